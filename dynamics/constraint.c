@@ -1,0 +1,234 @@
+/// Constraints at q: the rows of limits and friction losses, and what makes the law of each row and contact: R, h B, h K
+/// and the scale of smoothing (dynamics.md, 4). Two ways to them: MJCF's solref and solimp with their impedance curve,
+/// eqs. (27), (28); or the discrete step, critically damped with double pole z = exp(-h/kappa),
+/// h B = (1 + eps)(1 - z^2), h^2 K = (1 + eps)(1 - z)^2. Friction rows have K = 0. Contacts are found by collide.c,
+/// impulses are computed in inverse.c.
+///
+/// Which limits are rows: distance below the margin with solref (MuJoCo's rule). The discrete law looks at where the step
+/// ends, x + h v_next, so there a limit is a row from REACH_SPEED h before the margin: at a speed towards the limit
+/// below that, nothing is missed. The smoothed law adds where its force has decayed, REACH_SMOOTH delta.
+#include "math3.h"
+#include "workspace.h"
+
+static const double R_MIN = 1e-15, IMPEDANCE_MIN = 1e-4, IMPEDANCE_MAX = 0.9999, FRICTION_MIN = 1e-5;
+static const double REACH_SPEED = 20, REACH_SMOOTH = 12;
+
+/// R, h B and h K of one row.
+typedef struct law {
+  double regulariser, damping, stiffness;
+} law;
+
+static double larger(double a, double b) { return a > b ? a : b; }
+
+static double clamp(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
+
+// sigmoid of solimp on [0, 1]: a power on either side of the midpoint, meeting there with equal slope
+static double sigmoid(double x, double midpoint, double power) {
+  if (power == 1) { return x; }
+  if (power == 2) { return x <= midpoint ? x * x / midpoint : 1 - (1 - x) * (1 - x) / (1 - midpoint); }
+  if (x <= midpoint) { return pow(x, power) / pow(midpoint, power - 1); }
+  return 1 - pow(1 - x, power) / pow(1 - midpoint, power - 1);
+}
+
+// impedance d(x) of solimp at a violation x
+static double impedance(const double solimp[5], double x) {
+  double d0 = clamp(solimp[0], IMPEDANCE_MIN, IMPEDANCE_MAX), dw = clamp(solimp[1], IMPEDANCE_MIN, IMPEDANCE_MAX);
+  double width = solimp[2];
+  if (d0 == dw || width <= R_MIN) { return 0.5 * (d0 + dw); }
+  if (x >= width) { return dw; }
+  if (x <= 0) { return d0; }
+  double y = sigmoid(x / width, clamp(solimp[3], IMPEDANCE_MIN, IMPEDANCE_MAX), larger(1, solimp[4]));
+  return d0 + y * (dw - d0);
+}
+
+// by solref and solimp; violation x >= 0
+static law solref_law(const cav_state *state, const cav_softness *softness, double x, double weight) {
+  double h = state->options.timestep, d = impedance(softness->solimp, x);
+  double dw = clamp(softness->solimp[1], IMPEDANCE_MIN, IMPEDANCE_MAX);
+  double kappa = softness->solref[0], zeta = softness->solref[1];
+  law l = {larger(R_MIN, (1 - d) / d * weight), 0, 0};
+  if (kappa > 0) {
+    if (state->options.guard) { kappa = larger(kappa, 2 * h); }
+    l.damping = h * 2 / larger(R_MIN, dw * kappa);
+    l.stiffness = h * d / larger(R_MIN, dw * dw * kappa * kappa * zeta * zeta);
+  } else {
+    l.damping = h * -zeta / dw;
+    l.stiffness = h * -kappa * d / (dw * dw);
+  }
+  return l;
+}
+
+void cav_stabilise(cav_state *state) {
+  const cav_options *o = &state->options;
+  if (o->stabilisation != CAV_STABILISATION_DISCRETE) return;
+  double z = o->time_constant > 0 ? exp(-o->timestep / o->time_constant) : 0;
+  state->work->discrete_damping = (1 + o->softness) * (1 - z * z);
+  state->work->discrete_stiffness = (1 + o->softness) * (1 - z) * (1 - z) / o->timestep;
+}
+
+// by the discrete step: the same for every row but R
+static law discrete_law(const cav_state *state, double weight) {
+  const cav_workspace *w = state->work;
+  return (law){larger(R_MIN, state->options.softness * weight), w->discrete_damping, w->discrete_stiffness};
+}
+
+static law row_law(const cav_state *state, const cav_softness *softness, double x, double weight) {
+  if (state->options.stabilisation == CAV_STABILISATION_DISCRETE) return discrete_law(state, weight);
+  return solref_law(state, softness, larger(0, -x), weight);
+}
+
+// scale of the smoothed law felt at a distance delta
+static double smoothing_scale(const law *l, double delta) {
+  return delta > 0 ? l->stiffness * delta / sqrt(l->regulariser) : 0;
+}
+
+// distance over which limits and contacts between moving links are smoothed
+static double self_smoothing(const cav_state *state) {
+  return state->options.smoothing > 0 ? state->options.smoothing_self : 0;
+}
+
+double cav_limit_reach(const cav_state *state, double margin) {
+  double reach = margin + REACH_SMOOTH * self_smoothing(state);
+  if (state->options.stabilisation == CAV_STABILISATION_DISCRETE) { reach += REACH_SPEED * state->options.timestep; }
+  return reach;
+}
+
+// one more row with its law. Friction loss (bound > 0) has no position error; where the law is smoothed, its corners are
+// rounded over the velocity at which a limit of the same softness would be
+static cav_status add_row(cav_state *state, cav_row row, const cav_softness *softness, double weight) {
+  int friction = row.type == CAV_ROW_FRICTION_DOF || row.type == CAV_ROW_FRICTION_TENDON;
+  law l = row_law(state, softness, friction ? 0 : row.dist - row.margin, weight);
+  row.regulariser = l.regulariser;
+  row.damping = l.damping;
+  row.stiffness = friction ? 0 : l.stiffness;
+  row.sigma = smoothing_scale(&l, self_smoothing(state));
+  cav_row *slot = cav_row_push(state);
+  if (!slot) { return CAV_NO_MEMORY; }
+  *slot = row;
+  return CAV_OK;
+}
+
+static cav_status add_friction(const cav_model *model, cav_state *state) {
+  const cav_workspace *w = state->work;
+  cav_status status = CAV_OK;
+  for (int i = 0; i < w->nfriction && !status; i++) {
+    int k = w->friction[i];
+    const cav_dof *dof = &model->dof[k];
+    cav_row row = {.type = CAV_ROW_FRICTION_DOF, .object = k, .axis = {1}};
+    row.bound = state->options.timestep * dof->frictionloss;
+    status = add_row(state, row, &dof->friction, dof->inverse_weight);
+  }
+  for (int i = 0; i < w->ntendon_friction && !status; i++) {
+    int k = w->tendon_friction[i];
+    const cav_tendon *tendon = &model->tendon[k];
+    cav_row row = {.type = CAV_ROW_FRICTION_TENDON, .object = k, .axis = {1}};
+    row.bound = state->options.timestep * tendon->frictionloss;
+    status = add_row(state, row, &tendon->friction, tendon->inverse_weight);
+  }
+  return status;
+}
+
+// both ends of a scalar range
+static cav_status limit_scalar(cav_state *state, cav_row row, double value, const double range[2],
+                               const cav_softness *softness, double weight, double reach) {
+  cav_status status = CAV_OK;
+  for (int side = 0; side < 2 && !status; side++) {
+    row.side = side;
+    row.axis[0] = side ? -1 : 1;
+    row.dist = side ? range[1] - value : value - range[0];
+    if (row.dist < reach) { status = add_row(state, row, softness, weight); }
+  }
+  return status;
+}
+
+// largest rotation angle of a ball joint
+static cav_status limit_ball(cav_state *state, cav_row row, const cav_joint *joint, double weight, double reach) {
+  double turn[3];
+  quat_log(turn, state->work->q + joint->q);
+  row.side = 1;
+  row.dist = joint->range[1] - normalise3(turn);
+  scale3(row.axis, -1, turn);
+  return row.dist < reach ? add_row(state, row, &joint->limit, weight) : CAV_OK;
+}
+
+static cav_status add_limits(const cav_model *model, cav_state *state) {
+  const cav_workspace *w = state->work;
+  cav_status status = CAV_OK;
+  for (int i = 0; i < w->nlimit && !status; i++) {
+    int k = w->limit[i];
+    const cav_joint *joint = &model->joint[k];
+    double weight = model->dof[joint->dof].inverse_weight, reach = cav_limit_reach(state, joint->margin);
+    cav_row row = {.type = CAV_ROW_LIMIT_JOINT, .object = k, .margin = joint->margin};
+    if (joint->type == CAV_JOINT_BALL) {
+      status = limit_ball(state, row, joint, weight, reach);
+    } else {
+      status = limit_scalar(state, row, w->q[joint->q], joint->range, &joint->limit, weight, reach);
+    }
+  }
+  for (int i = 0; i < w->ntendon_limit && !status; i++) {
+    int k = w->tendon_limit[i];
+    const cav_tendon *tendon = &model->tendon[k];
+    cav_row row = {.type = CAV_ROW_LIMIT_TENDON, .object = k, .margin = tendon->margin};
+    status = limit_scalar(state, row, state->tendon_length[k], tendon->range, &tendon->limit, tendon->inverse_weight,
+                          cav_limit_reach(state, tendon->margin));
+  }
+  return status;
+}
+
+cav_status cav_rows(const cav_model *model, cav_state *state) {
+  state->nrow = 0;
+  if (!state->options.constraint) { return CAV_OK; }
+  cav_status status = add_friction(model, state);
+  return status ? status : add_limits(model, state);
+}
+
+// R of the friction rows so that R_j mu_j^2 is the same for all (22); all rows share the damping
+static void soften_contact(cav_state *state, cav_contact *c, double inverse_impratio) {
+  const cav_pair *pair = &state->model->pair[c->pair];
+  law l = row_law(state, &pair->softness, c->dist - c->margin, pair->weight[0]);
+  c->stiffness = l.stiffness;
+  c->sigma = smoothing_scale(&l, pair->same_world ? state->options.smoothing : self_smoothing(state));
+  c->regulariser[0] = l.regulariser;
+  c->damping[0] = l.damping;
+  for (int k = 1; k < c->dim; k++) {
+    double *mu = &c->friction[k - 1];
+    *mu = larger(*mu, FRICTION_MIN);
+    double ratio = *mu == c->friction[0] ? 1 : c->friction[0] / *mu;
+    c->regulariser[k] = larger(R_MIN, l.regulariser * inverse_impratio) * ratio * ratio;
+    c->damping[k] = l.damping;
+  }
+}
+
+void cav_soften(cav_state *state) {
+  double inverse_impratio = 1 / larger(R_MIN, state->options.impratio);
+  for (int i = 0; i < state->ncontact; i++) soften_contact(state, &state->contact[i], inverse_impratio);
+}
+
+double cav_row_velocity(const cav_model *model, const cav_row *row, const double *v) {
+  switch (row->type) {
+    case CAV_ROW_LIMIT_JOINT: {
+      const cav_joint *joint = &model->joint[row->object];
+      return joint->type == CAV_JOINT_BALL ? dot3(row->axis, v + joint->dof) : row->axis[0] * v[joint->dof];
+    }
+    case CAV_ROW_FRICTION_DOF:
+      return v[row->object];
+    default:
+      return row->axis[0] * cav_tendon_velocity(model, row->object, v);
+  }
+}
+
+void cav_row_push_force(const cav_model *model, const cav_row *row, double force, double *u) {
+  switch (row->type) {
+    case CAV_ROW_LIMIT_JOINT: {
+      const cav_joint *joint = &model->joint[row->object];
+      int n = joint->type == CAV_JOINT_BALL ? 3 : 1;
+      for (int k = 0; k < n; k++) { u[joint->dof + k] += row->axis[k] * force; }
+      break;
+    }
+    case CAV_ROW_FRICTION_DOF:
+      u[row->object] += force;
+      break;
+    default:
+      cav_tendon_pull(model, row->object, row->axis[0] * force, u);
+  }
+}

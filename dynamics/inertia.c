@@ -1,0 +1,69 @@
+/// The inertia matrix M(q) by the composite rigid body method (Featherstone 2008, section 6.2), tree-sparse as ldl.c
+/// stores it, or dense. Only the forward step, reference weights and callers who ask need it: the inverse does not.
+/// A composite is ten numbers at the tree's reference point: mass, first moment, inertia.
+#include "math3.h"
+#include "workspace.h"
+
+// each link's own mass, first moment and inertia at the reference, then sums towards the root
+static void composites(const cav_model *model, cav_state *state) {
+  double *all = state->work->composite;
+  for (int i = 1; i < model->nlink; i++) {
+    double *c = all + 10 * i, d[3], m = model->link[i].mass;
+    sub3(d, state->com + 3 * i, state->reference + 3 * i);
+    c[0] = m;
+    scale3(c + 1, m, d);
+    const double *I = state->inertia + 6 * i;
+    c[4] = I[0] + m * (d[1] * d[1] + d[2] * d[2]);
+    c[5] = I[1] + m * (d[0] * d[0] + d[2] * d[2]);
+    c[6] = I[2] + m * (d[0] * d[0] + d[1] * d[1]);
+    c[7] = I[3] - m * d[0] * d[1];
+    c[8] = I[4] - m * d[0] * d[2];
+    c[9] = I[5] - m * d[1] * d[2];
+  }
+  for (int i = model->nlink - 1; i > 0; i--) {
+    int parent = model->link[i].parent;
+    if (parent > 0) {
+      for (int k = 0; k < 10; k++) { all[10 * parent + k] += all[10 * i + k]; }
+    }
+  }
+}
+
+// wrench that gives the composite unit acceleration along S: (I a + c x l, m l + a x c) for S = (a, l), first moment c
+static void composite_mul(double F[6], const double c[10], const double S[6]) {
+  symmetric_mul(F, c + 4, S);
+  cross_add3(F, c + 1, S + 3);
+  scale3(F + 3, c[0], S + 3);
+  cross_add3(F + 3, S, c + 1);
+}
+
+double cav_added_inertia(const cav_model *model, const cav_state *state, int dof) {
+  const cav_dof *d = &model->dof[dof];
+  int implicit = state->options.order == CAV_ORDER_EULER && state->options.passive;
+  return d->armature + (implicit ? state->options.timestep * d->damping : 0);
+}
+
+void cav_composite_inertia(const cav_model *model, cav_state *state, double *M) {
+  const cav_workspace *w = state->work;
+  composites(model, state);
+  for (int i = 0; i < model->nv; i++) {
+    double F[6], *Mi = M + w->row[i];
+    composite_mul(F, w->composite + 10 * model->dof[i].link, state->axis + 6 * i);
+    for (int j = i, k = 0; j >= 0; j = w->parent[j], k++) { Mi[k] = dot6(F, state->axis + 6 * j); }
+  }
+}
+
+cav_status cav_inertia(const cav_model *model, cav_state *state, const double *q, double *M) {
+  if (!all_finite(q, model->nq)) { return CAV_NOT_FINITE; }
+  cav_workspace *w = state->work;
+  w->valid = CAV_STAGE_NONE;
+  cav_kinematics(model, state, q);
+  cav_composite_inertia(model, state, w->M);
+  int nv = model->nv;
+  memset(M, 0, (size_t)nv * (size_t)nv * sizeof *M);
+  for (int i = 0; i < nv; i++) {
+    const double *Mi = w->M + w->row[i];
+    for (int j = i, k = 0; j >= 0; j = w->parent[j], k++) { M[i * nv + j] = M[j * nv + i] = Mi[k]; }
+    M[i * nv + i] += cav_added_inertia(model, state, i);
+  }
+  return CAV_OK;
+}

@@ -1,0 +1,68 @@
+/// Forces of dofs and tendons that do not pass through links: armature, damping, springs. Springs of free and ball joints
+/// act along the rotation vector from q0, in body axes. Damping of joints and tendons is linear in one velocity, which
+/// the order of the step chooses. Fluid forces are not computed.
+#include "math3.h"
+#include "workspace.h"
+
+// u += k log(rest^-1 q)
+static void turning_spring(double stiffness, const double *q, const double *rest, double *u) {
+  double from[4], between[4], w[3];
+  quat_conjugate(from, rest);
+  quat_normalise(from);
+  quat_mul(between, from, q);
+  quat_log(w, between);
+  axpy3(u, u, stiffness, w);
+}
+
+static void joint_spring(const cav_model *model, const cav_joint *joint, const double *q, double *u) {
+  const double *rest = model->q0 + joint->q, *at = q + joint->q;
+  double *to = u + joint->dof, stretch[3];
+  switch (joint->type) {
+    case CAV_JOINT_FREE:
+      sub3(stretch, at, rest);
+      axpy3(to, to, joint->stiffness, stretch);
+      turning_spring(joint->stiffness, at + 3, rest + 3, to + 3);
+      break;
+    case CAV_JOINT_BALL:
+      turning_spring(joint->stiffness, at, rest, to);
+      break;
+    default:
+      to[0] += joint->stiffness * (at[0] - joint->springref);
+  }
+}
+
+double cav_tendon_velocity(const cav_model *model, int tendon, const double *v) {
+  const cav_tendon *t = &model->tendon[tendon];
+  const cav_tendon_part *part = &model->tendon_part[t->part];
+  double sum = 0;
+  for (int k = 0; k < t->npart; k++) { sum += part[k].coef * v[model->joint[part[k].joint].dof]; }
+  return sum;
+}
+
+void cav_tendon_pull(const cav_model *model, int tendon, double force, double *u) {
+  const cav_tendon *t = &model->tendon[tendon];
+  const cav_tendon_part *part = &model->tendon_part[t->part];
+  for (int k = 0; k < t->npart; k++) { u[model->joint[part[k].joint].dof] += part[k].coef * force; }
+}
+
+void cav_add_joint_forces(const cav_model *model, const cav_state *state, const double *v, const double *a, double *u) {
+  const cav_workspace *w = state->work;
+  for (int i = 0; i < model->nv; i++) { u[i] += w->armature[i] * a[i]; }
+  if (!state->options.passive) { return; }
+  if (w->damped) {
+    for (int i = 0; i < model->nv; i++) { u[i] += w->damping[i] * v[i]; }
+  }
+  for (int i = 0; i < w->nspring; i++) { joint_spring(model, &model->joint[w->spring[i]], w->q, u); }
+}
+
+void cav_add_tendon_forces(const cav_model *model, const cav_state *state, const double *v, double *u) {
+  const cav_workspace *w = state->work;
+  if (!state->options.passive) { return; }
+  for (int i = 0; i < w->ntendon_spring; i++) {
+    int k = w->tendon_spring[i];
+    const cav_tendon *tendon = &model->tendon[k];
+    double stretch = state->tendon_length[k] - tendon->springlength;
+    double force = tendon->stiffness * stretch + tendon->damping * cav_tendon_velocity(model, k, v);
+    cav_tendon_pull(model, k, force, u);
+  }
+}

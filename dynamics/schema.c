@@ -1,0 +1,410 @@
+/// The grammar of MJCF: which elements and attributes a model file may have, and of what type.
+///
+/// Names and counts are those of the MJCF reference for MuJoCo 2.2.2, plus the frame element of later versions. What is
+/// only seen (visual, asset textures, camera, light, statistic, size, custom) is accepted unread. What has an effect but is
+/// not offered is in the table too: mjcf.c says so with the line, which is clearer than "unknown element".
+
+#include "spec.h"
+
+#define TEXT(name) \
+  { name, CAV_XML_TEXT, 0, 0, NULL, 0 }
+#define NAMED(name) \
+  { name, CAV_XML_TEXT, 1, 0, NULL, 0 }
+#define NEEDED(name) \
+  { name, CAV_XML_TEXT, 1, 0, NULL, 1 }
+#define INT(name) \
+  { name, CAV_XML_INT, 1, 1, NULL, 0 }
+#define INTS(name, n) \
+  { name, CAV_XML_INT, n, n, NULL, 0 }
+#define REAL(name) \
+  { name, CAV_XML_REAL, 1, 1, NULL, 0 }
+#define REALS(name, least, most) \
+  { name, CAV_XML_REAL, least, most, NULL, 0 }
+#define WORD(name, words) \
+  { name, CAV_XML_WORD, 0, 0, words, 0 }
+#define BOOL(name) \
+  { name, CAV_XML_BOOL, 0, 0, NULL, 0 }
+#define SKIP(name) \
+  { name, CAV_XML_SKIP, 0, 0, NULL, 0 }
+#define END \
+  { NULL, CAV_XML_SKIP, 0, 0, NULL, 0 }
+
+// words in the order of the enumerations that mjcf.c casts them to
+static const char *const truth[] = {"false", "true", "auto", NULL};
+static const char *const onoff[] = {"disable", "enable", NULL};
+static const char *const angles[] = {"radian", "degree", NULL};
+static const char *const coordinates[] = {"local", "global", NULL};
+static const char *const collisions[] = {"all", "predefined", "dynamic", NULL};
+static const char *const cones[] = {"elliptic", "pyramidal", NULL};
+static const char *const integrators[] = {"Euler", "RK4", "implicit", "implicitfast", NULL};
+static const char *const joints[] = {"free", "ball", "slide", "hinge", NULL};
+static const char *const geoms[] = {"plane", "sphere", "capsule", "ellipsoid", "cylinder",
+                                    "box",   "mesh",   "hfield",  NULL};
+static const char *const objects[] = {"body", "xbody", "geom", "site", "camera", NULL};
+static const char *const dyntypes[] = {"none", "integrator", "filter", "muscle", "user", NULL};
+static const char *const gaintypes[] = {"fixed", "affine", "muscle", "user", NULL};
+static const char *const biastypes[] = {"none", "affine", "muscle", "user", NULL};
+
+// --- attributes shared by defaults and objects ---
+
+#define ORIENTATION \
+  REALS("quat", 4, 4), REALS("axisangle", 4, 4), REALS("xyaxes", 6, 6), REALS("zaxis", 3, 3), REALS("euler", 3, 3)
+
+#define JOINT                                                                                                        \
+  WORD("type", joints), SKIP("group"), REALS("pos", 3, 3), REALS("axis", 3, 3), REALS("springdamper", 2, 2),         \
+      WORD("limited", truth), REALS("solreflimit", 1, 2), REALS("solimplimit", 1, 5), REALS("solreffriction", 1, 2), \
+      REALS("solimpfriction", 1, 5), REAL("stiffness"), REALS("range", 2, 2), REAL("margin"), REAL("ref"),           \
+      REAL("springref"), REAL("armature"), REAL("damping"), REAL("frictionloss"), SKIP("user")
+
+#define GEOM                                                                                                        \
+  WORD("type", geoms), REALS("pos", 3, 3), ORIENTATION, INT("contype"), INT("conaffinity"), INT("condim"),          \
+      INT("group"), INT("priority"), REALS("size", 1, 3), NAMED("material"), REALS("friction", 1, 3), REAL("mass"), \
+      REAL("density"), BOOL("shellinertia"), REAL("solmix"), REALS("solref", 1, 2), REALS("solimp", 1, 5),          \
+      REAL("margin"), REAL("gap"), REALS("fromto", 6, 6), NAMED("hfield"), NAMED("mesh"), SKIP("fitscale"),         \
+      REALS("rgba", 4, 4), SKIP("fluidshape"), SKIP("fluidcoef"), SKIP("user")
+
+#define SITE                                                                                                           \
+  SKIP("type"), SKIP("group"), REALS("pos", 3, 3), ORIENTATION, SKIP("material"), SKIP("size"), REALS("fromto", 6, 6), \
+      SKIP("rgba"), SKIP("user")
+
+#define PAIR \
+  INT("condim"), REALS("friction", 1, 5), REALS("solref", 1, 2), REALS("solimp", 1, 5), REAL("gap"), REAL("margin")
+
+#define TENDON                                                                                                         \
+  SKIP("group"), WORD("limited", truth), REALS("range", 2, 2), REALS("solreflimit", 1, 2), REALS("solimplimit", 1, 5), \
+      REALS("solreffriction", 1, 2), REALS("solimpfriction", 1, 5), REAL("frictionloss"), REAL("springlength"),        \
+      SKIP("width"), SKIP("material"), REAL("margin"), REAL("stiffness"), REAL("damping"), SKIP("rgba"), SKIP("user")
+
+#define ACTUATOR                                                                                                \
+  WORD("ctrllimited", truth), WORD("forcelimited", truth), REALS("ctrlrange", 2, 2), REALS("forcerange", 2, 2), \
+      REALS("gear", 1, 6), SKIP("cranklength"), SKIP("user"), SKIP("group")
+
+#define GENERAL                                                                                 \
+  SKIP("actlimited"), SKIP("actrange"), WORD("dyntype", dyntypes), WORD("gaintype", gaintypes), \
+      WORD("biastype", biastypes), SKIP("dynprm"), REALS("gainprm", 1, 10), SKIP("biasprm")
+
+#define TRANSMISSION                                                                                           \
+  NAMED("name"), NAMED("class"), SKIP("lengthrange"), NAMED("joint"), NAMED("jointinparent"), NAMED("tendon"), \
+      NAMED("slidersite"), NAMED("cranksite"), NAMED("site"), NAMED("refsite"), NAMED("body")
+
+// --- elements without children, or with children of no interest ---
+
+static const cav_xml_attribute include_attributes[] = {NEEDED("file"), END};
+static const cav_xml_element include = {"include", 0, 0, include_attributes, NULL, CAV_XML_INCLUDE};
+
+#define LEAF(id, name, ...)                                              \
+  static const cav_xml_attribute id##_attributes[] = {__VA_ARGS__, END}; \
+  static const cav_xml_element id = {name, 0, 0, id##_attributes, NULL, 0}
+
+#define UNREAD(id, name) static const cav_xml_element id = {name, 0, 0, NULL, NULL, CAV_XML_ANYTHING}
+
+UNREAD(size, "size");
+UNREAD(visual, "visual");
+UNREAD(statistic, "statistic");
+UNREAD(custom, "custom");
+UNREAD(lengthrange, "lengthrange");
+UNREAD(texture, "texture");
+UNREAD(mesh, "mesh");
+UNREAD(hfield, "hfield");
+UNREAD(skin, "skin");
+UNREAD(camera, "camera");
+UNREAD(light, "light");
+UNREAD(composite, "composite");
+
+static const cav_xml_attribute compiler_attributes[] = {BOOL("autolimits"),
+                                                        REAL("boundmass"),
+                                                        REAL("boundinertia"),
+                                                        REAL("settotalmass"),
+                                                        BOOL("balanceinertia"),
+                                                        SKIP("strippath"),
+                                                        WORD("coordinate", coordinates),
+                                                        WORD("angle", angles),
+                                                        SKIP("fitaabb"),
+                                                        NAMED("eulerseq"),
+                                                        SKIP("meshdir"),
+                                                        SKIP("texturedir"),
+                                                        SKIP("assetdir"),
+                                                        SKIP("discardvisual"),
+                                                        SKIP("convexhull"),
+                                                        SKIP("usethread"),
+                                                        BOOL("fusestatic"),
+                                                        WORD("inertiafromgeom", truth),
+                                                        INTS("inertiagrouprange", 2),
+                                                        SKIP("exactmeshinertia"),
+                                                        END};
+static const cav_xml_element *const compiler_children[] = {&lengthrange, &include, NULL};
+static const cav_xml_element compiler = {"compiler", 0, 0, compiler_attributes, compiler_children, 0};
+
+LEAF(flag, "flag", WORD("constraint", onoff), WORD("equality", onoff), WORD("frictionloss", onoff),
+     WORD("limit", onoff), WORD("contact", onoff), WORD("passive", onoff), WORD("gravity", onoff),
+     WORD("clampctrl", onoff), SKIP("warmstart"), WORD("filterparent", onoff), WORD("actuation", onoff),
+     WORD("refsafe", onoff), SKIP("sensor"), WORD("override", onoff), SKIP("energy"), SKIP("fwdinv"),
+     SKIP("sensornoise"), WORD("multiccd", onoff));
+static const cav_xml_attribute option_attributes[] = {REAL("timestep"),
+                                                      SKIP("apirate"),
+                                                      REAL("impratio"),
+                                                      SKIP("tolerance"),
+                                                      SKIP("noslip_tolerance"),
+                                                      SKIP("mpr_tolerance"),
+                                                      REALS("gravity", 3, 3),
+                                                      SKIP("wind"),
+                                                      SKIP("magnetic"),
+                                                      REAL("density"),
+                                                      REAL("viscosity"),
+                                                      SKIP("o_margin"),
+                                                      SKIP("o_solref"),
+                                                      SKIP("o_solimp"),
+                                                      WORD("integrator", integrators),
+                                                      WORD("collision", collisions),
+                                                      WORD("cone", cones),
+                                                      SKIP("jacobian"),
+                                                      SKIP("solver"),
+                                                      SKIP("iterations"),
+                                                      INT("noslip_iterations"),
+                                                      SKIP("mpr_iterations"),
+                                                      END};
+static const cav_xml_element *const option_children[] = {&flag, &include, NULL};
+static const cav_xml_element option = {"option", 0, 0, option_attributes, option_children, 0};
+
+// --- defaults ---
+
+LEAF(default_mesh, "mesh", SKIP("scale"));
+LEAF(default_material, "material", SKIP("texture"), SKIP("emission"), SKIP("specular"), SKIP("shininess"),
+     SKIP("reflectance"), REALS("rgba", 4, 4), SKIP("texrepeat"), SKIP("texuniform"));
+LEAF(default_joint, "joint", JOINT);
+LEAF(default_geom, "geom", GEOM);
+LEAF(default_site, "site", SITE);
+LEAF(default_pair, "pair", PAIR);
+UNREAD(default_equality, "equality");
+LEAF(default_tendon, "tendon", TENDON);
+LEAF(default_general, "general", ACTUATOR, GENERAL);
+LEAF(default_motor, "motor", ACTUATOR);
+LEAF(default_position, "position", ACTUATOR, SKIP("kp"));
+LEAF(default_velocity, "velocity", ACTUATOR, SKIP("kv"));
+LEAF(default_intvelocity, "intvelocity", ACTUATOR, SKIP("actrange"), SKIP("kp"));
+LEAF(default_damper, "damper", ACTUATOR, SKIP("kv"));
+LEAF(default_cylinder, "cylinder", ACTUATOR, SKIP("timeconst"), SKIP("area"), SKIP("diameter"), SKIP("bias"));
+LEAF(default_muscle, "muscle", ACTUATOR, SKIP("timeconst"), SKIP("range"), SKIP("force"), SKIP("scale"), SKIP("lmin"),
+     SKIP("lmax"), SKIP("vmax"), SKIP("fpmax"), SKIP("fvmax"));
+LEAF(default_adhesion, "adhesion", ACTUATOR, SKIP("gain"));
+
+static const cav_xml_attribute default_attributes[] = {NAMED("class"), END};
+static const cav_xml_element defaults;
+static const cav_xml_element *const default_children[] = {&default_mesh,
+                                                          &default_material,
+                                                          &default_joint,
+                                                          &default_geom,
+                                                          &default_site,
+                                                          &default_pair,
+                                                          &default_equality,
+                                                          &default_tendon,
+                                                          &default_general,
+                                                          &default_motor,
+                                                          &default_position,
+                                                          &default_velocity,
+                                                          &default_damper,
+                                                          &default_cylinder,
+                                                          &default_muscle,
+                                                          &default_adhesion,
+                                                          &default_intvelocity,
+                                                          &camera,
+                                                          &light,
+                                                          &defaults,
+                                                          &include,
+                                                          NULL};
+static const cav_xml_element defaults = {"default", 0, 0, default_attributes, default_children, 0};
+
+// --- assets ---
+
+LEAF(material, "material", NEEDED("name"), NAMED("class"), SKIP("texture"), SKIP("texrepeat"), SKIP("texuniform"),
+     SKIP("emission"), SKIP("specular"), SKIP("shininess"), SKIP("reflectance"), REALS("rgba", 4, 4));
+static const cav_xml_element *const asset_children[] = {&texture, &hfield, &mesh, &skin, &material, &include, NULL};
+static const cav_xml_element asset = {"asset", 0, 0, NULL, asset_children, 0};
+
+// --- bodies ---
+
+static const cav_xml_attribute inertial_attributes[] = {{"pos", CAV_XML_REAL, 3, 3, NULL, 1},
+                                                        ORIENTATION,
+                                                        {"mass", CAV_XML_REAL, 1, 1, NULL, 1},
+                                                        REALS("diaginertia", 3, 3),
+                                                        REALS("fullinertia", 6, 6),
+                                                        END};
+static const cav_xml_element inertial = {"inertial", 0, 1, inertial_attributes, NULL, 0};
+LEAF(joint, "joint", NAMED("name"), NAMED("class"), JOINT);
+LEAF(freejoint, "freejoint", NAMED("name"), SKIP("group"));
+LEAF(geom, "geom", NAMED("name"), NAMED("class"), GEOM);
+LEAF(site, "site", NAMED("name"), NAMED("class"), SITE);
+static const cav_xml_attribute frame_attributes[] = {NAMED("name"), NAMED("childclass"), REALS("pos", 3, 3),
+                                                     ORIENTATION, END};
+static const cav_xml_attribute body_attributes[] = {
+    NAMED("name"), NAMED("childclass"), REALS("pos", 3, 3), ORIENTATION, BOOL("mocap"), SKIP("user"), END};
+static const cav_xml_element body, frame;
+static const cav_xml_element *const body_children[] = {&inertial, &joint,     &freejoint, &geom, &site,    &camera,
+                                                       &light,    &composite, &frame,     &body, &include, NULL};
+static const cav_xml_element *const frame_children[] = {&joint,     &freejoint, &geom, &site,    &camera, &light,
+                                                        &composite, &frame,     &body, &include, NULL};
+static const cav_xml_element *const world_children[] = {&geom,  &site, &camera,  &light, &composite,
+                                                        &frame, &body, &include, NULL};
+static const cav_xml_element frame = {"frame", 0, 0, frame_attributes, frame_children, 0};
+static const cav_xml_element body = {"body", 0, 0, body_attributes, body_children, 0};
+static const cav_xml_attribute world_attributes[] = {NAMED("name"), NAMED("childclass"), END};
+static const cav_xml_element worldbody = {"worldbody", 0, 0, world_attributes, world_children, 0};
+
+// --- contact, equality, tendon ---
+
+LEAF(pair, "pair", NAMED("name"), NAMED("class"), NEEDED("geom1"), NEEDED("geom2"), PAIR);
+LEAF(exclude, "exclude", NAMED("name"), NEEDED("body1"), NEEDED("body2"));
+static const cav_xml_element *const contact_children[] = {&pair, &exclude, &include, NULL};
+static const cav_xml_element contact = {"contact", 0, 0, NULL, contact_children, 0};
+
+LEAF(connect, "connect", NAMED("name"), NAMED("class"), BOOL("active"), SKIP("body1"), SKIP("body2"), SKIP("anchor"),
+     SKIP("solref"), SKIP("solimp"));
+LEAF(weld, "weld", NAMED("name"), NAMED("class"), BOOL("active"), SKIP("body1"), SKIP("body2"), SKIP("relpose"),
+     SKIP("anchor"), SKIP("solref"), SKIP("solimp"), SKIP("torquescale"));
+LEAF(equality_joint, "joint", NAMED("name"), NAMED("class"), BOOL("active"), SKIP("joint1"), SKIP("joint2"),
+     SKIP("polycoef"), SKIP("solref"), SKIP("solimp"));
+LEAF(equality_tendon, "tendon", NAMED("name"), NAMED("class"), BOOL("active"), SKIP("tendon1"), SKIP("tendon2"),
+     SKIP("polycoef"), SKIP("solref"), SKIP("solimp"));
+LEAF(equality_distance, "distance", NAMED("name"), NAMED("class"), BOOL("active"), SKIP("geom1"), SKIP("geom2"),
+     SKIP("distance"), SKIP("solref"), SKIP("solimp"));
+static const cav_xml_element *const equality_children[] = {
+    &connect, &weld, &equality_joint, &equality_tendon, &equality_distance, &include, NULL};
+static const cav_xml_element equality = {"equality", 0, 0, NULL, equality_children, 0};
+
+static const cav_xml_attribute part_attributes[] = {NEEDED("joint"), {"coef", CAV_XML_REAL, 1, 1, NULL, 1}, END};
+static const cav_xml_element part = {"joint", 1, 0, part_attributes, NULL, 0};
+static const cav_xml_attribute tendon_attributes[] = {NAMED("name"), NAMED("class"), TENDON, END};
+static const cav_xml_element *const fixed_children[] = {&part, &include, NULL};
+static const cav_xml_element fixed = {"fixed", 0, 0, tendon_attributes, fixed_children, 0};
+UNREAD(via_site, "site");
+UNREAD(via_geom, "geom");
+UNREAD(pulley, "pulley");
+static const cav_xml_element *const spatial_children[] = {&via_site, &via_geom, &pulley, &include, NULL};
+static const cav_xml_element spatial = {"spatial", 0, 0, tendon_attributes, spatial_children, 0};
+static const cav_xml_element *const tendon_children[] = {&fixed, &spatial, &include, NULL};
+static const cav_xml_element tendon = {"tendon", 0, 0, NULL, tendon_children, 0};
+
+// --- actuators ---
+
+LEAF(general, "general", TRANSMISSION, ACTUATOR, GENERAL);
+LEAF(motor, "motor", TRANSMISSION, ACTUATOR);
+UNREAD(position, "position");
+UNREAD(velocity, "velocity");
+UNREAD(intvelocity, "intvelocity");
+UNREAD(damper, "damper");
+UNREAD(cylinder, "cylinder");
+UNREAD(muscle, "muscle");
+UNREAD(adhesion, "adhesion");
+static const cav_xml_element *const actuator_children[] = {
+    &general, &motor, &position, &velocity, &intvelocity, &damper, &cylinder, &muscle, &adhesion, &include, NULL};
+static const cav_xml_element actuator = {"actuator", 0, 0, NULL, actuator_children, 0};
+
+// --- sensors ---
+
+#define READING REAL("cutoff"), SKIP("noise"), SKIP("user")
+LEAF(jointpos, "jointpos", NAMED("name"), NEEDED("joint"), READING);
+LEAF(jointvel, "jointvel", NAMED("name"), NEEDED("joint"), READING);
+LEAF(subtreecom, "subtreecom", NAMED("name"), NEEDED("body"), READING);
+LEAF(subtreelinvel, "subtreelinvel", NAMED("name"), NEEDED("body"), READING);
+LEAF(subtreeangmom, "subtreeangmom", NAMED("name"), NEEDED("body"), READING);
+
+static const cav_xml_attribute frame_sensor_attributes[] = {NAMED("name"),
+                                                            {"objtype", CAV_XML_WORD, 0, 0, objects, 1},
+                                                            NEEDED("objname"),
+                                                            WORD("reftype", objects),
+                                                            NAMED("refname"),
+                                                            READING,
+                                                            END};
+#define FRAME_SENSOR(id) static const cav_xml_element id = {#id, 0, 0, frame_sensor_attributes, NULL, 0}
+FRAME_SENSOR(framepos);
+FRAME_SENSOR(framequat);
+FRAME_SENSOR(framexaxis);
+FRAME_SENSOR(frameyaxis);
+FRAME_SENSOR(framezaxis);
+FRAME_SENSOR(framelinvel);
+FRAME_SENSOR(frameangvel);
+
+// sensors of MJCF that are not offered: mjcf.c warns of each
+#define OTHER_SENSOR(id) static const cav_xml_element sensor_##id = {#id, 0, 0, NULL, NULL, CAV_XML_ANYTHING}
+OTHER_SENSOR(touch);
+OTHER_SENSOR(accelerometer);
+OTHER_SENSOR(velocimeter);
+OTHER_SENSOR(gyro);
+OTHER_SENSOR(force);
+OTHER_SENSOR(torque);
+OTHER_SENSOR(magnetometer);
+OTHER_SENSOR(rangefinder);
+OTHER_SENSOR(tendonpos);
+OTHER_SENSOR(tendonvel);
+OTHER_SENSOR(actuatorpos);
+OTHER_SENSOR(actuatorvel);
+OTHER_SENSOR(actuatorfrc);
+OTHER_SENSOR(ballquat);
+OTHER_SENSOR(ballangvel);
+OTHER_SENSOR(jointlimitpos);
+OTHER_SENSOR(jointlimitvel);
+OTHER_SENSOR(jointlimitfrc);
+OTHER_SENSOR(tendonlimitpos);
+OTHER_SENSOR(tendonlimitvel);
+OTHER_SENSOR(tendonlimitfrc);
+OTHER_SENSOR(framelinacc);
+OTHER_SENSOR(frameangacc);
+OTHER_SENSOR(clock);
+OTHER_SENSOR(user);
+
+static const cav_xml_element *const sensor_children[] = {&jointpos,
+                                                         &jointvel,
+                                                         &framepos,
+                                                         &framequat,
+                                                         &framexaxis,
+                                                         &frameyaxis,
+                                                         &framezaxis,
+                                                         &framelinvel,
+                                                         &frameangvel,
+                                                         &subtreecom,
+                                                         &subtreelinvel,
+                                                         &subtreeangmom,
+                                                         &sensor_touch,
+                                                         &sensor_accelerometer,
+                                                         &sensor_velocimeter,
+                                                         &sensor_gyro,
+                                                         &sensor_force,
+                                                         &sensor_torque,
+                                                         &sensor_magnetometer,
+                                                         &sensor_rangefinder,
+                                                         &sensor_tendonpos,
+                                                         &sensor_tendonvel,
+                                                         &sensor_actuatorpos,
+                                                         &sensor_actuatorvel,
+                                                         &sensor_actuatorfrc,
+                                                         &sensor_ballquat,
+                                                         &sensor_ballangvel,
+                                                         &sensor_jointlimitpos,
+                                                         &sensor_jointlimitvel,
+                                                         &sensor_jointlimitfrc,
+                                                         &sensor_tendonlimitpos,
+                                                         &sensor_tendonlimitvel,
+                                                         &sensor_tendonlimitfrc,
+                                                         &sensor_framelinacc,
+                                                         &sensor_frameangacc,
+                                                         &sensor_clock,
+                                                         &sensor_user,
+                                                         &include,
+                                                         NULL};
+static const cav_xml_element sensor = {"sensor", 0, 0, NULL, sensor_children, 0};
+
+// --- keyframes ---
+
+LEAF(key, "key", NAMED("name"), REAL("time"), REALS("qpos", 0, 0), REALS("qvel", 0, 0), SKIP("act"), SKIP("mpos"),
+     SKIP("mquat"), SKIP("ctrl"));
+static const cav_xml_element *const keyframe_children[] = {&key, &include, NULL};
+static const cav_xml_element keyframe = {"keyframe", 0, 0, NULL, keyframe_children, 0};
+
+// --- the file ---
+
+static const cav_xml_attribute mujoco_attributes[] = {TEXT("model"), END};
+static const cav_xml_element *const mujoco_children[] = {
+    &compiler, &option,   &size,   &visual,   &statistic, &defaults, &custom,  &asset, &worldbody,
+    &contact,  &equality, &tendon, &actuator, &sensor,    &keyframe, &include, NULL};
+static const cav_xml_element mujoco = {"mujoco", 0, 0, mujoco_attributes, mujoco_children, 0};
+const cav_xml_element *const cav_mjcf_roots[] = {&mujoco, NULL};

@@ -1,0 +1,108 @@
+/// What all readers of models share: growing lists, the first failure, warnings, checks of single values.
+
+#include "spec.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+int cav_spec_grow(cav_spec *spec, void **at, int *n, int *room, size_t size) {
+  if (spec->status != CAV_OK) return 0;
+  if (*n == *room) {
+    int more = *room ? 2 * *room : 16;
+    void *moved = realloc(*at, (size_t)more * size);
+    if (!moved) {
+      cav_spec_no_memory(spec);
+      return 0;
+    }
+    *at = moved;
+    *room = more;
+  }
+  memset((char *)*at + (size_t)*n * size, 0, size);
+  ++*n;
+  return 1;
+}
+
+void cav_spec_no_memory(cav_spec *spec) {
+  if (spec->status != CAV_OK) return;
+  spec->status = CAV_NO_MEMORY;
+  if (!spec->error) return;
+  spec->error->status = CAV_NO_MEMORY;
+  spec->error->line = 0;
+  snprintf(spec->error->text, sizeof spec->error->text, "%.400s: no memory to build the model",
+           cav_xml_path(spec->xml));
+}
+
+void cav_spec_fail(cav_spec *spec, const cav_xml_node *node, const char *attribute, const char *format, ...) {
+  if (spec->status != CAV_OK) return;
+  char text[600];
+  va_list args;
+  va_start(args, format);
+  vsnprintf(text, sizeof text, format, args);
+  va_end(args);
+  spec->status = cav_xml_fail(spec->error, node, attribute, "%s", text);
+}
+
+void cav_spec_warn(cav_spec *spec, const cav_xml_node *node, const char *attribute, const char *format, ...) {
+  char text[600];
+  va_list args;
+  va_start(args, format);
+  vsnprintf(text, sizeof text, format, args);
+  va_end(args);
+  cav_error whole;
+  cav_xml_fail(&whole, node, attribute, "%s", text);
+  char **warning = CAV_SPEC_PUSH(spec, &spec->warning);
+  if (!warning) return;
+  *warning = strdup(whole.text);
+  if (!*warning) cav_spec_no_memory(spec);
+}
+
+void cav_spec_unknown(cav_spec *spec, const cav_xml_node *node, const char *attribute, const char *kind,
+                      const char *name, const void *first, int n, size_t stride) {
+  const char *near = cav_xml_nearest(name, first, n, stride);
+  if (near)
+    cav_spec_fail(spec, node, attribute, "no %s is named '%.60s'; did you mean '%.60s'?", kind, name, near);
+  else
+    cav_spec_fail(spec, node, attribute, "no %s is named '%.60s'; correct the name", kind, name);
+}
+
+void cav_spec_clear(cav_spec *spec) {
+  for (int i = 0; i < spec->warning.n; i++) free(spec->warning.at[i]);
+  free(spec->warning.at);
+  free(spec->body.at);
+  free(spec->joint.at);
+  free(spec->geom.at);
+  free(spec->site.at);
+  free(spec->pair.at);
+  free(spec->exclude.at);
+  free(spec->tendon.at);
+  free(spec->part.at);
+  free(spec->actuator.at);
+  free(spec->sensor.at);
+  free(spec->key.at);
+}
+
+// --- checks of single values ---
+
+void cav_check_not_negative(cav_spec *spec, const cav_xml_node *node, const char *name, double value) {
+  if (value < 0) cav_spec_fail(spec, node, name, "expected a number >= 0, got %g", value);
+}
+
+// solref: a time constant and a damping ratio, or both negative; solimp: within [0, 1], width and power in order
+void cav_check_softness(cav_spec *spec, const cav_xml_node *node, const char *where, const cav_softness *s) {
+  if ((s->solref[0] > 0) != (s->solref[1] > 0))
+    cav_spec_fail(spec, node, NULL,
+                  "solref%s %g %g: expected both > 0 (time constant, damping ratio) or both <= 0 (direct)", where,
+                  s->solref[0], s->solref[1]);
+  const double *d = s->solimp;
+  if (d[0] < 0 || d[0] > 1 || d[1] < 0 || d[1] > 1 || d[2] < 0 || d[3] < 0 || d[3] > 1 || d[4] < 1)
+    cav_spec_fail(spec, node, NULL,
+                  "solimp%s %g %g %g %g %g: expected impedances in [0, 1], width >= 0, midpoint in [0, 1], power >= 1",
+                  where, d[0], d[1], d[2], d[3], d[4]);
+}
+
+void cav_check_condim(cav_spec *spec, const cav_xml_node *node, int condim) {
+  if (condim != 1 && condim != 3 && condim != 4 && condim != 6)
+    cav_spec_fail(spec, node, "condim", "expected 1, 3, 4 or 6, got %d", condim);
+}

@@ -1,0 +1,235 @@
+/// A model as its file describes it, between reading (mjcf.c) and compiling (mass.c, filter.c, compile.c). Private.
+/// Lists are in the model's final order: bodies depth first, the objects of a body together, the rest as written.
+/// Angles are radians, poses are relative to the body (of a body: to its parent), defaults are applied. References are
+/// names until cav_compile resolves them. Texts belong to the tree of nodes, which outlives the spec.
+#ifndef CAVORT_SPEC_H
+#define CAVORT_SPEC_H
+
+#include "cavort/model.h"
+#include "xml.h"
+
+/// Whether a limit holds, as the file says.
+typedef enum cav_limited { CAV_LIMITED_NO, CAV_LIMITED_YES, CAV_LIMITED_AUTO } cav_limited;
+
+/// Mass, centre of mass and principal axes and moments in the body's (or geom's) frame.
+typedef struct cav_spec_inertia {
+  double mass, com[3], quat[4], moment[3];
+} cav_spec_inertia;
+
+typedef struct cav_spec_body {
+  const char *name;
+  const cav_xml_node *node;
+  int parent;
+  double pos[3], quat[4];
+  int joint, njoint, geom, ngeom;
+  int has_inertial; ///< the file gives inertia explicitly
+  double full[6];   ///< fullinertia where has_full: xx yy zz xy xz yz
+  int has_full;
+  cav_spec_inertia inertia; ///< explicit, or computed by mass.c
+} cav_spec_body;
+
+typedef struct cav_spec_joint {
+  const char *name;
+  const cav_xml_node *node;
+  int body;
+  cav_joint_type type;
+  double pos[3], axis[3], ref, springref, range[2], margin;
+  cav_limited limited;
+  cav_softness limit, friction;
+  double stiffness, damping, armature, frictionloss, springdamper[2];
+} cav_spec_joint;
+
+/// Shapes of a file: those of cav_geom_type, then what has no shape here.
+enum { CAV_SPEC_MESH = CAV_GEOM_TYPES, CAV_SPEC_HFIELD };
+
+typedef struct cav_spec_geom {
+  const char *name;
+  const cav_xml_node *node;
+  int body, type;
+  double pos[3], quat[4], size[3], fromto[6];
+  int has_fromto;
+  int contype, conaffinity, condim, priority, group;
+  double friction[3], margin, gap, solmix, mass, density;
+  int has_mass;
+  cav_softness softness;
+  double rgba[4];
+  const char *material, *mesh, *hfield;
+  cav_spec_inertia inertia; ///< of the shape, by mass.c; com is pos
+} cav_spec_geom;
+
+typedef struct cav_spec_site {
+  const char *name;
+  const cav_xml_node *node;
+  int body;
+  double pos[3], quat[4], fromto[6];
+  int has_fromto;
+} cav_spec_site;
+
+/// Explicit pair: its own parameters, nothing is taken from the two geoms.
+typedef struct cav_spec_pair {
+  const cav_xml_node *node;
+  const char *geom1, *geom2;
+  int condim;
+  double friction[5], margin, gap;
+  cav_softness softness;
+} cav_spec_pair;
+
+typedef struct cav_spec_exclude {
+  const cav_xml_node *node;
+  const char *body1, *body2;
+} cav_spec_exclude;
+
+typedef struct cav_spec_part {
+  const cav_xml_node *node;
+  const char *joint;
+  double coef;
+} cav_spec_part;
+
+typedef struct cav_spec_tendon {
+  const char *name;
+  const cav_xml_node *node;
+  int part, npart;
+  cav_limited limited;
+  double range[2], margin, stiffness, damping, frictionloss, springlength;
+  int has_springlength;
+  cav_softness limit, friction;
+} cav_spec_tendon;
+
+typedef struct cav_spec_actuator {
+  const char *name;
+  const cav_xml_node *node;
+  const char *joint, *tendon;
+  cav_limited ctrllimited, forcelimited;
+  double ctrlrange[2], forcerange[2], gear[6];
+  double gain;                     ///< force per control
+  int dyntype, gaintype, biastype; ///< all 0 for a motor
+} cav_spec_actuator;
+
+typedef struct cav_spec_sensor {
+  const char *name;
+  const cav_xml_node *node;
+  cav_sensor_type type;
+  cav_object_type object_type;
+  const char *object;
+} cav_spec_sensor;
+
+typedef struct cav_spec_key {
+  const char *name;
+  const cav_xml_node *node;
+  double time;
+  int nq, nv; ///< values given; 0: none
+  const double *q, *v;
+} cav_spec_key;
+
+typedef struct cav_spec_compiler {
+  int degree, autolimits, balance, from_geoms; ///< from_geoms, autolimits: 0 no, 1 yes, 2 not said
+  int group_range[2];
+  double bound_mass, bound_inertia, total_mass;
+  char euler[4];
+} cav_spec_compiler;
+
+typedef enum cav_collision { CAV_COLLISION_ALL, CAV_COLLISION_PAIRS, CAV_COLLISION_GEOMS } cav_collision;
+
+typedef struct cav_spec_option {
+  double timestep, gravity[3], impratio;
+  cav_collision collision;
+  int constraint, equality, frictionloss, limit, contact, passive, weight, clamp, filter_parent, guard; ///< flags
+} cav_spec_option;
+
+/// A growing list of one kind.
+#define CAV_SPEC_LIST(type) \
+  struct {                  \
+    type *at;               \
+    int n, room;            \
+  }
+
+typedef struct cav_spec {
+  const char *name;
+  const cav_xml *xml;
+  cav_error *error;
+  cav_status status; ///< of the first failure; everything stops at it
+  cav_spec_compiler compiler;
+  cav_spec_option option;
+  CAV_SPEC_LIST(cav_spec_body) body;
+  CAV_SPEC_LIST(cav_spec_joint) joint;
+  CAV_SPEC_LIST(cav_spec_geom) geom;
+  CAV_SPEC_LIST(cav_spec_site) site;
+  CAV_SPEC_LIST(cav_spec_pair) pair;
+  CAV_SPEC_LIST(cav_spec_exclude) exclude;
+  CAV_SPEC_LIST(cav_spec_tendon) tendon;
+  CAV_SPEC_LIST(cav_spec_part) part;
+  CAV_SPEC_LIST(cav_spec_actuator) actuator;
+  CAV_SPEC_LIST(cav_spec_sensor) sensor;
+  CAV_SPEC_LIST(cav_spec_key) key;
+  CAV_SPEC_LIST(char *) warning;
+} cav_spec;
+
+enum {
+  CAV_SPEC_OBJECTS = 65536, ///< most objects of one kind
+  CAV_SPEC_DOFS = 5000,     ///< most degrees of freedom
+  CAV_SPEC_PAIRS = 2000000  ///< most pairs that may touch
+};
+
+/// spec.c: lists and complaints.
+
+/// Room for one more at the end of a list, zeroed; NULL after a failure, which it notes. spec is the owner.
+#define CAV_SPEC_PUSH(spec, list)                                                             \
+  (cav_spec_grow((spec), (void **)&(list)->at, &(list)->n, &(list)->room, sizeof *(list)->at) \
+       ? &(list)->at[(list)->n - 1]                                                           \
+       : NULL)
+int cav_spec_grow(cav_spec *spec, void **at, int *n, int *room, size_t size);
+
+/// Notes the first failure, with file, line and element; later ones are ignored.
+void cav_spec_fail(cav_spec *spec, const cav_xml_node *node, const char *attribute, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
+void cav_spec_no_memory(cav_spec *spec);
+
+/// Adds a warning, with file, line and element.
+void cav_spec_warn(cav_spec *spec, const cav_xml_node *node, const char *attribute, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
+
+/// Notes that there is no object of that kind and name, and which is near.
+void cav_spec_unknown(cav_spec *spec, const cav_xml_node *node, const char *attribute, const char *kind,
+                      const char *name, const void *first, int n, size_t stride);
+
+/// Checks that fail with the element's line: a number >= 0; solref and solimp (where: limit, friction or nothing); condim.
+void cav_check_not_negative(cav_spec *spec, const cav_xml_node *node, const char *attribute, double value);
+void cav_check_softness(cav_spec *spec, const cav_xml_node *node, const char *where, const cav_softness *softness);
+void cav_check_condim(cav_spec *spec, const cav_xml_node *node, int condim);
+
+/// Lets go of the lists.
+void cav_spec_clear(cav_spec *spec);
+
+/// Roots of the grammar of MJCF: ends with NULL. schema.c.
+extern const cav_xml_element *const cav_mjcf_roots[];
+
+/// Fills spec from a checked tree. mjcf.c.
+void cav_mjcf_read(cav_spec *spec, const cav_xml *xml);
+
+/// Masses, centres and principal moments of geoms and bodies. mass.c.
+void cav_spec_masses(cav_spec *spec);
+
+/// Quaternion of the rotation with columns x and y made orthonormal, x kept; and z their cross product. orientation.c.
+void cav_quat_of_axes(const double x[3], const double y[3], double quat[4]);
+
+/// Orientation of an element, by whichever attribute gives it; quat stays where none does. orientation.c.
+void cav_read_orientation(cav_spec *spec, const cav_xml_node *node, double quat[4]);
+
+/// Pose midway between two points [6], z along their line; returns half their distance. orientation.c.
+double cav_pose_of_fromto(const double *fromto, double pos[3], double quat[4]);
+
+/// Eigenvectors (as a rotation, columns) and values, largest first, of a symmetric matrix xx yy zz xy xz yz. mass.c.
+void cav_principal_axes(const double S[6], double quat[4], double moment[3]);
+
+/// Pairs of geoms that may touch, explicit ones first, then in the order of body pairs; their parameters mixed. For each
+/// body [nbody] weld is the body at the top of the group that moves with it, link_of its link. Returns a list of malloc,
+/// *npair long, or NULL for an empty one. filter.c.
+cav_pair *cav_filter_pairs(cav_spec *spec, const int *weld, const int *link_of, int *npair);
+
+/// Index of a named object among n, at a stride of bytes whose first member is the name; -1 if there is none. model.c.
+int cav_find_name(const void *first, int n, size_t stride, const char *name);
+
+/// Model of a complete spec; NULL on failure, noted in spec. compile.c.
+cav_model *cav_compile(cav_spec *spec);
+
+#endif

@@ -1,0 +1,120 @@
+/// The stages of one evaluation and what they share. Private to dynamics/. Order of the stages: README.md.
+#ifndef CAVORT_STAGE_H
+#define CAVORT_STAGE_H
+
+#include "cavort/dynamics.h"
+
+/// Contact point found by the narrow phase: world position midway between the surfaces, unit normal from the first to the
+/// second geom, signed gap. feature tells the points of one manifold apart and is stable between nearby poses.
+typedef struct cav_touch {
+  double pos[3];
+  double normal[3];
+  double tangent[3]; ///< a direction to align the second contact axis with; zero: any
+  double dist;
+  int feature;
+} cav_touch;
+
+enum { CAV_TOUCH_MAX = 8 }; ///< most points one pair can give
+
+/// A geom in the world.
+typedef struct cav_shape {
+  cav_geom_type type;
+  const double *size;
+  double pos[3];
+  double rotation[9]; ///< row-major, world = rotation * local + pos
+} cav_shape;
+
+/// All contact points of two shapes with dist < margin; a->type <= b->type. Returns their number, at most CAV_TOUCH_MAX.
+/// pairs.c: table over types; exact routines where they exist, convex.c (libccd) for the rest.
+int cav_collide_shapes(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
+
+/// 1 if shapes of these two types can be collided by this build (some need libccd), else 0. convex.c.
+int cav_collide_supported(cav_geom_type a, cav_geom_type b);
+
+/// Pairs without a routine of their own: penetration or distance through libccd. One point, and up to 4 more
+/// where a cylinder or a box stands on a face. convex.c.
+int cav_collide_convex(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
+
+/// Broad and narrow phase over model->pair at the state's poses: fills pair, feature, dim, links, pos, frame, dist, margin,
+/// friction of state->contact and ncontact. collide.c. The reach of a pair is its margin, or where the smoothed law is
+/// felt (cav_reach), whichever is larger.
+cav_status cav_collide(const cav_model *model, cav_state *state);
+
+/// Distance from which a pair's force is not negligible under the state's options.
+double cav_reach(const cav_state *state, const cav_pair *pair);
+
+/// Room for one more contact or row at the end of the state's arrays; NULL if memory runs out. state.c.
+cav_contact *cav_contact_push(cav_state *state);
+cav_row *cav_row_push(cav_state *state);
+
+/// Poses, centres of mass, world inertias, motion subspaces from q. kinematics.c.
+void cav_kinematics(const cav_model *model, cav_state *state, const double *q);
+
+/// Spatial velocities of all links at v [nv] into velocity [nlink*6]; entry 0 is read: the world's, zero. rne.c.
+void cav_velocities(const cav_model *model, const cav_state *state, const double *v, double *velocity);
+
+/// Down the tree: velocities at v and v_next, accelerations at (v, a), wrench of each link's own inertia into
+/// state->force. Up the tree: state->force becomes that of subtrees, u [nv] its share along each dof. rne.c.
+void cav_newton_euler(const cav_model *model, cav_state *state, const double *v, const double *v_next,
+                      const double *a);
+void cav_project(const cav_model *model, cav_state *state, double *u);
+
+/// u += armature a + damping v - springs of joints; tendons' springs and dampers likewise. passive.c.
+void cav_add_joint_forces(const cav_model *model, const cav_state *state, const double *v, const double *a, double *u);
+void cav_add_tendon_forces(const cav_model *model, const cav_state *state, const double *v, double *u);
+
+/// Rate of length of a tendon at v [nv]; u [nv] += force along a tendon's gradient. passive.c.
+double cav_tendon_velocity(const cav_model *model, int tendon, const double *v);
+void cav_tendon_pull(const cav_model *model, int tendon, double force, double *u);
+
+/// Constants of the discrete stabilisation for the state's options; before the two below. constraint.c.
+void cav_stabilise(cav_state *state);
+
+/// Fills state->row at the state's positions; gives every contact its R, h B, h K and sigma. constraint.c.
+cav_status cav_rows(const cav_model *model, cav_state *state);
+void cav_soften(cav_state *state);
+
+/// Distance from which a limit is a row: its margin and what the state's options add. constraint.c.
+double cav_limit_reach(const cav_state *state, double margin);
+
+/// Velocity of a row at v [nv]; u [nv] += J' force of a row. constraint.c.
+double cav_row_velocity(const cav_model *model, const cav_row *row, const double *v);
+void cav_row_push_force(const cav_model *model, const cav_row *row, double force, double *u);
+
+/// Velocity of a contact in its frame, out [dim], from spatial velocities of links [nlink*6]. inverse.c.
+void cav_contact_velocity(const cav_state *state, const cav_contact *contact, const double *velocity, double *out);
+
+/// u [nv] of the step without constraints, at the state's positions: u = RNE + D a - p. Fills velocities. inverse.c.
+void cav_smooth_inverse(const cav_model *model, cav_state *state, const double *v, const double *v_next, double *u);
+
+/// q := q (+) step e_dof: one coordinate of the tangent. manifold.c.
+void cav_perturb(const cav_model *model, int dof, double step, double *q);
+
+/// Composite inertia at the state's poses without D, tree-sparse (row i: dof i, its parent, ...). inertia.c.
+void cav_composite_inertia(const cav_model *model, cav_state *state, double *M);
+
+/// D of a dof under the state's options: armature, and damping times h where damping is implicit. inertia.c.
+double cav_added_inertia(const cav_model *model, const cav_state *state, int dof);
+
+struct cav_workspace;
+
+/// Factors a tree-sparse matrix, M = L' D L; L may be M. Returns 0 if M is not positive definite. ldl.c.
+int cav_ldl_factor(const cav_model *model, const struct cav_workspace *w, const double *M, double *L);
+
+/// x := M^-1 x with the factors of cav_ldl_factor, x [nv]. ldl.c.
+void cav_ldl_solve(const cav_model *model, const struct cav_workspace *w, const double *L, double *x);
+
+/// Fills inverse_weight of dofs, bodies, tendons and weight of pairs of a model under construction at q0. reference.c.
+cav_status cav_reference_weights(cav_model *model);
+
+/// Impulse of an elliptic contact from g = R^-1 (v* - v_next) [dim]; R [dim], sigma 0: exact law, else smoothed.
+/// Writes f [dim]. Eqs. (19)-(22) and dynamics.md, 3. hessian, if not NULL, gets -df/dv_next [dim*dim], symmetric, psd.
+/// potential, if not NULL, gets Psi, the convex function of v_next whose gradient is -f. cone.c.
+void cav_cone(int dim, const double *R, const double *friction, double sigma, const double *g, double *f,
+              double *hessian, double *potential);
+
+/// The same for one-sided rows (limits) and two-sided ones (friction loss, |f| <= bound).
+void cav_unilateral(double R, double sigma, double g, double *f, double *hessian, double *potential);
+void cav_bilateral(double R, double sigma, double bound, double g, double *f, double *hessian, double *potential);
+
+#endif

@@ -1,0 +1,217 @@
+/// The state of one thread: one block carved once, plus contacts and rows in two arrays that grow.
+/// Here the model is also compiled into the list of work it needs: which joints have springs or limits, which dofs
+/// friction, how the rows of the sparse inertia lie. A model without any of them gets empty lists. Nothing is evaluated.
+#include <stdint.h>
+#include <stdlib.h>
+
+#include "math3.h"
+#include "workspace.h"
+
+enum { FIRST_ROOM = 16, ALIGNMENT = 64 };
+
+// next piece of a block, or only its size while base is NULL
+static void *carve(char *base, size_t *used, size_t count, size_t size) {
+  void *piece = base ? base + *used : NULL;
+  *used += (count * size + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+  return piece;
+}
+
+// number of entries of the tree-sparse inertia: each dof with its ancestors
+static size_t inertia_entries(const cav_model *model) {
+  size_t n = 0;
+  for (int i = 0; i < model->nv; i++) {
+    for (int j = i; j >= 0; j = model->dof[j].parent) { n++; }
+  }
+  return n;
+}
+
+// lays out the state and its workspace over base; with base NULL only counts. Returns the bytes
+static size_t layout(const cav_model *model, char *base, cav_state *s, cav_workspace *w) {
+  size_t used = 0;
+  size_t n = model->nlink, nv = model->nv, nq = model->nq, nt = model->ntendon, nj = model->njoint;
+  size_t d = sizeof(double), i = sizeof(int), entries = inertia_entries(model);
+  s->link = carve(base, &used, n, sizeof(cav_pose));
+  s->com = carve(base, &used, 3 * n, d);
+  s->inertia = carve(base, &used, 6 * n, d);
+  s->reference = carve(base, &used, 3 * n, d);
+  s->axis = carve(base, &used, 6 * nv, d);
+  s->velocity = carve(base, &used, 6 * n, d);
+  s->velocity_next = carve(base, &used, 6 * n, d);
+  s->force = carve(base, &used, 6 * n, d);
+  s->u = carve(base, &used, nv, d);
+  s->tendon_length = carve(base, &used, nt, d);
+  w->q = carve(base, &used, nq, d);
+  w->v = carve(base, &used, nv, d);
+  w->v_next = carve(base, &used, nv, d);
+  w->acceleration = carve(base, &used, 6 * n, d);
+  w->velocity_now = carve(base, &used, 6 * n, d);
+  w->scratch = carve(base, &used, 4 * nv, d);
+  w->armature = carve(base, &used, nv, d);
+  w->damping = carve(base, &used, nv, d);
+  w->group = carve(base, &used, nv, i);
+  w->parent = carve(base, &used, nv, i);
+  w->row = carve(base, &used, nv + 1, i);
+  w->M = carve(base, &used, entries, d);
+  w->L = carve(base, &used, entries, d);
+  w->composite = carve(base, &used, 10 * n, d);
+  w->quaternion = carve(base, &used, nj, i);
+  w->hinge = carve(base, &used, nj, i);
+  w->hinge_of = carve(base, &used, nj, i);
+  w->hinge_ref = carve(base, &used, nj, d);
+  w->half = carve(base, &used, nj, d);
+  w->sine = carve(base, &used, nj, d);
+  w->cosine = carve(base, &used, nj, d);
+  w->aligned = carve(base, &used, nj, i);
+  w->centred = carve(base, &used, nj, i);
+  w->straight = carve(base, &used, n, i);
+  w->spring = carve(base, &used, nj, i);
+  w->limit = carve(base, &used, nj, i);
+  w->friction = carve(base, &used, nv, i);
+  w->tendon_spring = carve(base, &used, nt, i);
+  w->tendon_limit = carve(base, &used, nt, i);
+  w->tendon_friction = carve(base, &used, nt, i);
+  size_t nu = model->nactuator, gears = 0;
+  for (int k = 0; k < model->nactuator; k++) { gears += (size_t)cav_transmission_entries(model, k); }
+  w->gear_start = carve(base, &used, nu + 1, i);
+  w->gear_dof = carve(base, &used, gears, i);
+  w->gear = carve(base, &used, gears, d);
+  w->gram_inverse = carve(base, &used, nu, d);
+  w->control = carve(base, &used, 2 * nu, d);
+  return used;
+}
+
+// dofs: compact copies and the rows of the sparse inertia
+static void compile_dofs(const cav_model *model, cav_workspace *w) {
+  int entries = 0;
+  for (int i = 0; i < model->nv; i++) {
+    const cav_dof *dof = &model->dof[i];
+    const cav_joint *joint = &model->joint[dof->joint];
+    int k = i - joint->dof;
+    w->armature[i] = dof->armature;
+    w->damping[i] = dof->damping;
+    w->group[i] = k == 0 || (joint->type == CAV_JOINT_FREE && k == 3);
+    w->parent[i] = dof->parent;
+    w->row[i] = entries;
+    for (int j = i; j >= 0; j = model->dof[j].parent) { entries++; }
+    if (dof->damping != 0) { w->damped = 1; }
+    if (dof->frictionloss > 0) { w->friction[w->nfriction++] = i; }
+  }
+  w->row[model->nv] = entries;
+}
+
+// index of the one coordinate axis a unit vector lies along, -1 if none
+static int along(const double a[3]) {
+  for (int k = 0; k < 3; k++) {
+    if (a[(k + 1) % 3] == 0 && a[(k + 2) % 3] == 0) return k;
+  }
+  return -1;
+}
+
+// special cases that kinematics takes advantage of
+static void compile_frames(const cav_model *model, cav_workspace *w) {
+  for (int i = 0; i < model->njoint; i++) {
+    const cav_joint *joint = &model->joint[i];
+    w->aligned[i] = joint->type == CAV_JOINT_HINGE ? along(joint->axis) : -1;
+    w->centred[i] = joint->pos[0] == 0 && joint->pos[1] == 0 && joint->pos[2] == 0;
+    if (joint->type == CAV_JOINT_HINGE) {
+      w->hinge_of[i] = w->nhinge;
+      w->hinge_ref[w->nhinge] = joint->ref;
+      w->hinge[w->nhinge++] = joint->q;
+    }
+    if (joint->type == CAV_JOINT_FREE || joint->type == CAV_JOINT_BALL) {
+      w->quaternion[w->nquaternion++] = joint->type == CAV_JOINT_FREE ? joint->q + 3 : joint->q;
+    }
+  }
+  for (int i = 0; i < model->nlink; i++) {
+    const double *quat = model->link[i].quat;
+    w->straight[i] = quat[0] == 1 && quat[1] == 0 && quat[2] == 0 && quat[3] == 0;
+  }
+}
+
+// joints and tendons that exert a force or set a limit
+static void compile_lists(const cav_model *model, cav_workspace *w) {
+  for (int i = 0; i < model->njoint; i++) {
+    if (model->joint[i].stiffness != 0) { w->spring[w->nspring++] = i; }
+    if (model->joint[i].limited && model->joint[i].type != CAV_JOINT_FREE) { w->limit[w->nlimit++] = i; }
+  }
+  for (int i = 0; i < model->ntendon; i++) {
+    const cav_tendon *tendon = &model->tendon[i];
+    if (tendon->stiffness != 0 || tendon->damping != 0) { w->tendon_spring[w->ntendon_spring++] = i; }
+    if (tendon->limited) { w->tendon_limit[w->ntendon_limit++] = i; }
+    if (tendon->frictionloss > 0) { w->tendon_friction[w->ntendon_friction++] = i; }
+  }
+}
+
+cav_state *cav_state_new(const cav_model *model) {
+  // sizes first, then one block: state, workspace, arrays
+  cav_state probe = {0};
+  cav_workspace probe_work = {0};
+  size_t head = 0;
+  carve(NULL, &head, 1, sizeof(cav_state));
+  carve(NULL, &head, 1, sizeof(cav_workspace));
+  size_t bytes = head + layout(model, NULL, &probe, &probe_work);
+  char *block = aligned_alloc(ALIGNMENT, bytes);
+  if (!block) { return NULL; }
+  memset(block, 0, bytes);
+  size_t used = 0;
+  cav_state *state = carve(block, &used, 1, sizeof(cav_state));
+  cav_workspace *work = carve(block, &used, 1, sizeof(cav_workspace));
+  layout(model, block + head, state, work);
+
+  // what this model needs
+  state->model = model;
+  state->options = model->options;
+  if (!(state->options.timestep > 0)) state->options.timestep = model->timestep;
+  state->work = work;
+  compile_dofs(model, work);
+  compile_frames(model, work);
+  compile_lists(model, work);
+  quat_normalise(state->link[0].quat);
+  quat_matrix(state->link[0].rotation, state->link[0].quat);
+
+  // room for contacts and rows; both grow later
+  state->contact = malloc(FIRST_ROOM * sizeof(cav_contact));
+  state->row = malloc(FIRST_ROOM * sizeof(cav_row));
+  work->contact_room = work->row_room = FIRST_ROOM;
+  work->geom = cav_geom_cache_new(model);
+  if (!state->contact || !state->row || !work->geom || cav_actuation_compile(model, work) != CAV_OK) {
+    cav_state_free(state);
+    return NULL;
+  }
+  return state;
+}
+
+void cav_state_free(cav_state *state) {
+  if (!state) { return; }
+  cav_geom_cache_free(state->work->geom);
+  free(state->work->gram);
+  free(state->work->readout);
+  free(state->work->solver);
+  free(state->work->memory);
+  free(state->contact);
+  free(state->row);
+  free(state);
+}
+
+// an array of items with room for count + 1, doubled when full; NULL if memory runs out, the old one is kept
+static void *grown(void *items, int count, int *room, size_t size) {
+  if (count < *room) { return items; }
+  if (*room > INT32_MAX / 2) { return NULL; }
+  void *larger = realloc(items, 2 * (size_t)*room * size);
+  if (larger) { *room *= 2; }
+  return larger;
+}
+
+cav_contact *cav_contact_push(cav_state *state) {
+  cav_contact *contact = grown(state->contact, state->ncontact, &state->work->contact_room, sizeof *contact);
+  if (!contact) { return NULL; }
+  state->contact = contact;
+  return &contact[state->ncontact++];
+}
+
+cav_row *cav_row_push(cav_state *state) {
+  cav_row *row = grown(state->row, state->nrow, &state->work->row_room, sizeof *row);
+  if (!row) { return NULL; }
+  state->row = row;
+  return &row[state->nrow++];
+}

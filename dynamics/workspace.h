@@ -1,0 +1,76 @@
+/// What a state keeps to itself: the list of work its model needs, compiled once by cav_state_new, and scratch.
+/// Private to dynamics/.
+#ifndef CAVORT_WORKSPACE_H
+#define CAVORT_WORKSPACE_H
+
+#include "stage.h"
+
+/// World placement of the geoms that are in pairs: what collide.c keeps between its own calls.
+struct cav_geom_cache;
+struct cav_geom_cache *cav_geom_cache_new(const cav_model *model);
+void cav_geom_cache_free(struct cav_geom_cache *cache);
+
+typedef struct cav_workspace {
+  // the last evaluation
+  cav_stage valid;        ///< what cav_inverse_from may reuse
+  cav_options options;    ///< under which it was made
+  double *q, *v, *v_next; ///< [nq], [nv], [nv]; quaternions of q unit
+  double *acceleration;   ///< [nlink*6] spatial, base acceleration -gravity
+  double *velocity_now;   ///< [nlink*6] scratch: at v, where that is not where the bias is taken
+
+  // rooms
+  int contact_room, row_room;
+  struct cav_geom_cache *geom;
+
+  double discrete_damping, discrete_stiffness; ///< h B and h K of every row, by the options of the last position
+
+  // dofs, compact
+  double *armature, *damping; ///< [nv]
+  int *group;                 ///< [nv] 1 where a joint's dofs start (a free joint's rotation starts a second group)
+  int *parent;                ///< [nv] previous dof towards the root, -1
+  int damped;                 ///< some dof has damping
+
+  // kinematics: what makes a joint or link cheap
+  int nquaternion, *quaternion;  ///< indices into q of quaternions
+  int nhinge, *hinge, *hinge_of; ///< indices into q of hinges; which of them a joint is [njoint]
+  double *hinge_ref;             ///< [nhinge] displacement zero
+  double *half, *sine, *cosine;  ///< [nhinge] half angles
+  int *aligned;                  ///< [njoint] hinge axis along x, y or z of the link frame: 0, 1, 2; else -1
+  int *centred;                  ///< [njoint] anchor at the link's origin
+  int *straight;                 ///< [nlink] frame at rest parallel to the parent's
+
+  // joints, tendons, dofs that need a stage: indices and counts
+  int nspring, nlimit, nfriction, ntendon_spring, ntendon_limit, ntendon_friction;
+  int *spring, *limit, *friction, *tendon_spring, *tendon_limit, *tendon_friction;
+
+  // tree-sparse inertia: row i holds dof i, its parent, the parent's parent, ...
+  int *row;          ///< [nv+1] first entry of each row
+  double *M;         ///< [row[nv]] composite inertia plus D
+  double *L;         ///< [row[nv]] its factors: M = L' D L, D in the first entry of each row
+  double *composite; ///< [nlink*10] mass, first moment, inertia at reference of each subtree
+  double *scratch;   ///< [4*nv]
+
+  // transmission: sparse columns of T and what inverts T'T (actuation.c)
+  int *gear_start, *gear_dof; ///< [nu+1], [entries]
+  double *gear;               ///< [entries]
+  int gram_diagonal;
+  double *gram_inverse; ///< [nu] of a diagonal T'T
+  double *gram;         ///< [nu*nu] its pseudo-inverse otherwise, with scratch behind; NULL if diagonal
+  double *control;      ///< [2*nu]
+
+  // readings of cav_differentiate, grown on demand
+  double *readout;
+  size_t readout_room;
+
+  // forward step: memory of its matrices, grown by impulse.c, and the impulses of its last Gauss-Seidel solve, by gpgs.c
+  void *solver;
+  size_t solver_bytes;
+  struct cav_memory *memory;
+  int nmemory, memory_room;
+} cav_workspace;
+
+/// Entries of an actuator's column of T; fills the transmission of a workspace. actuation.c.
+int cav_transmission_entries(const cav_model *model, int actuator);
+cav_status cav_actuation_compile(const cav_model *model, cav_workspace *w);
+
+#endif

@@ -1,0 +1,111 @@
+/// Reads XML files against a table that says what may stand where. Private: not installed.
+///
+/// A grammar is a set of constant tables: cav_xml_element (name, how often, attributes, children) and
+/// cav_xml_attribute (name, type, how many values). cav_xml_read checks the whole file against it while reading, so code
+/// that walks the tree afterwards meets only what the table allows, already converted. Every complaint reads
+/// "FILE:LINE: <element>: attribute 'x': expected ..., got '...'; do ...".
+/// Not offered: document types and entities (refused), namespaces, text between tags (refused, but see CAV_XML_ANYTHING).
+#ifndef CAVORT_XML_H
+#define CAVORT_XML_H
+
+#include <stddef.h>
+
+#include "cavort/status.h"
+
+typedef enum cav_xml_type {
+  CAV_XML_TEXT, ///< any text; min 1: not empty
+  CAV_XML_INT,  ///< min to max whole numbers
+  CAV_XML_REAL, ///< min to max finite numbers; max 0: any number of them
+  CAV_XML_WORD, ///< one of words
+  CAV_XML_BOOL, ///< true or false
+  CAV_XML_SKIP  ///< accepted, unread
+} cav_xml_type;
+
+typedef struct cav_xml_attribute {
+  const char *name; ///< NULL ends a table
+  cav_xml_type type;
+  int min, max;             ///< count of values, both 0 for types without
+  const char *const *words; ///< CAV_XML_WORD: ends with NULL; the value is the index
+  int required;
+} cav_xml_attribute;
+
+/// How an element is checked.
+enum {
+  CAV_XML_ANYTHING = 1, ///< attributes, children and text of it are accepted unread, children are not kept
+  CAV_XML_INCLUDE = 2   ///< replaced by the children of the root of the file that its attribute 'file' names
+};
+
+typedef struct cav_xml_element {
+  const char *name;
+  int min, max;                               ///< how often under one parent (includes counted in); max 0: no bound
+  const cav_xml_attribute *attribute;         ///< ends with name NULL; NULL: none
+  const struct cav_xml_element *const *child; ///< ends with NULL; NULL: none
+  int flags;
+} cav_xml_element;
+
+/// One attribute as found, converted.
+typedef struct cav_xml_value {
+  const cav_xml_attribute *rule;
+  const char *text;
+  int count;            ///< numbers; 1 for a word or a bool
+  const double *number; ///< CAV_XML_INT, CAV_XML_REAL
+  int word;             ///< index of the word; 0 or 1 for a bool
+} cav_xml_value;
+
+/// One element as found. Nodes live until cav_xml_free.
+typedef struct cav_xml_node {
+  const cav_xml_element *rule;
+  const char *file;
+  int line; ///< where the tag starts
+  struct cav_xml_node *parent, *child, *next;
+  int nvalue;
+  const cav_xml_value *value;
+  struct cav_xml_node *last; ///< child, while reading
+} cav_xml_node;
+
+typedef struct cav_xml cav_xml;
+
+/// Reads a file whose root is one of roots (ends with NULL). Included files are sought relative to the folder of path, and
+/// may be included once. NULL on failure with the reason in error (may be NULL): CAV_BAD_INPUT or CAV_NO_MEMORY.
+/// Bounds: 32 MB a file, 128 MB in all, 200 elements deep; files must be regular ones.
+cav_xml *cav_xml_read(const char *path, const cav_xml_element *const *roots, cav_error *error);
+
+/// Frees a tree; NULL is fine.
+void cav_xml_free(cav_xml *xml);
+
+const cav_xml_node *cav_xml_root(const cav_xml *xml);
+
+/// Path of the file read.
+const char *cav_xml_path(const cav_xml *xml);
+
+/// Next sibling of the same rule, or first child with that rule; NULL if none. For looping over one kind.
+const cav_xml_node *cav_xml_child(const cav_xml_node *node, const cav_xml_element *rule);
+const cav_xml_node *cav_xml_next(const cav_xml_node *node);
+
+/// The attribute of that name, NULL if the file does not give it.
+const cav_xml_value *cav_xml_get(const cav_xml_node *node, const char *name);
+
+/// 1 if the table lets the element have that attribute, given or not.
+int cav_xml_accepts(const cav_xml_node *node, const char *name);
+
+/// Value of an attribute, or fallback where the file gives none. The table fixes the type.
+const char *cav_xml_text(const cav_xml_node *node, const char *name, const char *fallback);
+double cav_xml_real(const cav_xml_node *node, const char *name, double fallback);
+int cav_xml_int(const cav_xml_node *node, const char *name, int fallback);
+int cav_xml_bool(const cav_xml_node *node, const char *name, int fallback);
+int cav_xml_word(const cav_xml_node *node, const char *name, int fallback);
+
+/// Copies the numbers of an attribute to out (at most most) and returns how many the file gives; 0 if none: out untouched.
+int cav_xml_reals(const cav_xml_node *node, const char *name, double *out, int most);
+
+/// Fills error with "FILE:LINE: <element>: attribute 'x': " and the formatted text; attribute may be NULL, error too.
+/// Returns CAV_BAD_INPUT, or what cav_xml_fail_as is told.
+cav_status cav_xml_fail(cav_error *error, const cav_xml_node *node, const char *attribute, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
+cav_status cav_xml_fail_as(cav_error *error, cav_status status, const cav_xml_node *node, const char *attribute,
+                           const char *format, ...) __attribute__((format(printf, 5, 6)));
+
+/// The name of names [n] (a stride of bytes apart) nearest to word in edits, NULL if none is near. For "did you mean".
+const char *cav_xml_nearest(const char *word, const void *names, int n, size_t stride);
+
+#endif

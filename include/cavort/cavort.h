@@ -1,0 +1,12 @@
+/// All of cavort.
+#ifndef CAVORT_CAVORT_H
+#define CAVORT_CAVORT_H
+
+#include "cavort/dynamics.h"
+#include "cavort/model.h"
+#include "cavort/problem.h"
+#include "cavort/solve.h"
+#include "cavort/status.h"
+#include "cavort/trajectory.h"
+
+#endif

@@ -1,0 +1,173 @@
+/// Inverse and forward dynamics with contacts. Todorov, ICRA 2014; equation numbers are that paper's.
+/// One state per thread; the model is shared. After the first call on a state nothing allocates, unless more
+/// contacts appear than ever before.
+#ifndef CAVORT_DYNAMICS_H
+#define CAVORT_DYNAMICS_H
+
+#include "cavort/model.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/// One contact point at (q, v, v_next). Impulses act on geom2 (and reversed on geom1) along the axes of frame.
+typedef struct cav_contact {
+  int pair;         ///< index into model->pair
+  int feature;      ///< which point of the pair's manifold: stable between nearby configurations
+  int dim;          ///< rows: 1, 3, 4 or 6
+  int link1, link2;
+  double pos[3];    ///< m, world, midway between the surfaces
+  double frame[9];  ///< rows are axes in world coordinates; the first is the normal, from geom1 to geom2
+  double dist;      ///< m, gap between the surfaces; negative: penetration
+  double margin;    ///< m, margin - gap: the constraint pushes below this distance
+  double regulariser[6];  ///< R, 1/kg
+  double damping[6];      ///< h B, dimensionless: v* = (1 - hB) x' - h K x
+  double stiffness;       ///< h K of the normal row, 1/s
+  double sigma;           ///< smoothing of the law in impulse scale (dynamics.md, 3), 0: exact
+  double friction[5];
+  double velocity[6];      ///< J v, m/s (rad/s for the last three)
+  double velocity_next[6]; ///< J v_next
+  double impulse[6];       ///< f, N s
+} cav_contact;
+
+/// One scalar constraint at (q, v, v_next): a limit or a friction loss, of a joint (dof) or of a tendon.
+typedef enum cav_row_type { CAV_ROW_LIMIT_JOINT, CAV_ROW_LIMIT_TENDON, CAV_ROW_FRICTION_DOF, CAV_ROW_FRICTION_TENDON } cav_row_type;
+typedef struct cav_row {
+  cav_row_type type;
+  int object;         ///< joint, tendon or dof
+  int side;           ///< limits: 0 lower, 1 upper
+  double dist;        ///< limits: distance to the limit, negative: violated
+  double margin;
+  double axis[3];     ///< gradient of dist: 1 value for scalar objects (+1 or -1), 3 for a ball joint
+  double bound;       ///< friction loss: h eta, N s
+  double regulariser, damping, stiffness, sigma;
+  double velocity, velocity_next; ///< J v and J v_next
+  double impulse;     ///< f, N s or N m s
+} cav_row;
+
+/// World pose of a link. Row-major rotation: world = rotation * local + pos.
+typedef struct cav_pose {
+  double pos[3];
+  double rotation[9];
+  double quat[4];
+} cav_pose;
+
+/// What one thread computes at one (q, v, v_next). Readable after the call that fills it, written by the library only
+/// (except options). Spatial vectors are (angular, linear) in world axes at the tree's reference point.
+typedef struct cav_state {
+  const cav_model *model;
+  cav_options options;
+
+  // position: filled from q
+  cav_pose *link;         ///< [nlink] world poses
+  double *com;            ///< [nlink*3] centres of mass, world
+  double *inertia;        ///< [nlink*6] about the centre of mass, world axes: xx yy zz xy xz yz
+  double *reference;      ///< [nlink*3] point at which the link's spatial vectors are taken (its tree's root position)
+  double *axis;           ///< [nv*6] motion subspace of each dof: what a unit velocity does
+  double *tendon_length;  ///< [ntendon]
+  int ncontact, nrow;
+  cav_contact *contact;   ///< [ncontact]; geometry only depends on q, velocities and impulses on all
+  cav_row *row;           ///< [nrow]
+
+  // velocity: filled from q and v (euler) or the mean of v and v_next (midpoint)
+  double *velocity;       ///< [nlink*6] spatial velocity of each link at the velocity the bias is taken
+  double *velocity_next;  ///< [nlink*6] spatial velocity of each link at v_next
+
+  // inverse
+  double *force;          ///< [nlink*6] wrench of each subtree
+  double *u;              ///< [nv] last result of cav_inverse
+
+  struct cav_workspace *work; ///< private
+} cav_state;
+
+/// A state for one thread; NULL if memory runs out.
+cav_state *cav_state_new(const cav_model *model);
+
+/// Frees a state; NULL is fine.
+void cav_state_free(cav_state *state);
+
+/// Which part of the last evaluation is still valid: what cav_inverse_from may reuse.
+typedef enum cav_stage {
+  CAV_STAGE_NONE,     ///< nothing: all is new
+  CAV_STAGE_POSITION, ///< q is unchanged
+  CAV_STAGE_VELOCITY  ///< q and v are unchanged
+} cav_stage;
+
+/// Poses, motion subspaces, tendon lengths, contacts and limits at q [nq]. Fails with CAV_NOT_FINITE or CAV_NO_MEMORY.
+cav_status cav_position(const cav_model *model, cav_state *state, const double *q);
+
+/// Generalised force that takes v to v_next in one step: u = RNE(q, v, a) + D a - p - (J' f)/h, a = (v_next - v)/h.
+/// q [nq], v, v_next [nv] -> u [nv], N or N m. D = armature (+ h B for euler). Forms no matrix.
+/// Fails with CAV_NOT_FINITE, u untouched. Todorov 2014, eqs. (2), (19)-(22).
+cav_status cav_inverse(const cav_model *model, cav_state *state, const double *q, const double *v,
+                       const double *v_next, double *u);
+
+/// The same, reusing from the state's last evaluation what stage says is unchanged (MuJoCo's mj_inverseSkip).
+cav_status cav_inverse_from(const cav_model *model, cav_state *state, cav_stage unchanged, const double *q,
+                            const double *v, const double *v_next, double *u);
+
+/// One step forward: v_next from u [nv], by Newton on the convex potential (9) in v_next, exact or smoothed law.
+/// Inverse of cav_inverse to 1e-9. v_next [nv] holds the warm start if state->options ask, otherwise v is taken.
+/// CAV_NOT_CONVERGED leaves the best iterate. The position afterwards is cav_integrate(q, v_next, timestep).
+cav_status cav_forward(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
+                       double *v_next);
+
+/// What a forward solve did.
+typedef struct cav_forward_report {
+  int iterations;
+  double residual; ///< largest |inverse(q, v, v_next) - u| relative to the largest |u| involved
+  double gap;      ///< duality gap of (9), J (GPGS only)
+  double mismatch; ///< |f_forward - f_inverse(v_next)| over all impulses, N s (GPGS only)
+} cav_forward_report;
+
+/// Forward step by generalised projected Gauss-Seidel on (9), exact law only. At most iterations sweeps, fewer when the
+/// largest change of an impulse, relative, falls below tolerance. report may be NULL. Paper, section IV.
+cav_status cav_forward_gpgs(const cav_model *model, cav_state *state, const double *q, const double *v,
+                            const double *u, int iterations, double tolerance, double *v_next,
+                            cav_forward_report *report);
+
+/// cav_forward with tolerance (relative, on u), iteration limit and a report.
+cav_status cav_forward_newton(const cav_model *model, cav_state *state, const double *q, const double *v,
+                              const double *u, int iterations, double tolerance, double *v_next,
+                              cav_forward_report *report);
+
+/// Derivatives of cav_inverse, nv x nv, row-major (du[i*nv+j] = du_i/dx_j); NULL = not needed. Positions are differentiated
+/// in the tangent: q (+) e_j. Staged one-sided differences with the default step; cav_inverse_jacobian_by chooses.
+cav_status cav_inverse_jacobian(const cav_model *model, cav_state *state, const double *q, const double *v,
+                                const double *v_next, double *du_dq, double *du_dv, double *du_dv_next);
+
+typedef enum cav_derivative { CAV_DERIVATIVE_FORWARD, CAV_DERIVATIVE_CENTRED } cav_derivative;
+
+/// A function of (q, v, v_next) read off a state after cav_inverse has filled it: writes n values.
+/// base is the state at the unperturbed point, equal to state for the base call itself.
+typedef void (*cav_readout)(const cav_model *model, const cav_state *state, void *context, double *value);
+
+/// Staged finite differences of any readout of n values. step 0: chosen by coordinate scale.
+/// value [n] at the point; d_dq, d_dv, d_dv_next [n*nv] row-major, NULL = not needed. dynamics.md, 7.
+/// A pass over v or v_next repeats no position work. The state is left at the point itself.
+cav_status cav_differentiate(const cav_model *model, cav_state *state, cav_derivative method, double step,
+                             const double *q, const double *v, const double *v_next, cav_readout readout,
+                             void *context, int n, double *value, double *d_dq, double *d_dv, double *d_dv_next);
+
+/// Inertia matrix M(q) with D, dense [nv*nv] row-major. q [nq].
+cav_status cav_inertia(const cav_model *model, cav_state *state, const double *q, double *M);
+
+/// Centre of mass of all that moves [3], its velocity [3] and the angular momentum about it [3], world, for the state's
+/// last position and the velocity v [nv]. Any output may be NULL.
+void cav_momentum(const cav_model *model, cav_state *state, const double *v, double *com, double *com_velocity,
+                  double *angular_momentum);
+
+/// Reading of a sensor at the state's last evaluation; velocity sensors read at v_next. out [sensor->dim].
+void cav_sense(const cav_model *model, const cav_state *state, const cav_sensor *sensor, double *out);
+
+/// World pose of a named kind of object at the state's last position.
+void cav_object_pose(const cav_model *model, const cav_state *state, cav_object_type type, int object, cav_pose *pose);
+
+/// Force of each dof that actuators can give, for u [nv]: u_actuated = P u with P the orthogonal projector onto the range of
+/// the transmission. residual [nv] = u - P u, control [nu] least-norm. Any output may be NULL.
+void cav_actuation(const cav_model *model, cav_state *state, const double *u, double *residual, double *control);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,294 @@
+/// A compiled model: immutable after loading, shared by threads. Layout of q and v, names and defaults are MJCF's.
+/// Units: m, kg, s, rad, N. Quaternions are (w, x, y, z), unit. A pose (pos, quat) maps local to parent coordinates.
+#ifndef CAVORT_MODEL_H
+#define CAVORT_MODEL_H
+
+#include <stddef.h>
+
+#include "cavort/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum cav_joint_type { CAV_JOINT_FREE, CAV_JOINT_BALL, CAV_JOINT_SLIDE, CAV_JOINT_HINGE } cav_joint_type;
+
+typedef enum cav_geom_type {
+  CAV_GEOM_PLANE,     ///< z = 0, solid below; size unused
+  CAV_GEOM_SPHERE,    ///< size[0] radius
+  CAV_GEOM_CAPSULE,   ///< along z; size[0] radius, size[1] half length of the segment
+  CAV_GEOM_ELLIPSOID, ///< size semi-axes
+  CAV_GEOM_CYLINDER,  ///< along z; size[0] radius, size[1] half length
+  CAV_GEOM_BOX,       ///< size half lengths
+  CAV_GEOM_TYPES
+} cav_geom_type;
+
+typedef enum cav_transmission { CAV_TRANSMISSION_JOINT, CAV_TRANSMISSION_TENDON } cav_transmission;
+
+typedef enum cav_sensor_type {
+  CAV_SENSOR_JOINTPOS,
+  CAV_SENSOR_JOINTVEL,
+  CAV_SENSOR_FRAMEPOS,      ///< 3, m, world
+  CAV_SENSOR_FRAMEQUAT,     ///< 4, unit quaternion
+  CAV_SENSOR_FRAMEXAXIS,    ///< 3, world
+  CAV_SENSOR_FRAMEYAXIS,    ///< 3, world
+  CAV_SENSOR_FRAMEZAXIS,    ///< 3, world
+  CAV_SENSOR_FRAMELINVEL,   ///< 3, m/s, world
+  CAV_SENSOR_FRAMEANGVEL,   ///< 3, rad/s, world
+  CAV_SENSOR_SUBTREECOM,    ///< 3, m, world
+  CAV_SENSOR_SUBTREELINVEL, ///< 3, m/s, world
+  CAV_SENSOR_SUBTREEANGMOM, ///< 3, kg m^2/s about the subtree's centre of mass, world
+  CAV_SENSOR_TYPES
+} cav_sensor_type;
+
+/// What a frame sensor or a term looks at.
+typedef enum cav_object_type {
+  CAV_OBJECT_BODY, ///< frame at the body's centre of mass (MJCF "body")
+  CAV_OBJECT_XBODY, ///< frame of the body as written in the file (MJCF "xbody")
+  CAV_OBJECT_JOINT,
+  CAV_OBJECT_GEOM,
+  CAV_OBJECT_SITE,
+  CAV_OBJECT_TENDON,
+  CAV_OBJECT_ACTUATOR,
+  CAV_OBJECT_KEY,
+  CAV_OBJECT_SENSOR,
+  CAV_OBJECT_TYPES
+} cav_object_type;
+
+/// Softness of one constraint as MJCF writes it; dynamics.md, 4.
+typedef struct cav_softness {
+  double solref[2]; ///< (time constant s, damping ratio), or both negative: (-stiffness, -damping)
+  double solimp[5]; ///< impedance d0, d_width, width, midpoint, power
+} cav_softness;
+
+/// A body as the file names it. Body 0 is the world.
+typedef struct cav_body {
+  const char *name; ///< never NULL; "" if the file gives none
+  int parent;       ///< body; 0 for children of the world; -1 for the world
+  int link;         ///< link it is part of
+  int geom, ngeom;  ///< its geoms: first, count
+  double pos[3];    ///< frame in its link's frame
+  double quat[4];
+  double mass;                ///< kg
+  double com[3];              ///< centre of mass in the body frame
+  double iquat[4];            ///< principal axes in the body frame
+  double inertia[3];          ///< principal moments about the centre of mass, kg m^2
+  double inverse_weight[2];   ///< mean diagonal of J M^-1 J' at its centre of mass at q0: translation 1/kg, rotation 1/(kg m^2)
+} cav_body;
+
+/// Bodies that move as one: the unit of the dynamics. Link 0 is the world and all that is fixed to it.
+/// Links are in topological order: parent < child. A link's frame is the frame of its one body with joints.
+typedef struct cav_link {
+  int body;          ///< body whose joints move it
+  int parent;        ///< link; -1 for the world
+  int root;          ///< link at the top of its tree (child of the world); 0 for the world
+  int joint, njoint; ///< joints in the order in which they act
+  int dof, ndof;
+  double pos[3]; ///< frame in the parent link's frame at zero joint displacement
+  double quat[4];
+  double mass;       ///< kg, of all its bodies
+  double com[3];     ///< centre of mass in the link frame
+  double inertia[6]; ///< about the centre of mass, link axes: xx yy zz xy xz yz, kg m^2
+} cav_link;
+
+typedef struct cav_joint {
+  const char *name;
+  cav_joint_type type;
+  int body, link;
+  int q, dof;        ///< first index into q and into v
+  double pos[3];     ///< anchor in the link frame
+  double axis[3];    ///< unit, link frame (hinge, slide)
+  double ref;        ///< q of a hinge or slide in the posture of the file
+  int limited;       ///< 1 if range holds
+  double range[2];   ///< rad or m; ball: range[1] is the largest rotation angle
+  double margin;     ///< limit acts from this distance on
+  cav_softness limit;
+  double stiffness;  ///< N m/rad or N/m
+  double springref;  ///< hinge and slide: q at rest of the spring
+} cav_joint;
+
+/// One degree of freedom, index into v.
+typedef struct cav_dof {
+  int link, joint;
+  int parent;            ///< previous dof towards the root, -1 if none
+  double damping;        ///< N m s/rad or N s/m
+  double armature;       ///< kg m^2 or kg
+  double frictionloss;   ///< N m or N, 0: none
+  cav_softness friction; ///< of the friction loss
+  double inverse_weight; ///< diagonal of M^-1 at q0, averaged over a ball's 3 and over 3+3 of a free joint
+} cav_dof;
+
+typedef struct cav_geom {
+  const char *name;
+  cav_geom_type type;
+  int body, link;
+  double pos[3]; ///< in the link frame
+  double quat[4];
+  double rotation[9]; ///< of quat, row-major
+  double size[3];
+  double bound;  ///< radius of the bounding sphere about pos; infinite for a plane
+  int contype, conaffinity;
+  int condim, priority;
+  double friction[3]; ///< sliding, torsional (m), rolling (m)
+  double margin, gap; ///< m
+  double solmix;
+  cav_softness softness;
+  float rgba[4];
+  int group;
+} cav_geom;
+
+typedef struct cav_site {
+  const char *name;
+  int body, link;
+  double pos[3]; ///< in the link frame
+  double quat[4];
+} cav_site;
+
+/// Two geoms that may touch; everything mixed at compile time. Only pairs that can touch are listed.
+typedef struct cav_pair {
+  int geom1, geom2; ///< geom1's type <= geom2's type
+  int dim;          ///< 1, 3, 4 or 6 rows
+  int same_world;   ///< 1 if one of the two does not move
+  double friction[5]; ///< two tangential, torsional (m), two rolling (m)
+  double margin, gap; ///< m
+  cav_softness softness;
+  double weight[2]; ///< reference diagonal of A: translation, rotation (sum of both bodies' inverse_weight)
+} cav_pair;
+
+/// One joint of a fixed tendon.
+typedef struct cav_tendon_part {
+  int joint;
+  double coef;
+} cav_tendon_part;
+
+/// Fixed tendon: length = sum coef q_joint.
+typedef struct cav_tendon {
+  const char *name;
+  int part, npart; ///< range in model->tendon_part
+  int limited;
+  double range[2];
+  double margin;
+  cav_softness limit;
+  double stiffness, damping, springlength;
+  double frictionloss;
+  cav_softness friction;
+  double inverse_weight; ///< J M^-1 J' at q0
+} cav_tendon;
+
+/// Motor: force = gear * clamp(control) on a joint or a tendon.
+typedef struct cav_actuator {
+  const char *name;
+  cav_transmission transmission;
+  int target;           ///< joint or tendon
+  double gear[6];       ///< gear[0] for scalar joints and tendons; all for ball (3) and free (6) joints
+  int ctrllimited, forcelimited;
+  double ctrlrange[2];
+  double forcerange[2]; ///< before gear
+} cav_actuator;
+
+typedef struct cav_sensor {
+  const char *name;
+  cav_sensor_type type;
+  cav_object_type object_type;
+  int object; ///< index of that kind
+  int dim;    ///< length of its reading
+  int adr;    ///< first index in the vector of all readings
+} cav_sensor;
+
+typedef struct cav_key {
+  const char *name;
+  double time;
+  const double *q; ///< [nq]
+  const double *v; ///< [nv]
+} cav_key;
+
+/// Which velocity the bias force c and the passive force p are evaluated at; optimisation.md, 1.
+typedef enum cav_order {
+  CAV_ORDER_EULER,   ///< at v; joint damping at v_next (implicit). The paper's step
+  CAV_ORDER_MIDPOINT ///< at (v + v_next)/2, damping too; second order where it matters
+} cav_order;
+
+/// How v* is made from a constraint's position error; dynamics.md, 4.
+typedef enum cav_stabilisation {
+  CAV_STABILISATION_SOLREF,  ///< eq. (28) from each constraint's solref and solimp, as MuJoCo does
+  CAV_STABILISATION_DISCRETE ///< critically damped discrete step with double pole exp(-h/time_constant), one softness for all
+} cav_stabilisation;
+
+/// Diagonal of A that scales the regulariser R (27).
+typedef enum cav_regulariser {
+  CAV_REGULARISER_REFERENCE ///< constants of the configuration q0: smooth in q, cheap, MuJoCo's
+} cav_regulariser;
+
+/// How constraints are evaluated. A state starts with the model's; change state->options between calls at will.
+typedef struct cav_options {
+  double timestep;        ///< h, s: starts as the model's; every evaluation uses this one
+  cav_order order;
+  cav_stabilisation stabilisation;
+  cav_regulariser regulariser;
+  double softness;        ///< epsilon of CAV_STABILISATION_DISCRETE, > 0
+  double time_constant;   ///< kappa of CAV_STABILISATION_DISCRETE, s; 0: deadbeat
+  double smoothing;       ///< delta, m: distance at which the smoothed law is felt; 0: the exact law (dynamics.md, 3)
+  double smoothing_self;  ///< delta between two moving links, m, used where smoothing > 0
+  double impratio;        ///< R_normal / R_friction, > 0
+  int guard;              ///< 1: keep solref time constants >= 2 h
+  int contact;            ///< 0: no contacts
+  int constraint;         ///< 0: no limits, friction loss or contacts
+  int gravity;            ///< 0: none
+  int passive;            ///< 0: no springs and dampers
+} cav_options;
+
+/// A compiled model. Built by cav_model_load, never changed afterwards.
+typedef struct cav_model {
+  const char *name;
+  int nq, nv, nu;  ///< sizes of q, v and of the control vector (one per actuator)
+  double timestep; ///< s
+  double gravity[3];
+  cav_options options; ///< defaults for new states
+
+  int nbody, nlink, njoint, ngeom, nsite, npair, ntendon, ntendon_part, nactuator, nsensor, nkey, nwarning;
+  int nsensordata; ///< length of the vector of all readings
+  const cav_body *body;
+  const cav_link *link;
+  const cav_joint *joint;
+  const cav_dof *dof; ///< [nv]
+  const cav_geom *geom;
+  const cav_site *site;
+  const cav_pair *pair;
+  const cav_tendon *tendon;
+  const cav_tendon_part *tendon_part;
+  const cav_actuator *actuator; ///< [nu]
+  const cav_sensor *sensor;
+  const cav_key *key;
+  const double *q0;          ///< [nq] configuration of the file, where reference quantities are taken
+  const char *const *warning; ///< what the file asks for and this version leaves aside, with file and line
+  double mass;               ///< kg, of all that moves
+  size_t bytes;              ///< memory of the model
+} cav_model;
+
+/// Loads an MJCF file, with its includes and assets. NULL on failure with the reason in error (may be NULL).
+/// What is understood but not used becomes a model->warning. The result is freed with cav_model_free.
+cav_model *cav_model_load(const char *path, cav_error *error);
+
+/// Frees a model; NULL is fine. No state of it may be used afterwards.
+void cav_model_free(cav_model *model);
+
+/// Index of the object of that kind and name, -1 if there is none. CAV_OBJECT_BODY and _XBODY both look up bodies.
+int cav_find(const cav_model *model, cav_object_type type, const char *name);
+
+/// q [nq] := the configuration of the file (model->q0).
+void cav_configuration_reset(const cav_model *model, double *q);
+
+/// Scales every quaternion in q [nq] to unit length; a zero quaternion becomes the identity.
+void cav_normalise(const cav_model *model, double *q);
+
+/// Moves q along v for a time h on the manifold: q_next = q (+) h v. q, q_next [nq], v [nv]; q_next may be q.
+/// Quaternions advance by the exponential in body axes. dynamics.md, 1.
+void cav_integrate(const cav_model *model, const double *q, const double *v, double h, double *q_next);
+
+/// Velocity that takes q0 to q1 in time h: v = (q1 (-) q0)/h. q0, q1 [nq], v [nv]; inverse of cav_integrate.
+void cav_difference(const cav_model *model, const double *q0, const double *q1, double h, double *v);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

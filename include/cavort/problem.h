@@ -1,0 +1,123 @@
+/// What a motion should achieve: a model, a horizon, a start, a guess, costs and constraints. Everything a problem file can
+/// say, these structs can say.
+#ifndef CAVORT_PROBLEM_H
+#define CAVORT_PROBLEM_H
+
+#include "cavort/trajectory.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/// What a term measures at a knot.
+typedef enum cav_quantity {
+  CAV_QUANTITY_SENSOR,        ///< reading of a sensor; quaternions as the rotation vector to the target
+  CAV_QUANTITY_CONFIGURATION, ///< q (-) target, tangent, nv values; by dofs if dof selection is given
+  CAV_QUANTITY_VELOCITY,      ///< v_t, nv values
+  CAV_QUANTITY_ACCELERATION,  ///< (v_{t+1} - v_t)/h, nv values
+  CAV_QUANTITY_EFFORT,        ///< actuator force over its limit (force itself where there is none), nu values
+  CAV_QUANTITY_GAP,           ///< sqrt(f_n/weight) * max(gap, 0) of every contact, m: force only where there is touch
+  CAV_QUANTITY_SLIP,          ///< sqrt(f_n/weight) * tangential velocity of every contact, m/s
+  CAV_QUANTITY_IMPACT,        ///< sqrt(f_n/weight) * normal velocity of every contact, m/s
+  CAV_QUANTITY_TYPES
+} cav_quantity;
+
+typedef enum cav_term_use {
+  CAV_USE_COST, ///< weight/2 * ||x - target||^2, integrated over the window; at a single knot not multiplied by time
+  CAV_USE_EQUAL, ///< x = target, hard
+  CAV_USE_RANGE  ///< lower <= x <= upper, hard
+} cav_term_use;
+
+/// Which dofs a term over velocities, accelerations or configurations selects.
+typedef enum cav_dof_set {
+  CAV_DOFS_ALL,
+  CAV_DOFS_ROOT_LINEAR,  ///< the three translations of free joints
+  CAV_DOFS_ROOT_ANGULAR, ///< the three rotations of free joints
+  CAV_DOFS_JOINTS,       ///< all but free joints
+  CAV_DOFS_ONE           ///< the dofs of one joint: term->object
+} cav_dof_set;
+
+typedef struct cav_term {
+  const char *name; ///< for logs and explanations; "" is fine
+  cav_quantity quantity;
+  cav_term_use use;
+  cav_sensor sensor;        ///< CAV_QUANTITY_SENSOR: from the model or declared by the problem
+  int component;            ///< sensor component, -1: all
+  cav_dof_set dofs;
+  int joint;                ///< CAV_DOFS_ONE
+  double from, to;          ///< window, s; equal: one knot (the nearest). to < 0: the end
+  double weight;            ///< cost
+  double scale;             ///< values are divided by it, > 0, unit of the quantity
+  const double *target;     ///< constant: sensors [sensor.dim], all of them even if one component counts; configurations a q
+                            ///< [nq]; rates [nv]. NULL: zeros (quaternion: identity; configuration: the goal)
+  int nwaypoint;            ///< 0, or target is [nwaypoint*dim], linear between times, constant before and after
+  const double *waypoint_time; ///< [nwaypoint], s, increasing
+  double lower, upper;      ///< CAV_USE_RANGE, infinite where open; target is NULL then, or a posture or orientation to start from
+} cav_term;
+
+typedef enum cav_guess { CAV_GUESS_HOLD, CAV_GUESS_INTERPOLATE } cav_guess;
+
+/// One stage of the continuation (optimisation.md, 5).
+typedef struct cav_stage_options {
+  double softness;      ///< epsilon of the contacts
+  double time_constant; ///< kappa, in steps of the horizon (0: deadbeat)
+  double smoothing;      ///< delta, m
+  double smoothing_self; ///< delta between moving links and of limits, m (rad)
+  double penalty;        ///< weight of the unactuated force (share of weight, squared)
+  int iterations;        ///< at most
+  double tolerance;      ///< relative decrease below which, twice in a row, the stage ends
+} cav_stage_options;
+
+/// The schedule: stages go geometrically from first to last; the penalty reaches its end at half way.
+typedef struct cav_schedule {
+  int stages;
+  cav_stage_options first, last;
+} cav_schedule;
+
+typedef struct cav_problem {
+  const char *name;
+  const cav_model *model;
+  double duration, timestep;  ///< s; knots are round(duration/timestep) + 1
+  cav_order order;
+  int close_at_rest;          ///< 1: v after the last knot is zero, with rows there; 0: no rows at the last knot
+  double *q_start;            ///< [nq]
+  double *v_start;            ///< [nv]
+  double *q_goal;             ///< [nq] goal posture of the guess and of configuration terms without a target
+  cav_guess guess;
+  double guess_height;        ///< m: ballistic arc added to the guess over guess_from .. guess_to
+  double guess_from, guess_to; ///< s
+  int nterm;
+  cav_term *term;
+  double effort_limit;        ///< share of the actuator limits planned with, 0 .. 1
+  double limit_margin;        ///< rad or m kept from joint and tendon limits in planning
+  double softness_replay;     ///< reserved for verification: contacts of the fine replay, see README of problems
+  cav_schedule schedule;
+  int solved;                 ///< 1: read from a result folder, contact holds
+  cav_options contact;        ///< the law that the recorded motion obeys, for verification; solving does not use it
+  const char *model_path;     ///< file the model was read from; NULL: made in C
+  void *owner;                ///< memory of a problem read from a file
+} cav_problem;
+
+/// Weights, schedule and options that serve all motions; the caller sets duration, start, goal and terms. Owns nothing.
+cav_problem cav_problem_default(const cav_model *model);
+
+/// The running costs that serve all motions: effort, velocities, accelerations, posture, gap, slip, impact. Writes the first
+/// most of them to term (may be NULL if most is 0) and returns how many there are.
+int cav_problem_default_terms(cav_term *term, int most);
+
+/// Reads a problem file and its model (model_path overrides the file's; NULL: as written). NULL on failure.
+/// The result and its model are freed by cav_problem_free.
+cav_problem *cav_problem_load(const char *path, const char *model_path, cav_error *error);
+
+/// Frees a problem that cav_problem_load gave, and its model; NULL is fine.
+void cav_problem_free(cav_problem *problem);
+
+/// Writes a problem such that reading it gives the same: poses as numbers, every term spelt out. model_path is written as it
+/// stands (NULL: problem->model_path). Replaces the file atomically. CAV_BAD_INPUT: path cannot be written, or a term looks
+/// at a body, site or geom without a name.
+cav_status cav_problem_write(const char *path, const cav_problem *problem, const char *model_path, cav_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,42 @@
+/// A motion: configurations at equidistant knots, and what follows from them.
+#ifndef CAVORT_TRAJECTORY_H
+#define CAVORT_TRAJECTORY_H
+
+#include "cavort/dynamics.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/// Knots 0 .. nknot-1 at times t*timestep. Rows are knots. v[t] = (q[t] (-) q[t-1])/timestep, v[0] is given;
+/// u[t] = inverse(q[t], v[t], v[t+1]); the last row of u uses the velocity that closes the motion (optimisation.md, 1).
+typedef struct cav_trajectory {
+  int nq, nv, nknot;
+  double timestep; ///< s
+  double *q;       ///< [nknot*nq]
+  double *v;       ///< [nknot*nv]
+  double *u;       ///< [nknot*nv], N or N m
+} cav_trajectory;
+
+/// nknot copies of model->q0 at rest; NULL if memory runs out or nknot < 2.
+cav_trajectory *cav_trajectory_new(const cav_model *model, int nknot, double timestep);
+cav_trajectory *cav_trajectory_copy(const cav_trajectory *trajectory);
+
+/// Frees a trajectory; NULL is fine.
+void cav_trajectory_free(cav_trajectory *trajectory);
+
+/// v of knots 1 .. nknot-1 from q by differences; v of knot 0 stays.
+void cav_trajectory_velocities(const cav_model *model, cav_trajectory *trajectory);
+
+/// The motion resampled at another step over the same duration: geodesic between knots.
+cav_trajectory *cav_trajectory_resample(const cav_model *model, const cav_trajectory *trajectory, double timestep);
+
+/// Reads and writes trajectory.csv: a header of named columns, then one row per knot: time, q in MuJoCo's layout, v, u.
+/// Writing replaces the file atomically.
+cav_status cav_trajectory_write(const char *path, const cav_model *model, const cav_trajectory *trajectory, cav_error *error);
+cav_trajectory *cav_trajectory_read(const char *path, const cav_model *model, cav_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,73 @@
+/// What the parts of verification share. Private to optim/; none of it is seen or used by the optimiser, and none of
+/// the optimiser is used here.
+#ifndef CAVORT_AUDIT_H
+#define CAVORT_AUDIT_H
+
+#include "cavort/solve.h"
+
+/// A worst value and where it was found.
+typedef struct cav_finding {
+  double value;
+  int knot;        ///< -1: not at a knot
+  char where[200]; ///< what, in words; always terminated
+} cav_finding;
+
+/// A motion under examination. Between cav_audit calls at a knot the state holds cav_inverse at that knot.
+typedef struct cav_audit {
+  const cav_problem *problem;
+  const cav_model *model;
+  cav_options law;  ///< claimed contact law, at the step of the knots
+  int last;         ///< last knot, T
+  int rows;         ///< knots 0 .. rows-1 have a force: T, or T+1 where the motion closes at rest
+  double h;         ///< s
+  double weight;    ///< N, unit of forces (cav_audit_weight)
+  double arm;       ///< m, unit of moments is weight*arm
+  const double *q;  ///< [(T+1)*nq] knots
+  double *v;        ///< [(T+2)*nv] from the knots; the last row closes the motion: zero, or v_T where nothing closes it
+  double *u;        ///< [(T+1)*nv] inverse dynamics under the claimed law; meaningful for rows knots
+  double *control;  ///< [(T+1)*nu] least-norm share of the actuators
+  cav_state *state; ///< claimed law
+  cav_state *bare;  ///< positions only: no contacts, no constraints
+} cav_audit;
+
+/// Keeps the larger of the two; a value that is not a number counts as larger. Writes where by printf's rules.
+void cav_finding_note(cav_finding *finding, double value, int knot, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
+
+/// Name of a link's body for people: its name, or "body N".
+const char *cav_audit_link_name(const cav_model *model, int link, char buffer[32]);
+
+/// Range of an actuator's control: control and force limits together, infinite where open. scale: the larger finite
+/// magnitude of the two, 1 where there is none.
+void cav_audit_actuator_range(const cav_actuator *actuator, double range[2], double *scale);
+
+/// Balance of momentum of every tree over all knots against gravity and contacts with what is not of the tree:
+/// root mean square and worst knot, share of weight. balance.c.
+typedef struct cav_balance cav_balance;
+cav_balance *cav_balance_new(const cav_audit *audit);
+void cav_balance_free(cav_balance *balance);
+/// Adds knot t; audit->state holds the inverse there.
+void cav_balance_add(cav_balance *balance, const cav_audit *audit, int t);
+/// Root mean square of the worst tree, and its worst knot.
+void cav_balance_result(const cav_balance *balance, const cav_audit *audit, cav_finding *finding);
+
+/// Hard terms of the problem at knot t; audit->state holds the inverse there. work holds cav_demand_room values.
+/// demand.c.
+int cav_demand_room(const cav_audit *audit);
+void cav_demand_note(const cav_audit *audit, int t, double *work, cav_finding *finding);
+
+/// Forward simulations. replay.c.
+typedef struct cav_replay {
+  double step_error; ///< |v' - v_{t+1}| h of single steps from the knots
+  int step_knot;
+  double open_error;     ///< largest |q - knot| in open loop
+  double open_seconds;   ///< within 1e-6
+  double closed_seconds; ///< followed
+  double closed_error;   ///< m
+  char lost[160];        ///< why the closed loop ended early, "" if it did not
+} cav_replay;
+cav_status cav_replay_steps(const cav_audit *audit, cav_replay *replay);
+cav_status cav_replay_open(const cav_audit *audit, cav_replay *replay);
+cav_status cav_replay_closed(const cav_audit *audit, const double *gain_q, const double *gain_v, cav_replay *replay);
+
+#endif

@@ -1,0 +1,328 @@
+/// Momentum defect: how well a motion obeys the balance of linear and angular momentum that no discretisation can bend.
+/// For each tree of bodies, with c its centre of mass at the knots and L its angular momentum about c, taken half way
+/// between knots (configuration q_t (+) h v_{t+1}/2, velocity v_{t+1}):
+///   F = m (c_{t+1} - 2 c_t + c_{t-1})/h^2 - m g - sum f
+///   N = (L_{t+1/2} - L_{t-1/2})/h - sum ((p - c_t) x f + torque)
+/// over contacts with what is not of the tree. Zero to rounding for exact discrete flight, of order h^2 for a motion
+/// sampled from the continuous one.
+/// A tree that joints hold to the world gets forces from there which no one measures: only what its root link can do
+/// freely is balanced. F and N/0.3 m are projected on the span of the motions of the root link's dofs that no actuator
+/// and no tendon drives, seen at c; what those joints themselves exert (damping, springs, armature, limits, friction
+/// loss) is accounted for. A free root gives all six components, a planar one (two slides and a hinge) three, a cart
+/// driven along its rail none: its defect is 0 by definition.
+/// Written for verification alone: momenta come from link poses and the motion subspaces, not from the inverse.
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "audit.h"
+
+struct cav_balance {
+  int ntree;
+  int *root;        // [ntree] root link
+  int *tree;        // [nlink] tree of a link, -1 for the world
+  double *com;      // [(T+3)*ntree*3] at knots -1 .. T+1
+  double *momentum; // [(T+2)*ntree*3] at knots -1/2 .. T+1/2
+  int *held;        // [nv] 1: driven by an actuator or a tendon, left out
+  double *sum;      // [ntree] squares
+  int *count;       // [ntree]
+  double *worst;    // [ntree] largest component
+  int *worst_knot;  // [ntree]
+  double *mass;     // [ntree]
+  double *twist;    // [nlink*6] scratch
+  double *wrench;   // [ntree*6] scratch: linear, angular about c
+};
+
+static double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+static void cross(const double *a, const double *b, double *out) {
+  out[0] = a[1] * b[2] - a[2] * b[1];
+  out[1] = a[2] * b[0] - a[0] * b[2];
+  out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+// velocity of the point p of a body with spatial velocity twist (angular, linear) taken at reference
+static void point_velocity(const double *twist, const double *reference, const double *p, double *out) {
+  const double arm[3] = {p[0] - reference[0], p[1] - reference[1], p[2] - reference[2]};
+  cross(twist, arm, out);
+  for (int k = 0; k < 3; k++) out[k] += twist[3 + k];
+}
+
+// centres of mass of all trees at the bare state's position
+static void tree_com(const cav_balance *balance, const cav_audit *audit, double *com) {
+  const cav_model *model = audit->model;
+  memset(com, 0, sizeof(double) * 3 * balance->ntree);
+  for (int l = 1; l < model->nlink; l++) {
+    double *c = com + 3 * balance->tree[l];
+    for (int k = 0; k < 3; k++) c[k] += model->link[l].mass * audit->bare->com[3 * l + k];
+  }
+  for (int i = 0; i < balance->ntree; i++) {
+    for (int k = 0; k < 3; k++) com[3 * i + k] /= balance->mass[i] > 0 ? balance->mass[i] : 1;
+  }
+}
+
+// spatial velocities of links at the bare state's position
+static void link_twists(const cav_audit *audit, const double *v, double *twist) {
+  const cav_model *model = audit->model;
+  memset(twist, 0, sizeof(double) * 6);
+  for (int l = 1; l < model->nlink; l++) {
+    const cav_link *link = model->link + l;
+    // links of one tree share their reference point
+    memcpy(twist + 6 * l, twist + 6 * link->parent, sizeof(double) * 6);
+    for (int d = link->dof; d < link->dof + link->ndof; d++) {
+      for (int k = 0; k < 6; k++) twist[6 * l + k] += audit->bare->axis[6 * d + k] * v[d];
+    }
+  }
+}
+
+// angular momenta of all trees about their centres of mass at the bare state's position; out [ntree*3]
+static void tree_momentum(const cav_balance *balance, const cav_audit *audit, const double *v, double *out) {
+  const cav_model *model = audit->model;
+  const cav_state *bare = audit->bare;
+  double com[3], arm[3], moment[3];
+  link_twists(audit, v, balance->twist);
+  memset(out, 0, sizeof(double) * 3 * balance->ntree);
+  for (int i = 0; i < balance->ntree; i++) {
+    // centre of mass of the tree
+    double mass = balance->mass[i] > 0 ? balance->mass[i] : 1;
+    memset(com, 0, sizeof com);
+    for (int l = 1; l < model->nlink; l++) {
+      if (balance->tree[l] != i) continue;
+      for (int k = 0; k < 3; k++) com[k] += model->link[l].mass * bare->com[3 * l + k] / mass;
+    }
+    // spin of each link and momentum of its centre; the tree's mean velocity drops out of the sum
+    for (int l = 1; l < model->nlink; l++) {
+      if (balance->tree[l] != i) continue;
+      const double *I = bare->inertia + 6 * l, *w = balance->twist + 6 * l;
+      double vc[3];
+      point_velocity(w, bare->reference + 3 * l, bare->com + 3 * l, vc);
+      for (int k = 0; k < 3; k++) arm[k] = bare->com[3 * l + k] - com[k];
+      cross(arm, vc, moment);
+      out[3 * i] += I[0] * w[0] + I[3] * w[1] + I[4] * w[2] + model->link[l].mass * moment[0];
+      out[3 * i + 1] += I[3] * w[0] + I[1] * w[1] + I[5] * w[2] + model->link[l].mass * moment[1];
+      out[3 * i + 2] += I[4] * w[0] + I[5] * w[1] + I[2] * w[2] + model->link[l].mass * moment[2];
+    }
+  }
+}
+
+// trees, and the dofs something drives
+static void survey(cav_balance *balance, const cav_audit *audit, double *unit, double *residual) {
+  const cav_model *model = audit->model;
+  balance->tree[0] = -1;
+  for (int l = 1; l < model->nlink; l++) {
+    const cav_link *link = model->link + l;
+    if (link->root == l) balance->root[balance->ntree++] = l;
+    for (int i = 0; i < balance->ntree; i++) {
+      if (balance->root[i] == link->root) balance->tree[l] = i;
+    }
+    balance->mass[balance->tree[l]] += link->mass;
+  }
+  for (int d = 0; d < model->nv; d++) {
+    memset(unit, 0, sizeof(double) * model->nv);
+    unit[d] = 1;
+    cav_actuation(model, audit->bare, unit, residual, NULL);
+    balance->held[d] = residual[d] < 1 - 1e-9;
+  }
+  for (int i = 0; i < model->ntendon_part; i++) balance->held[model->joint[model->tendon_part[i].joint].dof] = 1;
+}
+
+// centres of mass at the knots and one step either side, momenta half way
+static cav_status record(cav_balance *balance, const cav_audit *audit, double *q) {
+  const cav_model *model = audit->model;
+  int nv = model->nv, nt3 = 3 * balance->ntree;
+  cav_status status = CAV_OK;
+  for (int k = -1; k <= audit->last + 1 && status == CAV_OK; k++) {
+    // knot k
+    if (k < 0) cav_integrate(model, audit->q, audit->v, -audit->h, q);
+    if (k >= 0 && k <= audit->last) memcpy(q, audit->q + k * model->nq, sizeof(double) * model->nq);
+    if (k > audit->last) cav_integrate(model, audit->q + audit->last * model->nq, audit->v + k * nv, audit->h, q);
+    status = cav_position(model, audit->bare, q);
+    if (status != CAV_OK) break;
+    tree_com(balance, audit, balance->com + (k + 1) * nt3);
+    if (k > audit->last) break;
+    // half a step on
+    cav_integrate(model, q, audit->v + (k + 1) * nv, audit->h / 2, q);
+    status = cav_position(model, audit->bare, q);
+    if (status == CAV_OK) tree_momentum(balance, audit, audit->v + (k + 1) * nv, balance->momentum + (k + 1) * nt3);
+  }
+  return status;
+}
+
+cav_balance *cav_balance_new(const cav_audit *audit) {
+  const cav_model *model = audit->model;
+  size_t nl = (size_t)model->nlink, nv = (size_t)model->nv + 1, knots = (size_t)audit->last + 3;
+  cav_balance *b = calloc(1, sizeof *b);
+  double *unit = calloc(2 * nv + (size_t)model->nq, sizeof *unit);
+  if (!b || !unit) {
+    free(b);
+    free(unit);
+    return NULL;
+  }
+  b->root = calloc(nl, sizeof *b->root);
+  b->tree = calloc(nl, sizeof *b->tree);
+  b->com = calloc(knots * nl * 3, sizeof *b->com);
+  b->momentum = calloc(knots * nl * 3, sizeof *b->momentum);
+  b->held = calloc(nv, sizeof *b->held);
+  b->sum = calloc(nl, sizeof *b->sum);
+  b->count = calloc(nl, sizeof *b->count);
+  b->worst = calloc(nl, sizeof *b->worst);
+  b->worst_knot = calloc(nl, sizeof *b->worst_knot);
+  b->mass = calloc(nl, sizeof *b->mass);
+  b->twist = calloc(nl * 6, sizeof *b->twist);
+  b->wrench = calloc(nl * 6, sizeof *b->wrench);
+  int complete = b->root && b->tree && b->com && b->momentum && b->held && b->sum && b->count && b->worst &&
+                 b->worst_knot && b->mass && b->twist && b->wrench;
+  if (complete) survey(b, audit, unit, unit + nv);
+  if (!complete || record(b, audit, unit + 2 * nv) != CAV_OK) {
+    cav_balance_free(b);
+    b = NULL;
+  }
+  free(unit);
+  return b;
+}
+
+void cav_balance_free(cav_balance *balance) {
+  if (!balance) return;
+  free(balance->root);
+  free(balance->tree);
+  free(balance->com);
+  free(balance->momentum);
+  free(balance->held);
+  free(balance->sum);
+  free(balance->count);
+  free(balance->worst);
+  free(balance->worst_knot);
+  free(balance->mass);
+  free(balance->twist);
+  free(balance->wrench);
+  free(balance);
+}
+
+// takes a force and a torque at p, both on one link of tree i, out of the tree's balance
+static void apply(cav_balance *balance, int i, const double *com, const double *p, const double *force,
+                  const double *torque, double sign) {
+  double *w = balance->wrench + 6 * i, moment[3];
+  const double arm[3] = {p[0] - com[0], p[1] - com[1], p[2] - com[2]};
+  cross(arm, force, moment);
+  for (int k = 0; k < 3; k++) {
+    w[k] -= sign * force[k];
+    w[3 + k] -= sign * (moment[k] + torque[k]);
+  }
+}
+
+// balance of every tree at knot t: linear, angular about the centre of mass, N and N m
+static void wrenches(cav_balance *balance, const cav_audit *audit, int t) {
+  const cav_model *model = audit->model;
+  double h = audit->h;
+  int nt3 = 3 * balance->ntree;
+  const double *before = balance->com + t * nt3, *now = before + nt3, *after = now + nt3;
+  const double *spin = balance->momentum + t * nt3;
+  for (int i = 0; i < balance->ntree; i++) {
+    for (int k = 0; k < 3; k++) {
+      double a = (after[3 * i + k] - 2 * now[3 * i + k] + before[3 * i + k]) / (h * h);
+      balance->wrench[6 * i + k] = balance->mass[i] * (a - (audit->law.gravity ? model->gravity[k] : 0));
+      balance->wrench[6 * i + 3 + k] = (spin[nt3 + 3 * i + k] - spin[3 * i + k]) / h;
+    }
+  }
+  for (int j = 0; j < audit->state->ncontact; j++) {
+    const cav_contact *contact = audit->state->contact + j;
+    int tree1 = balance->tree[contact->link1], tree2 = balance->tree[contact->link2];
+    if (tree1 == tree2) continue;
+    double force[3] = {0}, torque[3] = {0};
+    for (int k = 0; k < contact->dim; k++) {
+      double *to = k < 3 ? force : torque;
+      for (int x = 0; x < 3; x++) to[x] += contact->frame[3 * (k % 3) + x] * contact->impulse[k] / h;
+    }
+    if (tree2 >= 0) apply(balance, tree2, now + 3 * tree2, contact->pos, force, torque, 1);
+    if (tree1 >= 0) apply(balance, tree1, now + 3 * tree1, contact->pos, force, torque, -1);
+  }
+}
+
+// what a root dof's own joint exerts along it at knot t: damping, spring, armature, limit, friction loss
+static double joint_force(const cav_audit *audit, int dof, int t) {
+  const cav_model *model = audit->model;
+  const cav_joint *joint = model->joint + model->dof[dof].joint;
+  int nv = model->nv;
+  double v = audit->v[t * nv + dof], next = audit->v[(t + 1) * nv + dof];
+  double rate = audit->law.order == CAV_ORDER_MIDPOINT ? (v + next) / 2 : next;
+  int scalar = joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE;
+  double force = -model->dof[dof].armature * (next - v) / audit->h;
+  if (audit->law.passive) {
+    force -= model->dof[dof].damping * rate;
+    if (scalar) force -= joint->stiffness * (audit->q[t * model->nq + joint->q] - joint->springref);
+  }
+  for (int i = 0; i < audit->state->nrow; i++) {
+    const cav_row *row = audit->state->row + i;
+    if (row->type == CAV_ROW_FRICTION_DOF && row->object == dof) force += row->impulse / audit->h;
+    if (row->type == CAV_ROW_LIMIT_JOINT && model->joint + row->object == joint) {
+      force += row->axis[scalar ? 0 : dof - joint->dof] * row->impulse / audit->h;
+    }
+  }
+  return force;
+}
+
+// 1 if the dof's joint can exert what joint_force does not know: the spring of a ball or free joint
+static int opaque(const cav_model *model, int dof) {
+  const cav_joint *joint = model->joint + model->dof[dof].joint;
+  return (joint->type == CAV_JOINT_BALL || joint->type == CAV_JOINT_FREE) && joint->stiffness > 0;
+}
+
+// components of tree i's balance along what its root can freely do, share of weight; returns their number
+static int project(const cav_balance *balance, const cav_audit *audit, int i, int t, double *out) {
+  const cav_model *model = audit->model;
+  const cav_state *state = audit->state;
+  const cav_link *root = model->link + balance->root[i];
+  const double *c = balance->com + (t + 1) * 3 * balance->ntree + 3 * i;
+  double basis[6][6], force[6], share[6];
+  int n = 0;
+  const double *w = balance->wrench + 6 * i;
+  for (int k = 0; k < 3; k++) share[k] = w[k], share[3 + k] = w[3 + k] / audit->arm;
+  for (int d = root->dof; d < root->dof + root->ndof && n < 6; d++) {
+    if (balance->held[d] || opaque(model, d)) continue;
+    // motion of this dof seen at c, angles in arms
+    const double *axis = state->axis + 6 * d;
+    double *e = basis[n], own = joint_force(audit, d, t);
+    point_velocity(axis, state->reference + 3 * balance->root[i], c, e);
+    for (int k = 0; k < 3; k++) e[3 + k] = axis[k] * audit->arm;
+    double size = 0;
+    for (int k = 0; k < 6; k++) size += e[k] * e[k];
+    // Gram-Schmidt, carrying the joint's own force along
+    for (int j = 0; j < n; j++) {
+      double along = dot(e, basis[j]) + dot(e + 3, basis[j] + 3);
+      for (int k = 0; k < 6; k++) e[k] -= along * basis[j][k];
+      own -= along * force[j];
+    }
+    double norm = sqrt(dot(e, e) + dot(e + 3, e + 3));
+    if (norm <= 1e-9 * sqrt(size)) continue;
+    for (int k = 0; k < 6; k++) e[k] /= norm;
+    force[n] = own / norm;
+    out[n] = (dot(e, share) + dot(e + 3, share + 3) - force[n]) / audit->weight;
+    n++;
+  }
+  return n;
+}
+
+void cav_balance_add(cav_balance *balance, const cav_audit *audit, int t) {
+  double part[6];
+  wrenches(balance, audit, t);
+  for (int i = 0; i < balance->ntree; i++) {
+    int n = project(balance, audit, i, t, part);
+    balance->count[i] += n;
+    for (int k = 0; k < n; k++) {
+      balance->sum[i] += part[k] * part[k];
+      if (fabs(part[k]) <= balance->worst[i]) continue;
+      balance->worst[i] = fabs(part[k]);
+      balance->worst_knot[i] = t;
+    }
+  }
+}
+
+void cav_balance_result(const cav_balance *balance, const cav_audit *audit, cav_finding *finding) {
+  char name[32];
+  for (int i = 0; i < balance->ntree; i++) {
+    if (!balance->count[i]) continue;
+    double rms = sqrt(balance->sum[i] / balance->count[i]);
+    cav_finding_note(finding, rms, balance->worst_knot[i], "tree of %s, worst component %.3g",
+                     cav_audit_link_name(audit->model, balance->root[i], name), balance->worst[i]);
+  }
+}

@@ -1,0 +1,174 @@
+/// Continuation from soft contacts felt at a distance and a priced helper force to the problem as stated, then an augmented
+/// Lagrangian that makes its constraints hold (optimisation.md, 5; recipe.md, 1). The schedule is data: problem->schedule.
+#include "continuation.h"
+
+#include <math.h>
+#include <string.h>
+#include <time.h>
+
+/// Weights of ranges while they are only priced; rows are scaled, so these serve all models.
+static const cav_penalties priced = {.effort = 100, .range = 1000, .term = 100};
+
+/// Augmented Lagrangian: rounds, iterations a round, tolerance of a round, and the unactuated force from which projection is safe.
+enum { ROUNDS = 6, ROUND_ITERATIONS = 15 };
+static const double round_tolerance = 1e-5, near = 1e-3;
+
+/// Projection onto the constraints: iterations, and how far below the tolerance it aims.
+enum { RESTORATIONS = 30 };
+
+double cav_clock(void) {
+  struct timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/// Cubic that leaves 0 and reaches 1 at rest.
+static double smoothstep(double s) {
+  s = fmin(fmax(s, 0), 1);
+  return s * s * (3 - 2 * s);
+}
+
+void cav_guess_fill(const cav_problem *problem, cav_trajectory *at) {
+  const cav_model *m = problem->model;
+  double *tangent = at->v + (size_t)(at->nknot - 1) * m->nv; // scratch until velocities are filled below
+  cav_difference(m, problem->q_start, problem->q_goal, 1, tangent);
+  for (int t = 0; t < at->nknot; t++) {
+    double time = t * problem->timestep, s = problem->guess == CAV_GUESS_HOLD ? 0 : smoothstep(time / problem->duration);
+    double *q = at->q + (size_t)t * at->nq;
+    cav_integrate(m, problem->q_start, tangent, s, q);
+    double span = problem->guess_to - problem->guess_from;
+    double x = span > 0 ? (time - problem->guess_from) / span : -1;
+    if (x <= 0 || x >= 1) continue;
+    for (int j = 0; j < m->njoint; j++) {
+      const cav_joint *joint = &m->joint[j];
+      int root = m->link[joint->link].parent == 0, vertical = joint->type == CAV_JOINT_SLIDE && fabs(joint->axis[2]) > 0.9;
+      double lift = 4 * problem->guess_height * x * (1 - x);
+      if (root && joint->type == CAV_JOINT_FREE) q[joint->q + 2] += lift;
+      if (root && vertical) q[joint->q] += copysign(lift, joint->axis[2]);
+    }
+  }
+  memcpy(at->v, problem->v_start, (size_t)m->nv * sizeof(double));
+  cav_trajectory_velocities(m, at);
+}
+
+static double between(double from, double to, double s) {
+  return from > 0 && to > 0 ? from * pow(to / from, s) : (1 - s) * from + s * to;
+}
+
+void cav_stage_set(const cav_problem *problem, int s, int n, cav_transcription *tr) {
+  const cav_stage_options *a = &problem->schedule.first, *b = &problem->schedule.last;
+  double x = n > 1 ? (double)s / (n - 1) : 1;
+  tr->options.stabilisation = CAV_STABILISATION_DISCRETE;
+  tr->options.softness = between(a->softness, b->softness, x);
+  tr->options.time_constant = between(a->time_constant, b->time_constant, x) * problem->timestep;
+  tr->options.smoothing = between(a->smoothing, b->smoothing, x);
+  tr->options.smoothing_self = between(a->smoothing_self, b->smoothing_self, x);
+  tr->penalty = priced;
+  tr->penalty.effort = between(priced.effort, 100 * priced.effort, x);
+  tr->penalty.range = between(priced.range, 10 * priced.range, x);
+  tr->penalty.unactuated = between(a->penalty, b->penalty, fmin(2 * x, 1));
+  tr->penalty.term = between(priced.term, 100 * priced.term, fmin(2 * x, 1));
+}
+
+int cav_run_report(void *context, double step, double radius) {
+  cav_solve_run *run = context;
+  cav_solution *solution = run->solution;
+  cav_progress line = {.phase = run->phase, .stage = run->stage, .stages = run->stages, .step = step, .radius = radius};
+  line.iteration = ++solution->iterations;
+  line.cost = cav_transcription_cost(run->tr);
+  line.unactuated = cav_transcription_unactuated(run->tr, &line.knot);
+  line.violation = cav_transcription_violation(run->tr);
+  line.seconds = cav_clock() - run->start;
+  int kept = cav_solution_log(solution, &line);
+  if (!kept) return 1;
+  return run->options->observer && run->options->observer(run->options->observer_context, &line);
+}
+
+cav_status cav_continue(cav_solve_run *run) {
+  const cav_schedule *schedule = &run->problem->schedule;
+  cav_status status = CAV_OK;
+  run->phase = "continuation";
+  run->stages = schedule->stages;
+  for (int s = 0; s < schedule->stages && status == CAV_OK; s++) {
+    run->stage = s + 1;
+    cav_stage_set(run->problem, s, schedule->stages, run->tr);
+    int last = s == schedule->stages - 1;
+    run->region.iterations = last ? schedule->last.iterations : schedule->first.iterations;
+    run->region.tolerance = last ? schedule->last.tolerance : schedule->first.tolerance;
+    status = cav_region_minimise(&run->region, run->normal, run->tr, &run->at, &run->spare);
+  }
+  return status;
+}
+
+/// Largest violation of each kind of row, and how much of it is allowed: what is planned with headroom may use half of that.
+typedef struct misfit {
+  double unactuated, effort, range, term;
+} misfit;
+
+static double excess(const cav_slot *slot) { return fmax(fmax(slot->lower - slot->value, slot->value - slot->upper), 0); }
+
+static misfit measure(const cav_transcription *tr) {
+  misfit m = {0};
+  for (int t = 0; t < tr->nknot; t++) {
+    const cav_knot *knot = &tr->knot[t];
+    for (int i = 0; i < knot->layout.count; i++) {
+      double e = excess(&knot->slot[i]);
+      double *worst = i < knot->layout.effort ? &m.unactuated : i < knot->layout.joint ? &m.effort : i < knot->layout.term ? &m.range : &m.term;
+      *worst = fmax(*worst, e);
+    }
+  }
+  return m;
+}
+
+static misfit allowed(const cav_solve_run *run) {
+  double tolerance = run->options->tolerance;
+  return (misfit){tolerance, fmax(0.5 * (1 - run->problem->effort_limit), tolerance),
+                  fmax(0.5 * run->problem->limit_margin, tolerance), tolerance};
+}
+
+static int holds(const misfit *m, const misfit *most) {
+  return m->unactuated <= most->unactuated && m->effort <= most->effort && m->range <= most->range && m->term <= most->term;
+}
+
+cav_status cav_multiply(cav_solve_run *run) {
+  misfit most = allowed(run);
+  most.unactuated = fmax(most.unactuated, near);
+  most.term = fmax(most.term, near);
+  run->phase = "multipliers";
+  run->stages = ROUNDS;
+  cav_status status = cav_transcription_values(run->tr, run->at);
+  for (int round = 0; round < ROUNDS && status == CAV_OK; round++) {
+    run->stage = round + 1;
+    cav_transcription_multipliers(run->tr);
+    run->region.iterations = ROUND_ITERATIONS;
+    run->region.tolerance = round_tolerance;
+    status = cav_region_minimise(&run->region, run->normal, run->tr, &run->at, &run->spare);
+    misfit is = measure(run->tr);
+    if (round > 0 && holds(&is, &most)) break;
+  }
+  return status;
+}
+
+cav_status cav_restore(cav_solve_run *run) {
+  misfit most = allowed(run), is = {0};
+  cav_transcription *tr = run->tr;
+  cav_region region = run->region;
+  run->phase = "restoration";
+  run->stages = 1;
+  run->stage = 1;
+  region.radius = INFINITY;
+  region.iterations = 1;
+  region.tolerance = 0;
+  tr->constraints_only = 1;
+  cav_status status = CAV_OK;
+  for (int i = 0; i < RESTORATIONS && status == CAV_OK; i++) {
+    status = cav_region_minimise(&region, run->normal, tr, &run->at, &run->spare);
+    is = measure(tr);
+    if (holds(&is, &most)) break;
+  }
+  tr->constraints_only = 0;
+  run->region.done = region.done;
+  run->region.seconds_linear = region.seconds_linear;
+  if (status != CAV_OK) return status;
+  return holds(&is, &most) ? CAV_OK : CAV_NOT_CONVERGED;
+}

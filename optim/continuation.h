@@ -1,0 +1,47 @@
+/// The way from a naive guess to the true problem. Private to optim/.
+#ifndef CAVORT_CONTINUATION_H
+#define CAVORT_CONTINUATION_H
+
+#include "cavort/solve.h"
+#include "gauss_newton.h"
+
+/// A solve under way: what continuation, multipliers and Ipopt hand to each other.
+typedef struct cav_solve_run {
+  const cav_problem *problem;
+  const cav_solve_options *options;
+  cav_transcription *tr;
+  cav_normal *normal;
+  cav_trajectory *at, *spare;
+  cav_region region;
+  cav_solution *solution;
+  const char *phase;
+  int stage, stages;
+  double start; ///< s
+} cav_solve_run;
+
+/// The problem's guess: start held, or the geodesic to the goal, with a ballistic arc if asked. q and v of at are filled.
+void cav_guess_fill(const cav_problem *problem, cav_trajectory *at);
+
+/// Contact law and weights of stage s of n.
+void cav_stage_set(const cav_problem *problem, int s, int n, cav_transcription *transcription);
+
+/// Stages first to last: softness, reach and the price of unactuated force go geometrically to their ends.
+cav_status cav_continue(cav_solve_run *run);
+
+/// Augmented Lagrangian on all constraint rows, at the last stage's law, until they nearly hold.
+cav_status cav_multiply(cav_solve_run *run);
+
+/// Gauss-Newton on the constraint rows alone, shortest steps first: from nearly holding to the tolerance. Costs have no say, so
+/// it is for the last millimetre only. CAV_NOT_CONVERGED if the rows do not come in.
+cav_status cav_restore(cav_solve_run *run);
+
+/// Appends a line to the log and tells the observer; nonzero if it asks to stop. Region's report.
+int cav_run_report(void *run, double step, double radius);
+
+/// Keeps a line of the log; 0 if memory runs out. solve.c.
+int cav_solution_log(cav_solution *solution, const cav_progress *line);
+
+/// Wall clock, s.
+double cav_clock(void);
+
+#endif

@@ -1,0 +1,52 @@
+/// Normal equations of a transcription and their trust-region solver. Private to optim/.
+#ifndef CAVORT_GAUSS_NEWTON_H
+#define CAVORT_GAUSS_NEWTON_H
+
+#include "transcription.h"
+
+/// Block-banded normal equations and their factor; opaque.
+typedef struct cav_normal cav_normal;
+
+/// For blocks of n unknowns; NULL if memory runs out.
+cav_normal *cav_normal_new(int blocks, int n);
+void cav_normal_free(cav_normal *normal);
+
+/// Sums the knots' Hessians and gradients. gradient and diagonal stay readable until the next call, [blocks*n].
+void cav_normal_gather(cav_normal *normal, const cav_transcription *transcription);
+const double *cav_normal_gradient(const cav_normal *normal);
+const double *cav_normal_diagonal(const cav_normal *normal);
+
+/// Factors H + shift diag(H); CAV_NOT_CONVERGED if that is not positive definite.
+cav_status cav_normal_factor(cav_normal *normal, double shift);
+
+/// x := (H + shift)^-1 b with the last factor; product := H x. [blocks*n]
+cav_status cav_normal_solve(cav_normal *normal, const double *b, double *x);
+void cav_normal_multiply(const cav_normal *normal, const double *x, double *product);
+
+/// Block (row, column) of H, row - 2 <= column <= row, dense [n*n] row-major (diagonal blocks: lower triangle only).
+void cav_normal_block(const cav_normal *normal, int row, int column, double *out);
+
+/// Entries of the lower triangle in a fixed order: rows, columns and values where asked for; returns their number.
+int cav_normal_entries(const cav_normal *normal, int *row, int *column, double *value);
+
+/// value := factor * value + the diagonal matrix of (absolute + share * diag(H)), in the order of cav_normal_entries.
+void cav_normal_shift_entries(const cav_normal *normal, double factor, double absolute, double share, double *value);
+
+/// What one run of the trust region may do and has done.
+typedef struct cav_region {
+  double radius;     ///< kept from run to run; 0: first Cauchy step
+  int iterations;    ///< at most
+  double tolerance;  ///< two relative decreases in a row below it end the run
+  int done;          ///< iterations made, over all runs
+  double seconds_linear;
+  int (*report)(void *context, double step, double radius); ///< after each iteration; nonzero stops
+  void *context;
+} cav_region;
+
+/// Minimises the transcription's merit from *at by Gauss-Newton steps (dogleg in the norm of sqrt(diag H)). *at and *spare are
+/// exchanged as steps are taken; on return the transcription holds the values at *at.
+/// CAV_INTERRUPTED if report asked; CAV_NOT_FINITE if *at itself cannot be evaluated.
+cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_transcription *transcription,
+                               cav_trajectory **at, cav_trajectory **spare);
+
+#endif

@@ -1,0 +1,287 @@
+/// Ipopt on the transcription: unknowns are tangent increments about the trajectory it starts from, forces that no actuator can
+/// give are hard equalities, efforts, tendon ranges and hard terms are bounded rows, joint ranges bound the unknowns. The
+/// Hessian is Gauss-Newton's of the cost plus a diagonal that stands for the neglected curvature of the constraints
+/// (optimisation.md, 2). The only user of Ipopt; written against 3.11 and 3.14 (index and number are int and double in both).
+#include "ipopt.h"
+
+#include <IpStdCInterface.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/// What stands for the curvature of the constraints: added to the diagonal, absolute and relative.
+static const double curvature = 100, curvature_share = 0.01;
+
+typedef struct program {
+  cav_solve_run *run;
+  cav_trajectory *anchor; ///< x = 0
+  int n, m;
+  int entries;            ///< of the Jacobian
+  int *row_knot, *row_slot; ///< [m]
+  int *jacobian_row, *jacobian_column, *source; ///< [entries]; source: column among the row's 3nv
+  double *x;              ///< [n] point of the last evaluation
+  int known;              ///< 1: values at x are known, 2: derivatives too
+  double *full;           ///< [3nv] a row while it is turned
+  int interrupted;
+} program;
+
+/// Brings the transcription to x; derivatives on demand. False where the dynamics has no finite value.
+static int evaluate(program *p, const double *x, int derivatives) {
+  if (p->known && memcmp(p->x, x, (size_t)p->n * sizeof *x)) p->known = 0;
+  if (p->known > derivatives) return 1;
+  cav_transcription *tr = p->run->tr;
+  memcpy(p->x, x, (size_t)p->n * sizeof *x);
+  cav_transcription_move(tr, p->anchor, x, p->run->at);
+  p->known = 0;
+  cav_status status = derivatives ? cav_transcription_linearise(tr, p->run->at) : cav_transcription_values(tr, p->run->at);
+  if (status != CAV_OK) return 0;
+  if (derivatives) cav_normal_gather(p->run->normal, tr);
+  p->known = 1 + derivatives;
+  return 1;
+}
+
+/// Tangent of the unknown at knot t to tangent at its configuration: row := row * Jr(x) on rotations.
+static void turn_row(const program *p, int t, double *row) {
+  const cav_transcription *tr = p->run->tr;
+  if (t < 1 || t >= tr->nknot) return;
+  for (int k = 0; k < tr->nturn; k++) {
+    double J[9], y[3], *r = row + tr->turn_dof[k];
+    cav_turn(p->x + (size_t)(t - 1) * tr->nv + tr->turn_dof[k], J);
+    for (int c = 0; c < 3; c++) y[c] = r[0] * J[c] + r[1] * J[3 + c] + r[2] * J[6 + c];
+    memcpy(r, y, sizeof y);
+  }
+}
+
+static Bool objective(int n, double *x, Bool fresh, double *value, UserDataPtr data) {
+  program *p = data;
+  (void)n, (void)fresh;
+  if (!evaluate(p, x, 0)) return 0;
+  *value = cav_transcription_cost(p->run->tr);
+  return 1;
+}
+
+static Bool objective_gradient(int n, double *x, Bool fresh, double *gradient, UserDataPtr data) {
+  program *p = data;
+  (void)fresh;
+  if (!evaluate(p, x, 1)) return 0;
+  memcpy(gradient, cav_normal_gradient(p->run->normal), (size_t)n * sizeof *gradient);
+  for (int t = 1; t < p->run->tr->nknot; t++) turn_row(p, t, gradient + (size_t)(t - 1) * p->run->tr->nv);
+  return 1;
+}
+
+static Bool constraints(int n, double *x, Bool fresh, int m, double *g, UserDataPtr data) {
+  program *p = data;
+  (void)n, (void)fresh;
+  if (!evaluate(p, x, 0)) return 0;
+  for (int i = 0; i < m; i++) g[i] = p->run->tr->knot[p->row_knot[i]].slot[p->row_slot[i]].value;
+  return 1;
+}
+
+static Bool constraint_jacobian(int n, double *x, Bool fresh, int m, int entries, int *row, int *column, double *value,
+                                UserDataPtr data) {
+  program *p = data;
+  (void)n, (void)fresh, (void)m;
+  if (!value) {
+    memcpy(row, p->jacobian_row, (size_t)entries * sizeof *row);
+    memcpy(column, p->jacobian_column, (size_t)entries * sizeof *column);
+    return 1;
+  }
+  if (!evaluate(p, x, 1)) return 0;
+  const cav_transcription *tr = p->run->tr;
+  int nv = tr->nv, last = -1;
+  for (int k = 0; k < entries; k++) {
+    int i = p->jacobian_row[k], t = p->row_knot[i];
+    if (i != last) {
+      memcpy(p->full, tr->knot[t].slot_row + (size_t)p->row_slot[i] * 3 * nv, 3 * (size_t)nv * sizeof(double));
+      for (int c = 0; c < 3; c++) turn_row(p, t + c - 1, p->full + c * nv);
+      last = i;
+    }
+    value[k] = p->full[p->source[k]];
+  }
+  return 1;
+}
+
+static Bool lagrangian_hessian(int n, double *x, Bool fresh, double factor, int m, double *multiplier, Bool fresh_multiplier,
+                               int entries, int *row, int *column, double *value, UserDataPtr data) {
+  program *p = data;
+  (void)n, (void)fresh, (void)m, (void)multiplier, (void)fresh_multiplier, (void)entries;
+  if (!value) {
+    cav_normal_entries(p->run->normal, row, column, NULL);
+    return 1;
+  }
+  if (!evaluate(p, x, 1)) return 0;
+  cav_normal_entries(p->run->normal, NULL, NULL, value);
+  cav_normal_shift_entries(p->run->normal, factor, curvature, curvature_share, value);
+  return 1;
+}
+
+static Bool progress(int mode, int iteration, double cost, double infeasibility, double dual, double mu, double step,
+                     double regularisation, double dual_step, double primal_step, int trials, UserDataPtr data) {
+  program *p = data;
+  (void)iteration, (void)cost, (void)infeasibility, (void)dual, (void)mu, (void)regularisation, (void)dual_step, (void)trials;
+  p->run->stage = mode;
+  if (!p->known) return 1;
+  p->interrupted = cav_run_report(p->run, step * primal_step, 0) != 0;
+  return !p->interrupted;
+}
+
+/// Rows: every slot but the ranges of scalar joints, which bound the unknowns.
+static int is_bound(const cav_transcription *tr, int t, int i, int *dof) {
+  const cav_slot_layout *at = &tr->knot[t].layout;
+  if (i < at->joint || i >= at->tendon) return 0;
+  int joint = 0;
+  for (int left = i - at->joint; left >= 0; joint++) left -= tr->model->joint[joint].limited;
+  *dof = tr->model->joint[joint - 1].dof;
+  return tr->model->joint[joint - 1].type != CAV_JOINT_BALL;
+}
+
+static int list_rows(program *p, char *pattern) {
+  const cav_transcription *tr = p->run->tr;
+  int nv = tr->nv, dof;
+  for (int pass = 0; pass < 2; pass++) {
+    int m = 0, entries = 0;
+    for (int t = 0; t < tr->nknot; t++) {
+      for (int i = 0; i < tr->knot[t].layout.count; i++) {
+        if (is_bound(tr, t, i, &dof)) continue;
+        if (pass) p->row_knot[m] = t, p->row_slot[m] = i;
+        cav_transcription_pattern(tr, t, i, pattern);
+        for (int c = 0; c < 3 * nv; c++) {
+          if (!pattern[c]) continue;
+          if (pass) {
+            p->jacobian_row[entries] = m;
+            p->jacobian_column[entries] = (t + c / nv - 2) * nv + c % nv;
+            p->source[entries] = c;
+          }
+          entries++;
+        }
+        m++;
+      }
+    }
+    if (pass) break;
+    p->m = m;
+    p->entries = entries;
+    p->row_knot = malloc((size_t)(m + 1) * sizeof(int));
+    p->row_slot = malloc((size_t)(m + 1) * sizeof(int));
+    p->jacobian_row = malloc((size_t)(entries + 1) * sizeof(int));
+    p->jacobian_column = malloc((size_t)(entries + 1) * sizeof(int));
+    p->source = malloc((size_t)(entries + 1) * sizeof(int));
+    if (!p->row_knot || !p->row_slot || !p->jacobian_row || !p->jacobian_column || !p->source) return 0;
+  }
+  return 1;
+}
+
+/// Bounds of unknowns and rows, Ipopt's infinity where open.
+static void set_bounds(const program *p, double *x_lower, double *x_upper, double *g_lower, double *g_upper) {
+  const cav_transcription *tr = p->run->tr;
+  const double infinite = 2e19;
+  int dof;
+  for (int i = 0; i < p->n; i++) x_lower[i] = -infinite, x_upper[i] = infinite;
+  for (int t = 1; t < tr->nknot; t++) {
+    for (int i = tr->knot[t].layout.joint; i < tr->knot[t].layout.tendon; i++) {
+      if (!is_bound(tr, t, i, &dof)) continue;
+      const cav_slot *slot = &tr->knot[t].slot[i];
+      x_lower[(t - 1) * tr->nv + dof] = slot->lower - slot->value;
+      x_upper[(t - 1) * tr->nv + dof] = slot->upper - slot->value;
+    }
+  }
+  for (int i = 0; i < p->m; i++) {
+    const cav_slot *slot = &tr->knot[p->row_knot[i]].slot[p->row_slot[i]];
+    g_lower[i] = fmax(slot->lower, -infinite);
+    g_upper[i] = fmin(slot->upper, infinite);
+  }
+}
+
+static int set_options(IpoptProblem nlp, const cav_solve_options *o) {
+  int ok = AddIpoptIntOption(nlp, "print_level", 0) && AddIpoptStrOption(nlp, "sb", "yes");
+  ok = ok && AddIpoptStrOption(nlp, "nlp_scaling_method", "none") && AddIpoptIntOption(nlp, "max_iter", o->ipopt_iterations);
+  ok = ok && AddIpoptNumOption(nlp, "tol", 1e-3) && AddIpoptNumOption(nlp, "constr_viol_tol", o->tolerance);
+  ok = ok && AddIpoptNumOption(nlp, "acceptable_tol", 1e-1) && AddIpoptNumOption(nlp, "acceptable_constr_viol_tol", o->tolerance);
+  ok = ok && AddIpoptIntOption(nlp, "acceptable_iter", 10) && AddIpoptNumOption(nlp, "mu_init", 1e-4);
+  ok = ok && AddIpoptIntOption(nlp, "mumps_mem_percent", 200) && AddIpoptIntOption(nlp, "mumps_pivot_order", 0);
+  if (o->linear_solver) ok = ok && AddIpoptStrOption(nlp, "linear_solver", (char *)o->linear_solver);
+  if (o->ipopt_derivative_test) ok = ok && AddIpoptStrOption(nlp, "derivative_test", "first-order");
+  if (o->ipopt_output) ok = ok && OpenIpoptOutputFile(nlp, (char *)o->ipopt_output, 5);
+  return ok;
+}
+
+/// Ipopt's verdict as a status with its meaning in words.
+static cav_status conclude(const program *p, enum ApplicationReturnStatus code, cav_error *error) {
+  static const struct {
+    enum ApplicationReturnStatus code;
+    cav_status status;
+    const char *text;
+  } meaning[] = {
+      {Solve_Succeeded, CAV_OK, ""},
+      {Solved_To_Acceptable_Level, CAV_OK, ""},
+      {Feasible_Point_Found, CAV_OK, ""},
+      {Infeasible_Problem_Detected, CAV_NOT_CONVERGED, "Ipopt found the constraints locally infeasible"},
+      {Search_Direction_Becomes_Too_Small, CAV_NOT_CONVERGED, "Ipopt's steps became too small: the noise of the derivatives bounds what it can reach"},
+      {Maximum_Iterations_Exceeded, CAV_NOT_CONVERGED, "Ipopt reached its iteration limit"},
+      {Restoration_Failed, CAV_NOT_CONVERGED, "Ipopt's restoration of feasibility failed: start it from a better motion (--solver both)"},
+      {Error_In_Step_Computation, CAV_NOT_CONVERGED, "Ipopt could not compute a step"},
+      {Invalid_Option, CAV_BAD_INPUT, "Ipopt does not know an option's value: is the linear solver installed?"},
+      {Insufficient_Memory, CAV_NO_MEMORY, "Ipopt ran out of memory"},
+  };
+  if (p->interrupted) return CAV_INTERRUPTED;
+  for (size_t i = 0; i < sizeof meaning / sizeof *meaning; i++) {
+    if (meaning[i].code != code) continue;
+    if (error && meaning[i].status != CAV_OK) {
+      *error = (cav_error){.status = meaning[i].status};
+      snprintf(error->text, sizeof error->text, "%s", meaning[i].text);
+    }
+    return meaning[i].status;
+  }
+  if (error) {
+    *error = (cav_error){.status = CAV_NOT_CONVERGED};
+    snprintf(error->text, sizeof error->text, "Ipopt stopped with return code %d", (int)code);
+  }
+  return CAV_NOT_CONVERGED;
+}
+
+static void program_free(program *p) {
+  cav_trajectory_free(p->anchor);
+  free(p->row_knot), free(p->row_slot), free(p->jacobian_row), free(p->jacobian_column), free(p->source);
+  free(p->x), free(p->full);
+}
+
+cav_status cav_ipopt(cav_solve_run *run, cav_error *error) {
+  cav_transcription *tr = run->tr;
+  cav_penalties kept = tr->penalty;
+  program p = {.run = run, .n = (tr->nknot - 1) * tr->nv, .anchor = cav_trajectory_copy(run->at)};
+  IpoptProblem nlp = NULL;
+  double *bound = NULL, *start = NULL;
+  char *pattern = malloc(3 * (size_t)tr->nv);
+  cav_status status = CAV_NO_MEMORY;
+  p.x = calloc((size_t)p.n, sizeof(double));
+  p.full = malloc(3 * (size_t)tr->nv * sizeof(double));
+  if (!p.anchor || !p.x || !p.full || !pattern || !cav_transcription_keep_rows(tr) || !list_rows(&p, pattern)) goto end;
+  bound = malloc((2 * (size_t)p.n + 2 * (size_t)p.m + 1) * sizeof(double));
+  start = calloc((size_t)p.n, sizeof(double));
+  if (!bound || !start) goto end;
+
+  // costs alone are the objective: constraint rows get no weight of their own
+  run->phase = "ipopt";
+  run->stages = 0;
+  tr->penalty = (cav_penalties){0};
+  if ((status = cav_transcription_values(tr, run->at)) != CAV_OK) goto end;
+  set_bounds(&p, bound, bound + p.n, bound + 2 * p.n, bound + 2 * p.n + p.m);
+  nlp = CreateIpoptProblem(p.n, bound, bound + p.n, p.m, bound + 2 * p.n, bound + 2 * p.n + p.m, p.entries,
+                           cav_normal_entries(run->normal, NULL, NULL, NULL), 0, objective, constraints, objective_gradient,
+                           constraint_jacobian, lagrangian_hessian);
+  status = CAV_NO_MEMORY;
+  if (!nlp) goto end;
+  if (!set_options(nlp, run->options)) {
+    status = conclude(&p, Invalid_Option, error);
+    goto end;
+  }
+  SetIntermediateCallback(nlp, progress);
+  status = conclude(&p, IpoptSolve(nlp, start, NULL, NULL, NULL, NULL, NULL, &p), error);
+  cav_transcription_move(tr, p.anchor, start, run->at);
+end:
+  tr->penalty = kept;
+  if (nlp) FreeIpoptProblem(nlp);
+  program_free(&p);
+  free(bound), free(start), free(pattern);
+  return status;
+}

@@ -1,0 +1,141 @@
+/// Which unknowns a constraint row can depend on, from the structure of the model alone: the force of a dof sees the dofs above
+/// and below it in its tree, those that share a tendon with it, and those across a pair of geoms that may touch.
+#include <stdlib.h>
+#include <string.h>
+
+#include "transcription.h"
+
+/// Whether a dof moves a link: it stands on the link's way to the root.
+static int moves(const cav_model *m, int dof, int link) {
+  for (int l = link; l > 0; l = m->link[l].parent)
+    if (m->dof[dof].link == l) return 1;
+  return 0;
+}
+
+/// Dofs that a force along dof i depends on, [nv]. Rotations of one joint count together.
+static void force_pattern(const cav_transcription *tr, int i, char *seen) {
+  const cav_model *m = tr->model;
+  int own = m->dof[i].link;
+  for (int j = 0; j < m->nv; j++) seen[j] |= (char)(moves(m, i, m->dof[j].link) || moves(m, j, own));
+  for (int k = 0; k < m->npair; k++) {
+    // a contact turns about nothing that moves both its links
+    int a = m->geom[m->pair[k].geom1].link, b = m->geom[m->pair[k].geom2].link;
+    if (moves(m, i, a) == moves(m, i, b)) continue;
+    for (int j = 0; j < m->nv; j++) seen[j] |= (char)(moves(m, j, a) != moves(m, j, b));
+  }
+  for (int k = 0; k < m->ntendon; k++) {
+    const cav_tendon_part *part = m->tendon_part + m->tendon[k].part;
+    int n = m->tendon[k].npart, in = 0;
+    int acts = m->tendon[k].limited || m->tendon[k].stiffness != 0 || m->tendon[k].damping != 0 || m->tendon[k].frictionloss != 0;
+    for (int c = 0; acts && c < n; c++) in |= m->joint[part[c].joint].dof == i;
+    for (int c = 0; in && c < n; c++) seen[m->joint[part[c].joint].dof] = 1;
+  }
+}
+
+static void subtree_pattern(const cav_model *m, int link, char *seen) {
+  for (int j = 0; j < m->nv; j++) seen[j] |= (char)(moves(m, j, link) || link == 0);
+  for (int l = link; l < m->nlink; l++) {
+    int below = 0;
+    for (int up = l; up > 0; up = m->link[up].parent) below |= up == link;
+    for (int d = 0; below && d < m->link[l].ndof; d++) seen[m->link[l].dof + d] = 1;
+  }
+}
+
+static int object_link(const cav_model *m, cav_object_type type, int object) {
+  switch (type) {
+    case CAV_OBJECT_BODY:
+    case CAV_OBJECT_XBODY: return m->body[object].link;
+    case CAV_OBJECT_GEOM: return m->geom[object].link;
+    case CAV_OBJECT_SITE: return m->site[object].link;
+    default: return 0;
+  }
+}
+
+/// Dofs of a sensor, and whether it reads velocities (at v_next) beside positions.
+static int sensor_pattern(const cav_model *m, const cav_sensor *sensor, char *seen) {
+  switch (sensor->type) {
+    case CAV_SENSOR_JOINTPOS:
+    case CAV_SENSOR_JOINTVEL:
+      for (int j = 0; j < m->nv; j++) seen[j] |= (char)(m->dof[j].joint == sensor->object);
+      return sensor->type == CAV_SENSOR_JOINTVEL;
+    case CAV_SENSOR_SUBTREECOM:
+    case CAV_SENSOR_SUBTREELINVEL:
+    case CAV_SENSOR_SUBTREEANGMOM:
+      subtree_pattern(m, m->body[sensor->object].link, seen);
+      return sensor->type != CAV_SENSOR_SUBTREECOM;
+    default: {
+      int link = object_link(m, sensor->object_type, sensor->object);
+      for (int j = 0; j < m->nv; j++) seen[j] |= (char)moves(m, j, link);
+      return sensor->type == CAV_SENSOR_FRAMELINVEL || sensor->type == CAV_SENSOR_FRAMEANGVEL;
+    }
+  }
+}
+
+/// Rotations of one joint are chained by full 3x3 blocks.
+static void spread_turns(const cav_transcription *tr, char *seen) {
+  for (int k = 0; k < tr->nturn; k++) {
+    char *s = seen + tr->turn_dof[k], any = (char)(s[0] | s[1] | s[2]);
+    s[0] = s[1] = s[2] = any;
+  }
+}
+
+/// Block c: 0 q_{t-1}, 1 q_t, 2 q_{t+1}, where those are unknowns.
+static void put(const cav_transcription *tr, int t, const char *seen, int from, int to, char *pattern) {
+  for (int c = from; c <= to; c++) {
+    int knot = t + c - 1;
+    if (knot >= 1 && knot < tr->nknot) memcpy(pattern + c * tr->nv, seen, (size_t)tr->nv);
+  }
+}
+
+/// The hard term and component behind row i of the term rows of knot t.
+static const cav_term *term_of(const cav_transcription *tr, int t, int i, int *component) {
+  for (int k = 0; k < tr->problem->nterm; k++) {
+    const cav_term *term = &tr->problem->term[k];
+    if (term->use == CAV_USE_COST || cav_term_weight(tr, term, t) == 0) continue;
+    int n = cav_term_dim(term);
+    for (int d = 0; term->quantity != CAV_QUANTITY_SENSOR && d < tr->nv; d++) {
+      if (!cav_dof_selected(tr, term, d)) continue;
+      if (n++ == i) *component = d;
+    }
+    if (i < n) return term;
+    i -= n;
+  }
+  return NULL;
+}
+
+void cav_transcription_pattern(const cav_transcription *tr, int t, int i, char *pattern) {
+  const cav_model *m = tr->model;
+  const cav_slot_layout *at = &tr->knot[t].layout;
+  char *seen = pattern + tr->nv; // block of q_t serves as the list
+  memset(pattern, 0, 3 * (size_t)tr->nv);
+  if (i < at->joint) {
+    const cav_force_row *row = i < at->effort ? &tr->unactuated[i] : &tr->effort[i - at->effort];
+    for (int k = 0; k < row->n; k++) force_pattern(tr, row->dof[k], seen);
+    spread_turns(tr, seen);
+    put(tr, t, seen, 0, 2, pattern);
+  } else if (i < at->tendon) {
+    int joint = 0;
+    for (int left = i - at->joint; left >= 0; joint++) left -= m->joint[joint].limited;
+    for (int d = 0; d < m->nv; d++) seen[d] = m->dof[d].joint == joint - 1;
+  } else if (i < at->term) {
+    int tendon = 0;
+    for (int left = i - at->tendon; left >= 0; tendon++) left -= m->tendon[tendon].limited;
+    const cav_tendon *of = &m->tendon[tendon - 1];
+    for (int k = 0; k < of->npart; k++) seen[m->joint[m->tendon_part[of->part + k].joint].dof] = 1;
+  } else {
+    int dof = 0;
+    const cav_term *term = term_of(tr, t, i - at->term, &dof);
+    if (!term) return;
+    if (term->quantity == CAV_QUANTITY_SENSOR) {
+      int moving = sensor_pattern(m, &term->sensor, seen);
+      spread_turns(tr, seen);
+      int open = t == tr->nknot - 1 && !tr->problem->close_at_rest; // there v_next is v_t
+      put(tr, t, seen, moving && open ? 0 : 1, moving ? 2 : 1, pattern);
+    } else {
+      seen[dof] = 1;
+      spread_turns(tr, seen);
+      put(tr, t, seen, term->quantity == CAV_QUANTITY_VELOCITY ? 0 : 1, 1, pattern);
+    }
+  }
+  if (t == 0) memset(pattern + tr->nv, 0, (size_t)tr->nv);
+}

@@ -1,0 +1,72 @@
+/// What the files that read a problem share: the tree, the model, and the memory of the result. Private to optim/.
+#ifndef CAVORT_PROBLEM_FILE_H
+#define CAVORT_PROBLEM_FILE_H
+
+#include "cavort/problem.h"
+#include "xml.h"
+
+/// Memory that lives as long as the problem.
+typedef struct cav_problem_block {
+  struct cav_problem_block *next;
+  double data[];
+} cav_problem_block;
+
+typedef struct cav_problem_owner {
+  cav_problem problem;
+  cav_model *model;
+  cav_problem_block *block;
+} cav_problem_owner;
+
+/// A reading in progress.
+typedef struct cav_problem_reader {
+  cav_problem_owner *owner;
+  cav_problem *problem;
+  const cav_model *model;
+  const cav_xml_node *root;
+  cav_state *state; ///< for readings and heights of poses
+  const char *path;
+  cav_error *error;
+} cav_problem_reader;
+
+/// The one root element: problem_grammar.c.
+extern const cav_xml_element cav_problem_element;
+
+/// Words of the grammar, in the order of their enumerations; NULL at the end.
+extern const char *const cav_problem_orders[],
+    *const cav_problem_closings[], *const cav_problem_guesses[], *const cav_problem_quantities[],
+                                                                     *const cav_problem_dof_sets[],
+                                                                         *const cav_problem_sensors[],
+                                                                             *const cav_problem_stabilisations[],
+                                                                                 *const cav_problem_regularisers[];
+
+/// Zeroed memory of the problem; NULL if there is none left. problem.c.
+void *cav_problem_alloc(cav_problem_owner *owner, size_t size);
+char *cav_problem_text(cav_problem_owner *owner, const char *text);
+
+/// First child of that name, NULL if there is none; NULL node: NULL. problem.c.
+const cav_xml_node *cav_problem_child(const cav_xml_node *node, const char *name);
+
+/// Index of the first of the names in an attribute, separated by |, that the model has; -1 and an error if it has none.
+int cav_problem_find(const cav_problem_reader *reader, const cav_xml_node *node, const char *attribute,
+                     cav_object_type type);
+
+/// Configuration q [nq] of <start>, <goal> or <pose>, from keyframes, numbers, a trajectory and joint values. problem_pose.c.
+cav_status cav_problem_pose(const cav_problem_reader *reader, const cav_xml_node *node, double *q);
+
+/// Configuration of the keyframe or <pose> that attribute 'key' of node names.
+cav_status cav_problem_key(const cav_problem_reader *reader, const cav_xml_node *node, double *q);
+
+/// Window of attributes from, to, at: seconds or "end". Left as they are where the file gives none; to < 0: the end. It holds
+/// a knot. problem_term.c.
+cav_status cav_problem_window(const cav_problem_reader *reader, const cav_xml_node *node, double *from, double *to);
+
+/// Terms of <cost> and <constraint>, with the defaults that they leave in place. problem_term.c.
+cav_status cav_problem_terms(const cav_problem_reader *reader);
+
+/// Whether a term over dofs selects dof d. problem_term.c.
+int cav_problem_selects(const cav_model *model, const cav_term *term, int d);
+
+/// Fills error with "no memory"; returns CAV_NO_MEMORY.
+cav_status cav_problem_no_memory(const cav_problem_reader *reader);
+
+#endif

@@ -1,0 +1,433 @@
+/// Terms of a problem file: <cost> and <constraint>.
+///
+/// A cost without a window (from, to, at) takes the place of the default costs of its quantity; one with a window is added
+/// to them; weight 0 leaves a term out, so that it costs nothing. A constraint with lower or upper is a range, otherwise its
+/// value equals its target. Targets are expanded to the layout of cav_term and relative ones resolved here, so solvers see
+/// numbers only.
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "file.h"
+#include "problem_file.h"
+
+static const double near_knot = 1e-6; // of a step
+
+// one sensor type: length of its reading, what it may look at, and whether it reads velocities
+static const struct {
+  int dim, joint, subtree, rate;
+} sensor_kind[CAV_SENSOR_TYPES] = {
+    [CAV_SENSOR_JOINTPOS] = {1, 1, 0, 0},      [CAV_SENSOR_JOINTVEL] = {1, 1, 0, 1},
+    [CAV_SENSOR_FRAMEPOS] = {3, 0, 0, 0},      [CAV_SENSOR_FRAMEQUAT] = {4, 0, 0, 0},
+    [CAV_SENSOR_FRAMEXAXIS] = {3, 0, 0, 0},    [CAV_SENSOR_FRAMEYAXIS] = {3, 0, 0, 0},
+    [CAV_SENSOR_FRAMEZAXIS] = {3, 0, 0, 0},    [CAV_SENSOR_FRAMELINVEL] = {3, 0, 0, 1},
+    [CAV_SENSOR_FRAMEANGVEL] = {3, 0, 0, 1},   [CAV_SENSOR_SUBTREECOM] = {3, 0, 1, 0},
+    [CAV_SENSOR_SUBTREELINVEL] = {3, 0, 1, 1}, [CAV_SENSOR_SUBTREEANGMOM] = {3, 0, 1, 1},
+};
+
+// seconds of an attribute, or "end"
+static cav_status instant(const cav_problem_reader *reader, const cav_xml_node *node, const char *name,
+                          double *seconds) {
+  const char *text = cav_xml_text(node, name, NULL);
+  double duration = reader->problem->duration;
+  if (!text) return CAV_OK;
+  char *end;
+  double value = strcmp(text, "end") ? cav_file_number(text, &end) : duration;
+  if (strcmp(text, "end") && (end == text || end[strspn(end, " ")] || !isfinite(value))) {
+    return cav_xml_fail(reader->error, node, name, "expected seconds or 'end', got '%.60s'", text);
+  }
+  if (value < 0 || value > duration * (1 + near_knot)) {
+    return cav_xml_fail(reader->error, node, name, "expected a time within the horizon, 0 .. %g s, got %g", duration,
+                        value);
+  }
+  *seconds = value;
+  return CAV_OK;
+}
+
+cav_status cav_problem_window(const cav_problem_reader *reader, const cav_xml_node *node, double *from, double *to) {
+  if (cav_xml_get(node, "at") && (cav_xml_get(node, "from") || cav_xml_get(node, "to"))) {
+    return cav_xml_fail(reader->error, node, "at", "contradicts attributes 'from' and 'to'; give one or the others");
+  }
+  cav_status status = instant(reader, node, "from", from);
+  if (!status) status = instant(reader, node, "to", to);
+  if (!status && cav_xml_get(node, "at")) {
+    status = instant(reader, node, "at", from);
+    *to = *from;
+  }
+  if (status) return status;
+  double end = *to < 0 ? reader->problem->duration : *to, h = reader->problem->timestep;
+  if (*from > end)
+    return cav_xml_fail(reader->error, node, "from", "the window ends at %g s, before it starts at %g s", end, *from);
+  if (*from < end && ceil(*from / h - near_knot) > floor(end / h + near_knot)) {
+    return cav_xml_fail(reader->error, node, "from", "no knot lies between %g and %g s; knots are %g s apart", *from,
+                        end, h);
+  }
+  return CAV_OK;
+}
+
+// an attribute that picks dofs
+static cav_status read_dofs(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  term->dofs = (cav_dof_set)cav_xml_word(node, "dofs", CAV_DOFS_JOINTS);
+  if (!cav_xml_get(node, "joint")) return CAV_OK;
+  if (cav_xml_get(node, "dofs")) {
+    return cav_xml_fail(reader->error, node, "joint", "contradicts attribute 'dofs'; give one of the two");
+  }
+  term->dofs = CAV_DOFS_ONE;
+  term->joint = cav_problem_find(reader, node, "joint", CAV_OBJECT_JOINT);
+  return term->joint < 0 ? CAV_BAD_INPUT : CAV_OK;
+}
+
+int cav_problem_selects(const cav_model *m, const cav_term *term, int d) {
+  const cav_joint *joint = &m->joint[m->dof[d].joint];
+  int free = joint->type == CAV_JOINT_FREE, place = d - joint->dof;
+  switch (term->dofs) {
+    case CAV_DOFS_ALL:
+      return 1;
+    case CAV_DOFS_ROOT_LINEAR:
+      return free && place < 3;
+    case CAV_DOFS_ROOT_ANGULAR:
+      return free && place >= 3;
+    case CAV_DOFS_JOINTS:
+      return !free;
+    case CAV_DOFS_ONE:
+      return m->dof[d].joint == term->joint;
+  }
+  return 0;
+}
+
+// room for the targets of a term and, with waypoints, their times; checks that times increase
+static cav_status make_targets(const cav_problem_reader *reader, const cav_xml_node *node, int dim, cav_term *term,
+                               double **target) {
+  const cav_xml_node *first = cav_problem_child(node, "waypoint");
+  int n = 0;
+  for (const cav_xml_node *w = first; w; w = cav_xml_next(w)) n++;
+  *target = cav_problem_alloc(reader->owner, sizeof(double) * (size_t)(n ? n : 1) * (size_t)(dim + 1));
+  if (!*target) return cav_problem_no_memory(reader);
+  double *time = *target + (size_t)(n ? n : 1) * (size_t)dim, before = -1;
+  int i = 0;
+  for (const cav_xml_node *w = first; w; w = cav_xml_next(w)) {
+    time[i] = cav_xml_real(w, "time", 0);
+    if (time[i] < 0 || time[i] > reader->problem->duration * (1 + near_knot)) {
+      return cav_xml_fail(reader->error, w, "time", "expected a time within the horizon, 0 .. %g s, got %g",
+                          reader->problem->duration, time[i]);
+    }
+    if (time[i] <= before)
+      return cav_xml_fail(reader->error, w, "time", "expected a time after the one before, %g s, got %g", before,
+                          time[i]);
+    before = time[i++];
+  }
+  term->target = *target;
+  term->nwaypoint = n;
+  term->waypoint_time = n ? time : NULL;
+  return CAV_OK;
+}
+
+// a posture by keyframe or numbers; neither: found stays 0
+static cav_status posture_of(const cav_problem_reader *reader, const cav_xml_node *node, double *q, int *found) {
+  const cav_model *m = reader->model;
+  const cav_xml_value *numbers = cav_xml_get(node, "qpos");
+  if (numbers && cav_xml_get(node, "key"))
+    return cav_xml_fail(reader->error, node, "qpos", "contradicts attribute 'key'; give one of the two");
+  *found = numbers || cav_xml_get(node, "key");
+  if (!*found) return CAV_OK;
+  if (!numbers) return cav_problem_key(reader, node, q);
+  if (numbers->count != m->nq) {
+    return cav_xml_fail(reader->error, node, "qpos", "expected %d numbers for the model '%s', got %d", m->nq, m->name,
+                        numbers->count);
+  }
+  cav_xml_reals(node, "qpos", q, m->nq);
+  cav_normalise(m, q);
+  return CAV_OK;
+}
+
+static cav_status read_posture(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  term->quantity = CAV_QUANTITY_CONFIGURATION;
+  cav_status status = read_dofs(reader, node, term);
+  const cav_xml_node *waypoint = cav_problem_child(node, "waypoint");
+  int found, own = cav_xml_get(node, "key") || cav_xml_get(node, "qpos");
+  if (status || (!own && !waypoint)) return status;
+  if (own && waypoint)
+    return cav_xml_fail(reader->error, waypoint, NULL,
+                        "contradicts the posture that <posture> gives; remove one of the two");
+  double *target;
+  int nq = reader->model->nq;
+  status = make_targets(reader, node, nq, term, &target);
+  if (!status && own) return posture_of(reader, node, target, &found);
+  for (int i = 0; waypoint && !status; i++, waypoint = cav_xml_next(waypoint)) {
+    status = posture_of(reader, waypoint, target + i * nq, &found);
+    if (!status && !found) status = cav_xml_fail(reader->error, waypoint, "key", "is missing; give 'key' or 'qpos'");
+  }
+  return status;
+}
+
+// targets of rates: one number for all selected dofs or one for each, laid out over nv
+static cav_status rate_target(const cav_problem_reader *reader, const cav_xml_node *node, const cav_term *term,
+                              double *target) {
+  const cav_model *m = reader->model;
+  const cav_xml_value *given = cav_xml_get(node, "target");
+  int n = 0;
+  for (int d = 0; d < m->nv; d++) n += cav_problem_selects(m, term, d);
+  if (given->count != 1 && given->count != n) {
+    return cav_xml_fail(reader->error, node, "target", "expected one number, or %d, one for each selected dof, got %d",
+                        n, given->count);
+  }
+  for (int d = 0, k = 0; d < m->nv; d++) {
+    if (!cav_problem_selects(m, term, d)) continue;
+    target[d] = given->number[given->count == 1 ? 0 : k];
+    k++;
+  }
+  return CAV_OK;
+}
+
+// targets by the attribute of the element or by waypoints, through what reads one of them
+static cav_status read_targets(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term, int dim,
+                               cav_status (*read)(const cav_problem_reader *, const cav_xml_node *, const cav_term *,
+                                                  double *)) {
+  const cav_xml_node *waypoint = cav_problem_child(node, "waypoint");
+  int own = cav_xml_get(node, "target") != NULL;
+  if (!own && !waypoint) return CAV_OK;
+  if (own && waypoint)
+    return cav_xml_fail(reader->error, node, "target", "contradicts <waypoint>; give one of the two");
+  double *target;
+  cav_status status = make_targets(reader, node, dim, term, &target);
+  if (!status && own) return read(reader, node, term, target);
+  for (int i = 0; waypoint && !status; i++, waypoint = cav_xml_next(waypoint)) {
+    status = read(reader, waypoint, term, target + i * dim);
+  }
+  return status;
+}
+
+static cav_status read_rate(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  term->quantity = strcmp(node->rule->name, "velocity") ? CAV_QUANTITY_ACCELERATION : CAV_QUANTITY_VELOCITY;
+  cav_status status = read_dofs(reader, node, term);
+  return status ? status : read_targets(reader, node, term, reader->model->nv, rate_target);
+}
+
+// the object that a sensor declared in the file looks at
+static cav_status read_object(const cav_problem_reader *reader, const cav_xml_node *node, cav_sensor *sensor) {
+  static const struct {
+    const char *name;
+    cav_object_type type;
+  } object[] = {{"body", CAV_OBJECT_BODY},
+                {"xbody", CAV_OBJECT_XBODY},
+                {"geom", CAV_OBJECT_GEOM},
+                {"site", CAV_OBJECT_SITE},
+                {"joint", CAV_OBJECT_JOINT}};
+  const char *given = NULL;
+  for (int i = 0; i < 5; i++) {
+    if (!cav_xml_get(node, object[i].name)) continue;
+    if (given)
+      return cav_xml_fail(reader->error, node, object[i].name, "contradicts attribute '%s'; give one of the two",
+                          given);
+    given = object[i].name;
+    sensor->object_type = object[i].type;
+  }
+  const char *type = cav_problem_sensors[sensor->type];
+  int joint = sensor_kind[sensor->type].joint, subtree = sensor_kind[sensor->type].subtree;
+  const char *wanted = joint ? "joint" : subtree ? "body" : "body, xbody, geom or site";
+  if (!given)
+    return cav_xml_fail(reader->error, node, joint ? "joint" : "body", "is missing; a %s needs one of: %s", type,
+                        wanted);
+  int fits = (sensor->object_type == CAV_OBJECT_JOINT) == joint && (!subtree || sensor->object_type == CAV_OBJECT_BODY);
+  if (!fits) return cav_xml_fail(reader->error, node, given, "a %s looks at a %s", type, wanted);
+  sensor->object = cav_problem_find(reader, node, given, sensor->object_type);
+  if (sensor->object < 0) return CAV_BAD_INPUT;
+  if (!joint || reader->model->joint[sensor->object].type >= CAV_JOINT_SLIDE) return CAV_OK;
+  return cav_xml_fail(reader->error, node, given, "a %s needs a hinge or a slide; '%s' is neither", type,
+                      reader->model->joint[sensor->object].name);
+}
+
+// x, y, z or a number; of an orientation, of the rotation vector to its target
+static cav_status read_component(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  const char *text = cav_xml_text(node, "component", NULL);
+  if (!text) return CAV_OK;
+  int dim = term->sensor.type == CAV_SENSOR_FRAMEQUAT ? 3 : term->sensor.dim;
+  int index = strlen(text) == 1 ? (strchr("012", *text) ? *text - '0' : strchr("xyz", *text) ? *text - 'x' : -1) : -1;
+  if (index < 0 || index >= dim || dim == 1) {
+    return cav_xml_fail(
+        reader->error, node, "component",
+        dim == 1 ? "the sensor has one value; remove it, got '%.40s'" : "expected x, y or z, got '%.40s'", text);
+  }
+  term->component = index;
+  return CAV_OK;
+}
+
+// targets of a sensor: all of its values, or the one that counts
+static cav_status sensor_target(const cav_problem_reader *reader, const cav_xml_node *node, const cav_term *term,
+                                double *target) {
+  const cav_xml_value *given = cav_xml_get(node, "target");
+  int turn = term->sensor.type == CAV_SENSOR_FRAMEQUAT, one = term->component >= 0 && !turn,
+      wanted = one ? 1 : term->sensor.dim;
+  if (given->count != wanted) {
+    return cav_xml_fail(reader->error, node, "target", "expected %d number%s, got %d", wanted, wanted > 1 ? "s" : "",
+                        given->count);
+  }
+  cav_xml_reals(node, "target", target + (one ? term->component : 0), wanted);
+  if (!turn) return CAV_OK;
+  double length = sqrt(target[0] * target[0] + target[1] * target[1] + target[2] * target[2] + target[3] * target[3]);
+  if (!(length > 1e-9)) return cav_xml_fail(reader->error, node, "target", "expected a quaternion that is not zero");
+  for (int i = 0; i < 4; i++) target[i] /= length;
+  return CAV_OK;
+}
+
+// reading + target, or reading * target for orientations
+static void add_reading(const cav_sensor *sensor, const double *reading, double *target) {
+  if (sensor->type != CAV_SENSOR_FRAMEQUAT) {
+    for (int i = 0; i < sensor->dim; i++) target[i] += reading[i];
+    return;
+  }
+  const double *a = reading, b[4] = {target[0], target[1], target[2], target[3]};
+  target[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3];
+  target[1] = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2];
+  target[2] = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1];
+  target[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
+}
+
+// targets and bounds given from the reading at the start or the goal
+static cav_status make_absolute(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  int relation = cav_xml_word(node, "relative", 0);
+  if (!relation) return CAV_OK;
+  const char *what = cav_problem_sensors[term->sensor.type];
+  if (sensor_kind[term->sensor.type].rate)
+    return cav_xml_fail(reader->error, node, "relative", "a %s has no reading at a posture at rest", what);
+  double reading[4] = {0};
+  cav_status status =
+      cav_position(reader->model, reader->state, relation == 1 ? reader->problem->q_start : reader->problem->q_goal);
+  if (status)
+    return cav_xml_fail_as(reader->error, status, node, "relative", "the posture cannot be evaluated: %s",
+                           cav_status_name(status));
+  cav_sense(reader->model, reader->state, &term->sensor, reading);
+  int turn = term->sensor.type == CAV_SENSOR_FRAMEQUAT;
+  if (term->use == CAV_USE_RANGE && !turn) {
+    if (term->sensor.dim > 1 && term->component < 0) {
+      return cav_xml_fail(reader->error, node, "component", "is missing; relative bounds are of one component");
+    }
+    double from = reading[term->component < 0 ? 0 : term->component];
+    term->lower += from;
+    term->upper += from;
+    return CAV_OK;
+  }
+  if (!term->target) {
+    double *target;
+    status = make_targets(reader, node, term->sensor.dim, term, &target);
+    if (status) return status;
+    if (turn) target[0] = 1;
+  }
+  for (int i = 0; i < (term->nwaypoint ? term->nwaypoint : 1); i++) {
+    add_reading(&term->sensor, reading, (double *)term->target + i * term->sensor.dim);
+  }
+  return CAV_OK;
+}
+
+static cav_status read_sensor(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  term->quantity = CAV_QUANTITY_SENSOR;
+  cav_status status = CAV_OK;
+  if (cav_xml_get(node, "type")) {
+    term->sensor = (cav_sensor){.name = "", .type = (cav_sensor_type)cav_xml_word(node, "type", 0), .adr = -1};
+    term->sensor.dim = sensor_kind[term->sensor.type].dim;
+    status = read_object(reader, node, &term->sensor);
+  } else if (cav_xml_get(node, "name")) {
+    int sensor = cav_problem_find(reader, node, "name", CAV_OBJECT_SENSOR);
+    if (sensor < 0) return CAV_BAD_INPUT;
+    term->sensor = reader->model->sensor[sensor];
+  } else {
+    status = cav_xml_fail(reader->error, node, "type",
+                          "is missing; give the type of a sensor, or in 'name' one of the model's");
+  }
+  if (!status) status = read_component(reader, node, term);
+  if (!status) status = read_targets(reader, node, term, term->sensor.dim, sensor_target);
+  if (!status && term->use == CAV_USE_RANGE && term->target && term->sensor.type != CAV_SENSOR_FRAMEQUAT) {
+    status = cav_xml_fail(reader->error, node, "target", "contradicts 'lower' and 'upper'; give one or the others");
+  }
+  return status ? status : make_absolute(reader, node, term);
+}
+
+static cav_status read_effort(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  (void)reader, (void)node;
+  term->quantity = CAV_QUANTITY_EFFORT;
+  return CAV_OK;
+}
+
+static cav_status read_touch(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  (void)reader;
+  const char *name = node->rule->name;
+  term->quantity = !strcmp(name, "gap")    ? CAV_QUANTITY_GAP
+                   : !strcmp(name, "slip") ? CAV_QUANTITY_SLIP
+                                           : CAV_QUANTITY_IMPACT;
+  return CAV_OK;
+}
+
+// who reads which element
+static const struct {
+  const char *name;
+  cav_status (*read)(const cav_problem_reader *, const cav_xml_node *, cav_term *);
+} term_reader[] = {{"sensor", read_sensor},     {"posture", read_posture}, {"velocity", read_rate},
+                   {"acceleration", read_rate}, {"effort", read_effort},   {"gap", read_touch},
+                   {"slip", read_touch},        {"impact", read_touch}};
+
+// bounds of a constraint, or the weight of a cost
+static cav_status read_use(const cav_problem_reader *reader, const cav_xml_node *node, int hard, cav_term *term) {
+  term->lower = cav_xml_real(node, "lower", -INFINITY);
+  term->upper = cav_xml_real(node, "upper", INFINITY);
+  term->weight = cav_xml_real(node, "weight", 0);
+  term->scale = cav_xml_real(node, "scale", 1);
+  if (hard) term->use = cav_xml_get(node, "lower") || cav_xml_get(node, "upper") ? CAV_USE_RANGE : CAV_USE_EQUAL;
+  if (term->lower > term->upper)
+    return cav_xml_fail(reader->error, node, "lower", "%g lies above 'upper', %g", term->lower, term->upper);
+  if (term->weight < 0)
+    return cav_xml_fail(reader->error, node, "weight", "expected a number of 0 or more, got %g", term->weight);
+  if (!(term->scale > 0))
+    return cav_xml_fail(reader->error, node, "scale", "expected a number above 0, got %g", term->scale);
+  return CAV_OK;
+}
+
+static cav_status read_term(const cav_problem_reader *reader, const cav_xml_node *node, int hard, cav_term *term) {
+  memset(term, 0, sizeof *term);
+  term->component = term->joint = -1;
+  term->to = -1;
+  term->name = cav_problem_text(reader->owner, cav_xml_text(node, "name", node->rule->name));
+  if (!term->name) return cav_problem_no_memory(reader);
+  cav_status status = read_use(reader, node, hard, term);
+  if (!status) status = cav_problem_window(reader, node, &term->from, &term->to);
+  int i = 0;
+  while (strcmp(term_reader[i].name, node->rule->name)) i++;
+  return status ? status : term_reader[i].read(reader, node, term);
+}
+
+static int has_window(const cav_xml_node *node) {
+  return cav_xml_get(node, "from") || cav_xml_get(node, "to") || cav_xml_get(node, "at");
+}
+
+// whether the file has a cost of that quantity over the whole horizon, which takes the defaults' place
+static int replaced(const cav_xml_node *cost, cav_quantity quantity) {
+  for (const cav_xml_node *node = cost ? cost->child : NULL; node; node = node->next) {
+    if (!has_window(node) && !strcmp(node->rule->name, cav_problem_quantities[quantity])) return 1;
+  }
+  return 0;
+}
+
+cav_status cav_problem_terms(const cav_problem_reader *reader) {
+  const cav_xml_node *cost = cav_problem_child(reader->root, "cost"),
+                     *constraint = cav_problem_child(reader->root, "constraint");
+  int ndefault = cav_problem_default_terms(NULL, 0), most = ndefault;
+  for (const cav_xml_node *node = cost ? cost->child : NULL; node; node = node->next) most++;
+  for (const cav_xml_node *node = constraint ? constraint->child : NULL; node; node = node->next) most++;
+  cav_problem *p = reader->problem;
+  p->term = cav_problem_alloc(reader->owner, (size_t)most * sizeof *p->term);
+  if (!p->term) return cav_problem_no_memory(reader);
+  // defaults that the file leaves in place, then its own
+  cav_problem_default_terms(p->term, ndefault);
+  for (int i = 0; i < ndefault; i++) {
+    if (!replaced(cost, p->term[i].quantity)) p->term[p->nterm++] = p->term[i];
+  }
+  cav_status status = CAV_OK;
+  for (const cav_xml_node *node = cost ? cost->child : NULL; node && !status; node = node->next) {
+    status = read_term(reader, node, 0, &p->term[p->nterm]);
+    p->nterm += p->term[p->nterm].weight > 0;
+  }
+  for (const cav_xml_node *node = constraint ? constraint->child : NULL; node && !status; node = node->next) {
+    status = read_term(reader, node, 1, &p->term[p->nterm++]);
+  }
+  return status;
+}

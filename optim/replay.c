@@ -1,0 +1,268 @@
+/// Forward simulation of a motion, three ways.
+/// Single steps: from every knot's own (q_t, v_t) with the whole u_t, one step of the claimed law: how well the forward
+/// step undoes the inverse.
+/// Open loop at the step of the knots: from (q_0, v_0), only what the actuators give of u_t. Errors grow as the
+/// body's own instability makes them; how long they stay small is the figure.
+/// Closed loop at a tenth of the step: the model as its file says (its own solref contacts by the exact law, the
+/// paper's Euler step), forces u + K_q (q (-) q_ref) + K_v (v - v_ref) brought to the actuators and clipped to their
+/// limits.
+/// From knot t on u_t and the gains of knot t hold for one step; the reference runs along the geodesic to knot t+1, its
+/// velocity from v_t to v_{t+1}. README.md has what the alternatives gave. optimisation.md, 3 and 6.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "audit.h"
+
+enum { SUBSTEPS = 10, ITERATIONS = 200 };
+
+static const double same = 1e-6;             // rad or m: a replay that is the knots
+static const double far = 0.5, turned = 1;   // m, rad: a replay that has lost the motion
+static const double exact_tolerance = 1e-12; // relative residual asked of forward steps
+static const double poor = 1e-6;             // share of weight that a forward step may leave unexplained
+
+// largest tangent component from q0 to q1
+static double apart(const cav_model *model, const double *q0, const double *q1, double *work) {
+  double most = 0;
+  cav_difference(model, q0, q1, 1, work);
+  for (int d = 0; d < model->nv; d++) {
+    if (!(fabs(work[d]) <= most)) most = fabs(work[d]);
+  }
+  return most;
+}
+
+// largest generalised force by which a step misses u, share of the weight
+static double missed(const cav_audit *audit, cav_state *state, const double *q, const double *v, const double *u,
+                     const double *next, double *found) {
+  double most = 0;
+  if (cav_inverse(audit->model, state, q, v, next, found) != CAV_OK) return INFINITY;
+  for (int d = 0; d < audit->model->nv; d++) most = fmax(most, fabs(found[d] - u[d]));
+  return most / (audit->weight * audit->arm);
+}
+
+// one forward step to next [2*nv], of which the second half is scratch. A step that stopped above the tolerance is
+// judged by the force that it leaves unexplained
+static cav_status step(const cav_audit *audit, cav_state *state, double tolerance, const double *q, const double *v,
+                       const double *u, double *next) {
+  int nv = audit->model->nv;
+  memcpy(next, v, sizeof(double) * nv);
+  cav_status status = cav_forward_newton(audit->model, state, q, v, u, ITERATIONS, tolerance, next, NULL);
+  if (status == CAV_NOT_CONVERGED && missed(audit, state, q, v, u, next, next + nv) <= poor) return CAV_OK;
+  return status;
+}
+
+cav_status cav_replay_steps(const cav_audit *audit, cav_replay *replay) {
+  const cav_model *model = audit->model;
+  int nv = model->nv;
+  double *next = malloc(sizeof(double) * (size_t)(2 * nv + 1));
+  if (!next) return CAV_NO_MEMORY;
+  cav_status status = CAV_OK;
+  replay->step_error = 0;
+  replay->step_knot = 0;
+  for (int t = 0; t < audit->rows && status == CAV_OK; t++) {
+    const double *v = audit->v + t * nv;
+    status = step(audit, audit->state, exact_tolerance, audit->q + t * model->nq, v, audit->u + t * nv, next);
+    // a step that stopped far from its solution shows as a large error, not as a failure
+    if (status == CAV_NOT_CONVERGED) status = CAV_OK;
+    if (status != CAV_OK) break;
+    for (int d = 0; d < nv; d++) {
+      double error = fabs(next[d] - v[nv + d]) * audit->h;
+      if (error <= replay->step_error) continue;
+      replay->step_error = error;
+      replay->step_knot = t;
+    }
+  }
+  free(next);
+  return status;
+}
+
+cav_status cav_replay_open(const cav_audit *audit, cav_replay *replay) {
+  const cav_model *model = audit->model;
+  int nv = model->nv, nq = model->nq, together = 1;
+  double *q = malloc(sizeof(double) * (size_t)(nq + 5 * nv + 1));
+  if (!q) return CAV_NO_MEMORY;
+  double *v = q + nq, *u = v + nv, *next = u + nv, *work = next + 2 * nv;
+  memcpy(q, audit->q, sizeof(double) * nq);
+  memcpy(v, audit->v, sizeof(double) * nv);
+  replay->open_error = replay->open_seconds = 0;
+  cav_status status = CAV_OK;
+  for (int t = 0; t < audit->last; t++) {
+    // only what actuators give
+    const double *whole = audit->u + t * nv;
+    cav_actuation(model, audit->state, whole, work, NULL);
+    for (int d = 0; d < nv; d++) u[d] = whole[d] - work[d];
+    status = step(audit, audit->state, exact_tolerance, q, v, u, next);
+    if (status != CAV_OK) break;
+    cav_integrate(model, q, next, audit->h, q);
+    memcpy(v, next, sizeof(double) * nv);
+    double error = apart(model, audit->q + (t + 1) * nq, q, work);
+    if (!(error <= replay->open_error)) replay->open_error = error;
+    together = together && error <= same;
+    if (together) replay->open_seconds = (t + 1) * audit->h;
+  }
+  free(q);
+  // a simulation that ends in numbers that are not finite or in a step without solution ends the figure, not the audit
+  return status == CAV_NO_MEMORY ? status : CAV_OK;
+}
+
+// generalised force of clipped controls
+static void drive(const cav_model *model, const double *control, double *u) {
+  memset(u, 0, sizeof(double) * model->nv);
+  for (int a = 0; a < model->nu; a++) {
+    const cav_actuator *actuator = model->actuator + a;
+    double range[2], scale;
+    cav_audit_actuator_range(actuator, range, &scale);
+    double c = fmin(fmax(control[a], range[0]), range[1]);
+    if (actuator->transmission == CAV_TRANSMISSION_TENDON) {
+      const cav_tendon *tendon = model->tendon + actuator->target;
+      for (int i = tendon->part; i < tendon->part + tendon->npart; i++) {
+        const cav_tendon_part *part = model->tendon_part + i;
+        u[model->joint[part->joint].dof] += part->coef * actuator->gear[0] * c;
+      }
+      continue;
+    }
+    const cav_joint *joint = model->joint + actuator->target;
+    int n = joint->type == CAV_JOINT_FREE ? 6 : joint->type == CAV_JOINT_BALL ? 3 : 1;
+    for (int k = 0; k < n; k++) u[joint->dof + k] += actuator->gear[k] * c;
+  }
+}
+
+// u := forces held from knot t on and feedback at (q, v), through the actuators
+static void command(const cav_audit *audit, int t, const double *gain_q, const double *gain_v, const double *dq,
+                    const double *dv, double *control, double *u) {
+  int nv = audit->model->nv;
+  size_t at = (size_t)t * (size_t)nv * (size_t)nv;
+  const double *Kq = gain_q ? gain_q + at : NULL, *Kv = gain_v ? gain_v + at : NULL;
+  for (int i = 0; i < nv; i++) {
+    u[i] = audit->u[t * nv + i];
+    for (int j = 0; Kq && j < nv; j++) u[i] += Kq[i * nv + j] * dq[j];
+    for (int j = 0; Kv && j < nv; j++) u[i] += Kv[i * nv + j] * dv[j];
+  }
+  cav_actuation(audit->model, audit->bare, u, NULL, control);
+  drive(audit->model, control, u);
+}
+
+// the motion at a share of the way from knot t to t+1
+static void reference(const cav_audit *audit, int t, double share, double *q, double *v) {
+  int nv = audit->model->nv;
+  const double *from = audit->v + t * nv, *to = from + nv;
+  cav_integrate(audit->model, audit->q + t * audit->model->nq, to, share * audit->h, q);
+  for (int d = 0; d < nv; d++) v[d] = (1 - share) * from[d] + share * to[d];
+}
+
+// angle between two unit quaternions
+static double angle(const double *a, const double *b) {
+  double w = fabs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]);
+  return 2 * acos(fmin(w, 1));
+}
+
+// distances between two configurations: of links' centres of mass, and turn of root links; -> bodies of the largest
+typedef struct gap {
+  double distance, turn;
+  int link, root;
+} gap;
+
+static cav_status compare(const cav_audit *audit, const double *q0, const double *q1, double *place, gap *found) {
+  const cav_model *model = audit->model;
+  cav_status status = cav_position(model, audit->bare, q0);
+  if (status != CAV_OK) return status;
+  for (int l = 0; l < model->nlink; l++) {
+    memcpy(place + 7 * l, audit->bare->com + 3 * l, sizeof(double) * 3);
+    memcpy(place + 7 * l + 3, audit->bare->link[l].quat, sizeof(double) * 4);
+  }
+  status = cav_position(model, audit->bare, q1);
+  *found = (gap){0};
+  for (int l = 1; l < model->nlink && status == CAV_OK; l++) {
+    const double *a = place + 7 * l, *b = audit->bare->com + 3 * l;
+    double distance =
+        sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+    if (distance > found->distance) found->distance = distance, found->link = l;
+    if (model->link[l].root != l) continue;
+    double turn = angle(a + 3, audit->bare->link[l].quat);
+    if (turn > found->turn) found->turn = turn, found->root = l;
+  }
+  return status;
+}
+
+// notes the distance now; 0 once the motion is lost
+static int following(const cav_audit *audit, const gap *now, double time, cav_replay *replay) {
+  char name[32];
+  replay->closed_error = now->distance;
+  int near = now->distance <= far && now->turn <= turned;
+  if (near) {
+    replay->closed_seconds = time;
+    return 1;
+  }
+  int by_turn = now->distance <= far;
+  snprintf(replay->lost, sizeof replay->lost, "%.60s is %.2g %s away at %.3f s",
+           cav_audit_link_name(audit->model, by_turn ? now->root : now->link, name),
+           by_turn ? now->turn : now->distance, by_turn ? "rad" : "m", time);
+  return 0;
+}
+
+// the model as its file says, at a finer step
+static cav_options fine_options(const cav_audit *audit) {
+  cav_options options = audit->model->options;
+  options.timestep = audit->h / SUBSTEPS;
+  options.order = CAV_ORDER_EULER;
+  options.stabilisation = CAV_STABILISATION_SOLREF;
+  options.smoothing = options.smoothing_self = 0;
+  options.guard = 1;
+  return options;
+}
+
+// simulates one interval; 0 in *on once the motion is lost
+static cav_status interval(const cav_audit *audit, cav_state *fine, const double *gain_q, const double *gain_v, int t,
+                           double *q, double *v, double *work, cav_replay *replay, int *on) {
+  const cav_model *model = audit->model;
+  int nv = model->nv;
+  double *q_ref = work, *v_ref = q_ref + model->nq, *dq = v_ref + nv, *dv = dq + nv, *u = dv + nv, *next = u + nv;
+  double *control = next + 2 * nv, *place = control + model->nu;
+  for (int k = 0; k < SUBSTEPS && *on; k++) {
+    double time = (t + (double)(k + 1) / SUBSTEPS) * audit->h;
+    reference(audit, t, (double)k / SUBSTEPS, q_ref, v_ref);
+    cav_difference(model, q_ref, q, 1, dq);
+    for (int d = 0; d < nv; d++) dv[d] = v[d] - v_ref[d];
+    command(audit, t, gain_q, gain_v, dq, dv, control, u);
+    cav_status status = step(audit, fine, 1e-9, q, v, u, next);
+    if (status == CAV_NO_MEMORY) return status;
+    if (status != CAV_OK) {
+      snprintf(replay->lost, sizeof replay->lost, "simulation stopped at %.3f s: %s", time, cav_status_name(status));
+      *on = 0;
+      return CAV_OK;
+    }
+    cav_integrate(model, q, next, fine->options.timestep, q);
+    memcpy(v, next, sizeof(double) * nv);
+    // how near
+    gap now;
+    reference(audit, t, (double)(k + 1) / SUBSTEPS, q_ref, v_ref);
+    status = compare(audit, q_ref, q, place, &now);
+    if (status != CAV_OK) return status;
+    *on = following(audit, &now, time, replay);
+  }
+  return CAV_OK;
+}
+
+cav_status cav_replay_closed(const cav_audit *audit, const double *gain_q, const double *gain_v, cav_replay *replay) {
+  const cav_model *model = audit->model;
+  size_t nq = (size_t)model->nq, nv = (size_t)model->nv;
+  double *q = malloc(sizeof(double) * (2 * nq + 7 * nv + (size_t)model->nu + 7 * (size_t)model->nlink));
+  cav_state *fine = cav_state_new(model);
+  cav_status status = q && fine ? CAV_OK : CAV_NO_MEMORY;
+  replay->closed_seconds = replay->closed_error = 0;
+  replay->lost[0] = 0;
+  if (status == CAV_OK) {
+    double *v = q + nq;
+    fine->options = fine_options(audit);
+    memcpy(q, audit->q, sizeof(double) * nq);
+    memcpy(v, audit->v, sizeof(double) * nv);
+    int on = 1;
+    for (int t = 0; t < audit->last && on && status == CAV_OK; t++) {
+      status = interval(audit, fine, gain_q, gain_v, t, q, v, v + nv, replay, &on);
+    }
+  }
+  cav_state_free(fine);
+  free(q);
+  return status;
+}

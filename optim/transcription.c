@@ -1,0 +1,921 @@
+/// Rows of a problem over its knots and their Gauss-Newton normal equations. Every knot t sees q_{t-1}, q_t, q_{t+1} through
+/// v_t, v_{t+1} and the inverse dynamics u_t (optimisation.md, 1), so its part of the Hessian is one dense block of three
+/// neighbours and knots are evaluated in any order, by any number of threads, with the same result.
+///
+/// Derivatives of u, contacts and sensors come from cav_differentiate; those of v, accelerations, postures and ranges are
+/// exact. Constraint rows enter the merit by an augmented Lagrangian of two-sided rows: with z~ = z + multiplier/rho and
+/// e = z~ - clamp(z~), the row costs rho/2 e^2 and its next multiplier is rho e (Powell, Hestenes, Rockafellar).
+#include "transcription.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+/// BLAS: C := alpha A A' + beta C for symmetric C.
+extern void dsyrk_(const char *uplo, const char *trans, const int *n, const int *k, const double *alpha, const double *A,
+                   const int *lda, const double *beta, double *C, const int *ldc);
+
+/// A moment counts as a force at this distance when it is compared with the weight.
+static const double moment_arm = 0.3;
+
+/// Contacts that push less than this share of the weight get no rows of their own.
+static const double contact_floor = 1e-6;
+
+typedef struct cav_scratch {
+  cav_state *state;
+  int room; ///< readings
+  double *value, *dq, *dv, *dn;
+  int *key; ///< [2*contacts] pair and feature of the contacts with rows
+  int key_room;
+  int dense_room; ///< rows
+  double *dense;  ///< [dense_room*3nv]
+  double *rest;   ///< [dense_room]
+  double *force_weight, *force_slope; ///< [nv] of rows along single dofs
+  double *row;    ///< [3nv]
+  int *column;    ///< [nv]
+  double *tangent; ///< [nv]
+  double seconds;
+} cav_scratch;
+
+static double now(void) {
+  struct timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+// ---------------------------------------------------------------- rotations
+
+void cav_turn(const double phi[3], double J[9]) {
+  double a2 = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2], a = sqrt(a2);
+  double s = a < 1e-4 ? 0.5 - a2 / 24 : (1 - cos(a)) / a2;
+  double c = a < 1e-4 ? 1.0 / 6 - a2 / 120 : (a - sin(a)) / (a2 * a);
+  // I - s [phi] + c [phi]^2
+  double x = phi[0], y = phi[1], z = phi[2];
+  double square[9] = {x * x - a2, x * y, x * z, x * y, y * y - a2, y * z, x * z, y * z, z * z - a2};
+  double skew[9] = {0, -z, y, z, 0, -x, -y, x, 0};
+  for (int i = 0; i < 9; i++) J[i] = (i % 4 == 0) - s * skew[i] + c * square[i];
+}
+
+void cav_turn_inverse(const double phi[3], double J[9]) {
+  double a2 = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2], a = sqrt(a2);
+  double c = a < 1e-3 ? 1.0 / 12 + a2 / 720 : 1 / a2 - (1 + cos(a)) / (2 * a * sin(a));
+  // I + [phi]/2 + c [phi]^2
+  double x = phi[0], y = phi[1], z = phi[2];
+  double square[9] = {x * x - a2, x * y, x * z, x * y, y * y - a2, y * z, x * z, y * z, z * z - a2};
+  double skew[9] = {0, -z, y, z, 0, -x, -y, x, 0};
+  for (int i = 0; i < 9; i++) J[i] = (i % 4 == 0) + 0.5 * skew[i] + c * square[i];
+}
+
+// ---------------------------------------------------------------- construction
+
+static int joint_is_turn(cav_joint_type type) { return type == CAV_JOINT_FREE || type == CAV_JOINT_BALL; }
+
+static int list_turns(cav_transcription *tr) {
+  const cav_model *m = tr->model;
+  tr->turn_of = malloc((size_t)m->nv * sizeof(int));
+  tr->turn_dof = malloc((size_t)(m->njoint + 1) * sizeof(int));
+  if (!tr->turn_of || !tr->turn_dof) return 0;
+  for (int d = 0; d < m->nv; d++) tr->turn_of[d] = -1;
+  for (int j = 0; j < m->njoint; j++) {
+    if (!joint_is_turn(m->joint[j].type)) continue;
+    int dof = m->joint[j].dof + (m->joint[j].type == CAV_JOINT_FREE ? 3 : 0);
+    for (int k = 0; k < 3; k++) tr->turn_of[dof + k] = tr->nturn;
+    tr->turn_dof[tr->nturn++] = dof;
+  }
+  return 1;
+}
+
+static int dof_is_linear(const cav_model *m, int d) {
+  const cav_joint *joint = &m->joint[m->dof[d].joint];
+  return joint->type == CAV_JOINT_SLIDE || (joint->type == CAV_JOINT_FREE && d < joint->dof + 3);
+}
+
+static int force_row_set(cav_force_row *row, int nv, const double *dense, double scale) {
+  int n = 0;
+  double largest = 0;
+  for (int d = 0; d < nv; d++) largest = fmax(largest, fabs(dense[d]));
+  for (int d = 0; d < nv; d++) n += fabs(dense[d]) > 1e-12 * largest;
+  row->dof = malloc((size_t)(n + 1) * sizeof(int));
+  row->coef = malloc((size_t)(n + 1) * sizeof(double));
+  if (!row->dof || !row->coef) return 0;
+  for (int d = 0; d < nv; d++) {
+    if (fabs(dense[d]) <= 1e-12 * largest) continue;
+    row->dof[row->n] = d;
+    row->coef[row->n++] = dense[d] * scale;
+  }
+  return 1;
+}
+
+/// Linear forms of u: an orthonormal basis of what actuators cannot give, and the least-norm actuator efforts.
+static int list_force_rows(cav_transcription *tr) {
+  const cav_model *m = tr->model;
+  int nv = m->nv, nu = m->nu, ok = 0;
+  double *unit = calloc((size_t)nv, sizeof(double)), *basis = calloc((size_t)nv * nv, sizeof(double));
+  double *residual = malloc((size_t)nv * sizeof(double)), *control = calloc((size_t)nv * (nu + 1), sizeof(double));
+  double *effort = malloc((size_t)nv * sizeof(double));
+  tr->unactuated = calloc((size_t)nv, sizeof *tr->unactuated);
+  tr->effort = calloc((size_t)nu + 1, sizeof *tr->effort);
+  tr->effort_range = malloc((size_t)(nu + 1) * sizeof *tr->effort_range);
+  if (!unit || !basis || !residual || !control || !effort || !tr->unactuated || !tr->effort || !tr->effort_range) goto end;
+
+  // project unit forces; orthonormalise what is left, twice for rounding
+  for (int d = 0; d < nv; d++) {
+    unit[d] = 1;
+    cav_actuation(m, tr->scratch[0].state, unit, residual, control + (size_t)d * nu);
+    unit[d] = 0;
+    for (int pass = 0; pass < 2; pass++) {
+      for (int k = 0; k < tr->nresidual; k++) {
+        double dot = 0;
+        for (int i = 0; i < nv; i++) dot += basis[k * nv + i] * residual[i];
+        for (int i = 0; i < nv; i++) residual[i] -= dot * basis[k * nv + i];
+      }
+    }
+    double norm = 0;
+    for (int i = 0; i < nv; i++) norm += residual[i] * residual[i];
+    if ((norm = sqrt(norm)) < 1e-7) continue;
+    for (int i = 0; i < nv; i++) basis[tr->nresidual * nv + i] = residual[i] / norm;
+    double unit_force = tr->weight * (dof_is_linear(m, d) ? 1 : moment_arm);
+    if (!force_row_set(&tr->unactuated[tr->nresidual], nv, basis + tr->nresidual * nv, 1 / unit_force)) goto end;
+    tr->nresidual++;
+  }
+
+  // efforts: control over its limit, or plain force where there is none
+  for (int a = 0; a < nu; a++) {
+    const cav_actuator *actuator = &m->actuator[a];
+    double lower = -INFINITY, upper = INFINITY;
+    if (actuator->ctrllimited) lower = actuator->ctrlrange[0], upper = actuator->ctrlrange[1];
+    if (actuator->forcelimited) {
+      lower = fmax(lower, actuator->forcerange[0]);
+      upper = fmin(upper, actuator->forcerange[1]);
+    }
+    double limit = fmax(isfinite(lower) ? fabs(lower) : 0, isfinite(upper) ? fabs(upper) : 0);
+    double scale = limit > 0 ? 1 / limit : 1;
+    tr->effort_range[a][0] = lower * scale * tr->problem->effort_limit;
+    tr->effort_range[a][1] = upper * scale * tr->problem->effort_limit;
+    for (int d = 0; d < nv; d++) effort[d] = control[(size_t)d * nu + a];
+    if (!force_row_set(&tr->effort[a], nv, effort, scale)) goto end;
+  }
+  ok = 1;
+end:
+  free(unit), free(basis), free(residual), free(control), free(effort);
+  return ok;
+}
+
+/// Constraint rows that a hard term gives at a knot.
+static int term_slots(const cav_transcription *tr, const cav_term *term, int t) {
+  if (term->use == CAV_USE_COST || cav_term_weight(tr, term, t) == 0) return 0;
+  if (term->quantity == CAV_QUANTITY_SENSOR) return cav_term_dim(term);
+  int n = 0;
+  for (int d = 0; d < tr->nv; d++) n += cav_dof_selected(tr, term, d);
+  return n;
+}
+
+static cav_slot_layout layout_of(const cav_transcription *tr, int t) {
+  const cav_model *m = tr->model;
+  cav_slot_layout at = {0};
+  int has_force = tr->knot[t].has_force;
+  at.effort = has_force ? tr->nresidual : 0;
+  at.joint = at.effort + (has_force ? m->nu : 0);
+  at.tendon = at.joint;
+  if (t > 0)
+    for (int j = 0; j < m->njoint; j++) at.tendon += m->joint[j].limited;
+  at.term = at.tendon;
+  if (t > 0)
+    for (int k = 0; k < m->ntendon; k++) at.term += m->tendon[k].limited;
+  at.count = at.term;
+  for (int i = 0; i < tr->problem->nterm; i++) at.count += term_slots(tr, &tr->problem->term[i], t);
+  return at;
+}
+
+static void *room(int *ok, size_t n, size_t size) {
+  void *p = calloc(n ? n : 1, size);
+  if (!p) *ok = 0;
+  return p;
+}
+
+static int knot_new(cav_transcription *tr, int t) {
+  cav_knot *knot = &tr->knot[t];
+  int ok = 1;
+  size_t n = (size_t)tr->nv;
+  knot->time = t * tr->h;
+  knot->has_force = t < tr->nknot - 1 || tr->problem->close_at_rest;
+  knot->layout = layout_of(tr, t);
+  knot->slot = room(&ok, (size_t)knot->layout.count, sizeof *knot->slot);
+  knot->u = room(&ok, n, sizeof(double));
+  knot->du = room(&ok, 3 * n * n, sizeof(double));
+  knot->hessian = room(&ok, 9 * n * n, sizeof(double));
+  knot->gradient = room(&ok, 3 * n, sizeof(double));
+  knot->turn = room(&ok, CAV_TURN * (size_t)tr->nturn, sizeof(double));
+  return ok;
+}
+
+static int scratch_new(cav_transcription *tr, cav_scratch *s) {
+  int ok = 1;
+  size_t n = (size_t)tr->nv;
+  s->state = cav_state_new(tr->model);
+  s->force_weight = room(&ok, n, sizeof(double));
+  s->force_slope = room(&ok, n, sizeof(double));
+  s->row = room(&ok, 3 * n, sizeof(double));
+  s->column = room(&ok, n, sizeof(int));
+  s->tangent = room(&ok, n, sizeof(double));
+  return ok && s->state;
+}
+
+cav_transcription *cav_transcription_new(const cav_problem *problem, int threads, cav_error *error) {
+  cav_transcription *tr = calloc(1, sizeof *tr);
+  if (!tr) goto memory;
+  tr->problem = problem;
+  tr->model = problem->model;
+  tr->nv = problem->model->nv;
+  tr->h = problem->timestep;
+  tr->nknot = (int)lround(problem->duration / problem->timestep) + 1;
+  const double *g = problem->model->gravity;
+  tr->weight = problem->model->mass * sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+  if (!(tr->weight > 0)) tr->weight = problem->model->mass > 0 ? problem->model->mass : 1;
+  tr->options = problem->model->options;
+  tr->options.timestep = tr->h;
+  tr->options.order = problem->order;
+  tr->pool = cav_parallel_new(threads);
+  if (!tr->pool || !list_turns(tr)) goto memory;
+  tr->scratch = calloc((size_t)cav_parallel_size(tr->pool), sizeof *tr->scratch);
+  if (!tr->scratch) goto memory;
+  for (int i = 0; i < cav_parallel_size(tr->pool); i++)
+    if (!scratch_new(tr, &tr->scratch[i])) goto memory;
+  if (!list_force_rows(tr)) goto memory;
+  tr->knot = calloc((size_t)tr->nknot, sizeof *tr->knot);
+  if (!tr->knot) goto memory;
+  for (int t = 0; t < tr->nknot; t++)
+    if (!knot_new(tr, t)) goto memory;
+  return tr;
+memory:
+  if (error) *error = (cav_error){CAV_NO_MEMORY, 0, "not enough memory for this problem"};
+  cav_transcription_free(tr);
+  return NULL;
+}
+
+void cav_transcription_free(cav_transcription *tr) {
+  if (!tr) return;
+  for (int t = 0; tr->knot && t < tr->nknot; t++) {
+    cav_knot *k = &tr->knot[t];
+    free(k->slot), free(k->u), free(k->du), free(k->hessian), free(k->gradient), free(k->turn), free(k->y), free(k->dy), free(k->slot_row);
+  }
+  for (int i = 0; tr->scratch && i < cav_parallel_size(tr->pool); i++) {
+    cav_scratch *s = &tr->scratch[i];
+    cav_state_free(s->state);
+    free(s->value), free(s->dq), free(s->dv), free(s->dn), free(s->key), free(s->dense), free(s->rest);
+    free(s->force_weight), free(s->force_slope), free(s->row), free(s->column), free(s->tangent);
+  }
+  for (int k = 0; k < tr->nresidual; k++) free(tr->unactuated[k].dof), free(tr->unactuated[k].coef);
+  for (int a = 0; tr->effort && a < tr->model->nu; a++) free(tr->effort[a].dof), free(tr->effort[a].coef);
+  free(tr->unactuated), free(tr->effort), free(tr->effort_range), free(tr->turn_dof), free(tr->turn_of);
+  free(tr->knot), free(tr->scratch);
+  cav_parallel_free(tr->pool);
+  free(tr);
+}
+
+// ---------------------------------------------------------------- readings of one knot
+
+/// What is read off a state at knot t: u, four numbers a contact, the sensors of the terms that speak there.
+typedef struct readings {
+  const cav_transcription *tr;
+  int t, ncontact;
+  const int *key;
+} readings;
+
+static void read_contact(const cav_transcription *tr, const cav_contact *c, double *y) {
+  double share = sqrt(fmax(c->impulse[0], 0) / (tr->h * tr->weight));
+  y[0] = share * fmax(c->dist, 0);
+  y[1] = c->dim > 1 ? share * c->velocity_next[1] : 0;
+  y[2] = c->dim > 1 ? share * c->velocity_next[2] : 0;
+  y[3] = share * c->velocity_next[0];
+}
+
+static void read_knot(const cav_model *model, const cav_state *state, void *context, double *value) {
+  const readings *r = context;
+  const cav_transcription *tr = r->tr;
+  memcpy(value, state->u, (size_t)model->nv * sizeof(double));
+  value += model->nv;
+
+  // contacts stand in the order of pairs and features, so both lists are walked once; one that is gone reads zero
+  const cav_contact *c = state->contact, *end = state->contact + state->ncontact;
+  for (int k = 0; k < r->ncontact; k++, value += 4) {
+    int pair = r->key[2 * k], feature = r->key[2 * k + 1];
+    while (c < end && (c->pair < pair || (c->pair == pair && c->feature < feature))) c++;
+    if (c < end && c->pair == pair && c->feature == feature) {
+      read_contact(tr, c, value);
+    } else {
+      memset(value, 0, 4 * sizeof(double));
+    }
+  }
+  for (int i = 0; i < tr->problem->nterm; i++) {
+    const cav_term *term = &tr->problem->term[i];
+    if (term->quantity != CAV_QUANTITY_SENSOR || cav_term_weight(tr, term, r->t) == 0) continue;
+    cav_term_read(tr, state, term, r->t, value);
+    value += cav_term_dim(term);
+  }
+}
+
+static int grow(double **array, size_t n) {
+  double *p = realloc(*array, n * sizeof(double));
+  if (p) *array = p;
+  return p != NULL;
+}
+
+/// Lists the contacts that carry load at the state and makes room for all readings of the knot.
+static int list_readings(cav_transcription *tr, cav_scratch *s, int t) {
+  cav_knot *knot = &tr->knot[t];
+  int nv = tr->nv, ncontact = 0, nsensor = 0;
+  if (s->state->ncontact > s->key_room) {
+    int *key = realloc(s->key, 2 * (size_t)s->state->ncontact * sizeof(int));
+    if (!key) return 0;
+    s->key = key;
+    s->key_room = s->state->ncontact;
+  }
+  if (knot->has_force) {
+    for (int k = 0; k < s->state->ncontact; k++) {
+      const cav_contact *c = &s->state->contact[k];
+      if (!tr->model->pair[c->pair].same_world || c->impulse[0] < contact_floor * tr->h * tr->weight) continue;
+      s->key[2 * ncontact] = c->pair;
+      s->key[2 * ncontact++ + 1] = c->feature;
+    }
+  }
+  for (int i = 0; i < tr->problem->nterm; i++) {
+    const cav_term *term = &tr->problem->term[i];
+    if (cav_term_weight(tr, term, t) > 0) nsensor += cav_term_dim(term);
+  }
+  knot->ncontact = ncontact;
+  knot->nread = 4 * ncontact + nsensor;
+  size_t total = (size_t)(nv + knot->nread), n = (size_t)nv;
+  if ((int)total > s->room) {
+    if (!grow(&s->value, total) || !grow(&s->dq, total * n) || !grow(&s->dv, total * n) || !grow(&s->dn, total * n)) return 0;
+    s->room = (int)total;
+  }
+  if (knot->nread > knot->room) {
+    if (!grow(&knot->y, (size_t)knot->nread) || !grow(&knot->dy, (size_t)knot->nread * 3 * n)) return 0;
+    knot->room = knot->nread;
+  }
+  int dense = nv + knot->nread + knot->layout.count + tr->model->nu;
+  if (dense > s->dense_room) {
+    if (!grow(&s->dense, (size_t)dense * 3 * n) || !grow(&s->rest, (size_t)dense)) return 0;
+    s->dense_room = dense;
+  }
+  return 1;
+}
+
+/// Velocity after knot t: that of the next knot, or what closes the motion.
+static const double *velocity_after(const cav_transcription *tr, const cav_trajectory *at, int t, const double *zero) {
+  if (t + 1 < tr->nknot) return at->v + (size_t)(t + 1) * tr->nv;
+  return tr->problem->close_at_rest ? zero : at->v + (size_t)t * tr->nv;
+}
+
+/// out += scale * row * (Jacobian of a step): side 0 by its end (Jr^-1), side 1 by its start (Jl^-1).
+static void times_turn(const cav_transcription *tr, const double *row, const double *turn, int side, double scale, double *out) {
+  for (int d = 0; d < tr->nv; d++)
+    if (tr->turn_of[d] < 0) out[d] += scale * row[d];
+  for (int k = 0; k < tr->nturn; k++) {
+    const double *J = turn + CAV_TURN * k + 9 * side, *x = row + tr->turn_dof[k];
+    double *y = out + tr->turn_dof[k];
+    for (int c = 0; c < 3; c++) y[c] += scale * (x[0] * J[c] + x[1] * J[3 + c] + x[2] * J[6 + c]);
+  }
+}
+
+/// Chains derivatives with respect to (q_t, v_t, v_{t+1}) to the three neighbouring knots.
+static void chain(const cav_transcription *tr, int t, int n, const double *dq, const double *dv, const double *dn, double *out) {
+  int nv = tr->nv, last = tr->nknot - 1;
+  const double *now_turn = tr->knot[t].turn, *next_turn = t < last ? tr->knot[t + 1].turn : NULL;
+  double inverse = 1 / tr->h;
+  memset(out, 0, (size_t)n * 3 * nv * sizeof(double));
+  for (int i = 0; i < n; i++, dq += nv, dv += nv, dn += nv, out += 3 * nv) {
+    if (t > 0) {
+      for (int d = 0; d < nv; d++) out[nv + d] = dq[d];
+      times_turn(tr, dv, now_turn, 0, inverse, out + nv);
+      if (t > 1) times_turn(tr, dv, now_turn, 1, -inverse, out);
+    }
+    if (t < last) {
+      times_turn(tr, dn, next_turn, 0, inverse, out + 2 * nv);
+      if (t > 0) times_turn(tr, dn, next_turn, 1, -inverse, out + nv);
+    } else if (!tr->problem->close_at_rest) {
+      times_turn(tr, dn, now_turn, 0, inverse, out + nv);
+      if (t > 1) times_turn(tr, dn, now_turn, 1, -inverse, out);
+    }
+  }
+}
+
+// ---------------------------------------------------------------- sums of one knot
+
+/// One knot being summed: dense rows gathered, sparse rows added at once. s->state is evaluated.
+typedef struct sum {
+  cav_transcription *tr;
+  cav_scratch *s;
+  cav_knot *knot;
+  int t, jacobian, dense;
+} sum;
+
+/// Adds weight/2 (r + row dx)^2 for a row with n entries.
+static void add_sparse(sum *a, double weight, double r, int n, const int *column, const double *entry) {
+  a->knot->merit += 0.5 * weight * r * r;
+  if (!a->jacobian) return;
+  int width = 3 * a->tr->nv;
+  for (int i = 0; i < n; i++) {
+    a->knot->gradient[column[i]] += weight * r * entry[i];
+    for (int j = 0; j < n; j++)
+      if (column[j] <= column[i]) a->knot->hessian[column[i] * width + column[j]] += weight * entry[i] * entry[j];
+  }
+}
+
+/// Adds weight/2 (r + row dx)^2 for a full row.
+static void add_dense(sum *a, double weight, double r, const double *row) {
+  a->knot->merit += 0.5 * weight * r * r;
+  if (!a->jacobian || weight == 0) return;
+  int width = 3 * a->tr->nv;
+  double root = sqrt(weight), *out = a->s->dense + (size_t)a->dense * width;
+  for (int k = 0; k < width; k++) out[k] = root * row[k];
+  a->s->rest[a->dense++] = root * r;
+}
+
+/// Adds weight/2 r^2 with r a linear form of u: along one dof it joins that dof's row, otherwise it is a row of its own.
+static void add_force(sum *a, double weight, double r, const cav_force_row *form) {
+  const cav_transcription *tr = a->tr;
+  if (form->n == 1) {
+    a->knot->merit += 0.5 * weight * r * r;
+    a->s->force_weight[form->dof[0]] += weight * form->coef[0] * form->coef[0];
+    a->s->force_slope[form->dof[0]] += weight * r * form->coef[0];
+    return;
+  }
+  int width = 3 * tr->nv;
+  memset(a->s->row, 0, (size_t)width * sizeof(double));
+  if (a->jacobian) {
+    for (int k = 0; k < form->n; k++) {
+      const double *du = a->knot->du + (size_t)form->dof[k] * width;
+      for (int c = 0; c < width; c++) a->s->row[c] += form->coef[k] * du[c];
+    }
+  }
+  add_dense(a, weight, r, a->s->row);
+}
+
+static double form_value(const cav_force_row *form, const double *u) {
+  double value = 0;
+  for (int k = 0; k < form->n; k++) value += form->coef[k] * u[form->dof[k]];
+  return value;
+}
+
+/// Sets a constraint row; the residual of its augmented Lagrangian, 0 with *active 0 where it does not push.
+static double slot_residual(const sum *a, int i, double value, double lower, double upper, double rho, int *active) {
+  cav_slot *slot = &a->knot->slot[i];
+  slot->value = value;
+  slot->lower = lower;
+  slot->upper = upper;
+  double shifted = value + (rho > 0 && !a->tr->constraints_only ? slot->multiplier / rho : 0);
+  double e = shifted - fmin(fmax(shifted, lower), upper);
+  *active = e != 0 || lower == upper;
+  return e;
+}
+
+/// Derivative of constraint row i, kept where the transcription is asked to (for solvers that want the rows themselves).
+static double *kept_row(sum *a, int i) {
+  if (!a->jacobian || !a->tr->keep_rows) return NULL;
+  double *row = a->knot->slot_row + (size_t)i * 3 * a->tr->nv;
+  memset(row, 0, 3 * (size_t)a->tr->nv * sizeof(double));
+  return row;
+}
+
+static void keep_sparse(sum *a, int i, int n, const int *column, const double *entry) {
+  double *row = kept_row(a, i);
+  for (int k = 0; row && k < n; k++) row[column[k]] += entry[k];
+}
+
+static void keep_force(sum *a, int i, const cav_force_row *form) {
+  double *row = kept_row(a, i);
+  int width = 3 * a->tr->nv;
+  for (int k = 0; row && k < form->n; k++)
+    for (int c = 0; c < width; c++) row[c] += form->coef[k] * a->knot->du[(size_t)form->dof[k] * width + c];
+}
+
+static void keep_reading(sum *a, int i, int reading) {
+  double *row = kept_row(a, i);
+  if (row) memcpy(row, a->knot->dy + (size_t)reading * 3 * a->tr->nv, 3 * (size_t)a->tr->nv * sizeof(double));
+}
+
+/// Entries of the derivative of v_t [dof d] over the columns; base is the column block of q_t, q_{t-1} stands before it.
+static int velocity_entries(const cav_transcription *tr, int step, int d, int base, int has_previous, double scale,
+                            int *column, double *entry) {
+  int n = 0, nv = tr->nv, k = tr->turn_of[d];
+  double s = scale / tr->h;
+  if (k < 0) {
+    column[n] = base + d, entry[n++] = s;
+    if (has_previous) column[n] = base - nv + d, entry[n++] = -s;
+    return n;
+  }
+  const double *J = tr->knot[step].turn + CAV_TURN * k;
+  int first = tr->turn_dof[k], row = d - first;
+  for (int c = 0; c < 3; c++) {
+    column[n] = base + first + c, entry[n++] = s * J[3 * row + c];
+    if (has_previous) column[n] = base - nv + first + c, entry[n++] = -s * J[9 + 3 * row + c];
+  }
+  return n;
+}
+
+static void add_velocity(sum *a, const cav_term *term, double weight, const double *v) {
+  const cav_transcription *tr = a->tr;
+  int column[6];
+  double entry[6], goal = term->target ? term->target[0] : 0;
+  if (a->t == 0) return;
+  for (int d = 0; d < tr->nv; d++) {
+    if (!cav_dof_selected(tr, term, d)) continue;
+    int n = velocity_entries(tr, a->t, d, tr->nv, a->t > 1, 1 / term->scale, column, entry);
+    add_sparse(a, weight, (v[d] - goal) / term->scale, n, column, entry);
+  }
+}
+
+static void add_acceleration(sum *a, const cav_term *term, double weight, const double *v, const double *v_next) {
+  const cav_transcription *tr = a->tr;
+  int column[12], last = tr->nknot - 1;
+  double entry[12], scale = 1 / (tr->h * term->scale);
+  if (!a->knot->has_force) return;
+  for (int d = 0; d < tr->nv; d++) {
+    if (!cav_dof_selected(tr, term, d)) continue;
+    int n = a->t > 0 ? velocity_entries(tr, a->t, d, tr->nv, a->t > 1, -scale, column, entry) : 0;
+    if (a->t < last) n += velocity_entries(tr, a->t + 1, d, 2 * tr->nv, a->t > 0, scale, column + n, entry + n);
+    add_sparse(a, weight, (v_next[d] - v[d]) * scale, n, column, entry);
+  }
+}
+
+/// Tangent difference of q_t to a term's posture and, per dof, the entries of its derivative.
+static void posture_difference(const sum *a, const cav_term *term, const double *q, double *difference) {
+  const cav_transcription *tr = a->tr;
+  const double *target = term->target ? term->target : tr->problem->q_goal;
+  cav_difference(tr->model, target, q, 1, difference);
+}
+
+static int posture_entries(const cav_transcription *tr, const double *difference, int d, double scale, int *column,
+                           double *entry) {
+  int k = tr->turn_of[d];
+  if (k < 0) {
+    column[0] = tr->nv + d, entry[0] = scale;
+    return 1;
+  }
+  double J[9];
+  cav_turn_inverse(difference + tr->turn_dof[k], J);
+  for (int c = 0; c < 3; c++) {
+    column[c] = tr->nv + tr->turn_dof[k] + c;
+    entry[c] = scale * J[3 * (d - tr->turn_dof[k]) + c];
+  }
+  return 3;
+}
+
+static void add_posture(sum *a, const cav_term *term, double weight, const double *q) {
+  const cav_transcription *tr = a->tr;
+  int column[3];
+  double entry[3];
+  if (a->t == 0) return;
+  posture_difference(a, term, q, a->s->tangent);
+  for (int d = 0; d < tr->nv; d++) {
+    if (!cav_dof_selected(tr, term, d)) continue;
+    int n = posture_entries(tr, a->s->tangent, d, 1 / term->scale, column, entry);
+    add_sparse(a, weight, a->s->tangent[d] / term->scale, n, column, entry);
+  }
+}
+
+static void add_effort(sum *a, const cav_term *term, double weight) {
+  const cav_transcription *tr = a->tr;
+  if (!a->knot->has_force) return;
+  for (int k = 0; k < tr->model->nu; k++)
+    add_force(a, weight / (term->scale * term->scale), form_value(&tr->effort[k], a->knot->u), &tr->effort[k]);
+}
+
+static void add_contact(sum *a, const cav_term *term, double weight, int first, int n) {
+  weight /= term->scale * term->scale;
+  for (int k = 0; k < a->knot->ncontact; k++) {
+    for (int i = first; i < first + n; i++) {
+      int row = 4 * k + i;
+      add_dense(a, weight, a->knot->y[row], a->knot->dy + (size_t)row * 3 * a->tr->nv);
+    }
+  }
+}
+
+/// Cost terms. sensor counts through the sensor readings, which stand in the order of the terms.
+static void add_costs(sum *a, const double *q, const double *v, const double *v_next) {
+  const cav_transcription *tr = a->tr;
+  int reading = 4 * a->knot->ncontact, width = 3 * tr->nv;
+  for (int i = 0; i < tr->problem->nterm; i++) {
+    const cav_term *term = &tr->problem->term[i];
+    double when = cav_term_weight(tr, term, a->t), weight = when * term->weight;
+    if (when == 0) continue;
+    int dim = cav_term_dim(term);
+    if (term->use == CAV_USE_COST) {
+      switch (term->quantity) {
+        case CAV_QUANTITY_SENSOR:
+          for (int k = 0; k < dim; k++)
+            add_dense(a, weight, a->knot->y[reading + k], a->knot->dy + (size_t)(reading + k) * width);
+          break;
+        case CAV_QUANTITY_CONFIGURATION: add_posture(a, term, weight, q); break;
+        case CAV_QUANTITY_VELOCITY: add_velocity(a, term, weight, v); break;
+        case CAV_QUANTITY_ACCELERATION: add_acceleration(a, term, weight, v, v_next); break;
+        case CAV_QUANTITY_EFFORT: add_effort(a, term, weight); break;
+        case CAV_QUANTITY_GAP: add_contact(a, term, weight, 0, 1); break;
+        case CAV_QUANTITY_SLIP: add_contact(a, term, weight, 1, 2); break;
+        case CAV_QUANTITY_IMPACT: add_contact(a, term, weight, 3, 1); break;
+        case CAV_QUANTITY_TYPES: break;
+      }
+    }
+    reading += dim;
+  }
+}
+
+/// Angle of a ball joint from its reference and, in axis, the gradient of it.
+static double ball_angle(const cav_joint *joint, const double *q, double axis[3]) {
+  const double *quat = q + joint->q;
+  double identity[4] = {1, 0, 0, 0};
+  cav_turn_between(identity, quat, axis);
+  double angle = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
+  for (int k = 0; k < 3; k++) axis[k] = angle > 0 ? axis[k] / angle : 0;
+  return angle;
+}
+
+static void add_ranges(sum *a, const double *q, double rho) {
+  const cav_transcription *tr = a->tr;
+  const cav_model *m = tr->model;
+  double keep = tr->problem->limit_margin;
+  int i = a->knot->layout.joint, active;
+  if (a->t == 0) return;
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    if (!joint->limited) continue;
+    int ball = joint->type == CAV_JOINT_BALL, n = ball ? 3 : 1, column[3];
+    double axis[3] = {1, 0, 0}, value = ball ? ball_angle(joint, q, axis) : q[joint->q];
+    for (int k = 0; k < 3; k++) column[k] = tr->nv + joint->dof + k;
+    keep_sparse(a, i, n, column, axis);
+    double lower = ball ? -INFINITY : joint->range[0] + keep;
+    double e = slot_residual(a, i++, value, lower, joint->range[1] - keep, rho, &active);
+    if (active) add_sparse(a, rho, e, n, column, axis);
+  }
+  for (int k = 0; k < m->ntendon; k++) {
+    const cav_tendon *tendon = &m->tendon[k];
+    if (!tendon->limited) continue;
+    double value = 0;
+    for (int c = 0; c < tendon->npart; c++) {
+      const cav_tendon_part *part = &m->tendon_part[tendon->part + c];
+      value += part->coef * q[m->joint[part->joint].q];
+      a->s->column[c] = tr->nv + m->joint[part->joint].dof;
+      a->s->row[c] = part->coef;
+    }
+    keep_sparse(a, i, tendon->npart, a->s->column, a->s->row);
+    double e = slot_residual(a, i++, value, tendon->range[0] + keep, tendon->range[1] - keep, rho, &active);
+    if (active) add_sparse(a, rho, e, tendon->npart, a->s->column, a->s->row);
+  }
+}
+
+static void add_force_slots(sum *a) {
+  const cav_transcription *tr = a->tr;
+  int i = a->knot->layout.unactuated, active;
+  if (!a->knot->has_force) return;
+  double rho = tr->h * tr->penalty.unactuated;
+  for (int k = 0; k < tr->nresidual; k++) {
+    keep_force(a, i, &tr->unactuated[k]);
+    double e = slot_residual(a, i++, form_value(&tr->unactuated[k], a->knot->u), 0, 0, rho, &active);
+    add_force(a, rho, e, &tr->unactuated[k]);
+  }
+  rho = tr->h * tr->penalty.effort;
+  for (int k = 0; k < tr->model->nu; k++) {
+    const double *range = tr->effort_range[k];
+    keep_force(a, i, &tr->effort[k]);
+    double e = slot_residual(a, i++, form_value(&tr->effort[k], a->knot->u), range[0], range[1], rho, &active);
+    if (active) add_force(a, rho, e, &tr->effort[k]);
+  }
+}
+
+/// Rows of a hard term over postures or velocities, one a selected dof; returns the next row.
+static int add_hard_dofs(sum *a, const cav_term *term, int i, double lower, double upper, const double *q, const double *v) {
+  const cav_transcription *tr = a->tr;
+  int posture = term->quantity == CAV_QUANTITY_CONFIGURATION, column[6], active;
+  double rho = tr->penalty.term, entry[6];
+  if (posture) posture_difference(a, term, q, a->s->tangent);
+  for (int d = 0; d < tr->nv; d++) {
+    if (!cav_dof_selected(tr, term, d)) continue;
+    int n = 0;
+    double value = (posture ? a->s->tangent[d] : v[d]) / term->scale;
+    if (a->t > 0 && posture) n = posture_entries(tr, a->s->tangent, d, 1 / term->scale, column, entry);
+    if (a->t > 0 && !posture) n = velocity_entries(tr, a->t, d, tr->nv, a->t > 1, 1 / term->scale, column, entry);
+    keep_sparse(a, i, n, column, entry);
+    double e = slot_residual(a, i++, value, lower, upper, rho, &active);
+    if (active) add_sparse(a, rho, e, n, column, entry);
+  }
+  return i;
+}
+
+static void add_hard_terms(sum *a, const double *q, const double *v) {
+  const cav_transcription *tr = a->tr;
+  double rho = tr->penalty.term;
+  int i = a->knot->layout.term, reading = 4 * a->knot->ncontact, width = 3 * tr->nv, active;
+  for (int k = 0; k < tr->problem->nterm; k++) {
+    const cav_term *term = &tr->problem->term[k];
+    if (cav_term_weight(tr, term, a->t) == 0) continue;
+    int dim = cav_term_dim(term), range = term->use == CAV_USE_RANGE;
+    double lower = range ? term->lower / term->scale : 0, upper = range ? term->upper / term->scale : 0;
+    if (term->use == CAV_USE_COST) {
+      reading += dim;
+      continue;
+    }
+    if (term->quantity != CAV_QUANTITY_SENSOR) i = add_hard_dofs(a, term, i, lower, upper, q, v);
+    for (int c = 0; c < dim; c++, reading++) {
+      keep_reading(a, i, reading);
+      double e = slot_residual(a, i++, a->knot->y[reading], lower, upper, rho, &active);
+      if (active) add_dense(a, rho, e, a->knot->dy + (size_t)reading * width);
+    }
+  }
+}
+
+/// Joins the rows along single dofs and the dense rows into the normal equations.
+static void finish(sum *a) {
+  const cav_transcription *tr = a->tr;
+  int width = 3 * tr->nv;
+  for (int d = 0; d < tr->nv; d++) {
+    double weight = a->s->force_weight[d];
+    if (weight == 0) continue;
+    double root = sqrt(weight), *out = a->s->dense + (size_t)a->dense * width;
+    const double *du = a->knot->du + (size_t)d * width;
+    for (int k = 0; k < width; k++) out[k] = root * du[k];
+    a->s->rest[a->dense++] = a->s->force_slope[d] / root;
+  }
+  for (int i = 0; i < a->dense; i++) {
+    double r = a->s->rest[i];
+    const double *row = a->s->dense + (size_t)i * width;
+    for (int k = 0; k < width; k++) a->knot->gradient[k] += r * row[k];
+  }
+  double one = 1;
+  if (a->dense) dsyrk_("U", "N", &width, &a->dense, &one, a->s->dense, &width, &one, a->knot->hessian, &width);
+}
+
+typedef struct pass {
+  cav_transcription *tr;
+  cav_trajectory *at;
+  const double *zero;
+  int jacobian;
+  cav_status *status; ///< [nknot]
+} pass;
+
+static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
+  cav_transcription *tr = p->tr;
+  cav_knot *knot = &tr->knot[t];
+  int nv = tr->nv;
+  const double *q = p->at->q + (size_t)t * p->at->nq, *v = p->at->v + (size_t)t * nv;
+  const double *v_next = velocity_after(tr, p->at, t, p->zero);
+  s->state->options = tr->options;
+
+  // dynamics
+  double start = now();
+  cav_status status = cav_inverse(tr->model, s->state, q, v, v_next, knot->u);
+  if (status != CAV_OK) return status;
+  if (!list_readings(tr, s, t)) return CAV_NO_MEMORY;
+  readings read = {tr, t, knot->ncontact, s->key};
+  int n = nv + knot->nread;
+  if (p->jacobian) {
+    status = cav_differentiate(tr->model, s->state, CAV_DERIVATIVE_FORWARD, 0, q, v, v_next, read_knot, &read, n, s->value,
+                               s->dq, s->dv, s->dn);
+    if (status != CAV_OK) return status;
+    chain(tr, t, nv, s->dq, s->dv, s->dn, knot->du);
+    chain(tr, t, knot->nread, s->dq + (size_t)nv * nv, s->dv + (size_t)nv * nv, s->dn + (size_t)nv * nv, knot->dy);
+  } else {
+    read_knot(tr->model, s->state, &read, s->value);
+  }
+  memcpy(knot->y, s->value + nv, (size_t)knot->nread * sizeof(double));
+  memcpy(p->at->u + (size_t)t * nv, knot->u, (size_t)nv * sizeof(double));
+  s->seconds += now() - start;
+
+  // rows
+  sum a = {tr, s, knot, t, p->jacobian, 0};
+  knot->merit = 0;
+  memset(s->force_weight, 0, (size_t)nv * sizeof(double));
+  memset(s->force_slope, 0, (size_t)nv * sizeof(double));
+  if (p->jacobian) {
+    memset(knot->hessian, 0, 9 * (size_t)nv * nv * sizeof(double));
+    memset(knot->gradient, 0, 3 * (size_t)nv * sizeof(double));
+  }
+  if (!tr->constraints_only) add_costs(&a, q, v, v_next);
+  knot->cost = knot->merit;
+  add_force_slots(&a);
+  add_ranges(&a, q, tr->h * tr->penalty.range);
+  add_hard_terms(&a, q, v);
+  if (p->jacobian) finish(&a);
+  return isfinite(knot->merit) ? CAV_OK : CAV_NOT_FINITE;
+}
+
+static void evaluate_item(void *context, int t, int member) {
+  const pass *p = context;
+  p->status[t] = evaluate_knot(p, &p->tr->scratch[member], t);
+}
+
+/// Rotation Jacobians of every step.
+static void prepare_turns(cav_transcription *tr, const cav_trajectory *at) {
+  for (int t = 1; t < tr->nknot; t++) {
+    for (int k = 0; k < tr->nturn; k++) {
+      double *J = tr->knot[t].turn + CAV_TURN * k;
+      for (int c = 0; c < 3; c++) J[18 + c] = tr->h * at->v[(size_t)t * tr->nv + tr->turn_dof[k] + c];
+      cav_turn_inverse(J + 18, J);
+      for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++) J[9 + 3 * r + c] = J[3 * c + r];
+    }
+  }
+}
+
+static cav_status evaluate(cav_transcription *tr, cav_trajectory *at, int jacobian) {
+  double start = now(), dynamics = 0;
+  int members = cav_parallel_size(tr->pool);
+  double *zero = calloc((size_t)tr->nv, sizeof(double));
+  cav_status *status = calloc((size_t)tr->nknot, sizeof *status), result = CAV_OK;
+  if (!zero || !status) {
+    free(zero), free(status);
+    return CAV_NO_MEMORY;
+  }
+  if (jacobian) prepare_turns(tr, at);
+  for (int i = 0; i < members; i++) tr->scratch[i].seconds = 0;
+  pass p = {tr, at, zero, jacobian, status};
+  cav_parallel_for(tr->pool, tr->nknot, evaluate_item, &p);
+  for (int t = 0; t < tr->nknot && result == CAV_OK; t++) result = status[t];
+  for (int i = 0; i < members; i++) dynamics += tr->scratch[i].seconds / members;
+  tr->seconds_dynamics += dynamics;
+  tr->seconds_assembly += now() - start - dynamics;
+  free(zero), free(status);
+  return result;
+}
+
+int cav_transcription_keep_rows(cav_transcription *tr) {
+  tr->keep_rows = 1;
+  for (int t = 0; t < tr->nknot; t++) {
+    cav_knot *knot = &tr->knot[t];
+    if (!knot->slot_row) knot->slot_row = calloc((size_t)knot->layout.count * 3 * tr->nv + 1, sizeof(double));
+    if (!knot->slot_row) return 0;
+  }
+  return 1;
+}
+
+cav_status cav_transcription_values(cav_transcription *tr, cav_trajectory *at) { return evaluate(tr, at, 0); }
+cav_status cav_transcription_linearise(cav_transcription *tr, cav_trajectory *at) { return evaluate(tr, at, 1); }
+
+// ---------------------------------------------------------------- sums over knots
+
+double cav_transcription_cost(const cav_transcription *tr) {
+  double sum_cost = 0;
+  for (int t = 0; t < tr->nknot; t++) sum_cost += tr->knot[t].cost;
+  return sum_cost;
+}
+
+double cav_transcription_merit(const cav_transcription *tr) {
+  double sum_merit = 0;
+  for (int t = 0; t < tr->nknot; t++) sum_merit += tr->knot[t].merit;
+  return sum_merit;
+}
+
+static double excess(const cav_slot *slot) {
+  return fmax(fmax(slot->lower - slot->value, slot->value - slot->upper), 0);
+}
+
+double cav_transcription_unactuated(const cav_transcription *tr, int *where) {
+  double worst = 0;
+  if (where) *where = 0;
+  for (int t = 0; t < tr->nknot; t++) {
+    for (int i = 0; i < tr->knot[t].layout.effort; i++) {
+      if (fabs(tr->knot[t].slot[i].value) <= worst) continue;
+      worst = fabs(tr->knot[t].slot[i].value);
+      if (where) *where = t;
+    }
+  }
+  return worst;
+}
+
+double cav_transcription_violation(const cav_transcription *tr) {
+  double worst = 0;
+  for (int t = 0; t < tr->nknot; t++)
+    for (int i = tr->knot[t].layout.effort; i < tr->knot[t].layout.count; i++)
+      worst = fmax(worst, excess(&tr->knot[t].slot[i]));
+  return worst;
+}
+
+/// Weight that evaluate gave the row.
+static double slot_rho(const cav_transcription *tr, const cav_slot_layout *at, int i) {
+  if (i < at->effort) return tr->h * tr->penalty.unactuated;
+  if (i < at->joint) return tr->h * tr->penalty.effort;
+  if (i < at->term) return tr->h * tr->penalty.range;
+  return tr->penalty.term;
+}
+
+void cav_transcription_multipliers(cav_transcription *tr) {
+  for (int t = 0; t < tr->nknot; t++) {
+    for (int i = 0; i < tr->knot[t].layout.count; i++) {
+      cav_slot *slot = &tr->knot[t].slot[i];
+      double rho = slot_rho(tr, &tr->knot[t].layout, i), shifted = rho * slot->value + slot->multiplier;
+      slot->multiplier = shifted - fmin(fmax(shifted, rho * slot->lower), rho * slot->upper);
+    }
+  }
+}
+
+void cav_transcription_move(const cav_transcription *tr, const cav_trajectory *from, const double *x, cav_trajectory *to) {
+  size_t nq = (size_t)from->nq;
+  memcpy(to->q, from->q, nq * sizeof(double));
+  memcpy(to->v, from->v, (size_t)tr->nv * sizeof(double));
+  for (int t = 1; t < tr->nknot; t++)
+    cav_integrate(tr->model, from->q + (size_t)t * nq, x + (size_t)(t - 1) * tr->nv, 1, to->q + (size_t)t * nq);
+  cav_trajectory_velocities(tr->model, to);
+}

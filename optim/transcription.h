@@ -1,0 +1,129 @@
+/// A problem as rows over knots: values, derivatives, normal equations. Private to optim/.
+#ifndef CAVORT_TRANSCRIPTION_H
+#define CAVORT_TRANSCRIPTION_H
+
+#include "cavort/problem.h"
+#include "parallel.h"
+
+/// A constraint row lower <= value <= upper, scaled; equalities have lower = upper.
+typedef struct cav_slot {
+  double value, lower, upper;
+  double multiplier;
+} cav_slot;
+
+/// Where a knot's constraint rows come from, in the order in which they stand in cav_knot.slot.
+typedef struct cav_slot_layout {
+  int unactuated;  ///< first row of the forces that no actuator can give
+  int effort;      ///< of the actuator forces
+  int joint;       ///< of the joint ranges (empty at knot 0)
+  int tendon;      ///< of the tendon ranges (empty at knot 0)
+  int term;        ///< of the problem's hard terms
+  int count;
+} cav_slot_layout;
+
+/// A linear form in the generalised force: value = sum coef[k] u[dof[k]].
+typedef struct cav_force_row {
+  int n;
+  int *dof;
+  double *coef;
+} cav_force_row;
+
+enum { CAV_TURN = 21 };
+
+/// One knot. Columns of its derivatives: tangent increments of q_{t-1}, q_t, q_{t+1}; those of knots that are not unknowns
+/// are zero.
+typedef struct cav_knot {
+  double time;
+  int has_force;      ///< u is defined here
+  cav_slot_layout layout;
+  cav_slot *slot;     ///< [layout.count]
+  double *slot_row;   ///< [layout.count*3nv] derivatives of the slots' values, if kept
+  double *u;          ///< [nv]
+  double *du;         ///< [nv*3nv] row-major
+  int nread, ncontact;///< readings beside u: 4 a contact, then sensors
+  int room;           ///< readings for which y, dy have space
+  double *y;          ///< [nread]
+  double *dy;         ///< [nread*3nv]
+  double *hessian;    ///< [3nv*3nv] Gauss-Newton, lower triangle
+  double *gradient;   ///< [3nv]
+  double *turn;       ///< [nturn*CAV_TURN] of the step that ends here: Jr^-1, Jl^-1 and the rotation vector itself
+  double cost, merit; ///< cost terms; and with penalties
+} cav_knot;
+
+/// Weights of the augmented Lagrangian, per kind of row.
+typedef struct cav_penalties {
+  double unactuated, effort, range, term;
+} cav_penalties;
+
+typedef struct cav_transcription {
+  const cav_problem *problem;
+  const cav_model *model;
+  int nv, nknot;       ///< unknown blocks are knots 1 .. nknot-1
+  double h;
+  double weight;       ///< N: model mass times gravity
+  int nresidual;       ///< rows of unactuated
+  cav_force_row *unactuated; ///< orthonormal complement of the actuators' range, scaled to shares of weight
+  cav_force_row *effort;     ///< [nu] actuator force over its limit
+  double (*effort_range)[2]; ///< [nu] limits of effort, scaled
+  int nturn;
+  int *turn_dof;       ///< [nturn] first of three rotational dofs
+  int *turn_of;        ///< [nv] index into turn_dof or -1
+  cav_penalties penalty;
+  int constraints_only; ///< costs and multipliers are left out: the merit is the violation alone
+  int keep_rows;       ///< slot_row of the knots is filled by linearisations
+  cav_options options; ///< contact law of this stage
+  cav_knot *knot;      ///< [nknot]
+  struct cav_scratch *scratch; ///< one a thread
+  cav_parallel *pool;
+  double seconds_dynamics, seconds_assembly;
+} cav_transcription;
+
+cav_transcription *cav_transcription_new(const cav_problem *problem, int threads, cav_error *error);
+void cav_transcription_free(cav_transcription *transcription);
+
+/// From now on linearisations keep the derivative of every constraint row; 0 if memory runs out.
+int cav_transcription_keep_rows(cav_transcription *transcription);
+
+/// Columns (of 3nv) in which constraint row i of knot t may be nonzero: pattern [3nv] is 1 there. pattern.c.
+void cav_transcription_pattern(const cav_transcription *transcription, int t, int i, char *pattern);
+
+/// Values at a trajectory: u, constraint rows, cost and merit of every knot. Fills trajectory->u.
+cav_status cav_transcription_values(cav_transcription *transcription, cav_trajectory *trajectory);
+
+/// Values and derivatives: du, dy, hessian and gradient of the merit of every knot.
+cav_status cav_transcription_linearise(cav_transcription *transcription, cav_trajectory *trajectory);
+
+/// Sums over knots of the last values.
+double cav_transcription_cost(const cav_transcription *transcription);
+double cav_transcription_merit(const cav_transcription *transcription);
+
+/// Largest unactuated force (share of weight) and its knot; largest violation of the other constraint rows.
+double cav_transcription_unactuated(const cav_transcription *transcription, int *knot);
+double cav_transcription_violation(const cav_transcription *transcription);
+
+/// Multiplier update of the augmented Lagrangian at the last values.
+void cav_transcription_multipliers(cav_transcription *transcription);
+
+
+/// q_t := q_t (+) x_t for every unknown knot; v follows. x [(nknot-1)*nv].
+void cav_transcription_move(const cav_transcription *transcription, const cav_trajectory *from, const double *x,
+                            cav_trajectory *to);
+
+/// Weight with which a term speaks at knot t: the step for an integral, 1 at a single knot, 0 outside its window. terms.c.
+double cav_term_weight(const cav_transcription *transcription, const cav_term *term, int t);
+
+/// Readings of a term (sensors only), whether it selects a dof, and value minus target over scale of a sensor at knot t.
+int cav_term_dim(const cav_term *term);
+int cav_dof_selected(const cav_transcription *transcription, const cav_term *term, int dof);
+void cav_term_read(const cav_transcription *transcription, const cav_state *state, const cav_term *term, int t, double *y);
+
+/// Rotation vector that takes unit quaternion a to b, in a's axes.
+void cav_turn_between(const double a[4], const double b[4], double phi[3]);
+
+/// Inverse of the right Jacobian of SO(3) at rotation vector phi, row-major; its transpose is the left one's. For angles below pi.
+void cav_turn_inverse(const double phi[3], double J[9]);
+
+/// Right Jacobian of SO(3).
+void cav_turn(const double phi[3], double J[9]);
+
+#endif

@@ -1,0 +1,30 @@
+/// A verdict as people and programs read it.
+#ifndef CAVORT_CERTIFICATE_H
+#define CAVORT_CERTIFICATE_H
+
+#include <stdio.h>
+
+#include "cavort/solve.h"
+
+enum { CAV_CERTIFICATE_LINES = 12 };
+
+/// One line: what, its value and limit as they are to be read; passed: 1 held, 0 missed, -1 only told.
+typedef struct cav_certificate_line {
+  const char *label;
+  char value[64], limit[64];
+  int passed;
+} cav_certificate_line;
+
+/// The lines of a verdict; returns their number.
+int cav_certificate_lines(const cav_verdict *verdict, cav_certificate_line line[CAV_CERTIFICATE_LINES]);
+
+/// Prints the table and the verdict in words.
+void cav_certificate_print(FILE *out, const char *problem, const char *model, const cav_verdict *verdict);
+
+/// Writes the verdict as one JSON object with a line end; numbers that are not known are null.
+void cav_certificate_json(FILE *out, const char *problem, const char *model, const cav_verdict *verdict);
+
+/// Writes text as a JSON string.
+void cav_certificate_json_text(FILE *out, const char *text);
+
+#endif

@@ -1,0 +1,199 @@
+/// cavort solve: reads a problem, solves it, certifies the result, writes its folder. The first Ctrl-C ends the solve with
+/// the best iterate saved; another one, a second later, ends the program at once.
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "certificate.h"
+#include "command.h"
+#include "file.h"
+#include "result.h"
+
+static volatile sig_atomic_t interrupted, first_second;
+
+// asks for the end; again after a second has passed: ends at once. Some parents deliver one interrupt twice
+static void interrupt(int signal_number) {
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  if (!interrupted) {
+    interrupted = 1;
+    first_second = (sig_atomic_t)now.tv_sec;
+  } else if (now.tv_sec > first_second + 1) {
+    signal(signal_number, SIG_DFL);
+    raise(signal_number);
+  }
+}
+
+static void catch_interrupts(void) {
+  struct sigaction action = {.sa_handler = interrupt};
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, NULL);
+  sigaction(SIGTERM, &action, NULL);
+}
+
+// what the progress line remembers
+typedef struct ticker {
+  int quiet, terminal;
+  int shown, stage;
+  const char *phase;
+  double last; // s
+} ticker;
+
+static void show_progress(ticker *tick, const cav_progress *p) {
+  int news = !tick->phase || strcmp(p->phase, tick->phase) || p->stage != tick->stage;
+  if (!news && p->seconds - tick->last < (tick->terminal ? 0.1 : 1.0)) return;
+  if (tick->terminal && tick->shown && news && p->seconds - tick->last < 0.05) return;
+  tick->phase = p->phase;
+  tick->stage = p->stage;
+  tick->last = p->seconds;
+  tick->shown = 1;
+  fprintf(stderr,
+          "%s%-12s %2d/%-2d  iteration %4d  cost %9.4g  unactuated %8.2e at knot %3d  violation %8.2e  %6.1f s%s",
+          tick->terminal ? "\r" : "", p->phase, p->stage, p->stages, p->iteration, p->cost, p->unactuated, p->knot,
+          p->violation, p->seconds, tick->terminal ? "\033[K" : "\n");
+  fflush(stderr);
+}
+
+static int observe(void *context, const cav_progress *progress) {
+  ticker *tick = context;
+  if (!tick->quiet) show_progress(tick, progress);
+  return interrupted;
+}
+
+// folder of the result: as asked, or NAME.result; NULL if memory runs out
+static char *folder_of(const cav_command_line *line, const cav_problem *problem) {
+  if (line->output) return strdup(line->output);
+  const char *name = problem->name[0] ? problem->name : "motion";
+  char *folder = malloc(strlen(name) + 8);
+  if (!folder) return NULL;
+  sprintf(folder, "%s.result", name);
+  // a name is no path
+  for (char *c = folder; *c; c++) {
+    if (*c == '/') *c = '-';
+  }
+  return folder;
+}
+
+// the folder, made; refuses one whose problem.xml is the problem file itself, which would be overwritten
+static cav_status prepare_folder(const char *folder, const cav_command_line *line, const cav_problem *problem,
+                                 cav_error *error) {
+  cav_status status = cav_result_folder(folder, error);
+  if (status || problem->solved) return status;
+  char *copy = cav_result_path(folder, "problem.xml");
+  char *there = copy ? realpath(copy, NULL) : NULL, *here = realpath(line->operand, NULL);
+  if (there && here && !strcmp(there, here)) {
+    status = cav_file_fail(error, CAV_BAD_INPUT, 0,
+                           "%s: holds the problem file itself, which the result would overwrite; choose another folder",
+                           folder);
+  }
+  free(copy);
+  free(there);
+  free(here);
+  return status;
+}
+
+// trajectory to start from: the folder's, on this problem's knots
+static cav_trajectory *resume_from(const char *folder, const cav_problem *problem, cav_error *error) {
+  char *path = cav_result_path(folder, "trajectory.csv");
+  cav_trajectory *start = path ? cav_trajectory_read(path, problem->model, error) : NULL;
+  double h = problem->timestep, duration = start ? (start->nknot - 1) * start->timestep : 0;
+  if (start && fabs(duration - problem->duration) > 0.5 * h) {
+    cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: lasts %g s, the problem %g s; remove --resume to start anew", path,
+                  duration, problem->duration);
+    cav_trajectory_free(start);
+    start = NULL;
+  }
+  if (start && fabs(start->timestep - h) > 1e-9 * h) {
+    cav_trajectory *other = cav_trajectory_resample(problem->model, start, h);
+    if (!other) cav_file_fail(error, CAV_NO_MEMORY, 0, "%s: no memory", path);
+    cav_trajectory_free(start);
+    start = other;
+  }
+  if (!path) cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
+  free(path);
+  return start;
+}
+
+// certifies and writes what depends on that; the exit status
+static int conclude(const cav_command_line *line, const char *folder, const cav_problem *problem,
+                    const cav_solution *solution) {
+  cav_error error = {0};
+  cav_verdict verdict = {0};
+  cav_status status = cav_result_write(folder, problem, solution, &error);
+  if (!status) {
+    status = cav_verify(problem, solution->trajectory, &solution->contact, solution->gain_q, solution->gain_v, &verdict,
+                        &error);
+  }
+  verdict.optimality = solution->optimality;
+  verdict.solve_seconds = solution->seconds;
+  verdict.iterations = solution->iterations;
+  if (!status) status = cav_result_write_verdict(folder, problem, &verdict, &error);
+  if (status) return cav_command_fail(&error);
+  if (line->json) cav_certificate_json(stdout, problem->name, problem->model->name, &verdict);
+  if (!line->quiet && !line->json) cav_certificate_print(stdout, problem->name, problem->model->name, &verdict);
+  // the page is a convenience: without three.js everything else stands
+  if (cav_result_write_page(folder, problem, solution->trajectory, &solution->contact, &verdict, &error)) {
+    fprintf(stderr, "cavort: no page: %s\n", error.text);
+  }
+  if (!line->quiet && !line->json) printf("result: %s\n", folder);
+  return verdict.certified ? CAV_EXIT_CERTIFIED : CAV_EXIT_NOT_CERTIFIED;
+}
+
+static const char *why_stopped(cav_status status) {
+  if (status == CAV_INTERRUPTED) return "interrupted; the best iterate is saved";
+  if (status == CAV_NOT_FINITE) return "a number that is not finite came up; the last finite iterate is saved";
+  return "the solver did not reach its tolerance; the best iterate is saved";
+}
+
+static int solve(const cav_command_line *line, const cav_problem *problem, const char *folder) {
+  cav_error error = {0};
+  cav_status status = prepare_folder(folder, line, problem, &error);
+  if (status) return cav_command_fail(&error);
+  cav_trajectory *start = line->resume ? resume_from(folder, problem, &error) : NULL;
+  if (line->resume && !start) return cav_command_fail(&error);
+  ticker tick = {.quiet = line->quiet, .terminal = isatty(STDERR_FILENO)};
+  cav_solve_options options = cav_solve_options_default();
+  options.solver = line->solver;
+  options.threads = line->threads;
+  options.observer = observe;
+  options.observer_context = &tick;
+  cav_solution *solution = NULL;
+  catch_interrupts();
+  status = cav_solve(problem, &options, start, &solution, &error);
+  if (tick.terminal && tick.shown) fputs("\r\033[K", stderr);
+  cav_trajectory_free(start);
+  // a solve that stopped early is told, then certified and saved like any other
+  int stopped = status == CAV_NOT_CONVERGED || status == CAV_INTERRUPTED || status == CAV_NOT_FINITE;
+  if (!solution || (status && !stopped)) {
+    cav_solution_free(solution);
+    if (!status) error.status = CAV_INTERNAL;
+    return cav_command_fail(&error);
+  }
+  if (stopped) fprintf(stderr, "cavort: %s\n", error.text[0] ? error.text : why_stopped(status));
+  int done = conclude(line, folder, problem, solution);
+  cav_solution_free(solution);
+  return status == CAV_INTERRUPTED && done <= CAV_EXIT_NOT_CERTIFIED ? CAV_EXIT_INTERRUPTED : done;
+}
+
+int cav_command_solve(const cav_command_line *line) {
+  cav_error error = {0};
+  cav_problem *problem = cav_problem_load(line->operand, line->model, &error);
+  if (!problem) return cav_command_fail(&error);
+  for (int i = 0; i < problem->model->nwarning && !line->quiet; i++)
+    fprintf(stderr, "cavort: %s\n", problem->model->warning[i]);
+  char *folder = folder_of(line, problem);
+  int done;
+  if (folder) {
+    done = solve(line, problem, folder);
+  } else {
+    error = (cav_error){.status = CAV_NO_MEMORY};
+    done = cav_command_fail(&error);
+  }
+  free(folder);
+  cav_problem_free(problem);
+  return done;
+}

@@ -1,0 +1,54 @@
+/// cavort verify and cavort view: what a result folder holds, certified again or shown. verify writes nothing; view writes
+/// forces.csv and view.html.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "certificate.h"
+#include "command.h"
+#include "result.h"
+
+static cav_status certify(const cav_result *result, cav_verdict *verdict, cav_error *error) {
+  memset(verdict, 0, sizeof *verdict);
+  cav_status status = cav_verify(result->problem, result->trajectory, &result->problem->contact, result->gain_q,
+                                 result->gain_v, verdict, error);
+  verdict->optimality = result->optimality;
+  verdict->solve_seconds = result->solve_seconds;
+  verdict->iterations = result->iterations;
+  return status;
+}
+
+int cav_command_verify(const cav_command_line *line) {
+  cav_error error = {0};
+  cav_verdict verdict;
+  cav_result *result = cav_result_read(line->operand, line->model, &error);
+  if (!result) return cav_command_fail(&error);
+  cav_status status = certify(result, &verdict, &error);
+  const char *name = result->problem->name, *model = result->problem->model->name;
+  if (!status && line->json) cav_certificate_json(stdout, name, model, &verdict);
+  if (!status && !line->json && !line->quiet) cav_certificate_print(stdout, name, model, &verdict);
+  cav_result_free(result);
+  if (status) return cav_command_fail(&error);
+  return verdict.certified ? CAV_EXIT_CERTIFIED : CAV_EXIT_NOT_CERTIFIED;
+}
+
+int cav_command_view(const cav_command_line *line) {
+  cav_error error = {0};
+  cav_verdict verdict;
+  cav_result *result = cav_result_read(line->operand, line->model, &error);
+  if (!result) return cav_command_fail(&error);
+  cav_status status = certify(result, &verdict, &error);
+  if (!status) {
+    status = cav_result_write_page(line->operand, result->problem, result->trajectory, &result->problem->contact,
+                                   &verdict, &error);
+  }
+  cav_result_free(result);
+  if (status) return cav_command_fail(&error);
+  char *page = cav_result_path(line->operand, "view.html"), *full = page ? realpath(page, NULL) : NULL;
+  if (!line->quiet)
+    printf("open in a browser: %s%s\n", full ? "file://" : "", full ? full : page ? page : line->operand);
+  free(page);
+  free(full);
+  return 0;
+}

@@ -1,0 +1,348 @@
+/// Writes a motion as one self-contained page: the template viewer.html with three.js and a block of JSON in its places.
+/// Poses of the links at every knot come from the dynamics library; the page interpolates between them. Numbers carry
+/// six digits (positions) or five, enough for the eye; the exact motion is in trajectory.csv. The page's own script is
+/// in viewer.html. Nothing here reads results from disk or computes forces: the caller hands them over.
+#include "view.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "file.h"
+#include "viewer_page.h"
+
+// --- JSON ---
+
+// length of the UTF-8 sequence at s, 0 if it is not one
+static int utf8_length(const unsigned char *s) {
+  int n = s[0] < 0x80                   ? 1
+          : s[0] >= 0xC2 && s[0] < 0xE0 ? 2
+          : (s[0] & 0xF0) == 0xE0       ? 3
+          : s[0] >= 0xF0 && s[0] < 0xF5 ? 4
+                                        : 0;
+  for (int i = 1; i < n; i++) {
+    if ((s[i] & 0xC0) != 0x80) return 0;
+  }
+  // overlong forms, surrogates and what lies beyond Unicode
+  if (n == 3 && ((s[0] == 0xE0 && s[1] < 0xA0) || (s[0] == 0xED && s[1] >= 0xA0))) return 0;
+  if (n == 4 && ((s[0] == 0xF0 && s[1] < 0x90) || (s[0] == 0xF4 && s[1] >= 0x90))) return 0;
+  return n;
+}
+
+// a string of JSON that is safe inside a script element too: '<', '>' and '&' never appear as themselves
+static void write_string(FILE *out, const char *text) {
+  putc('"', out);
+  for (const unsigned char *s = (const unsigned char *)(text ? text : ""); *s;) {
+    int n = utf8_length(s);
+    if (n == 0) {
+      fputs("\\ufffd", out);
+      s++;
+    } else if (n == 1 && (*s < 0x20 || *s == 0x7F || strchr("\"\\<>&", *s))) {
+      fprintf(out, "\\u%04x", *s++);
+    } else {
+      fwrite(s, 1, (size_t)n, out);
+      s += n;
+    }
+  }
+  putc('"', out);
+}
+
+// a number of so many digits; what is not finite is null
+static void write_number(FILE *out, double x, int digits) {
+  if (isfinite(x)) {
+    fprintf(out, "%.*g", digits, x == 0 ? 0.0 : x);
+  } else {
+    fputs("null", out);
+  }
+}
+
+static void write_numbers(FILE *out, const double *x, int n, int digits) {
+  putc('[', out);
+  for (int i = 0; i < n; i++) {
+    if (i > 0) putc(',', out);
+    write_number(out, x[i], digits);
+  }
+  putc(']', out);
+}
+
+// --- parts of the motion ---
+
+static void write_geoms(FILE *out, const cav_model *model) {
+  static const char *const kind[CAV_GEOM_TYPES] = {"plane", "sphere", "capsule", "ellipsoid", "cylinder", "box"};
+  fputs("\"geoms\":[", out);
+  for (int i = 0; i < model->ngeom; i++) {
+    const cav_geom *geom = &model->geom[i];
+    const double rgba[4] = {(double)geom->rgba[0], (double)geom->rgba[1], (double)geom->rgba[2], (double)geom->rgba[3]};
+    fprintf(out, "%s{\"name\":", i > 0 ? ",\n" : "\n");
+    write_string(out, geom->name);
+    fprintf(out, ",\"type\":\"%s\",\"link\":%d,\"group\":%d,\"size\":", kind[geom->type], geom->link, geom->group);
+    write_numbers(out, geom->size, 3, 6);
+    fputs(",\"pos\":", out);
+    write_numbers(out, geom->pos, 3, 6);
+    fputs(",\"quat\":", out);
+    write_numbers(out, geom->quat, 4, 6);
+    fputs(",\"rgba\":", out);
+    write_numbers(out, rgba, 4, 4);
+    putc('}', out);
+  }
+  fputs("\n]", out);
+}
+
+// mass and centre of mass of every link, for the camera and the path of the centre of mass
+static void write_links(FILE *out, const cav_model *model) {
+  fputs("\"links\":[", out);
+  for (int i = 0; i < model->nlink; i++) {
+    const cav_link *link = &model->link[i];
+    fprintf(out, "%s{\"name\":", i > 0 ? "," : "");
+    write_string(out, model->body[link->body].name);
+    fputs(",\"mass\":", out);
+    write_number(out, i > 0 ? link->mass : 0, 6);
+    fputs(",\"com\":", out);
+    write_numbers(out, link->com, 3, 6);
+    putc('}', out);
+  }
+  putc(']', out);
+}
+
+// one row per knot: position and quaternion of each link but the world
+static cav_status write_poses(FILE *out, const cav_model *model, const cav_view_input *input, cav_error *error) {
+  cav_state *state = cav_state_new(model);
+  if (!state) return cav_file_fail(error, CAV_NO_MEMORY, 0, "view: out of memory");
+  // contacts are the caller's; here only poses count
+  state->options.contact = 0;
+  cav_status status = CAV_OK;
+  fputs("\"poses\":[", out);
+  for (int t = 0; t < input->nknot && status == CAV_OK; t++) {
+    status = cav_position(model, state, input->q + (size_t)t * (size_t)model->nq);
+    if (status != CAV_OK) {
+      cav_file_fail(error, status, 0, "view: the configuration at knot %d has no poses (%s)", t,
+                    cav_status_name(status));
+      break;
+    }
+    fprintf(out, "%s[", t > 0 ? ",\n" : "\n");
+    for (int i = 1; i < model->nlink; i++) {
+      if (i > 1) putc(',', out);
+      for (int k = 0; k < 3; k++) {
+        write_number(out, state->link[i].pos[k], 6);
+        putc(',', out);
+      }
+      for (int k = 0; k < 4; k++) {
+        if (k > 0) putc(',', out);
+        write_number(out, state->link[i].quat[k], 5);
+      }
+    }
+    putc(']', out);
+  }
+  fputs("\n]", out);
+  cav_state_free(state);
+  return status;
+}
+
+// one row per knot: position and force of each contact, one after the other
+static void write_forces(FILE *out, const cav_view_input *input) {
+  if (!input->nforce) {
+    fputs("\"forces\":null", out);
+    return;
+  }
+  const cav_view_force *force = input->force;
+  fputs("\"forces\":[", out);
+  for (int t = 0; t < input->nknot; t++) {
+    fprintf(out, "%s[", t > 0 ? ",\n" : "\n");
+    for (int i = 0; i < input->nforce[t]; i++, force++) {
+      if (i > 0) putc(',', out);
+      for (int k = 0; k < 3; k++) {
+        write_number(out, force->pos[k], 5);
+        putc(',', out);
+      }
+      for (int k = 0; k < 3; k++) {
+        if (k > 0) putc(',', out);
+        write_number(out, force->force[k], 4);
+      }
+    }
+    putc(']', out);
+  }
+  fputs("\n]", out);
+}
+
+static void write_series(FILE *out, const cav_view_input *input) {
+  fputs("\"series\":[", out);
+  for (int i = 0; i < input->nseries; i++) {
+    const cav_view_series *series = &input->series[i];
+    fprintf(out, "%s{\"group\":", i > 0 ? ",\n" : "\n");
+    write_string(out, series->group);
+    fputs(",\"name\":", out);
+    write_string(out, series->name);
+    fputs(",\"unit\":", out);
+    write_string(out, series->unit);
+    fputs(",\"lower\":", out);
+    write_number(out, series->lower, 5);
+    fputs(",\"upper\":", out);
+    write_number(out, series->upper, 5);
+    fputs(",\"value\":", out);
+    write_numbers(out, series->value, input->nknot, 5);
+    putc('}', out);
+  }
+  fputs("\n]", out);
+}
+
+static void write_verdict(FILE *out, const cav_view_input *input) {
+  fputs("\"verdict\":[", out);
+  for (int i = 0; i < input->nline; i++) {
+    fprintf(out, "%s{\"label\":", i > 0 ? ",\n" : "\n");
+    write_string(out, input->line[i].label);
+    fputs(",\"value\":", out);
+    write_string(out, input->line[i].value);
+    fprintf(out, ",\"passed\":%d}", input->line[i].passed);
+  }
+  fputs("\n]", out);
+}
+
+static cav_status write_data(FILE *out, const cav_model *model, const cav_view_input *input, cav_error *error) {
+  fputs("{\"title\":", out);
+  write_string(out, input->title);
+  fputs(",\"model\":", out);
+  write_string(out, model->name);
+  fprintf(out, ",\"nknot\":%d,\"timestep\":", input->nknot);
+  write_number(out, input->timestep, 12);
+  fputs(",\"weight\":", out);
+  write_number(out,
+               model->mass * sqrt(model->gravity[0] * model->gravity[0] + model->gravity[1] * model->gravity[1] +
+                                  model->gravity[2] * model->gravity[2]),
+               6);
+  fputs(",\n", out);
+  write_geoms(out, model);
+  fputs(",\n", out);
+  write_links(out, model);
+  fputs(",\n", out);
+  cav_status status = write_poses(out, model, input, error);
+  if (status != CAV_OK) return status;
+  fputs(",\n", out);
+  write_forces(out, input);
+  fputs(",\n", out);
+  write_series(out, input);
+  fputs(",\n", out);
+  write_verdict(out, input);
+  fputs("}\n", out);
+  return CAV_OK;
+}
+
+// --- the page ---
+
+// whole file as text; NULL with the reason in error
+static char *read_text(const char *path, cav_error *error) {
+  FILE *file = fopen(path, "rb");
+  if (!file) {
+    cav_file_fail(
+        error, CAV_BAD_INPUT, 0,
+        "view: cannot read three.js at %s (%s). Install libjs-three, or set CAVORT_THREE_JS to a three.min.js of your "
+        "own",
+        path, strerror(errno));
+    return NULL;
+  }
+  size_t size = 0, room = (size_t)1 << 20;
+  char *text = malloc(room);
+  while (text) {
+    size += fread(text + size, 1, room - size - 1, file);
+    if (size < room - 1) break;
+    room *= 2;
+    char *more = realloc(text, room);
+    if (!more) free(text);
+    text = more;
+  }
+  int broken = ferror(file);
+  fclose(file);
+  if (!text) {
+    cav_file_fail(error, CAV_NO_MEMORY, 0, "view: out of memory");
+    return NULL;
+  }
+  text[size] = 0;
+  if (broken || strlen(text) != size || size == 0) {
+    cav_file_fail(error, CAV_BAD_INPUT, 0,
+                  "view: %s is not the text of three.js; set CAVORT_THREE_JS to a three.min.js", path);
+    free(text);
+    return NULL;
+  }
+  return text;
+}
+
+// where an element of script would end inside text, any case; NULL: nowhere
+static const char *script_end(const char *text) {
+  static const char end[] = "/script";
+  for (const char *s = strchr(text, '<'); s; s = strchr(s + 1, '<')) {
+    size_t i = 0;
+    while (end[i] && (s[1 + i] | (end[i] == '/' ? 0 : 0x20)) == end[i]) i++;
+    if (!end[i]) return s;
+  }
+  return NULL;
+}
+
+// the script of three.js, checked to be fit for a script element
+static char *read_three(cav_error *error) {
+  const char *path = getenv("CAVORT_THREE_JS");
+  if (!path || !*path) path = CAVORT_THREE_JS;
+  char *text = read_text(path, error);
+  if (text && (script_end(text) || strstr(text, "<!--"))) {
+    cav_file_fail(error, CAV_BAD_INPUT, 0,
+                  "view: %s cannot stand inside a page (it holds </script or <!--); use another build of three.js",
+                  path);
+    free(text);
+    return NULL;
+  }
+  return text;
+}
+
+// the template with both places filled
+static cav_status write_page(FILE *out, const char *three, const cav_model *model, const cav_view_input *input,
+                             cav_error *error) {
+  static const char place_three[] = "/*CAVORT_THREE*/", place_data[] = "{\"CAVORT_DATA\":0}";
+  const char *page = (const char *)viewer_page;
+  const char *at_three = strstr(page, place_three), *at_data = strstr(page, place_data);
+  if (!at_three || !at_data || at_data > at_three)
+    return cav_file_fail(error, CAV_INTERNAL, 0, "view: the template has lost its places");
+  fwrite(page, 1, (size_t)(at_data - page), out);
+  cav_status status = write_data(out, model, input, error);
+  if (status != CAV_OK) return status;
+  at_data += sizeof place_data - 1;
+  fwrite(at_data, 1, (size_t)(at_three - at_data), out);
+  fputs(three, out);
+  fputs(at_three + sizeof place_three - 1, out);
+  return CAV_OK;
+}
+
+static cav_status check_input(const cav_model *model, const cav_view_input *input, cav_error *error) {
+  if (input->nknot < 1 || !input->q) return cav_file_fail(error, CAV_BAD_INPUT, 0, "view: there is no knot to show");
+  if (!(isfinite(input->timestep) && input->timestep > 0))
+    return cav_file_fail(error, CAV_BAD_INPUT, 0, "view: the time step is %g s; it has to be positive",
+                         input->timestep);
+  for (int t = 0; t < input->nknot; t++) {
+    for (int i = 0; i < model->nq; i++) {
+      if (!isfinite(input->q[(size_t)t * (size_t)model->nq + (size_t)i]))
+        return cav_file_fail(error, CAV_NOT_FINITE, 0, "view: q[%d] at knot %d is not a finite number", i, t);
+    }
+  }
+  return CAV_OK;
+}
+
+cav_status cav_view_write(const char *path, const cav_model *model, const cav_view_input *input, cav_error *error) {
+  cav_error unasked;
+  if (!error) error = &unasked;
+  cav_status status = check_input(model, input, error);
+  if (status != CAV_OK) return status;
+  char *three = read_three(error);
+  if (!three) return error->status;
+
+  cav_file file;
+  status = cav_file_begin(&file, path, error);
+  if (status == CAV_OK) {
+    status = write_page(file.stream, three, model, input, error);
+    if (status == CAV_OK) {
+      status = cav_file_end(&file, error);
+    } else {
+      cav_file_abandon(&file);
+    }
+  }
+  free(three);
+  return status;
+}

@@ -1,0 +1,118 @@
+#!/bin/sh
+# Every check of the project. Usage: sh tests/all.sh. Ends with one line, "N passed, N failed"; the exit status follows it.
+# Installs what is missing, then: both compilers with warnings as errors, the tests of each, the second build with address and
+# undefined-behaviour sanitizers; headers on their own as C and C++; layout of the text; installation and use through pkg-config.
+# CAVORT_BUILD names the folder of the builds, by default build-ci. Long tests are not part of it: meson test --setup all.
+set -u
+cd "$(dirname "$0")/.." || exit 1
+
+out=${CAVORT_BUILD:-build-ci}
+mkdir -p "$out" && out=$(cd "$out" && pwd) || exit 1
+passed=0
+failed=0
+skipped=0
+
+# the sanitizers' findings end a test
+export UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 ASAN_OPTIONS=detect_leaks=1
+
+# check NAME COMMAND...: one check; what it prints is shown only where it fails
+check() {
+  name=$1
+  shift
+  start=$(date +%s)
+  if "$@" >"$out/check.log" 2>&1; then
+    passed=$((passed + 1))
+    echo "ok       $name ($(($(date +%s) - start)) s)"
+  else
+    failed=$((failed + 1))
+    echo "FAILED   $name ($(($(date +%s) - start)) s)"
+    tail -n 60 "$out/check.log" | sed 's/^/    /'
+    return 1
+  fi
+}
+
+# build NAME COMPILER OPTION...: a build folder from nothing, warnings are errors
+build() {
+  folder=$out/$1
+  compiler=$2
+  shift 2
+  rm -rf "$folder"
+  CC=$compiler meson setup "$folder" . -Dwerror=true "$@" && meson compile -C "$folder" --ninja-args=-k0
+}
+
+# tests NAME: the tests of one build, each counted
+tests() {
+  folder=$out/$1
+  shift
+  meson test -C "$folder" --no-rebuild --print-errorlogs "$@" >"$folder/tests.log" 2>&1
+  status=$?
+  count() { sed -n "s/^$1: *\([0-9][0-9]*\).*/\1/p" "$folder/tests.log" | tail -n 1; }
+  good=$(($(count Ok) + $(count 'Expected Fail')))
+  bad=$(($(count Fail) + $(count Timeout) + $(count 'Unexpected Pass')))
+  left=$(count Skipped)
+  # a run that broke off has no count of its own
+  [ "$status" -ne 0 ] && [ "$bad" -eq 0 ] && bad=1
+  [ "$good" -eq 0 ] && [ "$bad" -eq 0 ] && bad=1
+  passed=$((passed + good))
+  failed=$((failed + bad))
+  skipped=$((skipped + ${left:-0}))
+  if [ "$bad" -eq 0 ]; then
+    grep -E '^ *[0-9]+/[0-9]+ ' "$folder/tests.log" | sed 's/^/    /'
+  else
+    echo "FAILED   $bad of the tests of this build"
+    tail -n 200 "$folder/tests.log" | sed 's/^/    /'
+  fi
+}
+
+# every public header compiles on its own
+headers() {
+  for header in include/cavort/*.h; do
+    gcc -std=c17 -Wall -Wextra -Wpedantic -Werror -fsyntax-only -Iinclude -x c "$header" || return 1
+    g++ -std=c++17 -Wall -Wextra -Wpedantic -Werror -fsyntax-only -Iinclude -x c++ "$header" || return 1
+  done
+}
+
+layout() { find include dynamics optim problems tests -name '*.[ch]' -exec clang-format --dry-run -Werror {} +; }
+
+# installed into a folder of its own, then used by a program that knows nothing but pkg-config
+installed() {
+  root=$out/root
+  rm -rf "$root"
+  DESTDIR=$root meson install -C "$out/gcc" --no-rebuild || return 1
+  folder=$(dirname "$(find "$root" -name cavort.pc)")
+  prefix=$root$(sed -n 's/^prefix=//p' "$folder/cavort.pc")
+  cat >"$out/user.c" <<'TEXT'
+#include <cavort/cavort.h>
+#include <stdio.h>
+int main(void) {
+  cav_error error = {0};
+  cav_model *model = cav_model_load("/nowhere/none.xml", &error);
+  printf("cavort %s: %s\n", cav_version(), error.text);
+  cav_model_free(model);
+  return model != NULL || error.status != CAV_BAD_INPUT;
+}
+TEXT
+  flags=$(PKG_CONFIG_PATH=$folder pkg-config --define-variable=prefix="$prefix" --cflags --libs cavort) || return 1
+  gcc -std=c17 -Wall -Werror "$out/user.c" -o "$out/user" $flags && "$out/user" && "$prefix/bin/cavort" help
+}
+
+if sh problems/install.sh test; then
+  check "build, gcc" build gcc gcc --buildtype=release && tests gcc
+  check "build, clang with sanitizers" build clang clang --buildtype=debugoptimized -Db_sanitize=address,undefined \
+    -Db_lundef=false &&
+    tests clang --timeout-multiplier 6
+  check "headers alone, C17 and C++17" headers
+  if command -v clang-format >/dev/null 2>&1; then
+    check "layout of the text" layout
+  else
+    skipped=$((skipped + 1))
+    echo "skipped  layout of the text: no clang-format here"
+  fi
+  check "install and pkg-config" installed
+else
+  failed=1
+fi
+
+[ "$skipped" -gt 0 ] && echo "$skipped skipped"
+echo "$passed passed, $failed failed"
+[ "$failed" -eq 0 ] && [ "$passed" -gt 0 ]

@@ -1,0 +1,583 @@
+/// Contact of two shapes: each point carries its own proof. With normal n and gap d, the points pos -+ n d/2 must lie on
+/// the two surfaces, and the supporting planes there must be d apart: then d is at most and at least the distance. Then
+/// invariance under motions of both, derivatives of the gap by small displacements, degenerate poses, and MuJoCo.
+#include "check.h"
+#include "pairs.h"
+
+#ifdef CAVORT_HAVE_MUJOCO
+#include <mujoco/mujoco.h>
+#endif
+
+static const char *const names[CAV_GEOM_TYPES] = {"plane", "sphere", "capsule", "ellipsoid", "cylinder", "box"};
+
+// xorshift: the same numbers on every machine
+static unsigned long long seed = 88172645463325252ULL;
+static double uniform(double low, double high) {
+  seed ^= seed << 13;
+  seed ^= seed >> 7;
+  seed ^= seed << 17;
+  return low + (high - low) * (double)(seed >> 11) / 9007199254740992.0;
+}
+
+static void random_quat(double q[4]) {
+  for (int i = 0; i < 4; i++) q[i] = uniform(-1, 1);
+  quat_normalise(q);
+}
+
+/// A shape with room for its size.
+typedef struct solid {
+  double size[3], quat[4];
+  cav_shape shape;
+} solid;
+
+static void random_solid(cav_geom_type type, solid *s) {
+  s->shape.type = type;
+  s->shape.size = s->size;
+  for (int i = 0; i < 3; i++) {
+    s->size[i] = uniform(0.05, 0.3);
+    s->shape.pos[i] = uniform(-1, 1);
+  }
+  random_quat(s->quat);
+  quat_matrix(s->shape.rotation, s->quat);
+}
+
+// moves b along a random direction so that bounding shapes about touch: half of the poses end up in contact
+static void bring_near(const solid *a, solid *b) {
+  double n[3] = {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)}, x[3], y[3], back[3];
+  normalise3(n);
+  double gap = uniform(-0.04, 0.04);
+  if (a->shape.type == CAV_GEOM_PLANE) {
+    column3(n, a->shape.rotation, 2);
+    copy3(x, a->shape.pos);
+  } else {
+    cav_support(&a->shape, n, x);
+  }
+  scale3(back, -1, n);
+  cav_support(&b->shape, back, y);
+  double d[3];
+  sub3(d, x, y);
+  axpy3(d, d, gap, n);
+  add3(b->shape.pos, b->shape.pos, d);
+}
+
+// signed distance of a world point to a solid
+static double surface_height(const cav_shape *s, const double p[3]) {
+  double d[3], x[3], n[3];
+  sub3(d, p, s->pos);
+  rotate_back(x, s->rotation, d);
+  switch (s->type) {
+    case CAV_GEOM_PLANE:
+      return x[2];
+    case CAV_GEOM_SPHERE:
+      return norm3(x) - s->size[0];
+    case CAV_GEOM_CAPSULE:
+      x[2] -= fmax(-s->size[1], fmin(s->size[1], x[2]));
+      return norm3(x) - s->size[0];
+    case CAV_GEOM_ELLIPSOID:
+      return cav_surface_ellipsoid(s->size, x, n);
+    case CAV_GEOM_CYLINDER:
+      return cav_surface_cylinder(s->size, x, n);
+    case CAV_GEOM_BOX:
+      return cav_surface_box(s->size, x, n);
+    case CAV_GEOM_TYPES:
+      break;
+  }
+  return NAN;
+}
+
+// gap between the supporting planes of both along n
+static double plane_gap(const cav_shape *a, const cav_shape *b, const double n[3]) {
+  double x[3], y[3], back[3], d[3];
+  scale3(back, -1, n);
+  cav_support(b, back, y);
+  if (a->type == CAV_GEOM_PLANE) {
+    copy3(x, a->pos);
+  } else {
+    cav_support(a, n, x);
+  }
+  sub3(d, y, x);
+  return dot3(d, n);
+}
+
+static int nearest_of(const cav_touch *touch, int count) {
+  int best = 0;
+  for (int k = 1; k < count; k++) {
+    if (touch[k].dist < touch[best].dist) best = k;
+  }
+  return best;
+}
+
+/// Largest errors seen over the poses of one pair of types.
+typedef struct worst {
+  int contacts, points, apart;
+  double surface, gap, unit;
+} worst;
+
+static void gather(worst *w, const worst *one) {
+  w->contacts += one->contacts;
+  w->points += one->points;
+  w->apart += one->apart;
+  w->surface = fmax(w->surface, one->surface);
+  w->gap = fmax(w->gap, one->gap);
+  w->unit = fmax(w->unit, one->unit);
+}
+
+// the proof for all points of one pose
+static void certify(const cav_shape *a, const cav_shape *b, const cav_touch *touch, int count, double margin,
+                    worst *w) {
+  if (!count) return;
+  int first = nearest_of(touch, count);
+  w->contacts++;
+  w->points += count;
+  w->apart += touch[first].dist > 0;
+  for (int k = 0; k < count; k++) {
+    const cav_touch *t = touch + k;
+    double x[3], y[3];
+    axpy3(x, t->pos, -t->dist / 2, t->normal);
+    axpy3(y, t->pos, t->dist / 2, t->normal);
+    CHECK(t->dist < margin);
+    w->unit = fmax(w->unit, fabs(norm3(t->normal) - 1));
+    // in penetration a point of one surface may be inside it: only points on the first surfaces are certain
+    if (k == first) {
+      w->surface = fmax(w->surface, fmax(fabs(surface_height(a, x)), fabs(surface_height(b, y))));
+      w->gap = fmax(w->gap, fabs(plane_gap(a, b, t->normal) - t->dist));
+    }
+    for (int j = 0; j < k; j++) { CHECK(touch[j].feature != t->feature); }
+  }
+}
+
+enum { POSES = 3000 };
+static const double MARGIN = 0.05;
+
+// pairs that are solved by iteration from several starts
+static int is_convex(int ta, int tb) { return ta >= CAV_GEOM_ELLIPSOID && !(ta == CAV_GEOM_BOX && tb == CAV_GEOM_BOX); }
+
+static int collide(const solid *a, const solid *b, cav_touch *touch) {
+  return cav_collide_shapes(&a->shape, &b->shape, MARGIN, touch);
+}
+
+// bounds in metres, shapes of 0.05 to 0.3 m; residuals seen are in the table this prints: at most 2e-14
+static void test_certificates(void) {
+  for (int ta = 0; ta < CAV_GEOM_TYPES; ta++) {
+    for (int tb = ta + !ta; tb < CAV_GEOM_TYPES; tb++) {
+      if (!cav_collide_supported(ta, tb)) continue;
+      worst w = {0};
+      int unsolved = 0;
+      for (int k = 0; k < POSES; k++) {
+        solid a, b;
+        cav_touch touch[CAV_TOUCH_MAX];
+        random_solid(ta, &a);
+        random_solid(tb, &b);
+        bring_near(&a, &b);
+        worst one = {0};
+        certify(&a.shape, &b.shape, touch, collide(&a, &b, touch), MARGIN, &one);
+        // left short of its solution by convex.c: still a lower bound
+        int short_of = is_convex(ta, tb) && one.surface > 1e-12;
+        unsolved += short_of;
+        if (short_of) one.surface = 0;
+        gather(&w, &one);
+      }
+      printf("%-10s %-10s %5d in contact, %5d apart, %6d points: surface %.1e gap %.1e unit %.1e\n", names[ta],
+             names[tb], w.contacts, w.apart, w.points, w.surface, w.gap, w.unit);
+      // two boxes keep a face that is longer than the true distance by 1e-4 of the smallest half length (0.3 m)
+      CHECK_NEAR(w.gap, 0, ta == CAV_GEOM_BOX ? 3e-5 : 1e-12);
+      CHECK_NEAR(w.surface, 0, 1e-12);
+      CHECK(unsolved <= POSES / 1000); // seen: 0, and 1 in 100,000 with more poses
+      CHECK_NEAR(w.unit, 0, 1e-14);
+      // the poses put every one of them within the margin; boxes may lose to the exact distance
+      CHECK(w.contacts == POSES);
+      CHECK(w.apart > POSES / 3 && w.apart < POSES * 2 / 3);
+    }
+  }
+}
+
+// turns a solid by a small rotation vector (world) about the world's origin and shifts it
+static void displace(solid *s, const double turn[3], const double shift[3]) {
+  double q[4], R[9];
+  quat_exp(q, turn);
+  quat_matrix(R, q);
+  rotate(s->shape.pos, R, s->shape.pos);
+  add3(s->shape.pos, s->shape.pos, shift);
+  matmul3(s->shape.rotation, R, s->shape.rotation);
+}
+
+static const cav_touch *with_feature(const cav_touch *touch, int count, int feature) {
+  for (int k = 0; k < count; k++) {
+    if (touch[k].feature == feature) return touch + k;
+  }
+  return NULL;
+}
+
+// both shapes moved alike: the same contact, moved
+static void test_invariance(void) {
+  double most = 0;
+  int lost = 0, all = 0, elsewhere = 0;
+  for (int ta = 0; ta < CAV_GEOM_TYPES; ta++) {
+    for (int tb = ta + !ta; tb < CAV_GEOM_TYPES; tb++) {
+      if (!cav_collide_supported(ta, tb)) continue;
+      for (int k = 0; k < 300; k++) {
+        solid a, b;
+        cav_touch before[CAV_TOUCH_MAX], after[CAV_TOUCH_MAX];
+        random_solid(ta, &a);
+        random_solid(tb, &b);
+        bring_near(&a, &b);
+        int n = collide(&a, &b, before);
+        double turn[3] = {uniform(-2, 2), uniform(-2, 2), uniform(-2, 2)}, shift[3] = {3, -2, 1}, q[4], x[3];
+        displace(&a, turn, shift);
+        displace(&b, turn, shift);
+        int m = collide(&a, &b, after);
+        quat_exp(q, turn);
+        for (int j = 0; j < n; j++) {
+          const cav_touch *t = with_feature(after, m, before[j].feature);
+          all++;
+          if (!t) {
+            *(is_convex(ta, tb) && before[j].dist < 0 ? &elsewhere : &lost) += 1;
+            continue;
+          }
+          quat_rotate(x, q, before[j].pos);
+          add3(x, x, shift);
+          sub3(x, x, t->pos);
+          // convex.c may find another way out of an overlap
+          if (is_convex(ta, tb) && t->dist < 0 && norm3(x) > 1e-9) {
+            elsewhere++;
+          } else {
+            most = fmax(most, fmax(norm3(x), fabs(t->dist - before[j].dist)));
+          }
+        }
+      }
+    }
+  }
+  printf("moved together: %d points, %d without a partner, %d elsewhere, error %.1e\n", all, lost, elsewhere, most);
+  // a pose within rounding of the margin or of a tie may lose a point
+  CHECK(lost == 0);
+  CHECK(elsewhere <= 10);     // seen: 0 to 4 over 7 seeds
+  CHECK_NEAR(most, 0, 1e-11); // seen: 3e-14
+}
+
+// gap of the nearest point under small displacements of b: its derivative is the normal's share of b's motion there
+static void test_derivatives(void) {
+  const double step = 1e-7;
+  for (int ta = 0; ta < CAV_GEOM_TYPES; ta++) {
+    for (int tb = ta + !ta; tb < CAV_GEOM_TYPES; tb++) {
+      if (!cav_collide_supported(ta, tb)) continue;
+      int outliers = 0, lost = 0, all = 0;
+      double normal_rate = 0;
+      for (int k = 0; k < 300; k++) {
+        solid a, b;
+        cav_touch touch[CAV_TOUCH_MAX], side[2][CAV_TOUCH_MAX];
+        random_solid(ta, &a);
+        random_solid(tb, &b);
+        bring_near(&a, &b);
+        int n = collide(&a, &b, touch);
+        if (!n) continue;
+        const cav_touch *t = touch + nearest_of(touch, n), *moved[2];
+        double turn[3] = {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
+        double shift[3] = {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
+        for (int s = 0; s < 2; s++) {
+          solid c = b;
+          double w[3], v[3];
+          c.shape.size = c.size;
+          scale3(w, s ? step : -step, turn);
+          scale3(v, s ? step : -step, shift);
+          displace(&c, w, v);
+          moved[s] = with_feature(side[s], cav_collide_shapes(&a.shape, &c.shape, MARGIN, side[s]), t->feature);
+        }
+        all++;
+        if (!moved[0] || !moved[1]) {
+          lost++;
+          continue;
+        }
+        // velocity of b's surface point
+        double y[3], v[3], d[3];
+        axpy3(y, t->pos, t->dist / 2, t->normal);
+        cross3(v, turn, y);
+        add3(v, v, shift);
+        double rate = (moved[1]->dist - moved[0]->dist) / (2 * step);
+        if (!(fabs(rate - dot3(v, t->normal)) < 1e-5)) outliers++;
+        sub3(d, moved[1]->normal, moved[0]->normal);
+        normal_rate = fmax(normal_rate, norm3(d) / (2 * step));
+      }
+      printf("%-10s %-10s derivative of the gap: %d of %d beyond 1e-5, %d lost; normal turns at most %.1e per unit\n",
+             names[ta], names[tb], outliers, all, lost, normal_rate);
+      // a step may cross an edge: at most 1 %
+      CHECK(outliers + lost <= 3);
+    }
+  }
+}
+
+// shapes put on each other in every symmetric way: something sane or nothing
+static void test_degenerate(void) {
+  static const double half_turn[5][3] = {
+      {0, 0, 0}, {1.5707963267948966, 0, 0}, {0, 1.5707963267948966, 0}, {0, 0, 0.3}, {3.141592653589793, 0, 0}};
+  static const double place[7][3] = {{0, 0, 0},     {0.2, 0, 0}, {0, 0.2, 0},       {0, 0, 0.2},
+                                     {0.2, 0.2, 0}, {0, 0, 0.1}, {1e-300, 0, 1e-17}};
+  for (int ta = 0; ta < CAV_GEOM_TYPES; ta++) {
+    for (int tb = ta + !ta; tb < CAV_GEOM_TYPES; tb++) {
+      if (!cav_collide_supported(ta, tb)) continue;
+      for (int pose = 0; pose < 5 * 7; pose++) {
+        solid a, b;
+        cav_touch touch[CAV_TOUCH_MAX];
+        random_solid(ta, &a);
+        random_solid(tb, &b);
+        set3(a.size, 0.1, 0.1, 0.1);
+        set3(b.size, 0.1, 0.1, 0.1);
+        quat_matrix(a.shape.rotation, (double[4]){1, 0, 0, 0});
+        quat_matrix(b.shape.rotation, (double[4]){1, 0, 0, 0});
+        zero3(a.shape.pos);
+        zero3(b.shape.pos);
+        displace(&b, half_turn[pose % 5], place[pose / 5]);
+        int n = collide(&a, &b, touch);
+        CHECK(n >= 0 && n <= CAV_TOUCH_MAX);
+        for (int k = 0; k < n; k++) {
+          CHECK_NEAR(norm3(touch[k].normal), 1, 1e-12);
+          CHECK(isfinite(dot3(touch[k].pos, touch[k].pos)) && touch[k].dist < MARGIN && touch[k].dist >= -1);
+        }
+        // overlapping centres are always a contact
+        if (pose / 5 == 0) CHECK(n > 0);
+      }
+    }
+  }
+}
+
+// manifolds of flat contacts: how many points, and where
+static void test_manifolds(void) {
+  cav_touch touch[CAV_TOUCH_MAX];
+  double identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, lying[9] = {0, 0, 1, 1, 0, 0, 0, 1, 0}; // lying: axis z along x
+  double sizes[CAV_GEOM_TYPES][3] = {{0}, {0.1}, {0.1, 0.3}, {0.1, 0.2, 0.3}, {0.1, 0.3}, {0.1, 0.2, 0.3}};
+  cav_shape floor = {.type = CAV_GEOM_PLANE, .size = sizes[0]};
+  memcpy(floor.rotation, identity, sizeof identity);
+  // upright: sphere, capsule, ellipsoid, cylinder, box on a plane, 1 mm deep
+  static const double top[CAV_GEOM_TYPES] = {0, 0.1, 0.4, 0.3, 0.3, 0.3};
+  static const int upright[CAV_GEOM_TYPES] = {0, 1, 1, 1, 3, 4}, flat[CAV_GEOM_TYPES] = {0, 1, 2, 1, 2, 4};
+  for (int type = 1; type < CAV_GEOM_TYPES; type++) {
+    cav_shape s = {.type = type, .size = sizes[type], .pos = {0, 0, top[type] - 1e-3}};
+    memcpy(s.rotation, identity, sizeof identity);
+    int n = cav_collide_shapes(&floor, &s, 0, touch);
+    CHECK(n == upright[type]);
+    for (int k = 0; k < n; k++) CHECK_NEAR(touch[k].dist, -1e-3, 1e-15);
+    // lying: the ellipsoid and the box rest on their y side
+    s.pos[2] = (type >= CAV_GEOM_ELLIPSOID && type != CAV_GEOM_CYLINDER ? 0.2 : 0.1) - 1e-3;
+    memcpy(s.rotation, lying, sizeof lying);
+    n = cav_collide_shapes(&floor, &s, 0, touch);
+    CHECK(n == flat[type]);
+    for (int k = 0; k < n; k++) CHECK_NEAR(touch[k].dist, -1e-3, 1e-15);
+  }
+  // capsules side by side, and end to end; the same however little they are turned
+  cav_shape a = {.type = CAV_GEOM_CAPSULE, .size = sizes[2]}, b = a;
+  memcpy(a.rotation, identity, sizeof identity);
+  for (int k = 0; k < 3; k++) {
+    double q[4], turn[3] = {k == 1 ? 1e-7 : 0, k == 2 ? 1e-7 : 0, 0};
+    quat_exp(q, turn);
+    quat_matrix(b.rotation, q);
+    set3(b.pos, 0.199, 0, 0.2);
+    CHECK(cav_collide_shapes(&a, &b, 0, touch) == 2);
+    CHECK_NEAR(touch[0].pos[2], -0.1, 1e-6);
+    CHECK_NEAR(touch[1].pos[2], 0.3, 1e-6);
+    set3(b.pos, 0, 0, 0.799);
+    CHECK(cav_collide_shapes(&a, &b, 0, touch) == 1);
+    CHECK_NEAR(touch[0].dist, -1e-3, 1e-6);
+  }
+  // a capsule lying on a box, a box on a box, a capsule along a cylinder
+  cav_shape box = {.type = CAV_GEOM_BOX, .size = sizes[5]}, above = {.type = CAV_GEOM_CAPSULE, .size = sizes[2]};
+  memcpy(box.rotation, identity, sizeof identity);
+  memcpy(above.rotation, lying, sizeof lying);
+  set3(above.pos, 0.05, 0.05, 0.399);
+  CHECK(cav_collide_shapes(&above, &box, 0, touch) == 2);
+  CHECK_NEAR(fabs(touch[0].pos[0] - touch[1].pos[0]), 0.2, 1e-12); // the box is 0.2 wide, the capsule longer
+  CHECK_NEAR(touch[0].dist, -1e-3, 1e-15);
+  CHECK_NEAR(touch[1].dist, -1e-3, 1e-15);
+  CHECK_NEAR(touch[0].normal[2], -1, 1e-15);
+  cav_shape other = box;
+  set3(other.pos, 0.05, 0.1, 0.599);
+  CHECK(cav_collide_shapes(&box, &other, 0, touch) == 4);
+  for (int k = 0; k < 4; k++) CHECK_NEAR(touch[k].dist, -1e-3, 1e-15);
+  double q[4], turn[3] = {0, 0, 0.7853981633974483};
+  quat_exp(q, turn);
+  quat_matrix(other.rotation, q);
+  double square[3] = {0.2, 0.2, 0.3};
+  box.size = other.size = square;
+  set3(other.pos, 0, 0, 0.599);
+  CHECK(cav_collide_shapes(&box, &other, 0, touch) == 8);
+  cav_shape drum = {.type = CAV_GEOM_CYLINDER, .size = sizes[4]};
+  memcpy(drum.rotation, identity, sizeof identity);
+  memcpy(above.rotation, identity, sizeof identity);
+  set3(above.pos, 0.199, 0, 0);
+  CHECK(cav_collide_shapes(&above, &drum, 0, touch) == 2);
+}
+
+// a cylinder standing on a box, on a wider cylinder, and a box on a cylinder: three or four points that surround the
+// centre, the same ones under tiny tilts
+static void test_standing(void) {
+  if (!cav_collide_supported(CAV_GEOM_CYLINDER, CAV_GEOM_BOX)) return;
+  static const double drum_size[2] = {0.1, 0.3}, plate_size[2] = {0.5, 0.1}, table_size[3] = {0.5, 0.5, 0.1};
+  static const double brick_size[3] = {0.1, 0.15, 0.3}, small_size[2] = {0.1, 0.2};
+  cav_shape drum = {.type = CAV_GEOM_CYLINDER, .size = drum_size},
+            plate = {.type = CAV_GEOM_CYLINDER, .size = plate_size};
+  cav_shape table = {.type = CAV_GEOM_BOX, .size = table_size}, brick = {.type = CAV_GEOM_BOX, .size = brick_size};
+  cav_shape small = {.type = CAV_GEOM_CYLINDER, .size = small_size};
+  // upper, lower, height of the upper's centre less 1 mm, points
+  struct {
+    cav_shape *upper, *lower;
+    double height;
+    int points;
+  } stack[] = {{&drum, &table, 0.4, 3}, {&drum, &plate, 0.4, 3}, {&brick, &plate, 0.4, 4}, {&small, &small, 0.4, 3}};
+  for (int k = 0; k < 4; k++) {
+    for (int tilted = 0; tilted < 2; tilted++) {
+      cav_shape upper = *stack[k].upper, lower = *stack[k].lower;
+      double q[4], turn[3] = {tilted ? 1e-7 : 0, tilted ? 2e-7 : 0, 0}, mean[3] = {0, 0, 0};
+      quat_exp(q, turn);
+      quat_matrix(upper.rotation, q);
+      quat_matrix(lower.rotation, (double[4]){1, 0, 0, 0});
+      set3(upper.pos, 0, 0, stack[k].height - 1e-3);
+      cav_touch touch[CAV_TOUCH_MAX];
+      int upper_first = upper.type < lower.type || (upper.type == lower.type && tilted);
+      int n = upper_first ? cav_collide_shapes(&upper, &lower, 0, touch) : cav_collide_shapes(&lower, &upper, 0, touch);
+      // two equal cylinders: rim on rim, rounding decides which points are above
+      if (stack[k].upper == stack[k].lower) {
+        CHECK(n >= 1);
+        continue;
+      }
+      CHECK(n == stack[k].points);
+      for (int j = 0; j < n; j++) {
+        CHECK_NEAR(touch[j].dist, -1e-3, 1e-6);
+        CHECK_NEAR(touch[j].normal[2], upper_first ? -1 : 1, 1e-12);
+        axpy3(mean, mean, 1.0 / n, touch[j].pos);
+      }
+      CHECK_NEAR(mean[0], 0, 1e-6);
+      CHECK_NEAR(mean[1], 0, 1e-6);
+    }
+  }
+}
+
+#ifdef CAVORT_HAVE_MUJOCO
+
+// a scene of two free geoms, or of one and a plane
+static mjModel *peer_scene(int ta, int tb) {
+  char text[1000], error[300] = "";
+  const char *body = "<body><freejoint/><geom type='%s' size='.1 .1 .1' margin='.05'/></body>";
+  char first[200], second[200];
+  snprintf(second, sizeof second, body, names[tb]);
+  if (ta) snprintf(first, sizeof first, body, names[ta]);
+  snprintf(text, sizeof text,
+           "<mujoco><option mpr_tolerance='1e-8' mpr_iterations='200'/><worldbody>%s%s</worldbody></mujoco>",
+           ta ? first : "<geom type='plane' size='1 1 1' margin='.05' pos='.1 .2 .3' quat='.9 .1 .2 -.3'/>", second);
+  mjVFS *vfs = malloc(sizeof *vfs);
+  if (!vfs) return NULL;
+  mj_defaultVFS(vfs);
+  mj_makeEmptyFileVFS(vfs, "scene.xml", (int)strlen(text) + 1);
+  memcpy(vfs->filedata[0], text, strlen(text) + 1);
+  mjModel *model = mj_loadXML("scene.xml", vfs, error, sizeof error);
+  if (!model) fprintf(stderr, "%s\n", error);
+  mj_deleteVFS(vfs);
+  free(vfs);
+  return model;
+}
+
+// puts a random solid into geom g of the peer, and the peer's own pose back into it
+static void peer_place(mjModel *m, mjData *d, int g, const solid *s) {
+  if (m->geom_type[g] == mjGEOM_PLANE) return;
+  int adr = m->jnt_qposadr[m->body_jntadr[m->geom_bodyid[g]]];
+  copy3(m->geom_size + 3 * g, s->size);
+  m->geom_rbound[g] = 2;
+  copy3(d->qpos + adr, s->shape.pos);
+  memcpy(d->qpos + adr + 3, s->quat, sizeof s->quat);
+}
+
+static void peer_read(const mjData *d, int g, solid *s) {
+  copy3(s->shape.pos, d->geom_xpos + 3 * g);
+  memcpy(s->shape.rotation, d->geom_xmat + 9 * g, sizeof s->shape.rotation);
+}
+
+// largest difference of position, normal and gap between our point and the peer's nearest
+static double peer_difference(const mjData *d, const cav_touch *t) {
+  double best = INFINITY;
+  for (int k = 0; k < d->ncon; k++) {
+    const mjContact *c = d->contact + k;
+    double x[3], n[3];
+    sub3(x, c->pos, t->pos);
+    sub3(n, c->frame, t->normal);
+    best = fmin(best, fmax(fmax(norm3(x), norm3(n)), fabs(c->dist - t->dist)));
+  }
+  return best;
+}
+
+static double peer_gap(const mjData *d) {
+  double least = INFINITY;
+  for (int k = 0; k < d->ncon; k++) least = fmin(least, d->contact[k].dist);
+  return least;
+}
+
+// Agreement with MuJoCo. Planes, spheres and capsules: to rounding, in every pose, and sphere against box. Of the others
+// it takes most through a portal refinement, whose depth is that of one direction: the same or deeper than the true one.
+// Ours is the distance itself where apart, so theirs must never exceed it, and where they overlap neither.
+// Capsule on box and box on box: it chooses other points; the share of poses in agreement is reported.
+static void test_peer(void) {
+  for (int ta = 0; ta < CAV_GEOM_TYPES; ta++) {
+    for (int tb = ta + !ta; tb < CAV_GEOM_TYPES; tb++) {
+      if (!cav_collide_supported(ta, tb)) continue;
+      mjModel *m = peer_scene(ta, tb);
+      mjData *d = m ? mj_makeData(m) : NULL;
+      if (!CHECK(m && d)) continue;
+      int same_count = 0, same = 0, geom_a = m->geom_type[0] <= m->geom_type[1] ? 0 : 1;
+      double most = 0, above = -INFINITY, mean = 0;
+      enum { PEER_POSES = 1000 };
+      for (int k = 0; k < PEER_POSES; k++) {
+        solid a, b;
+        random_solid(ta, &a);
+        random_solid(tb, &b);
+        peer_place(m, d, geom_a, &a);
+        peer_place(m, d, 1 - geom_a, &b);
+        mj_kinematics(m, d);
+        peer_read(d, geom_a, &a);
+        peer_read(d, 1 - geom_a, &b);
+        bring_near(&a, &b);
+        copy3(d->qpos + m->jnt_qposadr[m->body_jntadr[m->geom_bodyid[1 - geom_a]]], b.shape.pos);
+        mj_kinematics(m, d);
+        mj_collision(m, d);
+        peer_read(d, 1 - geom_a, &b);
+        cav_touch touch[CAV_TOUCH_MAX];
+        int n = collide(&a, &b, touch);
+        double worst_point = 0;
+        for (int j = 0; j < n; j++) worst_point = fmax(worst_point, peer_difference(d, touch + j));
+        if (n && d->ncon) {
+          double excess = peer_gap(d) - touch[nearest_of(touch, n)].dist;
+          above = fmax(above, excess);
+          mean += fabs(excess) / PEER_POSES;
+        }
+        same_count += n == d->ncon;
+        same += n == d->ncon && worst_point < 1e-6;
+        if (n == d->ncon) most = fmax(most, worst_point);
+      }
+      printf(
+          "%-10s %-10s against MuJoCo: %4d of %d poses with as many points, %4d within 1e-6, largest difference %.1e; "
+          "its gap minus ours: at most %.1e, mean size %.1e\n",
+          names[ta], names[tb], same_count, PEER_POSES, same, most, above, mean);
+      int exact = ta == CAV_GEOM_PLANE || (ta == CAV_GEOM_SPHERE && (tb <= CAV_GEOM_CAPSULE || tb == CAV_GEOM_BOX)) ||
+                  tb == CAV_GEOM_CAPSULE;
+      if (exact) {
+        CHECK(same_count == PEER_POSES);
+        CHECK_NEAR(most, 0, 1e-12); // seen: 1.3e-15
+      }
+      // seen: 1.8e-9
+      if (ta != CAV_GEOM_BOX) CHECK(above < 1e-7);
+      mj_deleteData(d);
+      mj_deleteModel(m);
+    }
+  }
+}
+#endif
+
+int main(void) {
+  test_certificates();
+  test_invariance();
+  test_derivatives();
+  test_degenerate();
+  test_manifolds();
+  test_standing();
+#ifdef CAVORT_HAVE_MUJOCO
+  test_peer();
+#else
+  printf("built without MuJoCo: not compared\n");
+#endif
+  return check_result();
+}

@@ -1,0 +1,522 @@
+/// optim/problem*.c: defaults, what files say, postures and their heights, terms, the way back to a file, and every kind of
+/// broken problem file, each with the line and the word that its error names.
+#include "cavort/problem.h"
+
+#include <unistd.h>
+
+#include "check.h"
+
+static char folder[] = "/tmp/cavort-problem-XXXXXX";
+static char path[128], copy_path[128], csv_path[128];
+
+static const char hopper[] =
+    "<mujoco model='leg'><worldbody><geom name='floor' type='plane' size='1 1 1'/>"
+    "<body name='trunk' pos='0 0 1'><joint name='x' type='slide' axis='1 0 0'/><joint name='z' type='slide' axis='0 0 "
+    "-1'/>"
+    "<joint name='pitch' type='hinge' axis='0 1 0'/><geom name='trunk' type='box' size='.1 .1 .2'/><site name='eye' "
+    "pos='.1 0 .1'/>"
+    "<body name='shin' pos='0 0 -.2'><joint name='knee' axis='0 1 0' limited='true' range='-90 10'/>"
+    "<geom name='shin' type='capsule' fromto='0 0 0 0 0 -.4' size='.05'/></body></body></worldbody>"
+    "<actuator><motor name='knee' joint='knee' ctrllimited='true' ctrlrange='-50 50'/></actuator>"
+    "<sensor><framepos name='eye' objtype='site' objname='eye'/></sensor>"
+    "<keyframe><key name='bent' qpos='0 0 0 -.5'/></keyframe></mujoco>";
+
+static const char flyer[] =
+    "<mujoco model='flyer'><worldbody><geom name='floor' type='plane' size='1 1 1' pos='0 0 .5'/>"
+    "<body name='trunk' pos='0 0 3'><freejoint name='root'/><geom name='trunk' type='ellipsoid' size='.3 .2 .1'/>"
+    "<body name='arm' pos='.3 0 0'><joint name='shoulder' type='ball'/><geom name='arm' type='cylinder' size='.05 .2'/>"
+    "</body></body></worldbody></mujoco>";
+
+static void write_in(const char *name, const char *text) {
+  char full[160];
+  snprintf(full, sizeof full, "%s/%s", folder, name);
+  FILE *file = fopen(full, "w");
+  CHECK(file != NULL);
+  if (!file) return;
+  fputs(text, file);
+  fclose(file);
+}
+
+static cav_problem *load_as(const char *text, const char *model) {
+  cav_error error = {0};
+  write_in("problem.xml", text);
+  cav_problem *problem = cav_problem_load(path, model, &error);
+  CHECK(problem != NULL);
+  if (!problem) fprintf(stderr, "    %s\n", error.text);
+  return problem;
+}
+
+static cav_problem *load(const char *text) { return load_as(text, NULL); }
+
+static int count(const cav_problem *p, cav_quantity quantity) {
+  int n = 0;
+  for (int i = 0; i < p->nterm; i++) n += p->term[i].quantity == quantity;
+  return n;
+}
+
+static const cav_term *find(const cav_problem *p, const char *name) {
+  for (int i = 0; i < p->nterm; i++) {
+    if (!strcmp(p->term[i].name, name)) return &p->term[i];
+  }
+  int term_is_there = 0;
+  CHECK(term_is_there);
+  fprintf(stderr, "    %s\n", name);
+  return NULL;
+}
+
+#define HEAD "<problem name='p' model='leg.xml'>\n<horizon duration='1' timestep='.05'/>\n<start key='bent'/>\n"
+#define TAIL "</problem>\n"
+
+static void check_defaults(void) {
+  cav_problem *p = load(HEAD TAIL);
+  if (!p) return;
+  CHECK_TEXT(p->name, "p");
+  CHECK(p->duration == 1 && p->timestep == .05 && p->order == CAV_ORDER_MIDPOINT && p->close_at_rest == 1 &&
+        !p->solved);
+  CHECK(p->nterm == cav_problem_default_terms(NULL, 0));
+  for (int i = 0; i < p->nterm; i++) {
+    CHECK(p->term[i].use == CAV_USE_COST && p->term[i].weight > 0 && p->term[i].scale == 1 && p->term[i].from == 0 &&
+          p->term[i].to < 0);
+  }
+  // no goal: the start; no guess: from start to goal without an arc
+  CHECK_NEAR_ALL(p->q_goal, p->q_start, p->model->nq, 0);
+  CHECK(p->q_start[3] == -.5 && p->guess == CAV_GUESS_INTERPOLATE && p->guess_height == 0);
+  cav_problem given = cav_problem_default(p->model);
+  CHECK(given.effort_limit == p->effort_limit && given.schedule.stages == p->schedule.stages && given.nterm == 0);
+  cav_problem_free(p);
+  cav_problem_free(NULL);
+}
+
+static void check_words(void) {
+  cav_problem *p = load(
+      "<problem name='&lt;q&gt;' model='leg.xml'>\n"
+      "<horizon duration='2' timestep='.1' order='euler' close='open'/>\n"
+      "<start qpos='1 2 3 -.1' qvel='1 2 3 4'/>\n<goal key='nothing | bent'/>\n"
+      "<guess type='hold' apex='.3' from='.5' to='1.5'/>\n<limits effort='.5' margin='.01'/>\n"
+      "<schedule stages='3'><first softness='2' time_constant='1' smoothing='.2' smoothing_self='.1' penalty='10' "
+      "iterations='5' "
+      "tolerance='.1'/><last iterations='7'/></schedule>\n" TAIL);
+  if (!p) return;
+  CHECK_TEXT(p->name, "<q>");
+  CHECK(p->order == CAV_ORDER_EULER && p->close_at_rest == 0 && p->guess == CAV_GUESS_HOLD);
+  CHECK(p->guess_height == .3 && p->guess_from == .5 && p->guess_to == 1.5);
+  CHECK_NEAR_ALL(p->q_start, ((double[]){1, 2, 3, -.1}), 4, 0);
+  CHECK_NEAR_ALL(p->v_start, ((double[]){1, 2, 3, 4}), 4, 0);
+  CHECK(p->q_goal[3] == -.5 && p->effort_limit == .5 && p->limit_margin == .01);
+  const cav_stage_options *a = &p->schedule.first, *b = &p->schedule.last;
+  CHECK(p->schedule.stages == 3 && a->softness == 2 && a->time_constant == 1 && a->smoothing == .2 &&
+        a->smoothing_self == .1);
+  CHECK(a->penalty == 10 && a->iterations == 5 && a->tolerance == .1 && b->iterations == 7);
+  CHECK(b->softness == cav_problem_default(p->model).schedule.last.softness);
+  cav_problem_free(p);
+}
+
+// lowest point of the model over its floor, by the collision routine: seen from afar through the smoothed law's reach
+static double lowest(const cav_model *model, const double *q) {
+  cav_state *state = cav_state_new(model);
+  double least = INFINITY;
+  if (!state) return least;
+  state->options.smoothing = state->options.smoothing_self = 1;
+  if (cav_position(model, state, q) == CAV_OK) {
+    for (int i = 0; i < state->ncontact; i++) {
+      if (model->pair[state->contact[i].pair].same_world) least = fmin(least, state->contact[i].dist);
+    }
+  }
+  cav_state_free(state);
+  return least;
+}
+
+static void check_postures(void) {
+  // a pose of the file, joints by alternatives and in degrees, lowered to the floor along a slide that points down
+  cav_problem *p = load(
+      "<problem name='p' model='leg.xml'>\n<horizon duration='1' timestep='.05'/>\n"
+      "<pose name='up'><joint name='knie|knee' degrees='-45'/></pose>\n"
+      "<pose name='bent'><joint name='knee' pos='-.1'/></pose>\n"
+      "<start key='up' height='floor'/>\n<goal key='bent'><joint name='x' pos='.7'/></goal>\n" TAIL);
+  if (p) {
+    CHECK_NEAR(p->q_start[3], -M_PI / 4, 1e-15);
+    // exact up to rounding, seen 1e-16
+    CHECK_NEAR(lowest(p->model, p->q_start), 0, 1e-12);
+    // the model's own keyframe comes before the pose of that name
+    CHECK(p->q_goal[3] == -.5 && p->q_goal[0] == .7 && p->q_goal[1] == 0);
+    cav_problem_free(p);
+  }
+  // a free root on a raised floor; Euler angles in degrees; a ball joint
+  char model[160];
+  snprintf(model, sizeof model, "%s/flyer.xml", folder);
+  p = load_as(
+      "<problem name='p' model='leg.xml'>\n<horizon duration='1' timestep='.05'/>\n"
+      "<start height='floor'><root pos='1 2 9' euler='30 40 50'/><joint name='shoulder' quat='2 0 2 "
+      "0'/></start>\n" TAIL,
+      model);
+  if (!p) return;
+  CHECK_TEXT(p->model->name, "flyer");
+  CHECK(p->q_start[0] == 1 && p->q_start[1] == 2);
+  CHECK_NEAR(p->q_start[7], sqrt(.5), 1e-15);
+  // convex routine: its tolerance 1e-6, seen 2e-7
+  CHECK_NEAR(lowest(p->model, p->q_start), 0, 1e-5);
+  // x, then new y, then new z: the rotated z axis is Rx Ry e_z
+  double w = p->q_start[3], x = p->q_start[4], y = p->q_start[5], z = p->q_start[6], a = M_PI / 6, b = 2 * M_PI / 9;
+  CHECK_NEAR(2 * (x * z + w * y), sin(b), 1e-14);
+  CHECK_NEAR(2 * (y * z - w * x), -sin(a) * cos(b), 1e-14);
+  CHECK_NEAR(w * w + x * x + y * y + z * z, 1, 1e-15);
+  cav_problem_free(p);
+}
+
+static void check_trajectory_ends(void) {
+  cav_problem *p = load(HEAD TAIL);
+  if (!p) return;
+  cav_trajectory *trajectory = cav_trajectory_new(p->model, 3, .1);
+  for (int i = 0; i < 12; i++) trajectory->q[i] = -.01 * i;
+  cav_error error;
+  CHECK(cav_trajectory_write(csv_path, p->model, trajectory, &error) == CAV_OK);
+  cav_problem *q = load(
+      "<problem name='p' model='leg.xml'>\n<horizon duration='1' timestep='.05'/>\n<start file='motion.csv' "
+      "knot='first'/>\n"
+      "<goal file='motion.csv'/>\n" TAIL);
+  if (q) {
+    CHECK_NEAR_ALL(q->q_start, trajectory->q, 4, 0);
+    CHECK_NEAR_ALL(q->q_goal, trajectory->q + 8, 4, 0);
+  }
+  cav_problem_free(q);
+  cav_trajectory_free(trajectory);
+  cav_problem_free(p);
+}
+
+static void check_costs(void) {
+  cav_problem *p = load(HEAD
+                        "<cost>\n<effort weight='3'/>\n<slip weight='0'/>\n<gap weight='5' from='.5'/>\n"
+                        "<velocity name='one' joint='knee' weight='2' target='.5' at='end'/>\n"
+                        "<velocity name='two' dofs='all' weight='2' target='1 2 3 4' to='.5'/>\n"
+                        "<posture name='key' key='bent' weight='1' dofs='all' at='.52'/>\n"
+                        "<posture name='way' weight='1' from='0' to='end'><waypoint time='0' key='bent'/><waypoint "
+                        "time='.5' qpos='0 0 0 0'/></posture>\n"
+                        "<sensor name='eye' weight='1' component='z' target='1.5' scale='.1' at='.5'/>\n"
+                        "<sensor name='up' type='subtreecom' body='body|trunk' component='z' relative='start' "
+                        "target='.3' weight='9' at='.5'/>\n"
+                        "<sensor name='turn' type='framequat' xbody='trunk' relative='goal' weight='9'/>\n"
+                        "<sensor name='path' type='framepos' site='eye' weight='9'><waypoint time='.1' target='1 2 3'/>"
+                        "<waypoint time='.9' target='4 5 6'/></sensor>\n"
+                        "</cost>\n" TAIL);
+  if (!p) return;
+  // one running cost takes its default's place, weight 0 removes it, a window adds
+  CHECK(count(p, CAV_QUANTITY_EFFORT) == 1 && find(p, "effort")->weight == 3);
+  CHECK(count(p, CAV_QUANTITY_SLIP) == 0 && count(p, CAV_QUANTITY_GAP) == 2);
+  CHECK(count(p, CAV_QUANTITY_VELOCITY) == 4 && count(p, CAV_QUANTITY_IMPACT) == 1);
+  const cav_term *one = find(p, "one"), *two = find(p, "two"), *key = find(p, "key"), *way = find(p, "way");
+  CHECK(one && one->dofs == CAV_DOFS_ONE && one->joint == 3 && one->target[3] == .5 && one->from == 1 && one->to == 1);
+  CHECK(two && two->dofs == CAV_DOFS_ALL && two->target[2] == 3 && two->from == 0 && two->to == .5);
+  CHECK(key && key->target[3] == -.5 && key->from == .52 && key->to == .52 && key->nwaypoint == 0);
+  CHECK(way && way->nwaypoint == 2 && way->waypoint_time[1] == .5 && way->target[3] == -.5 && way->target[7] == 0);
+  const cav_term *eye = find(p, "eye"), *up = find(p, "up"), *turn = find(p, "turn"), *along = find(p, "path");
+  CHECK(eye && eye->sensor.type == CAV_SENSOR_FRAMEPOS && eye->component == 2 && eye->target[2] == 1.5 &&
+        eye->scale == .1);
+  CHECK(up && up->sensor.object == 1 && up->sensor.adr == -1 && up->sensor.dim == 3);
+  // .3 above where the centre of mass of the start is, computed apart
+  cav_state *state = cav_state_new(p->model);
+  double com[3];
+  CHECK(cav_position(p->model, state, p->q_start) == CAV_OK);
+  cav_momentum(p->model, state, p->v_start, com, NULL, NULL);
+  if (up) CHECK_NEAR(up->target[2], com[2] + .3, 1e-12);
+  cav_state_free(state);
+  CHECK(turn && turn->component == -1);
+  if (turn) CHECK_NEAR_ALL(turn->target, ((double[]){1, 0, 0, 0}), 4, 1e-15);
+  CHECK(along && along->nwaypoint == 2);
+  if (along) CHECK_NEAR_ALL(along->target, ((double[]){1, 2, 3, 4, 5, 6}), 6, 0);
+  cav_problem_free(p);
+}
+
+static void check_constraints(void) {
+  cav_problem *p =
+      load(HEAD
+           "<constraint>\n<sensor name='low' type='framepos' site='eye' component='z' lower='.2' relative='start'/>\n"
+           "<posture name='end' dofs='all' at='end'/>\n<velocity name='slow' joint='x' lower='-1' upper='1'/>\n"
+           "</constraint>\n" TAIL);
+  if (!p) return;
+  const cav_term *low = find(p, "low"), *end = find(p, "end"), *slow = find(p, "slow");
+  // the eye stands .1 over the trunk's frame, which is at 1
+  CHECK(low && low->use == CAV_USE_RANGE && low->upper == INFINITY && low->target == NULL);
+  if (low) CHECK_NEAR(low->lower, 1.1 + .2, 1e-12);
+  CHECK(end && end->use == CAV_USE_EQUAL && end->from == 1 && end->target == NULL);
+  CHECK(slow && slow->use == CAV_USE_RANGE && slow->lower == -1 && slow->upper == 1);
+  CHECK(p->nterm == 3 + cav_problem_default_terms(NULL, 0));
+  cav_problem_free(p);
+}
+
+// same numbers in both
+static void check_same(const cav_problem *a, const cav_problem *b) {
+  int nq = a->model->nq;
+  CHECK_TEXT(a->name, b->name);
+  CHECK(a->duration == b->duration && a->timestep == b->timestep && a->order == b->order &&
+        a->close_at_rest == b->close_at_rest);
+  CHECK_NEAR_ALL(a->q_start, b->q_start, nq, 0);
+  CHECK_NEAR_ALL(a->q_goal, b->q_goal, nq, 0);
+  CHECK_NEAR_ALL(a->v_start, b->v_start, a->model->nv, 0);
+  CHECK(a->guess == b->guess && a->guess_height == b->guess_height && a->effort_limit == b->effort_limit &&
+        a->limit_margin == b->limit_margin);
+  CHECK(!memcmp(&a->schedule, &b->schedule, sizeof a->schedule));
+  CHECK(a->nterm == b->nterm);
+  for (int i = 0; i < a->nterm && i < b->nterm; i++) {
+    const cav_term *s = &a->term[i], *t = find(b, s->name);
+    if (!t) continue;
+    CHECK(s->quantity == t->quantity && s->use == t->use && s->component == t->component && s->dofs == t->dofs);
+    CHECK(s->joint == t->joint && s->from == t->from && s->to == t->to && s->weight == t->weight &&
+          s->scale == t->scale);
+    CHECK(s->lower == t->lower && s->upper == t->upper && s->nwaypoint == t->nwaypoint && !s->target == !t->target);
+    CHECK(s->sensor.type == t->sensor.type && s->sensor.object_type == t->sensor.object_type &&
+          s->sensor.object == t->sensor.object);
+    int dim = s->quantity == CAV_QUANTITY_CONFIGURATION ? nq
+              : s->quantity == CAV_QUANTITY_SENSOR      ? s->sensor.dim
+                                                        : a->model->nv;
+    int n = s->nwaypoint ? s->nwaypoint : 1;
+    if (s->target && t->target) CHECK_NEAR_ALL(s->target, t->target, n * dim, 0);
+    if (s->nwaypoint && t->nwaypoint) CHECK_NEAR_ALL(s->waypoint_time, t->waypoint_time, n, 0);
+  }
+}
+
+static void check_round_trip(void) {
+  cav_problem *p = load(
+      "<problem name='a &amp; b \"c\"' model='leg.xml'>\n<horizon duration='1' timestep='.05' order='euler' "
+      "close='open'/>\n"
+      "<start key='bent' height='floor' qvel='.1 .2 .3 .4'/>\n<goal qpos='.1 .2 .3 -.4'/>\n<guess apex='.3' from='.1' "
+      "to='.9'/>\n"
+      "<limits effort='.7' margin='.002'/>\n<schedule stages='5'><last penalty='123456'/></schedule>\n"
+      "<cost>\n<effort weight='3'/>\n<slip weight='0'/>\n<impact name='hit' weight='7' from='.5'/>\n<velocity "
+      "name='one' joint='knee' weight='2' target='.5' at='end'/>\n"
+      "<acceleration name='late' weight='.1' from='.3' to='.6'/>\n"
+      "<posture name='way' weight='1' from='.1' to='end'><waypoint time='0' key='bent'/><waypoint time='.5' qpos='0 0 "
+      "0 0'/></posture>\n"
+      "<sensor name='eye' weight='1' component='z' target='1.5' scale='.1' at='.5'/>\n"
+      "<sensor name='path' type='framelinvel' geom='shin' weight='9'><waypoint time='.1' target='1 2 3'/><waypoint "
+      "time='.9' target='4 5 6'/></sensor>\n"
+      "</cost>\n<constraint>\n<sensor name='low' type='framepos' site='eye' component='z' lower='.2' "
+      "relative='start'/>\n"
+      "<sensor name='bend' type='jointpos' joint='knee' target='-.2' at='.35'/>\n<posture name='last' dofs='all' "
+      "at='end'/>\n</constraint>\n" TAIL);
+  if (!p) return;
+  cav_error error = {0};
+  // as a result folder records it, with the law of the motion
+  p->solved = 1;
+  p->contact.softness = 0.1 / 3;
+  p->contact.stabilisation = CAV_STABILISATION_DISCRETE;
+  p->contact.timestep = .05;
+  p->contact.gravity = 0;
+  CHECK(cav_problem_write(copy_path, p, NULL, &error) == CAV_OK);
+  cav_problem *q = cav_problem_load(copy_path, NULL, &error);
+  CHECK(q != NULL);
+  if (q) {
+    check_same(p, q);
+    check_same(q, p);
+    CHECK(q->solved && q->contact.softness == p->contact.softness && q->contact.timestep == .05 &&
+          q->contact.gravity == 0);
+    CHECK(q->contact.stabilisation == CAV_STABILISATION_DISCRETE && q->contact.passive == p->contact.passive);
+  } else {
+    fprintf(stderr, "    %s\n", error.text);
+  }
+  cav_problem_free(q);
+  CHECK(cav_problem_write("/nowhere/at/all.xml", p, NULL, &error) == CAV_BAD_INPUT);
+  p->model_path = NULL;
+  CHECK(cav_problem_write(copy_path, p, NULL, &error) == CAV_BAD_INPUT);
+  cav_problem_free(p);
+}
+
+// expects a file to be refused with this line and these words
+static void refuse(const char *text, int line, const char *words) {
+  cav_error error = {0};
+  write_in("problem.xml", text);
+  cav_problem *problem = cav_problem_load(path, NULL, &error);
+  CHECK(problem == NULL);
+  char place[160];
+  snprintf(place, sizeof place, "%s:%d: ", path, line);
+  int said = error.status == CAV_BAD_INPUT && error.line == line && !strncmp(error.text, place, strlen(place)) &&
+             strstr(error.text, words);
+  CHECK(said);
+  if (!said) fprintf(stderr, "    expected %s...%s, got %s\n", place, words, error.text);
+  cav_problem_free(problem);
+  // the same without a place for the error
+  problem = cav_problem_load(path, NULL, NULL);
+  CHECK(problem == NULL);
+}
+
+// a fault on line 5 of an otherwise good file, inside <cost> or <constraint>
+static void refuse_cost(const char *element, const char *words) {
+  char text[2000];
+  snprintf(text, sizeof text, HEAD "<cost>\n%s\n</cost>\n" TAIL, element);
+  refuse(text, 5, words);
+}
+
+static void refuse_constraint(const char *element, const char *words) {
+  char text[2000];
+  snprintf(text, sizeof text, HEAD "<constraint>\n%s\n</constraint>\n" TAIL, element);
+  refuse(text, 5, words);
+}
+
+// a fault on line 3, in the start
+static void refuse_start(const char *element, const char *words) {
+  char text[2000];
+  snprintf(text, sizeof text, "<problem model='leg.xml'>\n<horizon duration='1'/>\n%s\n</problem>", element);
+  refuse(text, 3, words);
+}
+
+static void check_broken_files(void) {
+  refuse("<problem model='leg.xml'>\n<horizon duration='1'/>\n<start>\n</problem>", 4, "");
+  refuse("<mujoco/>", 1, "mujoco");
+  refuse("<problem>\n<horizon duration='1'/>\n<start/></problem>", 1, "model");
+  refuse("<problem model='none.xml'>\n<horizon duration='1'/>\n<start/></problem>", 1, "none.xml");
+  refuse("<problem model='leg.xml'>\n<start/></problem>", 1, "horizon");
+  refuse("<problem model='leg.xml'>\n<horizon duration='1'/></problem>", 1, "start");
+  refuse("<problem model='leg.xml'>\n<horizon/>\n<start/></problem>", 2, "duration");
+  refuse("<problem model='leg.xml'>\n<horizon duration='nan'/>\n<start/></problem>", 2, "duration");
+  refuse("<problem model='leg.xml'>\n<horizon duration='-1'/>\n<start/></problem>", 2, "above 0");
+  refuse("<problem model='leg.xml'>\n<horizon duration='1' timestep='.3'/>\n<start/></problem>", 2, "whole number");
+  refuse("<problem model='leg.xml'>\n<horizon duration='1' timestep='1e-9'/>\n<start/></problem>", 2, "steps");
+  refuse("<problem model='leg.xml'>\n<horizon duration='1' order='middle'/>\n<start/></problem>", 2, "midpoint");
+  refuse(HEAD "<cast/>\n" TAIL, 4, "did you mean <cost>");
+  refuse(HEAD "<guess type='interpolated'/>\n" TAIL, 4, "did you mean 'interpolate'");
+  refuse(HEAD "<guess from='.1'/>\n" TAIL, 4, "apex");
+  refuse(HEAD "<guess apex='-1'/>\n" TAIL, 4, "apex");
+  refuse(HEAD "<limits effort='1.5'/>\n" TAIL, 4, "effort");
+  refuse(HEAD "<schedule stages='0'/>\n" TAIL, 4, "stages");
+  refuse(HEAD "<schedule>\n<first softness='0'/></schedule>\n" TAIL, 5, "softness");
+  refuse(HEAD "<schedule>\n<last iterations='0'/></schedule>\n" TAIL, 5, "iterations");
+  refuse(HEAD
+         "<contact timestep='.1' softness='1' time_constant='0' smoothing='0' smoothing_self='0' impratio='1'/>\n" TAIL,
+         4, "horizon");
+}
+
+static void check_broken_starts(void) {
+  refuse_start("<start key='bend'/>", "did you mean 'bent'");
+  refuse_start("<start qpos='1 2 3'/>", "expected 4 numbers");
+  refuse_start("<start qpos='0 0 0 0' key='bent'/>", "contradicts");
+  refuse_start("<start qvel='1'/>", "expected 4 numbers");
+  refuse_start("<start knot='last'/>", "file");
+  refuse_start("<start file='absent.csv'/>", "absent.csv");
+  refuse_start("<start><joint name='ankle' pos='1'/></start>", "no joint of that name");
+  refuse_start("<start><joint name='kne' pos='1'/></start>", "did you mean 'knee'");
+  refuse_start("<start><joint name='knee'/></start>", "one of the attributes");
+  refuse_start("<start><joint name='knee' pos='0' degrees='0'/></start>", "one of the attributes");
+  refuse_start("<start><joint name='x' degrees='10'/></start>", "slides");
+  refuse_start("<start><joint name='knee' quat='1 0 0 0'/></start>", "pos");
+  refuse_start("<start><joint name='knee' degrees='45'/></start>", "outside its range");
+  refuse_start("<start><root pos='0 0 1'/></start>", "no free joint");
+  refuse_start("<start key='a'/><pose name='a' key='b'/><pose name='b' key='a'/>", "circle");
+  refuse_start("<start key='a'/><pose name='a' key='a'/>", "neither");
+}
+
+static void check_broken_terms(void) {
+  refuse_cost("<effort/>", "weight");
+  refuse_cost("<effort weight='-1'/>", "weight");
+  refuse_cost("<effort weight='1' scale='0'/>", "scale");
+  refuse_cost("<effort weight='1' lower='0'/>", "lower");
+  refuse_cost("<slip weight='1' at='2'/>", "within the horizon");
+  refuse_cost("<slip weight='1' at='later'/>", "'end'");
+  refuse_cost("<slip weight='1' at='.5' from='.1'/>", "contradicts");
+  refuse_cost("<slip weight='1' from='.5' to='.2'/>", "before it starts");
+  refuse_cost("<slip weight='1' from='.51' to='.54'/>", "no knot");
+  refuse_cost("<velocity weight='1' dofs='joints' joint='knee'/>", "contradicts");
+  refuse_cost("<velocity weight='1' joint='elbow'/>", "no joint of that name");
+  refuse_cost("<velocity weight='1' dofs='all' target='1 2'/>", "one number, or 4");
+  refuse_cost("<posture weight='1' key='bent' qpos='0 0 0 0'/>", "contradicts");
+  refuse_cost("<posture weight='1' qpos='0'/>", "expected 4 numbers");
+  refuse_cost("<posture weight='1' key='bent'><waypoint time='0' key='bent'/></posture>", "contradicts");
+  refuse_cost("<posture weight='1'><waypoint time='0'/></posture>", "key");
+  refuse_cost("<posture weight='1'><waypoint time='.5' key='bent'/><waypoint time='.5' key='bent'/></posture>",
+              "after the one before");
+  refuse_cost("<posture weight='1'><waypoint time='5' key='bent'/></posture>", "within the horizon");
+  refuse_cost("<sensor weight='1'/>", "type");
+  refuse_cost("<sensor weight='1' name='eyes'/>", "did you mean 'eye'");
+  refuse_cost("<sensor weight='1' type='framepos'/>", "needs one of");
+  refuse_cost("<sensor weight='1' type='framepoz' body='trunk'/>", "did you mean 'framepos'");
+  refuse_cost("<sensor weight='1' type='framepos' body='trunk' site='eye'/>", "contradicts");
+  refuse_cost("<sensor weight='1' type='framepos' joint='knee'/>", "looks at");
+  refuse_cost("<sensor weight='1' type='subtreecom' site='eye'/>", "looks at");
+  refuse_cost("<sensor weight='1' type='framepos' body='trunc'/>", "did you mean 'trunk'");
+  refuse_cost("<sensor weight='1' type='framepos' body='trunk' target='1 2'/>", "expected 3 numbers");
+  refuse_cost("<sensor weight='1' type='framepos' body='trunk' component='z' target='1 2 3'/>", "expected 1 number");
+  refuse_cost("<sensor weight='1' type='framepos' body='trunk' component='w'/>", "x, y or z");
+  refuse_cost("<sensor weight='1' type='jointpos' joint='knee' component='x'/>", "one value");
+  refuse_cost("<sensor weight='1' type='framequat' body='trunk' target='0 0 0 0'/>", "not zero");
+  refuse_cost("<sensor weight='1' type='framelinvel' body='trunk' relative='goal'/>", "at rest");
+  refuse_constraint("<sensor type='framepos' body='trunk' component='z' lower='2' upper='1'/>", "above 'upper'");
+  refuse_constraint("<sensor type='framepos' body='trunk' component='z' lower='2' target='1'/>", "contradicts");
+  refuse_constraint("<sensor type='framepos' body='trunk' lower='2' relative='goal'/>", "component");
+  refuse_constraint("<effort upper='1'/>", "effort");
+  refuse_constraint("<velocity weight='1'/>", "weight");
+}
+
+static void check_other_model(void) {
+  char model[160];
+  cav_error error = {0};
+  snprintf(model, sizeof model, "%s/flyer.xml", folder);
+  write_in("problem.xml",
+           "<problem model='leg.xml'>\n<horizon duration='1'/>\n<start/>\n<cost>\n<velocity joint='knee' "
+           "weight='1'/></cost></problem>");
+  cav_problem *p = cav_problem_load(path, model, &error);
+  CHECK(!p && error.line == 5 && strstr(error.text, "flyer") && strstr(error.text, "no joint of that name"));
+  cav_problem_free(p);
+  p = cav_problem_load(path, "/nowhere/model.xml", &error);
+  CHECK(!p && error.status == CAV_BAD_INPUT && strstr(error.text, "/nowhere/model.xml"));
+  p = cav_problem_load("/nowhere/problem.xml", NULL, &error);
+  CHECK(!p && error.status == CAV_BAD_INPUT && strstr(error.text, "/nowhere/problem.xml"));
+}
+
+// the motions that the project ships load on the models they were written for
+static void check_motions(void) {
+  static const struct {
+    const char *motion, *model;
+  } motion[] = {{"squat-jump", "mujoco/humanoid.xml"},
+                {"squat-jump", "dm_control/humanoid.xml"},
+                {"hopper-hop", "dm_control/hopper.xml"},
+                {"walker-jump", "dm_control/walker.xml"},
+                {"cheetah-jump", "dm_control/cheetah.xml"}};
+  const char *shared = check_shared_models();
+  if (!shared) {
+    printf("the shared models are absent: motions are not tried on them\n");
+    return;
+  }
+  for (int i = 0; i < 5; i++) {
+    char file[5000], model[5000];
+    cav_error error = {0};
+    snprintf(file, sizeof file, "%s/problems/motions/%s/problem.xml", CAVORT_SOURCE_ROOT, motion[i].motion);
+    snprintf(model, sizeof model, "%s/%s", shared, motion[i].model);
+    cav_problem *p = cav_problem_load(file, model, &error);
+    CHECK(p != NULL);
+    if (!p) {
+      fprintf(stderr, "    %s\n", error.text);
+      continue;
+    }
+    // start and goal stand on the floor
+    CHECK_NEAR(lowest(p->model, p->q_start), 0, 1e-9);
+    CHECK_NEAR(lowest(p->model, p->q_goal), 0, 1e-9);
+    cav_problem_free(p);
+  }
+}
+
+int main(void) {
+  CHECK(mkdtemp(folder) != NULL);
+  snprintf(path, sizeof path, "%s/problem.xml", folder);
+  snprintf(copy_path, sizeof copy_path, "%s/copy.xml", folder);
+  snprintf(csv_path, sizeof csv_path, "%s/motion.csv", folder);
+  write_in("leg.xml", hopper);
+  write_in("flyer.xml", flyer);
+  check_defaults();
+  check_words();
+  check_postures();
+  check_trajectory_ends();
+  check_costs();
+  check_constraints();
+  check_round_trip();
+  check_broken_files();
+  check_broken_starts();
+  check_broken_terms();
+  check_other_model();
+  check_motions();
+  const char *made[] = {"problem.xml", "copy.xml", "motion.csv", "leg.xml", "flyer.xml"};
+  for (int i = 0; i < 5; i++) {
+    char full[160];
+    snprintf(full, sizeof full, "%s/%s", folder, made[i]);
+    remove(full);
+  }
+  CHECK(rmdir(folder) == 0);
+  return check_result();
+}

@@ -1,0 +1,222 @@
+/// problems/result.c, forces.c, certificate.c: a folder written from a made-up solution and read back bit for bit, forces that
+/// carry the weight of what rests, a verdict as JSON and as a table, and folders that are broken.
+#include "result.h"
+
+#include <unistd.h>
+
+#include "certificate.h"
+#include "check.h"
+
+static char top[] = "/tmp/cavort-result-XXXXXX";
+static char folder[128], model_path[128], problem_path[128];
+
+// a box that rests on the floor
+static const char model_text[] =
+    "<mujoco model='box \"1\"'><worldbody><geom name='floor' type='plane' size='1 1 1'/><body name='box' pos='0 0 .1'>"
+    "<freejoint name='root'/><geom name='box, big' type='box' size='.1 .1 .1' mass='2'/></body></worldbody></mujoco>";
+static const char problem_text[] =
+    "<problem name='rest' model='box.xml'><horizon duration='.1' timestep='.02'/><start height='floor'/></problem>";
+
+static void write_file(const char *path, const char *text) {
+  FILE *file = fopen(path, "w");
+  CHECK(file != NULL);
+  if (!file) return;
+  fputs(text, file);
+  fclose(file);
+}
+
+static const char *read_file(const char *name) {
+  static char text[200000];
+  char *path = cav_result_path(folder, name);
+  FILE *file = path ? fopen(path, "r") : NULL;
+  size_t n = file ? fread(text, 1, sizeof text - 1, file) : 0;
+  if (file) fclose(file);
+  free(path);
+  text[n] = 0;
+  return text;
+}
+
+static void replace(const char *name, const char *text) {
+  char *path = cav_result_path(folder, name);
+  if (path) write_file(path, text);
+  free(path);
+}
+
+// gains and a log with awkward numbers
+static int fill(cav_solution *solution, const cav_problem *problem) {
+  int nv = problem->model->nv, n = 5 * nv * nv;
+  solution->trajectory = cav_trajectory_new(problem->model, 6, .02);
+  solution->gain_q = malloc((size_t)n * sizeof(double));
+  solution->gain_v = malloc((size_t)n * sizeof(double));
+  solution->progress = calloc(2, sizeof *solution->progress);
+  if (!solution->trajectory || !solution->gain_q || !solution->gain_v || !solution->progress) return 0;
+  for (int t = 0; t < 6; t++) memcpy(solution->trajectory->q + 7 * t, problem->q_start, 7 * sizeof(double));
+  for (int i = 0; i < n; i++) solution->gain_q[i] = sin(i) / 3, solution->gain_v[i] = 1e-200 * cos(i);
+  solution->nprogress = 2;
+  solution->progress[0] = (cav_progress){.phase = "continuation", .stage = 1, .stages = 1, .iteration = 1, .cost = 0.1};
+  solution->progress[1] = (cav_progress){.phase = "multipliers", .stage = 1, .stages = 1, .iteration = 2, .cost = NAN};
+  solution->contact = problem->model->options;
+  solution->contact.timestep = .02;
+  solution->contact.stabilisation = CAV_STABILISATION_DISCRETE;
+  solution->contact.softness = 0.1;
+  solution->contact.time_constant = 0.03;
+  solution->contact.smoothing = 1e-3;
+  return 1;
+}
+
+static void check_read_back(const cav_solution *solution) {
+  cav_error error = {0};
+  cav_result *result = cav_result_read(folder, NULL, &error);
+  CHECK(result != NULL);
+  if (!result) {
+    fprintf(stderr, "    %s\n", error.text);
+    return;
+  }
+  int nv = result->problem->model->nv;
+  CHECK(result->trajectory->nknot == 6);
+  CHECK_NEAR_ALL(result->trajectory->q, solution->trajectory->q, 6 * 7, 0);
+  CHECK_NEAR_ALL(result->gain_q, solution->gain_q, 5 * nv * nv, 0);
+  CHECK_NEAR_ALL(result->gain_v, solution->gain_v, 5 * nv * nv, 0);
+  CHECK(result->problem->solved && result->problem->contact.softness == 0.1 &&
+        result->problem->contact.smoothing == 1e-3);
+  CHECK(result->problem->contact.stabilisation == CAV_STABILISATION_DISCRETE);
+  cav_result_free(result);
+  cav_result_free(NULL);
+}
+
+// the whole weight through four corners, at their places
+static void check_forces(const cav_problem *problem, const cav_solution *solution) {
+  cav_error error = {0};
+  cav_options contact = solution->contact;
+  cav_forces *forces = cav_forces_new(problem->model, solution->trajectory, &contact, 1, &error);
+  CHECK(forces != NULL);
+  if (!forces) return;
+  CHECK(forces->nknot == 6 && forces->nforce == 24);
+  double up = 0;
+  for (int t = 0; t < 6; t++) CHECK(forces->count[t] == 4);
+  for (int i = 0; i < 4; i++) {
+    const cav_contact_force *f = &forces->force[i];
+    CHECK(f->knot == 0 && !strcmp(problem->model->geom[f->geom2].name, "box, big"));
+    CHECK_NEAR(fabs(f->pos[0]), 0.1, 1e-12);
+    up += f->force[2];
+  }
+  // the vertical row of the inverse: u = weight - sum of forces, rounding of numbers near 20
+  CHECK_NEAR(up + forces->u[2], 2 * 9.81, 1e-12);
+  CHECK_NEAR(forces->com[2], 0.1, 1e-12);
+  cav_forces_free(forces);
+  // without rest after the end the last knot has no forces, and says so
+  forces = cav_forces_new(problem->model, solution->trajectory, &contact, 0, &error);
+  CHECK(forces && forces->nforce == 20 && isnan(forces->unactuated[5]) && isnan(forces->u[5 * 6]));
+  cav_forces_free(forces);
+  cav_forces_free(NULL);
+}
+
+static void check_verdict(const cav_problem *problem) {
+  cav_error error = {0};
+  cav_verdict verdict = {.certified = 0,
+                         .penetration_max_m = 0.02,
+                         .optimality = NAN,
+                         .duration = 0.1,
+                         .closed_loop_seconds = 0.1,
+                         .solve_seconds = 0.25,
+                         .iterations = 9};
+  snprintf(verdict.reason, sizeof verdict.reason, "too \"deep\"\n");
+  CHECK(cav_result_write_verdict(folder, problem, &verdict, &error) == CAV_OK);
+  const char *text = read_file("verdict.json");
+  const char *field[] = {
+      "\"certified\": false",           "\"model\": \"box \\\"1\\\"\"",  "\"reason\": \"too \\\"deep\\\"\\u000a\"",
+      "\"optimality\": null",           "\"penetration_max_m\": 0.02",   "\"iterations\": 9",
+      "\"unactuated_force_max\": ",     "\"momentum_defect_rms\": ",     "\"limit_violation_max\": ",
+      "\"constraint_violation_max\": ", "\"slip_mean_m_s\": ",           "\"replay_same_step_max_error\": ",
+      "\"closed_loop_seconds\": ",      "\"closed_loop_end_error_m\": ", "\"solve_seconds\": 0.25"};
+  for (size_t i = 0; i < sizeof field / sizeof *field; i++) {
+    CHECK(strstr(text, field[i]) != NULL);
+    if (!strstr(text, field[i])) fprintf(stderr, "    %s\n", field[i]);
+  }
+  // the marks follow the promises: only the penetration is missed; not a number is missed too
+  cav_certificate_line line[CAV_CERTIFICATE_LINES];
+  int n = cav_certificate_lines(&verdict, line), missed = 0;
+  for (int i = 0; i < n; i++) missed += line[i].passed == 0;
+  CHECK(n <= CAV_CERTIFICATE_LINES && missed == 1);
+  verdict.unactuated_force_max = NAN;
+  n = cav_certificate_lines(&verdict, line);
+  CHECK(line[0].passed == 0);
+  // what only the solver knew comes back from the file
+  cav_result *result = cav_result_read(folder, NULL, &error);
+  CHECK(result && isnan(result->optimality) && result->solve_seconds == 0.25 && result->iterations == 9);
+  cav_result_free(result);
+}
+
+// a folder with one file changed is refused, with this in the error
+static void refuse(const char *name, const char *text, const char *words) {
+  char *kept = strdup(read_file(name));
+  cav_error error = {0};
+  replace(name, text);
+  cav_result *result = cav_result_read(folder, NULL, &error);
+  CHECK(!result && error.status == CAV_BAD_INPUT && strstr(error.text, name) && strstr(error.text, words));
+  if (!strstr(error.text, words)) fprintf(stderr, "    expected %s, got %s\n", words, error.text);
+  cav_result_free(result);
+  if (kept) replace(name, kept);
+  free(kept);
+}
+
+static void check_refusals(void) {
+  refuse("gains.csv", "knot,time,dof\n0,0,0\n", "expected 30 rows");
+  refuse("gains.csv", "", "empty");
+  refuse("trajectory.csv", "time\n0\n1\n", "missing");
+  refuse("problem.xml", problem_text, "model");
+  cav_error error = {0};
+  CHECK(cav_result_read("/nowhere", NULL, &error) == NULL && error.status == CAV_BAD_INPUT);
+  // a file where a folder should be
+  char under[160];
+  snprintf(under, sizeof under, "%s/result", model_path);
+  CHECK(cav_result_folder(under, &error) == CAV_BAD_INPUT && strstr(error.text, model_path));
+}
+
+static void remove_all(void) {
+  const char *made[] = {"trajectory.csv", "gains.csv", "log.csv", "problem.xml", "verdict.json"};
+  char upper[128];
+  snprintf(upper, sizeof upper, "%s/some", top);
+  for (int i = 0; i < 5; i++) {
+    char *path = cav_result_path(folder, made[i]);
+    if (path) remove(path);
+    free(path);
+  }
+  remove(model_path);
+  remove(problem_path);
+  // nothing else was left there
+  CHECK(rmdir(folder) == 0 && rmdir(upper) == 0 && rmdir(top) == 0);
+}
+
+int main(void) {
+  CHECK(mkdtemp(top) != NULL);
+  snprintf(folder, sizeof folder, "%s/some/where", top);
+  snprintf(model_path, sizeof model_path, "%s/box.xml", top);
+  snprintf(problem_path, sizeof problem_path, "%s/rest.xml", top);
+  write_file(model_path, model_text);
+  write_file(problem_path, problem_text);
+  cav_error error = {0};
+  cav_problem *problem = cav_problem_load(problem_path, NULL, &error);
+  cav_solution solution = {0};
+  CHECK(problem != NULL);
+  if (problem && fill(&solution, problem)) {
+    CHECK(cav_result_folder(folder, &error) == CAV_OK && cav_result_folder(folder, &error) == CAV_OK);
+    CHECK(cav_result_write(folder, problem, &solution, &error) == CAV_OK);
+    // the model is two folders up: the folder and the model may move together
+    CHECK(strstr(read_file("problem.xml"), "model=\"../../box.xml\"") != NULL);
+    CHECK(strstr(read_file("log.csv"), "2,multipliers,1,,0,") != NULL);
+    check_read_back(&solution);
+    check_forces(problem, &solution);
+    check_verdict(problem);
+    check_refusals();
+  } else {
+    fprintf(stderr, "%s\n", error.text);
+  }
+  cav_trajectory_free(solution.trajectory);
+  free(solution.gain_q);
+  free(solution.gain_v);
+  free(solution.progress);
+  cav_problem_free(problem);
+  remove_all();
+  return check_result();
+}

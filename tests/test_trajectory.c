@@ -1,0 +1,240 @@
+/// optim/trajectory.c: making, differencing, resampling, and the CSV file both ways, with every kind of broken file.
+#include "cavort/trajectory.h"
+
+#include <locale.h>
+#include <unistd.h>
+
+#include "check.h"
+
+static char folder[] = "/tmp/cavort-trajectory-XXXXXX";
+static char model_path[128], csv_path[128];
+
+// one joint of each kind, one of them without a name, one whose name needs quotes
+static const char model_text[] =
+    "<mujoco><worldbody><body name='a'><joint name='root' type='free'/><geom size='.1'/>"
+    "<body name='b' pos='0 0 1'><joint name='shoulder' type='ball'/><geom size='.1'/>"
+    "<body name='c' pos='0 0 1'><joint name='slide, \"odd\"' type='slide'/><joint type='hinge' axis='0 1 0'/><geom "
+    "size='.1'/>"
+    "</body></body></body></worldbody></mujoco>";
+
+static void write_file(const char *path, const char *text) {
+  FILE *file = fopen(path, "w");
+  CHECK(file != NULL);
+  if (!file) return;
+  fputs(text, file);
+  fclose(file);
+}
+
+// whole file in static memory
+static const char *read_file(const char *path) {
+  static char text[200000];
+  FILE *file = fopen(path, "r");
+  size_t n = file ? fread(text, 1, sizeof text - 1, file) : 0;
+  if (file) fclose(file);
+  text[n] = 0;
+  return text;
+}
+
+static double draw(unsigned *seed) {
+  *seed = *seed * 1664525u + 1013904223u;
+  return (double)(*seed >> 8) / (1 << 23) - 1;
+}
+
+// a motion that moves every joint
+static cav_trajectory *wander(const cav_model *model, int n, double h) {
+  cav_trajectory *trajectory = cav_trajectory_new(model, n, h);
+  double v[16];
+  unsigned seed = 7;
+  for (int t = 0; t < n; t++) {
+    if (t > 0) {
+      for (int d = 0; d < model->nv; d++) v[d] = 2 * draw(&seed);
+      cav_integrate(model, trajectory->q + (t - 1) * model->nq, v, h, trajectory->q + t * model->nq);
+    }
+    for (int d = 0; d < model->nv; d++) trajectory->v[t * model->nv + d] = t ? v[d] : 0.1 * d;
+    for (int d = 0; d < model->nv; d++) trajectory->u[t * model->nv + d] = 100 * draw(&seed) / 3;
+  }
+  return trajectory;
+}
+
+static void check_new(const cav_model *model) {
+  cav_trajectory *trajectory = cav_trajectory_new(model, 5, 0.02);
+  CHECK(trajectory && trajectory->nq == model->nq && trajectory->nv == model->nv && trajectory->nknot == 5);
+  for (int t = 0; t < 5; t++) CHECK_NEAR_ALL(trajectory->q + t * model->nq, model->q0, model->nq, 0);
+  for (int i = 0; i < 5 * model->nv; i++) CHECK(trajectory->v[i] == 0 && trajectory->u[i] == 0);
+  CHECK(cav_trajectory_new(model, 1, 0.02) == NULL);
+  cav_trajectory_free(trajectory);
+  cav_trajectory_free(NULL);
+}
+
+static void check_velocities(const cav_model *model) {
+  cav_trajectory *trajectory = wander(model, 20, 0.03), *copy = cav_trajectory_copy(trajectory);
+  // the copy is apart: clearing its velocities and taking them from q gives back those that made q
+  memset(copy->v + model->nv, 0, sizeof(double) * (size_t)(19 * model->nv));
+  CHECK(trajectory->v[model->nv] != 0);
+  cav_trajectory_velocities(model, copy);
+  // rounding of q over h: 1e-15/0.03, seen 6e-14
+  CHECK_NEAR_ALL(copy->v, trajectory->v, 20 * model->nv, 1e-12);
+  cav_trajectory_free(copy);
+  cav_trajectory_free(trajectory);
+}
+
+static void check_resample(const cav_model *model) {
+  cav_trajectory *coarse = wander(model, 11, 0.04);
+  cav_trajectory *fine = cav_trajectory_resample(model, coarse, 0.01);
+  CHECK(fine && fine->nknot == 41);
+  for (int t = 0; t < 11 && fine; t++) {
+    // at shared knots the configurations agree: rounding, seen 3e-16
+    CHECK_NEAR_ALL(fine->q + 4 * t * model->nq, coarse->q + t * model->nq, model->nq, 1e-14);
+    CHECK_NEAR_ALL(fine->u + 4 * t * model->nv, coarse->u + t * model->nv, model->nv, 0);
+  }
+  // between knots the velocity is that of the coarse step
+  for (int t = 1; t < 41 && fine; t++) {
+    CHECK_NEAR_ALL(fine->v + t * model->nv, coarse->v + ((t + 3) / 4) * model->nv, model->nv, 1e-12);
+  }
+  cav_trajectory *back = fine ? cav_trajectory_resample(model, fine, 0.04) : NULL;
+  CHECK(back && back->nknot == 11);
+  if (back) CHECK_NEAR_ALL(back->q, coarse->q, 11 * model->nq, 1e-14);
+  CHECK(cav_trajectory_resample(model, coarse, 0) == NULL);
+  CHECK(cav_trajectory_resample(model, coarse, 10) == NULL);
+  CHECK(cav_trajectory_resample(model, coarse, NAN) == NULL);
+  cav_trajectory_free(back);
+  cav_trajectory_free(fine);
+  cav_trajectory_free(coarse);
+}
+
+static void check_round_trip(const cav_model *model) {
+  cav_error error;
+  cav_trajectory *trajectory = wander(model, 17, 1.0 / 30);
+  CHECK(cav_trajectory_write(csv_path, model, trajectory, &error) == CAV_OK);
+  cav_trajectory *read = cav_trajectory_read(csv_path, model, &error);
+  CHECK(read != NULL);
+  if (read) {
+    // bit for bit
+    CHECK(read->nknot == 17 && read->timestep == trajectory->timestep);
+    CHECK_NEAR_ALL(read->q, trajectory->q, 17 * model->nq, 0);
+    CHECK_NEAR_ALL(read->v, trajectory->v, 17 * model->nv, 0);
+    CHECK_NEAR_ALL(read->u, trajectory->u, 17 * model->nv, 0);
+  }
+  const char *header =
+      "time,qpos_root_0,qpos_root_1,qpos_root_2,qpos_root_3,qpos_root_4,qpos_root_5,qpos_root_6,qpos_shoulder_0,";
+  CHECK(!strncmp(read_file(csv_path), header, strlen(header)));
+  CHECK(strstr(read_file(csv_path), ",\"qpos_slide, \"\"odd\"\"\",qpos_#3,qvel_root_0,") != NULL);
+  cav_trajectory_free(read);
+
+  // what is not finite is not written, and the old file stays
+  char *before = strdup(read_file(csv_path));
+  trajectory->u[3] = NAN;
+  CHECK(cav_trajectory_write(csv_path, model, trajectory, &error) == CAV_NOT_FINITE);
+  CHECK_TEXT(read_file(csv_path), before);
+  trajectory->u[3] = 0;
+  CHECK(cav_trajectory_write("/nowhere/at/all.csv", model, trajectory, &error) == CAV_BAD_INPUT);
+  CHECK(strstr(error.text, "/nowhere/at/all.csv") != NULL);
+  free(before);
+  cav_trajectory_free(trajectory);
+}
+
+// a user's own file: only what is needed, columns in another order, few digits, CRLF
+static void check_partial(const cav_model *model) {
+  cav_error error = {0};
+  write_file(csv_path,
+             "qpos_#3,time,qpos_root_0,qpos_root_1,qpos_root_2,qpos_root_3,qpos_root_4,qpos_root_5,qpos_root_6,qpos_"
+             "shoulder_0,"
+             "qpos_shoulder_1,qpos_shoulder_2,qpos_shoulder_3,\"qpos_slide, \"\"odd\"\"\"\r\n"
+             "0.0,0,0,0,1,1,0,0,0,1,0,0,0,0\r\n\r\n"
+             "0.1,0.1,0,0,1.5,0.9998,0.02,0,0,1,0,0,0,0.25\r\n");
+  cav_trajectory *read = cav_trajectory_read(csv_path, model, &error);
+  CHECK(read != NULL);
+  if (!read) {
+    fprintf(stderr, "    %s\n", error.text);
+    return;
+  }
+  CHECK_NEAR(read->timestep, 0.1, 0);
+  CHECK_NEAR(read->v[model->nv + 2], 5, 1e-12);
+  CHECK_NEAR(read->v[model->nv + model->nv - 1], 1, 1e-12);
+  double *w = read->q + model->nq + 3;
+  CHECK_NEAR(w[0] * w[0] + w[1] * w[1] + w[2] * w[2] + w[3] * w[3], 1, 1e-15);
+  cav_trajectory_free(read);
+}
+
+// expects the file to be refused with this line and these words
+static void refuse(const cav_model *model, const char *text, int line, const char *words) {
+  cav_error error = {0};
+  write_file(csv_path, text);
+  cav_trajectory *read = cav_trajectory_read(csv_path, model, &error);
+  CHECK(read == NULL);
+  char place[160];
+  snprintf(place, sizeof place, "%s:%d: ", csv_path, line);
+  int said = error.status == CAV_BAD_INPUT && error.line == line && !strncmp(error.text, place, strlen(place)) &&
+             strstr(error.text, words);
+  CHECK(said);
+  if (!said) fprintf(stderr, "    expected %s...%s, got %s\n", place, words, error.text);
+  cav_trajectory_free(read);
+}
+
+static void check_refusals(void) {
+  write_file(model_path,
+             "<mujoco><worldbody><body><joint name='x' type='slide'/><geom size='.1'/></body></worldbody></mujoco>");
+  cav_error error = {0};
+  cav_model *model = cav_model_load(model_path, &error);
+  CHECK(model != NULL);
+  if (!model) return;
+  refuse(model, "", 1, "empty");
+  refuse(model, "time,qpos_x\n0,0\n", 1, "two rows");
+  refuse(model, "time,qpos_y\n0,0\n.1,0\n", 1, "qpos_x");
+  refuse(model, "time,elbow\n0,0\n.1,0\n", 1, "'elbow'");
+  refuse(model, "qpos_x\n0\n1\n", 1, "'time' is missing");
+  refuse(model, "time\n0\n1\n", 1, "'qpos_x' is missing");
+  refuse(model, "time,qpos_x,qpos_x\n0,0,0\n.1,0,0\n", 1, "twice");
+  refuse(model, "time,qpos_x\n0,0\n.1,0,5\n", 3, "expected 2 values");
+  refuse(model, "time,qpos_x\n0,0\n.1\n", 3, "expected 2 values");
+  refuse(model, "time,qpos_x\n0,zero\n.1,0\n", 2, "'zero'");
+  refuse(model, "time,qpos_x\n0,0\n.1,nan\n", 3, "finite");
+  refuse(model, "time,qpos_x\n0,0\n.1,1e999\n", 3, "finite");
+  refuse(model, "time,qpos_x\n0,0\n.1,\n", 3, "finite");
+  refuse(model, "time,qpos_x\n0,0\n.1,0\n.25,0\n", 3, "equal");
+  refuse(model, "time,qpos_x\n0,0\n-.1,0\n", 2, "increasing");
+  cav_trajectory *none = cav_trajectory_read("/nowhere/at/all.csv", model, &error);
+  CHECK(!none && error.status == CAV_BAD_INPUT && strstr(error.text, "/nowhere/at/all.csv"));
+  none = cav_trajectory_read(folder, model, &error);
+  CHECK(!none && error.status == CAV_BAD_INPUT);
+  none = cav_trajectory_read(folder, model, NULL);
+  CHECK(!none);
+  cav_model_free(model);
+}
+
+// numbers have a point in any locale that is there
+static void check_locale(const cav_model *model) {
+  if (!setlocale(LC_ALL, "de_DE.UTF-8")) {
+    printf("no German locale here: the comma is not tried\n");
+    return;
+  }
+  check_round_trip(model);
+  setlocale(LC_ALL, "C");
+}
+
+int main(void) {
+  CHECK(mkdtemp(folder) != NULL);
+  snprintf(model_path, sizeof model_path, "%s/model.xml", folder);
+  snprintf(csv_path, sizeof csv_path, "%s/trajectory.csv", folder);
+  write_file(model_path, model_text);
+  cav_error error = {0};
+  cav_model *model = cav_model_load(model_path, &error);
+  CHECK(model != NULL);
+  if (model) {
+    check_new(model);
+    check_velocities(model);
+    check_resample(model);
+    check_round_trip(model);
+    check_partial(model);
+    check_locale(model);
+  } else {
+    fprintf(stderr, "%s\n", error.text);
+  }
+  check_refusals();
+  cav_model_free(model);
+  remove(csv_path);
+  remove(model_path);
+  // nothing is left behind, not even half a file
+  CHECK(rmdir(folder) == 0);
+  return check_result();
+}

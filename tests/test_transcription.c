@@ -1,0 +1,229 @@
+/// Derivatives of whole problems: the gradient of the merit at every unknown, first and last knots included, the rows of the
+/// constraints and their sparsity, against centred differences of the values; the same bits with one and two threads.
+/// Seen: gradients to 3e-6 of their norm (bound 1e-5); rows to 7e-4 (bound 2e-3: one-sided differences across stiff contacts);
+/// no nonzero outside the pattern, and none of the pattern of forces and ranges that stays zero.
+#include "transcription.h"
+
+#include "scene.h"
+
+/// A body that floats over and touches a floor, with a ball joint, a tendon, limits near their ends and an unactuated dof.
+static const char walker[] =
+    "<mujoco><worldbody><geom name='floor' type='plane' size='1 1 1'/>"
+    "<body name='trunk' pos='0 0 .3'><freejoint name='root'/><geom type='sphere' size='.1' mass='3'/>"
+    "<site name='eye' pos='.1 0 .05'/>"
+    "<body name='leg' pos='.1 0 -.05'><joint name='hip' axis='0 1 0' limited='true' range='-30 30' armature='.01' damping='.1'/>"
+    "<geom type='capsule' size='.03' fromto='0 0 0 0 0 -.15' mass='.5'/>"
+    "<body name='foot' pos='0 0 -.2'><joint name='ankle' axis='0 1 0' armature='.01'/>"
+    "<geom name='sole' type='capsule' size='.03' fromto='-.05 0 0 .1 0 0' mass='.2'/></body></body>"
+    "<body name='arm' pos='-.1 0 .1'><joint name='shoulder' type='ball' limited='true' range='0 60' damping='.05'/>"
+    "<geom type='capsule' size='.03' fromto='0 0 0 .1 0 -.25' mass='.4'/></body></body></worldbody>"
+    "<tendon><fixed name='string' limited='true' range='-.5 .5'><joint joint='hip' coef='.5'/><joint joint='ankle' coef='.5'/>"
+    "</fixed></tendon>"
+    "<actuator><motor joint='hip' gear='20' ctrllimited='true' ctrlrange='-1 1'/>"
+    "<motor tendon='string' gear='5' ctrllimited='true' ctrlrange='-.5 1'/></actuator></mujoco>";
+
+/// Costs of every quantity, hard terms of every kind, windows of both kinds.
+static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) {
+  static double eye_target[3] = {0.2, 0.1, 0.5}, quat_target[4] = {0.9, 0.1, 0.3, 0.3}, waypoints[6] = {0, 0, 0.3, 0.1, 0, 0.4};
+  static double waypoint_time[2] = {0, 0.15};
+  int n = cav_problem_default_terms(term, 16), trunk = cav_find(m, CAV_OBJECT_BODY, "trunk");
+  cav_term base = term[0];
+  base.quantity = CAV_QUANTITY_SENSOR;
+  base.weight = 3;
+  for (int kind = 0; kind < 7; kind++) {
+    cav_term *t = &term[n++];
+    *t = base;
+    t->scale = 0.5 + 0.1 * kind;
+    t->sensor = (cav_sensor){.name = "", .type = CAV_SENSOR_FRAMEPOS, .object_type = CAV_OBJECT_SITE, .dim = 3};
+    t->sensor.object = cav_find(m, CAV_OBJECT_SITE, "eye");
+    t->target = eye_target;
+    if (kind == 0) t->from = t->to = p->duration;
+    if (kind == 1) t->sensor.type = CAV_SENSOR_FRAMEQUAT, t->sensor.dim = 4, t->target = quat_target;
+    if (kind == 2) t->sensor.type = CAV_SENSOR_FRAMELINVEL, t->use = CAV_USE_EQUAL, t->from = 0.05, t->to = 0.1;
+    if (kind == 3) t->sensor = (cav_sensor){"", CAV_SENSOR_SUBTREECOM, CAV_OBJECT_BODY, trunk, 3, 0}, t->nwaypoint = 2;
+    if (kind == 3) t->target = waypoints, t->waypoint_time = waypoint_time;
+    if (kind == 4) t->use = CAV_USE_RANGE, t->lower = -0.01, t->upper = 0.01, t->component = 2;
+    if (kind == 5) t->quantity = CAV_QUANTITY_CONFIGURATION, t->use = CAV_USE_EQUAL, t->from = t->to = p->duration, t->target = NULL;
+    if (kind == 6) t->quantity = CAV_QUANTITY_VELOCITY, t->use = CAV_USE_RANGE, t->lower = -0.1, t->upper = 0.1, t->target = NULL;
+  }
+  return n;
+}
+
+static void shake(cav_trajectory *at, const cav_model *m, double size) {
+  double step[64];
+  for (int t = 1; t < at->nknot; t++) {
+    for (int d = 0; d < m->nv; d++) step[d] = size * scene_uniform();
+    cav_integrate(m, at->q + (t - 1) * at->nq, step, 1, at->q + t * at->nq);
+  }
+  cav_trajectory_velocities(m, at);
+}
+
+static double merit_at(cav_transcription *tr, const cav_trajectory *at, cav_trajectory *moved, double *x, int i, double step) {
+  x[i] = step;
+  cav_transcription_move(tr, at, x, moved);
+  x[i] = 0;
+  CHECK(cav_transcription_values(tr, moved) == CAV_OK);
+  return cav_transcription_merit(tr);
+}
+
+/// The summed gradient against differences of the summed merit.
+static void test_gradient(cav_transcription *tr, cav_trajectory *at) {
+  const cav_model *m = tr->model;
+  int n = (tr->nknot - 1) * m->nv;
+  double *gradient = calloc((size_t)n, sizeof(double)), *x = calloc((size_t)n, sizeof(double)), norm = 0, worst = 0;
+  cav_trajectory *moved = cav_trajectory_copy(at);
+  CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
+  for (int t = 0; t < tr->nknot; t++)
+    for (int c = 0; c < 3 * m->nv; c++) {
+      int i = (t - 2) * m->nv + c;
+      if (i >= 0 && i < n) gradient[i] += tr->knot[t].gradient[c];
+      if (i < 0 || i >= n) CHECK(tr->knot[t].gradient[c] == 0);
+    }
+  for (int i = 0; i < n; i++) norm = fmax(norm, fabs(gradient[i]));
+  for (int i = 0; i < n; i++) {
+    double step = 1e-5, slope = (merit_at(tr, at, moved, x, i, step) - merit_at(tr, at, moved, x, i, -step)) / (2 * step);
+    double error = fabs(slope - gradient[i]) / norm;
+    if (error > worst) worst = error;
+    if (error > 1e-5) printf("knot %d dof %d: %.9g against %.9g\n", i / m->nv + 1, i % m->nv, gradient[i], slope);
+  }
+  printf("gradient: largest %.3g, worst error %.3g of it\n", norm, worst);
+  CHECK(worst < 1e-5);
+  // a control: one wrong component is seen
+  CHECK(norm > 1e-3);
+  free(gradient), free(x);
+  cav_trajectory_free(moved);
+}
+
+/// Rows of the constraints against differences of their values, and their pattern: all that is nonzero is in it, and all that
+/// is in it is nonzero somewhere (but for hard sensor terms, whose pattern is that of the whole reading).
+static void test_rows(cav_transcription *tr, cav_trajectory *at, int tries) {
+  const cav_model *m = tr->model;
+  int width = 3 * m->nv, extra = 0, total = 0, unused = 0;
+  double worst = 0;
+  size_t most = 0, rows = 0;
+  for (int t = 0; t < tr->nknot; t++) most += (size_t)tr->knot[t].layout.count;
+  char *pattern = calloc((size_t)width, 1), *used = calloc(most * (size_t)width, 1);
+  double *x = calloc((size_t)(tr->nknot - 1) * m->nv, sizeof(double)), *plus = malloc(most * sizeof(double));
+  cav_trajectory *moved = cav_trajectory_copy(at);
+  CHECK(cav_transcription_keep_rows(tr));
+  for (int k = 0; k < tries; k++) {
+    shake(at, m, k + 1 < tries ? 0.4 : 0.05);
+    CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
+    rows = 0;
+    for (int t = 0; t < tr->nknot; t++)
+      for (int i = 0; i < tr->knot[t].layout.count; i++, rows++)
+        for (int c = 0; c < width; c++) used[rows * (size_t)width + (size_t)c] |= tr->knot[t].slot_row[i * width + c] != 0;
+  }
+  // differences at the last point, for the first, a middle and the last knot
+  for (int t = 1; t < tr->nknot; t++) {
+    if (t != 1 && t != tr->nknot / 2 && t != tr->nknot - 1) continue;
+    for (int d = 0; d < m->nv; d++) {
+      double step = 1e-6;
+      int i = (t - 1) * m->nv + d;
+      merit_at(tr, at, moved, x, i, step);
+      size_t at_row = 0;
+      for (int s = 0; s < tr->nknot; s++)
+        for (int r = 0; r < tr->knot[s].layout.count; r++) plus[at_row++] = tr->knot[s].slot[r].value;
+      merit_at(tr, at, moved, x, i, -step);
+      at_row = 0;
+      for (int s = 0; s < tr->nknot; s++)
+        for (int r = 0; r < tr->knot[s].layout.count; r++, at_row++) {
+          double slope = (plus[at_row] - tr->knot[s].slot[r].value) / (2 * step);
+          int c = (t - s + 1) * m->nv + d;
+          double row = c >= 0 && c < width ? tr->knot[s].slot_row[r * width + c] : 0;
+          worst = fmax(worst, fabs(slope - row) / fmax(1, fabs(row)));
+        }
+    }
+  }
+  rows = 0;
+  for (int t = 0; t < tr->nknot; t++)
+    for (int i = 0; i < tr->knot[t].layout.count; i++, rows++) {
+      cav_transcription_pattern(tr, t, i, pattern);
+      for (int c = 0; c < width; c++) {
+        int is = used[rows * (size_t)width + (size_t)c];
+        extra += is && !pattern[c];
+        unused += i < tr->knot[t].layout.term && pattern[c] && !is;
+        total += pattern[c];
+      }
+    }
+  printf("rows: worst error %.3g; pattern of %d entries, %d outside it, %d never used\n", worst, total, extra, unused);
+  CHECK(worst < 2e-3);
+  CHECK(extra == 0);
+  CHECK(unused == 0);
+  free(pattern), free(used), free(x), free(plus);
+  cav_trajectory_free(moved);
+}
+
+static void test_threads(const cav_problem *p, cav_transcription *one, cav_trajectory *at) {
+  cav_transcription *two = cav_transcription_new(p, 2, NULL);
+  if (!CHECK(two != NULL)) return;
+  two->options = one->options;
+  two->penalty = one->penalty;
+  for (int t = 0; t < one->nknot; t++)
+    memcpy(two->knot[t].slot, one->knot[t].slot, (size_t)one->knot[t].layout.count * sizeof(cav_slot));
+  CHECK(cav_transcription_linearise(one, at) == CAV_OK && cav_transcription_linearise(two, at) == CAV_OK);
+  for (int t = 0; t < one->nknot; t++) {
+    size_t n = (size_t)one->nv;
+    CHECK(!memcmp(one->knot[t].hessian, two->knot[t].hessian, 9 * n * n * sizeof(double)));
+    CHECK(!memcmp(one->knot[t].gradient, two->knot[t].gradient, 3 * n * sizeof(double)));
+  }
+  cav_transcription_free(two);
+}
+
+static void test_scene(int close_at_rest, cav_order order) {
+  cav_model *m = scene_load(walker);
+  if (!CHECK(m != NULL)) return;
+  cav_term term[24];
+  double v_start[64] = {0}, q_start[64], q_goal[64];
+  cav_problem p = cav_problem_default(m);
+  p.order = order;
+  p.close_at_rest = close_at_rest;
+  p.duration = 0.15;
+  memcpy(q_start, m->q0, (size_t)m->nq * sizeof(double));
+  memcpy(q_goal, m->q0, (size_t)m->nq * sizeof(double));
+  for (int d = 0; d < m->nv; d++) v_start[d] = 0.3 * scene_uniform();
+  p.q_start = q_start, p.q_goal = q_goal, p.v_start = v_start;
+  p.nterm = fill_terms(m, &p, term);
+  p.term = term;
+  cav_transcription *tr = cav_transcription_new(&p, 1, NULL);
+  cav_trajectory *at = cav_trajectory_new(m, tr->nknot, p.timestep);
+  memcpy(at->v, v_start, (size_t)m->nv * sizeof(double));
+  shake(at, m, 0.05);
+  tr->options.stabilisation = CAV_STABILISATION_DISCRETE;
+  tr->options.softness = 0.5;
+  tr->options.smoothing = 0.03;
+  tr->options.smoothing_self = 0.02;
+  tr->penalty = (cav_penalties){1e3, 100, 1000, 200};
+  for (int t = 0; t < tr->nknot; t++)
+    for (int i = 0; i < tr->knot[t].layout.count; i++) tr->knot[t].slot[i].multiplier = scene_uniform();
+  test_gradient(tr, at);
+  test_threads(&p, tr, at);
+  test_rows(tr, at, 60);
+  cav_trajectory_free(at);
+  cav_transcription_free(tr);
+  cav_model_free(m);
+}
+
+/// SO(3) Jacobians against differences of the exponential.
+static void test_turns(void) {
+  for (int k = 0; k < 200; k++) {
+    double phi[3], J[9], inverse[9], size = k < 20 ? 1e-5 : 1.2;
+    for (int c = 0; c < 3; c++) phi[c] = size * scene_uniform();
+    cav_turn(phi, J);
+    cav_turn_inverse(phi, inverse);
+    for (int r = 0; r < 3; r++)
+      for (int c = 0; c < 3; c++) {
+        double sum = 0;
+        for (int i = 0; i < 3; i++) sum += J[3 * r + i] * inverse[3 * i + c];
+        CHECK_NEAR(sum, r == c, 1e-11);
+      }
+  }
+}
+
+int main(void) {
+  test_turns();
+  test_scene(1, CAV_ORDER_MIDPOINT);
+  test_scene(0, CAV_ORDER_MIDPOINT);
+  test_scene(1, CAV_ORDER_EULER);
+  return check_result();
+}
