@@ -125,8 +125,8 @@ static int touch_edges(const boxes *g, const separation *best, double margin, ca
   return touch_between(x, y, best->normal, best->gap, margin, 3 * i + j, touch);
 }
 
-// keeps a contact from x on a to y on b if it is nearer than the one held; two corners are found from both sides, and the
-// first stays whatever rounding says
+// keeps a contact from x on a to y on b if it is nearer than the one held; two corners are found from both sides, and
+// the first stays whatever rounding says
 static void keep_nearer(const boxes *g, const double x[3], const double y[3], int feature, cav_touch *touch) {
   double n[3];
   sub3(n, y, x);
@@ -181,14 +181,16 @@ static void nearest_features(const boxes *g, cav_touch *touch) {
 
 enum { POLYGON_MAX = 8 };
 
-/// Convex polygon; line[k] tells the line from corner k to the next: 0 to 3 edges of the face, 4 to 7 sides of the prism.
+/// Convex polygon; line[k] tells the line from corner k to the next: 0 to 3 edges of the face, 4 to 7 sides of the
+/// prism.
 typedef struct polygon {
   int count;
   double x[POLYGON_MAX][3];
   int line[POLYGON_MAX];
 } polygon;
 
-// cuts away where direction . x > bound; the cut is tagged line. A quadrilateral cut by 4 planes keeps at most 8 corners
+// cuts away where direction . x > bound; the cut is tagged line. A quadrilateral cut by 4 planes keeps at most 8
+// corners
 static void cut(polygon *p, const double direction[3], double bound, int line) {
   polygon out = {.count = 0};
   for (int k = 0; k < p->count; k++) {

@@ -1,7 +1,7 @@
 /// Which geoms touch: broad phase by bounding spheres over the list of pairs that the model was compiled to, then the
 /// narrow phase of pairs.c. Geoms in no pair are never placed; a geom's rotation is formed only if a narrow phase asks
-/// for it, once per call, and that of a geom fixed to the world once for all. No sorting or tree: the models in mind have
-/// a few hundred pairs.
+/// for it, once per call, and that of a geom fixed to the world once for all. No sorting or tree: the models in mind
+/// have a few hundred pairs.
 #include <stdlib.h>
 
 #include "cavort/dynamics.h"
@@ -145,8 +145,8 @@ static const cav_shape *shape_of(const cav_state *state, struct cav_geom_cache *
   return &s->shape;
 }
 
-// contact axes: the normal, then the tangent or, where none is given, the world's y or z, made square to it. No choice is
-// smooth over all normals: this one jumps where the normal's y crosses 1/2, with no effect on isotropic friction
+// contact axes: the normal, then the tangent or, where none is given, the world's y or z, made square to it. No choice
+// is smooth over all normals: this one jumps where the normal's y crosses 1/2, with no effect on isotropic friction
 static void make_frame(const cav_touch *touch, double frame[9]) {
   double *n = frame, *s = frame + 3;
   copy3(n, touch->normal);

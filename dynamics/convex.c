@@ -1,19 +1,18 @@
 /// Pairs of ellipsoid, cylinder and box without a routine of their own. The only user of libccd.
 ///
-/// 1. libccd (Minkowski portal refinement on both shapes grown by half the margin) finds a direction of separation, unless
-///    the line of centres or a face already proves them apart.
-///    Where they overlap, other starts are added.
+/// 1. libccd (Minkowski portal refinement on both shapes grown by half the margin) finds a direction of separation,
+///    unless the line of centres or a face already proves them apart. Where they overlap, other starts are added.
 /// 2. The direction is polished, because portals end at a loose tolerance and derivatives are taken by differences. The
-///    gap along n, gap(n) = min_b n.b - max_a n.a, has the gradient b - a of its support points; its largest value is the
-///    signed distance. Along which n it is smooth depends on how the shapes meet, so each way is solved by itself and the
-///    largest gap wins: a face or a cap (n fixed), two straight lines (n square to both), a line and a rim or a corner (n
-///    square to the line: one angle), rims, corners and ellipsoids (two angles). Every value is a lower bound of the
-///    distance, thus the winner is right as soon as one of them is.
-/// One point per pair, at the middle of what touches; a cylinder or box that stands on a cap or a face has in addition the
-/// points that a plane there would give it, as far as they are above that face, so that it is kept from tilting.
-/// Apart, the distance is exact but for about one pose in 100,000, where the direction is left short of its solution: the
-/// gap is then smaller than the distance. Overlapping shapes can leave each other in several ways; the best of a few is
-/// taken, which misses the least one in about one pose in 1,000 of those that overlap by a tenth of their size.
+///    gap along n, gap(n) = min_b n.b - max_a n.a, has the gradient b - a of its support points; its largest value is
+///    the signed distance. Along which n it is smooth depends on how the shapes meet, so each way is solved by itself
+///    and the largest gap wins: a face or a cap (n fixed), two straight lines (n square to both), a line and a rim or
+///    a corner (n square to the line: one angle), rims, corners and ellipsoids (two angles). Every value is a lower
+///    bound of the distance, thus the winner is right as soon as one of them is.
+/// One point per pair, at the middle of what touches; a cylinder or box that stands on a cap or a face has in addition
+/// the points that a plane there would give it, as far as they are above that face, so that it is kept from tilting.
+/// Apart, the distance is exact but for about one pose in 100,000, where the direction is left short of its solution:
+/// the gap is then smaller than the distance. Overlapping shapes can leave each other in several ways; the best of a
+/// few is taken, which misses the least one in about one pose in 1,000 of those that overlap by a tenth of their size.
 /// Slow, 10 to 60 microseconds a pair: models that care use capsules, spheres and planes.
 #include "pairs.h"
 
@@ -264,7 +263,8 @@ static void tangential(const probe *p, const double u[3], const double w[3], dou
   r[1] = dot3(p->d, w) - p->gap * dot3(p->n, w);
 }
 
-// Newton step (x, y) uphill for gradient r and Hessian (a, b; b, e): along each eigenvector by the curvature's magnitude
+// Newton step (x, y) uphill for gradient r and Hessian (a, b; b, e): along each eigenvector by the curvature's
+// magnitude
 static void uphill(const double r[2], double a, double b, double e, double *x, double *y) {
   double angle = 0.5 * atan2(2 * b, a - e), c = cos(angle), s = sin(angle);
   double first = a * c * c + 2 * b * c * s + e * s * s, second = a + e - first;
@@ -275,8 +275,8 @@ static void uphill(const double r[2], double a, double b, double e, double *x, d
   *y = s * along + c * across;
 }
 
-// two angles, where the support points move smoothly with n: Newton on the gap, whose gradient is the tangential part of
-// b - a; second derivatives by differences. Where the best direction is of another kind it ends without a solution
+// two angles, where the support points move smoothly with n: Newton on the gap, whose gradient is the tangential part
+// of b - a; second derivatives by differences. Where the best direction is of another kind it ends without a solution
 static void try_smooth(search *g, const double start[3]) {
   enum { STEPS_MAX = 40, HALVINGS_MAX = 12 };
   const double tilt = 1e-7, turn_max = 0.3;

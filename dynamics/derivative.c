@@ -127,8 +127,10 @@ cav_status cav_differentiate(const cav_model *model, cav_state *state, cav_deriv
   status = columns(&d, CAV_STAGE_VELOCITY, relative, d_dv_next);
   if (status == CAV_OK) { status = columns(&d, CAV_STAGE_POSITION, relative, d_dv); }
   if (status == CAV_OK) { status = columns(&d, CAV_STAGE_NONE, step > 0 ? step : POSITION_STEP[method], d_dq); }
-  if (status == CAV_OK && (d_dq || d_dv || d_dv_next)) {
-    status = restore(&d, d_dq ? CAV_STAGE_NONE : d_dv ? CAV_STAGE_POSITION : CAV_STAGE_VELOCITY);
+  // back to the point, also when a moved evaluation failed
+  if (d_dq || d_dv || d_dv_next) {
+    cav_status back = restore(&d, d_dq ? CAV_STAGE_NONE : d_dv ? CAV_STAGE_POSITION : CAV_STAGE_VELOCITY);
+    status = status == CAV_OK ? back : status;
   }
   return status;
 }

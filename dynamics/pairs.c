@@ -1,12 +1,13 @@
 /// Contact points of two shapes, by a table over their types.
 /// Conventions (MuJoCo's): a point lies midway between the two surfaces along the normal, the normal points from the
 /// first to the second shape, the gap is negative in penetration, and a point exists while its gap is below the margin.
-/// Distances are exact (two boxes and convex.c: see there). Normals and points are smooth in the poses but for what the geometry itself makes jump:
+/// Distances are exact (two boxes and convex.c: see there). Normals and points are smooth in the poses but for what
+/// the geometry itself makes jump:
 ///  - coincident centres: a fixed direction is taken; crossing axes of capsules: the normal changes side;
 ///  - capsules closer to parallel than PARALLEL rad have two points where their sides overlap, others one;
-///  - a plane sees the 4 lowest corners of a box, and of a cylinder one line along its side and a regular triangle on its
-///    lower cap with one corner at the lowest point. The triangle turns quickly near the upright pose, but three equal
-///    springs on it push and tilt alike however it is turned.
+///  - a plane sees the 4 lowest corners of a box, and of a cylinder one line along its side and a regular triangle on
+///    its lower cap with one corner at the lowest point. The triangle turns quickly near the upright pose, but three
+///    equal springs on it push and tilt alike however it is turned.
 /// Solids without a routine of their own go to convex.c.
 #include "pairs.h"
 
@@ -179,8 +180,8 @@ static int touch_at(const cav_shape *a, const cav_shape *b, const segments *g, d
   return touch_spheres(x, a->size[0], y, b->size[0], side, margin, feature, touch);
 }
 
-// touch of balls inside both segments: the normal is the common perpendicular. So it stays defined where the axes cross,
-// as they do all the time in planar models; there it is u x w itself
+// touch of balls inside both segments: the normal is the common perpendicular. So it stays defined where the axes
+// cross, as they do all the time in planar models; there it is u x w itself
 static int touch_across(const cav_shape *a, const cav_shape *b, const segments *g, const double cross[3], double s,
                         double margin, cav_touch *touch) {
   double n[3], apart = dot3(g->d, cross), length = norm3(cross);

@@ -5,8 +5,9 @@
 #include "math3.h"
 #include "stage.h"
 
-/// Signed distance of point p [3] to the surface of a solid centred at the origin, negative inside, and the unit outward
-/// normal [3] at the nearest surface point p - distance * normal. All in the solid's axes. Convex in p. surface.c.
+/// Signed distance of point p [3] to the surface of a solid centred at the origin, negative inside, and the unit
+/// outward normal [3] at the nearest surface point p - distance * normal. All in the solid's axes. Convex in p.
+/// surface.c.
 typedef double cav_surface(const double *size, const double p[3], double normal[3]);
 
 cav_surface cav_surface_box, cav_surface_cylinder, cav_surface_ellipsoid;

@@ -1,8 +1,8 @@
 /// Nearest surface points of box, cylinder and ellipsoid, and support points of all solids.
-/// Box and cylinder: closed form, by clamping. Ellipsoid: the nearest point x of y obeys y = x + t x/a^2; t is the largest
-/// root of sum (a_i y_i/(t + a_i^2))^2 = 1, convex and decreasing right of its poles, so that Newton started left of the
-/// root rises to it without a safeguard. Where a point has several nearest ones (an axis, the focal ellipse), one is
-/// picked, always the same: the normal jumps there, the distance does not.
+/// Box and cylinder: closed form, by clamping. Ellipsoid: the nearest point x of y obeys y = x + t x/a^2; t is the
+/// largest root of sum (a_i y_i/(t + a_i^2))^2 = 1, convex and decreasing right of its poles, so that Newton started
+/// left of the root rises to it without a safeguard. Where a point has several nearest ones (an axis, the focal
+/// ellipse), one is picked, always the same: the normal jumps there, the distance does not.
 #include "pairs.h"
 
 // +1 or -1, never 0

@@ -6,8 +6,10 @@
 /// Closed loop at a tenth of the step: the model as its file says (its own solref contacts by the exact law, the
 /// paper's Euler step), forces u + K_q (q (-) q_ref) + K_v (v - v_ref) brought to the actuators and clipped to their
 /// limits.
-/// From knot t on u_t and the gains of knot t hold for one step; the reference runs along the geodesic to knot t+1, its
-/// velocity from v_t to v_{t+1}. README.md has what the alternatives gave. optimisation.md, 3 and 6.
+/// Between knots the motion is read as what it is to second order: v_{t+1} = (q_{t+1} (-) q_t)/h is the velocity half
+/// way, and h u_t the impulse centred on knot t. So q_ref runs along the geodesic, v_ref is linear between half steps,
+/// and u_t and the gains of knot t hold for half a step either side. README.md has what the alternatives gave.
+/// optimisation.md, 3 and 6.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -128,11 +130,12 @@ static void drive(const cav_model *model, const double *control, double *u) {
   }
 }
 
-// u := forces held from knot t on and feedback at (q, v), through the actuators
+// u := forces held around knot t and feedback at (q, v), through the actuators. A last knot without gains borrows those
+// before
 static void command(const cav_audit *audit, int t, const double *gain_q, const double *gain_v, const double *dq,
                     const double *dv, double *control, double *u) {
   int nv = audit->model->nv;
-  size_t at = (size_t)t * (size_t)nv * (size_t)nv;
+  size_t at = (size_t)(t < audit->last ? t : audit->last - 1) * (size_t)nv * (size_t)nv;
   const double *Kq = gain_q ? gain_q + at : NULL, *Kv = gain_v ? gain_v + at : NULL;
   for (int i = 0; i < nv; i++) {
     u[i] = audit->u[t * nv + i];
@@ -145,10 +148,12 @@ static void command(const cav_audit *audit, int t, const double *gain_q, const d
 
 // the motion at a share of the way from knot t to t+1
 static void reference(const cav_audit *audit, int t, double share, double *q, double *v) {
-  int nv = audit->model->nv;
-  const double *from = audit->v + t * nv, *to = from + nv;
-  cav_integrate(audit->model, audit->q + t * audit->model->nq, to, share * audit->h, q);
-  for (int d = 0; d < nv; d++) v[d] = (1 - share) * from[d] + share * to[d];
+  int nv = audit->model->nv, late = share >= 0.5;
+  const double *rate = audit->v + (t + 1) * nv, *from = late ? rate : rate - nv, *to = from + nv;
+  double along = late ? share - 0.5 : share + 0.5;
+  if (late && t + 1 == audit->last) to = from;
+  cav_integrate(audit->model, audit->q + t * audit->model->nq, rate, share * audit->h, q);
+  for (int d = 0; d < nv; d++) v[d] = (1 - along) * from[d] + along * to[d];
 }
 
 // angle between two unit quaternions
@@ -224,7 +229,8 @@ static cav_status interval(const cav_audit *audit, cav_state *fine, const double
     reference(audit, t, (double)k / SUBSTEPS, q_ref, v_ref);
     cav_difference(model, q_ref, q, 1, dq);
     for (int d = 0; d < nv; d++) dv[d] = v[d] - v_ref[d];
-    command(audit, t, gain_q, gain_v, dq, dv, control, u);
+    int around = 2 * k >= SUBSTEPS && t + 1 < audit->rows ? t + 1 : t;
+    command(audit, around, gain_q, gain_v, dq, dv, control, u);
     cav_status status = step(audit, fine, 1e-9, q, v, u, next);
     if (status == CAV_NO_MEMORY) return status;
     if (status != CAV_OK) {

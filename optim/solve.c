@@ -11,8 +11,9 @@
 #include "feedback.h"
 #include "ipopt.h"
 
-/// Price of straying from the motion in the gains: recipe.md, 5 (1e-3 was too weak, 10 too stiff).
-static const double tracking = 1;
+/// Prices of straying from the motion that are tried for the gains, and the end error that ends the search, m.
+static const double tracking[] = {10, 1, 100, 30, 3};
+static const double near_enough = 0.05;
 
 cav_solve_options cav_solve_options_default(void) {
   return (cav_solve_options){.solver = CAV_SOLVER_GAUSS_NEWTON, .threads = 1, .tolerance = 2e-7, .ipopt_iterations = 200};
@@ -52,6 +53,13 @@ static cav_status check(const cav_problem *p, const cav_solve_options *o, const 
   if (!(p->effort_limit > 0) || p->effort_limit > 1) return fail(error, CAV_BAD_INPUT, "effort_limit must be in (0, 1]");
   if (p->schedule.stages < 1) return fail(error, CAV_BAD_INPUT, "the schedule needs at least one stage");
   int nknot = (int)lround(p->duration / p->timestep) + 1;
+  for (int i = 0; i < p->nterm; i++) {
+    const cav_term *term = &p->term[i];
+    int soft = term->use == CAV_USE_COST, hard = term->quantity == CAV_QUANTITY_SENSOR ||
+                                                 term->quantity == CAV_QUANTITY_CONFIGURATION || term->quantity == CAV_QUANTITY_VELOCITY;
+    if (!soft && !hard) return fail(error, CAV_BAD_INPUT, "a constraint must be over a sensor, a posture or a velocity");
+    if (!(term->scale > 0) || !(term->weight >= 0)) return fail(error, CAV_BAD_INPUT, "a term needs a positive scale and a weight that is not negative");
+  }
   if (start && (start->nq != p->model->nq || start->nv != p->model->nv || start->nknot != nknot))
     return fail(error, CAV_BAD_INPUT, "the start trajectory does not fit the problem: resample it to its step and duration");
 #ifndef CAVORT_HAVE_IPOPT
@@ -63,32 +71,52 @@ static cav_status check(const cav_problem *p, const cav_solve_options *o, const 
   return CAV_OK;
 }
 
-/// Optimality and gains at the last iterate. Optimality is the largest cosine between the residual and a column of its Jacobian.
-static cav_status conclude(cav_solve_run *run) {
-  cav_transcription *tr = run->tr;
+/// Largest cosine between the residual and a column of its Jacobian, at the gathered normal equations.
+static double optimality(const cav_normal *normal, const cav_transcription *tr) {
+  const double *gradient = cav_normal_gradient(normal), *diagonal = cav_normal_diagonal(normal);
+  double size = sqrt(2 * cav_transcription_merit(tr)), worst = 0;
+  for (int i = 0; i < (tr->nknot - 1) * tr->nv; i++)
+    if (diagonal[i] > 0 && size > 0) worst = fmax(worst, fabs(gradient[i]) / (sqrt(diagonal[i]) * size));
+  return worst;
+}
+
+/// Gains by several prices of straying; kept is the one whose closed loop follows longest, then nearest. The search ends at one
+/// that is near enough.
+static cav_status choose_gains(cav_solve_run *run, cav_error *error) {
   cav_solution *solution = run->solution;
-  size_t square = (size_t)tr->nv * tr->nv, blocks = (size_t)tr->nknot - 1;
-  solution->gain_q = calloc(blocks * square, sizeof(double));
-  solution->gain_v = calloc(blocks * square, sizeof(double));
-  if (!solution->gain_q || !solution->gain_v) return CAV_NO_MEMORY;
-  cav_status status = cav_transcription_linearise(tr, run->at);
-  if (status != CAV_OK) return status;
-  cav_normal_gather(run->normal, tr);
-  solution->contact = tr->options;
-  const double *gradient = cav_normal_gradient(run->normal), *diagonal = cav_normal_diagonal(run->normal);
-  double size = sqrt(2 * cav_transcription_merit(tr));
-  for (size_t i = 0; i < blocks * tr->nv; i++) {
-    if (diagonal[i] > 0 && size > 0)
-      solution->optimality = fmax(solution->optimality, fabs(gradient[i]) / (sqrt(diagonal[i]) * size));
+  cav_transcription *tr = run->tr;
+  size_t square = (size_t)tr->nv * tr->nv, n = ((size_t)tr->nknot - 1) * square;
+  double *gain = malloc(2 * n * sizeof *gain);
+  solution->gain_q = calloc(n, sizeof(double));
+  solution->gain_v = calloc(n, sizeof(double));
+  cav_status status = gain && solution->gain_q && solution->gain_v ? CAV_OK : CAV_NO_MEMORY;
+  cav_verdict best = {0}, verdict = {0};
+  for (size_t i = 0; i < sizeof tracking / sizeof *tracking && status == CAV_OK; i++) {
+    if (cav_feedback(tr, run->normal, tracking[i], gain, gain + n) != CAV_OK) continue;
+    status = cav_verify(run->problem, run->at, &tr->options, gain, gain + n, &verdict, error);
+    if (status != CAV_OK) break;
+    int longer = verdict.closed_loop_seconds > best.closed_loop_seconds;
+    int as_long = verdict.closed_loop_seconds == best.closed_loop_seconds;
+    if (longer || (as_long && verdict.closed_loop_end_error_m < best.closed_loop_end_error_m)) {
+      memcpy(solution->gain_q, gain, n * sizeof *gain);
+      memcpy(solution->gain_v, gain + n, n * sizeof *gain);
+      best = verdict;
+    }
+    if (best.closed_loop_seconds >= best.duration && best.closed_loop_end_error_m <= near_enough) break;
   }
-  solution->cost = cav_transcription_cost(tr);
-  solution->unactuated = cav_transcription_unactuated(tr, NULL);
-  if (getenv("GS")) { cav_penalties p=tr->penalty; cav_stage_set(run->problem, atoi(getenv("GS")), run->problem->schedule.stages, tr); if(getenv("GP")) tr->penalty=p; if(getenv("GE")) tr->penalty.effort=0;
-    for(int t=0;t<tr->nknot;t++) for(int i=0;i<tr->knot[t].layout.count;i++) tr->knot[t].slot[i].multiplier=0;
-   status = cav_transcription_linearise(tr, run->at); cav_normal_gather(run->normal, tr);}
-  if (getenv("PD")) { double pd=atof(getenv("PD")), dd=getenv("PV")?atof(getenv("PV")):pd*.1; cav_status st=cav_feedback(tr, run->normal, getenv("GT")?atof(getenv("GT")):tracking, solution->gain_q, solution->gain_v);
-    for(size_t t=0;t<blocks;t++) for(int a=0;a<tr->model->nu;a++){ int d=tr->effort[a].dof[0]; double lim=1/fabs(tr->effort[a].coef[0]); size_t k=t*square+(size_t)d*tr->nv+(size_t)d; solution->gain_q[k]-=pd*lim; solution->gain_v[k]-=dd*lim; } return st; }
-  return cav_feedback(tr, run->normal, getenv("GT")?atof(getenv("GT")):tracking, solution->gain_q, solution->gain_v);
+  free(gain);
+  return status;
+}
+
+/// What the solution says of its last iterate, and its gains.
+static cav_status conclude(cav_solve_run *run, cav_error *error) {
+  cav_status status = cav_transcription_linearise(run->tr, run->at);
+  if (status != CAV_OK) return status;
+  cav_normal_gather(run->normal, run->tr);
+  run->solution->optimality = optimality(run->normal, run->tr);
+  run->solution->cost = cav_transcription_cost(run->tr);
+  run->solution->unactuated = cav_transcription_unactuated(run->tr, NULL);
+  return choose_gains(run, error);
 }
 
 static cav_status solve(cav_solve_run *run, cav_error *error) {
@@ -135,11 +163,12 @@ cav_status cav_solve(const cav_problem *problem, const cav_solve_options *option
       cav_guess_fill(problem, run.at);
     }
     status = solve(&run, error);
-    end = conclude(&run);
+    end = conclude(&run, error);
     run.solution->seconds = cav_clock() - run.start;
     run.solution->seconds_dynamics = run.tr->seconds_dynamics;
     run.solution->seconds_assembly = run.tr->seconds_assembly;
     run.solution->seconds_linear = run.region.seconds_linear;
+    run.solution->contact = run.tr->options;
     run.solution->trajectory = run.at;
     run.at = NULL;
     *solution = run.solution;

@@ -5,11 +5,17 @@
 
 #include "transcription.h"
 
+/// Share of a step by which a window may miss a knot and still hold it.
+static const double near_knot = 1e-6;
+
 /// Whether a term speaks at a knot; its weight there (time step of an integral, or 1 at a single knot).
 double cav_term_weight(const cav_transcription *tr, const cav_term *term, int t) {
-  double end = (tr->nknot - 1) * tr->h, to = term->to < 0 ? end : term->to, from = term->from < 0 ? end : term->from;
-  if (to - from < 1e-9) return t == (int)lround(fmin(from, end) / tr->h) ? 1 : 0;
-  return t * tr->h > from - 1e-9 && t * tr->h < to + 1e-9 ? tr->h : 0;
+  double end = (tr->nknot - 1) * tr->h, to = fmin(term->to < 0 ? end : term->to, end);
+  double from = fmin(term->from < 0 ? end : term->from, end);
+  int first = (int)ceil(from / tr->h - near_knot), last = (int)floor(to / tr->h + near_knot);
+  // one instant, or a window between two knots: the knot nearest to its middle
+  if (to - from < 1e-9 || first > last) return t == (int)lround((from + to) / (2 * tr->h)) ? 1 : 0;
+  return t >= first && t <= last ? tr->h : 0;
 }
 
 /// Readings of a term: none but for sensors.
@@ -33,7 +39,7 @@ int cav_dof_selected(const cav_transcription *tr, const cav_term *term, int d) {
 }
 
 /// Target of a term at a knot: constant, waypoints, or zeros.
-static void term_target(const cav_term *term, double time, int dim, double *target) {
+void cav_term_target(const cav_term *term, double time, int dim, double *target) {
   if (!term->target) {
     memset(target, 0, (size_t)dim * sizeof(double));
   } else if (term->nwaypoint == 0) {
@@ -63,7 +69,7 @@ void cav_turn_between(const double a[4], const double b[4], double phi[3]) {
 void cav_term_read(const cav_transcription *tr, const cav_state *state, const cav_term *term, int t, double *y) {
   double reading[16], target[16];
   cav_sense(tr->model, state, &term->sensor, reading);
-  term_target(term, t * tr->h, term->sensor.dim, target);
+  cav_term_target(term, t * tr->h, term->sensor.dim, target);
   if (term->sensor.type == CAV_SENSOR_FRAMEQUAT) {
     double phi[3];
     if (!term->target) target[0] = 1;

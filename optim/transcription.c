@@ -36,6 +36,7 @@ typedef struct cav_scratch {
   double *row;    ///< [3nv]
   int *column;    ///< [nv]
   double *tangent; ///< [nv]
+  double *posture; ///< [nq]
   double seconds;
 } cav_scratch;
 
@@ -220,6 +221,7 @@ static int scratch_new(cav_transcription *tr, cav_scratch *s) {
   s->row = room(&ok, 3 * n, sizeof(double));
   s->column = room(&ok, n, sizeof(int));
   s->tangent = room(&ok, n, sizeof(double));
+  s->posture = room(&ok, (size_t)tr->model->nq, sizeof(double));
   return ok && s->state;
 }
 
@@ -265,7 +267,7 @@ void cav_transcription_free(cav_transcription *tr) {
     cav_scratch *s = &tr->scratch[i];
     cav_state_free(s->state);
     free(s->value), free(s->dq), free(s->dv), free(s->dn), free(s->key), free(s->dense), free(s->rest);
-    free(s->force_weight), free(s->force_slope), free(s->row), free(s->column), free(s->tangent);
+    free(s->force_weight), free(s->force_slope), free(s->row), free(s->column), free(s->tangent), free(s->posture);
   }
   for (int k = 0; k < tr->nresidual; k++) free(tr->unactuated[k].dof), free(tr->unactuated[k].coef);
   for (int a = 0; tr->effort && a < tr->model->nu; a++) free(tr->effort[a].dof), free(tr->effort[a].coef);
@@ -520,33 +522,45 @@ static int velocity_entries(const cav_transcription *tr, int step, int d, int ba
 static void add_velocity(sum *a, const cav_term *term, double weight, const double *v) {
   const cav_transcription *tr = a->tr;
   int column[6];
-  double entry[6], goal = term->target ? term->target[0] : 0;
+  double entry[6], *goal = a->s->tangent;
   if (a->t == 0) return;
+  cav_term_target(term, a->knot->time, tr->nv, goal);
   for (int d = 0; d < tr->nv; d++) {
     if (!cav_dof_selected(tr, term, d)) continue;
     int n = velocity_entries(tr, a->t, d, tr->nv, a->t > 1, 1 / term->scale, column, entry);
-    add_sparse(a, weight, (v[d] - goal) / term->scale, n, column, entry);
+    add_sparse(a, weight, (v[d] - goal[d]) / term->scale, n, column, entry);
   }
 }
 
 static void add_acceleration(sum *a, const cav_term *term, double weight, const double *v, const double *v_next) {
   const cav_transcription *tr = a->tr;
   int column[12], last = tr->nknot - 1;
-  double entry[12], scale = 1 / (tr->h * term->scale);
+  double entry[12], scale = 1 / (tr->h * term->scale), *goal = a->s->tangent;
   if (!a->knot->has_force) return;
+  cav_term_target(term, a->knot->time, tr->nv, goal);
   for (int d = 0; d < tr->nv; d++) {
     if (!cav_dof_selected(tr, term, d)) continue;
     int n = a->t > 0 ? velocity_entries(tr, a->t, d, tr->nv, a->t > 1, -scale, column, entry) : 0;
     if (a->t < last) n += velocity_entries(tr, a->t + 1, d, 2 * tr->nv, a->t > 0, scale, column + n, entry + n);
-    add_sparse(a, weight, (v_next[d] - v[d]) * scale, n, column, entry);
+    add_sparse(a, weight, (v_next[d] - v[d]) * scale - goal[d] / term->scale, n, column, entry);
   }
 }
 
 /// Tangent difference of q_t to a term's posture and, per dof, the entries of its derivative.
 static void posture_difference(const sum *a, const cav_term *term, const double *q, double *difference) {
-  const cav_transcription *tr = a->tr;
-  const double *target = term->target ? term->target : tr->problem->q_goal;
-  cav_difference(tr->model, target, q, 1, difference);
+  const cav_model *m = a->tr->model;
+  const double *target = term->target ? term->target : a->tr->problem->q_goal;
+  int n = term->target ? term->nwaypoint : 0, i = 0;
+  if (n > 1) {
+    // between waypoints along the geodesic
+    while (i < n - 2 && a->knot->time > term->waypoint_time[i + 1]) i++;
+    double span = term->waypoint_time[i + 1] - term->waypoint_time[i];
+    double share = fmin(fmax((a->knot->time - term->waypoint_time[i]) / span, 0), 1);
+    cav_difference(m, target + i * m->nq, target + (i + 1) * m->nq, 1, difference);
+    cav_integrate(m, target + i * m->nq, difference, share, a->s->posture);
+    target = a->s->posture;
+  }
+  cav_difference(m, target, q, 1, difference);
 }
 
 static int posture_entries(const cav_transcription *tr, const double *difference, int d, double scale, int *column,
@@ -691,11 +705,15 @@ static int add_hard_dofs(sum *a, const cav_term *term, int i, double lower, doub
   const cav_transcription *tr = a->tr;
   int posture = term->quantity == CAV_QUANTITY_CONFIGURATION, column[6], active;
   double rho = tr->penalty.term, entry[6];
-  if (posture) posture_difference(a, term, q, a->s->tangent);
+  if (posture) {
+    posture_difference(a, term, q, a->s->tangent);
+  } else {
+    cav_term_target(term, a->knot->time, tr->nv, a->s->tangent);
+  }
   for (int d = 0; d < tr->nv; d++) {
     if (!cav_dof_selected(tr, term, d)) continue;
     int n = 0;
-    double value = (posture ? a->s->tangent[d] : v[d]) / term->scale;
+    double value = (posture ? a->s->tangent[d] : v[d] - a->s->tangent[d]) / term->scale;
     if (a->t > 0 && posture) n = posture_entries(tr, a->s->tangent, d, 1 / term->scale, column, entry);
     if (a->t > 0 && !posture) n = velocity_entries(tr, a->t, d, tr->nv, a->t > 1, 1 / term->scale, column, entry);
     keep_sparse(a, i, n, column, entry);

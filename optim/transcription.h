@@ -117,6 +117,9 @@ int cav_term_dim(const cav_term *term);
 int cav_dof_selected(const cav_transcription *transcription, const cav_term *term, int dof);
 void cav_term_read(const cav_transcription *transcription, const cav_state *state, const cav_term *term, int t, double *y);
 
+/// Target of a term at a time, dim numbers: constant, between waypoints, or zeros.
+void cav_term_target(const cav_term *term, double time, int dim, double *target);
+
 /// Rotation vector that takes unit quaternion a to b, in a's axes.
 void cav_turn_between(const double a[4], const double b[4], double phi[3]);
 

@@ -1,5 +1,5 @@
-/// The broad phase against the narrow phase of every pair, cav_reach, the options that switch contacts off, contact axes,
-/// allocation, and MuJoCo's contacts on models no one here wrote.
+/// The broad phase against the narrow phase of every pair, cav_reach, the options that switch contacts off, contact
+/// axes, and MuJoCo's contacts on models no one here wrote.
 #include "check.h"
 #include "math3.h"
 #include "stage.h"
@@ -182,8 +182,8 @@ typedef struct tally {
   double worst;
 } tally;
 
-// capsules whose axes cross, as in planar models: in MuJoCo rounding chooses the side of the normal, in some poses all of
-// its direction, and with it the point, which lies off the middle if the radii differ; only the gap is compared
+// capsules whose axes cross, as in planar models: in MuJoCo rounding chooses the side of the normal, in some poses all
+// of its direction, and with it the point, which lies off the middle if the radii differ; only the gap is compared
 static int crossing(const cav_model *model, const cav_contact *c) {
   const cav_geom *a = model->geom + model->pair[c->pair].geom1, *b = model->geom + model->pair[c->pair].geom2;
   return a->type == CAV_GEOM_CAPSULE && b->type == CAV_GEOM_CAPSULE && c->dist < 1e-12 - a->size[0] - b->size[0];

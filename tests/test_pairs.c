@@ -1,6 +1,6 @@
-/// Contact of two shapes: each point carries its own proof. With normal n and gap d, the points pos -+ n d/2 must lie on
-/// the two surfaces, and the supporting planes there must be d apart: then d is at most and at least the distance. Then
-/// invariance under motions of both, derivatives of the gap by small displacements, degenerate poses, and MuJoCo.
+/// Contact of two shapes: each point carries its own proof. With normal n and gap d, the points pos -+ n d/2 must lie
+/// on the two surfaces, and the supporting planes there must be d apart: then d is at most and at least the distance.
+/// Then invariance under motions of both, derivatives of the gap by small displacements, degenerate poses, and MuJoCo.
 #include "check.h"
 #include "pairs.h"
 
@@ -507,9 +507,9 @@ static double peer_gap(const mjData *d) {
   return least;
 }
 
-// Agreement with MuJoCo. Planes, spheres and capsules: to rounding, in every pose, and sphere against box. Of the others
-// it takes most through a portal refinement, whose depth is that of one direction: the same or deeper than the true one.
-// Ours is the distance itself where apart, so theirs must never exceed it, and where they overlap neither.
+// Agreement with MuJoCo. Planes, spheres and capsules: to rounding, in every pose, and sphere against box. Of the
+// others it takes most through a portal refinement, whose depth is that of one direction: the same or deeper than the
+// true one. Ours is the distance itself where apart, so theirs must never exceed it, and where they overlap neither.
 // Capsule on box and box on box: it chooses other points; the share of poses in agreement is reported.
 static void test_peer(void) {
   for (int ta = 0; ta < CAV_GEOM_TYPES; ta++) {

@@ -90,7 +90,6 @@ typedef struct cav_problem {
   cav_term *term;
   double effort_limit;        ///< share of the actuator limits planned with, 0 .. 1
   double limit_margin;        ///< rad or m kept from joint and tendon limits in planning
-  double softness_replay;     ///< reserved for verification: contacts of the fine replay, see README of problems
   cav_schedule schedule;
   int solved;                 ///< 1: read from a result folder, contact holds
   cav_options contact;        ///< the law that the recorded motion obeys, for verification; solving does not use it
