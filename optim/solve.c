@@ -131,6 +131,7 @@ static cav_status solve(cav_solve_run *run, cav_error *error) {
   }
 #ifdef CAVORT_HAVE_IPOPT
   if (o->solver != CAV_SOLVER_GAUSS_NEWTON && (status == CAV_OK || status == CAV_NOT_CONVERGED)) status = cav_ipopt(run, error);
+  if (o->solver != CAV_SOLVER_GAUSS_NEWTON && status == CAV_OK) status = cav_restore(run);
 #else
   (void)error;
 #endif

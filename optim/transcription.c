@@ -790,7 +790,7 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   readings read = {tr, t, knot->ncontact, s->key};
   int n = nv + knot->nread;
   if (p->jacobian) {
-    status = cav_differentiate(tr->model, s->state, CAV_DERIVATIVE_FORWARD, 0, q, v, v_next, read_knot, &read, n, s->value,
+    status = cav_differentiate(tr->model, s->state, tr->derivative, 0, q, v, v_next, read_knot, &read, n, s->value,
                                s->dq, s->dv, s->dn);
     if (status != CAV_OK) return status;
     chain(tr, t, nv, s->dq, s->dv, s->dn, knot->du);

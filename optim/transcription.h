@@ -69,6 +69,7 @@ typedef struct cav_transcription {
   int *turn_dof;       ///< [nturn] first of three rotational dofs
   int *turn_of;        ///< [nv] index into turn_dof or -1
   cav_penalties penalty;
+  cav_derivative derivative; ///< of u, contacts and sensors
   int constraints_only; ///< costs and multipliers are left out: the merit is the violation alone
   int keep_rows;       ///< slot_row of the knots is filled by linearisations
   cav_options options; ///< contact law of this stage
