@@ -1,14 +1,18 @@
-/// Gauss-Newton on block-banded normal equations: one symbolic analysis, a supernodal Cholesky (CHOLMOD) an iteration, and
-/// Powell's dogleg in the norm of sqrt(diag H), which is blind to the units of the unknowns. The radius outlives a run, so
-/// a continuation keeps what it has learnt. The only user of SuiteSparse.
+/// Gauss-Newton on block-banded normal equations: a banded Cholesky (LAPACK's dpbtrf) an iteration, and Powell's dogleg in the
+/// norm of sqrt(diag H), which is blind to the units of the unknowns. The radius outlives a run, so a continuation keeps
+/// what it has learnt. Three neighbouring knots fill the band, so a general sparse factorisation has nothing to leave out.
 #include "gauss_newton.h"
 
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <suitesparse/cholmod.h>
 #include <time.h>
+
+/// LAPACK: Cholesky factor of a symmetric positive definite band matrix, and the solution with it.
+extern void dpbtrf_(const char *uplo, const int *n, const int *kd, double *ab, const int *ldab, int *info);
+extern void dpbtrs_(const char *uplo, const int *n, const int *kd, const int *nrhs, const double *ab, const int *ldab,
+                    double *b, const int *ldb, int *info);
 
 /// Added to the diagonal, relative: condition numbers reach 1e15 under stiff penalties.
 static const double jitter = 1e-10;
@@ -18,19 +22,16 @@ static const double step_limit = 0.7;
 
 struct cav_normal {
   int blocks, n, size;
-  cholmod_common common;
-  cholmod_sparse *H; ///< lower triangle by columns: of a column, the rest of its block and two blocks below
-  cholmod_factor *factor;
-  cholmod_dense *b, *x, *work1, *work2;
-  double *gradient, *diagonal;
+  int band;         ///< entries kept of a column: itself and three blocks below, of which the last is never reached
+  double *H;        ///< [size*band] lower triangle by columns: H[j*band + i - j] is H(i, j)
+  double *factor;   ///< [size*band]
+  double *gradient, *diagonal; ///< [size]
 };
 
-/// First entry of a column.
-static int *column(const cav_normal *normal, int j) { return (int *)normal->H->p + j; }
-
-static int depth(const cav_normal *normal, int block) {
-  int below = normal->blocks - 1 - block;
-  return below < 2 ? below : 2;
+/// Last row of H(:, j) that is not zero by structure.
+static int end_of(const cav_normal *normal, int j) {
+  int block = j / normal->n + 3;
+  return (block < normal->blocks ? block : normal->blocks) * normal->n;
 }
 
 cav_normal *cav_normal_new(int blocks, int n) {
@@ -39,131 +40,103 @@ cav_normal *cav_normal_new(int blocks, int n) {
   normal->blocks = blocks;
   normal->n = n;
   normal->size = blocks * n;
-  cholmod_start(&normal->common);
-  normal->common.print = 0;
-  normal->common.error_handler = NULL;
-  normal->common.supernodal = CHOLMOD_SUPERNODAL;
-  normal->common.nmethods = 1;
-  normal->common.method[0].ordering = CHOLMOD_NATURAL;
-  normal->common.postorder = 0;
-
-  // pattern
-  size_t entries = 0;
-  for (int b = 0; b < blocks; b++) entries += (size_t)n * (n + 1) / 2 + (size_t)depth(normal, b) * n * n;
-  normal->H = cholmod_allocate_sparse((size_t)normal->size, (size_t)normal->size, entries, 1, 1, -1, CHOLMOD_REAL, &normal->common);
-  normal->b = cholmod_allocate_dense((size_t)normal->size, 1, (size_t)normal->size, CHOLMOD_REAL, &normal->common);
-  normal->gradient = malloc((size_t)normal->size * sizeof(double));
-  normal->diagonal = malloc((size_t)normal->size * sizeof(double));
-  if (!normal->H || !normal->b || !normal->gradient || !normal->diagonal) goto fail;
-  int *p = normal->H->p, *i = normal->H->i, at = 0;
-  for (int j = 0; j < normal->size; j++) {
-    p[j] = at;
-    int end = (j / n + 1 + depth(normal, j / n)) * n;
-    for (int row = j; row < end; row++) i[at++] = row;
-  }
-  p[normal->size] = at;
-  normal->factor = cholmod_analyze(normal->H, &normal->common);
-  if (!normal->factor) goto fail;
-  return normal;
-fail:
+  normal->band = 3 * n;
+  size_t size = (size_t)normal->size, entries = size * (size_t)normal->band;
+  normal->H = calloc(entries, sizeof(double));
+  normal->factor = malloc(entries * sizeof(double));
+  normal->gradient = malloc(size * sizeof(double));
+  normal->diagonal = malloc(size * sizeof(double));
+  if (normal->H && normal->factor && normal->gradient && normal->diagonal) return normal;
   cav_normal_free(normal);
   return NULL;
 }
 
 void cav_normal_free(cav_normal *normal) {
   if (!normal) return;
-  cholmod_common *common = &normal->common;
-  cholmod_free_factor(&normal->factor, common);
-  cholmod_free_sparse(&normal->H, common);
-  cholmod_free_dense(&normal->b, common);
-  cholmod_free_dense(&normal->x, common);
-  cholmod_free_dense(&normal->work1, common);
-  cholmod_free_dense(&normal->work2, common);
-  cholmod_finish(common);
-  free(normal->gradient), free(normal->diagonal);
+  free(normal->H), free(normal->factor), free(normal->gradient), free(normal->diagonal);
   free(normal);
 }
 
 void cav_normal_gather(cav_normal *normal, const cav_transcription *tr) {
   int n = normal->n, width = 3 * n;
-  double *value = normal->H->x;
-  memset(value, 0, (size_t)*column(normal, normal->size) * sizeof(double));
+  memset(normal->H, 0, (size_t)normal->size * (size_t)normal->band * sizeof(double));
   memset(normal->gradient, 0, (size_t)normal->size * sizeof(double));
   for (int t = 0; t < tr->nknot; t++) {
     const cav_knot *knot = &tr->knot[t];
-    for (int c = 0; c < 3; c++) {
-      int block = t + c - 2; // of the unknowns; column block c of the knot
-      if (block < 0 || block >= normal->blocks) continue;
-      for (int j = 0; j < n; j++) {
-        normal->gradient[block * n + j] += knot->gradient[c * n + j];
-        double *out = value + *column(normal, block * n + j);
-        int below = depth(normal, block) < 2 - c ? depth(normal, block) : 2 - c;
-        for (int i = j; i < (1 + below) * n; i++) out[i - j] += knot->hessian[(size_t)(c * n + i) * width + c * n + j];
-      }
+    for (int c = 0; c < width; c++) {
+      int j = (t - 2) * n + c; // unknown of column c of the knot
+      if (j < 0 || j >= normal->size) continue;
+      normal->gradient[j] += knot->gradient[c];
+      double *out = normal->H + (size_t)j * normal->band - c;
+      int last = width < normal->size - j + c ? width : normal->size - j + c;
+      for (int r = c; r < last; r++) out[r] += knot->hessian[(size_t)r * width + c];
     }
   }
-  for (int j = 0; j < normal->size; j++) normal->diagonal[j] = value[*column(normal, j)];
+  for (int j = 0; j < normal->size; j++) normal->diagonal[j] = normal->H[(size_t)j * normal->band];
 }
 
 const double *cav_normal_gradient(const cav_normal *normal) { return normal->gradient; }
 const double *cav_normal_diagonal(const cav_normal *normal) { return normal->diagonal; }
 
 cav_status cav_normal_factor(cav_normal *normal, double shift) {
-  double *value = normal->H->x;
+  int below = normal->band - 1, info = 0;
+  memcpy(normal->factor, normal->H, (size_t)normal->size * (size_t)normal->band * sizeof(double));
   for (int j = 0; j < normal->size; j++)
-    value[*column(normal, j)] = normal->diagonal[j] * (1 + shift) + (normal->diagonal[j] > 0 ? 0 : 1);
-  int ok = cholmod_factorize(normal->H, normal->factor, &normal->common);
-  for (int j = 0; j < normal->size; j++) value[*column(normal, j)] = normal->diagonal[j];
-  if (!ok) return CAV_NO_MEMORY;
-  return normal->common.status == CHOLMOD_OK ? CAV_OK : CAV_NOT_CONVERGED;
+    normal->factor[(size_t)j * normal->band] = normal->diagonal[j] > 0 ? normal->diagonal[j] * (1 + shift) : 1;
+  dpbtrf_("L", &normal->size, &below, normal->factor, &normal->band, &info);
+  return info == 0 ? CAV_OK : CAV_NOT_CONVERGED;
 }
 
-cav_status cav_normal_solve(cav_normal *normal, const double *b, double *x) {
-  memcpy(normal->b->x, b, (size_t)normal->size * sizeof(double));
-  if (!cholmod_solve2(CHOLMOD_A, normal->factor, normal->b, NULL, &normal->x, NULL, &normal->work1, &normal->work2,
-                      &normal->common))
-    return CAV_NO_MEMORY;
-  memcpy(x, normal->x->x, (size_t)normal->size * sizeof(double));
-  return CAV_OK;
+void cav_normal_solve(const cav_normal *normal, const double *b, double *x) {
+  int below = normal->band - 1, one = 1, info = 0;
+  memcpy(x, b, (size_t)normal->size * sizeof *x);
+  dpbtrs_("L", &normal->size, &below, &one, normal->factor, &normal->band, x, &normal->size, &info);
 }
 
 void cav_normal_multiply(const cav_normal *normal, const double *x, double *product) {
-  const double *value = normal->H->x;
-  const int *row = normal->H->i;
   memset(product, 0, (size_t)normal->size * sizeof(double));
   for (int j = 0; j < normal->size; j++) {
-    int first = *column(normal, j), end = *column(normal, j + 1);
-    double sum = value[first] * x[j];
-    for (int k = first + 1; k < end; k++) {
-      product[row[k]] += value[k] * x[j];
-      sum += value[k] * x[row[k]];
+    const double *H = normal->H + (size_t)j * normal->band - j;
+    int end = end_of(normal, j);
+    double sum = H[j] * x[j];
+    for (int i = j + 1; i < end; i++) {
+      product[i] += H[i] * x[j];
+      sum += H[i] * x[i];
     }
     product[j] += sum;
   }
 }
 
 void cav_normal_block(const cav_normal *normal, int row, int col, double *out) {
-  int n = normal->n, below = row - col;
-  const double *value = normal->H->x;
-  for (int j = 0; j < n; j++) {
-    const double *entry = value + *column(normal, col * n + j);
-    for (int i = 0; i < n; i++) out[i * n + j] = below * n + i >= j ? entry[below * n + i - j] : 0;
+  int n = normal->n;
+  for (int c = 0; c < n; c++) {
+    int j = col * n + c;
+    for (int r = 0; r < n; r++) {
+      int i = row * n + r;
+      out[r * n + c] = i >= j ? normal->H[(size_t)j * normal->band + (size_t)(i - j)] : 0;
+    }
   }
 }
 
 int cav_normal_entries(const cav_normal *normal, int *row, int *col, double *value) {
-  int entries = *column(normal, normal->size);
-  if (row) memcpy(row, normal->H->i, (size_t)entries * sizeof *row);
-  if (value) memcpy(value, normal->H->x, (size_t)entries * sizeof *value);
-  for (int j = 0; col && j < normal->size; j++)
-    for (int k = *column(normal, j); k < *column(normal, j + 1); k++) col[k] = j;
+  int entries = 0;
+  for (int j = 0; j < normal->size; j++) {
+    for (int i = j; i < end_of(normal, j); i++, entries++) {
+      if (row) row[entries] = i;
+      if (col) col[entries] = j;
+      if (value) value[entries] = normal->H[(size_t)j * normal->band + (size_t)(i - j)];
+    }
+  }
   return entries;
 }
 
 void cav_normal_shift_entries(const cav_normal *normal, double factor, double absolute, double share, double *value) {
-  int entries = *column(normal, normal->size);
-  for (int k = 0; k < entries; k++) value[k] *= factor;
-  for (int j = 0; j < normal->size; j++) value[*column(normal, j)] += absolute + share * normal->diagonal[j];
+  for (int j = 0, k = 0; j < normal->size; j++) {
+    int n = end_of(normal, j) - j;
+    for (int i = 0; i < n; i++) value[k + i] *= factor;
+    value[k] += absolute + share * normal->diagonal[j];
+    k += n;
+  }
 }
 
 // ---------------------------------------------------------------- trust region
@@ -204,7 +177,7 @@ static cav_status prepare(dogleg *d, cav_normal *normal) {
     d->cauchy[i] = -gradient[i] / d->scale[i];
     d->step[i] = -gradient[i];
   }
-  if ((status = cav_normal_solve(normal, d->step, d->newton)) != CAV_OK) return status;
+  cav_normal_solve(normal, d->step, d->newton);
   cav_normal_multiply(normal, d->cauchy, d->product);
   double slope = dot(d->size, gradient, d->cauchy), curve = dot(d->size, d->cauchy, d->product);
   double length = curve > 0 ? -slope / curve : 1;

@@ -20,7 +20,7 @@ const double *cav_normal_diagonal(const cav_normal *normal);
 cav_status cav_normal_factor(cav_normal *normal, double shift);
 
 /// x := (H + shift)^-1 b with the last factor; product := H x. [blocks*n]
-cav_status cav_normal_solve(cav_normal *normal, const double *b, double *x);
+void cav_normal_solve(const cav_normal *normal, const double *b, double *x);
 void cav_normal_multiply(const cav_normal *normal, const double *x, double *product);
 
 /// Block (row, column) of H, row - 2 <= column <= row, dense [n*n] row-major (diagonal blocks: lower triangle only).

@@ -29,9 +29,6 @@ typedef struct cav_scratch {
   double *value, *dq, *dv, *dn;
   int *key; ///< [2*contacts] pair and feature of the contacts with rows
   int key_room;
-  int dense_room; ///< rows
-  double *dense;  ///< [dense_room*3nv]
-  double *rest;   ///< [dense_room]
   double *force_weight, *force_slope; ///< [nv] of rows along single dofs
   double *row;    ///< [3nv]
   int *column;    ///< [nv]
@@ -262,11 +259,12 @@ void cav_transcription_free(cav_transcription *tr) {
   for (int t = 0; tr->knot && t < tr->nknot; t++) {
     cav_knot *k = &tr->knot[t];
     free(k->slot), free(k->u), free(k->du), free(k->hessian), free(k->gradient), free(k->turn), free(k->y), free(k->dy), free(k->slot_row);
+    free(k->dense), free(k->rest);
   }
   for (int i = 0; tr->scratch && i < cav_parallel_size(tr->pool); i++) {
     cav_scratch *s = &tr->scratch[i];
     cav_state_free(s->state);
-    free(s->value), free(s->dq), free(s->dv), free(s->dn), free(s->key), free(s->dense), free(s->rest);
+    free(s->value), free(s->dq), free(s->dv), free(s->dn), free(s->key);
     free(s->force_weight), free(s->force_slope), free(s->row), free(s->column), free(s->tangent), free(s->posture);
   }
   for (int k = 0; k < tr->nresidual; k++) free(tr->unactuated[k].dof), free(tr->unactuated[k].coef);
@@ -359,9 +357,9 @@ static int list_readings(cav_transcription *tr, cav_scratch *s, int t) {
     knot->room = knot->nread;
   }
   int dense = nv + knot->nread + knot->layout.count + tr->model->nu;
-  if (dense > s->dense_room) {
-    if (!grow(&s->dense, (size_t)dense * 3 * n) || !grow(&s->rest, (size_t)dense)) return 0;
-    s->dense_room = dense;
+  if (dense > knot->dense_room) {
+    if (!grow(&knot->dense, (size_t)dense * 3 * n) || !grow(&knot->rest, (size_t)dense)) return 0;
+    knot->dense_room = dense;
   }
   return 1;
 }
@@ -412,7 +410,7 @@ typedef struct sum {
   cav_transcription *tr;
   cav_scratch *s;
   cav_knot *knot;
-  int t, jacobian, dense;
+  int t, jacobian;
 } sum;
 
 /// Adds weight/2 (r + row dx)^2 for a row with n entries.
@@ -432,9 +430,9 @@ static void add_dense(sum *a, double weight, double r, const double *row) {
   a->knot->merit += 0.5 * weight * r * r;
   if (!a->jacobian || weight == 0) return;
   int width = 3 * a->tr->nv;
-  double root = sqrt(weight), *out = a->s->dense + (size_t)a->dense * width;
+  double root = sqrt(weight), *out = a->knot->dense + (size_t)a->knot->ndense * width;
   for (int k = 0; k < width; k++) out[k] = root * row[k];
-  a->s->rest[a->dense++] = root * r;
+  a->knot->rest[a->knot->ndense++] = root * r;
 }
 
 /// Adds weight/2 r^2 with r a linear form of u: along one dof it joins that dof's row, otherwise it is a row of its own.
@@ -745,25 +743,33 @@ static void add_hard_terms(sum *a, const double *q, const double *v) {
   }
 }
 
-/// Joins the rows along single dofs and the dense rows into the normal equations.
-static void finish(sum *a) {
+/// Lays the rows along single dofs beside the dense ones.
+static void lay_force_rows(sum *a) {
   const cav_transcription *tr = a->tr;
   int width = 3 * tr->nv;
   for (int d = 0; d < tr->nv; d++) {
     double weight = a->s->force_weight[d];
     if (weight == 0) continue;
-    double root = sqrt(weight), *out = a->s->dense + (size_t)a->dense * width;
+    double root = sqrt(weight), *out = a->knot->dense + (size_t)a->knot->ndense * width;
     const double *du = a->knot->du + (size_t)d * width;
     for (int k = 0; k < width; k++) out[k] = root * du[k];
-    a->s->rest[a->dense++] = a->s->force_slope[d] / root;
+    a->knot->rest[a->knot->ndense++] = a->s->force_slope[d] / root;
   }
-  for (int i = 0; i < a->dense; i++) {
-    double r = a->s->rest[i];
-    const double *row = a->s->dense + (size_t)i * width;
+  for (int i = 0; i < a->knot->ndense; i++) {
+    double r = a->knot->rest[i];
+    const double *row = a->knot->dense + (size_t)i * width;
     for (int k = 0; k < width; k++) a->knot->gradient[k] += r * row[k];
   }
+}
+
+/// Joins the dense rows of all knots into their Hessians. One thread only: not every BLAS may be called by two at once.
+static void join_rows(cav_transcription *tr) {
+  int width = 3 * tr->nv;
   double one = 1;
-  if (a->dense) dsyrk_("U", "N", &width, &a->dense, &one, a->s->dense, &width, &one, a->knot->hessian, &width);
+  for (int t = 0; t < tr->nknot; t++) {
+    cav_knot *knot = &tr->knot[t];
+    if (knot->ndense) dsyrk_("U", "N", &width, &knot->ndense, &one, knot->dense, &width, &one, knot->hessian, &width);
+  }
 }
 
 typedef struct pass {
@@ -803,8 +809,9 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   s->seconds += now() - start;
 
   // rows
-  sum a = {tr, s, knot, t, p->jacobian, 0};
+  sum a = {tr, s, knot, t, p->jacobian};
   knot->merit = 0;
+  knot->ndense = 0;
   memset(s->force_weight, 0, (size_t)nv * sizeof(double));
   memset(s->force_slope, 0, (size_t)nv * sizeof(double));
   if (p->jacobian) {
@@ -816,7 +823,7 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   add_force_slots(&a);
   add_ranges(&a, q, tr->h * tr->penalty.range);
   add_hard_terms(&a, q, v);
-  if (p->jacobian) finish(&a);
+  if (p->jacobian) lay_force_rows(&a);
   return isfinite(knot->merit) ? CAV_OK : CAV_NOT_FINITE;
 }
 
@@ -852,6 +859,7 @@ static cav_status evaluate(cav_transcription *tr, cav_trajectory *at, int jacobi
   pass p = {tr, at, zero, jacobian, status};
   cav_parallel_for(tr->pool, tr->nknot, evaluate_item, &p);
   for (int t = 0; t < tr->nknot && result == CAV_OK; t++) result = status[t];
+  if (jacobian && result == CAV_OK) join_rows(tr);
   for (int i = 0; i < members; i++) dynamics += tr->scratch[i].seconds / members;
   tr->seconds_dynamics += dynamics;
   tr->seconds_assembly += now() - start - dynamics;

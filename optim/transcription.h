@@ -44,6 +44,8 @@ typedef struct cav_knot {
   int room;           ///< readings for which y, dy have space
   double *y;          ///< [nread]
   double *dy;         ///< [nread*3nv]
+  int ndense, dense_room; ///< rows over all columns, weighted, that make up the Hessian beside the sparse ones
+  double *dense, *rest; ///< [ndense*3nv], [ndense]
   double *hessian;    ///< [3nv*3nv] Gauss-Newton, lower triangle
   double *gradient;   ///< [3nv]
   double *turn;       ///< [nturn*CAV_TURN] of the step that ends here: Jr^-1, Jl^-1 and the rotation vector itself
