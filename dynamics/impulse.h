@@ -21,13 +21,13 @@ typedef struct cav_impulse {
   const cav_model *model;
   cav_state *state;
   int nv, nblock, nrow;
-  cav_block *block; ///< [nblock] contacts in their order, then scalar rows in theirs
-  double *target;   ///< v* [nrow], m/s or rad/s
-  double *R;        ///< regulariser [nrow], 1/kg
-  double *M;        ///< tree-sparse, D included; midpoint: with half of the damping that acts during the step
-  double *L;        ///< its factors by cav_ldl_factor
+  cav_block *block;       ///< [nblock] contacts in their order, then scalar rows in theirs
+  double *target;         ///< v* [nrow], m/s or rad/s
+  double *R;              ///< regulariser [nrow], 1/kg
+  double *M;              ///< tree-sparse, D included; midpoint: with half of the damping that acts during the step
+  double *L;              ///< its factors by cav_ldl_factor
   double *force, *change; ///< scratch [nv]
-  double *spare;    ///< doubles asked for
+  double *spare;          ///< doubles asked for
 } cav_impulse;
 
 /// Jacobian rows of all contacts and rows of the state, each with the dofs that move it. jacobian.c.

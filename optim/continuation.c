@@ -33,7 +33,8 @@ void cav_guess_fill(const cav_problem *problem, cav_trajectory *at) {
   double *tangent = at->v + (size_t)(at->nknot - 1) * m->nv; // scratch until velocities are filled below
   cav_difference(m, problem->q_start, problem->q_goal, 1, tangent);
   for (int t = 0; t < at->nknot; t++) {
-    double time = t * problem->timestep, s = problem->guess == CAV_GUESS_HOLD ? 0 : smoothstep(time / problem->duration);
+    double time = t * problem->timestep,
+           s = problem->guess == CAV_GUESS_HOLD ? 0 : smoothstep(time / problem->duration);
     double *q = at->q + (size_t)t * at->nq;
     cav_integrate(m, problem->q_start, tangent, s, q);
     double span = problem->guess_to - problem->guess_from;
@@ -41,7 +42,8 @@ void cav_guess_fill(const cav_problem *problem, cav_trajectory *at) {
     if (x <= 0 || x >= 1) continue;
     for (int j = 0; j < m->njoint; j++) {
       const cav_joint *joint = &m->joint[j];
-      int root = m->link[joint->link].parent == 0, vertical = joint->type == CAV_JOINT_SLIDE && fabs(joint->axis[2]) > 0.9;
+      int root = m->link[joint->link].parent == 0,
+          vertical = joint->type == CAV_JOINT_SLIDE && fabs(joint->axis[2]) > 0.9;
       double lift = 4 * problem->guess_height * x * (1 - x);
       if (root && joint->type == CAV_JOINT_FREE) q[joint->q + 2] += lift;
       if (root && vertical) q[joint->q] += copysign(lift, joint->axis[2]);
@@ -105,7 +107,9 @@ typedef struct misfit {
   double unactuated, effort, range, term;
 } misfit;
 
-static double excess(const cav_slot *slot) { return fmax(fmax(slot->lower - slot->value, slot->value - slot->upper), 0); }
+static double excess(const cav_slot *slot) {
+  return fmax(fmax(slot->lower - slot->value, slot->value - slot->upper), 0);
+}
 
 static misfit measure(const cav_transcription *tr) {
   misfit m = {0};
@@ -113,7 +117,10 @@ static misfit measure(const cav_transcription *tr) {
     const cav_knot *knot = &tr->knot[t];
     for (int i = 0; i < knot->layout.count; i++) {
       double e = excess(&knot->slot[i]);
-      double *worst = i < knot->layout.effort ? &m.unactuated : i < knot->layout.joint ? &m.effort : i < knot->layout.term ? &m.range : &m.term;
+      double *worst = i < knot->layout.effort  ? &m.unactuated
+                      : i < knot->layout.joint ? &m.effort
+                      : i < knot->layout.term  ? &m.range
+                                               : &m.term;
       *worst = fmax(*worst, e);
     }
   }
@@ -127,7 +134,8 @@ static misfit allowed(const cav_solve_run *run) {
 }
 
 static int holds(const misfit *m, const misfit *most) {
-  return m->unactuated <= most->unactuated && m->effort <= most->effort && m->range <= most->range && m->term <= most->term;
+  return m->unactuated <= most->unactuated && m->effort <= most->effort && m->range <= most->range &&
+         m->term <= most->term;
 }
 
 cav_status cav_multiply(cav_solve_run *run) {

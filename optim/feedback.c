@@ -7,7 +7,8 @@
 #include <string.h>
 
 /// LAPACK: solves A X = B for symmetric positive definite A.
-extern void dposv_(const char *uplo, const int *n, const int *nrhs, double *A, const int *lda, double *B, const int *ldb, int *info);
+extern void dposv_(const char *uplo, const int *n, const int *nrhs, double *A, const int *lda, double *B,
+                   const int *ldb, int *info);
 
 /// C (rows x n) += scale * A (rows x n) B (n x n), row-major.
 static void multiply_add(int rows, int n, double scale, const double *A, const double *B, double *C) {
@@ -27,7 +28,7 @@ static void transpose(int n, const double *A, double *B) {
 /// Elimination of unknown block b: dx_b = A dx_{b-1} + B dx_{b-2}, and what that leaves on the two blocks before it.
 typedef struct policy {
   int n;
-  double *A, *B;          ///< [blocks*n*n]
+  double *A, *B;              ///< [blocks*n*n]
   double *near, *far, *cross; ///< what later blocks add to H(b,b), H(b-1,b-1) and H(b,b-1), [n*n]
   double *D, *E, *F, *work;
 } policy;
@@ -116,7 +117,8 @@ static void carry_back(const cav_transcription *tr, int t, const double *P, doub
   }
 }
 
-cav_status cav_feedback(const cav_transcription *tr, const cav_normal *normal, double tracking, double *gain_q, double *gain_v) {
+cav_status cav_feedback(const cav_transcription *tr, const cav_normal *normal, double tracking, double *gain_q,
+                        double *gain_v) {
   int nv = tr->nv, blocks = tr->nknot - 1;
   size_t square = (size_t)nv * nv;
   policy p = {.n = nv};

@@ -22,9 +22,9 @@ static const double step_limit = 0.7;
 
 struct cav_normal {
   int blocks, n, size;
-  int band;         ///< entries kept of a column: itself and three blocks below, of which the last is never reached
-  double *H;        ///< [size*band] lower triangle by columns: H[j*band + i - j] is H(i, j)
-  double *factor;   ///< [size*band]
+  int band;       ///< entries kept of a column: itself and three blocks below, of which the last is never reached
+  double *H;      ///< [size*band] lower triangle by columns: H[j*band + i - j] is H(i, j)
+  double *factor; ///< [size*band]
   double *gradient, *diagonal; ///< [size]
 };
 
@@ -170,7 +170,8 @@ static double dot(int n, const double *a, const double *b) {
 static cav_status prepare(dogleg *d, cav_normal *normal) {
   const double *gradient = normal->gradient;
   cav_status status = CAV_NOT_CONVERGED;
-  for (double shift = jitter; status == CAV_NOT_CONVERGED && shift < 1; shift *= 100) status = cav_normal_factor(normal, shift);
+  for (double shift = jitter; status == CAV_NOT_CONVERGED && shift < 1; shift *= 100)
+    status = cav_normal_factor(normal, shift);
   if (status != CAV_OK) return status;
   for (int i = 0; i < d->size; i++) {
     d->scale[i] = normal->diagonal[i] > 0 ? normal->diagonal[i] : 1;

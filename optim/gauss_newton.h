@@ -34,10 +34,10 @@ void cav_normal_shift_entries(const cav_normal *normal, double factor, double ab
 
 /// What one run of the trust region may do and has done.
 typedef struct cav_region {
-  double radius;     ///< kept from run to run; 0: first Cauchy step
-  int iterations;    ///< at most
-  double tolerance;  ///< two relative decreases in a row below it end the run
-  int done;          ///< iterations made, over all runs
+  double radius;    ///< kept from run to run; 0: first Cauchy step
+  int iterations;   ///< at most
+  double tolerance; ///< two relative decreases in a row below it end the run
+  int done;         ///< iterations made, over all runs
   double seconds_linear;
   int (*report)(void *context, double step, double radius); ///< after each iteration; nonzero stops
   void *context;

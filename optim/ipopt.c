@@ -17,12 +17,12 @@ typedef struct program {
   cav_solve_run *run;
   cav_trajectory *anchor; ///< x = 0
   int n, m;
-  int entries;            ///< of the Jacobian
-  int *row_knot, *row_slot; ///< [m]
+  int entries;                                  ///< of the Jacobian
+  int *row_knot, *row_slot;                     ///< [m]
   int *jacobian_row, *jacobian_column, *source; ///< [entries]; source: column among the row's 3nv
-  double *x;              ///< [n] point of the last evaluation
-  int known;              ///< 1: values at x are known, 2: derivatives too
-  double *full;           ///< [3nv] a row while it is turned
+  double *x;                                    ///< [n] point of the last evaluation
+  int known;                                    ///< 1: values at x are known, 2: derivatives too
+  double *full;                                 ///< [3nv] a row while it is turned
   int interrupted;
 } program;
 
@@ -34,7 +34,8 @@ static int evaluate(program *p, const double *x, int derivatives) {
   memcpy(p->x, x, (size_t)p->n * sizeof *x);
   cav_transcription_move(tr, p->anchor, x, p->run->at);
   p->known = 0;
-  cav_status status = derivatives ? cav_transcription_linearise(tr, p->run->at) : cav_transcription_values(tr, p->run->at);
+  cav_status status =
+      derivatives ? cav_transcription_linearise(tr, p->run->at) : cav_transcription_values(tr, p->run->at);
   if (status != CAV_OK) return 0;
   if (derivatives) cav_normal_gather(p->run->normal, tr);
   p->known = 1 + derivatives;
@@ -102,8 +103,9 @@ static Bool constraint_jacobian(int n, double *x, Bool fresh, int m, int entries
   return 1;
 }
 
-static Bool lagrangian_hessian(int n, double *x, Bool fresh, double factor, int m, double *multiplier, Bool fresh_multiplier,
-                               int entries, int *row, int *column, double *value, UserDataPtr data) {
+static Bool lagrangian_hessian(int n, double *x, Bool fresh, double factor, int m, double *multiplier,
+                               Bool fresh_multiplier, int entries, int *row, int *column, double *value,
+                               UserDataPtr data) {
   program *p = data;
   (void)n, (void)fresh, (void)m, (void)multiplier, (void)fresh_multiplier, (void)entries;
   if (!value) {
@@ -119,7 +121,8 @@ static Bool lagrangian_hessian(int n, double *x, Bool fresh, double factor, int 
 static Bool progress(int mode, int iteration, double cost, double infeasibility, double dual, double mu, double step,
                      double regularisation, double dual_step, double primal_step, int trials, UserDataPtr data) {
   program *p = data;
-  (void)iteration, (void)cost, (void)infeasibility, (void)dual, (void)mu, (void)regularisation, (void)dual_step, (void)trials;
+  (void)iteration, (void)cost, (void)infeasibility, (void)dual, (void)mu, (void)regularisation, (void)dual_step,
+      (void)trials;
   p->run->stage = mode;
   if (!p->known) return 1;
   p->interrupted = cav_run_report(p->run, step * primal_step, 0) != 0;
@@ -194,16 +197,19 @@ static void set_bounds(const program *p, double *x_lower, double *x_upper, doubl
 
 static int set_options(IpoptProblem nlp, const cav_solve_options *o) {
   int ok = AddIpoptIntOption(nlp, "print_level", 0) && AddIpoptStrOption(nlp, "sb", "yes");
-  ok = ok && AddIpoptStrOption(nlp, "nlp_scaling_method", "none") && AddIpoptIntOption(nlp, "max_iter", o->ipopt_iterations);
+  ok = ok && AddIpoptStrOption(nlp, "nlp_scaling_method", "none") &&
+       AddIpoptIntOption(nlp, "max_iter", o->ipopt_iterations);
   ok = ok && AddIpoptNumOption(nlp, "tol", 1e-3) && AddIpoptNumOption(nlp, "constr_viol_tol", o->tolerance);
-  ok = ok && AddIpoptNumOption(nlp, "acceptable_tol", 1e-1) && AddIpoptNumOption(nlp, "acceptable_constr_viol_tol", 1e-4);
+  ok = ok && AddIpoptNumOption(nlp, "acceptable_tol", 1e-1) &&
+       AddIpoptNumOption(nlp, "acceptable_constr_viol_tol", 1e-4);
   ok = ok && AddIpoptIntOption(nlp, "acceptable_iter", 10) && AddIpoptNumOption(nlp, "mu_init", 1e-4);
   ok = ok && AddIpoptIntOption(nlp, "mumps_mem_percent", 200) && AddIpoptIntOption(nlp, "mumps_pivot_order", 0);
   if (o->linear_solver) ok = ok && AddIpoptStrOption(nlp, "linear_solver", (char *)o->linear_solver);
   if (o->ipopt_derivative_test) {
     // at the start itself: away from it the law is stiff beyond any difference's step
     ok = ok && AddIpoptStrOption(nlp, "derivative_test", "first-order");
-    ok = ok && AddIpoptNumOption(nlp, "point_perturbation_radius", 0) && AddIpoptNumOption(nlp, "derivative_test_perturbation", 1e-9);
+    ok = ok && AddIpoptNumOption(nlp, "point_perturbation_radius", 0) &&
+         AddIpoptNumOption(nlp, "derivative_test_perturbation", 1e-9);
     ok = ok && AddIpoptNumOption(nlp, "derivative_test_tol", 1e-3);
   }
   if (o->ipopt_output) ok = ok && OpenIpoptOutputFile(nlp, (char *)o->ipopt_output, 5);
@@ -221,9 +227,11 @@ static cav_status conclude(const program *p, enum ApplicationReturnStatus code, 
       {Solved_To_Acceptable_Level, CAV_OK, ""},
       {Feasible_Point_Found, CAV_OK, ""},
       {Infeasible_Problem_Detected, CAV_NOT_CONVERGED, "Ipopt found the constraints locally infeasible"},
-      {Search_Direction_Becomes_Too_Small, CAV_NOT_CONVERGED, "Ipopt's steps became too small: the noise of the derivatives bounds what it can reach"},
+      {Search_Direction_Becomes_Too_Small, CAV_NOT_CONVERGED,
+       "Ipopt's steps became too small: the noise of the derivatives bounds what it can reach"},
       {Maximum_Iterations_Exceeded, CAV_NOT_CONVERGED, "Ipopt reached its iteration limit"},
-      {Restoration_Failed, CAV_NOT_CONVERGED, "Ipopt's restoration of feasibility failed: start it from a better motion (--solver both)"},
+      {Restoration_Failed, CAV_NOT_CONVERGED,
+       "Ipopt's restoration of feasibility failed: start it from a better motion (--solver both)"},
       {Error_In_Step_Computation, CAV_NOT_CONVERGED, "Ipopt could not compute a step"},
       {Invalid_Option, CAV_BAD_INPUT, "Ipopt does not know an option's value: is the linear solver installed?"},
       {Insufficient_Memory, CAV_NO_MEMORY, "Ipopt ran out of memory"},
@@ -273,8 +281,8 @@ cav_status cav_ipopt(cav_solve_run *run, cav_error *error) {
   if ((status = cav_transcription_values(tr, run->at)) != CAV_OK) goto end;
   set_bounds(&p, bound, bound + p.n, bound + 2 * p.n, bound + 2 * p.n + p.m);
   nlp = CreateIpoptProblem(p.n, bound, bound + p.n, p.m, bound + 2 * p.n, bound + 2 * p.n + p.m, p.entries,
-                           cav_normal_entries(run->normal, NULL, NULL, NULL), 0, objective, constraints, objective_gradient,
-                           constraint_jacobian, lagrangian_hessian);
+                           cav_normal_entries(run->normal, NULL, NULL, NULL), 0, objective, constraints,
+                           objective_gradient, constraint_jacobian, lagrangian_hessian);
   status = CAV_NO_MEMORY;
   if (!nlp) goto end;
   if (!set_options(nlp, run->options)) {

@@ -12,7 +12,7 @@ struct cav_parallel {
   struct member {
     struct cav_parallel *team;
     int index;
-  } *member;
+  } * member;
   pthread_mutex_t mutex;
   pthread_cond_t work, done;
   int round, busy, stop;

@@ -26,7 +26,8 @@ static void force_pattern(const cav_transcription *tr, int i, char *seen) {
   for (int k = 0; k < m->ntendon; k++) {
     const cav_tendon_part *part = m->tendon_part + m->tendon[k].part;
     int n = m->tendon[k].npart, in = 0;
-    int acts = m->tendon[k].limited || m->tendon[k].stiffness != 0 || m->tendon[k].damping != 0 || m->tendon[k].frictionloss != 0;
+    int acts = m->tendon[k].limited || m->tendon[k].stiffness != 0 || m->tendon[k].damping != 0 ||
+               m->tendon[k].frictionloss != 0;
     for (int c = 0; acts && c < n; c++) in |= m->joint[part[c].joint].dof == i;
     for (int c = 0; in && c < n; c++) seen[m->joint[part[c].joint].dof] = 1;
   }
@@ -44,10 +45,14 @@ static void subtree_pattern(const cav_model *m, int link, char *seen) {
 static int object_link(const cav_model *m, cav_object_type type, int object) {
   switch (type) {
     case CAV_OBJECT_BODY:
-    case CAV_OBJECT_XBODY: return m->body[object].link;
-    case CAV_OBJECT_GEOM: return m->geom[object].link;
-    case CAV_OBJECT_SITE: return m->site[object].link;
-    default: return 0;
+    case CAV_OBJECT_XBODY:
+      return m->body[object].link;
+    case CAV_OBJECT_GEOM:
+      return m->geom[object].link;
+    case CAV_OBJECT_SITE:
+      return m->site[object].link;
+    default:
+      return 0;
   }
 }
 

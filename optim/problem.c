@@ -45,6 +45,22 @@ int cav_problem_default_terms(cav_term *term, int most) {
   return n;
 }
 
+// ends of the continuation
+static const cav_stage_options first_stage = {.softness = 4,
+                                              .time_constant = 1,
+                                              .smoothing = 0.05,
+                                              .smoothing_self = 0.002,
+                                              .penalty = 1e3,
+                                              .iterations = 30,
+                                              .tolerance = 1e-3};
+static const cav_stage_options last_stage = {.softness = 0.05,
+                                             .time_constant = 0,
+                                             .smoothing = 0.002,
+                                             .smoothing_self = 0.002,
+                                             .penalty = 1e5,
+                                             .iterations = 100,
+                                             .tolerance = 1e-5};
+
 cav_problem cav_problem_default(const cav_model *model) {
   return (cav_problem){
       .name = "",
@@ -57,19 +73,7 @@ cav_problem cav_problem_default(const cav_model *model) {
       .guess_to = 1,
       .effort_limit = 0.8,
       .limit_margin = 1e-3,
-      .schedule = {16,
-                   {.softness = 0.8,
-                    .smoothing = 0.05,
-                    .smoothing_self = 0.01,
-                    .penalty = 1e3,
-                    .iterations = 30,
-                    .tolerance = 1e-3},
-                   {.softness = 0.02,
-                    .smoothing = 0.0015,
-                    .smoothing_self = 0.0015,
-                    .penalty = 1e5,
-                    .iterations = 100,
-                    .tolerance = 1e-5}},
+      .schedule = {.stages = 16, .first = first_stage, .last = last_stage},
   };
 }
 

@@ -18,6 +18,8 @@ static const char *const heights[] = {"keep", "floor", NULL};
 static const char *const ends[] = {"first", "last", NULL};
 static const char *const relations[] = {"none", "start", "goal", NULL};
 
+// the tables below read as rows
+// clang-format off
 // name, type, least and most values, words, required
 #define TEXT(name, required) \
   { name, CAV_XML_TEXT, 1, 0, NULL, required }
@@ -134,3 +136,4 @@ const cav_xml_element cav_problem_element = {
     ATTRIBUTES(TEXT("name", 0), TEXT("model", 0)),
     CHILDREN(&horizon, &start, &goal, &pose, &guess, &cost, &constraint, &limits, &schedule, &contact),
     0};
+// clang-format on

@@ -16,7 +16,8 @@ static const double tracking[] = {10, 1, 100, 30, 3};
 static const double near_enough = 0.05;
 
 cav_solve_options cav_solve_options_default(void) {
-  return (cav_solve_options){.solver = CAV_SOLVER_GAUSS_NEWTON, .threads = 1, .tolerance = 2e-7, .ipopt_iterations = 200};
+  return (cav_solve_options){
+      .solver = CAV_SOLVER_GAUSS_NEWTON, .threads = 1, .tolerance = 2e-7, .ipopt_iterations = 200};
 }
 
 int cav_solution_log(cav_solution *solution, const cav_progress *line) {
@@ -47,24 +48,33 @@ static cav_status fail(cav_error *error, cav_status status, const char *text) {
 }
 
 /// What a caller can get wrong in structs filled by hand.
-static cav_status check(const cav_problem *p, const cav_solve_options *o, const cav_trajectory *start, cav_error *error) {
-  if (!p->model || !p->q_start || !p->v_start || !p->q_goal) return fail(error, CAV_BAD_INPUT, "the problem lacks a model, a start or a goal");
-  if (!(p->timestep > 0) || !(p->duration >= 2 * p->timestep)) return fail(error, CAV_BAD_INPUT, "the horizon needs a positive timestep and at least two steps");
-  if (!(p->effort_limit > 0) || p->effort_limit > 1) return fail(error, CAV_BAD_INPUT, "effort_limit must be in (0, 1]");
+static cav_status check(const cav_problem *p, const cav_solve_options *o, const cav_trajectory *start,
+                        cav_error *error) {
+  if (!p->model || !p->q_start || !p->v_start || !p->q_goal)
+    return fail(error, CAV_BAD_INPUT, "the problem lacks a model, a start or a goal");
+  if (!(p->timestep > 0) || !(p->duration >= 2 * p->timestep))
+    return fail(error, CAV_BAD_INPUT, "the horizon needs a positive timestep and at least two steps");
+  if (!(p->effort_limit > 0) || p->effort_limit > 1)
+    return fail(error, CAV_BAD_INPUT, "effort_limit must be in (0, 1]");
   if (p->schedule.stages < 1) return fail(error, CAV_BAD_INPUT, "the schedule needs at least one stage");
   int nknot = (int)lround(p->duration / p->timestep) + 1;
   for (int i = 0; i < p->nterm; i++) {
     const cav_term *term = &p->term[i];
     int soft = term->use == CAV_USE_COST, hard = term->quantity == CAV_QUANTITY_SENSOR ||
-                                                 term->quantity == CAV_QUANTITY_CONFIGURATION || term->quantity == CAV_QUANTITY_VELOCITY;
-    if (!soft && !hard) return fail(error, CAV_BAD_INPUT, "a constraint must be over a sensor, a posture or a velocity");
-    if (!(term->scale > 0) || !(term->weight >= 0)) return fail(error, CAV_BAD_INPUT, "a term needs a positive scale and a weight that is not negative");
+                                                 term->quantity == CAV_QUANTITY_CONFIGURATION ||
+                                                 term->quantity == CAV_QUANTITY_VELOCITY;
+    if (!soft && !hard)
+      return fail(error, CAV_BAD_INPUT, "a constraint must be over a sensor, a posture or a velocity");
+    if (!(term->scale > 0) || !(term->weight >= 0))
+      return fail(error, CAV_BAD_INPUT, "a term needs a positive scale and a weight that is not negative");
   }
   if (start && (start->nq != p->model->nq || start->nv != p->model->nv || start->nknot != nknot))
-    return fail(error, CAV_BAD_INPUT, "the start trajectory does not fit the problem: resample it to its step and duration");
+    return fail(error, CAV_BAD_INPUT,
+                "the start trajectory does not fit the problem: resample it to its step and duration");
 #ifndef CAVORT_HAVE_IPOPT
   if (o->solver != CAV_SOLVER_GAUSS_NEWTON)
-    return fail(error, CAV_NOT_SUPPORTED, "this build has no Ipopt: use --solver gn, or install coinor-libipopt-dev and build again");
+    return fail(error, CAV_NOT_SUPPORTED,
+                "this build has no Ipopt: use --solver gn, or install coinor-libipopt-dev and build again");
 #else
   (void)o;
 #endif
@@ -130,7 +140,8 @@ static cav_status solve(cav_solve_run *run, cav_error *error) {
     if (status == CAV_OK) status = cav_restore(run);
   }
 #ifdef CAVORT_HAVE_IPOPT
-  if (o->solver != CAV_SOLVER_GAUSS_NEWTON && (status == CAV_OK || status == CAV_NOT_CONVERGED)) status = cav_ipopt(run, error);
+  if (o->solver != CAV_SOLVER_GAUSS_NEWTON && (status == CAV_OK || status == CAV_NOT_CONVERGED))
+    status = cav_ipopt(run, error);
   if (o->solver != CAV_SOLVER_GAUSS_NEWTON && status == CAV_OK) status = cav_restore(run);
 #else
   (void)error;
@@ -176,7 +187,8 @@ cav_status cav_solve(const cav_problem *problem, const cav_solve_options *option
     run.solution = NULL;
   }
   if (status == CAV_NO_MEMORY) fail(error, status, "not enough memory for this problem");
-  if (status == CAV_NOT_FINITE) fail(error, status, "a number that is not finite came up; the last finite iterate is kept");
+  if (status == CAV_NOT_FINITE)
+    fail(error, status, "a number that is not finite came up; the last finite iterate is kept");
   cav_trajectory_free(run.at);
   cav_trajectory_free(run.spare);
   cav_solution_free(run.solution);

@@ -29,11 +29,16 @@ int cav_dof_selected(const cav_transcription *tr, const cav_term *term, int d) {
   const cav_joint *joint = &tr->model->joint[tr->model->dof[d].joint];
   int free_joint = joint->type == CAV_JOINT_FREE;
   switch (term->dofs) {
-    case CAV_DOFS_ALL: return 1;
-    case CAV_DOFS_ROOT_LINEAR: return free_joint && d < joint->dof + 3;
-    case CAV_DOFS_ROOT_ANGULAR: return free_joint && d >= joint->dof + 3;
-    case CAV_DOFS_JOINTS: return !free_joint;
-    case CAV_DOFS_ONE: return tr->model->dof[d].joint == term->joint;
+    case CAV_DOFS_ALL:
+      return 1;
+    case CAV_DOFS_ROOT_LINEAR:
+      return free_joint && d < joint->dof + 3;
+    case CAV_DOFS_ROOT_ANGULAR:
+      return free_joint && d >= joint->dof + 3;
+    case CAV_DOFS_JOINTS:
+      return !free_joint;
+    case CAV_DOFS_ONE:
+      return tr->model->dof[d].joint == term->joint;
   }
   return 0;
 }

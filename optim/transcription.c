@@ -14,8 +14,8 @@
 #include <time.h>
 
 /// BLAS: C := alpha A A' + beta C for symmetric C.
-extern void dsyrk_(const char *uplo, const char *trans, const int *n, const int *k, const double *alpha, const double *A,
-                   const int *lda, const double *beta, double *C, const int *ldc);
+extern void dsyrk_(const char *uplo, const char *trans, const int *n, const int *k, const double *alpha,
+                   const double *A, const int *lda, const double *beta, double *C, const int *ldc);
 
 /// A moment counts as a force at this distance when it is compared with the weight.
 static const double moment_arm = 0.3;
@@ -30,10 +30,10 @@ typedef struct cav_scratch {
   int *key; ///< [2*contacts] pair and feature of the contacts with rows
   int key_room;
   double *force_weight, *force_slope; ///< [nv] of rows along single dofs
-  double *row;    ///< [3nv]
-  int *column;    ///< [nv]
-  double *tangent; ///< [nv]
-  double *posture; ///< [nq]
+  double *row;                        ///< [3nv]
+  int *column;                        ///< [nv]
+  double *tangent;                    ///< [nv]
+  double *posture;                    ///< [nq]
   double seconds;
 } cav_scratch;
 
@@ -116,7 +116,8 @@ static int list_force_rows(cav_transcription *tr) {
   tr->unactuated = calloc((size_t)nv, sizeof *tr->unactuated);
   tr->effort = calloc((size_t)nu + 1, sizeof *tr->effort);
   tr->effort_range = malloc((size_t)(nu + 1) * sizeof *tr->effort_range);
-  if (!unit || !basis || !residual || !control || !effort || !tr->unactuated || !tr->effort || !tr->effort_range) goto end;
+  if (!unit || !basis || !residual || !control || !effort || !tr->unactuated || !tr->effort || !tr->effort_range)
+    goto end;
 
   // project unit forces; orthonormalise what is left, twice for rounding
   for (int d = 0; d < nv; d++) {
@@ -258,7 +259,8 @@ void cav_transcription_free(cav_transcription *tr) {
   if (!tr) return;
   for (int t = 0; tr->knot && t < tr->nknot; t++) {
     cav_knot *k = &tr->knot[t];
-    free(k->slot), free(k->u), free(k->du), free(k->hessian), free(k->gradient), free(k->turn), free(k->y), free(k->dy), free(k->slot_row);
+    free(k->slot), free(k->u), free(k->du), free(k->hessian), free(k->gradient), free(k->turn), free(k->y), free(k->dy),
+        free(k->slot_row);
     free(k->dense), free(k->rest);
   }
   for (int i = 0; tr->scratch && i < cav_parallel_size(tr->pool); i++) {
@@ -349,7 +351,8 @@ static int list_readings(cav_transcription *tr, cav_scratch *s, int t) {
   knot->nread = 4 * ncontact + nsensor;
   size_t total = (size_t)(nv + knot->nread), n = (size_t)nv;
   if ((int)total > s->room) {
-    if (!grow(&s->value, total) || !grow(&s->dq, total * n) || !grow(&s->dv, total * n) || !grow(&s->dn, total * n)) return 0;
+    if (!grow(&s->value, total) || !grow(&s->dq, total * n) || !grow(&s->dv, total * n) || !grow(&s->dn, total * n))
+      return 0;
     s->room = (int)total;
   }
   if (knot->nread > knot->room) {
@@ -371,7 +374,8 @@ static const double *velocity_after(const cav_transcription *tr, const cav_traje
 }
 
 /// out += scale * row * (Jacobian of a step): side 0 by its end (Jr^-1), side 1 by its start (Jl^-1).
-static void times_turn(const cav_transcription *tr, const double *row, const double *turn, int side, double scale, double *out) {
+static void times_turn(const cav_transcription *tr, const double *row, const double *turn, int side, double scale,
+                       double *out) {
   for (int d = 0; d < tr->nv; d++)
     if (tr->turn_of[d] < 0) out[d] += scale * row[d];
   for (int k = 0; k < tr->nturn; k++) {
@@ -382,7 +386,8 @@ static void times_turn(const cav_transcription *tr, const double *row, const dou
 }
 
 /// Chains derivatives with respect to (q_t, v_t, v_{t+1}) to the three neighbouring knots.
-static void chain(const cav_transcription *tr, int t, int n, const double *dq, const double *dv, const double *dn, double *out) {
+static void chain(const cav_transcription *tr, int t, int n, const double *dq, const double *dv, const double *dn,
+                  double *out) {
   int nv = tr->nv, last = tr->nknot - 1;
   const double *now_turn = tr->knot[t].turn, *next_turn = t < last ? tr->knot[t + 1].turn : NULL;
   double inverse = 1 / tr->h;
@@ -622,14 +627,29 @@ static void add_costs(sum *a, const double *q, const double *v, const double *v_
           for (int k = 0; k < dim; k++)
             add_dense(a, weight, a->knot->y[reading + k], a->knot->dy + (size_t)(reading + k) * width);
           break;
-        case CAV_QUANTITY_CONFIGURATION: add_posture(a, term, weight, q); break;
-        case CAV_QUANTITY_VELOCITY: add_velocity(a, term, weight, v); break;
-        case CAV_QUANTITY_ACCELERATION: add_acceleration(a, term, weight, v, v_next); break;
-        case CAV_QUANTITY_EFFORT: add_effort(a, term, weight); break;
-        case CAV_QUANTITY_GAP: add_contact(a, term, weight, 0, 1); break;
-        case CAV_QUANTITY_SLIP: add_contact(a, term, weight, 1, 2); break;
-        case CAV_QUANTITY_IMPACT: add_contact(a, term, weight, 3, 1); break;
-        case CAV_QUANTITY_TYPES: break;
+        case CAV_QUANTITY_CONFIGURATION:
+          add_posture(a, term, weight, q);
+          break;
+        case CAV_QUANTITY_VELOCITY:
+          add_velocity(a, term, weight, v);
+          break;
+        case CAV_QUANTITY_ACCELERATION:
+          add_acceleration(a, term, weight, v, v_next);
+          break;
+        case CAV_QUANTITY_EFFORT:
+          add_effort(a, term, weight);
+          break;
+        case CAV_QUANTITY_GAP:
+          add_contact(a, term, weight, 0, 1);
+          break;
+        case CAV_QUANTITY_SLIP:
+          add_contact(a, term, weight, 1, 2);
+          break;
+        case CAV_QUANTITY_IMPACT:
+          add_contact(a, term, weight, 3, 1);
+          break;
+        case CAV_QUANTITY_TYPES:
+          break;
       }
     }
     reading += dim;
@@ -699,7 +719,8 @@ static void add_force_slots(sum *a) {
 }
 
 /// Rows of a hard term over postures or velocities, one a selected dof; returns the next row.
-static int add_hard_dofs(sum *a, const cav_term *term, int i, double lower, double upper, const double *q, const double *v) {
+static int add_hard_dofs(sum *a, const cav_term *term, int i, double lower, double upper, const double *q,
+                         const double *v) {
   const cav_transcription *tr = a->tr;
   int posture = term->quantity == CAV_QUANTITY_CONFIGURATION, column[6], active;
   double rho = tr->penalty.term, entry[6];
@@ -937,7 +958,8 @@ void cav_transcription_multipliers(cav_transcription *tr) {
   }
 }
 
-void cav_transcription_move(const cav_transcription *tr, const cav_trajectory *from, const double *x, cav_trajectory *to) {
+void cav_transcription_move(const cav_transcription *tr, const cav_trajectory *from, const double *x,
+                            cav_trajectory *to) {
   size_t nq = (size_t)from->nq;
   memcpy(to->q, from->q, nq * sizeof(double));
   memcpy(to->v, from->v, (size_t)tr->nv * sizeof(double));

@@ -13,11 +13,11 @@ typedef struct cav_slot {
 
 /// Where a knot's constraint rows come from, in the order in which they stand in cav_knot.slot.
 typedef struct cav_slot_layout {
-  int unactuated;  ///< first row of the forces that no actuator can give
-  int effort;      ///< of the actuator forces
-  int joint;       ///< of the joint ranges (empty at knot 0)
-  int tendon;      ///< of the tendon ranges (empty at knot 0)
-  int term;        ///< of the problem's hard terms
+  int unactuated; ///< first row of the forces that no actuator can give
+  int effort;     ///< of the actuator forces
+  int joint;      ///< of the joint ranges (empty at knot 0)
+  int tendon;     ///< of the tendon ranges (empty at knot 0)
+  int term;       ///< of the problem's hard terms
   int count;
 } cav_slot_layout;
 
@@ -34,22 +34,22 @@ enum { CAV_TURN = 21 };
 /// are zero.
 typedef struct cav_knot {
   double time;
-  int has_force;      ///< u is defined here
+  int has_force; ///< u is defined here
   cav_slot_layout layout;
-  cav_slot *slot;     ///< [layout.count]
-  double *slot_row;   ///< [layout.count*3nv] derivatives of the slots' values, if kept
-  double *u;          ///< [nv]
-  double *du;         ///< [nv*3nv] row-major
-  int nread, ncontact;///< readings beside u: 4 a contact, then sensors
-  int room;           ///< readings for which y, dy have space
-  double *y;          ///< [nread]
-  double *dy;         ///< [nread*3nv]
+  cav_slot *slot;         ///< [layout.count]
+  double *slot_row;       ///< [layout.count*3nv] derivatives of the slots' values, if kept
+  double *u;              ///< [nv]
+  double *du;             ///< [nv*3nv] row-major
+  int nread, ncontact;    ///< readings beside u: 4 a contact, then sensors
+  int room;               ///< readings for which y, dy have space
+  double *y;              ///< [nread]
+  double *dy;             ///< [nread*3nv]
   int ndense, dense_room; ///< rows over all columns, weighted, that make up the Hessian beside the sparse ones
-  double *dense, *rest; ///< [ndense*3nv], [ndense]
-  double *hessian;    ///< [3nv*3nv] Gauss-Newton, lower triangle
-  double *gradient;   ///< [3nv]
-  double *turn;       ///< [nturn*CAV_TURN] of the step that ends here: Jr^-1, Jl^-1 and the rotation vector itself
-  double cost, merit; ///< cost terms; and with penalties
+  double *dense, *rest;   ///< [ndense*3nv], [ndense]
+  double *hessian;        ///< [3nv*3nv] Gauss-Newton, lower triangle
+  double *gradient;       ///< [3nv]
+  double *turn;           ///< [nturn*CAV_TURN] of the step that ends here: Jr^-1, Jl^-1 and the rotation vector itself
+  double cost, merit;     ///< cost terms; and with penalties
 } cav_knot;
 
 /// Weights of the augmented Lagrangian, per kind of row.
@@ -60,22 +60,22 @@ typedef struct cav_penalties {
 typedef struct cav_transcription {
   const cav_problem *problem;
   const cav_model *model;
-  int nv, nknot;       ///< unknown blocks are knots 1 .. nknot-1
+  int nv, nknot; ///< unknown blocks are knots 1 .. nknot-1
   double h;
-  double weight;       ///< N: model mass times gravity
-  int nresidual;       ///< rows of unactuated
+  double weight;             ///< N: model mass times gravity
+  int nresidual;             ///< rows of unactuated
   cav_force_row *unactuated; ///< orthonormal complement of the actuators' range, scaled to shares of weight
   cav_force_row *effort;     ///< [nu] actuator force over its limit
   double (*effort_range)[2]; ///< [nu] limits of effort, scaled
   int nturn;
-  int *turn_dof;       ///< [nturn] first of three rotational dofs
-  int *turn_of;        ///< [nv] index into turn_dof or -1
+  int *turn_dof; ///< [nturn] first of three rotational dofs
+  int *turn_of;  ///< [nv] index into turn_dof or -1
   cav_penalties penalty;
-  cav_derivative derivative; ///< of u, contacts and sensors
-  int constraints_only; ///< costs and multipliers are left out: the merit is the violation alone
-  int keep_rows;       ///< slot_row of the knots is filled by linearisations
-  cav_options options; ///< contact law of this stage
-  cav_knot *knot;      ///< [nknot]
+  cav_derivative derivative;   ///< of u, contacts and sensors
+  int constraints_only;        ///< costs and multipliers are left out: the merit is the violation alone
+  int keep_rows;               ///< slot_row of the knots is filled by linearisations
+  cav_options options;         ///< contact law of this stage
+  cav_knot *knot;              ///< [nknot]
   struct cav_scratch *scratch; ///< one a thread
   cav_parallel *pool;
   double seconds_dynamics, seconds_assembly;
@@ -107,7 +107,6 @@ double cav_transcription_violation(const cav_transcription *transcription);
 /// Multiplier update of the augmented Lagrangian at the last values.
 void cav_transcription_multipliers(cav_transcription *transcription);
 
-
 /// q_t := q_t (+) x_t for every unknown knot; v follows. x [(nknot-1)*nv].
 void cav_transcription_move(const cav_transcription *transcription, const cav_trajectory *from, const double *x,
                             cav_trajectory *to);
@@ -118,7 +117,8 @@ double cav_term_weight(const cav_transcription *transcription, const cav_term *t
 /// Readings of a term (sensors only), whether it selects a dof, and value minus target over scale of a sensor at knot t.
 int cav_term_dim(const cav_term *term);
 int cav_dof_selected(const cav_transcription *transcription, const cav_term *term, int dof);
-void cav_term_read(const cav_transcription *transcription, const cav_state *state, const cav_term *term, int t, double *y);
+void cav_term_read(const cav_transcription *transcription, const cav_state *state, const cav_term *term, int t,
+                   double *y);
 
 /// Target of a term at a time, dim numbers: constant, between waypoints, or zeros.
 void cav_term_target(const cav_term *term, double time, int dim, double *target);

@@ -11,20 +11,23 @@ static const char walker[] =
     "<mujoco><worldbody><geom name='floor' type='plane' size='1 1 1'/>"
     "<body name='trunk' pos='0 0 .3'><freejoint name='root'/><geom type='sphere' size='.1' mass='3'/>"
     "<site name='eye' pos='.1 0 .05'/>"
-    "<body name='leg' pos='.1 0 -.05'><joint name='hip' axis='0 1 0' limited='true' range='-30 30' armature='.01' damping='.1'/>"
+    "<body name='leg' pos='.1 0 -.05'><joint name='hip' axis='0 1 0' limited='true' range='-30 30' armature='.01' "
+    "damping='.1'/>"
     "<geom type='capsule' size='.03' fromto='0 0 0 0 0 -.15' mass='.5'/>"
     "<body name='foot' pos='0 0 -.2'><joint name='ankle' axis='0 1 0' armature='.01'/>"
     "<geom name='sole' type='capsule' size='.03' fromto='-.05 0 0 .1 0 0' mass='.2'/></body></body>"
     "<body name='arm' pos='-.1 0 .1'><joint name='shoulder' type='ball' limited='true' range='0 60' damping='.05'/>"
     "<geom type='capsule' size='.03' fromto='0 0 0 .1 0 -.25' mass='.4'/></body></body></worldbody>"
-    "<tendon><fixed name='string' limited='true' range='-.5 .5'><joint joint='hip' coef='.5'/><joint joint='ankle' coef='.5'/>"
+    "<tendon><fixed name='string' limited='true' range='-.5 .5'><joint joint='hip' coef='.5'/><joint joint='ankle' "
+    "coef='.5'/>"
     "</fixed></tendon>"
     "<actuator><motor joint='hip' gear='20' ctrllimited='true' ctrlrange='-1 1'/>"
     "<motor tendon='string' gear='5' ctrllimited='true' ctrlrange='-.5 1'/></actuator></mujoco>";
 
 /// Costs of every quantity, hard terms of every kind, windows of both kinds.
 static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) {
-  static double eye_target[3] = {0.2, 0.1, 0.5}, quat_target[4] = {0.9, 0.1, 0.3, 0.3}, waypoints[6] = {0, 0, 0.3, 0.1, 0, 0.4};
+  static double eye_target[3] = {0.2, 0.1, 0.5}, quat_target[4] = {0.9, 0.1, 0.3, 0.3},
+                waypoints[6] = {0, 0, 0.3, 0.1, 0, 0.4};
   static double waypoint_time[2] = {0, 0.15};
   int n = cav_problem_default_terms(term, 16), trunk = cav_find(m, CAV_OBJECT_BODY, "trunk");
   cav_term base = term[0];
@@ -43,8 +46,10 @@ static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) 
     if (kind == 3) t->sensor = (cav_sensor){"", CAV_SENSOR_SUBTREECOM, CAV_OBJECT_BODY, trunk, 3, 0}, t->nwaypoint = 2;
     if (kind == 3) t->target = waypoints, t->waypoint_time = waypoint_time;
     if (kind == 4) t->use = CAV_USE_RANGE, t->lower = -0.01, t->upper = 0.01, t->component = 2;
-    if (kind == 5) t->quantity = CAV_QUANTITY_CONFIGURATION, t->use = CAV_USE_EQUAL, t->from = t->to = p->duration, t->target = NULL;
-    if (kind == 6) t->quantity = CAV_QUANTITY_VELOCITY, t->use = CAV_USE_RANGE, t->lower = -0.1, t->upper = 0.1, t->target = NULL;
+    if (kind == 5)
+      t->quantity = CAV_QUANTITY_CONFIGURATION, t->use = CAV_USE_EQUAL, t->from = t->to = p->duration, t->target = NULL;
+    if (kind == 6)
+      t->quantity = CAV_QUANTITY_VELOCITY, t->use = CAV_USE_RANGE, t->lower = -0.1, t->upper = 0.1, t->target = NULL;
   }
   return n;
 }
@@ -58,7 +63,8 @@ static void shake(cav_trajectory *at, const cav_model *m, double size) {
   cav_trajectory_velocities(m, at);
 }
 
-static double merit_at(cav_transcription *tr, const cav_trajectory *at, cav_trajectory *moved, double *x, int i, double step) {
+static double merit_at(cav_transcription *tr, const cav_trajectory *at, cav_trajectory *moved, double *x, int i,
+                       double step) {
   x[i] = step;
   cav_transcription_move(tr, at, x, moved);
   x[i] = 0;
@@ -81,7 +87,8 @@ static void test_gradient(cav_transcription *tr, cav_trajectory *at) {
     }
   for (int i = 0; i < n; i++) norm = fmax(norm, fabs(gradient[i]));
   for (int i = 0; i < n; i++) {
-    double step = 1e-5, slope = (merit_at(tr, at, moved, x, i, step) - merit_at(tr, at, moved, x, i, -step)) / (2 * step);
+    double step = 1e-5,
+           slope = (merit_at(tr, at, moved, x, i, step) - merit_at(tr, at, moved, x, i, -step)) / (2 * step);
     double error = fabs(slope - gradient[i]) / norm;
     if (error > worst) worst = error;
     if (error > 1e-5) printf("knot %d dof %d: %.9g against %.9g\n", i / m->nv + 1, i % m->nv, gradient[i], slope);
@@ -112,7 +119,8 @@ static void test_rows(cav_transcription *tr, cav_trajectory *at, int tries) {
     rows = 0;
     for (int t = 0; t < tr->nknot; t++)
       for (int i = 0; i < tr->knot[t].layout.count; i++, rows++)
-        for (int c = 0; c < width; c++) used[rows * (size_t)width + (size_t)c] |= tr->knot[t].slot_row[i * width + c] != 0;
+        for (int c = 0; c < width; c++)
+          used[rows * (size_t)width + (size_t)c] |= tr->knot[t].slot_row[i * width + c] != 0;
   }
   // differences at the last point, for the first, a middle and the last knot
   for (int t = 1; t < tr->nknot; t++) {

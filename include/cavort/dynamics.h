@@ -12,18 +12,18 @@ extern "C" {
 
 /// One contact point at (q, v, v_next). Impulses act on geom2 (and reversed on geom1) along the axes of frame.
 typedef struct cav_contact {
-  int pair;         ///< index into model->pair
-  int feature;      ///< which point of the pair's manifold: stable between nearby configurations
-  int dim;          ///< rows: 1, 3, 4 or 6
+  int pair;    ///< index into model->pair
+  int feature; ///< which point of the pair's manifold: stable between nearby configurations
+  int dim;     ///< rows: 1, 3, 4 or 6
   int link1, link2;
-  double pos[3];    ///< m, world, midway between the surfaces
-  double frame[9];  ///< rows are axes in world coordinates; the first is the normal, from geom1 to geom2
-  double dist;      ///< m, gap between the surfaces; negative: penetration
-  double margin;    ///< m, margin - gap: the constraint pushes below this distance
-  double regulariser[6];  ///< R, 1/kg
-  double damping[6];      ///< h B, dimensionless: v* = (1 - hB) x' - h K x
-  double stiffness;       ///< h K of the normal row, 1/s
-  double sigma;           ///< smoothing of the law in impulse scale (dynamics.md, 3), 0: exact
+  double pos[3];         ///< m, world, midway between the surfaces
+  double frame[9];       ///< rows are axes in world coordinates; the first is the normal, from geom1 to geom2
+  double dist;           ///< m, gap between the surfaces; negative: penetration
+  double margin;         ///< m, margin - gap: the constraint pushes below this distance
+  double regulariser[6]; ///< R, 1/kg
+  double damping[6];     ///< h B, dimensionless: v* = (1 - hB) x' - h K x
+  double stiffness;      ///< h K of the normal row, 1/s
+  double sigma;          ///< smoothing of the law in impulse scale (dynamics.md, 3), 0: exact
   double friction[5];
   double velocity[6];      ///< J v, m/s (rad/s for the last three)
   double velocity_next[6]; ///< J v_next
@@ -31,18 +31,23 @@ typedef struct cav_contact {
 } cav_contact;
 
 /// One scalar constraint at (q, v, v_next): a limit or a friction loss, of a joint (dof) or of a tendon.
-typedef enum cav_row_type { CAV_ROW_LIMIT_JOINT, CAV_ROW_LIMIT_TENDON, CAV_ROW_FRICTION_DOF, CAV_ROW_FRICTION_TENDON } cav_row_type;
+typedef enum cav_row_type {
+  CAV_ROW_LIMIT_JOINT,
+  CAV_ROW_LIMIT_TENDON,
+  CAV_ROW_FRICTION_DOF,
+  CAV_ROW_FRICTION_TENDON
+} cav_row_type;
 typedef struct cav_row {
   cav_row_type type;
-  int object;         ///< joint, tendon or dof
-  int side;           ///< limits: 0 lower, 1 upper
-  double dist;        ///< limits: distance to the limit, negative: violated
+  int object;  ///< joint, tendon or dof
+  int side;    ///< limits: 0 lower, 1 upper
+  double dist; ///< limits: distance to the limit, negative: violated
   double margin;
-  double axis[3];     ///< gradient of dist: 1 value for scalar objects (+1 or -1), 3 for a ball joint
-  double bound;       ///< friction loss: h eta, N s
+  double axis[3]; ///< gradient of dist: 1 value for scalar objects (+1 or -1), 3 for a ball joint
+  double bound;   ///< friction loss: h eta, N s
   double regulariser, damping, stiffness, sigma;
   double velocity, velocity_next; ///< J v and J v_next
-  double impulse;     ///< f, N s or N m s
+  double impulse;                 ///< f, N s or N m s
 } cav_row;
 
 /// World pose of a link. Row-major rotation: world = rotation * local + pos.
@@ -59,23 +64,23 @@ typedef struct cav_state {
   cav_options options;
 
   // position: filled from q
-  cav_pose *link;         ///< [nlink] world poses
-  double *com;            ///< [nlink*3] centres of mass, world
-  double *inertia;        ///< [nlink*6] about the centre of mass, world axes: xx yy zz xy xz yz
-  double *reference;      ///< [nlink*3] point at which the link's spatial vectors are taken (its tree's root position)
-  double *axis;           ///< [nv*6] motion subspace of each dof: what a unit velocity does
-  double *tendon_length;  ///< [ntendon]
+  cav_pose *link;        ///< [nlink] world poses
+  double *com;           ///< [nlink*3] centres of mass, world
+  double *inertia;       ///< [nlink*6] about the centre of mass, world axes: xx yy zz xy xz yz
+  double *reference;     ///< [nlink*3] point at which the link's spatial vectors are taken (its tree's root position)
+  double *axis;          ///< [nv*6] motion subspace of each dof: what a unit velocity does
+  double *tendon_length; ///< [ntendon]
   int ncontact, nrow;
-  cav_contact *contact;   ///< [ncontact]; geometry only depends on q, velocities and impulses on all
-  cav_row *row;           ///< [nrow]
+  cav_contact *contact; ///< [ncontact]; geometry only depends on q, velocities and impulses on all
+  cav_row *row;         ///< [nrow]
 
   // velocity: filled from q and v (euler) or the mean of v and v_next (midpoint)
-  double *velocity;       ///< [nlink*6] spatial velocity of each link at the velocity the bias is taken
-  double *velocity_next;  ///< [nlink*6] spatial velocity of each link at v_next
+  double *velocity;      ///< [nlink*6] spatial velocity of each link at the velocity the bias is taken
+  double *velocity_next; ///< [nlink*6] spatial velocity of each link at v_next
 
   // inverse
-  double *force;          ///< [nlink*6] wrench of each subtree
-  double *u;              ///< [nv] last result of cav_inverse
+  double *force; ///< [nlink*6] wrench of each subtree
+  double *u;     ///< [nv] last result of cav_inverse
 
   struct cav_workspace *work; ///< private
 } cav_state;
@@ -99,8 +104,8 @@ cav_status cav_position(const cav_model *model, cav_state *state, const double *
 /// Generalised force that takes v to v_next in one step: u = RNE(q, v, a) + D a - p - (J' f)/h, a = (v_next - v)/h.
 /// q [nq], v, v_next [nv] -> u [nv], N or N m. D = armature (+ h B for euler). Forms no matrix.
 /// Fails with CAV_NOT_FINITE, u untouched. Todorov 2014, eqs. (2), (19)-(22).
-cav_status cav_inverse(const cav_model *model, cav_state *state, const double *q, const double *v,
-                       const double *v_next, double *u);
+cav_status cav_inverse(const cav_model *model, cav_state *state, const double *q, const double *v, const double *v_next,
+                       double *u);
 
 /// The same, reusing from the state's last evaluation what stage says is unchanged (MuJoCo's mj_inverseSkip).
 cav_status cav_inverse_from(const cav_model *model, cav_state *state, cav_stage unchanged, const double *q,
@@ -122,9 +127,8 @@ typedef struct cav_forward_report {
 
 /// Forward step by generalised projected Gauss-Seidel on (9), exact law only. At most iterations sweeps, fewer when the
 /// largest change of an impulse, relative, falls below tolerance. report may be NULL. Paper, section IV.
-cav_status cav_forward_gpgs(const cav_model *model, cav_state *state, const double *q, const double *v,
-                            const double *u, int iterations, double tolerance, double *v_next,
-                            cav_forward_report *report);
+cav_status cav_forward_gpgs(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
+                            int iterations, double tolerance, double *v_next, cav_forward_report *report);
 
 /// cav_forward with tolerance (relative, on u), iteration limit and a report.
 cav_status cav_forward_newton(const cav_model *model, cav_state *state, const double *q, const double *v,
@@ -146,8 +150,8 @@ typedef void (*cav_readout)(const cav_model *model, const cav_state *state, void
 /// value [n] at the point; d_dq, d_dv, d_dv_next [n*nv] row-major, NULL = not needed. dynamics.md, 7.
 /// A pass over v or v_next repeats no position work. The state is left at the point itself.
 cav_status cav_differentiate(const cav_model *model, cav_state *state, cav_derivative method, double step,
-                             const double *q, const double *v, const double *v_next, cav_readout readout,
-                             void *context, int n, double *value, double *d_dq, double *d_dv, double *d_dv_next);
+                             const double *q, const double *v, const double *v_next, cav_readout readout, void *context,
+                             int n, double *value, double *d_dq, double *d_dv, double *d_dv_next);
 
 /// Inertia matrix M(q) with D, dense [nv*nv] row-major. q [nq].
 cav_status cav_inertia(const cav_model *model, cav_state *state, const double *q, double *M);

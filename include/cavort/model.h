@@ -43,7 +43,7 @@ typedef enum cav_sensor_type {
 
 /// What a frame sensor or a term looks at.
 typedef enum cav_object_type {
-  CAV_OBJECT_BODY, ///< frame at the body's centre of mass (MJCF "body")
+  CAV_OBJECT_BODY,  ///< frame at the body's centre of mass (MJCF "body")
   CAV_OBJECT_XBODY, ///< frame of the body as written in the file (MJCF "xbody")
   CAV_OBJECT_JOINT,
   CAV_OBJECT_GEOM,
@@ -69,11 +69,11 @@ typedef struct cav_body {
   int geom, ngeom;  ///< its geoms: first, count
   double pos[3];    ///< frame in its link's frame
   double quat[4];
-  double mass;                ///< kg
-  double com[3];              ///< centre of mass in the body frame
-  double iquat[4];            ///< principal axes in the body frame
-  double inertia[3];          ///< principal moments about the centre of mass, kg m^2
-  double inverse_weight[2];   ///< mean diagonal of J M^-1 J' at its centre of mass at q0: translation 1/kg, rotation 1/(kg m^2)
+  double mass;              ///< kg
+  double com[3];            ///< centre of mass in the body frame
+  double iquat[4];          ///< principal axes in the body frame
+  double inertia[3];        ///< principal moments about the centre of mass, kg m^2
+  double inverse_weight[2]; ///< mean diagonal of J M^-1 J' at its com at q0: translation 1/kg, rotation 1/(kg m^2)
 } cav_body;
 
 /// Bodies that move as one: the unit of the dynamics. Link 0 is the world and all that is fixed to it.
@@ -95,16 +95,16 @@ typedef struct cav_joint {
   const char *name;
   cav_joint_type type;
   int body, link;
-  int q, dof;        ///< first index into q and into v
-  double pos[3];     ///< anchor in the link frame
-  double axis[3];    ///< unit, link frame (hinge, slide)
-  double ref;        ///< q of a hinge or slide in the posture of the file
-  int limited;       ///< 1 if range holds
-  double range[2];   ///< rad or m; ball: range[1] is the largest rotation angle
-  double margin;     ///< limit acts from this distance on
+  int q, dof;      ///< first index into q and into v
+  double pos[3];   ///< anchor in the link frame
+  double axis[3];  ///< unit, link frame (hinge, slide)
+  double ref;      ///< q of a hinge or slide in the posture of the file
+  int limited;     ///< 1 if range holds
+  double range[2]; ///< rad or m; ball: range[1] is the largest rotation angle
+  double margin;   ///< limit acts from this distance on
   cav_softness limit;
-  double stiffness;  ///< N m/rad or N/m
-  double springref;  ///< hinge and slide: q at rest of the spring
+  double stiffness; ///< N m/rad or N/m
+  double springref; ///< hinge and slide: q at rest of the spring
 } cav_joint;
 
 /// One degree of freedom, index into v.
@@ -126,7 +126,7 @@ typedef struct cav_geom {
   double quat[4];
   double rotation[9]; ///< of quat, row-major
   double size[3];
-  double bound;  ///< radius of the bounding sphere about pos; infinite for a plane
+  double bound; ///< radius of the bounding sphere about pos; infinite for a plane
   int contype, conaffinity;
   int condim, priority;
   double friction[3]; ///< sliding, torsional (m), rolling (m)
@@ -146,9 +146,9 @@ typedef struct cav_site {
 
 /// Two geoms that may touch; everything mixed at compile time. Only pairs that can touch are listed.
 typedef struct cav_pair {
-  int geom1, geom2; ///< geom1's type <= geom2's type
-  int dim;          ///< 1, 3, 4 or 6 rows
-  int same_world;   ///< 1 if one of the two does not move
+  int geom1, geom2;   ///< geom1's type <= geom2's type
+  int dim;            ///< 1, 3, 4 or 6 rows
+  int same_world;     ///< 1 if one of the two does not move
   double friction[5]; ///< two tangential, torsional (m), two rolling (m)
   double margin, gap; ///< m
   cav_softness softness;
@@ -179,8 +179,8 @@ typedef struct cav_tendon {
 typedef struct cav_actuator {
   const char *name;
   cav_transmission transmission;
-  int target;           ///< joint or tendon
-  double gear[6];       ///< gear[0] for scalar joints and tendons; all for ball (3) and free (6) joints
+  int target;     ///< joint or tendon
+  double gear[6]; ///< gear[0] for scalar joints and tendons; all for ball (3) and free (6) joints
   int ctrllimited, forcelimited;
   double ctrlrange[2];
   double forcerange[2]; ///< before gear
@@ -210,7 +210,7 @@ typedef enum cav_order {
 
 /// How v* is made from a constraint's position error; dynamics.md, 4.
 typedef enum cav_stabilisation {
-  CAV_STABILISATION_SOLREF,  ///< eq. (28) from each constraint's solref and solimp, as MuJoCo does
+  CAV_STABILISATION_SOLREF, ///< eq. (28) from each constraint's solref and solimp, as MuJoCo does
   CAV_STABILISATION_DISCRETE ///< critically damped discrete step with double pole exp(-h/time_constant), one softness for all
 } cav_stabilisation;
 
@@ -221,20 +221,20 @@ typedef enum cav_regulariser {
 
 /// How constraints are evaluated. A state starts with the model's; change state->options between calls at will.
 typedef struct cav_options {
-  double timestep;        ///< h, s: starts as the model's; every evaluation uses this one
+  double timestep; ///< h, s: starts as the model's; every evaluation uses this one
   cav_order order;
   cav_stabilisation stabilisation;
   cav_regulariser regulariser;
-  double softness;        ///< epsilon of CAV_STABILISATION_DISCRETE, > 0
-  double time_constant;   ///< kappa of CAV_STABILISATION_DISCRETE, s; 0: deadbeat
-  double smoothing;       ///< delta, m: distance at which the smoothed law is felt; 0: the exact law (dynamics.md, 3)
-  double smoothing_self;  ///< delta between two moving links, m, used where smoothing > 0
-  double impratio;        ///< R_normal / R_friction, > 0
-  int guard;              ///< 1: keep solref time constants >= 2 h
-  int contact;            ///< 0: no contacts
-  int constraint;         ///< 0: no limits, friction loss or contacts
-  int gravity;            ///< 0: none
-  int passive;            ///< 0: no springs and dampers
+  double softness;       ///< epsilon of CAV_STABILISATION_DISCRETE, > 0
+  double time_constant;  ///< kappa of CAV_STABILISATION_DISCRETE, s; 0: deadbeat
+  double smoothing;      ///< delta, m: distance at which the smoothed law is felt; 0: the exact law (dynamics.md, 3)
+  double smoothing_self; ///< delta between two moving links, m, used where smoothing > 0
+  double impratio;       ///< R_normal / R_friction, > 0
+  int guard;             ///< 1: keep solref time constants >= 2 h
+  int contact;           ///< 0: no contacts
+  int constraint;        ///< 0: no limits, friction loss or contacts
+  int gravity;           ///< 0: none
+  int passive;           ///< 0: no springs and dampers
 } cav_options;
 
 /// A compiled model. Built by cav_model_load, never changed afterwards.
@@ -259,10 +259,10 @@ typedef struct cav_model {
   const cav_actuator *actuator; ///< [nu]
   const cav_sensor *sensor;
   const cav_key *key;
-  const double *q0;          ///< [nq] configuration of the file, where reference quantities are taken
+  const double *q0;           ///< [nq] configuration of the file, where reference quantities are taken
   const char *const *warning; ///< what the file asks for and this version leaves aside, with file and line
-  double mass;               ///< kg, of all that moves
-  size_t bytes;              ///< memory of the model
+  double mass;                ///< kg, of all that moves
+  size_t bytes;               ///< memory of the model
 } cav_model;
 
 /// Loads an MJCF file, with its includes and assets. NULL on failure with the reason in error (may be NULL).

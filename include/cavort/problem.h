@@ -23,7 +23,7 @@ typedef enum cav_quantity {
 } cav_quantity;
 
 typedef enum cav_term_use {
-  CAV_USE_COST, ///< weight/2 * ||x - target||^2, integrated over the window; at a single knot not multiplied by time
+  CAV_USE_COST,  ///< weight/2 * ||x - target||^2, integrated over the window; at a single knot not multiplied by time
   CAV_USE_EQUAL, ///< x = target, hard
   CAV_USE_RANGE  ///< lower <= x <= upper, hard
 } cav_term_use;
@@ -41,26 +41,28 @@ typedef struct cav_term {
   const char *name; ///< for logs and explanations; "" is fine
   cav_quantity quantity;
   cav_term_use use;
-  cav_sensor sensor;        ///< CAV_QUANTITY_SENSOR: from the model or declared by the problem
-  int component;            ///< sensor component, -1: all
+  cav_sensor sensor; ///< CAV_QUANTITY_SENSOR: from the model or declared by the problem
+  int component;     ///< sensor component, -1: all
   cav_dof_set dofs;
-  int joint;                ///< CAV_DOFS_ONE
-  double from, to;          ///< window, s; equal: one knot (the nearest). to < 0: the end
-  double weight;            ///< cost
-  double scale;             ///< values are divided by it, > 0, unit of the quantity
-  const double *target;     ///< constant: sensors [sensor.dim], all of them even if one component counts; configurations a q
-                            ///< [nq]; rates [nv]. NULL: zeros (quaternion: identity; configuration: the goal)
-  int nwaypoint;            ///< 0, or target is [nwaypoint*dim], linear between times, constant before and after
+  int joint;       ///< CAV_DOFS_ONE
+  double from, to; ///< window, s; equal: one knot (the nearest). to < 0: the end
+  double weight;   ///< cost
+  double scale;    ///< values are divided by it, > 0, unit of the quantity
+  const double
+      *target;   ///< constant: sensors [sensor.dim], all of them even if one component counts; configurations a q
+                 ///< [nq]; rates [nv]. NULL: zeros (quaternion: identity; configuration: the goal)
+  int nwaypoint; ///< 0, or target is [nwaypoint*dim], linear between times, constant before and after
   const double *waypoint_time; ///< [nwaypoint], s, increasing
-  double lower, upper;      ///< CAV_USE_RANGE, infinite where open; target is NULL then, or a posture or orientation to start from
+  double lower,
+      upper; ///< CAV_USE_RANGE, infinite where open; target is NULL then, or a posture or orientation to start from
 } cav_term;
 
 typedef enum cav_guess { CAV_GUESS_HOLD, CAV_GUESS_INTERPOLATE } cav_guess;
 
 /// One stage of the continuation (optimisation.md, 5).
 typedef struct cav_stage_options {
-  double softness;      ///< epsilon of the contacts
-  double time_constant; ///< kappa, in steps of the horizon (0: deadbeat)
+  double softness;       ///< epsilon of the contacts
+  double time_constant;  ///< kappa, in steps of the horizon (0: deadbeat)
   double smoothing;      ///< delta, m
   double smoothing_self; ///< delta between moving links and of limits, m (rad)
   double penalty;        ///< weight of the unactuated force (share of weight, squared)
@@ -77,24 +79,24 @@ typedef struct cav_schedule {
 typedef struct cav_problem {
   const char *name;
   const cav_model *model;
-  double duration, timestep;  ///< s; knots are round(duration/timestep) + 1
+  double duration, timestep; ///< s; knots are round(duration/timestep) + 1
   cav_order order;
-  int close_at_rest;          ///< 1: v after the last knot is zero, with rows there; 0: no rows at the last knot
-  double *q_start;            ///< [nq]
-  double *v_start;            ///< [nv]
-  double *q_goal;             ///< [nq] goal posture of the guess and of configuration terms without a target
+  int close_at_rest; ///< 1: v after the last knot is zero, with rows there; 0: no rows at the last knot
+  double *q_start;   ///< [nq]
+  double *v_start;   ///< [nv]
+  double *q_goal;    ///< [nq] goal posture of the guess and of configuration terms without a target
   cav_guess guess;
-  double guess_height;        ///< m: ballistic arc added to the guess over guess_from .. guess_to
+  double guess_height;         ///< m: ballistic arc added to the guess over guess_from .. guess_to
   double guess_from, guess_to; ///< s
   int nterm;
   cav_term *term;
-  double effort_limit;        ///< share of the actuator limits planned with, 0 .. 1
-  double limit_margin;        ///< rad or m kept from joint and tendon limits in planning
+  double effort_limit; ///< share of the actuator limits planned with, 0 .. 1
+  double limit_margin; ///< rad or m kept from joint and tendon limits in planning
   cav_schedule schedule;
-  int solved;                 ///< 1: read from a result folder, contact holds
-  cav_options contact;        ///< the law that the recorded motion obeys, for verification; solving does not use it
-  const char *model_path;     ///< file the model was read from; NULL: made in C
-  void *owner;                ///< memory of a problem read from a file
+  int solved;             ///< 1: read from a result folder, contact holds
+  cav_options contact;    ///< the law that the recorded motion obeys, for verification; solving does not use it
+  const char *model_path; ///< file the model was read from; NULL: made in C
+  void *owner;            ///< memory of a problem read from a file
 } cav_problem;
 
 /// Weights, schedule and options that serve all motions; the caller sets duration, start, goal and terms. Owns nothing.

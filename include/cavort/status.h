@@ -9,13 +9,13 @@ extern "C" {
 /// Outcome of a call that a user can make fail. Zero is success.
 typedef enum cav_status {
   CAV_OK = 0,
-  CAV_BAD_INPUT,      ///< a file, name, size or option is wrong; the error text says which and what to do
-  CAV_NOT_FINITE,     ///< a number that is not finite went in or came out; outputs are untouched
-  CAV_NOT_CONVERGED,  ///< an iteration stopped above its tolerance; outputs hold its best iterate
-  CAV_INTERRUPTED,    ///< the caller asked to stop; outputs hold the best iterate
-  CAV_NO_MEMORY,      ///< an allocation failed; nothing changed
-  CAV_NOT_SUPPORTED,  ///< understood but not offered by this build or version
-  CAV_INTERNAL        ///< a defect of the library: please report it
+  CAV_BAD_INPUT,     ///< a file, name, size or option is wrong; the error text says which and what to do
+  CAV_NOT_FINITE,    ///< a number that is not finite went in or came out; outputs are untouched
+  CAV_NOT_CONVERGED, ///< an iteration stopped above its tolerance; outputs hold its best iterate
+  CAV_INTERRUPTED,   ///< the caller asked to stop; outputs hold the best iterate
+  CAV_NO_MEMORY,     ///< an allocation failed; nothing changed
+  CAV_NOT_SUPPORTED, ///< understood but not offered by this build or version
+  CAV_INTERNAL       ///< a defect of the library: please report it
 } cav_status;
 
 /// What went wrong: file, line, element, what was expected and what to do, in one text.

@@ -33,7 +33,8 @@ cav_trajectory *cav_trajectory_resample(const cav_model *model, const cav_trajec
 
 /// Reads and writes trajectory.csv: a header of named columns, then one row per knot: time, q in MuJoCo's layout, v, u.
 /// Writing replaces the file atomically.
-cav_status cav_trajectory_write(const char *path, const cav_model *model, const cav_trajectory *trajectory, cav_error *error);
+cav_status cav_trajectory_write(const char *path, const cav_model *model, const cav_trajectory *trajectory,
+                                cav_error *error);
 cav_trajectory *cav_trajectory_read(const char *path, const cav_model *model, cav_error *error);
 
 #ifdef __cplusplus
