@@ -409,8 +409,8 @@ static void test_manifolds(void) {
 // centre, the same ones under tiny tilts
 static void test_standing(void) {
   if (!cav_collide_supported(CAV_GEOM_CYLINDER, CAV_GEOM_BOX)) return;
-  static const double drum_size[2] = {0.1, 0.3}, plate_size[2] = {0.5, 0.1}, table_size[3] = {0.5, 0.5, 0.1};
-  static const double brick_size[3] = {0.1, 0.15, 0.3}, small_size[2] = {0.1, 0.2};
+  static const double drum_size[3] = {0.1, 0.3}, plate_size[3] = {0.5, 0.1}, table_size[3] = {0.5, 0.5, 0.1};
+  static const double brick_size[3] = {0.1, 0.15, 0.3}, small_size[3] = {0.1, 0.2};
   cav_shape drum = {.type = CAV_GEOM_CYLINDER, .size = drum_size},
             plate = {.type = CAV_GEOM_CYLINDER, .size = plate_size};
   cav_shape table = {.type = CAV_GEOM_BOX, .size = table_size}, brick = {.type = CAV_GEOM_BOX, .size = brick_size};

@@ -243,6 +243,12 @@ static void check_constraints(void) {
   cav_problem_free(p);
 }
 
+static void check_same_stage(const cav_stage_options *a, const cav_stage_options *b) {
+  CHECK(a->softness == b->softness && a->time_constant == b->time_constant && a->smoothing == b->smoothing);
+  CHECK(a->smoothing_self == b->smoothing_self && a->penalty == b->penalty && a->iterations == b->iterations &&
+        a->tolerance == b->tolerance);
+}
+
 // same numbers in both
 static void check_same(const cav_problem *a, const cav_problem *b) {
   int nq = a->model->nq;
@@ -254,7 +260,9 @@ static void check_same(const cav_problem *a, const cav_problem *b) {
   CHECK_NEAR_ALL(a->v_start, b->v_start, a->model->nv, 0);
   CHECK(a->guess == b->guess && a->guess_height == b->guess_height && a->effort_limit == b->effort_limit &&
         a->limit_margin == b->limit_margin);
-  CHECK(!memcmp(&a->schedule, &b->schedule, sizeof a->schedule));
+  CHECK(a->schedule.stages == b->schedule.stages);
+  check_same_stage(&a->schedule.first, &b->schedule.first);
+  check_same_stage(&a->schedule.last, &b->schedule.last);
   CHECK(a->nterm == b->nterm);
   for (int i = 0; i < a->nterm && i < b->nterm; i++) {
     const cav_term *s = &a->term[i], *t = find(b, s->name);
