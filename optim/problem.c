@@ -342,8 +342,10 @@ static cav_status read_contact(const cav_problem_reader *reader) {
 static cav_status load_model(cav_problem_reader *reader, const char *model_path) {
   const char *named = cav_xml_text(reader->root, "model", NULL);
   if (!named && !model_path) {
-    return cav_xml_fail(reader->error, reader->root, "model",
-                        "is missing; give the path of a model, from this file's folder");
+    return cav_xml_fail(
+        reader->error, reader->root, "model",
+        "is missing; this problem serves any model with the names that it uses: give one by --model FILE, or "
+        "write its path here, from this file's folder");
   }
   char *path = model_path ? strdup(model_path) : cav_file_beside(reader->path, named);
   if (!path) return cav_problem_no_memory(reader);

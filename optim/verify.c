@@ -10,15 +10,8 @@
 
 #include "audit.h"
 
-// what a certificate promises
-static const double unactuated_limit = 1e-6;  // share of weight
-static const double limit_limit = 1e-6;       // relative (actuators), rad or m (ranges)
-static const double term_limit = 1e-6;        // scaled; also rad, m, rad/s or m/s of the given start
-static const double penetration_limit = 0.01; // m
-static const double defect_limit = 0.01;      // share of weight
-static const double step_limit = 1e-8;        // rad or m
-static const double usual_gravity = 9.81;     // m/s^2, unit of forces where the model has none
-static const double moment_arm = 0.3;         // m
+static const double usual_gravity = 9.81; // m/s^2, unit of forces where the model has none
+static const double moment_arm = 0.3;     // m
 
 /// What was found at the knots.
 typedef struct evidence {
@@ -321,18 +314,18 @@ static void judge(const cav_audit *audit, const evidence *found, const cav_repla
   if (missing) {
     snprintf(verdict->reason, sizeof verdict->reason, "the claimed contact law leaves out the model's %s", missing);
   }
-  require(verdict, &found->unactuated, unactuated_limit, "unactuated force, share of weight,",
+  require(verdict, &found->unactuated, CAV_PROMISE_UNACTUATED, "unactuated force, share of weight,",
           "More iterations, a longer motion or a start nearer to balance usually help.");
-  require(verdict, &found->limit, limit_limit, "limit exceeded by",
+  require(verdict, &found->limit, CAV_PROMISE_LIMIT, "limit exceeded by",
           "A longer motion or a lower effort_limit usually helps.");
-  require(verdict, &found->term, term_limit, "constraint missed by",
+  require(verdict, &found->term, CAV_PROMISE_CONSTRAINT, "constraint missed by",
           "Constraints may contradict each other or the limits.");
-  require(verdict, &found->penetration, penetration_limit, "penetration, m,",
+  require(verdict, &found->penetration, CAV_PROMISE_PENETRATION, "penetration, m,",
           "A lower softness or smoothing at the end of the schedule usually helps.");
-  require(verdict, &found->defect, defect_limit, "momentum defect, share of weight rms,",
+  require(verdict, &found->defect, CAV_PROMISE_MOMENTUM, "momentum defect, share of weight rms,",
           "A smaller time step or the midpoint order usually helps.");
   const cav_finding step = {replay->step_error, replay->step_knot, "forward step from the knot against the next knot"};
-  require(verdict, &step, step_limit, "replay error, rad or m,",
+  require(verdict, &step, CAV_PROMISE_STEP, "replay error, rad or m,",
           "Forward and inverse dynamics disagree: please report it.");
   if (*replay->lost && !*verdict->reason) {
     snprintf(verdict->reason, sizeof verdict->reason,

@@ -112,7 +112,7 @@ cav_status cav_inverse_from(const cav_model *model, cav_state *state, cav_stage 
                             const double *v, const double *v_next, double *u);
 
 /// One step forward: v_next from u [nv], by Newton on the convex potential (9) in v_next, exact or smoothed law.
-/// Inverse of cav_inverse to 1e-9. v_next [nv] holds the warm start if state->options ask, otherwise v is taken.
+/// Inverse of cav_inverse to 1e-9; starts from v.
 /// CAV_NOT_CONVERGED leaves the best iterate. The position afterwards is cav_integrate(q, v_next, timestep).
 cav_status cav_forward(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
                        double *v_next);

@@ -67,7 +67,7 @@ void cav_solution_free(cav_solution *solution);
 /// What a certificate promises: the largest value of the verdict's field of that name.
 #define CAV_PROMISE_UNACTUATED 1e-6  ///< share of weight
 #define CAV_PROMISE_LIMIT 1e-6       ///< relative (actuators), rad or m (ranges)
-#define CAV_PROMISE_CONSTRAINT 1e-6  ///< scaled
+#define CAV_PROMISE_CONSTRAINT 1e-6  ///< scaled; rad, m, rad/s or m/s of the given start
 #define CAV_PROMISE_PENETRATION 0.01 ///< m
 #define CAV_PROMISE_MOMENTUM 0.01    ///< share of weight, root mean square
 #define CAV_PROMISE_STEP 1e-8        ///< rad or m
