@@ -9,9 +9,7 @@
 #include "stage.h"
 #include "workspace.h"
 
-// share of smoothing distances beyond which the smoothed force is dropped: exp(-12) = 6e-6 of its value at contact
-static const double SMOOTHING_REACH = 12;
-// the discrete law looks at x + h v_next: fastest approach met without a jump, m/s (a fall from 1.3 m)
+// fastest approach that the discrete law meets without a jump, m/s (a fall from 1.3 m)
 static const double APPROACH_SPEED = 5;
 
 /// A pair as the broad phase wants it: all it reads, in order.
@@ -105,10 +103,8 @@ void cav_geom_cache_free(struct cav_geom_cache *cache) {
 
 double cav_reach(const cav_state *state, const cav_pair *pair) {
   const cav_options *o = &state->options;
-  double reach = 0;
-  if (o->smoothing > 0) reach = SMOOTHING_REACH * (pair->same_world ? o->smoothing : o->smoothing_self);
-  if (o->stabilisation == CAV_STABILISATION_DISCRETE) reach = fmax(reach, APPROACH_SPEED * state->options.timestep);
-  return pair->margin + reach;
+  double delta = o->smoothing > 0 ? (pair->same_world ? o->smoothing : o->smoothing_self) : 0;
+  return pair->margin + cav_law_reach(state, delta, APPROACH_SPEED);
 }
 
 // centres of all geoms that move, and normals of planes that do

@@ -4,14 +4,18 @@
 /// h B = (1 + eps)(1 - z^2), h^2 K = (1 + eps)(1 - z)^2. Friction rows have K = 0. Contacts are found by collide.c,
 /// impulses are computed in inverse.c.
 ///
-/// Which limits are rows: distance below the margin with solref (MuJoCo's rule). The discrete law looks at where the step
-/// ends, x + h v_next, so there a limit is a row from REACH_SPEED h before the margin: at a speed towards the limit
-/// below that, nothing is missed. The smoothed law adds where its force has decayed, REACH_SMOOTH delta.
+/// Which limits are rows and which contacts are sought: distance below the margin with solref (MuJoCo's rule), and one
+/// rule for what reaches beyond it (cav_law_reach). The discrete law looks at where the step ends, x + h v_next, so there
+/// an object counts from speed h before the margin: slower than that, nothing is missed. The smoothed law is felt up to
+/// SMOOTH_REACH delta. The larger of the two holds.
 #include "math3.h"
 #include "workspace.h"
 
 static const double R_MIN = 1e-15, IMPEDANCE_MIN = 1e-4, IMPEDANCE_MAX = 0.9999, FRICTION_MIN = 1e-5;
-static const double REACH_SPEED = 20, REACH_SMOOTH = 12;
+// share of smoothing distances beyond which the smoothed force is dropped: exp(-12) = 6e-6 of its value at contact
+static const double SMOOTH_REACH = 12;
+// fastest approach to a limit met without a jump, rad/s or m/s
+static const double LIMIT_SPEED = 20;
 
 /// R, h B and h K of one row.
 typedef struct law {
@@ -87,10 +91,16 @@ static double self_smoothing(const cav_state *state) {
   return state->options.smoothing > 0 ? state->options.smoothing_self : 0;
 }
 
-double cav_limit_reach(const cav_state *state, double margin) {
-  double reach = margin + REACH_SMOOTH * self_smoothing(state);
-  if (state->options.stabilisation == CAV_STABILISATION_DISCRETE) { reach += REACH_SPEED * state->options.timestep; }
+double cav_law_reach(const cav_state *state, double delta, double speed) {
+  double reach = SMOOTH_REACH * delta;
+  if (state->options.stabilisation == CAV_STABILISATION_DISCRETE) {
+    reach = larger(reach, speed * state->options.timestep);
+  }
   return reach;
+}
+
+double cav_limit_reach(const cav_state *state, double margin) {
+  return margin + cav_law_reach(state, self_smoothing(state), LIMIT_SPEED);
 }
 
 // one more row with its law. Friction loss (bound > 0) has no position error; where the law is smoothed, its corners are
