@@ -639,6 +639,7 @@ static void set_options(builder *b) {
   const cav_spec_option *o = &b->spec->option;
   cav_model *m = b->model;
   m->timestep = o->timestep;
+  m->fused = b->spec->compiler.fuse;
   copy3(m->gravity, o->gravity);
   m->options = (cav_options){.order = CAV_ORDER_EULER,
                              .stabilisation = CAV_STABILISATION_SOLREF,

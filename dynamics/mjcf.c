@@ -98,9 +98,11 @@ static void read_compiler(reader *r, const cav_xml_node *node) {
     cav_spec_fail(r->spec, node, "boundinertia", "expected an inertia >= 0, got %g", c->bound_inertia);
   if (cav_xml_word(node, "coordinate", 0) == 1)
     cav_spec_fail(r->spec, node, "coordinate", "global coordinates are not supported; write local ones");
-  if (cav_xml_bool(node, "fusestatic", 0))
-    cav_spec_warn(r->spec, node, "fusestatic",
-                  "left aside: bodies that move as one are always fused, their names stay");
+  c->fuse = cav_xml_bool(node, "fusestatic", c->fuse);
+  c->strip = cav_xml_bool(node, "strippath", c->strip);
+  read_text(node, "assetdir", &c->mesh_folder);
+  read_text(node, "meshdir", &c->mesh_folder);
+  if (!cav_xml_bool(node, "discardvisual", 1)) r->spec->load.visual = 1;
 }
 
 static void read_flags(reader *r, const cav_xml_node *node) {
@@ -700,12 +702,18 @@ static void read_sections(reader *r, const cav_xml_node *root, const char *name,
   }
 }
 
-void cav_mjcf_read(cav_spec *spec, const cav_xml *xml) {
-  const cav_xml_node *root = cav_xml_root(xml);
-  reader r = {.spec = spec};
-  spec->name = cav_xml_text(root, "model", "");
-  spec->compiler = (cav_spec_compiler){
-      .degree = 1, .autolimits = 2, .from_geoms = 2, .group_range = {0, 5}, .total_mass = -1, .euler = "xyz"};
+void cav_mjcf_default_joint(cav_spec_joint *joint) { *joint = first_defaults().joint; }
+
+void cav_mjcf_default_geom(cav_spec_geom *geom) { *geom = first_defaults().geom; }
+
+void cav_mjcf_first_options(cav_spec *spec) {
+  spec->compiler = (cav_spec_compiler){.degree = 1,
+                                       .autolimits = 2,
+                                       .from_geoms = 2,
+                                       .group_range = {0, 5},
+                                       .total_mass = -1,
+                                       .euler = "xyz",
+                                       .mesh_folder = ""};
   spec->option = (cav_spec_option){.timestep = 0.002,
                                    .gravity = {0, 0, -9.81},
                                    .impratio = 1,
@@ -719,12 +727,24 @@ void cav_mjcf_read(cav_spec *spec, const cav_xml *xml) {
                                    .clamp = 1,
                                    .filter_parent = 1,
                                    .guard = 1};
+}
+
+void cav_mjcf_read_options(cav_spec *spec, const cav_xml_node *node) {
+  reader r = {.spec = spec};
+  read_sections(&r, node, "compiler", read_compiler);
+  read_sections(&r, node, "option", read_option);
+}
+
+void cav_mjcf_read(cav_spec *spec, const cav_xml *xml) {
+  const cav_xml_node *root = cav_xml_root(xml);
+  reader r = {.spec = spec};
+  spec->name = cav_xml_text(root, "model", "");
+  cav_mjcf_first_options(spec);
   defaults *main_class = CAV_SPEC_PUSH(spec, &r.classes);
   if (main_class) *main_class = first_defaults();
 
   // each section needs those before it, wherever they stand in the file
-  read_sections(&r, root, "compiler", read_compiler);
-  read_sections(&r, root, "option", read_option);
+  cav_mjcf_read_options(spec, root);
   read_sections(&r, root, "default", read_defaults);
   read_sections(&r, root, "asset", read_assets);
   read_world(&r, root);

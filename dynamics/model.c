@@ -6,12 +6,23 @@
 #include "cavort/model.h"
 #include "spec.h"
 
+cav_load_options cav_load_options_default(void) { return (cav_load_options){0}; }
+
 cav_model *cav_model_load(const char *path, cav_error *error) {
+  cav_load_options options = cav_load_options_default();
+  return cav_model_load_with(path, &options, error);
+}
+
+cav_model *cav_model_load_with(const char *path, const cav_load_options *options, cav_error *error) {
+  static const cav_xml_element *const roots[] = {&cav_mjcf_root, &cav_urdf_root, NULL};
   if (error) *error = (cav_error){.status = CAV_OK};
-  cav_xml *xml = cav_xml_read(path, cav_mjcf_roots, error);
+  cav_xml *xml = cav_xml_read(path, roots, error);
   if (!xml) return NULL;
-  cav_spec spec = {.xml = xml, .error = error};
-  cav_mjcf_read(&spec, xml);
+  cav_spec spec = {.xml = xml, .error = error, .load = *options};
+  if (cav_xml_root(xml)->rule == &cav_urdf_root)
+    cav_urdf_read(&spec, xml);
+  else
+    cav_mjcf_read(&spec, xml);
   cav_model *model = cav_compile(&spec);
   cav_spec_clear(&spec);
   cav_xml_free(xml);

@@ -65,8 +65,12 @@ static void weigh_body(const cav_model *model, const cav_state *state, cav_body 
   body->inverse_weight[0] = body->inverse_weight[1] = 0;
   if (body->link == 0) { return; }
   const cav_pose *link = &state->link[body->link];
-  quat_rotate(point, body->quat, body->com);
-  add3(point, point, body->pos);
+  if (model->fused) {
+    copy3(point, model->link[body->link].com);
+  } else {
+    quat_rotate(point, body->quat, body->com);
+    add3(point, point, body->pos);
+  }
   quat_matrix(R, link->quat);
   transform(point, link->pos, R, point);
   for (int kind = 0; kind < 2; kind++) {

@@ -116,15 +116,15 @@ static const cav_xml_attribute compiler_attributes[] = {BOOL("autolimits"),
                                                         REAL("boundinertia"),
                                                         REAL("settotalmass"),
                                                         BOOL("balanceinertia"),
-                                                        SKIP("strippath"),
+                                                        BOOL("strippath"),
                                                         WORD("coordinate", coordinates),
                                                         WORD("angle", angles),
                                                         SKIP("fitaabb"),
                                                         NAMED("eulerseq"),
-                                                        SKIP("meshdir"),
+                                                        TEXT("meshdir"),
                                                         SKIP("texturedir"),
-                                                        SKIP("assetdir"),
-                                                        SKIP("discardvisual"),
+                                                        TEXT("assetdir"),
+                                                        BOOL("discardvisual"),
                                                         SKIP("convexhull"),
                                                         SKIP("usethread"),
                                                         BOOL("fusestatic"),
@@ -406,5 +406,6 @@ static const cav_xml_attribute mujoco_attributes[] = {TEXT("model"), END};
 static const cav_xml_element *const mujoco_children[] = {
     &compiler, &option,   &size,   &visual,   &statistic, &defaults, &custom,  &asset, &worldbody,
     &contact,  &equality, &tendon, &actuator, &sensor,    &keyframe, &include, NULL};
-static const cav_xml_element mujoco = {"mujoco", 0, 0, mujoco_attributes, mujoco_children, 0};
-const cav_xml_element *const cav_mjcf_roots[] = {&mujoco, NULL};
+const cav_xml_element cav_mjcf_root = {"mujoco", 0, 0, mujoco_attributes, mujoco_children, 0};
+static const cav_xml_element *const extension_children[] = {&compiler, &option, &size, NULL};
+const cav_xml_element cav_mjcf_extension = {"mujoco", 0, 0, mujoco_attributes, extension_children, 0};

@@ -34,6 +34,14 @@ void cav_spec_no_memory(cav_spec *spec) {
            cav_xml_path(spec->xml));
 }
 
+char *cav_spec_keep_text(cav_spec *spec, size_t size) {
+  char **text = CAV_SPEC_PUSH(spec, &spec->kept);
+  if (!text) return NULL;
+  *text = calloc(1, size);
+  if (!*text) cav_spec_no_memory(spec);
+  return *text;
+}
+
 void cav_spec_fail(cav_spec *spec, const cav_xml_node *node, const char *attribute, const char *format, ...) {
   if (spec->status != CAV_OK) return;
   char text[600];
@@ -69,6 +77,8 @@ void cav_spec_unknown(cav_spec *spec, const cav_xml_node *node, const char *attr
 
 void cav_spec_clear(cav_spec *spec) {
   for (int i = 0; i < spec->warning.n; i++) free(spec->warning.at[i]);
+  for (int i = 0; i < spec->kept.n; i++) free(spec->kept.at[i]);
+  free(spec->kept.at);
   free(spec->warning.at);
   free(spec->body.at);
   free(spec->joint.at);

@@ -126,6 +126,9 @@ typedef struct cav_spec_compiler {
   int group_range[2];
   double bound_mass, bound_inertia, total_mass;
   char euler[4];
+  int fuse;                ///< bodies that move as one take the reference weights of the whole
+  int strip;               ///< of a mesh's path only the name counts
+  const char *mesh_folder; ///< never NULL
 } cav_spec_compiler;
 
 typedef enum cav_collision { CAV_COLLISION_ALL, CAV_COLLISION_PAIRS, CAV_COLLISION_GEOMS } cav_collision;
@@ -148,6 +151,7 @@ typedef struct cav_spec {
   const cav_xml *xml;
   cav_error *error;
   cav_status status; ///< of the first failure; everything stops at it
+  cav_load_options load;
   cav_spec_compiler compiler;
   cav_spec_option option;
   CAV_SPEC_LIST(cav_spec_body) body;
@@ -162,6 +166,7 @@ typedef struct cav_spec {
   CAV_SPEC_LIST(cav_spec_sensor) sensor;
   CAV_SPEC_LIST(cav_spec_key) key;
   CAV_SPEC_LIST(char *) warning;
+  CAV_SPEC_LIST(char *) kept; ///< texts made while reading
 } cav_spec;
 
 enum {
@@ -178,6 +183,9 @@ enum {
        ? &(list)->at[(list)->n - 1]                                                           \
        : NULL)
 int cav_spec_grow(cav_spec *spec, void **at, int *n, int *room, size_t size);
+
+/// Room for a text that lives as long as the spec; NULL after a failure.
+char *cav_spec_keep_text(cav_spec *spec, size_t size);
 
 /// Notes the first failure, with file, line and element; later ones are ignored.
 void cav_spec_fail(cav_spec *spec, const cav_xml_node *node, const char *attribute, const char *format, ...)
@@ -200,11 +208,21 @@ void cav_check_condim(cav_spec *spec, const cav_xml_node *node, int condim);
 /// Lets go of the lists.
 void cav_spec_clear(cav_spec *spec);
 
-/// Roots of the grammar of MJCF: ends with NULL. schema.c.
-extern const cav_xml_element *const cav_mjcf_roots[];
+/// Root of the grammar of MJCF, and the same element where a URDF file has one: options only. schema.c.
+extern const cav_xml_element cav_mjcf_root, cav_mjcf_extension;
 
 /// Fills spec from a checked tree. mjcf.c.
 void cav_mjcf_read(cav_spec *spec, const cav_xml *xml);
+
+/// What MJCF sets before a file says anything, and what a file's compiler and option elements say. mjcf.c.
+void cav_mjcf_first_options(cav_spec *spec);
+void cav_mjcf_read_options(cav_spec *spec, const cav_xml_node *node);
+void cav_mjcf_default_joint(cav_spec_joint *joint);
+void cav_mjcf_default_geom(cav_spec_geom *geom);
+
+/// Root of the grammar of URDF; fills spec from a checked tree of it. urdf.c.
+extern const cav_xml_element cav_urdf_root;
+void cav_urdf_read(cav_spec *spec, const cav_xml *xml);
 
 /// Masses, centres and principal moments of geoms and bodies. mass.c.
 void cav_spec_masses(cav_spec *spec);

@@ -305,6 +305,19 @@ static void unknown_attribute(source *s, int line, const cav_xml_element *rule, 
     fail(s, CAV_BAD_INPUT, line, rule->name, name, "not known here; remove it or check its spelling");
 }
 
+// attribute of an open element that the table does not know: only its name is kept
+static void keep_stranger(source *s, int line, const cav_xml_element *rule, const char *name, cav_xml_value *value) {
+  cav_xml_attribute *stranger = carve(s->reader->xml, sizeof *stranger);
+  char *copy = carve_text(s->reader->xml, name, strlen(name));
+  if (!stranger || !copy) {
+    fail(s, CAV_NO_MEMORY, line, rule->name, name, "no memory for its name");
+    return;
+  }
+  *stranger = (cav_xml_attribute){copy, CAV_XML_SKIP, CAV_XML_STRANGE, 0, NULL, 0};
+  value->rule = stranger;
+  value->text = "";
+}
+
 // one attribute of libxml2's list (local name, prefix, namespace, start, end of value) into value
 static void read_attribute(source *s, int line, const cav_xml_element *rule, const xmlChar *const *given,
                            cav_xml_value *value) {
@@ -312,7 +325,10 @@ static void read_attribute(source *s, int line, const cav_xml_element *rule, con
   const cav_xml_attribute *a = rule->attribute;
   while (a && a->name && strcmp(a->name, name)) a++;
   if (!a || !a->name || given[1]) {
-    unknown_attribute(s, line, rule, name);
+    if (rule->flags & CAV_XML_OPEN)
+      keep_stranger(s, line, rule, name, value);
+    else
+      unknown_attribute(s, line, rule, name);
     return;
   }
   value->rule = a;
@@ -379,6 +395,18 @@ static const cav_xml_element *find_rule(const cav_xml_element *const *allowed, c
     if (!strcmp((*allowed)->name, name)) return *allowed;
   }
   return NULL;
+}
+
+// rule of an element that an open parent holds and no table knows; NULL on failure
+static const cav_xml_element *rule_of_stranger(source *s, int line, const char *name) {
+  cav_xml_element *rule = carve(s->reader->xml, sizeof *rule);
+  char *copy = carve_text(s->reader->xml, name, strlen(name));
+  if (!rule || !copy) {
+    fail(s, CAV_NO_MEMORY, line, name, NULL, "no memory for its name");
+    return NULL;
+  }
+  *rule = (cav_xml_element){copy, 0, 0, NULL, NULL, CAV_XML_ANYTHING | CAV_XML_STRANGE};
+  return rule;
 }
 
 static void read_file(reader *r, const char *path, source *from, const cav_xml_node *asked);
@@ -466,8 +494,11 @@ static void on_start(void *context, const xmlChar *local, const xmlChar *prefix,
   if (!rule) {
     char whole[128];
     snprintf(whole, sizeof whole, "%.60s%s%.60s", prefix ? (const char *)prefix : "", prefix ? ":" : "", name);
-    unknown_element(s, line, parent, allowed, whole);
-    return;
+    if (parent && (parent->flags & CAV_XML_OPEN))
+      rule = rule_of_stranger(s, line, whole);
+    else
+      unknown_element(s, line, parent, allowed, whole);
+    if (!rule) return;
   }
   cav_xml_node *node = make_node(s, rule, line, n, (const xmlChar *const *)given);
   if (!node) return;

@@ -32,7 +32,9 @@ typedef struct cav_xml_attribute {
 /// How an element is checked.
 enum {
   CAV_XML_ANYTHING = 1, ///< attributes, children and text of it are accepted unread, children are not kept
-  CAV_XML_INCLUDE = 2   ///< replaced by the children of the root of the file that its attribute 'file' names
+  CAV_XML_INCLUDE = 2,  ///< replaced by the children of the root of the file that its attribute 'file' names
+  CAV_XML_OPEN = 4,     ///< may hold what the table does not know: kept by name, unread, with CAV_XML_STRANGE
+  CAV_XML_STRANGE = 8   ///< an element or (as min of its rule) an attribute that no table knows
 };
 
 typedef struct cav_xml_element {

@@ -20,6 +20,11 @@ enum { STATES = 1000, SHOWN = 3 };
 static const double SAME = 1e-9;      ///< relative error of u that counts as equal
 static const double GEOMETRY = 1e-10; ///< m or 1: difference of a contact that explains one of u
 static const double CROSSING = 1e-9;  ///< m: axes of capsules closer than this cross
+/// A model and the share of states that must agree where its contacts are made by routines that differ in kind.
+typedef struct subject {
+  const char *name;
+  double share;
+} subject;
 static const char *const kinds[] = {"plane", "sphere", "capsule", "ellipsoid", "cylinder", "box"};
 
 /// One model in both libraries.
@@ -175,30 +180,34 @@ static double compare_readings(const pair_of_models *p) {
   CHECK(cav_inverse(p->ours, p->state, d->qpos, d->qvel, d->qvel, u) == CAV_OK);
   mj_subtreeVel(m, d);
   for (int i = 0; i < m->nbody; i++) {
-    read_sensor(p, CAV_SENSOR_FRAMEPOS, CAV_OBJECT_BODY, i, out);
-    worst = fmax(worst, apart(out, d->xipos + 3 * i, 3));
-    read_sensor(p, CAV_SENSOR_FRAMEPOS, CAV_OBJECT_XBODY, i, out);
+    // MuJoCo's bodies of a URDF are the links that move: centres of mass are those of what it merged
+    int b = i ? cav_find(p->ours, CAV_OBJECT_XBODY, m->names + m->name_bodyadr[i]) : 0;
+    if (!p->ours->fused) {
+      read_sensor(p, CAV_SENSOR_FRAMEPOS, CAV_OBJECT_BODY, b, out);
+      worst = fmax(worst, apart(out, d->xipos + 3 * i, 3));
+    }
+    read_sensor(p, CAV_SENSOR_FRAMEPOS, CAV_OBJECT_XBODY, b, out);
     worst = fmax(worst, apart(out, d->xpos + 3 * i, 3));
     for (int k = 0; k < 3; k++) {
       double axis[3] = {d->xmat[9 * i + k], d->xmat[9 * i + 3 + k], d->xmat[9 * i + 6 + k]};
-      read_sensor(p, (cav_sensor_type)(CAV_SENSOR_FRAMEXAXIS + k), CAV_OBJECT_XBODY, i, out);
+      read_sensor(p, (cav_sensor_type)(CAV_SENSOR_FRAMEXAXIS + k), CAV_OBJECT_XBODY, b, out);
       worst = fmax(worst, apart(out, axis, 3));
     }
     mj_objectVelocity(m, d, mjOBJ_XBODY, i, motion, 0);
-    read_sensor(p, CAV_SENSOR_FRAMEANGVEL, CAV_OBJECT_XBODY, i, out);
+    read_sensor(p, CAV_SENSOR_FRAMEANGVEL, CAV_OBJECT_XBODY, b, out);
     worst = fmax(worst, apart(out, motion, 3));
-    read_sensor(p, CAV_SENSOR_FRAMELINVEL, CAV_OBJECT_XBODY, i, out);
+    read_sensor(p, CAV_SENSOR_FRAMELINVEL, CAV_OBJECT_XBODY, b, out);
     worst = fmax(worst, apart(out, motion + 3, 3));
     // what stands still has a mass in MuJoCo's subtree of the world and none in ours
     if (m->body_weldid[i] == 0) continue;
-    read_sensor(p, CAV_SENSOR_SUBTREECOM, CAV_OBJECT_BODY, i, out);
+    read_sensor(p, CAV_SENSOR_SUBTREECOM, CAV_OBJECT_BODY, b, out);
     worst = fmax(worst, apart(out, d->subtree_com + 3 * i, 3));
-    read_sensor(p, CAV_SENSOR_SUBTREELINVEL, CAV_OBJECT_BODY, i, out);
+    read_sensor(p, CAV_SENSOR_SUBTREELINVEL, CAV_OBJECT_BODY, b, out);
     worst = fmax(worst, apart(out, d->subtree_linvel + 3 * i, 3));
-    read_sensor(p, CAV_SENSOR_SUBTREEANGMOM, CAV_OBJECT_BODY, i, out);
+    read_sensor(p, CAV_SENSOR_SUBTREEANGMOM, CAV_OBJECT_BODY, b, out);
     worst = fmax(worst, apart(out, d->subtree_angmom + 3 * i, 3));
   }
-  for (int i = 0; i < m->ngeom; i++) {
+  for (int i = 0; i < m->ngeom && !p->ours->fused; i++) {
     read_sensor(p, CAV_SENSOR_FRAMEPOS, CAV_OBJECT_GEOM, i, out);
     worst = fmax(worst, apart(out, d->geom_xpos + 3 * i, 3));
     cav_pose pose;
@@ -214,7 +223,7 @@ static int ascending(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-static void compare_states(const char *name, const pair_of_models *p) {
+static void compare_states(const char *name, double share, const pair_of_models *p) {
   static double error[STATES];
   double *v_next = scene_vector(p->ours->nv), *u = scene_vector(p->ours->nv), *expected = scene_vector(p->ours->nv);
   int same = 0, crossed = 0, unexplained = 0, shown = 0, contacts = 0, rows = 0, touching = 0, limited = 0;
@@ -242,18 +251,45 @@ static void compare_states(const char *name, const pair_of_models *p) {
   printf("%-22s %3d %9d %5d %9d %8d   %.1e  %.1e  %.1e  %.1e %7.1f%% %8d %9.1e\n", name, p->ours->nv, contacts, rows,
          touching, limited, error[STATES / 2], error[STATES * 9 / 10], error[STATES * 99 / 100], error[STATES - 1],
          100.0 * same / STATES, crossed, readings);
-  CHECK(same >= STATES * 99 / 100);
+  CHECK(same >= STATES * share);
   CHECK(unexplained == 0);
   // bound: rounding of velocities about 20 m/s and angular momenta about 100; seen 4e-14
   CHECK(readings <= 1e-11);
   free(v_next), free(u), free(expected);
 }
 
-static void compare_model(const char *folder, const char *name) {
-  char path[4200], text[1000];
+// copies a URDF without the collision elements whose meshes are not there: MuJoCo does not read the file with them
+static int without_meshes(const char *path, char *copy) {
+  static char text[200000];
+  FILE *file = fopen(path, "r");
+  if (!file) return 0;
+  size_t length = fread(text, 1, sizeof text - 1, file);
+  fclose(file);
+  text[length] = 0;
+  for (char *from = text, *end; (from = strstr(from, "<collision")); from++) {
+    end = strstr(from, "</collision>");
+    char *mesh = strstr(from, "<mesh");
+    if (from[10] == '_' || !end || !mesh || mesh > end) continue;
+    memmove(from, end + 12, strlen(end + 12) + 1);
+    from--;
+  }
+  int out = mkstemps(copy, 5);
+  if (out < 0) return 0;
+  int whole = write(out, text, strlen(text)) == (ssize_t)strlen(text);
+  close(out);
+  return whole;
+}
+
+static void compare_model(const char *folder, const subject *model) {
+  const char *name = model->name;
+  char path[4200], text[1000], copy[] = "/tmp/cavort-peer-XXXXXX.urdf";
   snprintf(path, sizeof path, "%s/%s", folder, name);
   cav_error error = {0};
-  pair_of_models p = {.ours = cav_model_load(path, &error), .theirs = mj_loadXML(path, NULL, text, sizeof text)};
+  pair_of_models p = {.ours = cav_model_load(path, &error)};
+  int urdf = strstr(name, ".urdf") != NULL;
+  if (urdf) CHECK(without_meshes(path, copy));
+  p.theirs = mj_loadXML(urdf ? copy : path, NULL, text, sizeof text);
+  if (urdf) unlink(copy);
   CHECK(p.ours != NULL);
   CHECK(p.theirs != NULL);
   if (!p.ours) fprintf(stderr, "    %s\n", error.text);
@@ -262,7 +298,7 @@ static void compare_model(const char *folder, const char *name) {
     p.data = mj_makeData(p.theirs);
     p.state = cav_state_new(p.ours);
     CHECK(p.ours->nq == p.theirs->nq && p.ours->nv == p.theirs->nv);
-    compare_states(name, &p);
+    compare_states(name, model->share, &p);
     mj_deleteData(p.data);
     cav_state_free(p.state);
   }
@@ -271,9 +307,11 @@ static void compare_model(const char *folder, const char *name) {
 }
 
 int main(void) {
-  static const char *const models[] = {"mujoco/humanoid.xml",     "dm_control/acrobot.xml",  "dm_control/cartpole.xml",
-                                       "dm_control/pendulum.xml", "dm_control/hopper.xml",   "dm_control/walker.xml",
-                                       "dm_control/cheetah.xml",  "dm_control/humanoid.xml", "dm_control/reacher.xml"};
+  static const subject models[] = {
+      {"mujoco/humanoid.xml", 0.99},      {"dm_control/acrobot.xml", 0.99},    {"dm_control/cartpole.xml", 0.99},
+      {"dm_control/pendulum.xml", 0.99},  {"dm_control/hopper.xml", 0.99},     {"dm_control/walker.xml", 0.99},
+      {"dm_control/cheetah.xml", 0.99},   {"dm_control/humanoid.xml", 0.99},   {"dm_control/reacher.xml", 0.99},
+      {"urdf/double_pendulum.urdf", 0.7}, {"urdf/simple_humanoid.urdf", 0.99}, {"urdf/solo12.urdf", 0.99}};
   const char *folder = check_shared_models();
   if (!folder) {
     printf("skipped: set CAVORT_SHARED_MODELS to the folder of the models\n");
@@ -284,7 +322,7 @@ int main(void) {
   printf("relative error of u in %d random states\n", STATES);
   printf("%-22s %3s %9s %5s %9s %8s   %-8s %-8s %-8s %-8s %s %s %s\n", "model", "nv", "contacts", "rows", "touching",
          "limited", "median", "90%", "99%", "most", "within 1e-9", "crossed", "readings");
-  for (unsigned i = 0; i < sizeof models / sizeof *models; i++) compare_model(kept, models[i]);
+  for (unsigned i = 0; i < sizeof models / sizeof *models; i++) compare_model(kept, &models[i]);
   return check_result();
 }
 #endif

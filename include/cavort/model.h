@@ -246,6 +246,7 @@ typedef struct cav_model {
   cav_options options; ///< defaults for new states
 
   int nbody, nlink, njoint, ngeom, nsite, npair, ntendon, ntendon_part, nactuator, nsensor, nkey, nwarning;
+  int fused;       ///< 1: bodies without joints take the reference weights of the link they are part of
   int nsensordata; ///< length of the vector of all readings
   const cav_body *body;
   const cav_link *link;
@@ -265,7 +266,18 @@ typedef struct cav_model {
   size_t bytes;               ///< memory of the model
 } cav_model;
 
-/// Loads an MJCF file, with its includes and assets. NULL on failure with the reason in error (may be NULL).
+/// What to read of a file beyond what its dynamics need.
+typedef struct cav_load_options {
+  int visual; ///< 1: geometry that can neither touch nor weigh too, for a viewer
+  int floating; ///< 1: the root link of a URDF floats (joint "root"); 0: it stands in the world unless the file says otherwise
+} cav_load_options;
+
+cav_load_options cav_load_options_default(void);
+
+/// cav_model_load with options.
+cav_model *cav_model_load_with(const char *path, const cav_load_options *options, cav_error *error);
+
+/// Loads an MJCF or URDF file, told apart by the root element, with its includes and assets. NULL on failure with the reason in error (may be NULL).
 /// What is understood but not used becomes a model->warning. The result is freed with cav_model_free.
 cav_model *cav_model_load(const char *path, cav_error *error);
 
