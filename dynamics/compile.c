@@ -25,6 +25,8 @@ typedef struct builder {
   cav_pair *pair;
   cav_tendon *tendon;
   cav_tendon_part *part;
+  cav_path_point *path;
+  int *tendon_dof;
   cav_actuator *actuator;
   cav_sensor *sensor;
   cav_key *key;
@@ -191,6 +193,8 @@ static void carve_model(builder *b, carver *c) {
   b->pair = take(c, m->npair, sizeof *b->pair);
   b->tendon = take(c, m->ntendon, sizeof *b->tendon);
   b->part = take(c, m->ntendon_part, sizeof *b->part);
+  b->path = take(c, m->ntendon_path, sizeof *b->path);
+  b->tendon_dof = take(c, m->ntendon_dof, sizeof *b->tendon_dof);
   b->actuator = take(c, m->nactuator, sizeof *b->actuator);
   b->sensor = take(c, m->nsensor, sizeof *b->sensor);
   b->key = take(c, m->nkey, sizeof *b->key);
@@ -212,6 +216,8 @@ static void share_arrays(builder *b) {
   m->pair = b->pair;
   m->tendon = b->tendon;
   m->tendon_part = b->part;
+  m->tendon_path = b->path;
+  m->tendon_dof = b->tendon_dof;
   m->actuator = b->actuator;
   m->sensor = b->sensor;
   m->key = b->key;
@@ -510,6 +516,38 @@ static int find_scalar_joint(builder *b, const cav_xml_node *node, const char *n
   return i;
 }
 
+// dofs of all tendons, in order; out NULL: only counts
+static int list_tendon_dofs(builder *b, int *out) {
+  cav_spec *spec = b->spec;
+  char *mark = malloc((size_t)spec->joint.n + 1);
+  int n = 0;
+  if (!mark) cav_spec_no_memory(spec);
+  for (int i = 0; i < spec->tendon.n && mark; i++) {
+    int dofs = cav_spec_tendon_joints(spec, i, mark);
+    if (out) {
+      b->tendon[i].dof = n;
+      b->tendon[i].ndof = dofs;
+    }
+    for (int k = 0; k < spec->joint.n && out; k++) {
+      int size = mark[k] ? joint_v[b->joint[k].type] : 0;
+      for (int d = 0; d < size; d++) *out++ = b->joint[k].dof + d;
+    }
+    n += dofs;
+  }
+  free(mark);
+  return n;
+}
+
+// length of a spatial tendon's spring; NAN where the file gives none, until reference.c measures it
+static void fill_path(builder *b, const cav_spec_tendon *s, cav_tendon *t) {
+  int rests = s->has_springlength && s->springlength >= 0;
+  t->springlength = rests ? s->springlength : NAN;
+  for (int k = s->path; k < s->path + s->npath; k++) {
+    const cav_spec_path *p = &b->spec->path.at[k];
+    b->path[k] = (cav_path_point){p->type, p->object, p->side, p->divisor};
+  }
+}
+
 static void fill_tendons(builder *b) {
   cav_spec *spec = b->spec;
   for (int i = 0; i < spec->tendon.n && running(b); i++) {
@@ -518,6 +556,8 @@ static void fill_tendons(builder *b) {
     *t = (cav_tendon){.name = put_text(b, s->name),
                       .part = s->part,
                       .npart = s->npart,
+                      .path = s->path,
+                      .npath = s->npath,
                       .margin = s->margin,
                       .limit = s->limit,
                       .stiffness = s->stiffness,
@@ -535,12 +575,14 @@ static void fill_tendons(builder *b) {
       b->part[k] = (cav_tendon_part){joint, p->coef};
       if (!rests && running(b)) t->springlength += p->coef * b->joint[joint].springref;
     }
+    if (s->spatial) fill_path(b, s, t);
     cav_check_not_negative(spec, s->node, "stiffness", s->stiffness);
     cav_check_not_negative(spec, s->node, "damping", s->damping);
     cav_check_not_negative(spec, s->node, "frictionloss", s->frictionloss);
     cav_check_softness(spec, s->node, "limit", &s->limit);
     cav_check_softness(spec, s->node, "friction", &s->friction);
   }
+  if (running(b)) list_tendon_dofs(b, b->tendon_dof);
 }
 
 static int find_target(cav_spec *spec, const cav_spec_actuator *s) {
@@ -662,16 +704,25 @@ static void count(builder *b) {
   m->nsite = spec->site.n;
   m->ntendon = spec->tendon.n;
   m->ntendon_part = spec->part.n;
+  m->ntendon_path = spec->path.n;
   m->nactuator = m->nu = spec->actuator.n;
   m->nsensor = spec->sensor.n;
   m->nkey = spec->key.n;
   const struct {
     int n;
     const char *what;
-  } counts[] = {{m->nbody, "bodies"},        {m->njoint, "joints"},        {m->ngeom, "geoms"},
-                {m->nsite, "sites"},         {m->ntendon, "tendons"},      {m->ntendon_part, "tendon parts"},
-                {m->nactuator, "actuators"}, {m->nsensor, "sensors"},      {m->nkey, "keyframes"},
-                {spec->pair.n, "pairs"},     {spec->exclude.n, "excludes"}};
+  } counts[] = {{m->nbody, "bodies"},
+                {m->njoint, "joints"},
+                {m->ngeom, "geoms"},
+                {m->nsite, "sites"},
+                {m->ntendon, "tendons"},
+                {m->ntendon_part, "tendon parts"},
+                {m->ntendon_path, "elements of tendon paths"},
+                {m->nactuator, "actuators"},
+                {m->nsensor, "sensors"},
+                {m->nkey, "keyframes"},
+                {spec->pair.n, "pairs"},
+                {spec->exclude.n, "excludes"}};
   for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
     if (counts[i].n > CAV_SPEC_OBJECTS)
       cav_spec_fail(b->spec, spec->body.at[0].node, NULL, "%d %s; at most %d are read", counts[i].n, counts[i].what,
@@ -753,6 +804,8 @@ static cav_model *build(builder *b) {
   count(b);
   if (running(b)) check_names(spec);
   if (running(b)) find_links(b);
+  if (running(b)) cav_spec_routes(spec);
+  if (running(b)) b->model->ntendon_dof = list_tendon_dofs(b, NULL);
   if (running(b)) b->pairs = cav_filter_pairs(spec, b->weld, b->link_of, &b->model->npair);
   if (running(b)) warn_guarded(b);
   if (!running(b)) return NULL;

@@ -214,7 +214,8 @@ void cav_soften(cav_state *state) {
   for (int i = 0; i < state->ncontact; i++) soften_contact(state, &state->contact[i], inverse_impratio);
 }
 
-double cav_row_velocity(const cav_model *model, const cav_row *row, const double *v) {
+double cav_row_velocity(const cav_state *state, const cav_row *row, const double *v) {
+  const cav_model *model = state->model;
   switch (row->type) {
     case CAV_ROW_LIMIT_JOINT: {
       const cav_joint *joint = &model->joint[row->object];
@@ -223,11 +224,12 @@ double cav_row_velocity(const cav_model *model, const cav_row *row, const double
     case CAV_ROW_FRICTION_DOF:
       return v[row->object];
     default:
-      return row->axis[0] * cav_tendon_velocity(model, row->object, v);
+      return row->axis[0] * cav_tendon_velocity(state, row->object, v);
   }
 }
 
-void cav_row_push_force(const cav_model *model, const cav_row *row, double force, double *u) {
+void cav_row_push_force(const cav_state *state, const cav_row *row, double force, double *u) {
+  const cav_model *model = state->model;
   switch (row->type) {
     case CAV_ROW_LIMIT_JOINT: {
       const cav_joint *joint = &model->joint[row->object];
@@ -239,6 +241,6 @@ void cav_row_push_force(const cav_model *model, const cav_row *row, double force
       u[row->object] += force;
       break;
     default:
-      cav_tendon_pull(model, row->object, row->axis[0] * force, u);
+      cav_tendon_pull(state, row->object, row->axis[0] * force, u);
   }
 }

@@ -101,12 +101,11 @@ static void contacts(cav_state *state, const double *velocity_now, double scale)
 }
 
 // limits and friction losses: they act on dofs directly
-static void rows(const cav_model *model, cav_state *state, const double *v, const double *v_next, double scale,
-                 double *u) {
+static void rows(cav_state *state, const double *v, const double *v_next, double scale, double *u) {
   for (int i = 0; i < state->nrow; i++) {
     cav_row *row = &state->row[i];
-    row->velocity = cav_row_velocity(model, row, v);
-    row->velocity_next = cav_row_velocity(model, row, v_next);
+    row->velocity = cav_row_velocity(state, row, v);
+    row->velocity_next = cav_row_velocity(state, row, v_next);
     double target = (1 - row->damping) * row->velocity;
     if (row->type == CAV_ROW_LIMIT_JOINT || row->type == CAV_ROW_LIMIT_TENDON) {
       double g = (target - row->stiffness * (row->dist - row->margin) - row->velocity_next) / row->regulariser;
@@ -115,7 +114,7 @@ static void rows(const cav_model *model, cav_state *state, const double *v, cons
       double g = (target - row->velocity_next) / row->regulariser;
       cav_bilateral(row->regulariser, row->sigma, row->bound, g, &row->impulse, NULL, NULL);
     }
-    cav_row_push_force(model, row, scale * row->impulse, u);
+    cav_row_push_force(state, row, scale * row->impulse, u);
   }
 }
 
@@ -157,7 +156,7 @@ static void evaluate(const cav_model *model, cav_state *state, int with_constrai
   cav_project(model, state, u);
   cav_add_joint_forces(model, state, damped, a, u);
   cav_add_tendon_forces(model, state, bias, u);
-  if (with_constraints) { rows(model, state, w->v, w->v_next, scale, u); }
+  if (with_constraints) { rows(state, w->v, w->v_next, scale, u); }
 }
 
 void cav_smooth_inverse(const cav_model *model, cav_state *state, const double *v, const double *v_next, double *u) {

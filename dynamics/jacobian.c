@@ -47,7 +47,7 @@ static int contact_block(const cav_model *model, const cav_state *state, int ind
 }
 
 // dofs and row of a limit or a friction loss
-static int scalar_block(const cav_model *model, const cav_row *row, int *dof, double *J) {
+static int scalar_block(const cav_model *model, const cav_state *state, const cav_row *row, int *dof, double *J) {
   int n = 0;
   switch (row->type) {
     case CAV_ROW_LIMIT_JOINT: {
@@ -67,14 +67,9 @@ static int scalar_block(const cav_model *model, const cav_row *row, int *dof, do
     case CAV_ROW_FRICTION_TENDON: {
       const cav_tendon *tendon = &model->tendon[row->object];
       const double sign = row->type == CAV_ROW_LIMIT_TENDON ? row->axis[0] : 1.0;
-      for (int part = tendon->part; part < tendon->part + tendon->npart; part++) {
-        // a joint may be named twice
-        int k = 0;
-        const int moved = model->joint[model->tendon_part[part].joint].dof;
-        while (k < n && dof[k] != moved) k++;
-        if (k == n) J[n++] = 0.0;
-        dof[k] = moved;
-        J[k] += sign * model->tendon_part[part].coef;
+      for (; n < tendon->ndof; n++) {
+        dof[n] = model->tendon_dof[tendon->dof + n];
+        J[n] = sign * state->tendon_arm[tendon->dof + n];
       }
       break;
     }
@@ -93,7 +88,7 @@ int cav_jacobian(const cav_model *model, const cav_state *state, cav_block *bloc
   for (int i = 0; i < state->ncontact + state->nrow; i++) {
     const int contact = i < state->ncontact, dim = contact ? state->contact[i].dim : 1;
     const int n = contact ? contact_block(model, state, i, dof, J)
-                          : scalar_block(model, &state->row[i - state->ncontact], dof, J);
+                          : scalar_block(model, state, &state->row[i - state->ncontact], dof, J);
     block[i] = (cav_block){contact ? i : -1, contact ? -1 : i - state->ncontact, dim, first, n, dof, J};
     first += dim;
     dof += n;

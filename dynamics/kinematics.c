@@ -205,11 +205,5 @@ void cav_kinematics(const cav_model *model, cav_state *state, const double *q) {
   half_turns(state->work);
 
   for (int i = 1; i < model->nlink; i++) { place_link(model, state, i, unit); }
-  for (int i = 0; i < model->ntendon; i++) {
-    const cav_tendon *tendon = &model->tendon[i];
-    const cav_tendon_part *part = &model->tendon_part[tendon->part];
-    double length = 0;
-    for (int k = 0; k < tendon->npart; k++) { length += part[k].coef * unit[model->joint[part[k].joint].q]; }
-    state->tendon_length[i] = length;
-  }
+  if (model->ntendon > 0) { cav_tendon_lengths(model, state); }
 }

@@ -2,8 +2,8 @@
 ///
 /// Source: the MJCF reference of MuJoCo 2.2.2, whose semantics and defaults hold, with two extensions of later versions
 /// that no 2.2.2 file can contain: the frame element, and limits that hold where only a range is given.
-/// What would change the dynamics and is not offered is an error (equality constraints, spatial tendons that act, meshes
-/// that collide or weigh, actuators that are no motors, fluids, composite bodies); what only changes how MuJoCo itself
+/// What would change the dynamics and is not offered is an error (equality constraints, meshes that
+/// collide or weigh, actuators that are no motors, fluids, composite bodies); what only changes how MuJoCo itself
 /// steps or measures is a warning (integrator, cone, noslip, other sensors). Names are resolved in compile.c.
 
 #include <stdlib.h>
@@ -588,6 +588,20 @@ static void read_equality(reader *r, const cav_xml_node *node) {
   }
 }
 
+// sites, geoms and pulleys that a string passes
+static void read_path(cav_spec *spec, const cav_xml_node *node, cav_spec_tendon *t) {
+  for (const cav_xml_node *i = node->child; i; i = i->next) {
+    cav_spec_path *p = CAV_SPEC_PUSH(spec, &spec->path);
+    if (!p) return;
+    p->node = i;
+    p->type = is(i, "site") ? CAV_PATH_SITE : is(i, "geom") ? CAV_PATH_SPHERE : CAV_PATH_PULLEY;
+    p->name = cav_xml_text(i, is(i, "site") ? "site" : "geom", "");
+    p->sidesite = cav_xml_text(i, "sidesite", NULL);
+    p->divisor = cav_xml_real(i, "divisor", 1);
+    t->npath++;
+  }
+}
+
 static void read_tendon(reader *r, const cav_xml_node *node) {
   cav_spec *spec = r->spec;
   for (const cav_xml_node *c = node->child; c; c = c->next) {
@@ -596,17 +610,10 @@ static void read_tendon(reader *r, const cav_xml_node *node) {
     t.name = cav_xml_text(c, "name", "");
     t.node = c;
     t.part = spec->part.n;
-    if (is(c, "spatial")) {
-      int limits =
-          t.limited == CAV_LIMITED_YES || (t.limited == CAV_LIMITED_AUTO && (t.range[0] != 0 || t.range[1] != 0));
-      if (limits || t.stiffness != 0 || t.damping != 0 || t.frictionloss != 0)
-        cav_spec_fail(spec, c, NULL,
-                      "spatial tendons are not supported yet; this one acts (limit, spring or friction)");
-      else
-        cav_spec_warn(spec, c, NULL, "left out: spatial tendons are not supported yet, and this one does not act");
-      continue;
-    }
-    for (const cav_xml_node *i = c->child; i; i = i->next) {
+    t.path = spec->path.n;
+    t.spatial = is(c, "spatial");
+    if (t.spatial) read_path(spec, c, &t);
+    for (const cav_xml_node *i = c->child; i && !t.spatial; i = i->next) {
       cav_spec_part *p = CAV_SPEC_PUSH(spec, &spec->part);
       if (!p) return;
       *p = (cav_spec_part){i, cav_xml_text(i, "joint", ""), cav_xml_real(i, "coef", 0)};

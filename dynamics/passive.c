@@ -31,20 +31,6 @@ static void joint_spring(const cav_model *model, const cav_joint *joint, const d
   }
 }
 
-double cav_tendon_velocity(const cav_model *model, int tendon, const double *v) {
-  const cav_tendon *t = &model->tendon[tendon];
-  const cav_tendon_part *part = &model->tendon_part[t->part];
-  double sum = 0;
-  for (int k = 0; k < t->npart; k++) { sum += part[k].coef * v[model->joint[part[k].joint].dof]; }
-  return sum;
-}
-
-void cav_tendon_pull(const cav_model *model, int tendon, double force, double *u) {
-  const cav_tendon *t = &model->tendon[tendon];
-  const cav_tendon_part *part = &model->tendon_part[t->part];
-  for (int k = 0; k < t->npart; k++) { u[model->joint[part[k].joint].dof] += part[k].coef * force; }
-}
-
 void cav_add_joint_forces(const cav_model *model, const cav_state *state, const double *v, const double *a, double *u) {
   const cav_workspace *w = state->work;
   for (int i = 0; i < model->nv; i++) { u[i] += w->armature[i] * a[i]; }
@@ -62,7 +48,7 @@ void cav_add_tendon_forces(const cav_model *model, const cav_state *state, const
     int k = w->tendon_spring[i];
     const cav_tendon *tendon = &model->tendon[k];
     double stretch = state->tendon_length[k] - tendon->springlength;
-    double force = tendon->stiffness * stretch + tendon->damping * cav_tendon_velocity(model, k, v);
-    cav_tendon_pull(model, k, force, u);
+    double force = tendon->stiffness * stretch + tendon->damping * cav_tendon_velocity(state, k, v);
+    cav_tendon_pull(state, k, force, u);
   }
 }

@@ -1,7 +1,7 @@
 /// Inverse weights at the reference configuration q0: the `reference` diagonal of A (dynamics.md, 4). Per dof the
 /// diagonal of M^-1, averaged over a ball's three and over the two threes of a free joint; per body the mean
 /// translational and rotational diagonal of J M^-1 J' at its centre of mass; per tendon J M^-1 J'; per pair the sum over
-/// its two bodies. M is the inertia with armature and without implicit damping.
+/// its two bodies. Also the rest lengths of spatial tendons' springs. M is the inertia with armature and without implicit damping.
 #include <stdlib.h>
 
 #include "math3.h"
@@ -81,19 +81,18 @@ static void weigh_body(const cav_model *model, const cav_state *state, cav_body 
   }
 }
 
-static void weigh_tendon(const cav_model *model, const cav_workspace *w, cav_tendon *tendon) {
+static void weigh_tendon(const cav_model *model, const cav_state *state, cav_tendon *tendon) {
+  const cav_workspace *w = state->work;
   clear_row(model, w);
-  for (int k = 0; k < tendon->npart; k++) {
-    const cav_tendon_part *part = &model->tendon_part[tendon->part + k];
-    w->scratch[model->joint[part->joint].dof] += part->coef;
-  }
+  for (int e = tendon->dof; e < tendon->dof + tendon->ndof; e++)
+    w->scratch[model->tendon_dof[e]] = state->tendon_arm[e];
   tendon->inverse_weight = inverse_norm(model, w);
 }
 
 static void weigh_all(const cav_model *model, const cav_state *state) {
   weigh_dofs(model, state->work);
   for (int i = 0; i < model->nbody; i++) { weigh_body(model, state, (cav_body *)&model->body[i]); }
-  for (int i = 0; i < model->ntendon; i++) { weigh_tendon(model, state->work, (cav_tendon *)&model->tendon[i]); }
+  for (int i = 0; i < model->ntendon; i++) { weigh_tendon(model, state, (cav_tendon *)&model->tendon[i]); }
   for (int i = 0; i < model->npair; i++) {
     cav_pair *pair = (cav_pair *)&model->pair[i];
     const cav_body *a = &model->body[model->geom[pair->geom1].body], *b = &model->body[model->geom[pair->geom2].body];
@@ -102,10 +101,26 @@ static void weigh_all(const cav_model *model, const cav_state *state) {
   }
 }
 
+// springs of spatial tendons rest at the length they have where the springs of the joints rest, unless the file says
+static void measure_springs(const cav_model *model, cav_state *state) {
+  double *q = state->work->q;
+  memcpy(q, model->q0, (size_t)model->nq * sizeof *q);
+  for (int i = 0; i < model->njoint; i++) {
+    const cav_joint *joint = &model->joint[i];
+    if (joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE) { q[joint->q] = joint->springref; }
+  }
+  cav_kinematics(model, state, q);
+  for (int i = 0; i < model->ntendon; i++) {
+    cav_tendon *tendon = (cav_tendon *)&model->tendon[i];
+    if (isnan(tendon->springlength)) { tendon->springlength = state->tendon_length[i]; }
+  }
+}
+
 cav_status cav_reference_weights(cav_model *model) {
   cav_state *state = cav_state_new(model);
   if (!state) { return CAV_NO_MEMORY; }
   cav_workspace *w = state->work;
+  if (w->nstring > 0) { measure_springs(model, state); }
   cav_kinematics(model, state, model->q0);
   cav_composite_inertia(model, state, w->M);
   for (int i = 0; i < model->nv; i++) { w->M[w->row[i]] += w->armature[i]; }

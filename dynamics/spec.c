@@ -88,6 +88,7 @@ void cav_spec_clear(cav_spec *spec) {
   free(spec->exclude.at);
   free(spec->tendon.at);
   free(spec->part.at);
+  free(spec->path.at);
   free(spec->actuator.at);
   free(spec->sensor.at);
   free(spec->key.at);

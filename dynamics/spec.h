@@ -85,10 +85,19 @@ typedef struct cav_spec_part {
   double coef;
 } cav_spec_part;
 
+/// Element of a path; a geom is CAV_PATH_SPHERE until cav_spec_routes has found its shape.
+typedef struct cav_spec_path {
+  const cav_xml_node *node;
+  cav_path_type type;
+  const char *name, *sidesite; ///< sidesite: NULL for none
+  double divisor;
+  int object, side; ///< by cav_spec_routes
+} cav_spec_path;
+
 typedef struct cav_spec_tendon {
   const char *name;
   const cav_xml_node *node;
-  int part, npart;
+  int spatial, part, npart, path, npath;
   cav_limited limited;
   double range[2], margin, stiffness, damping, frictionloss, springlength;
   int has_springlength;
@@ -162,6 +171,7 @@ typedef struct cav_spec {
   CAV_SPEC_LIST(cav_spec_exclude) exclude;
   CAV_SPEC_LIST(cav_spec_tendon) tendon;
   CAV_SPEC_LIST(cav_spec_part) part;
+  CAV_SPEC_LIST(cav_spec_path) path;
   CAV_SPEC_LIST(cav_spec_actuator) actuator;
   CAV_SPEC_LIST(cav_spec_sensor) sensor;
   CAV_SPEC_LIST(cav_spec_key) key;
@@ -238,6 +248,15 @@ double cav_pose_of_fromto(const double *fromto, double pos[3], double quat[4]);
 
 /// Eigenvectors (as a rotation, columns) and values, largest first, of a symmetric matrix xx yy zz xy xz yz. mass.c.
 void cav_principal_axes(const double S[6], double quat[4], double moment[3]);
+
+/// Finds the sites and geoms of all paths and checks that they can be followed. route.c.
+void cav_spec_routes(cav_spec *spec);
+
+/// Marks the joints that move two bodies relative to each other, mark [joint.n]. route.c.
+void cav_spec_mark_between(const cav_spec *spec, int body1, int body2, char *mark);
+
+/// Marks the joints that can change a tendon's length, mark [joint.n], and returns their dofs. route.c.
+int cav_spec_tendon_joints(const cav_spec *spec, int tendon, char *mark);
 
 /// Pairs of geoms that may touch, explicit ones first, then in the order of body pairs; their parameters mixed. For each
 /// body [nbody] weld is the body at the top of the group that moves with it, link_of its link. Returns a list of malloc,

@@ -62,9 +62,14 @@ void cav_project(const cav_model *model, cav_state *state, double *u);
 void cav_add_joint_forces(const cav_model *model, const cav_state *state, const double *v, const double *a, double *u);
 void cav_add_tendon_forces(const cav_model *model, const cav_state *state, const double *v, double *u);
 
-/// Rate of length of a tendon at v [nv]; u [nv] += force along a tendon's gradient. passive.c.
-double cav_tendon_velocity(const cav_model *model, int tendon, const double *v);
-void cav_tendon_pull(const cav_model *model, int tendon, double force, double *u);
+/// Writes the constant arms of fixed tendons and lists the spatial ones, once. Lengths and arms at the state's poses.
+/// tendon.c.
+void cav_tendon_compile(const cav_model *model, cav_state *state);
+void cav_tendon_lengths(const cav_model *model, cav_state *state);
+
+/// Rate of length of a tendon at v [nv]; u [nv] += force along a tendon's gradient. tendon.c.
+double cav_tendon_velocity(const cav_state *state, int tendon, const double *v);
+void cav_tendon_pull(const cav_state *state, int tendon, double force, double *u);
 
 /// Constants of the discrete stabilisation for the state's options; before the two below. constraint.c.
 void cav_stabilise(cav_state *state);
@@ -82,8 +87,8 @@ double cav_law_reach(const cav_state *state, double delta, double speed);
 double cav_limit_reach(const cav_state *state, double margin);
 
 /// Velocity of a row at v [nv]; u [nv] += J' force of a row. constraint.c.
-double cav_row_velocity(const cav_model *model, const cav_row *row, const double *v);
-void cav_row_push_force(const cav_model *model, const cav_row *row, double force, double *u);
+double cav_row_velocity(const cav_state *state, const cav_row *row, const double *v);
+void cav_row_push_force(const cav_state *state, const cav_row *row, double force, double *u);
 
 /// Velocity of a contact in its frame, out [dim], from spatial velocities of links [nlink*6]. inverse.c.
 void cav_contact_velocity(const cav_state *state, const cav_contact *contact, const double *velocity, double *out);

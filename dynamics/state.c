@@ -40,6 +40,7 @@ static size_t layout(const cav_model *model, char *base, cav_state *s, cav_works
   s->force = carve(base, &used, 6 * n, d);
   s->u = carve(base, &used, nv, d);
   s->tendon_length = carve(base, &used, nt, d);
+  s->tendon_arm = carve(base, &used, model->ntendon_dof, d);
   w->q = carve(base, &used, nq, d);
   w->v = carve(base, &used, nv, d);
   w->v_next = carve(base, &used, nv, d);
@@ -67,6 +68,7 @@ static size_t layout(const cav_model *model, char *base, cav_state *s, cav_works
   w->spring = carve(base, &used, nj, i);
   w->limit = carve(base, &used, nj, i);
   w->friction = carve(base, &used, nv, i);
+  w->string = carve(base, &used, nt, i);
   w->tendon_spring = carve(base, &used, nt, i);
   w->tendon_limit = carve(base, &used, nt, i);
   w->tendon_friction = carve(base, &used, nt, i);
@@ -166,6 +168,7 @@ cav_state *cav_state_new(const cav_model *model) {
   compile_dofs(model, work);
   compile_frames(model, work);
   compile_lists(model, work);
+  cav_tendon_compile(model, state);
   quat_normalise(state->link[0].quat);
   quat_matrix(state->link[0].rotation, state->link[0].quat);
 

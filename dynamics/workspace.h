@@ -40,6 +40,7 @@ typedef struct cav_workspace {
   int *straight;                 ///< [nlink] frame at rest parallel to the parent's
 
   // joints, tendons, dofs that need a stage: indices and counts
+  int nstring, *string; ///< spatial tendons
   int nspring, nlimit, nfriction, ntendon_spring, ntendon_limit, ntendon_friction;
   int *spring, *limit, *friction, *tendon_spring, *tendon_limit, *tendon_friction;
 

@@ -123,7 +123,7 @@ static void survey(cav_balance *balance, const cav_audit *audit, double *unit, d
     cav_actuation(model, audit->bare, unit, residual, NULL);
     balance->held[d] = residual[d] < 1 - 1e-9;
   }
-  for (int i = 0; i < model->ntendon_part; i++) balance->held[model->joint[model->tendon_part[i].joint].dof] = 1;
+  for (int i = 0; i < model->ntendon_dof; i++) balance->held[model->tendon_dof[i]] = 1;
 }
 
 // centres of mass at the knots and one step either side, momenta half way

@@ -24,12 +24,12 @@ static void force_pattern(const cav_transcription *tr, int i, char *seen) {
     for (int j = 0; j < m->nv; j++) seen[j] |= (char)(moves(m, j, a) != moves(m, j, b));
   }
   for (int k = 0; k < m->ntendon; k++) {
-    const cav_tendon_part *part = m->tendon_part + m->tendon[k].part;
-    int n = m->tendon[k].npart, in = 0;
+    const int *dof = m->tendon_dof + m->tendon[k].dof;
+    int n = m->tendon[k].ndof, in = 0;
     int acts = m->tendon[k].limited || m->tendon[k].stiffness != 0 || m->tendon[k].damping != 0 ||
                m->tendon[k].frictionloss != 0;
-    for (int c = 0; acts && c < n; c++) in |= m->joint[part[c].joint].dof == i;
-    for (int c = 0; in && c < n; c++) seen[m->joint[part[c].joint].dof] = 1;
+    for (int c = 0; acts && c < n; c++) in |= dof[c] == i;
+    for (int c = 0; in && c < n; c++) seen[dof[c]] = 1;
   }
 }
 
@@ -126,7 +126,7 @@ void cav_transcription_pattern(const cav_transcription *tr, int t, int i, char *
     int tendon = 0;
     for (int left = i - at->tendon; left >= 0; tendon++) left -= m->tendon[tendon].limited;
     const cav_tendon *of = &m->tendon[tendon - 1];
-    for (int k = 0; k < of->npart; k++) seen[m->joint[m->tendon_part[of->part + k].joint].dof] = 1;
+    for (int k = 0; k < of->ndof; k++) seen[m->tendon_dof[of->dof + k]] = 1;
   } else {
     int dof = 0;
     const cav_term *term = term_of(tr, t, i - at->term, &dof);

@@ -202,6 +202,24 @@ static cav_status read_horizon(const cav_problem_reader *reader) {
   return CAV_OK;
 }
 
+// lengths of tendons within their ranges
+static cav_status check_tendons(const cav_problem_reader *reader, const cav_xml_node *node, const double *q,
+                                double slack) {
+  const cav_model *m = reader->model;
+  cav_state *state = cav_state_new(m);
+  cav_status status = state ? cav_position(m, state, q) : CAV_NO_MEMORY;
+  if (status != CAV_OK) cav_xml_fail_as(reader->error, status, node, NULL, "lengths of tendons cannot be computed");
+  for (int i = 0; i < m->ntendon && status == CAV_OK; i++) {
+    const cav_tendon *tendon = &m->tendon[i];
+    double length = state->tendon_length[i];
+    if (!tendon->limited || (length >= tendon->range[0] - slack && length <= tendon->range[1] + slack)) continue;
+    status = cav_xml_fail(reader->error, node, NULL, "tendon '%s' has length %g, outside its range %g .. %g",
+                          tendon->name, length, tendon->range[0], tendon->range[1]);
+  }
+  cav_state_free(state);
+  return status;
+}
+
 // within ranges of joints and tendons, or the solver meets a knot that it may not move
 static cav_status check_ranges(const cav_problem_reader *reader, const cav_xml_node *node, const double *q) {
   static const double slack = 1e-6;
@@ -220,18 +238,7 @@ static cav_status check_ranges(const cav_problem_reader *reader, const cav_xml_n
                           joint->name, value, least, joint->range[1]);
     }
   }
-  for (int i = 0; i < m->ntendon; i++) {
-    const cav_tendon *tendon = &m->tendon[i];
-    double length = 0;
-    for (int k = tendon->part; k < tendon->part + tendon->npart; k++) {
-      length += m->tendon_part[k].coef * q[m->joint[m->tendon_part[k].joint].q];
-    }
-    if (tendon->limited && (length < tendon->range[0] - slack || length > tendon->range[1] + slack)) {
-      return cav_xml_fail(reader->error, node, NULL, "tendon '%s' has length %g, outside its range %g .. %g",
-                          tendon->name, length, tendon->range[0], tendon->range[1]);
-    }
-  }
-  return CAV_OK;
+  return m->ntendon > 0 ? check_tendons(reader, node, q, slack) : CAV_OK;
 }
 
 static cav_status read_ends(const cav_problem_reader *reader) {

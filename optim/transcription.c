@@ -686,16 +686,14 @@ static void add_ranges(sum *a, const double *q, double rho) {
   for (int k = 0; k < m->ntendon; k++) {
     const cav_tendon *tendon = &m->tendon[k];
     if (!tendon->limited) continue;
-    double value = 0;
-    for (int c = 0; c < tendon->npart; c++) {
-      const cav_tendon_part *part = &m->tendon_part[tendon->part + c];
-      value += part->coef * q[m->joint[part->joint].q];
-      a->s->column[c] = tr->nv + m->joint[part->joint].dof;
-      a->s->row[c] = part->coef;
+    double value = a->s->state->tendon_length[k];
+    for (int c = 0; c < tendon->ndof; c++) {
+      a->s->column[c] = tr->nv + m->tendon_dof[tendon->dof + c];
+      a->s->row[c] = a->s->state->tendon_arm[tendon->dof + c];
     }
-    keep_sparse(a, i, tendon->npart, a->s->column, a->s->row);
+    keep_sparse(a, i, tendon->ndof, a->s->column, a->s->row);
     double e = slot_residual(a, i++, value, tendon->range[0] + keep, tendon->range[1] - keep, rho, &active);
-    if (active) add_sparse(a, rho, e, tendon->npart, a->s->column, a->s->row);
+    if (active) add_sparse(a, rho, e, tendon->ndof, a->s->column, a->s->row);
   }
 }
 

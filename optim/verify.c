@@ -226,11 +226,7 @@ static void note_ranges(const cav_audit *audit, int t, cav_finding *finding) {
   for (int i = 0; i < model->ntendon; i++) {
     const cav_tendon *tendon = model->tendon + i;
     if (!tendon->limited) continue;
-    // from the joints themselves
-    double length = 0;
-    for (int k = tendon->part; k < tendon->part + tendon->npart; k++) {
-      length += model->tendon_part[k].coef * q[model->joint[model->tendon_part[k].joint].q];
-    }
+    double length = audit->state->tendon_length[i];
     double beyond = fmax(tendon->range[0] - length, length - tendon->range[1]);
     cav_finding_note(finding, beyond, t, "range of tendon %.60s (%d)", tendon->name, i);
   }

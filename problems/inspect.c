@@ -75,7 +75,7 @@ static void print_bodies(const cav_model *m) {
 // what a model has, counted
 typedef struct census {
   int quaternion, spring, damper, armature, joint_limit, friction;
-  int tendon_spring, tendon_damper, tendon_limit, tendon_friction;
+  int tendon_spatial, tendon_spring, tendon_damper, tendon_limit, tendon_friction;
   int world_pair, body_pair, convex_pair, dim[7];
   int types[CAV_GEOM_TYPES][CAV_GEOM_TYPES];
 } census;
@@ -92,6 +92,7 @@ static void count_joints(const cav_model *m, census *c) {
     c->friction += m->dof[d].frictionloss > 0;
   }
   for (int i = 0; i < m->ntendon; i++) {
+    c->tendon_spatial += m->tendon[i].npath > 0;
     c->tendon_spring += m->tendon[i].stiffness != 0;
     c->tendon_damper += m->tendon[i].damping != 0;
     c->tendon_limit += m->tendon[i].limited;
@@ -151,6 +152,7 @@ static void print_stages(const cav_model *m) {
   print_stage("joint limits", held ? c.joint_limit : 0, "joints", held ? "no joint is limited" : off);
   print_stage("friction loss", held ? c.friction : 0, "dofs", held ? "no joint has any" : off);
   print_stage("tendon lengths", m->ntendon, "tendons", "no tendon");
+  print_stage("strings through sites", c.tendon_spatial, "tendons", "no tendon is spatial");
   print_stage("tendon springs", on ? c.tendon_spring : 0, "tendons", on ? "no tendon has stiffness" : off);
   print_stage("tendon dampers", on ? c.tendon_damper : 0, "tendons", on ? "no tendon has damping" : off);
   print_stage("tendon limits", held ? c.tendon_limit : 0, "tendons", held ? "no tendon is limited" : off);

@@ -70,6 +70,7 @@ typedef struct cav_state {
   double *reference;     ///< [nlink*3] point at which the link's spatial vectors are taken (its tree's root position)
   double *axis;          ///< [nv*6] motion subspace of each dof: what a unit velocity does
   double *tendon_length; ///< [ntendon]
+  double *tendon_arm;    ///< [ntendon_dof] gradient of the length along each dof of model->tendon_dof
   int ncontact, nrow;
   cav_contact *contact; ///< [ncontact]; geometry only depends on q, velocities and impulses on all
   cav_row *row;         ///< [nrow]

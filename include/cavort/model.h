@@ -161,10 +161,21 @@ typedef struct cav_tendon_part {
   double coef;
 } cav_tendon_part;
 
-/// Fixed tendon: length = sum coef q_joint.
+/// What the path of a spatial tendon meets next.
+typedef enum cav_path_type { CAV_PATH_SITE, CAV_PATH_SPHERE, CAV_PATH_CYLINDER, CAV_PATH_PULLEY } cav_path_type;
+typedef struct cav_path_point {
+  cav_path_type type;
+  int object;     ///< site to pass through, or geom to wrap around
+  int side;       ///< geoms: site on the side to pass, or inside to come through; -1: the shorter way
+  double divisor; ///< pulleys: of the length of the branch that starts here
+} cav_path_point;
+
+/// Tendon. Fixed: length = sum coef q_joint. Spatial: length of the string along its path.
 typedef struct cav_tendon {
   const char *name;
-  int part, npart; ///< range in model->tendon_part
+  int part, npart; ///< fixed: range in model->tendon_part
+  int path, npath; ///< spatial: range in model->tendon_path; npath is 0 for a fixed one
+  int dof, ndof;   ///< range in model->tendon_dof: what can change its length
   int limited;
   double range[2];
   double margin;
@@ -245,7 +256,8 @@ typedef struct cav_model {
   double gravity[3];
   cav_options options; ///< defaults for new states
 
-  int nbody, nlink, njoint, ngeom, nsite, npair, ntendon, ntendon_part, nactuator, nsensor, nkey, nwarning;
+  int nbody, nlink, njoint, ngeom, nsite, npair, ntendon, ntendon_part, ntendon_path, ntendon_dof, nactuator, nsensor,
+      nkey, nwarning;
   int fused;       ///< 1: bodies without joints take the reference weights of the link they are part of
   int nsensordata; ///< length of the vector of all readings
   const cav_body *body;
@@ -257,6 +269,8 @@ typedef struct cav_model {
   const cav_pair *pair;
   const cav_tendon *tendon;
   const cav_tendon_part *tendon_part;
+  const cav_path_point *tendon_path;
+  const int *tendon_dof;        ///< [ntendon_dof] indices into v, by tendon
   const cav_actuator *actuator; ///< [nu]
   const cav_sensor *sensor;
   const cav_key *key;
