@@ -164,3 +164,35 @@ void cav_actuation(const cav_model *model, cav_state *state, const double *u, do
   }
   if (control && nu > 0) { memcpy(control, y, (size_t)nu * sizeof *y); }
 }
+
+double cav_actuator_length(const cav_model *model, const cav_state *state, int actuator) {
+  const cav_actuator *a = &model->actuator[actuator];
+  if (a->transmission == CAV_TRANSMISSION_TENDON) { return a->gear[0] * state->tendon_length[a->target]; }
+  const cav_joint *joint = &model->joint[a->target];
+  const double *q = state->work->q + joint->q;
+  double turn[3];
+  switch (joint->type) {
+    case CAV_JOINT_FREE:
+      return 0;
+    case CAV_JOINT_BALL:
+      quat_log(turn, q);
+      return dot3(a->gear, turn);
+    default:
+      return a->gear[0] * q[0];
+  }
+}
+
+double cav_actuator_velocity(const cav_model *model, const cav_state *state, int actuator, const double *v) {
+  const cav_workspace *w = state->work;
+  double sum = 0;
+  (void)model;
+  for (int e = w->gear_start[actuator]; e < w->gear_start[actuator + 1]; e++) { sum += w->gear[e] * v[w->gear_dof[e]]; }
+  return sum;
+}
+
+double cav_actuator_force(const cav_model *model, const cav_state *state, int actuator) {
+  const cav_workspace *w = state->work;
+  into_controls(model, w, state->u, w->control);
+  solve_gram(model, w, w->control, w->control + model->nactuator);
+  return w->control[actuator];
+}

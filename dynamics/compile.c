@@ -494,6 +494,9 @@ static void fill_sites(builder *b) {
     const cav_spec_site *s = &b->spec->site.at[i];
     cav_site *x = &b->site[i];
     *x = (cav_site){.name = put_text(b, s->name), .body = s->body, .link = b->link_of[s->body]};
+    x->type = (cav_geom_type)s->type;
+    copy3(x->size, s->size);
+    for (int k = 0; k < 3; k++) cav_check_not_negative(b->spec, s->node, "size", s->size[k]);
     to_link(&b->body[s->body], s->pos, s->quat, x->pos, x->quat);
   }
 }
@@ -616,23 +619,48 @@ static void fill_actuators(builder *b) {
   }
 }
 
-static int sensor_dim(cav_sensor_type type) {
-  if (type == CAV_SENSOR_JOINTPOS || type == CAV_SENSOR_JOINTVEL) return 1;
-  return type == CAV_SENSOR_FRAMEQUAT ? 4 : 3;
+// index of what a sensor looks at, or refers to
+static int find_object(builder *b, const cav_spec_sensor *s, const char *attribute, cav_object_type type,
+                       const char *name) {
+  cav_spec *spec = b->spec;
+  switch (type) {
+    case CAV_OBJECT_JOINT:
+      return resolve(spec, s->node, attribute, "joint", name, TABLE(spec->joint));
+    case CAV_OBJECT_GEOM:
+      return resolve(spec, s->node, attribute, "geom", name, TABLE(spec->geom));
+    case CAV_OBJECT_SITE:
+      return resolve(spec, s->node, attribute, "site", name, TABLE(spec->site));
+    case CAV_OBJECT_TENDON:
+      return resolve(spec, s->node, attribute, "tendon", name, TABLE(spec->tendon));
+    case CAV_OBJECT_ACTUATOR:
+      return resolve(spec, s->node, attribute, "actuator", name, TABLE(spec->actuator));
+    default:
+      return resolve(spec, s->node, attribute, "body", name, TABLE(spec->body));
+  }
 }
 
-static int find_object(builder *b, const cav_spec_sensor *s) {
+// a joint or tendon of the kind that a sensor needs
+static void check_sensor(builder *b, const cav_spec_sensor *s, int object) {
   cav_spec *spec = b->spec;
-  const char *attribute = cav_xml_accepts(s->node, "objname") ? "objname" : "body";
-  switch (s->object_type) {
-    case CAV_OBJECT_JOINT:
-      return find_scalar_joint(b, s->node, s->object, "this sensor");
-    case CAV_OBJECT_GEOM:
-      return resolve(spec, s->node, attribute, "geom", s->object, TABLE(spec->geom));
-    case CAV_OBJECT_SITE:
-      return resolve(spec, s->node, attribute, "site", s->object, TABLE(spec->site));
+  const char *name = s->object;
+  switch (cav_sensor_rule_of(s->type)->target) {
+    case CAV_TARGET_SCALAR_JOINT:
+      find_scalar_joint(b, s->node, name, "this sensor");
+      break;
+    case CAV_TARGET_BALL_JOINT:
+      if (spec->joint.at[object].type != CAV_JOINT_BALL)
+        cav_spec_fail(spec, s->node, "joint", "'%.60s' is no ball joint, which this sensor needs", name);
+      break;
+    case CAV_TARGET_LIMITED_JOINT:
+      if (spec->option.limit && !b->joint[object].limited)
+        cav_spec_fail(spec, s->node, "joint", "'%.60s' has no limit to measure; give it a range", name);
+      break;
+    case CAV_TARGET_LIMITED_TENDON:
+      if (spec->option.limit && !b->tendon[object].limited)
+        cav_spec_fail(spec, s->node, "tendon", "'%.60s' has no limit to measure; give it a range", name);
+      break;
     default:
-      return resolve(spec, s->node, attribute, "body", s->object, TABLE(spec->body));
+      break;
   }
 }
 
@@ -641,13 +669,28 @@ static void fill_sensors(builder *b) {
   m->nsensordata = 0;
   for (int i = 0; i < m->nsensor && running(b); i++) {
     const cav_spec_sensor *s = &b->spec->sensor.at[i];
-    b->sensor[i] = (cav_sensor){.name = put_text(b, s->name),
-                                .type = s->type,
-                                .object_type = s->object_type,
-                                .object = find_object(b, s),
-                                .dim = sensor_dim(s->type),
-                                .adr = m->nsensordata};
-    m->nsensordata += b->sensor[i].dim;
+    const cav_sensor_rule *rule = cav_sensor_rule_of(s->type);
+    cav_sensor *x = &b->sensor[i];
+    *x = (cav_sensor){.name = put_text(b, s->name),
+                      .type = s->type,
+                      .object_type = s->object_type,
+                      .dim = rule->dim,
+                      .adr = m->nsensordata,
+                      .cutoff = s->cutoff};
+    m->nsensordata += rule->dim;
+    if (rule->target == CAV_TARGET_NONE) continue;
+    static const char *const attributes[CAV_OBJECT_TYPES] = {[CAV_OBJECT_BODY] = "body",
+                                                             [CAV_OBJECT_JOINT] = "joint",
+                                                             [CAV_OBJECT_SITE] = "site",
+                                                             [CAV_OBJECT_TENDON] = "tendon",
+                                                             [CAV_OBJECT_ACTUATOR] = "actuator"};
+    const char *attribute = rule->target == CAV_TARGET_FRAME ? "objname" : attributes[s->object_type];
+    x->object = find_object(b, s, attribute, s->object_type, s->object);
+    if (running(b)) check_sensor(b, s, x->object);
+    x->referred = s->reference != NULL;
+    if (!x->referred) continue;
+    x->reference_type = s->reference_type;
+    x->reference = find_object(b, s, "refname", s->reference_type, s->reference);
   }
 }
 
@@ -683,6 +726,7 @@ static void set_options(builder *b) {
   m->timestep = o->timestep;
   m->fused = b->spec->compiler.fuse;
   copy3(m->gravity, o->gravity);
+  copy3(m->magnetic, o->magnetic);
   m->options = (cav_options){.order = CAV_ORDER_EULER,
                              .stabilisation = CAV_STABILISATION_SOLREF,
                              .regulariser = CAV_REGULARISER_REFERENCE,

@@ -4,7 +4,7 @@
 /// that no 2.2.2 file can contain: the frame element, and limits that hold where only a range is given.
 /// What would change the dynamics and is not offered is an error (equality constraints, meshes that
 /// collide or weigh, actuators that are no motors, fluids, composite bodies); what only changes how MuJoCo itself
-/// steps or measures is a warning (integrator, cone, noslip, other sensors). Names are resolved in compile.c.
+/// steps is a warning (integrator, cone, noslip). Names are resolved in compile.c.
 
 #include <stdlib.h>
 
@@ -130,6 +130,7 @@ static void read_option(reader *r, const cav_xml_node *node) {
   read_real(node, "timestep", &o->timestep);
   read_real(node, "impratio", &o->impratio);
   cav_xml_reals(node, "gravity", o->gravity, 3);
+  cav_xml_reals(node, "magnetic", o->magnetic, 3);
   o->collision = (cav_collision)cav_xml_word(node, "collision", (int)o->collision);
   if (!(o->timestep > 0)) cav_spec_fail(spec, node, "timestep", "expected a time step > 0, got %g", o->timestep);
   if (!(o->impratio > 0)) cav_spec_fail(spec, node, "impratio", "expected a ratio > 0, got %g", o->impratio);
@@ -202,6 +203,8 @@ static void read_site_values(cav_spec *spec, const cav_xml_node *node, cav_spec_
   cav_xml_reals(node, "pos", s->pos, 3);
   cav_read_orientation(spec, node, s->quat);
   if (cav_xml_reals(node, "fromto", s->fromto, 6)) s->has_fromto = 1;
+  s->type = cav_xml_word(node, "type", s->type);
+  cav_xml_reals(node, "size", s->size, 3);
 }
 
 static void read_pair_values(cav_spec *spec, const cav_xml_node *node, cav_spec_pair *p) {
@@ -264,7 +267,7 @@ static defaults first_defaults(void) {
                            .density = 1000,
                            .softness = soft,
                            .rgba = {0.5, 0.5, 0.5, 1}};
-  d.site.quat[0] = 1;
+  d.site = (cav_spec_site){.quat = {1, 0, 0, 0}, .type = CAV_GEOM_SPHERE, .size = {0.005, 0.005, 0.005}};
   d.pair = (cav_spec_pair){.condim = 3, .friction = {1, 1, 0.005, 0.0001, 0.0001}, .softness = soft};
   d.tendon = (cav_spec_tendon){.limited = CAV_LIMITED_AUTO, .limit = soft, .friction = soft};
   d.actuator =
@@ -456,7 +459,13 @@ static void read_site(reader *r, const cav_xml_node *node, const place *at) {
   s->name = cav_xml_text(node, "name", "");
   s->node = node;
   s->body = at->body;
-  if (s->has_fromto) cav_pose_of_fromto(s->fromto, s->pos, s->quat);
+  if (s->type < CAV_GEOM_SPHERE || s->type > CAV_GEOM_BOX)
+    cav_spec_fail(r->spec, node, "type", "expected sphere, capsule, ellipsoid, cylinder or box");
+  if (s->has_fromto) {
+    int thick = s->type == CAV_GEOM_BOX || s->type == CAV_GEOM_ELLIPSOID;
+    if (thick) s->size[1] = s->size[0];
+    s->size[thick ? 2 : 1] = cav_pose_of_fromto(s->fromto, s->pos, s->quat);
+  }
   move_to(at, s->pos, s->quat);
 }
 
@@ -658,30 +667,58 @@ static void read_actuators(reader *r, const cav_xml_node *node) {
   }
 }
 
-static void read_sensors(reader *r, const cav_xml_node *node) {
-  static const char *const names[CAV_SENSOR_TYPES] = {"jointpos",    "jointvel",   "framepos",      "framequat",
-                                                      "framexaxis",  "frameyaxis", "framezaxis",    "framelinvel",
-                                                      "frameangvel", "subtreecom", "subtreelinvel", "subtreeangmom"};
-  static const cav_object_type objects[] = {CAV_OBJECT_BODY, CAV_OBJECT_XBODY, CAV_OBJECT_GEOM, CAV_OBJECT_SITE};
+// what a frame sensor looks at or refers to; 0: a camera, which has no frame here
+static int read_frame(const cav_xml_node *node, const char *type, const char *name, cav_object_type *kind,
+                      const char **object) {
+  static const cav_object_type kinds[] = {CAV_OBJECT_BODY, CAV_OBJECT_XBODY, CAV_OBJECT_GEOM, CAV_OBJECT_SITE};
+  int i = cav_xml_word(node, type, 0);
+  if (i > 3) return 0;
+  *kind = kinds[i];
+  *object = cav_xml_text(node, name, NULL);
+  return 1;
+}
+
+static void read_sensor(reader *r, const cav_xml_node *node, cav_sensor_type type) {
+  static const struct {
+    const char *attribute;
+    cav_object_type kind;
+  } objects[] = {[CAV_TARGET_BODY] = {"body", CAV_OBJECT_BODY},
+                 [CAV_TARGET_SITE] = {"site", CAV_OBJECT_SITE},
+                 [CAV_TARGET_SCALAR_JOINT] = {"joint", CAV_OBJECT_JOINT},
+                 [CAV_TARGET_BALL_JOINT] = {"joint", CAV_OBJECT_JOINT},
+                 [CAV_TARGET_LIMITED_JOINT] = {"joint", CAV_OBJECT_JOINT},
+                 [CAV_TARGET_TENDON] = {"tendon", CAV_OBJECT_TENDON},
+                 [CAV_TARGET_LIMITED_TENDON] = {"tendon", CAV_OBJECT_TENDON},
+                 [CAV_TARGET_ACTUATOR] = {"actuator", CAV_OBJECT_ACTUATOR}};
   cav_spec *spec = r->spec;
+  cav_sensor_target target = cav_sensor_rule_of(type)->target;
+  cav_spec_sensor s = {.name = cav_xml_text(node, "name", ""), .node = node, .type = type};
+  s.cutoff = cav_xml_real(node, "cutoff", 0);
+  cav_check_not_negative(spec, node, "cutoff", s.cutoff);
+  if (target == CAV_TARGET_FRAME) {
+    int known = read_frame(node, "objtype", "objname", &s.object_type, &s.object);
+    if (known && cav_xml_accepts(node, "refname") && cav_xml_get(node, "refname"))
+      known = read_frame(node, "reftype", "refname", &s.reference_type, &s.reference);
+    if (!known) {
+      cav_spec_warn(spec, node, NULL, "left out: cameras have no frame here");
+      return;
+    }
+  } else if (target != CAV_TARGET_NONE) {
+    s.object_type = objects[target].kind;
+    s.object = cav_xml_text(node, objects[target].attribute, "");
+  }
+  cav_spec_sensor *slot = CAV_SPEC_PUSH(spec, &spec->sensor);
+  if (slot) *slot = s;
+}
+
+static void read_sensors(reader *r, const cav_xml_node *node) {
   for (const cav_xml_node *c = node->child; c; c = c->next) {
     int type = 0;
-    while (type < CAV_SENSOR_TYPES && !is(c, names[type])) type++;
-    int framed = cav_xml_accepts(c, "objname"), object = framed ? cav_xml_word(c, "objtype", 0) : 0;
-    if (type == CAV_SENSOR_TYPES) {
-      cav_spec_warn(spec, c, NULL, "left out: this sensor is not supported");
-    } else if (framed && (object == 4 || cav_xml_get(c, "refname"))) {
-      cav_spec_warn(spec, c, NULL, "left out: %s are not supported",
-                    object == 4 ? "cameras" : "readings in another's frame");
-    } else {
-      cav_spec_sensor *s = CAV_SPEC_PUSH(spec, &spec->sensor);
-      if (!s) return;
-      *s = (cav_spec_sensor){.name = cav_xml_text(c, "name", ""), .node = c, .type = (cav_sensor_type)type};
-      int jointed = type == CAV_SENSOR_JOINTPOS || type == CAV_SENSOR_JOINTVEL;
-      s->object_type = framed ? objects[object] : jointed ? CAV_OBJECT_JOINT : CAV_OBJECT_BODY;
-      s->object = cav_xml_text(c, framed ? "objname" : jointed ? "joint" : "body", "");
-      if (cav_xml_real(c, "cutoff", 0) > 0) cav_spec_warn(spec, c, "cutoff", "left aside: readings are not cut");
-    }
+    while (type < CAV_SENSOR_TYPES && !is(c, cav_sensor_rule_of((cav_sensor_type)type)->name)) type++;
+    if (type < CAV_SENSOR_TYPES)
+      read_sensor(r, c, (cav_sensor_type)type);
+    else
+      cav_spec_warn(r->spec, c, NULL, "left out: what it reads is not in the file");
   }
 }
 
@@ -723,6 +760,7 @@ void cav_mjcf_first_options(cav_spec *spec) {
                                        .mesh_folder = ""};
   spec->option = (cav_spec_option){.timestep = 0.002,
                                    .gravity = {0, 0, -9.81},
+                                   .magnetic = {0, -0.5, 0},
                                    .impratio = 1,
                                    .constraint = 1,
                                    .equality = 1,

@@ -63,9 +63,9 @@ static const char *const biastypes[] = {"none", "affine", "muscle", "user", NULL
       REAL("margin"), REAL("gap"), REALS("fromto", 6, 6), NAMED("hfield"), NAMED("mesh"), SKIP("fitscale"),         \
       REALS("rgba", 4, 4), SKIP("fluidshape"), SKIP("fluidcoef"), SKIP("user")
 
-#define SITE                                                                                                           \
-  SKIP("type"), SKIP("group"), REALS("pos", 3, 3), ORIENTATION, SKIP("material"), SKIP("size"), REALS("fromto", 6, 6), \
-      SKIP("rgba"), SKIP("user")
+#define SITE                                                                                                  \
+  WORD("type", geoms), SKIP("group"), REALS("pos", 3, 3), ORIENTATION, SKIP("material"), REALS("size", 1, 3), \
+      REALS("fromto", 6, 6), SKIP("rgba"), SKIP("user")
 
 #define PAIR \
   INT("condim"), REALS("friction", 1, 5), REALS("solref", 1, 2), REALS("solimp", 1, 5), REAL("gap"), REAL("margin")
@@ -148,7 +148,7 @@ static const cav_xml_attribute option_attributes[] = {REAL("timestep"),
                                                       SKIP("mpr_tolerance"),
                                                       REALS("gravity", 3, 3),
                                                       SKIP("wind"),
-                                                      SKIP("magnetic"),
+                                                      REALS("magnetic", 3, 3),
                                                       REAL("density"),
                                                       REAL("viscosity"),
                                                       SKIP("o_margin"),
@@ -302,68 +302,66 @@ static const cav_xml_element actuator = {"actuator", 0, 0, NULL, actuator_childr
 // --- sensors ---
 
 #define READING REAL("cutoff"), SKIP("noise"), SKIP("user")
-LEAF(jointpos, "jointpos", NAMED("name"), NEEDED("joint"), READING);
-LEAF(jointvel, "jointvel", NAMED("name"), NEEDED("joint"), READING);
-LEAF(subtreecom, "subtreecom", NAMED("name"), NEEDED("body"), READING);
-LEAF(subtreelinvel, "subtreelinvel", NAMED("name"), NEEDED("body"), READING);
-LEAF(subtreeangmom, "subtreeangmom", NAMED("name"), NEEDED("body"), READING);
+#define SENSOR(id, target) LEAF(sensor_##id, #id, NAMED("name"), NEEDED(target), READING)
+SENSOR(jointpos, "joint");
+SENSOR(jointvel, "joint");
+SENSOR(ballquat, "joint");
+SENSOR(ballangvel, "joint");
+SENSOR(jointlimitpos, "joint");
+SENSOR(jointlimitvel, "joint");
+SENSOR(jointlimitfrc, "joint");
+SENSOR(subtreecom, "body");
+SENSOR(subtreelinvel, "body");
+SENSOR(subtreeangmom, "body");
+SENSOR(touch, "site");
+SENSOR(accelerometer, "site");
+SENSOR(velocimeter, "site");
+SENSOR(gyro, "site");
+SENSOR(force, "site");
+SENSOR(torque, "site");
+SENSOR(magnetometer, "site");
+SENSOR(rangefinder, "site");
+SENSOR(tendonpos, "tendon");
+SENSOR(tendonvel, "tendon");
+SENSOR(tendonlimitpos, "tendon");
+SENSOR(tendonlimitvel, "tendon");
+SENSOR(tendonlimitfrc, "tendon");
+SENSOR(actuatorpos, "actuator");
+SENSOR(actuatorvel, "actuator");
+SENSOR(actuatorfrc, "actuator");
+LEAF(sensor_clock, "clock", NAMED("name"), READING);
 
-static const cav_xml_attribute frame_sensor_attributes[] = {NAMED("name"),
-                                                            {"objtype", CAV_XML_WORD, 0, 0, objects, 1},
-                                                            NEEDED("objname"),
-                                                            WORD("reftype", objects),
-                                                            NAMED("refname"),
-                                                            READING,
-                                                            END};
-#define FRAME_SENSOR(id) static const cav_xml_element id = {#id, 0, 0, frame_sensor_attributes, NULL, 0}
-FRAME_SENSOR(framepos);
-FRAME_SENSOR(framequat);
-FRAME_SENSOR(framexaxis);
-FRAME_SENSOR(frameyaxis);
-FRAME_SENSOR(framezaxis);
-FRAME_SENSOR(framelinvel);
-FRAME_SENSOR(frameangvel);
+static const cav_xml_attribute place_attributes[] = {
+    NAMED("name"), {"objtype", CAV_XML_WORD, 0, 0, objects, 1}, NEEDED("objname"), READING, END};
+static const cav_xml_attribute referred_attributes[] = {NAMED("name"),
+                                                        {"objtype", CAV_XML_WORD, 0, 0, objects, 1},
+                                                        NEEDED("objname"),
+                                                        WORD("reftype", objects),
+                                                        NAMED("refname"),
+                                                        READING,
+                                                        END};
+#define FRAME_SENSOR(id, attributes) static const cav_xml_element sensor_##id = {#id, 0, 0, attributes, NULL, 0}
+FRAME_SENSOR(framepos, referred_attributes);
+FRAME_SENSOR(framequat, referred_attributes);
+FRAME_SENSOR(framexaxis, referred_attributes);
+FRAME_SENSOR(frameyaxis, referred_attributes);
+FRAME_SENSOR(framezaxis, referred_attributes);
+FRAME_SENSOR(framelinvel, referred_attributes);
+FRAME_SENSOR(frameangvel, referred_attributes);
+FRAME_SENSOR(framelinacc, place_attributes);
+FRAME_SENSOR(frameangacc, place_attributes);
+UNREAD(sensor_user, "user");
 
-// sensors of MJCF that are not offered: mjcf.c warns of each
-#define OTHER_SENSOR(id) static const cav_xml_element sensor_##id = {#id, 0, 0, NULL, NULL, CAV_XML_ANYTHING}
-OTHER_SENSOR(touch);
-OTHER_SENSOR(accelerometer);
-OTHER_SENSOR(velocimeter);
-OTHER_SENSOR(gyro);
-OTHER_SENSOR(force);
-OTHER_SENSOR(torque);
-OTHER_SENSOR(magnetometer);
-OTHER_SENSOR(rangefinder);
-OTHER_SENSOR(tendonpos);
-OTHER_SENSOR(tendonvel);
-OTHER_SENSOR(actuatorpos);
-OTHER_SENSOR(actuatorvel);
-OTHER_SENSOR(actuatorfrc);
-OTHER_SENSOR(ballquat);
-OTHER_SENSOR(ballangvel);
-OTHER_SENSOR(jointlimitpos);
-OTHER_SENSOR(jointlimitvel);
-OTHER_SENSOR(jointlimitfrc);
-OTHER_SENSOR(tendonlimitpos);
-OTHER_SENSOR(tendonlimitvel);
-OTHER_SENSOR(tendonlimitfrc);
-OTHER_SENSOR(framelinacc);
-OTHER_SENSOR(frameangacc);
-OTHER_SENSOR(clock);
-OTHER_SENSOR(user);
-
-static const cav_xml_element *const sensor_children[] = {&jointpos,
-                                                         &jointvel,
-                                                         &framepos,
-                                                         &framequat,
-                                                         &framexaxis,
-                                                         &frameyaxis,
-                                                         &framezaxis,
-                                                         &framelinvel,
-                                                         &frameangvel,
-                                                         &subtreecom,
-                                                         &subtreelinvel,
-                                                         &subtreeangmom,
+static const cav_xml_element *const sensor_children[] = {&sensor_jointpos,
+                                                         &sensor_jointvel,
+                                                         &sensor_ballquat,
+                                                         &sensor_ballangvel,
+                                                         &sensor_jointlimitpos,
+                                                         &sensor_jointlimitvel,
+                                                         &sensor_jointlimitfrc,
+                                                         &sensor_subtreecom,
+                                                         &sensor_subtreelinvel,
+                                                         &sensor_subtreeangmom,
                                                          &sensor_touch,
                                                          &sensor_accelerometer,
                                                          &sensor_velocimeter,
@@ -374,20 +372,22 @@ static const cav_xml_element *const sensor_children[] = {&jointpos,
                                                          &sensor_rangefinder,
                                                          &sensor_tendonpos,
                                                          &sensor_tendonvel,
-                                                         &sensor_actuatorpos,
-                                                         &sensor_actuatorvel,
-                                                         &sensor_actuatorfrc,
-                                                         &sensor_ballquat,
-                                                         &sensor_ballangvel,
-                                                         &sensor_jointlimitpos,
-                                                         &sensor_jointlimitvel,
-                                                         &sensor_jointlimitfrc,
                                                          &sensor_tendonlimitpos,
                                                          &sensor_tendonlimitvel,
                                                          &sensor_tendonlimitfrc,
+                                                         &sensor_actuatorpos,
+                                                         &sensor_actuatorvel,
+                                                         &sensor_actuatorfrc,
+                                                         &sensor_clock,
+                                                         &sensor_framepos,
+                                                         &sensor_framequat,
+                                                         &sensor_framexaxis,
+                                                         &sensor_frameyaxis,
+                                                         &sensor_framezaxis,
+                                                         &sensor_framelinvel,
+                                                         &sensor_frameangvel,
                                                          &sensor_framelinacc,
                                                          &sensor_frameangacc,
-                                                         &sensor_clock,
                                                          &sensor_user,
                                                          &include,
                                                          NULL};

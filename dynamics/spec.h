@@ -61,8 +61,8 @@ typedef struct cav_spec_site {
   const char *name;
   const cav_xml_node *node;
   int body;
-  double pos[3], quat[4], fromto[6];
-  int has_fromto;
+  double pos[3], quat[4], fromto[6], size[3];
+  int has_fromto, type;
 } cav_spec_site;
 
 /// Explicit pair: its own parameters, nothing is taken from the two geoms.
@@ -118,8 +118,9 @@ typedef struct cav_spec_sensor {
   const char *name;
   const cav_xml_node *node;
   cav_sensor_type type;
-  cav_object_type object_type;
-  const char *object;
+  cav_object_type object_type, reference_type;
+  const char *object, *reference; ///< names; NULL: none
+  double cutoff;
 } cav_spec_sensor;
 
 typedef struct cav_spec_key {
@@ -143,7 +144,7 @@ typedef struct cav_spec_compiler {
 typedef enum cav_collision { CAV_COLLISION_ALL, CAV_COLLISION_PAIRS, CAV_COLLISION_GEOMS } cav_collision;
 
 typedef struct cav_spec_option {
-  double timestep, gravity[3], impratio;
+  double timestep, gravity[3], magnetic[3], impratio;
   cav_collision collision;
   int constraint, equality, frictionloss, limit, contact, passive, weight, clamp, filter_parent, guard; ///< flags
 } cav_spec_option;

@@ -28,6 +28,10 @@ typedef struct cav_shape {
 /// pairs.c: table over types; exact routines where they exist, convex.c (libccd) for the rest.
 int cav_collide_shapes(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
+/// Distance along a ray, unit direction, to the surface of a shape; -1 if it misses. A ray that starts inside meets the
+/// surface where it leaves; a plane is met from above only, within its size where that is not 0. ray.c.
+double cav_ray(const cav_shape *shape, const double point[3], const double direction[3]);
+
 /// 1 if shapes of these two types can be collided by this build (some need libccd), else 0. convex.c.
 int cav_collide_supported(cav_geom_type a, cav_geom_type b);
 
@@ -104,6 +108,27 @@ void cav_composite_inertia(const cav_model *model, cav_state *state, double *M);
 
 /// D of a dof under the state's options: armature, and damping times h where damping is implicit. inertia.c.
 double cav_added_inertia(const cav_model *model, const cav_state *state, int dof);
+
+/// Principal frame of a body at its centre of mass, world. sensor.c.
+void cav_mass_pose(const cav_state *state, const cav_body *body, cav_pose *pose);
+
+/// Whether a body is another one or stands on it, in the tree of the file. wrench.c.
+int cav_descends(const cav_model *model, int body, int from);
+
+/// Acceleration of a point of a link at the last evaluation, world axes, relative to free fall. wrench.c.
+void cav_point_acceleration(const cav_state *state, int link, const double point[3], double out[3]);
+
+/// Wrench (moment about point, force) by which its parent holds a body with all that stands on it. wrench.c.
+void cav_body_wrench(const cav_model *model, const cav_state *state, int body, const double point[3], double F[6]);
+
+/// Sum of the normal forces on the body of a site that lie in its zone or point out through it, N. wrench.c.
+double cav_touch_force(const cav_model *model, const cav_state *state, int site);
+
+/// Length of an actuator's transmission at the state's positions, its rate at v [nv], and its share of the least-norm forces
+/// that give the state's u. actuation.c.
+double cav_actuator_length(const cav_model *model, const cav_state *state, int actuator);
+double cav_actuator_velocity(const cav_model *model, const cav_state *state, int actuator, const double *v);
+double cav_actuator_force(const cav_model *model, const cav_state *state, int actuator);
 
 struct cav_workspace;
 

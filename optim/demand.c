@@ -77,7 +77,7 @@ static int sensor_values(const cav_audit *audit, const cav_term *term, int t, do
   double reading[4], aim[4];
   int n = sensor->dim;
   cav_sense(audit->model, audit->state, sensor, reading);
-  if (sensor->type == CAV_SENSOR_FRAMEQUAT) {
+  if (sensor->dim == 4) {
     target_quat(term, t * audit->h, aim);
     turn(aim, reading, x);
     memset(target, 0, sizeof(double) * 3);
@@ -183,6 +183,7 @@ static int measure(const cav_audit *audit, const cav_term *term, int t, double *
   int forced = t < audit->rows;
   switch (term->quantity) {
     case CAV_QUANTITY_SENSOR:
+      if (!forced && cav_sensor_rule_of(term->sensor.type)->stage == CAV_READS_ACCELERATION) return 0;
       return sensor_values(audit, term, t, x, target);
     case CAV_QUANTITY_CONFIGURATION:
       return configuration_values(audit, term, t, q, x, target);

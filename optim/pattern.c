@@ -56,24 +56,100 @@ static int object_link(const cav_model *m, cav_object_type type, int object) {
   }
 }
 
-/// Dofs of a sensor, and whether it reads velocities (at v_next) beside positions.
-static int sensor_pattern(const cav_model *m, const cav_sensor *sensor, char *seen) {
-  switch (sensor->type) {
-    case CAV_SENSOR_JOINTPOS:
-    case CAV_SENSOR_JOINTVEL:
-      for (int j = 0; j < m->nv; j++) seen[j] |= (char)(m->dof[j].joint == sensor->object);
-      return sensor->type == CAV_SENSOR_JOINTVEL;
-    case CAV_SENSOR_SUBTREECOM:
-    case CAV_SENSOR_SUBTREELINVEL:
-    case CAV_SENSOR_SUBTREEANGMOM:
-      subtree_pattern(m, m->body[sensor->object].link, seen);
-      return sensor->type != CAV_SENSOR_SUBTREECOM;
-    default: {
-      int link = object_link(m, sensor->object_type, sensor->object);
-      for (int j = 0; j < m->nv; j++) seen[j] |= (char)moves(m, j, link);
-      return sensor->type == CAV_SENSOR_FRAMELINVEL || sensor->type == CAV_SENSOR_FRAMEANGVEL;
-    }
+/// Dofs that move an object's frame.
+static void frame_pattern(const cav_model *m, cav_object_type type, int object, char *seen) {
+  int link = object_link(m, type, object);
+  for (int j = 0; j < m->nv; j++) seen[j] |= (char)moves(m, j, link);
+}
+
+/// Dofs that a transmission or a limit sees: of a joint, or of all joints of a tendon.
+static void joint_pattern(const cav_model *m, int joint, char *seen) {
+  for (int j = 0; j < m->nv; j++) seen[j] |= (char)(m->dof[j].joint == joint);
+}
+
+static void tendon_pattern(const cav_model *m, int tendon, char *seen) {
+  const cav_tendon *t = &m->tendon[tendon];
+  for (int k = 0; k < t->npart; k++) joint_pattern(m, m->tendon_part[t->part + k].joint, seen);
+}
+
+/// Dofs that move either geom of a pair that may touch a link.
+static void touch_pattern(const cav_model *m, int link, char *seen) {
+  for (int k = 0; k < m->npair; k++) {
+    int a = m->geom[m->pair[k].geom1].link, b = m->geom[m->pair[k].geom2].link;
+    if (a != link && b != link) continue;
+    for (int j = 0; j < m->nv; j++) seen[j] |= (char)(moves(m, j, a) || moves(m, j, b));
   }
+}
+
+static void site_pattern(const cav_model *m, const cav_sensor *sensor, char *seen) {
+  int link = m->site[sensor->object].link;
+  switch (sensor->type) {
+    case CAV_SENSOR_RANGEFINDER:
+      // any geom may be the nearest
+      memset(seen, 1, (size_t)m->nv);
+      return;
+    case CAV_SENSOR_TOUCH:
+      touch_pattern(m, link, seen);
+      break;
+    case CAV_SENSOR_FORCE:
+    case CAV_SENSOR_TORQUE:
+      // all that stands on the body, and what touches that
+      subtree_pattern(m, link, seen);
+      for (int l = link; l < m->nlink; l++) {
+        int up = l;
+        while (up > link) up = m->link[up].parent;
+        if (up == link) touch_pattern(m, l, seen);
+      }
+      break;
+    default:
+      break;
+  }
+  frame_pattern(m, CAV_OBJECT_SITE, sensor->object, seen);
+}
+
+static void actuator_pattern(const cav_transcription *tr, const cav_sensor *sensor, char *seen) {
+  const cav_model *m = tr->model;
+  const cav_actuator *a = &m->actuator[sensor->object];
+  if (sensor->type == CAV_SENSOR_ACTUATORFRC) {
+    memset(seen, 1, (size_t)m->nv); // shares of u among all actuators
+  } else if (a->transmission == CAV_TRANSMISSION_TENDON) {
+    tendon_pattern(m, a->target, seen);
+  } else {
+    joint_pattern(m, a->target, seen);
+  }
+}
+
+/// Dofs of a sensor, and the last stage of an evaluation that it reads.
+static cav_sensor_stage sensor_pattern(const cav_transcription *tr, const cav_sensor *sensor, char *seen) {
+  const cav_model *m = tr->model;
+  const cav_sensor_rule *rule = cav_sensor_rule_of(sensor->type);
+  switch (rule->target) {
+    case CAV_TARGET_NONE:
+      break;
+    case CAV_TARGET_SCALAR_JOINT:
+    case CAV_TARGET_BALL_JOINT:
+    case CAV_TARGET_LIMITED_JOINT:
+      joint_pattern(m, sensor->object, seen);
+      break;
+    case CAV_TARGET_TENDON:
+    case CAV_TARGET_LIMITED_TENDON:
+      tendon_pattern(m, sensor->object, seen);
+      break;
+    case CAV_TARGET_ACTUATOR:
+      actuator_pattern(tr, sensor, seen);
+      break;
+    case CAV_TARGET_SITE:
+      site_pattern(m, sensor, seen);
+      break;
+    case CAV_TARGET_BODY:
+      subtree_pattern(m, m->body[sensor->object].link, seen);
+      break;
+    case CAV_TARGET_FRAME:
+      frame_pattern(m, sensor->object_type, sensor->object, seen);
+      if (sensor->referred) frame_pattern(m, sensor->reference_type, sensor->reference, seen);
+      break;
+  }
+  return rule->stage;
 }
 
 /// Rotations of one joint are chained by full 3x3 blocks.
@@ -132,10 +208,11 @@ void cav_transcription_pattern(const cav_transcription *tr, int t, int i, char *
     const cav_term *term = term_of(tr, t, i - at->term, &dof);
     if (!term) return;
     if (term->quantity == CAV_QUANTITY_SENSOR) {
-      int moving = sensor_pattern(m, &term->sensor, seen);
+      cav_sensor_stage stage = sensor_pattern(tr, &term->sensor, seen);
       spread_turns(tr, seen);
       int open = t == tr->nknot - 1 && !tr->problem->close_at_rest; // there v_next is v_t
-      put(tr, t, seen, moving && open ? 0 : 1, moving ? 2 : 1, pattern);
+      int moving = stage != CAV_READS_POSITION, before = stage == CAV_READS_ACCELERATION || (moving && open);
+      put(tr, t, seen, before ? 0 : 1, moving ? 2 : 1, pattern);
     } else {
       seen[dof] = 1;
       spread_turns(tr, seen);

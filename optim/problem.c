@@ -127,6 +127,11 @@ static const void *names_of(const cav_model *m, cav_object_type type, int *n, si
       return *kind = "geom", *n = m->ngeom, *stride = sizeof *m->geom, m->geom ? &m->geom->name : NULL;
     case CAV_OBJECT_SITE:
       return *kind = "site", *n = m->nsite, *stride = sizeof *m->site, m->site ? &m->site->name : NULL;
+    case CAV_OBJECT_TENDON:
+      return *kind = "tendon", *n = m->ntendon, *stride = sizeof *m->tendon, m->tendon ? &m->tendon->name : NULL;
+    case CAV_OBJECT_ACTUATOR:
+      return *kind = "actuator", *n = m->nactuator, *stride = sizeof *m->actuator,
+             m->actuator ? &m->actuator->name : NULL;
     case CAV_OBJECT_KEY:
       return *kind = "keyframe", *n = m->nkey, *stride = sizeof *m->key, m->key ? &m->key->name : NULL;
     case CAV_OBJECT_SENSOR:

@@ -9,13 +9,48 @@ const char *const cav_problem_guesses[] = {"hold", "interpolate", NULL};
 const char *const cav_problem_quantities[] = {"sensor", "posture", "velocity", "acceleration", "effort", "gap",
                                               "slip",   "impact",  NULL};
 const char *const cav_problem_dof_sets[] = {"all", "root_linear", "root_angular", "joints", NULL};
-const char *const cav_problem_sensors[] = {"jointpos",      "jointvel",      "framepos",    "framequat",   "framexaxis",
-                                           "frameyaxis",    "framezaxis",    "framelinvel", "frameangvel", "subtreecom",
-                                           "subtreelinvel", "subtreeangmom", NULL};
+const char *const cav_problem_sensors[] = {"jointpos",
+                                           "jointvel",
+                                           "framepos",
+                                           "framequat",
+                                           "framexaxis",
+                                           "frameyaxis",
+                                           "framezaxis",
+                                           "framelinvel",
+                                           "frameangvel",
+                                           "subtreecom",
+                                           "subtreelinvel",
+                                           "subtreeangmom",
+                                           "touch",
+                                           "accelerometer",
+                                           "velocimeter",
+                                           "gyro",
+                                           "force",
+                                           "torque",
+                                           "magnetometer",
+                                           "rangefinder",
+                                           "tendonpos",
+                                           "tendonvel",
+                                           "actuatorpos",
+                                           "actuatorvel",
+                                           "actuatorfrc",
+                                           "ballquat",
+                                           "ballangvel",
+                                           "jointlimitpos",
+                                           "jointlimitvel",
+                                           "jointlimitfrc",
+                                           "tendonlimitpos",
+                                           "tendonlimitvel",
+                                           "tendonlimitfrc",
+                                           "framelinacc",
+                                           "frameangacc",
+                                           "clock",
+                                           NULL};
 const char *const cav_problem_stabilisations[] = {"solref", "discrete", NULL};
 const char *const cav_problem_regularisers[] = {"reference", NULL};
 static const char *const heights[] = {"keep", "floor", NULL};
 static const char *const ends[] = {"first", "last", NULL};
+static const char *const frames[] = {"body", "xbody", "geom", "site", NULL};
 static const char *const relations[] = {"none", "start", "goal", NULL};
 
 // the tables below read as rows
@@ -58,9 +93,10 @@ static const cav_xml_element pose = {
 #define DOFS WORD("dofs", cav_problem_dof_sets), TEXT("joint", 0)
 #define RATE DOFS, REALS("target", 1, 0)
 #define POSTURE DOFS, TEXT("key", 0), REALS("qpos", 1, 0)
-#define SENSOR                                                                                            \
-  WORD("type", cav_problem_sensors), TEXT("body", 0), TEXT("xbody", 0), TEXT("geom", 0), TEXT("site", 0), \
-      TEXT("joint", 0), TEXT("component", 0), REALS("target", 1, 0), WORD("relative", relations)
+#define SENSOR                                                                                                \
+  WORD("type", cav_problem_sensors), TEXT("body", 0), TEXT("xbody", 0), TEXT("geom", 0), TEXT("site", 0),     \
+      TEXT("joint", 0), TEXT("tendon", 0), TEXT("actuator", 0), WORD("reftype", frames), TEXT("refname", 0), \
+      TEXT("component", 0), REALS("target", 1, 0), WORD("relative", relations)
 static const cav_xml_element posture_waypoint = {
     "waypoint", 0, 0, ATTRIBUTES(REAL("time", 1), TEXT("key", 0), REALS("qpos", 1, 0)), NULL, 0};
 static const cav_xml_element value_waypoint = {

@@ -14,18 +14,6 @@
 
 static const double near_knot = 1e-6; // of a step
 
-// one sensor type: length of its reading, what it may look at, and whether it reads velocities
-static const struct {
-  int dim, joint, subtree, rate;
-} sensor_kind[CAV_SENSOR_TYPES] = {
-    [CAV_SENSOR_JOINTPOS] = {1, 1, 0, 0},      [CAV_SENSOR_JOINTVEL] = {1, 1, 0, 1},
-    [CAV_SENSOR_FRAMEPOS] = {3, 0, 0, 0},      [CAV_SENSOR_FRAMEQUAT] = {4, 0, 0, 0},
-    [CAV_SENSOR_FRAMEXAXIS] = {3, 0, 0, 0},    [CAV_SENSOR_FRAMEYAXIS] = {3, 0, 0, 0},
-    [CAV_SENSOR_FRAMEZAXIS] = {3, 0, 0, 0},    [CAV_SENSOR_FRAMELINVEL] = {3, 0, 0, 1},
-    [CAV_SENSOR_FRAMEANGVEL] = {3, 0, 0, 1},   [CAV_SENSOR_SUBTREECOM] = {3, 0, 1, 0},
-    [CAV_SENSOR_SUBTREELINVEL] = {3, 0, 1, 1}, [CAV_SENSOR_SUBTREEANGMOM] = {3, 0, 1, 1},
-};
-
 // seconds of an attribute, or "end"
 static cav_status instant(const cav_problem_reader *reader, const cav_xml_node *node, const char *name,
                           double *seconds) {
@@ -204,45 +192,97 @@ static cav_status read_rate(const cav_problem_reader *reader, const cav_xml_node
   return status ? status : read_targets(reader, node, term, reader->model->nv, rate_target);
 }
 
+// kinds of objects by the attribute that names one
+static const struct {
+  const char *name;
+  cav_object_type type;
+} object_kind[] = {{"body", CAV_OBJECT_BODY},        {"xbody", CAV_OBJECT_XBODY}, {"geom", CAV_OBJECT_GEOM},
+                   {"site", CAV_OBJECT_SITE},        {"joint", CAV_OBJECT_JOINT}, {"tendon", CAV_OBJECT_TENDON},
+                   {"actuator", CAV_OBJECT_ACTUATOR}};
+enum { OBJECT_KINDS = sizeof object_kind / sizeof *object_kind, FRAME_KINDS = 4 };
+
+// what a sensor's target is called, and its kind; FRAME stands for the first kinds of the table
+static const struct {
+  const char *name;
+  cav_object_type type;
+} wanted_of[] = {[CAV_TARGET_NONE] = {"nothing", CAV_OBJECT_TYPES},
+                 [CAV_TARGET_FRAME] = {"body, xbody, geom or site", CAV_OBJECT_TYPES},
+                 [CAV_TARGET_BODY] = {"body", CAV_OBJECT_BODY},
+                 [CAV_TARGET_SITE] = {"site", CAV_OBJECT_SITE},
+                 [CAV_TARGET_SCALAR_JOINT] = {"joint", CAV_OBJECT_JOINT},
+                 [CAV_TARGET_BALL_JOINT] = {"joint", CAV_OBJECT_JOINT},
+                 [CAV_TARGET_LIMITED_JOINT] = {"joint", CAV_OBJECT_JOINT},
+                 [CAV_TARGET_TENDON] = {"tendon", CAV_OBJECT_TENDON},
+                 [CAV_TARGET_LIMITED_TENDON] = {"tendon", CAV_OBJECT_TENDON},
+                 [CAV_TARGET_ACTUATOR] = {"actuator", CAV_OBJECT_ACTUATOR}};
+
+// a joint or tendon of the kind that the sensor needs
+static cav_status check_object(const cav_problem_reader *reader, const cav_xml_node *node, const char *given,
+                               const cav_sensor *sensor) {
+  const cav_model *m = reader->model;
+  const char *needs = NULL, *name = cav_xml_text(node, given, "");
+  cav_sensor_target target = cav_sensor_rule_of(sensor->type)->target;
+  if (target == CAV_TARGET_SCALAR_JOINT && m->joint[sensor->object].type < CAV_JOINT_SLIDE)
+    needs = "a hinge or a slide";
+  if (target == CAV_TARGET_BALL_JOINT && m->joint[sensor->object].type != CAV_JOINT_BALL) needs = "a ball joint";
+  if (target == CAV_TARGET_LIMITED_JOINT && !m->joint[sensor->object].limited) needs = "a joint with a limit";
+  if (target == CAV_TARGET_LIMITED_TENDON && !m->tendon[sensor->object].limited) needs = "a tendon with a limit";
+  if (!needs) return CAV_OK;
+  return cav_xml_fail(reader->error, node, given, "a %s needs %s; '%.60s' is none", cav_problem_sensors[sensor->type],
+                      needs, name);
+}
+
+// the frame in which a frame sensor declared in the file reads
+static cav_status read_reference(const cav_problem_reader *reader, const cav_xml_node *node, cav_sensor *sensor) {
+  static const cav_object_type types[] = {CAV_OBJECT_BODY, CAV_OBJECT_XBODY, CAV_OBJECT_GEOM, CAV_OBJECT_SITE};
+  const cav_sensor_rule *rule = cav_sensor_rule_of(sensor->type);
+  int named = cav_xml_get(node, "refname") != NULL, typed = cav_xml_get(node, "reftype") != NULL;
+  if (!named && !typed) return CAV_OK;
+  if (named != typed)
+    return cav_xml_fail(reader->error, node, named ? "reftype" : "refname", "is missing; a frame needs both");
+  if (rule->target != CAV_TARGET_FRAME || rule->stage == CAV_READS_ACCELERATION)
+    return cav_xml_fail(reader->error, node, "refname", "a %s reads in no other frame", rule->name);
+  sensor->referred = 1;
+  sensor->reference_type = types[cav_xml_word(node, "reftype", 0)];
+  sensor->reference = cav_problem_find(reader, node, "refname", sensor->reference_type);
+  return sensor->reference < 0 ? CAV_BAD_INPUT : CAV_OK;
+}
+
 // the object that a sensor declared in the file looks at
 static cav_status read_object(const cav_problem_reader *reader, const cav_xml_node *node, cav_sensor *sensor) {
-  static const struct {
-    const char *name;
-    cav_object_type type;
-  } object[] = {{"body", CAV_OBJECT_BODY},
-                {"xbody", CAV_OBJECT_XBODY},
-                {"geom", CAV_OBJECT_GEOM},
-                {"site", CAV_OBJECT_SITE},
-                {"joint", CAV_OBJECT_JOINT}};
   const char *given = NULL;
-  for (int i = 0; i < 5; i++) {
-    if (!cav_xml_get(node, object[i].name)) continue;
+  int kind = 0;
+  for (int i = 0; i < OBJECT_KINDS; i++) {
+    if (!cav_xml_get(node, object_kind[i].name)) continue;
     if (given)
-      return cav_xml_fail(reader->error, node, object[i].name, "contradicts attribute '%s'; give one of the two",
+      return cav_xml_fail(reader->error, node, object_kind[i].name, "contradicts attribute '%s'; give one of the two",
                           given);
-    given = object[i].name;
-    sensor->object_type = object[i].type;
+    given = object_kind[i].name;
+    kind = i;
   }
-  const char *type = cav_problem_sensors[sensor->type];
-  int joint = sensor_kind[sensor->type].joint, subtree = sensor_kind[sensor->type].subtree;
-  const char *wanted = joint ? "joint" : subtree ? "body" : "body, xbody, geom or site";
+  sensor->object_type = object_kind[kind].type;
+  const cav_sensor_rule *rule = cav_sensor_rule_of(sensor->type);
+  int framed = rule->target == CAV_TARGET_FRAME;
+  const char *wanted = wanted_of[rule->target].name;
+  if (rule->target == CAV_TARGET_NONE)
+    return cav_xml_fail(reader->error, node, "type", "a %s reads nothing of the motion; windows tell the time",
+                        rule->name);
   if (!given)
-    return cav_xml_fail(reader->error, node, joint ? "joint" : "body", "is missing; a %s needs one of: %s", type,
+    return cav_xml_fail(reader->error, node, framed ? "body" : wanted, "is missing; a %s needs one of: %s", rule->name,
                         wanted);
-  int fits = (sensor->object_type == CAV_OBJECT_JOINT) == joint && (!subtree || sensor->object_type == CAV_OBJECT_BODY);
-  if (!fits) return cav_xml_fail(reader->error, node, given, "a %s looks at a %s", type, wanted);
+  if (framed ? kind >= FRAME_KINDS : sensor->object_type != wanted_of[rule->target].type)
+    return cav_xml_fail(reader->error, node, given, "a %s looks at a %s", rule->name, wanted);
   sensor->object = cav_problem_find(reader, node, given, sensor->object_type);
   if (sensor->object < 0) return CAV_BAD_INPUT;
-  if (!joint || reader->model->joint[sensor->object].type >= CAV_JOINT_SLIDE) return CAV_OK;
-  return cav_xml_fail(reader->error, node, given, "a %s needs a hinge or a slide; '%s' is neither", type,
-                      reader->model->joint[sensor->object].name);
+  cav_status status = check_object(reader, node, given, sensor);
+  return status ? status : read_reference(reader, node, sensor);
 }
 
 // x, y, z or a number; of an orientation, of the rotation vector to its target
 static cav_status read_component(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
   const char *text = cav_xml_text(node, "component", NULL);
   if (!text) return CAV_OK;
-  int dim = term->sensor.type == CAV_SENSOR_FRAMEQUAT ? 3 : term->sensor.dim;
+  int dim = term->sensor.dim == 4 ? 3 : term->sensor.dim;
   int index = strlen(text) == 1 ? (strchr("012", *text) ? *text - '0' : strchr("xyz", *text) ? *text - 'x' : -1) : -1;
   if (index < 0 || index >= dim || dim == 1) {
     return cav_xml_fail(
@@ -257,8 +297,7 @@ static cav_status read_component(const cav_problem_reader *reader, const cav_xml
 static cav_status sensor_target(const cav_problem_reader *reader, const cav_xml_node *node, const cav_term *term,
                                 double *target) {
   const cav_xml_value *given = cav_xml_get(node, "target");
-  int turn = term->sensor.type == CAV_SENSOR_FRAMEQUAT, one = term->component >= 0 && !turn,
-      wanted = one ? 1 : term->sensor.dim;
+  int turn = term->sensor.dim == 4, one = term->component >= 0 && !turn, wanted = one ? 1 : term->sensor.dim;
   if (given->count != wanted) {
     return cav_xml_fail(reader->error, node, "target", "expected %d number%s, got %d", wanted, wanted > 1 ? "s" : "",
                         given->count);
@@ -273,7 +312,7 @@ static cav_status sensor_target(const cav_problem_reader *reader, const cav_xml_
 
 // reading + target, or reading * target for orientations
 static void add_reading(const cav_sensor *sensor, const double *reading, double *target) {
-  if (sensor->type != CAV_SENSOR_FRAMEQUAT) {
+  if (sensor->dim != 4) {
     for (int i = 0; i < sensor->dim; i++) target[i] += reading[i];
     return;
   }
@@ -289,7 +328,7 @@ static cav_status make_absolute(const cav_problem_reader *reader, const cav_xml_
   int relation = cav_xml_word(node, "relative", 0);
   if (!relation) return CAV_OK;
   const char *what = cav_problem_sensors[term->sensor.type];
-  if (sensor_kind[term->sensor.type].rate)
+  if (cav_sensor_rule_of(term->sensor.type)->stage != CAV_READS_POSITION)
     return cav_xml_fail(reader->error, node, "relative", "a %s has no reading at a posture at rest", what);
   double reading[4] = {0};
   cav_status status =
@@ -298,7 +337,7 @@ static cav_status make_absolute(const cav_problem_reader *reader, const cav_xml_
     return cav_xml_fail_as(reader->error, status, node, "relative", "the posture cannot be evaluated: %s",
                            cav_status_name(status));
   cav_sense(reader->model, reader->state, &term->sensor, reading);
-  int turn = term->sensor.type == CAV_SENSOR_FRAMEQUAT;
+  int turn = term->sensor.dim == 4;
   if (term->use == CAV_USE_RANGE && !turn) {
     if (term->sensor.dim > 1 && term->component < 0) {
       return cav_xml_fail(reader->error, node, "component", "is missing; relative bounds are of one component");
@@ -325,19 +364,21 @@ static cav_status read_sensor(const cav_problem_reader *reader, const cav_xml_no
   cav_status status = CAV_OK;
   if (cav_xml_get(node, "type")) {
     term->sensor = (cav_sensor){.name = "", .type = (cav_sensor_type)cav_xml_word(node, "type", 0), .adr = -1};
-    term->sensor.dim = sensor_kind[term->sensor.type].dim;
+    term->sensor.dim = cav_sensor_rule_of(term->sensor.type)->dim;
     status = read_object(reader, node, &term->sensor);
   } else if (cav_xml_get(node, "name")) {
     int sensor = cav_problem_find(reader, node, "name", CAV_OBJECT_SENSOR);
     if (sensor < 0) return CAV_BAD_INPUT;
     term->sensor = reader->model->sensor[sensor];
+    if (term->sensor.type == CAV_SENSOR_CLOCK)
+      return cav_xml_fail(reader->error, node, "name", "a clock reads nothing of the motion; windows tell the time");
   } else {
     status = cav_xml_fail(reader->error, node, "type",
                           "is missing; give the type of a sensor, or in 'name' one of the model's");
   }
   if (!status) status = read_component(reader, node, term);
   if (!status) status = read_targets(reader, node, term, term->sensor.dim, sensor_target);
-  if (!status && term->use == CAV_USE_RANGE && term->target && term->sensor.type != CAV_SENSOR_FRAMEQUAT) {
+  if (!status && term->use == CAV_USE_RANGE && term->target && term->sensor.dim != 4) {
     status = cav_xml_fail(reader->error, node, "target", "contradicts 'lower' and 'upper'; give one or the others");
   }
   return status ? status : make_absolute(reader, node, term);

@@ -44,11 +44,10 @@ static void write_numbers(FILE *out, const char *name, const double *value, int 
   fputc('"', out);
 }
 
-// name of what a sensor looks at, NULL if it has none
-static const char *object_name(const cav_model *m, const cav_sensor *sensor, const char **kind) {
-  int i = sensor->object;
+// name of an object and of its kind, NULL if it has none
+static const char *object_name(const cav_model *m, cav_object_type type, int i, const char **kind) {
   const char *name = NULL;
-  switch (sensor->object_type) {
+  switch (type) {
     case CAV_OBJECT_BODY:
       *kind = "body", name = m->body[i].name;
       break;
@@ -64,6 +63,12 @@ static const char *object_name(const cav_model *m, const cav_sensor *sensor, con
     case CAV_OBJECT_JOINT:
       *kind = "joint", name = m->joint[i].name;
       break;
+    case CAV_OBJECT_TENDON:
+      *kind = "tendon", name = m->tendon[i].name;
+      break;
+    case CAV_OBJECT_ACTUATOR:
+      *kind = "actuator", name = m->actuator[i].name;
+      break;
     default:
       break;
   }
@@ -73,12 +78,19 @@ static const char *object_name(const cav_model *m, const cav_sensor *sensor, con
 // sensor by what it looks at, or by the model's name for it; 0 if it has neither
 static int write_sensor(FILE *out, const cav_problem *p, const cav_term *term) {
   static const char *const component[] = {"x", "y", "z"};
-  const char *kind = NULL, *object = object_name(p->model, &term->sensor, &kind);
-  const char *name = term->sensor.name ? term->sensor.name : "";
-  if (object) {
+  const cav_sensor *sensor = &term->sensor;
+  const char *kind = NULL, *object = object_name(p->model, sensor->object_type, sensor->object, &kind);
+  const char *name = sensor->name ? sensor->name : "", *reference = NULL, *frame = NULL;
+  if (sensor->referred) reference = object_name(p->model, sensor->reference_type, sensor->reference, &frame);
+  // a reading that is cut, or in a frame without a name, is only in the model
+  if (object && sensor->cutoff == 0 && (reference || !sensor->referred)) {
     write_text(out, "name", term->name ? term->name : "sensor");
-    write_text(out, "type", cav_problem_sensors[term->sensor.type]);
+    write_text(out, "type", cav_problem_sensors[sensor->type]);
     write_text(out, kind, object);
+    if (reference) {
+      write_text(out, "reftype", frame);
+      write_text(out, "refname", reference);
+    }
   } else if (*name) {
     write_text(out, "name", name);
   } else {
@@ -101,7 +113,7 @@ static void write_target(FILE *out, const cav_problem *p, const cav_term *term, 
   if (term->quantity == CAV_QUANTITY_CONFIGURATION) {
     write_numbers(out, "qpos", target, p->model->nq);
   } else if (term->quantity == CAV_QUANTITY_SENSOR) {
-    int one = term->component >= 0 && term->sensor.type != CAV_SENSOR_FRAMEQUAT;
+    int one = term->component >= 0 && term->sensor.dim != 4;
     write_numbers(out, "target", target + (one ? term->component : 0), one ? 1 : term->sensor.dim);
   } else {
     fputs(" target=\"", out);

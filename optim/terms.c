@@ -8,8 +8,15 @@
 /// Share of a step by which a window may miss a knot and still hold it.
 static const double near_knot = 1e-6;
 
+/// Whether a term measures an acceleration or a force at a last knot that nothing leaves.
+static int is_unforced(const cav_transcription *tr, const cav_term *term, int t) {
+  if (t < tr->nknot - 1 || tr->problem->close_at_rest || term->quantity != CAV_QUANTITY_SENSOR) return 0;
+  return cav_sensor_rule_of(term->sensor.type)->stage == CAV_READS_ACCELERATION;
+}
+
 /// Whether a term speaks at a knot; its weight there (time step of an integral, or 1 at a single knot).
 double cav_term_weight(const cav_transcription *tr, const cav_term *term, int t) {
+  if (is_unforced(tr, term, t)) return 0;
   double end = (tr->nknot - 1) * tr->h, to = fmin(term->to < 0 ? end : term->to, end);
   double from = fmin(term->from < 0 ? end : term->from, end);
   int first = (int)ceil(from / tr->h - near_knot), last = (int)floor(to / tr->h + near_knot);
@@ -22,7 +29,7 @@ double cav_term_weight(const cav_transcription *tr, const cav_term *term, int t)
 int cav_term_dim(const cav_term *term) {
   if (term->quantity != CAV_QUANTITY_SENSOR) return 0;
   if (term->component >= 0) return 1;
-  return term->sensor.type == CAV_SENSOR_FRAMEQUAT ? 3 : term->sensor.dim;
+  return term->sensor.dim == 4 ? 3 : term->sensor.dim;
 }
 
 int cav_dof_selected(const cav_transcription *tr, const cav_term *term, int d) {
@@ -75,7 +82,7 @@ void cav_term_read(const cav_transcription *tr, const cav_state *state, const ca
   double reading[16], target[16];
   cav_sense(tr->model, state, &term->sensor, reading);
   cav_term_target(term, t * tr->h, term->sensor.dim, target);
-  if (term->sensor.type == CAV_SENSOR_FRAMEQUAT) {
+  if (term->sensor.dim == 4) {
     double phi[3];
     if (!term->target) target[0] = 1;
     cav_turn_between(target, reading, phi);

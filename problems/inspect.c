@@ -187,9 +187,6 @@ static void print_quantity(const cav_problem *p, const cav_term *term) {
                                          "impact of loaded contacts"};
   static const char *const dofs[] = {"all dofs", "translation of free roots", "rotation of free roots",
                                      "all but free roots", "joint"};
-  static const char *const sensor[] = {"jointpos",    "jointvel",   "framepos",      "framequat",
-                                       "framexaxis",  "frameyaxis", "framezaxis",    "framelinvel",
-                                       "frameangvel", "subtreecom", "subtreelinvel", "subtreeangmom"};
   const cav_model *m = p->model;
   if (term->quantity != CAV_QUANTITY_SENSOR) printf("%s", quantity[term->quantity]);
   if (term->quantity == CAV_QUANTITY_CONFIGURATION || term->quantity == CAV_QUANTITY_VELOCITY ||
@@ -214,10 +211,16 @@ static void print_quantity(const cav_problem *p, const cav_term *term) {
     case CAV_OBJECT_JOINT:
       object = m->joint[i].name;
       break;
+    case CAV_OBJECT_TENDON:
+      object = m->tendon[i].name;
+      break;
+    case CAV_OBJECT_ACTUATOR:
+      object = m->actuator[i].name;
+      break;
     default:
       break;
   }
-  printf("%s of %s", sensor[term->sensor.type], object);
+  printf("%s of %s", cav_sensor_rule_of(term->sensor.type)->name, object);
   if (term->component >= 0 && term->sensor.dim > 1) printf(", %c", "xyz"[term->component]);
 }
 
@@ -233,7 +236,7 @@ static void print_target(const cav_problem *p, const cav_term *term) {
   } else if (term->quantity == CAV_QUANTITY_CONFIGURATION) {
     printf(" to %s", term->target ? "its own posture" : "the goal");
   } else if (term->quantity == CAV_QUANTITY_SENSOR && term->target) {
-    int turn = term->sensor.type == CAV_SENSOR_FRAMEQUAT, one = term->component >= 0 && !turn;
+    int turn = term->sensor.dim == 4, one = term->component >= 0 && !turn;
     printf(" to");
     for (int i = one ? term->component : 0; i < (one ? term->component + 1 : term->sensor.dim); i++)
       printf(" %.4g", term->target[i]);

@@ -139,7 +139,7 @@ static const char good[] =
     "<contact><exclude body1='b' body2='c'/></contact>\n<tendon><fixed name='t'><joint joint='j' "
     "coef='2'/></fixed></tendon>\n"
     "<actuator><motor joint='j' name='u'/></actuator>\n<sensor><framepos objtype='site' "
-    "objname='s'/><clock/></sensor>\n"
+    "objname='s'/><user dim='1'/></sensor>\n"
     "<keyframe><key name='k' qpos='0 0 0 1 0 0 0 .5'/></keyframe>\n</mujoco>\n";
 
 // --- the n-th allocation fails ---
@@ -312,7 +312,7 @@ static void test_memory(void) {
     fprintf(stderr, "    %s\n", error.text);
     return;
   }
-  CHECK(whole->nwarning == 1 && strstr(whole->warning[0], "good.xml:16: <clock>"));
+  CHECK(whole->nwarning == 1 && strstr(whole->warning[0], "good.xml:16: <user>"));
 #ifdef SANITIZED
   printf("SKIPPED: a sanitizer owns malloc\n");
 #else

@@ -50,6 +50,8 @@ static const int has_ccd = 0;
 #ifdef CAVORT_HAVE_MUJOCO
 #include <mujoco/mujoco.h>
 
+#include "peer.h"
+
 // rounding of a short chain of operations; largest residual seen 3.1e-15 relative
 static const double rounding = 1e-11;
 // MuJoCo's eigenvalue routine (mju_eig3) stops at an error up to 1e-6: where a body has general inertia (only in the file of
@@ -205,21 +207,20 @@ static void compare_actuators(const cav_model *m, const mjModel *p) {
   }
 }
 
-// sensors that are offered, in order, where MuJoCo has more
+// sensors, in order; MuJoCo also has those of cameras
 static void compare_sensors(const cav_model *m, const mjModel *p) {
-  static const int types[CAV_SENSOR_TYPES] = {mjSENS_JOINTPOS,   mjSENS_JOINTVEL,      mjSENS_FRAMEPOS,
-                                              mjSENS_FRAMEQUAT,  mjSENS_FRAMEXAXIS,    mjSENS_FRAMEYAXIS,
-                                              mjSENS_FRAMEZAXIS, mjSENS_FRAMELINVEL,   mjSENS_FRAMEANGVEL,
-                                              mjSENS_SUBTREECOM, mjSENS_SUBTREELINVEL, mjSENS_SUBTREEANGMOM};
   int k = 0, adr = 0;
   for (int i = 0; i < m->nsensor; i++, k++) {
     const cav_sensor *s = &m->sensor[i];
-    while (k < p->nsensor && p->sensor_type[k] != types[s->type]) k++;
+    while (k < p->nsensor && p->sensor_type[k] != peer_sensor[s->type]) k++;
     if (!CHECK(k < p->nsensor)) return;
     CHECK_TEXT(s->name, p->names + p->name_sensoradr[k]);
-    same(s->object, p->sensor_objid[k], "sensor object", s->name);
+    if (s->type != CAV_SENSOR_CLOCK) same(s->object, p->sensor_objid[k], "sensor object", s->name);
     same(s->dim, p->sensor_dim[k], "sensor dim", s->name);
     same(s->adr, adr, "sensor adr", s->name);
+    same(s->referred, p->sensor_reftype[k] != mjOBJ_UNKNOWN, "sensor reference", s->name);
+    if (s->referred) same(s->reference, p->sensor_refid[k], "sensor reference", s->name);
+    near(s->cutoff, p->sensor_cutoff[k], "sensor cutoff", s->name);
     adr += s->dim;
   }
   same(m->nsensordata, adr, "sensor data", m->name);

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "check.h"
+#include "problem_file.h"
 
 static char folder[] = "/tmp/cavort-problem-XXXXXX";
 static char path[128], copy_path[128], csv_path[128];
@@ -18,7 +19,8 @@ static const char hopper[] =
     "<body name='shin' pos='0 0 -.2'><joint name='knee' axis='0 1 0' limited='true' range='-90 10'/>"
     "<geom name='shin' type='capsule' fromto='0 0 0 0 0 -.4' size='.05'/></body></body></worldbody>"
     "<actuator><motor name='knee' joint='knee' ctrllimited='true' ctrlrange='-50 50'/></actuator>"
-    "<sensor><framepos name='eye' objtype='site' objname='eye'/></sensor>"
+    "<sensor><framepos name='eye' objtype='site' objname='eye'/><touch name='tap' site='eye' cutoff='5'/><clock "
+    "name='time'/></sensor>"
     "<keyframe><key name='bent' qpos='0 0 0 -.5'/></keyframe></mujoco>";
 
 static const char flyer[] =
@@ -26,6 +28,13 @@ static const char flyer[] =
     "<body name='trunk' pos='0 0 3'><freejoint name='root'/><geom name='trunk' type='ellipsoid' size='.3 .2 .1'/>"
     "<body name='arm' pos='.3 0 0'><joint name='shoulder' type='ball'/><geom name='arm' type='cylinder' size='.05 .2'/>"
     "</body></body></worldbody></mujoco>";
+
+// words of the grammar in the order of the table
+static void check_sensor_names(void) {
+  for (int i = 0; i < CAV_SENSOR_TYPES; i++)
+    CHECK_TEXT(cav_problem_sensors[i], cav_sensor_rule_of((cav_sensor_type)i)->name);
+  CHECK(cav_problem_sensors[CAV_SENSOR_TYPES] == NULL);
+}
 
 static void write_in(const char *name, const char *text) {
   char full[160];
@@ -273,6 +282,8 @@ static void check_same(const cav_problem *a, const cav_problem *b) {
     CHECK(s->lower == t->lower && s->upper == t->upper && s->nwaypoint == t->nwaypoint && !s->target == !t->target);
     CHECK(s->sensor.type == t->sensor.type && s->sensor.object_type == t->sensor.object_type &&
           s->sensor.object == t->sensor.object);
+    CHECK(s->sensor.referred == t->sensor.referred && s->sensor.reference_type == t->sensor.reference_type &&
+          s->sensor.reference == t->sensor.reference && s->sensor.cutoff == t->sensor.cutoff);
     int dim = s->quantity == CAV_QUANTITY_CONFIGURATION ? nq
               : s->quantity == CAV_QUANTITY_SENSOR      ? s->sensor.dim
                                                         : a->model->nv;
@@ -297,6 +308,10 @@ static void check_round_trip(void) {
       "<sensor name='eye' weight='1' component='z' target='1.5' scale='.1' at='.5'/>\n"
       "<sensor name='path' type='framelinvel' geom='shin' weight='9'><waypoint time='.1' target='1 2 3'/><waypoint "
       "time='.9' target='4 5 6'/></sensor>\n"
+      "<sensor name='feel' type='touch' site='eye' weight='1'/>\n<sensor name='tap' weight='2'/>\n"
+      "<sensor name='pull' type='actuatorfrc' actuator='knee' weight='1' target='3'/>\n"
+      "<sensor name='near' type='framepos' body='shin' reftype='site' refname='eye' weight='1'/>\n"
+      "<sensor name='stop' type='jointlimitfrc' joint='knee' weight='1'/>\n"
       "</cost>\n<constraint>\n<sensor name='low' type='framepos' site='eye' component='z' lower='.2' "
       "relative='start'/>\n"
       "<sensor name='bend' type='jointpos' joint='knee' target='-.2' at='.35'/>\n<posture name='last' dofs='all' "
@@ -438,6 +453,15 @@ static void check_broken_terms(void) {
   refuse_cost("<sensor weight='1' type='framepos' body='trunk' site='eye'/>", "contradicts");
   refuse_cost("<sensor weight='1' type='framepos' joint='knee'/>", "looks at");
   refuse_cost("<sensor weight='1' type='subtreecom' site='eye'/>", "looks at");
+  refuse_cost("<sensor weight='1' type='gyro' body='trunk'/>", "looks at a site");
+  refuse_cost("<sensor weight='1' type='clock'/>", "nothing of the motion");
+  refuse_cost("<sensor weight='1' name='time'/>", "nothing of the motion");
+  refuse_cost("<sensor weight='1' type='ballquat' joint='knee'/>", "needs a ball joint");
+  refuse_cost("<sensor weight='1' type='jointlimitpos' joint='pitch'/>", "needs a joint with a limit");
+  refuse_cost("<sensor weight='1' type='actuatorfrc' actuator='knees'/>", "did you mean 'knee'");
+  refuse_cost("<sensor weight='1' type='framepos' body='trunk' refname='eye'/>", "needs both");
+  refuse_cost("<sensor weight='1' type='framelinacc' body='trunk' reftype='site' refname='eye'/>", "no other frame");
+  refuse_cost("<sensor weight='1' type='accelerometer' site='eye' relative='start'/>", "at rest");
   refuse_cost("<sensor weight='1' type='framepos' body='trunc'/>", "did you mean 'trunk'");
   refuse_cost("<sensor weight='1' type='framepos' body='trunk' target='1 2'/>", "expected 3 numbers");
   refuse_cost("<sensor weight='1' type='framepos' body='trunk' component='z' target='1 2 3'/>", "expected 1 number");
@@ -507,6 +531,7 @@ int main(void) {
   snprintf(csv_path, sizeof csv_path, "%s/motion.csv", folder);
   write_in("leg.xml", hopper);
   write_in("flyer.xml", flyer);
+  check_sensor_names();
   check_defaults();
   check_words();
   check_postures();

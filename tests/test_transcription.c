@@ -33,7 +33,7 @@ static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) 
   cav_term base = term[0];
   base.quantity = CAV_QUANTITY_SENSOR;
   base.weight = 3;
-  for (int kind = 0; kind < 7; kind++) {
+  for (int kind = 0; kind < 11; kind++) {
     cav_term *t = &term[n++];
     *t = base;
     t->scale = 0.5 + 0.1 * kind;
@@ -43,13 +43,25 @@ static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) 
     if (kind == 0) t->from = t->to = p->duration;
     if (kind == 1) t->sensor.type = CAV_SENSOR_FRAMEQUAT, t->sensor.dim = 4, t->target = quat_target;
     if (kind == 2) t->sensor.type = CAV_SENSOR_FRAMELINVEL, t->use = CAV_USE_EQUAL, t->from = 0.05, t->to = 0.1;
-    if (kind == 3) t->sensor = (cav_sensor){"", CAV_SENSOR_SUBTREECOM, CAV_OBJECT_BODY, trunk, 3, 0}, t->nwaypoint = 2;
+    if (kind == 3) {
+      t->sensor = (cav_sensor){
+          .name = "", .type = CAV_SENSOR_SUBTREECOM, .object_type = CAV_OBJECT_BODY, .object = trunk, .dim = 3};
+      t->nwaypoint = 2;
+    }
     if (kind == 3) t->target = waypoints, t->waypoint_time = waypoint_time;
     if (kind == 4) t->use = CAV_USE_RANGE, t->lower = -0.01, t->upper = 0.01, t->component = 2;
     if (kind == 5)
       t->quantity = CAV_QUANTITY_CONFIGURATION, t->use = CAV_USE_EQUAL, t->from = t->to = p->duration, t->target = NULL;
     if (kind == 6)
       t->quantity = CAV_QUANTITY_VELOCITY, t->use = CAV_USE_RANGE, t->lower = -0.1, t->upper = 0.1, t->target = NULL;
+    // accelerations and forces, of the size of gravity and of weight
+    if (kind >= 7) t->target = NULL, t->scale = 50;
+    if (kind == 7) t->sensor.type = CAV_SENSOR_FRAMELINACC, t->use = CAV_USE_EQUAL;
+    if (kind == 8) t->sensor.type = CAV_SENSOR_FORCE;
+    if (kind == 9) t->sensor.type = CAV_SENSOR_TORQUE, t->use = CAV_USE_EQUAL;
+    if (kind == 10)
+      t->sensor = (cav_sensor){
+          .name = "", .type = CAV_SENSOR_ACTUATORFRC, .object_type = CAV_OBJECT_ACTUATOR, .object = 1, .dim = 1};
   }
   return n;
 }

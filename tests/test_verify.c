@@ -432,8 +432,9 @@ static void test_terms(void) {
   double place[3] = {end[0], end[1], end[2]}, quat[4] = {-middle[3], -middle[4], -middle[5], -middle[6]};
   double way[9] = {0, 0, 0, 0, -0.1, 0, 0, -0.2, 0}, times[3] = {0, 0.5, 1};
   int ball = cav_find(s.model, CAV_OBJECT_BODY, "ball");
-  cav_sensor pos = {"", CAV_SENSOR_FRAMEPOS, CAV_OBJECT_XBODY, ball, 3, 0};
-  cav_sensor axes = {"", CAV_SENSOR_FRAMEQUAT, CAV_OBJECT_XBODY, ball, 4, 0};
+  cav_sensor pos = {.name = "", .type = CAV_SENSOR_FRAMEPOS, .object_type = CAV_OBJECT_XBODY, .object = ball, .dim = 3};
+  cav_sensor axes = {
+      .name = "", .type = CAV_SENSOR_FRAMEQUAT, .object_type = CAV_OBJECT_XBODY, .object = ball, .dim = 4};
   cav_term term[5] = {
       // at the end, at an instant between knots 12 and 13 but nearer to 13, along a line, speeds, posture
       {.name = "end",

@@ -62,6 +62,7 @@ typedef struct cav_pose {
 typedef struct cav_state {
   const cav_model *model;
   cav_options options;
+  double time; ///< s, the caller's: what a clock reads
 
   // position: filled from q
   cav_pose *link;        ///< [nlink] world poses
@@ -162,7 +163,8 @@ cav_status cav_inertia(const cav_model *model, cav_state *state, const double *q
 void cav_momentum(const cav_model *model, cav_state *state, const double *v, double *com, double *com_velocity,
                   double *angular_momentum);
 
-/// Reading of a sensor at the state's last evaluation; velocity sensors read at v_next. out [sensor->dim].
+/// Reading of a sensor at the state's last evaluation; out [sensor->dim]. Positions are there after cav_position; velocities
+/// (at v_next), accelerations and forces after cav_inverse or cav_forward, which leave them at (q, v, v_next).
 void cav_sense(const cav_model *model, const cav_state *state, const cav_sensor *sensor, double *out);
 
 /// World pose of a named kind of object at the state's last position.

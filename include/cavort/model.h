@@ -25,19 +25,46 @@ typedef enum cav_geom_type {
 
 typedef enum cav_transmission { CAV_TRANSMISSION_JOINT, CAV_TRANSMISSION_TENDON } cav_transmission;
 
+/// What a sensor measures: MJCF's names, shapes and conventions. Velocities are those at v_next; accelerations and forces
+/// are those of the step from v to v_next.
 typedef enum cav_sensor_type {
-  CAV_SENSOR_JOINTPOS,
-  CAV_SENSOR_JOINTVEL,
-  CAV_SENSOR_FRAMEPOS,      ///< 3, m, world
+  CAV_SENSOR_JOINTPOS,      ///< 1, rad or m
+  CAV_SENSOR_JOINTVEL,      ///< 1
+  CAV_SENSOR_FRAMEPOS,      ///< 3, m, in the reference frame (default: world), as the next six
   CAV_SENSOR_FRAMEQUAT,     ///< 4, unit quaternion
-  CAV_SENSOR_FRAMEXAXIS,    ///< 3, world
-  CAV_SENSOR_FRAMEYAXIS,    ///< 3, world
-  CAV_SENSOR_FRAMEZAXIS,    ///< 3, world
-  CAV_SENSOR_FRAMELINVEL,   ///< 3, m/s, world
-  CAV_SENSOR_FRAMEANGVEL,   ///< 3, rad/s, world
+  CAV_SENSOR_FRAMEXAXIS,    ///< 3
+  CAV_SENSOR_FRAMEYAXIS,    ///< 3
+  CAV_SENSOR_FRAMEZAXIS,    ///< 3
+  CAV_SENSOR_FRAMELINVEL,   ///< 3, m/s
+  CAV_SENSOR_FRAMEANGVEL,   ///< 3, rad/s
   CAV_SENSOR_SUBTREECOM,    ///< 3, m, world
   CAV_SENSOR_SUBTREELINVEL, ///< 3, m/s, world
   CAV_SENSOR_SUBTREEANGMOM, ///< 3, kg m^2/s about the subtree's centre of mass, world
+  CAV_SENSOR_TOUCH, ///< 1, N, sum of normal forces on the site's body within the site or pointing out through it
+  CAV_SENSOR_ACCELEROMETER,  ///< 3, m/s^2, of the site, site axes, gravity included: 9.81 upwards at rest
+  CAV_SENSOR_VELOCIMETER,    ///< 3, m/s, site axes
+  CAV_SENSOR_GYRO,           ///< 3, rad/s, site axes
+  CAV_SENSOR_FORCE,          ///< 3, N, that the parent of the site's body exerts on it, site axes
+  CAV_SENSOR_TORQUE,         ///< 3, N m, likewise, about the site
+  CAV_SENSOR_MAGNETOMETER,   ///< 3, the model's magnetic field in site axes
+  CAV_SENSOR_RANGEFINDER,    ///< 1, m, along the site's z axis to the nearest geom of another body that is not fully
+                             ///< transparent; -1: nothing there
+  CAV_SENSOR_TENDONPOS,      ///< 1, m or rad
+  CAV_SENSOR_TENDONVEL,      ///< 1
+  CAV_SENSOR_ACTUATORPOS,    ///< 1, length of the transmission, gear included
+  CAV_SENSOR_ACTUATORVEL,    ///< 1
+  CAV_SENSOR_ACTUATORFRC,    ///< 1, N or N m before gear: least-norm forces of all actuators that give u
+  CAV_SENSOR_BALLQUAT,       ///< 4, unit quaternion
+  CAV_SENSOR_BALLANGVEL,     ///< 3, rad/s, body axes
+  CAV_SENSOR_JOINTLIMITPOS,  ///< 1, distance to the nearer limit minus margin; 0 where no limit acts, as the next five
+  CAV_SENSOR_JOINTLIMITVEL,  ///< 1, its rate
+  CAV_SENSOR_JOINTLIMITFRC,  ///< 1, N or N m
+  CAV_SENSOR_TENDONLIMITPOS, ///< 1
+  CAV_SENSOR_TENDONLIMITVEL, ///< 1
+  CAV_SENSOR_TENDONLIMITFRC, ///< 1, N
+  CAV_SENSOR_FRAMELINACC,    ///< 3, m/s^2, world axes, gravity included: 9.81 upwards at rest
+  CAV_SENSOR_FRAMEANGACC,    ///< 3, rad/s^2, world axes
+  CAV_SENSOR_CLOCK,          ///< 1, s, state->time
   CAV_SENSOR_TYPES
 } cav_sensor_type;
 
@@ -54,6 +81,35 @@ typedef enum cav_object_type {
   CAV_OBJECT_SENSOR,
   CAV_OBJECT_TYPES
 } cav_object_type;
+
+/// What a sensor may look at.
+typedef enum cav_sensor_target {
+  CAV_TARGET_NONE,  ///< nothing: a clock
+  CAV_TARGET_FRAME, ///< body, xbody, geom or site
+  CAV_TARGET_BODY,  ///< subtree of a body
+  CAV_TARGET_SITE,
+  CAV_TARGET_SCALAR_JOINT, ///< hinge or slide
+  CAV_TARGET_BALL_JOINT,
+  CAV_TARGET_LIMITED_JOINT,
+  CAV_TARGET_TENDON,
+  CAV_TARGET_LIMITED_TENDON,
+  CAV_TARGET_ACTUATOR
+} cav_sensor_target;
+
+/// The last stage of an evaluation that a sensor needs.
+typedef enum cav_sensor_stage {
+  CAV_READS_POSITION,    ///< q
+  CAV_READS_VELOCITY,    ///< q and v_next
+  CAV_READS_ACCELERATION ///< q, v and v_next
+} cav_sensor_stage;
+
+/// What holds for all sensors of a type.
+typedef struct cav_sensor_rule {
+  const char *name; ///< MJCF's element
+  int dim;          ///< length of a reading; 4: a unit quaternion
+  cav_sensor_target target;
+  cav_sensor_stage stage;
+} cav_sensor_rule;
 
 /// Softness of one constraint as MJCF writes it; dynamics.md, 4.
 typedef struct cav_softness {
@@ -142,6 +198,8 @@ typedef struct cav_site {
   int body, link;
   double pos[3]; ///< in the link frame
   double quat[4];
+  cav_geom_type type; ///< shape of the zone of a touch sensor: sphere, capsule, ellipsoid, cylinder or box
+  double size[3];
 } cav_site;
 
 /// Two geoms that may touch; everything mixed at compile time. Only pairs that can touch are listed.
@@ -201,9 +259,13 @@ typedef struct cav_sensor {
   const char *name;
   cav_sensor_type type;
   cav_object_type object_type;
-  int object; ///< index of that kind
-  int dim;    ///< length of its reading
-  int adr;    ///< first index in the vector of all readings
+  int object;                     ///< index of that kind
+  int dim;                        ///< length of its reading
+  int adr;                        ///< first index in the vector of all readings
+  int referred;                   ///< frame sensors: 1 if readings are in the frame of the following object
+  cav_object_type reference_type; ///< a kind with a frame
+  int reference;
+  double cutoff; ///< values beyond are cut to it, both ways; 0: not cut. Never cuts axes and quaternions
 } cav_sensor;
 
 typedef struct cav_key {
@@ -254,6 +316,7 @@ typedef struct cav_model {
   int nq, nv, nu;  ///< sizes of q, v and of the control vector (one per actuator)
   double timestep; ///< s
   double gravity[3];
+  double magnetic[3];  ///< field that magnetometers read, world
   cav_options options; ///< defaults for new states
 
   int nbody, nlink, njoint, ngeom, nsite, npair, ntendon, ntendon_part, ntendon_path, ntendon_dof, nactuator, nsensor,
@@ -300,6 +363,9 @@ void cav_model_free(cav_model *model);
 
 /// Index of the object of that kind and name, -1 if there is none. CAV_OBJECT_BODY and _XBODY both look up bodies.
 int cav_find(const cav_model *model, cav_object_type type, const char *name);
+
+/// Name, length and needs of a type of sensor; type < CAV_SENSOR_TYPES.
+const cav_sensor_rule *cav_sensor_rule_of(cav_sensor_type type);
 
 /// q [nq] := the configuration of the file (model->q0).
 void cav_configuration_reset(const cav_model *model, double *q);

@@ -1,0 +1,244 @@
+/// Sensors against MuJoCo's on a model with every kind of them and on shared models, in random states with contacts and
+/// limits active; and identities that need no peer: forces of actuators come back, an accelerometer is the difference of a
+/// velocimeter, a scale under a standing box reads its weight.
+/// MuJoCo reads everything at (q, v, a); ours reads velocities at v_next, so each state is evaluated twice: for a step from v
+/// by a, and for a step that keeps v.
+#include "scene.h"
+
+// a box of 3 kg at rest on a plate that is welded to a body on a spring-less slide
+static const char scale_text[] =
+    "<mujoco><option timestep='.002'/><worldbody><geom type='plane' size='1 1 1'/>"
+    "<body name='box' pos='0 0 .1'><freejoint/><geom type='box' size='.1 .1 .1' mass='3'/>"
+    "<site name='under' type='box' size='.11 .11 .02' pos='0 0 -.1'/><site name='above' type='box' size='.1 .1 .02' "
+    "pos='0 0 .1'/><body name='lid' pos='0 0 .1'><geom type='box' size='.05 .05 .01' mass='.5' contype='0' "
+    "conaffinity='0'/><site name='lid' euler='180 0 0'/></body></body></worldbody><sensor><touch site='under'/><touch "
+    "site='above'/><force site='lid'/><accelerometer site='lid'/></sensor></mujoco>";
+
+static void read_all(const cav_model *m, const cav_state *state, double *out) {
+  for (int i = 0; i < m->nsensor; i++) cav_sense(m, state, &m->sensor[i], out + m->sensor[i].adr);
+}
+
+// what a forward step with no force leaves: weight on the floor, weight of the lid on the box
+static void test_scale(void) {
+  cav_model *m = scene_load(scale_text);
+  if (!CHECK(m != NULL)) return;
+  cav_state *state = cav_state_new(m);
+  double q[7], v[6] = {0}, u[6] = {0}, reading[8];
+  cav_configuration_reset(m, q);
+  for (int i = 0; i < 2000; i++) {
+    CHECK(cav_forward(m, state, q, v, u, v) == CAV_OK);
+    cav_integrate(m, q, v, m->timestep, q);
+  }
+  read_all(m, state, reading);
+  // bound: what is left of the motion after 4 s; seen 4e-10 N
+  CHECK_NEAR(reading[0], 3.5 * 9.81, 1e-6);
+  CHECK_NEAR(reading[1], 0, 0);
+  const double lid[3] = {0, 0, -0.5 * 9.81}, up[3] = {0, 0, -9.81};
+  CHECK_NEAR_ALL(reading + 2, lid, 3, 1e-6);
+  CHECK_NEAR_ALL(reading + 5, up, 3, 1e-6);
+  cav_state_free(state);
+  cav_model_free(m);
+}
+
+// forces of independent actuators, through u and back
+static void test_actuators(const cav_model *m) {
+  cav_state *state = cav_state_new(m);
+  double *q = scene_vector(m->nq), *v = scene_vector(m->nv), *u = scene_vector(m->nv), *x = scene_vector(m->nv);
+  double *found = scene_vector(m->nu), *residual = scene_vector(m->nv);
+  scene_posture(m, q, x, 0.3);
+  scene_normals(v, m->nv, 0.5);
+  scene_normals(x, m->nv, 0.5);
+  CHECK(cav_inverse(m, state, q, v, x, u) == CAV_OK);
+  cav_actuation(m, state, u, residual, found);
+  double worst = 0;
+  for (int i = 0; i < m->nsensor; i++) {
+    const cav_sensor *s = &m->sensor[i];
+    double reading;
+    if (s->type != CAV_SENSOR_ACTUATORFRC) continue;
+    cav_sense(m, state, s, &reading);
+    worst = fmax(worst, fabs(reading - found[s->object]) / (1 + fabs(reading)));
+  }
+  // bound: the same arithmetic; seen 0
+  CHECK_NEAR(worst, 0, 1e-14);
+  // a clock reads what it is told
+  const cav_sensor clock = {.name = "", .type = CAV_SENSOR_CLOCK, .dim = 1};
+  double time;
+  state->time = 1.5;
+  cav_sense(m, state, &clock, &time);
+  CHECK(time == 1.5);
+  free(q), free(v), free(u), free(x), free(found), free(residual);
+  cav_state_free(state);
+}
+
+// accelerometer and frame accelerations against differences of velocities along the motion, gravity taken out
+static void test_accelerations(const cav_model *m) {
+  cav_state *state = cav_state_new(m);
+  double *q = scene_vector(m->nq), *v = scene_vector(m->nv), *u = scene_vector(m->nv), *x = scene_vector(m->nv);
+  double *a = scene_vector(m->nv), *moved = scene_vector(m->nq), worst = 0;
+  const double e = 1e-5;
+  scene_posture(m, q, x, 0.3);
+  scene_normals(v, m->nv, 1);
+  scene_normals(a, m->nv, 5);
+  for (int i = 0; i < m->nsite; i++) {
+    const cav_sensor acc = {.name = "", .type = CAV_SENSOR_FRAMELINACC, .object_type = CAV_OBJECT_SITE, .object = i};
+    const cav_sensor vel = {.name = "", .type = CAV_SENSOR_FRAMELINVEL, .object_type = CAV_OBJECT_SITE, .object = i};
+    double reading[3], speed[2][3];
+    for (int k = 0; k < m->nv; k++) x[k] = v[k] + m->timestep * a[k];
+    CHECK(cav_inverse(m, state, q, v, x, u) == CAV_OK);
+    cav_sense(m, state, &acc, reading);
+    for (int side = 0; side < 2; side++) {
+      double t = side ? e : -e;
+      for (int k = 0; k < m->nv; k++) x[k] = v[k] + 0.5 * t * a[k];
+      cav_integrate(m, q, x, t, moved);
+      for (int k = 0; k < m->nv; k++) x[k] = v[k] + t * a[k];
+      CHECK(cav_inverse(m, state, moved, x, x, u) == CAV_OK);
+      cav_sense(m, state, &vel, speed[side]);
+    }
+    for (int k = 0; k < 3; k++)
+      worst = fmax(worst, fabs(reading[k] + m->gravity[k] - (speed[1][k] - speed[0][k]) / (2 * e)));
+  }
+  // bound: square of the step times third derivatives about 1e3, rounding 1e-16/e; seen 2e-8
+  CHECK_NEAR(worst, 0, 1e-6);
+  free(q), free(v), free(u), free(x), free(a), free(moved);
+  cav_state_free(state);
+}
+
+#ifdef CAVORT_HAVE_MUJOCO
+#include "peer.h"
+
+enum { STATES = 1000 };
+
+typedef struct peers {
+  mjModel *theirs;
+  mjData *data;
+  cav_model *ours;
+  cav_state *state;
+  double worst[CAV_SENSOR_TYPES]; ///< largest difference over the size of the reading
+  int active[CAV_SENSOR_TYPES];   ///< readings that were not 0
+} peers;
+
+static void draw(const mjModel *m, mjData *d) {
+  mj_resetData(m, d);
+  for (int i = 0; i < m->njnt; i++) {
+    double *q = d->qpos + m->jnt_qposadr[i], *quat = m->jnt_type[i] == mjJNT_FREE ? q + 3 : q;
+    const double *range = m->jnt_range + 2 * i;
+    if (m->jnt_type[i] == mjJNT_FREE || m->jnt_type[i] == mjJNT_BALL) {
+      if (m->jnt_type[i] == mjJNT_FREE)
+        for (int k = 0; k < 3; k++) q[k] += 0.5 * scene_uniform();
+      for (int k = 0; k < 4; k++) quat[k] = scene_normal();
+      mju_normalize4(quat);
+    } else if (m->jnt_limited[i]) {
+      *q = 0.5 * (range[0] + range[1]) + 0.6 * (range[1] - range[0]) * scene_uniform();
+    } else {
+      *q = (m->jnt_type[i] == mjJNT_HINGE ? 3 : 0.3) * scene_uniform();
+    }
+  }
+  for (int i = 0; i < m->nv; i++) {
+    d->qvel[i] = 2 * scene_normal();
+    d->qacc[i] = 20 * scene_normal();
+  }
+}
+
+// readings of one stage; a quaternion may have either sign
+static void compare_stage(peers *p, int acceleration) {
+  for (int i = 0, k = 0; i < p->ours->nsensor; i++, k++) {
+    const cav_sensor *s = &p->ours->sensor[i];
+    while (p->theirs->sensor_type[k] != peer_sensor[s->type]) k++;
+    int late = cav_sensor_rule_of(s->type)->stage == CAV_READS_ACCELERATION;
+    if (late != acceleration || s->type == CAV_SENSOR_ACTUATORFRC) continue;
+    const double *theirs = p->data->sensordata + p->theirs->sensor_adr[k];
+    double ours[4], size = 0, far = 0, other = 0;
+    cav_sense(p->ours, p->state, s, ours);
+    for (int c = 0; c < s->dim; c++) {
+      size = fmax(size, fabs(theirs[c]));
+      far = fmax(far, fabs(theirs[c] - ours[c]));
+      other = fmax(other, fabs(theirs[c] + ours[c]));
+    }
+    if (s->dim == 4) far = fmin(far, other);
+    p->active[s->type] += size > 0;
+    p->worst[s->type] = fmax(p->worst[s->type], far / (1 + size));
+  }
+}
+
+// one state; 0 if the two see different contacts, which test_peer explains
+static int compare_state(peers *p, double *v_next, double *u, double *expected) {
+  const mjModel *m = p->theirs;
+  mjData *d = p->data;
+  mj_inverse(m, d);
+  for (int i = 0; i < m->nv; i++) {
+    v_next[i] = d->qvel[i] + m->opt.timestep * d->qacc[i];
+    double a = (v_next[i] - d->qvel[i]) / m->opt.timestep;
+    expected[i] = d->qfrc_inverse[i] + m->dof_damping[i] * m->opt.timestep * a;
+  }
+  CHECK(cav_inverse(p->ours, p->state, d->qpos, d->qvel, v_next, u) == CAV_OK);
+  if (scene_error(u, expected, m->nv) > 1e-9) return 0;
+  compare_stage(p, 1);
+  CHECK(cav_inverse(p->ours, p->state, d->qpos, d->qvel, d->qvel, u) == CAV_OK);
+  compare_stage(p, 0);
+  return 1;
+}
+
+// every reading of a model's sensors in random states; all: the model has sensors of every type
+static void compare_model(const char *path, int all) {
+  cav_error error = {0};
+  char text[1000];
+  static peers p;
+  p = (peers){.ours = cav_model_load(path, &error), .theirs = mj_loadXML(path, NULL, text, sizeof text)};
+  if (!CHECK(p.ours && p.theirs)) {
+    fprintf(stderr, "    %s: %s %s\n", path, error.text, p.theirs ? "" : text);
+    return;
+  }
+  p.theirs->opt.cone = mjCONE_ELLIPTIC;
+  p.data = mj_makeData(p.theirs);
+  p.state = cav_state_new(p.ours);
+  double *v_next = scene_vector(p.ours->nv), *u = scene_vector(p.ours->nv), *expected = scene_vector(p.ours->nv);
+  int same = 0;
+  for (int k = 0; k < STATES; k++) {
+    draw(p.theirs, p.data);
+    same += compare_state(&p, v_next, u, expected);
+  }
+  printf("%s: %d sensors, %d of %d states with the same contacts\n", path, p.ours->nsensor, same, STATES);
+  for (int i = 0; i < CAV_SENSOR_TYPES; i++) {
+    const char *name = cav_sensor_rule_of((cav_sensor_type)i)->name;
+    if (p.active[i]) printf("  %-15s largest difference %.1e in %d readings\n", name, p.worst[i], p.active[i]);
+    // bound: rounding of forces and accelerations about 1e4, relative to 1 + the reading; seen 4e-10 (touch)
+    CHECK_NEAR(p.worst[i], 0, 1e-8);
+    // not everything reads 0; a clock does, at time 0
+    if (all && i != CAV_SENSOR_CLOCK && i != CAV_SENSOR_ACTUATORFRC) CHECK(p.active[i] > STATES / 20);
+  }
+  CHECK(same > STATES / 2);
+  free(v_next), free(u), free(expected);
+  mj_deleteData(p.data);
+  mj_deleteModel(p.theirs);
+  cav_state_free(p.state);
+  cav_model_free(p.ours);
+}
+
+static void compare_models(void) {
+  static const char *const names[] = {"dm_control/humanoid.xml", "dm_control/cheetah.xml"};
+  compare_model(CAVORT_SOURCE_ROOT "/tests/sensors.xml", 1);
+  const char *folder = check_shared_models();
+  for (unsigned i = 0; folder && i < sizeof names / sizeof *names; i++) {
+    char path[4200];
+    snprintf(path, sizeof path, "%s/%s", folder, names[i]);
+    compare_model(path, 0);
+  }
+}
+#endif
+
+int main(void) {
+  cav_error error = {0};
+  cav_model *m = cav_model_load(CAVORT_SOURCE_ROOT "/tests/sensors.xml", &error);
+  if (!CHECK(m != NULL)) {
+    fprintf(stderr, "    %s\n", error.text);
+    return check_result();
+  }
+  test_scale();
+  test_actuators(m);
+  test_accelerations(m);
+  cav_model_free(m);
+#ifdef CAVORT_HAVE_MUJOCO
+  compare_models();
+#endif
+  return check_result();
+}
