@@ -310,7 +310,7 @@ static void sense(const cav_model *model, const cav_state *state, const cav_sens
       break;
     case CAV_TARGET_TENDON:
       out[0] = sensor->type == CAV_SENSOR_TENDONPOS ? state->tendon_length[sensor->object]
-                                                    : cav_tendon_velocity(model, sensor->object, state->work->v_next);
+                                                    : cav_tendon_velocity(state, sensor->object, state->work->v_next);
       break;
     case CAV_TARGET_ACTUATOR:
       out[0] = sense_actuator(model, state, sensor);

@@ -69,7 +69,7 @@ static void joint_pattern(const cav_model *m, int joint, char *seen) {
 
 static void tendon_pattern(const cav_model *m, int tendon, char *seen) {
   const cav_tendon *t = &m->tendon[tendon];
-  for (int k = 0; k < t->npart; k++) joint_pattern(m, m->tendon_part[t->part + k].joint, seen);
+  for (int k = 0; k < t->ndof; k++) seen[m->tendon_dof[t->dof + k]] = 1;
 }
 
 /// Dofs that move either geom of a pair that may touch a link.
