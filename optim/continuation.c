@@ -16,6 +16,10 @@ static const double round_tolerance = 1e-5, near = 1e-3;
 /// Projection onto the constraints: iterations, and how far below the tolerance it aims.
 enum { RESTORATIONS = 30 };
 
+/// Diagnosis: iterations towards the least violation, and the relative decrease that ends them.
+enum { REST_ITERATIONS = 300 };
+static const double rest_tolerance = 1e-8;
+
 double cav_clock(void) {
   struct timespec t;
   clock_gettime(CLOCK_MONOTONIC, &t);
@@ -138,6 +142,20 @@ static int holds(const misfit *m, const misfit *most) {
          m->term <= most->term;
 }
 
+void cav_run_allowed(const cav_solve_run *run, double allowance[CAV_BINDING_KINDS]) {
+  misfit most = allowed(run);
+  allowance[CAV_BINDING_UNACTUATED] = most.unactuated;
+  allowance[CAV_BINDING_EFFORT] = most.effort;
+  allowance[CAV_BINDING_JOINT] = allowance[CAV_BINDING_TENDON] = most.range;
+  allowance[CAV_BINDING_TERM] = most.term;
+  allowance[CAV_BINDING_PENETRATION] = CAV_PROMISE_PENETRATION;
+}
+
+int cav_run_met(const cav_solve_run *run) {
+  misfit most = allowed(run), is = measure(run->tr);
+  return holds(&is, &most);
+}
+
 cav_status cav_multiply(cav_solve_run *run) {
   misfit most = allowed(run);
   most.unactuated = fmax(most.unactuated, near);
@@ -179,4 +197,17 @@ cav_status cav_restore(cav_solve_run *run) {
   run->region.seconds_linear = region.seconds_linear;
   if (status != CAV_OK) return status;
   return holds(&is, &most) ? CAV_OK : CAV_NOT_CONVERGED;
+}
+
+cav_status cav_rest(cav_solve_run *run) {
+  run->phase = "diagnosis";
+  run->stages = 1;
+  run->stage = 1;
+  run->region.radius = 0;
+  run->region.iterations = REST_ITERATIONS;
+  run->region.tolerance = rest_tolerance;
+  run->tr->constraints_only = 1;
+  cav_status status = cav_region_minimise(&run->region, run->normal, run->tr, &run->at, &run->spare);
+  run->tr->constraints_only = 0;
+  return status;
 }

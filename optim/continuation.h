@@ -35,6 +35,16 @@ cav_status cav_multiply(cav_solve_run *run);
 /// it is for the last millimetre only. CAV_NOT_CONVERGED if the rows do not come in.
 cav_status cav_restore(cav_solve_run *run);
 
+/// Where constraints cannot all hold: to the point of least violation, where the violations balance and so say what contradicts
+/// what (explain.c).
+cav_status cav_rest(cav_solve_run *run);
+
+/// Violation that planning leaves room for, by kind of row: what is planned with headroom may use half of it.
+void cav_run_allowed(const cav_solve_run *run, double allowed[CAV_BINDING_KINDS]);
+
+/// Whether every row holds to that at the last values.
+int cav_run_met(const cav_solve_run *run);
+
 /// Appends a line to the log and tells the observer; nonzero if it asks to stop. Region's report.
 int cav_run_report(void *run, double step, double radius);
 

@@ -17,7 +17,7 @@ static const double near_enough = 0.05;
 
 cav_solve_options cav_solve_options_default(void) {
   return (cav_solve_options){
-      .solver = CAV_SOLVER_GAUSS_NEWTON, .threads = 1, .tolerance = 2e-7, .ipopt_iterations = 200};
+      .solver = CAV_SOLVER_GAUSS_NEWTON, .threads = 1, .diagnose = 1, .tolerance = 2e-7, .ipopt_iterations = 200};
 }
 
 int cav_solution_log(cav_solution *solution, const cav_progress *line) {
@@ -35,7 +35,7 @@ int cav_solution_log(cav_solution *solution, const cav_progress *line) {
 void cav_solution_free(cav_solution *solution) {
   if (!solution) return;
   cav_trajectory_free(solution->trajectory);
-  free(solution->gain_q), free(solution->gain_v), free(solution->progress);
+  free(solution->gain_q), free(solution->gain_v), free(solution->progress), free(solution->row);
   free(solution);
 }
 
@@ -118,14 +118,39 @@ static cav_status choose_gains(cav_solve_run *run, cav_error *error) {
   return status;
 }
 
+/// Constraint rows that hold something back, and their prices. Rounds of the augmented Lagrangian end before cheap rows have
+/// settled, so multipliers are those after one more step, as in a quadratic programme.
+static cav_status find_prices(cav_solve_run *run) {
+  cav_solution *solution = run->solution;
+  int n = (run->tr->nknot - 1) * run->tr->nv;
+  double allowed[CAV_BINDING_KINDS], *x = NULL;
+  cav_run_allowed(run, allowed);
+  if (cav_run_met(run)) {
+    x = malloc(2 * (size_t)n * sizeof *x);
+    if (!x) return CAV_NO_MEMORY;
+    cav_status status = CAV_NOT_CONVERGED;
+    for (double shift = 1e-12; status == CAV_NOT_CONVERGED && shift < 1; shift *= 100)
+      status = cav_normal_factor(run->normal, shift);
+    const double *gradient = cav_normal_gradient(run->normal);
+    for (int i = 0; i < n; i++) x[n + i] = -gradient[i], x[i] = 0;
+    if (status == CAV_OK) cav_normal_solve(run->normal, x + n, x);
+  }
+  cav_transcription_prices(run->tr, x);
+  free(x);
+  return cav_transcription_rows(run->tr, allowed, &solution->row, &solution->nrow);
+}
+
 /// What the solution says of its last iterate, and its gains.
 static cav_status conclude(cav_solve_run *run, cav_error *error) {
+  if (!cav_transcription_keep_rows(run->tr)) return CAV_NO_MEMORY;
   cav_status status = cav_transcription_linearise(run->tr, run->at);
   if (status != CAV_OK) return status;
   cav_normal_gather(run->normal, run->tr);
   run->solution->optimality = optimality(run->normal, run->tr);
   run->solution->cost = cav_transcription_cost(run->tr);
   run->solution->unactuated = cav_transcription_unactuated(run->tr, NULL);
+  status = find_prices(run);
+  if (status != CAV_OK) return status;
   return choose_gains(run, error);
 }
 
@@ -146,7 +171,9 @@ static cav_status solve(cav_solve_run *run, cav_error *error) {
 #else
   (void)error;
 #endif
-  return status;
+  if (status != CAV_NOT_CONVERGED || !o->diagnose || cav_run_met(run)) return status;
+  cav_status rest = cav_rest(run);
+  return rest == CAV_OK ? status : rest;
 }
 
 cav_status cav_solve(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,

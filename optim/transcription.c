@@ -391,6 +391,7 @@ static void chain(const cav_transcription *tr, int t, int n, const double *dq, c
   int nv = tr->nv, last = tr->nknot - 1;
   const double *now_turn = tr->knot[t].turn, *next_turn = t < last ? tr->knot[t + 1].turn : NULL;
   double inverse = 1 / tr->h;
+  if (n == 0) return;
   memset(out, 0, (size_t)n * 3 * nv * sizeof(double));
   for (int i = 0; i < n; i++, dq += nv, dv += nv, dn += nv, out += 3 * nv) {
     if (t > 0) {
@@ -823,7 +824,7 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   } else {
     read_knot(tr->model, s->state, &read, s->value);
   }
-  memcpy(knot->y, s->value + nv, (size_t)knot->nread * sizeof(double));
+  if (knot->nread) memcpy(knot->y, s->value + nv, (size_t)knot->nread * sizeof(double));
   memcpy(p->at->u + (size_t)t * nv, knot->u, (size_t)nv * sizeof(double));
   s->seconds += now() - start;
 
@@ -952,6 +953,21 @@ void cav_transcription_multipliers(cav_transcription *tr) {
       cav_slot *slot = &tr->knot[t].slot[i];
       double rho = slot_rho(tr, &tr->knot[t].layout, i), shifted = rho * slot->value + slot->multiplier;
       slot->multiplier = shifted - fmin(fmax(shifted, rho * slot->lower), rho * slot->upper);
+    }
+  }
+}
+
+void cav_transcription_prices(cav_transcription *tr, const double *x) {
+  int nv = tr->nv;
+  for (int t = 0; t < tr->nknot; t++) {
+    for (int i = 0; i < tr->knot[t].layout.count; i++) {
+      cav_slot *slot = &tr->knot[t].slot[i];
+      double rho = slot_rho(tr, &tr->knot[t].layout, i), value = slot->value;
+      const double *row = tr->knot[t].slot_row + (size_t)i * 3 * (size_t)nv;
+      for (int k = t > 1 ? t - 1 : 1; x && k <= t + 1 && k < tr->nknot; k++)
+        for (int d = 0; d < nv; d++) value += row[(k - t + 1) * nv + d] * x[(k - 1) * nv + d];
+      double shifted = rho * value + (x ? slot->multiplier : 0);
+      slot->price = shifted - fmin(fmax(shifted, rho * slot->lower), rho * slot->upper);
     }
   }
 }

@@ -2,13 +2,14 @@
 #ifndef CAVORT_TRANSCRIPTION_H
 #define CAVORT_TRANSCRIPTION_H
 
-#include "cavort/problem.h"
+#include "cavort/solve.h"
 #include "parallel.h"
 
 /// A constraint row lower <= value <= upper, scaled; equalities have lower = upper.
 typedef struct cav_slot {
   double value, lower, upper;
   double multiplier;
+  double price; ///< multiplier at the end of a solve, for explanations and warm starts
 } cav_slot;
 
 /// Where a knot's constraint rows come from, in the order in which they stand in cav_knot.slot.
@@ -106,6 +107,15 @@ double cav_transcription_violation(const cav_transcription *transcription);
 
 /// Multiplier update of the augmented Lagrangian at the last values.
 void cav_transcription_multipliers(cav_transcription *transcription);
+
+/// Prices of all rows at the last linearisation, whose rows were kept: the multipliers after a step x [(nknot-1)*nv], or with x
+/// NULL the weighted violations alone.
+void cav_transcription_prices(cav_transcription *transcription, const double *x);
+
+/// Rows that are violated or have a price, with where they come from, at the last linearisation, whose rows were kept; in fresh
+/// memory. allowed: violation, by kind of row. CAV_NO_MEMORY. rows.c.
+cav_status cav_transcription_rows(const cav_transcription *transcription, const double allowed[CAV_BINDING_KINDS],
+                                  cav_binding **row, int *n);
 
 /// q_t := q_t (+) x_t for every unknown knot; v follows. x [(nknot-1)*nv].
 void cav_transcription_move(const cav_transcription *transcription, const cav_trajectory *from, const double *x,

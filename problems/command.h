@@ -24,6 +24,7 @@ typedef struct cav_command_line {
 } cav_command_line;
 
 int cav_command_inspect(const cav_command_line *line);
+int cav_command_explain(const cav_command_line *line);
 int cav_command_solve(const cav_command_line *line);
 int cav_command_verify(const cav_command_line *line);
 int cav_command_view(const cav_command_line *line);

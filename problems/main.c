@@ -48,6 +48,8 @@ static const command commands[] = {
      OPTION_MODEL | OPTION_OUTPUT | OPTION_SOLVER | OPTION_THREADS | OPTION_RESUME | OPTION_QUIET | OPTION_JSON},
     {"verify", "DIR", "certify the motion of a result folder again, from its files alone", cav_command_verify,
      OPTION_MODEL | OPTION_QUIET | OPTION_JSON},
+    {"explain", "DIR", "say why the motion of a result folder is as it is: what it misses, and which constraints pull",
+     cav_command_explain, OPTION_MODEL | OPTION_JSON},
     {"view", "DIR", "write the page of a result folder anew and say where it is", cav_command_view,
      OPTION_MODEL | OPTION_QUIET},
     {"help", "[COMMAND]", "say how to use the tool or one of its commands", help, 0},

@@ -15,6 +15,7 @@
 #include "certificate.h"
 #include "file.h"
 #include "page.h"
+#include "rows.h"
 #include "table.h"
 
 char *cav_result_path(const char *folder, const char *name) {
@@ -136,15 +137,18 @@ cav_status cav_result_write(const char *folder, const cav_problem *problem, cons
                             cav_error *error) {
   char *trajectory = cav_result_path(folder, "trajectory.csv"), *gains = cav_result_path(folder, "gains.csv");
   char *log = cav_result_path(folder, "log.csv"), *copy = cav_result_path(folder, "problem.xml");
-  cav_status status = trajectory && gains && log && copy ? CAV_OK : no_memory(error);
+  char *rows = cav_result_path(folder, "rows.csv");
+  cav_status status = trajectory && gains && log && copy && rows ? CAV_OK : no_memory(error);
   if (!status) status = cav_trajectory_write(trajectory, problem->model, solution->trajectory, error);
   if (!status) status = write_problem(folder, copy, problem, &solution->contact, error);
   if (!status) status = write_log(log, solution, error);
+  if (!status) status = cav_rows_write(rows, problem->timestep, solution->nrow, solution->row, error);
   if (!status && solution->gain_q) status = write_gains(gains, problem->model, solution, error);
   free(trajectory);
   free(gains);
   free(log);
   free(copy);
+  free(rows);
   return status;
 }
 

@@ -174,10 +174,10 @@ static void check_refusals(void) {
 }
 
 static void remove_all(void) {
-  const char *made[] = {"trajectory.csv", "gains.csv", "log.csv", "problem.xml", "verdict.json"};
+  const char *made[] = {"trajectory.csv", "gains.csv", "log.csv", "problem.xml", "rows.csv", "verdict.json"};
   char upper[128];
   snprintf(upper, sizeof upper, "%s/some", top);
-  for (int i = 0; i < 5; i++) {
+  for (int i = 0; i < 6; i++) {
     char *path = cav_result_path(folder, made[i]);
     if (path) remove(path);
     free(path);

@@ -36,6 +36,7 @@ typedef struct cav_solve_options {
   cav_observer observer; ///< may be NULL
   void *observer_context;
   double tolerance; ///< unactuated force at the end, share of weight
+  int diagnose;     ///< 1: where constraints cannot all hold, end at their least violation, which cav_explain needs
   int ipopt_iterations;
   int ipopt_derivative_test; ///< 1: Ipopt's first-order checker runs before its first iteration; its text goes to ipopt_output
   const char *ipopt_output;  ///< file of Ipopt's own log, NULL: none
@@ -43,6 +44,31 @@ typedef struct cav_solve_options {
 } cav_solve_options;
 
 cav_solve_options cav_solve_options_default(void);
+
+/// Where a constraint row comes from.
+typedef enum cav_binding_kind {
+  CAV_BINDING_UNACTUATED,  ///< force that no actuator can give; object: the dof that it falls on most
+  CAV_BINDING_EFFORT,      ///< actuator force over its limit; object: actuator
+  CAV_BINDING_JOINT,       ///< object: joint
+  CAV_BINDING_TENDON,      ///< object: tendon
+  CAV_BINDING_TERM,        ///< object: number among the hard terms; component: of the reading, or the dof
+  CAV_BINDING_PENETRATION, ///< depth of a contact, m; object: pair. Not a row of the solver: cav_explain adds it
+  CAV_BINDING_KINDS
+} cav_binding_kind;
+
+/// A constraint row lower <= value <= upper of a solved problem, scaled as the solver sees it.
+typedef struct cav_binding {
+  int knot;
+  cav_binding_kind kind;
+  int object, component;
+  double value, lower, upper;
+  double allowed; ///< violation that planning leaves room for
+  double
+      multiplier; ///< price: what the cost would fall by if the bound gave way by one. Where constraints do not hold: the
+                  ///< weighted violation, which balances that of the rows it is in conflict with
+  double
+      pull; ///< force on the motion that the multipliers of it and its like at neighbouring knots leave, per rad or m
+} cav_binding;
 
 /// A solved motion.
 typedef struct cav_solution {
@@ -56,6 +82,8 @@ typedef struct cav_solution {
   double seconds, seconds_dynamics, seconds_assembly, seconds_linear; ///< wall clock
   int nprogress;
   cav_progress *progress; ///< log
+  int nrow;
+  cav_binding *row; ///< constraint rows that are violated or have a price, by knot
 } cav_solution;
 
 /// Solves from the problem's guess, or from start if not NULL. CAV_NOT_CONVERGED and CAV_INTERRUPTED leave the best iterate in
@@ -98,6 +126,32 @@ typedef struct cav_verdict {
 /// Certifies a motion: q, v of the trajectory and the gains are used, all else is recomputed. contact is the law it claims.
 cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
                       const double *gain_q, const double *gain_v, cav_verdict *verdict, cav_error *error);
+
+/// Why a motion is as it is: one thing that is missed, or that pulls.
+typedef struct cav_reason {
+  cav_binding row;  ///< the worst of its knots
+  int first, last;  ///< knots at which the same thing is missed or pulls
+  double time;      ///< of row.knot, s
+  double violation; ///< scaled, 0 if within what is allowed
+  double pull;      ///< of row
+  double share;     ///< of all pulls, over all its knots
+  char what[320];   ///< what, of which body, how far, in words
+  char cure[400];   ///< what usually helps
+} cav_reason;
+
+enum { CAV_REASONS = 10 };
+
+/// Reasons in order of their size, twice: by violation, and by share of the conflict.
+typedef struct cav_explanation {
+  int met; ///< 1: every constraint holds, and what pulls is what the motion's cost hangs on
+  int nviolation, nconflict;
+  cav_reason violation[CAV_REASONS], conflict[CAV_REASONS];
+} cav_explanation;
+
+/// Ranks what a motion misses and which constraints pull against each other, from the rows of its solution.
+/// CAV_BAD_INPUT: a row that is not of this problem; CAV_NO_MEMORY; CAV_NOT_FINITE.
+cav_status cav_explain(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
+                       int nrow, const cav_binding *row, cav_explanation *explanation, cav_error *error);
 
 #ifdef __cplusplus
 }

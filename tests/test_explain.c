@@ -1,0 +1,255 @@
+/// optim/explain.c, rows.c: problems made impossible on purpose, each named with the right row and knot; prices of one that can
+/// be solved against what loosening its bound saves; rows of another problem refused; rows.csv bit for bit.
+#include <unistd.h>
+
+#include "cavort/cavort.h"
+#include "check.h"
+#include "rows.h"
+
+static char folder[] = "/tmp/cavort-explain-XXXXXX";
+
+// an arm of two links in the vertical plane, reach 1 m; each link 1 kg: held level it needs 9.81 N m at the shoulder
+static const char arm[] =
+    "<mujoco><worldbody><body name='upper' pos='0 0 2'><joint name='shoulder' axis='0 1 0' limited='true' range='-170 "
+    "170'/>"
+    "<geom type='capsule' fromto='0 0 0 .5 0 0' size='.03' mass='1'/>"
+    "<body name='lower' pos='.5 0 0'><joint name='elbow' axis='0 1 0' limited='true' range='-150 150'/>"
+    "<geom type='capsule' fromto='0 0 0 .5 0 0' size='.03' mass='1'/><site name='tip' pos='.5 0 "
+    "0'/></body></body></worldbody>"
+    "<actuator><motor name='shoulder' joint='shoulder' gear='%s' ctrllimited='true' ctrlrange='-1 1'/>"
+    "<motor name='elbow' joint='elbow' gear='40' ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>";
+
+// a block with a foot below it that moves along the vertical, over a floor
+static const char stilt[] =
+    "<mujoco><worldbody><geom name='floor' type='plane' size='1 1 1'/><body name='trunk' pos='0 0 .5'>"
+    "<joint name='height' type='slide' axis='0 0 1'/><geom type='box' size='.1 .1 .1' mass='4' contype='0' "
+    "conaffinity='0'/>"
+    "<body name='foot' pos='0 0 -.4'><joint name='leg' type='slide' axis='0 0 1' limited='true' range='-.3 .3'/>"
+    "<geom name='sole' type='sphere' size='.1' mass='1'/></body></body></worldbody>"
+    "<actuator><motor name='leg' joint='leg' gear='400' ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>";
+
+static void write_in(const char *name, const char *text) {
+  char path[160];
+  snprintf(path, sizeof path, "%s/%s", folder, name);
+  FILE *file = fopen(path, "w");
+  CHECK(file != NULL);
+  if (!file) return;
+  fputs(text, file);
+  fclose(file);
+}
+
+typedef struct outcome {
+  cav_problem *problem;
+  cav_solution *solution;
+  cav_status status;
+  cav_explanation explanation;
+} outcome;
+
+static outcome solve(const char *model, const char *terms) {
+  char path[160], text[4000];
+  cav_error error = {0};
+  outcome out = {0};
+  write_in("model.xml", model);
+  snprintf(text, sizeof text,
+           "<problem name='p' model='model.xml'>\n<horizon duration='1' timestep='.05'/>\n<start%s/>\n%s"
+           "</problem>\n",
+           strstr(model, "floor") ? " height='floor'" : "", terms);
+  write_in("problem.xml", text);
+  snprintf(path, sizeof path, "%s/problem.xml", folder);
+  out.problem = cav_problem_load(path, NULL, &error);
+  CHECK(out.problem != NULL);
+  if (!out.problem) {
+    fprintf(stderr, "    %s\n", error.text);
+    return out;
+  }
+  cav_solve_options options = cav_solve_options_default();
+  out.status = cav_solve(out.problem, &options, NULL, &out.solution, &error);
+  CHECK(out.solution != NULL);
+  if (!out.solution) return out;
+  cav_solution *s = out.solution;
+  cav_status status = cav_explain(out.problem, s->trajectory, &s->contact, s->nrow, s->row, &out.explanation, &error);
+  CHECK(status == CAV_OK);
+  return out;
+}
+
+static void done(outcome *out) {
+  cav_solution_free(out->solution);
+  cav_problem_free(out->problem);
+}
+
+static int names(const char *text, const char *word) {
+  if (strstr(text, word)) return 1;
+  fprintf(stderr, "    no '%s' in: %s\n", word, text);
+  return 0;
+}
+
+// the reason of rank i by violation (conflict 0) or conflict, held against what it must name and when
+static void expect(const outcome *out, int conflict, int i, const char *word, int knot, int most) {
+  const cav_explanation *e = &out->explanation;
+  CHECK(i < (conflict ? e->nconflict : e->nviolation));
+  const cav_reason *r = conflict ? &e->conflict[i] : &e->violation[i];
+  CHECK(names(r->what, word));
+  CHECK(r->row.knot >= knot && r->row.knot <= most && r->first <= r->row.knot && r->row.knot <= r->last);
+  CHECK_NEAR(r->time, 0.05 * r->row.knot, 1e-12);
+}
+
+static const char *arm_of(const char *torque) {
+  static char text[2000];
+  snprintf(text, sizeof text, arm, torque);
+  return text;
+}
+
+// 1.5 m asked of an arm of 1 m: off by 0.5 m in x at the knot of the target
+static void check_out_of_reach(void) {
+  outcome o =
+      solve(arm_of("60"),
+            "<constraint><sensor name='grasp' type='framepos' site='tip' target='1.5 0 2' at='.8'/></constraint>");
+  if (o.solution) {
+    CHECK(o.status == CAV_NOT_CONVERGED && !o.explanation.met);
+    expect(&o, 0, 0, "'grasp', framepos of site 'tip', x: off by -0.5", 16, 16);
+    expect(&o, 1, 0, "'grasp'", 16, 16);
+    CHECK_NEAR(o.explanation.violation[0].violation, 0.5, 1e-6); // geometry; seen 1e-9
+    CHECK(names(o.explanation.violation[0].cure, "out of reach"));
+  }
+  done(&o);
+}
+
+// 5 N m where holding level takes 9.81: the actuator and the posture, while the posture is asked for
+static void check_too_weak(void) {
+  outcome o = solve(arm_of("5"), "<constraint><posture name='level' dofs='joints' from='.5' to='1'/></constraint>");
+  if (o.solution) {
+    CHECK(o.status == CAV_NOT_CONVERGED && !o.explanation.met);
+    expect(&o, 0, 0, "actuator 'shoulder' (body 'upper')", 10, 20);
+    // on the way up the actuator pulls too
+    expect(&o, 1, 0, "actuator 'shoulder'", 1, 20);
+    expect(&o, 1, 1, "'level', posture, joint 'shoulder'", 10, 20);
+    CHECK(names(o.explanation.conflict[1].cure, "too weak"));
+    CHECK(o.explanation.conflict[0].share + o.explanation.conflict[1].share > 0.7); // seen 0.9
+  }
+  done(&o);
+  // the control: with 60 N m nothing is missed
+  o = solve(arm_of("60"), "<constraint><posture name='level' dofs='joints' from='.5' to='1'/></constraint>");
+  if (o.solution) CHECK(o.status == CAV_OK && o.explanation.met && o.explanation.nviolation == 0);
+  done(&o);
+}
+
+// a foot of radius 0.1 m with its centre 0.1 m below the floor, at rest
+static void check_inside_the_floor(void) {
+  outcome o = solve(stilt,
+                    "<constraint><sensor name='step' type='framepos' body='foot' component='z' target='-.1' "
+                    "at='end'/></constraint>");
+  if (o.solution) {
+    CHECK(o.status == CAV_NOT_CONVERGED && !o.explanation.met);
+    expect(&o, 0, 0, "'step', framepos of body 'foot', z", 20, 20);
+    expect(&o, 0, 1, "penetration of geom 'sole' into 'floor'", 1, 20);
+    int found = 0;
+    for (int i = 0; i < 2; i++) found |= strstr(o.explanation.conflict[i].what, "'step'") != NULL;
+    CHECK(found);
+    CHECK(names(o.explanation.violation[0].cure, "inside a solid"));
+  }
+  done(&o);
+}
+
+// two heights at once: each names the other, and the blame is shared
+static void check_contradiction(void) {
+  outcome o = solve(arm_of("60"),
+                    "<constraint><sensor name='high' type='framepos' site='tip' component='z' target='2.2' at='.6'/>"
+                    "<sensor name='low' type='framepos' site='tip' component='z' target='1.8' at='.6'/></constraint>");
+  if (o.solution) {
+    CHECK(o.status == CAV_NOT_CONVERGED && !o.explanation.met);
+    for (int conflict = 0; conflict < 2; conflict++) {
+      expect(&o, conflict, 0, "framepos of site 'tip', z", 12, 12);
+      expect(&o, conflict, 1, "framepos of site 'tip', z", 12, 12);
+    }
+    const cav_reason *r = o.explanation.conflict;
+    int high = strstr(r[0].what, "'high'") != NULL;
+    CHECK(names(r[0].cure, high ? "contradicts constraint 'low'" : "contradicts constraint 'high'"));
+    CHECK_NEAR(r[0].share, 0.5, 1e-3); // equal weights; seen 1e-5
+    CHECK_NEAR(r[1].share, 0.5, 1e-3);
+  }
+  done(&o);
+}
+
+// the price of a bound is what the cost changes by when it gives way
+static void check_price(void) {
+  static const char terms[] =
+      "<constraint><sensor name='raise' type='framepos' site='tip' component='z' lower='%g' at='end'/></constraint>";
+  double cost[2], price = 0;
+  for (int i = 0; i < 2; i++) {
+    char text[200];
+    snprintf(text, sizeof text, terms, 2.3 + 0.01 * i);
+    outcome o = solve(arm_of("60"), text);
+    cost[i] = o.solution ? o.solution->cost : NAN;
+    CHECK(o.status == CAV_OK && o.explanation.met && o.explanation.nviolation == 0);
+    CHECK(o.explanation.nconflict > 0 && names(o.explanation.conflict[0].cure, "gives way"));
+    if (o.explanation.nconflict && o.explanation.conflict[0].row.kind == CAV_BINDING_TERM)
+      price += 0.5 * o.explanation.conflict[0].row.multiplier;
+    done(&o);
+  }
+  // mean of both ends against the slope between; a lower bound's multiplier is negative. Bound 2 %: both solves stop at
+  // relative decreases of 1e-5
+  CHECK(price < 0);
+  CHECK_NEAR((cost[1] - cost[0]) / 0.01, -price, 0.02 * fabs(price));
+}
+
+// rows as a file, bit for bit; rows of something else, and files that are no rows, are refused
+static void check_rows(void) {
+  char path[160];
+  cav_error error = {0};
+  outcome o = solve(arm_of("60"),
+                    "<constraint><sensor name='raise' type='framepos' site='tip' component='z' lower='2.3' "
+                    "at='end'/></constraint>");
+  if (!o.solution) return;
+  cav_solution *s = o.solution;
+  snprintf(path, sizeof path, "%s/rows.csv", folder);
+  CHECK(s->nrow > 0 && cav_rows_write(path, 0.05, s->nrow, s->row, &error) == CAV_OK);
+  cav_binding *row = NULL;
+  int n = 0, same = 1;
+  CHECK(cav_rows_read(path, &n, &row, &error) == CAV_OK && n == s->nrow);
+  for (int i = 0; i < n; i++) {
+    const cav_binding *a = &row[i], *b = &s->row[i];
+    same &= a->knot == b->knot && a->kind == b->kind && a->object == b->object && a->component == b->component;
+    same &= a->value == b->value && a->lower == b->lower && a->upper == b->upper && a->allowed == b->allowed;
+    same &= a->multiplier == b->multiplier && a->pull == b->pull;
+  }
+  CHECK(same);
+  static cav_explanation explanation;
+  cav_binding broken[] = {row[0], row[0], row[0], row[0], row[0]};
+  broken[0].knot = 21;
+  broken[1].object = -1;
+  broken[2].kind = CAV_BINDING_TERM, broken[2].object = 1;
+  broken[3].kind = CAV_BINDING_PENETRATION;
+  broken[4].multiplier = NAN;
+  for (int i = 0; i < 5; i++) {
+    cav_status status = cav_explain(o.problem, s->trajectory, &s->contact, 1, &broken[i], &explanation, &error);
+    CHECK(status == CAV_BAD_INPUT && names(error.text, "not of this problem"));
+  }
+  free(row);
+  write_in("rows.csv", "knot,time\n1,2\n");
+  CHECK(cav_rows_read(path, &n, &row, &error) == CAV_BAD_INPUT && n == 0 && !row && names(error.text, "rows.csv:1:"));
+  write_in("rows.csv",
+           "knot,time,kind,object,component,value,lower,upper,allowed,multiplier,pull\n1,.05,9,0,0,0,0,0,0,0,0\n");
+  CHECK(cav_rows_read(path, &n, &row, &error) == CAV_BAD_INPUT && !row && names(error.text, "rows.csv:2:"));
+  write_in("rows.csv",
+           "knot,time,kind,object,component,value,lower,upper,allowed,multiplier,pull\n1.5,.05,1,0,0,0,0,0,0,0,0\n");
+  CHECK(cav_rows_read(path, &n, &row, &error) == CAV_BAD_INPUT && !row && names(error.text, "'knot'"));
+  done(&o);
+}
+
+int main(void) {
+  if (!mkdtemp(folder)) return EXIT_FAILURE;
+  check_out_of_reach();
+  check_too_weak();
+  check_inside_the_floor();
+  check_contradiction();
+  check_price();
+  check_rows();
+  static const char *const file[] = {"model.xml", "problem.xml", "rows.csv"};
+  for (int i = 0; i < 3; i++) {
+    char path[160];
+    snprintf(path, sizeof path, "%s/%s", folder, file[i]);
+    unlink(path);
+  }
+  CHECK(rmdir(folder) == 0);
+  return check_result();
+}
