@@ -52,54 +52,6 @@ static int gram(const cav_model *model, const cav_workspace *w, double *G, doubl
   return diagonal;
 }
 
-// one Jacobi rotation in the plane (p, q) of A, accumulated in the columns of E
-static void jacobi_rotate(double *A, double *E, int n, int p, int q) {
-  double apq = A[p * n + q];
-  if (apq == 0) { return; }
-  double theta = 0.5 * (A[q * n + q] - A[p * n + p]) / apq;
-  double t = (theta < 0 ? -1 : 1) / (fabs(theta) + hypot(theta, 1)), c = 1 / hypot(t, 1), s = t * c;
-  for (int k = 0; k < n; k++) {
-    double a = A[k * n + p], b = A[k * n + q];
-    A[k * n + p] = c * a - s * b;
-    A[k * n + q] = s * a + c * b;
-  }
-  for (int k = 0; k < n; k++) {
-    double a = A[p * n + k], b = A[q * n + k];
-    A[p * n + k] = c * a - s * b;
-    A[q * n + k] = s * a + c * b;
-    a = E[k * n + p], b = E[k * n + q];
-    E[k * n + p] = c * a - s * b;
-    E[k * n + q] = s * a + c * b;
-  }
-}
-
-// G := pseudo-inverse of the symmetric positive semidefinite G; E [n*n], A [n*n] scratch
-static void pseudo_inverse(double *G, double *A, double *E, int n) {
-  memcpy(A, G, (size_t)n * (size_t)n * sizeof *A);
-  memset(E, 0, (size_t)n * (size_t)n * sizeof *E);
-  for (int i = 0; i < n; i++) { E[i * n + i] = 1; }
-  double largest = 0;
-  for (int sweep = 0; sweep < 30; sweep++) {
-    double off = 0;
-    largest = 0;
-    for (int p = 0; p < n; p++) {
-      largest = fmax(largest, fabs(A[p * n + p]));
-      for (int q = p + 1; q < n; q++) {
-        off = fmax(off, fabs(A[p * n + q]));
-        jacobi_rotate(A, E, n, p, q);
-      }
-    }
-    if (off <= 1e-17 * largest) { break; }
-  }
-  memset(G, 0, (size_t)n * (size_t)n * sizeof *G);
-  for (int k = 0; k < n; k++) {
-    double value = A[k * n + k];
-    for (int i = 0; i < n && value > RANK_TOLERANCE * largest; i++) {
-      for (int j = 0; j < n; j++) { G[i * n + j] += E[i * n + k] * E[j * n + k] / value; }
-    }
-  }
-}
-
 cav_status cav_actuation_compile(const cav_model *model, cav_workspace *w) {
   int nu = model->nactuator, entries = 0;
   for (int i = 0; i < nu; i++) {
@@ -116,7 +68,7 @@ cav_status cav_actuation_compile(const cav_model *model, cav_workspace *w) {
   if (!G) { return CAV_NO_MEMORY; }
   w->gram_diagonal = gram(model, w, G, w->scratch);
   if (!w->gram_diagonal) {
-    pseudo_inverse(G, G + nu * nu, G + 2 * nu * nu, nu);
+    cav_pseudo_inverse(nu, RANK_TOLERANCE, G, G + nu * nu, G + 2 * nu * nu);
     w->gram = G;
     return CAV_OK;
   }

@@ -27,6 +27,7 @@ typedef struct builder {
   cav_tendon_part *part;
   cav_path_point *path;
   int *tendon_dof;
+  cav_equality *equality;
   cav_actuator *actuator;
   cav_sensor *sensor;
   cav_key *key;
@@ -85,6 +86,7 @@ static void check_names(cav_spec *spec) {
   check_unique(spec, TABLE(spec->geom));
   check_unique(spec, TABLE(spec->site));
   check_unique(spec, TABLE(spec->tendon));
+  check_unique(spec, TABLE(spec->equality));
   check_unique(spec, TABLE(spec->actuator));
   check_unique(spec, TABLE(spec->sensor));
   check_unique(spec, TABLE(spec->key));
@@ -170,6 +172,7 @@ static size_t text_bytes(const cav_spec *spec) {
   ADD(spec->geom);
   ADD(spec->site);
   ADD(spec->tendon);
+  ADD(spec->equality);
   ADD(spec->actuator);
   ADD(spec->sensor);
   ADD(spec->key);
@@ -195,6 +198,7 @@ static void carve_model(builder *b, carver *c) {
   b->part = take(c, m->ntendon_part, sizeof *b->part);
   b->path = take(c, m->ntendon_path, sizeof *b->path);
   b->tendon_dof = take(c, m->ntendon_dof, sizeof *b->tendon_dof);
+  b->equality = take(c, m->nequality, sizeof *b->equality);
   b->actuator = take(c, m->nactuator, sizeof *b->actuator);
   b->sensor = take(c, m->nsensor, sizeof *b->sensor);
   b->key = take(c, m->nkey, sizeof *b->key);
@@ -218,6 +222,7 @@ static void share_arrays(builder *b) {
   m->tendon_part = b->part;
   m->tendon_path = b->path;
   m->tendon_dof = b->tendon_dof;
+  m->equality = b->equality;
   m->actuator = b->actuator;
   m->sensor = b->sensor;
   m->key = b->key;
@@ -588,6 +593,86 @@ static void fill_tendons(builder *b) {
   if (running(b)) list_tendon_dofs(b, b->tendon_dof);
 }
 
+// --- equality constraints ---
+
+// index of the first or second object; -1 where there is none, which for bodies is the world
+static int find_tied(builder *b, const cav_spec_equality *s, int side) {
+  static const char *const attribute[][2] = {[CAV_EQUALITY_CONNECT] = {"body1", "body2"},
+                                             [CAV_EQUALITY_WELD] = {"body1", "body2"},
+                                             [CAV_EQUALITY_JOINT] = {"joint1", "joint2"},
+                                             [CAV_EQUALITY_TENDON] = {"tendon1", "tendon2"},
+                                             [CAV_EQUALITY_DISTANCE] = {"geom1", "geom2"}};
+  cav_spec *spec = b->spec;
+  const char *at = attribute[s->type][side], *name = s->object[side];
+  int body = s->type == CAV_EQUALITY_CONNECT || s->type == CAV_EQUALITY_WELD;
+  if (!name) return body ? 0 : -1;
+  if (body) return resolve(spec, s->node, at, "body", name, TABLE(spec->body));
+  if (s->type == CAV_EQUALITY_TENDON) return resolve(spec, s->node, at, "tendon", name, TABLE(spec->tendon));
+  if (s->type == CAV_EQUALITY_DISTANCE) return resolve(spec, s->node, at, "geom", name, TABLE(spec->geom));
+  int joint = resolve(spec, s->node, at, "joint", name, TABLE(spec->joint));
+  if (running(b) && !is_scalar(spec->joint.at[joint].type))
+    cav_spec_fail(spec, s->node, at, "'%.60s' is a free or ball joint; this constraint needs a hinge or a slide", name);
+  return joint;
+}
+
+// what both objects must be for the constraint to say anything
+static void check_tied(builder *b, const cav_spec_equality *s, const cav_equality *e) {
+  cav_spec *spec = b->spec;
+  int coupled = s->type == CAV_EQUALITY_JOINT || s->type == CAV_EQUALITY_TENDON;
+  if (s->type == CAV_EQUALITY_DISTANCE && running(b)) {
+    int g1 = b->geom[e->object[0]].type, g2 = b->geom[e->object[1]].type, plane = g1 == g2 && g1 == CAV_GEOM_PLANE;
+    int low = g1 < g2 ? g1 : g2, high = g1 < g2 ? g2 : g1;
+    if (plane || !cav_collide_supported((cav_geom_type)low, (cav_geom_type)high))
+      cav_spec_fail(spec, s->node, NULL, "the distance between geoms of these two types is not computed%s",
+                    plane ? "" : " by a build without libccd; use capsules, spheres or boxes");
+  }
+  if (coupled ? e->object[0] == e->object[1] : e->link[0] == e->link[1])
+    cav_spec_fail(spec, s->node, NULL, coupled ? "ties one to itself; name two" : "the two move as one; remove it");
+  cav_check_softness(spec, s->node, "", &s->softness);
+  cav_check_not_negative(spec, s->node, "torquescale", s->torquescale);
+}
+
+static void fill_equalities(builder *b) {
+  static const int dim[] = {[CAV_EQUALITY_CONNECT] = 3,
+                            [CAV_EQUALITY_WELD] = 6,
+                            [CAV_EQUALITY_JOINT] = 1,
+                            [CAV_EQUALITY_TENDON] = 1,
+                            [CAV_EQUALITY_DISTANCE] = 1};
+  const double none[4] = {1, 0, 0, 0};
+  for (int i = 0; i < b->spec->equality.n && running(b); i++) {
+    const cav_spec_equality *s = &b->spec->equality.at[i];
+    cav_equality *e = &b->equality[i];
+    *e = (cav_equality){.name = put_text(b, s->name),
+                        .type = s->type,
+                        .dim = dim[s->type],
+                        .torquescale = s->torquescale,
+                        .distance = s->distance,
+                        .softness = s->softness};
+    memcpy(e->coef, s->polycoef, sizeof e->coef);
+    for (int k = 0; k < 2; k++) e->object[k] = find_tied(b, s, k);
+    if (!running(b)) return;
+    int bodies = s->type == CAV_EQUALITY_CONNECT || s->type == CAV_EQUALITY_WELD;
+    for (int k = 0; k < 2 && (bodies || s->type == CAV_EQUALITY_DISTANCE); k++)
+      e->link[k] = b->link_of[bodies ? e->object[k] : b->geom[e->object[k]].body];
+    check_tied(b, s, e);
+    if (!bodies) continue;
+    // a connect has its anchor in the first body, a weld in the second; the rest of both follows at q0
+    const cav_body *first = &b->body[e->object[0]], *second = &b->body[e->object[1]];
+    double quat[4];
+    memcpy(quat, s->relpose + 3, sizeof quat);
+    if (s->type == CAV_EQUALITY_CONNECT) {
+      to_link(first, s->anchor, none, e->pos[0], e->quat[0]);
+    } else {
+      to_link(second, s->anchor, none, e->pos[1], e->quat[1]);
+      int given = quat[0] != 0 || quat[1] != 0 || quat[2] != 0 || quat[3] != 0;
+      if (given) {
+        quat_normalise(quat);
+        to_link(first, s->relpose, quat, e->pos[0], e->quat[0]);
+      }
+    }
+  }
+}
+
 static int find_target(cav_spec *spec, const cav_spec_actuator *s) {
   if (s->tendon) return resolve(spec, s->node, "tendon", "tendon", s->tendon, TABLE(spec->tendon));
   return resolve(spec, s->node, "joint", "joint", s->joint, TABLE(spec->joint));
@@ -749,6 +834,7 @@ static void count(builder *b) {
   m->ntendon = spec->tendon.n;
   m->ntendon_part = spec->part.n;
   m->ntendon_path = spec->path.n;
+  m->nequality = spec->equality.n;
   m->nactuator = m->nu = spec->actuator.n;
   m->nsensor = spec->sensor.n;
   m->nkey = spec->key.n;
@@ -762,6 +848,7 @@ static void count(builder *b) {
                 {m->ntendon, "tendons"},
                 {m->ntendon_part, "tendon parts"},
                 {m->ntendon_path, "elements of tendon paths"},
+                {m->nequality, "equality constraints"},
                 {m->nactuator, "actuators"},
                 {m->nsensor, "sensors"},
                 {m->nkey, "keyframes"},
@@ -784,6 +871,7 @@ static void fill(builder *b) {
   fill_geoms(b);
   fill_sites(b);
   fill_tendons(b);
+  if (running(b)) fill_equalities(b);
   if (running(b)) fill_actuators(b);
   if (running(b)) fill_sensors(b);
   if (running(b)) fill_keys(b);

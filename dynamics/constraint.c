@@ -17,11 +17,6 @@ static const double SMOOTH_REACH = 12;
 // fastest approach to a limit met without a jump, rad/s or m/s
 static const double LIMIT_SPEED = 20;
 
-/// R, h B and h K of one row.
-typedef struct law {
-  double regulariser, damping, stiffness;
-} law;
-
 static double larger(double a, double b) { return a > b ? a : b; }
 
 static double clamp(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
@@ -46,11 +41,11 @@ static double impedance(const double solimp[5], double x) {
 }
 
 // by solref and solimp; violation x >= 0
-static law solref_law(const cav_state *state, const cav_softness *softness, double x, double weight) {
+static cav_law solref_law(const cav_state *state, const cav_softness *softness, double x, double weight) {
   double h = state->options.timestep, d = impedance(softness->solimp, x);
   double dw = clamp(softness->solimp[1], IMPEDANCE_MIN, IMPEDANCE_MAX);
   double kappa = softness->solref[0], zeta = softness->solref[1];
-  law l = {larger(R_MIN, (1 - d) / d * weight), 0, 0};
+  cav_law l = {larger(R_MIN, (1 - d) / d * weight), 0, 0};
   if (kappa > 0) {
     if (state->options.guard) { kappa = larger(kappa, 2 * h); }
     l.damping = h * 2 / larger(R_MIN, dw * kappa);
@@ -71,18 +66,23 @@ void cav_stabilise(cav_state *state) {
 }
 
 // by the discrete step: the same for every row but R
-static law discrete_law(const cav_state *state, double weight) {
+static cav_law discrete_law(const cav_state *state, double weight) {
   const cav_workspace *w = state->work;
-  return (law){larger(R_MIN, state->options.softness * weight), w->discrete_damping, w->discrete_stiffness};
+  return (cav_law){larger(R_MIN, state->options.softness * weight), w->discrete_damping, w->discrete_stiffness};
 }
 
-static law row_law(const cav_state *state, const cav_softness *softness, double x, double weight) {
+cav_law cav_law_at(const cav_state *state, const cav_softness *softness, double x, double weight) {
   if (state->options.stabilisation == CAV_STABILISATION_DISCRETE) return discrete_law(state, weight);
-  return solref_law(state, softness, larger(0, -x), weight);
+  return solref_law(state, softness, x, weight);
+}
+
+// of a one-sided row at a distance
+static cav_law row_law(const cav_state *state, const cav_softness *softness, double dist, double weight) {
+  return cav_law_at(state, softness, larger(0, -dist), weight);
 }
 
 // scale of the smoothed law felt at a distance delta
-static double smoothing_scale(const law *l, double delta) {
+static double smoothing_scale(const cav_law *l, double delta) {
   return delta > 0 ? l->stiffness * delta / sqrt(l->regulariser) : 0;
 }
 
@@ -107,7 +107,7 @@ double cav_limit_reach(const cav_state *state, double margin) {
 // rounded over the velocity at which a limit of the same softness would be
 static cav_status add_row(cav_state *state, cav_row row, const cav_softness *softness, double weight) {
   int friction = row.type == CAV_ROW_FRICTION_DOF || row.type == CAV_ROW_FRICTION_TENDON;
-  law l = row_law(state, softness, friction ? 0 : row.dist - row.margin, weight);
+  cav_law l = row_law(state, softness, friction ? 0 : row.dist - row.margin, weight);
   row.regulariser = l.regulariser;
   row.damping = l.damping;
   row.stiffness = friction ? 0 : l.stiffness;
@@ -195,7 +195,7 @@ cav_status cav_rows(const cav_model *model, cav_state *state) {
 // R of the friction rows so that R_j mu_j^2 is the same for all (22); all rows share the damping
 static void soften_contact(cav_state *state, cav_contact *c, double inverse_impratio) {
   const cav_pair *pair = &state->model->pair[c->pair];
-  law l = row_law(state, &pair->softness, c->dist - c->margin, pair->weight[0]);
+  cav_law l = row_law(state, &pair->softness, c->dist - c->margin, pair->weight[0]);
   c->stiffness = l.stiffness;
   c->sigma = smoothing_scale(&l, pair->same_world ? state->options.smoothing : self_smoothing(state));
   c->regulariser[0] = l.regulariser;

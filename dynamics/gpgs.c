@@ -1,8 +1,12 @@
 /// One step forward by generalised projected Gauss-Seidel on the impulse problem (9), Todorov 2014, section IV:
-/// minimise 1/2 f' (A + R) f + f' (v_minus - v*) over the cones, A = J M^-1 J', one object at a time and each update
+/// minimise 1/2 f' (A + R) f + f' (v_minus - v*) over the cones, A = J M_hat^-1 J', one object at a time and each update
 /// exact. Limits and friction losses are clamped. A contact is moved first along the ray of its impulse, or from the
 /// apex along the steepest ray of its cone, then in its friction part with the normal fixed: a quadratic on an
 /// ellipsoid, solved by Newton's method on the multiplier (Moré and Sorensen 1983).
+///
+/// Equality constraints are not swept over but eliminated, eqs. (6), (7): M^-1 gives way to
+/// M_hat^-1 = M^-1 - M^-1 J_E' S J_E M^-1 with S = (A_E + R_E)^-1, and v to v_hat. So they hold to rounding in every sweep
+/// and stiff ones cost no more of them.
 ///
 /// Starts from the impulses of the last solve on the same state, matched object by object. For midpoint the smooth
 /// forces are taken anew after each sweep. The exact law only: the smoothed one has no bounded dual; use
@@ -14,7 +18,7 @@
 #include "impulse.h"
 #include "math3.h"
 
-enum { DIM_MAX = 6, SECULAR_STEPS = 30 };
+enum { DIM_MAX = 6, SECULAR_STEPS = 30, PASSES = 3 };
 
 /// An impulse remembered between solves, and of which object.
 typedef struct cav_memory {
@@ -27,13 +31,20 @@ typedef struct cav_memory {
 // the solver's arrays
 typedef struct gpgs {
   cav_impulse problem;
-  double *A;       // [nrow*nrow] J M^-1 J' + diag(R)
-  double *W;       // [nrow*nv] rows of J M^-1
-  double *offset;  // [nrow] v_minus - v*
+  int n, m;        // rows of bounded objects and, behind them, of equality constraints
+  double *A;       // [n*n] J M_hat^-1 J' + diag(R)
+  double *W;       // [(n+m)*nv] rows of J M_hat^-1, then of J_E M^-1
+  double *S;       // [m*m] (A_E + R_E)^-1, with 2 m*m of scratch behind
+  double *offset;  // [n+m] v_minus - v*
   double *f, *was; // [nrow] impulses, those of the last sweep
   double *found;   // [nrow] impulses of the inverse
-  double *free;    // [nv] v without constraint impulses
-  double *x, *r;   // [nv] v_next; scratch
+  double *free;    // [nv] v_hat: v without impulses of bounded objects
+  double *x, *r;   // [nv] v_next; momentum missing by the smooth forces alone
+  double *row;     // [n+m] scratch: rows of something
+  double *hold;    // [m] impulses of equality constraints
+  double *lack;    // [m] scratch: what is missing of their velocities
+  double *missing; // [nv] scratch: momentum
+  double *moved;   // [nv] scratch
 } gpgs;
 
 static double dot(const double *a, const double *b, int n) {
@@ -128,7 +139,7 @@ static void update_ray(int dim, const double *H, const double *friction, double 
 
 // exact update of one contact
 static void update_contact(gpgs *s, const cav_block *block, const cav_contact *contact) {
-  const int dim = block->dim, nrow = s->problem.nrow;
+  const int dim = block->dim, nrow = s->n;
   double H[DIM_MAX * DIM_MAX], w[DIM_MAX], *f = s->f + block->first;
   for (int i = 0; i < dim; i++) {
     const double *A = s->A + (block->first + i) * nrow;
@@ -141,7 +152,7 @@ static void update_contact(gpgs *s, const cav_block *block, const cav_contact *c
 
 // exact update of one limit or friction loss
 static void update_scalar(gpgs *s, const cav_block *block, const cav_row *row) {
-  const int i = block->first, nrow = s->problem.nrow;
+  const int i = block->first, nrow = s->n;
   const double *A = s->A + i * nrow, w = dot(A, s->f, nrow) + s->offset[i];
   const int two_sided = row->type == CAV_ROW_FRICTION_DOF || row->type == CAV_ROW_FRICTION_TENDON;
   const double f = s->f[i] - w / A[i], least = two_sided ? -row->bound : 0.0, most = two_sided ? row->bound : INFINITY;
@@ -152,57 +163,167 @@ static void update_scalar(gpgs *s, const cav_block *block, const cav_row *row) {
 static double sweep(gpgs *s) {
   const cav_impulse *p = &s->problem;
   double change = 0.0, size = 0.0;
-  memcpy(s->was, s->f, (size_t)p->nrow * sizeof *s->f);
-  for (int b = 0; b < p->nblock; b++) {
+  memcpy(s->was, s->f, (size_t)s->n * sizeof *s->f);
+  for (int b = 0; b < p->nbound; b++) {
     const cav_block *block = &p->block[b];
     if (block->contact >= 0)
       update_contact(s, block, &p->state->contact[block->contact]);
     else
       update_scalar(s, block, &p->state->row[block->row]);
   }
-  for (int i = 0; i < p->nrow; i++) {
+  for (int i = 0; i < s->n; i++) {
     change = fmax(change, fabs(s->f[i] - s->was[i]));
     size = fmax(size, fmax(fabs(s->f[i]), fabs(s->was[i])));
   }
   return size > 0.0 ? change / size : 0.0;
 }
 
-// velocity without constraint impulses, from the smooth forces at x, and what it leaves to the constraints
+// r += J_E' f, f [m]
+static void push_equalities(const gpgs *s, const double *f, double *r) {
+  const cav_impulse *p = &s->problem;
+  for (int b = p->nbound; b < p->nblock; b++) {
+    const cav_block *block = &p->block[b];
+    for (int i = 0; i < block->dim; i++) {
+      const double *J = block->J + i * block->ndof, force = f[block->first - s->n + i];
+      for (int k = 0; k < block->ndof; k++) r[block->dof[k]] += J[k] * force;
+    }
+  }
+}
+
+// solves M dx - J_E' df = r, J_E dx + R_E df = e and adds the two to x and f; r [nv] and e [m] are overwritten
+static void solve_equalities(const gpgs *s, double *r, double *e, double *x, double *f) {
+  const cav_impulse *p = &s->problem;
+  cav_ldl_solve(p->model, p->state->work, p->L, r);
+  cav_impulse_rows(p, r, s->row);
+  for (int i = 0; i < s->m; i++) e[i] -= s->row[s->n + i];
+  for (int k = 0; k < p->nv; k++) x[k] += r[k];
+  for (int i = 0; i < s->m; i++) {
+    const double df = dot(s->S + i * s->m, e, s->m), *W = s->W + (s->n + i) * p->nv;
+    f[i] += df;
+    for (int k = 0; k < p->nv; k++) x[k] += df * W[k];
+  }
+}
+
+// e := what is missing of the equality rows at x with impulses f: aim v*_E - J_E x - R_E f, aim 1 or 0
+static void miss_equalities(const gpgs *s, double aim, const double *x, const double *f, double *e) {
+  const cav_impulse *p = &s->problem;
+  cav_impulse_rows(p, x, s->row);
+  for (int i = 0; i < s->m; i++) {
+    const int k = s->n + i;
+    e[i] = aim * p->target[k] - s->row[k] - p->R[k] * f[i];
+  }
+}
+
+// v_hat from the smooth forces at x, and what it leaves to the bounded objects. With equality constraints solved twice:
+// their impulses may cancel forces many digits larger
 static cav_status take_smooth(gpgs *s, const double *v, const double *u) {
   const cav_impulse *p = &s->problem;
+  const int nv = p->nv;
   const cav_status status = cav_impulse_smooth(p, v, u, s->x, s->r);
   if (status != CAV_OK) return status;
-  cav_ldl_solve(p->model, p->state->work, p->L, s->r);
-  for (int i = 0; i < p->nv; i++) s->free[i] = s->x[i] - s->r[i];
+  memcpy(s->free, s->x, (size_t)nv * sizeof *s->x);
+  memset(s->hold, 0, (size_t)s->m * sizeof *s->hold);
+  for (int pass = 0; pass < (s->m > 0 ? PASSES : 1); pass++) {
+    for (int i = 0; i < nv; i++) s->moved[i] = s->free[i] - s->x[i];
+    if (pass > 0) {
+      cav_impulse_inertia(p, s->moved, s->missing);
+    } else {
+      memset(s->missing, 0, (size_t)nv * sizeof *s->missing);
+    }
+    for (int i = 0; i < nv; i++) s->missing[i] = -s->r[i] - s->missing[i];
+    push_equalities(s, s->hold, s->missing);
+    miss_equalities(s, 1.0, s->free, s->hold, s->lack);
+    solve_equalities(s, s->missing, s->lack, s->free, s->hold);
+  }
   cav_impulse_rows(p, s->free, s->offset);
   for (int i = 0; i < p->nrow; i++) s->offset[i] -= p->target[i];
   return CAV_OK;
 }
 
-// x := free + M^-1 J' f
+// x := v_hat + M_hat^-1 J' f
 static void take_step(gpgs *s) {
   const cav_impulse *p = &s->problem;
   memcpy(s->x, s->free, (size_t)p->nv * sizeof *s->x);
-  for (int i = 0; i < p->nrow; i++)
+  for (int i = 0; i < s->n; i++)
     for (int k = 0; k < p->nv; k++) s->x[k] += s->f[i] * s->W[i * p->nv + k];
 }
 
-// A + R and the rows of J M^-1
-static void fill_matrices(gpgs *s) {
+// one row of J into a dense vector
+static void spread(const cav_impulse *p, const cav_block *block, int i, double *r) {
+  memset(r, 0, (size_t)p->nv * sizeof *r);
+  for (int k = 0; k < block->ndof; k++) r[block->dof[k]] = block->J[i * block->ndof + k];
+}
+
+// rows of J_E M^-1, and S
+static void fill_equalities(gpgs *s) {
   const cav_impulse *p = &s->problem;
-  memset(s->W, 0, (size_t)p->nrow * (size_t)p->nv * sizeof *s->W);
-  for (int b = 0; b < p->nblock; b++) {
+  const size_t square = (size_t)s->m * (size_t)s->m;
+  for (int b = p->nbound; b < p->nblock; b++) {
     const cav_block *block = &p->block[b];
     for (int i = 0; i < block->dim; i++) {
       double *W = s->W + (block->first + i) * p->nv;
-      for (int k = 0; k < block->ndof; k++) W[block->dof[k]] = block->J[i * block->ndof + k];
+      spread(p, block, i, W);
       cav_ldl_solve(p->model, p->state->work, p->L, W);
     }
   }
-  for (int i = 0; i < p->nrow; i++) {
-    cav_impulse_rows(p, s->W + i * p->nv, s->A + i * p->nrow);
-    s->A[i * p->nrow + i] += p->R[i];
+  for (int i = 0; i < s->m; i++) {
+    cav_impulse_rows(p, s->W + (s->n + i) * p->nv, s->row);
+    memcpy(s->S + i * s->m, s->row + s->n, (size_t)s->m * sizeof *s->row);
+    s->S[i * s->m + i] += p->R[s->n + i];
   }
+  cav_pseudo_inverse(s->m, 0.0, s->S, s->S + square, s->S + 2 * square);
+}
+
+// one row of J M_hat^-1
+static void fill_row(gpgs *s, const cav_block *block, int i, double *W) {
+  const cav_impulse *p = &s->problem;
+  if (s->m == 0) {
+    spread(p, block, i, W);
+    cav_ldl_solve(p->model, p->state->work, p->L, W);
+    return;
+  }
+  memset(W, 0, (size_t)p->nv * sizeof *W);
+  memset(s->hold, 0, (size_t)s->m * sizeof *s->hold);
+  for (int pass = 0; pass < PASSES; pass++) {
+    spread(p, block, i, s->missing);
+    cav_impulse_inertia(p, W, s->moved);
+    for (int k = 0; k < p->nv; k++) s->missing[k] -= s->moved[k];
+    push_equalities(s, s->hold, s->missing);
+    miss_equalities(s, 0.0, W, s->hold, s->lack);
+    solve_equalities(s, s->missing, s->lack, W, s->hold);
+  }
+}
+
+// A + R and the rows of J M_hat^-1
+static void fill_matrices(gpgs *s) {
+  const cav_impulse *p = &s->problem;
+  if (s->m > 0) fill_equalities(s);
+  for (int b = 0; b < p->nbound; b++) {
+    const cav_block *block = &p->block[b];
+    for (int i = 0; i < block->dim; i++) fill_row(s, block, i, s->W + (block->first + i) * p->nv);
+  }
+  for (int i = 0; i < s->n; i++) {
+    cav_impulse_rows(p, s->W + i * p->nv, s->row);
+    memcpy(s->A + i * s->n, s->row, (size_t)s->n * sizeof *s->row);
+    s->A[i * s->n + i] += p->R[i];
+  }
+}
+
+// at the end: x and the impulses of equality constraints for the impulses found, without what A has lost of them
+static cav_status settle(gpgs *s, const double *v, const double *u) {
+  const cav_impulse *p = &s->problem;
+  memset(s->hold, 0, (size_t)s->m * sizeof *s->hold);
+  for (int pass = 0; pass < PASSES; pass++) {
+    const cav_status status = cav_impulse_smooth(p, v, u, s->x, s->r);
+    if (status != CAV_OK) return status;
+    for (int k = 0; k < p->nv; k++) s->missing[k] = -s->r[k];
+    memset(s->f + s->n, 0, (size_t)s->m * sizeof *s->f);
+    cav_impulse_push(p, 1.0, s->f, s->missing);
+    push_equalities(s, s->hold, s->missing);
+    miss_equalities(s, 1.0, s->x, s->hold, s->lack);
+    solve_equalities(s, s->missing, s->lack, s->x, s->hold);
+  }
+  return CAV_OK;
 }
 
 // which object a block is
@@ -224,7 +345,7 @@ static void recall(gpgs *s) {
   const cav_impulse *p = &s->problem;
   const cav_workspace *work = p->state->work;
   memset(s->f, 0, (size_t)p->nrow * sizeof *s->f);
-  for (int b = 0, next = 0; b < p->nblock; b++) {
+  for (int b = 0, next = 0; b < p->nbound; b++) {
     const cav_memory m = identify(p, &p->block[b]);
     for (int k = 0; k < work->nmemory; k++) {
       const int at = (next + k) % work->nmemory;
@@ -240,14 +361,14 @@ static void recall(gpgs *s) {
 static cav_status remember(const gpgs *s) {
   const cav_impulse *p = &s->problem;
   cav_workspace *work = p->state->work;
-  if (p->nblock > work->memory_room) {
-    cav_memory *larger = realloc(work->memory, 2 * (size_t)p->nblock * sizeof *larger);
+  if (p->nbound > work->memory_room) {
+    cav_memory *larger = realloc(work->memory, 2 * (size_t)p->nbound * sizeof *larger);
     if (!larger) return CAV_NO_MEMORY;
     work->memory = larger;
-    work->memory_room = 2 * p->nblock;
+    work->memory_room = 2 * p->nbound;
   }
-  work->nmemory = p->nblock;
-  for (int b = 0; b < p->nblock; b++) {
+  work->nmemory = p->nbound;
+  for (int b = 0; b < p->nbound; b++) {
     work->memory[b] = identify(p, &p->block[b]);
     memcpy(work->memory[b].f, s->f + p->block[b].first, (size_t)p->block[b].dim * sizeof *s->f);
   }
@@ -260,7 +381,7 @@ static void fill_report(gpgs *s, cav_forward_report *report) {
   const cav_impulse *p = &s->problem;
   double *y = s->was, *found = s->found, square = 0.0, gap = 0.0;
   cav_impulse_rows(p, s->x, y);
-  for (int b = 0; b < p->nblock; b++) {
+  for (int b = 0; b < p->nbound; b++) {
     const cav_block *block = &p->block[b];
     cav_impulse_law(p, block, y, found, NULL, NULL);
     for (int i = block->first; i < block->first + block->dim; i++) {
@@ -275,12 +396,17 @@ static void fill_report(gpgs *s, cav_forward_report *report) {
 
 static cav_status prepare(gpgs *s, const cav_model *model, cav_state *state, const double *q, const double *v) {
   cav_impulse *p = &s->problem;
-  const cav_impulse_room room = {.per_row = 4, .per_row_squared = 1, .per_row_and_dof = 1, .per_dof = 3};
+  // S and its scratch are as large as A where all rows are of equality constraints
+  const size_t squares = model->nequality ? 3 : 1;
+  const cav_impulse_room room = {.per_row = 7, .per_row_squared = squares, .per_row_and_dof = 1, .per_dof = 5};
   const cav_status status = cav_impulse_new(model, state, q, v, &room, p);
   if (status != CAV_OK) return status;
   const size_t rows = (size_t)p->nrow, nv = (size_t)model->nv;
-  s->A = p->spare;
-  s->W = s->A + rows * rows;
+  s->n = p->nbound_row;
+  s->m = p->nrow - s->n;
+  s->S = p->spare;
+  s->A = s->S + 3 * (size_t)s->m * (size_t)s->m;
+  s->W = s->A + (size_t)s->n * (size_t)s->n;
   s->offset = s->W + rows * nv;
   s->f = s->offset + rows;
   s->was = s->f + rows;
@@ -288,7 +414,12 @@ static cav_status prepare(gpgs *s, const cav_model *model, cav_state *state, con
   s->free = s->found + rows;
   s->x = s->free + nv;
   s->r = s->x + nv;
-  for (int b = 0; b < p->nblock; b++) {
+  s->row = s->r + nv;
+  s->hold = s->row + rows;
+  s->lack = s->hold + rows;
+  s->missing = s->lack + rows;
+  s->moved = s->missing + nv;
+  for (int b = 0; b < p->nbound; b++) {
     const cav_block *block = &p->block[b];
     if (block->contact >= 0 ? state->contact[block->contact].sigma > 0.0 : state->row[block->row].sigma > 0.0)
       return CAV_NOT_SUPPORTED;
@@ -312,7 +443,7 @@ cav_status cav_forward_gpgs(const cav_model *model, cav_state *state, const doub
 
   // sweeps; for midpoint the smooth forces follow
   const int midpoint = state->options.order == CAV_ORDER_MIDPOINT;
-  int count = 0, converged = s.problem.nrow == 0 && !midpoint;
+  int count = 0, converged = s.n == 0 && !midpoint;
   while (!converged && count < iterations) {
     if (midpoint && (status = take_smooth(&s, v, u)) != CAV_OK) return status;
     const double change = sweep(&s);
@@ -326,6 +457,7 @@ cav_status cav_forward_gpgs(const cav_model *model, cav_state *state, const doub
     converged = change <= tolerance && moved <= tolerance * size;
     count++;
   }
+  if (s.m > 0 && (status = settle(&s, v, u)) != CAV_OK) return status;
   if (!all_finite(s.x, model->nv)) return CAV_NOT_FINITE;
   status = remember(&s);
   if (status != CAV_OK) return status;

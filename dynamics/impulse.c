@@ -47,6 +47,12 @@ static void fill_targets(cav_impulse *p) {
         target[i] = (1.0 - c->damping[i]) * c->velocity[i] - (i == 0 ? c->stiffness * (c->dist - c->margin) : 0.0);
         R[i] = c->regulariser[i];
       }
+    } else if (block->tie >= 0) {
+      const cav_tie *tie = &p->state->tie[block->tie];
+      for (int k = 0; k < tie->dim; k++) {
+        target[k] = (1.0 - tie->damping) * tie->velocity[k] - tie->stiffness * tie->error[k];
+        R[k] = tie->regulariser[k];
+      }
     } else {
       const cav_row *row = &p->state->row[block->row];
       const int limit = row->type == CAV_ROW_LIMIT_JOINT || row->type == CAV_ROW_LIMIT_TENDON;
@@ -60,7 +66,7 @@ cav_status cav_impulse_new(const cav_model *model, cav_state *state, const doubl
                            const cav_impulse_room *room, cav_impulse *p) {
   cav_status status = cav_position(model, state, q);
   if (status != CAV_OK) return status;
-  const size_t nv = (size_t)model->nv, nblock = (size_t)(state->ncontact + state->nrow);
+  const size_t nv = (size_t)model->nv, nblock = (size_t)(state->ncontact + state->nrow + state->ntie);
   const size_t nrow = (size_t)cav_jacobian_rows(state), entries = (size_t)state->work->row[model->nv];
 
   // one piece of memory: doubles first, then blocks, then indices
@@ -71,6 +77,8 @@ cav_status cav_impulse_new(const cav_model *model, cav_state *state, const doubl
       solver_room(state->work, doubles * sizeof(double) + nblock * (sizeof(cav_block) + nv * sizeof(int)) + 64);
   if (!at) return CAV_NO_MEMORY;
   *p = (cav_impulse){.model = model, .state = state, .nv = (int)nv, .nblock = (int)nblock, .nrow = (int)nrow};
+  p->nbound = state->ncontact + state->nrow;
+  p->nbound_row = (int)nrow - cav_tie_rows(state);
   p->target = at;
   p->R = p->target + nrow;
   double *J = p->R + nrow;
@@ -126,6 +134,17 @@ void cav_impulse_inertia(const cav_impulse *p, const double *x, double *r) {
   }
 }
 
+// soft equality: f = g, whatever it is
+static void equality_law(int dim, const double *R, const double *g, double *f, double *hessian, double *potential) {
+  double sum = 0.0;
+  for (int i = 0; i < dim; i++) {
+    f[i] = g[i];
+    sum += 0.5 * R[i] * g[i] * g[i];
+    for (int j = 0; hessian && j < dim; j++) hessian[i * dim + j] = i == j ? 1.0 / R[i] : 0.0;
+  }
+  if (potential) *potential = sum;
+}
+
 void cav_impulse_law(const cav_impulse *p, const cav_block *block, const double *y, double *f, double *hessian,
                      double *potential) {
   double g[DIM_MAX];
@@ -135,6 +154,10 @@ void cav_impulse_law(const cav_impulse *p, const cav_block *block, const double 
   if (block->contact >= 0) {
     const cav_contact *contact = &p->state->contact[block->contact];
     cav_cone(block->dim, R, contact->friction, contact->sigma, g, f, hessian, potential);
+    return;
+  }
+  if (block->tie >= 0) {
+    equality_law(block->dim, R, g, f, hessian, potential);
     return;
   }
   const cav_row *row = &p->state->row[block->row];
@@ -155,6 +178,8 @@ void cav_impulse_read(const cav_impulse *p, double *f) {
     const cav_block *block = &p->block[b];
     if (block->contact >= 0)
       memcpy(f + block->first, p->state->contact[block->contact].impulse, (size_t)block->dim * sizeof *f);
+    else if (block->tie >= 0)
+      memcpy(f + block->first, p->state->tie[block->tie].impulse, (size_t)block->dim * sizeof *f);
     else
       f[block->first] = p->state->row[block->row].impulse;
   }

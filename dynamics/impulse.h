@@ -9,6 +9,7 @@
 typedef struct cav_block {
   int contact; ///< index into state->contact, or -1
   int row;     ///< index into state->row, or -1
+  int tie;     ///< index into state->tie, or -1
   int dim;     ///< number of rows
   int first;   ///< first of them among all rows
   int ndof;
@@ -21,7 +22,8 @@ typedef struct cav_impulse {
   const cav_model *model;
   cav_state *state;
   int nv, nblock, nrow;
-  cav_block *block;       ///< [nblock] contacts in their order, then scalar rows in theirs
+  int nbound, nbound_row; ///< blocks and rows before those of equality constraints
+  cav_block *block;       ///< [nblock] contacts in their order, then scalar rows, then equality constraints in theirs
   double *target;         ///< v* [nrow], m/s or rad/s
   double *R;              ///< regulariser [nrow], 1/kg
   double *M;              ///< tree-sparse, D included; midpoint: with half of the damping that acts during the step
@@ -30,12 +32,13 @@ typedef struct cav_impulse {
   double *spare;          ///< doubles asked for
 } cav_impulse;
 
-/// Jacobian rows of all contacts and rows of the state, each with the dofs that move it. jacobian.c.
-/// block [ncontact+nrow], dof [(ncontact+nrow)*nv], J [rows*nv]. Returns the number of rows.
+/// Jacobian rows of all contacts, rows and ties of the state, each with the dofs that move it. jacobian.c.
+/// block [n], n = ncontact+nrow+ntie, dof [n*nv], J [rows*nv]. Returns the number of rows.
 int cav_jacobian(const cav_model *model, const cav_state *state, cav_block *block, int *dof, double *J);
 
-/// Number of constraint rows of the state. jacobian.c.
+/// Number of constraint rows of the state; those of ties alone. jacobian.c.
 int cav_jacobian_rows(const cav_state *state);
+int cav_tie_rows(const cav_state *state);
 
 /// Doubles a solver needs of its own, by what they grow with.
 typedef struct cav_impulse_room {

@@ -19,7 +19,7 @@ static int same_position_options(const cav_options *a, const cav_options *b) {
 
 cav_status cav_position(const cav_model *model, cav_state *state, const double *q) {
   state->work->valid = CAV_STAGE_NONE;
-  state->ncontact = state->nrow = 0;
+  state->ncontact = state->nrow = state->ntie = 0;
   if (!all_finite(q, model->nq)) { return CAV_NOT_FINITE; }
   cav_kinematics(model, state, q);
   cav_stabilise(state);
@@ -27,6 +27,7 @@ cav_status cav_position(const cav_model *model, cav_state *state, const double *
   if (status) { return status; }
   status = cav_collide(model, state);
   if (status) { return status; }
+  if (model->nequality) { cav_ties(model, state); }
   cav_soften(state);
   state->work->valid = CAV_STAGE_POSITION;
   state->work->options = state->options;
@@ -139,9 +140,9 @@ static void evaluate(const cav_model *model, cav_state *state, int with_constrai
   double *bias = w->scratch, *a = w->scratch + model->nv, scale = -1 / state->options.timestep;
   const double *damped = step_velocities(model, state, bias, a);
 
-  // inertial forces of links, then contacts on them
+  // inertial forces of links, then contacts and equality constraints on them
   cav_newton_euler(model, state, bias, w->v_next, a);
-  if (with_constraints && state->ncontact > 0) {
+  if (with_constraints && (state->ncontact > 0 || state->ntie > 0)) {
     const double *now = NULL;
     if (new_velocity && state->options.order == CAV_ORDER_MIDPOINT) {
       cav_velocities(model, state, w->v, w->velocity_now);
@@ -150,13 +151,17 @@ static void evaluate(const cav_model *model, cav_state *state, int with_constrai
       now = state->velocity;
     }
     contacts(state, now, scale);
+    if (state->ntie > 0) { cav_tie_impulses(model, state, w->v, now, w->v_next, scale); }
   }
 
   // up the tree, then what acts on dofs
   cav_project(model, state, u);
   cav_add_joint_forces(model, state, damped, a, u);
   cav_add_tendon_forces(model, state, bias, u);
-  if (with_constraints) { rows(state, w->v, w->v_next, scale, u); }
+  if (with_constraints) {
+    rows(state, w->v, w->v_next, scale, u);
+    if (state->ntie > 0) { cav_tie_pull(model, state, scale, u); }
+  }
 }
 
 void cav_smooth_inverse(const cav_model *model, cav_state *state, const double *v, const double *v_next, double *u) {

@@ -1,6 +1,7 @@
-/// Constraint Jacobian of the contacts and scalar rows of a state, needed by the forward step only. Each block keeps
-/// the dofs that move it: for a contact those between its two links and their nearest common ancestor, beyond which the
-/// motion of both is the same. Reads poses and subspaces of the last cav_position; computes no velocity.
+/// Constraint Jacobian of the contacts, scalar rows and equality constraints of a state, needed by the forward step
+/// and where A is. Each block keeps the dofs that move it: for a contact those between its two links and their nearest
+/// common ancestor, beyond which the motion of both is the same; for an equality constraint all that move either link,
+/// as its two points are apart by the error. Reads poses and subspaces of the last cav_position; computes no velocity.
 #include "impulse.h"
 #include "math3.h"
 
@@ -46,6 +47,74 @@ static int contact_block(const cav_model *model, const cav_state *state, int ind
   return n;
 }
 
+// column of one dof in the rows of a tie between links; on says which of the two it moves
+static void tie_column(const cav_model *model, const cav_state *state, const cav_tie *tie, int dof, const int on[2],
+                       int stride, double *J) {
+  const double *axis = state->axis + 6 * dof, *reference = state->reference + 3 * model->dof[dof].link;
+  double linear[3] = {0, 0, 0}, angular[3] = {0, 0, 0};
+  for (int k = 0; k < 2; k++) {
+    if (!on[k]) continue;
+    double at[3];
+    velocity_at(at, axis, reference, tie->point[k]);
+    axpy3(linear, linear, k ? -1 : 1, at);
+    axpy3(angular, angular, k ? -1 : 1, axis);
+  }
+  if (tie->dim == 1) J[0] = dot3(tie->normal, linear);
+  for (int i = 0; i < tie->dim && tie->dim > 1; i++)
+    J[i * stride] = i < 3 ? linear[i] : dot3(tie->turn + 3 * (i - 3), angular);
+}
+
+static int tie_links(const cav_model *model, const cav_state *state, const cav_tie *tie, int *dof, double *J) {
+  const cav_equality *e = &model->equality[tie->equality];
+  int first = last_dof(model, e->link[0]), second = last_dof(model, e->link[1]), n = 0;
+  for (int i = first, j = second; i >= 0 || j >= 0; n++) {
+    dof[n] = i > j ? i : j;
+    if (i == dof[n]) i = model->dof[i].parent;
+    if (j == dof[n]) j = model->dof[j].parent;
+  }
+  for (int k = 0, i = first, j = second; k < n; k++) {
+    const int on[2] = {i == dof[k], j == dof[k]};
+    tie_column(model, state, tie, dof[k], on, n, J + k);
+    if (on[0]) i = model->dof[i].parent;
+    if (on[1]) j = model->dof[j].parent;
+  }
+  return n;
+}
+
+// adds scale times the gradient of a tendon's length to a row whose first n dofs are known; returns their number
+static int tendon_gradient(const cav_model *model, const cav_state *state, int tendon, double scale, int n, int *dof,
+                           double *J) {
+  const cav_tendon *t = &model->tendon[tendon];
+  const int known = n;
+  for (int e = t->dof; e < t->dof + t->ndof; e++) {
+    int k = 0;
+    while (k < known && dof[k] != model->tendon_dof[e]) k++;
+    if (k == known) J[k = n++] = 0.0;
+    dof[k] = model->tendon_dof[e];
+    J[k] += scale * state->tendon_arm[e];
+  }
+  return n;
+}
+
+static int tie_block(const cav_model *model, const cav_state *state, const cav_tie *tie, int *dof, double *J) {
+  const cav_equality *e = &model->equality[tie->equality];
+  int n = 0;
+  switch (e->type) {
+    case CAV_EQUALITY_JOINT:
+      for (; n < 2 && e->object[n] >= 0; n++) {
+        dof[n] = model->joint[e->object[n]].dof;
+        J[n] = n ? -tie->slope : 1;
+      }
+      return n;
+    case CAV_EQUALITY_TENDON:
+      for (int side = 0; side < 2 && e->object[side] >= 0; side++)
+        n = tendon_gradient(model, state, e->object[side], side ? -tie->slope : 1, n, dof, J);
+      return n;
+    default:
+      return tie_links(model, state, tie, dof, J);
+  }
+}
+
 // dofs and row of a limit or a friction loss
 static int scalar_block(const cav_model *model, const cav_state *state, const cav_row *row, int *dof, double *J) {
   int n = 0;
@@ -64,32 +133,46 @@ static int scalar_block(const cav_model *model, const cav_state *state, const ca
       J[n++] = 1.0;
       break;
     case CAV_ROW_LIMIT_TENDON:
-    case CAV_ROW_FRICTION_TENDON: {
-      const cav_tendon *tendon = &model->tendon[row->object];
-      const double sign = row->type == CAV_ROW_LIMIT_TENDON ? row->axis[0] : 1.0;
-      for (; n < tendon->ndof; n++) {
-        dof[n] = model->tendon_dof[tendon->dof + n];
-        J[n] = sign * state->tendon_arm[tendon->dof + n];
-      }
+    case CAV_ROW_FRICTION_TENDON:
+      n = tendon_gradient(model, state, row->object, row->type == CAV_ROW_LIMIT_TENDON ? row->axis[0] : 1.0, n, dof, J);
       break;
-    }
   }
   return n;
 }
 
+int cav_tie_rows(const cav_state *state) {
+  int rows = 0;
+  for (int i = 0; i < state->ntie; i++) rows += state->tie[i].dim;
+  return rows;
+}
+
 int cav_jacobian_rows(const cav_state *state) {
-  int rows = state->nrow;
+  int rows = state->nrow + cav_tie_rows(state);
   for (int i = 0; i < state->ncontact; i++) rows += state->contact[i].dim;
   return rows;
 }
 
 int cav_jacobian(const cav_model *model, const cav_state *state, cav_block *block, int *dof, double *J) {
+  const int rows_from = state->ncontact, ties_from = rows_from + state->nrow;
   int first = 0;
-  for (int i = 0; i < state->ncontact + state->nrow; i++) {
-    const int contact = i < state->ncontact, dim = contact ? state->contact[i].dim : 1;
-    const int n = contact ? contact_block(model, state, i, dof, J)
-                          : scalar_block(model, state, &state->row[i - state->ncontact], dof, J);
-    block[i] = (cav_block){contact ? i : -1, contact ? -1 : i - state->ncontact, dim, first, n, dof, J};
+  for (int i = 0; i < ties_from + state->ntie; i++) {
+    int dim = 1, n = 0;
+    cav_block found = {.contact = -1, .row = -1, .tie = -1, .first = first, .dof = dof, .J = J};
+    if (i < rows_from) {
+      found.contact = i;
+      dim = state->contact[i].dim;
+      n = contact_block(model, state, i, dof, J);
+    } else if (i < ties_from) {
+      found.row = i - rows_from;
+      n = scalar_block(model, state, &state->row[found.row], dof, J);
+    } else {
+      found.tie = i - ties_from;
+      dim = state->tie[found.tie].dim;
+      n = tie_block(model, state, &state->tie[found.tie], dof, J);
+    }
+    found.dim = dim;
+    found.ndof = n;
+    block[i] = found;
     first += dim;
     dof += n;
     J += dim * n;

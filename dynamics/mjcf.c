@@ -2,7 +2,7 @@
 ///
 /// Source: the MJCF reference of MuJoCo 2.2.2, whose semantics and defaults hold, with two extensions of later versions
 /// that no 2.2.2 file can contain: the frame element, and limits that hold where only a range is given.
-/// What would change the dynamics and is not offered is an error (equality constraints, meshes that
+/// What would change the dynamics and is not offered is an error (meshes that
 /// collide or weigh, actuators that are no motors, fluids, composite bodies); what only changes how MuJoCo itself
 /// steps is a warning (integrator, cone, noslip). Names are resolved in compile.c.
 
@@ -19,6 +19,7 @@ typedef struct defaults {
   cav_spec_site site;
   cav_spec_pair pair;
   cav_spec_tendon tendon;
+  cav_spec_equality equality;
   cav_spec_actuator actuator;
   double rgba[4]; // of a material
 } defaults;
@@ -216,6 +217,12 @@ static void read_pair_values(cav_spec *spec, const cav_xml_node *node, cav_spec_
   read_real(node, "gap", &p->gap);
 }
 
+static void read_equality_values(cav_spec *spec, const cav_xml_node *node, cav_spec_equality *e) {
+  (void)spec;
+  e->active = cav_xml_bool(node, "active", e->active);
+  read_softness(node, "solref", "solimp", &e->softness);
+}
+
 static void read_tendon_values(cav_spec *spec, const cav_xml_node *node, cav_spec_tendon *t) {
   (void)spec;
   read_limited(node, "limited", &t->limited);
@@ -270,6 +277,7 @@ static defaults first_defaults(void) {
   d.site = (cav_spec_site){.quat = {1, 0, 0, 0}, .type = CAV_GEOM_SPHERE, .size = {0.005, 0.005, 0.005}};
   d.pair = (cav_spec_pair){.condim = 3, .friction = {1, 1, 0.005, 0.0001, 0.0001}, .softness = soft};
   d.tendon = (cav_spec_tendon){.limited = CAV_LIMITED_AUTO, .limit = soft, .friction = soft};
+  d.equality = (cav_spec_equality){.active = 1, .softness = soft};
   d.actuator =
       (cav_spec_actuator){.ctrllimited = CAV_LIMITED_AUTO, .forcelimited = CAV_LIMITED_AUTO, .gear = {1}, .gain = 1};
   for (int i = 0; i < 4; i++) d.rgba[i] = 1;
@@ -292,6 +300,8 @@ static void read_default_values(reader *r, const cav_xml_node *node, defaults *d
     read_site_values(spec, node, &d->site);
   else if (!strcmp(name, "pair"))
     read_pair_values(spec, node, &d->pair);
+  else if (!strcmp(name, "equality"))
+    read_equality_values(spec, node, &d->equality);
   else if (!strcmp(name, "tendon"))
     read_tendon_values(spec, node, &d->tendon);
   else if (!strcmp(name, "material"))
@@ -586,14 +596,40 @@ static void read_contact(reader *r, const cav_xml_node *node) {
   }
 }
 
+// names of the two objects, and what each type says of them
+static void read_equality_objects(const cav_xml_node *node, cav_spec_equality *e) {
+  static const char *const names[][3] = {[CAV_EQUALITY_CONNECT] = {"connect", "body1", "body2"},
+                                         [CAV_EQUALITY_WELD] = {"weld", "body1", "body2"},
+                                         [CAV_EQUALITY_JOINT] = {"joint", "joint1", "joint2"},
+                                         [CAV_EQUALITY_TENDON] = {"tendon", "tendon1", "tendon2"},
+                                         [CAV_EQUALITY_DISTANCE] = {"distance", "geom1", "geom2"}};
+  int type = 0;
+  while (!is(node, names[type][0])) type++;
+  e->type = (cav_equality_type)type;
+  for (int k = 0; k < 2; k++) e->object[k] = cav_xml_text(node, names[type][1 + k], NULL);
+  if (cav_xml_accepts(node, "anchor")) cav_xml_reals(node, "anchor", e->anchor, 3);
+  if (cav_xml_accepts(node, "relpose")) cav_xml_reals(node, "relpose", e->relpose, 7);
+  if (cav_xml_accepts(node, "polycoef")) cav_xml_reals(node, "polycoef", e->polycoef, 5);
+}
+
 static void read_equality(reader *r, const cav_xml_node *node) {
-  const cav_spec_option *o = &r->spec->option;
+  cav_spec *spec = r->spec;
   for (const cav_xml_node *c = node->child; c; c = c->next) {
-    if (!cav_xml_bool(c, "active", 1) || !o->equality || !o->constraint)
-      cav_spec_warn(r->spec, c, NULL, "left out: the constraint is switched off");
-    else
-      cav_spec_fail(r->spec, c, NULL,
-                    "equality constraints are not supported yet; set active=\"false\" to leave this one out");
+    cav_spec_equality e = class_of(r, c, NULL)->equality;
+    read_equality_values(spec, c, &e);
+    if (!e.active || !spec->option.equality || !spec->option.constraint) {
+      cav_spec_warn(spec, c, NULL, "left out: the constraint is switched off");
+      continue;
+    }
+    e.name = cav_xml_text(c, "name", "");
+    e.node = c;
+    e.polycoef[1] = 1;
+    read_equality_objects(c, &e);
+    e.torquescale = cav_xml_accepts(c, "torquescale") ? cav_xml_real(c, "torquescale", 1) : 1;
+    e.distance = cav_xml_accepts(c, "distance") ? cav_xml_real(c, "distance", 0) : 0;
+    cav_spec_equality *place_of = CAV_SPEC_PUSH(spec, &spec->equality);
+    if (!place_of) return;
+    *place_of = e;
   }
 }
 

@@ -59,6 +59,8 @@ int cav_find(const cav_model *model, cav_object_type type, const char *name) {
       return cav_find_name(model->key, model->nkey, sizeof *model->key, name);
     case CAV_OBJECT_SENSOR:
       return cav_find_name(model->sensor, model->nsensor, sizeof *model->sensor, name);
+    case CAV_OBJECT_EQUALITY:
+      return cav_find_name(model->equality, model->nequality, sizeof *model->equality, name);
     case CAV_OBJECT_TYPES:
       break;
   }

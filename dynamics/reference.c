@@ -1,7 +1,8 @@
 /// Inverse weights at the reference configuration q0: the `reference` diagonal of A (dynamics.md, 4). Per dof the
 /// diagonal of M^-1, averaged over a ball's three and over the two threes of a free joint; per body the mean
 /// translational and rotational diagonal of J M^-1 J' at its centre of mass; per tendon J M^-1 J'; per pair the sum over
-/// its two bodies. Also the rest lengths of spatial tendons' springs. M is the inertia with armature and without implicit damping.
+/// its two bodies. Also what equality constraints take from q0, and the rest lengths of spatial tendons' springs. M is the
+/// inertia with armature and without implicit damping.
 #include <stdlib.h>
 
 #include "math3.h"
@@ -99,6 +100,7 @@ static void weigh_all(const cav_model *model, const cav_state *state) {
     pair->weight[0] = a->inverse_weight[0] + b->inverse_weight[0];
     pair->weight[1] = a->inverse_weight[1] + b->inverse_weight[1];
   }
+  for (int i = 0; i < model->nequality; i++) cav_equality_settle(model, state, (cav_equality *)&model->equality[i]);
 }
 
 // springs of spatial tendons rest at the length they have where the springs of the joints rest, unless the file says

@@ -70,6 +70,8 @@ static const char *const biastypes[] = {"none", "affine", "muscle", "user", NULL
 #define PAIR \
   INT("condim"), REALS("friction", 1, 5), REALS("solref", 1, 2), REALS("solimp", 1, 5), REAL("gap"), REAL("margin")
 
+#define EQUALITY BOOL("active"), REALS("solref", 1, 2), REALS("solimp", 1, 5)
+
 #define TENDON                                                                                                         \
   SKIP("group"), WORD("limited", truth), REALS("range", 2, 2), REALS("solreflimit", 1, 2), REALS("solimplimit", 1, 5), \
       REALS("solreffriction", 1, 2), REALS("solimpfriction", 1, 5), REAL("frictionloss"), REAL("springlength"),        \
@@ -175,7 +177,7 @@ LEAF(default_joint, "joint", JOINT);
 LEAF(default_geom, "geom", GEOM);
 LEAF(default_site, "site", SITE);
 LEAF(default_pair, "pair", PAIR);
-UNREAD(default_equality, "equality");
+LEAF(default_equality, "equality", EQUALITY);
 LEAF(default_tendon, "tendon", TENDON);
 LEAF(default_general, "general", ACTUATOR, GENERAL);
 LEAF(default_motor, "motor", ACTUATOR);
@@ -257,16 +259,16 @@ LEAF(exclude, "exclude", NAMED("name"), NEEDED("body1"), NEEDED("body2"));
 static const cav_xml_element *const contact_children[] = {&pair, &exclude, &include, NULL};
 static const cav_xml_element contact = {"contact", 0, 0, NULL, contact_children, 0};
 
-LEAF(connect, "connect", NAMED("name"), NAMED("class"), BOOL("active"), SKIP("body1"), SKIP("body2"), SKIP("anchor"),
-     SKIP("solref"), SKIP("solimp"));
-LEAF(weld, "weld", NAMED("name"), NAMED("class"), BOOL("active"), SKIP("body1"), SKIP("body2"), SKIP("relpose"),
-     SKIP("anchor"), SKIP("solref"), SKIP("solimp"), SKIP("torquescale"));
-LEAF(equality_joint, "joint", NAMED("name"), NAMED("class"), BOOL("active"), SKIP("joint1"), SKIP("joint2"),
-     SKIP("polycoef"), SKIP("solref"), SKIP("solimp"));
-LEAF(equality_tendon, "tendon", NAMED("name"), NAMED("class"), BOOL("active"), SKIP("tendon1"), SKIP("tendon2"),
-     SKIP("polycoef"), SKIP("solref"), SKIP("solimp"));
-LEAF(equality_distance, "distance", NAMED("name"), NAMED("class"), BOOL("active"), SKIP("geom1"), SKIP("geom2"),
-     SKIP("distance"), SKIP("solref"), SKIP("solimp"));
+LEAF(connect, "connect", NAMED("name"), NAMED("class"), EQUALITY, NEEDED("body1"), NAMED("body2"),
+     {"anchor", CAV_XML_REAL, 3, 3, NULL, 1});
+LEAF(weld, "weld", NAMED("name"), NAMED("class"), EQUALITY, NEEDED("body1"), NAMED("body2"), REALS("relpose", 7, 7),
+     REALS("anchor", 3, 3), REAL("torquescale"));
+LEAF(equality_joint, "joint", NAMED("name"), NAMED("class"), EQUALITY, NEEDED("joint1"), NAMED("joint2"),
+     REALS("polycoef", 1, 5));
+LEAF(equality_tendon, "tendon", NAMED("name"), NAMED("class"), EQUALITY, NEEDED("tendon1"), NAMED("tendon2"),
+     REALS("polycoef", 1, 5));
+LEAF(equality_distance, "distance", NAMED("name"), NAMED("class"), EQUALITY, NEEDED("geom1"), NEEDED("geom2"),
+     REAL("distance"));
 static const cav_xml_element *const equality_children[] = {
     &connect, &weld, &equality_joint, &equality_tendon, &equality_distance, &include, NULL};
 static const cav_xml_element equality = {"equality", 0, 0, NULL, equality_children, 0};

@@ -89,6 +89,7 @@ void cav_spec_clear(cav_spec *spec) {
   free(spec->tendon.at);
   free(spec->part.at);
   free(spec->path.at);
+  free(spec->equality.at);
   free(spec->actuator.at);
   free(spec->sensor.at);
   free(spec->key.at);

@@ -104,6 +104,16 @@ typedef struct cav_spec_tendon {
   cav_softness limit, friction;
 } cav_spec_tendon;
 
+typedef struct cav_spec_equality {
+  const char *name;
+  const cav_xml_node *node;
+  cav_equality_type type;
+  const char *object[2]; ///< NULL: none, or the world
+  int active;
+  double anchor[3], relpose[7], torquescale, polycoef[5], distance;
+  cav_softness softness;
+} cav_spec_equality;
+
 typedef struct cav_spec_actuator {
   const char *name;
   const cav_xml_node *node;
@@ -173,6 +183,7 @@ typedef struct cav_spec {
   CAV_SPEC_LIST(cav_spec_tendon) tendon;
   CAV_SPEC_LIST(cav_spec_part) part;
   CAV_SPEC_LIST(cav_spec_path) path;
+  CAV_SPEC_LIST(cav_spec_equality) equality;
   CAV_SPEC_LIST(cav_spec_actuator) actuator;
   CAV_SPEC_LIST(cav_spec_sensor) sensor;
   CAV_SPEC_LIST(cav_spec_key) key;

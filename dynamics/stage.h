@@ -75,6 +75,28 @@ void cav_tendon_lengths(const cav_model *model, cav_state *state);
 double cav_tendon_velocity(const cav_state *state, int tendon, const double *v);
 void cav_tendon_pull(const cav_state *state, int tendon, double force, double *u);
 
+/// R, h B and h K of a row violated by x >= 0, by the state's options. constraint.c.
+typedef struct cav_law {
+  double regulariser, damping, stiffness;
+} cav_law;
+cav_law cav_law_at(const cav_state *state, const cav_softness *softness, double x, double weight);
+
+/// Fills state->tie at the state's positions: errors, what their rates depend on, laws. equality.c.
+void cav_ties(const cav_model *model, cav_state *state);
+
+/// Velocity of a tie's rows, out [dim], at v [nv] with the links' spatial velocities [nlink*6]. equality.c.
+void cav_tie_velocity(const cav_model *model, const cav_state *state, const cav_tie *tie, const double *v,
+                      const double *velocity, double *out);
+
+/// Impulses of all ties, v* taken at velocity_now (NULL: as it was); wrenches, times scale, into state->force. Then, once
+/// forces are projected: u [nv] += scale J' f of those between joints or tendons. equality.c.
+void cav_tie_impulses(const cav_model *model, cav_state *state, const double *v, const double *velocity_now,
+                      const double *v_next, double scale);
+void cav_tie_pull(const cav_model *model, const cav_state *state, double scale, double *u);
+
+/// Points, frames, references and weight of an equality constraint of a model under construction, at q0. equality.c.
+void cav_equality_settle(const cav_model *model, const cav_state *state, cav_equality *equality);
+
 /// Constants of the discrete stabilisation for the state's options; before the two below. constraint.c.
 void cav_stabilise(cav_state *state);
 
@@ -129,6 +151,9 @@ double cav_touch_force(const cav_model *model, const cav_state *state, int site)
 double cav_actuator_length(const cav_model *model, const cav_state *state, int actuator);
 double cav_actuator_velocity(const cav_model *model, const cav_state *state, int actuator, const double *v);
 double cav_actuator_force(const cav_model *model, const cav_state *state, int actuator);
+/// G [n*n] := pseudo-inverse of the symmetric positive semidefinite G by Jacobi rotations; eigenvalues up to rank times
+/// the largest count as 0. A, E [n*n] are scratch. symmetric.c.
+void cav_pseudo_inverse(int n, double rank, double *G, double *A, double *E);
 
 struct cav_workspace;
 

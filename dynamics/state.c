@@ -41,6 +41,7 @@ static size_t layout(const cav_model *model, char *base, cav_state *s, cav_works
   s->u = carve(base, &used, nv, d);
   s->tendon_length = carve(base, &used, nt, d);
   s->tendon_arm = carve(base, &used, model->ntendon_dof, d);
+  s->tie = carve(base, &used, (size_t)model->nequality, sizeof(cav_tie));
   w->q = carve(base, &used, nq, d);
   w->v = carve(base, &used, nv, d);
   w->v_next = carve(base, &used, nv, d);

@@ -370,7 +370,9 @@ static void test_peer(void) {
   compare(CAVORT_SOURCE_ROOT "/problems/humanoid.xml");
   const char *folder = check_shared_models();
   if (!folder) printf("SKIPPED: the shared models are absent\n");
-  for (size_t i = 0; folder && i < sizeof files / sizeof *files; i++) {
+  // two shapes of the last model need libccd
+  size_t count = sizeof files / sizeof *files - (has_ccd ? 0 : 1);
+  for (size_t i = 0; folder && i < count; i++) {
     char file[5000];
     snprintf(file, sizeof file, "%s/%s", folder, files[i]);
     compare(file);

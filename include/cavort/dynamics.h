@@ -50,6 +50,20 @@ typedef struct cav_row {
   double impulse;                 ///< f, N s or N m s
 } cav_row;
 
+/// One equality constraint at (q, v, v_next). Impulses act on the first object and, reversed, on the second.
+typedef struct cav_tie {
+  int equality;       ///< index into model->equality
+  int dim;            ///< rows: 1, 3 or 6
+  double error[6];    ///< x: m; weld, last three: torquescale times sines of half angles; joint and tendon: their unit
+  double point[2][3]; ///< connect, weld, distance: m, world, where the impulse acts on each link
+  double turn[9];     ///< weld: rate of error[3..5] = turn (w1 - w2), angular velocities in world axes
+  double normal[3];   ///< distance: from the second geom to the first
+  double slope;       ///< joint, tendon: rate of error = v1 - slope v2
+  double regulariser[6];
+  double damping, stiffness; ///< h B and h K of all rows: v* = (1 - hB) x' - hK x
+  double velocity[6], velocity_next[6], impulse[6];
+} cav_tie;
+
 /// World pose of a link. Row-major rotation: world = rotation * local + pos.
 typedef struct cav_pose {
   double pos[3];
@@ -72,9 +86,10 @@ typedef struct cav_state {
   double *axis;          ///< [nv*6] motion subspace of each dof: what a unit velocity does
   double *tendon_length; ///< [ntendon]
   double *tendon_arm;    ///< [ntendon_dof] gradient of the length along each dof of model->tendon_dof
-  int ncontact, nrow;
+  int ncontact, nrow, ntie;
   cav_contact *contact; ///< [ncontact]; geometry only depends on q, velocities and impulses on all
   cav_row *row;         ///< [nrow]
+  cav_tie *tie;         ///< [ntie] one for each equality constraint, in their order
 
   // velocity: filled from q and v (euler) or the mean of v and v_next (midpoint)
   double *velocity;      ///< [nlink*6] spatial velocity of each link at the velocity the bias is taken

@@ -79,6 +79,7 @@ typedef enum cav_object_type {
   CAV_OBJECT_ACTUATOR,
   CAV_OBJECT_KEY,
   CAV_OBJECT_SENSOR,
+  CAV_OBJECT_EQUALITY,
   CAV_OBJECT_TYPES
 } cav_object_type;
 
@@ -244,6 +245,31 @@ typedef struct cav_tendon {
   double inverse_weight; ///< J M^-1 J' at q0
 } cav_tendon;
 
+typedef enum cav_equality_type {
+  CAV_EQUALITY_CONNECT, ///< two points of two bodies are one
+  CAV_EQUALITY_WELD,    ///< two frames of two bodies are one
+  CAV_EQUALITY_JOINT,   ///< q1 - r1 = polynomial of q2 - r2
+  CAV_EQUALITY_TENDON,  ///< the same of two lengths
+  CAV_EQUALITY_DISTANCE ///< two geoms are that far apart
+} cav_equality_type;
+
+/// Constraint that holds always, softly: error x -> 0. Todorov 2014, eqs. (5)-(7).
+typedef struct cav_equality {
+  const char *name;
+  cav_equality_type type;
+  int dim;             ///< rows: connect 3, weld 6, others 1
+  int object[2];       ///< bodies, joints, tendons or geoms; the second joint or tendon may be -1: none
+  int link[2];         ///< of bodies and geoms
+  double pos[2][3];    ///< connect, weld: the points that are one, each in its link's frame, m
+  double quat[2][4];   ///< weld: the frames that are one, each in its link's frame
+  double torquescale;  ///< weld: length per sine of half the angle between the frames, m
+  double reference[2]; ///< joint, tendon: r, the values at q0
+  double coef[5];      ///< joint, tendon: of the polynomial, constant first
+  double distance;     ///< m
+  cav_softness softness;
+  double weight; ///< reference diagonal of A, the same for all rows
+} cav_equality;
+
 /// Motor: force = gear * clamp(control) on a joint or a tendon.
 typedef struct cav_actuator {
   const char *name;
@@ -305,7 +331,7 @@ typedef struct cav_options {
   double impratio;       ///< R_normal / R_friction, > 0
   int guard;             ///< 1: keep solref time constants >= 2 h
   int contact;           ///< 0: no contacts
-  int constraint;        ///< 0: no limits, friction loss or contacts
+  int constraint;        ///< 0: no equality constraints, limits, friction loss or contacts
   int gravity;           ///< 0: none
   int passive;           ///< 0: no springs and dampers
 } cav_options;
@@ -319,8 +345,8 @@ typedef struct cav_model {
   double magnetic[3];  ///< field that magnetometers read, world
   cav_options options; ///< defaults for new states
 
-  int nbody, nlink, njoint, ngeom, nsite, npair, ntendon, ntendon_part, ntendon_path, ntendon_dof, nactuator, nsensor,
-      nkey, nwarning;
+  int nbody, nlink, njoint, ngeom, nsite, npair, ntendon, ntendon_part, ntendon_path, ntendon_dof, nequality, nactuator,
+      nsensor, nkey, nwarning;
   int fused;       ///< 1: bodies without joints take the reference weights of the link they are part of
   int nsensordata; ///< length of the vector of all readings
   const cav_body *body;
@@ -333,7 +359,8 @@ typedef struct cav_model {
   const cav_tendon *tendon;
   const cav_tendon_part *tendon_part;
   const cav_path_point *tendon_path;
-  const int *tendon_dof;        ///< [ntendon_dof] indices into v, by tendon
+  const int *tendon_dof; ///< [ntendon_dof] indices into v, by tendon
+  const cav_equality *equality;
   const cav_actuator *actuator; ///< [nu]
   const cav_sensor *sensor;
   const cav_key *key;
