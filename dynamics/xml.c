@@ -703,6 +703,7 @@ static void parse(source *s) {
   s->parser = xmlNewParserCtxt();
   if (!s->parser) {
     fail(s, CAV_NO_MEMORY, 0, NULL, NULL, "no memory for the parser");
+    xmlResetLastError();
     return;
   }
   xmlSAXHandler *sax = s->parser->sax;
@@ -721,6 +722,7 @@ static void parse(source *s) {
   // all other faults were reported on the way: what stops without a word ran out of memory
   if (!s->ended || !s->parser->wellFormed) fail(s, CAV_NO_MEMORY, 0, NULL, NULL, "no memory to parse the file");
   xmlFreeParserCtxt(s->parser);
+  xmlResetLastError();
   s->parser = NULL;
 }
 

@@ -85,8 +85,10 @@ int cav_run_report(void *context, double step, double radius) {
   line.unactuated = cav_transcription_unactuated(run->tr, &line.knot);
   line.violation = cav_transcription_violation(run->tr);
   line.seconds = cav_clock() - run->start;
-  int kept = cav_solution_log(solution, &line);
-  if (!kept) return 1;
+  if (!cav_solution_log(solution, &line)) {
+    run->failed = CAV_NO_MEMORY;
+    return 1;
+  }
   return run->options->observer && run->options->observer(run->options->observer_context, &line);
 }
 

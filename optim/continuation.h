@@ -16,7 +16,8 @@ typedef struct cav_solve_run {
   cav_solution *solution;
   const char *phase;
   int stage, stages;
-  double start; ///< s
+  cav_status failed; ///< what went wrong in the report, CAV_OK: nothing
+  double start;      ///< s
 } cav_solve_run;
 
 /// The problem's guess: start held, or the geodesic to the goal, with a ballistic arc if asked. q and v of at are filled.

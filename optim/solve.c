@@ -203,6 +203,7 @@ cav_status cav_solve(const cav_problem *problem, const cav_solve_options *option
     }
     status = solve(&run, error);
     end = conclude(&run, error);
+    if (run.failed != CAV_OK) status = run.failed;
     run.solution->seconds = cav_clock() - run.start;
     run.solution->seconds_dynamics = run.tr->seconds_dynamics;
     run.solution->seconds_assembly = run.tr->seconds_assembly;
@@ -213,6 +214,7 @@ cav_status cav_solve(const cav_problem *problem, const cav_solve_options *option
     *solution = run.solution;
     run.solution = NULL;
   }
+  if (status == CAV_OK || end == CAV_NO_MEMORY) status = end;
   if (status == CAV_NO_MEMORY) fail(error, status, "not enough memory for this problem");
   if (status == CAV_NOT_FINITE)
     fail(error, status, "a number that is not finite came up; the last finite iterate is kept");
@@ -221,5 +223,5 @@ cav_status cav_solve(const cav_problem *problem, const cav_solve_options *option
   cav_solution_free(run.solution);
   cav_normal_free(run.normal);
   cav_transcription_free(run.tr);
-  return status == CAV_OK ? end : status;
+  return status;
 }

@@ -134,10 +134,9 @@ static int list_force_rows(cav_transcription *tr) {
     double norm = 0;
     for (int i = 0; i < nv; i++) norm += residual[i] * residual[i];
     if ((norm = sqrt(norm)) < 1e-7) continue;
-    for (int i = 0; i < nv; i++) basis[tr->nresidual * nv + i] = residual[i] / norm;
-    double unit_force = tr->weight * (dof_is_linear(m, d) ? 1 : moment_arm);
-    if (!force_row_set(&tr->unactuated[tr->nresidual], nv, basis + tr->nresidual * nv, 1 / unit_force)) goto end;
-    tr->nresidual++;
+    double unit_force = tr->weight * (dof_is_linear(m, d) ? 1 : moment_arm), *direction = basis + tr->nresidual * nv;
+    for (int i = 0; i < nv; i++) direction[i] = residual[i] / norm;
+    if (!force_row_set(&tr->unactuated[tr->nresidual++], nv, direction, 1 / unit_force)) goto end;
   }
 
   // efforts: control over its limit, or plain force where there is none

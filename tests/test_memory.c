@@ -1,0 +1,344 @@
+/// Memory: hot functions allocate nothing after their first call; and where the n-th allocation fails, for every n, loading,
+/// states, inverse, forward and solving say CAV_NO_MEMORY, leave nothing behind and work the next time, to the same bits.
+/// The allocator is counted by taking its place (glibc); skipped under sanitizers, which take it themselves.
+#include <errno.h>
+#include <malloc.h>
+
+#include "cavort/solve.h"
+#include "scene.h"
+
+#if defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
+#define SANITIZED 1
+#endif
+#endif
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(__GLIBC__)
+#define SANITIZED 1
+#endif
+
+#ifdef SANITIZED
+int main(void) {
+  printf("skipped: a sanitizer or another C library owns malloc\n");
+  return CHECK_SKIPPED;
+}
+#else
+
+void *__libc_malloc(size_t size);
+void *__libc_calloc(size_t n, size_t size);
+void *__libc_realloc(void *at, size_t size);
+void *__libc_memalign(size_t alignment, size_t size);
+void __libc_free(void *at);
+
+static long calls;     // allocations so far
+static long live;      // pieces not yet freed
+static long left = -1; // allocations before the one that fails; negative: none does
+
+static int fails(void) {
+  calls++;
+  if (left < 0 || left-- > 0) return 0;
+  errno = ENOMEM;
+  return 1;
+}
+
+static void *counted(void *piece) {
+  live += piece != NULL;
+  return piece;
+}
+
+void *malloc(size_t size) { return fails() ? NULL : counted(__libc_malloc(size)); }
+void *calloc(size_t n, size_t size) { return fails() ? NULL : counted(__libc_calloc(n, size)); }
+void *aligned_alloc(size_t alignment, size_t size) {
+  return fails() ? NULL : counted(__libc_memalign(alignment, size));
+}
+void *realloc(void *at, size_t size) {
+  if (!at) return malloc(size);
+  return fails() ? NULL : __libc_realloc(at, size);
+}
+void free(void *at) {
+  live -= at != NULL;
+  __libc_free(at);
+}
+
+static const char humanoid[] = CAVORT_SOURCE_ROOT "/problems/humanoid.xml";
+static const char sensors[] = CAVORT_SOURCE_ROOT "/tests/sensors.xml";
+
+// --- nothing is allocated after the first call ---
+
+enum { POSES = 20 };
+
+/// One model and random points at which everything is called.
+typedef struct bed {
+  cav_model *model;
+  cav_state *state;
+  double *q, *v, *v_next, *u, *scratch, *J, *reading;
+} bed;
+
+static void bed_new(bed *b, const char *path) {
+  cav_error error = {0};
+  *b = (bed){.model = cav_model_load(path, &error)};
+  if (!CHECK(b->model != NULL)) return;
+  const cav_model *m = b->model;
+  b->state = cav_state_new(m);
+  b->q = scene_vector(m->nq * POSES), b->v = scene_vector(m->nv * POSES), b->v_next = scene_vector(m->nv * POSES);
+  b->u = scene_vector(m->nv), b->scratch = scene_vector(m->nv + m->nu), b->J = scene_vector(3 * m->nv * m->nv);
+  b->reading = scene_vector(m->nsensordata);
+  for (int k = 0; k < POSES; k++) {
+    scene_posture(m, b->q + k * m->nq, b->scratch, 0.3);
+    // about the floor, so that contacts come and go
+    if (m->joint[0].type == CAV_JOINT_FREE) b->q[k * m->nq + 2] *= 0.5 + 0.3 * scene_uniform();
+    scene_normals(b->v + k * m->nv, m->nv, 0.3);
+    scene_normals(b->v_next + k * m->nv, m->nv, 0.3);
+  }
+}
+
+static void bed_free(bed *b) {
+  cav_state_free(b->state);
+  cav_model_free(b->model);
+  free(b->q), free(b->v), free(b->v_next), free(b->u), free(b->scratch), free(b->J), free(b->reading);
+}
+
+static void call_inverse(bed *b, const double *q, const double *v, const double *x) {
+  CHECK(cav_inverse(b->model, b->state, q, v, x, b->u) == CAV_OK);
+  CHECK(cav_inverse_from(b->model, b->state, CAV_STAGE_POSITION, q, v, x, b->u) == CAV_OK);
+}
+
+static void call_forward(bed *b, const double *q, const double *v, const double *x) {
+  (void)x;
+  memset(b->u, 0, (size_t)b->model->nv * sizeof *b->u);
+  cav_status status = cav_forward(b->model, b->state, q, v, b->u, b->scratch);
+  CHECK(status == CAV_OK || status == CAV_NOT_CONVERGED);
+}
+
+static void call_gpgs(bed *b, const double *q, const double *v, const double *x) {
+  (void)x;
+  memset(b->u, 0, (size_t)b->model->nv * sizeof *b->u);
+  cav_status status = cav_forward_gpgs(b->model, b->state, q, v, b->u, 20, 1e-9, b->scratch, NULL);
+  CHECK(status == CAV_OK || status == CAV_NOT_CONVERGED);
+}
+
+static void call_jacobian(bed *b, const double *q, const double *v, const double *x) {
+  size_t n = (size_t)b->model->nv * b->model->nv;
+  CHECK(cav_inverse_jacobian(b->model, b->state, q, v, x, b->J, b->J + n, b->J + 2 * n) == CAV_OK);
+}
+
+static void call_readings(bed *b, const double *q, const double *v, const double *x) {
+  const cav_model *m = b->model;
+  double com[3], speed[3], spin[3];
+  cav_pose pose;
+  CHECK(cav_inverse(m, b->state, q, v, x, b->u) == CAV_OK);
+  for (int i = 0; i < m->nsensor; i++) cav_sense(m, b->state, &m->sensor[i], b->reading + m->sensor[i].adr);
+  for (int i = 0; i < m->nbody; i++) cav_object_pose(m, b->state, CAV_OBJECT_BODY, i, &pose);
+  cav_momentum(m, b->state, v, com, speed, spin);
+  cav_actuation(m, b->state, b->u, b->scratch, b->scratch + m->nv);
+  CHECK(cav_inertia(m, b->state, q, b->J) == CAV_OK);
+}
+
+static const struct {
+  const char *name;
+  void (*call)(bed *, const double *, const double *, const double *);
+} hot[] = {{"inverse", call_inverse},
+           {"forward", call_forward},
+           {"gpgs", call_gpgs},
+           {"jacobian", call_jacobian},
+           {"readings", call_readings}};
+
+// all points once to make room, then again with the count held
+static void test_hot(const char *path) {
+  bed b;
+  bed_new(&b, path);
+  int nq = b.model ? b.model->nq : 0, nv = b.model ? b.model->nv : 0;
+  for (size_t f = 0; b.model && f < sizeof hot / sizeof *hot; f++) {
+    for (int smooth = 0; smooth < (f == 2 ? 1 : 2); smooth++) {
+      b.state->options.smoothing = smooth ? 0.01 : 0;
+      b.state->options.stabilisation = smooth ? CAV_STABILISATION_DISCRETE : CAV_STABILISATION_SOLREF;
+      long before = 0, first = calls;
+      for (int k = 0; k < 2 * POSES; k++) {
+        if (k == POSES) before = calls;
+        int i = k % POSES;
+        hot[f].call(&b, b.q + i * nq, b.v + i * nv, b.v_next + i * nv);
+      }
+      printf("%-9s %s law: %ld allocations at first, %ld again\n", hot[f].name, smooth ? "smoothed" : "exact   ",
+             before - first, calls - before);
+      CHECK(calls == before);
+    }
+  }
+  bed_free(&b);
+}
+
+// --- the n-th allocation fails ---
+
+/// Something that may run out of memory: returns its status and writes up to 8 numbers that tell its result.
+typedef cav_status (*attempt)(void *context, double *result);
+
+// every n until it succeeds; excused: failures after which a library we use keeps its own
+static void fail_each(const char *name, attempt try, void *context, long most, long excused) {
+  double whole[8] = {0}, result[8];
+  CHECK(try(context, whole) == CAV_OK);
+  long n = 0, wrong = 0, lost = 0;
+  for (; n < most; n++) {
+    long before = live;
+    memset(result, 0, sizeof result);
+    left = n;
+    cav_status status = try(context, result);
+    int reached = left < 0;
+    left = -1;
+    lost += live != before;
+    if (status == CAV_OK) {
+      // one that a library does without is no failure of ours, but the result stays
+      CHECK(!memcmp(whole, result, sizeof result));
+      if (!reached) break;
+    } else {
+      wrong += status != CAV_NO_MEMORY;
+    }
+  }
+  printf("%-9s %ld allocations, each failed once: %ld with another status, %ld left something behind\n", name, n, wrong,
+         lost);
+  CHECK(n > 0 && n < most && wrong == 0 && lost <= excused);
+}
+
+static cav_status try_load(void *context, double *result) {
+  cav_error error = {0};
+  cav_model *model = cav_model_load(context, &error);
+  if (model) result[0] = model->mass, result[1] = model->nv;
+  cav_model_free(model);
+  return model ? CAV_OK : error.status;
+}
+
+static cav_status try_state(void *context, double *result) {
+  const bed *b = context;
+  cav_state *state = cav_state_new(b->model);
+  result[0] = state != NULL;
+  cav_state_free(state);
+  return state ? CAV_OK : CAV_NO_MEMORY;
+}
+
+// one evaluation by a state that has never been used; it fails cleanly and then works
+static cav_status with_state(bed *b, cav_status (*evaluate)(bed *, cav_state *), double *result) {
+  long kept = left;
+  left = -1;
+  cav_state *state = cav_state_new(b->model);
+  left = kept;
+  cav_status status = evaluate(b, state);
+  long rest = left;
+  if (status == CAV_NO_MEMORY) {
+    left = -1;
+    CHECK(evaluate(b, state) == CAV_OK);
+    left = rest;
+  }
+  cav_state_free(state);
+  memcpy(result, b->scratch, 6 * sizeof *result);
+  return status;
+}
+
+static cav_status inverse(bed *b, cav_state *state) {
+  return cav_inverse(b->model, state, b->q, b->v, b->v_next, b->scratch);
+}
+
+static cav_status forward(bed *b, cav_state *state) {
+  return cav_forward(b->model, state, b->q, b->v, b->u, b->scratch);
+}
+
+static cav_status gpgs(bed *b, cav_state *state) {
+  return cav_forward_gpgs(b->model, state, b->q, b->v, b->u, 1000, 1e-6, b->scratch, NULL);
+}
+
+static cav_status jacobian(bed *b, cav_state *state) {
+  size_t n = (size_t)b->model->nv * b->model->nv;
+  return cav_inverse_jacobian(b->model, state, b->q, b->v, b->v_next, b->J, b->J + n, b->J + 2 * n);
+}
+
+static cav_status try_inverse(void *context, double *result) { return with_state(context, inverse, result); }
+static cav_status try_forward(void *context, double *result) { return with_state(context, forward, result); }
+static cav_status try_gpgs(void *context, double *result) { return with_state(context, gpgs, result); }
+static cav_status try_jacobian(void *context, double *result) { return with_state(context, jacobian, result); }
+
+static void test_states(void) {
+  bed b;
+  bed_new(&b, humanoid);
+  if (!b.model) return;
+  // lying in the floor: more contacts than a new state has room for
+  b.q[2] = 0.05;
+  fail_each("state", try_state, &b, 100, 0);
+  fail_each("inverse", try_inverse, &b, 100, 0);
+  memset(b.u, 0, (size_t)b.model->nv * sizeof *b.u);
+  fail_each("forward", try_forward, &b, 100, 0);
+  fail_each("gpgs", try_gpgs, &b, 100, 0);
+  fail_each("jacobian", try_jacobian, &b, 100, 0);
+  bed_free(&b);
+}
+
+// --- problems ---
+
+static const char leg_text[] =
+    "<mujoco model='leg'><option timestep='.02'/><worldbody><geom name='floor' type='plane' size='1 1 1'/>"
+    "<body name='trunk' pos='0 0 .45'><joint name='x' type='slide' axis='1 0 0'/><joint name='z' type='slide' axis='0 "
+    "0 1'/><joint name='pitch' axis='0 1 0'/><geom type='box' size='.1 .1 .05'/><body name='shin'><joint name='knee' "
+    "axis='0 1 0' limited='true' range='-90 90'/><geom type='capsule' fromto='0 0 0 0 0 -.4' size='.05'/></body></body>"
+    "</worldbody><actuator><motor name='knee' joint='knee' ctrllimited='true' ctrlrange='-50 50'/></actuator></mujoco>";
+
+static const char fall_text[] =
+    "<problem name='fall' model='leg.xml'><horizon duration='.2' timestep='.04' close='open'/><start/><schedule "
+    "stages='2'><first iterations='3'/><last iterations='3'/></schedule><constraint><sensor name='push' "
+    "type='jointpos' "
+    "joint='knee' upper='.5'/></constraint></problem>";
+
+static char folder[] = "/tmp/cavort-memory-XXXXXX", problem_path[64], model_path[64];
+
+static void write_text(const char *path, const char *text) {
+  FILE *file = fopen(path, "w");
+  if (!CHECK(file != NULL)) return;
+  fputs(text, file);
+  fclose(file);
+}
+
+static cav_status try_problem(void *context, double *result) {
+  cav_error error = {0};
+  cav_problem *problem = cav_problem_load(context, NULL, &error);
+  if (problem) result[0] = problem->nterm;
+  cav_problem_free(problem);
+  return problem ? CAV_OK : error.status;
+}
+
+static cav_status try_solve(void *context, double *result) {
+  cav_error error = {0};
+  cav_solution *solution = NULL;
+  cav_solve_options options = cav_solve_options_default();
+  cav_status status = cav_solve(context, &options, NULL, &solution, &error);
+  // too short a schedule to converge: what counts is that it ran
+  if (status == CAV_NOT_CONVERGED) status = CAV_OK;
+  if (status == CAV_OK) result[0] = solution->cost, result[1] = solution->iterations;
+  if (status != CAV_OK) CHECK(error.status == status && error.text[0]);
+  cav_solution_free(solution);
+  return status;
+}
+
+static void test_problems(void) {
+  if (!CHECK(mkdtemp(folder) != NULL)) return;
+  snprintf(problem_path, sizeof problem_path, "%s/fall.xml", folder);
+  snprintf(model_path, sizeof model_path, "%s/leg.xml", folder);
+  write_text(problem_path, fall_text);
+  write_text(model_path, leg_text);
+  cav_error error = {0};
+  cav_problem *problem = cav_problem_load(problem_path, NULL, &error);
+  if (CHECK(problem != NULL)) {
+    fail_each("problem", try_problem, problem_path, 20000, 0);
+    fail_each("solve", try_solve, problem, 20000, 0);
+  } else {
+    fprintf(stderr, "    %s\n", error.text);
+  }
+  cav_problem_free(problem);
+  remove(problem_path), remove(model_path), remove(folder);
+}
+
+int main(void) {
+  // what printf and the XML library keep for themselves
+  printf("allocations are counted\n");
+  test_hot(humanoid);
+  test_hot(sensors);
+  // libxml2 2.9 loses its input buffer where that cannot grow (xmlParserInputBufferCreateMem)
+  fail_each("load", try_load, (void *)humanoid, 100000, 1);
+  test_states();
+  test_problems();
+  return check_result();
+}
+#endif
