@@ -9,7 +9,7 @@
 /// an object counts from speed h before the margin: slower than that, nothing is missed. The smoothed law is felt up to
 /// SMOOTH_REACH delta. The larger of the two holds.
 #include "math3.h"
-#include "workspace.h"
+#include "slope.h"
 
 static const double R_MIN = 1e-15, IMPEDANCE_MIN = 1e-4, IMPEDANCE_MAX = 0.9999, FRICTION_MIN = 1e-5;
 // share of smoothing distances beyond which the smoothed force is dropped: exp(-12) = 6e-6 of its value at contact
@@ -38,6 +38,28 @@ static double impedance(const double solimp[5], double x) {
   if (x <= 0) { return d0; }
   double y = sigmoid(x / width, clamp(solimp[3], IMPEDANCE_MIN, IMPEDANCE_MAX), larger(1, solimp[4]));
   return d0 + y * (dw - d0);
+}
+
+// slope of the sigmoid
+static double sigmoid_slope(double x, double midpoint, double power) {
+  if (power == 1) { return 1; }
+  if (x <= midpoint) { return power * pow(x / midpoint, power - 1); }
+  return power * pow((1 - x) / (1 - midpoint), power - 1);
+}
+
+void cav_law_rates(const cav_state *state, const cav_softness *softness, double gap, double *regulariser,
+                   double *stiffness) {
+  const double *solimp = softness->solimp;
+  double d0 = clamp(solimp[0], IMPEDANCE_MIN, IMPEDANCE_MAX), dw = clamp(solimp[1], IMPEDANCE_MIN, IMPEDANCE_MAX);
+  double width = solimp[2];
+  *regulariser = *stiffness = 0;
+  if (state->options.stabilisation == CAV_STABILISATION_DISCRETE) { return; }
+  if (d0 == dw || width <= R_MIN || -gap >= width || gap >= 0) { return; }
+  double slope = sigmoid_slope(-gap / width, clamp(solimp[3], IMPEDANCE_MIN, IMPEDANCE_MAX), larger(1, solimp[4]));
+  double d = impedance(solimp, -gap), rate = -slope / width * (dw - d0);
+  // R goes with (1 - d)/d, hK with d
+  *regulariser = -rate / (d * (1 - d));
+  *stiffness = rate / d;
 }
 
 // by solref and solimp; violation x >= 0

@@ -98,7 +98,8 @@ static cav_status restore(difference *d, cav_stage unchanged) {
 cav_status cav_differentiate(const cav_model *model, cav_state *state, cav_derivative method, double step,
                              const double *q, const double *v, const double *v_next, cav_readout readout, void *context,
                              int n, double *value, double *d_dq, double *d_dv, double *d_dv_next) {
-  if (n < 0 || !(step >= 0)) { return CAV_BAD_INPUT; }
+  int by_difference = method == CAV_DERIVATIVE_FORWARD || method == CAV_DERIVATIVE_CENTRED;
+  if (n < 0 || !(step >= 0) || !by_difference) { return CAV_BAD_INPUT; }
   double *scratch = room(state, 3 * (size_t)n + (size_t)model->nq + (size_t)model->nv);
   if (!scratch) { return CAV_NO_MEMORY; }
   difference d = {.model = model,
@@ -140,8 +141,18 @@ static void read_force(const cav_model *model, const cav_state *state, void *con
   memcpy(value, state->u, (size_t)model->nv * sizeof *value);
 }
 
+cav_status cav_inverse_jacobian_by(const cav_model *model, cav_state *state, cav_derivative method, const double *q,
+                                   const double *v, const double *v_next, double *du_dq, double *du_dv,
+                                   double *du_dv_next) {
+  if (method == CAV_DERIVATIVE_ANALYTIC) {
+    cav_status status = cav_inverse(model, state, q, v, v_next, state->u);
+    return status != CAV_OK ? status : cav_derivatives(model, state, du_dq, du_dv, du_dv_next);
+  }
+  return cav_differentiate(model, state, method, 0, q, v, v_next, read_force, NULL, model->nv, NULL, du_dq, du_dv,
+                           du_dv_next);
+}
+
 cav_status cav_inverse_jacobian(const cav_model *model, cav_state *state, const double *q, const double *v,
                                 const double *v_next, double *du_dq, double *du_dv, double *du_dv_next) {
-  return cav_differentiate(model, state, CAV_DERIVATIVE_FORWARD, 0, q, v, v_next, read_force, NULL, model->nv, NULL,
-                           du_dq, du_dv, du_dv_next);
+  return cav_inverse_jacobian_by(model, state, CAV_DERIVATIVE_FORWARD, q, v, v_next, du_dq, du_dv, du_dv_next);
 }

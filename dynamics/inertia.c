@@ -5,7 +5,7 @@
 #include "workspace.h"
 
 // each link's own mass, first moment and inertia at the reference, then sums towards the root
-static void composites(const cav_model *model, cav_state *state) {
+void cav_composites(const cav_model *model, cav_state *state) {
   double *all = state->work->composite;
   for (int i = 1; i < model->nlink; i++) {
     double *c = all + 10 * i, d[3], m = model->link[i].mass;
@@ -28,14 +28,6 @@ static void composites(const cav_model *model, cav_state *state) {
   }
 }
 
-// wrench that gives the composite unit acceleration along S: (I a + c x l, m l + a x c) for S = (a, l), first moment c
-static void composite_mul(double F[6], const double c[10], const double S[6]) {
-  symmetric_mul(F, c + 4, S);
-  cross_add3(F, c + 1, S + 3);
-  scale3(F + 3, c[0], S + 3);
-  cross_add3(F + 3, S, c + 1);
-}
-
 double cav_added_inertia(const cav_model *model, const cav_state *state, int dof) {
   const cav_dof *d = &model->dof[dof];
   int implicit = state->options.order == CAV_ORDER_EULER && state->options.passive;
@@ -44,10 +36,10 @@ double cav_added_inertia(const cav_model *model, const cav_state *state, int dof
 
 void cav_composite_inertia(const cav_model *model, cav_state *state, double *M) {
   const cav_workspace *w = state->work;
-  composites(model, state);
+  cav_composites(model, state);
   for (int i = 0; i < model->nv; i++) {
     double F[6], *Mi = M + w->row[i];
-    composite_mul(F, w->composite + 10 * model->dof[i].link, state->axis + 6 * i);
+    inertia_mul(F, w->composite + 10 * model->dof[i].link, state->axis + 6 * i);
     for (int j = i, k = 0; j >= 0; j = w->parent[j], k++) { Mi[k] = dot6(F, state->axis + 6 * j); }
   }
 }

@@ -137,6 +137,7 @@ static void copy(double *to, const double *from, int n) {
 
 static void evaluate(const cav_model *model, cav_state *state, int with_constraints, int new_velocity, double *u) {
   cav_workspace *w = state->work;
+  w->derived = 0;
   double *bias = w->scratch, *a = w->scratch + model->nv, scale = -1 / state->options.timestep;
   const double *damped = step_velocities(model, state, bias, a);
 
@@ -172,6 +173,12 @@ void cav_smooth_inverse(const cav_model *model, cav_state *state, const double *
   evaluate(model, state, 0, 1, u);
 }
 
+int cav_evaluated(const cav_state *state) {
+  const cav_options *o = &state->options, *then = &state->work->options;
+  return state->work->valid == CAV_STAGE_VELOCITY && same_position_options(o, then) && o->order == then->order &&
+         o->gravity == then->gravity && o->passive == then->passive;
+}
+
 cav_status cav_inverse_from(const cav_model *model, cav_state *state, cav_stage unchanged, const double *q,
                             const double *v, const double *v_next, double *u) {
   cav_workspace *w = state->work;
@@ -191,6 +198,8 @@ cav_status cav_inverse_from(const cav_model *model, cav_state *state, cav_stage 
   if (!all_finite(state->u, model->nv)) { return CAV_NOT_FINITE; }
   w->valid = CAV_STAGE_VELOCITY;
   w->options.order = state->options.order;
+  w->options.gravity = state->options.gravity;
+  w->options.passive = state->options.passive;
   copy(u, state->u, model->nv);
   return CAV_OK;
 }

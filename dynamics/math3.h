@@ -247,4 +247,13 @@ static inline void push_at(double F[6], const double reference[3], const double 
   add3(F + 3, F + 3, force);
 }
 
+/// Wrench that gives a body unit acceleration along S; c: mass, first moment, inertia at the reference. For S = (a, l):
+/// (I a + c x l, m l + a x c).
+static inline void inertia_mul(double F[6], const double c[10], const double S[6]) {
+  symmetric_mul(F, c + 4, S);
+  cross_add3(F, c + 1, S + 3);
+  scale3(F + 3, c[0], S + 3);
+  cross_add3(F + 3, S, c + 1);
+}
+
 #endif

@@ -119,11 +119,17 @@ void cav_row_push_force(const cav_state *state, const cav_row *row, double force
 /// Velocity of a contact in its frame, out [dim], from spatial velocities of links [nlink*6]. inverse.c.
 void cav_contact_velocity(const cav_state *state, const cav_contact *contact, const double *velocity, double *out);
 
+/// Whether the state holds a whole evaluation of the inverse under its present options. inverse.c.
+int cav_evaluated(const cav_state *state);
+
 /// u [nv] of the step without constraints, at the state's positions: u = RNE + D a - p. Fills velocities. inverse.c.
 void cav_smooth_inverse(const cav_model *model, cav_state *state, const double *v, const double *v_next, double *u);
 
 /// q := q (+) step e_dof: one coordinate of the tangent. manifold.c.
 void cav_perturb(const cav_model *model, int dof, double step, double *q);
+
+/// Mass, first moment and inertia of every subtree at its reference, into the workspace [nlink*10]. inertia.c.
+void cav_composites(const cav_model *model, cav_state *state);
 
 /// Composite inertia at the state's poses without D, tree-sparse (row i: dof i, its parent, ...). inertia.c.
 void cav_composite_inertia(const cav_model *model, cav_state *state, double *M);

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "math3.h"
+#include "slope.h"
 #include "workspace.h"
 
 enum { FIRST_ROOM = 16, ALIGNMENT = 64 };
@@ -190,6 +191,7 @@ void cav_state_free(cav_state *state) {
   cav_geom_cache_free(state->work->geom);
   free(state->work->gram);
   free(state->work->readout);
+  cav_slopes_free(state->work->slopes);
   free(state->work->solver);
   free(state->work->memory);
   free(state->contact);

@@ -63,6 +63,10 @@ typedef struct cav_workspace {
   double *readout;
   size_t readout_room;
 
+  // analytic derivatives: made by the first call, and whether they are of the last evaluation
+  struct cav_slopes *slopes;
+  int derived;
+
   // forward step: memory of its matrices, grown by impulse.c, and the impulses of its last Gauss-Seidel solve, by gpgs.c
   void *solver;
   size_t solver_bytes;

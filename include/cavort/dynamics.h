@@ -152,19 +152,56 @@ cav_status cav_forward_newton(const cav_model *model, cav_state *state, const do
                               const double *u, int iterations, double tolerance, double *v_next,
                               cav_forward_report *report);
 
+/// How derivatives are computed.
+typedef enum cav_derivative {
+  CAV_DERIVATIVE_FORWARD, ///< staged one-sided differences
+  CAV_DERIVATIVE_CENTRED, ///< staged centred differences
+  CAV_DERIVATIVE_ANALYTIC ///< closed form
+} cav_derivative;
+
 /// Derivatives of cav_inverse, nv x nv, row-major (du[i*nv+j] = du_i/dx_j); NULL = not needed. Positions are differentiated
 /// in the tangent: q (+) e_j. Staged one-sided differences with the default step; cav_inverse_jacobian_by chooses.
 cav_status cav_inverse_jacobian(const cav_model *model, cav_state *state, const double *q, const double *v,
                                 const double *v_next, double *du_dq, double *du_dv, double *du_dv_next);
 
-typedef enum cav_derivative { CAV_DERIVATIVE_FORWARD, CAV_DERIVATIVE_CENTRED } cav_derivative;
+/// The same by any method. CAV_DERIVATIVE_ANALYTIC fails as cav_derivatives does; nothing takes its place.
+cav_status cav_inverse_jacobian_by(const cav_model *model, cav_state *state, cav_derivative method, const double *q,
+                                   const double *v, const double *v_next, double *du_dq, double *du_dv,
+                                   double *du_dv_next);
+
+/// What part of a model has no analytic derivatives, in a few words; NULL if every part has.
+const char *cav_derivatives_missing(const cav_model *model);
+
+/// Analytic derivatives of u at the state's last cav_inverse, as cav_inverse_jacobian gives them; NULL = not needed.
+/// CAV_BAD_INPUT if the state holds no evaluation under its present options; CAV_NOT_SUPPORTED if
+/// cav_derivatives_missing names something, or if contact points of a pair come and go within 1e-5 of the posture.
+/// Outputs are undefined after a failure. At kinks of the exact law one element of the generalised derivative.
+cav_status cav_derivatives(const cav_model *model, cav_state *state, double *du_dq, double *du_dv, double *du_dv_next);
+
+/// Derivatives of one contact, rows by nv, row-major; NULL = not needed.
+typedef struct cav_contact_derivative {
+  double *dist_dq;                                   ///< [nv]
+  double *velocity_dq;                               ///< [dim*nv] of velocity_next
+  double *velocity_dv_next;                          ///< [dim*nv] of velocity_next
+  double *impulse_dq, *impulse_dv, *impulse_dv_next; ///< [dim*nv]
+} cav_contact_derivative;
+
+/// Derivatives of contact number contact of the state, after cav_derivatives and before the next evaluation
+/// (CAV_BAD_INPUT otherwise). Writes where out points.
+cav_status cav_contact_derivatives(const cav_model *model, const cav_state *state, int contact,
+                                   cav_contact_derivative *out);
+
+/// Derivatives of cav_sense at the same point, [sensor->dim*nv] each; NULL = not needed. Readings do not depend on v.
+/// CAV_BAD_INPUT as above, CAV_NOT_SUPPORTED for a type of sensor without derivative.
+cav_status cav_sense_derivatives(const cav_model *model, const cav_state *state, const cav_sensor *sensor, double *d_dq,
+                                 double *d_dv_next);
 
 /// A function of (q, v, v_next) read off a state after cav_inverse has filled it: writes n values.
 /// base is the state at the unperturbed point, equal to state for the base call itself.
 typedef void (*cav_readout)(const cav_model *model, const cav_state *state, void *context, double *value);
 
 /// Staged finite differences of any readout of n values. step 0: chosen by coordinate scale.
-/// value [n] at the point; d_dq, d_dv, d_dv_next [n*nv] row-major, NULL = not needed. dynamics.md, 7.
+/// method is one of the two differences (CAV_BAD_INPUT otherwise). value [n] at the point; d_dq, d_dv, d_dv_next [n*nv] row-major, NULL = not needed. dynamics.md, 7.
 /// A pass over v or v_next repeats no position work. The state is left at the point itself.
 cav_status cav_differentiate(const cav_model *model, cav_state *state, cav_derivative method, double step,
                              const double *q, const double *v, const double *v_next, cav_readout readout, void *context,
