@@ -1,6 +1,6 @@
 /// Forces inside a model, from the last evaluation of the inverse: what holds a body to its parent, and what presses on a
 /// zone of its surface. The first is the balance of the body's subtree in the file, Newton-Euler for each of its bodies
-/// less the contacts upon it, so it is there also for bodies that are fused into one link. Springs, dampers, actuators,
+/// less the contacts and ties upon it, so it is there also for bodies that are fused into one link. Springs, dampers, actuators,
 /// limits and friction of joints and tendons act between bodies of the tree and are part of what it reports.
 #include "math3.h"
 #include "workspace.h"
@@ -47,6 +47,27 @@ static void add_contact(const cav_contact *c, const double point[3], double scal
   push_at(F, point, c->pos, force);
 }
 
+// wrench at a point of a connect, a weld or a distance on the body below, scaled
+static void add_tie(const cav_model *model, const cav_tie *tie, int body, const double point[3], double scale,
+                    double F[6]) {
+  const cav_equality *e = &model->equality[tie->equality];
+  if (e->type == CAV_EQUALITY_JOINT || e->type == CAV_EQUALITY_TENDON) { return; }
+  for (int k = 0; k < 2; k++) {
+    int on = e->type == CAV_EQUALITY_DISTANCE ? model->geom[e->object[k]].body : e->object[k];
+    if (!cav_descends(model, on, body)) { continue; }
+    double force[3], moment[3], sign = k ? -scale : scale;
+    if (tie->dim == 1) {
+      scale3(force, sign * tie->impulse[0], tie->normal);
+    } else {
+      scale3(force, sign, tie->impulse);
+    }
+    push_at(F, point, tie->point[k], force);
+    if (tie->dim < 6) { continue; }
+    rotate_back(moment, tie->turn, tie->impulse + 3);
+    axpy3(F, F, sign, moment);
+  }
+}
+
 void cav_body_wrench(const cav_model *model, const cav_state *state, int body, const double point[3], double F[6]) {
   zero3(F);
   zero3(F + 3);
@@ -61,6 +82,7 @@ void cav_body_wrench(const cav_model *model, const cav_state *state, int body, c
     int second = cav_descends(model, model->geom[pair->geom2].body, body);
     if (first != second) { add_contact(c, point, second ? -inverse_h : inverse_h, F); }
   }
+  for (int i = 0; i < state->ntie; i++) add_tie(model, &state->tie[i], body, point, -inverse_h, F);
 }
 
 double cav_touch_force(const cav_model *model, const cav_state *state, int site) {
