@@ -673,34 +673,19 @@ static void fill_equalities(builder *b) {
   }
 }
 
-static int find_target(cav_spec *spec, const cav_spec_actuator *s) {
-  if (s->tendon) return resolve(spec, s->node, "tendon", "tendon", s->tendon, TABLE(spec->tendon));
-  return resolve(spec, s->node, "joint", "joint", s->joint, TABLE(spec->joint));
-}
-
 static void fill_actuators(builder *b) {
   cav_spec *spec = b->spec;
   for (int i = 0; i < spec->actuator.n && running(b); i++) {
     const cav_spec_actuator *s = &spec->actuator.at[i];
     cav_actuator *a = &b->actuator[i];
     *a = (cav_actuator){.name = put_text(b, s->name)};
-    a->transmission = s->tendon ? CAV_TRANSMISSION_TENDON : CAV_TRANSMISSION_JOINT;
-    a->target = find_target(spec, s);
-    if (!running(b)) return;
-    cav_joint_type type = s->tendon ? CAV_JOINT_HINGE : spec->joint.at[a->target].type;
-    if (!is_scalar(type) && cav_xml_get(s->node, "jointinparent"))
-      cav_spec_fail(spec, s->node, "jointinparent", "not supported on free and ball joints; use joint");
+    cav_drive_compile(spec, s, a);
     a->ctrllimited =
         limits(spec, s->node, "ctrllimited", "ctrlrange", s->ctrllimited, s->ctrlrange) && spec->option.clamp;
     a->forcelimited = limits(spec, s->node, "forcelimited", "forcerange", s->forcelimited, s->forcerange);
+    a->actlimited = limits(spec, s->node, "actlimited", "actrange", s->actlimited, s->actrange);
     memcpy(a->ctrlrange, s->ctrlrange, sizeof a->ctrlrange);
-    // a gain multiplies the control and joins the gear; the limit of the force then counts in controls
-    for (int k = 0; k < 6; k++) a->gear[k] = s->gear[k] * s->gain;
-    a->forcerange[s->gain < 0] = s->forcerange[0] / s->gain;
-    a->forcerange[s->gain > 0] = s->forcerange[1] / s->gain;
-    double gear = 0;
-    for (int k = 0; k < joint_v[type]; k++) gear += fabs(a->gear[k]);
-    if (gear == 0) cav_spec_fail(spec, s->node, "gear", "expected a gear that is not 0; this actuator gives no force");
+    memcpy(a->actrange, s->actrange, sizeof a->actrange);
   }
 }
 
@@ -931,6 +916,15 @@ static void warn_guarded(builder *b) {
                   least);
 }
 
+// lengths between which muscles work
+static void find_strokes(builder *b) {
+  int i = cav_stroke(b->model);
+  if (i == b->model->nactuator && i > 0) cav_spec_no_memory(b->spec);
+  if (i >= 0 && i < b->model->nactuator)
+    cav_spec_fail(b->spec, b->spec->actuator.at[i].node, "lengthrange",
+                  "is missing, and the joints let this muscle become as long or as short as it likes; give it");
+}
+
 static cav_model *build(builder *b) {
   cav_spec *spec = b->spec;
   count(b);
@@ -962,6 +956,7 @@ static cav_model *build(builder *b) {
                     "the inertia matrix is singular in the posture of the file; check masses, axes and armature");
     else
       check_results(b);
+    if (running(b)) find_strokes(b);
   }
   if (running(b)) return b->model;
   free(b->model);

@@ -5,8 +5,7 @@
 #include "impulse.h"
 #include "math3.h"
 
-// last dof that moves a link, -1 for the world
-static int last_dof(const cav_model *model, int link) {
+int cav_last_dof(const cav_model *model, int link) {
   while (link > 0 && model->link[link].ndof == 0) link = model->link[link].parent;
   return link > 0 ? model->link[link].dof + model->link[link].ndof - 1 : -1;
 }
@@ -23,7 +22,7 @@ static void contact_column(const cav_model *model, const cav_state *state, const
 
 // dofs of a contact, from the leaves to where the two branches meet; returns their number
 static int contact_dofs(const cav_model *model, const cav_contact *contact, int *dof) {
-  int i = last_dof(model, contact->link1), j = last_dof(model, contact->link2), n = 0;
+  int i = cav_last_dof(model, contact->link1), j = cav_last_dof(model, contact->link2), n = 0;
   while (i != j) {
     // the higher index cannot be an ancestor of the other; the complement marks dofs of link1
     const int first = i > j;
@@ -66,7 +65,7 @@ static void tie_column(const cav_model *model, const cav_state *state, const cav
 
 static int tie_links(const cav_model *model, const cav_state *state, const cav_tie *tie, int *dof, double *J) {
   const cav_equality *e = &model->equality[tie->equality];
-  int first = last_dof(model, e->link[0]), second = last_dof(model, e->link[1]), n = 0;
+  int first = cav_last_dof(model, e->link[0]), second = cav_last_dof(model, e->link[1]), n = 0;
   for (int i = first, j = second; i >= 0 || j >= 0; n++) {
     dof[n] = i > j ? i : j;
     if (i == dof[n]) i = model->dof[i].parent;

@@ -237,26 +237,6 @@ static void read_tendon_values(cav_spec *spec, const cav_xml_node *node, cav_spe
   read_real(node, "springlength", &t->springlength);
 }
 
-// motor, or general; every other kind shares the same defaults and makes of a general actuator what is not offered
-static void read_actuator_values(cav_spec *spec, const cav_xml_node *node, cav_spec_actuator *a) {
-  (void)spec;
-  read_limited(node, "ctrllimited", &a->ctrllimited);
-  read_limited(node, "forcelimited", &a->forcelimited);
-  cav_xml_reals(node, "ctrlrange", a->ctrlrange, 2);
-  cav_xml_reals(node, "forcerange", a->forcerange, 2);
-  cav_xml_reals(node, "gear", a->gear, 6);
-  if (is(node, "general")) {
-    a->dyntype = cav_xml_word(node, "dyntype", a->dyntype);
-    a->gaintype = cav_xml_word(node, "gaintype", a->gaintype);
-    a->biastype = cav_xml_word(node, "biastype", a->biastype);
-    read_real(node, "gainprm", &a->gain);
-  } else {
-    a->dyntype = a->gaintype = 0;
-    a->biastype = !is(node, "motor");
-    a->gain = 1;
-  }
-}
-
 static const cav_softness soft = {{0.02, 1}, {0.9, 0.95, 0.001, 0.5, 2}};
 
 // the defaults of MJCF itself
@@ -278,8 +258,12 @@ static defaults first_defaults(void) {
   d.pair = (cav_spec_pair){.condim = 3, .friction = {1, 1, 0.005, 0.0001, 0.0001}, .softness = soft};
   d.tendon = (cav_spec_tendon){.limited = CAV_LIMITED_AUTO, .limit = soft, .friction = soft};
   d.equality = (cav_spec_equality){.active = 1, .softness = soft};
-  d.actuator =
-      (cav_spec_actuator){.ctrllimited = CAV_LIMITED_AUTO, .forcelimited = CAV_LIMITED_AUTO, .gear = {1}, .gain = 1};
+  d.actuator = (cav_spec_actuator){.ctrllimited = CAV_LIMITED_AUTO,
+                                   .forcelimited = CAV_LIMITED_AUTO,
+                                   .actlimited = CAV_LIMITED_AUTO,
+                                   .gear = {1},
+                                   .dynprm = {1},
+                                   .gainprm = {1}};
   for (int i = 0; i < 4; i++) d.rgba[i] = 1;
   return d;
 }
@@ -307,7 +291,7 @@ static void read_default_values(reader *r, const cav_xml_node *node, defaults *d
   else if (!strcmp(name, "material"))
     cav_xml_reals(node, "rgba", d->rgba, 4);
   else if (cav_xml_accepts(node, "ctrlrange"))
-    read_actuator_values(spec, node, &d->actuator);
+    cav_drive_values(node, &d->actuator);
 }
 
 // own values of a class first, then its subclasses, which start from them
@@ -669,37 +653,13 @@ static void read_tendon(reader *r, const cav_xml_node *node) {
   }
 }
 
-static void check_actuator(cav_spec *spec, const cav_spec_actuator *a) {
-  if (a->dyntype || a->gaintype || a->biastype)
-    cav_spec_fail(spec, a->node, NULL,
-                  "only motors are supported: dyntype none, gaintype fixed, biastype none (here or by default)");
-  if (a->gain == 0) cav_spec_fail(spec, a->node, "gainprm", "a gain of 0 gives no force; write another or remove it");
-  static const char *const others[] = {"slidersite", "cranksite", "site", "refsite", "body"};
-  for (int i = 0; i < 5; i++) {
-    if (cav_xml_get(a->node, others[i]))
-      cav_spec_fail(spec, a->node, others[i], "this transmission is not supported yet; use joint or tendon");
-  }
-  if (!a->joint == !a->tendon)
-    cav_spec_fail(spec, a->node, NULL, "expected one of joint and tendon; name what it drives");
-}
-
 static void read_actuators(reader *r, const cav_xml_node *node) {
   cav_spec *spec = r->spec;
   for (const cav_xml_node *c = node->child; c && spec->status == CAV_OK; c = c->next) {
-    if (!is(c, "motor") && !is(c, "general")) {
-      cav_spec_fail(spec, c, NULL,
-                    "this kind of actuator is not supported yet; write a motor with the range it can give");
-      return;
-    }
     cav_spec_actuator *a = CAV_SPEC_PUSH(spec, &spec->actuator);
     if (!a) return;
     *a = class_of(r, c, NULL)->actuator;
-    read_actuator_values(spec, c, a);
-    a->name = cav_xml_text(c, "name", "");
-    a->node = c;
-    a->tendon = cav_xml_text(c, "tendon", NULL);
-    a->joint = cav_xml_text(c, "joint", cav_xml_text(c, "jointinparent", NULL));
-    check_actuator(spec, a);
+    cav_drive_read(spec, c, a);
   }
 }
 

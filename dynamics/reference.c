@@ -1,8 +1,8 @@
 /// Inverse weights at the reference configuration q0: the `reference` diagonal of A (dynamics.md, 4). Per dof the
 /// diagonal of M^-1, averaged over a ball's three and over the two threes of a free joint; per body the mean
 /// translational and rotational diagonal of J M^-1 J' at its centre of mass; per tendon J M^-1 J'; per pair the sum over
-/// its two bodies. Also what equality constraints take from q0, and the rest lengths of spatial tendons' springs. M is the
-/// inertia with armature and without implicit damping.
+/// its two bodies. Also what equality constraints take from q0, the rest lengths of spatial tendons' springs, and per
+/// actuator the acceleration of a unit force. M is the inertia with armature and without implicit damping.
 #include <stdlib.h>
 
 #include "math3.h"
@@ -90,10 +90,21 @@ static void weigh_tendon(const cav_model *model, const cav_state *state, cav_ten
   tendon->inverse_weight = inverse_norm(model, w);
 }
 
+// |M^-1 moments| of an actuator
+static void weigh_actuator(const cav_model *model, const cav_state *state, int i) {
+  const cav_workspace *w = state->work;
+  double *x = w->scratch, sum = 0;
+  cav_actuator_length(model, state, i, x);
+  cav_ldl_solve(model, w, w->L, x);
+  for (int k = 0; k < model->nv; k++) { sum += x[k] * x[k]; }
+  ((cav_actuator *)&model->actuator[i])->acceleration = sqrt(sum);
+}
+
 static void weigh_all(const cav_model *model, const cav_state *state) {
   weigh_dofs(model, state->work);
   for (int i = 0; i < model->nbody; i++) { weigh_body(model, state, (cav_body *)&model->body[i]); }
   for (int i = 0; i < model->ntendon; i++) { weigh_tendon(model, state, (cav_tendon *)&model->tendon[i]); }
+  for (int i = 0; i < model->nactuator; i++) { weigh_actuator(model, state, i); }
   for (int i = 0; i < model->npair; i++) {
     cav_pair *pair = (cav_pair *)&model->pair[i];
     const cav_body *a = &model->body[model->geom[pair->geom1].body], *b = &model->body[model->geom[pair->geom2].body];

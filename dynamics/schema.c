@@ -79,14 +79,22 @@ static const char *const biastypes[] = {"none", "affine", "muscle", "user", NULL
 
 #define ACTUATOR                                                                                                \
   WORD("ctrllimited", truth), WORD("forcelimited", truth), REALS("ctrlrange", 2, 2), REALS("forcerange", 2, 2), \
-      REALS("gear", 1, 6), SKIP("cranklength"), SKIP("user"), SKIP("group")
+      REALS("gear", 1, 6), REAL("cranklength"), SKIP("user"), SKIP("group")
 
-#define GENERAL                                                                                 \
-  SKIP("actlimited"), SKIP("actrange"), WORD("dyntype", dyntypes), WORD("gaintype", gaintypes), \
-      WORD("biastype", biastypes), SKIP("dynprm"), REALS("gainprm", 1, 10), SKIP("biasprm")
+#define ACTRANGE WORD("actlimited", truth), REALS("actrange", 2, 2)
 
-#define TRANSMISSION                                                                                           \
-  NAMED("name"), NAMED("class"), SKIP("lengthrange"), NAMED("joint"), NAMED("jointinparent"), NAMED("tendon"), \
+#define GENERAL                                                                                  \
+  ACTRANGE, WORD("dyntype", dyntypes), WORD("gaintype", gaintypes), WORD("biastype", biastypes), \
+      REALS("dynprm", 1, 10), REALS("gainprm", 1, 10), REALS("biasprm", 1, 10)
+
+#define CYLINDER REAL("timeconst"), REAL("area"), REAL("diameter"), REALS("bias", 3, 3)
+
+#define MUSCLE                                                                                              \
+  REALS("timeconst", 2, 2), REALS("range", 2, 2), REAL("force"), REAL("scale"), REAL("lmin"), REAL("lmax"), \
+      REAL("vmax"), REAL("fpmax"), REAL("fvmax")
+
+#define TRANSMISSION                                                                                                  \
+  NAMED("name"), NAMED("class"), REALS("lengthrange", 2, 2), NAMED("joint"), NAMED("jointinparent"), NAMED("tendon"), \
       NAMED("slidersite"), NAMED("cranksite"), NAMED("site"), NAMED("refsite"), NAMED("body")
 
 // --- elements without children, or with children of no interest ---
@@ -181,13 +189,12 @@ LEAF(default_equality, "equality", EQUALITY);
 LEAF(default_tendon, "tendon", TENDON);
 LEAF(default_general, "general", ACTUATOR, GENERAL);
 LEAF(default_motor, "motor", ACTUATOR);
-LEAF(default_position, "position", ACTUATOR, SKIP("kp"));
-LEAF(default_velocity, "velocity", ACTUATOR, SKIP("kv"));
-LEAF(default_intvelocity, "intvelocity", ACTUATOR, SKIP("actrange"), SKIP("kp"));
-LEAF(default_damper, "damper", ACTUATOR, SKIP("kv"));
-LEAF(default_cylinder, "cylinder", ACTUATOR, SKIP("timeconst"), SKIP("area"), SKIP("diameter"), SKIP("bias"));
-LEAF(default_muscle, "muscle", ACTUATOR, SKIP("timeconst"), SKIP("range"), SKIP("force"), SKIP("scale"), SKIP("lmin"),
-     SKIP("lmax"), SKIP("vmax"), SKIP("fpmax"), SKIP("fvmax"));
+LEAF(default_position, "position", ACTUATOR, REAL("kp"));
+LEAF(default_velocity, "velocity", ACTUATOR, REAL("kv"));
+LEAF(default_intvelocity, "intvelocity", ACTUATOR, ACTRANGE, REAL("kp"));
+LEAF(default_damper, "damper", ACTUATOR, REAL("kv"));
+LEAF(default_cylinder, "cylinder", ACTUATOR, CYLINDER);
+LEAF(default_muscle, "muscle", ACTUATOR, MUSCLE);
 LEAF(default_adhesion, "adhesion", ACTUATOR, SKIP("gain"));
 
 static const cav_xml_attribute default_attributes[] = {NAMED("class"), END};
@@ -290,12 +297,12 @@ static const cav_xml_element tendon = {"tendon", 0, 0, NULL, tendon_children, 0}
 
 LEAF(general, "general", TRANSMISSION, ACTUATOR, GENERAL);
 LEAF(motor, "motor", TRANSMISSION, ACTUATOR);
-UNREAD(position, "position");
-UNREAD(velocity, "velocity");
-UNREAD(intvelocity, "intvelocity");
-UNREAD(damper, "damper");
-UNREAD(cylinder, "cylinder");
-UNREAD(muscle, "muscle");
+LEAF(position, "position", TRANSMISSION, ACTUATOR, REAL("kp"));
+LEAF(velocity, "velocity", TRANSMISSION, ACTUATOR, REAL("kv"));
+LEAF(intvelocity, "intvelocity", TRANSMISSION, ACTUATOR, ACTRANGE, REAL("kp"));
+LEAF(damper, "damper", TRANSMISSION, ACTUATOR, REAL("kv"));
+LEAF(cylinder, "cylinder", TRANSMISSION, ACTUATOR, CYLINDER);
+LEAF(muscle, "muscle", TRANSMISSION, ACTUATOR, MUSCLE);
 UNREAD(adhesion, "adhesion");
 static const cav_xml_element *const actuator_children[] = {
     &general, &motor, &position, &velocity, &intvelocity, &damper, &cylinder, &muscle, &adhesion, &include, NULL};

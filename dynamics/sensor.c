@@ -234,11 +234,11 @@ static void sense_site(const cav_model *model, const cav_state *state, const cav
 static double sense_actuator(const cav_model *model, const cav_state *state, const cav_sensor *sensor) {
   switch (sensor->type) {
     case CAV_SENSOR_ACTUATORPOS:
-      return cav_actuator_length(model, state, sensor->object);
+      return cav_actuator_length(model, state, sensor->object, NULL);
     case CAV_SENSOR_ACTUATORVEL:
-      return cav_actuator_velocity(model, state, sensor->object, state->work->v_next);
+      return cav_actuator_velocity(state, sensor->object, state->work->v_next);
     default:
-      return cav_actuator_force(model, state, sensor->object);
+      return cav_actuator_share(state, sensor->object);
   }
 }
 

@@ -114,14 +114,17 @@ typedef struct cav_spec_equality {
   cav_softness softness;
 } cav_spec_equality;
 
+enum { CAV_SPEC_DRIVE = CAV_DRIVE_PARAMETERS };
+
 typedef struct cav_spec_actuator {
   const char *name;
   const cav_xml_node *node;
-  const char *joint, *tendon;
-  cav_limited ctrllimited, forcelimited;
-  double ctrlrange[2], forcerange[2], gear[6];
-  double gain;                     ///< force per control
-  int dyntype, gaintype, biastype; ///< all 0 for a motor
+  cav_transmission transmission;
+  const char *target_kind, *target, *reference_kind, *reference; ///< attributes and what they name; NULL: no reference
+  cav_limited ctrllimited, forcelimited, actlimited;
+  double ctrlrange[2], forcerange[2], actrange[2], lengthrange[2], gear[6], cranklength;
+  int activation, gain, bias; ///< words of the file, in the order of the enumerations; one more is "user"
+  double dynprm[CAV_SPEC_DRIVE], gainprm[CAV_SPEC_DRIVE], biasprm[CAV_SPEC_DRIVE];
 } cav_spec_actuator;
 
 typedef struct cav_spec_sensor {
@@ -269,6 +272,13 @@ void cav_spec_mark_between(const cav_spec *spec, int body1, int body2, char *mar
 
 /// Marks the joints that can change a tendon's length, mark [joint.n], and returns their dofs. route.c.
 int cav_spec_tendon_joints(const cav_spec *spec, int tendon, char *mark);
+
+/// Values of an actuator element, of a class or of its own, over those it starts from. drive.c.
+void cav_drive_values(const cav_xml_node *node, cav_spec_actuator *actuator);
+
+/// The whole element: values, name, transmission. Then everything but name and the three limits. drive.c.
+void cav_drive_read(cav_spec *spec, const cav_xml_node *node, cav_spec_actuator *actuator);
+void cav_drive_compile(cav_spec *spec, const cav_spec_actuator *s, cav_actuator *actuator);
 
 /// Pairs of geoms that may touch, explicit ones first, then in the order of body pairs; their parameters mixed. For each
 /// body [nbody] weld is the body at the top of the group that moves with it, link_of its link. Returns a list of malloc,

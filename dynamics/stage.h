@@ -66,6 +66,9 @@ void cav_project(const cav_model *model, cav_state *state, double *u);
 void cav_add_joint_forces(const cav_model *model, const cav_state *state, const double *v, const double *a, double *u);
 void cav_add_tendon_forces(const cav_model *model, const cav_state *state, const double *v, double *u);
 
+/// Last dof that moves a link, -1 for the world. jacobian.c.
+int cav_last_dof(const cav_model *model, int link);
+
 /// Writes the constant arms of fixed tendons and lists the spatial ones, once. Lengths and arms at the state's poses.
 /// tendon.c.
 void cav_tendon_compile(const cav_model *model, cav_state *state);
@@ -152,14 +155,19 @@ void cav_body_wrench(const cav_model *model, const cav_state *state, int body, c
 /// Sum of the normal forces on the body of a site that lie in its zone or point out through it, N. wrench.c.
 double cav_touch_force(const cav_model *model, const cav_state *state, int site);
 
-/// Length of an actuator's transmission at the state's positions, its rate at v [nv], and its share of the least-norm forces
-/// that give the state's u. actuation.c.
-double cav_actuator_length(const cav_model *model, const cav_state *state, int actuator);
-double cav_actuator_velocity(const cav_model *model, const cav_state *state, int actuator, const double *v);
-double cav_actuator_force(const cav_model *model, const cav_state *state, int actuator);
+/// Rate of length of an actuator's transmission at v [nv], at the state's position. transmission.c.
+double cav_actuator_velocity(const cav_state *state, int actuator, const double *v);
+
+/// Force of an actuator, before gear, among the least-norm ones that give the state's u. actuation.c.
+double cav_actuator_share(const cav_state *state, int actuator);
+
 /// G [n*n] := pseudo-inverse of the symmetric positive semidefinite G by Jacobi rotations; eigenvalues up to rank times
 /// the largest count as 0. A, E [n*n] are scratch. symmetric.c.
 void cav_pseudo_inverse(int n, double rank, double *G, double *A, double *E);
+
+/// Fills the length ranges of muscles that the file leaves open, of a model under construction. Returns the first actuator
+/// whose length has no end within the ranges of the joints, nactuator if memory runs out, -1 if all is well. stroke.c.
+int cav_stroke(cav_model *model);
 
 struct cav_workspace;
 

@@ -75,7 +75,7 @@ static size_t layout(const cav_model *model, char *base, cav_state *s, cav_works
   w->tendon_limit = carve(base, &used, nt, i);
   w->tendon_friction = carve(base, &used, nt, i);
   size_t nu = model->nactuator, gears = 0;
-  for (int k = 0; k < model->nactuator; k++) { gears += (size_t)cav_transmission_entries(model, k); }
+  for (int k = 0; k < model->nactuator; k++) { gears += (size_t)cav_transmission_dofs(model, k, NULL); }
   w->gear_start = carve(base, &used, nu + 1, i);
   w->gear_dof = carve(base, &used, gears, i);
   w->gear = carve(base, &used, gears, d);
@@ -179,7 +179,7 @@ cav_state *cav_state_new(const cav_model *model) {
   state->row = malloc(FIRST_ROOM * sizeof(cav_row));
   work->contact_room = work->row_room = FIRST_ROOM;
   work->geom = cav_geom_cache_new(model);
-  if (!state->contact || !state->row || !work->geom || cav_actuation_compile(model, work) != CAV_OK) {
+  if (!state->contact || !state->row || !work->geom || cav_actuation_compile(model, state) != CAV_OK) {
     cav_state_free(state);
     return NULL;
   }

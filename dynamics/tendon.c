@@ -27,12 +27,6 @@ typedef struct knot {
   double pos[3]; ///< world
 } knot;
 
-// last dof that moves a link, -1 for the world
-static int last_dof(const cav_model *model, int link) {
-  while (link > 0 && model->link[link].ndof == 0) { link = model->link[link].parent; }
-  return link > 0 ? model->link[link].dof + model->link[link].ndof - 1 : -1;
-}
-
 // row += scale times what a unit velocity of the dof moves a point along a direction
 static void add_arm(const cav_state *state, int dof, const double point[3], const double direction[3], double scale,
                     double *row) {
@@ -49,7 +43,7 @@ static double add_piece(const cav_state *state, const knot *a, const knot *b, do
   double length = norm3(direction);
   if (a->link == b->link || length == 0) { return scale * length; }
   scale3(direction, 1 / length, direction);
-  int i = last_dof(model, a->link), j = last_dof(model, b->link);
+  int i = cav_last_dof(model, a->link), j = cav_last_dof(model, b->link);
   while (i != j) {
     // the higher index cannot be an ancestor of the other
     if (i > j) {

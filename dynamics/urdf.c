@@ -381,12 +381,13 @@ static void push_motor(cav_spec *spec, const cav_xml_node *node, const char *nam
   if (!a) return;
   *a = (cav_spec_actuator){.name = name,
                            .node = node,
-                           .joint = name,
+                           .target_kind = "joint",
+                           .target = name,
                            .ctrllimited = CAV_LIMITED_YES,
                            .forcelimited = CAV_LIMITED_NO,
                            .ctrlrange = {-effort, effort},
                            .gear = {1},
-                           .gain = 1};
+                           .gainprm = {1}};
 }
 
 // limits, damping and friction of a hinge or slide; an effort limit becomes a motor

@@ -51,12 +51,13 @@ typedef struct cav_workspace {
   double *composite; ///< [nlink*10] mass, first moment, inertia at reference of each subtree
   double *scratch;   ///< [4*nv]
 
-  // transmission: sparse columns of T and what inverts T'T (actuation.c)
+  // transmission: moments of each actuator along its dofs and what inverts T'T (actuation.c)
   int *gear_start, *gear_dof; ///< [nu+1], [entries]
   double *gear;               ///< [entries]
+  int gear_varies;            ///< some moments depend on q
   int gram_diagonal;
   double *gram_inverse; ///< [nu] of a diagonal T'T
-  double *gram;         ///< [nu*nu] its pseudo-inverse otherwise, with scratch behind; NULL if diagonal
+  double *gram;         ///< [nu*nu] its pseudo-inverse otherwise, with scratch behind; NULL if diagonal and constant
   double *control;      ///< [2*nu]
 
   // readings of cav_differentiate, grown on demand
@@ -74,8 +75,12 @@ typedef struct cav_workspace {
   int nmemory, memory_room;
 } cav_workspace;
 
-/// Entries of an actuator's column of T; fills the transmission of a workspace. actuation.c.
-int cav_transmission_entries(const cav_model *model, int actuator);
-cav_status cav_actuation_compile(const cav_model *model, cav_workspace *w);
+/// Dofs that an actuator moves, dof NULL: only their number. Its length and moments along them, at the state's position.
+/// transmission.c.
+int cav_transmission_dofs(const cav_model *model, int actuator, int *dof);
+double cav_transmission_length(const cav_state *state, int actuator, double *moment);
+
+/// Fills the transmission of a workspace. actuation.c.
+cav_status cav_actuation_compile(const cav_model *model, cav_state *state);
 
 #endif

@@ -37,9 +37,9 @@ void cav_finding_note(cav_finding *finding, double value, int knot, const char *
 /// Name of a link's body for people: its name, or "body N".
 const char *cav_audit_link_name(const cav_model *model, int link, char buffer[32]);
 
-/// Range of an actuator's control: control and force limits together, infinite where open. scale: the larger finite
+/// Range of an actuator's effort by its limits, infinite where open. scale: the larger finite
 /// magnitude of the two, 1 where there is none.
-void cav_audit_actuator_range(const cav_actuator *actuator, double range[2], double *scale);
+void cav_audit_actuator_range(const cav_model *model, int actuator, double range[2], double *scale);
 
 /// Balance of momentum of every tree over all knots against gravity and contacts with what is not of the tree:
 /// root mean square and worst knot, share of weight. balance.c.

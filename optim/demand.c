@@ -156,7 +156,7 @@ static int effort_values(const cav_audit *audit, const cav_term *term, int t, do
   const cav_model *model = audit->model;
   for (int a = 0; a < model->nu; a++) {
     double range[2], scale;
-    cav_audit_actuator_range(model->actuator + a, range, &scale);
+    cav_audit_actuator_range(model, a, range, &scale);
     x[a] = audit->control[t * model->nu + a] / scale;
   }
   target_at(term, t * audit->h, model->nu, target);

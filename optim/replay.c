@@ -108,32 +108,22 @@ cav_status cav_replay_open(const cav_audit *audit, cav_replay *replay) {
   return status == CAV_NO_MEMORY ? status : CAV_OK;
 }
 
-// generalised force of clipped controls
-static void drive(const cav_model *model, const double *control, double *u) {
+// generalised force of clipped efforts; moment [nv] is scratch
+static void drive(const cav_model *model, const cav_state *state, const double *effort, double *moment, double *u) {
   memset(u, 0, sizeof(double) * model->nv);
   for (int a = 0; a < model->nu; a++) {
-    const cav_actuator *actuator = model->actuator + a;
     double range[2], scale;
-    cav_audit_actuator_range(actuator, range, &scale);
-    double c = fmin(fmax(control[a], range[0]), range[1]);
-    if (actuator->transmission == CAV_TRANSMISSION_TENDON) {
-      const cav_tendon *tendon = model->tendon + actuator->target;
-      for (int i = tendon->part; i < tendon->part + tendon->npart; i++) {
-        const cav_tendon_part *part = model->tendon_part + i;
-        u[model->joint[part->joint].dof] += part->coef * actuator->gear[0] * c;
-      }
-      continue;
-    }
-    const cav_joint *joint = model->joint + actuator->target;
-    int n = joint->type == CAV_JOINT_FREE ? 6 : joint->type == CAV_JOINT_BALL ? 3 : 1;
-    for (int k = 0; k < n; k++) u[joint->dof + k] += actuator->gear[k] * c;
+    cav_audit_actuator_range(model, a, range, &scale);
+    double force = model->actuator[a].unit * fmin(fmax(effort[a], range[0]), range[1]);
+    cav_actuator_length(model, state, a, moment);
+    for (int d = 0; d < model->nv; d++) u[d] += force * moment[d];
   }
 }
 
 // u := forces held around knot t and feedback at (q, v), through the actuators. A last knot without gains borrows those
 // before
 static void command(const cav_audit *audit, int t, const double *gain_q, const double *gain_v, const double *dq,
-                    const double *dv, double *control, double *u) {
+                    const double *dv, double *effort, double *work, double *u) {
   int nv = audit->model->nv;
   size_t at = (size_t)(t < audit->last ? t : audit->last - 1) * (size_t)nv * (size_t)nv;
   const double *Kq = gain_q ? gain_q + at : NULL, *Kv = gain_v ? gain_v + at : NULL;
@@ -142,8 +132,8 @@ static void command(const cav_audit *audit, int t, const double *gain_q, const d
     for (int j = 0; Kq && j < nv; j++) u[i] += Kq[i * nv + j] * dq[j];
     for (int j = 0; Kv && j < nv; j++) u[i] += Kv[i * nv + j] * dv[j];
   }
-  cav_actuation(audit->model, audit->bare, u, NULL, control);
-  drive(audit->model, control, u);
+  cav_actuation(audit->model, audit->bare, u, NULL, effort);
+  drive(audit->model, audit->bare, effort, work, u);
 }
 
 // the motion at a share of the way from knot t to t+1
@@ -230,7 +220,7 @@ static cav_status interval(const cav_audit *audit, cav_state *fine, const double
     cav_difference(model, q_ref, q, 1, dq);
     for (int d = 0; d < nv; d++) dv[d] = v[d] - v_ref[d];
     int around = 2 * k >= SUBSTEPS && t + 1 < audit->rows ? t + 1 : t;
-    command(audit, around, gain_q, gain_v, dq, dv, control, u);
+    command(audit, around, gain_q, gain_v, dq, dv, control, next, u);
     cav_status status = step(audit, fine, 1e-9, q, v, u, next);
     if (status == CAV_NO_MEMORY) return status;
     if (status != CAV_OK) {

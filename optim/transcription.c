@@ -9,6 +9,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -141,13 +142,9 @@ static int list_force_rows(cav_transcription *tr) {
 
   // efforts: control over its limit, or plain force where there is none
   for (int a = 0; a < nu; a++) {
-    const cav_actuator *actuator = &m->actuator[a];
-    double lower = -INFINITY, upper = INFINITY;
-    if (actuator->ctrllimited) lower = actuator->ctrlrange[0], upper = actuator->ctrlrange[1];
-    if (actuator->forcelimited) {
-      lower = fmax(lower, actuator->forcerange[0]);
-      upper = fmin(upper, actuator->forcerange[1]);
-    }
+    double range[2];
+    cav_actuator_effort_range(m, a, range);
+    double lower = range[0], upper = range[1];
     double limit = fmax(isfinite(lower) ? fabs(lower) : 0, isfinite(upper) ? fabs(upper) : 0);
     double scale = limit > 0 ? 1 / limit : 1;
     tr->effort_range[a][0] = lower * scale * tr->problem->effort_limit;
@@ -222,7 +219,28 @@ static int scratch_new(cav_transcription *tr, cav_scratch *s) {
   return ok && s->state;
 }
 
+cav_status cav_drives_plannable(const cav_model *model, cav_error *error) {
+  for (int i = 0; i < model->nu; i++) {
+    const cav_actuator *a = &model->actuator[i];
+    int motor = a->gain == CAV_GAIN_FIXED && a->bias == CAV_BIAS_NONE, muscle = a->gain == CAV_GAIN_MUSCLE;
+    const char *why = !a->constant               ? "its moments depend on the configuration"
+                      : muscle                   ? "what a muscle can give depends on its length and velocity"
+                      : !motor && a->ctrllimited ? "the limits of a servo's control move with its length and velocity"
+                                                 : NULL;
+    if (!why) continue;
+    if (error) {
+      *error = (cav_error){.status = CAV_NOT_SUPPORTED};
+      snprintf(error->text, sizeof error->text,
+               "actuator '%.60s' (%d) cannot be planned with: %s; use motors along joints or fixed tendons instead",
+               a->name, i, why);
+    }
+    return CAV_NOT_SUPPORTED;
+  }
+  return CAV_OK;
+}
+
 cav_transcription *cav_transcription_new(const cav_problem *problem, int threads, cav_error *error) {
+  if (cav_drives_plannable(problem->model, error) != CAV_OK) return NULL;
   cav_transcription *tr = calloc(1, sizeof *tr);
   if (!tr) goto memory;
   tr->problem = problem;

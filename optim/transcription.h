@@ -82,6 +82,11 @@ typedef struct cav_transcription {
   double seconds_dynamics, seconds_assembly;
 } cav_transcription;
 
+/// Whether efforts of all actuators are linear forms of u with constant limits, which plans and audits of them assume:
+/// moments constant in q, and limits that no bias or muscle moves. CAV_NOT_SUPPORTED with the actuator and why not.
+cav_status cav_drives_plannable(const cav_model *model, cav_error *error);
+
+/// NULL with the reason in error: no memory, or actuators that cannot be planned with.
 cav_transcription *cav_transcription_new(const cav_problem *problem, int threads, cav_error *error);
 void cav_transcription_free(cav_transcription *transcription);
 

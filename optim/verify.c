@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "audit.h"
+#include "transcription.h"
 
 static const double usual_gravity = 9.81; // m/s^2, unit of forces where the model has none
 static const double moment_arm = 0.3;     // m
@@ -51,17 +52,8 @@ const char *cav_audit_link_name(const cav_model *model, int link, char buffer[32
   return buffer;
 }
 
-void cav_audit_actuator_range(const cav_actuator *actuator, double range[2], double *scale) {
-  range[0] = -INFINITY;
-  range[1] = INFINITY;
-  if (actuator->ctrllimited) {
-    range[0] = actuator->ctrlrange[0];
-    range[1] = actuator->ctrlrange[1];
-  }
-  if (actuator->forcelimited) {
-    range[0] = fmax(range[0], actuator->forcerange[0]);
-    range[1] = fmin(range[1], actuator->forcerange[1]);
-  }
+void cav_audit_actuator_range(const cav_model *model, int actuator, double range[2], double *scale) {
+  cav_actuator_effort_range(model, actuator, range);
   double most = 0;
   for (int k = 0; k < 2; k++) {
     if (isfinite(range[k])) most = fmax(most, fabs(range[k]));
@@ -201,7 +193,7 @@ static void note_forces(const cav_audit *audit, int t, double *residual, evidenc
   }
   for (int a = 0; a < model->nu; a++) {
     double range[2], scale;
-    cav_audit_actuator_range(model->actuator + a, range, &scale);
+    cav_audit_actuator_range(model, a, range, &scale);
     double beyond = fmax(range[0] - control[a], control[a] - range[1]) / scale;
     cav_finding_note(&found->limit, beyond, t, "actuator %.60s (%d) at %.4g of %.4g .. %.4g", model->actuator[a].name,
                      a, control[a], range[0], range[1]);
@@ -361,6 +353,8 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
   cav_replay replay = {0};
   cav_balance *balance = NULL;
   if (error) *error = (cav_error){0};
+  status = cav_drives_plannable(problem->model, error);
+  if (status != CAV_OK) return status;
   status = audit_start(&audit, problem, trajectory, contact);
   if (status == CAV_OK) balance = cav_balance_new(&audit);
   if (!balance) status = CAV_NO_MEMORY;

@@ -75,7 +75,7 @@ static void print_bodies(const cav_model *m) {
 // what a model has, counted
 typedef struct census {
   int quaternion, spring, damper, armature, joint_limit, friction;
-  int tendon_spatial, tendon_spring, tendon_damper, tendon_limit, tendon_friction;
+  int moving, tendon_spatial, tendon_spring, tendon_damper, tendon_limit, tendon_friction;
   int world_pair, body_pair, convex_pair, dim[7];
   int types[CAV_GEOM_TYPES][CAV_GEOM_TYPES];
 } census;
@@ -91,6 +91,7 @@ static void count_joints(const cav_model *m, census *c) {
     c->armature += m->dof[d].armature != 0;
     c->friction += m->dof[d].frictionloss > 0;
   }
+  for (int i = 0; i < m->nu; i++) c->moving += !m->actuator[i].constant;
   for (int i = 0; i < m->ntendon; i++) {
     c->tendon_spatial += m->tendon[i].npath > 0;
     c->tendon_spring += m->tendon[i].stiffness != 0;
@@ -166,7 +167,8 @@ static void print_stages(const cav_model *m) {
     for (int i = 0; i < m->nequality; i++) n += m->equality[i].type == (cav_equality_type)t;
     if (n) printf("              %s each: %d\n", what[t], n);
   }
-  print_stage("actuators", m->nu, "motors", "nothing is driven");
+  print_stage("actuators", m->nu, "actuators", "nothing is driven");
+  print_stage("moments that follow q", c.moving, "actuators", "all moments are constant");
   printf("  no matrix is formed or factorised\n");
 }
 

@@ -24,17 +24,6 @@ static double *add(charts *c, const char *group, const char *name, const char *u
   return value;
 }
 
-// limits of a control: those of the control and of the force, infinite where there are none
-static void control_range(const cav_actuator *actuator, double range[2]) {
-  range[0] = -INFINITY;
-  range[1] = INFINITY;
-  if (actuator->ctrllimited) memcpy(range, actuator->ctrlrange, 2 * sizeof(double));
-  if (actuator->forcelimited) {
-    range[0] = fmax(range[0], actuator->forcerange[0]);
-    range[1] = fmin(range[1], actuator->forcerange[1]);
-  }
-}
-
 static void add_whole(charts *c, const cav_model *model, const cav_trajectory *trajectory, const cav_forces *forces,
                       double weight) {
   double *height = add(c, "Motion", "height of the centre of mass", "m", NAN, NAN);
@@ -54,7 +43,7 @@ static void add_whole(charts *c, const cav_model *model, const cav_trajectory *t
     effort[t] = model->nu && isfinite(forces->control[t * model->nu]) ? 0 : NAN;
     for (int a = 0; a < model->nu; a++) {
       double range[2], u = forces->control[t * model->nu + a];
-      control_range(&model->actuator[a], range);
+      cav_actuator_effort_range(model, a, range);
       double share = u > 0 ? u / range[1] : u / range[0];
       if (isfinite(share)) effort[t] = fmax(effort[t], share);
     }
@@ -67,7 +56,7 @@ static void add_whole(charts *c, const cav_model *model, const cav_trajectory *t
 static void add_each(charts *c, const cav_model *model, const cav_trajectory *trajectory, const cav_forces *forces) {
   for (int a = 0; a < model->nu; a++) {
     double range[2];
-    control_range(&model->actuator[a], range);
+    cav_actuator_effort_range(model, a, range);
     double *value = add(c, "Controls", model->actuator[a].name, "", range[0], range[1]);
     for (int t = 0; t < c->nknot; t++) value[t] = forces->control[t * model->nu + a];
   }

@@ -534,13 +534,13 @@ static void transmit(const cav_model *model, const double *control, double *f) {
   for (int i = 0; i < model->nactuator; i++) {
     const cav_actuator *a = &model->actuator[i];
     if (a->transmission == CAV_TRANSMISSION_JOINT) {
-      f[model->joint[a->target].dof] += a->gear[0] * control[i];
+      f[model->joint[a->target].dof] += a->unit * a->gear[0] * control[i];
       continue;
     }
     const cav_tendon *tendon = &model->tendon[a->target];
     for (int k = 0; k < tendon->npart; k++) {
       const cav_tendon_part *part = &model->tendon_part[tendon->part + k];
-      f[model->joint[part->joint].dof] += a->gear[0] * part->coef * control[i];
+      f[model->joint[part->joint].dof] += a->unit * a->gear[0] * part->coef * control[i];
     }
   }
 }

@@ -195,11 +195,18 @@ static void compare_actuators(const cav_model *m, const mjModel *p) {
   for (int i = 0; i < m->nu && i < p->nu; i++) {
     const cav_actuator *a = &m->actuator[i];
     CHECK_TEXT(a->name, p->names + p->name_actuatoradr[i]);
-    same(a->transmission == CAV_TRANSMISSION_TENDON ? mjTRN_TENDON : mjTRN_JOINT, p->actuator_trntype[i],
-         "transmission", a->name);
+    static const int kinds[] = {[CAV_TRANSMISSION_JOINT] = mjTRN_JOINT,
+                                [CAV_TRANSMISSION_JOINT_IN_PARENT] = mjTRN_JOINTINPARENT,
+                                [CAV_TRANSMISSION_TENDON] = mjTRN_TENDON,
+                                [CAV_TRANSMISSION_SITE] = mjTRN_SITE,
+                                [CAV_TRANSMISSION_CRANK] = mjTRN_SLIDERCRANK};
+    same(kinds[a->transmission], p->actuator_trntype[i], "transmission", a->name);
     same(a->target, p->actuator_trnid[2 * i], "target", a->name);
-    double gain = p->actuator_gainprm[i * mjNGAIN];
-    for (int k = 0; k < 6; k++) near(a->gear[k], gain * p->actuator_gear[6 * i + k], "gear", a->name);
+    if (a->reference >= 0) same(a->reference, p->actuator_trnid[2 * i + 1], "reference", a->name);
+    for (int k = 0; k < 6; k++) near(a->gear[k], p->actuator_gear[6 * i + k], "gear", a->name);
+    int motor = a->gain == CAV_GAIN_FIXED && a->bias == CAV_BIAS_NONE;
+    double gain = motor ? p->actuator_gainprm[i * mjNGAIN] : 1;
+    near(a->unit, gain, "unit", a->name);
     same(a->ctrllimited, p->actuator_ctrllimited[i], "ctrllimited", a->name);
     same(a->forcelimited, p->actuator_forcelimited[i], "forcelimited", a->name);
     all_near(a->ctrlrange, p->actuator_ctrlrange + 2 * i, 2, "ctrlrange", a->name);

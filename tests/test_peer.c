@@ -181,7 +181,7 @@ static double compare_readings(const pair_of_models *p) {
   mj_subtreeVel(m, d);
   for (int i = 0; i < m->nbody; i++) {
     // MuJoCo's bodies of a URDF are the links that move: centres of mass are those of what it merged
-    int b = i ? cav_find(p->ours, CAV_OBJECT_XBODY, m->names + m->name_bodyadr[i]) : 0;
+    int b = i && p->ours->fused ? cav_find(p->ours, CAV_OBJECT_XBODY, m->names + m->name_bodyadr[i]) : i;
     if (!p->ours->fused) {
       read_sensor(p, CAV_SENSOR_FRAMEPOS, CAV_OBJECT_BODY, b, out);
       worst = fmax(worst, apart(out, d->xipos + 3 * i, 3));
@@ -313,7 +313,7 @@ int main(void) {
       {"dm_control/cheetah.xml", 0.99},     {"dm_control/humanoid.xml", 0.99},   {"dm_control/reacher.xml", 0.99},
       {"urdf/double_pendulum.urdf", 0.7},   {"urdf/simple_humanoid.urdf", 0.99}, {"urdf/solo12.urdf", 0.99},
       {"dm_control/ball_in_cup.xml", 0.99}, {"dm_control/point_mass.xml", 0.99}, {"dm_control/finger.xml", 0.99},
-      {"dm_control/manipulator.xml", 0.99}};
+      {"dm_control/manipulator.xml", 0.99}, {"mujoco/arm26.xml", 0.99},          {"mujoco/slider_crank.xml", 0.93}};
   const char *folder = check_shared_models();
   if (!folder) {
     printf("skipped: set CAVORT_SHARED_MODELS to the folder of the models\n");

@@ -222,9 +222,32 @@ void cav_sense(const cav_model *model, const cav_state *state, const cav_sensor 
 /// World pose of a named kind of object at the state's last position.
 void cav_object_pose(const cav_model *model, const cav_state *state, cav_object_type type, int object, cav_pose *pose);
 
-/// Force of each dof that actuators can give, for u [nv]: u_actuated = P u with P the orthogonal projector onto the range of
-/// the transmission. residual [nv] = u - P u, control [nu] least-norm. Any output may be NULL.
-void cav_actuation(const cav_model *model, cav_state *state, const double *u, double *residual, double *control);
+/// Force of each dof that actuators can give at the state's last position, for u [nv]: P u with P the orthogonal projector
+/// onto the range of the transmission. residual [nv] = u - P u, effort [nu] least-norm, limits not applied (a muscle only
+/// pulls). Any output may be NULL. Where all moments are constant, no position is needed.
+void cav_actuation(const cav_model *model, cav_state *state, const double *u, double *residual, double *effort);
+
+/// Inputs that give efforts [nu] at the state's last position and the velocity v [nv]: controls, or activations of
+/// actuators that have one (what control brings them about is the caller's). input [nu] is the nearest within the limits;
+/// returns the number of actuators that cannot give their effort.
+int cav_actuation_inputs(const cav_model *model, cav_state *state, const double *v, const double *effort,
+                         double *input);
+
+/// Length of an actuator's transmission, m or rad times gear, at the state's last position, and its moments [nv] (NULL:
+/// not needed): u per unit of force, rate of length per unit of v. Uses scratch of the state.
+double cav_actuator_length(const cav_model *model, const cav_state *state, int actuator, double *moment);
+
+/// Force of an actuator at a length, velocity and input (control or activation), limits applied. N or N m, before gear.
+double cav_actuator_force(const cav_model *model, int actuator, double length, double velocity, double input);
+
+/// Input that gives a force; returns 1, or 0 where the limits (or a muscle that is too short) do not allow it: input is
+/// then the nearest.
+int cav_actuator_input(const cav_model *model, int actuator, double length, double velocity, double force,
+                       double *input);
+
+/// Range of effort that an actuator's limits leave whatever its length and velocity are; infinite where they do not bound
+/// it. The limits of a servo's control bound no effort of their own.
+void cav_actuator_effort_range(const cav_model *model, int actuator, double range[2]);
 
 #ifdef __cplusplus
 }

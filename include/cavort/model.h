@@ -23,7 +23,24 @@ typedef enum cav_geom_type {
   CAV_GEOM_TYPES
 } cav_geom_type;
 
-typedef enum cav_transmission { CAV_TRANSMISSION_JOINT, CAV_TRANSMISSION_TENDON } cav_transmission;
+/// What an actuator pulls at.
+typedef enum cav_transmission {
+  CAV_TRANSMISSION_JOINT,           ///< gear along the joint's own dofs
+  CAV_TRANSMISSION_JOINT_IN_PARENT, ///< ball and free: turning gear in the axes of the parent (free: of the world)
+  CAV_TRANSMISSION_TENDON,
+  CAV_TRANSMISSION_SITE, ///< force and torque in the site's axes, or in those of a reference site
+  CAV_TRANSMISSION_CRANK ///< slider-crank
+} cav_transmission;
+
+/// What the input of an actuator is: its control, or an activation that follows the control (a state MuJoCo integrates).
+typedef enum cav_activation {
+  CAV_ACTIVATION_NONE,
+  CAV_ACTIVATION_INTEGRATOR,
+  CAV_ACTIVATION_FILTER,
+  CAV_ACTIVATION_MUSCLE
+} cav_activation;
+typedef enum cav_gain { CAV_GAIN_FIXED, CAV_GAIN_AFFINE, CAV_GAIN_MUSCLE } cav_gain;
+typedef enum cav_bias { CAV_BIAS_NONE, CAV_BIAS_AFFINE, CAV_BIAS_MUSCLE } cav_bias;
 
 /// What a sensor measures: MJCF's names, shapes and conventions. Velocities are those at v_next; accelerations and forces
 /// are those of the step from v to v_next.
@@ -270,15 +287,34 @@ typedef struct cav_equality {
   double weight; ///< reference diagonal of A, the same for all rows
 } cav_equality;
 
-/// Motor: force = gear * clamp(control) on a joint or a tendon.
+enum { CAV_DRIVE_PARAMETERS = 10 };
+
+/// Actuator: force = gain(length, velocity) input + bias(length, velocity), clamped; its share of u is force times the
+/// moments of its transmission. What is planned with is its effort: u = sum unit effort moment. A motor (fixed gain, no
+/// bias) has its gain as unit, so effort is the control; for every other one the unit is 1 and effort is the force, of
+/// which bias is a part, as the servo's pull towards its target: a law of control, not a passive force of the model.
 typedef struct cav_actuator {
   const char *name;
   cav_transmission transmission;
-  int target;     ///< joint or tendon
-  double gear[6]; ///< gear[0] for scalar joints and tendons; all for ball (3) and free (6) joints
-  int ctrllimited, forcelimited;
+  int target;     ///< joint, tendon, site, or site of the crank
+  int reference;  ///< site of reference, or of the slider; -1 for none
+  int constant;   ///< 1 if the moments do not depend on q
+  double gear[6]; ///< gear[0] for scalar joints, tendons and cranks; ball (3); free joint and site (6): force, torque
+  double cranklength; ///< m
+  cav_activation activation;
+  cav_gain gain;
+  cav_bias bias;
+  double activation_parameter[3];
+  double
+      gain_parameter[CAV_DRIVE_PARAMETERS]; ///< fixed: [0]; affine: constant, per length, per velocity; muscle: MJCF's
+  double bias_parameter[CAV_DRIVE_PARAMETERS];
+  double unit; ///< force of one unit of effort
+  int ctrllimited, forcelimited, actlimited;
   double ctrlrange[2];
-  double forcerange[2]; ///< before gear
+  double forcerange[2];  ///< in units of effort
+  double actrange[2];    ///< of an integrated activation
+  double lengthrange[2]; ///< muscles: shortest and longest transmission
+  double acceleration;   ///< |M^-1 moments| at q0, what a unit force causes
 } cav_actuator;
 
 typedef struct cav_sensor {
