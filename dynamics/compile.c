@@ -802,6 +802,7 @@ static void set_options(builder *b) {
                              .regulariser = CAV_REGULARISER_REFERENCE,
                              .softness = 1e-3,
                              .impratio = o->impratio,
+                             .self_share = 1,
                              .guard = o->guard,
                              .contact = o->contact,
                              .constraint = o->constraint,

@@ -217,7 +217,8 @@ cav_status cav_rows(const cav_model *model, cav_state *state) {
 // R of the friction rows so that R_j mu_j^2 is the same for all (22); all rows share the damping
 static void soften_contact(cav_state *state, cav_contact *c, double inverse_impratio) {
   const cav_pair *pair = &state->model->pair[c->pair];
-  cav_law l = row_law(state, &pair->softness, c->dist - c->margin, pair->weight[0]);
+  double weight = pair->same_world ? pair->weight[0] : pair->weight[0] / state->options.self_share;
+  cav_law l = row_law(state, &pair->softness, c->dist - c->margin, weight);
   c->stiffness = l.stiffness;
   c->sigma = smoothing_scale(&l, pair->same_world ? state->options.smoothing : self_smoothing(state));
   c->regulariser[0] = l.regulariser;

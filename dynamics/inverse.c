@@ -13,8 +13,8 @@
 static int same_position_options(const cav_options *a, const cav_options *b) {
   return a->timestep == b->timestep && a->stabilisation == b->stabilisation && a->regulariser == b->regulariser &&
          a->softness == b->softness && a->time_constant == b->time_constant && a->smoothing == b->smoothing &&
-         a->smoothing_self == b->smoothing_self && a->impratio == b->impratio && a->guard == b->guard &&
-         a->contact == b->contact && a->constraint == b->constraint;
+         a->smoothing_self == b->smoothing_self && a->self_share == b->self_share && a->impratio == b->impratio &&
+         a->guard == b->guard && a->contact == b->contact && a->constraint == b->constraint;
 }
 
 cav_status cav_position(const cav_model *model, cav_state *state, const double *q) {

@@ -60,14 +60,18 @@ void cav_demand_note(const cav_audit *audit, int t, double *work, cav_finding *f
 typedef struct cav_replay {
   double step_error; ///< |v' - v_{t+1}| h of single steps from the knots
   int step_knot;
-  double open_error;     ///< largest |q - knot| in open loop
-  double open_seconds;   ///< within 1e-6
-  double closed_seconds; ///< followed
-  double closed_error;   ///< m
-  char lost[160];        ///< why the closed loop ended early, "" if it did not
+  double open_error;   ///< largest |q - knot| in open loop
+  double open_seconds; ///< within 1e-6
+  struct cav_follow {
+    double seconds; ///< followed
+    double error;   ///< m
+    char lost[160]; ///< why it ended early, "" if it did not
+  } closed, own;    ///< closed loop under the claimed contact law, and under the model's own
 } cav_replay;
 cav_status cav_replay_steps(const cav_audit *audit, cav_replay *replay);
 cav_status cav_replay_open(const cav_audit *audit, cav_replay *replay);
-cav_status cav_replay_closed(const cav_audit *audit, const double *gain_q, const double *gain_v, cav_replay *replay);
+/// law is what the simulation obeys, its timestep apart; law NULL: the model's own.
+cav_status cav_replay_closed(const cav_audit *audit, const cav_options *law, const double *gain_q, const double *gain_v,
+                             struct cav_follow *follow);
 
 #endif

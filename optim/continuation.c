@@ -69,6 +69,7 @@ void cav_stage_set(const cav_problem *problem, int s, int n, cav_transcription *
   tr->options.time_constant = between(a->time_constant, b->time_constant, x) * problem->timestep;
   tr->options.smoothing = between(a->smoothing, b->smoothing, x);
   tr->options.smoothing_self = between(a->smoothing_self, b->smoothing_self, x);
+  tr->options.self_share = between(a->self_share, b->self_share, x);
   tr->penalty = priced;
   tr->penalty.effort = between(priced.effort, 100 * priced.effort, x);
   tr->penalty.range = between(priced.range, 10 * priced.range, x);
@@ -188,6 +189,8 @@ cav_status cav_restore(cav_solve_run *run) {
   region.iterations = 1;
   region.tolerance = 0;
   tr->constraints_only = 1;
+  tr->slack_effort = 0.9 * most.effort;
+  tr->slack_range = 0.9 * most.range;
   cav_status status = CAV_OK;
   for (int i = 0; i < RESTORATIONS && status == CAV_OK; i++) {
     status = cav_region_minimise(&region, run->normal, tr, &run->at, &run->spare);
@@ -195,6 +198,7 @@ cav_status cav_restore(cav_solve_run *run) {
     if (holds(&is, &most)) break;
   }
   tr->constraints_only = 0;
+  tr->slack_effort = tr->slack_range = 0;
   run->region.done = region.done;
   run->region.seconds_linear = region.seconds_linear;
   if (status != CAV_OK) return status;

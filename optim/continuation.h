@@ -46,6 +46,9 @@ void cav_run_allowed(const cav_solve_run *run, double allowed[CAV_BINDING_KINDS]
 /// Whether every row holds to that at the last values.
 int cav_run_met(const cav_solve_run *run);
 
+/// Feedback gains of run->at into the solution: the best of several, by the closed loop of verification. gains.c.
+cav_status cav_choose_gains(cav_solve_run *run, cav_error *error);
+
 /// Appends a line to the log and tells the observer; nonzero if it asks to stop. Region's report.
 int cav_run_report(void *run, double step, double radius);
 

@@ -172,6 +172,10 @@ static int contact_values(const cav_audit *audit, const cav_term *term, double *
     const double *rate = contact->velocity_next;
     if (term->quantity == CAV_QUANTITY_SLIP) value = contact->dim > 1 ? hypot(rate[1], rate[2]) : 0;
     if (term->quantity == CAV_QUANTITY_IMPACT) value = fabs(rate[0]);
+    if (term->quantity == CAV_QUANTITY_OVERLAP) {
+      int moving = !audit->model->pair[contact->pair].same_world;
+      load = 1, value = moving ? fmax(-contact->dist, 0) : 0;
+    }
     x[i] = load * value;
     target[i] = 0;
   }
@@ -196,6 +200,7 @@ static int measure(const cav_audit *audit, const cav_term *term, int t, double *
     case CAV_QUANTITY_GAP:
     case CAV_QUANTITY_SLIP:
     case CAV_QUANTITY_IMPACT:
+    case CAV_QUANTITY_OVERLAP:
       return forced ? contact_values(audit, term, x, target) : 0;
     case CAV_QUANTITY_TYPES:
       break;

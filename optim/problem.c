@@ -28,6 +28,7 @@ static const cav_term default_term[] = {
     {.name = "gap", .quantity = CAV_QUANTITY_GAP, .weight = 1000},
     {.name = "slip", .quantity = CAV_QUANTITY_SLIP, .weight = 50},
     {.name = "impact", .quantity = CAV_QUANTITY_IMPACT, .weight = 10},
+    {.name = "overlap", .quantity = CAV_QUANTITY_OVERLAP, .weight = 1e4},
 };
 
 int cav_problem_default_terms(cav_term *term, int most) {
@@ -50,13 +51,15 @@ static const cav_stage_options first_stage = {.softness = 4,
                                               .time_constant = 1,
                                               .smoothing = 0.05,
                                               .smoothing_self = 0.002,
+                                              .self_share = 1e-3,
                                               .penalty = 1e3,
                                               .iterations = 30,
                                               .tolerance = 1e-3};
-static const cav_stage_options last_stage = {.softness = 0.05,
+static const cav_stage_options last_stage = {.softness = 0.02,
                                              .time_constant = 0,
-                                             .smoothing = 0.002,
-                                             .smoothing_self = 0.002,
+                                             .smoothing = 0.001,
+                                             .smoothing_self = 0.001,
+                                             .self_share = 1,
                                              .penalty = 1e5,
                                              .iterations = 100,
                                              .tolerance = 1e-5};
@@ -301,6 +304,7 @@ static cav_status read_stage(const cav_problem_reader *reader, const cav_xml_nod
   if (!status) status = real(reader, node, "time_constant", 0, DBL_MAX, &stage->time_constant);
   if (!status) status = real(reader, node, "smoothing", DBL_MIN, DBL_MAX, &stage->smoothing);
   if (!status) status = real(reader, node, "smoothing_self", DBL_MIN, DBL_MAX, &stage->smoothing_self);
+  if (!status) status = real(reader, node, "self_share", DBL_MIN, 1, &stage->self_share);
   if (!status) status = real(reader, node, "penalty", DBL_MIN, DBL_MAX, &stage->penalty);
   if (!status) status = real(reader, node, "tolerance", DBL_MIN, 1, &stage->tolerance);
   if (status) return status;
@@ -332,6 +336,7 @@ static cav_status read_contact(const cav_problem_reader *reader) {
   if (!status) status = real(reader, node, "time_constant", 0, DBL_MAX, &o->time_constant);
   if (!status) status = real(reader, node, "smoothing", 0, DBL_MAX, &o->smoothing);
   if (!status) status = real(reader, node, "smoothing_self", 0, DBL_MAX, &o->smoothing_self);
+  if (!status) status = real(reader, node, "self_share", DBL_MIN, 1, &o->self_share);
   if (!status) status = real(reader, node, "impratio", DBL_MIN, DBL_MAX, &o->impratio);
   if (status) return status;
   o->order = (cav_order)cav_xml_word(node, "order", o->order);

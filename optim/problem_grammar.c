@@ -6,8 +6,8 @@
 const char *const cav_problem_orders[] = {"euler", "midpoint", NULL};
 const char *const cav_problem_closings[] = {"open", "rest", NULL};
 const char *const cav_problem_guesses[] = {"hold", "interpolate", NULL};
-const char *const cav_problem_quantities[] = {"sensor", "posture", "velocity", "acceleration", "effort", "gap",
-                                              "slip",   "impact",  NULL};
+const char *const cav_problem_quantities[] = {"sensor", "posture", "velocity", "acceleration", "effort",
+                                              "gap",    "slip",    "impact",   "overlap",      NULL};
 const char *const cav_problem_dof_sets[] = {"all", "root_linear", "root_angular", "joints", NULL};
 const char *const cav_problem_sensors[] = {"jointpos",
                                            "jointvel",
@@ -115,12 +115,14 @@ static const cav_xml_element cost_effort = {"effort", 0, 0, ATTRIBUTES(WINDOW, C
 static const cav_xml_element cost_gap = {"gap", 0, 0, ATTRIBUTES(WINDOW, COST), NULL, 0};
 static const cav_xml_element cost_slip = {"slip", 0, 0, ATTRIBUTES(WINDOW, COST), NULL, 0};
 static const cav_xml_element cost_impact = {"impact", 0, 0, ATTRIBUTES(WINDOW, COST), NULL, 0};
+static const cav_xml_element cost_overlap = {"overlap", 0, 0, ATTRIBUTES(WINDOW, COST), NULL, 0};
 static const cav_xml_element cost = {"cost",
                                      0,
                                      1,
                                      NULL,
                                      CHILDREN(&cost_sensor, &cost_posture, &cost_velocity, &cost_acceleration,
-                                              &cost_effort, &cost_gap, &cost_slip, &cost_impact),
+                                              &cost_effort, &cost_gap, &cost_slip, &cost_impact,
+                                              &cost_overlap),
                                      0};
 
 #define BOUNDS REAL("lower", 0), REAL("upper", 0)
@@ -148,6 +150,7 @@ static const cav_xml_element guess = {
 static const cav_xml_element limits = {"limits", 0, 1, ATTRIBUTES(REAL("effort", 0), REAL("margin", 0)), NULL, 0};
 #define STAGE                                                                                                \
   ATTRIBUTES(REAL("softness", 0), REAL("time_constant", 0), REAL("smoothing", 0), REAL("smoothing_self", 0), \
+             REAL("self_share", 0), \
              REAL("penalty", 0), WHOLE("iterations", 0), REAL("tolerance", 0))
 static const cav_xml_element schedule_first = {"first", 0, 1, STAGE, NULL, 0};
 static const cav_xml_element schedule_last = {"last", 0, 1, STAGE, NULL, 0};
@@ -160,6 +163,7 @@ static const cav_xml_element contact = {
     ATTRIBUTES(REAL("timestep", 1), WORD("order", cav_problem_orders),
                WORD("stabilisation", cav_problem_stabilisations), WORD("regulariser", cav_problem_regularisers),
                REAL("softness", 1), REAL("time_constant", 1), REAL("smoothing", 1), REAL("smoothing_self", 1),
+               REAL("self_share", 0),
                REAL("impratio", 1), FLAG("guard"), FLAG("contact"), FLAG("constraint"), FLAG("gravity"),
                FLAG("passive")),
     NULL,

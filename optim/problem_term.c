@@ -393,9 +393,10 @@ static cav_status read_effort(const cav_problem_reader *reader, const cav_xml_no
 static cav_status read_touch(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
   (void)reader;
   const char *name = node->rule->name;
-  term->quantity = !strcmp(name, "gap")    ? CAV_QUANTITY_GAP
-                   : !strcmp(name, "slip") ? CAV_QUANTITY_SLIP
-                                           : CAV_QUANTITY_IMPACT;
+  term->quantity = !strcmp(name, "gap")      ? CAV_QUANTITY_GAP
+                   : !strcmp(name, "slip")   ? CAV_QUANTITY_SLIP
+                   : !strcmp(name, "impact") ? CAV_QUANTITY_IMPACT
+                                             : CAV_QUANTITY_OVERLAP;
   return CAV_OK;
 }
 
@@ -405,7 +406,7 @@ static const struct {
   cav_status (*read)(const cav_problem_reader *, const cav_xml_node *, cav_term *);
 } term_reader[] = {{"sensor", read_sensor},     {"posture", read_posture}, {"velocity", read_rate},
                    {"acceleration", read_rate}, {"effort", read_effort},   {"gap", read_touch},
-                   {"slip", read_touch},        {"impact", read_touch}};
+                   {"slip", read_touch},        {"impact", read_touch},    {"overlap", read_touch}};
 
 // bounds of a constraint, or the weight of a cost
 static cav_status read_use(const cav_problem_reader *reader, const cav_xml_node *node, int hard, cav_term *term) {

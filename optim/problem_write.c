@@ -215,6 +215,7 @@ static void write_stage(FILE *out, const char *name, const cav_stage_options *st
   write_number(out, "time_constant", stage->time_constant);
   write_number(out, "smoothing", stage->smoothing);
   write_number(out, "smoothing_self", stage->smoothing_self);
+  write_number(out, "self_share", stage->self_share);
   write_number(out, "penalty", stage->penalty);
   fprintf(out, " iterations=\"%d\"", stage->iterations);
   write_number(out, "tolerance", stage->tolerance);
@@ -232,6 +233,7 @@ static void write_contact(FILE *out, const cav_options *o) {
   write_number(out, "time_constant", o->time_constant);
   write_number(out, "smoothing", o->smoothing);
   write_number(out, "smoothing_self", o->smoothing_self);
+  write_number(out, "self_share", o->self_share);
   write_number(out, "impratio", o->impratio);
   write_text(out, "guard", truth[o->guard != 0]);
   write_text(out, "contact", truth[o->contact != 0]);

@@ -3,9 +3,9 @@
 /// step undoes the inverse.
 /// Open loop at the step of the knots: from (q_0, v_0), only what the actuators give of u_t. Errors grow as the
 /// body's own instability makes them; how long they stay small is the figure.
-/// Closed loop at a tenth of the step: the model as its file says (its own solref contacts by the exact law, the
-/// paper's Euler step), forces u + K_q (q (-) q_ref) + K_v (v - v_ref) brought to the actuators and clipped to their
-/// limits.
+/// Closed loop at a tenth of the step, by the paper's Euler step: forces u + K_q (q (-) q_ref) + K_v (v - v_ref) brought to
+/// the actuators and clipped to their limits. Once under the claimed contact law, with the time constant that keeps its
+/// stiffness at the finer step, and once under the model as its file says (its own solref contacts, exact law).
 /// Between knots the motion is read as what it is to second order: v_{t+1} = (q_{t+1} (-) q_t)/h is the velocity half
 /// way, and h u_t the impulse centred on knot t. So q_ref runs along the geodesic, v_ref is linear between half steps,
 /// and u_t and the gains of knot t hold for half a step either side. README.md has what the alternatives gave.
@@ -181,23 +181,23 @@ static cav_status compare(const cav_audit *audit, const double *q0, const double
 }
 
 // notes the distance now; 0 once the motion is lost
-static int following(const cav_audit *audit, const gap *now, double time, cav_replay *replay) {
+static int following(const cav_audit *audit, const gap *now, double time, struct cav_follow *follow) {
   char name[32];
-  replay->closed_error = now->distance;
+  follow->error = now->distance;
   int near = now->distance <= far && now->turn <= turned;
   if (near) {
-    replay->closed_seconds = time;
+    follow->seconds = time;
     return 1;
   }
   int by_turn = now->distance <= far;
-  snprintf(replay->lost, sizeof replay->lost, "%.60s is %.2g %s away at %.3f s",
+  snprintf(follow->lost, sizeof follow->lost, "%.60s is %.2g %s away at %.3f s",
            cav_audit_link_name(audit->model, by_turn ? now->root : now->link, name),
            by_turn ? now->turn : now->distance, by_turn ? "rad" : "m", time);
   return 0;
 }
 
 // the model as its file says, at a finer step
-static cav_options fine_options(const cav_audit *audit) {
+static cav_options own_options(const cav_audit *audit) {
   cav_options options = audit->model->options;
   options.timestep = audit->h / SUBSTEPS;
   options.order = CAV_ORDER_EULER;
@@ -207,9 +207,21 @@ static cav_options fine_options(const cav_audit *audit) {
   return options;
 }
 
+// the claimed law at a finer step: a discrete one closes the share 1-z of a gap in its step, and the same share a second in
+// smaller ones, which keeps its stiffness (1-z)^2/h^2
+static cav_options claimed_options(const cav_audit *audit, const cav_options *law) {
+  cav_options options = *law;
+  double z = law->time_constant > 0 ? exp(-audit->h / law->time_constant) : 0;
+  options.timestep = audit->h / SUBSTEPS;
+  options.order = CAV_ORDER_EULER;
+  if (law->stabilisation == CAV_STABILISATION_DISCRETE)
+    options.time_constant = -options.timestep / log1p(-(1 - z) / SUBSTEPS);
+  return options;
+}
+
 // simulates one interval; 0 in *on once the motion is lost
 static cav_status interval(const cav_audit *audit, cav_state *fine, const double *gain_q, const double *gain_v, int t,
-                           double *q, double *v, double *work, cav_replay *replay, int *on) {
+                           double *q, double *v, double *work, struct cav_follow *follow, int *on) {
   const cav_model *model = audit->model;
   int nv = model->nv;
   double *q_ref = work, *v_ref = q_ref + model->nq, *dq = v_ref + nv, *dv = dq + nv, *u = dv + nv, *next = u + nv;
@@ -224,7 +236,7 @@ static cav_status interval(const cav_audit *audit, cav_state *fine, const double
     cav_status status = step(audit, fine, 1e-9, q, v, u, next);
     if (status == CAV_NO_MEMORY) return status;
     if (status != CAV_OK) {
-      snprintf(replay->lost, sizeof replay->lost, "simulation stopped at %.3f s: %s", time, cav_status_name(status));
+      snprintf(follow->lost, sizeof follow->lost, "simulation stopped at %.3f s: %s", time, cav_status_name(status));
       *on = 0;
       return CAV_OK;
     }
@@ -235,27 +247,27 @@ static cav_status interval(const cav_audit *audit, cav_state *fine, const double
     reference(audit, t, (double)(k + 1) / SUBSTEPS, q_ref, v_ref);
     status = compare(audit, q_ref, q, place, &now);
     if (status != CAV_OK) return status;
-    *on = following(audit, &now, time, replay);
+    *on = following(audit, &now, time, follow);
   }
   return CAV_OK;
 }
 
-cav_status cav_replay_closed(const cav_audit *audit, const double *gain_q, const double *gain_v, cav_replay *replay) {
+cav_status cav_replay_closed(const cav_audit *audit, const cav_options *law, const double *gain_q, const double *gain_v,
+                             struct cav_follow *follow) {
   const cav_model *model = audit->model;
   size_t nq = (size_t)model->nq, nv = (size_t)model->nv;
   double *q = malloc(sizeof(double) * (2 * nq + 7 * nv + (size_t)model->nu + 7 * (size_t)model->nlink));
   cav_state *fine = cav_state_new(model);
   cav_status status = q && fine ? CAV_OK : CAV_NO_MEMORY;
-  replay->closed_seconds = replay->closed_error = 0;
-  replay->lost[0] = 0;
+  *follow = (struct cav_follow){0};
   if (status == CAV_OK) {
     double *v = q + nq;
-    fine->options = fine_options(audit);
+    fine->options = law ? claimed_options(audit, law) : own_options(audit);
     memcpy(q, audit->q, sizeof(double) * nq);
     memcpy(v, audit->v, sizeof(double) * nv);
     int on = 1;
     for (int t = 0; t < audit->last && on && status == CAV_OK; t++) {
-      status = interval(audit, fine, gain_q, gain_v, t, q, v, v + nv, replay, &on);
+      status = interval(audit, fine, gain_q, gain_v, t, q, v, v + nv, follow, &on);
     }
   }
   cav_state_free(fine);

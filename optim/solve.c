@@ -8,12 +8,7 @@
 #include <string.h>
 
 #include "continuation.h"
-#include "feedback.h"
 #include "ipopt.h"
-
-/// Prices of straying from the motion that are tried for the gains, and the end error that ends the search, m.
-static const double tracking[] = {10, 1, 100, 30, 3};
-static const double near_enough = 0.05;
 
 cav_solve_options cav_solve_options_default(void) {
   return (cav_solve_options){
@@ -90,34 +85,6 @@ static double optimality(const cav_normal *normal, const cav_transcription *tr) 
   return worst;
 }
 
-/// Gains by several prices of straying; kept is the one whose closed loop follows longest, then nearest. The search ends at one
-/// that is near enough.
-static cav_status choose_gains(cav_solve_run *run, cav_error *error) {
-  cav_solution *solution = run->solution;
-  cav_transcription *tr = run->tr;
-  size_t square = (size_t)tr->nv * tr->nv, n = ((size_t)tr->nknot - 1) * square;
-  double *gain = malloc(2 * n * sizeof *gain);
-  solution->gain_q = calloc(n, sizeof(double));
-  solution->gain_v = calloc(n, sizeof(double));
-  cav_status status = gain && solution->gain_q && solution->gain_v ? CAV_OK : CAV_NO_MEMORY;
-  cav_verdict best = {0}, verdict = {0};
-  for (size_t i = 0; i < sizeof tracking / sizeof *tracking && status == CAV_OK; i++) {
-    if (cav_feedback(tr, run->normal, tracking[i], gain, gain + n) != CAV_OK) continue;
-    status = cav_verify(run->problem, run->at, &tr->options, gain, gain + n, &verdict, error);
-    if (status != CAV_OK) break;
-    int longer = verdict.closed_loop_seconds > best.closed_loop_seconds;
-    int as_long = verdict.closed_loop_seconds == best.closed_loop_seconds;
-    if (longer || (as_long && verdict.closed_loop_end_error_m < best.closed_loop_end_error_m)) {
-      memcpy(solution->gain_q, gain, n * sizeof *gain);
-      memcpy(solution->gain_v, gain + n, n * sizeof *gain);
-      best = verdict;
-    }
-    if (best.closed_loop_seconds >= best.duration && best.closed_loop_end_error_m <= near_enough) break;
-  }
-  free(gain);
-  return status;
-}
-
 /// Constraint rows that hold something back, and their prices. Rounds of the augmented Lagrangian end before cheap rows have
 /// settled, so multipliers are those after one more step, as in a quadratic programme.
 static cav_status find_prices(cav_solve_run *run) {
@@ -149,9 +116,10 @@ static cav_status conclude(cav_solve_run *run, cav_error *error) {
   run->solution->optimality = optimality(run->normal, run->tr);
   run->solution->cost = cav_transcription_cost(run->tr);
   run->solution->unactuated = cav_transcription_unactuated(run->tr, NULL);
+  run->solution->contact = run->tr->options;
   status = find_prices(run);
   if (status != CAV_OK) return status;
-  return choose_gains(run, error);
+  return cav_choose_gains(run, error);
 }
 
 static cav_status solve(cav_solve_run *run, cav_error *error) {
@@ -208,7 +176,6 @@ cav_status cav_solve(const cav_problem *problem, const cav_solve_options *option
     run.solution->seconds_dynamics = run.tr->seconds_dynamics;
     run.solution->seconds_assembly = run.tr->seconds_assembly;
     run.solution->seconds_linear = run.region.seconds_linear;
-    run.solution->contact = run.tr->options;
     run.solution->trajectory = run.at;
     run.at = NULL;
     *solution = run.solution;

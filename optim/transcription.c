@@ -278,7 +278,7 @@ void cav_transcription_free(cav_transcription *tr) {
     cav_knot *k = &tr->knot[t];
     free(k->slot), free(k->u), free(k->du), free(k->hessian), free(k->gradient), free(k->turn), free(k->y), free(k->dy),
         free(k->slot_row);
-    free(k->dense), free(k->rest);
+    free(k->dense), free(k->rest), free(k->moving);
   }
   for (int i = 0; tr->scratch && i < cav_parallel_size(tr->pool); i++) {
     cav_scratch *s = &tr->scratch[i];
@@ -304,6 +304,11 @@ typedef struct readings {
 } readings;
 
 static void read_contact(const cav_transcription *tr, const cav_contact *c, double *y) {
+  memset(y, 0, 4 * sizeof *y);
+  if (!tr->model->pair[c->pair].same_world) {
+    y[0] = fmax(-c->dist, 0);
+    return;
+  }
   double share = sqrt(fmax(c->impulse[0], 0) / (tr->h * tr->weight));
   y[0] = share * fmax(c->dist, 0);
   y[1] = c->dim > 1 ? share * c->velocity_next[1] : 0;
@@ -352,10 +357,15 @@ static int list_readings(cav_transcription *tr, cav_scratch *s, int t) {
     s->key = key;
     s->key_room = s->state->ncontact;
   }
+  char *moving = realloc(knot->moving, (size_t)s->state->ncontact + 1);
+  if (!moving) return 0;
+  knot->moving = moving;
   if (knot->has_force) {
     for (int k = 0; k < s->state->ncontact; k++) {
       const cav_contact *c = &s->state->contact[k];
-      if (!tr->model->pair[c->pair].same_world || c->impulse[0] < contact_floor * tr->h * tr->weight) continue;
+      int self = !tr->model->pair[c->pair].same_world;
+      if (self ? c->dist > 0 : c->impulse[0] < contact_floor * tr->h * tr->weight) continue;
+      moving[ncontact] = (char)self;
       s->key[2 * ncontact] = c->pair;
       s->key[2 * ncontact++ + 1] = c->feature;
     }
@@ -490,8 +500,15 @@ static double slot_residual(const sum *a, int i, double value, double lower, dou
   slot->value = value;
   slot->lower = lower;
   slot->upper = upper;
-  double shifted = value + (rho > 0 && !a->tr->constraints_only ? slot->multiplier / rho : 0);
-  double e = shifted - fmin(fmax(shifted, lower), upper);
+  const cav_slot_layout *at = &a->knot->layout;
+  double shifted = value, slack = 0;
+  if (a->tr->constraints_only) {
+    if (i >= at->effort && i < at->joint) slack = a->tr->slack_effort;
+    if (i >= at->joint && i < at->term) slack = a->tr->slack_range;
+  } else if (rho > 0) {
+    shifted += slot->multiplier / rho;
+  }
+  double e = shifted - fmin(fmax(shifted, lower - slack), upper + slack);
   *active = e != 0 || lower == upper;
   return e;
 }
@@ -620,9 +637,11 @@ static void add_effort(sum *a, const cav_term *term, double weight) {
     add_force(a, weight / (term->scale * term->scale), form_value(&tr->effort[k], a->knot->u), &tr->effort[k]);
 }
 
-static void add_contact(sum *a, const cav_term *term, double weight, int first, int n) {
+/// Readings first .. first+n-1 of the contacts with the world, or of those between moving links.
+static void add_contact(sum *a, const cav_term *term, double weight, int first, int n, int self) {
   weight /= term->scale * term->scale;
   for (int k = 0; k < a->knot->ncontact; k++) {
+    if (a->knot->moving[k] != self) continue;
     for (int i = first; i < first + n; i++) {
       int row = 4 * k + i;
       add_dense(a, weight, a->knot->y[row], a->knot->dy + (size_t)row * 3 * a->tr->nv);
@@ -658,13 +677,16 @@ static void add_costs(sum *a, const double *q, const double *v, const double *v_
           add_effort(a, term, weight);
           break;
         case CAV_QUANTITY_GAP:
-          add_contact(a, term, weight, 0, 1);
+          add_contact(a, term, weight, 0, 1, 0);
           break;
         case CAV_QUANTITY_SLIP:
-          add_contact(a, term, weight, 1, 2);
+          add_contact(a, term, weight, 1, 2, 0);
           break;
         case CAV_QUANTITY_IMPACT:
-          add_contact(a, term, weight, 3, 1);
+          add_contact(a, term, weight, 3, 1, 0);
+          break;
+        case CAV_QUANTITY_OVERLAP:
+          add_contact(a, term, weight, 0, 1, 1);
           break;
         case CAV_QUANTITY_TYPES:
           break;

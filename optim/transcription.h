@@ -43,6 +43,7 @@ typedef struct cav_knot {
   double *du;             ///< [nv*3nv] row-major
   int nread, ncontact;    ///< readings beside u: 4 a contact, then sensors
   int room;               ///< readings for which y, dy have space
+  char *moving;           ///< [ncontact] 1: between two moving links, its first reading is the depth
   double *y;              ///< [nread]
   double *dy;             ///< [nread*3nv]
   int ndense, dense_room; ///< rows over all columns, weighted, that make up the Hessian beside the sparse ones
@@ -72,12 +73,13 @@ typedef struct cav_transcription {
   int *turn_dof; ///< [nturn] first of three rotational dofs
   int *turn_of;  ///< [nv] index into turn_dof or -1
   cav_penalties penalty;
-  cav_derivative derivative;   ///< of u, contacts and sensors
-  int constraints_only;        ///< costs and multipliers are left out: the merit is the violation alone
-  int keep_rows;               ///< slot_row of the knots is filled by linearisations
-  cav_options options;         ///< contact law of this stage
-  cav_knot *knot;              ///< [nknot]
-  struct cav_scratch *scratch; ///< one a thread
+  cav_derivative derivative;        ///< of u, contacts and sensors
+  int constraints_only;             ///< costs and multipliers are left out: the merit is the violation alone
+  double slack_effort, slack_range; ///< how far constraints_only lets these rows pass their planned bounds
+  int keep_rows;                    ///< slot_row of the knots is filled by linearisations
+  cav_options options;              ///< contact law of this stage
+  cav_knot *knot;                   ///< [nknot]
+  struct cav_scratch *scratch;      ///< one a thread
   cav_parallel *pool;
   double seconds_dynamics, seconds_assembly;
 } cav_transcription;

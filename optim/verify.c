@@ -285,6 +285,7 @@ static const char *left_out(const cav_audit *audit) {
   if (own->constraint && !law->constraint) return "constraints";
   if (own->contact && !law->contact) return "contacts";
   if (own->passive && !law->passive) return "springs and dampers";
+  if (law->self_share != 1) return "full contacts between moving links (self_share below 1)";
   return NULL;
 }
 
@@ -315,11 +316,11 @@ static void judge(const cav_audit *audit, const evidence *found, const cav_repla
   const cav_finding step = {replay->step_error, replay->step_knot, "forward step from the knot against the next knot"};
   require(verdict, &step, CAV_PROMISE_STEP, "replay error, rad or m,",
           "Forward and inverse dynamics disagree: please report it.");
-  if (*replay->lost && !*verdict->reason) {
+  if (*replay->closed.lost && !*verdict->reason) {
     snprintf(verdict->reason, sizeof verdict->reason,
              "closed loop at a tenth of the step ends after %.3g of %.3g s: %s. "
              "Stiffer gains, more slack in the effort limits or a slower motion usually help.",
-             replay->closed_seconds, verdict->duration, replay->lost);
+             replay->closed.seconds, verdict->duration, replay->closed.lost);
   }
   verdict->certified = !*verdict->reason;
 }
@@ -336,8 +337,10 @@ static void fill(const cav_audit *audit, const evidence *found, const cav_replay
   verdict->replay_step_max_error = replay->step_error;
   verdict->replay_same_step_max_error = replay->open_error;
   verdict->replay_same_step_seconds = replay->open_seconds;
-  verdict->closed_loop_seconds = replay->closed_seconds;
-  verdict->closed_loop_end_error_m = replay->closed_error;
+  verdict->closed_loop_seconds = replay->closed.seconds;
+  verdict->closed_loop_end_error_m = replay->closed.error;
+  verdict->own_contacts_seconds = replay->own.seconds;
+  verdict->own_contacts_end_error_m = replay->own.error;
   verdict->duration = audit->last * audit->h;
 }
 
@@ -361,7 +364,8 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
   if (status == CAV_OK) status = examine(&audit, balance, &found, error);
   if (status == CAV_OK) status = cav_replay_steps(&audit, &replay);
   if (status == CAV_OK) status = cav_replay_open(&audit, &replay);
-  if (status == CAV_OK) status = cav_replay_closed(&audit, gain_q, gain_v, &replay);
+  if (status == CAV_OK) status = cav_replay_closed(&audit, contact, gain_q, gain_v, &replay.closed);
+  if (status == CAV_OK) status = cav_replay_closed(&audit, NULL, gain_q, gain_v, &replay.own);
   if (status == CAV_OK) {
     *verdict->reason = 0;
     fill(&audit, &found, &replay, verdict);

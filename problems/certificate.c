@@ -39,6 +39,9 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
   add(line, &n, "closed loop at a tenth of the step, until", value, limit,
       v->closed_loop_seconds >= v->duration * (1 - 1e-9));
   add_number(line, &n, "closed loop, error at the end", v->closed_loop_end_error_m, NAN, 1e3, " mm");
+  add_number(line, &n, "the same under the model's own contacts, until", v->own_contacts_seconds, NAN, 1, " s");
+  add_number(line, &n, "under the model's own contacts, error at the end", v->own_contacts_end_error_m, NAN, 1e3,
+             " mm");
   snprintf(value, sizeof value, "%.3g s", v->replay_same_step_seconds);
   add(line, &n, "open loop at the same step, within 1e-6 until", value, "", -1);
   add_number(line, &n, "open loop at the same step, largest error", v->replay_same_step_max_error, NAN, 1, "");
@@ -103,6 +106,8 @@ void cav_certificate_json(FILE *out, const char *problem, const char *model, con
   write_number(out, "replay_same_step_seconds", v->replay_same_step_seconds);
   write_number(out, "closed_loop_seconds", v->closed_loop_seconds);
   write_number(out, "closed_loop_end_error_m", v->closed_loop_end_error_m);
+  write_number(out, "own_contacts_seconds", v->own_contacts_seconds);
+  write_number(out, "own_contacts_end_error_m", v->own_contacts_end_error_m);
   write_number(out, "duration", v->duration);
   write_number(out, "solve_seconds", v->solve_seconds);
   write_number(out, "iterations", isnan(v->solve_seconds) ? (double)NAN : (double)v->iterations);

@@ -194,7 +194,8 @@ static void print_quantity(const cav_problem *p, const cav_term *term) {
                                          "effort of actuators",
                                          "gap of loaded contacts",
                                          "slip of loaded contacts",
-                                         "impact of loaded contacts"};
+                                         "impact of loaded contacts",
+                                         "overlap of moving links"};
   static const char *const dofs[] = {"all dofs", "translation of free roots", "rotation of free roots",
                                      "all but free roots", "joint"};
   const cav_model *m = p->model;

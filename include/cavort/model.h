@@ -364,6 +364,7 @@ typedef struct cav_options {
   double time_constant;  ///< kappa of CAV_STABILISATION_DISCRETE, s; 0: deadbeat
   double smoothing;      ///< delta, m: distance at which the smoothed law is felt; 0: the exact law (dynamics.md, 3)
   double smoothing_self; ///< delta between two moving links, m, used where smoothing > 0
+  double self_share;     ///< share of their stiffness that contacts between two moving links get, (0, 1]; 1: the law
   double impratio;       ///< R_normal / R_friction, > 0
   int guard;             ///< 1: keep solref time constants >= 2 h
   int contact;           ///< 0: no contacts

@@ -19,6 +19,7 @@ typedef enum cav_quantity {
   CAV_QUANTITY_GAP,           ///< sqrt(f_n/weight) * max(gap, 0) of every contact, m: force only where there is touch
   CAV_QUANTITY_SLIP,          ///< sqrt(f_n/weight) * tangential velocity of every contact, m/s
   CAV_QUANTITY_IMPACT,        ///< sqrt(f_n/weight) * normal velocity of every contact, m/s
+  CAV_QUANTITY_OVERLAP,       ///< depth of every contact between two moving links, m
   CAV_QUANTITY_TYPES
 } cav_quantity;
 
@@ -65,6 +66,7 @@ typedef struct cav_stage_options {
   double time_constant;  ///< kappa, in steps of the horizon (0: deadbeat)
   double smoothing;      ///< delta, m
   double smoothing_self; ///< delta between moving links and of limits, m (rad)
+  double self_share;     ///< share of the stiffness of contacts between moving links, (0, 1]; ends at 1
   double penalty;        ///< weight of the unactuated force (share of weight, squared)
   int iterations;        ///< at most
   double tolerance;      ///< relative decrease below which, twice in a row, the stage ends
@@ -102,7 +104,7 @@ typedef struct cav_problem {
 /// Weights, schedule and options that serve all motions; the caller sets duration, start, goal and terms. Owns nothing.
 cav_problem cav_problem_default(const cav_model *model);
 
-/// The running costs that serve all motions: effort, velocities, accelerations, posture, gap, slip, impact. Writes the first
+/// The running costs that serve all motions: effort, velocities, accelerations, posture, gap, slip, impact, overlap. Writes the first
 /// most of them to term (may be NULL if most is 0) and returns how many there are.
 int cav_problem_default_terms(cav_term *term, int most);
 

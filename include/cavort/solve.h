@@ -117,7 +117,8 @@ typedef struct cav_verdict {
   double replay_same_step_seconds;   ///< how long it stays within 1e-6
   double
       closed_loop_seconds; ///< how long the closed loop at a tenth of the step follows (all links within 0.5 m, roots 1 rad)
-  double closed_loop_end_error_m; ///< largest distance of a body's centre of mass at the end
+  double closed_loop_end_error_m;                        ///< largest distance of a body's centre of mass at the end
+  double own_contacts_seconds, own_contacts_end_error_m; ///< the same under the contacts of the model's file
   double duration, solve_seconds;
   int iterations;
   char reason[400]; ///< why not certified: the first condition missed; "" if certified
