@@ -178,19 +178,17 @@ cav_status cav_multiply(cav_solve_run *run) {
   return status;
 }
 
-cav_status cav_restore(cav_solve_run *run) {
+/// Restoration with rows of efforts and ranges let go by a share of what is allowed of them.
+static cav_status restore(cav_solve_run *run, double share) {
   misfit most = allowed(run), is = {0};
   cav_transcription *tr = run->tr;
   cav_region region = run->region;
-  run->phase = "restoration";
-  run->stages = 1;
-  run->stage = 1;
   region.radius = INFINITY;
   region.iterations = 1;
   region.tolerance = 0;
   tr->constraints_only = 1;
-  tr->slack_effort = 0.9 * most.effort;
-  tr->slack_range = 0.9 * most.range;
+  tr->slack_effort = share * most.effort;
+  tr->slack_range = share * most.range;
   cav_status status = CAV_OK;
   for (int i = 0; i < RESTORATIONS && status == CAV_OK; i++) {
     status = cav_region_minimise(&region, run->normal, tr, &run->at, &run->spare);
@@ -203,6 +201,24 @@ cav_status cav_restore(cav_solve_run *run) {
   run->region.seconds_linear = region.seconds_linear;
   if (status != CAV_OK) return status;
   return holds(&is, &most) ? CAV_OK : CAV_NOT_CONVERGED;
+}
+
+cav_status cav_restore(cav_solve_run *run) {
+  run->phase = "restoration";
+  run->stages = 2;
+  run->stage = 1;
+  cav_trajectory *before = cav_trajectory_copy(run->at);
+  if (!before) return CAV_NO_MEMORY;
+  cav_status status = restore(run, 0.9);
+  if (status != CAV_NOT_CONVERGED) {
+    cav_trajectory_free(before);
+    return status;
+  }
+  // rows that do not come in: again from where it started, with nothing let go
+  run->stage = 2;
+  cav_trajectory_free(run->at);
+  run->at = before;
+  return restore(run, 0);
 }
 
 cav_status cav_rest(cav_solve_run *run) {
