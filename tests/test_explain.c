@@ -137,7 +137,7 @@ static void check_too_weak(void) {
 static void check_inside_the_floor(void) {
   outcome o = solve(stilt,
                     "<constraint><sensor name='step' type='framepos' body='foot' component='z' target='-.1' "
-                    "at='end'/></constraint>");
+                    "at='end'/></constraint><schedule><last softness='.05' smoothing='.002'/></schedule>");
   if (o.solution) {
     CHECK(o.status == CAV_NOT_CONVERGED && !o.explanation.met);
     expect(&o, 0, 0, "'step', framepos of body 'foot', z", 20, 20);
