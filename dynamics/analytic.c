@@ -566,6 +566,10 @@ static cav_status add_rows(const task *t) {
 // whatever adds to u and is not differentiated above is named here
 const char *cav_derivatives_missing(const cav_model *model) {
   if (model->nequality > 0) return "equality constraints";
+  if (model->density > 0 || model->viscosity > 0) return "forces of a medium";
+  for (int i = 0; i < model->nbody; i++) {
+    if (model->body[i].buoyancy != 0) return "gravity compensation";
+  }
   for (int i = 0; i < model->ntendon; i++) {
     const cav_tendon *tendon = &model->tendon[i];
     int acts = tendon->limited || tendon->stiffness != 0 || tendon->damping != 0 || tendon->frictionloss > 0;

@@ -265,7 +265,8 @@ static void fill_bodies(builder *b) {
                     .link = b->link_of[i],
                     .geom = s->geom,
                     .ngeom = s->ngeom,
-                    .mass = s->inertia.mass};
+                    .mass = s->inertia.mass,
+                    .buoyancy = s->gravcomp};
     copy3(x->com, s->inertia.com);
     copy3(x->inertia, s->inertia.moment);
     memcpy(x->iquat, s->inertia.quat, sizeof x->iquat);
@@ -484,11 +485,13 @@ static void fill_geoms(builder *b) {
                     .gap = s->gap,
                     .solmix = s->solmix,
                     .softness = s->softness,
+                    .fluid = s->fluid,
                     .group = s->group};
     to_link(&b->body[s->body], s->pos, s->quat, g->pos, g->quat);
     quat_matrix(g->rotation, g->quat);
     copy3(g->size, s->size);
     copy3(g->friction, s->friction);
+    memcpy(g->fluidcoef, s->fluidcoef, sizeof g->fluidcoef);
     g->bound = bounding_radius(g);
     for (int k = 0; k < 4; k++) g->rgba[k] = (float)s->rgba[k];
   }
@@ -796,6 +799,9 @@ static void set_options(builder *b) {
   m->timestep = o->timestep;
   m->fused = b->spec->compiler.fuse;
   copy3(m->gravity, o->gravity);
+  m->density = o->density;
+  m->viscosity = o->viscosity;
+  copy3(m->wind, o->wind);
   copy3(m->magnetic, o->magnetic);
   m->options = (cav_options){.order = CAV_ORDER_EULER,
                              .stabilisation = CAV_STABILISATION_SOLREF,

@@ -143,6 +143,8 @@ static void evaluate(const cav_model *model, cav_state *state, int with_constrai
 
   // inertial forces of links, then contacts and equality constraints on them
   cav_newton_euler(model, state, bias, w->v_next, a);
+  if (w->nbuoy > 0) { cav_add_buoyancy(model, state); }
+  if (w->nfloat > 0) { cav_add_fluid_forces(model, state); }
   if (with_constraints && (state->ncontact > 0 || state->ntie > 0)) {
     const double *now = NULL;
     if (new_velocity && state->options.order == CAV_ORDER_MIDPOINT) {

@@ -1,10 +1,9 @@
 /// Reads an MJCF tree into a spec: defaults and classes applied, angles in radians, poses relative to bodies.
 ///
-/// Source: the MJCF reference of MuJoCo 2.2.2, whose semantics and defaults hold, with two extensions of later versions
-/// that no 2.2.2 file can contain: the frame element, and limits that hold where only a range is given.
-/// What would change the dynamics and is not offered is an error (meshes that
-/// collide or weigh, actuators that are no motors, fluids, composite bodies); what only changes how MuJoCo itself
-/// steps is a warning (integrator, cone, noslip). Names are resolved in compile.c.
+/// Source: the MJCF reference of MuJoCo 2.2.2, whose semantics and defaults hold, with extensions of later versions that
+/// no 2.2.2 file can contain: the frame element, gravcomp, and limits that hold where only a range is given.
+/// What would change the dynamics and is not offered is an error (meshes that collide or weigh, adhesion, composite
+/// bodies); what only changes how MuJoCo itself steps is a warning (integrator, cone, noslip). Names are resolved in compile.c.
 
 #include <stdlib.h>
 
@@ -135,12 +134,11 @@ static void read_option(reader *r, const cav_xml_node *node) {
   o->collision = (cav_collision)cav_xml_word(node, "collision", (int)o->collision);
   if (!(o->timestep > 0)) cav_spec_fail(spec, node, "timestep", "expected a time step > 0, got %g", o->timestep);
   if (!(o->impratio > 0)) cav_spec_fail(spec, node, "impratio", "expected a ratio > 0, got %g", o->impratio);
-  // forces of a medium, which nothing here computes
-  static const char *const medium[] = {"density", "viscosity"};
-  for (int i = 0; i < 2; i++) {
-    if (cav_xml_real(node, medium[i], 0) != 0)
-      cav_spec_fail(spec, node, medium[i], "forces of a fluid are not supported; set it to 0 to leave them out");
-  }
+  read_real(node, "density", &o->density);
+  read_real(node, "viscosity", &o->viscosity);
+  cav_xml_reals(node, "wind", o->wind, 3);
+  cav_check_not_negative(spec, node, "density", o->density);
+  cav_check_not_negative(spec, node, "viscosity", o->viscosity);
   // what only MuJoCo's own step or solver does
   if (cav_xml_word(node, "integrator", 0))
     cav_spec_warn(spec, node, "integrator", "left aside: steps are semi-implicit (velocity first)");
@@ -190,6 +188,8 @@ static void read_geom_values(cav_spec *spec, const cav_xml_node *node, cav_spec_
   read_real(node, "solmix", &g->solmix);
   read_real(node, "density", &g->density);
   read_softness(node, "solref", "solimp", &g->softness);
+  g->fluid = cav_xml_word(node, "fluidshape", g->fluid);
+  cav_xml_reals(node, "fluidcoef", g->fluidcoef, 5);
   if (cav_xml_get(node, "mass")) g->has_mass = 1;
   read_real(node, "mass", &g->mass);
   cav_xml_reals(node, "rgba", g->rgba, 4);
@@ -253,6 +253,7 @@ static defaults first_defaults(void) {
                            .solmix = 1,
                            .density = 1000,
                            .softness = soft,
+                           .fluidcoef = {0.5, 0.25, 1.5, 1, 1},
                            .rgba = {0.5, 0.5, 0.5, 1}};
   d.site = (cav_spec_site){.quat = {1, 0, 0, 0}, .type = CAV_GEOM_SPHERE, .size = {0.005, 0.005, 0.005}};
   d.pair = (cav_spec_pair){.condim = 3, .friction = {1, 1, 0.005, 0.0001, 0.0001}, .softness = soft};
@@ -526,6 +527,7 @@ static void read_bodies(reader *r, const cav_xml_node *node, const place *at) {
     cav_read_orientation(spec, c, b->quat);
     move_to(at, b->pos, b->quat);
     check_childclass(r, c);
+    read_real(c, "gravcomp", &b->gravcomp);
     if (cav_xml_bool(c, "mocap", 0)) cav_spec_warn(spec, c, "mocap", "left aside: the body stays where it is");
     place in = {spec->body.n - 1, {0, 0, 0}, {1, 0, 0, 0}, cav_xml_text(c, "childclass", at->childclass)};
     for (const cav_xml_node *i = c->child; i; i = i->next) {

@@ -1,6 +1,6 @@
 /// Forces of dofs and tendons that do not pass through links: armature, damping, springs. Springs of free and ball joints
 /// act along the rotation vector from q0, in body axes. Damping of joints and tendons is linear in one velocity, which
-/// the order of the step chooses. Fluid forces are not computed.
+/// the order of the step chooses. Also gravity compensation, a force at the centre of mass of a body. Fluids: fluid.c.
 #include "math3.h"
 #include "workspace.h"
 
@@ -28,6 +28,22 @@ static void joint_spring(const cav_model *model, const cav_joint *joint, const d
       break;
     default:
       to[0] += joint->stiffness * (at[0] - joint->springref);
+  }
+}
+
+void cav_add_buoyancy(const cav_model *model, cav_state *state) {
+  const cav_workspace *w = state->work;
+  if (!state->options.passive || !state->options.gravity) { return; }
+  for (int i = 0; i < w->nbuoy; i++) {
+    const cav_body *body = &model->body[w->buoy[i]];
+    const cav_pose *link = &state->link[body->link];
+    double point[3], force[3];
+    quat_rotate(point, body->quat, body->com);
+    add3(point, point, body->pos);
+    transform(point, link->pos, link->rotation, point);
+    // the force is against gravity; what is left to the inverse is less by it
+    scale3(force, body->buoyancy * body->mass, model->gravity);
+    push_at(state->force + 6 * body->link, state->reference + 3 * body->link, point, force);
   }
 }
 

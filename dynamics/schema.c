@@ -40,6 +40,7 @@ static const char *const integrators[] = {"Euler", "RK4", "implicit", "implicitf
 static const char *const joints[] = {"free", "ball", "slide", "hinge", NULL};
 static const char *const geoms[] = {"plane", "sphere", "capsule", "ellipsoid", "cylinder",
                                     "box",   "mesh",   "hfield",  NULL};
+static const char *const shapes[] = {"none", "ellipsoid", NULL};
 static const char *const objects[] = {"body", "xbody", "geom", "site", "camera", NULL};
 static const char *const dyntypes[] = {"none", "integrator", "filter", "muscle", "user", NULL};
 static const char *const gaintypes[] = {"fixed", "affine", "muscle", "user", NULL};
@@ -61,7 +62,7 @@ static const char *const biastypes[] = {"none", "affine", "muscle", "user", NULL
       INT("group"), INT("priority"), REALS("size", 1, 3), NAMED("material"), REALS("friction", 1, 3), REAL("mass"), \
       REAL("density"), BOOL("shellinertia"), REAL("solmix"), REALS("solref", 1, 2), REALS("solimp", 1, 5),          \
       REAL("margin"), REAL("gap"), REALS("fromto", 6, 6), NAMED("hfield"), NAMED("mesh"), SKIP("fitscale"),         \
-      REALS("rgba", 4, 4), SKIP("fluidshape"), SKIP("fluidcoef"), SKIP("user")
+      REALS("rgba", 4, 4), WORD("fluidshape", shapes), REALS("fluidcoef", 1, 5), SKIP("user")
 
 #define SITE                                                                                                  \
   WORD("type", geoms), SKIP("group"), REALS("pos", 3, 3), ORIENTATION, SKIP("material"), REALS("size", 1, 3), \
@@ -157,7 +158,7 @@ static const cav_xml_attribute option_attributes[] = {REAL("timestep"),
                                                       SKIP("noslip_tolerance"),
                                                       SKIP("mpr_tolerance"),
                                                       REALS("gravity", 3, 3),
-                                                      SKIP("wind"),
+                                                      REALS("wind", 3, 3),
                                                       REALS("magnetic", 3, 3),
                                                       REAL("density"),
                                                       REAL("viscosity"),
@@ -245,8 +246,8 @@ LEAF(geom, "geom", NAMED("name"), NAMED("class"), GEOM);
 LEAF(site, "site", NAMED("name"), NAMED("class"), SITE);
 static const cav_xml_attribute frame_attributes[] = {NAMED("name"), NAMED("childclass"), REALS("pos", 3, 3),
                                                      ORIENTATION, END};
-static const cav_xml_attribute body_attributes[] = {
-    NAMED("name"), NAMED("childclass"), REALS("pos", 3, 3), ORIENTATION, BOOL("mocap"), SKIP("user"), END};
+static const cav_xml_attribute body_attributes[] = {NAMED("name"), NAMED("childclass"), REALS("pos", 3, 3), ORIENTATION,
+                                                    BOOL("mocap"), REAL("gravcomp"),    SKIP("user"),       END};
 static const cav_xml_element body, frame;
 static const cav_xml_element *const body_children[] = {&inertial, &joint,     &freejoint, &geom, &site,    &camera,
                                                        &light,    &composite, &frame,     &body, &include, NULL};

@@ -22,6 +22,7 @@ typedef struct cav_spec_body {
   int parent;
   double pos[3], quat[4];
   int joint, njoint, geom, ngeom;
+  double gravcomp;
   int has_inertial; ///< the file gives inertia explicitly
   double full[6];   ///< fullinertia where has_full: xx yy zz xy xz yz
   int has_full;
@@ -54,6 +55,8 @@ typedef struct cav_spec_geom {
   cav_softness softness;
   double rgba[4];
   const char *material, *mesh, *hfield;
+  int fluid; ///< an ellipsoid to the medium
+  double fluidcoef[5];
   cav_spec_inertia inertia; ///< of the shape, by mass.c; com is pos
 } cav_spec_geom;
 
@@ -157,7 +160,7 @@ typedef struct cav_spec_compiler {
 typedef enum cav_collision { CAV_COLLISION_ALL, CAV_COLLISION_PAIRS, CAV_COLLISION_GEOMS } cav_collision;
 
 typedef struct cav_spec_option {
-  double timestep, gravity[3], magnetic[3], impratio;
+  double timestep, gravity[3], density, viscosity, wind[3], magnetic[3], impratio;
   cav_collision collision;
   int constraint, equality, frictionloss, limit, contact, passive, weight, clamp, filter_parent, guard; ///< flags
 } cav_spec_option;

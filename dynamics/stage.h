@@ -62,6 +62,11 @@ void cav_velocities(const cav_model *model, const cav_state *state, const double
 void cav_newton_euler(const cav_model *model, cav_state *state, const double *v, const double *v_next, const double *a);
 void cav_project(const cav_model *model, cav_state *state, double *u);
 
+/// Forces on links that only (q, v) make, taken off state->force after cav_newton_euler: gravity compensation, drag and
+/// lift of a medium at state->velocity. passive.c, fluid.c.
+void cav_add_buoyancy(const cav_model *model, cav_state *state);
+void cav_add_fluid_forces(const cav_model *model, cav_state *state);
+
 /// u += armature a + damping v - springs of joints; tendons' springs and dampers likewise. passive.c.
 void cav_add_joint_forces(const cav_model *model, const cav_state *state, const double *v, const double *a, double *u);
 void cav_add_tendon_forces(const cav_model *model, const cav_state *state, const double *v, double *u);

@@ -26,6 +26,17 @@ static size_t inertia_entries(const cav_model *model) {
   return n;
 }
 
+// bodies whose weight is taken off, wholly or in part; out may be NULL
+static size_t count_buoys(const cav_model *model, int *out) {
+  size_t n = 0;
+  for (int i = 1; i < model->nbody; i++) {
+    if (model->body[i].buoyancy == 0 || model->body[i].link == 0) { continue; }
+    if (out) { out[n] = i; }
+    n++;
+  }
+  return n;
+}
+
 // lays out the state and its workspace over base; with base NULL only counts. Returns the bytes
 static size_t layout(const cav_model *model, char *base, cav_state *s, cav_workspace *w) {
   size_t used = 0;
@@ -70,6 +81,7 @@ static size_t layout(const cav_model *model, char *base, cav_state *s, cav_works
   w->spring = carve(base, &used, nj, i);
   w->limit = carve(base, &used, nj, i);
   w->friction = carve(base, &used, nv, i);
+  w->buoy = carve(base, &used, count_buoys(model, NULL), i);
   w->string = carve(base, &used, nt, i);
   w->tendon_spring = carve(base, &used, nt, i);
   w->tendon_limit = carve(base, &used, nt, i);
@@ -138,6 +150,7 @@ static void compile_lists(const cav_model *model, cav_workspace *w) {
     if (model->joint[i].stiffness != 0) { w->spring[w->nspring++] = i; }
     if (model->joint[i].limited && model->joint[i].type != CAV_JOINT_FREE) { w->limit[w->nlimit++] = i; }
   }
+  w->nbuoy = (int)count_buoys(model, w->buoy);
   for (int i = 0; i < model->ntendon; i++) {
     const cav_tendon *tendon = &model->tendon[i];
     if (tendon->stiffness != 0 || tendon->damping != 0) { w->tendon_spring[w->ntendon_spring++] = i; }
@@ -179,7 +192,8 @@ cav_state *cav_state_new(const cav_model *model) {
   state->row = malloc(FIRST_ROOM * sizeof(cav_row));
   work->contact_room = work->row_room = FIRST_ROOM;
   work->geom = cav_geom_cache_new(model);
-  if (!state->contact || !state->row || !work->geom || cav_actuation_compile(model, state) != CAV_OK) {
+  if (!state->contact || !state->row || !work->geom || cav_fluid_compile(model, work) != CAV_OK ||
+      cav_actuation_compile(model, state) != CAV_OK) {
     cav_state_free(state);
     return NULL;
   }
@@ -190,6 +204,7 @@ void cav_state_free(cav_state *state) {
   if (!state) { return; }
   cav_geom_cache_free(state->work->geom);
   free(state->work->gram);
+  free(state->work->floats);
   free(state->work->readout);
   cav_slopes_free(state->work->slopes);
   free(state->work->solver);

@@ -40,6 +40,9 @@ typedef struct cav_workspace {
   int *straight;                 ///< [nlink] frame at rest parallel to the parent's
 
   // joints, tendons, dofs that need a stage: indices and counts
+  int nfloat; ///< boxes and ellipsoids in a medium, NULL if none
+  struct cav_float *floats;
+  int nbuoy, *buoy;     ///< bodies with gravity compensation
   int nstring, *string; ///< spatial tendons
   int nspring, nlimit, nfriction, ntendon_spring, ntendon_limit, ntendon_friction;
   int *spring, *limit, *friction, *tendon_spring, *tendon_limit, *tendon_friction;
@@ -79,6 +82,9 @@ typedef struct cav_workspace {
 /// transmission.c.
 int cav_transmission_dofs(const cav_model *model, int actuator, int *dof);
 double cav_transmission_length(const cav_state *state, int actuator, double *moment);
+
+/// What a medium acts on, if there is one. fluid.c.
+cav_status cav_fluid_compile(const cav_model *model, cav_workspace *w);
 
 /// Fills the transmission of a workspace. actuation.c.
 cav_status cav_actuation_compile(const cav_model *model, cav_state *state);

@@ -74,7 +74,7 @@ static void print_bodies(const cav_model *m) {
 
 // what a model has, counted
 typedef struct census {
-  int quaternion, spring, damper, armature, joint_limit, friction;
+  int buoyant, drifting, quaternion, spring, damper, armature, joint_limit, friction;
   int moving, tendon_spatial, tendon_spring, tendon_damper, tendon_limit, tendon_friction;
   int world_pair, body_pair, convex_pair, dim[7];
   int types[CAV_GEOM_TYPES][CAV_GEOM_TYPES];
@@ -90,6 +90,13 @@ static void count_joints(const cav_model *m, census *c) {
     c->damper += m->dof[d].damping != 0;
     c->armature += m->dof[d].armature != 0;
     c->friction += m->dof[d].frictionloss > 0;
+  }
+  for (int i = 1; i < m->nbody; i++) {
+    const cav_body *body = &m->body[i];
+    int ellipsoids = 0;
+    for (int g = body->geom; g < body->geom + body->ngeom; g++) ellipsoids += m->geom[g].fluid;
+    c->buoyant += body->link > 0 && body->buoyancy != 0;
+    if (body->link > 0) c->drifting += ellipsoids ? ellipsoids : body->mass > 0;
   }
   for (int i = 0; i < m->nu; i++) c->moving += !m->actuator[i].constant;
   for (int i = 0; i < m->ntendon; i++) {
@@ -150,6 +157,9 @@ static void print_stages(const cav_model *m) {
   print_stage("armature", c.armature, "dofs", "no joint has any");
   print_stage("springs", on ? c.spring : 0, "joints", on ? "no joint has stiffness" : off);
   print_stage("dampers", on ? c.damper : 0, "dofs", on ? "no joint has damping" : off);
+  int medium = m->density > 0 || m->viscosity > 0;
+  print_stage("gravity compensation", on ? c.buoyant : 0, "bodies", on ? "no body asks for it" : off);
+  print_stage("drag of a medium", on && medium ? c.drifting : 0, "shapes", on ? "no density, no viscosity" : off);
   print_stage("joint limits", held ? c.joint_limit : 0, "joints", held ? "no joint is limited" : off);
   print_stage("friction loss", held ? c.friction : 0, "dofs", held ? "no joint has any" : off);
   print_stage("tendon lengths", m->ntendon, "tendons", "no tendon");

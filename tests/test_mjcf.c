@@ -97,7 +97,7 @@ static const struct {
     {"eulerseq", 2, "three of xyzXYZ"},
     {"global", 2, "global coordinates"},
     {"override", 3, "override is not supported"},
-    {"fluid", 2, "fluid"},
+    {"fluid", 2, "expected a number >= 0"},
     {"equality", 9, "anchor"},
     {"equality_name", 9, "no body is named 'd'"},
     {"equality_free", 9, "free or ball joint"},

@@ -313,7 +313,8 @@ int main(void) {
       {"dm_control/cheetah.xml", 0.99},     {"dm_control/humanoid.xml", 0.99},   {"dm_control/reacher.xml", 0.99},
       {"urdf/double_pendulum.urdf", 0.7},   {"urdf/simple_humanoid.urdf", 0.99}, {"urdf/solo12.urdf", 0.99},
       {"dm_control/ball_in_cup.xml", 0.99}, {"dm_control/point_mass.xml", 0.99}, {"dm_control/finger.xml", 0.99},
-      {"dm_control/manipulator.xml", 0.99}, {"mujoco/arm26.xml", 0.99},          {"mujoco/slider_crank.xml", 0.93}};
+      {"dm_control/manipulator.xml", 0.99}, {"mujoco/arm26.xml", 0.99},          {"mujoco/slider_crank.xml", 0.93},
+      {"dm_control/fish.xml", 0.99},        {"dm_control/swimmer.xml", 0.99}};
   const char *folder = check_shared_models();
   if (!folder) {
     printf("skipped: set CAVORT_SHARED_MODELS to the folder of the models\n");

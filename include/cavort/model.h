@@ -148,6 +148,7 @@ typedef struct cav_body {
   double iquat[4];          ///< principal axes in the body frame
   double inertia[3];        ///< principal moments about the centre of mass, kg m^2
   double inverse_weight[2]; ///< mean diagonal of J M^-1 J' at its com at q0: translation 1/kg, rotation 1/(kg m^2)
+  double buoyancy;          ///< share of its weight that is taken off (gravcomp of MJCF), 1: floats
 } cav_body;
 
 /// Bodies that move as one: the unit of the dynamics. Link 0 is the world and all that is fixed to it.
@@ -207,6 +208,8 @@ typedef struct cav_geom {
   double margin, gap; ///< m
   double solmix;
   cav_softness softness;
+  int fluid;           ///< 1: in a medium this geom is an ellipsoid, and its body no box
+  double fluidcoef[5]; ///< drag blunt, slender, angular; lift of Kutta, of Magnus
   float rgba[4];
   int group;
 } cav_geom;
@@ -379,8 +382,9 @@ typedef struct cav_model {
   int nq, nv, nu;  ///< sizes of q, v and of the control vector (one per actuator)
   double timestep; ///< s
   double gravity[3];
-  double magnetic[3];  ///< field that magnetometers read, world
-  cav_options options; ///< defaults for new states
+  double density, viscosity, wind[3]; ///< of the medium: kg/m^3, kg/(m s), m/s; both 0: none
+  double magnetic[3];                 ///< field that magnetometers read, world
+  cav_options options;                ///< defaults for new states
 
   int nbody, nlink, njoint, ngeom, nsite, npair, ntendon, ntendon_part, ntendon_path, ntendon_dof, nequality, nactuator,
       nsensor, nkey, nwarning;
