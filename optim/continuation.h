@@ -16,6 +16,7 @@ typedef struct cav_solve_run {
   cav_solution *solution;
   const char *phase;
   int stage, stages;
+  int warm;          ///< the rows' prices are multipliers to start from
   cav_status failed; ///< what went wrong in the report, CAV_OK: nothing
   double start;      ///< s
 } cav_solve_run;

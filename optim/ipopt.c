@@ -1,6 +1,7 @@
 /// Ipopt on the transcription: unknowns are tangent increments about the trajectory it starts from, forces that no actuator can
 /// give are hard equalities, efforts, tendon ranges and hard terms are bounded rows, joint ranges bound the unknowns. The
-/// Hessian is Gauss-Newton's of the cost plus a diagonal that stands for the neglected curvature of the constraints
+/// Hessian is Gauss-Newton's of the cost plus a diagonal that stands for the neglected curvature of the constraints, which
+/// grows with their multipliers
 /// (optimisation.md, 2). The only user of Ipopt; written against 3.11 and 3.14 (index and number are int and double in both).
 #include "ipopt.h"
 
@@ -10,8 +11,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/// What stands for the curvature of the constraints: added to the diagonal, absolute and relative.
-static const double curvature = 100, curvature_share = 0.01;
+#include "ipopt_options.h"
+
+/// Dual infeasibility that the noise of differenced derivatives explains.
+static const double noise = 1;
+
+/// What stands for the curvature of the constraints on the diagonal: in proportion to the largest multiplier, and to the diagonal
+/// itself.
+static const double curvature = 3, curvature_share = 0.01;
 
 typedef struct program {
   cav_solve_run *run;
@@ -23,6 +30,7 @@ typedef struct program {
   double *x;                                    ///< [n] point of the last evaluation
   int known;                                    ///< 1: values at x are known, 2: derivatives too
   double *full;                                 ///< [3nv] a row while it is turned
+  double infeasibility, dual;                   ///< of the last iterate, as Ipopt measures them
   int interrupted;
 } program;
 
@@ -107,23 +115,26 @@ static Bool lagrangian_hessian(int n, double *x, Bool fresh, double factor, int 
                                Bool fresh_multiplier, int entries, int *row, int *column, double *value,
                                UserDataPtr data) {
   program *p = data;
-  (void)n, (void)fresh, (void)m, (void)multiplier, (void)fresh_multiplier, (void)entries;
+  (void)n, (void)fresh, (void)fresh_multiplier, (void)entries;
   if (!value) {
     cav_normal_entries(p->run->normal, row, column, NULL);
     return 1;
   }
   if (!evaluate(p, x, 1)) return 0;
+  double largest = 0;
+  for (int i = 0; i < m; i++) largest = fmax(largest, fabs(multiplier[i]));
   cav_normal_entries(p->run->normal, NULL, NULL, value);
-  cav_normal_shift_entries(p->run->normal, factor, curvature, curvature_share, value);
+  cav_normal_shift_entries(p->run->normal, factor, curvature * largest, curvature_share, value);
   return 1;
 }
 
 static Bool progress(int mode, int iteration, double cost, double infeasibility, double dual, double mu, double step,
                      double regularisation, double dual_step, double primal_step, int trials, UserDataPtr data) {
   program *p = data;
-  (void)iteration, (void)cost, (void)infeasibility, (void)dual, (void)mu, (void)regularisation, (void)dual_step,
-      (void)trials;
+  (void)iteration, (void)cost, (void)mu, (void)regularisation, (void)dual_step, (void)trials;
   p->run->stage = mode;
+  p->infeasibility = infeasibility;
+  p->dual = dual;
   if (!p->known) return 1;
   p->interrupted = cav_run_report(p->run, step * primal_step, 0) != 0;
   return !p->interrupted;
@@ -195,16 +206,63 @@ static void set_bounds(const program *p, double *x_lower, double *x_upper, doubl
   }
 }
 
-static int set_options(IpoptProblem nlp, const cav_solve_options *o) {
-  int ok = AddIpoptIntOption(nlp, "print_level", 0) && AddIpoptStrOption(nlp, "sb", "yes");
-  ok = ok && AddIpoptStrOption(nlp, "nlp_scaling_method", "none") &&
-       AddIpoptIntOption(nlp, "max_iter", o->ipopt_iterations);
-  ok = ok && AddIpoptNumOption(nlp, "tol", 1e-3) && AddIpoptNumOption(nlp, "constr_viol_tol", o->tolerance);
-  ok = ok && AddIpoptNumOption(nlp, "acceptable_tol", 1e-1) &&
-       AddIpoptNumOption(nlp, "acceptable_constr_viol_tol", 1e-4);
-  ok = ok && AddIpoptIntOption(nlp, "acceptable_iter", 10) && AddIpoptNumOption(nlp, "mu_init", 1e-4);
-  ok = ok && AddIpoptIntOption(nlp, "mumps_mem_percent", 200) && AddIpoptIntOption(nlp, "mumps_pivot_order", 0);
-  if (o->linear_solver) ok = ok && AddIpoptStrOption(nlp, "linear_solver", (char *)o->linear_solver);
+/// Multipliers of rows [m], lower and upper bounds [n] each: from the rows' prices, or back into their multipliers.
+static void price(const program *p, double *multiplier, int back) {
+  const cav_transcription *tr = p->run->tr;
+  double *lower = multiplier + p->m, *upper = lower + p->n;
+  int dof;
+  for (int i = 0; i < p->m; i++) {
+    cav_slot *slot = &tr->knot[p->row_knot[i]].slot[p->row_slot[i]];
+    if (back) slot->multiplier = multiplier[i];
+    multiplier[i] = slot->price;
+  }
+  for (int t = 1; t < tr->nknot; t++) {
+    for (int i = tr->knot[t].layout.joint; i < tr->knot[t].layout.tendon; i++) {
+      if (!is_bound(tr, t, i, &dof)) continue;
+      int k = (t - 1) * tr->nv + dof;
+      cav_slot *slot = &tr->knot[t].slot[i];
+      if (back) slot->multiplier = upper[k] - lower[k];
+      lower[k] = fmax(-slot->price, 0);
+      upper[k] = fmax(slot->price, 0);
+    }
+  }
+}
+
+/// Options that serve all motions; a problem or a caller may set others, and these anew.
+static const cav_ipopt_option usual[] = {
+    {"nlp_scaling_method", "none"},
+    {"max_iter", "200"},
+    {"tol", "1e-3"},
+    {"acceptable_tol", "1e-1"},
+    {"acceptable_iter", "10"},
+    {"acceptable_constr_viol_tol", "1e-4"},
+    {"mu_init", "1e-4"},
+    {"mumps_mem_percent", "200"},
+    {"mumps_pivot_order", "0"},
+    {"warm_start_bound_push", "1e-6"},
+    {"warm_start_slack_bound_push", "1e-6"},
+    {"warm_start_mult_bound_push", "1e-6"},
+};
+
+static int set_option(IpoptProblem nlp, const cav_ipopt_option *option) {
+  double number = 0;
+  const cav_ipopt_rule *rule = cav_ipopt_check(option, &number, NULL);
+  if (!rule) return 0;
+  if (rule->type == CAV_IPOPT_WHOLE) return AddIpoptIntOption(nlp, (char *)option->name, (int)number);
+  if (rule->type == CAV_IPOPT_REAL) return AddIpoptNumOption(nlp, (char *)option->name, number);
+  return AddIpoptStrOption(nlp, (char *)option->name, (char *)option->value);
+}
+
+static int set_options(IpoptProblem nlp, const cav_solve_run *run) {
+  const cav_solve_options *o = run->options;
+  // silent, and deaf to a file ipopt.opt that happens to lie where the program runs
+  int ok = AddIpoptIntOption(nlp, "print_level", 0) && AddIpoptStrOption(nlp, "sb", "yes") &&
+           AddIpoptStrOption(nlp, "option_file_name", "");
+  for (size_t i = 0; i < sizeof usual / sizeof *usual; i++) ok = ok && set_option(nlp, &usual[i]);
+  ok = ok && AddIpoptNumOption(nlp, "constr_viol_tol", o->tolerance);
+  if (run->warm) ok = ok && AddIpoptStrOption(nlp, "warm_start_init_point", "yes");
+  for (int i = 0; i < run->problem->nipopt; i++) ok = ok && set_option(nlp, &run->problem->ipopt[i]);
+  for (int i = 0; i < o->nipopt; i++) ok = ok && set_option(nlp, &o->ipopt[i]);
   if (o->ipopt_derivative_test) {
     // at the start itself: away from it the law is stiff beyond any difference's step
     ok = ok && AddIpoptStrOption(nlp, "derivative_test", "first-order");
@@ -229,7 +287,12 @@ static cav_status conclude(const program *p, enum ApplicationReturnStatus code, 
       {Infeasible_Problem_Detected, CAV_NOT_CONVERGED, "Ipopt found the constraints locally infeasible"},
       {Search_Direction_Becomes_Too_Small, CAV_NOT_CONVERGED,
        "Ipopt's steps became too small: the noise of the derivatives bounds what it can reach"},
-      {Maximum_Iterations_Exceeded, CAV_NOT_CONVERGED, "Ipopt reached its iteration limit"},
+      {Diverging_Iterates, CAV_NOT_CONVERGED,
+       "Ipopt's iterates diverge: start it from a better motion (--solver both)"},
+      {Maximum_Iterations_Exceeded, CAV_NOT_CONVERGED, "Ipopt reached its iteration limit (max_iter)"},
+      {Maximum_CpuTime_Exceeded, CAV_NOT_CONVERGED, "Ipopt reached its time limit (max_cpu_time)"},
+      {Not_Enough_Degrees_Of_Freedom, CAV_NOT_CONVERGED, "the problem has more equality constraints than unknowns"},
+      {Invalid_Number_Detected, CAV_NOT_FINITE, "the dynamics gave Ipopt a number that is not finite"},
       {Restoration_Failed, CAV_NOT_CONVERGED,
        "Ipopt's restoration of feasibility failed: start it from a better motion (--solver both)"},
       {Error_In_Step_Computation, CAV_NOT_CONVERGED, "Ipopt could not compute a step"},
@@ -241,7 +304,12 @@ static cav_status conclude(const program *p, enum ApplicationReturnStatus code, 
     if (meaning[i].code != code) continue;
     if (error && meaning[i].status != CAV_OK) {
       *error = (cav_error){.status = meaning[i].status};
-      snprintf(error->text, sizeof error->text, "%s", meaning[i].text);
+      // what is left, and whether it is the derivatives' noise that keeps the dual up
+      snprintf(error->text, sizeof error->text, "%s; constraints are left with %.2g, the dual with %.2g%s",
+               meaning[i].text, p->infeasibility, p->dual,
+               p->infeasibility <= p->run->options->tolerance && p->dual < noise
+                   ? ": all but optimal, within the noise of the derivatives"
+                   : "");
     }
     return meaning[i].status;
   }
@@ -263,7 +331,7 @@ cav_status cav_ipopt(cav_solve_run *run, cav_error *error) {
   cav_penalties kept = tr->penalty;
   program p = {.run = run, .n = (tr->nknot - 1) * tr->nv, .anchor = cav_trajectory_copy(run->at)};
   IpoptProblem nlp = NULL;
-  double *bound = NULL, *start = NULL;
+  double *bound = NULL, *start = NULL, *multiplier = NULL;
   char *pattern = malloc(3 * (size_t)tr->nv);
   cav_status status = CAV_NO_MEMORY;
   p.x = calloc((size_t)p.n, sizeof(double));
@@ -271,7 +339,8 @@ cav_status cav_ipopt(cav_solve_run *run, cav_error *error) {
   if (!p.anchor || !p.x || !p.full || !pattern || !cav_transcription_keep_rows(tr) || !list_rows(&p, pattern)) goto end;
   bound = malloc((2 * (size_t)p.n + 2 * (size_t)p.m + 1) * sizeof(double));
   start = calloc((size_t)p.n, sizeof(double));
-  if (!bound || !start) goto end;
+  multiplier = calloc(2 * (size_t)p.n + (size_t)p.m + 1, sizeof(double));
+  if (!bound || !start || !multiplier) goto end;
 
   // costs alone are the objective: constraint rows get no weight of their own
   run->phase = "ipopt";
@@ -285,18 +354,21 @@ cav_status cav_ipopt(cav_solve_run *run, cav_error *error) {
                            objective_gradient, constraint_jacobian, lagrangian_hessian);
   status = CAV_NO_MEMORY;
   if (!nlp) goto end;
-  if (!set_options(nlp, run->options)) {
+  if (!set_options(nlp, run)) {
     status = conclude(&p, Invalid_Option, error);
     goto end;
   }
   SetIntermediateCallback(nlp, progress);
-  status = conclude(&p, IpoptSolve(nlp, start, NULL, NULL, NULL, NULL, NULL, &p), error);
+  price(&p, multiplier, 0);
+  status =
+      conclude(&p, IpoptSolve(nlp, start, NULL, NULL, multiplier, multiplier + p.m, multiplier + p.m + p.n, &p), error);
+  price(&p, multiplier, 1);
   cav_transcription_move(tr, p.anchor, start, run->at);
 end:
   tr->penalty = kept;
   tr->derivative = CAV_DERIVATIVE_FORWARD;
   if (nlp) FreeIpoptProblem(nlp);
   program_free(&p);
-  free(bound), free(start), free(pattern);
+  free(bound), free(start), free(multiplier), free(pattern);
   return status;
 }

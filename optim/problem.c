@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "file.h"
+#include "ipopt_options.h"
 #include "problem_file.h"
 
 static const double most_knots = 1e6;
@@ -325,6 +326,29 @@ static cav_status read_schedule(const cav_problem_reader *reader) {
   return status ? status : read_stage(reader, cav_problem_child(node, "last"), &schedule->last);
 }
 
+// Ipopt's options, checked where they stand
+static cav_status read_ipopt(const cav_problem_reader *reader) {
+  const cav_xml_node *node = cav_problem_child(reader->root, "ipopt");
+  int n;
+  const cav_ipopt_rule *rule = cav_ipopt_rules(&n);
+  if (!node) return CAV_OK;
+  cav_ipopt_option *option = cav_problem_alloc(reader->owner, (size_t)n * sizeof *option);
+  if (!option) return cav_problem_no_memory(reader);
+  reader->problem->ipopt = option;
+  for (int i = 0; i < n; i++) {
+    const char *text = cav_xml_text(node, rule[i].name, NULL);
+    if (!text) continue;
+    cav_error inner = {0};
+    char *copy = cav_problem_text(reader->owner, text);
+    if (!copy) return cav_problem_no_memory(reader);
+    *option = (cav_ipopt_option){rule[i].name, copy};
+    if (cav_ipopt_option_check(option++, &inner))
+      return cav_xml_fail(reader->error, node, rule[i].name, "%s", inner.text);
+    reader->problem->nipopt++;
+  }
+  return CAV_OK;
+}
+
 // the law that a result folder records
 static cav_status read_contact(const cav_problem_reader *reader) {
   const cav_xml_node *node = cav_problem_child(reader->root, "contact");
@@ -394,6 +418,7 @@ static cav_status read_problem(cav_problem_reader *reader, const char *model_pat
   if (!status) status = read_guess(reader);
   if (!status) status = read_limits(reader);
   if (!status) status = read_schedule(reader);
+  if (!status) status = read_ipopt(reader);
   if (!status) status = read_contact(reader);
   if (!status) status = cav_problem_terms(reader);
   return status;

@@ -1,5 +1,6 @@
 /// The grammar of problem files: which elements and attributes there are, and the words they take. Their meaning is in
 /// problem.c, problem_pose.c and problem_term.c; a table for people is in problems/README.md.
+#include "ipopt_options.h"
 #include "problem_file.h"
 
 // in the order of the enumerations of problem.h and model.h
@@ -156,6 +157,9 @@ static const cav_xml_element schedule_first = {"first", 0, 1, STAGE, NULL, 0};
 static const cav_xml_element schedule_last = {"last", 0, 1, STAGE, NULL, 0};
 static const cav_xml_element schedule = {
     "schedule", 0, 1, ATTRIBUTES(WHOLE("stages", 0)), CHILDREN(&schedule_first, &schedule_last), 0};
+#define IPOPT(name, type, least, most, strict, words) TEXT(#name, 0),
+static const cav_xml_element ipopt = {
+    "ipopt", 0, 1, (const cav_xml_attribute[]){CAV_IPOPT_OPTIONS(IPOPT) END}, NULL, 0};
 static const cav_xml_element contact = {
     "contact",
     0,
@@ -174,6 +178,6 @@ const cav_xml_element cav_problem_element = {
     1,
     1,
     ATTRIBUTES(TEXT("name", 0), TEXT("model", 0)),
-    CHILDREN(&horizon, &start, &goal, &pose, &guess, &cost, &constraint, &limits, &schedule, &contact),
+    CHILDREN(&horizon, &start, &goal, &pose, &guess, &cost, &constraint, &limits, &schedule, &ipopt, &contact),
     0};
 // clang-format on

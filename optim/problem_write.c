@@ -276,6 +276,11 @@ static void write_tail(FILE *out, const cav_problem *p) {
   write_stage(out, "first", &p->schedule.first);
   write_stage(out, "last", &p->schedule.last);
   fputs("  </schedule>\n", out);
+  for (int i = 0; i < p->nipopt; i++) {
+    if (i == 0) fputs("  <ipopt", out);
+    write_text(out, p->ipopt[i].name, p->ipopt[i].value);
+    if (i == p->nipopt - 1) fputs("/>\n", out);
+  }
   if (p->solved) write_contact(out, &p->contact);
   fputs("</problem>\n", out);
 }

@@ -11,8 +11,7 @@
 #include "ipopt.h"
 
 cav_solve_options cav_solve_options_default(void) {
-  return (cav_solve_options){
-      .solver = CAV_SOLVER_GAUSS_NEWTON, .threads = 1, .diagnose = 1, .tolerance = 2e-7, .ipopt_iterations = 200};
+  return (cav_solve_options){.solver = CAV_SOLVER_GAUSS_NEWTON, .threads = 1, .diagnose = 1, .tolerance = 2e-7};
 }
 
 int cav_solution_log(cav_solution *solution, const cav_progress *line) {
@@ -63,6 +62,11 @@ static cav_status check(const cav_problem *p, const cav_solve_options *o, const 
     if (!(term->scale > 0) || !(term->weight >= 0))
       return fail(error, CAV_BAD_INPUT, "a term needs a positive scale and a weight that is not negative");
   }
+  for (int k = 0; k < 2; k++) {
+    const cav_ipopt_option *option = k ? o->ipopt : p->ipopt;
+    for (int i = 0; i < (k ? o->nipopt : p->nipopt); i++)
+      if (cav_ipopt_option_check(&option[i], error) != CAV_OK) return CAV_BAD_INPUT;
+  }
   if (start && (start->nq != p->model->nq || start->nv != p->model->nv || start->nknot != nknot))
     return fail(error, CAV_BAD_INPUT,
                 "the start trajectory does not fit the problem: resample it to its step and duration");
@@ -70,8 +74,6 @@ static cav_status check(const cav_problem *p, const cav_solve_options *o, const 
   if (o->solver != CAV_SOLVER_GAUSS_NEWTON)
     return fail(error, CAV_NOT_SUPPORTED,
                 "this build has no Ipopt: use --solver gn, or install coinor-libipopt-dev and build again");
-#else
-  (void)o;
 #endif
   return CAV_OK;
 }
@@ -85,26 +87,35 @@ static double optimality(const cav_normal *normal, const cav_transcription *tr) 
   return worst;
 }
 
-/// Constraint rows that hold something back, and their prices. Rounds of the augmented Lagrangian end before cheap rows have
-/// settled, so multipliers are those after one more step, as in a quadratic programme.
+/// Prices of all rows where they hold, after a linearisation that has kept them. Rounds of the augmented Lagrangian end before
+/// cheap rows have settled, so multipliers are those after one more step, as in a quadratic programme.
 static cav_status find_prices(cav_solve_run *run) {
-  cav_solution *solution = run->solution;
   int n = (run->tr->nknot - 1) * run->tr->nv;
-  double allowed[CAV_BINDING_KINDS], *x = NULL;
-  cav_run_allowed(run, allowed);
-  if (cav_run_met(run)) {
-    x = malloc(2 * (size_t)n * sizeof *x);
-    if (!x) return CAV_NO_MEMORY;
-    cav_status status = CAV_NOT_CONVERGED;
-    for (double shift = 1e-12; status == CAV_NOT_CONVERGED && shift < 1; shift *= 100)
-      status = cav_normal_factor(run->normal, shift);
-    const double *gradient = cav_normal_gradient(run->normal);
-    for (int i = 0; i < n; i++) x[n + i] = -gradient[i], x[i] = 0;
-    if (status == CAV_OK) cav_normal_solve(run->normal, x + n, x);
-  }
+  double *x = malloc(2 * (size_t)n * sizeof *x);
+  if (!x) return CAV_NO_MEMORY;
+  cav_status status = CAV_NOT_CONVERGED;
+  for (double shift = 1e-12; status == CAV_NOT_CONVERGED && shift < 1; shift *= 100)
+    status = cav_normal_factor(run->normal, shift);
+  const double *gradient = cav_normal_gradient(run->normal);
+  for (int i = 0; i < n; i++) x[n + i] = -gradient[i], x[i] = 0;
+  if (status == CAV_OK) cav_normal_solve(run->normal, x + n, x);
   cav_transcription_prices(run->tr, x);
   free(x);
-  return cav_transcription_rows(run->tr, allowed, &solution->row, &solution->nrow);
+  return CAV_OK;
+}
+
+/// Constraint rows that hold something back.
+static cav_status find_rows(cav_solve_run *run) {
+  double allowed[CAV_BINDING_KINDS];
+  cav_status status = CAV_OK;
+  cav_run_allowed(run, allowed);
+  if (cav_run_met(run)) {
+    status = find_prices(run);
+  } else {
+    cav_transcription_prices(run->tr, NULL);
+  }
+  if (status != CAV_OK) return status;
+  return cav_transcription_rows(run->tr, allowed, &run->solution->row, &run->solution->nrow);
 }
 
 /// What the solution says of its last iterate, and its gains.
@@ -117,10 +128,22 @@ static cav_status conclude(cav_solve_run *run, cav_error *error) {
   run->solution->cost = cav_transcription_cost(run->tr);
   run->solution->unactuated = cav_transcription_unactuated(run->tr, NULL);
   run->solution->contact = run->tr->options;
-  status = find_prices(run);
+  status = find_rows(run);
   if (status != CAV_OK) return status;
   return cav_choose_gains(run, error);
 }
+
+#ifdef CAVORT_HAVE_IPOPT
+/// Multipliers for Ipopt to start from.
+static cav_status warm_start(cav_solve_run *run) {
+  if (!cav_transcription_keep_rows(run->tr)) return CAV_NO_MEMORY;
+  cav_status status = cav_transcription_linearise(run->tr, run->at);
+  if (status != CAV_OK) return status;
+  cav_normal_gather(run->normal, run->tr);
+  run->warm = 1;
+  return find_prices(run);
+}
+#endif
 
 static cav_status solve(cav_solve_run *run, cav_error *error) {
   cav_status status = CAV_OK;
@@ -133,9 +156,14 @@ static cav_status solve(cav_solve_run *run, cav_error *error) {
     if (status == CAV_OK) status = cav_restore(run);
   }
 #ifdef CAVORT_HAVE_IPOPT
+  if (o->solver == CAV_SOLVER_BOTH && status == CAV_OK) status = warm_start(run);
   if (o->solver != CAV_SOLVER_GAUSS_NEWTON && (status == CAV_OK || status == CAV_NOT_CONVERGED))
     status = cav_ipopt(run, error);
-  if (o->solver != CAV_SOLVER_GAUSS_NEWTON && status == CAV_OK) status = cav_restore(run);
+  if (o->solver != CAV_SOLVER_GAUSS_NEWTON && (status == CAV_OK || status == CAV_NOT_CONVERGED)) {
+    // what Ipopt left is worth bringing in, though it stays unfinished
+    cav_status restored = cav_restore(run);
+    if (status == CAV_OK || restored != CAV_NOT_CONVERGED) status = restored == CAV_OK ? status : restored;
+  }
 #else
   (void)error;
 #endif
@@ -170,8 +198,11 @@ cav_status cav_solve(const cav_problem *problem, const cav_solve_options *option
       cav_guess_fill(problem, run.at);
     }
     status = solve(&run, error);
-    end = conclude(&run, error);
+    // the reason of the solve goes before what verification of the gains says
+    cav_error inner = {0};
+    end = conclude(&run, &inner);
     if (run.failed != CAV_OK) status = run.failed;
+    if (end != CAV_OK && status == CAV_OK && error) *error = inner;
     run.solution->seconds = cav_clock() - run.start;
     run.solution->seconds_dynamics = run.tr->seconds_dynamics;
     run.solution->seconds_assembly = run.tr->seconds_assembly;

@@ -13,6 +13,8 @@ enum {
   CAV_EXIT_INTERRUPTED = 130
 };
 
+enum { CAV_COMMAND_IPOPT = 32 };
+
 /// A command line as read by main.c.
 typedef struct cav_command_line {
   const char *operand; ///< MODEL, PROBLEM, DIR or TOPIC; NULL: none
@@ -21,6 +23,8 @@ typedef struct cav_command_line {
   cav_solver solver;
   int threads;
   int resume, quiet, json;
+  int nipopt; ///< --ipopt, any number of times
+  cav_ipopt_option ipopt[CAV_COMMAND_IPOPT];
 } cav_command_line;
 
 int cav_command_inspect(const cav_command_line *line);

@@ -159,6 +159,8 @@ static int solve(const cav_command_line *line, const cav_problem *problem, const
   cav_solve_options options = cav_solve_options_default();
   options.solver = line->solver;
   options.threads = line->threads;
+  options.nipopt = line->nipopt;
+  options.ipopt = line->ipopt;
   options.observer = observe;
   options.observer_context = &tick;
   cav_solution *solution = NULL;
@@ -181,6 +183,10 @@ static int solve(const cav_command_line *line, const cav_problem *problem, const
 
 int cav_command_solve(const cav_command_line *line) {
   cav_error error = {0};
+  if (line->nipopt && line->solver == CAV_SOLVER_GAUSS_NEWTON) {
+    cav_file_fail(&error, CAV_BAD_INPUT, 0, "--ipopt needs --solver ipopt or both: the own solver has no such options");
+    return cav_command_fail(&error);
+  }
   cav_problem *problem = cav_problem_load(line->operand, line->model, &error);
   if (!problem) return cav_command_fail(&error);
   for (int i = 0; i < problem->model->nwarning && !line->quiet; i++)

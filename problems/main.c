@@ -13,7 +13,8 @@ enum option {
   OPTION_THREADS = 8,
   OPTION_RESUME = 16,
   OPTION_QUIET = 32,
-  OPTION_JSON = 64
+  OPTION_JSON = 64,
+  OPTION_IPOPT = 128
 };
 
 // options: spelling, value's name or NULL, what it does
@@ -24,6 +25,8 @@ static const struct {
     {OPTION_MODEL, "--model", NULL, "FILE", "use this model instead of the one that the problem names"},
     {OPTION_OUTPUT, "--output", "-o", "DIR", "folder of the result (default: NAME.result)"},
     {OPTION_SOLVER, "--solver", NULL, "WORD", "gn: own Gauss-Newton (default), ipopt, or both, one after the other"},
+    {OPTION_IPOPT, "--ipopt", NULL, "NAME=VALUE",
+     "an option of Ipopt, laid over the problem's; may be given several times"},
     {OPTION_THREADS, "--threads", NULL, "N",
      "threads to use (default: all processors); the result does not depend on it"},
     {OPTION_RESUME, "--resume", NULL, NULL, "start from the trajectory that the result folder holds"},
@@ -45,7 +48,8 @@ static const command commands[] = {
      cav_command_inspect, OPTION_MODEL},
     {"solve", "PROBLEM", "find the motion that a problem file asks for, certify it and write a result folder",
      cav_command_solve,
-     OPTION_MODEL | OPTION_OUTPUT | OPTION_SOLVER | OPTION_THREADS | OPTION_RESUME | OPTION_QUIET | OPTION_JSON},
+     OPTION_MODEL | OPTION_OUTPUT | OPTION_SOLVER | OPTION_IPOPT | OPTION_THREADS | OPTION_RESUME | OPTION_QUIET |
+         OPTION_JSON},
     {"verify", "DIR", "certify the motion of a result folder again, from its files alone", cav_command_verify,
      OPTION_MODEL | OPTION_QUIET | OPTION_JSON},
     {"explain", "DIR", "say why the motion of a result folder is as it is: what it misses, and which constraints pull",
@@ -109,8 +113,28 @@ static int help(const cav_command_line *line) {
   return 0;
 }
 
+// an option of Ipopt, NAME=VALUE; the argument is cut in two
+static int take_ipopt(cav_command_line *line, char *text) {
+  cav_error error = {0};
+  char *equals = strchr(text, '=');
+  if (!equals) {
+    fprintf(stderr, "cavort: --ipopt: expected NAME=VALUE, got '%s'\n", text);
+    return 0;
+  }
+  if (line->nipopt == CAV_COMMAND_IPOPT) {
+    fprintf(stderr, "cavort: --ipopt: expected at most %d of them; write them into the problem\n", CAV_COMMAND_IPOPT);
+    return 0;
+  }
+  *equals = 0;
+  cav_ipopt_option *option = &line->ipopt[line->nipopt++];
+  *option = (cav_ipopt_option){text, equals + 1};
+  if (!cav_ipopt_option_check(option, &error)) return 1;
+  fprintf(stderr, "cavort: --ipopt: %s\n", error.text);
+  return 0;
+}
+
 // takes the value of an option; returns 0 after telling what is wrong with it
-static int take_value(cav_command_line *line, enum option option, const char *name, const char *value) {
+static int take_value(cav_command_line *line, enum option option, const char *name, char *value) {
   static const char *const solvers[] = {
       [CAV_SOLVER_GAUSS_NEWTON] = "gn", [CAV_SOLVER_IPOPT] = "ipopt", [CAV_SOLVER_BOTH] = "both"};
   char *end;
@@ -129,6 +153,8 @@ static int take_value(cav_command_line *line, enum option option, const char *na
       }
       fprintf(stderr, "cavort: %s: expected gn, ipopt or both, got '%s'\n", name, value);
       return 0;
+    case OPTION_IPOPT:
+      return take_ipopt(line, value);
     case OPTION_THREADS:
       n = strtol(value, &end, 10);
       line->threads = (int)n;
@@ -146,7 +172,7 @@ static int take_value(cav_command_line *line, enum option option, const char *na
 }
 
 // index of the option that an argument spells, as NAME, NAME=VALUE or its brief form; -1 if none
-static int option_of(const char *argument, const char **value) {
+static int option_of(char *argument, char **value) {
   *value = NULL;
   for (int i = 0; i < NOPTION; i++) {
     size_t n = strlen(options[i].name);
@@ -161,7 +187,7 @@ static int option_of(const char *argument, const char **value) {
 // reads what follows the command's name; returns 0 after telling what is wrong
 static int read_line(const command *c, int argc, char **argv, cav_command_line *line) {
   for (int i = 0; i < argc; i++) {
-    const char *value;
+    char *value;
     if (argv[i][0] != '-' || !argv[i][1]) {
       if (line->operand) {
         fprintf(stderr, "cavort %s: expected one %s, got '%s' and '%s'\n", c->name, c->operand, line->operand, argv[i]);

@@ -300,6 +300,7 @@ static void check_round_trip(void) {
       "<start key='bent' height='floor' qvel='.1 .2 .3 .4'/>\n<goal qpos='.1 .2 .3 -.4'/>\n<guess apex='.3' from='.1' "
       "to='.9'/>\n"
       "<limits effort='.7' margin='.002'/>\n<schedule stages='5'><last penalty='123456'/></schedule>\n"
+      "<ipopt max_iter='30' hessian_approximation='limited-memory'/>\n"
       "<cost>\n<effort weight='3'/>\n<slip weight='0'/>\n<impact name='hit' weight='7' from='.5'/>\n<velocity "
       "name='one' joint='knee' weight='2' target='.5' at='end'/>\n"
       "<acceleration name='late' weight='.1' from='.3' to='.6'/>\n"
@@ -333,6 +334,11 @@ static void check_round_trip(void) {
     CHECK(q->solved && q->contact.softness == p->contact.softness && q->contact.timestep == .05 &&
           q->contact.gravity == 0);
     CHECK(q->contact.stabilisation == CAV_STABILISATION_DISCRETE && q->contact.passive == p->contact.passive);
+    CHECK(p->nipopt == 2 && q->nipopt == 2);
+    for (int i = 0; i < 2 && q->nipopt == 2; i++) {
+      CHECK_TEXT(q->ipopt[i].name, i ? "max_iter" : "hessian_approximation");
+      CHECK_TEXT(q->ipopt[i].value, i ? "30" : "limited-memory");
+    }
   } else {
     fprintf(stderr, "    %s\n", error.text);
   }
@@ -400,6 +406,11 @@ static void check_broken_files(void) {
   refuse(HEAD "<guess apex='-1'/>\n" TAIL, 4, "apex");
   refuse(HEAD "<limits effort='1.5'/>\n" TAIL, 4, "effort");
   refuse(HEAD "<schedule stages='0'/>\n" TAIL, 4, "stages");
+  refuse(HEAD "<ipopt max_itr='3'/>\n" TAIL, 4, "did you mean 'max_iter'");
+  refuse(HEAD "<ipopt max_iter='3.5'/>\n" TAIL, 4, "expected a whole number of at least 0, got '3.5'");
+  refuse(HEAD "<ipopt mu_init='0'/>\n" TAIL, 4, "expected a number above 0, got '0'");
+  refuse(HEAD "<ipopt mumps_pivtol='2'/>\n" TAIL, 4, "from 0 up to 1");
+  refuse(HEAD "<ipopt hessian_approximation='limited'/>\n" TAIL, 4, "exact limited-memory");
   refuse(HEAD "<schedule>\n<first softness='0'/></schedule>\n" TAIL, 5, "softness");
   refuse(HEAD "<schedule>\n<last iterations='0'/></schedule>\n" TAIL, 5, "iterations");
   refuse(HEAD

@@ -78,6 +78,11 @@ typedef struct cav_schedule {
   cav_stage_options first, last;
 } cav_schedule;
 
+/// One option of Ipopt by its own name, its value as text.
+typedef struct cav_ipopt_option {
+  const char *name, *value;
+} cav_ipopt_option;
+
 typedef struct cav_problem {
   const char *name;
   const cav_model *model;
@@ -95,6 +100,8 @@ typedef struct cav_problem {
   double effort_limit; ///< share of the actuator limits planned with, 0 .. 1
   double limit_margin; ///< rad or m kept from joint and tendon limits in planning
   cav_schedule schedule;
+  int nipopt; ///< options for Ipopt, where it is the solver
+  const cav_ipopt_option *ipopt;
   int solved;             ///< 1: read from a result folder, contact holds
   cav_options contact;    ///< the law that the recorded motion obeys, for verification; solving does not use it
   const char *model_path; ///< file the model was read from; NULL: made in C
@@ -111,6 +118,9 @@ int cav_problem_default_terms(cav_term *term, int most);
 /// Reads a problem file and its model (model_path overrides the file's; NULL: as written). NULL on failure.
 /// The result and its model are freed by cav_problem_free.
 cav_problem *cav_problem_load(const char *path, const char *model_path, cav_error *error);
+
+/// Whether an option of Ipopt may be set and its value fits; CAV_BAD_INPUT with the reason in error (may be NULL).
+cav_status cav_ipopt_option_check(const cav_ipopt_option *option, cav_error *error);
 
 /// Frees a problem that cav_problem_load gave, and its model; NULL is fine.
 void cav_problem_free(cav_problem *problem);

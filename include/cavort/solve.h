@@ -37,10 +37,10 @@ typedef struct cav_solve_options {
   void *observer_context;
   double tolerance; ///< unactuated force at the end, share of weight
   int diagnose;     ///< 1: where constraints cannot all hold, end at their least violation, which cav_explain needs
-  int ipopt_iterations;
   int ipopt_derivative_test; ///< 1: Ipopt's first-order checker runs before its first iteration; its text goes to ipopt_output
-  const char *ipopt_output;  ///< file of Ipopt's own log, NULL: none
-  const char *linear_solver; ///< Ipopt's, NULL: its default
+  const char *ipopt_output; ///< file of Ipopt's own log, NULL: none
+  int nipopt;               ///< options for Ipopt, laid over the problem's
+  const cav_ipopt_option *ipopt;
 } cav_solve_options;
 
 cav_solve_options cav_solve_options_default(void);
