@@ -186,6 +186,8 @@ static cav_status restore(cav_solve_run *run, double share) {
   region.radius = INFINITY;
   region.iterations = 1;
   region.tolerance = 0;
+  cav_trajectory *entry = cav_trajectory_copy(run->at);
+  if (!entry) return CAV_NO_MEMORY;
   tr->constraints_only = 1;
   tr->slack_effort = share * most.effort;
   tr->slack_range = share * most.range;
@@ -199,8 +201,16 @@ static cav_status restore(cav_solve_run *run, double share) {
   tr->slack_effort = tr->slack_range = 0;
   run->region.done = region.done;
   run->region.seconds_linear = region.seconds_linear;
-  if (status != CAV_OK) return status;
-  return holds(&is, &most) ? CAV_OK : CAV_NOT_CONVERGED;
+  // what cannot be brought in stays as it was: steps that chase the impossible lead far away
+  if (status == CAV_OK && !holds(&is, &most)) {
+    cav_trajectory *away = run->at;
+    run->at = entry;
+    entry = away;
+    status = cav_transcription_values(tr, run->at);
+    if (status == CAV_OK) status = CAV_NOT_CONVERGED;
+  }
+  cav_trajectory_free(entry);
+  return status;
 }
 
 cav_status cav_restore(cav_solve_run *run) {
@@ -225,7 +235,7 @@ cav_status cav_rest(cav_solve_run *run) {
   run->phase = "diagnosis";
   run->stages = 1;
   run->stage = 1;
-  run->region.radius = 0;
+  run->region.radius = INFINITY;
   run->region.iterations = REST_ITERATIONS;
   run->region.tolerance = rest_tolerance;
   run->tr->constraints_only = 1;
