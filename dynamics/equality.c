@@ -173,6 +173,7 @@ static void push(cav_state *state, const cav_equality *e, const cav_tie *tie, do
 
 void cav_tie_impulses(const cav_model *model, cav_state *state, const double *v, const double *velocity_now,
                       const double *v_next, double scale) {
+  const double *coupled = state->options.coupled ? state->work->target + state->work->first_tie : NULL;
   for (int i = 0; i < state->ntie; i++) {
     cav_tie *tie = &state->tie[i];
     const cav_equality *e = &model->equality[tie->equality];
@@ -180,6 +181,7 @@ void cav_tie_impulses(const cav_model *model, cav_state *state, const double *v,
     cav_tie_velocity(model, state, tie, v_next, state->velocity_next, tie->velocity_next);
     for (int k = 0; k < tie->dim; k++) {
       double target = (1 - tie->damping) * tie->velocity[k] - tie->stiffness * tie->error[k];
+      if (coupled) { target = *coupled++; }
       tie->impulse[k] = (target - tie->velocity_next[k]) / tie->regulariser[k];
     }
     if (between_links(e)) { push(state, e, tie, scale); }

@@ -8,6 +8,8 @@
 /// M_hat^-1 = M^-1 - M^-1 J_E' S J_E M^-1 with S = (A_E + R_E)^-1, and v to v_hat. So they hold to rounding in every sweep
 /// and stiff ones cost no more of them.
 ///
+/// Hard ones are the same with R_E = 0 and the pseudo-inverse of A_E for S.
+///
 /// Starts from the impulses of the last solve on the same state, matched object by object. For midpoint the smooth
 /// forces are taken anew after each sweep. The exact law only: the smoothed one has no bounded dual; use
 /// cav_forward_newton.
@@ -17,6 +19,8 @@
 
 #include "impulse.h"
 #include "math3.h"
+
+static const double RANK_TOLERANCE = 1e-10;
 
 enum { DIM_MAX = 6, SECULAR_STEPS = 30, PASSES = 3 };
 
@@ -31,10 +35,11 @@ typedef struct cav_memory {
 // the solver's arrays
 typedef struct gpgs {
   cav_impulse problem;
+  int hard;        // equality constraints have R_E = 0
   int n, m;        // rows of bounded objects and, behind them, of equality constraints
   double *A;       // [n*n] J M_hat^-1 J' + diag(R)
   double *W;       // [(n+m)*nv] rows of J M_hat^-1, then of J_E M^-1
-  double *S;       // [m*m] (A_E + R_E)^-1, with 2 m*m of scratch behind
+  double *S;       // [m*m] (A_E + R_E)^-1 or hard A_E^+, with 2 m*m of scratch behind
   double *offset;  // [n+m] v_minus - v*
   double *f, *was; // [nrow] impulses, those of the last sweep
   double *found;   // [nrow] impulses of the inverse
@@ -248,12 +253,6 @@ static void take_step(gpgs *s) {
     for (int k = 0; k < p->nv; k++) s->x[k] += s->f[i] * s->W[i * p->nv + k];
 }
 
-// one row of J into a dense vector
-static void spread(const cav_impulse *p, const cav_block *block, int i, double *r) {
-  memset(r, 0, (size_t)p->nv * sizeof *r);
-  for (int k = 0; k < block->ndof; k++) r[block->dof[k]] = block->J[i * block->ndof + k];
-}
-
 // rows of J_E M^-1, and S
 static void fill_equalities(gpgs *s) {
   const cav_impulse *p = &s->problem;
@@ -262,30 +261,39 @@ static void fill_equalities(gpgs *s) {
     const cav_block *block = &p->block[b];
     for (int i = 0; i < block->dim; i++) {
       double *W = s->W + (block->first + i) * p->nv;
-      spread(p, block, i, W);
+      cav_block_spread(block, i, p->nv, W);
       cav_ldl_solve(p->model, p->state->work, p->L, W);
     }
   }
   for (int i = 0; i < s->m; i++) {
     cav_impulse_rows(p, s->W + (s->n + i) * p->nv, s->row);
     memcpy(s->S + i * s->m, s->row + s->n, (size_t)s->m * sizeof *s->row);
-    s->S[i * s->m + i] += p->R[s->n + i];
+    if (!s->hard) s->S[i * s->m + i] += p->R[s->n + i];
   }
-  cav_pseudo_inverse(s->m, 0.0, s->S, s->S + square, s->S + 2 * square);
+  if (!s->hard) {
+    cav_pseudo_inverse(s->m, 0.0, s->S, s->S + square, s->S + 2 * square);
+    return;
+  }
+  // the limit of soft rows is least squares in their metric: A_E^+ is taken of rows over sqrt(R_E)
+  double *R = p->R + s->n;
+  for (int i = 0; i < s->m * s->m; i++) s->S[i] /= sqrt(R[i / s->m] * R[i % s->m]);
+  cav_pseudo_inverse(s->m, RANK_TOLERANCE, s->S, s->S + square, s->S + 2 * square);
+  for (int i = 0; i < s->m * s->m; i++) s->S[i] /= sqrt(R[i / s->m] * R[i % s->m]);
+  memset(R, 0, (size_t)s->m * sizeof *R);
 }
 
 // one row of J M_hat^-1
 static void fill_row(gpgs *s, const cav_block *block, int i, double *W) {
   const cav_impulse *p = &s->problem;
   if (s->m == 0) {
-    spread(p, block, i, W);
+    cav_block_spread(block, i, p->nv, W);
     cav_ldl_solve(p->model, p->state->work, p->L, W);
     return;
   }
   memset(W, 0, (size_t)p->nv * sizeof *W);
   memset(s->hold, 0, (size_t)s->m * sizeof *s->hold);
   for (int pass = 0; pass < PASSES; pass++) {
-    spread(p, block, i, s->missing);
+    cav_block_spread(block, i, p->nv, s->missing);
     cav_impulse_inertia(p, W, s->moved);
     for (int k = 0; k < p->nv; k++) s->missing[k] -= s->moved[k];
     push_equalities(s, s->hold, s->missing);
@@ -394,6 +402,25 @@ static void fill_report(gpgs *s, cav_forward_report *report) {
   report->mismatch = sqrt(square);
 }
 
+// hard constraints: what is missing of the balance of forces, relative; impulses into the state
+static cav_status fill_hard_report(gpgs *s, const double *v, const double *u, cav_forward_report *report) {
+  const cav_impulse *p = &s->problem;
+  const double rate = 1.0 / p->state->options.timestep;
+  const cav_status status = cav_impulse_smooth(p, v, u, s->x, s->r);
+  if (status != CAV_OK) return status;
+  memcpy(s->f + s->n, s->hold, (size_t)s->m * sizeof *s->hold);
+  double error = 0.0, scale = 0.0;
+  for (int i = 0; i < p->nv; i++) scale = fmax(scale, fmax(fabs(u[i]), fabs(rate * s->r[i])));
+  cav_impulse_push(p, -1.0, s->f, s->r);
+  for (int i = 0; i < p->nv; i++) error = fmax(error, fabs(rate * s->r[i]));
+  report->residual = error > 0.0 ? error / scale : 0.0;
+  for (int b = p->nbound; b < p->nblock; b++) {
+    cav_tie *tie = &p->state->tie[p->block[b].tie];
+    memcpy(tie->impulse, s->f + p->block[b].first, (size_t)tie->dim * sizeof *s->f);
+  }
+  return CAV_OK;
+}
+
 static cav_status prepare(gpgs *s, const cav_model *model, cav_state *state, const double *q, const double *v) {
   cav_impulse *p = &s->problem;
   // S and its scratch are as large as A where all rows are of equality constraints
@@ -427,11 +454,11 @@ static cav_status prepare(gpgs *s, const cav_model *model, cav_state *state, con
   return CAV_OK;
 }
 
-cav_status cav_forward_gpgs(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
-                            int iterations, double tolerance, double *v_next, cav_forward_report *report) {
+static cav_status solve(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
+                        int hard, int iterations, double tolerance, double *v_next, cav_forward_report *report) {
   if (iterations < 0 || !(tolerance >= 0.0)) return CAV_BAD_INPUT;
   if (!all_finite(u, model->nv) || !all_finite(v, model->nv)) return CAV_NOT_FINITE;
-  gpgs s;
+  gpgs s = {.hard = hard};
   cav_status status = prepare(&s, model, state, q, v);
   if (status != CAV_OK) return status;
   fill_matrices(&s);
@@ -469,7 +496,18 @@ cav_status cav_forward_gpgs(const cav_model *model, cav_state *state, const doub
   if (status != CAV_OK) return status;
   fill_report(&s, &mine);
   mine.residual = error > 0.0 ? error / scale : 0.0;
+  if (s.hard && s.m > 0 && (status = fill_hard_report(&s, v, u, &mine)) != CAV_OK) return status;
   memcpy(v_next, s.x, (size_t)model->nv * sizeof *v_next);
   if (report) *report = mine;
   return converged ? CAV_OK : CAV_NOT_CONVERGED;
+}
+
+cav_status cav_forward_gpgs(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
+                            int iterations, double tolerance, double *v_next, cav_forward_report *report) {
+  return solve(model, state, q, v, u, 0, iterations, tolerance, v_next, report);
+}
+
+cav_status cav_forward_hard(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
+                            int iterations, double tolerance, double *v_next, cav_forward_report *report) {
+  return solve(model, state, q, v, u, 1, iterations, tolerance, v_next, report);
 }

@@ -12,8 +12,7 @@
 
 enum { DIM_MAX = 6 };
 
-// memory of the state's solvers with room for that many bytes; what it held is lost
-static void *solver_room(cav_workspace *work, size_t bytes) {
+void *cav_solver_room(cav_workspace *work, size_t bytes) {
   if (bytes > work->solver_bytes) {
     void *larger = malloc(bytes + bytes / 2);
     if (!larger) return NULL;
@@ -26,14 +25,8 @@ static void *solver_room(cav_workspace *work, size_t bytes) {
 
 // M with what acts implicitly, and its factors
 static cav_status fill_inertia(cav_impulse *p) {
-  const cav_workspace *work = p->state->work;
-  const int half = p->state->options.order == CAV_ORDER_MIDPOINT && p->state->options.passive;
-  cav_composite_inertia(p->model, p->state, p->M);
-  for (int i = 0; i < p->nv; i++) {
-    p->M[work->row[i]] += cav_added_inertia(p->model, p->state, i);
-    if (half) p->M[work->row[i]] += 0.5 * p->state->options.timestep * p->model->dof[i].damping;
-  }
-  return cav_ldl_factor(p->model, work, p->M, p->L) ? CAV_OK : CAV_BAD_INPUT;
+  cav_step_inertia(p->model, p->state, p->M);
+  return cav_ldl_factor(p->model, p->state->work, p->M, p->L) ? CAV_OK : CAV_BAD_INPUT;
 }
 
 // v* = (1 - hB) x' - hK x and R of every row
@@ -60,6 +53,8 @@ static void fill_targets(cav_impulse *p) {
       R[0] = row->regulariser;
     }
   }
+  const double *coupled = p->state->work->target;
+  if (p->state->options.coupled && p->nrow > 0) memcpy(p->target, coupled, (size_t)p->nrow * sizeof *coupled);
 }
 
 cav_status cav_impulse_new(const cav_model *model, cav_state *state, const double *q, const double *v,
@@ -74,7 +69,7 @@ cav_status cav_impulse_new(const cav_model *model, cav_state *state, const doubl
                        room->per_row_and_dof * nrow * nv + room->per_dof * nv + room->per_dof_squared * nv * nv;
   const size_t doubles = 2 * nrow + nrow * nv + 2 * entries + 2 * nv + spare;
   double *at =
-      solver_room(state->work, doubles * sizeof(double) + nblock * (sizeof(cav_block) + nv * sizeof(int)) + 64);
+      cav_solver_room(state->work, doubles * sizeof(double) + nblock * (sizeof(cav_block) + nv * sizeof(int)) + 64);
   if (!at) return CAV_NO_MEMORY;
   *p = (cav_impulse){.model = model, .state = state, .nv = (int)nv, .nblock = (int)nblock, .nrow = (int)nrow};
   p->nbound = state->ncontact + state->nrow;

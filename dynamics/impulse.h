@@ -40,6 +40,9 @@ int cav_jacobian(const cav_model *model, const cav_state *state, cav_block *bloc
 int cav_jacobian_rows(const cav_state *state);
 int cav_tie_rows(const cav_state *state);
 
+/// Row i of a block as a dense vector r [nv]. jacobian.c.
+void cav_block_spread(const cav_block *block, int i, int nv, double *r);
+
 /// Doubles a solver needs of its own, by what they grow with.
 typedef struct cav_impulse_room {
   size_t per_block, per_row, per_row_squared, per_row_and_dof, per_dof, per_dof_squared;

@@ -44,6 +44,16 @@ void cav_composite_inertia(const cav_model *model, cav_state *state, double *M) 
   }
 }
 
+void cav_step_inertia(const cav_model *model, cav_state *state, double *M) {
+  const cav_workspace *w = state->work;
+  const int half = state->options.order == CAV_ORDER_MIDPOINT && state->options.passive;
+  cav_composite_inertia(model, state, M);
+  for (int i = 0; i < model->nv; i++) {
+    M[w->row[i]] += cav_added_inertia(model, state, i);
+    if (half) { M[w->row[i]] += 0.5 * state->options.timestep * model->dof[i].damping; }
+  }
+}
+
 cav_status cav_inertia(const cav_model *model, cav_state *state, const double *q, double *M) {
   if (!all_finite(q, model->nq)) { return CAV_NOT_FINITE; }
   cav_workspace *w = state->work;

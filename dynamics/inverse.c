@@ -14,7 +14,7 @@ static int same_position_options(const cav_options *a, const cav_options *b) {
   return a->timestep == b->timestep && a->stabilisation == b->stabilisation && a->regulariser == b->regulariser &&
          a->softness == b->softness && a->time_constant == b->time_constant && a->smoothing == b->smoothing &&
          a->smoothing_self == b->smoothing_self && a->self_share == b->self_share && a->impratio == b->impratio &&
-         a->guard == b->guard && a->contact == b->contact && a->constraint == b->constraint;
+         a->coupled == b->coupled && a->guard == b->guard && a->contact == b->contact && a->constraint == b->constraint;
 }
 
 cav_status cav_position(const cav_model *model, cav_state *state, const double *q) {
@@ -29,6 +29,10 @@ cav_status cav_position(const cav_model *model, cav_state *state, const double *
   if (status) { return status; }
   if (model->nequality) { cav_ties(model, state); }
   cav_soften(state);
+  if (state->options.regulariser == CAV_REGULARISER_EXACT || state->options.coupled) {
+    status = cav_exact(model, state);
+    if (status) { return status; }
+  }
   state->work->valid = CAV_STAGE_POSITION;
   state->work->options = state->options;
   return CAV_OK;
@@ -79,12 +83,14 @@ static void contact_push(cav_state *state, const cav_contact *c, double scale) {
   push_link(state, c->link1, c->pos, force, moment);
 }
 
-// f of one contact: the cone's projection of g = R^-1 (v* - v_next), v* = (1 - hB) x' - hK x in the normal row
-static void contact_impulse(cav_contact *c) {
+// f of one contact: the cone's projection of g = R^-1 (v* - v_next), v* = (1 - hB) x' - hK x in the normal row or as
+// coupled rows have it
+static void contact_impulse(cav_contact *c, const double *coupled) {
   double g[6];
   for (int k = 0; k < c->dim; k++) {
     double target = (1 - c->damping[k]) * c->velocity[k];
     if (k == 0) { target -= c->stiffness * (c->dist - c->margin); }
+    if (coupled) { target = coupled[k]; }
     g[k] = (target - c->velocity_next[k]) / c->regulariser[k];
   }
   cav_cone(c->dim, c->regulariser, c->friction, c->sigma, g, c->impulse, NULL, NULL);
@@ -92,24 +98,31 @@ static void contact_impulse(cav_contact *c) {
 
 // all contacts: velocities (those at v only if v has changed), impulses, wrenches
 static void contacts(cav_state *state, const double *velocity_now, double scale) {
+  const double *coupled = state->options.coupled ? state->work->target : NULL;
   for (int i = 0; i < state->ncontact; i++) {
     cav_contact *c = &state->contact[i];
     if (velocity_now) { cav_contact_velocity(state, c, velocity_now, c->velocity); }
     cav_contact_velocity(state, c, state->velocity_next, c->velocity_next);
-    contact_impulse(c);
+    contact_impulse(c, coupled);
+    if (coupled) { coupled += c->dim; }
     contact_push(state, c, scale);
   }
 }
 
 // limits and friction losses: they act on dofs directly
 static void rows(cav_state *state, const double *v, const double *v_next, double scale, double *u) {
+  const double *coupled =
+      state->options.coupled && state->nrow > 0 ? state->work->target + state->work->first_row : NULL;
   for (int i = 0; i < state->nrow; i++) {
     cav_row *row = &state->row[i];
     row->velocity = cav_row_velocity(state, row, v);
     row->velocity_next = cav_row_velocity(state, row, v_next);
     double target = (1 - row->damping) * row->velocity;
-    if (row->type == CAV_ROW_LIMIT_JOINT || row->type == CAV_ROW_LIMIT_TENDON) {
-      double g = (target - row->stiffness * (row->dist - row->margin) - row->velocity_next) / row->regulariser;
+    int limit = row->type == CAV_ROW_LIMIT_JOINT || row->type == CAV_ROW_LIMIT_TENDON;
+    if (limit) { target -= row->stiffness * (row->dist - row->margin); }
+    if (coupled) { target = coupled[i]; }
+    if (limit) {
+      double g = (target - row->velocity_next) / row->regulariser;
       cav_unilateral(row->regulariser, row->sigma, g, &row->impulse, NULL, NULL);
     } else {
       double g = (target - row->velocity_next) / row->regulariser;
@@ -135,6 +148,19 @@ static void copy(double *to, const double *from, int n) {
   if (n > 0 && to != from) { memcpy(to, from, (size_t)n * sizeof *to); }
 }
 
+// v* of coupled rows: from the velocities of all at v, those of links at velocity_now
+static void couple(const cav_model *model, cav_state *state, const double *velocity_now) {
+  const double *v = state->work->v;
+  for (int i = 0; i < state->ncontact; i++) {
+    cav_contact_velocity(state, &state->contact[i], velocity_now, state->contact[i].velocity);
+  }
+  for (int i = 0; i < state->nrow; i++) state->row[i].velocity = cav_row_velocity(state, &state->row[i], v);
+  for (int i = 0; i < state->ntie; i++) {
+    cav_tie_velocity(model, state, &state->tie[i], v, velocity_now, state->tie[i].velocity);
+  }
+  cav_couple(state);
+}
+
 static void evaluate(const cav_model *model, cav_state *state, int with_constraints, int new_velocity, double *u) {
   cav_workspace *w = state->work;
   w->derived = 0;
@@ -145,14 +171,18 @@ static void evaluate(const cav_model *model, cav_state *state, int with_constrai
   cav_newton_euler(model, state, bias, w->v_next, a);
   if (w->nbuoy > 0) { cav_add_buoyancy(model, state); }
   if (w->nfloat > 0) { cav_add_fluid_forces(model, state); }
-  if (with_constraints && (state->ncontact > 0 || state->ntie > 0)) {
-    const double *now = NULL;
+  const double *now = NULL;
+  int links = with_constraints && (state->ncontact > 0 || state->ntie > 0);
+  if (links) {
     if (new_velocity && state->options.order == CAV_ORDER_MIDPOINT) {
       cav_velocities(model, state, w->v, w->velocity_now);
       now = w->velocity_now;
     } else if (new_velocity) {
       now = state->velocity;
     }
+  }
+  if (with_constraints && new_velocity && state->options.coupled) { couple(model, state, now); }
+  if (links) {
     contacts(state, now, scale);
     if (state->ntie > 0) { cav_tie_impulses(model, state, w->v, now, w->v_next, scale); }
   }

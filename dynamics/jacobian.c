@@ -139,6 +139,11 @@ static int scalar_block(const cav_model *model, const cav_state *state, const ca
   return n;
 }
 
+void cav_block_spread(const cav_block *block, int i, int nv, double *r) {
+  for (int k = 0; k < nv; k++) r[k] = 0.0;
+  for (int k = 0; k < block->ndof; k++) r[block->dof[k]] = block->J[i * block->ndof + k];
+}
+
 int cav_tie_rows(const cav_state *state) {
   int rows = 0;
   for (int i = 0; i < state->ntie; i++) rows += state->tie[i].dim;

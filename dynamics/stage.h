@@ -89,6 +89,13 @@ typedef struct cav_law {
 } cav_law;
 cav_law cav_law_at(const cav_state *state, const cav_softness *softness, double x, double weight);
 
+/// R by the true diagonal of A where the options ask, and what cav_couple needs. After all else of the position stage.
+/// Fails with CAV_NO_MEMORY, and with CAV_BAD_INPUT if the inertia is not positive definite. exact.c.
+cav_status cav_exact(const cav_model *model, cav_state *state);
+
+/// v* of all rows together from their velocities in the state, into its workspace. exact.c.
+void cav_couple(cav_state *state);
+
 /// Fills state->tie at the state's positions: errors, what their rates depend on, laws. equality.c.
 void cav_ties(const cav_model *model, cav_state *state);
 
@@ -141,6 +148,9 @@ void cav_composites(const cav_model *model, cav_state *state);
 
 /// Composite inertia at the state's poses without D, tree-sparse (row i: dof i, its parent, ...). inertia.c.
 void cav_composite_inertia(const cav_model *model, cav_state *state, double *M);
+
+/// M as a step sees it, tree-sparse: with D and, for midpoint, half of the damping that acts during the step. inertia.c.
+void cav_step_inertia(const cav_model *model, cav_state *state, double *M);
 
 /// D of a dof under the state's options: armature, and damping times h where damping is implicit. inertia.c.
 double cav_added_inertia(const cav_model *model, const cav_state *state, int dof);

@@ -207,6 +207,7 @@ void cav_state_free(cav_state *state) {
   free(state->work->floats);
   free(state->work->readout);
   cav_slopes_free(state->work->slopes);
+  free(state->work->coupling);
   free(state->work->solver);
   free(state->work->memory);
   free(state->contact);

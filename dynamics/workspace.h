@@ -63,6 +63,12 @@ typedef struct cav_workspace {
   double *gram;         ///< [nu*nu] its pseudo-inverse otherwise, with scratch behind; NULL if diagonal and constant
   double *control;      ///< [2*nu]
 
+  // coupled rows (exact.c): I + R A^+ times what undoes the factor 1 + epsilon of each row [rows*rows], v* [rows] in the
+  // order of cav_jacobian; NULL without
+  double *coupling, *target;
+  size_t coupling_room;
+  int first_row, first_tie; // where in target rows and ties begin
+
   // readings of cav_differentiate, grown on demand
   double *readout;
   size_t readout_room;
@@ -88,5 +94,8 @@ cav_status cav_fluid_compile(const cav_model *model, cav_workspace *w);
 
 /// Fills the transmission of a workspace. actuation.c.
 cav_status cav_actuation_compile(const cav_model *model, cav_state *state);
+
+/// Memory of the state's solvers with room for that many bytes, what it held is lost; NULL if memory runs out. impulse.c.
+void *cav_solver_room(cav_workspace *w, size_t bytes);
 
 #endif

@@ -147,6 +147,13 @@ typedef struct cav_forward_report {
 cav_status cav_forward_gpgs(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
                             int iterations, double tolerance, double *v_next, cav_forward_report *report);
 
+/// The same with equality constraints hard: R_E = 0, the limit that the soft ones approach as R_E does. Forward only, as
+/// it has no inverse: many u give one v_next. Rows may repeat or contradict each other; what cannot hold together holds in
+/// the least squares of the soft rows. residual of the report is the force missing from the balance, relative; the
+/// impulses that hold the constraints are left in state->tie. Paper, section II C.
+cav_status cav_forward_hard(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
+                            int iterations, double tolerance, double *v_next, cav_forward_report *report);
+
 /// cav_forward with tolerance (relative, on u), iteration limit and a report.
 cav_status cav_forward_newton(const cav_model *model, cav_state *state, const double *q, const double *v,
                               const double *u, int iterations, double tolerance, double *v_next,

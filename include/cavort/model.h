@@ -354,7 +354,8 @@ typedef enum cav_stabilisation {
 
 /// Diagonal of A that scales the regulariser R (27).
 typedef enum cav_regulariser {
-  CAV_REGULARISER_REFERENCE ///< constants of the configuration q0: smooth in q, cheap, MuJoCo's
+  CAV_REGULARISER_REFERENCE, ///< constants of the configuration q0: smooth in q, cheap, MuJoCo's
+  CAV_REGULARISER_EXACT      ///< of J M_hat^-1 J' at q, the paper's: factors the inertia in every evaluation
 } cav_regulariser;
 
 /// How constraints are evaluated. A state starts with the model's; change state->options between calls at will.
@@ -363,6 +364,7 @@ typedef struct cav_options {
   cav_order order;
   cav_stabilisation stabilisation;
   cav_regulariser regulariser;
+  int coupled;           ///< 1: B and K dense, so that all rows together are critically damped; costs a factorisation
   double softness;       ///< epsilon of CAV_STABILISATION_DISCRETE, > 0
   double time_constant;  ///< kappa of CAV_STABILISATION_DISCRETE, s; 0: deadbeat
   double smoothing;      ///< delta, m: distance at which the smoothed law is felt; 0: the exact law (dynamics.md, 3)
