@@ -581,6 +581,8 @@ const char *cav_derivatives_missing(const cav_model *model) {
 cav_status cav_derivatives(const cav_model *model, cav_state *state, double *du_dq, double *du_dv, double *du_dv_next) {
   if (!cav_evaluated(state)) return CAV_BAD_INPUT;
   if (cav_derivatives_missing(model)) return CAV_NOT_SUPPORTED;
+  // laws that hang on all rows together
+  if (state->options.regulariser == CAV_REGULARISER_EXACT || state->options.coupled) return CAV_NOT_SUPPORTED;
   cav_slopes *s = prepare(model, state);
   if (!s) return CAV_NO_MEMORY;
   int nv = model->nv;

@@ -148,6 +148,12 @@ static double regulariser_of(const cav_state *state, const cav_block *block, int
   return state->row[block->row].regulariser;
 }
 
+// by how much more than by its softness an object's R was raised
+static double eased(const cav_state *state, const cav_block *block) {
+  if (block->contact < 0 || state->model->pair[state->contact[block->contact].pair].same_world) return 1;
+  return 1 / state->options.self_share;
+}
+
 // (I + R A^+) diag(1/(1 + epsilon)); epsilon = R/weight of a block's first row is the one that h B and h K were made with.
 // exact says that the weights are the true diagonal
 static cav_status fill_coupling(rows *r, int exact) {
@@ -164,9 +170,9 @@ static cav_status fill_coupling(rows *r, int exact) {
     const cav_block *block = &r->p.block[b];
     for (int k = 0; k < block->dim; k++) {
       const int i = block->first + (block->tie >= 0 ? k : 0);
-      const double weight = reference(state, block), R = regulariser_of(state, block, i - block->first);
-      const double true_weight = fmax(LEAST * weight, G[i * (n + 1)]);
-      damped[block->first + k] = exact ? true_weight / (true_weight + R) : weight / (weight + R);
+      const double R = regulariser_of(state, block, i - block->first), constant = reference(state, block);
+      const double weight = eased(state, block) * (exact ? fmax(LEAST * constant, G[i * (n + 1)]) : constant);
+      damped[block->first + k] = weight / (weight + R);
     }
   }
   for (int i = 0; i < n; i++)

@@ -366,6 +366,7 @@ static cav_status read_contact(const cav_problem_reader *reader) {
   o->order = (cav_order)cav_xml_word(node, "order", o->order);
   o->stabilisation = (cav_stabilisation)cav_xml_word(node, "stabilisation", o->stabilisation);
   o->regulariser = (cav_regulariser)cav_xml_word(node, "regulariser", o->regulariser);
+  o->coupled = cav_xml_bool(node, "coupled", o->coupled);
   o->guard = cav_xml_bool(node, "guard", o->guard);
   o->contact = cav_xml_bool(node, "contact", o->contact);
   o->constraint = cav_xml_bool(node, "constraint", o->constraint);

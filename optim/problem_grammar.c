@@ -48,7 +48,7 @@ const char *const cav_problem_sensors[] = {"jointpos",
                                            "clock",
                                            NULL};
 const char *const cav_problem_stabilisations[] = {"solref", "discrete", NULL};
-const char *const cav_problem_regularisers[] = {"reference", NULL};
+const char *const cav_problem_regularisers[] = {"reference", "exact", NULL};
 static const char *const heights[] = {"keep", "floor", NULL};
 static const char *const ends[] = {"first", "last", NULL};
 static const char *const frames[] = {"body", "xbody", "geom", "site", NULL};
@@ -168,7 +168,7 @@ static const cav_xml_element contact = {
                WORD("stabilisation", cav_problem_stabilisations), WORD("regulariser", cav_problem_regularisers),
                REAL("softness", 1), REAL("time_constant", 1), REAL("smoothing", 1), REAL("smoothing_self", 1),
                REAL("self_share", 0),
-               REAL("impratio", 1), FLAG("guard"), FLAG("contact"), FLAG("constraint"), FLAG("gravity"),
+               REAL("impratio", 1), FLAG("coupled"), FLAG("guard"), FLAG("contact"), FLAG("constraint"), FLAG("gravity"),
                FLAG("passive")),
     NULL,
     0};

@@ -235,6 +235,7 @@ static void write_contact(FILE *out, const cav_options *o) {
   write_number(out, "smoothing_self", o->smoothing_self);
   write_number(out, "self_share", o->self_share);
   write_number(out, "impratio", o->impratio);
+  write_text(out, "coupled", truth[o->coupled != 0]);
   write_text(out, "guard", truth[o->guard != 0]);
   write_text(out, "contact", truth[o->contact != 0]);
   write_text(out, "constraint", truth[o->constraint != 0]);
