@@ -22,15 +22,7 @@
 
 static const double RANK_TOLERANCE = 1e-10;
 
-enum { DIM_MAX = 6, SECULAR_STEPS = 30, PASSES = 3 };
-
-/// An impulse remembered between solves, and of which object.
-typedef struct cav_memory {
-  int type;   ///< -1 for a contact, else the cav_row_type
-  int object; ///< pair, or the object of the row
-  int detail; ///< feature, or the side of the row
-  double f[DIM_MAX];
-} cav_memory;
+enum { DIM_MAX = CAV_IMPULSE_DIM, SECULAR_STEPS = 30, PASSES = 3 };
 
 // the solver's arrays
 typedef struct gpgs {

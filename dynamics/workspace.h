@@ -10,6 +10,16 @@ struct cav_geom_cache;
 struct cav_geom_cache *cav_geom_cache_new(const cav_model *model);
 void cav_geom_cache_free(struct cav_geom_cache *cache);
 
+enum { CAV_IMPULSE_DIM = 6 }; ///< most impulses of one object
+
+/// An impulse remembered between Gauss-Seidel solves, and of which object. gpgs.c.
+typedef struct cav_memory {
+  int type;   ///< -1 for a contact, else the cav_row_type
+  int object; ///< pair, or the object of the row
+  int detail; ///< feature, or the side of the row
+  double f[CAV_IMPULSE_DIM];
+} cav_memory;
+
 typedef struct cav_workspace {
   // the last evaluation
   cav_stage valid;        ///< what cav_inverse_from may reuse
@@ -80,7 +90,7 @@ typedef struct cav_workspace {
   // forward step: memory of its matrices, grown by impulse.c, and the impulses of its last Gauss-Seidel solve, by gpgs.c
   void *solver;
   size_t solver_bytes;
-  struct cav_memory *memory;
+  cav_memory *memory;
   int nmemory, memory_room;
 } cav_workspace;
 
