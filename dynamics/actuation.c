@@ -45,6 +45,7 @@ static void invert_gram(const cav_model *model, cav_workspace *w, double *G) {
 cav_status cav_actuation_compile(const cav_model *model, cav_state *state) {
   cav_workspace *w = state->work;
   int nu = model->nactuator, entries = 0;
+  if (nu == 0) { return CAV_OK; }
   for (int i = 0; i < nu; i++) {
     w->gear_start[i] = entries;
     entries += cav_transmission_dofs(model, i, w->gear_dof + entries);
@@ -55,7 +56,6 @@ cav_status cav_actuation_compile(const cav_model *model, cav_state *state) {
     }
   }
   w->gear_start[nu] = entries;
-  if (nu == 0) { return CAV_OK; }
   double *G = malloc(3 * (size_t)nu * (size_t)nu * sizeof *G);
   if (!G) { return CAV_NO_MEMORY; }
   invert_gram(model, w, G);

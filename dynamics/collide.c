@@ -30,6 +30,7 @@ typedef struct slot {
 } slot;
 
 struct cav_geom_cache {
+  size_t bytes;
   int nslot;
   slot *slot;
   double (*centre)[3];  ///< [nslot] world
@@ -90,8 +91,12 @@ struct cav_geom_cache *cav_geom_cache_new(const cav_model *model) {
   }
   open_slots(model, cache, slot_of);
   free(slot_of);
+  cache->bytes = sizeof *cache + ((size_t)model->ngeom + 1) * (sizeof *cache->slot + sizeof *cache->centre);
+  cache->bytes += ((size_t)model->npair + 1) * sizeof *cache->candidate;
   return cache;
 }
+
+size_t cav_geom_cache_bytes(const struct cav_geom_cache *cache) { return cache ? cache->bytes : 0; }
 
 void cav_geom_cache_free(struct cav_geom_cache *cache) {
   if (!cache) return;

@@ -37,37 +37,41 @@ static size_t count_buoys(const cav_model *model, int *out) {
   return n;
 }
 
-// lays out the state and its workspace over base; with base NULL only counts. Returns the bytes
+// how many joints, dofs and actuators need a list of their own
+typedef struct census {
+  size_t springs, limits, frictions, gears;
+} census;
+
+static census count(const cav_model *model) {
+  census c = {0};
+  for (int i = 0; i < model->njoint; i++) {
+    c.springs += model->joint[i].stiffness != 0;
+    c.limits += model->joint[i].limited && model->joint[i].type != CAV_JOINT_FREE;
+  }
+  for (int i = 0; i < model->nv; i++) { c.frictions += model->dof[i].frictionloss > 0; }
+  for (int k = 0; k < model->nactuator; k++) { c.gears += (size_t)cav_transmission_dofs(model, k, NULL); }
+  return c;
+}
+
+// notes what was laid out since the last note as belonging to a part
+static void note(cav_workspace *w, cav_part part, size_t used) {
+  w->bytes[part] += used - w->noted;
+  w->noted = used;
+}
+
+// lays out the state and its workspace over base, part by part; with base NULL only counts. Returns the bytes
 static size_t layout(const cav_model *model, char *base, cav_state *s, cav_workspace *w) {
   size_t used = 0;
   size_t n = model->nlink, nv = model->nv, nq = model->nq, nt = model->ntendon, nj = model->njoint;
-  size_t d = sizeof(double), i = sizeof(int), entries = inertia_entries(model);
+  size_t d = sizeof(double), i = sizeof(int), nu = model->nactuator, entries = inertia_entries(model);
+  const census c = count(model);
+
   s->link = carve(base, &used, n, sizeof(cav_pose));
   s->com = carve(base, &used, 3 * n, d);
   s->inertia = carve(base, &used, 6 * n, d);
   s->reference = carve(base, &used, 3 * n, d);
   s->axis = carve(base, &used, 6 * nv, d);
-  s->velocity = carve(base, &used, 6 * n, d);
-  s->velocity_next = carve(base, &used, 6 * n, d);
-  s->force = carve(base, &used, 6 * n, d);
-  s->u = carve(base, &used, nv, d);
-  s->tendon_length = carve(base, &used, nt, d);
-  s->tendon_arm = carve(base, &used, model->ntendon_dof, d);
-  s->tie = carve(base, &used, (size_t)model->nequality, sizeof(cav_tie));
   w->q = carve(base, &used, nq, d);
-  w->v = carve(base, &used, nv, d);
-  w->v_next = carve(base, &used, nv, d);
-  w->acceleration = carve(base, &used, 6 * n, d);
-  w->velocity_now = carve(base, &used, 6 * n, d);
-  w->scratch = carve(base, &used, 4 * nv, d);
-  w->armature = carve(base, &used, nv, d);
-  w->damping = carve(base, &used, nv, d);
-  w->group = carve(base, &used, nv, i);
-  w->parent = carve(base, &used, nv, i);
-  w->row = carve(base, &used, nv + 1, i);
-  w->M = carve(base, &used, entries, d);
-  w->L = carve(base, &used, entries, d);
-  w->composite = carve(base, &used, 10 * n, d);
   w->quaternion = carve(base, &used, nj, i);
   w->hinge = carve(base, &used, nj, i);
   w->hinge_of = carve(base, &used, nj, i);
@@ -78,21 +82,52 @@ static size_t layout(const cav_model *model, char *base, cav_state *s, cav_works
   w->aligned = carve(base, &used, nj, i);
   w->centred = carve(base, &used, nj, i);
   w->straight = carve(base, &used, n, i);
-  w->spring = carve(base, &used, nj, i);
-  w->limit = carve(base, &used, nj, i);
-  w->friction = carve(base, &used, nv, i);
+  note(w, CAV_PART_POSES, used);
+
+  s->velocity = carve(base, &used, 6 * n, d);
+  s->velocity_next = carve(base, &used, 6 * n, d);
+  s->force = carve(base, &used, 6 * n, d);
+  s->u = carve(base, &used, nv, d);
+  w->v = carve(base, &used, nv, d);
+  w->v_next = carve(base, &used, nv, d);
+  w->acceleration = carve(base, &used, 6 * n, d);
+  w->velocity_now = carve(base, &used, 6 * n, d);
+  w->scratch = carve(base, &used, 4 * nv, d);
+  w->group = carve(base, &used, nv, i);
+  w->armature = carve(base, &used, nv, d);
+  w->damping = carve(base, &used, nv, d);
+  w->spring = carve(base, &used, c.springs, i);
   w->buoy = carve(base, &used, count_buoys(model, NULL), i);
+  note(w, CAV_PART_MOTION, used);
+
+  s->tendon_length = carve(base, &used, nt, d);
+  s->tendon_arm = carve(base, &used, model->ntendon_dof, d);
   w->string = carve(base, &used, nt, i);
   w->tendon_spring = carve(base, &used, nt, i);
   w->tendon_limit = carve(base, &used, nt, i);
   w->tendon_friction = carve(base, &used, nt, i);
-  size_t nu = model->nactuator, gears = 0;
-  for (int k = 0; k < model->nactuator; k++) { gears += (size_t)cav_transmission_dofs(model, k, NULL); }
-  w->gear_start = carve(base, &used, nu + 1, i);
-  w->gear_dof = carve(base, &used, gears, i);
-  w->gear = carve(base, &used, gears, d);
+  note(w, CAV_PART_TENDONS, used);
+
+  s->tie = carve(base, &used, (size_t)model->nequality, sizeof(cav_tie));
+  note(w, CAV_PART_EQUALITY, used);
+
+  w->limit = carve(base, &used, c.limits, i);
+  w->friction = carve(base, &used, c.frictions, i);
+  note(w, CAV_PART_ROWS, used);
+
+  w->gear_start = carve(base, &used, nu > 0 ? nu + 1 : 0, i);
+  w->gear_dof = carve(base, &used, c.gears, i);
+  w->gear = carve(base, &used, c.gears, d);
   w->gram_inverse = carve(base, &used, nu, d);
   w->control = carve(base, &used, 2 * nu, d);
+  note(w, CAV_PART_ACTUATION, used);
+
+  w->parent = carve(base, &used, nv, i);
+  w->row = carve(base, &used, nv + 1, i);
+  w->M = carve(base, &used, entries, d);
+  w->L = carve(base, &used, entries, d);
+  w->composite = carve(base, &used, 10 * n, d);
+  note(w, CAV_PART_INERTIA, used);
   return used;
 }
 
@@ -159,6 +194,13 @@ static void compile_lists(const cav_model *model, cav_workspace *w) {
   }
 }
 
+// an array for the first few items, if it is needed at all
+static void *make_room(int needed, int *room, size_t size) {
+  void *items = needed ? malloc(FIRST_ROOM * size) : NULL;
+  *room = items ? FIRST_ROOM : 0;
+  return items;
+}
+
 cav_state *cav_state_new(const cav_model *model) {
   // sizes first, then one block: state, workspace, arrays
   cav_state probe = {0};
@@ -187,13 +229,14 @@ cav_state *cav_state_new(const cav_model *model) {
   quat_normalise(state->link[0].quat);
   quat_matrix(state->link[0].rotation, state->link[0].quat);
 
-  // room for contacts and rows; both grow later
-  state->contact = malloc(FIRST_ROOM * sizeof(cav_contact));
-  state->row = malloc(FIRST_ROOM * sizeof(cav_row));
-  work->contact_room = work->row_room = FIRST_ROOM;
-  work->geom = cav_geom_cache_new(model);
-  if (!state->contact || !state->row || !work->geom || cav_fluid_compile(model, work) != CAV_OK ||
-      cav_actuation_compile(model, state) != CAV_OK) {
+  // room for contacts and rows, where there can be any; both grow later
+  int touches = model->npair > 0, bounded = work->nlimit + work->nfriction > 0;
+  bounded = bounded || work->ntendon_limit + work->ntendon_friction > 0;
+  state->contact = make_room(touches, &work->contact_room, sizeof *state->contact);
+  state->row = make_room(bounded, &work->row_room, sizeof *state->row);
+  work->geom = touches ? cav_geom_cache_new(model) : NULL;
+  int whole = (!touches || (state->contact && work->geom)) && (!bounded || state->row);
+  if (!whole || cav_fluid_compile(model, work) != CAV_OK || cav_actuation_compile(model, state) != CAV_OK) {
     cav_state_free(state);
     return NULL;
   }
@@ -219,8 +262,9 @@ void cav_state_free(cav_state *state) {
 static void *grown(void *items, int count, int *room, size_t size) {
   if (count < *room) { return items; }
   if (*room > INT32_MAX / 2) { return NULL; }
-  void *larger = realloc(items, 2 * (size_t)*room * size);
-  if (larger) { *room *= 2; }
+  int more = *room > 0 ? 2 * *room : FIRST_ROOM;
+  void *larger = realloc(items, (size_t)more * size);
+  if (larger) { *room = more; }
   return larger;
 }
 
@@ -236,4 +280,16 @@ cav_row *cav_row_push(cav_state *state) {
   if (!row) { return NULL; }
   state->row = row;
   return &row[state->nrow++];
+}
+
+void cav_state_bytes(const cav_state *state, size_t bytes[CAV_PARTS]) {
+  const cav_workspace *w = state->work;
+  memcpy(bytes, w->bytes, sizeof w->bytes);
+  bytes[CAV_PART_HEAD] += sizeof(cav_state) + sizeof(cav_workspace);
+  bytes[CAV_PART_ROWS] += (size_t)w->row_room * sizeof *state->row;
+  bytes[CAV_PART_CONTACTS] += (size_t)w->contact_room * sizeof *state->contact + cav_geom_cache_bytes(w->geom);
+  size_t nu = (size_t)state->model->nactuator;
+  bytes[CAV_PART_ACTUATION] += w->gram ? 3 * nu * nu * sizeof(double) : 0;
+  bytes[CAV_PART_SOLVERS] += w->solver_bytes + w->readout_room * sizeof(double);
+  bytes[CAV_PART_SOLVERS] += (size_t)w->memory_room * sizeof *w->memory;
 }

@@ -9,6 +9,37 @@
 struct cav_geom_cache;
 struct cav_geom_cache *cav_geom_cache_new(const cav_model *model);
 void cav_geom_cache_free(struct cav_geom_cache *cache);
+size_t cav_geom_cache_bytes(const struct cav_geom_cache *cache);
+
+/// What the memory of a state serves. profile.c tells of it.
+typedef enum cav_part {
+  CAV_PART_HEAD,      ///< the two structs themselves
+  CAV_PART_POSES,     ///< positions of links
+  CAV_PART_MOTION,    ///< velocities, forces, joints' own forces
+  CAV_PART_TENDONS,   ///< lengths and moment arms
+  CAV_PART_EQUALITY,  ///< ties
+  CAV_PART_ROWS,      ///< limits and friction losses
+  CAV_PART_CONTACTS,  ///< contacts, and geoms that may touch
+  CAV_PART_ACTUATION, ///< transmissions
+  CAV_PART_INERTIA,   ///< inertia matrix and its factors: forward steps only
+  CAV_PART_SOLVERS,   ///< solvers and derivatives that have been called
+  CAV_PARTS
+} cav_part;
+
+/// Bytes of each part of a state as it is now. state.c.
+void cav_state_bytes(const cav_state *state, size_t bytes[CAV_PARTS]);
+
+/// Times of the stages of one evaluation of the inverse, s: each run alone often enough to be measured, shortest of several.
+typedef struct cav_profile {
+  double poses, rows, contacts, ties, laws; ///< from q: links and tendons; limits; search of contacts; errors; R, B, K
+  double motion;                            ///< from v and v_next: Newton-Euler, joints' and tendons' forces
+  double impulses;                          ///< from both: of contacts, ties and rows
+  double whole;
+} cav_profile;
+
+/// Measures at (q, v, v_next); fails as cav_inverse does. The state is left evaluated there. profile.c.
+cav_status cav_profile_inverse(const cav_model *model, cav_state *state, const double *q, const double *v,
+                               const double *v_next, cav_profile *profile);
 
 enum { CAV_IMPULSE_DIM = 6 }; ///< most impulses of one object
 
@@ -21,6 +52,8 @@ typedef struct cav_memory {
 } cav_memory;
 
 typedef struct cav_workspace {
+  size_t bytes[CAV_PARTS], noted; ///< of the block, by part
+
   // the last evaluation
   cav_stage valid;        ///< what cav_inverse_from may reuse
   cav_options options;    ///< under which it was made

@@ -1,5 +1,5 @@
 /// cavort inspect: what a model holds, what an evaluation of it runs and leaves out and why; for a problem also its terms and
-/// schedule in words. Counts come from the compiled model. Solves nothing.
+/// schedule in words. Counts come from the compiled model, times from running it. Solves nothing.
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -8,6 +8,7 @@
 
 #include "command.h"
 #include "file.h"
+#include "workspace.h"
 
 static const char *const geom_name[] = {"plane", "sphere", "capsule", "ellipsoid", "cylinder", "box"};
 static const char *const joint_name[] = {"free", "ball", "slide", "hinge"};
@@ -179,7 +180,47 @@ static void print_stages(const cav_model *m) {
   }
   print_stage("actuators", m->nu, "actuators", "nothing is driven");
   print_stage("moments that follow q", c.moving, "actuators", "all moments are constant");
+  print_stage("sensors", m->nsensor, "sensors, each when it is read", "none in the file");
   printf("  no matrix is formed or factorised\n");
+}
+
+// one line of the table of costs; what takes neither time nor memory says so
+static void print_cost(const char *name, double seconds, size_t bytes) {
+  printf("  %-44s", name);
+  if (seconds > 0)
+    printf(" %8.2f us", 1e6 * seconds);
+  else
+    printf(" %11s", seconds < 0 ? "" : "0");
+  printf(" %8.1f kB\n", (double)bytes / 1024);
+}
+
+// time of the stages at the file's posture, at rest, and the memory of a state
+static void print_costs(const cav_model *m) {
+  cav_state *state = cav_state_new(m);
+  double *v = calloc((size_t)m->nv, sizeof *v);
+  cav_profile time = {0};
+  size_t bytes[CAV_PARTS], all = 0;
+  cav_status status = state && v ? cav_profile_inverse(m, state, m->q0, v, v, &time) : CAV_NO_MEMORY;
+  if (status == CAV_OK) {
+    cav_state_bytes(state, bytes);
+    for (int i = 0; i < CAV_PARTS; i++) all += bytes[i];
+    printf("\nits time, at the posture of the file with %d contacts, and the memory of a state\n", state->ncontact);
+    print_cost("poses and tendon lengths", time.poses, bytes[CAV_PART_POSES] + bytes[CAV_PART_TENDONS]);
+    print_cost("limits and friction losses", time.rows, bytes[CAV_PART_ROWS]);
+    print_cost("search of contacts", time.contacts, bytes[CAV_PART_CONTACTS]);
+    print_cost("equality constraints", time.ties, bytes[CAV_PART_EQUALITY]);
+    print_cost("laws of contacts", time.laws, 0);
+    print_cost("Newton-Euler, forces of joints and tendons", time.motion, bytes[CAV_PART_MOTION]);
+    print_cost("impulses of all constraints", time.impulses, 0);
+    print_cost("actuators, where they are asked for", -1, bytes[CAV_PART_ACTUATION]);
+    print_cost("inertia matrix, forward steps only", -1, bytes[CAV_PART_INERTIA]);
+    print_cost("solvers, once they are called", -1, bytes[CAV_PART_SOLVERS]);
+    print_cost("the whole", time.whole, all);
+  } else {
+    printf("\nno evaluation at the posture of the file: %s\n", cav_status_name(status));
+  }
+  cav_state_free(state);
+  free(v);
 }
 
 static void print_warnings(const cav_model *m) {
@@ -339,6 +380,7 @@ static void print_model(const cav_model *m) {
   print_sizes(m);
   print_bodies(m);
   print_stages(m);
+  print_costs(m);
   print_warnings(m);
 }
 

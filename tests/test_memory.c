@@ -1,11 +1,13 @@
-/// Memory: hot functions allocate nothing after their first call; and where the n-th allocation fails, for every n, loading,
-/// states, inverse, forward and solving say CAV_NO_MEMORY, leave nothing behind and work the next time, to the same bits.
+/// Memory: hot functions allocate nothing after their first call; what a scene does not have takes no byte; and where the
+/// n-th allocation fails, for every n, loading, states, inverse, forward and solving say CAV_NO_MEMORY, leave nothing behind
+/// and work the next time, to the same bits.
 /// The allocator is counted by taking its place (glibc); skipped under sanitizers, which take it themselves.
 #include <errno.h>
 #include <malloc.h>
 
 #include "cavort/solve.h"
 #include "scene.h"
+#include "workspace.h"
 
 #if defined(__has_feature)
 #if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
@@ -163,6 +165,32 @@ static void test_hot(const char *path) {
     }
   }
   bed_free(&b);
+}
+
+// --- what a scene does not have holds no memory ---
+
+static const char bare_text[] =
+    "<mujoco><worldbody><body><joint axis='0 1 0'/><geom type='capsule' size='.03' fromto='0 0 0 .3 0 0'/>"
+    "<body pos='.3 0 0'><joint axis='0 1 0'/><geom type='capsule' size='.03' fromto='0 0 0 .3 0 0'/></body></body>"
+    "</worldbody></mujoco>";
+
+static void test_absent(void) {
+  cav_error error = {0};
+  cav_model *bare = scene_load(bare_text), *full = cav_model_load(sensors, &error);
+  if (!CHECK(bare && full)) return;
+  size_t none[CAV_PARTS], some[CAV_PARTS];
+  cav_state *a = cav_state_new(bare), *b = cav_state_new(full);
+  cav_state_bytes(a, none);
+  cav_state_bytes(b, some);
+  static const cav_part parts[] = {CAV_PART_TENDONS,  CAV_PART_EQUALITY,  CAV_PART_ROWS,
+                                   CAV_PART_CONTACTS, CAV_PART_ACTUATION, CAV_PART_SOLVERS};
+  for (int i = 0; i < 6; i++) {
+    CHECK(none[parts[i]] == 0);
+    // the control: where there are some they are counted
+    CHECK(some[parts[i]] > 0 || parts[i] == CAV_PART_SOLVERS);
+  }
+  cav_state_free(a), cav_state_free(b);
+  cav_model_free(bare), cav_model_free(full);
 }
 
 // --- the n-th allocation fails ---
@@ -335,6 +363,7 @@ int main(void) {
   printf("allocations are counted\n");
   test_hot(humanoid);
   test_hot(sensors);
+  test_absent();
   // libxml2 2.9 loses its input buffer where that cannot grow (xmlParserInputBufferCreateMem)
   fail_each("load", try_load, (void *)humanoid, 100000, 1);
   test_states();
