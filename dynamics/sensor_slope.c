@@ -211,53 +211,61 @@ static void tendon(const task *t, int index, double *out) {
   }
 }
 
+static int offered(const cav_model *model, const cav_sensor *sensor) {
+  if (sensor->cutoff > 0 || sensor->referred) return 0;
+  switch (sensor->type) {
+    case CAV_SENSOR_TENDONVEL:
+      return model->tendon[sensor->object].npath == 0;
+    case CAV_SENSOR_VELOCIMETER:
+    case CAV_SENSOR_GYRO:
+    case CAV_SENSOR_TENDONPOS:
+    case CAV_SENSOR_BALLANGVEL:
+    case CAV_SENSOR_CLOCK:
+      return 1;
+    default:
+      return sensor->type <= CAV_SENSOR_SUBTREEANGMOM;
+  }
+}
+
 cav_status cav_sense_derivatives(const cav_model *model, const cav_state *state, const cav_sensor *sensor, double *d_dq,
                                  double *d_dv_next) {
+  if (!offered(model, sensor)) return CAV_NOT_SUPPORTED;
   const cav_workspace *w = state->work;
   if (!cav_evaluated(state) || !w->derived) return CAV_BAD_INPUT;
+  if (!d_dq && !d_dv_next) return CAV_OK;
   task t = {model, state, w->slopes->drift_next, model->nv, d_dq, d_dv_next};
   size_t n = (size_t)sensor->dim * (size_t)model->nv * sizeof(double);
   if (d_dq) memset(d_dq, 0, n);
   if (d_dv_next) memset(d_dv_next, 0, n);
-  if (sensor->cutoff > 0 || sensor->referred) return CAV_NOT_SUPPORTED;
   switch (sensor->type) {
     case CAV_SENSOR_CLOCK:
-      return CAV_OK;
-    case CAV_SENSOR_BALLANGVEL:
-      for (int i = 0; i < 3; i++) put(d_dv_next, t.nv, i, model->joint[sensor->object].dof + i, 1);
-      return CAV_OK;
-    case CAV_SENSOR_TENDONPOS:
-      tendon(&t, sensor->object, d_dq);
-      return CAV_OK;
-    case CAV_SENSOR_TENDONVEL:
-      if (model->tendon[sensor->object].npath > 0) return CAV_NOT_SUPPORTED;
-      tendon(&t, sensor->object, d_dv_next);
-      return CAV_OK;
+      break;
     case CAV_SENSOR_JOINTPOS:
       put(d_dq, t.nv, 0, model->joint[sensor->object].dof, 1);
-      return CAV_OK;
+      break;
     case CAV_SENSOR_JOINTVEL:
       put(d_dv_next, t.nv, 0, model->joint[sensor->object].dof, 1);
-      return CAV_OK;
+      break;
+    case CAV_SENSOR_BALLANGVEL:
+      for (int i = 0; i < 3; i++) put(d_dv_next, t.nv, i, model->joint[sensor->object].dof + i, 1);
+      break;
+    case CAV_SENSOR_TENDONPOS:
+      tendon(&t, sensor->object, d_dq);
+      break;
+    case CAV_SENSOR_TENDONVEL:
+      tendon(&t, sensor->object, d_dv_next);
+      break;
     case CAV_SENSOR_SUBTREECOM:
     case CAV_SENSOR_SUBTREELINVEL:
     case CAV_SENSOR_SUBTREEANGMOM:
       subtree(&t, sensor);
-      return CAV_OK;
-    case CAV_SENSOR_FRAMEPOS:
-    case CAV_SENSOR_FRAMEQUAT:
-    case CAV_SENSOR_FRAMEXAXIS:
-    case CAV_SENSOR_FRAMEYAXIS:
-    case CAV_SENSOR_FRAMEZAXIS:
-    case CAV_SENSOR_FRAMELINVEL:
-    case CAV_SENSOR_FRAMEANGVEL:
-      frame(&t, sensor, sensor->object_type);
-      return CAV_OK;
+      break;
     case CAV_SENSOR_VELOCIMETER:
     case CAV_SENSOR_GYRO:
       frame(&t, sensor, CAV_OBJECT_SITE);
-      return CAV_OK;
+      break;
     default:
-      return CAV_NOT_SUPPORTED;
+      frame(&t, sensor, sensor->object_type);
   }
+  return CAV_OK;
 }

@@ -3,6 +3,7 @@
 #include "continuation.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
@@ -19,6 +20,9 @@ enum { RESTORATIONS = 30 };
 /// Diagnosis: iterations towards the least violation, and the relative decrease that ends them.
 enum { REST_ITERATIONS = 300 };
 static const double rest_tolerance = 1e-8;
+
+/// How far a guess is moved off its symmetries, rad or m, by a fixed sequence; golden section.
+static const double nudge = 1e-6, golden = 0.6180339887498949;
 
 double cav_clock(void) {
   struct timespec t;
@@ -55,6 +59,20 @@ void cav_guess_fill(const cav_problem *problem, cav_trajectory *at) {
   }
   memcpy(at->v, problem->v_start, (size_t)m->nv * sizeof(double));
   cav_trajectory_velocities(m, at);
+}
+
+cav_status cav_guess_take(cav_solve_run *run) {
+  int n = (run->tr->nknot - 1) * run->tr->nv;
+  double *x = malloc((size_t)n * sizeof *x);
+  if (!x) return CAV_NO_MEMORY;
+  cav_guess_fill(run->problem, run->at);
+  for (int i = 0; i < n; i++) x[i] = nudge * (2 * fmod((i + 1) * golden, 1) - 1);
+  cav_transcription_move(run->tr, run->at, x, run->spare);
+  cav_trajectory *moved = run->spare;
+  run->spare = run->at;
+  run->at = moved;
+  free(x);
+  return CAV_OK;
 }
 
 static double between(double from, double to, double s) {
@@ -231,15 +249,35 @@ cav_status cav_restore(cav_solve_run *run) {
   return restore(run, 0);
 }
 
+static cav_status rest_from_here(cav_solve_run *run, double radius) {
+  run->region.radius = radius;
+  return cav_region_minimise(&run->region, run->normal, run->tr, &run->at, &run->spare);
+}
+
 cav_status cav_rest(cav_solve_run *run) {
   run->phase = "diagnosis";
-  run->stages = 1;
+  run->stages = 2;
   run->stage = 1;
-  run->region.radius = INFINITY;
   run->region.iterations = REST_ITERATIONS;
   run->region.tolerance = rest_tolerance;
   run->tr->constraints_only = 1;
-  cav_status status = cav_region_minimise(&run->region, run->normal, run->tr, &run->at, &run->spare);
+  cav_status status = rest_from_here(run, INFINITY);
+  cav_trajectory *first = status == CAV_OK ? cav_trajectory_copy(run->at) : NULL;
+  if (status == CAV_OK && !first) status = CAV_NO_MEMORY;
+  if (status == CAV_OK) {
+    // what stalled on the way may lie far from where the guess leads
+    double merit = cav_transcription_merit(run->tr);
+    run->stage = 2;
+    status = cav_guess_take(run);
+    if (status == CAV_OK) status = rest_from_here(run, 0);
+    if (status != CAV_OK || !(cav_transcription_merit(run->tr) < merit)) {
+      cav_trajectory *worse = run->at;
+      run->at = first;
+      first = worse;
+      if (status == CAV_OK) status = cav_transcription_values(run->tr, run->at);
+    }
+  }
+  cav_trajectory_free(first);
   run->tr->constraints_only = 0;
   return status;
 }

@@ -24,6 +24,10 @@ typedef struct cav_solve_run {
 /// The problem's guess: start held, or the geodesic to the goal, with a ballistic arc if asked. q and v of at are filled.
 void cav_guess_fill(const cav_problem *problem, cav_trajectory *at);
 
+/// The guess into run->at, moved a little off its symmetries: a straight or symmetric one can be a saddle of all costs and
+/// constraints at once, which exact derivatives never leave.
+cav_status cav_guess_take(cav_solve_run *run);
+
 /// Contact law and weights of stage s of n.
 void cav_stage_set(const cav_problem *problem, int s, int n, cav_transcription *transcription);
 
@@ -38,7 +42,7 @@ cav_status cav_multiply(cav_solve_run *run);
 cav_status cav_restore(cav_solve_run *run);
 
 /// Where constraints cannot all hold: to the point of least violation, where the violations balance and so say what contradicts
-/// what (explain.c).
+/// what (explain.c): the lower of two, from the iterate and from the guess.
 cav_status cav_rest(cav_solve_run *run);
 
 /// Violation that planning leaves room for, by kind of row: what is planned with headroom may use half of it.

@@ -340,12 +340,15 @@ static int sensor_link(const cav_model *m, const cav_sensor *s) {
   return 0;
 }
 
+/// Knots within which a penetration belongs to a target: contacts give way before or after it.
+enum { near_knots = 2 };
+
 /// The deepest penetration of a link at a knot; NULL: none.
 static const cav_binding *buried(const inquiry *in, int link, int knot) {
   const cav_binding *best = NULL;
   for (int i = 0; i < in->nrow; i++) {
     const cav_binding *r = &in->row[i];
-    if (r->kind != CAV_BINDING_PENETRATION || r->knot != knot) continue;
+    if (r->kind != CAV_BINDING_PENETRATION || abs(r->knot - knot) > near_knots) continue;
     const cav_pair *pair = &in->model->pair[r->object];
     if (in->model->geom[pair->geom1].link != link && in->model->geom[pair->geom2].link != link) continue;
     if (!best || r->value > best->value) best = r;
@@ -359,7 +362,7 @@ static void cure_term(const inquiry *in, const cav_binding *row, const cav_bindi
   const cav_binding *deepest = link > 0 ? buried(in, link, row->knot) : NULL;
   char other[48];
   if (deepest) {
-    snprintf(out, size, "What it asks for lies %.3g mm inside a solid: move the target out of it.",
+    snprintf(out, size, "What it asks for leads %.3g mm inside a solid: move the target out of it.",
              1e3 * deepest->value);
   } else if (against && against->kind == CAV_BINDING_TERM && against->object != row->object) {
     snprintf(out, size,

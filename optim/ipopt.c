@@ -329,6 +329,7 @@ static void program_free(program *p) {
 cav_status cav_ipopt(cav_solve_run *run, cav_error *error) {
   cav_transcription *tr = run->tr;
   cav_penalties kept = tr->penalty;
+  cav_derivative difference = tr->difference;
   program p = {.run = run, .n = (tr->nknot - 1) * tr->nv, .anchor = cav_trajectory_copy(run->at)};
   IpoptProblem nlp = NULL;
   double *bound = NULL, *start = NULL, *multiplier = NULL;
@@ -346,7 +347,7 @@ cav_status cav_ipopt(cav_solve_run *run, cav_error *error) {
   run->phase = "ipopt";
   run->stages = 0;
   tr->penalty = (cav_penalties){0};
-  tr->derivative = CAV_DERIVATIVE_CENTRED;
+  tr->difference = CAV_DERIVATIVE_CENTRED;
   if ((status = cav_transcription_values(tr, run->at)) != CAV_OK) goto end;
   set_bounds(&p, bound, bound + p.n, bound + 2 * p.n, bound + 2 * p.n + p.m);
   nlp = CreateIpoptProblem(p.n, bound, bound + p.n, p.m, bound + 2 * p.n, bound + 2 * p.n + p.m, p.entries,
@@ -366,7 +367,7 @@ cav_status cav_ipopt(cav_solve_run *run, cav_error *error) {
   cav_transcription_move(tr, p.anchor, start, run->at);
 end:
   tr->penalty = kept;
-  tr->derivative = CAV_DERIVATIVE_FORWARD;
+  tr->difference = difference;
   if (nlp) FreeIpoptProblem(nlp);
   program_free(&p);
   free(bound), free(start), free(multiplier), free(pattern);

@@ -11,7 +11,11 @@
 #include "ipopt.h"
 
 cav_solve_options cav_solve_options_default(void) {
-  return (cav_solve_options){.solver = CAV_SOLVER_GAUSS_NEWTON, .threads = 1, .diagnose = 1, .tolerance = 2e-7};
+  return (cav_solve_options){.solver = CAV_SOLVER_GAUSS_NEWTON,
+                             .derivative = CAV_DERIVATIVE_ANALYTIC,
+                             .threads = 1,
+                             .diagnose = 1,
+                             .tolerance = 2e-7};
 }
 
 int cav_solution_log(cav_solution *solution, const cav_progress *line) {
@@ -182,6 +186,8 @@ cav_status cav_solve(const cav_problem *problem, const cav_solve_options *option
 
   run.tr = cav_transcription_new(problem, run.options->threads, error);
   if (!run.tr) return CAV_NO_MEMORY;
+  run.tr->derivative = run.options->derivative;
+  if (run.tr->derivative == CAV_DERIVATIVE_CENTRED) run.tr->difference = CAV_DERIVATIVE_CENTRED;
   run.normal = cav_normal_new(run.tr->nknot - 1, run.tr->nv);
   run.at = start ? cav_trajectory_copy(start) : cav_trajectory_new(problem->model, run.tr->nknot, problem->timestep);
   run.spare = cav_trajectory_new(problem->model, run.tr->nknot, problem->timestep);
@@ -195,9 +201,9 @@ cav_status cav_solve(const cav_problem *problem, const cav_solve_options *option
     if (start) {
       cav_trajectory_velocities(problem->model, run.at);
     } else {
-      cav_guess_fill(problem, run.at);
+      status = cav_guess_take(&run);
     }
-    status = solve(&run, error);
+    if (status == CAV_OK) status = solve(&run, error);
     // the reason of the solve goes before what verification of the gains says
     cav_error inner = {0};
     end = conclude(&run, &inner);

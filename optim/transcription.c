@@ -2,10 +2,10 @@
 /// v_t, v_{t+1} and the inverse dynamics u_t (optimisation.md, 1), so its part of the Hessian is one dense block of three
 /// neighbours and knots are evaluated in any order, by any number of threads, with the same result.
 ///
-/// Derivatives of u, contacts and sensors come from cav_differentiate; those of v, accelerations, postures and ranges are
+/// Derivatives of u, contacts and sensors come from readings.c; those of v, accelerations, postures and ranges are
 /// exact. Constraint rows enter the merit by an augmented Lagrangian of two-sided rows: with z~ = z + multiplier/rho and
 /// e = z~ - clamp(z~), the row costs rho/2 e^2 and its next multiplier is rho e (Powell, Hestenes, Rockafellar).
-#include "transcription.h"
+#include "readings.h"
 
 #include <float.h>
 #include <math.h>
@@ -20,23 +20,6 @@ extern void dsyrk_(const char *uplo, const char *trans, const int *n, const int 
 
 /// A moment counts as a force at this distance when it is compared with the weight.
 static const double moment_arm = 0.3;
-
-/// Contacts that push less than this share of the weight get no rows of their own.
-static const double contact_floor = 1e-6;
-
-typedef struct cav_scratch {
-  cav_state *state;
-  int room; ///< readings
-  double *value, *dq, *dv, *dn;
-  int *key; ///< [2*contacts] pair and feature of the contacts with rows
-  int key_room;
-  double *force_weight, *force_slope; ///< [nv] of rows along single dofs
-  double *row;                        ///< [3nv]
-  int *column;                        ///< [nv]
-  double *tangent;                    ///< [nv]
-  double *posture;                    ///< [nq]
-  double seconds;
-} cav_scratch;
 
 static double now(void) {
   struct timespec t;
@@ -213,6 +196,7 @@ static int scratch_new(cav_transcription *tr, cav_scratch *s) {
   s->force_weight = room(&ok, n, sizeof(double));
   s->force_slope = room(&ok, n, sizeof(double));
   s->row = room(&ok, 3 * n, sizeof(double));
+  s->slope = room(&ok, CAV_SLOPES * n, sizeof(double));
   s->column = room(&ok, n, sizeof(int));
   s->tangent = room(&ok, n, sizeof(double));
   s->posture = room(&ok, (size_t)tr->model->nq, sizeof(double));
@@ -254,6 +238,7 @@ cav_transcription *cav_transcription_new(const cav_problem *problem, int threads
   tr->options = problem->model->options;
   tr->options.timestep = tr->h;
   tr->options.order = problem->order;
+  tr->derivative = CAV_DERIVATIVE_ANALYTIC;
   tr->pool = cav_parallel_new(threads);
   if (!tr->pool || !list_turns(tr)) goto memory;
   tr->scratch = calloc((size_t)cav_parallel_size(tr->pool), sizeof *tr->scratch);
@@ -283,7 +268,7 @@ void cav_transcription_free(cav_transcription *tr) {
   for (int i = 0; tr->scratch && i < cav_parallel_size(tr->pool); i++) {
     cav_scratch *s = &tr->scratch[i];
     cav_state_free(s->state);
-    free(s->value), free(s->dq), free(s->dv), free(s->dn), free(s->key);
+    free(s->value), free(s->dq), free(s->dv), free(s->dn), free(s->key), free(s->slope);
     free(s->force_weight), free(s->force_slope), free(s->row), free(s->column), free(s->tangent), free(s->posture);
   }
   for (int k = 0; k < tr->nresidual; k++) free(tr->unactuated[k].dof), free(tr->unactuated[k].coef);
@@ -294,105 +279,7 @@ void cav_transcription_free(cav_transcription *tr) {
   free(tr);
 }
 
-// ---------------------------------------------------------------- readings of one knot
-
-/// What is read off a state at knot t: u, four numbers a contact, the sensors of the terms that speak there.
-typedef struct readings {
-  const cav_transcription *tr;
-  int t, ncontact;
-  const int *key;
-} readings;
-
-static void read_contact(const cav_transcription *tr, const cav_contact *c, double *y) {
-  memset(y, 0, 4 * sizeof *y);
-  if (!tr->model->pair[c->pair].same_world) {
-    y[0] = fmax(-c->dist, 0);
-    return;
-  }
-  double share = sqrt(fmax(c->impulse[0], 0) / (tr->h * tr->weight));
-  y[0] = share * fmax(c->dist, 0);
-  y[1] = c->dim > 1 ? share * c->velocity_next[1] : 0;
-  y[2] = c->dim > 1 ? share * c->velocity_next[2] : 0;
-  y[3] = share * c->velocity_next[0];
-}
-
-static void read_knot(const cav_model *model, const cav_state *state, void *context, double *value) {
-  const readings *r = context;
-  const cav_transcription *tr = r->tr;
-  memcpy(value, state->u, (size_t)model->nv * sizeof(double));
-  value += model->nv;
-
-  // contacts stand in the order of pairs and features, so both lists are walked once; one that is gone reads zero
-  const cav_contact *c = state->contact, *end = state->contact + state->ncontact;
-  for (int k = 0; k < r->ncontact; k++, value += 4) {
-    int pair = r->key[2 * k], feature = r->key[2 * k + 1];
-    while (c < end && (c->pair < pair || (c->pair == pair && c->feature < feature))) c++;
-    if (c < end && c->pair == pair && c->feature == feature) {
-      read_contact(tr, c, value);
-    } else {
-      memset(value, 0, 4 * sizeof(double));
-    }
-  }
-  for (int i = 0; i < tr->problem->nterm; i++) {
-    const cav_term *term = &tr->problem->term[i];
-    if (term->quantity != CAV_QUANTITY_SENSOR || cav_term_weight(tr, term, r->t) == 0) continue;
-    cav_term_read(tr, state, term, r->t, value);
-    value += cav_term_dim(term);
-  }
-}
-
-static int grow(double **array, size_t n) {
-  double *p = realloc(*array, n * sizeof(double));
-  if (p) *array = p;
-  return p != NULL;
-}
-
-/// Lists the contacts that carry load at the state and makes room for all readings of the knot.
-static int list_readings(cav_transcription *tr, cav_scratch *s, int t) {
-  cav_knot *knot = &tr->knot[t];
-  int nv = tr->nv, ncontact = 0, nsensor = 0;
-  if (s->state->ncontact > s->key_room) {
-    int *key = realloc(s->key, 2 * (size_t)s->state->ncontact * sizeof(int));
-    if (!key) return 0;
-    s->key = key;
-    s->key_room = s->state->ncontact;
-  }
-  char *moving = realloc(knot->moving, (size_t)s->state->ncontact + 1);
-  if (!moving) return 0;
-  knot->moving = moving;
-  if (knot->has_force) {
-    for (int k = 0; k < s->state->ncontact; k++) {
-      const cav_contact *c = &s->state->contact[k];
-      int self = !tr->model->pair[c->pair].same_world;
-      if (self ? c->dist > 0 : c->impulse[0] < contact_floor * tr->h * tr->weight) continue;
-      moving[ncontact] = (char)self;
-      s->key[2 * ncontact] = c->pair;
-      s->key[2 * ncontact++ + 1] = c->feature;
-    }
-  }
-  for (int i = 0; i < tr->problem->nterm; i++) {
-    const cav_term *term = &tr->problem->term[i];
-    if (cav_term_weight(tr, term, t) > 0) nsensor += cav_term_dim(term);
-  }
-  knot->ncontact = ncontact;
-  knot->nread = 4 * ncontact + nsensor;
-  size_t total = (size_t)(nv + knot->nread), n = (size_t)nv;
-  if ((int)total > s->room) {
-    if (!grow(&s->value, total) || !grow(&s->dq, total * n) || !grow(&s->dv, total * n) || !grow(&s->dn, total * n))
-      return 0;
-    s->room = (int)total;
-  }
-  if (knot->nread > knot->room) {
-    if (!grow(&knot->y, (size_t)knot->nread) || !grow(&knot->dy, (size_t)knot->nread * 3 * n)) return 0;
-    knot->room = knot->nread;
-  }
-  int dense = nv + knot->nread + knot->layout.count + tr->model->nu;
-  if (dense > knot->dense_room) {
-    if (!grow(&knot->dense, (size_t)dense * 3 * n) || !grow(&knot->rest, (size_t)dense)) return 0;
-    knot->dense_room = dense;
-  }
-  return 1;
-}
+// ---------------------------------------------------------------- chaining to knots
 
 /// Velocity after knot t: that of the next knot, or what closes the motion.
 static const double *velocity_after(const cav_transcription *tr, const cav_trajectory *at, int t, const double *zero) {
@@ -851,17 +738,13 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   double start = now();
   cav_status status = cav_inverse(tr->model, s->state, q, v, v_next, knot->u);
   if (status != CAV_OK) return status;
-  if (!list_readings(tr, s, t)) return CAV_NO_MEMORY;
-  readings read = {tr, t, knot->ncontact, s->key};
-  int n = nv + knot->nread;
+  if (!cav_readings_list(tr, s, t)) return CAV_NO_MEMORY;
+  cav_readings_values(tr, s, t);
   if (p->jacobian) {
-    status = cav_differentiate(tr->model, s->state, tr->derivative, 0, q, v, v_next, read_knot, &read, n, s->value,
-                               s->dq, s->dv, s->dn);
+    status = cav_readings_derivatives(tr, s, t, q, v, v_next);
     if (status != CAV_OK) return status;
     chain(tr, t, nv, s->dq, s->dv, s->dn, knot->du);
     chain(tr, t, knot->nread, s->dq + (size_t)nv * nv, s->dv + (size_t)nv * nv, s->dn + (size_t)nv * nv, knot->dy);
-  } else {
-    read_knot(tr->model, s->state, &read, s->value);
   }
   if (knot->nread) memcpy(knot->y, s->value + nv, (size_t)knot->nread * sizeof(double));
   memcpy(p->at->u + (size_t)t * nv, knot->u, (size_t)nv * sizeof(double));

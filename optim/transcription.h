@@ -74,6 +74,7 @@ typedef struct cav_transcription {
   int *turn_of;  ///< [nv] index into turn_dof or -1
   cav_penalties penalty;
   cav_derivative derivative;        ///< of u, contacts and sensors
+  cav_derivative difference;        ///< what stands in where there is no analytic one
   int constraints_only;             ///< costs and multipliers are left out: the merit is the violation alone
   double slack_effort, slack_range; ///< how far constraints_only lets these rows pass their planned bounds
   int keep_rows;                    ///< slot_row of the knots is filled by linearisations

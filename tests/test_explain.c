@@ -119,11 +119,15 @@ static void check_too_weak(void) {
   outcome o = solve(arm_of("5"), "<constraint><posture name='level' dofs='joints' from='.5' to='1'/></constraint>");
   if (o.solution) {
     CHECK(o.status == CAV_NOT_CONVERGED && !o.explanation.met);
-    expect(&o, 0, 0, "actuator 'shoulder' (body 'upper')", 10, 20);
+    // which of the two gives way more is the weights' to say
+    int posture = strstr(o.explanation.violation[0].what, "'level'") != NULL;
+    expect(&o, 0, posture, "actuator 'shoulder' (body 'upper')", 10, 20);
+    expect(&o, 0, !posture, "'level', posture, joint 'shoulder'", 10, 20);
     // on the way up the actuator pulls too
-    expect(&o, 1, 0, "actuator 'shoulder'", 1, 20);
-    expect(&o, 1, 1, "'level', posture, joint 'shoulder'", 10, 20);
-    CHECK(names(o.explanation.conflict[1].cure, "too weak"));
+    posture = strstr(o.explanation.conflict[0].what, "'level'") != NULL;
+    expect(&o, 1, posture, "actuator 'shoulder'", 1, 20);
+    expect(&o, 1, !posture, "'level', posture, joint 'shoulder'", 10, 20);
+    CHECK(names(o.explanation.conflict[!posture].cure, "too weak"));
     CHECK(o.explanation.conflict[0].share + o.explanation.conflict[1].share > 0.7); // seen 0.9
   }
   done(&o);

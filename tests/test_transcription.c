@@ -1,8 +1,8 @@
 /// Derivatives of whole problems: the gradient of the merit at every unknown, first and last knots included, the rows of the
 /// constraints and their sparsity, against centred differences of the values; the same bits with one and two threads.
-/// Seen: gradients to 3e-6 of their norm (bound 1e-5); rows to 7e-4 (bound 2e-3: one-sided differences across stiff contacts);
-/// no nonzero outside the pattern, and none of the pattern of forces and ranges that stays zero.
-#include "transcription.h"
+/// Seen: gradients to 2e-8 of their norm (bound 1e-6); rows to 3e-6 (bound 1e-4: the difference that they are compared with);
+/// analytic derivatives and centred differences give the same Hessians to 2e-8 (bound 1e-6); no nonzero outside the pattern, and none of the pattern of forces and ranges that stays zero.
+#include "readings.h"
 
 #include "scene.h"
 
@@ -103,10 +103,10 @@ static void test_gradient(cav_transcription *tr, cav_trajectory *at) {
            slope = (merit_at(tr, at, moved, x, i, step) - merit_at(tr, at, moved, x, i, -step)) / (2 * step);
     double error = fabs(slope - gradient[i]) / norm;
     if (error > worst) worst = error;
-    if (error > 1e-5) printf("knot %d dof %d: %.9g against %.9g\n", i / m->nv + 1, i % m->nv, gradient[i], slope);
+    if (error > 1e-6) printf("knot %d dof %d: %.9g against %.9g\n", i / m->nv + 1, i % m->nv, gradient[i], slope);
   }
   printf("gradient: largest %.3g, worst error %.3g of it\n", norm, worst);
-  CHECK(worst < 1e-5);
+  CHECK(worst < 1e-6);
   // a control: one wrong component is seen
   CHECK(norm > 1e-3);
   free(gradient), free(x);
@@ -167,11 +167,39 @@ static void test_rows(cav_transcription *tr, cav_trajectory *at, int tries) {
       }
     }
   printf("rows: worst error %.3g; pattern of %d entries, %d outside it, %d never used\n", worst, total, extra, unused);
-  CHECK(worst < 2e-3);
+  CHECK(worst < 1e-4);
   CHECK(extra == 0);
   CHECK(unused == 0);
   free(pattern), free(used), free(x), free(plus);
   cav_trajectory_free(moved);
+}
+
+/// Both ways to derivatives give the same Hessians, and differences stand in for accelerations and forces alone.
+static void test_methods(cav_transcription *tr, cav_trajectory *at) {
+  size_t n = 9 * (size_t)tr->nv * tr->nv;
+  double *hessian = malloc((size_t)tr->nknot * n * sizeof *hessian), worst = 0;
+  int accelerations = 0;
+  tr->scratch->differenced = 0;
+  CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
+  for (int t = 0; t < tr->nknot; t++) {
+    memcpy(hessian + (size_t)t * n, tr->knot[t].hessian, n * sizeof *hessian);
+    for (int i = 0; i < tr->problem->nterm; i++) {
+      const cav_term *term = &tr->problem->term[i];
+      if (term->quantity != CAV_QUANTITY_SENSOR || cav_term_weight(tr, term, t) == 0) continue;
+      accelerations += cav_sensor_rule_of(term->sensor.type)->stage == CAV_READS_ACCELERATION;
+    }
+  }
+  CHECK(tr->scratch->differenced == accelerations);
+  tr->derivative = tr->difference = CAV_DERIVATIVE_CENTRED;
+  CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
+  CHECK(tr->scratch->differenced == accelerations + tr->nknot);
+  for (int t = 0; t < tr->nknot; t++)
+    worst = fmax(worst, scene_error(hessian + (size_t)t * n, tr->knot[t].hessian, (int)n));
+  printf("analytic against centred: Hessians differ by %.3g\n", worst);
+  CHECK(worst < 1e-6);
+  tr->derivative = CAV_DERIVATIVE_ANALYTIC;
+  tr->difference = CAV_DERIVATIVE_FORWARD;
+  free(hessian);
 }
 
 static void test_threads(const cav_problem *p, cav_transcription *one, cav_trajectory *at) {
@@ -217,6 +245,7 @@ static void test_scene(int close_at_rest, cav_order order) {
   for (int t = 0; t < tr->nknot; t++)
     for (int i = 0; i < tr->knot[t].layout.count; i++) tr->knot[t].slot[i].multiplier = scene_uniform();
   test_gradient(tr, at);
+  test_methods(tr, at);
   test_threads(&p, tr, at);
   test_rows(tr, at, 60);
   cav_trajectory_free(at);

@@ -1,0 +1,38 @@
+/// What is read off the dynamics at one knot, with derivatives: u, four numbers a contact, sensors. Private to optim/.
+#ifndef CAVORT_READINGS_H
+#define CAVORT_READINGS_H
+
+#include "transcription.h"
+
+/// Rows of nv that the derivatives of one contact or sensor take at most.
+enum { CAV_SLOPES = 31 };
+
+/// What one thread works with.
+typedef struct cav_scratch {
+  cav_state *state;
+  int room; ///< readings
+  double *value, *dq, *dv, *dn;
+  int *key; ///< [2*contacts] pair and feature of the contacts with rows
+  int key_room;
+  double *force_weight, *force_slope; ///< [nv] of rows along single dofs
+  double *row;                        ///< [3nv]
+  int *column;                        ///< [nv]
+  double *tangent;                    ///< [nv]
+  double *posture;                    ///< [nq]
+  double *slope;                      ///< [CAV_SLOPES*nv] derivatives of one contact or sensor
+  int differenced;                    ///< calls in which differences stood in for analytic derivatives
+  double seconds;
+} cav_scratch;
+
+/// Lists the contacts that carry load at the state and makes room for all readings of knot t; 0 if memory runs out.
+int cav_readings_list(cav_transcription *transcription, cav_scratch *scratch, int t);
+
+/// Readings at the state's last evaluation: scratch->value [nv + nread].
+void cav_readings_values(const cav_transcription *transcription, cav_scratch *scratch, int t);
+
+/// Their derivatives by the transcription's method, scratch->dq, dv, dn [(nv + nread)*nv]. The state holds the point
+/// (q, v, v_next) and is left there.
+cav_status cav_readings_derivatives(const cav_transcription *transcription, cav_scratch *scratch, int t,
+                                    const double *q, const double *v, const double *v_next);
+
+#endif
