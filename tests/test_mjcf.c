@@ -139,17 +139,22 @@ static const struct {
 };
 
 static const char good[] =
-    "<mujoco model='good'>\n<compiler angle='radian'/>\n<option timestep='.01'/>\n"
+    "<mujoco model='good'>\n<compiler angle='radian'/>\n<option timestep='.01' density='2' wind='1 0 0'/>\n"
     "<default><default class='a'><geom size='.1'/></default></default>\n<asset><material name='m' rgba='1 0 0 "
     "1'/></asset>\n"
-    "<worldbody>\n<geom name='floor' type='plane' size='1 1 1'/>\n<body name='b' childclass='a' euler='1 2 "
+    "<worldbody>\n<geom name='floor' type='plane' size='1 1 1'/><site name='w'/><geom name='ball' size='.1' "
+    "contype='0' "
+    "conaffinity='0' fluidshape='ellipsoid'/>\n<body name='b' childclass='a' euler='1 2 "
     "3'>\n<freejoint/>\n"
     "<geom name='g' type='capsule' fromto='0 0 0 1 1 1' material='m'/><site name='s'/>\n"
     "<body name='c'><joint name='j' limited='true' range='-1 1'/><geom type='box' size='.1 .2 "
     ".3'/></body></body>\n</worldbody>\n"
     "<contact><exclude body1='b' body2='c'/></contact>\n<tendon><fixed name='t'><joint joint='j' "
-    "coef='2'/></fixed></tendon>\n"
-    "<actuator><motor joint='j' name='u'/></actuator>\n<sensor><framepos objtype='site' "
+    "coef='2'/></fixed><spatial name='x' range='0 3'><site site='s'/><geom geom='ball' sidesite='w'/><site site='w'/>"
+    "<pulley divisor='2'/><site site='s'/><site site='w'/></spatial></tendon>\n"
+    "<actuator><motor joint='j' name='u'/><position tendon='x' kp='2'/><motor site='s' refsite='w' gear='0 1 0 1 0 0'/>"
+    "<motor cranksite='s' slidersite='w' cranklength='.3'/><muscle joint='j' range='.8 "
+    "1'/></actuator>\n<sensor><framepos objtype='site' "
     "objname='s'/><user dim='1'/></sensor>\n"
     "<keyframe><key name='k' qpos='0 0 0 1 0 0 0 .5'/></keyframe>\n</mujoco>\n";
 

@@ -168,11 +168,29 @@ static void compare_geoms(const cav_model *m, const mjModel *p) {
   }
 }
 
+static void compare_path(const cav_model *m, const mjModel *p, int tendon) {
+  static const int kinds[] = {[CAV_PATH_SITE] = mjWRAP_SITE,
+                              [CAV_PATH_SPHERE] = mjWRAP_SPHERE,
+                              [CAV_PATH_CYLINDER] = mjWRAP_CYLINDER,
+                              [CAV_PATH_PULLEY] = mjWRAP_PULLEY};
+  const cav_tendon *t = &m->tendon[tendon];
+  for (int k = 0; k < t->npath; k++) {
+    const cav_path_point *x = &m->tendon_path[t->path + k];
+    int w = p->tendon_adr[tendon] + k;
+    same(kinds[x->type], p->wrap_type[w], "path element", t->name);
+    if (x->type != CAV_PATH_PULLEY) same(x->object, p->wrap_objid[w], "path object", t->name);
+    if (x->type == CAV_PATH_PULLEY) near(x->divisor, p->wrap_prm[w], "path divisor", t->name);
+    if (x->type == CAV_PATH_SPHERE || x->type == CAV_PATH_CYLINDER)
+      same(x->side, (int)lround(p->wrap_prm[w]), "path side", t->name);
+  }
+}
+
 static void compare_tendons(const cav_model *m, const mjModel *p) {
   for (int i = 0; i < m->ntendon && i < p->ntendon; i++) {
     const cav_tendon *t = &m->tendon[i];
     CHECK_TEXT(t->name, p->names + p->name_tendonadr[i]);
-    same(t->npart, p->tendon_num[i], "tendon parts", t->name);
+    same(t->npart + t->npath, p->tendon_num[i], "tendon parts", t->name);
+    compare_path(m, p, i);
     for (int k = 0; k < t->npart; k++) {
       int w = p->tendon_adr[i] + k;
       same(m->tendon_part[t->part + k].joint, p->wrap_objid[w], "tendon joint", t->name);
@@ -365,10 +383,11 @@ static void compare(const char *path) {
 }
 
 static void test_peer(void) {
-  static const char *const files[] = {"mujoco/humanoid.xml",       "dm_control/acrobot.xml",  "dm_control/cartpole.xml",
-                                      "dm_control/pendulum.xml",   "dm_control/hopper.xml",   "dm_control/walker.xml",
-                                      "dm_control/cheetah.xml",    "dm_control/humanoid.xml", "dm_control/reacher.xml",
-                                      "dm_control/point_mass.xml", "dm_control/finger.xml"};
+  static const char *const files[] = {
+      "mujoco/humanoid.xml",    "dm_control/acrobot.xml",    "dm_control/cartpole.xml",    "dm_control/pendulum.xml",
+      "dm_control/hopper.xml",  "dm_control/walker.xml",     "dm_control/cheetah.xml",     "dm_control/humanoid.xml",
+      "dm_control/reacher.xml", "dm_control/point_mass.xml", "dm_control/ball_in_cup.xml", "dm_control/swimmer.xml",
+      "dm_control/finger.xml",  "dm_control/fish.xml",       "mujoco/arm26.xml",           "mujoco/slider_crank.xml"};
   slack = 2e-6;
   if (has_ccd) compare(features);
   slack = rounding;
@@ -377,8 +396,8 @@ static void test_peer(void) {
   compare(CAVORT_SOURCE_ROOT "/problems/humanoid.xml");
   const char *folder = check_shared_models();
   if (!folder) printf("SKIPPED: the shared models are absent\n");
-  // two shapes of the last model need libccd
-  size_t count = sizeof files / sizeof *files - (has_ccd ? 0 : 1);
+  // shapes of the last four models need libccd
+  size_t count = sizeof files / sizeof *files - (has_ccd ? 0 : 4);
   for (size_t i = 0; folder && i < count; i++) {
     char file[5000];
     snprintf(file, sizeof file, "%s/%s", folder, files[i]);
