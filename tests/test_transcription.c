@@ -15,12 +15,15 @@ static const char walker[] =
     "damping='.1'/>"
     "<geom type='capsule' size='.03' fromto='0 0 0 0 0 -.15' mass='.5'/>"
     "<body name='foot' pos='0 0 -.2'><joint name='ankle' axis='0 1 0' armature='.01'/>"
-    "<geom name='sole' type='capsule' size='.03' fromto='-.05 0 0 .1 0 0' mass='.2'/></body></body>"
+    "<geom name='sole' type='capsule' size='.03' fromto='-.05 0 0 .1 0 0' mass='.2'/><site name='toe' pos='.1 0 "
+    "0'/></body></body>"
     "<body name='arm' pos='-.1 0 .1'><joint name='shoulder' type='ball' limited='true' range='0 60' damping='.05'/>"
-    "<geom type='capsule' size='.03' fromto='0 0 0 .1 0 -.25' mass='.4'/></body></body></worldbody>"
+    "<geom type='capsule' size='.03' fromto='0 0 0 .1 0 -.25' mass='.4'/><site name='hand' pos='.1 0 "
+    "-.25'/></body></body></worldbody>"
     "<tendon><fixed name='string' limited='true' range='-.5 .5'><joint joint='hip' coef='.5'/><joint joint='ankle' "
     "coef='.5'/>"
-    "</fixed></tendon>"
+    "</fixed><spatial name='cord' limited='true' range='0 .3' stiffness='20' springlength='.1'><site site='eye'/>"
+    "<site site='toe'/><pulley divisor='2'/><site site='toe'/><site site='hand'/></spatial></tendon>"
     "<actuator><motor joint='hip' gear='20' ctrllimited='true' ctrlrange='-1 1'/>"
     "<motor tendon='string' gear='5' ctrllimited='true' ctrlrange='-.5 1'/></actuator></mujoco>";
 
@@ -269,8 +272,34 @@ static void test_turns(void) {
   }
 }
 
+/// What cannot be planned with is refused by name, before anything is solved.
+static void test_refusals(void) {
+  static const char frame[] =
+      "<mujoco><worldbody><site name='w'/><body><joint name='j' range='-1 1' limited='true'/><geom size='.1'/>"
+      "<site name='s' pos='.1 .2 0'/></body></worldbody><tendon><spatial name='cord'><site site='w'/><site site='s'/>"
+      "</spatial></tendon><actuator>%s</actuator></mujoco>";
+  static const struct {
+    const char *actuator, *says;
+  } cases[] = {{"<motor name='pull' tendon='cord'/>", "'pull' (0) cannot be planned with: its moments depend"},
+               {"<motor joint='j'/><motor name='push' site='s' gear='1 0 0 0 0 0'/>", "'push' (1)"},
+               {"<muscle name='arm' joint='j'/>", "a muscle"},
+               {"<motor joint='j' gear='3' ctrllimited='true' ctrlrange='-1 1'/>", NULL},
+               {"<position joint='j' kp='3' forcelimited='true' forcerange='-1 1'/>", NULL}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    char text[1000];
+    snprintf(text, sizeof text, frame, cases[i].actuator);
+    cav_model *m = scene_load(text);
+    if (!CHECK(m != NULL)) continue;
+    cav_error error = {0};
+    CHECK((cav_drives_plannable(m, &error) == CAV_OK) == !cases[i].says);
+    if (cases[i].says) CHECK(error.status == CAV_NOT_SUPPORTED && strstr(error.text, cases[i].says));
+    cav_model_free(m);
+  }
+}
+
 int main(void) {
   test_turns();
+  test_refusals();
   test_scene(1, CAV_ORDER_MIDPOINT);
   test_scene(0, CAV_ORDER_MIDPOINT);
   test_scene(1, CAV_ORDER_EULER);
