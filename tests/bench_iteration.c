@@ -1,0 +1,80 @@
+/// Time of one Gauss-Newton iteration of our humanoid at 40 knots on one thread, split into dynamics with derivatives, assembly
+/// and factorisation, by method of derivatives. The motion is a stance from which every joint is moved a little, under the
+/// contact law of the schedule's first, middle and last stage. Times are the shortest of several runs.
+/// Usage: bench_iteration [PROBLEM]; default problems/motions/squat-jump.
+#include <time.h>
+
+#include "continuation.h"
+#include "scene.h"
+#include "transcription.h"
+
+enum { KNOTS = 40, RUNS = 15 };
+
+static double seconds(void) {
+  struct timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void shake(cav_trajectory *at, const cav_model *m, double size) {
+  double *step = scene_vector(m->nv), *moved = scene_vector(m->nq);
+  for (int t = 1; t < at->nknot; t++) {
+    for (int d = 0; d < m->nv; d++) step[d] = size * scene_uniform();
+    cav_integrate(m, at->q + (size_t)t * at->nq, step, 1, moved);
+    memcpy(at->q + (size_t)t * at->nq, moved, (size_t)at->nq * sizeof *moved);
+  }
+  cav_trajectory_velocities(m, at);
+  free(step), free(moved);
+}
+
+// one method under one law; milliseconds
+static void measure(cav_transcription *tr, cav_normal *normal, cav_trajectory *at, const char *name) {
+  double best[4] = {INFINITY, INFINITY, INFINITY, INFINITY};
+  for (int r = 0; r < RUNS; r++) {
+    tr->seconds_dynamics = tr->seconds_assembly = 0;
+    double start = seconds();
+    CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
+    double gather = seconds();
+    cav_normal_gather(normal, tr);
+    double factor = seconds();
+    CHECK(cav_normal_factor(normal, 1e-6) == CAV_OK);
+    double end = seconds();
+    double part[4] = {tr->seconds_dynamics, tr->seconds_assembly + factor - gather, end - factor, end - start};
+    for (int k = 0; k < 4; k++) best[k] = fmin(best[k], 1e3 * part[k]);
+  }
+  printf("  %-10s dynamics %6.2f ms, assembly %5.2f ms, factorisation %5.2f ms, all %6.2f ms\n", name, best[0], best[1],
+         best[2], best[3]);
+}
+
+int main(int argc, char **argv) {
+  static const char *const names[] = {"one-sided", "centred", "analytic"};
+  cav_error error = {0};
+  cav_problem *p = cav_problem_load(argc > 1 ? argv[1] : CAVORT_SOURCE_ROOT "/problems/motions/squat-jump/problem.xml",
+                                    NULL, &error);
+  if (!p) {
+    fprintf(stderr, "%s\n", error.text);
+    return EXIT_FAILURE;
+  }
+  p->duration = (KNOTS - 1) * p->timestep;
+  cav_transcription *tr = cav_transcription_new(p, 1, &error);
+  cav_normal *normal = tr ? cav_normal_new(tr->nknot - 1, tr->nv) : NULL;
+  cav_trajectory *at = tr ? cav_trajectory_new(p->model, tr->nknot, p->timestep) : NULL;
+  if (!CHECK(normal && at)) return check_result();
+  cav_guess_fill(p, at);
+  shake(at, p->model, 0.02);
+  printf("%s: %d dofs, %d knots, step %g s\n", p->name, tr->nv, tr->nknot, p->timestep);
+  for (int s = 0; s < 3; s++) {
+    cav_stage_set(p, s, 3, tr);
+    printf("%s stage\n", s == 0 ? "first" : s == 1 ? "middle" : "last");
+    for (int k = 0; k < 3; k++) {
+      tr->derivative = (cav_derivative)k;
+      tr->difference = k == 1 ? CAV_DERIVATIVE_CENTRED : CAV_DERIVATIVE_FORWARD;
+      measure(tr, normal, at, names[k]);
+    }
+  }
+  cav_trajectory_free(at);
+  cav_normal_free(normal);
+  cav_transcription_free(tr);
+  cav_problem_free(p);
+  return check_result();
+}
