@@ -47,7 +47,7 @@ static cav_slopes *slopes_new(const cav_model *model) {
   cav_slopes *s = calloc(1, sizeof *s);
   if (!s) return NULL;
   size_t nv = (size_t)model->nv, n = (size_t)model->nlink;
-  s->drift = calloc(5 * 6 * nv + (12 + 3 * BLOCK) * n + nv * nv + ALIGN, sizeof(double));
+  s->drift = calloc(5 * 6 * nv + (12 + 3 * BLOCK) * n + 12 * nv + nv * nv + ALIGN, sizeof(double));
   s->touched = calloc(n + 1, sizeof(int));
   if (!s->drift || !s->touched) {
     cav_slopes_free(s);
@@ -61,7 +61,8 @@ static cav_slopes *slopes_new(const cav_model *model) {
   s->by_motion = s->gyration + 12 * n;
   s->by_now = s->by_motion + BLOCK * n;
   s->by_next = s->by_now + BLOCK * n;
-  s->spare = s->by_next + BLOCK * n;
+  s->across = s->by_next + BLOCK * n;
+  s->spare = s->across + 12 * nv;
   return s;
 }
 
@@ -238,8 +239,9 @@ static cav_status contacts(const task *t) {
   memset(s->by_motion, 0, 3 * BLOCK * n * sizeof *s->by_motion);
   for (int i = 0; i < t->state->ncontact; i++) {
     const cav_contact *c = &t->state->contact[i];
-    cav_status status = cav_contact_slopes(t->model, t->state, c, &s->contact[i]);
+    cav_status status = cav_contact_slopes(t->model, t->state, c, 0, &s->contact[i]);
     if (status != CAV_OK) return status;
+    if (s->contact[i].idle) continue;
     if (c->link1 > 0) contact_at_link(t, c, &s->contact[i], 0);
     if (c->link2 > 0) contact_at_link(t, c, &s->contact[i], 1);
   }
@@ -295,6 +297,13 @@ static void multiply6_transposed(double r[6], const double *M, const double x[6]
 static void contact_across(const task *t, const cav_contact *c, const cav_contact_slope *slope) {
   int nv = t->nv, link[2] = {c->link1, c->link2};
   const double *K = &slope->by_velocity[0][0], keep = 1 - c->damping[0];
+  double *axes[2] = {t->s->across, t->s->across + 6 * nv};
+  for (int side = 0; side < 2; side++) {
+    double *S = axes[side];
+    for (int k = last_dof(t->model, link[side]); k >= 0; k = t->model->dof[k].parent, S += 6) {
+      motion_at(S, t->state->axis + 6 * k, t->state->reference + 3 * t->model->dof[k].link, c->pos);
+    }
+  }
   for (int side = 0; side < 2; side++) {
     // columns of this side, rows of the other; the wrench on link2 is that of the law
     double sign = side ? 1 : -1, on = (side ? 1 : -1) * t->inverse_h;
@@ -308,9 +317,8 @@ static void contact_across(const task *t, const cav_contact *c, const cav_contac
       accumulate6(dq, now);
       multiply6(next, K, col.axis);
       scale6(next, sign, next);
-      for (int k = last_dof(t->model, link[!side]); k >= 0; k = t->model->dof[k].parent) {
-        double S[6];
-        motion_at(S, t->state->axis + 6 * k, t->state->reference + 3 * t->model->dof[k].link, c->pos);
+      const double *S = axes[!side];
+      for (int k = last_dof(t->model, link[!side]); k >= 0; k = t->model->dof[k].parent, S += 6) {
         double push = dot6(S, next) * on;
         t->dq[k * nv + j] += on * dot6(S, dq);
         t->dv[k * nv + j] += keep * push;
@@ -610,7 +618,7 @@ cav_status cav_derivatives(const cav_model *model, cav_state *state, double *du_
   for (int j = 0; j < nv; j++) pairs_of(&t, j);
   for (int i = 0; i < state->ncontact; i++) {
     const cav_contact *c = &state->contact[i];
-    if (c->link1 > 0 && c->link2 > 0) contact_across(&t, c, &s->contact[i]);
+    if (c->link1 > 0 && c->link2 > 0 && !s->contact[i].idle) contact_across(&t, c, &s->contact[i]);
   }
 
   // what acts on dofs
@@ -652,6 +660,10 @@ cav_status cav_contact_derivatives(const cav_model *model, const cav_state *stat
   cav_slopes *s = state->work->slopes;
   if (!cav_evaluated(state) || !state->work->derived || contact < 0 || contact >= state->ncontact) return CAV_BAD_INPUT;
   const cav_contact *c = &state->contact[contact];
+  if (s->contact[contact].idle) {
+    cav_status status = cav_contact_slopes(model, state, c, 1, &s->contact[contact]);
+    if (status != CAV_OK) return status;
+  }
   size_t row = (size_t)model->nv * sizeof(double), rows = (size_t)c->dim * row;
   if (out->dist_dq) memset(out->dist_dq, 0, row);
   double *all[] = {out->velocity_dq, out->velocity_dv_next, out->impulse_dq, out->impulse_dv, out->impulse_dv_next};

@@ -20,6 +20,8 @@ typedef struct geometry {
 
 // steps of differences of the narrow phase: rad, and share of the size of the smaller geom
 static const double TURN_STEP = 1e-5, SHIFT_STEP = 1e-5;
+// share of the curvature of a contact that pushes below which there is none
+static const double FLAT = 1e-13;
 
 static void place(const cav_model *model, const cav_state *state, int index, cav_shape *shape) {
   const cav_geom *geom = &model->geom[index];
@@ -264,8 +266,20 @@ static void fill_side(const cav_contact *c, const geometry *g, const motion *now
   }
 }
 
-cav_status cav_contact_slopes(const cav_model *model, const cav_state *state, const cav_contact *c,
+// whether the law is flat: no curvature beside that of a contact that pushes, which is 1/R
+static int is_flat(const cav_contact *c, const double *H) {
+  double share = 0;
+  for (int i = 0; i < c->dim; i++) share += H[i * c->dim + i] * c->regulariser[i];
+  return share < FLAT;
+}
+
+cav_status cav_contact_slopes(const cav_model *model, const cav_state *state, const cav_contact *c, int whole,
                               cav_contact_slope *slope) {
+  law_slope law;
+  double H[36];
+  differentiate_law(model, state, c, H, &law);
+  slope->idle = !whole && is_flat(c, H);
+  if (slope->idle) return CAV_OK;
   geometry g;
   cav_status status = measure(model, state, c, &g);
   if (status != CAV_OK) return status;
@@ -273,9 +287,6 @@ cav_status cav_contact_slopes(const cav_model *model, const cav_state *state, co
   motion now, next;
   move(state, c, state->velocity, midpoint ? state->velocity_next : NULL, &now);
   move(state, c, state->velocity_next, NULL, &next);
-  law_slope law;
-  double H[36];
-  differentiate_law(model, state, c, H, &law);
   for (int side = 0; side < 2; side++) {
     if ((side ? c->link2 : c->link1) > 0) fill_side(c, &g, &now, &next, &law, H, side, slope);
   }

@@ -8,6 +8,7 @@
 /// Derivatives of one contact by unit twists (angular, linear) of link1 [0] and of link2 [1] at the contact's position,
 /// while all links keep their own velocities but for what turns with them.
 typedef struct cav_contact_slope {
+  int idle; ///< the law is flat here: nothing is filled but this
   double dist[2][6];
   double velocity[2][6][6]; ///< [row][twist] of velocity_next
   double impulse[2][6][6];  ///< [row][twist] of the impulse
@@ -29,6 +30,7 @@ typedef struct cav_slopes {
   double *by_motion; ///< [nlink*36] of contact wrenches by the motion of the link, those carried along left out
   double *by_now;    ///< [nlink*36] of contact wrenches by v
   double *by_next;   ///< [nlink*36] and by -v_next
+  double *across;    ///< [12*nv] axes of the dofs of two links about a contact
   double *spare;     ///< [nv*nv] for outputs that are not asked for
   int room;
   cav_contact_slope *contact; ///< [room]
@@ -37,8 +39,9 @@ typedef struct cav_slopes {
 void cav_slopes_free(cav_slopes *slopes);
 
 /// Slopes of a contact at the state's last evaluation. CAV_NOT_SUPPORTED if the points of its pair come and go within the
-/// step of a difference, so that there is no derivative to take. slope.c.
-cav_status cav_contact_slopes(const cav_model *model, const cav_state *state, const cav_contact *contact,
+/// step of a difference, so that there is no derivative to take. Where the impulse and its slope are below 1e-13 of what a
+/// contact that pushes has, it is idle and its geometry left alone, unless whole is asked for. slope.c.
+cav_status cav_contact_slopes(const cav_model *model, const cav_state *state, const cav_contact *contact, int whole,
                               cav_contact_slope *slope);
 
 /// Rates by the distance to the constraint (dist - margin) of ln R and of ln hK of a row or contact's normal.

@@ -277,5 +277,6 @@ cav_status cav_readings_derivatives(const cav_transcription *tr, cav_scratch *s,
     if (!c) return CAV_INTERNAL;
     status = tr->knot[t].moving[k] ? overlap_rows(tr, s, c, out) : contact_rows(tr, s, c, out);
   }
+  if (status == CAV_NOT_SUPPORTED) return difference(tr, s, t, q, v, v_next);
   return status == CAV_OK ? sensors(tr, s, t, q, v, v_next) : status;
 }
