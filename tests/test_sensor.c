@@ -252,7 +252,9 @@ static void compare_model(const char *path, int all) {
 }
 
 static void compare_models(void) {
-  static const char *const names[] = {"dm_control/humanoid.xml", "dm_control/cheetah.xml"};
+  static const char *const names[] = {"dm_control/humanoid.xml", "dm_control/cheetah.xml",    "dm_control/finger.xml",
+                                      "dm_control/fish.xml",     "dm_control/hopper.xml",     "dm_control/walker.xml",
+                                      "dm_control/swimmer.xml",  "dm_control/manipulator.xml"};
   compare_model(CAVORT_SOURCE_ROOT "/tests/sensors.xml", 1);
   const char *folder = check_shared_models();
   for (unsigned i = 0; folder && i < sizeof names / sizeof *names; i++) {
