@@ -108,22 +108,27 @@ cav_status cav_replay_open(const cav_audit *audit, cav_replay *replay) {
   return status == CAV_NO_MEMORY ? status : CAV_OK;
 }
 
-// generalised force of clipped efforts; moment [nv] is scratch
-static void drive(const cav_model *model, const cav_state *state, const double *effort, double *moment, double *u) {
+// generalised force of efforts within the limits at (q, v); moment [nv] is scratch
+static cav_status drive(const cav_audit *audit, const double *q, const double *v, const double *effort, double *moment,
+                        double *u) {
+  const cav_model *model = audit->model;
+  cav_status status = cav_position(model, audit->bare, q);
   memset(u, 0, sizeof(double) * model->nv);
-  for (int a = 0; a < model->nu; a++) {
-    double range[2], scale;
-    cav_audit_actuator_range(model, a, range, &scale);
-    double force = model->actuator[a].unit * fmin(fmax(effort[a], range[0]), range[1]);
-    cav_actuator_length(model, state, a, moment);
+  for (int a = 0; a < model->nu && status == CAV_OK; a++) {
+    double length = cav_actuator_length(model, audit->bare, a, moment), velocity = 0, input;
+    for (int d = 0; d < model->nv; d++) velocity += moment[d] * v[d];
+    cav_actuator_input(model, a, length, velocity, model->actuator[a].unit * effort[a], &input);
+    double force = cav_actuator_force(model, a, length, velocity, input);
     for (int d = 0; d < model->nv; d++) u[d] += force * moment[d];
   }
+  return status;
 }
 
 // u := forces held around knot t and feedback at (q, v), through the actuators. A last knot without gains borrows those
 // before
-static void command(const cav_audit *audit, int t, const double *gain_q, const double *gain_v, const double *dq,
-                    const double *dv, double *effort, double *work, double *u) {
+static cav_status command(const cav_audit *audit, int t, const double *gain_q, const double *gain_v, const double *q,
+                          const double *v, const double *dq, const double *dv, double *effort, double *work,
+                          double *u) {
   int nv = audit->model->nv;
   size_t at = (size_t)(t < audit->last ? t : audit->last - 1) * (size_t)nv * (size_t)nv;
   const double *Kq = gain_q ? gain_q + at : NULL, *Kv = gain_v ? gain_v + at : NULL;
@@ -133,7 +138,7 @@ static void command(const cav_audit *audit, int t, const double *gain_q, const d
     for (int j = 0; Kv && j < nv; j++) u[i] += Kv[i * nv + j] * dv[j];
   }
   cav_actuation(audit->model, audit->bare, u, NULL, effort);
-  drive(audit->model, audit->bare, effort, work, u);
+  return drive(audit, q, v, effort, work, u);
 }
 
 // the motion at a share of the way from knot t to t+1
@@ -232,8 +237,8 @@ static cav_status interval(const cav_audit *audit, cav_state *fine, const double
     cav_difference(model, q_ref, q, 1, dq);
     for (int d = 0; d < nv; d++) dv[d] = v[d] - v_ref[d];
     int around = 2 * k >= SUBSTEPS && t + 1 < audit->rows ? t + 1 : t;
-    command(audit, around, gain_q, gain_v, dq, dv, control, next, u);
-    cav_status status = step(audit, fine, 1e-9, q, v, u, next);
+    cav_status status = command(audit, around, gain_q, gain_v, q, v, dq, dv, control, next, u);
+    if (status == CAV_OK) status = step(audit, fine, 1e-9, q, v, u, next);
     if (status == CAV_NO_MEMORY) return status;
     if (status != CAV_OK) {
       snprintf(follow->lost, sizeof follow->lost, "simulation stopped at %.3f s: %s", time, cav_status_name(status));

@@ -9,7 +9,6 @@
 
 #include <float.h>
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -100,7 +99,9 @@ static int list_force_rows(cav_transcription *tr) {
   tr->unactuated = calloc((size_t)nv, sizeof *tr->unactuated);
   tr->effort = calloc((size_t)nu + 1, sizeof *tr->effort);
   tr->effort_range = malloc((size_t)(nu + 1) * sizeof *tr->effort_range);
-  if (!unit || !basis || !residual || !control || !effort || !tr->unactuated || !tr->effort || !tr->effort_range)
+  tr->servo = calloc((size_t)nu + 1, sizeof *tr->servo);
+  if (!unit || !basis || !residual || !control || !effort || !tr->unactuated || !tr->effort || !tr->effort_range ||
+      !tr->servo)
     goto end;
 
   // project unit forces; orthonormalise what is left, twice for rounding
@@ -125,15 +126,16 @@ static int list_force_rows(cav_transcription *tr) {
 
   // efforts: control over its limit, or plain force where there is none
   for (int a = 0; a < nu; a++) {
-    double range[2];
+    double range[2], per_effort = 1;
     cav_actuator_effort_range(m, a, range);
+    if (cav_servo_bounds(m, a) && !cav_servo_set(m, a, &tr->servo[a], &per_effort, range)) goto end;
     double lower = range[0], upper = range[1];
     double limit = fmax(isfinite(lower) ? fabs(lower) : 0, isfinite(upper) ? fabs(upper) : 0);
     double scale = limit > 0 ? 1 / limit : 1;
     tr->effort_range[a][0] = lower * scale * tr->problem->effort_limit;
     tr->effort_range[a][1] = upper * scale * tr->problem->effort_limit;
     for (int d = 0; d < nv; d++) effort[d] = control[(size_t)d * nu + a];
-    if (!force_row_set(&tr->effort[a], nv, effort, scale)) goto end;
+    if (!force_row_set(&tr->effort[a], nv, effort, per_effort * scale)) goto end;
   }
   ok = 1;
 end:
@@ -203,26 +205,6 @@ static int scratch_new(cav_transcription *tr, cav_scratch *s) {
   return ok && s->state;
 }
 
-cav_status cav_drives_plannable(const cav_model *model, cav_error *error) {
-  for (int i = 0; i < model->nu; i++) {
-    const cav_actuator *a = &model->actuator[i];
-    int motor = a->gain == CAV_GAIN_FIXED && a->bias == CAV_BIAS_NONE, muscle = a->gain == CAV_GAIN_MUSCLE;
-    const char *why = !a->constant               ? "its moments depend on the configuration"
-                      : muscle                   ? "what a muscle can give depends on its length and velocity"
-                      : !motor && a->ctrllimited ? "the limits of a servo's control move with its length and velocity"
-                                                 : NULL;
-    if (!why) continue;
-    if (error) {
-      *error = (cav_error){.status = CAV_NOT_SUPPORTED};
-      snprintf(error->text, sizeof error->text,
-               "actuator '%.60s' (%d) cannot be planned with: %s; use motors along joints or fixed tendons instead",
-               a->name, i, why);
-    }
-    return CAV_NOT_SUPPORTED;
-  }
-  return CAV_OK;
-}
-
 cav_transcription *cav_transcription_new(const cav_problem *problem, int threads, cav_error *error) {
   if (cav_drives_plannable(problem->model, error) != CAV_OK) return NULL;
   cav_transcription *tr = calloc(1, sizeof *tr);
@@ -273,6 +255,8 @@ void cav_transcription_free(cav_transcription *tr) {
   }
   for (int k = 0; k < tr->nresidual; k++) free(tr->unactuated[k].dof), free(tr->unactuated[k].coef);
   for (int a = 0; tr->effort && a < tr->model->nu; a++) free(tr->effort[a].dof), free(tr->effort[a].coef);
+  for (int a = 0; tr->servo && a < tr->model->nu; a++) cav_servo_free(&tr->servo[a]);
+  free(tr->servo);
   free(tr->unactuated), free(tr->effort), free(tr->effort_range), free(tr->turn_dof), free(tr->turn_of);
   free(tr->knot), free(tr->scratch);
   cav_parallel_free(tr->pool);
@@ -355,6 +339,15 @@ static void add_dense(sum *a, double weight, double r, const double *row) {
   a->knot->rest[a->knot->ndense++] = root * r;
 }
 
+/// Adds a linear form of u to a row [3nv].
+static void put_force(const sum *a, const cav_force_row *form, double *row) {
+  int width = 3 * a->tr->nv;
+  for (int k = 0; k < form->n; k++) {
+    const double *du = a->knot->du + (size_t)form->dof[k] * width;
+    for (int c = 0; c < width; c++) row[c] += form->coef[k] * du[c];
+  }
+}
+
 /// Adds weight/2 r^2 with r a linear form of u: along one dof it joins that dof's row, otherwise it is a row of its own.
 static void add_force(sum *a, double weight, double r, const cav_force_row *form) {
   const cav_transcription *tr = a->tr;
@@ -366,12 +359,7 @@ static void add_force(sum *a, double weight, double r, const cav_force_row *form
   }
   int width = 3 * tr->nv;
   memset(a->s->row, 0, (size_t)width * sizeof(double));
-  if (a->jacobian) {
-    for (int k = 0; k < form->n; k++) {
-      const double *du = a->knot->du + (size_t)form->dof[k] * width;
-      for (int c = 0; c < width; c++) a->s->row[c] += form->coef[k] * du[c];
-    }
-  }
+  if (a->jacobian) put_force(a, form, a->s->row);
   add_dense(a, weight, r, a->s->row);
 }
 
@@ -413,11 +401,10 @@ static void keep_sparse(sum *a, int i, int n, const int *column, const double *e
   for (int k = 0; row && k < n; k++) row[column[k]] += entry[k];
 }
 
-static void keep_force(sum *a, int i, const cav_force_row *form) {
+static double *keep_force(sum *a, int i, const cav_force_row *form) {
   double *row = kept_row(a, i);
-  int width = 3 * a->tr->nv;
-  for (int k = 0; row && k < form->n; k++)
-    for (int c = 0; c < width; c++) row[c] += form->coef[k] * a->knot->du[(size_t)form->dof[k] * width + c];
+  if (row) put_force(a, form, row);
+  return row;
 }
 
 static void keep_reading(sum *a, int i, int reading) {
@@ -624,7 +611,28 @@ static void add_ranges(sum *a, const double *q, double rho) {
   }
 }
 
-static void add_force_slots(sum *a) {
+/// Entries of a servo's own part of row i over q_t and v_t, into row [3nv].
+static void put_servo(const sum *a, const cav_servo *servo, double *row) {
+  int column[6];
+  double entry[6];
+  for (int k = 0; a->t > 0 && k < servo->n; k++) {
+    int n = velocity_entries(a->tr, a->t, servo->dof[k], a->tr->nv, a->t > 1, servo->of_v[k], column, entry);
+    for (int c = 0; c < n; c++) row[column[c]] -= entry[c];
+    row[a->tr->nv + servo->dof[k]] -= servo->of_q[k];
+  }
+}
+
+/// Adds weight/2 r^2 for the row of a servo.
+static void add_servo(sum *a, double weight, double r, const cav_force_row *form, const cav_servo *servo) {
+  memset(a->s->row, 0, 3 * (size_t)a->tr->nv * sizeof(double));
+  if (a->jacobian) {
+    put_force(a, form, a->s->row);
+    put_servo(a, servo, a->s->row);
+  }
+  add_dense(a, weight, r, a->s->row);
+}
+
+static void add_force_slots(sum *a, const double *q, const double *v) {
   const cav_transcription *tr = a->tr;
   int i = a->knot->layout.unactuated, active;
   if (!a->knot->has_force) return;
@@ -637,9 +645,14 @@ static void add_force_slots(sum *a) {
   rho = tr->h * tr->penalty.effort;
   for (int k = 0; k < tr->model->nu; k++) {
     const double *range = tr->effort_range[k];
-    keep_force(a, i, &tr->effort[k]);
-    double e = slot_residual(a, i++, form_value(&tr->effort[k], a->knot->u), range[0], range[1], rho, &active);
-    if (active) add_force(a, rho, e, &tr->effort[k]);
+    const cav_servo *servo = &tr->servo[k];
+    double value = form_value(&tr->effort[k], a->knot->u);
+    double *row = keep_force(a, i, &tr->effort[k]);
+    if (servo->n > 0) value -= cav_servo_value(tr->model, servo, q, v);
+    if (servo->n > 0 && row) put_servo(a, servo, row);
+    double e = slot_residual(a, i++, value, range[0], range[1], rho, &active);
+    if (active && servo->n > 0) add_servo(a, rho, e, &tr->effort[k], servo);
+    if (active && servo->n == 0) add_force(a, rho, e, &tr->effort[k]);
   }
 }
 
@@ -762,7 +775,7 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   }
   if (!tr->constraints_only) add_costs(&a, q, v, v_next);
   knot->cost = knot->merit;
-  add_force_slots(&a);
+  add_force_slots(&a, q, v);
   add_ranges(&a, q, tr->h * tr->penalty.range);
   add_hard_terms(&a, q, v);
   if (p->jacobian) lay_force_rows(&a);

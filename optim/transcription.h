@@ -59,6 +59,13 @@ typedef struct cav_penalties {
   double unactuated, effort, range, term;
 } cav_penalties;
 
+/// What a servo's bias adds to its row: control = effort over gain - constant - sum of weights times q and v of dofs, scaled
+/// as the row. n 0: the row is that of the effort alone. servo.c.
+typedef struct cav_servo {
+  int n, *dof;
+  double constant, *of_q, *of_v; ///< [n]
+} cav_servo;
+
 typedef struct cav_transcription {
   const cav_problem *problem;
   const cav_model *model;
@@ -68,7 +75,8 @@ typedef struct cav_transcription {
   int nresidual;             ///< rows of unactuated
   cav_force_row *unactuated; ///< orthonormal complement of the actuators' range, scaled to shares of weight
   cav_force_row *effort;     ///< [nu] actuator force over its limit
-  double (*effort_range)[2]; ///< [nu] limits of effort, scaled
+  double (*effort_range)[2]; ///< [nu] limits of effort, scaled; of servos with limits of control, those
+  cav_servo *servo;          ///< [nu]
   int nturn;
   int *turn_dof; ///< [nturn] first of three rotational dofs
   int *turn_of;  ///< [nv] index into turn_dof or -1
@@ -86,8 +94,20 @@ typedef struct cav_transcription {
 } cav_transcription;
 
 /// Whether efforts of all actuators are linear forms of u with constant limits, which plans and audits of them assume:
-/// moments constant in q, and limits that no bias or muscle moves. CAV_NOT_SUPPORTED with the actuator and why not.
+/// moments constant in q, and limits that move with q and v at most as those of cav_servo_bounds. servo.c. CAV_NOT_SUPPORTED with the actuator and why not.
 cav_status cav_drives_plannable(const cav_model *model, cav_error *error);
+
+/// Whether the limits of a servo's control bound its effort by rows in u, q and v: fixed gain, affine bias, on a scalar joint
+/// or a fixed tendon, without limits of force. servo.c.
+int cav_servo_bounds(const cav_model *model, int actuator);
+
+/// Fills the row of such a servo: what control is per unit of effort (per_effort), its limits over the larger of them, and
+/// what q and v add. Returns 0 if memory runs out. servo.c.
+int cav_servo_set(const cav_model *model, int actuator, cav_servo *servo, double *per_effort, double range[2]);
+void cav_servo_free(cav_servo *servo);
+
+/// Part of the row at q [nq], v [nv]. servo.c.
+double cav_servo_value(const cav_model *model, const cav_servo *servo, const double *q, const double *v);
 
 /// NULL with the reason in error: no memory, or actuators that cannot be planned with.
 cav_transcription *cav_transcription_new(const cav_problem *problem, int threads, cav_error *error);

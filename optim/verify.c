@@ -177,6 +177,19 @@ static void note_start(const cav_audit *audit, cav_finding *finding) {
   }
 }
 
+// control of a servo beyond its limits: what the nearest one within them does not give, over gain and limits
+static void note_servo(const cav_audit *audit, int t, int a, double effort, double *moment, evidence *found) {
+  const cav_model *model = audit->model;
+  const cav_actuator *actuator = model->actuator + a;
+  double length = cav_actuator_length(model, audit->state, a, moment), velocity = 0, input;
+  for (int d = 0; d < model->nv; d++) velocity += moment[d] * audit->v[t * model->nv + d];
+  cav_actuator_input(model, a, length, velocity, effort, &input);
+  double missing = fabs(effort - cav_actuator_force(model, a, length, velocity, input));
+  double scale = fmax(fabs(actuator->ctrlrange[0]), fabs(actuator->ctrlrange[1])) * fabs(actuator->gain_parameter[0]);
+  cav_finding_note(&found->limit, missing / scale, t, "servo %.60s (%d), control at %.4g of %.4g .. %.4g",
+                   actuator->name, a, input, actuator->ctrlrange[0], actuator->ctrlrange[1]);
+}
+
 // what no actuator gives, and what actuators are asked for beyond their limits
 static void note_forces(const cav_audit *audit, int t, double *residual, evidence *found) {
   const cav_model *model = audit->model;
@@ -197,6 +210,7 @@ static void note_forces(const cav_audit *audit, int t, double *residual, evidenc
     double beyond = fmax(range[0] - control[a], control[a] - range[1]) / scale;
     cav_finding_note(&found->limit, beyond, t, "actuator %.60s (%d) at %.4g of %.4g .. %.4g", model->actuator[a].name,
                      a, control[a], range[0], range[1]);
+    if (cav_servo_bounds(model, a)) note_servo(audit, t, a, control[a], residual, found);
   }
 }
 

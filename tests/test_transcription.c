@@ -7,7 +7,7 @@
 #include "scene.h"
 
 /// A body that floats over and touches a floor, with a ball joint, a tendon, limits near their ends and an unactuated dof.
-#define WALKER(CORD)                                                                                               \
+#define WALKER(CORD, MORE)                                                                                         \
   "<mujoco><worldbody><geom name='floor' type='plane' size='1 1 1'/>"                                              \
   "<body name='trunk' pos='0 0 .3'><freejoint name='root'/><geom type='sphere' size='.1' mass='3'/>"               \
   "<site name='eye' pos='.1 0 .05'/>"                                                                              \
@@ -25,13 +25,21 @@
   "</fixed>" CORD                                                                                                  \
   "</tendon>"                                                                                                      \
   "<actuator><motor joint='hip' gear='20' ctrllimited='true' ctrlrange='-1 1'/>"                                   \
-  "<motor tendon='string' gear='5' ctrllimited='true' ctrlrange='-.5 1'/></actuator></mujoco>"
-static const char walker[] = WALKER("");
+  "<motor tendon='string' gear='5' ctrllimited='true' ctrlrange='-.5 1'/>" MORE "</actuator></mujoco>"
+static const char walker[] = WALKER("", "");
+
+/// The same with servos, whose limits of control move with their lengths and velocities.
+static const char served[] = WALKER("",
+                                    "<position joint='ankle' kp='3' gear='2' ctrllimited='true' ctrlrange='-.1 .2'/>"
+                                    "<general tendon='string' gear='-1.5' gainprm='-4' biastype='affine' biasprm='.5 "
+                                    "-3 -.7' dyntype='filter' dynprm='.1' "
+                                    "ctrllimited='true' ctrlrange='-.3 .1'/>");
 
 /// The same with a string from the trunk over a foot to a hand, whose arms turn with all of them.
 static const char roped[] = WALKER(
     "<spatial name='cord' limited='true' range='0 .3' stiffness='20' springlength='.1'><site site='eye'/>"
-    "<site site='toe'/><pulley divisor='2'/><site site='toe'/><site site='hand'/></spatial>");
+    "<site site='toe'/><pulley divisor='2'/><site site='toe'/><site site='hand'/></spatial>",
+    "");
 
 /// Costs of every quantity, hard terms of every kind, windows of both kinds.
 static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) {
@@ -211,6 +219,29 @@ static void test_methods(cav_transcription *tr, cav_trajectory *at) {
   free(hessian);
 }
 
+/// Rows of servos are their controls over the limit: effort less what the actuator does without control, over its gain.
+static void test_controls(const cav_transcription *tr, const cav_trajectory *at) {
+  const cav_model *m = tr->model;
+  cav_state *state = cav_state_new(m);
+  double *effort = scene_vector(m->nu), *moment = scene_vector(m->nv);
+  for (int t = 1; t + 1 < tr->nknot; t++) {
+    CHECK(cav_position(m, state, at->q + t * at->nq) == CAV_OK);
+    cav_actuation(m, state, tr->knot[t].u, NULL, effort);
+    for (int a = 0; a < m->nu; a++) {
+      if (!cav_servo_bounds(m, a)) continue;
+      const cav_actuator *x = &m->actuator[a];
+      double length = cav_actuator_length(m, state, a, moment), velocity = 0;
+      for (int d = 0; d < m->nv; d++) velocity += moment[d] * at->v[t * m->nv + d];
+      double control = (effort[a] - cav_actuator_force(m, a, length, velocity, 0)) / x->gain_parameter[0];
+      double limit = fmax(fabs(x->ctrlrange[0]), fabs(x->ctrlrange[1]));
+      double value = tr->knot[t].slot[tr->knot[t].layout.effort + a].value;
+      CHECK_NEAR(value, control / limit, 1e-9 * (1 + fabs(value)));
+    }
+  }
+  cav_state_free(state);
+  free(effort), free(moment);
+}
+
 static void test_threads(const cav_problem *p, cav_transcription *one, cav_trajectory *at) {
   cav_transcription *two = cav_transcription_new(p, 2, NULL);
   if (!CHECK(two != NULL)) return;
@@ -255,6 +286,7 @@ static void test_scene(const char *scene, int close_at_rest, cav_order order) {
     for (int i = 0; i < tr->knot[t].layout.count; i++) tr->knot[t].slot[i].multiplier = scene_uniform();
   test_gradient(tr, at);
   if (!cav_derivatives_missing(m)) test_methods(tr, at);
+  test_controls(tr, at);
   test_threads(&p, tr, at);
   test_rows(tr, at, 60);
   cav_trajectory_free(at);
@@ -286,11 +318,15 @@ static void test_refusals(void) {
       "</spatial></tendon><actuator>%s</actuator></mujoco>";
   static const struct {
     const char *actuator, *says;
-  } cases[] = {{"<motor name='pull' tendon='cord'/>", "'pull' (0) cannot be planned with: its moments depend"},
-               {"<motor joint='j'/><motor name='push' site='s' gear='1 0 0 0 0 0'/>", "'push' (1)"},
-               {"<muscle name='arm' joint='j'/>", "a muscle"},
-               {"<motor joint='j' gear='3' ctrllimited='true' ctrlrange='-1 1'/>", NULL},
-               {"<position joint='j' kp='3' forcelimited='true' forcerange='-1 1'/>", NULL}};
+  } cases[] = {
+      {"<motor name='pull' tendon='cord'/>", "'pull' (0) cannot be planned with: its moments depend"},
+      {"<motor joint='j'/><motor name='push' site='s' gear='1 0 0 0 0 0'/>", "'push' (1)"},
+      {"<muscle name='arm' joint='j'/>", "a muscle"},
+      {"<motor joint='j' gear='3' ctrllimited='true' ctrlrange='-1 1'/>", NULL},
+      {"<position joint='j' kp='3' ctrllimited='true' ctrlrange='-1 1'/>", NULL},
+      {"<position joint='j' ctrllimited='true' ctrlrange='-1 1' forcelimited='true' forcerange='-1 1'/>", "move"},
+      {"<damper joint='j' kv='3' ctrllimited='true' ctrlrange='0 1'/>", "move"},
+      {"<position joint='j' kp='3' forcelimited='true' forcerange='-1 1'/>", NULL}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
     char text[1000];
     snprintf(text, sizeof text, frame, cases[i].actuator);
@@ -310,5 +346,7 @@ int main(void) {
   test_scene(walker, 0, CAV_ORDER_MIDPOINT);
   test_scene(walker, 1, CAV_ORDER_EULER);
   test_scene(roped, 1, CAV_ORDER_MIDPOINT);
+  test_scene(served, 1, CAV_ORDER_MIDPOINT);
+  test_scene(served, 0, CAV_ORDER_EULER);
   return check_result();
 }

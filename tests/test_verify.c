@@ -28,6 +28,13 @@ static const char *const pendulum = HEAD
     "<geom type='sphere' pos='0 0 -0.5' size='0.05' mass='1'/></body></worldbody>"
     "<actuator><motor name='drive' joint='pivot' gear='2' ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>";
 
+// the same, pulled to where a servo is told: kp 4 behind a gear of 2, so 16 N m per rad, and 8 per rad of control
+static const char *const servo = HEAD
+    "<body name='rod'><joint name='pivot' type='hinge' axis='0 1 0' damping='0.1'/>"
+    "<geom type='sphere' pos='0 0 -0.5' size='0.05' mass='1'/></body></worldbody>"
+    "<actuator><position name='puller' joint='pivot' kp='4' gear='2' ctrllimited='true' ctrlrange='-1 1'/></actuator>"
+    "</mujoco>";
+
 static const char *const ranged = HEAD
     "<body name='rod'><joint name='pivot' type='hinge' axis='0 1 0' damping='0.1' limited='true' range='-0.5 0.5'/>"
     "<geom type='sphere' pos='0 0 -0.5' size='0.05' mass='1'/></body></worldbody>"
@@ -293,6 +300,25 @@ static void test_effort(void) {
     CHECK_NEAR(s.verdict.limit_violation_max, i ? lever * sin(1) / 2 - 1 : 0, 1e-12);
     CHECK_NEAR(s.verdict.momentum_defect_rms, 0, 1e-15);
     if (i) CHECK(strstr(s.verdict.reason, "limit") && strstr(s.verdict.reason, "drive"));
+  }
+  sample_free(&s);
+}
+
+// the control of a servo that holds is where it is and what its pull takes: 2 angle + m g l sin(angle) / 8
+static void test_servo(void) {
+  sample s = sample_new(servo, 25, 0.02, CAV_ORDER_MIDPOINT);
+  s.problem.close_at_rest = 1;
+  const double angle[2] = {0.3, 0.5}, lever = 9.81 * 0.5;
+  for (int i = 0; i < 2; i++) {
+    s.q[0] = angle[i];
+    for (int t = 0; t <= 25; t++) knot(&s, t)[0] = angle[i];
+    CHECK(verify(&s, NULL, NULL) == CAV_OK);
+    double control = 2 * angle[i] + lever * sin(angle[i]) / 8;
+    CHECK((control > 1) == (i == 1));
+    CHECK(s.verdict.certified == (i == 0));
+    CHECK_NEAR(s.verdict.limit_violation_max, i ? control - 1 : 0, 1e-12);
+    if (i == 0) CHECK_NEAR(s.verdict.closed_loop_end_error_m, 0, 1e-6);
+    if (i) CHECK(strstr(s.verdict.reason, "limit") && strstr(s.verdict.reason, "servo puller"));
   }
   sample_free(&s);
 }
@@ -591,6 +617,7 @@ int main(void) {
   test_tumble();
   test_held_roots();
   test_effort();
+  test_servo();
   test_range();
   test_cords();
   test_contact_balance();
