@@ -38,11 +38,10 @@ struct cav_geom_cache {
 };
 
 // places a geom fixed to the world, or prepares one that moves
-static void open_slot(const cav_geom *geom, slot *s, double centre[3]) {
+static void open_slot(const cav_model *model, const cav_geom *geom, slot *s, double centre[3]) {
   s->geom = geom;
   s->fixed = geom->link == 0;
-  s->shape.type = geom->type;
-  s->shape.size = geom->size;
+  s->shape = cav_shape_of(model, geom);
   if (!s->fixed) return;
   // link 0 is the world: its frame is the world's
   copy3(centre, geom->pos);
@@ -61,7 +60,7 @@ static void open_slots(const cav_model *model, struct cav_geom_cache *cache, int
     for (int k = 0; k < 2; k++) {
       if (slot_of[geoms[k]] >= 0) continue;
       slot_of[geoms[k]] = cache->nslot;
-      open_slot(model->geom + geoms[k], cache->slot + cache->nslot, cache->centre[cache->nslot]);
+      open_slot(model, model->geom + geoms[k], cache->slot + cache->nslot, cache->centre[cache->nslot]);
       cache->nslot++;
     }
     const cav_geom *a = model->geom + pair->geom1, *b = model->geom + pair->geom2;

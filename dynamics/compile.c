@@ -21,6 +21,7 @@ typedef struct builder {
   cav_joint *joint;
   cav_dof *dof;
   cav_geom *geom;
+  void *assets; // meshes and height fields, written by asset.c
   cav_site *site;
   cav_pair *pair;
   cav_tendon *tendon;
@@ -84,6 +85,8 @@ static void check_names(cav_spec *spec) {
   check_unique(spec, TABLE(spec->body));
   check_unique(spec, TABLE(spec->joint));
   check_unique(spec, TABLE(spec->geom));
+  check_unique(spec, TABLE(spec->mesh));
+  check_unique(spec, TABLE(spec->hfield));
   check_unique(spec, TABLE(spec->site));
   check_unique(spec, TABLE(spec->tendon));
   check_unique(spec, TABLE(spec->equality));
@@ -192,6 +195,7 @@ static void carve_model(builder *b, carver *c) {
   b->joint = take(c, m->njoint, sizeof *b->joint);
   b->dof = take(c, m->nv, sizeof *b->dof);
   b->geom = take(c, m->ngeom, sizeof *b->geom);
+  b->assets = take(c, 1, cav_put_assets(b->spec, NULL, b->model));
   b->site = take(c, m->nsite, sizeof *b->site);
   b->pair = take(c, m->npair, sizeof *b->pair);
   b->tendon = take(c, m->ntendon, sizeof *b->tendon);
@@ -211,6 +215,7 @@ static void carve_model(builder *b, carver *c) {
 
 static void share_arrays(builder *b) {
   cav_model *m = b->model;
+  cav_put_assets(b->spec, b->assets, m);
   m->body = b->body;
   m->link = b->link;
   m->joint = b->joint;
@@ -490,9 +495,10 @@ static void fill_geoms(builder *b) {
     to_link(&b->body[s->body], s->pos, s->quat, g->pos, g->quat);
     quat_matrix(g->rotation, g->quat);
     copy3(g->size, s->size);
+    g->asset = s->type >= CAV_GEOM_MESH ? s->asset : 0;
     copy3(g->friction, s->friction);
     memcpy(g->fluidcoef, s->fluidcoef, sizeof g->fluidcoef);
-    g->bound = bounding_radius(g);
+    g->bound = s->type >= CAV_GEOM_MESH ? s->bound : bounding_radius(g);
     for (int k = 0; k < 4; k++) g->rgba[k] = (float)s->rgba[k];
   }
 }
@@ -624,6 +630,7 @@ static void check_tied(builder *b, const cav_spec_equality *s, const cav_equalit
   int coupled = s->type == CAV_EQUALITY_JOINT || s->type == CAV_EQUALITY_TENDON;
   if (s->type == CAV_EQUALITY_DISTANCE && running(b)) {
     int g1 = b->geom[e->object[0]].type, g2 = b->geom[e->object[1]].type, plane = g1 == g2 && g1 == CAV_GEOM_PLANE;
+    plane |= g1 == CAV_GEOM_HFIELD || g2 == CAV_GEOM_HFIELD;
     int low = g1 < g2 ? g1 : g2, high = g1 < g2 ? g2 : g1;
     if (plane || !cav_collide_supported((cav_geom_type)low, (cav_geom_type)high))
       cav_spec_fail(spec, s->node, NULL, "the distance between geoms of these two types is not computed%s",
@@ -974,6 +981,7 @@ cav_model *cav_compile(cav_spec *spec) {
   cav_model measured = {0};
   builder b = {.spec = spec, .model = &measured};
   cav_model *model = NULL;
+  if (spec->status == CAV_OK) cav_spec_assets(spec);
   if (spec->status == CAV_OK) cav_spec_masses(spec);
   b.weld = calloc((size_t)spec->body.n + 1, sizeof *b.weld);
   b.link_of = calloc((size_t)spec->body.n + 1, sizeof *b.link_of);

@@ -22,6 +22,7 @@ int cav_collide_supported(cav_geom_type a, cav_geom_type b) {
   return a < CAV_GEOM_TYPES && b < CAV_GEOM_TYPES;
 #else
   // ellipsoid, cylinder and box among themselves, but for two boxes
+  if (a >= CAV_GEOM_MESH || b >= CAV_GEOM_MESH) return a < CAV_GEOM_TYPES && b < CAV_GEOM_TYPES;
   int solid_a = a >= CAV_GEOM_ELLIPSOID, solid_b = b >= CAV_GEOM_ELLIPSOID;
   return a < CAV_GEOM_TYPES && b < CAV_GEOM_TYPES && (!solid_a || !solid_b || (a == CAV_GEOM_BOX && b == CAV_GEOM_BOX));
 #endif

@@ -47,7 +47,7 @@ static void turn(const cav_state *state, const cav_equality *e, cav_tie *tie) {
 static cav_shape shape_of(const cav_model *model, const cav_state *state, int index) {
   const cav_geom *geom = &model->geom[index];
   const cav_pose *link = &state->link[geom->link];
-  cav_shape shape = {.type = geom->type, .size = geom->size};
+  cav_shape shape = cav_shape_of(model, geom);
   transform(shape.pos, link->pos, link->rotation, geom->pos);
   matmul3(shape.rotation, link->rotation, geom->rotation);
   return shape;

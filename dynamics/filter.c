@@ -125,13 +125,16 @@ static void bound_friction(cav_pair *pair) {
   for (int i = 0; i < 5; i++) pair->friction[i] = larger(pair->friction[i], 1e-5);
 }
 
+// planes and height fields do not meet each other
+static int is_ground(const cav_geom *g) { return g->type == CAV_GEOM_PLANE || g->type == CAV_GEOM_HFIELD; }
+
 // collisions of two bodies' geoms by their masks
 static void add_bodies(cav_spec *spec, list *l, const cav_geom *geom, int b1, int b2, const keys *explicit_pairs) {
   const cav_spec_body *x = &spec->body.at[b1], *y = &spec->body.at[b2];
   for (int i = x->geom; i < x->geom + x->ngeom; i++) {
     for (int j = y->geom; j < y->geom + y->ngeom; j++) {
       if (!(geom[i].contype & geom[j].conaffinity) && !(geom[j].contype & geom[i].conaffinity)) continue;
-      if (geom[i].type == CAV_GEOM_PLANE && geom[j].type == CAV_GEOM_PLANE) continue;
+      if (is_ground(&geom[i]) && is_ground(&geom[j])) continue;
       if (has_key(explicit_pairs, i, j)) continue;
       cav_pair *pair = push(spec, l, geom, i, j);
       if (!pair) return;
@@ -199,8 +202,8 @@ static void add_explicit(cav_spec *spec, list *l, const cav_geom *geom, const in
     int g1 = find_geom(spec, p, "geom1", p->geom1), g2 = find_geom(spec, p, "geom2", p->geom2);
     if (g1 < 0 || g2 < 0) return;
     explicit_pairs->at[explicit_pairs->n++] = make_key(g1, g2);
-    if (geom[g1].type == CAV_GEOM_PLANE && geom[g2].type == CAV_GEOM_PLANE) {
-      cav_spec_fail(spec, p->node, NULL, "two planes cannot touch; remove the pair");
+    if (is_ground(&geom[g1]) && is_ground(&geom[g2])) {
+      cav_spec_fail(spec, p->node, NULL, "two planes or height fields cannot touch; remove the pair");
     } else if (weld[geom[g1].body] == weld[geom[g2].body]) {
       cav_spec_warn(spec, p->node, NULL, "left out: the two geoms move as one");
     } else {

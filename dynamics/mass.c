@@ -2,7 +2,8 @@
 ///
 /// Solid bodies of uniform density; a body's geoms add up by the parallel axis theorem, overlaps counting twice, as MJCF
 /// has it. Principal axes by Jacobi's rotations. Then MJCF's compiler options boundmass, boundinertia, balanceinertia and
-/// settotalmass, in this order. Not done: shells, meshes.
+/// settotalmass, in this order. Meshes are weighed in asset.c. Not
+/// done: shells.
 
 #include "math3.h"
 #include "spec.h"
@@ -74,7 +75,8 @@ static void moments(int type, double m, const double *s, double moment[3]) {
 }
 
 static void weigh_geom(cav_spec *spec, cav_spec_geom *g) {
-  static const char *const names[CAV_GEOM_TYPES] = {"plane", "sphere", "capsule", "ellipsoid", "cylinder", "box"};
+  static const char *const names[CAV_GEOM_TYPES] = {"plane",    "sphere", "capsule", "ellipsoid",
+                                                    "cylinder", "box",    "mesh",    "height field"};
   for (int i = 0; i < size_count(g->type); i++) {
     if (!(g->size[i] > 0))
       cav_spec_fail(spec, g->node, "size", "expected %d number%s > 0 for a %s, got %g; give the missing size",
@@ -84,13 +86,24 @@ static void weigh_geom(cav_spec *spec, cav_spec_geom *g) {
   if (!g->has_mass && g->density < 0)
     cav_spec_fail(spec, g->node, "density", "expected a density >= 0, got %g", g->density);
   if (spec->status != CAV_OK) return;
-  double mass = g->type == CAV_GEOM_PLANE ? 0 : g->has_mass ? g->mass : g->density * volume(g->type, g->size);
+  int solid = g->type != CAV_GEOM_PLANE && g->type != CAV_GEOM_HFIELD;
+  double mass = !solid ? 0 : g->has_mass ? g->mass : g->density * volume(g->type, g->size);
+  // a mesh has been weighed by asset.c
+  if (g->type == CAV_GEOM_MESH) mass = g->inertia.mass;
   g->inertia.mass = mass;
   copy3(g->inertia.com, g->pos);
   memcpy(g->inertia.quat, g->quat, sizeof g->quat);
-  moments(g->type, mass, g->size, g->inertia.moment);
+  if (g->type != CAV_GEOM_MESH) moments(g->type, mass, g->size, g->inertia.moment);
   if (!isfinite(mass) || !isfinite(norm3(g->inertia.moment)))
     cav_spec_fail(spec, g->node, NULL, "mass or inertia is not finite; make size, mass or density smaller");
+}
+
+int cav_geom_weighs(const cav_spec *spec, const cav_spec_geom *g) {
+  const cav_spec_compiler *c = &spec->compiler;
+  if (g->has_mass ? g->mass == 0 : g->density == 0) return 0;
+  if (g->body == 0 || g->type == CAV_GEOM_PLANE || g->type == CAV_GEOM_HFIELD || c->from_geoms == 0) return 0;
+  if (spec->body.at[g->body].has_inertial && c->from_geoms != 1) return 0;
+  return g->group >= c->group_range[0] && g->group <= c->group_range[1];
 }
 
 // --- bodies ---

@@ -20,7 +20,8 @@ typedef struct defaults {
   cav_spec_tendon tendon;
   cav_spec_equality equality;
   cav_spec_actuator actuator;
-  double rgba[4]; // of a material
+  double rgba[4];  // of a material
+  double scale[3]; // of a mesh
 } defaults;
 
 typedef struct material {
@@ -99,6 +100,7 @@ static void read_compiler(reader *r, const cav_xml_node *node) {
   if (cav_xml_word(node, "coordinate", 0) == 1)
     cav_spec_fail(r->spec, node, "coordinate", "global coordinates are not supported; write local ones");
   c->fuse = cav_xml_bool(node, "fusestatic", c->fuse);
+  c->exact_mesh = cav_xml_bool(node, "exactmeshinertia", c->exact_mesh);
   c->strip = cav_xml_bool(node, "strippath", c->strip);
   read_text(node, "assetdir", &c->mesh_folder);
   read_text(node, "meshdir", &c->mesh_folder);
@@ -266,6 +268,7 @@ static defaults first_defaults(void) {
                                    .dynprm = {1},
                                    .gainprm = {1}};
   for (int i = 0; i < 4; i++) d.rgba[i] = 1;
+  set3(d.scale, 1, 1, 1);
   return d;
 }
 
@@ -289,6 +292,8 @@ static void read_default_values(reader *r, const cav_xml_node *node, defaults *d
     read_equality_values(spec, node, &d->equality);
   else if (!strcmp(name, "tendon"))
     read_tendon_values(spec, node, &d->tendon);
+  else if (!strcmp(name, "mesh"))
+    cav_xml_reals(node, "scale", d->scale, 3);
   else if (!strcmp(name, "material"))
     cav_xml_reals(node, "rgba", d->rgba, 4);
   else if (cav_xml_accepts(node, "ctrlrange"))
@@ -347,6 +352,8 @@ static void check_childclass(reader *r, const cav_xml_node *node) {
 
 static void read_assets(reader *r, const cav_xml_node *node) {
   for (const cav_xml_node *c = node->child; c; c = c->next) {
+    if (is(c, "mesh")) cav_read_mesh(r->spec, c, class_of(r, c, NULL)->scale);
+    if (is(c, "hfield")) cav_read_hfield(r->spec, c);
     if (!is(c, "material")) continue;
     material *m = CAV_SPEC_PUSH(r->spec, &r->materials);
     if (!m) return;
@@ -400,23 +407,30 @@ static void read_colour(reader *r, cav_spec_geom *g) {
   if (!memcmp(g->rgba, plain, sizeof plain)) memcpy(g->rgba, r->materials.at[i].rgba, sizeof g->rgba);
 }
 
-// meshes and height fields: left out, with a warning, where they are only seen
-static int is_left_out(reader *r, const cav_spec_geom *g) {
+// the mesh or height field that a geom names; 0 where it is left out because it is only seen
+static int find_asset(reader *r, cav_spec_geom *g) {
   cav_spec *spec = r->spec;
-  const char *what = g->type == CAV_SPEC_HFIELD || g->hfield ? "height fields" : "meshes";
-  if (g->type < CAV_GEOM_TYPES && !g->mesh && !g->hfield) return 0;
-  int weighs = !(g->has_mass ? g->mass == 0 : g->density == 0), from_geoms = spec->compiler.from_geoms;
-  if (spec->body.at[g->body].has_inertial && from_geoms != 1) weighs = 0;
-  if (g->body == 0 || g->type == CAV_SPEC_HFIELD) weighs = 0;
-  if (from_geoms == 0 || g->group < spec->compiler.group_range[0] || g->group > spec->compiler.group_range[1])
-    weighs = 0;
-  if (g->contype || g->conaffinity || weighs)
-    cav_spec_fail(spec, g->node, NULL, "%s are not supported; use another type%s", what,
-                  weighs ? ", or give the body an inertial element and the geom contype 0 and conaffinity 0"
-                         : ", or set contype and conaffinity to 0 to leave it out");
-  else
-    cav_spec_warn(spec, g->node, NULL, "left out: %s are not supported, and this one is only seen", what);
-  return 1;
+  int is_mesh = g->type == CAV_GEOM_MESH, is_field = g->type == CAV_GEOM_HFIELD;
+  const char *kind = is_mesh ? "mesh" : "hfield", *name = is_mesh ? g->mesh : g->hfield;
+  if (g->mesh && !is_mesh)
+    cav_spec_fail(spec, g->node, "mesh", "fitting a shape to a mesh is not supported; write type=\"mesh\" or the size");
+  if (g->hfield && !is_field)
+    cav_spec_fail(spec, g->node, "hfield", "is for geoms of type hfield; write type=\"hfield\"");
+  if (!is_mesh && !is_field) return 1;
+  if (!name) {
+    cav_spec_fail(spec, g->node, kind, "is missing; name the asset");
+    return 0;
+  }
+  g->asset = is_mesh ? cav_find_name(spec->mesh.at, spec->mesh.n, sizeof *spec->mesh.at, name)
+                     : cav_find_name(spec->hfield.at, spec->hfield.n, sizeof *spec->hfield.at, name);
+  if (g->asset < 0 && is_mesh)
+    cav_spec_unknown(spec, g->node, kind, kind, name, spec->mesh.at, spec->mesh.n, sizeof *spec->mesh.at);
+  if (g->asset < 0 && is_field)
+    cav_spec_unknown(spec, g->node, kind, kind, name, spec->hfield.at, spec->hfield.n, sizeof *spec->hfield.at);
+  g->weighs = cav_geom_weighs(spec, g);
+  if (g->contype || g->conaffinity || g->weighs || spec->load.visual) return g->asset >= 0;
+  cav_spec_warn(spec, g->node, NULL, "left out: it can neither touch nor weigh, and is only seen");
+  return 0;
 }
 
 static void read_geom(reader *r, const cav_xml_node *node, const place *at) {
@@ -428,7 +442,7 @@ static void read_geom(reader *r, const cav_xml_node *node, const place *at) {
   g->name = cav_xml_text(node, "name", "");
   g->node = node;
   g->body = at->body;
-  if (is_left_out(r, g)) {
+  if (!find_asset(r, g)) {
     spec->geom.n--;
     return;
   }

@@ -230,17 +230,22 @@ static int capsule_capsule(const cav_shape *a, const cav_shape *b, double margin
   return count;
 }
 
+// the last two columns of every row
+#define MESH cav_collide_polytope, cav_collide_hfield
+
 typedef int routine(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
 int cav_collide_shapes(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
   // upper triangle over types; planes do not meet planes
   static routine *const table[CAV_GEOM_TYPES][CAV_GEOM_TYPES] = {
-      {NULL, plane_sphere, plane_capsule, plane_ellipsoid, plane_cylinder, plane_box},
-      {NULL, sphere_sphere, sphere_capsule, sphere_ellipsoid, sphere_cylinder, sphere_box},
-      {NULL, NULL, capsule_capsule, cav_collide_segment, cav_collide_segment, cav_collide_segment},
-      {NULL, NULL, NULL, cav_collide_convex, cav_collide_convex, cav_collide_convex},
-      {NULL, NULL, NULL, NULL, cav_collide_convex, cav_collide_convex},
-      {NULL, NULL, NULL, NULL, NULL, cav_collide_boxes}};
+      {NULL, plane_sphere, plane_capsule, plane_ellipsoid, plane_cylinder, plane_box, cav_collide_plane_mesh, NULL},
+      {NULL, sphere_sphere, sphere_capsule, sphere_ellipsoid, sphere_cylinder, sphere_box, MESH},
+      {NULL, NULL, capsule_capsule, cav_collide_segment, cav_collide_segment, cav_collide_segment, MESH},
+      {NULL, NULL, NULL, cav_collide_convex, cav_collide_convex, cav_collide_convex, MESH},
+      {NULL, NULL, NULL, NULL, cav_collide_convex, cav_collide_convex, MESH},
+      {NULL, NULL, NULL, NULL, NULL, cav_collide_boxes, MESH},
+      {NULL, NULL, NULL, NULL, NULL, NULL, MESH},
+      {NULL}};
   routine *collide = table[a->type][b->type];
   return collide ? collide(a, b, margin, touch) : 0;
 }

@@ -19,6 +19,23 @@ void cav_support(const cav_shape *shape, const double direction[3], double point
 /// Segment swept by a sphere (the capsule a) against a solid b with a surface: up to 2 points. segment.c.
 int cav_collide_segment(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
+/// A mesh against a plane, or a sphere, capsule, ellipsoid, cylinder, box or mesh: up to 8 points. polytope.c.
+int cav_collide_plane_mesh(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
+int cav_collide_polytope(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
+
+/// Keeps the deepest of n contacts and those furthest from the ones kept, most at most; returns how many. polytope.c.
+int cav_thin_out(cav_touch *touch, int n, int most);
+
+/// Lowest points of a shape over a triangle with that normal, world. polytope.c.
+enum { CAV_LYING_MAX = 32 };
+int cav_points_over(const cav_shape *shape, double corner[3][3], const double normal[3], double point[][3]);
+
+/// A height field against all but planes and height fields: up to 8 points. heightfield.c.
+int cav_collide_hfield(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
+
+/// Distance along a ray in its axes to the surface of a height field from above; -1 if it misses. heightfield.c.
+double cav_ray_hfield(const cav_hfield *field, const double point[3], const double direction[3]);
+
 /// Box against box: up to 8 points. boxes.c.
 int cav_collide_boxes(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 

@@ -2,6 +2,7 @@
 /// ray, found in closed form in the shape's own axes: an ellipsoid by one quadratic, a box and a cylinder as intersections
 /// of slabs and a tube, a capsule as the union of a cylinder and two balls.
 #include "math3.h"
+#include "pairs.h"
 #include "stage.h"
 
 /// Part of a ray, from <= to; from > to: none.
@@ -53,6 +54,20 @@ static interval ellipsoid(const double p[3], const double d[3], const double siz
   return ball(q, e, 1, 0);
 }
 
+// inside all faces of a hull; a flat one has no inside
+static interval polyhedron(const cav_mesh *m, const double p[3], const double d[3]) {
+  interval solid = m->nface ? everything : nothing;
+  for (int f = 0; f < m->nface; f++) {
+    const double *plane = m->plane + 4 * f;
+    double height = dot3(plane, p) - plane[3], rate = dot3(plane, d);
+    if (rate == 0 && height > 0) { return nothing; }
+    if (rate == 0) { continue; }
+    double t = -height / rate;
+    solid = both(solid, rate > 0 ? (interval){-INFINITY, t} : (interval){t, INFINITY});
+  }
+  return solid;
+}
+
 static double meet_plane(const double p[3], const double d[3], const double size[3]) {
   if (d[2] >= 0 || p[2] < 0) { return -1; }
   double t = -p[2] / d[2];
@@ -90,7 +105,12 @@ double cav_ray(const cav_shape *shape, const double point[3], const double direc
       solid = everything;
       for (int k = 0; k < 3; k++) solid = both(solid, slab(p[k], d[k], size[k]));
       break;
-    default:
+    case CAV_GEOM_MESH:
+      solid = polyhedron(shape->mesh, p, d);
+      break;
+    case CAV_GEOM_HFIELD:
+      return cav_ray_hfield(shape->hfield, p, d);
+    case CAV_GEOM_TYPES:
       break;
   }
   if (!(solid.from <= solid.to) || solid.to < 0) { return -1; }

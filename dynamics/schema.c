@@ -115,8 +115,6 @@ UNREAD(statistic, "statistic");
 UNREAD(custom, "custom");
 UNREAD(lengthrange, "lengthrange");
 UNREAD(texture, "texture");
-UNREAD(mesh, "mesh");
-UNREAD(hfield, "hfield");
 UNREAD(skin, "skin");
 UNREAD(camera, "camera");
 UNREAD(light, "light");
@@ -141,7 +139,7 @@ static const cav_xml_attribute compiler_attributes[] = {BOOL("autolimits"),
                                                         BOOL("fusestatic"),
                                                         WORD("inertiafromgeom", truth),
                                                         INTS("inertiagrouprange", 2),
-                                                        SKIP("exactmeshinertia"),
+                                                        BOOL("exactmeshinertia"),
                                                         END};
 static const cav_xml_element *const compiler_children[] = {&lengthrange, &include, NULL};
 static const cav_xml_element compiler = {"compiler", 0, 0, compiler_attributes, compiler_children, 0};
@@ -179,7 +177,7 @@ static const cav_xml_element option = {"option", 0, 0, option_attributes, option
 
 // --- defaults ---
 
-LEAF(default_mesh, "mesh", SKIP("scale"));
+LEAF(default_mesh, "mesh", REALS("scale", 3, 3));
 LEAF(default_material, "material", SKIP("texture"), SKIP("emission"), SKIP("specular"), SKIP("shininess"),
      SKIP("reflectance"), REALS("rgba", 4, 4), SKIP("texrepeat"), SKIP("texuniform"));
 LEAF(default_joint, "joint", JOINT);
@@ -228,6 +226,10 @@ static const cav_xml_element defaults = {"default", 0, 0, default_attributes, de
 
 LEAF(material, "material", NEEDED("name"), NAMED("class"), SKIP("texture"), SKIP("texrepeat"), SKIP("texuniform"),
      SKIP("emission"), SKIP("specular"), SKIP("shininess"), SKIP("reflectance"), REALS("rgba", 4, 4));
+LEAF(mesh, "mesh", NAMED("name"), NAMED("class"), NAMED("file"), REALS("scale", 3, 3), REALS("refpos", 3, 3),
+     REALS("refquat", 4, 4), REALS("vertex", 0, 0), REALS("face", 0, 0), SKIP("normal"), SKIP("texcoord"),
+     SKIP("smoothnormal"));
+LEAF(hfield, "hfield", NAMED("name"), NAMED("file"), INT("nrow"), INT("ncol"), {"size", CAV_XML_REAL, 4, 4, NULL, 1});
 static const cav_xml_element *const asset_children[] = {&texture, &hfield, &mesh, &skin, &material, &include, NULL};
 static const cav_xml_element asset = {"asset", 0, 0, NULL, asset_children, 0};
 

@@ -191,7 +191,7 @@ static double measure_range(const cav_model *model, const cav_state *state, int 
     if (geom->body == body || geom->rgba[3] == 0) { continue; }
     cav_pose pose;
     pose_in_link(state, geom->link, geom->pos, geom->quat, &pose);
-    cav_shape shape = {.type = geom->type, .size = geom->size};
+    cav_shape shape = cav_shape_of(model, geom);
     copy3(shape.pos, pose.pos);
     memcpy(shape.rotation, pose.rotation, sizeof shape.rotation);
     double t = cav_ray(&shape, from->pos, direction);

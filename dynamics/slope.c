@@ -26,8 +26,7 @@ static const double FLAT = 1e-13;
 static void place(const cav_model *model, const cav_state *state, int index, cav_shape *shape) {
   const cav_geom *geom = &model->geom[index];
   const cav_pose *link = &state->link[geom->link];
-  shape->type = geom->type;
-  shape->size = geom->size;
+  *shape = cav_shape_of(model, geom);
   transform(shape->pos, link->pos, link->rotation, geom->pos);
   matmul3(shape->rotation, link->rotation, geom->rotation);
 }

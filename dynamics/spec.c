@@ -83,6 +83,7 @@ void cav_spec_clear(cav_spec *spec) {
   free(spec->body.at);
   free(spec->joint.at);
   free(spec->geom.at);
+  cav_clear_assets(spec);
   free(spec->site.at);
   free(spec->pair.at);
   free(spec->exclude.at);

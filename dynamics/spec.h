@@ -6,6 +6,8 @@
 #define CAVORT_SPEC_H
 
 #include "cavort/model.h"
+#include "hull.h"
+#include "mesh.h"
 #include "xml.h"
 
 /// Whether a limit holds, as the file says.
@@ -40,9 +42,6 @@ typedef struct cav_spec_joint {
   double stiffness, damping, armature, frictionloss, springdamper[2];
 } cav_spec_joint;
 
-/// Shapes of a file: those of cav_geom_type, then what has no shape here.
-enum { CAV_SPEC_MESH = CAV_GEOM_TYPES, CAV_SPEC_HFIELD };
-
 typedef struct cav_spec_geom {
   const char *name;
   const cav_xml_node *node;
@@ -57,8 +56,33 @@ typedef struct cav_spec_geom {
   const char *material, *mesh, *hfield;
   int fluid; ///< an ellipsoid to the medium
   double fluidcoef[5];
+  int asset;                ///< mesh or height field in its list
+  int weighs;               ///< its mass counts in its body's
+  double bound;             ///< of a mesh or height field: radius of the bounding sphere
   cav_spec_inertia inertia; ///< of the shape, by mass.c; com is pos
 } cav_spec_geom;
+
+/// A mesh as asked for; from index on filled by asset.c where a geom uses it.
+typedef struct cav_spec_mesh {
+  const char *name;
+  const cav_xml_node *node;
+  const char *path; ///< NULL: vertex and face
+  const cav_xml_value *vertex, *face;
+  double scale[3], refpos[3], refquat[4];
+  int index;                              ///< in the model; -1: no geom uses it
+  double volume, moment[3];               ///< moments of inertia of density 1
+  double pos[3], quat[4], half[3], bound; ///< centre of mass and principal axes; its box and sphere about these
+  cav_hull hull;
+} cav_spec_mesh;
+
+typedef struct cav_spec_hfield {
+  const char *name;
+  const cav_xml_node *node;
+  const char *path; ///< NULL: level
+  int nrow, ncol, index;
+  double size[4]; ///< half lengths along x and y, height, depth of the base
+  double *height; ///< [nrow*ncol] m; of malloc
+} cav_spec_hfield;
 
 typedef struct cav_spec_site {
   const char *name;
@@ -152,6 +176,7 @@ typedef struct cav_spec_compiler {
   int group_range[2];
   double bound_mass, bound_inertia, total_mass;
   char euler[4];
+  int exact_mesh;          ///< volume of meshes by signed sums
   int fuse;                ///< bodies that move as one take the reference weights of the whole
   int strip;               ///< of a mesh's path only the name counts
   const char *mesh_folder; ///< never NULL
@@ -183,6 +208,8 @@ typedef struct cav_spec {
   CAV_SPEC_LIST(cav_spec_body) body;
   CAV_SPEC_LIST(cav_spec_joint) joint;
   CAV_SPEC_LIST(cav_spec_geom) geom;
+  CAV_SPEC_LIST(cav_spec_mesh) mesh;
+  CAV_SPEC_LIST(cav_spec_hfield) hfield;
   CAV_SPEC_LIST(cav_spec_site) site;
   CAV_SPEC_LIST(cav_spec_pair) pair;
   CAV_SPEC_LIST(cav_spec_exclude) exclude;
@@ -199,6 +226,7 @@ typedef struct cav_spec {
 
 enum {
   CAV_SPEC_OBJECTS = 65536, ///< most objects of one kind
+  CAV_SPEC_GRID = 4096,     ///< most points along a side of a height field
   CAV_SPEC_DOFS = 5000,     ///< most degrees of freedom
   CAV_SPEC_PAIRS = 2000000  ///< most pairs that may touch
 };
@@ -247,6 +275,21 @@ void cav_mjcf_first_options(cav_spec *spec);
 void cav_mjcf_read_options(cav_spec *spec, const cav_xml_node *node);
 void cav_mjcf_default_joint(cav_spec_joint *joint);
 void cav_mjcf_default_geom(cav_spec_geom *geom);
+
+/// Mesh and hfield elements of MJCF into the lists of a spec; a mesh by path and scale, once: its index. asset.c.
+void cav_read_mesh(cav_spec *spec, const cav_xml_node *node, const double scale[3]);
+void cav_read_hfield(cav_spec *spec, const cav_xml_node *node);
+int cav_add_mesh(cav_spec *spec, const cav_xml_node *node, const char *path, const double scale[3]);
+
+/// Loads the meshes and height fields that geoms use, and moves those geoms to their frames. asset.c.
+void cav_spec_assets(cav_spec *spec);
+
+/// Copies them to base (16-byte aligned) and sets them in the model; base NULL: only counts. Returns the bytes. asset.c.
+size_t cav_put_assets(const cav_spec *spec, void *base, cav_model *model);
+void cav_clear_assets(cav_spec *spec);
+
+/// 1 if a geom's mass counts in that of its body. mass.c.
+int cav_geom_weighs(const cav_spec *spec, const cav_spec_geom *geom);
 
 /// Root of the grammar of URDF; fills spec from a checked tree of it. urdf.c.
 extern const cav_xml_element cav_urdf_root;

@@ -20,9 +20,19 @@ enum { CAV_TOUCH_MAX = 8 }; ///< most points one pair can give
 typedef struct cav_shape {
   cav_geom_type type;
   const double *size;
+  const cav_mesh *mesh;     ///< of a mesh
+  const cav_hfield *hfield; ///< of a height field
   double pos[3];
   double rotation[9]; ///< row-major, world = rotation * local + pos
 } cav_shape;
+
+/// Kind, size and asset of a geom; its place is left to the caller.
+static inline cav_shape cav_shape_of(const cav_model *model, const cav_geom *geom) {
+  cav_shape shape = {.type = geom->type, .size = geom->size};
+  if (geom->type == CAV_GEOM_MESH) shape.mesh = &model->mesh[geom->asset];
+  if (geom->type == CAV_GEOM_HFIELD) shape.hfield = &model->hfield[geom->asset];
+  return shape;
+}
 
 /// All contact points of two shapes with dist < margin; a->type <= b->type. Returns their number, at most CAV_TOUCH_MAX.
 /// pairs.c: table over types; exact routines where they exist, convex.c (libccd) for the rest.

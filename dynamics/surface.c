@@ -118,15 +118,41 @@ static void support_local(cav_geom_type type, const double *size, const double d
       set3(x, sign_of(d[0]) * size[0], sign_of(d[1]) * size[1], sign_of(d[2]) * size[2]);
       return;
     case CAV_GEOM_PLANE:
+    case CAV_GEOM_MESH:
+    case CAV_GEOM_HFIELD:
     case CAV_GEOM_TYPES:
       break;
   }
   zero3(x);
 }
 
+// corner of a mesh furthest along a direction: all of them, or uphill from neighbour to neighbour, which on a convex
+// body ends at the top
+static const double *support_mesh(const cav_mesh *m, const double d[3]) {
+  enum { FEW = 32 };
+  int best = 0;
+  double most = dot3(m->vertex, d);
+  for (int v = 1; v < m->nvertex && m->nvertex <= FEW; v++) {
+    double h = dot3(m->vertex + 3 * v, d);
+    if (h > most) most = h, best = v;
+  }
+  for (int last = -1; last != best && m->nvertex > FEW;) {
+    last = best;
+    for (int k = m->neighbour_start[last]; k < m->neighbour_start[last + 1]; k++) {
+      double h = dot3(m->vertex + 3 * m->neighbour[k], d);
+      if (h > most) most = h, best = m->neighbour[k];
+    }
+  }
+  return m->vertex + 3 * best;
+}
+
 void cav_support(const cav_shape *shape, const double direction[3], double point[3]) {
   double d[3], x[3];
   rotate_back(d, shape->rotation, direction);
-  support_local(shape->type, shape->size, d, x);
+  if (shape->type == CAV_GEOM_MESH) {
+    copy3(x, support_mesh(shape->mesh, d));
+  } else {
+    support_local(shape->type, shape->size, d, x);
+  }
   transform(point, shape->pos, shape->rotation, x);
 }

@@ -255,15 +255,16 @@ static const char *find_file(cav_spec *spec, const char *name) {
 }
 
 // a mesh that is absent cannot be touched; said, not fatal, for robots travel without their meshes
-static int read_mesh(cav_spec *spec, const cav_xml_node *node, int seen_only, cav_spec_geom *g) {
+static int read_mesh(cav_spec *spec, const cav_xml_node *node, const double scale[3], int seen_only, cav_spec_geom *g) {
   const char *name = cav_xml_text(node, "filename", ""), *path = find_file(spec, name);
   if (spec->status == CAV_OK && !path)
     cav_spec_warn(spec, node, "filename", "'%.200s' is not found: the shape is left out, nothing %s it", name,
                   seen_only ? "shows" : "touches");
   if (!path) return 0;
-  (void)g;
-  cav_spec_fail(spec, node, "filename", "meshes are not supported yet");
-  return 0;
+  g->type = CAV_GEOM_MESH;
+  g->asset = cav_add_mesh(spec, node, path, scale);
+  g->weighs = cav_geom_weighs(spec, g);
+  return 1;
 }
 
 // one of the shapes into a geom; 0 where it is left out
@@ -284,7 +285,7 @@ static int read_shape(reader *r, const cav_xml_node *node, int seen_only, cav_sp
     int given = cav_xml_reals(shape, "scale", scale, 3);
     if (given == 1) scale[1] = scale[2] = scale[0];
     if (given == 2) cav_spec_fail(spec, shape, "scale", "expected 1 or 3 numbers, got 2");
-    return read_mesh(spec, shape, seen_only, g);
+    return read_mesh(spec, shape, scale, seen_only, g);
   } else {
     g->type = shape->rule == &sphere     ? CAV_GEOM_SPHERE
               : shape->rule == &cylinder ? CAV_GEOM_CYLINDER

@@ -203,8 +203,10 @@ static double reach(const cav_geom *geom, const cav_pose *pose, const double n[3
     case CAV_GEOM_CYLINDER:
       return s[0] * sqrt(x * x + y * y) + s[1] * fabs(z);
     case CAV_GEOM_BOX:
+    case CAV_GEOM_MESH: // its box
       return s[0] * fabs(x) + s[1] * fabs(y) + s[2] * fabs(z);
     case CAV_GEOM_PLANE:
+    case CAV_GEOM_HFIELD:
     case CAV_GEOM_TYPES:
       break;
   }

@@ -10,7 +10,8 @@
 #include "file.h"
 #include "workspace.h"
 
-static const char *const geom_name[] = {"plane", "sphere", "capsule", "ellipsoid", "cylinder", "box"};
+static const char *const geom_name[] = {"plane",    "sphere", "capsule", "ellipsoid",
+                                        "cylinder", "box",    "mesh",    "height field"};
 static const char *const joint_name[] = {"free", "ball", "slide", "hinge"};
 
 // name of the first element of a file, "" if there is none in its first part

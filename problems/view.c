@@ -69,8 +69,48 @@ static void write_numbers(FILE *out, const double *x, int n, int digits) {
 
 // --- parts of the motion ---
 
+// the hull of a mesh as corners and triangles
+static void write_mesh(FILE *out, const cav_mesh *m) {
+  fputs(",\"corners\":", out);
+  write_numbers(out, m->vertex, 3 * m->nvertex, 6);
+  fputs(",\"triangles\":[", out);
+  const char *comma = "";
+  for (int f = 0; f < m->nface; f++) {
+    for (int k = m->face[f] + 2; k < m->face[f + 1]; k++) {
+      fprintf(out, "%s%d,%d,%d", comma, m->corner[m->face[f]], m->corner[k - 1], m->corner[k]);
+      comma = ",";
+    }
+  }
+  putc(']', out);
+}
+
+// at most so many cells of a height field along each side: a page is looked at, not measured
+enum { CELLS_SHOWN = 64 };
+
+static void write_hfield(FILE *out, const cav_hfield *h) {
+  int rows = h->nrow - 1 < CELLS_SHOWN ? h->nrow - 1 : CELLS_SHOWN;
+  int columns = h->ncol - 1 < CELLS_SHOWN ? h->ncol - 1 : CELLS_SHOWN;
+  fputs(",\"corners\":[", out);
+  for (int i = 0; i < (rows + 1) * (columns + 1); i++) {
+    int r = i / (columns + 1) * (h->nrow - 1) / rows, c = i % (columns + 1) * (h->ncol - 1) / columns;
+    double x[3] = {h->size[0] * (2.0 * c / (h->ncol - 1) - 1), h->size[1] * (2.0 * r / (h->nrow - 1) - 1),
+                   h->height[r * h->ncol + c]};
+    for (int k = 0; k < 3; k++) {
+      if (i > 0 || k > 0) putc(',', out);
+      write_number(out, x[k], 5);
+    }
+  }
+  fputs("],\"triangles\":[", out);
+  for (int i = 0; i < rows * columns; i++) {
+    int at = i / columns * (columns + 1) + i % columns, up = at + columns + 1;
+    fprintf(out, "%s%d,%d,%d,%d,%d,%d", i > 0 ? "," : "", at, at + 1, up + 1, at, up + 1, up);
+  }
+  putc(']', out);
+}
+
 static void write_geoms(FILE *out, const cav_model *model) {
-  static const char *const kind[CAV_GEOM_TYPES] = {"plane", "sphere", "capsule", "ellipsoid", "cylinder", "box"};
+  static const char *const kind[CAV_GEOM_TYPES] = {"plane",    "sphere", "capsule", "ellipsoid",
+                                                   "cylinder", "box",    "mesh",    "hfield"};
   fputs("\"geoms\":[", out);
   for (int i = 0; i < model->ngeom; i++) {
     const cav_geom *geom = &model->geom[i];
@@ -85,6 +125,8 @@ static void write_geoms(FILE *out, const cav_model *model) {
     write_numbers(out, geom->quat, 4, 6);
     fputs(",\"rgba\":", out);
     write_numbers(out, rgba, 4, 4);
+    if (geom->type == CAV_GEOM_MESH) write_mesh(out, &model->mesh[geom->asset]);
+    if (geom->type == CAV_GEOM_HFIELD) write_hfield(out, &model->hfield[geom->asset]);
     putc('}', out);
   }
   fputs("\n]", out);

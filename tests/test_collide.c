@@ -62,7 +62,7 @@ static void fill(heap *h) {
   }
   // 2 planes, one fixed and one that moves, then all types in turn; the first ones are fixed to the world
   for (int g = 0; g < GEOMS; g++) {
-    random_geom(h->geom + g, g < 2 ? CAV_GEOM_PLANE : (cav_geom_type)(1 + g % (CAV_GEOM_TYPES - 1)));
+    random_geom(h->geom + g, g < 2 ? CAV_GEOM_PLANE : (cav_geom_type)(1 + g % CAV_GEOM_BOX));
     h->geom[g].link = h->geom[g].body = g == 1 ? 3 : g * LINKS / GEOMS;
   }
   for (int a = 0; a < GEOMS; a++) {

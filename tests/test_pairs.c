@@ -1,6 +1,6 @@
 /// Contact of two shapes: each point carries its own proof. With normal n and gap d, the points pos -+ n d/2 must lie
 /// on the two surfaces, and the supporting planes there must be d apart: then d is at most and at least the distance.
-/// Then invariance under motions of both, derivatives of the gap by small displacements, degenerate poses, and MuJoCo.
+/// Meshes and height fields have tests of their own (test_mesh.c). Then invariance under motions of both, derivatives of the gap by small displacements, degenerate poses, and MuJoCo.
 #include "check.h"
 #include "pairs.h"
 
@@ -79,6 +79,8 @@ static double surface_height(const cav_shape *s, const double p[3]) {
       return cav_surface_cylinder(s->size, x, n);
     case CAV_GEOM_BOX:
       return cav_surface_box(s->size, x, n);
+    case CAV_GEOM_MESH:
+    case CAV_GEOM_HFIELD:
     case CAV_GEOM_TYPES:
       break;
   }
@@ -158,8 +160,8 @@ static int collide(const solid *a, const solid *b, cav_touch *touch) {
 
 // bounds in metres, shapes of 0.05 to 0.3 m; residuals seen are in the table this prints: at most 2e-14
 static void test_certificates(void) {
-  for (int ta = 0; ta < CAV_GEOM_TYPES; ta++) {
-    for (int tb = ta + !ta; tb < CAV_GEOM_TYPES; tb++) {
+  for (int ta = 0; ta < CAV_GEOM_MESH; ta++) {
+    for (int tb = ta + !ta; tb < CAV_GEOM_MESH; tb++) {
       if (!cav_collide_supported(ta, tb)) continue;
       worst w = {0};
       int unsolved = 0;
@@ -212,8 +214,8 @@ static const cav_touch *with_feature(const cav_touch *touch, int count, int feat
 static void test_invariance(void) {
   double most = 0;
   int lost = 0, all = 0, elsewhere = 0;
-  for (int ta = 0; ta < CAV_GEOM_TYPES; ta++) {
-    for (int tb = ta + !ta; tb < CAV_GEOM_TYPES; tb++) {
+  for (int ta = 0; ta < CAV_GEOM_MESH; ta++) {
+    for (int tb = ta + !ta; tb < CAV_GEOM_MESH; tb++) {
       if (!cav_collide_supported(ta, tb)) continue;
       for (int k = 0; k < 300; k++) {
         solid a, b;
@@ -257,8 +259,8 @@ static void test_invariance(void) {
 // gap of the nearest point under small displacements of b: its derivative is the normal's share of b's motion there
 static void test_derivatives(void) {
   const double step = 1e-7;
-  for (int ta = 0; ta < CAV_GEOM_TYPES; ta++) {
-    for (int tb = ta + !ta; tb < CAV_GEOM_TYPES; tb++) {
+  for (int ta = 0; ta < CAV_GEOM_MESH; ta++) {
+    for (int tb = ta + !ta; tb < CAV_GEOM_MESH; tb++) {
       if (!cav_collide_supported(ta, tb)) continue;
       int outliers = 0, lost = 0, all = 0;
       double normal_rate = 0;
@@ -311,8 +313,8 @@ static void test_degenerate(void) {
       {0, 0, 0}, {1.5707963267948966, 0, 0}, {0, 1.5707963267948966, 0}, {0, 0, 0.3}, {3.141592653589793, 0, 0}};
   static const double place[7][3] = {{0, 0, 0},     {0.2, 0, 0}, {0, 0.2, 0},       {0, 0, 0.2},
                                      {0.2, 0.2, 0}, {0, 0, 0.1}, {1e-300, 0, 1e-17}};
-  for (int ta = 0; ta < CAV_GEOM_TYPES; ta++) {
-    for (int tb = ta + !ta; tb < CAV_GEOM_TYPES; tb++) {
+  for (int ta = 0; ta < CAV_GEOM_MESH; ta++) {
+    for (int tb = ta + !ta; tb < CAV_GEOM_MESH; tb++) {
       if (!cav_collide_supported(ta, tb)) continue;
       for (int pose = 0; pose < 5 * 7; pose++) {
         solid a, b;
@@ -349,7 +351,7 @@ static void test_manifolds(void) {
   // upright: sphere, capsule, ellipsoid, cylinder, box on a plane, 1 mm deep
   static const double top[CAV_GEOM_TYPES] = {0, 0.1, 0.4, 0.3, 0.3, 0.3};
   static const int upright[CAV_GEOM_TYPES] = {0, 1, 1, 1, 3, 4}, flat[CAV_GEOM_TYPES] = {0, 1, 2, 1, 2, 4};
-  for (int type = 1; type < CAV_GEOM_TYPES; type++) {
+  for (int type = 1; type < CAV_GEOM_MESH; type++) {
     cav_shape s = {.type = type, .size = sizes[type], .pos = {0, 0, top[type] - 1e-3}};
     memcpy(s.rotation, identity, sizeof identity);
     int n = cav_collide_shapes(&floor, &s, 0, touch);
@@ -512,8 +514,8 @@ static double peer_gap(const mjData *d) {
 // true one. Ours is the distance itself where apart, so theirs must never exceed it, and where they overlap neither.
 // Capsule on box and box on box: it chooses other points; the share of poses in agreement is reported.
 static void test_peer(void) {
-  for (int ta = 0; ta < CAV_GEOM_TYPES; ta++) {
-    for (int tb = ta + !ta; tb < CAV_GEOM_TYPES; tb++) {
+  for (int ta = 0; ta < CAV_GEOM_MESH; ta++) {
+    for (int tb = ta + !ta; tb < CAV_GEOM_MESH; tb++) {
       if (!cav_collide_supported(ta, tb)) continue;
       mjModel *m = peer_scene(ta, tb);
       mjData *d = m ? mj_makeData(m) : NULL;

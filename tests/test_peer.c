@@ -20,12 +20,15 @@ enum { STATES = 1000, SHOWN = 3 };
 static const double SAME = 1e-9;      ///< relative error of u that counts as equal
 static const double GEOMETRY = 1e-10; ///< m or 1: difference of a contact that explains one of u
 static const double CROSSING = 1e-9;  ///< m: axes of capsules closer than this cross
-/// A model and the share of states that must agree where its contacts are made by routines that differ in kind.
+/// A model and the share of states that must agree; less than 0.99 where MuJoCo's contacts are made by iteration or by
+/// routines that differ in kind: box against box (double_pendulum), capsule on cylinder (slider_crank), ellipsoid and
+/// height field (quadruped). Every state that differs is explained by its contacts all the same.
 typedef struct subject {
   const char *name;
   double share;
 } subject;
-static const char *const kinds[] = {"plane", "sphere", "capsule", "ellipsoid", "cylinder", "box"};
+static const char *const kinds[] = {"plane",    "sphere", "capsule", "ellipsoid",
+                                    "cylinder", "box",    "mesh",    "height field"};
 
 /// One model in both libraries.
 typedef struct pair_of_models {
@@ -314,7 +317,7 @@ int main(void) {
       {"urdf/double_pendulum.urdf", 0.7},   {"urdf/simple_humanoid.urdf", 0.99}, {"urdf/solo12.urdf", 0.99},
       {"dm_control/ball_in_cup.xml", 0.99}, {"dm_control/point_mass.xml", 0.99}, {"dm_control/finger.xml", 0.99},
       {"dm_control/manipulator.xml", 0.99}, {"mujoco/arm26.xml", 0.99},          {"mujoco/slider_crank.xml", 0.93},
-      {"dm_control/fish.xml", 0.99},        {"dm_control/swimmer.xml", 0.99}};
+      {"dm_control/fish.xml", 0.99},        {"dm_control/swimmer.xml", 0.99},    {"dm_control/quadruped.xml", 0.3}};
   const char *folder = check_shared_models();
   if (!folder) {
     printf("skipped: set CAVORT_SHARED_MODELS to the folder of the models\n");

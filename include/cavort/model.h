@@ -20,6 +20,8 @@ typedef enum cav_geom_type {
   CAV_GEOM_ELLIPSOID, ///< size semi-axes
   CAV_GEOM_CYLINDER,  ///< along z; size[0] radius, size[1] half length
   CAV_GEOM_BOX,       ///< size half lengths
+  CAV_GEOM_MESH,      ///< the convex hull of a mesh: model->mesh[asset]; size half lengths of its box
+  CAV_GEOM_HFIELD,    ///< model->hfield[asset]; size as there
   CAV_GEOM_TYPES
 } cav_geom_type;
 
@@ -193,6 +195,26 @@ typedef struct cav_dof {
   double inverse_weight; ///< diagonal of M^-1 at q0, averaged over a ball's 3 and over 3+3 of a free joint
 } cav_dof;
 
+/// Convex hull of a mesh, about its centre of mass and principal axes: the frame of its geoms.
+typedef struct cav_mesh {
+  const char *name;
+  int nvertex, nface;
+  const double *vertex; ///< [nvertex*3] m
+  const double *plane;  ///< [nface*4] of each polygon: outward unit normal n and offset d, n x <= d inside
+  const int *face;      ///< [nface+1] first entry of each polygon in corner
+  const int *corner;    ///< [face[nface]] vertices, counterclockwise from outside
+  const int *neighbour_start, *neighbour; ///< [nvertex+1], vertices across an edge from each
+} cav_mesh;
+
+/// Heights over a grid in the x-y plane, solid down to -base; x grows along columns, y along rows, both about 0.
+typedef struct cav_hfield {
+  const char *name;
+  int nrow, ncol;
+  double size[2];       ///< half lengths along x and y, m
+  double top, base;     ///< m: largest height that elevation 1 stands for; depth below 0
+  const double *height; ///< [nrow*ncol] m
+} cav_hfield;
+
 typedef struct cav_geom {
   const char *name;
   cav_geom_type type;
@@ -201,6 +223,7 @@ typedef struct cav_geom {
   double quat[4];
   double rotation[9]; ///< of quat, row-major
   double size[3];
+  int asset;    ///< of a mesh or height field: index of its kind
   double bound; ///< radius of the bounding sphere about pos; infinite for a plane
   int contype, conaffinity;
   int condim, priority;
@@ -390,6 +413,7 @@ typedef struct cav_model {
 
   int nbody, nlink, njoint, ngeom, nsite, npair, ntendon, ntendon_part, ntendon_path, ntendon_dof, nequality, nactuator,
       nsensor, nkey, nwarning;
+  int nmesh, nhfield;
   int fused;       ///< 1: bodies without joints take the reference weights of the link they are part of
   int nsensordata; ///< length of the vector of all readings
   const cav_body *body;
@@ -397,6 +421,8 @@ typedef struct cav_model {
   const cav_joint *joint;
   const cav_dof *dof; ///< [nv]
   const cav_geom *geom;
+  const cav_mesh *mesh;
+  const cav_hfield *hfield;
   const cav_site *site;
   const cav_pair *pair;
   const cav_tendon *tendon;

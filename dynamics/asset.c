@@ -1,0 +1,371 @@
+/// Meshes and height fields of a model: asked for while the file is read, loaded only where a geom uses them.
+///
+/// A mesh collides as its convex hull and weighs as its triangles: it is scaled, moved by its reference pose, and expressed
+/// about its centre of mass and principal axes, to which its geoms are moved, as MuJoCo does. One without volume keeps the
+/// middle of its surface and must not be asked to weigh by density. A height field without a file is level; with one, a
+/// binary file of two 32-bit integers and rows times columns 32-bit floats, its heights are stretched to 0 to 1.
+/// Not done: images as height fields, fitting of simple shapes to meshes, MuJoCo's MSH format.
+
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include "math3.h"
+#include "spec.h"
+
+// --- files ---
+
+// path of an asset: relative to the asset folder, that to the model's file; of its path only the name counts with strip
+static const char *asset_path(cav_spec *spec, const char *file) {
+  const char *model = cav_xml_path(spec->xml), *slash = strrchr(model, '/'), *folder = spec->compiler.mesh_folder;
+  if (spec->compiler.strip && strrchr(file, '/')) file = strrchr(file, '/') + 1;
+  int base = slash && *folder != '/' && *file != '/' ? (int)(slash - model) + 1 : 0;
+  if (*file == '/') folder = "";
+  size_t length = strlen(folder), room = strlen(model) + length + strlen(file) + 3;
+  char *path = cav_spec_keep_text(spec, room);
+  if (path)
+    snprintf(path, room, "%.*s%s%s%s", base, model, folder, length && folder[length - 1] != '/' ? "/" : "", file);
+  return path;
+}
+
+// a file's name without folder and ending
+static const char *name_of(cav_spec *spec, const char *file) {
+  const char *slash = strrchr(file, '/'), *start = slash ? slash + 1 : file, *dot = strrchr(start, '.');
+  size_t length = dot ? (size_t)(dot - start) : strlen(start);
+  char *name = cav_spec_keep_text(spec, length + 1);
+  if (name) memcpy(name, start, length);
+  return name ? name : "";
+}
+
+// --- asking ---
+
+void cav_read_mesh(cav_spec *spec, const cav_xml_node *node, const double scale[3]) {
+  cav_spec_mesh *m = CAV_SPEC_PUSH(spec, &spec->mesh);
+  if (!m) return;
+  *m = (cav_spec_mesh){.node = node, .refquat = {1, 0, 0, 0}, .index = -1};
+  const char *file = cav_xml_text(node, "file", NULL);
+  m->vertex = cav_xml_get(node, "vertex");
+  m->face = cav_xml_get(node, "face");
+  m->name = cav_xml_text(node, "name", NULL);
+  if (!m->name) m->name = file ? name_of(spec, file) : "";
+  if (!file == !m->vertex)
+    cav_spec_fail(spec, node, NULL, "expected one of file and vertex; say where the mesh comes from");
+  m->path = file ? asset_path(spec, file) : NULL;
+  copy3(m->scale, scale);
+  cav_xml_reals(node, "scale", m->scale, 3);
+  cav_xml_reals(node, "refpos", m->refpos, 3);
+  cav_xml_reals(node, "refquat", m->refquat, 4);
+  quat_normalise(m->refquat);
+  if (m->scale[0] * m->scale[1] * m->scale[2] == 0)
+    cav_spec_fail(spec, node, "scale", "expected numbers other than 0, got %g %g %g", m->scale[0], m->scale[1],
+                  m->scale[2]);
+}
+
+int cav_add_mesh(cav_spec *spec, const cav_xml_node *node, const char *path, const double scale[3]) {
+  for (int i = 0; i < spec->mesh.n; i++) {
+    const cav_spec_mesh *m = &spec->mesh.at[i];
+    if (!strcmp(m->path, path) && !memcmp(m->scale, scale, sizeof m->scale)) return i;
+  }
+  cav_spec_mesh *m = CAV_SPEC_PUSH(spec, &spec->mesh);
+  if (!m) return 0;
+  *m = (cav_spec_mesh){.name = "", .node = node, .path = path, .refquat = {1, 0, 0, 0}, .index = -1};
+  copy3(m->scale, scale);
+  if (scale[0] * scale[1] * scale[2] == 0)
+    cav_spec_fail(spec, node, "scale", "expected numbers other than 0, got %g %g %g", scale[0], scale[1], scale[2]);
+  return spec->mesh.n - 1;
+}
+
+void cav_read_hfield(cav_spec *spec, const cav_xml_node *node) {
+  cav_spec_hfield *h = CAV_SPEC_PUSH(spec, &spec->hfield);
+  if (!h) return;
+  const char *file = cav_xml_text(node, "file", NULL);
+  *h = (cav_spec_hfield){.node = node, .index = -1};
+  h->name = cav_xml_text(node, "name", NULL);
+  if (!h->name) h->name = file ? name_of(spec, file) : "";
+  h->path = file ? asset_path(spec, file) : NULL;
+  h->nrow = cav_xml_int(node, "nrow", 0);
+  h->ncol = cav_xml_int(node, "ncol", 0);
+  cav_xml_reals(node, "size", h->size, 4);
+  for (int k = 0; k < 4; k++) {
+    if (!(h->size[k] > 0))
+      cav_spec_fail(spec, node, "size", "expected four numbers > 0 (half lengths, height, depth of the base), got %g",
+                    h->size[k]);
+  }
+  if (!file && (h->nrow < 2 || h->ncol < 2))
+    cav_spec_fail(spec, node, NULL, "expected nrow and ncol of at least 2, or a file; got %d and %d", h->nrow, h->ncol);
+  if (h->nrow > CAV_SPEC_GRID || h->ncol > CAV_SPEC_GRID)
+    cav_spec_fail(spec, node, NULL, "%d by %d points; at most %d along each side are read", h->nrow, h->ncol,
+                  CAV_SPEC_GRID);
+}
+
+// --- meshes ---
+
+// triangles that the file of the model itself gives, or those of the hull where it gives points alone
+static void read_own_mesh(cav_spec *spec, const cav_spec_mesh *m, cav_triangles *t) {
+  int n = m->vertex->count / 3, faces = m->face ? m->face->count / 3 : 0;
+  if (m->vertex->count % 3 || n < 1 || (m->face && m->face->count % 3)) {
+    cav_spec_fail(spec, m->node, NULL, "vertex and face: expected numbers three by three");
+    return;
+  }
+  t->vertex = malloc(sizeof *t->vertex * 3 * (size_t)n);
+  t->triangle = malloc(sizeof *t->triangle * (3 * (size_t)faces + 1));
+  if (!t->vertex || !t->triangle) {
+    cav_spec_no_memory(spec);
+    return;
+  }
+  t->nvertex = n;
+  t->ntriangle = faces;
+  memcpy(t->vertex, m->vertex->number, sizeof *t->vertex * 3 * (size_t)n);
+  for (int i = 0; i < 3 * faces; i++) {
+    t->triangle[i] = (int)m->face->number[i];
+    if (t->triangle[i] < 0 || t->triangle[i] >= n)
+      cav_spec_fail(spec, m->node, "face", "%d is no vertex: %d are given", t->triangle[i], n);
+  }
+}
+
+// fans of the hull's polygons
+static int triangles_of_hull(const cav_hull *h, cav_triangles *t) {
+  int count = h->ncorner - 2 * h->nface;
+  int *v = realloc(t->triangle, sizeof *v * (3 * (size_t)count + 1));
+  double *x = realloc(t->vertex, sizeof *x * (3 * (size_t)h->nvertex + 1));
+  if (v) t->triangle = v;
+  if (x) t->vertex = x;
+  if (!v || !x) return 0;
+  memcpy(x, h->vertex, sizeof *x * 3 * (size_t)h->nvertex);
+  t->nvertex = h->nvertex;
+  t->ntriangle = 0;
+  for (int f = 0; f < h->nface; f++) {
+    for (int k = h->face[f] + 2; k < h->face[f + 1]; k++, v += 3) {
+      v[0] = h->corner[h->face[f]];
+      v[1] = h->corner[k - 1];
+      v[2] = h->corner[k];
+      t->ntriangle++;
+    }
+  }
+  return 1;
+}
+
+// scaled and moved by the reference pose
+static void transform_mesh(const cav_spec_mesh *m, cav_triangles *t) {
+  double back[4];
+  quat_conjugate(back, m->refquat);
+  for (int i = 0; i < t->nvertex; i++) {
+    double *x = t->vertex + 3 * i;
+    for (int k = 0; k < 3; k++) x[k] *= m->scale[k];
+    sub3(x, x, m->refpos);
+    quat_rotate(x, back, x);
+  }
+}
+
+// bulk, principal axes, and all vertices into them
+static void weigh_mesh(cav_spec *spec, cav_spec_mesh *m, cav_triangles *t) {
+  cav_bulk bulk = cav_mesh_bulk(t, spec->compiler.exact_mesh);
+  double size = 0, back[4];
+  for (int i = 0; i < 3 * t->nvertex; i++) size = fmax(size, fabs(t->vertex[i]));
+  m->volume = bulk.volume > 1e-15 * size * size * size ? bulk.volume : 0;
+  copy3(m->pos, bulk.centre);
+  m->quat[0] = 1;
+  if (m->volume > 0) cav_principal_axes(bulk.inertia, m->quat, m->moment);
+  quat_conjugate(back, m->quat);
+  for (int i = 0; i < t->nvertex; i++) {
+    double *x = t->vertex + 3 * i;
+    sub3(x, x, m->pos);
+    quat_rotate(x, back, x);
+    for (int k = 0; k < 3; k++) m->half[k] = fmax(m->half[k], fabs(x[k]));
+    m->bound = fmax(m->bound, norm3(x));
+  }
+  if (!isfinite(m->volume) || !isfinite(m->bound) || !all_finite(m->moment, 3))
+    cav_spec_fail(spec, m->node, NULL, "numbers are too large: what follows from them is not finite");
+}
+
+static void load_mesh(cav_spec *spec, cav_spec_mesh *m) {
+  cav_triangles t = {0};
+  char reason[200] = "";
+  if (m->path) {
+    cav_status status = cav_mesh_read(m->path, &t, reason, sizeof reason);
+    if (status == CAV_NO_MEMORY)
+      cav_spec_no_memory(spec);
+    else if (status != CAV_OK)
+      cav_spec_fail(spec, m->node, NULL, "%.300s: %s", m->path, reason);
+  } else {
+    read_own_mesh(spec, m, &t);
+  }
+  if (spec->status == CAV_OK) transform_mesh(m, &t);
+  // points alone: their hull is the solid
+  if (spec->status == CAV_OK && !t.ntriangle) {
+    if (cav_hull_build(t.vertex, t.nvertex, &m->hull) != CAV_OK || !triangles_of_hull(&m->hull, &t))
+      cav_spec_no_memory(spec);
+    cav_hull_clear(&m->hull);
+  }
+  if (spec->status == CAV_OK) weigh_mesh(spec, m, &t);
+  if (spec->status == CAV_OK && cav_hull_build(t.vertex, t.nvertex, &m->hull) != CAV_OK) cav_spec_no_memory(spec);
+  cav_triangles_clear(&t);
+}
+
+// --- height fields ---
+
+static unsigned word_at(const unsigned char *p) {
+  return p[0] | (unsigned)p[1] << 8 | (unsigned)p[2] << 16 | (unsigned)p[3] << 24;
+}
+
+// rows, columns and heights of a file
+static void read_heights(cav_spec *spec, cav_spec_hfield *h) {
+  unsigned char head[8];
+  FILE *file = fopen(h->path, "rb");
+  if (!file) {
+    cav_spec_fail(spec, h->node, "file", "%.300s: cannot be opened; check the path", h->path);
+    return;
+  }
+  unsigned rows = 0, columns = 0;
+  if (fread(head, 1, 8, file) == 8) rows = word_at(head), columns = word_at(head + 4);
+  int sane = rows >= 2 && columns >= 2 && rows <= CAV_SPEC_GRID && columns <= CAV_SPEC_GRID;
+  size_t n = sane ? (size_t)rows * columns : 0;
+  unsigned char *bytes = malloc(4 * n + 1);
+  h->height = malloc(sizeof *h->height * (n + 1));
+  if (!bytes || !h->height) cav_spec_no_memory(spec);
+  if (!sane || (bytes && fread(bytes, 1, 4 * n + 1, file) != 4 * n))
+    cav_spec_fail(spec, h->node, "file",
+                  "%.300s: expected two 32-bit integers, rows and columns (2 to %d each), and that many 32-bit floats; "
+                  "images are not supported",
+                  h->path, CAV_SPEC_GRID);
+  for (size_t i = 0; i < n && spec->status == CAV_OK; i++) {
+    unsigned bits = word_at(bytes + 4 * i);
+    float x;
+    memcpy(&x, &bits, sizeof x);
+    h->height[i] = (double)x;
+    if (!isfinite(h->height[i])) cav_spec_fail(spec, h->node, "file", "a height is not finite");
+  }
+  h->nrow = (int)rows;
+  h->ncol = (int)columns;
+  free(bytes);
+  fclose(file);
+}
+
+static void load_hfield(cav_spec *spec, cav_spec_hfield *h) {
+  if (h->path) read_heights(spec, h);
+  size_t n = (size_t)h->nrow * (size_t)h->ncol;
+  if (!h->path) h->height = calloc(n, sizeof *h->height);
+  if (!h->height) cav_spec_no_memory(spec);
+  if (spec->status != CAV_OK) return;
+  // heights from 0 to 1 over the range of the file, times the height asked for
+  double low = INFINITY, high = -INFINITY;
+  for (size_t i = 0; i < n; i++) {
+    low = fmin(low, h->height[i]);
+    high = fmax(high, h->height[i]);
+  }
+  for (size_t i = 0; i < n; i++) h->height[i] = high > low ? (h->height[i] - low) / (high - low) * h->size[2] : 0;
+}
+
+// --- geoms ---
+
+// the geom at the mesh's own frame, with its mass
+static void place_on_mesh(cav_spec *spec, cav_spec_geom *g, const cav_spec_mesh *m) {
+  double turned[3];
+  quat_rotate(turned, g->quat, m->pos);
+  add3(g->pos, g->pos, turned);
+  quat_mul(g->quat, g->quat, m->quat);
+  copy3(g->size, m->half);
+  double mass = g->has_mass ? g->mass : g->density * m->volume;
+  g->inertia.mass = mass;
+  if (m->volume > 0) scale3(g->inertia.moment, mass / m->volume, m->moment);
+  if (m->volume == 0 && g->weighs)
+    cav_spec_fail(
+        spec, g->node, "mesh",
+        "the mesh has no volume: it cannot weigh by itself; give the body an inertial element, and the geom a "
+        "mass of 0");
+}
+
+void cav_spec_assets(cav_spec *spec) {
+  int meshes = 0, fields = 0;
+  for (int i = 0; i < spec->geom.n && spec->status == CAV_OK; i++) {
+    cav_spec_geom *g = &spec->geom.at[i];
+    if (g->type == CAV_GEOM_MESH) {
+      cav_spec_mesh *m = &spec->mesh.at[g->asset];
+      if (m->index < 0) {
+        m->index = meshes++;
+        load_mesh(spec, m);
+      }
+      if (spec->status == CAV_OK) place_on_mesh(spec, g, m);
+      g->bound = m->bound;
+      g->asset = m->index;
+    } else if (g->type == CAV_GEOM_HFIELD) {
+      cav_spec_hfield *h = &spec->hfield.at[g->asset];
+      if (h->index < 0) {
+        h->index = fields++;
+        load_hfield(spec, h);
+      }
+      copy3(g->size, h->size);
+      g->bound = hypot(hypot(h->size[0], h->size[1]), fmax(h->size[2], h->size[3]));
+      g->asset = h->index;
+    }
+  }
+}
+
+// --- into the model ---
+
+// position in a block; base NULL: only measures
+typedef struct carver {
+  char *base;
+  size_t used;
+} carver;
+
+static void *put(carver *c, const void *from, size_t size) {
+  size_t at = (c->used + 15) & ~(size_t)15;
+  c->used = at + size;
+  if (!c->base) return NULL;
+  if (size) memcpy(c->base + at, from, size);
+  return c->base + at;
+}
+
+static void put_mesh(carver *c, const cav_spec_mesh *m, cav_mesh *out) {
+  const cav_hull *h = &m->hull;
+  cav_mesh mesh = {.nvertex = h->nvertex, .nface = h->nface};
+  mesh.name = put(c, m->name, strlen(m->name) + 1);
+  mesh.vertex = put(c, h->vertex, sizeof *h->vertex * 3 * (size_t)h->nvertex);
+  mesh.plane = put(c, h->plane, sizeof *h->plane * 4 * (size_t)h->nface);
+  mesh.face = put(c, h->face, sizeof *h->face * ((size_t)h->nface + 1));
+  mesh.corner = put(c, h->corner, sizeof *h->corner * (size_t)h->ncorner);
+  mesh.neighbour_start = put(c, h->neighbour_start, sizeof *h->neighbour_start * ((size_t)h->nvertex + 1));
+  mesh.neighbour = put(c, h->neighbour, sizeof *h->neighbour * (size_t)h->nneighbour);
+  if (out) *out = mesh;
+}
+
+static void put_hfield(carver *c, const cav_spec_hfield *h, cav_hfield *out) {
+  cav_hfield field = {.nrow = h->nrow, .ncol = h->ncol, .size = {h->size[0], h->size[1]}};
+  field.top = h->size[2];
+  field.base = h->size[3];
+  field.name = put(c, h->name, strlen(h->name) + 1);
+  field.height = put(c, h->height, sizeof *h->height * (size_t)h->nrow * (size_t)h->ncol);
+  if (out) *out = field;
+}
+
+size_t cav_put_assets(const cav_spec *spec, void *base, cav_model *model) {
+  carver c = {base, 0};
+  int meshes = 0, fields = 0;
+  for (int i = 0; i < spec->mesh.n; i++) meshes += spec->mesh.at[i].index >= 0;
+  for (int i = 0; i < spec->hfield.n; i++) fields += spec->hfield.at[i].index >= 0;
+  c.used = sizeof(cav_mesh) * (size_t)meshes + sizeof(cav_hfield) * (size_t)fields;
+  cav_mesh *mesh = base;
+  cav_hfield *field = base ? (cav_hfield *)(mesh + meshes) : NULL;
+  for (int i = 0; i < spec->mesh.n; i++) {
+    const cav_spec_mesh *m = &spec->mesh.at[i];
+    if (m->index >= 0) put_mesh(&c, m, base ? &mesh[m->index] : NULL);
+  }
+  for (int i = 0; i < spec->hfield.n; i++) {
+    const cav_spec_hfield *h = &spec->hfield.at[i];
+    if (h->index >= 0) put_hfield(&c, h, base ? &field[h->index] : NULL);
+  }
+  model->nmesh = meshes;
+  model->nhfield = fields;
+  model->mesh = meshes ? mesh : NULL;
+  model->hfield = fields ? field : NULL;
+  return c.used;
+}
+
+void cav_clear_assets(cav_spec *spec) {
+  for (int i = 0; i < spec->mesh.n; i++) cav_hull_clear(&spec->mesh.at[i].hull);
+  for (int i = 0; i < spec->hfield.n; i++) free(spec->hfield.at[i].height);
+  free(spec->mesh.at);
+  free(spec->hfield.at);
+}

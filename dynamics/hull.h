@@ -1,0 +1,22 @@
+/// Convex hulls of points: what a mesh collides as. Private to dynamics/.
+#ifndef CAVORT_HULL_H
+#define CAVORT_HULL_H
+
+#include "cavort/model.h"
+
+/// A hull under construction or done; lists of malloc, let go by cav_hull_clear.
+typedef struct cav_hull {
+  int nvertex, nface, ncorner, nneighbour;
+  double *vertex; ///< [nvertex*3]
+  double *plane;  ///< [nface*4]
+  int *face;      ///< [nface+1]
+  int *corner;    ///< [ncorner]
+  int *neighbour_start, *neighbour;
+} cav_hull;
+
+/// Hull of points [n*3], finite. Points of no volume give a polygon with two faces, a segment or a single point without
+/// any. Faces that differ from a plane by less than 1e-6 of the size are one. CAV_OK or CAV_NO_MEMORY. hull.c.
+cav_status cav_hull_build(const double *point, int n, cav_hull *hull);
+void cav_hull_clear(cav_hull *hull);
+
+#endif

@@ -1,0 +1,34 @@
+/// Triangles of a mesh file and what they weigh. Private to dynamics/.
+#ifndef CAVORT_MESH_H
+#define CAVORT_MESH_H
+
+#include <stddef.h>
+
+#include "cavort/status.h"
+
+/// Triangles as read; lists of malloc, let go by cav_triangles_clear.
+typedef struct cav_triangles {
+  int nvertex, ntriangle;
+  double *vertex; ///< [nvertex*3]
+  int *triangle;  ///< [ntriangle*3] counterclockwise from outside
+} cav_triangles;
+
+/// Volume, its centre, and second moments of volume about the centre: xx yy zz xy xz yz of the inertia of density 1.
+typedef struct cav_bulk {
+  double volume, centre[3], inertia[6];
+} cav_bulk;
+
+/// Reads a file of triangles by its ending: .stl (binary or text) or .obj. On failure a reason, without the path, and
+/// CAV_BAD_INPUT or CAV_NO_MEMORY. mesh.c.
+cav_status cav_mesh_read(const char *path, cav_triangles *mesh, char *reason, size_t room);
+
+/// The same of bytes in memory: STL, OBJ. line: of the fault in a text, 0 otherwise. mesh.c.
+cav_status cav_mesh_read_stl(const char *bytes, size_t size, cav_triangles *mesh, char *reason, size_t room);
+cav_status cav_mesh_read_obj(const char *bytes, size_t size, cav_triangles *mesh, char *reason, size_t room);
+void cav_triangles_clear(cav_triangles *mesh);
+
+/// Bulk of the solid inside the triangles; exact 0: as the sum of pyramids from the middle of the surface to each triangle,
+/// none negative (MuJoCo's rule, larger where the surface is not convex); 1: signed, right for any closed surface. mesh.c.
+cav_bulk cav_mesh_bulk(const cav_triangles *mesh, int exact);
+
+#endif

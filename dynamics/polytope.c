@@ -1,0 +1,543 @@
+/// Contacts of convex polyhedra: a mesh, or a prism of a height field, with sphere, capsule, ellipsoid, cylinder, box, mesh.
+///
+/// gjk.c gives the direction in which the two bodies are furthest apart or least inside each other: to rounding for
+/// polyhedra; with an ellipsoid or a cylinder to about 1e-5, then made exact by the feature of the polyhedron that meets it:
+/// a corner (nearest surface point in closed form), an edge (lowest point of the surface distance along it, by bisection), a
+/// face, or the curved body's own cap or straight line; every one of these is a lower bound of the gap, so the largest wins.
+/// Where the direction is the normal of a face, the points of the other body over that face touch too, each with its own
+/// height: the opposite face cut to the prism above it, both ends of a segment, four points of a rim. At most 8: the
+/// deepest, then those furthest from the ones taken. Else one point, at the middle of what meets.
+/// Round edges (spheres, capsules) are the core grown by a radius, margins likewise: no case of their own.
+/// With an ellipsoid or a cylinder 1 in 100 deep overlaps keeps a direction that is not the best to 1e-9 of the size: its gap
+/// is a lower bound, its points lie off the surfaces by up to a few millimetres (test_mesh.c counts them); others are exact.
+/// Not done: choosing between two ways out of an overlap by history; a tie may jump.
+#include "gjk.h"
+#include "math3.h"
+#include "pairs.h"
+
+enum { CORNERS_MAX = 64, NEAR_MAX = 12 };
+// cosine beyond which the direction is a face's normal (1.4e-5 rad); share of the size within which corners meet
+static const double ON_NORMAL = 1 - 1e-10, MEETS = 1e-2;
+
+/// Corners of a face, an edge or a rim in the world, in order.
+typedef struct outline {
+  int n;
+  double x[CORNERS_MAX][3];
+} outline;
+
+typedef struct meeting {
+  const cav_shape *a, *b;
+  cav_core core_a, core_b;
+  double size, margin;
+  cav_apart apart;
+} meeting;
+
+static double size_of(const cav_shape *s) {
+  if (s->type == CAV_GEOM_SPHERE) return s->size[0];
+  if (s->type == CAV_GEOM_CAPSULE || s->type == CAV_GEOM_CYLINDER) return s->size[0] + s->size[1];
+  return s->size[0] + s->size[1] + s->size[2];
+}
+
+// --- curved bodies against a corner, an edge or a face ---
+
+static cav_surface *surface_of(const cav_shape *s) {
+  return s->type == CAV_GEOM_CYLINDER ? cav_surface_cylinder : cav_surface_ellipsoid;
+}
+
+// signed distance of a world point to a curved body and its outward normal in the world
+static double height_over(const cav_shape *s, const double y[3], double n[3]) {
+  double d[3], local[3], normal[3];
+  sub3(d, y, s->pos);
+  rotate_back(local, s->rotation, d);
+  double height = surface_of(s)(s->size, local, normal);
+  rotate(n, s->rotation, normal);
+  return height;
+}
+
+// keeps a direction if its true gap beats the best; y: the point of b that meets
+static void keep(const meeting *g, const double n[3], const double y[3], cav_apart *best) {
+  double back[3], x[3], far[3], d[3];
+  scale3(back, -1, n);
+  cav_core_support(&g->core_a, n, x);
+  cav_core_support(&g->core_b, back, far);
+  sub3(d, far, x);
+  double gap = dot3(d, n);
+  if (!(gap > best->gap)) return;
+  best->gap = gap;
+  copy3(best->n, n);
+  copy3(best->y, y);
+  axpy3(best->x, y, -gap, n);
+}
+
+// directions square to an edge: the gap is largest where its slope along the circle of these changes sign. Bracketed
+// about the direction known, then bisected
+static void try_edge(const meeting *g, const double p[3], const double q[3], cav_apart *best) {
+  enum { STEPS_MAX = 60 };
+  double e[3], u[3], w[3], n[3], x[3], y[3], d[3], low = -0.1, high = 0.1;
+  sub3(e, q, p);
+  normalise3(e);
+  axpy3(u, g->apart.n, -dot3(g->apart.n, e), e);
+  if (normalise3(u) < 0.5) return;
+  cross3(w, e, u);
+  for (int k = 0; k < STEPS_MAX; k++) {
+    double angle = (low + high) / 2, across[3];
+    scale3(n, cos(angle), u);
+    axpy3(n, n, sin(angle), w);
+    scale3(across, -sin(angle), u);
+    axpy3(across, across, cos(angle), w);
+    cav_core_support(&g->core_a, n, x);
+    sub3(d, p, x);
+    if (dot3(d, across) > 0)
+      low = angle;
+    else
+      high = angle;
+  }
+  // the point of the edge across from the other's
+  sub3(d, x, p);
+  double t = dot3(d, e), length;
+  sub3(y, q, p);
+  length = norm3(y);
+  axpy3(y, p, t < 0 ? 0 : t > length ? length : t, e);
+  keep(g, n, y, best);
+}
+
+// a straight line of a cylinder across an edge: their common normal
+static void try_crossing(const meeting *g, const double p[3], const double q[3], cav_apart *best) {
+  double axis[3], e[3], c[3], d[3], x[3];
+  if (g->a->type != CAV_GEOM_CYLINDER) return;
+  column3(axis, g->a->rotation, 2);
+  sub3(e, q, p);
+  cross3(c, axis, e);
+  double sine2 = dot3(c, c);
+  if (!(sine2 > 1e-16 * dot3(e, e))) return;
+  // parameter along the edge of its point nearest to the axis
+  sub3(d, p, g->a->pos);
+  cross3(x, d, axis);
+  double y[3], t = dot3(x, c) / sine2;
+  axpy3(y, p, t < 0 ? 0 : t > 1 ? 1 : t, e);
+  normalise3(c);
+  if (dot3(c, g->apart.n) < 0) scale3(c, -1, c);
+  keep(g, c, y, best);
+}
+
+static void corner_at(const cav_shape *s, int v, double x[3]) {
+  transform(x, s->pos, s->rotation, s->mesh->vertex + 3 * v);
+}
+
+// corners of b that meet the other body along n, to a share of the size: the lowest ones; their number
+static int near_corners(const meeting *g, int near[NEAR_MAX]) {
+  const cav_mesh *m = g->b->mesh;
+  double n[3], height[NEAR_MAX], lowest = INFINITY;
+  int count = 0;
+  rotate_back(n, g->b->rotation, g->apart.n);
+  for (int v = 0; v < m->nvertex; v++) lowest = fmin(lowest, dot3(n, m->vertex + 3 * v));
+  for (int v = 0; v < m->nvertex; v++) {
+    double h = dot3(n, m->vertex + 3 * v);
+    if (!(h < lowest + MEETS * g->size) || (count == NEAR_MAX && h >= height[NEAR_MAX - 1])) continue;
+    // sorted by height; the highest falls off the end
+    int k = count < NEAR_MAX ? count++ : NEAR_MAX - 1;
+    for (; k > 0 && height[k - 1] > h; k--) {
+      height[k] = height[k - 1];
+      near[k] = near[k - 1];
+    }
+    height[k] = h;
+    near[k] = v;
+  }
+  return count;
+}
+
+static int are_neighbours(const cav_mesh *m, int v, int w) {
+  for (int k = m->neighbour_start[v]; k < m->neighbour_start[v + 1]; k++) {
+    if (m->neighbour[k] == w) return 1;
+  }
+  return 0;
+}
+
+// the best of all features about the direction
+static cav_apart best_feature(const meeting *g) {
+  const cav_mesh *m = g->b->mesh;
+  int near[NEAR_MAX], count = near_corners(g, near);
+  cav_apart best = g->apart;
+  best.gap = -INFINITY;
+  double middle[3] = {0, 0, 0}, n[3];
+  for (int i = 0; i < count; i++) {
+    double p[3], q[3];
+    corner_at(g->b, near[i], p);
+    axpy3(middle, middle, 1.0 / count, p);
+    height_over(g->a, p, n);
+    keep(g, n, p, &best);
+    for (int j = 0; j < i; j++) {
+      if (!are_neighbours(m, near[i], near[j])) continue;
+      corner_at(g->b, near[j], q);
+      try_edge(g, p, q, &best);
+      try_crossing(g, p, q, &best);
+    }
+  }
+  for (int f = 0; f < m->nface; f++) {
+    rotate(n, g->b->rotation, m->plane + 4 * f);
+    scale3(n, -1, n);
+    if (dot3(n, g->apart.n) < 1 - MEETS) continue;
+    double x[3], y[3];
+    cav_core_support(&g->core_a, n, x);
+    double d[3];
+    sub3(d, middle, x);
+    axpy3(y, x, dot3(d, n), n);
+    keep(g, n, y, &best);
+  }
+  if (g->a->type == CAV_GEOM_CYLINDER) {
+    column3(n, g->a->rotation, 2);
+    if (dot3(n, g->apart.n) < 0) scale3(n, -1, n);
+    double y[3], back[3];
+    scale3(back, -1, n);
+    cav_support(g->b, back, y);
+    if (dot3(n, g->apart.n) > 1 - MEETS) keep(g, n, y, &best);
+  }
+  return best;
+}
+
+static void polish(meeting *g) {
+  enum { ROUNDS_MAX = 4 };
+  for (int round = 0; round < ROUNDS_MAX; round++) {
+    cav_apart best = best_feature(g);
+    double turned = dot3(best.n, g->apart.n), gain = best.gap - g->apart.gap;
+    // equal to rounding: the feature's is exact
+    if (!(gain > -1e-9 * g->size)) return;
+    g->apart = best;
+    if (turned > ON_NORMAL) return;
+  }
+}
+
+// --- faces ---
+
+static void push_corner(outline *o, const double x[3]) {
+  if (o->n < CORNERS_MAX) copy3(o->x[o->n++], x);
+}
+
+// corners of a face of a mesh; of very many every second, third, ...
+static void push_face(const cav_shape *s, int face, outline *o) {
+  const cav_mesh *m = s->mesh;
+  int first = m->face[face], corners = m->face[face + 1] - first, step = (corners + CORNERS_MAX - 1) / CORNERS_MAX;
+  for (int k = 0; k < corners; k += step) {
+    double x[3];
+    corner_at(s, m->corner[first + k], x);
+    push_corner(o, x);
+  }
+}
+
+// of the faces of a mesh at its furthest corner along a direction the one that looks most along it; the corner alone if
+// there is none
+static void lowest_face(const cav_shape *s, const double n[3], outline *o) {
+  const cav_mesh *m = s->mesh;
+  double local[3], top = -INFINITY, most = -1;
+  int face = -1, best = 0;
+  rotate_back(local, s->rotation, n);
+  for (int v = 0; v < m->nvertex; v++) {
+    double h = dot3(local, m->vertex + 3 * v);
+    if (h > top) top = h, best = v;
+  }
+  for (int f = 0; f < m->nface; f++) {
+    double c = dot3(m->plane + 4 * f, local);
+    if (c <= most) continue;
+    for (int k = m->face[f]; k < m->face[f + 1]; k++) {
+      if (m->corner[k] == best) most = c, face = f;
+    }
+  }
+  o->n = 0;
+  if (face >= 0) {
+    push_face(s, face, o);
+    return;
+  }
+  corner_at(s, best, o->x[0]);
+  o->n = 1;
+}
+
+// the face of a body that looks most along n: outline, normal out of it; returns the cosine, -1 where there is none.
+// A cylinder's cap has a normal but no outline
+static double face_along(const cav_shape *s, const double n[3], outline *o, double normal[3]) {
+  double most = -1, c;
+  o->n = 0;
+  if (s->type == CAV_GEOM_BOX) {
+    int face = 0;
+    for (int k = 0; k < 6; k++) {
+      double axis[3];
+      column3(axis, s->rotation, k / 2);
+      c = (k & 1 ? -1 : 1) * dot3(axis, n);
+      if (c > most) most = c, face = k;
+    }
+    int k0 = face / 2, k1 = (k0 + 1) % 3, k2 = (k0 + 2) % 3;
+    double sign = face & 1 ? -1 : 1, axis[3];
+    column3(axis, s->rotation, k0);
+    scale3(normal, sign, axis);
+    for (int i = 0; i < 4; i++) {
+      double local[3], x[3];
+      local[k0] = sign * s->size[k0];
+      local[k1] = sign * (i == 0 || i == 3 ? -1 : 1) * s->size[k1];
+      local[k2] = (i < 2 ? -1 : 1) * s->size[k2];
+      transform(x, s->pos, s->rotation, local);
+      push_corner(o, x);
+    }
+  } else if (s->type == CAV_GEOM_MESH) {
+    const cav_mesh *m = s->mesh;
+    int face = -1;
+    double local[3];
+    rotate_back(local, s->rotation, n);
+    for (int f = 0; f < m->nface; f++) {
+      c = dot3(m->plane + 4 * f, local);
+      if (c > most) most = c, face = f;
+    }
+    if (face < 0) return -1;
+    rotate(normal, s->rotation, m->plane + 4 * face);
+    push_face(s, face, o);
+  } else if (s->type == CAV_GEOM_CYLINDER) {
+    column3(normal, s->rotation, 2);
+    most = fabs(dot3(normal, n));
+    if (dot3(normal, n) < 0) scale3(normal, -1, normal);
+  }
+  return most;
+}
+
+// what of a body could lie on a face whose normal is m: a face, a segment, four points of a rim, or nothing
+static void lying_on(const cav_shape *s, const double m[3], outline *o) {
+  double back[3], normal[3], u[3], x[3];
+  scale3(back, -1, m);
+  o->n = 0;
+  if (s->type == CAV_GEOM_MESH) {
+    lowest_face(s, back, o);
+    return;
+  }
+  if (s->type == CAV_GEOM_BOX) {
+    face_along(s, back, o, normal);
+    return;
+  }
+  if (s->type != CAV_GEOM_CAPSULE && s->type != CAV_GEOM_CYLINDER) return;
+  column3(u, s->rotation, 2);
+  double along = dot3(u, back), radius = s->size[0], half = s->size[1], out[3];
+  // the direction across the axis that is lowest
+  axpy3(out, back, -along, u);
+  double slope = normalise3(out);
+  if (slope < 1e-9) column3(out, s->rotation, 0);
+  if (s->type == CAV_GEOM_CYLINDER && fabs(along) > 0.9) {
+    double w[3], cap[3];
+    cross3(w, u, out);
+    axpy3(cap, s->pos, along < 0 ? -half : half, u);
+    for (int k = 0; k < 4; k++) {
+      axpy3(x, cap, k & 1 ? 0 : (k ? -radius : radius), out);
+      axpy3(x, x, k & 1 ? (k > 1 ? -radius : radius) : 0, w);
+      push_corner(o, x);
+    }
+    return;
+  }
+  for (int end = 0; end < 2; end++) {
+    axpy3(x, s->pos, end ? half : -half, u);
+    // a capsule's round edge is lowest straight below its core, a cylinder's on its side
+    if (s->type == CAV_GEOM_CAPSULE)
+      axpy3(x, x, radius, back);
+    else
+      axpy3(x, x, radius, out);
+    push_corner(o, x);
+  }
+}
+
+// cuts away where direction . x > bound
+static void cut(outline *o, const double direction[3], double bound) {
+  outline kept = {.n = 0};
+  int closed = o->n > 2;
+  for (int k = 0; k < o->n; k++) {
+    const double *x = o->x[k], *y = o->x[(k + 1) % o->n];
+    double hx = dot3(direction, x) - bound, hy = dot3(direction, y) - bound;
+    if (hx <= 0) push_corner(&kept, x);
+    if ((hx <= 0) == (hy <= 0) || (!closed && k == o->n - 1)) continue;
+    double d[3], p[3];
+    sub3(d, y, x);
+    axpy3(p, x, hx / (hx - hy), d);
+    push_corner(&kept, p);
+  }
+  *o = kept;
+}
+
+// cuts to the prism over a face, or to the disk of a cylinder's cap by dropping what is outside
+static void cut_to_face(outline *o, const outline *face, const double normal[3], const cav_shape *ground) {
+  for (int k = 0; k < face->n && o->n; k++) {
+    double e[3], out[3];
+    sub3(e, face->x[(k + 1) % face->n], face->x[k]);
+    cross3(out, e, normal);
+    double length = normalise3(out);
+    if (length > 0) cut(o, out, dot3(out, face->x[k]) + 1e-12 * length);
+  }
+  if (face->n) return;
+  int kept = 0;
+  for (int k = 0; k < o->n; k++) {
+    double d[3];
+    sub3(d, o->x[k], ground->pos);
+    double along = dot3(d, normal), radius2 = dot3(d, d) - along * along;
+    if (radius2 <= ground->size[0] * ground->size[0]) copy3(o->x[kept++], o->x[k]);
+  }
+  o->n = kept;
+}
+
+// the deepest; of several as deep the one furthest from the middle of all, thus a corner
+static int first_kept(const cav_touch *touch, int n) {
+  double middle[3] = {0, 0, 0}, d[3], spread = 0, deepest = INFINITY, far = -1;
+  int best = 0;
+  for (int i = 0; i < n; i++) {
+    axpy3(middle, middle, 1.0 / n, touch[i].pos);
+    deepest = fmin(deepest, touch[i].dist);
+  }
+  for (int pass = 0; pass < 2; pass++) {
+    for (int i = 0; i < n; i++) {
+      sub3(d, touch[i].pos, middle);
+      double length = norm3(d);
+      if (pass == 0) spread = fmax(spread, length);
+      if (pass == 1 && touch[i].dist <= deepest + 1e-6 * spread && length > far) far = length, best = i;
+    }
+  }
+  return best;
+}
+
+// how much a contact adds to those taken: distance from the first; from the line of two; from that line on the side where
+// the third is not; then from the nearest
+static double worth(const cav_touch *touch, int taken, const cav_touch *t) {
+  double e[3], d[3], third[3], least = INFINITY;
+  sub3(e, touch[taken > 1].pos, touch[0].pos);
+  sub3(d, t->pos, touch[0].pos);
+  if (taken == 2 || taken == 3) {
+    double e2 = dot3(e, e);
+    if (e2 > 0) axpy3(d, d, -dot3(d, e) / e2, e);
+    if (taken == 2) return norm3(d);
+    sub3(third, touch[2].pos, touch[0].pos);
+    return -dot3(d, third);
+  }
+  for (int j = 0; j < taken; j++) {
+    sub3(d, t->pos, touch[j].pos);
+    least = fmin(least, dot3(d, d));
+  }
+  return least;
+}
+
+int cav_thin_out(cav_touch *touch, int n, int most) {
+  if (n <= most) return n;
+  for (int taken = 0; taken < most; taken++) {
+    int best = taken ? taken : first_kept(touch, n);
+    double far = -INFINITY;
+    for (int i = taken; i < n && taken; i++) {
+      double score = worth(touch, taken, &touch[i]);
+      if (score > far) far = score, best = i;
+    }
+    cav_touch swap = touch[taken];
+    touch[taken] = touch[best];
+    touch[best] = swap;
+  }
+  return most;
+}
+
+// points over a face that the direction stands square on; 0 if none
+static int touch_face(const meeting *g, cav_touch *touch) {
+  outline face_a, face_b, lying;
+  double normal_a[3], normal_b[3], back[3];
+  scale3(back, -1, g->apart.n);
+  double ca = face_along(g->a, g->apart.n, &face_a, normal_a), cb = face_along(g->b, back, &face_b, normal_b);
+  int on_b = cb >= ca - 1e-9;
+  if (fmax(ca, cb) < ON_NORMAL) return 0;
+  const cav_shape *ground = on_b ? g->b : g->a, *other = on_b ? g->a : g->b;
+  const double *m = on_b ? normal_b : normal_a;
+  const outline *face = on_b ? &face_b : &face_a;
+  double x[3];
+  cav_support(ground, m, x);
+  double top = dot3(m, x);
+  lying_on(other, m, &lying);
+  cut_to_face(&lying, face, m, ground);
+  cav_touch found[CORNERS_MAX];
+  int count = 0;
+  for (int k = 0; k < lying.n; k++) {
+    double height = dot3(m, lying.x[k]) - top;
+    if (!(height < g->margin)) continue;
+    cav_touch *t = &found[count++];
+    axpy3(t->pos, lying.x[k], -height / 2, m);
+    scale3(t->normal, on_b ? -1 : 1, m);
+    zero3(t->tangent);
+    t->dist = height;
+    t->feature = 1 + k;
+  }
+  count = cav_thin_out(found, count, CAV_TOUCH_MAX);
+  for (int k = 0; k < count; k++) touch[k] = found[k];
+  return count;
+}
+
+static int touch_single(const meeting *g, double dist, cav_touch *touch) {
+  double x[3], y[3];
+  axpy3(x, g->apart.x, g->core_a.radius, g->apart.n);
+  axpy3(y, g->apart.y, -g->core_b.radius, g->apart.n);
+  add3(touch->pos, x, y);
+  scale3(touch->pos, 0.5, touch->pos);
+  copy3(touch->normal, g->apart.n);
+  zero3(touch->tangent);
+  touch->dist = dist;
+  touch->feature = 0;
+  return 1;
+}
+
+static int meet(meeting *g, cav_touch *touch) {
+  if (g->a->type == CAV_GEOM_ELLIPSOID || g->a->type == CAV_GEOM_CYLINDER) polish(g);
+  double dist = g->apart.gap - g->core_a.radius - g->core_b.radius;
+  if (!(dist < g->margin)) return 0;
+  int count = touch_face(g, touch);
+  double lowest = INFINITY;
+  for (int k = 0; k < count; k++) lowest = fmin(lowest, touch[k].dist);
+  // a face whose points all stand higher than what was found is not what meets: a rim, a slope
+  if (count && lowest < dist + 1e-6 * g->size) return count;
+  cav_touch last;
+  touch_single(g, dist, &last);
+  if (count == CAV_TOUCH_MAX) count--;
+  touch[count] = last;
+  return count + 1;
+}
+
+int cav_points_over(const cav_shape *s, double corner[3][3], const double normal[3], double point[][3]) {
+  outline face = {.n = 3}, lying;
+  double back[3];
+  for (int k = 0; k < 3; k++) copy3(face.x[k], corner[k]);
+  lying_on(s, normal, &lying);
+  if (!lying.n) {
+    // a sphere or an ellipsoid: its lowest point
+    scale3(back, -1, normal);
+    cav_support(s, back, lying.x[0]);
+    lying.n = 1;
+  }
+  cut_to_face(&lying, &face, normal, NULL);
+  int count = lying.n < CAV_LYING_MAX ? lying.n : CAV_LYING_MAX;
+  for (int k = 0; k < count; k++) copy3(point[k], lying.x[k]);
+  return count;
+}
+
+int cav_collide_polytope(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
+  meeting g = {.a = a, .b = b, .core_a = cav_core_of(a), .core_b = cav_core_of(b), .margin = margin};
+  g.size = fmax(size_of(a), size_of(b));
+  double most = margin + g.core_a.radius + g.core_b.radius;
+  if (!cav_find_apart(&g.core_a, &g.core_b, g.size, most, &g.apart)) return 0;
+  return meet(&g, touch);
+}
+
+int cav_collide_plane_mesh(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
+  enum { FOUND_MAX = 128 };
+  const cav_mesh *m = b->mesh;
+  cav_touch found[FOUND_MAX];
+  double n[3], local[3], d[3];
+  int count = 0;
+  column3(n, a->rotation, 2);
+  rotate_back(local, b->rotation, n);
+  sub3(d, b->pos, a->pos);
+  double base = dot3(d, n);
+  for (int v = 0; v < m->nvertex; v++) {
+    double height = base + dot3(local, m->vertex + 3 * v), x[3];
+    if (!(height < margin)) continue;
+    cav_touch t = {.dist = height, .feature = v};
+    corner_at(b, v, x);
+    axpy3(t.pos, x, -height / 2, n);
+    copy3(t.normal, n);
+    if (count == FOUND_MAX) count = cav_thin_out(found, count, FOUND_MAX / 2);
+    found[count++] = t;
+  }
+  count = cav_thin_out(found, count, CAV_TOUCH_MAX);
+  for (int k = 0; k < count; k++) touch[k] = found[k];
+  return count;
+}
