@@ -10,7 +10,7 @@ build=${CAVORT_BUILD:-build}
 out=tests/results
 [ -d "$build" ] || meson setup "$build" .
 
-# a build before spatial tendons, equality constraints, meshes, fluids and further sensors and actuators were there
+# a build before spatial tendons, equality constraints, fluids and further sensors and actuators were there
 before=a83d729
 
 provenance() {
@@ -45,7 +45,7 @@ absent() {
   done >"$old/times"
   {
     provenance "sh tests/results.sh absent"
-    echo "Inverse of problems/humanoid.xml, which has no tendon, equality constraint, mesh, height field, fluid or sensor: us,"
+    echo "Inverse of problems/humanoid.xml, which has no tendon, equality constraint, fluid or sensor: us,"
     echo "least and median of nine runs by turns, of this build and of one before all of those were there ($before)."
     echo
     echo "rows from   before: least, median   now: least, median   ratio of the least"
