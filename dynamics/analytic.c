@@ -423,16 +423,6 @@ static void add_diagonals(const task *t) {
   }
 }
 
-// inverse of the right Jacobian of rotations at w, row-major: 1 + [w]/2 + c [w]^2
-static void turn_inverse(const double w[3], double J[9]) {
-  double a2 = dot3(w, w), a = sqrt(a2);
-  double c = a < 1e-3 ? 1.0 / 12 + a2 / 720 : 1 / a2 - (1 + cos(a)) / (2 * a * sin(a));
-  double skew[9] = {0, -w[2], w[1], w[2], 0, -w[0], -w[1], w[0], 0};
-  for (int i = 0; i < 3; i++) {
-    for (int j = 0; j < 3; j++) { J[3 * i + j] = (i == j) + 0.5 * skew[3 * i + j] + c * (w[i] * w[j] - (i == j) * a2); }
-  }
-}
-
 // du/dq of the spring of three rotations
 static void add_turning_spring(const task *t, int dof, double stiffness, const double *q, const double *rest) {
   double from[4], between[4], w[3], J[9];
@@ -577,6 +567,9 @@ const char *cav_derivatives_missing(const cav_model *model) {
   if (model->density > 0 || model->viscosity > 0) return "forces of a medium";
   for (int i = 0; i < model->nbody; i++) {
     if (model->body[i].buoyancy != 0) return "gravity compensation";
+  }
+  for (int i = 0; i < model->njoint; i++) {
+    if (model->joint[i].twist_limited || model->joint[i].swing_limited) return "twist and swing limits of ball joints";
   }
   for (int i = 0; i < model->ntendon; i++) {
     const cav_tendon *tendon = &model->tendon[i];

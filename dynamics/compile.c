@@ -362,6 +362,26 @@ static int joint_limits(cav_spec *spec, const cav_spec_joint *s) {
   return holds && spec->option.limit;
 }
 
+// the cylinder of a ball joint, an attribute of our own: within what a rotation vector can be
+static void fill_cylinder(builder *b, const cav_spec_joint *s, cav_joint *j) {
+  cav_spec *spec = b->spec;
+  if (!s->has_twist && !s->has_swing) return;
+  const char *attribute = s->has_twist ? "twistrange" : "swingrange";
+  // a class may say it of all its joints
+  if (s->type != CAV_JOINT_BALL) {
+    if (cav_xml_get(s->node, attribute)) cav_spec_fail(spec, s->node, attribute, "only for ball joints; give range");
+    return;
+  }
+  if (s->has_twist && !(s->twist[0] < s->twist[1] && s->twist[0] >= -M_PI && s->twist[1] <= M_PI))
+    cav_spec_fail(spec, s->node, "twistrange", "expected lower < upper within half a turn either way");
+  if (s->has_swing && !(s->swing > 0 && s->swing <= M_PI))
+    cav_spec_fail(spec, s->node, "swingrange", "expected an angle > 0 up to half a turn");
+  j->twist_limited = s->has_twist && spec->option.limit;
+  j->swing_limited = s->has_swing && spec->option.limit;
+  memcpy(j->twist, s->twist, sizeof j->twist);
+  j->swing = s->swing;
+}
+
 static void fill_joint(builder *b, int i, int q, int dof) {
   cav_spec *spec = b->spec;
   const cav_spec_joint *s = &spec->joint.at[i];
@@ -379,10 +399,13 @@ static void fill_joint(builder *b, int i, int q, int dof) {
   memcpy(j->range, s->range, sizeof j->range);
   set3(j->axis, 0, 0, 1);
   if (s->type != CAV_JOINT_FREE) copy3(j->pos, s->pos);
-  if (is_scalar(s->type)) {
+  fill_cylinder(b, s, j);
+  if (is_scalar(s->type) || j->twist_limited || j->swing_limited) {
     copy3(j->axis, s->axis);
     if (!(normalise3(j->axis) > 1e-14))
       cav_spec_fail(spec, s->node, "axis", "expected a direction, got %g %g %g", s->axis[0], s->axis[1], s->axis[2]);
+  }
+  if (is_scalar(s->type)) {
     j->ref = s->ref;
     j->springref = s->springref;
   }

@@ -173,6 +173,38 @@ static cav_status limit_scalar(cav_state *state, cav_row row, double value, cons
   return status;
 }
 
+// one side of a ball's cylinder, whose distance grows along n in the rotation vector that J moves
+static cav_status limit_turn(cav_state *state, cav_row row, int side, double dist, const double n[3], const double J[9],
+                             const cav_joint *joint, double weight, double reach) {
+  if (!(dist < reach)) { return CAV_OK; }
+  row.side = side;
+  row.dist = dist;
+  rotate_back(row.axis, J, n);
+  return add_row(state, row, &joint->limit, weight);
+}
+
+// twist range and swing radius of a ball joint
+static cav_status limit_cylinder(cav_state *state, cav_row row, const cav_joint *joint, double weight, double reach) {
+  double w[3], J[9], n[3], away[3];
+  quat_log(w, state->work->q + joint->q);
+  turn_inverse(w, J);
+  double twist = dot3(w, joint->axis);
+  cav_status status = CAV_OK;
+  if (joint->twist_limited) {
+    scale3(n, -1, joint->axis);
+    status = limit_turn(state, row, 2, twist - joint->twist[0], joint->axis, J, joint, weight, reach);
+    if (!status) { status = limit_turn(state, row, 3, joint->twist[1] - twist, n, J, joint, weight, reach); }
+  }
+  if (joint->swing_limited && !status) {
+    axpy3(away, w, -twist, joint->axis);
+    double swing = norm3(away);
+    // without swing no direction leads to the limit more than another
+    scale3(n, swing > 0 ? -1 / swing : 0, away);
+    status = limit_turn(state, row, 4, joint->swing - swing, n, J, joint, weight, reach);
+  }
+  return status;
+}
+
 // largest rotation angle of a ball joint
 static cav_status limit_ball(cav_state *state, cav_row row, const cav_joint *joint, double weight, double reach) {
   double turn[3];
@@ -192,7 +224,8 @@ static cav_status add_limits(const cav_model *model, cav_state *state) {
     double weight = model->dof[joint->dof].inverse_weight, reach = cav_limit_reach(state, joint->margin);
     cav_row row = {.type = CAV_ROW_LIMIT_JOINT, .object = k, .margin = joint->margin};
     if (joint->type == CAV_JOINT_BALL) {
-      status = limit_ball(state, row, joint, weight, reach);
+      if (joint->limited) { status = limit_ball(state, row, joint, weight, reach); }
+      if (!status) { status = limit_cylinder(state, row, joint, weight, reach); }
     } else {
       status = limit_scalar(state, row, w->q[joint->q], joint->range, &joint->limit, weight, reach);
     }

@@ -237,14 +237,15 @@ static cav_status solve_convex(newton *s, double tolerance) {
   return CAV_OK;
 }
 
-// largest error of the generalised force that rounding causes: of x through stiff constraints, and of the largest
-// forces
+// largest error of the generalised force that rounding causes: of x through inertia and stiff constraints, and of the
+// largest forces
 static double rounding(newton *s) {
   const cav_impulse *p = &s->problem;
   double *error = s->gradient;
   cav_impulse_rows(p, s->x, s->y);
   laws(s, s->y, s->f, s->curvature, 0);
-  memset(error, 0, (size_t)p->nv * sizeof *error);
+  cav_impulse_inertia(p, s->x, error);
+  for (int i = 0; i < p->nv; i++) error[i] = fabs(error[i]);
   for (int b = 0; b < p->nblock; b++) {
     const cav_block *block = &p->block[b];
     const double *H = s->curvature + BLOCK * b;

@@ -161,6 +161,9 @@ static void read_joint_values(cav_spec *spec, const cav_xml_node *node, cav_spec
   cav_xml_reals(node, "springdamper", j->springdamper, 2);
   cav_xml_reals(node, "range", j->range, 2);
   read_limited(node, "limited", &j->limited);
+  if (cav_xml_reals(node, "twistrange", j->twist, 2)) j->has_twist = 1;
+  if (cav_xml_get(node, "swingrange")) j->has_swing = 1;
+  read_real(node, "swingrange", &j->swing);
   read_softness(node, "solreflimit", "solimplimit", &j->limit);
   read_softness(node, "solreffriction", "solimpfriction", &j->friction);
   read_real(node, "stiffness", &j->stiffness);
@@ -392,6 +395,9 @@ static void read_joint(reader *r, const cav_xml_node *node, const place *at) {
   j->range[1] *= unit;
   j->ref *= unit;
   j->springref *= unit;
+  j->twist[0] *= unit;
+  j->twist[1] *= unit;
+  j->swing *= unit;
   spec->body.at[at->body].njoint++;
 }
 

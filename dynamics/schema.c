@@ -51,11 +51,12 @@ static const char *const biastypes[] = {"none", "affine", "muscle", "user", NULL
 #define ORIENTATION \
   REALS("quat", 4, 4), REALS("axisangle", 4, 4), REALS("xyaxes", 6, 6), REALS("zaxis", 3, 3), REALS("euler", 3, 3)
 
-#define JOINT                                                                                                        \
-  WORD("type", joints), SKIP("group"), REALS("pos", 3, 3), REALS("axis", 3, 3), REALS("springdamper", 2, 2),         \
-      WORD("limited", truth), REALS("solreflimit", 1, 2), REALS("solimplimit", 1, 5), REALS("solreffriction", 1, 2), \
-      REALS("solimpfriction", 1, 5), REAL("stiffness"), REALS("range", 2, 2), REAL("margin"), REAL("ref"),           \
-      REAL("springref"), REAL("armature"), REAL("damping"), REAL("frictionloss"), SKIP("user")
+#define JOINT                                                                                                      \
+  WORD("type", joints), SKIP("group"), REALS("pos", 3, 3), REALS("axis", 3, 3), REALS("springdamper", 2, 2),       \
+      WORD("limited", truth), REALS("twistrange", 2, 2), REAL("swingrange"), REALS("solreflimit", 1, 2),           \
+      REALS("solimplimit", 1, 5), REALS("solreffriction", 1, 2), REALS("solimpfriction", 1, 5), REAL("stiffness"), \
+      REALS("range", 2, 2), REAL("margin"), REAL("ref"), REAL("springref"), REAL("armature"), REAL("damping"),     \
+      REAL("frictionloss"), SKIP("user")
 
 #define GEOM                                                                                                        \
   WORD("type", geoms), REALS("pos", 3, 3), ORIENTATION, INT("contype"), INT("conaffinity"), INT("condim"),          \

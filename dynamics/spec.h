@@ -38,6 +38,8 @@ typedef struct cav_spec_joint {
   cav_joint_type type;
   double pos[3], axis[3], ref, springref, range[2], margin;
   cav_limited limited;
+  double twist[2], swing; ///< ball: the cylinder, where has_twist and has_swing
+  int has_twist, has_swing;
   cav_softness limit, friction;
   double stiffness, damping, armature, frictionloss, springdamper[2];
 } cav_spec_joint;

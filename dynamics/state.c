@@ -42,11 +42,15 @@ typedef struct census {
   size_t springs, limits, frictions, gears;
 } census;
 
+static int is_limited(const cav_joint *joint) {
+  return joint->type != CAV_JOINT_FREE && (joint->limited || joint->twist_limited || joint->swing_limited);
+}
+
 static census count(const cav_model *model) {
   census c = {0};
   for (int i = 0; i < model->njoint; i++) {
     c.springs += model->joint[i].stiffness != 0;
-    c.limits += model->joint[i].limited && model->joint[i].type != CAV_JOINT_FREE;
+    c.limits += is_limited(&model->joint[i]);
   }
   for (int i = 0; i < model->nv; i++) { c.frictions += model->dof[i].frictionloss > 0; }
   for (int k = 0; k < model->nactuator; k++) { c.gears += (size_t)cav_transmission_dofs(model, k, NULL); }
@@ -183,7 +187,7 @@ static void compile_frames(const cav_model *model, cav_workspace *w) {
 static void compile_lists(const cav_model *model, cav_workspace *w) {
   for (int i = 0; i < model->njoint; i++) {
     if (model->joint[i].stiffness != 0) { w->spring[w->nspring++] = i; }
-    if (model->joint[i].limited && model->joint[i].type != CAV_JOINT_FREE) { w->limit[w->nlimit++] = i; }
+    if (is_limited(&model->joint[i])) { w->limit[w->nlimit++] = i; }
   }
   w->nbuoy = (int)count_buoys(model, w->buoy);
   for (int i = 0; i < model->ntendon; i++) {

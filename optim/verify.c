@@ -229,6 +229,13 @@ static void note_ranges(const cav_audit *audit, int t, cav_finding *finding) {
     }
     cav_finding_note(finding, beyond, t, "range of %.60s, in rad or m", joint_name(model, j, name));
   }
+  // twist and swing of ball joints are rows where they are violated
+  for (int i = 0; i < audit->state->nrow; i++) {
+    const cav_row *row = audit->state->row + i;
+    if (row->type != CAV_ROW_LIMIT_JOINT || row->side < 2) continue;
+    cav_finding_note(finding, -row->dist, t, "%s of %.60s, in rad", row->side < 4 ? "twist" : "swing",
+                     joint_name(model, row->object, name));
+  }
   for (int i = 0; i < model->ntendon; i++) {
     const cav_tendon *tendon = model->tendon + i;
     if (!tendon->limited) continue;

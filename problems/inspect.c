@@ -50,6 +50,8 @@ static void print_joint(const cav_joint *joint) {
   double scale = joint->type == CAV_JOINT_SLIDE ? 1 : 180 / M_PI;
   printf("%s %s", joint->name[0] ? joint->name : "(no name)", joint_name[joint->type]);
   if (joint->limited && joint->type == CAV_JOINT_BALL) printf(" up to %.3g deg", scale * joint->range[1]);
+  if (joint->twist_limited) printf(" twist %.3g..%.3g deg", scale * joint->twist[0], scale * joint->twist[1]);
+  if (joint->swing_limited) printf(" swing up to %.3g deg", scale * joint->swing);
   if (joint->limited && joint->type != CAV_JOINT_BALL) {
     printf(" %.3g..%.3g %s", scale * joint->range[0], scale * joint->range[1],
            joint->type == CAV_JOINT_SLIDE ? "m" : "deg");
@@ -86,7 +88,7 @@ static void count_joints(const cav_model *m, census *c) {
   for (int j = 0; j < m->njoint; j++) {
     c->quaternion += m->joint[j].type == CAV_JOINT_FREE || m->joint[j].type == CAV_JOINT_BALL;
     c->spring += m->joint[j].stiffness != 0;
-    c->joint_limit += m->joint[j].limited && m->joint[j].type != CAV_JOINT_FREE;
+    c->joint_limit += m->joint[j].limited || m->joint[j].twist_limited || m->joint[j].swing_limited;
   }
   for (int d = 0; d < m->nv; d++) {
     c->damper += m->dof[d].damping != 0;

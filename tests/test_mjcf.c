@@ -98,6 +98,8 @@ static const struct {
     {"global", 2, "global coordinates"},
     {"override", 3, "override is not supported"},
     {"fluid", 2, "expected a number >= 0"},
+    {"twist_hinge", 4, "only for ball joints"},
+    {"swing", 4, "expected an angle > 0"},
     {"equality", 9, "anchor"},
     {"equality_name", 9, "no body is named 'd'"},
     {"equality_free", 9, "free or ball joint"},

@@ -1,5 +1,6 @@
 /// Stabilisation, predicted against measured (Todorov 2014, section V): depth at rest, decay of sliding, critical damping
-/// by the diagonal and by coupled rows, convergence of soft to hard equality constraints. Prints the tables of
+/// by the diagonal and by coupled rows, convergence of soft to hard equality constraints, ODE's parameters; limits of twist,
+/// swing and distance. Prints the tables of
 /// results/stabilisation.md.
 #include "scene.h"
 
@@ -328,10 +329,166 @@ static void test_hard(void) {
   CHECK(held < 1e-10);
 }
 
+// --- ODE's parameters ---
+
+// one mass between a wall and a spring row: ODE's step in closed form, m (v' - v) = h F, v' = -(ERP/h) x - CFM F
+static void test_ode(void) {
+  static const char text[] =
+      "<mujoco><option timestep='.01' gravity='0 0 0'/><worldbody><body><joint name='x' type='slide' axis='1 0 0'/>"
+      "<geom size='.1' mass='2'/></body></worldbody><equality><joint joint1='x' solref='-1 -1' solimp='.9 .9 .001'/>"
+      "</equality></mujoco>";
+  bench b;
+  if (!bench_open(&b, text)) return;
+  const double mass = 2, h = 0.01, cfms[] = {1e-4, 1e-2}, erps[] = {0.1, 0.8, 1};
+  cav_equality *row = (cav_equality *)b.model->equality;
+  double worst = 0;
+  for (int c = 0; c < 2; c++) {
+    for (int e = 0; e < 3; e++) {
+      double cfm = cfms[c], erp = erps[e], x = 0.1, v = 0.7;
+      CHECK(cav_softness_from_ode(cfm, erp, h, row->weight, &row->softness) == CAV_OK);
+      b.q[0] = x;
+      b.v[0] = v;
+      for (int i = 0; i < 20; i++) {
+        double F = -(v + erp / h * x) / (cfm + h / mass);
+        v += h * F / mass;
+        x += h * v;
+        step(&b);
+        worst = fmax(worst, fmax(fabs(b.v[0] - v), fabs(b.q[0] - x) / h));
+      }
+    }
+  }
+  printf("ODE's rows: CFM and ERP converted, largest difference of v over 20 steps %.1e m/s\n", worst);
+  // bound: rounding of velocities about 10 m/s; seen 2e-15
+  CHECK(worst < 1e-12);
+
+  // the other way: ODE's step with what the row amounts to follows it, where the row's own mass 1/R is 1e-4 of the body's
+  double cfm, erp, apart[2];
+  for (int fine = 0; fine < 2; fine++) {
+    double step_size = fine ? 1e-4 : 1e-3, x = 0.1, v = 0;
+    row->softness = (cav_softness){{-300, -20}, {1e-4, 1e-4, 0.001, 0.5, 2}};
+    b.state->options.timestep = step_size;
+    CHECK(cav_softness_to_ode(b.state, &row->softness, row->weight, &cfm, &erp) == CAV_OK);
+    b.q[0] = x;
+    b.v[0] = apart[fine] = 0;
+    for (double t = 0; t < 0.2; t += step_size) {
+      v += step_size / mass * -(v + erp / step_size * x) / (cfm + step_size / mass);
+      x += step_size * v;
+      step(&b);
+      apart[fine] = fmax(apart[fine], fabs(b.q[0] - x));
+    }
+  }
+  printf("and back: largest difference of x over 0.2 s %.1e m at 1 ms, %.1e m at 0.1 ms\n", apart[0], apart[1]);
+  // first order in the step; what is left is the mass
+  CHECK(apart[0] < 2e-3 && apart[0] / apart[1] > 7 && apart[0] / apart[1] < 13);
+  CHECK(cav_softness_from_ode(0, 0.5, h, 1, &row->softness) == CAV_BAD_INPUT);
+  CHECK(cav_softness_from_ode(1e9, 0.5, h, 1, &row->softness) == CAV_BAD_INPUT);
+  bench_close(&b);
+}
+
+// --- twist and swing ---
+
+static const char shoulder[] =
+    "<mujoco><compiler angle='degree'/><option timestep='.002' gravity='0 0 0'/><default><joint solreflimit='.02 "
+    "1'/></default>"
+    "<worldbody><body><joint name='ball' type='ball' axis='1 1 0' twistrange='-20 35' swingrange='50'/>"
+    "<geom type='capsule' size='.05' fromto='0 0 0 .3 .1 .2'/></body></worldbody></mujoco>";
+
+// rows of the cylinder: distances and their rates by differences; pushed hard, the joint stays inside
+static void test_cylinder(void) {
+  bench b;
+  if (!bench_open(&b, shoulder)) return;
+  const double reach = 1e3, degree = M_PI / 180;
+  double worst = 0;
+  int seen[5] = {0};
+  // all rows at any posture: the reach of the smoothed law
+  b.state->options.smoothing = b.state->options.smoothing_self = reach;
+  for (int trial = 0; trial < 200; trial++) {
+    double w[3], e = 1e-6, plus[5] = {0}, minus[5] = {0};
+    scene_normals(w, 3, 0.6);
+    memcpy(b.q, b.model->q0, 4 * sizeof *b.q);
+    cav_integrate(b.model, b.q, w, 1, b.q);
+    scene_normals(b.v, 3, 1);
+    for (int side = 0; side < 2; side++) {
+      double *out = side ? minus : plus;
+      cav_integrate(b.model, b.q, b.v, side ? -e : e, b.next);
+      CHECK(cav_position(b.model, b.state, b.next) == CAV_OK);
+      for (int i = 0; i < b.state->nrow; i++) out[b.state->row[i].side] = b.state->row[i].dist;
+    }
+    CHECK(cav_inverse(b.model, b.state, b.q, b.v, b.v, b.u) == CAV_OK);
+    CHECK(b.state->nrow == 3);
+    for (int i = 0; i < b.state->nrow; i++) {
+      const cav_row *row = &b.state->row[i];
+      seen[row->side]++;
+      worst = fmax(worst, fabs((plus[row->side] - minus[row->side]) / (2 * e) - row->velocity));
+      // what the rotation vector says
+      double length = scene_norm(w, 3), axis[3] = {sqrt(0.5), sqrt(0.5), 0};
+      if (length > 3) continue;
+      double twist = w[0] * axis[0] + w[1] * axis[1], swing = sqrt(fmax(0, length * length - twist * twist));
+      double expected = row->side == 2   ? twist + 20 * degree
+                        : row->side == 3 ? 35 * degree - twist
+                                         : 50 * degree - swing;
+      CHECK_NEAR(row->dist, expected, 1e-12);
+    }
+  }
+  CHECK(seen[2] == 200 && seen[3] == 200 && seen[4] == 200);
+  printf("twist and swing: rate of the distances against the rows %.1e\n", worst);
+  // bound: rounding over the step; seen 3e-10
+  CHECK(worst < 1e-7);
+
+  // a constant torque of 3 N m pushes it in every direction: it ends at the limits, not far beyond
+  b.state->options = b.model->options;
+  b.state->options.timestep = b.model->timestep;
+  double beyond = 0;
+  for (int trial = 0; trial < 12; trial++) {
+    cav_configuration_reset(b.model, b.q);
+    memset(b.v, 0, 3 * sizeof *b.v);
+    for (int k = 0; k < 3; k++) b.u[k] = 3 * cos(trial + 2 * k);
+    for (int i = 0; i < 1500; i++) {
+      // damped, so that it comes to rest
+      for (int k = 0; k < 3; k++) b.u[k] = 3 * cos(trial + 2 * k) - 0.5 * b.v[k];
+      step(&b);
+    }
+    CHECK(cav_position(b.model, b.state, b.q) == CAV_OK);
+    CHECK(b.state->nrow > 0);
+    for (int i = 0; i < b.state->nrow; i++) beyond = fmax(beyond, -b.state->row[i].dist);
+  }
+  printf("pushed by 3 N m: %.2g deg beyond its limits\n", beyond / degree);
+  CHECK(beyond > 0 && beyond < 3 * degree);
+  bench_close(&b);
+}
+
+// --- distances ---
+
+// a frictionless pair with a margin keeps two geoms apart: the limit of a distance
+static void test_distance(void) {
+  static const char text[] =
+      "<mujoco><option timestep='.002'/><worldbody><body pos='0 0 .6'><freejoint/><geom name='a' size='.1' contype='0' "
+      "conaffinity='0' mass='1'/></body><geom name='b' type='capsule' size='.1' fromto='-1 0 0 1 0 0' contype='0' "
+      "conaffinity='0'/></worldbody><contact><pair geom1='a' geom2='b' condim='1' margin='.3' solref='.02 1' "
+      "solimp='.99 .99 .001'/></contact></mujoco>";
+  bench b;
+  if (!bench_open(&b, text)) return;
+  for (int i = 0; i < 2000; i++) step(&b);
+  CHECK(cav_position(b.model, b.state, b.q) == CAV_OK);
+  if (CHECK(b.state->ncontact == 1)) {
+    const cav_contact *c = &b.state->contact[0];
+    double epsilon = 1 / 0.99 - 1, deep = epsilon * 0.02 * 0.02 * 9.81 / (1 + epsilon);
+    CHECK(c->dim == 1);
+    // it rests at the margin, less the depth at rest; bound: what is left of the fall after 4 s, seen 3e-16
+    CHECK_NEAR(c->dist, 0.3 - deep, 1e-10);
+    printf("limit of a distance: rests %.3g m from 0.3 m, predicted %.3g m\n", 0.3 - c->dist, deep);
+  }
+  bench_close(&b);
+}
+
 int main(void) {
   test_depth();
   test_decay();
   test_critical();
   test_hard();
+  printf("\n## Other rows\n\n");
+  test_ode();
+  test_cylinder();
+  test_distance();
   return check_result();
 }

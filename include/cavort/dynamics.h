@@ -40,7 +40,7 @@ typedef enum cav_row_type {
 typedef struct cav_row {
   cav_row_type type;
   int object;  ///< joint, tendon or dof
-  int side;    ///< limits: 0 lower, 1 upper
+  int side;    ///< limits: 0 lower, 1 upper; of a ball's cylinder 2 lower and 3 upper twist, 4 swing
   double dist; ///< limits: distance to the limit, negative: violated
   double margin;
   double axis[3]; ///< gradient of dist: 1 value for scalar objects (+1 or -1), 3 for a ball joint
@@ -256,6 +256,17 @@ int cav_actuator_input(const cav_model *model, int actuator, double length, doub
 /// Range of effort that an actuator's limits leave whatever its length and velocity are; infinite where they do not bound
 /// it. The limits of a servo's control bound no effort of their own.
 void cav_actuator_effort_range(const cav_model *model, int actuator, double range[2]);
+
+/// Softness of a row that acts as ODE's with that CFM (m/(N s), or rad/(N m s)) and ERP at that time step: J v_next =
+/// -(ERP/h) x - CFM F, exactly. weight is the diagonal of A that the row's R is scaled with (cav_pair.weight[0],
+/// cav_dof.inverse_weight, cav_tendon.inverse_weight, cav_equality.weight). CAV_BAD_INPUT if CFM is not between 1e-4 h and
+/// 1e4 h times the weight, where no impedance is used: softness is then untouched. Methods in softness.c.
+cav_status cav_softness_from_ode(double cfm, double erp, double timestep, double weight, cav_softness *softness);
+
+/// CFM and ERP of the spring and damper that a row amounts to under the state's options: alike where the step is short and
+/// inertia matters little, as a row also has a mass 1/R. CAV_BAD_INPUT if it has neither.
+cav_status cav_softness_to_ode(const cav_state *state, const cav_softness *softness, double weight, double *cfm,
+                               double *erp);
 
 #ifdef __cplusplus
 }

@@ -174,11 +174,15 @@ typedef struct cav_joint {
   int body, link;
   int q, dof;      ///< first index into q and into v
   double pos[3];   ///< anchor in the link frame
-  double axis[3];  ///< unit, link frame (hinge, slide)
+  double axis[3];  ///< unit, link frame (hinge, slide, twist of a ball)
   double ref;      ///< q of a hinge or slide in the posture of the file
   int limited;     ///< 1 if range holds
   double range[2]; ///< rad or m; ball: range[1] is the largest rotation angle
-  double margin;   ///< limit acts from this distance on
+  /// Ball: the cylinder of Todorov 2014 in the rotation vector of its quaternion, rad: twist is its component along axis,
+  /// within a range, swing the length of the rest, at most a radius. Each holds where its flag is 1.
+  int twist_limited, swing_limited;
+  double twist[2], swing;
+  double margin; ///< limit acts from this distance on
   cav_softness limit;
   double stiffness; ///< N m/rad or N/m
   double springref; ///< hinge and slide: q at rest of the spring
