@@ -20,6 +20,11 @@ static const double noise = 1;
 /// itself.
 static const double curvature = 3, curvature_share = 0.01;
 
+/// Ipopt's checker takes one-sided differences, at the start itself: away from it the law is stiff beyond any step. Contacts
+/// and their costs have second derivatives up to 5e6, so a step p is off by 2.5e6 p, and rounding of objective and forces by
+/// about 5e-13 / p: least near 5e-10, where both together stay below the tolerance (seen: 1.2e-3).
+static const double test_step = 5e-10, test_tolerance = 3e-3;
+
 typedef struct program {
   cav_solve_run *run;
   cav_trajectory *anchor; ///< x = 0
@@ -264,11 +269,10 @@ static int set_options(IpoptProblem nlp, const cav_solve_run *run) {
   for (int i = 0; i < run->problem->nipopt; i++) ok = ok && set_option(nlp, &run->problem->ipopt[i]);
   for (int i = 0; i < o->nipopt; i++) ok = ok && set_option(nlp, &o->ipopt[i]);
   if (o->ipopt_derivative_test) {
-    // at the start itself: away from it the law is stiff beyond any difference's step
     ok = ok && AddIpoptStrOption(nlp, "derivative_test", "first-order");
     ok = ok && AddIpoptNumOption(nlp, "point_perturbation_radius", 0) &&
-         AddIpoptNumOption(nlp, "derivative_test_perturbation", 1e-9);
-    ok = ok && AddIpoptNumOption(nlp, "derivative_test_tol", 1e-3);
+         AddIpoptNumOption(nlp, "derivative_test_perturbation", test_step);
+    ok = ok && AddIpoptNumOption(nlp, "derivative_test_tol", test_tolerance);
   }
   if (o->ipopt_output) ok = ok && OpenIpoptOutputFile(nlp, (char *)o->ipopt_output, 5);
   return ok;

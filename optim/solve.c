@@ -54,6 +54,8 @@ static cav_status check(const cav_problem *p, const cav_solve_options *o, const 
     return fail(error, CAV_BAD_INPUT, "the horizon needs a positive timestep and at least two steps");
   if (!(p->effort_limit > 0) || p->effort_limit > 1)
     return fail(error, CAV_BAD_INPUT, "effort_limit must be in (0, 1]");
+  if (o->threads < 1) return fail(error, CAV_BAD_INPUT, "threads must be at least 1");
+  if (!(o->tolerance > 0)) return fail(error, CAV_BAD_INPUT, "tolerance must be positive");
   if (p->schedule.stages < 1) return fail(error, CAV_BAD_INPUT, "the schedule needs at least one stage");
   int nknot = (int)lround(p->duration / p->timestep) + 1;
   for (int i = 0; i < p->nterm; i++) {

@@ -37,10 +37,11 @@ typedef struct cav_solve_options {
   void *observer_context;
   double tolerance; ///< unactuated force at the end, share of weight
   int diagnose;     ///< 1: where constraints cannot all hold, end at their least violation, which cav_explain needs
-  cav_derivative
-      derivative; ///< of the dynamics: analytic, and what has none (cav_derivatives_missing, sensors) by one-sided
-                  ///< differences, or all by differences. Ipopt always takes centred ones
-  int ipopt_derivative_test; ///< 1: Ipopt's first-order checker runs before its first iteration; its text goes to ipopt_output
+  /// Of the dynamics: analytic, and what has none (cav_derivatives_missing, sensors) by one-sided differences, or all by
+  /// differences. Ipopt always takes centred ones.
+  cav_derivative derivative;
+  int ipopt_derivative_test; ///< 1: Ipopt's first-order checker runs before its first iteration, at the start; its text goes to
+                             ///< ipopt_output. Its time grows with the cube of the number of knots
   const char *ipopt_output; ///< file of Ipopt's own log, NULL: none
   int nipopt;               ///< options for Ipopt, laid over the problem's
   const cav_ipopt_option *ipopt;
