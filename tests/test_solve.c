@@ -1,0 +1,233 @@
+/// The whole way, problem file to certificate: the project's motions on its own humanoid and, where they are, on models that
+/// no one here wrote. Each is certified, close to what its folder says to expect, its derivatives pass Ipopt's checker at the
+/// solution, and a motion spoilt afterwards is not certified. Then the promises of cav_solve: the same bits at 1 and 2 threads,
+/// an end when the observer asks with the best iterate kept, and refusal of what makes no sense.
+#include "motion.h"
+
+// --- expected.json: flat, one "name": number or word a line ---
+
+static char expected[20000];
+
+static int read_expected(const char *motion) {
+  char path[4200];
+  motion_file(path, motion, "expected.json");
+  FILE *file = fopen(path, "r");
+  size_t n = file ? fread(expected, 1, sizeof expected - 1, file) : 0;
+  if (file) fclose(file);
+  expected[n] = 0;
+  return n > 0;
+}
+
+// where the value of a name stands; NULL if the file lacks it
+static const char *find_value(const char *name) {
+  char quoted[100];
+  snprintf(quoted, sizeof quoted, "\"%s\":", name);
+  const char *at = strstr(expected, quoted);
+  return at ? at + strlen(quoted) : NULL;
+}
+
+// value within [expected / factor, expected * factor], widened by slack to either side
+static void compare(const char *name, double value, double factor, double slack) {
+  const char *at = find_value(name);
+  double number = at ? strtod(at, NULL) : NAN;
+  if (CHECK(value <= number * factor + slack && value >= number / factor - slack)) return;
+  fprintf(stderr, "    %s: %g, expected %g\n", name, value, number);
+}
+
+// factors are what one more or one less correction on the way may change; a different method belongs in a new record
+static void compare_expected(const cav_verdict *verdict) {
+  const char *certified = find_value("certified");
+  CHECK(certified && !strncmp(certified + strspn(certified, " "), "true", 4));
+  compare("duration", verdict->duration, 1, 1e-9);
+  compare("iterations", verdict->iterations, 2, 0);
+  compare("penetration_max_m", verdict->penetration_max_m, 2, 1e-3);
+  compare("momentum_defect_rms", verdict->momentum_defect_rms, 2, 1e-3);
+  compare("slip_mean_m_s", verdict->slip_mean_m_s, 2, 5e-3);
+  compare("closed_loop_end_error_m", verdict->closed_loop_end_error_m, 4, 0.1);
+}
+
+// --- motions ---
+
+// one knot moved by a millimetre or a milliradian: forces that no one gives, and no certificate
+static void check_spoilt(const cav_problem *problem, const cav_solution *s) {
+  cav_trajectory *spoilt = cav_trajectory_copy(s->trajectory);
+  cav_verdict verdict = {0};
+  // the second dof of every model here is a root's translation
+  int knot = spoilt->nknot / 2,
+      second = problem->model->joint[0].type == CAV_JOINT_FREE ? 1 : problem->model->joint[1].q;
+  spoilt->q[knot * spoilt->nq + second] += 1e-3;
+  cav_trajectory_velocities(problem->model, spoilt);
+  CHECK(cav_verify(problem, spoilt, &s->contact, s->gain_q, s->gain_v, &verdict, NULL) == CAV_OK);
+  CHECK(!verdict.certified && verdict.unactuated_force_max > CAV_PROMISE_UNACTUATED && verdict.reason[0]);
+  cav_trajectory_free(spoilt);
+}
+
+static void check_motion(const motion_case *c) {
+  cav_problem *problem = motion_load(c);
+  if (!problem) {
+    printf("%-14s %-26s not tried: the shared models are absent\n", c->motion, c->model ? c->model : "");
+    return;
+  }
+  cav_solution *s = NULL;
+  cav_verdict verdict = {0};
+  cav_error error = {0};
+  cav_status status = cav_solve(problem, NULL, NULL, &s, &error);
+  CHECK(status == CAV_OK && s);
+  if (s) {
+    CHECK(cav_verify(problem, s->trajectory, &s->contact, s->gain_q, s->gain_v, &verdict, &error) == CAV_OK);
+    verdict.iterations = s->iterations;
+    if (!CHECK(verdict.certified))
+      fprintf(stderr, "    %s on %s: %s\n", c->motion, problem->model->name, verdict.reason);
+    // the log is complete and ends where the solution does
+    CHECK(s->nprogress == s->iterations && s->progress[s->nprogress - 1].iteration == s->iterations);
+    CHECK(s->unactuated <= CAV_PROMISE_UNACTUATED);
+    check_spoilt(problem, s);
+    printf("%-14s %-26s %5.1f s %4d iterations  unactuated %.1e  momentum %.1e  penetration %.1f mm  end %.0f mm\n",
+           c->motion, problem->model->name, s->seconds, s->iterations, verdict.unactuated_force_max,
+           verdict.momentum_defect_rms, 1e3 * verdict.penetration_max_m, 1e3 * verdict.closed_loop_end_error_m);
+#ifdef CAVORT_HAVE_IPOPT
+    motion_findings found = motion_check_derivatives(problem, s->trajectory);
+    CHECK(found.windows > 0 && found.silent == 0 && found.errors == 0);
+    if (found.errors) fprintf(stderr, "    %d entries differ, the worst by %g\n", found.errors, found.worst);
+#endif
+    // expected.json is about the problem's own model, or the one it was written for
+    int record = !c->model || strcmp(c->motion, "squat-jump");
+    if (record && CHECK(read_expected(c->motion))) compare_expected(&verdict);
+  }
+  cav_solution_free(s);
+  cav_problem_free(problem);
+}
+
+// --- promises ---
+
+// squat-jump cut down to what takes a second: long enough to use every part of the solver
+static cav_problem *load_short(void) {
+  cav_problem *problem = motion_load(&motion_cases[0]);
+  if (!problem) return NULL;
+  problem->duration = 0.5;
+  problem->schedule.stages = 3;
+  // terms that lie beyond the end now
+  int n = 0;
+  for (int i = 0; i < problem->nterm; i++) {
+    if (problem->term[i].from <= problem->duration) problem->term[n++] = problem->term[i];
+  }
+  problem->nterm = n;
+  return problem;
+}
+
+static void check_threads(const cav_problem *problem) {
+  cav_solution *s[2] = {NULL};
+  for (int i = 0; i < 2; i++) {
+    cav_solve_options options = cav_solve_options_default();
+    options.threads = 1 + i;
+    cav_status status = cav_solve(problem, &options, NULL, &s[i], NULL);
+    CHECK(s[i] && (status == CAV_OK || status == CAV_NOT_CONVERGED));
+  }
+  if (s[0] && s[1]) {
+    const cav_trajectory *a = s[0]->trajectory, *b = s[1]->trajectory;
+    size_t gains = (size_t)(a->nknot - 1) * a->nv * a->nv;
+    CHECK(!memcmp(a->q, b->q, (size_t)a->nknot * a->nq * sizeof *a->q));
+    CHECK(!memcmp(a->u, b->u, (size_t)(a->nknot - 1) * a->nv * sizeof *a->u));
+    CHECK(!memcmp(s[0]->gain_q, s[1]->gain_q, gains * sizeof(double)));
+    CHECK(!memcmp(s[0]->gain_v, s[1]->gain_v, gains * sizeof(double)));
+    CHECK(s[0]->iterations == s[1]->iterations && s[0]->cost == s[1]->cost);
+  }
+  cav_solution_free(s[0]);
+  cav_solution_free(s[1]);
+}
+
+/// What an observer sees, and after how many calls it asks for the end.
+typedef struct watch {
+  int calls, most, orderly;
+  const char *last;
+} watch;
+
+static int observe(void *context, const cav_progress *progress) {
+  watch *w = context;
+  w->orderly &= progress->iteration == w->calls + 1 && isfinite(progress->cost) && progress->seconds >= 0;
+  w->last = progress->phase;
+  return ++w->calls == w->most;
+}
+
+static void check_interruption(const cav_problem *problem) {
+  // at the first chance and later
+  for (int most = 1; most <= 31; most += 15) {
+    watch w = {.most = most, .orderly = 1};
+    cav_solve_options options = cav_solve_options_default();
+    options.observer = observe;
+    options.observer_context = &w;
+    cav_solution *s = NULL;
+    CHECK(cav_solve(problem, &options, NULL, &s, NULL) == CAV_INTERRUPTED);
+    CHECK(w.calls == most && w.orderly && s && s->iterations == most);
+    if (s) {
+      double sum = 0;
+      for (int i = 0; i < s->trajectory->nknot * s->trajectory->nq; i++) sum += s->trajectory->q[i];
+      CHECK(isfinite(sum) && s->gain_q && s->gain_v);
+      CHECK(!memcmp(s->trajectory->q, problem->q_start, (size_t)problem->model->nq * sizeof(double)));
+    }
+    cav_solution_free(s);
+  }
+}
+
+static void refuse(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
+                   const char *word) {
+  cav_solution *s = NULL;
+  cav_error error = {0};
+  CHECK(cav_solve(problem, options, start, &s, &error) == CAV_BAD_INPUT);
+  if (!CHECK(s == NULL && strstr(error.text, word))) fprintf(stderr, "    '%s' lacks '%s'\n", error.text, word);
+  cav_solution_free(s);
+  CHECK(cav_solve(problem, options, start, &s, NULL) == CAV_BAD_INPUT);
+}
+
+static void check_refusals(const cav_problem *problem) {
+  cav_problem bad = *problem;
+  bad.model = NULL;
+  refuse(&bad, NULL, NULL, "model");
+  bad = *problem;
+  bad.q_start = NULL;
+  refuse(&bad, NULL, NULL, "start");
+  bad = *problem;
+  bad.timestep = 0;
+  refuse(&bad, NULL, NULL, "timestep");
+  bad.timestep = NAN;
+  refuse(&bad, NULL, NULL, "timestep");
+  bad = *problem;
+  bad.duration = problem->timestep;
+  refuse(&bad, NULL, NULL, "two steps");
+  bad = *problem;
+  bad.effort_limit = 1.5;
+  refuse(&bad, NULL, NULL, "effort_limit");
+  bad = *problem;
+  bad.schedule.stages = 0;
+  refuse(&bad, NULL, NULL, "schedule");
+  cav_term term = problem->term[0];
+  bad = *problem;
+  bad.term = &term;
+  bad.nterm = 1;
+  term.scale = 0;
+  refuse(&bad, NULL, NULL, "scale");
+  term = (cav_term){.quantity = CAV_QUANTITY_GAP, .use = CAV_USE_EQUAL, .scale = 1, .to = -1, .component = -1};
+  refuse(&bad, NULL, NULL, "constraint");
+
+  cav_solve_options options = cav_solve_options_default();
+  options.threads = 0;
+  refuse(problem, &options, NULL, "threads");
+  options = cav_solve_options_default();
+  options.tolerance = -1;
+  refuse(problem, &options, NULL, "tolerance");
+  cav_trajectory *start = cav_trajectory_new(problem->model, 4, problem->timestep);
+  refuse(problem, NULL, start, "does not fit");
+  cav_trajectory_free(start);
+}
+
+int main(void) {
+  cav_problem *problem = load_short();
+  if (problem) {
+    check_threads(problem);
+    check_interruption(problem);
+    check_refusals(problem);
+  }
+  cav_problem_free(problem);
+  for (int i = 0; i < MOTION_CASES; i++) check_motion(&motion_cases[i]);
+  return check_result();
+}
