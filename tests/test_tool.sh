@@ -1,0 +1,198 @@
+#!/bin/sh
+# The command itself: exit statuses, what goes to standard output and what to standard error, folders, interruption, resuming.
+# Usage: test_tool.sh CAVORT SOURCE_ROOT. Prints what is wrong and fails if anything is.
+set -u
+cavort=$(cd "$(dirname "$1")" && pwd)/$(basename "$1")
+root=$2
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+checks=0
+failed=0
+
+# check TEXT COMMAND...: one check
+check() {
+  text=$1
+  shift
+  checks=$((checks + 1))
+  "$@" && return 0
+  failed=$((failed + 1))
+  echo "failed: $text"
+  sed 's/^/    /' out err 2>/dev/null | head -n 20
+}
+
+# run STATUS ARGUMENT...: the command ends with that status; out and err keep what it wrote
+run() {
+  wanted=$1
+  shift
+  "$cavort" "$@" >out 2>err
+  status=$?
+  check "cavort $*: status $status, expected $wanted" [ "$status" -eq "$wanted" ]
+}
+
+says() { check "$1 says: $2" grep -qF -- "$2" "$1"; }
+silent() { check "$1 is empty" [ ! -s "$1" ]; }
+has() { check "$1 exists" [ -s "$1" ]; }
+
+# --- the command line ---
+
+run 0 help
+says out "exit status: 0 certified"
+silent err
+run 0 help solve
+says out "--resume"
+run 0 solve --help
+run 0 --version
+check "a version" grep -qE '^cavort [0-9]+\.[0-9]+\.[0-9]+' out
+run 2
+run 2 fly
+says err "no command 'fly'"
+silent out
+run 2 solve
+says err "expected PROBLEM"
+run 2 solve a.xml b.xml
+says err "'a.xml' and 'b.xml'"
+run 2 solve nowhere.xml
+says err "nowhere.xml"
+run 2 solve a.xml --solver magic
+says err "gn, ipopt or both"
+run 2 solve a.xml --threads 0
+run 2 solve a.xml --threads
+says err "needs a value"
+run 2 solve a.xml --colour
+says err "not an option"
+run 2 verify a.result --threads 2
+says err "not an option"
+run 2 verify nowhere
+run 2 view nowhere
+
+# --- input that is wrong ---
+
+cat >model.xml <<'TEXT'
+<mujoco model="pendulum"><worldbody><body name="rod"><joint name="pivot" axis="0 1 0" damping=".1"/>
+<geom type="sphere" pos="0 0 -.5" size=".05" mass="1"/></body></worldbody>
+<actuator><motor name="drive" joint="pivot" gear="10" ctrlrange="-1 1" ctrllimited="true"/></actuator></mujoco>
+TEXT
+cat >problem.xml <<'TEXT'
+<problem name="swing" model="model.xml">
+  <horizon duration="1" timestep=".025"/>
+  <start/>
+  <goal><joint name="pivot" pos="1"/></goal>
+  <cost><posture dofs="all" at="end" weight="900"/></cost>
+</problem>
+TEXT
+sed 's/pivot/pivor/' problem.xml >misspelt.xml
+run 2 solve misspelt.xml
+says err "misspelt.xml:4"
+says err "did you mean 'pivot'"
+sed 's/ model="model.xml"//' problem.xml >modelless.xml
+run 2 solve modelless.xml
+says err "--model FILE"
+run 2 inspect modelless.xml
+says err "--model FILE"
+check "nothing was written" [ ! -e swing.result ]
+run 0 inspect problem.xml
+says out "pendulum"
+run 0 inspect model.xml
+
+# --- solving ---
+
+run 0 solve problem.xml
+says out "certified: swing on pendulum"
+says err "continuation"
+for name in trajectory.csv forces.csv gains.csv log.csv problem.xml verdict.json view.html; do has "swing.result/$name"; done
+run 0 solve modelless.xml --model model.xml -o given --quiet
+silent out
+silent err
+check "the same motion" cmp -s swing.result/trajectory.csv given/trajectory.csv
+run 0 solve problem.xml -o json --json --threads 2
+says out '"certified": true'
+check "JSON alone" [ "$(head -c 1 out)" = "{" ]
+check "the file says the same" cmp -s out json/verdict.json
+check "the same bits with two threads" cmp -s swing.result/trajectory.csv json/trajectory.csv
+if command -v python3 >/dev/null 2>&1; then
+  check "it is JSON" python3 -c 'import json, sys; json.load(open("out"))'
+fi
+
+# --- the folder again ---
+
+cp swing.result/verdict.json before.json
+run 0 verify swing.result
+says out "certified: swing on pendulum"
+run 0 verify swing.result --json
+says out '"certified": true'
+check "verify writes nothing" cmp -s before.json swing.result/verdict.json
+rm swing.result/view.html
+run 0 view swing.result
+says out "view.html"
+has swing.result/view.html
+# one knot moved: no certificate
+cp -r swing.result spoilt
+awk -F, -v OFS=, 'NR == 20 { $2 += 0.1 } { print }' swing.result/trajectory.csv >spoilt/trajectory.csv
+run 1 verify spoilt
+says out "NOT certified"
+run 1 verify spoilt --quiet
+silent out
+# a table broken off
+head -n 5 swing.result/gains.csv >spoilt/gains.csv
+run 2 verify spoilt
+says err "gains.csv"
+# a result would overwrite its own problem
+run 2 solve problem.xml -o .
+says err "overwrite"
+
+# --- a motion that cannot be: no certificate, and still a result ---
+
+sed 's/ctrlrange="-1 1"/ctrlrange="-.001 .001"/' model.xml >weak.xml
+sed 's/<cost>/<constraint><posture dofs="all" at="end"\/><\/constraint><cost>/' problem.xml >strict.xml
+run 1 solve strict.xml --model weak.xml -o weak
+says out "NOT certified"
+has weak/verdict.json
+says weak/verdict.json '"certified": false'
+
+# --- interruption, and going on from there ---
+
+# a motion long enough to be caught on its way
+motion=$root/problems/motions/squat-jump/problem.xml
+"$cavort" solve "$motion" -o caught --threads 1 >caught.out 2>caught.err &
+child=$!
+tries=0
+while [ "$tries" -lt 600 ] && ! grep -qs 'continuation  [2-9]' caught.err; do
+  kill -0 "$child" 2>/dev/null || break
+  sleep 0.1
+  tries=$((tries + 1))
+done
+# a shell lets what it starts in the background ignore SIGINT, but the command asks for it itself
+kill -INT "$child"
+wait "$child"
+status=$?
+mv caught.out out
+mv caught.err err
+check "interrupted: status $status, expected 130" [ "$status" -eq 130 ]
+says err "best iterate is saved"
+for name in trajectory.csv gains.csv log.csv problem.xml verdict.json; do has "caught/$name"; done
+says caught/verdict.json '"certified": false'
+lines=$(wc -l <caught/log.csv)
+check "the log ends early: $lines lines" [ "$lines" -lt 200 ]
+run 1 verify caught --quiet
+
+run 0 solve problem.xml -o swing.result --resume --quiet
+sed 's/duration="1"/duration="2"/' problem.xml >longer.xml
+run 2 solve longer.xml -o swing.result --resume
+says err "lasts 1 s, the problem 2 s"
+sed 's/timestep=".025"/timestep=".0125"/' problem.xml >finer.xml
+run 0 solve finer.xml -o swing.result --resume --quiet
+check "on the finer knots" [ "$(wc -l <swing.result/trajectory.csv)" -eq 82 ]
+run 2 solve problem.xml -o empty --resume
+
+# --- where nothing can be written ---
+
+if [ "$(id -u)" -ne 0 ]; then
+  mkdir locked && chmod a-w locked
+  run 2 solve problem.xml -o locked/result
+fi
+: >file
+run 2 solve problem.xml -o file/result
+
+echo "$checks checks, $failed failed"
+[ "$failed" -eq 0 ]
