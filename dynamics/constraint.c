@@ -7,7 +7,7 @@
 /// Which limits are rows and which contacts are sought: distance below the margin with solref (MuJoCo's rule), and one
 /// rule for what reaches beyond it (cav_law_reach). The discrete law looks at where the step ends, x + h v_next, so there
 /// an object counts from speed h before the margin: slower than that, nothing is missed. The smoothed law is felt up to
-/// SMOOTH_REACH delta. The larger of the two holds.
+/// SMOOTH_REACH delta from there: the two add up.
 #include "math3.h"
 #include "slope.h"
 
@@ -115,9 +115,7 @@ static double self_smoothing(const cav_state *state) {
 
 double cav_law_reach(const cav_state *state, double delta, double speed) {
   double reach = SMOOTH_REACH * delta;
-  if (state->options.stabilisation == CAV_STABILISATION_DISCRETE) {
-    reach = larger(reach, speed * state->options.timestep);
-  }
+  if (state->options.stabilisation == CAV_STABILISATION_DISCRETE) { reach += speed * state->options.timestep; }
   return reach;
 }
 

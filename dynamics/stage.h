@@ -130,7 +130,7 @@ cav_status cav_rows(const cav_model *model, cav_state *state);
 void cav_soften(cav_state *state);
 
 /// Distance beyond the margin from which a limit or a contact counts: as far as the smoothed law of scale delta is felt,
-/// or as far as an approach at speed gets within a step where the discrete law looks ahead, whichever is more.
+/// and where the discrete law looks ahead, as far as an approach at speed gets within a step before that.
 /// constraint.c.
 double cav_law_reach(const cav_state *state, double delta, double speed);
 

@@ -243,6 +243,7 @@ cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_trans
 
     // shrink the radius until the step is as good as promised
     double decrease = 0, predicted = 0, length = 0;
+    int grown = 0;
     for (int attempt = 0;; attempt++) {
       predicted = bend(&d, normal->gradient, region->radius);
       length = scaled_norm(&d, d.step);
@@ -252,7 +253,8 @@ cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_trans
       double ratio = predicted > 0 ? decrease / predicted : -1;
       if (trial == CAV_NO_MEMORY) status = trial;
       if (ratio < 0.25) region->radius = 0.5 * fmin(length, region->radius);
-      if (ratio > 0.75 && length > 0.9 * region->radius) region->radius *= 2;
+      grown = ratio > 0.75 && length > 0.9 * region->radius;
+      if (grown) region->radius *= 2;
       if (ratio > 1e-4 || attempt > 30 || predicted <= 1e-14 * merit || status != CAV_OK) break;
     }
     region->done++;
@@ -263,7 +265,9 @@ cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_trans
       *spare = swap;
     }
     if (status != CAV_OK) break;
-    calm = decrease < region->tolerance * merit ? calm + 1 : 0;
+    // a good step that only the radius held back says nothing about the end
+    int held = grown && length < 0.99 * d.newton_norm;
+    calm = decrease < region->tolerance * merit && !held ? calm + 1 : 0;
     if (!fresh) break;
     if (region->report && region->report(region->context, length, region->radius)) {
       status = CAV_INTERRUPTED;

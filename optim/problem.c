@@ -243,7 +243,8 @@ static cav_status check_ranges(const cav_problem_reader *reader, const cav_xml_n
       least = 0;
     }
     if (value < least - slack || value > joint->range[1] + slack) {
-      return cav_xml_fail(reader->error, node, NULL, "joint '%s' is at %g, outside its range %g .. %g (rad or m)",
+      return cav_xml_fail(reader->error, node, NULL,
+                          "joint '%s' is at %g, outside its range %g .. %g (rad or m); ranges='clip' would bring it in",
                           joint->name, value, least, joint->range[1]);
     }
   }
@@ -275,6 +276,32 @@ static cav_status read_ends(const cav_problem_reader *reader) {
   return status ? status : check_ranges(reader, goal, p->q_goal);
 }
 
+// <swing> of a guess
+static cav_status read_swings(const cav_problem_reader *reader, const cav_xml_node *node) {
+  cav_problem *p = reader->problem;
+  const cav_xml_node *first = cav_problem_child(node, "swing");
+  int n = 0;
+  for (const cav_xml_node *swing = first; swing; swing = cav_xml_next(swing)) n++;
+  if (n == 0) return CAV_OK;
+  cav_swing *list = cav_problem_alloc(reader->owner, (size_t)n * sizeof *list);
+  if (!list) return cav_problem_no_memory(reader);
+  p->swing = list;
+  for (const cav_xml_node *swing = first; swing; swing = cav_xml_next(swing)) {
+    cav_swing *s = &list[p->nswing];
+    s->joint = cav_problem_find(reader, swing, "joint", CAV_OBJECT_JOINT);
+    if (s->joint < 0) return CAV_BAD_INPUT;
+    cav_joint_type type = reader->model->joint[s->joint].type;
+    if (type != CAV_JOINT_HINGE && type != CAV_JOINT_SLIDE) {
+      return cav_xml_fail(reader->error, swing, "joint", "expected a hinge or a slide");
+    }
+    s->amplitude = cav_xml_real(swing, "amplitude", 0);
+    s->frequency = cav_xml_real(swing, "frequency", 0);
+    s->phase = cav_xml_real(swing, "phase", 0) * M_PI / 180;
+    p->nswing++;
+  }
+  return CAV_OK;
+}
+
 static cav_status read_guess(const cav_problem_reader *reader) {
   cav_problem *p = reader->problem;
   const cav_xml_node *node = cav_problem_child(reader->root, "guess");
@@ -282,12 +309,18 @@ static cav_status read_guess(const cav_problem_reader *reader) {
   p->guess_to = p->duration;
   if (!node) return CAV_OK;
   p->guess = (cav_guess)cav_xml_word(node, "type", p->guess);
-  cav_status status = real(reader, node, "apex", 0, DBL_MAX, &p->guess_height);
+  double turn[3] = {0};
+  cav_xml_reals(node, "turn", turn, 3);
+  for (int i = 0; i < 3; i++) p->guess_turn[i] = turn[i] * M_PI / 180;
+  int turned = turn[0] != 0 || turn[1] != 0 || turn[2] != 0;
+  cav_status status = read_swings(reader, node);
+  if (!status) status = real(reader, node, "apex", 0, DBL_MAX, &p->guess_height);
   if (!status) status = cav_problem_window(reader, node, &p->guess_from, &p->guess_to);
   if (status) return status;
   if (p->guess_to < 0) p->guess_to = p->duration;
-  if (p->guess_height == 0 && (cav_xml_get(node, "from") || cav_xml_get(node, "to"))) {
-    return cav_xml_fail(reader->error, node, "apex", "expected a height above 0 for the arc between 'from' and 'to'");
+  if (p->guess_height == 0 && !turned && (cav_xml_get(node, "from") || cav_xml_get(node, "to"))) {
+    return cav_xml_fail(reader->error, node, "apex",
+                        "expected a height above 0 for the arc, or a turn, between 'from' and 'to'");
   }
   return CAV_OK;
 }

@@ -50,6 +50,7 @@ const char *const cav_problem_sensors[] = {"jointpos",
 const char *const cav_problem_stabilisations[] = {"solref", "discrete", NULL};
 const char *const cav_problem_regularisers[] = {"reference", "exact", NULL};
 static const char *const heights[] = {"keep", "floor", NULL};
+static const char *const clippings[] = {"keep", "clip", NULL};
 static const char *const ends[] = {"first", "last", NULL};
 static const char *const frames[] = {"body", "xbody", "geom", "site", NULL};
 static const char *const relations[] = {"none", "start", "goal", NULL};
@@ -82,7 +83,8 @@ static const cav_xml_element pose_root = {
 static const cav_xml_element pose_joint = {
     "joint", 0, 0, ATTRIBUTES(TEXT("name", 1), REALS("pos", 1, 1), REALS("degrees", 1, 1), REALS("quat", 4, 4)),
     NULL,    0};
-#define POSE_SOURCE TEXT("key", 0), REALS("qpos", 1, 0), TEXT("file", 0), WORD("knot", ends), WORD("height", heights)
+#define POSE_SOURCE TEXT("key", 0), REALS("qpos", 1, 0), TEXT("file", 0), WORD("knot", ends), WORD("height", heights), \
+  WORD("ranges", clippings)
 static const cav_xml_element start = {
     "start", 1, 1, ATTRIBUTES(POSE_SOURCE, REALS("qvel", 1, 0)), CHILDREN(&pose_root, &pose_joint), 0};
 static const cav_xml_element goal = {"goal", 0, 1, ATTRIBUTES(POSE_SOURCE), CHILDREN(&pose_root, &pose_joint), 0};
@@ -145,9 +147,11 @@ static const cav_xml_element horizon = {
                WORD("close", cav_problem_closings)),
     NULL,
     0};
+static const cav_xml_element swing = {
+    "swing", 0, 0, ATTRIBUTES(TEXT("joint", 1), REAL("amplitude", 1), REAL("frequency", 1), REAL("phase", 0)), NULL, 0};
 static const cav_xml_element guess = {
-    "guess", 0, 1, ATTRIBUTES(WORD("type", cav_problem_guesses), REAL("apex", 0), TEXT("from", 0), TEXT("to", 0)),
-    NULL,    0};
+    "guess", 0, 1, ATTRIBUTES(WORD("type", cav_problem_guesses), REAL("apex", 0), REALS("turn", 3, 3), TEXT("from", 0), TEXT("to", 0)),
+    CHILDREN(&swing), 0};
 static const cav_xml_element limits = {"limits", 0, 1, ATTRIBUTES(REAL("effort", 0), REAL("margin", 0)), NULL, 0};
 #define STAGE                                                                                                \
   ATTRIBUTES(REAL("softness", 0), REAL("time_constant", 0), REAL("smoothing", 0), REAL("smoothing_self", 0), \

@@ -268,12 +268,22 @@ static cav_status drop(const cav_problem_reader *reader, const cav_xml_node *nod
                       m->name);
 }
 
+// brings scalar joints into their ranges
+static void clip(const cav_model *m, double *q) {
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    int scalar = joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE;
+    if (joint->limited && scalar) q[joint->q] = fmin(fmax(q[joint->q], joint->range[0]), joint->range[1]);
+  }
+}
+
 static cav_status read_pose(const cav_problem_reader *reader, const cav_xml_node *node, int depth, double *q) {
   if (depth > DEEPEST) return cav_xml_fail(reader->error, node, "key", "poses name each other in a circle");
   cav_status status = read_base(reader, node, depth, q);
   if (!status) status = lay_root(reader, node, q);
   const cav_xml_node *joint = cav_problem_child(node, "joint");
   for (; joint && !status; joint = cav_xml_next(joint)) status = lay_joint(reader, joint, q);
+  if (!status && cav_xml_word(node, "ranges", 0)) clip(reader->model, q);
   if (!status && cav_xml_word(node, "height", 0)) status = drop(reader, node, q);
   return status;
 }

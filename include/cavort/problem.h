@@ -58,6 +58,14 @@ typedef struct cav_term {
       upper; ///< CAV_USE_RANGE, infinite where open; target is NULL then, or a posture or orientation to start from
 } cav_term;
 
+/// A sine laid over a scalar joint of the guess; it fades in and out over the first and last fifth of the motion.
+typedef struct cav_swing {
+  int joint;
+  double amplitude; ///< rad or m
+  double frequency; ///< Hz
+  double phase;     ///< rad
+} cav_swing;
+
 typedef enum cav_guess { CAV_GUESS_HOLD, CAV_GUESS_INTERPOLATE } cav_guess;
 
 /// One stage of the continuation (optimisation.md, 5).
@@ -95,6 +103,9 @@ typedef struct cav_problem {
   cav_guess guess;
   double guess_height;         ///< m: ballistic arc added to the guess over guess_from .. guess_to
   double guess_from, guess_to; ///< s
+  double guess_turn[3]; ///< rotation vector that the first free joint's guess makes over guess_from .. guess_to, rad
+  int nswing;
+  cav_swing *swing; ///< [nswing]
   int nterm;
   cav_term *term;
   double effort_limit; ///< share of the actuator limits planned with, 0 .. 1
