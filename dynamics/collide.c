@@ -9,9 +9,8 @@
 #include "stage.h"
 #include "workspace.h"
 
-// fastest approach that the discrete law meets without a jump, m/s; and that of a limb to the world under the smoothed
-// law, where feet of unfinished motions swing that fast
-static const double APPROACH_SPEED = 5, SWING_SPEED = 20;
+// fastest approach that the discrete law meets without a jump, m/s (a fall from 1.3 m)
+static const double APPROACH_SPEED = 5;
 
 /// A pair as the broad phase wants it: all it reads, in order.
 typedef struct candidate {
@@ -109,7 +108,7 @@ void cav_geom_cache_free(struct cav_geom_cache *cache) {
 double cav_reach(const cav_state *state, const cav_pair *pair) {
   const cav_options *o = &state->options;
   double delta = o->smoothing > 0 ? (pair->same_world ? o->smoothing : o->smoothing_self) : 0;
-  return pair->margin + cav_law_reach(state, delta, delta > 0 && pair->same_world ? SWING_SPEED : APPROACH_SPEED);
+  return pair->margin + cav_law_reach(state, delta, APPROACH_SPEED);
 }
 
 // centres of all geoms that move, and normals of planes that do
