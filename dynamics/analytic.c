@@ -563,7 +563,13 @@ static cav_status add_rows(const task *t) {
 
 // whatever adds to u and is not differentiated above is named here
 const char *cav_derivatives_missing(const cav_model *model) {
-  if (model->nequality > 0) return "equality constraints";
+  for (int i = 0; i < model->nequality; i++) {
+    const cav_equality *e = &model->equality[i];
+    if (e->type == CAV_EQUALITY_DISTANCE) return "equality constraints on distances";
+    for (int k = 0; k < 2 && e->type == CAV_EQUALITY_TENDON && e->object[k] >= 0; k++) {
+      if (model->tendon[e->object[k]].npath > 0) return "equality constraints on spatial tendons";
+    }
+  }
   if (model->density > 0 || model->viscosity > 0) return "forces of a medium";
   for (int i = 0; i < model->nbody; i++) {
     if (model->body[i].buoyancy != 0) return "gravity compensation";
@@ -618,6 +624,7 @@ cav_status cav_derivatives(const cav_model *model, cav_state *state, double *du_
   add_diagonals(&t);
   add_springs(&t);
   add_tendon_forces(&t);
+  if (state->ntie > 0) cav_tie_slopes(model, state, t.dq, t.dv, t.dn);
   return add_rows(&t);
 }
 

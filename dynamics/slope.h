@@ -44,6 +44,10 @@ void cav_slopes_free(cav_slopes *slopes);
 cav_status cav_contact_slopes(const cav_model *model, const cav_state *state, const cav_contact *contact, int whole,
                               cav_contact_slope *slope);
 
+/// Adds what equality constraints between joints, tendons or links give du/dq, du/dv and du/dv_next [nv*nv], beyond what
+/// is carried along with the wrenches of subtrees. Not for distances. tie_slope.c.
+void cav_tie_slopes(const cav_model *model, const cav_state *state, double *dq, double *dv, double *dn);
+
 /// Rates by the distance to the constraint (dist - margin) of ln R and of ln hK of a row or contact's normal.
 /// constraint.c.
 void cav_law_rates(const cav_state *state, const cav_softness *softness, double gap, double *regulariser,

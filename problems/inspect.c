@@ -185,6 +185,9 @@ static void print_stages(const cav_model *m) {
   print_stage("moments that follow q", c.moving, "actuators", "all moments are constant");
   print_stage("sensors", m->nsensor, "sensors, each when it is read", "none in the file");
   printf("  no matrix is formed or factorised\n");
+  const char *missing = cav_derivatives_missing(m);
+  printf("  derivatives %s%s\n", missing ? "by differences, as there is no closed form for " : "in closed form",
+         missing ? missing : "");
 }
 
 // one line of the table of costs; what takes neither time nor memory says so

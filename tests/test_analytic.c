@@ -301,6 +301,8 @@ int main(void) {
   check_model("shapes", STATES);
   model = cav_model_load(CAVORT_SOURCE_ROOT "/tests/features.xml", NULL);
   check_model("features", STATES);
+  model = cav_model_load(CAVORT_SOURCE_ROOT "/tests/equality.xml", NULL);
+  check_model("equality", STATES);
 #endif
   const char *folder = check_shared_models();
   for (size_t i = 0; folder && i < sizeof names / sizeof *names; i++) {
