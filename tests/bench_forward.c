@@ -103,6 +103,49 @@ static double median(const sample *s, int n, int method, int ratio) {
   return x[n / 2];
 }
 
+/// What a solver needs to make forward and inverse agree: largest over states, and median time, us.
+typedef struct agreement {
+  double residual, mismatch, iterations, time[PER_BIN];
+} agreement;
+
+static void agree(agreement *a, int at, const sample *s, int newton) {
+  cav_forward_report report = {0};
+  double t = seconds();
+  cav_status status = newton ? cav_forward_newton(model, state, s->q, s->v, s->u, 200, 1e-12, found, &report)
+                             : cav_forward_gpgs(model, state, s->q, s->v, s->u, 100000, 1e-12, found, &report);
+  a->time[at] = 1e6 * (seconds() - t);
+  if (status != CAV_OK && status != CAV_NOT_CONVERGED) return;
+  a->iterations = fmax(a->iterations, report.iterations);
+  a->mismatch = fmax(a->mismatch, report.mismatch);
+
+  // the inverse at what came out against what went in, relative
+  double *u = scene_vector(model->nv), worst = 0, most = 0;
+  cav_inverse(model, state, s->q, s->v, found, u);
+  for (int i = 0; i < model->nv; i++) {
+    worst = fmax(worst, fabs(u[i] - s->u[i]));
+    most = fmax(most, fabs(s->u[i]));
+  }
+  a->residual = fmax(a->residual, worst / most);
+  free(u);
+}
+
+// both solvers run to the end where there are about 60 rows; Gauss-Seidel starts from
+// what it remembers of the state before
+static void agreements(const sample *s, int n, int rows) {
+  static const char *const solver[] = {"Gauss-Seidel", "Newton"};
+  for (int newton = 0; newton < 2; newton++) {
+    agreement a = {0};
+    for (int i = 0; i < n; i++) agree(&a, i, &s[i], newton);
+    qsort(a.time, (size_t)n, sizeof *a.time, ascending);
+    printf("%3d - %-5d %-12s inverse(forward) within %.1e of the largest u, %.0f iterations at most, %.0f us", rows,
+           rows + WIDTH - 1, solver[newton], a.residual, a.iterations, a.time[n / 2]);
+    if (newton)
+      printf("\n");
+    else
+      printf(", impulses within %.1e N s\n", a.mismatch);
+  }
+}
+
 int main(int argc, char **argv) {
   static sample bin[BINS][PER_BIN];
   int count[BINS] = {0}, failed = 0;
@@ -153,6 +196,10 @@ int main(int argc, char **argv) {
     if (out)
       fprintf(out, "%.2f %d %.3f %.3f %.3f %.3f %.3f %.3f\n", mean, count[b], time[0], time[1], time[2], time[3],
               ratio[1], ratio[2]);
+  }
+  printf("to convergence, largest over the states and median time\n");
+  for (int b = 60 / WIDTH; b <= 60 / WIDTH + 1; b++) {
+    if (count[b]) agreements(bin[b], count[b], b * WIDTH);
   }
   if (out) fclose(out);
   return EXIT_SUCCESS;
