@@ -926,12 +926,14 @@ static void warn_guarded(builder *b) {
   const double least = 2 * spec->option.timestep;
   const cav_spec_joint *joint = NULL;
   const cav_spec_tendon *tendon = NULL;
+  const cav_spec_equality *tie = NULL;
   const cav_pair *pair = NULL;
   if (!spec->option.guard || !spec->option.constraint) return;
   for (int i = spec->joint.n - 1; i >= 0; i--) {
     const cav_spec_joint *s = &spec->joint.at[i];
     int rubs = s->frictionloss > 0 && spec->option.frictionloss && is_guarded(b, s->friction.solref);
-    if (rubs || (is_guarded(b, s->limit.solref) && joint_limits(spec, s))) joint = s;
+    int turns = s->type == CAV_JOINT_BALL && spec->option.limit && (s->has_twist || s->has_swing);
+    if (rubs || (is_guarded(b, s->limit.solref) && (turns || joint_limits(spec, s)))) joint = s;
   }
   for (int i = spec->tendon.n - 1; i >= 0; i--) {
     const cav_spec_tendon *s = &spec->tendon.at[i];
@@ -939,6 +941,9 @@ static void warn_guarded(builder *b) {
     if (rubs || (is_guarded(b, s->limit.solref) && spec->option.limit &&
                  limits(spec, s->node, "limited", "range", s->limited, s->range)))
       tendon = s;
+  }
+  for (int i = spec->equality.n - 1; i >= 0; i--) {
+    if (is_guarded(b, spec->equality.at[i].softness.solref)) tie = &spec->equality.at[i];
   }
   for (int i = b->model->npair - 1; i >= 0; i--) {
     if (is_guarded(b, b->pairs[i].softness.solref)) pair = &b->pairs[i];
@@ -948,6 +953,7 @@ static void warn_guarded(builder *b) {
       "or set the flag refsafe to disable";
   if (joint) cav_spec_warn(spec, joint->node, NULL, text, "joint ", joint->name, least);
   if (tendon) cav_spec_warn(spec, tendon->node, NULL, text, "tendon ", tendon->name, least);
+  if (tie) cav_spec_warn(spec, tie->node, NULL, text, "equality constraint ", tie->name, least);
   if (pair)
     cav_spec_warn(spec, spec->geom.at[pair->geom2].node, NULL, text, "contacts of ", spec->geom.at[pair->geom2].name,
                   least);

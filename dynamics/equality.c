@@ -60,6 +60,8 @@ static void distance(const cav_model *model, const cav_state *state, const cav_e
   double between[3];
   sub3(between, b.pos, a.pos);
   cav_touch touch[CAV_TOUCH_MAX];
+  // a degenerate pair may have no point: then nothing is asked of it
+  touch[0] = (cav_touch){.dist = e->distance};
   int n = cav_collide_shapes(&a, &b, 2 * norm3(between) + 1, touch);
   for (int k = 1; k < n; k++) {
     if (touch[k].dist < touch[nearest].dist) nearest = k;

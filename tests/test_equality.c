@@ -196,6 +196,31 @@ static void test_switch(bench *b) {
   CHECK(b->state->ntie == b->model->nequality && scene_error(b->u, b->out, b->model->nv) > 1e-3);
 }
 
+// a time constant below two steps is raised, which is said, and does what the raised one does
+static void test_guard(void) {
+  static const char text[] =
+      "<mujoco><option timestep='.01'/><worldbody><body><joint name='x' type='slide'/><geom "
+      "size='.1'/></body></worldbody>"
+      "<equality><joint name='hold' joint1='x' solref='%s 1'/></equality></mujoco>";
+  char short_text[1000], raised[1000];
+  snprintf(short_text, sizeof short_text, text, ".001");
+  snprintf(raised, sizeof raised, text, ".02");
+  bench a, b;
+  if (bench_open_text(&a, short_text) && bench_open_text(&b, raised)) {
+    CHECK(a.model->nwarning == 1 && strstr(a.model->warning[0], "equality constraint hold"));
+    CHECK(b.model->nwarning == 0);
+    random_state(&a, 0.1);
+    CHECK(cav_inverse(a.model, a.state, a.q, a.v, a.v_next, a.u) == CAV_OK);
+    CHECK(cav_inverse(b.model, b.state, a.q, a.v, a.v_next, b.u) == CAV_OK);
+    CHECK_NEAR_ALL(a.u, b.u, 1, 0);
+    a.state->options.guard = 0;
+    CHECK(cav_inverse(a.model, a.state, a.q, a.v, a.v_next, a.u) == CAV_OK);
+    CHECK(fabs(a.u[0] - b.u[0]) > 1e-3 * fabs(b.u[0]));
+  }
+  bench_close(&a);
+  bench_close(&b);
+}
+
 #ifdef CAVORT_HAVE_MUJOCO
 enum { STATES = 1000 };
 
@@ -254,6 +279,7 @@ int main(void) {
     test_switch(&b);
   }
   bench_close(&b);
+  test_guard();
 #ifdef CAVORT_HAVE_CCD
   if (bench_open_text(&b, scene_tied)) test_scene(&b, "distances");
   bench_close(&b);
