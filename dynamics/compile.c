@@ -493,6 +493,9 @@ static void check_geom(builder *b, const cav_spec_geom *s) {
   cav_check_softness(spec, s->node, "", &s->softness);
   if (s->type == CAV_GEOM_PLANE && b->link_of[s->body] != 0)
     cav_spec_fail(spec, s->node, "type", "a plane cannot move; put it into the world or use a box");
+  if (s->fluid && s->type >= CAV_GEOM_MESH)
+    cav_spec_fail(spec, s->node, "fluidshape",
+                  "a mesh has no ellipsoid here; give the body a geom of another type for it");
 }
 
 static void fill_geoms(builder *b) {

@@ -123,6 +123,8 @@ cav_status cav_fluid_compile(const cav_model *model, cav_workspace *w) {
   return CAV_OK;
 }
 
+size_t cav_fluid_bytes(const cav_workspace *w) { return (size_t)w->nfloat * sizeof *w->floats; }
+
 /// Motion of the middle of a float against the medium, and what it does, in its own axes.
 typedef struct flow {
   double density, viscosity, v[3], w[3], force[3], torque[3];

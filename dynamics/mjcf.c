@@ -99,6 +99,10 @@ static void read_compiler(reader *r, const cav_xml_node *node) {
     cav_spec_fail(r->spec, node, "boundinertia", "expected an inertia >= 0, got %g", c->bound_inertia);
   if (cav_xml_word(node, "coordinate", 0) == 1)
     cav_spec_fail(r->spec, node, "coordinate", "global coordinates are not supported; write local ones");
+  for (const cav_xml_node *i = node->child; i; i = i->next) {
+    if (is(i, "lengthrange"))
+      cav_spec_warn(r->spec, i, NULL, "left aside: lengths of muscles are found over the ranges of the joints");
+  }
   c->fuse = cav_xml_bool(node, "fusestatic", c->fuse);
   c->exact_mesh = cav_xml_bool(node, "exactmeshinertia", c->exact_mesh);
   c->strip = cav_xml_bool(node, "strippath", c->strip);

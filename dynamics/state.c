@@ -291,6 +291,7 @@ void cav_state_bytes(const cav_state *state, size_t bytes[CAV_PARTS]) {
   memcpy(bytes, w->bytes, sizeof w->bytes);
   bytes[CAV_PART_HEAD] += sizeof(cav_state) + sizeof(cav_workspace);
   bytes[CAV_PART_ROWS] += (size_t)w->row_room * sizeof *state->row;
+  bytes[CAV_PART_MOTION] += cav_fluid_bytes(w);
   bytes[CAV_PART_CONTACTS] += (size_t)w->contact_room * sizeof *state->contact + cav_geom_cache_bytes(w->geom);
   size_t nu = (size_t)state->model->nactuator;
   bytes[CAV_PART_ACTUATION] += w->gram ? 3 * nu * nu * sizeof(double) : 0;

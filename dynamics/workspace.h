@@ -134,6 +134,7 @@ double cav_transmission_length(const cav_state *state, int actuator, double *mom
 
 /// What a medium acts on, if there is one. fluid.c.
 cav_status cav_fluid_compile(const cav_model *model, cav_workspace *w);
+size_t cav_fluid_bytes(const cav_workspace *w);
 
 /// Fills the transmission of a workspace. actuation.c.
 cav_status cav_actuation_compile(const cav_model *model, cav_state *state);

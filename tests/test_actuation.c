@@ -128,7 +128,7 @@ static void draw(const cav_model *m, double *q, double *scratch) {
   }
 }
 
-static void compare_state(const cav_model *m, cav_state *state, const mjModel *p, mjData *d, double worst[3]) {
+static void compare_state(const cav_model *m, cav_state *state, const mjModel *p, mjData *d, double worst[4]) {
   double *moment = scene_vector(m->nv);
   mj_forward(p, d);
   CHECK(cav_position(m, state, d->qpos) == CAV_OK);
@@ -144,6 +144,7 @@ static void compare_state(const cav_model *m, cav_state *state, const mjModel *p
     if (joined(&m->actuator[i])) length = d->actuator_length[i], velocity = d->actuator_velocity[i];
     double input = m->actuator[i].activation == CAV_ACTIVATION_NONE ? d->ctrl[i] : d->act[activation++];
     double force = cav_actuator_force(m, i, length, velocity, input);
+    worst[3] = fmax(worst[3], fabs(d->actuator_force[i]));
     double errors[3] = {fabs(length - d->actuator_length[i]), off / scale,
                         fabs(force - d->actuator_force[i]) / (1 + fabs(force))};
     for (int k = 0; k < 3; k++) {
@@ -165,7 +166,7 @@ static void test_peer(const cav_model *m, const char *path, const char *name) {
   printf("%s\n", name);
   mjData *d = mj_makeData(p);
   cav_state *state = cav_state_new(m);
-  double *scratch = scene_vector(m->nv), worst[3] = {0};
+  double *scratch = scene_vector(m->nv), worst[4] = {0};
   compare_parameters(m, p);
   compare_strokes(m, p);
   for (int k = 0; k < STATES; k++) {
@@ -180,8 +181,11 @@ static void test_peer(const cav_model *m, const char *path, const char *name) {
     compare_state(m, state, p, d, worst);
   }
   // bound: rounding; seen 1e-14, 3e-14, 2e-13
-  printf("  %d states: lengths %.1e, moments %.1e, forces %.1e\n", STATES, worst[0], worst[1], worst[2]);
+  printf("  %d states: lengths %.1e, moments %.1e, forces %.1e, the largest %.3g\n", STATES, worst[0], worst[1],
+         worst[2], worst[3]);
   for (int k = 0; k < 3; k++) CHECK(worst[k] < 1e-10);
+  // the control: there are forces to compare
+  CHECK(worst[3] > 0);
   cav_state_free(state);
   free(scratch);
   mj_deleteData(d);
@@ -202,8 +206,10 @@ int main(void) {
   }
   cav_model_free(m);
 #ifdef CAVORT_HAVE_MUJOCO
-  const char *folder = check_shared_models(), *const shared[] = {"mujoco/arm26.xml", "mujoco/slider_crank.xml"};
-  for (int i = 0; folder && i < 2; i++) {
+  const char *folder = check_shared_models(), *const shared[] = {"mujoco/arm26.xml", "mujoco/slider_crank.xml",
+                                                                 "dm_control/fish.xml", "dm_control/quadruped.xml",
+                                                                 "dm_control/manipulator.xml"};
+  for (int i = 0; folder && i < 5; i++) {
     snprintf(path, sizeof path, "%s/%s", folder, shared[i]);
     m = load(path);
     if (m) test_peer(m, path, shared[i]);
