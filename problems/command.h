@@ -18,18 +18,22 @@ enum { CAV_COMMAND_IPOPT = 32 };
 /// A command line as read by main.c.
 typedef struct cav_command_line {
   const char *operand; ///< MODEL, PROBLEM, DIR or TOPIC; NULL: none
+  int noperand;        ///< of commands that take several
+  char **operands;     ///< [noperand]
   const char *model;   ///< --model, NULL: as the problem says
   const char *output;  ///< -o, NULL: named after the problem
   cav_solver solver;
   int threads;
   int resume, quiet, json;
-  int nipopt; ///< --ipopt, any number of times
+  const char *methods; ///< --methods, NULL: own
+  int nipopt;          ///< --ipopt, any number of times
   cav_ipopt_option ipopt[CAV_COMMAND_IPOPT];
 } cav_command_line;
 
 int cav_command_inspect(const cav_command_line *line);
 int cav_command_explain(const cav_command_line *line);
 int cav_command_solve(const cav_command_line *line);
+int cav_command_study(const cav_command_line *line);
 int cav_command_verify(const cav_command_line *line);
 int cav_command_view(const cav_command_line *line);
 

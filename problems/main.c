@@ -14,7 +14,8 @@ enum option {
   OPTION_RESUME = 16,
   OPTION_QUIET = 32,
   OPTION_JSON = 64,
-  OPTION_IPOPT = 128
+  OPTION_IPOPT = 128,
+  OPTION_METHODS = 256
 };
 
 // options: spelling, value's name or NULL, what it does
@@ -27,6 +28,8 @@ static const struct {
     {OPTION_SOLVER, "--solver", NULL, "WORD", "gn: own Gauss-Newton (default), ipopt, or both, one after the other"},
     {OPTION_IPOPT, "--ipopt", NULL, "NAME=VALUE",
      "an option of Ipopt, laid over the problem's; may be given several times"},
+    {OPTION_METHODS, "--methods", NULL, "LIST",
+     "what to compare, with commas: own (default), ipopt, limited (Ipopt with limited memory), both"},
     {OPTION_THREADS, "--threads", NULL, "N",
      "threads to use (default: all processors); the result does not depend on it"},
     {OPTION_RESUME, "--resume", NULL, NULL, "start from the trajectory that the result folder holds"},
@@ -56,25 +59,14 @@ static const command commands[] = {
      cav_command_explain, OPTION_MODEL | OPTION_JSON},
     {"view", "DIR", "write the page of a result folder anew and say where it is", cav_command_view,
      OPTION_MODEL | OPTION_QUIET},
+    {"study", "[MOTION...]",
+     "solve motions from ten perturbed starts each, in N processes, and count: problem files, or all of "
+     "problems/motions;\n"
+     "  what a folder holds already is not solved again",
+     cav_command_study, OPTION_MODEL | OPTION_OUTPUT | OPTION_METHODS | OPTION_THREADS | OPTION_QUIET},
     {"help", "[COMMAND]", "say how to use the tool or one of its commands", help, 0},
 };
 enum { NCOMMAND = sizeof commands / sizeof *commands };
-
-int cav_command_fail(const cav_error *error) {
-  fprintf(stderr, "cavort: %s\n", error->text[0] ? error->text : cav_status_name(error->status));
-  switch (error->status) {
-    case CAV_BAD_INPUT:
-    case CAV_NOT_FINITE:
-    case CAV_NOT_SUPPORTED:
-      return CAV_EXIT_BAD_INPUT;
-    case CAV_INTERRUPTED:
-      return CAV_EXIT_INTERRUPTED;
-    case CAV_NOT_CONVERGED:
-      return CAV_EXIT_NOT_CERTIFIED;
-    default:
-      return CAV_EXIT_INTERNAL;
-  }
-}
 
 static void print_command(const command *c) {
   printf("cavort %s %s\n  %s\n", c->name, c->operand, c->text);
@@ -153,6 +145,9 @@ static int take_value(cav_command_line *line, enum option option, const char *na
       }
       fprintf(stderr, "cavort: %s: expected gn, ipopt or both, got '%s'\n", name, value);
       return 0;
+    case OPTION_METHODS:
+      line->methods = value;
+      return 1;
     case OPTION_IPOPT:
       return take_ipopt(line, value);
     case OPTION_THREADS:
@@ -189,6 +184,12 @@ static int read_line(const command *c, int argc, char **argv, cav_command_line *
   for (int i = 0; i < argc; i++) {
     char *value;
     if (argv[i][0] != '-' || !argv[i][1]) {
+      if (strstr(c->operand, "...")) {
+        // operands gather at the front, where they have been read already
+        line->operands = argv;
+        argv[line->noperand++] = argv[i];
+        continue;
+      }
       if (line->operand) {
         fprintf(stderr, "cavort %s: expected one %s, got '%s' and '%s'\n", c->name, c->operand, line->operand, argv[i]);
         return 0;

@@ -461,6 +461,11 @@ cav_model *cav_model_load(const char *path, cav_error *error);
 /// Frees a model; NULL is fine. No state of it may be used afterwards.
 void cav_model_free(cav_model *model);
 
+/// Changes a model before any state of it exists: mass and inertia of link i times mass_scale[i] ([nlink], > 0; NULL: as they are),
+/// sliding friction of every contact (0: as it is); what the model derives from them follows. CAV_BAD_INPUT: a scale that is not
+/// positive, a negative friction, nothing changed; CAV_NO_MEMORY: do not use the model.
+cav_status cav_model_vary(cav_model *model, const double *mass_scale, double friction);
+
 /// Index of the object of that kind and name, -1 if there is none. CAV_OBJECT_BODY and _XBODY both look up bodies.
 int cav_find(const cav_model *model, cav_object_type type, const char *name);
 
