@@ -410,6 +410,28 @@ static void pairs_of(const task *t, int j) {
   }
 }
 
+// gravity compensation: a force at a body's centre of mass that keeps its direction, where subtrees carry it along turning
+static void add_buoyancy(const task *t) {
+  const cav_workspace *w = t->state->work;
+  if (!t->state->options.passive || !t->state->options.gravity) return;
+  for (int i = 0; i < w->nbuoy; i++) {
+    const cav_body *body = &t->model->body[w->buoy[i]];
+    const double *reference = t->state->reference + 3 * body->link;
+    cav_pose pose;
+    double force[3];
+    cav_mass_pose(t->state, body, &pose);
+    scale3(force, body->buoyancy * body->mass, t->model->gravity);
+    for (int j = last_dof(t->model, body->link); j >= 0; j = w->parent[j]) {
+      double back[3], S[6];
+      cross3(back, force, t->state->axis + 6 * j);
+      for (int k = last_dof(t->model, body->link); k >= 0; k = w->parent[k]) {
+        motion_at(S, t->state->axis + 6 * k, reference, pose.pos);
+        t->dq[k * t->nv + j] += dot3(S + 3, back);
+      }
+    }
+  }
+}
+
 // ---------------------------------------------------------------- joints, tendons, rows
 
 static void add_diagonals(const task *t) {
@@ -571,9 +593,6 @@ const char *cav_derivatives_missing(const cav_model *model) {
     }
   }
   if (model->density > 0 || model->viscosity > 0) return "forces of a medium";
-  for (int i = 0; i < model->nbody; i++) {
-    if (model->body[i].buoyancy != 0) return "gravity compensation";
-  }
   for (int i = 0; i < model->njoint; i++) {
     if (model->joint[i].twist_limited || model->joint[i].swing_limited) return "twist and swing limits of ball joints";
   }
@@ -623,6 +642,7 @@ cav_status cav_derivatives(const cav_model *model, cav_state *state, double *du_
   // what acts on dofs
   add_diagonals(&t);
   add_springs(&t);
+  add_buoyancy(&t);
   add_tendon_forces(&t);
   if (state->ntie > 0) cav_tie_slopes(model, state, t.dq, t.dv, t.dn);
   return add_rows(&t);

@@ -11,7 +11,7 @@ static const char shapes[] =
     "<mujoco><option timestep='0.01'/><default><geom condim='6' friction='.8 .05 .02'/></default><worldbody>"
     "<geom name='floor' type='plane' size='1 1 1' euler='5 0 0'/><geom type='box' size='.3 .2 .05' pos='0 0 .02'/>"
     "<body pos='0 0 .16'><freejoint/><geom name='ball' type='sphere' size='.1'/>"
-    "<body pos='.1 0 .1'><joint axis='0 1 0'/><joint axis='1 0 .2' pos='0 .02 0'/>"
+    "<body pos='.1 0 .1' gravcomp='.6'><joint axis='0 1 0'/><joint axis='1 0 .2' pos='0 .02 0'/>"
     "<geom name='arm' type='capsule' size='.04' fromto='0 0 0 .2 .05 -.1'/></body></body>"
     "<body pos='.25 .05 .14'><freejoint/><geom name='egg' type='ellipsoid' size='.05 .08 .1'/></body>"
     "<body pos='-.2 0 .16'><joint type='slide' axis='0 .2 1'/><joint type='ball' damping='.1'/>"
