@@ -6,6 +6,7 @@
 #include "scene.h"
 #include "stage.h"
 
+#ifdef CAVORT_HAVE_CCD
 /// Rolling and sliding bodies of all shapes, rough pairs of unequal friction, two trees that touch.
 static const char shapes[] =
     "<mujoco><option timestep='0.01'/><default><geom condim='6' friction='.8 .05 .02'/></default><worldbody>"
@@ -19,6 +20,7 @@ static const char shapes[] =
     "<body pos='.6 .1 .1'><freejoint/><geom name='brick' type='box' size='.1 .05 .08' condim='3'/></body>"
     "</worldbody><contact><pair geom1='floor' geom2='arm' condim='6' friction='.9 .3 .05 .02 .04'/>"
     "<pair geom1='ball' geom2='egg' condim='6' friction='.3 .9 .05 .02 .04'/></contact></mujoco>";
+#endif
 
 enum { STATES = 16, POINTS = 6, SENSORS = 40 };
 
