@@ -5,8 +5,9 @@
 /// weigh what their collision shapes weigh at 1000 kg/m^3; limits hold where lower < upper. What is read beyond collision:
 /// visual geometry only on request, since it can neither touch nor weigh. Links joined by fixed joints move as one and keep
 /// their names; their reference weights are those of the whole, as if they were merged, unless the file's
-/// <mujoco><compiler fusestatic="false"/></mujoco> says otherwise. A joint with an effort limit gets a motor of that range.
-/// What the file asks for and is left aside is a warning with its line: velocity limits, mimic, safety controllers,
+/// <mujoco><compiler fusestatic="false"/></mujoco> says otherwise. A joint with an effort limit gets a motor of that
+/// range; one that mimics another is tied to it by a joint equality.
+/// What the file asks for and is left aside is a warning with its line: velocity limits, safety controllers,
 /// elements that no table knows. Not done: soft limits, transmissions, xacro.
 
 #include <stdio.h>
@@ -408,13 +409,27 @@ static void read_motion(reader *r, const cav_xml_node *node, int type, cav_spec_
   push_motor(spec, node, j->name, cav_xml_real(l, "effort", 0));
 }
 
+// a joint that follows another: q = multiplier q_other + offset, as a joint equality with MJCF's softness
+static void read_mimic(cav_spec *spec, const cav_xml_node *node, const char *name) {
+  cav_spec_joint soft;
+  cav_mjcf_default_joint(&soft);
+  cav_spec_equality *e = CAV_SPEC_PUSH(spec, &spec->equality);
+  if (!e) return;
+  *e = (cav_spec_equality){
+      .name = "", .node = node, .type = CAV_EQUALITY_JOINT, .active = 1, .torquescale = 1, .softness = soft.limit};
+  e->object[0] = name;
+  e->object[1] = cav_xml_text(node, "joint", "");
+  e->polycoef[0] = cav_xml_real(node, "offset", 0);
+  e->polycoef[1] = cav_xml_real(node, "multiplier", 1);
+}
+
 static void read_joint(reader *r, const cav_xml_node *node, int body) {
   int type = cav_xml_word(node, "type", FIXED);
   const char *name = cav_xml_text(node, "name", "");
   const cav_xml_node *a = cav_xml_child(node, &axis), *m = cav_xml_child(node, &mimic);
   double direction[3] = {1, 0, 0};
   if (a) cav_xml_reals(a, "xyz", direction, 3);
-  if (m) cav_spec_warn(r->spec, m, NULL, "left aside: joint equality is not supported yet, the joint moves by itself");
+  if (m) read_mimic(r->spec, m, name);
   const cav_xml_node *s = cav_xml_child(node, &safety);
   if (s) cav_spec_warn(r->spec, s, NULL, "left aside: soft limits of a controller are not part of the dynamics");
   if (type == FIXED) return;
