@@ -93,8 +93,12 @@ int main(void) {
 }
 TEXT
   flags=$(PKG_CONFIG_PATH=$folder pkg-config --define-variable=prefix="$prefix" --cflags --libs cavort) || return 1
-  gcc -std=c17 -Wall -Werror "$out/user.c" -o "$out/user" $flags && "$out/user" && "$prefix/bin/cavort" help
+  gcc -std=c17 -Wall -Werror "$out/user.c" -o "$out/user" $flags && "$out/user" && "$prefix/bin/cavort" help || return 1
+  gcc -std=c17 -Wall -Wextra -Werror problems/example.c -o "$out/example" $flags && "$out/example"
 }
+
+# the example of README.md is the file that was just built
+example() { awk '/^```$/ { on = 0 } on { print } /^```c$/ { on = 1 }' README.md | cmp - problems/example.c; }
 
 if sh problems/install.sh test; then
   check "build, gcc" build gcc gcc --buildtype=release && tests gcc
@@ -108,7 +112,8 @@ if sh problems/install.sh test; then
     skipped=$((skipped + 1))
     echo "skipped  layout of the text: no clang-format here"
   fi
-  check "install and pkg-config" installed
+  check "install, pkg-config, the example" installed
+  check "the example as README.md has it" example
 else
   failed=1
 fi

@@ -1,0 +1,56 @@
+#!/bin/sh
+# Solves the six motions, one after the other, and writes results/solve.md: time, iterations, what the certificate says.
+# Usage: sh tests/motions.sh [BUILD]   (folder of a release build, by default build)
+# The models that no one here wrote come from $CAVORT_SHARED_MODELS or ../shared/models; rows of absent ones are left out.
+set -eu
+cd "$(dirname "$0")/.."
+build=${1:-build}
+shared=${CAVORT_SHARED_MODELS:-../shared/models}
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+# number NAME SCALE FORMAT: a field of the last verdict
+number() { sed -n "s/^ *\"$1\": \([^,]*\),*$/\1/p" "$work/out/verdict.json" | awk -v s="$2" -v f="$3" '{ printf f, $1 * s }'; }
+
+# row MOTION [MODEL]
+row() {
+  if [ $# -gt 1 ]; then
+    [ -f "$shared/$2" ] || return 0
+    set -- "$1" "$2" --model "$shared/$2"
+  else
+    set -- "$1" "problems/humanoid.xml"
+  fi
+  motion=$1
+  name=$2
+  shift 2
+  "$build/problems/cavort" solve "problems/motions/$motion/problem.xml" -o "$work/out" --threads 1 --quiet "$@" || true
+  certified=$(sed -n 's/^ *"certified": \([a-z]*\),*$/\1/p' "$work/out/verdict.json")
+  [ "$certified" = true ] && certified=yes || certified=no
+  printf '| %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s |\n' "$motion" "$name" "$certified" \
+    "$(number solve_seconds 1 %.1f)" "$(number iterations 1 %d)" "$(number unactuated_force_max 1 %.0e)" \
+    "$(number momentum_defect_rms 100 %.2f)" "$(number penetration_max_m 1000 %.1f)" "$(number slip_mean_m_s 1000 %.0f)" \
+    "$(number replay_same_step_seconds 1 %.2f)" "$(number closed_loop_end_error_m 1000 %.0f)"
+}
+
+{
+  echo "# Six motions"
+  echo
+  echo "\`sh tests/motions.sh\`: one solve each by the own solver from the naive guess, one thread, the default schedule."
+  echo
+  echo "- machine: $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1), $(nproc) processors, load $(cut -d ' ' -f 1 /proc/loadavg)"
+  echo "- compiler: $(cc --version | head -n 1)"
+  echo "- commit: $(git rev-parse --short HEAD)"
+  echo
+  echo "| motion | model | certified | s | iterations | unactuated force, of weight | momentum defect, % | penetration, mm | slip, mm/s | same-step replay within 1e-6, s | closed loop, end, mm |"
+  echo "|---|---|---|---|---|---|---|---|---|---|---|"
+  row squat-jump
+  row squat-jump mujoco/humanoid.xml
+  row squat-jump dm_control/humanoid.xml
+  row hopper-hop dm_control/hopper.xml
+  row walker-jump dm_control/walker.xml
+  row cheetah-jump dm_control/cheetah.xml
+  echo
+  echo "Joint, tendon and actuator limits hold to 1e-6 in every certified row."
+} >"$work/solve.md"
+mv "$work/solve.md" tests/results/solve.md
+cat tests/results/solve.md
