@@ -8,7 +8,7 @@
 /// stiffness at the finer step, and once under the model as its file says (its own solref contacts, exact law).
 /// Between knots the motion is read as what it is to second order: v_{t+1} = (q_{t+1} (-) q_t)/h is the velocity half
 /// way, and h u_t the impulse centred on knot t. So q_ref runs along the geodesic, v_ref is linear between half steps,
-/// and u_t and the gains of knot t hold for half a step either side. README.md has what the alternatives gave.
+/// and u_t and the gains of knot t hold for half a step either side.
 /// optimisation.md, 3 and 6.
 #include <math.h>
 #include <stdio.h>
