@@ -8,7 +8,7 @@
 
 // whether a path can be followed: pieces start and end at sites, geoms stand between two of them, branches are whole
 static void check_path(cav_spec *spec, const cav_spec_tendon *t) {
-  const cav_spec_path *path = spec->path.at + t->path;
+  const cav_spec_path *path = spec->path.at ? spec->path.at + t->path : NULL;
   for (int i = 0; i < t->npath; i++) {
     int before = i > 0 ? (int)path[i - 1].type : CAV_PATH_PULLEY;
     int after = i + 1 < t->npath ? (int)path[i + 1].type : CAV_PATH_PULLEY;

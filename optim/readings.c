@@ -37,7 +37,7 @@ static void read_knot(const cav_model *model, const cav_state *state, void *cont
   value += model->nv;
 
   // contacts stand in the order of pairs and features, so both lists are walked once; one that is gone reads zero
-  const cav_contact *c = state->contact, *end = state->contact + state->ncontact;
+  const cav_contact *c = state->contact, *end = c ? c + state->ncontact : NULL;
   for (int k = 0; k < r->ncontact; k++, value += 4) {
     int pair = r->key[2 * k], feature = r->key[2 * k + 1];
     while (c < end && (c->pair < pair || (c->pair == pair && c->feature < feature))) c++;
