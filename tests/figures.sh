@@ -41,6 +41,8 @@ set ylabel "limit, N m s"
 set xlabel "time, s"
 plot "$data/joint" using 1:8 with lines lw 4 lc "black", "" using 1:9 with lines lw 1.5 lc "#ff8c00"
 END
+  # titles of curves name the file of the data
+  sed -i "s#\"$data/#\"#" "$out/figure2.svg"
 }
 
 figure3() {
