@@ -20,8 +20,7 @@ void cav_mass_pose(const cav_state *state, const cav_body *body, cav_pose *pose)
   pose_in_link(state, body->link, pos, quat, pose);
 }
 
-// link that carries an object; the world's where the kind has no frame
-static int link_of(const cav_model *model, cav_object_type type, int object) {
+int cav_object_link(const cav_model *model, cav_object_type type, int object) {
   switch (type) {
     case CAV_OBJECT_BODY:
     case CAV_OBJECT_XBODY:
@@ -112,7 +111,7 @@ static subtree measure(const cav_model *model, const cav_state *state, int root)
 // velocity of an object's frame at v_next: origin and turning, world axes
 static void frame_velocity(const cav_model *model, const cav_state *state, cav_object_type type, int object,
                            const double point[3], double linear[3], double angular[3]) {
-  int link = link_of(model, type, object);
+  int link = cav_object_link(model, type, object);
   const double *V = state->velocity_next + 6 * link;
   velocity_at(linear, V, state->reference + 3 * link, point);
   copy3(angular, V);
@@ -146,7 +145,7 @@ static void refer_velocity(const cav_model *model, const cav_state *state, const
 static void sense_frame(const cav_model *model, const cav_state *state, const cav_sensor *sensor, double *out) {
   cav_pose pose, from;
   double linear[3], angular[3];
-  int link = link_of(model, sensor->object_type, sensor->object);
+  int link = cav_object_link(model, sensor->object_type, sensor->object);
   cav_object_pose(model, state, sensor->object_type, sensor->object, &pose);
   if (sensor->referred) { cav_object_pose(model, state, sensor->reference_type, sensor->reference, &from); }
   switch (sensor->type) {

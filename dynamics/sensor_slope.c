@@ -23,20 +23,6 @@ static void put3(double *out, int nv, int column, const double x[3]) {
   for (int i = 0; i < 3; i++) put(out, nv, i, column, x[i]);
 }
 
-static int link_of(const cav_model *model, cav_object_type type, int object) {
-  switch (type) {
-    case CAV_OBJECT_BODY:
-    case CAV_OBJECT_XBODY:
-      return model->body[object].link;
-    case CAV_OBJECT_GEOM:
-      return model->geom[object].link;
-    case CAV_OBJECT_SITE:
-      return model->site[object].link;
-    default:
-      return 0;
-  }
-}
-
 static int last_dof(const cav_model *model, int link) {
   while (link > 0 && model->link[link].ndof == 0) link = model->link[link].parent;
   return link > 0 ? model->link[link].dof + model->link[link].ndof - 1 : -1;
@@ -104,7 +90,7 @@ static void frame_column(const task *t, const cav_sensor *sensor, const cav_pose
 }
 
 static void frame(const task *t, const cav_sensor *sensor, cav_object_type type) {
-  int link = link_of(t->model, type, sensor->object);
+  int link = cav_object_link(t->model, type, sensor->object);
   cav_pose pose;
   double V[6];
   cav_object_pose(t->model, t->state, type, sensor->object, &pose);

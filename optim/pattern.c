@@ -42,23 +42,9 @@ static void subtree_pattern(const cav_model *m, int link, char *seen) {
   }
 }
 
-static int object_link(const cav_model *m, cav_object_type type, int object) {
-  switch (type) {
-    case CAV_OBJECT_BODY:
-    case CAV_OBJECT_XBODY:
-      return m->body[object].link;
-    case CAV_OBJECT_GEOM:
-      return m->geom[object].link;
-    case CAV_OBJECT_SITE:
-      return m->site[object].link;
-    default:
-      return 0;
-  }
-}
-
 /// Dofs that move an object's frame.
 static void frame_pattern(const cav_model *m, cav_object_type type, int object, char *seen) {
-  int link = object_link(m, type, object);
+  int link = cav_object_link(m, type, object);
   for (int j = 0; j < m->nv; j++) seen[j] |= (char)moves(m, j, link);
 }
 

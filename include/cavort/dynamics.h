@@ -227,6 +227,9 @@ void cav_momentum(const cav_model *model, cav_state *state, const double *v, dou
 /// (at v_next), accelerations and forces after cav_inverse or cav_forward, which leave them at (q, v, v_next).
 void cav_sense(const cav_model *model, const cav_state *state, const cav_sensor *sensor, double *out);
 
+/// Link that carries an object; the world's, 0, for kinds without a frame.
+int cav_object_link(const cav_model *model, cav_object_type type, int object);
+
 /// World pose of a named kind of object at the state's last position.
 void cav_object_pose(const cav_model *model, const cav_state *state, cav_object_type type, int object, cav_pose *pose);
 
