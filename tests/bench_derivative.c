@@ -3,9 +3,7 @@
 /// of du/dq, which both libraries define alike, relative to its norm, against a sixth-order difference; states at which two
 /// steps of that disagree, at a kink, are left out. A time is the shortest of several runs; shown are medians over states.
 /// Usage: bench_derivative [MODEL]; default mujoco/humanoid.xml among the shared models.
-#include <time.h>
-
-#include "scene.h"
+#include "bench.h"
 #include "stage.h"
 
 #ifndef CAVORT_HAVE_MUJOCO
@@ -14,7 +12,6 @@ int main(void) {
   return CHECK_SKIPPED;
 }
 #else
-#include <mujoco/mujoco.h>
 
 enum { BINS = 8, WIDTH = 10, PER_BIN = 20, DRAWS = 20000, RUNS = 5, METHODS = 4 };
 static const char *const names[METHODS] = {"one-sided", "centred", "analytic", "MuJoCo"};
@@ -30,38 +27,6 @@ static mjData *d;
 static cav_model *model;
 static cav_state *state;
 static double *q, *v, *a, *v_next, *u;
-
-static double seconds(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-// postures from relaxed to cramped, height from clear of the floor to pressed on it
-static void draw(void) {
-  double spread = 0.3 + 0.3 * scene_uniform(), lift = 0.3 * scene_uniform();
-  mj_resetData(m, d);
-  for (int i = 0; i < m->njnt; i++) {
-    double *x = d->qpos + m->jnt_qposadr[i];
-    const double *range = m->jnt_range + 2 * i;
-    if (m->jnt_type[i] == mjJNT_FREE) {
-      for (int k = 3; k < 7; k++) x[k] = scene_normal();
-      mju_normalize4(x + 3);
-    } else if (m->jnt_limited[i]) {
-      *x = 0.5 * (range[0] + range[1]) + spread * (range[1] - range[0]) * scene_uniform();
-    }
-  }
-  mj_kinematics(m, d);
-  double lowest = INFINITY;
-  for (int i = 0; i < m->ngeom; i++) {
-    if (m->geom_bodyid[i] > 0) lowest = fmin(lowest, d->geom_xpos[3 * i + 2] - m->geom_size[3 * i]);
-  }
-  if (m->jnt_type[0] == mjJNT_FREE) d->qpos[2] += lift - lowest;
-  for (int i = 0; i < m->nv; i++) {
-    d->qvel[i] = scene_normal();
-    d->qacc[i] = 20 * scene_normal();
-  }
-}
 
 // keeps the state in d; whether both libraries see it alike
 static int keep(double *expected) {
@@ -135,30 +100,25 @@ static int measure(sample *s, double *x[6], double *moved, double *move) {
   for (int k = 0; k < METHODS; k++) {
     s->time[k] = INFINITY;
     for (int r = 0; r < RUNS; r++) {
-      double t = seconds();
+      double t = bench_seconds();
       if (k < 3) {
         cav_status status = cav_inverse_jacobian_by(model, state, (cav_derivative)k, q, v, v_next, x[0], x[1], x[2]);
         if (status != CAV_OK) return 0;
       } else {
         their_jacobian(x[0], x[1], x[2], x[5], moved, move);
       }
-      s->time[k] = fmin(s->time[k], (seconds() - t) * 1e6);
+      s->time[k] = fmin(s->time[k], (bench_seconds() - t) * 1e6);
     }
     s->error[k] = scene_error(x[0], x[4], nv * nv);
   }
   return 1;
 }
 
-static int ascending(const void *x, const void *y) {
-  double left = *(const double *)x, right = *(const double *)y;
-  return (left > right) - (left < right);
-}
-
 // median of one number of n samples, by its offset
 static double median(const sample *s, int n, size_t offset) {
   double x[PER_BIN];
   for (int i = 0; i < n; i++) x[i] = *(const double *)((const char *)&s[i] + offset);
-  qsort(x, (size_t)n, sizeof *x, ascending);
+  qsort(x, (size_t)n, sizeof *x, bench_ascending);
   return x[n / 2];
 }
 
@@ -213,7 +173,7 @@ int main(int argc, char **argv) {
   double *x[6], *moved = scene_vector(m->nq), *move = scene_vector(nv), *expected = scene_vector(nv);
   for (int k = 0; k < 6; k++) x[k] = scene_vector(nv * nv);
   for (int k = 0; k < DRAWS; k++) {
-    draw();
+    bench_draw(m, d);
     mj_inverse(m, d);
     int b = (d->nefc + WIDTH - 1) / WIDTH;
     if (b >= BINS || count[b] == PER_BIN || !keep(expected)) continue;

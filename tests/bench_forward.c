@@ -4,9 +4,7 @@
 /// their Jacobian grows large: condim 6. Beside them Newton's method to convergence, whose answer is exact.
 /// Times are the shortest of several runs of one state, the four by turns; shown are medians over the states of a bin.
 /// Usage: bench_forward [FILE]; FILE gets the table in columns. tests/figures.sh draws it.
-#include <time.h>
-
-#include "scene.h"
+#include "bench.h"
 
 enum { WIDTH = 6, BINS = 20, PER_BIN = 40, STEPS = 300000, RUNS = 7, METHODS = 4 };
 static const char model_path[] = CAVORT_SOURCE_ROOT "/problems/humanoid.xml";
@@ -21,12 +19,6 @@ typedef struct sample {
 static cav_model *model;
 static cav_state *state;
 static double *found;
-
-static double seconds(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 // the humanoid with six rows for every contact
 static cav_model *load(void) {
@@ -84,22 +76,17 @@ static void measure(sample *s) {
     for (int k = 0; k < METHODS; k++) {
       int calls = k == 0 ? 10 : 1;
       call(k, s);
-      double t = seconds();
+      double t = bench_seconds();
       for (int c = 0; c < calls; c++) call(k, s);
-      s->time[k] = fmin(s->time[k], 1e6 * (seconds() - t) / calls);
+      s->time[k] = fmin(s->time[k], 1e6 * (bench_seconds() - t) / calls);
     }
   }
-}
-
-static int ascending(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
 }
 
 static double median(const sample *s, int n, int method, int ratio) {
   double x[PER_BIN];
   for (int i = 0; i < n; i++) x[i] = ratio ? s[i].time[method] / s[i].time[0] : s[i].time[method];
-  qsort(x, (size_t)n, sizeof *x, ascending);
+  qsort(x, (size_t)n, sizeof *x, bench_ascending);
   return x[n / 2];
 }
 
@@ -110,10 +97,10 @@ typedef struct agreement {
 
 static void agree(agreement *a, int at, const sample *s, int newton) {
   cav_forward_report report = {0};
-  double t = seconds();
+  double t = bench_seconds();
   cav_status status = newton ? cav_forward_newton(model, state, s->q, s->v, s->u, 200, 1e-12, found, &report)
                              : cav_forward_gpgs(model, state, s->q, s->v, s->u, 100000, 1e-12, found, &report);
-  a->time[at] = 1e6 * (seconds() - t);
+  a->time[at] = 1e6 * (bench_seconds() - t);
   if (status != CAV_OK && status != CAV_NOT_CONVERGED) return;
   a->iterations = fmax(a->iterations, report.iterations);
   a->mismatch = fmax(a->mismatch, report.mismatch);
@@ -136,7 +123,7 @@ static void agreements(const sample *s, int n, int rows) {
   for (int newton = 0; newton < 2; newton++) {
     agreement a = {0};
     for (int i = 0; i < n; i++) agree(&a, i, &s[i], newton);
-    qsort(a.time, (size_t)n, sizeof *a.time, ascending);
+    qsort(a.time, (size_t)n, sizeof *a.time, bench_ascending);
     printf("%3d - %-5d %-12s inverse(forward) within %.1e of the largest u, %.0f iterations at most, %.0f us", rows,
            rows + WIDTH - 1, solver[newton], a.residual, a.iterations, a.time[n / 2]);
     if (newton)

@@ -2,9 +2,7 @@
 /// number of constraint rows. A time is the shortest of several short runs of one state; shown are the median over
 /// states and the middle half. Prints the work done beside the time, and the share of the stages of ours.
 /// Usage: bench_inverse [MODEL]; default mujoco/humanoid.xml among the shared models.
-#include <time.h>
-
-#include "scene.h"
+#include "bench.h"
 #include "stage.h"
 
 #ifndef CAVORT_HAVE_MUJOCO
@@ -13,7 +11,6 @@ int main(void) {
   return CHECK_SKIPPED;
 }
 #else
-#include <mujoco/mujoco.h>
 
 enum { BINS = 8, WIDTH = 10, PER_BIN = 40, DRAWS = 40000, RUNS = 15, CALLS = 10 };
 
@@ -29,38 +26,6 @@ static mjData *d;
 static cav_model *model;
 static cav_state *state;
 static double *u;
-
-static double seconds(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-// postures from relaxed to cramped, height from clear of the floor to pressed on it
-static void draw(void) {
-  double spread = 0.3 + 0.3 * scene_uniform(), lift = 0.3 * scene_uniform();
-  mj_resetData(m, d);
-  for (int i = 0; i < m->njnt; i++) {
-    double *q = d->qpos + m->jnt_qposadr[i];
-    const double *range = m->jnt_range + 2 * i;
-    if (m->jnt_type[i] == mjJNT_FREE) {
-      for (int k = 3; k < 7; k++) q[k] = scene_normal();
-      mju_normalize4(q + 3);
-    } else if (m->jnt_limited[i]) {
-      *q = 0.5 * (range[0] + range[1]) + spread * (range[1] - range[0]) * scene_uniform();
-    }
-  }
-  mj_kinematics(m, d);
-  double lowest = INFINITY;
-  for (int i = 0; i < m->ngeom; i++) {
-    if (m->geom_bodyid[i] > 0) lowest = fmin(lowest, d->geom_xpos[3 * i + 2] - m->geom_size[3 * i]);
-  }
-  if (m->jnt_type[0] == mjJNT_FREE) d->qpos[2] += lift - lowest;
-  for (int i = 0; i < m->nv; i++) {
-    d->qvel[i] = scene_normal();
-    d->qacc[i] = 20 * scene_normal();
-  }
-}
 
 static double *kept(const double *x, int n) {
   double *copy = scene_vector(n);
@@ -95,27 +60,22 @@ static void run(sample *s) {
   mju_copy(d->qpos, s->q, m->nq);
   mju_copy(d->qvel, s->v, m->nv);
   mju_copy(d->qacc, s->a, m->nv);
-  double t = seconds();
+  double t = bench_seconds();
   for (int k = 0; k < CALLS; k++) mj_inverse(m, d);
-  s->theirs = fmin(s->theirs, (seconds() - t) * 1e6 / CALLS);
-  t = seconds();
+  s->theirs = fmin(s->theirs, (bench_seconds() - t) * 1e6 / CALLS);
+  t = bench_seconds();
   for (int k = 0; k < CALLS; k++) cav_inverse(model, state, s->q, s->v, s->v_next, u);
-  s->ours = fmin(s->ours, (seconds() - t) * 1e6 / CALLS);
-  t = seconds();
+  s->ours = fmin(s->ours, (bench_seconds() - t) * 1e6 / CALLS);
+  t = bench_seconds();
   for (int k = 0; k < CALLS; k++) cav_inverse_from(model, state, CAV_STAGE_POSITION, s->q, s->v, s->v_next, u);
-  s->from_position = fmin(s->from_position, (seconds() - t) * 1e6 / CALLS);
-}
-
-static int ascending(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
+  s->from_position = fmin(s->from_position, (bench_seconds() - t) * 1e6 / CALLS);
 }
 
 // quantile of something of n samples
 static double quantile(const sample *s, int n, double share, double (*of)(const sample *)) {
   double x[PER_BIN];
   for (int i = 0; i < n; i++) x[i] = of(&s[i]);
-  qsort(x, (size_t)n, sizeof *x, ascending);
+  qsort(x, (size_t)n, sizeof *x, bench_ascending);
   return x[(int)(share * (n - 1) + 0.5)];
 }
 
@@ -152,7 +112,7 @@ static void stages(sample bin[BINS][PER_BIN], const int *count) {
         for (int i = 0; i < count[b]; i++, n++) {
           const sample *s = &bin[b][i];
           cav_inverse(model, state, s->q, s->v, s->v_next, u);
-          double t = seconds();
+          double t = bench_seconds();
           for (int c = 0; c < CALLS; c++) {
             switch (k) {
               case 0:
@@ -171,7 +131,7 @@ static void stages(sample bin[BINS][PER_BIN], const int *count) {
                 cav_inverse_from(model, state, CAV_STAGE_POSITION, s->q, s->v, s->v_next, u);
             }
           }
-          sum += seconds() - t;
+          sum += bench_seconds() - t;
         }
       }
       best = fmin(best, sum * 1e6 / CALLS / n);
@@ -228,12 +188,12 @@ static void jacobians(sample bin[BINS][PER_BIN], const int *count) {
       sample *s = &bin[b][i];
       s->ours = s->theirs = INFINITY;
       for (int r = 0; r < 3; r++) {
-        double t = seconds();
+        double t = bench_seconds();
         their_jacobian(s, x[0], x[1], x[2], base);
-        s->theirs = fmin(s->theirs, (seconds() - t) * 1e6);
-        t = seconds();
+        s->theirs = fmin(s->theirs, (bench_seconds() - t) * 1e6);
+        t = bench_seconds();
         cav_inverse_jacobian(model, state, s->q, s->v, s->v_next, x[0], x[1], x[2]);
-        s->ours = fmin(s->ours, (seconds() - t) * 1e6);
+        s->ours = fmin(s->ours, (bench_seconds() - t) * 1e6);
       }
     }
     if (n == 0) continue;
@@ -277,7 +237,7 @@ int main(int argc, char **argv) {
   int refused = 0;
   double *v_next = scene_vector(m->nv), *expected = scene_vector(m->nv);
   for (int k = 0; k < DRAWS; k++) {
-    draw();
+    bench_draw(m, d);
     mj_inverse(m, d);
     int b = (d->nefc + WIDTH - 1) / WIDTH;
     if (b >= BINS || count[b] == PER_BIN) continue;

@@ -2,19 +2,11 @@
 /// and factorisation, by method of derivatives. The motion is a stance from which every joint is moved a little, under the
 /// contact law of the schedule's first, middle and last stage. Times are the shortest of several runs.
 /// Usage: bench_iteration [PROBLEM]; default problems/motions/squat-jump.
-#include <time.h>
-
+#include "bench.h"
 #include "continuation.h"
-#include "scene.h"
 #include "transcription.h"
 
 enum { KNOTS = 40, RUNS = 15 };
-
-static double seconds(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 static void shake(cav_trajectory *at, const cav_model *m, double size) {
   double *step = scene_vector(m->nv), *moved = scene_vector(m->nq);
@@ -32,13 +24,13 @@ static void measure(cav_transcription *tr, cav_normal *normal, cav_trajectory *a
   double best[4] = {INFINITY, INFINITY, INFINITY, INFINITY};
   for (int r = 0; r < RUNS; r++) {
     tr->seconds_dynamics = tr->seconds_assembly = 0;
-    double start = seconds();
+    double start = bench_seconds();
     CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
-    double gather = seconds();
+    double gather = bench_seconds();
     cav_normal_gather(normal, tr);
-    double factor = seconds();
+    double factor = bench_seconds();
     CHECK(cav_normal_factor(normal, 1e-6) == CAV_OK);
-    double end = seconds();
+    double end = bench_seconds();
     double part[4] = {tr->seconds_dynamics, tr->seconds_assembly + factor - gather, end - factor, end - start};
     for (int k = 0; k < 4; k++) best[k] = fmin(best[k], 1e3 * part[k]);
   }
