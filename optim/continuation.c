@@ -10,11 +10,11 @@
 /// Weights of ranges while they are only priced; rows are scaled, so these serve all models.
 static const cav_penalties priced = {.effort = 100, .range = 1000, .term = 100};
 
-/// Augmented Lagrangian: rounds, iterations a round, tolerance of a round, and the unactuated force from which projection is safe.
+/// Augmented Lagrangian: rounds, iterations a round, tolerance of a round, and the unactuated force from which restoration is safe.
 enum { ROUNDS = 6, ROUND_ITERATIONS = 15 };
 static const double round_tolerance = 1e-5, near = 1e-3;
 
-/// Projection onto the constraints: iterations, and how far below the tolerance it aims.
+/// Restoration: iterations of each of its two attempts.
 enum { RESTORATIONS = 30 };
 
 /// Diagnosis: iterations towards the least violation, and the relative decrease that ends them.

@@ -42,6 +42,17 @@ static const char scene_joints[] =
     "<actuator><motor name='ms' joint='s' gear='2'/><motor name='mh' joint='h' gear='-3'/>"
     "<motor name='mt' tendon='string' gear='5'/><motor name='ms2' joint='s' gear='4'/></actuator></mujoco>";
 
+/// Writes a text as folder/name; a failed check where that cannot be.
+static inline void scene_write(const char *folder, const char *name, const char *text) {
+  char path[400];
+  snprintf(path, sizeof path, "%.250s/%.140s", folder, name);
+  FILE *file = fopen(path, "w");
+  CHECK(file != NULL);
+  if (!file) return;
+  fputs(text, file);
+  fclose(file);
+}
+
 /// The model of an MJCF text, through a temporary file; NULL with a message if it does not load.
 static inline cav_model *scene_load(const char *text) {
   char path[] = "/tmp/cavort-test-XXXXXX";

@@ -3,8 +3,8 @@
 #include <unistd.h>
 
 #include "cavort/cavort.h"
-#include "check.h"
 #include "rows.h"
+#include "scene.h"
 
 static char folder[] = "/tmp/cavort-explain-XXXXXX";
 
@@ -28,16 +28,6 @@ static const char stilt[] =
     "<geom name='sole' type='sphere' size='.1' mass='1'/></body></body></worldbody>"
     "<actuator><motor name='leg' joint='leg' gear='400' ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>";
 
-static void write_in(const char *name, const char *text) {
-  char path[160];
-  snprintf(path, sizeof path, "%s/%s", folder, name);
-  FILE *file = fopen(path, "w");
-  CHECK(file != NULL);
-  if (!file) return;
-  fputs(text, file);
-  fclose(file);
-}
-
 typedef struct outcome {
   cav_problem *problem;
   cav_solution *solution;
@@ -49,12 +39,12 @@ static outcome solve(const char *model, const char *terms) {
   char path[160], text[4000];
   cav_error error = {0};
   outcome out = {0};
-  write_in("model.xml", model);
+  scene_write(folder, "model.xml", model);
   snprintf(text, sizeof text,
            "<problem name='p' model='model.xml'>\n<horizon duration='1' timestep='.05'/>\n<start%s/>\n%s"
            "</problem>\n",
            strstr(model, "floor") ? " height='floor'" : "", terms);
-  write_in("problem.xml", text);
+  scene_write(folder, "problem.xml", text);
   snprintf(path, sizeof path, "%s/problem.xml", folder);
   out.problem = cav_problem_load(path, NULL, &error);
   CHECK(out.problem != NULL);
@@ -229,13 +219,13 @@ static void check_rows(void) {
     CHECK(status == CAV_BAD_INPUT && names(error.text, "not of this problem"));
   }
   free(row);
-  write_in("rows.csv", "knot,time\n1,2\n");
+  scene_write(folder, "rows.csv", "knot,time\n1,2\n");
   CHECK(cav_rows_read(path, &n, &row, &error) == CAV_BAD_INPUT && n == 0 && !row && names(error.text, "rows.csv:1:"));
-  write_in("rows.csv",
-           "knot,time,kind,object,component,value,lower,upper,allowed,multiplier,pull\n1,.05,9,0,0,0,0,0,0,0,0\n");
+  scene_write(folder, "rows.csv",
+              "knot,time,kind,object,component,value,lower,upper,allowed,multiplier,pull\n1,.05,9,0,0,0,0,0,0,0,0\n");
   CHECK(cav_rows_read(path, &n, &row, &error) == CAV_BAD_INPUT && !row && names(error.text, "rows.csv:2:"));
-  write_in("rows.csv",
-           "knot,time,kind,object,component,value,lower,upper,allowed,multiplier,pull\n1.5,.05,1,0,0,0,0,0,0,0,0\n");
+  scene_write(folder, "rows.csv",
+              "knot,time,kind,object,component,value,lower,upper,allowed,multiplier,pull\n1.5,.05,1,0,0,0,0,0,0,0,0\n");
   CHECK(cav_rows_read(path, &n, &row, &error) == CAV_BAD_INPUT && !row && names(error.text, "'knot'"));
   done(&o);
 }

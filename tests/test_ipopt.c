@@ -4,7 +4,7 @@
 #include <unistd.h>
 
 #include "cavort/cavort.h"
-#include "check.h"
+#include "scene.h"
 
 #ifndef CAVORT_HAVE_IPOPT
 int main(void) {
@@ -29,21 +29,11 @@ static const char raise[] =
     "<constraint><sensor name='high' type='framepos' site='tip' component='z' lower='2.6' "
     "at='.6'/></constraint>\n</problem>";
 
-static void write_in(const char *name, const char *text) {
-  char path[160];
-  snprintf(path, sizeof path, "%s/%s", folder, name);
-  FILE *file = fopen(path, "w");
-  CHECK(file != NULL);
-  if (!file) return;
-  fputs(text, file);
-  fclose(file);
-}
-
 static cav_problem *load(const char *element) {
   char text[1000], path[160];
   cav_error error = {0};
   snprintf(text, sizeof text, raise, element);
-  write_in("problem.xml", text);
+  scene_write(folder, "problem.xml", text);
   snprintf(path, sizeof path, "%s/problem.xml", folder);
   cav_problem *problem = cav_problem_load(path, NULL, &error);
   CHECK(problem != NULL);
@@ -139,9 +129,9 @@ static void check_limited_memory(const cav_problem *problem) {
 
 int main(void) {
   if (!mkdtemp(folder) || chdir(folder) != 0) return EXIT_FAILURE;
-  write_in("arm.xml", arm);
+  scene_write(folder, "arm.xml", arm);
   // would end every run after its start
-  write_in("ipopt.opt", "max_iter 0\n");
+  scene_write(folder, "ipopt.opt", "max_iter 0\n");
   cav_problem *problem = load("");
   if (problem) {
     check_both(problem);

@@ -5,9 +5,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "check.h"
 #include "command.h"
 #include "result.h"
+#include "scene.h"
 
 static char top[] = "/tmp/cavort-study-XXXXXX";
 
@@ -25,21 +25,11 @@ static const char swing[] =
     "name='turn' "
     "pos='.5'/></goal>\n<cost><posture at='end' weight='100'/></cost></problem>";
 
-static void write_in(const char *name, const char *text) {
-  char path[160];
-  snprintf(path, sizeof path, "%s/%s", top, name);
-  FILE *file = fopen(path, "w");
-  CHECK(file != NULL);
-  if (!file) return;
-  fputs(text, file);
-  fclose(file);
-}
-
 static cav_model *load_cart(double friction, double cart_mass, double pole_mass) {
   char text[2000], path[160];
   cav_error error = {0};
   snprintf(text, sizeof text, cart, friction, cart_mass, friction, pole_mass, friction);
-  write_in("cart.xml", text);
+  scene_write(top, "cart.xml", text);
   snprintf(path, sizeof path, "%s/cart.xml", top);
   cav_model *model = cav_model_load(path, &error);
   CHECK(model != NULL);
@@ -112,7 +102,8 @@ static void check_command(char *problem) {
   CHECK(strstr(read_file(folder, "study.csv"), "swing,own,9,1,") != NULL);
   struct stat before, after;
   CHECK(stat(record, &before) == 0);
-  write_in("study/runs/swing.own.5.csv", "certified,seconds,iterations,cost,unactuated,end_error\n0,1,2,3,4,5\n");
+  scene_write(top, "study/runs/swing.own.5.csv",
+              "certified,seconds,iterations,cost,unactuated,end_error\n0,1,2,3,4,5\n");
   unlink(record);
   CHECK(cav_command_study(&line) == CAV_EXIT_NOT_CERTIFIED);
   CHECK(stat(record, &after) == 0);
@@ -130,7 +121,7 @@ int main(void) {
   char problem[160], command[200];
   check_vary();
   cav_model_free(load_cart(1, 2, 0.5));
-  write_in("swing.xml", swing);
+  scene_write(top, "swing.xml", swing);
   snprintf(problem, sizeof problem, "%s/swing.xml", top);
   check_starts(problem);
   check_command(problem);
