@@ -302,6 +302,36 @@ static cav_status read_swings(const cav_problem_reader *reader, const cav_xml_no
   return CAV_OK;
 }
 
+// <waypoint> of a guess
+static cav_status read_guess_poses(const cav_problem_reader *reader, const cav_xml_node *node) {
+  cav_problem *p = reader->problem;
+  const cav_model *m = reader->model;
+  const cav_xml_node *first = cav_problem_child(node, "waypoint");
+  int n = 0;
+  for (const cav_xml_node *w = first; w; w = cav_xml_next(w)) n++;
+  if (n == 0) return CAV_OK;
+  if (p->guess == CAV_GUESS_HOLD)
+    return cav_xml_fail(reader->error, first, NULL, "contradicts type='hold'; remove one of the two");
+  cav_guess_pose *list = cav_problem_alloc(reader->owner, (size_t)n * sizeof *list);
+  double *q = cav_problem_alloc(reader->owner, (size_t)n * (size_t)m->nq * sizeof *q), before = 0;
+  if (!list || !q) return cav_problem_no_memory(reader);
+  p->guess_pose = list;
+  for (const cav_xml_node *w = first; w; w = cav_xml_next(w), q += m->nq) {
+    double time = cav_xml_real(w, "time", 0);
+    if (!(time > before && time < p->duration)) {
+      return cav_xml_fail(reader->error, w, "time",
+                          "expected a time after the posture before, %g s, and before the goal, %g s, got %g", before,
+                          p->duration, time);
+    }
+    cav_status status = cav_problem_pose(reader, w, q);
+    if (!status) status = check_ranges(reader, w, q);
+    if (status) return status;
+    list[p->nguess_pose++] = (cav_guess_pose){time, q};
+    before = time;
+  }
+  return CAV_OK;
+}
+
 static cav_status read_guess(const cav_problem_reader *reader) {
   cav_problem *p = reader->problem;
   const cav_xml_node *node = cav_problem_child(reader->root, "guess");
@@ -313,7 +343,8 @@ static cav_status read_guess(const cav_problem_reader *reader) {
   cav_xml_reals(node, "turn", turn, 3);
   for (int i = 0; i < 3; i++) p->guess_turn[i] = turn[i] * M_PI / 180;
   int turned = turn[0] != 0 || turn[1] != 0 || turn[2] != 0;
-  cav_status status = read_swings(reader, node);
+  cav_status status = read_guess_poses(reader, node);
+  if (!status) status = read_swings(reader, node);
   if (!status) status = real(reader, node, "apex", 0, DBL_MAX, &p->guess_height);
   if (!status) status = cav_problem_window(reader, node, &p->guess_from, &p->guess_to);
   if (status) return status;

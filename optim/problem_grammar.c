@@ -149,9 +149,11 @@ static const cav_xml_element horizon = {
     0};
 static const cav_xml_element swing = {
     "swing", 0, 0, ATTRIBUTES(TEXT("joint", 1), REAL("amplitude", 1), REAL("frequency", 1), REAL("phase", 0)), NULL, 0};
+static const cav_xml_element guess_waypoint = {
+    "waypoint", 0, 0, ATTRIBUTES(REAL("time", 1), POSE_SOURCE), CHILDREN(&pose_root, &pose_joint), 0};
 static const cav_xml_element guess = {
     "guess", 0, 1, ATTRIBUTES(WORD("type", cav_problem_guesses), REAL("apex", 0), REALS("turn", 3, 3), TEXT("from", 0), TEXT("to", 0)),
-    CHILDREN(&swing), 0};
+    CHILDREN(&guess_waypoint, &swing), 0};
 static const cav_xml_element limits = {"limits", 0, 1, ATTRIBUTES(REAL("effort", 0), REAL("margin", 0)), NULL, 0};
 #define STAGE                                                                                                \
   ATTRIBUTES(REAL("softness", 0), REAL("time_constant", 0), REAL("smoothing", 0), REAL("smoothing_self", 0), \

@@ -244,6 +244,37 @@ static void write_contact(FILE *out, const cav_options *o) {
   fputs("/>\n", out);
 }
 
+static void write_guess(FILE *out, const cav_problem *p) {
+  const cav_model *m = p->model;
+  double turn[3];
+  for (int i = 0; i < 3; i++) turn[i] = p->guess_turn[i] * 180 / M_PI;
+  int turned = turn[0] != 0 || turn[1] != 0 || turn[2] != 0;
+  fputs("  <guess", out);
+  write_text(out, "type", cav_problem_guesses[p->guess]);
+  if (p->guess_height > 0) write_number(out, "apex", p->guess_height);
+  if (turned) write_numbers(out, "turn", turn, 3);
+  if (turned || p->guess_height > 0) {
+    write_number(out, "from", p->guess_from);
+    write_number(out, "to", p->guess_to);
+  }
+  fputs(p->nguess_pose || p->nswing ? ">\n" : "/>\n", out);
+  for (int i = 0; i < p->nguess_pose; i++) {
+    fputs("    <waypoint", out);
+    write_number(out, "time", p->guess_pose[i].time);
+    write_numbers(out, "qpos", p->guess_pose[i].q, m->nq);
+    fputs("/>\n", out);
+  }
+  for (int i = 0; i < p->nswing; i++) {
+    fputs("    <swing", out);
+    write_text(out, "joint", m->joint[p->swing[i].joint].name);
+    write_number(out, "amplitude", p->swing[i].amplitude);
+    write_number(out, "frequency", p->swing[i].frequency);
+    write_number(out, "phase", p->swing[i].phase * 180 / M_PI);
+    fputs("/>\n", out);
+  }
+  if (p->nguess_pose || p->nswing) fputs("  </guess>\n", out);
+}
+
 static void write_head(FILE *out, const cav_problem *p, const char *model_path) {
   const cav_model *m = p->model;
   fputs("<problem", out);
@@ -259,27 +290,8 @@ static void write_head(FILE *out, const cav_problem *p, const char *model_path) 
   write_numbers(out, "qvel", p->v_start, m->nv);
   fputs("/>\n  <goal", out);
   write_numbers(out, "qpos", p->q_goal, m->nq);
-  fputs("/>\n  <guess", out);
-  write_text(out, "type", cav_problem_guesses[p->guess]);
-  if (p->guess_height > 0) { write_number(out, "apex", p->guess_height); }
-  double turn[3];
-  for (int i = 0; i < 3; i++) turn[i] = p->guess_turn[i] * 180 / M_PI;
-  int turned = turn[0] != 0 || turn[1] != 0 || turn[2] != 0;
-  if (turned) write_numbers(out, "turn", turn, 3);
-  if (turned || p->guess_height > 0) {
-    write_number(out, "from", p->guess_from);
-    write_number(out, "to", p->guess_to);
-  }
-  fputs(p->nswing ? ">\n" : "/>\n", out);
-  for (int i = 0; i < p->nswing; i++) {
-    fputs("    <swing", out);
-    write_text(out, "joint", m->joint[p->swing[i].joint].name);
-    write_number(out, "amplitude", p->swing[i].amplitude);
-    write_number(out, "frequency", p->swing[i].frequency);
-    write_number(out, "phase", p->swing[i].phase * 180 / M_PI);
-    fputs("/>\n", out);
-  }
-  if (p->nswing) fputs("  </guess>\n", out);
+  fputs("/>\n", out);
+  write_guess(out, p);
 }
 
 static void write_tail(FILE *out, const cav_problem *p) {

@@ -367,6 +367,7 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
   if (status) return status;
   printf("  %d unknowns; the guess %s", (knots - 1) * p->model->nv,
          p->guess == CAV_GUESS_HOLD ? "holds the start" : "goes from start to goal");
+  if (p->nguess_pose > 0) printf(" by %d postures", p->nguess_pose);
   if (p->guess_height > 0) printf(", with an arc of %g m from %g to %g s", p->guess_height, p->guess_from, p->guess_to);
   printf("\n  actuators up to %g of their limits, joints and tendons %g rad or m inside theirs\n", p->effort_limit,
          p->limit_margin);

@@ -68,6 +68,12 @@ typedef struct cav_swing {
 
 typedef enum cav_guess { CAV_GUESS_HOLD, CAV_GUESS_INTERPOLATE } cav_guess;
 
+/// A posture that the guess passes.
+typedef struct cav_guess_pose {
+  double time;     ///< s
+  const double *q; ///< [nq]
+} cav_guess_pose;
+
 /// One stage of the continuation (optimisation.md, 5).
 typedef struct cav_stage_options {
   double softness;       ///< epsilon of the contacts
@@ -104,6 +110,9 @@ typedef struct cav_problem {
   double guess_height;         ///< m: ballistic arc added to the guess over guess_from .. guess_to
   double guess_from, guess_to; ///< s
   double guess_turn[3]; ///< rotation vector that the first free joint's guess makes over guess_from .. guess_to, rad
+  int nguess_pose;
+  const cav_guess_pose
+      *guess_pose; ///< [nguess_pose], times increasing within the horizon: postures on the way to the goal
   int nswing;
   cav_swing *swing; ///< [nswing]
   int nterm;

@@ -1,0 +1,156 @@
+/// optim/guess.c: the held start, the way from start to goal, postures on the way, turns, arcs and swings, each at its knots;
+/// and what a problem file may not ask of a guess.
+#include <unistd.h>
+
+#include "check.h"
+#include "continuation.h"
+#include "scene.h"
+
+static char folder[] = "/tmp/cavort-guess-XXXXXX";
+static char path[128], model_path[128];
+
+static const char model[] =
+    "<mujoco model='m'><worldbody><geom type='plane' size='1 1 1'/><body name='a' pos='0 0 1'><freejoint/>"
+    "<geom type='sphere' size='.1'/><body name='b' pos='0 0 .3'><joint name='knee' axis='0 1 0' limited='true' "
+    "range='-90 10'/><geom type='sphere' size='.1'/></body></body></worldbody></mujoco>";
+
+#define HEAD                                                                                   \
+  "<problem model='m.xml'>\n<horizon duration='1' timestep='.1'/>\n<start><root pos='0 0 2'/>" \
+  "</start>\n<goal><root pos='1 0 2' euler='0 0 90'/></goal>\n"
+#define TAIL "\n</problem>\n"
+#define POSES                                                                                           \
+  "<pose name='bent'><root pos='0 3 5' euler='0 60 0'/><joint name='knee' pos='-1'/></pose>\n<guess>\n" \
+  "<waypoint time='.2' key='bent' height='floor'/>\n<waypoint time='.6' key='bent'/></guess>"
+
+/// The guess of a problem as trajectory; NULL and a failed check where there is none.
+static cav_trajectory *guess(const char *text, cav_problem **problem) {
+  cav_error error = {0};
+  scene_write(folder, "p.xml", text);
+  *problem = cav_problem_load(path, NULL, &error);
+  CHECK(*problem != NULL);
+  if (!*problem) {
+    fprintf(stderr, "    %s\n", error.text);
+    return NULL;
+  }
+  cav_trajectory *at = cav_trajectory_new((*problem)->model, 11, .1);
+  CHECK(at != NULL);
+  if (at) cav_guess_fill(*problem, at);
+  return at;
+}
+
+/// Root position and angle of the knee at a knot; differences of a few roundings, 1e-16 seen.
+static void check_knot(const cav_trajectory *at, int knot, const double root[3], double knee) {
+  CHECK_NEAR_ALL(at->q + knot * at->nq, root, 3, 1e-14);
+  CHECK_NEAR(at->q[knot * at->nq + 7], knee, 1e-14);
+}
+
+/// Orientation at a knot, as angle about an axis, rad; 2e-16 seen.
+static void check_turned(const cav_trajectory *at, int knot, int axis, double angle) {
+  double w[4] = {cos(angle / 2), 0, 0, 0}, sign = 1;
+  w[1 + axis] = sin(angle / 2);
+  const double *q = at->q + knot * at->nq + 3;
+  for (int i = 0; i < 4; i++) sign = fabs(w[i]) > 0.5 && w[i] * q[i] < 0 ? -1 : sign;
+  for (int i = 0; i < 4; i++) CHECK_NEAR(sign * q[i], w[i], 1e-14);
+}
+
+static void check_ways(void) {
+  cav_problem *p;
+  cav_trajectory *at = guess(HEAD TAIL, &p);
+  // cubic from rest to rest
+  if (at) {
+    check_knot(at, 0, (double[]){0, 0, 2}, 0);
+    check_knot(at, 3, (double[]){.3 * .3 * 2.4, 0, 2}, 0);
+    check_knot(at, 10, (double[]){1, 0, 2}, 0);
+    check_turned(at, 5, 2, M_PI / 4);
+  }
+  cav_trajectory_free(at);
+  cav_problem_free(p);
+
+  at = guess(HEAD "<guess type='hold' apex='1' turn='0 360 0' from='.2' to='.8'/>" TAIL, &p);
+  // the start, with an arc and one turn between two times
+  if (at) {
+    check_knot(at, 2, (double[]){0, 0, 2}, 0);
+    check_knot(at, 5, (double[]){0, 0, 3}, 0);
+    check_knot(at, 8, (double[]){0, 0, 2}, 0);
+    check_turned(at, 5, 1, M_PI);
+    check_turned(at, 9, 1, 2 * M_PI);
+  }
+  cav_trajectory_free(at);
+  cav_problem_free(p);
+
+  at = guess(HEAD "<guess type='hold'><swing joint='knee' amplitude='1' frequency='.5' phase='180'/></guess>" TAIL, &p);
+  // full height at half time; the range holds on the other side
+  if (at) check_knot(at, 5, (double[]){0, 0, 2}, -1);
+  cav_trajectory_free(at);
+  cav_problem_free(p);
+}
+
+static void check_postures(void) {
+  cav_problem *p;
+  cav_trajectory *at = guess(HEAD POSES TAIL, &p);
+  // the postures at their times, lines between; the first lies on the floor
+  if (at) {
+    CHECK(p->nguess_pose == 2 && p->guess_pose[0].time == .2 && p->guess_pose[1].time == .6);
+    double low = p->guess_pose[0].q[2];
+    CHECK_NEAR(low, .1, 1e-14);
+    check_knot(at, 0, (double[]){0, 0, 2}, 0);
+    check_knot(at, 1, (double[]){0, 1.5, (2 + low) / 2}, -.5);
+    check_knot(at, 2, (double[]){0, 3, low}, -1);
+    check_knot(at, 3, (double[]){0, 3, low + (5 - low) / 4}, -1);
+    check_knot(at, 6, (double[]){0, 3, 5}, -1);
+    check_knot(at, 8, (double[]){.5, 1.5, 3.5}, -.5);
+    check_knot(at, 10, (double[]){1, 0, 2}, 0);
+    check_turned(at, 1, 1, M_PI / 6);
+    check_turned(at, 4, 1, M_PI / 3);
+    check_turned(at, 10, 2, M_PI / 2);
+  }
+  cav_trajectory_free(at);
+  if (!p) return;
+
+  // as a result folder has it
+  cav_error error = {0};
+  CHECK(cav_problem_write(path, p, NULL, &error) == CAV_OK);
+  cav_problem *again = cav_problem_load(path, NULL, &error);
+  CHECK(again && again->nguess_pose == 2);
+  for (int i = 0; i < 2 && again; i++) {
+    CHECK(again->guess_pose[i].time == p->guess_pose[i].time);
+    CHECK_NEAR_ALL(again->guess_pose[i].q, p->guess_pose[i].q, 8, 0);
+  }
+  cav_problem_free(again);
+  cav_problem_free(p);
+}
+
+/// A file that must fail at that line with that text.
+static void refuse(const char *text, int line, const char *part) {
+  cav_error error = {0};
+  scene_write(folder, "p.xml", text);
+  cav_problem *p = cav_problem_load(path, NULL, &error);
+  CHECK(!p && error.line == line && strstr(error.text, part));
+  if (p || error.line != line || !strstr(error.text, part)) fprintf(stderr, "    %d: %s\n", error.line, error.text);
+  cav_problem_free(p);
+}
+
+static void check_broken(void) {
+  refuse(HEAD "<guess>\n<waypoint key='bent'/></guess>" TAIL, 6, "'time': is missing");
+  refuse(HEAD "<guess>\n<waypoint time='.5' key='bent'/></guess>" TAIL, 6, "has a keyframe or pose");
+  refuse(HEAD "<guess>\n<waypoint time='0'/></guess>" TAIL, 6, "after the posture before");
+  refuse(HEAD "<guess>\n<waypoint time='1'/></guess>" TAIL, 6, "before the goal");
+  refuse(HEAD "<guess>\n<waypoint time='.5'/>\n<waypoint time='.5'/></guess>" TAIL, 7, "after the posture before");
+  refuse(HEAD "<guess type='hold'>\n<waypoint time='.5'/></guess>" TAIL, 6, "contradicts type='hold'");
+  refuse(HEAD "<guess>\n<waypoint time='.5'><joint name='knee' pos='1'/></waypoint></guess>" TAIL, 6,
+         "outside its range");
+}
+
+int main(void) {
+  CHECK(mkdtemp(folder) != NULL);
+  snprintf(path, sizeof path, "%s/p.xml", folder);
+  snprintf(model_path, sizeof model_path, "%s/m.xml", folder);
+  scene_write(folder, "m.xml", model);
+  check_ways();
+  check_postures();
+  check_broken();
+  unlink(path);
+  unlink(model_path);
+  rmdir(folder);
+  return check_result();
+}
