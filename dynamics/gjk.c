@@ -204,7 +204,7 @@ typedef struct polytope {
   int np, nface;
 } polytope;
 
-// a face turned away from the middle of the polytope; 0 if it has no area
+// a face, counterclockwise from outside, whose normal is turned away from the middle of the polytope; 0 if it has no area
 static int add_face(polytope *t, int i, int j, int k, const double middle[3]) {
   double u[3], w[3], m[3];
   if (t->nface == SHEET_MAX) return 0;
@@ -219,11 +219,8 @@ static int add_face(polytope *t, int i, int j, int k, const double middle[3]) {
   f->v[1] = j;
   f->v[2] = k;
   sub3(m, t->p[i].w, middle);
-  if (dot3(m, f->n) < 0) {
-    scale3(f->n, -1, f->n);
-    f->v[1] = k;
-    f->v[2] = j;
-  }
+  // only rounding of a sliver says otherwise: its corners keep the order of its neighbours
+  if (dot3(m, f->n) < 0) scale3(f->n, -1, f->n);
   f->d = dot3(f->n, t->p[i].w);
   t->nface++;
   return 1;
@@ -266,37 +263,52 @@ static int first_points(const bodies *g, const simplex *s, polytope *t) {
   return 1;
 }
 
-// replaces the faces that see a new point by a fan from their outline; 0 if that fails
-static int include(polytope *t, const vertex *p, const double middle[3], double slack) {
-  int edge[3 * SHEET_MAX][2], edges = 0, kept = 0;
+// the face on the other side of an edge; -1 if there is none
+static int face_beyond(const polytope *t, const int edge[2]) {
+  for (int f = 0; f < t->nface; f++) {
+    for (int k = 0; k < 3; k++) {
+      if (t->face[f].v[k] == edge[1] && t->face[f].v[(k + 1) % 3] == edge[0]) return f;
+    }
+  }
+  return -1;
+}
+
+// replaces the faces that see a new point by a fan from their outline; 0 if that fails. They are taken in from the one that
+// sees it best, neighbour by neighbour: where rounding decides what sees, the outline stays one loop
+static int include(polytope *t, int nearest, const vertex *p, const double middle[3], double slack) {
+  int edge[3 * SHEET_MAX][2], edges = 0, outline = 0;
   if (t->np == VERTEX_MAX) return 0;
   t->p[t->np] = *p;
-  for (int f = 0; f < t->nface; f++) {
-    const sheet *s = &t->face[f];
-    if (dot3(s->n, p->w) - s->d <= slack) {
-      t->face[kept++] = *s;
-      continue;
-    }
+  // edges up to outline are of faces that stay
+  for (int from = nearest; from >= 0;) {
+    const sheet seen = t->face[from];
+    t->face[from] = t->face[--t->nface];
     for (int k = 0; k < 3; k++) {
-      int from = s->v[k], to = s->v[(k + 1) % 3], twin = 0;
-      while (twin < edges && !(edge[twin][0] == to && edge[twin][1] == from)) twin++;
+      const int a = seen.v[k], b = seen.v[(k + 1) % 3];
+      int twin = outline;
+      while (twin < edges && !(edge[twin][0] == b && edge[twin][1] == a)) twin++;
       if (twin < edges) {
         edges--;
         edge[twin][0] = edge[edges][0];
         edge[twin][1] = edge[edges][1];
       } else {
-        edge[edges][0] = from;
-        edge[edges++][1] = to;
+        edge[edges][0] = a;
+        edge[edges++][1] = b;
       }
     }
+    for (from = -1; outline < edges && from < 0;) {
+      int f = face_beyond(t, edge[outline]);
+      if (f >= 0 && dot3(t->face[f].n, p->w) - t->face[f].d > slack)
+        from = f;
+      else
+        outline++;
+    }
   }
-  if (!edges) return 0;
-  t->nface = kept;
   for (int i = 0; i < edges; i++) {
     if (!add_face(t, edge[i][0], edge[i][1], t->np, middle)) return 0;
   }
   t->np++;
-  return 1;
+  return edges > 0;
 }
 
 // the point nearest to the origin of the faces in one plane with a face, as points of both bodies: such faces tie, and the
@@ -321,6 +333,16 @@ static int expand(const bodies *g, const simplex *s, cav_apart *out) {
   if (!first_points(g, s, &t)) return 0;
   double middle[3] = {0, 0, 0};
   for (int k = 0; k < 4; k++) axpy3(middle, middle, 0.25, t.p[k].w);
+  double u[3], v[3], w[3], c[3];
+  sub3(u, t.p[1].w, t.p[0].w);
+  sub3(v, t.p[2].w, t.p[0].w);
+  sub3(w, t.p[3].w, t.p[0].w);
+  cross3(c, u, v);
+  if (dot3(c, w) > 0) {
+    vertex swap = t.p[1];
+    t.p[1] = t.p[2];
+    t.p[2] = swap;
+  }
   static const int corners[4][3] = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
   for (int k = 0; k < 4; k++) {
     if (!add_face(&t, corners[k][0], corners[k][1], corners[k][2], middle)) return 0;
@@ -336,7 +358,7 @@ static int expand(const bodies *g, const simplex *s, cav_apart *out) {
     double beyond = dot3(best.n, p.w) - best.d;
     if (beyond < g->close * g->size || t.np == VERTEX_MAX) break;
     // by rounding there may be no further: the faces found so far
-    if (!include(&t, &p, middle, SEES * g->size)) break;
+    if (!include(&t, nearest, &p, middle, SEES * g->size)) break;
   }
   scale3(out->n, -1, best.n);
   copy3(out->x, t.p[best.v[0]].x);

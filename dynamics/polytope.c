@@ -2,14 +2,13 @@
 ///
 /// gjk.c gives the direction in which the two bodies are furthest apart or least inside each other: to rounding for
 /// polyhedra; with an ellipsoid or a cylinder to about 1e-5, then made exact by the feature of the polyhedron that meets it:
-/// a corner (nearest surface point in closed form), an edge (lowest point of the surface distance along it, by bisection), a
-/// face, or the curved body's own cap or straight line; every one of these is a lower bound of the gap, so the largest wins.
+/// a corner (nearest way out in closed form, or the one about the direction by Newton), an edge (slope of the gap about it, by
+/// bisection), a face, or the curved body's own cap or straight line. Every one of these is a lower bound of the gap, so the
+/// largest wins; of equal ones that whose points lie across from each other.
 /// Where the direction is the normal of a face, the points of the other body over that face touch too, each with its own
 /// height: the opposite face cut to the prism above it, both ends of a segment, four points of a rim. At most 8: the
 /// deepest, then those furthest from the ones taken. Else one point, at the middle of what meets.
 /// Round edges (spheres, capsules) are the core grown by a radius, margins likewise: no case of their own.
-/// With an ellipsoid or a cylinder 1 in 100 deep overlaps keeps a direction that is not the best to 1e-9 of the size: its gap
-/// is a lower bound, its points lie off the surfaces by up to a few millimetres (test_mesh.c counts them); others are exact.
 /// Not done: choosing between two ways out of an overlap by history; a tie may jump.
 #include "gjk.h"
 #include "math3.h"
@@ -18,6 +17,8 @@
 enum { CORNERS_MAX = 64, NEAR_MAX = 12 };
 // cosine beyond which the direction is a face's normal (1.4e-5 rad); share of the size within which corners meet
 static const double ON_NORMAL = 1 - 1e-10, MEETS = 1e-2;
+// cosine below which a direction is square to an axis; share of the size within which gaps are equal
+static const double SQUARE = 1e-9, TIE = 1e-13;
 
 /// Corners of a face, an edge or a rim in the world, in order.
 typedef struct outline {
@@ -54,70 +55,214 @@ static double height_over(const cav_shape *s, const double y[3], double n[3]) {
   return height;
 }
 
-// keeps a direction if its true gap beats the best; y: the point of b that meets
-static void keep(const meeting *g, const double n[3], const double y[3], cav_apart *best) {
-  double back[3], x[3], far[3], d[3];
-  scale3(back, -1, n);
-  cav_core_support(&g->core_a, n, x);
-  cav_core_support(&g->core_b, back, far);
-  sub3(d, far, x);
-  double gap = dot3(d, n);
-  if (!(gap > best->gap)) return;
-  best->gap = gap;
-  copy3(best->n, n);
-  copy3(best->y, y);
-  axpy3(best->x, y, -gap, n);
+// point nearest to y of all those of the curved body furthest along n: one, a straight line of a side, or a cap
+static void nearest_on_curved(const cav_shape *s, const double n[3], const double y[3], double x[3]) {
+  double axis[3], out[3], d[3];
+  cav_support(s, n, x);
+  if (s->type != CAV_GEOM_CYLINDER) return;
+  column3(axis, s->rotation, 2);
+  double along = dot3(n, axis), half = s->size[1];
+  axpy3(out, n, -along, axis);
+  double across = normalise3(out);
+  sub3(d, y, s->pos);
+  if (fabs(along) <= SQUARE) {
+    double t = dot3(d, axis);
+    axpy3(x, s->pos, s->size[0], out);
+    axpy3(x, x, t < -half ? -half : t > half ? half : t, axis);
+  } else if (across <= SQUARE) {
+    axpy3(d, d, -dot3(d, axis), axis);
+    double radius = norm3(d);
+    axpy3(x, s->pos, along < 0 ? -half : half, axis);
+    axpy3(x, x, radius > s->size[0] ? s->size[0] / radius : 1, d);
+  }
 }
 
-// directions square to an edge: the gap is largest where its slope along the circle of these changes sign. Bracketed
-// about the direction known, then bisected
-static void try_edge(const meeting *g, const double p[3], const double q[3], cav_apart *best) {
-  enum { STEPS_MAX = 60 };
-  double e[3], u[3], w[3], n[3], x[3], y[3], d[3], low = -0.1, high = 0.1;
+static void nearest_on_segment(const double p[3], const double q[3], const double x[3], double y[3]) {
+  double e[3], d[3];
   sub3(e, q, p);
+  sub3(d, x, p);
+  double length2 = dot3(e, e), t = length2 > 0 ? dot3(d, e) / length2 : 0;
+  axpy3(y, p, t < 0 ? 0 : t > 1 ? 1 : t, e);
+}
+
+// point of a corner, an edge or a face square to n that is nearest to x as seen along n
+static void nearest_on_outline(const outline *o, const double n[3], const double x[3], double y[3]) {
+  double flat[3], d[3], least = INFINITY, turn[2] = {0, 0};
+  sub3(d, o->x[0], x);
+  axpy3(flat, x, dot3(d, n), n);
+  for (int k = 0; k < o->n; k++) {
+    double on[3], e[3], c[3];
+    const double *from = o->x[k], *to = o->x[(k + 1) % o->n];
+    nearest_on_segment(from, to, flat, on);
+    sub3(d, on, flat);
+    sub3(e, to, from);
+    cross3(c, e, d);
+    // on which sides of the edges it lies
+    turn[dot3(c, n) < 0] = 1;
+    if (!(dot3(d, d) < least)) continue;
+    least = dot3(d, d);
+    copy3(y, on);
+  }
+  if (o->n > 2 && turn[0] + turn[1] < 2) copy3(y, flat);
+}
+
+/// A direction, points of both bodies that meet along it, and by how far they miss each other across it: 0 if it is solved.
+typedef struct candidate {
+  cav_apart apart;
+  double miss;
+} candidate;
+
+// tries a direction along which b is furthest at a corner, an edge or a face; y: a point of that to start from. The largest
+// gap wins; among equal ones the points say which is solved, as near its top a gap does not depend on the direction
+static void keep(const meeting *g, const double n[3], const outline *o, const double start[3], candidate *best) {
+  enum { STEPS_MAX = 20 };
+  candidate c;
+  double back[3], x[3], y[3], far[3], d[3];
+  scale3(back, -1, n);
+  cav_support(g->a, n, x);
+  cav_support(g->b, back, far);
+  sub3(d, far, x);
+  c.apart.gap = dot3(d, n);
+  if (c.apart.gap < best->apart.gap - TIE * g->size) return;
+  copy3(y, start);
+  for (int k = 0; k < STEPS_MAX; k++) {
+    double last[3];
+    copy3(last, y);
+    nearest_on_curved(g->a, n, y, x);
+    nearest_on_outline(o, n, x, y);
+    sub3(last, last, y);
+    if (dot3(last, last) == 0) break;
+  }
+  sub3(d, y, x);
+  axpy3(d, d, -c.apart.gap, n);
+  c.miss = norm3(d);
+  if (c.apart.gap < best->apart.gap + TIE * g->size && c.miss >= best->miss) return;
+  copy3(c.apart.n, n);
+  copy3(c.apart.x, x);
+  copy3(c.apart.y, y);
+  *best = c;
+}
+
+// direction near a given one in which a point leaves an ellipsoid, though another way out may be nearer: Newton on the gap
+// over the sphere of directions, in the ellipsoid's axes; 0 if it does not end
+static int leave_ellipsoid(const cav_shape *s, const double y[3], const double start[3], double n[3]) {
+  enum { STEPS_MAX = 20 };
+  double d[3], p[3], m[3];
+  sub3(d, y, s->pos);
+  rotate_back(p, s->rotation, d);
+  rotate_back(m, s->rotation, start);
+  for (int k = 0; k < STEPS_MAX; k++) {
+    double x[3], square[3], t[2][3], r[2], H[2][2], reach = 0;
+    for (int i = 0; i < 3; i++) square[i] = s->size[i] * s->size[i], reach += square[i] * m[i] * m[i];
+    reach = sqrt(reach);
+    for (int i = 0; i < 3; i++) x[i] = square[i] * m[i] / reach;
+    sub3(d, p, x);
+    double gap = dot3(m, p) - reach;
+    // two axes square to m; gradient and second derivatives of the gap along them
+    int least = fabs(m[0]) < fabs(m[1]) ? 0 : 1;
+    if (fabs(m[2]) < fabs(m[least])) least = 2;
+    const double e[3] = {least == 0, least == 1, least == 2};
+    cross3(t[0], m, e);
+    normalise3(t[0]);
+    cross3(t[1], m, t[0]);
+    for (int i = 0; i < 2; i++) {
+      r[i] = dot3(d, t[i]);
+      for (int j = 0; j < 2; j++) {
+        double stretch = 0;
+        for (int c = 0; c < 3; c++) stretch += t[i][c] * square[c] * t[j][c];
+        H[i][j] = (dot3(x, t[i]) * dot3(x, t[j]) - stretch) / reach - (i == j ? gap : 0);
+      }
+    }
+    double det = H[0][0] * H[1][1] - H[0][1] * H[0][1];
+    if (!(H[0][0] < 0) || !(det > 0)) return 0;
+    double a = (H[0][1] * r[1] - H[1][1] * r[0]) / det, b = (H[0][1] * r[0] - H[0][0] * r[1]) / det;
+    axpy3(m, m, a, t[0]);
+    axpy3(m, m, b, t[1]);
+    normalise3(m);
+    if (!(a * a + b * b < 1)) return 0;
+    if (a * a + b * b < 1e-30) break;
+  }
+  rotate(n, s->rotation, m);
+  return 1;
+}
+
+// the ways out of the curved body at a corner: the nearest, and the one about the direction known, through the side of a
+// cylinder even where its cap is nearer
+static void try_corner(const meeting *g, const outline *corner, candidate *best) {
+  double n[3], axis[3];
+  height_over(g->a, corner->x[0], n);
+  keep(g, n, corner, corner->x[0], best);
+  if (g->a->type == CAV_GEOM_CYLINDER) {
+    column3(axis, g->a->rotation, 2);
+    sub3(n, corner->x[0], g->a->pos);
+    axpy3(n, n, -dot3(n, axis), axis);
+    if (normalise3(n) > 0) keep(g, n, corner, corner->x[0], best);
+  } else if (leave_ellipsoid(g->a, corner->x[0], g->apart.n, n)) {
+    keep(g, n, corner, corner->x[0], best);
+  }
+}
+
+// slope of the gap along directions square to an edge, at an angle from u towards w
+static double slope_at(const meeting *g, const double p[3], const double u[3], const double w[3], double angle,
+                       double n[3]) {
+  double across[3], x[3], d[3];
+  scale3(n, cos(angle), u);
+  axpy3(n, n, sin(angle), w);
+  scale3(across, -sin(angle), u);
+  axpy3(across, across, cos(angle), w);
+  cav_support(g->a, n, x);
+  sub3(d, p, x);
+  return dot3(d, across);
+}
+
+// directions square to an edge: from the one known uphill to where the slope of the gap changes sign, then by bisection
+static void try_edge(const meeting *g, const outline *edge, candidate *best) {
+  enum { STEPS_MAX = 60 };
+  static const double FIRST = 1e-4, FURTHEST = 0.4;
+  double e[3], u[3], w[3], n[3];
+  sub3(e, edge->x[1], edge->x[0]);
   normalise3(e);
   axpy3(u, g->apart.n, -dot3(g->apart.n, e), e);
   if (normalise3(u) < 0.5) return;
   cross3(w, e, u);
+  if (slope_at(g, edge->x[0], u, w, 0, n) < 0) scale3(w, -1, w);
+  double low = 0, high = FIRST;
+  while (high < FURTHEST && slope_at(g, edge->x[0], u, w, high, n) > 0) low = high, high *= 4;
   for (int k = 0; k < STEPS_MAX; k++) {
-    double angle = (low + high) / 2, across[3];
-    scale3(n, cos(angle), u);
-    axpy3(n, n, sin(angle), w);
-    scale3(across, -sin(angle), u);
-    axpy3(across, across, cos(angle), w);
-    cav_core_support(&g->core_a, n, x);
-    sub3(d, p, x);
-    if (dot3(d, across) > 0)
+    double angle = (low + high) / 2;
+    if (slope_at(g, edge->x[0], u, w, angle, n) > 0)
       low = angle;
     else
       high = angle;
   }
-  // the point of the edge across from the other's
-  sub3(d, x, p);
-  double t = dot3(d, e), length;
-  sub3(y, q, p);
-  length = norm3(y);
-  axpy3(y, p, t < 0 ? 0 : t > length ? length : t, e);
-  keep(g, n, y, best);
+  keep(g, n, edge, edge->x[0], best);
 }
 
 // a straight line of a cylinder across an edge: their common normal
-static void try_crossing(const meeting *g, const double p[3], const double q[3], cav_apart *best) {
-  double axis[3], e[3], c[3], d[3], x[3];
+static void try_crossing(const meeting *g, const outline *edge, candidate *best) {
+  double axis[3], e[3], c[3], d[3], x[3], y[3];
   if (g->a->type != CAV_GEOM_CYLINDER) return;
   column3(axis, g->a->rotation, 2);
-  sub3(e, q, p);
+  sub3(e, edge->x[1], edge->x[0]);
   cross3(c, axis, e);
   double sine2 = dot3(c, c);
   if (!(sine2 > 1e-16 * dot3(e, e))) return;
   // parameter along the edge of its point nearest to the axis
-  sub3(d, p, g->a->pos);
+  sub3(d, edge->x[0], g->a->pos);
   cross3(x, d, axis);
-  double y[3], t = dot3(x, c) / sine2;
-  axpy3(y, p, t < 0 ? 0 : t > 1 ? 1 : t, e);
+  axpy3(y, edge->x[0], dot3(x, c) / sine2, e);
   normalise3(c);
   if (dot3(c, g->apart.n) < 0) scale3(c, -1, c);
-  keep(g, c, y, best);
+  keep(g, c, edge, y, best);
+}
+
+// the cap of a cylinder that faces along the direction, on a corner, an edge or a face
+static void try_cap(const meeting *g, const outline *o, candidate *best) {
+  double n[3];
+  if (g->a->type != CAV_GEOM_CYLINDER) return;
+  column3(n, g->a->rotation, 2);
+  if (dot3(n, g->apart.n) < 0) scale3(n, -1, n);
+  if (dot3(n, g->apart.n) > 1 - MEETS) keep(g, n, o, o->x[0], best);
 }
 
 static void corner_at(const cav_shape *s, int v, double x[3]) {
@@ -153,62 +298,6 @@ static int are_neighbours(const cav_mesh *m, int v, int w) {
   return 0;
 }
 
-// the best of all features about the direction
-static cav_apart best_feature(const meeting *g) {
-  const cav_mesh *m = g->b->mesh;
-  int near[NEAR_MAX], count = near_corners(g, near);
-  cav_apart best = g->apart;
-  best.gap = -INFINITY;
-  double middle[3] = {0, 0, 0}, n[3];
-  for (int i = 0; i < count; i++) {
-    double p[3], q[3];
-    corner_at(g->b, near[i], p);
-    axpy3(middle, middle, 1.0 / count, p);
-    height_over(g->a, p, n);
-    keep(g, n, p, &best);
-    for (int j = 0; j < i; j++) {
-      if (!are_neighbours(m, near[i], near[j])) continue;
-      corner_at(g->b, near[j], q);
-      try_edge(g, p, q, &best);
-      try_crossing(g, p, q, &best);
-    }
-  }
-  for (int f = 0; f < m->nface; f++) {
-    rotate(n, g->b->rotation, m->plane + 4 * f);
-    scale3(n, -1, n);
-    if (dot3(n, g->apart.n) < 1 - MEETS) continue;
-    double x[3], y[3];
-    cav_core_support(&g->core_a, n, x);
-    double d[3];
-    sub3(d, middle, x);
-    axpy3(y, x, dot3(d, n), n);
-    keep(g, n, y, &best);
-  }
-  if (g->a->type == CAV_GEOM_CYLINDER) {
-    column3(n, g->a->rotation, 2);
-    if (dot3(n, g->apart.n) < 0) scale3(n, -1, n);
-    double y[3], back[3];
-    scale3(back, -1, n);
-    cav_support(g->b, back, y);
-    if (dot3(n, g->apart.n) > 1 - MEETS) keep(g, n, y, &best);
-  }
-  return best;
-}
-
-static void polish(meeting *g) {
-  enum { ROUNDS_MAX = 4 };
-  for (int round = 0; round < ROUNDS_MAX; round++) {
-    cav_apart best = best_feature(g);
-    double turned = dot3(best.n, g->apart.n), gain = best.gap - g->apart.gap;
-    // equal to rounding: the feature's is exact
-    if (!(gain > -1e-9 * g->size)) return;
-    g->apart = best;
-    if (turned > ON_NORMAL) return;
-  }
-}
-
-// --- faces ---
-
 static void push_corner(outline *o, const double x[3]) {
   if (o->n < CORNERS_MAX) copy3(o->x[o->n++], x);
 }
@@ -223,6 +312,52 @@ static void push_face(const cav_shape *s, int face, outline *o) {
     push_corner(o, x);
   }
 }
+
+// the best of all features about the direction
+static candidate best_feature(const meeting *g) {
+  const cav_mesh *m = g->b->mesh;
+  int near[NEAR_MAX], count = near_corners(g, near);
+  candidate best = {.apart = {.gap = -INFINITY}, .miss = INFINITY};
+  double n[3];
+  for (int i = 0; i < count; i++) {
+    outline corner = {.n = 1}, edge = {.n = 2};
+    corner_at(g->b, near[i], corner.x[0]);
+    try_corner(g, &corner, &best);
+    try_cap(g, &corner, &best);
+    copy3(edge.x[0], corner.x[0]);
+    for (int j = 0; j < i; j++) {
+      if (!are_neighbours(m, near[i], near[j])) continue;
+      corner_at(g->b, near[j], edge.x[1]);
+      try_edge(g, &edge, &best);
+      try_crossing(g, &edge, &best);
+      try_cap(g, &edge, &best);
+    }
+  }
+  for (int f = 0; f < m->nface; f++) {
+    outline face = {.n = 0};
+    rotate(n, g->b->rotation, m->plane + 4 * f);
+    scale3(n, -1, n);
+    if (dot3(n, g->apart.n) < 1 - MEETS) continue;
+    push_face(g->b, f, &face);
+    keep(g, n, &face, face.x[0], &best);
+    try_cap(g, &face, &best);
+  }
+  return best;
+}
+
+static void polish(meeting *g) {
+  enum { ROUNDS_MAX = 4 };
+  for (int round = 0; round < ROUNDS_MAX; round++) {
+    candidate best = best_feature(g);
+    double turned = dot3(best.apart.n, g->apart.n), gain = best.apart.gap - g->apart.gap;
+    // equal to rounding: the feature's is exact
+    if (!(gain > -1e-9 * g->size)) return;
+    g->apart = best.apart;
+    if (turned > ON_NORMAL) return;
+  }
+}
+
+// --- faces ---
 
 // of the faces of a mesh at its furthest corner along a direction the one that looks most along it; the corner alone if
 // there is none
