@@ -2,15 +2,16 @@
 ///
 /// A mesh collides as its convex hull and weighs as its triangles: it is scaled, moved by its reference pose, and expressed
 /// about its centre of mass and principal axes, to which its geoms are moved, as MuJoCo does. One without volume keeps the
-/// middle of its surface and must not be asked to weigh by density. A height field without a file is level; with one, a
-/// binary file of two 32-bit integers and rows times columns 32-bit floats, its heights are stretched to 0 to 1.
-/// Not done: images as height fields, fitting of simple shapes to meshes, MuJoCo's MSH format.
+/// middle of its surface and must not be asked to weigh by density. A height field without a file is level; with one (see
+/// elevation.c) its heights are stretched to 0 to 1.
+/// Not done: fitting of simple shapes to meshes, MuJoCo's MSH format.
 
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
 
+#include "elevation.h"
 #include "math3.h"
 #include "spec.h"
 
@@ -205,48 +206,25 @@ static void load_mesh(cav_spec *spec, cav_spec_mesh *m) {
 
 // --- height fields ---
 
-static unsigned word_at(const unsigned char *p) {
-  return p[0] | (unsigned)p[1] << 8 | (unsigned)p[2] << 16 | (unsigned)p[3] << 24;
-}
-
 // rows, columns and heights of a file
 static void read_heights(cav_spec *spec, cav_spec_hfield *h) {
-  unsigned char head[8];
-  FILE *file = fopen(h->path, "rb");
-  if (!file) {
-    cav_spec_fail(spec, h->node, "file", "%.300s: cannot be opened; check the path", h->path);
-    return;
-  }
-  unsigned rows = 0, columns = 0;
-  if (fread(head, 1, 8, file) == 8) rows = word_at(head), columns = word_at(head + 4);
-  int sane = rows >= 2 && columns >= 2 && rows <= CAV_SPEC_GRID && columns <= CAV_SPEC_GRID;
-  size_t n = sane ? (size_t)rows * columns : 0;
-  unsigned char *bytes = malloc(4 * n + 1);
-  h->height = malloc(sizeof *h->height * (n + 1));
-  if (!bytes || !h->height) cav_spec_no_memory(spec);
-  if (!sane || (bytes && fread(bytes, 1, 4 * n + 1, file) != 4 * n))
-    cav_spec_fail(spec, h->node, "file",
-                  "%.300s: expected two 32-bit integers, rows and columns (2 to %d each), and that many 32-bit floats; "
-                  "images are not supported",
-                  h->path, CAV_SPEC_GRID);
-  for (size_t i = 0; i < n && spec->status == CAV_OK; i++) {
-    unsigned bits = word_at(bytes + 4 * i);
-    float x;
-    memcpy(&x, &bits, sizeof x);
-    h->height[i] = (double)x;
-    if (!isfinite(h->height[i])) cav_spec_fail(spec, h->node, "file", "a height is not finite");
-  }
-  h->nrow = (int)rows;
-  h->ncol = (int)columns;
-  free(bytes);
-  fclose(file);
+  cav_elevation e;
+  char reason[200] = "";
+  cav_status status = cav_elevation_read(h->path, CAV_SPEC_GRID, &e, reason, sizeof reason);
+  if (status == CAV_NO_MEMORY)
+    cav_spec_no_memory(spec);
+  else if (status != CAV_OK)
+    cav_spec_fail(spec, h->node, "file", "%.300s: %s", h->path, reason);
+  h->height = e.height;
+  h->nrow = e.nrow;
+  h->ncol = e.ncol;
 }
 
 static void load_hfield(cav_spec *spec, cav_spec_hfield *h) {
   if (h->path) read_heights(spec, h);
   size_t n = (size_t)h->nrow * (size_t)h->ncol;
   if (!h->path) h->height = calloc(n, sizeof *h->height);
-  if (!h->height) cav_spec_no_memory(spec);
+  if (!h->path && !h->height) cav_spec_no_memory(spec);
   if (spec->status != CAV_OK) return;
   // heights from 0 to 1 over the range of the file, times the height asked for
   double low = INFINITY, high = -INFINITY;
