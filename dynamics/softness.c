@@ -8,6 +8,8 @@
 /// bodies are held more softly. The other way only slow motion is alike: a row of ours is a spring K/R, a damper B/R and,
 /// along the row, a mass 1/R, of which ODE has the first two: ERP = h k/(h k + b), CFM = 1/(h k + b). Rows are all this
 /// speaks of: what an engine does with them, a complementarity problem there, a convex one here, differs beside.
+#include <math.h>
+
 #include "cavort/dynamics.h"
 #include "stage.h"
 
@@ -34,4 +36,15 @@ cav_status cav_softness_to_ode(const cav_state *state, const cav_softness *softn
   *cfm = 1 / sum;
   *erp = h * stiffness / sum;
   return CAV_OK;
+}
+
+cav_options cav_options_at_step(const cav_options *options, double timestep) {
+  cav_options finer = *options;
+  finer.timestep = timestep;
+  if (options->stabilisation != CAV_STABILISATION_DISCRETE || timestep == options->timestep) return finer;
+  // the share of a gap that a step leaves is z; (1 - z)/h stays
+  double z = options->time_constant > 0 ? exp(-options->timestep / options->time_constant) : 0;
+  double closed = (1 - z) * timestep / options->timestep;
+  finer.time_constant = closed < 1 ? -timestep / log1p(-closed) : 0;
+  return finer;
 }

@@ -56,22 +56,30 @@ void cav_balance_result(const cav_balance *balance, const cav_audit *audit, cav_
 int cav_demand_room(const cav_audit *audit);
 void cav_demand_note(const cav_audit *audit, int t, double *work, cav_finding *finding);
 
+/// How long and how near a closed loop follows.
+struct cav_follow {
+  double seconds;
+  double error;   ///< m, at its end
+  char lost[160]; ///< why it ended early, "" if it did not
+};
+
 /// Forward simulations. replay.c.
 typedef struct cav_replay {
   double step_error; ///< |v' - v_{t+1}| h of single steps from the knots
   int step_knot;
-  double open_error;   ///< largest |q - knot| in open loop
-  double open_seconds; ///< within 1e-6
-  struct cav_follow {
-    double seconds; ///< followed
-    double error;   ///< m
-    char lost[160]; ///< why it ended early, "" if it did not
-  } closed, own;    ///< closed loop under the claimed contact law, and under the model's own
+  double open_error;             ///< largest |q - knot| in open loop
+  double open_seconds;           ///< within 1e-6
+  struct cav_follow closed, own; ///< closed loop under the claimed contact law, and under the model's own
 } cav_replay;
 cav_status cav_replay_steps(const cav_audit *audit, cav_replay *replay);
 cav_status cav_replay_open(const cav_audit *audit, cav_replay *replay);
 /// law is what the simulation obeys, its timestep apart; law NULL: the model's own.
 cav_status cav_replay_closed(const cav_audit *audit, const cav_options *law, const double *gain_q, const double *gain_v,
                              struct cav_follow *follow);
+
+/// The closed loops of a verification alone, for the choice of gains. Fails as cav_verify does.
+cav_status cav_track(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
+                     const double *gain_q, const double *gain_v, struct cav_follow *claimed, struct cav_follow *own,
+                     cav_error *error);
 
 #endif

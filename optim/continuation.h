@@ -28,6 +28,9 @@ void cav_guess_fill(const cav_problem *problem, cav_trajectory *at);
 /// constraints at once, which exact derivatives never leave.
 cav_status cav_guess_take(cav_solve_run *run);
 
+/// Contact law at a share of the schedule, 0 .. 1; the rest of law stays.
+void cav_stage_law(const cav_problem *problem, double share, cav_options *law);
+
 /// Contact law and weights of stage s of n.
 void cav_stage_set(const cav_problem *problem, int s, int n, cav_transcription *transcription);
 

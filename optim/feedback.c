@@ -1,156 +1,245 @@
-/// Linear feedback of the remaining problem: block elimination of the Gauss-Newton Hessian from the last knot backwards gives
-/// dq_{t+1} = A dq_t + B dq_{t-1}; with the derivatives of u_t that becomes du_t = gain_q dq_t + gain_v dv_t, where dq_{t-1} is
-/// dq_t - h dv_t carried through the step's rotation (optimisation.md, 3).
+/// Linear feedback of a motion: the linear-quadratic regulator of the forward step along it. The motion is read at a finer step,
+/// du/dq, du/dv, du/dv' of the inverse there give the forward step's linear map, and a Riccati recursion from the last knot
+/// backwards gives du = gain_q dq + gain_v dv. Straying is priced by its energy, dv' M dv and dq' M dq, against squared shares of
+/// the actuators' limits, so one price serves all limbs. Gains of a knot are the mean of the finer steps up to the next knot.
+///
+/// The step matters: gains of the plan's own step answer a touch with what undoes it within that step, and a tenth of the step
+/// later they answer again. Gains from the plan's Hessian carried motions a third as far (README.md).
+/// Does not know limits of actuators, and does not see contacts that the law at hand does not feel.
 #include "feedback.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/// LAPACK: solves A X = B for symmetric positive definite A.
+#include "audit.h"
+
+/// BLAS and LAPACK, column-major.
+extern void dgemm_(const char *transa, const char *transb, const int *m, const int *n, const int *k,
+                   const double *alpha, const double *A, const int *lda, const double *B, const int *ldb,
+                   const double *beta, double *C, const int *ldc);
+extern void dgesv_(const int *n, const int *nrhs, double *A, const int *lda, int *pivot, double *B, const int *ldb,
+                   int *info);
 extern void dposv_(const char *uplo, const int *n, const int *nrhs, double *A, const int *lda, double *B,
                    const int *ldb, int *info);
 
-/// C (rows x n) += scale * A (rows x n) B (n x n), row-major.
-static void multiply_add(int rows, int n, double scale, const double *A, const double *B, double *C) {
-  for (int i = 0; i < rows; i++)
-    for (int k = 0; k < n; k++) {
-      double a = scale * A[i * n + k];
-      if (a == 0) continue;
-      for (int j = 0; j < n; j++) C[i * n + j] += a * B[k * n + j];
-    }
+/// Finer steps in a step of the motion.
+enum { FINER = 20 };
+
+/// The regulator at one step: state (dq, dv), input shares of the actuators' limits. Matrices are column-major.
+typedef struct regulator {
+  int nv, nu, n;        ///< n = 2 nv
+  double h;             ///< finer step, s
+  double q, v;          ///< prices of dq' M dq and dv' M dv a second
+  double *force;        ///< [nv*nu] generalised force of an input
+  double *A, *B;        ///< [n*n], [n*nu] the step
+  double *P;            ///< [n*n] price of what is left
+  double *PA, *PB;      ///< [n*n], [n*nu]
+  double *H;            ///< [nu*nu]
+  double *G, *K;        ///< [nu*n] G = B'PA; K = H^-1 G: input -K x
+  double *slope;        ///< [nv*(n+nu)] derivatives of v' by dq, dv and inputs
+  double *dq, *dv, *dn; ///< [nv*nv] of the inverse, row-major
+  double *M;            ///< [nv*nv]
+  double *u;            ///< [nv]
+  int *pivot;           ///< [nv]
+  void *memory;
+} regulator;
+
+static void product(char ta, int m, int n, int k, double alpha, const double *A, int lda, const double *B, int ldb,
+                    double beta, double *C, int ldc) {
+  dgemm_(&ta, "N", &m, &n, &k, &alpha, A, &lda, B, &ldb, &beta, C, &ldc);
 }
 
-static void transpose(int n, const double *A, double *B) {
-  for (int i = 0; i < n; i++)
-    for (int j = 0; j < n; j++) B[j * n + i] = A[i * n + j];
-}
-
-/// Elimination of unknown block b: dx_b = A dx_{b-1} + B dx_{b-2}, and what that leaves on the two blocks before it.
-typedef struct policy {
-  int n;
-  double *A, *B;              ///< [blocks*n*n]
-  double *near, *far, *cross; ///< what later blocks add to H(b,b), H(b-1,b-1) and H(b,b-1), [n*n]
-  double *D, *E, *F, *work;
-} policy;
-
-/// Columns of the solution of D X = [E F] as A = -X_E, B = -X_F.
-static int eliminate(policy *p, double *A, double *B) {
-  int n = p->n, columns = 2 * n, info = 0;
-  // column-major right-hand side: column j of E is E[:, j]
-  for (int j = 0; j < n; j++)
-    for (int i = 0; i < n; i++) {
-      p->work[j * n + i] = p->E[i * n + j];
-      p->work[(n + j) * n + i] = p->F[i * n + j];
-    }
-  dposv_("L", &n, &columns, p->D, &n, p->work, &n, &info);
-  if (info) return 0;
-  for (int j = 0; j < n; j++)
-    for (int i = 0; i < n; i++) {
-      A[i * n + j] = -p->work[j * n + i];
-      B[i * n + j] = -p->work[(n + j) * n + i];
-    }
+static int regulator_make(regulator *r, const cav_model *model) {
+  int nv = model->nv, nu = model->nu, n = 2 * nv;
+  size_t v = (size_t)nv, u = (size_t)nu, s = (size_t)n;
+  *r = (regulator){.nv = nv, .nu = nu, .n = n};
+  double *m = calloc(v * u + 3 * s * s + 2 * s * u + u * u + 2 * u * s + v * (s + u) + 4 * v * v + v + 1, sizeof *m);
+  r->memory = m;
+  r->pivot = malloc((v + 1) * sizeof *r->pivot);
+  if (!m || !r->pivot) return 0;
+  r->force = m, m += v * u;
+  r->A = m, m += s * s;
+  r->P = m, m += s * s;
+  r->PA = m, m += s * s;
+  r->B = m, m += s * u;
+  r->PB = m, m += s * u;
+  r->H = m, m += u * u;
+  r->G = m, m += u * s;
+  r->K = m, m += u * s;
+  r->slope = m, m += v * (s + u);
+  r->dq = m, m += v * v;
+  r->dv = m, m += v * v;
+  r->dn = m, m += v * v;
+  r->M = m, m += v * v;
+  r->u = m;
   return 1;
 }
 
-static void symmetrise(int n, double *A) {
-  for (int i = 0; i < n; i++)
-    for (int j = i + 1; j < n; j++) A[i * n + j] = A[j * n + i];
-}
+static void regulator_free(regulator *r) { free(r->memory), free(r->pivot); }
 
-/// Fills A and B of every unknown block, last to first.
-static int sweep(policy *p, const cav_normal *normal, int blocks, double tracking) {
-  int n = p->n;
-  size_t square = (size_t)n * n;
-  memset(p->near, 0, 3 * square * sizeof(double));
-  for (int b = blocks - 1; b >= 0; b--) {
-    double *A = p->A + (size_t)b * square, *B = p->B + (size_t)b * square;
-    cav_normal_block(normal, b, b, p->D);
-    symmetrise(n, p->D);
-    memset(p->E, 0, 2 * square * sizeof(double));
-    if (b > 0) cav_normal_block(normal, b, b - 1, p->E);
-    if (b > 1) cav_normal_block(normal, b, b - 2, p->F);
-    for (size_t i = 0; i < square; i++) p->D[i] += p->near[i], p->E[i] += p->cross[i];
-    for (int i = 0; i < n; i++) p->D[i * n + i] += tracking;
-    if (!eliminate(p, A, B)) return 0;
-
-    // Schur complement on blocks b-1 and b-2: H(b-1,b-1) += E'A, H(b-1,b-2) += E'B, H(b-2,b-2) += F'B
-    double *next = p->work;
-    transpose(n, p->E, next);
-    for (size_t i = 0; i < square; i++) p->near[i] = p->far[i], p->cross[i] = 0;
-    multiply_add(n, n, 1, next, A, p->near);
-    multiply_add(n, n, 1, next, B, p->cross);
-    transpose(n, p->F, next);
-    memset(p->far, 0, square * sizeof(double));
-    multiply_add(n, n, 1, next, B, p->far);
+/// Generalised force of each actuator at its limit; moments are constant (cav_drives_plannable).
+static cav_status find_forces(regulator *r, const cav_model *model, cav_state *state, const double *q) {
+  cav_status status = cav_position(model, state, q);
+  for (int a = 0; a < r->nu && status == CAV_OK; a++) {
+    double range[2], scale, *force = r->force + (size_t)a * r->nv;
+    cav_actuator_length(model, state, a, force);
+    cav_audit_actuator_range(model, a, range, &scale);
+    for (int d = 0; d < r->nv; d++) force[d] *= scale;
   }
-  return 1;
+  return status;
 }
 
-/// out (n x n) := block c of du at knot t.
-static void force_block(const cav_transcription *tr, int t, int c, double *out) {
-  for (int i = 0; i < tr->nv; i++)
-    memcpy(out + (size_t)i * tr->nv, tr->knot[t].du + ((size_t)i * 3 + c) * tr->nv, (size_t)tr->nv * sizeof(double));
-}
-
-/// out := P T with T the tangent map of the step that ends at t: dq_{t-1} = T (dq_t - h dv_t) to first order.
-static void carry_back(const cav_transcription *tr, int t, const double *P, double *to_q, double *to_v) {
-  int nv = tr->nv;
-  for (int i = 0; i < nv; i++) {
-    for (int d = 0; d < nv; d++) {
-      if (tr->turn_of[d] >= 0) continue;
-      to_q[i * nv + d] += P[i * nv + d];
-      to_v[i * nv + d] -= tr->h * P[i * nv + d];
+/// slope := derivatives of v' by (q, v) and the inputs, from those of the inverse.
+static cav_status find_slope(regulator *r, const cav_model *model, cav_state *state, const double *q, const double *v) {
+  int nv = r->nv, columns = r->n + r->nu, info = 0;
+  const double *next = v + nv;
+  cav_status status = cav_inverse(model, state, q, v, next, r->u);
+  if (status == CAV_OK) status = cav_derivatives(model, state, r->dq, r->dv, r->dn);
+  if (status == CAV_NOT_SUPPORTED) status = cav_inverse_jacobian(model, state, q, v, next, r->dq, r->dv, r->dn);
+  if (status != CAV_OK) return status;
+  // column-major: the matrix of the system is dn's transpose in memory
+  double *system = r->PA;
+  for (int i = 0; i < nv; i++)
+    for (int j = 0; j < nv; j++) {
+      system[j * nv + i] = r->dn[i * nv + j];
+      r->slope[j * nv + i] = -r->dq[i * nv + j];
+      r->slope[(nv + j) * nv + i] = -r->dv[i * nv + j];
     }
-    for (int k = 0; k < tr->nturn; k++) {
-      // v_t = (Jr^-1 dq_t - Jl^-1 dq_{t-1})/h, so dq_{t-1} = Jl (Jr^-1 dq_t - h dv_t)
-      const double *right = tr->knot[t].turn + CAV_TURN * k, *row = P + i * nv + tr->turn_dof[k];
-      double phi[3], left[9], x[3], y[3];
-      for (int c = 0; c < 3; c++) phi[c] = -right[18 + c];
-      cav_turn(phi, left);
-      for (int c = 0; c < 3; c++) x[c] = row[0] * left[c] + row[1] * left[3 + c] + row[2] * left[6 + c];
-      for (int c = 0; c < 3; c++) y[c] = x[0] * right[c] + x[1] * right[3 + c] + x[2] * right[6 + c];
-      for (int c = 0; c < 3; c++) {
-        to_q[i * nv + tr->turn_dof[k] + c] += y[c];
-        to_v[i * nv + tr->turn_dof[k] + c] -= tr->h * x[c];
+  memcpy(r->slope + (size_t)r->n * nv, r->force, (size_t)nv * r->nu * sizeof(double));
+  dgesv_(&nv, &columns, system, &nv, r->pivot, r->slope, &nv, &info);
+  return info ? CAV_NOT_CONVERGED : CAV_OK;
+}
+
+/// Three rows of dq' for a rotation over phi: Exp(-phi) dq + h Jr(phi) dv'.
+static void turn_rows(const regulator *r, int dof, const double *v, const double *slope, int columns, int with_q,
+                      double *out) {
+  double phi[3], right[9], inverse[9], back[9] = {0};
+  for (int c = 0; c < 3; c++) phi[c] = r->h * v[dof + c];
+  cav_turn(phi, right);
+  cav_turn_inverse(phi, inverse);
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++)
+      for (int k = 0; k < 3; k++) back[3 * i + j] += right[3 * i + k] * inverse[3 * j + k];
+  for (int j = 0; j < columns; j++)
+    for (int i = 0; i < 3; i++) {
+      double sum = 0;
+      for (int k = 0; k < 3; k++) sum += right[3 * i + k] * slope[j * r->nv + dof + k];
+      out[(size_t)j * r->n + dof + i] = r->h * sum;
+      if (with_q && j >= dof && j < dof + 3) out[(size_t)j * r->n + dof + i] += back[3 * i + j - dof];
+    }
+}
+
+/// Columns of the step, from slope: dv' below, dq' = dq + h dv' above.
+static void step_columns(const regulator *r, const cav_transcription *tr, const double *v_next, const double *slope,
+                         int columns, int with_q, double *out) {
+  int nv = r->nv;
+  for (int j = 0; j < columns; j++)
+    for (int i = 0; i < nv; i++) {
+      out[(size_t)j * r->n + nv + i] = slope[j * nv + i];
+      out[(size_t)j * r->n + i] = r->h * slope[j * nv + i] + (with_q && i == j);
+    }
+  for (int k = 0; k < tr->nturn; k++) turn_rows(r, tr->turn_dof[k], v_next, slope, columns, with_q, out);
+}
+
+/// P += scale * price of straying.
+static void add_price(regulator *r, double scale) {
+  int nv = r->nv, n = r->n;
+  for (int i = 0; i < nv; i++)
+    for (int j = 0; j < nv; j++) {
+      r->P[(size_t)i * n + j] += scale * r->q * r->M[i * nv + j];
+      r->P[(size_t)(nv + i) * n + nv + j] += scale * r->v * r->M[i * nv + j];
+    }
+}
+
+/// One step back: K, and P of the step before without the price of its state. H is there already.
+static cav_status riccati(regulator *r) {
+  int n = r->n, nu = r->nu, info = 0;
+  product('N', n, n, n, 1, r->P, n, r->A, n, 0, r->PA, n);
+  product('T', n, n, n, 1, r->A, n, r->PA, n, 0, r->P, n);
+  if (nu > 0) {
+    product('T', nu, n, n, 1, r->B, n, r->PA, n, 0, r->G, nu);
+    memcpy(r->K, r->G, (size_t)nu * n * sizeof(double));
+    dposv_("L", &nu, &n, r->H, &nu, r->K, &nu, &info);
+    if (info) return CAV_NOT_CONVERGED;
+    product('T', n, n, nu, -1, r->G, nu, r->K, nu, 1, r->P, n);
+  }
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < i; j++) {
+      double mean = 0.5 * (r->P[(size_t)i * n + j] + r->P[(size_t)j * n + i]);
+      r->P[(size_t)i * n + j] = r->P[(size_t)j * n + i] = mean;
+    }
+  return CAV_OK;
+}
+
+/// H = B'PB + h, the price of inputs being one a second.
+static void price_inputs(regulator *r) {
+  int n = r->n, nu = r->nu;
+  if (nu == 0) return;
+  product('N', n, nu, n, 1, r->P, n, r->B, n, 0, r->PB, n);
+  product('T', nu, nu, n, 1, r->B, n, r->PB, n, 0, r->H, nu);
+  for (int i = 0; i < nu; i++) r->H[i * nu + i] += r->h;
+}
+
+/// Adds the gains of this step, as generalised forces, to those of the knot.
+static void add_gains(const regulator *r, double *gain_q, double *gain_v) {
+  int nv = r->nv;
+  for (int j = 0; j < nv; j++)
+    for (int a = 0; a < r->nu; a++) {
+      double q = r->K[(size_t)j * r->nu + a] / FINER, v = r->K[(size_t)(nv + j) * r->nu + a] / FINER;
+      for (int i = 0; i < nv; i++) {
+        gain_q[i * nv + j] -= r->force[(size_t)a * nv + i] * q;
+        gain_v[i * nv + j] -= r->force[(size_t)a * nv + i] * v;
       }
     }
-  }
 }
 
-cav_status cav_feedback(const cav_transcription *tr, const cav_normal *normal, double tracking, double *gain_q,
-                        double *gain_v) {
-  int nv = tr->nv, blocks = tr->nknot - 1;
+static cav_status sweep(regulator *r, const cav_transcription *tr, const cav_trajectory *fine, cav_state *state,
+                        cav_state *bare, double *gain_q, double *gain_v) {
+  int nq = fine->nq, nv = fine->nv;
   size_t square = (size_t)nv * nv;
-  policy p = {.n = nv};
-  double *memory = calloc((2 * (size_t)blocks + 12) * square, sizeof(double));
-  if (!memory) return CAV_NO_MEMORY;
-  double *m = memory;
-  p.A = m, m += (size_t)blocks * square;
-  p.B = m, m += (size_t)blocks * square;
-  p.near = m, p.far = m + square, p.cross = m + 2 * square, m += 3 * square;
-  p.D = m, p.E = m + square, p.F = m + 2 * square, m += 3 * square;
-  p.work = m, m += 2 * square;
-  double *here = m, *before = m + square, *block = m + 2 * square;
-  cav_status status = sweep(&p, normal, blocks, tracking) ? CAV_OK : CAV_NOT_CONVERGED;
+  cav_status status = CAV_OK;
+  for (int k = fine->nknot - 2; k >= 0 && status == CAV_OK; k--) {
+    const double *q = fine->q + (size_t)k * nq, *v = fine->v + (size_t)k * nv;
+    status = cav_inertia(tr->model, bare, q, r->M);
+    if (status == CAV_OK) status = find_slope(r, tr->model, state, q, v);
+    if (status != CAV_OK) break;
+    // at the end a second's straying is priced
+    if (k == fine->nknot - 2) add_price(r, 1);
+    step_columns(r, tr, v + nv, r->slope, r->n, 1, r->A);
+    step_columns(r, tr, v + nv, r->slope + (size_t)r->n * nv, r->nu, 0, r->B);
+    price_inputs(r);
+    status = riccati(r);
+    add_price(r, r->h);
+    int t = k / FINER;
+    if (status == CAV_OK) add_gains(r, gain_q + (size_t)t * square, gain_v + (size_t)t * square);
+  }
+  return status;
+}
 
-  // knots 0 and 1 look back on given ones, whose columns do not exist: they take the gains of the first complete knot
-  int first = blocks > 2 ? 2 : blocks - 1;
-  for (int t = first; status == CAV_OK && t < blocks; t++) {
-    double *Kq = gain_q + (size_t)t * square, *Kv = gain_v + (size_t)t * square;
-    // u depends on q_{t-1}, q_t and, through the policy of block t (knot t+1), on both again
-    force_block(tr, t, 1, here);
-    force_block(tr, t, 0, before);
-    force_block(tr, t, 2, block);
-    multiply_add(nv, nv, 1, block, p.A + (size_t)t * square, here);
-    multiply_add(nv, nv, 1, block, p.B + (size_t)t * square, before);
-    memcpy(Kq, here, square * sizeof(double));
-    memset(Kv, 0, square * sizeof(double));
-    if (t > 1) carry_back(tr, t, before, Kq, Kv);
+cav_status cav_feedback(const cav_transcription *tr, const cav_trajectory *motion, const cav_options *law,
+                        const cav_feedback_price *price, double *gain_q, double *gain_v) {
+  size_t n = ((size_t)motion->nknot - 1) * (size_t)motion->nv * (size_t)motion->nv;
+  memset(gain_q, 0, n * sizeof *gain_q);
+  memset(gain_v, 0, n * sizeof *gain_v);
+  regulator r;
+  int ready = regulator_make(&r, tr->model);
+  cav_trajectory *fine = cav_trajectory_resample(tr->model, motion, motion->timestep / FINER);
+  cav_state *state = cav_state_new(tr->model), *bare = cav_state_new(tr->model);
+  cav_status status = ready && fine && state && bare ? CAV_OK : CAV_NO_MEMORY;
+  if (status == CAV_OK) {
+    r.h = motion->timestep / FINER;
+    r.v = price->tracking / (tr->weight * CAV_MOMENT_ARM);
+    r.q = r.v * price->rate * price->rate;
+    state->options = cav_options_at_step(law, r.h);
+    state->options.order = CAV_ORDER_EULER;
+    bare->options.contact = bare->options.constraint = 0;
+    status = find_forces(&r, tr->model, bare, motion->q);
   }
-  for (int t = 0; t < first; t++) {
-    memcpy(gain_q + (size_t)t * square, gain_q + (size_t)first * square, square * sizeof(double));
-    memcpy(gain_v + (size_t)t * square, gain_v + (size_t)first * square, square * sizeof(double));
-  }
-  free(memory);
+  if (status == CAV_OK) status = sweep(&r, tr, fine, state, bare, gain_q, gain_v);
+  cav_state_free(state);
+  cav_state_free(bare);
+  cav_trajectory_free(fine);
+  regulator_free(&r);
   return status;
 }

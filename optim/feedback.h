@@ -2,12 +2,18 @@
 #ifndef CAVORT_FEEDBACK_H
 #define CAVORT_FEEDBACK_H
 
-#include "gauss_newton.h"
+#include "transcription.h"
 
-/// Gains du_t = gain_q dq_t + gain_v dv_t for t = 0 .. nknot-2, each [nv*nv] row-major, from gathered normal equations and the
-/// derivatives of u at the same point. tracking is added to the Hessian's diagonal: the price of straying from the motion.
-/// Knots 0 and 1 repeat the gains of knot 2: what they look back on is given, so they have none of their own.
-cav_status cav_feedback(const cav_transcription *transcription, const cav_normal *normal, double tracking,
-                        double *gain_q, double *gain_v);
+/// Price of straying from a motion.
+typedef struct cav_feedback_price {
+  double tracking; ///< of the energy of straying, in weight times CAV_MOMENT_ARM, against one actuator at its limit
+  double rate;     ///< rad/s: straying by an angle or way counts as a velocity of rate times that
+} cav_feedback_price;
+
+/// Gains du = gain_q dq + gain_v dv from knot t to t+1, t = 0 .. nknot-2, each [nv*nv] row-major, at tenths of the step and
+/// below, for contacts by law. q, v of the motion are used. CAV_NO_MEMORY, CAV_NOT_FINITE, CAV_NOT_CONVERGED: the motion
+/// is too far from any that a regulator can hold.
+cav_status cav_feedback(const cav_transcription *transcription, const cav_trajectory *motion, const cav_options *law,
+                        const cav_feedback_price *price, double *gain_q, double *gain_v);
 
 #endif

@@ -107,17 +107,6 @@ void cav_normal_multiply(const cav_normal *normal, const double *x, double *prod
   }
 }
 
-void cav_normal_block(const cav_normal *normal, int row, int col, double *out) {
-  int n = normal->n;
-  for (int c = 0; c < n; c++) {
-    int j = col * n + c;
-    for (int r = 0; r < n; r++) {
-      int i = row * n + r;
-      out[r * n + c] = i >= j ? normal->H[(size_t)j * normal->band + (size_t)(i - j)] : 0;
-    }
-  }
-}
-
 int cav_normal_entries(const cav_normal *normal, int *row, int *col, double *value) {
   int entries = 0;
   for (int j = 0; j < normal->size; j++) {

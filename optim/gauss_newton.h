@@ -23,9 +23,6 @@ cav_status cav_normal_factor(cav_normal *normal, double shift);
 void cav_normal_solve(const cav_normal *normal, const double *b, double *x);
 void cav_normal_multiply(const cav_normal *normal, const double *x, double *product);
 
-/// Block (row, column) of H, row - 2 <= column <= row, dense [n*n] row-major (diagonal blocks: lower triangle only).
-void cav_normal_block(const cav_normal *normal, int row, int column, double *out);
-
 /// Entries of the lower triangle in a fixed order: rows, columns and values where asked for; returns their number.
 int cav_normal_entries(const cav_normal *normal, int *row, int *column, double *value);
 

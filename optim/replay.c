@@ -6,9 +6,7 @@
 /// Closed loop at a tenth of the step, by the paper's Euler step: forces u + K_q (q (-) q_ref) + K_v (v - v_ref) brought to
 /// the actuators and clipped to their limits. Once under the claimed contact law, with the time constant that keeps its
 /// stiffness at the finer step, and once under the model as its file says (its own solref contacts, exact law).
-/// Between knots the motion is read as what it is to second order: v_{t+1} = (q_{t+1} (-) q_t)/h is the velocity half
-/// way, and h u_t the impulse centred on knot t. So q_ref runs along the geodesic, v_ref is linear between half steps,
-/// and u_t and the gains of knot t hold for half a step either side.
+/// Between knots the motion is read as cav_trajectory_resample does; gains of knot t hold until knot t+1.
 /// optimisation.md, 3 and 6.
 #include <math.h>
 #include <stdio.h>
@@ -124,31 +122,20 @@ static cav_status drive(const cav_audit *audit, const double *q, const double *v
   return status;
 }
 
-// u := forces held around knot t and feedback at (q, v), through the actuators. A last knot without gains borrows those
-// before
-static cav_status command(const cav_audit *audit, int t, const double *gain_q, const double *gain_v, const double *q,
-                          const double *v, const double *dq, const double *dv, double *effort, double *work,
-                          double *u) {
+// u := forces of the motion and feedback of knot t at (q, v), through the actuators
+static cav_status command(const cav_audit *audit, int t, const double *planned, const double *gain_q,
+                          const double *gain_v, const double *q, const double *v, const double *dq, const double *dv,
+                          double *effort, double *work, double *u) {
   int nv = audit->model->nv;
-  size_t at = (size_t)(t < audit->last ? t : audit->last - 1) * (size_t)nv * (size_t)nv;
+  size_t at = (size_t)t * (size_t)nv * (size_t)nv;
   const double *Kq = gain_q ? gain_q + at : NULL, *Kv = gain_v ? gain_v + at : NULL;
   for (int i = 0; i < nv; i++) {
-    u[i] = audit->u[t * nv + i];
+    u[i] = planned[i];
     for (int j = 0; Kq && j < nv; j++) u[i] += Kq[i * nv + j] * dq[j];
     for (int j = 0; Kv && j < nv; j++) u[i] += Kv[i * nv + j] * dv[j];
   }
   cav_actuation(audit->model, audit->bare, u, NULL, effort);
   return drive(audit, q, v, effort, work, u);
-}
-
-// the motion at a share of the way from knot t to t+1
-static void reference(const cav_audit *audit, int t, double share, double *q, double *v) {
-  int nv = audit->model->nv, late = share >= 0.5;
-  const double *rate = audit->v + (t + 1) * nv, *from = late ? rate : rate - nv, *to = from + nv;
-  double along = late ? share - 0.5 : share + 0.5;
-  if (late && t + 1 == audit->last) to = from;
-  cav_integrate(audit->model, audit->q + t * audit->model->nq, rate, share * audit->h, q);
-  for (int d = 0; d < nv; d++) v[d] = (1 - along) * from[d] + along * to[d];
 }
 
 // angle between two unit quaternions
@@ -212,70 +199,78 @@ static cav_options own_options(const cav_audit *audit) {
   return options;
 }
 
-// the claimed law at a finer step: a discrete one closes the share 1-z of a gap in its step, and the same share a second in
-// smaller ones, which keeps its stiffness (1-z)^2/h^2
+// the claimed law at a finer step
 static cav_options claimed_options(const cav_audit *audit, const cav_options *law) {
-  cav_options options = *law;
-  double z = law->time_constant > 0 ? exp(-audit->h / law->time_constant) : 0;
-  options.timestep = audit->h / SUBSTEPS;
-  options.order = CAV_ORDER_EULER;
-  if (law->stabilisation == CAV_STABILISATION_DISCRETE)
-    options.time_constant = -options.timestep / log1p(-(1 - z) / SUBSTEPS);
-  return options;
+  cav_options claimed = *law;
+  claimed.timestep = audit->h;
+  claimed = cav_options_at_step(&claimed, audit->h / SUBSTEPS);
+  claimed.order = CAV_ORDER_EULER;
+  return claimed;
 }
 
-// simulates one interval; 0 in *on once the motion is lost
-static cav_status interval(const cav_audit *audit, cav_state *fine, const double *gain_q, const double *gain_v, int t,
-                           double *q, double *v, double *work, struct cav_follow *follow, int *on) {
+// the motion read at the finer step; the last knot holds the force before it where none closes the motion
+static cav_trajectory *finer(const cav_audit *audit) {
   const cav_model *model = audit->model;
-  int nv = model->nv;
-  double *q_ref = work, *v_ref = q_ref + model->nq, *dq = v_ref + nv, *dv = dq + nv, *u = dv + nv, *next = u + nv;
-  double *control = next + 2 * nv, *place = control + model->nu;
-  for (int k = 0; k < SUBSTEPS && *on; k++) {
-    double time = (t + (double)(k + 1) / SUBSTEPS) * audit->h;
-    reference(audit, t, (double)k / SUBSTEPS, q_ref, v_ref);
-    cav_difference(model, q_ref, q, 1, dq);
-    for (int d = 0; d < nv; d++) dv[d] = v[d] - v_ref[d];
-    int around = 2 * k >= SUBSTEPS && t + 1 < audit->rows ? t + 1 : t;
-    cav_status status = command(audit, around, gain_q, gain_v, q, v, dq, dv, control, next, u);
-    if (status == CAV_OK) status = step(audit, fine, 1e-9, q, v, u, next);
-    if (status == CAV_NO_MEMORY) return status;
-    if (status != CAV_OK) {
-      snprintf(follow->lost, sizeof follow->lost, "simulation stopped at %.3f s: %s", time, cav_status_name(status));
-      *on = 0;
-      return CAV_OK;
-    }
-    cav_integrate(model, q, next, fine->options.timestep, q);
-    memcpy(v, next, sizeof(double) * nv);
-    // how near
-    gap now;
-    reference(audit, t, (double)(k + 1) / SUBSTEPS, q_ref, v_ref);
-    status = compare(audit, q_ref, q, place, &now);
-    if (status != CAV_OK) return status;
-    *on = following(audit, &now, time, follow);
+  double *u = audit->u + (size_t)audit->last * (size_t)model->nv;
+  if (audit->rows == audit->last) memcpy(u, u - model->nv, sizeof(double) * model->nv);
+  cav_trajectory motion = {.nq = model->nq, .nv = model->nv, .nknot = audit->last + 1, .timestep = audit->h};
+  motion.q = (double *)audit->q, motion.v = audit->v, motion.u = audit->u;
+  return cav_trajectory_resample(model, &motion, audit->h / SUBSTEPS);
+}
+
+// a simulation under way
+typedef struct simulation {
+  const cav_trajectory *motion; ///< at the finer step
+  const double *gain_q, *gain_v;
+  cav_state *state;
+  double *q, *v, *dq, *dv, *u, *next, *control, *place;
+} simulation;
+
+// one step from i to i+1 of the finer motion; 0 in *on once the motion is lost
+static cav_status advance(const cav_audit *audit, simulation *s, int i, struct cav_follow *follow, int *on) {
+  const cav_model *model = audit->model;
+  const double *q_ref = s->motion->q + i * model->nq, *v_ref = s->motion->v + i * model->nv;
+  double time = (i + 1) * s->motion->timestep;
+  cav_difference(model, q_ref, s->q, 1, s->dq);
+  for (int d = 0; d < model->nv; d++) s->dv[d] = s->v[d] - v_ref[d];
+  cav_status status = command(audit, i / SUBSTEPS, s->motion->u + i * model->nv, s->gain_q, s->gain_v, s->q, s->v,
+                              s->dq, s->dv, s->control, s->next, s->u);
+  if (status == CAV_OK) status = step(audit, s->state, 1e-9, s->q, s->v, s->u, s->next);
+  if (status == CAV_NO_MEMORY) return status;
+  if (status != CAV_OK) {
+    snprintf(follow->lost, sizeof follow->lost, "simulation stopped at %.3f s: %s", time, cav_status_name(status));
+    *on = 0;
+    return CAV_OK;
   }
-  return CAV_OK;
+  cav_integrate(model, s->q, s->next, s->motion->timestep, s->q);
+  memcpy(s->v, s->next, sizeof(double) * model->nv);
+  gap now;
+  status = compare(audit, q_ref + model->nq, s->q, s->place, &now);
+  if (status == CAV_OK) *on = following(audit, &now, time, follow);
+  return status;
 }
 
 cav_status cav_replay_closed(const cav_audit *audit, const cav_options *law, const double *gain_q, const double *gain_v,
                              struct cav_follow *follow) {
   const cav_model *model = audit->model;
   size_t nq = (size_t)model->nq, nv = (size_t)model->nv;
-  double *q = malloc(sizeof(double) * (2 * nq + 7 * nv + (size_t)model->nu + 7 * (size_t)model->nlink));
-  cav_state *fine = cav_state_new(model);
-  cav_status status = q && fine ? CAV_OK : CAV_NO_MEMORY;
+  double *q = malloc(sizeof(double) * (nq + 6 * nv + (size_t)model->nu + 7 * (size_t)model->nlink));
+  cav_state *state = cav_state_new(model);
+  cav_trajectory *motion = finer(audit);
+  cav_status status = q && state && motion ? CAV_OK : CAV_NO_MEMORY;
   *follow = (struct cav_follow){0};
   if (status == CAV_OK) {
-    double *v = q + nq;
-    fine->options = law ? claimed_options(audit, law) : own_options(audit);
-    memcpy(q, audit->q, sizeof(double) * nq);
-    memcpy(v, audit->v, sizeof(double) * nv);
+    simulation s = {.motion = motion, .gain_q = gain_q, .gain_v = gain_v, .state = state, .q = q, .v = q + nq};
+    s.dq = s.v + nv, s.dv = s.dq + nv, s.u = s.dv + nv, s.next = s.u + nv, s.control = s.next + 2 * nv;
+    s.place = s.control + model->nu;
+    state->options = law ? claimed_options(audit, law) : own_options(audit);
+    memcpy(s.q, audit->q, sizeof(double) * nq);
+    memcpy(s.v, audit->v, sizeof(double) * nv);
     int on = 1;
-    for (int t = 0; t < audit->last && on && status == CAV_OK; t++) {
-      status = interval(audit, fine, gain_q, gain_v, t, q, v, v + nv, follow, &on);
-    }
+    for (int i = 0; i + 1 < motion->nknot && on && status == CAV_OK; i++) status = advance(audit, &s, i, follow, &on);
   }
-  cav_state_free(fine);
+  cav_trajectory_free(motion);
+  cav_state_free(state);
   free(q);
   return status;
 }

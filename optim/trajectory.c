@@ -58,30 +58,42 @@ void cav_trajectory_velocities(const cav_model *model, cav_trajectory *trajector
   }
 }
 
+// x := way from a knot to a share of the step after it, over the step: cubic from 0 to v_{t+1} with the slopes of the knots
+static void along(const cav_trajectory *trajectory, int t, double share, double *x) {
+  int nv = trajectory->nv;
+  const double *v = trajectory->v + (t + 1) * nv;
+  double s = share, left = s * (1 - s) * (1 - s), right = s * s * (s - 1), whole = s * s * (3 - 2 * s);
+  for (int d = 0; d < nv; d++) {
+    double from = 0.5 * (v[d - nv] + v[d]), to = t + 2 < trajectory->nknot ? 0.5 * (v[d] + v[d + nv]) : 2 * v[d] - from;
+    x[d] = left * from + whole * v[d] + right * to;
+  }
+}
+
 cav_trajectory *cav_trajectory_resample(const cav_model *model, const cav_trajectory *trajectory, double timestep) {
   double h = trajectory->timestep, duration = h * (trajectory->nknot - 1);
   double steps = timestep > 0 ? round(duration / timestep) : 0;
   if (!(steps >= 1 && steps < 1e8)) return NULL;
   cav_trajectory *finer = cav_trajectory_new(model, (int)steps + 1, timestep);
-  double *v = malloc((size_t)model->nv * sizeof *v);
-  if (!finer || !v) {
+  double *x = malloc((size_t)model->nv * sizeof *x);
+  if (!finer || !x) {
     cav_trajectory_free(finer);
-    free(v);
+    free(x);
     return NULL;
   }
   for (int t = 0; t < finer->nknot; t++) {
     // the knot before, and the part of the step past it; the last knot ends the last step
     double at = fmin(t * timestep / h, trajectory->nknot - 1);
     int knot = (int)fmin(floor(at + uneven_most), trajectory->nknot - 2);
-    const double *q = trajectory->q + knot * trajectory->nq;
-    cav_difference(model, q, q + trajectory->nq, 1, v);
-    cav_integrate(model, q, v, at - knot, finer->q + t * finer->nq);
-    int held = (int)fmin(floor(at + uneven_most), trajectory->nknot - 1);
-    memcpy(finer->u + t * finer->nv, trajectory->u + held * finer->nv, (size_t)finer->nv * sizeof(double));
+    along(trajectory, knot, at - knot, x);
+    cav_integrate(model, trajectory->q + knot * trajectory->nq, x, h, finer->q + t * finer->nq);
+    const double *u = trajectory->u + knot * trajectory->nv;
+    for (int d = 0; d < model->nv; d++) {
+      finer->u[t * model->nv + d] = (1 - (at - knot)) * u[d] + (at - knot) * u[model->nv + d];
+    }
   }
   memcpy(finer->v, trajectory->v, (size_t)finer->nv * sizeof(double));
   cav_trajectory_velocities(model, finer);
-  free(v);
+  free(x);
   return finer;
 }
 

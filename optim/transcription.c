@@ -17,9 +17,6 @@
 extern void dsyrk_(const char *uplo, const char *trans, const int *n, const int *k, const double *alpha,
                    const double *A, const int *lda, const double *beta, double *C, const int *ldc);
 
-/// A moment counts as a force at this distance when it is compared with the weight.
-static const double moment_arm = 0.3;
-
 static double now(void) {
   struct timespec t;
   clock_gettime(CLOCK_MONOTONIC, &t);
@@ -119,7 +116,8 @@ static int list_force_rows(cav_transcription *tr) {
     double norm = 0;
     for (int i = 0; i < nv; i++) norm += residual[i] * residual[i];
     if ((norm = sqrt(norm)) < 1e-7) continue;
-    double unit_force = tr->weight * (dof_is_linear(m, d) ? 1 : moment_arm), *direction = basis + tr->nresidual * nv;
+    double unit_force = tr->weight * (dof_is_linear(m, d) ? 1 : CAV_MOMENT_ARM),
+           *direction = basis + tr->nresidual * nv;
     for (int i = 0; i < nv; i++) direction[i] = residual[i] / norm;
     if (!force_row_set(&tr->unactuated[tr->nresidual++], nv, direction, 1 / unit_force)) goto end;
   }

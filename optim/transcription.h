@@ -5,6 +5,9 @@
 #include "cavort/solve.h"
 #include "parallel.h"
 
+/// m: a moment counts as a force at this distance when it is compared with the weight.
+#define CAV_MOMENT_ARM 0.3
+
 /// A constraint row lower <= value <= upper, scaled; equalities have lower = upper.
 typedef struct cav_slot {
   double value, lower, upper;

@@ -12,7 +12,6 @@
 #include "transcription.h"
 
 static const double usual_gravity = 9.81; // m/s^2, unit of forces where the model has none
-static const double moment_arm = 0.3;     // m
 
 /// What was found at the knots.
 typedef struct evidence {
@@ -145,7 +144,7 @@ static cav_status audit_start(cav_audit *audit, const cav_problem *problem, cons
                        .law = *contact,
                        .last = trajectory->nknot - 1,
                        .h = trajectory->timestep,
-                       .arm = moment_arm,
+                       .arm = CAV_MOMENT_ARM,
                        .q = trajectory->q};
   audit->rows = audit->last + (problem->close_at_rest ? 1 : 0);
   audit->law.timestep = audit->h;
@@ -395,5 +394,23 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
   cav_balance_free(balance);
   audit_clear(&audit);
   if (status != CAV_OK && error && !*error->text) fail(error, status, "verification: %s", cav_status_name(status));
+  return status;
+}
+
+cav_status cav_track(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
+                     const double *gain_q, const double *gain_v, struct cav_follow *claimed, struct cav_follow *own,
+                     cav_error *error) {
+  cav_audit audit;
+  cav_status status = admit(problem, trajectory, contact, gain_q, gain_v, error);
+  if (status != CAV_OK) return status;
+  status = audit_start(&audit, problem, trajectory, contact);
+  int nv = audit.model->nv;
+  for (int t = 0; t < audit.rows && status == CAV_OK; t++) {
+    const double *v = audit.v + t * nv;
+    status = cav_inverse(audit.model, audit.state, audit.q + t * audit.model->nq, v, v + nv, audit.u + t * nv);
+  }
+  if (status == CAV_OK) status = cav_replay_closed(&audit, contact, gain_q, gain_v, claimed);
+  if (status == CAV_OK) status = cav_replay_closed(&audit, NULL, gain_q, gain_v, own);
+  audit_clear(&audit);
   return status;
 }

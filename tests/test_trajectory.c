@@ -85,11 +85,8 @@ static void check_resample(const cav_model *model) {
   for (int t = 0; t < 11 && fine; t++) {
     // at shared knots the configurations agree: rounding, seen 3e-16
     CHECK_NEAR_ALL(fine->q + 4 * t * model->nq, coarse->q + t * model->nq, model->nq, 1e-14);
-    CHECK_NEAR_ALL(fine->u + 4 * t * model->nv, coarse->u + t * model->nv, model->nv, 0);
-  }
-  // between knots the velocity is that of the coarse step
-  for (int t = 1; t < 41 && fine; t++) {
-    CHECK_NEAR_ALL(fine->v + t * model->nv, coarse->v + ((t + 3) / 4) * model->nv, model->nv, 1e-12);
+    // rounding of forces of some tens: seen 6e-14
+    CHECK_NEAR_ALL(fine->u + 4 * t * model->nv, coarse->u + t * model->nv, model->nv, 1e-12);
   }
   cav_trajectory *back = fine ? cav_trajectory_resample(model, fine, 0.04) : NULL;
   CHECK(back && back->nknot == 11);
@@ -100,6 +97,34 @@ static void check_resample(const cav_model *model) {
   cav_trajectory_free(back);
   cav_trajectory_free(fine);
   cav_trajectory_free(coarse);
+}
+
+// largest distance at the middle of steps, first and last steps apart, from a motion along one tangent as sin 3t
+static double misread(const cav_model *model, double h) {
+  int n = (int)lround(0.8 / h) + 1;
+  double *along = malloc(sizeof(double) * (size_t)(2 * model->nv + model->nq)), worst = 0;
+  double *scaled = along + model->nv, *q = scaled + model->nv;
+  for (int d = 0; d < model->nv; d++) along[d] = 0.3 * sin(1.3 * d + 0.4);
+  cav_trajectory *coarse = cav_trajectory_new(model, n, h);
+  for (int t = 0; t < n; t++) cav_integrate(model, model->q0, along, sin(3 * t * h), coarse->q + t * model->nq);
+  cav_trajectory_velocities(model, coarse);
+  cav_trajectory *fine = cav_trajectory_resample(model, coarse, h / 2);
+  for (int t = 3; t < 2 * n - 4; t += 2) {
+    cav_integrate(model, model->q0, along, sin(1.5 * t * h), q);
+    cav_difference(model, q, fine->q + t * model->nq, 1, scaled);
+    for (int d = 0; d < model->nv; d++) worst = fmax(worst, fabs(scaled[d]));
+  }
+  cav_trajectory_free(fine);
+  cav_trajectory_free(coarse);
+  free(along);
+  return worst;
+}
+
+// cubics with central slopes read a smooth motion to h^4 in the middle of a step: seen a factor 15.8 a halving. Geodesics: 4
+static void check_smooth(const cav_model *model) {
+  double coarse = misread(model, 0.04), fine = misread(model, 0.02);
+  printf("motion read between knots: %.2g at 0.04 s, %.2g at 0.02 s\n", coarse, fine);
+  CHECK(coarse < 1e-4 && coarse / fine > 12);
 }
 
 static void check_round_trip(const cav_model *model) {
@@ -224,6 +249,7 @@ int main(void) {
     check_new(model);
     check_velocities(model);
     check_resample(model);
+    check_smooth(model);
     check_round_trip(model);
     check_partial(model);
     check_locale(model);

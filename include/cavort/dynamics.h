@@ -260,6 +260,10 @@ int cav_actuator_input(const cav_model *model, int actuator, double length, doub
 /// it. The limits of a servo's control bound no effort of their own.
 void cav_actuator_effort_range(const cav_model *model, int actuator, double range[2]);
 
+/// The same law at another step: a discrete stabilisation keeps the share of a gap that it closes a second, and so its
+/// stiffness; deadbeat (time constant 0) where that is more than the whole gap in a step.
+cav_options cav_options_at_step(const cav_options *options, double timestep);
+
 /// Softness of a row that acts as ODE's with that CFM (m/(N s), or rad/(N m s)) and ERP at that time step: J v_next =
 /// -(ERP/h) x - CFM F, exactly. weight is the diagonal of A that the row's R is scaled with (cav_pair.weight[0],
 /// cav_dof.inverse_weight, cav_tendon.inverse_weight, cav_equality.weight). CAV_BAD_INPUT if CFM is not between 1e-4 h and

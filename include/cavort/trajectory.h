@@ -28,7 +28,8 @@ void cav_trajectory_free(cav_trajectory *trajectory);
 /// v of knots 1 .. nknot-1 from q by differences; v of knot 0 stays.
 void cav_trajectory_velocities(const cav_model *model, cav_trajectory *trajectory);
 
-/// The motion resampled at another step over the same duration: geodesic between knots.
+/// The motion resampled at another step over the same duration. Through the knots, by cubics along the geodesics between
+/// them whose velocity at a knot is the mean of the steps before and after it; u is linear between knots.
 cav_trajectory *cav_trajectory_resample(const cav_model *model, const cav_trajectory *trajectory, double timestep);
 
 /// Reads and writes trajectory.csv: a header of named columns, then one row per knot: time, q in MuJoCo's layout, v, u.
