@@ -4,6 +4,7 @@
 #define CAVORT_AUDIT_H
 
 #include "cavort/solve.h"
+#include "cycle.h"
 
 /// A worst value and where it was found.
 typedef struct cav_finding {
@@ -22,8 +23,11 @@ typedef struct cav_audit {
   double h;         ///< s
   double weight;    ///< N, unit of forces (cav_audit_weight)
   double arm;       ///< m, unit of moments is weight*arm
+  cav_wrap *wrap;   ///< cycles: from one period to the next; else NULL
+  int periods;      ///< that replays run for
   const double *q;  ///< [(T+1)*nq] knots
-  double *v;        ///< [(T+2)*nv] from the knots; the last row closes the motion: zero, or v_T where nothing closes it
+  double *v;        ///< [(T+2)*nv] from the knots; the last row closes the motion: zero, v_1 moved in a cycle, or v_T
+                    ///< where nothing closes it
   double *u;        ///< [(T+1)*nv] inverse dynamics under the claimed law; meaningful for rows knots
   double *control;  ///< [(T+1)*nu] least-norm share of the actuators
   cav_state *state; ///< claimed law

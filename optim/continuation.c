@@ -31,11 +31,11 @@ static double between(double from, double to, double s) {
   return from > 0 && to > 0 ? from * pow(to / from, s) : (1 - s) * from + s * to;
 }
 
-void cav_stage_law(const cav_problem *problem, double x, cav_options *law) {
+void cav_stage_law(const cav_problem *problem, double x, double step, cav_options *law) {
   const cav_stage_options *a = &problem->schedule.first, *b = &problem->schedule.last;
   law->stabilisation = CAV_STABILISATION_DISCRETE;
   law->softness = between(a->softness, b->softness, x);
-  law->time_constant = between(a->time_constant, b->time_constant, x) * problem->timestep;
+  law->time_constant = between(a->time_constant, b->time_constant, x) * step;
   law->smoothing = between(a->smoothing, b->smoothing, x);
   law->smoothing_self = between(a->smoothing_self, b->smoothing_self, x);
   law->self_share = between(a->self_share, b->self_share, x);
@@ -44,7 +44,7 @@ void cav_stage_law(const cav_problem *problem, double x, cav_options *law) {
 void cav_stage_set(const cav_problem *problem, int s, int n, cav_transcription *tr) {
   const cav_stage_options *a = &problem->schedule.first, *b = &problem->schedule.last;
   double x = n > 1 ? (double)s / (n - 1) : 1;
-  cav_stage_law(problem, x, &tr->options);
+  cav_stage_law(problem, x, tr->h, &tr->options);
   tr->penalty = priced;
   tr->penalty.effort = between(priced.effort, 100 * priced.effort, x);
   tr->penalty.range = between(priced.range, 10 * priced.range, x);

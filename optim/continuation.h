@@ -21,15 +21,16 @@ typedef struct cav_solve_run {
   double start;      ///< s
 } cav_solve_run;
 
-/// The problem's guess: start held, or the geodesic to the goal, with a ballistic arc if asked. q and v of at are filled.
-void cav_guess_fill(const cav_problem *problem, cav_trajectory *at);
+/// The problem's guess: start held, or the geodesic to end [nq], with a ballistic arc if asked; cycles always go to their end, at
+/// constant speed. q and v of at are filled.
+void cav_guess_fill(const cav_problem *problem, const double *end, cav_trajectory *at);
 
 /// The guess into run->at, moved a little off its symmetries: a straight or symmetric one can be a saddle of all costs and
 /// constraints at once, which exact derivatives never leave.
 cav_status cav_guess_take(cav_solve_run *run);
 
-/// Contact law at a share of the schedule, 0 .. 1; the rest of law stays.
-void cav_stage_law(const cav_problem *problem, double share, cav_options *law);
+/// Contact law at a share of the schedule, 0 .. 1, for a step in s; the rest of law stays.
+void cav_stage_law(const cav_problem *problem, double share, double step, cav_options *law);
 
 /// Contact law and weights of stage s of n.
 void cav_stage_set(const cav_problem *problem, int s, int n, cav_transcription *transcription);

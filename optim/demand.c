@@ -11,13 +11,16 @@
 
 #include "audit.h"
 
+// time of a knot for windows and targets: a share of the problem's duration, whatever the step has become
+static double when(const cav_audit *audit, int t) { return t * audit->problem->timestep; }
+
 // 1 if the term's window holds knot t
 static int holds(const cav_audit *audit, const cav_term *term, int t) {
-  double duration = audit->last * audit->h;
+  double h = audit->problem->timestep, duration = audit->last * h;
   double from = term->from < 0 || term->from > duration ? duration : term->from;
   double to = term->to < 0 || term->to > duration ? duration : term->to;
-  int first = (int)ceil(from / audit->h - 1e-6), last = (int)floor(to / audit->h + 1e-6);
-  if (to - from < 1e-9 || first > last) first = last = (int)lround((from + to) / 2 / audit->h);
+  int first = (int)ceil(from / h - 1e-6), last = (int)floor(to / h + 1e-6);
+  if (to - from < 1e-9 || first > last) first = last = (int)lround((from + to) / 2 / h);
   return t >= first && t <= last;
 }
 
@@ -78,13 +81,13 @@ static int sensor_values(const cav_audit *audit, const cav_term *term, int t, do
   int n = sensor->dim;
   cav_sense(audit->model, audit->state, sensor, reading);
   if (sensor->dim == 4) {
-    target_quat(term, t * audit->h, aim);
+    target_quat(term, when(audit, t), aim);
     turn(aim, reading, x);
     memset(target, 0, sizeof(double) * 3);
     n = 3;
   } else {
     memcpy(x, reading, sizeof(double) * n);
-    target_at(term, t * audit->h, n, target);
+    target_at(term, when(audit, t), n, target);
   }
   if (term->component < 0) return n;
   x[0] = x[term->component];
@@ -130,7 +133,7 @@ static int configuration_values(const cav_audit *audit, const cav_term *term, in
   const double *from = audit->problem->q_goal, *to = from;
   double share = 0;
   if (term->target) {
-    share = waypoints(term, t * audit->h, &low, &high);
+    share = waypoints(term, when(audit, t), &low, &high);
     from = term->target + low * model->nq;
     to = term->target + high * model->nq;
   }
@@ -148,7 +151,7 @@ static int velocity_values(const cav_audit *audit, const cav_term *term, int t, 
   const double *v = audit->v + t * model->nv, *next = v + model->nv;
   int rate = term->quantity == CAV_QUANTITY_ACCELERATION;
   for (int d = 0; d < model->nv; d++) x[d] = rate ? (next[d] - v[d]) / audit->h : v[d];
-  target_at(term, t * audit->h, model->nv, target);
+  target_at(term, when(audit, t), model->nv, target);
   return select_dofs(model, term, x, target);
 }
 
@@ -159,7 +162,7 @@ static int effort_values(const cav_audit *audit, const cav_term *term, int t, do
     cav_audit_actuator_range(model, a, range, &scale);
     x[a] = audit->control[t * model->nu + a] / scale;
   }
-  target_at(term, t * audit->h, model->nu, target);
+  target_at(term, when(audit, t), model->nu, target);
   return model->nu;
 }
 

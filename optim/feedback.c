@@ -194,8 +194,9 @@ static void add_gains(const regulator *r, double *gain_q, double *gain_v) {
     }
 }
 
+/// Back over a motion; gains of the first knots are kept.
 static cav_status sweep(regulator *r, const cav_transcription *tr, const cav_trajectory *fine, cav_state *state,
-                        cav_state *bare, double *gain_q, double *gain_v) {
+                        cav_state *bare, int knots, double *gain_q, double *gain_v) {
   int nq = fine->nq, nv = fine->nv;
   size_t square = (size_t)nv * nv;
   cav_status status = CAV_OK;
@@ -212,7 +213,7 @@ static cav_status sweep(regulator *r, const cav_transcription *tr, const cav_tra
     status = riccati(r);
     add_price(r, r->h);
     int t = k / FINER;
-    if (status == CAV_OK) add_gains(r, gain_q + (size_t)t * square, gain_v + (size_t)t * square);
+    if (status == CAV_OK && t < knots) add_gains(r, gain_q + (size_t)t * square, gain_v + (size_t)t * square);
   }
   return status;
 }
@@ -224,7 +225,10 @@ cav_status cav_feedback(const cav_transcription *tr, const cav_trajectory *motio
   memset(gain_v, 0, n * sizeof *gain_v);
   regulator r;
   int ready = regulator_make(&r, tr->model);
-  cav_trajectory *fine = cav_trajectory_resample(tr->model, motion, motion->timestep / FINER);
+  // a cycle goes on: two strides are looked ahead
+  int ahead = tr->problem->cycle.mirror == CAV_MIRROR_NONE ? 2 : 4;
+  cav_trajectory *whole = tr->wrap ? cav_wrap_unroll(tr->wrap, motion, ahead) : cav_trajectory_copy(motion);
+  cav_trajectory *fine = whole ? cav_trajectory_resample(tr->model, whole, motion->timestep / FINER) : NULL;
   cav_state *state = cav_state_new(tr->model), *bare = cav_state_new(tr->model);
   cav_status status = ready && fine && state && bare ? CAV_OK : CAV_NO_MEMORY;
   if (status == CAV_OK) {
@@ -236,9 +240,10 @@ cav_status cav_feedback(const cav_transcription *tr, const cav_trajectory *motio
     bare->options.contact = bare->options.constraint = 0;
     status = find_forces(&r, tr->model, bare, motion->q);
   }
-  if (status == CAV_OK) status = sweep(&r, tr, fine, state, bare, gain_q, gain_v);
+  if (status == CAV_OK) status = sweep(&r, tr, fine, state, bare, motion->nknot - 1, gain_q, gain_v);
   cav_state_free(state);
   cav_state_free(bare);
+  cav_trajectory_free(whole);
   cav_trajectory_free(fine);
   regulator_free(&r);
   return status;

@@ -44,7 +44,7 @@ cav_status cav_choose_gains(cav_solve_run *run, cav_error *error) {
   for (int i = 0; i < trials && status == CAV_OK && (first || !done(&best)); i++) {
     outcome now;
     cav_options law = run->tr->options;
-    cav_stage_law(run->problem, trial[i].share, &law);
+    cav_stage_law(run->problem, trial[i].share, run->tr->h, &law);
     status = cav_feedback(run->tr, run->at, &law, &trial[i].price, gain, gain + n);
     // a regulator that does not exist is no reason to give up the motion
     if (status == CAV_NOT_CONVERGED || status == CAV_NOT_FINITE) status = CAV_OK;

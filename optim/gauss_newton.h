@@ -4,14 +4,14 @@
 
 #include "transcription.h"
 
-/// Block-banded normal equations and their factor; opaque.
+/// Block-banded normal equations with a border, and their factor; opaque.
 typedef struct cav_normal cav_normal;
 
-/// For blocks of n unknowns; NULL if memory runs out.
-cav_normal *cav_normal_new(int blocks, int n);
+/// Of the unknowns of a transcription; NULL if memory runs out.
+cav_normal *cav_normal_new(const cav_transcription *transcription);
 void cav_normal_free(cav_normal *normal);
 
-/// Sums the knots' Hessians and gradients. gradient and diagonal stay readable until the next call, [blocks*n].
+/// Sums the knots' Hessians and gradients. gradient and diagonal stay readable until the next call, [unknowns].
 void cav_normal_gather(cav_normal *normal, const cav_transcription *transcription);
 const double *cav_normal_gradient(const cav_normal *normal);
 const double *cav_normal_diagonal(const cav_normal *normal);
@@ -19,7 +19,10 @@ const double *cav_normal_diagonal(const cav_normal *normal);
 /// Factors H + shift diag(H); CAV_NOT_CONVERGED if that is not positive definite.
 cav_status cav_normal_factor(cav_normal *normal, double shift);
 
-/// x := (H + shift)^-1 b with the last factor; product := H x. [blocks*n]
+/// Holds the last unknown where it is: its gradient and row become those of one that has no say.
+void cav_normal_hold(cav_normal *normal);
+
+/// x := (H + shift)^-1 b with the last factor; product := H x. [unknowns]
 void cav_normal_solve(const cav_normal *normal, const double *b, double *x);
 void cav_normal_multiply(const cav_normal *normal, const double *x, double *product);
 

@@ -2,7 +2,7 @@
 ///
 /// From start to goal along the geodesic of the configuration space with a cubic of time; or by postures on the way, linear in
 /// time between them; or the start held. On that a rotation of the first free joint, a ballistic arc of the roots, and sines
-/// laid over single joints. Asks nothing of contacts or forces.
+/// laid over single joints. Cycles go from their start to where that is a period on, at constant speed. Asks nothing of contacts or forces.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -50,7 +50,7 @@ static void turn(const cav_problem *problem, double share, double *q) {
 
 /// Lays the swings over q, within the joints' ranges: a knee swings one way only.
 static void swing(const cav_problem *problem, double time, double *q) {
-  double fade = smoothstep(5 * fmin(time, problem->duration - time) / problem->duration);
+  double fade = problem->cycle.on ? 1 : smoothstep(5 * fmin(time, problem->duration - time) / problem->duration);
   for (int i = 0; i < problem->nswing; i++) {
     const cav_swing *s = &problem->swing[i];
     const cav_joint *joint = &problem->model->joint[s->joint];
@@ -60,34 +60,35 @@ static void swing(const cav_problem *problem, double time, double *q) {
   }
 }
 
-/// Posture i of those on the way: the start first, the goal last.
-static cav_guess_pose passed(const cav_problem *problem, int i) {
+/// Posture i of those on the way: the start first, the end last.
+static cav_guess_pose passed(const cav_problem *problem, const double *end, int i) {
   if (i == 0) return (cav_guess_pose){0, problem->q_start};
   if (i <= problem->nguess_pose) return problem->guess_pose[i - 1];
-  return (cav_guess_pose){problem->duration, problem->q_goal};
+  return (cav_guess_pose){problem->duration, end};
 }
 
 /// What the guess is before turn, arc and swings; tangent is room for nv numbers.
-static void follow(const cav_problem *problem, double time, double *tangent, double *q) {
+static void follow(const cav_problem *problem, const double *end, double time, double *tangent, double *q) {
   const cav_model *m = problem->model;
   int i = 1;
   while (i <= problem->nguess_pose && problem->guess_pose[i - 1].time <= time) i++;
-  cav_guess_pose a = passed(problem, i - 1), b = passed(problem, i);
+  cav_guess_pose a = passed(problem, end, i - 1), b = passed(problem, end, i);
   double s = b.time > a.time ? fmin((time - a.time) / (b.time - a.time), 1) : 1;
-  if (problem->nguess_pose == 0) s = smoothstep(s);
-  if (problem->guess == CAV_GUESS_HOLD) s = 0;
+  // a cycle goes on at constant speed
+  if (problem->nguess_pose == 0 && !problem->cycle.on) s = smoothstep(s);
+  if (problem->guess == CAV_GUESS_HOLD && !problem->cycle.on) s = 0;
   cav_difference(m, a.q, b.q, 1, tangent);
   cav_integrate(m, a.q, tangent, s, q);
 }
 
-void cav_guess_fill(const cav_problem *problem, cav_trajectory *at) {
+void cav_guess_fill(const cav_problem *problem, const double *end, cav_trajectory *at) {
   const cav_model *m = problem->model;
   double *tangent = at->v + (size_t)(at->nknot - 1) * m->nv; // scratch until velocities are filled below
   double span = problem->guess_to - problem->guess_from;
   for (int t = 0; t < at->nknot; t++) {
     double time = t * problem->timestep, *q = at->q + (size_t)t * at->nq;
     double x = span > 0 ? (time - problem->guess_from) / span : -1;
-    follow(problem, time, tangent, q);
+    follow(problem, end, time, tangent, q);
     swing(problem, time, q);
     turn(problem, smoothstep(x), q);
     if (x > 0 && x < 1) lift(m, 4 * problem->guess_height * x * (1 - x), q);
@@ -97,10 +98,17 @@ void cav_guess_fill(const cav_problem *problem, cav_trajectory *at) {
 }
 
 cav_status cav_guess_take(cav_solve_run *run) {
-  int n = (run->tr->nknot - 1) * run->tr->nv;
+  int n = cav_transcription_unknowns(run->tr);
   double *x = malloc((size_t)n * sizeof *x);
   if (!x) return CAV_NO_MEMORY;
-  cav_guess_fill(run->problem, run->at);
+  // a cycle goes to where its start is a period on
+  const double *end = run->problem->q_goal;
+  if (run->tr->wrap) {
+    cav_wrap_configuration(run->tr->wrap, 1, run->problem->q_start, run->spare->q);
+    end = run->spare->q;
+  }
+  run->at->timestep = run->problem->timestep;
+  cav_guess_fill(run->problem, end, run->at);
   for (int i = 0; i < n; i++) x[i] = nudge * (2 * fmod((i + 1) * golden, 1) - 1);
   cav_transcription_move(run->tr, run->at, x, run->spare);
   cav_trajectory *moved = run->spare;

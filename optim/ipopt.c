@@ -34,7 +34,7 @@ typedef struct program {
   int *jacobian_row, *jacobian_column, *source; ///< [entries]; source: column among the row's 3nv
   double *x;                                    ///< [n] point of the last evaluation
   int known;                                    ///< 1: values at x are known, 2: derivatives too
-  double *full;                                 ///< [3nv] a row while it is turned
+  double *full;                                 ///< [3nv+1] a row while it is turned, and its entry of the step
   double infeasibility, dual;                   ///< of the last iterate, as Ipopt measures them
   int interrupted;
 } program;
@@ -55,13 +55,12 @@ static int evaluate(program *p, const double *x, int derivatives) {
   return 1;
 }
 
-/// Tangent of the unknown at knot t to tangent at its configuration: row := row * Jr(x) on rotations.
-static void turn_row(const program *p, int t, double *row) {
+/// Tangent of a block of unknowns to tangent at its configuration: row := row * Jr(x) on rotations.
+static void turn_row(const program *p, int block, double *row) {
   const cav_transcription *tr = p->run->tr;
-  if (t < 1 || t >= tr->nknot) return;
-  for (int k = 0; k < tr->nturn; k++) {
+  for (int k = 0; block >= 0 && k < tr->nturn; k++) {
     double J[9], y[3], *r = row + tr->turn_dof[k];
-    cav_turn(p->x + (size_t)(t - 1) * tr->nv + tr->turn_dof[k], J);
+    cav_turn(p->x + (size_t)block * tr->nv + tr->turn_dof[k], J);
     for (int c = 0; c < 3; c++) y[c] = r[0] * J[c] + r[1] * J[3 + c] + r[2] * J[6 + c];
     memcpy(r, y, sizeof y);
   }
@@ -80,7 +79,7 @@ static Bool objective_gradient(int n, double *x, Bool fresh, double *gradient, U
   (void)fresh;
   if (!evaluate(p, x, 1)) return 0;
   memcpy(gradient, cav_normal_gradient(p->run->normal), (size_t)n * sizeof *gradient);
-  for (int t = 1; t < p->run->tr->nknot; t++) turn_row(p, t, gradient + (size_t)(t - 1) * p->run->tr->nv);
+  for (int b = 0; b < p->run->tr->nknot - 1; b++) turn_row(p, b, gradient + (size_t)b * p->run->tr->nv);
   return 1;
 }
 
@@ -108,7 +107,8 @@ static Bool constraint_jacobian(int n, double *x, Bool fresh, int m, int entries
     int i = p->jacobian_row[k], t = p->row_knot[i];
     if (i != last) {
       memcpy(p->full, tr->knot[t].slot_row + (size_t)p->row_slot[i] * 3 * nv, 3 * (size_t)nv * sizeof(double));
-      for (int c = 0; c < 3; c++) turn_row(p, t + c - 1, p->full + c * nv);
+      for (int c = 0; c < 3; c++) turn_row(p, cav_transcription_block(tr, t, c), p->full + c * nv);
+      p->full[3 * nv] = tr->knot[t].slot_step[p->row_slot[i]];
       last = i;
     }
     value[k] = p->full[p->source[k]];
@@ -155,6 +155,12 @@ static int is_bound(const cav_transcription *tr, int t, int i, int *dof) {
   return tr->model->joint[joint - 1].type != CAV_JOINT_BALL;
 }
 
+/// Whether a row depends on the step: forces, and terms that read more than the configuration.
+static int sees_step(const cav_transcription *tr, int t, int i) {
+  const cav_slot_layout *at = &tr->knot[t].layout;
+  return i < at->joint || i >= at->term;
+}
+
 static int list_rows(program *p, char *pattern) {
   const cav_transcription *tr = p->run->tr;
   int nv = tr->nv, dof;
@@ -169,8 +175,17 @@ static int list_rows(program *p, char *pattern) {
           if (!pattern[c]) continue;
           if (pass) {
             p->jacobian_row[entries] = m;
-            p->jacobian_column[entries] = (t + c / nv - 2) * nv + c % nv;
+            p->jacobian_column[entries] = cav_transcription_block(tr, t, c / nv) * nv + c % nv;
             p->source[entries] = c;
+          }
+          entries++;
+        }
+        // a free step is seen by what is not of the posture alone
+        if (tr->free_step && sees_step(tr, t, i)) {
+          if (pass) {
+            p->jacobian_row[entries] = m;
+            p->jacobian_column[entries] = p->n - 1;
+            p->source[entries] = 3 * nv;
           }
           entries++;
         }
@@ -196,6 +211,11 @@ static void set_bounds(const program *p, double *x_lower, double *x_upper, doubl
   const double infinite = 2e19;
   int dof;
   for (int i = 0; i < p->n; i++) x_lower[i] = -infinite, x_upper[i] = infinite;
+  if (tr->free_step) {
+    double steps = tr->nknot - 1;
+    x_lower[p->n - 1] = log(tr->problem->duration_least / (steps * p->anchor->timestep));
+    x_upper[p->n - 1] = log(tr->problem->duration_most / (steps * p->anchor->timestep));
+  }
   for (int t = 1; t < tr->nknot; t++) {
     for (int i = tr->knot[t].layout.joint; i < tr->knot[t].layout.tendon; i++) {
       if (!is_bound(tr, t, i, &dof)) continue;
@@ -334,13 +354,13 @@ cav_status cav_ipopt(cav_solve_run *run, cav_error *error) {
   cav_transcription *tr = run->tr;
   cav_penalties kept = tr->penalty;
   cav_derivative difference = tr->difference;
-  program p = {.run = run, .n = (tr->nknot - 1) * tr->nv, .anchor = cav_trajectory_copy(run->at)};
+  program p = {.run = run, .n = cav_transcription_unknowns(tr), .anchor = cav_trajectory_copy(run->at)};
   IpoptProblem nlp = NULL;
   double *bound = NULL, *start = NULL, *multiplier = NULL;
-  char *pattern = malloc(3 * (size_t)tr->nv);
+  char *pattern = malloc(4 * (size_t)tr->nv);
   cav_status status = CAV_NO_MEMORY;
   p.x = calloc((size_t)p.n, sizeof(double));
-  p.full = malloc(3 * (size_t)tr->nv * sizeof(double));
+  p.full = malloc((3 * (size_t)tr->nv + 1) * sizeof(double));
   if (!p.anchor || !p.x || !p.full || !pattern || !cav_transcription_keep_rows(tr) || !list_rows(&p, pattern)) goto end;
   bound = malloc((2 * (size_t)p.n + 2 * (size_t)p.m + 1) * sizeof(double));
   start = calloc((size_t)p.n, sizeof(double));

@@ -146,11 +146,18 @@ static void spread_turns(const cav_transcription *tr, char *seen) {
   }
 }
 
-/// Block c: 0 q_{t-1}, 1 q_t, 2 q_{t+1}, where those are unknowns.
+/// Block c: 0 q_{t-1}, 1 q_t, 2 q_{t+1}, where those are unknowns. seen may be block 1.
 static void put(const cav_transcription *tr, int t, const char *seen, int from, int to, char *pattern) {
+  char *scratch = pattern + 3 * tr->nv;
+  memcpy(scratch, seen, (size_t)tr->nv);
   for (int c = from; c <= to; c++) {
     int knot = t + c - 1;
-    if (knot >= 1 && knot < tr->nknot) memcpy(pattern + c * tr->nv, seen, (size_t)tr->nv);
+    if (cav_transcription_block(tr, t, c) < 0) continue;
+    if (tr->wrap && (knot < 1 || knot >= tr->nknot)) {
+      cav_wrap_pattern(tr->wrap, knot < 1 ? 1 : -1, scratch, pattern + c * tr->nv);
+    } else {
+      memcpy(pattern + c * tr->nv, scratch, (size_t)tr->nv);
+    }
   }
 }
 
@@ -196,7 +203,7 @@ void cav_transcription_pattern(const cav_transcription *tr, int t, int i, char *
     if (term->quantity == CAV_QUANTITY_SENSOR) {
       cav_sensor_stage stage = sensor_pattern(tr, &term->sensor, seen);
       spread_turns(tr, seen);
-      int open = t == tr->nknot - 1 && !tr->problem->close_at_rest; // there v_next is v_t
+      int open = t == tr->nknot - 1 && !tr->problem->close_at_rest && !tr->wrap; // there v_next is v_t
       int moving = stage != CAV_READS_POSITION, before = stage == CAV_READS_ACCELERATION || (moving && open);
       put(tr, t, seen, before ? 0 : 1, moving ? 2 : 1, pattern);
     } else {
@@ -205,5 +212,5 @@ void cav_transcription_pattern(const cav_transcription *tr, int t, int i, char *
       put(tr, t, seen, term->quantity == CAV_QUANTITY_VELOCITY ? 0 : 1, 1, pattern);
     }
   }
-  if (t == 0) memset(pattern + tr->nv, 0, (size_t)tr->nv);
+  if (cav_transcription_block(tr, t, 1) < 0) memset(pattern + tr->nv, 0, (size_t)tr->nv);
 }

@@ -206,6 +206,19 @@ static cav_status read_horizon(const cav_problem_reader *reader) {
                         "expected a whole number of steps of %g s, got %g; %g s would be one", p->timestep, steps,
                         round(steps) * p->timestep);
   }
+  double range[2];
+  status = real(reader, node, "weight", 0, DBL_MAX, &p->duration_weight);
+  if (status) return status;
+  if (cav_xml_reals(node, "range", range, 2)) {
+    if (!(range[0] > 0 && range[0] <= p->duration && p->duration <= range[1]))
+      return cav_xml_fail(reader->error, node, "range",
+                          "expected a shortest and a longest duration about %g s, got %g %g", p->duration, range[0],
+                          range[1]);
+    p->duration_least = range[0];
+    p->duration_most = range[1];
+  } else if (cav_xml_get(node, "weight")) {
+    return cav_xml_fail(reader->error, node, "weight", "prices a free duration: give its range too");
+  }
   p->order = (cav_order)cav_xml_word(node, "order", p->order);
   p->close_at_rest = cav_xml_word(node, "close", p->close_at_rest);
   return CAV_OK;
@@ -436,7 +449,9 @@ static cav_status read_contact(const cav_problem_reader *reader) {
   o->constraint = cav_xml_bool(node, "constraint", o->constraint);
   o->gravity = cav_xml_bool(node, "gravity", o->gravity);
   o->passive = cav_xml_bool(node, "passive", o->passive);
-  if (fabs(o->timestep - reader->problem->timestep) > whole_step * o->timestep) {
+  // a free duration has found its own
+  const cav_problem *p = reader->problem;
+  if (p->duration_most == 0 && fabs(o->timestep - p->timestep) > whole_step * o->timestep) {
     return cav_xml_fail(reader->error, node, "timestep", "expected %g as in <horizon>, got %g",
                         reader->problem->timestep, o->timestep);
   }
@@ -480,6 +495,7 @@ static cav_status read_problem(cav_problem_reader *reader, const char *model_pat
   if (!reader->problem->name) return cav_problem_no_memory(reader);
   status = read_horizon(reader);
   if (!status) status = read_ends(reader);
+  if (!status) status = cav_problem_cycle(reader);
   if (!status) status = read_guess(reader);
   if (!status) status = read_limits(reader);
   if (!status) status = read_schedule(reader);

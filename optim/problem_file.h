@@ -32,12 +32,15 @@ typedef struct cav_problem_reader {
 extern const cav_xml_element cav_problem_element;
 
 /// Words of the grammar, in the order of their enumerations; NULL at the end.
-extern const char *const cav_problem_orders[],
-    *const cav_problem_closings[], *const cav_problem_guesses[], *const cav_problem_quantities[],
-                                                                     *const cav_problem_dof_sets[],
-                                                                         *const cav_problem_sensors[],
-                                                                             *const cav_problem_stabilisations[],
-                                                                                 *const cav_problem_regularisers[];
+extern const char *const cav_problem_orders[];
+extern const char *const cav_problem_closings[];
+extern const char *const cav_problem_guesses[];
+extern const char *const cav_problem_quantities[];
+extern const char *const cav_problem_dof_sets[];
+extern const char *const cav_problem_sensors[];
+extern const char *const cav_problem_stabilisations[];
+extern const char *const cav_problem_regularisers[];
+extern const char *const cav_problem_mirrors[];
 
 /// Zeroed memory of the problem; NULL if there is none left. problem.c.
 void *cav_problem_alloc(cav_problem_owner *owner, size_t size);
@@ -59,6 +62,9 @@ cav_status cav_problem_key(const cav_problem_reader *reader, const cav_xml_node 
 /// Window of attributes from, to, at: seconds or "end". Left as they are where the file gives none; to < 0: the end. It holds
 /// a knot. problem_term.c.
 cav_status cav_problem_window(const cav_problem_reader *reader, const cav_xml_node *node, double *from, double *to);
+
+/// <cycle>, once the start is known. problem_cycle.c.
+cav_status cav_problem_cycle(const cav_problem_reader *reader);
 
 /// Terms of <cost> and <constraint>, with the defaults that they leave in place. problem_term.c.
 cav_status cav_problem_terms(const cav_problem_reader *reader);

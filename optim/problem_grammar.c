@@ -49,6 +49,7 @@ const char *const cav_problem_sensors[] = {"jointpos",
                                            NULL};
 const char *const cav_problem_stabilisations[] = {"solref", "discrete", NULL};
 const char *const cav_problem_regularisers[] = {"reference", "exact", NULL};
+const char *const cav_problem_mirrors[] = {"none", "x", "y", NULL};
 static const char *const heights[] = {"keep", "floor", NULL};
 static const char *const clippings[] = {"keep", "clip", NULL};
 static const char *const ends[] = {"first", "last", NULL};
@@ -144,9 +145,13 @@ static const cav_xml_element horizon = {
     1,
     1,
     ATTRIBUTES(REAL("duration", 1), REAL("timestep", 0), WORD("order", cav_problem_orders),
-               WORD("close", cav_problem_closings)),
+               WORD("close", cav_problem_closings), REALS("range", 2, 2), REAL("weight", 0)),
     NULL,
     0};
+static const cav_xml_element cycle_pair = {"pair", 0, 0, ATTRIBUTES(TEXT("joint", 1), TEXT("other", 1)), NULL, 0};
+static const cav_xml_element cycle = {
+    "cycle", 0, 1, ATTRIBUTES(REALS("translation", 3, 3), REAL("turn", 0), WORD("mirror", cav_problem_mirrors)),
+    CHILDREN(&cycle_pair), 0};
 static const cav_xml_element swing = {
     "swing", 0, 0, ATTRIBUTES(TEXT("joint", 1), REAL("amplitude", 1), REAL("frequency", 1), REAL("phase", 0)), NULL, 0};
 static const cav_xml_element guess_waypoint = {
@@ -184,6 +189,6 @@ const cav_xml_element cav_problem_element = {
     1,
     1,
     ATTRIBUTES(TEXT("name", 0), TEXT("model", 0)),
-    CHILDREN(&horizon, &start, &goal, &pose, &guess, &cost, &constraint, &limits, &schedule, &ipopt, &contact),
+    CHILDREN(&horizon, &cycle, &start, &goal, &pose, &guess, &cost, &constraint, &limits, &schedule, &ipopt, &contact),
     0};
 // clang-format on

@@ -275,6 +275,22 @@ static void write_guess(FILE *out, const cav_problem *p) {
   if (p->nguess_pose || p->nswing) fputs("  </guess>\n", out);
 }
 
+static void write_cycle(FILE *out, const cav_problem *p) {
+  const cav_cycle *c = &p->cycle;
+  fputs("  <cycle", out);
+  write_numbers(out, "translation", c->translation, 3);
+  if (c->turn != 0) write_number(out, "turn", c->turn * 180 / M_PI);
+  write_text(out, "mirror", cav_problem_mirrors[c->mirror]);
+  fputs(c->npair ? ">\n" : "/>\n", out);
+  for (int i = 0; i < c->npair; i++) {
+    fputs("    <pair", out);
+    write_text(out, "joint", p->model->joint[c->pair[i][0]].name);
+    write_text(out, "other", p->model->joint[c->pair[i][1]].name);
+    fputs("/>\n", out);
+  }
+  if (c->npair) fputs("  </cycle>\n", out);
+}
+
 static void write_head(FILE *out, const cav_problem *p, const char *model_path) {
   const cav_model *m = p->model;
   fputs("<problem", out);
@@ -284,8 +300,14 @@ static void write_head(FILE *out, const cav_problem *p, const char *model_path) 
   write_number(out, "duration", p->duration);
   write_number(out, "timestep", p->timestep);
   write_text(out, "order", cav_problem_orders[p->order]);
-  write_text(out, "close", cav_problem_closings[p->close_at_rest != 0]);
-  fputs("/>\n  <start", out);
+  if (!p->cycle.on) write_text(out, "close", cav_problem_closings[p->close_at_rest != 0]);
+  if (p->duration_most > 0) {
+    write_numbers(out, "range", (double[]){p->duration_least, p->duration_most}, 2);
+    write_number(out, "weight", p->duration_weight);
+  }
+  fputs("/>\n", out);
+  if (p->cycle.on) write_cycle(out, p);
+  fputs("  <start", out);
   write_numbers(out, "qpos", p->q_start, m->nq);
   write_numbers(out, "qvel", p->v_start, m->nv);
   fputs("/>\n  <goal", out);

@@ -61,6 +61,18 @@ static int grow(double **array, size_t n) {
   return p != NULL;
 }
 
+void cav_scratch_note(cav_scratch *s, int which, int i, double value) {
+  if (i >= s->trace_room[which]) {
+    int room = 2 * i + 64;
+    if (!grow(&s->trace[which], (size_t)room)) {
+      s->short_of_memory = 1;
+      return;
+    }
+    s->trace_room[which] = room;
+  }
+  s->trace[which][i] = value;
+}
+
 int cav_readings_list(cav_transcription *tr, cav_scratch *s, int t) {
   cav_knot *knot = &tr->knot[t];
   int nv = tr->nv, ncontact = 0, nsensor = 0;
@@ -98,6 +110,10 @@ int cav_readings_list(cav_transcription *tr, cav_scratch *s, int t) {
   if (knot->nread > knot->room) {
     if (!grow(&knot->y, (size_t)knot->nread) || !grow(&knot->dy, (size_t)knot->nread * 3 * n)) return 0;
     knot->room = knot->nread;
+  }
+  if (tr->free_step && knot->layout.count > s->slot_room) {
+    if (!grow(&s->slot[0], (size_t)knot->layout.count) || !grow(&s->slot[1], (size_t)knot->layout.count)) return 0;
+    s->slot_room = knot->layout.count;
   }
   int dense = nv + knot->nread + knot->layout.count + tr->model->nu;
   if (dense > knot->dense_room) {
@@ -197,7 +213,7 @@ static cav_status sensor_rows(const cav_transcription *tr, const cav_scratch *s,
   if (status != CAV_OK) return status;
   if (dim == 4) {
     double target[4], reading[4];
-    cav_term_target(term, t * tr->h, 4, target);
+    cav_term_target(term, cav_knot_time(tr, t), 4, target);
     if (!term->target) target[0] = 1;
     cav_sense(tr->model, s->state, sensor, reading);
     // a quaternion depends on q alone

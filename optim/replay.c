@@ -7,6 +7,7 @@
 /// the actuators and clipped to their limits. Once under the claimed contact law, with the time constant that keeps its
 /// stiffness at the finer step, and once under the model as its file says (its own solref contacts, exact law).
 /// Between knots the motion is read as cav_trajectory_resample does; gains of knot t hold until knot t+1.
+/// Cycles run for several periods.
 /// optimisation.md, 3 and 6.
 #include <math.h>
 #include <stdio.h>
@@ -77,31 +78,47 @@ cav_status cav_replay_steps(const cav_audit *audit, cav_replay *replay) {
   return status;
 }
 
+// all periods of the motion; the last knot holds the force before it where none closes the motion
+static cav_trajectory *whole(const cav_audit *audit) {
+  const cav_model *model = audit->model;
+  double *u = audit->u + (size_t)audit->last * (size_t)model->nv;
+  if (audit->rows == audit->last) memcpy(u, u - model->nv, sizeof(double) * model->nv);
+  cav_trajectory motion = {.nq = model->nq, .nv = model->nv, .nknot = audit->last + 1, .timestep = audit->h};
+  motion.q = (double *)audit->q, motion.v = audit->v, motion.u = audit->u;
+  return audit->wrap ? cav_wrap_unroll(audit->wrap, &motion, audit->periods) : cav_trajectory_copy(&motion);
+}
+
 cav_status cav_replay_open(const cav_audit *audit, cav_replay *replay) {
   const cav_model *model = audit->model;
   int nv = model->nv, nq = model->nq, together = 1;
   double *q = malloc(sizeof(double) * (size_t)(nq + 5 * nv + 1));
-  if (!q) return CAV_NO_MEMORY;
+  cav_trajectory *motion = whole(audit);
+  if (!q || !motion) {
+    free(q);
+    cav_trajectory_free(motion);
+    return CAV_NO_MEMORY;
+  }
   double *v = q + nq, *u = v + nv, *next = u + nv, *work = next + 2 * nv;
   memcpy(q, audit->q, sizeof(double) * nq);
   memcpy(v, audit->v, sizeof(double) * nv);
   replay->open_error = replay->open_seconds = 0;
   cav_status status = CAV_OK;
-  for (int t = 0; t < audit->last; t++) {
+  for (int t = 0; t + 1 < motion->nknot; t++) {
     // only what actuators give
-    const double *whole = audit->u + t * nv;
-    cav_actuation(model, audit->state, whole, work, NULL);
-    for (int d = 0; d < nv; d++) u[d] = whole[d] - work[d];
+    const double *all = motion->u + t * nv;
+    cav_actuation(model, audit->state, all, work, NULL);
+    for (int d = 0; d < nv; d++) u[d] = all[d] - work[d];
     status = step(audit, audit->state, exact_tolerance, q, v, u, next);
     if (status != CAV_OK) break;
     cav_integrate(model, q, next, audit->h, q);
     memcpy(v, next, sizeof(double) * nv);
-    double error = apart(model, audit->q + (t + 1) * nq, q, work);
+    double error = apart(model, motion->q + (t + 1) * nq, q, work);
     if (!(error <= replay->open_error)) replay->open_error = error;
     together = together && error <= same;
     if (together) replay->open_seconds = (t + 1) * audit->h;
   }
   free(q);
+  cav_trajectory_free(motion);
   // a simulation that ends in numbers that are not finite or in a step without solution ends the figure, not the audit
   return status == CAV_NO_MEMORY ? status : CAV_OK;
 }
@@ -122,18 +139,31 @@ static cav_status drive(const cav_audit *audit, const double *q, const double *v
   return status;
 }
 
-// u := forces of the motion and feedback of knot t at (q, v), through the actuators
+// x [nv], a tangent, moved by a number of periods; scratch [nv]
+static void move(const cav_audit *audit, int periods, double *x, double *scratch) {
+  for (int k = 0; k < abs(periods); k++) {
+    cav_wrap_tangent(audit->wrap, periods > 0 ? 1 : -1, x, scratch);
+    memcpy(x, scratch, sizeof(double) * audit->model->nv);
+  }
+}
+
+// u := forces of the motion and feedback of knot t at (q, v), through the actuators. dq and dv may be changed
 static cav_status command(const cav_audit *audit, int t, const double *planned, const double *gain_q,
-                          const double *gain_v, const double *q, const double *v, const double *dq, const double *dv,
+                          const double *gain_v, const double *q, const double *v, double *dq, double *dv,
                           double *effort, double *work, double *u) {
-  int nv = audit->model->nv;
-  size_t at = (size_t)t * (size_t)nv * (size_t)nv;
+  int nv = audit->model->nv, periods = t / audit->last;
+  size_t at = (size_t)(t % audit->last) * (size_t)nv * (size_t)nv;
   const double *Kq = gain_q ? gain_q + at : NULL, *Kv = gain_v ? gain_v + at : NULL;
+  // gains are those of the first period, where forces and strayings are moved to
+  move(audit, -periods, dq, work);
+  move(audit, -periods, dv, work);
   for (int i = 0; i < nv; i++) {
-    u[i] = planned[i];
+    u[i] = 0;
     for (int j = 0; Kq && j < nv; j++) u[i] += Kq[i * nv + j] * dq[j];
     for (int j = 0; Kv && j < nv; j++) u[i] += Kv[i * nv + j] * dv[j];
   }
+  move(audit, periods, u, work);
+  for (int i = 0; i < nv; i++) u[i] += planned[i];
   cav_actuation(audit->model, audit->bare, u, NULL, effort);
   return drive(audit, q, v, effort, work, u);
 }
@@ -208,14 +238,12 @@ static cav_options claimed_options(const cav_audit *audit, const cav_options *la
   return claimed;
 }
 
-// the motion read at the finer step; the last knot holds the force before it where none closes the motion
+// the motion read at the finer step
 static cav_trajectory *finer(const cav_audit *audit) {
-  const cav_model *model = audit->model;
-  double *u = audit->u + (size_t)audit->last * (size_t)model->nv;
-  if (audit->rows == audit->last) memcpy(u, u - model->nv, sizeof(double) * model->nv);
-  cav_trajectory motion = {.nq = model->nq, .nv = model->nv, .nknot = audit->last + 1, .timestep = audit->h};
-  motion.q = (double *)audit->q, motion.v = audit->v, motion.u = audit->u;
-  return cav_trajectory_resample(model, &motion, audit->h / SUBSTEPS);
+  cav_trajectory *motion = whole(audit), *fine = NULL;
+  if (motion) fine = cav_trajectory_resample(audit->model, motion, audit->h / SUBSTEPS);
+  cav_trajectory_free(motion);
+  return fine;
 }
 
 // a simulation under way

@@ -101,13 +101,18 @@ static double net_force(const list *all, const cav_binding *b, int k) {
   const cav_transcription *tr = all->tr;
   int nv = tr->nv;
   double sum = 0;
+  if (tr->wrap) k = (k + tr->nknot - 2) % (tr->nknot - 1) + 1;
   if (k < 1 || k >= tr->nknot) return 0;
   memset(all->force, 0, (size_t)nv * sizeof(double));
-  for (int t = k - 1; t <= k + 1; t++) {
+  // knots that see it: beside it, and across the seam of a cycle
+  for (int i = 0; i < 9; i++) {
+    int t = k - 1 + i % 3 + (i / 3 - 1) * (tr->nknot - 1);
     const listed *at = same_at(all, b, t);
-    if (!at) continue;
-    const double *row = tr->knot[t].slot_row + ((size_t)at->slot * 3 + (size_t)(k - t + 1)) * (size_t)nv;
-    for (int d = 0; d < nv; d++) all->force[d] += at->binding.multiplier * row[d];
+    for (int c = 0; at && c < 3; c++) {
+      if (cav_transcription_block(tr, t, c) != k - 1) continue;
+      const double *row = tr->knot[t].slot_row + ((size_t)at->slot * 3 + (size_t)c) * (size_t)nv;
+      for (int d = 0; d < nv; d++) all->force[d] += at->binding.multiplier * row[d];
+    }
   }
   for (int d = 0; d < nv; d++) sum += all->force[d] * all->force[d];
   return sum;

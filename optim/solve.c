@@ -50,6 +50,13 @@ static cav_status check(const cav_problem *p, const cav_solve_options *o, const 
                         cav_error *error) {
   if (!p->model || !p->q_start || !p->v_start || !p->q_goal)
     return fail(error, CAV_BAD_INPUT, "the problem lacks a model, a start or a goal");
+  if (p->duration_most != 0 && !(p->duration_least > 0 && p->duration_most >= p->duration_least &&
+                                 p->duration >= p->duration_least && p->duration <= p->duration_most))
+    return fail(error, CAV_BAD_INPUT,
+                "a free duration needs duration between duration_least, above 0, and duration_most");
+  if (!(p->duration_weight >= 0)) return fail(error, CAV_BAD_INPUT, "duration_weight must not be negative");
+  if (p->cycle.on && !(p->duration >= 2.5 * p->timestep))
+    return fail(error, CAV_BAD_INPUT, "a cycle needs at least three steps");
   if (!(p->timestep > 0) || !(p->duration >= 2 * p->timestep))
     return fail(error, CAV_BAD_INPUT, "the horizon needs a positive timestep and at least two steps");
   if (!(p->effort_limit > 0) || p->effort_limit > 1)
@@ -76,6 +83,9 @@ static cav_status check(const cav_problem *p, const cav_solve_options *o, const 
   if (start && (start->nq != p->model->nq || start->nv != p->model->nv || start->nknot != nknot))
     return fail(error, CAV_BAD_INPUT,
                 "the start trajectory does not fit the problem: resample it to its step and duration");
+  if (start && p->duration_most == 0 && fabs(start->timestep - p->timestep) > 1e-9 * p->timestep)
+    return fail(error, CAV_BAD_INPUT,
+                "the step of the start trajectory is not the problem's: resample it, it does not fit");
 #ifndef CAVORT_HAVE_IPOPT
   if (o->solver != CAV_SOLVER_GAUSS_NEWTON)
     return fail(error, CAV_NOT_SUPPORTED,
@@ -88,7 +98,7 @@ static cav_status check(const cav_problem *p, const cav_solve_options *o, const 
 static double optimality(const cav_normal *normal, const cav_transcription *tr) {
   const double *gradient = cav_normal_gradient(normal), *diagonal = cav_normal_diagonal(normal);
   double size = sqrt(2 * cav_transcription_merit(tr)), worst = 0;
-  for (int i = 0; i < (tr->nknot - 1) * tr->nv; i++)
+  for (int i = 0; i < cav_transcription_unknowns(tr); i++)
     if (diagonal[i] > 0 && size > 0) worst = fmax(worst, fabs(gradient[i]) / (sqrt(diagonal[i]) * size));
   return worst;
 }
@@ -96,7 +106,7 @@ static double optimality(const cav_normal *normal, const cav_transcription *tr) 
 /// Prices of all rows where they hold, after a linearisation that has kept them. Rounds of the augmented Lagrangian end before
 /// cheap rows have settled, so multipliers are those after one more step, as in a quadratic programme.
 static cav_status find_prices(cav_solve_run *run) {
-  int n = (run->tr->nknot - 1) * run->tr->nv;
+  int n = cav_transcription_unknowns(run->tr);
   double *x = malloc(2 * (size_t)n * sizeof *x);
   if (!x) return CAV_NO_MEMORY;
   cav_status status = CAV_NOT_CONVERGED;
@@ -178,6 +188,18 @@ static cav_status solve(cav_solve_run *run, cav_error *error) {
   return rest == CAV_OK ? status : rest;
 }
 
+/// A given start, brought to where unknowns can be: its step within the bounds, its ends those of a cycle.
+static cav_status take_start(cav_solve_run *run) {
+  double *x = calloc((size_t)cav_transcription_unknowns(run->tr), sizeof *x);
+  if (!x) return CAV_NO_MEMORY;
+  cav_transcription_move(run->tr, run->at, x, run->spare);
+  cav_trajectory *moved = run->spare;
+  run->spare = run->at;
+  run->at = moved;
+  free(x);
+  return CAV_OK;
+}
+
 cav_status cav_solve(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
                      cav_solution **solution, cav_error *error) {
   cav_solve_options defaults = cav_solve_options_default();
@@ -186,11 +208,15 @@ cav_status cav_solve(const cav_problem *problem, const cav_solve_options *option
   cav_status status = check(problem, run.options, start, error), end = CAV_OK;
   if (status != CAV_OK) return status;
 
-  run.tr = cav_transcription_new(problem, run.options->threads, error);
-  if (!run.tr) return CAV_NO_MEMORY;
+  cav_error refusal = {0};
+  run.tr = cav_transcription_new(problem, run.options->threads, &refusal);
+  if (!run.tr) {
+    if (error) *error = refusal;
+    return refusal.status;
+  }
   run.tr->derivative = run.options->derivative;
   if (run.tr->derivative == CAV_DERIVATIVE_CENTRED) run.tr->difference = CAV_DERIVATIVE_CENTRED;
-  run.normal = cav_normal_new(run.tr->nknot - 1, run.tr->nv);
+  run.normal = cav_normal_new(run.tr);
   run.at = start ? cav_trajectory_copy(start) : cav_trajectory_new(problem->model, run.tr->nknot, problem->timestep);
   run.spare = cav_trajectory_new(problem->model, run.tr->nknot, problem->timestep);
   run.solution = calloc(1, sizeof *run.solution);
@@ -200,11 +226,7 @@ cav_status cav_solve(const cav_problem *problem, const cav_solve_options *option
   if (status == CAV_OK) {
     memcpy(run.at->q, problem->q_start, (size_t)problem->model->nq * sizeof(double));
     memcpy(run.at->v, problem->v_start, (size_t)problem->model->nv * sizeof(double));
-    if (start) {
-      cav_trajectory_velocities(problem->model, run.at);
-    } else {
-      status = cav_guess_take(&run);
-    }
+    status = start ? take_start(&run) : cav_guess_take(&run);
     if (status == CAV_OK) status = solve(&run, error);
     // the reason of the solve goes before what verification of the gains says
     cav_error inner = {0};

@@ -8,20 +8,32 @@
 /// Share of a step by which a window may miss a knot and still hold it.
 static const double near_knot = 1e-6;
 
+/// Whether what a term measures needs the forces of a knot.
+static int reads_force(const cav_term *term) {
+  if (term->quantity == CAV_QUANTITY_SENSOR)
+    return cav_sensor_rule_of(term->sensor.type)->stage == CAV_READS_ACCELERATION;
+  return term->quantity != CAV_QUANTITY_CONFIGURATION && term->quantity != CAV_QUANTITY_VELOCITY;
+}
+
 /// Whether a term measures an acceleration or a force at a last knot that nothing leaves.
 static int is_unforced(const cav_transcription *tr, const cav_term *term, int t) {
-  if (t < tr->nknot - 1 || tr->problem->close_at_rest || term->quantity != CAV_QUANTITY_SENSOR) return 0;
+  if (tr->knot[t].has_force || term->quantity != CAV_QUANTITY_SENSOR) return 0;
   return cav_sensor_rule_of(term->sensor.type)->stage == CAV_READS_ACCELERATION;
 }
+
+double cav_knot_time(const cav_transcription *tr, int t) { return t * tr->problem->timestep; }
 
 /// Whether a term speaks at a knot; its weight there (time step of an integral, or 1 at a single knot).
 double cav_term_weight(const cav_transcription *tr, const cav_term *term, int t) {
   if (is_unforced(tr, term, t)) return 0;
-  double end = (tr->nknot - 1) * tr->h, to = fmin(term->to < 0 ? end : term->to, end);
+  double h = tr->problem->timestep, end = (tr->nknot - 1) * h, to = fmin(term->to < 0 ? end : term->to, end);
   double from = fmin(term->from < 0 ? end : term->from, end);
-  int first = (int)ceil(from / tr->h - near_knot), last = (int)floor(to / tr->h + near_knot);
+  int first = (int)ceil(from / h - near_knot), last = (int)floor(to / h + near_knot);
   // one instant, or a window between two knots: the knot nearest to its middle
-  if (to - from < 1e-9 || first > last) return t == (int)lround((from + to) / (2 * tr->h)) ? 1 : 0;
+  if (to - from < 1e-9 || first > last) return t == (int)lround((from + to) / (2 * h)) ? 1 : 0;
+  // both ends of a cycle are one knot: costs count it once, at its end, or where its forces are
+  if (tr->wrap && t == 0 && first == 0 && last == tr->nknot - 1 && term->use == CAV_USE_COST && !reads_force(term))
+    return 0;
   return t >= first && t <= last ? tr->h : 0;
 }
 
@@ -81,7 +93,7 @@ void cav_turn_between(const double a[4], const double b[4], double phi[3]) {
 void cav_term_read(const cav_transcription *tr, const cav_state *state, const cav_term *term, int t, double *y) {
   double reading[16], target[16];
   cav_sense(tr->model, state, &term->sensor, reading);
-  cav_term_target(term, t * tr->h, term->sensor.dim, target);
+  cav_term_target(term, cav_knot_time(tr, t), term->sensor.dim, target);
   if (term->sensor.dim == 4) {
     double phi[3];
     if (!term->target) target[0] = 1;

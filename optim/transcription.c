@@ -17,6 +17,9 @@
 extern void dsyrk_(const char *uplo, const char *trans, const int *n, const int *k, const double *alpha,
                    const double *A, const int *lda, const double *beta, double *C, const int *ldc);
 
+/// Share by which the step is shortened and lengthened for derivatives by its logarithm.
+static const double step_share = 1e-6;
+
 static double now(void) {
   struct timespec t;
   clock_gettime(CLOCK_MONOTONIC, &t);
@@ -178,13 +181,15 @@ static int knot_new(cav_transcription *tr, int t) {
   int ok = 1;
   size_t n = (size_t)tr->nv;
   knot->time = t * tr->h;
-  knot->has_force = t < tr->nknot - 1 || tr->problem->close_at_rest;
+  knot->has_force = t < tr->nknot - 1 || (tr->problem->close_at_rest && !tr->wrap);
   knot->layout = layout_of(tr, t);
   knot->slot = room(&ok, (size_t)knot->layout.count, sizeof *knot->slot);
   knot->u = room(&ok, n, sizeof(double));
   knot->du = room(&ok, 3 * n * n, sizeof(double));
   knot->hessian = room(&ok, 9 * n * n, sizeof(double));
   knot->gradient = room(&ok, 3 * n, sizeof(double));
+  knot->step_row = room(&ok, 3 * n, sizeof(double));
+  knot->slot_step = room(&ok, (size_t)knot->layout.count, sizeof(double));
   knot->turn = room(&ok, CAV_TURN * (size_t)tr->nturn, sizeof(double));
   return ok;
 }
@@ -200,6 +205,8 @@ static int scratch_new(cav_transcription *tr, cav_scratch *s) {
   s->column = room(&ok, n, sizeof(int));
   s->tangent = room(&ok, n, sizeof(double));
   s->posture = room(&ok, (size_t)tr->model->nq, sizeof(double));
+  s->force_step = room(&ok, n, sizeof(double));
+  s->rate = room(&ok, 2 * n, sizeof(double));
   return ok && s->state;
 }
 
@@ -220,7 +227,16 @@ cav_transcription *cav_transcription_new(const cav_problem *problem, int threads
   tr->options.order = problem->order;
   tr->derivative = CAV_DERIVATIVE_ANALYTIC;
   tr->pool = cav_parallel_new(threads);
+  if (problem->cycle.on && !(tr->wrap = cav_wrap_new(problem, error))) {
+    cav_transcription_free(tr);
+    return NULL;
+  }
+  tr->free_step = problem->duration_most > 0;
   if (!tr->pool || !list_turns(tr)) goto memory;
+  tr->before = calloc(2 * (size_t)tr->nv + 1, sizeof(double));
+  tr->turn_after = calloc(CAV_TURN * (size_t)tr->nturn + 1, sizeof(double));
+  if (!tr->before || !tr->turn_after) goto memory;
+  tr->after = tr->before + tr->nv;
   tr->scratch = calloc((size_t)cav_parallel_size(tr->pool), sizeof *tr->scratch);
   if (!tr->scratch) goto memory;
   for (int i = 0; i < cav_parallel_size(tr->pool); i++)
@@ -242,7 +258,7 @@ void cav_transcription_free(cav_transcription *tr) {
   for (int t = 0; tr->knot && t < tr->nknot; t++) {
     cav_knot *k = &tr->knot[t];
     free(k->slot), free(k->u), free(k->du), free(k->hessian), free(k->gradient), free(k->turn), free(k->y), free(k->dy),
-        free(k->slot_row);
+        free(k->slot_row), free(k->slot_step), free(k->step_row);
     free(k->dense), free(k->rest), free(k->moving);
   }
   for (int i = 0; tr->scratch && i < cav_parallel_size(tr->pool); i++) {
@@ -250,23 +266,39 @@ void cav_transcription_free(cav_transcription *tr) {
     cav_state_free(s->state);
     free(s->value), free(s->dq), free(s->dv), free(s->dn), free(s->key), free(s->slope);
     free(s->force_weight), free(s->force_slope), free(s->row), free(s->column), free(s->tangent), free(s->posture);
+    free(s->force_step), free(s->rate), free(s->trace[0]), free(s->trace[1]), free(s->slot[0]), free(s->slot[1]);
   }
   for (int k = 0; k < tr->nresidual; k++) free(tr->unactuated[k].dof), free(tr->unactuated[k].coef);
   for (int a = 0; tr->effort && a < tr->model->nu; a++) free(tr->effort[a].dof), free(tr->effort[a].coef);
   for (int a = 0; tr->servo && a < tr->model->nu; a++) cav_servo_free(&tr->servo[a]);
   free(tr->servo);
   free(tr->unactuated), free(tr->effort), free(tr->effort_range), free(tr->turn_dof), free(tr->turn_of);
-  free(tr->knot), free(tr->scratch);
+  free(tr->knot), free(tr->scratch), free(tr->before), free(tr->turn_after);
+  cav_wrap_free(tr->wrap);
   cav_parallel_free(tr->pool);
   free(tr);
 }
 
 // ---------------------------------------------------------------- chaining to knots
 
-/// Velocity after knot t: that of the next knot, or what closes the motion.
-static const double *velocity_after(const cav_transcription *tr, const cav_trajectory *at, int t, const double *zero) {
-  if (t + 1 < tr->nknot) return at->v + (size_t)(t + 1) * tr->nv;
-  return tr->problem->close_at_rest ? zero : at->v + (size_t)t * tr->nv;
+int cav_transcription_unknowns(const cav_transcription *tr) { return (tr->nknot - 1) * tr->nv + tr->free_step; }
+
+int cav_transcription_block(const cav_transcription *tr, int t, int c) {
+  int blocks = tr->nknot - 1, block = t - 2 + c;
+  if (tr->wrap) return (block + blocks) % blocks;
+  return block >= 0 && block < blocks ? block : -1;
+}
+
+/// Whether the configuration of knot t moves with an unknown.
+static int is_unknown(const cav_transcription *tr, int t) { return tr->wrap || (t >= 1 && t < tr->nknot); }
+
+/// Velocity that reaches knot t, and the one that leaves it: that of the next knot, or what closes the motion.
+static const double *velocity_at(const cav_transcription *tr, const cav_trajectory *at, int t) {
+  return t == 0 && tr->wrap ? tr->before : at->v + (size_t)t * tr->nv;
+}
+
+static const double *velocity_after(const cav_transcription *tr, const cav_trajectory *at, int t) {
+  return t + 1 < tr->nknot ? at->v + (size_t)(t + 1) * tr->nv : tr->after;
 }
 
 /// out += scale * row * (Jacobian of a step): side 0 by its end (Jr^-1), side 1 by its start (Jl^-1).
@@ -285,22 +317,23 @@ static void times_turn(const cav_transcription *tr, const double *row, const dou
 static void chain(const cav_transcription *tr, int t, int n, const double *dq, const double *dv, const double *dn,
                   double *out) {
   int nv = tr->nv, last = tr->nknot - 1;
-  const double *now_turn = tr->knot[t].turn, *next_turn = t < last ? tr->knot[t + 1].turn : NULL;
+  const double *now_turn = tr->knot[t].turn, *next_turn = t < last ? tr->knot[t + 1].turn : tr->turn_after;
+  int here = is_unknown(tr, t), before = is_unknown(tr, t - 1), next = is_unknown(tr, t + 1);
   double inverse = 1 / tr->h;
   if (n == 0) return;
   memset(out, 0, (size_t)n * 3 * nv * sizeof(double));
   for (int i = 0; i < n; i++, dq += nv, dv += nv, dn += nv, out += 3 * nv) {
-    if (t > 0) {
+    if (here) {
       for (int d = 0; d < nv; d++) out[nv + d] = dq[d];
       times_turn(tr, dv, now_turn, 0, inverse, out + nv);
-      if (t > 1) times_turn(tr, dv, now_turn, 1, -inverse, out);
+      if (before) times_turn(tr, dv, now_turn, 1, -inverse, out);
     }
-    if (t < last) {
+    if (next) {
       times_turn(tr, dn, next_turn, 0, inverse, out + 2 * nv);
-      if (t > 0) times_turn(tr, dn, next_turn, 1, -inverse, out + nv);
+      if (here) times_turn(tr, dn, next_turn, 1, -inverse, out + nv);
     } else if (!tr->problem->close_at_rest) {
       times_turn(tr, dn, now_turn, 0, inverse, out + nv);
-      if (t > 1) times_turn(tr, dn, now_turn, 1, -inverse, out);
+      if (before) times_turn(tr, dn, now_turn, 1, -inverse, out);
     }
   }
 }
@@ -313,13 +346,33 @@ typedef struct sum {
   cav_scratch *s;
   cav_knot *knot;
   int t, jacobian;
+  int shifted; ///< 1, 2: at a shorter or longer step, whose residuals are noted only; 0: at the step itself
+  int row;     ///< rows begun
+  double root,
+      slope; ///< of the present row: root of its weight, and what the step's logarithm does to root times residual
 } sum;
 
-/// Adds weight/2 (r + row dx)^2 for a row with n entries.
+/// Starts a row of weight/2 r^2. Where the step is free its derivative by the step's logarithm is the difference of two passes that
+/// begin the same rows; weights count with it, as integrals are sums over steps.
+static void begin_row(sum *a, double weight, double r) {
+  if (!a->tr->free_step || !(a->jacobian || a->shifted)) return;
+  int i = a->row++;
+  a->root = sqrt(weight);
+  if (a->shifted) {
+    cav_scratch_note(a->s, a->shifted - 1, i, a->root * r);
+    return;
+  }
+  a->slope = weight > 0 ? (a->s->trace[1][i] - a->s->trace[0][i]) / (2 * step_share) : 0;
+  a->knot->step_square += a->slope * a->slope;
+  a->knot->step_slope += a->slope * a->root * r;
+}
+
+/// Adds weight/2 (r + row dx)^2 for a row with n entries, begun.
 static void add_sparse(sum *a, double weight, double r, int n, const int *column, const double *entry) {
   a->knot->merit += 0.5 * weight * r * r;
   if (!a->jacobian) return;
   int width = 3 * a->tr->nv;
+  for (int i = 0; i < n && a->tr->free_step; i++) a->knot->step_row[column[i]] += a->slope * a->root * entry[i];
   for (int i = 0; i < n; i++) {
     a->knot->gradient[column[i]] += weight * r * entry[i];
     for (int j = 0; j < n; j++)
@@ -327,7 +380,7 @@ static void add_sparse(sum *a, double weight, double r, int n, const int *column
   }
 }
 
-/// Adds weight/2 (r + row dx)^2 for a full row.
+/// Adds weight/2 (r + row dx)^2 for a full row, begun.
 static void add_dense(sum *a, double weight, double r, const double *row) {
   a->knot->merit += 0.5 * weight * r * r;
   if (!a->jacobian || weight == 0) return;
@@ -335,6 +388,7 @@ static void add_dense(sum *a, double weight, double r, const double *row) {
   double root = sqrt(weight), *out = a->knot->dense + (size_t)a->knot->ndense * width;
   for (int k = 0; k < width; k++) out[k] = root * row[k];
   a->knot->rest[a->knot->ndense++] = root * r;
+  for (int k = 0; k < width && a->tr->free_step; k++) a->knot->step_row[k] += a->slope * out[k];
 }
 
 /// Adds a linear form of u to a row [3nv].
@@ -346,13 +400,14 @@ static void put_force(const sum *a, const cav_force_row *form, double *row) {
   }
 }
 
-/// Adds weight/2 r^2 with r a linear form of u: along one dof it joins that dof's row, otherwise it is a row of its own.
+/// Adds weight/2 r^2 with r a linear form of u, begun: along one dof it joins that dof's row, otherwise it is a row of its own.
 static void add_force(sum *a, double weight, double r, const cav_force_row *form) {
   const cav_transcription *tr = a->tr;
   if (form->n == 1) {
     a->knot->merit += 0.5 * weight * r * r;
     a->s->force_weight[form->dof[0]] += weight * form->coef[0] * form->coef[0];
     a->s->force_slope[form->dof[0]] += weight * r * form->coef[0];
+    if (a->jacobian && tr->free_step) a->s->force_step[form->dof[0]] += a->slope * a->root * form->coef[0];
     return;
   }
   int width = 3 * tr->nv;
@@ -367,8 +422,8 @@ static double form_value(const cav_force_row *form, const double *u) {
   return value;
 }
 
-/// Sets a constraint row; the residual of its augmented Lagrangian, 0 with *active 0 where it does not push.
-static double slot_residual(const sum *a, int i, double value, double lower, double upper, double rho, int *active) {
+/// Sets and begins a constraint row; the residual of its augmented Lagrangian, 0 with *active 0 where it does not push.
+static double slot_residual(sum *a, int i, double value, double lower, double upper, double rho, int *active) {
   cav_slot *slot = &a->knot->slot[i];
   slot->value = value;
   slot->lower = lower;
@@ -383,6 +438,9 @@ static double slot_residual(const sum *a, int i, double value, double lower, dou
   }
   double e = shifted - fmin(fmax(shifted, lower - slack), upper + slack);
   *active = e != 0 || lower == upper;
+  begin_row(a, *active ? rho : 0, e);
+  if (a->shifted) a->s->slot[a->shifted - 1][i] = value;
+  if (a->jacobian && a->tr->free_step) a->knot->slot_step[i] = (a->s->slot[1][i] - a->s->slot[0][i]) / (2 * step_share);
   return e;
 }
 
@@ -433,26 +491,30 @@ static void add_velocity(sum *a, const cav_term *term, double weight, const doub
   const cav_transcription *tr = a->tr;
   int column[6];
   double entry[6], *goal = a->s->tangent;
-  if (a->t == 0) return;
+  if (!is_unknown(tr, a->t)) return;
   cav_term_target(term, a->knot->time, tr->nv, goal);
   for (int d = 0; d < tr->nv; d++) {
     if (!cav_dof_selected(tr, term, d)) continue;
-    int n = velocity_entries(tr, a->t, d, tr->nv, a->t > 1, 1 / term->scale, column, entry);
-    add_sparse(a, weight, (v[d] - goal[d]) / term->scale, n, column, entry);
+    int n = velocity_entries(tr, a->t, d, tr->nv, is_unknown(tr, a->t - 1), 1 / term->scale, column, entry);
+    double r = (v[d] - goal[d]) / term->scale;
+    begin_row(a, weight, r);
+    add_sparse(a, weight, r, n, column, entry);
   }
 }
 
 static void add_acceleration(sum *a, const cav_term *term, double weight, const double *v, const double *v_next) {
   const cav_transcription *tr = a->tr;
-  int column[12], last = tr->nknot - 1;
+  int column[12], last = tr->nknot - 1, here = is_unknown(tr, a->t);
   double entry[12], scale = 1 / (tr->h * term->scale), *goal = a->s->tangent;
   if (!a->knot->has_force) return;
   cav_term_target(term, a->knot->time, tr->nv, goal);
   for (int d = 0; d < tr->nv; d++) {
     if (!cav_dof_selected(tr, term, d)) continue;
-    int n = a->t > 0 ? velocity_entries(tr, a->t, d, tr->nv, a->t > 1, -scale, column, entry) : 0;
-    if (a->t < last) n += velocity_entries(tr, a->t + 1, d, 2 * tr->nv, a->t > 0, scale, column + n, entry + n);
-    add_sparse(a, weight, (v_next[d] - v[d]) * scale - goal[d] / term->scale, n, column, entry);
+    int n = here ? velocity_entries(tr, a->t, d, tr->nv, is_unknown(tr, a->t - 1), -scale, column, entry) : 0;
+    if (a->t < last) n += velocity_entries(tr, a->t + 1, d, 2 * tr->nv, here, scale, column + n, entry + n);
+    double r = (v_next[d] - v[d]) * scale - goal[d] / term->scale;
+    begin_row(a, weight, r);
+    add_sparse(a, weight, r, n, column, entry);
   }
 }
 
@@ -493,11 +555,12 @@ static void add_posture(sum *a, const cav_term *term, double weight, const doubl
   const cav_transcription *tr = a->tr;
   int column[3];
   double entry[3];
-  if (a->t == 0) return;
+  if (!is_unknown(tr, a->t)) return;
   posture_difference(a, term, q, a->s->tangent);
   for (int d = 0; d < tr->nv; d++) {
     if (!cav_dof_selected(tr, term, d)) continue;
     int n = posture_entries(tr, a->s->tangent, d, 1 / term->scale, column, entry);
+    begin_row(a, weight, a->s->tangent[d] / term->scale);
     add_sparse(a, weight, a->s->tangent[d] / term->scale, n, column, entry);
   }
 }
@@ -505,8 +568,12 @@ static void add_posture(sum *a, const cav_term *term, double weight, const doubl
 static void add_effort(sum *a, const cav_term *term, double weight) {
   const cav_transcription *tr = a->tr;
   if (!a->knot->has_force) return;
-  for (int k = 0; k < tr->model->nu; k++)
-    add_force(a, weight / (term->scale * term->scale), form_value(&tr->effort[k], a->knot->u), &tr->effort[k]);
+  weight /= term->scale * term->scale;
+  for (int k = 0; k < tr->model->nu; k++) {
+    double r = form_value(&tr->effort[k], a->knot->u);
+    begin_row(a, weight, r);
+    add_force(a, weight, r, &tr->effort[k]);
+  }
 }
 
 /// Readings first .. first+n-1 of the contacts with the world, or of those between moving links.
@@ -516,6 +583,7 @@ static void add_contact(sum *a, const cav_term *term, double weight, int first, 
     if (a->knot->moving[k] != self) continue;
     for (int i = first; i < first + n; i++) {
       int row = 4 * k + i;
+      begin_row(a, weight, a->knot->y[row]);
       add_dense(a, weight, a->knot->y[row], a->knot->dy + (size_t)row * 3 * a->tr->nv);
     }
   }
@@ -533,8 +601,10 @@ static void add_costs(sum *a, const double *q, const double *v, const double *v_
     if (term->use == CAV_USE_COST) {
       switch (term->quantity) {
         case CAV_QUANTITY_SENSOR:
-          for (int k = 0; k < dim; k++)
+          for (int k = 0; k < dim; k++) {
+            begin_row(a, weight, a->knot->y[reading + k]);
             add_dense(a, weight, a->knot->y[reading + k], a->knot->dy + (size_t)(reading + k) * width);
+          }
           break;
         case CAV_QUANTITY_CONFIGURATION:
           add_posture(a, term, weight, q);
@@ -566,6 +636,11 @@ static void add_costs(sum *a, const double *q, const double *v, const double *v_
     }
     reading += dim;
   }
+  // the duration's own price
+  if (a->t > 0 || !tr->free_step) return;
+  double duration = (tr->nknot - 1) * tr->h;
+  begin_row(a, tr->problem->duration_weight, duration);
+  add_sparse(a, tr->problem->duration_weight, duration, 0, NULL, NULL);
 }
 
 /// Angle of a ball joint from its reference and, in axis, the gradient of it.
@@ -613,8 +688,9 @@ static void add_ranges(sum *a, const double *q, double rho) {
 static void put_servo(const sum *a, const cav_servo *servo, double *row) {
   int column[6];
   double entry[6];
-  for (int k = 0; a->t > 0 && k < servo->n; k++) {
-    int n = velocity_entries(a->tr, a->t, servo->dof[k], a->tr->nv, a->t > 1, servo->of_v[k], column, entry);
+  for (int k = 0; is_unknown(a->tr, a->t) && k < servo->n; k++) {
+    int before = is_unknown(a->tr, a->t - 1);
+    int n = velocity_entries(a->tr, a->t, servo->dof[k], a->tr->nv, before, servo->of_v[k], column, entry);
     for (int c = 0; c < n; c++) row[column[c]] -= entry[c];
     row[a->tr->nv + servo->dof[k]] -= servo->of_q[k];
   }
@@ -659,6 +735,7 @@ static int add_hard_dofs(sum *a, const cav_term *term, int i, double lower, doub
                          const double *v) {
   const cav_transcription *tr = a->tr;
   int posture = term->quantity == CAV_QUANTITY_CONFIGURATION, column[6], active;
+  int here = is_unknown(tr, a->t), before = is_unknown(tr, a->t - 1);
   double rho = tr->penalty.term, entry[6];
   if (posture) {
     posture_difference(a, term, q, a->s->tangent);
@@ -669,8 +746,8 @@ static int add_hard_dofs(sum *a, const cav_term *term, int i, double lower, doub
     if (!cav_dof_selected(tr, term, d)) continue;
     int n = 0;
     double value = (posture ? a->s->tangent[d] : v[d] - a->s->tangent[d]) / term->scale;
-    if (a->t > 0 && posture) n = posture_entries(tr, a->s->tangent, d, 1 / term->scale, column, entry);
-    if (a->t > 0 && !posture) n = velocity_entries(tr, a->t, d, tr->nv, a->t > 1, 1 / term->scale, column, entry);
+    if (here && posture) n = posture_entries(tr, a->s->tangent, d, 1 / term->scale, column, entry);
+    if (here && !posture) n = velocity_entries(tr, a->t, d, tr->nv, before, 1 / term->scale, column, entry);
     keep_sparse(a, i, n, column, entry);
     double e = slot_residual(a, i++, value, lower, upper, rho, &active);
     if (active) add_sparse(a, rho, e, n, column, entry);
@@ -711,6 +788,7 @@ static void lay_force_rows(sum *a) {
     const double *du = a->knot->du + (size_t)d * width;
     for (int k = 0; k < width; k++) out[k] = root * du[k];
     a->knot->rest[a->knot->ndense++] = a->s->force_slope[d] / root;
+    for (int k = 0; k < width && tr->free_step; k++) a->knot->step_row[k] += a->s->force_step[d] * du[k];
   }
   for (int i = 0; i < a->knot->ndense; i++) {
     double r = a->knot->rest[i];
@@ -732,51 +810,127 @@ static void join_rows(cav_transcription *tr) {
 typedef struct pass {
   cav_transcription *tr;
   cav_trajectory *at;
-  const double *zero;
   int jacobian;
   cav_status *status; ///< [nknot]
 } pass;
+
+/// Values of a knot's rows at the state's last evaluation, and with derivatives in place its part of the normal equations.
+static void sum_rows(sum *a, const double *q, const double *v, const double *v_next) {
+  const cav_transcription *tr = a->tr;
+  cav_knot *knot = a->knot;
+  int nv = tr->nv;
+  knot->merit = 0;
+  knot->ndense = 0;
+  memset(a->s->force_weight, 0, (size_t)nv * sizeof(double));
+  memset(a->s->force_slope, 0, (size_t)nv * sizeof(double));
+  memset(a->s->force_step, 0, (size_t)nv * sizeof(double));
+  if (a->jacobian) {
+    memset(knot->hessian, 0, 9 * (size_t)nv * nv * sizeof(double));
+    memset(knot->gradient, 0, 3 * (size_t)nv * sizeof(double));
+    memset(knot->step_row, 0, 3 * (size_t)nv * sizeof(double));
+    knot->step_square = knot->step_slope = 0;
+  }
+  if (!tr->constraints_only) add_costs(a, q, v, v_next);
+  knot->cost = knot->merit;
+  add_force_slots(a, q, v);
+  add_ranges(a, q, tr->h * tr->penalty.range);
+  add_hard_terms(a, q, v);
+  if (a->jacobian) lay_force_rows(a);
+}
+
+/// Residuals of all rows at a step shorter (1) or longer (2) by a small share, with the knots where they are.
+static cav_status shift_step(const cav_transcription *tr, cav_scratch *s, int t, int shifted, const double *q,
+                             const double *v, const double *v_next) {
+  cav_transcription near = *tr;
+  cav_knot *knot = &tr->knot[t];
+  double share = exp(shifted == 1 ? -step_share : step_share), *v_here = s->rate, *v_then = s->rate + tr->nv;
+  near.h *= share;
+  for (int d = 0; d < tr->nv; d++) {
+    v_here[d] = v[d] / (t > 0 || tr->wrap ? share : 1); // that of a given start stays
+    v_then[d] = v_next[d] / share;
+  }
+  s->state->options.timestep *= share;
+  s->state->options.time_constant *= share;
+  cav_status status = cav_inverse(tr->model, s->state, q, v_here, v_then, knot->u);
+  if (status == CAV_OK) cav_readings_values(&near, s, t);
+  s->state->options = tr->options;
+  if (status != CAV_OK) return status;
+  if (knot->nread) memcpy(knot->y, s->value + tr->nv, (size_t)knot->nread * sizeof(double));
+  sum a = {.tr = &near, .s = s, .knot = knot, .t = t, .shifted = shifted};
+  sum_rows(&a, q, v_here, v_then);
+  return s->short_of_memory ? CAV_NO_MEMORY : CAV_OK;
+}
+
+/// Turns rows [n*3nv] whose columns are of the knots beside into rows over the unknowns, across the seam of a cycle.
+static void wrap_rows(const cav_transcription *tr, cav_scratch *s, int t, int n, double *row) {
+  size_t nv = (size_t)tr->nv;
+  for (int i = 0; i < n; i++, row += 3 * nv) {
+    for (int c = 0; c < 3; c++) {
+      int knot = t + c - 1, way = knot < 1 ? 1 : knot >= tr->nknot ? -1 : 0;
+      if (!way) continue;
+      cav_wrap_tangent(tr->wrap, way, row + (size_t)c * nv, s->rate);
+      memcpy(row + (size_t)c * nv, s->rate, nv * sizeof(double));
+    }
+  }
+}
+
+/// The same of all of a knot's sums.
+static void wrap_knot(const cav_transcription *tr, cav_scratch *s, int t) {
+  cav_knot *knot = &tr->knot[t];
+  int width = 3 * tr->nv;
+  double *H = knot->hessian;
+  wrap_rows(tr, s, t, knot->ndense, knot->dense);
+  wrap_rows(tr, s, t, 1, knot->gradient);
+  wrap_rows(tr, s, t, 1, knot->step_row);
+  if (tr->keep_rows) wrap_rows(tr, s, t, knot->layout.count, knot->slot_row);
+  // the Hessian from both sides
+  for (int side = 0; side < 2; side++) {
+    for (int i = 0; i < width; i++)
+      for (int j = i + 1; j < width; j++) {
+        double x = H[i * width + j];
+        if (side == 0) H[i * width + j] = H[j * width + i];
+        if (side == 1) H[i * width + j] = H[j * width + i], H[j * width + i] = x;
+      }
+    wrap_rows(tr, s, t, width, H);
+  }
+  for (int i = 0; i < width; i++)
+    for (int j = i + 1; j < width; j++) H[i * width + j] = 0;
+}
 
 static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   cav_transcription *tr = p->tr;
   cav_knot *knot = &tr->knot[t];
   int nv = tr->nv;
-  const double *q = p->at->q + (size_t)t * p->at->nq, *v = p->at->v + (size_t)t * nv;
-  const double *v_next = velocity_after(tr, p->at, t, p->zero);
+  const double *q = p->at->q + (size_t)t * p->at->nq, *v = velocity_at(tr, p->at, t);
+  const double *v_next = velocity_after(tr, p->at, t);
   s->state->options = tr->options;
 
-  // dynamics
+  // dynamics, first beside the step where that is an unknown
   double start = now();
   cav_status status = cav_inverse(tr->model, s->state, q, v, v_next, knot->u);
   if (status != CAV_OK) return status;
   if (!cav_readings_list(tr, s, t)) return CAV_NO_MEMORY;
+  if (p->jacobian && tr->free_step) {
+    status = shift_step(tr, s, t, 1, q, v, v_next);
+    if (status == CAV_OK) status = shift_step(tr, s, t, 2, q, v, v_next);
+    if (status == CAV_OK) status = cav_inverse(tr->model, s->state, q, v, v_next, knot->u);
+    if (status != CAV_OK) return status;
+  }
   cav_readings_values(tr, s, t);
+  if (knot->nread) memcpy(knot->y, s->value + nv, (size_t)knot->nread * sizeof(double));
+  memcpy(p->at->u + (size_t)t * nv, knot->u, (size_t)nv * sizeof(double));
   if (p->jacobian) {
     status = cav_readings_derivatives(tr, s, t, q, v, v_next);
     if (status != CAV_OK) return status;
     chain(tr, t, nv, s->dq, s->dv, s->dn, knot->du);
     chain(tr, t, knot->nread, s->dq + (size_t)nv * nv, s->dv + (size_t)nv * nv, s->dn + (size_t)nv * nv, knot->dy);
   }
-  if (knot->nread) memcpy(knot->y, s->value + nv, (size_t)knot->nread * sizeof(double));
-  memcpy(p->at->u + (size_t)t * nv, knot->u, (size_t)nv * sizeof(double));
   s->seconds += now() - start;
 
   // rows
-  sum a = {tr, s, knot, t, p->jacobian};
-  knot->merit = 0;
-  knot->ndense = 0;
-  memset(s->force_weight, 0, (size_t)nv * sizeof(double));
-  memset(s->force_slope, 0, (size_t)nv * sizeof(double));
-  if (p->jacobian) {
-    memset(knot->hessian, 0, 9 * (size_t)nv * nv * sizeof(double));
-    memset(knot->gradient, 0, 3 * (size_t)nv * sizeof(double));
-  }
-  if (!tr->constraints_only) add_costs(&a, q, v, v_next);
-  knot->cost = knot->merit;
-  add_force_slots(&a, q, v);
-  add_ranges(&a, q, tr->h * tr->penalty.range);
-  add_hard_terms(&a, q, v);
-  if (p->jacobian) lay_force_rows(&a);
+  sum a = {.tr = tr, .s = s, .knot = knot, .t = t, .jacobian = p->jacobian};
+  sum_rows(&a, q, v, v_next);
+  if (p->jacobian && tr->wrap && (t < 2 || t == tr->nknot - 1)) wrap_knot(tr, s, t);
   return isfinite(knot->merit) ? CAV_OK : CAV_NOT_FINITE;
 }
 
@@ -785,38 +939,52 @@ static void evaluate_item(void *context, int t, int member) {
   p->status[t] = evaluate_knot(p, &p->tr->scratch[member], t);
 }
 
-/// Rotation Jacobians of every step.
+/// Rotation Jacobians of one step with velocity v.
+static void prepare_turn(const cav_transcription *tr, const double *v, double *turn) {
+  for (int k = 0; k < tr->nturn; k++) {
+    double *J = turn + CAV_TURN * k;
+    for (int c = 0; c < 3; c++) J[18 + c] = tr->h * v[tr->turn_dof[k] + c];
+    cav_turn_inverse(J + 18, J);
+    for (int r = 0; r < 3; r++)
+      for (int c = 0; c < 3; c++) J[9 + 3 * r + c] = J[3 * c + r];
+  }
+}
+
 static void prepare_turns(cav_transcription *tr, const cav_trajectory *at) {
-  for (int t = 1; t < tr->nknot; t++) {
-    for (int k = 0; k < tr->nturn; k++) {
-      double *J = tr->knot[t].turn + CAV_TURN * k;
-      for (int c = 0; c < 3; c++) J[18 + c] = tr->h * at->v[(size_t)t * tr->nv + tr->turn_dof[k] + c];
-      cav_turn_inverse(J + 18, J);
-      for (int r = 0; r < 3; r++)
-        for (int c = 0; c < 3; c++) J[9 + 3 * r + c] = J[3 * c + r];
-    }
+  for (int t = tr->wrap ? 0 : 1; t < tr->nknot; t++) prepare_turn(tr, velocity_at(tr, at, t), tr->knot[t].turn);
+  if (tr->wrap) prepare_turn(tr, tr->after, tr->turn_after);
+}
+
+/// The step of the trajectory, and the velocities at its ends.
+static void prepare_ends(cav_transcription *tr, const cav_trajectory *at) {
+  const double *first = at->v + tr->nv, *last = at->v + (size_t)(tr->nknot - 1) * tr->nv;
+  if (at->timestep != tr->h) tr->options.time_constant *= at->timestep / tr->h;
+  tr->h = tr->options.timestep = at->timestep;
+  memset(tr->after, 0, (size_t)tr->nv * sizeof(double));
+  if (tr->wrap) {
+    cav_wrap_tangent(tr->wrap, -1, last, tr->before);
+    cav_wrap_tangent(tr->wrap, 1, first, tr->after);
+  } else if (!tr->problem->close_at_rest) {
+    memcpy(tr->after, last, (size_t)tr->nv * sizeof(double));
   }
 }
 
 static cav_status evaluate(cav_transcription *tr, cav_trajectory *at, int jacobian) {
   double start = now(), dynamics = 0;
   int members = cav_parallel_size(tr->pool);
-  double *zero = calloc((size_t)tr->nv, sizeof(double));
   cav_status *status = calloc((size_t)tr->nknot, sizeof *status), result = CAV_OK;
-  if (!zero || !status) {
-    free(zero), free(status);
-    return CAV_NO_MEMORY;
-  }
+  if (!status) return CAV_NO_MEMORY;
+  prepare_ends(tr, at);
   if (jacobian) prepare_turns(tr, at);
   for (int i = 0; i < members; i++) tr->scratch[i].seconds = 0;
-  pass p = {tr, at, zero, jacobian, status};
+  pass p = {tr, at, jacobian, status};
   cav_parallel_for(tr->pool, tr->nknot, evaluate_item, &p);
   for (int t = 0; t < tr->nknot && result == CAV_OK; t++) result = status[t];
   if (jacobian && result == CAV_OK) join_rows(tr);
   for (int i = 0; i < members; i++) dynamics += tr->scratch[i].seconds / members;
   tr->seconds_dynamics += dynamics;
   tr->seconds_assembly += now() - start - dynamics;
-  free(zero), free(status);
+  free(status);
   return result;
 }
 
@@ -897,8 +1065,11 @@ void cav_transcription_prices(cav_transcription *tr, const double *x) {
       cav_slot *slot = &tr->knot[t].slot[i];
       double rho = slot_rho(tr, &tr->knot[t].layout, i), value = slot->value;
       const double *row = tr->knot[t].slot_row + (size_t)i * 3 * (size_t)nv;
-      for (int k = t > 1 ? t - 1 : 1; x && k <= t + 1 && k < tr->nknot; k++)
-        for (int d = 0; d < nv; d++) value += row[(k - t + 1) * nv + d] * x[(k - 1) * nv + d];
+      for (int c = 0; x && c < 3; c++) {
+        int block = cav_transcription_block(tr, t, c);
+        for (int d = 0; block >= 0 && d < nv; d++) value += row[c * nv + d] * x[block * nv + d];
+      }
+      if (x && tr->free_step) value += tr->knot[t].slot_step[i] * x[(tr->nknot - 1) * nv];
       double shifted = rho * value + (x ? slot->multiplier : 0);
       slot->price = shifted - fmin(fmax(shifted, rho * slot->lower), rho * slot->upper);
     }
@@ -907,10 +1078,19 @@ void cav_transcription_prices(cav_transcription *tr, const double *x) {
 
 void cav_transcription_move(const cav_transcription *tr, const cav_trajectory *from, const double *x,
                             cav_trajectory *to) {
-  size_t nq = (size_t)from->nq;
-  memcpy(to->q, from->q, nq * sizeof(double));
-  memcpy(to->v, from->v, (size_t)tr->nv * sizeof(double));
-  for (int t = 1; t < tr->nknot; t++)
-    cav_integrate(tr->model, from->q + (size_t)t * nq, x + (size_t)(t - 1) * tr->nv, 1, to->q + (size_t)t * nq);
+  size_t nq = (size_t)from->nq, last = (size_t)tr->nknot - 1, nv = (size_t)tr->nv;
+  to->timestep = from->timestep;
+  if (tr->free_step) {
+    double least = tr->problem->duration_least / (double)last, most = tr->problem->duration_most / (double)last;
+    to->timestep = fmin(fmax(from->timestep * exp(x[last * nv]), least), most);
+  }
+  for (size_t t = 1; t <= last; t++) cav_integrate(tr->model, from->q + t * nq, x + (t - 1) * nv, 1, to->q + t * nq);
+  if (tr->wrap) {
+    cav_wrap_configuration(tr->wrap, -1, to->q + last * nq, to->q);
+  } else {
+    memcpy(to->q, from->q, nq * sizeof(double));
+    memcpy(to->v, from->v, nv * sizeof(double));
+  }
   cav_trajectory_velocities(tr->model, to);
+  if (tr->wrap) cav_wrap_tangent(tr->wrap, -1, to->v + last * nv, to->v);
 }

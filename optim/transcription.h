@@ -3,6 +3,7 @@
 #define CAVORT_TRANSCRIPTION_H
 
 #include "cavort/solve.h"
+#include "cycle.h"
 #include "parallel.h"
 
 /// m: a moment counts as a force at this distance when it is compared with the weight.
@@ -35,13 +36,15 @@ typedef struct cav_force_row {
 enum { CAV_TURN = 21 };
 
 /// One knot. Columns of its derivatives: tangent increments of q_{t-1}, q_t, q_{t+1}; those of knots that are not unknowns
-/// are zero.
+/// are zero. In cycles q_{-1}, q_0 and q_{T+1} are the unknowns of q_{T-1}, q_T and q_1 moved: columns of hessian, gradient,
+/// step_row and slot_row are of the unknowns themselves, those of du and dy of the knots beside.
 typedef struct cav_knot {
   double time;
   int has_force; ///< u is defined here
   cav_slot_layout layout;
   cav_slot *slot;         ///< [layout.count]
   double *slot_row;       ///< [layout.count*3nv] derivatives of the slots' values, if kept
+  double *slot_step;      ///< [layout.count] the same by the logarithm of the step, where that is free
   double *u;              ///< [nv]
   double *du;             ///< [nv*3nv] row-major
   int nread, ncontact;    ///< readings beside u: 4 a contact, then sensors
@@ -53,8 +56,11 @@ typedef struct cav_knot {
   double *dense, *rest;   ///< [ndense*3nv], [ndense]
   double *hessian;        ///< [3nv*3nv] Gauss-Newton, lower triangle
   double *gradient;       ///< [3nv]
-  double *turn;           ///< [nturn*CAV_TURN] of the step that ends here: Jr^-1, Jl^-1 and the rotation vector itself
-  double cost, merit;     ///< cost terms; and with penalties
+  double
+      *step_row; ///< [3nv] of the Hessian, by the logarithm of the step where that is free; then its square and slope
+  double step_square, step_slope;
+  double *turn;       ///< [nturn*CAV_TURN] of the step that ends here: Jr^-1, Jl^-1 and the rotation vector itself
+  double cost, merit; ///< cost terms; and with penalties
 } cav_knot;
 
 /// Weights of the augmented Lagrangian, per kind of row.
@@ -72,8 +78,12 @@ typedef struct cav_servo {
 typedef struct cav_transcription {
   const cav_problem *problem;
   const cav_model *model;
-  int nv, nknot; ///< unknown blocks are knots 1 .. nknot-1
-  double h;
+  int nv, nknot;             ///< unknown blocks are knots 1 .. nknot-1
+  int free_step;             ///< 1: one more unknown after them, the logarithm of the step over that of the trajectory
+  double h;                  ///< of the last trajectory
+  cav_wrap *wrap;            ///< cycles: from one period to the next; else NULL
+  double *before, *after;    ///< [nv] velocity at knot 0 (cycles), and after the last one
+  double *turn_after;        ///< [nturn*CAV_TURN] of the step after the last knot, in cycles
   double weight;             ///< N: model mass times gravity
   int nresidual;             ///< rows of unactuated
   cav_force_row *unactuated; ///< orthonormal complement of the actuators' range, scaled to shares of weight
@@ -112,14 +122,18 @@ void cav_servo_free(cav_servo *servo);
 /// Part of the row at q [nq], v [nv]. servo.c.
 double cav_servo_value(const cav_model *model, const cav_servo *servo, const double *q, const double *v);
 
-/// NULL with the reason in error: no memory, or actuators that cannot be planned with.
+/// NULL with the reason in error: no memory, actuators that cannot be planned with, a cycle that is none.
 cav_transcription *cav_transcription_new(const cav_problem *problem, int threads, cav_error *error);
 void cav_transcription_free(cav_transcription *transcription);
 
 /// From now on linearisations keep the derivative of every constraint row; 0 if memory runs out.
 int cav_transcription_keep_rows(cav_transcription *transcription);
 
-/// Columns (of 3nv) in which constraint row i of knot t may be nonzero: pattern [3nv] is 1 there. pattern.c.
+/// Number of unknowns, and the block 0 .. nknot-2 of them that columns c*nv .. (c+1)*nv-1 of knot t belong to; -1: none.
+int cav_transcription_unknowns(const cav_transcription *transcription);
+int cav_transcription_block(const cav_transcription *transcription, int t, int c);
+
+/// Columns (of 3nv) in which constraint row i of knot t may be nonzero: pattern [3nv] is 1 there; the nv after them are scratch. pattern.c.
 void cav_transcription_pattern(const cav_transcription *transcription, int t, int i, char *pattern);
 
 /// Values at a trajectory: u, constraint rows, cost and merit of every knot. Fills trajectory->u.
@@ -139,7 +153,7 @@ double cav_transcription_violation(const cav_transcription *transcription);
 /// Multiplier update of the augmented Lagrangian at the last values.
 void cav_transcription_multipliers(cav_transcription *transcription);
 
-/// Prices of all rows at the last linearisation, whose rows were kept: the multipliers after a step x [(nknot-1)*nv], or with x
+/// Prices of all rows at the last linearisation, whose rows were kept: the multipliers after a step x [unknowns], or with x
 /// NULL the weighted violations alone.
 void cav_transcription_prices(cav_transcription *transcription, const double *x);
 
@@ -148,7 +162,8 @@ void cav_transcription_prices(cav_transcription *transcription, const double *x)
 cav_status cav_transcription_rows(const cav_transcription *transcription, const double allowed[CAV_BINDING_KINDS],
                                   cav_binding **row, int *n);
 
-/// q_t := q_t (+) x_t for every unknown knot; v follows. x [(nknot-1)*nv].
+/// q_t := q_t (+) x_t for every unknown knot, the step by its unknown within its bounds; v follows, and in cycles q_0 and v_0.
+/// x [unknowns].
 void cav_transcription_move(const cav_transcription *transcription, const cav_trajectory *from, const double *x,
                             cav_trajectory *to);
 
@@ -160,6 +175,9 @@ int cav_term_dim(const cav_term *term);
 int cav_dof_selected(const cav_transcription *transcription, const cav_term *term, int dof);
 void cav_term_read(const cav_transcription *transcription, const cav_state *state, const cav_term *term, int t,
                    double *y);
+
+/// Time of a knot for windows and targets: a share of the problem's duration, whatever the step has become. terms.c.
+double cav_knot_time(const cav_transcription *transcription, int t);
 
 /// Target of a term at a time, dim numbers: constant, between waypoints, or zeros.
 void cav_term_target(const cav_term *term, double time, int dim, double *target);

@@ -15,7 +15,7 @@ static const double usual_gravity = 9.81; // m/s^2, unit of forces where the mod
 
 /// What was found at the knots.
 typedef struct evidence {
-  cav_finding unactuated, limit, term, penetration, defect;
+  cav_finding unactuated, limit, term, penetration, defect, wrap;
   double slip, load;
 } evidence;
 
@@ -96,10 +96,12 @@ static cav_status admit(const cav_problem *problem, const cav_trajectory *trajec
   if (!problem->q_start || !problem->v_start) {
     return fail(error, CAV_BAD_INPUT, "the problem has no start: set q_start and v_start");
   }
-  if (!(problem->timestep > 0) || !(fabs(trajectory->timestep - problem->timestep) <= 1e-9 * problem->timestep)) {
+  if (problem->duration_most == 0 && !(fabs(trajectory->timestep - problem->timestep) <= 1e-9 * problem->timestep)) {
     return fail(error, CAV_BAD_INPUT, "the trajectory's step is %.9g s, the problem's %.9g s", trajectory->timestep,
                 problem->timestep);
   }
+  if (!(problem->timestep > 0) || !(trajectory->timestep > 0))
+    return fail(error, CAV_BAD_INPUT, "the steps of the problem and of the trajectory must be positive");
   long knots = lround(problem->duration / problem->timestep) + 1;
   if (trajectory->nknot < 2 || trajectory->nknot != knots) {
     return fail(error, CAV_BAD_INPUT, "the trajectory has %d knots, the problem asks for %ld", trajectory->nknot,
@@ -115,6 +117,7 @@ static cav_status admit(const cav_problem *problem, const cav_trajectory *trajec
 }
 
 static void audit_clear(cav_audit *audit) {
+  cav_wrap_free(audit->wrap);
   cav_state_free(audit->state);
   cav_state_free(audit->bare);
   free(audit->v);
@@ -132,11 +135,16 @@ static void knot_velocities(cav_audit *audit) {
   }
   double *close = audit->v + (audit->last + 1) * nv;
   memset(close, 0, sizeof(double) * nv);
-  if (!audit->problem->close_at_rest) memcpy(close, close - nv, sizeof(double) * nv);
+  if (audit->wrap) {
+    cav_wrap_tangent(audit->wrap, -1, close - nv, audit->v);
+    cav_wrap_tangent(audit->wrap, 1, audit->v + nv, close);
+  } else if (!audit->problem->close_at_rest) {
+    memcpy(close, close - nv, sizeof(double) * nv);
+  }
 }
 
 static cav_status audit_start(cav_audit *audit, const cav_problem *problem, const cav_trajectory *trajectory,
-                              const cav_options *contact) {
+                              const cav_options *contact, cav_error *error) {
   const cav_model *model = problem->model;
   size_t n = (size_t)trajectory->nknot, nv = (size_t)model->nv;
   *audit = (cav_audit){.problem = problem,
@@ -146,7 +154,13 @@ static cav_status audit_start(cav_audit *audit, const cav_problem *problem, cons
                        .h = trajectory->timestep,
                        .arm = CAV_MOMENT_ARM,
                        .q = trajectory->q};
-  audit->rows = audit->last + (problem->close_at_rest ? 1 : 0);
+  audit->periods = 1;
+  if (problem->cycle.on) {
+    audit->wrap = cav_wrap_new(problem, error);
+    if (!audit->wrap) return error->status;
+    audit->periods = problem->cycle.mirror == CAV_MIRROR_NONE ? 2 : 4;
+  }
+  audit->rows = audit->last + (problem->close_at_rest && !problem->cycle.on ? 1 : 0);
   audit->law.timestep = audit->h;
   // weight, or a like force where there is no gravity
   const double *g = model->gravity;
@@ -174,6 +188,46 @@ static void note_start(const cav_audit *audit, cav_finding *finding) {
     cav_finding_note(finding, fabs(away[d]), 0, "start, %s, away from the problem's start",
                      joint_name(model, model->dof[d].joint, name));
   }
+}
+
+// the duration is one that the problem allows
+static void note_duration(const cav_audit *audit, cav_finding *finding) {
+  const cav_problem *p = audit->problem;
+  double duration = audit->last * audit->h, least = p->duration, most = p->duration;
+  if (p->duration_most > 0) least = p->duration_least, most = p->duration_most;
+  double beyond = fmax(least - duration, duration - most) / p->duration;
+  cav_finding_note(finding, beyond, audit->last, "duration, %.6g s of %.6g .. %.6g s", duration, least, most);
+}
+
+// the end of a cycle is its start moved: by coordinates, by where the links are, and by the step that leads to the start
+static cav_status note_wrap(const cav_audit *audit, cav_finding *finding) {
+  const cav_model *model = audit->model;
+  int nq = model->nq, nv = model->nv;
+  const double *last = audit->q + audit->last * nq;
+  double *q = malloc(sizeof(double) * (size_t)(nq + nv + 3 * model->nlink)), *off = q + nq, *com = off + nv;
+  char name[32];
+  if (!q) return CAV_NO_MEMORY;
+  cav_wrap_configuration(audit->wrap, 1, audit->q, q);
+  cav_difference(model, q, last, 1, off);
+  for (int d = 0; d < nv; d++)
+    cav_finding_note(finding, fabs(off[d]), audit->last, "%s", joint_name(model, model->dof[d].joint, name));
+  cav_wrap_configuration(audit->wrap, -1, last - nq, q);
+  cav_difference(model, q, audit->q, 1, off);
+  for (int d = 0; d < nv; d++)
+    cav_finding_note(finding, fabs(off[d] - audit->h * audit->v[d]), 0, "step of %s",
+                     joint_name(model, model->dof[d].joint, name));
+  cav_status status = cav_position(model, audit->bare, audit->q);
+  memcpy(com, audit->bare->com, sizeof(double) * 3 * model->nlink);
+  if (status == CAV_OK) status = cav_position(model, audit->bare, last);
+  for (int l = 1; l < model->nlink && status == CAV_OK; l++) {
+    const double *there = audit->bare->com + 3 * cav_wrap_link(audit->wrap, l);
+    double moved[3], apart = 0;
+    cav_wrap_point(audit->wrap, com + 3 * l, moved);
+    for (int k = 0; k < 3; k++) apart += (moved[k] - there[k]) * (moved[k] - there[k]);
+    cav_finding_note(finding, sqrt(apart), audit->last, "%s", cav_audit_link_name(model, l, name));
+  }
+  free(q);
+  return status;
 }
 
 // control of a servo beyond its limits: what the nearest one within them does not give, over gain and limits
@@ -266,7 +320,12 @@ static cav_status examine(cav_audit *audit, cav_balance *balance, evidence *foun
   int nv = model->nv, room = 0;
   double *work = NULL, *residual = malloc(sizeof(double) * (size_t)(2 * nv + 1));
   cav_status status = residual ? CAV_OK : CAV_NO_MEMORY;
-  note_start(audit, &found->term);
+  if (status == CAV_OK && audit->wrap) {
+    status = note_wrap(audit, &found->wrap);
+  } else if (status == CAV_OK) {
+    note_start(audit, &found->term);
+  }
+  note_duration(audit, &found->term);
   for (int t = 0; t <= audit->last && status == CAV_OK; t++) {
     const double *v = audit->v + t * nv;
     double *u = residual + nv;
@@ -329,6 +388,8 @@ static void judge(const cav_audit *audit, const evidence *found, const cav_repla
           "A longer motion or a lower effort_limit usually helps.");
   require(verdict, &found->term, CAV_PROMISE_CONSTRAINT, "constraint missed by",
           "Constraints may contradict each other or the limits.");
+  require(verdict, &found->wrap, CAV_PROMISE_WRAP, "end of the cycle away from its start, m or rad,",
+          "It was cut or resampled after it was solved: solve it again from there.");
   require(verdict, &found->penetration, CAV_PROMISE_PENETRATION, "penetration, m,",
           "A lower softness or smoothing at the end of the schedule usually helps.");
   require(verdict, &found->defect, CAV_PROMISE_MOMENTUM, "momentum defect, share of weight rms,",
@@ -340,7 +401,7 @@ static void judge(const cav_audit *audit, const evidence *found, const cav_repla
     snprintf(verdict->reason, sizeof verdict->reason,
              "closed loop at a tenth of the step ends after %.3g of %.3g s: %s. "
              "Stiffer gains, more slack in the effort limits or a slower motion usually help.",
-             replay->closed.seconds, verdict->duration, replay->closed.lost);
+             replay->closed.seconds, verdict->periods * verdict->duration, replay->closed.lost);
   }
   verdict->certified = !*verdict->reason;
 }
@@ -361,6 +422,8 @@ static void fill(const cav_audit *audit, const evidence *found, const cav_replay
   verdict->closed_loop_end_error_m = replay->closed.error;
   verdict->own_contacts_seconds = replay->own.seconds;
   verdict->own_contacts_end_error_m = replay->own.error;
+  verdict->wrap_error = found->wrap.value;
+  verdict->periods = audit->periods;
   verdict->duration = audit->last * audit->h;
 }
 
@@ -378,9 +441,11 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
   if (error) *error = (cav_error){0};
   status = cav_drives_plannable(problem->model, error);
   if (status != CAV_OK) return status;
-  status = audit_start(&audit, problem, trajectory, contact);
+  cav_error refusal = {0};
+  status = audit_start(&audit, problem, trajectory, contact, &refusal);
+  if (refusal.status != CAV_OK && error) *error = refusal;
   if (status == CAV_OK) balance = cav_balance_new(&audit);
-  if (!balance) status = CAV_NO_MEMORY;
+  if (status == CAV_OK && !balance) status = CAV_NO_MEMORY;
   if (status == CAV_OK) status = examine(&audit, balance, &found, error);
   if (status == CAV_OK) status = cav_replay_steps(&audit, &replay);
   if (status == CAV_OK) status = cav_replay_open(&audit, &replay);
@@ -403,7 +468,9 @@ cav_status cav_track(const cav_problem *problem, const cav_trajectory *trajector
   cav_audit audit;
   cav_status status = admit(problem, trajectory, contact, gain_q, gain_v, error);
   if (status != CAV_OK) return status;
-  status = audit_start(&audit, problem, trajectory, contact);
+  cav_error refusal = {0};
+  status = audit_start(&audit, problem, trajectory, contact, &refusal);
+  if (refusal.status != CAV_OK && error) *error = refusal;
   int nv = audit.model->nv;
   for (int t = 0; t < audit.rows && status == CAV_OK; t++) {
     const double *v = audit.v + t * nv;

@@ -30,14 +30,15 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
   add_number(line, &n, "unactuated force, share of weight", v->unactuated_force_max, CAV_PROMISE_UNACTUATED, 1, "");
   add_number(line, &n, "limits of actuators, joints, tendons", v->limit_violation_max, CAV_PROMISE_LIMIT, 1, "");
   add_number(line, &n, "constraints of the problem", v->constraint_violation_max, CAV_PROMISE_CONSTRAINT, 1, "");
+  if (v->periods > 1) add_number(line, &n, "end of the cycle on its start", v->wrap_error, CAV_PROMISE_WRAP, 1, "");
   add_number(line, &n, "penetration", v->penetration_max_m, CAV_PROMISE_PENETRATION, 1e3, " mm");
   add_number(line, &n, "momentum defect, rms, share of weight", v->momentum_defect_rms, CAV_PROMISE_MOMENTUM, 100,
              " %");
   add_number(line, &n, "forward step from each knot, error", v->replay_step_max_error, CAV_PROMISE_STEP, 1, "");
   snprintf(value, sizeof value, "%.4g s", v->closed_loop_seconds);
-  snprintf(limit, sizeof limit, "%.4g s", v->duration);
+  snprintf(limit, sizeof limit, "%.4g s", v->periods * v->duration);
   add(line, &n, "closed loop at a tenth of the step, until", value, limit,
-      v->closed_loop_seconds >= v->duration * (1 - 1e-9));
+      v->closed_loop_seconds >= v->periods * v->duration * (1 - 1e-9));
   add_number(line, &n, "closed loop, error at the end", v->closed_loop_end_error_m, NAN, 1e3, " mm");
   add_number(line, &n, "the same under the model's own contacts, until", v->own_contacts_seconds, NAN, 1, " s");
   add_number(line, &n, "under the model's own contacts, error at the end", v->own_contacts_end_error_m, NAN, 1e3,
@@ -108,6 +109,8 @@ void cav_certificate_json(FILE *out, const char *problem, const char *model, con
   write_number(out, "closed_loop_end_error_m", v->closed_loop_end_error_m);
   write_number(out, "own_contacts_seconds", v->own_contacts_seconds);
   write_number(out, "own_contacts_end_error_m", v->own_contacts_end_error_m);
+  write_number(out, "wrap_error", v->wrap_error);
+  write_number(out, "periods", v->periods);
   write_number(out, "duration", v->duration);
   write_number(out, "solve_seconds", v->solve_seconds);
   write_number(out, "iterations", isnan(v->solve_seconds) ? (double)NAN : (double)v->iterations);

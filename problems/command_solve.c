@@ -101,7 +101,8 @@ static cav_trajectory *resume_from(const char *folder, const cav_problem *proble
   char *path = cav_result_path(folder, "trajectory.csv");
   cav_trajectory *start = path ? cav_trajectory_read(path, problem->model, error) : NULL;
   double h = problem->timestep, duration = start ? (start->nknot - 1) * start->timestep : 0;
-  if (start && fabs(duration - problem->duration) > 0.5 * h) {
+  if (problem->duration_most > 0) h = duration / round(problem->duration / h);
+  if (start && problem->duration_most == 0 && fabs(duration - problem->duration) > 0.5 * h) {
     cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: lasts %g s, the problem %g s; remove --resume to start anew", path,
                   duration, problem->duration);
     cav_trajectory_free(start);

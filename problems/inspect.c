@@ -361,7 +361,17 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
   int knots = (int)lround(p->duration / p->timestep) + 1;
   printf("problem %s\n", p->name[0] ? p->name : "without a name");
   printf("  %g s in %d knots of %g s, order %s, %s\n", p->duration, knots, p->timestep, order[p->order],
-         p->close_at_rest ? "at rest after the last knot" : "open after the last knot");
+         p->cycle.on        ? "a cycle"
+         : p->close_at_rest ? "at rest after the last knot"
+                            : "open after the last knot");
+  if (p->duration_most > 0)
+    printf("  duration free from %g to %g s, weight %g\n", p->duration_least, p->duration_most, p->duration_weight);
+  if (p->cycle.on)
+    printf("  a period moves by %g %g %g m and turns by %g degrees%s\n", p->cycle.translation[0],
+           p->cycle.translation[1], p->cycle.translation[2], p->cycle.turn * 180 / M_PI,
+           p->cycle.mirror == CAV_MIRROR_X   ? ", mirrored along x"
+           : p->cycle.mirror == CAV_MIRROR_Y ? ", mirrored along y"
+                                             : "");
   cav_status status = print_posture(p, "start", p->q_start, error);
   if (!status) status = print_posture(p, "goal", p->q_goal, error);
   if (status) return status;

@@ -142,7 +142,7 @@ cav_status cav_result_write(const char *folder, const cav_problem *problem, cons
   if (!status) status = cav_trajectory_write(trajectory, problem->model, solution->trajectory, error);
   if (!status) status = write_problem(folder, copy, problem, &solution->contact, error);
   if (!status) status = write_log(log, solution, error);
-  if (!status) status = cav_rows_write(rows, problem->timestep, solution->nrow, solution->row, error);
+  if (!status) status = cav_rows_write(rows, solution->trajectory->timestep, solution->nrow, solution->row, error);
   if (!status && solution->gain_q) status = write_gains(gains, problem->model, solution, error);
   free(trajectory);
   free(gains);
@@ -168,7 +168,8 @@ cav_status cav_result_write_verdict(const char *folder, const cav_problem *probl
 
 cav_status cav_result_write_page(const char *folder, const cav_problem *problem, const cav_trajectory *trajectory,
                                  const cav_options *contact, const cav_verdict *verdict, cav_error *error) {
-  cav_forces *forces = cav_forces_new(problem->model, trajectory, contact, problem->close_at_rest, error);
+  int at_rest = problem->close_at_rest && !problem->cycle.on;
+  cav_forces *forces = cav_forces_new(problem->model, trajectory, contact, at_rest, error);
   if (!forces) return error->status;
   char *table = cav_result_path(folder, "forces.csv"), *page = cav_result_path(folder, "view.html");
   cav_status status = table && page ? CAV_OK : no_memory(error);

@@ -49,10 +49,10 @@ int main(int argc, char **argv) {
   }
   p->duration = (KNOTS - 1) * p->timestep;
   cav_transcription *tr = cav_transcription_new(p, 1, &error);
-  cav_normal *normal = tr ? cav_normal_new(tr->nknot - 1, tr->nv) : NULL;
+  cav_normal *normal = tr ? cav_normal_new(tr) : NULL;
   cav_trajectory *at = tr ? cav_trajectory_new(p->model, tr->nknot, p->timestep) : NULL;
   if (!CHECK(normal && at)) return check_result();
-  cav_guess_fill(p, at);
+  cav_guess_fill(p, p->q_goal, at);
   shake(at, p->model, 0.02);
   printf("%s: %d dofs, %d knots, step %g s\n", p->name, tr->nv, tr->nknot, p->timestep);
   for (int s = 0; s < 3; s++) {

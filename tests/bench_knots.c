@@ -47,12 +47,12 @@ static int work(const char *model_path, int steps, measure *out) {
   out->floor_kilobytes = resident();
   double start = cav_clock();
   cav_transcription *tr = cav_transcription_new(&problem, 1, &error);
-  cav_normal *normal = tr ? cav_normal_new(tr->nknot - 1, tr->nv) : NULL;
+  cav_normal *normal = tr ? cav_normal_new(tr) : NULL;
   cav_trajectory *at = tr ? cav_trajectory_new(model, tr->nknot, problem.timestep) : NULL;
   cav_trajectory *spare = at ? cav_trajectory_copy(at) : NULL;
   if (!normal || !spare) return 0;
   memcpy(at->q, q_start, sizeof q_start);
-  cav_guess_fill(&problem, at);
+  cav_guess_fill(&problem, problem.q_goal, at);
   cav_trajectory_velocities(model, at);
   cav_stage_set(&problem, 0, 2, tr);
   out->seconds_new = cav_clock() - start;

@@ -34,7 +34,7 @@ static cav_trajectory *guess(const char *text, cav_problem **problem) {
   }
   cav_trajectory *at = cav_trajectory_new((*problem)->model, 11, .1);
   CHECK(at != NULL);
-  if (at) cav_guess_fill(*problem, at);
+  if (at) cav_guess_fill(*problem, (*problem)->q_goal, at);
   return at;
 }
 

@@ -1,7 +1,10 @@
 /// Derivatives of whole problems: the gradient of the merit at every unknown, first and last knots included, the rows of the
-/// constraints and their sparsity, against centred differences of the values; the same bits with one and two threads.
+/// constraints and their sparsity, against centred differences of the values; the same bits with one and two threads. The same of
+/// cycles, whose ends meet, moved, turned or mirrored, and with the step as an unknown; products and solutions of their
+/// bordered normal equations against dense ones.
 /// Seen: gradients to 2e-8 of their norm (bound 1e-6); rows to 3e-6 (bound 1e-4: the difference that they are compared with);
 /// analytic derivatives and centred differences give the same Hessians to 2e-8 (bound 1e-6); no nonzero outside the pattern, and none of the pattern of forces and ranges that stays zero.
+#include "gauss_newton.h"
 #include "readings.h"
 
 #include "scene.h"
@@ -40,6 +43,22 @@ static const char roped[] = WALKER(
     "<spatial name='cord' limited='true' range='0 .3' stiffness='20' springlength='.1'><site site='eye'/>"
     "<site site='toe'/><pulley divisor='2'/><site site='toe'/><site site='hand'/></spatial>",
     "");
+
+/// A body with two arms of ball joints and two legs, its own mirror image but for names.
+static const char sided[] =
+    "<mujoco><worldbody><geom name='floor' type='plane' size='1 1 1'/>"
+    "<body name='trunk' pos='0 0 .3'><freejoint name='root'/><geom type='sphere' size='.1' mass='3'/>"
+    "<site name='eye' pos='.1 0 .05'/>"
+    "<body name='left leg' pos='.1 .1 -.05'><joint name='left hip' axis='.2 1 .1' limited='true' range='-30 40' "
+    "armature='.01'/><geom type='capsule' size='.03' fromto='0 0 0 0 .02 -.2' mass='.5'/></body>"
+    "<body name='right leg' pos='.1 -.1 -.05'><joint name='right hip' axis='.2 -1 .1' limited='true' range='-40 30' "
+    "armature='.01'/><geom type='capsule' size='.03' fromto='0 0 0 0 -.02 -.2' mass='.5'/></body>"
+    "<body name='arm_l' pos='-.1 .1 .1' euler='20 30 0'><joint name='shoulder_l' type='ball' limited='true' "
+    "range='0 60'/><geom type='capsule' size='.03' fromto='0 0 0 .1 0 -.25' mass='.4'/></body>"
+    "<body name='arm_r' pos='-.1 -.1 .1' euler='-20 30 0'><joint name='shoulder_r' type='ball' limited='true' "
+    "range='0 60'/><geom type='capsule' size='.03' fromto='0 0 0 .1 0 -.25' mass='.4'/></body></body></worldbody>"
+    "<actuator><motor joint='left hip' gear='20' ctrllimited='true' ctrlrange='-1 .5'/>"
+    "<motor joint='right hip' gear='20' ctrllimited='true' ctrlrange='-.5 1'/></actuator></mujoco>";
 
 /// Costs of every quantity, hard terms of every kind, windows of both kinds.
 static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) {
@@ -92,6 +111,15 @@ static void shake(cav_trajectory *at, const cav_model *m, double size) {
   cav_trajectory_velocities(m, at);
 }
 
+/// Brings the start of a cycle to where its end says.
+static void close_cycle(cav_transcription *tr, cav_trajectory *at) {
+  double *x = calloc((size_t)cav_transcription_unknowns(tr), sizeof *x);
+  cav_trajectory *from = cav_trajectory_copy(at);
+  if (tr->wrap) cav_transcription_move(tr, from, x, at);
+  cav_trajectory_free(from);
+  free(x);
+}
+
 static double merit_at(cav_transcription *tr, const cav_trajectory *at, cav_trajectory *moved, double *x, int i,
                        double step) {
   x[i] = step;
@@ -104,16 +132,18 @@ static double merit_at(cav_transcription *tr, const cav_trajectory *at, cav_traj
 /// The summed gradient against differences of the summed merit.
 static void test_gradient(cav_transcription *tr, cav_trajectory *at) {
   const cav_model *m = tr->model;
-  int n = (tr->nknot - 1) * m->nv;
+  int n = cav_transcription_unknowns(tr);
   double *gradient = calloc((size_t)n, sizeof(double)), *x = calloc((size_t)n, sizeof(double)), norm = 0, worst = 0;
   cav_trajectory *moved = cav_trajectory_copy(at);
   CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
-  for (int t = 0; t < tr->nknot; t++)
+  for (int t = 0; t < tr->nknot; t++) {
     for (int c = 0; c < 3 * m->nv; c++) {
-      int i = (t - 2) * m->nv + c;
-      if (i >= 0 && i < n) gradient[i] += tr->knot[t].gradient[c];
-      if (i < 0 || i >= n) CHECK(tr->knot[t].gradient[c] == 0);
+      int block = cav_transcription_block(tr, t, c / m->nv);
+      if (block >= 0) gradient[block * m->nv + c % m->nv] += tr->knot[t].gradient[c];
+      if (block < 0) CHECK(tr->knot[t].gradient[c] == 0);
     }
+    if (tr->free_step) gradient[n - 1] += tr->knot[t].step_slope;
+  }
   for (int i = 0; i < n; i++) norm = fmax(norm, fabs(gradient[i]));
   for (int i = 0; i < n; i++) {
     double step = 1e-5,
@@ -138,12 +168,13 @@ static void test_rows(cav_transcription *tr, cav_trajectory *at, int tries) {
   double worst = 0;
   size_t most = 0, rows = 0;
   for (int t = 0; t < tr->nknot; t++) most += (size_t)tr->knot[t].layout.count;
-  char *pattern = calloc((size_t)width, 1), *used = calloc(most * (size_t)width, 1);
-  double *x = calloc((size_t)(tr->nknot - 1) * m->nv, sizeof(double)), *plus = malloc(most * sizeof(double));
+  char *pattern = calloc((size_t)(width + m->nv), 1), *used = calloc(most * (size_t)width, 1);
+  double *x = calloc((size_t)cav_transcription_unknowns(tr), sizeof(double)), *plus = malloc(most * sizeof(double));
   cav_trajectory *moved = cav_trajectory_copy(at);
   CHECK(cav_transcription_keep_rows(tr));
   for (int k = 0; k < tries; k++) {
     shake(at, m, k + 1 < tries ? 0.4 : 0.05);
+    close_cycle(tr, at);
     CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
     rows = 0;
     for (int t = 0; t < tr->nknot; t++)
@@ -151,10 +182,10 @@ static void test_rows(cav_transcription *tr, cav_trajectory *at, int tries) {
         for (int c = 0; c < width; c++)
           used[rows * (size_t)width + (size_t)c] |= tr->knot[t].slot_row[i * width + c] != 0;
   }
-  // differences at the last point, for the first, a middle and the last knot
-  for (int t = 1; t < tr->nknot; t++) {
-    if (t != 1 && t != tr->nknot / 2 && t != tr->nknot - 1) continue;
-    for (int d = 0; d < m->nv; d++) {
+  // differences at the last point, for the first, a middle and the last knot, and for the step
+  for (int t = 1; t < tr->nknot + tr->free_step; t++) {
+    if (t != 1 && t != tr->nknot / 2 && t < tr->nknot - 1) continue;
+    for (int d = 0; d < (t < tr->nknot ? m->nv : 1); d++) {
       double step = 1e-6;
       int i = (t - 1) * m->nv + d;
       merit_at(tr, at, moved, x, i, step);
@@ -166,8 +197,9 @@ static void test_rows(cav_transcription *tr, cav_trajectory *at, int tries) {
       for (int s = 0; s < tr->nknot; s++)
         for (int r = 0; r < tr->knot[s].layout.count; r++, at_row++) {
           double slope = (plus[at_row] - tr->knot[s].slot[r].value) / (2 * step);
-          int c = (t - s + 1) * m->nv + d;
-          double row = c >= 0 && c < width ? tr->knot[s].slot_row[r * width + c] : 0;
+          double row = t < tr->nknot ? 0 : tr->knot[s].slot_step[r];
+          for (int c = 0; c < 3; c++)
+            if (cav_transcription_block(tr, s, c) == t - 1) row = tr->knot[s].slot_row[r * width + c * m->nv + d];
           worst = fmax(worst, fabs(slope - row) / fmax(1, fabs(row)));
         }
     }
@@ -258,25 +290,95 @@ static void test_threads(const cav_problem *p, cav_transcription *one, cav_traje
   cav_transcription_free(two);
 }
 
-static void test_scene(const char *scene, int close_at_rest, cav_order order) {
+/// Solutions and products of normal equations against those of the dense matrix that their entries make.
+static void test_normal(cav_transcription *tr, cav_trajectory *at) {
+  cav_normal *normal = cav_normal_new(tr);
+  int n = cav_transcription_unknowns(tr), entries = cav_normal_entries(normal, NULL, NULL, NULL);
+  size_t square = (size_t)n * n;
+  double *dense = calloc(square, sizeof(double)), *summed = calloc(square, sizeof(double)), worst = 0, largest = 0;
+  double *x = scene_vector(n), *b = scene_vector(n), *product = scene_vector(n), *value = scene_vector(entries);
+  int *row = calloc((size_t)entries, sizeof(int)), *column = calloc((size_t)entries, sizeof(int)), nv = tr->nv;
+  CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
+  cav_normal_gather(normal, tr);
+  cav_normal_entries(normal, row, column, value);
+  for (int k = 0; k < entries; k++) {
+    CHECK(row[k] >= column[k] && (k == 0 || column[k] > column[k - 1] || row[k] > row[k - 1]));
+    dense[row[k] * n + column[k]] = dense[column[k] * n + row[k]] = value[k];
+  }
+  // the sum over knots, made here
+  for (int t = 0; t < tr->nknot; t++) {
+    for (int r = 0; r < 3 * nv; r++)
+      for (int c = 0; c < 3 * nv; c++) {
+        int i = cav_transcription_block(tr, t, r / nv), j = cav_transcription_block(tr, t, c / nv);
+        int low = r > c ? c : r, high = r > c ? r : c;
+        if (i < 0 || j < 0) continue;
+        summed[(i * nv + r % nv) * n + j * nv + c % nv] += tr->knot[t].hessian[high * 3 * nv + low];
+      }
+    for (int c = 0; c < 3 * nv && tr->free_step; c++) {
+      int i = cav_transcription_block(tr, t, c / nv);
+      if (i < 0) continue;
+      summed[(i * nv + c % nv) * n + n - 1] += tr->knot[t].step_row[c];
+      summed[(n - 1) * n + i * nv + c % nv] += tr->knot[t].step_row[c];
+    }
+    if (tr->free_step) summed[square - 1] += tr->knot[t].step_square;
+  }
+  for (size_t i = 0; i < square; i++) {
+    worst = fmax(worst, fabs(summed[i] - dense[i]));
+    largest = fmax(largest, fabs(dense[i]));
+  }
+  CHECK(worst < 1e-12 * largest);
+  scene_normals(x, n, 1);
+  cav_normal_multiply(normal, x, product);
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < n; j++) b[i] += dense[(size_t)i * n + j] * x[j];
+  double off = scene_error(product, b, n);
+  CHECK(off < 1e-13);
+  // what was multiplied is found again, with the shift that the factor has on its diagonal
+  const double shift = 0.1, *diagonal = cav_normal_diagonal(normal);
+  CHECK(cav_normal_factor(normal, shift) == CAV_OK);
+  for (int i = 0; i < n; i++) b[i] += (diagonal[i] > 0 ? shift * diagonal[i] : 1) * x[i];
+  cav_normal_solve(normal, b, product);
+  double wrong = scene_error(product, x, n);
+  printf("normal equations: %d unknowns, product off by %.2g, solution by %.2g\n", n, off, wrong);
+  CHECK(wrong < 1e-9);
+  cav_normal_free(normal);
+  free(dense), free(summed), free(x), free(b), free(product), free(value), free(row), free(column);
+}
+
+/// How a scene is to be closed.
+typedef struct closing {
+  int at_rest, free_step;
+  cav_cycle cycle;
+} closing;
+
+static void test_scene(const char *scene, closing close, cav_order order) {
   cav_model *m = scene_load(scene);
   if (!CHECK(m != NULL)) return;
   cav_term term[24];
   double v_start[64] = {0}, q_start[64], q_goal[64];
   cav_problem p = cav_problem_default(m);
   p.order = order;
-  p.close_at_rest = close_at_rest;
+  p.close_at_rest = close.at_rest;
+  p.cycle = close.cycle;
   p.duration = 0.15;
+  if (close.free_step) p.duration_least = 0.1, p.duration_most = 0.3, p.duration_weight = 700;
   memcpy(q_start, m->q0, (size_t)m->nq * sizeof(double));
   memcpy(q_goal, m->q0, (size_t)m->nq * sizeof(double));
   for (int d = 0; d < m->nv; d++) v_start[d] = 0.3 * scene_uniform();
   p.q_start = q_start, p.q_goal = q_goal, p.v_start = v_start;
   p.nterm = fill_terms(m, &p, term);
   p.term = term;
-  cav_transcription *tr = cav_transcription_new(&p, 1, NULL);
+  cav_error error = {0};
+  cav_transcription *tr = cav_transcription_new(&p, 1, &error);
+  if (!CHECK(tr != NULL)) {
+    fprintf(stderr, "    %s\n", error.text);
+    cav_model_free(m);
+    return;
+  }
   cav_trajectory *at = cav_trajectory_new(m, tr->nknot, p.timestep);
   memcpy(at->v, v_start, (size_t)m->nv * sizeof(double));
   shake(at, m, 0.05);
+  close_cycle(tr, at);
   tr->options.stabilisation = CAV_STABILISATION_DISCRETE;
   tr->options.softness = 0.5;
   tr->options.smoothing = 0.03;
@@ -288,6 +390,7 @@ static void test_scene(const char *scene, int close_at_rest, cav_order order) {
   if (!cav_derivatives_missing(m)) test_methods(tr, at);
   test_controls(tr, at);
   test_threads(&p, tr, at);
+  test_normal(tr, at);
   test_rows(tr, at, 60);
   cav_trajectory_free(at);
   cav_transcription_free(tr);
@@ -342,11 +445,20 @@ static void test_refusals(void) {
 int main(void) {
   test_turns();
   test_refusals();
-  test_scene(walker, 1, CAV_ORDER_MIDPOINT);
-  test_scene(walker, 0, CAV_ORDER_MIDPOINT);
-  test_scene(walker, 1, CAV_ORDER_EULER);
-  test_scene(roped, 1, CAV_ORDER_MIDPOINT);
-  test_scene(served, 1, CAV_ORDER_MIDPOINT);
-  test_scene(served, 0, CAV_ORDER_EULER);
+  const closing rest = {.at_rest = 1}, open = {0}, timed = {.at_rest = 1, .free_step = 1}, adrift = {.free_step = 1};
+  const closing moved = {.cycle = {.on = 1, .translation = {0.2, 0.1, 0}}};
+  const closing turned = {.free_step = 1, .cycle = {.on = 1, .translation = {0.2, 0, 0}, .turn = 0.4}};
+  const closing mirrored = {.free_step = 1, .cycle = {.on = 1, .translation = {0.2, 0, 0}, .mirror = CAV_MIRROR_Y}};
+  test_scene(walker, rest, CAV_ORDER_MIDPOINT);
+  test_scene(walker, open, CAV_ORDER_MIDPOINT);
+  test_scene(walker, rest, CAV_ORDER_EULER);
+  test_scene(roped, rest, CAV_ORDER_MIDPOINT);
+  test_scene(served, rest, CAV_ORDER_MIDPOINT);
+  test_scene(served, open, CAV_ORDER_EULER);
+  test_scene(walker, timed, CAV_ORDER_MIDPOINT);
+  test_scene(served, adrift, CAV_ORDER_EULER);
+  test_scene(walker, moved, CAV_ORDER_MIDPOINT);
+  test_scene(roped, turned, CAV_ORDER_MIDPOINT);
+  test_scene(sided, mirrored, CAV_ORDER_MIDPOINT);
   return check_result();
 }

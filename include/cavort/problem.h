@@ -66,6 +66,20 @@ typedef struct cav_swing {
   double phase;     ///< rad
 } cav_swing;
 
+/// Axis that a cycle reflects.
+typedef enum cav_mirror { CAV_MIRROR_NONE, CAV_MIRROR_X, CAV_MIRROR_Y } cav_mirror;
+
+/// A motion without start and end: the last knot is the first one moved, and so are their velocities. With a mirror the horizon is
+/// half a stride, and the second half is the first one reflected, left for right.
+typedef struct cav_cycle {
+  int on;                ///< 0: the motion has a start and an end
+  double translation[3]; ///< m, from one period to the next, of all that floats or slides
+  double turn;           ///< rad about the vertical through the first free joint of q_start, before the translation
+  cav_mirror mirror;     ///< in the origin of the world, before the translation; excludes a turn
+  int npair;             ///< counterparts that names do not tell
+  const int (*pair)[2];  ///< [npair] joints
+} cav_cycle;
+
 typedef enum cav_guess { CAV_GUESS_HOLD, CAV_GUESS_INTERPOLATE } cav_guess;
 
 /// A posture that the guess passes.
@@ -103,9 +117,14 @@ typedef struct cav_problem {
   double duration, timestep; ///< s; knots are round(duration/timestep) + 1
   cav_order order;
   int close_at_rest; ///< 1: v after the last knot is zero, with rows there; 0: no rows at the last knot
-  double *q_start;   ///< [nq]
-  double *v_start;   ///< [nv]
-  double *q_goal;    ///< [nq] goal posture of the guess and of configuration terms without a target
+  /// Free duration: the step is an unknown, the same for all knots, between these; both 0: duration is what it is. Times
+  /// of windows and waypoints stay shares of duration.
+  double duration_least, duration_most;
+  double duration_weight; ///< cost weight/2 * (duration in s)^2 where the duration is free
+  cav_cycle cycle;        ///< where on: close_at_rest and v_start do not count, and q_start is where the guess starts
+  double *q_start;        ///< [nq]
+  double *v_start;        ///< [nv]
+  double *q_goal;         ///< [nq] goal posture of the guess and of configuration terms without a target
   cav_guess guess;
   double guess_height;         ///< m: ballistic arc added to the guess over guess_from .. guess_to
   double guess_from, guess_to; ///< s

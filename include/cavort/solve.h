@@ -103,6 +103,7 @@ void cav_solution_free(cav_solution *solution);
 #define CAV_PROMISE_PENETRATION 0.01 ///< m
 #define CAV_PROMISE_MOMENTUM 0.01    ///< share of weight, root mean square
 #define CAV_PROMISE_STEP 1e-8        ///< rad or m
+#define CAV_PROMISE_WRAP 1e-9        ///< m, rad, and these per step
 
 /// What verification found; from the knots alone, with code apart from the optimiser's. optimisation.md, 6.
 /// optimality, solve_seconds and iterations are the solver's: cav_verify leaves them as they are.
@@ -123,7 +124,9 @@ typedef struct cav_verdict {
       closed_loop_seconds; ///< how long the closed loop at a tenth of the step follows (all links within 0.5 m, roots 1 rad)
   double closed_loop_end_error_m;                        ///< largest distance of a body's centre of mass at the end
   double own_contacts_seconds, own_contacts_end_error_m; ///< the same under the contacts of the model's file
-  double duration, solve_seconds;
+  double wrap_error; ///< cycles: how far the last knot is from the first one moved, m, rad, or their rates; else 0
+  int periods;       ///< that the closed loop ran for: 1, of cycles more
+  double duration, solve_seconds; ///< duration: of one period
   int iterations;
   char reason[400]; ///< why not certified: the first condition missed; "" if certified
 } cav_verdict;
