@@ -17,6 +17,10 @@ static const double SMOOTH_REACH = 12;
 // fastest approach to a limit met without a jump, rad/s or m/s
 static const double LIMIT_SPEED = 20;
 
+// contacts of the smoothed law: share of their reach over which they fade out at its end, share of the radii of round geoms
+// over which they fade out where axes meet, and the least that is left
+static const double FADING = 0.3, CORE = 0.5, SHARE_MIN = 1e-12;
+
 static double larger(double a, double b) { return a > b ? a : b; }
 
 static double clamp(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
@@ -245,10 +249,42 @@ cav_status cav_rows(const cav_model *model, cav_state *state) {
   return status ? status : add_limits(model, state);
 }
 
+// 0 below 0, 1 above 1, with no slope at either, and the rate of its logarithm
+static double rise(double x, double *rate) {
+  *rate = x > 0 && x < 1 ? 6 * (1 - x) / (x * (3 - 2 * x)) : 0;
+  return x <= 0 ? 0 : x >= 1 ? 1 : x * x * (3 - 2 * x);
+}
+
+// distance between the axes of two round geoms at which they touch; 0: one of them is not round
+static double round_thickness(const cav_model *model, const cav_pair *pair) {
+  const cav_geom *geom[2] = {&model->geom[pair->geom1], &model->geom[pair->geom2]};
+  double sum = 0;
+  for (int k = 0; k < 2; k++) {
+    if (geom[k]->type != CAV_GEOM_SPHERE && geom[k]->type != CAV_GEOM_CAPSULE) return 0;
+    sum += geom[k]->size[0];
+  }
+  return sum;
+}
+
+double cav_contact_share(const cav_state *state, const cav_contact *c, double *rate) {
+  const cav_pair *pair = &state->model->pair[c->pair];
+  double share = pair->same_world ? 1 : state->options.self_share, slope;
+  *rate = 0;
+  if (!(state->options.smoothing > 0)) return share;
+  double reach = cav_reach(state, pair), width = FADING * reach;
+  share *= larger(SHARE_MIN, rise((reach - c->dist) / width, &slope));
+  *rate = -slope / width;
+  double thickness = round_thickness(state->model, pair), core = CORE * thickness;
+  if (!(thickness > 0)) return share;
+  share *= larger(SHARE_MIN, rise((c->dist + thickness) / core, &slope));
+  *rate += slope / core;
+  return share;
+}
+
 // R of the friction rows so that R_j mu_j^2 is the same for all (22); all rows share the damping
 static void soften_contact(cav_state *state, cav_contact *c, double inverse_impratio) {
   const cav_pair *pair = &state->model->pair[c->pair];
-  double weight = pair->same_world ? pair->weight[0] : pair->weight[0] / state->options.self_share;
+  double rate, weight = pair->weight[0] / cav_contact_share(state, c, &rate);
   cav_law l = row_law(state, &pair->softness, c->dist - c->margin, weight);
   c->stiffness = l.stiffness;
   c->sigma = smoothing_scale(&l, pair->same_world ? state->options.smoothing : self_smoothing(state));

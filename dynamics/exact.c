@@ -150,8 +150,8 @@ static double regulariser_of(const cav_state *state, const cav_block *block, int
 
 // by how much more than by its softness an object's R was raised
 static double eased(const cav_state *state, const cav_block *block) {
-  if (block->contact < 0 || state->model->pair[state->contact[block->contact].pair].same_world) return 1;
-  return 1 / state->options.self_share;
+  double rate;
+  return block->contact < 0 ? 1 : 1 / cav_contact_share(state, &state->contact[block->contact], &rate);
 }
 
 // (I + R A^+) diag(1/(1 + epsilon)); epsilon = R/weight of a block's first row is the one that h B and h K were made with.

@@ -215,7 +215,7 @@ typedef struct law_slope {
 
 static void differentiate_law(const cav_model *model, const cav_state *state, const cav_contact *c, double *H,
                               law_slope *law) {
-  double z[6], g[6], f[6], reaction[6], regulariser, stiffness;
+  double z[6], g[6], f[6], reaction[6], regulariser, stiffness, share;
   for (int k = 0; k < c->dim; k++) {
     z[k] = (1 - c->damping[k]) * c->velocity[k] - c->velocity_next[k];
     if (k == 0) z[k] -= c->stiffness * (c->dist - c->margin);
@@ -223,6 +223,8 @@ static void differentiate_law(const cav_model *model, const cav_state *state, co
   }
   cav_cone(c->dim, c->regulariser, c->friction, c->sigma, g, f, H, NULL);
   cav_law_rates(state, &model->pair[c->pair].softness, c->dist - c->margin, &regulariser, &stiffness);
+  cav_contact_share(state, c, &share);
+  regulariser -= share;
   double target = -c->stiffness * (1 + stiffness * (c->dist - c->margin));
   for (int i = 0; i < c->dim; i++) {
     reaction[i] = 0;
