@@ -7,8 +7,11 @@
 #include <string.h>
 #include <time.h>
 
-/// Weights of ranges while they are only priced; rows are scaled, so these serve all models.
-static const cav_penalties priced = {.effort = 100, .range = 1000, .term = 100};
+/// Weights of rows while they are only priced, at the first stage; they end a hundred times higher. Rows are scaled, so these
+/// serve all models. Ranges are dear from the start: a motion that leans on a limit, whose force is free, would have to be
+/// found anew where the limit takes it away, and rows of ranges are all but linear, so a high price costs nothing.
+static const cav_penalties priced = {.effort = 100, .range = 1e4, .term = 100};
+enum { PRICE_RISE = 100 };
 
 /// Augmented Lagrangian: rounds, iterations a round, tolerance of a round, and the unactuated force from which restoration is safe.
 enum { ROUNDS = 6, ROUND_ITERATIONS = 15 };
@@ -46,10 +49,10 @@ void cav_stage_set(const cav_problem *problem, int s, int n, cav_transcription *
   double x = n > 1 ? (double)s / (n - 1) : 1;
   cav_stage_law(problem, x, tr->h, &tr->options);
   tr->penalty = priced;
-  tr->penalty.effort = between(priced.effort, 100 * priced.effort, x);
-  tr->penalty.range = between(priced.range, 10 * priced.range, x);
+  tr->penalty.effort = between(priced.effort, PRICE_RISE * priced.effort, x);
+  tr->penalty.range = between(priced.range, PRICE_RISE * priced.range, x);
   tr->penalty.unactuated = between(a->penalty, b->penalty, fmin(2 * x, 1));
-  tr->penalty.term = between(priced.term, 100 * priced.term, fmin(2 * x, 1));
+  tr->penalty.term = between(priced.term, PRICE_RISE * priced.term, fmin(2 * x, 1));
 }
 
 int cav_run_report(void *context, double step, double radius) {

@@ -29,7 +29,7 @@ static const cav_term default_term[] = {
     {.name = "gap", .quantity = CAV_QUANTITY_GAP, .weight = 1000},
     {.name = "slip", .quantity = CAV_QUANTITY_SLIP, .weight = 50},
     {.name = "impact", .quantity = CAV_QUANTITY_IMPACT, .weight = 10},
-    {.name = "overlap", .quantity = CAV_QUANTITY_OVERLAP, .weight = 1e4},
+    {.name = "overlap", .quantity = CAV_QUANTITY_OVERLAP, .weight = 1e6},
 };
 
 int cav_problem_default_terms(cav_term *term, int most) {
