@@ -340,6 +340,8 @@ static cav_status conclude(const program *p, enum ApplicationReturnStatus code, 
   if (p->interrupted) return CAV_INTERRUPTED;
   for (size_t i = 0; i < sizeof meaning / sizeof *meaning; i++) {
     if (meaning[i].code != code) continue;
+    // an iterate whose rows hold and whose dual is noise is a solution, however Ipopt went on from there
+    if (meaning[i].status == CAV_NOT_CONVERGED && p->best_error <= 1 && p->best_iteration >= 0) return CAV_OK;
     if (error && meaning[i].status != CAV_OK) {
       *error = (cav_error){.status = meaning[i].status};
       // where it ended, what is kept instead, and whether it is the derivatives' noise that keeps the dual up
@@ -407,10 +409,11 @@ cav_status cav_ipopt(cav_solve_run *run, cav_error *error) {
   }
   SetIntermediateCallback(nlp, progress);
   price(&p, multiplier, 0);
-  status =
-      conclude(&p, IpoptSolve(nlp, start, NULL, NULL, multiplier, multiplier + p.m, multiplier + p.m + p.n, &p), error);
-  // one that failed or was stopped gives its best, with the multipliers that it started from
-  int best = status != CAV_OK && p.best_iteration >= 0;
+  enum ApplicationReturnStatus code =
+      IpoptSolve(nlp, start, NULL, NULL, multiplier, multiplier + p.m, multiplier + p.m + p.n, &p);
+  status = conclude(&p, code, error);
+  // one that failed or was stopped gives its best iterate, with the multipliers that it started from
+  int best = code != Solve_Succeeded && code != Solved_To_Acceptable_Level && p.best_iteration >= 0;
   if (!best) price(&p, multiplier, 1);
   cav_transcription_move(tr, p.anchor, best ? p.best_x : start, run->at);
 end:
