@@ -230,6 +230,17 @@ static int capsule_capsule(const cav_shape *a, const cav_shape *b, double margin
   return count;
 }
 
+// few and mostly in order
+static void sort(cav_touch *touch, int count) {
+  for (int i = 1; i < count; i++) {
+    for (int k = i; k > 0 && touch[k].feature < touch[k - 1].feature; k--) {
+      cav_touch later = touch[k - 1];
+      touch[k - 1] = touch[k];
+      touch[k] = later;
+    }
+  }
+}
+
 // the last two columns of every row
 #define MESH cav_collide_polytope, cav_collide_hfield
 
@@ -247,5 +258,7 @@ int cav_collide_shapes(const cav_shape *a, const cav_shape *b, double margin, ca
       {NULL, NULL, NULL, NULL, NULL, NULL, MESH},
       {NULL}};
   routine *collide = table[a->type][b->type];
-  return collide ? collide(a, b, margin, touch) : 0;
+  int count = collide ? collide(a, b, margin, touch) : 0;
+  sort(touch, count);
+  return count;
 }

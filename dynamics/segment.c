@@ -5,6 +5,10 @@
 /// segment is the normal of the edge contact. A capsule that lies along a face, a side or an edge has a second point,
 /// at the other end of the part above that feature; it exists by its own gap, so no test of parallelism decides. A
 /// segment deep inside a solid leaves by its deepest point, which need not be the least translation.
+/// On a box there are always two points, which move with the pose and never come or go: the lowest, and one that lies at the
+/// other end of the part above the feature where the capsule lies flat and draws near to the lowest the more it tilts. The
+/// part widens with the tilt of the normal, so that a foot may leave a face over its edge without a jump of force; an
+/// optimiser that looks ahead of contact needs that.
 #include "pairs.h"
 
 /// The segment in the solid's axes.
@@ -116,16 +120,11 @@ static void clip_disk(const segment *g, double *low, double *high) {
   *high = fmin(*high, (-b + sqrt(disc)) / a);
 }
 
-// part of the segment above the feature (face, edge, side, cap) whose normal is n
-static void clip_feature(const segment *g, const double n[3], double *low, double *high) {
+// part of the segment above a cylinder's side or cap whose normal is n
+static void clip_cylinder(const segment *g, const double n[3], double *low, double *high) {
   *low = -1;
   *high = 1;
-  if (g->type == CAV_GEOM_BOX) {
-    for (int i = 0; i < 3; i++) {
-      // across the normal; a face normal is cut by 2 slabs, one of an edge by 1
-      if (fabs(n[i]) < 0.5) clip_slab(g->centre[i], g->half[i], g->size[i], low, high);
-    }
-  } else if (fabs(n[2]) < 0.5) {
+  if (fabs(n[2]) < 0.5) {
     clip_slab(g->centre[2], g->half[2], g->size[1], low, high);
   } else {
     clip_disk(g, low, high);
@@ -172,6 +171,53 @@ static int touch_at(const cav_shape *a, const cav_shape *b, const segment *g, do
   return 1;
 }
 
+// part of the segment above the face, edge or corner of a box around its lowest point: between the faces across the normal,
+// which recede as the normal turns to them
+static void clip_box(const segment *g, const lowest *best, double *low, double *high) {
+  double room = norm3(g->half) + fmax(best->height, 0);
+  *low = -1;
+  *high = 1;
+  for (int i = 0; i < 3; i++) {
+    double n = fabs(best->normal[i]);
+    if (n < 0.5) clip_slab(g->centre[i], g->half[i], g->size[i] + n * room / (1 - 2 * n), low, high);
+  }
+  *low = fmin(*low, best->t);
+  *high = fmax(*high, best->t);
+}
+
+// how far the second point goes from the lowest towards an end of the part: all the way where the segment lies flat, nowhere
+// where it rises steeper than FLAT
+static double draw(const segment *g, const lowest *best, double end) {
+  static const double FLAT = 0.5; // sine
+  double length = fabs(end - best->t) * norm3(g->half), normal[3];
+  if (length == 0) return 0;
+  double s = (height_along(g, end, best->normal, normal) - best->height) / (length * FLAT), share = fmax(1 - s * s, 0);
+  return share * share * (end - best->t);
+}
+
+static int collide_box(const cav_shape *a, const cav_shape *b, const segment *g, const lowest *best, double margin,
+                       cav_touch *touch) {
+  lowest first = *best, second;
+  double end[2], normal[3], flat = 1e-12 * (norm3(g->half) + a->size[0]);
+  clip_box(g, best, &end[0], &end[1]);
+  second.t = best->t + draw(g, best, end[0]) + draw(g, best, end[1]);
+  for (int k = 0; k < 2; k++) {
+    // anywhere along it is as low: it rests on both ends
+    double height = height_along(g, end[k], best->normal, normal);
+    if (end[k] == best->t || height - best->height > flat) continue;
+    first = (lowest){.t = end[k], .height = height};
+    copy3(first.normal, normal);
+    second.t = end[k] + draw(g, &first, end[!k]);
+    break;
+  }
+  second.height = first.height;
+  copy3(second.normal, first.normal);
+  if (second.t != first.t) second.height = height_along(g, second.t, first.normal, second.normal);
+  int late = first.t > second.t;
+  int count = touch_at(a, b, g, first.t, first.height, first.normal, margin, late, touch);
+  return count + touch_at(a, b, g, second.t, second.height, second.normal, margin, !late, touch + count);
+}
+
 int cav_collide_segment(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
   segment g = {.type = b->type, .size = b->size};
   g.surface = b->type == CAV_GEOM_BOX        ? cav_surface_box
@@ -190,10 +236,11 @@ int cav_collide_segment(const cav_shape *a, const cav_shape *b, double margin, c
   if (b->type == CAV_GEOM_ELLIPSOID) {
     return touch_at(a, b, &g, first.t, first.height, first.normal, margin, 0, touch);
   }
+  if (b->type == CAV_GEOM_BOX) return collide_box(a, b, &g, &first, margin, touch);
 
   // two points where a part of the segment runs above one feature; a flat one rests on both its ends
   double low, high, normal[3], flat = 1e-12 * (norm3(g.half) + a->size[0]);
-  clip_feature(&g, first.normal, &low, &high);
+  clip_cylinder(&g, first.normal, &low, &high);
   if (high <= low) { return touch_at(a, b, &g, first.t, first.height, first.normal, margin, first.t > 0, touch); }
   double ends[2] = {low, high};
   for (int k = 0; k < 2; k++) {

@@ -34,7 +34,8 @@ static inline cav_shape cav_shape_of(const cav_model *model, const cav_geom *geo
   return shape;
 }
 
-/// All contact points of two shapes with dist < margin; a->type <= b->type. Returns their number, at most CAV_TOUCH_MAX.
+/// All contact points of two shapes with dist < margin; a->type <= b->type, in the order of their features. Returns their
+/// number, at most CAV_TOUCH_MAX.
 /// pairs.c: table over types; exact routines where they exist, convex.c (libccd) for the rest.
 int cav_collide_shapes(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
