@@ -800,21 +800,26 @@ static void fill_sensors(builder *b) {
   }
 }
 
+// keyframes are of the model's own coordinates; those of a scene come after them and stay where they stand
 static void fill_keys(builder *b) {
   cav_spec *spec = b->spec;
   const cav_model *m = b->model;
   double *at = b->keys;
+  int nq = m->nq, nv = m->nv;
+  for (int k = m->njoint - 1; k >= 0 && spec->joint.at[k].body >= spec->own_bodies; k--)
+    nq = b->joint[k].q, nv = b->joint[k].dof;
   for (int i = 0; i < m->nkey; i++) {
     const cav_spec_key *s = &spec->key.at[i];
-    if (s->nq && s->nq != m->nq)
-      cav_spec_fail(spec, s->node, "qpos", "expected %d numbers, one per coordinate, got %d", m->nq, s->nq);
-    if (s->nv && s->nv != m->nv)
-      cav_spec_fail(spec, s->node, "qvel", "expected %d numbers, one per degree of freedom, got %d", m->nv, s->nv);
+    if (s->nq && s->nq != nq)
+      cav_spec_fail(spec, s->node, "qpos", "expected %d numbers, one per coordinate, got %d", nq, s->nq);
+    if (s->nv && s->nv != nv)
+      cav_spec_fail(spec, s->node, "qvel", "expected %d numbers, one per degree of freedom, got %d", nv, s->nv);
     if (!running(b)) return;
     double *q = at, *v = at + m->nq;
     at += m->nq + m->nv;
-    memcpy(q, s->nq ? s->q : b->q0, (size_t)m->nq * sizeof *q);
-    if (s->nv) memcpy(v, s->v, (size_t)m->nv * sizeof *v);
+    memcpy(q, b->q0, (size_t)m->nq * sizeof *q);
+    if (s->nq) memcpy(q, s->q, (size_t)nq * sizeof *q);
+    if (s->nv) memcpy(v, s->v, (size_t)nv * sizeof *v);
     for (int k = 0; k < m->njoint; k++) {
       const cav_joint *j = &b->joint[k];
       if (j->type == CAV_JOINT_FREE) quat_normalise(q + j->q + 3);

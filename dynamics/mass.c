@@ -220,13 +220,14 @@ void cav_spec_masses(cav_spec *spec) {
     cav_spec_body *b = &spec->body.at[i];
     if (!b->has_inertial) b->inertia.quat[0] = 1;
     if (b->has_full) cav_principal_axes(b->full, b->inertia.quat, b->inertia.moment);
-    if (c->from_geoms == 1 || (c->from_geoms == 2 && !b->has_inertial)) weigh_by_geoms(spec, b);
+    int own = i < spec->own_bodies;
+    if ((own && c->from_geoms == 1) || ((!own || c->from_geoms == 2) && !b->has_inertial)) weigh_by_geoms(spec, b);
     check_inertia(spec, b);
-    total += b->inertia.mass;
+    if (own) total += b->inertia.mass;
   }
-  // all that is not the world scaled to the total asked for
+  // all of the model that is not the world scaled to the total asked for
   if (!(c->total_mass > 0) || !(total > 0)) return;
-  for (int i = 1; i < spec->body.n; i++) {
+  for (int i = 1; i < spec->own_bodies; i++) {
     cav_spec_inertia *n = &spec->body.at[i].inertia;
     n->mass *= c->total_mass / total;
     scale3(n->moment, c->total_mass / total, n->moment);

@@ -581,7 +581,34 @@ static void read_world(reader *r, const cav_xml_node *root) {
       else
         read_bodies(r, c, &at);
     }
+    if (pass == 0 && spec->body.n) cav_scene_objects(spec);
   }
+  cav_scene_bodies(spec);
+}
+
+// --- the scene ---
+
+// reads the scene by MJCF's own defaults, whatever the model's file says
+static void read_scene(cav_spec *spec, void (*read)(reader *, const cav_xml_node *, const place *)) {
+  if (!spec->scene || spec->status != CAV_OK) return;
+  reader r = {.spec = spec};
+  cav_spec_compiler compiler = spec->compiler;
+  spec->compiler.degree = 1;
+  memcpy(spec->compiler.euler, "xyz", 3);
+  defaults *first = CAV_SPEC_PUSH(spec, &r.classes);
+  if (first) {
+    *first = first_defaults();
+    read(&r, spec->scene, &(place){.quat = {1, 0, 0, 0}});
+  }
+  spec->compiler = compiler;
+  free(r.classes.at);
+}
+
+void cav_scene_objects(cav_spec *spec) { read_scene(spec, read_objects); }
+
+void cav_scene_bodies(cav_spec *spec) {
+  spec->own_bodies = spec->body.n;
+  read_scene(spec, read_bodies);
 }
 
 // --- contact, equality, tendon, actuator, sensor, keyframe ---

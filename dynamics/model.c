@@ -4,21 +4,17 @@
 #include <string.h>
 
 #include "cavort/model.h"
+#include "scene.h"
 #include "spec.h"
 
 cav_load_options cav_load_options_default(void) { return (cav_load_options){0}; }
 
-cav_model *cav_model_load(const char *path, cav_error *error) {
-  cav_load_options options = cav_load_options_default();
-  return cav_model_load_with(path, &options, error);
-}
-
-cav_model *cav_model_load_with(const char *path, const cav_load_options *options, cav_error *error) {
+static cav_model *load(const char *path, const cav_load_options *options, const cav_xml_node *scene, cav_error *error) {
   static const cav_xml_element *const roots[] = {&cav_mjcf_root, &cav_urdf_root, NULL};
   if (error) *error = (cav_error){.status = CAV_OK};
   cav_xml *xml = cav_xml_read(path, roots, error);
   if (!xml) return NULL;
-  cav_spec spec = {.xml = xml, .error = error, .load = *options};
+  cav_spec spec = {.xml = xml, .error = error, .load = *options, .scene = scene};
   if (cav_xml_root(xml)->rule == &cav_urdf_root)
     cav_urdf_read(&spec, xml);
   else
@@ -27,6 +23,20 @@ cav_model *cav_model_load_with(const char *path, const cav_load_options *options
   cav_spec_clear(&spec);
   cav_xml_free(xml);
   return model;
+}
+
+cav_model *cav_model_load(const char *path, cav_error *error) {
+  cav_load_options options = cav_load_options_default();
+  return load(path, &options, NULL, error);
+}
+
+cav_model *cav_model_load_with(const char *path, const cav_load_options *options, cav_error *error) {
+  return load(path, options, NULL, error);
+}
+
+cav_model *cav_model_load_scene(const char *path, const cav_xml_node *scene, cav_error *error) {
+  cav_load_options options = cav_load_options_default();
+  return load(path, &options, scene, error);
 }
 
 void cav_model_free(cav_model *model) { free(model); }

@@ -205,6 +205,8 @@ typedef struct cav_spec {
   cav_error *error;
   cav_status status; ///< of the first failure; everything stops at it
   cav_load_options load;
+  const cav_xml_node *scene; ///< what is added to the world, NULL: nothing
+  int own_bodies;            ///< bodies before those of the scene, the world included
   cav_spec_compiler compiler;
   cav_spec_option option;
   CAV_SPEC_LIST(cav_spec_body) body;
@@ -271,6 +273,11 @@ extern const cav_xml_element cav_mjcf_root, cav_mjcf_extension;
 
 /// Fills spec from a checked tree. mjcf.c.
 void cav_mjcf_read(cav_spec *spec, const cav_xml *xml);
+
+/// Adds the scene's objects that stand in the world, with what the world has of its own; then its bodies, after all others.
+/// mjcf.c.
+void cav_scene_objects(cav_spec *spec);
+void cav_scene_bodies(cav_spec *spec);
 
 /// What MJCF sets before a file says anything, and what a file's compiler and option elements say. mjcf.c.
 void cav_mjcf_first_options(cav_spec *spec);

@@ -576,6 +576,7 @@ void cav_urdf_read(cav_spec *spec, const cav_xml *xml) {
   if (world)
     *world = (cav_spec_body){
         .name = "world", .node = root, .parent = -1, .quat = {1, 0, 0, 0}, .inertia.quat = {1, 0, 0, 0}};
+  cav_scene_objects(spec);
   if (is_small(spec, root)) collect_links(&r, root);
   if (spec->status == CAV_OK) collect_joints(&r, root);
   int first = spec->status == CAV_OK ? find_root(&r, root) : -1;
@@ -583,6 +584,7 @@ void cav_urdf_read(cav_spec *spec, const cav_xml *xml) {
   if (first >= 0 && spec->status == CAV_OK && spec->body.n - (strcmp(r.parts.at[first].name, "world") != 0) < r.parts.n)
     cav_spec_fail(spec, root, NULL, "some links carry each other in a circle, apart from the root; connect them to it");
   if (spec->status == CAV_OK) settle_names(spec);
+  cav_scene_bodies(spec);
   if (r.velocities && spec->status == CAV_OK)
     cav_spec_warn(spec, root, NULL, "left aside: the velocity limits of %d joints", r.velocities);
   if (spec->status == CAV_OK) warn_strangers(spec, root);

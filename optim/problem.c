@@ -15,6 +15,7 @@
 #include "file.h"
 #include "ipopt_options.h"
 #include "problem_file.h"
+#include "scene.h"
 
 static const double most_knots = 1e6;
 static const double whole_step = 1e-6; // of a step: how far the duration may be from a whole number of them
@@ -471,11 +472,15 @@ static cav_status load_model(cav_problem_reader *reader, const char *model_path)
   char *path = model_path ? strdup(model_path) : cav_file_beside(reader->path, named);
   if (!path) return cav_problem_no_memory(reader);
   cav_error inner = {0};
-  reader->owner->model = cav_model_load(path, &inner);
+  const cav_xml_node *scene = cav_problem_child(reader->root, "scene");
+  reader->owner->model = cav_model_load_scene(path, scene, &inner);
   reader->problem->model_path = cav_problem_text(reader->owner, path);
   free(path);
   if (!reader->owner->model) {
-    if (model_path) return cav_file_fail(reader->error, inner.status, inner.line, "%s", inner.text);
+    // a fault of the scene is in this file and says so
+    size_t length = strlen(reader->path);
+    int own = !strncmp(inner.text, reader->path, length) && inner.text[length] == ':';
+    if (model_path || own) return cav_file_fail(reader->error, inner.status, inner.line, "%s", inner.text);
     return cav_xml_fail_as(reader->error, inner.status, reader->root, "model", "%s", inner.text);
   }
   reader->model = reader->owner->model;
@@ -489,6 +494,9 @@ static cav_status read_problem(cav_problem_reader *reader, const char *model_pat
   if (status) return status;
   const char *path = reader->problem->model_path;
   *reader->problem = cav_problem_default(reader->model);
+  const cav_xml_node *scene = cav_problem_child(reader->root, "scene");
+  if (scene && !(reader->problem->scene = cav_problem_scene(reader->owner, scene)))
+    return cav_problem_no_memory(reader);
   reader->problem->owner = reader->owner;
   reader->problem->model_path = path;
   reader->problem->name = cav_problem_text(reader->owner, cav_xml_text(reader->root, "name", ""));

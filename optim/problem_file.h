@@ -59,6 +59,9 @@ cav_status cav_problem_pose(const cav_problem_reader *reader, const cav_xml_node
 /// Configuration of the keyframe or <pose> that attribute 'key' of node names.
 cav_status cav_problem_key(const cav_problem_reader *reader, const cav_xml_node *node, double *q);
 
+/// Text of the children of a <scene>, as it is written; NULL without memory. problem_write.c.
+char *cav_problem_scene(cav_problem_owner *owner, const cav_xml_node *scene);
+
 /// Window of attributes from, to, at: seconds or "end". Left as they are where the file gives none; to < 0: the end. It holds
 /// a knot. problem_term.c.
 cav_status cav_problem_window(const cav_problem_reader *reader, const cav_xml_node *node, double *from, double *to);

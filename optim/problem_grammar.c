@@ -2,6 +2,7 @@
 /// problem.c, problem_pose.c and problem_term.c; a table for people is in problems/README.md.
 #include "ipopt_options.h"
 #include "problem_file.h"
+#include "scene.h"
 
 // in the order of the enumerations of problem.h and model.h
 const char *const cav_problem_orders[] = {"euler", "midpoint", NULL};
@@ -80,11 +81,11 @@ static const char *const relations[] = {"none", "start", "goal", NULL};
 
 // postures
 static const cav_xml_element pose_root = {
-    "root", 0, 1, ATTRIBUTES(REALS("pos", 3, 3), REALS("quat", 4, 4), REALS("euler", 3, 3)), NULL, 0};
+    "root", 0, 0, ATTRIBUTES(TEXT("joint", 0), REALS("pos", 3, 3), REALS("quat", 4, 4), REALS("euler", 3, 3)), NULL, 0};
 static const cav_xml_element pose_joint = {
     "joint", 0, 0, ATTRIBUTES(TEXT("name", 1), REALS("pos", 1, 1), REALS("degrees", 1, 1), REALS("quat", 4, 4)),
     NULL,    0};
-#define POSE_SOURCE TEXT("key", 0), REALS("qpos", 1, 0), TEXT("file", 0), WORD("knot", ends), WORD("height", heights), \
+#define POSE_SOURCE TEXT("key", 0), REALS("qpos", 1, 0), TEXT("file", 0), WORD("knot", ends), WORD("height", heights), REAL("rise", 0), \
   WORD("ranges", clippings)
 static const cav_xml_element start = {
     "start", 1, 1, ATTRIBUTES(POSE_SOURCE, REALS("qvel", 1, 0)), CHILDREN(&pose_root, &pose_joint), 0};
@@ -189,6 +190,7 @@ const cav_xml_element cav_problem_element = {
     1,
     1,
     ATTRIBUTES(TEXT("name", 0), TEXT("model", 0)),
-    CHILDREN(&horizon, &cycle, &start, &goal, &pose, &guess, &cost, &constraint, &limits, &schedule, &ipopt, &contact),
+    CHILDREN(&cav_scene_element, &horizon, &cycle, &start, &goal, &pose, &guess, &cost, &constraint, &limits, &schedule, &ipopt,
+             &contact),
     0};
 // clang-format on

@@ -133,15 +133,27 @@ static void times(const double *a, const double *b, double *out) {
   out[0] = w, out[1] = x, out[2] = y, out[3] = z;
 }
 
-// position and orientation of the first free joint
-static cav_status lay_root(const cav_problem_reader *reader, const cav_xml_node *pose, double *q) {
-  const cav_xml_node *node = cav_problem_child(pose, "root");
-  if (!node) return CAV_OK;
+// the free joint that a <root> names, or the first; -1 and an error if it is none
+static int root_joint(const cav_problem_reader *reader, const cav_xml_node *node) {
   const cav_model *m = reader->model;
-  int j = 0;
-  while (j < m->njoint && m->joint[j].type != CAV_JOINT_FREE) j++;
-  if (j == m->njoint)
-    return cav_xml_fail(reader->error, node, NULL, "the model '%s' has no free joint; use <joint> instead", m->name);
+  if (cav_xml_get(node, "joint")) {
+    int j = cav_problem_find(reader, node, "joint", CAV_OBJECT_JOINT);
+    if (j < 0 || m->joint[j].type == CAV_JOINT_FREE) return j;
+    cav_xml_fail(reader->error, node, "joint", "joint '%s' is not free; use <joint>", m->joint[j].name);
+    return -1;
+  }
+  for (int j = 0; j < m->njoint; j++) {
+    if (m->joint[j].type == CAV_JOINT_FREE) return j;
+  }
+  cav_xml_fail(reader->error, node, NULL, "the model '%s' has no free joint; use <joint> instead", m->name);
+  return -1;
+}
+
+// position and orientation of a free joint
+static cav_status lay_root(const cav_problem_reader *reader, const cav_xml_node *node, double *q) {
+  const cav_model *m = reader->model;
+  int j = root_joint(reader, node);
+  if (j < 0) return CAV_BAD_INPUT;
   if (cav_xml_get(node, "quat") && cav_xml_get(node, "euler")) {
     return cav_xml_fail(reader->error, node, "euler", "contradicts attribute 'quat'; give one of the two");
   }
@@ -228,9 +240,9 @@ static int lifting(const cav_model *m, const cav_state *state, int root, double 
   return -1;
 }
 
-// moves one tree along its root until the lowest of its geoms that can touch a plane of the world touches it; returns whether
-// there is such a geom
-static int drop_tree(const cav_model *m, cav_state *state, int root, double *q) {
+// moves one tree along its root until the lowest of its geoms that can touch a plane of the world touches it, and higher by
+// rise; returns whether there is such a geom
+static int drop_tree(const cav_model *m, cav_state *state, int root, double rise, double *q) {
   double gain = 1, up = -INFINITY;
   int height = lifting(m, state, root, &gain);
   if (height < 0) return 0;
@@ -246,7 +258,7 @@ static int drop_tree(const cav_model *m, cav_state *state, int root, double *q) 
     up = fmax(up, -distance / n[2]);
   }
   if (isinf(up)) return 0;
-  q[height] += up / gain;
+  q[height] += (up + rise) / gain;
   return 1;
 }
 
@@ -258,7 +270,7 @@ static cav_status drop(const cav_problem_reader *reader, const cav_xml_node *nod
                            cav_status_name(status));
   int dropped = 0;
   for (int i = 1; i < m->nlink; i++) {
-    if (m->link[i].parent == 0) dropped += drop_tree(m, reader->state, i, q);
+    if (m->link[i].parent == 0) dropped += drop_tree(m, reader->state, i, cav_xml_real(node, "rise", 0), q);
   }
   if (dropped) return CAV_OK;
   return cav_xml_fail(reader->error, node, "height",
@@ -280,11 +292,14 @@ static void clip(const cav_model *m, double *q) {
 static cav_status read_pose(const cav_problem_reader *reader, const cav_xml_node *node, int depth, double *q) {
   if (depth > DEEPEST) return cav_xml_fail(reader->error, node, "key", "poses name each other in a circle");
   cav_status status = read_base(reader, node, depth, q);
-  if (!status) status = lay_root(reader, node, q);
+  const cav_xml_node *root = cav_problem_child(node, "root");
+  for (; root && !status; root = cav_xml_next(root)) status = lay_root(reader, root, q);
   const cav_xml_node *joint = cav_problem_child(node, "joint");
   for (; joint && !status; joint = cav_xml_next(joint)) status = lay_joint(reader, joint, q);
   if (!status && cav_xml_word(node, "ranges", 0)) clip(reader->model, q);
   if (!status && cav_xml_word(node, "height", 0)) status = drop(reader, node, q);
+  if (!status && cav_xml_get(node, "rise") && !cav_xml_word(node, "height", 0))
+    status = cav_xml_fail(reader->error, node, "rise", "is counted from the floor; add height='floor'");
   return status;
 }
 

@@ -244,6 +244,26 @@ static void write_contact(FILE *out, const cav_options *o) {
   fputs("/>\n", out);
 }
 
+// an element of a scene, as it was read
+static void write_element(FILE *out, const cav_xml_node *node, int indent) {
+  fprintf(out, "%*s<%s", indent, "", node->rule->name);
+  for (int i = 0; i < node->nvalue; i++) write_text(out, node->value[i].rule->name, node->value[i].text);
+  fputs(node->child ? ">\n" : "/>\n", out);
+  for (const cav_xml_node *c = node->child; c; c = c->next) write_element(out, c, indent + 2);
+  if (node->child) fprintf(out, "%*s</%s>\n", indent, "", node->rule->name);
+}
+
+char *cav_problem_scene(cav_problem_owner *owner, const cav_xml_node *scene) {
+  char *text = NULL, *copy = NULL;
+  size_t size;
+  FILE *out = open_memstream(&text, &size);
+  if (!out) return NULL;
+  for (const cav_xml_node *c = scene->child; c; c = c->next) write_element(out, c, 4);
+  if (fclose(out) == 0) copy = cav_problem_text(owner, text);
+  free(text);
+  return copy;
+}
+
 static void write_guess(FILE *out, const cav_problem *p) {
   const cav_model *m = p->model;
   double turn[3];
@@ -296,7 +316,9 @@ static void write_head(FILE *out, const cav_problem *p, const char *model_path) 
   fputs("<problem", out);
   write_text(out, "name", p->name && *p->name ? p->name : "motion");
   write_text(out, "model", model_path);
-  fputs(">\n  <horizon", out);
+  fputs(">\n", out);
+  if (p->scene) fprintf(out, "  <scene>\n%s  </scene>\n", p->scene);
+  fputs("  <horizon", out);
   write_number(out, "duration", p->duration);
   write_number(out, "timestep", p->timestep);
   write_text(out, "order", cav_problem_orders[p->order]);

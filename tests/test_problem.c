@@ -11,12 +11,13 @@ static char folder[] = "/tmp/cavort-problem-XXXXXX";
 static char path[128], copy_path[128], csv_path[128];
 
 static const char hopper[] =
-    "<mujoco model='leg'><worldbody><geom name='floor' type='plane' size='1 1 1'/>"
+    "<mujoco model='leg'><compiler angle='radian' settotalmass='7'/><worldbody><geom name='floor' type='plane' size='1 "
+    "1 1'/>"
     "<body name='trunk' pos='0 0 1'><joint name='x' type='slide' axis='1 0 0'/><joint name='z' type='slide' axis='0 0 "
     "-1'/>"
     "<joint name='pitch' type='hinge' axis='0 1 0'/><geom name='trunk' type='box' size='.1 .1 .2'/><site name='eye' "
     "pos='.1 0 .1'/>"
-    "<body name='shin' pos='0 0 -.2'><joint name='knee' axis='0 1 0' limited='true' range='-90 10'/>"
+    "<body name='shin' pos='0 0 -.2'><joint name='knee' axis='0 1 0' limited='true' range='-1.57 .17'/>"
     "<geom name='shin' type='capsule' fromto='0 0 0 0 0 -.4' size='.05'/></body></body></worldbody>"
     "<actuator><motor name='knee' joint='knee' ctrllimited='true' ctrlrange='-50 50'/></actuator>"
     "<sensor><framepos name='eye' objtype='site' objname='eye'/><touch name='tap' site='eye' cutoff='5'/><clock "
@@ -28,6 +29,12 @@ static const char flyer[] =
     "<body name='trunk' pos='0 0 3'><freejoint name='root'/><geom name='trunk' type='ellipsoid' size='.3 .2 .1'/>"
     "<body name='arm' pos='.3 0 0'><joint name='shoulder' type='ball'/><geom name='arm' type='cylinder' size='.05 .2'/>"
     "</body></body></worldbody></mujoco>";
+
+static const char turntable[] =
+    "<robot name='r'><link name='base'><inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' "
+    "iyz='0'/></inertial></link><link name='arm'><inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' "
+    "ixz='0' iyz='0'/></inertial></link><joint name='turn' type='continuous'><parent link='base'/><child link='arm'/>"
+    "</joint></robot>";
 
 // words of the grammar in the order of the table
 static void check_sensor_names(void) {
@@ -169,6 +176,63 @@ static void check_postures(void) {
   CHECK_NEAR(2 * (x * z + w * y), sin(b), 1e-14);
   CHECK_NEAR(2 * (y * z - w * x), -sin(a) * cos(b), 1e-14);
   CHECK_NEAR(w * w + x * x + y * y + z * z, 1, 1e-15);
+  cav_problem_free(p);
+}
+
+static void check_same(const cav_problem *a, const cav_problem *b);
+
+#define SCENE                                                                                        \
+  "<scene>\n<geom name='step' type='box' pos='2 0 .1' size='.5 .5 .1'/>\n"                           \
+  "<frame pos='0 0 1'><body name='crate' pos='1 0 0' euler='0 0 90'><freejoint name='crate'/>"       \
+  "<geom name='crate' type='box' size='.1 .1 .1' mass='2'/></body></frame>\n"                        \
+  "<body name='door' pos='0 5 1'><joint name='door' type='hinge' range='0 90'/><geom type='sphere' " \
+  "size='.1'/></body></scene>\n"
+#define SCENE_HEAD \
+  "<problem name='p' model='leg.xml'>\n" SCENE "<horizon duration='1' timestep='.05'/>\n<start key='bent'/>\n"
+
+// bodies and geoms that the file puts into the model's world, after the model's own
+static void check_scene(void) {
+  cav_problem *p =
+      load(SCENE_HEAD
+           "<goal key='bent' height='floor' rise='.2'><root joint='crate' pos='3 4 5' euler='0 0 0'/></goal>\n" TAIL);
+  if (!p) return;
+  const cav_model *m = p->model;
+  CHECK(m->nbody == 5 && m->nq == 12 && m->nv == 11 && m->nkey == 1);
+  CHECK(cav_find(m, CAV_OBJECT_BODY, "crate") == 3 && cav_find(m, CAV_OBJECT_GEOM, "step") == 1);
+  CHECK(m->geom[1].link == 0 && m->npair > 4);
+  // the model's keyframe, and the scene where it stands; angles are degrees although the model's are radians
+  double start[12] = {0, 0, 0, -.5, 1, 0, 1, sqrt(.5), 0, 0, sqrt(.5), 0};
+  CHECK_NEAR_ALL(p->q_start, start, 12, 1e-15);
+  CHECK_NEAR(m->joint[cav_find(m, CAV_OBJECT_JOINT, "door")].range[1], M_PI / 2, 1e-15);
+  // what stands on the floor rises: lowest points .2 above it
+  CHECK_NEAR(lowest(m, p->q_goal), .2, 1e-12);
+  double crate[7] = {3, 4, .3, 1, 0, 0, 0};
+  CHECK_NEAR_ALL(p->q_goal + 4, crate, 7, 1e-15);
+  // a total mass is of the model's own bodies
+  CHECK_NEAR(m->mass - m->body[4].mass, 7 + 2, 1e-12);
+
+  cav_error error = {0};
+  CHECK(cav_problem_write(copy_path, p, NULL, &error) == CAV_OK);
+  cav_problem *q = cav_problem_load(copy_path, NULL, &error);
+  CHECK(q != NULL);
+  if (q) {
+    CHECK_TEXT(q->scene, p->scene);
+    CHECK(q->model->nq == 12 && q->model->npair == m->npair);
+    CHECK_NEAR_ALL(q->model->q0, m->q0, 12, 0);
+    check_same(p, q);
+  } else {
+    fprintf(stderr, "    %s\n", error.text);
+  }
+  cav_problem_free(q);
+  cav_problem_free(p);
+
+  // the same things in the world of a robot from URDF
+  char robot[160];
+  snprintf(robot, sizeof robot, "%s/robot.urdf", folder);
+  p = load_as("<problem name='p'>\n" SCENE "<horizon duration='1' timestep='.05'/>\n<start/>\n" TAIL, robot);
+  if (!p) return;
+  CHECK(p->model->nbody == 5 && p->model->nq == 1 + 7 + 1 && cav_find(p->model, CAV_OBJECT_GEOM, "step") == 0);
+  CHECK_NEAR_ALL(p->q_start + 1, start + 4, 7, 1e-15);
   cav_problem_free(p);
 }
 
@@ -418,6 +482,27 @@ static void check_broken_files(void) {
          4, "horizon");
 }
 
+static void refuse_scene(const char *element, const char *words) {
+  char text[2000];
+  snprintf(text, sizeof text,
+           "<problem model='leg.xml'>\n<scene>\n%s\n</scene>\n<horizon duration='1'/>\n<start/></problem>", element);
+  refuse(text, 3, words);
+}
+
+static void check_broken_scenes(void) {
+  refuse_scene("<gem/>", "did you mean <geom>");
+  refuse_scene("<geom type='box' size='.1'/>", "size");
+  refuse_scene("<geom name='shin' size='.1'/>", "is taken already");
+  refuse_scene("<geom class='hard' size='.1'/>", "no default class 'hard'");
+  refuse_scene("<geom material='wood' size='.1'/>", "no material 'wood'");
+  refuse_scene("<geom type='mesh' mesh='rock'/>", "rock");
+  refuse_scene("<body><freejoint/></body>", "mass");
+  refuse(HEAD "<goal><root pos='0 0 0'/></goal>\n" TAIL, 4, "no free joint");
+  refuse(SCENE_HEAD "<goal><root joint='crte'/></goal>\n" TAIL, 8, "did you mean 'crate'");
+  refuse(SCENE_HEAD "<goal><root joint='door'/></goal>\n" TAIL, 8, "is not free; use <joint>");
+  refuse(SCENE_HEAD "<goal rise='.2'/>\n" TAIL, 8, "add height='floor'");
+}
+
 static void check_broken_starts(void) {
   refuse_start("<start key='bend'/>", "did you mean 'bent'");
   refuse_start("<start qpos='1 2 3'/>", "expected 4 numbers");
@@ -542,21 +627,24 @@ int main(void) {
   snprintf(csv_path, sizeof csv_path, "%s/motion.csv", folder);
   write_in("leg.xml", hopper);
   write_in("flyer.xml", flyer);
+  write_in("robot.urdf", turntable);
   check_sensor_names();
   check_defaults();
   check_words();
   check_postures();
+  check_scene();
   check_trajectory_ends();
   check_costs();
   check_constraints();
   check_round_trip();
   check_broken_files();
+  check_broken_scenes();
   check_broken_starts();
   check_broken_terms();
   check_other_model();
   check_motions();
-  const char *made[] = {"problem.xml", "copy.xml", "motion.csv", "leg.xml", "flyer.xml"};
-  for (int i = 0; i < 5; i++) {
+  const char *made[] = {"problem.xml", "copy.xml", "motion.csv", "leg.xml", "flyer.xml", "robot.urdf"};
+  for (int i = 0; i < 6; i++) {
     char full[160];
     snprintf(full, sizeof full, "%s/%s", folder, made[i]);
     remove(full);

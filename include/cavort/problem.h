@@ -114,6 +114,8 @@ typedef struct cav_ipopt_option {
 typedef struct cav_problem {
   const char *name;
   const cav_model *model;
+  const char *
+      scene; ///< what the problem file added to the world of the model's file, as MJCF; the model has it. NULL: nothing
   double duration, timestep; ///< s; knots are round(duration/timestep) + 1
   cav_order order;
   int close_at_rest; ///< 1: v after the last knot is zero, with rows there; 0: no rows at the last knot
