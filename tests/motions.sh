@@ -49,7 +49,7 @@ row() {
   row hopper-hop dm_control/hopper.xml
   row walker-jump dm_control/walker.xml
   row cheetah-jump dm_control/cheetah.xml
-  for motion in jump kick reach get-up-back get-up-front walk; do
+  for motion in jump kick reach get-up-back get-up-front walk step-up; do
     row $motion
     row $motion mujoco/humanoid.xml
     row $motion dm_control/humanoid.xml
