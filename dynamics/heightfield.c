@@ -5,6 +5,7 @@
 /// surface about the point: walls between prisms, and edges that lie in a plane or a valley, push nothing sideways.
 /// Overlapping: the points of the shape over the triangle, each with its height over the triangle's plane; the way out is up.
 /// Points found by several prisms are one; of more than 8 the deepest is kept, then those furthest apart.
+/// A shape that sinks through the base is pushed up by its whole depth until it is below it altogether.
 /// Not done: what goes through the surface from below, or sideways through an outer wall deeper than its core, is pushed up.
 #include "gjk.h"
 #include "math3.h"
@@ -24,6 +25,7 @@ typedef struct field {
   const cav_shape *shape;
   const cav_hfield *h;
   double dx, dy, size;
+  double depth; ///< of the prisms: the base, or deeper where the other shape reaches through it
 } field;
 
 static void grid_point(const field *g, int r, int c, double x[3]) {
@@ -58,7 +60,7 @@ static void make_prism(const field *g, double top[3][3], prism *p) {
   static const int neighbour[18] = {1, 2, 3, 0, 2, 4, 0, 1, 5, 4, 5, 0, 3, 5, 1, 3, 4, 2};
   for (int k = 0; k < 3; k++) {
     copy3(p->vertex + 3 * k, top[k]);
-    set3(p->vertex + 9 + 3 * k, top[k][0], top[k][1], -g->h->base);
+    set3(p->vertex + 9 + 3 * k, top[k][0], top[k][1], -g->depth);
   }
   for (int f = 0; f < 5; f++) {
     const int *v = corner + face[f];
@@ -181,7 +183,7 @@ static int cells_between(double low, double high, double half, double step, int 
 
 int cav_collide_hfield(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
   const cav_hfield *h = b->hfield;
-  field g = {b, h, 2 * h->size[0] / (h->ncol - 1), 2 * h->size[1] / (h->nrow - 1), 0};
+  field g = {b, h, 2 * h->size[0] / (h->ncol - 1), 2 * h->size[1] / (h->nrow - 1), 0, 0};
   double low[3], high[3];
   g.size = g.dx + g.dy + h->base + h->top;
   for (int k = 0; k < 6; k++) {
@@ -198,6 +200,7 @@ int cav_collide_hfield(const cav_shape *a, const cav_shape *b, double margin, ca
   if (!cells_between(low[0], high[0], h->size[0], g.dx, h->ncol - 1, &c0, &c1)) return 0;
   if (!cells_between(low[1], high[1], h->size[1], g.dy, h->nrow - 1, &r0, &r1)) return 0;
   collection all;
+  g.depth = fmax(h->base, -low[2]);
   all.n = 0;
   all.alike = ALIKE * (g.dx + g.dy);
   for (int r = r0; r <= r1; r++) {
@@ -248,7 +251,7 @@ static void clip_ray(double p, double d, double low, double high, double *from, 
 }
 
 double cav_ray_hfield(const cav_hfield *h, const double p[3], const double d[3]) {
-  field g = {NULL, h, 2 * h->size[0] / (h->ncol - 1), 2 * h->size[1] / (h->nrow - 1), 0};
+  field g = {NULL, h, 2 * h->size[0] / (h->ncol - 1), 2 * h->size[1] / (h->nrow - 1), 0, 0};
   double from = 0, to = INFINITY, best = INFINITY, slack = 1e-9 * (h->top + h->base);
   clip_ray(p[0], d[0], -h->size[0], h->size[0], &from, &to);
   clip_ray(p[1], d[1], -h->size[1], h->size[1], &from, &to);

@@ -1,4 +1,5 @@
-/// Contacts of convex polyhedra: a mesh, or a prism of a height field, with sphere, capsule, ellipsoid, cylinder, box, mesh.
+/// Contacts of convex polyhedra: a mesh, or a prism of a height field, with sphere, capsule, ellipsoid, cylinder, box, mesh;
+/// and of a capsule whose segment is inside an ellipsoid, cylinder or box.
 ///
 /// gjk.c gives the direction in which the two bodies are furthest apart or least inside each other: to rounding for
 /// polyhedra; with an ellipsoid or a cylinder to about 1e-5, then made exact by the feature of the polyhedron that meets it:
@@ -256,13 +257,15 @@ static void try_crossing(const meeting *g, const outline *edge, candidate *best)
   keep(g, c, edge, y, best);
 }
 
-// the cap of a cylinder that faces along the direction, on a corner, an edge or a face
+// the cap of a cylinder on the side of the direction, on a corner, an edge or a face
 static void try_cap(const meeting *g, const outline *o, candidate *best) {
-  double n[3];
+  double n[3], y[3];
   if (g->a->type != CAV_GEOM_CYLINDER) return;
   column3(n, g->a->rotation, 2);
   if (dot3(n, g->apart.n) < 0) scale3(n, -1, n);
-  if (dot3(n, g->apart.n) > 1 - MEETS) keep(g, n, o, o->x[0], best);
+  // from what is nearest to the axis, which is over the cap if anything is
+  nearest_on_outline(o, n, g->a->pos, y);
+  keep(g, n, o, y, best);
 }
 
 static void corner_at(const cav_shape *s, int v, double x[3]) {
@@ -611,8 +614,32 @@ static int touch_single(const meeting *g, double dist, cav_touch *touch) {
   return 1;
 }
 
+static int is_curved(const cav_shape *s) { return s->type == CAV_GEOM_ELLIPSOID || s->type == CAV_GEOM_CYLINDER; }
+
+// the same for the segment of a capsule a inside a curved body b: as a polyhedron of one edge
+static void polish_segment(meeting *g) {
+  static const int start[3] = {0, 1, 2}, neighbour[2] = {1, 0}, none[1] = {0};
+  const double vertex[6] = {0, 0, -g->a->size[1], 0, 0, g->a->size[1]};
+  const cav_mesh edge = {
+      .name = "", .nvertex = 2, .vertex = vertex, .face = none, .neighbour_start = start, .neighbour = neighbour};
+  cav_shape segment = *g->a;
+  segment.type = CAV_GEOM_MESH;
+  segment.mesh = &edge;
+  meeting h = {.a = g->b, .b = &segment, .size = g->size, .margin = g->margin};
+  h.apart = (cav_apart){.gap = g->apart.gap};
+  scale3(h.apart.n, -1, g->apart.n);
+  copy3(h.apart.x, g->apart.y);
+  copy3(h.apart.y, g->apart.x);
+  polish(&h);
+  g->apart.gap = h.apart.gap;
+  scale3(g->apart.n, -1, h.apart.n);
+  copy3(g->apart.x, h.apart.y);
+  copy3(g->apart.y, h.apart.x);
+}
+
 static int meet(meeting *g, cav_touch *touch) {
-  if (g->a->type == CAV_GEOM_ELLIPSOID || g->a->type == CAV_GEOM_CYLINDER) polish(g);
+  if (is_curved(g->a)) polish(g);
+  if (g->a->type == CAV_GEOM_CAPSULE && is_curved(g->b)) polish_segment(g);
   double dist = g->apart.gap - g->core_a.radius - g->core_b.radius;
   if (!(dist < g->margin)) return 0;
   int count = touch_face(g, touch);

@@ -4,12 +4,15 @@
 /// the derivative jumps (the segment cuts an edge from the inside) the element of the subgradient square to the
 /// segment is the normal of the edge contact. A capsule that lies along a face, a side or an edge has a second point,
 /// at the other end of the part above that feature; it exists by its own gap, so no test of parallelism decides. A
-/// segment deep inside a solid leaves by its deepest point, which need not be the least translation.
+/// segment that cuts the solid has no such lowest point: polytope.c finds the least translation that parts the two.
 /// On a box there are always two points, which move with the pose and never come or go: the lowest, and one that lies at the
 /// other end of the part above the feature where the capsule lies flat and draws near to the lowest the more it tilts. The
 /// part widens with the tilt of the normal, so that a foot may leave a face over its edge without a jump of force; an
 /// optimiser that looks ahead of contact needs that.
 #include "pairs.h"
+
+// share of the capsule's size below which the segment and the solid touch: no height over the surface tells a direction
+static const double TOUCHES = 1e-9;
 
 /// The segment in the solid's axes.
 typedef struct segment {
@@ -233,6 +236,7 @@ int cav_collide_segment(const cav_shape *a, const cav_shape *b, double margin, c
   lowest first;
   find_lowest(&g, &first);
   if (first.height - a->size[0] >= margin) return 0;
+  if (first.height < TOUCHES * (a->size[0] + a->size[1])) return cav_collide_polytope(a, b, margin, touch);
   if (b->type == CAV_GEOM_ELLIPSOID) {
     return touch_at(a, b, &g, first.t, first.height, first.normal, margin, 0, touch);
   }

@@ -1,9 +1,8 @@
-/// Meshes and height fields: hulls, files, masses; contacts that carry their own proof (normal n and gap d: the points
-/// pos -+ n d/2 lie on the surfaces, and the supporting planes there are d apart, so d is the distance); the same contacts
+/// Meshes and height fields: hulls, files, masses; contacts that carry their own proof (proof.h); the same contacts
 /// as primitives where both exist; derivatives by displacement; degenerate meshes; damaged files; MuJoCo.
 #include "hull.h"
 #include "mesh.h"
-#include "pairs.h"
+#include "proof.h"
 #include "scene.h"
 
 #ifdef CAVORT_HAVE_MUJOCO
@@ -97,46 +96,6 @@ static void bring_near(const solid *a, solid *b) {
   add3(b->shape.pos, b->shape.pos, d);
 }
 
-// signed distance of a world point to the surface, from inside; from outside that to the planes, a lower bound
-static double surface_height(const cav_shape *s, const double p[3]) {
-  double d[3], x[3], n[3], most = -INFINITY;
-  sub3(d, p, s->pos);
-  rotate_back(x, s->rotation, d);
-  if (s->type == CAV_GEOM_PLANE) return x[2];
-  if (s->type == CAV_GEOM_SPHERE) return norm3(x) - s->size[0];
-  if (s->type == CAV_GEOM_CAPSULE) {
-    x[2] -= fmax(-s->size[1], fmin(s->size[1], x[2]));
-    return norm3(x) - s->size[0];
-  }
-  if (s->type == CAV_GEOM_ELLIPSOID) return cav_surface_ellipsoid(s->size, x, n);
-  if (s->type == CAV_GEOM_CYLINDER) return cav_surface_cylinder(s->size, x, n);
-  if (s->type == CAV_GEOM_BOX) return cav_surface_box(s->size, x, n);
-  for (int f = 0; f < s->mesh->nface; f++)
-    most = fmax(most, dot3(s->mesh->plane + 4 * f, x) - s->mesh->plane[4 * f + 3]);
-  return most;
-}
-
-static double plane_gap(const cav_shape *a, const cav_shape *b, const double n[3]) {
-  double x[3], y[3], back[3], d[3];
-  scale3(back, -1, n);
-  cav_support(b, back, y);
-  if (a->type == CAV_GEOM_PLANE) {
-    copy3(x, a->pos);
-  } else {
-    cav_support(a, n, x);
-  }
-  sub3(d, y, x);
-  return dot3(d, n);
-}
-
-static int nearest_of(const cav_touch *touch, int count) {
-  int best = 0;
-  for (int k = 1; k < count; k++) {
-    if (touch[k].dist < touch[best].dist) best = k;
-  }
-  return best;
-}
-
 enum { POSES = 2000 };
 static const double MARGIN = 0.05;
 
@@ -152,19 +111,15 @@ static void test_certificates(int type, int kind) {
     int n = cav_collide_shapes(&a.shape, &b.shape, MARGIN, touch);
     CHECK(n >= 0 && n <= CAV_TOUCH_MAX);
     if (n > 0) {
-      const cav_touch *t = touch + nearest_of(touch, n);
-      double x[3], y[3];
+      const cav_touch *t = touch + proof_nearest(touch, n);
+      proof is = proof_of(&a.shape, &b.shape, t);
       contacts++;
       points += n;
       apart += t->dist > 0;
-      axpy3(x, t->pos, -t->dist / 2, t->normal);
-      axpy3(y, t->pos, t->dist / 2, t->normal);
       unit = fmax(unit, fabs(norm3(t->normal) - 1));
-      double off = fmax(fabs(surface_height(&a.shape, x)), fabs(surface_height(&b.shape, y)));
-      double beyond = fabs(plane_gap(&a.shape, &b.shape, t->normal) - t->dist);
-      loose += !(off <= 1e-12 && beyond <= 1e-12);
-      surface = fmax(surface, off);
-      gap = fmax(gap, beyond);
+      loose += !(is.surface <= 1e-12 && is.gap <= 1e-12);
+      surface = fmax(surface, is.surface);
+      gap = fmax(gap, is.gap);
       for (int i = 0; i < n; i++) {
         CHECK(touch[i].dist < MARGIN);
         for (int j = 0; j < i; j++) CHECK(touch[i].feature != touch[j].feature);
@@ -203,7 +158,7 @@ static void test_box_as_mesh(void) {
       int m = cav_collide_shapes(&a.shape, &c.shape, MARGIN, as_box);
       counts += n == m;
       if (n && m) {
-        const cav_touch *t = as_mesh + nearest_of(as_mesh, n), *u = as_box + nearest_of(as_box, m);
+        const cav_touch *t = as_mesh + proof_nearest(as_mesh, n), *u = as_box + proof_nearest(as_box, m);
         // the larger gap is the better answer in an overlap
         double excess = u->dist - t->dist;
         most = fmax(most, t->dist > 0 ? fabs(excess) : excess);
@@ -230,7 +185,7 @@ static void test_derivatives(void) {
       bring_near(&a, &b);
       int n = cav_collide_shapes(&a.shape, &b.shape, MARGIN, touch);
       if (n) {
-        const cav_touch *t = touch + nearest_of(touch, n);
+        const cav_touch *t = touch + proof_nearest(touch, n);
         double turn[3] = {scene_uniform(), scene_uniform(), scene_uniform()}, dist[2], y[3], v[3];
         for (int s = 0; s < 2; s++) {
           cav_shape c = b.shape;
@@ -242,7 +197,7 @@ static void test_derivatives(void) {
           matmul3(c.rotation, R, c.rotation);
           rotate(c.pos, R, c.pos);
           int m = cav_collide_shapes(&a.shape, &c, MARGIN, moved);
-          dist[s] = m ? moved[nearest_of(moved, m)].dist : NAN;
+          dist[s] = m ? moved[proof_nearest(moved, m)].dist : NAN;
         }
         axpy3(y, t->pos, t->dist / 2, t->normal);
         cross3(v, turn, y);
@@ -317,7 +272,7 @@ static void test_level(void) {
       int n = cav_collide_shapes(&a.shape, &ground, MARGIN, touch);
       int m = cav_collide_shapes(&plane, &a.shape, MARGIN, flat);
       missed += !n || !m;
-      if (n && m) most = fmax(most, fabs(touch[nearest_of(touch, n)].dist - flat[nearest_of(flat, m)].dist));
+      if (n && m) most = fmax(most, fabs(touch[proof_nearest(touch, n)].dist - flat[proof_nearest(flat, m)].dist));
       for (int i = 0; i < n; i++) tilt = fmax(tilt, 1 + touch[i].normal[2]);
       let_go(&a);
     }
@@ -370,9 +325,9 @@ static void test_hills(void) {
           thin.shape.size = thin.size;
           cav_touch t[CAV_TOUCH_MAX];
           int n = cav_collide_shapes(&ball, &thin.shape, 1, t);
-          if (n && t[nearest_of(t, n)].dist < best) {
-            best = t[nearest_of(t, n)].dist;
-            up = t[nearest_of(t, n)].normal[2];
+          if (n && t[proof_nearest(t, n)].dist < best) {
+            best = t[proof_nearest(t, n)].dist;
+            up = t[proof_nearest(t, n)].normal[2];
           }
           let_go(&thin);
         }
@@ -385,7 +340,7 @@ static void test_hills(void) {
     cav_touch touch[CAV_TOUCH_MAX];
     int n = cav_collide_shapes(&ball, &ground, 0.02, touch);
     CHECK(n > 0);
-    if (n) most = fmax(most, fabs(touch[nearest_of(touch, n)].dist - best));
+    if (n) most = fmax(most, fabs(touch[proof_nearest(touch, n)].dist - best));
     compared++;
   }
   printf("spheres over hills: %d compared with all triangles, distance differs by %.1e\n", compared, most);
