@@ -15,9 +15,12 @@
 /// of a contact does not depend on the depth of the tree. Contacts between two moving links add the two blocks across.
 /// Limits, friction losses, springs and dampers act on few dofs and are added entry by entry.
 ///
+/// For the order momentum the rows of root links are those of halfway_slope.c instead.
+///
 /// Not offered: models with parts listed by cav_derivatives_missing; nothing is approximated in their place.
 #include <stdlib.h>
 
+#include "halfway.h"
 #include "math3.h"
 #include "slope.h"
 
@@ -28,7 +31,7 @@ typedef struct task {
   const cav_model *model;
   cav_state *state;
   cav_slopes *s;
-  int nv, midpoint;
+  int nv, mean, momentum; ///< bias and passive forces at the mean velocity; rows of roots from momenta
   double inverse_h;
   double *dq, *dv, *dn; ///< [nv*nv]
 } task;
@@ -97,7 +100,7 @@ static void group_drifts(const task *t, int first, int end, const double V[6], c
     motion_cross(D, V, S);
     motion_cross(next, W, S);
     // the bias is taken at v, or at the mean of v and v_next
-    if (t->midpoint) {
+    if (t->mean) {
       scale6(now, 2, D);
       axpy6(now, now, -1, next);
     } else {
@@ -124,7 +127,7 @@ static void drifts(const task *t) {
       double before[6];
       copy6(before, V);
       for (int k = first; k < last; k++) {
-        double v = t->midpoint ? 0.5 * (w->v[k] + w->v_next[k]) : w->v[k], motion[6];
+        double v = t->mean ? 0.5 * (w->v[k] + w->v_next[k]) : w->v[k], motion[6];
         scale6(motion, v, axis + 6 * k);
         accumulate6(V, motion);
         axpy6(W, W, w->v_next[k], axis + 6 * k);
@@ -333,11 +336,20 @@ static void contact_across(const task *t, const cav_contact *c, const cav_contac
 /// What the deeper dof of a pair brings: as a column for the rows above it, as a row for the columns above it.
 typedef struct deep {
   double a[6], w[6], q[6], carried[6]; ///< columns: by acceleration, velocity, position; the wrench carried along
+  double push[6];                      ///< the part of contacts in q
   double gyration[3];                  ///< rows beside a: angular
   double motion[6];                    ///< rows: contacts by motion
   double now[6], next[6];              ///< both: contacts by v and v_next
   int touched;
 } deep;
+
+// a change of contact wrenches by position: scale M x
+static void add_push(deep *d, const double *M, const double x[6], double scale) {
+  double part[6];
+  multiply6(part, M, x);
+  axpy6(d->q, d->q, scale, part);
+  axpy6(d->push, d->push, scale, part);
+}
 
 static void deepen(const task *t, int j, deep *d) {
   const cav_slopes *s = t->s;
@@ -356,7 +368,7 @@ static void deepen(const task *t, int j, deep *d) {
   d->touched = s->touched[i];
   if (!d->touched) return;
   const double *P = s->by_motion + BLOCK * i, *now = s->by_now + BLOCK * i, *next = s->by_next + BLOCK * i;
-  double part[6], scale = -t->inverse_h;
+  double scale = -t->inverse_h;
   // these two are symmetric
   multiply6(d->now, now, S);
   multiply6(d->next, next, S);
@@ -364,46 +376,51 @@ static void deepen(const task *t, int j, deep *d) {
   scale6(d->next, -scale, d->next);
   multiply6_transposed(d->motion, P, S);
   scale6(d->motion, scale, d->motion);
-  multiply6(part, P, S);
-  axpy6(d->q, d->q, scale, part);
-  multiply6(part, now, s->drift_now + 6 * j);
-  axpy6(d->q, d->q, scale, part);
-  multiply6(part, next, s->drift_next + 6 * j);
-  axpy6(d->q, d->q, -scale, part);
+  add_push(d, P, S, scale);
+  add_push(d, now, s->drift_now + 6 * j, scale);
+  add_push(d, next, s->drift_next + 6 * j, -scale);
 }
 
 // adds what the smooth part gives an entry: by acceleration and by the velocity of the bias
 static void add_entry(const task *t, int at, double q, double w, double a) {
-  double half = t->midpoint ? 0.5 : 0;
+  double half = t->mean ? 0.5 : 0;
   t->dq[at] += q;
-  t->dv[at] += (t->midpoint ? 0.5 : 1) * w - a * t->inverse_h;
+  t->dv[at] += (t->mean ? 0.5 : 1) * w - a * t->inverse_h;
   t->dn[at] += half * w + a * t->inverse_h;
 }
 
 static void pairs_of(const task *t, int j) {
   const cav_slopes *s = t->s;
   const cav_workspace *w = t->state->work;
-  int nv = t->nv, own = 1;
+  // of the rows of root links momentum brings all but the contacts
+  int nv = t->nv, own = 1, given = t->momentum && cav_moves_root(t->model, j);
   deep d = {0};
   deepen(t, j, &d);
   for (int k = j; k >= 0; k = w->parent[k]) {
     const double *S = t->state->axis + 6 * k;
     double a = dot6(d.a, S);
     // row j: column k moves j
-    double q = dot6(d.a, s->second + 6 * k) + dot3(d.gyration, s->drift + 6 * k);
-    if (d.touched) { q += dot6(d.motion, S) + dot6(d.now, s->drift_now + 6 * k) + dot6(d.next, s->drift_next + 6 * k); }
-    add_entry(t, j * nv + k, q, dot6(d.a, s->rate + 6 * k) + dot3(d.gyration, S), a);
+    int at = j * nv + k;
+    if (!given) {
+      double q = dot6(d.a, s->second + 6 * k) + dot3(d.gyration, s->drift + 6 * k);
+      add_entry(t, at, q, dot6(d.a, s->rate + 6 * k) + dot3(d.gyration, S), a);
+    }
     if (d.touched) {
-      t->dv[j * nv + k] += dot6(d.now, S);
-      t->dn[j * nv + k] += dot6(d.next, S);
+      t->dq[at] += dot6(d.motion, S) + dot6(d.now, s->drift_now + 6 * k) + dot6(d.next, s->drift_next + 6 * k);
+      t->dv[at] += dot6(d.now, S);
+      t->dn[at] += dot6(d.next, S);
     }
     // row k: j moves k only within its group
     if (k != j) {
-      q = dot6(d.q, S) + (own ? 0 : dot6(d.carried, S));
-      add_entry(t, k * nv + j, q, dot6(d.w, S), a);
+      at = k * nv + j;
+      if (t->momentum && cav_moves_root(t->model, k)) {
+        t->dq[at] += dot6(d.push, S);
+      } else {
+        add_entry(t, at, dot6(d.q, S) + (own ? 0 : dot6(d.carried, S)), dot6(d.w, S), a);
+      }
       if (d.touched) {
-        t->dv[k * nv + j] += dot6(d.now, S);
-        t->dn[k * nv + j] += dot6(d.next, S);
+        t->dv[at] += dot6(d.now, S);
+        t->dn[at] += dot6(d.next, S);
       }
     }
     if (w->group[k]) own = 0;
@@ -440,8 +457,8 @@ static void add_diagonals(const task *t) {
     int at = i * (t->nv + 1);
     add_entry(t, at, 0, 0, w->armature[i]);
     if (!t->state->options.passive) continue;
-    t->dv[at] += t->midpoint ? 0.5 * w->damping[i] : 0;
-    t->dn[at] += (t->midpoint ? 0.5 : 1) * w->damping[i];
+    t->dv[at] += t->mean ? 0.5 * w->damping[i] : 0;
+    t->dn[at] += (t->mean ? 0.5 : 1) * w->damping[i];
   }
 }
 
@@ -495,8 +512,7 @@ static void add_tendon_forces(const task *t) {
   for (int i = 0; i < w->ntendon_spring; i++) {
     const cav_tendon *tendon = &t->model->tendon[w->tendon_spring[i]];
     double half = 0.5 * tendon->damping;
-    add_along_tendon(t, w->tendon_spring[i], tendon->stiffness, t->midpoint ? half : tendon->damping,
-                     t->midpoint ? half : 0);
+    add_along_tendon(t, w->tendon_spring[i], tendon->stiffness, t->mean ? half : tendon->damping, t->mean ? half : 0);
   }
 }
 
@@ -616,7 +632,8 @@ cav_status cav_derivatives(const cav_model *model, cav_state *state, double *du_
             .state = state,
             .s = s,
             .nv = nv,
-            .midpoint = state->options.order == CAV_ORDER_MIDPOINT,
+            .mean = cav_takes_mean(state),
+            .momentum = state->options.order == CAV_ORDER_MOMENTUM,
             .inverse_h = 1 / state->options.timestep};
   state->work->derived = 0;
   drifts(&t);
@@ -633,7 +650,11 @@ cav_status cav_derivatives(const cav_model *model, cav_state *state, double *du_
   for (int k = 0; k < 3; k++) memset(out[k], 0, (size_t)nv * (size_t)nv * sizeof(double));
   cav_composites(model, state);
   gyrations(&t);
-  for (int j = 0; j < nv; j++) pairs_of(&t, j);
+  if (t.momentum) cav_halves_slopes(model, state);
+  for (int j = 0; j < nv; j++) {
+    pairs_of(&t, j);
+    if (t.momentum) cav_halves_column(model, state, j, t.dq, t.dv, t.dn);
+  }
   for (int i = 0; i < state->ncontact; i++) {
     const cav_contact *c = &state->contact[i];
     if (c->link1 > 0 && c->link2 > 0 && !s->contact[i].idle) contact_across(&t, c, &s->contact[i]);

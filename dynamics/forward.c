@@ -5,9 +5,9 @@
 /// semismooth Newton method, the smoothed law an ordinary one. Outer passes refine: they measure the inverse itself,
 /// not the model of it.
 ///
-/// midpoint: bias and passive forces depend on v_next. The convex problem with these frozen gives the start; Newton
+/// midpoint, momentum: bias and passive forces depend on v_next. The convex problem with these frozen gives the start; Newton
 /// with their derivative (differences of the smooth inverse, reused while it serves) finishes. Nothing then is
-/// symmetric or convex: a midpoint step need not exist once a body turns by a radian or so within it (gyroscopic
+/// symmetric or convex: such a step need not exist once a body turns by a radian or so within it (gyroscopic
 /// torques at speeds near 2/h; the solutions traced there end in a fold). Then the best iterate is returned as not
 /// converged.
 ///
@@ -39,7 +39,7 @@ typedef struct newton {
   double *gradient;        // [nv]
   double *best, *found;    // [nv] best iterate; inverse there
   double *matrix;          // [nv*nv] Hessian, its factors
-  double *smooth;          // [nv*nv] derivative of h times the smooth inverse, midpoint only
+  double *smooth;          // [nv*nv] derivative of h times the smooth inverse, not for euler
   int have_smooth;
   double error, scale; // of the last measurement
   int iterations, limit;
@@ -62,7 +62,7 @@ static void copy(double *to, const double *from, int n) {
 }
 
 static cav_status prepare(newton *s, const cav_model *model, cav_state *state) {
-  const size_t matrices = state->options.order == CAV_ORDER_MIDPOINT ? 2 : 1;
+  const size_t matrices = cav_takes_mean(state) ? 2 : 1;
   const cav_impulse_room room = {.per_block = BLOCK, .per_row = 5, .per_dof = 8, .per_dof_squared = matrices};
   const cav_status status = cav_impulse_new(model, state, s->q, s->v, &room, &s->problem);
   if (status != CAV_OK) return status;
@@ -245,7 +245,9 @@ static double rounding(newton *s) {
   cav_impulse_rows(p, s->x, s->y);
   laws(s, s->y, s->f, s->curvature, 0);
   cav_impulse_inertia(p, s->x, error);
-  for (int i = 0; i < p->nv; i++) error[i] = fabs(error[i]);
+  // two momenta, each at poses that are rounded, or one change of velocity
+  const double terms = p->state->options.order == CAV_ORDER_MOMENTUM ? 4.0 : 1.0;
+  for (int i = 0; i < p->nv; i++) error[i] = terms * fabs(error[i]);
   for (int b = 0; b < p->nblock; b++) {
     const cav_block *block = &p->block[b];
     const double *H = s->curvature + BLOCK * b;
@@ -261,8 +263,8 @@ static double rounding(newton *s) {
   return DBL_EPSILON * (largest(error, p->nv) / p->state->options.timestep + 8.0 * s->scale);
 }
 
-// derivative of h times the smooth inverse with respect to v_next, by columns. It is quadratic in v_next: a one-sided
-// difference errs by the step, 1e-5 of the Coriolis terms, which costs Newton nothing
+// derivative of h times the smooth inverse with respect to v_next, by columns. It is quadratic in v_next, or
+// nearly so: a one-sided difference errs by the step, 1e-5 of the Coriolis terms, which costs Newton nothing
 static cav_status differentiate_smooth(newton *s) {
   const int nv = s->problem.nv;
   cav_status status = cav_impulse_smooth(&s->problem, s->v, s->u, s->x, s->base);
@@ -336,8 +338,8 @@ static cav_status newton_step(newton *s, int *accepted) {
   for (double length = 1.0; length > SHORTEST_STEP; length *= 0.5) {
     for (int i = 0; i < nv; i++) s->x[i] = s->anchor[i] + length * s->step[i];
     const cav_status status = measure(s);
-    // a derivative that served badly is taken anew next time
-    if (length == 1.0 && residual(s) > 0.02 * before) s->have_smooth = 0;
+    // a derivative that served badly is taken anew next time, unless what is left is rounding
+    if (length == 1.0 && residual(s) > 0.02 * before && s->error > rounding(s)) s->have_smooth = 0;
     *accepted = status == CAV_OK && residual(s) <= (1.0 - 0.5 * length) * before;
     if (*accepted) return CAV_OK;
   }
@@ -357,7 +359,7 @@ static double velocity_error(newton *s) {
 
 // passes until the inverse agrees with u; x is then the best iterate and the state evaluated there
 static cav_status iterate(newton *s, double tolerance) {
-  const int nv = s->problem.nv, midpoint = s->problem.state->options.order == CAV_ORDER_MIDPOINT;
+  const int nv = s->problem.nv, mean = cav_takes_mean(s->problem.state);
   double least = INFINITY;
   int stalls = 0, accepted = 0, polished = 0;
   copy(s->x, s->v, nv);
@@ -376,8 +378,8 @@ static cav_status iterate(newton *s, double tolerance) {
     if (stalls >= STALLS || s->iterations >= s->limit) break;
     accepted = 0;
     cav_status status = CAV_OK;
-    if (midpoint && pass > 0) status = newton_step(s, &accepted);
-    if (status == CAV_OK && !accepted) status = solve_convex(s, midpoint && pass == 0 ? 1e-2 : 0.1 * tolerance);
+    if (mean && pass > 0) status = newton_step(s, &accepted);
+    if (status == CAV_OK && !accepted) status = solve_convex(s, mean && pass == 0 ? 1e-2 : 0.1 * tolerance);
     if (status != CAV_OK) return status;
   }
   copy(s->x, s->best, nv);

@@ -460,16 +460,16 @@ static cav_status solve(const cav_model *model, cav_state *state, const double *
   if (status != CAV_OK) return status;
   take_step(&s);
 
-  // sweeps; for midpoint the smooth forces follow
-  const int midpoint = state->options.order == CAV_ORDER_MIDPOINT;
-  int count = 0, converged = s.n == 0 && !midpoint;
+  // sweeps; at the mean velocity the smooth forces follow
+  const int mean = cav_takes_mean(state);
+  int count = 0, converged = s.n == 0 && !mean;
   while (!converged && count < iterations) {
-    if (midpoint && (status = take_smooth(&s, v, u)) != CAV_OK) return status;
+    if (mean && (status = take_smooth(&s, v, u)) != CAV_OK) return status;
     const double change = sweep(&s);
     memcpy(s.r, s.x, (size_t)model->nv * sizeof *s.r);
     take_step(&s);
     double moved = 0.0, size = 0.0;
-    for (int i = 0; midpoint && i < model->nv; i++) {
+    for (int i = 0; mean && i < model->nv; i++) {
       moved = fmax(moved, fabs(s.x[i] - s.r[i]));
       size = fmax(size, fabs(s.x[i]));
     }

@@ -26,8 +26,8 @@ typedef struct cav_impulse {
   cav_block *block;       ///< [nblock] contacts in their order, then scalar rows, then equality constraints in theirs
   double *target;         ///< v* [nrow], m/s or rad/s
   double *R;              ///< regulariser [nrow], 1/kg
-  double *M;              ///< tree-sparse, D included; midpoint: with half of the damping that acts during the step
-  double *L;              ///< its factors by cav_ldl_factor
+  double *M; ///< tree-sparse, D included; at the mean velocity with half of the damping that acts during the step
+  double *L; ///< its factors by cav_ldl_factor
   double *force, *change; ///< scratch [nv]
   double *spare;          ///< doubles asked for
 } cav_impulse;

@@ -4,15 +4,14 @@
 #include "math3.h"
 #include "workspace.h"
 
-// each link's own mass, first moment and inertia at the reference, then sums towards the root
-void cav_composites(const cav_model *model, cav_state *state) {
-  double *all = state->work->composite;
+void cav_composites_at(const cav_model *model, const cav_posture *at, double *all) {
+  // each link's own mass, first moment and inertia at the reference, then sums towards the root
   for (int i = 1; i < model->nlink; i++) {
     double *c = all + 10 * i, d[3], m = model->link[i].mass;
-    sub3(d, state->com + 3 * i, state->reference + 3 * i);
+    sub3(d, at->com + 3 * i, at->reference + 3 * i);
     c[0] = m;
     scale3(c + 1, m, d);
-    const double *I = state->inertia + 6 * i;
+    const double *I = at->inertia + 6 * i;
     c[4] = I[0] + m * (d[1] * d[1] + d[2] * d[2]);
     c[5] = I[1] + m * (d[0] * d[0] + d[2] * d[2]);
     c[6] = I[2] + m * (d[0] * d[0] + d[1] * d[1]);
@@ -26,6 +25,11 @@ void cav_composites(const cav_model *model, cav_state *state) {
       for (int k = 0; k < 10; k++) { all[10 * parent + k] += all[10 * i + k]; }
     }
   }
+}
+
+void cav_composites(const cav_model *model, cav_state *state) {
+  const cav_posture at = {.com = state->com, .inertia = state->inertia, .reference = state->reference};
+  cav_composites_at(model, &at, state->work->composite);
 }
 
 double cav_added_inertia(const cav_model *model, const cav_state *state, int dof) {
@@ -46,7 +50,7 @@ void cav_composite_inertia(const cav_model *model, cav_state *state, double *M) 
 
 void cav_step_inertia(const cav_model *model, cav_state *state, double *M) {
   const cav_workspace *w = state->work;
-  const int half = state->options.order == CAV_ORDER_MIDPOINT && state->options.passive;
+  const int half = cav_takes_mean(state) && state->options.passive;
   cav_composite_inertia(model, state, M);
   for (int i = 0; i < model->nv; i++) {
     M[w->row[i]] += cav_added_inertia(model, state, i);

@@ -3,9 +3,11 @@
 /// the impulses along with the inertial forces. No matrix is formed.
 ///
 /// The order of the step says at which velocity bias and passive forces are taken: v with joint damping at v_next
-/// (euler), or the mean of both (midpoint). Constraints always compare J v with J v_next at q.
+/// (euler), or the mean of both (midpoint, momentum). For momentum the root link bears what is missing to the change of the
+/// momentum of its tree from half a step before to half a step after (halfway.c). Constraints always compare J v with J v_next at q.
 ///
 /// What a stage may reuse depends on the options too: after a change of those that positions depend on, all is new.
+#include "halfway.h"
 #include "math3.h"
 #include "workspace.h"
 
@@ -135,13 +137,13 @@ static void rows(cav_state *state, const double *v, const double *v_next, double
 // velocity of bias and passive forces, and acceleration; returns the velocity at which joint damping acts
 static const double *step_velocities(const cav_model *model, cav_state *state, double *bias, double *a) {
   const cav_workspace *w = state->work;
-  int midpoint = state->options.order == CAV_ORDER_MIDPOINT;
+  int mean = cav_takes_mean(state);
   double inverse_h = 1 / state->options.timestep;
   for (int i = 0; i < model->nv; i++) {
     a[i] = (w->v_next[i] - w->v[i]) * inverse_h;
-    bias[i] = midpoint ? 0.5 * (w->v[i] + w->v_next[i]) : w->v[i];
+    bias[i] = mean ? 0.5 * (w->v[i] + w->v_next[i]) : w->v[i];
   }
-  return midpoint ? bias : w->v_next;
+  return mean ? bias : w->v_next;
 }
 
 static void copy(double *to, const double *from, int n) {
@@ -169,12 +171,13 @@ static void evaluate(const cav_model *model, cav_state *state, int with_constrai
 
   // inertial forces of links, then contacts and equality constraints on them
   cav_newton_euler(model, state, bias, w->v_next, a);
+  if (state->options.order == CAV_ORDER_MOMENTUM) { cav_halves_forces(model, state); }
   if (w->nbuoy > 0) { cav_add_buoyancy(model, state); }
   if (w->nfloat > 0) { cav_add_fluid_forces(model, state); }
   const double *now = NULL;
   int links = with_constraints && (state->ncontact > 0 || state->ntie > 0);
   if (links) {
-    if (new_velocity && state->options.order == CAV_ORDER_MIDPOINT) {
+    if (new_velocity && cav_takes_mean(state)) {
       cav_velocities(model, state, w->v, w->velocity_now);
       now = w->velocity_now;
     } else if (new_velocity) {
@@ -219,6 +222,10 @@ cav_status cav_inverse_from(const cav_model *model, cav_state *state, cav_stage 
   if (unchanged == CAV_STAGE_VELOCITY && state->options.order != w->options.order) unchanged = CAV_STAGE_POSITION;
   if (unchanged == CAV_STAGE_NONE) {
     cav_status status = cav_position(model, state, q);
+    if (status) { return status; }
+  }
+  if (state->options.order == CAV_ORDER_MOMENTUM) {
+    cav_status status = cav_halves_make(model, state);
     if (status) { return status; }
   }
   copy(w->v, v, model->nv);

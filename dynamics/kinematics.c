@@ -4,6 +4,7 @@
 ///
 /// Spatial vectors are taken in world axes at the position of the tree's root link, one point for the whole tree: going
 /// from link to link they are only added, never transformed.
+#include "halfway.h"
 #include "math3.h"
 #include "workspace.h"
 
@@ -40,11 +41,11 @@ static void sines(const double *angle, double *sine, double *cosine, int n) {
   }
 }
 
-// half angles of all hinges, by joint order of the work list
-static void half_turns(cav_workspace *w) {
+// half angles of all hinges of q, by joint order of the work list
+static void half_turns(cav_workspace *w, const double *q) {
   double largest = 0;
   for (int i = 0; i < w->nhinge; i++) {
-    w->half[i] = 0.5 * (w->q[w->hinge[i]] - w->hinge_ref[i]);
+    w->half[i] = 0.5 * (q[w->hinge[i]] - w->hinge_ref[i]);
     largest = fmax(largest, fabs(w->half[i]));
   }
   if (largest < 1e5) {
@@ -173,37 +174,42 @@ static void refer(double *axis, const double reference[3]) {
   cross3(axis + 3, arm, axis);
 }
 
-static void place_link(const cav_model *model, cav_state *state, int i, const double *q) {
+static void place_link(const cav_model *model, const cav_workspace *w, const cav_posture *at, int i) {
   const cav_link *link = &model->link[i];
-  const cav_pose *parent = &state->link[link->parent];
+  const cav_pose *parent = &at->link[link->parent];
   cav_pose local, *pose = &local;
 
   // frame at rest in the parent, then the joints in order
   transform(pose->pos, parent->pos, parent->rotation, link->pos);
-  if (state->work->straight[i]) {
+  if (w->straight[i]) {
     memcpy(pose->quat, parent->quat, sizeof pose->quat);
   } else {
     quat_mul(pose->quat, parent->quat, link->quat);
   }
-  for (int k = 0; k < link->njoint; k++) joint_act(model, state->work, link->joint + k, q, pose, state->axis);
+  for (int k = 0; k < link->njoint; k++) joint_act(model, w, link->joint + k, at->q, pose, at->axis);
   quat_matrix(pose->rotation, pose->quat);
 
   // reference point of the tree, mass geometry, subspace at the reference
-  double *reference = state->reference + 3 * i;
-  copy3(reference, link->root == i ? pose->pos : state->reference + 3 * link->root);
-  transform(state->com + 3 * i, pose->pos, pose->rotation, link->com);
-  symmetric_rotate(state->inertia + 6 * i, pose->rotation, link->inertia);
-  for (int k = 0; k < link->ndof; k++) refer(state->axis + 6 * (link->dof + k), reference);
-  state->link[i] = local;
+  double *reference = at->reference + 3 * i;
+  if (!at->referred) copy3(reference, link->root == i ? pose->pos : at->reference + 3 * link->root);
+  transform(at->com + 3 * i, pose->pos, pose->rotation, link->com);
+  symmetric_rotate(at->inertia + 6 * i, pose->rotation, link->inertia);
+  for (int k = 0; k < link->ndof; k++) refer(at->axis + 6 * (link->dof + k), reference);
+  at->link[i] = local;
+}
+
+void cav_place(const cav_model *model, cav_workspace *w, const cav_posture *at) {
+  for (int i = 0; i < w->nquaternion; i++) quat_normalise(at->q + w->quaternion[i]);
+  half_turns(w, at->q);
+  for (int i = 1; i < model->nlink; i++) place_link(model, w, at, i);
 }
 
 void cav_kinematics(const cav_model *model, cav_state *state, const double *q) {
   // unit quaternions, whatever came in
   double *unit = state->work->q;
   if (unit != q && model->nq > 0) { memcpy(unit, q, (size_t)model->nq * sizeof *q); }
-  for (int i = 0; i < state->work->nquaternion; i++) quat_normalise(unit + state->work->quaternion[i]);
-  half_turns(state->work);
-
-  for (int i = 1; i < model->nlink; i++) { place_link(model, state, i, unit); }
+  const cav_posture at = {unit, state->link, state->com, state->inertia, state->reference, state->axis, 0};
+  cav_place(model, state->work, &at);
+  if (state->work->halves) { state->work->halves->fresh = 0; }
   if (model->ntendon > 0) { cav_tendon_lengths(model, state); }
 }

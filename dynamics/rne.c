@@ -16,8 +16,8 @@ void cav_velocities(const cav_model *model, const cav_state *state, const double
 }
 
 // wrench at the reference that moves a link's mass with velocity V and acceleration A
-static void link_force(double F[6], double mass, const double *inertia, const double *com, const double *reference,
-                       const double *V, const double *A) {
+static inline void link_force(double F[6], double mass, const double *inertia, const double *com,
+                              const double *reference, const double *V, const double *A) {
   double d[3], v[3], a[3], momentum[3];
   sub3(d, com, reference);
 
@@ -66,6 +66,13 @@ void cav_newton_euler(const cav_model *model, cav_state *state, const double *v,
     copy6(w->acceleration + 6 * i, A);
     link_force(state->force + 6 * i, link->mass, state->inertia + 6 * i, state->com + 3 * i, state->reference + 3 * i,
                V, A);
+  }
+}
+
+void cav_inertial_forces(const cav_model *model, const cav_state *state, double *force) {
+  for (int i = 1; i < model->nlink; i++) {
+    link_force(force + 6 * i, model->link[i].mass, state->inertia + 6 * i, state->com + 3 * i, state->reference + 3 * i,
+               state->velocity + 6 * i, state->work->acceleration + 6 * i);
   }
 }
 

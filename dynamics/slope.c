@@ -284,9 +284,8 @@ cav_status cav_contact_slopes(const cav_model *model, const cav_state *state, co
   geometry g;
   cav_status status = measure(model, state, c, &g);
   if (status != CAV_OK) return status;
-  int midpoint = state->options.order == CAV_ORDER_MIDPOINT;
   motion now, next;
-  move(state, c, state->velocity, midpoint ? state->velocity_next : NULL, &now);
+  move(state, c, state->velocity, cav_takes_mean(state) ? state->velocity_next : NULL, &now);
   move(state, c, state->velocity_next, NULL, &next);
   for (int side = 0; side < 2; side++) {
     if ((side ? c->link2 : c->link1) > 0) fill_side(c, &g, &now, &next, &law, H, side, slope);

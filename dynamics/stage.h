@@ -73,6 +73,9 @@ void cav_velocities(const cav_model *model, const cav_state *state, const double
 void cav_newton_euler(const cav_model *model, cav_state *state, const double *v, const double *v_next, const double *a);
 void cav_project(const cav_model *model, cav_state *state, double *u);
 
+/// Those wrenches again, from the state's last evaluation, force [nlink*6]. rne.c.
+void cav_inertial_forces(const cav_model *model, const cav_state *state, double *force);
+
 /// Forces on links that only (q, v) make, taken off state->force after cav_newton_euler: gravity compensation, drag and
 /// lift of a medium at state->velocity. passive.c, fluid.c.
 void cav_add_buoyancy(const cav_model *model, cav_state *state);
@@ -154,7 +157,8 @@ void cav_contact_velocity(const cav_state *state, const cav_contact *contact, co
 /// Whether the state holds a whole evaluation of the inverse under its present options. inverse.c.
 int cav_evaluated(const cav_state *state);
 
-/// u [nv] of the step without constraints, at the state's positions: u = RNE + D a - p. Fills velocities. inverse.c.
+/// u [nv] of the step without constraints, at the state's positions: u = RNE + D a - p. Fills velocities. Under an order that
+/// the state has evaluated before. inverse.c.
 void cav_smooth_inverse(const cav_model *model, cav_state *state, const double *v, const double *v_next, double *u);
 
 /// q := q (+) step e_dof: one coordinate of the tangent. manifold.c.
@@ -166,7 +170,7 @@ void cav_composites(const cav_model *model, cav_state *state);
 /// Composite inertia at the state's poses without D, tree-sparse (row i: dof i, its parent, ...). inertia.c.
 void cav_composite_inertia(const cav_model *model, cav_state *state, double *M);
 
-/// M as a step sees it, tree-sparse: with D and, for midpoint, half of the damping that acts during the step. inertia.c.
+/// M as a step sees it, tree-sparse: with D and, where a step takes the mean velocity, half of the damping that acts during the step. inertia.c.
 void cav_step_inertia(const cav_model *model, cav_state *state, double *M);
 
 /// D of a dof under the state's options: armature, and damping times h where damping is implicit. inertia.c.
@@ -200,6 +204,9 @@ void cav_pseudo_inverse(int n, double rank, double *G, double *A, double *E);
 /// Fills the length ranges of muscles that the file leaves open, of a model under construction. Returns the first actuator
 /// whose length has no end within the ranges of the joints, nactuator if memory runs out, -1 if all is well. stroke.c.
 int cav_stroke(cav_model *model);
+
+/// Whether a step takes bias and passive forces at the mean of v and v_next, not at v.
+static inline int cav_takes_mean(const cav_state *state) { return state->options.order != CAV_ORDER_EULER; }
 
 struct cav_workspace;
 

@@ -4,6 +4,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 
+#include "halfway.h"
 #include "math3.h"
 #include "slope.h"
 #include "workspace.h"
@@ -253,6 +254,7 @@ void cav_state_free(cav_state *state) {
   free(state->work->gram);
   free(state->work->floats);
   free(state->work->readout);
+  free(state->work->halves);
   cav_slopes_free(state->work->slopes);
   free(state->work->coupling);
   free(state->work->solver);
@@ -291,7 +293,7 @@ void cav_state_bytes(const cav_state *state, size_t bytes[CAV_PARTS]) {
   memcpy(bytes, w->bytes, sizeof w->bytes);
   bytes[CAV_PART_HEAD] += sizeof(cav_state) + sizeof(cav_workspace);
   bytes[CAV_PART_ROWS] += (size_t)w->row_room * sizeof *state->row;
-  bytes[CAV_PART_MOTION] += cav_fluid_bytes(w);
+  bytes[CAV_PART_MOTION] += cav_fluid_bytes(w) + (w->halves ? w->halves->bytes : 0);
   bytes[CAV_PART_CONTACTS] += (size_t)w->contact_room * sizeof *state->contact + cav_geom_cache_bytes(w->geom);
   size_t nu = (size_t)state->model->nactuator;
   bytes[CAV_PART_ACTUATION] += w->gram ? 3 * nu * nu * sizeof(double) : 0;

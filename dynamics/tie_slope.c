@@ -129,13 +129,12 @@ static void add_push(const link_tie *l, const double *turn, const double *impuls
 static void open_tie(const task *t, const cav_tie *tie, link_tie *l) {
   l->tie = tie;
   l->e = &t->model->equality[tie->equality];
-  int midpoint = t->state->options.order == CAV_ORDER_MIDPOINT;
   for (int k = 0; k < 2; k++) {
     int link = l->e->link[k];
     const double *W = t->state->velocity_next + 6 * link, *reference = t->state->reference + 3 * link;
     double V[6];
     copy6(V, t->state->velocity + 6 * link);
-    if (midpoint) {
+    if (cav_takes_mean(t->state)) {
       scale6(V, 2, V);
       axpy6(V, V, -1, W);
     }

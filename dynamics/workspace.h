@@ -11,6 +11,21 @@ struct cav_geom_cache *cav_geom_cache_new(const cav_model *model);
 void cav_geom_cache_free(struct cav_geom_cache *cache);
 size_t cav_geom_cache_bytes(const struct cav_geom_cache *cache);
 
+/// Links at one configuration; arrays as in cav_state.
+typedef struct cav_posture {
+  double *q; ///< [nq], its quaternions are made unit
+  cav_pose *link;
+  double *com, *inertia, *reference, *axis;
+  int referred; ///< 1: reference is given and stays
+} cav_posture;
+
+/// Poses, centres of mass, world inertias and motion subspaces at a posture. kinematics.c.
+void cav_place(const cav_model *model, struct cav_workspace *w, const cav_posture *at);
+
+/// Mass, first moment and inertia of every subtree about its reference, all [nlink*10], from com, inertia and reference of a
+/// posture. inertia.c.
+void cav_composites_at(const cav_model *model, const cav_posture *at, double *all);
+
 /// What the memory of a state serves. profile.c tells of it.
 typedef enum cav_part {
   CAV_PART_HEAD,      ///< the two structs themselves
@@ -115,6 +130,9 @@ typedef struct cav_workspace {
   // readings of cav_differentiate, grown on demand
   double *readout;
   size_t readout_room;
+
+  // momenta half a step before and after: made by the first evaluation of the order that takes them
+  struct cav_halves *halves;
 
   // analytic derivatives: made by the first call, and whether they are of the last evaluation
   struct cav_slopes *slopes;

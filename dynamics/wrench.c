@@ -3,6 +3,7 @@
 /// less the contacts and ties upon it, so it is there also for bodies that are fused into one link. Springs, dampers, actuators,
 /// limits and friction of joints and tendons act between bodies of the tree and are part of what it reports; so are, as in
 /// MuJoCo, drag of a fluid and lift against gravity, which act from outside.
+#include "halfway.h"
 #include "math3.h"
 #include "workspace.h"
 
@@ -74,6 +75,13 @@ void cav_body_wrench(const cav_model *model, const cav_state *state, int body, c
   zero3(F + 3);
   for (int i = body; i < model->nbody; i++) {
     if (cav_descends(model, i, body)) { add_inertial(state, &model->body[i], point, F); }
+  }
+  // what the inertial forces of whole trees lack of their change of momentum
+  for (int i = 1; i < model->nlink && state->options.order == CAV_ORDER_MOMENTUM; i++) {
+    const double *missing = state->work->halves->missing + 6 * i;
+    if (model->link[i].root != i || !cav_descends(model, model->link[i].body, body)) { continue; }
+    push_at(F, point, state->reference + 3 * i, missing + 3);
+    add3(F, F, missing);
   }
   double inverse_h = 1 / state->options.timestep;
   for (int i = 0; i < state->ncontact; i++) {

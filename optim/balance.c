@@ -1,10 +1,11 @@
 /// Momentum defect: how well a motion obeys the balance of linear and angular momentum that no discretisation can bend.
-/// For each tree of bodies, with c its centre of mass at the knots and L its angular momentum about c, taken half way
-/// between knots (configuration q_t (+) h v_{t+1}/2, velocity v_{t+1}):
-///   F = m (c_{t+1} - 2 c_t + c_{t-1})/h^2 - m g - sum f
+/// For each tree of bodies, with c its centre of mass at the knots, P its linear momentum and L its angular momentum about
+/// the point c_t, both taken half way between knots (configuration q_t (+) h v_{t+1}/2, velocity v_{t+1}):
+///   F = (P_{t+1/2} - P_{t-1/2})/h - m g - sum f
 ///   N = (L_{t+1/2} - L_{t-1/2})/h - sum ((p - c_t) x f + torque)
-/// over contacts with what is not of the tree. Zero to rounding for exact discrete flight, of order h^2 for a motion
-/// sampled from the continuous one.
+/// over contacts with what is not of the tree. What is lost at one knot is lost for good: the momenta after a knot are
+/// those before the next. Of order h^2 for a motion sampled from the continuous one; zero to rounding for one that
+/// obeys the step of order momentum.
 /// A tree that joints hold to the world gets forces from there which no one measures: only what its root link can do
 /// freely is balanced. F and N/0.3 m are projected on the span of the motions of the root link's dofs that no actuator
 /// and no tendon drives, seen at c; what those joints themselves exert (damping, springs, armature, limits, friction
@@ -21,8 +22,8 @@ struct cav_balance {
   int ntree;
   int *root;        // [ntree] root link
   int *tree;        // [nlink] tree of a link, -1 for the world
-  double *com;      // [(T+3)*ntree*3] at knots -1 .. T+1
-  double *momentum; // [(T+2)*ntree*3] at knots -1/2 .. T+1/2
+  double *com;      // [(T+1)*ntree*3] at the knots
+  double *momentum; // [(T+2)*ntree*9] half way, from before knot 0 on: centre of mass, P, angular momentum about it
   int *held;        // [nv] 1: driven by an actuator or a tendon, left out
   double *sum;      // [ntree] squares
   int *count;       // [ntree]
@@ -75,17 +76,16 @@ static void link_twists(const cav_audit *audit, const double *v, double *twist) 
   }
 }
 
-// angular momenta of all trees about their centres of mass at the bare state's position; out [ntree*3]
+// centres of mass of all trees, linear and angular momenta about them at the bare state's position; out [ntree*9]
 static void tree_momentum(const cav_balance *balance, const cav_audit *audit, const double *v, double *out) {
   const cav_model *model = audit->model;
   const cav_state *bare = audit->bare;
-  double com[3], arm[3], moment[3];
+  double arm[3], moment[3];
   link_twists(audit, v, balance->twist);
-  memset(out, 0, sizeof(double) * 3 * balance->ntree);
+  memset(out, 0, sizeof(double) * 9 * balance->ntree);
   for (int i = 0; i < balance->ntree; i++) {
     // centre of mass of the tree
-    double mass = balance->mass[i] > 0 ? balance->mass[i] : 1;
-    memset(com, 0, sizeof com);
+    double mass = balance->mass[i] > 0 ? balance->mass[i] : 1, *com = out + 9 * i, *linear = com + 3, *spin = com + 6;
     for (int l = 1; l < model->nlink; l++) {
       if (balance->tree[l] != i) continue;
       for (int k = 0; k < 3; k++) com[k] += model->link[l].mass * bare->com[3 * l + k] / mass;
@@ -96,11 +96,14 @@ static void tree_momentum(const cav_balance *balance, const cav_audit *audit, co
       const double *I = bare->inertia + 6 * l, *w = balance->twist + 6 * l;
       double vc[3];
       point_velocity(w, bare->reference + 3 * l, bare->com + 3 * l, vc);
-      for (int k = 0; k < 3; k++) arm[k] = bare->com[3 * l + k] - com[k];
+      for (int k = 0; k < 3; k++) {
+        arm[k] = bare->com[3 * l + k] - com[k];
+        linear[k] += model->link[l].mass * vc[k];
+      }
       cross(arm, vc, moment);
-      out[3 * i] += I[0] * w[0] + I[3] * w[1] + I[4] * w[2] + model->link[l].mass * moment[0];
-      out[3 * i + 1] += I[3] * w[0] + I[1] * w[1] + I[5] * w[2] + model->link[l].mass * moment[1];
-      out[3 * i + 2] += I[4] * w[0] + I[5] * w[1] + I[2] * w[2] + model->link[l].mass * moment[2];
+      spin[0] += I[0] * w[0] + I[3] * w[1] + I[4] * w[2] + model->link[l].mass * moment[0];
+      spin[1] += I[3] * w[0] + I[1] * w[1] + I[5] * w[2] + model->link[l].mass * moment[1];
+      spin[2] += I[4] * w[0] + I[5] * w[1] + I[2] * w[2] + model->link[l].mass * moment[2];
     }
   }
 }
@@ -126,31 +129,30 @@ static void survey(cav_balance *balance, const cav_audit *audit, double *unit, d
   for (int i = 0; i < model->ntendon_dof; i++) balance->held[model->tendon_dof[i]] = 1;
 }
 
-// centres of mass at the knots and one step either side, momenta half way
+// centres of mass at the knots, momenta half way
 static cav_status record(cav_balance *balance, const cav_audit *audit, double *q) {
   const cav_model *model = audit->model;
-  int nv = model->nv, nt3 = 3 * balance->ntree;
+  int nv = model->nv, ntree = balance->ntree;
   cav_status status = CAV_OK;
-  for (int k = -1; k <= audit->last + 1 && status == CAV_OK; k++) {
+  for (int k = -1; k <= audit->last && status == CAV_OK; k++) {
     // knot k
     if (k < 0) cav_integrate(model, audit->q, audit->v, -audit->h, q);
-    if (k >= 0 && k <= audit->last) memcpy(q, audit->q + k * model->nq, sizeof(double) * model->nq);
-    if (k > audit->last) cav_integrate(model, audit->q + audit->last * model->nq, audit->v + k * nv, audit->h, q);
+    if (k >= 0) memcpy(q, audit->q + k * model->nq, sizeof(double) * model->nq);
     status = cav_position(model, audit->bare, q);
     if (status != CAV_OK) break;
-    tree_com(balance, audit, balance->com + (k + 1) * nt3);
-    if (k > audit->last) break;
+    if (k >= 0) tree_com(balance, audit, balance->com + 3 * k * ntree);
     // half a step on
     cav_integrate(model, q, audit->v + (k + 1) * nv, audit->h / 2, q);
     status = cav_position(model, audit->bare, q);
-    if (status == CAV_OK) tree_momentum(balance, audit, audit->v + (k + 1) * nv, balance->momentum + (k + 1) * nt3);
+    if (status == CAV_OK)
+      tree_momentum(balance, audit, audit->v + (k + 1) * nv, balance->momentum + 9 * (k + 1) * ntree);
   }
   return status;
 }
 
 cav_balance *cav_balance_new(const cav_audit *audit) {
   const cav_model *model = audit->model;
-  size_t nl = (size_t)model->nlink, nv = (size_t)model->nv + 1, knots = (size_t)audit->last + 3;
+  size_t nl = (size_t)model->nlink, nv = (size_t)model->nv + 1, knots = (size_t)audit->last + 2;
   cav_balance *b = calloc(1, sizeof *b);
   double *unit = calloc(2 * nv + (size_t)model->nq, sizeof *unit);
   if (!b || !unit) {
@@ -161,7 +163,7 @@ cav_balance *cav_balance_new(const cav_audit *audit) {
   b->root = calloc(nl, sizeof *b->root);
   b->tree = calloc(nl, sizeof *b->tree);
   b->com = calloc(knots * nl * 3, sizeof *b->com);
-  b->momentum = calloc(knots * nl * 3, sizeof *b->momentum);
+  b->momentum = calloc(knots * nl * 9, sizeof *b->momentum);
   b->held = calloc(nv, sizeof *b->held);
   b->sum = calloc(nl, sizeof *b->sum);
   b->count = calloc(nl, sizeof *b->count);
@@ -210,18 +212,27 @@ static void apply(cav_balance *balance, int i, const double *com, const double *
   }
 }
 
+// angular momentum of a tree about a point; momentum [9] as tree_momentum writes it
+static void moment_about(const double *momentum, const double *point, double *out) {
+  const double arm[3] = {momentum[0] - point[0], momentum[1] - point[1], momentum[2] - point[2]};
+  cross(arm, momentum + 3, out);
+  for (int k = 0; k < 3; k++) out[k] += momentum[6 + k];
+}
+
 // balance of every tree at knot t: linear, angular about the centre of mass, N and N m
 static void wrenches(cav_balance *balance, const cav_audit *audit, int t) {
   const cav_model *model = audit->model;
   double h = audit->h;
-  int nt3 = 3 * balance->ntree;
-  const double *before = balance->com + t * nt3, *now = before + nt3, *after = now + nt3;
-  const double *spin = balance->momentum + t * nt3;
+  const double *now = balance->com + 3 * t * balance->ntree;
   for (int i = 0; i < balance->ntree; i++) {
+    const double *before = balance->momentum + 9 * (t * balance->ntree + i), *after = before + 9 * balance->ntree;
+    double *w = balance->wrench + 6 * i, change[3];
+    moment_about(after, now + 3 * i, change);
+    memcpy(w + 3, change, sizeof change);
+    moment_about(before, now + 3 * i, change);
     for (int k = 0; k < 3; k++) {
-      double a = (after[3 * i + k] - 2 * now[3 * i + k] + before[3 * i + k]) / (h * h);
-      balance->wrench[6 * i + k] = balance->mass[i] * (a - (audit->law.gravity ? model->gravity[k] : 0));
-      balance->wrench[6 * i + 3 + k] = (spin[nt3 + 3 * i + k] - spin[3 * i + k]) / h;
+      w[k] = (after[3 + k] - before[3 + k]) / h - (audit->law.gravity ? balance->mass[i] * model->gravity[k] : 0);
+      w[3 + k] = (w[3 + k] - change[k]) / h;
     }
   }
   for (int j = 0; j < audit->state->ncontact; j++) {
@@ -244,7 +255,7 @@ static double joint_force(const cav_audit *audit, int dof, int t) {
   const cav_joint *joint = model->joint + model->dof[dof].joint;
   int nv = model->nv;
   double v = audit->v[t * nv + dof], next = audit->v[(t + 1) * nv + dof];
-  double rate = audit->law.order == CAV_ORDER_MIDPOINT ? (v + next) / 2 : next;
+  double rate = audit->law.order == CAV_ORDER_EULER ? next : (v + next) / 2;
   int scalar = joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE;
   double force = -model->dof[dof].armature * (next - v) / audit->h;
   if (audit->law.passive) {
@@ -272,7 +283,7 @@ static int project(const cav_balance *balance, const cav_audit *audit, int i, in
   const cav_model *model = audit->model;
   const cav_state *state = audit->state;
   const cav_link *root = model->link + balance->root[i];
-  const double *c = balance->com + (t + 1) * 3 * balance->ntree + 3 * i;
+  const double *c = balance->com + 3 * (t * balance->ntree + i);
   double basis[6][6], force[6], share[6];
   int n = 0;
   const double *w = balance->wrench + 6 * i;

@@ -5,7 +5,7 @@
 #include "scene.h"
 
 // in the order of the enumerations of problem.h and model.h
-const char *const cav_problem_orders[] = {"euler", "midpoint", NULL};
+const char *const cav_problem_orders[] = {"euler", "midpoint", "momentum", NULL};
 const char *const cav_problem_closings[] = {"open", "rest", NULL};
 const char *const cav_problem_guesses[] = {"hold", "interpolate", NULL};
 const char *const cav_problem_quantities[] = {"sensor", "posture", "velocity", "acceleration", "effort",

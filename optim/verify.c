@@ -393,7 +393,7 @@ static void judge(const cav_audit *audit, const evidence *found, const cav_repla
   require(verdict, &found->penetration, CAV_PROMISE_PENETRATION, "penetration, m,",
           "A lower softness or smoothing at the end of the schedule usually helps.");
   require(verdict, &found->defect, CAV_PROMISE_MOMENTUM, "momentum defect, share of weight rms,",
-          "A smaller time step or the midpoint order usually helps.");
+          "The order momentum keeps it exactly; a smaller time step usually helps too.");
   const cav_finding step = {replay->step_error, replay->step_knot, "forward step from the knot against the next knot"};
   require(verdict, &step, CAV_PROMISE_STEP, "replay error, rad or m,",
           "Forward and inverse dynamics disagree: please report it.");

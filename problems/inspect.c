@@ -357,7 +357,7 @@ static cav_status print_posture(const cav_problem *p, const char *name, const do
 }
 
 static cav_status print_problem(const cav_problem *p, cav_error *error) {
-  static const char *const order[] = {"euler", "midpoint"};
+  static const char *const order[] = {"euler", "midpoint", "momentum"};
   int knots = (int)lround(p->duration / p->timestep) + 1;
   printf("problem %s\n", p->name[0] ? p->name : "without a name");
   printf("  %g s in %d knots of %g s, order %s, %s\n", p->duration, knots, p->timestep, order[p->order],

@@ -168,7 +168,7 @@ static void stages(bench *b) {
   int nv = b->model->nv;
   double *whole = scene_vector(nv);
   for (int k = 0; k < 40; k++) {
-    b->state->options.order = k % 2 ? CAV_ORDER_MIDPOINT : CAV_ORDER_EULER;
+    b->state->options.order = (cav_order)(k % 3);
     random_state(b);
     CHECK(run(b) == CAV_OK);
     scene_normals(b->v_next, nv, 1);

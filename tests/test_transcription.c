@@ -460,5 +460,10 @@ int main(void) {
   test_scene(walker, moved, CAV_ORDER_MIDPOINT);
   test_scene(roped, turned, CAV_ORDER_MIDPOINT);
   test_scene(sided, mirrored, CAV_ORDER_MIDPOINT);
+  test_scene(walker, rest, CAV_ORDER_MOMENTUM);
+  test_scene(walker, open, CAV_ORDER_MOMENTUM);
+  test_scene(roped, rest, CAV_ORDER_MOMENTUM);
+  test_scene(served, timed, CAV_ORDER_MOMENTUM);
+  test_scene(roped, turned, CAV_ORDER_MOMENTUM);
   return check_result();
 }

@@ -91,7 +91,7 @@ typedef struct cav_state {
   cav_row *row;         ///< [nrow]
   cav_tie *tie;         ///< [ntie] one for each equality constraint, in their order
 
-  // velocity: filled from q and v (euler) or the mean of v and v_next (midpoint)
+  // velocity: filled from q and v (euler) or the mean of v and v_next (midpoint, momentum)
   double *velocity;      ///< [nlink*6] spatial velocity of each link at the velocity the bias is taken
   double *velocity_next; ///< [nlink*6] spatial velocity of each link at v_next
 
@@ -118,7 +118,8 @@ typedef enum cav_stage {
 /// Poses, motion subspaces, tendon lengths, contacts and limits at q [nq]. Fails with CAV_NOT_FINITE or CAV_NO_MEMORY.
 cav_status cav_position(const cav_model *model, cav_state *state, const double *q);
 
-/// Generalised force that takes v to v_next in one step: u = RNE(q, v, a) + D a - p - (J' f)/h, a = (v_next - v)/h.
+/// Generalised force that takes v to v_next in one step: u = RNE(q, v, a) + D a - p - (J' f)/h, a = (v_next - v)/h. Under
+/// the order momentum the change of the momenta of links stands for RNE.
 /// q [nq], v, v_next [nv] -> u [nv], N or N m. D = armature (+ h B for euler). Forms no matrix.
 /// Fails with CAV_NOT_FINITE, u untouched. Todorov 2014, eqs. (2), (19)-(22).
 cav_status cav_inverse(const cav_model *model, cav_state *state, const double *q, const double *v, const double *v_next,

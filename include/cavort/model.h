@@ -367,10 +367,11 @@ typedef struct cav_key {
   const double *v; ///< [nv]
 } cav_key;
 
-/// Which velocity the bias force c and the passive force p are evaluated at; optimisation.md, 1.
+/// Which velocity the bias force c and the passive force p are evaluated at, or what takes their place; optimisation.md, 1.
 typedef enum cav_order {
-  CAV_ORDER_EULER,   ///< at v; joint damping at v_next (implicit). The paper's step
-  CAV_ORDER_MIDPOINT ///< at (v + v_next)/2, damping too; second order where it matters
+  CAV_ORDER_EULER,    ///< at v; joint damping at v_next (implicit). The paper's step
+  CAV_ORDER_MIDPOINT, ///< at (v + v_next)/2, damping too; second order where it matters
+  CAV_ORDER_MOMENTUM ///< inertial forces from momenta half a step before and after, which they keep exactly; p as midpoint
 } cav_order;
 
 /// How v* is made from a constraint's position error; dynamics.md, 4.

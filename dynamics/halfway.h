@@ -1,0 +1,55 @@
+/// The order `momentum`: what trees of links weigh and how they move half a step before and after a knot. Private to dynamics/.
+#ifndef CAVORT_HALFWAY_H
+#define CAVORT_HALFWAY_H
+
+#include "workspace.h"
+
+/// Links half way: at q (-) h v/2 with v, or at q (+) h v_next/2 with v_next. Spatial vectors about the references of the
+/// state, which are points fixed in space for both.
+typedef struct cav_half {
+  double sign; ///< -1 before, 1 after the knot
+  double *q;   ///< [nq]
+  cav_pose *link;
+  double *com, *inertia, *axis; ///< as in cav_state
+  double *velocity, *momentum;  ///< [nlink*6] of each link
+
+  // for derivatives, halfway_slope.c
+  double *composite, *whole; ///< [nlink*10], [nlink*6] inertia and momentum of subtrees
+  double *by_q,
+      *by_v; ///< [nv*12] by each dof of q and of the velocity: twist of what it moves, what inertia multiplies
+} cav_half;
+
+typedef struct cav_halves {
+  cav_half before, after;
+  int fresh;       ///< before is of the state's position,
+  double timestep; ///< of this step
+  double *v;       ///< [nv] and of this velocity
+  double
+      *missing; ///< [nlink*6] of root links: what their trees' change of momentum has over the sum of inertial forces
+  double
+      *inner; ///< [nlink*6] sums of inertial forces over subtrees; of whole trees, of root links, what stands for them
+  size_t bytes;
+} cav_halves;
+
+/// Memory of the halves of a state, at its first use. CAV_NO_MEMORY.
+cav_status cav_halves_make(const cav_model *model, cav_state *state);
+
+/// After cav_newton_euler: adds to the wrench of each root link what is missing to the change of momentum of its tree, from
+/// half a step before to half a step after the position, v and v_next of the workspace. Where only v_next is new, what is before
+/// is kept.
+void cav_halves_forces(const cav_model *model, cav_state *state);
+
+/// Whether a dof is one of a root link: its row is that of momentum.
+static inline int cav_moves_root(const cav_model *model, int dof) {
+  int link = model->dof[dof].link;
+  return model->link[link].root == link;
+}
+
+/// What the derivatives of the rows of root links are made of, at the state's last evaluation.
+void cav_halves_slopes(const cav_model *model, cav_state *state);
+
+/// Then column j of those rows in du/dq, du/dv and du/dv_next [nv*nv], added. Forces on the subtree of j that are carried
+/// along, whatever they are, are in it.
+void cav_halves_column(const cav_model *model, const cav_state *state, int j, double *dq, double *dv, double *dn);
+
+#endif
