@@ -14,10 +14,10 @@ static const double APPROACH_SPEED = 5;
 
 /// A pair as the broad phase wants it: all it reads, in order.
 typedef struct candidate {
-  int first, second;     ///< slots
-  int plane, same_world; ///< 1 if the first geom is a plane; as in the pair
-  double margin;         ///< of the pair
-  double bound;          ///< sum of bounding radii; of the second geom alone if the first is a plane
+  int first, second; ///< slots
+  int plane, outer;  ///< 1 if the first geom is a plane; as in the pair
+  double margin;     ///< of the pair
+  double bound;      ///< sum of bounding radii; of the second geom alone if the first is a plane
 } candidate;
 
 /// A geom in some pair.
@@ -67,7 +67,7 @@ static void open_slots(const cav_model *model, struct cav_geom_cache *cache, int
     candidate *c = cache->candidate + p;
     c->first = slot_of[pair->geom1];
     c->second = slot_of[pair->geom2];
-    c->same_world = pair->same_world;
+    c->outer = pair->outer;
     c->margin = pair->margin;
     c->plane = a->type == CAV_GEOM_PLANE;
     c->bound = b->bound + (c->plane ? 0 : a->bound);
@@ -107,7 +107,7 @@ void cav_geom_cache_free(struct cav_geom_cache *cache) {
 
 double cav_reach(const cav_state *state, const cav_pair *pair) {
   const cav_options *o = &state->options;
-  double delta = o->smoothing > 0 ? (pair->same_world ? o->smoothing : o->smoothing_self) : 0;
+  double delta = o->smoothing > 0 ? (pair->outer ? o->smoothing : o->smoothing_self) : 0;
   return pair->margin + cav_law_reach(state, delta, APPROACH_SPEED);
 }
 
@@ -184,11 +184,11 @@ cav_status cav_collide(const cav_model *model, cav_state *state) {
   struct cav_geom_cache *cache = state->work->geom;
   place(state, cache);
   // reach is the margin plus one of two distances: found once, not per pair
-  const cav_pair alone[2] = {{.same_world = 0}, {.same_world = 1}};
+  const cav_pair alone[2] = {{.outer = 0}, {.outer = 1}};
   double reach[2] = {cav_reach(state, alone), cav_reach(state, alone + 1)};
   for (int p = 0; p < model->npair; p++) {
     const candidate *c = cache->candidate + p;
-    double margin = c->margin + reach[c->same_world];
+    double margin = c->margin + reach[c->outer];
     if (!near(cache, c, margin)) continue;
     cav_touch touch[CAV_TOUCH_MAX];
     const cav_shape *a = shape_of(state, cache, c->first), *b = shape_of(state, cache, c->second);

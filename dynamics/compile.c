@@ -800,6 +800,16 @@ static void fill_sensors(builder *b) {
   }
 }
 
+// the list of filter.c, and which pairs are not two parts of one body
+static void fill_pairs(builder *b) {
+  const cav_model *m = b->model;
+  for (int i = 0; i < m->npair; i++) {
+    b->pair[i] = b->pairs[i];
+    int one = b->geom[b->pair[i].geom1].link, other = b->geom[b->pair[i].geom2].link;
+    b->pair[i].outer = one == 0 || other == 0 || b->link[one].root != b->link[other].root;
+  }
+}
+
 // keyframes are of the model's own coordinates; those of a scene come after them and stay where they stand
 static void fill_keys(builder *b) {
   cav_spec *spec = b->spec;
@@ -906,7 +916,7 @@ static void fill(builder *b) {
   if (running(b)) fill_sensors(b);
   if (running(b)) fill_keys(b);
   set_options(b);
-  if (b->model->npair) memcpy(b->pair, b->pairs, (size_t)b->model->npair * sizeof *b->pair);
+  fill_pairs(b);
   for (int i = 0; i < b->model->nwarning; i++) b->warning[i] = put_text(b, b->spec->warning.at[i]);
 }
 

@@ -112,7 +112,7 @@ static double smoothing_scale(const cav_law *l, double delta) {
   return delta > 0 ? l->stiffness * delta / sqrt(l->regulariser) : 0;
 }
 
-// distance over which limits and contacts between moving links are smoothed
+// distance over which limits and contacts between links of one tree are smoothed
 static double self_smoothing(const cav_state *state) {
   return state->options.smoothing > 0 ? state->options.smoothing_self : 0;
 }
@@ -268,7 +268,7 @@ static double round_thickness(const cav_model *model, const cav_pair *pair) {
 
 double cav_contact_share(const cav_state *state, const cav_contact *c, double *rate) {
   const cav_pair *pair = &state->model->pair[c->pair];
-  double share = pair->same_world ? 1 : state->options.self_share, slope;
+  double share = pair->outer ? 1 : state->options.self_share, slope;
   *rate = 0;
   if (!(state->options.smoothing > 0)) return share;
   double reach = cav_reach(state, pair), width = FADING * reach;
@@ -287,7 +287,7 @@ static void soften_contact(cav_state *state, cav_contact *c, double inverse_impr
   double rate, weight = pair->weight[0] / cav_contact_share(state, c, &rate);
   cav_law l = row_law(state, &pair->softness, c->dist - c->margin, weight);
   c->stiffness = l.stiffness;
-  c->sigma = smoothing_scale(&l, pair->same_world ? state->options.smoothing : self_smoothing(state));
+  c->sigma = smoothing_scale(&l, pair->outer ? state->options.smoothing : self_smoothing(state));
   c->regulariser[0] = l.regulariser;
   c->damping[0] = l.damping;
   for (int k = 1; k < c->dim; k++) {

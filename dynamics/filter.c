@@ -115,7 +115,6 @@ static cav_pair *push(cav_spec *spec, list *l, const cav_geom *geom, int g1, int
   }
   cav_pair *pair = &l->at[l->n++];
   *pair = (cav_pair){.geom1 = swap ? g2 : g1, .geom2 = swap ? g1 : g2};
-  pair->same_world = geom[g1].link == 0 || geom[g2].link == 0;
   mix(&geom[pair->geom1], &geom[pair->geom2], pair);
   return pair;
 }

@@ -134,7 +134,7 @@ cav_status cav_rows(const cav_model *model, cav_state *state);
 void cav_soften(cav_state *state);
 
 /// Share of its stiffness that a contact has, by which its R is divided, and the rate of its logarithm by the distance:
-/// self_share between moving links. Where the law is smoothed it fades out towards the end of its reach, so that what
+/// self_share between links of one tree. Where the law is smoothed it fades out towards the end of its reach, so that what
 /// comes faster than the reach foresees does not jump, and where the axes of two spheres or capsules meet, so that the force
 /// does not jump as the normal changes side; that is deeper than half the sum of their radii. constraint.c.
 double cav_contact_share(const cav_state *state, const cav_contact *contact, double *rate);

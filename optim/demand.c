@@ -176,7 +176,7 @@ static int contact_values(const cav_audit *audit, const cav_term *term, double *
     if (term->quantity == CAV_QUANTITY_SLIP) value = contact->dim > 1 ? hypot(rate[1], rate[2]) : 0;
     if (term->quantity == CAV_QUANTITY_IMPACT) value = fabs(rate[0]);
     if (term->quantity == CAV_QUANTITY_OVERLAP) {
-      int moving = !audit->model->pair[contact->pair].same_world;
+      int moving = !audit->model->pair[contact->pair].outer;
       load = 1, value = moving ? fmax(-contact->dist, 0) : 0;
     }
     x[i] = load * value;

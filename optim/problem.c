@@ -338,7 +338,6 @@ static cav_status read_guess_poses(const cav_problem_reader *reader, const cav_x
                           p->duration, time);
     }
     cav_status status = cav_problem_pose(reader, w, q);
-    if (!status) status = check_ranges(reader, w, q);
     if (status) return status;
     list[p->nguess_pose++] = (cav_guess_pose){time, q};
     before = time;

@@ -19,7 +19,7 @@ typedef struct readings {
 
 static void read_contact(const cav_transcription *tr, const cav_contact *c, double *y) {
   memset(y, 0, 4 * sizeof *y);
-  if (!tr->model->pair[c->pair].same_world) {
+  if (!tr->model->pair[c->pair].outer) {
     y[0] = fmax(-c->dist, 0);
     return;
   }
@@ -88,7 +88,7 @@ int cav_readings_list(cav_transcription *tr, cav_scratch *s, int t) {
   if (knot->has_force) {
     for (int k = 0; k < s->state->ncontact; k++) {
       const cav_contact *c = &s->state->contact[k];
-      int self = !tr->model->pair[c->pair].same_world;
+      int self = !tr->model->pair[c->pair].outer;
       if (self ? c->dist > 0 : c->impulse[0] < contact_floor * tr->h * tr->weight) continue;
       moving[ncontact] = (char)self;
       s->key[2 * ncontact] = c->pair;
@@ -146,7 +146,7 @@ static const cav_contact *find_contact(const cav_state *state, const int key[2])
   return NULL;
 }
 
-/// Derivatives of the overlap of two moving links.
+/// Derivatives of the overlap of two links of one tree.
 static cav_status overlap_rows(const cav_transcription *tr, const cav_scratch *s, const cav_contact *c, rows out) {
   size_t n = (size_t)tr->nv;
   memset(out.dq, 0, 4 * n * sizeof(double));

@@ -576,7 +576,7 @@ static void add_effort(sum *a, const cav_term *term, double weight) {
   }
 }
 
-/// Readings first .. first+n-1 of the contacts with the world, or of those between moving links.
+/// Readings first .. first+n-1 of the contacts between trees or with the world, or of those within one tree.
 static void add_contact(sum *a, const cav_term *term, double weight, int first, int n, int self) {
   weight /= term->scale * term->scale;
   for (int k = 0; k < a->knot->ncontact; k++) {

@@ -49,7 +49,7 @@ typedef struct cav_knot {
   double *du;             ///< [nv*3nv] row-major
   int nread, ncontact;    ///< readings beside u: 4 a contact, then sensors
   int room;               ///< readings for which y, dy have space
-  char *moving;           ///< [ncontact] 1: between two moving links, its first reading is the depth
+  char *moving;           ///< [ncontact] 1: between two links of one tree, its first reading is the depth
   double *y;              ///< [nread]
   double *dy;             ///< [nread*3nv]
   int ndense, dense_room; ///< rows over all columns, weighted, that make up the Hessian beside the sparse ones

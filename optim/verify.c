@@ -364,7 +364,7 @@ static const char *left_out(const cav_audit *audit) {
   if (own->constraint && !law->constraint) return "constraints";
   if (own->contact && !law->contact) return "contacts";
   if (own->passive && !law->passive) return "springs and dampers";
-  if (law->self_share != 1) return "full contacts between moving links (self_share below 1)";
+  if (law->self_share != 1) return "full contacts between links of one tree (self_share below 1)";
   return NULL;
 }
 

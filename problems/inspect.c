@@ -115,8 +115,9 @@ static void count_joints(const cav_model *m, census *c) {
 static void count_pairs(const cav_model *m, census *c) {
   for (int p = 0; p < m->npair; p++) {
     const cav_pair *pair = &m->pair[p];
-    c->world_pair += pair->same_world;
-    c->body_pair += !pair->same_world;
+    int world = !m->geom[pair->geom1].link || !m->geom[pair->geom2].link;
+    c->world_pair += world;
+    c->body_pair += !world;
     c->dim[pair->dim]++;
     c->types[m->geom[pair->geom1].type][m->geom[pair->geom2].type]++;
   }
@@ -252,7 +253,7 @@ static void print_quantity(const cav_problem *p, const cav_term *term) {
                                          "gap of loaded contacts",
                                          "slip of loaded contacts",
                                          "impact of loaded contacts",
-                                         "overlap of moving links"};
+                                         "overlap of links"};
   static const char *const dofs[] = {"all dofs", "translation of free roots", "rotation of free roots",
                                      "all but free roots", "joint"};
   const cav_model *m = p->model;

@@ -37,7 +37,7 @@ static cav_status lowest_gap(const cav_model *m, cav_state *state, const double 
   cav_status status = cav_position(m, state, q);
   *gap = INFINITY;
   for (int i = 0; i < state->ncontact && !status; i++)
-    if (m->pair[state->contact[i].pair].same_world) *gap = fmin(*gap, state->contact[i].dist);
+    if (m->pair[state->contact[i].pair].outer) *gap = fmin(*gap, state->contact[i].dist);
   return status;
 }
 

@@ -71,7 +71,7 @@ static void fill(heap *h) {
       if (h->geom[a].link == h->geom[b].link || !cav_collide_supported(h->geom[a].type, h->geom[b].type)) continue;
       cav_pair *p = h->pair + m->npair++;
       *p = (cav_pair){.geom1 = swap ? b : a, .geom2 = swap ? a : b, .dim = 3, .friction = {1, 1, 0.1, 0.2, 0.3}};
-      p->same_world = !h->geom[a].link || !h->geom[b].link;
+      p->outer = !h->geom[a].link || !h->geom[b].link;
       p->margin = uniform(0, 0.1);
       p->gap = p->margin / 3;
     }
@@ -160,7 +160,7 @@ static void test_reach(void) {
   fill(&h);
   cav_state *state = cav_state_new(&h.model);
   if (!CHECK(state != NULL)) return;
-  cav_pair moving = {.margin = 0.02}, grounded = {.margin = 0.02, .same_world = 1};
+  cav_pair moving = {.margin = 0.02}, grounded = {.margin = 0.02, .outer = 1};
   CHECK_NEAR(cav_reach(state, &moving), 0.02, 0);
   state->options.smoothing = 0.03;
   state->options.smoothing_self = 0.01;

@@ -137,8 +137,6 @@ static void check_broken(void) {
   refuse(HEAD "<guess>\n<waypoint time='1'/></guess>" TAIL, 6, "before the goal");
   refuse(HEAD "<guess>\n<waypoint time='.5'/>\n<waypoint time='.5'/></guess>" TAIL, 7, "after the posture before");
   refuse(HEAD "<guess type='hold'>\n<waypoint time='.5'/></guess>" TAIL, 6, "contradicts type='hold'");
-  refuse(HEAD "<guess>\n<waypoint time='.5'><joint name='knee' pos='1'/></waypoint></guess>" TAIL, 6,
-         "outside its range");
 }
 
 int main(void) {

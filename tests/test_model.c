@@ -490,7 +490,7 @@ static void test_humanoid(void) {
     double deepest = 1, inner = 1, com[3], still[27] = {0};
     for (int k = 0; k < state->ncontact; k++) {
       const cav_contact *c = &state->contact[k];
-      double *least = m->pair[c->pair].same_world ? &deepest : &inner;
+      double *least = m->pair[c->pair].outer ? &deepest : &inner;
       *least = fmin(*least, c->dist);
     }
     // penetration 0.5 mm by design, to the six digits that the file gives

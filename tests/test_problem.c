@@ -135,7 +135,7 @@ static double lowest(const cav_model *model, const double *q) {
   state->options.smoothing = state->options.smoothing_self = 1;
   if (cav_position(model, state, q) == CAV_OK) {
     for (int i = 0; i < state->ncontact; i++) {
-      if (model->pair[state->contact[i].pair].same_world) least = fmin(least, state->contact[i].dist);
+      if (model->pair[state->contact[i].pair].outer) least = fmin(least, state->contact[i].dist);
     }
   }
   cav_state_free(state);

@@ -254,7 +254,7 @@ typedef struct cav_site {
 typedef struct cav_pair {
   int geom1, geom2;   ///< geom1's type <= geom2's type
   int dim;            ///< 1, 3, 4 or 6 rows
-  int same_world;     ///< 1 if one of the two does not move
+  int outer;          ///< 1 if one of the two stands in the world, or they hang from the world by different roots
   double friction[5]; ///< two tangential, torsional (m), two rolling (m)
   double margin, gap; ///< m
   cav_softness softness;
@@ -396,14 +396,14 @@ typedef struct cav_options {
   double softness;       ///< epsilon of CAV_STABILISATION_DISCRETE, > 0
   double time_constant;  ///< kappa of CAV_STABILISATION_DISCRETE, s; 0: deadbeat
   double smoothing;      ///< delta, m: distance at which the smoothed law is felt; 0: the exact law (dynamics.md, 3)
-  double smoothing_self; ///< delta between two moving links, m, used where smoothing > 0
-  double self_share;     ///< share of their stiffness that contacts between two moving links get, (0, 1]; 1: the law
-  double impratio;       ///< R_normal / R_friction, > 0
-  int guard;             ///< 1: keep solref time constants >= 2 h
-  int contact;           ///< 0: no contacts
-  int constraint;        ///< 0: no equality constraints, limits, friction loss or contacts
-  int gravity;           ///< 0: none
-  int passive;           ///< 0: no springs and dampers
+  double smoothing_self; ///< delta between two links of one tree, m, used where smoothing > 0
+  double self_share; ///< share of their stiffness that contacts between two links of one tree get, (0, 1]; 1: the law
+  double impratio;   ///< R_normal / R_friction, > 0
+  int guard;         ///< 1: keep solref time constants >= 2 h
+  int contact;       ///< 0: no contacts
+  int constraint;    ///< 0: no equality constraints, limits, friction loss or contacts
+  int gravity;       ///< 0: none
+  int passive;       ///< 0: no springs and dampers
 } cav_options;
 
 /// A compiled model. Built by cav_model_load, never changed afterwards.

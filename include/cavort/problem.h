@@ -19,7 +19,7 @@ typedef enum cav_quantity {
   CAV_QUANTITY_GAP,           ///< sqrt(f_n/weight) * max(gap, 0) of every contact, m: force only where there is touch
   CAV_QUANTITY_SLIP,          ///< sqrt(f_n/weight) * tangential velocity of every contact, m/s
   CAV_QUANTITY_IMPACT,        ///< sqrt(f_n/weight) * normal velocity of every contact, m/s
-  CAV_QUANTITY_OVERLAP,       ///< depth of every contact between two moving links, m
+  CAV_QUANTITY_OVERLAP,       ///< depth of every contact between two links of one tree, m
   CAV_QUANTITY_TYPES
 } cav_quantity;
 
@@ -93,8 +93,8 @@ typedef struct cav_stage_options {
   double softness;       ///< epsilon of the contacts
   double time_constant;  ///< kappa, in steps of the horizon (0: deadbeat)
   double smoothing;      ///< delta, m
-  double smoothing_self; ///< delta between moving links and of limits, m (rad)
-  double self_share;     ///< share of the stiffness of contacts between moving links, (0, 1]; ends at 1
+  double smoothing_self; ///< delta between links of one tree and of limits, m (rad)
+  double self_share;     ///< share of the stiffness of contacts between links of one tree, (0, 1]; ends at 1
   double penalty;        ///< weight of the unactuated force (share of weight, squared)
   int iterations;        ///< at most
   double tolerance;      ///< relative decrease below which, twice in a row, the stage ends
