@@ -10,7 +10,7 @@
 ///
 /// Hard ones are the same with R_E = 0 and the pseudo-inverse of A_E for S.
 ///
-/// Starts from the impulses of the last solve on the same state, matched object by object. For midpoint the smooth
+/// Starts from the impulses of the last solve on the same state, matched object by object. For midpoint and momentum the smooth
 /// forces are taken anew after each sweep. The exact law only: the smoothed one has no bounded dual; use
 /// cav_forward_newton.
 #include <math.h>

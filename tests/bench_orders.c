@@ -1,5 +1,5 @@
 /// Error against run time of the orders of the step, on one thread. Forces: the inverse along a prescribed flight of a humanoid
-/// whose joints swing at 4 to 12 rad/s, against that of a step a hundred times finer; and what an inverse, its analytic
+/// whose joints swing at up to 6 rad/s, against that of a step a hundred times finer; and what an inverse, its analytic
 /// derivatives and a Gauss-Newton iteration take. Motion: the humanoid thrown without weight, its joints free or at work,
 /// forwards, against a step much finer; with what becomes of momentum (half way between knots, where momentum keeps it) and
 /// energy. Velocities start half a step back, as the steps read them (optimisation.md, 1). Times are the shortest of several.
@@ -17,7 +17,7 @@ static cav_model *m;
 static cav_state *state;
 static double *amplitude, *rate, *phase;
 
-// of this process alone: flights last longer than a turn of the scheduler
+// of this process alone, for what lasts longer than a turn of the scheduler
 static double cpu_seconds(void) {
   struct timespec t;
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
@@ -96,11 +96,11 @@ static double iteration_time(cav_order order) {
     cav_guess_fill(p, p->q_goal, at);
     cav_stage_set(p, 2, 3, tr);
     for (int r = 0; r < 3 * RUNS; r++) {
-      double start = bench_seconds();
+      double start = cpu_seconds();
       CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
       cav_normal_gather(normal, tr);
       CHECK(cav_normal_factor(normal, 1e-6) == CAV_OK);
-      best = fmin(best, 1e3 * (bench_seconds() - start));
+      best = fmin(best, 1e3 * (cpu_seconds() - start));
     }
   }
   cav_trajectory_free(at);

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Writes the tables of tests/results anew, each with machine, compiler and commit. Usage: sh tests/results.sh [NAME...], default
-# all of: inverse (time against MuJoCo, needs it and the shared models), conservation (drift of energy and momentum), absent
-# (what features cost where a scene has none of them), sensors, tendons, actuation, fluid (readings, strings, drives and
+# all of: inverse (time against MuJoCo, needs it and the shared models), conservation (drift of energy and momentum), orders
+# (error of the orders of the step against their time), absent (what features cost where a scene has none of them), sensors, tendons, actuation, fluid (readings, strings, drives and
 # drag against MuJoCo's).
 # CAVORT_BUILD names a build folder, by default build.
 set -eu
@@ -62,15 +62,16 @@ absent() {
   } >"$out/absent.txt"
 }
 
-for name in ${*:-inverse conservation sensors tendons actuation fluid absent}; do
+for name in ${*:-inverse conservation orders sensors tendons actuation fluid absent}; do
   case $name in
     inverse) run inverse bench_inverse ;;
     conservation) run conservation test_conservation ;;
+    orders) run orders bench_orders ;;
     sensors) run sensors test_sensor ;;
     tendons) run tendons test_tendon ;;
     actuation) run actuation test_actuation ;;
     fluid) run fluid test_fluid ;;
     absent) absent ;;
-    *) echo "usage: sh tests/results.sh [inverse|conservation|sensors|tendons|actuation|fluid|absent]..." >&2 && exit 2 ;;
+    *) echo "usage: sh tests/results.sh [inverse|conservation|orders|sensors|tendons|actuation|fluid|absent]..." >&2 && exit 2 ;;
   esac
 done

@@ -298,6 +298,8 @@ int main(void) {
   wrong_calls();
   model = scene_load(scene_joints);
   check_model("joints", STATES);
+  model = cav_model_load(CAVORT_SOURCE_ROOT "/problems/humanoid.xml", NULL);
+  check_model("our humanoid", 8);
 #ifdef CAVORT_HAVE_CCD
   model = scene_load(shapes);
   check_model("shapes", STATES);

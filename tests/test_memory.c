@@ -132,6 +132,14 @@ static void call_analytic(bed *b, const double *q, const double *v, const double
   CHECK(status == CAV_OK || status == CAV_NOT_SUPPORTED);
 }
 
+static void call_momentum(bed *b, const double *q, const double *v, const double *x) {
+  b->state->options.order = CAV_ORDER_MOMENTUM;
+  call_inverse(b, q, v, x);
+  call_forward(b, q, v, x);
+  call_analytic(b, q, v, x);
+  b->state->options.order = CAV_ORDER_EULER;
+}
+
 static void call_readings(bed *b, const double *q, const double *v, const double *x) {
   const cav_model *m = b->model;
   double com[3], speed[3], spin[3];
@@ -148,7 +156,8 @@ static const struct {
   const char *name;
   void (*call)(bed *, const double *, const double *, const double *);
 } hot[] = {{"inverse", call_inverse},   {"forward", call_forward},   {"gpgs", call_gpgs},
-           {"jacobian", call_jacobian}, {"analytic", call_analytic}, {"readings", call_readings}};
+           {"jacobian", call_jacobian}, {"analytic", call_analytic}, {"momentum", call_momentum},
+           {"readings", call_readings}};
 
 // all points once to make room, then again with the count held
 static void test_hot(const char *path) {
@@ -268,6 +277,11 @@ static cav_status inverse(bed *b, cav_state *state) {
   return cav_inverse(b->model, state, b->q, b->v, b->v_next, b->scratch);
 }
 
+static cav_status momentum(bed *b, cav_state *state) {
+  state->options.order = CAV_ORDER_MOMENTUM;
+  return cav_inverse(b->model, state, b->q, b->v, b->v_next, b->scratch);
+}
+
 static cav_status forward(bed *b, cav_state *state) {
   return cav_forward(b->model, state, b->q, b->v, b->u, b->scratch);
 }
@@ -284,6 +298,7 @@ static cav_status jacobian(bed *b, cav_state *state) {
 }
 
 static cav_status try_inverse(void *context, double *result) { return with_state(context, inverse, result); }
+static cav_status try_momentum(void *context, double *result) { return with_state(context, momentum, result); }
 static cav_status try_forward(void *context, double *result) { return with_state(context, forward, result); }
 static cav_status try_gpgs(void *context, double *result) { return with_state(context, gpgs, result); }
 static cav_status try_jacobian(void *context, double *result) { return with_state(context, jacobian, result); }
@@ -296,6 +311,7 @@ static void test_states(void) {
   b.q[2] = 0.05;
   fail_each("state", try_state, &b, 100, 0);
   fail_each("inverse", try_inverse, &b, 100, 0);
+  fail_each("momentum", try_momentum, &b, 100, 0);
   memset(b.u, 0, (size_t)b.model->nv * sizeof *b.u);
   fail_each("forward", try_forward, &b, 100, 0);
   fail_each("gpgs", try_gpgs, &b, 100, 0);

@@ -371,7 +371,8 @@ typedef struct cav_key {
 typedef enum cav_order {
   CAV_ORDER_EULER,    ///< at v; joint damping at v_next (implicit). The paper's step
   CAV_ORDER_MIDPOINT, ///< at (v + v_next)/2, damping too; second order where it matters
-  CAV_ORDER_MOMENTUM ///< inertial forces from momenta half a step before and after, which they keep exactly; p as midpoint
+  /// as midpoint, but the rows of a root link balance the momentum of its tree half a step before and after: exact in flight
+  CAV_ORDER_MOMENTUM
 } cav_order;
 
 /// How v* is made from a constraint's position error; dynamics.md, 4.
