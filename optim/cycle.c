@@ -14,6 +14,7 @@
 static const double near = 1e-6;       // m and shares: what files leave open
 static const double alike = 1e-6;      // share of the largest force by which two images may differ
 static const double golden = 0.618034; // states are drawn by its multiples
+static const double inside = 0.02;     // rad or m from a limit, where it does not act
 enum { STATES = 3 };
 
 struct cav_wrap {
@@ -125,6 +126,18 @@ void cav_wrap_pattern(const cav_wrap *wrap, int way, const char *seen, char *out
   for (int k = 0; k < wrap->entries; k++) {
     int i = way > 0 ? wrap->row[k] : wrap->column[k], j = way > 0 ? wrap->column[k] : wrap->row[k];
     out[i] |= seen[j];
+  }
+}
+
+void cav_wrap_range(const cav_wrap *wrap, int joint, double range[2]) {
+  const cav_model *m = wrap->model;
+  const cav_image *image = &wrap->image[joint];
+  const cav_joint *a = &m->joint[joint], *b = &m->joint[image->joint];
+  int scalar = a->type == CAV_JOINT_HINGE || a->type == CAV_JOINT_SLIDE;
+  for (int k = 0; k < 2; k++) {
+    double other = b->range[scalar && image->sign < 0 ? 1 - k : k];
+    if (scalar) other = m->q0[a->q] + image->sign * (other - m->q0[b->q]);
+    range[k] = k ? fmin(a->range[k], other) : fmax(a->range[k], other);
   }
 }
 
@@ -280,6 +293,18 @@ static cav_status fit_actuators(const cav_wrap *w, const cav_state *state, doubl
 /// A number in -1 .. 1, by a fixed sequence.
 static double draw(int *count) { return 2 * fmod(++*count * golden, 1) - 1; }
 
+/// Brings joints into the ranges of themselves and their images, whose limits may differ.
+static void clip(const cav_wrap *w, double *q) {
+  const cav_model *m = w->model;
+  for (int j = 0; j < m->njoint && w->mirror; j++) {
+    const cav_joint *joint = &m->joint[j];
+    double range[2], *x = q + joint->q;
+    if (!joint->limited || joint->type == CAV_JOINT_BALL || joint->type == CAV_JOINT_FREE) continue;
+    cav_wrap_range(w, j, range);
+    *x = fmin(fmax(*x, range[0] + inside), range[1] - inside);
+  }
+}
+
 /// The forces of images are images of forces.
 static cav_status fit_forces(const cav_wrap *w, const cav_problem *problem, cav_state *state, double *work,
                              cav_error *error) {
@@ -290,6 +315,7 @@ static cav_status fit_forces(const cav_wrap *w, const cav_problem *problem, cav_
   for (int s = 0; s < STATES; s++) {
     for (int d = 0; d < nv; d++) v[d] = 0.3 * draw(&count);
     cav_integrate(m, problem->q_start, v, s ? 1 : 0.05, q);
+    clip(w, q);
     for (int d = 0; d < nv; d++) v[d] = draw(&count), next[d] = v[d] + 0.1 * draw(&count);
     cav_wrap_configuration(w, 1, q, moved);
     cav_wrap_tangent(w, 1, v, pv);

@@ -28,6 +28,9 @@ void cav_wrap_point(const cav_wrap *wrap, const double p[3], double out[3]);
 /// The link that takes a link's place one period on.
 int cav_wrap_link(const cav_wrap *wrap, int link);
 
+/// Range of a joint within which its image is in its own too.
+void cav_wrap_range(const cav_wrap *wrap, int joint, double range[2]);
+
 /// A motion of several periods from one of them, whose last knot is its first one moved: q, v and the forces of its knots but
 /// the last. NULL if memory runs out.
 cav_trajectory *cav_wrap_unroll(const cav_wrap *wrap, const cav_trajectory *period, int periods);

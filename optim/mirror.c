@@ -3,8 +3,8 @@
 /// l and r, FL and FR); all others stand for themselves. With M the reflection, at the configuration of the file q0: anchors
 /// go to M p, axes of slides to M a, axes of hinges, which are pseudovectors, to -M a; the signs that are left over are those of the
 /// coordinates. A rotation away from q0 is conjugated by N = R0' M R0_image, which is improper; -N is what is kept.
-/// Checked here: geometry, masses, ranges and efforts, each with a name in the complaint. What no one can list (contacts,
-/// springs, tendons) cycle.c checks by the forces themselves.
+/// Checked here: geometry and masses, each with a name in the complaint. What no one can list (contacts, springs, tendons) cycle.c
+/// checks by the forces themselves; ranges may differ, and what both allow holds.
 #include <ctype.h>
 #include <math.h>
 #include <stdlib.h>
@@ -173,15 +173,7 @@ static cav_status fit_joint(const cav_model *m, const cav_state *state, int axis
     to_quaternion(N, image->turn);
   }
   if (a->type != CAV_JOINT_SLIDE && apart(mirrored, at_b) > near) return unlike(m, j, other, "the anchors", error);
-
-  // ranges
   if (a->limited != b->limited) return unlike(m, j, other, "the ranges", error);
-  for (int k = 0; k < 2 && a->limited; k++) {
-    double value = a->range[k], wanted = value;
-    if (scalar) wanted = m->q0[b->q] + image->sign * (value - m->q0[a->q]);
-    double found = b->range[scalar && image->sign < 0 ? 1 - k : k];
-    if (fabs(wanted - found) > near) return unlike(m, j, other, "the ranges", error);
-  }
   return CAV_OK;
 }
 

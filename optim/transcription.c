@@ -666,8 +666,10 @@ static void add_ranges(sum *a, const double *q, double rho) {
     double axis[3] = {1, 0, 0}, value = ball ? ball_angle(joint, q, axis) : q[joint->q];
     for (int k = 0; k < 3; k++) column[k] = tr->nv + joint->dof + k;
     keep_sparse(a, i, n, column, axis);
-    double lower = ball ? -INFINITY : joint->range[0] + keep;
-    double e = slot_residual(a, i++, value, lower, joint->range[1] - keep, rho, &active);
+    double range[2] = {joint->range[0], joint->range[1]};
+    if (tr->wrap) cav_wrap_range(tr->wrap, j, range);
+    double lower = ball ? -INFINITY : range[0] + keep;
+    double e = slot_residual(a, i++, value, lower, range[1] - keep, rho, &active);
     if (active) add_sparse(a, rho, e, n, column, axis);
   }
   for (int k = 0; k < m->ntendon; k++) {

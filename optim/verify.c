@@ -267,10 +267,9 @@ static void note_forces(const cav_audit *audit, int t, double *residual, evidenc
   }
 }
 
-// joint and tendon ranges
-static void note_ranges(const cav_audit *audit, int t, cav_finding *finding) {
+// ranges of joints at q, a configuration of knot t or its image
+static void note_joints(const cav_audit *audit, int t, const double *q, cav_finding *finding) {
   const cav_model *model = audit->model;
-  const double *q = audit->q + t * model->nq;
   char name[32];
   for (int j = 0; j < model->njoint; j++) {
     const cav_joint *joint = model->joint + j;
@@ -281,6 +280,18 @@ static void note_ranges(const cav_audit *audit, int t, cav_finding *finding) {
       beyond = 2 * atan2(sqrt(x[1] * x[1] + x[2] * x[2] + x[3] * x[3]), fabs(x[0])) - joint->range[1];
     }
     cav_finding_note(finding, beyond, t, "range of %.60s, in rad or m", joint_name(model, j, name));
+  }
+}
+
+// joint and tendon ranges; image [nq] is scratch
+static void note_ranges(const cav_audit *audit, int t, double *image, cav_finding *finding) {
+  const cav_model *model = audit->model;
+  const double *q = audit->q + t * model->nq;
+  char name[32];
+  note_joints(audit, t, q, finding);
+  if (audit->wrap) {
+    cav_wrap_configuration(audit->wrap, 1, q, image);
+    note_joints(audit, t, image, finding);
   }
   // twist and swing of ball joints are rows where they are violated
   for (int i = 0; i < audit->state->nrow; i++) {
@@ -318,7 +329,7 @@ static void note_contacts(const cav_audit *audit, int t, evidence *found) {
 static cav_status examine(cav_audit *audit, cav_balance *balance, evidence *found, cav_error *error) {
   const cav_model *model = audit->model;
   int nv = model->nv, room = 0;
-  double *work = NULL, *residual = malloc(sizeof(double) * (size_t)(2 * nv + 1));
+  double *work = NULL, *residual = malloc(sizeof(double) * (size_t)(2 * nv + model->nq + 1));
   cav_status status = residual ? CAV_OK : CAV_NO_MEMORY;
   if (status == CAV_OK && audit->wrap) {
     status = note_wrap(audit, &found->wrap);
@@ -342,7 +353,7 @@ static cav_status examine(cav_audit *audit, cav_balance *balance, evidence *foun
       if (!work) status = CAV_NO_MEMORY;
       if (!work) break;
     }
-    note_ranges(audit, t, &found->limit);
+    note_ranges(audit, t, residual + 2 * nv, &found->limit);
     note_contacts(audit, t, found);
     if (t < audit->rows) {
       memcpy(audit->u + t * nv, u, sizeof(double) * nv);

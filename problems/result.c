@@ -13,6 +13,7 @@
 #include <sys/stat.h>
 
 #include "certificate.h"
+#include "cycle.h"
 #include "file.h"
 #include "page.h"
 #include "rows.h"
@@ -166,6 +167,23 @@ cav_status cav_result_write_verdict(const char *folder, const cav_problem *probl
   return status;
 }
 
+// the page of a cycle shows two strides
+static cav_status write_strides(const char *page, const cav_problem *problem, const cav_trajectory *period,
+                                const cav_options *contact, const cav_verdict *verdict, cav_error *error) {
+  cav_wrap *wrap = cav_wrap_new(problem, error);
+  if (!wrap) return error->status;
+  int periods = problem->cycle.mirror == CAV_MIRROR_NONE ? 2 : 4;
+  cav_trajectory *all = cav_wrap_unroll(wrap, period, periods);
+  cav_forces *forces = all ? cav_forces_new(problem->model, all, contact, 0, error) : NULL;
+  cav_status status = all ? CAV_OK : no_memory(error);
+  if (all && !forces) status = error->status;
+  if (!status) status = cav_page_write(page, problem, all, forces, verdict, error);
+  cav_forces_free(forces);
+  cav_trajectory_free(all);
+  cav_wrap_free(wrap);
+  return status;
+}
+
 cav_status cav_result_write_page(const char *folder, const cav_problem *problem, const cav_trajectory *trajectory,
                                  const cav_options *contact, const cav_verdict *verdict, cav_error *error) {
   int at_rest = problem->close_at_rest && !problem->cycle.on;
@@ -174,7 +192,11 @@ cav_status cav_result_write_page(const char *folder, const cav_problem *problem,
   char *table = cav_result_path(folder, "forces.csv"), *page = cav_result_path(folder, "view.html");
   cav_status status = table && page ? CAV_OK : no_memory(error);
   if (!status) status = cav_forces_write(table, problem->model, trajectory, forces, error);
-  if (!status) status = cav_page_write(page, problem, trajectory, forces, verdict, error);
+  if (!status && problem->cycle.on) {
+    status = write_strides(page, problem, trajectory, contact, verdict, error);
+  } else if (!status) {
+    status = cav_page_write(page, problem, trajectory, forces, verdict, error);
+  }
   free(table);
   free(page);
   cav_forces_free(forces);

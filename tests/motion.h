@@ -19,6 +19,8 @@ static const motion_case motion_cases[] = {
     {"hopper-hop", "dm_control/hopper.xml"},
     {"walker-jump", "dm_control/walker.xml"},
     {"cheetah-jump", "dm_control/cheetah.xml"},
+    {"walk-cycle", NULL},
+    {"hop", "dm_control/hopper.xml"},
 };
 enum { MOTION_CASES = sizeof motion_cases / sizeof *motion_cases };
 
@@ -67,11 +69,14 @@ static inline void motion_read_log(const char *path, motion_findings *found) {
 static inline cav_problem motion_window(const cav_problem *problem, const cav_trajectory *at, int first, int last,
                                         cav_term *terms) {
   cav_problem part = *problem;
-  double h = problem->timestep, before = first * h;
+  double h = at->timestep, before = first * h;
+  part.timestep = h;
   part.duration = (last - first) * h;
   part.q_start = at->q + (size_t)first * at->nq;
   part.v_start = at->v + (size_t)first * at->nv;
-  part.close_at_rest = problem->close_at_rest && last == at->nknot - 1;
+  part.close_at_rest = problem->close_at_rest && !problem->cycle.on && last == at->nknot - 1;
+  part.cycle.on = 0;
+  part.duration_most = 0;
   part.term = terms;
   part.nterm = 0;
   for (int i = 0; i < problem->nterm; i++) {
