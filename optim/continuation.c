@@ -17,6 +17,9 @@ enum { PRICE_RISE = 100 };
 enum { ROUNDS = 6, ROUND_ITERATIONS = 15 };
 static const double round_tolerance = 1e-5, near = 1e-3;
 
+/// Continuation: how often a stage that stalls is taken back.
+enum { RETRIES = 3 };
+
 /// Restoration: iterations of each of its two attempts.
 enum { RESTORATIONS = 30 };
 
@@ -44,9 +47,8 @@ void cav_stage_law(const cav_problem *problem, double x, double step, cav_option
   law->self_share = between(a->self_share, b->self_share, x);
 }
 
-void cav_stage_set(const cav_problem *problem, int s, int n, cav_transcription *tr) {
+void cav_stage_set(const cav_problem *problem, double x, cav_transcription *tr) {
   const cav_stage_options *a = &problem->schedule.first, *b = &problem->schedule.last;
-  double x = n > 1 ? (double)s / (n - 1) : 1;
   cav_stage_law(problem, x, tr->h, &tr->options);
   tr->penalty = priced;
   tr->penalty.effort = between(priced.effort, PRICE_RISE * priced.effort, x);
@@ -71,19 +73,83 @@ int cav_run_report(void *context, double step, double radius) {
   return run->options->observer && run->options->observer(run->options->observer_context, &line);
 }
 
-cav_status cav_continue(cav_solve_run *run) {
+int cav_run_note(cav_solve_run *run, double share, int begin, cav_outcome outcome) {
+  cav_stage_record line = {.phase = run->phase, .stage = run->stage, .stages = run->stages, .share = share};
+  line.iterations = run->solution->iterations - begin;
+  line.cost = cav_transcription_cost(run->tr);
+  line.unactuated = cav_transcription_unactuated(run->tr, NULL);
+  line.violation = cav_transcription_violation(run->tr);
+  line.outcome = outcome;
+  if (!cav_solution_note(run->solution, &line)) run->failed = CAV_NO_MEMORY;
+  return run->failed == CAV_OK;
+}
+
+/// How a run of the trust region ended.
+static cav_outcome outcome_of(const cav_solve_run *run, cav_status status) {
+  if (status != CAV_OK) return CAV_OUTCOME_STOPPED;
+  return run->region.stalled ? CAV_OUTCOME_STALLED : run->region.settled ? CAV_OUTCOME_SETTLED : CAV_OUTCOME_LIMIT;
+}
+
+static void exchange(cav_trajectory **a, cav_trajectory **b) {
+  cav_trajectory *kept = *a;
+  *a = *b;
+  *b = kept;
+}
+
+/// Copies a trajectory over another one's place; 0 if memory runs out.
+static int keep(cav_trajectory **kept, const cav_trajectory *at) {
+  cav_trajectory_free(*kept);
+  *kept = cav_trajectory_copy(at);
+  return *kept != NULL;
+}
+
+/// One stage, at a share of the way.
+static cav_status run_stage(cav_solve_run *run, double share, cav_outcome *outcome) {
   const cav_schedule *schedule = &run->problem->schedule;
+  int last = share >= 1;
+  cav_stage_set(run->problem, share, run->tr);
+  run->region.iterations = last ? schedule->last.iterations : schedule->first.iterations;
+  run->region.tolerance = last ? schedule->last.tolerance : schedule->first.tolerance;
+  cav_status status = cav_region_minimise(&run->region, run->normal, run->tr, &run->at, &run->spare);
+  *outcome = outcome_of(run, status);
+  return status;
+}
+
+cav_status cav_continue(cav_solve_run *run) {
+  int stages = run->problem->schedule.stages, retries = 0, begin;
+  double share = stages > 1 ? 0 : 1, settled = 0; // of this stage, and of the one before it
+  cav_trajectory *before = NULL;
   cav_status status = CAV_OK;
   run->phase = "continuation";
-  run->stages = schedule->stages;
-  for (int s = 0; s < schedule->stages && status == CAV_OK; s++) {
-    run->stage = s + 1;
-    cav_stage_set(run->problem, s, schedule->stages, run->tr);
-    int last = s == schedule->stages - 1;
-    run->region.iterations = last ? schedule->last.iterations : schedule->first.iterations;
-    run->region.tolerance = last ? schedule->last.tolerance : schedule->first.tolerance;
-    status = cav_region_minimise(&run->region, run->normal, run->tr, &run->at, &run->spare);
+  run->stages = stages;
+  run->stage = 1;
+  while (status == CAV_OK) {
+    cav_outcome outcome;
+    begin = run->solution->iterations;
+    status = keep(&before, run->at) ? run_stage(run, share, &outcome) : CAV_NO_MEMORY;
+    if (!before) break;
+    int again = outcome == CAV_OUTCOME_STALLED && retries < RETRIES && share > settled;
+    if (again) outcome = CAV_OUTCOME_AGAIN;
+    if (!cav_run_note(run, share, begin, outcome)) status = CAV_NO_MEMORY;
+    if (status != CAV_OK || (!again && run->stage == stages && share >= 1)) break;
+    if (outcome == CAV_OUTCOME_AGAIN || outcome == CAV_OUTCOME_STALLED) run->region.radius = 0;
+    if (again) {
+      exchange(&run->at, &before);
+      retries++;
+      share = 0.5 * (settled + share);
+      continue;
+    }
+    // on to the stage that was due, or to the next
+    double due = stages > 1 ? (double)(run->stage - 1) / (stages - 1) : 1;
+    settled = share;
+    if (share < due) {
+      share = due;
+      continue;
+    }
+    retries = 0;
+    share = (double)run->stage++ / (stages - 1);
   }
+  cav_trajectory_free(before);
   return status;
 }
 
@@ -145,12 +211,14 @@ cav_status cav_multiply(cav_solve_run *run) {
   run->stages = ROUNDS;
   cav_status status = cav_transcription_values(run->tr, run->at);
   for (int round = 0; round < ROUNDS && status == CAV_OK; round++) {
+    int begin = run->solution->iterations;
     run->stage = round + 1;
     cav_transcription_multipliers(run->tr);
     run->region.iterations = ROUND_ITERATIONS;
     run->region.tolerance = round_tolerance;
     status = cav_region_minimise(&run->region, run->normal, run->tr, &run->at, &run->spare);
     misfit is = measure(run->tr);
+    if (!cav_run_note(run, 1, begin, outcome_of(run, status))) status = CAV_NO_MEMORY;
     if (round > 0 && holds(&is, &most)) break;
   }
   return status;
@@ -160,6 +228,7 @@ cav_status cav_multiply(cav_solve_run *run) {
 static cav_status restore(cav_solve_run *run, double share) {
   misfit most = allowed(run), is = {0};
   cav_transcription *tr = run->tr;
+  int begin = run->solution->iterations;
   cav_region region = run->region;
   region.radius = INFINITY;
   region.iterations = 1;
@@ -179,11 +248,13 @@ static cav_status restore(cav_solve_run *run, double share) {
   tr->slack_effort = tr->slack_range = 0;
   run->region.done = region.done;
   run->region.seconds_linear = region.seconds_linear;
+  cav_outcome outcome = status != CAV_OK    ? CAV_OUTCOME_STOPPED
+                        : holds(&is, &most) ? CAV_OUTCOME_SETTLED
+                                            : CAV_OUTCOME_STALLED;
+  if (!cav_run_note(run, 1, begin, outcome)) status = CAV_NO_MEMORY;
   // what cannot be brought in stays as it was: steps that chase the impossible lead far away
   if (status == CAV_OK && !holds(&is, &most)) {
-    cav_trajectory *away = run->at;
-    run->at = entry;
-    entry = away;
+    exchange(&run->at, &entry);
     status = cav_transcription_values(tr, run->at);
     if (status == CAV_OK) status = CAV_NOT_CONVERGED;
   }
@@ -210,8 +281,10 @@ cav_status cav_restore(cav_solve_run *run) {
 }
 
 static cav_status rest_from_here(cav_solve_run *run, double radius) {
+  int begin = run->solution->iterations;
   run->region.radius = radius;
-  return cav_region_minimise(&run->region, run->normal, run->tr, &run->at, &run->spare);
+  cav_status status = cav_region_minimise(&run->region, run->normal, run->tr, &run->at, &run->spare);
+  return cav_run_note(run, 1, begin, outcome_of(run, status)) ? status : CAV_NO_MEMORY;
 }
 
 cav_status cav_rest(cav_solve_run *run) {
@@ -231,13 +304,34 @@ cav_status cav_rest(cav_solve_run *run) {
     status = cav_guess_take(run);
     if (status == CAV_OK) status = rest_from_here(run, 0);
     if (status != CAV_OK || !(cav_transcription_merit(run->tr) < merit)) {
-      cav_trajectory *worse = run->at;
-      run->at = first;
-      first = worse;
+      exchange(&run->at, &first);
       if (status == CAV_OK) status = cav_transcription_values(run->tr, run->at);
     }
   }
   cav_trajectory_free(first);
   run->tr->constraints_only = 0;
+  return status;
+}
+
+cav_status cav_recover(cav_solve_run *run) {
+  cav_trajectory *feasible = cav_trajectory_copy(run->at);
+  if (!feasible) return CAV_NO_MEMORY;
+  cav_outcome outcome;
+  int begin = run->solution->iterations;
+  for (int t = 0; t < run->tr->nknot; t++)
+    for (int i = 0; i < run->tr->knot[t].layout.count; i++) run->tr->knot[t].slot[i].multiplier = 0;
+  run->phase = "recovery";
+  run->stage = run->stages = 1;
+  run->region.radius = 0;
+  cav_status status = run_stage(run, 1, &outcome);
+  if (!cav_run_note(run, 1, begin, outcome)) status = CAV_NO_MEMORY;
+  if (status == CAV_OK) status = cav_multiply(run);
+  if (status == CAV_OK) status = cav_restore(run);
+  if (status == CAV_NOT_CONVERGED) {
+    // a motion that is possible is worth more than a cheaper one that is not
+    exchange(&run->at, &feasible);
+    status = cav_transcription_values(run->tr, run->at);
+  }
+  cav_trajectory_free(feasible);
   return status;
 }

@@ -32,10 +32,11 @@ cav_status cav_guess_take(cav_solve_run *run);
 /// Contact law at a share of the schedule, 0 .. 1, for a step in s; the rest of law stays.
 void cav_stage_law(const cav_problem *problem, double share, double step, cav_options *law);
 
-/// Contact law and weights of stage s of n.
-void cav_stage_set(const cav_problem *problem, int s, int n, cav_transcription *transcription);
+/// Contact law and weights at a share of the way from the first to the last stage.
+void cav_stage_set(const cav_problem *problem, double share, cav_transcription *transcription);
 
-/// Stages first to last: softness, reach and the price of unactuated force go geometrically to their ends.
+/// Stages first to last: softness, reach and the price of unactuated force go geometrically to their ends. One that stalls is
+/// taken back and reached by a stage half way there.
 cav_status cav_continue(cav_solve_run *run);
 
 /// Augmented Lagrangian on all constraint rows, at the last stage's law, until they nearly hold.
@@ -61,8 +62,17 @@ cav_status cav_choose_gains(cav_solve_run *run, cav_error *error);
 /// Appends a line to the log and tells the observer; nonzero if it asks to stop. Region's report.
 int cav_run_report(void *run, double step, double radius);
 
+/// Where every row holds but costs had no say: to a minimum of the costs from there, if the rows hold there too.
+cav_status cav_recover(cav_solve_run *run);
+
+/// Notes a stage that ended, of begin iterations before it; 0 if memory runs out.
+int cav_run_note(cav_solve_run *run, double share, int begin, cav_outcome outcome);
+
 /// Keeps a line of the log; 0 if memory runs out. solve.c.
 int cav_solution_log(cav_solution *solution, const cav_progress *line);
+
+/// Keeps a stage that ended; 0 if memory runs out. solve.c.
+int cav_solution_note(cav_solution *solution, const cav_stage_record *stage);
 
 /// Wall clock, s.
 double cav_clock(void);

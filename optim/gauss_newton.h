@@ -38,6 +38,8 @@ typedef struct cav_region {
   int iterations;   ///< at most
   double tolerance; ///< two relative decreases in a row below it end the run
   int done;         ///< iterations made, over all runs
+  int stalled; ///< the last run ended at a jump: the step that helped was a millionth of the one wanted, or none did
+  int settled; ///< the last run ended by its tolerance
   double seconds_linear;
   int (*report)(void *context, double step, double radius); ///< after each iteration; nonzero stops
   void *context;

@@ -30,10 +30,22 @@ int cav_solution_log(cav_solution *solution, const cav_progress *line) {
   return 1;
 }
 
+int cav_solution_note(cav_solution *solution, const cav_stage_record *stage) {
+  int n = solution->nstage;
+  if ((n & (n - 1)) == 0) {
+    cav_stage_record *s = realloc(solution->stage, 2 * ((size_t)n + 1) * sizeof *s);
+    if (!s) return 0;
+    solution->stage = s;
+  }
+  solution->stage[solution->nstage++] = *stage;
+  return 1;
+}
+
 void cav_solution_free(cav_solution *solution) {
   if (!solution) return;
   cav_trajectory_free(solution->trajectory);
-  free(solution->gain_q), free(solution->gain_v), free(solution->progress), free(solution->row);
+  free(solution->gain_q), free(solution->gain_v), free(solution->progress), free(solution->stage);
+  free(solution->row);
   free(solution);
 }
 
@@ -165,7 +177,7 @@ static cav_status solve(cav_solve_run *run, cav_error *error) {
   cav_status status = CAV_OK;
   const cav_solve_options *o = run->options;
   if (o->solver == CAV_SOLVER_IPOPT) {
-    cav_stage_set(run->problem, 1, 1, run->tr);
+    cav_stage_set(run->problem, 1, run->tr);
   } else {
     status = cav_continue(run);
     if (status == CAV_OK) status = cav_multiply(run);
@@ -185,7 +197,9 @@ static cav_status solve(cav_solve_run *run, cav_error *error) {
 #endif
   if (status != CAV_NOT_CONVERGED || !o->diagnose || cav_run_met(run)) return status;
   cav_status rest = cav_rest(run);
-  return rest == CAV_OK ? status : rest;
+  if (rest != CAV_OK) return rest;
+  // not the motion that was stopped at, but one that can be
+  return cav_run_met(run) && o->solver != CAV_SOLVER_IPOPT ? cav_recover(run) : status;
 }
 
 /// A given start, brought to where unknowns can be: its step within the bounds, its ends those of a cycle.

@@ -134,15 +134,36 @@ static cav_status write_problem(const char *folder, const char *path, const cav_
   return status;
 }
 
+static cav_status write_stages(const char *path, const cav_solution *solution, cav_error *error) {
+  static const char *const outcome[] = {[CAV_OUTCOME_SETTLED] = "settled",
+                                        [CAV_OUTCOME_LIMIT] = "limit",
+                                        [CAV_OUTCOME_STALLED] = "stalled",
+                                        [CAV_OUTCOME_AGAIN] = "again",
+                                        [CAV_OUTCOME_STOPPED] = "stopped"};
+  cav_file file;
+  cav_status status = cav_file_begin(&file, path, error);
+  if (status) return status;
+  fputs("phase,stage,share,iterations,cost,unactuated,violation,outcome\n", file.stream);
+  for (int i = 0; i < solution->nstage; i++) {
+    const cav_stage_record *s = &solution->stage[i];
+    const double value[3] = {s->cost, s->unactuated, s->violation};
+    fprintf(file.stream, "%s,%d,%.6g,%d", s->phase, s->stage, s->share, s->iterations);
+    for (int k = 0; k < 3; k++) fputc(',', file.stream), cav_table_write_number(file.stream, value[k]);
+    fprintf(file.stream, ",%s\n", outcome[s->outcome]);
+  }
+  return cav_file_end(&file, error);
+}
+
 cav_status cav_result_write(const char *folder, const cav_problem *problem, const cav_solution *solution,
                             cav_error *error) {
   char *trajectory = cav_result_path(folder, "trajectory.csv"), *gains = cav_result_path(folder, "gains.csv");
   char *log = cav_result_path(folder, "log.csv"), *copy = cav_result_path(folder, "problem.xml");
-  char *rows = cav_result_path(folder, "rows.csv");
-  cav_status status = trajectory && gains && log && copy && rows ? CAV_OK : no_memory(error);
+  char *rows = cav_result_path(folder, "rows.csv"), *stages = cav_result_path(folder, "stages.csv");
+  cav_status status = trajectory && gains && log && copy && rows && stages ? CAV_OK : no_memory(error);
   if (!status) status = cav_trajectory_write(trajectory, problem->model, solution->trajectory, error);
   if (!status) status = write_problem(folder, copy, problem, &solution->contact, error);
   if (!status) status = write_log(log, solution, error);
+  if (!status) status = write_stages(stages, solution, error);
   if (!status) status = cav_rows_write(rows, solution->trajectory->timestep, solution->nrow, solution->row, error);
   if (!status && solution->gain_q) status = write_gains(gains, problem->model, solution, error);
   free(trajectory);
@@ -150,6 +171,7 @@ cav_status cav_result_write(const char *folder, const cav_problem *problem, cons
   free(log);
   free(copy);
   free(rows);
+  free(stages);
   return status;
 }
 

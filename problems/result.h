@@ -20,7 +20,7 @@ char *cav_result_path(const char *folder, const char *name);
 /// Makes a folder and those above it that are missing.
 cav_status cav_result_folder(const char *folder, cav_error *error);
 
-/// Writes trajectory.csv, gains.csv, log.csv, rows.csv and problem.xml, each atomically. The model's path is written relative to the
+/// Writes trajectory.csv, gains.csv, log.csv, stages.csv, rows.csv and problem.xml, each atomically. The model's path is written relative to the
 /// folder where the two share a folder other than the root, absolute otherwise.
 cav_status cav_result_write(const char *folder, const cav_problem *problem, const cav_solution *solution,
                             cav_error *error);

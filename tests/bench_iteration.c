@@ -56,7 +56,7 @@ int main(int argc, char **argv) {
   shake(at, p->model, 0.02);
   printf("%s: %d dofs, %d knots, step %g s\n", p->name, tr->nv, tr->nknot, p->timestep);
   for (int s = 0; s < 3; s++) {
-    cav_stage_set(p, s, 3, tr);
+    cav_stage_set(p, 0.5 * s, tr);
     printf("%s stage\n", s == 0 ? "first" : s == 1 ? "middle" : "last");
     for (int k = 0; k < 3; k++) {
       tr->derivative = (cav_derivative)k;

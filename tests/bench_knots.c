@@ -54,7 +54,7 @@ static int work(const char *model_path, int steps, measure *out) {
   memcpy(at->q, q_start, sizeof q_start);
   cav_guess_fill(&problem, problem.q_goal, at);
   cav_trajectory_velocities(model, at);
-  cav_stage_set(&problem, 0, 2, tr);
+  cav_stage_set(&problem, 0, tr);
   out->seconds_new = cav_clock() - start;
   start = cav_clock();
   cav_region region = {.iterations = ITERATIONS};

@@ -94,7 +94,7 @@ static double iteration_time(cav_order order) {
   double best = INFINITY;
   if (CHECK(normal && at)) {
     cav_guess_fill(p, p->q_goal, at);
-    cav_stage_set(p, 2, 3, tr);
+    cav_stage_set(p, 1, tr);
     for (int r = 0; r < 3 * RUNS; r++) {
       double start = cpu_seconds();
       CHECK(cav_transcription_linearise(tr, at) == CAV_OK);

@@ -49,12 +49,22 @@ static int fill(cav_solution *solution, const cav_problem *problem) {
   solution->gain_q = malloc((size_t)n * sizeof(double));
   solution->gain_v = malloc((size_t)n * sizeof(double));
   solution->progress = calloc(2, sizeof *solution->progress);
-  if (!solution->trajectory || !solution->gain_q || !solution->gain_v || !solution->progress) return 0;
+  solution->stage = calloc(1, sizeof *solution->stage);
+  if (!solution->trajectory || !solution->gain_q || !solution->gain_v || !solution->progress || !solution->stage)
+    return 0;
   for (int t = 0; t < 6; t++) memcpy(solution->trajectory->q + 7 * t, problem->q_start, 7 * sizeof(double));
   for (int i = 0; i < n; i++) solution->gain_q[i] = sin(i) / 3, solution->gain_v[i] = 1e-200 * cos(i);
   solution->nprogress = 2;
   solution->progress[0] = (cav_progress){.phase = "continuation", .stage = 1, .stages = 1, .iteration = 1, .cost = 0.1};
   solution->progress[1] = (cav_progress){.phase = "multipliers", .stage = 1, .stages = 1, .iteration = 2, .cost = NAN};
+  solution->nstage = 1;
+  solution->stage[0] = (cav_stage_record){.phase = "multipliers",
+                                          .stage = 1,
+                                          .share = 0.5,
+                                          .iterations = 7,
+                                          .cost = 2,
+                                          .unactuated = NAN,
+                                          .outcome = CAV_OUTCOME_AGAIN};
   solution->contact = problem->model->options;
   solution->contact.timestep = .02;
   solution->contact.stabilisation = CAV_STABILISATION_DISCRETE;
@@ -174,10 +184,11 @@ static void check_refusals(void) {
 }
 
 static void remove_all(void) {
-  const char *made[] = {"trajectory.csv", "gains.csv", "log.csv", "problem.xml", "rows.csv", "verdict.json"};
+  const char *made[] = {"trajectory.csv", "gains.csv", "log.csv",     "stages.csv",
+                        "problem.xml",    "rows.csv",  "verdict.json"};
   char upper[128];
   snprintf(upper, sizeof upper, "%s/some", top);
-  for (int i = 0; i < 6; i++) {
+  for (size_t i = 0; i < sizeof made / sizeof *made; i++) {
     char *path = cav_result_path(folder, made[i]);
     if (path) remove(path);
     free(path);
@@ -205,6 +216,7 @@ int main(void) {
     // the model is two folders up: the folder and the model may move together
     CHECK(strstr(read_file("problem.xml"), "model=\"../../box.xml\"") != NULL);
     CHECK(strstr(read_file("log.csv"), "2,multipliers,1,,0,") != NULL);
+    CHECK(strstr(read_file("stages.csv"), "multipliers,1,0.5,7,2,,0,again\n") != NULL);
     check_read_back(&solution);
     check_forces(problem, &solution);
     check_verdict(problem);
@@ -216,6 +228,7 @@ int main(void) {
   free(solution.gain_q);
   free(solution.gain_v);
   free(solution.progress);
+  free(solution.stage);
   cav_problem_free(problem);
   remove_all();
   return check_result();

@@ -100,7 +100,7 @@ run 0 inspect model.xml
 run 0 solve problem.xml
 says out "certified: swing on pendulum"
 says err "continuation"
-for name in trajectory.csv forces.csv gains.csv log.csv problem.xml verdict.json view.html; do has "swing.result/$name"; done
+for name in trajectory.csv forces.csv gains.csv log.csv stages.csv problem.xml verdict.json view.html; do has "swing.result/$name"; done
 run 0 solve modelless.xml --model model.xml -o given --quiet
 silent out
 silent err
@@ -170,7 +170,7 @@ mv caught.out out
 mv caught.err err
 check "interrupted: status $status, expected 130" [ "$status" -eq 130 ]
 says err "best iterate is saved"
-for name in trajectory.csv gains.csv log.csv problem.xml verdict.json; do has "caught/$name"; done
+for name in trajectory.csv gains.csv log.csv stages.csv problem.xml verdict.json; do has "caught/$name"; done
 says caught/verdict.json '"certified": false'
 lines=$(wc -l <caught/log.csv)
 check "the log ends early: $lines lines" [ "$lines" -lt 200 ]

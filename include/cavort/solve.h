@@ -16,7 +16,7 @@ typedef enum cav_solver {
 
 /// One line of progress, and of the log.
 typedef struct cav_progress {
-  const char *phase; ///< "continuation", "multipliers", "ipopt"
+  const char *phase; ///< "continuation", "multipliers", "restoration", "ipopt", "diagnosis", "recovery"
   int stage, stages;
   int iteration;     ///< over the whole solve
   double cost;       ///< of the cost terms alone
@@ -48,6 +48,25 @@ typedef struct cav_solve_options {
 } cav_solve_options;
 
 cav_solve_options cav_solve_options_default(void);
+
+/// How a stage of a solve ended.
+typedef enum cav_outcome {
+  CAV_OUTCOME_SETTLED, ///< by its tolerance, or its rows hold
+  CAV_OUTCOME_LIMIT,   ///< by its number of iterations
+  CAV_OUTCOME_STALLED, ///< at a jump of the merit, which no step passes, or its rows do not come in
+  CAV_OUTCOME_AGAIN,   ///< stalled and taken back: the stage after it starts where this one did, and goes half as far
+  CAV_OUTCOME_STOPPED  ///< interrupted, or by an error
+} cav_outcome;
+
+/// One stage of a solve, and what it left.
+typedef struct cav_stage_record {
+  const char *phase; ///< as in cav_progress
+  int stage, stages;
+  double share; ///< of the way from the schedule's first to its last stage
+  int iterations;
+  double cost, unactuated, violation; ///< as in cav_progress
+  cav_outcome outcome;
+} cav_stage_record;
 
 /// Where a constraint row comes from.
 typedef enum cav_binding_kind {
@@ -86,6 +105,8 @@ typedef struct cav_solution {
   double seconds, seconds_dynamics, seconds_assembly, seconds_linear; ///< wall clock
   int nprogress;
   cav_progress *progress; ///< log
+  int nstage;
+  cav_stage_record *stage; ///< its stages in order
   int nrow;
   cav_binding *row; ///< constraint rows that are violated or have a price, by knot
 } cav_solution;
@@ -95,6 +116,25 @@ typedef struct cav_solution {
 cav_status cav_solve(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
                      cav_solution **solution, cav_error *error);
 void cav_solution_free(cav_solution *solution);
+
+enum { CAV_ROUTES = 8, CAV_ROUTE_SWINGS = 4 };
+
+/// A way to a motion: the guess and the schedule that a solve starts from.
+typedef struct cav_route {
+  const char *name, *text; ///< in a word, and in words
+  int stated;              ///< 1: the problem's own guess, 0: guess and swing
+  cav_guess guess;
+  int nswing;
+  cav_swing swing[CAV_ROUTE_SWINGS];
+  cav_schedule schedule;
+} cav_route;
+
+/// Routes for a problem, in the order in which they are worth trying; the first is the problem's own. CAV_NO_MEMORY, or what
+/// the dynamics says of the goal posture.
+cav_status cav_routes(const cav_problem *problem, cav_route route[CAV_ROUTES], int *n);
+
+/// The problem by a route: borrows all else from the problem, and the swings from the route.
+void cav_route_take(const cav_problem *problem, const cav_route *route, cav_problem *taken);
 
 /// What a certificate promises: the largest value of the verdict's field of that name.
 #define CAV_PROMISE_UNACTUATED 1e-6  ///< share of weight

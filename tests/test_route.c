@@ -1,0 +1,154 @@
+/// Routes: which are offered to which problem, that a gait is found with the right signs, that taking one changes guess and
+/// schedule alone; and stages of the continuation that stall: taken back, reached half way, noted. Stalls are made by the
+/// linker, which puts a region that claims one in the place of the true one.
+#include "continuation.h"
+#include "scene.h"
+
+cav_status __real_cav_region_minimise(cav_region *region, cav_normal *normal, cav_transcription *tr,
+                                      cav_trajectory **at, cav_trajectory **spare);
+cav_status __wrap_cav_region_minimise(cav_region *region, cav_normal *normal, cav_transcription *tr,
+                                      cav_trajectory **at, cav_trajectory **spare);
+
+// runs of the region from first to last stall, counted from 1
+static int runs, first_stall, last_stall;
+
+cav_status __wrap_cav_region_minimise(cav_region *region, cav_normal *normal, cav_transcription *tr,
+                                      cav_trajectory **at, cav_trajectory **spare) {
+  cav_status status = __real_cav_region_minimise(region, normal, tr, at, spare);
+  runs++;
+  if (runs >= first_stall && runs <= last_stall) {
+    region->stalled = 1, region->settled = 0;
+    region->radius = 1e-12;
+  }
+  return status;
+}
+
+#define LEG(SIDE, Y, AXIS)                                                                 \
+  "<body name='thigh_" SIDE "' pos='0 " Y " -.1'><joint name='hip_" SIDE "' axis='0 " AXIS \
+  " 0' range='-100 60'/>"                                                                  \
+  "<geom type='capsule' size='.05' fromto='0 0 0 0 0 -.4' mass='5'/><body pos='0 0 -.4'>"  \
+  "<joint name='knee_" SIDE "' axis='0 " AXIS                                              \
+  " 0' range='-2 140'/>"                                                                   \
+  "<geom type='capsule' size='.04' fromto='0 0 0 0 0 -.4' mass='3'/>"                      \
+  "<geom type='sphere' size='.05' pos='0 0 -.4' mass='.5'/></body></body>"
+#define BIPED(AXIS) \
+  "<mujoco><compiler angle='degree'/><default><joint limited='true'/><motor ctrllimited='true' ctrlrange='-1 1'/>"     \
+  "</default><worldbody><geom type='plane' size='9 9 1'/><body name='trunk' pos='0 0 .95'><freejoint/>"                \
+  "<geom type='capsule' size='.1' fromto='0 0 0 0 0 .4' mass='20'/>" LEG("left", ".1", AXIS) LEG("right", "-.1", AXIS) \
+  "</body></worldbody><actuator><motor joint='hip_left' gear='100'/><motor joint='hip_right' gear='100'/>"             \
+  "<motor joint='knee_left' gear='100'/><motor joint='knee_right' gear='100'/></actuator></mujoco>"
+
+static const cav_route *find(const cav_route *route, int n, const char *name) {
+  for (int i = 0; i < n; i++)
+    if (!strcmp(route[i].name, name)) return &route[i];
+  return NULL;
+}
+
+// the offered routes' names, with blanks
+static int offers(const cav_problem *p, const char *names) {
+  cav_route route[CAV_ROUTES];
+  char text[200] = "";
+  int n;
+  CHECK(cav_routes(p, route, &n) == CAV_OK);
+  for (int i = 0; i < n; i++) strcat(strcat(text, i ? " " : ""), route[i].name);
+  if (!strcmp(text, names)) return 1;
+  fprintf(stderr, "    '%s', expected '%s'\n", text, names);
+  return 0;
+}
+
+// both legs swing in turn, the right way round whichever way the axes point
+static void test_gait(const char *text, double axis, double travel) {
+  cav_model *m = scene_load(text);
+  if (!CHECK(m != NULL)) return;
+  double q[20], goal[20], v[20] = {0};
+  cav_configuration_reset(m, q);
+  memcpy(goal, q, sizeof goal);
+  goal[0] += travel;
+  cav_problem p = cav_problem_default(m), taken;
+  p.q_start = q, p.v_start = v, p.q_goal = goal;
+  cav_route route[CAV_ROUTES];
+  int n;
+  CHECK(cav_routes(&p, route, &n) == CAV_OK);
+  const cav_route *gait = find(route, n, "swing");
+  if (CHECK(gait && gait->nswing == 4)) {
+    int hip = cav_find(m, CAV_OBJECT_JOINT, "hip_left"), knee = cav_find(m, CAV_OBJECT_JOINT, "knee_left");
+    cav_route_take(&p, gait, &taken);
+    CHECK(taken.nswing == 4 && taken.swing == gait->swing && taken.q_goal == goal && taken.duration == p.duration);
+    CHECK(gait->swing[0].joint == hip && gait->swing[2].joint == knee);
+    CHECK(gait->swing[1].joint == cav_find(m, CAV_OBJECT_JOINT, "hip_right"));
+    // turning about +y takes a hanging leg backwards; the knee bends to where its range is, while the leg comes forwards
+    CHECK(gait->swing[0].amplitude * axis * travel < 0 && gait->swing[1].amplitude == gait->swing[0].amplitude);
+    CHECK_NEAR(gait->swing[1].phase - gait->swing[0].phase, M_PI, 1e-15);
+    CHECK(gait->swing[2].amplitude > 0 && fabs(gait->swing[2].phase - M_PI / 2) < 1e-15);
+  }
+  // no gait where it stands, nor where the guess swings already; a guess that is held is not held twice
+  goal[0] = q[0];
+  CHECK(offers(&p, "stated soft slow hold"));
+  p.guess = CAV_GUESS_HOLD;
+  CHECK(offers(&p, "stated soft slow line"));
+  p.guess = CAV_GUESS_INTERPOLATE;
+  p.guess_height = 0.3;
+  CHECK(offers(&p, "stated soft slow line hold"));
+  goal[0] += travel;
+  p.nswing = 1;
+  p.swing = &(cav_swing){.joint = 1, .amplitude = 0.1, .frequency = 1};
+  CHECK(offers(&p, "stated soft slow line hold"));
+  // taking one leaves the problem as it was
+  CHECK(cav_routes(&p, route, &n) == CAV_OK);
+  cav_route_take(&p, &route[0], &taken);
+  CHECK(taken.nswing == 1 && taken.guess_height == 0.3 && taken.schedule.stages == p.schedule.stages);
+  cav_route_take(&p, &route[2], &taken);
+  CHECK(taken.nswing == 1 && taken.schedule.stages == 2 * p.schedule.stages);
+  cav_route_take(&p, &route[4], &taken);
+  CHECK(taken.nswing == 0 && taken.guess_height == 0 && taken.guess == CAV_GUESS_HOLD && p.guess_height == 0.3);
+  cav_model_free(m);
+}
+
+// a ball on a slide that is lifted; stages that stall are reached half way, at most three times
+static void test_stalls(void) {
+  cav_model *m = scene_load(
+      "<mujoco><worldbody><geom type='plane' size='1 1 1'/><body pos='0 0 .1'>"
+      "<joint name='lift' type='slide' axis='0 0 1'/><geom type='sphere' size='.1' mass='1'/>"
+      "</body></worldbody><actuator><motor joint='lift' gear='50' ctrllimited='true' "
+      "ctrlrange='-1 1'/></actuator></mujoco>");
+  if (!CHECK(m != NULL)) return;
+  double q = 0, goal = 0.2, v = 0;
+  cav_term terms[20];
+  cav_problem p = cav_problem_default(m);
+  p.q_start = &q, p.v_start = &v, p.q_goal = &goal;
+  p.duration = 0.5;
+  p.term = terms, p.nterm = cav_problem_default_terms(terms, 20);
+  p.schedule.stages = 5;
+  // what the third stage becomes: how many times it is taken back, and the shares of the way that follow
+  static const struct {
+    int stalls, again;
+    double share[8];
+  } cases[] = {{0, 0, {0.5, 0.75, 1}},
+               {1, 1, {0.5, 0.375, 0.5, 0.75, 1}},
+               {2, 2, {0.5, 0.375, 0.3125, 0.5, 0.75, 1}},
+               {4, 3, {0.5, 0.375, 0.3125, 0.28125, 0.5, 0.75, 1}}};
+  for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+    cav_solution *s = NULL;
+    runs = 0, first_stall = 3, last_stall = 2 + cases[c].stalls;
+    CHECK(cav_solve(&p, NULL, NULL, &s, NULL) == CAV_OK && s && s->unactuated < 1e-6);
+    int again = 0, iterations = 0;
+    for (int i = 0; s && i < s->nstage; i++) {
+      again += s->stage[i].outcome == CAV_OUTCOME_AGAIN;
+      iterations += s->stage[i].iterations;
+      double share = i >= 2 && i < 10 ? cases[c].share[i - 2] : 0;
+      if (share > 0) CHECK(!strcmp(s->stage[i].phase, "continuation") && fabs(s->stage[i].share - share) < 1e-12);
+    }
+    CHECK(s && again == cases[c].again && iterations == s->iterations);
+    cav_solution_free(s);
+  }
+  first_stall = last_stall = 0;
+  cav_model_free(m);
+}
+
+int main(void) {
+  test_gait(BIPED("1"), 1, 2);
+  test_gait(BIPED("1"), 1, -2);
+  test_gait(BIPED("-1"), -1, 2);
+  test_stalls();
+  return check_result();
+}
