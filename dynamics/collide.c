@@ -1,12 +1,13 @@
 /// Which geoms touch: broad phase by bounding spheres over the list of pairs that the model was compiled to, then the
 /// narrow phase of pairs.c. Geoms in no pair are never placed; a geom's rotation is formed only if a narrow phase asks
-/// for it, once per call, and that of a geom fixed to the world once for all. No sorting or tree: the models in mind
-/// have a few hundred pairs.
+/// for it, once per call, and that of a geom fixed to the world once for all. Lists of CAV_SWEEP_FROM pairs and more are first
+/// pruned along an axis (sweep.c); bench_sweep measures where that begins to pay.
 #include <stdlib.h>
 
 #include "cavort/dynamics.h"
 #include "math3.h"
 #include "stage.h"
+#include "sweep.h"
 #include "workspace.h"
 
 // fastest approach that the discrete law meets without a jump, m/s (a fall from 1.3 m)
@@ -23,9 +24,8 @@ typedef struct candidate {
 /// A geom in some pair.
 typedef struct slot {
   const cav_geom *geom;
-  int turned;       ///< shape.rotation is valid
-  int fixed;        ///< moves with the world: placed once
-  double normal[3]; ///< world, planes only
+  int turned; ///< shape.rotation is valid; of planes always
+  int fixed;  ///< moves with the world: placed once
   cav_shape shape;
 } slot;
 
@@ -35,6 +35,8 @@ struct cav_geom_cache {
   slot *slot;
   double (*centre)[3];  ///< [nslot] world
   candidate *candidate; ///< [npair]
+  cav_sweep *sweep;     ///< NULL: all pairs are looked at
+  double margin;        ///< largest of all pairs, for the sweep
 };
 
 // places a geom fixed to the world, or prepares one that moves
@@ -47,7 +49,6 @@ static void open_slot(const cav_model *model, const cav_geom *geom, slot *s, dou
   copy3(centre, geom->pos);
   copy3(s->shape.pos, geom->pos);
   memcpy(s->shape.rotation, geom->rotation, sizeof s->shape.rotation);
-  column3(s->normal, geom->rotation, 2);
   s->turned = 1;
 }
 
@@ -74,7 +75,25 @@ static void open_slots(const cav_model *model, struct cav_geom_cache *cache, int
   }
 }
 
-struct cav_geom_cache *cav_geom_cache_new(const cav_model *model) {
+// what prunes the pairs along an axis; 0 if memory runs out
+static int open_sweep(const cav_model *model, struct cav_geom_cache *cache) {
+  double *radius = malloc(sizeof *radius * (size_t)cache->nslot);
+  cav_sweep_pair *pair = malloc(sizeof *pair * (size_t)model->npair);
+  if (radius && pair) {
+    for (int i = 0; i < cache->nslot; i++) radius[i] = cache->slot[i].geom->bound;
+    for (int p = 0; p < model->npair; p++) {
+      const candidate *c = cache->candidate + p;
+      pair[p] = (cav_sweep_pair){c->plane ? -1 : c->first, c->second};
+      cache->margin = fmax(cache->margin, c->margin);
+    }
+    cache->sweep = cav_sweep_new(cache->nslot, radius, model->npair, pair);
+  }
+  free(radius);
+  free(pair);
+  return cache->sweep != NULL;
+}
+
+struct cav_geom_cache *cav_geom_cache_new(const cav_model *model, int sweep_from) {
   // one spare of each, so that no size is zero
   struct cav_geom_cache *cache = calloc(1, sizeof *cache);
   int *slot_of = malloc(sizeof *slot_of * (size_t)(model->ngeom + 1));
@@ -90,7 +109,12 @@ struct cav_geom_cache *cav_geom_cache_new(const cav_model *model) {
   }
   open_slots(model, cache, slot_of);
   free(slot_of);
-  cache->bytes = sizeof *cache + ((size_t)model->ngeom + 1) * (sizeof *cache->slot + sizeof *cache->centre);
+  if (model->npair >= sweep_from && !open_sweep(model, cache)) {
+    cav_geom_cache_free(cache);
+    return NULL;
+  }
+  cache->bytes = cav_sweep_bytes(cache->sweep) + sizeof *cache +
+                 ((size_t)model->ngeom + 1) * (sizeof *cache->slot + sizeof *cache->centre);
   cache->bytes += ((size_t)model->npair + 1) * sizeof *cache->candidate;
   return cache;
 }
@@ -99,6 +123,7 @@ size_t cav_geom_cache_bytes(const struct cav_geom_cache *cache) { return cache ?
 
 void cav_geom_cache_free(struct cav_geom_cache *cache) {
   if (!cache) return;
+  cav_sweep_free(cache->sweep);
   free(cache->slot);
   free(cache->centre);
   free(cache->candidate);
@@ -111,7 +136,13 @@ double cav_reach(const cav_state *state, const cav_pair *pair) {
   return pair->margin + cav_law_reach(state, delta, APPROACH_SPEED);
 }
 
-// centres of all geoms that move, and normals of planes that do
+// rotation of a geom that moves
+static void turn(const cav_state *state, slot *s) {
+  matmul3(s->shape.rotation, state->link[s->geom->link].rotation, s->geom->rotation);
+  s->turned = 1;
+}
+
+// centres of all geoms that move, and rotations of planes that do
 static void place(const cav_state *state, struct cav_geom_cache *cache) {
   for (int i = 0; i < cache->nslot; i++) {
     slot *s = cache->slot + i;
@@ -119,10 +150,7 @@ static void place(const cav_state *state, struct cav_geom_cache *cache) {
     const cav_pose *link = state->link + s->geom->link;
     transform(cache->centre[i], link->pos, link->rotation, s->geom->pos);
     s->turned = 0;
-    if (s->geom->type != CAV_GEOM_PLANE) continue;
-    double axis[3];
-    column3(axis, s->geom->rotation, 2);
-    rotate(s->normal, link->rotation, axis);
+    if (s->geom->type == CAV_GEOM_PLANE) turn(state, s);
   }
 }
 
@@ -130,18 +158,18 @@ static void place(const cav_state *state, struct cav_geom_cache *cache) {
 static int near(const struct cav_geom_cache *cache, const candidate *c, double margin) {
   double d[3], reach = c->bound + margin;
   sub3(d, cache->centre[c->second], cache->centre[c->first]);
-  if (c->plane) return dot3(d, cache->slot[c->first].normal) < reach;
+  if (c->plane) {
+    const double *R = cache->slot[c->first].shape.rotation;
+    return d[0] * R[2] + d[1] * R[5] + d[2] * R[8] < reach;
+  }
   return reach > 0 && dot3(d, d) < reach * reach;
 }
 
 // the geom as a shape, its rotation formed at the first request
 static const cav_shape *shape_of(const cav_state *state, struct cav_geom_cache *cache, int i) {
   slot *s = cache->slot + i;
-  if (!s->turned) {
-    copy3(s->shape.pos, cache->centre[i]);
-    matmul3(s->shape.rotation, state->link[s->geom->link].rotation, s->geom->rotation);
-    s->turned = 1;
-  }
+  if (!s->turned) turn(state, s);
+  copy3(s->shape.pos, cache->centre[i]);
   return &s->shape;
 }
 
@@ -178,6 +206,20 @@ static cav_status push(const cav_model *model, cav_state *state, int p, const ca
   return CAV_OK;
 }
 
+// contacts of one pair, if its bounds are near
+static cav_status collide_pair(const cav_model *model, cav_state *state, int p, const double reach[2]) {
+  struct cav_geom_cache *cache = state->work->geom;
+  const candidate *c = cache->candidate + p;
+  double margin = c->margin + reach[c->outer];
+  if (!near(cache, c, margin)) return CAV_OK;
+  cav_touch touch[CAV_TOUCH_MAX];
+  const cav_shape *a = shape_of(state, cache, c->first), *b = shape_of(state, cache, c->second);
+  int count = cav_collide_shapes(a, b, margin, touch);
+  cav_status status = CAV_OK;
+  for (int k = 0; k < count && status == CAV_OK; k++) status = push(model, state, p, touch + k);
+  return status;
+}
+
 cav_status cav_collide(const cav_model *model, cav_state *state) {
   state->ncontact = 0;
   if (!model->npair || !state->options.contact || !state->options.constraint) return CAV_OK;
@@ -186,17 +228,14 @@ cav_status cav_collide(const cav_model *model, cav_state *state) {
   // reach is the margin plus one of two distances: found once, not per pair
   const cav_pair alone[2] = {{.outer = 0}, {.outer = 1}};
   double reach[2] = {cav_reach(state, alone), cav_reach(state, alone + 1)};
-  for (int p = 0; p < model->npair; p++) {
-    const candidate *c = cache->candidate + p;
-    double margin = c->margin + reach[c->outer];
-    if (!near(cache, c, margin)) continue;
-    cav_touch touch[CAV_TOUCH_MAX];
-    const cav_shape *a = shape_of(state, cache, c->first), *b = shape_of(state, cache, c->second);
-    int count = cav_collide_shapes(a, b, margin, touch);
-    for (int k = 0; k < count; k++) {
-      cav_status status = push(model, state, p, touch + k);
-      if (status) return status;
-    }
+  cav_status status = CAV_OK;
+  if (!cache->sweep) {
+    for (int p = 0; p < model->npair && status == CAV_OK; p++) status = collide_pair(model, state, p, reach);
+    return status;
   }
-  return CAV_OK;
+  const int *found;
+  int count =
+      cav_sweep_find(cache->sweep, (const double(*)[3])cache->centre, cache->margin + fmax(reach[0], reach[1]), &found);
+  for (int i = 0; i < count && status == CAV_OK; i++) status = collide_pair(model, state, found[i], reach);
+  return status;
 }

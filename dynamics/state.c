@@ -239,7 +239,7 @@ cav_state *cav_state_new(const cav_model *model) {
   bounded = bounded || work->ntendon_limit + work->ntendon_friction > 0;
   state->contact = make_room(touches, &work->contact_room, sizeof *state->contact);
   state->row = make_room(bounded, &work->row_room, sizeof *state->row);
-  work->geom = touches ? cav_geom_cache_new(model) : NULL;
+  work->geom = touches ? cav_geom_cache_new(model, CAV_SWEEP_FROM) : NULL;
   int whole = (!touches || (state->contact && work->geom)) && (!bounded || state->row);
   if (!whole || cav_fluid_compile(model, work) != CAV_OK || cav_actuation_compile(model, state) != CAV_OK) {
     cav_state_free(state);

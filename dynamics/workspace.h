@@ -7,7 +7,8 @@
 
 /// World placement of the geoms that are in pairs: what collide.c keeps between its own calls.
 struct cav_geom_cache;
-struct cav_geom_cache *cav_geom_cache_new(const cav_model *model);
+enum { CAV_SWEEP_FROM = 1000 }; ///< pairs from which on a sweep prunes them (bench_sweep)
+struct cav_geom_cache *cav_geom_cache_new(const cav_model *model, int sweep_from);
 void cav_geom_cache_free(struct cav_geom_cache *cache);
 size_t cav_geom_cache_bytes(const struct cav_geom_cache *cache);
 

@@ -1,7 +1,8 @@
 #!/bin/sh
 # Writes the tables of tests/results anew, each with machine, compiler and commit. Usage: sh tests/results.sh [NAME...], default
-# all of: inverse (time against MuJoCo, needs it and the shared models), conservation (drift of energy and momentum), orders
-# (error of the orders of the step against their time), absent (what features cost where a scene has none of them), sensors, tendons, actuation, fluid (readings, strings, drives and
+# all of: inverse (time against MuJoCo, needs it and the shared models), sweep (broad phase), conservation (drift of energy and
+# momentum), orders (error of the orders of the step against their time), absent (what features cost where a scene has none of
+# them), sensors, tendons, actuation, fluid (readings, strings, drives and
 # drag against MuJoCo's).
 # CAVORT_BUILD names a build folder, by default build.
 set -eu
@@ -32,39 +33,61 @@ run() {
   rm "$out/$1.tmp"
 }
 
-# times of the humanoid's inverse by this build and by the one before, by turns
+# a humanoid's file with all that a scene can have and leave out: a mesh and a height field that are only seen, a constraint that
+# is switched off
+declare_unused() {
+  sed 's|^  </worldbody>|<geom type="mesh" mesh="unused" contype="0" conaffinity="0"/>\
+<geom type="hfield" hfield="unused" contype="0" conaffinity="0"/></worldbody>\
+<asset><mesh name="unused" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/><hfield name="unused" nrow="9" ncol="9" size="1 1 1 1"/></asset>\
+<equality><joint joint1="elbow_left" joint2="elbow_right" active="false"/></equality>|' problems/humanoid.xml
+}
+
+# times of the humanoid's inverse by the build before, by this one, and by this one with what is left out in the file, by turns
 absent() {
   old=$(mktemp -d)
   trap 'git worktree remove --force "$old/tree"; rm -rf "$old"' EXIT
   git worktree add --quiet --detach "$old/tree" "$before"
   meson setup "$old/build" "$old/tree" >/dev/null
-  ninja -C "$old/build" tests/bench_inverse >/dev/null
-  ninja -C "$build" tests/bench_inverse >/dev/null
+  ninja -C "$old/build" tests/bench_inverse problems/cavort >/dev/null
+  ninja -C "$build" tests/bench_inverse problems/cavort >/dev/null
+  declare_unused >"$old/declared.xml"
   for turn in 1 2 3 4 5 6 7 8 9; do
-    "$old/build/tests/bench_inverse" problems/humanoid.xml | sed -n 's/^ *\([0-9]*\) - .* us *\([0-9.]*\) us .*us .*/\1 before \2/p'
-    "$build/tests/bench_inverse" problems/humanoid.xml | sed -n 's/^ *\([0-9]*\) - .* us *\([0-9.]*\) us .*us .*/\1 now \2/p'
+    for when in before now declared; do
+      tool=$build model=problems/humanoid.xml
+      [ $when = before ] && tool=$old/build
+      [ $when = declared ] && model=$old/declared.xml
+      "$tool/tests/bench_inverse" "$model" | sed -n "s/^ *\([0-9]*\) - .* us *\([0-9.]*\) us .*us .*/\1 $when \2/p"
+    done
   done >"$old/times"
   {
     provenance "sh tests/results.sh absent"
-    echo "Inverse of problems/humanoid.xml, which has no tendon, equality constraint, fluid or sensor: us,"
-    echo "least and median of nine runs by turns, of this build and of one before all of those were there ($before)."
+    echo "Inverse of problems/humanoid.xml, which has no tendon, equality constraint, fluid, sensor, mesh or height field: us,"
+    echo "least and median of nine runs by turns, of a build before all of those were there ($before), of this build, and of this"
+    echo "build with a mesh and a height field that are only seen and an equality constraint that is switched off in the file."
     echo
-    echo "rows from   before: least, median   now: least, median   ratio of the least"
+    echo "rows from  before: least, median  now: least, median  declared: least, median  ratio of the least: now, declared"
     for rows in 0 1 11 21 31 41 51 61; do
-      for when in before now; do
+      for when in before now declared; do
         sed -n "s/^$rows $when //p" "$old/times" | sort -n | sed -n '1p;5p' | tr '\n' ' '
-      done | awk -v rows="$rows" '{ printf "%9d   %13.2f %8.2f   %10.2f %8.2f   %18.3f\n", rows, $1, $2, $3, $4, $3 / $1 }'
+      done | awk -v rows="$rows" \
+        '{ printf "%9d  %13.2f %7.2f  %10.2f %7.2f  %15.2f %7.2f  %25.3f %9.3f\n", rows, $1, $2, $3, $4, $5, $6, $3 / $1, $5 / $1 }'
     done
     echo
-    echo "Memory of a state of it, cavort inspect:"
-    ninja -C "$build" problems/cavort >/dev/null
-    "$build/problems/cavort" inspect problems/humanoid.xml | sed -n '/memory of a state/,/the whole/p'
+    echo "Memory of a state, cavort inspect: before, now, declared"
+    for when in before now declared; do
+      tool=$build model=problems/humanoid.xml
+      [ $when = before ] && tool=$old/build
+      [ $when = declared ] && model=$old/declared.xml
+      "$tool/problems/cavort" inspect "$model" | sed -n '/memory of a state/,/the whole/s/ us  / us/p' | sed 's/ *[0-9.]* us/ /' >"$old/$when.txt"
+    done
+    cat "$old/before.txt" "$old/now.txt" "$old/declared.txt"
   } >"$out/absent.txt"
 }
 
-for name in ${*:-inverse conservation orders sensors tendons actuation fluid absent}; do
+for name in ${*:-inverse sweep conservation orders sensors tendons actuation fluid absent}; do
   case $name in
     inverse) run inverse bench_inverse ;;
+    sweep) run sweep bench_sweep ;;
     conservation) run conservation test_conservation ;;
     orders) run orders bench_orders ;;
     sensors) run sensors test_sensor ;;
@@ -72,6 +95,6 @@ for name in ${*:-inverse conservation orders sensors tendons actuation fluid abs
     actuation) run actuation test_actuation ;;
     fluid) run fluid test_fluid ;;
     absent) absent ;;
-    *) echo "usage: sh tests/results.sh [inverse|conservation|orders|sensors|tendons|actuation|fluid|absent]..." >&2 && exit 2 ;;
+    *) echo "usage: sh tests/results.sh [inverse|sweep|conservation|orders|sensors|tendons|actuation|fluid|absent]..." >&2 && exit 2 ;;
   esac
 done

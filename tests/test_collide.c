@@ -128,11 +128,18 @@ static void compare(const cav_state *state) {
   CHECK(k == state->ncontact);
 }
 
-static void test_heap(void) {
+// the broad phase that looks at all pairs, or the one that sweeps
+static void test_heap(int sweep_from) {
   static heap h;
   fill(&h);
+  // two pairs of the same geoms
+  cav_pair *twin = h.pair + 200;
+  twin->geom1 = twin[-1].geom1, twin->geom2 = twin[-1].geom2, twin->outer = twin[-1].outer;
   cav_state *state = cav_state_new(&h.model);
   if (!CHECK(state != NULL)) return;
+  cav_geom_cache_free(state->work->geom);
+  state->work->geom = cav_geom_cache_new(&h.model, sweep_from);
+  if (!CHECK(state->work->geom != NULL)) return;
   int contacts = 0;
   for (int pose = 0; pose < 300; pose++) {
     scatter(state);
@@ -143,7 +150,8 @@ static void test_heap(void) {
     compare(state);
     contacts += state->ncontact;
   }
-  printf("%d pairs, %.1f contacts a pose\n", h.model.npair, contacts / 300.0);
+  printf("%d pairs, %s: %.1f contacts a pose\n", h.model.npair, sweep_from ? "all looked at" : "swept",
+         contacts / 300.0);
   CHECK(contacts > 300 * 10);
 
   // switched off
@@ -276,7 +284,8 @@ static void test_model(const char *folder, const char *name) {
 #endif
 
 int main(void) {
-  test_heap();
+  test_heap(CAV_SWEEP_FROM);
+  test_heap(0);
   test_reach();
 #ifdef CAVORT_HAVE_MUJOCO
   static const char *const models[] = {"mujoco/humanoid.xml",     "dm_control/acrobot.xml",  "dm_control/cartpole.xml",
