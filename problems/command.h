@@ -24,6 +24,7 @@ typedef struct cav_command_line {
   const char *output;  ///< -o, NULL: named after the problem
   cav_solver solver;
   int threads;
+  int routes; ///< --routes: 0 auto, else how many at once
   int resume, quiet, json;
   const char *methods; ///< --methods, NULL: own
   int nipopt;          ///< --ipopt, any number of times

@@ -1,4 +1,5 @@
-/// cavort solve: reads a problem, solves it, certifies the result, writes its folder. The first Ctrl-C ends the solve with
+/// cavort solve: reads a problem, solves it, certifies the result, writes its folder. What the stated guess does not lead to is
+/// tried by other routes, in processes (race.c). The first Ctrl-C ends the solve with
 /// the best iterate saved; another one, a second later, ends the program at once.
 #include <math.h>
 #include <signal.h>
@@ -11,6 +12,7 @@
 #include "certificate.h"
 #include "command.h"
 #include "file.h"
+#include "race.h"
 #include "result.h"
 
 static volatile sig_atomic_t interrupted, first_second;
@@ -119,35 +121,64 @@ static cav_trajectory *resume_from(const char *folder, const cav_problem *proble
   return start;
 }
 
-// certifies and writes what depends on that; the exit status
-static int conclude(const cav_command_line *line, const char *folder, const cav_problem *problem,
-                    const cav_solution *solution) {
-  cav_error error = {0};
-  cav_verdict verdict = {0};
-  cav_status status = cav_result_write(folder, problem, solution, &error);
-  if (!status) {
-    status = cav_verify(problem, solution->trajectory, &solution->contact, solution->gain_q, solution->gain_v, &verdict,
-                        &error);
-  }
-  verdict.optimality = solution->optimality;
-  verdict.solve_seconds = solution->seconds;
-  verdict.iterations = solution->iterations;
-  if (!status) status = cav_result_write_verdict(folder, problem, &verdict, &error);
-  if (status) return cav_command_fail(&error);
-  if (line->json) cav_certificate_json(stdout, problem->name, problem->model->name, &verdict);
-  if (!line->quiet && !line->json) cav_certificate_print(stdout, problem->name, problem->model->name, &verdict);
-  // the page is a convenience: without three.js everything else stands
-  if (cav_result_write_page(folder, problem, solution->trajectory, &solution->contact, &verdict, &error)) {
-    fprintf(stderr, "cavort: no page: %s\n", error.text);
-  }
-  if (!line->quiet && !line->json) printf("result: %s\n", folder);
-  return verdict.certified ? CAV_EXIT_CERTIFIED : CAV_EXIT_NOT_CERTIFIED;
-}
+// what saving needs to know
+typedef struct destination {
+  const cav_command_line *line;
+  const char *folder;
+} destination;
 
-static const char *why_stopped(cav_status status) {
+static const char *why_stopped(int status) {
   if (status == CAV_INTERRUPTED) return "interrupted; the best iterate is saved";
   if (status == CAV_NOT_FINITE) return "a number that is not finite came up; the last finite iterate is saved";
   return "the solver did not reach its tolerance; the best iterate is saved";
+}
+
+// writes a result and tells its verdict; the exit status
+static int save(void *context, const cav_problem *problem, const cav_solution *solution,
+                const cav_race_report *report) {
+  const destination *to = context;
+  const cav_command_line *line = to->line;
+  const cav_verdict *verdict = &report->verdict;
+  cav_error error = {0};
+  if (report->status) fprintf(stderr, "cavort: %s\n", report->text[0] ? report->text : why_stopped(report->status));
+  cav_status status = cav_result_write(to->folder, problem, solution, &error);
+  if (!status) status = cav_result_write_verdict(to->folder, problem, verdict, &error);
+  if (status) return cav_command_fail(&error);
+  if (line->json) cav_certificate_json(stdout, problem->name, problem->model->name, verdict);
+  if (!line->quiet && !line->json) cav_certificate_print(stdout, problem->name, problem->model->name, verdict);
+  // the page is a convenience: without three.js everything else stands
+  if (cav_result_write_page(to->folder, problem, solution->trajectory, &solution->contact, verdict, &error)) {
+    fprintf(stderr, "cavort: no page: %s\n", error.text);
+  }
+  if (!line->quiet && !line->json) printf("result: %s\n", to->folder);
+  if (report->status == CAV_INTERRUPTED) return CAV_EXIT_INTERRUPTED;
+  return verdict->certified ? CAV_EXIT_CERTIFIED : CAV_EXIT_NOT_CERTIFIED;
+}
+
+// in processes whose lines no one reads
+static int observe_quietly(void *context, const cav_progress *progress) {
+  (void)context, (void)progress;
+  return interrupted;
+}
+
+static void tell_more(const cav_race *race) {
+  const cav_verdict *v = &race->entry[0].report.verdict;
+  fprintf(stderr, "not certified: %s\ntrying by other routes:", v->reason);
+  for (int i = 1; i < race->n; i++) fprintf(stderr, " %s", race->entry[i].route.name);
+  fprintf(stderr, " (%d at a time; --routes 1 for none)\n", race->processes);
+}
+
+// as the command line says: the first alone and the others where it does not do, or so many at once
+static cav_status run_race(cav_race *race, const cav_command_line *line, ticker *tick, cav_error *error) {
+  int at_once = line->routes > 1;
+  cav_status status = CAV_OK;
+  if (!at_once) {
+    status = cav_race_first(race, error);
+    if (tick->terminal && tick->shown) fputs("\r\033[K", stderr);
+    if (status || race->entry[0].report.verdict.certified || race->n == 1 || interrupted) return status;
+    if (race->tell) tell_more(race);
+  }
+  return cav_race_rest(race, at_once, error);
 }
 
 static int solve(const cav_command_line *line, const cav_problem *problem, const char *folder) {
@@ -157,29 +188,41 @@ static int solve(const cav_command_line *line, const cav_problem *problem, const
   cav_trajectory *start = line->resume ? resume_from(folder, problem, &error) : NULL;
   if (line->resume && !start) return cav_command_fail(&error);
   ticker tick = {.quiet = line->quiet, .terminal = isatty(STDERR_FILENO)};
-  cav_solve_options options = cav_solve_options_default();
-  options.solver = line->solver;
-  options.threads = line->threads;
-  options.nipopt = line->nipopt;
-  options.ipopt = line->ipopt;
-  options.observer = observe;
-  options.observer_context = &tick;
-  cav_solution *solution = NULL;
+  destination to = {line, folder};
+  cav_race race = {.problem = problem,
+                   .start = start,
+                   .options = cav_solve_options_default(),
+                   .quiet = observe_quietly,
+                   .interrupted = &interrupted,
+                   .processes = line->threads,
+                   .tell = !line->quiet,
+                   .save = save,
+                   .context = &to};
+  race.options.solver = line->solver;
+  race.options.threads = line->threads;
+  race.options.nipopt = line->nipopt;
+  race.options.ipopt = line->ipopt;
+  race.options.observer = observe;
+  race.options.observer_context = &tick;
   catch_interrupts();
-  status = cav_solve(problem, &options, start, &solution, &error);
-  if (tick.terminal && tick.shown) fputs("\r\033[K", stderr);
-  cav_trajectory_free(start);
-  // a solve that stopped early is told, then certified and saved like any other
-  int stopped = status == CAV_NOT_CONVERGED || status == CAV_INTERRUPTED || status == CAV_NOT_FINITE;
-  if (!solution || (status && !stopped)) {
-    cav_solution_free(solution);
-    if (!status) error.status = CAV_INTERNAL;
-    return cav_command_fail(&error);
+  // a start that is given is the only one; Ipopt alone knows no schedule
+  int most = line->resume ? 1 : line->routes ? line->routes : CAV_ROUTES;
+  status = cav_race_open(&race, most, line->solver != CAV_SOLVER_IPOPT, &error);
+  if (!status) status = run_race(&race, line, &tick, &error);
+  int best = status ? -1 : cav_race_best(&race, line->routes > 1), done = CAV_EXIT_INTERNAL;
+  if (best >= 0) {
+    done = cav_race_save(&race, best);
+    char *path = cav_result_path(folder, "routes.csv");
+    status = path ? cav_race_write(&race, best, path, &error) : cav_file_fail(&error, CAV_NO_MEMORY, 0, "no memory");
+    free(path);
+  } else if (!status) {
+    status = cav_file_fail(&error, CAV_NOT_CONVERGED, 0, "no route led to a motion");
   }
-  if (stopped) fprintf(stderr, "cavort: %s\n", error.text[0] ? error.text : why_stopped(status));
-  int done = conclude(line, folder, problem, solution);
-  cav_solution_free(solution);
-  return status == CAV_INTERRUPTED && done <= CAV_EXIT_NOT_CERTIFIED ? CAV_EXIT_INTERRUPTED : done;
+  if (race.n > 1 && race.tell && best > 0) fprintf(stderr, "kept: route %s\n", race.entry[best].route.name);
+  if (status) done = cav_command_fail(&error);
+  cav_race_close(&race);
+  cav_trajectory_free(start);
+  return done;
 }
 
 int cav_command_solve(const cav_command_line *line) {

@@ -15,7 +15,8 @@ enum option {
   OPTION_QUIET = 32,
   OPTION_JSON = 64,
   OPTION_IPOPT = 128,
-  OPTION_METHODS = 256
+  OPTION_METHODS = 256,
+  OPTION_ROUTES = 512
 };
 
 // options: spelling, value's name or NULL, what it does
@@ -28,6 +29,9 @@ static const struct {
     {OPTION_SOLVER, "--solver", NULL, "WORD", "gn: own Gauss-Newton (default), ipopt, or both, one after the other"},
     {OPTION_IPOPT, "--ipopt", NULL, "NAME=VALUE",
      "an option of Ipopt, laid over the problem's; may be given several times"},
+    {OPTION_ROUTES, "--routes", NULL, "N",
+     "auto: where the stated guess leads to no certificate, others (default); 1: never; N: so many at once, the "
+     "cheapest kept"},
     {OPTION_METHODS, "--methods", NULL, "LIST",
      "what to compare, with commas: own (default), ipopt, limited (Ipopt with limited memory), both"},
     {OPTION_THREADS, "--threads", NULL, "N",
@@ -51,8 +55,8 @@ static const command commands[] = {
      cav_command_inspect, OPTION_MODEL},
     {"solve", "PROBLEM", "find the motion that a problem file asks for, certify it and write a result folder",
      cav_command_solve,
-     OPTION_MODEL | OPTION_OUTPUT | OPTION_SOLVER | OPTION_IPOPT | OPTION_THREADS | OPTION_RESUME | OPTION_QUIET |
-         OPTION_JSON},
+     OPTION_MODEL | OPTION_OUTPUT | OPTION_SOLVER | OPTION_IPOPT | OPTION_THREADS | OPTION_ROUTES | OPTION_RESUME |
+         OPTION_QUIET | OPTION_JSON},
     {"verify", "DIR", "certify the motion of a result folder again, from its files alone", cav_command_verify,
      OPTION_MODEL | OPTION_QUIET | OPTION_JSON},
     {"explain", "DIR", "say why the motion of a result folder is as it is: what it misses, and which constraints pull",
@@ -144,6 +148,12 @@ static int take_value(cav_command_line *line, enum option option, const char *na
         if (!strcmp(value, solvers[i])) return 1;
       }
       fprintf(stderr, "cavort: %s: expected gn, ipopt or both, got '%s'\n", name, value);
+      return 0;
+    case OPTION_ROUTES:
+      n = strtol(value, &end, 10);
+      line->routes = (int)n;
+      if (!strcmp(value, "auto") || (end != value && !*end && n >= 1 && n <= CAV_ROUTES)) return 1;
+      fprintf(stderr, "cavort: %s: expected auto or a number from 1 to %d, got '%s'\n", name, CAV_ROUTES, value);
       return 0;
     case OPTION_METHODS:
       line->methods = value;
