@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "cavort/model.h"
+#include "omit.h"
 #include "scene.h"
 #include "spec.h"
 
@@ -14,6 +15,10 @@ static cav_model *load(const char *path, const cav_load_options *options, const 
   if (error) *error = (cav_error){.status = CAV_OK};
   cav_xml *xml = cav_xml_read(path, roots, error);
   if (!xml) return NULL;
+  if (scene && cav_omit(xml, scene, error) != CAV_OK) {
+    cav_xml_free(xml);
+    return NULL;
+  }
   cav_spec spec = {.xml = xml, .error = error, .load = *options, .scene = scene};
   if (cav_xml_root(xml)->rule == &cav_urdf_root)
     cav_urdf_read(&spec, xml);

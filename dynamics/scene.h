@@ -6,7 +6,7 @@
 #include "cavort/model.h"
 #include "xml.h"
 
-/// The element <scene>: what MJCF's worldbody may hold, but for classes and materials.
+/// The element <scene>: what MJCF's worldbody may hold, but for classes and materials; and <leave>, omit.h.
 extern const cav_xml_element cav_scene_element;
 
 /// cav_model_load with the children of a <scene> (NULL: none) added to the world. They take MJCF's own defaults, angles are

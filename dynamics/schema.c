@@ -4,6 +4,7 @@
 /// only seen (visual, asset textures, camera, light, statistic, size, custom) is accepted unread. What has an effect but is
 /// not offered is in the table too: mjcf.c says so with the line, which is clearer than "unknown element".
 
+#include "omit.h"
 #include "scene.h"
 #include "spec.h"
 
@@ -257,13 +258,14 @@ static const cav_xml_element *const body_children[] = {&inertial, &joint,     &f
                                                        &light,    &composite, &frame,     &body, &include, NULL};
 static const cav_xml_element *const frame_children[] = {&joint,     &freejoint, &geom, &site,    &camera, &light,
                                                         &composite, &frame,     &body, &include, NULL};
-static const cav_xml_element *const world_children[] = {&geom,  &site, &camera,  &light, &composite,
-                                                        &frame, &body, &include, NULL};
+#define WORLD_CHILDREN &geom, &site, &camera, &light, &composite, &frame, &body, &include
+static const cav_xml_element *const world_children[] = {WORLD_CHILDREN, NULL};
 static const cav_xml_element frame = {"frame", 0, 0, frame_attributes, frame_children, 0};
 static const cav_xml_element body = {"body", 0, 0, body_attributes, body_children, 0};
 static const cav_xml_attribute world_attributes[] = {NAMED("name"), NAMED("childclass"), END};
 static const cav_xml_element worldbody = {"worldbody", 0, 0, world_attributes, world_children, 0};
-const cav_xml_element cav_scene_element = {"scene", 0, 1, NULL, world_children, 0};
+static const cav_xml_element *const scene_children[] = {WORLD_CHILDREN, &cav_leave_element, NULL};
+const cav_xml_element cav_scene_element = {"scene", 0, 1, NULL, scene_children, 0};
 
 // --- contact, equality, tendon ---
 

@@ -52,6 +52,7 @@ row() {
   row hop dm_control/hopper.xml
   row walker-walk dm_control/walker.xml
   row cheetah-gallop dm_control/cheetah.xml
+  row quadruped-trot dm_control/quadruped.xml
   for motion in jump kick reach get-up-back get-up-front walk step-up walk-cycle run; do
     row $motion
     row $motion mujoco/humanoid.xml
