@@ -1,8 +1,9 @@
 /// Derivatives of sensor readings by q and v_next, in closed form at the state's last evaluation. What is fixed in a link
 /// moves with the axes of the dofs below it: a point by S at the point, a direction by the angular part. The velocity of
 /// a link changes by (drift of the axis) - V x S when a dof moves, the drift being (motion before the joint) x S, which
-/// cav_derivatives has left in the state. Readings do not depend on v. Not offered: forces, accelerations, ranges, limits,
-/// actuators, readings in another frame or cut off.
+/// cav_derivatives has left in the state. A pose in a moving frame changes by the twist of the object less that of the frame,
+/// both at the object. Readings do not depend on v. Not offered: forces, accelerations, ranges, limits, actuators, velocities
+/// in another frame, readings that are cut off.
 #include "math3.h"
 #include "slope.h"
 
@@ -45,6 +46,41 @@ static void put_turned(const task *t, const cav_pose *pose, const double turn[3]
   put3(t->dq, t->nv, j, r);
   rotate_back(r, pose->rotation, by_next);
   put3(t->dn, t->nv, j, r);
+}
+
+// adds to a column of a pose what a dof gives that moves the object (sign 1) or the frame it is read in (-1)
+static void add_pose(const task *t, const cav_sensor *sensor, const cav_pose *pose, const cav_pose *from, double sign,
+                     int j) {
+  double S[6], x[4] = {0}, turn[4] = {0};
+  motion_at(S, t->state->axis + 6 * j, t->state->reference + 3 * t->model->dof[j].link, pose->pos);
+  if (sensor->type == CAV_SENSOR_FRAMEPOS) {
+    rotate_back(x, from->rotation, S + 3);
+  } else if (sensor->type == CAV_SENSOR_FRAMEQUAT) {
+    double back[4], quat[4];
+    scale3(turn + 1, 0.5, S);
+    quat_mul(quat, turn, pose->quat);
+    quat_conjugate(back, from->quat);
+    quat_mul(x, back, quat);
+  } else {
+    double axis[3];
+    column3(axis, pose->rotation, sensor->type - CAV_SENSOR_FRAMEXAXIS);
+    cross3(axis, S, axis);
+    rotate_back(x, from->rotation, axis);
+  }
+  for (int i = 0; i < sensor->dim; i++) {
+    if (t->dq) t->dq[i * t->nv + j] += sign * x[i];
+  }
+}
+
+// a pose read in another frame: dofs that move both drop out
+static void referred_pose(const task *t, const cav_sensor *sensor) {
+  cav_pose pose, from;
+  int link = cav_object_link(t->model, sensor->object_type, sensor->object);
+  int base = cav_object_link(t->model, sensor->reference_type, sensor->reference);
+  cav_object_pose(t->model, t->state, sensor->object_type, sensor->object, &pose);
+  cav_object_pose(t->model, t->state, sensor->reference_type, sensor->reference, &from);
+  for (int j = last_dof(t->model, link); j >= 0; j = t->model->dof[j].parent) add_pose(t, sensor, &pose, &from, 1, j);
+  for (int j = last_dof(t->model, base); j >= 0; j = t->model->dof[j].parent) add_pose(t, sensor, &pose, &from, -1, j);
 }
 
 // one column of the derivatives of a frame's reading
@@ -198,7 +234,8 @@ static void tendon(const task *t, int index, double *out) {
 }
 
 static int offered(const cav_model *model, const cav_sensor *sensor) {
-  if (sensor->cutoff > 0 || sensor->referred) return 0;
+  if (sensor->cutoff > 0) return 0;
+  if (sensor->referred) return sensor->type >= CAV_SENSOR_FRAMEPOS && sensor->type <= CAV_SENSOR_FRAMEZAXIS;
   switch (sensor->type) {
     case CAV_SENSOR_TENDONVEL:
       return model->tendon[sensor->object].npath == 0;
@@ -251,7 +288,11 @@ cav_status cav_sense_derivatives(const cav_model *model, const cav_state *state,
       frame(&t, sensor, CAV_OBJECT_SITE);
       break;
     default:
-      frame(&t, sensor, sensor->object_type);
+      if (sensor->referred) {
+        referred_pose(&t, sensor);
+      } else {
+        frame(&t, sensor, sensor->object_type);
+      }
   }
   return CAV_OK;
 }

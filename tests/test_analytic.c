@@ -22,7 +22,7 @@ static const char shapes[] =
     "<pair geom1='ball' geom2='egg' condim='6' friction='.3 .9 .05 .02 .04'/></contact></mujoco>";
 #endif
 
-enum { STATES = 16, POINTS = 6, SENSORS = 40 };
+enum { STATES = 16, POINTS = 6, SENSORS = 48 };
 
 /// What is compared, of one state: u, then 13 numbers a contact (gap, velocities, impulses), then sensors.
 typedef struct readings {
@@ -53,6 +53,16 @@ static void list_sensors(readings *r) {
     }
     r->sensor[r->nsensor++] = s;
   }
+  // poses in the frame of another body, one up the chain of the object or apart from it
+  for (int type = CAV_SENSOR_FRAMEPOS; type <= CAV_SENSOR_FRAMEZAXIS; type++) {
+    r->sensor[r->nsensor++] = (cav_sensor){.type = (cav_sensor_type)type,
+                                           .dim = type == CAV_SENSOR_FRAMEQUAT ? 4 : 3,
+                                           .object_type = CAV_OBJECT_BODY,
+                                           .object = model->nbody - 1,
+                                           .referred = 1,
+                                           .reference_type = CAV_OBJECT_XBODY,
+                                           .reference = type % 2 ? 1 : model->nbody / 2};
+  }
   for (int k = 0; k < 2 && model->nsite > 0; k++) {
     cav_sensor_type type = k ? CAV_SENSOR_GYRO : CAV_SENSOR_VELOCIMETER;
     r->sensor[r->nsensor++] =
@@ -67,7 +77,7 @@ static void list_sensors(readings *r) {
 // whether sensors of a type have a derivative
 static int has_derivative(const cav_sensor *s) {
   int type = (int)s->type, string = s->type == CAV_SENSOR_TENDONVEL && model->tendon[s->object].npath == 0;
-  if (s->referred || s->cutoff > 0) return 0;
+  if (s->cutoff > 0 || (s->referred && (type < CAV_SENSOR_FRAMEPOS || type > CAV_SENSOR_FRAMEZAXIS))) return 0;
   return type <= CAV_SENSOR_SUBTREEANGMOM || type == CAV_SENSOR_VELOCIMETER || type == CAV_SENSOR_GYRO || string ||
          type == CAV_SENSOR_TENDONPOS || type == CAV_SENSOR_BALLANGVEL || type == CAV_SENSOR_CLOCK;
 }
