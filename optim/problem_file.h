@@ -72,6 +72,16 @@ cav_status cav_problem_cycle(const cav_problem_reader *reader);
 /// Terms of <cost> and <constraint>, with the defaults that they leave in place. problem_term.c.
 cav_status cav_problem_terms(const cav_problem_reader *reader);
 
+/// Targets of a term as a table gives them.
+typedef struct cav_problem_targets {
+  int count;            ///< numbers of a target, given
+  int n;                ///< rows
+  double *time, *value; ///< [n], [n*count], memory of the problem
+} cav_problem_targets;
+
+/// Table of attribute 'file' of a term, its columns by attribute 'columns'. problem_table.c.
+cav_status cav_problem_table(const cav_problem_reader *reader, const cav_xml_node *node, cav_problem_targets *targets);
+
 /// Whether a term over dofs selects dof d. problem_term.c.
 int cav_problem_selects(const cav_model *model, const cav_term *term, int d);
 

@@ -94,14 +94,15 @@ static const cav_xml_element pose = {
     "pose", 0, 0, ATTRIBUTES(TEXT("name", 1), POSE_SOURCE), CHILDREN(&pose_root, &pose_joint), 0};
 
 // terms: what is measured; when; and as a cost or as a constraint
+#define TABLE TEXT("file", 0), TEXT("columns", 0)
 #define WINDOW TEXT("name", 0), TEXT("from", 0), TEXT("to", 0), TEXT("at", 0), REAL("scale", 0)
 #define DOFS WORD("dofs", cav_problem_dof_sets), TEXT("joint", 0)
-#define RATE DOFS, REALS("target", 1, 0)
-#define POSTURE DOFS, TEXT("key", 0), REALS("qpos", 1, 0)
+#define RATE DOFS, TABLE, REALS("target", 1, 0)
+#define POSTURE DOFS, TABLE, TEXT("key", 0), REALS("qpos", 1, 0)
 #define SENSOR                                                                                                \
   WORD("type", cav_problem_sensors), TEXT("body", 0), TEXT("xbody", 0), TEXT("geom", 0), TEXT("site", 0),     \
       TEXT("joint", 0), TEXT("tendon", 0), TEXT("actuator", 0), WORD("reftype", frames), TEXT("refname", 0), \
-      TEXT("component", 0), REALS("target", 1, 0), WORD("relative", relations)
+      TEXT("component", 0), TABLE, REALS("target", 1, 0), WORD("relative", relations)
 static const cav_xml_element posture_waypoint = {
     "waypoint", 0, 0, ATTRIBUTES(REAL("time", 1), TEXT("key", 0), REALS("qpos", 1, 0)), NULL, 0};
 static const cav_xml_element value_waypoint = {

@@ -84,6 +84,70 @@ int cav_problem_selects(const cav_model *m, const cav_term *term, int d) {
   return 0;
 }
 
+// one number for each selected dof, or one for all, laid out over nv
+static void spread(const cav_model *m, const cav_term *term, const double *number, int count, double *target) {
+  for (int d = 0, k = 0; d < m->nv; d++) {
+    if (!cav_problem_selects(m, term, d)) continue;
+    target[d] = number[count == 1 ? 0 : k];
+    k++;
+  }
+}
+
+// numbers of a target: of a posture, of a rate, of a sensor or of the one component of it that counts
+static int target_count(const cav_model *m, const cav_term *term) {
+  int n = 0;
+  if (term->quantity == CAV_QUANTITY_CONFIGURATION) return m->nq;
+  if (term->quantity == CAV_QUANTITY_SENSOR)
+    return term->component >= 0 && term->sensor.dim != 4 ? 1 : term->sensor.dim;
+  for (int d = 0; d < m->nv; d++) n += cav_problem_selects(m, term, d);
+  return n;
+}
+
+// brings a target that holds orientations to unit length; 0 if one is zero
+static int normalise(const cav_model *m, const cav_term *term, double *target) {
+  if (term->quantity == CAV_QUANTITY_CONFIGURATION) {
+    cav_normalise(m, target);
+  } else if (term->quantity == CAV_QUANTITY_SENSOR && term->sensor.dim == 4) {
+    double *w = target, length = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2] + w[3] * w[3]);
+    for (int i = 0; i < 4; i++) w[i] /= length > 0 ? length : 1;
+    return length > 1e-9;
+  }
+  return 1;
+}
+
+// targets by a table, dim numbers each
+static cav_status read_table(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term, int dim) {
+  const cav_model *m = reader->model;
+  cav_problem_targets table = {.count = target_count(m, term)};
+  cav_status status = cav_problem_table(reader, node, &table);
+  if (status) return status;
+  double *target = cav_problem_alloc(reader->owner, sizeof(double) * (size_t)table.n * (size_t)dim);
+  if (!target) return cav_problem_no_memory(reader);
+  for (int i = 0; i < table.n; i++) {
+    const double *in = table.value + i * table.count;
+    double *out = target + i * dim;
+    int rate = term->quantity == CAV_QUANTITY_VELOCITY || term->quantity == CAV_QUANTITY_ACCELERATION;
+    int first = term->quantity == CAV_QUANTITY_SENSOR && table.count == 1 && term->component >= 0 ? term->component : 0;
+    if (rate) spread(m, term, in, table.count, out);
+    if (!rate) memcpy(out + first, in, sizeof(double) * (size_t)table.count);
+    if (!normalise(m, term, out))
+      return cav_xml_fail(reader->error, node, "file", "the quaternion at %g s is zero", table.time[i]);
+  }
+  term->target = target;
+  term->nwaypoint = table.n;
+  term->waypoint_time = table.time;
+  return CAV_OK;
+}
+
+// a table stands alone
+static cav_status check_sources(const cav_problem_reader *reader, const cav_xml_node *node, const char *own) {
+  if (!cav_xml_get(node, "file") && cav_xml_get(node, "columns"))
+    return cav_xml_fail(reader->error, node, "columns", "says which columns of attribute 'file', which is missing");
+  if (cav_xml_get(node, "file") && own)
+    return cav_xml_fail(reader->error, node, "file", "contradicts %s; give one of the two", own);
+  return CAV_OK;
+}
+
 // room for the targets of a term and, with waypoints, their times; checks that times increase
 static cav_status make_targets(const cav_problem_reader *reader, const cav_xml_node *node, int dim, cav_term *term,
                                double **target) {
@@ -134,6 +198,9 @@ static cav_status read_posture(const cav_problem_reader *reader, const cav_xml_n
   cav_status status = read_dofs(reader, node, term);
   const cav_xml_node *waypoint = cav_problem_child(node, "waypoint");
   int found, own = cav_xml_get(node, "key") || cav_xml_get(node, "qpos");
+  if (!status)
+    status = check_sources(reader, node, own ? "the posture that <posture> gives" : waypoint ? "<waypoint>" : NULL);
+  if (!status && cav_xml_get(node, "file")) return read_table(reader, node, term, reader->model->nq);
   if (status || (!own && !waypoint)) return status;
   if (own && waypoint)
     return cav_xml_fail(reader->error, waypoint, NULL,
@@ -154,17 +221,12 @@ static cav_status rate_target(const cav_problem_reader *reader, const cav_xml_no
                               double *target) {
   const cav_model *m = reader->model;
   const cav_xml_value *given = cav_xml_get(node, "target");
-  int n = 0;
-  for (int d = 0; d < m->nv; d++) n += cav_problem_selects(m, term, d);
+  int n = target_count(m, term);
   if (given->count != 1 && given->count != n) {
     return cav_xml_fail(reader->error, node, "target", "expected one number, or %d, one for each selected dof, got %d",
                         n, given->count);
   }
-  for (int d = 0, k = 0; d < m->nv; d++) {
-    if (!cav_problem_selects(m, term, d)) continue;
-    target[d] = given->number[given->count == 1 ? 0 : k];
-    k++;
-  }
+  spread(m, term, given->number, given->count, target);
   return CAV_OK;
 }
 
@@ -174,11 +236,13 @@ static cav_status read_targets(const cav_problem_reader *reader, const cav_xml_n
                                                   double *)) {
   const cav_xml_node *waypoint = cav_problem_child(node, "waypoint");
   int own = cav_xml_get(node, "target") != NULL;
-  if (!own && !waypoint) return CAV_OK;
+  cav_status status = check_sources(reader, node, own ? "attribute 'target'" : waypoint ? "<waypoint>" : NULL);
+  if (!status && cav_xml_get(node, "file")) return read_table(reader, node, term, dim);
+  if (status || (!own && !waypoint)) return status;
   if (own && waypoint)
     return cav_xml_fail(reader->error, node, "target", "contradicts <waypoint>; give one of the two");
   double *target;
-  cav_status status = make_targets(reader, node, dim, term, &target);
+  status = make_targets(reader, node, dim, term, &target);
   if (!status && own) return read(reader, node, term, target);
   for (int i = 0; waypoint && !status; i++, waypoint = cav_xml_next(waypoint)) {
     status = read(reader, waypoint, term, target + i * dim);
@@ -304,10 +368,8 @@ static cav_status sensor_target(const cav_problem_reader *reader, const cav_xml_
   }
   cav_xml_reals(node, "target", target + (one ? term->component : 0), wanted);
   if (!turn) return CAV_OK;
-  double length = sqrt(target[0] * target[0] + target[1] * target[1] + target[2] * target[2] + target[3] * target[3]);
-  if (!(length > 1e-9)) return cav_xml_fail(reader->error, node, "target", "expected a quaternion that is not zero");
-  for (int i = 0; i < 4; i++) target[i] /= length;
-  return CAV_OK;
+  if (normalise(reader->model, term, target)) return CAV_OK;
+  return cav_xml_fail(reader->error, node, "target", "expected a quaternion that is not zero");
 }
 
 // reading + target, or reading * target for orientations
