@@ -37,23 +37,34 @@ static double between(double from, double to, double s) {
   return from > 0 && to > 0 ? from * pow(to / from, s) : (1 - s) * from + s * to;
 }
 
+cav_stage_options cav_schedule_at(const cav_schedule *schedule, double x) {
+  const cav_stage_options *a = &schedule->first, *b = &schedule->last;
+  cav_stage_options stage = x < 1 ? *a : *b;
+  stage.softness = between(a->softness, b->softness, x);
+  stage.time_constant = between(a->time_constant, b->time_constant, x);
+  stage.smoothing = between(a->smoothing, b->smoothing, x);
+  stage.smoothing_self = between(a->smoothing_self, b->smoothing_self, x);
+  stage.self_share = between(a->self_share, b->self_share, x);
+  stage.penalty = between(a->penalty, b->penalty, fmin(2 * x, 1));
+  return stage;
+}
+
 void cav_stage_law(const cav_problem *problem, double x, double step, cav_options *law) {
-  const cav_stage_options *a = &problem->schedule.first, *b = &problem->schedule.last;
+  cav_stage_options stage = cav_schedule_at(&problem->schedule, x);
   law->stabilisation = CAV_STABILISATION_DISCRETE;
-  law->softness = between(a->softness, b->softness, x);
-  law->time_constant = between(a->time_constant, b->time_constant, x) * step;
-  law->smoothing = between(a->smoothing, b->smoothing, x);
-  law->smoothing_self = between(a->smoothing_self, b->smoothing_self, x);
-  law->self_share = between(a->self_share, b->self_share, x);
+  law->softness = stage.softness;
+  law->time_constant = stage.time_constant * step;
+  law->smoothing = stage.smoothing;
+  law->smoothing_self = stage.smoothing_self;
+  law->self_share = stage.self_share;
 }
 
 void cav_stage_set(const cav_problem *problem, double x, cav_transcription *tr) {
-  const cav_stage_options *a = &problem->schedule.first, *b = &problem->schedule.last;
   cav_stage_law(problem, x, tr->h, &tr->options);
   tr->penalty = priced;
   tr->penalty.effort = between(priced.effort, PRICE_RISE * priced.effort, x);
   tr->penalty.range = between(priced.range, PRICE_RISE * priced.range, x);
-  tr->penalty.unactuated = between(a->penalty, b->penalty, fmin(2 * x, 1));
+  tr->penalty.unactuated = cav_schedule_at(&problem->schedule, x).penalty;
   tr->penalty.term = between(priced.term, PRICE_RISE * priced.term, fmin(2 * x, 1));
 }
 
@@ -105,11 +116,10 @@ static int keep(cav_trajectory **kept, const cav_trajectory *at) {
 
 /// One stage, at a share of the way.
 static cav_status run_stage(cav_solve_run *run, double share, cav_outcome *outcome) {
-  const cav_schedule *schedule = &run->problem->schedule;
-  int last = share >= 1;
+  cav_stage_options stage = cav_schedule_at(&run->problem->schedule, share);
   cav_stage_set(run->problem, share, run->tr);
-  run->region.iterations = last ? schedule->last.iterations : schedule->first.iterations;
-  run->region.tolerance = last ? schedule->last.tolerance : schedule->first.tolerance;
+  run->region.iterations = stage.iterations;
+  run->region.tolerance = stage.tolerance;
   cav_status status = cav_region_minimise(&run->region, run->normal, run->tr, &run->at, &run->spare);
   *outcome = outcome_of(run, status);
   return status;

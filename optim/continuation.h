@@ -32,6 +32,9 @@ cav_status cav_guess_take(cav_solve_run *run);
 /// Contact law at a share of the schedule, 0 .. 1, for a step in s; the rest of law stays.
 void cav_stage_law(const cav_problem *problem, double share, double step, cav_options *law);
 
+/// The stage at a share of the way from first to last.
+cav_stage_options cav_schedule_at(const cav_schedule *schedule, double share);
+
 /// Contact law and weights at a share of the way from the first to the last stage.
 void cav_stage_set(const cav_problem *problem, double share, cav_transcription *transcription);
 

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "cavort/solve.h"
+#include "continuation.h"
 #include "cycle.h"
 
 /// Gap below which a limb carries, m; travel from which there is a gait, m; cosine from which a hinge lies across the travel.
@@ -20,6 +20,10 @@ static const double swing_angle = 0.25, bend_angle = 0.4, pace = 1.2;
 
 /// How much softer, and how much slower than stated.
 enum { SOFTER = 2, CHEAPER = 10, SLOWER = 2 };
+
+/// Where a motion solved under another order goes on: share of the schedule's way, and stages from there (recipe.md, 1, phase B).
+static const double resumed_share = 0.4;
+enum { RESUMED_STAGES = 10 };
 
 /// What the gait is made of.
 typedef struct walker {
@@ -148,6 +152,12 @@ cav_status cav_routes(const cav_problem *problem, cav_route route[CAV_ROUTES], i
   slow.schedule.stages *= SLOWER;
   add(route, n, &slow, "slow", "twice as many stages");
 
+  if (problem->order == CAV_ORDER_MOMENTUM) {
+    cav_route twice = stated;
+    twice.first_midpoint = 1;
+    add(route, n, &twice, "midpoint", "under the midpoint order first, then from there under the order of momentum");
+  }
+
   cav_route plain = {.guess = CAV_GUESS_INTERPOLATE, .schedule = problem->schedule}, walk = plain;
   cav_status status = problem->nswing ? CAV_OK : gait(problem, &walk);
   if (status != CAV_OK) return status;
@@ -172,4 +182,36 @@ void cav_route_take(const cav_problem *problem, const cav_route *route, cav_prob
   taken->nguess_pose = 0;
   taken->nswing = route->nswing;
   taken->swing = (cav_swing *)route->swing;
+}
+
+/// The schedule from where contacts are half hard.
+static cav_schedule resumed(const cav_schedule *schedule) {
+  cav_schedule rest = *schedule;
+  rest.first = cav_schedule_at(schedule, resumed_share);
+  rest.stages = RESUMED_STAGES;
+  return rest;
+}
+
+cav_status cav_route_solve(const cav_problem *problem, const cav_route *route, const cav_solve_options *options,
+                           const cav_trajectory *start, cav_solution **solution, cav_error *error) {
+  cav_problem taken;
+  cav_route_take(problem, route, &taken);
+  if (!route->first_midpoint || start) return cav_solve(&taken, options, start, solution, error);
+  cav_solve_options first = options ? *options : cav_solve_options_default();
+  cav_solution *before = NULL;
+  first.diagnose = 0;
+  taken.order = CAV_ORDER_MIDPOINT;
+  cav_status status = cav_solve(&taken, &first, NULL, &before, error);
+  // one that was stopped, or has no motion, ends here
+  if (!before || (status != CAV_OK && status != CAV_NOT_CONVERGED)) {
+    *solution = before;
+    return status;
+  }
+  taken.order = problem->order;
+  taken.schedule = resumed(&taken.schedule);
+  status = cav_solve(&taken, options, before->trajectory, solution, error);
+  if (*solution) (*solution)->iterations += before->iterations;
+  if (*solution) (*solution)->seconds += before->seconds;
+  cav_solution_free(before);
+  return status;
 }

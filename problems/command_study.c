@@ -90,8 +90,8 @@ static int methods_of(const char *list, cav_error *error) {
       if (strlen(name) == n && !strncmp(name, word, n)) known = 1 << k;
     }
     if (!known) {
-      cav_file_fail(error, CAV_BAD_INPUT, 0, "--methods: expected own, ipopt, limited or both, got '%.*s'", (int)n,
-                    word);
+      cav_file_fail(error, CAV_BAD_INPUT, 0, "--methods: expected own, routes, ipopt, limited or both, got '%.*s'",
+                    (int)n, word);
       return 0;
     }
     methods |= known;

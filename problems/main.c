@@ -33,7 +33,8 @@ static const struct {
      "auto: where the stated guess leads to no certificate, others (default); 1: never; N: so many at once, the "
      "cheapest kept"},
     {OPTION_METHODS, "--methods", NULL, "LIST",
-     "what to compare, with commas: own (default), ipopt, limited (Ipopt with limited memory), both"},
+     "what to compare, with commas: own (default), routes (own, other routes where needed), ipopt, limited (Ipopt with "
+     "limited memory), both"},
     {OPTION_THREADS, "--threads", NULL, "N",
      "threads to use (default: all processors); the result does not depend on it"},
     {OPTION_RESUME, "--resume", NULL, NULL, "start from the trajectory that the result folder holds"},

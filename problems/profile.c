@@ -119,7 +119,8 @@ static void write_profile(FILE *out, int nrun, const cav_study_run *run, const i
 }
 
 static void write_drawing(FILE *out, int nmethod, const int used[CAV_STUDY_METHODS]) {
-  static const char *const label[] = {"own", "Ipopt, Gauss-Newton Hessian", "Ipopt, limited memory", "own, then Ipopt"};
+  static const char *const label[] = {"own", "own, other routes where needed", "Ipopt, Gauss-Newton Hessian",
+                                      "Ipopt, limited memory", "own, then Ipopt"};
   fputs(
       "set terminal svg size 900,400 background 'white'\nset output 'profile.svg'\nset datafile separator ','\n"
       "set multiplot layout 1,2\nset logscale x\nset yrange [0:1.02]\nset key bottom right\nset grid\n"

@@ -40,7 +40,8 @@ static cav_solution *run(const cav_race *race, int i, const cav_solve_options *o
   cav_error error = {0};
   *report = (cav_race_report){0};
   cav_route_take(race->problem, &race->entry[i].route, taken);
-  cav_status status = cav_solve(taken, options, i == 0 ? race->start : NULL, &solution, &error);
+  cav_status status =
+      cav_route_solve(race->problem, &race->entry[i].route, options, i == 0 ? race->start : NULL, &solution, &error);
   if (solution && counts(status)) {
     cav_status judged = cav_verify(taken, solution->trajectory, &solution->contact, solution->gain_q, solution->gain_v,
                                    &report->verdict, &error);

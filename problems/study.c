@@ -11,7 +11,7 @@
 
 #include "file.h"
 
-const char *const cav_study_method_names[CAV_STUDY_METHODS] = {"own", "ipopt", "limited", "both"};
+const char *const cav_study_method_names[CAV_STUDY_METHODS] = {"own", "routes", "ipopt", "limited", "both"};
 
 static const double joint_noise = 0.03, mass_noise = 0.05, least_friction = 0.6, most_friction = 1;
 static const double most_seconds = 120;
@@ -97,9 +97,8 @@ static int observe(void *context, const cav_progress *progress) {
 static cav_solve_options options_of(cav_study_method method, double *begin) {
   static const cav_ipopt_option limited[] = {{"hessian_approximation", "limited-memory"}};
   cav_solve_options o = cav_solve_options_default();
-  o.solver = method == CAV_STUDY_OWN    ? CAV_SOLVER_GAUSS_NEWTON
-             : method == CAV_STUDY_BOTH ? CAV_SOLVER_BOTH
-                                        : CAV_SOLVER_IPOPT;
+  int own = method == CAV_STUDY_OWN || method == CAV_STUDY_ROUTES;
+  o.solver = own ? CAV_SOLVER_GAUSS_NEWTON : method == CAV_STUDY_BOTH ? CAV_SOLVER_BOTH : CAV_SOLVER_IPOPT;
   if (method == CAV_STUDY_LIMITED) o.ipopt = limited, o.nipopt = 1;
   o.diagnose = 0;
   o.observer = observe;
@@ -107,36 +106,45 @@ static cav_solve_options options_of(cav_study_method method, double *begin) {
   return o;
 }
 
+/// Solves and certifies by one route. One that was stopped is judged like any other.
+static cav_status solve_by(const cav_problem *problem, const cav_route *route, cav_study_run *run, double *begin,
+                           cav_verdict *verdict, cav_error *error) {
+  cav_solve_options options = options_of(run->method, begin);
+  cav_solution *solution = NULL;
+  cav_status status = cav_route_solve(problem, route, &options, NULL, &solution, error);
+  if (solution)
+    status = cav_verify(problem, solution->trajectory, &solution->contact, solution->gain_q, solution->gain_v, verdict,
+                        error);
+  if (solution && !status) {
+    run->known = 1;
+    run->certified = verdict->certified;
+    run->iterations += solution->iterations;
+    run->cost = solution->cost;
+    run->unactuated = verdict->unactuated_force_max;
+    run->end_error = verdict->closed_loop_end_error_m;
+  }
+  cav_solution_free(solution);
+  return status;
+}
+
 cav_status cav_study_solve(const char *path, const char *model_path, cav_study_run *run, char reason[400],
                            cav_error *error) {
   double begin = processor_seconds();
   cav_problem *problem = cav_problem_load(path, model_path, error);
   if (!problem) return error->status;
+  cav_route route[CAV_ROUTES];
+  int n = 0;
   cav_status status = perturb(problem, run->start);
-  cav_solution *solution = NULL;
-  cav_verdict verdict = {.closed_loop_end_error_m = -1};
-  if (!status) {
-    cav_solve_options options = options_of(run->method, &begin);
-    cav_status solved = cav_solve(problem, &options, NULL, &solution, error);
-    if (!solution) status = solved;
-  } else {
-    cav_file_fail(error, status, 0, "%s: cannot be perturbed: %s", path, cav_status_name(status));
+  if (!status) status = cav_routes(problem, route, &n);
+  if (status) cav_file_fail(error, status, 0, "%s: cannot be perturbed: %s", path, cav_status_name(status));
+  if (run->method != CAV_STUDY_ROUTES && n > 1) n = 1;
+  for (int i = 0; i < n && !status && !run->certified && processor_seconds() - begin < most_seconds; i++) {
+    cav_verdict verdict = {.closed_loop_end_error_m = -1};
+    status = solve_by(problem, &route[i], run, &begin, &verdict, error);
+    // of many that fail the stated one says why
+    if (i == 0 || run->certified) snprintf(reason, 400, "%s", verdict.reason);
   }
-  // one that was stopped is judged like any other
-  if (!status)
-    status = cav_verify(problem, solution->trajectory, &solution->contact, solution->gain_q, solution->gain_v, &verdict,
-                        error);
-  if (!status) {
-    run->known = 1;
-    run->certified = verdict.certified;
-    run->seconds = processor_seconds() - begin;
-    run->iterations = solution->iterations;
-    run->cost = solution->cost;
-    run->unactuated = verdict.unactuated_force_max;
-    run->end_error = verdict.closed_loop_end_error_m;
-    snprintf(reason, 400, "%s", verdict.reason);
-  }
-  cav_solution_free(solution);
+  run->seconds = processor_seconds() - begin;
   cav_problem_free(problem);
   return status;
 }

@@ -8,6 +8,7 @@ enum { CAV_STUDY_STARTS = 10 };
 
 typedef enum cav_study_method {
   CAV_STUDY_OWN,     ///< Gauss-Newton of our own
+  CAV_STUDY_ROUTES,  ///< the same, and other routes one after the other until one is certified
   CAV_STUDY_IPOPT,   ///< Ipopt with the Gauss-Newton Hessian, from the guess
   CAV_STUDY_LIMITED, ///< Ipopt with limited memory, from the guess
   CAV_STUDY_BOTH,    ///< own, then Ipopt

@@ -123,6 +123,7 @@ enum { CAV_ROUTES = 8, CAV_ROUTE_SWINGS = 4 };
 typedef struct cav_route {
   const char *name, *text; ///< in a word, and in words
   int stated;              ///< 1: the problem's own guess, 0: guess and swing
+  int first_midpoint;      ///< 1: solved under CAV_ORDER_MIDPOINT, then from there under the problem's order
   cav_guess guess;
   int nswing;
   cav_swing swing[CAV_ROUTE_SWINGS];
@@ -135,6 +136,11 @@ cav_status cav_routes(const cav_problem *problem, cav_route route[CAV_ROUTES], i
 
 /// The problem by a route: borrows all else from the problem, and the swings from the route.
 void cav_route_take(const cav_problem *problem, const cav_route *route, cav_problem *taken);
+
+/// Solves by a route: cav_solve of what cav_route_take gives, after one under the midpoint order where the route says so, whose
+/// iterations and seconds are counted but whose log is not kept.
+cav_status cav_route_solve(const cav_problem *problem, const cav_route *route, const cav_solve_options *options,
+                           const cav_trajectory *start, cav_solution **solution, cav_error *error);
 
 /// What a certificate promises: the largest value of the verdict's field of that name.
 #define CAV_PROMISE_UNACTUATED 1e-6  ///< share of weight
