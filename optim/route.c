@@ -143,20 +143,16 @@ cav_status cav_routes(const cav_problem *problem, cav_route route[CAV_ROUTES], i
   *n = 0;
   add(route, n, &stated, "stated", "the problem's guess and schedule");
 
-  cav_route soft = stated;
-  soft.schedule.first.smoothing *= SOFTER;
-  soft.schedule.first.penalty /= CHEAPER;
-  add(route, n, &soft, "soft", "contacts felt from twice as far, unactuated force ten times cheaper at first");
-
-  cav_route slow = stated;
-  slow.schedule.stages *= SLOWER;
-  add(route, n, &slow, "slow", "twice as many stages");
-
   if (problem->order == CAV_ORDER_MOMENTUM) {
     cav_route twice = stated;
     twice.first_midpoint = 1;
     add(route, n, &twice, "midpoint", "under the midpoint order first, then from there under the order of momentum");
   }
+
+  cav_route soft = stated;
+  soft.schedule.first.smoothing *= SOFTER;
+  soft.schedule.first.penalty /= CHEAPER;
+  add(route, n, &soft, "soft", "contacts felt from twice as far, unactuated force ten times cheaper at first");
 
   cav_route plain = {.guess = CAV_GUESS_INTERPOLATE, .schedule = problem->schedule}, walk = plain;
   cav_status status = problem->nswing ? CAV_OK : gait(problem, &walk);
@@ -169,6 +165,10 @@ cav_status cav_routes(const cav_problem *problem, cav_route route[CAV_ROUTES], i
   plain.guess = CAV_GUESS_HOLD;
   if (!problem->cycle.on && (decorated || problem->guess != CAV_GUESS_HOLD))
     add(route, n, &plain, "hold", "the start held");
+
+  cav_route slow = stated;
+  slow.schedule.stages *= SLOWER;
+  add(route, n, &slow, "slow", "twice as many stages");
   return CAV_OK;
 }
 

@@ -160,7 +160,7 @@ sed 's/pos="1"/pos="3"/; s/duration="1"/duration="3"/; s/<cost>/<constraint><pos
 run 1 solve rise.xml --model lazy.xml -o alone --routes 1
 check "no other route" [ "$(wc -l <alone/routes.csv)" -eq 2 ]
 run 0 solve rise.xml --model lazy.xml -o risen --threads 1
-says err "trying by other routes: soft slow hold"
+says err "trying by other routes: soft hold slow"
 says err "kept: route hold"
 says out "certified: swing"
 for line in "stated,0,not certified" "soft,0,not certified" "hold,1,certified"; do says risen/routes.csv "$line"; done
