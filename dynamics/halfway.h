@@ -13,22 +13,23 @@ typedef struct cav_half {
   double *com, *inertia, *axis; ///< as in cav_state
   double *velocity, *momentum;  ///< [nlink*6] of each link
 
-  // for derivatives, halfway_slope.c
-  double *composite, *whole; ///< [nlink*10], [nlink*6] inertia and momentum of subtrees
-  double *by_q,
-      *by_v; ///< [nv*12] by each dof of q and of the velocity: twist of what it moves, what inertia multiplies
+  // for derivatives, halfway_slope.c: inertia and momentum of subtrees; by each dof of q and of the velocity, the twist of what
+  // it moves and what inertia multiplies
+  double *composite, *whole; ///< [nlink*10], [nlink*6]
+  double *by_q, *by_v;       ///< [nv*12]
 } cav_half;
 
 typedef struct cav_halves {
   cav_half before, after;
-  int fresh;       ///< before is of the state's position,
-  double timestep; ///< of this step
-  double *v;       ///< [nv] and of this velocity
-  double
-      *missing; ///< [nlink*6] of root links: what their trees' change of momentum has over the sum of inertial forces
-  double
-      *inner; ///< [nlink*6] sums of inertial forces over subtrees; of whole trees, of root links, what stands for them
   size_t bytes;
+
+  // what before is good for: the state's position, this step and this velocity
+  int fresh;
+  double timestep, *v; ///< [nv]
+
+  // of root links: what the change of momentum of their trees has over the sum of inertial forces. For derivatives: sums of
+  // inertial forces over subtrees, of root links what stands for them
+  double *missing, *inner; ///< [nlink*6]
 } cav_halves;
 
 /// Memory of the halves of a state, at its first use. CAV_NO_MEMORY.
