@@ -179,6 +179,7 @@ static int contact_values(const cav_audit *audit, const cav_term *term, double *
       int moving = !audit->model->pair[contact->pair].outer;
       load = 1, value = moving ? fmax(-contact->dist, 0) : 0;
     }
+    if (term->quantity == CAV_QUANTITY_FORCE) value = audit->model->pair[contact->pair].outer ? load : 0;
     x[i] = load * value;
     target[i] = 0;
   }
@@ -204,6 +205,7 @@ static int measure(const cav_audit *audit, const cav_term *term, int t, double *
     case CAV_QUANTITY_SLIP:
     case CAV_QUANTITY_IMPACT:
     case CAV_QUANTITY_OVERLAP:
+    case CAV_QUANTITY_FORCE:
       return forced ? contact_values(audit, term, x, target) : 0;
     case CAV_QUANTITY_TYPES:
       break;

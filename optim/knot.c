@@ -26,6 +26,19 @@ static void begin_row(cav_sum *a, double weight, double r) {
   a->knot->step_slope += a->slope * a->root * r;
 }
 
+/// Starts the row of a cost, and turns its norm into a square: with x = r/unit and y^2/2 the norm of x, the residual is y and its row
+/// dy/dx times that of x, which goes into weight and residual.
+static void begin_cost(cav_sum *a, const cav_term *term, double unit, double *weight, double *r) {
+  if (term->norm == CAV_NORM_ABSOLUTE) {
+    double x = *r / unit, root = sqrt(1 + x * x);
+    // y = x sqrt(2/(1 + root)), which is exact for small x; dy/dx = x/(root y)
+    double part = sqrt(2 / (1 + root)), slope = 1 / (root * part);
+    *weight *= slope * slope;
+    *r = unit * x * part / slope;
+  }
+  begin_row(a, *weight, *r);
+}
+
 /// Adds weight/2 (r + row dx)^2 for a row with n entries, begun.
 static void add_sparse(cav_sum *a, double weight, double r, int n, const int *column, const double *entry) {
   a->knot->merit += 0.5 * weight * r * r;
@@ -156,9 +169,9 @@ static void add_velocity(cav_sum *a, const cav_term *term, double weight, const 
   for (int d = 0; d < tr->nv; d++) {
     if (!cav_dof_selected(tr, term, d)) continue;
     int n = velocity_entries(tr, a->t, d, tr->nv, cav_knot_moves(tr, a->t - 1), 1 / term->scale, column, entry);
-    double r = (v[d] - goal[d]) / term->scale;
-    begin_row(a, weight, r);
-    add_sparse(a, weight, r, n, column, entry);
+    double r = (v[d] - goal[d]) / term->scale, w = weight;
+    begin_cost(a, term, 1, &w, &r);
+    add_sparse(a, w, r, n, column, entry);
   }
 }
 
@@ -172,9 +185,9 @@ static void add_acceleration(cav_sum *a, const cav_term *term, double weight, co
     if (!cav_dof_selected(tr, term, d)) continue;
     int n = here ? velocity_entries(tr, a->t, d, tr->nv, cav_knot_moves(tr, a->t - 1), -scale, column, entry) : 0;
     if (a->t < last) n += velocity_entries(tr, a->t + 1, d, 2 * tr->nv, here, scale, column + n, entry + n);
-    double r = (v_next[d] - v[d]) * scale - goal[d] / term->scale;
-    begin_row(a, weight, r);
-    add_sparse(a, weight, r, n, column, entry);
+    double r = (v_next[d] - v[d]) * scale - goal[d] / term->scale, w = weight;
+    begin_cost(a, term, 1, &w, &r);
+    add_sparse(a, w, r, n, column, entry);
   }
 }
 
@@ -220,8 +233,9 @@ static void add_posture(cav_sum *a, const cav_term *term, double weight, const d
   for (int d = 0; d < tr->nv; d++) {
     if (!cav_dof_selected(tr, term, d)) continue;
     int n = posture_entries(tr, a->s->tangent, d, 1 / term->scale, column, entry);
-    begin_row(a, weight, a->s->tangent[d] / term->scale);
-    add_sparse(a, weight, a->s->tangent[d] / term->scale, n, column, entry);
+    double r = a->s->tangent[d] / term->scale, w = weight;
+    begin_cost(a, term, 1, &w, &r);
+    add_sparse(a, w, r, n, column, entry);
   }
 }
 
@@ -230,21 +244,30 @@ static void add_effort(cav_sum *a, const cav_term *term, double weight) {
   if (!a->knot->has_force) return;
   weight /= term->scale * term->scale;
   for (int k = 0; k < tr->model->nu; k++) {
-    double r = form_value(&tr->effort[k], a->knot->u);
-    begin_row(a, weight, r);
-    add_force(a, weight, r, &tr->effort[k]);
+    double r = form_value(&tr->effort[k], a->knot->u), w = weight;
+    begin_cost(a, term, term->scale, &w, &r);
+    add_force(a, w, r, &tr->effort[k]);
   }
+}
+
+/// Whether a term counts the contacts of the knot's k-th pair.
+static int counts(const cav_sum *a, const cav_term *term, int k) {
+  const cav_model *m = a->tr->model;
+  const cav_pair *pair = &m->pair[a->s->key[2 * k]];
+  int link = m->body[term->body].link;
+  return term->body <= 0 || m->geom[pair->geom1].link == link || m->geom[pair->geom2].link == link;
 }
 
 /// Readings first .. first+n-1 of the contacts between trees or with the world, or of those within one tree.
 static void add_contact(cav_sum *a, const cav_term *term, double weight, int first, int n, int self) {
   weight /= term->scale * term->scale;
   for (int k = 0; k < a->knot->ncontact; k++) {
-    if (a->knot->moving[k] != self) continue;
+    if (a->knot->moving[k] != self || !counts(a, term, k)) continue;
     for (int i = first; i < first + n; i++) {
-      int row = 4 * k + i;
-      begin_row(a, weight, a->knot->y[row]);
-      add_dense(a, weight, a->knot->y[row], a->knot->dy + (size_t)row * 3 * a->tr->nv);
+      int row = CAV_CONTACT_READINGS * k + i;
+      double r = a->knot->y[row], w = weight;
+      begin_cost(a, term, term->scale, &w, &r);
+      add_dense(a, w, r, a->knot->dy + (size_t)row * 3 * a->tr->nv);
     }
   }
 }
@@ -252,7 +275,7 @@ static void add_contact(cav_sum *a, const cav_term *term, double weight, int fir
 /// Cost terms. sensor counts through the sensor readings, which stand in the order of the terms.
 static void add_costs(cav_sum *a, const double *q, const double *v, const double *v_next) {
   const cav_transcription *tr = a->tr;
-  int reading = 4 * a->knot->ncontact, width = 3 * tr->nv;
+  int reading = CAV_CONTACT_READINGS * a->knot->ncontact, width = 3 * tr->nv;
   for (int i = 0; i < tr->problem->nterm; i++) {
     const cav_term *term = &tr->problem->term[i];
     double when = cav_term_weight(tr, term, a->t), weight = when * term->weight;
@@ -262,8 +285,9 @@ static void add_costs(cav_sum *a, const double *q, const double *v, const double
       switch (term->quantity) {
         case CAV_QUANTITY_SENSOR:
           for (int k = 0; k < dim; k++) {
-            begin_row(a, weight, a->knot->y[reading + k]);
-            add_dense(a, weight, a->knot->y[reading + k], a->knot->dy + (size_t)(reading + k) * width);
+            double r = a->knot->y[reading + k], w = weight;
+            begin_cost(a, term, 1, &w, &r);
+            add_dense(a, w, r, a->knot->dy + (size_t)(reading + k) * width);
           }
           break;
         case CAV_QUANTITY_CONFIGURATION:
@@ -289,6 +313,9 @@ static void add_costs(cav_sum *a, const double *q, const double *v, const double
           break;
         case CAV_QUANTITY_OVERLAP:
           add_contact(a, term, weight, 0, 1, 1);
+          break;
+        case CAV_QUANTITY_FORCE:
+          add_contact(a, term, weight, 4, 1, 0);
           break;
         case CAV_QUANTITY_TYPES:
           break;
@@ -420,7 +447,7 @@ static int add_hard_dofs(cav_sum *a, const cav_term *term, int i, double lower, 
 static void add_hard_terms(cav_sum *a, const double *q, const double *v) {
   const cav_transcription *tr = a->tr;
   double rho = tr->penalty.term;
-  int i = a->knot->layout.term, reading = 4 * a->knot->ncontact, width = 3 * tr->nv, active;
+  int i = a->knot->layout.term, reading = CAV_CONTACT_READINGS * a->knot->ncontact, width = 3 * tr->nv, active;
   for (int k = 0; k < tr->problem->nterm; k++) {
     const cav_term *term = &tr->problem->term[k];
     if (cav_term_weight(tr, term, a->t) == 0) continue;

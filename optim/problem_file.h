@@ -41,6 +41,7 @@ extern const char *const cav_problem_sensors[];
 extern const char *const cav_problem_stabilisations[];
 extern const char *const cav_problem_regularisers[];
 extern const char *const cav_problem_mirrors[];
+extern const char *const cav_problem_norms[];
 
 /// Zeroed memory of the problem; NULL if there is none left. problem.c.
 void *cav_problem_alloc(cav_problem_owner *owner, size_t size);

@@ -8,8 +8,8 @@
 const char *const cav_problem_orders[] = {"euler", "midpoint", "momentum", NULL};
 const char *const cav_problem_closings[] = {"open", "rest", NULL};
 const char *const cav_problem_guesses[] = {"hold", "interpolate", NULL};
-const char *const cav_problem_quantities[] = {"sensor", "posture", "velocity", "acceleration", "effort",
-                                              "gap",    "slip",    "impact",   "overlap",      NULL};
+const char *const cav_problem_quantities[] = {"sensor", "posture", "velocity", "acceleration", "effort", "gap",
+                                              "slip",   "impact",  "overlap",  "force",        NULL};
 const char *const cav_problem_dof_sets[] = {"all", "root_linear", "root_angular", "joints", NULL};
 const char *const cav_problem_sensors[] = {"jointpos",
                                            "jointvel",
@@ -50,6 +50,7 @@ const char *const cav_problem_sensors[] = {"jointpos",
                                            NULL};
 const char *const cav_problem_stabilisations[] = {"solref", "discrete", NULL};
 const char *const cav_problem_regularisers[] = {"reference", "exact", NULL};
+const char *const cav_problem_norms[] = {"square", "absolute", NULL};
 const char *const cav_problem_mirrors[] = {"none", "x", "y", NULL};
 static const char *const heights[] = {"keep", "floor", NULL};
 static const char *const clippings[] = {"keep", "clip", NULL};
@@ -108,7 +109,8 @@ static const cav_xml_element posture_waypoint = {
 static const cav_xml_element value_waypoint = {
     "waypoint", 0, 0, ATTRIBUTES(REAL("time", 1), {"target", CAV_XML_REAL, 1, 0, NULL, 1}), NULL, 0};
 
-#define COST REAL("weight", 1)
+#define COST REAL("weight", 1), WORD("norm", cav_problem_norms)
+#define TOUCH TEXT("body", 0), WINDOW, COST
 static const cav_xml_element cost_sensor = {"sensor", 0, 0, ATTRIBUTES(SENSOR, WINDOW, COST), CHILDREN(&value_waypoint),
                                             0};
 static const cav_xml_element cost_posture = {
@@ -118,17 +120,18 @@ static const cav_xml_element cost_velocity = {
 static const cav_xml_element cost_acceleration = {
     "acceleration", 0, 0, ATTRIBUTES(RATE, WINDOW, COST), CHILDREN(&value_waypoint), 0};
 static const cav_xml_element cost_effort = {"effort", 0, 0, ATTRIBUTES(WINDOW, COST), NULL, 0};
-static const cav_xml_element cost_gap = {"gap", 0, 0, ATTRIBUTES(WINDOW, COST), NULL, 0};
-static const cav_xml_element cost_slip = {"slip", 0, 0, ATTRIBUTES(WINDOW, COST), NULL, 0};
-static const cav_xml_element cost_impact = {"impact", 0, 0, ATTRIBUTES(WINDOW, COST), NULL, 0};
-static const cav_xml_element cost_overlap = {"overlap", 0, 0, ATTRIBUTES(WINDOW, COST), NULL, 0};
+static const cav_xml_element cost_gap = {"gap", 0, 0, ATTRIBUTES(TOUCH), NULL, 0};
+static const cav_xml_element cost_slip = {"slip", 0, 0, ATTRIBUTES(TOUCH), NULL, 0};
+static const cav_xml_element cost_impact = {"impact", 0, 0, ATTRIBUTES(TOUCH), NULL, 0};
+static const cav_xml_element cost_overlap = {"overlap", 0, 0, ATTRIBUTES(TOUCH), NULL, 0};
+static const cav_xml_element cost_force = {"force", 0, 0, ATTRIBUTES(TOUCH), NULL, 0};
 static const cav_xml_element cost = {"cost",
                                      0,
                                      1,
                                      NULL,
                                      CHILDREN(&cost_sensor, &cost_posture, &cost_velocity, &cost_acceleration,
                                               &cost_effort, &cost_gap, &cost_slip, &cost_impact,
-                                              &cost_overlap),
+                                              &cost_overlap, &cost_force),
                                      0};
 
 #define BOUNDS REAL("lower", 0), REAL("upper", 0)

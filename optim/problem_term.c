@@ -453,11 +453,18 @@ static cav_status read_effort(const cav_problem_reader *reader, const cav_xml_no
 }
 
 static cav_status read_touch(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
-  (void)reader;
   const char *name = node->rule->name;
+  if (cav_xml_get(node, "body")) {
+    term->body = cav_problem_find(reader, node, "body", CAV_OBJECT_BODY);
+    if (term->body < 0) return CAV_BAD_INPUT;
+    if (reader->model->body[term->body].link == 0)
+      return cav_xml_fail(reader->error, node, "body", "expected a body that moves, got '%.80s'",
+                          cav_xml_text(node, "body", ""));
+  }
   term->quantity = !strcmp(name, "gap")      ? CAV_QUANTITY_GAP
                    : !strcmp(name, "slip")   ? CAV_QUANTITY_SLIP
                    : !strcmp(name, "impact") ? CAV_QUANTITY_IMPACT
+                   : !strcmp(name, "force")  ? CAV_QUANTITY_FORCE
                                              : CAV_QUANTITY_OVERLAP;
   return CAV_OK;
 }
@@ -468,7 +475,8 @@ static const struct {
   cav_status (*read)(const cav_problem_reader *, const cav_xml_node *, cav_term *);
 } term_reader[] = {{"sensor", read_sensor},     {"posture", read_posture}, {"velocity", read_rate},
                    {"acceleration", read_rate}, {"effort", read_effort},   {"gap", read_touch},
-                   {"slip", read_touch},        {"impact", read_touch},    {"overlap", read_touch}};
+                   {"slip", read_touch},        {"impact", read_touch},    {"overlap", read_touch},
+                   {"force", read_touch}};
 
 // bounds of a constraint, or the weight of a cost
 static cav_status read_use(const cav_problem_reader *reader, const cav_xml_node *node, int hard, cav_term *term) {
@@ -476,6 +484,7 @@ static cav_status read_use(const cav_problem_reader *reader, const cav_xml_node 
   term->upper = cav_xml_real(node, "upper", INFINITY);
   term->weight = cav_xml_real(node, "weight", 0);
   term->scale = cav_xml_real(node, "scale", 1);
+  term->norm = hard ? CAV_NORM_SQUARE : (cav_norm)cav_xml_word(node, "norm", CAV_NORM_SQUARE);
   if (hard) term->use = cav_xml_get(node, "lower") || cav_xml_get(node, "upper") ? CAV_USE_RANGE : CAV_USE_EQUAL;
   if (term->lower > term->upper)
     return cav_xml_fail(reader->error, node, "lower", "%g lies above 'upper', %g", term->lower, term->upper);
@@ -506,7 +515,9 @@ static int has_window(const cav_xml_node *node) {
 // whether the file has a cost of that quantity over the whole horizon, which takes the defaults' place
 static int replaced(const cav_xml_node *cost, cav_quantity quantity) {
   for (const cav_xml_node *node = cost ? cost->child : NULL; node; node = node->next) {
-    if (!has_window(node) && !strcmp(node->rule->name, cav_problem_quantities[quantity])) return 1;
+    int part = has_window(node) ||
+               (cav_xml_accepts(node, "body") && cav_xml_get(node, "body") && !cav_xml_accepts(node, "type"));
+    if (!part && !strcmp(node->rule->name, cav_problem_quantities[quantity])) return 1;
   }
   return 0;
 }

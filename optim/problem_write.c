@@ -146,7 +146,7 @@ static void write_window(FILE *out, const cav_problem *p, const cav_term *term) 
 }
 
 static int is_running(const cav_problem *p, const cav_term *term) {
-  return term->from == 0 && term->to < 0 && p->duration > 1e-9;
+  return term->from == 0 && term->to < 0 && p->duration > 1e-9 && term->body <= 0;
 }
 
 static int write_term(FILE *out, const cav_problem *p, const cav_term *term) {
@@ -160,7 +160,11 @@ static int write_term(FILE *out, const cav_problem *p, const cav_term *term) {
   if (has_dofs(term) && !write_dofs(out, p, term)) return 0;
   if (term->target && !term->nwaypoint) write_target(out, p, term, term->target);
   write_window(out, p, term);
+  if (term->body > 0 && !*p->model->body[term->body].name) return 0;
+  if (term->body > 0) write_text(out, "body", p->model->body[term->body].name);
   if (term->use == CAV_USE_COST) write_number(out, "weight", term->weight);
+  if (term->use == CAV_USE_COST && term->norm != CAV_NORM_SQUARE)
+    write_text(out, "norm", cav_problem_norms[term->norm]);
   if (term->use == CAV_USE_RANGE && isfinite(term->lower)) write_number(out, "lower", term->lower);
   if (term->use == CAV_USE_RANGE && isfinite(term->upper)) write_number(out, "upper", term->upper);
   if (term->scale != 1) write_number(out, "scale", term->scale);

@@ -18,7 +18,7 @@ typedef struct readings {
 } readings;
 
 static void read_contact(const cav_transcription *tr, const cav_contact *c, double *y) {
-  memset(y, 0, 4 * sizeof *y);
+  memset(y, 0, CAV_CONTACT_READINGS * sizeof *y);
   if (!tr->model->pair[c->pair].outer) {
     y[0] = fmax(-c->dist, 0);
     return;
@@ -28,6 +28,7 @@ static void read_contact(const cav_transcription *tr, const cav_contact *c, doub
   y[1] = c->dim > 1 ? share * c->velocity_next[1] : 0;
   y[2] = c->dim > 1 ? share * c->velocity_next[2] : 0;
   y[3] = share * c->velocity_next[0];
+  y[4] = share * share;
 }
 
 static void read_knot(const cav_model *model, const cav_state *state, void *context, double *value) {
@@ -38,13 +39,13 @@ static void read_knot(const cav_model *model, const cav_state *state, void *cont
 
   // contacts stand in the order of pairs and features, so both lists are walked once; one that is gone reads zero
   const cav_contact *c = state->contact, *end = c ? c + state->ncontact : NULL;
-  for (int k = 0; k < r->ncontact; k++, value += 4) {
+  for (int k = 0; k < r->ncontact; k++, value += CAV_CONTACT_READINGS) {
     int pair = r->key[2 * k], feature = r->key[2 * k + 1];
     while (c < end && (c->pair < pair || (c->pair == pair && c->feature < feature))) c++;
     if (c < end && c->pair == pair && c->feature == feature) {
       read_contact(tr, c, value);
     } else {
-      memset(value, 0, 4 * sizeof(double));
+      memset(value, 0, CAV_CONTACT_READINGS * sizeof(double));
     }
   }
   for (int i = 0; i < tr->problem->nterm; i++) {
@@ -100,7 +101,7 @@ int cav_readings_list(cav_transcription *tr, cav_scratch *s, int t) {
     if (cav_term_weight(tr, term, t) > 0) nsensor += cav_term_dim(term);
   }
   knot->ncontact = ncontact;
-  knot->nread = 4 * ncontact + nsensor;
+  knot->nread = CAV_CONTACT_READINGS * ncontact + nsensor;
   size_t total = (size_t)(nv + knot->nread), n = (size_t)nv;
   if ((int)total > s->room) {
     if (!grow(&s->value, total) || !grow(&s->dq, total * n) || !grow(&s->dv, total * n) || !grow(&s->dn, total * n))
@@ -149,9 +150,9 @@ static const cav_contact *find_contact(const cav_state *state, const int key[2])
 /// Derivatives of the overlap of two links of one tree.
 static cav_status overlap_rows(const cav_transcription *tr, const cav_scratch *s, const cav_contact *c, rows out) {
   size_t n = (size_t)tr->nv;
-  memset(out.dq, 0, 4 * n * sizeof(double));
-  memset(out.dv, 0, 4 * n * sizeof(double));
-  memset(out.dn, 0, 4 * n * sizeof(double));
+  memset(out.dq, 0, CAV_CONTACT_READINGS * n * sizeof(double));
+  memset(out.dv, 0, CAV_CONTACT_READINGS * n * sizeof(double));
+  memset(out.dn, 0, CAV_CONTACT_READINGS * n * sizeof(double));
   if (c->dist >= 0) return CAV_OK;
   cav_contact_derivative d = {.dist_dq = out.dq};
   cav_status status = cav_contact_derivatives(tr->model, s->state, (int)(c - s->state->contact), &d);
@@ -159,7 +160,7 @@ static cav_status overlap_rows(const cav_transcription *tr, const cav_scratch *s
   return status;
 }
 
-/// The four readings of a contact: sqrt(f_n) times gap, slip and normal velocity.
+/// The readings of a contact: sqrt(f_n) times gap, slip and normal velocity; f_n.
 static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s, const cav_contact *c, rows out) {
   int nv = tr->nv;
   size_t n = (size_t)nv;
@@ -185,6 +186,12 @@ static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s
       out.dv[k * nv + j] = half * value * d.impulse_dv[j];
       out.dn[k * nv + j] = half * value * d.impulse_dv_next[j] + share * by_next;
     }
+  }
+  double unit = c->impulse[0] > 0 ? 1 / (tr->h * tr->weight) : 0;
+  for (int j = 0; j < nv; j++) {
+    out.dq[4 * nv + j] = unit * d.impulse_dq[j];
+    out.dv[4 * nv + j] = unit * d.impulse_dv[j];
+    out.dn[4 * nv + j] = unit * d.impulse_dv_next[j];
   }
   return CAV_OK;
 }
@@ -249,7 +256,7 @@ static int speaks(const cav_transcription *tr, const cav_term *term, int t) {
 /// Sensors: those with derivatives first, as differences move the state.
 static cav_status sensors(const cav_transcription *tr, cav_scratch *s, int t, const double *q, const double *v,
                           const double *v_next) {
-  int missing = 0, first = tr->nv + 4 * tr->knot[t].ncontact;
+  int missing = 0, first = tr->nv + CAV_CONTACT_READINGS * tr->knot[t].ncontact;
   for (int pass = 0; pass < 1 + (missing > 0); pass++) {
     for (int i = 0, at = first; i < tr->problem->nterm; i++) {
       const cav_term *term = &tr->problem->term[i];
@@ -289,7 +296,7 @@ cav_status cav_readings_derivatives(const cav_transcription *tr, cav_scratch *s,
   if (status == CAV_NOT_SUPPORTED) return difference(tr, s, t, q, v, v_next);
   for (int k = 0; k < tr->knot[t].ncontact && status == CAV_OK; k++) {
     const cav_contact *c = find_contact(s->state, s->key + 2 * k);
-    rows out = rows_at(tr, s, tr->nv + 4 * k);
+    rows out = rows_at(tr, s, tr->nv + CAV_CONTACT_READINGS * k);
     if (!c) return CAV_INTERNAL;
     status = tr->knot[t].moving[k] ? overlap_rows(tr, s, c, out) : contact_rows(tr, s, c, out);
   }

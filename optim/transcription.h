@@ -35,6 +35,9 @@ typedef struct cav_force_row {
 
 enum { CAV_TURN = 21 };
 
+/// Readings of a contact: gap or depth, slip (2), impact, force.
+enum { CAV_CONTACT_READINGS = 5 };
+
 /// One knot. Columns of its derivatives: tangent increments of q_{t-1}, q_t, q_{t+1}; those of knots that are not unknowns
 /// are zero. In cycles q_{-1}, q_0 and q_{T+1} are the unknowns of q_{T-1}, q_T and q_1 moved: columns of hessian, gradient,
 /// step_row and slot_row are of the unknowns themselves, those of du and dy of the knots beside.
@@ -47,7 +50,7 @@ typedef struct cav_knot {
   double *slot_step;      ///< [layout.count] the same by the logarithm of the step, where that is free
   double *u;              ///< [nv]
   double *du;             ///< [nv*3nv] row-major
-  int nread, ncontact;    ///< readings beside u: 4 a contact, then sensors
+  int nread, ncontact;    ///< readings beside u: CAV_CONTACT_READINGS a contact, then sensors
   int room;               ///< readings for which y, dy have space
   char *moving;           ///< [ncontact] 1: between two links of one tree, its first reading is the depth
   double *y;              ///< [nread]

@@ -253,7 +253,8 @@ static void print_quantity(const cav_problem *p, const cav_term *term) {
                                          "gap of loaded contacts",
                                          "slip of loaded contacts",
                                          "impact of loaded contacts",
-                                         "overlap of links"};
+                                         "overlap of links",
+                                         "force of contacts"};
   static const char *const dofs[] = {"all dofs", "translation of free roots", "rotation of free roots",
                                      "all but free roots", "joint"};
   const cav_model *m = p->model;
@@ -263,6 +264,8 @@ static void print_quantity(const cav_problem *p, const cav_term *term) {
     printf(" of %s%s%s", dofs[term->dofs], term->dofs == CAV_DOFS_ONE ? " " : "",
            term->dofs == CAV_DOFS_ONE ? m->joint[term->joint].name : "");
   }
+  if (term->body > 0) printf(" of body %s", m->body[term->body].name);
+  if (term->norm == CAV_NORM_ABSOLUTE) printf(", absolute beyond %g", term->scale);
   if (term->quantity != CAV_QUANTITY_SENSOR) return;
   int i = term->sensor.object;
   const char *object = "";

@@ -62,6 +62,29 @@ static void refuse(const char *terms, const char *table, int line, const char *s
 #define COST(what) "<cost><" what "/></cost>"
 #define TIP COST("sensor type='framepos' site='tip' file='t.csv' weight='1'")
 
+/// Norms, and contacts of one body, there and back; they are added to the defaults of their kind.
+static void check_norms(void) {
+  cav_problem *p =
+      load("<cost><force body='hand' weight='2' norm='absolute' scale='.3'/><slip body='hand' weight='7'/></cost>",
+           "time\n0\n", NULL);
+  if (!CHECK(p != NULL)) return;
+  char path[300];
+  snprintf(path, sizeof path, "%s/again.xml", folder);
+  cav_problem *again = NULL;
+  CHECK(cav_problem_write(path, p, NULL, NULL) == CAV_OK && (again = cav_problem_load(path, NULL, NULL)));
+  CHECK(p->nterm == cav_problem_default_terms(NULL, 0) + 2 && again && again->nterm == p->nterm);
+  for (int k = 0; k < 2 && again; k++) {
+    const cav_problem *of = k ? again : p;
+    const cav_term *force = &of->term[of->nterm - 2], *slip = force + 1;
+    CHECK(force->quantity == CAV_QUANTITY_FORCE && force->norm == CAV_NORM_ABSOLUTE && force->scale == .3 &&
+          force->body == cav_find(p->model, CAV_OBJECT_BODY, "hand") && force->weight == 2);
+    CHECK(slip->quantity == CAV_QUANTITY_SLIP && slip->norm == CAV_NORM_SQUARE && slip->body == force->body);
+  }
+  cav_problem_free(again);
+  cav_problem_free(p);
+  unlink(path);
+}
+
 int main(void) {
   if (!CHECK(mkdtemp(folder) != NULL)) return check_result();
   take(TIP, "time,x,y,z\n0,1,2,3\n.5,3,2,1\n", .25, 3, (double[]){2, 2, 2});
@@ -95,6 +118,10 @@ int main(void) {
   refuse("<cost><velocity file='t.csv' weight='1'><waypoint time='0' target='1'/></velocity></cost>", "time\n0\n", 3,
          "<waypoint>");
   refuse(COST("sensor type='framequat' body='hand' file='t.csv' weight='1'"), "time,w,x,y,z\n0,0,0,0,0\n", 3, "zero");
+  check_norms();
+  refuse(COST("force body='hamd' weight='1'"), "time\n0\n", 3, "'hand'");
+  refuse(COST("slip body='world' weight='1'"), "time\n0\n", 3, "moves");
+  refuse(COST("effort norm='cubic' weight='1'"), "time\n0\n", 3, "norm");
   const char *files[] = {"m.xml", "p.xml", "t.csv"};
   for (int i = 0; i < 3; i++) {
     char path[300];

@@ -69,7 +69,7 @@ static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) 
   cav_term base = term[0];
   base.quantity = CAV_QUANTITY_SENSOR;
   base.weight = 3;
-  for (int kind = 0; kind < 11; kind++) {
+  for (int kind = 0; kind < 14; kind++) {
     cav_term *t = &term[n++];
     *t = base;
     t->scale = 0.5 + 0.1 * kind;
@@ -90,6 +90,11 @@ static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) 
       t->quantity = CAV_QUANTITY_CONFIGURATION, t->use = CAV_USE_EQUAL, t->from = t->to = p->duration, t->target = NULL;
     if (kind == 6)
       t->quantity = CAV_QUANTITY_VELOCITY, t->use = CAV_USE_RANGE, t->lower = -0.1, t->upper = 0.1, t->target = NULL;
+    // norms, and contacts of one body
+    if (kind == 11) t->norm = CAV_NORM_ABSOLUTE, t->scale = 0.1;
+    if (kind == 12) t->quantity = CAV_QUANTITY_FORCE, t->target = NULL, t->norm = CAV_NORM_ABSOLUTE, t->scale = 0.2;
+    if (kind == 13) t->quantity = CAV_QUANTITY_SLIP, t->target = NULL, t->body = trunk;
+    if (kind >= 11) continue;
     // accelerations and forces, of the size of gravity and of weight
     if (kind >= 7) t->target = NULL, t->scale = 50;
     if (kind == 7) t->sensor.type = CAV_SENSOR_FRAMELINACC, t->use = CAV_USE_EQUAL;

@@ -20,11 +20,18 @@ typedef enum cav_quantity {
   CAV_QUANTITY_SLIP,          ///< sqrt(f_n/weight) * tangential velocity of every contact, m/s
   CAV_QUANTITY_IMPACT,        ///< sqrt(f_n/weight) * normal velocity of every contact, m/s
   CAV_QUANTITY_OVERLAP,       ///< depth of every contact between two links of one tree, m
+  CAV_QUANTITY_FORCE,         ///< normal force of every contact between trees or with the world, share of the weight
   CAV_QUANTITY_TYPES
 } cav_quantity;
 
+/// What a cost makes of a residual x, value minus target over scale.
+typedef enum cav_norm {
+  CAV_NORM_SQUARE,  ///< x^2/2
+  CAV_NORM_ABSOLUTE ///< sqrt(1 + x^2) - 1: x^2/2 within the scale, |x| far beyond it, where it pulls no harder
+} cav_norm;
+
 typedef enum cav_term_use {
-  CAV_USE_COST,  ///< weight/2 * ||x - target||^2, integrated over the window; at a single knot not multiplied by time
+  CAV_USE_COST, ///< weight times norm of every component, integrated over the window; at a single knot not multiplied by time
   CAV_USE_EQUAL, ///< x = target, hard
   CAV_USE_RANGE  ///< lower <= x <= upper, hard
 } cav_term_use;
@@ -48,6 +55,8 @@ typedef struct cav_term {
   int joint;       ///< CAV_DOFS_ONE
   double from, to; ///< window, s; equal: one knot (the nearest). to < 0: the end
   double weight;   ///< cost
+  cav_norm norm;   ///< cost
+  int body;        ///< over contacts: those of this body's link alone; 0: all
   double scale;    ///< values are divided by it, > 0, unit of the quantity
   const double
       *target;   ///< constant: sensors [sensor.dim], all of them even if one component counts; configurations a q
