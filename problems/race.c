@@ -37,20 +37,20 @@ static int counts(cav_status status) {
 static cav_solution *run(const cav_race *race, int i, const cav_solve_options *options, cav_problem *taken,
                          cav_race_report *report) {
   cav_solution *solution = NULL;
-  cav_error error = {0};
+  cav_error error = {0}, verification = {0};
   *report = (cav_race_report){0};
   cav_route_take(race->problem, &race->entry[i].route, taken);
   cav_status status =
       cav_route_solve(race->problem, &race->entry[i].route, options, i == 0 ? race->start : NULL, &solution, &error);
   if (solution && counts(status)) {
     cav_status judged = cav_verify(taken, solution->trajectory, &solution->contact, solution->gain_q, solution->gain_v,
-                                   &report->verdict, &error);
+                                   &report->verdict, &verification);
     report->verdict.optimality = solution->optimality;
     report->verdict.solve_seconds = solution->seconds;
     report->verdict.iterations = solution->iterations;
     report->cost = solution->cost;
     report->solution = judged == CAV_OK;
-    if (judged != CAV_OK) status = judged;
+    if (judged != CAV_OK) status = judged, error = verification;
   }
   report->status = (int)status;
   snprintf(report->text, sizeof report->text, "%.399s", error.text);

@@ -172,6 +172,14 @@ run 0 solve problem.xml -o cheapest --routes 3 --threads 2
 check "three routes certified" [ "$(grep -c ',certified,' cheapest/routes.csv)" -eq 3 ]
 check "one kept" [ "$(grep -c ',1,certified,' cheapest/routes.csv)" -eq 1 ]
 
+# --- what Ipopt says is told, where it is there ---
+
+if "$cavort" solve problem.xml -o asked --solver ipopt --quiet >out 2>err || ! grep -q "has no Ipopt" err; then
+  "$cavort" solve rise.xml --model lazy.xml -o asked --solver ipopt --ipopt max_iter=1 --routes 1 >out 2>err
+  says err "iteration limit (max_iter)"
+  says err "kept is its iterate"
+fi
+
 # --- interruption, and going on from there ---
 
 # a motion long enough to be caught on its way
