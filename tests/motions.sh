@@ -56,7 +56,7 @@ row() {
   row walker-walk dm_control/walker.xml
   row cheetah-gallop dm_control/cheetah.xml
   row quadruped-trot dm_control/quadruped.xml
-  for motion in jump kick reach get-up-back get-up-front walk step-up walk-cycle run; do
+  for motion in jump kick reach get-up-back get-up-front walk walk-cycle run step-up roll handstand cartwheel backflip lift; do
     row $motion
     row $motion mujoco/humanoid.xml
     row $motion dm_control/humanoid.xml
