@@ -136,8 +136,10 @@ double cav_reach(const cav_state *state, const cav_pair *pair) {
   return pair->margin + cav_law_reach(state, delta, APPROACH_SPEED);
 }
 
-// rotation of a geom that moves
-static void turn(const cav_state *state, slot *s) {
+// a geom that moves as a shape, once it is placed
+static void turn(const cav_state *state, struct cav_geom_cache *cache, int i) {
+  slot *s = cache->slot + i;
+  copy3(s->shape.pos, cache->centre[i]);
   matmul3(s->shape.rotation, state->link[s->geom->link].rotation, s->geom->rotation);
   s->turned = 1;
 }
@@ -150,12 +152,12 @@ static void place(const cav_state *state, struct cav_geom_cache *cache) {
     const cav_pose *link = state->link + s->geom->link;
     transform(cache->centre[i], link->pos, link->rotation, s->geom->pos);
     s->turned = 0;
-    if (s->geom->type == CAV_GEOM_PLANE) turn(state, s);
+    if (s->geom->type == CAV_GEOM_PLANE) turn(state, cache, i);
   }
 }
 
-// bounding spheres, or a plane and a sphere, closer than margin
-static int near(const struct cav_geom_cache *cache, const candidate *c, double margin) {
+// bounding spheres, or a plane and a sphere, closer than margin; inline: most of the search is this
+static inline int near(const struct cav_geom_cache *cache, const candidate *c, double margin) {
   double d[3], reach = c->bound + margin;
   sub3(d, cache->centre[c->second], cache->centre[c->first]);
   if (c->plane) {
@@ -167,10 +169,8 @@ static int near(const struct cav_geom_cache *cache, const candidate *c, double m
 
 // the geom as a shape, its rotation formed at the first request
 static const cav_shape *shape_of(const cav_state *state, struct cav_geom_cache *cache, int i) {
-  slot *s = cache->slot + i;
-  if (!s->turned) turn(state, s);
-  copy3(s->shape.pos, cache->centre[i]);
-  return &s->shape;
+  if (!cache->slot[i].turned) turn(state, cache, i);
+  return &cache->slot[i].shape;
 }
 
 // contact axes: the normal, then the tangent or, where none is given, the world's y or z, made square to it. No choice
@@ -206,18 +206,32 @@ static cav_status push(const cav_model *model, cav_state *state, int p, const ca
   return CAV_OK;
 }
 
-// contacts of one pair, if its bounds are near
-static cav_status collide_pair(const cav_model *model, cav_state *state, int p, const double reach[2]) {
+// contacts of one pair whose bounds are near
+static inline cav_status collide_pair(const cav_model *model, cav_state *state, int p, double margin) {
   struct cav_geom_cache *cache = state->work->geom;
   const candidate *c = cache->candidate + p;
-  double margin = c->margin + reach[c->outer];
-  if (!near(cache, c, margin)) return CAV_OK;
   cav_touch touch[CAV_TOUCH_MAX];
   const cav_shape *a = shape_of(state, cache, c->first), *b = shape_of(state, cache, c->second);
   int count = cav_collide_shapes(a, b, margin, touch);
   cav_status status = CAV_OK;
   for (int k = 0; k < count && status == CAV_OK; k++) status = push(model, state, p, touch + k);
   return status;
+}
+
+// contacts of the pairs that a sweep leaves
+static cav_status collide_swept(const cav_model *model, cav_state *state, const double reach[2]) {
+  struct cav_geom_cache *cache = state->work->geom;
+  const int *found;
+  double most = cache->margin + fmax(reach[0], reach[1]);
+  int count = cav_sweep_find(cache->sweep, (const double(*)[3])cache->centre, most, &found);
+  for (int i = 0; i < count; i++) {
+    const candidate *c = cache->candidate + found[i];
+    double margin = c->margin + reach[c->outer];
+    if (!near(cache, c, margin)) continue;
+    cav_status status = collide_pair(model, state, found[i], margin);
+    if (status) return status;
+  }
+  return CAV_OK;
 }
 
 cav_status cav_collide(const cav_model *model, cav_state *state) {
@@ -228,14 +242,13 @@ cav_status cav_collide(const cav_model *model, cav_state *state) {
   // reach is the margin plus one of two distances: found once, not per pair
   const cav_pair alone[2] = {{.outer = 0}, {.outer = 1}};
   double reach[2] = {cav_reach(state, alone), cav_reach(state, alone + 1)};
-  cav_status status = CAV_OK;
-  if (!cache->sweep) {
-    for (int p = 0; p < model->npair && status == CAV_OK; p++) status = collide_pair(model, state, p, reach);
-    return status;
+  if (cache->sweep) return collide_swept(model, state, reach);
+  for (int p = 0; p < model->npair; p++) {
+    const candidate *c = cache->candidate + p;
+    double margin = c->margin + reach[c->outer];
+    if (!near(cache, c, margin)) continue;
+    cav_status status = collide_pair(model, state, p, margin);
+    if (status) return status;
   }
-  const int *found;
-  int count =
-      cav_sweep_find(cache->sweep, (const double(*)[3])cache->centre, cache->margin + fmax(reach[0], reach[1]), &found);
-  for (int i = 0; i < count && status == CAV_OK; i++) status = collide_pair(model, state, found[i], reach);
-  return status;
+  return CAV_OK;
 }

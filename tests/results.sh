@@ -48,7 +48,7 @@ absent() {
   trap 'git worktree remove --force "$old/tree"; rm -rf "$old"' EXIT
   git worktree add --quiet --detach "$old/tree" "$before"
   meson setup "$old/build" "$old/tree" >/dev/null
-  ninja -C "$old/build" tests/bench_inverse problems/cavort >/dev/null
+  ninja -C "$old/build" tests/bench_inverse >/dev/null
   ninja -C "$build" tests/bench_inverse problems/cavort >/dev/null
   declare_unused >"$old/declared.xml"
   for turn in 1 2 3 4 5 6 7 8 9; do
@@ -73,14 +73,12 @@ absent() {
         '{ printf "%9d  %13.2f %7.2f  %10.2f %7.2f  %15.2f %7.2f  %25.3f %9.3f\n", rows, $1, $2, $3, $4, $5, $6, $3 / $1, $5 / $1 }'
     done
     echo
-    echo "Memory of a state, cavort inspect: before, now, declared"
-    for when in before now declared; do
-      tool=$build model=problems/humanoid.xml
-      [ $when = before ] && tool=$old/build
+    for when in now declared; do
+      model=problems/humanoid.xml
       [ $when = declared ] && model=$old/declared.xml
-      "$tool/problems/cavort" inspect "$model" | sed -n '/memory of a state/,/the whole/s/ us  / us/p' | sed 's/ *[0-9.]* us/ /' >"$old/$when.txt"
+      echo "Memory of a state, cavort inspect: $when"
+      "$build/problems/cavort" inspect "$model" | sed -n '/memory of a state/,/the whole/s/^\(.*[^ ]\)  *\([0-9.]* us\|0\)\{0,1\}  *\([0-9.]* kB\)$/\1  \3/p'
     done
-    cat "$old/before.txt" "$old/now.txt" "$old/declared.txt"
   } >"$out/absent.txt"
 }
 
