@@ -243,11 +243,11 @@ cav_status cav_collide(const cav_model *model, cav_state *state) {
   const cav_pair alone[2] = {{.outer = 0}, {.outer = 1}};
   double reach[2] = {cav_reach(state, alone), cav_reach(state, alone + 1)};
   if (cache->sweep) return collide_swept(model, state, reach);
-  for (int p = 0; p < model->npair; p++) {
-    const candidate *c = cache->candidate + p;
+  const candidate *first = cache->candidate;
+  for (const candidate *c = first, *end = first + model->npair; c < end; c++) {
     double margin = c->margin + reach[c->outer];
     if (!near(cache, c, margin)) continue;
-    cav_status status = collide_pair(model, state, p, margin);
+    cav_status status = collide_pair(model, state, (int)(c - first), margin);
     if (status) return status;
   }
   return CAV_OK;

@@ -1,0 +1,53 @@
+#!/bin/sh
+# Runs the four fuzzers of the readers, two at a time, and writes tests/results/fuzz.txt. Needs clang. Usage:
+#   sh tests/fuzz.sh SECONDS          each for that long; what they find and their logs stay in build-fuzz/found
+#   sh tests/fuzz.sh table FOLDER     the table alone, from the logs in a folder (NAME.log, and NAME.*.log of further runs)
+set -eu
+cd "$(dirname "$0")/.."
+
+names="mjcf urdf stl obj"
+found=build-fuzz/found
+
+# one fuzzer; what libFuzzer keeps, crash-*, timeout-* and so on, is a finding
+fuzz() {
+  mkdir -p "$found/$1"
+  nice -n 19 "build-fuzz/tests/fuzz_$1" -seed=1 -max_total_time="$2" -max_len=4096 -timeout=60 -print_final_stats=1 \
+    -artifact_prefix="$found/$1." "$found/$1" "tests/fuzz/$1" >"$found/$1.log" 2>&1 || echo "fuzz: $1 ended with a finding"
+}
+
+# sum of a number over the logs of a fuzzer: what, from which lines
+sum_of() { cat "$1/$2".log "$1/$2".*.log 2>/dev/null | sed -n "$3" | awk '{ sum += $1 } END { printf "%d", sum }'; }
+
+table() {
+  echo "sh tests/fuzz.sh SECONDS"
+  echo
+  echo "machine   $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1), $(nproc) cores"
+  echo "compiler  $(clang --version | head -n 1), libFuzzer with address and undefined-behaviour sanitizers"
+  echo "commit    $(git rev-parse --short HEAD)"
+  echo
+  echo "reader    seconds  executions  coverage (edges)  corpus found  committed corpus  findings"
+  for name in $names; do
+    seconds=$(sum_of "$1" "$name" 's/^Done [0-9]* runs in \([0-9]*\) second.*/\1/p')
+    runs=$(sum_of "$1" "$name" 's/^stat::number_of_executed_units: *\([0-9]*\)/\1/p')
+    last=$(grep -h 'cov:' "$1/$name.log" | tail -n 1)
+    findings=$(find "$1" -maxdepth 1 -name "$name.*-*" | wc -l)
+    printf '%-6s  %9s  %10s  %16s  %12s  %16s  %8s\n' "$name" "$seconds" "$runs" \
+      "$(echo "$last" | sed 's/.*cov: \([0-9]*\).*/\1/')" "$(echo "$last" | sed 's/.*corp: \([0-9]*\).*/\1/')" \
+      "$(ls "tests/fuzz/$name" | wc -l) ($(cat tests/fuzz/"$name"/* | wc -c) B)" "$findings"
+  done
+}
+
+case "${1:-}" in
+  table) table "$2" ;;
+  *[!0-9]* | '') echo "usage: sh tests/fuzz.sh SECONDS | table FOLDER" >&2 && exit 2 ;;
+  *)
+    [ -d build-fuzz ] || CC=clang meson setup build-fuzz -Dfuzz=enabled -Db_sanitize=address,undefined -Db_lundef=false \
+      --buildtype=debugoptimized >/dev/null
+    for name in $names; do ninja -C build-fuzz "tests/fuzz_$name" >/dev/null; done
+    rm -rf "$found"
+    { fuzz mjcf "$1" && fuzz stl "$1"; } &
+    fuzz urdf "$1" && fuzz obj "$1"
+    wait
+    table "$found" >tests/results/fuzz.txt
+    ;;
+esac
