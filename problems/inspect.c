@@ -379,7 +379,7 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
   cav_status status = print_posture(p, "start", p->q_start, error);
   if (!status) status = print_posture(p, "goal", p->q_goal, error);
   if (status) return status;
-  printf("  %d unknowns; the guess %s", (knots - 1) * p->model->nv,
+  printf("  %d unknowns; the guess %s", (knots - 1) * p->model->nv + (p->duration_most > 0),
          p->guess == CAV_GUESS_HOLD ? "holds the start" : "goes from start to goal");
   if (p->nguess_pose > 0) printf(" by %d postures", p->nguess_pose);
   if (p->guess_height > 0) printf(", with an arc of %g m from %g to %g s", p->guess_height, p->guess_from, p->guess_to);

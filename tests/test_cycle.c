@@ -222,6 +222,33 @@ static void test_files(void) {
 
 // ---------------------------------------------------------------- a motion
 
+#ifdef CAVORT_HAVE_IPOPT
+/// Ipopt's checker on gradient, Jacobian and its sparsity at a solution, the seam and the step among its unknowns.
+static void check_derivatives(const cav_problem *p, const cav_trajectory *at) {
+  static const cav_ipopt_option no_iterations = {"max_iter", "0"};
+  char log[] = "/tmp/cavort-ipopt-XXXXXX";
+  int file = mkstemp(log);
+  if (!CHECK(file >= 0)) return;
+  close(file);
+  cav_solve_options options = cav_solve_options_default();
+  cav_solution *solution = NULL;
+  motion_findings found = {0};
+  options.solver = CAV_SOLVER_IPOPT;
+  options.nipopt = 1;
+  options.ipopt = &no_iterations;
+  options.ipopt_derivative_test = 1;
+  options.ipopt_output = log;
+  options.diagnose = 0;
+  cav_status status = cav_solve(p, &options, at, &solution, NULL);
+  CHECK(status == CAV_OK || status == CAV_NOT_CONVERGED);
+  motion_read_log(log, &found);
+  CHECK(found.silent == 0 && found.errors == 0);
+  if (found.errors) fprintf(stderr, "    %d entries differ, the worst by %g\n", found.errors, found.worst);
+  cav_solution_free(solution);
+  unlink(log);
+}
+#endif
+
 /// Certified, with the wrap exact; the duration it took, 0 if it is not.
 static double hop(const cav_problem *p, cav_solver solver, cav_verdict *verdict) {
   cav_solve_options options = cav_solve_options_default();
@@ -242,6 +269,9 @@ static double hop(const cav_problem *p, cav_solver solver, cav_verdict *verdict)
         "mm\n",
         duration, s->iterations, s->cost, verdict->unactuated_force_max, verdict->wrap_error,
         verdict->momentum_defect_rms, verdict->replay_same_step_seconds, 1e3 * verdict->closed_loop_end_error_m);
+#ifdef CAVORT_HAVE_IPOPT
+    check_derivatives(p, s->trajectory);
+#endif
     // a period that does not close is seen
     cav_verdict spoilt = {0};
     s->trajectory->q[0] += 1e-6;
