@@ -175,17 +175,26 @@ static void add_velocity(cav_sum *a, const cav_term *term, double weight, const 
   }
 }
 
+/// Entries of the derivative of scale times the acceleration of dof d at a knot that has one.
+static int acceleration_entries(const cav_sum *a, int d, double scale, int *column, double *entry) {
+  const cav_transcription *tr = a->tr;
+  int n = 0, t = a->t, here = cav_knot_moves(tr, t);
+  scale /= tr->h;
+  if (here) n = velocity_entries(tr, t, d, tr->nv, cav_knot_moves(tr, t - 1), -scale, column, entry);
+  if (t + 1 < tr->nknot) n += velocity_entries(tr, t + 1, d, 2 * tr->nv, here, scale, column + n, entry + n);
+  return n;
+}
+
 static void add_acceleration(cav_sum *a, const cav_term *term, double weight, const double *v, const double *v_next) {
   const cav_transcription *tr = a->tr;
-  int column[12], last = tr->nknot - 1, here = cav_knot_moves(tr, a->t);
-  double entry[12], scale = 1 / (tr->h * term->scale), *goal = a->s->tangent;
+  int column[12];
+  double entry[12], *goal = a->s->tangent;
   if (!a->knot->has_force) return;
   cav_term_target(term, a->knot->time, tr->nv, goal);
   for (int d = 0; d < tr->nv; d++) {
     if (!cav_dof_selected(tr, term, d)) continue;
-    int n = here ? velocity_entries(tr, a->t, d, tr->nv, cav_knot_moves(tr, a->t - 1), -scale, column, entry) : 0;
-    if (a->t < last) n += velocity_entries(tr, a->t + 1, d, 2 * tr->nv, here, scale, column + n, entry + n);
-    double r = (v_next[d] - v[d]) * scale - goal[d] / term->scale, w = weight;
+    int n = acceleration_entries(a, d, 1 / term->scale, column, entry);
+    double r = ((v_next[d] - v[d]) / tr->h - goal[d]) / term->scale, w = weight;
     begin_cost(a, term, 1, &w, &r);
     add_sparse(a, w, r, n, column, entry);
   }
@@ -419,13 +428,13 @@ static void add_force_slots(cav_sum *a, const double *q, const double *v) {
   }
 }
 
-/// Rows of a hard term over postures or velocities, one a selected dof; returns the next row.
+/// Rows of a hard term over postures, velocities or accelerations, one a selected dof; returns the next row.
 static int add_hard_dofs(cav_sum *a, const cav_term *term, int i, double lower, double upper, const double *q,
-                         const double *v) {
+                         const double *v, const double *v_next) {
   const cav_transcription *tr = a->tr;
-  int posture = term->quantity == CAV_QUANTITY_CONFIGURATION, column[6], active;
-  int here = cav_knot_moves(tr, a->t), before = cav_knot_moves(tr, a->t - 1);
-  double rho = tr->penalty.term, entry[6];
+  int posture = term->quantity == CAV_QUANTITY_CONFIGURATION, rate = term->quantity == CAV_QUANTITY_ACCELERATION;
+  int here = cav_knot_moves(tr, a->t), before = cav_knot_moves(tr, a->t - 1), column[12], active;
+  double rho = tr->penalty.term, entry[12];
   if (posture) {
     posture_difference(a, term, q, a->s->tangent);
   } else {
@@ -434,9 +443,11 @@ static int add_hard_dofs(cav_sum *a, const cav_term *term, int i, double lower, 
   for (int d = 0; d < tr->nv; d++) {
     if (!cav_dof_selected(tr, term, d)) continue;
     int n = 0;
-    double value = (posture ? a->s->tangent[d] : v[d] - a->s->tangent[d]) / term->scale;
+    double measured = rate ? (v_next[d] - v[d]) / tr->h : v[d];
+    double value = (posture ? a->s->tangent[d] : measured - a->s->tangent[d]) / term->scale;
     if (here && posture) n = posture_entries(tr, a->s->tangent, d, 1 / term->scale, column, entry);
-    if (here && !posture) n = velocity_entries(tr, a->t, d, tr->nv, before, 1 / term->scale, column, entry);
+    if (rate) n = acceleration_entries(a, d, 1 / term->scale, column, entry);
+    if (here && !posture && !rate) n = velocity_entries(tr, a->t, d, tr->nv, before, 1 / term->scale, column, entry);
     keep_sparse(a, i, n, column, entry);
     double e = slot_residual(a, i++, value, lower, upper, rho, &active);
     if (active) add_sparse(a, rho, e, n, column, entry);
@@ -444,7 +455,7 @@ static int add_hard_dofs(cav_sum *a, const cav_term *term, int i, double lower, 
   return i;
 }
 
-static void add_hard_terms(cav_sum *a, const double *q, const double *v) {
+static void add_hard_terms(cav_sum *a, const double *q, const double *v, const double *v_next) {
   const cav_transcription *tr = a->tr;
   double rho = tr->penalty.term;
   int i = a->knot->layout.term, reading = CAV_CONTACT_READINGS * a->knot->ncontact, width = 3 * tr->nv, active;
@@ -457,7 +468,7 @@ static void add_hard_terms(cav_sum *a, const double *q, const double *v) {
       reading += dim;
       continue;
     }
-    if (term->quantity != CAV_QUANTITY_SENSOR) i = add_hard_dofs(a, term, i, lower, upper, q, v);
+    if (term->quantity != CAV_QUANTITY_SENSOR) i = add_hard_dofs(a, term, i, lower, upper, q, v, v_next);
     for (int c = 0; c < dim; c++, reading++) {
       keep_reading(a, i, reading);
       double e = slot_residual(a, i++, a->knot->y[reading], lower, upper, rho, &active);
@@ -505,6 +516,6 @@ void cav_knot_sum(cav_sum *a, const double *q, const double *v, const double *v_
   knot->cost = knot->merit;
   add_force_slots(a, q, v);
   add_ranges(a, q, tr->h * tr->penalty.range);
-  add_hard_terms(a, q, v);
+  add_hard_terms(a, q, v, v_next);
   if (a->jacobian) lay_force_rows(a);
 }

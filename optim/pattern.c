@@ -209,7 +209,8 @@ void cav_transcription_pattern(const cav_transcription *tr, int t, int i, char *
     } else {
       seen[dof] = 1;
       spread_turns(tr, seen);
-      put(tr, t, seen, term->quantity == CAV_QUANTITY_VELOCITY ? 0 : 1, 1, pattern);
+      int rate = term->quantity == CAV_QUANTITY_ACCELERATION, moving = rate || term->quantity == CAV_QUANTITY_VELOCITY;
+      put(tr, t, seen, moving ? 0 : 1, rate ? 2 : 1, pattern);
     }
   }
   if (cav_transcription_block(tr, t, 1) < 0) memset(pattern + tr->nv, 0, (size_t)tr->nv);

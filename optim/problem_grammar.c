@@ -141,8 +141,10 @@ static const cav_xml_element hard_posture = {
     "posture", 0, 0, ATTRIBUTES(POSTURE, WINDOW, BOUNDS), CHILDREN(&posture_waypoint), 0};
 static const cav_xml_element hard_velocity = {
     "velocity", 0, 0, ATTRIBUTES(RATE, WINDOW, BOUNDS), CHILDREN(&value_waypoint), 0};
+static const cav_xml_element hard_acceleration = {
+    "acceleration", 0, 0, ATTRIBUTES(RATE, WINDOW, BOUNDS), CHILDREN(&value_waypoint), 0};
 static const cav_xml_element constraint = {
-    "constraint", 0, 1, NULL, CHILDREN(&hard_sensor, &hard_posture, &hard_velocity), 0};
+    "constraint", 0, 1, NULL, CHILDREN(&hard_sensor, &hard_posture, &hard_velocity, &hard_acceleration), 0};
 
 // the rest
 static const cav_xml_element horizon = {

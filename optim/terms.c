@@ -17,7 +17,9 @@ static int reads_force(const cav_term *term) {
 
 /// Whether a term measures an acceleration or a force at a last knot that nothing leaves.
 static int is_unforced(const cav_transcription *tr, const cav_term *term, int t) {
-  if (tr->knot[t].has_force || term->quantity != CAV_QUANTITY_SENSOR) return 0;
+  if (tr->knot[t].has_force) return 0;
+  if (term->quantity == CAV_QUANTITY_ACCELERATION) return 1;
+  if (term->quantity != CAV_QUANTITY_SENSOR) return 0;
   return cav_sensor_rule_of(term->sensor.type)->stage == CAV_READS_ACCELERATION;
 }
 

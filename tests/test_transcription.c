@@ -69,7 +69,7 @@ static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) 
   cav_term base = term[0];
   base.quantity = CAV_QUANTITY_SENSOR;
   base.weight = 3;
-  for (int kind = 0; kind < 14; kind++) {
+  for (int kind = 0; kind < 15; kind++) {
     cav_term *t = &term[n++];
     *t = base;
     t->scale = 0.5 + 0.1 * kind;
@@ -94,6 +94,7 @@ static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) 
     if (kind == 11) t->norm = CAV_NORM_ABSOLUTE, t->scale = 0.1;
     if (kind == 12) t->quantity = CAV_QUANTITY_FORCE, t->target = NULL, t->norm = CAV_NORM_ABSOLUTE, t->scale = 0.2;
     if (kind == 13) t->quantity = CAV_QUANTITY_SLIP, t->target = NULL, t->body = trunk;
+    if (kind == 14) t->quantity = CAV_QUANTITY_ACCELERATION, t->use = CAV_USE_EQUAL, t->target = NULL, t->scale = 50;
     if (kind >= 11) continue;
     // accelerations and forces, of the size of gravity and of weight
     if (kind >= 7) t->target = NULL, t->scale = 50;
@@ -359,7 +360,7 @@ typedef struct closing {
 static void test_scene(const char *scene, closing close, cav_order order) {
   cav_model *m = scene_load(scene);
   if (!CHECK(m != NULL)) return;
-  cav_term term[24];
+  cav_term term[32];
   double v_start[64] = {0}, q_start[64], q_goal[64];
   cav_problem p = cav_problem_default(m);
   p.order = order;
