@@ -15,8 +15,11 @@ fuzz() {
     -artifact_prefix="$found/$1." "$found/$1" "tests/fuzz/$1" >"$found/$1.log" 2>&1 || echo "fuzz: $1 ended with a finding"
 }
 
-# sum of a number over the logs of a fuzzer: what, from which lines
-sum_of() { cat "$1/$2".log "$1/$2".*.log 2>/dev/null | sed -n "$3" | awk '{ sum += $1 } END { printf "%d", sum }'; }
+# executions and seconds over the logs of a fuzzer; one that is interrupted tells its rate alone
+work_of() {
+  cat "$1/$2".log "$1/$2".*.log 2>/dev/null | awk '/number_of_executed_units/ { n = $2 } /average_exec_per_sec/ { runs += n; s += n / $2 }
+    END { printf "%9.0f  %10d", s, runs }'
+}
 
 table() {
   echo "sh tests/fuzz.sh SECONDS"
@@ -27,11 +30,9 @@ table() {
   echo
   echo "reader    seconds  executions  coverage (edges)  corpus found  committed corpus  findings"
   for name in $names; do
-    seconds=$(sum_of "$1" "$name" 's/^Done [0-9]* runs in \([0-9]*\) second.*/\1/p')
-    runs=$(sum_of "$1" "$name" 's/^stat::number_of_executed_units: *\([0-9]*\)/\1/p')
     last=$(grep -h 'cov:' "$1/$name.log" | tail -n 1)
     findings=$(find "$1" -maxdepth 1 -name "$name.*-*" | wc -l)
-    printf '%-6s  %9s  %10s  %16s  %12s  %16s  %8s\n' "$name" "$seconds" "$runs" \
+    printf '%-6s %s  %16s  %12s  %16s  %8s\n' "$name" "$(work_of "$1" "$name")" \
       "$(echo "$last" | sed 's/.*cov: \([0-9]*\).*/\1/')" "$(echo "$last" | sed 's/.*corp: \([0-9]*\).*/\1/')" \
       "$(ls "tests/fuzz/$name" | wc -l) ($(cat tests/fuzz/"$name"/* | wc -c) B)" "$findings"
   done
