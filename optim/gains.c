@@ -12,7 +12,8 @@
 static const struct trial {
   cav_feedback_price price;
   double share;
-} trial[] = {{{36, 3}, 0.95}, {{100, 3}, 0.95}, {{12, 3}, 1}, {{12, 3}, 0.8}, {{36, 5}, 0.9}};
+} trial[] = {{{36, 3}, 1},    {{36, 3}, 0.95}, {{12, 3}, 1},  {{100, 3}, 0.95},
+             {{12, 3}, 0.85}, {{36, 5}, 0.8},  {{12, 3}, 0.7}};
 
 /// End error that ends the search, m.
 static const double near_enough = 0.03;

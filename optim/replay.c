@@ -234,6 +234,8 @@ static cav_options claimed_options(const cav_audit *audit, const cav_options *la
   cav_options claimed = *law;
   claimed.timestep = audit->h;
   claimed = cav_options_at_step(&claimed, audit->h / SUBSTEPS);
+  claimed.smoothing /= SUBSTEPS;
+  claimed.smoothing_self /= SUBSTEPS;
   claimed.order = CAV_ORDER_EULER;
   return claimed;
 }

@@ -12,6 +12,7 @@
 #include "transcription.h"
 
 static const double usual_gravity = 9.81; // m/s^2, unit of forces where the model has none
+static const double loaded = 0.01;        // share of the weight from which on a contact is loaded
 
 /// What was found at the knots.
 typedef struct evidence {
@@ -319,7 +320,8 @@ static void note_contacts(const cav_audit *audit, int t, evidence *found) {
     cav_finding_note(&found->penetration, -contact->dist, t, "%.60s in %.60s", geom_name(model, pair->geom2, name2),
                      geom_name(model, pair->geom1, name1));
     if (t >= audit->rows || contact->dim < 3) continue;
-    double load = fmax(contact->impulse[0], 0);
+    double load = contact->impulse[0];
+    if (!(load > loaded * audit->weight * audit->h)) continue;
     found->load += load;
     found->slip += load * hypot(contact->velocity_next[1], contact->velocity_next[2]);
   }
@@ -379,12 +381,18 @@ static const char *left_out(const cav_audit *audit) {
   return NULL;
 }
 
+double cav_verdict_replay(const cav_verdict *verdict) {
+  return fmin(CAV_PROMISE_REPLAY, verdict->duration) * (1 - 1e-9);
+}
+
 // writes the reason unless there is one, when a finding breaks its limit
 static void require(cav_verdict *verdict, const cav_finding *finding, double limit, const char *what,
                     const char *help) {
   if (finding->value <= limit || *verdict->reason) return;
-  snprintf(verdict->reason, sizeof verdict->reason, "%s %.3g (at most %g) at knot %d: %s. %s", what, finding->value,
-           limit, finding->knot, finding->where, help);
+  char knot[32] = "";
+  if (finding->knot >= 0) snprintf(knot, sizeof knot, " at knot %d", finding->knot);
+  snprintf(verdict->reason, sizeof verdict->reason, "%s %.3g (at most %g)%s: %s. %s", what, finding->value, limit, knot,
+           finding->where, help);
 }
 
 // the promises in order
@@ -405,9 +413,19 @@ static void judge(const cav_audit *audit, const evidence *found, const cav_repla
           "A lower softness or smoothing at the end of the schedule usually helps.");
   require(verdict, &found->defect, CAV_PROMISE_MOMENTUM, "momentum defect, share of weight rms,",
           "The order momentum keeps it exactly; a smaller time step usually helps too.");
+  const cav_finding slip = {verdict->slip_mean_m_s, -1, "mean over loaded contacts"};
+  require(verdict, &slip, CAV_PROMISE_SLIP, "slip, m/s,",
+          "A lower softness or smoothing at the end of the schedule, or a higher weight of slip, usually helps.");
   const cav_finding step = {replay->step_error, replay->step_knot, "forward step from the knot against the next knot"};
   require(verdict, &step, CAV_PROMISE_STEP, "replay error, rad or m,",
           "Forward and inverse dynamics disagree: please report it.");
+  double least = cav_verdict_replay(verdict);
+  if (replay->open_seconds < least && !*verdict->reason) {
+    snprintf(verdict->reason, sizeof verdict->reason,
+             "open loop at the same step leaves the knots by 1e-6 after %.3g s (at least %.3g s). "
+             "A smaller tolerance of the solver usually helps.",
+             replay->open_seconds, least);
+  }
   if (*replay->closed.lost && !*verdict->reason) {
     snprintf(verdict->reason, sizeof verdict->reason,
              "closed loop at a tenth of the step ends after %.3g of %.3g s: %s. "

@@ -128,6 +128,7 @@ static void check_verdict(const cav_problem *problem) {
                          .optimality = NAN,
                          .duration = 0.1,
                          .closed_loop_seconds = 0.1,
+                         .replay_same_step_seconds = 0.1,
                          .solve_seconds = 0.25,
                          .iterations = 9};
   snprintf(verdict.reason, sizeof verdict.reason, "too \"deep\"\n");

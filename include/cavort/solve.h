@@ -146,8 +146,10 @@ cav_status cav_route_solve(const cav_problem *problem, const cav_route *route, c
 #define CAV_PROMISE_UNACTUATED 1e-6  ///< share of weight
 #define CAV_PROMISE_LIMIT 1e-6       ///< relative (actuators), rad or m (ranges)
 #define CAV_PROMISE_CONSTRAINT 1e-6  ///< scaled; rad, m, rad/s or m/s of the given start
-#define CAV_PROMISE_PENETRATION 0.01 ///< m
-#define CAV_PROMISE_MOMENTUM 0.01    ///< share of weight, root mean square
+#define CAV_PROMISE_PENETRATION 0.005 ///< m, of contacts between moving links too
+#define CAV_PROMISE_MOMENTUM 0.005    ///< share of weight, root mean square
+#define CAV_PROMISE_SLIP 0.01         ///< m/s
+#define CAV_PROMISE_REPLAY 0.5        ///< s, or the whole motion: the open loop at the same step reproduces the knots at least so long
 #define CAV_PROMISE_STEP 1e-8        ///< rad or m
 #define CAV_PROMISE_WRAP 1e-9        ///< m, rad, and these per step
 
@@ -176,6 +178,9 @@ typedef struct cav_verdict {
   int iterations;
   char reason[400]; ///< why not certified: the first condition missed; "" if certified
 } cav_verdict;
+
+/// What replay_same_step_seconds has to be, s: CAV_PROMISE_REPLAY, or the whole motion where that is shorter; less rounding.
+double cav_verdict_replay(const cav_verdict *verdict);
 
 /// Certifies a motion: q, v of the trajectory and the gains are used, all else is recomputed. contact is the law it claims.
 cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
