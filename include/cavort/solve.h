@@ -143,15 +143,16 @@ cav_status cav_route_solve(const cav_problem *problem, const cav_route *route, c
                            const cav_trajectory *start, cav_solution **solution, cav_error *error);
 
 /// What a certificate promises: the largest value of the verdict's field of that name.
-#define CAV_PROMISE_UNACTUATED 1e-6  ///< share of weight
-#define CAV_PROMISE_LIMIT 1e-6       ///< relative (actuators), rad or m (ranges)
-#define CAV_PROMISE_CONSTRAINT 1e-6  ///< scaled; rad, m, rad/s or m/s of the given start
+#define CAV_PROMISE_UNACTUATED 1e-6   ///< share of weight
+#define CAV_PROMISE_LIMIT 1e-6        ///< relative (actuators), rad or m (ranges)
+#define CAV_PROMISE_CONSTRAINT 1e-6   ///< scaled; rad, m, rad/s or m/s of the given start
 #define CAV_PROMISE_PENETRATION 0.005 ///< m, of contacts between moving links too
 #define CAV_PROMISE_MOMENTUM 0.005    ///< share of weight, root mean square
 #define CAV_PROMISE_SLIP 0.01         ///< m/s
-#define CAV_PROMISE_REPLAY 0.5        ///< s, or the whole motion: the open loop at the same step reproduces the knots at least so long
-#define CAV_PROMISE_STEP 1e-8        ///< rad or m
-#define CAV_PROMISE_WRAP 1e-9        ///< m, rad, and these per step
+#define CAV_PROMISE_REPLAY \
+  0.5 ///< s, or the whole motion: the open loop at the same step reproduces the knots at least so long
+#define CAV_PROMISE_STEP 1e-8 ///< rad or m
+#define CAV_PROMISE_WRAP 1e-9 ///< m, rad, and these per step
 
 /// What verification found; from the knots alone, with code apart from the optimiser's. optimisation.md, 6.
 /// optimality, solve_seconds and iterations are the solver's: cav_verify leaves them as they are.
