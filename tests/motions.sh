@@ -1,10 +1,13 @@
 #!/bin/sh
 # Solves the motions, one after the other, and writes results/solve.md: time, iterations, what the certificate says.
-# Usage: sh tests/motions.sh [BUILD]   (folder of a release build, by default build)
+# Usage: sh tests/motions.sh [BUILD [MOTION...]]   (folder of a release build, by default build; with motions only their rows are
+# solved anew, and the others stay, each with the commit it was measured at)
 # The models that no one here wrote come from $CAVORT_SHARED_MODELS or ../shared/models; rows of absent ones are left out.
 set -eu
 cd "$(dirname "$0")/.."
 build=${1:-build}
+[ $# -eq 0 ] || shift
+chosen=" $* "
 shared=${CAVORT_SHARED_MODELS:-../shared/models}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -26,13 +29,18 @@ row() {
   motion=$1
   name=$2
   shift 2
+  case "$chosen" in
+    "  " | *" $motion "*) ;;
+    *) grep -F "| $motion | $name |" tests/results/solve.md && return 0 ;;
+  esac
   "$build/problems/cavort" solve "problems/motions/$motion/problem.xml" -o "$work/out" --threads 1 --quiet "$@" || true
   certified=$(sed -n 's/^ *"certified": \([a-z]*\),*$/\1/p' "$work/out/verdict.json")
   [ "$certified" = true ] && certified=yes || certified=no
-  printf '| %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s |\n' "$motion" "$name" "$certified" \
+  printf '| %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s |\n' "$motion" "$name" "$certified" \
     "$(tried 'if ($2) print $1' '')" "$(tried 's += $6' 'printf "%.1f", s')" "$(number iterations 1 %d)" "$(number unactuated_force_max 1 %.0e)" \
     "$(number momentum_defect_rms 100 %.2f)" "$(number penetration_max_m 1000 %.1f)" "$(number slip_mean_m_s 1000 %.0f)" \
-    "$(number replay_same_step_seconds 1 %.2f)" "$(number closed_loop_end_error_m 1000 %.0f)"
+    "$(number replay_same_step_seconds 1 %.2f)" "$(number closed_loop_end_error_m 1000 %.0f)" \
+    "$(git rev-parse --short HEAD)"
 }
 
 {
@@ -42,10 +50,9 @@ row() {
   echo
   echo "- machine: $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1), $(nproc) processors, load $(cut -d ' ' -f 1 /proc/loadavg)"
   echo "- compiler: $(cc --version | head -n 1)"
-  echo "- commit: $(git rev-parse --short HEAD)"
   echo
-  echo "| motion | model | certified | route | s, all routes | iterations | unactuated force, of weight | momentum defect, % | penetration, mm | slip, mm/s | same-step replay within 1e-6, s | closed loop, end, mm |"
-  echo "|---|---|---|---|---|---|---|---|---|---|---|---|"
+  echo "| motion | model | certified | route | s, all routes | iterations | unactuated force, of weight | momentum defect, % | penetration, mm | slip, mm/s | same-step replay within 1e-6, s | closed loop, end, mm | commit |"
+  echo "|---|---|---|---|---|---|---|---|---|---|---|---|---|"
   row squat-jump
   row squat-jump mujoco/humanoid.xml
   row squat-jump dm_control/humanoid.xml
