@@ -229,7 +229,7 @@ static cav_options own_options(const cav_audit *audit) {
   return options;
 }
 
-// the claimed law at a finer step
+// the claimed law at a finer step; what smoothing lets slip in a step, delta/h, stays
 static cav_options claimed_options(const cav_audit *audit, const cav_options *law) {
   cav_options claimed = *law;
   claimed.timestep = audit->h;
