@@ -5,7 +5,7 @@
 // the forces that hold a humanoid still for one step, and the step that they lead to
 int main(int argc, char **argv) {
   cav_error error = {0};
-  cav_model *model = cav_model_load(argc > 1 ? argv[1] : "problems/humanoid.xml", &error);
+  cav_model *model = cav_model_load(argc > 1 ? argv[1] : "problems/models/humanoid.xml", &error);
   if (!model) return fprintf(stderr, "%s\n", error.text), EXIT_FAILURE;
   cav_state *state = cav_state_new(model);
   double *v = calloc(3 * (size_t)model->nv, sizeof *v), *u = v + model->nv, *v_next = u + model->nv;

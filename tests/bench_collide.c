@@ -1,4 +1,4 @@
-/// Time of cav_collide on the humanoid against mj_collision, same states, in turns: a posture in the air, where the
+/// Time of cav_contacts_find on the humanoid against mj_collision, same states, in turns: a posture in the air, where the
 /// broad phase is nearly all, and random postures near the ground; exact law, and the smoothed law's longer reach.
 #include <time.h>
 
@@ -36,9 +36,9 @@ typedef struct times {
   double at[REPEATS];
 } times;
 
-static double quantile(times *t, double share) {
+static double quantile(times *t, double fraction) {
   qsort(t->at, REPEATS, sizeof *t->at, by_value);
-  return t->at[(int)(share * (REPEATS - 1))];
+  return t->at[(int)(fraction * (REPEATS - 1))];
 }
 
 /// Both engines at the same states.
@@ -76,7 +76,7 @@ static void compare(rig *r, const char *name, double smoothing) {
     start = now();
     for (int k = 0; k < STATES; k++) {
       memcpy(r->state->link, r->pose[k], poses);
-      cav_collide(r->model, r->state);
+      cav_contacts_find(r->model, r->state);
       contacts += r->state->ncontact;
     }
     ours.at[repeat] = (now() - start - copy) / STATES;

@@ -83,7 +83,7 @@ static void reference(double step, double *out, double *moved, double *value) {
   for (int j = 0; j < nv; j++) {
     for (int k = 0; k < 6; k++) {
       memcpy(moved, q, (size_t)m->nq * sizeof *moved);
-      cav_perturb(model, j, at[k] * step, moved);
+      cav_configuration_perturb(model, j, at[k] * step, moved);
       cav_inverse(model, state, moved, v, v_next, value);
       for (int i = 0; i < nv; i++) out[i * nv + j] += weight[k] * value[i] / step;
     }

@@ -7,7 +7,7 @@
 #include "bench.h"
 
 enum { WIDTH = 6, BINS = 20, PER_BIN = 40, STEPS = 300000, RUNS = 7, METHODS = 4 };
-static const char model_path[] = CAVORT_SOURCE_ROOT "/problems/humanoid.xml";
+static const char model_path[] = CAVORT_SOURCE_ROOT "/problems/models/humanoid.xml";
 static const char *const names[METHODS] = {"inverse", "forward(5)", "forward(50)", "newton"};
 
 /// One state on the way and its times, us.

@@ -1,6 +1,6 @@
 /// Time of the inverse against MuJoCo's mj_inverse: the same states of the same model in one run, the two by turns, by
 /// number of constraint rows. A time is the shortest of several short runs of one state; shown are the median over
-/// states and the middle half. Prints the work done beside the time, and the share of the stages of ours.
+/// states and the middle half. Prints the work done beside the time, and the fraction of the stages of ours.
 /// Usage: bench_inverse [MODEL]; default mujoco/humanoid.xml among the shared models.
 #include "bench.h"
 #include "stage.h"
@@ -72,11 +72,11 @@ static void run(sample *s) {
 }
 
 // quantile of something of n samples
-static double quantile(const sample *s, int n, double share, double (*of)(const sample *)) {
+static double quantile(const sample *s, int n, double fraction, double (*of)(const sample *)) {
   double x[PER_BIN];
   for (int i = 0; i < n; i++) x[i] = of(&s[i]);
   qsort(x, (size_t)n, sizeof *x, bench_ascending);
-  return x[(int)(share * (n - 1) + 0.5)];
+  return x[(int)(fraction * (n - 1) + 0.5)];
 }
 
 static double ours(const sample *s) { return s->ours; }
@@ -119,13 +119,13 @@ static void stages(sample bin[BINS][PER_BIN], const int *count) {
                 cav_kinematics(model, state, s->q);
                 break;
               case 1:
-                cav_rows(model, state);
+                cav_limits_find(model, state);
                 break;
               case 2:
-                cav_collide(model, state);
+                cav_contacts_find(model, state);
                 break;
               case 3:
-                cav_soften(state);
+                cav_contacts_soften(state);
                 break;
               default:
                 cav_inverse_from(model, state, CAV_STAGE_POSITION, s->q, s->v, s->v_next, u);

@@ -3,7 +3,7 @@
 /// derivatives and a Gauss-Newton iteration take. Motion: the humanoid thrown without weight, its joints free or at work,
 /// forwards, against a step much finer; with what becomes of momentum (half way between knots, where momentum keeps it) and
 /// energy. Velocities start half a step back, as the steps read them (optimisation.md, 1). Times are the shortest of several.
-/// Usage: bench_orders [MODEL]; default problems/humanoid.xml.
+/// Usage: bench_orders [MODEL]; default problems/models/humanoid.xml.
 #include "bench.h"
 #include "continuation.h"
 #include "transcription.h"
@@ -207,7 +207,7 @@ static void flights(double push) {
 
 int main(int argc, char **argv) {
   cav_error error = {0};
-  m = cav_model_load(argc > 1 ? argv[1] : CAVORT_SOURCE_ROOT "/problems/humanoid.xml", &error);
+  m = cav_model_load(argc > 1 ? argv[1] : CAVORT_SOURCE_ROOT "/problems/models/humanoid.xml", &error);
   if (!m) {
     fprintf(stderr, "%s\n", error.text);
     return EXIT_FAILURE;

@@ -1,5 +1,5 @@
 /// The broad phase. First what bounding spheres leave of the pairs of the shared models, in random postures: pairs, those whose
-/// bounds meet, those that touch. Then the time of cav_collide and of a whole inverse with 10 to 800 free bodies scattered so
+/// bounds meet, those that touch. Then the time of cav_contacts_find and of a whole inverse with 10 to 800 free bodies scattered so
 /// that each touches a few others, when all pairs are looked at and when a sweep prunes them (sweep.c), by turns: where the two
 /// cross is CAV_SWEEP_FROM. Usage: bench_sweep.
 #include "bench.h"
@@ -19,7 +19,7 @@ static int bounds_meet(const cav_state *state, const cav_pair *pair) {
   cav_object_pose(state->model, state, CAV_OBJECT_GEOM, pair->geom2, &q);
   sub3(d, q.pos, p.pos);
   column3(n, p.rotation, 2);
-  double reach = cav_reach(state, pair) + b->bound;
+  double reach = cav_contact_activation(state, pair) + b->bound;
   return a->type == CAV_GEOM_PLANE ? dot3(d, n) < reach : norm3(d) < reach + a->bound;
 }
 
@@ -80,7 +80,7 @@ typedef struct times {
 
 static void measure(cav_state *state, const double *q, double *v, double *u, int calls, times *t) {
   double start = bench_seconds();
-  for (int k = 0; k < calls; k++) cav_collide(state->model, state);
+  for (int k = 0; k < calls; k++) cav_contacts_find(state->model, state);
   t->collide = fmin(t->collide, 1e6 * (bench_seconds() - start) / calls);
   start = bench_seconds();
   for (int k = 0; k < calls; k++) cav_inverse(state->model, state, q, v, v, u);
@@ -107,7 +107,7 @@ static void compare(int bodies) {
     }
     // moved a little, as by a step
     for (int i = 0; i < m->nq; i++) q[i] += 1e-3 * scene_uniform();
-    cav_normalise(m, q);
+    cav_configuration_normalise(m, q);
   }
   CHECK(contacts[0] == contacts[1]);
   printf("%6d %7d %9d   %10.1f %10.1f   %10.1f %10.1f   %6zu %6zu\n", bodies, m->npair, contacts[0], t[0].collide,

@@ -16,7 +16,7 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-// stops the fuzzer where a promise does not hold
+// stops the fuzzer where a tolerance does not hold
 static inline void fuzz_require(int holds) {
   if (!holds) abort();
 }

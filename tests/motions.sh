@@ -15,8 +15,8 @@ trap 'rm -rf "$work"' EXIT
 # number NAME SCALE FORMAT: a field of the last verdict
 number() { sed -n "s/^ *\"$1\": \([^,]*\),*$/\1/p" "$work/out/verdict.json" | awk -v s="$2" -v f="$3" '{ printf f, $1 * s }'; }
 
-# tried EXPRESSION: of awk over the routes that were tried: $1 name, $2 kept, $6 seconds
-tried() { awk -F , "NR > 1 && \$6 != \"\" { $1 } END { $2 }" "$work/out/routes.csv"; }
+# tried EXPRESSION: of awk over the strategies that were tried: $1 name, $2 kept, $6 seconds
+tried() { awk -F , "NR > 1 && \$6 != \"\" { $1 } END { $2 }" "$work/out/strategies.csv"; }
 
 # row MOTION [MODEL]
 row() {
@@ -24,7 +24,7 @@ row() {
     [ -f "$shared/$2" ] || return 0
     set -- "$1" "$2" --model "$shared/$2"
   else
-    set -- "$1" "problems/humanoid.xml"
+    set -- "$1" "problems/models/humanoid.xml"
   fi
   motion=$1
   name=$2
@@ -51,7 +51,7 @@ row() {
   echo "- machine: $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1), $(nproc) processors, load $(cut -d ' ' -f 1 /proc/loadavg)"
   echo "- compiler: $(cc --version | head -n 1)"
   echo
-  echo "| motion | model | certified | route | s, all routes | iterations | unactuated force, of weight | momentum defect, % | penetration, mm | slip, mm/s | same-step replay within 1e-6, s | closed loop, end, mm | commit |"
+  echo "| motion | model | certified | strategy | s, all strategies | iterations | unactuated force, of weight | momentum defect, % | penetration, mm | slip, mm/s | same-step replay within 1e-6, s | closed loop, end, mm | commit |"
   echo "|---|---|---|---|---|---|---|---|---|---|---|---|---|"
   row squat-jump
   row squat-jump mujoco/humanoid.xml

@@ -15,7 +15,7 @@ field() { sed -n "s/^ *\"$1\": \([^,]*\),*$/\1/p" "$work/out/verdict.json"; }
 # cells ORDER MOTION MODEL
 cells() {
   sed "s/<horizon /<horizon order=\"$1\" /" "problems/motions/$2/problem.xml" >"$work/problem.xml"
-  "$build/problems/cavort" solve "$work/problem.xml" --model "$3" -o "$work/out" --routes 1 --threads 1 --quiet || true
+  "$build/problems/cavort" solve "$work/problem.xml" --model "$3" -o "$work/out" --strategies 1 --threads 1 --quiet || true
   certified=no
   [ "$(field certified)" = true ] && certified=yes
   printf ' %s | %d | %s | %s |' "$certified" "$(field iterations)" \
@@ -44,7 +44,7 @@ row() {
   echo "| motion | model | midpoint: certified | iterations | defect, % | end, mm | momentum: certified | iterations | defect, % | end, mm |"
   echo "|---|---|---|---|---|---|---|---|---|---|"
   for motion in squat-jump jump kick reach walk step-up get-up-back get-up-front; do
-    row $motion problems/humanoid.xml ours
+    row $motion problems/models/humanoid.xml ours
     row $motion "$shared/mujoco/humanoid.xml" MuJoCo
     row $motion "$shared/dm_control/humanoid.xml" dm_control
   done

@@ -43,11 +43,11 @@ static inline double proof_height(const cav_shape *s, const double p[3]) {
 static inline double proof_gap(const cav_shape *a, const cav_shape *b, const double n[3]) {
   double x[3], y[3], back[3], d[3];
   scale3(back, -1, n);
-  cav_support(b, back, y);
+  cav_shape_support(b, back, y);
   if (a->type == CAV_GEOM_PLANE) {
     copy3(x, a->pos);
   } else {
-    cav_support(a, n, x);
+    cav_shape_support(a, n, x);
   }
   sub3(d, y, x);
   return dot3(d, n);

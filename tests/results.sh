@@ -39,7 +39,7 @@ declare_unused() {
   sed 's|^  </worldbody>|<geom type="mesh" mesh="unused" contype="0" conaffinity="0"/>\
 <geom type="hfield" hfield="unused" contype="0" conaffinity="0"/></worldbody>\
 <asset><mesh name="unused" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/><hfield name="unused" nrow="9" ncol="9" size="1 1 1 1"/></asset>\
-<equality><joint joint1="elbow_left" joint2="elbow_right" active="false"/></equality>|' problems/humanoid.xml
+<equality><joint joint1="elbow_left" joint2="elbow_right" active="false"/></equality>|' problems/models/humanoid.xml
 }
 
 # times of the humanoid's inverse by the build before, by this one, and by this one with what is left out in the file, by turns
@@ -53,7 +53,7 @@ absent() {
   declare_unused >"$old/declared.xml"
   for turn in 1 2 3 4 5 6 7 8 9; do
     for when in before now declared; do
-      tool=$build model=problems/humanoid.xml
+      tool=$build model=problems/models/humanoid.xml
       [ $when = before ] && tool=$old/build
       [ $when = declared ] && model=$old/declared.xml
       "$tool/tests/bench_inverse" "$model" | sed -n "s/^ *\([0-9]*\) - .* us *\([0-9.]*\) us .*us .*/\1 $when \2/p"
@@ -61,7 +61,7 @@ absent() {
   done >"$old/times"
   {
     provenance "sh tests/results.sh absent"
-    echo "Inverse of problems/humanoid.xml, which has no tendon, equality constraint, fluid, sensor, mesh or height field: us,"
+    echo "Inverse of problems/models/humanoid.xml, which has no tendon, equality constraint, fluid, sensor, mesh or height field: us,"
     echo "least and median of nine runs by turns, of a build before all of those were there ($before), of this build, and of this"
     echo "build with a mesh and a height field that are only seen and an equality constraint that is switched off in the file."
     echo
@@ -74,7 +74,7 @@ absent() {
     done
     echo
     for when in now declared; do
-      model=problems/humanoid.xml
+      model=problems/models/humanoid.xml
       [ $when = declared ] && model=$old/declared.xml
       echo "Memory of a state, cavort inspect: $when"
       "$build/problems/cavort" inspect "$model" | sed -n '/memory of a state/,/the whole/p' | sed 1d

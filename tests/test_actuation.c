@@ -68,12 +68,12 @@ static void test_inputs(const cav_model *m) {
     CHECK(cav_actuation_inputs(m, state, v, effort, input) == 1);
     CHECK(input[0] == 2);
   }
-  int strong = cav_find(m, CAV_OBJECT_ACTUATOR, "strong");
+  int strong = cav_object_find(m, CAV_OBJECT_ACTUATOR, "strong");
   double found, range[2];
   CHECK(cav_actuator_input(m, strong, 0, 0, 10, &found) == 0 && found == 0);
   cav_actuator_effort_range(m, 0, range);
   CHECK(range[0] == -2 && range[1] == 2);
-  cav_actuator_effort_range(m, cav_find(m, CAV_OBJECT_ACTUATOR, "servo"), range);
+  cav_actuator_effort_range(m, cav_object_find(m, CAV_OBJECT_ACTUATOR, "servo"), range);
   CHECK(range[0] == -30 && range[1] == 30);
   cav_state_free(state);
   free(q), free(v), free(moment), free(effort), free(input);
@@ -113,7 +113,7 @@ static void compare_strokes(const cav_model *m, mjModel *p) {
       theirs[k] = a->lengthrange[k];
     }
   }
-  printf("  strokes of muscles: %.1e of theirs\n", worst);
+  printf("  length range of muscles: %.1e of theirs\n", worst);
   // bound: limits of MuJoCo's simulation are soft; seen 3 %
   CHECK(worst < 0.06);
 }

@@ -2,7 +2,7 @@
 /// all joints, limits, tendons, friction losses, springs, contacts of all pairs, exact and smoothed law, all orders,
 /// both stabilisations. A column is compared where two steps of the reference agree: elsewhere the law, the narrow phase
 /// or a limit has a kink within the step. Also: refusals are explicit, wrong calls fail. If this test fails because a new
-/// force or constraint has no derivative in dynamics/analytic.c yet, name it in cav_derivatives_missing.
+/// force or constraint has no derivative in dynamics/derivative/analytic.c yet, name it in cav_derivatives_missing.
 #include "scene.h"
 #include "stage.h"
 
@@ -102,7 +102,7 @@ static void read_all(const readings *r, const cav_state *at, double *value) {
     memcpy(value + 7, c->impulse, (size_t)c->dim * sizeof *value);
   }
   for (int i = 0; i < r->nsensor; i++) {
-    cav_sense(model, at, &r->sensor[i], value);
+    cav_sensor_read(model, at, &r->sensor[i], value);
     value += r->sensor[i].dim;
   }
 }
@@ -122,7 +122,7 @@ static int differentiate(const readings *r, double *dq, double *dv, double *dn) 
     CHECK(cav_contact_derivatives(model, state, i, &d) == CAV_OK);
   }
   for (int i = 0; i < r->nsensor; i++) {
-    cav_status status = cav_sense_derivatives(model, state, &r->sensor[i], dq + at, dn + at);
+    cav_status status = cav_sensor_derivatives(model, state, &r->sensor[i], dq + at, dn + at);
     CHECK(status == (has_derivative(&r->sensor[i]) ? CAV_OK : CAV_NOT_SUPPORTED));
     at += r->sensor[i].dim * nv;
   }
@@ -137,7 +137,7 @@ static void reference(const readings *r, int which, int j, double step, double *
   for (int k = 0; k < POINTS; k++) {
     const double *x[3] = {q, v, v_next};
     memcpy(moved, x[which], (size_t)(which ? model->nv : model->nq) * sizeof *moved);
-    if (which == 0) cav_perturb(model, j, at[k] * step, moved);
+    if (which == 0) cav_configuration_perturb(model, j, at[k] * step, moved);
     if (which > 0) moved[j] += at[k] * step;
     x[which] = moved;
     CHECK(cav_inverse(model, other, x[0], x[1], x[2], scratch) == CAV_OK);
@@ -281,7 +281,7 @@ static void wrong_calls(void) {
   CHECK(cav_derivatives(model, state, d, d, d) == CAV_BAD_INPUT);
   scene_posture(model, q, scratch, 0.2);
   CHECK(cav_inverse(model, state, q, v, v_next, scratch) == CAV_OK);
-  CHECK(cav_sense_derivatives(model, state, &(cav_sensor){.type = CAV_SENSOR_SUBTREECOM, .dim = 3}, d, d) ==
+  CHECK(cav_sensor_derivatives(model, state, &(cav_sensor){.type = CAV_SENSOR_SUBTREECOM, .dim = 3}, d, d) ==
         CAV_BAD_INPUT);
   CHECK(cav_derivatives(model, state, d, NULL, NULL) == CAV_OK);
   CHECK(cav_contact_derivatives(model, state, state->ncontact, &none) == CAV_BAD_INPUT);
@@ -291,9 +291,9 @@ static void wrong_calls(void) {
   CHECK(state->nrow > 0);
   state->row[0].type = (cav_row_type)99;
   CHECK(cav_derivatives(model, state, d, NULL, NULL) == CAV_NOT_SUPPORTED);
-  CHECK(cav_differentiate(model, state, CAV_DERIVATIVE_ANALYTIC, 0, q, v, v_next, NULL, NULL, 0, NULL, d, d, d) ==
-        CAV_BAD_INPUT);
-  CHECK(cav_sense_derivatives(model, state, &(cav_sensor){.type = CAV_SENSOR_TYPES, .dim = 3}, d, d) != CAV_OK);
+  CHECK(cav_readout_differentiate(model, state, CAV_DERIVATIVE_ANALYTIC, 0, q, v, v_next, NULL, NULL, 0, NULL, d, d,
+                                  d) == CAV_BAD_INPUT);
+  CHECK(cav_sensor_derivatives(model, state, &(cav_sensor){.type = CAV_SENSOR_TYPES, .dim = 3}, d, d) != CAV_OK);
   free(d);
   close_model();
 }
@@ -308,7 +308,7 @@ int main(void) {
   wrong_calls();
   model = scene_load(scene_joints);
   check_model("joints", STATES);
-  model = cav_model_load(CAVORT_SOURCE_ROOT "/problems/humanoid.xml", NULL);
+  model = cav_model_load(CAVORT_SOURCE_ROOT "/problems/models/humanoid.xml", NULL);
   check_model("our humanoid", 8);
 #ifdef CAVORT_HAVE_CCD
   model = scene_load(shapes);

@@ -120,8 +120,8 @@ static void check_alone(const cav_problem *problem) {
   cav_verdict verdict = {0};
   cav_solution *solution = solve(problem, CAV_SOLVER_IPOPT, &verdict);
   if (solution) CHECK(phases(solution, "continuation") == 0 && phases(solution, "ipopt") > 0);
-  CHECK(verdict.unactuated_force_max <= CAV_PROMISE_UNACTUATED);
-  CHECK(verdict.limit_violation_max <= CAV_PROMISE_LIMIT);
+  CHECK(verdict.unactuated_force_max <= CAV_TOLERANCE_UNACTUATED);
+  CHECK(verdict.limit_violation_max <= CAV_TOLERANCE_LIMIT);
   cav_solution_free(solution);
 }
 

@@ -1,4 +1,4 @@
-/// The broad phase against the narrow phase of every pair, cav_reach, the options that switch contacts off, contact
+/// The broad phase against the narrow phase of every pair, cav_contact_activation, the options that switch contacts off, contact
 /// axes, and MuJoCo's contacts on models no one here wrote.
 #include "check.h"
 #include "math3.h"
@@ -71,7 +71,7 @@ static void fill(heap *h) {
       if (h->geom[a].link == h->geom[b].link || !cav_collide_supported(h->geom[a].type, h->geom[b].type)) continue;
       cav_pair *p = h->pair + m->npair++;
       *p = (cav_pair){.geom1 = swap ? b : a, .geom2 = swap ? a : b, .dim = 3, .friction = {1, 1, 0.1, 0.2, 0.3}};
-      p->outer = !h->geom[a].link || !h->geom[b].link;
+      p->external = !h->geom[a].link || !h->geom[b].link;
       p->margin = uniform(0, 0.1);
       p->gap = p->margin / 3;
     }
@@ -105,13 +105,13 @@ static void compare(const cav_state *state) {
     const cav_pair *pair = m->pair + p;
     cav_shape a = shape_of(state, pair->geom1), b = shape_of(state, pair->geom2);
     cav_touch touch[CAV_TOUCH_MAX];
-    int n = cav_collide_shapes(&a, &b, cav_reach(state, pair), touch);
+    int n = cav_collide_shapes(&a, &b, cav_contact_activation(state, pair), touch);
     for (int j = 0; j < n; j++, k++) {
       if (!CHECK(k < state->ncontact)) return;
       const cav_contact *c = state->contact + k;
       CHECK(c->pair == p && c->feature == touch[j].feature && c->dim == pair->dim);
       CHECK(c->link1 == m->geom[pair->geom1].link && c->link2 == m->geom[pair->geom2].link);
-      CHECK(c->dist < cav_reach(state, pair));
+      CHECK(c->dist < cav_contact_activation(state, pair));
       // same arithmetic: the same bits
       CHECK(c->dist == touch[j].dist && !memcmp(c->pos, touch[j].pos, sizeof c->pos));
       CHECK(!memcmp(c->friction, pair->friction, sizeof c->friction));
@@ -134,7 +134,7 @@ static void test_heap(int sweep_from) {
   fill(&h);
   // two pairs of the same geoms
   cav_pair *twin = h.pair + 200;
-  twin->geom1 = twin[-1].geom1, twin->geom2 = twin[-1].geom2, twin->outer = twin[-1].outer;
+  twin->geom1 = twin[-1].geom1, twin->geom2 = twin[-1].geom2, twin->external = twin[-1].external;
   cav_state *state = cav_state_new(&h.model);
   if (!CHECK(state != NULL)) return;
   cav_geom_cache_free(state->work->geom);
@@ -146,7 +146,7 @@ static void test_heap(int sweep_from) {
     state->options.smoothing = pose % 3 == 1 ? 0.01 : 0;
     state->options.smoothing_self = pose % 3 == 1 ? 0.001 : 0;
     state->options.stabilisation = pose % 3 == 2 ? CAV_STABILISATION_DISCRETE : CAV_STABILISATION_SOLREF;
-    CHECK(cav_collide(&h.model, state) == CAV_OK);
+    CHECK(cav_contacts_find(&h.model, state) == CAV_OK);
     compare(state);
     contacts += state->ncontact;
   }
@@ -156,10 +156,10 @@ static void test_heap(int sweep_from) {
 
   // switched off
   state->options.contact = 0;
-  CHECK(cav_collide(&h.model, state) == CAV_OK && state->ncontact == 0);
+  CHECK(cav_contacts_find(&h.model, state) == CAV_OK && state->ncontact == 0);
   state->options.contact = 1;
   state->options.constraint = 0;
-  CHECK(cav_collide(&h.model, state) == CAV_OK && state->ncontact == 0);
+  CHECK(cav_contacts_find(&h.model, state) == CAV_OK && state->ncontact == 0);
   cav_state_free(state);
 }
 
@@ -168,17 +168,17 @@ static void test_reach(void) {
   fill(&h);
   cav_state *state = cav_state_new(&h.model);
   if (!CHECK(state != NULL)) return;
-  cav_pair moving = {.margin = 0.02}, grounded = {.margin = 0.02, .outer = 1};
-  CHECK_NEAR(cav_reach(state, &moving), 0.02, 0);
+  cav_pair moving = {.margin = 0.02}, grounded = {.margin = 0.02, .external = 1};
+  CHECK_NEAR(cav_contact_activation(state, &moving), 0.02, 0);
   state->options.smoothing = 0.03;
   state->options.smoothing_self = 0.01;
-  CHECK_NEAR(cav_reach(state, &moving), 0.02 + 0.12, 1e-15);
-  CHECK_NEAR(cav_reach(state, &grounded), 0.02 + 0.36, 1e-15);
+  CHECK_NEAR(cav_contact_activation(state, &moving), 0.02 + 0.12, 1e-15);
+  CHECK_NEAR(cav_contact_activation(state, &grounded), 0.02 + 0.36, 1e-15);
   // the discrete law: and what an approach of 5 m/s covers in a step of 0.01 s
   state->options.stabilisation = CAV_STABILISATION_DISCRETE;
-  CHECK_NEAR(cav_reach(state, &grounded), 0.02 + 0.36 + 0.05, 1e-15);
+  CHECK_NEAR(cav_contact_activation(state, &grounded), 0.02 + 0.36 + 0.05, 1e-15);
   state->options.smoothing = 0;
-  CHECK_NEAR(cav_reach(state, &moving), 0.02 + 0.05, 1e-15);
+  CHECK_NEAR(cav_contact_activation(state, &moving), 0.02 + 0.05, 1e-15);
   cav_state_free(state);
 }
 

@@ -2,7 +2,7 @@
 /// (Dzhanibekov), a chain of pendulums. The forward step runs without applied force. The drift of a quantity is its largest
 /// departure from its first value, relative to a scale of the motion; it falls with the step as the order of the step says:
 /// with the first power for `euler`, the second for `midpoint` and `momentum`; `momentum` keeps momenta to rounding, half way
-/// between knots, where it takes them (halfway.c). v_t = (q_t - q_{t-1})/h belongs half a step before its knot
+/// between knots, where it takes them (half-step.c). v_t = (q_t - q_{t-1})/h belongs half a step before its knot
 /// (optimisation.md, 1), so quantities at a knot take the mean of the velocities that reach and leave it.
 /// Usage: test_conservation prints the table that is kept in results/conservation.txt.
 #include "scene.h"
@@ -110,7 +110,7 @@ static drift run(const cav_model *m, const scene *s, cav_order order, double h) 
 }
 
 // power of the step by which a drift falls, over the whole table
-static double slope(double coarse, double fine) { return log(coarse / fine) / log(step[0] / step[STEPS - 1]); }
+static double derivative(double coarse, double fine) { return log(coarse / fine) / log(step[0] / step[STEPS - 1]); }
 
 static void check_order(const char *what, const double *d, cav_order order, int kept) {
   // rounding alone: seen 4e-14
@@ -119,9 +119,9 @@ static void check_order(const char *what, const double *d, cav_order order, int 
     printf("| %s | kept to rounding |\n", what);
     return;
   }
-  double power = slope(d[0], d[STEPS - 1]);
+  double power = derivative(d[0], d[STEPS - 1]);
   printf("| %s | %.2f |\n", what, power);
-  // bound: the next power of the step spoils a slope by some percent; seen 0.96 to 1.03 and 1.99 to 2.02. The bounds of one order
+  // bound: the next power of the step spoils a derivative by some percent; seen 0.96 to 1.03 and 1.99 to 2.02. The bounds of one order
   // refuse the other
   CHECK_NEAR(power, order == CAV_ORDER_EULER ? 1 : 2, 0.1);
 }

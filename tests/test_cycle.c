@@ -2,8 +2,8 @@
 /// why, the element of problem files, and a hopper of our own that hops for ever: certified by both solvers, its wrap exact to
 /// rounding, with a free duration that moves to where the cost is least, or to its bound.
 #include "cavort/cavort.h"
-#include "cycle.h"
 #include "motion.h"
+#include "periodicity.h"
 #include "scene.h"
 
 /// Two arms of ball joints, two legs of which one's hinge is turned about, a cart on the side that turns with nothing.
@@ -51,8 +51,8 @@ static cav_problem with_cycle(const cav_model *m, cav_cycle cycle) {
 static void test_map(const cav_model *m, cav_cycle cycle) {
   cav_problem p = with_cycle(m, cycle);
   cav_error error = {0};
-  cav_wrap *wrap = cav_wrap_new(&p, &error);
-  if (!CHECK(wrap != NULL)) {
+  cav_periodicity *periodicity = cav_periodicity_new(&p, &error);
+  if (!CHECK(periodicity != NULL)) {
     fprintf(stderr, "    %s\n", error.text);
     return;
   }
@@ -63,29 +63,29 @@ static void test_map(const cav_model *m, cav_cycle cycle) {
   cav_state *state = cav_state_new(m);
   for (int k = 0; k < 20; k++) {
     scene_posture(m, q, v, 0.6);
-    cav_wrap_configuration(wrap, 1, q, moved);
-    cav_wrap_configuration(wrap, -1, moved, back);
+    cav_periodicity_configuration(periodicity, 1, q, moved);
+    cav_periodicity_configuration(periodicity, -1, moved, back);
     cav_difference(m, q, back, 1, found);
     CHECK(scene_norm(found, m->nv) < 1e-12);
     // G (q (+) v) = (G q) (+) P v
     scene_normals(v, m->nv, 0.3);
     cav_integrate(m, q, v, 1, near);
-    cav_wrap_configuration(wrap, 1, near, there);
+    cav_periodicity_configuration(periodicity, 1, near, there);
     cav_difference(m, moved, there, 1, found);
-    cav_wrap_tangent(wrap, 1, v, pv);
+    cav_periodicity_tangent(periodicity, 1, v, pv);
     CHECK(scene_error(found, pv, m->nv) < 1e-12);
-    cav_wrap_tangent(wrap, -1, pv, found);
+    cav_periodicity_tangent(periodicity, -1, pv, found);
     CHECK(scene_error(found, v, m->nv) < 1e-12);
     CHECK(cav_position(m, state, q) == CAV_OK);
     memcpy(com, state->com, sizeof(double) * 3 * (size_t)m->nlink);
     CHECK(cav_position(m, state, moved) == CAV_OK);
     for (int l = 1; l < m->nlink; l++) {
-      cav_wrap_point(wrap, com + 3 * l, point);
-      CHECK(scene_error(point, state->com + 3 * cav_wrap_link(wrap, l), 3) < 1e-9);
+      cav_periodicity_point(periodicity, com + 3 * l, point);
+      CHECK(scene_error(point, state->com + 3 * cav_periodicity_link(periodicity, l), 3) < 1e-9);
     }
   }
   cav_state_free(state);
-  cav_wrap_free(wrap);
+  cav_periodicity_free(periodicity);
   free(q), free(moved), free(back), free(near), free(there), free(v), free(pv), free(found), free(com);
 }
 
@@ -94,17 +94,17 @@ static void refuse(const char *scene, cav_cycle cycle, const char *says) {
   if (!CHECK(m != NULL)) return;
   cav_problem p = with_cycle(m, cycle);
   cav_error error = {0};
-  cav_wrap *wrap = cav_wrap_new(&p, &error);
-  if (!CHECK(!wrap && error.status == CAV_BAD_INPUT && strstr(error.text, says)))
+  cav_periodicity *periodicity = cav_periodicity_new(&p, &error);
+  if (!CHECK(!periodicity && error.status == CAV_BAD_INPUT && strstr(error.text, says)))
     fprintf(stderr, "    '%s' lacks '%s'\n", error.text, says);
-  cav_wrap_free(wrap);
+  cav_periodicity_free(periodicity);
   cav_model_free(m);
 }
 
 static void test_refusals(void) {
   const cav_cycle mirror = {.mirror = CAV_MIRROR_Y}, along_y = {.translation = {0, 1, 0}},
                   up = {.translation = {0, 0, 1}};
-  const cav_cycle turn = {.turn = 1}, both = {.turn = 1, .mirror = CAV_MIRROR_Y};
+  const cav_cycle rotation = {.rotation = 1}, both = {.rotation = 1, .mirror = CAV_MIRROR_Y};
   const cav_cycle across = {.translation = {0, 1, 0}, .mirror = CAV_MIRROR_Y};
   static const int pair[1][2] = {{0, 99}};
   const cav_cycle paired = {.mirror = CAV_MIRROR_Y, .npair = 1, .pair = pair};
@@ -124,7 +124,7 @@ static void test_refusals(void) {
   refuse(SIDED(LEG, HIP), up, "ground is not the same");
   refuse(SIDED(LEG, HIP), paired, "pair of the cycle");
   refuse(hopper, along_y, "cannot follow");
-  refuse(hopper, turn, "cannot turn");
+  refuse(hopper, rotation, "cannot turn");
   refuse(
       "<mujoco><worldbody><geom name='step' type='box' size='1 1 .1'/><body><freejoint/><geom size='.1'/></body>"
       "</worldbody></mujoco>",
@@ -139,17 +139,17 @@ static void test_ranges(void) {
   cav_model *m = scene_load(SIDED("<joint name='right hip' axis='.2 -1 .1' limited='true' range='-35 20'/>", HIP));
   if (!CHECK(m != NULL)) return;
   cav_problem p = with_cycle(m, (cav_cycle){.mirror = CAV_MIRROR_Y});
-  cav_wrap *wrap = cav_wrap_new(&p, NULL);
+  cav_periodicity *periodicity = cav_periodicity_new(&p, NULL);
   double left[2] = {0}, right[2] = {0}, degree = M_PI / 180;
-  if (CHECK(wrap != NULL)) {
-    cav_wrap_range(wrap, cav_find(m, CAV_OBJECT_JOINT, "left hip"), left);
-    cav_wrap_range(wrap, cav_find(m, CAV_OBJECT_JOINT, "right hip"), right);
+  if (CHECK(periodicity != NULL)) {
+    cav_periodicity_range(periodicity, cav_object_find(m, CAV_OBJECT_JOINT, "left hip"), left);
+    cav_periodicity_range(periodicity, cav_object_find(m, CAV_OBJECT_JOINT, "right hip"), right);
   }
   CHECK_NEAR(left[0], -20 * degree, 1e-12);
   CHECK_NEAR(left[1], 35 * degree, 1e-12);
   CHECK_NEAR(right[0], -35 * degree, 1e-12);
   CHECK_NEAR(right[1], 20 * degree, 1e-12);
-  cav_wrap_free(wrap);
+  cav_periodicity_free(periodicity);
   cav_model_free(m);
 }
 
@@ -177,7 +177,7 @@ static cav_problem *load_file(const char *horizon, const char *cycle, cav_error 
     CHECK(cav_problem_write(path, p, NULL, NULL) == CAV_OK && (again = cav_problem_load(path, NULL, NULL)));
     if (again) {
       CHECK(again->cycle.on == p->cycle.on && again->cycle.mirror == p->cycle.mirror &&
-            again->cycle.npair == p->cycle.npair && fabs(again->cycle.turn - p->cycle.turn) < 1e-15 &&
+            again->cycle.npair == p->cycle.npair && fabs(again->cycle.rotation - p->cycle.rotation) < 1e-15 &&
             !memcmp(again->cycle.translation, p->cycle.translation, sizeof p->cycle.translation));
       CHECK(again->duration_least == p->duration_least && again->duration_most == p->duration_most &&
             again->duration_weight == p->duration_weight);
@@ -208,7 +208,7 @@ static void test_files(void) {
   refuse_file("close='rest'", "<cycle/>", 2, "contradicts <cycle>");
   refuse_file("", "<cycle translation='1 0'/>", 3, "translation");
   refuse_file("", "<cycle translation='0 1 0'/>", 3, "cannot follow");
-  refuse_file("", "<cycle turn='30'/>", 3, "cannot turn");
+  refuse_file("", "<cycle rotation='30'/>", 3, "cannot turn");
   refuse_file("", "<cycle mirror='z'/>", 3, "mirror");
   refuse_file("", "<cycle><pair joint='hip' other='knee'/></cycle>", 3, "mirrored");
   refuse_file("", "<cycle mirror='y'><pair joint='hip' other='kneee'/></cycle>", 3, "knee");
@@ -249,7 +249,7 @@ static void check_derivatives(const cav_problem *p, const cav_trajectory *at) {
 }
 #endif
 
-/// Certified, with the wrap exact; the duration it took, 0 if it is not.
+/// Certified, with the periodicity exact; the duration it took, 0 if it is not.
 static double hop(const cav_problem *p, cav_solver solver, cav_verdict *verdict) {
   cav_solve_options options = cav_solve_options_default();
   cav_solution *s = NULL;
@@ -261,13 +261,13 @@ static double hop(const cav_problem *p, cav_solver solver, cav_verdict *verdict)
   if (status != CAV_OK) fprintf(stderr, "    %s\n", error.text);
   if (s && CHECK(cav_verify(p, s->trajectory, &s->contact, s->gain_q, s->gain_v, verdict, &error) == CAV_OK)) {
     if (!CHECK(verdict->certified)) fprintf(stderr, "    %s\n", verdict->reason);
-    CHECK(verdict->wrap_error < 1e-12 && verdict->periods == 2);
+    CHECK(verdict->periodicity_error < 1e-12 && verdict->periods == 2);
     CHECK(verdict->closed_loop_seconds > 1.999 * verdict->duration);
     duration = verdict->duration;
     printf(
         "hop: %.4f s, %d iterations, cost %.4f, unactuated %.1e, wrap %.1e, momentum %.1e, open loop %.2f s, end %.0f "
         "mm\n",
-        duration, s->iterations, s->cost, verdict->unactuated_force_max, verdict->wrap_error,
+        duration, s->iterations, s->cost, verdict->unactuated_force_max, verdict->periodicity_error,
         verdict->momentum_defect_rms, verdict->replay_same_step_seconds, 1e3 * verdict->closed_loop_end_error_m);
 #ifdef CAVORT_HAVE_IPOPT
     check_derivatives(p, s->trajectory);
@@ -276,7 +276,7 @@ static double hop(const cav_problem *p, cav_solver solver, cav_verdict *verdict)
     cav_verdict spoilt = {0};
     s->trajectory->q[0] += 1e-6;
     CHECK(cav_verify(p, s->trajectory, &s->contact, s->gain_q, s->gain_v, &spoilt, &error) == CAV_OK);
-    CHECK(!spoilt.certified && spoilt.wrap_error > 0.9e-6);
+    CHECK(!spoilt.certified && spoilt.periodicity_error > 0.9e-6);
   }
   cav_solution_free(s);
   return duration;
@@ -290,12 +290,12 @@ static void test_hop(void) {
 #ifdef CAVORT_HAVE_IPOPT
   hop(p, CAV_SOLVER_BOTH, &verdict);
 #endif
-  // free: away from where it stood, and to its bound where time is dear
+  // free: away from where it stood, and to its bound where time is expensive
   p->duration_least = 0.3, p->duration_most = 0.8;
   double cheap = hop(p, CAV_SOLVER_GAUSS_NEWTON, &verdict);
   CHECK(cheap > 0.3 && cheap <= 0.8 && fabs(cheap - 0.5) > 1e-3);
   p->duration_least = 0.45, p->duration_weight = 1e4;
-  // the restoration of rows at the end asks no price and may leave the bound a little: seen 5e-8
+  // the restoration of rows at the end asks no penalty and may leave the bound a little: seen 5e-8
   CHECK(fabs(hop(p, CAV_SOLVER_GAUSS_NEWTON, &verdict) - 0.45) < 1e-6);
   cav_problem_free(p);
 }
@@ -304,7 +304,7 @@ int main(void) {
   cav_model *m = scene_load(SIDED(LEG, HIP));
   if (CHECK(m != NULL)) {
     test_map(m, (cav_cycle){.translation = {1, 2, 0}});
-    test_map(m, (cav_cycle){.translation = {1, 2, 0}, .turn = 0.7});
+    test_map(m, (cav_cycle){.translation = {1, 2, 0}, .rotation = 0.7});
     test_map(m, (cav_cycle){.translation = {1, 0, 0}, .mirror = CAV_MIRROR_Y});
   }
   cav_model_free(m);

@@ -31,7 +31,7 @@ static void moved(int which, int j, double step, double *out) {
   double *x = scene_vector(model->nq);
   if (which == 0) {
     memcpy(x, q, (size_t)model->nq * sizeof *x);
-    cav_perturb(model, j, step, x);
+    cav_configuration_perturb(model, j, step, x);
     CHECK(cav_inverse(model, state, x, v, v_next, out) == CAV_OK);
   } else {
     memcpy(x, which == 1 ? v : v_next, (size_t)model->nv * sizeof *x);
@@ -73,8 +73,8 @@ static void accuracy(const char *name, double height, double smoothing, const do
     state->options.order = (cav_order)(k % 3);
     for (int method = 0; method < 2; method++) {
       int calls = 0;
-      CHECK(cav_differentiate(model, state, (cav_derivative)method, 0, q, v, v_next, read_u, &calls, nv, u, d[0], d[1],
-                              d[2]) == CAV_OK);
+      CHECK(cav_readout_differentiate(model, state, (cav_derivative)method, 0, q, v, v_next, read_u, &calls, nv, u,
+                                      d[0], d[1], d[2]) == CAV_OK);
       CHECK(calls == 1 + 3 * nv * (method + 1));
       CHECK(!memcmp(u, state->u, (size_t)nv * sizeof *u));
       for (int which = 0; which < 3; which++) {
@@ -123,14 +123,14 @@ static void failures(void) {
   random_state(0);
   v[3] = NAN;
   d[0] = u[0] = 42;
-  CHECK(cav_differentiate(model, state, CAV_DERIVATIVE_FORWARD, 0, q, v, v_next, read_u, &calls, nv, u, d, d, d) ==
-        CAV_NOT_FINITE);
+  CHECK(cav_readout_differentiate(model, state, CAV_DERIVATIVE_FORWARD, 0, q, v, v_next, read_u, &calls, nv, u, d, d,
+                                  d) == CAV_NOT_FINITE);
   CHECK(d[0] == 42 && u[0] == 42 && calls == 0);
   v[3] = 0;
-  CHECK(cav_differentiate(model, state, CAV_DERIVATIVE_FORWARD, -1, q, v, v_next, read_u, &calls, nv, u, d, d, d) ==
-        CAV_BAD_INPUT);
-  CHECK(cav_differentiate(model, state, CAV_DERIVATIVE_FORWARD, 0, q, v, v_next, read_u, &calls, 0, NULL, NULL, NULL,
-                          NULL) == CAV_OK);
+  CHECK(cav_readout_differentiate(model, state, CAV_DERIVATIVE_FORWARD, -1, q, v, v_next, read_u, &calls, nv, u, d, d,
+                                  d) == CAV_BAD_INPUT);
+  CHECK(cav_readout_differentiate(model, state, CAV_DERIVATIVE_FORWARD, 0, q, v, v_next, read_u, &calls, 0, NULL, NULL,
+                                  NULL, NULL) == CAV_OK);
   free(d);
 }
 

@@ -71,8 +71,8 @@ static void random_state(bench *b, double spread) {
 // all errors of a state, up to 6 per tie
 static int read_errors(const cav_state *s, double *out) {
   int n = 0;
-  for (int i = 0; i < s->ntie; i++)
-    for (int k = 0; k < s->tie[i].dim; k++) out[n++] = s->tie[i].error[k];
+  for (int i = 0; i < s->nequality; i++)
+    for (int k = 0; k < s->equality[i].dim; k++) out[n++] = s->equality[i].error[k];
   return n;
 }
 
@@ -82,9 +82,9 @@ static void test_rates(bench *b, const char *name) {
   for (int trial = 0; trial < 50; trial++) {
     random_state(b, 0.3);
     CHECK(cav_inverse(b->model, b->state, b->q, b->v, b->v_next, b->u) == CAV_OK);
-    cav_tie kept[64];
-    int n = b->state->ntie;
-    memcpy(kept, b->state->tie, (size_t)n * sizeof *kept);
+    cav_equality_rows kept[64];
+    int n = b->state->nequality;
+    memcpy(kept, b->state->equality, (size_t)n * sizeof *kept);
     cav_integrate(b->model, b->q, b->v, h, b->moved);
     CHECK(cav_position(b->model, b->state, b->moved) == CAV_OK);
     read_errors(b->state, plus);
@@ -115,7 +115,7 @@ static void test_jacobian(bench *b, const char *name) {
   for (int trial = 0; trial < 50; trial++) {
     random_state(b, 0.3);
     CHECK(cav_inverse(b->model, b->state, b->q, b->v, b->v_next, b->u) == CAV_OK);
-    int first = b->state->ncontact + b->state->nrow, n = first + b->state->ntie;
+    int first = b->state->ncontact + b->state->nrow, n = first + b->state->nequality;
     if (!CHECK(n <= 100)) break;
     cav_jacobian(b->model, b->state, block, dof, J);
     cav_smooth_inverse(b->model, b->state, b->v, b->v_next, smooth);
@@ -123,7 +123,7 @@ static void test_jacobian(bench *b, const char *name) {
       double h = b->state->options.timestep;
       for (int k = 0; k < block[i].dim; k++) {
         double sum = 0, f = 0;
-        if (block[i].tie >= 0) f = b->state->tie[block[i].tie].impulse[k];
+        if (block[i].equality >= 0) f = b->state->equality[block[i].equality].impulse[k];
         if (block[i].row >= 0) f = b->state->row[block[i].row].impulse;
         if (block[i].contact >= 0) f = b->state->contact[block[i].contact].impulse[k];
         for (int d = 0; d < block[i].ndof; d++) {
@@ -131,7 +131,7 @@ static void test_jacobian(bench *b, const char *name) {
           sum += entry * b->v[block[i].dof[d]];
           smooth[block[i].dof[d]] -= entry * f / h;
         }
-        if (block[i].tie >= 0) worst = fmax(worst, fabs(sum - b->state->tie[block[i].tie].velocity[k]));
+        if (block[i].equality >= 0) worst = fmax(worst, fabs(sum - b->state->equality[block[i].equality].velocity[k]));
       }
     }
     transposed = fmax(transposed, scene_error(smooth, b->u, nv));
@@ -192,12 +192,12 @@ static void test_switch(bench *b) {
   random_state(b, 0.3);
   b->state->options.constraint = 0;
   CHECK(cav_inverse(b->model, b->state, b->q, b->v, b->v_next, b->u) == CAV_OK);
-  CHECK(b->state->ntie == 0);
+  CHECK(b->state->nequality == 0);
   cav_smooth_inverse(b->model, b->state, b->v, b->v_next, b->out);
   CHECK_NEAR_ALL(b->u, b->out, b->model->nv, 0);
   b->state->options.constraint = 1;
   CHECK(cav_inverse(b->model, b->state, b->q, b->v, b->v_next, b->u) == CAV_OK);
-  CHECK(b->state->ntie == b->model->nequality && scene_error(b->u, b->out, b->model->nv) > 1e-3);
+  CHECK(b->state->nequality == b->model->nequality && scene_error(b->u, b->out, b->model->nv) > 1e-3);
 }
 
 // a time constant below two steps is raised, which is said, and does what the raised one does
@@ -217,7 +217,7 @@ static void test_guard(void) {
     CHECK(cav_inverse(a.model, a.state, a.q, a.v, a.v_next, a.u) == CAV_OK);
     CHECK(cav_inverse(b.model, b.state, a.q, a.v, a.v_next, b.u) == CAV_OK);
     CHECK_NEAR_ALL(a.u, b.u, 1, 0);
-    a.state->options.guard = 0;
+    a.state->options.refsafe = 0;
     CHECK(cav_inverse(a.model, a.state, a.q, a.v, a.v_next, a.u) == CAV_OK);
     CHECK(fabs(a.u[0] - b.u[0]) > 1e-3 * fabs(b.u[0]));
   }
@@ -277,7 +277,8 @@ int main(void) {
   bench b;
   if (bench_open(&b, model_file)) {
     CHECK(b.model->nequality == 13 && b.model->nwarning == 1);
-    CHECK(cav_find(b.model, CAV_OBJECT_EQUALITY, "w3") == 6 && cav_find(b.model, CAV_OBJECT_EQUALITY, "off") < 0);
+    CHECK(cav_object_find(b.model, CAV_OBJECT_EQUALITY, "w3") == 6 &&
+          cav_object_find(b.model, CAV_OBJECT_EQUALITY, "off") < 0);
     test_peer(&b);
     test_scene(&b, "all kinds");
     test_switch(&b);

@@ -59,7 +59,7 @@ typedef struct dense {
 static void read_jacobian(const bench *b, dense *d) {
   int *dof = calloc(200 * 64, sizeof *dof);
   double *J = scene_vector(200 * 64);
-  d->nblock = b->state->ncontact + b->state->nrow + b->state->ntie;
+  d->nblock = b->state->ncontact + b->state->nrow + b->state->nequality;
   d->n = cav_jacobian(b->model, b->state, d->block, dof, J);
   for (int i = 0; i < d->nblock; i++)
     for (int k = 0; k < d->block[i].dim; k++)
@@ -69,7 +69,7 @@ static void read_jacobian(const bench *b, dense *d) {
 
 static double regulariser(const cav_state *s, const cav_block *block, int k) {
   if (block->contact >= 0) return s->contact[block->contact].regulariser[k];
-  return block->tie >= 0 ? s->tie[block->tie].regulariser[k] : s->row[block->row].regulariser;
+  return block->equality >= 0 ? s->equality[block->equality].regulariser[k] : s->row[block->row].regulariser;
 }
 
 // j' M^-1 j, or with M_hat
@@ -82,7 +82,7 @@ static double diagonal(const bench *b, const dense *d, const double *j, int hat)
   CHECK(cav_inertia(b->model, other, q, M) == CAV_OK);
   for (int i = 0; i < d->nblock && hat; i++) {
     const cav_block *block = &d->block[i];
-    for (int k = 0; k < block->dim && block->tie >= 0; k++) {
+    for (int k = 0; k < block->dim && block->equality >= 0; k++) {
       const double *row = d->J + (block->first + k) * nv;
       for (int r = 0; r < nv; r++)
         for (int c = 0; c < nv; c++) M[r * nv + c] += row[r] * row[c] / regulariser(b->state, block, k);
@@ -107,8 +107,8 @@ static void test_diagonal(bench *b) {
     read_jacobian(b, &d);
     for (int i = 0; i < d.nblock; i++) {
       const cav_block *block = &d.block[i];
-      for (int k = 0; k < (block->tie >= 0 ? block->dim : 1); k++) {
-        double A = diagonal(b, &d, d.J + (block->first + k) * b->model->nv, block->tie < 0);
+      for (int k = 0; k < (block->equality >= 0 ? block->dim : 1); k++) {
+        double A = diagonal(b, &d, d.J + (block->first + k) * b->model->nv, block->equality < 0);
         double R = regulariser(b->state, block, k) / b->state->options.softness;
         worst = fmax(worst, fabs(R / A - 1));
       }
@@ -124,7 +124,7 @@ static void test_diagonal(bench *b) {
     b->state->options.regulariser = CAV_REGULARISER_REFERENCE;
     CHECK(cav_position(b->model, b->state, b->q) == CAV_OK);
     for (int i = 0; i < d.nblock; i++) {
-      double A = diagonal(b, &d, d.J + d.block[i].first * b->model->nv, d.block[i].tie < 0);
+      double A = diagonal(b, &d, d.J + d.block[i].first * b->model->nv, d.block[i].equality < 0);
       control = fmax(control, fabs(regulariser(b->state, &d.block[i], 0) / b->state->options.softness / A - 1));
     }
   }

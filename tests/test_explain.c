@@ -1,9 +1,9 @@
-/// optim/explain.c, rows.c: problems made impossible on purpose, each named with the right row and knot; prices of one that can
+/// optim/explain/explain.c, rows.c: problems made impossible on purpose, each named with the right row and knot; penalties on one that can
 /// be solved against what loosening its bound saves; rows of another problem refused; rows.csv bit for bit.
 #include <unistd.h>
 
 #include "cavort/cavort.h"
-#include "rows.h"
+#include "constraint_table.h"
 #include "scene.h"
 
 static char folder[] = "/tmp/cavort-explain-XXXXXX";
@@ -118,7 +118,7 @@ static void check_too_weak(void) {
     expect(&o, 1, posture, "actuator 'shoulder'", 1, 20);
     expect(&o, 1, !posture, "'level', posture, joint 'shoulder'", 10, 20);
     CHECK(names(o.explanation.conflict[!posture].cure, "too weak"));
-    CHECK(o.explanation.conflict[0].share + o.explanation.conflict[1].share > 0.7); // seen 0.9
+    CHECK(o.explanation.conflict[0].fraction + o.explanation.conflict[1].fraction > 0.7); // seen 0.9
   }
   done(&o);
   // the control: with 60 N m nothing is missed
@@ -158,17 +158,17 @@ static void check_contradiction(void) {
     const cav_reason *r = o.explanation.conflict;
     int high = strstr(r[0].what, "'high'") != NULL;
     CHECK(names(r[0].cure, high ? "contradicts constraint 'low'" : "contradicts constraint 'high'"));
-    CHECK_NEAR(r[0].share, 0.5, 1e-3); // equal weights; seen 1e-5
-    CHECK_NEAR(r[1].share, 0.5, 1e-3);
+    CHECK_NEAR(r[0].fraction, 0.5, 1e-3); // equal weights; seen 1e-5
+    CHECK_NEAR(r[1].fraction, 0.5, 1e-3);
   }
   done(&o);
 }
 
-// the price of a bound is what the cost changes by when it gives way
+// the penalty on a bound is what the cost changes by when it gives way
 static void check_price(void) {
   static const char terms[] =
       "<constraint><sensor name='raise' type='framepos' site='tip' component='z' lower='%g' at='end'/></constraint>";
-  double cost[2], price = 0;
+  double cost[2], multiplier = 0;
   for (int i = 0; i < 2; i++) {
     char text[200];
     snprintf(text, sizeof text, terms, 2.3 + 0.01 * i);
@@ -177,13 +177,13 @@ static void check_price(void) {
     CHECK(o.status == CAV_OK && o.explanation.met && o.explanation.nviolation == 0);
     CHECK(o.explanation.nconflict > 0 && names(o.explanation.conflict[0].cure, "gives way"));
     if (o.explanation.nconflict && o.explanation.conflict[0].row.kind == CAV_BINDING_TERM)
-      price += 0.5 * o.explanation.conflict[0].row.multiplier;
+      multiplier += 0.5 * o.explanation.conflict[0].row.multiplier;
     done(&o);
   }
-  // mean of both ends against the slope between; a lower bound's multiplier is negative. Bound 2 %: both solves stop at
+  // mean of both ends against the derivative between; a lower bound's multiplier is negative. Bound 2 %: both solves stop at
   // relative decreases of 1e-5
-  CHECK(price < 0);
-  CHECK_NEAR((cost[1] - cost[0]) / 0.01, -price, 0.02 * fabs(price));
+  CHECK(multiplier < 0);
+  CHECK_NEAR((cost[1] - cost[0]) / 0.01, -multiplier, 0.02 * fabs(multiplier));
 }
 
 // rows as a file, bit for bit; rows of something else, and files that are no rows, are refused

@@ -1,5 +1,5 @@
 /// Gains of the regulator: those of a mass on a line against the closed form, and a spinning ball that they must bring back.
-#include "feedback.h"
+#include "lqr.h"
 
 #include "scene.h"
 
@@ -25,7 +25,7 @@ static cav_problem rest(const cav_model *model, double duration) {
   return p;
 }
 
-/// A mass m with force F w, priced a (v'mv + r^2 x'mx) + w^2: the optimal w = -k1 x - k2 v far from the end has
+/// A mass m with force F w, penalised a (v'mv + r^2 x'mx) + w^2: the optimal w = -k1 x - k2 v far from the end has
 /// k1^2 = a r^2 m, k2^2 = a m + 2 k1 m/F.
 static void check_cart(void) {
   cav_model *model = scene_load(cart);
@@ -33,9 +33,9 @@ static void check_cart(void) {
   cav_transcription *tr = cav_transcription_new(&problem, 1, NULL);
   cav_trajectory *motion = cav_trajectory_new(model, tr->nknot, problem.timestep);
   double *gain = malloc(2 * (size_t)tr->nknot * sizeof *gain), *rate = gain + tr->nknot;
-  cav_feedback_price price = {.tracking = 6, .rate = 3};
-  CHECK(cav_feedback(tr, motion, &tr->options, &price, gain, rate) == CAV_OK);
-  double m = 2, force = 5, a = price.tracking / (tr->weight * CAV_MOMENT_ARM), r2 = price.rate * price.rate;
+  cav_feedback_penalty penalty = {.tracking = 6, .rate = 3};
+  CHECK(cav_feedback(tr, motion, &tr->options, &penalty, gain, rate) == CAV_OK);
+  double m = 2, force = 5, a = penalty.tracking / (tr->weight * CAV_MOMENT_ARM), r2 = penalty.rate * penalty.rate;
   double k1 = sqrt(a * r2 * m), k2 = sqrt(a * m + 2 * k1 * m / force);
   // a step of 1 ms against a pole at 14/s: half of that product, seen 0.7 %
   CHECK_NEAR(gain[0], -force * k1, 0.01 * force * k1);
@@ -64,8 +64,8 @@ static void check_ball(void) {
   cav_trajectory_velocities(model, motion);
   size_t n = 9 * (size_t)(tr->nknot - 1);
   double *gain = malloc(2 * n * sizeof *gain);
-  cav_feedback_price price = {.tracking = 36, .rate = 3};
-  CHECK(cav_feedback(tr, motion, &tr->options, &price, gain, gain + n) == CAV_OK);
+  cav_feedback_penalty penalty = {.tracking = 36, .rate = 3};
+  CHECK(cav_feedback(tr, motion, &tr->options, &penalty, gain, gain + n) == CAV_OK);
 
   enum { FINER = 10 };
   double end[2];

@@ -105,7 +105,7 @@ static int random_posture(bench *b) {
     const int lying = uniform() > -0.5;
     random_joints(b, lying ? 0.1 : 0.5 + 0.5 * uniform(), 0.05 * size);
     for (int k = 3; k < 7; k++) b->q[k] = lying ? (k == 3 || k == 5 ? 1.0 : 0.0) + 0.02 * uniform() : uniform();
-    cav_normalise(b->model, b->q);
+    cav_configuration_normalise(b->model, b->q);
     // height by bisection
     const double depth = size * (0.02 + 0.02 * uniform());
     double low = 0.0, high = 2.0;
@@ -274,7 +274,7 @@ static void test_round_trip(bench *b, const char *name) {
     }
     printf("  %-27s %4d  %4.1f, %3d   %.1e           %.1e           %.1e\n", settings[k].name, rows, sum / STATES, most,
            back, forth, kkt);
-    // promised 1e-9; the solver aims at 1e-13 of the largest force in the balance, or at rounding; seen 2.3e-11,
+    // required 1e-9; the solver aims at 1e-13 of the largest force in the balance, or at rounding; seen 2.3e-11,
     // 4.1e-12, 5e-13
     CHECK(back <= 1e-9);
     CHECK(forth <= 1e-9);
@@ -303,7 +303,7 @@ static void test_gauss_seidel(bench *b, const char *name, int states) {
     // warm start: the same problem again is over at once
     cav_forward_gpgs(b->model, b->state, b->q, b->v, b->u, 20000, 1e-10, b->v_next, &again);
     if (i % 2) kept = fmax(kept, again.iterations);
-    // the law felt at a distance has no place in it
+    // the law active at a distance has no place in it
     choose(b, &settings[1]);
     CHECK(cav_forward_gpgs(b->model, b->state, b->q, b->v, b->u, 10, 0.0, b->v_next, NULL) == CAV_NOT_SUPPORTED);
   }
@@ -385,7 +385,7 @@ static void test_mechanism(void) {
       "single joint: inverse(forward) %.1e N m, mismatch of Gauss-Seidel %.1e N s; contact %d, limit %d, friction %d\n",
       worst, gap, active[0], active[1], active[2]);
   // the paper shows 1e-5 for its Gauss-Seidel; here a change of 1e-13 a sweep leaves the sum of a slow tail, seen
-  // 5e-11. Newton: promised 1e-10, seen 8e-12
+  // 5e-11. Newton: required 1e-10, seen 8e-12
   CHECK(worst <= 1e-10 && gap <= 1e-8);
   CHECK(active[0] > 50 && active[1] > 20 && active[2] == 1500);
   bench_close(&b);
@@ -434,8 +434,8 @@ static void test_rate_at_the_kink(void) {
     const cav_contact *c = &b.state->contact[0];
     double w = 1.0;
     for (int k = 0; k < 50; k++) {
-      const double e = exp(-w), slope = 2.0 * c->regulariser[0] + e / (1.0 + e);
-      w -= (2.0 * c->regulariser[0] * w - log1p(e)) / slope;
+      const double e = exp(-w), derivative = 2.0 * c->regulariser[0] + e / (1.0 + e);
+      w -= (2.0 * c->regulariser[0] * w - log1p(e)) / derivative;
     }
     const double predicted = c->stiffness * delta * w;
     printf("                            %.0e   %.3e  %.3e\n", delta, b.v_next[2], predicted);
@@ -513,7 +513,7 @@ static void test_every_row(void) {
       cav_configuration_reset(b.model, b.q);
       for (int i = 7; i < b.model->nq; i++)
         b.q[i] += (i == 7 ? 0.011 : i == 8 ? 0.36 : i > 12 ? 0.53 : 0.24) * uniform();
-      cav_normalise(b.model, b.q);
+      cav_configuration_normalise(b.model, b.q);
       random_velocity(&b, b.v, 1.0);
       random_velocity(&b, b.u, 20.0);
       const int nv = b.model->nv;
@@ -536,7 +536,7 @@ static void test_every_row(void) {
   printf(
       "every kind of row: %d rows, inverse(forward) %.1e, forward(inverse) %.1e, optimality %.1e, Gauss-Seidel %.1e\n",
       rows, back, forth, kkt, against);
-  // promised 1e-9, seen 4e-10 (forces of limits are 1e4 times u), 1e-10, 1e-13; Gauss-Seidel stops at a change of 1e-13
+  // required 1e-9, seen 4e-10 (forces of limits are 1e4 times u), 1e-10, 1e-13; Gauss-Seidel stops at a change of 1e-13
   // a sweep, seen 2e-12
   CHECK(back <= 1e-9 && forth <= 1e-9 && kkt <= 1e-9 && against <= 1e-8);
   for (int i = 0; i < 4; i++) CHECK(met[i] > 10);
@@ -643,7 +643,7 @@ int main(void) {
   test_stiff_and_fast();
   char path[5000];
 #ifdef CAVORT_SOURCE_ROOT
-  snprintf(path, sizeof path, "%s", CAVORT_SOURCE_ROOT "/problems/humanoid.xml");
+  snprintf(path, sizeof path, "%s", CAVORT_SOURCE_ROOT "/problems/models/humanoid.xml");
   if (access(path, R_OK) == 0) test_humanoid(path, "our humanoid");
 #endif
   const char *shared = check_shared_models();

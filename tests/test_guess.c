@@ -1,4 +1,4 @@
-/// optim/guess.c: the held start, the way from start to goal, postures on the way, turns, arcs and swings, each at its knots;
+/// optim/solver/guess.c: the held start, the way from start to goal, postures on the way, turns, arcs and swings, each at its knots;
 /// and what a problem file may not ask of a guess.
 #include <unistd.h>
 
@@ -66,7 +66,7 @@ static void check_ways(void) {
   cav_trajectory_free(at);
   cav_problem_free(p);
 
-  at = guess(HEAD "<guess type='hold' apex='1' turn='0 360 0' from='.2' to='.8'/>" TAIL, &p);
+  at = guess(HEAD "<guess type='hold' apex='1' rotation='0 360 0' from='.2' to='.8'/>" TAIL, &p);
   // the start, with an arc and one turn between two times
   if (at) {
     check_knot(at, 2, (double[]){0, 0, 2}, 0);

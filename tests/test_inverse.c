@@ -266,7 +266,7 @@ static void springs(bench *b) {
       double change = 0;
       for (int side = -1; side <= 1; side += 2) {
         memcpy(q1, b->q, (size_t)b->model->nq * sizeof *q1);
-        cav_perturb(b->model, i, side * 1e-5, q1);
+        cav_configuration_perturb(b->model, i, side * 1e-5, q1);
         change += side * spring_energy(b->model, q1) / 2e-5;
       }
       // bound: 1e-10 times third derivatives and rounding of energies about 10; seen 1.1e-10
@@ -430,7 +430,7 @@ static void action_and_reaction(void) {
   close_bench(&b);
 }
 
-// the smoothed law: off the kink it is the exact one but for exp(-lambda/sigma); on it, sigma log 2; felt at a distance
+// the smoothed law: off the kink it is the exact one but for exp(-lambda/sigma); on it, sigma log 2; active at a distance
 static void smoothing(void) {
   bench b = open_bench(two_balls);
   cav_options *o = &b.state->options;
@@ -461,7 +461,7 @@ static void smoothing(void) {
     CHECK_NEAR(c->impulse[0] / expected, 1, 1e-10);
   }
 
-  // apart by less than the smoothing, the smoothed law is felt and the exact one is not
+  // apart by less than the smoothing, the smoothed law is active and the exact one is not
   b.q[7] = 0.22;
   o->smoothing = o->smoothing_self = 0.01;
   CHECK(cav_inverse(b.model, b.state, b.q, b.v, b.v, b.u) == CAV_OK);
@@ -565,7 +565,7 @@ static void actuation(bench *b) {
   cav_actuation(b->model, b->state, b->u, NULL, NULL);
 
   // two motors on one joint share the work: less than either alone
-  int joint = cav_find(b->model, CAV_OBJECT_JOINT, "s");
+  int joint = cav_object_find(b->model, CAV_OBJECT_JOINT, "s");
   CHECK(joint >= 0);
   if (joint >= 0) {
     memset(b->u, 0, (size_t)nv * sizeof *b->u);
@@ -581,7 +581,7 @@ static void actuation(bench *b) {
 // largest change of u between neighbours of a sweep of one coordinate, over the largest u; derivatives on the way
 static double largest_jump(bench *b, double from, double to, double speed) {
   enum { STEPS = 4000 };
-  double step = (to - from) / STEPS, before = 0, jump = 0, most = 0, slope[3] = {0};
+  double step = (to - from) / STEPS, before = 0, jump = 0, most = 0, derivative[3] = {0};
   for (int k = 0; k <= STEPS; k++) {
     b->q[0] = from + k * step;
     b->v_next[0] = b->v[0] = speed;
@@ -596,15 +596,15 @@ static double largest_jump(bench *b, double from, double to, double speed) {
     for (int side = 0; side < 2; side++) {
       b->q[0] = from + k * step + (side ? 1e-6 : -1e-6);
       CHECK(run(b) == CAV_OK);
-      slope[side] = b->u[0];
+      derivative[side] = b->u[0];
     }
     // bound: truncation of the difference against the curvature of what fades; seen 2e-8, and 1e-4 where all is small
-    CHECK_NEAR(dq[0], (slope[1] - slope[0]) / 2e-6, 1e-6 * fabs(dq[0]) + 1e-3);
+    CHECK_NEAR(dq[0], (derivative[1] - derivative[0]) / 2e-6, 1e-6 * fabs(dq[0]) + 1e-3);
   }
   return jump / most;
 }
 
-// the smoothed law does not jump where a contact enters the list faster than its reach foresees, nor where axes cross
+// the smoothed law does not jump where a contact enters the list faster than its activation distance foresees, nor where axes cross
 static void fading(void) {
   bench fast = open_bench(
       "<mujoco><option gravity='0 0 0' timestep='.02'/><worldbody><geom type='plane' size='1 1 1'/>"
@@ -616,13 +616,13 @@ static void fading(void) {
   o->softness = 0.02;
   // reach 0.112 m, and 0.2 m covered in a step: seen 0.0013, a step of the sweep; 0.9 without fading
   CHECK(largest_jump(&fast, 0.1, 0.3, -10) < 0.002);
-  // slower than 5 m/s over 0.7 of the reach nothing fades: the law in closed form, R = 0.02/m
+  // slower than 5 m/s over 0.7 of the activation distance nothing fades: the law in closed form, R = 0.02/m
   fast.q[0] = 0.1 + 0.07, fast.v[0] = fast.v_next[0] = -3.3;
   CHECK(run(&fast) == CAV_OK);
-  double share = fast.state->contact[0].regulariser[0];
+  double fraction = fast.state->contact[0].regulariser[0];
   o->smoothing = 0;
   CHECK(run(&fast) == CAV_OK);
-  CHECK_NEAR(share, fast.state->contact[0].regulariser[0], 0);
+  CHECK_NEAR(fraction, fast.state->contact[0].regulariser[0], 0);
   close_bench(&fast);
 
   bench crossing = open_bench(

@@ -1,4 +1,4 @@
-/// optim/ipopt.c, ipopt_options.c: the same motion and multipliers from Ipopt as from the own solver; multipliers as a warm start;
+/// optim/solver/ipopt.c, ipopt_options.c: the same motion and multipliers from Ipopt as from the own solver; multipliers as a warm start;
 /// options from the problem and from the caller, and which of the two wins; a limited-memory Hessian; limits told in words; deaf
 /// to an ipopt.opt where the program runs.
 #include <unistd.h>
@@ -70,7 +70,7 @@ static double multiplier(const cav_solution *solution, const cav_binding *of) {
   return 0;
 }
 
-// one optimum, the same prices, fewer iterations from the prices than from none
+// one optimum, the same multipliers, fewer iterations from the multipliers than from none
 static void check_both(const cav_problem *problem) {
   cav_error error;
   static const cav_ipopt_option cold[] = {{"warm_start_init_point", "no"}};

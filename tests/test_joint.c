@@ -7,7 +7,7 @@
 #include "workspace.h"
 
 enum { STEPS = 400, KINDS = 3 };
-static const char model_path[] = CAVORT_SOURCE_ROOT "/problems/joint.xml";
+static const char model_path[] = CAVORT_SOURCE_ROOT "/problems/models/joint.xml";
 
 // impulses the last Gauss-Seidel solve ended with, as it remembers them: friction, normal contact, limit
 static void forward_impulses(const cav_state *state, double f[KINDS]) {
@@ -64,7 +64,7 @@ int main(int argc, char **argv) {
   for (int k = 0; k < KINDS; k++) {
     printf("%-8s impulse up to %.3g, forward and inverse within %.1e, acts in %d of %d steps\n", names[k], most[k],
            worst[k], active[k], STEPS);
-    // bound: the promise; what the slow tail of Gauss-Seidel leaves, seen 2e-11
+    // bound: the tolerance; what the slow tail of Gauss-Seidel leaves, seen 2e-11
     CHECK(worst[k] <= 1e-10);
     CHECK(active[k] > 20);
   }

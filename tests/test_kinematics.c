@@ -34,7 +34,7 @@ static void frames(void) {
 // reading of a frame sensor of a body at (q, v_next)
 static void sense(cav_sensor_type type, cav_object_type kind, int object, double *out) {
   cav_sensor sensor = {.name = "", .type = type, .object_type = kind, .object = object, .dim = 3};
-  cav_sense(model, state, &sensor, out);
+  cav_sensor_read(model, state, &sensor, out);
 }
 
 // velocity sensors against centred differences of position sensors along v_next

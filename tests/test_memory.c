@@ -61,7 +61,7 @@ void free(void *at) {
   __libc_free(at);
 }
 
-static const char humanoid[] = CAVORT_SOURCE_ROOT "/problems/humanoid.xml";
+static const char humanoid[] = CAVORT_SOURCE_ROOT "/problems/models/humanoid.xml";
 static const char features[] = CAVORT_SOURCE_ROOT "/tests/features.xml";
 static const char sensors[] = CAVORT_SOURCE_ROOT "/tests/sensors.xml";
 
@@ -145,7 +145,7 @@ static void call_readings(bed *b, const double *q, const double *v, const double
   double com[3], speed[3], spin[3];
   cav_pose pose;
   CHECK(cav_inverse(m, b->state, q, v, x, b->u) == CAV_OK);
-  for (int i = 0; i < m->nsensor; i++) cav_sense(m, b->state, &m->sensor[i], b->reading + m->sensor[i].adr);
+  for (int i = 0; i < m->nsensor; i++) cav_sensor_read(m, b->state, &m->sensor[i], b->reading + m->sensor[i].adr);
   for (int i = 0; i < m->nbody; i++) cav_object_pose(m, b->state, CAV_OBJECT_BODY, i, &pose);
   cav_momentum(m, b->state, v, com, speed, spin);
   cav_actuation(m, b->state, b->u, b->scratch, b->scratch + m->nv);

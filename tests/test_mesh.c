@@ -87,10 +87,10 @@ static void bring_near(const solid *a, solid *b) {
     column3(n, a->shape.rotation, 2);
     copy3(x, a->shape.pos);
   } else {
-    cav_support(&a->shape, n, x);
+    cav_shape_support(&a->shape, n, x);
   }
   scale3(back, -1, n);
-  cav_support(&b->shape, back, y);
+  cav_shape_support(&b->shape, back, y);
   sub3(d, x, y);
   axpy3(d, d, uniform(-0.04, 0.04), n);
   add3(b->shape.pos, b->shape.pos, d);
@@ -172,7 +172,7 @@ static void test_box_as_mesh(void) {
   }
 }
 
-// gap of the nearest point under small displacements: its rate is the normal's share of the motion
+// gap of the nearest point under small displacements: its rate is the normal's fraction of the motion
 static void test_derivatives(void) {
   const double step = 1e-7;
   for (int type = 1; type <= CAV_GEOM_MESH; type++) {
@@ -267,7 +267,7 @@ static void test_level(void) {
       random_solid(type, 0, &a);
       set3(a.shape.pos, uniform(-1, 1), uniform(-1, 1), 0);
       double down[3] = {0, 0, -1}, x[3];
-      cav_support(&a.shape, down, x);
+      cav_shape_support(&a.shape, down, x);
       a.shape.pos[2] -= x[2] + uniform(-0.03, 0.03);
       int n = cav_collide_shapes(&a.shape, &ground, MARGIN, touch);
       int m = cav_collide_shapes(&plane, &a.shape, MARGIN, flat);
@@ -525,10 +525,10 @@ static void test_model(void) {
   }
   // what is only seen is not read, though its file is absent; said once for each
   CHECK(m->nmesh == 3 && m->nhfield == 2 && m->nwarning == 2);
-  int brick = cav_find(m, CAV_OBJECT_GEOM, "brick"), a = cav_find(m, CAV_OBJECT_BODY, "a");
+  int brick = cav_object_find(m, CAV_OBJECT_GEOM, "brick"), a = cav_object_find(m, CAV_OBJECT_BODY, "a");
   CHECK(m->mesh[m->geom[brick].asset].nvertex == 8 && m->mesh[m->geom[brick].asset].nface == 6);
   CHECK_NEAR(m->body[a].mass, 1000 * 1 * 1 * 2 * .5, 1e-9);
-  const cav_hfield *h = &m->hfield[m->geom[cav_find(m, CAV_OBJECT_GEOM, "hills")].asset];
+  const cav_hfield *h = &m->hfield[m->geom[cav_object_find(m, CAV_OBJECT_GEOM, "hills")].asset];
   for (int i = 0; i < 12; i++) CHECK_NEAR(h->height[i], .5 * hills[i], 1e-7);
   // falls, meets, and forward is the inverse's inverse
   cav_state *state = cav_state_new(m);
@@ -542,7 +542,7 @@ static void test_model(void) {
       set3(q + 7 * i, scene_uniform(), scene_uniform(), uniform(0.3, 1.5));
       for (int j = 3; j < 7; j++) q[7 * i + j] = scene_uniform();
     }
-    cav_normalise(m, q);
+    cav_configuration_normalise(m, q);
     scene_normals(v, m->nv, 0.3);
     scene_normals(u, m->nv, 30);
     CHECK(cav_forward(m, state, q, v, u, next) == CAV_OK);
@@ -604,7 +604,7 @@ static void test_peer(void) {
     for (int k = 0; k < 3; k++) most = fmax(most, fabs(pose.pos[k] - d->geom_xpos[3 * i + k]));
   }
   // straight down and aslant onto the hills
-  int field = cav_find(m, CAV_OBJECT_GEOM, "hills"), met = 0;
+  int field = cav_object_find(m, CAV_OBJECT_GEOM, "hills"), met = 0;
   cav_shape ground = cav_shape_of(m, &m->geom[field]);
   copy3(ground.pos, m->geom[field].pos);
   memcpy(ground.rotation, m->geom[field].rotation, sizeof ground.rotation);

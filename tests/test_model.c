@@ -169,18 +169,18 @@ static void compare_geoms(const cav_model *m, const mjModel *p) {
 }
 
 static void compare_path(const cav_model *m, const mjModel *p, int tendon) {
-  static const int kinds[] = {[CAV_PATH_SITE] = mjWRAP_SITE,
-                              [CAV_PATH_SPHERE] = mjWRAP_SPHERE,
-                              [CAV_PATH_CYLINDER] = mjWRAP_CYLINDER,
-                              [CAV_PATH_PULLEY] = mjWRAP_PULLEY};
+  static const int kinds[] = {[CAV_TENDON_PATH_SITE] = mjWRAP_SITE,
+                              [CAV_TENDON_PATH_SPHERE] = mjWRAP_SPHERE,
+                              [CAV_TENDON_PATH_CYLINDER] = mjWRAP_CYLINDER,
+                              [CAV_TENDON_PATH_PULLEY] = mjWRAP_PULLEY};
   const cav_tendon *t = &m->tendon[tendon];
   for (int k = 0; k < t->npath; k++) {
-    const cav_path_point *x = &m->tendon_path[t->path + k];
+    const cav_tendon_path_point *x = &m->tendon_path[t->path + k];
     int w = p->tendon_adr[tendon] + k;
     same(kinds[x->type], p->wrap_type[w], "path element", t->name);
-    if (x->type != CAV_PATH_PULLEY) same(x->object, p->wrap_objid[w], "path object", t->name);
-    if (x->type == CAV_PATH_PULLEY) near(x->divisor, p->wrap_prm[w], "path divisor", t->name);
-    if (x->type == CAV_PATH_SPHERE || x->type == CAV_PATH_CYLINDER)
+    if (x->type != CAV_TENDON_PATH_PULLEY) same(x->object, p->wrap_objid[w], "path object", t->name);
+    if (x->type == CAV_TENDON_PATH_PULLEY) near(x->divisor, p->wrap_prm[w], "path divisor", t->name);
+    if (x->type == CAV_TENDON_PATH_SPHERE || x->type == CAV_TENDON_PATH_CYLINDER)
       same(x->side, (int)lround(p->wrap_prm[w]), "path side", t->name);
   }
 }
@@ -276,7 +276,7 @@ static void compare_frames(const cav_model *m, mjModel *p) {
   for (int trial = 0; trial < 5; trial++) {
     double *q = d->qpos;
     for (int i = 0; i < m->nq; i++) q[i] = p->qpos0[i] + (trial ? uniform(&seed) : 0);
-    cav_normalise(m, q);
+    cav_configuration_normalise(m, q);
     CHECK(cav_position(m, state, q) == CAV_OK);
     mj_kinematics(p, d);
     const int counts[] = {m->nbody, m->nbody, m->ngeom, m->nsite};
@@ -355,7 +355,7 @@ static void compare_options(const cav_model *m, const mjModel *p) {
   same(!m->options.contact, !!(p->opt.disableflags & mjDSBL_CONTACT), "contact", m->name);
   same(!m->options.gravity, !!(p->opt.disableflags & mjDSBL_GRAVITY), "gravity flag", m->name);
   same(!m->options.passive, !!(p->opt.disableflags & mjDSBL_PASSIVE), "passive", m->name);
-  same(!m->options.guard, !!(p->opt.disableflags & mjDSBL_REFSAFE), "refsafe", m->name);
+  same(!m->options.refsafe, !!(p->opt.disableflags & mjDSBL_REFSAFE), "refsafe", m->name);
 }
 
 static void compare(const char *path) {
@@ -393,7 +393,7 @@ static void test_peer(void) {
   slack = rounding;
   printf("largest relative difference %.1e, where a general inertia matters %.1e\n", worst, worst_slack);
   worst_slack = 0;
-  compare(CAVORT_SOURCE_ROOT "/problems/humanoid.xml");
+  compare(CAVORT_SOURCE_ROOT "/problems/models/humanoid.xml");
   const char *folder = check_shared_models();
   if (!folder) printf("SKIPPED: the shared models are absent\n");
   // shapes of the last four models need libccd
@@ -412,14 +412,15 @@ static void test_peer(void) { printf("SKIPPED: built without MuJoCo\n"); }
 static void test_find(void) {
   cav_model *m = load(features);
   if (!m) return;
-  CHECK(cav_find(m, CAV_OBJECT_BODY, "world") == 0 && cav_find(m, CAV_OBJECT_XBODY, "tip") == m->nbody - 3);
-  CHECK(cav_find(m, CAV_OBJECT_JOINT, "j5") == 5 && cav_find(m, CAV_OBJECT_GEOM, "floor") == 0);
-  CHECK(cav_find(m, CAV_OBJECT_SITE, "s1") == 1 && cav_find(m, CAV_OBJECT_TENDON, "t2") == 1);
-  CHECK(cav_find(m, CAV_OBJECT_ACTUATOR, "a4") == 3 && cav_find(m, CAV_OBJECT_KEY, "first") == 0);
-  CHECK(cav_find(m, CAV_OBJECT_SENSOR, "jv") == 1 && cav_find(m, CAV_OBJECT_JOINT, "none") == -1);
+  CHECK(cav_object_find(m, CAV_OBJECT_BODY, "world") == 0 &&
+        cav_object_find(m, CAV_OBJECT_XBODY, "tip") == m->nbody - 3);
+  CHECK(cav_object_find(m, CAV_OBJECT_JOINT, "j5") == 5 && cav_object_find(m, CAV_OBJECT_GEOM, "floor") == 0);
+  CHECK(cav_object_find(m, CAV_OBJECT_SITE, "s1") == 1 && cav_object_find(m, CAV_OBJECT_TENDON, "t2") == 1);
+  CHECK(cav_object_find(m, CAV_OBJECT_ACTUATOR, "a4") == 3 && cav_object_find(m, CAV_OBJECT_KEY, "first") == 0);
+  CHECK(cav_object_find(m, CAV_OBJECT_SENSOR, "jv") == 1 && cav_object_find(m, CAV_OBJECT_JOINT, "none") == -1);
   // the name of what has none finds nothing
-  CHECK(cav_find(m, CAV_OBJECT_KEY, "") == -1 && cav_find(m, CAV_OBJECT_KEY, NULL) == -1);
-  CHECK(cav_find(m, CAV_OBJECT_TYPES, "j5") == -1);
+  CHECK(cav_object_find(m, CAV_OBJECT_KEY, "") == -1 && cav_object_find(m, CAV_OBJECT_KEY, NULL) == -1);
+  CHECK(cav_object_find(m, CAV_OBJECT_TYPES, "j5") == -1);
   cav_model_free(m);
   cav_model_free(NULL);
 }
@@ -475,7 +476,7 @@ static void test_fused(void) {
 
 // our humanoid: weight, names and order of MuJoCo's, keyframes that rest on the floor and touch nothing else
 static void test_humanoid(void) {
-  cav_model *m = load(CAVORT_SOURCE_ROOT "/problems/humanoid.xml");
+  cav_model *m = load(CAVORT_SOURCE_ROOT "/problems/models/humanoid.xml");
   cav_state *state = m ? cav_state_new(m) : NULL;
   if (!CHECK(state != NULL)) return;
   // bound: rounding of the scaling to 65 kg; residual seen 1.4e-14
@@ -483,14 +484,14 @@ static void test_humanoid(void) {
   CHECK(m->nv == 27 && m->nu == 21 && m->nwarning == 0);
   static const char *const keys[] = {"stand", "squat", "prone", "supine"};
   for (int i = 0; i < 4; i++) {
-    int key = cav_find(m, CAV_OBJECT_KEY, keys[i]);
+    int key = cav_object_find(m, CAV_OBJECT_KEY, keys[i]);
     if (!CHECK(key >= 0)) continue;
     const double *q = m->key[key].q;
     CHECK(cav_position(m, state, q) == CAV_OK);
     double deepest = 1, inner = 1, com[3], still[27] = {0};
     for (int k = 0; k < state->ncontact; k++) {
       const cav_contact *c = &state->contact[k];
-      double *least = m->pair[c->pair].outer ? &deepest : &inner;
+      double *least = m->pair[c->pair].external ? &deepest : &inner;
       *least = fmin(*least, c->dist);
     }
     // penetration 0.5 mm by design, to the six digits that the file gives
@@ -504,7 +505,7 @@ static void test_humanoid(void) {
     // standing and squatting balance: the centre of mass is over the feet, which reach from -62 to 191 mm
     cav_pose foot;
     cav_momentum(m, state, still, com, NULL, NULL);
-    cav_object_pose(m, state, CAV_OBJECT_XBODY, cav_find(m, CAV_OBJECT_BODY, "foot_right"), &foot);
+    cav_object_pose(m, state, CAV_OBJECT_XBODY, cav_object_find(m, CAV_OBJECT_BODY, "foot_right"), &foot);
     CHECK(com[0] - foot.pos[0] > 0.04 && com[0] - foot.pos[0] < 0.065);
     CHECK_NEAR(com[1], 0, 1e-12); // symmetric; residual seen 1e-17
   }
@@ -518,7 +519,7 @@ static void test_same_names(void) {
   const char *folder = check_shared_models();
   if (!folder) return;
   snprintf(file, sizeof file, "%s/mujoco/humanoid.xml", folder);
-  cav_model *a = load(file), *b = load(CAVORT_SOURCE_ROOT "/problems/humanoid.xml");
+  cav_model *a = load(file), *b = load(CAVORT_SOURCE_ROOT "/problems/models/humanoid.xml");
   if (a && b && CHECK(a->nbody == b->nbody && a->njoint == b->njoint && a->nu == b->nu)) {
     for (int i = 0; i < a->nbody; i++) CHECK_TEXT(a->body[i].name, b->body[i].name);
     for (int i = 0; i < a->njoint; i++) CHECK_TEXT(a->joint[i].name, b->joint[i].name);

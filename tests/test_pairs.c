@@ -49,10 +49,10 @@ static void bring_near(const solid *a, solid *b) {
     column3(n, a->shape.rotation, 2);
     copy3(x, a->shape.pos);
   } else {
-    cav_support(&a->shape, n, x);
+    cav_shape_support(&a->shape, n, x);
   }
   scale3(back, -1, n);
-  cav_support(&b->shape, back, y);
+  cav_shape_support(&b->shape, back, y);
   double d[3];
   sub3(d, x, y);
   axpy3(d, d, gap, n);
@@ -241,7 +241,7 @@ static void test_invariance(void) {
   CHECK_NEAR(most, 0, 1e-11); // seen: 3e-14
 }
 
-// gap of the nearest point under small displacements of b: its derivative is the normal's share of b's motion there
+// gap of the nearest point under small displacements of b: its derivative is the normal's fraction of b's motion there
 static void test_derivatives(void) {
   const double step = 1e-7;
   for (int ta = 0; ta < CAV_GEOM_MESH; ta++) {
@@ -555,7 +555,7 @@ static double peer_gap(const mjData *d) {
 // Agreement with MuJoCo. Planes, spheres and capsules: to rounding, in every pose, and sphere against box. Of the
 // others it takes most through a portal refinement, whose depth is that of one direction: the same or deeper than the
 // true one. Ours is the distance itself where apart, so theirs must never exceed it, and where they overlap neither.
-// Capsule on box and box on box: it chooses other points; the share of poses in agreement is reported.
+// Capsule on box and box on box: it chooses other points; the fraction of poses in agreement is reported.
 static void test_peer(void) {
   for (int ta = 0; ta < CAV_GEOM_MESH; ta++) {
     for (int tb = ta + !ta; tb < CAV_GEOM_MESH; tb++) {

@@ -22,12 +22,12 @@ static const double SAME = 1e-9;      ///< relative error of u that counts as eq
 static const double GEOMETRY = 1e-10; ///< m or 1: difference of contacts that counts
 static const double PROVEN = 1e-12;   ///< m: residual of a proof, ours; seen: 7e-14
 static const double MISSED = 1e-9;    ///< m: residual of MuJoCo's from which on ours is the better one
-/// A model and the share of states that must agree; less than 0.99 where MuJoCo's contacts are made by iteration or
+/// A model and the fraction of states that must agree; less than 0.99 where MuJoCo's contacts are made by iteration or
 /// miss the least depth: box against box (double_pendulum), capsule on cylinder (slider_crank), ellipsoid and height
 /// field (quadruped).
 typedef struct subject {
   const char *name;
-  double share;
+  double fraction;
 } subject;
 static const char *const kinds[TYPES] = {"plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "field"};
 
@@ -258,7 +258,7 @@ static double compare_fed(const pair_of_models *p, const double *v_next, const d
 
 static void read_sensor(const pair_of_models *p, cav_sensor_type type, cav_object_type kind, int object, double *out) {
   cav_sensor sensor = {.name = "", .type = type, .object_type = kind, .object = object};
-  cav_sense(p->ours, p->state, &sensor, out);
+  cav_sensor_read(p->ours, p->state, &sensor, out);
 }
 
 // frames, their velocities and subtrees of every body at the state of the last comparison, v_next = v
@@ -270,7 +270,7 @@ static double compare_readings(const pair_of_models *p) {
   mj_subtreeVel(m, d);
   for (int i = 0; i < m->nbody; i++) {
     // MuJoCo's bodies of a URDF are the links that move: centres of mass are those of what it merged
-    int b = i && p->ours->fused ? cav_find(p->ours, CAV_OBJECT_XBODY, m->names + m->name_bodyadr[i]) : i;
+    int b = i && p->ours->fused ? cav_object_find(p->ours, CAV_OBJECT_XBODY, m->names + m->name_bodyadr[i]) : i;
     if (!p->ours->fused) {
       read_sensor(p, CAV_SENSOR_FRAMEPOS, CAV_OBJECT_BODY, b, out);
       worst = fmax(worst, apart(out, d->xipos + 3 * i, 3));
@@ -328,7 +328,7 @@ static void print_disputes(dispute disputes[TYPES][TYPES]) {
   }
 }
 
-static void compare_states(const char *name, double share, const pair_of_models *p) {
+static void compare_states(const char *name, double fraction, const pair_of_models *p) {
   static double error[STATES];
   double *v_next = scene_vector(p->ours->nv), *u = scene_vector(p->ours->nv), *expected = scene_vector(p->ours->nv);
   dispute disputes[TYPES][TYPES] = {{{0}}};
@@ -355,7 +355,7 @@ static void compare_states(const char *name, double share, const pair_of_models 
          touching, limited, error[STATES / 2], error[STATES * 9 / 10], error[STATES * 99 / 100], error[STATES - 1],
          100.0 * same / STATES, fed, readings);
   print_disputes(disputes);
-  CHECK(same >= STATES * share);
+  CHECK(same >= STATES * fraction);
   CHECK(unexplained == 0);
   // every state, the disputed ones with the same contacts
   CHECK(fed <= SAME);
@@ -404,7 +404,7 @@ static void compare_model(const char *folder, const subject *model) {
     p.data = mj_makeData(p.theirs);
     p.state = cav_state_new(p.ours);
     CHECK(p.ours->nq == p.theirs->nq && p.ours->nv == p.theirs->nv);
-    compare_states(name, model->share, &p);
+    compare_states(name, model->fraction, &p);
     mj_deleteData(p.data);
     cav_state_free(p.state);
   }

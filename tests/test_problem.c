@@ -135,7 +135,7 @@ static double lowest(const cav_model *model, const double *q) {
   state->options.smoothing = state->options.smoothing_self = 1;
   if (cav_position(model, state, q) == CAV_OK) {
     for (int i = 0; i < state->ncontact; i++) {
-      if (model->pair[state->contact[i].pair].outer) least = fmin(least, state->contact[i].dist);
+      if (model->pair[state->contact[i].pair].external) least = fmin(least, state->contact[i].dist);
     }
   }
   cav_state_free(state);
@@ -198,12 +198,12 @@ static void check_scene(void) {
   if (!p) return;
   const cav_model *m = p->model;
   CHECK(m->nbody == 5 && m->nq == 12 && m->nv == 11 && m->nkey == 1);
-  CHECK(cav_find(m, CAV_OBJECT_BODY, "crate") == 3 && cav_find(m, CAV_OBJECT_GEOM, "step") == 1);
+  CHECK(cav_object_find(m, CAV_OBJECT_BODY, "crate") == 3 && cav_object_find(m, CAV_OBJECT_GEOM, "step") == 1);
   CHECK(m->geom[1].link == 0 && m->npair > 4);
   // the model's keyframe, and the scene where it stands; angles are degrees although the model's are radians
   double start[12] = {0, 0, 0, -.5, 1, 0, 1, sqrt(.5), 0, 0, sqrt(.5), 0};
   CHECK_NEAR_ALL(p->q_start, start, 12, 1e-15);
-  CHECK_NEAR(m->joint[cav_find(m, CAV_OBJECT_JOINT, "door")].range[1], M_PI / 2, 1e-15);
+  CHECK_NEAR(m->joint[cav_object_find(m, CAV_OBJECT_JOINT, "door")].range[1], M_PI / 2, 1e-15);
   // what stands on the floor rises: lowest points .2 above it
   CHECK_NEAR(lowest(m, p->q_goal), .2, 1e-12);
   double crate[7] = {3, 4, .3, 1, 0, 0, 0};
@@ -231,7 +231,7 @@ static void check_scene(void) {
   snprintf(robot, sizeof robot, "%s/robot.urdf", folder);
   p = load_as("<problem name='p'>\n" SCENE "<horizon duration='1' timestep='.05'/>\n<start/>\n" TAIL, robot);
   if (!p) return;
-  CHECK(p->model->nbody == 5 && p->model->nq == 1 + 7 + 1 && cav_find(p->model, CAV_OBJECT_GEOM, "step") == 0);
+  CHECK(p->model->nbody == 5 && p->model->nq == 1 + 7 + 1 && cav_object_find(p->model, CAV_OBJECT_GEOM, "step") == 0);
   CHECK_NEAR_ALL(p->q_start + 1, start + 4, 7, 1e-15);
   cav_problem_free(p);
 }

@@ -1,4 +1,4 @@
-/// problems/result.c, forces.c, certificate.c: a folder written from a made-up solution and read back bit for bit, forces that
+/// problems/result/result.c, forces.c, certificate.c: a folder written from a made-up solution and read back bit for bit, forces that
 /// carry the weight of what rests, a verdict as JSON and as a table, and folders that are broken.
 #include "result.h"
 
@@ -60,7 +60,7 @@ static int fill(cav_solution *solution, const cav_problem *problem) {
   solution->nstage = 1;
   solution->stage[0] = (cav_stage_record){.phase = "multipliers",
                                           .stage = 1,
-                                          .share = 0.5,
+                                          .fraction = 0.5,
                                           .iterations = 7,
                                           .cost = 2,
                                           .unactuated = NAN,
@@ -144,7 +144,7 @@ static void check_verdict(const cav_problem *problem) {
     CHECK(strstr(text, field[i]) != NULL);
     if (!strstr(text, field[i])) fprintf(stderr, "    %s\n", field[i]);
   }
-  // the marks follow the promises: only the penetration is missed; not a number is missed too
+  // the marks follow the requires: only the penetration is missed; not a number is missed too
   cav_certificate_line line[CAV_CERTIFICATE_LINES];
   int n = cav_certificate_lines(&verdict, line), missed = 0;
   for (int i = 0; i < n; i++) missed += line[i].passed == 0;

@@ -24,7 +24,7 @@ static const char tied_text[] =
     "<force site='a'/><torque site='a'/><force site='b'/><torque site='b'/></sensor></mujoco>";
 
 static void read_all(const cav_model *m, const cav_state *state, double *out) {
-  for (int i = 0; i < m->nsensor; i++) cav_sense(m, state, &m->sensor[i], out + m->sensor[i].adr);
+  for (int i = 0; i < m->nsensor; i++) cav_sensor_read(m, state, &m->sensor[i], out + m->sensor[i].adr);
 }
 
 // what a forward step with no force leaves: weight on the floor, weight of the lid on the box
@@ -92,7 +92,7 @@ static void test_actuators(const cav_model *m) {
     const cav_sensor *s = &m->sensor[i];
     double reading;
     if (s->type != CAV_SENSOR_ACTUATORFRC) continue;
-    cav_sense(m, state, s, &reading);
+    cav_sensor_read(m, state, s, &reading);
     worst = fmax(worst, fabs(reading - found[s->object]) / (1 + fabs(reading)));
   }
   // bound: the same arithmetic; seen 0
@@ -101,7 +101,7 @@ static void test_actuators(const cav_model *m) {
   const cav_sensor clock = {.name = "", .type = CAV_SENSOR_CLOCK, .dim = 1};
   double time;
   state->time = 1.5;
-  cav_sense(m, state, &clock, &time);
+  cav_sensor_read(m, state, &clock, &time);
   CHECK(time == 1.5);
   free(q), free(v), free(u), free(x), free(found), free(residual);
   cav_state_free(state);
@@ -122,14 +122,14 @@ static void test_accelerations(const cav_model *m) {
     double reading[3], speed[2][3];
     for (int k = 0; k < m->nv; k++) x[k] = v[k] + m->timestep * a[k];
     CHECK(cav_inverse(m, state, q, v, x, u) == CAV_OK);
-    cav_sense(m, state, &acc, reading);
+    cav_sensor_read(m, state, &acc, reading);
     for (int side = 0; side < 2; side++) {
       double t = side ? e : -e;
       for (int k = 0; k < m->nv; k++) x[k] = v[k] + 0.5 * t * a[k];
       cav_integrate(m, q, x, t, moved);
       for (int k = 0; k < m->nv; k++) x[k] = v[k] + t * a[k];
       CHECK(cav_inverse(m, state, moved, x, x, u) == CAV_OK);
-      cav_sense(m, state, &vel, speed[side]);
+      cav_sensor_read(m, state, &vel, speed[side]);
     }
     for (int k = 0; k < 3; k++)
       worst = fmax(worst, fabs(reading[k] + m->gravity[k] - (speed[1][k] - speed[0][k]) / (2 * e)));
@@ -185,7 +185,7 @@ static void compare_stage(peers *p, int acceleration) {
     if (late != acceleration || s->type == CAV_SENSOR_ACTUATORFRC) continue;
     const double *theirs = p->data->sensordata + p->theirs->sensor_adr[k];
     double ours[4], size = 0, far = 0, other = 0;
-    cav_sense(p->ours, p->state, s, ours);
+    cav_sensor_read(p->ours, p->state, s, ours);
     for (int c = 0; c < s->dim; c++) {
       size = fmax(size, fabs(theirs[c]));
       far = fmax(far, fabs(theirs[c] - ours[c]));

@@ -1,6 +1,6 @@
 /// The whole way, problem file to certificate: the project's motions on its own humanoid and, where they are, on models that
 /// no one here wrote. Each is certified, close to what its folder says to expect, its derivatives pass Ipopt's checker at the
-/// solution, and a motion spoilt afterwards is not certified. Then the promises of cav_solve: the same bits at 1 and 2 threads,
+/// solution, and a motion spoilt afterwards is not certified. Then the requires of cav_solve: the same bits at 1 and 2 threads,
 /// an end when the observer asks with the best iterate kept, and refusal of what makes no sense.
 #include "motion.h"
 
@@ -58,7 +58,7 @@ static void check_spoilt(const cav_problem *problem, const cav_solution *s) {
   spoilt->q[knot * spoilt->nq + second] += 1e-3;
   cav_trajectory_velocities(problem->model, spoilt);
   CHECK(cav_verify(problem, spoilt, &s->contact, s->gain_q, s->gain_v, &verdict, NULL) == CAV_OK);
-  CHECK(!verdict.certified && verdict.unactuated_force_max > CAV_PROMISE_UNACTUATED && verdict.reason[0]);
+  CHECK(!verdict.certified && verdict.unactuated_force_max > CAV_TOLERANCE_UNACTUATED && verdict.reason[0]);
   cav_trajectory_free(spoilt);
 }
 
@@ -80,7 +80,7 @@ static void check_motion(const motion_case *c) {
     CHECK(verdict.certified);
     // the log is complete and ends where the solution does
     CHECK(s->nprogress == s->iterations && s->progress[s->nprogress - 1].iteration == s->iterations);
-    CHECK(s->unactuated <= CAV_PROMISE_UNACTUATED || !verdict.certified);
+    CHECK(s->unactuated <= CAV_TOLERANCE_UNACTUATED || !verdict.certified);
     check_spoilt(problem, s);
     printf("%-14s %-26s %5.1f s %4d iterations  unactuated %.1e  momentum %.1e  penetration %.1f mm  end %.0f mm\n",
            c->motion, problem->model->name, s->seconds, s->iterations, verdict.unactuated_force_max,
@@ -98,7 +98,7 @@ static void check_motion(const motion_case *c) {
   cav_problem_free(problem);
 }
 
-// --- promises ---
+// --- requires ---
 
 // squat-jump cut down to what takes a second: long enough to use every part of the solver
 static cav_problem *load_short(void) {

@@ -76,7 +76,7 @@ static void test_depth(void) {
       "g/(1 + "
       "epsilon), whatever the mass.\n\n| epsilon | kappa, s | mass, kg | predicted, m | sphere, relative error | box "
       "on "
-      "four corners, share of it: diagonal, reference | diagonal, exact |\n|---|---|---|---|---|---|---|\n");
+      "four corners, fraction of it: diagonal, reference | diagonal, exact |\n|---|---|---|---|---|---|---|\n");
   const double cases[][2] = {{0.01, 0.02}, {0.1, 0.02}, {0.1, 0.1}, {1, 0.05}};
   const double masses[] = {1e-3, 1, 1e3};
   for (int c = 0; c < 4; c++) {
@@ -186,8 +186,8 @@ static double deviation(double epsilon, double kappa, double h, int redundant, i
   memcpy(b.q, away, sizeof away);
   for (int i = 0; i < (int)(8 * kappa / h); i++) {
     CHECK(cav_position(b.model, b.state, b.q) == CAV_OK);
-    for (int k = 0; k < b.state->ntie; k++) {
-      double x = b.state->tie[k].error[0], t = i * h / kappa;
+    for (int k = 0; k < b.state->nequality; k++) {
+      double x = b.state->equality[k].error[0], t = i * h / kappa;
       if (i == 0) start[k] = x;
       worst = fmax(worst, fabs(x / start[k] - (1 + t) * exp(-t)));
     }
@@ -253,11 +253,11 @@ static double gap_to_hard(bench *b, double epsilon, const double *hard, double *
   CHECK(cav_forward_newton(b->model, b->state, b->q, b->v, b->u, 100, 1e-13, v_next, NULL) == CAV_OK);
   double difference = 0;
   for (int i = 0; i < b->model->nv; i++) difference = fmax(difference, fabs(v_next[i] - hard[i]));
-  cav_tie *tie = &b->state->tie[0];
+  cav_equality_rows *eq = &b->state->equality[0];
   *mismatch = 0;
   for (int k = 0; k < 3; k++) {
-    double target = (1 - tie->damping) * tie->velocity[k] - tie->stiffness * tie->error[k];
-    *mismatch = fmax(*mismatch, fabs(tie->velocity_next[k] - target));
+    double target = (1 - eq->damping) * eq->velocity[k] - eq->stiffness * eq->error[k];
+    *mismatch = fmax(*mismatch, fabs(eq->velocity_next[k] - target));
   }
   return difference;
 }
@@ -296,11 +296,11 @@ static void test_hard(void) {
         CHECK(cav_forward_hard(b.model, b.state, b.q, b.v, b.u, 100000, 1e-14, hard, &report) == CAV_OK);
         residual = fmax(residual, report.residual);
         if (!twice) {
-          const cav_tie *tie = &b.state->tie[0];
+          const cav_equality_rows *eq = &b.state->equality[0];
           double rate[3];
           CHECK(cav_inverse(b.model, b.state, b.q, b.v, hard, b.next) == CAV_OK);
           for (int k = 0; k < 3; k++) {
-            rate[k] = tie->velocity_next[k] - (1 - tie->damping) * tie->velocity[k] + tie->stiffness * tie->error[k];
+            rate[k] = eq->velocity_next[k] - (1 - eq->damping) * eq->velocity[k] + eq->stiffness * eq->error[k];
             held = fmax(held, fabs(rate[k]));
           }
         }
@@ -400,7 +400,7 @@ static void test_cylinder(void) {
   const double reach = 1e3, degree = M_PI / 180;
   double worst = 0;
   int seen[5] = {0};
-  // all rows at any posture: the reach of the smoothed law
+  // all rows at any posture: the activation distance of the smoothed law
   b.state->options.smoothing = b.state->options.smoothing_self = reach;
   for (int trial = 0; trial < 200; trial++) {
     double w[3], e = 1e-6, plus[5] = {0}, minus[5] = {0};

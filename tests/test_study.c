@@ -1,4 +1,4 @@
-/// problems/study.c, profile.c, command_study.c, dynamics/vary.c: a varied model against one loaded from a file that says the same;
+/// problems/study/study.c, profile.c, command_study.c, dynamics/model/perturb.c: a varied model against one loaded from a file that says the same;
 /// one start always the same, another one different; a study that is counted, drawn, resumed and not done twice.
 #include "study.h"
 
@@ -38,13 +38,14 @@ static cav_model *load_cart(double friction, double cart_mass, double pole_mass)
 }
 
 // all that follows from masses and friction, against the compiler's own way; bound 1e-12 relative: the same sums in other orders
-static void check_vary(void) {
+static void check_perturb(void) {
   cav_model *expected = load_cart(0.7, 2 * 1.04, 0.5 * 0.97), *model = load_cart(1, 2, 0.5);
   const double scale[3] = {1, 1.04, 0.97}, wrong[3] = {1, 0, 1};
   if (expected && model) {
-    CHECK(cav_model_vary(model, wrong, 0.7) == CAV_BAD_INPUT && cav_model_vary(model, scale, -1) == CAV_BAD_INPUT);
+    CHECK(cav_model_perturb(model, wrong, 0.7) == CAV_BAD_INPUT &&
+          cav_model_perturb(model, scale, -1) == CAV_BAD_INPUT);
     CHECK_NEAR(model->mass, 2.5, 1e-12); // refused: nothing changed
-    CHECK(cav_model_vary(model, scale, 0.7) == CAV_OK);
+    CHECK(cav_model_perturb(model, scale, 0.7) == CAV_OK);
     CHECK_NEAR(model->mass, expected->mass, 1e-12);
     for (int i = 1; i < model->nlink; i++) {
       CHECK_NEAR(model->link[i].mass, expected->link[i].mass, 1e-12);
@@ -122,7 +123,7 @@ static void check_command(char *problem) {
 int main(void) {
   if (!mkdtemp(top)) return EXIT_FAILURE;
   char problem[160], command[200];
-  check_vary();
+  check_perturb();
   cav_model_free(load_cart(1, 2, 0.5));
   scene_write(top, "swing.xml", swing);
   snprintf(problem, sizeof problem, "%s/swing.xml", top);

@@ -77,7 +77,7 @@ static void check_norms(void) {
     const cav_problem *of = k ? again : p;
     const cav_term *force = &of->term[of->nterm - 2], *slip = force + 1;
     CHECK(force->quantity == CAV_QUANTITY_FORCE && force->norm == CAV_NORM_ABSOLUTE && force->scale == .3 &&
-          force->body == cav_find(p->model, CAV_OBJECT_BODY, "hand") && force->weight == 2);
+          force->body == cav_object_find(p->model, CAV_OBJECT_BODY, "hand") && force->weight == 2);
     CHECK(slip->quantity == CAV_QUANTITY_SLIP && slip->norm == CAV_NORM_SQUARE && slip->body == force->body);
   }
   cav_problem_free(again);

@@ -1,8 +1,8 @@
 /// Spatial tendons: arms against differences of lengths, forward against inverse, both against MuJoCo's lengths, arms and
 /// mj_inverse where it is there, on a scene with every kind of path. Wrapping against shapes known by hand, and paths
 /// that do not hold together refused.
-#include "../dynamics/wrap.h"
 #include "scene.h"
+#include "wrap.h"
 
 #ifdef CAVORT_HAVE_MUJOCO
 #include <mujoco/mujoco.h>
@@ -69,13 +69,13 @@ static double arm_error(const cav_model *m, cav_state *state, cav_state *moved, 
     CHECK(cav_position(m, moved, q_moved) == CAV_OK);
     for (int i = 0; i < m->ntendon; i++) {
       const cav_tendon *t = &m->tendon[i];
-      double arm = 0, slope = (ahead[i] - moved->tendon_length[i]) / (2 * step);
+      double arm = 0, derivative = (ahead[i] - moved->tendon_length[i]) / (2 * step);
       for (int e = t->dof; e < t->dof + t->ndof; e++) {
         if (m->tendon_dof[e] == j) arm = state->tendon_arm[e];
       }
-      // where wrapping begins between the two the slope is that of neither side: such pairs are far apart or nothing
-      if (fabs(slope - arm) < 1e-3) worst = fmax(worst, fabs(slope - arm));
-      CHECK(fabs(slope - arm) < 0.5);
+      // where wrapping begins between the two the derivative is that of neither side: such pairs are far apart or nothing
+      if (fabs(derivative - arm) < 1e-3) worst = fmax(worst, fabs(derivative - arm));
+      CHECK(fabs(derivative - arm) < 0.5);
     }
     v[j] = 0;
   }

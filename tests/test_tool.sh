@@ -59,7 +59,7 @@ says err "gn, ipopt or both"
 run 2 solve a.xml --threads 0
 run 2 solve a.xml --threads
 says err "needs a value"
-run 2 solve a.xml --routes 0
+run 2 solve a.xml --strategies 0
 says err "auto or a number from 1"
 run 2 solve a.xml --colour
 says err "not an option"
@@ -102,7 +102,7 @@ run 0 inspect model.xml
 run 0 solve problem.xml
 says out "certified: swing on pendulum"
 says err "continuation"
-for name in trajectory.csv forces.csv gains.csv log.csv stages.csv problem.xml routes.csv verdict.json view.html; do has "swing.result/$name"; done
+for name in trajectory.csv forces.csv gains.csv log.csv stages.csv problem.xml strategies.csv verdict.json view.html; do has "swing.result/$name"; done
 run 0 solve modelless.xml --model model.xml -o given --quiet
 silent out
 silent err
@@ -157,25 +157,25 @@ says weak/verdict.json '"certified": false'
 sed 's/gear="10"/gear="2.5"/' model.xml >lazy.xml
 sed 's/pos="1"/pos="3"/; s/duration="1"/duration="3"/; s/<cost>/<constraint><posture dofs="all" at="end"\/><\/constraint><cost>/' \
   problem.xml >rise.xml
-run 1 solve rise.xml --model lazy.xml -o alone --routes 1
-check "no other route" [ "$(wc -l <alone/routes.csv)" -eq 2 ]
+run 1 solve rise.xml --model lazy.xml -o alone --strategies 1
+check "no other strategy" [ "$(wc -l <alone/strategies.csv)" -eq 2 ]
 run 0 solve rise.xml --model lazy.xml -o risen --threads 1
-says err "trying by other routes: soft hold slow"
-says err "kept: route hold"
+says err "trying by other strategies: soft hold slow"
+says err "kept: strategy hold"
 says out "certified: swing"
-for line in "stated,0,not certified" "soft,0,not certified" "hold,1,certified"; do says risen/routes.csv "$line"; done
+for line in "stated,0,not certified" "soft,0,not certified" "hold,1,certified"; do says risen/strategies.csv "$line"; done
 run 0 verify risen --quiet
 run 0 solve rise.xml --model lazy.xml -o together --threads 3 --quiet
 silent err
 check "the same motion whoever ends first" cmp -s risen/trajectory.csv together/trajectory.csv
-run 0 solve problem.xml -o cheapest --routes 3 --threads 2
-check "three routes certified" [ "$(grep -c ',certified,' cheapest/routes.csv)" -eq 3 ]
-check "one kept" [ "$(grep -c ',1,certified,' cheapest/routes.csv)" -eq 1 ]
+run 0 solve problem.xml -o cheapest --strategies 3 --threads 2
+check "three strategies certified" [ "$(grep -c ',certified,' cheapest/strategies.csv)" -eq 3 ]
+check "one kept" [ "$(grep -c ',1,certified,' cheapest/strategies.csv)" -eq 1 ]
 
 # --- what Ipopt says is told, where it is there ---
 
 if "$cavort" solve problem.xml -o asked --solver ipopt --quiet >out 2>err || ! grep -q "has no Ipopt" err; then
-  "$cavort" solve rise.xml --model lazy.xml -o asked --solver ipopt --ipopt max_iter=1 --routes 1 >out 2>err
+  "$cavort" solve rise.xml --model lazy.xml -o asked --solver ipopt --ipopt max_iter=1 --strategies 1 >out 2>err
   says err "iteration limit (max_iter)"
   says err "kept is its iterate"
 fi

@@ -65,7 +65,7 @@ static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) 
   static double eye_target[3] = {0.2, 0.1, 0.5}, quat_target[4] = {0.9, 0.1, 0.3, 0.3},
                 waypoints[6] = {0, 0, 0.3, 0.1, 0, 0.4};
   static double waypoint_time[2] = {0, 0.15};
-  int n = cav_problem_default_terms(term, 16), trunk = cav_find(m, CAV_OBJECT_BODY, "trunk");
+  int n = cav_problem_default_terms(term, 16), trunk = cav_object_find(m, CAV_OBJECT_BODY, "trunk");
   cav_term base = term[0];
   base.quantity = CAV_QUANTITY_SENSOR;
   base.weight = 3;
@@ -74,7 +74,7 @@ static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) 
     *t = base;
     t->scale = 0.5 + 0.1 * kind;
     t->sensor = (cav_sensor){.name = "", .type = CAV_SENSOR_FRAMEPOS, .object_type = CAV_OBJECT_SITE, .dim = 3};
-    t->sensor.object = cav_find(m, CAV_OBJECT_SITE, "eye");
+    t->sensor.object = cav_object_find(m, CAV_OBJECT_SITE, "eye");
     t->target = eye_target;
     if (kind == 0) t->from = t->to = p->duration;
     if (kind == 1) t->sensor.type = CAV_SENSOR_FRAMEQUAT, t->sensor.dim = 4, t->target = quat_target;
@@ -121,7 +121,7 @@ static void shake(cav_trajectory *at, const cav_model *m, double size) {
 static void close_cycle(cav_transcription *tr, cav_trajectory *at) {
   double *x = calloc((size_t)cav_transcription_unknowns(tr), sizeof *x);
   cav_trajectory *from = cav_trajectory_copy(at);
-  if (tr->wrap) cav_transcription_move(tr, from, x, at);
+  if (tr->periodicity) cav_transcription_move(tr, from, x, at);
   cav_trajectory_free(from);
   free(x);
 }
@@ -148,15 +148,15 @@ static void test_gradient(cav_transcription *tr, cav_trajectory *at) {
       if (block >= 0) gradient[block * m->nv + c % m->nv] += tr->knot[t].gradient[c];
       if (block < 0) CHECK(tr->knot[t].gradient[c] == 0);
     }
-    if (tr->free_step) gradient[n - 1] += tr->knot[t].step_slope;
+    if (tr->free_step) gradient[n - 1] += tr->knot[t].step_derivative;
   }
   for (int i = 0; i < n; i++) norm = fmax(norm, fabs(gradient[i]));
   for (int i = 0; i < n; i++) {
     double step = 1e-5,
-           slope = (merit_at(tr, at, moved, x, i, step) - merit_at(tr, at, moved, x, i, -step)) / (2 * step);
-    double error = fabs(slope - gradient[i]) / norm;
+           derivative = (merit_at(tr, at, moved, x, i, step) - merit_at(tr, at, moved, x, i, -step)) / (2 * step);
+    double error = fabs(derivative - gradient[i]) / norm;
     if (error > worst) worst = error;
-    if (error > 1e-6) printf("knot %d dof %d: %.9g against %.9g\n", i / m->nv + 1, i % m->nv, gradient[i], slope);
+    if (error > 1e-6) printf("knot %d dof %d: %.9g against %.9g\n", i / m->nv + 1, i % m->nv, gradient[i], derivative);
   }
   printf("gradient: largest %.3g, worst error %.3g of it\n", norm, worst);
   CHECK(worst < 1e-6);
@@ -202,11 +202,11 @@ static void test_rows(cav_transcription *tr, cav_trajectory *at, int tries) {
       at_row = 0;
       for (int s = 0; s < tr->nknot; s++)
         for (int r = 0; r < tr->knot[s].layout.count; r++, at_row++) {
-          double slope = (plus[at_row] - tr->knot[s].slot[r].value) / (2 * step);
+          double derivative = (plus[at_row] - tr->knot[s].slot[r].value) / (2 * step);
           double row = t < tr->nknot ? 0 : tr->knot[s].slot_step[r];
           for (int c = 0; c < 3; c++)
             if (cav_transcription_block(tr, s, c) == t - 1) row = tr->knot[s].slot_row[r * width + c * m->nv + d];
-          worst = fmax(worst, fabs(slope - row) / fmax(1, fabs(row)));
+          worst = fmax(worst, fabs(derivative - row) / fmax(1, fabs(row)));
         }
     }
   }
@@ -404,12 +404,12 @@ static void test_scene(const char *scene, closing close, cav_order order) {
 }
 
 /// SO(3) Jacobians against differences of the exponential.
-static void test_turns(void) {
+static void test_rotations(void) {
   for (int k = 0; k < 200; k++) {
     double phi[3], J[9], inverse[9], size = k < 20 ? 1e-5 : 1.2;
     for (int c = 0; c < 3; c++) phi[c] = size * scene_uniform();
-    cav_turn(phi, J);
-    cav_turn_inverse(phi, inverse);
+    cav_rotation_jacobian(phi, J);
+    cav_rotation_jacobian_inverse(phi, inverse);
     for (int r = 0; r < 3; r++)
       for (int c = 0; c < 3; c++) {
         double sum = 0;
@@ -442,18 +442,18 @@ static void test_refusals(void) {
     cav_model *m = scene_load(text);
     if (!CHECK(m != NULL)) continue;
     cav_error error = {0};
-    CHECK((cav_drives_plannable(m, &error) == CAV_OK) == !cases[i].says);
+    CHECK((cav_actuators_plannable(m, &error) == CAV_OK) == !cases[i].says);
     if (cases[i].says) CHECK(error.status == CAV_NOT_SUPPORTED && strstr(error.text, cases[i].says));
     cav_model_free(m);
   }
 }
 
 int main(void) {
-  test_turns();
+  test_rotations();
   test_refusals();
   const closing rest = {.at_rest = 1}, open = {0}, timed = {.at_rest = 1, .free_step = 1}, adrift = {.free_step = 1};
   const closing moved = {.cycle = {.on = 1, .translation = {0.2, 0.1, 0}}};
-  const closing turned = {.free_step = 1, .cycle = {.on = 1, .translation = {0.2, 0, 0}, .turn = 0.4}};
+  const closing turned = {.free_step = 1, .cycle = {.on = 1, .translation = {0.2, 0, 0}, .rotation = 0.4}};
   const closing mirrored = {.free_step = 1, .cycle = {.on = 1, .translation = {0.2, 0, 0}, .mirror = CAV_MIRROR_Y}};
   test_scene(walker, rest, CAV_ORDER_MIDPOINT);
   test_scene(walker, open, CAV_ORDER_MIDPOINT);

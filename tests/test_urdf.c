@@ -68,23 +68,23 @@ static void test_robot(void) {
   CHECK_TEXT(m->name, "r");
   CHECK(m->nbody == 8 && m->nlink == 6 && m->nq == 13 && m->nv == 12 && m->nu == 2);
   // a floating joint on what stands in the world: free, named, under the world
-  int f = cav_find(m, CAV_OBJECT_JOINT, "float"), base = cav_find(m, CAV_OBJECT_BODY, "base");
+  int f = cav_object_find(m, CAV_OBJECT_JOINT, "float"), base = cav_object_find(m, CAV_OBJECT_BODY, "base");
   CHECK(f >= 0 && m->joint[f].type == CAV_JOINT_FREE && m->body[base].parent == 0);
   // fixed: one link, name kept, mass of both
-  int tip = cav_find(m, CAV_OBJECT_BODY, "tip"), rod = cav_find(m, CAV_OBJECT_BODY, "rod");
+  int tip = cav_object_find(m, CAV_OBJECT_BODY, "tip"), rod = cav_object_find(m, CAV_OBJECT_BODY, "rod");
   CHECK(tip >= 0 && m->body[tip].link == m->body[rod].link);
   CHECK_NEAR(m->link[m->body[rod].link].mass, 1.5, 0);
   CHECK_NEAR(m->body[tip].inverse_weight[0], m->body[rod].inverse_weight[0], 0);
-  int t = cav_find(m, CAV_OBJECT_JOINT, "turn"), spin = cav_find(m, CAV_OBJECT_JOINT, "spin");
+  int t = cav_object_find(m, CAV_OBJECT_JOINT, "turn"), spin = cav_object_find(m, CAV_OBJECT_JOINT, "spin");
   CHECK(m->joint[t].limited && !m->joint[spin].limited);
   CHECK_NEAR(m->joint[t].range[1], 0.5, 0);
   CHECK_NEAR(m->dof[m->joint[t].dof].damping, 0.3, 0);
   CHECK_NEAR(m->dof[m->joint[t].dof].frictionloss, 0.2, 0);
   // motors as strong as the limits
-  int motor = cav_find(m, CAV_OBJECT_ACTUATOR, "push");
+  int motor = cav_object_find(m, CAV_OBJECT_ACTUATOR, "push");
   CHECK(motor >= 0 && m->actuator[motor].ctrllimited);
   CHECK_NEAR(m->actuator[motor].ctrlrange[1], 9, 0);
-  CHECK(cav_find(m, CAV_OBJECT_JOINT, "slide_RZ") >= 0 && cav_find(m, CAV_OBJECT_GEOM, "hull") >= 0);
+  CHECK(cav_object_find(m, CAV_OBJECT_JOINT, "slide_RZ") >= 0 && cav_object_find(m, CAV_OBJECT_GEOM, "hull") >= 0);
   // follows another joint
   CHECK(m->nequality == 1 && m->equality[0].type == CAV_EQUALITY_JOINT && m->equality[0].object[0] == spin);
   CHECK(m->equality[0].object[1] == t && m->equality[0].coef[0] == 0.1 && m->equality[0].coef[1] == 2);
@@ -106,7 +106,7 @@ static void test_options(void) {
   options = (cav_load_options){.visual = 1, .floating = 1};
   m = load_with(two, &options, &error);
   if (CHECK(m != NULL)) {
-    CHECK(m->nq == 7 && m->ngeom == 1 && m->npair == 0 && cav_find(m, CAV_OBJECT_JOINT, "root") == 0);
+    CHECK(m->nq == 7 && m->ngeom == 1 && m->npair == 0 && cav_object_find(m, CAV_OBJECT_JOINT, "root") == 0);
     CHECK_NEAR(m->mass, 1, 0);
   }
   cav_model_free(m);

@@ -1,6 +1,6 @@
 // Verification against motions made by hand whose faults are known: each fault has a sound motion beside it that must
 // pass, and is found with the size it was given.
-// Bounds of 1e-11 and 1e-12 are on shares of weight, metres and radians of order one or less: rounding of positions of
+// Bounds of 1e-11 and 1e-12 are on fractions of weight, metres and radians of order one or less: rounding of positions of
 // a metre over h^2 = 4e-4 s^2 is 1e-13 of g. Seen: 6e-13 in forces, 9e-15 in momentum, 3e-15 in the others. Bounds that
 // stand for something else say so beside them.
 #include <unistd.h>
@@ -217,9 +217,9 @@ static void test_spin(void) {
   sample s = sample_new(flying, 25, 0.02, CAV_ORDER_MIDPOINT);
   const double angle[3] = {0, 0, 2e-3};
   fly(&s);
-  double turn[6] = {0};
-  memcpy(turn + 3, angle, sizeof angle);
-  cav_integrate(s.model, knot(&s, 12), turn, 1, knot(&s, 12));
+  double rotation[6] = {0};
+  memcpy(rotation + 3, angle, sizeof angle);
+  cav_integrate(s.model, knot(&s, 12), rotation, 1, knot(&s, 12));
   CHECK(verify(&s, NULL, NULL) == CAV_OK);
   // inertia 2/5 m r^2 = 0.008; about a turning axis the three knots share 6 (I angle/h^2)^2 up to the turn within a
   // step
@@ -469,7 +469,7 @@ static void test_terms(void) {
   const double *end = knot(&s, last), *middle = knot(&s, 13);
   double place[3] = {end[0], end[1], end[2]}, quat[4] = {-middle[3], -middle[4], -middle[5], -middle[6]};
   double way[9] = {0, 0, 0, 0, -0.1, 0, 0, -0.2, 0}, times[3] = {0, 0.5, 1};
-  int ball = cav_find(s.model, CAV_OBJECT_BODY, "ball");
+  int ball = cav_object_find(s.model, CAV_OBJECT_BODY, "ball");
   cav_sensor pos = {.name = "", .type = CAV_SENSOR_FRAMEPOS, .object_type = CAV_OBJECT_XBODY, .object = ball, .dim = 3};
   cav_sensor axes = {
       .name = "", .type = CAV_SENSOR_FRAMEQUAT, .object_type = CAV_OBJECT_XBODY, .object = ball, .dim = 4};

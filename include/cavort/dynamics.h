@@ -51,18 +51,18 @@ typedef struct cav_row {
 } cav_row;
 
 /// One equality constraint at (q, v, v_next). Impulses act on the first object and, reversed, on the second.
-typedef struct cav_tie {
+typedef struct cav_equality_rows {
   int equality;       ///< index into model->equality
   int dim;            ///< rows: 1, 3 or 6
   double error[6];    ///< x: m; weld, last three: torquescale times sines of half angles; joint and tendon: their unit
   double point[2][3]; ///< connect, weld, distance: m, world, where the impulse acts on each link
-  double turn[9];     ///< weld: rate of error[3..5] = turn (w1 - w2), angular velocities in world axes
+  double rotation[9]; ///< weld: rate of error[3..5] = turn (w1 - w2), angular velocities in world axes
   double normal[3];   ///< distance: from the second geom to the first
-  double slope;       ///< joint, tendon: rate of error = v1 - slope v2
+  double derivative;  ///< joint, tendon: rate of error = v1 - derivative v2
   double regulariser[6];
   double damping, stiffness; ///< h B and h K of all rows: v* = (1 - hB) x' - hK x
   double velocity[6], velocity_next[6], impulse[6];
-} cav_tie;
+} cav_equality_rows;
 
 /// World pose of a link. Row-major rotation: world = rotation * local + pos.
 typedef struct cav_pose {
@@ -86,10 +86,10 @@ typedef struct cav_state {
   double *axis;          ///< [nv*6] motion subspace of each dof: what a unit velocity does
   double *tendon_length; ///< [ntendon]
   double *tendon_arm;    ///< [ntendon_dof] gradient of the length along each dof of model->tendon_dof
-  int ncontact, nrow, ntie;
-  cav_contact *contact; ///< [ncontact]; geometry only depends on q, velocities and impulses on all
-  cav_row *row;         ///< [nrow]
-  cav_tie *tie;         ///< [ntie] one for each equality constraint, in their order
+  int ncontact, nrow, nequality;
+  cav_contact *contact;        ///< [ncontact]; geometry only depends on q, velocities and impulses on all
+  cav_row *row;                ///< [nrow]
+  cav_equality_rows *equality; ///< [nequality] one for each equality constraint, in their order
 
   // velocity: filled from q and v (euler) or the mean of v and v_next (midpoint, momentum)
   double *velocity;      ///< [nlink*6] spatial velocity of each link at the velocity the bias is taken
@@ -151,7 +151,7 @@ cav_status cav_forward_gpgs(const cav_model *model, cav_state *state, const doub
 /// The same with equality constraints hard: R_E = 0, the limit that the soft ones approach as R_E does. Forward only, as
 /// it has no inverse: many u give one v_next. Rows may repeat or contradict each other; what cannot hold together holds in
 /// the least squares of the soft rows. residual of the report is the force missing from the balance, relative; the
-/// impulses that hold the constraints are left in state->tie. Paper, section II C.
+/// impulses that hold the constraints are left in state->equality constraint. Paper, section II C.
 cav_status cav_forward_hard(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
                             int iterations, double tolerance, double *v_next, cav_forward_report *report);
 
@@ -200,10 +200,10 @@ typedef struct cav_contact_derivative {
 cav_status cav_contact_derivatives(const cav_model *model, const cav_state *state, int contact,
                                    cav_contact_derivative *out);
 
-/// Derivatives of cav_sense at the same point, [sensor->dim*nv] each; NULL = not needed. Readings do not depend on v.
+/// Derivatives of cav_sensor_read at the same point, [sensor->dim*nv] each; NULL = not needed. Readings do not depend on v.
 /// CAV_BAD_INPUT as above, CAV_NOT_SUPPORTED for a type of sensor without derivative.
-cav_status cav_sense_derivatives(const cav_model *model, const cav_state *state, const cav_sensor *sensor, double *d_dq,
-                                 double *d_dv_next);
+cav_status cav_sensor_derivatives(const cav_model *model, const cav_state *state, const cav_sensor *sensor,
+                                  double *d_dq, double *d_dv_next);
 
 /// A function of (q, v, v_next) read off a state after cav_inverse has filled it: writes n values.
 /// base is the state at the unperturbed point, equal to state for the base call itself.
@@ -212,9 +212,10 @@ typedef void (*cav_readout)(const cav_model *model, const cav_state *state, void
 /// Staged finite differences of any readout of n values. step 0: chosen by coordinate scale.
 /// method is one of the two differences (CAV_BAD_INPUT otherwise). value [n] at the point; d_dq, d_dv, d_dv_next [n*nv] row-major, NULL = not needed. dynamics.md, 7.
 /// A pass over v or v_next repeats no position work. The state is left at the point itself.
-cav_status cav_differentiate(const cav_model *model, cav_state *state, cav_derivative method, double step,
-                             const double *q, const double *v, const double *v_next, cav_readout readout, void *context,
-                             int n, double *value, double *d_dq, double *d_dv, double *d_dv_next);
+cav_status cav_readout_differentiate(const cav_model *model, cav_state *state, cav_derivative method, double step,
+                                     const double *q, const double *v, const double *v_next, cav_readout readout,
+                                     void *context, int n, double *value, double *d_dq, double *d_dv,
+                                     double *d_dv_next);
 
 /// Inertia matrix M(q) with D, dense [nv*nv] row-major. q [nq].
 cav_status cav_inertia(const cav_model *model, cav_state *state, const double *q, double *M);
@@ -226,7 +227,7 @@ void cav_momentum(const cav_model *model, cav_state *state, const double *v, dou
 
 /// Reading of a sensor at the state's last evaluation; out [sensor->dim]. Positions are there after cav_position; velocities
 /// (at v_next), accelerations and forces after cav_inverse or cav_forward, which leave them at (q, v, v_next).
-void cav_sense(const cav_model *model, const cav_state *state, const cav_sensor *sensor, double *out);
+void cav_sensor_read(const cav_model *model, const cav_state *state, const cav_sensor *sensor, double *out);
 
 /// Link that carries an object; the world's, 0, for kinds without a frame.
 int cav_object_link(const cav_model *model, cav_object_type type, int object);
@@ -261,7 +262,7 @@ int cav_actuator_input(const cav_model *model, int actuator, double length, doub
 /// it. The limits of a servo's control bound no effort of their own.
 void cav_actuator_effort_range(const cav_model *model, int actuator, double range[2]);
 
-/// The same law at another step: a discrete stabilisation keeps the share of a gap that it closes a second, and so its
+/// The same law at another step: a discrete stabilisation keeps the fraction of a gap that it closes a second, and so its
 /// stiffness; deadbeat (time constant 0) where that is more than the whole gap in a step.
 cav_options cav_options_at_step(const cav_options *options, double timestep);
 

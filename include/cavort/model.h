@@ -150,7 +150,7 @@ typedef struct cav_body {
   double iquat[4];          ///< principal axes in the body frame
   double inertia[3];        ///< principal moments about the centre of mass, kg m^2
   double inverse_weight[2]; ///< mean diagonal of J M^-1 J' at its com at q0: translation 1/kg, rotation 1/(kg m^2)
-  double buoyancy;          ///< share of its weight that is taken off (gravcomp of MJCF), 1: floats
+  double buoyancy;          ///< fraction of its weight that is taken off (gravcomp of MJCF), 1: floats
 } cav_body;
 
 /// Bodies that move as one: the unit of the dynamics. Link 0 is the world and all that is fixed to it.
@@ -254,7 +254,7 @@ typedef struct cav_site {
 typedef struct cav_pair {
   int geom1, geom2;   ///< geom1's type <= geom2's type
   int dim;            ///< 1, 3, 4 or 6 rows
-  int outer;          ///< 1 if one of the two stands in the world, or they hang from the world by different roots
+  int external;       ///< 1 if one of the two stands in the world, or they hang from the world by different roots
   double friction[5]; ///< two tangential, torsional (m), two rolling (m)
   double margin, gap; ///< m
   cav_softness softness;
@@ -268,13 +268,18 @@ typedef struct cav_tendon_part {
 } cav_tendon_part;
 
 /// What the path of a spatial tendon meets next.
-typedef enum cav_path_type { CAV_PATH_SITE, CAV_PATH_SPHERE, CAV_PATH_CYLINDER, CAV_PATH_PULLEY } cav_path_type;
-typedef struct cav_path_point {
-  cav_path_type type;
+typedef enum cav_tendon_path_type {
+  CAV_TENDON_PATH_SITE,
+  CAV_TENDON_PATH_SPHERE,
+  CAV_TENDON_PATH_CYLINDER,
+  CAV_TENDON_PATH_PULLEY
+} cav_tendon_path_type;
+typedef struct cav_tendon_path_point {
+  cav_tendon_path_type type;
   int object;     ///< site to pass through, or geom to wrap around
   int side;       ///< geoms: site on the side to pass, or inside to come through; -1: the shorter way
   double divisor; ///< pulleys: of the length of the branch that starts here
-} cav_path_point;
+} cav_tendon_path_point;
 
 /// Tendon. Fixed: length = sum coef q_joint. Spatial: length of the string along its path.
 typedef struct cav_tendon {
@@ -317,9 +322,9 @@ typedef struct cav_equality {
   double weight; ///< reference diagonal of A, the same for all rows
 } cav_equality;
 
-enum { CAV_DRIVE_PARAMETERS = 10 };
+enum { CAV_ACTUATOR_PARAMETERS = 10 };
 
-/// Actuator: force = gain(length, velocity) input + bias(length, velocity), clamped; its share of u is force times the
+/// Actuator: force = gain(length, velocity) input + bias(length, velocity), clamped; its fraction of u is force times the
 /// moments of its transmission. What is planned with is its effort: u = sum unit effort moment. A motor (fixed gain, no
 /// bias) has its gain as unit, so effort is the control; for every other one the unit is 1 and effort is the force, of
 /// which bias is a part, as the servo's pull towards its target: a law of control, not a passive force of the model.
@@ -335,9 +340,9 @@ typedef struct cav_actuator {
   cav_gain gain;
   cav_bias bias;
   double activation_parameter[3];
-  double
-      gain_parameter[CAV_DRIVE_PARAMETERS]; ///< fixed: [0]; affine: constant, per length, per velocity; muscle: MJCF's
-  double bias_parameter[CAV_DRIVE_PARAMETERS];
+  double gain_parameter
+      [CAV_ACTUATOR_PARAMETERS]; ///< fixed: [0]; affine: constant, per length, per velocity; muscle: MJCF's
+  double bias_parameter[CAV_ACTUATOR_PARAMETERS];
   double unit; ///< force of one unit of effort
   int ctrllimited, forcelimited, actlimited;
   double ctrlrange[2];
@@ -396,15 +401,16 @@ typedef struct cav_options {
   int coupled;           ///< 1: B and K dense, so that all rows together are critically damped; costs a factorisation
   double softness;       ///< epsilon of CAV_STABILISATION_DISCRETE, > 0
   double time_constant;  ///< kappa of CAV_STABILISATION_DISCRETE, s; 0: deadbeat
-  double smoothing;      ///< delta, m: distance at which the smoothed law is felt; 0: the exact law (dynamics.md, 3)
+  double smoothing;      ///< delta, m: distance at which the smoothed law is active; 0: the exact law (dynamics.md, 3)
   double smoothing_self; ///< delta between two links of one tree, m, used where smoothing > 0
-  double self_share; ///< share of their stiffness that contacts between two links of one tree get, (0, 1]; 1: the law
-  double impratio;   ///< R_normal / R_friction, > 0
-  int guard;         ///< 1: keep solref time constants >= 2 h
-  int contact;       ///< 0: no contacts
-  int constraint;    ///< 0: no equality constraints, limits, friction loss or contacts
-  int gravity;       ///< 0: none
-  int passive;       ///< 0: no springs and dampers
+  double
+      self_stiffness; ///< fraction of their stiffness that contacts between two links of one tree get, (0, 1]; 1: the law
+  double impratio;    ///< R_normal / R_friction, > 0
+  int refsafe;        ///< 1: keep solref time constants >= 2 h
+  int contact;        ///< 0: no contacts
+  int constraint;     ///< 0: no equality constraints, limits, friction loss or contacts
+  int gravity;        ///< 0: none
+  int passive;        ///< 0: no springs and dampers
 } cav_options;
 
 /// A compiled model. Built by cav_model_load, never changed afterwards.
@@ -433,7 +439,7 @@ typedef struct cav_model {
   const cav_pair *pair;
   const cav_tendon *tendon;
   const cav_tendon_part *tendon_part;
-  const cav_path_point *tendon_path;
+  const cav_tendon_path_point *tendon_path;
   const int *tendon_dof; ///< [ntendon_dof] indices into v, by tendon
   const cav_equality *equality;
   const cav_actuator *actuator; ///< [nu]
@@ -466,10 +472,10 @@ void cav_model_free(cav_model *model);
 /// Changes a model before any state of it exists: mass and inertia of link i times mass_scale[i] ([nlink], > 0; NULL: as they are),
 /// sliding friction of every contact (0: as it is); what the model derives from them follows. CAV_BAD_INPUT: a scale that is not
 /// positive, a negative friction, nothing changed; CAV_NO_MEMORY: do not use the model.
-cav_status cav_model_vary(cav_model *model, const double *mass_scale, double friction);
+cav_status cav_model_perturb(cav_model *model, const double *mass_scale, double friction);
 
 /// Index of the object of that kind and name, -1 if there is none. CAV_OBJECT_BODY and _XBODY both look up bodies.
-int cav_find(const cav_model *model, cav_object_type type, const char *name);
+int cav_object_find(const cav_model *model, cav_object_type type, const char *name);
 
 /// Name, length and needs of a type of sensor; type < CAV_SENSOR_TYPES.
 const cav_sensor_rule *cav_sensor_rule_of(cav_sensor_type type);
@@ -478,7 +484,7 @@ const cav_sensor_rule *cav_sensor_rule_of(cav_sensor_type type);
 void cav_configuration_reset(const cav_model *model, double *q);
 
 /// Scales every quaternion in q [nq] to unit length; a zero quaternion becomes the identity.
-void cav_normalise(const cav_model *model, double *q);
+void cav_configuration_normalise(const cav_model *model, double *q);
 
 /// Moves q along v for a time h on the manifold: q_next = q (+) h v. q, q_next [nq], v [nv]; q_next may be q.
 /// Quaternions advance by the exponential in body axes. dynamics.md, 1.

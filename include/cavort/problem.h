@@ -19,8 +19,8 @@ typedef enum cav_quantity {
   CAV_QUANTITY_GAP,           ///< sqrt(f_n/weight) * max(gap, 0) of every contact, m: force only where there is touch
   CAV_QUANTITY_SLIP,          ///< sqrt(f_n/weight) * tangential velocity of every contact, m/s
   CAV_QUANTITY_IMPACT,        ///< sqrt(f_n/weight) * normal velocity of every contact, m/s
-  CAV_QUANTITY_OVERLAP,       ///< depth of every contact between two links of one tree, m
-  CAV_QUANTITY_FORCE,         ///< normal force of every contact between trees or with the world, share of the weight
+  CAV_QUANTITY_SELF_PENETRATION, ///< depth of every contact between two links of one tree, m
+  CAV_QUANTITY_FORCE, ///< normal force of every contact between trees or with the world, fraction of the weight
   CAV_QUANTITY_TYPES
 } cav_quantity;
 
@@ -83,7 +83,7 @@ typedef enum cav_mirror { CAV_MIRROR_NONE, CAV_MIRROR_X, CAV_MIRROR_Y } cav_mirr
 typedef struct cav_cycle {
   int on;                ///< 0: the motion has a start and an end
   double translation[3]; ///< m, from one period to the next, of all that floats or slides
-  double turn;           ///< rad about the vertical through the first free joint of q_start, before the translation
+  double rotation;       ///< rad about the vertical through the first free joint of q_start, before the translation
   cav_mirror mirror;     ///< in the origin of the world, before the translation; excludes a turn
   int npair;             ///< counterparts that names do not tell
   const int (*pair)[2];  ///< [npair] joints
@@ -103,8 +103,8 @@ typedef struct cav_stage_options {
   double time_constant;  ///< kappa, in steps of the horizon (0: deadbeat)
   double smoothing;      ///< delta, m
   double smoothing_self; ///< delta between links of one tree and of limits, m (rad)
-  double self_share;     ///< share of the stiffness of contacts between links of one tree, (0, 1]; ends at 1
-  double penalty;        ///< weight of the unactuated force (share of weight, squared)
+  double self_stiffness; ///< fraction of the stiffness of contacts between links of one tree, (0, 1]; ends at 1
+  double penalty;        ///< weight of the unactuated force (fraction of weight, squared)
   int iterations;        ///< at most
   double tolerance;      ///< relative decrease below which, twice in a row, the stage ends
 } cav_stage_options;
@@ -129,7 +129,7 @@ typedef struct cav_problem {
   cav_order order;
   int close_at_rest; ///< 1: v after the last knot is zero, with rows there; 0: no rows at the last knot
   /// Free duration: the step is an unknown, the same for all knots, between these; both 0: duration is what it is. Times
-  /// of windows and waypoints stay shares of duration.
+  /// of windows and waypoints stay fractions of duration.
   double duration_least, duration_most;
   double duration_weight; ///< cost weight/2 * (duration in s)^2 where the duration is free
   cav_cycle cycle;        ///< where on: close_at_rest and v_start do not count, and q_start is where the guess starts
@@ -139,7 +139,8 @@ typedef struct cav_problem {
   cav_guess guess;
   double guess_height;         ///< m: ballistic arc added to the guess over guess_from .. guess_to
   double guess_from, guess_to; ///< s
-  double guess_turn[3]; ///< rotation vector that the first free joint's guess makes over guess_from .. guess_to, rad
+  double
+      guess_rotation[3]; ///< rotation vector that the first free joint's guess makes over guess_from .. guess_to, rad
   int nguess_pose;
   const cav_guess_pose
       *guess_pose; ///< [nguess_pose], times increasing within the horizon: postures on the way to the goal
@@ -147,7 +148,7 @@ typedef struct cav_problem {
   cav_swing *swing; ///< [nswing]
   int nterm;
   cav_term *term;
-  double effort_limit; ///< share of the actuator limits planned with, 0 .. 1
+  double effort_limit; ///< fraction of the actuator limits planned with, 0 .. 1
   double limit_margin; ///< rad or m kept from joint and tendon limits in planning
   cav_schedule schedule;
   int nipopt; ///< options for Ipopt, where it is the solver

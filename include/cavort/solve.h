@@ -20,7 +20,7 @@ typedef struct cav_progress {
   int stage, stages;
   int iteration;     ///< over the whole solve
   double cost;       ///< of the cost terms alone
-  double unactuated; ///< largest unactuated force, share of weight (moments: per 0.3 m)
+  double unactuated; ///< largest unactuated force, fraction of weight (moments: per 0.3 m)
   double violation;  ///< largest scaled violation of limits and other constraints
   double step, radius;
   double seconds;
@@ -35,7 +35,7 @@ typedef struct cav_solve_options {
   int threads;           ///< over knots, >= 1; the result does not depend on it
   cav_observer observer; ///< may be NULL
   void *observer_context;
-  double tolerance; ///< unactuated force at the end, share of weight
+  double tolerance; ///< unactuated force at the end, fraction of weight
   int diagnose;     ///< 1: where constraints cannot all hold, end at their least violation, which cav_explain needs
   /// Of the dynamics: analytic, and what has none (cav_derivatives_missing, sensors) by one-sided differences, or all by
   /// differences. Ipopt always takes centred ones.
@@ -62,7 +62,7 @@ typedef enum cav_outcome {
 typedef struct cav_stage_record {
   const char *phase; ///< as in cav_progress
   int stage, stages;
-  double share; ///< of the way from the schedule's first to its last stage
+  double fraction; ///< of the way from the schedule's first to its last stage
   int iterations;
   double cost, unactuated, violation; ///< as in cav_progress
   cav_outcome outcome;
@@ -87,7 +87,7 @@ typedef struct cav_binding {
   double value, lower, upper;
   double allowed; ///< violation that planning leaves room for
   double
-      multiplier; ///< price: what the cost would fall by if the bound gave way by one. Where constraints do not hold: the
+      multiplier; ///< penalty: what the cost would fall by if the bound gave way by one. Where constraints do not hold: the
                   ///< weighted violation, which balances that of the rows it is in conflict with
   double
       pull; ///< force on the motion that the multipliers of it and its like at neighbouring knots leave, per rad or m
@@ -100,7 +100,7 @@ typedef struct cav_solution {
   double *gain_q, *gain_v; ///< [(nknot-1)*nv*nv] du_t = gain_q dq_t + gain_v dv_t, row-major
   double cost;
   double optimality; ///< largest scaled component of the Lagrangian's gradient
-  double unactuated; ///< largest, share of weight
+  double unactuated; ///< largest, fraction of weight
   int iterations;
   double seconds, seconds_dynamics, seconds_assembly, seconds_linear; ///< wall clock
   int nprogress;
@@ -108,7 +108,7 @@ typedef struct cav_solution {
   int nstage;
   cav_stage_record *stage; ///< its stages in order
   int nrow;
-  cav_binding *row; ///< constraint rows that are violated or have a price, by knot
+  cav_binding *row; ///< constraint rows that are violated or have a multiplier, by knot
 } cav_solution;
 
 /// Solves from the problem's guess, or from start if not NULL. CAV_NOT_CONVERGED and CAV_INTERRUPTED leave the best iterate in
@@ -117,50 +117,51 @@ cav_status cav_solve(const cav_problem *problem, const cav_solve_options *option
                      cav_solution **solution, cav_error *error);
 void cav_solution_free(cav_solution *solution);
 
-enum { CAV_ROUTES = 8, CAV_ROUTE_SWINGS = 4 };
+enum { CAV_STRATEGIES = 8, CAV_STRATEGY_SWINGS = 4 };
 
 /// A way to a motion: the guess and the schedule that a solve starts from.
-typedef struct cav_route {
+typedef struct cav_strategy {
   const char *name, *text; ///< in a word, and in words
   int stated;              ///< 1: the problem's own guess, 0: guess and swing
   int first_midpoint;      ///< 1: solved under CAV_ORDER_MIDPOINT, then from there under the problem's order
   cav_guess guess;
   int nswing;
-  cav_swing swing[CAV_ROUTE_SWINGS];
+  cav_swing swing[CAV_STRATEGY_SWINGS];
   cav_schedule schedule;
-} cav_route;
+} cav_strategy;
 
-/// Routes for a problem, in the order in which they are worth trying; the first is the problem's own. CAV_NO_MEMORY, or what
+/// Strategies for a problem, in the order in which they are worth trying; the first is the problem's own. CAV_NO_MEMORY, or what
 /// the dynamics says of the goal posture.
-cav_status cav_routes(const cav_problem *problem, cav_route route[CAV_ROUTES], int *n);
+cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[CAV_STRATEGIES], int *n);
 
-/// The problem by a route: borrows all else from the problem, and the swings from the route.
-void cav_route_take(const cav_problem *problem, const cav_route *route, cav_problem *taken);
+/// The problem by a strategy: borrows all else from the problem, and the swings from the strategy.
+void cav_strategy_apply(const cav_problem *problem, const cav_strategy *strategy, cav_problem *taken);
 
-/// Solves by a route: cav_solve of what cav_route_take gives, after one under the midpoint order where the route says so, whose
+/// Solves by a strategy: cav_solve of what cav_strategy_apply gives, after one under the midpoint order where the strategy says so, whose
 /// iterations and seconds are counted but whose log is not kept.
-cav_status cav_route_solve(const cav_problem *problem, const cav_route *route, const cav_solve_options *options,
-                           const cav_trajectory *start, cav_solution **solution, cav_error *error);
+cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *strategy,
+                              const cav_solve_options *options, const cav_trajectory *start, cav_solution **solution,
+                              cav_error *error);
 
-/// What a certificate promises: the largest value of the verdict's field of that name.
-#define CAV_PROMISE_UNACTUATED 1e-6   ///< share of weight
-#define CAV_PROMISE_LIMIT 1e-6        ///< relative (actuators), rad or m (ranges)
-#define CAV_PROMISE_CONSTRAINT 1e-6   ///< scaled; rad, m, rad/s or m/s of the given start
-#define CAV_PROMISE_PENETRATION 0.005 ///< m, of contacts between moving links too
-#define CAV_PROMISE_MOMENTUM 0.005    ///< share of weight, root mean square
-#define CAV_PROMISE_SLIP 0.01         ///< m/s
-#define CAV_PROMISE_REPLAY \
+/// What a certificate requires: the largest value of the verdict's field of that name.
+#define CAV_TOLERANCE_UNACTUATED 1e-6   ///< fraction of weight
+#define CAV_TOLERANCE_LIMIT 1e-6        ///< relative (actuators), rad or m (ranges)
+#define CAV_TOLERANCE_CONSTRAINT 1e-6   ///< scaled; rad, m, rad/s or m/s of the given start
+#define CAV_TOLERANCE_PENETRATION 0.005 ///< m, of contacts between moving links too
+#define CAV_TOLERANCE_MOMENTUM 0.005    ///< fraction of weight, root mean square
+#define CAV_TOLERANCE_SLIP 0.01         ///< m/s
+#define CAV_TOLERANCE_REPLAY \
   0.5 ///< s, or the whole motion: the open loop at the same step reproduces the knots at least so long
-#define CAV_PROMISE_STEP 1e-8 ///< rad or m
-#define CAV_PROMISE_WRAP 1e-9 ///< m, rad, and these per step
+#define CAV_TOLERANCE_STEP 1e-8        ///< rad or m
+#define CAV_TOLERANCE_PERIODICITY 1e-9 ///< m, rad, and these per step
 
 /// What verification found; from the knots alone, with code apart from the optimiser's. optimisation.md, 6.
 /// optimality, solve_seconds and iterations are the solver's: cav_verify leaves them as they are.
 typedef struct cav_verdict {
   int certified;
-  double unactuated_force_max; ///< share of weight
+  double unactuated_force_max; ///< fraction of weight
   int unactuated_force_knot;
-  double momentum_defect_rms;      ///< share of weight
+  double momentum_defect_rms;      ///< fraction of weight
   double limit_violation_max;      ///< relative to the limit (effort), rad or m (range)
   double constraint_violation_max; ///< of the problem's hard terms, scaled
   double penetration_max_m;
@@ -171,10 +172,11 @@ typedef struct cav_verdict {
   double replay_same_step_seconds;   ///< how long it stays within 1e-6
   double
       closed_loop_seconds; ///< how long the closed loop at a tenth of the step follows (all links within 0.5 m, roots 1 rad)
-  double closed_loop_end_error_m;                        ///< largest distance of a body's centre of mass at the end
-  double own_contacts_seconds, own_contacts_end_error_m; ///< the same under the contacts of the model's file
-  double wrap_error; ///< cycles: how far the last knot is from the first one moved, m, rad, or their rates; else 0
-  int periods;       ///< that the closed loop ran for: 1, of cycles more
+  double closed_loop_end_error_m;                            ///< largest distance of a body's centre of mass at the end
+  double model_contacts_seconds, model_contacts_end_error_m; ///< the same under the contacts of the model's file
+  double
+      periodicity_error; ///< cycles: how far the last knot is from the first one moved, m, rad, or their rates; else 0
+  int periods;           ///< that the closed loop ran for: 1, of cycles more
   double duration, solve_seconds; ///< duration: of one period
   int iterations;
   char reason[400]; ///< why not certified: the first condition missed; "" if certified
@@ -194,14 +196,14 @@ typedef struct cav_reason {
   double time;      ///< of row.knot, s
   double violation; ///< scaled, 0 if within what is allowed
   double pull;      ///< of row
-  double share;     ///< of all pulls, over all its knots
+  double fraction;  ///< of all pulls, over all its knots
   char what[320];   ///< what, of which body, how far, in words
   char cure[400];   ///< what usually helps
 } cav_reason;
 
 enum { CAV_REASONS = 10 };
 
-/// Reasons in order of their size, twice: by violation, and by share of the conflict.
+/// Reasons in order of their size, twice: by violation, and by fraction of the conflict.
 typedef struct cav_explanation {
   int met; ///< 1: every constraint holds, and what pulls is what the motion's cost hangs on
   int nviolation, nconflict;

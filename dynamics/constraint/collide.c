@@ -1,0 +1,254 @@
+/// Which geoms touch: broad phase by bounding spheres over the list of pairs that the model was compiled to, then the
+/// narrow phase of pairs.c. Geoms in no pair are never placed; a geom's rotation is formed only if a narrow phase asks
+/// for it, once per call, and that of a geom fixed to the world once for all. Lists of CAV_SWEEP_FROM pairs and more are first
+/// pruned along an axis (sweep.c); bench_sweep measures where that begins to pay.
+#include <stdlib.h>
+
+#include "cavort/dynamics.h"
+#include "math3.h"
+#include "stage.h"
+#include "sweep.h"
+#include "workspace.h"
+
+// fastest approach that the discrete law meets without a jump, m/s (a fall from 1.3 m)
+static const double APPROACH_SPEED = 5;
+
+/// A pair as the broad phase wants it: all it reads, in order.
+typedef struct candidate {
+  int first, second;   ///< slots
+  int plane, external; ///< 1 if the first geom is a plane; as in the pair
+  double margin;       ///< of the pair
+  double bound;        ///< sum of bounding radii; of the second geom alone if the first is a plane
+} candidate;
+
+/// A geom in some pair.
+typedef struct slot {
+  const cav_geom *geom;
+  int turned; ///< shape.rotation is valid; of planes always
+  int fixed;  ///< moves with the world: placed once
+  cav_shape shape;
+} slot;
+
+struct cav_geom_cache {
+  size_t bytes;
+  int nslot;
+  slot *slot;
+  double (*centre)[3];  ///< [nslot] world
+  candidate *candidate; ///< [npair]
+  cav_sweep *sweep;     ///< NULL: all pairs are looked at
+  double margin;        ///< largest of all pairs, for the sweep
+};
+
+// places a geom fixed to the world, or prepares one that moves
+static void open_slot(const cav_model *model, const cav_geom *geom, slot *s, double centre[3]) {
+  s->geom = geom;
+  s->fixed = geom->link == 0;
+  s->shape = cav_shape_of(model, geom);
+  if (!s->fixed) return;
+  // link 0 is the world: its frame is the world's
+  copy3(centre, geom->pos);
+  copy3(s->shape.pos, geom->pos);
+  memcpy(s->shape.rotation, geom->rotation, sizeof s->shape.rotation);
+  s->turned = 1;
+}
+
+// gives each geom in a pair a slot
+static void open_slots(const cav_model *model, struct cav_geom_cache *cache, int *slot_of) {
+  for (int g = 0; g < model->ngeom; g++) { slot_of[g] = -1; }
+  for (int p = 0; p < model->npair; p++) {
+    const cav_pair *pair = model->pair + p;
+    int geoms[2] = {pair->geom1, pair->geom2};
+    for (int k = 0; k < 2; k++) {
+      if (slot_of[geoms[k]] >= 0) continue;
+      slot_of[geoms[k]] = cache->nslot;
+      open_slot(model, model->geom + geoms[k], cache->slot + cache->nslot, cache->centre[cache->nslot]);
+      cache->nslot++;
+    }
+    const cav_geom *a = model->geom + pair->geom1, *b = model->geom + pair->geom2;
+    candidate *c = cache->candidate + p;
+    c->first = slot_of[pair->geom1];
+    c->second = slot_of[pair->geom2];
+    c->external = pair->external;
+    c->margin = pair->margin;
+    c->plane = a->type == CAV_GEOM_PLANE;
+    c->bound = b->bound + (c->plane ? 0 : a->bound);
+  }
+}
+
+// what prunes the pairs along an axis; 0 if memory runs out
+static int open_sweep(const cav_model *model, struct cav_geom_cache *cache) {
+  double *radius = malloc(sizeof *radius * (size_t)cache->nslot);
+  cav_sweep_pair *pair = malloc(sizeof *pair * (size_t)model->npair);
+  if (radius && pair) {
+    for (int i = 0; i < cache->nslot; i++) radius[i] = cache->slot[i].geom->bound;
+    for (int p = 0; p < model->npair; p++) {
+      const candidate *c = cache->candidate + p;
+      pair[p] = (cav_sweep_pair){c->plane ? -1 : c->first, c->second};
+      cache->margin = fmax(cache->margin, c->margin);
+    }
+    cache->sweep = cav_sweep_new(cache->nslot, radius, model->npair, pair);
+  }
+  free(radius);
+  free(pair);
+  return cache->sweep != NULL;
+}
+
+struct cav_geom_cache *cav_geom_cache_new(const cav_model *model, int sweep_from) {
+  // one spare of each, so that no size is zero
+  struct cav_geom_cache *cache = calloc(1, sizeof *cache);
+  int *slot_of = malloc(sizeof *slot_of * (size_t)(model->ngeom + 1));
+  if (cache) {
+    cache->slot = calloc((size_t)model->ngeom + 1, sizeof *cache->slot);
+    cache->centre = calloc((size_t)model->ngeom + 1, sizeof *cache->centre);
+    cache->candidate = calloc((size_t)model->npair + 1, sizeof *cache->candidate);
+  }
+  if (!cache || !slot_of || !cache->slot || !cache->centre || !cache->candidate) {
+    free(slot_of);
+    cav_geom_cache_free(cache);
+    return NULL;
+  }
+  open_slots(model, cache, slot_of);
+  free(slot_of);
+  if (model->npair >= sweep_from && !open_sweep(model, cache)) {
+    cav_geom_cache_free(cache);
+    return NULL;
+  }
+  cache->bytes = cav_sweep_bytes(cache->sweep) + sizeof *cache +
+                 ((size_t)model->ngeom + 1) * (sizeof *cache->slot + sizeof *cache->centre);
+  cache->bytes += ((size_t)model->npair + 1) * sizeof *cache->candidate;
+  return cache;
+}
+
+size_t cav_geom_cache_bytes(const struct cav_geom_cache *cache) { return cache ? cache->bytes : 0; }
+
+void cav_geom_cache_free(struct cav_geom_cache *cache) {
+  if (!cache) return;
+  cav_sweep_free(cache->sweep);
+  free(cache->slot);
+  free(cache->centre);
+  free(cache->candidate);
+  free(cache);
+}
+
+double cav_contact_activation(const cav_state *state, const cav_pair *pair) {
+  const cav_options *o = &state->options;
+  double delta = o->smoothing > 0 ? (pair->external ? o->smoothing : o->smoothing_self) : 0;
+  return pair->margin + cav_law_activation(state, delta, APPROACH_SPEED);
+}
+
+// a geom that moves as a shape, once it is placed
+static void turn(const cav_state *state, struct cav_geom_cache *cache, int i) {
+  slot *s = cache->slot + i;
+  copy3(s->shape.pos, cache->centre[i]);
+  matmul3(s->shape.rotation, state->link[s->geom->link].rotation, s->geom->rotation);
+  s->turned = 1;
+}
+
+// centres of all geoms that move, and rotations of planes that do
+static void place(const cav_state *state, struct cav_geom_cache *cache) {
+  for (int i = 0; i < cache->nslot; i++) {
+    slot *s = cache->slot + i;
+    if (s->fixed) continue;
+    const cav_pose *link = state->link + s->geom->link;
+    transform(cache->centre[i], link->pos, link->rotation, s->geom->pos);
+    s->turned = 0;
+    if (s->geom->type == CAV_GEOM_PLANE) turn(state, cache, i);
+  }
+}
+
+// bounding spheres, or a plane and a sphere, closer than margin; inline: most of the search is this
+static inline int near(const struct cav_geom_cache *cache, const candidate *c, double margin) {
+  double d[3], activation = c->bound + margin;
+  sub3(d, cache->centre[c->second], cache->centre[c->first]);
+  if (c->plane) {
+    const double *R = cache->slot[c->first].shape.rotation;
+    return d[0] * R[2] + d[1] * R[5] + d[2] * R[8] < activation;
+  }
+  return activation > 0 && dot3(d, d) < activation * activation;
+}
+
+// the geom as a shape, its rotation formed at the first request
+static const cav_shape *shape_of(const cav_state *state, struct cav_geom_cache *cache, int i) {
+  if (!cache->slot[i].turned) turn(state, cache, i);
+  return &cache->slot[i].shape;
+}
+
+// contact axes: the normal, then the tangent or, where none is given, the world's y or z, made square to it. No choice
+// is smooth over all normals: this one jumps where the normal's y crosses 1/2, with no effect on isotropic friction
+static void make_frame(const cav_touch *touch, double frame[9]) {
+  double *n = frame, *s = frame + 3;
+  copy3(n, touch->normal);
+  axpy3(s, touch->tangent, -dot3(n, touch->tangent), n);
+  if (dot3(s, s) < 1e-12) {
+    int y = fabs(n[1]) < 0.5;
+    set3(s, 0, y, !y);
+    axpy3(s, s, -dot3(n, s), n);
+  }
+  normalise3(s);
+  cross3(frame + 6, n, s);
+}
+
+// one contact of the state
+static cav_status push(const cav_model *model, cav_state *state, int p, const cav_touch *touch) {
+  const cav_pair *pair = model->pair + p;
+  cav_contact *contact = cav_contact_push(state);
+  if (!contact) return CAV_NO_MEMORY;
+  contact->pair = p;
+  contact->feature = touch->feature;
+  contact->dim = pair->dim;
+  contact->link1 = model->geom[pair->geom1].link;
+  contact->link2 = model->geom[pair->geom2].link;
+  copy3(contact->pos, touch->pos);
+  make_frame(touch, contact->frame);
+  contact->dist = touch->dist;
+  contact->margin = pair->margin - pair->gap;
+  memcpy(contact->friction, pair->friction, sizeof contact->friction);
+  return CAV_OK;
+}
+
+// contacts of one pair whose bounds are near
+static inline cav_status collide_pair(const cav_model *model, cav_state *state, int p, double margin) {
+  struct cav_geom_cache *cache = state->work->geom;
+  const candidate *c = cache->candidate + p;
+  cav_touch touch[CAV_TOUCH_MAX];
+  const cav_shape *a = shape_of(state, cache, c->first), *b = shape_of(state, cache, c->second);
+  int count = cav_collide_shapes(a, b, margin, touch);
+  cav_status status = CAV_OK;
+  for (int k = 0; k < count && status == CAV_OK; k++) status = push(model, state, p, touch + k);
+  return status;
+}
+
+// contacts of the pairs that a sweep leaves
+static cav_status collide_swept(const cav_model *model, cav_state *state, const double activation[2]) {
+  struct cav_geom_cache *cache = state->work->geom;
+  const int *found;
+  double most = cache->margin + fmax(activation[0], activation[1]);
+  int count = cav_sweep_find(cache->sweep, (const double(*)[3])cache->centre, most, &found);
+  for (int i = 0; i < count; i++) {
+    const candidate *c = cache->candidate + found[i];
+    double margin = c->margin + activation[c->external];
+    if (!near(cache, c, margin)) continue;
+    cav_status status = collide_pair(model, state, found[i], margin);
+    if (status) return status;
+  }
+  return CAV_OK;
+}
+
+cav_status cav_contacts_find(const cav_model *model, cav_state *state) {
+  state->ncontact = 0;
+  if (!model->npair || !state->options.contact || !state->options.constraint) return CAV_OK;
+  struct cav_geom_cache *cache = state->work->geom;
+  place(state, cache);
+  // reach is the margin plus one of two distances: found once, not per pair
+  const cav_pair alone[2] = {{.external = 0}, {.external = 1}};
+  double activation[2] = {cav_contact_activation(state, alone), cav_contact_activation(state, alone + 1)};
+  if (cache->sweep) return collide_swept(model, state, activation);
+  const candidate *first = cache->candidate;
+  for (const candidate *c = first, *end = first + model->npair; c < end; c++) {
+    double margin = c->margin + activation[c->external];
+    if (!near(cache, c, margin)) continue;
+    cav_status status = collide_pair(model, state, (int)(c - first), margin);
+    if (status) return status;
+  }
+  return CAV_OK;
+}

@@ -1,0 +1,265 @@
+/// Equality constraints by the soft Gauss principle, Todorov 2014, eqs. (5)-(7): the impulse of each row is
+/// f = R^-1 (v* - J v_next), whatever the others do, so the inverse has it in closed form. v* as for all constraints
+/// (dynamics.md, 4) from the error x of
+///
+///   connect   p1 - p2, two points
+///   weld      the same, and torquescale Im(conj(q2) q1): sines of half the angles between two frames
+///   joint     q1 - r1 - polynomial(q2 - r2); of one joint alone q1 - r1 - constant. r is the value at q0
+///   tendon    the same of lengths
+///   distance  the gap between two geoms, less the distance asked for
+///
+/// Errors, weights and the impedance (by the length of x over all rows) are MuJoCo 2.2.2's, but for two things: it scales
+/// only the rate of a weld's rotation by torquescale and not the error, where both agree at 1; and it has no distance.
+/// Where the nearest points of a distance are not unique, the deepest point that the pair's routine gives first counts.
+#include "math3.h"
+#include "workspace.h"
+
+// whether it acts between links, else between joints or tendons
+static int between_links(const cav_equality *e) {
+  return e->type == CAV_EQUALITY_CONNECT || e->type == CAV_EQUALITY_WELD || e->type == CAV_EQUALITY_DISTANCE;
+}
+
+// --- errors ---
+
+static void points(const cav_state *state, const cav_equality *e, cav_equality_rows *eq) {
+  for (int k = 0; k < 2; k++) {
+    const cav_pose *link = &state->link[e->link[k]];
+    transform(eq->point[k], link->pos, link->rotation, e->pos[k]);
+  }
+  sub3(eq->error, eq->point[0], eq->point[1]);
+}
+
+// x = s Im(conj(q2) q1), its rate s/2 Im(conj(q2) w q1) with w = w1 - w2 in world axes
+static void turn(const cav_state *state, const cav_equality *e, cav_equality_rows *eq) {
+  double frame[2][4], between[4];
+  for (int k = 0; k < 2; k++) quat_mul(frame[k], state->link[e->link[k]].quat, e->quat[k]);
+  quat_conjugate(frame[1], frame[1]);
+  quat_mul(between, frame[1], frame[0]);
+  scale3(eq->error + 3, e->torquescale, between + 1);
+  for (int k = 0; k < 3; k++) {
+    double spin[4] = {0, k == 0, k == 1, k == 2};
+    quat_mul(spin, spin, frame[0]);
+    quat_mul(spin, frame[1], spin);
+    for (int i = 0; i < 3; i++) eq->rotation[3 * i + k] = 0.5 * e->torquescale * spin[1 + i];
+  }
+}
+
+static cav_shape shape_of(const cav_model *model, const cav_state *state, int index) {
+  const cav_geom *geom = &model->geom[index];
+  const cav_pose *link = &state->link[geom->link];
+  cav_shape shape = cav_shape_of(model, geom);
+  transform(shape.pos, link->pos, link->rotation, geom->pos);
+  matmul3(shape.rotation, link->rotation, geom->rotation);
+  return shape;
+}
+
+// nearest points of two geoms, however far apart; both at the middle, which moves the same along the normal
+static void distance(const cav_model *model, const cav_state *state, const cav_equality *e, cav_equality_rows *eq) {
+  int swap = model->geom[e->object[0]].type > model->geom[e->object[1]].type, nearest = 0;
+  cav_shape a = shape_of(model, state, e->object[swap]), b = shape_of(model, state, e->object[!swap]);
+  double between[3];
+  sub3(between, b.pos, a.pos);
+  cav_touch touch[CAV_TOUCH_MAX];
+  // a degenerate pair may have no point: then nothing is asked of it
+  touch[0] = (cav_touch){.dist = e->distance};
+  int n = cav_collide_shapes(&a, &b, 2 * norm3(between) + 1, touch);
+  for (int k = 1; k < n; k++) {
+    if (touch[k].dist < touch[nearest].dist) nearest = k;
+  }
+  eq->error[0] = touch[nearest].dist - e->distance;
+  scale3(eq->normal, swap ? 1 : -1, touch[nearest].normal);
+  copy3(eq->point[0], touch[nearest].pos);
+  copy3(eq->point[1], touch[nearest].pos);
+}
+
+// x1 - r1 - polynomial(x2 - r2) and the polynomial's derivative
+static void couple(const cav_equality *e, double x1, double x2, cav_equality_rows *eq) {
+  double value = e->coef[0], derivative = 0, s = e->object[1] >= 0 ? x2 - e->reference[1] : 0, power = 1;
+  for (int k = 1; k < 5 && e->object[1] >= 0; k++) {
+    derivative += k * e->coef[k] * power;
+    power *= s;
+    value += e->coef[k] * power;
+  }
+  eq->error[0] = x1 - e->reference[0] - value;
+  eq->derivative = derivative;
+}
+
+// value of a joint or a tendon; of none 0
+static double value_of(const cav_model *model, const cav_state *state, const cav_equality *e, int side) {
+  int object = e->object[side];
+  if (object < 0) return 0;
+  return e->type == CAV_EQUALITY_JOINT ? state->work->q[model->joint[object].q] : state->tendon_length[object];
+}
+
+void cav_equality_evaluate(const cav_model *model, cav_state *state) {
+  if (!state->options.constraint) return;
+  state->nequality = model->nequality;
+  for (int i = 0; i < model->nequality; i++) {
+    const cav_equality *e = &model->equality[i];
+    cav_equality_rows *eq = &state->equality[i];
+    eq->equality = i;
+    eq->dim = e->dim;
+    switch (e->type) {
+      case CAV_EQUALITY_WELD:
+        turn(state, e, eq);
+        points(state, e, eq);
+        break;
+      case CAV_EQUALITY_CONNECT:
+        points(state, e, eq);
+        break;
+      case CAV_EQUALITY_DISTANCE:
+        distance(model, state, e, eq);
+        break;
+      default:
+        couple(e, value_of(model, state, e, 0), value_of(model, state, e, 1), eq);
+    }
+    double square = 0;
+    for (int k = 0; k < e->dim; k++) square += eq->error[k] * eq->error[k];
+    cav_law law = cav_law_at(state, &e->softness, sqrt(square), e->weight);
+    for (int k = 0; k < e->dim; k++) eq->regulariser[k] = law.regulariser;
+    eq->damping = law.damping;
+    eq->stiffness = law.stiffness;
+  }
+}
+
+// --- rates and impulses ---
+
+static double rate_of(const cav_model *model, const cav_state *state, const cav_equality *e, int side,
+                      const double *v) {
+  int object = e->object[side];
+  if (object < 0) return 0;
+  return e->type == CAV_EQUALITY_JOINT ? v[model->joint[object].dof] : cav_tendon_velocity(state, object, v);
+}
+
+void cav_equality_velocity(const cav_model *model, const cav_state *state, const cav_equality_rows *eq, const double *v,
+                           const double *velocity, double *out) {
+  const cav_equality *e = &model->equality[eq->equality];
+  if (!between_links(e)) {
+    out[0] = rate_of(model, state, e, 0, v) - eq->derivative * rate_of(model, state, e, 1, v);
+    return;
+  }
+  double linear[3] = {0, 0, 0}, angular[3] = {0, 0, 0};
+  for (int k = 0; k < 2; k++) {
+    if (e->link[k] == 0) continue;
+    const double *V = velocity + 6 * e->link[k];
+    double at[3];
+    velocity_at(at, V, state->reference + 3 * e->link[k], eq->point[k]);
+    axpy3(linear, linear, k ? -1 : 1, at);
+    axpy3(angular, angular, k ? -1 : 1, V);
+  }
+  if (eq->dim == 1) {
+    out[0] = dot3(eq->normal, linear);
+    return;
+  }
+  copy3(out, linear);
+  if (eq->dim == 6) { rotate(out + 3, eq->rotation, angular); }
+}
+
+// wrenches of an impulse on both links
+static void push(cav_state *state, const cav_equality *e, const cav_equality_rows *eq, double scale) {
+  double force[3], moment[3] = {0, 0, 0};
+  if (eq->dim == 1) {
+    scale3(force, eq->impulse[0], eq->normal);
+  } else {
+    copy3(force, eq->impulse);
+  }
+  if (eq->dim == 6) { rotate_back(moment, eq->rotation, eq->impulse + 3); }
+  for (int k = 0; k < 2; k++) {
+    if (e->link[k] == 0) continue;
+    double *F = state->force + 6 * e->link[k], signed_force[3];
+    scale3(signed_force, k ? -scale : scale, force);
+    push_at(F, state->reference + 3 * e->link[k], eq->point[k], signed_force);
+    axpy3(F, F, k ? -scale : scale, moment);
+  }
+}
+
+void cav_equality_impulses(const cav_model *model, cav_state *state, const double *v, const double *velocity_now,
+                           const double *v_next, double scale) {
+  const double *coupled = state->options.coupled ? state->work->target + state->work->first_equality : NULL;
+  for (int i = 0; i < state->nequality; i++) {
+    cav_equality_rows *eq = &state->equality[i];
+    const cav_equality *e = &model->equality[eq->equality];
+    if (velocity_now) { cav_equality_velocity(model, state, eq, v, velocity_now, eq->velocity); }
+    cav_equality_velocity(model, state, eq, v_next, state->velocity_next, eq->velocity_next);
+    for (int k = 0; k < eq->dim; k++) {
+      double target = (1 - eq->damping) * eq->velocity[k] - eq->stiffness * eq->error[k];
+      if (coupled) { target = *coupled++; }
+      eq->impulse[k] = (target - eq->velocity_next[k]) / eq->regulariser[k];
+    }
+    if (between_links(e)) { push(state, e, eq, scale); }
+  }
+}
+
+void cav_equality_apply(const cav_model *model, const cav_state *state, double scale, double *u) {
+  for (int i = 0; i < state->nequality; i++) {
+    const cav_equality_rows *eq = &state->equality[i];
+    const cav_equality *e = &model->equality[eq->equality];
+    if (between_links(e)) continue;
+    for (int side = 0; side < 2 && e->object[side] >= 0; side++) {
+      double force = scale * eq->impulse[0] * (side ? -eq->derivative : 1);
+      if (e->type == CAV_EQUALITY_JOINT) {
+        u[model->joint[e->object[side]].dof] += force;
+      } else {
+        cav_tendon_pull(state, e->object[side], force, u);
+      }
+    }
+  }
+}
+
+// --- at q0 ---
+
+// a point of one link in the frame of the other
+static void move_point(const cav_state *state, cav_equality *e, int from, int to) {
+  double point[3];
+  const cav_pose *a = &state->link[e->link[from]], *b = &state->link[e->link[to]];
+  transform(point, a->pos, a->rotation, e->pos[from]);
+  sub3(point, point, b->pos);
+  rotate_back(e->pos[to], b->rotation, point);
+}
+
+// frame 1 where frame 2 is at q0
+static void align(const cav_state *state, cav_equality *e) {
+  double back[4], world[4];
+  quat_conjugate(back, state->link[e->link[0]].quat);
+  quat_mul(world, state->link[e->link[1]].quat, e->quat[1]);
+  quat_mul(e->quat[0], back, world);
+}
+
+// reference diagonal of A: translations for all rows of bodies, as MuJoCo has it
+static double weigh(const cav_model *model, const cav_equality *e) {
+  double weight = 0;
+  for (int side = 0; side < 2 && e->object[side] >= 0; side++) {
+    int object = e->object[side];
+    switch (e->type) {
+      case CAV_EQUALITY_JOINT:
+        weight += model->dof[model->joint[object].dof].inverse_weight;
+        break;
+      case CAV_EQUALITY_TENDON:
+        weight += model->tendon[object].inverse_weight;
+        break;
+      case CAV_EQUALITY_DISTANCE:
+        weight += model->body[model->geom[object].body].inverse_weight[0];
+        break;
+      default:
+        weight += model->body[object].inverse_weight[0];
+    }
+  }
+  return weight;
+}
+
+void cav_equality_settle(const cav_model *model, const cav_state *state, cav_equality *e) {
+  const double *frame = e->quat[0];
+  int given = frame[0] != 0 || frame[1] != 0 || frame[2] != 0 || frame[3] != 0;
+  if (e->type == CAV_EQUALITY_CONNECT) { move_point(state, e, 0, 1); }
+  if (e->type == CAV_EQUALITY_WELD && !given) {
+    move_point(state, e, 1, 0);
+    align(state, e);
+  }
+  for (int side = 0; side < 2; side++) {
+    int object = e->object[side];
+    if (object < 0) continue;
+    if (e->type == CAV_EQUALITY_JOINT) e->reference[side] = model->q0[model->joint[object].q];
+    if (e->type == CAV_EQUALITY_TENDON) e->reference[side] = state->tendon_length[object];
+  }
+  e->weight = weigh(model, e);
+}

@@ -1,0 +1,338 @@
+/// Constraints at q: the rows of limits and friction losses, and what makes the law of each row and contact: R, h B, h K
+/// and the scale of smoothing (dynamics.md, 4). Two ways to them: MJCF's solref and solimp with their impedance curve,
+/// eqs. (27), (28); or the discrete step, critically damped with double pole z = exp(-h/kappa),
+/// h B = (1 + eps)(1 - z^2), h^2 K = (1 + eps)(1 - z)^2. Friction rows have K = 0. Contacts are found by collide.c,
+/// impulses are computed in inverse.c.
+///
+/// Which limits are rows and which contacts are sought: distance below the margin with solref (MuJoCo's rule), and one
+/// rule for what reaches beyond it (cav_law_activation). The discrete law looks at where the step ends, x + h v_next, so there
+/// an object counts from speed h before the margin: slower than that, nothing is missed. The smoothed law is active up to
+/// SMOOTH_ACTIVATION delta from there: the two add up.
+#include "derivative.h"
+#include "math3.h"
+
+static const double R_MIN = 1e-15, IMPEDANCE_MIN = 1e-4, IMPEDANCE_MAX = 0.9999, FRICTION_MIN = 1e-5;
+// fraction of smoothing distances beyond which the smoothed force is dropped: exp(-12) = 6e-6 of its value at contact
+static const double SMOOTH_ACTIVATION = 12;
+// fastest approach to a limit met without a jump, rad/s or m/s
+static const double LIMIT_SPEED = 20;
+
+// contacts of the smoothed law: fraction of their reach over which they fade out at its end, fraction of the radii of round geoms
+// over which they fade out where axes meet, and the least that is left
+static const double FADING = 0.3, CORE = 0.5, STIFFNESS_RATIO_MIN = 1e-12;
+
+static double larger(double a, double b) { return a > b ? a : b; }
+
+static double clamp(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
+
+// sigmoid of solimp on [0, 1]: a power on either side of the midpoint, meeting there with equal derivative
+static double sigmoid(double x, double midpoint, double power) {
+  if (power == 1) { return x; }
+  if (power == 2) { return x <= midpoint ? x * x / midpoint : 1 - (1 - x) * (1 - x) / (1 - midpoint); }
+  if (x <= midpoint) { return pow(x, power) / pow(midpoint, power - 1); }
+  return 1 - pow(1 - x, power) / pow(1 - midpoint, power - 1);
+}
+
+// impedance d(x) of solimp at a violation x
+static double impedance(const double solimp[5], double x) {
+  double d0 = clamp(solimp[0], IMPEDANCE_MIN, IMPEDANCE_MAX), dw = clamp(solimp[1], IMPEDANCE_MIN, IMPEDANCE_MAX);
+  double width = solimp[2];
+  if (d0 == dw || width <= R_MIN) { return 0.5 * (d0 + dw); }
+  if (x >= width) { return dw; }
+  if (x <= 0) { return d0; }
+  double y = sigmoid(x / width, clamp(solimp[3], IMPEDANCE_MIN, IMPEDANCE_MAX), larger(1, solimp[4]));
+  return d0 + y * (dw - d0);
+}
+
+// derivative of the sigmoid
+static double sigmoid_derivative(double x, double midpoint, double power) {
+  if (power == 1) { return 1; }
+  if (x <= midpoint) { return power * pow(x / midpoint, power - 1); }
+  return power * pow((1 - x) / (1 - midpoint), power - 1);
+}
+
+void cav_law_rates(const cav_state *state, const cav_softness *softness, double gap, double *regulariser,
+                   double *stiffness) {
+  const double *solimp = softness->solimp;
+  double d0 = clamp(solimp[0], IMPEDANCE_MIN, IMPEDANCE_MAX), dw = clamp(solimp[1], IMPEDANCE_MIN, IMPEDANCE_MAX);
+  double width = solimp[2];
+  *regulariser = *stiffness = 0;
+  if (state->options.stabilisation == CAV_STABILISATION_DISCRETE) { return; }
+  if (d0 == dw || width <= R_MIN || -gap >= width || gap >= 0) { return; }
+  double derivative =
+      sigmoid_derivative(-gap / width, clamp(solimp[3], IMPEDANCE_MIN, IMPEDANCE_MAX), larger(1, solimp[4]));
+  double d = impedance(solimp, -gap), rate = -derivative / width * (dw - d0);
+  // R goes with (1 - d)/d, hK with d
+  *regulariser = -rate / (d * (1 - d));
+  *stiffness = rate / d;
+}
+
+// by solref and solimp; violation x >= 0
+static cav_law solref_law(const cav_state *state, const cav_softness *softness, double x, double weight) {
+  double h = state->options.timestep, d = impedance(softness->solimp, x);
+  double dw = clamp(softness->solimp[1], IMPEDANCE_MIN, IMPEDANCE_MAX);
+  double kappa = softness->solref[0], zeta = softness->solref[1];
+  cav_law l = {larger(R_MIN, (1 - d) / d * weight), 0, 0};
+  if (kappa > 0) {
+    if (state->options.refsafe) { kappa = larger(kappa, 2 * h); }
+    l.damping = h * 2 / larger(R_MIN, dw * kappa);
+    l.stiffness = h * d / larger(R_MIN, dw * dw * kappa * kappa * zeta * zeta);
+  } else {
+    l.damping = h * -zeta / dw;
+    l.stiffness = h * -kappa * d / (dw * dw);
+  }
+  return l;
+}
+
+void cav_stabilisation_prepare(cav_state *state) {
+  const cav_options *o = &state->options;
+  if (o->stabilisation != CAV_STABILISATION_DISCRETE) return;
+  double z = o->time_constant > 0 ? exp(-o->timestep / o->time_constant) : 0;
+  state->work->discrete_damping = (1 + o->softness) * (1 - z * z);
+  state->work->discrete_stiffness = (1 + o->softness) * (1 - z) * (1 - z) / o->timestep;
+}
+
+// by the discrete step: the same for every row but R
+static cav_law discrete_law(const cav_state *state, double weight) {
+  const cav_workspace *w = state->work;
+  return (cav_law){larger(R_MIN, state->options.softness * weight), w->discrete_damping, w->discrete_stiffness};
+}
+
+cav_law cav_law_at(const cav_state *state, const cav_softness *softness, double x, double weight) {
+  if (state->options.stabilisation == CAV_STABILISATION_DISCRETE) return discrete_law(state, weight);
+  return solref_law(state, softness, x, weight);
+}
+
+// of a one-sided row at a distance
+static cav_law row_law(const cav_state *state, const cav_softness *softness, double dist, double weight) {
+  return cav_law_at(state, softness, larger(0, -dist), weight);
+}
+
+// scale of the smoothed law active at a distance delta
+static double smoothing_scale(const cav_law *l, double delta) {
+  return delta > 0 ? l->stiffness * delta / sqrt(l->regulariser) : 0;
+}
+
+// distance over which limits and contacts between links of one tree are smoothed
+static double self_smoothing(const cav_state *state) {
+  return state->options.smoothing > 0 ? state->options.smoothing_self : 0;
+}
+
+double cav_law_activation(const cav_state *state, double delta, double speed) {
+  double activation = SMOOTH_ACTIVATION * delta;
+  if (state->options.stabilisation == CAV_STABILISATION_DISCRETE) { activation += speed * state->options.timestep; }
+  return activation;
+}
+
+double cav_limit_activation(const cav_state *state, double margin) {
+  return margin + cav_law_activation(state, self_smoothing(state), LIMIT_SPEED);
+}
+
+// one more row with its law. Friction loss (bound > 0) has no position error; where the law is smoothed, its corners are
+// rounded over the velocity at which a limit of the same softness would be
+static cav_status add_row(cav_state *state, cav_row row, const cav_softness *softness, double weight) {
+  int friction = row.type == CAV_ROW_FRICTION_DOF || row.type == CAV_ROW_FRICTION_TENDON;
+  cav_law l = row_law(state, softness, friction ? 0 : row.dist - row.margin, weight);
+  row.regulariser = l.regulariser;
+  row.damping = l.damping;
+  row.stiffness = friction ? 0 : l.stiffness;
+  row.sigma = smoothing_scale(&l, self_smoothing(state));
+  cav_row *slot = cav_row_push(state);
+  if (!slot) { return CAV_NO_MEMORY; }
+  *slot = row;
+  return CAV_OK;
+}
+
+static cav_status add_friction(const cav_model *model, cav_state *state) {
+  const cav_workspace *w = state->work;
+  cav_status status = CAV_OK;
+  for (int i = 0; i < w->nfriction && !status; i++) {
+    int k = w->friction[i];
+    const cav_dof *dof = &model->dof[k];
+    cav_row row = {.type = CAV_ROW_FRICTION_DOF, .object = k, .axis = {1}};
+    row.bound = state->options.timestep * dof->frictionloss;
+    status = add_row(state, row, &dof->friction, dof->inverse_weight);
+  }
+  for (int i = 0; i < w->ntendon_friction && !status; i++) {
+    int k = w->tendon_friction[i];
+    const cav_tendon *tendon = &model->tendon[k];
+    cav_row row = {.type = CAV_ROW_FRICTION_TENDON, .object = k, .axis = {1}};
+    row.bound = state->options.timestep * tendon->frictionloss;
+    status = add_row(state, row, &tendon->friction, tendon->inverse_weight);
+  }
+  return status;
+}
+
+// both ends of a scalar range
+static cav_status limit_scalar(cav_state *state, cav_row row, double value, const double range[2],
+                               const cav_softness *softness, double weight, double activation) {
+  cav_status status = CAV_OK;
+  for (int side = 0; side < 2 && !status; side++) {
+    row.side = side;
+    row.axis[0] = side ? -1 : 1;
+    row.dist = side ? range[1] - value : value - range[0];
+    if (row.dist < activation) { status = add_row(state, row, softness, weight); }
+  }
+  return status;
+}
+
+// one side of a ball's cylinder, whose distance grows along n in the rotation vector that J moves
+static cav_status limit_turn(cav_state *state, cav_row row, int side, double dist, const double n[3], const double J[9],
+                             const cav_joint *joint, double weight, double activation) {
+  if (!(dist < activation)) { return CAV_OK; }
+  row.side = side;
+  row.dist = dist;
+  rotate_back(row.axis, J, n);
+  return add_row(state, row, &joint->limit, weight);
+}
+
+// twist range and swing radius of a ball joint
+static cav_status limit_cylinder(cav_state *state, cav_row row, const cav_joint *joint, double weight,
+                                 double activation) {
+  double w[3], J[9], n[3], away[3];
+  quat_log(w, state->work->q + joint->q);
+  turn_inverse(w, J);
+  double twist = dot3(w, joint->axis);
+  cav_status status = CAV_OK;
+  if (joint->twist_limited) {
+    scale3(n, -1, joint->axis);
+    status = limit_turn(state, row, 2, twist - joint->twist[0], joint->axis, J, joint, weight, activation);
+    if (!status) { status = limit_turn(state, row, 3, joint->twist[1] - twist, n, J, joint, weight, activation); }
+  }
+  if (joint->swing_limited && !status) {
+    axpy3(away, w, -twist, joint->axis);
+    double swing = norm3(away);
+    // without swing no direction leads to the limit more than another
+    scale3(n, swing > 0 ? -1 / swing : 0, away);
+    status = limit_turn(state, row, 4, joint->swing - swing, n, J, joint, weight, activation);
+  }
+  return status;
+}
+
+// largest rotation angle of a ball joint
+static cav_status limit_ball(cav_state *state, cav_row row, const cav_joint *joint, double weight, double activation) {
+  double turn[3];
+  quat_log(turn, state->work->q + joint->q);
+  row.side = 1;
+  row.dist = joint->range[1] - normalise3(turn);
+  scale3(row.axis, -1, turn);
+  return row.dist < activation ? add_row(state, row, &joint->limit, weight) : CAV_OK;
+}
+
+static cav_status add_limits(const cav_model *model, cav_state *state) {
+  const cav_workspace *w = state->work;
+  cav_status status = CAV_OK;
+  for (int i = 0; i < w->nlimit && !status; i++) {
+    int k = w->limit[i];
+    const cav_joint *joint = &model->joint[k];
+    double weight = model->dof[joint->dof].inverse_weight, activation = cav_limit_activation(state, joint->margin);
+    cav_row row = {.type = CAV_ROW_LIMIT_JOINT, .object = k, .margin = joint->margin};
+    if (joint->type == CAV_JOINT_BALL) {
+      if (joint->limited) { status = limit_ball(state, row, joint, weight, activation); }
+      if (!status) { status = limit_cylinder(state, row, joint, weight, activation); }
+    } else {
+      status = limit_scalar(state, row, w->q[joint->q], joint->range, &joint->limit, weight, activation);
+    }
+  }
+  for (int i = 0; i < w->ntendon_limit && !status; i++) {
+    int k = w->tendon_limit[i];
+    const cav_tendon *tendon = &model->tendon[k];
+    cav_row row = {.type = CAV_ROW_LIMIT_TENDON, .object = k, .margin = tendon->margin};
+    status = limit_scalar(state, row, state->tendon_length[k], tendon->range, &tendon->limit, tendon->inverse_weight,
+                          cav_limit_activation(state, tendon->margin));
+  }
+  return status;
+}
+
+cav_status cav_limits_find(const cav_model *model, cav_state *state) {
+  state->nrow = 0;
+  if (!state->options.constraint) { return CAV_OK; }
+  cav_status status = add_friction(model, state);
+  return status ? status : add_limits(model, state);
+}
+
+// 0 below 0, 1 above 1, with no derivative at either, and the rate of its logarithm
+static double rise(double x, double *rate) {
+  *rate = x > 0 && x < 1 ? 6 * (1 - x) / (x * (3 - 2 * x)) : 0;
+  return x <= 0 ? 0 : x >= 1 ? 1 : x * x * (3 - 2 * x);
+}
+
+// distance between the axes of two round geoms at which they touch; 0: one of them is not round
+static double round_thickness(const cav_model *model, const cav_pair *pair) {
+  const cav_geom *geom[2] = {&model->geom[pair->geom1], &model->geom[pair->geom2]};
+  double sum = 0;
+  for (int k = 0; k < 2; k++) {
+    if (geom[k]->type != CAV_GEOM_SPHERE && geom[k]->type != CAV_GEOM_CAPSULE) return 0;
+    sum += geom[k]->size[0];
+  }
+  return sum;
+}
+
+double cav_contact_stiffness_ratio(const cav_state *state, const cav_contact *c, double *rate) {
+  const cav_pair *pair = &state->model->pair[c->pair];
+  double fraction = pair->external ? 1 : state->options.self_stiffness, derivative;
+  *rate = 0;
+  if (!(state->options.smoothing > 0)) return fraction;
+  double activation = cav_contact_activation(state, pair), width = FADING * activation;
+  fraction *= larger(STIFFNESS_RATIO_MIN, rise((activation - c->dist) / width, &derivative));
+  *rate = -derivative / width;
+  double thickness = round_thickness(state->model, pair), core = CORE * thickness;
+  if (!(thickness > 0)) return fraction;
+  fraction *= larger(STIFFNESS_RATIO_MIN, rise((c->dist + thickness) / core, &derivative));
+  *rate += derivative / core;
+  return fraction;
+}
+
+// R of the friction rows so that R_j mu_j^2 is the same for all (22); all rows share the damping
+static void soften_contact(cav_state *state, cav_contact *c, double inverse_impratio) {
+  const cav_pair *pair = &state->model->pair[c->pair];
+  double rate, weight = pair->weight[0] / cav_contact_stiffness_ratio(state, c, &rate);
+  cav_law l = row_law(state, &pair->softness, c->dist - c->margin, weight);
+  c->stiffness = l.stiffness;
+  c->sigma = smoothing_scale(&l, pair->external ? state->options.smoothing : self_smoothing(state));
+  c->regulariser[0] = l.regulariser;
+  c->damping[0] = l.damping;
+  for (int k = 1; k < c->dim; k++) {
+    double *mu = &c->friction[k - 1];
+    *mu = larger(*mu, FRICTION_MIN);
+    double ratio = *mu == c->friction[0] ? 1 : c->friction[0] / *mu;
+    c->regulariser[k] = larger(R_MIN, l.regulariser * inverse_impratio) * ratio * ratio;
+    c->damping[k] = l.damping;
+  }
+}
+
+void cav_contacts_soften(cav_state *state) {
+  double inverse_impratio = 1 / larger(R_MIN, state->options.impratio);
+  for (int i = 0; i < state->ncontact; i++) soften_contact(state, &state->contact[i], inverse_impratio);
+}
+
+double cav_row_velocity(const cav_state *state, const cav_row *row, const double *v) {
+  const cav_model *model = state->model;
+  switch (row->type) {
+    case CAV_ROW_LIMIT_JOINT: {
+      const cav_joint *joint = &model->joint[row->object];
+      return joint->type == CAV_JOINT_BALL ? dot3(row->axis, v + joint->dof) : row->axis[0] * v[joint->dof];
+    }
+    case CAV_ROW_FRICTION_DOF:
+      return v[row->object];
+    default:
+      return row->axis[0] * cav_tendon_velocity(state, row->object, v);
+  }
+}
+
+void cav_row_push_force(const cav_state *state, const cav_row *row, double force, double *u) {
+  const cav_model *model = state->model;
+  switch (row->type) {
+    case CAV_ROW_LIMIT_JOINT: {
+      const cav_joint *joint = &model->joint[row->object];
+      int n = joint->type == CAV_JOINT_BALL ? 3 : 1;
+      for (int k = 0; k < n; k++) { u[joint->dof + k] += row->axis[k] * force; }
+      break;
+    }
+    case CAV_ROW_FRICTION_DOF:
+      u[row->object] += force;
+      break;
+    default:
+      cav_tendon_pull(state, row->object, row->axis[0] * force, u);
+  }
+}

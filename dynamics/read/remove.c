@@ -1,0 +1,137 @@
+/// Takes bodies and geoms out of the tree of an MJCF file before it is read as a model: walls, height fields, a ball that a
+/// motion has no use for. What refers to them goes too, and what refers to that, or the rest would not hold together. Works on
+/// names by kind, as references do; keyframes stay as they are, and fit only where no coordinates went.
+#include "remove.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const cav_xml_attribute remove_attributes[] = {
+    {"body", CAV_XML_TEXT, 1, 0, NULL, 0}, {"geom", CAV_XML_TEXT, 1, 0, NULL, 0}, {NULL, CAV_XML_SKIP, 0, 0, NULL, 0}};
+const cav_xml_element cav_remove_element = {"remove", 0, 0, remove_attributes, NULL, 0};
+
+/// A name that is gone, of a kind that references know.
+typedef struct lost {
+  const char *kind, *name;
+} lost;
+
+typedef struct omission {
+  int n, room, failed;
+  lost *item;
+} omission;
+
+static void lose(omission *o, const char *kind, const char *name) {
+  if (!*name) return;
+  if (o->n == o->room) {
+    int room = o->room ? 2 * o->room : 32;
+    lost *more = realloc(o->item, (size_t)room * sizeof *more);
+    if (!more) {
+      o->failed = 1;
+      return;
+    }
+    o->item = more;
+    o->room = room;
+  }
+  o->item[o->n++] = (lost){kind, name};
+}
+
+static int is(const cav_xml_node *node, const char *name) { return !strcmp(node->rule->name, name); }
+
+/// What references call the kind of an element.
+static const char *kind_of(const cav_xml_node *node) {
+  const char *section = node->parent ? node->parent->rule->name : "";
+  if (!strcmp(section, "tendon")) return "tendon";
+  if (!strcmp(section, "actuator")) return "actuator";
+  return is(node, "freejoint") ? "joint" : node->rule->name;
+}
+
+static void lose_all(omission *o, const cav_xml_node *node) {
+  lose(o, kind_of(node), cav_xml_text(node, "name", ""));
+  for (const cav_xml_node *c = node->child; c; c = c->next) lose_all(o, c);
+}
+
+/// Whether the kind that an attribute names is that one: "joint2" and "jointinparent" name joints, "objname" what "objtype" says.
+static int names(const cav_xml_node *node, const char *attribute, const char *kind) {
+  const char *type = !strcmp(attribute, "objname")   ? cav_xml_text(node, "objtype", "")
+                     : !strcmp(attribute, "refname") ? cav_xml_text(node, "reftype", "")
+                                                     : NULL;
+  if (type) return !strcmp(*type == 'x' ? type + 1 : type, kind);
+  size_t n = strlen(attribute), m = strlen(kind);
+  return !strncmp(attribute, kind, m) || (!strcmp(kind, "site") && n >= 4 && !strcmp(attribute + n - 4, "site"));
+}
+
+/// Whether a node, or one in it, refers to something that is gone.
+static int refers(const omission *o, const cav_xml_node *node) {
+  for (int i = 0; i < node->nvalue; i++) {
+    const cav_xml_value *value = &node->value[i];
+    for (int k = 0; k < o->n; k++) {
+      const char *attribute = value->rule->name;
+      if (!strcmp(attribute, "name") || strcmp(value->text, o->item[k].name)) continue;
+      if (names(node, attribute, o->item[k].kind)) return 1;
+    }
+  }
+  for (const cav_xml_node *c = node->child; c; c = c->next)
+    if (refers(o, c)) return 1;
+  return 0;
+}
+
+/// Takes a node out of its parent's children.
+static void unlink_node(cav_xml_node *node) {
+  cav_xml_node **at = &node->parent->child;
+  while (*at != node) at = &(*at)->next;
+  *at = node->next;
+}
+
+/// The element of that kind and name among the children of a node, at any depth.
+static cav_xml_node *find(cav_xml_node *node, const char *kind, const char *name) {
+  for (cav_xml_node *c = node->child; c; c = c->next) {
+    if (is(c, kind) && !strcmp(cav_xml_text(c, "name", ""), name)) return c;
+    cav_xml_node *below = find(c, kind, name);
+    if (below) return below;
+  }
+  return NULL;
+}
+
+/// Takes out what refers to what is gone; returns whether there was such a thing.
+static int follow(omission *o, cav_xml_node *root) {
+  static const char *const sections[] = {"tendon", "actuator", "sensor", "equality", "contact"};
+  int found = 0;
+  for (cav_xml_node *section = root->child; section; section = section->next) {
+    int known = 0;
+    for (size_t i = 0; i < sizeof sections / sizeof *sections; i++) known |= is(section, sections[i]);
+    for (cav_xml_node *c = known ? section->child : NULL, *next; c; c = next) {
+      next = c->next;
+      if (!refers(o, c)) continue;
+      lose_all(o, c);
+      unlink_node(c);
+      found = 1;
+    }
+  }
+  return found;
+}
+
+cav_status cav_xml_remove(cav_xml *xml, const cav_xml_node *scene, cav_error *error) {
+  // the tree is ours alone until it has been read
+  cav_xml_node *root = (cav_xml_node *)cav_xml_root(xml);
+  omission o = {0};
+  cav_status status = CAV_OK;
+  for (const cav_xml_node *leave = cav_xml_child(scene, &cav_remove_element); leave; leave = cav_xml_next(leave)) {
+    const char *body = cav_xml_text(leave, "body", NULL), *geom = cav_xml_text(leave, "geom", NULL);
+    const char *kind = body ? "body" : "geom", *name = body ? body : geom;
+    if (!body == !geom) status = cav_xml_fail(error, leave, NULL, "expected one of the attributes body and geom");
+    cav_xml_node *found = NULL;
+    for (cav_xml_node *c = root->child; c && status == CAV_OK && !found; c = c->next)
+      if (is(c, "worldbody")) found = find(c, kind, name);
+    if (status == CAV_OK && !found)
+      status = cav_xml_fail(error, leave, kind, "the file '%s' has no %s of that name, got '%.200s'", cav_xml_path(xml),
+                            kind, name);
+    if (status != CAV_OK) break;
+    lose_all(&o, found);
+    unlink_node(found);
+  }
+  while (status == CAV_OK && o.n > 0 && follow(&o, root)) continue;
+  if (o.failed) status = cav_xml_fail_as(error, CAV_NO_MEMORY, scene, NULL, "not enough memory");
+  free(o.item);
+  return status;
+}

@@ -1,0 +1,428 @@
+/// The grammar of MJCF: which elements and attributes a model file may have, and of what type.
+///
+/// Names and counts are those of the MJCF reference for MuJoCo 2.2.2, plus the frame element of later versions. What is
+/// only seen (visual, asset textures, camera, light, statistic, size, custom) is accepted unread. What has an effect but is
+/// not offered is in the table too: mjcf.c says so with the line, which is clearer than "unknown element".
+
+#include "remove.h"
+#include "scene.h"
+#include "spec.h"
+
+#define TEXT(name) \
+  { name, CAV_XML_TEXT, 0, 0, NULL, 0 }
+#define NAMED(name) \
+  { name, CAV_XML_TEXT, 1, 0, NULL, 0 }
+#define NEEDED(name) \
+  { name, CAV_XML_TEXT, 1, 0, NULL, 1 }
+#define INT(name) \
+  { name, CAV_XML_INT, 1, 1, NULL, 0 }
+#define INTS(name, n) \
+  { name, CAV_XML_INT, n, n, NULL, 0 }
+#define REAL(name) \
+  { name, CAV_XML_REAL, 1, 1, NULL, 0 }
+#define REALS(name, least, most) \
+  { name, CAV_XML_REAL, least, most, NULL, 0 }
+#define WORD(name, words) \
+  { name, CAV_XML_WORD, 0, 0, words, 0 }
+#define BOOL(name) \
+  { name, CAV_XML_BOOL, 0, 0, NULL, 0 }
+#define SKIP(name) \
+  { name, CAV_XML_SKIP, 0, 0, NULL, 0 }
+#define END \
+  { NULL, CAV_XML_SKIP, 0, 0, NULL, 0 }
+
+// words in the order of the enumerations that mjcf.c casts them to
+static const char *const truth[] = {"false", "true", "auto", NULL};
+static const char *const onoff[] = {"disable", "enable", NULL};
+static const char *const angles[] = {"radian", "degree", NULL};
+static const char *const coordinates[] = {"local", "global", NULL};
+static const char *const collisions[] = {"all", "predefined", "dynamic", NULL};
+static const char *const cones[] = {"elliptic", "pyramidal", NULL};
+static const char *const integrators[] = {"Euler", "RK4", "implicit", "implicitfast", NULL};
+static const char *const joints[] = {"free", "ball", "slide", "hinge", NULL};
+static const char *const geoms[] = {"plane", "sphere", "capsule", "ellipsoid", "cylinder",
+                                    "box",   "mesh",   "hfield",  NULL};
+static const char *const shapes[] = {"none", "ellipsoid", NULL};
+static const char *const objects[] = {"body", "xbody", "geom", "site", "camera", NULL};
+static const char *const dyntypes[] = {"none", "integrator", "filter", "muscle", "user", NULL};
+static const char *const gaintypes[] = {"fixed", "affine", "muscle", "user", NULL};
+static const char *const biastypes[] = {"none", "affine", "muscle", "user", NULL};
+
+// --- attributes shared by defaults and objects ---
+
+#define ORIENTATION \
+  REALS("quat", 4, 4), REALS("axisangle", 4, 4), REALS("xyaxes", 6, 6), REALS("zaxis", 3, 3), REALS("euler", 3, 3)
+
+#define JOINT                                                                                                      \
+  WORD("type", joints), SKIP("group"), REALS("pos", 3, 3), REALS("axis", 3, 3), REALS("springdamper", 2, 2),       \
+      WORD("limited", truth), REALS("twistrange", 2, 2), REAL("swingrange"), REALS("solreflimit", 1, 2),           \
+      REALS("solimplimit", 1, 5), REALS("solreffriction", 1, 2), REALS("solimpfriction", 1, 5), REAL("stiffness"), \
+      REALS("range", 2, 2), REAL("margin"), REAL("ref"), REAL("springref"), REAL("armature"), REAL("damping"),     \
+      REAL("frictionloss"), SKIP("user")
+
+#define GEOM                                                                                                        \
+  WORD("type", geoms), REALS("pos", 3, 3), ORIENTATION, INT("contype"), INT("conaffinity"), INT("condim"),          \
+      INT("group"), INT("priority"), REALS("size", 1, 3), NAMED("material"), REALS("friction", 1, 3), REAL("mass"), \
+      REAL("density"), BOOL("shellinertia"), REAL("solmix"), REALS("solref", 1, 2), REALS("solimp", 1, 5),          \
+      REAL("margin"), REAL("gap"), REALS("fromto", 6, 6), NAMED("hfield"), NAMED("mesh"), SKIP("fitscale"),         \
+      REALS("rgba", 4, 4), WORD("fluidshape", shapes), REALS("fluidcoef", 1, 5), SKIP("user")
+
+#define SITE                                                                                                  \
+  WORD("type", geoms), SKIP("group"), REALS("pos", 3, 3), ORIENTATION, SKIP("material"), REALS("size", 1, 3), \
+      REALS("fromto", 6, 6), SKIP("rgba"), SKIP("user")
+
+#define PAIR \
+  INT("condim"), REALS("friction", 1, 5), REALS("solref", 1, 2), REALS("solimp", 1, 5), REAL("gap"), REAL("margin")
+
+#define EQUALITY BOOL("active"), REALS("solref", 1, 2), REALS("solimp", 1, 5)
+
+#define TENDON                                                                                                         \
+  SKIP("group"), WORD("limited", truth), REALS("range", 2, 2), REALS("solreflimit", 1, 2), REALS("solimplimit", 1, 5), \
+      REALS("solreffriction", 1, 2), REALS("solimpfriction", 1, 5), REAL("frictionloss"), REAL("springlength"),        \
+      SKIP("width"), SKIP("material"), REAL("margin"), REAL("stiffness"), REAL("damping"), SKIP("rgba"), SKIP("user")
+
+#define ACTUATOR                                                                                                \
+  WORD("ctrllimited", truth), WORD("forcelimited", truth), REALS("ctrlrange", 2, 2), REALS("forcerange", 2, 2), \
+      REALS("gear", 1, 6), REAL("cranklength"), SKIP("user"), SKIP("group")
+
+#define ACTRANGE WORD("actlimited", truth), REALS("actrange", 2, 2)
+
+#define GENERAL                                                                                  \
+  ACTRANGE, WORD("dyntype", dyntypes), WORD("gaintype", gaintypes), WORD("biastype", biastypes), \
+      REALS("dynprm", 1, 10), REALS("gainprm", 1, 10), REALS("biasprm", 1, 10)
+
+#define CYLINDER REAL("timeconst"), REAL("area"), REAL("diameter"), REALS("bias", 3, 3)
+
+#define MUSCLE                                                                                              \
+  REALS("timeconst", 2, 2), REALS("range", 2, 2), REAL("force"), REAL("scale"), REAL("lmin"), REAL("lmax"), \
+      REAL("vmax"), REAL("fpmax"), REAL("fvmax")
+
+#define TRANSMISSION                                                                                                  \
+  NAMED("name"), NAMED("class"), REALS("lengthrange", 2, 2), NAMED("joint"), NAMED("jointinparent"), NAMED("tendon"), \
+      NAMED("slidersite"), NAMED("cranksite"), NAMED("site"), NAMED("refsite"), NAMED("body")
+
+// --- elements without children, or with children of no interest ---
+
+static const cav_xml_attribute include_attributes[] = {NEEDED("file"), END};
+static const cav_xml_element include = {"include", 0, 0, include_attributes, NULL, CAV_XML_INCLUDE};
+
+#define LEAF(id, name, ...)                                              \
+  static const cav_xml_attribute id##_attributes[] = {__VA_ARGS__, END}; \
+  static const cav_xml_element id = {name, 0, 0, id##_attributes, NULL, 0}
+
+#define UNREAD(id, name) static const cav_xml_element id = {name, 0, 0, NULL, NULL, CAV_XML_ANYTHING}
+
+UNREAD(size, "size");
+UNREAD(visual, "visual");
+UNREAD(statistic, "statistic");
+UNREAD(custom, "custom");
+UNREAD(lengthrange, "lengthrange");
+UNREAD(texture, "texture");
+UNREAD(skin, "skin");
+UNREAD(camera, "camera");
+UNREAD(light, "light");
+UNREAD(composite, "composite");
+
+static const cav_xml_attribute compiler_attributes[] = {BOOL("autolimits"),
+                                                        REAL("boundmass"),
+                                                        REAL("boundinertia"),
+                                                        REAL("settotalmass"),
+                                                        BOOL("balanceinertia"),
+                                                        BOOL("strippath"),
+                                                        WORD("coordinate", coordinates),
+                                                        WORD("angle", angles),
+                                                        SKIP("fitaabb"),
+                                                        NAMED("eulerseq"),
+                                                        TEXT("meshdir"),
+                                                        SKIP("texturedir"),
+                                                        TEXT("assetdir"),
+                                                        BOOL("discardvisual"),
+                                                        SKIP("convexhull"),
+                                                        SKIP("usethread"),
+                                                        BOOL("fusestatic"),
+                                                        WORD("inertiafromgeom", truth),
+                                                        INTS("inertiagrouprange", 2),
+                                                        BOOL("exactmeshinertia"),
+                                                        END};
+static const cav_xml_element *const compiler_children[] = {&lengthrange, &include, NULL};
+static const cav_xml_element compiler = {"compiler", 0, 0, compiler_attributes, compiler_children, 0};
+
+LEAF(flag, "flag", WORD("constraint", onoff), WORD("equality", onoff), WORD("frictionloss", onoff),
+     WORD("limit", onoff), WORD("contact", onoff), WORD("passive", onoff), WORD("gravity", onoff),
+     WORD("clampctrl", onoff), SKIP("warmstart"), WORD("filterparent", onoff), WORD("actuation", onoff),
+     WORD("refsafe", onoff), SKIP("sensor"), WORD("override", onoff), SKIP("energy"), SKIP("fwdinv"),
+     SKIP("sensornoise"), WORD("multiccd", onoff));
+static const cav_xml_attribute option_attributes[] = {REAL("timestep"),
+                                                      SKIP("apirate"),
+                                                      REAL("impratio"),
+                                                      SKIP("tolerance"),
+                                                      SKIP("noslip_tolerance"),
+                                                      SKIP("mpr_tolerance"),
+                                                      REALS("gravity", 3, 3),
+                                                      REALS("wind", 3, 3),
+                                                      REALS("magnetic", 3, 3),
+                                                      REAL("density"),
+                                                      REAL("viscosity"),
+                                                      SKIP("o_margin"),
+                                                      SKIP("o_solref"),
+                                                      SKIP("o_solimp"),
+                                                      WORD("integrator", integrators),
+                                                      WORD("collision", collisions),
+                                                      WORD("cone", cones),
+                                                      SKIP("jacobian"),
+                                                      SKIP("solver"),
+                                                      SKIP("iterations"),
+                                                      INT("noslip_iterations"),
+                                                      SKIP("mpr_iterations"),
+                                                      END};
+static const cav_xml_element *const option_children[] = {&flag, &include, NULL};
+static const cav_xml_element option = {"option", 0, 0, option_attributes, option_children, 0};
+
+// --- defaults ---
+
+LEAF(default_mesh, "mesh", REALS("scale", 3, 3));
+LEAF(default_material, "material", SKIP("texture"), SKIP("emission"), SKIP("specular"), SKIP("shininess"),
+     SKIP("reflectance"), REALS("rgba", 4, 4), SKIP("texrepeat"), SKIP("texuniform"));
+LEAF(default_joint, "joint", JOINT);
+LEAF(default_geom, "geom", GEOM);
+LEAF(default_site, "site", SITE);
+LEAF(default_pair, "pair", PAIR);
+LEAF(default_equality, "equality", EQUALITY);
+LEAF(default_tendon, "tendon", TENDON);
+LEAF(default_general, "general", ACTUATOR, GENERAL);
+LEAF(default_motor, "motor", ACTUATOR);
+LEAF(default_position, "position", ACTUATOR, REAL("kp"));
+LEAF(default_velocity, "velocity", ACTUATOR, REAL("kv"));
+LEAF(default_intvelocity, "intvelocity", ACTUATOR, ACTRANGE, REAL("kp"));
+LEAF(default_damper, "damper", ACTUATOR, REAL("kv"));
+LEAF(default_cylinder, "cylinder", ACTUATOR, CYLINDER);
+LEAF(default_muscle, "muscle", ACTUATOR, MUSCLE);
+LEAF(default_adhesion, "adhesion", ACTUATOR, SKIP("gain"));
+
+static const cav_xml_attribute default_attributes[] = {NAMED("class"), END};
+static const cav_xml_element defaults;
+static const cav_xml_element *const default_children[] = {&default_mesh,
+                                                          &default_material,
+                                                          &default_joint,
+                                                          &default_geom,
+                                                          &default_site,
+                                                          &default_pair,
+                                                          &default_equality,
+                                                          &default_tendon,
+                                                          &default_general,
+                                                          &default_motor,
+                                                          &default_position,
+                                                          &default_velocity,
+                                                          &default_damper,
+                                                          &default_cylinder,
+                                                          &default_muscle,
+                                                          &default_adhesion,
+                                                          &default_intvelocity,
+                                                          &camera,
+                                                          &light,
+                                                          &defaults,
+                                                          &include,
+                                                          NULL};
+static const cav_xml_element defaults = {"default", 0, 0, default_attributes, default_children, 0};
+
+// --- assets ---
+
+LEAF(material, "material", NEEDED("name"), NAMED("class"), SKIP("texture"), SKIP("texrepeat"), SKIP("texuniform"),
+     SKIP("emission"), SKIP("specular"), SKIP("shininess"), SKIP("reflectance"), REALS("rgba", 4, 4));
+LEAF(mesh, "mesh", NAMED("name"), NAMED("class"), NAMED("file"), REALS("scale", 3, 3), REALS("refpos", 3, 3),
+     REALS("refquat", 4, 4), REALS("vertex", 0, 0), REALS("face", 0, 0), SKIP("normal"), SKIP("texcoord"),
+     SKIP("smoothnormal"));
+LEAF(hfield, "hfield", NAMED("name"), NAMED("file"), INT("nrow"), INT("ncol"), {"size", CAV_XML_REAL, 4, 4, NULL, 1});
+static const cav_xml_element *const asset_children[] = {&texture, &hfield, &mesh, &skin, &material, &include, NULL};
+static const cav_xml_element asset = {"asset", 0, 0, NULL, asset_children, 0};
+
+// --- bodies ---
+
+static const cav_xml_attribute inertial_attributes[] = {{"pos", CAV_XML_REAL, 3, 3, NULL, 1},
+                                                        ORIENTATION,
+                                                        {"mass", CAV_XML_REAL, 1, 1, NULL, 1},
+                                                        REALS("diaginertia", 3, 3),
+                                                        REALS("fullinertia", 6, 6),
+                                                        END};
+static const cav_xml_element inertial = {"inertial", 0, 1, inertial_attributes, NULL, 0};
+LEAF(joint, "joint", NAMED("name"), NAMED("class"), JOINT);
+LEAF(freejoint, "freejoint", NAMED("name"), SKIP("group"));
+LEAF(geom, "geom", NAMED("name"), NAMED("class"), GEOM);
+LEAF(site, "site", NAMED("name"), NAMED("class"), SITE);
+static const cav_xml_attribute frame_attributes[] = {NAMED("name"), NAMED("childclass"), REALS("pos", 3, 3),
+                                                     ORIENTATION, END};
+static const cav_xml_attribute body_attributes[] = {NAMED("name"), NAMED("childclass"), REALS("pos", 3, 3), ORIENTATION,
+                                                    BOOL("mocap"), REAL("gravcomp"),    SKIP("user"),       END};
+static const cav_xml_element body, frame;
+static const cav_xml_element *const body_children[] = {&inertial, &joint,     &freejoint, &geom, &site,    &camera,
+                                                       &light,    &composite, &frame,     &body, &include, NULL};
+static const cav_xml_element *const frame_children[] = {&joint,     &freejoint, &geom, &site,    &camera, &light,
+                                                        &composite, &frame,     &body, &include, NULL};
+#define WORLD_CHILDREN &geom, &site, &camera, &light, &composite, &frame, &body, &include
+static const cav_xml_element *const world_children[] = {WORLD_CHILDREN, NULL};
+static const cav_xml_element frame = {"frame", 0, 0, frame_attributes, frame_children, 0};
+static const cav_xml_element body = {"body", 0, 0, body_attributes, body_children, 0};
+static const cav_xml_attribute world_attributes[] = {NAMED("name"), NAMED("childclass"), END};
+static const cav_xml_element worldbody = {"worldbody", 0, 0, world_attributes, world_children, 0};
+static const cav_xml_element *const scene_children[] = {WORLD_CHILDREN, &cav_remove_element, NULL};
+const cav_xml_element cav_scene_element = {"scene", 0, 1, NULL, scene_children, 0};
+
+// --- contact, equality, tendon ---
+
+LEAF(pair, "pair", NAMED("name"), NAMED("class"), NEEDED("geom1"), NEEDED("geom2"), PAIR);
+LEAF(exclude, "exclude", NAMED("name"), NEEDED("body1"), NEEDED("body2"));
+static const cav_xml_element *const contact_children[] = {&pair, &exclude, &include, NULL};
+static const cav_xml_element contact = {"contact", 0, 0, NULL, contact_children, 0};
+
+LEAF(connect, "connect", NAMED("name"), NAMED("class"), EQUALITY, NEEDED("body1"), NAMED("body2"),
+     {"anchor", CAV_XML_REAL, 3, 3, NULL, 1});
+LEAF(weld, "weld", NAMED("name"), NAMED("class"), EQUALITY, NEEDED("body1"), NAMED("body2"), REALS("relpose", 7, 7),
+     REALS("anchor", 3, 3), REAL("torquescale"));
+LEAF(equality_joint, "joint", NAMED("name"), NAMED("class"), EQUALITY, NEEDED("joint1"), NAMED("joint2"),
+     REALS("polycoef", 1, 5));
+LEAF(equality_tendon, "tendon", NAMED("name"), NAMED("class"), EQUALITY, NEEDED("tendon1"), NAMED("tendon2"),
+     REALS("polycoef", 1, 5));
+LEAF(equality_distance, "distance", NAMED("name"), NAMED("class"), EQUALITY, NEEDED("geom1"), NEEDED("geom2"),
+     REAL("distance"));
+static const cav_xml_element *const equality_children[] = {
+    &connect, &weld, &equality_joint, &equality_tendon, &equality_distance, &include, NULL};
+static const cav_xml_element equality = {"equality", 0, 0, NULL, equality_children, 0};
+
+static const cav_xml_attribute part_attributes[] = {NEEDED("joint"), {"coef", CAV_XML_REAL, 1, 1, NULL, 1}, END};
+static const cav_xml_element part = {"joint", 1, 0, part_attributes, NULL, 0};
+static const cav_xml_attribute tendon_attributes[] = {NAMED("name"), NAMED("class"), TENDON, END};
+static const cav_xml_element *const fixed_children[] = {&part, &include, NULL};
+static const cav_xml_element fixed = {"fixed", 0, 0, tendon_attributes, fixed_children, 0};
+LEAF(via_site, "site", NEEDED("site"));
+LEAF(via_geom, "geom", NEEDED("geom"), NAMED("sidesite"));
+LEAF(pulley, "pulley", {"divisor", CAV_XML_REAL, 1, 1, NULL, 1});
+static const cav_xml_element *const spatial_children[] = {&via_site, &via_geom, &pulley, &include, NULL};
+static const cav_xml_element spatial = {"spatial", 0, 0, tendon_attributes, spatial_children, 0};
+static const cav_xml_element *const tendon_children[] = {&fixed, &spatial, &include, NULL};
+static const cav_xml_element tendon = {"tendon", 0, 0, NULL, tendon_children, 0};
+
+// --- actuators ---
+
+LEAF(general, "general", TRANSMISSION, ACTUATOR, GENERAL);
+LEAF(motor, "motor", TRANSMISSION, ACTUATOR);
+LEAF(position, "position", TRANSMISSION, ACTUATOR, REAL("kp"));
+LEAF(velocity, "velocity", TRANSMISSION, ACTUATOR, REAL("kv"));
+LEAF(intvelocity, "intvelocity", TRANSMISSION, ACTUATOR, ACTRANGE, REAL("kp"));
+LEAF(damper, "damper", TRANSMISSION, ACTUATOR, REAL("kv"));
+LEAF(cylinder, "cylinder", TRANSMISSION, ACTUATOR, CYLINDER);
+LEAF(muscle, "muscle", TRANSMISSION, ACTUATOR, MUSCLE);
+UNREAD(adhesion, "adhesion");
+static const cav_xml_element *const actuator_children[] = {
+    &general, &motor, &position, &velocity, &intvelocity, &damper, &cylinder, &muscle, &adhesion, &include, NULL};
+static const cav_xml_element actuator = {"actuator", 0, 0, NULL, actuator_children, 0};
+
+// --- sensors ---
+
+#define READING REAL("cutoff"), SKIP("noise"), SKIP("user")
+#define SENSOR(id, target) LEAF(sensor_##id, #id, NAMED("name"), NEEDED(target), READING)
+SENSOR(jointpos, "joint");
+SENSOR(jointvel, "joint");
+SENSOR(ballquat, "joint");
+SENSOR(ballangvel, "joint");
+SENSOR(jointlimitpos, "joint");
+SENSOR(jointlimitvel, "joint");
+SENSOR(jointlimitfrc, "joint");
+SENSOR(subtreecom, "body");
+SENSOR(subtreelinvel, "body");
+SENSOR(subtreeangmom, "body");
+SENSOR(touch, "site");
+SENSOR(accelerometer, "site");
+SENSOR(velocimeter, "site");
+SENSOR(gyro, "site");
+SENSOR(force, "site");
+SENSOR(torque, "site");
+SENSOR(magnetometer, "site");
+SENSOR(rangefinder, "site");
+SENSOR(tendonpos, "tendon");
+SENSOR(tendonvel, "tendon");
+SENSOR(tendonlimitpos, "tendon");
+SENSOR(tendonlimitvel, "tendon");
+SENSOR(tendonlimitfrc, "tendon");
+SENSOR(actuatorpos, "actuator");
+SENSOR(actuatorvel, "actuator");
+SENSOR(actuatorfrc, "actuator");
+LEAF(sensor_clock, "clock", NAMED("name"), READING);
+
+static const cav_xml_attribute place_attributes[] = {
+    NAMED("name"), {"objtype", CAV_XML_WORD, 0, 0, objects, 1}, NEEDED("objname"), READING, END};
+static const cav_xml_attribute referred_attributes[] = {NAMED("name"),
+                                                        {"objtype", CAV_XML_WORD, 0, 0, objects, 1},
+                                                        NEEDED("objname"),
+                                                        WORD("reftype", objects),
+                                                        NAMED("refname"),
+                                                        READING,
+                                                        END};
+#define FRAME_SENSOR(id, attributes) static const cav_xml_element sensor_##id = {#id, 0, 0, attributes, NULL, 0}
+FRAME_SENSOR(framepos, referred_attributes);
+FRAME_SENSOR(framequat, referred_attributes);
+FRAME_SENSOR(framexaxis, referred_attributes);
+FRAME_SENSOR(frameyaxis, referred_attributes);
+FRAME_SENSOR(framezaxis, referred_attributes);
+FRAME_SENSOR(framelinvel, referred_attributes);
+FRAME_SENSOR(frameangvel, referred_attributes);
+FRAME_SENSOR(framelinacc, place_attributes);
+FRAME_SENSOR(frameangacc, place_attributes);
+UNREAD(sensor_user, "user");
+
+static const cav_xml_element *const sensor_children[] = {&sensor_jointpos,
+                                                         &sensor_jointvel,
+                                                         &sensor_ballquat,
+                                                         &sensor_ballangvel,
+                                                         &sensor_jointlimitpos,
+                                                         &sensor_jointlimitvel,
+                                                         &sensor_jointlimitfrc,
+                                                         &sensor_subtreecom,
+                                                         &sensor_subtreelinvel,
+                                                         &sensor_subtreeangmom,
+                                                         &sensor_touch,
+                                                         &sensor_accelerometer,
+                                                         &sensor_velocimeter,
+                                                         &sensor_gyro,
+                                                         &sensor_force,
+                                                         &sensor_torque,
+                                                         &sensor_magnetometer,
+                                                         &sensor_rangefinder,
+                                                         &sensor_tendonpos,
+                                                         &sensor_tendonvel,
+                                                         &sensor_tendonlimitpos,
+                                                         &sensor_tendonlimitvel,
+                                                         &sensor_tendonlimitfrc,
+                                                         &sensor_actuatorpos,
+                                                         &sensor_actuatorvel,
+                                                         &sensor_actuatorfrc,
+                                                         &sensor_clock,
+                                                         &sensor_framepos,
+                                                         &sensor_framequat,
+                                                         &sensor_framexaxis,
+                                                         &sensor_frameyaxis,
+                                                         &sensor_framezaxis,
+                                                         &sensor_framelinvel,
+                                                         &sensor_frameangvel,
+                                                         &sensor_framelinacc,
+                                                         &sensor_frameangacc,
+                                                         &sensor_user,
+                                                         &include,
+                                                         NULL};
+static const cav_xml_element sensor = {"sensor", 0, 0, NULL, sensor_children, 0};
+
+// --- keyframes ---
+
+LEAF(key, "key", NAMED("name"), REAL("time"), REALS("qpos", 0, 0), REALS("qvel", 0, 0), SKIP("act"), SKIP("mpos"),
+     SKIP("mquat"), SKIP("ctrl"));
+static const cav_xml_element *const keyframe_children[] = {&key, &include, NULL};
+static const cav_xml_element keyframe = {"keyframe", 0, 0, NULL, keyframe_children, 0};
+
+// --- the file ---
+
+static const cav_xml_attribute mujoco_attributes[] = {TEXT("model"), END};
+static const cav_xml_element *const mujoco_children[] = {
+    &compiler, &option,   &size,   &visual,   &statistic, &defaults, &custom,  &asset, &worldbody,
+    &contact,  &equality, &tendon, &actuator, &sensor,    &keyframe, &include, NULL};
+const cav_xml_element cav_mjcf_root = {"mujoco", 0, 0, mujoco_attributes, mujoco_children, 0};
+static const cav_xml_element *const extension_children[] = {&compiler, &option, &size, NULL};
+const cav_xml_element cav_mjcf_extension = {"mujoco", 0, 0, mujoco_attributes, extension_children, 0};

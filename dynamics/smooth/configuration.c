@@ -1,0 +1,100 @@
+/// Configurations as a manifold: q (+) h v and its inverse. Quaternions advance by the exponential in body axes; the
+/// rotation vector of a difference is the shortest, so its length is at most pi.
+#include "math3.h"
+#include "stage.h"
+
+void cav_configuration_reset(const cav_model *model, double *q) {
+  if (model->nq > 0) { memcpy(q, model->q0, (size_t)model->nq * sizeof *q); }
+}
+
+// index into q of a joint's quaternion, -1 if it has none
+static int quaternion_of(const cav_joint *joint) {
+  switch (joint->type) {
+    case CAV_JOINT_FREE:
+      return joint->q + 3;
+    case CAV_JOINT_BALL:
+      return joint->q;
+    default:
+      return -1;
+  }
+}
+
+void cav_configuration_normalise(const cav_model *model, double *q) {
+  for (int i = 0; i < model->njoint; i++) {
+    int k = quaternion_of(&model->joint[i]);
+    if (k >= 0) { quat_normalise(q + k); }
+  }
+}
+
+// q_next = q exp(h w)
+static void turn(const double *q, const double *w, double h, double *q_next) {
+  double angle[3], step[4];
+  scale3(angle, h, w);
+  quat_exp(step, angle);
+  quat_mul(q_next, q, step);
+  quat_normalise(q_next);
+}
+
+void cav_integrate(const cav_model *model, const double *q, const double *v, double h, double *q_next) {
+  for (int i = 0; i < model->njoint; i++) {
+    const cav_joint *joint = &model->joint[i];
+    const double *a = q + joint->q, *s = v + joint->dof;
+    double *b = q_next + joint->q;
+    switch (joint->type) {
+      case CAV_JOINT_FREE:
+        axpy3(b, a, h, s);
+        turn(a + 3, s + 3, h, b + 3);
+        break;
+      case CAV_JOINT_BALL:
+        turn(a, s, h, b);
+        break;
+      default:
+        b[0] = a[0] + h * s[0];
+    }
+  }
+}
+
+void cav_configuration_perturb(const cav_model *model, int dof, double step, double *q) {
+  const cav_joint *joint = &model->joint[model->dof[dof].joint];
+  int k = dof - joint->dof, turning = quaternion_of(joint);
+  if (joint->type == CAV_JOINT_FREE && k < 3) { turning = -1; }
+  if (turning < 0) {
+    q[joint->q + k] += step;
+    return;
+  }
+  double w[3] = {0, 0, 0};
+  w[joint->type == CAV_JOINT_FREE ? k - 3 : k] = 1;
+  turn(q + turning, w, step, q + turning);
+}
+
+// w = log(a^-1 b) / h
+static void turn_between(const double *a, const double *b, double h, double *w) {
+  double from[4], to[4], between[4];
+  quat_conjugate(from, a);
+  memcpy(to, b, sizeof to);
+  quat_normalise(from);
+  quat_normalise(to);
+  quat_mul(between, from, to);
+  quat_log(w, between);
+  scale3(w, 1 / h, w);
+}
+
+void cav_difference(const cav_model *model, const double *q0, const double *q1, double h, double *v) {
+  for (int i = 0; i < model->njoint; i++) {
+    const cav_joint *joint = &model->joint[i];
+    const double *a = q0 + joint->q, *b = q1 + joint->q;
+    double *s = v + joint->dof;
+    switch (joint->type) {
+      case CAV_JOINT_FREE:
+        sub3(s, b, a);
+        scale3(s, 1 / h, s);
+        turn_between(a + 3, b + 3, h, s + 3);
+        break;
+      case CAV_JOINT_BALL:
+        turn_between(a, b, h, s);
+        break;
+      default:
+        s[0] = (b[0] - a[0]) / h;
+    }
+  }
+}

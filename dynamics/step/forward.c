@@ -1,0 +1,409 @@
+/// One step forward by Newton's method on the convex potential in v_next (design/dynamics.md, 3; Todorov 2014, eqs.
+/// (5)-(9)): minimise 1/2 (x - x_free)' M (x - x_free) + sum Psi(R^-1 (v* - J x)), whose gradient is h (inverse(x) -
+/// u). Exact Hessian M + J' H J, factored from the leaves so that zeros of the tree stay zeros; line search on the
+/// derivative, which needs no differences of the potential and so works to the last digit. The exact law makes it a
+/// semismooth Newton method, the smoothed law an ordinary one. Outer passes refine: they measure the inverse itself,
+/// not the model of it.
+///
+/// midpoint, momentum: bias and passive forces depend on v_next. The convex problem with these frozen gives the start; Newton
+/// with their derivative (differences of the smooth inverse, reused while it serves) finishes. Nothing then is
+/// symmetric or convex: such a step need not exist once a body turns by a radian or so within it (gyroscopic
+/// torques at speeds near 2/h; the solutions traced there end in a fold). Then the best iterate is returned as not
+/// converged.
+///
+/// Stops when |inverse - u| is within tolerance of the largest force in the balance, or within what rounding of v_next
+/// to a double does to stiff constraints, whichever is larger; up to two more passes serve light links, whose forces
+/// are small against the largest. No step depends on earlier calls. Integrates no positions.
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "impulse.h"
+#include "math3.h"
+
+enum { BLOCK = 36, DEFAULT_ITERATIONS = 100, SEARCH_STEPS = 60, STALLS = 4, POLISH = 2 };
+
+static const double DEFAULT_TOLERANCE = 1e-13, SHORTEST_STEP = 0.02;
+
+// the solver's own arrays; names as in the text above
+typedef struct newton {
+  cav_impulse problem;
+  const double *q, *v, *u;
+  double *y, *f;           // [nrow] J x and impulses there
+  double *derivative;      // [nrow] J d
+  double *try_y, *try_f;   // [nrow] the same along the line
+  double *curvature;       // [nblock*36] -df/dy
+  double *x, *anchor;      // [nv] iterate; where base was taken
+  double *base;            // [nv] h (smooth inverse - u) at anchor
+  double *step, *momentum; // [nv] d; M (x - anchor) or M d
+  double *gradient;        // [nv]
+  double *best, *found;    // [nv] best iterate; inverse there
+  double *matrix;          // [nv*nv] Hessian, its factors
+  double *smooth;          // [nv*nv] derivative of h times the smooth inverse, not for euler
+  int have_smooth;
+  double error, scale; // of the last measurement
+  int iterations, limit;
+} newton;
+
+static double largest(const double *x, int n) {
+  double most = 0.0;
+  for (int i = 0; i < n; i++) most = most > fabs(x[i]) ? most : fabs(x[i]);
+  return most;
+}
+
+static double dot(const double *a, const double *b, int n) {
+  double sum = 0.0;
+  for (int i = 0; i < n; i++) sum += a[i] * b[i];
+  return sum;
+}
+
+static void copy(double *to, const double *from, int n) {
+  if (n > 0) memcpy(to, from, (size_t)n * sizeof *to);
+}
+
+static cav_status prepare(newton *s, const cav_model *model, cav_state *state) {
+  const size_t matrices = cav_takes_mean(state) ? 2 : 1;
+  const cav_impulse_room room = {.per_block = BLOCK, .per_row = 5, .per_dof = 8, .per_dof_squared = matrices};
+  const cav_status status = cav_impulse_new(model, state, s->q, s->v, &room, &s->problem);
+  if (status != CAV_OK) return status;
+  const size_t nv = (size_t)model->nv, nrow = (size_t)s->problem.nrow, nblock = (size_t)s->problem.nblock;
+  double **const row[] = {&s->y, &s->f, &s->derivative, &s->try_y, &s->try_f};
+  double **const dof[] = {&s->x, &s->anchor, &s->base, &s->step, &s->momentum, &s->gradient, &s->best, &s->found};
+  double *at = s->problem.spare;
+  for (int i = 0; i < 5; i++, at += nrow) *row[i] = at;
+  for (int i = 0; i < 8; i++, at += nv) *dof[i] = at;
+  s->curvature = at;
+  s->matrix = s->curvature + BLOCK * nblock;
+  s->smooth = s->matrix + nv * nv;
+  return CAV_OK;
+}
+
+// impulses at y; with their curvature or the potential if asked
+static double laws(newton *s, const double *y, double *f, double *curvature, int potential) {
+  double sum = 0.0, psi = 0.0;
+  for (int b = 0; b < s->problem.nblock; b++) {
+    cav_impulse_law(&s->problem, &s->problem.block[b], y, f, curvature ? curvature + BLOCK * b : NULL,
+                    potential ? &psi : NULL);
+    sum += psi;
+  }
+  return sum;
+}
+
+// matrix := matrix + J' H J, lower triangle only or whole
+static void add_constraints(newton *s, int whole) {
+  const int nv = s->problem.nv;
+  for (int b = 0; b < s->problem.nblock; b++) {
+    const cav_block *block = &s->problem.block[b];
+    const double *H = s->curvature + BLOCK * b, *J = block->J;
+    const int n = block->ndof, dim = block->dim;
+    if (largest(H, dim * dim) == 0.0) continue;
+    for (int i = 0; i < n; i++) {
+      double bent[6] = {0.0}, *to = s->matrix + block->dof[i] * nv;
+      for (int k = 0; k < dim; k++)
+        for (int l = 0; l < dim; l++) bent[k] += H[k * dim + l] * J[l * n + i];
+      for (int j = 0; j < n; j++) {
+        if (!whole && block->dof[j] > block->dof[i]) continue;
+        double sum = 0.0;
+        for (int k = 0; k < dim; k++) sum += bent[k] * J[k * n + j];
+        to[block->dof[j]] += sum;
+      }
+    }
+  }
+}
+
+// matrix := M + J' H J, lower triangle
+static void fill_hessian(newton *s) {
+  const cav_impulse *p = &s->problem;
+  const cav_workspace *work = p->state->work;
+  memset(s->matrix, 0, (size_t)p->nv * (size_t)p->nv * sizeof *s->matrix);
+  for (int i = 0; i < p->nv; i++) {
+    const double *M = p->M + work->row[i];
+    for (int j = i, k = 0; j >= 0; j = work->parent[j], k++) s->matrix[i * p->nv + j] = M[k];
+  }
+  add_constraints(s, 0);
+}
+
+// matrix = L' D L from the last dof to the first, touching only what is not zero. No pivot can fall below that of M
+// itself, so rounding in a very stiff constraint cannot make the matrix indefinite
+static void factor_hessian(newton *s) {
+  const int nv = s->problem.nv, *row = s->problem.state->work->row;
+  for (int k = nv - 1; k >= 0; k--) {
+    double *Ak = s->matrix + k * nv;
+    const double least = s->problem.L[row[k]];
+    if (!(Ak[k] >= least)) Ak[k] = least;
+    for (int i = k - 1; i >= 0; i--) {
+      if (Ak[i] == 0.0) continue;
+      const double ratio = Ak[i] / Ak[k];
+      double *Ai = s->matrix + i * nv;
+      for (int j = 0; j <= i; j++) Ai[j] -= ratio * Ak[j];
+      Ak[i] = ratio;
+    }
+  }
+}
+
+static void solve_hessian(const newton *s, double *x) {
+  const int nv = s->problem.nv;
+  for (int k = nv - 1; k >= 0; k--)
+    for (int i = 0; i < k; i++) x[i] -= s->matrix[k * nv + i] * x[k];
+  for (int k = 0; k < nv; k++) {
+    x[k] /= s->matrix[k * nv + k];
+    for (int i = 0; i < k; i++) x[k] -= s->matrix[k * nv + i] * x[i];
+  }
+}
+
+// gradient of the convex potential at x
+static void fill_gradient(newton *s) {
+  const int nv = s->problem.nv;
+  for (int i = 0; i < nv; i++) s->step[i] = s->x[i] - s->anchor[i];
+  cav_impulse_inertia(&s->problem, s->step, s->momentum);
+  for (int i = 0; i < nv; i++) s->gradient[i] = s->momentum[i] + s->base[i];
+  cav_impulse_push(&s->problem, -1.0, s->f, s->gradient);
+}
+
+// least point of the potential along step, by its derivative: Newton within a shrinking bracket. Returns how far to go
+static double search(newton *s) {
+  const cav_impulse *p = &s->problem;
+  const int nv = p->nv, nrow = p->nrow;
+  double linear = 0.0, bend = 0.0, low = 0.0, high = INFINITY, length = 1.0;
+  for (int i = 0; i < nv; i++) linear += s->step[i] * (s->momentum[i] + s->base[i]);
+  cav_impulse_inertia(p, s->step, s->found);
+  bend = dot(s->step, s->found, nv);
+  cav_impulse_rows(p, s->step, s->derivative);
+  const double pull = dot(s->derivative, s->f, nrow), start = linear - pull;
+  const double noise = 4.0 * DBL_EPSILON * (fabs(linear) + fabs(pull));
+  for (int k = 0; k < SEARCH_STEPS; k++) {
+    for (int i = 0; i < nrow; i++) s->try_y[i] = s->y[i] + length * s->derivative[i];
+    laws(s, s->try_y, s->try_f, s->curvature, 0);
+    const double derivative = linear + length * bend - dot(s->derivative, s->try_f, nrow);
+    // short of the minimum a rough answer will do, beyond it a close one is needed to be sure of descent
+    if ((derivative <= 0.0 && derivative >= 0.3 * start) || fabs(derivative) <= fmax(1e-3 * fabs(start), noise)) break;
+    double curve = bend;
+    for (int b = 0; b < p->nblock; b++) {
+      const cav_block *block = &p->block[b];
+      const double *H = s->curvature + BLOCK * b, *Jd = s->derivative + block->first;
+      for (int i = 0; i < block->dim; i++) curve += Jd[i] * dot(H + i * block->dim, Jd, block->dim);
+    }
+    if (derivative < 0.0)
+      low = length;
+    else
+      high = length;
+    length -= derivative / curve;
+    if (!(length > low && length < high)) length = high < INFINITY ? 0.5 * (low + high) : 2.0 * low;
+  }
+  return length;
+}
+
+// start of the convex problem: where it is lower, x or where the smooth forces alone lead
+static void choose_start(newton *s) {
+  const cav_impulse *p = &s->problem;
+  const int nv = p->nv;
+  cav_impulse_rows(p, s->x, s->y);
+  const double stay = laws(s, s->y, s->f, NULL, 1);
+  copy(s->step, s->base, nv);
+  cav_ldl_solve(p->model, p->state->work, p->L, s->step);
+  const double fall = 0.5 * dot(s->base, s->step, nv);
+  for (int i = 0; i < nv; i++) s->step[i] = s->x[i] - s->step[i];
+  cav_impulse_rows(p, s->step, s->try_y);
+  const double go = laws(s, s->try_y, s->try_f, NULL, 1) - fall;
+  if (go < stay) copy(s->x, s->step, nv);
+}
+
+// minimises the potential with smooth forces linear in M about x, to tolerance of the largest force or until it stalls
+static cav_status solve_convex(newton *s, double tolerance) {
+  const cav_impulse *p = &s->problem;
+  const int nv = p->nv;
+  copy(s->anchor, s->x, nv);
+  const cav_status status = cav_impulse_smooth(p, s->v, s->u, s->x, s->base);
+  if (status != CAV_OK) return status;
+  // impulses where v_next = v say nothing about those of the solution, so the first pass does not count them
+  const double scale = p->state->options.timestep * (s->iterations > 0 ? s->scale : largest(s->u, nv));
+  choose_start(s);
+  for (int first = 1; s->iterations < s->limit; first = 0) {
+    cav_impulse_rows(p, s->x, s->y);
+    laws(s, s->y, s->f, s->curvature, 0);
+    fill_gradient(s);
+    const double inertial = fmax(largest(s->base, nv), largest(s->momentum, nv));
+    if (!first && largest(s->gradient, nv) <= tolerance * fmax(scale, inertial)) break;
+    fill_hessian(s);
+    factor_hessian(s);
+    for (int i = 0; i < nv; i++) s->step[i] = -s->gradient[i];
+    solve_hessian(s, s->step);
+    if (!all_finite(s->step, nv)) return CAV_NOT_FINITE;
+    s->iterations++;
+    const double length = search(s);
+    for (int i = 0; i < nv; i++) s->x[i] += length * s->step[i];
+    if (length * largest(s->step, nv) <= 64.0 * DBL_EPSILON * largest(s->x, nv)) break;
+  }
+  return CAV_OK;
+}
+
+// largest error of the generalised force that rounding causes: of x through inertia and stiff constraints, and of the
+// largest forces
+static double rounding(newton *s) {
+  const cav_impulse *p = &s->problem;
+  double *error = s->gradient;
+  cav_impulse_rows(p, s->x, s->y);
+  laws(s, s->y, s->f, s->curvature, 0);
+  cav_impulse_inertia(p, s->x, error);
+  // two momenta, each at poses that are rounded, or one change of velocity
+  const double terms = p->state->options.order == CAV_ORDER_MOMENTUM ? 4.0 : 1.0;
+  for (int i = 0; i < p->nv; i++) error[i] = terms * fabs(error[i]);
+  for (int b = 0; b < p->nblock; b++) {
+    const cav_block *block = &p->block[b];
+    const double *H = s->curvature + BLOCK * b;
+    for (int i = 0; i < block->dim; i++) {
+      const double *J = block->J + i * block->ndof;
+      double size = fabs(p->target[block->first + i]);
+      for (int k = 0; k < block->ndof; k++) size += fabs(J[k] * s->x[block->dof[k]]);
+      for (int j = 0; j < block->dim; j++)
+        for (int k = 0; k < block->ndof; k++)
+          error[block->dof[k]] += fabs(block->J[j * block->ndof + k] * H[j * block->dim + i]) * size;
+    }
+  }
+  return DBL_EPSILON * (largest(error, p->nv) / p->state->options.timestep + 8.0 * s->scale);
+}
+
+// derivative of h times the smooth inverse with respect to v_next, by columns. It is quadratic in v_next, or
+// nearly so: a one-sided difference errs by the step, 1e-5 of the Coriolis terms, which costs Newton nothing
+static cav_status differentiate_smooth(newton *s) {
+  const int nv = s->problem.nv;
+  cav_status status = cav_impulse_smooth(&s->problem, s->v, s->u, s->x, s->base);
+  for (int j = 0; j < nv && status == CAV_OK; j++) {
+    const double kept = s->x[j], step = 1e-5 * fmax(1.0, fabs(kept));
+    s->x[j] = kept + step;
+    const double taken = s->x[j] - kept;
+    status = cav_impulse_smooth(&s->problem, s->v, s->u, s->x, s->gradient);
+    s->x[j] = kept;
+    for (int i = 0; i < nv; i++) s->smooth[i * nv + j] = (s->gradient[i] - s->base[i]) / taken;
+  }
+  s->have_smooth = status == CAV_OK;
+  return status;
+}
+
+// b := A^-1 b by elimination with row exchanges, A overwritten; returns 0 if A is singular
+static int solve_general(int n, double *A, double *b) {
+  for (int k = 0; k < n; k++) {
+    int pivot = k;
+    for (int i = k + 1; i < n; i++)
+      if (fabs(A[i * n + k]) > fabs(A[pivot * n + k])) pivot = i;
+    if (!(fabs(A[pivot * n + k]) > 0.0)) return 0;
+    for (int j = k; pivot != k && j < n; j++) {
+      const double held = A[k * n + j];
+      A[k * n + j] = A[pivot * n + j];
+      A[pivot * n + j] = held;
+    }
+    const double held = b[k];
+    b[k] = b[pivot];
+    b[pivot] = held;
+    for (int i = k + 1; i < n; i++) {
+      const double ratio = A[i * n + k] / A[k * n + k];
+      if (ratio == 0.0) continue;
+      for (int j = k + 1; j < n; j++) A[i * n + j] -= ratio * A[k * n + j];
+      b[i] -= ratio * b[k];
+    }
+  }
+  for (int i = n - 1; i >= 0; i--) {
+    for (int j = i + 1; j < n; j++) b[i] -= A[i * n + j] * b[j];
+    b[i] /= A[i * n + i];
+  }
+  return all_finite(b, n);
+}
+
+// measures the inverse at x
+static cav_status measure(newton *s) {
+  return cav_impulse_check(&s->problem, s->q, s->v, s->u, s->x, s->found, s->f, &s->error, &s->scale);
+}
+
+static double residual(const newton *s) { return s->error > 0.0 ? s->error / s->scale : 0.0; }
+
+// one Newton step on the inverse itself, smooth derivative included, from a point just measured; shortened until the
+// error falls. accepted tells whether it did; x is measured afterwards in either case
+static cav_status newton_step(newton *s, int *accepted) {
+  const int nv = s->problem.nv;
+  const double before = residual(s);
+  *accepted = 0;
+  copy(s->momentum, s->found, nv);
+  if (!s->have_smooth) {
+    const cav_status status = differentiate_smooth(s);
+    if (status != CAV_OK) return status;
+  }
+  cav_impulse_rows(&s->problem, s->x, s->y);
+  laws(s, s->y, s->f, s->curvature, 0);
+  copy(s->matrix, s->smooth, nv * nv);
+  add_constraints(s, 1);
+  for (int i = 0; i < nv; i++) s->step[i] = s->problem.state->options.timestep * (s->u[i] - s->momentum[i]);
+  s->iterations++;
+  if (!solve_general(nv, s->matrix, s->step)) return CAV_OK;
+  copy(s->anchor, s->x, nv);
+  for (double length = 1.0; length > SHORTEST_STEP; length *= 0.5) {
+    for (int i = 0; i < nv; i++) s->x[i] = s->anchor[i] + length * s->step[i];
+    const cav_status status = measure(s);
+    // a derivative that served badly is taken anew next time, unless what is left is rounding
+    if (length == 1.0 && residual(s) > 0.02 * before && s->error > rounding(s)) s->have_smooth = 0;
+    *accepted = status == CAV_OK && residual(s) <= (1.0 - 0.5 * length) * before;
+    if (*accepted) return CAV_OK;
+  }
+  copy(s->x, s->anchor, nv);
+  return measure(s);
+}
+
+// error of v_next relative to its largest entry that the error of u stands for, if constraints did not hold it back: a
+// force small against the largest may still move a light link
+static double velocity_error(newton *s) {
+  const cav_impulse *p = &s->problem;
+  for (int i = 0; i < p->nv; i++) s->gradient[i] = p->state->options.timestep * (s->found[i] - s->u[i]);
+  cav_ldl_solve(p->model, p->state->work, p->L, s->gradient);
+  const double error = largest(s->gradient, p->nv);
+  return error > 0.0 ? error / largest(s->x, p->nv) : 0.0;
+}
+
+// passes until the inverse agrees with u; x is then the best iterate and the state evaluated there
+static cav_status iterate(newton *s, double tolerance) {
+  const int nv = s->problem.nv, mean = cav_takes_mean(s->problem.state);
+  double least = INFINITY;
+  int stalls = 0, accepted = 0, polished = 0;
+  copy(s->x, s->v, nv);
+  for (int pass = 0;; pass++) {
+    if (!accepted) {
+      const cav_status status = measure(s);
+      if (status != CAV_OK) return status;
+    }
+    stalls = residual(s) < 0.99 * least ? 0 : stalls + 1;
+    if (residual(s) < least) {
+      least = residual(s);
+      copy(s->best, s->x, nv);
+    }
+    if (least <= tolerance && (polished++ == POLISH || velocity_error(s) <= 10.0 * tolerance)) break;
+    if (pass > 0 && s->error <= rounding(s)) break;
+    if (stalls >= STALLS || s->iterations >= s->limit) break;
+    accepted = 0;
+    cav_status status = CAV_OK;
+    if (mean && pass > 0) status = newton_step(s, &accepted);
+    if (status == CAV_OK && !accepted) status = solve_convex(s, mean && pass == 0 ? 1e-2 : 0.1 * tolerance);
+    if (status != CAV_OK) return status;
+  }
+  copy(s->x, s->best, nv);
+  const cav_status status = measure(s);
+  if (status != CAV_OK) return status;
+  return residual(s) <= tolerance || s->error <= 4.0 * rounding(s) ? CAV_OK : CAV_NOT_CONVERGED;
+}
+
+cav_status cav_forward_newton(const cav_model *model, cav_state *state, const double *q, const double *v,
+                              const double *u, int iterations, double tolerance, double *v_next,
+                              cav_forward_report *report) {
+  if (iterations < 0 || !(tolerance >= 0.0)) return CAV_BAD_INPUT;
+  if (!all_finite(u, model->nv) || !all_finite(v, model->nv)) return CAV_NOT_FINITE;
+  newton s = {.q = q, .v = v, .u = u, .limit = iterations};
+  cav_status status = prepare(&s, model, state);
+  if (status != CAV_OK) return status;
+  status = iterate(&s, tolerance);
+  if (status != CAV_OK && status != CAV_NOT_CONVERGED) return status;
+  copy(v_next, s.x, model->nv);
+  if (report) *report = (cav_forward_report){.iterations = s.iterations, .residual = residual(&s)};
+  return status;
+}
+
+cav_status cav_forward(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
+                       double *v_next) {
+  return cav_forward_newton(model, state, q, v, u, DEFAULT_ITERATIONS, DEFAULT_TOLERANCE, v_next, NULL);
+}

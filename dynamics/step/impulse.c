@@ -1,0 +1,203 @@
+/// Writes out the impulse problem (9) of Todorov 2014 at one (q, v): inertia with its factors, Jacobian blocks, targets
+/// v* and regularisers R, and the operations on them that both forward solvers use. Everything it needs of the
+/// constraints comes from the state after an inverse at v_next = v, so forward and inverse cannot disagree about them.
+/// Solves nothing: forward.c, gpgs.c.
+#include "impulse.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "math3.h"
+
+enum { DIM_MAX = 6 };
+
+void *cav_solver_room(cav_workspace *work, size_t bytes) {
+  if (bytes > work->solver_bytes) {
+    void *larger = malloc(bytes + bytes / 2);
+    if (!larger) return NULL;
+    free(work->solver);
+    work->solver = larger;
+    work->solver_bytes = bytes + bytes / 2;
+  }
+  return work->solver;
+}
+
+// M with what acts implicitly, and its factors
+static cav_status fill_inertia(cav_impulse *p) {
+  cav_step_inertia(p->model, p->state, p->M);
+  return cav_ldl_factor(p->model, p->state->work, p->M, p->L) ? CAV_OK : CAV_BAD_INPUT;
+}
+
+// v* = (1 - hB) x' - hK x and R of every row
+static void fill_targets(cav_impulse *p) {
+  for (int b = 0; b < p->nblock; b++) {
+    const cav_block *block = &p->block[b];
+    double *target = p->target + block->first, *R = p->R + block->first;
+    if (block->contact >= 0) {
+      const cav_contact *c = &p->state->contact[block->contact];
+      for (int i = 0; i < c->dim; i++) {
+        target[i] = (1.0 - c->damping[i]) * c->velocity[i] - (i == 0 ? c->stiffness * (c->dist - c->margin) : 0.0);
+        R[i] = c->regulariser[i];
+      }
+    } else if (block->equality >= 0) {
+      const cav_equality_rows *eq = &p->state->equality[block->equality];
+      for (int k = 0; k < eq->dim; k++) {
+        target[k] = (1.0 - eq->damping) * eq->velocity[k] - eq->stiffness * eq->error[k];
+        R[k] = eq->regulariser[k];
+      }
+    } else {
+      const cav_row *row = &p->state->row[block->row];
+      const int limit = row->type == CAV_ROW_LIMIT_JOINT || row->type == CAV_ROW_LIMIT_TENDON;
+      target[0] = (1.0 - row->damping) * row->velocity - (limit ? row->stiffness * (row->dist - row->margin) : 0.0);
+      R[0] = row->regulariser;
+    }
+  }
+  const double *coupled = p->state->work->target;
+  if (p->state->options.coupled && p->nrow > 0) memcpy(p->target, coupled, (size_t)p->nrow * sizeof *coupled);
+}
+
+cav_status cav_impulse_new(const cav_model *model, cav_state *state, const double *q, const double *v,
+                           const cav_impulse_room *room, cav_impulse *p) {
+  cav_status status = cav_position(model, state, q);
+  if (status != CAV_OK) return status;
+  const size_t nv = (size_t)model->nv, nblock = (size_t)(state->ncontact + state->nrow + state->nequality);
+  const size_t nrow = (size_t)cav_jacobian_rows(state), entries = (size_t)state->work->row[model->nv];
+
+  // one piece of memory: doubles first, then blocks, then indices
+  const size_t spare = room->per_block * nblock + room->per_row * nrow + room->per_row_squared * nrow * nrow +
+                       room->per_row_and_dof * nrow * nv + room->per_dof * nv + room->per_dof_squared * nv * nv;
+  const size_t doubles = 2 * nrow + nrow * nv + 2 * entries + 2 * nv + spare;
+  double *at =
+      cav_solver_room(state->work, doubles * sizeof(double) + nblock * (sizeof(cav_block) + nv * sizeof(int)) + 64);
+  if (!at) return CAV_NO_MEMORY;
+  *p = (cav_impulse){.model = model, .state = state, .nv = (int)nv, .nblock = (int)nblock, .nrow = (int)nrow};
+  p->nbound = state->ncontact + state->nrow;
+  p->nbound_row = (int)nrow - cav_equality_row_count(state);
+  p->target = at;
+  p->R = p->target + nrow;
+  double *J = p->R + nrow;
+  p->M = J + nrow * nv;
+  p->L = p->M + entries;
+  p->force = p->L + entries;
+  p->change = p->force + nv;
+  p->spare = p->change + nv;
+  p->block = (cav_block *)(p->spare + spare);
+  int *dof = (int *)(p->block + nblock);
+
+  // the constraints as the inverse sees them, then the matrices
+  status = cav_inverse_from(model, state, CAV_STAGE_POSITION, q, v, v, state->u);
+  if (status != CAV_OK) return status;
+  cav_jacobian(model, state, p->block, dof, J);
+  fill_targets(p);
+  return fill_inertia(p);
+}
+
+void cav_impulse_rows(const cav_impulse *p, const double *x, double *y) {
+  for (int b = 0; b < p->nblock; b++) {
+    const cav_block *block = &p->block[b];
+    for (int i = 0; i < block->dim; i++) {
+      const double *J = block->J + i * block->ndof;
+      double sum = 0.0;
+      for (int k = 0; k < block->ndof; k++) sum += J[k] * x[block->dof[k]];
+      y[block->first + i] = sum;
+    }
+  }
+}
+
+void cav_impulse_push(const cav_impulse *p, double s, const double *f, double *r) {
+  for (int b = 0; b < p->nblock; b++) {
+    const cav_block *block = &p->block[b];
+    for (int i = 0; i < block->dim; i++) {
+      const double *J = block->J + i * block->ndof, sf = s * f[block->first + i];
+      if (sf == 0.0) continue;
+      for (int k = 0; k < block->ndof; k++) r[block->dof[k]] += J[k] * sf;
+    }
+  }
+}
+
+void cav_impulse_inertia(const cav_impulse *p, const double *x, double *r) {
+  const cav_workspace *work = p->state->work;
+  memset(r, 0, (size_t)p->nv * sizeof *r);
+  for (int i = 0; i < p->nv; i++) {
+    const double *M = p->M + work->row[i];
+    r[i] += M[0] * x[i];
+    for (int j = work->parent[i], k = 1; j >= 0; j = work->parent[j], k++) {
+      r[i] += M[k] * x[j];
+      r[j] += M[k] * x[i];
+    }
+  }
+}
+
+// soft equality: f = g, whatever it is
+static void equality_law(int dim, const double *R, const double *g, double *f, double *hessian, double *potential) {
+  double sum = 0.0;
+  for (int i = 0; i < dim; i++) {
+    f[i] = g[i];
+    sum += 0.5 * R[i] * g[i] * g[i];
+    for (int j = 0; hessian && j < dim; j++) hessian[i * dim + j] = i == j ? 1.0 / R[i] : 0.0;
+  }
+  if (potential) *potential = sum;
+}
+
+void cav_impulse_law(const cav_impulse *p, const cav_block *block, const double *y, double *f, double *hessian,
+                     double *potential) {
+  double g[DIM_MAX];
+  const double *R = p->R + block->first;
+  for (int i = 0; i < block->dim; i++) g[i] = (p->target[block->first + i] - y[block->first + i]) / R[i];
+  f += block->first;
+  if (block->contact >= 0) {
+    const cav_contact *contact = &p->state->contact[block->contact];
+    cav_law_cone(block->dim, R, contact->friction, contact->sigma, g, f, hessian, potential);
+    return;
+  }
+  if (block->equality >= 0) {
+    equality_law(block->dim, R, g, f, hessian, potential);
+    return;
+  }
+  const cav_row *row = &p->state->row[block->row];
+  if (row->type == CAV_ROW_FRICTION_DOF || row->type == CAV_ROW_FRICTION_TENDON)
+    cav_law_bilateral(R[0], row->sigma, row->bound, g[0], f, hessian, potential);
+  else
+    cav_law_unilateral(R[0], row->sigma, g[0], f, hessian, potential);
+}
+
+cav_status cav_impulse_smooth(const cav_impulse *p, const double *v, const double *u, const double *x, double *r) {
+  cav_smooth_inverse(p->model, p->state, v, x, r);
+  for (int i = 0; i < p->nv; i++) r[i] = p->state->options.timestep * (r[i] - u[i]);
+  return all_finite(r, p->nv) ? CAV_OK : CAV_NOT_FINITE;
+}
+
+void cav_impulse_read(const cav_impulse *p, double *f) {
+  for (int b = 0; b < p->nblock; b++) {
+    const cav_block *block = &p->block[b];
+    if (block->contact >= 0)
+      memcpy(f + block->first, p->state->contact[block->contact].impulse, (size_t)block->dim * sizeof *f);
+    else if (block->equality >= 0)
+      memcpy(f + block->first, p->state->equality[block->equality].impulse, (size_t)block->dim * sizeof *f);
+    else
+      f[block->first] = p->state->row[block->row].impulse;
+  }
+}
+
+cav_status cav_impulse_check(const cav_impulse *p, const double *q, const double *v, const double *u, const double *x,
+                             double *u_found, double *f, double *error, double *scale) {
+  const cav_status status = cav_inverse_from(p->model, p->state, CAV_STAGE_VELOCITY, q, v, x, u_found);
+  if (status != CAV_OK) return status;
+  cav_impulse_read(p, f);
+
+  // inertial and constraint forces are as much part of the balance as u is
+  const double rate = 1.0 / p->state->options.timestep;
+  double *change = p->change, *force = p->force;
+  *error = *scale = 0.0;
+  for (int i = 0; i < p->nv; i++) change[i] = rate * (x[i] - v[i]);
+  cav_impulse_inertia(p, change, force);
+  for (int i = 0; i < p->nv; i++) {
+    *scale = fmax(*scale, fmax(fabs(u[i]), fabs(force[i])));
+    *error = fmax(*error, fabs(u_found[i] - u[i]));
+    force[i] = 0.0;
+  }
+  cav_impulse_push(p, rate, f, force);
+  for (int i = 0; i < p->nv; i++) *scale = fmax(*scale, fabs(force[i]));
+  return CAV_OK;
+}

@@ -1,0 +1,83 @@
+/// The impulse problem (9) of one state written out in matrices, shared by the forward solvers. The inverse never needs
+/// it. Private to dynamics/.
+#ifndef CAVORT_IMPULSE_H
+#define CAVORT_IMPULSE_H
+
+#include "workspace.h"
+
+/// The rows of one constraint object and what their Jacobian is made of: only dofs that move the object are listed.
+typedef struct cav_block {
+  int contact;  ///< index into state->contact, or -1
+  int row;      ///< index into state->row, or -1
+  int equality; ///< index into state->equality constraint, or -1
+  int dim;      ///< number of rows
+  int first;    ///< first of them among all rows
+  int ndof;
+  const int *dof;  ///< [ndof] indices into v
+  const double *J; ///< [dim*ndof] row-major
+} cav_block;
+
+/// The problem at one (q, v). Memory belongs to the state and is good until the next call of cav_impulse_new on it.
+typedef struct cav_impulse {
+  const cav_model *model;
+  cav_state *state;
+  int nv, nblock, nrow;
+  int nbound, nbound_row; ///< blocks and rows before those of equality constraints
+  cav_block *block;       ///< [nblock] contacts in their order, then scalar rows, then equality constraints in theirs
+  double *target;         ///< v* [nrow], m/s or rad/s
+  double *R;              ///< regulariser [nrow], 1/kg
+  double *M; ///< tree-sparse, D included; at the mean velocity with half of the damping that acts during the step
+  double *L; ///< its factors by cav_ldl_factor
+  double *force, *change; ///< scratch [nv]
+  double *spare;          ///< doubles asked for
+} cav_impulse;
+
+/// Jacobian rows of all contacts, rows and equality constraints of the state, each with the dofs that move it. jacobian.c.
+/// block [n], n = ncontact+nrow+nequality, dof [n*nv], J [rows*nv]. Returns the number of rows.
+int cav_jacobian(const cav_model *model, const cav_state *state, cav_block *block, int *dof, double *J);
+
+/// Number of constraint rows of the state; those of equality constraints alone. jacobian.c.
+int cav_jacobian_rows(const cav_state *state);
+int cav_equality_row_count(const cav_state *state);
+
+/// Row i of a block as a dense vector r [nv]. jacobian.c.
+void cav_block_spread(const cav_block *block, int i, int nv, double *r);
+
+/// Doubles a solver needs of its own, by what they grow with.
+typedef struct cav_impulse_room {
+  size_t per_block, per_row, per_row_squared, per_row_and_dof, per_dof, per_dof_squared;
+} cav_impulse_room;
+
+/// Evaluates the state at (q, v, v_next = v) and writes out the problem there, with the room asked for at spare.
+/// impulse.c. Fails as cav_inverse does, with CAV_NO_MEMORY, and with CAV_BAD_INPUT if the inertia is not positive
+/// definite.
+cav_status cav_impulse_new(const cav_model *model, cav_state *state, const double *q, const double *v,
+                           const cav_impulse_room *room, cav_impulse *problem);
+
+/// y := J x, x [nv] -> y [nrow].
+void cav_impulse_rows(const cav_impulse *problem, const double *x, double *y);
+
+/// r := r + s J' f, f [nrow], r [nv].
+void cav_impulse_push(const cav_impulse *problem, double s, const double *f, double *r);
+
+/// r := M x, x, r [nv], not the same.
+void cav_impulse_inertia(const cav_impulse *problem, const double *x, double *r);
+
+/// Impulse of one block at its constraint velocity v_next: y, f [nrow] of the whole problem. hessian [dim*dim] and
+/// potential may be NULL.
+void cav_impulse_law(const cav_impulse *problem, const cav_block *block, const double *y, double *f, double *hessian,
+                     double *potential);
+
+/// Momentum missing without constraints: r := h (smooth inverse at x - u), zero where u alone takes v to x. Leaves the
+/// state's contacts as they are. v, u, x, r [nv]. Fails with CAV_NOT_FINITE.
+cav_status cav_impulse_smooth(const cav_impulse *problem, const double *v, const double *u, const double *x, double *r);
+
+/// Impulses found by the state's last evaluation, f [nrow].
+void cav_impulse_read(const cav_impulse *problem, double *f);
+
+/// Evaluates the inverse at x and compares: error receives the largest |inverse - u|, scale the largest generalised
+/// force in the balance, u_found [nv] and f [nrow] what the inverse gives.
+cav_status cav_impulse_check(const cav_impulse *problem, const double *q, const double *v, const double *u,
+                             const double *x, double *u_found, double *f, double *error, double *scale);
+
+#endif

@@ -1,0 +1,474 @@
+/// Why a motion misses what it was asked for: constraint rows of its solution gathered by what they come from, ranked twice.
+///
+/// By violation: how far the worst knot of each is from its bound, scaled, beyond what planning leaves room for.
+/// By conflict: at a point where constraints cannot all hold, Gauss-Newton on the rows alone has come to rest, so their
+/// weighted violations times their gradients sum to zero: sum_i y_i dg_i = 0, a local certificate of infeasibility (Farkas).
+/// What one thing (an actuator, a joint, a component of a term) adds to that sum over its knots is its pull. It does not depend
+/// on the weights that spread the violation over the rows, so what pulls hardest is the contradiction, wherever its violation
+/// shows. Where all constraints hold the y_i are the multipliers, and the same ranking says what the cost hangs on.
+///
+/// Penetrations are added from the knots. Costs are not explained, nor is a local minimum told from a true impossibility.
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cavort/solve.h"
+#include "file.h"
+#include "problem_file.h"
+
+/// A contact counts as deep where planning would not have left it.
+static const double deep = CAV_TOLERANCE_PENETRATION;
+
+/// Same thing over all its knots.
+typedef struct group {
+  cav_binding_kind kind;
+  int object, component;
+  const cav_binding *missed, *pulled; ///< worst of its rows, NULL: none
+  int missed_first, missed_last;      ///< knots
+  int pulled_first, pulled_last;      ///< knots with at least a tenth of the worst pull
+  double violation, pull, sum;        ///< worst and worst, sum of pulls
+} group;
+
+/// An explanation in progress.
+typedef struct inquiry {
+  const cav_problem *problem;
+  const cav_model *model;
+  double timestep;
+  int nrow, room;
+  cav_binding *row; ///< those given, then penetrations
+  int ngroup;
+  group *group;
+  int met; ///< all but penetrations hold
+  double pulls;
+} inquiry;
+
+static double excess(const cav_binding *row) {
+  double e = fmax(fmax(row->lower - row->value, row->value - row->upper), 0);
+  return e > row->allowed ? e : 0;
+}
+
+// ---------------------------------------------------------------- gathering
+
+static int add_row(inquiry *in, const cav_binding *row) {
+  if (in->nrow == in->room) {
+    in->room = in->room ? 2 * in->room : 64;
+    cav_binding *larger = realloc(in->row, (size_t)in->room * sizeof *larger);
+    if (!larger) return 0;
+    in->row = larger;
+  }
+  in->row[in->nrow++] = *row;
+  return 1;
+}
+
+/// The hard term of that number among the hard ones, -1: there are fewer.
+static int hard_term(const cav_problem *p, int k) {
+  for (int i = 0; i < p->nterm; i++)
+    if (p->term[i].use != CAV_USE_COST && k-- == 0) return i;
+  return -1;
+}
+
+/// Number of objects of a kind of row.
+static int objects(const cav_problem *p, cav_binding_kind kind) {
+  switch (kind) {
+    case CAV_BINDING_UNACTUATED:
+      return p->model->nv;
+    case CAV_BINDING_EFFORT:
+      return p->model->nu;
+    case CAV_BINDING_JOINT:
+      return p->model->njoint;
+    case CAV_BINDING_TENDON:
+      return p->model->ntendon;
+    case CAV_BINDING_TERM:
+      return p->nterm; // told more closely by hard_term
+    case CAV_BINDING_PENETRATION:
+    case CAV_BINDING_KINDS:
+      break;
+  }
+  return 0;
+}
+
+/// Components of a row of that kind and object.
+static int components(const cav_problem *p, const cav_binding *row) {
+  if (row->kind == CAV_BINDING_UNACTUATED) return p->model->nv;
+  if (row->kind != CAV_BINDING_TERM) return 1;
+  int i = hard_term(p, row->object);
+  if (i < 0) return 0;
+  const cav_term *term = &p->term[i];
+  return term->quantity == CAV_QUANTITY_SENSOR ? term->sensor.dim : p->model->nv;
+}
+
+static cav_status take_rows(inquiry *in, int nknot, int nrow, const cav_binding *row, cav_error *error) {
+  for (int i = 0; i < nrow; i++) {
+    const cav_binding *r = &row[i];
+    int known = r->kind >= 0 && r->object >= 0 && r->object < objects(in->problem, r->kind);
+    if (!known || r->knot < 0 || r->knot >= nknot || r->component < 0 || r->component >= components(in->problem, r) ||
+        !isfinite(r->value) || !isfinite(r->multiplier) || !isfinite(r->pull))
+      return cav_file_fail(error, CAV_BAD_INPUT, 0, "constraint row %d is not of this problem; solve it again", i);
+    if (!add_row(in, r)) return CAV_NO_MEMORY;
+  }
+  return CAV_OK;
+}
+
+/// Contacts that are deeper than a certificate allows.
+static cav_status take_penetrations(inquiry *in, const cav_trajectory *at, const cav_options *law) {
+  cav_state *state = cav_state_new(in->model);
+  cav_status status = state ? CAV_OK : CAV_NO_MEMORY;
+  if (state) state->options = *law;
+  for (int t = 0; t < at->nknot && status == CAV_OK; t++) {
+    status = cav_position(in->model, state, at->q + (size_t)t * (size_t)at->nq);
+    for (int i = 0; i < state->ncontact && status == CAV_OK; i++) {
+      cav_binding row = {.knot = t,
+                         .kind = CAV_BINDING_PENETRATION,
+                         .object = state->contact[i].pair,
+                         .value = -state->contact[i].dist,
+                         .lower = -INFINITY,
+                         .upper = deep};
+      if (row.value > deep && !add_row(in, &row)) status = CAV_NO_MEMORY;
+    }
+  }
+  cav_state_free(state);
+  return status;
+}
+
+static group *group_of(inquiry *in, const cav_binding *row) {
+  for (int i = 0; i < in->ngroup; i++) {
+    group *g = &in->group[i];
+    if (g->kind == row->kind && g->object == row->object && g->component == row->component) return g;
+  }
+  if ((in->ngroup & (in->ngroup + 1)) == 0) {
+    // full at 0, 1, 3, 7, ...
+    group *larger = realloc(in->group, (2 * (size_t)in->ngroup + 1) * sizeof *larger);
+    if (!larger) return NULL;
+    in->group = larger;
+  }
+  in->group[in->ngroup] = (group){.kind = row->kind,
+                                  .object = row->object,
+                                  .component = row->component,
+                                  .pulled_first = INT_MAX,
+                                  .pulled_last = -1};
+  return &in->group[in->ngroup++];
+}
+
+static cav_status gather(inquiry *in) {
+  in->met = 1;
+  for (int i = 0; i < in->nrow; i++)
+    if (in->row[i].kind != CAV_BINDING_PENETRATION && excess(&in->row[i]) > 0) in->met = 0;
+  for (int i = 0; i < in->nrow; i++) {
+    const cav_binding *row = &in->row[i];
+    group *g = group_of(in, row);
+    if (!g) return CAV_NO_MEMORY;
+    double e = excess(row);
+    if (e > 0) {
+      if (!g->missed) g->missed_first = row->knot;
+      g->missed_last = row->knot;
+      if (!g->missed || e > g->violation) g->missed = row, g->violation = e;
+    }
+    // the laws of motion hold back everything: no news where they hold
+    if (in->met && row->kind == CAV_BINDING_UNACTUATED) continue;
+    if (row->pull > 0 && (!g->pulled || row->pull > g->pull)) g->pulled = row, g->pull = row->pull;
+    g->sum += row->pull;
+    in->pulls += row->pull;
+  }
+  for (int i = 0; i < in->nrow; i++) {
+    const cav_binding *row = &in->row[i];
+    group *g = group_of(in, row);
+    if (!g || !g->pulled || row->pull < 0.1 * g->pull) continue;
+    if (row->knot < g->pulled_first) g->pulled_first = row->knot;
+    if (row->knot > g->pulled_last) g->pulled_last = row->knot;
+  }
+  return CAV_OK;
+}
+
+// ---------------------------------------------------------------- words
+
+static const char *or_number(const char *name, const char *kind, int i, char buffer[48]) {
+  if (name && *name) return name;
+  snprintf(buffer, 48, "%s %d", kind, i);
+  return buffer;
+}
+
+static const char *body_name(const cav_model *m, int body, char buffer[48]) {
+  return body == 0 ? "the world" : or_number(m->body[body].name, "body", body, buffer);
+}
+
+static const char *geom_name(const cav_model *m, int geom, char buffer[48]) {
+  return or_number(m->geom[geom].name, "geom", geom, buffer);
+}
+
+/// A dof as "joint, what of it, of body".
+static void tell_dof(const cav_model *m, int d, char *out, size_t size) {
+  static const char *const along[] = {"x", "y", "z", "turn about x", "turn about y", "turn about z"};
+  char joint[48], body[48];
+  const cav_joint *j = &m->joint[m->dof[d].joint];
+  int place = d - j->dof;
+  const char *which = j->type == CAV_JOINT_FREE ? along[place] : j->type == CAV_JOINT_BALL ? along[3 + place] : "";
+  snprintf(out, size, "joint '%.60s'%s%s (body '%.60s')", or_number(j->name, "joint", m->dof[d].joint, joint),
+           *which ? ", " : "", which, body_name(m, j->body, body));
+}
+
+static int is_line(const cav_model *m, int d) {
+  const cav_joint *j = &m->joint[m->dof[d].joint];
+  return j->type == CAV_JOINT_SLIDE || (j->type == CAV_JOINT_FREE && d - j->dof < 3);
+}
+
+static const char *term_name(const cav_problem *p, int k, char buffer[48]) {
+  return or_number(p->term[hard_term(p, k)].name, "constraint", k, buffer);
+}
+
+/// What a sensor looks at: kind and name; "" where it is not of a body.
+static void tell_sensor(const cav_model *m, const cav_sensor *s, char *out, size_t size) {
+  char buffer[48];
+  int i = s->object;
+  *out = 0;
+  if (s->object_type == CAV_OBJECT_BODY || s->object_type == CAV_OBJECT_XBODY)
+    snprintf(out, size, " of body '%.60s'", body_name(m, i, buffer));
+  if (s->object_type == CAV_OBJECT_GEOM) snprintf(out, size, " of geom '%.60s'", geom_name(m, i, buffer));
+  if (s->object_type == CAV_OBJECT_SITE)
+    snprintf(out, size, " of site '%.60s'", or_number(m->site[i].name, "site", i, buffer));
+  if (s->object_type == CAV_OBJECT_JOINT)
+    snprintf(out, size, " of joint '%.60s'", or_number(m->joint[i].name, "joint", i, buffer));
+}
+
+static void tell_term(const cav_problem *p, const cav_binding *row, char *out, size_t size) {
+  static const char *const component[] = {"x", "y", "z", "w"};
+  const cav_term *term = &p->term[hard_term(p, row->object)];
+  char name[48], of[160] = "";
+  const char *which = "";
+  if (term->quantity == CAV_QUANTITY_SENSOR) {
+    tell_sensor(p->model, &term->sensor, of, sizeof of);
+    if (term->sensor.dim > 1) which = component[row->component & 3];
+  } else {
+    of[0] = ',', of[1] = ' ';
+    tell_dof(p->model, row->component, of + 2, sizeof of - 2);
+  }
+  const char *kind = term->quantity == CAV_QUANTITY_SENSOR ? cav_problem_sensors[term->sensor.type]
+                                                           : cav_problem_quantities[term->quantity];
+  snprintf(out, size, "constraint '%.60s', %s%s%s%s", term_name(p, row->object, name), kind, of, *which ? ", " : "",
+           which);
+}
+
+/// What a row is about, without its numbers.
+static void tell_subject(const inquiry *in, const cav_binding *row, char *out, size_t size) {
+  const cav_model *m = in->model;
+  char a[48], b[48], dof[160];
+  switch (row->kind) {
+    case CAV_BINDING_UNACTUATED:
+      tell_dof(m, row->object, dof, sizeof dof);
+      snprintf(out, size, "force without an actuator on %s", dof);
+      break;
+    case CAV_BINDING_EFFORT: {
+      const cav_actuator *actuator = &m->actuator[row->object];
+      const char *body =
+          actuator->transmission == CAV_TRANSMISSION_JOINT ? body_name(m, m->joint[actuator->target].body, b) : "";
+      snprintf(out, size, "effort of actuator '%.60s'%s%.60s%s", or_number(actuator->name, "actuator", row->object, a),
+               *body ? " (body '" : "", body, *body ? "')" : "");
+      break;
+    }
+    case CAV_BINDING_JOINT:
+      snprintf(out, size, "range of joint '%.60s' (body '%.60s')",
+               or_number(m->joint[row->object].name, "joint", row->object, a),
+               body_name(m, m->joint[row->object].body, b));
+      break;
+    case CAV_BINDING_TENDON:
+      snprintf(out, size, "range of tendon '%.60s'", or_number(m->tendon[row->object].name, "tendon", row->object, a));
+      break;
+    case CAV_BINDING_TERM:
+      tell_term(in->problem, row, out, size);
+      break;
+    case CAV_BINDING_PENETRATION:
+    case CAV_BINDING_KINDS: {
+      const cav_pair *pair = &m->pair[row->object];
+      snprintf(out, size, "penetration of geom '%.60s' into '%.60s'", geom_name(m, pair->geom2, a),
+               geom_name(m, pair->geom1, b));
+      break;
+    }
+  }
+}
+
+/// The same with its numbers, in the units of the user.
+static void tell(const inquiry *in, const cav_binding *row, char *out, size_t size) {
+  char subject[200];
+  tell_subject(in, row, subject, sizeof subject);
+  double off = row->value < row->lower   ? row->value - row->lower
+               : row->value > row->upper ? row->value - row->upper
+                                         : 0;
+  switch (row->kind) {
+    case CAV_BINDING_UNACTUATED:
+      snprintf(out, size, "%s: %.3g of the weight%s", subject, row->value,
+               is_line(in->model, row->object) ? "" : " times 0.3 m");
+      break;
+    case CAV_BINDING_EFFORT:
+      snprintf(out, size, "%s: %.3g of its limit, planned with %.3g .. %.3g", subject, row->value, row->lower,
+               row->upper);
+      break;
+    case CAV_BINDING_JOINT:
+    case CAV_BINDING_TENDON:
+      snprintf(out, size, "%s: at %.4g, planned with %.4g .. %.4g", subject, row->value, row->lower, row->upper);
+      break;
+    case CAV_BINDING_TERM:
+      snprintf(out, size, "%s: off by %.4g", subject,
+               off * in->problem->term[hard_term(in->problem, row->object)].scale);
+      break;
+    case CAV_BINDING_PENETRATION:
+    case CAV_BINDING_KINDS:
+      snprintf(out, size, "%s: %.3g mm deep, %.3g mm allowed", subject, 1e3 * row->value, 1e3 * row->upper);
+      break;
+  }
+}
+
+// ---------------------------------------------------------------- cures
+
+/// The strongest row of another group at the same knot or one beside it that pulls; NULL: none.
+static const cav_binding *opponent(const inquiry *in, const cav_binding *row) {
+  const cav_binding *best = NULL;
+  for (int i = 0; i < in->nrow; i++) {
+    const cav_binding *r = &in->row[i];
+    int same = r->kind == row->kind && r->object == row->object && r->component == row->component;
+    if (same || abs(r->knot - row->knot) > 1 || r->pull <= 0) continue;
+    if (!best || r->pull > best->pull) best = r;
+  }
+  return best;
+}
+
+/// Link that a sensor is on, 0 where it is on none alone.
+static int sensor_link(const cav_model *m, const cav_sensor *s) {
+  if (s->object_type == CAV_OBJECT_BODY || s->object_type == CAV_OBJECT_XBODY) return m->body[s->object].link;
+  if (s->object_type == CAV_OBJECT_GEOM) return m->geom[s->object].link;
+  if (s->object_type == CAV_OBJECT_SITE) return m->site[s->object].link;
+  return 0;
+}
+
+/// Knots within which a penetration belongs to a target: contacts give way before or after it.
+enum { near_knots = 2 };
+
+/// The deepest penetration of a link at a knot; NULL: none.
+static const cav_binding *buried(const inquiry *in, int link, int knot) {
+  const cav_binding *best = NULL;
+  for (int i = 0; i < in->nrow; i++) {
+    const cav_binding *r = &in->row[i];
+    if (r->kind != CAV_BINDING_PENETRATION || abs(r->knot - knot) > near_knots) continue;
+    const cav_pair *pair = &in->model->pair[r->object];
+    if (in->model->geom[pair->geom1].link != link && in->model->geom[pair->geom2].link != link) continue;
+    if (!best || r->value > best->value) best = r;
+  }
+  return best;
+}
+
+static void cure_term(const inquiry *in, const cav_binding *row, const cav_binding *against, char *out, size_t size) {
+  const cav_term *term = &in->problem->term[hard_term(in->problem, row->object)];
+  int link = term->quantity == CAV_QUANTITY_SENSOR ? sensor_link(in->model, &term->sensor) : 0;
+  const cav_binding *deepest = link > 0 ? buried(in, link, row->knot) : NULL;
+  char other[48];
+  if (deepest) {
+    snprintf(out, size, "What it asks for leads %.3g mm inside a solid: move the target out of it.",
+             1e3 * deepest->value);
+  } else if (against && against->kind == CAV_BINDING_TERM && against->object != row->object) {
+    snprintf(out, size,
+             "It contradicts constraint '%.60s' at this time: drop or loosen one, or set them apart in time.",
+             term_name(in->problem, against->object, other));
+  } else if (against && against->kind == CAV_BINDING_EFFORT) {
+    snprintf(out, size, "The actuators are too weak for it: more time, a nearer target, a larger effort limit.");
+  } else if (against && (against->kind == CAV_BINDING_JOINT || against->kind == CAV_BINDING_TENDON)) {
+    snprintf(out, size, "A range ends before it is reached: move the target, or check the range.");
+  } else if (against && against->kind == CAV_BINDING_UNACTUATED) {
+    snprintf(out, size,
+             "Contacts cannot carry the body that way: more time, a target nearer to balance, or a guess that "
+             "touches where it should push.");
+  } else {
+    snprintf(out, size, "It is out of reach: move the target nearer, or make it a cost.");
+  }
+}
+
+static void tell_cure(const inquiry *in, const cav_binding *row, char *out, size_t size) {
+  static const char *const usual[] = {
+      [CAV_BINDING_UNACTUATED] =
+          "Nothing can push there: more time, a start and goal that stand, a guess that touches the "
+          "ground where it should push, or more stages.",
+      [CAV_BINDING_EFFORT] =
+          "The actuator is too weak for what is asked: more time, a nearer target, a stronger actuator, or "
+          "<limits effort> nearer to 1.",
+      [CAV_BINDING_JOINT] =
+          "The range ends too early for what is asked: move the target, or check the range in the model.",
+      [CAV_BINDING_TENDON] =
+          "The range ends too early for what is asked: move the target, or check the range in the model.",
+      [CAV_BINDING_PENETRATION] =
+          "A lower softness or smoothing at the end of the schedule, or a target that is not inside a "
+          "solid.",
+  };
+  const cav_binding *against = opponent(in, row);
+  char subject[200];
+  if (in->met && row->kind != CAV_BINDING_PENETRATION) {
+    // the multiplier in the units of the user
+    double scale = row->kind == CAV_BINDING_TERM ? in->problem->term[hard_term(in->problem, row->object)].scale : 1;
+    const char *unit = row->kind == CAV_BINDING_EFFORT ? "fraction of the limit" : "rad or m";
+    snprintf(out, size, "The cost falls by about %.3g for each 0.01 (%s) that it gives way.",
+             0.01 * fabs(row->multiplier) / scale, row->kind == CAV_BINDING_TERM ? "in its unit" : unit);
+    return;
+  }
+  if (row->kind == CAV_BINDING_TERM) {
+    cure_term(in, row, against, out, size);
+  } else {
+    snprintf(out, size, "%s", usual[row->kind]);
+  }
+  size_t n = strlen(out);
+  if (!against || n + 1 >= size) return;
+  tell_subject(in, against, subject, sizeof subject);
+  snprintf(out + n, size - n, " Pulls against: %s.", subject);
+}
+
+// ---------------------------------------------------------------- ranking
+
+static cav_reason reason_of(const inquiry *in, const group *g, const cav_binding *row, int first, int last) {
+  cav_reason reason = {.row = *row, .first = first, .last = last, .time = row->knot * in->timestep};
+  reason.violation = excess(row);
+  reason.pull = row->pull;
+  reason.fraction = in->pulls > 0 ? g->sum / in->pulls : 0;
+  tell(in, row, reason.what, sizeof reason.what);
+  tell_cure(in, row, reason.cure, sizeof reason.cure);
+  return reason;
+}
+
+static int by_violation(const void *a, const void *b) {
+  double x = ((const group *)a)->violation, y = ((const group *)b)->violation;
+  return (x < y) - (x > y);
+}
+
+static int by_pull(const void *a, const void *b) {
+  double x = ((const group *)a)->sum, y = ((const group *)b)->sum;
+  return (x < y) - (x > y);
+}
+
+static void rank(inquiry *in, cav_explanation *out) {
+  out->met = in->met;
+  qsort(in->group, (size_t)in->ngroup, sizeof *in->group, by_violation);
+  for (int i = 0; i < in->ngroup && out->nviolation < CAV_REASONS; i++) {
+    const group *g = &in->group[i];
+    if (!g->missed) break;
+    out->violation[out->nviolation++] = reason_of(in, g, g->missed, g->missed_first, g->missed_last);
+  }
+  qsort(in->group, (size_t)in->ngroup, sizeof *in->group, by_pull);
+  for (int i = 0; i < in->ngroup && out->nconflict < CAV_REASONS; i++) {
+    const group *g = &in->group[i];
+    if (!g->pulled) break;
+    out->conflict[out->nconflict++] = reason_of(in, g, g->pulled, g->pulled_first, g->pulled_last);
+  }
+}
+
+cav_status cav_explain(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
+                       int nrow, const cav_binding *row, cav_explanation *explanation, cav_error *error) {
+  inquiry in = {.problem = problem, .model = problem->model, .timestep = trajectory->timestep};
+  *explanation = (cav_explanation){.met = 1};
+  if (trajectory->nq != in.model->nq || trajectory->nv != in.model->nv)
+    return cav_file_fail(error, CAV_BAD_INPUT, 0, "the trajectory is not of the problem's model");
+  cav_status status = take_rows(&in, trajectory->nknot, nrow, row, error);
+  if (status == CAV_OK) status = take_penetrations(&in, trajectory, contact);
+  if (status == CAV_OK) status = gather(&in);
+  if (status == CAV_OK && in.ngroup > 0) rank(&in, explanation);
+  free(in.row);
+  free(in.group);
+  if (status == CAV_NO_MEMORY) cav_file_fail(error, status, 0, "not enough memory to explain this motion");
+  if (status == CAV_NOT_FINITE) cav_file_fail(error, status, 0, "the trajectory holds a number that is not finite");
+  return status;
+}

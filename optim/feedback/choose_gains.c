@@ -1,0 +1,63 @@
+/// Which feedback goes with a motion. Gains are those of a regulator (lqr.c), but what straying costs, and how hard the
+/// contacts are that it counts on, are not in the problem. So a few of each are tried in the closed loops of verification.
+/// Kept is what follows longest under the claimed contacts, then longest and nearest under the model's own.
+#include <stdlib.h>
+#include <string.h>
+
+#include "continuation.h"
+#include "lqr.h"
+#include "verification.h"
+
+/// Trials in order: multipliers, and the fraction of the schedule whose contact law is taken.
+static const struct trial {
+  cav_feedback_penalty penalty;
+  double fraction;
+} trial[] = {{{36, 3}, 1},    {{36, 3}, 0.95}, {{12, 3}, 1},  {{100, 3}, 0.95},
+             {{12, 3}, 0.85}, {{36, 5}, 0.8},  {{12, 3}, 0.7}};
+
+/// End error that ends the search, m.
+static const double near_enough = 0.03;
+
+/// What a set of gains does.
+typedef struct outcome {
+  struct cav_follow claimed, own;
+} outcome;
+
+static int better(const outcome *a, const outcome *b) {
+  if (a->claimed.seconds != b->claimed.seconds) return a->claimed.seconds > b->claimed.seconds;
+  if (a->own.seconds != b->own.seconds) return a->own.seconds > b->own.seconds;
+  return a->claimed.error + a->own.error < b->claimed.error + b->own.error;
+}
+
+static int done(const outcome *o) {
+  return !*o->claimed.lost && !*o->own.lost && o->claimed.error <= near_enough && o->own.error <= near_enough;
+}
+
+cav_status cav_choose_gains(cav_solve_run *run, cav_error *error) {
+  cav_solution *solution = run->solution;
+  size_t n = ((size_t)run->tr->nknot - 1) * (size_t)run->tr->nv * (size_t)run->tr->nv;
+  double *gain = malloc(2 * n * sizeof *gain);
+  solution->gain_q = calloc(n, sizeof(double));
+  solution->gain_v = calloc(n, sizeof(double));
+  cav_status status = gain && solution->gain_q && solution->gain_v ? CAV_OK : CAV_NO_MEMORY;
+  outcome best = {0};
+  int trials = (int)(sizeof trial / sizeof *trial), first = 1;
+  for (int i = 0; i < trials && status == CAV_OK && (first || !done(&best)); i++) {
+    outcome now;
+    cav_options law = run->tr->options;
+    cav_stage_law(run->problem, trial[i].fraction, run->tr->h, &law);
+    status = cav_feedback(run->tr, run->at, &law, &trial[i].penalty, gain, gain + n);
+    // a regulator that does not exist is no reason to give up the motion
+    if (status == CAV_NOT_CONVERGED || status == CAV_NOT_FINITE) status = CAV_OK;
+    if (status == CAV_OK)
+      status =
+          cav_closed_loops(run->problem, run->at, &solution->contact, gain, gain + n, &now.claimed, &now.own, error);
+    if (status != CAV_OK || !(first || better(&now, &best))) continue;
+    memcpy(solution->gain_q, gain, n * sizeof *gain);
+    memcpy(solution->gain_v, gain + n, n * sizeof *gain);
+    best = now;
+    first = 0;
+  }
+  free(gain);
+  return status;
+}

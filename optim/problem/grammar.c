@@ -1,0 +1,202 @@
+/// The grammar of problem files: which elements and attributes there are, and the words they take. Their meaning is in
+/// problem.c, pose.c and term.c; a table for people is in problems/README.md.
+#include "ipopt_options.h"
+#include "problem_file.h"
+#include "scene.h"
+
+// in the order of the enumerations of problem.h and model.h
+const char *const cav_problem_orders[] = {"euler", "midpoint", "momentum", NULL};
+const char *const cav_problem_closings[] = {"open", "rest", NULL};
+const char *const cav_problem_guesses[] = {"hold", "interpolate", NULL};
+const char *const cav_problem_quantities[] = {"sensor", "posture", "velocity",         "acceleration", "effort", "gap",
+                                              "slip",   "impact",  "self_penetration", "force",        NULL};
+const char *const cav_problem_dof_sets[] = {"all", "root_linear", "root_angular", "joints", NULL};
+const char *const cav_problem_sensors[] = {"jointpos",
+                                           "jointvel",
+                                           "framepos",
+                                           "framequat",
+                                           "framexaxis",
+                                           "frameyaxis",
+                                           "framezaxis",
+                                           "framelinvel",
+                                           "frameangvel",
+                                           "subtreecom",
+                                           "subtreelinvel",
+                                           "subtreeangmom",
+                                           "touch",
+                                           "accelerometer",
+                                           "velocimeter",
+                                           "gyro",
+                                           "force",
+                                           "torque",
+                                           "magnetometer",
+                                           "rangefinder",
+                                           "tendonpos",
+                                           "tendonvel",
+                                           "actuatorpos",
+                                           "actuatorvel",
+                                           "actuatorfrc",
+                                           "ballquat",
+                                           "ballangvel",
+                                           "jointlimitpos",
+                                           "jointlimitvel",
+                                           "jointlimitfrc",
+                                           "tendonlimitpos",
+                                           "tendonlimitvel",
+                                           "tendonlimitfrc",
+                                           "framelinacc",
+                                           "frameangacc",
+                                           "clock",
+                                           NULL};
+const char *const cav_problem_stabilisations[] = {"solref", "discrete", NULL};
+const char *const cav_problem_regularisers[] = {"reference", "exact", NULL};
+const char *const cav_problem_norms[] = {"square", "absolute", NULL};
+const char *const cav_problem_mirrors[] = {"none", "x", "y", NULL};
+static const char *const heights[] = {"keep", "floor", NULL};
+static const char *const clippings[] = {"keep", "clip", NULL};
+static const char *const ends[] = {"first", "last", NULL};
+static const char *const frames[] = {"body", "xbody", "geom", "site", NULL};
+static const char *const relations[] = {"none", "start", "goal", NULL};
+
+// the tables below read as rows
+// clang-format off
+// name, type, least and most values, words, required
+#define TEXT(name, required) \
+  { name, CAV_XML_TEXT, 1, 0, NULL, required }
+#define REAL(name, required) \
+  { name, CAV_XML_REAL, 1, 1, NULL, required }
+#define REALS(name, least, most) \
+  { name, CAV_XML_REAL, least, most, NULL, 0 }
+#define WHOLE(name, required) \
+  { name, CAV_XML_INT, 1, 1, NULL, required }
+#define WORD(name, words) \
+  { name, CAV_XML_WORD, 0, 0, words, 0 }
+#define FLAG(name) \
+  { name, CAV_XML_BOOL, 0, 0, NULL, 0 }
+#define END \
+  { NULL, CAV_XML_SKIP, 0, 0, NULL, 0 }
+#define ATTRIBUTES(...) \
+  (const cav_xml_attribute[]) { __VA_ARGS__, END }
+#define CHILDREN(...) \
+  (const cav_xml_element *const[]) { __VA_ARGS__, NULL }
+
+// postures
+static const cav_xml_element pose_root = {
+    "root", 0, 0, ATTRIBUTES(TEXT("joint", 0), REALS("pos", 3, 3), REALS("quat", 4, 4), REALS("euler", 3, 3)), NULL, 0};
+static const cav_xml_element pose_joint = {
+    "joint", 0, 0, ATTRIBUTES(TEXT("name", 1), REALS("pos", 1, 1), REALS("degrees", 1, 1), REALS("quat", 4, 4)),
+    NULL,    0};
+#define POSE_SOURCE TEXT("key", 0), REALS("qpos", 1, 0), TEXT("file", 0), WORD("knot", ends), WORD("height", heights), REAL("rise", 0), \
+  WORD("ranges", clippings)
+static const cav_xml_element start = {
+    "start", 1, 1, ATTRIBUTES(POSE_SOURCE, REALS("qvel", 1, 0)), CHILDREN(&pose_root, &pose_joint), 0};
+static const cav_xml_element goal = {"goal", 0, 1, ATTRIBUTES(POSE_SOURCE), CHILDREN(&pose_root, &pose_joint), 0};
+static const cav_xml_element pose = {
+    "pose", 0, 0, ATTRIBUTES(TEXT("name", 1), POSE_SOURCE), CHILDREN(&pose_root, &pose_joint), 0};
+
+// terms: what is measured; when; and as a cost or as a constraint
+#define TABLE TEXT("file", 0), TEXT("columns", 0)
+#define WINDOW TEXT("name", 0), TEXT("from", 0), TEXT("to", 0), TEXT("at", 0), REAL("scale", 0)
+#define DOFS WORD("dofs", cav_problem_dof_sets), TEXT("joint", 0)
+#define RATE DOFS, TABLE, REALS("target", 1, 0)
+#define POSTURE DOFS, TABLE, TEXT("key", 0), REALS("qpos", 1, 0)
+#define SENSOR                                                                                                \
+  WORD("type", cav_problem_sensors), TEXT("body", 0), TEXT("xbody", 0), TEXT("geom", 0), TEXT("site", 0),     \
+      TEXT("joint", 0), TEXT("tendon", 0), TEXT("actuator", 0), WORD("reftype", frames), TEXT("refname", 0), \
+      TEXT("component", 0), TABLE, REALS("target", 1, 0), WORD("relative", relations)
+static const cav_xml_element posture_waypoint = {
+    "waypoint", 0, 0, ATTRIBUTES(REAL("time", 1), TEXT("key", 0), REALS("qpos", 1, 0)), NULL, 0};
+static const cav_xml_element value_waypoint = {
+    "waypoint", 0, 0, ATTRIBUTES(REAL("time", 1), {"target", CAV_XML_REAL, 1, 0, NULL, 1}), NULL, 0};
+
+#define COST REAL("weight", 1), WORD("norm", cav_problem_norms)
+#define TOUCH TEXT("body", 0), WINDOW, COST
+static const cav_xml_element cost_sensor = {"sensor", 0, 0, ATTRIBUTES(SENSOR, WINDOW, COST), CHILDREN(&value_waypoint),
+                                            0};
+static const cav_xml_element cost_posture = {
+    "posture", 0, 0, ATTRIBUTES(POSTURE, WINDOW, COST), CHILDREN(&posture_waypoint), 0};
+static const cav_xml_element cost_velocity = {
+    "velocity", 0, 0, ATTRIBUTES(RATE, WINDOW, COST), CHILDREN(&value_waypoint), 0};
+static const cav_xml_element cost_acceleration = {
+    "acceleration", 0, 0, ATTRIBUTES(RATE, WINDOW, COST), CHILDREN(&value_waypoint), 0};
+static const cav_xml_element cost_effort = {"effort", 0, 0, ATTRIBUTES(WINDOW, COST), NULL, 0};
+static const cav_xml_element cost_gap = {"gap", 0, 0, ATTRIBUTES(TOUCH), NULL, 0};
+static const cav_xml_element cost_slip = {"slip", 0, 0, ATTRIBUTES(TOUCH), NULL, 0};
+static const cav_xml_element cost_impact = {"impact", 0, 0, ATTRIBUTES(TOUCH), NULL, 0};
+static const cav_xml_element cost_self_penetration = {"self_penetration", 0, 0, ATTRIBUTES(TOUCH), NULL, 0};
+static const cav_xml_element cost_force = {"force", 0, 0, ATTRIBUTES(TOUCH), NULL, 0};
+static const cav_xml_element cost = {"cost",
+                                     0,
+                                     1,
+                                     NULL,
+                                     CHILDREN(&cost_sensor, &cost_posture, &cost_velocity, &cost_acceleration,
+                                              &cost_effort, &cost_gap, &cost_slip, &cost_impact,
+                                              &cost_self_penetration, &cost_force),
+                                     0};
+
+#define BOUNDS REAL("lower", 0), REAL("upper", 0)
+static const cav_xml_element hard_sensor = {
+    "sensor", 0, 0, ATTRIBUTES(SENSOR, WINDOW, BOUNDS), CHILDREN(&value_waypoint), 0};
+static const cav_xml_element hard_posture = {
+    "posture", 0, 0, ATTRIBUTES(POSTURE, WINDOW, BOUNDS), CHILDREN(&posture_waypoint), 0};
+static const cav_xml_element hard_velocity = {
+    "velocity", 0, 0, ATTRIBUTES(RATE, WINDOW, BOUNDS), CHILDREN(&value_waypoint), 0};
+static const cav_xml_element hard_acceleration = {
+    "acceleration", 0, 0, ATTRIBUTES(RATE, WINDOW, BOUNDS), CHILDREN(&value_waypoint), 0};
+static const cav_xml_element constraint = {
+    "constraint", 0, 1, NULL, CHILDREN(&hard_sensor, &hard_posture, &hard_velocity, &hard_acceleration), 0};
+
+// the rest
+static const cav_xml_element horizon = {
+    "horizon",
+    1,
+    1,
+    ATTRIBUTES(REAL("duration", 1), REAL("timestep", 0), WORD("order", cav_problem_orders),
+               WORD("close", cav_problem_closings), REALS("range", 2, 2), REAL("weight", 0)),
+    NULL,
+    0};
+static const cav_xml_element cycle_pair = {"pair", 0, 0, ATTRIBUTES(TEXT("joint", 1), TEXT("other", 1)), NULL, 0};
+static const cav_xml_element cycle = {
+    "cycle", 0, 1, ATTRIBUTES(REALS("translation", 3, 3), REAL("rotation", 0), WORD("mirror", cav_problem_mirrors)),
+    CHILDREN(&cycle_pair), 0};
+static const cav_xml_element swing = {
+    "swing", 0, 0, ATTRIBUTES(TEXT("joint", 1), REAL("amplitude", 1), REAL("frequency", 1), REAL("phase", 0)), NULL, 0};
+static const cav_xml_element guess_waypoint = {
+    "waypoint", 0, 0, ATTRIBUTES(REAL("time", 1), POSE_SOURCE), CHILDREN(&pose_root, &pose_joint), 0};
+static const cav_xml_element guess = {
+    "guess", 0, 1, ATTRIBUTES(WORD("type", cav_problem_guesses), REAL("apex", 0), REALS("rotation", 3, 3), TEXT("from", 0), TEXT("to", 0)),
+    CHILDREN(&guess_waypoint, &swing), 0};
+static const cav_xml_element limits = {"limits", 0, 1, ATTRIBUTES(REAL("effort", 0), REAL("margin", 0)), NULL, 0};
+#define STAGE                                                                                                \
+  ATTRIBUTES(REAL("softness", 0), REAL("time_constant", 0), REAL("smoothing", 0), REAL("smoothing_self", 0), \
+             REAL("self_stiffness", 0), \
+             REAL("penalty", 0), WHOLE("iterations", 0), REAL("tolerance", 0))
+static const cav_xml_element schedule_first = {"first", 0, 1, STAGE, NULL, 0};
+static const cav_xml_element schedule_last = {"last", 0, 1, STAGE, NULL, 0};
+static const cav_xml_element schedule = {
+    "schedule", 0, 1, ATTRIBUTES(WHOLE("stages", 0)), CHILDREN(&schedule_first, &schedule_last), 0};
+#define IPOPT(name, type, least, most, strict, words) TEXT(#name, 0),
+static const cav_xml_element ipopt = {
+    "ipopt", 0, 1, (const cav_xml_attribute[]){CAV_IPOPT_OPTIONS(IPOPT) END}, NULL, 0};
+static const cav_xml_element contact = {
+    "contact",
+    0,
+    1,
+    ATTRIBUTES(REAL("timestep", 1), WORD("order", cav_problem_orders),
+               WORD("stabilisation", cav_problem_stabilisations), WORD("regulariser", cav_problem_regularisers),
+               REAL("softness", 1), REAL("time_constant", 1), REAL("smoothing", 1), REAL("smoothing_self", 1),
+               REAL("self_stiffness", 0),
+               REAL("impratio", 1), FLAG("coupled"), FLAG("refsafe"), FLAG("contact"), FLAG("constraint"), FLAG("gravity"),
+               FLAG("passive")),
+    NULL,
+    0};
+
+const cav_xml_element cav_problem_element = {
+    "problem",
+    1,
+    1,
+    ATTRIBUTES(TEXT("name", 0), TEXT("model", 0)),
+    CHILDREN(&cav_scene_element, &horizon, &cycle, &start, &goal, &pose, &guess, &cost, &constraint, &limits, &schedule, &ipopt,
+             &contact),
+    0};
+// clang-format on

@@ -1,0 +1,308 @@
+/// Postures of a problem file: <start>, <goal>, <pose>.
+///
+/// A posture is a base (a keyframe of the model, a <pose> of the file, numbers, a knot of a trajectory, or else the model's
+/// own configuration) on which root and joint values are laid, and which height="floor" then moves along its root until its
+/// lowest geom touches a plane of the world. So one file can set up models that share joint names, or list alternatives.
+/// The distance of a geom from a plane is by its support point, exact for every type here. Balance, contact between limbs
+/// and orientation to the floor are the file's business.
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "file.h"
+#include "problem_file.h"
+
+enum { DEEPEST = 16 }; // poses that name each other
+
+static cav_status read_pose(const cav_problem_reader *reader, const cav_xml_node *node, int depth, double *q);
+
+// <pose> of that name
+static const cav_xml_node *pose_named(const cav_problem_reader *reader, const char *name) {
+  const cav_xml_node *pose = cav_problem_child(reader->root, "pose");
+  while (pose && strcmp(cav_xml_text(pose, "name", ""), name)) pose = cav_xml_next(pose);
+  return pose;
+}
+
+// name nearest to word among the model's keyframes and the file's poses
+static const char *nearest_key(const cav_problem_reader *reader, const char *word) {
+  const cav_model *m = reader->model;
+  const char *near = m->nkey ? cav_xml_nearest(word, &m->key->name, m->nkey, sizeof *m->key) : NULL;
+  for (const cav_xml_node *pose = cav_problem_child(reader->root, "pose"); pose && !near; pose = cav_xml_next(pose)) {
+    const char *name = cav_xml_text(pose, "name", "");
+    near = cav_xml_nearest(word, &name, 1, sizeof name);
+  }
+  return near;
+}
+
+// the first of the names, separated by |, that is a keyframe of the model or else a <pose>
+static cav_status read_key(const cav_problem_reader *reader, const cav_xml_node *node, int depth, double *q) {
+  const cav_model *m = reader->model;
+  const char *list = cav_xml_text(node, "key", "");
+  char *copy = strdup(list), *rest = copy, *name;
+  if (!copy) return cav_problem_no_memory(reader);
+  while ((name = strsep(&rest, "|"))) {
+    name += strspn(name, " ");
+    for (size_t n = strlen(name); n && name[n - 1] == ' '; n--) name[n - 1] = 0;
+    int key = *name ? cav_object_find(m, CAV_OBJECT_KEY, name) : -1;
+    const cav_xml_node *pose = *name ? pose_named(reader, name) : NULL;
+    if (key < 0 && (!pose || pose == node)) continue;
+    free(copy);
+    if (key < 0) return read_pose(reader, pose, depth + 1, q);
+    memcpy(q, m->key[key].q, (size_t)m->nq * sizeof(double));
+    return CAV_OK;
+  }
+  copy[strcspn(copy, " ")] = 0;
+  const char *near = nearest_key(reader, copy);
+  cav_xml_fail(reader->error, node, "key",
+               "neither the model '%s' nor this file has a keyframe or pose of that name, got '%.200s'%s%s%s", m->name,
+               list, near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
+  free(copy);
+  return CAV_BAD_INPUT;
+}
+
+cav_status cav_problem_key(const cav_problem_reader *reader, const cav_xml_node *node, double *q) {
+  return read_key(reader, node, 0, q);
+}
+
+static int unit(double *w) {
+  double length = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2] + w[3] * w[3]);
+  if (!(length > 1e-9)) return 0;
+  for (int i = 0; i < 4; i++) w[i] /= length;
+  return 1;
+}
+
+static cav_status read_numbers(const cav_problem_reader *reader, const cav_xml_node *node, double *q) {
+  const cav_model *m = reader->model;
+  const cav_xml_value *given = cav_xml_get(node, "qpos");
+  if (given->count != m->nq) {
+    return cav_xml_fail(reader->error, node, "qpos", "expected %d numbers for the model '%s', got %d", m->nq, m->name,
+                        given->count);
+  }
+  cav_xml_reals(node, "qpos", q, m->nq);
+  // numbers written with all digits stay as they are, others are brought to unit length
+  for (int j = 0; j < m->njoint; j++) {
+    if (m->joint[j].type != CAV_JOINT_FREE && m->joint[j].type != CAV_JOINT_BALL) continue;
+    double *w = q + m->joint[j].q + (m->joint[j].type == CAV_JOINT_FREE ? 3 : 0), kept[4];
+    memcpy(kept, w, sizeof kept);
+    if (!unit(w))
+      return cav_xml_fail(reader->error, node, "qpos", "the quaternion of joint '%s' is zero", m->joint[j].name);
+    if (fabs(kept[0] * w[0] + kept[1] * w[1] + kept[2] * w[2] + kept[3] * w[3] - 1) < 1e-14)
+      memcpy(w, kept, sizeof kept);
+  }
+  return CAV_OK;
+}
+
+// first or last knot of a trajectory
+static cav_status read_knot(const cav_problem_reader *reader, const cav_xml_node *node, double *q) {
+  char *path = cav_file_beside(reader->path, cav_xml_text(node, "file", ""));
+  if (!path) return cav_problem_no_memory(reader);
+  cav_error inner = {0};
+  cav_trajectory *trajectory = cav_trajectory_read(path, reader->model, &inner);
+  free(path);
+  if (!trajectory) return cav_xml_fail_as(reader->error, inner.status, node, "file", "%s", inner.text);
+  int knot = cav_xml_word(node, "knot", 1) ? trajectory->nknot - 1 : 0;
+  memcpy(q, trajectory->q + knot * trajectory->nq, (size_t)trajectory->nq * sizeof(double));
+  cav_trajectory_free(trajectory);
+  return CAV_OK;
+}
+
+static cav_status read_base(const cav_problem_reader *reader, const cav_xml_node *node, int depth, double *q) {
+  const char *source[] = {"key", "qpos", "file"};
+  const char *first = NULL;
+  for (int i = 0; i < 3; i++) {
+    if (!cav_xml_get(node, source[i])) continue;
+    if (first)
+      return cav_xml_fail(reader->error, node, source[i], "contradicts attribute '%s'; give one of the two", first);
+    first = source[i];
+  }
+  if (cav_xml_get(node, "knot") && !cav_xml_get(node, "file")) {
+    return cav_xml_fail(reader->error, node, "knot", "says which knot of attribute 'file', which is missing");
+  }
+  cav_configuration_reset(reader->model, q);
+  if (!first) return CAV_OK;
+  if (first == source[0]) return read_key(reader, node, depth, q);
+  return first == source[1] ? read_numbers(reader, node, q) : read_knot(reader, node, q);
+}
+
+// product of quaternions a b
+static void times(const double *a, const double *b, double *out) {
+  double w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3];
+  double x = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2];
+  double y = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1];
+  double z = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
+  out[0] = w, out[1] = x, out[2] = y, out[3] = z;
+}
+
+// the free joint that a <root> names, or the first; -1 and an error if it is none
+static int root_joint(const cav_problem_reader *reader, const cav_xml_node *node) {
+  const cav_model *m = reader->model;
+  if (cav_xml_get(node, "joint")) {
+    int j = cav_problem_find(reader, node, "joint", CAV_OBJECT_JOINT);
+    if (j < 0 || m->joint[j].type == CAV_JOINT_FREE) return j;
+    cav_xml_fail(reader->error, node, "joint", "joint '%s' is not free; use <joint>", m->joint[j].name);
+    return -1;
+  }
+  for (int j = 0; j < m->njoint; j++) {
+    if (m->joint[j].type == CAV_JOINT_FREE) return j;
+  }
+  cav_xml_fail(reader->error, node, NULL, "the model '%s' has no free joint; use <joint> instead", m->name);
+  return -1;
+}
+
+// position and orientation of a free joint
+static cav_status lay_root(const cav_problem_reader *reader, const cav_xml_node *node, double *q) {
+  const cav_model *m = reader->model;
+  int j = root_joint(reader, node);
+  if (j < 0) return CAV_BAD_INPUT;
+  if (cav_xml_get(node, "quat") && cav_xml_get(node, "euler")) {
+    return cav_xml_fail(reader->error, node, "euler", "contradicts attribute 'quat'; give one of the two");
+  }
+  double *at = q + m->joint[j].q, euler[3], rotation[4];
+  cav_xml_reals(node, "pos", at, 3);
+  if (cav_xml_reals(node, "quat", at + 3, 4) && !unit(at + 3)) {
+    return cav_xml_fail(reader->error, node, "quat", "expected a quaternion that is not zero");
+  }
+  if (!cav_xml_reals(node, "euler", euler, 3)) return CAV_OK;
+  // degrees about x, then the new y, then the new z
+  memcpy(at + 3, (double[]){1, 0, 0, 0}, 4 * sizeof(double));
+  for (int i = 0; i < 3; i++) {
+    double half = euler[i] * M_PI / 360;
+    memset(rotation, 0, sizeof rotation);
+    rotation[0] = cos(half);
+    rotation[1 + i] = sin(half);
+    times(at + 3, rotation, at + 3);
+  }
+  return CAV_OK;
+}
+
+static cav_status lay_joint(const cav_problem_reader *reader, const cav_xml_node *node, double *q) {
+  int j = cav_problem_find(reader, node, "name", CAV_OBJECT_JOINT);
+  if (j < 0) return CAV_BAD_INPUT;
+  const cav_joint *joint = &reader->model->joint[j];
+  int given = !!cav_xml_get(node, "pos") + !!cav_xml_get(node, "degrees") + !!cav_xml_get(node, "quat");
+  if (given != 1)
+    return cav_xml_fail(reader->error, node, NULL, "expected one of the attributes pos, degrees, quat, got %d", given);
+  const char *wanted = joint->type == CAV_JOINT_BALL ? "quat" : "pos";
+  if (joint->type == CAV_JOINT_FREE)
+    return cav_xml_fail(reader->error, node, "name", "joint '%s' is free; use <root>", joint->name);
+  if (joint->type == CAV_JOINT_SLIDE && cav_xml_get(node, "degrees")) {
+    return cav_xml_fail(reader->error, node, "degrees", "joint '%s' slides; give its metres in 'pos'", joint->name);
+  }
+  if ((joint->type == CAV_JOINT_BALL) != !!cav_xml_get(node, "quat")) {
+    return cav_xml_fail(reader->error, node, wanted, "is what joint '%s' needs", joint->name);
+  }
+  if (cav_xml_reals(node, "quat", q + joint->q, 4) && !unit(q + joint->q)) {
+    return cav_xml_fail(reader->error, node, "quat", "expected a quaternion that is not zero");
+  }
+  if (cav_xml_get(node, "pos")) q[joint->q] = cav_xml_real(node, "pos", 0);
+  if (cav_xml_get(node, "degrees")) q[joint->q] = cav_xml_real(node, "degrees", 0) * M_PI / 180;
+  return CAV_OK;
+}
+
+// how far a geom reaches from its centre against the unit direction n
+static double reach(const cav_geom *geom, const cav_pose *pose, const double n[3]) {
+  const double *r = pose->rotation, *s = geom->size;
+  double x = n[0] * r[0] + n[1] * r[3] + n[2] * r[6];
+  double y = n[0] * r[1] + n[1] * r[4] + n[2] * r[7];
+  double z = n[0] * r[2] + n[1] * r[5] + n[2] * r[8];
+  switch (geom->type) {
+    case CAV_GEOM_SPHERE:
+      return s[0];
+    case CAV_GEOM_CAPSULE:
+      return s[0] + s[1] * fabs(z);
+    case CAV_GEOM_ELLIPSOID:
+      return sqrt(s[0] * s[0] * x * x + s[1] * s[1] * y * y + s[2] * s[2] * z * z);
+    case CAV_GEOM_CYLINDER:
+      return s[0] * sqrt(x * x + y * y) + s[1] * fabs(z);
+    case CAV_GEOM_BOX:
+    case CAV_GEOM_MESH: // its box
+      return s[0] * fabs(x) + s[1] * fabs(y) + s[2] * fabs(z);
+    case CAV_GEOM_PLANE:
+    case CAV_GEOM_HFIELD:
+    case CAV_GEOM_TYPES:
+      break;
+  }
+  return 0;
+}
+
+// first joint that raises a tree: free, or a slide along the vertical. Its coordinate of height and how much that raises
+static int lifting(const cav_model *m, const cav_state *state, int root, double *gain) {
+  const cav_link *link = &m->link[root];
+  for (int j = link->joint; j < link->joint + link->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    *gain = 1;
+    if (joint->type == CAV_JOINT_FREE) return joint->q + 2;
+    if (joint->type != CAV_JOINT_SLIDE) continue;
+    const double *axis = state->axis + 6 * joint->dof;
+    *gain = axis[5];
+    if (fabs(axis[5]) > 0.999) return joint->q;
+  }
+  return -1;
+}
+
+// moves one tree along its root until the lowest of its geoms that can touch a plane of the world touches it, and higher by
+// rise; returns whether there is such a geom
+static int drop_tree(const cav_model *m, cav_state *state, int root, double rise, double *q) {
+  double gain = 1, up = -INFINITY;
+  int height = lifting(m, state, root, &gain);
+  if (height < 0) return 0;
+  for (int p = 0; p < m->npair; p++) {
+    const cav_geom *plane = &m->geom[m->pair[p].geom1], *geom = &m->geom[m->pair[p].geom2];
+    if (plane->type != CAV_GEOM_PLANE || plane->link != 0 || m->link[geom->link].root != root) continue;
+    cav_pose floor, at;
+    cav_object_pose(m, state, CAV_OBJECT_GEOM, m->pair[p].geom1, &floor);
+    cav_object_pose(m, state, CAV_OBJECT_GEOM, m->pair[p].geom2, &at);
+    double n[3] = {floor.rotation[2], floor.rotation[5], floor.rotation[8]}, distance = -reach(geom, &at, n);
+    if (n[2] < 0.1) continue;
+    for (int i = 0; i < 3; i++) distance += n[i] * (at.pos[i] - floor.pos[i]);
+    up = fmax(up, -distance / n[2]);
+  }
+  if (isinf(up)) return 0;
+  q[height] += (up + rise) / gain;
+  return 1;
+}
+
+static cav_status drop(const cav_problem_reader *reader, const cav_xml_node *node, double *q) {
+  const cav_model *m = reader->model;
+  cav_status status = cav_position(m, reader->state, q);
+  if (status)
+    return cav_xml_fail_as(reader->error, status, node, "height", "the posture cannot be evaluated: %s",
+                           cav_status_name(status));
+  int dropped = 0;
+  for (int i = 1; i < m->nlink; i++) {
+    if (m->link[i].parent == 0) dropped += drop_tree(m, reader->state, i, cav_xml_real(node, "rise", 0), q);
+  }
+  if (dropped) return CAV_OK;
+  return cav_xml_fail(reader->error, node, "height",
+                      "nothing of the model '%s' can be lowered to a plane: it needs a plane in the world, a geom that "
+                      "may touch it, and "
+                      "a root that is free or slides along the vertical",
+                      m->name);
+}
+
+// brings scalar joints into their ranges
+static void clip(const cav_model *m, double *q) {
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    int scalar = joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE;
+    if (joint->limited && scalar) q[joint->q] = fmin(fmax(q[joint->q], joint->range[0]), joint->range[1]);
+  }
+}
+
+static cav_status read_pose(const cav_problem_reader *reader, const cav_xml_node *node, int depth, double *q) {
+  if (depth > DEEPEST) return cav_xml_fail(reader->error, node, "key", "poses name each other in a circle");
+  cav_status status = read_base(reader, node, depth, q);
+  const cav_xml_node *root = cav_problem_child(node, "root");
+  for (; root && !status; root = cav_xml_next(root)) status = lay_root(reader, root, q);
+  const cav_xml_node *joint = cav_problem_child(node, "joint");
+  for (; joint && !status; joint = cav_xml_next(joint)) status = lay_joint(reader, joint, q);
+  if (!status && cav_xml_word(node, "ranges", 0)) clip(reader->model, q);
+  if (!status && cav_xml_word(node, "height", 0)) status = drop(reader, node, q);
+  if (!status && cav_xml_get(node, "rise") && !cav_xml_word(node, "height", 0))
+    status = cav_xml_fail(reader->error, node, "rise", "is counted from the floor; add height='floor'");
+  return status;
+}
+
+cav_status cav_problem_pose(const cav_problem_reader *reader, const cav_xml_node *node, double *q) {
+  return read_pose(reader, node, 0, q);
+}

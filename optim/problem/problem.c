@@ -1,0 +1,533 @@
+/// Problems: defaults, and reading a problem file with its model.
+///
+/// The file is checked against grammar.c while it is read; what is left here is what only the whole can tell: that
+/// names stand for something in the model, that windows lie in the horizon, that nothing contradicts. Postures are read by
+/// pose.c, terms by term.c; write.c is the way back. The weights and the schedule come from trials on
+/// a 27-dof humanoid (squat, jump, walk, get-up) and serve other bodies because all quantities are scaled by weight, limits
+/// and lengths. Does not decides whether a motion is possible.
+#include "cavort/problem.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "file.h"
+#include "ipopt_options.h"
+#include "problem_file.h"
+#include "scene.h"
+
+static const double most_knots = 1e6;
+static const double whole_step = 1e-6; // of a step: how far the duration may be from a whole number of them
+
+static const cav_term default_term[] = {
+    {.name = "effort", .quantity = CAV_QUANTITY_EFFORT, .weight = 1},
+    {.name = "joint velocity", .quantity = CAV_QUANTITY_VELOCITY, .dofs = CAV_DOFS_JOINTS, .weight = 0.05},
+    {.name = "root turning", .quantity = CAV_QUANTITY_VELOCITY, .dofs = CAV_DOFS_ROOT_ANGULAR, .weight = 0.05},
+    {.name = "acceleration", .quantity = CAV_QUANTITY_ACCELERATION, .dofs = CAV_DOFS_ALL, .weight = 1e-4},
+    {.name = "root acceleration", .quantity = CAV_QUANTITY_ACCELERATION, .dofs = CAV_DOFS_ROOT_LINEAR, .weight = 0.02},
+    {.name = "posture", .quantity = CAV_QUANTITY_CONFIGURATION, .dofs = CAV_DOFS_JOINTS, .weight = 0.1},
+    {.name = "gap", .quantity = CAV_QUANTITY_GAP, .weight = 1000},
+    {.name = "slip", .quantity = CAV_QUANTITY_SLIP, .weight = 200},
+    {.name = "impact", .quantity = CAV_QUANTITY_IMPACT, .weight = 10},
+    {.name = "self_penetration", .quantity = CAV_QUANTITY_SELF_PENETRATION, .weight = 1e6},
+};
+
+int cav_problem_default_terms(cav_term *term, int most) {
+  int n = (int)(sizeof default_term / sizeof *default_term);
+  for (int i = 0; i < n && i < most; i++) {
+    term[i] = default_term[i];
+    term[i].use = CAV_USE_COST;
+    term[i].component = -1;
+    term[i].joint = -1;
+    term[i].to = -1;
+    term[i].scale = 1;
+    term[i].lower = -INFINITY;
+    term[i].upper = INFINITY;
+  }
+  return n;
+}
+
+// ends of the continuation
+static const cav_stage_options first_stage = {.softness = 4,
+                                              .time_constant = 1,
+                                              .smoothing = 0.05,
+                                              .smoothing_self = 0.002,
+                                              .self_stiffness = 1e-3,
+                                              .penalty = 1e3,
+                                              .iterations = 30,
+                                              .tolerance = 1e-3};
+static const cav_stage_options last_stage = {.softness = 0.005,
+                                             .time_constant = 0,
+                                             .smoothing = 0.0005,
+                                             .smoothing_self = 0.001,
+                                             .self_stiffness = 1,
+                                             .penalty = 1e5,
+                                             .iterations = 100,
+                                             .tolerance = 1e-5};
+
+cav_problem cav_problem_default(const cav_model *model) {
+  return (cav_problem){
+      .name = "",
+      .model = model,
+      .duration = 1,
+      .timestep = 0.025,
+      .order = CAV_ORDER_MIDPOINT,
+      .close_at_rest = 1,
+      .guess = CAV_GUESS_INTERPOLATE,
+      .guess_to = 1,
+      .effort_limit = 0.8,
+      .limit_margin = 1e-3,
+      .schedule = {.stages = 16, .first = first_stage, .last = last_stage},
+  };
+}
+
+void *cav_problem_alloc(cav_problem_owner *owner, size_t size) {
+  cav_problem_block *block = calloc(1, sizeof *block + size);
+  if (!block) return NULL;
+  block->next = owner->block;
+  owner->block = block;
+  return block->data;
+}
+
+char *cav_problem_text(cav_problem_owner *owner, const char *text) {
+  char *copy = cav_problem_alloc(owner, strlen(text) + 1);
+  return copy ? strcpy(copy, text) : NULL;
+}
+
+static void free_owner(cav_problem_owner *owner) {
+  if (!owner) return;
+  while (owner->block) {
+    cav_problem_block *next = owner->block->next;
+    free(owner->block);
+    owner->block = next;
+  }
+  cav_model_free(owner->model);
+  free(owner);
+}
+
+void cav_problem_free(cav_problem *problem) {
+  if (problem) free_owner(problem->owner);
+}
+
+const cav_xml_node *cav_problem_child(const cav_xml_node *node, const char *name) {
+  const cav_xml_node *child = node ? node->child : NULL;
+  while (child && strcmp(child->rule->name, name)) child = child->next;
+  return child;
+}
+
+cav_status cav_problem_no_memory(const cav_problem_reader *reader) {
+  return cav_file_fail(reader->error, CAV_NO_MEMORY, 0, "%s: no memory for the problem", reader->path);
+}
+
+// the names of all objects of a kind: first, count, bytes between them; what to call one
+static const void *names_of(const cav_model *m, cav_object_type type, int *n, size_t *stride, const char **kind) {
+  switch (type) {
+    case CAV_OBJECT_BODY:
+    case CAV_OBJECT_XBODY:
+      return *kind = "body", *n = m->nbody, *stride = sizeof *m->body, m->body ? &m->body->name : NULL;
+    case CAV_OBJECT_JOINT:
+      return *kind = "joint", *n = m->njoint, *stride = sizeof *m->joint, m->joint ? &m->joint->name : NULL;
+    case CAV_OBJECT_GEOM:
+      return *kind = "geom", *n = m->ngeom, *stride = sizeof *m->geom, m->geom ? &m->geom->name : NULL;
+    case CAV_OBJECT_SITE:
+      return *kind = "site", *n = m->nsite, *stride = sizeof *m->site, m->site ? &m->site->name : NULL;
+    case CAV_OBJECT_TENDON:
+      return *kind = "tendon", *n = m->ntendon, *stride = sizeof *m->tendon, m->tendon ? &m->tendon->name : NULL;
+    case CAV_OBJECT_ACTUATOR:
+      return *kind = "actuator", *n = m->nactuator, *stride = sizeof *m->actuator,
+             m->actuator ? &m->actuator->name : NULL;
+    case CAV_OBJECT_KEY:
+      return *kind = "keyframe", *n = m->nkey, *stride = sizeof *m->key, m->key ? &m->key->name : NULL;
+    case CAV_OBJECT_SENSOR:
+      return *kind = "sensor", *n = m->nsensor, *stride = sizeof *m->sensor, m->sensor ? &m->sensor->name : NULL;
+    default:
+      return *kind = "object", *n = 0, *stride = 0, NULL;
+  }
+}
+
+int cav_problem_find(const cav_problem_reader *reader, const cav_xml_node *node, const char *attribute,
+                     cav_object_type type) {
+  const char *list = cav_xml_text(node, attribute, "");
+  char *copy = strdup(list), *rest = copy, *name = NULL;
+  if (!copy) {
+    cav_problem_no_memory(reader);
+    return -1;
+  }
+  int found = -1;
+  while (found < 0 && (name = strsep(&rest, "|"))) {
+    name += strspn(name, " ");
+    for (size_t n = strlen(name); n && name[n - 1] == ' '; n--) name[n - 1] = 0;
+    if (*name) found = cav_object_find(reader->model, type, name);
+  }
+  if (found < 0) {
+    int n = 0;
+    size_t stride = 0;
+    const char *kind;
+    const void *names = names_of(reader->model, type, &n, &stride, &kind);
+    copy[strcspn(copy, " |")] = 0;
+    const char *near = n ? cav_xml_nearest(copy, names, n, stride) : NULL;
+    cav_xml_fail(reader->error, node, attribute, "the model '%s' has no %s of that name, got '%.200s'%s%s%s",
+                 reader->model->name, kind, list, near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
+  }
+  free(copy);
+  return found;
+}
+
+// a number that must satisfy a condition, in words
+static cav_status real(const cav_problem_reader *reader, const cav_xml_node *node, const char *name, double least,
+                       double most, double *value) {
+  if (!cav_xml_get(node, name)) return CAV_OK;
+  double given = cav_xml_real(node, name, 0);
+  if (given < least || given > most) {
+    if (most < DBL_MAX) {
+      return cav_xml_fail(reader->error, node, name, "expected a number from %g to %g, got '%s'", least, most,
+                          cav_xml_text(node, name, ""));
+    }
+    return cav_xml_fail(reader->error, node, name, "expected a number %s, got '%s'",
+                        least > 0 ? "above 0" : "of 0 or more", cav_xml_text(node, name, ""));
+  }
+  *value = given;
+  return CAV_OK;
+}
+
+static cav_status read_horizon(const cav_problem_reader *reader) {
+  cav_problem *p = reader->problem;
+  const cav_xml_node *node = cav_problem_child(reader->root, "horizon");
+  cav_status status = real(reader, node, "duration", DBL_MIN, DBL_MAX, &p->duration);
+  if (!status) status = real(reader, node, "timestep", DBL_MIN, DBL_MAX, &p->timestep);
+  if (status) return status;
+  double steps = p->duration / p->timestep;
+  if (!(steps >= 2 - whole_step && steps < most_knots)) {
+    return cav_xml_fail(reader->error, node, "duration", "expected 2 to %g steps of %g s, got %g", most_knots,
+                        p->timestep, steps);
+  }
+  if (fabs(steps - round(steps)) > whole_step) {
+    return cav_xml_fail(reader->error, node, "duration",
+                        "expected a whole number of steps of %g s, got %g; %g s would be one", p->timestep, steps,
+                        round(steps) * p->timestep);
+  }
+  double range[2];
+  status = real(reader, node, "weight", 0, DBL_MAX, &p->duration_weight);
+  if (status) return status;
+  if (cav_xml_reals(node, "range", range, 2)) {
+    if (!(range[0] > 0 && range[0] <= p->duration && p->duration <= range[1]))
+      return cav_xml_fail(reader->error, node, "range",
+                          "expected a shortest and a longest duration about %g s, got %g %g", p->duration, range[0],
+                          range[1]);
+    p->duration_least = range[0];
+    p->duration_most = range[1];
+  } else if (cav_xml_get(node, "weight")) {
+    return cav_xml_fail(reader->error, node, "weight", "multipliers a free duration: give its range too");
+  }
+  p->order = (cav_order)cav_xml_word(node, "order", p->order);
+  p->close_at_rest = cav_xml_word(node, "close", p->close_at_rest);
+  return CAV_OK;
+}
+
+// lengths of tendons within their ranges
+static cav_status check_tendons(const cav_problem_reader *reader, const cav_xml_node *node, const double *q,
+                                double slack) {
+  const cav_model *m = reader->model;
+  cav_state *state = cav_state_new(m);
+  cav_status status = state ? cav_position(m, state, q) : CAV_NO_MEMORY;
+  if (status != CAV_OK) cav_xml_fail_as(reader->error, status, node, NULL, "lengths of tendons cannot be computed");
+  for (int i = 0; i < m->ntendon && status == CAV_OK; i++) {
+    const cav_tendon *tendon = &m->tendon[i];
+    double length = state->tendon_length[i];
+    if (!tendon->limited || (length >= tendon->range[0] - slack && length <= tendon->range[1] + slack)) continue;
+    status = cav_xml_fail(reader->error, node, NULL, "tendon '%s' has length %g, outside its range %g .. %g",
+                          tendon->name, length, tendon->range[0], tendon->range[1]);
+  }
+  cav_state_free(state);
+  return status;
+}
+
+// within ranges of joints and tendons, or the solver meets a knot that it may not move
+static cav_status check_ranges(const cav_problem_reader *reader, const cav_xml_node *node, const double *q) {
+  static const double slack = 1e-6;
+  const cav_model *m = reader->model;
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    if (!joint->limited || joint->type == CAV_JOINT_FREE) continue;
+    double value = q[joint->q], least = joint->range[0];
+    if (joint->type == CAV_JOINT_BALL) {
+      const double *w = q + joint->q;
+      value = 2 * atan2(sqrt(w[1] * w[1] + w[2] * w[2] + w[3] * w[3]), fabs(w[0]));
+      least = 0;
+    }
+    if (value < least - slack || value > joint->range[1] + slack) {
+      return cav_xml_fail(reader->error, node, NULL,
+                          "joint '%s' is at %g, outside its range %g .. %g (rad or m); ranges='clip' would bring it in",
+                          joint->name, value, least, joint->range[1]);
+    }
+  }
+  return m->ntendon > 0 ? check_tendons(reader, node, q, slack) : CAV_OK;
+}
+
+static cav_status read_ends(const cav_problem_reader *reader) {
+  cav_problem *p = reader->problem;
+  const cav_model *m = reader->model;
+  p->q_start = cav_problem_alloc(reader->owner, (size_t)(2 * m->nq + m->nv + 1) * sizeof(double));
+  if (!p->q_start) return cav_problem_no_memory(reader);
+  p->q_goal = p->q_start + m->nq;
+  p->v_start = p->q_goal + m->nq;
+  const cav_xml_node *start = cav_problem_child(reader->root, "start"), *goal = cav_problem_child(reader->root, "goal");
+  cav_status status = cav_problem_pose(reader, start, p->q_start);
+  if (!status) status = check_ranges(reader, start, p->q_start);
+  if (status) return status;
+  const cav_xml_value *qvel = cav_xml_get(start, "qvel");
+  if (qvel && qvel->count != m->nv) {
+    return cav_xml_fail(reader->error, start, "qvel", "expected %d numbers for the model '%s', got %d", m->nv, m->name,
+                        qvel->count);
+  }
+  if (qvel) cav_xml_reals(start, "qvel", p->v_start, m->nv);
+  if (!goal) {
+    memcpy(p->q_goal, p->q_start, (size_t)m->nq * sizeof(double));
+    return CAV_OK;
+  }
+  status = cav_problem_pose(reader, goal, p->q_goal);
+  return status ? status : check_ranges(reader, goal, p->q_goal);
+}
+
+// <swing> of a guess
+static cav_status read_swings(const cav_problem_reader *reader, const cav_xml_node *node) {
+  cav_problem *p = reader->problem;
+  const cav_xml_node *first = cav_problem_child(node, "swing");
+  int n = 0;
+  for (const cav_xml_node *swing = first; swing; swing = cav_xml_next(swing)) n++;
+  if (n == 0) return CAV_OK;
+  cav_swing *list = cav_problem_alloc(reader->owner, (size_t)n * sizeof *list);
+  if (!list) return cav_problem_no_memory(reader);
+  p->swing = list;
+  for (const cav_xml_node *swing = first; swing; swing = cav_xml_next(swing)) {
+    cav_swing *s = &list[p->nswing];
+    s->joint = cav_problem_find(reader, swing, "joint", CAV_OBJECT_JOINT);
+    if (s->joint < 0) return CAV_BAD_INPUT;
+    cav_joint_type type = reader->model->joint[s->joint].type;
+    if (type != CAV_JOINT_HINGE && type != CAV_JOINT_SLIDE) {
+      return cav_xml_fail(reader->error, swing, "joint", "expected a hinge or a slide");
+    }
+    s->amplitude = cav_xml_real(swing, "amplitude", 0);
+    s->frequency = cav_xml_real(swing, "frequency", 0);
+    s->phase = cav_xml_real(swing, "phase", 0) * M_PI / 180;
+    p->nswing++;
+  }
+  return CAV_OK;
+}
+
+// <waypoint> of a guess
+static cav_status read_guess_poses(const cav_problem_reader *reader, const cav_xml_node *node) {
+  cav_problem *p = reader->problem;
+  const cav_model *m = reader->model;
+  const cav_xml_node *first = cav_problem_child(node, "waypoint");
+  int n = 0;
+  for (const cav_xml_node *w = first; w; w = cav_xml_next(w)) n++;
+  if (n == 0) return CAV_OK;
+  if (p->guess == CAV_GUESS_HOLD)
+    return cav_xml_fail(reader->error, first, NULL, "contradicts type='hold'; remove one of the two");
+  cav_guess_pose *list = cav_problem_alloc(reader->owner, (size_t)n * sizeof *list);
+  double *q = cav_problem_alloc(reader->owner, (size_t)n * (size_t)m->nq * sizeof *q), before = 0;
+  if (!list || !q) return cav_problem_no_memory(reader);
+  p->guess_pose = list;
+  for (const cav_xml_node *w = first; w; w = cav_xml_next(w), q += m->nq) {
+    double time = cav_xml_real(w, "time", 0);
+    if (!(time > before && time < p->duration)) {
+      return cav_xml_fail(reader->error, w, "time",
+                          "expected a time after the posture before, %g s, and before the goal, %g s, got %g", before,
+                          p->duration, time);
+    }
+    cav_status status = cav_problem_pose(reader, w, q);
+    if (status) return status;
+    list[p->nguess_pose++] = (cav_guess_pose){time, q};
+    before = time;
+  }
+  return CAV_OK;
+}
+
+static cav_status read_guess(const cav_problem_reader *reader) {
+  cav_problem *p = reader->problem;
+  const cav_xml_node *node = cav_problem_child(reader->root, "guess");
+  p->guess_from = 0;
+  p->guess_to = p->duration;
+  if (!node) return CAV_OK;
+  p->guess = (cav_guess)cav_xml_word(node, "type", p->guess);
+  double rotation[3] = {0};
+  cav_xml_reals(node, "rotation", rotation, 3);
+  for (int i = 0; i < 3; i++) p->guess_rotation[i] = rotation[i] * M_PI / 180;
+  int turned = rotation[0] != 0 || rotation[1] != 0 || rotation[2] != 0;
+  cav_status status = read_guess_poses(reader, node);
+  if (!status) status = read_swings(reader, node);
+  if (!status) status = real(reader, node, "apex", 0, DBL_MAX, &p->guess_height);
+  if (!status) status = cav_problem_window(reader, node, &p->guess_from, &p->guess_to);
+  if (status) return status;
+  if (p->guess_to < 0) p->guess_to = p->duration;
+  if (p->guess_height == 0 && !turned && (cav_xml_get(node, "from") || cav_xml_get(node, "to"))) {
+    return cav_xml_fail(reader->error, node, "apex",
+                        "expected a height above 0 for the arc, or a turn, between 'from' and 'to'");
+  }
+  return CAV_OK;
+}
+
+static cav_status read_limits(const cav_problem_reader *reader) {
+  const cav_xml_node *node = cav_problem_child(reader->root, "limits");
+  if (!node) return CAV_OK;
+  cav_status status = real(reader, node, "effort", DBL_MIN, 1, &reader->problem->effort_limit);
+  return status ? status : real(reader, node, "margin", 0, DBL_MAX, &reader->problem->limit_margin);
+}
+
+static cav_status read_stage(const cav_problem_reader *reader, const cav_xml_node *node, cav_stage_options *stage) {
+  if (!node) return CAV_OK;
+  cav_status status = real(reader, node, "softness", DBL_MIN, DBL_MAX, &stage->softness);
+  if (!status) status = real(reader, node, "time_constant", 0, DBL_MAX, &stage->time_constant);
+  if (!status) status = real(reader, node, "smoothing", DBL_MIN, DBL_MAX, &stage->smoothing);
+  if (!status) status = real(reader, node, "smoothing_self", DBL_MIN, DBL_MAX, &stage->smoothing_self);
+  if (!status) status = real(reader, node, "self_stiffness", DBL_MIN, 1, &stage->self_stiffness);
+  if (!status) status = real(reader, node, "penalty", DBL_MIN, DBL_MAX, &stage->penalty);
+  if (!status) status = real(reader, node, "tolerance", DBL_MIN, 1, &stage->tolerance);
+  if (status) return status;
+  stage->iterations = cav_xml_int(node, "iterations", stage->iterations);
+  if (stage->iterations >= 1) return CAV_OK;
+  return cav_xml_fail(reader->error, node, "iterations", "expected at least 1, got %d", stage->iterations);
+}
+
+static cav_status read_schedule(const cav_problem_reader *reader) {
+  const cav_xml_node *node = cav_problem_child(reader->root, "schedule");
+  if (!node) return CAV_OK;
+  cav_schedule *schedule = &reader->problem->schedule;
+  schedule->stages = cav_xml_int(node, "stages", schedule->stages);
+  if (schedule->stages < 1 || schedule->stages > 1000) {
+    return cav_xml_fail(reader->error, node, "stages", "expected 1 to 1000, got %d", schedule->stages);
+  }
+  cav_status status = read_stage(reader, cav_problem_child(node, "first"), &schedule->first);
+  return status ? status : read_stage(reader, cav_problem_child(node, "last"), &schedule->last);
+}
+
+// Ipopt's options, checked where they stand
+static cav_status read_ipopt(const cav_problem_reader *reader) {
+  const cav_xml_node *node = cav_problem_child(reader->root, "ipopt");
+  int n;
+  const cav_ipopt_rule *rule = cav_ipopt_rules(&n);
+  if (!node) return CAV_OK;
+  cav_ipopt_option *option = cav_problem_alloc(reader->owner, (size_t)n * sizeof *option);
+  if (!option) return cav_problem_no_memory(reader);
+  reader->problem->ipopt = option;
+  for (int i = 0; i < n; i++) {
+    const char *text = cav_xml_text(node, rule[i].name, NULL);
+    if (!text) continue;
+    cav_error inner = {0};
+    char *copy = cav_problem_text(reader->owner, text);
+    if (!copy) return cav_problem_no_memory(reader);
+    *option = (cav_ipopt_option){rule[i].name, copy};
+    if (cav_ipopt_option_check(option++, &inner))
+      return cav_xml_fail(reader->error, node, rule[i].name, "%s", inner.text);
+    reader->problem->nipopt++;
+  }
+  return CAV_OK;
+}
+
+// the law that a result folder records
+static cav_status read_contact(const cav_problem_reader *reader) {
+  const cav_xml_node *node = cav_problem_child(reader->root, "contact");
+  cav_options *o = &reader->problem->contact;
+  *o = reader->model->options;
+  if (!node) return CAV_OK;
+  cav_status status = real(reader, node, "timestep", DBL_MIN, DBL_MAX, &o->timestep);
+  if (!status) status = real(reader, node, "softness", DBL_MIN, DBL_MAX, &o->softness);
+  if (!status) status = real(reader, node, "time_constant", 0, DBL_MAX, &o->time_constant);
+  if (!status) status = real(reader, node, "smoothing", 0, DBL_MAX, &o->smoothing);
+  if (!status) status = real(reader, node, "smoothing_self", 0, DBL_MAX, &o->smoothing_self);
+  if (!status) status = real(reader, node, "self_stiffness", DBL_MIN, 1, &o->self_stiffness);
+  if (!status) status = real(reader, node, "impratio", DBL_MIN, DBL_MAX, &o->impratio);
+  if (status) return status;
+  o->order = (cav_order)cav_xml_word(node, "order", o->order);
+  o->stabilisation = (cav_stabilisation)cav_xml_word(node, "stabilisation", o->stabilisation);
+  o->regulariser = (cav_regulariser)cav_xml_word(node, "regulariser", o->regulariser);
+  o->coupled = cav_xml_bool(node, "coupled", o->coupled);
+  o->refsafe = cav_xml_bool(node, "refsafe", o->refsafe);
+  o->contact = cav_xml_bool(node, "contact", o->contact);
+  o->constraint = cav_xml_bool(node, "constraint", o->constraint);
+  o->gravity = cav_xml_bool(node, "gravity", o->gravity);
+  o->passive = cav_xml_bool(node, "passive", o->passive);
+  // a free duration has found its own
+  const cav_problem *p = reader->problem;
+  if (p->duration_most == 0 && fabs(o->timestep - p->timestep) > whole_step * o->timestep) {
+    return cav_xml_fail(reader->error, node, "timestep", "expected %g as in <horizon>, got %g",
+                        reader->problem->timestep, o->timestep);
+  }
+  reader->problem->solved = 1;
+  return CAV_OK;
+}
+
+// the model that the file names, or another in its place
+static cav_status load_model(cav_problem_reader *reader, const char *model_path) {
+  const char *named = cav_xml_text(reader->root, "model", NULL);
+  if (!named && !model_path) {
+    return cav_xml_fail(
+        reader->error, reader->root, "model",
+        "is missing; this problem serves any model with the names that it uses: give one by --model FILE, or "
+        "write its path here, from this file's folder");
+  }
+  char *path = model_path ? strdup(model_path) : cav_file_beside(reader->path, named);
+  if (!path) return cav_problem_no_memory(reader);
+  cav_error inner = {0};
+  const cav_xml_node *scene = cav_problem_child(reader->root, "scene");
+  reader->owner->model = cav_model_load_scene(path, scene, &inner);
+  reader->problem->model_path = cav_problem_text(reader->owner, path);
+  free(path);
+  if (!reader->owner->model) {
+    // a fault of the scene is in this file and says so
+    size_t length = strlen(reader->path);
+    int own = !strncmp(inner.text, reader->path, length) && inner.text[length] == ':';
+    if (model_path || own) return cav_file_fail(reader->error, inner.status, inner.line, "%s", inner.text);
+    return cav_xml_fail_as(reader->error, inner.status, reader->root, "model", "%s", inner.text);
+  }
+  reader->model = reader->owner->model;
+  reader->state = cav_state_new(reader->model);
+  return reader->state && reader->problem->model_path ? CAV_OK : cav_problem_no_memory(reader);
+}
+
+// all parts, in the order in which they need each other
+static cav_status read_problem(cav_problem_reader *reader, const char *model_path) {
+  cav_status status = load_model(reader, model_path);
+  if (status) return status;
+  const char *path = reader->problem->model_path;
+  *reader->problem = cav_problem_default(reader->model);
+  const cav_xml_node *scene = cav_problem_child(reader->root, "scene");
+  if (scene && !(reader->problem->scene = cav_problem_scene(reader->owner, scene)))
+    return cav_problem_no_memory(reader);
+  reader->problem->owner = reader->owner;
+  reader->problem->model_path = path;
+  reader->problem->name = cav_problem_text(reader->owner, cav_xml_text(reader->root, "name", ""));
+  if (!reader->problem->name) return cav_problem_no_memory(reader);
+  status = read_horizon(reader);
+  if (!status) status = read_ends(reader);
+  if (!status) status = cav_problem_cycle(reader);
+  if (!status) status = read_guess(reader);
+  if (!status) status = read_limits(reader);
+  if (!status) status = read_schedule(reader);
+  if (!status) status = read_ipopt(reader);
+  if (!status) status = read_contact(reader);
+  if (!status) status = cav_problem_terms(reader);
+  return status;
+}
+
+cav_problem *cav_problem_load(const char *path, const char *model_path, cav_error *error) {
+  static const cav_xml_element *const roots[] = {&cav_problem_element, NULL};
+  cav_xml *xml = cav_xml_read(path, roots, error);
+  if (!xml) return NULL;
+  cav_problem_owner *owner = calloc(1, sizeof *owner);
+  cav_status status;
+  if (owner) {
+    cav_problem_reader reader = {
+        .owner = owner, .problem = &owner->problem, .root = cav_xml_root(xml), .path = path, .error = error};
+    status = read_problem(&reader, model_path);
+    cav_state_free(reader.state);
+  } else {
+    status = cav_file_fail(error, CAV_NO_MEMORY, 0, "%s: no memory for the problem", path);
+  }
+  cav_xml_free(xml);
+  if (!status) return &owner->problem;
+  free_owner(owner);
+  return NULL;
+}

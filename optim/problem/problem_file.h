@@ -1,0 +1,92 @@
+/// What the files that read a problem share: the tree, the model, and the memory of the result. Private to optim/.
+#ifndef CAVORT_PROBLEM_FILE_H
+#define CAVORT_PROBLEM_FILE_H
+
+#include "cavort/problem.h"
+#include "xml.h"
+
+/// Memory that lives as long as the problem.
+typedef struct cav_problem_block {
+  struct cav_problem_block *next;
+  double data[];
+} cav_problem_block;
+
+typedef struct cav_problem_owner {
+  cav_problem problem;
+  cav_model *model;
+  cav_problem_block *block;
+} cav_problem_owner;
+
+/// A reading in progress.
+typedef struct cav_problem_reader {
+  cav_problem_owner *owner;
+  cav_problem *problem;
+  const cav_model *model;
+  const cav_xml_node *root;
+  cav_state *state; ///< for readings and heights of poses
+  const char *path;
+  cav_error *error;
+} cav_problem_reader;
+
+/// The one root element: grammar.c.
+extern const cav_xml_element cav_problem_element;
+
+/// Words of the grammar, in the order of their enumerations; NULL at the end.
+extern const char *const cav_problem_orders[];
+extern const char *const cav_problem_closings[];
+extern const char *const cav_problem_guesses[];
+extern const char *const cav_problem_quantities[];
+extern const char *const cav_problem_dof_sets[];
+extern const char *const cav_problem_sensors[];
+extern const char *const cav_problem_stabilisations[];
+extern const char *const cav_problem_regularisers[];
+extern const char *const cav_problem_mirrors[];
+extern const char *const cav_problem_norms[];
+
+/// Zeroed memory of the problem; NULL if there is none left. problem.c.
+void *cav_problem_alloc(cav_problem_owner *owner, size_t size);
+char *cav_problem_text(cav_problem_owner *owner, const char *text);
+
+/// First child of that name, NULL if there is none; NULL node: NULL. problem.c.
+const cav_xml_node *cav_problem_child(const cav_xml_node *node, const char *name);
+
+/// Index of the first of the names in an attribute, separated by |, that the model has; -1 and an error if it has none.
+int cav_problem_find(const cav_problem_reader *reader, const cav_xml_node *node, const char *attribute,
+                     cav_object_type type);
+
+/// Configuration q [nq] of <start>, <goal> or <pose>, from keyframes, numbers, a trajectory and joint values. pose.c.
+cav_status cav_problem_pose(const cav_problem_reader *reader, const cav_xml_node *node, double *q);
+
+/// Configuration of the keyframe or <pose> that attribute 'key' of node names.
+cav_status cav_problem_key(const cav_problem_reader *reader, const cav_xml_node *node, double *q);
+
+/// Text of the children of a <scene>, as it is written; NULL without memory. write.c.
+char *cav_problem_scene(cav_problem_owner *owner, const cav_xml_node *scene);
+
+/// Window of attributes from, to, at: seconds or "end". Left as they are where the file gives none; to < 0: the end. It holds
+/// a knot. term.c.
+cav_status cav_problem_window(const cav_problem_reader *reader, const cav_xml_node *node, double *from, double *to);
+
+/// <cycle>, once the start is known. cycle.c.
+cav_status cav_problem_cycle(const cav_problem_reader *reader);
+
+/// Terms of <cost> and <constraint>, with the defaults that they leave in place. term.c.
+cav_status cav_problem_terms(const cav_problem_reader *reader);
+
+/// Targets of a term as a table gives them.
+typedef struct cav_problem_targets {
+  int count;            ///< numbers of a target, given
+  int n;                ///< rows
+  double *time, *value; ///< [n], [n*count], memory of the problem
+} cav_problem_targets;
+
+/// Table of attribute 'file' of a term, its columns by attribute 'columns'. target_table.c.
+cav_status cav_problem_table(const cav_problem_reader *reader, const cav_xml_node *node, cav_problem_targets *targets);
+
+/// Whether a term over dofs selects dof d. term.c.
+int cav_problem_selects(const cav_model *model, const cav_term *term, int d);
+
+/// Fills error with "no memory"; returns CAV_NO_MEMORY.
+cav_status cav_problem_no_memory(const cav_problem_reader *reader);
+
+#endif

@@ -1,0 +1,548 @@
+/// Terms of a problem file: <cost> and <constraint>.
+///
+/// A cost without a window (from, to, at) takes the place of the default costs of its quantity; one with a window is added
+/// to them; weight 0 leaves a term out, so that it costs nothing. A constraint with lower or upper is a range, otherwise its
+/// value equals its target. Targets are expanded to the layout of cav_term and relative ones resolved here, so solvers see
+/// numbers only.
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "file.h"
+#include "problem_file.h"
+
+static const double near_knot = 1e-6; // of a step
+
+// seconds of an attribute, or "end"
+static cav_status instant(const cav_problem_reader *reader, const cav_xml_node *node, const char *name,
+                          double *seconds) {
+  const char *text = cav_xml_text(node, name, NULL);
+  double duration = reader->problem->duration;
+  if (!text) return CAV_OK;
+  char *end;
+  double value = strcmp(text, "end") ? cav_file_number(text, &end) : duration;
+  if (strcmp(text, "end") && (end == text || end[strspn(end, " ")] || !isfinite(value))) {
+    return cav_xml_fail(reader->error, node, name, "expected seconds or 'end', got '%.60s'", text);
+  }
+  if (value < 0 || value > duration * (1 + near_knot)) {
+    return cav_xml_fail(reader->error, node, name, "expected a time within the horizon, 0 .. %g s, got %g", duration,
+                        value);
+  }
+  *seconds = value;
+  return CAV_OK;
+}
+
+cav_status cav_problem_window(const cav_problem_reader *reader, const cav_xml_node *node, double *from, double *to) {
+  if (cav_xml_get(node, "at") && (cav_xml_get(node, "from") || cav_xml_get(node, "to"))) {
+    return cav_xml_fail(reader->error, node, "at", "contradicts attributes 'from' and 'to'; give one or the others");
+  }
+  cav_status status = instant(reader, node, "from", from);
+  if (!status) status = instant(reader, node, "to", to);
+  if (!status && cav_xml_get(node, "at")) {
+    status = instant(reader, node, "at", from);
+    *to = *from;
+  }
+  if (status) return status;
+  double end = *to < 0 ? reader->problem->duration : *to, h = reader->problem->timestep;
+  if (*from > end)
+    return cav_xml_fail(reader->error, node, "from", "the window ends at %g s, before it starts at %g s", end, *from);
+  if (*from < end && ceil(*from / h - near_knot) > floor(end / h + near_knot)) {
+    return cav_xml_fail(reader->error, node, "from", "no knot lies between %g and %g s; knots are %g s apart", *from,
+                        end, h);
+  }
+  return CAV_OK;
+}
+
+// an attribute that picks dofs
+static cav_status read_dofs(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  term->dofs = (cav_dof_set)cav_xml_word(node, "dofs", CAV_DOFS_JOINTS);
+  if (!cav_xml_get(node, "joint")) return CAV_OK;
+  if (cav_xml_get(node, "dofs")) {
+    return cav_xml_fail(reader->error, node, "joint", "contradicts attribute 'dofs'; give one of the two");
+  }
+  term->dofs = CAV_DOFS_ONE;
+  term->joint = cav_problem_find(reader, node, "joint", CAV_OBJECT_JOINT);
+  return term->joint < 0 ? CAV_BAD_INPUT : CAV_OK;
+}
+
+int cav_problem_selects(const cav_model *m, const cav_term *term, int d) {
+  const cav_joint *joint = &m->joint[m->dof[d].joint];
+  int free = joint->type == CAV_JOINT_FREE, place = d - joint->dof;
+  switch (term->dofs) {
+    case CAV_DOFS_ALL:
+      return 1;
+    case CAV_DOFS_ROOT_LINEAR:
+      return free && place < 3;
+    case CAV_DOFS_ROOT_ANGULAR:
+      return free && place >= 3;
+    case CAV_DOFS_JOINTS:
+      return !free;
+    case CAV_DOFS_ONE:
+      return m->dof[d].joint == term->joint;
+  }
+  return 0;
+}
+
+// one number for each selected dof, or one for all, laid out over nv
+static void spread(const cav_model *m, const cav_term *term, const double *number, int count, double *target) {
+  for (int d = 0, k = 0; d < m->nv; d++) {
+    if (!cav_problem_selects(m, term, d)) continue;
+    target[d] = number[count == 1 ? 0 : k];
+    k++;
+  }
+}
+
+// numbers of a target: of a posture, of a rate, of a sensor or of the one component of it that counts
+static int target_count(const cav_model *m, const cav_term *term) {
+  int n = 0;
+  if (term->quantity == CAV_QUANTITY_CONFIGURATION) return m->nq;
+  if (term->quantity == CAV_QUANTITY_SENSOR)
+    return term->component >= 0 && term->sensor.dim != 4 ? 1 : term->sensor.dim;
+  for (int d = 0; d < m->nv; d++) n += cav_problem_selects(m, term, d);
+  return n;
+}
+
+// brings a target that holds orientations to unit length; 0 if one is zero
+static int normalise(const cav_model *m, const cav_term *term, double *target) {
+  if (term->quantity == CAV_QUANTITY_CONFIGURATION) {
+    cav_configuration_normalise(m, target);
+  } else if (term->quantity == CAV_QUANTITY_SENSOR && term->sensor.dim == 4) {
+    double *w = target, length = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2] + w[3] * w[3]);
+    for (int i = 0; i < 4; i++) w[i] /= length > 0 ? length : 1;
+    return length > 1e-9;
+  }
+  return 1;
+}
+
+// targets by a table, dim numbers each
+static cav_status read_table(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term, int dim) {
+  const cav_model *m = reader->model;
+  cav_problem_targets table = {.count = target_count(m, term)};
+  cav_status status = cav_problem_table(reader, node, &table);
+  if (status) return status;
+  double *target = cav_problem_alloc(reader->owner, sizeof(double) * (size_t)table.n * (size_t)dim);
+  if (!target) return cav_problem_no_memory(reader);
+  for (int i = 0; i < table.n; i++) {
+    const double *in = table.value + i * table.count;
+    double *out = target + i * dim;
+    int rate = term->quantity == CAV_QUANTITY_VELOCITY || term->quantity == CAV_QUANTITY_ACCELERATION;
+    int first = term->quantity == CAV_QUANTITY_SENSOR && table.count == 1 && term->component >= 0 ? term->component : 0;
+    if (rate) spread(m, term, in, table.count, out);
+    if (!rate) memcpy(out + first, in, sizeof(double) * (size_t)table.count);
+    if (!normalise(m, term, out))
+      return cav_xml_fail(reader->error, node, "file", "the quaternion at %g s is zero", table.time[i]);
+  }
+  term->target = target;
+  term->nwaypoint = table.n;
+  term->waypoint_time = table.time;
+  return CAV_OK;
+}
+
+// a table stands alone
+static cav_status check_sources(const cav_problem_reader *reader, const cav_xml_node *node, const char *own) {
+  if (!cav_xml_get(node, "file") && cav_xml_get(node, "columns"))
+    return cav_xml_fail(reader->error, node, "columns", "says which columns of attribute 'file', which is missing");
+  if (cav_xml_get(node, "file") && own)
+    return cav_xml_fail(reader->error, node, "file", "contradicts %s; give one of the two", own);
+  return CAV_OK;
+}
+
+// room for the targets of a term and, with waypoints, their times; checks that times increase
+static cav_status make_targets(const cav_problem_reader *reader, const cav_xml_node *node, int dim, cav_term *term,
+                               double **target) {
+  const cav_xml_node *first = cav_problem_child(node, "waypoint");
+  int n = 0;
+  for (const cav_xml_node *w = first; w; w = cav_xml_next(w)) n++;
+  *target = cav_problem_alloc(reader->owner, sizeof(double) * (size_t)(n ? n : 1) * (size_t)(dim + 1));
+  if (!*target) return cav_problem_no_memory(reader);
+  double *time = *target + (size_t)(n ? n : 1) * (size_t)dim, before = -1;
+  int i = 0;
+  for (const cav_xml_node *w = first; w; w = cav_xml_next(w)) {
+    time[i] = cav_xml_real(w, "time", 0);
+    if (time[i] < 0 || time[i] > reader->problem->duration * (1 + near_knot)) {
+      return cav_xml_fail(reader->error, w, "time", "expected a time within the horizon, 0 .. %g s, got %g",
+                          reader->problem->duration, time[i]);
+    }
+    if (time[i] <= before)
+      return cav_xml_fail(reader->error, w, "time", "expected a time after the one before, %g s, got %g", before,
+                          time[i]);
+    before = time[i++];
+  }
+  term->target = *target;
+  term->nwaypoint = n;
+  term->waypoint_time = n ? time : NULL;
+  return CAV_OK;
+}
+
+// a posture by keyframe or numbers; neither: found stays 0
+static cav_status posture_of(const cav_problem_reader *reader, const cav_xml_node *node, double *q, int *found) {
+  const cav_model *m = reader->model;
+  const cav_xml_value *numbers = cav_xml_get(node, "qpos");
+  if (numbers && cav_xml_get(node, "key"))
+    return cav_xml_fail(reader->error, node, "qpos", "contradicts attribute 'key'; give one of the two");
+  *found = numbers || cav_xml_get(node, "key");
+  if (!*found) return CAV_OK;
+  if (!numbers) return cav_problem_key(reader, node, q);
+  if (numbers->count != m->nq) {
+    return cav_xml_fail(reader->error, node, "qpos", "expected %d numbers for the model '%s', got %d", m->nq, m->name,
+                        numbers->count);
+  }
+  cav_xml_reals(node, "qpos", q, m->nq);
+  cav_configuration_normalise(m, q);
+  return CAV_OK;
+}
+
+static cav_status read_posture(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  term->quantity = CAV_QUANTITY_CONFIGURATION;
+  cav_status status = read_dofs(reader, node, term);
+  const cav_xml_node *waypoint = cav_problem_child(node, "waypoint");
+  int found, own = cav_xml_get(node, "key") || cav_xml_get(node, "qpos");
+  if (!status)
+    status = check_sources(reader, node, own ? "the posture that <posture> gives" : waypoint ? "<waypoint>" : NULL);
+  if (!status && cav_xml_get(node, "file")) return read_table(reader, node, term, reader->model->nq);
+  if (status || (!own && !waypoint)) return status;
+  if (own && waypoint)
+    return cav_xml_fail(reader->error, waypoint, NULL,
+                        "contradicts the posture that <posture> gives; remove one of the two");
+  double *target;
+  int nq = reader->model->nq;
+  status = make_targets(reader, node, nq, term, &target);
+  if (!status && own) return posture_of(reader, node, target, &found);
+  for (int i = 0; waypoint && !status; i++, waypoint = cav_xml_next(waypoint)) {
+    status = posture_of(reader, waypoint, target + i * nq, &found);
+    if (!status && !found) status = cav_xml_fail(reader->error, waypoint, "key", "is missing; give 'key' or 'qpos'");
+  }
+  return status;
+}
+
+// targets of rates: one number for all selected dofs or one for each, laid out over nv
+static cav_status rate_target(const cav_problem_reader *reader, const cav_xml_node *node, const cav_term *term,
+                              double *target) {
+  const cav_model *m = reader->model;
+  const cav_xml_value *given = cav_xml_get(node, "target");
+  int n = target_count(m, term);
+  if (given->count != 1 && given->count != n) {
+    return cav_xml_fail(reader->error, node, "target", "expected one number, or %d, one for each selected dof, got %d",
+                        n, given->count);
+  }
+  spread(m, term, given->number, given->count, target);
+  return CAV_OK;
+}
+
+// targets by the attribute of the element or by waypoints, through what reads one of them
+static cav_status read_targets(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term, int dim,
+                               cav_status (*read)(const cav_problem_reader *, const cav_xml_node *, const cav_term *,
+                                                  double *)) {
+  const cav_xml_node *waypoint = cav_problem_child(node, "waypoint");
+  int own = cav_xml_get(node, "target") != NULL;
+  cav_status status = check_sources(reader, node, own ? "attribute 'target'" : waypoint ? "<waypoint>" : NULL);
+  if (!status && cav_xml_get(node, "file")) return read_table(reader, node, term, dim);
+  if (status || (!own && !waypoint)) return status;
+  if (own && waypoint)
+    return cav_xml_fail(reader->error, node, "target", "contradicts <waypoint>; give one of the two");
+  double *target;
+  status = make_targets(reader, node, dim, term, &target);
+  if (!status && own) return read(reader, node, term, target);
+  for (int i = 0; waypoint && !status; i++, waypoint = cav_xml_next(waypoint)) {
+    status = read(reader, waypoint, term, target + i * dim);
+  }
+  return status;
+}
+
+static cav_status read_rate(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  term->quantity = strcmp(node->rule->name, "velocity") ? CAV_QUANTITY_ACCELERATION : CAV_QUANTITY_VELOCITY;
+  cav_status status = read_dofs(reader, node, term);
+  return status ? status : read_targets(reader, node, term, reader->model->nv, rate_target);
+}
+
+// kinds of objects by the attribute that names one
+static const struct {
+  const char *name;
+  cav_object_type type;
+} object_kind[] = {{"body", CAV_OBJECT_BODY},        {"xbody", CAV_OBJECT_XBODY}, {"geom", CAV_OBJECT_GEOM},
+                   {"site", CAV_OBJECT_SITE},        {"joint", CAV_OBJECT_JOINT}, {"tendon", CAV_OBJECT_TENDON},
+                   {"actuator", CAV_OBJECT_ACTUATOR}};
+enum { OBJECT_KINDS = sizeof object_kind / sizeof *object_kind, FRAME_KINDS = 4 };
+
+// what a sensor's target is called, and its kind; FRAME stands for the first kinds of the table
+static const struct {
+  const char *name;
+  cav_object_type type;
+} wanted_of[] = {[CAV_TARGET_NONE] = {"nothing", CAV_OBJECT_TYPES},
+                 [CAV_TARGET_FRAME] = {"body, xbody, geom or site", CAV_OBJECT_TYPES},
+                 [CAV_TARGET_BODY] = {"body", CAV_OBJECT_BODY},
+                 [CAV_TARGET_SITE] = {"site", CAV_OBJECT_SITE},
+                 [CAV_TARGET_SCALAR_JOINT] = {"joint", CAV_OBJECT_JOINT},
+                 [CAV_TARGET_BALL_JOINT] = {"joint", CAV_OBJECT_JOINT},
+                 [CAV_TARGET_LIMITED_JOINT] = {"joint", CAV_OBJECT_JOINT},
+                 [CAV_TARGET_TENDON] = {"tendon", CAV_OBJECT_TENDON},
+                 [CAV_TARGET_LIMITED_TENDON] = {"tendon", CAV_OBJECT_TENDON},
+                 [CAV_TARGET_ACTUATOR] = {"actuator", CAV_OBJECT_ACTUATOR}};
+
+// a joint or tendon of the kind that the sensor needs
+static cav_status check_object(const cav_problem_reader *reader, const cav_xml_node *node, const char *given,
+                               const cav_sensor *sensor) {
+  const cav_model *m = reader->model;
+  const char *needs = NULL, *name = cav_xml_text(node, given, "");
+  cav_sensor_target target = cav_sensor_rule_of(sensor->type)->target;
+  if (target == CAV_TARGET_SCALAR_JOINT && m->joint[sensor->object].type < CAV_JOINT_SLIDE)
+    needs = "a hinge or a slide";
+  if (target == CAV_TARGET_BALL_JOINT && m->joint[sensor->object].type != CAV_JOINT_BALL) needs = "a ball joint";
+  if (target == CAV_TARGET_LIMITED_JOINT && !m->joint[sensor->object].limited) needs = "a joint with a limit";
+  if (target == CAV_TARGET_LIMITED_TENDON && !m->tendon[sensor->object].limited) needs = "a tendon with a limit";
+  if (!needs) return CAV_OK;
+  return cav_xml_fail(reader->error, node, given, "a %s needs %s; '%.60s' is none", cav_problem_sensors[sensor->type],
+                      needs, name);
+}
+
+// the frame in which a frame sensor declared in the file reads
+static cav_status read_reference(const cav_problem_reader *reader, const cav_xml_node *node, cav_sensor *sensor) {
+  static const cav_object_type types[] = {CAV_OBJECT_BODY, CAV_OBJECT_XBODY, CAV_OBJECT_GEOM, CAV_OBJECT_SITE};
+  const cav_sensor_rule *rule = cav_sensor_rule_of(sensor->type);
+  int named = cav_xml_get(node, "refname") != NULL, typed = cav_xml_get(node, "reftype") != NULL;
+  if (!named && !typed) return CAV_OK;
+  if (named != typed)
+    return cav_xml_fail(reader->error, node, named ? "reftype" : "refname", "is missing; a frame needs both");
+  if (rule->target != CAV_TARGET_FRAME || rule->stage == CAV_READS_ACCELERATION)
+    return cav_xml_fail(reader->error, node, "refname", "a %s reads in no other frame", rule->name);
+  sensor->referred = 1;
+  sensor->reference_type = types[cav_xml_word(node, "reftype", 0)];
+  sensor->reference = cav_problem_find(reader, node, "refname", sensor->reference_type);
+  return sensor->reference < 0 ? CAV_BAD_INPUT : CAV_OK;
+}
+
+// the object that a sensor declared in the file looks at
+static cav_status read_object(const cav_problem_reader *reader, const cav_xml_node *node, cav_sensor *sensor) {
+  const char *given = NULL;
+  int kind = 0;
+  for (int i = 0; i < OBJECT_KINDS; i++) {
+    if (!cav_xml_get(node, object_kind[i].name)) continue;
+    if (given)
+      return cav_xml_fail(reader->error, node, object_kind[i].name, "contradicts attribute '%s'; give one of the two",
+                          given);
+    given = object_kind[i].name;
+    kind = i;
+  }
+  sensor->object_type = object_kind[kind].type;
+  const cav_sensor_rule *rule = cav_sensor_rule_of(sensor->type);
+  int framed = rule->target == CAV_TARGET_FRAME;
+  const char *wanted = wanted_of[rule->target].name;
+  if (rule->target == CAV_TARGET_NONE)
+    return cav_xml_fail(reader->error, node, "type", "a %s reads nothing of the motion; windows tell the time",
+                        rule->name);
+  if (!given)
+    return cav_xml_fail(reader->error, node, framed ? "body" : wanted, "is missing; a %s needs one of: %s", rule->name,
+                        wanted);
+  if (framed ? kind >= FRAME_KINDS : sensor->object_type != wanted_of[rule->target].type)
+    return cav_xml_fail(reader->error, node, given, "a %s looks at a %s", rule->name, wanted);
+  sensor->object = cav_problem_find(reader, node, given, sensor->object_type);
+  if (sensor->object < 0) return CAV_BAD_INPUT;
+  cav_status status = check_object(reader, node, given, sensor);
+  return status ? status : read_reference(reader, node, sensor);
+}
+
+// x, y, z or a number; of an orientation, of the rotation vector to its target
+static cav_status read_component(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  const char *text = cav_xml_text(node, "component", NULL);
+  if (!text) return CAV_OK;
+  int dim = term->sensor.dim == 4 ? 3 : term->sensor.dim;
+  int index = strlen(text) == 1 ? (strchr("012", *text) ? *text - '0' : strchr("xyz", *text) ? *text - 'x' : -1) : -1;
+  if (index < 0 || index >= dim || dim == 1) {
+    return cav_xml_fail(
+        reader->error, node, "component",
+        dim == 1 ? "the sensor has one value; remove it, got '%.40s'" : "expected x, y or z, got '%.40s'", text);
+  }
+  term->component = index;
+  return CAV_OK;
+}
+
+// targets of a sensor: all of its values, or the one that counts
+static cav_status sensor_target(const cav_problem_reader *reader, const cav_xml_node *node, const cav_term *term,
+                                double *target) {
+  const cav_xml_value *given = cav_xml_get(node, "target");
+  int rotation = term->sensor.dim == 4, one = term->component >= 0 && !rotation, wanted = one ? 1 : term->sensor.dim;
+  if (given->count != wanted) {
+    return cav_xml_fail(reader->error, node, "target", "expected %d number%s, got %d", wanted, wanted > 1 ? "s" : "",
+                        given->count);
+  }
+  cav_xml_reals(node, "target", target + (one ? term->component : 0), wanted);
+  if (!rotation) return CAV_OK;
+  if (normalise(reader->model, term, target)) return CAV_OK;
+  return cav_xml_fail(reader->error, node, "target", "expected a quaternion that is not zero");
+}
+
+// reading + target, or reading * target for orientations
+static void add_reading(const cav_sensor *sensor, const double *reading, double *target) {
+  if (sensor->dim != 4) {
+    for (int i = 0; i < sensor->dim; i++) target[i] += reading[i];
+    return;
+  }
+  const double *a = reading, b[4] = {target[0], target[1], target[2], target[3]};
+  target[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3];
+  target[1] = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2];
+  target[2] = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1];
+  target[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
+}
+
+// targets and bounds given from the reading at the start or the goal
+static cav_status make_absolute(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  int relation = cav_xml_word(node, "relative", 0);
+  if (!relation) return CAV_OK;
+  const char *what = cav_problem_sensors[term->sensor.type];
+  if (cav_sensor_rule_of(term->sensor.type)->stage != CAV_READS_POSITION)
+    return cav_xml_fail(reader->error, node, "relative", "a %s has no reading at a posture at rest", what);
+  double reading[4] = {0};
+  cav_status status =
+      cav_position(reader->model, reader->state, relation == 1 ? reader->problem->q_start : reader->problem->q_goal);
+  if (status)
+    return cav_xml_fail_as(reader->error, status, node, "relative", "the posture cannot be evaluated: %s",
+                           cav_status_name(status));
+  cav_sensor_read(reader->model, reader->state, &term->sensor, reading);
+  int rotation = term->sensor.dim == 4;
+  if (term->use == CAV_USE_RANGE && !rotation) {
+    if (term->sensor.dim > 1 && term->component < 0) {
+      return cav_xml_fail(reader->error, node, "component", "is missing; relative bounds are of one component");
+    }
+    double from = reading[term->component < 0 ? 0 : term->component];
+    term->lower += from;
+    term->upper += from;
+    return CAV_OK;
+  }
+  if (!term->target) {
+    double *target;
+    status = make_targets(reader, node, term->sensor.dim, term, &target);
+    if (status) return status;
+    if (rotation) target[0] = 1;
+  }
+  for (int i = 0; i < (term->nwaypoint ? term->nwaypoint : 1); i++) {
+    add_reading(&term->sensor, reading, (double *)term->target + i * term->sensor.dim);
+  }
+  return CAV_OK;
+}
+
+static cav_status read_sensor(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  term->quantity = CAV_QUANTITY_SENSOR;
+  cav_status status = CAV_OK;
+  if (cav_xml_get(node, "type")) {
+    term->sensor = (cav_sensor){.name = "", .type = (cav_sensor_type)cav_xml_word(node, "type", 0), .adr = -1};
+    term->sensor.dim = cav_sensor_rule_of(term->sensor.type)->dim;
+    status = read_object(reader, node, &term->sensor);
+  } else if (cav_xml_get(node, "name")) {
+    int sensor = cav_problem_find(reader, node, "name", CAV_OBJECT_SENSOR);
+    if (sensor < 0) return CAV_BAD_INPUT;
+    term->sensor = reader->model->sensor[sensor];
+    if (term->sensor.type == CAV_SENSOR_CLOCK)
+      return cav_xml_fail(reader->error, node, "name", "a clock reads nothing of the motion; windows tell the time");
+  } else {
+    status = cav_xml_fail(reader->error, node, "type",
+                          "is missing; give the type of a sensor, or in 'name' one of the model's");
+  }
+  if (!status) status = read_component(reader, node, term);
+  if (!status) status = read_targets(reader, node, term, term->sensor.dim, sensor_target);
+  if (!status && term->use == CAV_USE_RANGE && term->target && term->sensor.dim != 4) {
+    status = cav_xml_fail(reader->error, node, "target", "contradicts 'lower' and 'upper'; give one or the others");
+  }
+  return status ? status : make_absolute(reader, node, term);
+}
+
+static cav_status read_effort(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  (void)reader, (void)node;
+  term->quantity = CAV_QUANTITY_EFFORT;
+  return CAV_OK;
+}
+
+static cav_status read_touch(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  const char *name = node->rule->name;
+  if (cav_xml_get(node, "body")) {
+    term->body = cav_problem_find(reader, node, "body", CAV_OBJECT_BODY);
+    if (term->body < 0) return CAV_BAD_INPUT;
+    if (reader->model->body[term->body].link == 0)
+      return cav_xml_fail(reader->error, node, "body", "expected a body that moves, got '%.80s'",
+                          cav_xml_text(node, "body", ""));
+  }
+  term->quantity = !strcmp(name, "gap")      ? CAV_QUANTITY_GAP
+                   : !strcmp(name, "slip")   ? CAV_QUANTITY_SLIP
+                   : !strcmp(name, "impact") ? CAV_QUANTITY_IMPACT
+                   : !strcmp(name, "force")  ? CAV_QUANTITY_FORCE
+                                             : CAV_QUANTITY_SELF_PENETRATION;
+  return CAV_OK;
+}
+
+// who reads which element
+static const struct {
+  const char *name;
+  cav_status (*read)(const cav_problem_reader *, const cav_xml_node *, cav_term *);
+} term_reader[] = {{"sensor", read_sensor},     {"posture", read_posture}, {"velocity", read_rate},
+                   {"acceleration", read_rate}, {"effort", read_effort},   {"gap", read_touch},
+                   {"slip", read_touch},        {"impact", read_touch},    {"self_penetration", read_touch},
+                   {"force", read_touch}};
+
+// bounds of a constraint, or the weight of a cost
+static cav_status read_use(const cav_problem_reader *reader, const cav_xml_node *node, int hard, cav_term *term) {
+  term->lower = cav_xml_real(node, "lower", -INFINITY);
+  term->upper = cav_xml_real(node, "upper", INFINITY);
+  term->weight = cav_xml_real(node, "weight", 0);
+  term->scale = cav_xml_real(node, "scale", 1);
+  term->norm = hard ? CAV_NORM_SQUARE : (cav_norm)cav_xml_word(node, "norm", CAV_NORM_SQUARE);
+  if (hard) term->use = cav_xml_get(node, "lower") || cav_xml_get(node, "upper") ? CAV_USE_RANGE : CAV_USE_EQUAL;
+  if (term->lower > term->upper)
+    return cav_xml_fail(reader->error, node, "lower", "%g lies above 'upper', %g", term->lower, term->upper);
+  if (term->weight < 0)
+    return cav_xml_fail(reader->error, node, "weight", "expected a number of 0 or more, got %g", term->weight);
+  if (!(term->scale > 0))
+    return cav_xml_fail(reader->error, node, "scale", "expected a number above 0, got %g", term->scale);
+  return CAV_OK;
+}
+
+static cav_status read_term(const cav_problem_reader *reader, const cav_xml_node *node, int hard, cav_term *term) {
+  memset(term, 0, sizeof *term);
+  term->component = term->joint = -1;
+  term->to = -1;
+  term->name = cav_problem_text(reader->owner, cav_xml_text(node, "name", node->rule->name));
+  if (!term->name) return cav_problem_no_memory(reader);
+  cav_status status = read_use(reader, node, hard, term);
+  if (!status) status = cav_problem_window(reader, node, &term->from, &term->to);
+  int i = 0;
+  while (strcmp(term_reader[i].name, node->rule->name)) i++;
+  return status ? status : term_reader[i].read(reader, node, term);
+}
+
+static int has_window(const cav_xml_node *node) {
+  return cav_xml_get(node, "from") || cav_xml_get(node, "to") || cav_xml_get(node, "at");
+}
+
+// whether the file has a cost of that quantity over the whole horizon, which takes the defaults' place
+static int replaced(const cav_xml_node *cost, cav_quantity quantity) {
+  for (const cav_xml_node *node = cost ? cost->child : NULL; node; node = node->next) {
+    int part = has_window(node) ||
+               (cav_xml_accepts(node, "body") && cav_xml_get(node, "body") && !cav_xml_accepts(node, "type"));
+    if (!part && !strcmp(node->rule->name, cav_problem_quantities[quantity])) return 1;
+  }
+  return 0;
+}
+
+cav_status cav_problem_terms(const cav_problem_reader *reader) {
+  const cav_xml_node *cost = cav_problem_child(reader->root, "cost"),
+                     *constraint = cav_problem_child(reader->root, "constraint");
+  int ndefault = cav_problem_default_terms(NULL, 0), most = ndefault;
+  for (const cav_xml_node *node = cost ? cost->child : NULL; node; node = node->next) most++;
+  for (const cav_xml_node *node = constraint ? constraint->child : NULL; node; node = node->next) most++;
+  cav_problem *p = reader->problem;
+  p->term = cav_problem_alloc(reader->owner, (size_t)most * sizeof *p->term);
+  if (!p->term) return cav_problem_no_memory(reader);
+  // defaults that the file leaves in place, then its own
+  cav_problem_default_terms(p->term, ndefault);
+  for (int i = 0; i < ndefault; i++) {
+    if (!replaced(cost, p->term[i].quantity)) p->term[p->nterm++] = p->term[i];
+  }
+  cav_status status = CAV_OK;
+  for (const cav_xml_node *node = cost ? cost->child : NULL; node && !status; node = node->next) {
+    status = read_term(reader, node, 0, &p->term[p->nterm]);
+    p->nterm += p->term[p->nterm].weight > 0;
+  }
+  for (const cav_xml_node *node = constraint ? constraint->child : NULL; node && !status; node = node->next) {
+    status = read_term(reader, node, 1, &p->term[p->nterm++]);
+  }
+  return status;
+}

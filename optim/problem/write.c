@@ -1,0 +1,379 @@
+/// Problem files from problems: what problem.c reads, with nothing left to resolve.
+///
+/// Postures are written as numbers, targets as they stand in the terms, every stage option spelt out; default costs that the
+/// problem does not have are written with weight 0, as a file says it. Numbers carry 17 digits, so reading gives the same bits.
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "file.h"
+#include "problem_file.h"
+
+// text inside an attribute
+static void write_text(FILE *out, const char *name, const char *text) {
+  fprintf(out, " %s=\"", name);
+  for (; *text; text++) {
+    switch (*text) {
+      case '<':
+        fputs("&lt;", out);
+        break;
+      case '>':
+        fputs("&gt;", out);
+        break;
+      case '&':
+        fputs("&amp;", out);
+        break;
+      case '"':
+        fputs("&quot;", out);
+        break;
+      default:
+        if ((unsigned char)*text < ' ')
+          fprintf(out, "&#%d;", *text);
+        else
+          fputc(*text, out);
+    }
+  }
+  fputc('"', out);
+}
+
+static void write_number(FILE *out, const char *name, double value) { fprintf(out, " %s=\"%.17g\"", name, value); }
+
+static void write_numbers(FILE *out, const char *name, const double *value, int n) {
+  fprintf(out, " %s=\"", name);
+  for (int i = 0; i < n; i++) fprintf(out, "%s%.17g", i ? " " : "", value[i]);
+  fputc('"', out);
+}
+
+// name of an object and of its kind, NULL if it has none
+static const char *object_name(const cav_model *m, cav_object_type type, int i, const char **kind) {
+  const char *name = NULL;
+  switch (type) {
+    case CAV_OBJECT_BODY:
+      *kind = "body", name = m->body[i].name;
+      break;
+    case CAV_OBJECT_XBODY:
+      *kind = "xbody", name = m->body[i].name;
+      break;
+    case CAV_OBJECT_GEOM:
+      *kind = "geom", name = m->geom[i].name;
+      break;
+    case CAV_OBJECT_SITE:
+      *kind = "site", name = m->site[i].name;
+      break;
+    case CAV_OBJECT_JOINT:
+      *kind = "joint", name = m->joint[i].name;
+      break;
+    case CAV_OBJECT_TENDON:
+      *kind = "tendon", name = m->tendon[i].name;
+      break;
+    case CAV_OBJECT_ACTUATOR:
+      *kind = "actuator", name = m->actuator[i].name;
+      break;
+    default:
+      break;
+  }
+  return name && *name ? name : NULL;
+}
+
+// sensor by what it looks at, or by the model's name for it; 0 if it has neither
+static int write_sensor(FILE *out, const cav_problem *p, const cav_term *term) {
+  static const char *const component[] = {"x", "y", "z"};
+  const cav_sensor *sensor = &term->sensor;
+  const char *kind = NULL, *object = object_name(p->model, sensor->object_type, sensor->object, &kind);
+  const char *name = sensor->name ? sensor->name : "", *reference = NULL, *frame = NULL;
+  if (sensor->referred) reference = object_name(p->model, sensor->reference_type, sensor->reference, &frame);
+  // a reading that is cut, or in a frame without a name, is only in the model
+  if (object && sensor->cutoff == 0 && (reference || !sensor->referred)) {
+    write_text(out, "name", term->name ? term->name : "sensor");
+    write_text(out, "type", cav_problem_sensors[sensor->type]);
+    write_text(out, kind, object);
+    if (reference) {
+      write_text(out, "reftype", frame);
+      write_text(out, "refname", reference);
+    }
+  } else if (*name) {
+    write_text(out, "name", name);
+  } else {
+    return 0;
+  }
+  if (term->component >= 0 && term->sensor.dim > 1) write_text(out, "component", component[term->component]);
+  return 1;
+}
+
+// selection of dofs; 0 if it is of a joint without a name
+static int write_dofs(FILE *out, const cav_problem *p, const cav_term *term) {
+  int one = term->dofs == CAV_DOFS_ONE;
+  const char *text = one ? p->model->joint[term->joint].name : cav_problem_dof_sets[term->dofs];
+  write_text(out, one ? "joint" : "dofs", text);
+  return *text != 0;
+}
+
+// one target, as the element's attribute or a waypoint's
+static void write_target(FILE *out, const cav_problem *p, const cav_term *term, const double *target) {
+  if (term->quantity == CAV_QUANTITY_CONFIGURATION) {
+    write_numbers(out, "qpos", target, p->model->nq);
+  } else if (term->quantity == CAV_QUANTITY_SENSOR) {
+    int one = term->component >= 0 && term->sensor.dim != 4;
+    write_numbers(out, "target", target + (one ? term->component : 0), one ? 1 : term->sensor.dim);
+  } else {
+    fputs(" target=\"", out);
+    for (int d = 0, n = 0; d < p->model->nv; d++) {
+      if (cav_problem_selects(p->model, term, d)) fprintf(out, "%s%.17g", n++ ? " " : "", target[d]);
+    }
+    fputc('"', out);
+  }
+}
+
+static int target_length(const cav_problem *p, const cav_term *term) {
+  if (term->quantity == CAV_QUANTITY_CONFIGURATION) return p->model->nq;
+  return term->quantity == CAV_QUANTITY_SENSOR ? term->sensor.dim : p->model->nv;
+}
+
+static int has_dofs(const cav_term *term) {
+  return term->quantity == CAV_QUANTITY_CONFIGURATION || term->quantity == CAV_QUANTITY_VELOCITY ||
+         term->quantity == CAV_QUANTITY_ACCELERATION;
+}
+
+// window attributes; none for the whole horizon
+static void write_window(FILE *out, const cav_problem *p, const cav_term *term) {
+  double to = term->to < 0 ? p->duration : term->to, from = term->from < 0 ? p->duration : term->from;
+  if (to - from < 1e-9) {
+    write_number(out, "at", fmin(from, p->duration));
+    return;
+  }
+  if (from > 0) write_number(out, "from", from);
+  if (term->to >= 0) write_number(out, "to", to);
+}
+
+static int is_running(const cav_problem *p, const cav_term *term) {
+  return term->from == 0 && term->to < 0 && p->duration > 1e-9 && term->body <= 0;
+}
+
+static int write_term(FILE *out, const cav_problem *p, const cav_term *term) {
+  const char *element = cav_problem_quantities[term->quantity];
+  fprintf(out, "    <%s", element);
+  if (term->quantity == CAV_QUANTITY_SENSOR) {
+    if (!write_sensor(out, p, term)) return 0;
+  } else {
+    write_text(out, "name", term->name && *term->name ? term->name : element);
+  }
+  if (has_dofs(term) && !write_dofs(out, p, term)) return 0;
+  if (term->target && !term->nwaypoint) write_target(out, p, term, term->target);
+  write_window(out, p, term);
+  if (term->body > 0 && !*p->model->body[term->body].name) return 0;
+  if (term->body > 0) write_text(out, "body", p->model->body[term->body].name);
+  if (term->use == CAV_USE_COST) write_number(out, "weight", term->weight);
+  if (term->use == CAV_USE_COST && term->norm != CAV_NORM_SQUARE)
+    write_text(out, "norm", cav_problem_norms[term->norm]);
+  if (term->use == CAV_USE_RANGE && isfinite(term->lower)) write_number(out, "lower", term->lower);
+  if (term->use == CAV_USE_RANGE && isfinite(term->upper)) write_number(out, "upper", term->upper);
+  if (term->scale != 1) write_number(out, "scale", term->scale);
+  if (!term->target || !term->nwaypoint) {
+    fputs("/>\n", out);
+    return 1;
+  }
+  fputs(">\n", out);
+  for (int i = 0; i < term->nwaypoint; i++) {
+    fputs("      <waypoint", out);
+    write_number(out, "time", term->waypoint_time[i]);
+    write_target(out, p, term, term->target + i * target_length(p, term));
+    fputs("/>\n", out);
+  }
+  fprintf(out, "    </%s>\n", element);
+  return 1;
+}
+
+// defaults that the problem goes without
+static void write_absent(FILE *out, const cav_problem *p) {
+  for (int quantity = 0; quantity < CAV_QUANTITY_TYPES; quantity++) {
+    int running = quantity == CAV_QUANTITY_SENSOR;
+    for (int i = 0; i < p->nterm && !running; i++) {
+      const cav_term *term = &p->term[i];
+      running = term->use == CAV_USE_COST && (int)term->quantity == quantity && term->weight > 0 && is_running(p, term);
+    }
+    if (!running) fprintf(out, "    <%s weight=\"0\"/>\n", cav_problem_quantities[quantity]);
+  }
+}
+
+// the term that cannot be written, or -1
+static int write_terms(FILE *out, const cav_problem *p) {
+  fputs("  <cost>\n", out);
+  write_absent(out, p);
+  for (int i = 0; i < p->nterm; i++) {
+    if (p->term[i].use == CAV_USE_COST && p->term[i].weight > 0 && !write_term(out, p, &p->term[i])) return i;
+  }
+  fputs("  </cost>\n", out);
+  int hard = 0;
+  for (int i = 0; i < p->nterm; i++) {
+    if (p->term[i].use == CAV_USE_COST) continue;
+    if (!hard++) fputs("  <constraint>\n", out);
+    if (!write_term(out, p, &p->term[i])) return i;
+  }
+  if (hard) fputs("  </constraint>\n", out);
+  return -1;
+}
+
+static void write_stage(FILE *out, const char *name, const cav_stage_options *stage) {
+  fprintf(out, "    <%s", name);
+  write_number(out, "softness", stage->softness);
+  write_number(out, "time_constant", stage->time_constant);
+  write_number(out, "smoothing", stage->smoothing);
+  write_number(out, "smoothing_self", stage->smoothing_self);
+  write_number(out, "self_stiffness", stage->self_stiffness);
+  write_number(out, "penalty", stage->penalty);
+  fprintf(out, " iterations=\"%d\"", stage->iterations);
+  write_number(out, "tolerance", stage->tolerance);
+  fputs("/>\n", out);
+}
+
+static void write_contact(FILE *out, const cav_options *o) {
+  static const char *const truth[] = {"false", "true"};
+  fputs("  <contact", out);
+  write_number(out, "timestep", o->timestep);
+  write_text(out, "order", cav_problem_orders[o->order]);
+  write_text(out, "stabilisation", cav_problem_stabilisations[o->stabilisation]);
+  write_text(out, "regulariser", cav_problem_regularisers[o->regulariser]);
+  write_number(out, "softness", o->softness);
+  write_number(out, "time_constant", o->time_constant);
+  write_number(out, "smoothing", o->smoothing);
+  write_number(out, "smoothing_self", o->smoothing_self);
+  write_number(out, "self_stiffness", o->self_stiffness);
+  write_number(out, "impratio", o->impratio);
+  write_text(out, "coupled", truth[o->coupled != 0]);
+  write_text(out, "refsafe", truth[o->refsafe != 0]);
+  write_text(out, "contact", truth[o->contact != 0]);
+  write_text(out, "constraint", truth[o->constraint != 0]);
+  write_text(out, "gravity", truth[o->gravity != 0]);
+  write_text(out, "passive", truth[o->passive != 0]);
+  fputs("/>\n", out);
+}
+
+// an element of a scene, as it was read
+static void write_element(FILE *out, const cav_xml_node *node, int indent) {
+  fprintf(out, "%*s<%s", indent, "", node->rule->name);
+  for (int i = 0; i < node->nvalue; i++) write_text(out, node->value[i].rule->name, node->value[i].text);
+  fputs(node->child ? ">\n" : "/>\n", out);
+  for (const cav_xml_node *c = node->child; c; c = c->next) write_element(out, c, indent + 2);
+  if (node->child) fprintf(out, "%*s</%s>\n", indent, "", node->rule->name);
+}
+
+char *cav_problem_scene(cav_problem_owner *owner, const cav_xml_node *scene) {
+  char *text = NULL, *copy = NULL;
+  size_t size;
+  FILE *out = open_memstream(&text, &size);
+  if (!out) return NULL;
+  for (const cav_xml_node *c = scene->child; c; c = c->next) write_element(out, c, 4);
+  if (fclose(out) == 0) copy = cav_problem_text(owner, text);
+  free(text);
+  return copy;
+}
+
+static void write_guess(FILE *out, const cav_problem *p) {
+  const cav_model *m = p->model;
+  double rotation[3];
+  for (int i = 0; i < 3; i++) rotation[i] = p->guess_rotation[i] * 180 / M_PI;
+  int turned = rotation[0] != 0 || rotation[1] != 0 || rotation[2] != 0;
+  fputs("  <guess", out);
+  write_text(out, "type", cav_problem_guesses[p->guess]);
+  if (p->guess_height > 0) write_number(out, "apex", p->guess_height);
+  if (turned) write_numbers(out, "rotation", rotation, 3);
+  if (turned || p->guess_height > 0) {
+    write_number(out, "from", p->guess_from);
+    write_number(out, "to", p->guess_to);
+  }
+  fputs(p->nguess_pose || p->nswing ? ">\n" : "/>\n", out);
+  for (int i = 0; i < p->nguess_pose; i++) {
+    fputs("    <waypoint", out);
+    write_number(out, "time", p->guess_pose[i].time);
+    write_numbers(out, "qpos", p->guess_pose[i].q, m->nq);
+    fputs("/>\n", out);
+  }
+  for (int i = 0; i < p->nswing; i++) {
+    fputs("    <swing", out);
+    write_text(out, "joint", m->joint[p->swing[i].joint].name);
+    write_number(out, "amplitude", p->swing[i].amplitude);
+    write_number(out, "frequency", p->swing[i].frequency);
+    write_number(out, "phase", p->swing[i].phase * 180 / M_PI);
+    fputs("/>\n", out);
+  }
+  if (p->nguess_pose || p->nswing) fputs("  </guess>\n", out);
+}
+
+static void write_cycle(FILE *out, const cav_problem *p) {
+  const cav_cycle *c = &p->cycle;
+  fputs("  <cycle", out);
+  write_numbers(out, "translation", c->translation, 3);
+  if (c->rotation != 0) write_number(out, "rotation", c->rotation * 180 / M_PI);
+  write_text(out, "mirror", cav_problem_mirrors[c->mirror]);
+  fputs(c->npair ? ">\n" : "/>\n", out);
+  for (int i = 0; i < c->npair; i++) {
+    fputs("    <pair", out);
+    write_text(out, "joint", p->model->joint[c->pair[i][0]].name);
+    write_text(out, "other", p->model->joint[c->pair[i][1]].name);
+    fputs("/>\n", out);
+  }
+  if (c->npair) fputs("  </cycle>\n", out);
+}
+
+static void write_head(FILE *out, const cav_problem *p, const char *model_path) {
+  const cav_model *m = p->model;
+  fputs("<problem", out);
+  write_text(out, "name", p->name && *p->name ? p->name : "motion");
+  write_text(out, "model", model_path);
+  fputs(">\n", out);
+  if (p->scene) fprintf(out, "  <scene>\n%s  </scene>\n", p->scene);
+  fputs("  <horizon", out);
+  write_number(out, "duration", p->duration);
+  write_number(out, "timestep", p->timestep);
+  write_text(out, "order", cav_problem_orders[p->order]);
+  if (!p->cycle.on) write_text(out, "close", cav_problem_closings[p->close_at_rest != 0]);
+  if (p->duration_most > 0) {
+    write_numbers(out, "range", (double[]){p->duration_least, p->duration_most}, 2);
+    write_number(out, "weight", p->duration_weight);
+  }
+  fputs("/>\n", out);
+  if (p->cycle.on) write_cycle(out, p);
+  fputs("  <start", out);
+  write_numbers(out, "qpos", p->q_start, m->nq);
+  write_numbers(out, "qvel", p->v_start, m->nv);
+  fputs("/>\n  <goal", out);
+  write_numbers(out, "qpos", p->q_goal, m->nq);
+  fputs("/>\n", out);
+  write_guess(out, p);
+}
+
+static void write_tail(FILE *out, const cav_problem *p) {
+  fputs("  <limits", out);
+  write_number(out, "effort", p->effort_limit);
+  write_number(out, "margin", p->limit_margin);
+  fprintf(out, "/>\n  <schedule stages=\"%d\">\n", p->schedule.stages);
+  write_stage(out, "first", &p->schedule.first);
+  write_stage(out, "last", &p->schedule.last);
+  fputs("  </schedule>\n", out);
+  for (int i = 0; i < p->nipopt; i++) {
+    if (i == 0) fputs("  <ipopt", out);
+    write_text(out, p->ipopt[i].name, p->ipopt[i].value);
+    if (i == p->nipopt - 1) fputs("/>\n", out);
+  }
+  if (p->solved) write_contact(out, &p->contact);
+  fputs("</problem>\n", out);
+}
+
+cav_status cav_problem_write(const char *path, const cav_problem *problem, const char *model_path, cav_error *error) {
+  if (!model_path) model_path = problem->model_path;
+  if (!model_path)
+    return cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: not written: the model's file is not known; pass model_path",
+                         path);
+  cav_file file;
+  cav_status status = cav_file_begin(&file, path, error);
+  if (status) return status;
+  write_head(file.stream, problem, model_path);
+  int bad = write_terms(file.stream, problem);
+  write_tail(file.stream, problem);
+  if (bad < 0) return cav_file_end(&file, error);
+  cav_file_abandon(&file);
+  const char *name = problem->term[bad].name ? problem->term[bad].name : "";
+  return cav_file_fail(error, CAV_BAD_INPUT, 0,
+                       "%s: not written: term %d '%s' looks at something without a name; name it in the model", path,
+                       bad, name);
+}

@@ -1,0 +1,347 @@
+/// Continuation from soft contacts active at a distance and a penalised helper force to the problem as stated, then an augmented
+/// Lagrangian that makes its constraints hold (optimisation.md, 5; recipe.md, 1). The schedule is data: problem->schedule.
+#include "continuation.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+/// Weights of rows while they are only penalised, at the first stage; they end a hundred times higher. Rows are scaled, so these
+/// serve all models. Ranges are expensive from the start: a motion that leans on a limit, whose force is free, would have to be
+/// found anew where the limit takes it away, and rows of ranges are all but linear, so a high penalty costs nothing.
+static const cav_penalties penalised = {.effort = 100, .range = 1e4, .term = 100};
+enum { PENALTY_RISE = 100 };
+
+/// Augmented Lagrangian: rounds, iterations a round, tolerance of a round, and the unactuated force from which restoration is safe.
+enum { ROUNDS = 6, ROUND_ITERATIONS = 15 };
+static const double round_tolerance = 1e-5, near = 1e-3;
+
+/// Continuation: how often a stage that stalls is taken back.
+enum { RETRIES = 3 };
+
+/// Restoration: iterations of each of its two attempts.
+enum { RESTORATIONS = 30 };
+
+/// Diagnosis: iterations towards the least violation, and the relative decrease that ends them.
+enum { REST_ITERATIONS = 300 };
+static const double rest_tolerance = 1e-8;
+
+double cav_clock(void) {
+  struct timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static double between(double from, double to, double s) {
+  return from > 0 && to > 0 ? from * pow(to / from, s) : (1 - s) * from + s * to;
+}
+
+cav_stage_options cav_schedule_at(const cav_schedule *schedule, double x) {
+  const cav_stage_options *a = &schedule->first, *b = &schedule->last;
+  cav_stage_options stage = x < 1 ? *a : *b;
+  stage.softness = between(a->softness, b->softness, x);
+  stage.time_constant = between(a->time_constant, b->time_constant, x);
+  stage.smoothing = between(a->smoothing, b->smoothing, x);
+  stage.smoothing_self = between(a->smoothing_self, b->smoothing_self, x);
+  stage.self_stiffness = between(a->self_stiffness, b->self_stiffness, x);
+  stage.penalty = between(a->penalty, b->penalty, fmin(2 * x, 1));
+  return stage;
+}
+
+void cav_stage_law(const cav_problem *problem, double x, double step, cav_options *law) {
+  cav_stage_options stage = cav_schedule_at(&problem->schedule, x);
+  law->stabilisation = CAV_STABILISATION_DISCRETE;
+  law->softness = stage.softness;
+  law->time_constant = stage.time_constant * step;
+  law->smoothing = stage.smoothing;
+  law->smoothing_self = stage.smoothing_self;
+  law->self_stiffness = stage.self_stiffness;
+}
+
+void cav_stage_set(const cav_problem *problem, double x, cav_transcription *tr) {
+  cav_stage_law(problem, x, tr->h, &tr->options);
+  tr->penalty = penalised;
+  tr->penalty.effort = between(penalised.effort, PENALTY_RISE * penalised.effort, x);
+  tr->penalty.range = between(penalised.range, PENALTY_RISE * penalised.range, x);
+  tr->penalty.unactuated = cav_schedule_at(&problem->schedule, x).penalty;
+  tr->penalty.term = between(penalised.term, PENALTY_RISE * penalised.term, fmin(2 * x, 1));
+}
+
+int cav_run_report(void *context, double step, double radius) {
+  cav_solve_run *run = context;
+  cav_solution *solution = run->solution;
+  cav_progress line = {.phase = run->phase, .stage = run->stage, .stages = run->stages, .step = step, .radius = radius};
+  line.iteration = ++solution->iterations;
+  line.cost = cav_transcription_cost(run->tr);
+  line.unactuated = cav_transcription_unactuated(run->tr, &line.knot);
+  line.violation = cav_transcription_violation(run->tr);
+  line.seconds = cav_clock() - run->start;
+  if (!cav_solution_log(solution, &line)) {
+    run->failed = CAV_NO_MEMORY;
+    return 1;
+  }
+  return run->options->observer && run->options->observer(run->options->observer_context, &line);
+}
+
+int cav_run_note(cav_solve_run *run, double fraction, int begin, cav_outcome outcome) {
+  cav_stage_record line = {.phase = run->phase, .stage = run->stage, .stages = run->stages, .fraction = fraction};
+  line.iterations = run->solution->iterations - begin;
+  line.cost = cav_transcription_cost(run->tr);
+  line.unactuated = cav_transcription_unactuated(run->tr, NULL);
+  line.violation = cav_transcription_violation(run->tr);
+  line.outcome = outcome;
+  if (!cav_solution_note(run->solution, &line)) run->failed = CAV_NO_MEMORY;
+  return run->failed == CAV_OK;
+}
+
+/// How a run of the trust region ended.
+static cav_outcome outcome_of(const cav_solve_run *run, cav_status status) {
+  if (status != CAV_OK) return CAV_OUTCOME_STOPPED;
+  return run->region.stalled ? CAV_OUTCOME_STALLED : run->region.settled ? CAV_OUTCOME_SETTLED : CAV_OUTCOME_LIMIT;
+}
+
+static void exchange(cav_trajectory **a, cav_trajectory **b) {
+  cav_trajectory *kept = *a;
+  *a = *b;
+  *b = kept;
+}
+
+/// Copies a trajectory over another one's place; 0 if memory runs out.
+static int keep(cav_trajectory **kept, const cav_trajectory *at) {
+  cav_trajectory_free(*kept);
+  *kept = cav_trajectory_copy(at);
+  return *kept != NULL;
+}
+
+/// One stage, at a fraction of the way.
+static cav_status run_stage(cav_solve_run *run, double fraction, cav_outcome *outcome) {
+  cav_stage_options stage = cav_schedule_at(&run->problem->schedule, fraction);
+  cav_stage_set(run->problem, fraction, run->tr);
+  run->region.iterations = stage.iterations;
+  run->region.tolerance = stage.tolerance;
+  cav_status status = cav_region_minimise(&run->region, run->normal, run->tr, &run->at, &run->spare);
+  *outcome = outcome_of(run, status);
+  return status;
+}
+
+cav_status cav_continuation_run(cav_solve_run *run) {
+  int stages = run->problem->schedule.stages, retries = 0, begin;
+  double fraction = stages > 1 ? 0 : 1, settled = 0; // of this stage, and of the one before it
+  cav_trajectory *before = NULL;
+  cav_status status = CAV_OK;
+  run->phase = "continuation";
+  run->stages = stages;
+  run->stage = 1;
+  while (status == CAV_OK) {
+    cav_outcome outcome;
+    begin = run->solution->iterations;
+    status = keep(&before, run->at) ? run_stage(run, fraction, &outcome) : CAV_NO_MEMORY;
+    if (!before) break;
+    int again = outcome == CAV_OUTCOME_STALLED && retries < RETRIES && fraction > settled;
+    if (again) outcome = CAV_OUTCOME_AGAIN;
+    if (!cav_run_note(run, fraction, begin, outcome)) status = CAV_NO_MEMORY;
+    if (status != CAV_OK || (!again && run->stage == stages && fraction >= 1)) break;
+    if (outcome == CAV_OUTCOME_AGAIN || outcome == CAV_OUTCOME_STALLED) run->region.radius = 0;
+    if (again) {
+      exchange(&run->at, &before);
+      retries++;
+      fraction = 0.5 * (settled + fraction);
+      continue;
+    }
+    // on to the stage that was due, or to the next
+    double due = stages > 1 ? (double)(run->stage - 1) / (stages - 1) : 1;
+    settled = fraction;
+    if (fraction < due) {
+      fraction = due;
+      continue;
+    }
+    retries = 0;
+    fraction = (double)run->stage++ / (stages - 1);
+  }
+  cav_trajectory_free(before);
+  return status;
+}
+
+/// Largest violation of each kind of row, and how much of it is allowed: what is planned with headroom may use half of that.
+typedef struct violation {
+  double unactuated, effort, range, term;
+} violation;
+
+static double excess(const cav_slot *slot) {
+  return fmax(fmax(slot->lower - slot->value, slot->value - slot->upper), 0);
+}
+
+static violation measure(const cav_transcription *tr) {
+  violation m = {0};
+  for (int t = 0; t < tr->nknot; t++) {
+    const cav_knot *knot = &tr->knot[t];
+    for (int i = 0; i < knot->layout.count; i++) {
+      double e = excess(&knot->slot[i]);
+      double *worst = i < knot->layout.effort  ? &m.unactuated
+                      : i < knot->layout.joint ? &m.effort
+                      : i < knot->layout.term  ? &m.range
+                                               : &m.term;
+      *worst = fmax(*worst, e);
+    }
+  }
+  return m;
+}
+
+static violation allowed(const cav_solve_run *run) {
+  double tolerance = run->options->tolerance;
+  return (violation){tolerance, fmax(0.5 * (1 - run->problem->effort_limit), tolerance),
+                     fmax(0.5 * run->problem->limit_margin, tolerance), tolerance};
+}
+
+static int holds(const violation *m, const violation *most) {
+  return m->unactuated <= most->unactuated && m->effort <= most->effort && m->range <= most->range &&
+         m->term <= most->term;
+}
+
+void cav_run_allowed(const cav_solve_run *run, double allowance[CAV_BINDING_KINDS]) {
+  violation most = allowed(run);
+  allowance[CAV_BINDING_UNACTUATED] = most.unactuated;
+  allowance[CAV_BINDING_EFFORT] = most.effort;
+  allowance[CAV_BINDING_JOINT] = allowance[CAV_BINDING_TENDON] = most.range;
+  allowance[CAV_BINDING_TERM] = most.term;
+  allowance[CAV_BINDING_PENETRATION] = CAV_TOLERANCE_PENETRATION;
+}
+
+int cav_run_met(const cav_solve_run *run) {
+  violation most = allowed(run), is = measure(run->tr);
+  return holds(&is, &most);
+}
+
+cav_status cav_augmented_lagrangian(cav_solve_run *run) {
+  violation most = allowed(run);
+  most.unactuated = fmax(most.unactuated, near);
+  most.term = fmax(most.term, near);
+  run->phase = "multipliers";
+  run->stages = ROUNDS;
+  cav_status status = cav_transcription_values(run->tr, run->at);
+  for (int round = 0; round < ROUNDS && status == CAV_OK; round++) {
+    int begin = run->solution->iterations;
+    run->stage = round + 1;
+    cav_transcription_multipliers(run->tr);
+    run->region.iterations = ROUND_ITERATIONS;
+    run->region.tolerance = round_tolerance;
+    status = cav_region_minimise(&run->region, run->normal, run->tr, &run->at, &run->spare);
+    violation is = measure(run->tr);
+    if (!cav_run_note(run, 1, begin, outcome_of(run, status))) status = CAV_NO_MEMORY;
+    if (round > 0 && holds(&is, &most)) break;
+  }
+  return status;
+}
+
+/// Restoration with rows of efforts and ranges let go by a fraction of what is allowed of them.
+static cav_status restore(cav_solve_run *run, double fraction) {
+  violation most = allowed(run), is = {0};
+  cav_transcription *tr = run->tr;
+  int begin = run->solution->iterations;
+  cav_region region = run->region;
+  region.radius = INFINITY;
+  region.iterations = 1;
+  region.tolerance = 0;
+  cav_trajectory *entry = cav_trajectory_copy(run->at);
+  if (!entry) return CAV_NO_MEMORY;
+  tr->constraints_only = 1;
+  tr->slack_effort = fraction * most.effort;
+  tr->slack_range = fraction * most.range;
+  cav_status status = CAV_OK;
+  for (int i = 0; i < RESTORATIONS && status == CAV_OK; i++) {
+    status = cav_region_minimise(&region, run->normal, tr, &run->at, &run->spare);
+    is = measure(tr);
+    if (holds(&is, &most)) break;
+  }
+  tr->constraints_only = 0;
+  tr->slack_effort = tr->slack_range = 0;
+  run->region.done = region.done;
+  run->region.seconds_linear = region.seconds_linear;
+  cav_outcome outcome = status != CAV_OK    ? CAV_OUTCOME_STOPPED
+                        : holds(&is, &most) ? CAV_OUTCOME_SETTLED
+                                            : CAV_OUTCOME_STALLED;
+  if (!cav_run_note(run, 1, begin, outcome)) status = CAV_NO_MEMORY;
+  // what cannot be brought in stays as it was: steps that chase the impossible lead far away
+  if (status == CAV_OK && !holds(&is, &most)) {
+    exchange(&run->at, &entry);
+    status = cav_transcription_values(tr, run->at);
+    if (status == CAV_OK) status = CAV_NOT_CONVERGED;
+  }
+  cav_trajectory_free(entry);
+  return status;
+}
+
+cav_status cav_restore(cav_solve_run *run) {
+  run->phase = "restoration";
+  run->stages = 2;
+  run->stage = 1;
+  cav_trajectory *before = cav_trajectory_copy(run->at);
+  if (!before) return CAV_NO_MEMORY;
+  cav_status status = restore(run, 0.9);
+  if (status != CAV_NOT_CONVERGED) {
+    cav_trajectory_free(before);
+    return status;
+  }
+  // rows that do not come in: again from where it started, with nothing let go
+  run->stage = 2;
+  cav_trajectory_free(run->at);
+  run->at = before;
+  return restore(run, 0);
+}
+
+static cav_status rest_from_here(cav_solve_run *run, double radius) {
+  int begin = run->solution->iterations;
+  run->region.radius = radius;
+  cav_status status = cav_region_minimise(&run->region, run->normal, run->tr, &run->at, &run->spare);
+  return cav_run_note(run, 1, begin, outcome_of(run, status)) ? status : CAV_NO_MEMORY;
+}
+
+cav_status cav_minimise_infeasibility(cav_solve_run *run) {
+  run->phase = "diagnosis";
+  run->stages = 2;
+  run->stage = 1;
+  run->region.iterations = REST_ITERATIONS;
+  run->region.tolerance = rest_tolerance;
+  run->tr->constraints_only = 1;
+  cav_status status = rest_from_here(run, INFINITY);
+  cav_trajectory *first = status == CAV_OK ? cav_trajectory_copy(run->at) : NULL;
+  if (status == CAV_OK && !first) status = CAV_NO_MEMORY;
+  if (status == CAV_OK) {
+    // what stalled on the way may lie far from where the guess leads
+    double merit = cav_transcription_merit(run->tr);
+    run->stage = 2;
+    status = cav_guess_take(run);
+    if (status == CAV_OK) status = rest_from_here(run, 0);
+    if (status != CAV_OK || !(cav_transcription_merit(run->tr) < merit)) {
+      exchange(&run->at, &first);
+      if (status == CAV_OK) status = cav_transcription_values(run->tr, run->at);
+    }
+  }
+  cav_trajectory_free(first);
+  run->tr->constraints_only = 0;
+  return status;
+}
+
+cav_status cav_recover_feasible(cav_solve_run *run) {
+  cav_trajectory *feasible = cav_trajectory_copy(run->at);
+  if (!feasible) return CAV_NO_MEMORY;
+  cav_outcome outcome;
+  int begin = run->solution->iterations;
+  for (int t = 0; t < run->tr->nknot; t++)
+    for (int i = 0; i < run->tr->knot[t].layout.count; i++) run->tr->knot[t].slot[i].multiplier = 0;
+  run->phase = "recovery";
+  run->stage = run->stages = 1;
+  run->region.radius = 0;
+  cav_status status = run_stage(run, 1, &outcome);
+  if (!cav_run_note(run, 1, begin, outcome)) status = CAV_NO_MEMORY;
+  if (status == CAV_OK) status = cav_augmented_lagrangian(run);
+  if (status == CAV_OK) status = cav_restore(run);
+  if (status == CAV_NOT_CONVERGED) {
+    // a motion that is possible is worth more than a cheaper one that is not
+    exchange(&run->at, &feasible);
+    status = cav_transcription_values(run->tr, run->at);
+  }
+  cav_trajectory_free(feasible);
+  return status;
+}

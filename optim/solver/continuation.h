@@ -1,0 +1,83 @@
+/// The way from a naive guess to the true problem. Private to optim/.
+#ifndef CAVORT_CONTINUATION_H
+#define CAVORT_CONTINUATION_H
+
+#include "cavort/solve.h"
+#include "gauss_newton.h"
+
+/// A solve under way: what continuation, multipliers and Ipopt hand to each other.
+typedef struct cav_solve_run {
+  const cav_problem *problem;
+  const cav_solve_options *options;
+  cav_transcription *tr;
+  cav_normal *normal;
+  cav_trajectory *at, *spare;
+  cav_region region;
+  cav_solution *solution;
+  const char *phase;
+  int stage, stages;
+  int warm;          ///< the rows' multipliers are multipliers to start from
+  cav_status failed; ///< what went wrong in the report, CAV_OK: nothing
+  double start;      ///< s
+} cav_solve_run;
+
+/// The problem's guess: start held, or the geodesic to end [nq], with a ballistic arc if asked; cycles always go to their end, at
+/// constant speed. q and v of at are filled.
+void cav_guess_fill(const cav_problem *problem, const double *end, cav_trajectory *at);
+
+/// The guess into run->at, moved a little off its symmetries: a straight or symmetric one can be a saddle of all costs and
+/// constraints at once, which exact derivatives never leave.
+cav_status cav_guess_take(cav_solve_run *run);
+
+/// Contact law at a fraction of the schedule, 0 .. 1, for a step in s; the rest of law stays.
+void cav_stage_law(const cav_problem *problem, double fraction, double step, cav_options *law);
+
+/// The stage at a fraction of the way from first to last.
+cav_stage_options cav_schedule_at(const cav_schedule *schedule, double fraction);
+
+/// Contact law and weights at a fraction of the way from the first to the last stage.
+void cav_stage_set(const cav_problem *problem, double fraction, cav_transcription *transcription);
+
+/// Stages first to last: softness, activation distance and the penalty on unactuated force go geometrically to their ends. One that stalls is
+/// taken back and reached by a stage half way there.
+cav_status cav_continuation_run(cav_solve_run *run);
+
+/// Augmented Lagrangian on all constraint rows, at the last stage's law, until they nearly hold.
+cav_status cav_augmented_lagrangian(cav_solve_run *run);
+
+/// Gauss-Newton on the constraint rows alone, shortest steps first: from nearly holding to the tolerance. Costs have no say, so
+/// it is for the last millimetre only. CAV_NOT_CONVERGED if the rows do not come in.
+cav_status cav_restore(cav_solve_run *run);
+
+/// Where constraints cannot all hold: to the point of least violation, where the violations balance and so say what contradicts
+/// what (explain.c): the lower of two, from the iterate and from the guess.
+cav_status cav_minimise_infeasibility(cav_solve_run *run);
+
+/// Violation that planning leaves room for, by kind of row: what is planned with headroom may use half of it.
+void cav_run_allowed(const cav_solve_run *run, double allowed[CAV_BINDING_KINDS]);
+
+/// Whether every row holds to that at the last values.
+int cav_run_met(const cav_solve_run *run);
+
+/// Feedback gains of run->at into the solution: the best of several, by the closed loop of verification. choose_gains.c.
+cav_status cav_choose_gains(cav_solve_run *run, cav_error *error);
+
+/// Appends a line to the log and tells the observer; nonzero if it asks to stop. Region's report.
+int cav_run_report(void *run, double step, double radius);
+
+/// Where every row holds but costs had no say: to a minimum of the costs from there, if the rows hold there too.
+cav_status cav_recover_feasible(cav_solve_run *run);
+
+/// Notes a stage that ended, of begin iterations before it; 0 if memory runs out.
+int cav_run_note(cav_solve_run *run, double fraction, int begin, cav_outcome outcome);
+
+/// Keeps a line of the log; 0 if memory runs out. solution.c.
+int cav_solution_log(cav_solution *solution, const cav_progress *line);
+
+/// Keeps a stage that ended; 0 if memory runs out. solution.c.
+int cav_solution_note(cav_solution *solution, const cav_stage_record *stage);
+
+/// Wall clock, s.
+double cav_clock(void);
+
+#endif

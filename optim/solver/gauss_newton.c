@@ -1,0 +1,418 @@
+/// Gauss-Newton on block-banded normal equations: a banded Cholesky (LAPACK's dpbtrf) an iteration, and Powell's dogleg in the
+/// norm of sqrt(diag H), which is blind to the units of the unknowns. The radius outlives a run, so a continuation keeps
+/// what it has learnt. Three neighbouring knots fill the band, so a general sparse factorisation has nothing to leave out.
+/// In a cycle the last two knots meet the first two, and a free step meets all: these unknowns stand last, as a dense border.
+/// With A = L L' the band, B the border's rows and C its corner, Y = L^-1 B' leaves S = C - Y'Y, which is factored densely.
+#include "gauss_newton.h"
+
+#include <float.h>
+#include <math.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+/// LAPACK: Cholesky factor of a symmetric positive definite band matrix, and solutions with its triangle; the same of a dense
+/// one, and with both triangles.
+extern void dpbtrf_(const char *uplo, const int *n, const int *kd, double *ab, const int *ldab, int *info);
+extern void dtbtrs_(const char *uplo, const char *trans, const char *diag, const int *n, const int *kd, const int *nrhs,
+                    const double *ab, const int *ldab, double *b, const int *ldb, int *info);
+extern void dpotrf_(const char *uplo, const int *n, double *a, const int *lda, int *info);
+extern void dpotrs_(const char *uplo, const int *n, const int *nrhs, const double *a, const int *lda, double *b,
+                    const int *ldb, int *info);
+
+/// BLAS: C := alpha A' A + beta C for symmetric C; y := alpha A x + beta y, or with A'.
+extern void dsyrk_(const char *uplo, const char *trans, const int *n, const int *k, const double *alpha,
+                   const double *A, const int *lda, const double *beta, double *C, const int *ldc);
+extern void dgemv_(const char *trans, const int *m, const int *n, const double *alpha, const double *A, const int *lda,
+                   const double *x, const int *incx, const double *beta, double *y, const int *incy);
+
+/// Added to the diagonal, relative: condition numbers reach 1e15 under stiff penalties.
+static const double jitter = 1e-10;
+
+/// Largest change of one unknown in a step, rad or m: rotations stay well inside their chart.
+static const double step_limit = 0.7;
+
+/// Share of the Newton step below which a radius that still shrinks is one that a jump of the merit holds.
+static const double collapse = 1e-6;
+
+struct cav_normal {
+  int blocks, n, size;
+  int cyclic, free_step;
+  int core, border; ///< unknowns in the band, and after it
+  int band;         ///< entries kept of a column: itself and three blocks below, of which the last is never reached
+  double *H;        ///< [core*band] lower triangle by columns: H[j*band + i - j] is H(i, j)
+  double *B;        ///< [core*border] by columns of the core: B[i*core + j] is H(core + i, j)
+  double *C;        ///< [border*border] lower triangle by columns
+  double *factor;   ///< [core*band]
+  double *Y, *S;    ///< [core*border] L^-1 B', [border*border] factor of what the core leaves of C
+  double *gradient, *diagonal; ///< [size]
+};
+
+/// Last row of the core's H(:, j) that is not zero by structure.
+static int end_of(const cav_normal *normal, int j) {
+  int end = (j / normal->n + 3) * normal->n;
+  return end < normal->core ? end : normal->core;
+}
+
+/// Whether H(core + i, j), j in the core, can be anything but zero.
+static int meets(const cav_normal *normal, int i, int j) {
+  int row = (normal->core + i) / normal->n, column = j / normal->n;
+  if (normal->core + i >= normal->blocks * normal->n) return 1;
+  return row - column <= 2 || row - column >= normal->blocks - 2;
+}
+
+cav_normal *cav_normal_new(const cav_transcription *tr) {
+  cav_normal *normal = calloc(1, sizeof *normal);
+  if (!normal) return NULL;
+  normal->blocks = tr->nknot - 1;
+  normal->n = tr->nv;
+  normal->size = cav_transcription_unknowns(tr);
+  normal->cyclic = tr->periodicity != NULL;
+  normal->free_step = tr->free_step;
+  normal->core = (normal->blocks - (normal->cyclic ? 2 : 0)) * normal->n;
+  normal->border = normal->size - normal->core;
+  normal->band = 3 * normal->n;
+  size_t size = (size_t)normal->size, core = (size_t)normal->core, border = (size_t)normal->border;
+  size_t entries = core * (size_t)normal->band;
+  normal->H = calloc(entries, sizeof(double));
+  normal->factor = malloc(entries * sizeof(double));
+  normal->B = calloc(2 * core * border + 1, sizeof(double));
+  normal->C = calloc(2 * border * border + 1, sizeof(double));
+  normal->gradient = malloc(size * sizeof(double));
+  normal->diagonal = malloc(size * sizeof(double));
+  if (normal->H && normal->factor && normal->B && normal->C && normal->gradient && normal->diagonal) {
+    normal->Y = normal->B + core * border;
+    normal->S = normal->C + border * border;
+    return normal;
+  }
+  cav_normal_free(normal);
+  return NULL;
+}
+
+void cav_normal_free(cav_normal *normal) {
+  if (!normal) return;
+  free(normal->H), free(normal->factor), free(normal->B), free(normal->C), free(normal->gradient),
+      free(normal->diagonal);
+  free(normal);
+}
+
+/// Place of H(i, j), in either order.
+static double *entry_of(const cav_normal *normal, int i, int j) {
+  if (i < j) {
+    int swap = i;
+    i = j, j = swap;
+  }
+  int core = normal->core;
+  if (i < core) return &normal->H[(size_t)j * normal->band + (size_t)(i - j)];
+  if (j < core) return &normal->B[(size_t)(i - core) * core + j];
+  return &normal->C[(size_t)(j - core) * normal->border + (i - core)];
+}
+
+/// Adds the part of a knot's Hessian between two of its blocks, the column's not after the row's.
+static void gather_blocks(cav_normal *normal, const cav_knot *knot, int row_block, int column_block, int r, int c) {
+  int n = normal->n, width = 3 * n;
+  for (int j = 0; j < n; j++) {
+    // entries of a column lie evenly
+    int first = r == c ? j : 0, row = row_block * n + first, column = column_block * n + j;
+    double *out = entry_of(normal, row, column);
+    ptrdiff_t stride = first + 1 < n ? entry_of(normal, row + 1, column) - out : 0;
+    const double *in = knot->hessian + (size_t)(r * n + first) * width + c * n + j;
+    for (int i = first; i < n; i++, out += stride, in += width) *out += *in;
+  }
+}
+
+/// Adds what the step's logarithm meets.
+static void gather_step(cav_normal *normal, const cav_transcription *tr, int t) {
+  const cav_knot *knot = &tr->knot[t];
+  int n = normal->n, last = normal->size - 1;
+  for (int c = 0; c < 3; c++) {
+    int block = cav_transcription_block(tr, t, c);
+    for (int j = 0; block >= 0 && j < n; j++) *entry_of(normal, last, block * n + j) += knot->step_row[c * n + j];
+  }
+  *entry_of(normal, last, last) += knot->step_square;
+  normal->gradient[last] += knot->step_derivative;
+}
+
+void cav_normal_gather(cav_normal *normal, const cav_transcription *tr) {
+  int n = normal->n;
+  size_t core = (size_t)normal->core, border = (size_t)normal->border;
+  memset(normal->H, 0, core * (size_t)normal->band * sizeof(double));
+  memset(normal->B, 0, core * border * sizeof(double));
+  memset(normal->C, 0, border * border * sizeof(double));
+  memset(normal->gradient, 0, (size_t)normal->size * sizeof(double));
+  for (int t = 0; t < tr->nknot; t++) {
+    const cav_knot *knot = &tr->knot[t];
+    for (int c = 0; c < 3; c++) {
+      int column = cav_transcription_block(tr, t, c);
+      for (int j = 0; column >= 0 && j < n; j++) normal->gradient[column * n + j] += knot->gradient[c * n + j];
+      for (int r = c; column >= 0 && r < 3; r++) {
+        int row = cav_transcription_block(tr, t, r);
+        if (row >= 0) gather_blocks(normal, knot, row, column, r, c);
+      }
+    }
+    if (normal->free_step) gather_step(normal, tr, t);
+  }
+  for (int j = 0; j < normal->size; j++) normal->diagonal[j] = *entry_of(normal, j, j);
+}
+
+const double *cav_normal_gradient(const cav_normal *normal) { return normal->gradient; }
+const double *cav_normal_diagonal(const cav_normal *normal) { return normal->diagonal; }
+
+void cav_normal_hold(cav_normal *normal) {
+  int last = normal->size - 1;
+  for (int j = 0; j < last; j++) *entry_of(normal, last, j) = 0;
+  *entry_of(normal, last, last) = normal->diagonal[last] = 1;
+  normal->gradient[last] = 0;
+}
+
+/// A diagonal entry of H as it is factored.
+static double lifted(const cav_normal *normal, int j, double shift) {
+  return normal->diagonal[j] > 0 ? normal->diagonal[j] * (1 + shift) : 1;
+}
+
+cav_status cav_normal_factor(cav_normal *normal, double shift) {
+  int core = normal->core, border = normal->border, below = normal->band - 1, info = 0;
+  double one = 1, minus = -1;
+  memcpy(normal->factor, normal->H, (size_t)core * (size_t)normal->band * sizeof(double));
+  for (int j = 0; j < core; j++) normal->factor[(size_t)j * normal->band] = lifted(normal, j, shift);
+  dpbtrf_("L", &core, &below, normal->factor, &normal->band, &info);
+  if (info != 0) return CAV_NOT_CONVERGED;
+  if (border == 0) return CAV_OK;
+
+  // border: Y = L^-1 B', S = C - Y'Y
+  memcpy(normal->Y, normal->B, (size_t)core * (size_t)border * sizeof(double));
+  memcpy(normal->S, normal->C, (size_t)border * (size_t)border * sizeof(double));
+  for (int i = 0; i < border; i++) normal->S[(size_t)i * border + i] = lifted(normal, core + i, shift);
+  dtbtrs_("L", "N", "N", &core, &below, &border, normal->factor, &normal->band, normal->Y, &core, &info);
+  if (info != 0) return CAV_NOT_CONVERGED;
+  dsyrk_("L", "T", &border, &core, &minus, normal->Y, &core, &one, normal->S, &border);
+  dpotrf_("L", &border, normal->S, &border, &info);
+  return info == 0 ? CAV_OK : CAV_NOT_CONVERGED;
+}
+
+void cav_normal_solve(const cav_normal *normal, const double *b, double *x) {
+  int core = normal->core, border = normal->border, below = normal->band - 1, once = 1, info = 0;
+  double one = 1, minus = -1;
+  memcpy(x, b, (size_t)normal->size * sizeof *x);
+  // down the band, across the border, up the band
+  dtbtrs_("L", "N", "N", &core, &below, &once, normal->factor, &normal->band, x, &core, &info);
+  if (border > 0) {
+    dgemv_("T", &core, &border, &minus, normal->Y, &core, x, &once, &one, x + core, &once);
+    dpotrs_("L", &border, &once, normal->S, &border, x + core, &border, &info);
+    dgemv_("N", &core, &border, &minus, normal->Y, &core, x + core, &once, &one, x, &once);
+  }
+  dtbtrs_("L", "T", "N", &core, &below, &once, normal->factor, &normal->band, x, &core, &info);
+}
+
+void cav_normal_multiply(const cav_normal *normal, const double *x, double *product) {
+  int core = normal->core, border = normal->border;
+  memset(product, 0, (size_t)normal->size * sizeof(double));
+  for (int j = 0; j < core; j++) {
+    const double *H = normal->H + (size_t)j * normal->band - j;
+    int end = end_of(normal, j);
+    double sum = H[j] * x[j];
+    for (int i = j + 1; i < end; i++) {
+      product[i] += H[i] * x[j];
+      sum += H[i] * x[i];
+    }
+    product[j] += sum;
+  }
+  for (int i = 0; i < border; i++) {
+    const double *B = normal->B + (size_t)i * core;
+    double sum = 0;
+    for (int j = 0; j < core; j++) sum += B[j] * x[j], product[j] += B[j] * x[core + i];
+    for (int j = 0; j < border; j++) sum += *entry_of(normal, core + i, core + j) * x[core + j];
+    product[core + i] += sum;
+  }
+}
+
+/// Row of the entry after (i, j) in column j of the lower triangle; the size at its end.
+static int next_row(const cav_normal *normal, int i, int j) {
+  i++;
+  if (j >= normal->core) return i;
+  if (i < normal->core && i == end_of(normal, j)) i = normal->core;
+  while (i >= normal->core && i < normal->size && !meets(normal, i - normal->core, j)) i++;
+  return i;
+}
+
+int cav_normal_entries(const cav_normal *normal, int *row, int *col, double *value) {
+  int entries = 0;
+  for (int j = 0; j < normal->size; j++) {
+    for (int i = j; i < normal->size; i = next_row(normal, i, j)) {
+      if (row) row[entries] = i;
+      if (col) col[entries] = j;
+      if (value) value[entries] = *entry_of(normal, i, j);
+      entries++;
+    }
+  }
+  return entries;
+}
+
+void cav_normal_shift_entries(const cav_normal *normal, double factor, double absolute, double fraction,
+                              double *value) {
+  for (int j = 0, k = 0; j < normal->size; j++) {
+    value[k] = factor * value[k] + absolute + fraction * normal->diagonal[j];
+    k++;
+    for (int i = next_row(normal, j, j); i < normal->size; i = next_row(normal, i, j)) value[k++] *= factor;
+  }
+}
+
+// ---------------------------------------------------------------- trust region
+
+static double now(void) {
+  struct timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/// Directions of one iteration and the model's numbers along them.
+typedef struct dogleg {
+  int size;
+  double *newton, *cauchy, *product, *step, *scale; ///< product = H cauchy; scale = diag H
+  double newton_norm, cauchy_norm;
+} dogleg;
+
+static double scaled_norm(const dogleg *d, const double *x) {
+  double sum = 0;
+  for (int i = 0; i < d->size; i++) sum += d->scale[i] * x[i] * x[i];
+  return sqrt(sum);
+}
+
+static double dot(int n, const double *a, const double *b) {
+  double sum = 0;
+  for (int i = 0; i < n; i++) sum += a[i] * b[i];
+  return sum;
+}
+
+/// Newton and Cauchy points of the gathered equations; the shift grows until the factor exists.
+static cav_status prepare(dogleg *d, cav_normal *normal) {
+  const double *gradient = normal->gradient;
+  cav_status status = CAV_NOT_CONVERGED;
+  for (double shift = jitter; status == CAV_NOT_CONVERGED && shift < 1; shift *= 100)
+    status = cav_normal_factor(normal, shift);
+  if (status != CAV_OK) return status;
+  for (int i = 0; i < d->size; i++) {
+    d->scale[i] = normal->diagonal[i] > 0 ? normal->diagonal[i] : 1;
+    d->cauchy[i] = -gradient[i] / d->scale[i];
+    d->step[i] = -gradient[i];
+  }
+  cav_normal_solve(normal, d->step, d->newton);
+  cav_normal_multiply(normal, d->cauchy, d->product);
+  double derivative = dot(d->size, gradient, d->cauchy), curve = dot(d->size, d->cauchy, d->product);
+  double length = curve > 0 ? -derivative / curve : 1;
+  for (int i = 0; i < d->size; i++) d->cauchy[i] *= length, d->product[i] *= length;
+  d->newton_norm = scaled_norm(d, d->newton);
+  d->cauchy_norm = scaled_norm(d, d->cauchy);
+  return CAV_OK;
+}
+
+/// Dogleg step of scaled length radius at most. Returns the decrease that the quadratic model predicts.
+static double bend(dogleg *d, const double *gradient, double radius) {
+  double a, b; // step = a cauchy + b newton
+  if (d->newton_norm <= radius) {
+    a = 0, b = 1;
+  } else if (d->cauchy_norm >= radius) {
+    a = radius / d->cauchy_norm, b = 0;
+  } else {
+    // |cauchy + s (newton - cauchy)| = radius
+    double cc = d->cauchy_norm * d->cauchy_norm, cn = 0;
+    for (int i = 0; i < d->size; i++) cn += d->scale[i] * d->cauchy[i] * d->newton[i];
+    double nn = d->newton_norm * d->newton_norm, qa = nn - 2 * cn + cc, qb = cn - cc, qc = cc - radius * radius;
+    double s = qa > 0 ? (-qb + sqrt(fmax(qb * qb - qa * qc, 0))) / qa : 0;
+    a = 1 - s, b = s;
+  }
+  double largest = 0;
+  for (int i = 0; i < d->size; i++) {
+    d->step[i] = a * d->cauchy[i] + b * d->newton[i];
+    largest = fmax(largest, fabs(d->step[i]));
+  }
+  if (largest > step_limit) {
+    a *= step_limit / largest, b *= step_limit / largest;
+    for (int i = 0; i < d->size; i++) d->step[i] *= step_limit / largest;
+  }
+  // H newton = -gradient
+  double gc = dot(d->size, gradient, d->cauchy), gn = dot(d->size, gradient, d->newton);
+  double curve = a * a * dot(d->size, d->cauchy, d->product) - 2 * a * b * gc - b * b * gn;
+  return -(a * gc + b * gn) - 0.5 * curve;
+}
+
+static int dogleg_new(dogleg *d, int size) {
+  *d = (dogleg){.size = size};
+  double *block = malloc(5 * (size_t)size * sizeof(double));
+  if (!block) return 0;
+  d->newton = block, d->cauchy = block + size, d->product = block + 2 * size, d->step = block + 3 * size;
+  d->scale = block + 4 * size;
+  return 1;
+}
+
+/// Whether the step would leave its bounds, at one of which it is.
+static int step_is_held(const cav_transcription *tr, const cav_trajectory *at, double change) {
+  double least = tr->problem->duration_least / (tr->nknot - 1), most = tr->problem->duration_most / (tr->nknot - 1);
+  return (at->timestep <= least * (1 + DBL_EPSILON) && change < 0) ||
+         (at->timestep >= most * (1 - DBL_EPSILON) && change > 0);
+}
+
+/// Newton and Cauchy points at a trajectory whose normal equations are gathered.
+static cav_status prepare_at(dogleg *d, cav_normal *normal, const cav_transcription *tr, const cav_trajectory *at) {
+  cav_status status = prepare(d, normal);
+  if (status != CAV_OK || !tr->free_step || !step_is_held(tr, at, d->newton[d->size - 1])) return status;
+  cav_normal_hold(normal);
+  return prepare(d, normal);
+}
+
+cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_transcription *tr, cav_trajectory **at,
+                               cav_trajectory **spare) {
+  dogleg d;
+  if (!dogleg_new(&d, normal->size)) return CAV_NO_MEMORY;
+  int calm = 0, fresh = 0; // consecutive small decreases; whether the transcription holds values at *at
+  region->stalled = region->settled = 0;
+  cav_status status = CAV_OK;
+  for (int i = 0; i < region->iterations && calm < 2; i++) {
+    if ((status = cav_transcription_linearise(tr, *at)) != CAV_OK) break;
+    double merit = cav_transcription_merit(tr), start = now();
+    cav_normal_gather(normal, tr);
+    if ((status = prepare_at(&d, normal, tr, *at)) != CAV_OK) break;
+    region->seconds_linear += now() - start;
+    if (!(region->radius > 0)) region->radius = d.cauchy_norm;
+
+    // shrink the radius until the step is as good as required
+    double decrease = 0, predicted = 0, length = 0, promised = 0;
+    int grown = 0;
+    for (int attempt = 0;; attempt++) {
+      predicted = bend(&d, normal->gradient, region->radius);
+      if (attempt == 0) promised = predicted;
+      length = scaled_norm(&d, d.step);
+      cav_transcription_move(tr, *at, d.step, *spare);
+      cav_status trial = cav_transcription_values(tr, *spare);
+      decrease = trial == CAV_OK ? merit - cav_transcription_merit(tr) : -INFINITY;
+      double ratio = predicted > 0 ? decrease / predicted : -1;
+      if (trial == CAV_NO_MEMORY) status = trial;
+      if (ratio < 0.25) region->radius = 0.5 * fmin(length, region->radius);
+      grown = ratio > 0.75 && length > 0.9 * region->radius;
+      if (grown) region->radius *= 2;
+      if (ratio > 1e-4 || attempt > 30 || predicted <= 1e-14 * merit || status != CAV_OK) break;
+    }
+    region->done++;
+    fresh = decrease > 0;
+    if (fresh) {
+      cav_trajectory *swap = *at;
+      *at = *spare;
+      *spare = swap;
+    }
+    if (status != CAV_OK) break;
+    region->stalled = length < collapse * d.newton_norm || (!fresh && promised > region->tolerance * merit);
+    // a good step that only the radius held back says nothing about the end
+    int held = grown && length < 0.99 * d.newton_norm;
+    calm = decrease < region->tolerance * merit && !held ? calm + 1 : 0;
+    region->settled = (calm == 2 || !fresh) && !region->stalled;
+    if (!fresh) break;
+    if (region->report && region->report(region->context, length, region->radius)) {
+      status = CAV_INTERRUPTED;
+      break;
+    }
+  }
+  if (!fresh && status == CAV_OK) status = cav_transcription_values(tr, *at);
+  free(d.newton);
+  return status;
+}

@@ -1,0 +1,119 @@
+/// Guesses: the trajectory that a solve starts from.
+///
+/// From start to goal along the geodesic of the configuration space with a cubic of time; or by postures on the way, linear in
+/// time between them; or the start held. On that a rotation of the first free joint, a ballistic arc of the roots, and sines
+/// laid over single joints. Cycles go from their start to where that is a period on, at constant speed. Asks nothing of contacts or forces.
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "continuation.h"
+
+/// How far a guess is moved off its symmetries, rad or m, by a fixed sequence; golden section.
+static const double nudge = 1e-6, golden = 0.6180339887498949;
+
+/// Cubic that leaves 0 and reaches 1 at rest.
+static double smoothstep(double s) {
+  s = fmin(fmax(s, 0), 1);
+  return s * s * (3 - 2 * s);
+}
+
+/// Raises the roots that can rise.
+static void lift(const cav_model *m, double height, double *q) {
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    int root = m->link[joint->link].parent == 0;
+    int vertical = joint->type == CAV_JOINT_SLIDE && fabs(joint->axis[2]) > 0.9;
+    if (root && joint->type == CAV_JOINT_FREE) q[joint->q + 2] += height;
+    if (root && vertical) q[joint->q] += copysign(height, joint->axis[2]);
+  }
+}
+
+/// Turns the first free joint by a fraction of the guess's rotation.
+static void rotation(const cav_problem *problem, double fraction, double *q) {
+  const cav_model *m = problem->model;
+  for (int j = 0; j < m->njoint; j++) {
+    if (m->joint[j].type != CAV_JOINT_FREE) continue;
+    double phi[3], *quat = q + m->joint[j].q + 3, angle = 0;
+    for (int k = 0; k < 3; k++) phi[k] = fraction * problem->guess_rotation[k], angle += phi[k] * phi[k];
+    angle = sqrt(angle);
+    if (angle == 0) return;
+    double s = sin(angle / 2) / angle, p[4] = {cos(angle / 2), s * phi[0], s * phi[1], s * phi[2]}, r[4];
+    r[0] = quat[0] * p[0] - quat[1] * p[1] - quat[2] * p[2] - quat[3] * p[3];
+    r[1] = quat[0] * p[1] + quat[1] * p[0] + quat[2] * p[3] - quat[3] * p[2];
+    r[2] = quat[0] * p[2] - quat[1] * p[3] + quat[2] * p[0] + quat[3] * p[1];
+    r[3] = quat[0] * p[3] + quat[1] * p[2] - quat[2] * p[1] + quat[3] * p[0];
+    memcpy(quat, r, sizeof r);
+    return;
+  }
+}
+
+/// Lays the swings over q, within the joints' ranges: a knee swings one way only.
+static void swing(const cav_problem *problem, double time, double *q) {
+  double fade = problem->cycle.on ? 1 : smoothstep(5 * fmin(time, problem->duration - time) / problem->duration);
+  for (int i = 0; i < problem->nswing; i++) {
+    const cav_swing *s = &problem->swing[i];
+    const cav_joint *joint = &problem->model->joint[s->joint];
+    double *value = q + joint->q, keep = problem->limit_margin;
+    *value += fade * s->amplitude * sin(2 * M_PI * s->frequency * time + s->phase);
+    if (joint->limited) *value = fmin(fmax(*value, joint->range[0] + keep), joint->range[1] - keep);
+  }
+}
+
+/// Posture i of those on the way: the start first, the end last.
+static cav_guess_pose passed(const cav_problem *problem, const double *end, int i) {
+  if (i == 0) return (cav_guess_pose){0, problem->q_start};
+  if (i <= problem->nguess_pose) return problem->guess_pose[i - 1];
+  return (cav_guess_pose){problem->duration, end};
+}
+
+/// What the guess is before turn, arc and swings; tangent is room for nv numbers.
+static void follow(const cav_problem *problem, const double *end, double time, double *tangent, double *q) {
+  const cav_model *m = problem->model;
+  int i = 1;
+  while (i <= problem->nguess_pose && problem->guess_pose[i - 1].time <= time) i++;
+  cav_guess_pose a = passed(problem, end, i - 1), b = passed(problem, end, i);
+  double s = b.time > a.time ? fmin((time - a.time) / (b.time - a.time), 1) : 1;
+  // a cycle goes on at constant speed
+  if (problem->nguess_pose == 0 && !problem->cycle.on) s = smoothstep(s);
+  if (problem->guess == CAV_GUESS_HOLD && !problem->cycle.on) s = 0;
+  cav_difference(m, a.q, b.q, 1, tangent);
+  cav_integrate(m, a.q, tangent, s, q);
+}
+
+void cav_guess_fill(const cav_problem *problem, const double *end, cav_trajectory *at) {
+  const cav_model *m = problem->model;
+  double *tangent = at->v + (size_t)(at->nknot - 1) * m->nv; // scratch until velocities are filled below
+  double span = problem->guess_to - problem->guess_from;
+  for (int t = 0; t < at->nknot; t++) {
+    double time = t * problem->timestep, *q = at->q + (size_t)t * at->nq;
+    double x = span > 0 ? (time - problem->guess_from) / span : -1;
+    follow(problem, end, time, tangent, q);
+    swing(problem, time, q);
+    rotation(problem, smoothstep(x), q);
+    if (x > 0 && x < 1) lift(m, 4 * problem->guess_height * x * (1 - x), q);
+  }
+  memcpy(at->v, problem->v_start, (size_t)m->nv * sizeof(double));
+  cav_trajectory_velocities(m, at);
+}
+
+cav_status cav_guess_take(cav_solve_run *run) {
+  int n = cav_transcription_unknowns(run->tr);
+  double *x = malloc((size_t)n * sizeof *x);
+  if (!x) return CAV_NO_MEMORY;
+  // a cycle goes to where its start is a period on
+  const double *end = run->problem->q_goal;
+  if (run->tr->periodicity) {
+    cav_periodicity_configuration(run->tr->periodicity, 1, run->problem->q_start, run->spare->q);
+    end = run->spare->q;
+  }
+  run->at->timestep = run->problem->timestep;
+  cav_guess_fill(run->problem, end, run->at);
+  for (int i = 0; i < n; i++) x[i] = nudge * (2 * fmod((i + 1) * golden, 1) - 1);
+  cav_transcription_move(run->tr, run->at, x, run->spare);
+  cav_trajectory *moved = run->spare;
+  run->spare = run->at;
+  run->at = moved;
+  free(x);
+  return CAV_OK;
+}

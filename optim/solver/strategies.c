@@ -1,0 +1,219 @@
+/// Ways to a motion: guesses and schedules to start from where the one that a problem states does not lead to a certificate.
+/// Data only: a caller solves them one after the other, or at once in processes of its own, and keeps what it likes.
+///
+/// One guess has to be found in the model: a gait, that is the limbs that carry the body swinging against each other
+/// (recipe.md, 3: without it a walk becomes a hop). Left and right are those of mirror.c; the limbs are those that touch the world in
+/// the goal posture; of their hinges across the direction of travel the first swings, forwards as a sine, and the second
+/// bends while the limb comes forwards.
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "continuation.h"
+#include "periodicity.h"
+
+/// Gap below which a limb carries, m; travel from which there is a gait, m; cosine from which a hinge lies across the travel.
+static const double touching = 0.02, least_travel = 0.3, across = 0.7;
+
+/// The gait: how far the first and the second hinge go, rad, and its frequency where the hip is a metre up, Hz.
+static const double swing_angle = 0.25, bend_angle = 0.4, pace = 1.2;
+
+/// How much softer, and how much slower than stated.
+enum { SOFTER = 2, CHEAPER = 10, SLOWER = 2 };
+
+/// Where a motion solved under another order goes on: fraction of the schedule's way, and stages from there (recipe.md, 1, phase B).
+static const double resumed_fraction = 0.4;
+enum { RESUMED_STAGES = 10 };
+
+/// What the gait is made of.
+typedef struct walker {
+  const cav_problem *problem;
+  cav_state *state; ///< at the goal
+  cav_image *image; ///< [njoint]
+  char *carries;    ///< [nlink] the link or one that it carries touches the world
+  int side;         ///< axis that the mirror reflects: 0 x, 1 y
+} walker;
+
+/// How far the first body that can goes from start to goal along the horizontal axes, m.
+static void find_travel(const cav_problem *p, double travel[2]) {
+  const cav_model *m = p->model;
+  travel[0] = p->cycle.on ? p->cycle.translation[0] : 0;
+  travel[1] = p->cycle.on ? p->cycle.translation[1] : 0;
+  if (p->cycle.on) return;
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    int free = joint->type == CAV_JOINT_FREE;
+    if (m->link[joint->link].parent != 0 || (!free && joint->type != CAV_JOINT_SLIDE)) continue;
+    for (int k = 0; k < 2; k++) {
+      if (free) travel[k] += p->q_goal[joint->q + k] - p->q_start[joint->q + k];
+      if (!free) travel[k] += (p->q_goal[joint->q] - p->q_start[joint->q]) * joint->axis[k];
+    }
+    if (free) return;
+  }
+}
+
+/// Marks the links that carry the body in the goal posture.
+static cav_status find_support(walker *w) {
+  const cav_model *m = w->problem->model;
+  w->state->options = m->options;
+  w->state->options.smoothing = w->state->options.smoothing_self = touching;
+  cav_status status = cav_position(m, w->state, w->problem->q_goal);
+  for (int i = 0; i < w->state->ncontact && status == CAV_OK; i++) {
+    const cav_contact *c = &w->state->contact[i];
+    if ((c->link1 > 0 && c->link2 > 0) || c->dist > touching) continue;
+    for (int link = c->link1 > 0 ? c->link1 : c->link2; link > 0; link = m->link[link].parent) w->carries[link] = 1;
+  }
+  return status;
+}
+
+/// Share of a hinge's axis across the travel, in the goal posture; 0 for other joints and those that stand for themselves.
+static double crosses(const walker *w, int j) {
+  const cav_joint *joint = &w->problem->model->joint[j];
+  if (joint->type != CAV_JOINT_HINGE || w->image[j].joint == j || !w->carries[joint->link]) return 0;
+  return w->state->axis[6 * joint->dof + w->side];
+}
+
+/// The next hinge across the travel on the way from a link outwards; -1: none.
+static int next_hinge(const walker *w, int after) {
+  const cav_model *m = w->problem->model;
+  for (int j = after + 1; j < m->njoint; j++) {
+    if (fabs(crosses(w, j)) < across) continue;
+    int link = m->joint[j].link;
+    while (link > 0 && after >= 0 && link != m->joint[after].link) link = m->link[link].parent;
+    if (link > 0 || after < 0) return j;
+  }
+  return -1;
+}
+
+/// A swing of a joint and the opposite one of its image, half a period later.
+static void lay(const walker *w, int j, double amplitude, double frequency, double phase, cav_strategy *strategy) {
+  strategy->swing[strategy->nswing++] = (cav_swing){j, amplitude, frequency, phase};
+  strategy->swing[strategy->nswing++] =
+      (cav_swing){w->image[j].joint, w->image[j].sign * amplitude, frequency, phase + M_PI};
+}
+
+/// The swings of the hinges found; none where the model has none.
+static void find_gait(const walker *w, double travel, cav_strategy *strategy) {
+  const cav_model *m = w->problem->model;
+  int hip = next_hinge(w, -1), knee = hip < 0 ? -1 : next_hinge(w, hip);
+  if (hip < 0) return;
+  double up = w->state->link[m->joint[hip].link].pos[2], frequency = pace / sqrt(fmax(up, 0.05));
+  // a limb hangs down: turning about +y takes it to -x, about +x to +y
+  double forwards = (w->side == 1 ? -1 : 1) * copysign(1, travel) * copysign(1, crosses(w, hip));
+  lay(w, hip, forwards * swing_angle, frequency, 0, strategy);
+  if (knee < 0) return;
+  const cav_joint *joint = &m->joint[knee];
+  double at = w->problem->q_goal[joint->q];
+  int up_first = joint->limited && joint->range[1] - at > at - joint->range[0];
+  double bends = joint->limited ? (up_first ? 1 : -1) : -forwards;
+  lay(w, knee, bends * bend_angle, frequency, M_PI / 2, strategy);
+}
+
+/// The strategy by a gait: nswing is 0 where none is found. CAV_NO_MEMORY, or what the dynamics says of the goal.
+static cav_status gait(const cav_problem *problem, cav_strategy *strategy) {
+  const cav_model *m = problem->model;
+  double travel[2];
+  find_travel(problem, travel);
+  int along = fabs(travel[1]) > fabs(travel[0]);
+  if (fabs(travel[along]) < least_travel) return CAV_OK;
+  walker w = {.problem = problem, .state = cav_state_new(m), .side = !along};
+  w.image = calloc((size_t)m->njoint + 1, sizeof *w.image);
+  w.carries = calloc((size_t)m->nlink + 1, 1);
+  int *link = calloc((size_t)m->nlink + 1, sizeof *link);
+  cav_status status = w.state && w.image && w.carries && link ? CAV_OK : CAV_NO_MEMORY;
+  // a model that is not its own mirror image has no gait of this kind
+  cav_error unlike;
+  cav_status mirrored = status == CAV_OK ? cav_mirror_find(problem, w.side, w.image, link, &unlike) : status;
+  if (mirrored == CAV_NO_MEMORY) status = mirrored;
+  if (mirrored == CAV_OK) status = find_support(&w);
+  if (mirrored == CAV_OK && status == CAV_OK) find_gait(&w, travel[along], strategy);
+  cav_state_free(w.state);
+  free(w.image), free(w.carries), free(link);
+  return status;
+}
+
+static void add(cav_strategy *strategy, int *n, const cav_strategy *from, const char *name, const char *text) {
+  strategy[*n] = *from;
+  strategy[*n].name = name;
+  strategy[*n].text = text;
+  ++*n;
+}
+
+cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[CAV_STRATEGIES], int *n) {
+  const cav_strategy stated = {.guess = problem->guess, .stated = 1, .schedule = problem->schedule};
+  *n = 0;
+  add(strategy, n, &stated, "stated", "the problem's guess and schedule");
+
+  if (problem->order == CAV_ORDER_MOMENTUM) {
+    cav_strategy twice = stated;
+    twice.first_midpoint = 1;
+    add(strategy, n, &twice, "midpoint", "under the midpoint order first, then from there under the order of momentum");
+  }
+
+  cav_strategy soft = stated;
+  soft.schedule.first.smoothing *= SOFTER;
+  soft.schedule.first.penalty /= CHEAPER;
+  add(strategy, n, &soft, "soft", "contacts active from twice as far, unactuated force ten times cheaper at first");
+
+  cav_strategy plain = {.guess = CAV_GUESS_INTERPOLATE, .schedule = problem->schedule}, walk = plain;
+  cav_status status = problem->nswing ? CAV_OK : gait(problem, &walk);
+  if (status != CAV_OK) return status;
+  if (walk.nswing) add(strategy, n, &walk, "swing", "from start to goal with the limbs that carry swinging in turn");
+
+  int decorated = problem->guess_height != 0 || problem->nguess_pose || problem->nswing;
+  for (int k = 0; k < 3; k++) decorated |= problem->guess_rotation[k] != 0;
+  if (decorated || problem->guess == CAV_GUESS_HOLD) add(strategy, n, &plain, "line", "straight from start to goal");
+  plain.guess = CAV_GUESS_HOLD;
+  if (!problem->cycle.on && (decorated || problem->guess != CAV_GUESS_HOLD))
+    add(strategy, n, &plain, "hold", "the start held");
+
+  cav_strategy slow = stated;
+  slow.schedule.stages *= SLOWER;
+  add(strategy, n, &slow, "slow", "twice as many stages");
+  return CAV_OK;
+}
+
+void cav_strategy_apply(const cav_problem *problem, const cav_strategy *strategy, cav_problem *taken) {
+  *taken = *problem;
+  taken->guess = strategy->guess;
+  taken->schedule = strategy->schedule;
+  if (strategy->stated) return;
+  taken->guess_height = 0;
+  memset(taken->guess_rotation, 0, sizeof taken->guess_rotation);
+  taken->nguess_pose = 0;
+  taken->nswing = strategy->nswing;
+  taken->swing = (cav_swing *)strategy->swing;
+}
+
+/// The schedule from where contacts are half hard.
+static cav_schedule resumed(const cav_schedule *schedule) {
+  cav_schedule rest = *schedule;
+  rest.first = cav_schedule_at(schedule, resumed_fraction);
+  rest.stages = RESUMED_STAGES;
+  return rest;
+}
+
+cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *strategy,
+                              const cav_solve_options *options, const cav_trajectory *start, cav_solution **solution,
+                              cav_error *error) {
+  cav_problem taken;
+  cav_strategy_apply(problem, strategy, &taken);
+  if (!strategy->first_midpoint || start) return cav_solve(&taken, options, start, solution, error);
+  cav_solve_options first = options ? *options : cav_solve_options_default();
+  cav_solution *before = NULL;
+  first.diagnose = 0;
+  taken.order = CAV_ORDER_MIDPOINT;
+  cav_status status = cav_solve(&taken, &first, NULL, &before, error);
+  // one that was stopped, or has no motion, ends here
+  if (!before || (status != CAV_OK && status != CAV_NOT_CONVERGED)) {
+    *solution = before;
+    return status;
+  }
+  taken.order = problem->order;
+  taken.schedule = resumed(&taken.schedule);
+  status = cav_solve(&taken, options, before->trajectory, solution, error);
+  if (*solution) (*solution)->iterations += before->iterations;
+  if (*solution) (*solution)->seconds += before->seconds;
+  cav_solution_free(before);
+  return status;
+}

@@ -1,0 +1,313 @@
+/// Motions as knots: making, copying, differencing, resampling, and trajectory.csv.
+///
+/// Velocities are backward differences on the manifold, v_t = (q_t (-) q_{t-1})/h. Resampling follows the geodesic between
+/// two knots at constant velocity; forces are held from the knot before, as a forward step applies them. Columns of the
+/// file: time, qpos_<joint>, qvel_<joint>, u_<joint>, with _0, _1, ... where a joint has several values, and #3 for the
+/// joint 3 that has no name. Does not compute forces: what u means is the transcription's or the reader's business.
+#include "cavort/trajectory.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "csv.h"
+#include "file.h"
+#include "xml.h"
+
+static const double uneven_most = 1e-6;      // of a step: how far a row's time may be from its knot's
+static const double quaternion_most = 1e-3;  // how far from unit length a quaternion may be before it is an error
+static const double quaternion_unit = 1e-12; // how near to unit length it stays as it was written
+
+cav_trajectory *cav_trajectory_new(const cav_model *model, int nknot, double timestep) {
+  if (nknot < 2) return NULL;
+  // one block: the head, then q, v, u
+  size_t n = (size_t)nknot, nq = n * (size_t)model->nq, nv = n * (size_t)model->nv;
+  cav_trajectory *trajectory = calloc(1, sizeof *trajectory + (nq + 2 * nv) * sizeof(double));
+  if (!trajectory) return NULL;
+  trajectory->nq = model->nq;
+  trajectory->nv = model->nv;
+  trajectory->nknot = nknot;
+  trajectory->timestep = timestep;
+  trajectory->q = (double *)(trajectory + 1);
+  trajectory->v = trajectory->q + nq;
+  trajectory->u = trajectory->v + nv;
+  for (int t = 0; t < nknot; t++) memcpy(trajectory->q + t * model->nq, model->q0, (size_t)model->nq * sizeof(double));
+  return trajectory;
+}
+
+cav_trajectory *cav_trajectory_copy(const cav_trajectory *trajectory) {
+  size_t n = (size_t)trajectory->nknot, nq = n * (size_t)trajectory->nq, nv = n * (size_t)trajectory->nv;
+  cav_trajectory *copy = malloc(sizeof *copy + (nq + 2 * nv) * sizeof(double));
+  if (!copy) return NULL;
+  *copy = *trajectory;
+  copy->q = (double *)(copy + 1);
+  copy->v = copy->q + nq;
+  copy->u = copy->v + nv;
+  memcpy(copy->q, trajectory->q, nq * sizeof(double));
+  memcpy(copy->v, trajectory->v, nv * sizeof(double));
+  memcpy(copy->u, trajectory->u, nv * sizeof(double));
+  return copy;
+}
+
+void cav_trajectory_free(cav_trajectory *trajectory) { free(trajectory); }
+
+void cav_trajectory_velocities(const cav_model *model, cav_trajectory *trajectory) {
+  for (int t = 1; t < trajectory->nknot; t++) {
+    const double *q = trajectory->q + t * trajectory->nq;
+    cav_difference(model, q - trajectory->nq, q, trajectory->timestep, trajectory->v + t * trajectory->nv);
+  }
+}
+
+// x := way from a knot to a fraction of the step after it, over the step: cubic from 0 to v_{t+1} with the derivatives of the knots
+static void along(const cav_trajectory *trajectory, int t, double fraction, double *x) {
+  int nv = trajectory->nv;
+  const double *v = trajectory->v + (t + 1) * nv;
+  double s = fraction, left = s * (1 - s) * (1 - s), right = s * s * (s - 1), whole = s * s * (3 - 2 * s);
+  for (int d = 0; d < nv; d++) {
+    double from = 0.5 * (v[d - nv] + v[d]), to = t + 2 < trajectory->nknot ? 0.5 * (v[d] + v[d + nv]) : 2 * v[d] - from;
+    x[d] = left * from + whole * v[d] + right * to;
+  }
+}
+
+cav_trajectory *cav_trajectory_resample(const cav_model *model, const cav_trajectory *trajectory, double timestep) {
+  double h = trajectory->timestep, duration = h * (trajectory->nknot - 1);
+  double steps = timestep > 0 ? round(duration / timestep) : 0;
+  if (!(steps >= 1 && steps < 1e8)) return NULL;
+  cav_trajectory *finer = cav_trajectory_new(model, (int)steps + 1, timestep);
+  double *x = malloc((size_t)model->nv * sizeof *x);
+  if (!finer || !x) {
+    cav_trajectory_free(finer);
+    free(x);
+    return NULL;
+  }
+  for (int t = 0; t < finer->nknot; t++) {
+    // the knot before, and the part of the step past it; the last knot ends the last step
+    double at = fmin(t * timestep / h, trajectory->nknot - 1);
+    int knot = (int)fmin(floor(at + uneven_most), trajectory->nknot - 2);
+    along(trajectory, knot, at - knot, x);
+    cav_integrate(model, trajectory->q + knot * trajectory->nq, x, h, finer->q + t * finer->nq);
+    const double *u = trajectory->u + knot * trajectory->nv;
+    for (int d = 0; d < model->nv; d++) {
+      finer->u[t * model->nv + d] = (1 - (at - knot)) * u[d] + (at - knot) * u[model->nv + d];
+    }
+  }
+  memcpy(finer->v, trajectory->v, (size_t)finer->nv * sizeof(double));
+  cav_trajectory_velocities(model, finer);
+  free(x);
+  return finer;
+}
+
+// names of all columns, one after the other: time, q, v, u
+typedef struct columns {
+  int n;
+  char **name;
+} columns;
+
+static void free_columns(columns *c) {
+  for (int i = 0; i < c->n && c->name; i++) free(c->name[i]);
+  free(c->name);
+  *c = (columns){0};
+}
+
+// prefix_joint or prefix_joint_i; 0 if memory runs out
+static int add_columns(columns *c, const char *prefix, const cav_model *model, int j, int count) {
+  const cav_joint *joint = &model->joint[j];
+  size_t room = strlen(joint->name) + strlen(prefix) + 32;
+  for (int i = 0; i < count; i++) {
+    char *name = malloc(room);
+    if (!name) return 0;
+    int length =
+        joint->name[0] ? snprintf(name, room, "%s_%s", prefix, joint->name) : snprintf(name, room, "%s_#%d", prefix, j);
+    if (count > 1) snprintf(name + length, room - (size_t)length, "_%d", i);
+    c->name[c->n++] = name;
+  }
+  return 1;
+}
+
+static int make_columns(columns *c, const cav_model *model) {
+  static const int nq[] = {[CAV_JOINT_FREE] = 7, [CAV_JOINT_BALL] = 4, [CAV_JOINT_SLIDE] = 1, [CAV_JOINT_HINGE] = 1};
+  static const int nv[] = {[CAV_JOINT_FREE] = 6, [CAV_JOINT_BALL] = 3, [CAV_JOINT_SLIDE] = 1, [CAV_JOINT_HINGE] = 1};
+  *c = (columns){0, calloc((size_t)(1 + model->nq + 2 * model->nv), sizeof *c->name)};
+  int good = c->name && (c->name[0] = strdup("time")) != NULL;
+  c->n = good;
+  for (int j = 0; j < model->njoint && good; j++) good = add_columns(c, "qpos", model, j, nq[model->joint[j].type]);
+  for (int j = 0; j < model->njoint && good; j++) good = add_columns(c, "qvel", model, j, nv[model->joint[j].type]);
+  for (int j = 0; j < model->njoint && good; j++) good = add_columns(c, "u", model, j, nv[model->joint[j].type]);
+  if (!good) free_columns(c);
+  return good;
+}
+
+static void write_values(FILE *stream, const double *value, int n) {
+  for (int i = 0; i < n; i++) {
+    fputc(',', stream);
+    cav_table_write_number(stream, value[i]);
+  }
+}
+
+static int all_finite(const double *value, size_t n) {
+  for (size_t i = 0; i < n; i++) {
+    if (!isfinite(value[i])) return 0;
+  }
+  return 1;
+}
+
+cav_status cav_trajectory_write(const char *path, const cav_model *model, const cav_trajectory *trajectory,
+                                cav_error *error) {
+  size_t n = (size_t)trajectory->nknot;
+  if (trajectory->nq != model->nq || trajectory->nv != model->nv) {
+    return cav_file_fail(error, CAV_BAD_INPUT, 0,
+                         "%s: the trajectory has %d positions and %d velocities, the model %d and %d", path,
+                         trajectory->nq, trajectory->nv, model->nq, model->nv);
+  }
+  if (!all_finite(trajectory->q, n * (size_t)model->nq) || !all_finite(trajectory->v, n * (size_t)model->nv) ||
+      !all_finite(trajectory->u, n * (size_t)model->nv)) {
+    return cav_file_fail(error, CAV_NOT_FINITE, 0, "%s: not written: the trajectory holds a number that is not finite",
+                         path);
+  }
+  columns c;
+  cav_file file;
+  if (!make_columns(&c, model)) return cav_file_fail(error, CAV_NO_MEMORY, 0, "%s: no memory to write the file", path);
+  cav_status status = cav_file_begin(&file, path, error);
+  if (!status) {
+    for (int i = 0; i < c.n; i++) {
+      if (i) fputc(',', file.stream);
+      cav_table_write_text(file.stream, c.name[i]);
+    }
+    fputc('\n', file.stream);
+    for (int t = 0; t < trajectory->nknot; t++) {
+      cav_table_write_number(file.stream, t * trajectory->timestep);
+      write_values(file.stream, trajectory->q + t * model->nq, model->nq);
+      write_values(file.stream, trajectory->v + t * model->nv, model->nv);
+      write_values(file.stream, trajectory->u + t * model->nv, model->nv);
+      fputc('\n', file.stream);
+    }
+    status = cav_file_end(&file, error);
+  }
+  free_columns(&c);
+  return status;
+}
+
+// place of a table's column among the expected ones: first where it should stand, then anywhere; -1 if nowhere
+static int place_of(const columns *c, const char *name, int at) {
+  if (at < c->n && !strcmp(c->name[at], name)) return at;
+  for (int i = 0; i < c->n; i++) {
+    if (!strcmp(c->name[i], name)) return i;
+  }
+  return -1;
+}
+
+// column of the table for each expected one, -1 where it is missing; q must be there, v and u as a whole or not at all
+static cav_status match(const cav_table *table, const columns *c, const cav_model *model, int *source,
+                        cav_error *error) {
+  for (int i = 0; i < c->n; i++) source[i] = -1;
+  for (int i = 0; i < table->ncol; i++) {
+    int place = place_of(c, table->name[i], i);
+    if (place < 0) {
+      const char *near = cav_xml_nearest(table->name[i], c->name, c->n, sizeof *c->name);
+      return cav_file_fail(error, CAV_BAD_INPUT, 1, "%s:1: column '%.80s': the model has no such value%s%.80s%s",
+                           table->path, table->name[i], near ? "; did you mean '" : "", near ? near : "",
+                           near ? "'?" : "");
+    }
+    if (source[place] >= 0) {
+      return cav_file_fail(error, CAV_BAD_INPUT, 1, "%s:1: column '%.80s' stands there twice", table->path,
+                           table->name[i]);
+    }
+    source[place] = i;
+  }
+  int v = 1 + model->nq, u = v + model->nv;
+  for (int i = 0; i < c->n; i++) {
+    int first = i < v ? 0 : i < u ? v : u, end = i < v ? v : i < u ? u : c->n, wanted = i < v;
+    for (int k = first; k < end && !wanted; k++) wanted = source[k] >= 0;
+    if (wanted && source[i] < 0) {
+      return cav_file_fail(error, CAV_BAD_INPUT, 1, "%s:1: column '%.80s' is missing", table->path, c->name[i]);
+    }
+  }
+  return CAV_OK;
+}
+
+// the step, and that all rows keep to it; 0 on failure
+static double step_of(const cav_table *table, int column, cav_error *error) {
+  if (table->nrow < 2) {
+    cav_file_fail(error, CAV_BAD_INPUT, 1, "%s:1: expected at least two rows, got %d", table->path, table->nrow);
+    return 0;
+  }
+  const double *time = table->value + column;
+  double first = time[0], last = time[(size_t)(table->nrow - 1) * (size_t)table->ncol];
+  double mean = (last - first) / (table->nrow - 1), exact = time[table->ncol] - first;
+  double h = fabs(exact - mean) <= 1e-12 * fabs(mean) ? exact : mean;
+  for (int i = 0; i < table->nrow; i++) {
+    double off = time[(size_t)i * (size_t)table->ncol] - first - i * h;
+    if (!(h > 0) || !(fabs(off) <= uneven_most * h)) {
+      cav_file_fail(error, CAV_BAD_INPUT, table->line[i],
+                    "%s:%d: column 'time': expected rows at equal, increasing times; row %d is %g s off", table->path,
+                    table->line[i], i + 1, off);
+      return 0;
+    }
+  }
+  return h;
+}
+
+// brings quaternions that were written with few digits to unit length
+static cav_status check_quaternions(const cav_model *model, double *q, const cav_table *table, int row,
+                                    cav_error *error) {
+  int off = 0;
+  for (int j = 0; j < model->njoint; j++) {
+    const cav_joint *joint = &model->joint[j];
+    if (joint->type != CAV_JOINT_FREE && joint->type != CAV_JOINT_BALL) continue;
+    const double *w = q + joint->q + (joint->type == CAV_JOINT_FREE ? 3 : 0);
+    double length = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2] + w[3] * w[3]);
+    if (!(fabs(length - 1) <= quaternion_most)) {
+      return cav_file_fail(error, CAV_BAD_INPUT, table->line[row],
+                           "%s:%d: joint '%.80s': expected a quaternion of length 1, got %g", table->path,
+                           table->line[row], joint->name, length);
+    }
+    off |= fabs(length - 1) > quaternion_unit;
+  }
+  if (off) cav_configuration_normalise(model, q);
+  return CAV_OK;
+}
+
+static void take(const cav_table *table, const int *source, int row, int n, double *out) {
+  for (int i = 0; i < n && source[0] >= 0; i++)
+    out[i] = table->value[(size_t)row * (size_t)table->ncol + (size_t)source[i]];
+}
+
+static cav_trajectory *from_table(const cav_table *table, const cav_model *model, const int *source, cav_error *error) {
+  double h = step_of(table, source[0], error);
+  if (h == 0) return NULL;
+  cav_trajectory *trajectory = cav_trajectory_new(model, table->nrow, h);
+  if (!trajectory) {
+    cav_file_fail(error, CAV_NO_MEMORY, 0, "%s: no memory for %d knots", table->path, table->nrow);
+    return NULL;
+  }
+  const int *source_q = source + 1, *source_v = source_q + model->nq, *source_u = source_v + model->nv;
+  for (int t = 0; t < table->nrow; t++) {
+    double *q = trajectory->q + t * model->nq;
+    if (model->nq) take(table, source_q, t, model->nq, q);
+    if (model->nv) take(table, source_v, t, model->nv, trajectory->v + t * model->nv);
+    if (model->nv) take(table, source_u, t, model->nv, trajectory->u + t * model->nv);
+    if (check_quaternions(model, q, table, t, error)) {
+      cav_trajectory_free(trajectory);
+      return NULL;
+    }
+  }
+  if (model->nv && source_v[0] < 0) cav_trajectory_velocities(model, trajectory);
+  return trajectory;
+}
+
+cav_trajectory *cav_trajectory_read(const char *path, const cav_model *model, cav_error *error) {
+  cav_table *table = cav_table_read(path, error);
+  if (!table) return NULL;
+  cav_trajectory *trajectory = NULL;
+  columns c;
+  int *source = calloc((size_t)(1 + model->nq + 2 * model->nv), sizeof *source);
+  if (!source || !make_columns(&c, model)) {
+    cav_file_fail(error, CAV_NO_MEMORY, 0, "%s: no memory", path);
+  } else {
+    if (match(table, &c, model, source, error) == CAV_OK) trajectory = from_table(table, model, source, error);
+    free_columns(&c);
+  }
+  free(source);
+  cav_table_free(table);
+  return trajectory;
+}

@@ -1,0 +1,521 @@
+/// Rows of one knot: costs and constraints, from readings, forces and velocities to residuals, gradient and Gauss-Newton Hessian.
+/// Rows with few columns are added at once, dense ones gathered for one product (transcription.c); forces along single dofs
+/// are gathered by dof, as they share the derivatives of u. A constraint row enters by an augmented Lagrangian. Where the step is
+/// free, every row's derivative by its logarithm is the difference of two passes that begin the same rows.
+#include "knot.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+int cav_knot_moves(const cav_transcription *tr, int t) { return tr->periodicity || (t >= 1 && t < tr->nknot); }
+
+/// Starts a row of weight/2 r^2. Where the step is free its derivative by the step's logarithm is the difference of two passes that
+/// begin the same rows; weights count with it, as integrals are sums over steps.
+static void begin_row(cav_sum *a, double weight, double r) {
+  if (!a->tr->free_step || !(a->jacobian || a->shifted)) return;
+  int i = a->row++;
+  a->root = sqrt(weight);
+  if (a->shifted) {
+    cav_scratch_note(a->s, a->shifted - 1, i, a->root * r);
+    return;
+  }
+  a->derivative = weight > 0 ? (a->s->trace[1][i] - a->s->trace[0][i]) / (2 * CAV_STEP_FRACTION) : 0;
+  a->knot->step_square += a->derivative * a->derivative;
+  a->knot->step_derivative += a->derivative * a->root * r;
+}
+
+/// Starts the row of a cost, and turns its norm into a square: with x = r/unit and y^2/2 the norm of x, the residual is y and its row
+/// dy/dx times that of x, which goes into weight and residual.
+static void begin_cost(cav_sum *a, const cav_term *term, double unit, double *weight, double *r) {
+  if (term->norm == CAV_NORM_ABSOLUTE) {
+    double x = *r / unit, root = sqrt(1 + x * x);
+    // y = x sqrt(2/(1 + root)), which is exact for small x; dy/dx = x/(root y)
+    double part = sqrt(2 / (1 + root)), derivative = 1 / (root * part);
+    *weight *= derivative * derivative;
+    *r = unit * x * part / derivative;
+  }
+  begin_row(a, *weight, *r);
+}
+
+/// Adds weight/2 (r + row dx)^2 for a row with n entries, begun.
+static void add_sparse(cav_sum *a, double weight, double r, int n, const int *column, const double *entry) {
+  a->knot->merit += 0.5 * weight * r * r;
+  if (!a->jacobian) return;
+  int width = 3 * a->tr->nv;
+  for (int i = 0; i < n && a->tr->free_step; i++) a->knot->step_row[column[i]] += a->derivative * a->root * entry[i];
+  for (int i = 0; i < n; i++) {
+    a->knot->gradient[column[i]] += weight * r * entry[i];
+    for (int j = 0; j < n; j++)
+      if (column[j] <= column[i]) a->knot->hessian[column[i] * width + column[j]] += weight * entry[i] * entry[j];
+  }
+}
+
+/// Adds weight/2 (r + row dx)^2 for a full row, begun.
+static void add_dense(cav_sum *a, double weight, double r, const double *row) {
+  a->knot->merit += 0.5 * weight * r * r;
+  if (!a->jacobian || weight == 0) return;
+  int width = 3 * a->tr->nv;
+  double root = sqrt(weight), *out = a->knot->dense + (size_t)a->knot->ndense * width;
+  for (int k = 0; k < width; k++) out[k] = root * row[k];
+  a->knot->rest[a->knot->ndense++] = root * r;
+  for (int k = 0; k < width && a->tr->free_step; k++) a->knot->step_row[k] += a->derivative * out[k];
+}
+
+/// Adds a linear form of u to a row [3nv].
+static void put_force(const cav_sum *a, const cav_force_row *form, double *row) {
+  int width = 3 * a->tr->nv;
+  for (int k = 0; k < form->n; k++) {
+    const double *du = a->knot->du + (size_t)form->dof[k] * width;
+    for (int c = 0; c < width; c++) row[c] += form->coef[k] * du[c];
+  }
+}
+
+/// Adds weight/2 r^2 with r a linear form of u, begun: along one dof it joins that dof's row, otherwise it is a row of its own.
+static void add_force(cav_sum *a, double weight, double r, const cav_force_row *form) {
+  const cav_transcription *tr = a->tr;
+  if (form->n == 1) {
+    a->knot->merit += 0.5 * weight * r * r;
+    a->s->force_weight[form->dof[0]] += weight * form->coef[0] * form->coef[0];
+    a->s->force_derivative[form->dof[0]] += weight * r * form->coef[0];
+    if (a->jacobian && tr->free_step) a->s->force_step[form->dof[0]] += a->derivative * a->root * form->coef[0];
+    return;
+  }
+  int width = 3 * tr->nv;
+  memset(a->s->row, 0, (size_t)width * sizeof(double));
+  if (a->jacobian) put_force(a, form, a->s->row);
+  add_dense(a, weight, r, a->s->row);
+}
+
+static double form_value(const cav_force_row *form, const double *u) {
+  double value = 0;
+  for (int k = 0; k < form->n; k++) value += form->coef[k] * u[form->dof[k]];
+  return value;
+}
+
+/// Sets and begins a constraint row; the residual of its augmented Lagrangian, 0 with *active 0 where it does not push.
+static double slot_residual(cav_sum *a, int i, double value, double lower, double upper, double rho, int *active) {
+  cav_slot *slot = &a->knot->slot[i];
+  slot->value = value;
+  slot->lower = lower;
+  slot->upper = upper;
+  const cav_slot_layout *at = &a->knot->layout;
+  double shifted = value, slack = 0;
+  if (a->tr->constraints_only) {
+    if (i >= at->effort && i < at->joint) slack = a->tr->slack_effort;
+    if (i >= at->joint && i < at->term) slack = a->tr->slack_range;
+  } else if (rho > 0) {
+    shifted += slot->multiplier / rho;
+  }
+  double e = shifted - fmin(fmax(shifted, lower - slack), upper + slack);
+  *active = e != 0 || lower == upper;
+  begin_row(a, *active ? rho : 0, e);
+  if (a->shifted) a->s->slot[a->shifted - 1][i] = value;
+  if (a->jacobian && a->tr->free_step)
+    a->knot->slot_step[i] = (a->s->slot[1][i] - a->s->slot[0][i]) / (2 * CAV_STEP_FRACTION);
+  return e;
+}
+
+/// Derivative of constraint row i, kept where the transcription is asked to (for solvers that want the rows themselves).
+static double *kept_row(cav_sum *a, int i) {
+  if (!a->jacobian || !a->tr->keep_rows) return NULL;
+  double *row = a->knot->slot_row + (size_t)i * 3 * a->tr->nv;
+  memset(row, 0, 3 * (size_t)a->tr->nv * sizeof(double));
+  return row;
+}
+
+static void keep_sparse(cav_sum *a, int i, int n, const int *column, const double *entry) {
+  double *row = kept_row(a, i);
+  for (int k = 0; row && k < n; k++) row[column[k]] += entry[k];
+}
+
+static double *keep_force(cav_sum *a, int i, const cav_force_row *form) {
+  double *row = kept_row(a, i);
+  if (row) put_force(a, form, row);
+  return row;
+}
+
+static void keep_reading(cav_sum *a, int i, int reading) {
+  double *row = kept_row(a, i);
+  if (row) memcpy(row, a->knot->dy + (size_t)reading * 3 * a->tr->nv, 3 * (size_t)a->tr->nv * sizeof(double));
+}
+
+/// Entries of the derivative of v_t [dof d] over the columns; base is the column block of q_t, q_{t-1} stands before it.
+static int velocity_entries(const cav_transcription *tr, int step, int d, int base, int has_previous, double scale,
+                            int *column, double *entry) {
+  int n = 0, nv = tr->nv, k = tr->rotation_of[d];
+  double s = scale / tr->h;
+  if (k < 0) {
+    column[n] = base + d, entry[n++] = s;
+    if (has_previous) column[n] = base - nv + d, entry[n++] = -s;
+    return n;
+  }
+  const double *J = tr->knot[step].rotation + CAV_ROTATION_SIZE * k;
+  int first = tr->rotation_dof[k], row = d - first;
+  for (int c = 0; c < 3; c++) {
+    column[n] = base + first + c, entry[n++] = s * J[3 * row + c];
+    if (has_previous) column[n] = base - nv + first + c, entry[n++] = -s * J[9 + 3 * row + c];
+  }
+  return n;
+}
+
+static void add_velocity(cav_sum *a, const cav_term *term, double weight, const double *v) {
+  const cav_transcription *tr = a->tr;
+  int column[6];
+  double entry[6], *goal = a->s->tangent;
+  if (!cav_knot_moves(tr, a->t)) return;
+  cav_term_target(term, a->knot->time, tr->nv, goal);
+  for (int d = 0; d < tr->nv; d++) {
+    if (!cav_dof_selected(tr, term, d)) continue;
+    int n = velocity_entries(tr, a->t, d, tr->nv, cav_knot_moves(tr, a->t - 1), 1 / term->scale, column, entry);
+    double r = (v[d] - goal[d]) / term->scale, w = weight;
+    begin_cost(a, term, 1, &w, &r);
+    add_sparse(a, w, r, n, column, entry);
+  }
+}
+
+/// Entries of the derivative of scale times the acceleration of dof d at a knot that has one.
+static int acceleration_entries(const cav_sum *a, int d, double scale, int *column, double *entry) {
+  const cav_transcription *tr = a->tr;
+  int n = 0, t = a->t, here = cav_knot_moves(tr, t);
+  scale /= tr->h;
+  if (here) n = velocity_entries(tr, t, d, tr->nv, cav_knot_moves(tr, t - 1), -scale, column, entry);
+  if (t + 1 < tr->nknot) n += velocity_entries(tr, t + 1, d, 2 * tr->nv, here, scale, column + n, entry + n);
+  return n;
+}
+
+static void add_acceleration(cav_sum *a, const cav_term *term, double weight, const double *v, const double *v_next) {
+  const cav_transcription *tr = a->tr;
+  int column[12];
+  double entry[12], *goal = a->s->tangent;
+  if (!a->knot->has_force) return;
+  cav_term_target(term, a->knot->time, tr->nv, goal);
+  for (int d = 0; d < tr->nv; d++) {
+    if (!cav_dof_selected(tr, term, d)) continue;
+    int n = acceleration_entries(a, d, 1 / term->scale, column, entry);
+    double r = ((v_next[d] - v[d]) / tr->h - goal[d]) / term->scale, w = weight;
+    begin_cost(a, term, 1, &w, &r);
+    add_sparse(a, w, r, n, column, entry);
+  }
+}
+
+/// Tangent difference of q_t to a term's posture and, per dof, the entries of its derivative.
+static void posture_difference(const cav_sum *a, const cav_term *term, const double *q, double *difference) {
+  const cav_model *m = a->tr->model;
+  const double *target = term->target ? term->target : a->tr->problem->q_goal;
+  int n = term->target ? term->nwaypoint : 0, i = 0;
+  if (n > 1) {
+    // between waypoints along the geodesic
+    while (i < n - 2 && a->knot->time > term->waypoint_time[i + 1]) i++;
+    double span = term->waypoint_time[i + 1] - term->waypoint_time[i];
+    double fraction = fmin(fmax((a->knot->time - term->waypoint_time[i]) / span, 0), 1);
+    cav_difference(m, target + i * m->nq, target + (i + 1) * m->nq, 1, difference);
+    cav_integrate(m, target + i * m->nq, difference, fraction, a->s->posture);
+    target = a->s->posture;
+  }
+  cav_difference(m, target, q, 1, difference);
+}
+
+static int posture_entries(const cav_transcription *tr, const double *difference, int d, double scale, int *column,
+                           double *entry) {
+  int k = tr->rotation_of[d];
+  if (k < 0) {
+    column[0] = tr->nv + d, entry[0] = scale;
+    return 1;
+  }
+  double J[9];
+  cav_rotation_jacobian_inverse(difference + tr->rotation_dof[k], J);
+  for (int c = 0; c < 3; c++) {
+    column[c] = tr->nv + tr->rotation_dof[k] + c;
+    entry[c] = scale * J[3 * (d - tr->rotation_dof[k]) + c];
+  }
+  return 3;
+}
+
+static void add_posture(cav_sum *a, const cav_term *term, double weight, const double *q) {
+  const cav_transcription *tr = a->tr;
+  int column[3];
+  double entry[3];
+  if (!cav_knot_moves(tr, a->t)) return;
+  posture_difference(a, term, q, a->s->tangent);
+  for (int d = 0; d < tr->nv; d++) {
+    if (!cav_dof_selected(tr, term, d)) continue;
+    int n = posture_entries(tr, a->s->tangent, d, 1 / term->scale, column, entry);
+    double r = a->s->tangent[d] / term->scale, w = weight;
+    begin_cost(a, term, 1, &w, &r);
+    add_sparse(a, w, r, n, column, entry);
+  }
+}
+
+static void add_effort(cav_sum *a, const cav_term *term, double weight) {
+  const cav_transcription *tr = a->tr;
+  if (!a->knot->has_force) return;
+  weight /= term->scale * term->scale;
+  for (int k = 0; k < tr->model->nu; k++) {
+    double r = form_value(&tr->effort[k], a->knot->u), w = weight;
+    begin_cost(a, term, term->scale, &w, &r);
+    add_force(a, w, r, &tr->effort[k]);
+  }
+}
+
+/// Whether a term counts the contacts of the knot's k-th pair.
+static int counts(const cav_sum *a, const cav_term *term, int k) {
+  const cav_model *m = a->tr->model;
+  const cav_pair *pair = &m->pair[a->s->key[2 * k]];
+  int link = m->body[term->body].link;
+  return term->body <= 0 || m->geom[pair->geom1].link == link || m->geom[pair->geom2].link == link;
+}
+
+/// Readings first .. first+n-1 of the contacts between trees or with the world, or of those within one tree.
+static void add_contact(cav_sum *a, const cav_term *term, double weight, int first, int n, int self) {
+  weight /= term->scale * term->scale;
+  for (int k = 0; k < a->knot->ncontact; k++) {
+    if (a->knot->moving[k] != self || !counts(a, term, k)) continue;
+    for (int i = first; i < first + n; i++) {
+      int row = CAV_CONTACT_READINGS * k + i;
+      double r = a->knot->y[row], w = weight;
+      begin_cost(a, term, term->scale, &w, &r);
+      add_dense(a, w, r, a->knot->dy + (size_t)row * 3 * a->tr->nv);
+    }
+  }
+}
+
+/// Cost terms. sensor counts through the sensor readings, which stand in the order of the terms.
+static void add_costs(cav_sum *a, const double *q, const double *v, const double *v_next) {
+  const cav_transcription *tr = a->tr;
+  int reading = CAV_CONTACT_READINGS * a->knot->ncontact, width = 3 * tr->nv;
+  for (int i = 0; i < tr->problem->nterm; i++) {
+    const cav_term *term = &tr->problem->term[i];
+    double when = cav_term_weight(tr, term, a->t), weight = when * term->weight;
+    if (when == 0) continue;
+    int dim = cav_term_dim(term);
+    if (term->use == CAV_USE_COST) {
+      switch (term->quantity) {
+        case CAV_QUANTITY_SENSOR:
+          for (int k = 0; k < dim; k++) {
+            double r = a->knot->y[reading + k], w = weight;
+            begin_cost(a, term, 1, &w, &r);
+            add_dense(a, w, r, a->knot->dy + (size_t)(reading + k) * width);
+          }
+          break;
+        case CAV_QUANTITY_CONFIGURATION:
+          add_posture(a, term, weight, q);
+          break;
+        case CAV_QUANTITY_VELOCITY:
+          add_velocity(a, term, weight, v);
+          break;
+        case CAV_QUANTITY_ACCELERATION:
+          add_acceleration(a, term, weight, v, v_next);
+          break;
+        case CAV_QUANTITY_EFFORT:
+          add_effort(a, term, weight);
+          break;
+        case CAV_QUANTITY_GAP:
+          add_contact(a, term, weight, 0, 1, 0);
+          break;
+        case CAV_QUANTITY_SLIP:
+          add_contact(a, term, weight, 1, 2, 0);
+          break;
+        case CAV_QUANTITY_IMPACT:
+          add_contact(a, term, weight, 3, 1, 0);
+          break;
+        case CAV_QUANTITY_SELF_PENETRATION:
+          add_contact(a, term, weight, 0, 1, 1);
+          break;
+        case CAV_QUANTITY_FORCE:
+          add_contact(a, term, weight, 4, 1, 0);
+          break;
+        case CAV_QUANTITY_TYPES:
+          break;
+      }
+    }
+    reading += dim;
+  }
+  // the duration's own penalty
+  if (a->t > 0 || !tr->free_step) return;
+  double duration = (tr->nknot - 1) * tr->h;
+  begin_row(a, tr->problem->duration_weight, duration);
+  add_sparse(a, tr->problem->duration_weight, duration, 0, NULL, NULL);
+}
+
+/// Angle of a ball joint from its reference and, in axis, the gradient of it.
+static double ball_angle(const cav_joint *joint, const double *q, double axis[3]) {
+  const double *quat = q + joint->q;
+  double identity[4] = {1, 0, 0, 0};
+  cav_rotation_between(identity, quat, axis);
+  double angle = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
+  for (int k = 0; k < 3; k++) axis[k] = angle > 0 ? axis[k] / angle : 0;
+  return angle;
+}
+
+static void add_ranges(cav_sum *a, const double *q, double rho) {
+  const cav_transcription *tr = a->tr;
+  const cav_model *m = tr->model;
+  double keep = tr->problem->limit_margin;
+  int i = a->knot->layout.joint, active;
+  if (a->t == 0) return;
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    if (!joint->limited) continue;
+    int ball = joint->type == CAV_JOINT_BALL, n = ball ? 3 : 1, column[3];
+    double axis[3] = {1, 0, 0}, value = ball ? ball_angle(joint, q, axis) : q[joint->q];
+    for (int k = 0; k < 3; k++) column[k] = tr->nv + joint->dof + k;
+    keep_sparse(a, i, n, column, axis);
+    double range[2] = {joint->range[0], joint->range[1]};
+    if (tr->periodicity) cav_periodicity_range(tr->periodicity, j, range);
+    double lower = ball ? -INFINITY : range[0] + keep;
+    double e = slot_residual(a, i++, value, lower, range[1] - keep, rho, &active);
+    if (active) add_sparse(a, rho, e, n, column, axis);
+  }
+  for (int k = 0; k < m->ntendon; k++) {
+    const cav_tendon *tendon = &m->tendon[k];
+    if (!tendon->limited) continue;
+    double value = a->s->state->tendon_length[k];
+    for (int c = 0; c < tendon->ndof; c++) {
+      a->s->column[c] = tr->nv + m->tendon_dof[tendon->dof + c];
+      a->s->row[c] = a->s->state->tendon_arm[tendon->dof + c];
+    }
+    keep_sparse(a, i, tendon->ndof, a->s->column, a->s->row);
+    double e = slot_residual(a, i++, value, tendon->range[0] + keep, tendon->range[1] - keep, rho, &active);
+    if (active) add_sparse(a, rho, e, tendon->ndof, a->s->column, a->s->row);
+  }
+}
+
+/// Entries of a servo's own part of row i over q_t and v_t, into row [3nv].
+static void put_servo(const cav_sum *a, const cav_servo *servo, double *row) {
+  int column[6];
+  double entry[6];
+  for (int k = 0; cav_knot_moves(a->tr, a->t) && k < servo->n; k++) {
+    int before = cav_knot_moves(a->tr, a->t - 1);
+    int n = velocity_entries(a->tr, a->t, servo->dof[k], a->tr->nv, before, servo->of_v[k], column, entry);
+    for (int c = 0; c < n; c++) row[column[c]] -= entry[c];
+    row[a->tr->nv + servo->dof[k]] -= servo->of_q[k];
+  }
+}
+
+/// Adds weight/2 r^2 for the row of a servo.
+static void add_servo(cav_sum *a, double weight, double r, const cav_force_row *form, const cav_servo *servo) {
+  memset(a->s->row, 0, 3 * (size_t)a->tr->nv * sizeof(double));
+  if (a->jacobian) {
+    put_force(a, form, a->s->row);
+    put_servo(a, servo, a->s->row);
+  }
+  add_dense(a, weight, r, a->s->row);
+}
+
+static void add_force_slots(cav_sum *a, const double *q, const double *v) {
+  const cav_transcription *tr = a->tr;
+  int i = a->knot->layout.unactuated, active;
+  if (!a->knot->has_force) return;
+  double rho = tr->h * tr->penalty.unactuated;
+  for (int k = 0; k < tr->nresidual; k++) {
+    keep_force(a, i, &tr->unactuated[k]);
+    double e = slot_residual(a, i++, form_value(&tr->unactuated[k], a->knot->u), 0, 0, rho, &active);
+    add_force(a, rho, e, &tr->unactuated[k]);
+  }
+  rho = tr->h * tr->penalty.effort;
+  for (int k = 0; k < tr->model->nu; k++) {
+    const double *range = tr->effort_range[k];
+    const cav_servo *servo = &tr->servo[k];
+    double value = form_value(&tr->effort[k], a->knot->u);
+    double *row = keep_force(a, i, &tr->effort[k]);
+    if (servo->n > 0) value -= cav_servo_value(tr->model, servo, q, v);
+    if (servo->n > 0 && row) put_servo(a, servo, row);
+    double e = slot_residual(a, i++, value, range[0], range[1], rho, &active);
+    if (active && servo->n > 0) add_servo(a, rho, e, &tr->effort[k], servo);
+    if (active && servo->n == 0) add_force(a, rho, e, &tr->effort[k]);
+  }
+}
+
+/// Rows of a hard term over postures, velocities or accelerations, one a selected dof; returns the next row.
+static int add_hard_dofs(cav_sum *a, const cav_term *term, int i, double lower, double upper, const double *q,
+                         const double *v, const double *v_next) {
+  const cav_transcription *tr = a->tr;
+  int posture = term->quantity == CAV_QUANTITY_CONFIGURATION, rate = term->quantity == CAV_QUANTITY_ACCELERATION;
+  int here = cav_knot_moves(tr, a->t), before = cav_knot_moves(tr, a->t - 1), column[12], active;
+  double rho = tr->penalty.term, entry[12];
+  if (posture) {
+    posture_difference(a, term, q, a->s->tangent);
+  } else {
+    cav_term_target(term, a->knot->time, tr->nv, a->s->tangent);
+  }
+  for (int d = 0; d < tr->nv; d++) {
+    if (!cav_dof_selected(tr, term, d)) continue;
+    int n = 0;
+    double measured = rate ? (v_next[d] - v[d]) / tr->h : v[d];
+    double value = (posture ? a->s->tangent[d] : measured - a->s->tangent[d]) / term->scale;
+    if (here && posture) n = posture_entries(tr, a->s->tangent, d, 1 / term->scale, column, entry);
+    if (rate) n = acceleration_entries(a, d, 1 / term->scale, column, entry);
+    if (here && !posture && !rate) n = velocity_entries(tr, a->t, d, tr->nv, before, 1 / term->scale, column, entry);
+    keep_sparse(a, i, n, column, entry);
+    double e = slot_residual(a, i++, value, lower, upper, rho, &active);
+    if (active) add_sparse(a, rho, e, n, column, entry);
+  }
+  return i;
+}
+
+static void add_hard_terms(cav_sum *a, const double *q, const double *v, const double *v_next) {
+  const cav_transcription *tr = a->tr;
+  double rho = tr->penalty.term;
+  int i = a->knot->layout.term, reading = CAV_CONTACT_READINGS * a->knot->ncontact, width = 3 * tr->nv, active;
+  for (int k = 0; k < tr->problem->nterm; k++) {
+    const cav_term *term = &tr->problem->term[k];
+    if (cav_term_weight(tr, term, a->t) == 0) continue;
+    int dim = cav_term_dim(term), range = term->use == CAV_USE_RANGE;
+    double lower = range ? term->lower / term->scale : 0, upper = range ? term->upper / term->scale : 0;
+    if (term->use == CAV_USE_COST) {
+      reading += dim;
+      continue;
+    }
+    if (term->quantity != CAV_QUANTITY_SENSOR) i = add_hard_dofs(a, term, i, lower, upper, q, v, v_next);
+    for (int c = 0; c < dim; c++, reading++) {
+      keep_reading(a, i, reading);
+      double e = slot_residual(a, i++, a->knot->y[reading], lower, upper, rho, &active);
+      if (active) add_dense(a, rho, e, a->knot->dy + (size_t)reading * width);
+    }
+  }
+}
+
+/// Lays the rows along single dofs beside the dense ones.
+static void lay_force_rows(cav_sum *a) {
+  const cav_transcription *tr = a->tr;
+  int width = 3 * tr->nv;
+  for (int d = 0; d < tr->nv; d++) {
+    double weight = a->s->force_weight[d];
+    if (weight == 0) continue;
+    double root = sqrt(weight), *out = a->knot->dense + (size_t)a->knot->ndense * width;
+    const double *du = a->knot->du + (size_t)d * width;
+    for (int k = 0; k < width; k++) out[k] = root * du[k];
+    a->knot->rest[a->knot->ndense++] = a->s->force_derivative[d] / root;
+    for (int k = 0; k < width && tr->free_step; k++) a->knot->step_row[k] += a->s->force_step[d] * du[k];
+  }
+  for (int i = 0; i < a->knot->ndense; i++) {
+    double r = a->knot->rest[i];
+    const double *row = a->knot->dense + (size_t)i * width;
+    for (int k = 0; k < width; k++) a->knot->gradient[k] += r * row[k];
+  }
+}
+
+void cav_knot_sum(cav_sum *a, const double *q, const double *v, const double *v_next) {
+  const cav_transcription *tr = a->tr;
+  cav_knot *knot = a->knot;
+  int nv = tr->nv;
+  knot->merit = 0;
+  knot->ndense = 0;
+  memset(a->s->force_weight, 0, (size_t)nv * sizeof(double));
+  memset(a->s->force_derivative, 0, (size_t)nv * sizeof(double));
+  memset(a->s->force_step, 0, (size_t)nv * sizeof(double));
+  if (a->jacobian) {
+    memset(knot->hessian, 0, 9 * (size_t)nv * nv * sizeof(double));
+    memset(knot->gradient, 0, 3 * (size_t)nv * sizeof(double));
+    memset(knot->step_row, 0, 3 * (size_t)nv * sizeof(double));
+    knot->step_square = knot->step_derivative = 0;
+  }
+  if (!tr->constraints_only) add_costs(a, q, v, v_next);
+  knot->cost = knot->merit;
+  add_force_slots(a, q, v);
+  add_ranges(a, q, tr->h * tr->penalty.range);
+  add_hard_terms(a, q, v, v_next);
+  if (a->jacobian) lay_force_rows(a);
+}

@@ -1,0 +1,28 @@
+/// Sums over the rows of one knot. Private to optim/.
+#ifndef CAVORT_KNOT_H
+#define CAVORT_KNOT_H
+
+#include "readings.h"
+
+/// Share by which the step is shortened and lengthened for derivatives by its logarithm.
+#define CAV_STEP_FRACTION 1e-6
+
+/// One knot being summed: dense rows gathered, sparse rows added at once. s->state is evaluated.
+typedef struct cav_sum {
+  cav_transcription *tr;
+  cav_scratch *s;
+  cav_knot *knot;
+  int t, jacobian;
+  int shifted; ///< 1, 2: at a shorter or longer step, whose residuals are noted only; 0: at the step itself
+  int row;     ///< rows begun
+  double root,
+      derivative; ///< of the present row: root of its weight, and what the step's logarithm does to root times residual
+} cav_sum;
+
+/// Whether the configuration of knot t moves with an unknown.
+int cav_knot_moves(const cav_transcription *transcription, int t);
+
+/// Values of a knot's rows at the state's last evaluation, and with derivatives in place its part of the normal equations.
+void cav_knot_sum(cav_sum *sum, const double *q, const double *v, const double *v_next);
+
+#endif

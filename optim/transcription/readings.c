@@ -1,0 +1,307 @@
+/// Readings of one knot, and their derivatives by (q_t, v_t, v_{t+1}): analytic where the dynamics offers them. What it
+/// does not offer (a force or constraint of the model, contact points that come and go, a type of sensor) is differenced
+/// instead, only that, and counted; nothing else is mixed.
+#include "readings.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/// Contacts that push less than this fraction of the weight get no rows of their own.
+static const double contact_floor = 1e-6;
+
+/// What is read off a state at knot t: u, four numbers a contact, the sensors of the terms that speak there.
+typedef struct readings {
+  const cav_transcription *tr;
+  int t, ncontact;
+  const int *key;
+} readings;
+
+static void read_contact(const cav_transcription *tr, const cav_contact *c, double *y) {
+  memset(y, 0, CAV_CONTACT_READINGS * sizeof *y);
+  if (!tr->model->pair[c->pair].external) {
+    y[0] = fmax(-c->dist, 0);
+    return;
+  }
+  double fraction = sqrt(fmax(c->impulse[0], 0) / (tr->h * tr->weight));
+  y[0] = fraction * fmax(c->dist, 0);
+  y[1] = c->dim > 1 ? fraction * c->velocity_next[1] : 0;
+  y[2] = c->dim > 1 ? fraction * c->velocity_next[2] : 0;
+  y[3] = fraction * c->velocity_next[0];
+  y[4] = fraction * fraction;
+}
+
+static void read_knot(const cav_model *model, const cav_state *state, void *context, double *value) {
+  const readings *r = context;
+  const cav_transcription *tr = r->tr;
+  memcpy(value, state->u, (size_t)model->nv * sizeof(double));
+  value += model->nv;
+
+  // contacts stand in the order of pairs and features, so both lists are walked once; one that is gone reads zero
+  const cav_contact *c = state->contact, *end = c ? c + state->ncontact : NULL;
+  for (int k = 0; k < r->ncontact; k++, value += CAV_CONTACT_READINGS) {
+    int pair = r->key[2 * k], feature = r->key[2 * k + 1];
+    while (c < end && (c->pair < pair || (c->pair == pair && c->feature < feature))) c++;
+    if (c < end && c->pair == pair && c->feature == feature) {
+      read_contact(tr, c, value);
+    } else {
+      memset(value, 0, CAV_CONTACT_READINGS * sizeof(double));
+    }
+  }
+  for (int i = 0; i < tr->problem->nterm; i++) {
+    const cav_term *term = &tr->problem->term[i];
+    if (term->quantity != CAV_QUANTITY_SENSOR || cav_term_weight(tr, term, r->t) == 0) continue;
+    cav_term_read(tr, state, term, r->t, value);
+    value += cav_term_dim(term);
+  }
+}
+
+static int grow(double **array, size_t n) {
+  double *p = realloc(*array, n * sizeof(double));
+  if (p) *array = p;
+  return p != NULL;
+}
+
+void cav_scratch_note(cav_scratch *s, int which, int i, double value) {
+  if (i >= s->trace_room[which]) {
+    int room = 2 * i + 64;
+    if (!grow(&s->trace[which], (size_t)room)) {
+      s->short_of_memory = 1;
+      return;
+    }
+    s->trace_room[which] = room;
+  }
+  s->trace[which][i] = value;
+}
+
+int cav_readings_list(cav_transcription *tr, cav_scratch *s, int t) {
+  cav_knot *knot = &tr->knot[t];
+  int nv = tr->nv, ncontact = 0, nsensor = 0;
+  if (s->state->ncontact > s->key_room) {
+    int *key = realloc(s->key, 2 * (size_t)s->state->ncontact * sizeof(int));
+    if (!key) return 0;
+    s->key = key;
+    s->key_room = s->state->ncontact;
+  }
+  char *moving = realloc(knot->moving, (size_t)s->state->ncontact + 1);
+  if (!moving) return 0;
+  knot->moving = moving;
+  if (knot->has_force) {
+    for (int k = 0; k < s->state->ncontact; k++) {
+      const cav_contact *c = &s->state->contact[k];
+      int self = !tr->model->pair[c->pair].external;
+      if (self ? c->dist > 0 : c->impulse[0] < contact_floor * tr->h * tr->weight) continue;
+      moving[ncontact] = (char)self;
+      s->key[2 * ncontact] = c->pair;
+      s->key[2 * ncontact++ + 1] = c->feature;
+    }
+  }
+  for (int i = 0; i < tr->problem->nterm; i++) {
+    const cav_term *term = &tr->problem->term[i];
+    if (cav_term_weight(tr, term, t) > 0) nsensor += cav_term_dim(term);
+  }
+  knot->ncontact = ncontact;
+  knot->nread = CAV_CONTACT_READINGS * ncontact + nsensor;
+  size_t total = (size_t)(nv + knot->nread), n = (size_t)nv;
+  if ((int)total > s->room) {
+    if (!grow(&s->value, total) || !grow(&s->dq, total * n) || !grow(&s->dv, total * n) || !grow(&s->dn, total * n))
+      return 0;
+    s->room = (int)total;
+  }
+  if (knot->nread > knot->room) {
+    if (!grow(&knot->y, (size_t)knot->nread) || !grow(&knot->dy, (size_t)knot->nread * 3 * n)) return 0;
+    knot->room = knot->nread;
+  }
+  if (tr->free_step && knot->layout.count > s->slot_room) {
+    if (!grow(&s->slot[0], (size_t)knot->layout.count) || !grow(&s->slot[1], (size_t)knot->layout.count)) return 0;
+    s->slot_room = knot->layout.count;
+  }
+  int dense = nv + knot->nread + knot->layout.count + tr->model->nu;
+  if (dense > knot->dense_room) {
+    if (!grow(&knot->dense, (size_t)dense * 3 * n) || !grow(&knot->rest, (size_t)dense)) return 0;
+    knot->dense_room = dense;
+  }
+  return 1;
+}
+
+void cav_readings_values(const cav_transcription *tr, cav_scratch *s, int t) {
+  readings r = {tr, t, tr->knot[t].ncontact, s->key};
+  read_knot(tr->model, s->state, &r, s->value);
+}
+
+// ---------------------------------------------------------------- derivatives
+
+/// Rows of derivatives that are being filled, from some reading on.
+typedef struct rows {
+  double *dq, *dv, *dn;
+} rows;
+
+static rows rows_at(const cav_transcription *tr, const cav_scratch *s, int reading) {
+  size_t at = (size_t)reading * tr->nv;
+  return (rows){s->dq + at, s->dv + at, s->dn + at};
+}
+
+static const cav_contact *find_contact(const cav_state *state, const int key[2]) {
+  for (int i = 0; i < state->ncontact; i++)
+    if (state->contact[i].pair == key[0] && state->contact[i].feature == key[1]) return &state->contact[i];
+  return NULL;
+}
+
+/// Derivatives of the overlap of two links of one tree.
+static cav_status self_penetration_rows(const cav_transcription *tr, const cav_scratch *s, const cav_contact *c,
+                                        rows out) {
+  size_t n = (size_t)tr->nv;
+  memset(out.dq, 0, CAV_CONTACT_READINGS * n * sizeof(double));
+  memset(out.dv, 0, CAV_CONTACT_READINGS * n * sizeof(double));
+  memset(out.dn, 0, CAV_CONTACT_READINGS * n * sizeof(double));
+  if (c->dist >= 0) return CAV_OK;
+  cav_contact_derivative d = {.dist_dq = out.dq};
+  cav_status status = cav_contact_derivatives(tr->model, s->state, (int)(c - s->state->contact), &d);
+  for (size_t j = 0; j < n; j++) out.dq[j] = -out.dq[j];
+  return status;
+}
+
+/// The readings of a contact: sqrt(f_n) times gap, slip and normal velocity; f_n.
+static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s, const cav_contact *c, rows out) {
+  int nv = tr->nv;
+  size_t n = (size_t)nv;
+  double *at = s->derivative;
+  cav_contact_derivative d = {.dist_dq = at,
+                              .velocity_dq = at + n,
+                              .velocity_dv_next = at + 7 * n,
+                              .impulse_dq = at + 13 * n,
+                              .impulse_dv = at + 19 * n,
+                              .impulse_dv_next = at + 25 * n};
+  cav_status status = cav_contact_derivatives(tr->model, s->state, (int)(c - s->state->contact), &d);
+  if (status != CAV_OK) return status;
+  double fraction = sqrt(fmax(c->impulse[0], 0) / (tr->h * tr->weight));
+  double half = c->impulse[0] > 0 ? 0.5 * fraction / c->impulse[0] : 0;
+  for (int k = 0; k < 4; k++) {
+    int row = k == 3 ? 0 : k, gap = k == 0, given = gap || row < c->dim;
+    double value = gap ? fmax(c->dist, 0) : given ? c->velocity_next[row] : 0, open = c->dist > 0;
+    for (int j = 0; j < nv; j++) {
+      int i = row * nv + j;
+      double by_q = gap ? open * d.dist_dq[j] : given ? d.velocity_dq[i] : 0;
+      double by_next = gap || !given ? 0 : d.velocity_dv_next[i];
+      out.dq[k * nv + j] = half * value * d.impulse_dq[j] + fraction * by_q;
+      out.dv[k * nv + j] = half * value * d.impulse_dv[j];
+      out.dn[k * nv + j] = half * value * d.impulse_dv_next[j] + fraction * by_next;
+    }
+  }
+  double unit = c->impulse[0] > 0 ? 1 / (tr->h * tr->weight) : 0;
+  for (int j = 0; j < nv; j++) {
+    out.dq[4 * nv + j] = unit * d.impulse_dq[j];
+    out.dv[4 * nv + j] = unit * d.impulse_dv[j];
+    out.dn[4 * nv + j] = unit * d.impulse_dv_next[j];
+  }
+  return CAV_OK;
+}
+
+/// Derivative of the rotation vector from a target to a quaternion by that of the quaternion [4*nv]; out [3*nv].
+static void rotation_rows(int nv, const double target[4], const double quat[4], const double *d_quat, double *out) {
+  double phi[3], J[9];
+  cav_rotation_between(target, quat, phi);
+  cav_rotation_jacobian_inverse(phi, J);
+  for (int j = 0; j < nv; j++) {
+    // rotation in the frame's own axes: twice the vector part of conj(quat) times the change
+    double w = d_quat[j], x = d_quat[nv + j], y = d_quat[2 * nv + j], z = d_quat[3 * nv + j];
+    double rotation[3] = {2 * (quat[0] * x - quat[1] * w - quat[2] * z + quat[3] * y),
+                          2 * (quat[0] * y + quat[1] * z - quat[2] * w - quat[3] * x),
+                          2 * (quat[0] * z - quat[1] * y + quat[2] * x - quat[3] * w)};
+    for (int k = 0; k < 3; k++)
+      out[k * nv + j] = J[3 * k] * rotation[0] + J[3 * k + 1] * rotation[1] + J[3 * k + 2] * rotation[2];
+  }
+}
+
+static cav_status sensor_rows(const cav_transcription *tr, const cav_scratch *s, const cav_term *term, int t,
+                              rows out) {
+  const cav_sensor *sensor = &term->sensor;
+  int nv = tr->nv, dim = sensor->dim;
+  double *dq = s->derivative, *dn = dq + (size_t)dim * nv, *rotation = dn + (size_t)dim * nv;
+  cav_status status = cav_sensor_derivatives(tr->model, s->state, sensor, dq, dn);
+  if (status != CAV_OK) return status;
+  if (dim == 4) {
+    double target[4], reading[4];
+    cav_term_target(term, cav_knot_time(tr, t), 4, target);
+    if (!term->target) target[0] = 1;
+    cav_sensor_read(tr->model, s->state, sensor, reading);
+    // a quaternion depends on q alone
+    rotation_rows(nv, target, reading, dq, rotation);
+    dq = rotation;
+  }
+  int first = term->component < 0 ? 0 : term->component, n = cav_term_dim(term) * nv;
+  for (int i = 0; i < n; i++) {
+    out.dq[i] = dq[first * nv + i] / term->scale;
+    out.dv[i] = 0;
+    out.dn[i] = dn[first * nv + i] / term->scale;
+  }
+  return CAV_OK;
+}
+
+/// Readings of one term alone, for differences.
+typedef struct single_term {
+  const cav_transcription *tr;
+  const cav_term *term;
+  int t;
+} single_term;
+
+static void read_term(const cav_model *model, const cav_state *state, void *context, double *value) {
+  const single_term *r = context;
+  (void)model;
+  cav_term_read(r->tr, state, r->term, r->t, value);
+}
+
+static int speaks(const cav_transcription *tr, const cav_term *term, int t) {
+  return term->quantity == CAV_QUANTITY_SENSOR && cav_term_weight(tr, term, t) != 0;
+}
+
+/// Sensors: those with derivatives first, as differences move the state.
+static cav_status sensors(const cav_transcription *tr, cav_scratch *s, int t, const double *q, const double *v,
+                          const double *v_next) {
+  int missing = 0, first = tr->nv + CAV_CONTACT_READINGS * tr->knot[t].ncontact;
+  for (int pass = 0; pass < 1 + (missing > 0); pass++) {
+    for (int i = 0, at = first; i < tr->problem->nterm; i++) {
+      const cav_term *term = &tr->problem->term[i];
+      if (!speaks(tr, term, t)) continue;
+      rows out = rows_at(tr, s, at);
+      at += cav_term_dim(term);
+      cav_status status = CAV_OK;
+      if (pass == 0) {
+        status = sensor_rows(tr, s, term, t, out);
+        missing += status == CAV_NOT_SUPPORTED;
+        if (status == CAV_NOT_SUPPORTED) status = CAV_OK;
+      } else if (cav_sensor_derivatives(tr->model, s->state, &term->sensor, NULL, NULL) == CAV_NOT_SUPPORTED) {
+        single_term single = {tr, term, t};
+        status = cav_readout_differentiate(tr->model, s->state, tr->difference, 0, q, v, v_next, read_term, &single,
+                                           cav_term_dim(term), NULL, out.dq, out.dv, out.dn);
+        s->differenced++;
+      }
+      if (status != CAV_OK) return status;
+    }
+  }
+  return CAV_OK;
+}
+
+/// All by differences.
+static cav_status difference(const cav_transcription *tr, cav_scratch *s, int t, const double *q, const double *v,
+                             const double *v_next) {
+  readings r = {tr, t, tr->knot[t].ncontact, s->key};
+  s->differenced++;
+  return cav_readout_differentiate(tr->model, s->state, tr->difference, 0, q, v, v_next, read_knot, &r,
+                                   tr->nv + tr->knot[t].nread, NULL, s->dq, s->dv, s->dn);
+}
+
+cav_status cav_readings_derivatives(const cav_transcription *tr, cav_scratch *s, int t, const double *q,
+                                    const double *v, const double *v_next) {
+  if (tr->derivative != CAV_DERIVATIVE_ANALYTIC) return difference(tr, s, t, q, v, v_next);
+  cav_status status = cav_derivatives(tr->model, s->state, s->dq, s->dv, s->dn);
+  if (status == CAV_NOT_SUPPORTED) return difference(tr, s, t, q, v, v_next);
+  for (int k = 0; k < tr->knot[t].ncontact && status == CAV_OK; k++) {
+    const cav_contact *c = find_contact(s->state, s->key + 2 * k);
+    rows out = rows_at(tr, s, tr->nv + CAV_CONTACT_READINGS * k);
+    if (!c) return CAV_INTERNAL;
+    status = tr->knot[t].moving[k] ? self_penetration_rows(tr, s, c, out) : contact_rows(tr, s, c, out);
+  }
+  if (status == CAV_NOT_SUPPORTED) return difference(tr, s, t, q, v, v_next);
+  return status == CAV_OK ? sensors(tr, s, t, q, v, v_next) : status;
+}

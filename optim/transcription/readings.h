@@ -1,0 +1,48 @@
+/// What is read off the dynamics at one knot, with derivatives: u, four numbers a contact, sensors. Private to optim/.
+#ifndef CAVORT_READINGS_H
+#define CAVORT_READINGS_H
+
+#include "transcription.h"
+
+/// Rows of nv that the derivatives of one contact or sensor take at most.
+enum { CAV_DERIVATIVE_ROWS = 31 };
+
+/// What one thread works with.
+typedef struct cav_scratch {
+  cav_state *state;
+  int room; ///< readings
+  double *value, *dq, *dv, *dn;
+  int *key; ///< [2*contacts] pair and feature of the contacts with rows
+  int key_room;
+  double *force_weight, *force_derivative; ///< [nv] of rows along single dofs
+  double *row;                             ///< [3nv]
+  int *column;                             ///< [nv]
+  double *tangent;                         ///< [nv]
+  double *posture;                         ///< [nq]
+  double *force_step;                      ///< [nv] what the step does to rows along single dofs
+  double *rate;                            ///< [2nv]
+  double *trace[2];                        ///< residuals of all rows of a knot at a shorter and a longer step
+  int trace_room[2];
+  double *slot[2]; ///< [slot_room] values of its constraint rows there
+  int slot_room;
+  int short_of_memory; ///< 1: trace could not grow
+  double *derivative;  ///< [CAV_DERIVATIVE_ROWS*nv] derivatives of one contact or sensor
+  int differenced;     ///< calls in which differences stood in for analytic derivatives
+  double seconds;
+} cav_scratch;
+
+/// Lists the contacts that carry load at the state and makes room for all readings of knot t; 0 if memory runs out.
+int cav_readings_list(cav_transcription *transcription, cav_scratch *scratch, int t);
+
+/// trace[which][i] := value; sets short_of_memory if there is no room.
+void cav_scratch_note(cav_scratch *scratch, int which, int i, double value);
+
+/// Readings at the state's last evaluation: scratch->value [nv + nread].
+void cav_readings_values(const cav_transcription *transcription, cav_scratch *scratch, int t);
+
+/// Their derivatives by the transcription's method, scratch->dq, dv, dn [(nv + nread)*nv]. The state holds the point
+/// (q, v, v_next) and is left there.
+cav_status cav_readings_derivatives(const cav_transcription *transcription, cav_scratch *scratch, int t,
+                                    const double *q, const double *v, const double *v_next);
+
+#endif

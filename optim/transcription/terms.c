@@ -1,0 +1,108 @@
+/// What a term measures at a knot: its window, its dofs, its target, and the reading of a sensor against it. The sums over
+/// dofs and contacts, which know derivatives, are in transcription.c.
+#include <math.h>
+#include <string.h>
+
+#include "transcription.h"
+
+/// Share of a step by which a window may miss a knot and still hold it.
+static const double near_knot = 1e-6;
+
+/// Whether what a term measures needs the forces of a knot.
+static int reads_force(const cav_term *term) {
+  if (term->quantity == CAV_QUANTITY_SENSOR)
+    return cav_sensor_rule_of(term->sensor.type)->stage == CAV_READS_ACCELERATION;
+  return term->quantity != CAV_QUANTITY_CONFIGURATION && term->quantity != CAV_QUANTITY_VELOCITY;
+}
+
+/// Whether a term measures an acceleration or a force at a last knot that nothing leaves.
+static int is_unforced(const cav_transcription *tr, const cav_term *term, int t) {
+  if (tr->knot[t].has_force) return 0;
+  if (term->quantity == CAV_QUANTITY_ACCELERATION) return 1;
+  if (term->quantity != CAV_QUANTITY_SENSOR) return 0;
+  return cav_sensor_rule_of(term->sensor.type)->stage == CAV_READS_ACCELERATION;
+}
+
+double cav_knot_time(const cav_transcription *tr, int t) { return t * tr->problem->timestep; }
+
+/// Whether a term speaks at a knot; its weight there (time step of an integral, or 1 at a single knot).
+double cav_term_weight(const cav_transcription *tr, const cav_term *term, int t) {
+  if (is_unforced(tr, term, t)) return 0;
+  double h = tr->problem->timestep, end = (tr->nknot - 1) * h, to = fmin(term->to < 0 ? end : term->to, end);
+  double from = fmin(term->from < 0 ? end : term->from, end);
+  int first = (int)ceil(from / h - near_knot), last = (int)floor(to / h + near_knot);
+  // one instant, or a window between two knots: the knot nearest to its middle
+  if (to - from < 1e-9 || first > last) return t == (int)lround((from + to) / (2 * h)) ? 1 : 0;
+  // both ends of a cycle are one knot: costs count it once, at its end, or where its forces are
+  if (tr->periodicity && t == 0 && first == 0 && last == tr->nknot - 1 && term->use == CAV_USE_COST &&
+      !reads_force(term))
+    return 0;
+  return t >= first && t <= last ? tr->h : 0;
+}
+
+/// Readings of a term: none but for sensors.
+int cav_term_dim(const cav_term *term) {
+  if (term->quantity != CAV_QUANTITY_SENSOR) return 0;
+  if (term->component >= 0) return 1;
+  return term->sensor.dim == 4 ? 3 : term->sensor.dim;
+}
+
+int cav_dof_selected(const cav_transcription *tr, const cav_term *term, int d) {
+  const cav_joint *joint = &tr->model->joint[tr->model->dof[d].joint];
+  int free_joint = joint->type == CAV_JOINT_FREE;
+  switch (term->dofs) {
+    case CAV_DOFS_ALL:
+      return 1;
+    case CAV_DOFS_ROOT_LINEAR:
+      return free_joint && d < joint->dof + 3;
+    case CAV_DOFS_ROOT_ANGULAR:
+      return free_joint && d >= joint->dof + 3;
+    case CAV_DOFS_JOINTS:
+      return !free_joint;
+    case CAV_DOFS_ONE:
+      return tr->model->dof[d].joint == term->joint;
+  }
+  return 0;
+}
+
+/// Target of a term at a knot: constant, waypoints, or zeros.
+void cav_term_target(const cav_term *term, double time, int dim, double *target) {
+  if (!term->target) {
+    memset(target, 0, (size_t)dim * sizeof(double));
+  } else if (term->nwaypoint == 0) {
+    memcpy(target, term->target, (size_t)dim * sizeof(double));
+  } else {
+    int n = term->nwaypoint, i = 0;
+    while (i < n - 2 && time > term->waypoint_time[i + 1]) i++;
+    int j = i + 1 < n ? i + 1 : i;
+    double span = term->waypoint_time[j] - term->waypoint_time[i];
+    double s = span > 0 ? fmin(fmax((time - term->waypoint_time[i]) / span, 0), 1) : 0;
+    for (int k = 0; k < dim; k++) target[k] = (1 - s) * term->target[i * dim + k] + s * term->target[j * dim + k];
+  }
+}
+
+/// Rotation vector that takes a to b, in a's axes.
+void cav_rotation_between(const double a[4], const double b[4], double phi[3]) {
+  double w = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+  double x = a[0] * b[1] - a[1] * b[0] - a[2] * b[3] + a[3] * b[2];
+  double y = a[0] * b[2] + a[1] * b[3] - a[2] * b[0] - a[3] * b[1];
+  double z = a[0] * b[3] - a[1] * b[2] + a[2] * b[1] - a[3] * b[0];
+  double s = sqrt(x * x + y * y + z * z), sign = w < 0 ? -1 : 1;
+  double gain = s > 1e-12 ? 2 * atan2(s, fabs(w)) / s * sign : 2 * sign;
+  phi[0] = gain * x, phi[1] = gain * y, phi[2] = gain * z;
+}
+
+/// Value minus target of a sensor term, over its scale.
+void cav_term_read(const cav_transcription *tr, const cav_state *state, const cav_term *term, int t, double *y) {
+  double reading[16], target[16];
+  cav_sensor_read(tr->model, state, &term->sensor, reading);
+  cav_term_target(term, cav_knot_time(tr, t), term->sensor.dim, target);
+  if (term->sensor.dim == 4) {
+    double phi[3];
+    if (!term->target) target[0] = 1;
+    cav_rotation_between(target, reading, phi);
+    for (int k = 0; k < 3; k++) reading[k] = phi[k], target[k] = 0;
+  }
+  int first = term->component < 0 ? 0 : term->component, n = cav_term_dim(term);
+  for (int k = 0; k < n; k++) y[k] = (reading[first + k] - target[first + k]) / term->scale;
+}

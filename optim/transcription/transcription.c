@@ -1,0 +1,612 @@
+/// Rows of a problem over its knots and their Gauss-Newton normal equations. Every knot t sees q_{t-1}, q_t, q_{t+1} through
+/// v_t, v_{t+1} and the inverse dynamics u_t (optimisation.md, 1), so its part of the Hessian is one dense block of three
+/// neighbours and knots are evaluated in any order, by any number of threads, with the same result.
+///
+/// Derivatives of u, contacts and sensors come from readings.c; those of v, accelerations, postures and ranges are
+/// exact. Constraint rows enter the merit by an augmented Lagrangian of two-sided rows: with z~ = z + multiplier/rho and
+/// e = z~ - clamp(z~), the row costs rho/2 e^2 and its next multiplier is rho e (Powell, Hestenes, Rockafellar).
+#include "knot.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+/// BLAS: C := alpha A A' + beta C for symmetric C.
+extern void dsyrk_(const char *uplo, const char *trans, const int *n, const int *k, const double *alpha,
+                   const double *A, const int *lda, const double *beta, double *C, const int *ldc);
+
+static double now(void) {
+  struct timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+// ---------------------------------------------------------------- rotations
+
+void cav_rotation_jacobian(const double phi[3], double J[9]) {
+  double a2 = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2], a = sqrt(a2);
+  double s = a < 1e-4 ? 0.5 - a2 / 24 : (1 - cos(a)) / a2;
+  double c = a < 1e-4 ? 1.0 / 6 - a2 / 120 : (a - sin(a)) / (a2 * a);
+  // I - s [phi] + c [phi]^2
+  double x = phi[0], y = phi[1], z = phi[2];
+  double square[9] = {x * x - a2, x * y, x * z, x * y, y * y - a2, y * z, x * z, y * z, z * z - a2};
+  double skew[9] = {0, -z, y, z, 0, -x, -y, x, 0};
+  for (int i = 0; i < 9; i++) J[i] = (i % 4 == 0) - s * skew[i] + c * square[i];
+}
+
+void cav_rotation_jacobian_inverse(const double phi[3], double J[9]) {
+  double a2 = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2], a = sqrt(a2);
+  double c = a < 1e-3 ? 1.0 / 12 + a2 / 720 : 1 / a2 - (1 + cos(a)) / (2 * a * sin(a));
+  // I + [phi]/2 + c [phi]^2
+  double x = phi[0], y = phi[1], z = phi[2];
+  double square[9] = {x * x - a2, x * y, x * z, x * y, y * y - a2, y * z, x * z, y * z, z * z - a2};
+  double skew[9] = {0, -z, y, z, 0, -x, -y, x, 0};
+  for (int i = 0; i < 9; i++) J[i] = (i % 4 == 0) + 0.5 * skew[i] + c * square[i];
+}
+
+// ---------------------------------------------------------------- construction
+
+static int joint_is_rotation(cav_joint_type type) { return type == CAV_JOINT_FREE || type == CAV_JOINT_BALL; }
+
+static int list_rotations(cav_transcription *tr) {
+  const cav_model *m = tr->model;
+  tr->rotation_of = malloc((size_t)m->nv * sizeof(int));
+  tr->rotation_dof = malloc((size_t)(m->njoint + 1) * sizeof(int));
+  if (!tr->rotation_of || !tr->rotation_dof) return 0;
+  for (int d = 0; d < m->nv; d++) tr->rotation_of[d] = -1;
+  for (int j = 0; j < m->njoint; j++) {
+    if (!joint_is_rotation(m->joint[j].type)) continue;
+    int dof = m->joint[j].dof + (m->joint[j].type == CAV_JOINT_FREE ? 3 : 0);
+    for (int k = 0; k < 3; k++) tr->rotation_of[dof + k] = tr->nrotation;
+    tr->rotation_dof[tr->nrotation++] = dof;
+  }
+  return 1;
+}
+
+static int dof_is_linear(const cav_model *m, int d) {
+  const cav_joint *joint = &m->joint[m->dof[d].joint];
+  return joint->type == CAV_JOINT_SLIDE || (joint->type == CAV_JOINT_FREE && d < joint->dof + 3);
+}
+
+static int force_row_set(cav_force_row *row, int nv, const double *dense, double scale) {
+  int n = 0;
+  double largest = 0;
+  for (int d = 0; d < nv; d++) largest = fmax(largest, fabs(dense[d]));
+  for (int d = 0; d < nv; d++) n += fabs(dense[d]) > 1e-12 * largest;
+  row->dof = malloc((size_t)(n + 1) * sizeof(int));
+  row->coef = malloc((size_t)(n + 1) * sizeof(double));
+  if (!row->dof || !row->coef) return 0;
+  for (int d = 0; d < nv; d++) {
+    if (fabs(dense[d]) <= 1e-12 * largest) continue;
+    row->dof[row->n] = d;
+    row->coef[row->n++] = dense[d] * scale;
+  }
+  return 1;
+}
+
+/// Linear forms of u: an orthonormal basis of what actuators cannot give, and the least-norm actuator efforts.
+static int list_force_rows(cav_transcription *tr) {
+  const cav_model *m = tr->model;
+  int nv = m->nv, nu = m->nu, ok = 0;
+  double *unit = calloc((size_t)nv, sizeof(double)), *basis = calloc((size_t)nv * nv, sizeof(double));
+  double *residual = malloc((size_t)nv * sizeof(double)), *control = calloc((size_t)nv * (nu + 1), sizeof(double));
+  double *effort = malloc((size_t)nv * sizeof(double));
+  tr->unactuated = calloc((size_t)nv, sizeof *tr->unactuated);
+  tr->effort = calloc((size_t)nu + 1, sizeof *tr->effort);
+  tr->effort_range = malloc((size_t)(nu + 1) * sizeof *tr->effort_range);
+  tr->servo = calloc((size_t)nu + 1, sizeof *tr->servo);
+  if (!unit || !basis || !residual || !control || !effort || !tr->unactuated || !tr->effort || !tr->effort_range ||
+      !tr->servo)
+    goto end;
+
+  // project unit forces; orthonormalise what is left, twice for rounding
+  for (int d = 0; d < nv; d++) {
+    unit[d] = 1;
+    cav_actuation(m, tr->scratch[0].state, unit, residual, control + (size_t)d * nu);
+    unit[d] = 0;
+    for (int pass = 0; pass < 2; pass++) {
+      for (int k = 0; k < tr->nresidual; k++) {
+        double dot = 0;
+        for (int i = 0; i < nv; i++) dot += basis[k * nv + i] * residual[i];
+        for (int i = 0; i < nv; i++) residual[i] -= dot * basis[k * nv + i];
+      }
+    }
+    double norm = 0;
+    for (int i = 0; i < nv; i++) norm += residual[i] * residual[i];
+    if ((norm = sqrt(norm)) < 1e-7) continue;
+    double unit_force = tr->weight * (dof_is_linear(m, d) ? 1 : CAV_MOMENT_ARM),
+           *direction = basis + tr->nresidual * nv;
+    for (int i = 0; i < nv; i++) direction[i] = residual[i] / norm;
+    if (!force_row_set(&tr->unactuated[tr->nresidual++], nv, direction, 1 / unit_force)) goto end;
+  }
+
+  // efforts: control over its limit, or plain force where there is none
+  for (int a = 0; a < nu; a++) {
+    double range[2], per_effort = 1;
+    cav_actuator_effort_range(m, a, range);
+    if (cav_servo_bounds(m, a) && !cav_servo_set(m, a, &tr->servo[a], &per_effort, range)) goto end;
+    double lower = range[0], upper = range[1];
+    double limit = fmax(isfinite(lower) ? fabs(lower) : 0, isfinite(upper) ? fabs(upper) : 0);
+    double scale = limit > 0 ? 1 / limit : 1;
+    tr->effort_range[a][0] = lower * scale * tr->problem->effort_limit;
+    tr->effort_range[a][1] = upper * scale * tr->problem->effort_limit;
+    for (int d = 0; d < nv; d++) effort[d] = control[(size_t)d * nu + a];
+    if (!force_row_set(&tr->effort[a], nv, effort, per_effort * scale)) goto end;
+  }
+  ok = 1;
+end:
+  free(unit), free(basis), free(residual), free(control), free(effort);
+  return ok;
+}
+
+/// Constraint rows that a hard term gives at a knot.
+static int term_slots(const cav_transcription *tr, const cav_term *term, int t) {
+  if (term->use == CAV_USE_COST || cav_term_weight(tr, term, t) == 0) return 0;
+  if (term->quantity == CAV_QUANTITY_SENSOR) return cav_term_dim(term);
+  int n = 0;
+  for (int d = 0; d < tr->nv; d++) n += cav_dof_selected(tr, term, d);
+  return n;
+}
+
+static cav_slot_layout layout_of(const cav_transcription *tr, int t) {
+  const cav_model *m = tr->model;
+  cav_slot_layout at = {0};
+  int has_force = tr->knot[t].has_force;
+  at.effort = has_force ? tr->nresidual : 0;
+  at.joint = at.effort + (has_force ? m->nu : 0);
+  at.tendon = at.joint;
+  if (t > 0)
+    for (int j = 0; j < m->njoint; j++) at.tendon += m->joint[j].limited;
+  at.term = at.tendon;
+  if (t > 0)
+    for (int k = 0; k < m->ntendon; k++) at.term += m->tendon[k].limited;
+  at.count = at.term;
+  for (int i = 0; i < tr->problem->nterm; i++) at.count += term_slots(tr, &tr->problem->term[i], t);
+  return at;
+}
+
+static void *room(int *ok, size_t n, size_t size) {
+  void *p = calloc(n ? n : 1, size);
+  if (!p) *ok = 0;
+  return p;
+}
+
+static int knot_new(cav_transcription *tr, int t) {
+  cav_knot *knot = &tr->knot[t];
+  int ok = 1;
+  size_t n = (size_t)tr->nv;
+  knot->time = t * tr->h;
+  knot->has_force = t < tr->nknot - 1 || (tr->problem->close_at_rest && !tr->periodicity);
+  knot->layout = layout_of(tr, t);
+  knot->slot = room(&ok, (size_t)knot->layout.count, sizeof *knot->slot);
+  knot->u = room(&ok, n, sizeof(double));
+  knot->du = room(&ok, 3 * n * n, sizeof(double));
+  knot->hessian = room(&ok, 9 * n * n, sizeof(double));
+  knot->gradient = room(&ok, 3 * n, sizeof(double));
+  knot->step_row = room(&ok, 3 * n, sizeof(double));
+  knot->slot_step = room(&ok, (size_t)knot->layout.count, sizeof(double));
+  knot->rotation = room(&ok, CAV_ROTATION_SIZE * (size_t)tr->nrotation, sizeof(double));
+  return ok;
+}
+
+static int scratch_new(cav_transcription *tr, cav_scratch *s) {
+  int ok = 1;
+  size_t n = (size_t)tr->nv;
+  s->state = cav_state_new(tr->model);
+  s->force_weight = room(&ok, n, sizeof(double));
+  s->force_derivative = room(&ok, n, sizeof(double));
+  s->row = room(&ok, 3 * n, sizeof(double));
+  s->derivative = room(&ok, CAV_DERIVATIVE_ROWS * n, sizeof(double));
+  s->column = room(&ok, n, sizeof(int));
+  s->tangent = room(&ok, n, sizeof(double));
+  s->posture = room(&ok, (size_t)tr->model->nq, sizeof(double));
+  s->force_step = room(&ok, n, sizeof(double));
+  s->rate = room(&ok, 2 * n, sizeof(double));
+  return ok && s->state;
+}
+
+cav_transcription *cav_transcription_new(const cav_problem *problem, int threads, cav_error *error) {
+  if (cav_actuators_plannable(problem->model, error) != CAV_OK) return NULL;
+  cav_transcription *tr = calloc(1, sizeof *tr);
+  if (!tr) goto memory;
+  tr->problem = problem;
+  tr->model = problem->model;
+  tr->nv = problem->model->nv;
+  tr->h = problem->timestep;
+  tr->nknot = (int)lround(problem->duration / problem->timestep) + 1;
+  const double *g = problem->model->gravity;
+  tr->weight = problem->model->mass * sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+  if (!(tr->weight > 0)) tr->weight = problem->model->mass > 0 ? problem->model->mass : 1;
+  tr->options = problem->model->options;
+  tr->options.timestep = tr->h;
+  tr->options.order = problem->order;
+  tr->derivative = CAV_DERIVATIVE_ANALYTIC;
+  tr->pool = cav_parallel_new(threads);
+  if (problem->cycle.on && !(tr->periodicity = cav_periodicity_new(problem, error))) {
+    cav_transcription_free(tr);
+    return NULL;
+  }
+  tr->free_step = problem->duration_most > 0;
+  if (!tr->pool || !list_rotations(tr)) goto memory;
+  tr->before = calloc(2 * (size_t)tr->nv + 1, sizeof(double));
+  tr->rotation_after = calloc(CAV_ROTATION_SIZE * (size_t)tr->nrotation + 1, sizeof(double));
+  if (!tr->before || !tr->rotation_after) goto memory;
+  tr->after = tr->before + tr->nv;
+  tr->scratch = calloc((size_t)cav_parallel_size(tr->pool), sizeof *tr->scratch);
+  if (!tr->scratch) goto memory;
+  for (int i = 0; i < cav_parallel_size(tr->pool); i++)
+    if (!scratch_new(tr, &tr->scratch[i])) goto memory;
+  if (!list_force_rows(tr)) goto memory;
+  tr->knot = calloc((size_t)tr->nknot, sizeof *tr->knot);
+  if (!tr->knot) goto memory;
+  for (int t = 0; t < tr->nknot; t++)
+    if (!knot_new(tr, t)) goto memory;
+  return tr;
+memory:
+  if (error) *error = (cav_error){CAV_NO_MEMORY, 0, "not enough memory for this problem"};
+  cav_transcription_free(tr);
+  return NULL;
+}
+
+void cav_transcription_free(cav_transcription *tr) {
+  if (!tr) return;
+  for (int t = 0; tr->knot && t < tr->nknot; t++) {
+    cav_knot *k = &tr->knot[t];
+    free(k->slot), free(k->u), free(k->du), free(k->hessian), free(k->gradient), free(k->rotation), free(k->y),
+        free(k->dy), free(k->slot_row), free(k->slot_step), free(k->step_row);
+    free(k->dense), free(k->rest), free(k->moving);
+  }
+  for (int i = 0; tr->scratch && i < cav_parallel_size(tr->pool); i++) {
+    cav_scratch *s = &tr->scratch[i];
+    cav_state_free(s->state);
+    free(s->value), free(s->dq), free(s->dv), free(s->dn), free(s->key), free(s->derivative);
+    free(s->force_weight), free(s->force_derivative), free(s->row), free(s->column), free(s->tangent), free(s->posture);
+    free(s->force_step), free(s->rate), free(s->trace[0]), free(s->trace[1]), free(s->slot[0]), free(s->slot[1]);
+  }
+  for (int k = 0; k < tr->nresidual; k++) free(tr->unactuated[k].dof), free(tr->unactuated[k].coef);
+  for (int a = 0; tr->effort && a < tr->model->nu; a++) free(tr->effort[a].dof), free(tr->effort[a].coef);
+  for (int a = 0; tr->servo && a < tr->model->nu; a++) cav_servo_free(&tr->servo[a]);
+  free(tr->servo);
+  free(tr->unactuated), free(tr->effort), free(tr->effort_range), free(tr->rotation_dof), free(tr->rotation_of);
+  free(tr->knot), free(tr->scratch), free(tr->before), free(tr->rotation_after);
+  cav_periodicity_free(tr->periodicity);
+  cav_parallel_free(tr->pool);
+  free(tr);
+}
+
+// ---------------------------------------------------------------- chaining to knots
+
+int cav_transcription_unknowns(const cav_transcription *tr) { return (tr->nknot - 1) * tr->nv + tr->free_step; }
+
+int cav_transcription_block(const cav_transcription *tr, int t, int c) {
+  int blocks = tr->nknot - 1, block = t - 2 + c;
+  if (tr->periodicity) return (block + blocks) % blocks;
+  return block >= 0 && block < blocks ? block : -1;
+}
+
+/// Velocity that reaches knot t, and the one that leaves it: that of the next knot, or what closes the motion.
+static const double *velocity_at(const cav_transcription *tr, const cav_trajectory *at, int t) {
+  return t == 0 && tr->periodicity ? tr->before : at->v + (size_t)t * tr->nv;
+}
+
+static const double *velocity_after(const cav_transcription *tr, const cav_trajectory *at, int t) {
+  return t + 1 < tr->nknot ? at->v + (size_t)(t + 1) * tr->nv : tr->after;
+}
+
+/// out += scale * row * (Jacobian of a step): side 0 by its end (Jr^-1), side 1 by its start (Jl^-1).
+static void times_rotation(const cav_transcription *tr, const double *row, const double *rotation, int side,
+                           double scale, double *out) {
+  for (int d = 0; d < tr->nv; d++)
+    if (tr->rotation_of[d] < 0) out[d] += scale * row[d];
+  for (int k = 0; k < tr->nrotation; k++) {
+    const double *J = rotation + CAV_ROTATION_SIZE * k + 9 * side, *x = row + tr->rotation_dof[k];
+    double *y = out + tr->rotation_dof[k];
+    for (int c = 0; c < 3; c++) y[c] += scale * (x[0] * J[c] + x[1] * J[3 + c] + x[2] * J[6 + c]);
+  }
+}
+
+/// Chains derivatives with respect to (q_t, v_t, v_{t+1}) to the three neighbouring knots.
+static void chain(const cav_transcription *tr, int t, int n, const double *dq, const double *dv, const double *dn,
+                  double *out) {
+  int nv = tr->nv, last = tr->nknot - 1;
+  const double *now_rotation = tr->knot[t].rotation,
+               *next_rotation = t < last ? tr->knot[t + 1].rotation : tr->rotation_after;
+  int here = cav_knot_moves(tr, t), before = cav_knot_moves(tr, t - 1), next = cav_knot_moves(tr, t + 1);
+  double inverse = 1 / tr->h;
+  if (n == 0) return;
+  memset(out, 0, (size_t)n * 3 * nv * sizeof(double));
+  for (int i = 0; i < n; i++, dq += nv, dv += nv, dn += nv, out += 3 * nv) {
+    if (here) {
+      for (int d = 0; d < nv; d++) out[nv + d] = dq[d];
+      times_rotation(tr, dv, now_rotation, 0, inverse, out + nv);
+      if (before) times_rotation(tr, dv, now_rotation, 1, -inverse, out);
+    }
+    if (next) {
+      times_rotation(tr, dn, next_rotation, 0, inverse, out + 2 * nv);
+      if (here) times_rotation(tr, dn, next_rotation, 1, -inverse, out + nv);
+    } else if (!tr->problem->close_at_rest) {
+      times_rotation(tr, dn, now_rotation, 0, inverse, out + nv);
+      if (before) times_rotation(tr, dn, now_rotation, 1, -inverse, out);
+    }
+  }
+}
+
+// ---------------------------------------------------------------- evaluation
+
+/// Joins the dense rows of all knots into their Hessians. One thread only: not every BLAS may be called by two at once.
+static void join_rows(cav_transcription *tr) {
+  int width = 3 * tr->nv;
+  double one = 1;
+  for (int t = 0; t < tr->nknot; t++) {
+    cav_knot *knot = &tr->knot[t];
+    if (knot->ndense) dsyrk_("U", "N", &width, &knot->ndense, &one, knot->dense, &width, &one, knot->hessian, &width);
+  }
+}
+
+typedef struct pass {
+  cav_transcription *tr;
+  cav_trajectory *at;
+  int jacobian;
+  cav_status *status; ///< [nknot]
+} pass;
+
+/// Residuals of all rows at a step shorter (1) or longer (2) by a small share, with the knots where they are.
+static cav_status shift_step(const cav_transcription *tr, cav_scratch *s, int t, int shifted, const double *q,
+                             const double *v, const double *v_next) {
+  cav_transcription near = *tr;
+  cav_knot *knot = &tr->knot[t];
+  double fraction = exp(shifted == 1 ? -CAV_STEP_FRACTION : CAV_STEP_FRACTION), *v_here = s->rate,
+         *v_then = s->rate + tr->nv;
+  near.h *= fraction;
+  for (int d = 0; d < tr->nv; d++) {
+    v_here[d] = v[d] / (t > 0 || tr->periodicity ? fraction : 1); // that of a given start stays
+    v_then[d] = v_next[d] / fraction;
+  }
+  s->state->options.timestep *= fraction;
+  s->state->options.time_constant *= fraction;
+  cav_status status = cav_inverse(tr->model, s->state, q, v_here, v_then, knot->u);
+  if (status == CAV_OK) cav_readings_values(&near, s, t);
+  s->state->options = tr->options;
+  if (status != CAV_OK) return status;
+  if (knot->nread) memcpy(knot->y, s->value + tr->nv, (size_t)knot->nread * sizeof(double));
+  cav_sum a = {.tr = &near, .s = s, .knot = knot, .t = t, .shifted = shifted};
+  cav_knot_sum(&a, q, v_here, v_then);
+  return s->short_of_memory ? CAV_NO_MEMORY : CAV_OK;
+}
+
+/// Turns rows [n*3nv] whose columns are of the knots beside into rows over the unknowns, across the seam of a cycle.
+static void periodicity_rows(const cav_transcription *tr, cav_scratch *s, int t, int n, double *row) {
+  size_t nv = (size_t)tr->nv;
+  for (int i = 0; i < n; i++, row += 3 * nv) {
+    for (int c = 0; c < 3; c++) {
+      int knot = t + c - 1, way = knot < 1 ? 1 : knot >= tr->nknot ? -1 : 0;
+      if (!way) continue;
+      cav_periodicity_tangent(tr->periodicity, way, row + (size_t)c * nv, s->rate);
+      memcpy(row + (size_t)c * nv, s->rate, nv * sizeof(double));
+    }
+  }
+}
+
+/// The same of all of a knot's sums.
+static void periodicity_knot(const cav_transcription *tr, cav_scratch *s, int t) {
+  cav_knot *knot = &tr->knot[t];
+  int width = 3 * tr->nv;
+  double *H = knot->hessian;
+  periodicity_rows(tr, s, t, knot->ndense, knot->dense);
+  periodicity_rows(tr, s, t, 1, knot->gradient);
+  periodicity_rows(tr, s, t, 1, knot->step_row);
+  if (tr->keep_rows) periodicity_rows(tr, s, t, knot->layout.count, knot->slot_row);
+  // the Hessian from both sides
+  for (int side = 0; side < 2; side++) {
+    for (int i = 0; i < width; i++)
+      for (int j = i + 1; j < width; j++) {
+        double x = H[i * width + j];
+        if (side == 0) H[i * width + j] = H[j * width + i];
+        if (side == 1) H[i * width + j] = H[j * width + i], H[j * width + i] = x;
+      }
+    periodicity_rows(tr, s, t, width, H);
+  }
+  for (int i = 0; i < width; i++)
+    for (int j = i + 1; j < width; j++) H[i * width + j] = 0;
+}
+
+static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
+  cav_transcription *tr = p->tr;
+  cav_knot *knot = &tr->knot[t];
+  int nv = tr->nv;
+  const double *q = p->at->q + (size_t)t * p->at->nq, *v = velocity_at(tr, p->at, t);
+  const double *v_next = velocity_after(tr, p->at, t);
+  s->state->options = tr->options;
+
+  // dynamics, first beside the step where that is an unknown
+  double start = now();
+  cav_status status = cav_inverse(tr->model, s->state, q, v, v_next, knot->u);
+  if (status != CAV_OK) return status;
+  if (!cav_readings_list(tr, s, t)) return CAV_NO_MEMORY;
+  if (p->jacobian && tr->free_step) {
+    status = shift_step(tr, s, t, 1, q, v, v_next);
+    if (status == CAV_OK) status = shift_step(tr, s, t, 2, q, v, v_next);
+    if (status == CAV_OK) status = cav_inverse(tr->model, s->state, q, v, v_next, knot->u);
+    if (status != CAV_OK) return status;
+  }
+  cav_readings_values(tr, s, t);
+  if (knot->nread) memcpy(knot->y, s->value + nv, (size_t)knot->nread * sizeof(double));
+  memcpy(p->at->u + (size_t)t * nv, knot->u, (size_t)nv * sizeof(double));
+  if (p->jacobian) {
+    status = cav_readings_derivatives(tr, s, t, q, v, v_next);
+    if (status != CAV_OK) return status;
+    chain(tr, t, nv, s->dq, s->dv, s->dn, knot->du);
+    chain(tr, t, knot->nread, s->dq + (size_t)nv * nv, s->dv + (size_t)nv * nv, s->dn + (size_t)nv * nv, knot->dy);
+  }
+  s->seconds += now() - start;
+
+  // rows
+  cav_sum a = {.tr = tr, .s = s, .knot = knot, .t = t, .jacobian = p->jacobian};
+  cav_knot_sum(&a, q, v, v_next);
+  if (p->jacobian && tr->periodicity && (t < 2 || t == tr->nknot - 1)) periodicity_knot(tr, s, t);
+  return isfinite(knot->merit) ? CAV_OK : CAV_NOT_FINITE;
+}
+
+static void evaluate_item(void *context, int t, int member) {
+  const pass *p = context;
+  p->status[t] = evaluate_knot(p, &p->tr->scratch[member], t);
+}
+
+/// Rotation Jacobians of one step with velocity v.
+static void prepare_rotation(const cav_transcription *tr, const double *v, double *rotation) {
+  for (int k = 0; k < tr->nrotation; k++) {
+    double *J = rotation + CAV_ROTATION_SIZE * k;
+    for (int c = 0; c < 3; c++) J[18 + c] = tr->h * v[tr->rotation_dof[k] + c];
+    cav_rotation_jacobian_inverse(J + 18, J);
+    for (int r = 0; r < 3; r++)
+      for (int c = 0; c < 3; c++) J[9 + 3 * r + c] = J[3 * c + r];
+  }
+}
+
+static void prepare_rotations(cav_transcription *tr, const cav_trajectory *at) {
+  for (int t = tr->periodicity ? 0 : 1; t < tr->nknot; t++)
+    prepare_rotation(tr, velocity_at(tr, at, t), tr->knot[t].rotation);
+  if (tr->periodicity) prepare_rotation(tr, tr->after, tr->rotation_after);
+}
+
+/// The step of the trajectory, and the velocities at its ends.
+static void prepare_ends(cav_transcription *tr, const cav_trajectory *at) {
+  const double *first = at->v + tr->nv, *last = at->v + (size_t)(tr->nknot - 1) * tr->nv;
+  if (at->timestep != tr->h) tr->options.time_constant *= at->timestep / tr->h;
+  tr->h = tr->options.timestep = at->timestep;
+  memset(tr->after, 0, (size_t)tr->nv * sizeof(double));
+  if (tr->periodicity) {
+    cav_periodicity_tangent(tr->periodicity, -1, last, tr->before);
+    cav_periodicity_tangent(tr->periodicity, 1, first, tr->after);
+  } else if (!tr->problem->close_at_rest) {
+    memcpy(tr->after, last, (size_t)tr->nv * sizeof(double));
+  }
+}
+
+static cav_status evaluate(cav_transcription *tr, cav_trajectory *at, int jacobian) {
+  double start = now(), dynamics = 0;
+  int members = cav_parallel_size(tr->pool);
+  cav_status *status = calloc((size_t)tr->nknot, sizeof *status), result = CAV_OK;
+  if (!status) return CAV_NO_MEMORY;
+  prepare_ends(tr, at);
+  if (jacobian) prepare_rotations(tr, at);
+  for (int i = 0; i < members; i++) tr->scratch[i].seconds = 0;
+  pass p = {tr, at, jacobian, status};
+  cav_parallel_for(tr->pool, tr->nknot, evaluate_item, &p);
+  for (int t = 0; t < tr->nknot && result == CAV_OK; t++) result = status[t];
+  if (jacobian && result == CAV_OK) join_rows(tr);
+  for (int i = 0; i < members; i++) dynamics += tr->scratch[i].seconds / members;
+  tr->seconds_dynamics += dynamics;
+  tr->seconds_assembly += now() - start - dynamics;
+  free(status);
+  return result;
+}
+
+int cav_transcription_keep_rows(cav_transcription *tr) {
+  tr->keep_rows = 1;
+  for (int t = 0; t < tr->nknot; t++) {
+    cav_knot *knot = &tr->knot[t];
+    if (!knot->slot_row) knot->slot_row = calloc((size_t)knot->layout.count * 3 * tr->nv + 1, sizeof(double));
+    if (!knot->slot_row) return 0;
+  }
+  return 1;
+}
+
+cav_status cav_transcription_values(cav_transcription *tr, cav_trajectory *at) { return evaluate(tr, at, 0); }
+cav_status cav_transcription_linearise(cav_transcription *tr, cav_trajectory *at) { return evaluate(tr, at, 1); }
+
+// ---------------------------------------------------------------- sums over knots
+
+double cav_transcription_cost(const cav_transcription *tr) {
+  double sum_cost = 0;
+  for (int t = 0; t < tr->nknot; t++) sum_cost += tr->knot[t].cost;
+  return sum_cost;
+}
+
+double cav_transcription_merit(const cav_transcription *tr) {
+  double sum_merit = 0;
+  for (int t = 0; t < tr->nknot; t++) sum_merit += tr->knot[t].merit;
+  return sum_merit;
+}
+
+static double excess(const cav_slot *slot) {
+  return fmax(fmax(slot->lower - slot->value, slot->value - slot->upper), 0);
+}
+
+double cav_transcription_unactuated(const cav_transcription *tr, int *where) {
+  double worst = 0;
+  if (where) *where = 0;
+  for (int t = 0; t < tr->nknot; t++) {
+    for (int i = 0; i < tr->knot[t].layout.effort; i++) {
+      if (fabs(tr->knot[t].slot[i].value) <= worst) continue;
+      worst = fabs(tr->knot[t].slot[i].value);
+      if (where) *where = t;
+    }
+  }
+  return worst;
+}
+
+double cav_transcription_violation(const cav_transcription *tr) {
+  double worst = 0;
+  for (int t = 0; t < tr->nknot; t++)
+    for (int i = tr->knot[t].layout.effort; i < tr->knot[t].layout.count; i++)
+      worst = fmax(worst, excess(&tr->knot[t].slot[i]));
+  return worst;
+}
+
+/// Weight that evaluate gave the row.
+static double slot_rho(const cav_transcription *tr, const cav_slot_layout *at, int i) {
+  if (i < at->effort) return tr->h * tr->penalty.unactuated;
+  if (i < at->joint) return tr->h * tr->penalty.effort;
+  if (i < at->term) return tr->h * tr->penalty.range;
+  return tr->penalty.term;
+}
+
+void cav_transcription_multipliers(cav_transcription *tr) {
+  for (int t = 0; t < tr->nknot; t++) {
+    for (int i = 0; i < tr->knot[t].layout.count; i++) {
+      cav_slot *slot = &tr->knot[t].slot[i];
+      double rho = slot_rho(tr, &tr->knot[t].layout, i), shifted = rho * slot->value + slot->multiplier;
+      slot->multiplier = shifted - fmin(fmax(shifted, rho * slot->lower), rho * slot->upper);
+    }
+  }
+}
+
+void cav_transcription_estimate_multipliers(cav_transcription *tr, const double *x) {
+  int nv = tr->nv;
+  for (int t = 0; t < tr->nknot; t++) {
+    for (int i = 0; i < tr->knot[t].layout.count; i++) {
+      cav_slot *slot = &tr->knot[t].slot[i];
+      double rho = slot_rho(tr, &tr->knot[t].layout, i), value = slot->value;
+      const double *row = tr->knot[t].slot_row + (size_t)i * 3 * (size_t)nv;
+      for (int c = 0; x && c < 3; c++) {
+        int block = cav_transcription_block(tr, t, c);
+        for (int d = 0; block >= 0 && d < nv; d++) value += row[c * nv + d] * x[block * nv + d];
+      }
+      if (x && tr->free_step) value += tr->knot[t].slot_step[i] * x[(tr->nknot - 1) * nv];
+      double shifted = rho * value + (x ? slot->multiplier : 0);
+      slot->final_multiplier = shifted - fmin(fmax(shifted, rho * slot->lower), rho * slot->upper);
+    }
+  }
+}
+
+void cav_transcription_move(const cav_transcription *tr, const cav_trajectory *from, const double *x,
+                            cav_trajectory *to) {
+  size_t nq = (size_t)from->nq, last = (size_t)tr->nknot - 1, nv = (size_t)tr->nv;
+  to->timestep = from->timestep;
+  if (tr->free_step) {
+    double least = tr->problem->duration_least / (double)last, most = tr->problem->duration_most / (double)last;
+    to->timestep = fmin(fmax(from->timestep * exp(x[last * nv]), least), most);
+  }
+  for (size_t t = 1; t <= last; t++) cav_integrate(tr->model, from->q + t * nq, x + (t - 1) * nv, 1, to->q + t * nq);
+  if (tr->periodicity) {
+    cav_periodicity_configuration(tr->periodicity, -1, to->q + last * nq, to->q);
+  } else {
+    memcpy(to->q, from->q, nq * sizeof(double));
+    memcpy(to->v, from->v, nv * sizeof(double));
+  }
+  cav_trajectory_velocities(tr->model, to);
+  if (tr->periodicity) cav_periodicity_tangent(tr->periodicity, -1, to->v + last * nv, to->v);
+}

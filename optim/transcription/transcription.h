@@ -1,0 +1,198 @@
+/// A problem as rows over knots: values, derivatives, normal equations. Private to optim/.
+#ifndef CAVORT_TRANSCRIPTION_H
+#define CAVORT_TRANSCRIPTION_H
+
+#include "cavort/solve.h"
+#include "parallel.h"
+#include "periodicity.h"
+
+/// m: a moment counts as a force at this distance when it is compared with the weight.
+#define CAV_MOMENT_ARM 0.3
+
+/// A constraint row lower <= value <= upper, scaled; equalities have lower = upper.
+typedef struct cav_slot {
+  double value, lower, upper;
+  double multiplier;
+  double final_multiplier; ///< multiplier at the end of a solve, for explanations and warm starts
+} cav_slot;
+
+/// Where a knot's constraint rows come from, in the order in which they stand in cav_knot.slot.
+typedef struct cav_slot_layout {
+  int unactuated; ///< first row of the forces that no actuator can give
+  int effort;     ///< of the actuator forces
+  int joint;      ///< of the joint ranges (empty at knot 0)
+  int tendon;     ///< of the tendon ranges (empty at knot 0)
+  int term;       ///< of the problem's hard terms
+  int count;
+} cav_slot_layout;
+
+/// A linear form in the generalised force: value = sum coef[k] u[dof[k]].
+typedef struct cav_force_row {
+  int n;
+  int *dof;
+  double *coef;
+} cav_force_row;
+
+enum { CAV_ROTATION_SIZE = 21 };
+
+/// Readings of a contact: gap or depth, slip (2), impact, force.
+enum { CAV_CONTACT_READINGS = 5 };
+
+/// One knot. Columns of its derivatives: tangent increments of q_{t-1}, q_t, q_{t+1}; those of knots that are not unknowns
+/// are zero. In cycles q_{-1}, q_0 and q_{T+1} are the unknowns of q_{T-1}, q_T and q_1 moved: columns of hessian, gradient,
+/// step_row and slot_row are of the unknowns themselves, those of du and dy of the knots beside.
+typedef struct cav_knot {
+  double time;
+  int has_force; ///< u is defined here
+  cav_slot_layout layout;
+  cav_slot *slot;         ///< [layout.count]
+  double *slot_row;       ///< [layout.count*3nv] derivatives of the slots' values, if kept
+  double *slot_step;      ///< [layout.count] the same by the logarithm of the step, where that is free
+  double *u;              ///< [nv]
+  double *du;             ///< [nv*3nv] row-major
+  int nread, ncontact;    ///< readings beside u: CAV_CONTACT_READINGS a contact, then sensors
+  int room;               ///< readings for which y, dy have space
+  char *moving;           ///< [ncontact] 1: between two links of one tree, its first reading is the depth
+  double *y;              ///< [nread]
+  double *dy;             ///< [nread*3nv]
+  int ndense, dense_room; ///< rows over all columns, weighted, that make up the Hessian beside the sparse ones
+  double *dense, *rest;   ///< [ndense*3nv], [ndense]
+  double *hessian;        ///< [3nv*3nv] Gauss-Newton, lower triangle
+  double *gradient;       ///< [3nv]
+  double *
+      step_row; ///< [3nv] of the Hessian, by the logarithm of the step where that is free; then its square and derivative
+  double step_square, step_derivative;
+  double
+      *rotation; ///< [nturn*CAV_ROTATION_SIZE] of the step that ends here: Jr^-1, Jl^-1 and the rotation vector itself
+  double cost, merit; ///< cost terms; and with penalties
+} cav_knot;
+
+/// Weights of the augmented Lagrangian, per kind of row.
+typedef struct cav_penalties {
+  double unactuated, effort, range, term;
+} cav_penalties;
+
+/// What a servo's bias adds to its row: control = effort over gain - constant - sum of weights times q and v of dofs, scaled
+/// as the row. n 0: the row is that of the effort alone. servo.c.
+typedef struct cav_servo {
+  int n, *dof;
+  double constant, *of_q, *of_v; ///< [n]
+} cav_servo;
+
+typedef struct cav_transcription {
+  const cav_problem *problem;
+  const cav_model *model;
+  int nv, nknot; ///< unknown blocks are knots 1 .. nknot-1
+  int free_step; ///< 1: one more unknown after them, the logarithm of the step over that of the trajectory
+  double h;      ///< of the last trajectory
+  cav_periodicity *periodicity; ///< cycles: from one period to the next; else NULL
+  double *before, *after;       ///< [nv] velocity at knot 0 (cycles), and after the last one
+  double *rotation_after;       ///< [nturn*CAV_ROTATION_SIZE] of the step after the last knot, in cycles
+  double weight;                ///< N: model mass times gravity
+  int nresidual;                ///< rows of unactuated
+  cav_force_row *unactuated;    ///< orthonormal complement of the actuators' range, scaled to fractions of weight
+  cav_force_row *effort;        ///< [nu] actuator force over its limit
+  double (*effort_range)[2];    ///< [nu] limits of effort, scaled; of servos with limits of control, those
+  cav_servo *servo;             ///< [nu]
+  int nrotation;
+  int *rotation_dof; ///< [nturn] first of three rotational dofs
+  int *rotation_of;  ///< [nv] index into turn_dof or -1
+  cav_penalties penalty;
+  cav_derivative derivative;        ///< of u, contacts and sensors
+  cav_derivative difference;        ///< what stands in where there is no analytic one
+  int constraints_only;             ///< costs and multipliers are left out: the merit is the violation alone
+  double slack_effort, slack_range; ///< how far constraints_only lets these rows pass their planned bounds
+  int keep_rows;                    ///< slot_row of the knots is filled by linearisations
+  cav_options options;              ///< contact law of this stage
+  cav_knot *knot;                   ///< [nknot]
+  struct cav_scratch *scratch;      ///< one a thread
+  cav_parallel *pool;
+  double seconds_dynamics, seconds_assembly;
+} cav_transcription;
+
+/// Whether efforts of all actuators are linear forms of u with constant limits, which plans and verification of them assume:
+/// moments constant in q, and limits that move with q and v at most as those of cav_servo_bounds. servo.c. CAV_NOT_SUPPORTED with the actuator and why not.
+cav_status cav_actuators_plannable(const cav_model *model, cav_error *error);
+
+/// Whether the limits of a servo's control bound its effort by rows in u, q and v: fixed gain, affine bias, on a scalar joint
+/// or a fixed tendon, without limits of force. servo.c.
+int cav_servo_bounds(const cav_model *model, int actuator);
+
+/// Fills the row of such a servo: what control is per unit of effort (per_effort), its limits over the larger of them, and
+/// what q and v add. Returns 0 if memory runs out. servo.c.
+int cav_servo_set(const cav_model *model, int actuator, cav_servo *servo, double *per_effort, double range[2]);
+void cav_servo_free(cav_servo *servo);
+
+/// Part of the row at q [nq], v [nv]. servo.c.
+double cav_servo_value(const cav_model *model, const cav_servo *servo, const double *q, const double *v);
+
+/// NULL with the reason in error: no memory, actuators that cannot be planned with, a cycle that is none.
+cav_transcription *cav_transcription_new(const cav_problem *problem, int threads, cav_error *error);
+void cav_transcription_free(cav_transcription *transcription);
+
+/// From now on linearisations keep the derivative of every constraint row; 0 if memory runs out.
+int cav_transcription_keep_rows(cav_transcription *transcription);
+
+/// Number of unknowns, and the block 0 .. nknot-2 of them that columns c*nv .. (c+1)*nv-1 of knot t belong to; -1: none.
+int cav_transcription_unknowns(const cav_transcription *transcription);
+int cav_transcription_block(const cav_transcription *transcription, int t, int c);
+
+/// Columns (of 3nv) in which constraint row i of knot t may be nonzero: pattern [3nv] is 1 there; the nv after them are scratch. pattern.c.
+void cav_transcription_pattern(const cav_transcription *transcription, int t, int i, char *pattern);
+
+/// Values at a trajectory: u, constraint rows, cost and merit of every knot. Fills trajectory->u.
+cav_status cav_transcription_values(cav_transcription *transcription, cav_trajectory *trajectory);
+
+/// Values and derivatives: du, dy, hessian and gradient of the merit of every knot.
+cav_status cav_transcription_linearise(cav_transcription *transcription, cav_trajectory *trajectory);
+
+/// Sums over knots of the last values.
+double cav_transcription_cost(const cav_transcription *transcription);
+double cav_transcription_merit(const cav_transcription *transcription);
+
+/// Largest unactuated force (fraction of weight) and its knot; largest violation of the other constraint rows.
+double cav_transcription_unactuated(const cav_transcription *transcription, int *knot);
+double cav_transcription_violation(const cav_transcription *transcription);
+
+/// Multiplier update of the augmented Lagrangian at the last values.
+void cav_transcription_multipliers(cav_transcription *transcription);
+
+/// Prices of all rows at the last linearisation, whose rows were kept: the multipliers after a step x [unknowns], or with x
+/// NULL the weighted violations alone.
+void cav_transcription_estimate_multipliers(cav_transcription *transcription, const double *x);
+
+/// Rows that are violated or have a multiplier, with where they come from, at the last linearisation, whose rows were kept; in fresh
+/// memory. allowed: violation, by kind of row. CAV_NO_MEMORY. constraint_rows.c.
+cav_status cav_transcription_rows(const cav_transcription *transcription, const double allowed[CAV_BINDING_KINDS],
+                                  cav_binding **row, int *n);
+
+/// q_t := q_t (+) x_t for every unknown knot, the step by its unknown within its bounds; v follows, and in cycles q_0 and v_0.
+/// x [unknowns].
+void cav_transcription_move(const cav_transcription *transcription, const cav_trajectory *from, const double *x,
+                            cav_trajectory *to);
+
+/// Weight with which a term speaks at knot t: the step for an integral, 1 at a single knot, 0 outside its window. terms.c.
+double cav_term_weight(const cav_transcription *transcription, const cav_term *term, int t);
+
+/// Readings of a term (sensors only), whether it selects a dof, and value minus target over scale of a sensor at knot t.
+int cav_term_dim(const cav_term *term);
+int cav_dof_selected(const cav_transcription *transcription, const cav_term *term, int dof);
+void cav_term_read(const cav_transcription *transcription, const cav_state *state, const cav_term *term, int t,
+                   double *y);
+
+/// Time of a knot for windows and targets: a fraction of the problem's duration, whatever the step has become. terms.c.
+double cav_knot_time(const cav_transcription *transcription, int t);
+
+/// Target of a term at a time, dim numbers: constant, between waypoints, or zeros.
+void cav_term_target(const cav_term *term, double time, int dim, double *target);
+
+/// Rotation vector that takes unit quaternion a to b, in a's axes.
+void cav_rotation_between(const double a[4], const double b[4], double phi[3]);
+
+/// Inverse of the right Jacobian of SO(3) at rotation vector phi, row-major; its transpose is the left one's. For angles below pi.
+void cav_rotation_jacobian_inverse(const double phi[3], double J[9]);
+
+/// Right Jacobian of SO(3).
+void cav_rotation_jacobian(const double phi[3], double J[9]);
+
+#endif

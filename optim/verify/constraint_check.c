@@ -1,0 +1,242 @@
+/// Hard terms of a problem (CAV_USE_EQUAL, CAV_USE_RANGE), evaluated at one knot for verification: what is measured,
+/// its target at that time, how far it is missed, over the term's scale. Written from the meaning of the terms in
+/// problem.h, apart from the optimiser's rows.
+/// A window holds the knots whose times lie in it, ends included (a negative time is the end); a window of one
+/// instant, or one that falls between two knots, holds the knot nearest to its middle. A range bounds what is left
+/// after the target. Velocity sensors read the velocity that leaves the knot; at a last knot that nothing leaves, the
+/// velocity that reaches it. What needs a force or an acceleration has no value there.
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "verification.h"
+
+// time of a knot for windows and targets: a fraction of the problem's duration, whatever the step has become
+static double when(const cav_verification *verification, int t) { return t * verification->problem->timestep; }
+
+// 1 if the term's window holds knot t
+static int holds(const cav_verification *verification, const cav_term *term, int t) {
+  double h = verification->problem->timestep, duration = verification->last * h;
+  double from = term->from < 0 || term->from > duration ? duration : term->from;
+  double to = term->to < 0 || term->to > duration ? duration : term->to;
+  int first = (int)ceil(from / h - 1e-6), last = (int)floor(to / h + 1e-6);
+  if (to - from < 1e-9 || first > last) first = last = (int)lround((from + to) / 2 / h);
+  return t >= first && t <= last;
+}
+
+// rotation vector of the turn from unit quaternion a to b, in a's axes
+static void rotation(const double *a, const double *b, double *out) {
+  double w = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+  double x = a[0] * b[1] - a[1] * b[0] - a[2] * b[3] + a[3] * b[2];
+  double y = a[0] * b[2] + a[1] * b[3] - a[2] * b[0] - a[3] * b[1];
+  double z = a[0] * b[3] - a[1] * b[2] + a[2] * b[1] - a[3] * b[0];
+  double s = sqrt(x * x + y * y + z * z), angle = 2 * atan2(s, fabs(w));
+  double scale = (w < 0 ? -1 : 1) * (s > 1e-12 ? angle / s : 2);
+  out[0] = scale * x;
+  out[1] = scale * y;
+  out[2] = scale * z;
+}
+
+// the two waypoints around the knot's time and the fraction of the second
+static double waypoints(const cav_term *term, double time, int *low, int *high) {
+  *low = *high = 0;
+  if (term->nwaypoint < 2 || time <= term->waypoint_time[0]) return 0;
+  *low = *high = term->nwaypoint - 1;
+  if (time >= term->waypoint_time[*high]) return 0;
+  while (*low > 0 && term->waypoint_time[*low] > time) --*low;
+  *high = *low + 1;
+  return (time - term->waypoint_time[*low]) / (term->waypoint_time[*high] - term->waypoint_time[*low]);
+}
+
+// target of dim values at a time, linear between waypoints; zeros where the term gives none
+static void target_at(const cav_term *term, double time, int dim, double *out) {
+  int low, high;
+  memset(out, 0, sizeof(double) * dim);
+  if (!term->target) return;
+  double fraction = waypoints(term, time, &low, &high);
+  const double *a = term->target + low * dim, *b = term->target + high * dim;
+  for (int k = 0; k < dim; k++) out[k] = (1 - fraction) * a[k] + fraction * b[k];
+}
+
+// unit quaternion of a target: the identity where the term gives none
+static void target_quat(const cav_term *term, double time, double *out) {
+  int low, high;
+  const double identity[4] = {1, 0, 0, 0};
+  memcpy(out, identity, sizeof identity);
+  if (!term->target) return;
+  double fraction = waypoints(term, time, &low, &high), norm = 0;
+  const double *a = term->target + 4 * low, *b = term->target + 4 * high;
+  double sign = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] < 0 ? -1 : 1;
+  for (int k = 0; k < 4; k++) {
+    out[k] = (1 - fraction) * a[k] + fraction * sign * b[k];
+    norm += out[k] * out[k];
+  }
+  for (int k = 0; k < 4; k++) out[k] = norm > 0 ? out[k] / sqrt(norm) : identity[k];
+}
+
+// a sensor's values and their target; work has room for one more reading
+static int sensor_values(const cav_verification *verification, const cav_term *term, int t, double *x, double *target) {
+  const cav_sensor *sensor = &term->sensor;
+  double reading[4], aim[4];
+  int n = sensor->dim;
+  cav_sensor_read(verification->model, verification->state, sensor, reading);
+  if (sensor->dim == 4) {
+    target_quat(term, when(verification, t), aim);
+    rotation(aim, reading, x);
+    memset(target, 0, sizeof(double) * 3);
+    n = 3;
+  } else {
+    memcpy(x, reading, sizeof(double) * n);
+    target_at(term, when(verification, t), n, target);
+  }
+  if (term->component < 0) return n;
+  x[0] = x[term->component];
+  target[0] = target[term->component];
+  return 1;
+}
+
+// 1 if the term selects the dof
+static int selects(const cav_model *model, const cav_term *term, int dof) {
+  const cav_joint *joint = model->joint + model->dof[dof].joint;
+  int free = joint->type == CAV_JOINT_FREE, place = dof - joint->dof;
+  switch (term->dofs) {
+    case CAV_DOFS_ALL:
+      return 1;
+    case CAV_DOFS_ROOT_LINEAR:
+      return free && place < 3;
+    case CAV_DOFS_ROOT_ANGULAR:
+      return free && place >= 3;
+    case CAV_DOFS_JOINTS:
+      return !free;
+    case CAV_DOFS_ONE:
+      return model->dof[dof].joint == term->joint;
+  }
+  return 0;
+}
+
+// keeps the selected dofs of x and target [nv]
+static int select_dofs(const cav_model *model, const cav_term *term, double *x, double *target) {
+  int n = 0;
+  for (int d = 0; d < model->nv; d++) {
+    if (!selects(model, term, d)) continue;
+    x[n] = x[d];
+    target[n++] = target[d];
+  }
+  return n;
+}
+
+// q (-) target in the tangent; the goal where the term gives none. q: room for one configuration
+static int configuration_values(const cav_verification *verification, const cav_term *term, int t, double *q, double *x,
+                                double *target) {
+  const cav_model *model = verification->model;
+  int low = 0, high = 0;
+  const double *from = verification->problem->q_goal, *to = from;
+  double fraction = 0;
+  if (term->target) {
+    fraction = waypoints(term, when(verification, t), &low, &high);
+    from = term->target + low * model->nq;
+    to = term->target + high * model->nq;
+  }
+  if (!from) return 0;
+  // geodesic between waypoints
+  cav_difference(model, from, to, 1, x);
+  cav_integrate(model, from, x, fraction, q);
+  cav_difference(model, q, verification->q + t * model->nq, 1, x);
+  memset(target, 0, sizeof(double) * model->nv);
+  return select_dofs(model, term, x, target);
+}
+
+static int velocity_values(const cav_verification *verification, const cav_term *term, int t, double *x,
+                           double *target) {
+  const cav_model *model = verification->model;
+  const double *v = verification->v + t * model->nv, *next = v + model->nv;
+  int rate = term->quantity == CAV_QUANTITY_ACCELERATION;
+  for (int d = 0; d < model->nv; d++) x[d] = rate ? (next[d] - v[d]) / verification->h : v[d];
+  target_at(term, when(verification, t), model->nv, target);
+  return select_dofs(model, term, x, target);
+}
+
+static int effort_values(const cav_verification *verification, const cav_term *term, int t, double *x, double *target) {
+  const cav_model *model = verification->model;
+  for (int a = 0; a < model->nu; a++) {
+    double range[2], scale;
+    cav_verification_actuator_range(model, a, range, &scale);
+    x[a] = verification->control[t * model->nu + a] / scale;
+  }
+  target_at(term, when(verification, t), model->nu, target);
+  return model->nu;
+}
+
+// one value per contact, a magnitude
+static int contact_values(const cav_verification *verification, const cav_term *term, double *x, double *target) {
+  const cav_state *state = verification->state;
+  for (int i = 0; i < state->ncontact; i++) {
+    const cav_contact *contact = state->contact + i;
+    double load = sqrt(fmax(contact->impulse[0], 0) / verification->h / verification->weight),
+           value = fmax(contact->dist, 0);
+    const double *rate = contact->velocity_next;
+    if (term->quantity == CAV_QUANTITY_SLIP) value = contact->dim > 1 ? hypot(rate[1], rate[2]) : 0;
+    if (term->quantity == CAV_QUANTITY_IMPACT) value = fabs(rate[0]);
+    if (term->quantity == CAV_QUANTITY_SELF_PENETRATION) {
+      int moving = !verification->model->pair[contact->pair].external;
+      load = 1, value = moving ? fmax(-contact->dist, 0) : 0;
+    }
+    if (term->quantity == CAV_QUANTITY_FORCE) value = verification->model->pair[contact->pair].external ? load : 0;
+    x[i] = load * value;
+    target[i] = 0;
+  }
+  return state->ncontact;
+}
+
+// values of a term at knot t and their targets; their number, 0 where the term has no value
+static int measure(const cav_verification *verification, const cav_term *term, int t, double *q, double *x,
+                   double *target) {
+  int forced = t < verification->rows;
+  switch (term->quantity) {
+    case CAV_QUANTITY_SENSOR:
+      if (!forced && cav_sensor_rule_of(term->sensor.type)->stage == CAV_READS_ACCELERATION) return 0;
+      return sensor_values(verification, term, t, x, target);
+    case CAV_QUANTITY_CONFIGURATION:
+      return configuration_values(verification, term, t, q, x, target);
+    case CAV_QUANTITY_VELOCITY:
+      return velocity_values(verification, term, t, x, target);
+    case CAV_QUANTITY_ACCELERATION:
+      return forced ? velocity_values(verification, term, t, x, target) : 0;
+    case CAV_QUANTITY_EFFORT:
+      return forced ? effort_values(verification, term, t, x, target) : 0;
+    case CAV_QUANTITY_GAP:
+    case CAV_QUANTITY_SLIP:
+    case CAV_QUANTITY_IMPACT:
+    case CAV_QUANTITY_SELF_PENETRATION:
+    case CAV_QUANTITY_FORCE:
+      return forced ? contact_values(verification, term, x, target) : 0;
+    case CAV_QUANTITY_TYPES:
+      break;
+  }
+  return 0;
+}
+
+int cav_constraint_check_room(const cav_verification *verification) {
+  const cav_model *model = verification->model;
+  int most = model->nv > model->nu ? model->nv : model->nu;
+  if (verification->state->ncontact > most) most = verification->state->ncontact;
+  return model->nq + 2 * (most > 4 ? most : 4);
+}
+
+void cav_constraint_check(const cav_verification *verification, int t, double *work, cav_metric *metric) {
+  int room = (cav_constraint_check_room(verification) - verification->model->nq) / 2;
+  double *q = work, *x = q + verification->model->nq, *target = x + room;
+  for (int i = 0; i < verification->problem->nterm; i++) {
+    const cav_term *term = verification->problem->term + i;
+    if (term->use == CAV_USE_COST || !holds(verification, term, t)) continue;
+    int n = measure(verification, term, t, q, x, target);
+    for (int k = 0; k < n; k++) {
+      double left = x[k] - target[k], missed = fabs(left);
+      if (term->use == CAV_USE_RANGE) missed = fmax(fmax(term->lower - left, left - term->upper), 0);
+      // fmax drops what is not a number: keep it
+      if (isnan(left)) missed = left;
+      cav_metric_note(metric, missed / term->scale, t, "term %d%s%s, component %d, value %.6g", i,
+                      term->name && *term->name ? " " : "", term->name ? term->name : "", k, x[k]);
+    }
+  }
+}

@@ -1,0 +1,312 @@
+/// Forward simulation of a motion, three ways.
+/// Single steps: from every knot's own (q_t, v_t) with the whole u_t, one step of the claimed law: how well the forward
+/// step undoes the inverse.
+/// Open loop at the step of the knots: from (q_0, v_0), only what the actuators give of u_t. Errors grow as the
+/// body's own instability makes them; how long they stay small is the figure.
+/// Closed loop at a tenth of the step, by the paper's Euler step: forces u + K_q (q (-) q_ref) + K_v (v - v_ref) brought to
+/// the actuators and clipped to their limits. Once under the claimed contact law, with the time constant that keeps its
+/// stiffness at the finer step, and once under the model as its file says (its own solref contacts, exact law).
+/// Between knots the motion is read as cav_trajectory_resample does; gains of knot t hold until knot t+1.
+/// Cycles run for several periods.
+/// optimisation.md, 3 and 6.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "verification.h"
+
+enum { SUBSTEPS = 10, ITERATIONS = 200 };
+
+static const double same = 1e-6;             // rad or m: a replay that is the knots
+static const double far = 0.5, turned = 1;   // m, rad: a replay that has lost the motion
+static const double exact_tolerance = 1e-12; // relative residual asked of forward steps
+static const double poor = 1e-6;             // fraction of weight that a forward step may leave unexplained
+
+// largest tangent component from q0 to q1
+static double apart(const cav_model *model, const double *q0, const double *q1, double *work) {
+  double most = 0;
+  cav_difference(model, q0, q1, 1, work);
+  for (int d = 0; d < model->nv; d++) {
+    if (!(fabs(work[d]) <= most)) most = fabs(work[d]);
+  }
+  return most;
+}
+
+// largest generalised force by which a step misses u, fraction of the weight
+static double missed(const cav_verification *verification, cav_state *state, const double *q, const double *v,
+                     const double *u, const double *next, double *found) {
+  double most = 0;
+  if (cav_inverse(verification->model, state, q, v, next, found) != CAV_OK) return INFINITY;
+  for (int d = 0; d < verification->model->nv; d++) most = fmax(most, fabs(found[d] - u[d]));
+  return most / (verification->weight * verification->arm);
+}
+
+// one forward step to next [2*nv], of which the second half is scratch. A step that stopped above the tolerance is
+// checked by the force that it leaves unexplained
+static cav_status step(const cav_verification *verification, cav_state *state, double tolerance, const double *q,
+                       const double *v, const double *u, double *next) {
+  int nv = verification->model->nv;
+  memcpy(next, v, sizeof(double) * nv);
+  cav_status status = cav_forward_newton(verification->model, state, q, v, u, ITERATIONS, tolerance, next, NULL);
+  if (status == CAV_NOT_CONVERGED && missed(verification, state, q, v, u, next, next + nv) <= poor) return CAV_OK;
+  return status;
+}
+
+cav_status cav_replay_steps(const cav_verification *verification, cav_replay *replay) {
+  const cav_model *model = verification->model;
+  int nv = model->nv;
+  double *next = malloc(sizeof(double) * (size_t)(2 * nv + 1));
+  if (!next) return CAV_NO_MEMORY;
+  cav_status status = CAV_OK;
+  replay->step_error = 0;
+  replay->step_knot = 0;
+  for (int t = 0; t < verification->rows && status == CAV_OK; t++) {
+    const double *v = verification->v + t * nv;
+    status = step(verification, verification->state, exact_tolerance, verification->q + t * model->nq, v,
+                  verification->u + t * nv, next);
+    // a step that stopped far from its solution shows as a large error, not as a failure
+    if (status == CAV_NOT_CONVERGED) status = CAV_OK;
+    if (status != CAV_OK) break;
+    for (int d = 0; d < nv; d++) {
+      double error = fabs(next[d] - v[nv + d]) * verification->h;
+      if (error <= replay->step_error) continue;
+      replay->step_error = error;
+      replay->step_knot = t;
+    }
+  }
+  free(next);
+  return status;
+}
+
+// all periods of the motion; the last knot holds the force before it where none closes the motion
+static cav_trajectory *whole(const cav_verification *verification) {
+  const cav_model *model = verification->model;
+  double *u = verification->u + (size_t)verification->last * (size_t)model->nv;
+  if (verification->rows == verification->last) memcpy(u, u - model->nv, sizeof(double) * model->nv);
+  cav_trajectory motion = {
+      .nq = model->nq, .nv = model->nv, .nknot = verification->last + 1, .timestep = verification->h};
+  motion.q = (double *)verification->q, motion.v = verification->v, motion.u = verification->u;
+  return verification->periodicity ? cav_periodicity_unroll(verification->periodicity, &motion, verification->periods)
+                                   : cav_trajectory_copy(&motion);
+}
+
+cav_status cav_replay_open(const cav_verification *verification, cav_replay *replay) {
+  const cav_model *model = verification->model;
+  int nv = model->nv, nq = model->nq, together = 1;
+  double *q = malloc(sizeof(double) * (size_t)(nq + 5 * nv + 1));
+  cav_trajectory *motion = whole(verification);
+  if (!q || !motion) {
+    free(q);
+    cav_trajectory_free(motion);
+    return CAV_NO_MEMORY;
+  }
+  double *v = q + nq, *u = v + nv, *next = u + nv, *work = next + 2 * nv;
+  memcpy(q, verification->q, sizeof(double) * nq);
+  memcpy(v, verification->v, sizeof(double) * nv);
+  replay->open_error = replay->open_seconds = 0;
+  cav_status status = CAV_OK;
+  for (int t = 0; t + 1 < motion->nknot; t++) {
+    // only what actuators give
+    const double *all = motion->u + t * nv;
+    cav_actuation(model, verification->state, all, work, NULL);
+    for (int d = 0; d < nv; d++) u[d] = all[d] - work[d];
+    status = step(verification, verification->state, exact_tolerance, q, v, u, next);
+    if (status != CAV_OK) break;
+    cav_integrate(model, q, next, verification->h, q);
+    memcpy(v, next, sizeof(double) * nv);
+    double error = apart(model, motion->q + (t + 1) * nq, q, work);
+    if (!(error <= replay->open_error)) replay->open_error = error;
+    together = together && error <= same;
+    if (together) replay->open_seconds = (t + 1) * verification->h;
+  }
+  free(q);
+  cav_trajectory_free(motion);
+  // a simulation that ends in numbers that are not finite or in a step without solution ends the figure, not the verification
+  return status == CAV_NO_MEMORY ? status : CAV_OK;
+}
+
+// generalised force of efforts within the limits at (q, v); moment [nv] is scratch
+static cav_status drive(const cav_verification *verification, const double *q, const double *v, const double *effort,
+                        double *moment, double *u) {
+  const cav_model *model = verification->model;
+  cav_status status = cav_position(model, verification->bare, q);
+  memset(u, 0, sizeof(double) * model->nv);
+  for (int a = 0; a < model->nu && status == CAV_OK; a++) {
+    double length = cav_actuator_length(model, verification->bare, a, moment), velocity = 0, input;
+    for (int d = 0; d < model->nv; d++) velocity += moment[d] * v[d];
+    cav_actuator_input(model, a, length, velocity, model->actuator[a].unit * effort[a], &input);
+    double force = cav_actuator_force(model, a, length, velocity, input);
+    for (int d = 0; d < model->nv; d++) u[d] += force * moment[d];
+  }
+  return status;
+}
+
+// x [nv], a tangent, moved by a number of periods; scratch [nv]
+static void move(const cav_verification *verification, int periods, double *x, double *scratch) {
+  for (int k = 0; k < abs(periods); k++) {
+    cav_periodicity_tangent(verification->periodicity, periods > 0 ? 1 : -1, x, scratch);
+    memcpy(x, scratch, sizeof(double) * verification->model->nv);
+  }
+}
+
+// u := forces of the motion and feedback of knot t at (q, v), through the actuators. dq and dv may be changed
+static cav_status command(const cav_verification *verification, int t, const double *planned, const double *gain_q,
+                          const double *gain_v, const double *q, const double *v, double *dq, double *dv,
+                          double *effort, double *work, double *u) {
+  int nv = verification->model->nv, periods = t / verification->last;
+  size_t at = (size_t)(t % verification->last) * (size_t)nv * (size_t)nv;
+  const double *Kq = gain_q ? gain_q + at : NULL, *Kv = gain_v ? gain_v + at : NULL;
+  // gains are those of the first period, where forces and strayings are moved to
+  move(verification, -periods, dq, work);
+  move(verification, -periods, dv, work);
+  for (int i = 0; i < nv; i++) {
+    u[i] = 0;
+    for (int j = 0; Kq && j < nv; j++) u[i] += Kq[i * nv + j] * dq[j];
+    for (int j = 0; Kv && j < nv; j++) u[i] += Kv[i * nv + j] * dv[j];
+  }
+  move(verification, periods, u, work);
+  for (int i = 0; i < nv; i++) u[i] += planned[i];
+  cav_actuation(verification->model, verification->bare, u, NULL, effort);
+  return drive(verification, q, v, effort, work, u);
+}
+
+// angle between two unit quaternions
+static double angle(const double *a, const double *b) {
+  double w = fabs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]);
+  return 2 * acos(fmin(w, 1));
+}
+
+// distances between two configurations: of links' centres of mass, and turn of root links; -> bodies of the largest
+typedef struct gap {
+  double distance, rotation;
+  int link, root;
+} gap;
+
+static cav_status compare(const cav_verification *verification, const double *q0, const double *q1, double *place,
+                          gap *found) {
+  const cav_model *model = verification->model;
+  cav_status status = cav_position(model, verification->bare, q0);
+  if (status != CAV_OK) return status;
+  for (int l = 0; l < model->nlink; l++) {
+    memcpy(place + 7 * l, verification->bare->com + 3 * l, sizeof(double) * 3);
+    memcpy(place + 7 * l + 3, verification->bare->link[l].quat, sizeof(double) * 4);
+  }
+  status = cav_position(model, verification->bare, q1);
+  *found = (gap){0};
+  for (int l = 1; l < model->nlink && status == CAV_OK; l++) {
+    const double *a = place + 7 * l, *b = verification->bare->com + 3 * l;
+    double distance =
+        sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+    if (distance > found->distance) found->distance = distance, found->link = l;
+    if (model->link[l].root != l) continue;
+    double rotation = angle(a + 3, verification->bare->link[l].quat);
+    if (rotation > found->rotation) found->rotation = rotation, found->root = l;
+  }
+  return status;
+}
+
+// notes the distance now; 0 once the motion is lost
+static int following(const cav_verification *verification, const gap *now, double time, struct cav_follow *follow) {
+  char name[32];
+  follow->error = now->distance;
+  int near = now->distance <= far && now->rotation <= turned;
+  if (near) {
+    follow->seconds = time;
+    return 1;
+  }
+  int by_rotation = now->distance <= far;
+  snprintf(follow->lost, sizeof follow->lost, "%.60s is %.2g %s away at %.3f s",
+           cav_verification_link_name(verification->model, by_rotation ? now->root : now->link, name),
+           by_rotation ? now->rotation : now->distance, by_rotation ? "rad" : "m", time);
+  return 0;
+}
+
+// the model as its file says, at a finer step
+static cav_options own_options(const cav_verification *verification) {
+  cav_options options = verification->model->options;
+  options.timestep = verification->h / SUBSTEPS;
+  options.order = CAV_ORDER_EULER;
+  options.stabilisation = CAV_STABILISATION_SOLREF;
+  options.smoothing = options.smoothing_self = 0;
+  options.refsafe = 1;
+  return options;
+}
+
+// the claimed law at a finer step; what smoothing lets slip in a step, delta/h, stays
+static cav_options claimed_options(const cav_verification *verification, const cav_options *law) {
+  cav_options claimed = *law;
+  claimed.timestep = verification->h;
+  claimed = cav_options_at_step(&claimed, verification->h / SUBSTEPS);
+  claimed.smoothing /= SUBSTEPS;
+  claimed.smoothing_self /= SUBSTEPS;
+  claimed.order = CAV_ORDER_EULER;
+  return claimed;
+}
+
+// the motion read at the finer step
+static cav_trajectory *finer(const cav_verification *verification) {
+  cav_trajectory *motion = whole(verification), *fine = NULL;
+  if (motion) fine = cav_trajectory_resample(verification->model, motion, verification->h / SUBSTEPS);
+  cav_trajectory_free(motion);
+  return fine;
+}
+
+// a simulation under way
+typedef struct simulation {
+  const cav_trajectory *motion; ///< at the finer step
+  const double *gain_q, *gain_v;
+  cav_state *state;
+  double *q, *v, *dq, *dv, *u, *next, *control, *place;
+} simulation;
+
+// one step from i to i+1 of the finer motion; 0 in *on once the motion is lost
+static cav_status advance(const cav_verification *verification, simulation *s, int i, struct cav_follow *follow,
+                          int *on) {
+  const cav_model *model = verification->model;
+  const double *q_ref = s->motion->q + i * model->nq, *v_ref = s->motion->v + i * model->nv;
+  double time = (i + 1) * s->motion->timestep;
+  cav_difference(model, q_ref, s->q, 1, s->dq);
+  for (int d = 0; d < model->nv; d++) s->dv[d] = s->v[d] - v_ref[d];
+  cav_status status = command(verification, i / SUBSTEPS, s->motion->u + i * model->nv, s->gain_q, s->gain_v, s->q,
+                              s->v, s->dq, s->dv, s->control, s->next, s->u);
+  if (status == CAV_OK) status = step(verification, s->state, 1e-9, s->q, s->v, s->u, s->next);
+  if (status == CAV_NO_MEMORY) return status;
+  if (status != CAV_OK) {
+    snprintf(follow->lost, sizeof follow->lost, "simulation stopped at %.3f s: %s", time, cav_status_name(status));
+    *on = 0;
+    return CAV_OK;
+  }
+  cav_integrate(model, s->q, s->next, s->motion->timestep, s->q);
+  memcpy(s->v, s->next, sizeof(double) * model->nv);
+  gap now;
+  status = compare(verification, q_ref + model->nq, s->q, s->place, &now);
+  if (status == CAV_OK) *on = following(verification, &now, time, follow);
+  return status;
+}
+
+cav_status cav_replay_closed(const cav_verification *verification, const cav_options *law, const double *gain_q,
+                             const double *gain_v, struct cav_follow *follow) {
+  const cav_model *model = verification->model;
+  size_t nq = (size_t)model->nq, nv = (size_t)model->nv;
+  double *q = malloc(sizeof(double) * (nq + 6 * nv + (size_t)model->nu + 7 * (size_t)model->nlink));
+  cav_state *state = cav_state_new(model);
+  cav_trajectory *motion = finer(verification);
+  cav_status status = q && state && motion ? CAV_OK : CAV_NO_MEMORY;
+  *follow = (struct cav_follow){0};
+  if (status == CAV_OK) {
+    simulation s = {.motion = motion, .gain_q = gain_q, .gain_v = gain_v, .state = state, .q = q, .v = q + nq};
+    s.dq = s.v + nv, s.dv = s.dq + nv, s.u = s.dv + nv, s.next = s.u + nv, s.control = s.next + 2 * nv;
+    s.place = s.control + model->nu;
+    state->options = law ? claimed_options(verification, law) : own_options(verification);
+    memcpy(s.q, verification->q, sizeof(double) * nq);
+    memcpy(s.v, verification->v, sizeof(double) * nv);
+    int on = 1;
+    for (int i = 0; i + 1 < motion->nknot && on && status == CAV_OK; i++)
+      status = advance(verification, &s, i, follow, &on);
+  }
+  cav_trajectory_free(motion);
+  cav_state_free(state);
+  free(q);
+  return status;
+}

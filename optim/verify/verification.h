@@ -1,0 +1,89 @@
+/// What the parts of verification share. Private to optim/; none of it is seen or used by the optimiser, and none of
+/// the optimiser is used here.
+#ifndef CAVORT_AUDIT_H
+#define CAVORT_AUDIT_H
+
+#include "cavort/solve.h"
+#include "periodicity.h"
+
+/// A worst value and where it was found.
+typedef struct cav_metric {
+  double value;
+  int knot;        ///< -1: not at a knot
+  char where[200]; ///< what, in words; always terminated
+} cav_metric;
+
+/// A motion under examination. Between cav_verification calls at a knot the state holds cav_inverse at that knot.
+typedef struct cav_verification {
+  const cav_problem *problem;
+  const cav_model *model;
+  cav_options law;              ///< claimed contact law, at the step of the knots
+  int last;                     ///< last knot, T
+  int rows;                     ///< knots 0 .. rows-1 have a force: T, or T+1 where the motion closes at rest
+  double h;                     ///< s
+  double weight;                ///< N, unit of forces (cav_verification_weight)
+  double arm;                   ///< m, unit of moments is weight*arm
+  cav_periodicity *periodicity; ///< cycles: from one period to the next; else NULL
+  int periods;                  ///< that replays run for
+  const double *q;              ///< [(T+1)*nq] knots
+  double *v;        ///< [(T+2)*nv] from the knots; the last row closes the motion: zero, v_1 moved in a cycle, or v_T
+                    ///< where nothing closes it
+  double *u;        ///< [(T+1)*nv] inverse dynamics under the claimed law; meaningful for rows knots
+  double *control;  ///< [(T+1)*nu] least-norm fraction of the actuators
+  cav_state *state; ///< claimed law
+  cav_state *bare;  ///< positions only: no contacts, no constraints
+} cav_verification;
+
+/// Keeps the larger of the two; a value that is not a number counts as larger. Writes where by printf's rules.
+void cav_metric_note(cav_metric *metric, double value, int knot, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
+
+/// Name of a link's body for people: its name, or "body N".
+const char *cav_verification_link_name(const cav_model *model, int link, char buffer[32]);
+
+/// Range of an actuator's effort by its limits, infinite where open. scale: the larger finite
+/// magnitude of the two, 1 where there is none.
+void cav_verification_actuator_range(const cav_model *model, int actuator, double range[2], double *scale);
+
+/// Balance of momentum of every tree over all knots against gravity and contacts with what is not of the tree:
+/// root mean square and worst knot, fraction of weight. momentum_balance.c.
+typedef struct cav_balance cav_balance;
+cav_balance *cav_balance_new(const cav_verification *verification);
+void cav_balance_free(cav_balance *balance);
+/// Adds knot t; verification->state holds the inverse there.
+void cav_balance_add(cav_balance *balance, const cav_verification *verification, int t);
+/// Root mean square of the worst tree, and its worst knot.
+void cav_balance_result(const cav_balance *balance, const cav_verification *verification, cav_metric *metric);
+
+/// Hard terms of the problem at knot t; verification->state holds the inverse there. work holds cav_constraint_check_room values.
+/// constraint_check.c.
+int cav_constraint_check_room(const cav_verification *verification);
+void cav_constraint_check(const cav_verification *verification, int t, double *work, cav_metric *metric);
+
+/// How long and how near a closed loop follows.
+struct cav_follow {
+  double seconds;
+  double error;   ///< m, at its end
+  char lost[160]; ///< why it ended early, "" if it did not
+};
+
+/// Forward simulations. replay.c.
+typedef struct cav_replay {
+  double step_error; ///< |v' - v_{t+1}| h of single steps from the knots
+  int step_knot;
+  double open_error;             ///< largest |q - knot| in open loop
+  double open_seconds;           ///< within 1e-6
+  struct cav_follow closed, own; ///< closed loop under the claimed contact law, and under the model's own
+} cav_replay;
+cav_status cav_replay_steps(const cav_verification *verification, cav_replay *replay);
+cav_status cav_replay_open(const cav_verification *verification, cav_replay *replay);
+/// law is what the simulation obeys, its timestep apart; law NULL: the model's own.
+cav_status cav_replay_closed(const cav_verification *verification, const cav_options *law, const double *gain_q,
+                             const double *gain_v, struct cav_follow *follow);
+
+/// The closed loops of a verification alone, for the choice of gains. Fails as cav_verify does.
+cav_status cav_closed_loops(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
+                            const double *gain_q, const double *gain_v, struct cav_follow *claimed,
+                            struct cav_follow *own, cav_error *error);
+
+#endif

@@ -1,0 +1,517 @@
+/// Certifies a motion from its knots alone, with code apart from the optimiser's: velocities, forces and contacts are
+/// recomputed from q; what a certificate requires is measured, and the first tolerance that is broken is named with its
+/// knot, body and size. optimisation.md, 6. Momentum: momentum_balance.c; hard terms: constraint_check.c; forward simulation: replay.c.
+/// It does not decides the cost, and it does not look between knots, except by the closed-loop replay.
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "transcription.h"
+#include "verification.h"
+
+static const double usual_gravity = 9.81; // m/s^2, unit of forces where the model has none
+static const double loaded = 0.01;        // fraction of the weight from which on a contact is loaded
+
+/// What was found at the knots.
+typedef struct metrics {
+  cav_metric unactuated, limit, term, penetration, defect, periodicity;
+  double slip, load;
+} metrics;
+
+// writes the reason of a failed call
+static cav_status fail(cav_error *error, cav_status status, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+static cav_status fail(cav_error *error, cav_status status, const char *format, ...) {
+  if (!error) return status;
+  va_list list;
+  va_start(list, format);
+  error->status = status;
+  error->line = 0;
+  vsnprintf(error->text, sizeof error->text, format, list);
+  va_end(list);
+  return status;
+}
+
+void cav_metric_note(cav_metric *metric, double value, int knot, const char *format, ...) {
+  if (value <= metric->value || isnan(metric->value)) return;
+  va_list list;
+  va_start(list, format);
+  metric->value = value;
+  metric->knot = knot;
+  vsnprintf(metric->where, sizeof metric->where, format, list);
+  va_end(list);
+}
+
+const char *cav_verification_link_name(const cav_model *model, int link, char buffer[32]) {
+  int body = model->link[link].body;
+  if (link == 0) return "the world";
+  if (*model->body[body].name) return model->body[body].name;
+  snprintf(buffer, 32, "body %d", body);
+  return buffer;
+}
+
+void cav_verification_actuator_range(const cav_model *model, int actuator, double range[2], double *scale) {
+  cav_actuator_effort_range(model, actuator, range);
+  double most = 0;
+  for (int k = 0; k < 2; k++) {
+    if (isfinite(range[k])) most = fmax(most, fabs(range[k]));
+  }
+  *scale = most > 0 ? most : 1;
+}
+
+static const char *joint_name(const cav_model *model, int joint, char buffer[32]) {
+  if (*model->joint[joint].name) return model->joint[joint].name;
+  snprintf(buffer, 32, "joint %d", joint);
+  return buffer;
+}
+
+static const char *geom_name(const cav_model *model, int geom, char buffer[32]) {
+  if (*model->geom[geom].name) return model->geom[geom].name;
+  snprintf(buffer, 32, "geom %d", geom);
+  return buffer;
+}
+
+// 1 if all n values are finite
+static int all_finite(const double *x, size_t n) {
+  for (size_t i = 0; i < n; i++) {
+    if (!isfinite(x[i])) return 0;
+  }
+  return 1;
+}
+
+// the motion fits the problem, and all of it is numbers
+static cav_status admit(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
+                        const double *gain_q, const double *gain_v, cav_error *error) {
+  if (!problem || !problem->model || !trajectory || !contact) {
+    return fail(error, CAV_BAD_INPUT, "verification needs a problem with a model, a trajectory and a contact law");
+  }
+  const cav_model *model = problem->model;
+  if (trajectory->nq != model->nq || trajectory->nv != model->nv) {
+    return fail(error, CAV_BAD_INPUT,
+                "the trajectory has %d positions and %d velocities, the model %d and %d: "
+                "verify it with the model it was solved for",
+                trajectory->nq, trajectory->nv, model->nq, model->nv);
+  }
+  if (!problem->q_start || !problem->v_start) {
+    return fail(error, CAV_BAD_INPUT, "the problem has no start: set q_start and v_start");
+  }
+  if (problem->duration_most == 0 && !(fabs(trajectory->timestep - problem->timestep) <= 1e-9 * problem->timestep)) {
+    return fail(error, CAV_BAD_INPUT, "the trajectory's step is %.9g s, the problem's %.9g s", trajectory->timestep,
+                problem->timestep);
+  }
+  if (!(problem->timestep > 0) || !(trajectory->timestep > 0))
+    return fail(error, CAV_BAD_INPUT, "the steps of the problem and of the trajectory must be positive");
+  long knots = lround(problem->duration / problem->timestep) + 1;
+  if (trajectory->nknot < 2 || trajectory->nknot != knots) {
+    return fail(error, CAV_BAD_INPUT, "the trajectory has %d knots, the problem asks for %ld", trajectory->nknot,
+                knots);
+  }
+  size_t n = (size_t)trajectory->nknot, gains = (n - 1) * (size_t)model->nv * (size_t)model->nv;
+  int finite = all_finite(trajectory->q, n * (size_t)model->nq) && all_finite(problem->q_start, (size_t)model->nq) &&
+               all_finite(problem->v_start, (size_t)model->nv) && (!gain_q || all_finite(gain_q, gains)) &&
+               (!gain_v || all_finite(gain_v, gains));
+  return finite
+             ? CAV_OK
+             : fail(error, CAV_NOT_FINITE, "the trajectory, the start or the gains hold numbers that are not finite");
+}
+
+static void verification_clear(cav_verification *verification) {
+  cav_periodicity_free(verification->periodicity);
+  cav_state_free(verification->state);
+  cav_state_free(verification->bare);
+  free(verification->v);
+  free(verification->u);
+  free(verification->control);
+}
+
+// velocities from the knots; one more closes the motion
+static void knot_velocities(cav_verification *verification) {
+  const cav_model *model = verification->model;
+  int nq = model->nq, nv = model->nv;
+  memcpy(verification->v, verification->problem->v_start, sizeof(double) * nv);
+  for (int t = 1; t <= verification->last; t++) {
+    cav_difference(model, verification->q + (t - 1) * nq, verification->q + t * nq, verification->h,
+                   verification->v + t * nv);
+  }
+  double *close = verification->v + (verification->last + 1) * nv;
+  memset(close, 0, sizeof(double) * nv);
+  if (verification->periodicity) {
+    cav_periodicity_tangent(verification->periodicity, -1, close - nv, verification->v);
+    cav_periodicity_tangent(verification->periodicity, 1, verification->v + nv, close);
+  } else if (!verification->problem->close_at_rest) {
+    memcpy(close, close - nv, sizeof(double) * nv);
+  }
+}
+
+static cav_status verification_start(cav_verification *verification, const cav_problem *problem,
+                                     const cav_trajectory *trajectory, const cav_options *contact, cav_error *error) {
+  const cav_model *model = problem->model;
+  size_t n = (size_t)trajectory->nknot, nv = (size_t)model->nv;
+  *verification = (cav_verification){.problem = problem,
+                                     .model = model,
+                                     .law = *contact,
+                                     .last = trajectory->nknot - 1,
+                                     .h = trajectory->timestep,
+                                     .arm = CAV_MOMENT_ARM,
+                                     .q = trajectory->q};
+  verification->periods = 1;
+  if (problem->cycle.on) {
+    verification->periodicity = cav_periodicity_new(problem, error);
+    if (!verification->periodicity) return error->status;
+    verification->periods = problem->cycle.mirror == CAV_MIRROR_NONE ? 2 : 4;
+  }
+  verification->rows = verification->last + (problem->close_at_rest && !problem->cycle.on ? 1 : 0);
+  verification->law.timestep = verification->h;
+  // weight, or a like force where there is no gravity
+  const double *g = model->gravity;
+  double pull = contact->gravity ? sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) : 0;
+  verification->weight = (pull > 0 ? pull : usual_gravity) * (model->mass > 0 ? model->mass : 1);
+  verification->state = cav_state_new(model);
+  verification->bare = cav_state_new(model);
+  verification->v = malloc(sizeof(double) * (n + 1) * (nv + 1));
+  verification->u = calloc(n * (nv + 1), sizeof(double));
+  verification->control = calloc(n * ((size_t)model->nu + 1), sizeof(double));
+  if (!verification->state || !verification->bare || !verification->v || !verification->u || !verification->control)
+    return CAV_NO_MEMORY;
+  verification->state->options = verification->law;
+  verification->bare->options.contact = verification->bare->options.constraint = 0;
+  knot_velocities(verification);
+  return CAV_OK;
+}
+
+// the motion begins where the problem says
+static void note_start(const cav_verification *verification, cav_metric *metric) {
+  const cav_model *model = verification->model;
+  double *away = verification->u; // not yet filled
+  char name[32];
+  cav_difference(model, verification->problem->q_start, verification->q, 1, away);
+  for (int d = 0; d < model->nv; d++) {
+    cav_metric_note(metric, fabs(away[d]), 0, "start, %s, away from the problem's start",
+                    joint_name(model, model->dof[d].joint, name));
+  }
+}
+
+// the duration is one that the problem allows
+static void note_duration(const cav_verification *verification, cav_metric *metric) {
+  const cav_problem *p = verification->problem;
+  double duration = verification->last * verification->h, least = p->duration, most = p->duration;
+  if (p->duration_most > 0) least = p->duration_least, most = p->duration_most;
+  double beyond = fmax(least - duration, duration - most) / p->duration;
+  cav_metric_note(metric, beyond, verification->last, "duration, %.6g s of %.6g .. %.6g s", duration, least, most);
+}
+
+// the end of a cycle is its start moved: by coordinates, by where the links are, and by the step that leads to the start
+static cav_status note_periodicity(const cav_verification *verification, cav_metric *metric) {
+  const cav_model *model = verification->model;
+  int nq = model->nq, nv = model->nv;
+  const double *last = verification->q + verification->last * nq;
+  double *q = malloc(sizeof(double) * (size_t)(nq + nv + 3 * model->nlink)), *off = q + nq, *com = off + nv;
+  char name[32];
+  if (!q) return CAV_NO_MEMORY;
+  cav_periodicity_configuration(verification->periodicity, 1, verification->q, q);
+  cav_difference(model, q, last, 1, off);
+  for (int d = 0; d < nv; d++)
+    cav_metric_note(metric, fabs(off[d]), verification->last, "%s", joint_name(model, model->dof[d].joint, name));
+  cav_periodicity_configuration(verification->periodicity, -1, last - nq, q);
+  cav_difference(model, q, verification->q, 1, off);
+  for (int d = 0; d < nv; d++)
+    cav_metric_note(metric, fabs(off[d] - verification->h * verification->v[d]), 0, "step of %s",
+                    joint_name(model, model->dof[d].joint, name));
+  cav_status status = cav_position(model, verification->bare, verification->q);
+  memcpy(com, verification->bare->com, sizeof(double) * 3 * model->nlink);
+  if (status == CAV_OK) status = cav_position(model, verification->bare, last);
+  for (int l = 1; l < model->nlink && status == CAV_OK; l++) {
+    const double *there = verification->bare->com + 3 * cav_periodicity_link(verification->periodicity, l);
+    double moved[3], apart = 0;
+    cav_periodicity_point(verification->periodicity, com + 3 * l, moved);
+    for (int k = 0; k < 3; k++) apart += (moved[k] - there[k]) * (moved[k] - there[k]);
+    cav_metric_note(metric, sqrt(apart), verification->last, "%s", cav_verification_link_name(model, l, name));
+  }
+  free(q);
+  return status;
+}
+
+// control of a servo beyond its limits: what the nearest one within them does not give, over gain and limits
+static void note_servo(const cav_verification *verification, int t, int a, double effort, double *moment,
+                       metrics *found) {
+  const cav_model *model = verification->model;
+  const cav_actuator *actuator = model->actuator + a;
+  double length = cav_actuator_length(model, verification->state, a, moment), velocity = 0, input;
+  for (int d = 0; d < model->nv; d++) velocity += moment[d] * verification->v[t * model->nv + d];
+  cav_actuator_input(model, a, length, velocity, effort, &input);
+  double missing = fabs(effort - cav_actuator_force(model, a, length, velocity, input));
+  double scale = fmax(fabs(actuator->ctrlrange[0]), fabs(actuator->ctrlrange[1])) * fabs(actuator->gain_parameter[0]);
+  cav_metric_note(&found->limit, missing / scale, t, "servo %.60s (%d), control at %.4g of %.4g .. %.4g",
+                  actuator->name, a, input, actuator->ctrlrange[0], actuator->ctrlrange[1]);
+}
+
+// what no actuator gives, and what actuators are asked for beyond their limits
+static void note_forces(const cav_verification *verification, int t, double *residual, metrics *found) {
+  const cav_model *model = verification->model;
+  double *control = verification->control + t * model->nu;
+  char name[32], link[32];
+  cav_actuation(model, verification->state, verification->u + t * model->nv, residual, control);
+  for (int d = 0; d < model->nv; d++) {
+    const cav_joint *joint = model->joint + model->dof[d].joint;
+    int line = joint->type == CAV_JOINT_SLIDE || (joint->type == CAV_JOINT_FREE && d - joint->dof < 3);
+    double fraction = fabs(residual[d]) / (verification->weight * (line ? 1 : verification->arm));
+    cav_metric_note(&found->unactuated, fraction, t, "%.60s of %.60s, dof %d: %.4g %s",
+                    joint_name(model, model->dof[d].joint, name), cav_verification_link_name(model, joint->link, link),
+                    d, residual[d], line ? "N" : "N m");
+  }
+  for (int a = 0; a < model->nu; a++) {
+    double range[2], scale;
+    cav_verification_actuator_range(model, a, range, &scale);
+    double beyond = fmax(range[0] - control[a], control[a] - range[1]) / scale;
+    cav_metric_note(&found->limit, beyond, t, "actuator %.60s (%d) at %.4g of %.4g .. %.4g", model->actuator[a].name, a,
+                    control[a], range[0], range[1]);
+    if (cav_servo_bounds(model, a)) note_servo(verification, t, a, control[a], residual, found);
+  }
+}
+
+// ranges of joints at q, a configuration of knot t or its image
+static void note_joints(const cav_verification *verification, int t, const double *q, cav_metric *metric) {
+  const cav_model *model = verification->model;
+  char name[32];
+  for (int j = 0; j < model->njoint; j++) {
+    const cav_joint *joint = model->joint + j;
+    if (!joint->limited || joint->type == CAV_JOINT_FREE) continue;
+    const double *x = q + joint->q;
+    double beyond = fmax(joint->range[0] - *x, *x - joint->range[1]);
+    if (joint->type == CAV_JOINT_BALL) {
+      beyond = 2 * atan2(sqrt(x[1] * x[1] + x[2] * x[2] + x[3] * x[3]), fabs(x[0])) - joint->range[1];
+    }
+    cav_metric_note(metric, beyond, t, "range of %.60s, in rad or m", joint_name(model, j, name));
+  }
+}
+
+// joint and tendon ranges; image [nq] is scratch
+static void note_ranges(const cav_verification *verification, int t, double *image, cav_metric *metric) {
+  const cav_model *model = verification->model;
+  const double *q = verification->q + t * model->nq;
+  char name[32];
+  note_joints(verification, t, q, metric);
+  if (verification->periodicity) {
+    cav_periodicity_configuration(verification->periodicity, 1, q, image);
+    note_joints(verification, t, image, metric);
+  }
+  // twist and swing of ball joints are rows where they are violated
+  for (int i = 0; i < verification->state->nrow; i++) {
+    const cav_row *row = verification->state->row + i;
+    if (row->type != CAV_ROW_LIMIT_JOINT || row->side < 2) continue;
+    cav_metric_note(metric, -row->dist, t, "%s of %.60s, in rad", row->side < 4 ? "twist" : "swing",
+                    joint_name(model, row->object, name));
+  }
+  for (int i = 0; i < model->ntendon; i++) {
+    const cav_tendon *tendon = model->tendon + i;
+    if (!tendon->limited) continue;
+    double length = verification->state->tendon_length[i];
+    double beyond = fmax(tendon->range[0] - length, length - tendon->range[1]);
+    cav_metric_note(metric, beyond, t, "range of tendon %.60s (%d)", tendon->name, i);
+  }
+}
+
+// how deep, how fast under load
+static void note_contacts(const cav_verification *verification, int t, metrics *found) {
+  const cav_model *model = verification->model;
+  char name1[32], name2[32];
+  for (int i = 0; i < verification->state->ncontact; i++) {
+    const cav_contact *contact = verification->state->contact + i;
+    const cav_pair *pair = model->pair + contact->pair;
+    cav_metric_note(&found->penetration, -contact->dist, t, "%.60s in %.60s", geom_name(model, pair->geom2, name2),
+                    geom_name(model, pair->geom1, name1));
+    if (t >= verification->rows || contact->dim < 3) continue;
+    double load = contact->impulse[0];
+    if (!(load > loaded * verification->weight * verification->h)) continue;
+    found->load += load;
+    found->slip += load * hypot(contact->velocity_next[1], contact->velocity_next[2]);
+  }
+}
+
+// inverse dynamics knot by knot, and all that is measured there
+static cav_status examine(cav_verification *verification, cav_balance *balance, metrics *found, cav_error *error) {
+  const cav_model *model = verification->model;
+  int nv = model->nv, room = 0;
+  double *work = NULL, *residual = malloc(sizeof(double) * (size_t)(2 * nv + model->nq + 1));
+  cav_status status = residual ? CAV_OK : CAV_NO_MEMORY;
+  if (status == CAV_OK && verification->periodicity) {
+    status = note_periodicity(verification, &found->periodicity);
+  } else if (status == CAV_OK) {
+    note_start(verification, &found->term);
+  }
+  note_duration(verification, &found->term);
+  for (int t = 0; t <= verification->last && status == CAV_OK; t++) {
+    const double *v = verification->v + t * nv;
+    double *u = residual + nv;
+    status = cav_inverse(model, verification->state, verification->q + t * model->nq, v, v + nv, u);
+    if (status != CAV_OK) {
+      fail(error, status, "inverse dynamics at knot %d: %s", t, cav_status_name(status));
+      break;
+    }
+    // contacts may have come
+    if (cav_constraint_check_room(verification) > room) {
+      free(work);
+      room = cav_constraint_check_room(verification);
+      work = malloc(sizeof(double) * (size_t)room);
+      if (!work) status = CAV_NO_MEMORY;
+      if (!work) break;
+    }
+    note_ranges(verification, t, residual + 2 * nv, &found->limit);
+    note_contacts(verification, t, found);
+    if (t < verification->rows) {
+      memcpy(verification->u + t * nv, u, sizeof(double) * nv);
+      note_forces(verification, t, residual, found);
+      cav_balance_add(balance, verification, t);
+    }
+    cav_constraint_check(verification, t, work, &found->term);
+  }
+  cav_balance_result(balance, verification, &found->defect);
+  free(residual);
+  free(work);
+  return status;
+}
+
+// what the model has and the claimed law leaves out, NULL if nothing
+static const char *left_out(const cav_verification *verification) {
+  const cav_options *own = &verification->model->options, *law = &verification->law;
+  if (own->gravity && !law->gravity) return "gravity";
+  if (own->constraint && !law->constraint) return "constraints";
+  if (own->contact && !law->contact) return "contacts";
+  if (own->passive && !law->passive) return "springs and dampers";
+  if (law->self_stiffness != 1) return "full contacts between links of one tree (self_stiffness below 1)";
+  return NULL;
+}
+
+double cav_verdict_replay(const cav_verdict *verdict) {
+  return fmin(CAV_TOLERANCE_REPLAY, verdict->duration) * (1 - 1e-9);
+}
+
+// writes the reason unless there is one, when a metric breaks its limit
+static void require(cav_verdict *verdict, const cav_metric *metric, double limit, const char *what, const char *help) {
+  if (metric->value <= limit || *verdict->reason) return;
+  char knot[32] = "";
+  if (metric->knot >= 0) snprintf(knot, sizeof knot, " at knot %d", metric->knot);
+  snprintf(verdict->reason, sizeof verdict->reason, "%s %.3g (at most %g)%s: %s. %s", what, metric->value, limit, knot,
+           metric->where, help);
+}
+
+// the requires in order
+static void decide(const cav_verification *verification, const metrics *found, const cav_replay *replay,
+                   cav_verdict *verdict) {
+  const char *missing = left_out(verification);
+  if (missing) {
+    snprintf(verdict->reason, sizeof verdict->reason, "the claimed contact law leaves out the model's %s", missing);
+  }
+  require(verdict, &found->unactuated, CAV_TOLERANCE_UNACTUATED, "unactuated force, fraction of weight,",
+          "More iterations, a longer motion or a start nearer to balance usually help.");
+  require(verdict, &found->limit, CAV_TOLERANCE_LIMIT, "limit exceeded by",
+          "A longer motion or a lower effort_limit usually helps.");
+  require(verdict, &found->term, CAV_TOLERANCE_CONSTRAINT, "constraint missed by",
+          "Constraints may contradict each other or the limits.");
+  require(verdict, &found->periodicity, CAV_TOLERANCE_PERIODICITY, "end of the cycle away from its start, m or rad,",
+          "It was cut or resampled after it was solved: solve it again from there.");
+  require(verdict, &found->penetration, CAV_TOLERANCE_PENETRATION, "penetration, m,",
+          "A lower softness or smoothing at the end of the schedule usually helps.");
+  require(verdict, &found->defect, CAV_TOLERANCE_MOMENTUM, "momentum defect, fraction of weight rms,",
+          "The order momentum keeps it exactly; a smaller time step usually helps too.");
+  const cav_metric slip = {verdict->slip_mean_m_s, -1, "mean over loaded contacts"};
+  require(verdict, &slip, CAV_TOLERANCE_SLIP, "slip, m/s,",
+          "A lower softness or smoothing at the end of the schedule, or a higher weight of slip, usually helps.");
+  const cav_metric step = {replay->step_error, replay->step_knot, "forward step from the knot against the next knot"};
+  require(verdict, &step, CAV_TOLERANCE_STEP, "replay error, rad or m,",
+          "Forward and inverse dynamics disagree: please report it.");
+  double least = cav_verdict_replay(verdict);
+  if (replay->open_seconds < least && !*verdict->reason) {
+    snprintf(verdict->reason, sizeof verdict->reason,
+             "open loop at the same step leaves the knots by 1e-6 after %.3g s (at least %.3g s). "
+             "A smaller tolerance of the solver usually helps.",
+             replay->open_seconds, least);
+  }
+  if (*replay->closed.lost && !*verdict->reason) {
+    snprintf(verdict->reason, sizeof verdict->reason,
+             "closed loop at a tenth of the step ends after %.3g of %.3g s: %s. "
+             "Stiffer gains, more slack in the effort limits or a slower motion usually help.",
+             replay->closed.seconds, verdict->periods * verdict->duration, replay->closed.lost);
+  }
+  verdict->certified = !*verdict->reason;
+}
+
+// numbers into the verdict
+static void fill(const cav_verification *verification, const metrics *found, const cav_replay *replay,
+                 cav_verdict *verdict) {
+  verdict->unactuated_force_max = found->unactuated.value;
+  verdict->unactuated_force_knot = found->unactuated.knot;
+  verdict->momentum_defect_rms = found->defect.value;
+  verdict->limit_violation_max = found->limit.value;
+  verdict->constraint_violation_max = found->term.value;
+  verdict->penetration_max_m = found->penetration.value;
+  verdict->slip_mean_m_s = found->load > 0 ? found->slip / found->load : 0;
+  verdict->replay_step_max_error = replay->step_error;
+  verdict->replay_same_step_max_error = replay->open_error;
+  verdict->replay_same_step_seconds = replay->open_seconds;
+  verdict->closed_loop_seconds = replay->closed.seconds;
+  verdict->closed_loop_end_error_m = replay->closed.error;
+  verdict->model_contacts_seconds = replay->own.seconds;
+  verdict->model_contacts_end_error_m = replay->own.error;
+  verdict->periodicity_error = found->periodicity.value;
+  verdict->periods = verification->periods;
+  verdict->duration = verification->last * verification->h;
+}
+
+cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
+                      const double *gain_q, const double *gain_v, cav_verdict *verdict, cav_error *error) {
+  if (!verdict) return fail(error, CAV_BAD_INPUT, "verification needs a place for its verdict");
+  verdict->certified = 0;
+  snprintf(verdict->reason, sizeof verdict->reason, "not verified");
+  cav_status status = admit(problem, trajectory, contact, gain_q, gain_v, error);
+  if (status != CAV_OK) return status;
+  cav_verification verification;
+  metrics found = {0};
+  cav_replay replay = {0};
+  cav_balance *balance = NULL;
+  if (error) *error = (cav_error){0};
+  status = cav_actuators_plannable(problem->model, error);
+  if (status != CAV_OK) return status;
+  cav_error refusal = {0};
+  status = verification_start(&verification, problem, trajectory, contact, &refusal);
+  if (refusal.status != CAV_OK && error) *error = refusal;
+  if (status == CAV_OK) balance = cav_balance_new(&verification);
+  if (status == CAV_OK && !balance) status = CAV_NO_MEMORY;
+  if (status == CAV_OK) status = examine(&verification, balance, &found, error);
+  if (status == CAV_OK) status = cav_replay_steps(&verification, &replay);
+  if (status == CAV_OK) status = cav_replay_open(&verification, &replay);
+  if (status == CAV_OK) status = cav_replay_closed(&verification, contact, gain_q, gain_v, &replay.closed);
+  if (status == CAV_OK) status = cav_replay_closed(&verification, NULL, gain_q, gain_v, &replay.own);
+  if (status == CAV_OK) {
+    *verdict->reason = 0;
+    fill(&verification, &found, &replay, verdict);
+    decide(&verification, &found, &replay, verdict);
+  }
+  cav_balance_free(balance);
+  verification_clear(&verification);
+  if (status != CAV_OK && error && !*error->text) fail(error, status, "verification: %s", cav_status_name(status));
+  return status;
+}
+
+cav_status cav_closed_loops(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
+                            const double *gain_q, const double *gain_v, struct cav_follow *claimed,
+                            struct cav_follow *own, cav_error *error) {
+  cav_verification verification;
+  cav_status status = admit(problem, trajectory, contact, gain_q, gain_v, error);
+  if (status != CAV_OK) return status;
+  cav_error refusal = {0};
+  status = verification_start(&verification, problem, trajectory, contact, &refusal);
+  if (refusal.status != CAV_OK && error) *error = refusal;
+  int nv = verification.model->nv;
+  for (int t = 0; t < verification.rows && status == CAV_OK; t++) {
+    const double *v = verification.v + t * nv;
+    status = cav_inverse(verification.model, verification.state, verification.q + t * verification.model->nq, v, v + nv,
+                         verification.u + t * nv);
+  }
+  if (status == CAV_OK) status = cav_replay_closed(&verification, contact, gain_q, gain_v, claimed);
+  if (status == CAV_OK) status = cav_replay_closed(&verification, NULL, gain_q, gain_v, own);
+  verification_clear(&verification);
+  return status;
+}

@@ -1,0 +1,44 @@
+/// What the commands of the tool share: the command line as read, exit statuses, and how errors are told.
+#ifndef CAVORT_COMMAND_H
+#define CAVORT_COMMAND_H
+
+#include "cavort/solve.h"
+
+/// Exit status of the tool.
+enum {
+  CAV_EXIT_CERTIFIED = 0, ///< or done, where nothing is certified
+  CAV_EXIT_NOT_CERTIFIED = 1,
+  CAV_EXIT_BAD_INPUT = 2,
+  CAV_EXIT_INTERNAL = 3,
+  CAV_EXIT_INTERRUPTED = 130
+};
+
+enum { CAV_COMMAND_IPOPT = 32 };
+
+/// A command line as read by main.c.
+typedef struct cav_command_line {
+  const char *operand; ///< MODEL, PROBLEM, DIR or TOPIC; NULL: none
+  int noperand;        ///< of commands that take several
+  char **operands;     ///< [noperand]
+  const char *model;   ///< --model, NULL: as the problem says
+  const char *output;  ///< -o, NULL: named after the problem
+  cav_solver solver;
+  int threads;
+  int strategies; ///< --strategies: 0 auto, else how many at once
+  int resume, quiet, json;
+  const char *methods; ///< --methods, NULL: own
+  int nipopt;          ///< --ipopt, any number of times
+  cav_ipopt_option ipopt[CAV_COMMAND_IPOPT];
+} cav_command_line;
+
+int cav_command_inspect(const cav_command_line *line);
+int cav_command_explain(const cav_command_line *line);
+int cav_command_solve(const cav_command_line *line);
+int cav_command_study(const cav_command_line *line);
+int cav_command_verify(const cav_command_line *line);
+int cav_command_view(const cav_command_line *line);
+
+/// Prints "cavort: text" on standard error; returns the exit status that goes with the error's status.
+int cav_command_fail(const cav_error *error);
+
+#endif

@@ -1,0 +1,71 @@
+/// cavort explain: what the motion of a result folder misses and which constraints pull against each other, from its files. Exit
+/// status 0 if every constraint holds, 1 if not.
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "certificate.h"
+#include "command.h"
+#include "constraint_table.h"
+#include "result.h"
+
+static void print_when(const cav_reason *r) {
+  printf("  knot %d, %.4g s", r->row.knot, r->time);
+  if (r->last > r->first) printf(" (knots %d to %d)", r->first, r->last);
+  printf(": %s\n    %s\n", r->what, r->cure);
+}
+
+static void print_table(const cav_explanation *e) {
+  printf(e->nviolation ? "missed, by size:\n" : "nothing is missed\n");
+  for (int i = 0; i < e->nviolation; i++) {
+    printf("%2d. %.3g", i + 1, e->violation[i].violation);
+    print_when(&e->violation[i]);
+  }
+  if (e->nconflict) printf(e->met ? "what the cost hangs on:\n" : "what pulls against each other, by share:\n");
+  for (int i = 0; i < e->nconflict; i++) {
+    printf("%2d. %.0f %%", i + 1, 100 * e->conflict[i].fraction);
+    print_when(&e->conflict[i]);
+  }
+}
+
+static void print_reasons(const char *name, int n, const cav_reason *reason) {
+  printf(",\n  \"%s\": [", name);
+  for (int i = 0; i < n; i++) {
+    const cav_reason *r = &reason[i];
+    printf(
+        "%s\n    {\"knot\": %d, \"first\": %d, \"last\": %d, \"time\": %.17g, \"violation\": %.17g, \"pull\": %.17g, "
+        "\"share\": %.17g,\n     \"what\": ",
+        i ? "," : "", r->row.knot, r->first, r->last, r->time, r->violation, r->pull, r->fraction);
+    cav_certificate_json_text(stdout, r->what);
+    printf(",\n     \"cure\": ");
+    cav_certificate_json_text(stdout, r->cure);
+    printf("}");
+  }
+  printf("]");
+}
+
+int cav_command_explain(const cav_command_line *line) {
+  cav_error error = {0};
+  cav_result *result = cav_result_read(line->operand, line->model, &error);
+  if (!result) return cav_command_fail(&error);
+  char *path = cav_result_path(line->operand, "rows.csv");
+  cav_binding *row = NULL;
+  int nrow = 0;
+  static cav_explanation explanation; // some kilobytes
+  cav_status status = path ? cav_rows_read(path, &nrow, &row, &error) : (error.status = CAV_NO_MEMORY);
+  if (!status)
+    status =
+        cav_explain(result->problem, result->trajectory, &result->problem->contact, nrow, row, &explanation, &error);
+  if (!status && line->json) {
+    printf("{\n  \"met\": %s", explanation.met ? "true" : "false");
+    print_reasons("violation", explanation.nviolation, explanation.violation);
+    print_reasons("conflict", explanation.nconflict, explanation.conflict);
+    printf("\n}\n");
+  } else if (!status) {
+    print_table(&explanation);
+  }
+  free(path);
+  free(row);
+  cav_result_free(result);
+  if (status) return cav_command_fail(&error);
+  return explanation.nviolation ? CAV_EXIT_NOT_CERTIFIED : CAV_EXIT_CERTIFIED;
+}

@@ -1,0 +1,249 @@
+/// cavort solve: reads a problem, solves it, certifies the result, writes its folder. What the stated guess does not lead to is
+/// tried by other strategies, in processes (race.c). The first Ctrl-C ends the solve with
+/// the best iterate saved; another one, a second later, ends the program at once.
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "certificate.h"
+#include "command.h"
+#include "file.h"
+#include "race.h"
+#include "result.h"
+
+static volatile sig_atomic_t interrupted, first_second;
+
+// asks for the end; again after a second has passed: ends at once. Some parents deliver one interrupt twice
+static void interrupt(int signal_number) {
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  if (!interrupted) {
+    interrupted = 1;
+    first_second = (sig_atomic_t)now.tv_sec;
+  } else if (now.tv_sec > first_second + 1) {
+    signal(signal_number, SIG_DFL);
+    raise(signal_number);
+  }
+}
+
+static void catch_interrupts(void) {
+  struct sigaction action = {.sa_handler = interrupt};
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, NULL);
+  sigaction(SIGTERM, &action, NULL);
+}
+
+// what the progress line remembers
+typedef struct ticker {
+  int quiet, terminal;
+  int shown, stage;
+  const char *phase;
+  double last; // s
+} ticker;
+
+static void show_progress(ticker *tick, const cav_progress *p) {
+  int news = !tick->phase || strcmp(p->phase, tick->phase) || p->stage != tick->stage;
+  if (!news && p->seconds - tick->last < (tick->terminal ? 0.1 : 1.0)) return;
+  if (tick->terminal && tick->shown && news && p->seconds - tick->last < 0.05) return;
+  tick->phase = p->phase;
+  tick->stage = p->stage;
+  tick->last = p->seconds;
+  tick->shown = 1;
+  fprintf(stderr,
+          "%s%-12s %2d/%-2d  iteration %4d  cost %9.4g  unactuated %8.2e at knot %3d  violation %8.2e  %6.1f s%s",
+          tick->terminal ? "\r" : "", p->phase, p->stage, p->stages, p->iteration, p->cost, p->unactuated, p->knot,
+          p->violation, p->seconds, tick->terminal ? "\033[K" : "\n");
+  fflush(stderr);
+}
+
+static int observe(void *context, const cav_progress *progress) {
+  ticker *tick = context;
+  if (!tick->quiet) show_progress(tick, progress);
+  return interrupted;
+}
+
+// folder of the result: as asked, or NAME.result; NULL if memory runs out
+static char *folder_of(const cav_command_line *line, const cav_problem *problem) {
+  if (line->output) return strdup(line->output);
+  const char *name = problem->name[0] ? problem->name : "motion";
+  char *folder = malloc(strlen(name) + 8);
+  if (!folder) return NULL;
+  sprintf(folder, "%s.result", name);
+  // a name is no path
+  for (char *c = folder; *c; c++) {
+    if (*c == '/') *c = '-';
+  }
+  return folder;
+}
+
+// the folder, made; refuses one whose problem.xml is the problem file itself, which would be overwritten
+static cav_status prepare_folder(const char *folder, const cav_command_line *line, const cav_problem *problem,
+                                 cav_error *error) {
+  cav_status status = cav_result_folder(folder, error);
+  if (status || problem->solved) return status;
+  char *copy = cav_result_path(folder, "problem.xml");
+  char *there = copy ? realpath(copy, NULL) : NULL, *here = realpath(line->operand, NULL);
+  if (there && here && !strcmp(there, here)) {
+    status = cav_file_fail(error, CAV_BAD_INPUT, 0,
+                           "%s: holds the problem file itself, which the result would overwrite; choose another folder",
+                           folder);
+  }
+  free(copy);
+  free(there);
+  free(here);
+  return status;
+}
+
+// trajectory to start from: the folder's, on this problem's knots
+static cav_trajectory *resume_from(const char *folder, const cav_problem *problem, cav_error *error) {
+  char *path = cav_result_path(folder, "trajectory.csv");
+  cav_trajectory *start = path ? cav_trajectory_read(path, problem->model, error) : NULL;
+  double h = problem->timestep, duration = start ? (start->nknot - 1) * start->timestep : 0;
+  if (problem->duration_most > 0) h = duration / round(problem->duration / h);
+  if (start && problem->duration_most == 0 && fabs(duration - problem->duration) > 0.5 * h) {
+    cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: lasts %g s, the problem %g s; remove --resume to start anew", path,
+                  duration, problem->duration);
+    cav_trajectory_free(start);
+    start = NULL;
+  }
+  if (start && fabs(start->timestep - h) > 1e-9 * h) {
+    cav_trajectory *other = cav_trajectory_resample(problem->model, start, h);
+    if (!other) cav_file_fail(error, CAV_NO_MEMORY, 0, "%s: no memory", path);
+    cav_trajectory_free(start);
+    start = other;
+  }
+  if (!path) cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
+  free(path);
+  return start;
+}
+
+// what saving needs to know
+typedef struct destination {
+  const cav_command_line *line;
+  const char *folder;
+} destination;
+
+static const char *why_stopped(int status) {
+  if (status == CAV_INTERRUPTED) return "interrupted; the best iterate is saved";
+  if (status == CAV_NOT_FINITE) return "a number that is not finite came up; the last finite iterate is saved";
+  return "the solver did not reach its tolerance; the best iterate is saved";
+}
+
+// writes a result and tells its verdict; the exit status
+static int save(void *context, const cav_problem *problem, const cav_solution *solution,
+                const cav_race_report *report) {
+  const destination *to = context;
+  const cav_command_line *line = to->line;
+  const cav_verdict *verdict = &report->verdict;
+  cav_error error = {0};
+  if (report->status) fprintf(stderr, "cavort: %s\n", report->text[0] ? report->text : why_stopped(report->status));
+  cav_status status = cav_result_write(to->folder, problem, solution, &error);
+  if (!status) status = cav_result_write_verdict(to->folder, problem, verdict, &error);
+  if (status) return cav_command_fail(&error);
+  if (line->json) cav_certificate_json(stdout, problem->name, problem->model->name, verdict);
+  if (!line->quiet && !line->json) cav_certificate_print(stdout, problem->name, problem->model->name, verdict);
+  // the page is a convenience: without three.js everything else stands
+  if (cav_result_write_page(to->folder, problem, solution->trajectory, &solution->contact, verdict, &error)) {
+    fprintf(stderr, "cavort: no page: %s\n", error.text);
+  }
+  if (!line->quiet && !line->json) printf("result: %s\n", to->folder);
+  if (report->status == CAV_INTERRUPTED) return CAV_EXIT_INTERRUPTED;
+  return verdict->certified ? CAV_EXIT_CERTIFIED : CAV_EXIT_NOT_CERTIFIED;
+}
+
+// in processes whose lines no one reads
+static int observe_quietly(void *context, const cav_progress *progress) {
+  (void)context, (void)progress;
+  return interrupted;
+}
+
+static void tell_more(const cav_race *race) {
+  const cav_verdict *v = &race->entry[0].report.verdict;
+  fprintf(stderr, "not certified: %s\ntrying by other strategies:", v->reason);
+  for (int i = 1; i < race->n; i++) fprintf(stderr, " %s", race->entry[i].strategy.name);
+  fprintf(stderr, " (%d at a time; --strategies 1 for none)\n", race->processes);
+}
+
+// as the command line says: the first alone and the others where it does not do, or so many at once
+static cav_status run_race(cav_race *race, const cav_command_line *line, ticker *tick, cav_error *error) {
+  int at_once = line->strategies > 1;
+  cav_status status = CAV_OK;
+  if (!at_once) {
+    status = cav_race_first(race, error);
+    if (tick->terminal && tick->shown) fputs("\r\033[K", stderr);
+    if (status || race->entry[0].report.verdict.certified || race->n == 1 || interrupted) return status;
+    if (race->tell) tell_more(race);
+  }
+  return cav_race_finish(race, at_once, error);
+}
+
+static int solve(const cav_command_line *line, const cav_problem *problem, const char *folder) {
+  cav_error error = {0};
+  cav_status status = prepare_folder(folder, line, problem, &error);
+  if (status) return cav_command_fail(&error);
+  cav_trajectory *start = line->resume ? resume_from(folder, problem, &error) : NULL;
+  if (line->resume && !start) return cav_command_fail(&error);
+  ticker tick = {.quiet = line->quiet, .terminal = isatty(STDERR_FILENO)};
+  destination to = {line, folder};
+  cav_race race = {.problem = problem,
+                   .start = start,
+                   .options = cav_solve_options_default(),
+                   .quiet = observe_quietly,
+                   .interrupted = &interrupted,
+                   .processes = line->threads,
+                   .tell = !line->quiet,
+                   .save = save,
+                   .context = &to};
+  race.options.solver = line->solver;
+  race.options.threads = line->threads;
+  race.options.nipopt = line->nipopt;
+  race.options.ipopt = line->ipopt;
+  race.options.observer = observe;
+  race.options.observer_context = &tick;
+  catch_interrupts();
+  // a start that is given is the only one; Ipopt alone knows no schedule
+  int most = line->resume ? 1 : line->strategies ? line->strategies : CAV_STRATEGIES;
+  status = cav_race_open(&race, most, line->solver != CAV_SOLVER_IPOPT, &error);
+  if (!status) status = run_race(&race, line, &tick, &error);
+  int best = status ? -1 : cav_race_best(&race, line->strategies > 1), done = CAV_EXIT_INTERNAL;
+  if (best >= 0) {
+    done = cav_race_save(&race, best);
+    char *path = cav_result_path(folder, "strategies.csv");
+    status = path ? cav_race_write(&race, best, path, &error) : cav_file_fail(&error, CAV_NO_MEMORY, 0, "no memory");
+    free(path);
+  } else if (!status) {
+    status = cav_file_fail(&error, CAV_NOT_CONVERGED, 0, "no strategy led to a motion");
+  }
+  if (race.n > 1 && race.tell && best > 0) fprintf(stderr, "kept: strategy %s\n", race.entry[best].strategy.name);
+  if (status) done = cav_command_fail(&error);
+  cav_race_close(&race);
+  cav_trajectory_free(start);
+  return done;
+}
+
+int cav_command_solve(const cav_command_line *line) {
+  cav_error error = {0};
+  if (line->nipopt && line->solver == CAV_SOLVER_GAUSS_NEWTON) {
+    cav_file_fail(&error, CAV_BAD_INPUT, 0, "--ipopt needs --solver ipopt or both: the own solver has no such options");
+    return cav_command_fail(&error);
+  }
+  cav_problem *problem = cav_problem_load(line->operand, line->model, &error);
+  if (!problem) return cav_command_fail(&error);
+  for (int i = 0; i < problem->model->nwarning && !line->quiet; i++)
+    fprintf(stderr, "cavort: %s\n", problem->model->warning[i]);
+  char *folder = folder_of(line, problem);
+  int done;
+  if (folder) {
+    done = solve(line, problem, folder);
+  } else {
+    error = (cav_error){.status = CAV_NO_MEMORY};
+    done = cav_command_fail(&error);
+  }
+  free(folder);
+  cav_problem_free(problem);
+  return done;
+}

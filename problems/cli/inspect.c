@@ -1,0 +1,429 @@
+/// cavort inspect: what a model holds, what an evaluation of it runs and leaves out and why; for a problem also its terms and
+/// schedule in words. Counts come from the compiled model, times from running it. Solves nothing.
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "command.h"
+#include "file.h"
+#include "workspace.h"
+
+static const char *const geom_name[] = {"plane",    "sphere", "capsule", "ellipsoid",
+                                        "cylinder", "box",    "mesh",    "height field"};
+static const char *const joint_name[] = {"free", "ball", "slide", "hinge"};
+
+// name of the first element of a file, "" if there is none in its first part
+static void first_element(const char *path, char name[32]) {
+  static char text[65536];
+  FILE *file = fopen(path, "r");
+  size_t n = file ? fread(text, 1, sizeof text - 1, file) : 0;
+  if (file) fclose(file);
+  text[n] = 0;
+  name[0] = 0;
+  for (const char *at = strchr(text, '<'); at; at = strchr(at, '<')) {
+    const char *end = !strncmp(at, "<!--", 4) ? strstr(at, "-->") : at[1] == '?' ? strstr(at, "?>") : NULL;
+    if (end) {
+      at = end;
+      continue;
+    }
+    size_t length = strcspn(at + 1, " \t\r\n/>");
+    snprintf(name, 32, "%.*s", length < 31 ? (int)length : 31, at + 1);
+    return;
+  }
+}
+
+static void print_sizes(const cav_model *m) {
+  int tree = 0;
+  for (int i = 1; i < m->nlink; i++) tree += m->link[i].parent == 0;
+  printf("model %s\n", m->name[0] ? m->name : "without a name");
+  printf("  positions %d, velocities %d, controls %d, mass %.4g kg, step %g s, gravity %g %g %g m/s^2\n", m->nq, m->nv,
+         m->nu, m->mass, m->timestep, m->gravity[0], m->gravity[1], m->gravity[2]);
+  printf("  %d bodies in %d moving links in %d tree%s, %d geoms, %d sites, %d sensors, %d keyframes, %.1f kB\n\n",
+         m->nbody - 1, m->nlink - 1, tree, tree == 1 ? "" : "s", m->ngeom, m->nsite, m->nsensor, m->nkey,
+         (double)m->bytes / 1024);
+}
+
+// "name type lower..upper" of one joint
+static void print_joint(const cav_joint *joint) {
+  double scale = joint->type == CAV_JOINT_SLIDE ? 1 : 180 / M_PI;
+  printf("%s %s", joint->name[0] ? joint->name : "(no name)", joint_name[joint->type]);
+  if (joint->limited && joint->type == CAV_JOINT_BALL) printf(" up to %.3g deg", scale * joint->range[1]);
+  if (joint->twist_limited) printf(" twist %.3g..%.3g deg", scale * joint->twist[0], scale * joint->twist[1]);
+  if (joint->swing_limited) printf(" swing up to %.3g deg", scale * joint->swing);
+  if (joint->limited && joint->type != CAV_JOINT_BALL) {
+    printf(" %.3g..%.3g %s", scale * joint->range[0], scale * joint->range[1],
+           joint->type == CAV_JOINT_SLIDE ? "m" : "deg");
+  }
+}
+
+static void print_bodies(const cav_model *m) {
+  printf("%-20s %-20s %8s  %s\n", "body", "on", "kg", "joints");
+  for (int i = 1; i < m->nbody; i++) {
+    const cav_body *body = &m->body[i];
+    const cav_link *link = &m->link[body->link];
+    printf("%-20s %-20s %8.4g  ", body->name[0] ? body->name : "(no name)",
+           body->parent > 0 ? m->body[body->parent].name : "world", body->mass);
+    if (body->link == 0) printf("fixed to the world");
+    if (body->link > 0 && link->body != i) printf("fixed to %s", m->body[link->body].name);
+    for (int j = link->joint; body->link > 0 && link->body == i && j < link->joint + link->njoint; j++) {
+      if (j > link->joint) printf(", ");
+      print_joint(&m->joint[j]);
+    }
+    printf("\n");
+  }
+  printf("\n");
+}
+
+// what a model has, counted
+typedef struct census {
+  int buoyant, drifting, quaternion, spring, damper, armature, joint_limit, friction;
+  int moving, tendon_spatial, tendon_spring, tendon_damper, tendon_limit, tendon_friction;
+  int world_pair, body_pair, convex_pair, dim[7];
+  int types[CAV_GEOM_TYPES][CAV_GEOM_TYPES];
+} census;
+
+static void count_joints(const cav_model *m, census *c) {
+  for (int j = 0; j < m->njoint; j++) {
+    c->quaternion += m->joint[j].type == CAV_JOINT_FREE || m->joint[j].type == CAV_JOINT_BALL;
+    c->spring += m->joint[j].stiffness != 0;
+    c->joint_limit += m->joint[j].limited || m->joint[j].twist_limited || m->joint[j].swing_limited;
+  }
+  for (int d = 0; d < m->nv; d++) {
+    c->damper += m->dof[d].damping != 0;
+    c->armature += m->dof[d].armature != 0;
+    c->friction += m->dof[d].frictionloss > 0;
+  }
+  for (int i = 1; i < m->nbody; i++) {
+    const cav_body *body = &m->body[i];
+    int ellipsoids = 0;
+    for (int g = body->geom; g < body->geom + body->ngeom; g++) ellipsoids += m->geom[g].fluid;
+    c->buoyant += body->link > 0 && body->buoyancy != 0;
+    if (body->link > 0) c->drifting += ellipsoids ? ellipsoids : body->mass > 0;
+  }
+  for (int i = 0; i < m->nu; i++) c->moving += !m->actuator[i].constant;
+  for (int i = 0; i < m->ntendon; i++) {
+    c->tendon_spatial += m->tendon[i].npath > 0;
+    c->tendon_spring += m->tendon[i].stiffness != 0;
+    c->tendon_damper += m->tendon[i].damping != 0;
+    c->tendon_limit += m->tendon[i].limited;
+    c->tendon_friction += m->tendon[i].frictionloss > 0;
+  }
+}
+
+static void count_pairs(const cav_model *m, census *c) {
+  for (int p = 0; p < m->npair; p++) {
+    const cav_pair *pair = &m->pair[p];
+    int world = !m->geom[pair->geom1].link || !m->geom[pair->geom2].link;
+    c->world_pair += world;
+    c->body_pair += !world;
+    c->dim[pair->dim]++;
+    c->types[m->geom[pair->geom1].type][m->geom[pair->geom2].type]++;
+  }
+}
+
+// one stage: runs with its count, or left out with the reason
+static void print_stage(const char *name, int count, const char *unit, const char *why_not) {
+  if (count)
+    printf("  runs      %-24s %d %s\n", name, count, unit);
+  else
+    printf("  left out  %-24s %s\n", name, why_not);
+}
+
+static void print_pairs(const cav_model *m, const census *c) {
+  const char *why =
+      m->options.contact && m->options.constraint ? "no two geoms that may touch" : "switched off by the file";
+  print_stage("contacts with the world", c->world_pair, "pairs", why);
+  print_stage("contacts between links", c->body_pair, "pairs", why);
+  for (int a = 0; a < CAV_GEOM_TYPES; a++) {
+    for (int b = a; b < CAV_GEOM_TYPES; b++) {
+      if (c->types[a][b]) printf("              %s with %s: %d\n", geom_name[a], geom_name[b], c->types[a][b]);
+    }
+  }
+  for (int d = 1; d < 7; d++) {
+    static const char *const what[] = {
+        "", "no friction", "", "sliding", "sliding and torsion", "", "sliding, torsion and rolling"};
+    if (c->dim[d]) printf("              %d row%s each (%s): %d\n", d, d > 1 ? "s" : "", what[d], c->dim[d]);
+  }
+}
+
+static void print_stages(const cav_model *m) {
+  census c = {0};
+  count_joints(m, &c);
+  count_pairs(m, &c);
+  int on = m->options.passive, held = m->options.constraint;
+  const char *off = "switched off by the file";
+  printf("an evaluation of the inverse\n");
+  print_stage("poses and velocities", m->nlink - 1, "links", "nothing moves");
+  print_stage("quaternions", c.quaternion, "joints", "no free or ball joint");
+  print_stage("Newton-Euler, one pass", m->nlink - 1, "links", "nothing moves");
+  print_stage("gravity", m->options.gravity ? m->nlink - 1 : 0, "links", off);
+  print_stage("armature", c.armature, "dofs", "no joint has any");
+  print_stage("springs", on ? c.spring : 0, "joints", on ? "no joint has stiffness" : off);
+  print_stage("dampers", on ? c.damper : 0, "dofs", on ? "no joint has damping" : off);
+  int medium = m->density > 0 || m->viscosity > 0;
+  print_stage("gravity compensation", on ? c.buoyant : 0, "bodies", on ? "no body asks for it" : off);
+  print_stage("drag of a medium", on && medium ? c.drifting : 0, "shapes", on ? "no density, no viscosity" : off);
+  print_stage("joint limits", held ? c.joint_limit : 0, "joints", held ? "no joint is limited" : off);
+  print_stage("friction loss", held ? c.friction : 0, "dofs", held ? "no joint has any" : off);
+  print_stage("tendon lengths", m->ntendon, "tendons", "no tendon");
+  print_stage("strings through sites", c.tendon_spatial, "tendons", "no tendon is spatial");
+  print_stage("tendon springs", on ? c.tendon_spring : 0, "tendons", on ? "no tendon has stiffness" : off);
+  print_stage("tendon dampers", on ? c.tendon_damper : 0, "tendons", on ? "no tendon has damping" : off);
+  print_stage("tendon limits", held ? c.tendon_limit : 0, "tendons", held ? "no tendon is limited" : off);
+  print_stage("tendon friction loss", held ? c.tendon_friction : 0, "tendons", held ? "no tendon has any" : off);
+  print_pairs(m, &c);
+  print_stage("equality constraints", held ? m->nequality : 0, "ties", held ? "no equality constraint" : off);
+  for (int t = 0; t <= CAV_EQUALITY_DISTANCE && held; t++) {
+    static const char *const what[] = {"points, 3 rows", "frames, 6 rows", "joints, 1 row", "tendons, 1 row",
+                                       "distances, 1 row"};
+    int n = 0;
+    for (int i = 0; i < m->nequality; i++) n += m->equality[i].type == (cav_equality_type)t;
+    if (n) printf("              %s each: %d\n", what[t], n);
+  }
+  print_stage("actuators", m->nu, "actuators", "nothing is driven");
+  print_stage("moments that follow q", c.moving, "actuators", "all moments are constant");
+  print_stage("sensors", m->nsensor, "sensors, each when it is read", "none in the file");
+  printf("  no matrix is formed or factorised\n");
+  const char *missing = cav_derivatives_missing(m);
+  printf("  derivatives %s%s\n", missing ? "by differences, as there is no closed form for " : "in closed form",
+         missing ? missing : "");
+}
+
+// one line of the table of costs; what takes neither time nor memory says so
+static void print_cost(const char *name, double seconds, size_t bytes) {
+  printf("  %-44s", name);
+  if (seconds > 0)
+    printf(" %8.2f us", 1e6 * seconds);
+  else
+    printf(" %11s", seconds < 0 ? "" : "0");
+  printf(" %8.1f kB\n", (double)bytes / 1024);
+}
+
+// time of the stages at the file's posture, at rest, and the memory of a state
+static void print_costs(const cav_model *m) {
+  cav_state *state = cav_state_new(m);
+  double *v = calloc((size_t)m->nv, sizeof *v);
+  cav_profile time = {0};
+  size_t bytes[CAV_PARTS], all = 0;
+  cav_status status = state && v ? cav_profile_inverse(m, state, m->q0, v, v, &time) : CAV_NO_MEMORY;
+  if (status == CAV_OK) {
+    cav_state_bytes(state, bytes);
+    for (int i = 0; i < CAV_PARTS; i++) all += bytes[i];
+    printf("\nits time, at the posture of the file with %d contacts, and the memory of a state\n", state->ncontact);
+    print_cost("poses and tendon lengths", time.poses, bytes[CAV_PART_POSES] + bytes[CAV_PART_TENDONS]);
+    print_cost("limits and friction losses", time.rows, bytes[CAV_PART_ROWS]);
+    print_cost("search of contacts", time.contacts, bytes[CAV_PART_CONTACTS]);
+    print_cost("equality constraints", time.equalities, bytes[CAV_PART_EQUALITY]);
+    print_cost("laws of contacts", time.laws, 0);
+    print_cost("Newton-Euler, forces of joints and tendons", time.motion, bytes[CAV_PART_MOTION]);
+    print_cost("impulses of all constraints", time.impulses, 0);
+    print_cost("actuators, where they are asked for", -1, bytes[CAV_PART_ACTUATION]);
+    print_cost("inertia matrix, forward steps only", -1, bytes[CAV_PART_INERTIA]);
+    print_cost("solvers, once they are called", -1, bytes[CAV_PART_SOLVERS]);
+    print_cost("the whole", time.whole, all);
+  } else {
+    printf("\nno evaluation at the posture of the file: %s\n", cav_status_name(status));
+  }
+  cav_state_free(state);
+  free(v);
+}
+
+static void print_warnings(const cav_model *m) {
+  if (m->nwarning) printf("\nunderstood but left aside\n");
+  for (int i = 0; i < m->nwarning; i++) printf("  %s\n", m->warning[i]);
+}
+
+// "at 1.2 s", "from 0.5 to 1 s", or nothing for the whole horizon
+static void print_window(const cav_problem *p, const cav_term *term) {
+  double from = term->from, to = term->to < 0 ? p->duration : term->to;
+  if (to - from < 1e-9)
+    printf(" at %g s", from);
+  else if (from > 0 || to < p->duration)
+    printf(" from %g to %g s", from, to);
+}
+
+static void print_quantity(const cav_problem *p, const cav_term *term) {
+  static const char *const quantity[] = {"sensor",
+                                         "posture",
+                                         "velocity",
+                                         "acceleration",
+                                         "effort of actuators",
+                                         "gap of loaded contacts",
+                                         "slip of loaded contacts",
+                                         "impact of loaded contacts",
+                                         "overlap of links",
+                                         "force of contacts"};
+  static const char *const dofs[] = {"all dofs", "translation of free roots", "rotation of free roots",
+                                     "all but free roots", "joint"};
+  const cav_model *m = p->model;
+  if (term->quantity != CAV_QUANTITY_SENSOR) printf("%s", quantity[term->quantity]);
+  if (term->quantity == CAV_QUANTITY_CONFIGURATION || term->quantity == CAV_QUANTITY_VELOCITY ||
+      term->quantity == CAV_QUANTITY_ACCELERATION) {
+    printf(" of %s%s%s", dofs[term->dofs], term->dofs == CAV_DOFS_ONE ? " " : "",
+           term->dofs == CAV_DOFS_ONE ? m->joint[term->joint].name : "");
+  }
+  if (term->body > 0) printf(" of body %s", m->body[term->body].name);
+  if (term->norm == CAV_NORM_ABSOLUTE) printf(", absolute beyond %g", term->scale);
+  if (term->quantity != CAV_QUANTITY_SENSOR) return;
+  int i = term->sensor.object;
+  const char *object = "";
+  switch (term->sensor.object_type) {
+    case CAV_OBJECT_BODY:
+    case CAV_OBJECT_XBODY:
+      object = m->body[i].name;
+      break;
+    case CAV_OBJECT_GEOM:
+      object = m->geom[i].name;
+      break;
+    case CAV_OBJECT_SITE:
+      object = m->site[i].name;
+      break;
+    case CAV_OBJECT_JOINT:
+      object = m->joint[i].name;
+      break;
+    case CAV_OBJECT_TENDON:
+      object = m->tendon[i].name;
+      break;
+    case CAV_OBJECT_ACTUATOR:
+      object = m->actuator[i].name;
+      break;
+    default:
+      break;
+  }
+  printf("%s of %s", cav_sensor_rule_of(term->sensor.type)->name, object);
+  if (term->component >= 0 && term->sensor.dim > 1) printf(", %c", "xyz"[term->component]);
+}
+
+// what a term is held against
+static void print_target(const cav_problem *p, const cav_term *term) {
+  if (term->use == CAV_USE_RANGE) {
+    if (isfinite(term->lower)) printf(" at least %g", term->lower);
+    if (isfinite(term->upper)) printf("%s at most %g", isfinite(term->lower) ? " and" : "", term->upper);
+    return;
+  }
+  if (term->nwaypoint) {
+    printf(" along %d waypoints", term->nwaypoint);
+  } else if (term->quantity == CAV_QUANTITY_CONFIGURATION) {
+    printf(" to %s", term->target ? "its own posture" : "the goal");
+  } else if (term->quantity == CAV_QUANTITY_SENSOR && term->target) {
+    int rotation = term->sensor.dim == 4, one = term->component >= 0 && !rotation;
+    printf(" to");
+    for (int i = one ? term->component : 0; i < (one ? term->component + 1 : term->sensor.dim); i++)
+      printf(" %.4g", term->target[i]);
+  }
+  (void)p;
+}
+
+static void print_terms(const cav_problem *p, int hard) {
+  int n = 0;
+  for (int i = 0; i < p->nterm; i++) {
+    const cav_term *term = &p->term[i];
+    if ((term->use != CAV_USE_COST) != hard) continue;
+    if (!n++) printf("%s\n", hard ? "constraints" : "costs");
+    if (hard)
+      printf("  must be           ");
+    else
+      printf("  weight %-10.4g ", term->weight);
+    print_quantity(p, term);
+    print_target(p, term);
+    print_window(p, term);
+    printf("\n");
+  }
+}
+
+// where a posture has its centre of mass and where it touches: whether it could stand
+static cav_status print_posture(const cav_problem *p, const char *name, const double *q, cav_error *error) {
+  static const double touching = 0.005; // m
+  cav_state *state = cav_state_new(p->model);
+  if (!state) return cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for a state");
+  state->options.smoothing = state->options.smoothing_self = touching; // so that contacts are seen before they touch
+  cav_status status = cav_position(p->model, state, q);
+  if (status) cav_file_fail(error, status, 0, "the posture of the %s cannot be evaluated", name);
+  double com[3], low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, depth = 0;
+  int n = 0;
+  if (!status) cav_momentum(p->model, state, p->v_start, com, NULL, NULL);
+  for (int i = 0; i < state->ncontact && !status; i++) {
+    const cav_contact *c = &state->contact[i];
+    depth = fmax(depth, -c->dist);
+    if (c->dist > touching || (c->link1 != 0 && c->link2 != 0)) continue;
+    for (int k = 0; k < 3; k++) low[k] = fmin(low[k], c->pos[k]), high[k] = fmax(high[k], c->pos[k]);
+    n++;
+  }
+  if (!status) {
+    printf("  %-6s centre of mass at %.3f %.3f %.3f m", name, com[0], com[1], com[2]);
+    if (n) printf(", touches the world in x %.3f..%.3f, y %.3f..%.3f", low[0], high[0], low[1], high[1]);
+    printf(depth > 0 ? ", deepest penetration %.1f mm\n" : "\n", 1e3 * depth);
+  }
+  cav_state_free(state);
+  return status;
+}
+
+static cav_status print_problem(const cav_problem *p, cav_error *error) {
+  static const char *const order[] = {"euler", "midpoint", "momentum"};
+  int knots = (int)lround(p->duration / p->timestep) + 1;
+  printf("problem %s\n", p->name[0] ? p->name : "without a name");
+  printf("  %g s in %d knots of %g s, order %s, %s\n", p->duration, knots, p->timestep, order[p->order],
+         p->cycle.on        ? "a cycle"
+         : p->close_at_rest ? "at rest after the last knot"
+                            : "open after the last knot");
+  if (p->duration_most > 0)
+    printf("  duration free from %g to %g s, weight %g\n", p->duration_least, p->duration_most, p->duration_weight);
+  if (p->cycle.on)
+    printf("  a period moves by %g %g %g m and turns by %g degrees%s\n", p->cycle.translation[0],
+           p->cycle.translation[1], p->cycle.translation[2], p->cycle.rotation * 180 / M_PI,
+           p->cycle.mirror == CAV_MIRROR_X   ? ", mirrored along x"
+           : p->cycle.mirror == CAV_MIRROR_Y ? ", mirrored along y"
+                                             : "");
+  cav_status status = print_posture(p, "start", p->q_start, error);
+  if (!status) status = print_posture(p, "goal", p->q_goal, error);
+  if (status) return status;
+  printf("  %d unknowns; the guess %s", (knots - 1) * p->model->nv + (p->duration_most > 0),
+         p->guess == CAV_GUESS_HOLD ? "holds the start" : "goes from start to goal");
+  if (p->nguess_pose > 0) printf(" by %d postures", p->nguess_pose);
+  if (p->guess_height > 0) printf(", with an arc of %g m from %g to %g s", p->guess_height, p->guess_from, p->guess_to);
+  printf("\n  actuators up to %g of their limits, joints and tendons %g rad or m inside theirs\n", p->effort_limit,
+         p->limit_margin);
+  print_terms(p, 0);
+  print_terms(p, 1);
+  const cav_stage_options *a = &p->schedule.first, *b = &p->schedule.last;
+  printf("schedule: %d stages, geometric\n", p->schedule.stages);
+  printf("  softness %g to %g, time constant %g to %g steps, smoothing %g to %g m (self %g to %g)\n", a->softness,
+         b->softness, a->time_constant, b->time_constant, a->smoothing, b->smoothing, a->smoothing_self,
+         b->smoothing_self);
+  printf("  penalty %g to %g, iterations %d to %d, tolerance %g to %g\n\n", a->penalty, b->penalty, a->iterations,
+         b->iterations, a->tolerance, b->tolerance);
+  return CAV_OK;
+}
+
+static void print_model(const cav_model *m) {
+  print_sizes(m);
+  print_bodies(m);
+  print_stages(m);
+  print_costs(m);
+  print_warnings(m);
+}
+
+int cav_command_inspect(const cav_command_line *line) {
+  cav_error error = {0};
+  char root[32];
+  first_element(line->operand, root);
+  if (!strcmp(root, "problem")) {
+    cav_problem *problem = cav_problem_load(line->operand, line->model, &error);
+    if (!problem) return cav_command_fail(&error);
+    cav_status status = print_problem(problem, &error);
+    if (!status) print_model(problem->model);
+    cav_problem_free(problem);
+    return status ? cav_command_fail(&error) : 0;
+  }
+  if (line->model) {
+    cav_file_fail(&error, CAV_BAD_INPUT, 0, "%s: is not a problem file; --model has no meaning here", line->operand);
+    return cav_command_fail(&error);
+  }
+  cav_model *model = cav_model_load(line->operand, &error);
+  if (!model) return cav_command_fail(&error);
+  print_model(model);
+  cav_model_free(model);
+  return 0;
+}

@@ -1,0 +1,263 @@
+/// The cavort command: reads the command line and calls one command. Commands are a table; each says which options it takes.
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "command.h"
+
+enum option {
+  OPTION_MODEL = 1,
+  OPTION_OUTPUT = 2,
+  OPTION_SOLVER = 4,
+  OPTION_THREADS = 8,
+  OPTION_RESUME = 16,
+  OPTION_QUIET = 32,
+  OPTION_JSON = 64,
+  OPTION_IPOPT = 128,
+  OPTION_METHODS = 256,
+  OPTION_STRATEGIES = 512
+};
+
+// options: spelling, value's name or NULL, what it does
+static const struct {
+  enum option option;
+  const char *name, *brief, *value, *text;
+} options[] = {
+    {OPTION_MODEL, "--model", NULL, "FILE", "use this model instead of the one that the problem names"},
+    {OPTION_OUTPUT, "--output", "-o", "DIR", "folder of the result (default: NAME.result)"},
+    {OPTION_SOLVER, "--solver", NULL, "WORD", "gn: own Gauss-Newton (default), ipopt, or both, one after the other"},
+    {OPTION_IPOPT, "--ipopt", NULL, "NAME=VALUE",
+     "an option of Ipopt, laid over the problem's; may be given several times"},
+    {OPTION_STRATEGIES, "--strategies", NULL, "N",
+     "auto: where the stated guess leads to no certificate, others (default); 1: never; N: so many at once, the "
+     "cheapest kept"},
+    {OPTION_METHODS, "--methods", NULL, "LIST",
+     "what to compare, with commas: own (default), strategies (own, other strategies where needed), ipopt, limited "
+     "(Ipopt with "
+     "limited memory), both"},
+    {OPTION_THREADS, "--threads", NULL, "N",
+     "threads to use (default: all processors); the result does not depend on it"},
+    {OPTION_RESUME, "--resume", NULL, NULL, "start from the trajectory that the result folder holds"},
+    {OPTION_QUIET, "--quiet", "-q", NULL, "no progress and no table; errors and the exit status remain"},
+    {OPTION_JSON, "--json", NULL, NULL, "print the verdict as JSON instead of a table"},
+};
+enum { NOPTION = sizeof options / sizeof *options };
+
+typedef struct command {
+  const char *name, *operand, *text;
+  int (*run)(const cav_command_line *);
+  int options;
+} command;
+
+static int help(const cav_command_line *line);
+
+static const command commands[] = {
+    {"inspect", "MODEL|PROBLEM", "say what a model or a problem holds, what it runs and what it leaves out",
+     cav_command_inspect, OPTION_MODEL},
+    {"solve", "PROBLEM", "find the motion that a problem file asks for, certify it and write a result folder",
+     cav_command_solve,
+     OPTION_MODEL | OPTION_OUTPUT | OPTION_SOLVER | OPTION_IPOPT | OPTION_THREADS | OPTION_STRATEGIES | OPTION_RESUME |
+         OPTION_QUIET | OPTION_JSON},
+    {"verify", "DIR", "certify the motion of a result folder again, from its files alone", cav_command_verify,
+     OPTION_MODEL | OPTION_QUIET | OPTION_JSON},
+    {"explain", "DIR", "say why the motion of a result folder is as it is: what it misses, and which constraints pull",
+     cav_command_explain, OPTION_MODEL | OPTION_JSON},
+    {"view", "DIR", "write the page of a result folder anew and say where it is", cav_command_view,
+     OPTION_MODEL | OPTION_QUIET},
+    {"study", "[MOTION...]",
+     "solve motions from ten perturbed starts each, in N processes, and count: problem files, or all of "
+     "problems/motions;\n"
+     "  what a folder holds already is not solved again",
+     cav_command_study, OPTION_MODEL | OPTION_OUTPUT | OPTION_METHODS | OPTION_THREADS | OPTION_QUIET},
+    {"help", "[COMMAND]", "say how to use the tool or one of its commands", help, 0},
+};
+enum { NCOMMAND = sizeof commands / sizeof *commands };
+
+static void print_command(const command *c) {
+  printf("cavort %s %s\n  %s\n", c->name, c->operand, c->text);
+  for (int i = 0; i < NOPTION; i++) {
+    char text[64];
+    if (!(c->options & (int)options[i].option)) continue;
+    snprintf(text, sizeof text, "%s%s%s%s%s", options[i].brief ? options[i].brief : "", options[i].brief ? ", " : "",
+             options[i].name, options[i].value ? " " : "", options[i].value ? options[i].value : "");
+    printf("  %-18s %s\n", text, options[i].text);
+  }
+}
+
+static const command *find_command(const char *name) {
+  for (int i = 0; i < NCOMMAND; i++) {
+    if (!strcmp(commands[i].name, name)) return &commands[i];
+  }
+  return NULL;
+}
+
+static int help(const cav_command_line *line) {
+  const command *c = line->operand ? find_command(line->operand) : NULL;
+  if (line->operand && !c) {
+    fprintf(stderr, "cavort: there is no command '%s'; see cavort help\n", line->operand);
+    return CAV_EXIT_BAD_INPUT;
+  }
+  if (c) {
+    print_command(c);
+    return 0;
+  }
+  printf("cavort %s: motions of robots and characters, with contacts, by inverse dynamics\n\n", cav_version());
+  for (int i = 0; i < NCOMMAND; i++) {
+    print_command(&commands[i]);
+    printf("\n");
+  }
+  printf("exit status: 0 certified or done, 1 not certified, 2 bad input, 3 internal error, 130 interrupted\n");
+  return 0;
+}
+
+// an option of Ipopt, NAME=VALUE; the argument is cut in two
+static int take_ipopt(cav_command_line *line, char *text) {
+  cav_error error = {0};
+  char *equals = strchr(text, '=');
+  if (!equals) {
+    fprintf(stderr, "cavort: --ipopt: expected NAME=VALUE, got '%s'\n", text);
+    return 0;
+  }
+  if (line->nipopt == CAV_COMMAND_IPOPT) {
+    fprintf(stderr, "cavort: --ipopt: expected at most %d of them; write them into the problem\n", CAV_COMMAND_IPOPT);
+    return 0;
+  }
+  *equals = 0;
+  cav_ipopt_option *option = &line->ipopt[line->nipopt++];
+  *option = (cav_ipopt_option){text, equals + 1};
+  if (!cav_ipopt_option_check(option, &error)) return 1;
+  fprintf(stderr, "cavort: --ipopt: %s\n", error.text);
+  return 0;
+}
+
+// takes the value of an option; returns 0 after telling what is wrong with it
+static int take_value(cav_command_line *line, enum option option, const char *name, char *value) {
+  static const char *const solvers[] = {
+      [CAV_SOLVER_GAUSS_NEWTON] = "gn", [CAV_SOLVER_IPOPT] = "ipopt", [CAV_SOLVER_BOTH] = "both"};
+  char *end;
+  long n;
+  switch (option) {
+    case OPTION_MODEL:
+      line->model = value;
+      return 1;
+    case OPTION_OUTPUT:
+      line->output = value;
+      return 1;
+    case OPTION_SOLVER:
+      for (int i = 0; i < 3; i++) {
+        line->solver = (cav_solver)i;
+        if (!strcmp(value, solvers[i])) return 1;
+      }
+      fprintf(stderr, "cavort: %s: expected gn, ipopt or both, got '%s'\n", name, value);
+      return 0;
+    case OPTION_STRATEGIES:
+      n = strtol(value, &end, 10);
+      line->strategies = (int)n;
+      if (!strcmp(value, "auto") || (end != value && !*end && n >= 1 && n <= CAV_STRATEGIES)) return 1;
+      fprintf(stderr, "cavort: %s: expected auto or a number from 1 to %d, got '%s'\n", name, CAV_STRATEGIES, value);
+      return 0;
+    case OPTION_METHODS:
+      line->methods = value;
+      return 1;
+    case OPTION_IPOPT:
+      return take_ipopt(line, value);
+    case OPTION_THREADS:
+      n = strtol(value, &end, 10);
+      line->threads = (int)n;
+      if (end != value && !*end && n >= 1 && n <= 1024) return 1;
+      fprintf(stderr, "cavort: %s: expected a number from 1 to 1024, got '%s'\n", name, value);
+      return 0;
+    case OPTION_RESUME:
+      return line->resume = 1;
+    case OPTION_QUIET:
+      return line->quiet = 1;
+    case OPTION_JSON:
+      return line->json = 1;
+  }
+  return 0;
+}
+
+// index of the option that an argument spells, as NAME, NAME=VALUE or its brief form; -1 if none
+static int option_of(char *argument, char **value) {
+  *value = NULL;
+  for (int i = 0; i < NOPTION; i++) {
+    size_t n = strlen(options[i].name);
+    if (options[i].brief && !strcmp(argument, options[i].brief)) return i;
+    if (strncmp(argument, options[i].name, n)) continue;
+    if (argument[n] == '=') *value = argument + n + 1;
+    if (!argument[n] || (argument[n] == '=' && options[i].value)) return i;
+  }
+  return -1;
+}
+
+// reads what follows the command's name; returns 0 after telling what is wrong
+static int read_line(const command *c, int argc, char **argv, cav_command_line *line) {
+  for (int i = 0; i < argc; i++) {
+    char *value;
+    if (argv[i][0] != '-' || !argv[i][1]) {
+      if (strstr(c->operand, "...")) {
+        // operands gather at the front, where they have been read already
+        line->operands = argv;
+        argv[line->noperand++] = argv[i];
+        continue;
+      }
+      if (line->operand) {
+        fprintf(stderr, "cavort %s: expected one %s, got '%s' and '%s'\n", c->name, c->operand, line->operand, argv[i]);
+        return 0;
+      }
+      line->operand = argv[i];
+      continue;
+    }
+    int k = option_of(argv[i], &value);
+    if (k < 0 || !(c->options & (int)options[k].option)) {
+      fprintf(stderr, "cavort %s: %s is not an option of this command; see cavort help %s\n", c->name, argv[i],
+              c->name);
+      return 0;
+    }
+    if (options[k].value && !value && (i + 1 == argc || !*(value = argv[++i]))) {
+      fprintf(stderr, "cavort %s: %s needs a value: %s\n", c->name, options[k].name, options[k].value);
+      return 0;
+    }
+    if (!take_value(line, options[k].option, options[k].name, value)) return 0;
+  }
+  if (line->operand || c->operand[0] == '[') return 1;
+  fprintf(stderr, "cavort %s: expected %s; see cavort help %s\n", c->name, c->operand, c->name);
+  return 0;
+}
+
+int main(int argc, char **argv) {
+  long processors = sysconf(_SC_NPROCESSORS_ONLN);
+  cav_command_line line = {.solver = CAV_SOLVER_GAUSS_NEWTON,
+                           .threads = processors < 1      ? 1
+                                      : processors > 1024 ? 1024
+                                                          : (int)processors};
+  if (argc < 2) {
+    help(&line);
+    return CAV_EXIT_BAD_INPUT;
+  }
+  const char *name = argv[1];
+  if (!strcmp(name, "--help") || !strcmp(name, "-h")) name = "help";
+  if (!strcmp(name, "--version")) {
+    printf("cavort %s\n", cav_version());
+    return 0;
+  }
+  const command *c = find_command(name);
+  if (!c) {
+    fprintf(stderr, "cavort: there is no command '%s'; see cavort help\n", name);
+    return CAV_EXIT_BAD_INPUT;
+  }
+  for (int i = 2; i < argc; i++) {
+    if (strcmp(argv[i], "--help") && strcmp(argv[i], "-h")) continue;
+    print_command(c);
+    return 0;
+  }
+  if (!read_line(c, argc - 2, argv + 2, &line)) return CAV_EXIT_BAD_INPUT;
+  int status = c->run(&line);
+  // a full disk or a closed pipe must not pass for success
+  if (fflush(stdout) != 0 && status == 0) {
+    fprintf(stderr, "cavort: standard output cannot be written\n");
+    status = CAV_EXIT_INTERNAL;
+  }
+  return status;
+}

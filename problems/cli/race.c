@@ -1,0 +1,299 @@
+/// Strategies solved by processes: a child solves and certifies, reports through a pipe and waits; told to, it saves what it has, and
+/// where the pipe closes it ends. So a solution stays in the process that found it. Which one is kept depends on the
+/// reports alone: whatever comes after a certified strategy in the list is cancelled, what comes before it is waited for.
+#include "race.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "command.h"
+#include "csv.h"
+#include "file.h"
+
+cav_status cav_race_open(cav_race *race, int most, int schedules, cav_error *error) {
+  cav_strategy strategy[CAV_STRATEGIES];
+  int n = 0;
+  cav_status status = cav_strategy_list(race->problem, strategy, &n);
+  if (status) return cav_file_fail(error, status, 0, "strategies cannot be listed: %s", cav_status_name(status));
+  race->n = 0;
+  for (int i = 0; i < n && race->n < most; i++) {
+    if (i > 0 && strategy[i].stated && !schedules) continue;
+    race->entry[race->n++] = (cav_race_entry){.strategy = strategy[i], .answer = -1, .order = -1};
+  }
+  return CAV_OK;
+}
+
+// a solve that stopped early counts like any other
+static int counts(cav_status status) {
+  return status == CAV_OK || status == CAV_NOT_CONVERGED || status == CAV_INTERRUPTED || status == CAV_NOT_FINITE;
+}
+
+// solves and certifies, in whichever process
+static cav_solution *run(const cav_race *race, int i, const cav_solve_options *options, cav_problem *taken,
+                         cav_race_report *report) {
+  cav_solution *solution = NULL;
+  cav_error error = {0}, verification = {0};
+  *report = (cav_race_report){0};
+  cav_strategy_apply(race->problem, &race->entry[i].strategy, taken);
+  cav_status status = cav_strategy_solve(race->problem, &race->entry[i].strategy, options, i == 0 ? race->start : NULL,
+                                         &solution, &error);
+  if (solution && counts(status)) {
+    cav_status verified = cav_verify(taken, solution->trajectory, &solution->contact, solution->gain_q,
+                                     solution->gain_v, &report->verdict, &verification);
+    report->verdict.optimality = solution->optimality;
+    report->verdict.solve_seconds = solution->seconds;
+    report->verdict.iterations = solution->iterations;
+    report->cost = solution->cost;
+    report->solution = verified == CAV_OK;
+    if (verified != CAV_OK) status = verified, error = verification;
+  }
+  report->status = (int)status;
+  snprintf(report->text, sizeof report->text, "%.399s", error.text);
+  if (report->solution) return solution;
+  cav_solution_free(solution);
+  return NULL;
+}
+
+static const char *outcome(const cav_race_entry *e) {
+  switch (e->state) {
+    case CAV_RACE_WAITING:
+      return "not tried";
+    case CAV_RACE_RUNNING:
+      return "running";
+    case CAV_RACE_CANCELLED:
+      return "cancelled";
+    case CAV_RACE_LOST:
+      return "lost";
+    case CAV_RACE_DONE:
+      break;
+  }
+  if (!e->report.solution) return "failed";
+  return e->report.verdict.certified ? "certified" : "not certified";
+}
+
+static void tell(const cav_race *race, const cav_race_entry *e) {
+  if (!race->tell) return;
+  fprintf(stderr, "strategy %-7s %s", e->strategy.name, outcome(e));
+  if (e->state == CAV_RACE_DONE && e->report.solution)
+    fprintf(stderr, ", cost %.4g, %d iterations, %.1f s", e->report.cost, e->report.verdict.iterations,
+            e->report.verdict.solve_seconds);
+  fputc('\n', stderr);
+}
+
+cav_status cav_race_first(cav_race *race, cav_error *error) {
+  cav_problem taken;
+  cav_race_entry *e = &race->entry[0];
+  e->solution = run(race, 0, &race->options, &taken, &e->report);
+  e->state = CAV_RACE_DONE;
+  if (e->report.solution) return CAV_OK;
+  cav_status status = e->report.status ? (cav_status)e->report.status : CAV_INTERNAL;
+  return cav_file_fail(error, status, 0, "%s", e->report.text[0] ? e->report.text : cav_status_name(status));
+}
+
+// all of a report, or 0
+static int whole(int end, void *data, size_t size, int writes) {
+  for (char *at = data; size > 0;) {
+    ssize_t n = writes ? write(end, at, size) : read(end, at, size);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return 0;
+    at += n;
+    size -= (size_t)n;
+  }
+  return 1;
+}
+
+// in the child: never returns
+static void work(cav_race *race, int i) {
+  cav_problem taken;
+  cav_race_report report;
+  char order = 0;
+  cav_race_entry *e = &race->entry[i];
+  for (int k = 0; k < race->n; k++) {
+    if (k == i) continue;
+    if (race->entry[k].answer >= 0) close(race->entry[k].answer);
+    if (race->entry[k].order >= 0) close(race->entry[k].order);
+  }
+  signal(SIGPIPE, SIG_IGN);
+  cav_solve_options options = race->options;
+  options.threads = 1;
+  options.observer = race->quiet;
+  cav_solution *solution = run(race, i, &options, &taken, &report);
+  int done = 0;
+  if (whole(e->answer, &report, sizeof report, 1) && whole(e->order, &order, 1, 0) && solution)
+    done = race->save(race->context, &taken, solution, &report);
+  fflush(NULL);
+  _exit(done);
+}
+
+// forks one that waits; 0 if there is no process
+static int start(cav_race *race, int i) {
+  int answer[2], order[2];
+  cav_race_entry *e = &race->entry[i];
+  if (pipe(answer) != 0) return 0;
+  if (pipe(order) != 0) {
+    close(answer[0]), close(answer[1]);
+    return 0;
+  }
+  fflush(NULL);
+  pid_t child = fork();
+  if (child == 0) {
+    close(answer[0]), close(order[1]);
+    e->answer = answer[1], e->order = order[0];
+    work(race, i);
+  }
+  close(answer[1]), close(order[0]);
+  e->answer = answer[0], e->order = order[1];
+  e->child = child;
+  if (child > 0) e->state = CAV_RACE_RUNNING;
+  if (child < 0) close(e->answer), close(e->order), e->answer = e->order = -1;
+  return child > 0;
+}
+
+// ends a child's process; its pipes close
+static void end(cav_race_entry *e) {
+  if (e->child <= 0) return;
+  kill(e->child, SIGKILL);
+  while (waitpid(e->child, NULL, 0) < 0 && errno == EINTR) continue;
+  close(e->answer), close(e->order);
+  e->child = 0;
+  e->answer = e->order = -1;
+}
+
+// what comes after a certified strategy cannot be kept any more
+static void cancel_after(cav_race *race, int certified) {
+  for (int k = certified + 1; k < race->n; k++) {
+    cav_race_entry *e = &race->entry[k];
+    if (e->state != CAV_RACE_WAITING && e->state != CAV_RACE_RUNNING) continue;
+    int running = e->state == CAV_RACE_RUNNING;
+    end(e);
+    e->state = running ? CAV_RACE_CANCELLED : CAV_RACE_WAITING;
+    if (running) tell(race, e);
+  }
+}
+
+static int first_certified(const cav_race *race) {
+  for (int i = 0; i < race->n; i++)
+    if (race->entry[i].state == CAV_RACE_DONE && race->entry[i].report.verdict.certified) return i;
+  return race->n;
+}
+
+// waits for reports; interruption is passed on once
+static void listen_to(cav_race *race, int *passed_on) {
+  struct pollfd wait[CAV_STRATEGIES];
+  int of[CAV_STRATEGIES], n = 0;
+  for (int i = 0; i < race->n; i++)
+    if (race->entry[i].state == CAV_RACE_RUNNING)
+      of[n] = i, wait[n++] = (struct pollfd){race->entry[i].answer, POLLIN, 0};
+  int ready = poll(wait, (nfds_t)n, 200);
+  if (*race->interrupted && !*passed_on) {
+    for (int k = 0; k < n; k++) kill(race->entry[of[k]].child, SIGINT);
+    *passed_on = 1;
+  }
+  for (int k = 0; k < n && ready > 0; k++) {
+    cav_race_entry *e = &race->entry[of[k]];
+    if (!wait[k].revents) continue;
+    if (whole(e->answer, &e->report, sizeof e->report, 0)) {
+      e->state = CAV_RACE_DONE;
+    } else {
+      end(e);
+      e->report = (cav_race_report){0};
+      e->state = CAV_RACE_LOST;
+    }
+    tell(race, e);
+  }
+}
+
+cav_status cav_race_finish(cav_race *race, int cheapest, cav_error *error) {
+  int passed_on = 0;
+  while (1) {
+    int most = cheapest ? race->n : first_certified(race), running = 0;
+    if (!cheapest) cancel_after(race, most);
+    for (int i = 0; i < most; i++) running += race->entry[i].state == CAV_RACE_RUNNING;
+    for (int i = 0; i < most && running < race->processes && !*race->interrupted; i++) {
+      if (race->entry[i].state != CAV_RACE_WAITING) continue;
+      if (!start(race, i)) return cav_file_fail(error, CAV_NO_MEMORY, 0, "no process for another strategy");
+      running++;
+    }
+    if (running == 0) return CAV_OK;
+    listen_to(race, &passed_on);
+  }
+}
+
+// whether a is the better motion: the one that keeps more of the certificate's requires, in their order; or misses the same one
+// by less
+static int better(const cav_race_report *a, const cav_race_report *b, int cheapest) {
+  const cav_verdict *v = &a->verdict, *w = &b->verdict;
+  const double missed[][3] = {{v->unactuated_force_max, w->unactuated_force_max, CAV_TOLERANCE_UNACTUATED},
+                              {v->limit_violation_max, w->limit_violation_max, CAV_TOLERANCE_LIMIT},
+                              {v->constraint_violation_max, w->constraint_violation_max, CAV_TOLERANCE_CONSTRAINT},
+                              {v->penetration_max_m, w->penetration_max_m, CAV_TOLERANCE_PENETRATION},
+                              {v->momentum_defect_rms, w->momentum_defect_rms, CAV_TOLERANCE_MOMENTUM},
+                              {v->replay_step_max_error, w->replay_step_max_error, CAV_TOLERANCE_STEP}};
+  if (v->certified && w->certified) return cheapest && a->cost < b->cost;
+  if (v->certified || w->certified) return v->certified;
+  for (size_t k = 0; k < sizeof missed / sizeof *missed; k++)
+    if (missed[k][0] > missed[k][2] || missed[k][1] > missed[k][2]) return missed[k][0] < missed[k][1];
+  return v->closed_loop_seconds > w->closed_loop_seconds;
+}
+
+int cav_race_best(const cav_race *race, int cheapest) {
+  int best = -1;
+  for (int i = 0; i < race->n; i++) {
+    const cav_race_entry *e = &race->entry[i];
+    if (e->state != CAV_RACE_DONE || !e->report.solution) continue;
+    if (best < 0 || better(&e->report, &race->entry[best].report, cheapest)) best = i;
+  }
+  return best;
+}
+
+int cav_race_save(cav_race *race, int best) {
+  cav_race_entry *e = &race->entry[best];
+  cav_problem taken;
+  cav_strategy_apply(race->problem, &e->strategy, &taken);
+  if (e->solution) return race->save(race->context, &taken, e->solution, &e->report);
+  int how = 0;
+  char order = 1;
+  fflush(NULL);
+  if (!whole(e->order, &order, 1, 1)) return CAV_EXIT_INTERNAL;
+  while (waitpid(e->child, &how, 0) < 0 && errno == EINTR) continue;
+  close(e->answer), close(e->order);
+  e->child = 0;
+  e->answer = e->order = -1;
+  return WIFEXITED(how) ? WEXITSTATUS(how) : CAV_EXIT_INTERNAL;
+}
+
+void cav_race_close(cav_race *race) {
+  for (int i = 0; i < race->n; i++) {
+    end(&race->entry[i]);
+    cav_solution_free(race->entry[i].solution);
+    race->entry[i].solution = NULL;
+  }
+}
+
+cav_status cav_race_write(const cav_race *race, int kept, const char *path, cav_error *error) {
+  cav_file file;
+  cav_status status = cav_file_begin(&file, path, error);
+  if (status) return status;
+  fputs("strategy,kept,outcome,cost,iterations,seconds,unactuated,closed_loop_seconds,reason\n", file.stream);
+  for (int i = 0; i < race->n; i++) {
+    const cav_race_entry *e = &race->entry[i];
+    const cav_verdict *v = &e->report.verdict;
+    int known = e->state == CAV_RACE_DONE && e->report.solution;
+    const double value[] = {e->report.cost, v->iterations, v->solve_seconds, v->unactuated_force_max,
+                            v->closed_loop_seconds};
+    fprintf(file.stream, "%s,%d,%s", e->strategy.name, i == kept, outcome(e));
+    for (int k = 0; k < 5; k++) {
+      fputc(',', file.stream);
+      if (known) cav_table_write_number(file.stream, value[k]);
+    }
+    fputs(",\"", file.stream);
+    for (const char *c = known ? v->reason : e->report.text; *c; c++) fputc(*c == '"' ? '\'' : *c, file.stream);
+    fputs("\"\n", file.stream);
+  }
+  return cav_file_end(&file, error);
+}

@@ -1,0 +1,75 @@
+/// Strategies to a motion, solved by processes, and the one that is kept.
+#ifndef CAVORT_RACE_H
+#define CAVORT_RACE_H
+
+#include <signal.h>
+#include <sys/types.h>
+
+#include "cavort/solve.h"
+
+/// What a solve by a strategy came to; goes through a pipe as it is.
+typedef struct cav_race_report {
+  int status;   ///< of cav_solve
+  int solution; ///< 1: there is one, and verdict, cost and iterations are about it
+  cav_verdict verdict;
+  double cost;
+  char text[400]; ///< what the solver said
+} cav_race_report;
+
+typedef enum cav_race_state {
+  CAV_RACE_WAITING,
+  CAV_RACE_RUNNING,
+  CAV_RACE_DONE,      ///< there is a report
+  CAV_RACE_CANCELLED, ///< a better one is certified
+  CAV_RACE_LOST       ///< its process ended without a report
+} cav_race_state;
+
+typedef struct cav_race_entry {
+  cav_strategy strategy;
+  cav_race_state state;
+  cav_race_report report;
+  cav_solution *solution; ///< if solved in this process
+  pid_t child;
+  int answer, order; ///< pipes: from the child, to the child
+} cav_race_entry;
+
+/// A race over the strategies of a problem. The caller fills the first part.
+typedef struct cav_race {
+  const cav_problem *problem;
+  const cav_trajectory *start;        ///< for the first strategy, may be NULL
+  cav_solve_options options;          ///< of a solve in this process; children use one thread and no observer but quiet
+  cav_observer quiet;                 ///< asks children for their end
+  volatile sig_atomic_t *interrupted; ///< nonzero: start nothing more
+  int processes;                      ///< at most
+  int tell;                           ///< 1: lines on standard error about what starts and ends
+  /// Saves a solution; called in the process that has it. Returns an exit status.
+  int (*save)(void *context, const cav_problem *problem, const cav_solution *solution, const cav_race_report *report);
+  void *context;
+  int n;
+  cav_race_entry entry[CAV_STRATEGIES];
+} cav_race;
+
+/// The strategies of the problem, at most as many; those that differ in the schedule alone only if asked.
+cav_status cav_race_open(cav_race *race, int most, int schedules, cav_error *error);
+
+/// Solves by the first strategy in this process. CAV_NO_MEMORY, CAV_BAD_INPUT and the like with the reason in error.
+cav_status cav_race_first(cav_race *race, cav_error *error);
+
+/// Solves by all that wait, in processes. cheapest 0: ends as soon as one is certified and all before it are not; 1: when all
+/// have ended.
+cav_status cav_race_finish(cav_race *race, int cheapest, cav_error *error);
+
+/// The entry to keep: the first certified one, or the cheapest; without any, the one that keeps most of what a certificate requires.
+/// -1: none has a solution. The same whichever ended first.
+int cav_race_best(const cav_race *race, int cheapest);
+
+/// Has the entry saved by the process that solved it; its exit status.
+int cav_race_save(cav_race *race, int best);
+
+/// Ends all processes, and frees.
+void cav_race_close(cav_race *race);
+
+/// Writes strategies.csv: what became of each.
+cav_status cav_race_write(const cav_race *race, int kept, const char *path, cav_error *error);
+
+#endif

@@ -1,0 +1,150 @@
+/// One run of a study: the problem with a start, masses and friction that differ a little from its file, by a generator that
+/// depends on the number of the start alone, so that every method meets the same ones.
+#include "study.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "file.h"
+
+const char *const cav_study_method_names[CAV_STUDY_METHODS] = {"own", "strategies", "ipopt", "limited", "both"};
+
+static const double joint_noise = 0.03, mass_noise = 0.05, least_friction = 0.6, most_friction = 1;
+static const double most_seconds = 120;
+
+/// Uniform in -1 .. 1: splitmix64.
+static double uniform(uint64_t *state) {
+  uint64_t z = *state += 0x9e3779b97f4a7c15u;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+  z ^= z >> 31;
+  return 2 * (double)(z >> 11) / 9007199254740992.0 - 1;
+}
+
+static double processor_seconds(void) {
+  struct timespec t;
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/// Lowest gap between what moves and the world, seen from afar through the activation distance of the smoothed law; infinite if nothing is near.
+static cav_status lowest_gap(const cav_model *m, cav_state *state, const double *q, double *gap) {
+  state->options.smoothing = state->options.smoothing_self = 1;
+  cav_status status = cav_position(m, state, q);
+  *gap = INFINITY;
+  for (int i = 0; i < state->ncontact && !status; i++)
+    if (m->pair[state->contact[i].pair].external) *gap = fmin(*gap, state->contact[i].dist);
+  return status;
+}
+
+/// Moves roots that can along the vertical.
+static void lift(const cav_model *m, double *q, double height) {
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    if (m->link[joint->link].parent != 0) continue;
+    if (joint->type == CAV_JOINT_FREE) q[joint->q + 2] += height;
+    if (joint->type == CAV_JOINT_SLIDE && fabs(joint->axis[2]) > 0.9) q[joint->q] += height / joint->axis[2];
+  }
+}
+
+static int is_root(const cav_model *m, const cav_joint *joint) {
+  return m->link[joint->link].parent == 0 && (joint->type == CAV_JOINT_FREE || joint->type == CAV_JOINT_SLIDE);
+}
+
+/// Joints a little elsewhere, within their ranges; the root so that the lowest point is where it was.
+static cav_status perturb_posture(const cav_model *m, double *q, uint64_t *seed) {
+  cav_state *state = cav_state_new(m);
+  if (!state) return CAV_NO_MEMORY;
+  double before = 0, after = 0;
+  cav_status status = lowest_gap(m, state, q, &before);
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    int scalar = joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE;
+    double shift = uniform(seed);
+    if (!scalar || is_root(m, joint)) continue;
+    double width = joint->limited ? fmin(1, joint->range[1] - joint->range[0]) : 1, *x = q + joint->q;
+    *x += joint_noise * width * shift;
+    if (joint->limited) *x = fmin(fmax(*x, joint->range[0]), joint->range[1]);
+  }
+  if (!status) status = lowest_gap(m, state, q, &after);
+  if (!status && isfinite(before) && isfinite(after)) lift(m, q, before - after);
+  cav_state_free(state);
+  return status;
+}
+
+static cav_status perturb(cav_problem *p, int start) {
+  // the model is the problem's own, and no state of it lives
+  cav_model *m = (cav_model *)p->model;
+  uint64_t seed = 1000003u * (uint64_t)(start + 1);
+  double *scale = malloc((size_t)m->nlink * sizeof *scale);
+  if (!scale) return CAV_NO_MEMORY;
+  for (int i = 0; i < m->nlink; i++) scale[i] = 1 + mass_noise * uniform(&seed);
+  double fraction = 0.5 * (1 + uniform(&seed));
+  cav_status status = cav_model_perturb(m, scale, least_friction + fraction * (most_friction - least_friction));
+  free(scale);
+  return status ? status : perturb_posture(m, p->q_start, &seed);
+}
+
+static int observe(void *context, const cav_progress *progress) {
+  (void)progress;
+  return processor_seconds() - *(const double *)context > most_seconds;
+}
+
+static cav_solve_options options_of(cav_study_method method, double *begin) {
+  static const cav_ipopt_option limited[] = {{"hessian_approximation", "limited-memory"}};
+  cav_solve_options o = cav_solve_options_default();
+  int own = method == CAV_STUDY_OWN || method == CAV_STUDY_STRATEGIES;
+  o.solver = own ? CAV_SOLVER_GAUSS_NEWTON : method == CAV_STUDY_BOTH ? CAV_SOLVER_BOTH : CAV_SOLVER_IPOPT;
+  if (method == CAV_STUDY_LIMITED) o.ipopt = limited, o.nipopt = 1;
+  o.diagnose = 0;
+  o.observer = observe;
+  o.observer_context = begin;
+  return o;
+}
+
+/// Solves and certifies by one strategy. One that was stopped is checked like any other.
+static cav_status solve_by(const cav_problem *problem, const cav_strategy *strategy, cav_study_run *run, double *begin,
+                           cav_verdict *verdict, cav_error *error) {
+  cav_solve_options options = options_of(run->method, begin);
+  cav_solution *solution = NULL;
+  cav_status status = cav_strategy_solve(problem, strategy, &options, NULL, &solution, error);
+  if (solution)
+    status = cav_verify(problem, solution->trajectory, &solution->contact, solution->gain_q, solution->gain_v, verdict,
+                        error);
+  if (solution && !status) {
+    run->known = 1;
+    run->certified = verdict->certified;
+    run->iterations += solution->iterations;
+    run->cost = solution->cost;
+    run->unactuated = verdict->unactuated_force_max;
+    run->end_error = verdict->closed_loop_end_error_m;
+  }
+  cav_solution_free(solution);
+  return status;
+}
+
+cav_status cav_study_solve(const char *path, const char *model_path, cav_study_run *run, char reason[400],
+                           cav_error *error) {
+  double begin = processor_seconds();
+  cav_problem *problem = cav_problem_load(path, model_path, error);
+  if (!problem) return error->status;
+  cav_strategy strategy[CAV_STRATEGIES];
+  int n = 0;
+  cav_status status = perturb(problem, run->start);
+  if (!status) status = cav_strategy_list(problem, strategy, &n);
+  if (status) cav_file_fail(error, status, 0, "%s: cannot be perturbed: %s", path, cav_status_name(status));
+  if (run->method != CAV_STUDY_STRATEGIES && n > 1) n = 1;
+  for (int i = 0; i < n && !status && !run->certified && processor_seconds() - begin < most_seconds; i++) {
+    cav_verdict verdict = {.closed_loop_end_error_m = -1};
+    status = solve_by(problem, &strategy[i], run, &begin, &verdict, error);
+    // of many that fail the stated one says why
+    if (i == 0 || run->certified) snprintf(reason, 400, "%s", verdict.reason);
+  }
+  run->seconds = processor_seconds() - begin;
+  cav_problem_free(problem);
+  return status;
+}

@@ -1,0 +1,88 @@
+/// What a problem leaves out of a model's file: the bodies and geoms that it names, all that refers to them, all that refers to
+/// that, and nothing else, also where names of other kinds are the same; a name that is not there is told with its line.
+#include "cavort/cavort.h"
+#include "scene.h"
+
+static const char model[] =
+    "<mujoco><worldbody><geom name='floor' type='plane' size='1 1 1'/><geom name='wall' type='box' size='1 .1 1' "
+    "pos='0 3 0'/>"
+    "<body name='cart' pos='0 0 1'><joint name='rail' type='slide' axis='1 0 0'/><geom name='cart' size='.1'/><geom "
+    "size='.05'/>"
+    "<body name='arm' pos='0 0 .2'><joint name='elbow' axis='0 1 0'/><geom name='fist' size='.05' pos='0 0 .3'/>"
+    "<site name='ball' pos='0 0 .3'/></body></body>"
+    "<body name='ball' pos='1 0 1'><freejoint name='fly'/><geom name='skin' size='.1'/><site name='mark'/>"
+    "<body name='tail' pos='-.2 0 0'><joint name='wag' axis='0 0 1'/><geom size='.03'/></body></body></worldbody>"
+    "<tendon><fixed name='both'><joint joint='rail' coef='1'/><joint joint='wag' coef='1'/></fixed>"
+    "<fixed name='lone'><joint joint='elbow' coef='2'/></fixed></tendon>"
+    "<actuator><motor name='drive' joint='rail'/><motor name='pull' tendon='both'/><motor name='bend' tendon='lone'/>"
+    "<motor name='wagger' joint='wag'/></actuator>"
+    "<sensor><framepos name='a' objtype='body' objname='ball'/><framepos name='b' objtype='site' objname='ball'/>"
+    "<framepos name='c' objtype='xbody' objname='cart' reftype='site' refname='mark'/><jointpos name='d' joint='rail'/>"
+    "<actuatorfrc name='e' actuator='pull'/></sensor>"
+    "<contact><exclude body1='cart' body2='tail'/><exclude body1='cart' body2='arm'/></contact>"
+    "<equality><weld body1='tail' body2='cart'/></equality></mujoco>";
+
+static cav_problem *load(const char *scene, cav_error *error) {
+  char folder[] = "/tmp/cavort-omit-XXXXXX", path[300], text[1000];
+  if (!CHECK(mkdtemp(folder) != NULL)) return NULL;
+  snprintf(text, sizeof text,
+           "<problem model='m.xml'>\n<scene>\n%s\n</scene>\n<horizon duration='1'/><start/></problem>\n", scene);
+  scene_write(folder, "m.xml", model);
+  scene_write(folder, "p.xml", text);
+  snprintf(path, sizeof path, "%s/p.xml", folder);
+  cav_problem *p = cav_problem_load(path, NULL, error);
+  // results say it too
+  if (p) {
+    cav_problem *again = NULL;
+    snprintf(path, sizeof path, "%s/again.xml", folder);
+    CHECK(cav_problem_write(path, p, NULL, NULL) == CAV_OK && (again = cav_problem_load(path, NULL, NULL)));
+    CHECK(again && again->model->nv == p->model->nv && again->model->ngeom == p->model->ngeom);
+    cav_problem_free(again);
+    unlink(path);
+  }
+  snprintf(path, sizeof path, "%s/p.xml", folder), unlink(path);
+  snprintf(path, sizeof path, "%s/m.xml", folder), unlink(path);
+  rmdir(folder);
+  return p;
+}
+
+static void check_left(void) {
+  cav_problem *p =
+      load("<remove body='ball'/><remove geom='wall'/><geom name='step' type='box' size='.1 .1 .1'/>", NULL);
+  if (!CHECK(p != NULL)) return;
+  const cav_model *m = p->model;
+  CHECK(m->nv == 2 && m->nq == 2 && m->nlink == 3 && m->nequality == 0);
+  CHECK(cav_object_find(m, CAV_OBJECT_GEOM, "wall") < 0 && cav_object_find(m, CAV_OBJECT_GEOM, "floor") >= 0);
+  CHECK(cav_object_find(m, CAV_OBJECT_GEOM, "step") >= 0);
+  CHECK(cav_object_find(m, CAV_OBJECT_BODY, "ball") < 0 && cav_object_find(m, CAV_OBJECT_SITE, "ball") >= 0);
+  CHECK(m->ntendon == 1 && cav_object_find(m, CAV_OBJECT_TENDON, "lone") == 0);
+  CHECK(m->nu == 2 && cav_object_find(m, CAV_OBJECT_ACTUATOR, "drive") == 0 &&
+        cav_object_find(m, CAV_OBJECT_ACTUATOR, "bend") == 1);
+  CHECK(m->nsensor == 2 && cav_object_find(m, CAV_OBJECT_SENSOR, "b") == 0 &&
+        cav_object_find(m, CAV_OBJECT_SENSOR, "d") == 1);
+  cav_problem_free(p);
+}
+
+static void refuse(const char *scene, int line, const char *says) {
+  cav_error error = {0};
+  cav_problem *p = load(scene, &error);
+  if (!CHECK(!p && error.status == CAV_BAD_INPUT && error.line == line && strstr(error.text, says)))
+    fprintf(stderr, "    line %d, '%s' lacks '%s'\n", error.line, error.text, says);
+  cav_problem_free(p);
+}
+
+int main(void) {
+  check_left();
+  // a geom alone takes no body, joint or actuator with it
+  cav_error error = {0};
+  cav_problem *p = load("<remove geom='cart'/>", &error);
+  if (!p) fprintf(stderr, "    %s\n", error.text);
+  CHECK(p && p->model->nv == 9 && p->model->nu == 4 && p->model->nsensor == 5 && p->model->nequality == 1);
+  cav_problem_free(p);
+  refuse("<remove body='bal'/>", 3, "no body of that name");
+  refuse("\n<remove geom='ball'/>", 4, "no geom of that name");
+  refuse("<remove/>", 3, "body and geom");
+  refuse("<remove body='ball' geom='wall'/>", 3, "body and geom");
+  refuse("<remove body='ball'/><remove geom='skin'/>", 3, "no geom of that name");
+  return check_result();
+}

@@ -1,0 +1,182 @@
+/// Strategies: which are offered to which problem, that a gait is found with the right signs, that taking one changes guess and
+/// schedule alone; and stages of the continuation that stall: taken back, reached half way, noted. Stalls are made by the
+/// linker, which puts a region that claims one in the place of the true one.
+#include "continuation.h"
+#include "scene.h"
+
+cav_status __real_cav_region_minimise(cav_region *region, cav_normal *normal, cav_transcription *tr,
+                                      cav_trajectory **at, cav_trajectory **spare);
+cav_status __wrap_cav_region_minimise(cav_region *region, cav_normal *normal, cav_transcription *tr,
+                                      cav_trajectory **at, cav_trajectory **spare);
+
+// runs of the region from first to last stall, counted from 1
+static int runs, first_stall, last_stall;
+
+cav_status __wrap_cav_region_minimise(cav_region *region, cav_normal *normal, cav_transcription *tr,
+                                      cav_trajectory **at, cav_trajectory **spare) {
+  cav_status status = __real_cav_region_minimise(region, normal, tr, at, spare);
+  runs++;
+  if (runs >= first_stall && runs <= last_stall) {
+    region->stalled = 1, region->settled = 0;
+    region->radius = 1e-12;
+  }
+  return status;
+}
+
+#define LEG(SIDE, Y, AXIS)                                                                 \
+  "<body name='thigh_" SIDE "' pos='0 " Y " -.1'><joint name='hip_" SIDE "' axis='0 " AXIS \
+  " 0' range='-100 60'/>"                                                                  \
+  "<geom type='capsule' size='.05' fromto='0 0 0 0 0 -.4' mass='5'/><body pos='0 0 -.4'>"  \
+  "<joint name='knee_" SIDE "' axis='0 " AXIS                                              \
+  " 0' range='-2 140'/>"                                                                   \
+  "<geom type='capsule' size='.04' fromto='0 0 0 0 0 -.4' mass='3'/>"                      \
+  "<geom type='sphere' size='.05' pos='0 0 -.4' mass='.5'/></body></body>"
+#define BIPED(AXIS) \
+  "<mujoco><compiler angle='degree'/><default><joint limited='true'/><motor ctrllimited='true' ctrlrange='-1 1'/>"     \
+  "</default><worldbody><geom type='plane' size='9 9 1'/><body name='trunk' pos='0 0 .95'><freejoint/>"                \
+  "<geom type='capsule' size='.1' fromto='0 0 0 0 0 .4' mass='20'/>" LEG("left", ".1", AXIS) LEG("right", "-.1", AXIS) \
+  "</body></worldbody><actuator><motor joint='hip_left' gear='100'/><motor joint='hip_right' gear='100'/>"             \
+  "<motor joint='knee_left' gear='100'/><motor joint='knee_right' gear='100'/></actuator></mujoco>"
+
+static const cav_strategy *find(const cav_strategy *strategy, int n, const char *name) {
+  for (int i = 0; i < n; i++)
+    if (!strcmp(strategy[i].name, name)) return &strategy[i];
+  return NULL;
+}
+
+// the offered strategies' names, with blanks
+static int offers(const cav_problem *p, const char *names) {
+  cav_strategy strategy[CAV_STRATEGIES];
+  char text[200] = "";
+  int n;
+  CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
+  for (int i = 0; i < n; i++) strcat(strcat(text, i ? " " : ""), strategy[i].name);
+  if (!strcmp(text, names)) return 1;
+  fprintf(stderr, "    '%s', expected '%s'\n", text, names);
+  return 0;
+}
+
+// both legs swing in turn, the right way round whichever way the axes point
+static void test_gait(const char *text, double axis, double travel) {
+  cav_model *m = scene_load(text);
+  if (!CHECK(m != NULL)) return;
+  double q[20], goal[20], v[20] = {0};
+  cav_configuration_reset(m, q);
+  memcpy(goal, q, sizeof goal);
+  goal[0] += travel;
+  cav_problem p = cav_problem_default(m), taken;
+  p.q_start = q, p.v_start = v, p.q_goal = goal;
+  cav_strategy strategy[CAV_STRATEGIES];
+  int n;
+  CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK);
+  const cav_strategy *gait = find(strategy, n, "swing");
+  if (CHECK(gait && gait->nswing == 4)) {
+    int hip = cav_object_find(m, CAV_OBJECT_JOINT, "hip_left"),
+        knee = cav_object_find(m, CAV_OBJECT_JOINT, "knee_left");
+    cav_strategy_apply(&p, gait, &taken);
+    CHECK(taken.nswing == 4 && taken.swing == gait->swing && taken.q_goal == goal && taken.duration == p.duration);
+    CHECK(gait->swing[0].joint == hip && gait->swing[2].joint == knee);
+    CHECK(gait->swing[1].joint == cav_object_find(m, CAV_OBJECT_JOINT, "hip_right"));
+    // turning about +y takes a hanging leg backwards; the knee bends to where its range is, while the leg comes forwards
+    CHECK(gait->swing[0].amplitude * axis * travel < 0 && gait->swing[1].amplitude == gait->swing[0].amplitude);
+    CHECK_NEAR(gait->swing[1].phase - gait->swing[0].phase, M_PI, 1e-15);
+    CHECK(gait->swing[2].amplitude > 0 && fabs(gait->swing[2].phase - M_PI / 2) < 1e-15);
+  }
+  // no gait where it stands, nor where the guess swings already; a guess that is held is not held twice
+  goal[0] = q[0];
+  CHECK(offers(&p, "stated soft hold slow"));
+  p.guess = CAV_GUESS_HOLD;
+  CHECK(offers(&p, "stated soft line slow"));
+  p.guess = CAV_GUESS_INTERPOLATE;
+  p.guess_height = 0.3;
+  CHECK(offers(&p, "stated soft line hold slow"));
+  goal[0] += travel;
+  p.nswing = 1;
+  p.swing = &(cav_swing){.joint = 1, .amplitude = 0.1, .frequency = 1};
+  CHECK(offers(&p, "stated soft line hold slow"));
+  // taking one leaves the problem as it was
+  CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK);
+  cav_strategy_apply(&p, &strategy[0], &taken);
+  CHECK(taken.nswing == 1 && taken.guess_height == 0.3 && taken.schedule.stages == p.schedule.stages);
+  cav_strategy_apply(&p, find(strategy, n, "slow"), &taken);
+  CHECK(taken.nswing == 1 && taken.schedule.stages == 2 * p.schedule.stages);
+  cav_strategy_apply(&p, find(strategy, n, "hold"), &taken);
+  CHECK(taken.nswing == 0 && taken.guess_height == 0 && taken.guess == CAV_GUESS_HOLD && p.guess_height == 0.3);
+  cav_model_free(m);
+}
+
+// under the order of momentum one strategy goes by the midpoint order, and ends under the order that was asked for
+static void check_order(cav_problem *p) {
+  cav_strategy strategy[CAV_STRATEGIES];
+  int n;
+  p->order = CAV_ORDER_MOMENTUM;
+  CHECK(offers(p, "stated midpoint soft hold slow"));
+  CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
+  cav_solution *straight = NULL, *round = NULL;
+  runs = first_stall = last_stall = 0;
+  CHECK(cav_strategy_solve(p, &strategy[0], NULL, NULL, &straight, NULL) == CAV_OK);
+  int before = runs;
+  CHECK(cav_strategy_solve(p, find(strategy, n, "midpoint"), NULL, NULL, &round, NULL) == CAV_OK);
+  if (CHECK(straight && round)) {
+    // both solves count, and the second one starts late in the schedule
+    CHECK(straight->contact.order == CAV_ORDER_MOMENTUM && round->contact.order == CAV_ORDER_MOMENTUM);
+    CHECK(runs - before > before && round->iterations > round->nprogress);
+    CHECK(round->nstage > 10 && round->stage[0].stages == 10);
+    // one convex motion: the same minimum
+    printf("costs differ by %.1g\n", fabs(round->cost / straight->cost - 1));
+    CHECK_NEAR(round->cost, straight->cost, 1e-6 * straight->cost);
+  }
+  cav_solution_free(straight);
+  cav_solution_free(round);
+  p->order = CAV_ORDER_MIDPOINT;
+}
+
+// a ball on a slide that is lifted; stages that stall are reached half way, at most three times
+static void test_stalls(void) {
+  cav_model *m = scene_load(
+      "<mujoco><worldbody><geom type='plane' size='1 1 1'/><body pos='0 0 .1'>"
+      "<joint name='lift' type='slide' axis='0 0 1'/><geom type='sphere' size='.1' mass='1'/>"
+      "</body></worldbody><actuator><motor joint='lift' gear='50' ctrllimited='true' "
+      "ctrlrange='-1 1'/></actuator></mujoco>");
+  if (!CHECK(m != NULL)) return;
+  double q = 0, goal = 0.2, v = 0;
+  cav_term terms[20];
+  cav_problem p = cav_problem_default(m);
+  p.q_start = &q, p.v_start = &v, p.q_goal = &goal;
+  p.duration = 0.5;
+  p.term = terms, p.nterm = cav_problem_default_terms(terms, 20);
+  p.schedule.stages = 5;
+  // what the third stage becomes: how many times it is taken back, and the fractions of the way that follow
+  static const struct {
+    int stalls, again;
+    double fraction[8];
+  } cases[] = {{0, 0, {0.5, 0.75, 1}},
+               {1, 1, {0.5, 0.375, 0.5, 0.75, 1}},
+               {2, 2, {0.5, 0.375, 0.3125, 0.5, 0.75, 1}},
+               {4, 3, {0.5, 0.375, 0.3125, 0.28125, 0.5, 0.75, 1}}};
+  for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+    cav_solution *s = NULL;
+    runs = 0, first_stall = 3, last_stall = 2 + cases[c].stalls;
+    CHECK(cav_solve(&p, NULL, NULL, &s, NULL) == CAV_OK && s && s->unactuated < 1e-6);
+    int again = 0, iterations = 0;
+    for (int i = 0; s && i < s->nstage; i++) {
+      again += s->stage[i].outcome == CAV_OUTCOME_AGAIN;
+      iterations += s->stage[i].iterations;
+      double fraction = i >= 2 && i < 10 ? cases[c].fraction[i - 2] : 0;
+      if (fraction > 0)
+        CHECK(!strcmp(s->stage[i].phase, "continuation") && fabs(s->stage[i].fraction - fraction) < 1e-12);
+    }
+    CHECK(s && again == cases[c].again && iterations == s->iterations);
+    cav_solution_free(s);
+  }
+  check_order(&p);
+  cav_model_free(m);
+}
+
+int main(void) {
+  test_gait(BIPED("1"), 1, 2);
+  test_gait(BIPED("1"), 1, -2);
+  test_gait(BIPED("-1"), -1, 2);
+  test_stalls();
+  return check_result();
+}
