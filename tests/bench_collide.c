@@ -4,7 +4,7 @@
 
 #include "check.h"
 #include "math3.h"
-#include "stage.h"
+#include "step.h"
 
 #ifdef CAVORT_HAVE_MUJOCO
 #include <mujoco/mujoco.h>

@@ -4,7 +4,7 @@
 /// steps of that disagree, at a kink, are left out. A time is the shortest of several runs; shown are medians over states.
 /// Usage: bench_derivative [MODEL]; default mujoco/humanoid.xml among the shared models.
 #include "bench.h"
-#include "stage.h"
+#include "step.h"
 
 #ifndef CAVORT_HAVE_MUJOCO
 int main(void) {

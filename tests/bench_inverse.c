@@ -3,7 +3,7 @@
 /// states and the middle half. Prints the work done beside the time, and the fraction of the stages of ours.
 /// Usage: bench_inverse [MODEL]; default mujoco/humanoid.xml among the shared models.
 #include "bench.h"
-#include "stage.h"
+#include "step.h"
 
 #ifndef CAVORT_HAVE_MUJOCO
 int main(void) {

@@ -4,8 +4,7 @@
 /// cross is CAV_SWEEP_FROM. Usage: bench_sweep.
 #include "bench.h"
 #include "math3.h"
-#include "stage.h"
-#include "workspace.h"
+#include "step.h"
 
 enum { POSTURES = 200, RUNS = 9 };
 

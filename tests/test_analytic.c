@@ -4,7 +4,7 @@
 /// or a limit has a kink within the step. Also: refusals are explicit, wrong calls fail. If this test fails because a new
 /// force or constraint has no derivative in dynamics/derivative/analytic.c yet, name it in cav_derivatives_missing.
 #include "scene.h"
-#include "stage.h"
+#include "step.h"
 
 #ifdef CAVORT_HAVE_CCD
 /// Rolling and sliding bodies of all shapes, rough pairs of unequal friction, two trees that touch.

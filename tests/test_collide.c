@@ -2,8 +2,7 @@
 /// axes, and MuJoCo's contacts on models no one here wrote.
 #include "check.h"
 #include "math3.h"
-#include "stage.h"
-#include "workspace.h"
+#include "step.h"
 
 #ifdef CAVORT_HAVE_MUJOCO
 #include <mujoco/mujoco.h>

@@ -1,7 +1,7 @@
 /// Contact law: the exact projection against a numerical minimiser, the smoothed one against its definition in long
 /// double, gradient and Hessian against differences, convergence for sigma -> 0, extreme numbers.
 #include "check.h"
-#include "stage.h"
+#include "step.h"
 
 enum { DIM_MAX = 6 };
 

@@ -2,7 +2,7 @@
 /// columns of full evaluations; du/dv_next is M/h where nothing touches; the state ends at the point; failures leave the
 /// outputs alone.
 #include "scene.h"
-#include "stage.h"
+#include "step.h"
 
 static const char humanlike[] =
     "<mujoco><option timestep='0.005'/><default><geom condim='3' friction='.7'/></default><worldbody>"

@@ -2,7 +2,7 @@
 /// open and closed chains; u against MuJoCo's mj_inverse. Each check has a control that must differ.
 #include "impulse.h"
 #include "scene.h"
-#include "stage.h"
+#include "step.h"
 
 #ifdef CAVORT_HAVE_MUJOCO
 #include <mujoco/mujoco.h>

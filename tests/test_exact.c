@@ -2,7 +2,7 @@
 /// and that stages may be reused. Each has a control.
 #include "impulse.h"
 #include "scene.h"
-#include "stage.h"
+#include "step.h"
 
 /// Every kind of row at once: contacts of 1, 3, 4 and 6 rows, limits of hinge, slide, ball and tendon, friction losses, ties.
 static const char every_row[] =

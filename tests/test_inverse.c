@@ -4,7 +4,7 @@
 #include <malloc.h>
 
 #include "scene.h"
-#include "stage.h"
+#include "step.h"
 
 /// One model with a state and vectors for it.
 typedef struct bench {

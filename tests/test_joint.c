@@ -4,7 +4,7 @@
 /// Usage: test_joint [FILE]; FILE gets a line a step: time, angle, control, then friction, contact and limit impulses of the
 /// forward and of the inverse dynamics, N s and N m s. tests/figures.sh draws it.
 #include "scene.h"
-#include "workspace.h"
+#include "step.h"
 
 enum { STEPS = 400, KINDS = 3 };
 static const char model_path[] = CAVORT_SOURCE_ROOT "/problems/models/joint.xml";

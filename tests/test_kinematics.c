@@ -2,7 +2,7 @@
 /// composite bodies is the M that Newton-Euler shows column by column, the sparse factorisation solves, kinetic energy
 /// and momentum agree between their two definitions.
 #include "scene.h"
-#include "workspace.h"
+#include "step.h"
 
 static const cav_model *model;
 static cav_state *state;

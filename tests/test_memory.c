@@ -7,7 +7,7 @@
 
 #include "cavort/solve.h"
 #include "scene.h"
-#include "workspace.h"
+#include "step.h"
 
 #if defined(__has_feature)
 #if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)

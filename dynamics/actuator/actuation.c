@@ -4,8 +4,9 @@
 /// otherwise as a pseudo-inverse by Jacobi rotations; with other transmissions at every call. Limits are not applied.
 #include <stdlib.h>
 
+#include "actuator.h"
+#include "algebra.h"
 #include "math3.h"
-#include "workspace.h"
 
 static const double RANK_TOLERANCE = 1e-12;
 

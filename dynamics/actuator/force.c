@@ -2,8 +2,8 @@
 /// and bias are constants, affine in length and velocity, or those of a muscle: MJCF's curves, unit force times
 /// active force over length and over velocity, and passive force over length. The input is the control, or the
 /// activation where the actuator has one; how activation follows control is not computed.
+#include "actuator.h"
 #include "math3.h"
-#include "workspace.h"
 
 /// A muscle at one length and velocity, in its own units.
 typedef struct fibre {

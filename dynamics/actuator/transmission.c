@@ -4,8 +4,8 @@
 /// of fixed length from the crank's site to a slider on the z axis of the other; where the rod is too short to reach the
 /// axis, the slider is at the foot of the perpendicular. MJCF's definitions; a reference site's turning is not part of
 /// the moments there, and so not here. Only dofs that move one end relative to the other are listed.
+#include "actuator.h"
 #include "math3.h"
-#include "workspace.h"
 
 /// A force on one link and its reaction on another, in world axes.
 typedef struct pull {

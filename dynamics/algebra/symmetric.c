@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "stage.h"
+#include "algebra.h"
 
 enum { SWEEPS = 30 };
 

@@ -5,10 +5,9 @@
 #include <stdlib.h>
 
 #include "cavort/dynamics.h"
+#include "constraint.h"
 #include "math3.h"
-#include "stage.h"
 #include "sweep.h"
-#include "workspace.h"
 
 // fastest approach that the discrete law meets without a jump, m/s (a fall from 1.3 m)
 static const double APPROACH_SPEED = 5;

@@ -13,7 +13,7 @@
 #include <float.h>
 #include <math.h>
 
-#include "stage.h"
+#include "constraint.h"
 
 enum { DIM_MAX = 6 };
 

@@ -11,8 +11,8 @@
 /// Errors, weights and the impedance (by the length of x over all rows) are MuJoCo 2.2.2's, but for two things: it scales
 /// only the rate of a weld's rotation by torquescale and not the error, where both agree at 1; and it has no distance.
 /// Where the nearest points of a distance are not unique, the deepest point that the pair's routine gives first counts.
+#include "constraint.h"
 #include "math3.h"
-#include "workspace.h"
 
 // whether it acts between links, else between joints or tendons
 static int between_links(const cav_equality *e) {

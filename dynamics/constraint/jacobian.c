@@ -2,13 +2,8 @@
 /// and where A is. Each block keeps the dofs that move it: for a contact those between its two links and their nearest
 /// common ancestor, beyond which the motion of both is the same; for an equality constraint all that move either link,
 /// as its two points are apart by the error. Reads poses and subspaces of the last cav_position; computes no velocity.
-#include "impulse.h"
+#include "jacobian.h"
 #include "math3.h"
-
-int cav_last_dof(const cav_model *model, int link) {
-  while (link > 0 && model->link[link].ndof == 0) link = model->link[link].parent;
-  return link > 0 ? model->link[link].dof + model->link[link].ndof - 1 : -1;
-}
 
 // column of one dof in the rows of a contact: velocity of geom2 relative to geom1 along the axes of the frame
 static void contact_column(const cav_model *model, const cav_state *state, const cav_contact *contact, int dof,

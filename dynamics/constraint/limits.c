@@ -8,7 +8,7 @@
 /// rule for what reaches beyond it (cav_law_activation). The discrete law looks at where the step ends, x + h v_next, so there
 /// an object counts from speed h before the margin: slower than that, nothing is missed. The smoothed law is active up to
 /// SMOOTH_ACTIVATION delta from there: the two add up.
-#include "derivative.h"
+#include "constraint.h"
 #include "math3.h"
 
 static const double R_MIN = 1e-15, IMPEDANCE_MIN = 1e-4, IMPEDANCE_MAX = 0.9999, FRICTION_MIN = 1e-5;

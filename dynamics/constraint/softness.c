@@ -11,7 +11,7 @@
 #include <math.h>
 
 #include "cavort/dynamics.h"
-#include "stage.h"
+#include "constraint.h"
 
 // impedances outside are not used: limits.c
 static const double IMPEDANCE_MIN = 1e-4, IMPEDANCE_MAX = 0.9999;

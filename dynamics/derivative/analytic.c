@@ -38,14 +38,6 @@ typedef struct task {
 
 // ---------------------------------------------------------------- memory
 
-void cav_derivative_store_free(cav_derivative_store *derivatives) {
-  if (!derivatives) return;
-  free(derivatives->contact);
-  free(derivatives->drift);
-  free(derivatives->touched);
-  free(derivatives);
-}
-
 static cav_derivative_store *derivatives_new(const cav_model *model) {
   cav_derivative_store *s = calloc(1, sizeof *s);
   if (!s) return NULL;

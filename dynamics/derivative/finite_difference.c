@@ -4,8 +4,8 @@
 /// order in the step, centred ones second order where the law is smooth.
 #include <stdlib.h>
 
+#include "derivative.h"
 #include "math3.h"
-#include "workspace.h"
 
 /// Everything one pass of columns needs.
 typedef struct difference {

@@ -2,7 +2,7 @@
 #ifndef CAVORT_GJK_H
 #define CAVORT_GJK_H
 
-#include "stage.h"
+#include "geometry.h"
 
 /// A shape without its round edge: the centre of a sphere, the segment of a capsule, any other shape as it is.
 typedef struct cav_core {

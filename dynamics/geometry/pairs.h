@@ -2,8 +2,8 @@
 #ifndef CAVORT_PAIRS_H
 #define CAVORT_PAIRS_H
 
+#include "geometry.h"
 #include "math3.h"
-#include "stage.h"
 
 /// Signed distance of point p [3] to the surface of a solid centred at the origin, negative inside, and the unit
 /// outward normal [3] at the nearest surface point p - distance * normal. All in the solid's axes. Convex in p.

@@ -8,9 +8,10 @@
 #include <stdint.h>
 #include <stdlib.h>
 
+#include "compile.h"
 #include "math3.h"
 #include "spec.h"
-#include "stage.h"
+#include "step.h"
 
 // the model under construction; its arrays are writable here only
 typedef struct builder {

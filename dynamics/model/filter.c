@@ -7,9 +7,10 @@
 
 #include <stdlib.h>
 
+#include "compile.h"
 #include "math3.h"
 #include "spec.h"
-#include "stage.h"
+#include "step.h"
 
 // pairs under construction
 typedef struct list {

@@ -3,8 +3,9 @@
 /// projected steps along its gradient from q0, to the nearest end each way. Contacts and other constraints are left out.
 #include <stdlib.h>
 
+#include "compile.h"
 #include "math3.h"
-#include "workspace.h"
+#include "step.h"
 
 enum { STEPS = 5000 };
 static const double FARTHEST = 1e3; ///< a coordinate that goes this far has no end

@@ -5,6 +5,8 @@
 /// settotalmass, in this order. Meshes are weighed in asset.c. Not
 /// done: shells.
 
+#include "algebra.h"
+#include "compile.h"
 #include "math3.h"
 #include "spec.h"
 
@@ -98,56 +100,7 @@ static void weigh_geom(cav_spec *spec, cav_spec_geom *g) {
     cav_spec_fail(spec, g->node, NULL, "mass or inertia is not finite; make size, mass or density smaller");
 }
 
-int cav_geom_weighs(const cav_spec *spec, const cav_spec_geom *g) {
-  const cav_spec_compiler *c = &spec->compiler;
-  if (g->has_mass ? g->mass == 0 : g->density == 0) return 0;
-  if (g->body == 0 || g->type == CAV_GEOM_PLANE || g->type == CAV_GEOM_HFIELD || c->from_geoms == 0) return 0;
-  if (spec->body.at[g->body].has_inertial && c->from_geoms != 1) return 0;
-  return g->group >= c->group_range[0] && g->group <= c->group_range[1];
-}
-
 // --- bodies ---
-
-void cav_principal_axes(const double S[6], double quat[4], double moment[3]) {
-  double A[9] = {S[0], S[3], S[4], S[3], S[1], S[5], S[4], S[5], S[2]}, V[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  // rotate the largest off-diagonal entry away until none matters
-  for (int sweep = 0; sweep < 60; sweep++) {
-    int p = 0, q = 1;
-    if (fabs(A[2]) > fabs(A[1])) q = 2;
-    if (fabs(A[5]) > fabs(A[3 * p + q])) p = 1, q = 2;
-    double off = A[3 * p + q];
-    if (fabs(off) <= 1e-17 * (fabs(A[0]) + fabs(A[4]) + fabs(A[8]))) break;
-    double theta = (A[4 * q] - A[4 * p]) / (2 * off);
-    double t = (theta < 0 ? -1 : 1) / (fabs(theta) + sqrt(theta * theta + 1)), c = 1 / sqrt(t * t + 1), s = t * c;
-    for (int k = 0; k < 3; k++) {
-      double a = A[3 * k + p], b = A[3 * k + q];
-      A[3 * k + p] = c * a - s * b;
-      A[3 * k + q] = s * a + c * b;
-    }
-    for (int k = 0; k < 3; k++) {
-      double a = A[3 * p + k], b = A[3 * q + k], u = V[3 * k + p], w = V[3 * k + q];
-      A[3 * p + k] = c * a - s * b;
-      A[3 * q + k] = s * a + c * b;
-      V[3 * k + p] = c * u - s * w;
-      V[3 * k + q] = s * u + c * w;
-    }
-  }
-  // largest moment first
-  int order[3] = {0, 1, 2};
-  for (int i = 0; i < 2; i++) {
-    for (int j = 0; j < 2 - i; j++) {
-      if (A[4 * order[j]] >= A[4 * order[j + 1]]) continue;
-      int swap = order[j];
-      order[j] = order[j + 1];
-      order[j + 1] = swap;
-    }
-  }
-  double x[3], y[3];
-  column3(x, V, order[0]);
-  column3(y, V, order[1]);
-  for (int i = 0; i < 3; i++) moment[i] = A[4 * order[i]];
-  cav_quat_of_axes(x, y, quat);
-}
 
 // takes part in a body's inertia
 static int counts(const cav_spec *spec, const cav_spec_geom *g) {

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "cavort/model.h"
+#include "compile.h"
 #include "remove.h"
 #include "scene.h"
 #include "spec.h"
@@ -45,15 +46,6 @@ cav_model *cav_model_load_scene(const char *path, const cav_xml_node *scene, cav
 }
 
 void cav_model_free(cav_model *model) { free(model); }
-
-int cav_name_find(const void *first, int n, size_t stride, const char *name) {
-  if (!name || !*name) return -1;
-  for (int i = 0; i < n; i++) {
-    const char *other = *(const char *const *)((const char *)first + (size_t)i * stride);
-    if (!strcmp(other, name)) return i;
-  }
-  return -1;
-}
 
 int cav_object_find(const cav_model *model, cav_object_type type, const char *name) {
   switch (type) {

@@ -3,7 +3,8 @@
 /// torsional and rolling friction stay as they are.
 #include <math.h>
 
-#include "stage.h"
+#include "compile.h"
+#include "step.h"
 
 static void scale_mass(cav_model *model, const double *scale) {
   cav_link *link = (cav_link *)model->link;

@@ -5,8 +5,9 @@
 /// actuator the acceleration of a unit force. M is the inertia with armature and without implicit damping.
 #include <stdlib.h>
 
+#include "compile.h"
 #include "math3.h"
-#include "workspace.h"
+#include "step.h"
 
 // x' M^-1 x for a row x given in w->scratch[0..nv)
 static double inverse_norm(const cav_model *model, const cav_workspace *w) {

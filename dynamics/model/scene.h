@@ -4,10 +4,7 @@
 #define CAVORT_SCENE_H
 
 #include "cavort/model.h"
-#include "xml.h"
-
-/// The element <scene>: what MJCF's worldbody may hold, but for classes and materials; and <leave>, remove.h.
-extern const cav_xml_element cav_scene_element;
+#include "remove.h"
 
 /// cav_model_load with the children of a <scene> (NULL: none) added to the world. They take MJCF's own defaults, angles are
 /// in degrees, whatever the model's file says; bodies come after those of the model, and so do their coordinates: keyframes

@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "compile.h"
 #include "spec.h"
 
 // whether a path can be followed: pieces start and end at sites, geoms stand between two of them, branches are whole

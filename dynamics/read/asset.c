@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include "algebra.h"
 #include "elevation.h"
 #include "math3.h"
 #include "spec.h"

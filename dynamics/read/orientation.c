@@ -2,6 +2,7 @@
 ///
 /// Angles are in the unit, euler sequences of the axes, that the file's compiler element sets.
 
+#include "algebra.h"
 #include "math3.h"
 #include "spec.h"
 
@@ -33,25 +34,6 @@ static void quat_of_z(const double direction[3], double quat[4]) {
   half = atan2(sine, d[2]) / 2;
   quat[0] = cos(half);
   scale3(quat + 1, sin(half), axis);
-}
-
-// rotation with the columns x, y made orthonormal, x kept
-void cav_quat_of_axes(const double along_x[3], const double near_y[3], double quat[4]) {
-  double x[3], y[3], z[3];
-  copy3(x, along_x);
-  normalise3(x);
-  axpy3(y, near_y, -dot3(x, near_y), x);
-  normalise3(y);
-  cross3(z, x, y);
-  const double R[9] = {x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]};
-  // the largest of the four squared entries divides best
-  double t[4] = {1 + R[0] + R[4] + R[8], 1 + R[0] - R[4] - R[8], 1 - R[0] + R[4] - R[8], 1 - R[0] - R[4] + R[8]};
-  int k = 0;
-  for (int i = 1; i < 4; i++) k = t[i] > t[k] ? i : k;
-  double a = R[7] - R[5], b = R[2] - R[6], c = R[3] - R[1], d = R[1] + R[3], e = R[2] + R[6], f = R[5] + R[7];
-  const double rows[4][4] = {{t[0], a, b, c}, {a, t[1], d, e}, {b, d, t[2], f}, {c, e, f, t[3]}};
-  memcpy(quat, rows[k], sizeof rows[k]);
-  quat_normalise(quat);
 }
 
 // any of the five ways to write an orientation; at most one

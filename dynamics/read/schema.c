@@ -5,7 +5,6 @@
 /// not offered is in the table too: mjcf.c says so with the line, which is clearer than "unknown element".
 
 #include "remove.h"
-#include "scene.h"
 #include "spec.h"
 
 #define TEXT(name) \

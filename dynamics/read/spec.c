@@ -119,3 +119,20 @@ void cav_check_condim(cav_spec *spec, const cav_xml_node *node, int condim) {
   if (condim != 1 && condim != 3 && condim != 4 && condim != 6)
     cav_spec_fail(spec, node, "condim", "expected 1, 3, 4 or 6, got %d", condim);
 }
+
+int cav_name_find(const void *first, int n, size_t stride, const char *name) {
+  if (!name || !*name) return -1;
+  for (int i = 0; i < n; i++) {
+    const char *other = *(const char *const *)((const char *)first + (size_t)i * stride);
+    if (!strcmp(other, name)) return i;
+  }
+  return -1;
+}
+
+int cav_geom_weighs(const cav_spec *spec, const cav_spec_geom *g) {
+  const cav_spec_compiler *c = &spec->compiler;
+  if (g->has_mass ? g->mass == 0 : g->density == 0) return 0;
+  if (g->body == 0 || g->type == CAV_GEOM_PLANE || g->type == CAV_GEOM_HFIELD || c->from_geoms == 0) return 0;
+  if (spec->body.at[g->body].has_inertial && c->from_geoms != 1) return 0;
+  return g->group >= c->group_range[0] && g->group <= c->group_range[1];
+}

@@ -266,6 +266,12 @@ void cav_check_not_negative(cav_spec *spec, const cav_xml_node *node, const char
 void cav_check_softness(cav_spec *spec, const cav_xml_node *node, const char *where, const cav_softness *softness);
 void cav_check_condim(cav_spec *spec, const cav_xml_node *node, int condim);
 
+/// Index of a named object among n, at a stride of bytes whose first member is the name; -1 if there is none. spec.c.
+int cav_name_find(const void *first, int n, size_t stride, const char *name);
+
+/// 1 if a geom's mass counts in that of its body. spec.c.
+int cav_geom_weighs(const cav_spec *spec, const cav_spec_geom *geom);
+
 /// Lets go of the lists.
 void cav_spec_clear(cav_spec *spec);
 
@@ -298,18 +304,9 @@ void cav_spec_assets(cav_spec *spec);
 size_t cav_put_assets(const cav_spec *spec, void *base, cav_model *model);
 void cav_clear_assets(cav_spec *spec);
 
-/// 1 if a geom's mass counts in that of its body. mass.c.
-int cav_geom_weighs(const cav_spec *spec, const cav_spec_geom *geom);
-
 /// Root of the grammar of URDF; fills spec from a checked tree of it. urdf.c.
 extern const cav_xml_element cav_urdf_root;
 void cav_urdf_read(cav_spec *spec, const cav_xml *xml);
-
-/// Masses, centres and principal moments of geoms and bodies. mass.c.
-void cav_spec_masses(cav_spec *spec);
-
-/// Quaternion of the rotation with columns x and y made orthonormal, x kept; and z their cross product. orientation.c.
-void cav_quat_of_axes(const double x[3], const double y[3], double quat[4]);
 
 /// Orientation of an element, by whichever attribute gives it; quat stays where none does. orientation.c.
 void cav_read_orientation(cav_spec *spec, const cav_xml_node *node, double quat[4]);
@@ -317,34 +314,11 @@ void cav_read_orientation(cav_spec *spec, const cav_xml_node *node, double quat[
 /// Pose midway between two points [6], z along their line; returns half their distance. orientation.c.
 double cav_pose_of_fromto(const double *fromto, double pos[3], double quat[4]);
 
-/// Eigenvectors (as a rotation, columns) and values, largest first, of a symmetric matrix xx yy zz xy xz yz. mass.c.
-void cav_principal_axes(const double S[6], double quat[4], double moment[3]);
-
-/// Finds the sites and geoms of all paths and checks that they can be followed. tendon_path.c.
-void cav_spec_tendon_paths(cav_spec *spec);
-
-/// Marks the joints that move two bodies relative to each other, mark [joint.n]. tendon_path.c.
-void cav_spec_mark_between(const cav_spec *spec, int body1, int body2, char *mark);
-
-/// Marks the joints that can change a tendon's length, mark [joint.n], and returns their dofs. tendon_path.c.
-int cav_spec_tendon_joints(const cav_spec *spec, int tendon, char *mark);
-
 /// Values of an actuator element, of a class or of its own, over those it starts from. actuator.c.
 void cav_actuator_read_values(const cav_xml_node *node, cav_spec_actuator *actuator);
 
 /// The whole element: values, name, transmission. Then everything but name and the three limits. actuator.c.
 void cav_actuator_read(cav_spec *spec, const cav_xml_node *node, cav_spec_actuator *actuator);
 void cav_actuator_compile(cav_spec *spec, const cav_spec_actuator *s, cav_actuator *actuator);
-
-/// Pairs of geoms that may touch, explicit ones first, then in the order of body pairs; their parameters mixed. For each
-/// body [nbody] weld is the body at the top of the group that moves with it, link_of its link. Returns a list of malloc,
-/// *npair long, or NULL for an empty one. filter.c.
-cav_pair *cav_filter_pairs(cav_spec *spec, const int *weld, const int *link_of, int *npair);
-
-/// Index of a named object among n, at a stride of bytes whose first member is the name; -1 if there is none. model.c.
-int cav_name_find(const void *first, int n, size_t stride, const char *name);
-
-/// Model of a complete spec; NULL on failure, noted in spec. compile.c.
-cav_model *cav_compile(cav_spec *spec);
 
 #endif

@@ -1,63 +1,8 @@
 /// Poses of objects and readings of sensors from a state's last evaluation. Velocities are those at v_next, accelerations
 /// and forces those of the step. Bodies welded into one link keep their own frames and masses here, so a subtree is a
 /// subtree of the file. Readings carry no noise. Nothing is computed for sensors that are not asked for.
+#include "sensor.h"
 #include "math3.h"
-#include "workspace.h"
-
-// pose of a frame fixed in a link
-static void pose_in_link(const cav_state *state, int link, const double pos[3], const double quat[4], cav_pose *pose) {
-  const cav_pose *l = &state->link[link];
-  transform(pose->pos, l->pos, l->rotation, pos);
-  quat_mul(pose->quat, l->quat, quat);
-  quat_matrix(pose->rotation, pose->quat);
-}
-
-void cav_mass_pose(const cav_state *state, const cav_body *body, cav_pose *pose) {
-  double pos[3], quat[4];
-  quat_rotate(pos, body->quat, body->com);
-  add3(pos, pos, body->pos);
-  quat_mul(quat, body->quat, body->iquat);
-  pose_in_link(state, body->link, pos, quat, pose);
-}
-
-int cav_object_link(const cav_model *model, cav_object_type type, int object) {
-  switch (type) {
-    case CAV_OBJECT_BODY:
-    case CAV_OBJECT_XBODY:
-      return model->body[object].link;
-    case CAV_OBJECT_GEOM:
-      return model->geom[object].link;
-    case CAV_OBJECT_SITE:
-      return model->site[object].link;
-    default:
-      return 0;
-  }
-}
-
-void cav_object_pose(const cav_model *model, const cav_state *state, cav_object_type type, int object, cav_pose *pose) {
-  switch (type) {
-    case CAV_OBJECT_BODY:
-      cav_mass_pose(state, &model->body[object], pose);
-      break;
-    case CAV_OBJECT_XBODY: {
-      const cav_body *body = &model->body[object];
-      pose_in_link(state, body->link, body->pos, body->quat, pose);
-      break;
-    }
-    case CAV_OBJECT_GEOM: {
-      const cav_geom *geom = &model->geom[object];
-      pose_in_link(state, geom->link, geom->pos, geom->quat, pose);
-      break;
-    }
-    case CAV_OBJECT_SITE: {
-      const cav_site *site = &model->site[object];
-      pose_in_link(state, site->link, site->pos, site->quat, pose);
-      break;
-    }
-    default:
-      *pose = state->link[0];
-  }
-}
 
 /// Sums over the bodies of a subtree.
 typedef struct subtree {
@@ -189,7 +134,7 @@ static double measure_range(const cav_model *model, const cav_state *state, int 
     const cav_geom *geom = &model->geom[i];
     if (geom->body == body || geom->rgba[3] == 0) { continue; }
     cav_pose pose;
-    pose_in_link(state, geom->link, geom->pos, geom->quat, &pose);
+    cav_frame_pose(state, geom->link, geom->pos, geom->quat, &pose);
     cav_shape shape = cav_shape_of(model, geom);
     copy3(shape.pos, pose.pos);
     memcpy(shape.rotation, pose.rotation, sizeof shape.rotation);
@@ -203,7 +148,7 @@ static void sense_site(const cav_model *model, const cav_state *state, const cav
   const cav_site *site = &model->site[sensor->object];
   cav_pose pose;
   double world[3] = {0, 0, 0}, wrench[6], angular[3];
-  pose_in_link(state, site->link, site->pos, site->quat, &pose);
+  cav_frame_pose(state, site->link, site->pos, site->quat, &pose);
   switch (sensor->type) {
     case CAV_SENSOR_TOUCH:
       out[0] = cav_touch_force(model, state, sensor->object);

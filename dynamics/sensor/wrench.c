@@ -5,7 +5,7 @@
 /// MuJoCo, drag of a fluid and lift against gravity, which act from outside.
 #include "half_step.h"
 #include "math3.h"
-#include "workspace.h"
+#include "sensor.h"
 
 int cav_descends(const cav_model *model, int body, int from) {
   while (body > from) { body = model->body[body].parent; }

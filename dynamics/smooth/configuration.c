@@ -1,7 +1,7 @@
 /// Configurations as a manifold: q (+) h v and its inverse. Quaternions advance by the exponential in body axes; the
 /// rotation vector of a difference is the shortest, so its length is at most pi.
 #include "math3.h"
-#include "stage.h"
+#include "smooth.h"
 
 void cav_configuration_reset(const cav_model *model, double *q) {
   if (model->nq > 0) { memcpy(q, model->q0, (size_t)model->nq * sizeof *q); }

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 
 #include "math3.h"
-#include "workspace.h"
+#include "smooth.h"
 
 /// What the medium acts on: a box or an ellipsoid fixed in a link.
 typedef struct cav_float {

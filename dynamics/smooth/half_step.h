@@ -2,7 +2,7 @@
 #ifndef CAVORT_HALFWAY_H
 #define CAVORT_HALFWAY_H
 
-#include "workspace.h"
+#include "smooth.h"
 
 /// Links half way: at q (-) h v/2 with v, or at q (+) h v_next/2 with v_next. Spatial vectors about the references of the
 /// state, which are points fixed in space for both.

@@ -2,7 +2,7 @@
 /// stores it, or dense. Only the forward step, reference weights and callers who ask need it: the inverse does not.
 /// A composite is ten numbers at the tree's reference point: mass, first moment, inertia.
 #include "math3.h"
-#include "workspace.h"
+#include "smooth.h"
 
 void cav_composites_at(const cav_model *model, const cav_posture *at, double *all) {
   // each link's own mass, first moment and inertia at the reference, then sums towards the root

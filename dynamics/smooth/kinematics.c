@@ -6,7 +6,7 @@
 /// from link to link they are only added, never transformed.
 #include "half_step.h"
 #include "math3.h"
-#include "workspace.h"
+#include "smooth.h"
 
 // sines and cosines of n angles: Cody-Waite reduction to a quarter turn and Taylor sums to x^17, absolute error below
 // 3e-16. Without branches, so that the compiler takes several at once; good to |angle| < 1e5, checked by the caller
@@ -212,4 +212,9 @@ void cav_kinematics(const cav_model *model, cav_state *state, const double *q) {
   cav_posture_place(model, state->work, &at);
   if (state->work->half_steps) { state->work->half_steps->fresh = 0; }
   if (model->ntendon > 0) { cav_tendon_lengths(model, state); }
+}
+
+int cav_last_dof(const cav_model *model, int link) {
+  while (link > 0 && model->link[link].ndof == 0) link = model->link[link].parent;
+  return link > 0 ? model->link[link].dof + model->link[link].ndof - 1 : -1;
 }

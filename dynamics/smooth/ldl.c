@@ -2,7 +2,7 @@
 /// section 6.5). Row i of the storage holds dof i, its parent, the parent's parent and so on: lower triangle, from the
 /// diagonal towards the root. D replaces the diagonal, L the rest. Needs positive definite M: it does not pivot.
 #include "math3.h"
-#include "workspace.h"
+#include "smooth.h"
 
 int cav_ldl_factor(const cav_model *model, const cav_workspace *w, const double *M, double *L) {
   const int *row = w->row, *parent = w->parent;

@@ -1,6 +1,6 @@
 /// Centre of mass, its velocity and the angular momentum about it, of all links that move, at the state's poses.
 #include "math3.h"
-#include "workspace.h"
+#include "smooth.h"
 
 // mass of all links and their mean position
 static double centre(const cav_model *model, const cav_state *state, double com[3]) {

@@ -2,7 +2,7 @@
 /// act along the rotation vector from q0, in body axes. Damping of joints and tendons is linear in one velocity, which
 /// the order of the step chooses. Also gravity compensation, a force at the centre of mass of a body. Fluids: fluid.c.
 #include "math3.h"
-#include "workspace.h"
+#include "smooth.h"
 
 // u += k log(rest^-1 q)
 static void turning_spring(double stiffness, const double *q, const double *rest, double *u) {

@@ -3,7 +3,7 @@
 /// A_child = A_parent + S a + V x S v with V the velocity before the joint. Forces balance about each link's centre of
 /// mass. A free joint is two groups of dofs, translation and rotation: the axes of a group turn with what is before it.
 #include "math3.h"
-#include "workspace.h"
+#include "smooth.h"
 
 void cav_link_velocities(const cav_model *model, const cav_state *state, const double *v, double *velocity) {
   for (int i = 1; i < model->nlink; i++) {

@@ -4,7 +4,7 @@
 /// velocity that a dof gives its ends relative to each other. Only dofs that move a piece's ends apart are listed
 /// (model->tendon_dof). A piece of no length has no direction and no arm.
 #include "math3.h"
-#include "workspace.h"
+#include "smooth.h"
 #include "wrap.h"
 
 void cav_tendon_compile(const cav_model *model, cav_state *state) {

@@ -3,29 +3,7 @@
 #ifndef CAVORT_WORKSPACE_H
 #define CAVORT_WORKSPACE_H
 
-#include "stage.h"
-
-/// World placement of the geoms that are in pairs: what collide.c keeps between its own calls.
-struct cav_geom_cache;
-enum { CAV_SWEEP_FROM = 1000 }; ///< pairs from which on a sweep prunes them (bench_sweep)
-struct cav_geom_cache *cav_geom_cache_new(const cav_model *model, int sweep_from);
-void cav_geom_cache_free(struct cav_geom_cache *cache);
-size_t cav_geom_cache_bytes(const struct cav_geom_cache *cache);
-
-/// Links at one configuration; arrays as in cav_state.
-typedef struct cav_posture {
-  double *q; ///< [nq], its quaternions are made unit
-  cav_pose *link;
-  double *com, *inertia, *reference, *axis;
-  int referred; ///< 1: reference is given and stays
-} cav_posture;
-
-/// Poses, centres of mass, world inertias and motion subspaces at a posture. kinematics.c.
-void cav_posture_place(const cav_model *model, struct cav_workspace *w, const cav_posture *at);
-
-/// Mass, first moment and inertia of every subtree about its reference, all [nlink*10], from com, inertia and reference of a
-/// posture. inertia.c.
-void cav_composites_at(const cav_model *model, const cav_posture *at, double *all);
+#include "cavort/dynamics.h"
 
 /// What the memory of a state serves. profile.c tells of it.
 typedef enum cav_part {
@@ -42,22 +20,6 @@ typedef enum cav_part {
   CAV_PARTS
 } cav_part;
 
-/// Bytes of each part of a state as it is now. state.c.
-void cav_state_bytes(const cav_state *state, size_t bytes[CAV_PARTS]);
-
-/// Times of the stages of one evaluation of the inverse, s: each run alone often enough to be measured, shortest of several.
-typedef struct cav_profile {
-  double poses, rows, contacts, equalities,
-      laws;        ///< from q: links and tendons; limits; search of contacts; errors; R, B, K
-  double motion;   ///< from v and v_next: Newton-Euler, joints' and tendons' forces
-  double impulses; ///< from both: of contacts, equality constraints and rows
-  double whole;
-} cav_profile;
-
-/// Measures at (q, v, v_next); fails as cav_inverse does. The state is left evaluated there. profile.c.
-cav_status cav_profile_inverse(const cav_model *model, cav_state *state, const double *q, const double *v,
-                               const double *v_next, cav_profile *profile);
-
 enum { CAV_IMPULSE_DIM = 6 }; ///< most impulses of one object
 
 /// An impulse remembered between Gauss-Seidel solves, and of which object. gpgs.c.
@@ -67,6 +29,10 @@ typedef struct cav_memory {
   int detail; ///< feature, or the side of the row
   double f[CAV_IMPULSE_DIM];
 } cav_memory;
+
+struct cav_geom_cache;
+struct cav_half_steps;
+struct cav_derivative_store;
 
 typedef struct cav_workspace {
   size_t bytes[CAV_PARTS], noted; ///< of the block, by part
@@ -147,19 +113,10 @@ typedef struct cav_workspace {
   int nmemory, memory_room;
 } cav_workspace;
 
-/// Dofs that an actuator moves, dof NULL: only their number. Its length and moments along them, at the state's position.
-/// transmission.c.
-int cav_transmission_dofs(const cav_model *model, int actuator, int *dof);
-double cav_transmission_length(const cav_state *state, int actuator, double *moment);
+/// Room for one more contact or row at the end of the state's arrays; NULL if memory runs out. storage.c.
+cav_contact *cav_contact_push(cav_state *state);
+cav_row *cav_row_push(cav_state *state);
 
-/// What a medium acts on, if there is one. fluid.c.
-cav_status cav_fluid_compile(const cav_model *model, cav_workspace *w);
-size_t cav_fluid_bytes(const cav_workspace *w);
-
-/// Fills the transmission of a workspace. actuation.c.
-cav_status cav_actuation_compile(const cav_model *model, cav_state *state);
-
-/// Memory of the state's solvers with room for that many bytes, what it held is lost; NULL if memory runs out. impulse.c.
-void *cav_solver_room(cav_workspace *w, size_t bytes);
+enum { CAV_FIRST_ROOM = 16 }; ///< contacts or rows that a new state has room for
 
 #endif

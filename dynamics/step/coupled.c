@@ -12,6 +12,7 @@
 /// 1 + epsilon for this coupling with the row itself; it is taken out first, so both laws are one where A is diagonal.
 #include <stdlib.h>
 
+#include "algebra.h"
 #include "impulse.h"
 #include "math3.h"
 

@@ -18,6 +18,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "algebra.h"
 #include "impulse.h"
 #include "math3.h"
 

@@ -17,6 +17,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "algebra.h"
 #include "impulse.h"
 #include "math3.h"
 

@@ -3,6 +3,7 @@
 /// constraints comes from the state after an inverse at v_next = v, so forward and inverse cannot disagree about them.
 /// Solves nothing: forward.c, gpgs.c.
 #include "impulse.h"
+#include "algebra.h"
 
 #include <math.h>
 #include <stdlib.h>

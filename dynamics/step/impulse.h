@@ -3,19 +3,8 @@
 #ifndef CAVORT_IMPULSE_H
 #define CAVORT_IMPULSE_H
 
-#include "workspace.h"
-
-/// The rows of one constraint object and what their Jacobian is made of: only dofs that move the object are listed.
-typedef struct cav_block {
-  int contact;  ///< index into state->contact, or -1
-  int row;      ///< index into state->row, or -1
-  int equality; ///< index into state->equality constraint, or -1
-  int dim;      ///< number of rows
-  int first;    ///< first of them among all rows
-  int ndof;
-  const int *dof;  ///< [ndof] indices into v
-  const double *J; ///< [dim*ndof] row-major
-} cav_block;
+#include "jacobian.h"
+#include "step.h"
 
 /// The problem at one (q, v). Memory belongs to the state and is good until the next call of cav_impulse_new on it.
 typedef struct cav_impulse {
@@ -31,17 +20,6 @@ typedef struct cav_impulse {
   double *force, *change; ///< scratch [nv]
   double *spare;          ///< doubles asked for
 } cav_impulse;
-
-/// Jacobian rows of all contacts, rows and equality constraints of the state, each with the dofs that move it. jacobian.c.
-/// block [n], n = ncontact+nrow+nequality, dof [n*nv], J [rows*nv]. Returns the number of rows.
-int cav_jacobian(const cav_model *model, const cav_state *state, cav_block *block, int *dof, double *J);
-
-/// Number of constraint rows of the state; those of equality constraints alone. jacobian.c.
-int cav_jacobian_rows(const cav_state *state);
-int cav_equality_row_count(const cav_state *state);
-
-/// Row i of a block as a dense vector r [nv]. jacobian.c.
-void cav_block_spread(const cav_block *block, int i, int nv, double *r);
 
 /// Doubles a solver needs of its own, by what they grow with.
 typedef struct cav_impulse_room {

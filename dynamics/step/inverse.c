@@ -9,7 +9,7 @@
 /// What a stage may reuse depends on the options too: after a change of those that positions depend on, all is new.
 #include "half_step.h"
 #include "math3.h"
-#include "workspace.h"
+#include "step.h"
 
 // whether what cav_position computes is the same under both
 static int same_position_options(const cav_options *a, const cav_options *b) {

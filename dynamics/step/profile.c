@@ -4,7 +4,7 @@
 #include <time.h>
 
 #include "math3.h"
-#include "workspace.h"
+#include "step.h"
 
 enum { RUNS = 5, CALLS = 200 };
 

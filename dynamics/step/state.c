@@ -4,12 +4,12 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-#include "derivative.h"
+#include "derivative_store.h"
 #include "half_step.h"
 #include "math3.h"
-#include "workspace.h"
+#include "step.h"
 
-enum { FIRST_ROOM = 16, ALIGNMENT = 64 };
+enum { ALIGNMENT = 64 };
 
 // next piece of a block, or only its size while base is NULL
 static void *carve(char *base, size_t *used, size_t count, size_t size) {
@@ -201,8 +201,8 @@ static void compile_lists(const cav_model *model, cav_workspace *w) {
 
 // an array for the first few items, if it is needed at all
 static void *make_room(int needed, int *room, size_t size) {
-  void *items = needed ? malloc(FIRST_ROOM * size) : NULL;
-  *room = items ? FIRST_ROOM : 0;
+  void *items = needed ? malloc(CAV_FIRST_ROOM * size) : NULL;
+  *room = items ? CAV_FIRST_ROOM : 0;
   return items;
 }
 
@@ -262,30 +262,6 @@ void cav_state_free(cav_state *state) {
   free(state->contact);
   free(state->row);
   free(state);
-}
-
-// an array of items with room for count + 1, doubled when full; NULL if memory runs out, the old one is kept
-static void *grown(void *items, int count, int *room, size_t size) {
-  if (count < *room) { return items; }
-  if (*room > INT32_MAX / 2) { return NULL; }
-  int more = *room > 0 ? 2 * *room : FIRST_ROOM;
-  void *larger = realloc(items, (size_t)more * size);
-  if (larger) { *room = more; }
-  return larger;
-}
-
-cav_contact *cav_contact_push(cav_state *state) {
-  cav_contact *contact = grown(state->contact, state->ncontact, &state->work->contact_room, sizeof *contact);
-  if (!contact) { return NULL; }
-  state->contact = contact;
-  return &contact[state->ncontact++];
-}
-
-cav_row *cav_row_push(cav_state *state) {
-  cav_row *row = grown(state->row, state->nrow, &state->work->row_room, sizeof *row);
-  if (!row) { return NULL; }
-  state->row = row;
-  return &row[state->nrow++];
 }
 
 void cav_state_bytes(const cav_state *state, size_t bytes[CAV_PARTS]) {

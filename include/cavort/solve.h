@@ -143,6 +143,9 @@ cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *st
                               const cav_solve_options *options, const cav_trajectory *start, cav_solution **solution,
                               cav_error *error);
 
+/// m: a moment counts as a force at this distance where it is compared with the weight.
+#define CAV_MOMENT_ARM 0.3
+
 /// What a certificate requires: the largest value of the verdict's field of that name.
 #define CAV_TOLERANCE_UNACTUATED 1e-6   ///< fraction of weight
 #define CAV_TOLERANCE_LIMIT 1e-6        ///< relative (actuators), rad or m (ranges)

@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "continuation.h"
 #include "lqr.h"
+#include "schedule.h"
 #include "verification.h"
 
 /// Trials in order: multipliers, and the fraction of the schedule whose contact law is taken.
@@ -33,9 +33,9 @@ static int done(const outcome *o) {
   return !*o->claimed.lost && !*o->own.lost && o->claimed.error <= near_enough && o->own.error <= near_enough;
 }
 
-cav_status cav_choose_gains(cav_solve_run *run, cav_error *error) {
-  cav_solution *solution = run->solution;
-  size_t n = ((size_t)run->tr->nknot - 1) * (size_t)run->tr->nv * (size_t)run->tr->nv;
+cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription *tr, const cav_trajectory *at,
+                            cav_solution *solution, cav_error *error) {
+  size_t n = ((size_t)tr->nknot - 1) * (size_t)tr->nv * (size_t)tr->nv;
   double *gain = malloc(2 * n * sizeof *gain);
   solution->gain_q = calloc(n, sizeof(double));
   solution->gain_v = calloc(n, sizeof(double));
@@ -44,14 +44,13 @@ cav_status cav_choose_gains(cav_solve_run *run, cav_error *error) {
   int trials = (int)(sizeof trial / sizeof *trial), first = 1;
   for (int i = 0; i < trials && status == CAV_OK && (first || !done(&best)); i++) {
     outcome now;
-    cav_options law = run->tr->options;
-    cav_stage_law(run->problem, trial[i].fraction, run->tr->h, &law);
-    status = cav_feedback(run->tr, run->at, &law, &trial[i].penalty, gain, gain + n);
+    cav_options law = tr->options;
+    cav_stage_law(problem, trial[i].fraction, tr->h, &law);
+    status = cav_feedback(tr, at, &law, &trial[i].penalty, gain, gain + n);
     // a regulator that does not exist is no reason to give up the motion
     if (status == CAV_NOT_CONVERGED || status == CAV_NOT_FINITE) status = CAV_OK;
     if (status == CAV_OK)
-      status =
-          cav_closed_loops(run->problem, run->at, &solution->contact, gain, gain + n, &now.claimed, &now.own, error);
+      status = cav_closed_loops(problem, at, &solution->contact, gain, gain + n, &now.claimed, &now.own, error);
     if (status != CAV_OK || !(first || better(&now, &best))) continue;
     memcpy(solution->gain_q, gain, n * sizeof *gain);
     memcpy(solution->gain_v, gain + n, n * sizeof *gain);

@@ -7,21 +7,13 @@
 /// later they answer again. Gains from the plan's Hessian carried motions a third as far (README.md).
 /// Does not know limits of actuators, and does not see contacts that the law at hand does not feel.
 #include "lqr.h"
+#include "lapack.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "verification.h"
-
-/// BLAS and LAPACK, column-major.
-extern void dgemm_(const char *transa, const char *transb, const int *m, const int *n, const int *k,
-                   const double *alpha, const double *A, const int *lda, const double *B, const int *ldb,
-                   const double *beta, double *C, const int *ldc);
-extern void dgesv_(const int *n, const int *nrhs, double *A, const int *lda, int *pivot, double *B, const int *ldb,
-                   int *info);
-extern void dposv_(const char *uplo, const int *n, const int *nrhs, double *A, const int *lda, double *B,
-                   const int *ldb, int *info);
 
 /// Finer steps in a step of the motion.
 enum { FINER = 20 };

@@ -4,6 +4,7 @@
 
 #include "cavort/solve.h"
 #include "gauss_newton.h"
+#include "schedule.h"
 
 /// A solve under way: what continuation, multipliers and Ipopt hand to each other.
 typedef struct cav_solve_run {
@@ -29,12 +30,6 @@ void cav_guess_fill(const cav_problem *problem, const double *end, cav_trajector
 /// constraints at once, which exact derivatives never leave.
 cav_status cav_guess_take(cav_solve_run *run);
 
-/// Contact law at a fraction of the schedule, 0 .. 1, for a step in s; the rest of law stays.
-void cav_stage_law(const cav_problem *problem, double fraction, double step, cav_options *law);
-
-/// The stage at a fraction of the way from first to last.
-cav_stage_options cav_schedule_at(const cav_schedule *schedule, double fraction);
-
 /// Contact law and weights at a fraction of the way from the first to the last stage.
 void cav_stage_set(const cav_problem *problem, double fraction, cav_transcription *transcription);
 
@@ -58,9 +53,6 @@ void cav_run_allowed(const cav_solve_run *run, double allowed[CAV_BINDING_KINDS]
 
 /// Whether every row holds to that at the last values.
 int cav_run_met(const cav_solve_run *run);
-
-/// Feedback gains of run->at into the solution: the best of several, by the closed loop of verification. choose_gains.c.
-cav_status cav_choose_gains(cav_solve_run *run, cav_error *error);
 
 /// Appends a line to the log and tells the observer; nonzero if it asks to stop. Region's report.
 int cav_run_report(void *run, double step, double radius);

@@ -4,6 +4,7 @@
 /// In a cycle the last two knots meet the first two, and a free step meets all: these unknowns stand last, as a dense border.
 /// With A = L L' the band, B the border's rows and C its corner, Y = L^-1 B' leaves S = C - Y'Y, which is factored densely.
 #include "gauss_newton.h"
+#include "lapack.h"
 
 #include <float.h>
 #include <math.h>
@@ -11,21 +12,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-
-/// LAPACK: Cholesky factor of a symmetric positive definite band matrix, and solutions with its triangle; the same of a dense
-/// one, and with both triangles.
-extern void dpbtrf_(const char *uplo, const int *n, const int *kd, double *ab, const int *ldab, int *info);
-extern void dtbtrs_(const char *uplo, const char *trans, const char *diag, const int *n, const int *kd, const int *nrhs,
-                    const double *ab, const int *ldab, double *b, const int *ldb, int *info);
-extern void dpotrf_(const char *uplo, const int *n, double *a, const int *lda, int *info);
-extern void dpotrs_(const char *uplo, const int *n, const int *nrhs, const double *a, const int *lda, double *b,
-                    const int *ldb, int *info);
-
-/// BLAS: C := alpha A' A + beta C for symmetric C; y := alpha A x + beta y, or with A'.
-extern void dsyrk_(const char *uplo, const char *trans, const int *n, const int *k, const double *alpha,
-                   const double *A, const int *lda, const double *beta, double *C, const int *ldc);
-extern void dgemv_(const char *trans, const int *m, const int *n, const double *alpha, const double *A, const int *lda,
-                   const double *x, const int *incx, const double *beta, double *y, const int *incy);
 
 /// Added to the diagonal, relative: condition numbers reach 1e15 under stiff penalties.
 static const double jitter = 1e-10;

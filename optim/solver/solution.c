@@ -9,6 +9,7 @@
 
 #include "continuation.h"
 #include "ipopt.h"
+#include "lqr.h"
 
 cav_solve_options cav_solve_options_default(void) {
   return (cav_solve_options){.solver = CAV_SOLVER_GAUSS_NEWTON,
@@ -158,7 +159,7 @@ static cav_status conclude(cav_solve_run *run, cav_error *error) {
   run->solution->contact = run->tr->options;
   status = find_rows(run);
   if (status != CAV_OK) return status;
-  return cav_choose_gains(run, error);
+  return cav_choose_gains(run->problem, run->tr, run->at, run->solution, error);
 }
 
 #ifdef CAVORT_HAVE_IPOPT

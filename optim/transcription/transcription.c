@@ -6,16 +6,13 @@
 /// exact. Constraint rows enter the merit by an augmented Lagrangian of two-sided rows: with z~ = z + multiplier/rho and
 /// e = z~ - clamp(z~), the row costs rho/2 e^2 and its next multiplier is rho e (Powell, Hestenes, Rockafellar).
 #include "knot.h"
+#include "lapack.h"
 
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-
-/// BLAS: C := alpha A A' + beta C for symmetric C.
-extern void dsyrk_(const char *uplo, const char *trans, const int *n, const int *k, const double *alpha,
-                   const double *A, const int *lda, const double *beta, double *C, const int *ldc);
 
 static double now(void) {
   struct timespec t;

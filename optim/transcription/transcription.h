@@ -5,9 +5,7 @@
 #include "cavort/solve.h"
 #include "parallel.h"
 #include "periodicity.h"
-
-/// m: a moment counts as a force at this distance when it is compared with the weight.
-#define CAV_MOMENT_ARM 0.3
+#include "plannable.h"
 
 /// A constraint row lower <= value <= upper, scaled; equalities have lower = upper.
 typedef struct cav_slot {
@@ -109,14 +107,6 @@ typedef struct cav_transcription {
   cav_parallel *pool;
   double seconds_dynamics, seconds_assembly;
 } cav_transcription;
-
-/// Whether efforts of all actuators are linear forms of u with constant limits, which plans and verification of them assume:
-/// moments constant in q, and limits that move with q and v at most as those of cav_servo_bounds. servo.c. CAV_NOT_SUPPORTED with the actuator and why not.
-cav_status cav_actuators_plannable(const cav_model *model, cav_error *error);
-
-/// Whether the limits of a servo's control bound its effort by rows in u, q and v: fixed gain, affine bias, on a scalar joint
-/// or a fixed tendon, without limits of force. servo.c.
-int cav_servo_bounds(const cav_model *model, int actuator);
 
 /// Fills the row of such a servo: what control is per unit of effort (per_effort), its limits over the larger of them, and
 /// what q and v add. Returns 0 if memory runs out. servo.c.

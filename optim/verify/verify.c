@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "transcription.h"
+#include "plannable.h"
 #include "verification.h"
 
 static const double usual_gravity = 9.81; // m/s^2, unit of forces where the model has none
@@ -233,6 +233,11 @@ static cav_status note_periodicity(const cav_verification *verification, cav_met
   return status;
 }
 
+// whether the limits of its control, and not constant ones of its effort, bound an actuator
+static int bounded_by_control(const cav_actuator *a) {
+  return a->ctrllimited && !a->forcelimited && a->gain == CAV_GAIN_FIXED && a->bias == CAV_BIAS_AFFINE;
+}
+
 // control of a servo beyond its limits: what the nearest one within them does not give, over gain and limits
 static void note_servo(const cav_verification *verification, int t, int a, double effort, double *moment,
                        metrics *found) {
@@ -267,7 +272,7 @@ static void note_forces(const cav_verification *verification, int t, double *res
     double beyond = fmax(range[0] - control[a], control[a] - range[1]) / scale;
     cav_metric_note(&found->limit, beyond, t, "actuator %.60s (%d) at %.4g of %.4g .. %.4g", model->actuator[a].name, a,
                     control[a], range[0], range[1]);
-    if (cav_servo_bounds(model, a)) note_servo(verification, t, a, control[a], residual, found);
+    if (bounded_by_control(&model->actuator[a])) note_servo(verification, t, a, control[a], residual, found);
   }
 }
 

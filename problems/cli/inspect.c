@@ -8,7 +8,7 @@
 
 #include "command.h"
 #include "file.h"
-#include "workspace.h"
+#include "step.h"
 
 static const char *const geom_name[] = {"plane",    "sphere", "capsule", "ellipsoid",
                                         "cylinder", "box",    "mesh",    "height field"};

@@ -1,0 +1,53 @@
+/// Shapes and where they touch: shapes in, points out, no state. Private to dynamics/.
+#ifndef CAVORT_GEOMETRY_H
+#define CAVORT_GEOMETRY_H
+
+#include "cavort/model.h"
+
+/// Contact point found by the narrow phase: world position midway between the surfaces, unit normal from the first to the
+/// second geom, signed gap. feature tells the points of one manifold apart and is stable between nearby poses.
+typedef struct cav_touch {
+  double pos[3];
+  double normal[3];
+  double tangent[3]; ///< a direction to align the second contact axis with; zero: any
+  double dist;
+  int feature;
+} cav_touch;
+
+enum { CAV_TOUCH_MAX = 8 }; ///< most points one pair can give
+
+/// A geom in the world.
+typedef struct cav_shape {
+  cav_geom_type type;
+  const double *size;
+  const cav_mesh *mesh;     ///< of a mesh
+  const cav_hfield *hfield; ///< of a height field
+  double pos[3];
+  double rotation[9]; ///< row-major, world = rotation * local + pos
+} cav_shape;
+
+/// Kind, size and asset of a geom; its place is left to the caller.
+static inline cav_shape cav_shape_of(const cav_model *model, const cav_geom *geom) {
+  cav_shape shape = {.type = geom->type, .size = geom->size};
+  if (geom->type == CAV_GEOM_MESH) shape.mesh = &model->mesh[geom->asset];
+  if (geom->type == CAV_GEOM_HFIELD) shape.hfield = &model->hfield[geom->asset];
+  return shape;
+}
+
+/// All contact points of two shapes with dist < margin; a->type <= b->type, in the order of their features. Returns their
+/// number, at most CAV_TOUCH_MAX.
+/// pairs.c: table over types; exact routines where they exist, convex.c (libccd) for the rest.
+int cav_collide_shapes(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
+
+/// Distance along a ray, unit direction, to the surface of a shape; -1 if it misses. A ray that starts inside meets the
+/// surface where it leaves; a plane is met from above only, within its size where that is not 0. ray.c.
+double cav_ray(const cav_shape *shape, const double point[3], const double direction[3]);
+
+/// 1 if shapes of these two types can be collided by this build (some need libccd), else 0. convex.c.
+int cav_collide_supported(cav_geom_type a, cav_geom_type b);
+
+/// Pairs without a routine of their own: penetration or distance through libccd. One point, and up to 4 more
+/// where a cylinder or a box stands on a face. convex.c.
+int cav_collide_convex(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
+
+#endif

@@ -1,0 +1,40 @@
+/// What the analytic derivatives of a state keep: how each dof's motion drifts, sums over subtrees, and the derivatives of
+/// each contact. Made by the first call of cav_derivatives on a state, released with it. Private to dynamics/.
+#ifndef CAVORT_DERIVATIVE_STORE_H
+#define CAVORT_DERIVATIVE_STORE_H
+
+/// Derivatives of one contact by unit twists (angular, linear) of link1 [0] and of link2 [1] at the contact's position,
+/// while all links keep their own velocities but for what turns with them.
+typedef struct cav_contact_jacobian {
+  int idle; ///< the law is flat here: nothing is filled but this
+  double dist[2][6];
+  double velocity[2][6][6]; ///< [row][twist] of velocity_next
+  double impulse[2][6][6];  ///< [row][twist] of the impulse
+  double wrench[2][6][6];   ///< [twist][6] of the wrench on link2 about the position
+  double hessian[6][6];     ///< -df/dv_next
+  double by_velocity[6][6]; ///< frame' hessian frame, 6 x 6 in world axes about the position
+} cav_contact_jacobian;
+
+typedef struct cav_derivative_store {
+  // dofs: rates of their axes, [nv*6]
+  double *drift;      ///< (motion before the joint at the velocity of the bias) x axis
+  double *drift_now;  ///< the same at v
+  double *drift_next; ///< the same at v_next
+  double *second;     ///< (acceleration before) x axis + (motion before) x drift
+  double *rate;       ///< drift + (motion after) x axis
+  // links: sums over subtrees
+  double *gyration;  ///< [nlink*12] moment by angular velocity, 3 x 3, and linear momentum
+  int *touched;      ///< [nlink] contacts push in the subtree
+  double *by_motion; ///< [nlink*36] of contact wrenches by the motion of the link, those carried along left out
+  double *by_now;    ///< [nlink*36] of contact wrenches by v
+  double *by_next;   ///< [nlink*36] and by -v_next
+  double *across;    ///< [12*nv] axes of the dofs of two links about a contact
+  double *spare;     ///< [nv*nv] for outputs that are not asked for
+  int room;
+  cav_contact_jacobian *contact; ///< [room]
+} cav_derivative_store;
+
+/// Releases it; NULL is fine. storage.c.
+void cav_derivative_store_free(cav_derivative_store *store);
+
+#endif

@@ -1,0 +1,13 @@
+/// Stages of a schedule. Private to optim/.
+#ifndef CAVORT_SCHEDULE_H
+#define CAVORT_SCHEDULE_H
+
+#include "cavort/problem.h"
+
+/// Contact law at a fraction of the schedule, 0 .. 1, for a step in s; the rest of law stays.
+void cav_stage_law(const cav_problem *problem, double fraction, double step, cav_options *law);
+
+/// The stage at a fraction of the way from first to last.
+cav_stage_options cav_schedule_at(const cav_schedule *schedule, double fraction);
+
+#endif
