@@ -104,7 +104,7 @@ static const struct {
     {"equality_name", 9, "no body is named 'd'"},
     {"equality_free", 9, "free or ball joint"},
     {"equality_same", 9, "move as one"},
-    {"equality_self", 9, "ties one to itself"},
+    {"equality_self", 9, "constrains one to itself"},
     {"equality_planes", 9, "is not computed"},
     {"equality_softness", 9, "solref"},
     {"mesh", 5, "no mesh is named"},

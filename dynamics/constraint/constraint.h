@@ -50,7 +50,7 @@ void cav_stabilisation_prepare(cav_state *state);
 cav_status cav_limits_find(const cav_model *model, cav_state *state);
 void cav_contacts_soften(cav_state *state);
 
-/// Share of its stiffness that a contact has, by which its R is divided, and the rate of its logarithm by the distance:
+/// Fraction of its stiffness that a contact has, by which its R is divided, and the rate of its logarithm by the distance:
 /// self_stiffness between links of one tree. Where the law is smoothed it fades out towards the end of its activation distance, so that what
 /// comes faster than the activation distance foresees does not jump, and where the axes of two spheres or capsules meet, so that the force
 /// does not jump as the normal changes side; that is deeper than half the sum of their radii. limits.c.

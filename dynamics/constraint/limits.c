@@ -17,7 +17,7 @@ static const double SMOOTH_ACTIVATION = 12;
 // fastest approach to a limit met without a jump, rad/s or m/s
 static const double LIMIT_SPEED = 20;
 
-// contacts of the smoothed law: fraction of their reach over which they fade out at its end, fraction of the radii of round geoms
+// contacts of the smoothed law: fraction of their activation distance over which they fade out at its end, fraction of the radii of round geoms
 // over which they fade out where axes meet, and the least that is left
 static const double FADING = 0.3, CORE = 0.5, STIFFNESS_RATIO_MIN = 1e-12;
 

@@ -529,7 +529,7 @@ static void rank(const search *g, const double n[3], probe best[STARTS], int *co
 }
 
 // overlapping shapes may leave each other in several ways, each least among its neighbours. Starts are taken from a
-// scatter that turns with the shapes: their axes, the line of centres, and what lies half-step between any two of these
+// scatter that turns with the shapes: their axes, the line of centres, and what lies half way between any two of these
 static void try_elsewhere(search *g, const double centres[3], double axis[6][3], int count) {
   double v[7][3], n[3];
   const cav_shape *shapes[2] = {g->a, g->b};

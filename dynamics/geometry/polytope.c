@@ -10,7 +10,7 @@
 /// height: the opposite face cut to the prism above it, both ends of a segment, four points of a rim. At most 8: the
 /// deepest, then those furthest from the ones taken. Else one point, at the middle of what meets.
 /// Round edges (spheres, capsules) are the core grown by a radius, margins likewise: no case of their own.
-/// Not done: choosing between two ways out of an overlap by history; an equality constraint may jump.
+/// Not done: choosing between two ways out of an overlap by history; equal ones may jump.
 #include "gjk.h"
 #include "math3.h"
 #include "pairs.h"
@@ -19,7 +19,7 @@ enum { CORNERS_MAX = 64, NEAR_MAX = 12 };
 // cosine beyond which the direction is a face's normal (1.4e-5 rad); fraction of the size within which corners meet
 static const double ON_NORMAL = 1 - 1e-10, MEETS = 1e-2;
 // cosine below which a direction is square to an axis; fraction of the size within which gaps are equal
-static const double SQUARE = 1e-9, TIE = 1e-13;
+static const double SQUARE = 1e-9, LEAST_GAIN = 1e-13;
 
 /// Corners of a face, an edge or a rim in the world, in order.
 typedef struct outline {
@@ -124,7 +124,7 @@ static void keep(const contact_pair *g, const double n[3], const outline *o, con
   cav_shape_support(g->b, back, far);
   sub3(d, far, x);
   c.separation.gap = dot3(d, n);
-  if (c.separation.gap < best->separation.gap - TIE * g->size) return;
+  if (c.separation.gap < best->separation.gap - LEAST_GAIN * g->size) return;
   copy3(y, start);
   for (int k = 0; k < STEPS_MAX; k++) {
     double last[3];
@@ -137,7 +137,7 @@ static void keep(const contact_pair *g, const double n[3], const outline *o, con
   sub3(d, y, x);
   axpy3(d, d, -c.separation.gap, n);
   c.miss = norm3(d);
-  if (c.separation.gap < best->separation.gap + TIE * g->size && c.miss >= best->miss) return;
+  if (c.separation.gap < best->separation.gap + LEAST_GAIN * g->size && c.miss >= best->miss) return;
   copy3(c.separation.n, n);
   copy3(c.separation.x, x);
   copy3(c.separation.y, y);

@@ -1,6 +1,6 @@
 /// Capsule against ellipsoid, cylinder and box: a segment swept by a sphere.
 /// The signed distance to a convex solid is convex along the segment, so its lowest point is where the derivative, the
-/// surface normal's share along the segment, changes sign: bracketed false position (Illinois) with bisection. Where
+/// surface normal's component along the segment, changes sign: bracketed false position (Illinois) with bisection. Where
 /// the derivative jumps (the segment cuts an edge from the inside) the element of the subgradient square to the
 /// segment is the normal of the edge contact. A capsule that lies along a face, a side or an edge has a second point,
 /// at the other end of the part above that feature; it exists by its own gap, so no test of parallelism decides. A

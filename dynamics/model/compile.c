@@ -664,7 +664,7 @@ static void check_tied(builder *b, const cav_spec_equality *s, const cav_equalit
                     plane ? "" : " by a build without libccd; use capsules, spheres or boxes");
   }
   if (coupled ? e->object[0] == e->object[1] : e->link[0] == e->link[1])
-    cav_spec_fail(spec, s->node, NULL, coupled ? "ties one to itself; name two" : "the two move as one; remove it");
+    cav_spec_fail(spec, s->node, NULL, coupled ? "constrains one to itself; name two" : "the two move as one; remove it");
   cav_check_softness(spec, s->node, "", &s->softness);
   cav_check_not_negative(spec, s->node, "torquescale", s->torquescale);
 }

@@ -39,7 +39,7 @@ static double volume(int type, const double *s) {
   }
 }
 
-// moments of a box or an ellipsoid: m (b^2 + c^2) share
+// moments of a box or an ellipsoid: factor of m (b^2 + c^2)
 static void moments_of_axes(double m, const double *s, double fraction, double moment[3]) {
   set3(moment, m * fraction * (s[1] * s[1] + s[2] * s[2]), m * fraction * (s[0] * s[0] + s[2] * s[2]),
        m * fraction * (s[0] * s[0] + s[1] * s[1]));

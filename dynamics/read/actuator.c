@@ -113,7 +113,7 @@ void cav_actuator_read(cav_spec *spec, const cav_xml_node *node, cav_spec_actuat
   a->reference_kind = a->transmission == CAV_TRANSMISSION_CRANK ? "slidersite" : "refsite";
   a->reference = cav_xml_text(node, a->reference_kind, NULL);
   if (targets != 1)
-    cav_spec_fail(spec, node, NULL, "expected one of joint, tendon, site and cranksite; name what it drives");
+    cav_spec_fail(spec, node, NULL, "expected one of joint, tendon, site and cranksite; name what it acts on");
   else if (a->transmission == CAV_TRANSMISSION_CRANK && !a->reference)
     cav_spec_fail(spec, node, "slidersite", "is missing; name the site whose z axis the slider follows");
   else if (a->transmission != CAV_TRANSMISSION_SITE && cav_xml_get(node, "refsite"))

@@ -26,7 +26,7 @@ void cav_kinematics(const cav_model *model, cav_state *state, const double *q);
 void cav_link_velocities(const cav_model *model, const cav_state *state, const double *v, double *velocity);
 
 /// Down the tree: velocities at v and v_next, accelerations at (v, a), wrench of each link's own inertia into
-/// state->force. Up the tree: state->force becomes that of subtrees, u [nv] its share along each dof. rne.c.
+/// state->force. Up the tree: state->force becomes that of subtrees, u [nv] its component along each dof. rne.c.
 void cav_newton_euler(const cav_model *model, cav_state *state, const double *v, const double *v_next, const double *a);
 void cav_force_project(const cav_model *model, cav_state *state, double *u);
 

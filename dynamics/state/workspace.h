@@ -95,7 +95,7 @@ typedef struct cav_workspace {
   size_t coupling_room;
   int first_row, first_equality; // where in target rows and equality constraints begin
 
-  // readings of cav_readout_differentiate, grown on demand
+  // readings of cav_readout_differentiate, grown as needed
   double *readout;
   size_t readout_room;
 

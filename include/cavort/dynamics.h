@@ -56,7 +56,7 @@ typedef struct cav_equality_rows {
   int dim;            ///< rows: 1, 3 or 6
   double error[6];    ///< x: m; weld, last three: torquescale times sines of half angles; joint and tendon: their unit
   double point[2][3]; ///< connect, weld, distance: m, world, where the impulse acts on each link
-  double rotation[9]; ///< weld: rate of error[3..5] = turn (w1 - w2), angular velocities in world axes
+  double rotation[9]; ///< weld: rate of error[3..5] = rotation (w1 - w2), angular velocities in world axes
   double normal[3];   ///< distance: from the second geom to the first
   double derivative;  ///< joint, tendon: rate of error = v1 - derivative v2
   double regulariser[6];

@@ -84,7 +84,7 @@ typedef struct cav_cycle {
   int on;                ///< 0: the motion has a start and an end
   double translation[3]; ///< m, from one period to the next, of all that floats or slides
   double rotation;       ///< rad about the vertical through the first free joint of q_start, before the translation
-  cav_mirror mirror;     ///< in the origin of the world, before the translation; excludes a turn
+  cav_mirror mirror;     ///< in the origin of the world, before the translation; excludes a rotation
   int npair;             ///< counterparts that names do not tell
   const int (*pair)[2];  ///< [npair] joints
 } cav_cycle;

@@ -8,7 +8,7 @@
 
 #include "transcription.h"
 
-/// Prices below this fraction of the largest are noise.
+/// Multipliers below this fraction of the largest are noise.
 static const double floor_fraction = 1e-9;
 
 /// A listed row and its slot.

@@ -4,7 +4,7 @@
 
 #include "transcription.h"
 
-/// Price of straying from a motion.
+/// Penalty on straying from a motion.
 typedef struct cav_feedback_penalty {
   double tracking; ///< of the energy of straying, in weight times CAV_MOMENT_ARM, against one actuator at its limit
   double rate;     ///< rad/s: straying by an angle or way counts as a velocity of rate times that

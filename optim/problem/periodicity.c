@@ -20,7 +20,7 @@ enum { STATES = 3 };
 struct cav_periodicity {
   const cav_model *model;
   double world[9];    ///< what turns (or reflects) directions
-  double rotation[4]; ///< the turn alone, as a quaternion
+  double rotation[4]; ///< the rotation alone, as a quaternion
   double centre[3], shift[3];
   int mirror;        ///< 1: images are not the identity
   cav_image *image;  ///< [njoint]
@@ -342,7 +342,7 @@ static cav_status fit_forces(const cav_periodicity *w, const cav_problem *proble
                          w->mirror
                              ? "the model is not its own mirror image (contacts, springs or tendons), or a pair is "
                                "missing"
-                             : "something ties the body to the world");
+                             : "something fixes the body to the world");
   }
   return CAV_OK;
 }

@@ -42,7 +42,7 @@ typedef struct program {
   int interrupted;
 } program;
 
-/// Brings the transcription to x; derivatives on demand. False where the dynamics has no finite value.
+/// Brings the transcription to x; derivatives where asked for. False where the dynamics has no finite value.
 static int evaluate(program *p, const double *x, int derivatives) {
   if (p->known && memcmp(p->x, x, (size_t)p->n * sizeof *x)) p->known = 0;
   if (p->known > derivatives) return 1;

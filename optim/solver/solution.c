@@ -116,7 +116,7 @@ static double optimality(const cav_normal *normal, const cav_transcription *tr) 
   return worst;
 }
 
-/// Prices of all rows where they hold, after a linearisation that has kept them. Rounds of the augmented Lagrangian end before
+/// Multipliers of all rows where they hold, after a linearisation that has kept them. Rounds of the augmented Lagrangian end before
 /// cheap rows have settled, so multipliers are those after one more step, as in a quadratic programme.
 static cav_status estimate_multipliers(cav_solve_run *run) {
   int n = cav_transcription_unknowns(run->tr);

@@ -66,7 +66,7 @@ static cav_status find_support(walker *w) {
   return status;
 }
 
-/// Share of a hinge's axis across the travel, in the goal posture; 0 for other joints and those that stand for themselves.
+/// Fraction of a hinge's axis across the travel, in the goal posture; 0 for other joints and those that stand for themselves.
 static double crosses(const walker *w, int j) {
   const cav_joint *joint = &w->problem->model->joint[j];
   if (joint->type != CAV_JOINT_HINGE || w->image[j].joint == j || !w->carries[joint->link]) return 0;

@@ -5,7 +5,7 @@
 
 #include "transcription.h"
 
-/// Share of a step by which a window may miss a knot and still hold it.
+/// Fraction of a step by which a window may miss a knot and still hold it.
 static const double near_knot = 1e-6;
 
 /// Whether what a term measures needs the forces of a knot.

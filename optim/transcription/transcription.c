@@ -349,7 +349,7 @@ typedef struct pass {
   cav_status *status; ///< [nknot]
 } pass;
 
-/// Residuals of all rows at a step shorter (1) or longer (2) by a small share, with the knots where they are.
+/// Residuals of all rows at a step shorter (1) or longer (2) by a small fraction, with the knots where they are.
 static cav_status shift_step(const cav_transcription *tr, cav_scratch *s, int t, int shifted, const double *q,
                              const double *v, const double *v_next) {
   cav_transcription near = *tr;

@@ -147,7 +147,7 @@ double cav_transcription_violation(const cav_transcription *transcription);
 /// Multiplier update of the augmented Lagrangian at the last values.
 void cav_transcription_multipliers(cav_transcription *transcription);
 
-/// Prices of all rows at the last linearisation, whose rows were kept: the multipliers after a step x [unknowns], or with x
+/// Multipliers of all rows at the last linearisation, whose rows were kept: the multipliers after a step x [unknowns], or with x
 /// NULL the weighted violations alone.
 void cav_transcription_estimate_multipliers(cav_transcription *transcription, const double *x);
 

@@ -20,7 +20,7 @@ static void print_table(const cav_explanation *e) {
     printf("%2d. %.3g", i + 1, e->violation[i].violation);
     print_when(&e->violation[i]);
   }
-  if (e->nconflict) printf(e->met ? "what the cost hangs on:\n" : "what pulls against each other, by share:\n");
+  if (e->nconflict) printf(e->met ? "what the cost hangs on:\n" : "what pulls against each other, by fraction:\n");
   for (int i = 0; i < e->nconflict; i++) {
     printf("%2d. %.0f %%", i + 1, 100 * e->conflict[i].fraction);
     print_when(&e->conflict[i]);
@@ -33,7 +33,7 @@ static void print_reasons(const char *name, int n, const cav_reason *reason) {
     const cav_reason *r = &reason[i];
     printf(
         "%s\n    {\"knot\": %d, \"first\": %d, \"last\": %d, \"time\": %.17g, \"violation\": %.17g, \"pull\": %.17g, "
-        "\"share\": %.17g,\n     \"what\": ",
+        "\"fraction\": %.17g,\n     \"what\": ",
         i ? "," : "", r->row.knot, r->first, r->last, r->time, r->violation, r->pull, r->fraction);
     cav_certificate_json_text(stdout, r->what);
     printf(",\n     \"cure\": ");

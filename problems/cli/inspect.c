@@ -174,7 +174,7 @@ static void print_stages(const cav_model *m) {
   print_stage("tendon limits", held ? c.tendon_limit : 0, "tendons", held ? "no tendon is limited" : off);
   print_stage("tendon friction loss", held ? c.tendon_friction : 0, "tendons", held ? "no tendon has any" : off);
   print_pairs(m, &c);
-  print_stage("equality constraints", held ? m->nequality : 0, "ties", held ? "no equality constraint" : off);
+  print_stage("equality constraints", held ? m->nequality : 0, "equality", held ? "no equality constraint" : off);
   for (int t = 0; t <= CAV_EQUALITY_DISTANCE && held; t++) {
     static const char *const what[] = {"points, 3 rows", "frames, 6 rows", "joints, 1 row", "tendons, 1 row",
                                        "distances, 1 row"};

@@ -59,7 +59,7 @@ void cav_certificate_print(FILE *out, const char *problem, const char *model, co
   static const char *const mark[] = {"NOT", "ok"};
   cav_certificate_line line[CAV_CERTIFICATE_LINES];
   int n = cav_certificate_lines(v, line);
-  fprintf(out, "%-48s %12s  %10s\n", "certificate", "value", "promised");
+  fprintf(out, "%-48s %12s  %10s\n", "certificate", "value", "tolerance");
   for (int i = 0; i < n; i++) {
     fprintf(out, "  %-46s %12s  %10s  %s\n", line[i].label, line[i].value, line[i].limit,
             line[i].passed < 0 ? "" : mark[line[i].passed]);

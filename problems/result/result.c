@@ -143,7 +143,7 @@ static cav_status write_stages(const char *path, const cav_solution *solution, c
   cav_file file;
   cav_status status = cav_file_begin(&file, path, error);
   if (status) return status;
-  fputs("phase,stage,share,iterations,cost,unactuated,violation,outcome\n", file.stream);
+  fputs("phase,stage,fraction,iterations,cost,unactuated,violation,outcome\n", file.stream);
   for (int i = 0; i < solution->nstage; i++) {
     const cav_stage_record *s = &solution->stage[i];
     const double value[3] = {s->cost, s->unactuated, s->violation};

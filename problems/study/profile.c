@@ -1,5 +1,5 @@
-/// What a study found: every run as a table; by motion and method the share certified and the middle of time and iterations; and
-/// the share certified within a time, in seconds and as a multiple of the fastest method's on the same run (the performance
+/// What a study found: every run as a table; by motion and method the fraction certified and the middle of time and iterations; and
+/// the fraction certified within a time, in seconds and as a multiple of the fastest method's on the same run (the performance
 /// profile of Dolan and More, 2002), drawn by gnuplot where it is installed.
 #include <math.h>
 #include <stdio.h>
@@ -124,7 +124,7 @@ static void write_drawing(FILE *out, int nmethod, const int used[CAV_STUDY_METHO
   fputs(
       "set terminal svg size 900,400 background 'white'\nset output 'profile.svg'\nset datafile separator ','\n"
       "set multiplot layout 1,2\nset logscale x\nset yrange [0:1.02]\nset key bottom right\nset grid\n"
-      "set ylabel 'share certified'\n",
+      "set ylabel 'fraction certified'\n",
       out);
   for (int relative = 0; relative < 2; relative++) {
     int first = relative ? nmethod + 2 : 1, column = first + 1;

@@ -35,7 +35,7 @@ typedef struct cav_study_run {
 cav_status cav_study_solve(const char *path, const char *model_path, cav_study_run *run, char reason[400],
                            cav_error *error);
 
-/// Writes study.csv (every run), study.txt (table of motions and methods), and the share certified within a time as profile.csv,
+/// Writes study.csv (every run), study.txt (table of motions and methods), and the fraction certified within a time as profile.csv,
 /// profile.gp and, where gnuplot is installed, profile.svg. *drawn: 1 if it is.
 cav_status cav_profile_write(const char *folder, int nmotion, const char *const *motion, int nrun,
                              const cav_study_run *run, int *drawn, cav_error *error);
