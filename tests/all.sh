@@ -2,7 +2,7 @@
 # Every check of the project. Usage: sh tests/all.sh. Ends with one line, "N passed, N failed"; the exit status follows it.
 # Installs what is missing, then: both compilers with warnings as errors, the tests of each, the second build with address and
 # undefined-behaviour sanitizers; headers on their own as C and C++; layout of the text; installation and use through pkg-config.
-# CAVORT_BUILD names the folder of the builds, by default build-ci. Long tests are not part of it: meson test --setup all.
+# CAVORT_BUILD names the folder of the builds, by default build-ci.
 set -u
 cd "$(dirname "$0")/.." || exit 1
 

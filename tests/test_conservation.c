@@ -3,7 +3,7 @@
 /// departure from its first value, relative to a scale of the motion; it falls with the step as the order of the step says:
 /// with the first power for `euler`, the second for `midpoint` and `momentum`; `momentum` keeps momenta to rounding, half way
 /// between knots, where it takes them (half_step.c). v_t = (q_t - q_{t-1})/h belongs half a step before its knot
-/// (optimisation.md, 1), so quantities at a knot take the mean of the velocities that reach and leave it.
+/// (optim/METHOD.md, 1), so quantities at a knot take the mean of the velocities that reach and leave it.
 /// Usage: test_conservation prints the table that is kept in results/conservation.txt.
 #include "scene.h"
 

@@ -1,4 +1,4 @@
-/// optim/explain/explain.c, rows.c: problems made impossible on purpose, each named with the right row and knot; penalties on one that can
+/// optim/explain/explain.c, constraint_rows.c: problems made impossible on purpose, each named with the right row and knot; penalties on one that can
 /// be solved against what loosening its bound saves; rows of another problem refused; rows.csv bit for bit.
 #include <unistd.h>
 
@@ -165,7 +165,7 @@ static void check_contradiction(void) {
 }
 
 // the penalty on a bound is what the cost changes by when it gives way
-static void check_price(void) {
+static void check_penalty(void) {
   static const char terms[] =
       "<constraint><sensor name='raise' type='framepos' site='tip' component='z' lower='%g' at='end'/></constraint>";
   double cost[2], multiplier = 0;
@@ -236,7 +236,7 @@ int main(void) {
   check_too_weak();
   check_inside_the_floor();
   check_contradiction();
-  check_price();
+  check_penalty();
   check_rows();
   static const char *const file[] = {"model.xml", "problem.xml", "rows.csv"};
   for (int i = 0; i < 3; i++) {

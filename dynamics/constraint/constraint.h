@@ -69,7 +69,7 @@ double cav_row_velocity(const cav_state *state, const cav_row *row, const double
 void cav_row_push_force(const cav_state *state, const cav_row *row, double force, double *u);
 
 /// Impulse of an elliptic contact from g = R^-1 (v* - v_next) [dim]; R [dim], sigma 0: exact law, else smoothed.
-/// Writes f [dim]. Eqs. (19)-(22) and dynamics.md, 3. hessian, if not NULL, gets -df/dv_next [dim*dim], symmetric, psd.
+/// Writes f [dim]. Eqs. (19)-(22) and METHOD.md, 3. hessian, if not NULL, gets -df/dv_next [dim*dim], symmetric, psd.
 /// potential, if not NULL, gets Psi, the convex function of v_next whose gradient is -f. contact_law.c.
 void cav_law_cone(int dim, const double *R, const double *friction, double sigma, const double *g, double *f,
                   double *hessian, double *potential);

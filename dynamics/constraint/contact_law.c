@@ -1,5 +1,5 @@
 /// Contact law of one constraint, in closed form: impulse f from g = R^-1 (v* - v_next), its derivative and its
-/// potential. Todorov 2014, eqs. (19)-(22), and design/dynamics.md, 3: f is the projection of g on the constraint's
+/// potential. Todorov 2014, eqs. (19)-(22), and METHOD.md, 3: f is the projection of g on the constraint's
 /// cone in the metric R. In the scaled coordinates G = R^(1/2) g the elliptic cone is circular, its half angle theta
 /// has tan^2 theta = rho/R_n with rho = R_j mu_j^2 the same for every friction row j, and the projection is spectral,
 ///

@@ -1,6 +1,6 @@
 /// Equality constraints by the soft Gauss principle, Todorov 2014, eqs. (5)-(7): the impulse of each row is
 /// f = R^-1 (v* - J v_next), whatever the others do, so the inverse has it in closed form. v* as for all constraints
-/// (dynamics.md, 4) from the error x of
+/// (METHOD.md, 4) from the error x of
 ///
 ///   connect   p1 - p2, two points
 ///   weld      the same, and torquescale Im(conj(q2) q1): sines of half the angles between two frames

@@ -1,5 +1,5 @@
 /// Constraints at q: the rows of limits and friction losses, and what makes the law of each row and contact: R, h B, h K
-/// and the scale of smoothing (dynamics.md, 4). Two ways to them: MJCF's solref and solimp with their impedance curve,
+/// and the scale of smoothing (METHOD.md, 4). Two ways to them: MJCF's solref and solimp with their impedance curve,
 /// eqs. (27), (28); or the discrete step, critically damped with double pole z = exp(-h/kappa),
 /// h B = (1 + eps)(1 - z^2), h^2 K = (1 + eps)(1 - z)^2. Friction rows have K = 0. Contacts are found by collide.c,
 /// impulses are computed in inverse.c.

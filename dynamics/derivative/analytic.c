@@ -1,4 +1,4 @@
-/// Derivatives of the inverse in closed form: du/dq, du/dv, du/dv_next at the state's last evaluation (dynamics.md, 7).
+/// Derivatives of the inverse in closed form: du/dq, du/dv, du/dv_next at the state's last evaluation (METHOD.md, 7).
 /// With the pair of dofs (k, j) of which m is the deeper one, every term of the smooth part is S_k . (sum over the subtree
 /// of m) of something linear in dof j: as in Carpentier and Mansard (RSS 2018) and Singh, Russell and Wensing (2022), but
 /// derived and written for spatial vectors at one point of the tree:

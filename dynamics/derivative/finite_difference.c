@@ -1,5 +1,5 @@
 /// Staged finite differences of whatever a state holds after the inverse, one-sided or centred: the reference method
-/// (dynamics.md, 7). A column of v_next or v repeats no position work; a column of q is one evaluation of all, in the
+/// (METHOD.md, 7). A column of v_next or v repeats no position work; a column of q is one evaluation of all, in the
 /// tangent q (+) step e_j. Steps are relative to max(1, |coordinate|), rotations absolute. One-sided columns are first
 /// order in the step, centred ones second order where the law is smooth.
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-/// The balance of momentum in the inverse (optimisation.md, 1). With l the spatial momentum of a tree of links, linear and
+/// The balance of momentum in the inverse (METHOD.md, 2). With l the spatial momentum of a tree of links, linear and
 /// angular about a point fixed in space, half a step before a knot at q (-) h v/2 with v, and half a step after it at
 /// q (+) h v_next/2 with v_next, the wrench that moves the tree is
 ///
@@ -7,7 +7,7 @@
 /// and the root link bears what the sum of its links' Newton-Euler forces at the mean velocity lacks of it: all other rows
 /// of u are those of midpoint, the rows of the root are S(q) . W. What is after one knot is before the next, so over a
 /// motion these add up to the balance of linear and angular momentum, exactly, whatever the step. Second order in h, and
-/// the same read backwards in time. Two more placements of the links are its penalty; no matrix is formed.
+/// the same read backwards in time. Two more placements of the links are its cost; no matrix is formed.
 ///
 /// Tried and left: changes of momentum for the forces of every link, which is neater, but errs several times as much where
 /// limbs turn fast; and a discrete action (as in Lee, Liu, Park and Srinivasa 2016, arXiv 1609.02898), which keeps momentum too

@@ -1,4 +1,4 @@
-/// One step forward by Newton's method on the convex potential in v_next (design/dynamics.md, 3; Todorov 2014, eqs.
+/// One step forward by Newton's method on the convex potential in v_next (METHOD.md, 3; Todorov 2014, eqs.
 /// (5)-(9)): minimise 1/2 (x - x_free)' M (x - x_free) + sum Psi(R^-1 (v* - J x)), whose gradient is h (inverse(x) -
 /// u). Exact Hessian M + J' H J, factored from the leaves so that zeros of the tree stay zeros; line search on the
 /// derivative, which needs no differences of the potential and so works to the last digit. The exact law makes it a

@@ -23,7 +23,7 @@ typedef struct cav_contact {
   double regulariser[6]; ///< R, 1/kg
   double damping[6];     ///< h B, dimensionless: v* = (1 - hB) x' - h K x
   double stiffness;      ///< h K of the normal row, 1/s
-  double sigma;          ///< smoothing of the law in impulse scale (dynamics.md, 3), 0: exact
+  double sigma;          ///< smoothing of the law in impulse scale (dynamics/METHOD.md, 3), 0: exact
   double friction[5];
   double velocity[6];      ///< J v, m/s (rad/s for the last three)
   double velocity_next[6]; ///< J v_next
@@ -210,7 +210,7 @@ cav_status cav_sensor_derivatives(const cav_model *model, const cav_state *state
 typedef void (*cav_readout)(const cav_model *model, const cav_state *state, void *context, double *value);
 
 /// Staged finite differences of any readout of n values. step 0: chosen by coordinate scale.
-/// method is one of the two differences (CAV_BAD_INPUT otherwise). value [n] at the point; d_dq, d_dv, d_dv_next [n*nv] row-major, NULL = not needed. dynamics.md, 7.
+/// method is one of the two differences (CAV_BAD_INPUT otherwise). value [n] at the point; d_dq, d_dv, d_dv_next [n*nv] row-major, NULL = not needed. dynamics/METHOD.md, 7.
 /// A pass over v or v_next repeats no position work. The state is left at the point itself.
 cav_status cav_readout_differentiate(const cav_model *model, cav_state *state, cav_derivative method, double step,
                                      const double *q, const double *v, const double *v_next, cav_readout readout,

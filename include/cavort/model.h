@@ -131,7 +131,7 @@ typedef struct cav_sensor_rule {
   cav_sensor_stage stage;
 } cav_sensor_rule;
 
-/// Softness of one constraint as MJCF writes it; dynamics.md, 4.
+/// Softness of one constraint as MJCF writes it; dynamics/METHOD.md, 4.
 typedef struct cav_softness {
   double solref[2]; ///< (time constant s, damping ratio), or both negative: (-stiffness, -damping)
   double solimp[5]; ///< impedance d0, d_width, width, midpoint, power
@@ -372,7 +372,7 @@ typedef struct cav_key {
   const double *v; ///< [nv]
 } cav_key;
 
-/// Which velocity the bias force c and the passive force p are evaluated at, or what takes their place; optimisation.md, 1.
+/// Which velocity the bias force c and the passive force p are evaluated at, or what takes their place; dynamics/METHOD.md, 2.
 typedef enum cav_order {
   CAV_ORDER_EULER,    ///< at v; joint damping at v_next (implicit). The paper's step
   CAV_ORDER_MIDPOINT, ///< at (v + v_next)/2, damping too; second order where it matters
@@ -380,7 +380,7 @@ typedef enum cav_order {
   CAV_ORDER_MOMENTUM
 } cav_order;
 
-/// How v* is made from a constraint's position error; dynamics.md, 4.
+/// How v* is made from a constraint's position error; dynamics/METHOD.md, 4.
 typedef enum cav_stabilisation {
   CAV_STABILISATION_SOLREF, ///< eq. (28) from each constraint's solref and solimp, as MuJoCo does
   CAV_STABILISATION_DISCRETE ///< critically damped discrete step with double pole exp(-h/time_constant), one softness for all
@@ -401,7 +401,7 @@ typedef struct cav_options {
   int coupled;           ///< 1: B and K dense, so that all rows together are critically damped; costs a factorisation
   double softness;       ///< epsilon of CAV_STABILISATION_DISCRETE, > 0
   double time_constant;  ///< kappa of CAV_STABILISATION_DISCRETE, s; 0: deadbeat
-  double smoothing;      ///< delta, m: distance at which the smoothed law is active; 0: the exact law (dynamics.md, 3)
+  double smoothing;      ///< delta, m: distance at which the smoothed law is active; 0: the exact law (dynamics/METHOD.md, 3)
   double smoothing_self; ///< delta between two links of one tree, m, used where smoothing > 0
   double
       self_stiffness; ///< fraction of their stiffness that contacts between two links of one tree get, (0, 1]; 1: the law
@@ -413,7 +413,7 @@ typedef struct cav_options {
   int passive;        ///< 0: no springs and dampers
 } cav_options;
 
-/// A compiled model. Built by cav_model_load, never changed afterwards.
+/// A compiled model. Built by cav_model_load; nothing but cav_model_perturb changes it, before any state of it exists.
 typedef struct cav_model {
   const char *name;
   int nq, nv, nu;  ///< sizes of q, v and of the control vector (one per actuator)
@@ -487,7 +487,7 @@ void cav_configuration_reset(const cav_model *model, double *q);
 void cav_configuration_normalise(const cav_model *model, double *q);
 
 /// Moves q along v for a time h on the manifold: q_next = q (+) h v. q, q_next [nq], v [nv]; q_next may be q.
-/// Quaternions advance by the exponential in body axes. dynamics.md, 1.
+/// Quaternions advance by the exponential in body axes. dynamics/METHOD.md, 1.
 void cav_integrate(const cav_model *model, const double *q, const double *v, double h, double *q_next);
 
 /// Velocity that takes q0 to q1 in time h: v = (q1 (-) q0)/h. q0, q1 [nq], v [nv]; inverse of cav_integrate.

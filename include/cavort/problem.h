@@ -97,7 +97,7 @@ typedef struct cav_guess_pose {
   const double *q; ///< [nq]
 } cav_guess_pose;
 
-/// One stage of the continuation (optimisation.md, 5).
+/// One stage of the continuation (optim/METHOD.md, 5).
 typedef struct cav_stage_options {
   double softness;       ///< epsilon of the contacts
   double time_constant;  ///< kappa, in steps of the horizon (0: deadbeat)

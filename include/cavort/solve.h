@@ -158,7 +158,7 @@ cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *st
 #define CAV_TOLERANCE_STEP 1e-8        ///< rad or m
 #define CAV_TOLERANCE_PERIODICITY 1e-9 ///< m, rad, and these per step
 
-/// What verification found; from the knots alone, with code apart from the optimiser's. optimisation.md, 6.
+/// What verification found; from the knots alone, with code apart from the optimiser's. optim/METHOD.md, 6.
 /// optimality, solve_seconds and iterations are the solver's: cav_verify leaves them as they are.
 typedef struct cav_verdict {
   int certified;
@@ -185,7 +185,7 @@ typedef struct cav_verdict {
   char reason[400]; ///< why not certified: the first condition missed; "" if certified
 } cav_verdict;
 
-/// What replay_same_step_seconds has to be, s: CAV_PROMISE_REPLAY, or the whole motion where that is shorter; less rounding.
+/// What replay_same_step_seconds has to be, s: CAV_TOLERANCE_REPLAY, or the whole motion where that is shorter; less rounding.
 double cav_verdict_replay(const cav_verdict *verdict);
 
 /// Certifies a motion: q, v of the trajectory and the gains are used, all else is recomputed. contact is the law it claims.

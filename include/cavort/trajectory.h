@@ -9,7 +9,7 @@ extern "C" {
 #endif
 
 /// Knots 0 .. nknot-1 at times t*timestep. Rows are knots. v[t] = (q[t] (-) q[t-1])/timestep, v[0] is given;
-/// u[t] = inverse(q[t], v[t], v[t+1]); the last row of u uses the velocity that closes the motion (optimisation.md, 1).
+/// u[t] = inverse(q[t], v[t], v[t+1]); the last row of u uses the velocity that closes the motion (optim/METHOD.md, 1).
 typedef struct cav_trajectory {
   int nq, nv, nknot;
   double timestep; ///< s

@@ -137,7 +137,7 @@ static void step_columns(const regulator *r, const cav_transcription *tr, const 
 }
 
 /// P += scale * penalty of straying.
-static void add_price(regulator *r, double scale) {
+static void add_penalty(regulator *r, double scale) {
   int nv = r->nv, n = r->n;
   for (int i = 0; i < nv; i++)
     for (int j = 0; j < nv; j++) {
@@ -167,7 +167,7 @@ static cav_status riccati(regulator *r) {
 }
 
 /// H = B'PB + h, the penalty on inputs being one a second.
-static void price_inputs(regulator *r) {
+static void penalty_inputs(regulator *r) {
   int n = r->n, nu = r->nu;
   if (nu == 0) return;
   product('N', n, nu, n, 1, r->P, n, r->B, n, 0, r->PB, n);
@@ -200,12 +200,12 @@ static cav_status sweep(regulator *r, const cav_transcription *tr, const cav_tra
     if (status == CAV_OK) status = find_derivative(r, tr->model, state, q, v);
     if (status != CAV_OK) break;
     // at the end a second's straying is penalised
-    if (k == fine->nknot - 2) add_price(r, 1);
+    if (k == fine->nknot - 2) add_penalty(r, 1);
     step_columns(r, tr, v + nv, r->derivative, r->n, 1, r->A);
     step_columns(r, tr, v + nv, r->derivative + (size_t)r->n * nv, r->nu, 0, r->B);
-    price_inputs(r);
+    penalty_inputs(r);
     status = riccati(r);
-    add_price(r, r->h);
+    add_penalty(r, r->h);
     int t = k / FINER;
     if (status == CAV_OK && t < knots) add_gains(r, gain_q + (size_t)t * square, gain_v + (size_t)t * square);
   }

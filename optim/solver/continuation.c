@@ -1,5 +1,5 @@
 /// Continuation from soft contacts active at a distance and a penalised helper force to the problem as stated, then an augmented
-/// Lagrangian that makes its constraints hold (optimisation.md, 5; recipe.md, 1). The schedule is data: problem->schedule.
+/// Lagrangian that makes its constraints hold (METHOD.md, 5). The schedule is data: problem->schedule.
 #include "continuation.h"
 
 #include <math.h>

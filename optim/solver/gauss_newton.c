@@ -19,7 +19,7 @@ static const double jitter = 1e-10;
 /// Largest change of one unknown in a step, rad or m: rotations stay well inside their chart.
 static const double step_limit = 0.7;
 
-/// Share of the Newton step below which a radius that still shrinks is one that a jump of the merit holds.
+/// Fraction of the Newton step below which a radius that still shrinks is one that a jump of the merit holds.
 static const double collapse = 1e-6;
 
 struct cav_normal {
@@ -363,11 +363,11 @@ cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_trans
     if (!(region->radius > 0)) region->radius = d.cauchy_norm;
 
     // shrink the radius until the step is as good as required
-    double decrease = 0, predicted = 0, length = 0, promised = 0;
+    double decrease = 0, predicted = 0, length = 0, first_predicted = 0;
     int grown = 0;
     for (int attempt = 0;; attempt++) {
       predicted = bend(&d, normal->gradient, region->radius);
-      if (attempt == 0) promised = predicted;
+      if (attempt == 0) first_predicted = predicted;
       length = scaled_norm(&d, d.step);
       cav_transcription_move(tr, *at, d.step, *spare);
       cav_status trial = cav_transcription_values(tr, *spare);
@@ -387,7 +387,7 @@ cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_trans
       *spare = swap;
     }
     if (status != CAV_OK) break;
-    region->stalled = length < collapse * d.newton_norm || (!fresh && promised > region->tolerance * merit);
+    region->stalled = length < collapse * d.newton_norm || (!fresh && first_predicted > region->tolerance * merit);
     // a good step that only the radius held back says nothing about the end
     int held = grown && length < 0.99 * d.newton_norm;
     calm = decrease < region->tolerance * merit && !held ? calm + 1 : 0;

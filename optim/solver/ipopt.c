@@ -2,7 +2,7 @@
 /// give are hard equalities, efforts, tendon ranges and hard terms are bounded rows, joint ranges bound the unknowns. The
 /// Hessian is Gauss-Newton's of the cost plus a diagonal that stands for the neglected curvature of the constraints, which
 /// grows with their multipliers
-/// (optimisation.md, 2). The only user of Ipopt; written against 3.11 and 3.14 (index and number are int and double in both).
+/// (METHOD.md, 2). The only user of Ipopt; written against 3.11 and 3.14 (index and number are int and double in both).
 #include "ipopt.h"
 
 #include <IpStdCInterface.h>

@@ -2,7 +2,7 @@
 /// Data only: a caller solves them one after the other, or at once in processes of its own, and keeps what it likes.
 ///
 /// One guess has to be found in the model: a gait, that is the limbs that carry the body swinging against each other
-/// (recipe.md, 3: without it a walk becomes a hop). Left and right are those of mirror.c; the limbs are those that touch the world in
+/// (METHOD.md, 7: without it a walk becomes a hop). Left and right are those of mirror.c; the limbs are those that touch the world in
 /// the goal posture; of their hinges across the direction of travel the first swings, forwards as a sine, and the second
 /// bends while the limb comes forwards.
 #include <math.h>
@@ -21,7 +21,7 @@ static const double swing_angle = 0.25, bend_angle = 0.4, pace = 1.2;
 /// How much softer, and how much slower than stated.
 enum { SOFTER = 2, CHEAPER = 10, SLOWER = 2 };
 
-/// Where a motion solved under another order goes on: fraction of the schedule's way, and stages from there (recipe.md, 1, phase B).
+/// Where a motion solved under another order goes on: fraction of the schedule's way, and stages from there (METHOD.md, 7).
 static const double resumed_fraction = 0.4;
 enum { RESUMED_STAGES = 10 };
 

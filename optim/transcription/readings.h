@@ -1,4 +1,4 @@
-/// What is read off the dynamics at one knot, with derivatives: u, four numbers a contact, sensors. Private to optim/.
+/// What is read off the dynamics at one knot, with derivatives: u, CAV_CONTACT_READINGS numbers a contact, sensors. Private to optim/.
 #ifndef CAVORT_READINGS_H
 #define CAVORT_READINGS_H
 

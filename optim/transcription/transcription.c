@@ -1,5 +1,5 @@
 /// Rows of a problem over its knots and their Gauss-Newton normal equations. Every knot t sees q_{t-1}, q_t, q_{t+1} through
-/// v_t, v_{t+1} and the inverse dynamics u_t (optimisation.md, 1), so its part of the Hessian is one dense block of three
+/// v_t, v_{t+1} and the inverse dynamics u_t (METHOD.md, 1), so its part of the Hessian is one dense block of three
 /// neighbours and knots are evaluated in any order, by any number of threads, with the same result.
 ///
 /// Derivatives of u, contacts and sensors come from readings.c; those of v, accelerations, postures and ranges are

@@ -8,7 +8,7 @@
 /// obeys the step of order momentum.
 /// A tree that joints hold to the world gets forces from there which no one measures: only what its root link can do
 /// freely is balanced. F and N/0.3 m are projected on the span of the motions of the root link's dofs that no actuator
-/// and no tendon drives, seen at c; what those joints themselves exert (damping, springs, armature, limits, friction
+/// and no tendon acts on, seen at c; what those joints themselves exert (damping, springs, armature, limits, friction
 /// loss) is accounted for. A free root gives all six components, a planar one (two slides and a hinge) three, a cart
 /// driven along its rail none: its defect is 0 by definition.
 /// Written for verification alone: momenta come from link poses and the motion subspaces, not from the inverse.
@@ -109,7 +109,7 @@ static void tree_momentum(const cav_balance *balance, const cav_verification *ve
   }
 }
 
-// trees, and the dofs something drives
+// trees, and the dofs that something acts on
 static void survey(cav_balance *balance, const cav_verification *verification, double *unit, double *residual) {
   const cav_model *model = verification->model;
   balance->tree[0] = -1;

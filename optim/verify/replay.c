@@ -8,7 +8,7 @@
 /// stiffness at the finer step, and once under the model as its file says (its own solref contacts, exact law).
 /// Between knots the motion is read as cav_trajectory_resample does; gains of knot t hold until knot t+1.
 /// Cycles run for several periods.
-/// optimisation.md, 3 and 6.
+/// METHOD.md, 6 and 8.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -127,7 +127,7 @@ cav_status cav_replay_open(const cav_verification *verification, cav_replay *rep
 }
 
 // generalised force of efforts within the limits at (q, v); moment [nv] is scratch
-static cav_status drive(const cav_verification *verification, const double *q, const double *v, const double *effort,
+static cav_status run_loop(const cav_verification *verification, const double *q, const double *v, const double *effort,
                         double *moment, double *u) {
   const cav_model *model = verification->model;
   cav_status status = cav_position(model, verification->bare, q);
@@ -168,7 +168,7 @@ static cav_status command(const cav_verification *verification, int t, const dou
   move(verification, periods, u, work);
   for (int i = 0; i < nv; i++) u[i] += planned[i];
   cav_actuation(verification->model, verification->bare, u, NULL, effort);
-  return drive(verification, q, v, effort, work, u);
+  return run_loop(verification, q, v, effort, work, u);
 }
 
 // angle between two unit quaternions

@@ -21,7 +21,7 @@ typedef struct cav_verification {
   int last;                     ///< last knot, T
   int rows;                     ///< knots 0 .. rows-1 have a force: T, or T+1 where the motion closes at rest
   double h;                     ///< s
-  double weight;                ///< N, unit of forces (cav_verification_weight)
+  double weight;                ///< N, unit of forces
   double arm;                   ///< m, unit of moments is weight*arm
   cav_periodicity *periodicity; ///< cycles: from one period to the next; else NULL
   int periods;                  ///< that replays run for
