@@ -2,6 +2,7 @@
 /// column k is actuator k's moments times its unit of effort, and the least-norm efforts that reach it. T does not depend
 /// on q for joints and fixed tendons: there T'T is inverted once per state, by division where columns share no dof,
 /// otherwise as a pseudo-inverse by Jacobi rotations; with other transmissions at every call. Limits are not applied.
+#include <assert.h>
 #include <stdlib.h>
 
 #include "actuator.h"
@@ -57,6 +58,7 @@ cav_status cav_actuation_compile(const cav_model *model, cav_state *state) {
     }
   }
   w->gear_start[nu] = entries;
+  assert(entries == w->gear_room);
   double *G = malloc(3 * (size_t)nu * (size_t)nu * sizeof *G);
   if (!G) { return CAV_NO_MEMORY; }
   invert_gram(model, w, G);

@@ -2,6 +2,8 @@
 /// and where A is. Each block keeps the dofs that move it: for a contact those between its two links and their nearest
 /// common ancestor, beyond which the motion of both is the same; for an equality constraint all that move either link,
 /// as its two points are apart by the error. Reads poses and subspaces of the last cav_position; computes no velocity.
+#include <assert.h>
+
 #include "jacobian.h"
 #include "math3.h"
 
@@ -171,6 +173,7 @@ int cav_jacobian(const cav_model *model, const cav_state *state, cav_block *bloc
       dim = state->equality[found.equality].dim;
       n = equality_block(model, state, &state->equality[found.equality], dof, J);
     }
+    assert(n <= model->nv && dim >= 1 && dim <= CAV_IMPULSE_DIM);
     found.dim = dim;
     found.ndof = n;
     block[i] = found;

@@ -5,6 +5,7 @@
 /// Not done: boxes instead of balls, trees; balls as large as the scene are compared with all.
 #include "sweep.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -44,7 +45,10 @@ size_t cav_sweep_bytes(const cav_sweep *s) {
          (size_t)s->nword * 2 * sizeof *s->mark + (size_t)s->npair * sizeof *s->found;
 }
 
-static int *entry(const cav_sweep *s, int i, int j) { return s->table + (i < j ? i * s->nball + j : j * s->nball + i); }
+static int *entry(const cav_sweep *s, int i, int j) {
+  assert(i >= 0 && i < s->nball && j >= 0 && j < s->nball);
+  return s->table + (size_t)(i < j ? i : j) * (size_t)s->nball + (i < j ? j : i);
+}
 
 static void set_bit(uint64_t *bits, int p) { bits[p / WORD] |= (uint64_t)1 << p % WORD; }
 
@@ -129,6 +133,7 @@ int cav_sweep_find(cav_sweep *s, const double (*centre)[3], double margin, const
   for (int w = 0; w < s->nword; w++) {
     for (uint64_t bits = s->mark[w]; bits; bits &= bits - 1) s->found[count++] = w * WORD + __builtin_ctzll(bits);
   }
+  assert(count <= s->npair);
   *found = s->found;
   return count;
 }

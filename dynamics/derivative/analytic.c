@@ -18,6 +18,7 @@
 /// For the order momentum the rows of root links are those of half_step.c instead.
 ///
 /// Not offered: models with parts listed by cav_derivatives_missing; nothing is approximated in their place.
+#include <assert.h>
 #include <stdlib.h>
 
 #include "derivative.h"
@@ -42,7 +43,8 @@ static cav_derivative_store *derivatives_new(const cav_model *model) {
   cav_derivative_store *s = calloc(1, sizeof *s);
   if (!s) return NULL;
   size_t nv = (size_t)model->nv, n = (size_t)model->nlink;
-  s->drift = calloc(5 * 6 * nv + (12 + 3 * BLOCK) * n + 12 * nv + nv * nv + ALIGN, sizeof(double));
+  size_t doubles = 5 * 6 * nv + (12 + 3 * BLOCK) * n + 12 * nv + nv * nv;
+  s->drift = calloc(doubles + ALIGN, sizeof(double));
   s->touched = calloc(n + 1, sizeof(int));
   if (!s->drift || !s->touched) {
     cav_derivative_store_free(s);
@@ -58,6 +60,8 @@ static cav_derivative_store *derivatives_new(const cav_model *model) {
   s->by_next = s->by_now + BLOCK * n;
   s->across = s->by_next + BLOCK * n;
   s->spare = s->across + 12 * nv;
+  assert(s->spare + nv * nv == s->drift + doubles);
+  s->bytes = sizeof *s + (doubles + ALIGN) * sizeof(double) + (n + 1) * sizeof(int);
   return s;
 }
 

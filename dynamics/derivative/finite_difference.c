@@ -2,6 +2,7 @@
 /// (METHOD.md, 7). A column of v_next or v repeats no position work; a column of q is one evaluation of all, in the
 /// tangent q (+) step e_j. Steps are relative to max(1, |coordinate|), rotations absolute. One-sided columns are first
 /// order in the step, centred ones second order where the law is smooth.
+#include <assert.h>
 #include <stdlib.h>
 
 #include "derivative.h"
@@ -21,7 +22,8 @@ typedef struct difference {
 } difference;
 
 /// Relative steps of positions and velocities.
-static const double POSITION_STEP[] = {1e-7, 1e-5}, VELOCITY_STEP[] = {1e-6, 1e-4};
+static const double POSITION_STEP[] = {[CAV_DERIVATIVE_FORWARD] = 1e-7, [CAV_DERIVATIVE_CENTRED] = 1e-5};
+static const double VELOCITY_STEP[] = {[CAV_DERIVATIVE_FORWARD] = 1e-6, [CAV_DERIVATIVE_CENTRED] = 1e-4};
 
 // room for the readings and moved coordinates; kept by the state
 static double *room(cav_state *state, size_t count) {
@@ -117,6 +119,7 @@ cav_status cav_readout_differentiate(const cav_model *model, cav_state *state, c
   d.minus = d.plus + n;
   d.q_moved = d.minus + n;
   d.velocity_moved = d.q_moved + model->nq;
+  assert(d.velocity_moved + model->nv <= scratch + state->work->readout_room);
 
   // the point itself: a failure here leaves every output untouched
   cav_status status = restore(&d, CAV_STAGE_NONE);

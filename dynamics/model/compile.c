@@ -5,6 +5,7 @@
 /// the link they stand on: mass, centre and inertia add up, and geoms, sites and body frames are re-expressed in its frame.
 /// Every check that needs the whole model is here, with the line of the element at fault.
 
+#include <assert.h>
 #include <stdint.h>
 #include <stdlib.h>
 
@@ -163,6 +164,7 @@ typedef struct carver {
 
 static void *take(carver *c, int n, size_t size) {
   size_t at = (c->used + 15) & ~(size_t)15;
+  assert(n >= 0 && size <= SIZE_MAX / 4 / ((size_t)n + 1));
   c->used = at + (size_t)n * size;
   return c->base ? c->base + at : NULL;
 }
@@ -579,6 +581,7 @@ static int list_tendon_dofs(builder *b, int *out) {
     n += dofs;
   }
   free(mark);
+  assert(!out || out == b->tendon_dof + n);
   return n;
 }
 
@@ -1007,8 +1010,10 @@ static cav_model *build(builder *b) {
     return NULL;
   }
   carve_model(b, &c);
+  assert(c.used == b->model->bytes);
   fill(b);
   fraction_arrays(b);
+  assert(!running(b) || b->text == b->text_end);
   if (running(b)) {
     cav_status status = cav_reference_weights(b->model);
     if (status == CAV_NO_MEMORY)

@@ -30,17 +30,25 @@
 #define END \
   { NULL, CAV_XML_SKIP, 0, 0, NULL, 0 }
 
-// words in the order of the enumerations that mjcf.c casts them to
-static const char *const truth[] = {"false", "true", "auto", NULL};
+// words by the enumerations that mjcf.c casts them to
+static const char *const truth[] = {
+    [CAV_LIMITED_NO] = "false", [CAV_LIMITED_YES] = "true", [CAV_LIMITED_AUTO] = "auto", NULL};
 static const char *const onoff[] = {"disable", "enable", NULL};
 static const char *const angles[] = {"radian", "degree", NULL};
 static const char *const coordinates[] = {"local", "global", NULL};
-static const char *const collisions[] = {"all", "predefined", "dynamic", NULL};
+static const char *const collisions[] = {
+    [CAV_COLLISION_ALL] = "all", [CAV_COLLISION_PAIRS] = "predefined", [CAV_COLLISION_GEOMS] = "dynamic", NULL};
 static const char *const cones[] = {"elliptic", "pyramidal", NULL};
 static const char *const integrators[] = {"Euler", "RK4", "implicit", "implicitfast", NULL};
-static const char *const joints[] = {"free", "ball", "slide", "hinge", NULL};
-static const char *const geoms[] = {"plane", "sphere", "capsule", "ellipsoid", "cylinder",
-                                    "box",   "mesh",   "hfield",  NULL};
+static const char *const joints[] = {[CAV_JOINT_FREE] = "free",
+                                     [CAV_JOINT_BALL] = "ball",
+                                     [CAV_JOINT_SLIDE] = "slide",
+                                     [CAV_JOINT_HINGE] = "hinge",
+                                     NULL};
+static const char *const geoms[CAV_GEOM_TYPES + 1] = {
+    [CAV_GEOM_PLANE] = "plane",         [CAV_GEOM_SPHERE] = "sphere",     [CAV_GEOM_CAPSULE] = "capsule",
+    [CAV_GEOM_ELLIPSOID] = "ellipsoid", [CAV_GEOM_CYLINDER] = "cylinder", [CAV_GEOM_BOX] = "box",
+    [CAV_GEOM_MESH] = "mesh",           [CAV_GEOM_HFIELD] = "hfield"};
 static const char *const shapes[] = {"none", "ellipsoid", NULL};
 static const char *const objects[] = {"body", "xbody", "geom", "site", "camera", NULL};
 static const char *const dyntypes[] = {"none", "integrator", "filter", "muscle", "user", NULL};

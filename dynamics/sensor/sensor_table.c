@@ -1,4 +1,6 @@
 /// The table of sensors: MJCF's names, lengths of readings, what they look at and which stage they read.
+#include <assert.h>
+
 #include "cavort/model.h"
 
 static const cav_sensor_rule rules[CAV_SENSOR_TYPES] = {
@@ -40,4 +42,7 @@ static const cav_sensor_rule rules[CAV_SENSOR_TYPES] = {
     [CAV_SENSOR_CLOCK] = {"clock", 1, CAV_TARGET_NONE, CAV_READS_POSITION},
 };
 
-const cav_sensor_rule *cav_sensor_rule_of(cav_sensor_type type) { return &rules[type]; }
+const cav_sensor_rule *cav_sensor_rule_of(cav_sensor_type type) {
+  assert(type < CAV_SENSOR_TYPES && rules[type].name && rules[type].dim <= CAV_SENSOR_DIM_MAX);
+  return &rules[type];
+}

@@ -14,6 +14,7 @@
 /// and errs more still, as it takes chords between knots for velocities. Not conserved exactly: energy.
 #include "half_step.h"
 
+#include <assert.h>
 #include <stdlib.h>
 
 #include "math3.h"
@@ -56,6 +57,7 @@ cav_status cav_half_steps_new(const cav_model *model, cav_state *state) {
   half_steps->v = take(&at, nv);
   half_steps->missing = take(&at, 6 * n);
   half_steps->inner = take(&at, 6 * n);
+  assert((char *)at == (char *)half_steps + bytes);
   // the world stays where it is
   half_steps->before.link[0] = half_steps->after.link[0] = state->link[0];
   state->work->half_steps = half_steps;

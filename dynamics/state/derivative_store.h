@@ -30,6 +30,7 @@ typedef struct cav_derivative_store {
   double *by_next;   ///< [nlink*36] and by -v_next
   double *across;    ///< [12*nv] axes of the dofs of two links about a contact
   double *spare;     ///< [nv*nv] for outputs that are not asked for
+  size_t bytes;      ///< of all but contact
   int room;
   cav_contact_jacobian *contact; ///< [room]
 } cav_derivative_store;

@@ -83,6 +83,7 @@ typedef struct cav_workspace {
   // transmission: moments of each actuator along its dofs and what inverts T'T (actuation.c)
   int *gear_start, *gear_dof; ///< [nu+1], [entries]
   double *gear;               ///< [entries]
+  int gear_room;              ///< entries that were counted
   int gear_varies;            ///< some moments depend on q
   int gram_diagonal;
   double *gram_inverse; ///< [nu] of a diagonal T'T

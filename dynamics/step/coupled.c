@@ -12,6 +12,8 @@
 /// 1 + epsilon for this coupling with the row itself; it is taken out first, so both laws are one where A is diagonal.
 #include <stdlib.h>
 
+#include <assert.h>
+
 #include "algebra.h"
 #include "impulse.h"
 #include "math3.h"
@@ -40,7 +42,8 @@ static cav_status fill(rows *r, const cav_model *model, cav_state *state) {
   const size_t nv = (size_t)model->nv, nblock = (size_t)(state->ncontact + state->nrow + state->nequality);
   const size_t nrow = (size_t)cav_jacobian_rows(state), m = (size_t)cav_equality_row_count(state);
   const size_t doubles = 2 * nrow * nv + nrow + m * m + 2 * nrow * nrow;
-  double *J = cav_solver_room(w, doubles * sizeof *J + nblock * (sizeof(cav_block) + nv * sizeof(int)));
+  const size_t bytes = doubles * sizeof(double) + nblock * (sizeof(cav_block) + nv * sizeof(int));
+  double *J = cav_solver_room(w, bytes);
   if (!J) return CAV_NO_MEMORY;
   r->W = J + nrow * nv;
   r->row = r->W + nrow * nv;
@@ -51,7 +54,11 @@ static cav_status fill(rows *r, const cav_model *model, cav_state *state) {
   r->p.nbound = state->ncontact + state->nrow;
   r->m = (int)m;
   r->n = (int)(nrow - m);
-  cav_jacobian(model, state, r->p.block, (int *)(r->p.block + nblock), J);
+  int *dof = (int *)(r->p.block + nblock);
+  assert((char *)(dof + nblock * nv) == (char *)J + bytes);
+  const int rows_laid = cav_jacobian(model, state, r->p.block, dof, J);
+  assert(rows_laid == r->p.nrow);
+  (void)rows_laid;
   cav_step_inertia(model, state, w->M);
   if (!cav_ldl_factor(model, w, w->M, w->L)) return CAV_BAD_INPUT;
   for (int b = 0; b < r->p.nblock; b++) {

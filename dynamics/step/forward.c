@@ -14,6 +14,7 @@
 /// Stops when |inverse - u| is within tolerance of the largest force in the balance, or within what rounding of v_next
 /// to a double does to stiff constraints, whichever is larger; up to two more passes serve light links, whose forces
 /// are small against the largest. No step depends on earlier calls. Integrates no positions.
+#include <assert.h>
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -22,7 +23,7 @@
 #include "impulse.h"
 #include "math3.h"
 
-enum { BLOCK = 36, DEFAULT_ITERATIONS = 100, SEARCH_STEPS = 60, STALLS = 4, POLISH = 2 };
+enum { BLOCK = CAV_IMPULSE_DIM * CAV_IMPULSE_DIM, DEFAULT_ITERATIONS = 100, SEARCH_STEPS = 60, STALLS = 4, POLISH = 2 };
 
 static const double DEFAULT_TOLERANCE = 1e-13, SHORTEST_STEP = 0.02;
 
@@ -76,6 +77,7 @@ static cav_status prepare(newton *s, const cav_model *model, cav_state *state) {
   s->curvature = at;
   s->matrix = s->curvature + BLOCK * nblock;
   s->smooth = s->matrix + nv * nv;
+  assert(s->matrix + matrices * nv * nv == s->problem.spare + s->problem.nspare);
   return CAV_OK;
 }
 
@@ -99,7 +101,7 @@ static void add_constraints(newton *s, int whole) {
     const int n = block->ndof, dim = block->dim;
     if (largest(H, dim * dim) == 0.0) continue;
     for (int i = 0; i < n; i++) {
-      double bent[6] = {0.0}, *to = s->matrix + block->dof[i] * nv;
+      double bent[CAV_IMPULSE_DIM] = {0.0}, *to = s->matrix + block->dof[i] * nv;
       for (int k = 0; k < dim; k++)
         for (int l = 0; l < dim; l++) bent[k] += H[k * dim + l] * J[l * n + i];
       for (int j = 0; j < n; j++) {

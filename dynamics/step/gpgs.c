@@ -17,6 +17,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <assert.h>
+
 #include "algebra.h"
 #include "impulse.h"
 #include "math3.h"
@@ -439,6 +441,7 @@ static cav_status prepare(gpgs *s, const cav_model *model, cav_state *state, con
   s->lack = s->hold + rows;
   s->missing = s->lack + rows;
   s->moved = s->missing + nv;
+  assert(s->moved + nv <= p->spare + p->nspare);
   for (int b = 0; b < p->nbound; b++) {
     const cav_block *block = &p->block[b];
     if (block->contact >= 0 ? state->contact[block->contact].sigma > 0.0 : state->row[block->row].sigma > 0.0)

@@ -5,13 +5,14 @@
 #include "impulse.h"
 #include "algebra.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "math3.h"
 
-enum { DIM_MAX = 6 };
+enum { DIM_MAX = CAV_IMPULSE_DIM };
 
 void *cav_solver_room(cav_workspace *work, size_t bytes) {
   if (bytes > work->solver_bytes) {
@@ -69,8 +70,8 @@ cav_status cav_impulse_new(const cav_model *model, cav_state *state, const doubl
   const size_t spare = room->per_block * nblock + room->per_row * nrow + room->per_row_squared * nrow * nrow +
                        room->per_row_and_dof * nrow * nv + room->per_dof * nv + room->per_dof_squared * nv * nv;
   const size_t doubles = 2 * nrow + nrow * nv + 2 * entries + 2 * nv + spare;
-  double *at =
-      cav_solver_room(state->work, doubles * sizeof(double) + nblock * (sizeof(cav_block) + nv * sizeof(int)) + 64);
+  const size_t bytes = doubles * sizeof(double) + nblock * (sizeof(cav_block) + nv * sizeof(int));
+  double *at = cav_solver_room(state->work, bytes);
   if (!at) return CAV_NO_MEMORY;
   *p = (cav_impulse){.model = model, .state = state, .nv = (int)nv, .nblock = (int)nblock, .nrow = (int)nrow};
   p->nbound = state->ncontact + state->nrow;
@@ -84,12 +85,16 @@ cav_status cav_impulse_new(const cav_model *model, cav_state *state, const doubl
   p->change = p->force + nv;
   p->spare = p->change + nv;
   p->block = (cav_block *)(p->spare + spare);
+  p->nspare = spare;
   int *dof = (int *)(p->block + nblock);
+  assert((char *)(dof + nblock * nv) == (char *)at + bytes);
 
   // the constraints as the inverse sees them, then the matrices
   status = cav_inverse_from(model, state, CAV_STAGE_POSITION, q, v, v, state->u);
   if (status != CAV_OK) return status;
-  cav_jacobian(model, state, p->block, dof, J);
+  const int rows = cav_jacobian(model, state, p->block, dof, J);
+  assert(rows == p->nrow);
+  (void)rows;
   fill_targets(p);
   return fill_inertia(p);
 }

@@ -18,7 +18,8 @@ typedef struct cav_impulse {
   double *M; ///< tree-sparse, D included; at the mean velocity with half of the damping that acts during the step
   double *L; ///< its factors by cav_ldl_factor
   double *force, *change; ///< scratch [nv]
-  double *spare;          ///< doubles asked for
+  double *spare;          ///< [nspare] doubles asked for
+  size_t nspare;
 } cav_impulse;
 
 /// Doubles a solver needs of its own, by what they grow with.

@@ -1,6 +1,7 @@
 /// The state of one thread: one block carved once, plus contacts and rows in two arrays that grow.
 /// Here the model is also compiled into the list of work it needs: which joints have springs or limits, which dofs
 /// friction, how the rows of the sparse inertia lie. A model without any of them gets empty lists. Nothing is evaluated.
+#include <assert.h>
 #include <stdint.h>
 #include <stdlib.h>
 
@@ -14,6 +15,7 @@ enum { ALIGNMENT = 64 };
 // next piece of a block, or only its size while base is NULL
 static void *carve(char *base, size_t *used, size_t count, size_t size) {
   void *piece = base ? base + *used : NULL;
+  assert(size < (SIZE_MAX / 2 - *used) / (count + 1));
   *used += (count * size + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
   return piece;
 }
@@ -123,6 +125,7 @@ static size_t layout(const cav_model *model, char *base, cav_state *s, cav_works
   w->gear_start = carve(base, &used, nu > 0 ? nu + 1 : 0, i);
   w->gear_dof = carve(base, &used, c.gears, i);
   w->gear = carve(base, &used, c.gears, d);
+  w->gear_room = (int)c.gears;
   w->gram_inverse = carve(base, &used, nu, d);
   w->control = carve(base, &used, 2 * nu, d);
   note(w, CAV_PART_ACTUATION, used);
@@ -199,6 +202,17 @@ static void compile_lists(const cav_model *model, cav_workspace *w) {
   }
 }
 
+// every list is as long as was counted for it
+static void check_lists(const cav_model *model, const cav_workspace *w) {
+  const census c = count(model);
+  assert((size_t)w->nspring == c.springs && (size_t)w->nlimit == c.limits && (size_t)w->nfriction == c.frictions);
+  assert((size_t)w->row[model->nv] == inertia_entries(model));
+  assert(w->nhinge <= model->njoint && w->nquaternion <= model->njoint);
+  assert(w->ntendon_spring <= model->ntendon && w->ntendon_limit <= model->ntendon);
+  assert(w->ntendon_friction <= model->ntendon);
+  (void)model, (void)w, (void)c;
+}
+
 // an array for the first few items, if it is needed at all
 static void *make_room(int needed, int *room, size_t size) {
   void *items = needed ? malloc(CAV_FIRST_ROOM * size) : NULL;
@@ -220,7 +234,9 @@ cav_state *cav_state_new(const cav_model *model) {
   size_t used = 0;
   cav_state *state = carve(block, &used, 1, sizeof(cav_state));
   cav_workspace *work = carve(block, &used, 1, sizeof(cav_workspace));
-  layout(model, block + head, state, work);
+  size_t laid = layout(model, block + head, state, work);
+  assert(used == head && head + laid == bytes);
+  (void)laid;
 
   // what this model needs
   state->model = model;
@@ -230,6 +246,7 @@ cav_state *cav_state_new(const cav_model *model) {
   compile_dofs(model, work);
   compile_frames(model, work);
   compile_lists(model, work);
+  check_lists(model, work);
   cav_tendon_compile(model, state);
   quat_normalise(state->link[0].quat);
   quat_matrix(state->link[0].rotation, state->link[0].quat);

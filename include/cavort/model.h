@@ -87,6 +87,8 @@ typedef enum cav_sensor_type {
   CAV_SENSOR_TYPES
 } cav_sensor_type;
 
+enum { CAV_SENSOR_DIM_MAX = 4 }; ///< most numbers of a reading
+
 /// What a frame sensor or a term looks at.
 typedef enum cav_object_type {
   CAV_OBJECT_BODY,  ///< frame at the body's centre of mass (MJCF "body")

@@ -4,54 +4,73 @@
 #include "problem_file.h"
 #include "scene.h"
 
-// in the order of the enumerations of problem.h and model.h
-const char *const cav_problem_orders[] = {"euler", "midpoint", "momentum", NULL};
+// by the enumerations of problem.h and model.h, NULL behind the last
+const char *const cav_problem_orders[] = {
+    [CAV_ORDER_EULER] = "euler", [CAV_ORDER_MIDPOINT] = "midpoint", [CAV_ORDER_MOMENTUM] = "momentum", NULL};
 const char *const cav_problem_closings[] = {"open", "rest", NULL};
-const char *const cav_problem_guesses[] = {"hold", "interpolate", NULL};
-const char *const cav_problem_quantities[] = {"sensor", "posture", "velocity",         "acceleration", "effort", "gap",
-                                              "slip",   "impact",  "self_penetration", "force",        NULL};
-const char *const cav_problem_dof_sets[] = {"all", "root_linear", "root_angular", "joints", NULL};
-const char *const cav_problem_sensors[] = {"jointpos",
-                                           "jointvel",
-                                           "framepos",
-                                           "framequat",
-                                           "framexaxis",
-                                           "frameyaxis",
-                                           "framezaxis",
-                                           "framelinvel",
-                                           "frameangvel",
-                                           "subtreecom",
-                                           "subtreelinvel",
-                                           "subtreeangmom",
-                                           "touch",
-                                           "accelerometer",
-                                           "velocimeter",
-                                           "gyro",
-                                           "force",
-                                           "torque",
-                                           "magnetometer",
-                                           "rangefinder",
-                                           "tendonpos",
-                                           "tendonvel",
-                                           "actuatorpos",
-                                           "actuatorvel",
-                                           "actuatorfrc",
-                                           "ballquat",
-                                           "ballangvel",
-                                           "jointlimitpos",
-                                           "jointlimitvel",
-                                           "jointlimitfrc",
-                                           "tendonlimitpos",
-                                           "tendonlimitvel",
-                                           "tendonlimitfrc",
-                                           "framelinacc",
-                                           "frameangacc",
-                                           "clock",
-                                           NULL};
-const char *const cav_problem_stabilisations[] = {"solref", "discrete", NULL};
-const char *const cav_problem_regularisers[] = {"reference", "exact", NULL};
-const char *const cav_problem_norms[] = {"square", "absolute", NULL};
-const char *const cav_problem_mirrors[] = {"none", "x", "y", NULL};
+const char *const cav_problem_guesses[] = {[CAV_GUESS_HOLD] = "hold", [CAV_GUESS_INTERPOLATE] = "interpolate", NULL};
+const char *const cav_problem_quantities[CAV_QUANTITY_TYPES + 1] = {
+    [CAV_QUANTITY_SENSOR] = "sensor",
+    [CAV_QUANTITY_CONFIGURATION] = "posture",
+    [CAV_QUANTITY_VELOCITY] = "velocity",
+    [CAV_QUANTITY_ACCELERATION] = "acceleration",
+    [CAV_QUANTITY_EFFORT] = "effort",
+    [CAV_QUANTITY_GAP] = "gap",
+    [CAV_QUANTITY_SLIP] = "slip",
+    [CAV_QUANTITY_IMPACT] = "impact",
+    [CAV_QUANTITY_SELF_PENETRATION] = "self_penetration",
+    [CAV_QUANTITY_FORCE] = "force",
+};
+const char *const cav_problem_dof_sets[] = {[CAV_DOFS_ALL] = "all",
+                                            [CAV_DOFS_ROOT_LINEAR] = "root_linear",
+                                            [CAV_DOFS_ROOT_ANGULAR] = "root_angular",
+                                            [CAV_DOFS_JOINTS] = "joints",
+                                            NULL};
+const char *const cav_problem_sensors[CAV_SENSOR_TYPES + 1] = {
+    [CAV_SENSOR_JOINTPOS] = "jointpos",
+    [CAV_SENSOR_JOINTVEL] = "jointvel",
+    [CAV_SENSOR_FRAMEPOS] = "framepos",
+    [CAV_SENSOR_FRAMEQUAT] = "framequat",
+    [CAV_SENSOR_FRAMEXAXIS] = "framexaxis",
+    [CAV_SENSOR_FRAMEYAXIS] = "frameyaxis",
+    [CAV_SENSOR_FRAMEZAXIS] = "framezaxis",
+    [CAV_SENSOR_FRAMELINVEL] = "framelinvel",
+    [CAV_SENSOR_FRAMEANGVEL] = "frameangvel",
+    [CAV_SENSOR_SUBTREECOM] = "subtreecom",
+    [CAV_SENSOR_SUBTREELINVEL] = "subtreelinvel",
+    [CAV_SENSOR_SUBTREEANGMOM] = "subtreeangmom",
+    [CAV_SENSOR_TOUCH] = "touch",
+    [CAV_SENSOR_ACCELEROMETER] = "accelerometer",
+    [CAV_SENSOR_VELOCIMETER] = "velocimeter",
+    [CAV_SENSOR_GYRO] = "gyro",
+    [CAV_SENSOR_FORCE] = "force",
+    [CAV_SENSOR_TORQUE] = "torque",
+    [CAV_SENSOR_MAGNETOMETER] = "magnetometer",
+    [CAV_SENSOR_RANGEFINDER] = "rangefinder",
+    [CAV_SENSOR_TENDONPOS] = "tendonpos",
+    [CAV_SENSOR_TENDONVEL] = "tendonvel",
+    [CAV_SENSOR_ACTUATORPOS] = "actuatorpos",
+    [CAV_SENSOR_ACTUATORVEL] = "actuatorvel",
+    [CAV_SENSOR_ACTUATORFRC] = "actuatorfrc",
+    [CAV_SENSOR_BALLQUAT] = "ballquat",
+    [CAV_SENSOR_BALLANGVEL] = "ballangvel",
+    [CAV_SENSOR_JOINTLIMITPOS] = "jointlimitpos",
+    [CAV_SENSOR_JOINTLIMITVEL] = "jointlimitvel",
+    [CAV_SENSOR_JOINTLIMITFRC] = "jointlimitfrc",
+    [CAV_SENSOR_TENDONLIMITPOS] = "tendonlimitpos",
+    [CAV_SENSOR_TENDONLIMITVEL] = "tendonlimitvel",
+    [CAV_SENSOR_TENDONLIMITFRC] = "tendonlimitfrc",
+    [CAV_SENSOR_FRAMELINACC] = "framelinacc",
+    [CAV_SENSOR_FRAMEANGACC] = "frameangacc",
+    [CAV_SENSOR_CLOCK] = "clock",
+};
+const char *const cav_problem_stabilisations[] = {
+    [CAV_STABILISATION_SOLREF] = "solref", [CAV_STABILISATION_DISCRETE] = "discrete", NULL};
+const char *const cav_problem_regularisers[] = {
+    [CAV_REGULARISER_REFERENCE] = "reference", [CAV_REGULARISER_EXACT] = "exact", NULL};
+const char *const cav_problem_norms[] = {[CAV_NORM_SQUARE] = "square", [CAV_NORM_ABSOLUTE] = "absolute", NULL};
+const char *const cav_problem_mirrors[] = {
+    [CAV_MIRROR_NONE] = "none", [CAV_MIRROR_X] = "x", [CAV_MIRROR_Y] = "y", NULL};
 static const char *const heights[] = {"keep", "floor", NULL};
 static const char *const clippings[] = {"keep", "clip", NULL};
 static const char *const ends[] = {"first", "last", NULL};

@@ -392,7 +392,7 @@ static cav_status make_absolute(const cav_problem_reader *reader, const cav_xml_
   const char *what = cav_problem_sensors[term->sensor.type];
   if (cav_sensor_rule_of(term->sensor.type)->stage != CAV_READS_POSITION)
     return cav_xml_fail(reader->error, node, "relative", "a %s has no reading at a posture at rest", what);
-  double reading[4] = {0};
+  double reading[CAV_SENSOR_DIM_MAX] = {0};
   cav_status status =
       cav_position(reader->model, reader->state, relation == 1 ? reader->problem->q_start : reader->problem->q_goal);
   if (status)

@@ -3,6 +3,7 @@
 #include "csv.h"
 
 #include <errno.h>
+#include <limits.h>
 #include <locale.h>
 #include <math.h>
 #include <stdlib.h>
@@ -77,6 +78,8 @@ static cav_status read_names(cav_table *table, char *text, int line, cav_error *
 // room for one more row
 static cav_status grow(cav_table *table, int *room, int line, cav_error *error) {
   if (table->nrow < *room) return CAV_OK;
+  if (*room > INT_MAX / 2)
+    return cav_file_fail(error, CAV_BAD_INPUT, line, "%s:%d: more rows than are read, %d", table->path, line, *room);
   size_t more = *room ? 2 * (size_t)*room : 64;
   double *value = realloc(table->value, more * (size_t)table->ncol * sizeof *value);
   if (value) table->value = value;
@@ -148,11 +151,13 @@ static cav_status read_lines(cav_table *table, FILE *stream, cav_error *error) {
 }
 
 cav_table *cav_table_read(const char *path, cav_error *error) {
-  FILE *stream = fopen(path, "r");
   struct stat about;
-  if (!stream || fstat(fileno(stream), &about) != 0 || !S_ISREG(about.st_mode)) {
-    cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: cannot be read: %s", path, stream ? "not a file" : strerror(errno));
-    if (stream) fclose(stream);
+  // before it is opened: that of a pipe would wait for a writer
+  int there = stat(path, &about) == 0, regular = there && S_ISREG(about.st_mode);
+  FILE *stream = regular ? fopen(path, "r") : NULL;
+  if (!stream) {
+    cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: cannot be read: %s", path,
+                  there && !regular ? "not a file" : strerror(errno));
     return NULL;
   }
   // numbers are read with a point, whatever the locale

@@ -4,21 +4,160 @@
 /// free, every row's derivative by its logarithm is the difference of two passes that begin the same rows.
 #include "knot.h"
 
+#include <assert.h>
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 int cav_knot_moves(const cav_transcription *tr, int t) { return tr->periodicity || (t >= 1 && t < tr->nknot); }
 
+// ---------------------------------------------------------------- counting
+
+/// Readings of a contact that a cost takes: n from the first, of contacts within one tree (self) or of all others.
+typedef struct contact_part {
+  int first, n, self;
+} contact_part;
+
+/// n 0: not a cost of contacts.
+static contact_part contact_part_of(cav_quantity quantity) {
+  static const contact_part part[CAV_QUANTITY_TYPES] = {
+      [CAV_QUANTITY_GAP] = {0, 1, 0},    [CAV_QUANTITY_SLIP] = {1, 2, 0},
+      [CAV_QUANTITY_IMPACT] = {3, 1, 0}, [CAV_QUANTITY_SELF_PENETRATION] = {0, 1, 1},
+      [CAV_QUANTITY_FORCE] = {4, 1, 0},
+  };
+  assert(part[quantity].first + part[quantity].n <= CAV_CONTACT_READINGS);
+  return part[quantity];
+}
+
+/// Rows that are begun, and how many of them at most are laid over all columns.
+typedef struct row_count {
+  size_t rows, dense;
+} row_count;
+
+/// Whether a force row is a row of its own, or joins that of its only dof.
+static int stands_alone(const cav_force_row *form) { return form->n != 1; }
+
+/// Whether a term counts the knot's k-th contact, key [2*contacts].
+static int counts(const cav_transcription *tr, const int *key, const cav_term *term, int k) {
+  const cav_model *m = tr->model;
+  const cav_pair *pair = &m->pair[key[2 * k]];
+  int link = m->body[term->body].link;
+  return term->body <= 0 || m->geom[pair->geom1].link == link || m->geom[pair->geom2].link == link;
+}
+
+/// Rows of a cost at knot t, whose contacts are listed.
+static row_count cost_rows(const cav_transcription *tr, const int *key, const cav_term *term, int t) {
+  const cav_knot *knot = &tr->knot[t];
+  row_count n = {0};
+  if (cav_term_weight(tr, term, t) == 0) return n;
+  int rate = term->quantity == CAV_QUANTITY_ACCELERATION;
+  contact_part part = contact_part_of(term->quantity);
+  switch (term->quantity) {
+    case CAV_QUANTITY_SENSOR:
+      n.rows = n.dense = (size_t)cav_term_dim(term);
+      break;
+    case CAV_QUANTITY_CONFIGURATION:
+    case CAV_QUANTITY_VELOCITY:
+    case CAV_QUANTITY_ACCELERATION:
+      if (rate ? !knot->has_force : !cav_knot_moves(tr, t)) break;
+      for (int d = 0; d < tr->nv; d++) n.rows += (size_t)cav_dof_selected(tr, term, d);
+      break;
+    case CAV_QUANTITY_EFFORT:
+      if (!knot->has_force) break;
+      n.rows = (size_t)tr->model->nu;
+      for (int k = 0; k < tr->model->nu; k++) n.dense += (size_t)stands_alone(&tr->effort[k]);
+      break;
+    case CAV_QUANTITY_GAP:
+    case CAV_QUANTITY_SLIP:
+    case CAV_QUANTITY_IMPACT:
+    case CAV_QUANTITY_SELF_PENETRATION:
+    case CAV_QUANTITY_FORCE:
+      for (int k = 0; k < knot->ncontact; k++)
+        if (knot->moving[k] == part.self && counts(tr, key, term, k)) n.rows += (size_t)part.n;
+      n.dense = n.rows;
+      break;
+    case CAV_QUANTITY_TYPES:
+      break;
+  }
+  return n;
+}
+
+/// Rows of all constraints at knot t.
+static row_count constraint_rows(const cav_transcription *tr, int t) {
+  row_count n = {.rows = (size_t)tr->knot[t].layout.count};
+  if (tr->knot[t].has_force) {
+    for (int k = 0; k < tr->nresidual; k++) n.dense += (size_t)stands_alone(&tr->unactuated[k]);
+    for (int k = 0; k < tr->model->nu; k++) n.dense += tr->servo[k].n > 0 || stands_alone(&tr->effort[k]);
+  }
+  for (int i = 0; i < tr->problem->nterm; i++) {
+    const cav_term *term = &tr->problem->term[i];
+    if (term->use != CAV_USE_COST) n.dense += (size_t)cav_term_readings(tr, term, t);
+  }
+  return n;
+}
+
+/// Whether the penalty on the duration has its row at knot t.
+static int has_duration(const cav_transcription *tr, int t) { return tr->free_step && t == 0; }
+
+/// All rows of knot t.
+static row_count knot_rows(const cav_transcription *tr, const int *key, int t) {
+  row_count n = constraint_rows(tr, t);
+  // those along single dofs
+  n.dense += (size_t)tr->nv;
+  if (tr->constraints_only) return n;
+  n.rows += (size_t)has_duration(tr, t);
+  for (int i = 0; i < tr->problem->nterm; i++) {
+    if (tr->problem->term[i].use != CAV_USE_COST) continue;
+    row_count cost = cost_rows(tr, key, &tr->problem->term[i], t);
+    n.rows += cost.rows;
+    n.dense += cost.dense;
+  }
+  return n;
+}
+
+static int grow(double **array, size_t n) {
+  double *p = realloc(*array, n * sizeof(double));
+  if (p) *array = p;
+  return p != NULL;
+}
+
+int cav_knot_reserve(cav_transcription *tr, cav_scratch *s, int t) {
+  cav_knot *knot = &tr->knot[t];
+  row_count n = knot_rows(tr, s->key, t);
+  if (n.rows > INT_MAX / 2 || n.dense > INT_MAX / 2) return 0;
+  knot->nrow = (int)n.rows;
+  knot->dense_most = (int)n.dense;
+  if (knot->dense_most > knot->dense_room) {
+    if (!grow(&knot->dense, n.dense * 3 * (size_t)tr->nv) || !grow(&knot->rest, n.dense)) return 0;
+    knot->dense_room = knot->dense_most;
+  }
+  if (!tr->free_step) return 1;
+  if (knot->nrow > s->trace_room) {
+    if (!grow(&s->trace[0], n.rows) || !grow(&s->trace[1], n.rows)) return 0;
+    s->trace_room = knot->nrow;
+  }
+  size_t slots = (size_t)knot->layout.count;
+  if (knot->layout.count > s->slot_room) {
+    if (!grow(&s->slot[0], slots) || !grow(&s->slot[1], slots)) return 0;
+    s->slot_room = knot->layout.count;
+  }
+  return 1;
+}
+
+// ---------------------------------------------------------------- rows
+
 /// Starts a row of weight/2 r^2. Where the step is free its derivative by the step's logarithm is the difference of two passes that
 /// begin the same rows; weights count with it, as integrals are sums over steps.
 static void begin_row(cav_sum *a, double weight, double r) {
-  if (!a->tr->free_step || !(a->jacobian || a->shifted)) return;
   int i = a->row++;
+  assert(i < a->knot->nrow);
+  if (!a->tr->free_step || !(a->jacobian || a->shifted)) return;
+  assert(i < a->s->trace_room);
   a->root = sqrt(weight);
   if (a->shifted) {
-    cav_scratch_note(a->s, a->shifted - 1, i, a->root * r);
+    a->s->trace[a->shifted - 1][i] = a->root * r;
     return;
   }
   a->derivative = weight > 0 ? (a->s->trace[1][i] - a->s->trace[0][i]) / (2 * CAV_STEP_FRACTION) : 0;
@@ -52,14 +191,21 @@ static void add_sparse(cav_sum *a, double weight, double r, int n, const int *co
   }
 }
 
+/// Space for one more dense row [3nv] with its residual.
+static double *new_dense(cav_sum *a, double rest) {
+  cav_knot *knot = a->knot;
+  assert(knot->ndense < knot->dense_most && knot->dense_most <= knot->dense_room);
+  knot->rest[knot->ndense] = rest;
+  return knot->dense + (size_t)knot->ndense++ * 3 * (size_t)a->tr->nv;
+}
+
 /// Adds weight/2 (r + row dx)^2 for a full row, begun.
 static void add_dense(cav_sum *a, double weight, double r, const double *row) {
   a->knot->merit += 0.5 * weight * r * r;
   if (!a->jacobian || weight == 0) return;
   int width = 3 * a->tr->nv;
-  double root = sqrt(weight), *out = a->knot->dense + (size_t)a->knot->ndense * width;
+  double root = sqrt(weight), *out = new_dense(a, root * r);
   for (int k = 0; k < width; k++) out[k] = root * row[k];
-  a->knot->rest[a->knot->ndense++] = root * r;
   for (int k = 0; k < width && a->tr->free_step; k++) a->knot->step_row[k] += a->derivative * out[k];
 }
 
@@ -75,7 +221,7 @@ static void put_force(const cav_sum *a, const cav_force_row *form, double *row) 
 /// Adds weight/2 r^2 with r a linear form of u, begun: along one dof it joins that dof's row, otherwise it is a row of its own.
 static void add_force(cav_sum *a, double weight, double r, const cav_force_row *form) {
   const cav_transcription *tr = a->tr;
-  if (form->n == 1) {
+  if (!stands_alone(form)) {
     a->knot->merit += 0.5 * weight * r * r;
     a->s->force_weight[form->dof[0]] += weight * form->coef[0] * form->coef[0];
     a->s->force_derivative[form->dof[0]] += weight * r * form->coef[0];
@@ -97,6 +243,7 @@ static double form_value(const cav_force_row *form, const double *u) {
 /// Sets and begins a constraint row; the residual of its augmented Lagrangian, 0 with *active 0 where it does not push.
 static double slot_residual(cav_sum *a, int i, double value, double lower, double upper, double rho, int *active) {
   cav_slot *slot = &a->knot->slot[i];
+  assert(i < a->knot->layout.count);
   slot->value = value;
   slot->lower = lower;
   slot->upper = upper;
@@ -111,6 +258,7 @@ static double slot_residual(cav_sum *a, int i, double value, double lower, doubl
   double e = shifted - fmin(fmax(shifted, lower - slack), upper + slack);
   *active = e != 0 || lower == upper;
   begin_row(a, *active ? rho : 0, e);
+  assert(!a->tr->free_step || i < a->s->slot_room);
   if (a->shifted) a->s->slot[a->shifted - 1][i] = value;
   if (a->jacobian && a->tr->free_step)
     a->knot->slot_step[i] = (a->s->slot[1][i] - a->s->slot[0][i]) / (2 * CAV_STEP_FRACTION);
@@ -259,20 +407,12 @@ static void add_effort(cav_sum *a, const cav_term *term, double weight) {
   }
 }
 
-/// Whether a term counts the contacts of the knot's k-th pair.
-static int counts(const cav_sum *a, const cav_term *term, int k) {
-  const cav_model *m = a->tr->model;
-  const cav_pair *pair = &m->pair[a->s->key[2 * k]];
-  int link = m->body[term->body].link;
-  return term->body <= 0 || m->geom[pair->geom1].link == link || m->geom[pair->geom2].link == link;
-}
-
-/// Readings first .. first+n-1 of the contacts between trees or with the world, or of those within one tree.
-static void add_contact(cav_sum *a, const cav_term *term, double weight, int first, int n, int self) {
+static void add_contact(cav_sum *a, const cav_term *term, double weight) {
+  contact_part part = contact_part_of(term->quantity);
   weight /= term->scale * term->scale;
   for (int k = 0; k < a->knot->ncontact; k++) {
-    if (a->knot->moving[k] != self || !counts(a, term, k)) continue;
-    for (int i = first; i < first + n; i++) {
+    if (a->knot->moving[k] != part.self || !counts(a->tr, a->s->key, term, k)) continue;
+    for (int i = part.first; i < part.first + part.n; i++) {
       int row = CAV_CONTACT_READINGS * k + i;
       double r = a->knot->y[row], w = weight;
       begin_cost(a, term, term->scale, &w, &r);
@@ -281,59 +421,63 @@ static void add_contact(cav_sum *a, const cav_term *term, double weight, int fir
   }
 }
 
-/// Cost terms. sensor counts through the sensor readings, which stand in the order of the terms.
+/// One cost, whose readings, if it is of a sensor, are the knot's from reading on.
+static void add_cost(cav_sum *a, const cav_term *term, int reading, const double *q, const double *v,
+                     const double *v_next) {
+  double weight = cav_term_weight(a->tr, term, a->t) * term->weight;
+  size_t width = 3 * (size_t)a->tr->nv;
+  switch (term->quantity) {
+    case CAV_QUANTITY_SENSOR:
+      for (int k = 0; k < cav_term_dim(term); k++) {
+        double r = a->knot->y[reading + k], w = weight;
+        begin_cost(a, term, 1, &w, &r);
+        add_dense(a, w, r, a->knot->dy + (size_t)(reading + k) * width);
+      }
+      break;
+    case CAV_QUANTITY_CONFIGURATION:
+      add_posture(a, term, weight, q);
+      break;
+    case CAV_QUANTITY_VELOCITY:
+      add_velocity(a, term, weight, v);
+      break;
+    case CAV_QUANTITY_ACCELERATION:
+      add_acceleration(a, term, weight, v, v_next);
+      break;
+    case CAV_QUANTITY_EFFORT:
+      add_effort(a, term, weight);
+      break;
+    case CAV_QUANTITY_GAP:
+    case CAV_QUANTITY_SLIP:
+    case CAV_QUANTITY_IMPACT:
+    case CAV_QUANTITY_SELF_PENETRATION:
+    case CAV_QUANTITY_FORCE:
+      add_contact(a, term, weight);
+      break;
+    case CAV_QUANTITY_TYPES:
+      break;
+  }
+}
+
+/// Cost terms. reading counts through the readings of sensors, which stand in the order of the terms. Each begins the rows that
+/// were counted for it.
 static void add_costs(cav_sum *a, const double *q, const double *v, const double *v_next) {
   const cav_transcription *tr = a->tr;
-  int reading = CAV_CONTACT_READINGS * a->knot->ncontact, width = 3 * tr->nv;
+  int reading = CAV_CONTACT_READINGS * a->knot->ncontact;
   for (int i = 0; i < tr->problem->nterm; i++) {
     const cav_term *term = &tr->problem->term[i];
-    double when = cav_term_weight(tr, term, a->t), weight = when * term->weight;
-    if (when == 0) continue;
-    int dim = cav_term_dim(term);
+    row_count before = {(size_t)a->row, (size_t)a->knot->ndense};
+    if (cav_term_weight(tr, term, a->t) == 0) continue;
     if (term->use == CAV_USE_COST) {
-      switch (term->quantity) {
-        case CAV_QUANTITY_SENSOR:
-          for (int k = 0; k < dim; k++) {
-            double r = a->knot->y[reading + k], w = weight;
-            begin_cost(a, term, 1, &w, &r);
-            add_dense(a, w, r, a->knot->dy + (size_t)(reading + k) * width);
-          }
-          break;
-        case CAV_QUANTITY_CONFIGURATION:
-          add_posture(a, term, weight, q);
-          break;
-        case CAV_QUANTITY_VELOCITY:
-          add_velocity(a, term, weight, v);
-          break;
-        case CAV_QUANTITY_ACCELERATION:
-          add_acceleration(a, term, weight, v, v_next);
-          break;
-        case CAV_QUANTITY_EFFORT:
-          add_effort(a, term, weight);
-          break;
-        case CAV_QUANTITY_GAP:
-          add_contact(a, term, weight, 0, 1, 0);
-          break;
-        case CAV_QUANTITY_SLIP:
-          add_contact(a, term, weight, 1, 2, 0);
-          break;
-        case CAV_QUANTITY_IMPACT:
-          add_contact(a, term, weight, 3, 1, 0);
-          break;
-        case CAV_QUANTITY_SELF_PENETRATION:
-          add_contact(a, term, weight, 0, 1, 1);
-          break;
-        case CAV_QUANTITY_FORCE:
-          add_contact(a, term, weight, 4, 1, 0);
-          break;
-        case CAV_QUANTITY_TYPES:
-          break;
-      }
+      add_cost(a, term, reading, q, v, v_next);
+      row_count n = cost_rows(tr, a->s->key, term, a->t);
+      assert((size_t)a->row == before.rows + n.rows && (size_t)a->knot->ndense <= before.dense + n.dense);
+      (void)before, (void)n;
     }
-    reading += dim;
+    reading += cav_term_readings(tr, term, a->t);
   }
+  assert(reading == a->knot->nread);
   // the duration's own penalty
-  if (a->t > 0 || !tr->free_step) return;
+  if (!has_duration(tr, a->t)) return;
   double duration = (tr->nknot - 1) * tr->h;
   begin_row(a, tr->problem->duration_weight, duration);
   add_sparse(a, tr->problem->duration_weight, duration, 0, NULL, NULL);
@@ -368,9 +512,11 @@ static void add_ranges(cav_sum *a, const double *q, double rho) {
     double e = slot_residual(a, i++, value, lower, range[1] - keep, rho, &active);
     if (active) add_sparse(a, rho, e, n, column, axis);
   }
+  assert(i == a->knot->layout.tendon);
   for (int k = 0; k < m->ntendon; k++) {
     const cav_tendon *tendon = &m->tendon[k];
     if (!tendon->limited) continue;
+    assert(tendon->ndof <= tr->nv);
     double value = a->s->state->tendon_length[k];
     for (int c = 0; c < tendon->ndof; c++) {
       a->s->column[c] = tr->nv + m->tendon_dof[tendon->dof + c];
@@ -380,6 +526,7 @@ static void add_ranges(cav_sum *a, const double *q, double rho) {
     double e = slot_residual(a, i++, value, tendon->range[0] + keep, tendon->range[1] - keep, rho, &active);
     if (active) add_sparse(a, rho, e, tendon->ndof, a->s->column, a->s->row);
   }
+  assert(i == a->knot->layout.term);
 }
 
 /// Entries of a servo's own part of row i over q_t and v_t, into row [3nv].
@@ -414,6 +561,7 @@ static void add_force_slots(cav_sum *a, const double *q, const double *v) {
     double e = slot_residual(a, i++, form_value(&tr->unactuated[k], a->knot->u), 0, 0, rho, &active);
     add_force(a, rho, e, &tr->unactuated[k]);
   }
+  assert(i == a->knot->layout.effort);
   rho = tr->h * tr->penalty.effort;
   for (int k = 0; k < tr->model->nu; k++) {
     const double *range = tr->effort_range[k];
@@ -426,6 +574,7 @@ static void add_force_slots(cav_sum *a, const double *q, const double *v) {
     if (active && servo->n > 0) add_servo(a, rho, e, &tr->effort[k], servo);
     if (active && servo->n == 0) add_force(a, rho, e, &tr->effort[k]);
   }
+  assert(i == a->knot->layout.joint);
 }
 
 /// Rows of a hard term over postures, velocities or accelerations, one a selected dof; returns the next row.
@@ -462,7 +611,7 @@ static void add_hard_terms(cav_sum *a, const double *q, const double *v, const d
   for (int k = 0; k < tr->problem->nterm; k++) {
     const cav_term *term = &tr->problem->term[k];
     if (cav_term_weight(tr, term, a->t) == 0) continue;
-    int dim = cav_term_dim(term), range = term->use == CAV_USE_RANGE;
+    int dim = cav_term_readings(tr, term, a->t), range = term->use == CAV_USE_RANGE;
     double lower = range ? term->lower / term->scale : 0, upper = range ? term->upper / term->scale : 0;
     if (term->use == CAV_USE_COST) {
       reading += dim;
@@ -475,6 +624,7 @@ static void add_hard_terms(cav_sum *a, const double *q, const double *v, const d
       if (active) add_dense(a, rho, e, a->knot->dy + (size_t)reading * width);
     }
   }
+  assert(i == a->knot->layout.count && reading == a->knot->nread);
 }
 
 /// Lays the rows along single dofs beside the dense ones.
@@ -484,10 +634,9 @@ static void lay_force_rows(cav_sum *a) {
   for (int d = 0; d < tr->nv; d++) {
     double weight = a->s->force_weight[d];
     if (weight == 0) continue;
-    double root = sqrt(weight), *out = a->knot->dense + (size_t)a->knot->ndense * width;
+    double root = sqrt(weight), *out = new_dense(a, a->s->force_derivative[d] / root);
     const double *du = a->knot->du + (size_t)d * width;
     for (int k = 0; k < width; k++) out[k] = root * du[k];
-    a->knot->rest[a->knot->ndense++] = a->s->force_derivative[d] / root;
     for (int k = 0; k < width && tr->free_step; k++) a->knot->step_row[k] += a->s->force_step[d] * du[k];
   }
   for (int i = 0; i < a->knot->ndense; i++) {
@@ -503,6 +652,7 @@ void cav_knot_sum(cav_sum *a, const double *q, const double *v, const double *v_
   int nv = tr->nv;
   knot->merit = 0;
   knot->ndense = 0;
+  a->row = 0;
   memset(a->s->force_weight, 0, (size_t)nv * sizeof(double));
   memset(a->s->force_derivative, 0, (size_t)nv * sizeof(double));
   memset(a->s->force_step, 0, (size_t)nv * sizeof(double));
@@ -517,5 +667,7 @@ void cav_knot_sum(cav_sum *a, const double *q, const double *v, const double *v_
   add_force_slots(a, q, v);
   add_ranges(a, q, tr->h * tr->penalty.range);
   add_hard_terms(a, q, v, v_next);
+  // every pass begins the same rows, or the derivatives by the step would pair residuals of different ones
+  assert(a->row == knot->nrow);
   if (a->jacobian) lay_force_rows(a);
 }

@@ -3,6 +3,7 @@
 /// instead, only that, and counted; nothing else is mixed.
 #include "readings.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -34,6 +35,7 @@ static void read_contact(const cav_transcription *tr, const cav_contact *c, doub
 static void read_knot(const cav_model *model, const cav_state *state, void *context, double *value) {
   const readings *r = context;
   const cav_transcription *tr = r->tr;
+  const double *end_of_values = value + model->nv + tr->knot[r->t].nread;
   memcpy(value, state->u, (size_t)model->nv * sizeof(double));
   value += model->nv;
 
@@ -50,28 +52,18 @@ static void read_knot(const cav_model *model, const cav_state *state, void *cont
   }
   for (int i = 0; i < tr->problem->nterm; i++) {
     const cav_term *term = &tr->problem->term[i];
-    if (term->quantity != CAV_QUANTITY_SENSOR || cav_term_weight(tr, term, r->t) == 0) continue;
-    cav_term_read(tr, state, term, r->t, value);
-    value += cav_term_dim(term);
+    int n = cav_term_readings(tr, term, r->t);
+    if (n > 0) cav_term_read(tr, state, term, r->t, value);
+    value += n;
   }
+  assert(value == end_of_values);
+  (void)end_of_values;
 }
 
 static int grow(double **array, size_t n) {
   double *p = realloc(*array, n * sizeof(double));
   if (p) *array = p;
   return p != NULL;
-}
-
-void cav_scratch_note(cav_scratch *s, int which, int i, double value) {
-  if (i >= s->trace_room[which]) {
-    int room = 2 * i + 64;
-    if (!grow(&s->trace[which], (size_t)room)) {
-      s->short_of_memory = 1;
-      return;
-    }
-    s->trace_room[which] = room;
-  }
-  s->trace[which][i] = value;
 }
 
 int cav_readings_list(cav_transcription *tr, cav_scratch *s, int t) {
@@ -98,7 +90,7 @@ int cav_readings_list(cav_transcription *tr, cav_scratch *s, int t) {
   }
   for (int i = 0; i < tr->problem->nterm; i++) {
     const cav_term *term = &tr->problem->term[i];
-    if (cav_term_weight(tr, term, t) > 0) nsensor += cav_term_dim(term);
+    nsensor += cav_term_readings(tr, term, t);
   }
   knot->ncontact = ncontact;
   knot->nread = CAV_CONTACT_READINGS * ncontact + nsensor;
@@ -111,15 +103,6 @@ int cav_readings_list(cav_transcription *tr, cav_scratch *s, int t) {
   if (knot->nread > knot->room) {
     if (!grow(&knot->y, (size_t)knot->nread) || !grow(&knot->dy, (size_t)knot->nread * 3 * n)) return 0;
     knot->room = knot->nread;
-  }
-  if (tr->free_step && knot->layout.count > s->slot_room) {
-    if (!grow(&s->slot[0], (size_t)knot->layout.count) || !grow(&s->slot[1], (size_t)knot->layout.count)) return 0;
-    s->slot_room = knot->layout.count;
-  }
-  int dense = nv + knot->nread + knot->layout.count + tr->model->nu;
-  if (dense > knot->dense_room) {
-    if (!grow(&knot->dense, (size_t)dense * 3 * n) || !grow(&knot->rest, (size_t)dense)) return 0;
-    knot->dense_room = dense;
   }
   return 1;
 }
@@ -166,6 +149,7 @@ static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s
   int nv = tr->nv;
   size_t n = (size_t)nv;
   double *at = s->derivative;
+  _Static_assert(25 + 6 == CAV_DERIVATIVE_ROWS, "the last of these arrays ends where the scratch does");
   cav_contact_derivative d = {.dist_dq = at,
                               .velocity_dq = at + n,
                               .velocity_dv_next = at + 7 * n,
@@ -217,11 +201,13 @@ static cav_status sensor_rows(const cav_transcription *tr, const cav_scratch *s,
                               rows out) {
   const cav_sensor *sensor = &term->sensor;
   int nv = tr->nv, dim = sensor->dim;
+  _Static_assert(2 * CAV_SENSOR_DIM_MAX + 3 <= CAV_DERIVATIVE_ROWS, "both derivatives of a sensor and of its turn fit");
+  assert(dim <= CAV_SENSOR_DIM_MAX);
   double *dq = s->derivative, *dn = dq + (size_t)dim * nv, *rotation = dn + (size_t)dim * nv;
   cav_status status = cav_sensor_derivatives(tr->model, s->state, sensor, dq, dn);
   if (status != CAV_OK) return status;
   if (dim == 4) {
-    double target[4], reading[4];
+    double target[CAV_SENSOR_DIM_MAX], reading[CAV_SENSOR_DIM_MAX];
     cav_term_target(term, cav_knot_time(tr, t), 4, target);
     if (!term->target) target[0] = 1;
     cav_sensor_read(tr->model, s->state, sensor, reading);
@@ -251,10 +237,6 @@ static void read_term(const cav_model *model, const cav_state *state, void *cont
   cav_term_read(r->tr, state, r->term, r->t, value);
 }
 
-static int speaks(const cav_transcription *tr, const cav_term *term, int t) {
-  return term->quantity == CAV_QUANTITY_SENSOR && cav_term_weight(tr, term, t) != 0;
-}
-
 /// Sensors: those with derivatives first, as differences move the state.
 static cav_status sensors(const cav_transcription *tr, cav_scratch *s, int t, const double *q, const double *v,
                           const double *v_next) {
@@ -262,9 +244,11 @@ static cav_status sensors(const cav_transcription *tr, cav_scratch *s, int t, co
   for (int pass = 0; pass < 1 + (missing > 0); pass++) {
     for (int i = 0, at = first; i < tr->problem->nterm; i++) {
       const cav_term *term = &tr->problem->term[i];
-      if (!speaks(tr, term, t)) continue;
+      int n = cav_term_readings(tr, term, t);
+      if (n == 0) continue;
       rows out = rows_at(tr, s, at);
-      at += cav_term_dim(term);
+      at += n;
+      assert(at <= tr->nv + tr->knot[t].nread);
       cav_status status = CAV_OK;
       if (pass == 0) {
         status = sensor_rows(tr, s, term, t, out);
@@ -272,8 +256,8 @@ static cav_status sensors(const cav_transcription *tr, cav_scratch *s, int t, co
         if (status == CAV_NOT_SUPPORTED) status = CAV_OK;
       } else if (cav_sensor_derivatives(tr->model, s->state, &term->sensor, NULL, NULL) == CAV_NOT_SUPPORTED) {
         single_term single = {tr, term, t};
-        status = cav_readout_differentiate(tr->model, s->state, tr->difference, 0, q, v, v_next, read_term, &single,
-                                           cav_term_dim(term), NULL, out.dq, out.dv, out.dn);
+        status = cav_readout_differentiate(tr->model, s->state, tr->difference, 0, q, v, v_next, read_term, &single, n,
+                                           NULL, out.dq, out.dv, out.dn);
         s->differenced++;
       }
       if (status != CAV_OK) return status;

@@ -21,21 +21,17 @@ typedef struct cav_scratch {
   double *posture;                         ///< [nq]
   double *force_step;                      ///< [nv] what the step does to rows along single dofs
   double *rate;                            ///< [2nv]
-  double *trace[2];                        ///< residuals of all rows of a knot at a shorter and a longer step
-  int trace_room[2];
+  double *trace[2]; ///< [trace_room] residuals of all rows of a knot at a shorter and a longer step
+  int trace_room;
   double *slot[2]; ///< [slot_room] values of its constraint rows there
   int slot_room;
-  int short_of_memory; ///< 1: trace could not grow
-  double *derivative;  ///< [CAV_DERIVATIVE_ROWS*nv] derivatives of one contact or sensor
-  int differenced;     ///< calls in which differences stood in for analytic derivatives
+  double *derivative; ///< [CAV_DERIVATIVE_ROWS*nv] derivatives of one contact or sensor
+  int differenced;    ///< calls in which differences stood in for analytic derivatives
   double seconds;
 } cav_scratch;
 
 /// Lists the contacts that carry load at the state and makes room for all readings of knot t; 0 if memory runs out.
 int cav_readings_list(cav_transcription *transcription, cav_scratch *scratch, int t);
-
-/// trace[which][i] := value; sets short_of_memory if there is no room.
-void cav_scratch_note(cav_scratch *scratch, int which, int i, double value);
 
 /// Readings at the state's last evaluation: scratch->value [nv + nread].
 void cav_readings_values(const cav_transcription *transcription, cav_scratch *scratch, int t);

@@ -1,5 +1,10 @@
 /// What a term measures at a knot: its window, its dofs, its target, and the reading of a sensor against it. The sums over
+<<<<<<< HEAD
 /// dofs and contacts, which know derivatives, are in knot.c.
+=======
+/// dofs and contacts, which know derivatives, are in transcription.c.
+#include <assert.h>
+>>>>>>> dc2a0cc (Rows of a knot are counted from the terms that speak there)
 #include <math.h>
 #include <string.h>
 
@@ -45,6 +50,10 @@ int cav_term_dim(const cav_term *term) {
   if (term->quantity != CAV_QUANTITY_SENSOR) return 0;
   if (term->component >= 0) return 1;
   return term->sensor.dim == 4 ? 3 : term->sensor.dim;
+}
+
+int cav_term_readings(const cav_transcription *tr, const cav_term *term, int t) {
+  return cav_term_weight(tr, term, t) == 0 ? 0 : cav_term_dim(term);
 }
 
 int cav_dof_selected(const cav_transcription *tr, const cav_term *term, int d) {
@@ -94,7 +103,8 @@ void cav_rotation_between(const double a[4], const double b[4], double phi[3]) {
 
 /// Value minus target of a sensor term, over its scale.
 void cav_term_read(const cav_transcription *tr, const cav_state *state, const cav_term *term, int t, double *y) {
-  double reading[16], target[16];
+  double reading[CAV_SENSOR_DIM_MAX], target[CAV_SENSOR_DIM_MAX];
+  assert(term->sensor.dim <= CAV_SENSOR_DIM_MAX);
   cav_sensor_read(tr->model, state, &term->sensor, reading);
   cav_term_target(term, cav_knot_time(tr, t), term->sensor.dim, target);
   if (term->sensor.dim == 4) {

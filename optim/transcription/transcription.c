@@ -8,6 +8,7 @@
 #include "knot.h"
 #include "lapack.h"
 
+#include <assert.h>
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -113,6 +114,7 @@ static int list_force_rows(cav_transcription *tr) {
     double norm = 0;
     for (int i = 0; i < nv; i++) norm += residual[i] * residual[i];
     if ((norm = sqrt(norm)) < 1e-7) continue;
+    assert(tr->nresidual < nv);
     double unit_force = tr->weight * (dof_is_linear(m, d) ? 1 : CAV_MOMENT_ARM),
            *direction = basis + tr->nresidual * nv;
     for (int i = 0; i < nv; i++) direction[i] = residual[i] / norm;
@@ -141,6 +143,9 @@ end:
 /// Constraint rows that a hard term gives at a knot.
 static int term_slots(const cav_transcription *tr, const cav_term *term, int t) {
   if (term->use == CAV_USE_COST || cav_term_weight(tr, term, t) == 0) return 0;
+  // others are refused by cav_solve
+  assert(term->quantity == CAV_QUANTITY_SENSOR || term->quantity == CAV_QUANTITY_CONFIGURATION ||
+         term->quantity == CAV_QUANTITY_VELOCITY || term->quantity == CAV_QUANTITY_ACCELERATION);
   if (term->quantity == CAV_QUANTITY_SENSOR) return cav_term_dim(term);
   int n = 0;
   for (int d = 0; d < tr->nv; d++) n += cav_dof_selected(tr, term, d);
@@ -370,7 +375,7 @@ static cav_status shift_step(const cav_transcription *tr, cav_scratch *s, int t,
   if (knot->nread) memcpy(knot->y, s->value + tr->nv, (size_t)knot->nread * sizeof(double));
   cav_sum a = {.tr = &near, .s = s, .knot = knot, .t = t, .shifted = shifted};
   cav_knot_sum(&a, q, v_here, v_then);
-  return s->short_of_memory ? CAV_NO_MEMORY : CAV_OK;
+  return CAV_OK;
 }
 
 /// Turns rows [n*3nv] whose columns are of the knots beside into rows over the unknowns, across the seam of a cycle.
@@ -421,7 +426,7 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   double start = now();
   cav_status status = cav_inverse(tr->model, s->state, q, v, v_next, knot->u);
   if (status != CAV_OK) return status;
-  if (!cav_readings_list(tr, s, t)) return CAV_NO_MEMORY;
+  if (!cav_readings_list(tr, s, t) || !cav_knot_reserve(tr, s, t)) return CAV_NO_MEMORY;
   if (p->jacobian && tr->free_step) {
     status = shift_step(tr, s, t, 1, q, v, v_next);
     if (status == CAV_OK) status = shift_step(tr, s, t, 2, q, v, v_next);

@@ -53,10 +53,12 @@ typedef struct cav_knot {
   char *moving;           ///< [ncontact] 1: between two links of one tree, its first reading is the depth
   double *y;              ///< [nread]
   double *dy;             ///< [nread*3nv]
-  int ndense, dense_room; ///< rows over all columns, weighted, that make up the Hessian beside the sparse ones
-  double *dense, *rest;   ///< [ndense*3nv], [ndense]
-  double *hessian;        ///< [3nv*3nv] Gauss-Newton, lower triangle
-  double *gradient;       ///< [3nv]
+  int nrow;               ///< rows of costs and constraints
+  int ndense, dense_most; ///< rows over all columns, weighted, that make up the Hessian beside the sparse ones; at most
+  int dense_room;
+  double *dense, *rest; ///< [dense_room*3nv], [dense_room]
+  double *hessian;      ///< [3nv*3nv] Gauss-Newton, lower triangle
+  double *gradient;     ///< [3nv]
   double *
       step_row; ///< [3nv] of the Hessian, by the logarithm of the step where that is free; then its square and derivative
   double step_square, step_derivative;
@@ -164,8 +166,10 @@ void cav_transcription_move(const cav_transcription *transcription, const cav_tr
 /// Weight with which a term speaks at knot t: the step for an integral, 1 at a single knot, 0 outside its window. terms.c.
 double cav_term_weight(const cav_transcription *transcription, const cav_term *term, int t);
 
-/// Readings of a term (sensors only), whether it selects a dof, and value minus target over scale of a sensor at knot t.
+/// Readings of a term (sensors only) where it speaks, and at knot t: 0 where it does not; whether it selects a dof; and value
+/// minus target over scale of a sensor at knot t.
 int cav_term_dim(const cav_term *term);
+int cav_term_readings(const cav_transcription *transcription, const cav_term *term, int t);
 int cav_dof_selected(const cav_transcription *transcription, const cav_term *term, int dof);
 void cav_term_read(const cav_transcription *transcription, const cav_state *state, const cav_term *term, int t,
                    double *y);
