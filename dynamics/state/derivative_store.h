@@ -3,6 +3,8 @@
 #ifndef CAVORT_DERIVATIVE_STORE_H
 #define CAVORT_DERIVATIVE_STORE_H
 
+#include <stddef.h>
+
 /// Derivatives of one contact by unit twists (angular, linear) of link1 [0] and of link2 [1] at the contact's position,
 /// while all links keep their own velocities but for what turns with them.
 typedef struct cav_contact_jacobian {

@@ -13,11 +13,10 @@
 /// Starts from the impulses of the last solve on the same state, matched object by object. For midpoint and momentum the smooth
 /// forces are taken anew after each sweep. The exact law only: the smoothed one has no bounded dual; use
 /// cav_forward_newton.
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <assert.h>
 
 #include "algebra.h"
 #include "impulse.h"
