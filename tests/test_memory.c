@@ -35,6 +35,32 @@ static long calls;     // allocations so far
 static long live;      // pieces not yet freed
 static long left = -1; // allocations before the one that fails; negative: none does
 
+// sizes asked for, of the pieces made while a ledger is kept
+enum { LEDGER = 256 };
+static struct {
+  void *at;
+  size_t size;
+} ledger[LEDGER];
+static int entries, keeps_ledger;
+
+static void note_piece(void *at, size_t size) {
+  if (!at || !keeps_ledger) return;
+  if (entries == LEDGER) abort();
+  ledger[entries].at = at;
+  ledger[entries++].size = size;
+}
+
+static void strike_piece(const void *at) {
+  for (int i = 0; i < entries; i++)
+    if (ledger[i].at == at) ledger[i--] = ledger[--entries];
+}
+
+static size_t ledger_bytes(void) {
+  size_t sum = 0;
+  for (int i = 0; i < entries; i++) sum += ledger[i].size;
+  return sum;
+}
+
 static int fails(void) {
   calls++;
   if (left < 0 || left-- > 0) return 0;
@@ -42,22 +68,29 @@ static int fails(void) {
   return 1;
 }
 
-static void *counted(void *piece) {
+static void *counted(void *piece, size_t size) {
   live += piece != NULL;
+  note_piece(piece, size);
   return piece;
 }
 
-void *malloc(size_t size) { return fails() ? NULL : counted(__libc_malloc(size)); }
-void *calloc(size_t n, size_t size) { return fails() ? NULL : counted(__libc_calloc(n, size)); }
+void *malloc(size_t size) { return fails() ? NULL : counted(__libc_malloc(size), size); }
+void *calloc(size_t n, size_t size) { return fails() ? NULL : counted(__libc_calloc(n, size), n * size); }
 void *aligned_alloc(size_t alignment, size_t size) {
-  return fails() ? NULL : counted(__libc_memalign(alignment, size));
+  return fails() ? NULL : counted(__libc_memalign(alignment, size), size);
 }
 void *realloc(void *at, size_t size) {
   if (!at) return malloc(size);
-  return fails() ? NULL : __libc_realloc(at, size);
+  if (fails()) return NULL;
+  void *moved = __libc_realloc(at, size);
+  if (!moved) return NULL;
+  strike_piece(at);
+  note_piece(moved, size);
+  return moved;
 }
 void free(void *at) {
   live -= at != NULL;
+  strike_piece(at);
   __libc_free(at);
 }
 
@@ -180,6 +213,67 @@ static void test_hot(const char *path) {
     }
   }
   bed_free(&b);
+}
+
+// --- a state tells of all its memory ---
+
+static size_t told_bytes(const cav_state *state) {
+  size_t bytes[CAV_PARTS], sum = 0;
+  cav_state_bytes(state, bytes);
+  for (int k = 0; k < CAV_PARTS; k++) sum += bytes[k];
+  return sum;
+}
+
+// with contacts and rows felt from afar, so that there are many
+static void call_coupled(bed *b, const double *q, const double *v, const double *x) {
+  b->state->options.regulariser = CAV_REGULARISER_EXACT;
+  b->state->options.coupled = 1;
+  call_inverse(b, q, v, x);
+  call_forward(b, q, v, x);
+}
+
+/// The bytes that a state tells of are those it asked for: fresh, and after each of the functions that make room.
+static void test_account(const char *path) {
+  bed b;
+  bed_new(&b, path);
+  if (!b.model) return;
+  printf("%s: %d pairs\n", path, b.model->npair);
+  entries = 0, keeps_ledger = 1;
+  cav_state *state = cav_state_new(b.model);
+  CHECK(told_bytes(state) == ledger_bytes());
+  cav_state *own = b.state;
+  b.state = state;
+  for (size_t f = 0; f <= sizeof hot / sizeof *hot; f++) {
+    int last = f == sizeof hot / sizeof *hot;
+    size_t before = ledger_bytes();
+    for (int k = 0; k < POSES; k++)
+      (last ? call_coupled : hot[f].call)(&b, b.q + k * b.model->nq, b.v + k * b.model->nv, b.v_next + k * b.model->nv);
+    printf("%-9s %zu bytes more, %zu in all, %zu told\n", last ? "coupled" : hot[f].name, ledger_bytes() - before,
+           ledger_bytes(), told_bytes(state));
+    CHECK(told_bytes(state) == ledger_bytes());
+  }
+  // a control: derivatives have made room
+  CHECK(ledger_bytes() > 10000);
+  cav_state_free(state);
+  CHECK(entries == 0);
+  keeps_ledger = 0;
+  b.state = own;
+  bed_free(&b);
+}
+
+// so many pairs that a sweep prunes them
+static void test_account_of_many(void) {
+  static char text[16000] = "<mujoco><worldbody>", path[] = "/tmp/cavort-test-XXXXXX";
+  for (int i = 0; i < 50; i++)
+    snprintf(text + strlen(text), sizeof text - strlen(text),
+             "<body pos='%g %g 0'><joint axis='0 1 0'/><geom size='.1' pos='.2 0 0'/></body>", 0.21 * (i % 7),
+             0.21 * (i / 7));
+  snprintf(text + strlen(text), sizeof text - strlen(text), "</worldbody></mujoco>");
+  int file = mkstemp(path);
+  if (!CHECK(file >= 0 && write(file, text, strlen(text)) == (ssize_t)strlen(text))) return;
+  close(file);
+  test_account(path);
+  unlink(path);
 }
 
 // --- what a scene does not have holds no memory ---
@@ -392,6 +486,11 @@ int main(void) {
   test_hot(humanoid);
   test_hot(sensors);
   test_hot(features);
+  test_account(humanoid);
+  test_account(features);
+  test_account(sensors);
+  test_account(CAVORT_SOURCE_ROOT "/tests/fluid.xml");
+  test_account_of_many();
   test_absent();
   // libxml2 2.9 loses its input buffer where that cannot grow (xmlParserInputBufferCreateMem)
   fail_each("load", try_load, (void *)humanoid, 100000, 1);

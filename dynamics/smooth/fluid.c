@@ -119,7 +119,6 @@ cav_status cav_fluid_compile(const cav_model *model, cav_workspace *w) {
   w->floats = malloc((size_t)n * sizeof *w->floats);
   if (!w->floats) { return CAV_NO_MEMORY; }
   w->nfloat = list_floats(model, w->floats);
-  w->bytes[CAV_PART_MOTION] += (size_t)n * sizeof *w->floats;
   return CAV_OK;
 }
 

@@ -40,4 +40,7 @@ typedef struct cav_derivative_store {
 /// Releases it; NULL is fine. storage.c.
 void cav_derivative_store_free(cav_derivative_store *store);
 
+/// Bytes that it holds; NULL: none.
+size_t cav_derivative_store_bytes(const cav_derivative_store *store);
+
 #endif

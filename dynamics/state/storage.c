@@ -37,3 +37,7 @@ void cav_derivative_store_free(cav_derivative_store *derivatives) {
   free(derivatives->touched);
   free(derivatives);
 }
+
+size_t cav_derivative_store_bytes(const cav_derivative_store *store) {
+  return store ? store->bytes + (size_t)store->room * sizeof *store->contact : 0;
+}

@@ -237,6 +237,7 @@ cav_state *cav_state_new(const cav_model *model) {
   size_t laid = layout(model, block + head, state, work);
   assert(used == head && head + laid == bytes);
   (void)laid;
+  work->bytes[CAV_PART_HEAD] = head;
 
   // what this model needs
   state->model = model;
@@ -284,12 +285,12 @@ void cav_state_free(cav_state *state) {
 void cav_state_bytes(const cav_state *state, size_t bytes[CAV_PARTS]) {
   const cav_workspace *w = state->work;
   memcpy(bytes, w->bytes, sizeof w->bytes);
-  bytes[CAV_PART_HEAD] += sizeof(cav_state) + sizeof(cav_workspace);
   bytes[CAV_PART_ROWS] += (size_t)w->row_room * sizeof *state->row;
   bytes[CAV_PART_MOTION] += cav_fluid_bytes(w) + (w->half_steps ? w->half_steps->bytes : 0);
   bytes[CAV_PART_CONTACTS] += (size_t)w->contact_room * sizeof *state->contact + cav_geom_cache_bytes(w->geom);
   size_t nu = (size_t)state->model->nactuator;
   bytes[CAV_PART_ACTUATION] += w->gram ? 3 * nu * nu * sizeof(double) : 0;
   bytes[CAV_PART_SOLVERS] += w->solver_bytes + w->readout_room * sizeof(double);
-  bytes[CAV_PART_SOLVERS] += (size_t)w->memory_room * sizeof *w->memory;
+  bytes[CAV_PART_SOLVERS] += (size_t)w->memory_room * sizeof *w->memory + w->coupling_room * sizeof *w->coupling;
+  bytes[CAV_PART_SOLVERS] += cav_derivative_store_bytes(w->derivatives);
 }
