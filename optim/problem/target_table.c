@@ -62,7 +62,7 @@ static cav_status check_times(const cav_problem_reader *reader, const cav_xml_no
                               int time) {
   double before = -INFINITY, most = reader->problem->duration * (1 + near_knot);
   for (int i = 0; i < table->nrow; i++) {
-    double t = table->value[i * table->ncol + time];
+    double t = table->value[(size_t)i * (size_t)table->ncol + (size_t)time];
     if (t < 0 || t > most)
       return cav_xml_fail(reader->error, node, "file", "%s:%d: expected a time within the horizon, 0 .. %g s, got %g",
                           table->path, table->line[i], reader->problem->duration, t);
@@ -88,9 +88,9 @@ static cav_status take(const cav_problem_reader *reader, const cav_xml_node *nod
   if (!targets->time) return cav_problem_no_memory(reader);
   targets->value = targets->time + table->nrow;
   for (int i = 0; i < table->nrow; i++) {
-    const double *row = table->value + i * table->ncol;
+    const double *row = table->value + (size_t)i * (size_t)table->ncol;
     targets->time[i] = row[time];
-    for (int k = 0; k < count; k++) targets->value[i * count + k] = row[column[k]];
+    for (int k = 0; k < count; k++) targets->value[(size_t)i * (size_t)count + (size_t)k] = row[column[k]];
   }
   return CAV_OK;
 }

@@ -5,6 +5,7 @@
 /// (METHOD.md, 7: without it a walk becomes a hop). Left and right are those of mirror.c; the limbs are those that touch the world in
 /// the goal posture; of their hinges across the direction of travel the first swings, forwards as a sine, and the second
 /// bends while the limb comes forwards.
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -87,6 +88,7 @@ static int next_hinge(const walker *w, int after) {
 
 /// A swing of a joint and the opposite one of its image, half a period later.
 static void lay(const walker *w, int j, double amplitude, double frequency, double phase, cav_strategy *strategy) {
+  assert(strategy->nswing + 2 <= CAV_STRATEGY_SWINGS);
   strategy->swing[strategy->nswing++] = (cav_swing){j, amplitude, frequency, phase};
   strategy->swing[strategy->nswing++] =
       (cav_swing){w->image[j].joint, w->image[j].sign * amplitude, frequency, phase + M_PI};
@@ -133,6 +135,7 @@ static cav_status gait(const cav_problem *problem, cav_strategy *strategy) {
 }
 
 static void add(cav_strategy *strategy, int *n, const cav_strategy *from, const char *name, const char *text) {
+  assert(*n < CAV_STRATEGIES);
   strategy[*n] = *from;
   strategy[*n].name = name;
   strategy[*n].text = text;

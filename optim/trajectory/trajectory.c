@@ -31,7 +31,8 @@ cav_trajectory *cav_trajectory_new(const cav_model *model, int nknot, double tim
   trajectory->q = (double *)(trajectory + 1);
   trajectory->v = trajectory->q + nq;
   trajectory->u = trajectory->v + nv;
-  for (int t = 0; t < nknot; t++) memcpy(trajectory->q + t * model->nq, model->q0, (size_t)model->nq * sizeof(double));
+  for (int t = 0; t < nknot; t++)
+    memcpy(trajectory->q + (size_t)t * (size_t)model->nq, model->q0, (size_t)model->nq * sizeof(double));
   return trajectory;
 }
 
@@ -53,15 +54,16 @@ void cav_trajectory_free(cav_trajectory *trajectory) { free(trajectory); }
 
 void cav_trajectory_velocities(const cav_model *model, cav_trajectory *trajectory) {
   for (int t = 1; t < trajectory->nknot; t++) {
-    const double *q = trajectory->q + t * trajectory->nq;
-    cav_difference(model, q - trajectory->nq, q, trajectory->timestep, trajectory->v + t * trajectory->nv);
+    const double *q = trajectory->q + (size_t)t * (size_t)trajectory->nq;
+    cav_difference(model, q - trajectory->nq, q, trajectory->timestep,
+                   trajectory->v + (size_t)t * (size_t)trajectory->nv);
   }
 }
 
 // x := way from a knot to a fraction of the step after it, over the step: cubic from 0 to v_{t+1} with the derivatives of the knots
 static void along(const cav_trajectory *trajectory, int t, double fraction, double *x) {
   int nv = trajectory->nv;
-  const double *v = trajectory->v + (t + 1) * nv;
+  const double *v = trajectory->v + ((size_t)t + 1) * (size_t)nv;
   double s = fraction, left = s * (1 - s) * (1 - s), right = s * s * (s - 1), whole = s * s * (3 - 2 * s);
   for (int d = 0; d < nv; d++) {
     double from = 0.5 * (v[d - nv] + v[d]), to = t + 2 < trajectory->nknot ? 0.5 * (v[d] + v[d + nv]) : 2 * v[d] - from;
@@ -84,12 +86,12 @@ cav_trajectory *cav_trajectory_resample(const cav_model *model, const cav_trajec
     // the knot before, and the part of the step past it; the last knot ends the last step
     double at = fmin(t * timestep / h, trajectory->nknot - 1);
     int knot = (int)fmin(floor(at + uneven_most), trajectory->nknot - 2);
+    size_t from = (size_t)knot, to = (size_t)t;
     along(trajectory, knot, at - knot, x);
-    cav_integrate(model, trajectory->q + knot * trajectory->nq, x, h, finer->q + t * finer->nq);
-    const double *u = trajectory->u + knot * trajectory->nv;
-    for (int d = 0; d < model->nv; d++) {
-      finer->u[t * model->nv + d] = (1 - (at - knot)) * u[d] + (at - knot) * u[model->nv + d];
-    }
+    cav_integrate(model, trajectory->q + from * (size_t)trajectory->nq, x, h, finer->q + to * (size_t)finer->nq);
+    const double *u = trajectory->u + from * (size_t)trajectory->nv;
+    double *u_to = finer->u + to * (size_t)finer->nv;
+    for (int d = 0; d < model->nv; d++) { u_to[d] = (1 - (at - knot)) * u[d] + (at - knot) * u[model->nv + d]; }
   }
   memcpy(finer->v, trajectory->v, (size_t)finer->nv * sizeof(double));
   cav_trajectory_velocities(model, finer);
@@ -176,9 +178,9 @@ cav_status cav_trajectory_write(const char *path, const cav_model *model, const 
     fputc('\n', file.stream);
     for (int t = 0; t < trajectory->nknot; t++) {
       cav_table_write_number(file.stream, t * trajectory->timestep);
-      write_values(file.stream, trajectory->q + t * model->nq, model->nq);
-      write_values(file.stream, trajectory->v + t * model->nv, model->nv);
-      write_values(file.stream, trajectory->u + t * model->nv, model->nv);
+      write_values(file.stream, trajectory->q + (size_t)t * (size_t)model->nq, model->nq);
+      write_values(file.stream, trajectory->v + (size_t)t * (size_t)model->nv, model->nv);
+      write_values(file.stream, trajectory->u + (size_t)t * (size_t)model->nv, model->nv);
       fputc('\n', file.stream);
     }
     status = cav_file_end(&file, error);
@@ -282,10 +284,11 @@ static cav_trajectory *from_table(const cav_table *table, const cav_model *model
   }
   const int *source_q = source + 1, *source_v = source_q + model->nq, *source_u = source_v + model->nv;
   for (int t = 0; t < table->nrow; t++) {
-    double *q = trajectory->q + t * model->nq;
+    size_t at = (size_t)t * (size_t)model->nv;
+    double *q = trajectory->q + (size_t)t * (size_t)model->nq;
     if (model->nq) take(table, source_q, t, model->nq, q);
-    if (model->nv) take(table, source_v, t, model->nv, trajectory->v + t * model->nv);
-    if (model->nv) take(table, source_u, t, model->nv, trajectory->u + t * model->nv);
+    if (model->nv) take(table, source_v, t, model->nv, trajectory->v + at);
+    if (model->nv) take(table, source_u, t, model->nv, trajectory->u + at);
     if (check_quaternions(model, q, table, t, error)) {
       cav_trajectory_free(trajectory);
       return NULL;

@@ -10,6 +10,7 @@
 
 #include <assert.h>
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -218,6 +219,8 @@ cav_transcription *cav_transcription_new(const cav_problem *problem, int threads
   tr->nv = problem->model->nv;
   tr->h = problem->timestep;
   tr->nknot = (int)lround(problem->duration / problem->timestep) + 1;
+  // unknowns and entries of their rows are counted in int
+  if ((double)tr->nknot * tr->nv > INT_MAX / 4) goto memory;
   const double *g = problem->model->gravity;
   tr->weight = problem->model->mass * sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
   if (!(tr->weight > 0)) tr->weight = problem->model->mass > 0 ? problem->model->mass : 1;

@@ -247,8 +247,9 @@ static cav_status read_gains(const char *path, cav_result *result, cav_error *er
       status = cav_file_fail(error, CAV_BAD_INPUT, table->line[i], "%s:%d: expected knot %d, dof %d, got %g, %g", path,
                              table->line[i], i / nv, i % nv, row[0], row[2]);
     }
-    memcpy(result->gain_q + i * nv, row + 3, (size_t)nv * sizeof(double));
-    memcpy(result->gain_v + i * nv, row + 3 + nv, (size_t)nv * sizeof(double));
+    size_t at = (size_t)i * (size_t)nv;
+    memcpy(result->gain_q + at, row + 3, (size_t)nv * sizeof(double));
+    memcpy(result->gain_v + at, row + 3 + nv, (size_t)nv * sizeof(double));
   }
   cav_table_free(table);
   return status;
