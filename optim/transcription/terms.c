@@ -1,10 +1,6 @@
 /// What a term measures at a knot: its window, its dofs, its target, and the reading of a sensor against it. The sums over
-<<<<<<< HEAD
 /// dofs and contacts, which know derivatives, are in knot.c.
-=======
-/// dofs and contacts, which know derivatives, are in transcription.c.
 #include <assert.h>
->>>>>>> dc2a0cc (Rows of a knot are counted from the terms that speak there)
 #include <math.h>
 #include <string.h>
 
