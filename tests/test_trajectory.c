@@ -2,6 +2,7 @@
 #include "cavort/trajectory.h"
 
 #include <locale.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "check.h"
@@ -227,6 +228,18 @@ static void check_refusals(void) {
   cav_model_free(model);
 }
 
+// nobody writes into the pipe: whoever opens it to read waits for ever
+static void check_pipe(const cav_model *model) {
+  cav_error error = {0};
+  remove(csv_path);
+  CHECK(mkfifo(csv_path, 0600) == 0);
+  alarm(20);
+  cav_trajectory *none = cav_trajectory_read(csv_path, model, &error);
+  alarm(0);
+  CHECK(!none && error.status == CAV_BAD_INPUT && strstr(error.text, "not a file") != NULL);
+  remove(csv_path);
+}
+
 // numbers have a point in any locale that is there
 static void check_locale(const cav_model *model) {
   if (!setlocale(LC_ALL, "de_DE.UTF-8")) {
@@ -252,6 +265,7 @@ int main(void) {
     check_smooth(model);
     check_round_trip(model);
     check_partial(model);
+    check_pipe(model);
     check_locale(model);
   } else {
     fprintf(stderr, "%s\n", error.text);
