@@ -1,7 +1,8 @@
 #!/bin/sh
 # Every check of the project. Usage: sh tests/all.sh. Ends with one line, "N passed, N failed"; the exit status follows it.
 # Installs what is missing, then: both compilers with warnings as errors, the tests of each, the second build with address and
-# undefined-behaviour sanitizers; headers on their own as C and C++; layout of the text; installation and use through pkg-config.
+# undefined-behaviour sanitizers; headers on their own as C and C++; layout of the text; installation and use through pkg-config,
+# of the static and of the shared library.
 # CAVORT_BUILD names the folder of the builds, by default build-ci.
 set -u
 cd "$(dirname "$0")/.." || exit 1
@@ -74,11 +75,11 @@ headers() {
 
 layout() { find include dynamics optim problems tests -name '*.[ch]' -exec clang-format --dry-run -Werror {} +; }
 
-# installed into a folder of its own, then used by a program that knows nothing but pkg-config
+# installed NAME: a build installed into a folder of its own, then used by a program that knows nothing but pkg-config
 installed() {
-  root=$out/root
+  root=$out/root-$1
   rm -rf "$root"
-  DESTDIR=$root meson install -C "$out/gcc" --no-rebuild || return 1
+  DESTDIR=$root meson install -C "$out/$1" --no-rebuild || return 1
   folder=$(dirname "$(find "$root" -name cavort.pc)")
   prefix=$root$(sed -n 's/^prefix=//p' "$folder/cavort.pc")
   cat >"$out/user.c" <<'TEXT'
@@ -93,8 +94,10 @@ int main(void) {
 }
 TEXT
   flags=$(PKG_CONFIG_PATH=$folder pkg-config --define-variable=prefix="$prefix" --cflags --libs cavort) || return 1
-  gcc -std=c17 -Wall -Werror "$out/user.c" -o "$out/user" $flags && "$out/user" && "$prefix/bin/cavort" help || return 1
-  gcc -std=c17 -Wall -Wextra -Werror problems/example.c -o "$out/example" $flags && "$out/example"
+  # a shared library is found where it was installed to
+  run="env LD_LIBRARY_PATH=$(dirname "$folder")"
+  gcc -std=c17 -Wall -Werror "$out/user.c" -o "$out/user" $flags && $run "$out/user" && "$prefix/bin/cavort" help || return 1
+  gcc -std=c17 -Wall -Wextra -Werror problems/example.c -o "$out/example" $flags && $run "$out/example"
 }
 
 # the example of README.md is the file that was just built
@@ -112,7 +115,10 @@ if sh problems/install.sh test; then
     skipped=$((skipped + 1))
     echo "skipped  layout of the text: no clang-format here"
   fi
-  check "install, pkg-config, the example" installed
+  check "install, pkg-config, the example" installed gcc
+  check "shared library: build, gcc" build shared gcc --buildtype=release -Ddefault_library=shared &&
+    tests shared symbols tool &&
+    check "shared library: install, pkg-config, the example" installed shared
   check "the example as README.md has it" example
 else
   failed=1

@@ -103,10 +103,10 @@ typedef struct cav_state {
 } cav_state;
 
 /// A state for one thread; NULL if memory runs out.
-cav_state *cav_state_new(const cav_model *model);
+CAV_API cav_state *cav_state_new(const cav_model *model);
 
 /// Frees a state; NULL is fine.
-void cav_state_free(cav_state *state);
+CAV_API void cav_state_free(cav_state *state);
 
 /// Which part of the last evaluation is still valid: what cav_inverse_from may reuse.
 typedef enum cav_stage {
@@ -116,24 +116,24 @@ typedef enum cav_stage {
 } cav_stage;
 
 /// Poses, motion subspaces, tendon lengths, contacts and limits at q [nq]. Fails with CAV_NOT_FINITE or CAV_NO_MEMORY.
-cav_status cav_position(const cav_model *model, cav_state *state, const double *q);
+CAV_API cav_status cav_position(const cav_model *model, cav_state *state, const double *q);
 
 /// Generalised force that takes v to v_next in one step: u = RNE(q, v, a) + D a - p - (J' f)/h, a = (v_next - v)/h. Under
 /// the order momentum the change of momentum of whole trees stands for RNE in the rows of their root links.
 /// q [nq], v, v_next [nv] -> u [nv], N or N m. D = armature (+ h B for euler). Forms no matrix.
 /// Fails with CAV_NOT_FINITE, u untouched. Todorov 2014, eqs. (2), (19)-(22).
-cav_status cav_inverse(const cav_model *model, cav_state *state, const double *q, const double *v, const double *v_next,
-                       double *u);
+CAV_API cav_status cav_inverse(const cav_model *model, cav_state *state, const double *q, const double *v,
+                               const double *v_next, double *u);
 
 /// The same, reusing from the state's last evaluation what stage says is unchanged (MuJoCo's mj_inverseSkip).
-cav_status cav_inverse_from(const cav_model *model, cav_state *state, cav_stage unchanged, const double *q,
-                            const double *v, const double *v_next, double *u);
+CAV_API cav_status cav_inverse_from(const cav_model *model, cav_state *state, cav_stage unchanged, const double *q,
+                                    const double *v, const double *v_next, double *u);
 
 /// One step forward: v_next from u [nv], by Newton on the convex potential (9) in v_next, exact or smoothed law.
 /// Inverse of cav_inverse to 1e-9; starts from v.
 /// CAV_NOT_CONVERGED leaves the best iterate. The position afterwards is cav_integrate(q, v_next, timestep).
-cav_status cav_forward(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
-                       double *v_next);
+CAV_API cav_status cav_forward(const cav_model *model, cav_state *state, const double *q, const double *v,
+                               const double *u, double *v_next);
 
 /// What a forward solve did.
 typedef struct cav_forward_report {
@@ -145,20 +145,22 @@ typedef struct cav_forward_report {
 
 /// Forward step by generalised projected Gauss-Seidel on (9), exact law only. At most iterations sweeps, fewer when the
 /// largest change of an impulse, relative, falls below tolerance. report may be NULL. Paper, section IV.
-cav_status cav_forward_gpgs(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
-                            int iterations, double tolerance, double *v_next, cav_forward_report *report);
+CAV_API cav_status cav_forward_gpgs(const cav_model *model, cav_state *state, const double *q, const double *v,
+                                    const double *u, int iterations, double tolerance, double *v_next,
+                                    cav_forward_report *report);
 
 /// The same with equality constraints hard: R_E = 0, the limit that the soft ones approach as R_E does. Forward only, as
 /// it has no inverse: many u give one v_next. Rows may repeat or contradict each other; what cannot hold together holds in
 /// the least squares of the soft rows. residual of the report is the force missing from the balance, relative; the
 /// impulses that hold the constraints are left in state->equality constraint. Paper, section II C.
-cav_status cav_forward_hard(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
-                            int iterations, double tolerance, double *v_next, cav_forward_report *report);
+CAV_API cav_status cav_forward_hard(const cav_model *model, cav_state *state, const double *q, const double *v,
+                                    const double *u, int iterations, double tolerance, double *v_next,
+                                    cav_forward_report *report);
 
 /// cav_forward with tolerance (relative, on u), iteration limit and a report.
-cav_status cav_forward_newton(const cav_model *model, cav_state *state, const double *q, const double *v,
-                              const double *u, int iterations, double tolerance, double *v_next,
-                              cav_forward_report *report);
+CAV_API cav_status cav_forward_newton(const cav_model *model, cav_state *state, const double *q, const double *v,
+                                      const double *u, int iterations, double tolerance, double *v_next,
+                                      cav_forward_report *report);
 
 /// How derivatives are computed.
 typedef enum cav_derivative {
@@ -169,23 +171,24 @@ typedef enum cav_derivative {
 
 /// Derivatives of cav_inverse, nv x nv, row-major (du[i*nv+j] = du_i/dx_j); NULL = not needed. Positions are differentiated
 /// in the tangent: q (+) e_j. Staged one-sided differences with the default step; cav_inverse_jacobian_by chooses.
-cav_status cav_inverse_jacobian(const cav_model *model, cav_state *state, const double *q, const double *v,
-                                const double *v_next, double *du_dq, double *du_dv, double *du_dv_next);
+CAV_API cav_status cav_inverse_jacobian(const cav_model *model, cav_state *state, const double *q, const double *v,
+                                        const double *v_next, double *du_dq, double *du_dv, double *du_dv_next);
 
 /// The same by any method. CAV_DERIVATIVE_ANALYTIC fails as cav_derivatives does; nothing takes its place.
-cav_status cav_inverse_jacobian_by(const cav_model *model, cav_state *state, cav_derivative method, const double *q,
-                                   const double *v, const double *v_next, double *du_dq, double *du_dv,
-                                   double *du_dv_next);
+CAV_API cav_status cav_inverse_jacobian_by(const cav_model *model, cav_state *state, cav_derivative method,
+                                           const double *q, const double *v, const double *v_next, double *du_dq,
+                                           double *du_dv, double *du_dv_next);
 
 /// What part of a model has no analytic derivatives, in a few words; NULL if every part has.
-const char *cav_derivatives_missing(const cav_model *model);
+CAV_API const char *cav_derivatives_missing(const cav_model *model);
 
 /// Analytic derivatives of u at the state's last cav_inverse, as cav_inverse_jacobian gives them; NULL = not needed.
 /// CAV_BAD_INPUT if the state holds no evaluation under its present options; CAV_NOT_SUPPORTED if
 /// cav_derivatives_missing names something, under the options CAV_REGULARISER_EXACT and coupled, or if contact points of a
 /// pair come and go within 1e-5 of the posture.
 /// Outputs are undefined after a failure. At kinks of the exact law one element of the generalised derivative.
-cav_status cav_derivatives(const cav_model *model, cav_state *state, double *du_dq, double *du_dv, double *du_dv_next);
+CAV_API cav_status cav_derivatives(const cav_model *model, cav_state *state, double *du_dq, double *du_dv,
+                                   double *du_dv_next);
 
 /// Derivatives of one contact, rows by nv, row-major; NULL = not needed.
 typedef struct cav_contact_derivative {
@@ -197,13 +200,13 @@ typedef struct cav_contact_derivative {
 
 /// Derivatives of contact number contact of the state, after cav_derivatives and before the next evaluation
 /// (CAV_BAD_INPUT otherwise). Writes where out points.
-cav_status cav_contact_derivatives(const cav_model *model, const cav_state *state, int contact,
-                                   cav_contact_derivative *out);
+CAV_API cav_status cav_contact_derivatives(const cav_model *model, const cav_state *state, int contact,
+                                           cav_contact_derivative *out);
 
 /// Derivatives of cav_sensor_read at the same point, [sensor->dim*nv] each; NULL = not needed. Readings do not depend on v.
 /// CAV_BAD_INPUT as above, CAV_NOT_SUPPORTED for a type of sensor without derivative.
-cav_status cav_sensor_derivatives(const cav_model *model, const cav_state *state, const cav_sensor *sensor,
-                                  double *d_dq, double *d_dv_next);
+CAV_API cav_status cav_sensor_derivatives(const cav_model *model, const cav_state *state, const cav_sensor *sensor,
+                                          double *d_dq, double *d_dv_next);
 
 /// A function of (q, v, v_next) read off a state after cav_inverse has filled it: writes n values.
 /// base is the state at the unperturbed point, equal to state for the base call itself.
@@ -212,70 +215,72 @@ typedef void (*cav_readout)(const cav_model *model, const cav_state *state, void
 /// Staged finite differences of any readout of n values. step 0: chosen by coordinate scale.
 /// method is one of the two differences (CAV_BAD_INPUT otherwise). value [n] at the point; d_dq, d_dv, d_dv_next [n*nv] row-major, NULL = not needed. dynamics/METHOD.md, 7.
 /// A pass over v or v_next repeats no position work. The state is left at the point itself.
-cav_status cav_readout_differentiate(const cav_model *model, cav_state *state, cav_derivative method, double step,
-                                     const double *q, const double *v, const double *v_next, cav_readout readout,
-                                     void *context, int n, double *value, double *d_dq, double *d_dv,
-                                     double *d_dv_next);
+CAV_API cav_status cav_readout_differentiate(const cav_model *model, cav_state *state, cav_derivative method,
+                                             double step, const double *q, const double *v, const double *v_next,
+                                             cav_readout readout, void *context, int n, double *value, double *d_dq,
+                                             double *d_dv, double *d_dv_next);
 
 /// Inertia matrix M(q) with D, dense [nv*nv] row-major. q [nq].
-cav_status cav_inertia(const cav_model *model, cav_state *state, const double *q, double *M);
+CAV_API cav_status cav_inertia(const cav_model *model, cav_state *state, const double *q, double *M);
 
 /// Centre of mass of all that moves [3], its velocity [3] and the angular momentum about it [3], world, for the state's
 /// last position and the velocity v [nv]. Any output may be NULL.
-void cav_momentum(const cav_model *model, cav_state *state, const double *v, double *com, double *com_velocity,
-                  double *angular_momentum);
+CAV_API void cav_momentum(const cav_model *model, cav_state *state, const double *v, double *com, double *com_velocity,
+                          double *angular_momentum);
 
 /// Reading of a sensor at the state's last evaluation; out [sensor->dim]. Positions are there after cav_position; velocities
 /// (at v_next), accelerations and forces after cav_inverse or cav_forward, which leave them at (q, v, v_next).
-void cav_sensor_read(const cav_model *model, const cav_state *state, const cav_sensor *sensor, double *out);
+CAV_API void cav_sensor_read(const cav_model *model, const cav_state *state, const cav_sensor *sensor, double *out);
 
 /// Link that carries an object; the world's, 0, for kinds without a frame.
-int cav_object_link(const cav_model *model, cav_object_type type, int object);
+CAV_API int cav_object_link(const cav_model *model, cav_object_type type, int object);
 
 /// World pose of a named kind of object at the state's last position.
-void cav_object_pose(const cav_model *model, const cav_state *state, cav_object_type type, int object, cav_pose *pose);
+CAV_API void cav_object_pose(const cav_model *model, const cav_state *state, cav_object_type type, int object,
+                             cav_pose *pose);
 
 /// Force of each dof that actuators can give at the state's last position, for u [nv]: P u with P the orthogonal projector
 /// onto the range of the transmission. residual [nv] = u - P u, effort [nu] least-norm, limits not applied (a muscle only
 /// pulls). Any output may be NULL. Where all moments are constant, no position is needed.
-void cav_actuation(const cav_model *model, cav_state *state, const double *u, double *residual, double *effort);
+CAV_API void cav_actuation(const cav_model *model, cav_state *state, const double *u, double *residual, double *effort);
 
 /// Inputs that give efforts [nu] at the state's last position and the velocity v [nv]: controls, or activations of
 /// actuators that have one (what control brings them about is the caller's). input [nu] is the nearest within the limits;
 /// returns the number of actuators that cannot give their effort.
-int cav_actuation_inputs(const cav_model *model, cav_state *state, const double *v, const double *effort,
-                         double *input);
+CAV_API int cav_actuation_inputs(const cav_model *model, cav_state *state, const double *v, const double *effort,
+                                 double *input);
 
 /// Length of an actuator's transmission, m or rad times gear, at the state's last position, and its moments [nv] (NULL:
 /// not needed): u per unit of force, rate of length per unit of v. Uses scratch of the state.
-double cav_actuator_length(const cav_model *model, const cav_state *state, int actuator, double *moment);
+CAV_API double cav_actuator_length(const cav_model *model, const cav_state *state, int actuator, double *moment);
 
 /// Force of an actuator at a length, velocity and input (control or activation), limits applied. N or N m, before gear.
-double cav_actuator_force(const cav_model *model, int actuator, double length, double velocity, double input);
+CAV_API double cav_actuator_force(const cav_model *model, int actuator, double length, double velocity, double input);
 
 /// Input that gives a force; returns 1, or 0 where the limits (or a muscle that is too short) do not allow it: input is
 /// then the nearest.
-int cav_actuator_input(const cav_model *model, int actuator, double length, double velocity, double force,
-                       double *input);
+CAV_API int cav_actuator_input(const cav_model *model, int actuator, double length, double velocity, double force,
+                               double *input);
 
 /// Range of effort that an actuator's limits leave whatever its length and velocity are; infinite where they do not bound
 /// it. The limits of a servo's control bound no effort of their own.
-void cav_actuator_effort_range(const cav_model *model, int actuator, double range[2]);
+CAV_API void cav_actuator_effort_range(const cav_model *model, int actuator, double range[2]);
 
 /// The same law at another step: a discrete stabilisation keeps the fraction of a gap that it closes a second, and so its
 /// stiffness; deadbeat (time constant 0) where that is more than the whole gap in a step.
-cav_options cav_options_at_step(const cav_options *options, double timestep);
+CAV_API cav_options cav_options_at_step(const cav_options *options, double timestep);
 
 /// Softness of a row that acts as ODE's with that CFM (m/(N s), or rad/(N m s)) and ERP at that time step: J v_next =
 /// -(ERP/h) x - CFM F, exactly. weight is the diagonal of A that the row's R is scaled with (cav_pair.weight[0],
 /// cav_dof.inverse_weight, cav_tendon.inverse_weight, cav_equality.weight). CAV_BAD_INPUT if CFM is not between 1e-4 h and
 /// 1e4 h times the weight, where no impedance is used: softness is then untouched. Methods in softness.c.
-cav_status cav_softness_from_ode(double cfm, double erp, double timestep, double weight, cav_softness *softness);
+CAV_API cav_status cav_softness_from_ode(double cfm, double erp, double timestep, double weight,
+                                         cav_softness *softness);
 
 /// CFM and ERP of the spring and damper that a row amounts to under the state's options: alike where the step is short and
 /// inertia matters little, as a row also has a mass 1/R. CAV_BAD_INPUT if it has neither.
-cav_status cav_softness_to_ode(const cav_state *state, const cav_softness *softness, double weight, double *cfm,
-                               double *erp);
+CAV_API cav_status cav_softness_to_ode(const cav_state *state, const cav_softness *softness, double weight, double *cfm,
+                                       double *erp);
 
 #ifdef __cplusplus
 }

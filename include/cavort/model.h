@@ -400,10 +400,11 @@ typedef struct cav_options {
   cav_order order;
   cav_stabilisation stabilisation;
   cav_regulariser regulariser;
-  int coupled;           ///< 1: B and K dense, so that all rows together are critically damped; costs a factorisation
-  double softness;       ///< epsilon of CAV_STABILISATION_DISCRETE, > 0
-  double time_constant;  ///< kappa of CAV_STABILISATION_DISCRETE, s; 0: deadbeat
-  double smoothing;      ///< delta, m: distance at which the smoothed law is active; 0: the exact law (dynamics/METHOD.md, 3)
+  int coupled;          ///< 1: B and K dense, so that all rows together are critically damped; costs a factorisation
+  double softness;      ///< epsilon of CAV_STABILISATION_DISCRETE, > 0
+  double time_constant; ///< kappa of CAV_STABILISATION_DISCRETE, s; 0: deadbeat
+  double
+      smoothing; ///< delta, m: distance at which the smoothed law is active; 0: the exact law (dynamics/METHOD.md, 3)
   double smoothing_self; ///< delta between two links of one tree, m, used where smoothing > 0
   double
       self_stiffness; ///< fraction of their stiffness that contacts between two links of one tree get, (0, 1]; 1: the law
@@ -459,41 +460,41 @@ typedef struct cav_load_options {
   int floating; ///< 1: the root link of a URDF floats (joint "root"); 0: it stands in the world unless the file says otherwise
 } cav_load_options;
 
-cav_load_options cav_load_options_default(void);
+CAV_API cav_load_options cav_load_options_default(void);
 
 /// cav_model_load with options.
-cav_model *cav_model_load_with(const char *path, const cav_load_options *options, cav_error *error);
+CAV_API cav_model *cav_model_load_with(const char *path, const cav_load_options *options, cav_error *error);
 
 /// Loads an MJCF or URDF file, told apart by the root element, with its includes and assets. NULL on failure with the reason in error (may be NULL).
 /// What is understood but not used becomes a model->warning. The result is freed with cav_model_free.
-cav_model *cav_model_load(const char *path, cav_error *error);
+CAV_API cav_model *cav_model_load(const char *path, cav_error *error);
 
 /// Frees a model; NULL is fine. No state of it may be used afterwards.
-void cav_model_free(cav_model *model);
+CAV_API void cav_model_free(cav_model *model);
 
 /// Changes a model before any state of it exists: mass and inertia of link i times mass_scale[i] ([nlink], > 0; NULL: as they are),
 /// sliding friction of every contact (0: as it is); what the model derives from them follows. CAV_BAD_INPUT: a scale that is not
 /// positive, a negative friction, nothing changed; CAV_NO_MEMORY: do not use the model.
-cav_status cav_model_perturb(cav_model *model, const double *mass_scale, double friction);
+CAV_API cav_status cav_model_perturb(cav_model *model, const double *mass_scale, double friction);
 
 /// Index of the object of that kind and name, -1 if there is none. CAV_OBJECT_BODY and _XBODY both look up bodies.
-int cav_object_find(const cav_model *model, cav_object_type type, const char *name);
+CAV_API int cav_object_find(const cav_model *model, cav_object_type type, const char *name);
 
 /// Name, length and needs of a type of sensor; type < CAV_SENSOR_TYPES.
-const cav_sensor_rule *cav_sensor_rule_of(cav_sensor_type type);
+CAV_API const cav_sensor_rule *cav_sensor_rule_of(cav_sensor_type type);
 
 /// q [nq] := the configuration of the file (model->q0).
-void cav_configuration_reset(const cav_model *model, double *q);
+CAV_API void cav_configuration_reset(const cav_model *model, double *q);
 
 /// Scales every quaternion in q [nq] to unit length; a zero quaternion becomes the identity.
-void cav_configuration_normalise(const cav_model *model, double *q);
+CAV_API void cav_configuration_normalise(const cav_model *model, double *q);
 
 /// Moves q along v for a time h on the manifold: q_next = q (+) h v. q, q_next [nq], v [nv]; q_next may be q.
 /// Quaternions advance by the exponential in body axes. dynamics/METHOD.md, 1.
-void cav_integrate(const cav_model *model, const double *q, const double *v, double h, double *q_next);
+CAV_API void cav_integrate(const cav_model *model, const double *q, const double *v, double h, double *q_next);
 
 /// Velocity that takes q0 to q1 in time h: v = (q1 (-) q0)/h. q0, q1 [nq], v [nv]; inverse of cav_integrate.
-void cav_difference(const cav_model *model, const double *q0, const double *q1, double h, double *v);
+CAV_API void cav_difference(const cav_model *model, const double *q0, const double *q1, double h, double *v);
 
 #ifdef __cplusplus
 }

@@ -160,26 +160,27 @@ typedef struct cav_problem {
 } cav_problem;
 
 /// Weights, schedule and options that serve all motions; the caller sets duration, start, goal and terms. Owns nothing.
-cav_problem cav_problem_default(const cav_model *model);
+CAV_API cav_problem cav_problem_default(const cav_model *model);
 
 /// The running costs that serve all motions: effort, velocities, accelerations, posture, gap, slip, impact, overlap. Writes the first
 /// most of them to term (may be NULL if most is 0) and returns how many there are.
-int cav_problem_default_terms(cav_term *term, int most);
+CAV_API int cav_problem_default_terms(cav_term *term, int most);
 
 /// Reads a problem file and its model (model_path overrides the file's; NULL: as written). NULL on failure.
 /// The result and its model are freed by cav_problem_free.
-cav_problem *cav_problem_load(const char *path, const char *model_path, cav_error *error);
+CAV_API cav_problem *cav_problem_load(const char *path, const char *model_path, cav_error *error);
 
 /// Whether an option of Ipopt may be set and its value fits; CAV_BAD_INPUT with the reason in error (may be NULL).
-cav_status cav_ipopt_option_check(const cav_ipopt_option *option, cav_error *error);
+CAV_API cav_status cav_ipopt_option_check(const cav_ipopt_option *option, cav_error *error);
 
 /// Frees a problem that cav_problem_load gave, and its model; NULL is fine.
-void cav_problem_free(cav_problem *problem);
+CAV_API void cav_problem_free(cav_problem *problem);
 
 /// Writes a problem such that reading it gives the same: poses as numbers, every term spelt out. model_path is written as it
 /// stands (NULL: problem->model_path). Replaces the file atomically. CAV_BAD_INPUT: path cannot be written, or a term looks
 /// at a body, site or geom without a name.
-cav_status cav_problem_write(const char *path, const cav_problem *problem, const char *model_path, cav_error *error);
+CAV_API cav_status cav_problem_write(const char *path, const cav_problem *problem, const char *model_path,
+                                     cav_error *error);
 
 #ifdef __cplusplus
 }

@@ -47,7 +47,7 @@ typedef struct cav_solve_options {
   const cav_ipopt_option *ipopt;
 } cav_solve_options;
 
-cav_solve_options cav_solve_options_default(void);
+CAV_API cav_solve_options cav_solve_options_default(void);
 
 /// How a stage of a solve ended.
 typedef enum cav_outcome {
@@ -113,9 +113,9 @@ typedef struct cav_solution {
 
 /// Solves from the problem's guess, or from start if not NULL. CAV_NOT_CONVERGED and CAV_INTERRUPTED leave the best iterate in
 /// the solution; NULL in *solution only where error says so.
-cav_status cav_solve(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
-                     cav_solution **solution, cav_error *error);
-void cav_solution_free(cav_solution *solution);
+CAV_API cav_status cav_solve(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
+                             cav_solution **solution, cav_error *error);
+CAV_API void cav_solution_free(cav_solution *solution);
 
 enum { CAV_STRATEGIES = 8, CAV_STRATEGY_SWINGS = 4 };
 
@@ -132,16 +132,16 @@ typedef struct cav_strategy {
 
 /// Strategies for a problem, in the order in which they are worth trying; the first is the problem's own. CAV_NO_MEMORY, or what
 /// the dynamics says of the goal posture.
-cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[CAV_STRATEGIES], int *n);
+CAV_API cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[CAV_STRATEGIES], int *n);
 
 /// The problem by a strategy: borrows all else from the problem, and the swings from the strategy.
-void cav_strategy_apply(const cav_problem *problem, const cav_strategy *strategy, cav_problem *taken);
+CAV_API void cav_strategy_apply(const cav_problem *problem, const cav_strategy *strategy, cav_problem *taken);
 
 /// Solves by a strategy: cav_solve of what cav_strategy_apply gives, after one under the midpoint order where the strategy says so, whose
 /// iterations and seconds are counted but whose log is not kept.
-cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *strategy,
-                              const cav_solve_options *options, const cav_trajectory *start, cav_solution **solution,
-                              cav_error *error);
+CAV_API cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *strategy,
+                                      const cav_solve_options *options, const cav_trajectory *start,
+                                      cav_solution **solution, cav_error *error);
 
 /// m: a moment counts as a force at this distance where it is compared with the weight.
 #define CAV_MOMENT_ARM 0.3
@@ -186,11 +186,11 @@ typedef struct cav_verdict {
 } cav_verdict;
 
 /// What replay_same_step_seconds has to be, s: CAV_TOLERANCE_REPLAY, or the whole motion where that is shorter; less rounding.
-double cav_verdict_replay(const cav_verdict *verdict);
+CAV_API double cav_verdict_replay(const cav_verdict *verdict);
 
 /// Certifies a motion: q, v of the trajectory and the gains are used, all else is recomputed. contact is the law it claims.
-cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
-                      const double *gain_q, const double *gain_v, cav_verdict *verdict, cav_error *error);
+CAV_API cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
+                              const double *gain_q, const double *gain_v, cav_verdict *verdict, cav_error *error);
 
 /// Why a motion is as it is: one thing that is missed, or that pulls.
 typedef struct cav_reason {
@@ -215,8 +215,8 @@ typedef struct cav_explanation {
 
 /// Ranks what a motion misses and which constraints pull against each other, from the rows of its solution.
 /// CAV_BAD_INPUT: a row that is not of this problem; CAV_NO_MEMORY; CAV_NOT_FINITE.
-cav_status cav_explain(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
-                       int nrow, const cav_binding *row, cav_explanation *explanation, cav_error *error);
+CAV_API cav_status cav_explain(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
+                               int nrow, const cav_binding *row, cav_explanation *explanation, cav_error *error);
 
 #ifdef __cplusplus
 }

@@ -2,6 +2,13 @@
 #ifndef CAVORT_STATUS_H
 #define CAVORT_STATUS_H
 
+/// Marks what the shared library exports; everything else in it is hidden.
+#if defined __GNUC__
+#define CAV_API __attribute__((visibility("default")))
+#else
+#define CAV_API
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -26,10 +33,10 @@ typedef struct cav_error {
 } cav_error;
 
 /// One word or two for a status, never NULL.
-const char *cav_status_name(cav_status status);
+CAV_API const char *cav_status_name(cav_status status);
 
 /// Version of the library, "major.minor.patch".
-const char *cav_version(void);
+CAV_API const char *cav_version(void);
 
 #ifdef __cplusplus
 }

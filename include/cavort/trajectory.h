@@ -19,24 +19,25 @@ typedef struct cav_trajectory {
 } cav_trajectory;
 
 /// nknot copies of model->q0 at rest; NULL if memory runs out or nknot < 2.
-cav_trajectory *cav_trajectory_new(const cav_model *model, int nknot, double timestep);
-cav_trajectory *cav_trajectory_copy(const cav_trajectory *trajectory);
+CAV_API cav_trajectory *cav_trajectory_new(const cav_model *model, int nknot, double timestep);
+CAV_API cav_trajectory *cav_trajectory_copy(const cav_trajectory *trajectory);
 
 /// Frees a trajectory; NULL is fine.
-void cav_trajectory_free(cav_trajectory *trajectory);
+CAV_API void cav_trajectory_free(cav_trajectory *trajectory);
 
 /// v of knots 1 .. nknot-1 from q by differences; v of knot 0 stays.
-void cav_trajectory_velocities(const cav_model *model, cav_trajectory *trajectory);
+CAV_API void cav_trajectory_velocities(const cav_model *model, cav_trajectory *trajectory);
 
 /// The motion resampled at another step over the same duration. Through the knots, by cubics along the geodesics between
 /// them whose velocity at a knot is the mean of the steps before and after it; u is linear between knots.
-cav_trajectory *cav_trajectory_resample(const cav_model *model, const cav_trajectory *trajectory, double timestep);
+CAV_API cav_trajectory *cav_trajectory_resample(const cav_model *model, const cav_trajectory *trajectory,
+                                                double timestep);
 
 /// Reads and writes trajectory.csv: a header of named columns, then one row per knot: time, q in MuJoCo's layout, v, u.
 /// Writing replaces the file atomically.
-cav_status cav_trajectory_write(const char *path, const cav_model *model, const cav_trajectory *trajectory,
-                                cav_error *error);
-cav_trajectory *cav_trajectory_read(const char *path, const cav_model *model, cav_error *error);
+CAV_API cav_status cav_trajectory_write(const char *path, const cav_model *model, const cav_trajectory *trajectory,
+                                        cav_error *error);
+CAV_API cav_trajectory *cav_trajectory_read(const char *path, const cav_model *model, cav_error *error);
 
 #ifdef __cplusplus
 }
