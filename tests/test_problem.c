@@ -451,6 +451,23 @@ static void refuse_start(const char *element, const char *words) {
   refuse(text, 3, words);
 }
 
+// names of earlier versions: the error says what they are called now
+static void check_former_names(void) {
+  refuse(HEAD "<scene><remove body='shin'/>\n<leave body='shin'/></scene>\n" TAIL, 5,
+         "<leave>: is called <remove> now");
+  refuse_cost("<overlap weight='1'/>", "<overlap>: is called <self_penetration> now");
+  refuse(HEAD "<cycle\nturn='30'/>" TAIL, 4, "attribute 'turn': is called 'rotation' now");
+  refuse(HEAD "<guess turn='0 1 0'/>" TAIL, 4, "attribute 'turn': is called 'rotation' now");
+  refuse(HEAD "<schedule><first\nself_share='.5'/></schedule>" TAIL, 4, "'self_share': is called 'self_stiffness' now");
+  refuse(HEAD "<schedule>\n<last self_share='1'/></schedule>" TAIL, 5, "'self_share': is called 'self_stiffness' now");
+  refuse(HEAD "<contact guard='true'/>" TAIL, 4, "'guard': is called 'refsafe' now");
+  refuse(HEAD "<contact self_share='1'/>" TAIL, 4, "'self_share': is called 'self_stiffness' now");
+  // elsewhere the same words are no former names
+  refuse(HEAD "<overlap/>" TAIL, 4, "not known inside problem");
+  refuse(HEAD "<schedule turn='1'/>" TAIL, 4, "not known here");
+  refuse_cost("<gap weight='1' overlap='1'/>", "not known here");
+}
+
 static void check_broken_files(void) {
   refuse("<problem model='leg.xml'>\n<horizon duration='1'/>\n<start>\n</problem>", 4, "");
   refuse("<mujoco/>", 1, "mujoco");
@@ -638,6 +655,7 @@ int main(void) {
   check_constraints();
   check_round_trip();
   check_broken_files();
+  check_former_names();
   check_broken_scenes();
   check_broken_starts();
   check_broken_terms();

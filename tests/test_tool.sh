@@ -61,6 +61,12 @@ run 2 solve a.xml --threads
 says err "needs a value"
 run 2 solve a.xml --strategies 0
 says err "auto or a number from 1"
+run 2 solve a.xml --routes 1
+says err "cavort solve: --routes is called --strategies now"
+run 2 solve a.xml --routes=1
+says err "cavort solve: --routes is called --strategies now"
+run 2 study --methods own,routes
+says err "'routes' is called 'strategies' now"
 run 2 solve a.xml --colour
 says err "not an option"
 run 2 verify a.result --threads 2

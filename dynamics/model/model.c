@@ -14,7 +14,7 @@ cav_load_options cav_load_options_default(void) { return (cav_load_options){0}; 
 static cav_model *load(const char *path, const cav_load_options *options, const cav_xml_node *scene, cav_error *error) {
   static const cav_xml_element *const roots[] = {&cav_mjcf_root, &cav_urdf_root, NULL};
   if (error) *error = (cav_error){.status = CAV_OK};
-  cav_xml *xml = cav_xml_read(path, roots, error);
+  cav_xml *xml = cav_xml_read(path, roots, NULL, error);
   if (!xml) return NULL;
   if (scene && cav_xml_remove(xml, scene, error) != CAV_OK) {
     cav_xml_free(xml);

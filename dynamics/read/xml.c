@@ -67,6 +67,7 @@ typedef struct source {
 typedef struct reader {
   cav_xml *xml;
   const cav_xml_element *const *roots;
+  const cav_xml_former *former;
   cav_error *error;
   cav_status status; // of the first failure
   cav_xml_node *at;  // innermost open element that is kept
@@ -294,7 +295,20 @@ static void read_word(source *s, int line, const char *element, cav_xml_value *v
        near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
 }
 
+// what a child or an attribute is called now that was called name before; NULL if none was
+static const char *renamed(const source *s, const char *inside, const char *name, int attribute) {
+  for (const cav_xml_former *f = s->reader->former; f && f->inside; f++) {
+    if (f->attribute == attribute && !strcmp(f->inside, inside) && !strcmp(f->was, name)) return f->now;
+  }
+  return NULL;
+}
+
 static void unknown_attribute(source *s, int line, const cav_xml_element *rule, const char *name) {
+  const char *now = renamed(s, rule->name, name, 1);
+  if (now) {
+    fail(s, CAV_BAD_INPUT, line, rule->name, name, "is called '%s' now; rename it", now);
+    return;
+  }
   const cav_xml_attribute *a = rule->attribute;
   int n = 0;
   while (a && a[n].name) n++;
@@ -374,6 +388,11 @@ static int tag_line(const source *s) {
 
 static void unknown_element(source *s, int line, const cav_xml_element *parent, const cav_xml_element *const *allowed,
                             const char *name) {
+  const char *now = parent ? renamed(s, parent->name, name, 0) : NULL;
+  if (now) {
+    fail(s, CAV_BAD_INPUT, line, name, NULL, "is called <%s> now; rename it", now);
+    return;
+  }
   const char *names[120];
   int n = 0;
   for (; allowed && allowed[n] && n < 119; n++) names[n] = allowed[n]->name;
@@ -738,9 +757,10 @@ static void read_file(reader *r, const char *path, source *from, const cav_xml_n
   free(s.text);
 }
 
-cav_xml *cav_xml_read(const char *path, const cav_xml_element *const *roots, cav_error *error) {
+cav_xml *cav_xml_read(const char *path, const cav_xml_element *const *roots, const cav_xml_former *former,
+                      cav_error *error) {
   cav_xml *xml = calloc(1, sizeof *xml);
-  reader r = {.xml = xml, .roots = roots, .error = error};
+  reader r = {.xml = xml, .roots = roots, .former = former, .error = error};
   source none = {.reader = &r, .path = path};
   if (xml) xml->path = carve_text(xml, path, strlen(path));
   locale_t plain = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0);

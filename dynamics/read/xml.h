@@ -45,6 +45,13 @@ typedef struct cav_xml_element {
   int flags;
 } cav_xml_element;
 
+/// A name that files of earlier versions have: an error that meets it says what it is called now.
+typedef struct cav_xml_former {
+  const char *inside;    ///< element that holds the child or the attribute; NULL ends a table
+  const char *was, *now; ///< names, then and now
+  int attribute;         ///< 1: of an attribute, 0: of a child
+} cav_xml_former;
+
 /// One attribute as found, converted.
 typedef struct cav_xml_value {
   const cav_xml_attribute *rule;
@@ -68,9 +75,10 @@ typedef struct cav_xml_node {
 typedef struct cav_xml cav_xml;
 
 /// Reads a file whose root is one of roots (ends with NULL). Included files are sought relative to the folder of path, and
-/// may be included once. NULL on failure with the reason in error (may be NULL): CAV_BAD_INPUT or CAV_NO_MEMORY.
+/// may be included once. former: names that have changed, NULL: none. NULL on failure with the reason in error (may be NULL): CAV_BAD_INPUT or CAV_NO_MEMORY.
 /// Bounds: 32 MB a file, 128 MB in all, 200 elements deep; files must be regular ones.
-cav_xml *cav_xml_read(const char *path, const cav_xml_element *const *roots, cav_error *error);
+cav_xml *cav_xml_read(const char *path, const cav_xml_element *const *roots, const cav_xml_former *former,
+                      cav_error *error);
 
 /// Frees a tree; NULL is fine.
 void cav_xml_free(cav_xml *xml);

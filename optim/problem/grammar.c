@@ -218,4 +218,18 @@ const cav_xml_element cav_problem_element = {
     CHILDREN(&cav_scene_element, &horizon, &cycle, &start, &goal, &pose, &guess, &cost, &constraint, &limits, &schedule, &ipopt,
              &contact),
     0};
+
+// names of earlier versions
+#define FORMER_CHILD(inside, was, now) { inside, was, now, 0 }
+#define FORMER_ATTRIBUTE(inside, was, now) { inside, was, now, 1 }
+const cav_xml_former cav_problem_former[] = {
+    FORMER_CHILD("scene", "leave", "remove"),
+    FORMER_CHILD("cost", "overlap", "self_penetration"),
+    FORMER_ATTRIBUTE("cycle", "turn", "rotation"),
+    FORMER_ATTRIBUTE("guess", "turn", "rotation"),
+    FORMER_ATTRIBUTE("first", "self_share", "self_stiffness"),
+    FORMER_ATTRIBUTE("last", "self_share", "self_stiffness"),
+    FORMER_ATTRIBUTE("contact", "self_share", "self_stiffness"),
+    FORMER_ATTRIBUTE("contact", "guard", "refsafe"),
+    {NULL, NULL, NULL, 0}};
 // clang-format on

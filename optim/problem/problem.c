@@ -514,7 +514,7 @@ static cav_status read_problem(cav_problem_reader *reader, const char *model_pat
 
 cav_problem *cav_problem_load(const char *path, const char *model_path, cav_error *error) {
   static const cav_xml_element *const roots[] = {&cav_problem_element, NULL};
-  cav_xml *xml = cav_xml_read(path, roots, error);
+  cav_xml *xml = cav_xml_read(path, roots, cav_problem_former, error);
   if (!xml) return NULL;
   cav_problem_owner *owner = calloc(1, sizeof *owner);
   cav_status status;

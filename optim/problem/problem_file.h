@@ -31,6 +31,9 @@ typedef struct cav_problem_reader {
 /// The one root element: grammar.c.
 extern const cav_xml_element cav_problem_element;
 
+/// Elements and attributes that earlier versions called otherwise: grammar.c.
+extern const cav_xml_former cav_problem_former[];
+
 /// Words of the grammar, in the order of their enumerations; NULL at the end.
 extern const char *const cav_problem_orders[];
 extern const char *const cav_problem_closings[];

@@ -79,6 +79,9 @@ static cav_status add_all(study *s, cav_error *error) {
   return ok ? CAV_OK : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for the study");
 }
 
+// a method of earlier versions and what it is called now
+static const char *const former_method[2] = {"routes", "strategies"};
+
 // the methods of the list, one bit each; 0 and an error for a word that is none
 static int methods_of(const char *list, cav_error *error) {
   int methods = 0;
@@ -88,6 +91,10 @@ static int methods_of(const char *list, cav_error *error) {
     for (int k = 0; k < CAV_STUDY_METHODS; k++) {
       const char *name = cav_study_method_names[k];
       if (strlen(name) == n && !strncmp(name, word, n)) known = 1 << k;
+    }
+    if (!known && n == strlen(former_method[0]) && !strncmp(word, former_method[0], n)) {
+      cav_file_fail(error, CAV_BAD_INPUT, 0, "--methods: '%s' is called '%s' now", former_method[0], former_method[1]);
+      return 0;
     }
     if (!known) {
       cav_file_fail(error, CAV_BAD_INPUT, 0, "--methods: expected own, strategies, ipopt, limited or both, got '%.*s'",

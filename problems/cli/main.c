@@ -191,6 +191,19 @@ static int option_of(char *argument, char **value) {
   return -1;
 }
 
+// options of earlier versions and what they are called now
+static const char *const former_options[][2] = {{"--routes", "--strategies"}};
+
+// what an option of an earlier version is called now; NULL if it is none
+static const char *option_renamed(const char *argument) {
+  for (size_t i = 0; i < sizeof former_options / sizeof *former_options; i++) {
+    size_t n = strlen(former_options[i][0]);
+    if (!strncmp(argument, former_options[i][0], n) && (!argument[n] || argument[n] == '='))
+      return former_options[i][1];
+  }
+  return NULL;
+}
+
 // reads what follows the command's name; returns 0 after telling what is wrong
 static int read_line(const command *c, int argc, char **argv, cav_command_line *line) {
   for (int i = 0; i < argc; i++) {
@@ -211,8 +224,12 @@ static int read_line(const command *c, int argc, char **argv, cav_command_line *
     }
     int k = option_of(argv[i], &value);
     if (k < 0 || !(c->options & (int)options[k].option)) {
-      fprintf(stderr, "cavort %s: %s is not an option of this command; see cavort help %s\n", c->name, argv[i],
-              c->name);
+      const char *now = option_renamed(argv[i]);
+      if (now)
+        fprintf(stderr, "cavort %s: %.*s is called %s now\n", c->name, (int)strcspn(argv[i], "="), argv[i], now);
+      else
+        fprintf(stderr, "cavort %s: %s is not an option of this command; see cavort help %s\n", c->name, argv[i],
+                c->name);
       return 0;
     }
     if (options[k].value && !value && (i + 1 == argc || !*(value = argv[++i]))) {
