@@ -855,7 +855,8 @@ static void set_options(builder *b) {
   m->viscosity = o->viscosity;
   copy3(m->wind, o->wind);
   copy3(m->magnetic, o->magnetic);
-  m->options = (cav_options){.order = CAV_ORDER_EULER,
+  m->options = (cav_options){.timestep = o->timestep,
+                             .order = CAV_ORDER_EULER,
                              .stabilisation = CAV_STABILISATION_SOLREF,
                              .regulariser = CAV_REGULARISER_REFERENCE,
                              .softness = 1e-3,

@@ -5,6 +5,7 @@
 
 #include "cavort/model.h"
 #include "compile.h"
+#include "objects.h"
 #include "remove.h"
 #include "scene.h"
 #include "spec.h"
@@ -47,31 +48,41 @@ cav_model *cav_model_load_scene(const char *path, const cav_xml_node *scene, cav
 
 void cav_model_free(cav_model *model) { free(model); }
 
+const char *const *cav_object_names(const cav_model *model, cav_object_type type, int *n, size_t *stride) {
+  static const struct {
+    size_t array, count, size;
+  } kinds[] = {
+#define KIND(type, array, ...) \
+  [CAV_OBJECT_##type] = {offsetof(cav_model, array), offsetof(cav_model, n##array), sizeof *((cav_model *)0)->array},
+      CAV_OBJECTS(KIND)};
+  // every object starts with its name
+#define NAMED(type, array, ...) _Static_assert(offsetof(cav_##array, name) == 0, "an object starts with its name");
+  CAV_OBJECTS(NAMED)
+  const char *at = (const char *)model;
+  *n = *(const int *)(const void *)(at + kinds[type].count);
+  *stride = kinds[type].size;
+  return *n ? *(const char *const *const *)(const void *)(at + kinds[type].array) : NULL;
+}
+
 int cav_object_find(const cav_model *model, cav_object_type type, const char *name) {
-  switch (type) {
-    case CAV_OBJECT_BODY:
-    case CAV_OBJECT_XBODY:
-      return cav_name_find(model->body, model->nbody, sizeof *model->body, name);
-    case CAV_OBJECT_JOINT:
-      return cav_name_find(model->joint, model->njoint, sizeof *model->joint, name);
-    case CAV_OBJECT_GEOM:
-      return cav_name_find(model->geom, model->ngeom, sizeof *model->geom, name);
-    case CAV_OBJECT_SITE:
-      return cav_name_find(model->site, model->nsite, sizeof *model->site, name);
-    case CAV_OBJECT_TENDON:
-      return cav_name_find(model->tendon, model->ntendon, sizeof *model->tendon, name);
-    case CAV_OBJECT_ACTUATOR:
-      return cav_name_find(model->actuator, model->nactuator, sizeof *model->actuator, name);
-    case CAV_OBJECT_KEY:
-      return cav_name_find(model->key, model->nkey, sizeof *model->key, name);
-    case CAV_OBJECT_SENSOR:
-      return cav_name_find(model->sensor, model->nsensor, sizeof *model->sensor, name);
-    case CAV_OBJECT_EQUALITY:
-      return cav_name_find(model->equality, model->nequality, sizeof *model->equality, name);
-    case CAV_OBJECT_TYPES:
-      break;
-  }
-  return -1;
+  if ((unsigned)type >= CAV_OBJECT_TYPES) return -1;
+  int n;
+  size_t stride;
+  const char *const *names = cav_object_names(model, type, &n, &stride);
+  return cav_name_find(names, n, stride, name);
+}
+
+const char *cav_object_name(const cav_model *model, cav_object_type type, int object) {
+  int n;
+  size_t stride;
+  const char *names = (const char *)cav_object_names(model, type, &n, &stride);
+  return *(const char *const *)(const void *)(names + (size_t)object * stride);
+}
+
+const cav_object_kind *cav_object_kind_of(cav_object_type type) {
+#define WORDS(type, array, attribute, text) [CAV_OBJECT_##type] = {attribute, text},
+  static const cav_object_kind kinds[] = {CAV_OBJECTS(WORDS)};
+  return &kinds[type];
 }
 
 const char *cav_status_name(cav_status status) {

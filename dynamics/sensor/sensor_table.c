@@ -1,48 +1,16 @@
-/// The table of sensors: MJCF's names, lengths of readings, what they look at and which stage they read.
+/// The table of sensors, as CAV_SENSORS declares them.
 #include <assert.h>
 
 #include "cavort/model.h"
 
-static const cav_sensor_rule rules[CAV_SENSOR_TYPES] = {
-    [CAV_SENSOR_JOINTPOS] = {"jointpos", 1, CAV_TARGET_SCALAR_JOINT, CAV_READS_POSITION},
-    [CAV_SENSOR_JOINTVEL] = {"jointvel", 1, CAV_TARGET_SCALAR_JOINT, CAV_READS_VELOCITY},
-    [CAV_SENSOR_FRAMEPOS] = {"framepos", 3, CAV_TARGET_FRAME, CAV_READS_POSITION},
-    [CAV_SENSOR_FRAMEQUAT] = {"framequat", 4, CAV_TARGET_FRAME, CAV_READS_POSITION},
-    [CAV_SENSOR_FRAMEXAXIS] = {"framexaxis", 3, CAV_TARGET_FRAME, CAV_READS_POSITION},
-    [CAV_SENSOR_FRAMEYAXIS] = {"frameyaxis", 3, CAV_TARGET_FRAME, CAV_READS_POSITION},
-    [CAV_SENSOR_FRAMEZAXIS] = {"framezaxis", 3, CAV_TARGET_FRAME, CAV_READS_POSITION},
-    [CAV_SENSOR_FRAMELINVEL] = {"framelinvel", 3, CAV_TARGET_FRAME, CAV_READS_VELOCITY},
-    [CAV_SENSOR_FRAMEANGVEL] = {"frameangvel", 3, CAV_TARGET_FRAME, CAV_READS_VELOCITY},
-    [CAV_SENSOR_SUBTREECOM] = {"subtreecom", 3, CAV_TARGET_BODY, CAV_READS_POSITION},
-    [CAV_SENSOR_SUBTREELINVEL] = {"subtreelinvel", 3, CAV_TARGET_BODY, CAV_READS_VELOCITY},
-    [CAV_SENSOR_SUBTREEANGMOM] = {"subtreeangmom", 3, CAV_TARGET_BODY, CAV_READS_VELOCITY},
-    [CAV_SENSOR_TOUCH] = {"touch", 1, CAV_TARGET_SITE, CAV_READS_ACCELERATION},
-    [CAV_SENSOR_ACCELEROMETER] = {"accelerometer", 3, CAV_TARGET_SITE, CAV_READS_ACCELERATION},
-    [CAV_SENSOR_VELOCIMETER] = {"velocimeter", 3, CAV_TARGET_SITE, CAV_READS_VELOCITY},
-    [CAV_SENSOR_GYRO] = {"gyro", 3, CAV_TARGET_SITE, CAV_READS_VELOCITY},
-    [CAV_SENSOR_FORCE] = {"force", 3, CAV_TARGET_SITE, CAV_READS_ACCELERATION},
-    [CAV_SENSOR_TORQUE] = {"torque", 3, CAV_TARGET_SITE, CAV_READS_ACCELERATION},
-    [CAV_SENSOR_MAGNETOMETER] = {"magnetometer", 3, CAV_TARGET_SITE, CAV_READS_POSITION},
-    [CAV_SENSOR_RANGEFINDER] = {"rangefinder", 1, CAV_TARGET_SITE, CAV_READS_POSITION},
-    [CAV_SENSOR_TENDONPOS] = {"tendonpos", 1, CAV_TARGET_TENDON, CAV_READS_POSITION},
-    [CAV_SENSOR_TENDONVEL] = {"tendonvel", 1, CAV_TARGET_TENDON, CAV_READS_VELOCITY},
-    [CAV_SENSOR_ACTUATORPOS] = {"actuatorpos", 1, CAV_TARGET_ACTUATOR, CAV_READS_POSITION},
-    [CAV_SENSOR_ACTUATORVEL] = {"actuatorvel", 1, CAV_TARGET_ACTUATOR, CAV_READS_VELOCITY},
-    [CAV_SENSOR_ACTUATORFRC] = {"actuatorfrc", 1, CAV_TARGET_ACTUATOR, CAV_READS_ACCELERATION},
-    [CAV_SENSOR_BALLQUAT] = {"ballquat", 4, CAV_TARGET_BALL_JOINT, CAV_READS_POSITION},
-    [CAV_SENSOR_BALLANGVEL] = {"ballangvel", 3, CAV_TARGET_BALL_JOINT, CAV_READS_VELOCITY},
-    [CAV_SENSOR_JOINTLIMITPOS] = {"jointlimitpos", 1, CAV_TARGET_LIMITED_JOINT, CAV_READS_POSITION},
-    [CAV_SENSOR_JOINTLIMITVEL] = {"jointlimitvel", 1, CAV_TARGET_LIMITED_JOINT, CAV_READS_VELOCITY},
-    [CAV_SENSOR_JOINTLIMITFRC] = {"jointlimitfrc", 1, CAV_TARGET_LIMITED_JOINT, CAV_READS_ACCELERATION},
-    [CAV_SENSOR_TENDONLIMITPOS] = {"tendonlimitpos", 1, CAV_TARGET_LIMITED_TENDON, CAV_READS_POSITION},
-    [CAV_SENSOR_TENDONLIMITVEL] = {"tendonlimitvel", 1, CAV_TARGET_LIMITED_TENDON, CAV_READS_VELOCITY},
-    [CAV_SENSOR_TENDONLIMITFRC] = {"tendonlimitfrc", 1, CAV_TARGET_LIMITED_TENDON, CAV_READS_ACCELERATION},
-    [CAV_SENSOR_FRAMELINACC] = {"framelinacc", 3, CAV_TARGET_FRAME, CAV_READS_ACCELERATION},
-    [CAV_SENSOR_FRAMEANGACC] = {"frameangacc", 3, CAV_TARGET_FRAME, CAV_READS_ACCELERATION},
-    [CAV_SENSOR_CLOCK] = {"clock", 1, CAV_TARGET_NONE, CAV_READS_POSITION},
-};
+#define RULE(type, name, dim, target, stage, text) \
+  [CAV_SENSOR_##type] = {name, dim, CAV_TARGET_##target, CAV_READS_##stage, text},
+static const cav_sensor_rule rules[CAV_SENSOR_TYPES] = {CAV_SENSORS(RULE)};
+
+#define FITS(type, name, dim, ...) _Static_assert(dim >= 1 && dim <= CAV_SENSOR_DIM_MAX, "a reading has room: " name);
+CAV_SENSORS(FITS)
 
 const cav_sensor_rule *cav_sensor_rule_of(cav_sensor_type type) {
-  assert(type < CAV_SENSOR_TYPES && rules[type].name && rules[type].dim <= CAV_SENSOR_DIM_MAX);
+  assert(type < CAV_SENSOR_TYPES);
   return &rules[type];
 }

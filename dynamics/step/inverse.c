@@ -9,20 +9,13 @@
 /// What a stage may reuse depends on the options too: after a change of those that positions depend on, all is new.
 #include "half_step.h"
 #include "math3.h"
+#include "options.h"
 #include "step.h"
-
-// whether what cav_position computes is the same under both
-static int same_position_options(const cav_options *a, const cav_options *b) {
-  return a->timestep == b->timestep && a->stabilisation == b->stabilisation && a->regulariser == b->regulariser &&
-         a->softness == b->softness && a->time_constant == b->time_constant && a->smoothing == b->smoothing &&
-         a->smoothing_self == b->smoothing_self && a->self_stiffness == b->self_stiffness &&
-         a->impratio == b->impratio && a->coupled == b->coupled && a->refsafe == b->refsafe &&
-         a->contact == b->contact && a->constraint == b->constraint;
-}
 
 cav_status cav_position(const cav_model *model, cav_state *state, const double *q) {
   state->work->valid = CAV_STAGE_NONE;
   state->ncontact = state->nrow = state->nequality = 0;
+  if (!cav_options_valid(&state->options)) { return CAV_BAD_INPUT; }
   if (!all_finite(q, model->nq)) { return CAV_NOT_FINITE; }
   cav_kinematics(model, state, q);
   cav_stabilisation_prepare(state);
@@ -210,17 +203,18 @@ void cav_smooth_inverse(const cav_model *model, cav_state *state, const double *
 }
 
 int cav_state_evaluated(const cav_state *state) {
-  const cav_options *o = &state->options, *then = &state->work->options;
-  return state->work->valid == CAV_STAGE_VELOCITY && same_position_options(o, then) && o->order == then->order &&
-         o->gravity == then->gravity && o->passive == then->passive;
+  return state->work->valid == CAV_STAGE_VELOCITY &&
+         cav_options_same(&state->options, &state->work->options, CAV_STAGE_VELOCITY);
 }
 
 cav_status cav_inverse_from(const cav_model *model, cav_state *state, cav_stage unchanged, const double *q,
                             const double *v, const double *v_next, double *u) {
   cav_workspace *w = state->work;
   if (unchanged > w->valid) unchanged = w->valid;
-  if (unchanged != CAV_STAGE_NONE && !same_position_options(&state->options, &w->options)) unchanged = CAV_STAGE_NONE;
-  if (unchanged == CAV_STAGE_VELOCITY && state->options.order != w->options.order) unchanged = CAV_STAGE_POSITION;
+  if (!cav_options_valid(&state->options)) { return CAV_BAD_INPUT; }
+  if (!cav_options_same(&state->options, &w->options, CAV_STAGE_POSITION)) unchanged = CAV_STAGE_NONE;
+  if (!cav_options_same(&state->options, &w->options, CAV_STAGE_VELOCITY) && unchanged > CAV_STAGE_POSITION)
+    unchanged = CAV_STAGE_POSITION;
   if (unchanged == CAV_STAGE_NONE) {
     cav_status status = cav_position(model, state, q);
     if (status) { return status; }
@@ -237,9 +231,7 @@ cav_status cav_inverse_from(const cav_model *model, cav_state *state, cav_stage 
   // one number that is not finite anywhere above reaches u
   if (!all_finite(state->u, model->nv)) { return CAV_NOT_FINITE; }
   w->valid = CAV_STAGE_VELOCITY;
-  w->options.order = state->options.order;
-  w->options.gravity = state->options.gravity;
-  w->options.passive = state->options.passive;
+  w->options = state->options;
   copy(u, state->u, model->nv);
   return CAV_OK;
 }

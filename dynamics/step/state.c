@@ -242,7 +242,6 @@ cav_state *cav_state_new(const cav_model *model) {
   // what this model needs
   state->model = model;
   state->options = model->options;
-  if (!(state->options.timestep > 0)) state->options.timestep = model->timestep;
   state->work = work;
   compile_dofs(model, work);
   compile_frames(model, work);

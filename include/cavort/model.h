@@ -3,6 +3,7 @@
 #ifndef CAVORT_MODEL_H
 #define CAVORT_MODEL_H
 
+#include <float.h>
 #include <stddef.h>
 
 #include "cavort/status.h"
@@ -44,64 +45,77 @@ typedef enum cav_activation {
 typedef enum cav_gain { CAV_GAIN_FIXED, CAV_GAIN_AFFINE, CAV_GAIN_MUSCLE } cav_gain;
 typedef enum cav_bias { CAV_BIAS_NONE, CAV_BIAS_AFFINE, CAV_BIAS_MUSCLE } cav_bias;
 
-/// What a sensor measures: MJCF's names, shapes and conventions. Velocities are those at v_next; accelerations and forces
-/// are those of the step from v to v_next.
+/// What sensors measure, X(type, MJCF's name, length of a reading, what it looks at, last stage it needs, text): MJCF's names,
+/// shapes and conventions. Velocities are those at v_next; accelerations and forces are those of the step from v to v_next.
+/// The enumeration, the table of rules, the names in model and problem files and the help follow from it.
+// clang-format off
+#define CAV_SENSORS(X)                                                                                                     \
+  X(JOINTPOS, "jointpos", 1, SCALAR_JOINT, POSITION, "rad or m")                                                           \
+  X(JOINTVEL, "jointvel", 1, SCALAR_JOINT, VELOCITY, "rad/s or m/s")                                                       \
+  X(FRAMEPOS, "framepos", 3, FRAME, POSITION, "m, in the reference frame (default: the world), as all up to frameangvel")   \
+  X(FRAMEQUAT, "framequat", 4, FRAME, POSITION, "unit quaternion")                                                         \
+  X(FRAMEXAXIS, "framexaxis", 3, FRAME, POSITION, "unit vector")                                                           \
+  X(FRAMEYAXIS, "frameyaxis", 3, FRAME, POSITION, "unit vector")                                                           \
+  X(FRAMEZAXIS, "framezaxis", 3, FRAME, POSITION, "unit vector")                                                           \
+  X(FRAMELINVEL, "framelinvel", 3, FRAME, VELOCITY, "m/s")                                                                 \
+  X(FRAMEANGVEL, "frameangvel", 3, FRAME, VELOCITY, "rad/s")                                                               \
+  X(SUBTREECOM, "subtreecom", 3, BODY, POSITION, "m, world")                                                               \
+  X(SUBTREELINVEL, "subtreelinvel", 3, BODY, VELOCITY, "m/s, world")                                                       \
+  X(SUBTREEANGMOM, "subtreeangmom", 3, BODY, VELOCITY, "kg m^2/s about the subtree's centre of mass, world")                \
+  X(TOUCH, "touch", 1, SITE, ACCELERATION, "N, sum of normal forces on the site's body within the site or pointing out through it") \
+  X(ACCELEROMETER, "accelerometer", 3, SITE, ACCELERATION, "m/s^2, of the site, site axes, gravity included: 9.81 upwards at rest") \
+  X(VELOCIMETER, "velocimeter", 3, SITE, VELOCITY, "m/s, site axes")                                                       \
+  X(GYRO, "gyro", 3, SITE, VELOCITY, "rad/s, site axes")                                                                   \
+  X(FORCE, "force", 3, SITE, ACCELERATION, "N, that the parent of the site's body exerts on it, site axes")                 \
+  X(TORQUE, "torque", 3, SITE, ACCELERATION, "N m, likewise, about the site")                                              \
+  X(MAGNETOMETER, "magnetometer", 3, SITE, POSITION, "the model's magnetic field in site axes")                            \
+  X(RANGEFINDER, "rangefinder", 1, SITE, POSITION, "m, along the site's z axis to the nearest geom of another body that is not fully transparent; -1: nothing there") \
+  X(TENDONPOS, "tendonpos", 1, TENDON, POSITION, "m or rad")                                                               \
+  X(TENDONVEL, "tendonvel", 1, TENDON, VELOCITY, "m/s or rad/s")                                                           \
+  X(ACTUATORPOS, "actuatorpos", 1, ACTUATOR, POSITION, "length of the transmission, gear included")                        \
+  X(ACTUATORVEL, "actuatorvel", 1, ACTUATOR, VELOCITY, "its rate")                                                         \
+  X(ACTUATORFRC, "actuatorfrc", 1, ACTUATOR, ACCELERATION, "N or N m before gear: least-norm forces of all actuators that give u") \
+  X(BALLQUAT, "ballquat", 4, BALL_JOINT, POSITION, "unit quaternion")                                                      \
+  X(BALLANGVEL, "ballangvel", 3, BALL_JOINT, VELOCITY, "rad/s, body axes")                                                 \
+  X(JOINTLIMITPOS, "jointlimitpos", 1, LIMITED_JOINT, POSITION, "distance to the nearer limit minus margin; 0 where no limit acts, as the next five") \
+  X(JOINTLIMITVEL, "jointlimitvel", 1, LIMITED_JOINT, VELOCITY, "its rate")                                                \
+  X(JOINTLIMITFRC, "jointlimitfrc", 1, LIMITED_JOINT, ACCELERATION, "N or N m")                                            \
+  X(TENDONLIMITPOS, "tendonlimitpos", 1, LIMITED_TENDON, POSITION, "distance to the nearer limit minus margin")            \
+  X(TENDONLIMITVEL, "tendonlimitvel", 1, LIMITED_TENDON, VELOCITY, "its rate")                                             \
+  X(TENDONLIMITFRC, "tendonlimitfrc", 1, LIMITED_TENDON, ACCELERATION, "N")                                                \
+  X(FRAMELINACC, "framelinacc", 3, FRAME, ACCELERATION, "m/s^2, world axes, gravity included: 9.81 upwards at rest")        \
+  X(FRAMEANGACC, "frameangacc", 3, FRAME, ACCELERATION, "rad/s^2, world axes")                                             \
+  X(CLOCK, "clock", 1, NONE, POSITION, "s, state->time")
+// clang-format on
+
 typedef enum cav_sensor_type {
-  CAV_SENSOR_JOINTPOS,      ///< 1, rad or m
-  CAV_SENSOR_JOINTVEL,      ///< 1
-  CAV_SENSOR_FRAMEPOS,      ///< 3, m, in the reference frame (default: world), as the next six
-  CAV_SENSOR_FRAMEQUAT,     ///< 4, unit quaternion
-  CAV_SENSOR_FRAMEXAXIS,    ///< 3
-  CAV_SENSOR_FRAMEYAXIS,    ///< 3
-  CAV_SENSOR_FRAMEZAXIS,    ///< 3
-  CAV_SENSOR_FRAMELINVEL,   ///< 3, m/s
-  CAV_SENSOR_FRAMEANGVEL,   ///< 3, rad/s
-  CAV_SENSOR_SUBTREECOM,    ///< 3, m, world
-  CAV_SENSOR_SUBTREELINVEL, ///< 3, m/s, world
-  CAV_SENSOR_SUBTREEANGMOM, ///< 3, kg m^2/s about the subtree's centre of mass, world
-  CAV_SENSOR_TOUCH, ///< 1, N, sum of normal forces on the site's body within the site or pointing out through it
-  CAV_SENSOR_ACCELEROMETER,  ///< 3, m/s^2, of the site, site axes, gravity included: 9.81 upwards at rest
-  CAV_SENSOR_VELOCIMETER,    ///< 3, m/s, site axes
-  CAV_SENSOR_GYRO,           ///< 3, rad/s, site axes
-  CAV_SENSOR_FORCE,          ///< 3, N, that the parent of the site's body exerts on it, site axes
-  CAV_SENSOR_TORQUE,         ///< 3, N m, likewise, about the site
-  CAV_SENSOR_MAGNETOMETER,   ///< 3, the model's magnetic field in site axes
-  CAV_SENSOR_RANGEFINDER,    ///< 1, m, along the site's z axis to the nearest geom of another body that is not fully
-                             ///< transparent; -1: nothing there
-  CAV_SENSOR_TENDONPOS,      ///< 1, m or rad
-  CAV_SENSOR_TENDONVEL,      ///< 1
-  CAV_SENSOR_ACTUATORPOS,    ///< 1, length of the transmission, gear included
-  CAV_SENSOR_ACTUATORVEL,    ///< 1
-  CAV_SENSOR_ACTUATORFRC,    ///< 1, N or N m before gear: least-norm forces of all actuators that give u
-  CAV_SENSOR_BALLQUAT,       ///< 4, unit quaternion
-  CAV_SENSOR_BALLANGVEL,     ///< 3, rad/s, body axes
-  CAV_SENSOR_JOINTLIMITPOS,  ///< 1, distance to the nearer limit minus margin; 0 where no limit acts, as the next five
-  CAV_SENSOR_JOINTLIMITVEL,  ///< 1, its rate
-  CAV_SENSOR_JOINTLIMITFRC,  ///< 1, N or N m
-  CAV_SENSOR_TENDONLIMITPOS, ///< 1
-  CAV_SENSOR_TENDONLIMITVEL, ///< 1
-  CAV_SENSOR_TENDONLIMITFRC, ///< 1, N
-  CAV_SENSOR_FRAMELINACC,    ///< 3, m/s^2, world axes, gravity included: 9.81 upwards at rest
-  CAV_SENSOR_FRAMEANGACC,    ///< 3, rad/s^2, world axes
-  CAV_SENSOR_CLOCK,          ///< 1, s, state->time
-  CAV_SENSOR_TYPES
+#define CAV_SENSOR_MEMBER(type, ...) CAV_SENSOR_##type,
+  CAV_SENSORS(CAV_SENSOR_MEMBER)
+#undef CAV_SENSOR_MEMBER
+      CAV_SENSOR_TYPES
 } cav_sensor_type;
 
 enum { CAV_SENSOR_DIM_MAX = 4 }; ///< most numbers of a reading
 
-/// What a frame sensor or a term looks at.
+/// What a frame sensor or a term looks at, X(type, array of the model, attribute that names one in problem files, what to call
+/// it). BODY is the frame at a body's centre of mass (MJCF "body"), XBODY that of the body as written in the file (MJCF "xbody").
+#define CAV_OBJECTS(X)                          \
+  X(BODY, body, "body", "body")                 \
+  X(XBODY, body, "xbody", "body")               \
+  X(JOINT, joint, "joint", "joint")             \
+  X(GEOM, geom, "geom", "geom")                 \
+  X(SITE, site, "site", "site")                 \
+  X(TENDON, tendon, "tendon", "tendon")         \
+  X(ACTUATOR, actuator, "actuator", "actuator") \
+  X(KEY, key, "key", "keyframe")                \
+  X(SENSOR, sensor, "sensor", "sensor")         \
+  X(EQUALITY, equality, "equality", "equality constraint")
+
 typedef enum cav_object_type {
-  CAV_OBJECT_BODY,  ///< frame at the body's centre of mass (MJCF "body")
-  CAV_OBJECT_XBODY, ///< frame of the body as written in the file (MJCF "xbody")
-  CAV_OBJECT_JOINT,
-  CAV_OBJECT_GEOM,
-  CAV_OBJECT_SITE,
-  CAV_OBJECT_TENDON,
-  CAV_OBJECT_ACTUATOR,
-  CAV_OBJECT_KEY,
-  CAV_OBJECT_SENSOR,
-  CAV_OBJECT_EQUALITY,
-  CAV_OBJECT_TYPES
+#define CAV_OBJECT_MEMBER(type, ...) CAV_OBJECT_##type,
+  CAV_OBJECTS(CAV_OBJECT_MEMBER)
+#undef CAV_OBJECT_MEMBER
+      CAV_OBJECT_TYPES
 } cav_object_type;
 
 /// What a sensor may look at.
@@ -131,6 +145,7 @@ typedef struct cav_sensor_rule {
   int dim;          ///< length of a reading; 4: a unit quaternion
   cav_sensor_target target;
   cav_sensor_stage stage;
+  const char *text; ///< unit and meaning
 } cav_sensor_rule;
 
 /// Softness of one constraint as MJCF writes it; dynamics/METHOD.md, 4.
@@ -374,47 +389,85 @@ typedef struct cav_key {
   const double *v; ///< [nv]
 } cav_key;
 
+/// A member of a struct of options, as the table of that struct declares it: what may stand there.
+typedef enum cav_field_type { CAV_FIELD_REAL, CAV_FIELD_WHOLE, CAV_FIELD_FLAG, CAV_FIELD_WORD } cav_field_type;
+
+typedef struct cav_field {
+  const char *name; ///< of the member, and of its attribute in problem files
+  cav_field_type type;
+  size_t offset;            ///< of a double; of an int or an enumeration
+  double least, most;       ///< of numbers and words; least DBL_MIN: above 0
+  const char *const *words; ///< of a word, by enumerator; NULL at the end
+  const char *unit, *text;
+} cav_field;
+
 /// Which velocity the bias force c and the passive force p are evaluated at, or what takes their place; dynamics/METHOD.md, 2.
-typedef enum cav_order {
-  CAV_ORDER_EULER,    ///< at v; joint damping at v_next (implicit). The paper's step
-  CAV_ORDER_MIDPOINT, ///< at (v + v_next)/2, damping too; second order where it matters
-  /// as midpoint, but the rows of a root link balance the momentum of its tree half a step before and after: exact in flight
-  CAV_ORDER_MOMENTUM
-} cav_order;
+/// X(enumerator, word, text), as all lists of words.
+// clang-format off
+#define CAV_ORDERS(X)                                                                                              \
+  X(CAV_ORDER_EULER, "euler", "at v; joint damping at v_next (implicit). The paper's step")                        \
+  X(CAV_ORDER_MIDPOINT, "midpoint", "at (v + v_next)/2, damping too; second order where it matters")               \
+  X(CAV_ORDER_MOMENTUM, "momentum", "as midpoint, but the rows of a root link balance the momentum of its tree half a step before and after: exact in flight")
 
 /// How v* is made from a constraint's position error; dynamics/METHOD.md, 4.
-typedef enum cav_stabilisation {
-  CAV_STABILISATION_SOLREF, ///< eq. (28) from each constraint's solref and solimp, as MuJoCo does
-  CAV_STABILISATION_DISCRETE ///< critically damped discrete step with double pole exp(-h/time_constant), one softness for all
-} cav_stabilisation;
+#define CAV_STABILISATIONS(X)                                                                                      \
+  X(CAV_STABILISATION_SOLREF, "solref", "eq. (28) from each constraint's solref and solimp, as MuJoCo does")       \
+  X(CAV_STABILISATION_DISCRETE, "discrete", "critically damped discrete step with double pole exp(-h/time_constant), one softness for all")
 
 /// Diagonal of A that scales the regulariser R (27).
-typedef enum cav_regulariser {
-  CAV_REGULARISER_REFERENCE, ///< constants of the configuration q0: smooth in q, cheap, MuJoCo's
-  CAV_REGULARISER_EXACT      ///< of J M_hat^-1 J' at q, the paper's: factors the inertia in every evaluation
-} cav_regulariser;
+#define CAV_REGULARISERS(X)                                                                                        \
+  X(CAV_REGULARISER_REFERENCE, "reference", "constants of the configuration q0: smooth in q, cheap, MuJoCo's")     \
+  X(CAV_REGULARISER_EXACT, "exact", "of J M_hat^-1 J' at q, the paper's: factors the inertia in every evaluation")
 
-/// How constraints are evaluated. A state starts with the model's; change state->options between calls at will.
+/// How constraints are evaluated: REAL(stage, name, least, most, required, unit, text), WORD(stage, name, type, words, text) and
+/// FLAG(stage, name, text), which is 0 or 1. stage: the first stage of an evaluation that depends on it, which is not reused
+/// after a change. required: of a recorded law (<contact> of a problem file). The struct, the comparison, the checks, and
+/// reading, writing, grammar and help of <contact> follow from this list.
+#define CAV_OPTIONS(REAL, WORD, FLAG)                                                                              \
+  REAL(POSITION, timestep, DBL_MIN, DBL_MAX, 1, "s", "h: starts as the model's; every evaluation uses this one")   \
+  WORD(VELOCITY, order, cav_order, CAV_ORDERS, "velocity of the bias and passive forces")                          \
+  WORD(POSITION, stabilisation, cav_stabilisation, CAV_STABILISATIONS, "how v* follows from the position error")   \
+  WORD(POSITION, regulariser, cav_regulariser, CAV_REGULARISERS, "diagonal of A that scales R")                    \
+  REAL(POSITION, softness, DBL_MIN, DBL_MAX, 1, "", "epsilon of the discrete stabilisation")                       \
+  REAL(POSITION, time_constant, 0, DBL_MAX, 1, "s", "kappa of the discrete stabilisation; 0: deadbeat")            \
+  REAL(POSITION, smoothing, 0, DBL_MAX, 1, "m", "delta: distance at which the smoothed law is active; 0: the exact law (dynamics/METHOD.md, 3)") \
+  REAL(POSITION, smoothing_self, 0, DBL_MAX, 1, "m", "delta between two links of one tree, used where smoothing > 0") \
+  REAL(POSITION, self_stiffness, DBL_MIN, 1, 0, "", "fraction of their stiffness that contacts between two links of one tree get; 1: the law") \
+  REAL(POSITION, impratio, DBL_MIN, DBL_MAX, 1, "", "R_normal / R_friction")                                       \
+  FLAG(POSITION, coupled, "1: B and K dense, so that all rows together are critically damped; costs a factorisation") \
+  FLAG(POSITION, refsafe, "1: keep solref time constants >= 2 h")                                                  \
+  FLAG(POSITION, contact, "0: no contacts")                                                                        \
+  FLAG(POSITION, constraint, "0: no equality constraints, limits, friction loss or contacts")                      \
+  FLAG(VELOCITY, gravity, "0: none")                                                                               \
+  FLAG(VELOCITY, passive, "0: no springs and dampers")
+// clang-format on
+
+#define CAV_WORD_MEMBER(enumerator, word, text) enumerator,
+typedef enum cav_order { CAV_ORDERS(CAV_WORD_MEMBER) } cav_order;
+typedef enum cav_stabilisation { CAV_STABILISATIONS(CAV_WORD_MEMBER) } cav_stabilisation;
+typedef enum cav_regulariser { CAV_REGULARISERS(CAV_WORD_MEMBER) } cav_regulariser;
+#undef CAV_WORD_MEMBER
+
+/// A state starts with the model's; change state->options between calls at will.
 typedef struct cav_options {
-  double timestep; ///< h, s: starts as the model's; every evaluation uses this one
-  cav_order order;
-  cav_stabilisation stabilisation;
-  cav_regulariser regulariser;
-  int coupled;          ///< 1: B and K dense, so that all rows together are critically damped; costs a factorisation
-  double softness;      ///< epsilon of CAV_STABILISATION_DISCRETE, > 0
-  double time_constant; ///< kappa of CAV_STABILISATION_DISCRETE, s; 0: deadbeat
-  double
-      smoothing; ///< delta, m: distance at which the smoothed law is active; 0: the exact law (dynamics/METHOD.md, 3)
-  double smoothing_self; ///< delta between two links of one tree, m, used where smoothing > 0
-  double
-      self_stiffness; ///< fraction of their stiffness that contacts between two links of one tree get, (0, 1]; 1: the law
-  double impratio;    ///< R_normal / R_friction, > 0
-  int refsafe;        ///< 1: keep solref time constants >= 2 h
-  int contact;        ///< 0: no contacts
-  int constraint;     ///< 0: no equality constraints, limits, friction loss or contacts
-  int gravity;        ///< 0: none
-  int passive;        ///< 0: no springs and dampers
+#define CAV_REAL_MEMBER(stage, name, ...) double name;
+#define CAV_WORD_MEMBER(stage, name, type, ...) type name;
+#define CAV_FLAG_MEMBER(stage, name, text) int name;
+  CAV_OPTIONS(CAV_REAL_MEMBER, CAV_WORD_MEMBER, CAV_FLAG_MEMBER)
+#undef CAV_REAL_MEMBER
+#undef CAV_WORD_MEMBER
+#undef CAV_FLAG_MEMBER
 } cav_options;
+
+/// The table of cav_options; its length in *n.
+const cav_field *cav_option_fields(int *n);
+
+/// CAV_BAD_INPUT, with the member at fault and what it may be in error (may be NULL), if an option is outside the table.
+/// Evaluations refuse such options with the same status.
+cav_status cav_options_check(const cav_options *options, cav_error *error);
+
+/// The same of any struct by its table of n fields; what: how the text calls it.
+cav_status cav_fields_check(const cav_field *field, int n, const void *values, const char *what, cav_error *error);
 
 /// A compiled model. Built by cav_model_load; nothing but cav_model_perturb changes it, before any state of it exists.
 typedef struct cav_model {

@@ -97,17 +97,34 @@ typedef struct cav_guess_pose {
   const double *q; ///< [nq]
 } cav_guess_pose;
 
-/// One stage of the continuation (optim/METHOD.md, 5).
+/// Options of a stage of the continuation (optim/METHOD.md, 5): REAL(name, first, last, least, most, course, law, unit, text) and
+/// WHOLE(name, first, last, least, most, text), with the defaults of the first and the last stage.
+/// course: ALL goes from first to last over all stages, HALF over the first half of them, KEEP stays until the last stage, as
+/// whole numbers do. law: SAME is the option of that name of the contact law, STEPS too, in steps of the horizon, NONE is not.
+/// The struct, its defaults, interpolation and checks, and reading, writing, grammar and help of <first> and <last> in problem
+/// files follow from this list.
+// clang-format off
+#define CAV_STAGE_OPTIONS(REAL, WHOLE)                                                                             \
+  REAL(softness, 4, 0.005, DBL_MIN, DBL_MAX, ALL, SAME, "", "epsilon of the contacts")                             \
+  REAL(time_constant, 1, 0, 0, DBL_MAX, ALL, STEPS, "steps", "kappa of the contacts; 0: deadbeat")                 \
+  REAL(smoothing, 0.05, 0.0005, DBL_MIN, DBL_MAX, ALL, SAME, "m", "delta of the contacts")                         \
+  REAL(smoothing_self, 0.002, 0.001, DBL_MIN, DBL_MAX, ALL, SAME, "m", "delta between links of one tree and of limits (rad)") \
+  REAL(self_stiffness, 1e-3, 1, DBL_MIN, 1, ALL, SAME, "", "fraction of the stiffness of contacts between links of one tree; ends at 1") \
+  REAL(penalty, 1e3, 1e5, DBL_MIN, DBL_MAX, HALF, NONE, "", "weight of the unactuated force (fraction of weight, squared)") \
+  WHOLE(iterations, 30, 100, 1, INT_MAX, "at most")                                                                \
+  REAL(tolerance, 1e-3, 1e-5, DBL_MIN, 1, KEEP, NONE, "", "relative decrease below which, twice in a row, the stage ends")
+// clang-format on
+
 typedef struct cav_stage_options {
-  double softness;       ///< epsilon of the contacts
-  double time_constant;  ///< kappa, in steps of the horizon (0: deadbeat)
-  double smoothing;      ///< delta, m
-  double smoothing_self; ///< delta between links of one tree and of limits, m (rad)
-  double self_stiffness; ///< fraction of the stiffness of contacts between links of one tree, (0, 1]; ends at 1
-  double penalty;        ///< weight of the unactuated force (fraction of weight, squared)
-  int iterations;        ///< at most
-  double tolerance;      ///< relative decrease below which, twice in a row, the stage ends
+#define CAV_REAL_MEMBER(name, ...) double name;
+#define CAV_WHOLE_MEMBER(name, ...) int name;
+  CAV_STAGE_OPTIONS(CAV_REAL_MEMBER, CAV_WHOLE_MEMBER)
+#undef CAV_REAL_MEMBER
+#undef CAV_WHOLE_MEMBER
 } cav_stage_options;
+
+/// The table of cav_stage_options; its length in *n.
+const cav_field *cav_stage_fields(int *n);
 
 /// The schedule: stages go geometrically from first to last; the penalty reaches its end at half way.
 typedef struct cav_schedule {

@@ -5,8 +5,8 @@
 #include "scene.h"
 
 // by the enumerations of problem.h and model.h, NULL behind the last
-const char *const cav_problem_orders[] = {
-    [CAV_ORDER_EULER] = "euler", [CAV_ORDER_MIDPOINT] = "midpoint", [CAV_ORDER_MOMENTUM] = "momentum", NULL};
+#define WORD_TEXT(enumerator, word, text) [enumerator] = word,
+const char *const cav_problem_orders[] = {CAV_ORDERS(WORD_TEXT) NULL};
 const char *const cav_problem_closings[] = {"open", "rest", NULL};
 const char *const cav_problem_guesses[] = {[CAV_GUESS_HOLD] = "hold", [CAV_GUESS_INTERPOLATE] = "interpolate", NULL};
 const char *const cav_problem_quantities[CAV_QUANTITY_TYPES + 1] = {
@@ -26,48 +26,10 @@ const char *const cav_problem_dof_sets[] = {[CAV_DOFS_ALL] = "all",
                                             [CAV_DOFS_ROOT_ANGULAR] = "root_angular",
                                             [CAV_DOFS_JOINTS] = "joints",
                                             NULL};
-const char *const cav_problem_sensors[CAV_SENSOR_TYPES + 1] = {
-    [CAV_SENSOR_JOINTPOS] = "jointpos",
-    [CAV_SENSOR_JOINTVEL] = "jointvel",
-    [CAV_SENSOR_FRAMEPOS] = "framepos",
-    [CAV_SENSOR_FRAMEQUAT] = "framequat",
-    [CAV_SENSOR_FRAMEXAXIS] = "framexaxis",
-    [CAV_SENSOR_FRAMEYAXIS] = "frameyaxis",
-    [CAV_SENSOR_FRAMEZAXIS] = "framezaxis",
-    [CAV_SENSOR_FRAMELINVEL] = "framelinvel",
-    [CAV_SENSOR_FRAMEANGVEL] = "frameangvel",
-    [CAV_SENSOR_SUBTREECOM] = "subtreecom",
-    [CAV_SENSOR_SUBTREELINVEL] = "subtreelinvel",
-    [CAV_SENSOR_SUBTREEANGMOM] = "subtreeangmom",
-    [CAV_SENSOR_TOUCH] = "touch",
-    [CAV_SENSOR_ACCELEROMETER] = "accelerometer",
-    [CAV_SENSOR_VELOCIMETER] = "velocimeter",
-    [CAV_SENSOR_GYRO] = "gyro",
-    [CAV_SENSOR_FORCE] = "force",
-    [CAV_SENSOR_TORQUE] = "torque",
-    [CAV_SENSOR_MAGNETOMETER] = "magnetometer",
-    [CAV_SENSOR_RANGEFINDER] = "rangefinder",
-    [CAV_SENSOR_TENDONPOS] = "tendonpos",
-    [CAV_SENSOR_TENDONVEL] = "tendonvel",
-    [CAV_SENSOR_ACTUATORPOS] = "actuatorpos",
-    [CAV_SENSOR_ACTUATORVEL] = "actuatorvel",
-    [CAV_SENSOR_ACTUATORFRC] = "actuatorfrc",
-    [CAV_SENSOR_BALLQUAT] = "ballquat",
-    [CAV_SENSOR_BALLANGVEL] = "ballangvel",
-    [CAV_SENSOR_JOINTLIMITPOS] = "jointlimitpos",
-    [CAV_SENSOR_JOINTLIMITVEL] = "jointlimitvel",
-    [CAV_SENSOR_JOINTLIMITFRC] = "jointlimitfrc",
-    [CAV_SENSOR_TENDONLIMITPOS] = "tendonlimitpos",
-    [CAV_SENSOR_TENDONLIMITVEL] = "tendonlimitvel",
-    [CAV_SENSOR_TENDONLIMITFRC] = "tendonlimitfrc",
-    [CAV_SENSOR_FRAMELINACC] = "framelinacc",
-    [CAV_SENSOR_FRAMEANGACC] = "frameangacc",
-    [CAV_SENSOR_CLOCK] = "clock",
-};
-const char *const cav_problem_stabilisations[] = {
-    [CAV_STABILISATION_SOLREF] = "solref", [CAV_STABILISATION_DISCRETE] = "discrete", NULL};
-const char *const cav_problem_regularisers[] = {
-    [CAV_REGULARISER_REFERENCE] = "reference", [CAV_REGULARISER_EXACT] = "exact", NULL};
+#define SENSOR_NAME(type, name, ...) [CAV_SENSOR_##type] = name,
+const char *const cav_problem_sensors[CAV_SENSOR_TYPES + 1] = {CAV_SENSORS(SENSOR_NAME)};
+const char *const cav_problem_stabilisations[] = {CAV_STABILISATIONS(WORD_TEXT) NULL};
+const char *const cav_problem_regularisers[] = {CAV_REGULARISERS(WORD_TEXT) NULL};
 const char *const cav_problem_norms[] = {[CAV_NORM_SQUARE] = "square", [CAV_NORM_ABSOLUTE] = "absolute", NULL};
 const char *const cav_problem_mirrors[] = {
     [CAV_MIRROR_NONE] = "none", [CAV_MIRROR_X] = "x", [CAV_MIRROR_Y] = "y", NULL};
@@ -186,10 +148,9 @@ static const cav_xml_element guess = {
     "guess", 0, 1, ATTRIBUTES(WORD("type", cav_problem_guesses), REAL("apex", 0), REALS("rotation", 3, 3), TEXT("from", 0), TEXT("to", 0)),
     CHILDREN(&guess_waypoint, &swing), 0};
 static const cav_xml_element limits = {"limits", 0, 1, ATTRIBUTES(REAL("effort", 0), REAL("margin", 0)), NULL, 0};
-#define STAGE                                                                                                \
-  ATTRIBUTES(REAL("softness", 0), REAL("time_constant", 0), REAL("smoothing", 0), REAL("smoothing_self", 0), \
-             REAL("self_stiffness", 0), \
-             REAL("penalty", 0), WHOLE("iterations", 0), REAL("tolerance", 0))
+#define STAGE_REAL(name, ...) REAL(#name, 0),
+#define STAGE_WHOLE(name, ...) WHOLE(#name, 0),
+#define STAGE (const cav_xml_attribute[]) { CAV_STAGE_OPTIONS(STAGE_REAL, STAGE_WHOLE) END }
 static const cav_xml_element schedule_first = {"first", 0, 1, STAGE, NULL, 0};
 static const cav_xml_element schedule_last = {"last", 0, 1, STAGE, NULL, 0};
 static const cav_xml_element schedule = {
@@ -197,18 +158,11 @@ static const cav_xml_element schedule = {
 #define IPOPT(name, type, least, most, strict, words) TEXT(#name, 0),
 static const cav_xml_element ipopt = {
     "ipopt", 0, 1, (const cav_xml_attribute[]){CAV_IPOPT_OPTIONS(IPOPT) END}, NULL, 0};
+#define OPTION_REAL(stage, name, least, most, required, ...) REAL(#name, required),
+#define OPTION_WORD(stage, name, ...) WORD(#name, cav_problem_##name##s),
+#define OPTION_FLAG(stage, name, ...) FLAG(#name),
 static const cav_xml_element contact = {
-    "contact",
-    0,
-    1,
-    ATTRIBUTES(REAL("timestep", 1), WORD("order", cav_problem_orders),
-               WORD("stabilisation", cav_problem_stabilisations), WORD("regulariser", cav_problem_regularisers),
-               REAL("softness", 1), REAL("time_constant", 1), REAL("smoothing", 1), REAL("smoothing_self", 1),
-               REAL("self_stiffness", 0),
-               REAL("impratio", 1), FLAG("coupled"), FLAG("refsafe"), FLAG("contact"), FLAG("constraint"), FLAG("gravity"),
-               FLAG("passive")),
-    NULL,
-    0};
+    "contact", 0, 1, (const cav_xml_attribute[]){CAV_OPTIONS(OPTION_REAL, OPTION_WORD, OPTION_FLAG) END}, NULL, 0};
 
 const cav_xml_element cav_problem_element = {
     "problem",

@@ -8,12 +8,14 @@
 #include "cavort/problem.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "file.h"
 #include "ipopt_options.h"
+#include "objects.h"
 #include "problem_file.h"
 #include "scene.h"
 
@@ -49,22 +51,10 @@ int cav_problem_default_terms(cav_term *term, int most) {
 }
 
 // ends of the continuation
-static const cav_stage_options first_stage = {.softness = 4,
-                                              .time_constant = 1,
-                                              .smoothing = 0.05,
-                                              .smoothing_self = 0.002,
-                                              .self_stiffness = 1e-3,
-                                              .penalty = 1e3,
-                                              .iterations = 30,
-                                              .tolerance = 1e-3};
-static const cav_stage_options last_stage = {.softness = 0.005,
-                                             .time_constant = 0,
-                                             .smoothing = 0.0005,
-                                             .smoothing_self = 0.001,
-                                             .self_stiffness = 1,
-                                             .penalty = 1e5,
-                                             .iterations = 100,
-                                             .tolerance = 1e-5};
+#define FIRST(name, first, ...) .name = first,
+#define LAST(name, first, last, ...) .name = last,
+static const cav_stage_options first_stage = {CAV_STAGE_OPTIONS(FIRST, FIRST)};
+static const cav_stage_options last_stage = {CAV_STAGE_OPTIONS(LAST, LAST)};
 
 cav_problem cav_problem_default(const cav_model *model) {
   return (cav_problem){
@@ -120,32 +110,6 @@ cav_status cav_problem_no_memory(const cav_problem_reader *reader) {
   return cav_file_fail(reader->error, CAV_NO_MEMORY, 0, "%s: no memory for the problem", reader->path);
 }
 
-// the names of all objects of a kind: first, count, bytes between them; what to call one
-static const void *names_of(const cav_model *m, cav_object_type type, int *n, size_t *stride, const char **kind) {
-  switch (type) {
-    case CAV_OBJECT_BODY:
-    case CAV_OBJECT_XBODY:
-      return *kind = "body", *n = m->nbody, *stride = sizeof *m->body, m->body ? &m->body->name : NULL;
-    case CAV_OBJECT_JOINT:
-      return *kind = "joint", *n = m->njoint, *stride = sizeof *m->joint, m->joint ? &m->joint->name : NULL;
-    case CAV_OBJECT_GEOM:
-      return *kind = "geom", *n = m->ngeom, *stride = sizeof *m->geom, m->geom ? &m->geom->name : NULL;
-    case CAV_OBJECT_SITE:
-      return *kind = "site", *n = m->nsite, *stride = sizeof *m->site, m->site ? &m->site->name : NULL;
-    case CAV_OBJECT_TENDON:
-      return *kind = "tendon", *n = m->ntendon, *stride = sizeof *m->tendon, m->tendon ? &m->tendon->name : NULL;
-    case CAV_OBJECT_ACTUATOR:
-      return *kind = "actuator", *n = m->nactuator, *stride = sizeof *m->actuator,
-             m->actuator ? &m->actuator->name : NULL;
-    case CAV_OBJECT_KEY:
-      return *kind = "keyframe", *n = m->nkey, *stride = sizeof *m->key, m->key ? &m->key->name : NULL;
-    case CAV_OBJECT_SENSOR:
-      return *kind = "sensor", *n = m->nsensor, *stride = sizeof *m->sensor, m->sensor ? &m->sensor->name : NULL;
-    default:
-      return *kind = "object", *n = 0, *stride = 0, NULL;
-  }
-}
-
 int cav_problem_find(const cav_problem_reader *reader, const cav_xml_node *node, const char *attribute,
                      cav_object_type type) {
   const char *list = cav_xml_text(node, attribute, "");
@@ -163,8 +127,8 @@ int cav_problem_find(const cav_problem_reader *reader, const cav_xml_node *node,
   if (found < 0) {
     int n = 0;
     size_t stride = 0;
-    const char *kind;
-    const void *names = names_of(reader->model, type, &n, &stride, &kind);
+    const char *kind = cav_object_kind_of(type)->text;
+    const void *names = cav_object_names(reader->model, type, &n, &stride);
     copy[strcspn(copy, " |")] = 0;
     const char *near = n ? cav_xml_nearest(copy, names, n, stride) : NULL;
     cav_xml_fail(reader->error, node, attribute, "the model '%s' has no %s of that name, got '%.200s'%s%s%s",
@@ -174,28 +138,11 @@ int cav_problem_find(const cav_problem_reader *reader, const cav_xml_node *node,
   return found;
 }
 
-// a number that must satisfy a condition, in words
-static cav_status real(const cav_problem_reader *reader, const cav_xml_node *node, const char *name, double least,
-                       double most, double *value) {
-  if (!cav_xml_get(node, name)) return CAV_OK;
-  double given = cav_xml_real(node, name, 0);
-  if (given < least || given > most) {
-    if (most < DBL_MAX) {
-      return cav_xml_fail(reader->error, node, name, "expected a number from %g to %g, got '%s'", least, most,
-                          cav_xml_text(node, name, ""));
-    }
-    return cav_xml_fail(reader->error, node, name, "expected a number %s, got '%s'",
-                        least > 0 ? "above 0" : "of 0 or more", cav_xml_text(node, name, ""));
-  }
-  *value = given;
-  return CAV_OK;
-}
-
 static cav_status read_horizon(const cav_problem_reader *reader) {
   cav_problem *p = reader->problem;
   const cav_xml_node *node = cav_problem_child(reader->root, "horizon");
-  cav_status status = real(reader, node, "duration", DBL_MIN, DBL_MAX, &p->duration);
-  if (!status) status = real(reader, node, "timestep", DBL_MIN, DBL_MAX, &p->timestep);
+  cav_status status = cav_problem_real(reader, node, "duration", DBL_MIN, DBL_MAX, &p->duration);
+  if (!status) status = cav_problem_real(reader, node, "timestep", DBL_MIN, DBL_MAX, &p->timestep);
   if (status) return status;
   double steps = p->duration / p->timestep;
   if (!(steps >= 2 - whole_step && steps < most_knots)) {
@@ -208,7 +155,7 @@ static cav_status read_horizon(const cav_problem_reader *reader) {
                         round(steps) * p->timestep);
   }
   double range[2];
-  status = real(reader, node, "weight", 0, DBL_MAX, &p->duration_weight);
+  status = cav_problem_real(reader, node, "weight", 0, DBL_MAX, &p->duration_weight);
   if (status) return status;
   if (cav_xml_reals(node, "range", range, 2)) {
     if (!(range[0] > 0 && range[0] <= p->duration && p->duration <= range[1]))
@@ -358,7 +305,7 @@ static cav_status read_guess(const cav_problem_reader *reader) {
   int turned = rotation[0] != 0 || rotation[1] != 0 || rotation[2] != 0;
   cav_status status = read_guess_poses(reader, node);
   if (!status) status = read_swings(reader, node);
-  if (!status) status = real(reader, node, "apex", 0, DBL_MAX, &p->guess_height);
+  if (!status) status = cav_problem_real(reader, node, "apex", 0, DBL_MAX, &p->guess_height);
   if (!status) status = cav_problem_window(reader, node, &p->guess_from, &p->guess_to);
   if (status) return status;
   if (p->guess_to < 0) p->guess_to = p->duration;
@@ -372,23 +319,8 @@ static cav_status read_guess(const cav_problem_reader *reader) {
 static cav_status read_limits(const cav_problem_reader *reader) {
   const cav_xml_node *node = cav_problem_child(reader->root, "limits");
   if (!node) return CAV_OK;
-  cav_status status = real(reader, node, "effort", DBL_MIN, 1, &reader->problem->effort_limit);
-  return status ? status : real(reader, node, "margin", 0, DBL_MAX, &reader->problem->limit_margin);
-}
-
-static cav_status read_stage(const cav_problem_reader *reader, const cav_xml_node *node, cav_stage_options *stage) {
-  if (!node) return CAV_OK;
-  cav_status status = real(reader, node, "softness", DBL_MIN, DBL_MAX, &stage->softness);
-  if (!status) status = real(reader, node, "time_constant", 0, DBL_MAX, &stage->time_constant);
-  if (!status) status = real(reader, node, "smoothing", DBL_MIN, DBL_MAX, &stage->smoothing);
-  if (!status) status = real(reader, node, "smoothing_self", DBL_MIN, DBL_MAX, &stage->smoothing_self);
-  if (!status) status = real(reader, node, "self_stiffness", DBL_MIN, 1, &stage->self_stiffness);
-  if (!status) status = real(reader, node, "penalty", DBL_MIN, DBL_MAX, &stage->penalty);
-  if (!status) status = real(reader, node, "tolerance", DBL_MIN, 1, &stage->tolerance);
-  if (status) return status;
-  stage->iterations = cav_xml_int(node, "iterations", stage->iterations);
-  if (stage->iterations >= 1) return CAV_OK;
-  return cav_xml_fail(reader->error, node, "iterations", "expected at least 1, got %d", stage->iterations);
+  cav_status status = cav_problem_real(reader, node, "effort", DBL_MIN, 1, &reader->problem->effort_limit);
+  return status ? status : cav_problem_real(reader, node, "margin", 0, DBL_MAX, &reader->problem->limit_margin);
 }
 
 static cav_status read_schedule(const cav_problem_reader *reader) {
@@ -399,8 +331,10 @@ static cav_status read_schedule(const cav_problem_reader *reader) {
   if (schedule->stages < 1 || schedule->stages > 1000) {
     return cav_xml_fail(reader->error, node, "stages", "expected 1 to 1000, got %d", schedule->stages);
   }
-  cav_status status = read_stage(reader, cav_problem_child(node, "first"), &schedule->first);
-  return status ? status : read_stage(reader, cav_problem_child(node, "last"), &schedule->last);
+  int n;
+  const cav_field *field = cav_stage_fields(&n);
+  cav_status status = cav_problem_read_fields(reader, cav_problem_child(node, "first"), field, n, &schedule->first);
+  return status ? status : cav_problem_read_fields(reader, cav_problem_child(node, "last"), field, n, &schedule->last);
 }
 
 // Ipopt's options, checked where they stand
@@ -432,23 +366,10 @@ static cav_status read_contact(const cav_problem_reader *reader) {
   cav_options *o = &reader->problem->contact;
   *o = reader->model->options;
   if (!node) return CAV_OK;
-  cav_status status = real(reader, node, "timestep", DBL_MIN, DBL_MAX, &o->timestep);
-  if (!status) status = real(reader, node, "softness", DBL_MIN, DBL_MAX, &o->softness);
-  if (!status) status = real(reader, node, "time_constant", 0, DBL_MAX, &o->time_constant);
-  if (!status) status = real(reader, node, "smoothing", 0, DBL_MAX, &o->smoothing);
-  if (!status) status = real(reader, node, "smoothing_self", 0, DBL_MAX, &o->smoothing_self);
-  if (!status) status = real(reader, node, "self_stiffness", DBL_MIN, 1, &o->self_stiffness);
-  if (!status) status = real(reader, node, "impratio", DBL_MIN, DBL_MAX, &o->impratio);
+  int n;
+  const cav_field *field = cav_option_fields(&n);
+  cav_status status = cav_problem_read_fields(reader, node, field, n, o);
   if (status) return status;
-  o->order = (cav_order)cav_xml_word(node, "order", o->order);
-  o->stabilisation = (cav_stabilisation)cav_xml_word(node, "stabilisation", o->stabilisation);
-  o->regulariser = (cav_regulariser)cav_xml_word(node, "regulariser", o->regulariser);
-  o->coupled = cav_xml_bool(node, "coupled", o->coupled);
-  o->refsafe = cav_xml_bool(node, "refsafe", o->refsafe);
-  o->contact = cav_xml_bool(node, "contact", o->contact);
-  o->constraint = cav_xml_bool(node, "constraint", o->constraint);
-  o->gravity = cav_xml_bool(node, "gravity", o->gravity);
-  o->passive = cav_xml_bool(node, "passive", o->passive);
   // a free duration has found its own
   const cav_problem *p = reader->problem;
   if (p->duration_most == 0 && fabs(o->timestep - p->timestep) > whole_step * o->timestep) {

@@ -2,6 +2,8 @@
 #ifndef CAVORT_PROBLEM_FILE_H
 #define CAVORT_PROBLEM_FILE_H
 
+#include <stdio.h>
+
 #include "cavort/problem.h"
 #include "xml.h"
 
@@ -62,6 +64,18 @@ cav_status cav_problem_pose(const cav_problem_reader *reader, const cav_xml_node
 
 /// Configuration of the keyframe or <pose> that attribute 'key' of node names.
 cav_status cav_problem_key(const cav_problem_reader *reader, const cav_xml_node *node, double *q);
+
+/// A number from least (DBL_MIN: above 0) to most (DBL_MAX: any), left as it is where the file gives none. fields.c.
+cav_status cav_problem_real(const cav_problem_reader *reader, const cav_xml_node *node, const char *name, double least,
+                            double most, double *value);
+
+/// A struct by the table of its n fields, an attribute each; what the file does not give stays, all of it if node is NULL.
+/// fields.c.
+cav_status cav_problem_read_fields(const cav_problem_reader *reader, const cav_xml_node *node, const cav_field *field,
+                                   int n, void *values);
+
+/// Attributes that read back to the same bits. fields.c.
+void cav_problem_write_fields(FILE *out, const cav_field *field, int n, const void *values);
 
 /// Text of the children of a <scene>, as it is written; NULL without memory. write.c.
 char *cav_problem_scene(cav_problem_owner *owner, const cav_xml_node *scene);

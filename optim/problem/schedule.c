@@ -1,7 +1,20 @@
 /// The schedule as data: the stage, and the contact law of it, at any fraction of the way from the first to the last.
 #include "schedule.h"
 
+#include <float.h>
+#include <limits.h>
 #include <math.h>
+
+#define REAL_FIELD(name, first, last, least, most, course, law, unit, text) \
+  {#name, CAV_FIELD_REAL, offsetof(cav_stage_options, name), least, most, NULL, unit, text},
+#define WHOLE_FIELD(name, first, last, least, most, text) \
+  {#name, CAV_FIELD_WHOLE, offsetof(cav_stage_options, name), least, most, NULL, "", text},
+static const cav_field fields[] = {CAV_STAGE_OPTIONS(REAL_FIELD, WHOLE_FIELD)};
+
+const cav_field *cav_stage_fields(int *n) {
+  *n = sizeof fields / sizeof *fields;
+  return fields;
+}
 
 static double between(double from, double to, double s) {
   return from > 0 && to > 0 ? from * pow(to / from, s) : (1 - s) * from + s * to;
@@ -10,21 +23,21 @@ static double between(double from, double to, double s) {
 cav_stage_options cav_schedule_at(const cav_schedule *schedule, double x) {
   const cav_stage_options *a = &schedule->first, *b = &schedule->last;
   cav_stage_options stage = x < 1 ? *a : *b;
-  stage.softness = between(a->softness, b->softness, x);
-  stage.time_constant = between(a->time_constant, b->time_constant, x);
-  stage.smoothing = between(a->smoothing, b->smoothing, x);
-  stage.smoothing_self = between(a->smoothing_self, b->smoothing_self, x);
-  stage.self_stiffness = between(a->self_stiffness, b->self_stiffness, x);
-  stage.penalty = between(a->penalty, b->penalty, fmin(2 * x, 1));
+#define COURSE_ALL(name) stage.name = between(a->name, b->name, x);
+#define COURSE_HALF(name) stage.name = between(a->name, b->name, fmin(2 * x, 1));
+#define COURSE_KEEP(name)
+#define COURSE(name, first, last, least, most, course, ...) COURSE_##course(name)
+#define KEEP(...)
+  CAV_STAGE_OPTIONS(COURSE, KEEP)
   return stage;
 }
 
 void cav_stage_law(const cav_problem *problem, double x, double step, cav_options *law) {
   cav_stage_options stage = cav_schedule_at(&problem->schedule, x);
   law->stabilisation = CAV_STABILISATION_DISCRETE;
-  law->softness = stage.softness;
-  law->time_constant = stage.time_constant * step;
-  law->smoothing = stage.smoothing;
-  law->smoothing_self = stage.smoothing_self;
-  law->self_stiffness = stage.self_stiffness;
+#define LAW_SAME(name) law->name = stage.name;
+#define LAW_STEPS(name) law->name = stage.name * step;
+#define LAW_NONE(name)
+#define LAW(name, first, last, least, most, course, in, ...) LAW_##in(name)
+  CAV_STAGE_OPTIONS(LAW, KEEP)
 }

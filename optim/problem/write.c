@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "file.h"
+#include "objects.h"
 #include "problem_file.h"
 
 // text inside an attribute
@@ -46,33 +47,9 @@ static void write_numbers(FILE *out, const char *name, const double *value, int 
 
 // name of an object and of its kind, NULL if it has none
 static const char *object_name(const cav_model *m, cav_object_type type, int i, const char **kind) {
-  const char *name = NULL;
-  switch (type) {
-    case CAV_OBJECT_BODY:
-      *kind = "body", name = m->body[i].name;
-      break;
-    case CAV_OBJECT_XBODY:
-      *kind = "xbody", name = m->body[i].name;
-      break;
-    case CAV_OBJECT_GEOM:
-      *kind = "geom", name = m->geom[i].name;
-      break;
-    case CAV_OBJECT_SITE:
-      *kind = "site", name = m->site[i].name;
-      break;
-    case CAV_OBJECT_JOINT:
-      *kind = "joint", name = m->joint[i].name;
-      break;
-    case CAV_OBJECT_TENDON:
-      *kind = "tendon", name = m->tendon[i].name;
-      break;
-    case CAV_OBJECT_ACTUATOR:
-      *kind = "actuator", name = m->actuator[i].name;
-      break;
-    default:
-      break;
-  }
-  return name && *name ? name : NULL;
+  const char *name = cav_object_name(m, type, i);
+  *kind = cav_object_kind_of(type)->attribute;
+  return *name ? name : NULL;
 }
 
 // sensor by what it looks at, or by the model's name for it; 0 if it has neither
@@ -214,37 +191,18 @@ static int write_terms(FILE *out, const cav_problem *p) {
 }
 
 static void write_stage(FILE *out, const char *name, const cav_stage_options *stage) {
+  int n;
+  const cav_field *field = cav_stage_fields(&n);
   fprintf(out, "    <%s", name);
-  write_number(out, "softness", stage->softness);
-  write_number(out, "time_constant", stage->time_constant);
-  write_number(out, "smoothing", stage->smoothing);
-  write_number(out, "smoothing_self", stage->smoothing_self);
-  write_number(out, "self_stiffness", stage->self_stiffness);
-  write_number(out, "penalty", stage->penalty);
-  fprintf(out, " iterations=\"%d\"", stage->iterations);
-  write_number(out, "tolerance", stage->tolerance);
+  cav_problem_write_fields(out, field, n, stage);
   fputs("/>\n", out);
 }
 
 static void write_contact(FILE *out, const cav_options *o) {
-  static const char *const truth[] = {"false", "true"};
+  int n;
+  const cav_field *field = cav_option_fields(&n);
   fputs("  <contact", out);
-  write_number(out, "timestep", o->timestep);
-  write_text(out, "order", cav_problem_orders[o->order]);
-  write_text(out, "stabilisation", cav_problem_stabilisations[o->stabilisation]);
-  write_text(out, "regulariser", cav_problem_regularisers[o->regulariser]);
-  write_number(out, "softness", o->softness);
-  write_number(out, "time_constant", o->time_constant);
-  write_number(out, "smoothing", o->smoothing);
-  write_number(out, "smoothing_self", o->smoothing_self);
-  write_number(out, "self_stiffness", o->self_stiffness);
-  write_number(out, "impratio", o->impratio);
-  write_text(out, "coupled", truth[o->coupled != 0]);
-  write_text(out, "refsafe", truth[o->refsafe != 0]);
-  write_text(out, "contact", truth[o->contact != 0]);
-  write_text(out, "constraint", truth[o->constraint != 0]);
-  write_text(out, "gravity", truth[o->gravity != 0]);
-  write_text(out, "passive", truth[o->passive != 0]);
+  cav_problem_write_fields(out, field, n, o);
   fputs("/>\n", out);
 }
 

@@ -77,6 +77,11 @@ static cav_status check(const cav_problem *p, const cav_solve_options *o, const 
   if (o->threads < 1) return fail(error, CAV_BAD_INPUT, "threads must be at least 1");
   if (!(o->tolerance > 0)) return fail(error, CAV_BAD_INPUT, "tolerance must be positive");
   if (p->schedule.stages < 1) return fail(error, CAV_BAD_INPUT, "the schedule needs at least one stage");
+  int nfield;
+  const cav_field *field = cav_stage_fields(&nfield);
+  cav_status status = cav_fields_check(field, nfield, &p->schedule.first, "first stage of the schedule", error);
+  if (!status) status = cav_fields_check(field, nfield, &p->schedule.last, "last stage of the schedule", error);
+  if (status) return status;
   int nknot = (int)lround(p->duration / p->timestep) + 1;
   for (int i = 0; i < p->nterm; i++) {
     const cav_term *term = &p->term[i];

@@ -8,6 +8,7 @@
 
 #include "command.h"
 #include "file.h"
+#include "objects.h"
 #include "step.h"
 
 static const char *const geom_name[] = {"plane",    "sphere", "capsule", "ellipsoid",
@@ -267,31 +268,7 @@ static void print_quantity(const cav_problem *p, const cav_term *term) {
   if (term->body > 0) printf(" of body %s", m->body[term->body].name);
   if (term->norm == CAV_NORM_ABSOLUTE) printf(", absolute beyond %g", term->scale);
   if (term->quantity != CAV_QUANTITY_SENSOR) return;
-  int i = term->sensor.object;
-  const char *object = "";
-  switch (term->sensor.object_type) {
-    case CAV_OBJECT_BODY:
-    case CAV_OBJECT_XBODY:
-      object = m->body[i].name;
-      break;
-    case CAV_OBJECT_GEOM:
-      object = m->geom[i].name;
-      break;
-    case CAV_OBJECT_SITE:
-      object = m->site[i].name;
-      break;
-    case CAV_OBJECT_JOINT:
-      object = m->joint[i].name;
-      break;
-    case CAV_OBJECT_TENDON:
-      object = m->tendon[i].name;
-      break;
-    case CAV_OBJECT_ACTUATOR:
-      object = m->actuator[i].name;
-      break;
-    default:
-      break;
-  }
+  const char *object = cav_object_name(m, term->sensor.object_type, term->sensor.object);
   printf("%s of %s", cav_sensor_rule_of(term->sensor.type)->name, object);
   if (term->component >= 0 && term->sensor.dim > 1) printf(", %c", "xyz"[term->component]);
 }
@@ -360,6 +337,21 @@ static cav_status print_posture(const cav_problem *p, const char *name, const do
   return status;
 }
 
+// what goes from where to where
+static void print_stage_ends(const cav_stage_options *first, const cav_stage_options *last) {
+  int n;
+  const cav_field *field = cav_stage_fields(&n);
+  for (int i = 0; i < n; i++, field++) {
+    const char *a = (const char *)first + field->offset, *b = (const char *)last + field->offset;
+    int whole = field->type == CAV_FIELD_WHOLE;
+    printf("%s%s %g to %g%s%s", i ? ", " : "  ", field->name,
+           whole ? *(const int *)(const void *)a : *(const double *)(const void *)a,
+           whole ? *(const int *)(const void *)b : *(const double *)(const void *)b, *field->unit ? " " : "",
+           field->unit);
+  }
+  printf("\n\n");
+}
+
 static cav_status print_problem(const cav_problem *p, cav_error *error) {
   static const char *const order[] = {"euler", "midpoint", "momentum"};
   int knots = (int)lround(p->duration / p->timestep) + 1;
@@ -389,11 +381,7 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
   print_terms(p, 1);
   const cav_stage_options *a = &p->schedule.first, *b = &p->schedule.last;
   printf("schedule: %d stages, geometric\n", p->schedule.stages);
-  printf("  softness %g to %g, time constant %g to %g steps, smoothing %g to %g m (self %g to %g)\n", a->softness,
-         b->softness, a->time_constant, b->time_constant, a->smoothing, b->smoothing, a->smoothing_self,
-         b->smoothing_self);
-  printf("  penalty %g to %g, iterations %d to %d, tolerance %g to %g\n\n", a->penalty, b->penalty, a->iterations,
-         b->iterations, a->tolerance, b->tolerance);
+  print_stage_ends(a, b);
   return CAV_OK;
 }
 
