@@ -42,6 +42,16 @@ silent err
 run 0 help solve
 says out "--resume"
 run 0 solve --help
+run 0 help terms
+for word in sensor posture velocity acceleration effort gap slip impact self_penetration force; do says out "  $word "; done
+run 0 help schedule
+says out "self_stiffness"
+run 0 help contact
+says out "midpoint"
+run 0 help sensors
+says out "rangefinder"
+run 2 help nothing
+says err "no command or topic 'nothing'"
 run 0 --version
 check "a version" grep -qE '^cavort [0-9]+\.[0-9]+\.[0-9]+' out
 run 2

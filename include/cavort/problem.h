@@ -9,20 +9,50 @@
 extern "C" {
 #endif
 
-/// What a term measures at a knot.
+/// What a term measures at a knot, X(quantity, element of problem files, what it has values of, what it reads, hard, unit, in
+/// words, text). Values are of a SENSOR, of a POSTURE (a tangent, by dofs), of RATEs of dofs, of ACTUATORS or of CONTACTS; hard 1:
+/// a constraint can be of it, too. The enumeration, reading, writing, grammar and help of <cost> and <constraint> follow from it.
+// clang-format off
+#define CAV_QUANTITIES(X)                                                                                          \
+  X(SENSOR, sensor, SENSOR, POSITION, 1, "its own", "sensor", "reading of a sensor; quaternions as the rotation vector to the target") \
+  X(CONFIGURATION, posture, POSTURE, POSITION, 1, "rad or m", "posture", "q (-) target, tangent, of the selected dofs") \
+  X(VELOCITY, velocity, RATE, VELOCITY, 1, "rad/s or m/s", "velocity", "v_t of the selected dofs")                 \
+  X(ACCELERATION, acceleration, RATE, ACCELERATION, 1, "rad/s^2 or m/s^2", "acceleration", "(v_{t+1} - v_t)/h of the selected dofs") \
+  X(EFFORT, effort, ACTUATORS, ACCELERATION, 0, "of limits", "effort of actuators", "force of every actuator over its limit (force itself where there is none)") \
+  X(GAP, gap, CONTACTS, ACCELERATION, 0, "m", "gap of loaded contacts", "sqrt(f_n/weight) * max(gap, 0) of every contact: force only where there is touch") \
+  X(SLIP, slip, CONTACTS, ACCELERATION, 0, "m/s", "slip of loaded contacts", "sqrt(f_n/weight) * tangential velocity of every contact") \
+  X(IMPACT, impact, CONTACTS, ACCELERATION, 0, "m/s", "impact of loaded contacts", "sqrt(f_n/weight) * normal velocity of every contact") \
+  X(SELF_PENETRATION, self_penetration, CONTACTS, ACCELERATION, 0, "m", "self-penetration", "depth of every contact between two links of one tree") \
+  X(FORCE, force, CONTACTS, ACCELERATION, 0, "of weight", "force of contacts", "normal force of every contact between trees or with the world")
+// clang-format on
+
 typedef enum cav_quantity {
-  CAV_QUANTITY_SENSOR,        ///< reading of a sensor; quaternions as the rotation vector to the target
-  CAV_QUANTITY_CONFIGURATION, ///< q (-) target, tangent, nv values; by dofs if dof selection is given
-  CAV_QUANTITY_VELOCITY,      ///< v_t, nv values
-  CAV_QUANTITY_ACCELERATION,  ///< (v_{t+1} - v_t)/h, nv values
-  CAV_QUANTITY_EFFORT,        ///< actuator force over its limit (force itself where there is none), nu values
-  CAV_QUANTITY_GAP,           ///< sqrt(f_n/weight) * max(gap, 0) of every contact, m: force only where there is touch
-  CAV_QUANTITY_SLIP,          ///< sqrt(f_n/weight) * tangential velocity of every contact, m/s
-  CAV_QUANTITY_IMPACT,        ///< sqrt(f_n/weight) * normal velocity of every contact, m/s
-  CAV_QUANTITY_SELF_PENETRATION, ///< depth of every contact between two links of one tree, m
-  CAV_QUANTITY_FORCE, ///< normal force of every contact between trees or with the world, fraction of the weight
-  CAV_QUANTITY_TYPES
+#define CAV_QUANTITY_MEMBER(quantity, ...) CAV_QUANTITY_##quantity,
+  CAV_QUANTITIES(CAV_QUANTITY_MEMBER)
+#undef CAV_QUANTITY_MEMBER
+      CAV_QUANTITY_TYPES
 } cav_quantity;
+
+/// What a quantity has values of.
+typedef enum cav_values_of {
+  CAV_OF_SENSOR,    ///< term->sensor, or one component of it
+  CAV_OF_POSTURE,   ///< the dofs that a term selects, against a configuration
+  CAV_OF_RATE,      ///< the dofs that a term selects
+  CAV_OF_ACTUATORS, ///< all actuators
+  CAV_OF_CONTACTS   ///< the contacts of a knot, or those of term->body
+} cav_values_of;
+
+/// What holds for all terms of a quantity.
+typedef struct cav_quantity_rule {
+  const char *name; ///< its element in problem files
+  cav_values_of of;
+  cav_sensor_stage reads; ///< of sensors: what cav_sensor_rule_of tells
+  int hard;               ///< 1: a constraint can be of it, too
+  const char *unit, *words, *text;
+} cav_quantity_rule;
+
+/// quantity < CAV_QUANTITY_TYPES.
+const cav_quantity_rule *cav_quantity_rule_of(cav_quantity quantity);
 
 /// What a cost makes of a residual x, value minus target over scale.
 typedef enum cav_norm {

@@ -243,8 +243,8 @@ static void tell_term(const cav_problem *p, const cav_binding *row, char *out, s
     of[0] = ',', of[1] = ' ';
     tell_dof(p->model, row->component, of + 2, sizeof of - 2);
   }
-  const char *kind = term->quantity == CAV_QUANTITY_SENSOR ? cav_problem_sensors[term->sensor.type]
-                                                           : cav_problem_quantities[term->quantity];
+  const char *kind = term->quantity == CAV_QUANTITY_SENSOR ? cav_sensor_rule_of(term->sensor.type)->name
+                                                           : cav_quantity_rule_of(term->quantity)->name;
   snprintf(out, size, "constraint '%.60s', %s%s%s%s", term_name(p, row->object, name), kind, of, *which ? ", " : "",
            which);
 }

@@ -9,25 +9,13 @@
 const char *const cav_problem_orders[] = {CAV_ORDERS(WORD_TEXT) NULL};
 const char *const cav_problem_closings[] = {"open", "rest", NULL};
 const char *const cav_problem_guesses[] = {[CAV_GUESS_HOLD] = "hold", [CAV_GUESS_INTERPOLATE] = "interpolate", NULL};
-const char *const cav_problem_quantities[CAV_QUANTITY_TYPES + 1] = {
-    [CAV_QUANTITY_SENSOR] = "sensor",
-    [CAV_QUANTITY_CONFIGURATION] = "posture",
-    [CAV_QUANTITY_VELOCITY] = "velocity",
-    [CAV_QUANTITY_ACCELERATION] = "acceleration",
-    [CAV_QUANTITY_EFFORT] = "effort",
-    [CAV_QUANTITY_GAP] = "gap",
-    [CAV_QUANTITY_SLIP] = "slip",
-    [CAV_QUANTITY_IMPACT] = "impact",
-    [CAV_QUANTITY_SELF_PENETRATION] = "self_penetration",
-    [CAV_QUANTITY_FORCE] = "force",
-};
 const char *const cav_problem_dof_sets[] = {[CAV_DOFS_ALL] = "all",
                                             [CAV_DOFS_ROOT_LINEAR] = "root_linear",
                                             [CAV_DOFS_ROOT_ANGULAR] = "root_angular",
                                             [CAV_DOFS_JOINTS] = "joints",
                                             NULL};
 #define SENSOR_NAME(type, name, ...) [CAV_SENSOR_##type] = name,
-const char *const cav_problem_sensors[CAV_SENSOR_TYPES + 1] = {CAV_SENSORS(SENSOR_NAME)};
+static const char *const sensors[CAV_SENSOR_TYPES + 1] = {CAV_SENSORS(SENSOR_NAME)};
 const char *const cav_problem_stabilisations[] = {CAV_STABILISATIONS(WORD_TEXT) NULL};
 const char *const cav_problem_regularisers[] = {CAV_REGULARISERS(WORD_TEXT) NULL};
 const char *const cav_problem_norms[] = {[CAV_NORM_SQUARE] = "square", [CAV_NORM_ABSOLUTE] = "absolute", NULL};
@@ -79,10 +67,10 @@ static const cav_xml_element pose = {
 #define TABLE TEXT("file", 0), TEXT("columns", 0)
 #define WINDOW TEXT("name", 0), TEXT("from", 0), TEXT("to", 0), TEXT("at", 0), REAL("scale", 0)
 #define DOFS WORD("dofs", cav_problem_dof_sets), TEXT("joint", 0)
-#define RATE DOFS, TABLE, REALS("target", 1, 0)
-#define POSTURE DOFS, TABLE, TEXT("key", 0), REALS("qpos", 1, 0)
-#define SENSOR                                                                                                \
-  WORD("type", cav_problem_sensors), TEXT("body", 0), TEXT("xbody", 0), TEXT("geom", 0), TEXT("site", 0),     \
+#define RATE_ATTRIBUTES DOFS, TABLE, REALS("target", 1, 0)
+#define POSTURE_ATTRIBUTES DOFS, TABLE, TEXT("key", 0), REALS("qpos", 1, 0)
+#define SENSOR_ATTRIBUTES \
+  WORD("type", sensors), TEXT("body", 0), TEXT("xbody", 0), TEXT("geom", 0), TEXT("site", 0),     \
       TEXT("joint", 0), TEXT("tendon", 0), TEXT("actuator", 0), WORD("reftype", frames), TEXT("refname", 0), \
       TEXT("component", 0), TABLE, REALS("target", 1, 0), WORD("relative", relations)
 static const cav_xml_element posture_waypoint = {
@@ -90,42 +78,32 @@ static const cav_xml_element posture_waypoint = {
 static const cav_xml_element value_waypoint = {
     "waypoint", 0, 0, ATTRIBUTES(REAL("time", 1), {"target", CAV_XML_REAL, 1, 0, NULL, 1}), NULL, 0};
 
+// attributes and children of a term by what it has values of
+#define TERM_SENSOR(use) ATTRIBUTES(SENSOR_ATTRIBUTES, WINDOW, use), CHILDREN(&value_waypoint)
+#define TERM_POSTURE(use) ATTRIBUTES(POSTURE_ATTRIBUTES, WINDOW, use), CHILDREN(&posture_waypoint)
+#define TERM_RATE(use) ATTRIBUTES(RATE_ATTRIBUTES, WINDOW, use), CHILDREN(&value_waypoint)
+#define TERM_ACTUATORS(use) ATTRIBUTES(WINDOW, use), NULL
+#define TERM_CONTACTS(use) ATTRIBUTES(TEXT("body", 0), WINDOW, use), NULL
+
 #define COST REAL("weight", 1), WORD("norm", cav_problem_norms)
-#define TOUCH TEXT("body", 0), WINDOW, COST
-static const cav_xml_element cost_sensor = {"sensor", 0, 0, ATTRIBUTES(SENSOR, WINDOW, COST), CHILDREN(&value_waypoint),
-                                            0};
-static const cav_xml_element cost_posture = {
-    "posture", 0, 0, ATTRIBUTES(POSTURE, WINDOW, COST), CHILDREN(&posture_waypoint), 0};
-static const cav_xml_element cost_velocity = {
-    "velocity", 0, 0, ATTRIBUTES(RATE, WINDOW, COST), CHILDREN(&value_waypoint), 0};
-static const cav_xml_element cost_acceleration = {
-    "acceleration", 0, 0, ATTRIBUTES(RATE, WINDOW, COST), CHILDREN(&value_waypoint), 0};
-static const cav_xml_element cost_effort = {"effort", 0, 0, ATTRIBUTES(WINDOW, COST), NULL, 0};
-static const cav_xml_element cost_gap = {"gap", 0, 0, ATTRIBUTES(TOUCH), NULL, 0};
-static const cav_xml_element cost_slip = {"slip", 0, 0, ATTRIBUTES(TOUCH), NULL, 0};
-static const cav_xml_element cost_impact = {"impact", 0, 0, ATTRIBUTES(TOUCH), NULL, 0};
-static const cav_xml_element cost_self_penetration = {"self_penetration", 0, 0, ATTRIBUTES(TOUCH), NULL, 0};
-static const cav_xml_element cost_force = {"force", 0, 0, ATTRIBUTES(TOUCH), NULL, 0};
-static const cav_xml_element cost = {"cost",
-                                     0,
-                                     1,
-                                     NULL,
-                                     CHILDREN(&cost_sensor, &cost_posture, &cost_velocity, &cost_acceleration,
-                                              &cost_effort, &cost_gap, &cost_slip, &cost_impact,
-                                              &cost_self_penetration, &cost_force),
-                                     0};
+#define COST_ELEMENT(quantity, element, of, ...) \
+  static const cav_xml_element cost_##element = {#element, 0, 0, TERM_##of(COST), 0};
+#define COST_CHILD(quantity, element, ...) &cost_##element,
+CAV_QUANTITIES(COST_ELEMENT)
+static const cav_xml_element cost = {
+    "cost", 0, 1, NULL, (const cav_xml_element *const[]){CAV_QUANTITIES(COST_CHILD) NULL}, 0};
 
 #define BOUNDS REAL("lower", 0), REAL("upper", 0)
-static const cav_xml_element hard_sensor = {
-    "sensor", 0, 0, ATTRIBUTES(SENSOR, WINDOW, BOUNDS), CHILDREN(&value_waypoint), 0};
-static const cav_xml_element hard_posture = {
-    "posture", 0, 0, ATTRIBUTES(POSTURE, WINDOW, BOUNDS), CHILDREN(&posture_waypoint), 0};
-static const cav_xml_element hard_velocity = {
-    "velocity", 0, 0, ATTRIBUTES(RATE, WINDOW, BOUNDS), CHILDREN(&value_waypoint), 0};
-static const cav_xml_element hard_acceleration = {
-    "acceleration", 0, 0, ATTRIBUTES(RATE, WINDOW, BOUNDS), CHILDREN(&value_waypoint), 0};
+#define HARD_ELEMENT_0(element, of)
+#define HARD_ELEMENT_1(element, of) \
+  static const cav_xml_element hard_##element = {#element, 0, 0, TERM_##of(BOUNDS), 0};
+#define HARD_CHILD_0(element)
+#define HARD_CHILD_1(element) &hard_##element,
+#define HARD_ELEMENT(quantity, element, of, reads, hard, ...) HARD_ELEMENT_##hard(element, of)
+#define HARD_CHILD(quantity, element, of, reads, hard, ...) HARD_CHILD_##hard(element)
+CAV_QUANTITIES(HARD_ELEMENT)
 static const cav_xml_element constraint = {
-    "constraint", 0, 1, NULL, CHILDREN(&hard_sensor, &hard_posture, &hard_velocity, &hard_acceleration), 0};
+    "constraint", 0, 1, NULL, (const cav_xml_element *const[]){CAV_QUANTITIES(HARD_CHILD) NULL}, 0};
 
 // the rest
 static const cav_xml_element horizon = {

@@ -22,34 +22,6 @@
 static const double most_knots = 1e6;
 static const double whole_step = 1e-6; // of a step: how far the duration may be from a whole number of them
 
-static const cav_term default_term[] = {
-    {.name = "effort", .quantity = CAV_QUANTITY_EFFORT, .weight = 1},
-    {.name = "joint velocity", .quantity = CAV_QUANTITY_VELOCITY, .dofs = CAV_DOFS_JOINTS, .weight = 0.05},
-    {.name = "root turning", .quantity = CAV_QUANTITY_VELOCITY, .dofs = CAV_DOFS_ROOT_ANGULAR, .weight = 0.05},
-    {.name = "acceleration", .quantity = CAV_QUANTITY_ACCELERATION, .dofs = CAV_DOFS_ALL, .weight = 1e-4},
-    {.name = "root acceleration", .quantity = CAV_QUANTITY_ACCELERATION, .dofs = CAV_DOFS_ROOT_LINEAR, .weight = 0.02},
-    {.name = "posture", .quantity = CAV_QUANTITY_CONFIGURATION, .dofs = CAV_DOFS_JOINTS, .weight = 0.1},
-    {.name = "gap", .quantity = CAV_QUANTITY_GAP, .weight = 1000},
-    {.name = "slip", .quantity = CAV_QUANTITY_SLIP, .weight = 200},
-    {.name = "impact", .quantity = CAV_QUANTITY_IMPACT, .weight = 10},
-    {.name = "self_penetration", .quantity = CAV_QUANTITY_SELF_PENETRATION, .weight = 1e6},
-};
-
-int cav_problem_default_terms(cav_term *term, int most) {
-  int n = (int)(sizeof default_term / sizeof *default_term);
-  for (int i = 0; i < n && i < most; i++) {
-    term[i] = default_term[i];
-    term[i].use = CAV_USE_COST;
-    term[i].component = -1;
-    term[i].joint = -1;
-    term[i].to = -1;
-    term[i].scale = 1;
-    term[i].lower = -INFINITY;
-    term[i].upper = INFINITY;
-  }
-  return n;
-}
-
 // ends of the continuation
 #define FIRST(name, first, ...) .name = first,
 #define LAST(name, first, last, ...) .name = last,

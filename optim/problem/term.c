@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "file.h"
+#include "objects.h"
 #include "problem_file.h"
 
 static const double near_knot = 1e-6; // of a step
@@ -126,7 +127,7 @@ static cav_status read_table(const cav_problem_reader *reader, const cav_xml_nod
   for (int i = 0; i < table.n; i++) {
     const double *in = table.value + i * table.count;
     double *out = target + i * dim;
-    int rate = term->quantity == CAV_QUANTITY_VELOCITY || term->quantity == CAV_QUANTITY_ACCELERATION;
+    int rate = cav_quantity_rule_of(term->quantity)->of == CAV_OF_RATE;
     int first = term->quantity == CAV_QUANTITY_SENSOR && table.count == 1 && term->component >= 0 ? term->component : 0;
     if (rate) spread(m, term, in, table.count, out);
     if (!rate) memcpy(out + first, in, sizeof(double) * (size_t)table.count);
@@ -194,7 +195,6 @@ static cav_status posture_of(const cav_problem_reader *reader, const cav_xml_nod
 }
 
 static cav_status read_posture(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
-  term->quantity = CAV_QUANTITY_CONFIGURATION;
   cav_status status = read_dofs(reader, node, term);
   const cav_xml_node *waypoint = cav_problem_child(node, "waypoint");
   int found, own = cav_xml_get(node, "key") || cav_xml_get(node, "qpos");
@@ -251,21 +251,11 @@ static cav_status read_targets(const cav_problem_reader *reader, const cav_xml_n
 }
 
 static cav_status read_rate(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
-  term->quantity = strcmp(node->rule->name, "velocity") ? CAV_QUANTITY_ACCELERATION : CAV_QUANTITY_VELOCITY;
   cav_status status = read_dofs(reader, node, term);
   return status ? status : read_targets(reader, node, term, reader->model->nv, rate_target);
 }
 
-// kinds of objects by the attribute that names one
-static const struct {
-  const char *name;
-  cav_object_type type;
-} object_kind[] = {{"body", CAV_OBJECT_BODY},        {"xbody", CAV_OBJECT_XBODY}, {"geom", CAV_OBJECT_GEOM},
-                   {"site", CAV_OBJECT_SITE},        {"joint", CAV_OBJECT_JOINT}, {"tendon", CAV_OBJECT_TENDON},
-                   {"actuator", CAV_OBJECT_ACTUATOR}};
-enum { OBJECT_KINDS = sizeof object_kind / sizeof *object_kind, FRAME_KINDS = 4 };
-
-// what a sensor's target is called, and its kind; FRAME stands for the first kinds of the table
+// what a sensor's target is called, and its kind; FRAME stands for all that have a frame
 static const struct {
   const char *name;
   cav_object_type type;
@@ -292,8 +282,8 @@ static cav_status check_object(const cav_problem_reader *reader, const cav_xml_n
   if (target == CAV_TARGET_LIMITED_JOINT && !m->joint[sensor->object].limited) needs = "a joint with a limit";
   if (target == CAV_TARGET_LIMITED_TENDON && !m->tendon[sensor->object].limited) needs = "a tendon with a limit";
   if (!needs) return CAV_OK;
-  return cav_xml_fail(reader->error, node, given, "a %s needs %s; '%.60s' is none", cav_problem_sensors[sensor->type],
-                      needs, name);
+  return cav_xml_fail(reader->error, node, given, "a %s needs %s; '%.60s' is none",
+                      cav_sensor_rule_of(sensor->type)->name, needs, name);
 }
 
 // the frame in which a frame sensor declared in the file reads
@@ -312,19 +302,20 @@ static cav_status read_reference(const cav_problem_reader *reader, const cav_xml
   return sensor->reference < 0 ? CAV_BAD_INPUT : CAV_OK;
 }
 
+static int has_frame(cav_object_type type) {
+  return type == CAV_OBJECT_BODY || type == CAV_OBJECT_XBODY || type == CAV_OBJECT_GEOM || type == CAV_OBJECT_SITE;
+}
+
 // the object that a sensor declared in the file looks at
 static cav_status read_object(const cav_problem_reader *reader, const cav_xml_node *node, cav_sensor *sensor) {
   const char *given = NULL;
-  int kind = 0;
-  for (int i = 0; i < OBJECT_KINDS; i++) {
-    if (!cav_xml_get(node, object_kind[i].name)) continue;
-    if (given)
-      return cav_xml_fail(reader->error, node, object_kind[i].name, "contradicts attribute '%s'; give one of the two",
-                          given);
-    given = object_kind[i].name;
-    kind = i;
+  for (cav_object_type type = 0; type < CAV_OBJECT_TYPES; type++) {
+    const char *name = cav_object_kind_of(type)->attribute;
+    if (!cav_xml_accepts(node, name) || !cav_xml_get(node, name)) continue;
+    if (given) return cav_xml_fail(reader->error, node, name, "contradicts attribute '%s'; give one of the two", given);
+    given = name;
+    sensor->object_type = type;
   }
-  sensor->object_type = object_kind[kind].type;
   const cav_sensor_rule *rule = cav_sensor_rule_of(sensor->type);
   int framed = rule->target == CAV_TARGET_FRAME;
   const char *wanted = wanted_of[rule->target].name;
@@ -334,7 +325,7 @@ static cav_status read_object(const cav_problem_reader *reader, const cav_xml_no
   if (!given)
     return cav_xml_fail(reader->error, node, framed ? "body" : wanted, "is missing; a %s needs one of: %s", rule->name,
                         wanted);
-  if (framed ? kind >= FRAME_KINDS : sensor->object_type != wanted_of[rule->target].type)
+  if (framed ? !has_frame(sensor->object_type) : sensor->object_type != wanted_of[rule->target].type)
     return cav_xml_fail(reader->error, node, given, "a %s looks at a %s", rule->name, wanted);
   sensor->object = cav_problem_find(reader, node, given, sensor->object_type);
   if (sensor->object < 0) return CAV_BAD_INPUT;
@@ -389,7 +380,7 @@ static void add_reading(const cav_sensor *sensor, const double *reading, double 
 static cav_status make_absolute(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
   int relation = cav_xml_word(node, "relative", 0);
   if (!relation) return CAV_OK;
-  const char *what = cav_problem_sensors[term->sensor.type];
+  const char *what = cav_sensor_rule_of(term->sensor.type)->name;
   if (cav_sensor_rule_of(term->sensor.type)->stage != CAV_READS_POSITION)
     return cav_xml_fail(reader->error, node, "relative", "a %s has no reading at a posture at rest", what);
   double reading[CAV_SENSOR_DIM_MAX] = {0};
@@ -422,7 +413,6 @@ static cav_status make_absolute(const cav_problem_reader *reader, const cav_xml_
 }
 
 static cav_status read_sensor(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
-  term->quantity = CAV_QUANTITY_SENSOR;
   cav_status status = CAV_OK;
   if (cav_xml_get(node, "type")) {
     term->sensor = (cav_sensor){.name = "", .type = (cav_sensor_type)cav_xml_word(node, "type", 0), .adr = -1};
@@ -446,37 +436,32 @@ static cav_status read_sensor(const cav_problem_reader *reader, const cav_xml_no
   return status ? status : make_absolute(reader, node, term);
 }
 
-static cav_status read_effort(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
-  (void)reader, (void)node;
-  term->quantity = CAV_QUANTITY_EFFORT;
-  return CAV_OK;
-}
-
 static cav_status read_touch(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
-  const char *name = node->rule->name;
-  if (cav_xml_get(node, "body")) {
-    term->body = cav_problem_find(reader, node, "body", CAV_OBJECT_BODY);
-    if (term->body < 0) return CAV_BAD_INPUT;
-    if (reader->model->body[term->body].link == 0)
-      return cav_xml_fail(reader->error, node, "body", "expected a body that moves, got '%.80s'",
-                          cav_xml_text(node, "body", ""));
-  }
-  term->quantity = !strcmp(name, "gap")      ? CAV_QUANTITY_GAP
-                   : !strcmp(name, "slip")   ? CAV_QUANTITY_SLIP
-                   : !strcmp(name, "impact") ? CAV_QUANTITY_IMPACT
-                   : !strcmp(name, "force")  ? CAV_QUANTITY_FORCE
-                                             : CAV_QUANTITY_SELF_PENETRATION;
+  if (!cav_xml_get(node, "body")) return CAV_OK;
+  term->body = cav_problem_find(reader, node, "body", CAV_OBJECT_BODY);
+  if (term->body < 0) return CAV_BAD_INPUT;
+  if (reader->model->body[term->body].link == 0)
+    return cav_xml_fail(reader->error, node, "body", "expected a body that moves, got '%.80s'",
+                        cav_xml_text(node, "body", ""));
   return CAV_OK;
 }
 
-// who reads which element
-static const struct {
-  const char *name;
-  cav_status (*read)(const cav_problem_reader *, const cav_xml_node *, cav_term *);
-} term_reader[] = {{"sensor", read_sensor},     {"posture", read_posture}, {"velocity", read_rate},
-                   {"acceleration", read_rate}, {"effort", read_effort},   {"gap", read_touch},
-                   {"slip", read_touch},        {"impact", read_touch},    {"self_penetration", read_touch},
-                   {"force", read_touch}};
+// what its values are of
+static cav_status read_values(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  switch (cav_quantity_rule_of(term->quantity)->of) {
+    case CAV_OF_SENSOR:
+      return read_sensor(reader, node, term);
+    case CAV_OF_POSTURE:
+      return read_posture(reader, node, term);
+    case CAV_OF_RATE:
+      return read_rate(reader, node, term);
+    case CAV_OF_CONTACTS:
+      return read_touch(reader, node, term);
+    case CAV_OF_ACTUATORS:
+      break;
+  }
+  return CAV_OK;
+}
 
 // bounds of a constraint, or the weight of a cost
 static cav_status read_use(const cav_problem_reader *reader, const cav_xml_node *node, int hard, cav_term *term) {
@@ -503,9 +488,8 @@ static cav_status read_term(const cav_problem_reader *reader, const cav_xml_node
   if (!term->name) return cav_problem_no_memory(reader);
   cav_status status = read_use(reader, node, hard, term);
   if (!status) status = cav_problem_window(reader, node, &term->from, &term->to);
-  int i = 0;
-  while (strcmp(term_reader[i].name, node->rule->name)) i++;
-  return status ? status : term_reader[i].read(reader, node, term);
+  while (strcmp(cav_quantity_rule_of(term->quantity)->name, node->rule->name)) term->quantity++;
+  return status ? status : read_values(reader, node, term);
 }
 
 static int has_window(const cav_xml_node *node) {
@@ -517,7 +501,7 @@ static int replaced(const cav_xml_node *cost, cav_quantity quantity) {
   for (const cav_xml_node *node = cost ? cost->child : NULL; node; node = node->next) {
     int part = has_window(node) ||
                (cav_xml_accepts(node, "body") && cav_xml_get(node, "body") && !cav_xml_accepts(node, "type"));
-    if (!part && !strcmp(node->rule->name, cav_problem_quantities[quantity])) return 1;
+    if (!part && !strcmp(node->rule->name, cav_quantity_rule_of(quantity)->name)) return 1;
   }
   return 0;
 }

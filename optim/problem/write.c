@@ -9,6 +9,7 @@
 #include "file.h"
 #include "objects.h"
 #include "problem_file.h"
+#include "quantity.h"
 
 // text inside an attribute
 static void write_text(FILE *out, const char *name, const char *text) {
@@ -62,7 +63,7 @@ static int write_sensor(FILE *out, const cav_problem *p, const cav_term *term) {
   // a reading that is cut, or in a frame without a name, is only in the model
   if (object && sensor->cutoff == 0 && (reference || !sensor->referred)) {
     write_text(out, "name", term->name ? term->name : "sensor");
-    write_text(out, "type", cav_problem_sensors[sensor->type]);
+    write_text(out, "type", cav_sensor_rule_of(sensor->type)->name);
     write_text(out, kind, object);
     if (reference) {
       write_text(out, "reftype", frame);
@@ -106,11 +107,6 @@ static int target_length(const cav_problem *p, const cav_term *term) {
   return term->quantity == CAV_QUANTITY_SENSOR ? term->sensor.dim : p->model->nv;
 }
 
-static int has_dofs(const cav_term *term) {
-  return term->quantity == CAV_QUANTITY_CONFIGURATION || term->quantity == CAV_QUANTITY_VELOCITY ||
-         term->quantity == CAV_QUANTITY_ACCELERATION;
-}
-
 // window attributes; none for the whole horizon
 static void write_window(FILE *out, const cav_problem *p, const cav_term *term) {
   double to = term->to < 0 ? p->duration : term->to, from = term->from < 0 ? p->duration : term->from;
@@ -127,14 +123,14 @@ static int is_running(const cav_problem *p, const cav_term *term) {
 }
 
 static int write_term(FILE *out, const cav_problem *p, const cav_term *term) {
-  const char *element = cav_problem_quantities[term->quantity];
+  const char *element = cav_quantity_rule_of(term->quantity)->name;
   fprintf(out, "    <%s", element);
   if (term->quantity == CAV_QUANTITY_SENSOR) {
     if (!write_sensor(out, p, term)) return 0;
   } else {
     write_text(out, "name", term->name && *term->name ? term->name : element);
   }
-  if (has_dofs(term) && !write_dofs(out, p, term)) return 0;
+  if (cav_term_has_dofs(term) && !write_dofs(out, p, term)) return 0;
   if (term->target && !term->nwaypoint) write_target(out, p, term, term->target);
   write_window(out, p, term);
   if (term->body > 0 && !*p->model->body[term->body].name) return 0;
@@ -160,15 +156,22 @@ static int write_term(FILE *out, const cav_problem *p, const cav_term *term) {
   return 1;
 }
 
+static int has_running(const cav_problem *p, cav_quantity quantity) {
+  for (int i = 0; i < p->nterm; i++) {
+    const cav_term *term = &p->term[i];
+    if (term->use == CAV_USE_COST && term->quantity == quantity && term->weight > 0 && is_running(p, term)) return 1;
+  }
+  return 0;
+}
+
 // defaults that the problem goes without
 static void write_absent(FILE *out, const cav_problem *p) {
-  for (int quantity = 0; quantity < CAV_QUANTITY_TYPES; quantity++) {
-    int running = quantity == CAV_QUANTITY_SENSOR;
-    for (int i = 0; i < p->nterm && !running; i++) {
-      const cav_term *term = &p->term[i];
-      running = term->use == CAV_USE_COST && (int)term->quantity == quantity && term->weight > 0 && is_running(p, term);
-    }
-    if (!running) fprintf(out, "    <%s weight=\"0\"/>\n", cav_problem_quantities[quantity]);
+  cav_term term[CAV_DEFAULT_TERMS];
+  int n = cav_problem_default_terms(term, CAV_DEFAULT_TERMS);
+  for (cav_quantity quantity = 0; quantity < CAV_QUANTITY_TYPES; quantity++) {
+    int absent = 0;
+    for (int i = 0; i < n; i++) absent |= term[i].quantity == quantity && !has_running(p, quantity);
+    if (absent) fprintf(out, "    <%s weight=\"0\"/>\n", cav_quantity_rule_of(quantity)->name);
   }
 }
 

@@ -85,10 +85,8 @@ static cav_status check(const cav_problem *p, const cav_solve_options *o, const 
   int nknot = (int)lround(p->duration / p->timestep) + 1;
   for (int i = 0; i < p->nterm; i++) {
     const cav_term *term = &p->term[i];
-    int soft = term->use == CAV_USE_COST,
-        hard = term->quantity == CAV_QUANTITY_SENSOR || term->quantity == CAV_QUANTITY_CONFIGURATION ||
-               term->quantity == CAV_QUANTITY_VELOCITY || term->quantity == CAV_QUANTITY_ACCELERATION;
-    if (!soft && !hard)
+    if (term->quantity >= CAV_QUANTITY_TYPES) return fail(error, CAV_BAD_INPUT, "a term is of no quantity");
+    if (term->use != CAV_USE_COST && !cav_quantity_rule_of(term->quantity)->hard)
       return fail(error, CAV_BAD_INPUT, "a constraint must be over a sensor, a posture, a velocity or an acceleration");
     if (!(term->scale > 0) || !(term->weight >= 0))
       return fail(error, CAV_BAD_INPUT, "a term needs a positive scale and a weight that is not negative");

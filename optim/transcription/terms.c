@@ -4,24 +4,18 @@
 #include <math.h>
 #include <string.h>
 
+#include "quantity.h"
 #include "transcription.h"
 
 /// Fraction of a step by which a window may miss a knot and still hold it.
 static const double near_knot = 1e-6;
 
 /// Whether what a term measures needs the forces of a knot.
-static int reads_force(const cav_term *term) {
-  if (term->quantity == CAV_QUANTITY_SENSOR)
-    return cav_sensor_rule_of(term->sensor.type)->stage == CAV_READS_ACCELERATION;
-  return term->quantity != CAV_QUANTITY_CONFIGURATION && term->quantity != CAV_QUANTITY_VELOCITY;
-}
+static int reads_force(const cav_term *term) { return cav_term_stage(term) == CAV_READS_ACCELERATION; }
 
 /// Whether a term measures an acceleration or a force at a last knot that nothing leaves.
 static int is_unforced(const cav_transcription *tr, const cav_term *term, int t) {
-  if (tr->knot[t].has_force) return 0;
-  if (term->quantity == CAV_QUANTITY_ACCELERATION) return 1;
-  if (term->quantity != CAV_QUANTITY_SENSOR) return 0;
-  return cav_sensor_rule_of(term->sensor.type)->stage == CAV_READS_ACCELERATION;
+  return !tr->knot[t].has_force && reads_force(term);
 }
 
 double cav_knot_time(const cav_transcription *tr, int t) { return t * tr->problem->timestep; }

@@ -41,4 +41,10 @@ int cav_command_view(const cav_command_line *line);
 /// Prints "cavort: text" on standard error; returns the exit status that goes with the error's status.
 int cav_command_fail(const cav_error *error);
 
+/// Prints a topic of cavort help; 0 if there is none of that name. topics.c.
+int cav_topic_print(const char *name);
+
+/// Prints the list of topics.
+void cav_topics_print(void);
+
 #endif

@@ -9,6 +9,7 @@
 #include "command.h"
 #include "file.h"
 #include "objects.h"
+#include "quantity.h"
 #include "step.h"
 
 static const char *const geom_name[] = {"plane",    "sphere", "capsule", "ellipsoid",
@@ -246,22 +247,11 @@ static void print_window(const cav_problem *p, const cav_term *term) {
 }
 
 static void print_quantity(const cav_problem *p, const cav_term *term) {
-  static const char *const quantity[] = {"sensor",
-                                         "posture",
-                                         "velocity",
-                                         "acceleration",
-                                         "effort of actuators",
-                                         "gap of loaded contacts",
-                                         "slip of loaded contacts",
-                                         "impact of loaded contacts",
-                                         "overlap of links",
-                                         "force of contacts"};
   static const char *const dofs[] = {"all dofs", "translation of free roots", "rotation of free roots",
                                      "all but free roots", "joint"};
   const cav_model *m = p->model;
-  if (term->quantity != CAV_QUANTITY_SENSOR) printf("%s", quantity[term->quantity]);
-  if (term->quantity == CAV_QUANTITY_CONFIGURATION || term->quantity == CAV_QUANTITY_VELOCITY ||
-      term->quantity == CAV_QUANTITY_ACCELERATION) {
+  if (term->quantity != CAV_QUANTITY_SENSOR) printf("%s", cav_quantity_rule_of(term->quantity)->words);
+  if (cav_term_has_dofs(term)) {
     printf(" of %s%s%s", dofs[term->dofs], term->dofs == CAV_DOFS_ONE ? " " : "",
            term->dofs == CAV_DOFS_ONE ? m->joint[term->joint].name : "");
   }

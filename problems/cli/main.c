@@ -70,7 +70,7 @@ static const command commands[] = {
      "problems/motions;\n"
      "  what a folder holds already is not solved again",
      cav_command_study, OPTION_MODEL | OPTION_OUTPUT | OPTION_METHODS | OPTION_THREADS | OPTION_QUIET},
-    {"help", "[COMMAND]", "say how to use the tool or one of its commands", help, 0},
+    {"help", "[COMMAND|TOPIC]", "say how to use the tool, one of its commands, or what problem files may say", help, 0},
 };
 enum { NCOMMAND = sizeof commands / sizeof *commands };
 
@@ -94,8 +94,9 @@ static const command *find_command(const char *name) {
 
 static int help(const cav_command_line *line) {
   const command *c = line->operand ? find_command(line->operand) : NULL;
+  if (line->operand && !c && cav_topic_print(line->operand)) return 0;
   if (line->operand && !c) {
-    fprintf(stderr, "cavort: there is no command '%s'; see cavort help\n", line->operand);
+    fprintf(stderr, "cavort: there is no command or topic '%s'; see cavort help\n", line->operand);
     return CAV_EXIT_BAD_INPUT;
   }
   if (c) {
@@ -107,6 +108,7 @@ static int help(const cav_command_line *line) {
     print_command(&commands[i]);
     printf("\n");
   }
+  cav_topics_print();
   printf("exit status: 0 certified or done, 1 not certified, 2 bad input, 3 internal error, 130 interrupted\n");
   return 0;
 }

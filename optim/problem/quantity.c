@@ -1,0 +1,54 @@
+/// Quantities, as CAV_QUANTITIES declares them, and the costs of them that serve all motions.
+#include <assert.h>
+#include <math.h>
+
+#include "quantity.h"
+
+#define RULE(quantity, element, of, reads, hard, unit, words, text) \
+  [CAV_QUANTITY_##quantity] = {#element, CAV_OF_##of, CAV_READS_##reads, hard, unit, words, text},
+static const cav_quantity_rule rules[CAV_QUANTITY_TYPES] = {CAV_QUANTITIES(RULE)};
+
+const cav_quantity_rule *cav_quantity_rule_of(cav_quantity quantity) {
+  assert(quantity < CAV_QUANTITY_TYPES);
+  return &rules[quantity];
+}
+
+cav_sensor_stage cav_term_stage(const cav_term *term) {
+  int sensor = term->quantity == CAV_QUANTITY_SENSOR;
+  return sensor ? cav_sensor_rule_of(term->sensor.type)->stage : cav_quantity_rule_of(term->quantity)->reads;
+}
+
+int cav_term_has_dofs(const cav_term *term) {
+  cav_values_of of = cav_quantity_rule_of(term->quantity)->of;
+  return of == CAV_OF_POSTURE || of == CAV_OF_RATE;
+}
+
+static const cav_term default_term[] = {
+    {.name = "effort", .quantity = CAV_QUANTITY_EFFORT, .weight = 1},
+    {.name = "joint velocity", .quantity = CAV_QUANTITY_VELOCITY, .dofs = CAV_DOFS_JOINTS, .weight = 0.05},
+    {.name = "root turning", .quantity = CAV_QUANTITY_VELOCITY, .dofs = CAV_DOFS_ROOT_ANGULAR, .weight = 0.05},
+    {.name = "acceleration", .quantity = CAV_QUANTITY_ACCELERATION, .dofs = CAV_DOFS_ALL, .weight = 1e-4},
+    {.name = "root acceleration", .quantity = CAV_QUANTITY_ACCELERATION, .dofs = CAV_DOFS_ROOT_LINEAR, .weight = 0.02},
+    {.name = "posture", .quantity = CAV_QUANTITY_CONFIGURATION, .dofs = CAV_DOFS_JOINTS, .weight = 0.1},
+    {.name = "gap", .quantity = CAV_QUANTITY_GAP, .weight = 1000},
+    {.name = "slip", .quantity = CAV_QUANTITY_SLIP, .weight = 200},
+    {.name = "impact", .quantity = CAV_QUANTITY_IMPACT, .weight = 10},
+    {.name = "self_penetration", .quantity = CAV_QUANTITY_SELF_PENETRATION, .weight = 1e6},
+};
+
+_Static_assert(sizeof default_term / sizeof *default_term == CAV_DEFAULT_TERMS, "default costs are counted");
+
+int cav_problem_default_terms(cav_term *term, int most) {
+  int n = CAV_DEFAULT_TERMS;
+  for (int i = 0; i < n && i < most; i++) {
+    term[i] = default_term[i];
+    term[i].use = CAV_USE_COST;
+    term[i].component = -1;
+    term[i].joint = -1;
+    term[i].to = -1;
+    term[i].scale = 1;
+    term[i].lower = -INFINITY;
+    term[i].upper = INFINITY;
+  }
+  return n;
+}
