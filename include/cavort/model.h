@@ -460,14 +460,14 @@ typedef struct cav_options {
 } cav_options;
 
 /// The table of cav_options; its length in *n.
-const cav_field *cav_option_fields(int *n);
+CAV_API const cav_field *cav_option_fields(int *n);
 
 /// CAV_BAD_INPUT, with the member at fault and what it may be in error (may be NULL), if an option is outside the table.
 /// Evaluations refuse such options with the same status.
-cav_status cav_options_check(const cav_options *options, cav_error *error);
+CAV_API cav_status cav_options_check(const cav_options *options, cav_error *error);
 
 /// The same of any struct by its table of n fields; what: how the text calls it.
-cav_status cav_fields_check(const cav_field *field, int n, const void *values, const char *what, cav_error *error);
+CAV_API cav_status cav_fields_check(const cav_field *field, int n, const void *values, const char *what, cav_error *error);
 
 /// A compiled model. Built by cav_model_load; nothing but cav_model_perturb changes it, before any state of it exists.
 typedef struct cav_model {

@@ -52,7 +52,7 @@ typedef struct cav_quantity_rule {
 } cav_quantity_rule;
 
 /// quantity < CAV_QUANTITY_TYPES.
-const cav_quantity_rule *cav_quantity_rule_of(cav_quantity quantity);
+CAV_API const cav_quantity_rule *cav_quantity_rule_of(cav_quantity quantity);
 
 /// What a cost makes of a residual x, value minus target over scale.
 typedef enum cav_norm {
@@ -154,7 +154,7 @@ typedef struct cav_stage_options {
 } cav_stage_options;
 
 /// The table of cav_stage_options; its length in *n.
-const cav_field *cav_stage_fields(int *n);
+CAV_API const cav_field *cav_stage_fields(int *n);
 
 /// The schedule: stages go geometrically from first to last; the penalty reaches its end at half way.
 typedef struct cav_schedule {
