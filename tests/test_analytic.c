@@ -6,7 +6,6 @@
 #include "scene.h"
 #include "step.h"
 
-#ifdef CAVORT_HAVE_CCD
 /// Rolling and sliding bodies of all shapes, rough pairs of unequal friction, two trees that touch.
 static const char shapes[] =
     "<mujoco><option timestep='0.01'/><default><geom condim='6' friction='.8 .05 .02'/></default><worldbody>"
@@ -20,7 +19,6 @@ static const char shapes[] =
     "<body pos='.6 .1 .1'><freejoint/><geom name='brick' type='box' size='.1 .05 .08' condim='3'/></body>"
     "</worldbody><contact><pair geom1='floor' geom2='arm' condim='6' friction='.9 .3 .05 .02 .04'/>"
     "<pair geom1='ball' geom2='egg' condim='6' friction='.3 .9 .05 .02 .04'/></contact></mujoco>";
-#endif
 
 enum { STATES = 16, POINTS = 6, SENSORS = 48 };
 
@@ -310,14 +308,12 @@ int main(void) {
   check_model("joints", STATES);
   model = cav_model_load(CAVORT_SOURCE_ROOT "/problems/models/humanoid.xml", NULL);
   check_model("our humanoid", 8);
-#ifdef CAVORT_HAVE_CCD
   model = scene_load(shapes);
   check_model("shapes", STATES);
   model = cav_model_load(CAVORT_SOURCE_ROOT "/tests/features.xml", NULL);
   check_model("features", STATES);
   model = cav_model_load(CAVORT_SOURCE_ROOT "/tests/equality.xml", NULL);
   check_model("equality", STATES);
-#endif
   const char *folder = check_shared_models();
   for (size_t i = 0; folder && i < sizeof names / sizeof *names; i++) {
     char path[4300];

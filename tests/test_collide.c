@@ -67,7 +67,7 @@ static void fill(heap *h) {
   for (int a = 0; a < GEOMS; a++) {
     for (int b = a + 1; b < GEOMS; b++) {
       int swap = h->geom[a].type > h->geom[b].type;
-      if (h->geom[a].link == h->geom[b].link || !cav_collide_supported(h->geom[a].type, h->geom[b].type)) continue;
+      if (h->geom[a].link == h->geom[b].link) continue;
       cav_pair *p = h->pair + m->npair++;
       *p = (cav_pair){.geom1 = swap ? b : a, .geom2 = swap ? a : b, .dim = 3, .friction = {1, 1, 0.1, 0.2, 0.3}};
       p->external = !h->geom[a].link || !h->geom[b].link;

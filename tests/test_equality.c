@@ -10,7 +10,6 @@
 
 static const char model_file[] = CAVORT_SOURCE_ROOT "/tests/equality.xml";
 
-#ifdef CAVORT_HAVE_CCD
 /// Distances of every kind of pair that has a routine here, closed loops, contacts beside them.
 static const char scene_tied[] =
     "<mujoco><compiler angle='degree'/><option timestep='.005'/><worldbody><geom name='floor' type='plane' size='1 1 "
@@ -26,7 +25,6 @@ static const char scene_tied[] =
     "<distance geom1='brick' geom2='floor' distance='.1'/><distance geom1='pipe' geom2='brick' distance='.2'/>"
     "<distance geom1='rod' geom2='pipe' distance='.3'/><distance geom1='floor' geom2='ball' distance='.05'/>"
     "<connect body1='c' body2='d' anchor='.2 0 0'/><weld body1='d' body2='e'/></equality></mujoco>";
-#endif
 
 typedef struct bench {
   cav_model *model;
@@ -285,9 +283,7 @@ int main(void) {
   }
   bench_close(&b);
   test_guard();
-#ifdef CAVORT_HAVE_CCD
   if (bench_open_text(&b, scene_tied)) test_scene(&b, "distances");
   bench_close(&b);
-#endif
   return check_result();
 }

@@ -477,10 +477,6 @@ static void test_problems(void) {
 }
 
 int main(void) {
-#ifndef CAVORT_HAVE_CCD
-  puts("SKIPPED: tests/sensors.xml has pairs that need libccd, which this build is without");
-  return CHECK_SKIPPED;
-#endif
   // what printf and the XML library keep for themselves
   printf("allocations are counted\n");
   test_hot(humanoid);

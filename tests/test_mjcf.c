@@ -135,9 +135,6 @@ static const struct {
     {"sensor_ball", 9, "free or ball"},
     {"two_planes", 9, "two planes"},
     {"autolimits", 4, "is missing where range"},
-#ifndef CAVORT_HAVE_CCD
-    {"unsupported_pair", 5, "may touch the geom at line 7"},
-#endif
 };
 
 static const char good[] =

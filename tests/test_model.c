@@ -40,12 +40,6 @@ static cav_model *load_text(const char *text) {
 
 // as many features as one file can hold
 static const char features[] = CAVORT_SOURCE_ROOT "/tests/features.xml";
-// its solids may touch each other, which needs libccd
-#ifdef CAVORT_HAVE_CCD
-static const int has_ccd = 1;
-#else
-static const int has_ccd = 0;
-#endif
 
 #ifdef CAVORT_HAVE_MUJOCO
 #include <mujoco/mujoco.h>
@@ -389,16 +383,14 @@ static void test_peer(void) {
       "dm_control/reacher.xml", "dm_control/point_mass.xml", "dm_control/ball_in_cup.xml", "dm_control/swimmer.xml",
       "dm_control/finger.xml",  "dm_control/fish.xml",       "mujoco/arm26.xml",           "mujoco/slider_crank.xml"};
   slack = 2e-6;
-  if (has_ccd) compare(features);
+  compare(features);
   slack = rounding;
   printf("largest relative difference %.1e, where a general inertia matters %.1e\n", worst, worst_slack);
   worst_slack = 0;
   compare(CAVORT_SOURCE_ROOT "/problems/models/humanoid.xml");
   const char *folder = check_shared_models();
   if (!folder) printf("SKIPPED: the shared models are absent\n");
-  // shapes of the last four models need libccd
-  size_t count = sizeof files / sizeof *files - (has_ccd ? 0 : 4);
-  for (size_t i = 0; folder && i < count; i++) {
+  for (size_t i = 0; folder && i < sizeof files / sizeof *files; i++) {
     char file[5000];
     snprintf(file, sizeof file, "%s/%s", folder, files[i]);
     compare(file);
@@ -545,10 +537,7 @@ static void test_principal(void) {
 }
 
 int main(void) {
-  if (has_ccd)
-    test_find();
-  else
-    printf("SKIPPED: the file of features needs libccd\n");
+  test_find();
   test_principal();
   test_humanoid();
   test_same_names();

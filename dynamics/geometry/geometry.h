@@ -36,18 +36,11 @@ static inline cav_shape cav_shape_of(const cav_model *model, const cav_geom *geo
 
 /// All contact points of two shapes with dist < margin; a->type <= b->type, in the order of their features. Returns their
 /// number, at most CAV_TOUCH_MAX.
-/// pairs.c: table over types; exact routines where they exist, convex.c (libccd) for the rest.
+/// pairs.c: table over types; exact routines where they exist, polytope.c for the rest.
 int cav_collide_shapes(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
 /// Distance along a ray, unit direction, to the surface of a shape; -1 if it misses. A ray that starts inside meets the
 /// surface where it leaves; a plane is met from above only, within its size where that is not 0. ray.c.
 double cav_ray(const cav_shape *shape, const double point[3], const double direction[3]);
-
-/// 1 if shapes of these two types can be collided by this build (some need libccd), else 0. convex.c.
-int cav_collide_supported(cav_geom_type a, cav_geom_type b);
-
-/// Pairs without a routine of their own: penetration or distance through libccd. One point, and up to 4 more
-/// where a cylinder or a box stands on a face. convex.c.
-int cav_collide_convex(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
 #endif

@@ -1,18 +1,19 @@
-/// Distance of convex bodies by their support points (Gilbert, Johnson and Keerthi 1988), overlap by an expanding polytope
-/// (van den Bergen 2001).
+/// Distance of convex bodies by their support points (Gilbert, Johnson and Keerthi 1988), overlap by an expanding
+/// polytope (van den Bergen 2001).
 ///
-/// Both look at W, the differences y - x of points of b and a. GJK walks the point of W nearest to the origin by simplices
-/// of support points. If the origin is inside, a polytope of support points grows from inside W until its face nearest to the
-/// origin is a face of W. For polyhedra both end at a feature, to rounding; for curved bodies to 1e-10 of the size in
-/// distance, and their callers polish. All loops are bounded; bodies that touch so closely that neither has a direction, or
-/// whose W is flat, get the best of a few directions: any direction gives a lower bound of the gap.
+/// Both look at W, the differences y - x of points of b and a. GJK walks the point of W nearest to the origin by
+/// simplices of support points. If the origin is inside, a polytope of support points grows from inside W until its
+/// face nearest to the origin is a face of W. For polyhedra both end at a feature, to rounding; for curved bodies to
+/// 1e-9 of the size in distance, and their callers polish. All loops are bounded; bodies that touch so closely that
+/// neither has a direction, or whose W is flat, get the best of a few directions: any direction gives a lower bound of
+/// the gap.
 #include "gjk.h"
 
 #include "math3.h"
 #include "pairs.h"
 
 enum { STEPS_MAX = 100, VERTEX_MAX = 160, SHEET_MAX = 2 * VERTEX_MAX };
-static const double CLOSE = 1e-14, CURVED_CLOSE = 1e-11, INSIDE = 1e-9, SEES = 1e-13;
+static const double CLOSE = 1e-14, CURVED_CLOSE = 1e-9, INSIDE = 1e-9, SEES = 1e-13;
 
 /// A point of W and what it is made of.
 typedef struct vertex {
@@ -62,7 +63,8 @@ static vertex support(const bodies *g, const double d[3]) {
 
 // --- nearest point of a simplex ---
 
-// weights of the point of the affine hull of points nearest to the origin; 0 if one is not positive or they are dependent
+// weights of the point of the affine hull of points nearest to the origin; 0 if one is not positive or they are
+// dependent
 static int weights_of(const vertex *const p[4], int n, double weight[4]) {
   double e[3][3], G[3][3], r[3];
   for (int i = 1; i < n; i++) sub3(e[i - 1], p[i]->w, p[0]->w);
@@ -204,7 +206,8 @@ typedef struct polytope {
   int np, nface;
 } polytope;
 
-// a face, counterclockwise from outside, whose normal is turned away from the middle of the polytope; 0 if it has no area
+// a face, counterclockwise from outside, whose normal is turned away from the middle of the polytope; 0 if it has no
+// area
 static int add_face(polytope *t, int i, int j, int k, const double middle[3]) {
   double u[3], w[3], m[3];
   if (t->nface == SHEET_MAX) return 0;
@@ -273,8 +276,8 @@ static int face_beyond(const polytope *t, const int edge[2]) {
   return -1;
 }
 
-// replaces the faces that see a new point by a fan from their outline; 0 if that fails. They are taken in from the one that
-// sees it best, neighbour by neighbour: where rounding decides what sees, the outline stays one loop
+// replaces the faces that see a new point by a fan from their outline; 0 if that fails. They are taken in from the one
+// that sees it best, neighbour by neighbour: where rounding decides what sees, the outline stays one loop
 static int include(polytope *t, int nearest, const vertex *p, const double middle[3], double slack) {
   int edge[3 * SHEET_MAX][2], edges = 0, outline = 0;
   if (t->np == VERTEX_MAX) return 0;
@@ -311,8 +314,8 @@ static int include(polytope *t, int nearest, const vertex *p, const double middl
   return edges > 0;
 }
 
-// the point nearest to the origin of the faces in one plane with a face, as points of both bodies: such faces equality constraint, and the
-// origin lies over one of them
+// the point nearest to the origin of the faces in one plane with a face, as points of both bodies: such faces tie, and
+// the origin lies over one of them
 static void points_of_faces(const polytope *t, const sheet *best, double slack, cav_separation *out) {
   double least = INFINITY;
   for (int f = 0; f < t->nface; f++) {

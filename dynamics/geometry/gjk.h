@@ -11,15 +11,37 @@ typedef struct cav_core {
 } cav_core;
 
 /// Direction of least overlap or of separation, unit, from a to b; points of both that meet along it; signed distance of
-/// the cores along n. exact: the direction solves the problem to rounding, as for polyhedra; else to about 1e-5.
+/// the cores along n.
 typedef struct cav_separation {
   double n[3], x[3], y[3], gap;
 } cav_separation;
 
+/// Corners of a face, an edge or a rim in the world, in order.
+enum { CAV_OUTLINE_MAX = 64 };
+typedef struct cav_outline {
+  int n;
+  double x[CAV_OUTLINE_MAX][3];
+} cav_outline;
+
+/// Corners and faces of a mesh, a box, and the core of a capsule or a sphere, in the world. polytope.c.
+int cav_shape_corners(const cav_shape *shape);
+void cav_shape_corner(const cav_shape *shape, int corner, double x[3]);
+int cav_shape_neighbours(const cav_shape *shape, int corner, int other);
+int cav_shape_faces(const cav_shape *shape);
+void cav_shape_normal(const cav_shape *shape, int face, double n[3]);
+void cav_outline_push(const cav_shape *shape, int face, cav_outline *outline);
+
+/// A length that a shape is no larger than. polytope.c.
+double cav_shape_size(const cav_shape *shape);
+
 cav_core cav_core_of(const cav_shape *shape);
 void cav_core_support(const cav_core *core, const double direction[3], double point[3]);
 
-/// Finds it; 0 if the cores are further apart than most (out is unchanged). gjk.c.
+/// Finds it to rounding for polyhedra, with an ellipsoid or a cylinder to about 1e-5; 0 if the cores are further apart than
+/// most (out is unchanged). gjk.c.
 int cav_separation_find(const cav_core *a, const cav_core *b, double size, double most, cav_separation *out);
+
+/// The same, exact for all; 0 if the shapes are further apart than margin. convex.c.
+int cav_separation_solve(const cav_shape *a, const cav_shape *b, double margin, cav_separation *out);
 
 #endif

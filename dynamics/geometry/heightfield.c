@@ -136,7 +136,7 @@ static int collect_apart(const field *g, const cav_shape *a, const cav_shape *so
                          double margin, int feature, collection *all) {
   cav_touch touch[CAV_TOUCH_MAX];
   double radius = cav_core_of(a).radius;
-  int count = cav_collide_polytope(a, solid, margin, touch);
+  int count = cav_collide_convex(a, solid, margin, touch);
   for (int k = 0; k < count; k++) {
     if (touch[k].dist + radius <= 0) return 1;
   }

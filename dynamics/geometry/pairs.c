@@ -1,14 +1,14 @@
 /// Contact points of two shapes, by a table over their types.
 /// Conventions (MuJoCo's): a point lies midway between the two surfaces along the normal, the normal points from the
 /// first to the second shape, the gap is negative in penetration, and a point exists while its gap is below the margin.
-/// Distances are exact (two boxes and convex.c: see there). Normals and points are smooth in the poses but for what
+/// Distances are exact (two boxes: see there). Normals and points are smooth in the poses but for what
 /// the geometry itself makes jump:
 ///  - coincident centres: a fixed direction is taken; crossing axes of capsules: the normal changes side;
 ///  - capsules closer to parallel than PARALLEL rad have two points where their sides overlap, others one;
 ///  - a plane sees the 4 lowest corners of a box, and of a cylinder one line along its side and a regular triangle on
 ///    its lower cap with one corner at the lowest point. The triangle turns quickly near the upright pose, but three
 ///    equal springs on it push and tilt alike however it is turned.
-/// Solids without a routine of their own go to convex.c.
+/// Solids without a routine of their own go to polytope.c.
 #include "pairs.h"
 
 // capsules are parallel below this angle, rad: well above steps of differentiation
@@ -242,7 +242,7 @@ static void sort(cav_touch *touch, int count) {
 }
 
 // the last two columns of every row
-#define MESH cav_collide_polytope, cav_collide_hfield
+#define MESH cav_collide_convex, cav_collide_hfield
 
 typedef int routine(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 

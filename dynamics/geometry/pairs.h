@@ -19,10 +19,12 @@ void cav_shape_support(const cav_shape *shape, const double direction[3], double
 /// Segment swept by a sphere (the capsule a) against a solid b with a surface: up to 2 points. segment.c.
 int cav_collide_segment(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
-/// A mesh against a plane, or a sphere, capsule, ellipsoid, cylinder, box or mesh; a capsule whose segment cuts an ellipsoid,
-/// cylinder or box: up to 8 points. polytope.c.
+/// A mesh against a plane: up to 8 points. polytope.c.
 int cav_collide_plane_mesh(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
-int cav_collide_polytope(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
+
+/// Convex pairs without a routine of their own: ellipsoid, cylinder, box (not two) and mesh; sphere or capsule against mesh; a
+/// capsule whose segment cuts an ellipsoid, cylinder or box: up to 8 points. polytope.c.
+int cav_collide_convex(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
 /// Keeps the deepest of n contacts and those furthest from the ones kept, most at most; returns how many. polytope.c.
 int cav_thin_out(cav_touch *touch, int n, int most);

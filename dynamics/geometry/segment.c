@@ -237,7 +237,7 @@ int cav_collide_segment(const cav_shape *a, const cav_shape *b, double margin, c
   lowest first;
   find_lowest(&g, &first);
   if (first.height - a->size[0] >= margin) return 0;
-  if (first.height < TOUCHES * (a->size[0] + a->size[1])) return cav_collide_polytope(a, b, margin, touch);
+  if (first.height < TOUCHES * (a->size[0] + a->size[1])) return cav_collide_convex(a, b, margin, touch);
   if (b->type == CAV_GEOM_ELLIPSOID) {
     return touch_at(a, b, &g, first.t, first.height, first.normal, margin, 0, touch);
   }

@@ -661,10 +661,7 @@ static void check_tied(builder *b, const cav_spec_equality *s, const cav_equalit
   if (s->type == CAV_EQUALITY_DISTANCE && running(b)) {
     int g1 = b->geom[e->object[0]].type, g2 = b->geom[e->object[1]].type, plane = g1 == g2 && g1 == CAV_GEOM_PLANE;
     plane |= g1 == CAV_GEOM_HFIELD || g2 == CAV_GEOM_HFIELD;
-    int low = g1 < g2 ? g1 : g2, high = g1 < g2 ? g2 : g1;
-    if (plane || !cav_collide_supported((cav_geom_type)low, (cav_geom_type)high))
-      cav_spec_fail(spec, s->node, NULL, "the distance between geoms of these two types is not computed%s",
-                    plane ? "" : " by a build without libccd; use capsules, spheres or boxes");
+    if (plane) cav_spec_fail(spec, s->node, NULL, "the distance between geoms of these two types is not computed");
   }
   if (coupled ? e->object[0] == e->object[1] : e->link[0] == e->link[1])
     cav_spec_fail(spec, s->node, NULL, coupled ? "constrains one to itself; name two" : "the two move as one; remove it");

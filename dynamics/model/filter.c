@@ -106,14 +106,6 @@ static cav_pair *push(cav_spec *spec, list *l, const cav_geom *geom, int g1, int
   }
   // the simpler type first: collision routines expect it
   int swap = geom[g1].type > geom[g2].type;
-  cav_geom_type first = geom[swap ? g2 : g1].type, second = geom[swap ? g1 : g2].type;
-  if (!cav_collide_supported(first, second)) {
-    cav_spec_fail(spec, spec->geom.at[g2].node, NULL,
-                  "may touch the geom at line %d, and shapes of these two types need libccd, which this build is "
-                  "without; use capsules, spheres or boxes, or keep the two apart by contype and conaffinity",
-                  spec->geom.at[g1].node->line);
-    return NULL;
-  }
   cav_pair *pair = &l->at[l->n++];
   *pair = (cav_pair){.geom1 = swap ? g2 : g1, .geom2 = swap ? g1 : g2};
   mix(&geom[pair->geom1], &geom[pair->geom2], pair);
