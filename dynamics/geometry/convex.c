@@ -27,6 +27,8 @@ enum { NEAR_MAX = 12, FEATURES_MAX = NEAR_MAX + NEAR_MAX * (NEAR_MAX - 1) / 2 + 
 static const double MEETS = 1e-2, SQUARE = 1e-9;
 // fractions of the size: gaps that are equal; points that lie across from each other
 static const double TIE = 1e-13, ACROSS = 1e-12;
+// fraction of the size by which the polish improves on a search that has not ended
+static const double LOOSE = 1e-6;
 
 /// What of a body may meet the other: a corner, an edge or a face, or of a curved body what its support follows.
 typedef struct feature {
@@ -339,7 +341,7 @@ static void cross_lines(const feature *fa, const feature *fb, const double y[3],
 // keeps a direction of two features if its gap is larger than the best; among equal ones the points say which is
 // solved, as near its top a gap does not depend on the direction
 static void keep(search *g, const feature *fa, const feature *fb, const double n[3]) {
-  enum { STEPS_MAX = 20 };
+  enum { STEPS_MAX = 300 };
   candidate c;
   double back[3], x[3], y[3], far[3], d[3];
   scale3(back, -1, n);
@@ -349,7 +351,9 @@ static void keep(search *g, const feature *fa, const feature *fb, const double n
   c.separation.gap = dot3(d, n);
   if (c.separation.gap < g->best.separation.gap - TIE * g->size) return;
   if (fa->straight == 1 && fb->straight == 1) cross_lines(fa, fb, fb->corners ? fb->x[0] : far, x);
+  // from the middle of a cap one step tells where it meets anything
   if (fa->straight == 2) copy3(x, g->a->pos);
+  if (fb->straight == 2 && !fb->corners) nearest_on(g->a, fa, n, g->b->pos, x);
   nearest_on(g->b, fb, back, x, y);
   for (int k = 0; k < STEPS_MAX; k++) {
     double last[3];
@@ -390,6 +394,20 @@ static int polish(search *g, const double start[3], double least) {
     copy3(about, g->best.separation.n);
   }
   return 0;
+}
+
+// the polytope ends short of the least way out where a body is in the middle of a large round one: then the axes of both are
+// tried too, either way
+static void polish_elsewhere(search *g) {
+  const cav_shape *shapes[2] = {g->a, g->b};
+  for (int k = 0; k < 12; k++) {
+    candidate best = g->best;
+    double n[3];
+    column3(n, shapes[k & 1]->rotation, k / 4);
+    if (k & 2) scale3(n, -1, n);
+    polish(g, n, -INFINITY);
+    if (g->best.separation.gap < best.separation.gap + TIE * g->size) g->best = best;
+  }
 }
 
 // --- libccd ---
@@ -463,7 +481,8 @@ int cav_separation_solve(const cav_shape *a, const cav_shape *b, double margin, 
 #endif
   if (!proven) {
     if (!cav_separation_find(&ca, &cb, g.size, most, out)) return 0;
-    proven = polish(&g, out->n, -INFINITY);
+    polish(&g, out->n, -INFINITY);
+    if (g.best.separation.gap < 0 && g.best.separation.gap > out->gap + LOOSE * g.size) polish_elsewhere(&g);
     // what the search found stays where the polish does not improve on it
     if (g.best.separation.gap < out->gap - 1e-9 * g.size) g.best.separation = *out;
   }
