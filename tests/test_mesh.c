@@ -628,6 +628,10 @@ static void test_peer(void) {
 #endif
 
 int main(void) {
+#ifndef CAVORT_HAVE_QHULL
+  puts("SKIPPED: meshes need Qhull, which this build is without");
+  return CHECK_SKIPPED;
+#endif
   for (int kind = 0; kind < 3; kind++) {
     for (int type = 0; type <= CAV_GEOM_MESH; type++) test_certificates(type, kind);
   }

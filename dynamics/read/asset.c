@@ -181,6 +181,19 @@ static void weigh_mesh(cav_spec *spec, cav_spec_mesh *m, cav_triangles *t) {
     cav_spec_fail(spec, m->node, NULL, "numbers are too large: what follows from them is not finite");
 }
 
+static void build_hull(cav_spec *spec, cav_spec_mesh *m, const cav_triangles *t) {
+  cav_status status = cav_hull_build(t->vertex, t->nvertex, &m->hull);
+  if (status == CAV_NO_MEMORY)
+    cav_spec_no_memory(spec);
+  else if (status == CAV_NOT_SUPPORTED)
+    cav_spec_fail(
+        spec, m->node, NULL,
+        "the convex hull of a mesh needs Qhull, which this build is without; use boxes, capsules, ellipsoids or "
+        "cylinders, or build with libqhull-dev and -Dmeshes=enabled");
+  else if (status != CAV_OK)
+    cav_spec_fail(spec, m->node, NULL, "Qhull finds no convex hull of its %d points", t->nvertex);
+}
+
 static void load_mesh(cav_spec *spec, cav_spec_mesh *m) {
   cav_triangles t = {0};
   char reason[200] = "";
@@ -196,12 +209,12 @@ static void load_mesh(cav_spec *spec, cav_spec_mesh *m) {
   if (spec->status == CAV_OK) transform_mesh(m, &t);
   // points alone: their hull is the solid
   if (spec->status == CAV_OK && !t.ntriangle) {
-    if (cav_hull_build(t.vertex, t.nvertex, &m->hull) != CAV_OK || !triangles_of_hull(&m->hull, &t))
-      cav_spec_no_memory(spec);
+    build_hull(spec, m, &t);
+    if (spec->status == CAV_OK && !triangles_of_hull(&m->hull, &t)) cav_spec_no_memory(spec);
     cav_hull_clear(&m->hull);
   }
   if (spec->status == CAV_OK) weigh_mesh(spec, m, &t);
-  if (spec->status == CAV_OK && cav_hull_build(t.vertex, t.nvertex, &m->hull) != CAV_OK) cav_spec_no_memory(spec);
+  if (spec->status == CAV_OK) build_hull(spec, m, &t);
   cav_triangles_clear(&t);
 }
 

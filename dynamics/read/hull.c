@@ -1,55 +1,39 @@
-/// Convex hull of points in space by quickhull (Barber, Dobkin and Huhdanpaa 1996).
+/// Convex hull of points in space: the only user of Qhull (reentrant, libqhull_r).
 ///
-/// Starts from a tetrahedron of extreme points; each point outside is kept with one face that sees it; the furthest point of
-/// a face is added by replacing all faces that it sees with a fan from their horizon. Points within 1e-12 of the size of a
-/// face count as on it. A point whose horizon is no simple circle, by rounding, is left out: it is that near. Afterwards
-/// triangles in one plane to within 1e-6 of the size become one polygon, since files write coordinates in single
-/// precision; the vertices and their neighbours stay those of the triangles, thus support points are exact. Flat sets:
-/// their hull in the plane, seen from both sides.
+/// Sets that are flat to 1e-9 of their size are no task for Qhull: their hull in the plane, seen from both sides, a
+/// segment or a point. The others go to it about the origin at size 1, triangulated. Afterwards triangles in one plane to
+/// within 1e-6 of the size become one polygon, since files write coordinates in single precision; the vertices and their
+/// neighbours stay those of the triangles, thus support points are exact. tests/results/hull.md has the measurements
+/// against the quickhull that was here.
 #include "hull.h"
 
 #include <stdlib.h>
 
 #include "math3.h"
 
+#ifdef CAVORT_HAVE_QHULL
+#include <libqhull_r/qhull_ra.h>
+#endif
+
 static const double ON_FACE = 1e-12, FLAT = 1e-9, ALIKE = 1e-6;
 
 typedef struct triangle {
   int v[3], next[3]; ///< next[i]: across the edge from v[i] to v[i+1]
   double plane[4];
-  int outside; ///< first point that it sees, -1
-  int alive, mark;
+  int alive, mark; ///< alive: 1 until it is part of a polygon, then 2
 } triangle;
 
 typedef struct builder {
   const double *point;
   int n;
-  double size;
+  double size, low[3];
   triangle *face;
-  int nface, room;
-  int *next;  ///< [n] list of points outside
-  int *stack; ///< faces to visit
-  int stack_room;
-  int *horizon; ///< pairs: face beyond, its edge
-  int nhorizon, horizon_room;
-  int *from; ///< [n] new face that starts at a vertex of the horizon, -1
-  int mark;
-  int failed;
+  int nface, mark;
 } builder;
 
 static const double *at(const builder *b, int i) { return b->point + 3 * i; }
 
 static double height(const triangle *t, const double x[3]) { return dot3(t->plane, x) - t->plane[3]; }
-
-static int grow(void **list, int *room, int need, size_t size) {
-  if (need <= *room) return 1;
-  int more = 2 * need + 64;
-  void *moved = realloc(*list, (size_t)more * size);
-  if (!moved) return 0;
-  *list = moved;
-  *room = more;
-  return 1;
-}
 
 // a face through three points; 0 if they are in a line
 static int set_face(const builder *b, triangle *t, int i, int j, int k) {
@@ -58,22 +42,14 @@ static int set_face(const builder *b, triangle *t, int i, int j, int k) {
   sub3(w, at(b, k), at(b, i));
   cross3(n, u, w);
   double area = norm3(n), longest = fmax(norm3(u), norm3(w));
-  *t = (triangle){.v = {i, j, k}, .next = {-1, -1, -1}, .outside = -1, .alive = 1};
+  *t = (triangle){.v = {i, j, k}, .next = {-1, -1, -1}, .alive = 1};
   if (!(area > 1e-14 * longest * longest) || !(longest > 0)) return 0;
   scale3(t->plane, 1 / area, n);
   t->plane[3] = dot3(t->plane, at(b, i));
   return 1;
 }
 
-static int new_face(builder *b) {
-  if (!grow((void **)&b->face, &b->room, b->nface + 1, sizeof *b->face)) {
-    b->failed = 1;
-    return -1;
-  }
-  return b->nface++;
-}
-
-// --- first tetrahedron ---
+// --- extent ---
 
 // point furthest along a measure; -1 if none exceeds least
 static int furthest_line(const builder *b, int i, int j, double *most) {
@@ -119,6 +95,7 @@ static int extremes(builder *b, int found[4]) {
   found[0] = low[axis];
   found[1] = high[axis];
   b->size = at(b, found[1])[axis] - at(b, found[0])[axis];
+  for (int k = 0; k < 3; k++) b->low[k] = at(b, low[k])[k];
   // all points in one, as far as their distance from the origin lets one tell
   if (!(b->size > 1e-13 * largest)) return 1;
   double far;
@@ -130,158 +107,72 @@ static int extremes(builder *b, int found[4]) {
   int fourth = furthest_plane(b, &t, &far);
   if (fourth < 0 || !(far > FLAT * b->size)) return 3;
   found[3] = fourth;
-  if (height(&t, at(b, fourth)) > 0) {
-    int swap = found[0];
-    found[0] = found[1];
-    found[1] = swap;
-  }
   return 4;
 }
 
-// --- growing ---
+// --- Qhull ---
 
-// gives a point to the face among those from first on that it is furthest above; drops it if it is above none
-static void assign(builder *b, int p, int first) {
-  int best = -1;
-  double most = ON_FACE * b->size;
-  for (int f = first; f < b->nface; f++) {
-    double h = b->face[f].alive ? height(&b->face[f], at(b, p)) : 0;
-    if (h > most) most = h, best = f;
-  }
-  if (best < 0) return;
-  b->next[p] = b->face[best].outside;
-  b->face[best].outside = p;
-}
+#ifdef CAVORT_HAVE_QHULL
 
-static void link_faces(builder *b, int f, int edge, int g) {
-  triangle *t = &b->face[f], *u = &b->face[g];
-  int from = t->v[edge], to = t->v[(edge + 1) % 3];
-  t->next[edge] = g;
+// corners counterclockwise from outside and the triangles beyond their edges; the plane in the coordinates of the points
+static void read_facet(const builder *b, qhT *qh, facetT *facet, triangle *t) {
+  // Qhull's neighbour k is opposite to its vertex k, and its order is clockwise where it says so
+  int order[3] = {0, facet->toporient ? 2 : 1, facet->toporient ? 1 : 2};
+  *t = (triangle){.alive = 1};
   for (int k = 0; k < 3; k++) {
-    if (u->v[k] == to && u->v[(k + 1) % 3] == from) u->next[k] = f;
+    t->v[k] = qh_pointid(qh, SETelemt_(facet->vertices, order[k], vertexT)->point);
+    t->next[k] = SETelemt_(facet->neighbors, order[(k + 2) % 3], facetT)->visitid;
   }
+  copy3(t->plane, facet->normal);
+  t->plane[3] = -INFINITY;
+  for (int k = 0; k < 3; k++) t->plane[3] = fmax(t->plane[3], dot3(t->plane, at(b, t->v[k])));
 }
 
-static int start(builder *b, const int v[4]) {
-  static const int corners[4][3] = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
-  for (int f = 0; f < 4; f++) {
-    int i = new_face(b);
-    if (i < 0 || !set_face(b, &b->face[i], v[corners[f][0]], v[corners[f][1]], v[corners[f][2]])) return 0;
+static cav_status read_facets(builder *b, qhT *qh) {
+  facetT *facet;
+  b->face = malloc(sizeof *b->face * (size_t)(qh->num_facets + 1));
+  if (!b->face) return CAV_NO_MEMORY;
+  int count = 0;
+  FORALLfacets {
+    if (!facet->simplicial) return CAV_INTERNAL;
+    facet->visitid = (unsigned)count++;
   }
-  for (int f = 0; f < 4; f++) {
-    for (int g = 0; g < 4; g++) {
-      for (int k = 0; k < 3; k++) {
-        for (int l = 0; l < 3; l++) {
-          if (b->face[f].v[k] == b->face[g].v[(l + 1) % 3] && b->face[f].v[(k + 1) % 3] == b->face[g].v[l])
-            b->face[f].next[k] = g;
-        }
-      }
+  FORALLfacets read_facet(b, qh, facet, &b->face[b->nface++]);
+  return CAV_OK;
+}
+
+// triangles of the hull of points that are not flat
+static cav_status triangulate(builder *b) {
+  char command[] = "qhull Qt", *said = NULL;
+  size_t length;
+  double *moved = malloc(sizeof *moved * 3 * (size_t)b->n);
+  // Qhull wants a file for what it has to say: one that nobody reads
+  FILE *silent = open_memstream(&said, &length);
+  cav_status status = CAV_NO_MEMORY;
+  if (moved && silent) {
+    qhT qh;
+    int blocks, left;
+    for (int i = 0; i < b->n; i++) {
+      for (int k = 0; k < 3; k++) moved[3 * i + k] = (at(b, i)[k] - b->low[k]) / b->size - 0.5;
     }
+    qh_zero(&qh, silent);
+    int failed = qh_new_qhull(&qh, 3, b->n, moved, False, command, silent, silent);
+    status = !failed ? read_facets(b, &qh) : failed == qh_ERRmem ? CAV_NO_MEMORY : CAV_BAD_INPUT;
+    qh_freeqhull(&qh, !qh_ALL);
+    qh_memfreeshort(&qh, &left, &blocks);
   }
-  for (int p = 0; p < b->n; p++) {
-    if (p != v[0] && p != v[1] && p != v[2] && p != v[3]) assign(b, p, 0);
-  }
-  return 1;
+  if (silent) fclose(silent);
+  free(said);
+  free(moved);
+  return status;
 }
+#else
 
-// marks the faces that see a point, from one of them on, and lists the edges beyond which none does; 0 without memory
-static int find_horizon(builder *b, int f, const double x[3]) {
-  int count = 1;
-  b->mark++;
-  b->nhorizon = 0;
-  if (!grow((void **)&b->stack, &b->stack_room, 1, sizeof *b->stack)) return 0;
-  b->stack[0] = f;
-  b->face[f].mark = b->mark;
-  for (int i = 0; i < count; i++) {
-    const triangle *t = &b->face[b->stack[i]];
-    for (int k = 0; k < 3; k++) {
-      triangle *u = &b->face[t->next[k]];
-      if (u->mark == b->mark) continue;
-      if (height(u, x) > ON_FACE * b->size) {
-        if (!grow((void **)&b->stack, &b->stack_room, count + 1, sizeof *b->stack)) return 0;
-        u->mark = b->mark;
-        b->stack[count++] = t->next[k];
-      } else {
-        if (!grow((void **)&b->horizon, &b->horizon_room, 2 * b->nhorizon + 2, sizeof *b->horizon)) return 0;
-        b->horizon[2 * b->nhorizon] = b->stack[i];
-        b->horizon[2 * b->nhorizon++ + 1] = k;
-      }
-    }
-  }
-  // what was a neighbour when it was listed may have been found to see the point later
-  int kept = 0;
-  for (int i = 0; i < b->nhorizon; i++) {
-    const triangle *t = &b->face[b->horizon[2 * i]];
-    if (b->face[t->next[b->horizon[2 * i + 1]]].mark == b->mark) continue;
-    b->horizon[2 * kept] = b->horizon[2 * i];
-    b->horizon[2 * kept++ + 1] = b->horizon[2 * i + 1];
-  }
-  b->nhorizon = kept;
-  return count;
+static cav_status triangulate(builder *b) {
+  (void)b;
+  return CAV_NOT_SUPPORTED;
 }
-
-// a fan from a point to the horizon; 0 if that is no simple circle or a triangle of it has no area: nothing is changed
-static int add_fan(builder *b, int p) {
-  int first = b->nface, good = 1;
-  for (int i = 0; i < b->nhorizon && good; i++) {
-    int f = new_face(b);
-    if (f < 0) return 0;
-    const triangle *t = &b->face[b->horizon[2 * i]];
-    int k = b->horizon[2 * i + 1], from = t->v[k], to = t->v[(k + 1) % 3];
-    good = set_face(b, &b->face[f], from, to, p) && b->from[from] < 0;
-    if (b->from[from] < 0) b->from[from] = f;
-  }
-  for (int f = first; f < b->nface && good; f++) good = b->from[b->face[f].v[1]] >= 0;
-  // one circle, not several
-  int steps = 0;
-  for (int f = first; good && steps <= b->nhorizon; steps++) {
-    f = b->from[b->face[f].v[1]];
-    if (f == first) break;
-  }
-  good = good && steps + 1 == b->nhorizon;
-  for (int f = first; f < b->nface && good; f++) {
-    triangle *t = &b->face[f];
-    const int *h = b->horizon + 2 * (f - first);
-    t->next[1] = b->from[t->v[1]];
-    b->face[t->next[1]].next[2] = f;
-    link_faces(b, f, 0, b->face[h[0]].next[h[1]]);
-  }
-  for (int f = first; f < b->nface; f++) b->from[b->face[f].v[0]] = -1;
-  if (!good) b->nface = first;
-  return good;
-}
-
-// the furthest point above a face joins the hull
-static void extend(builder *b, int f) {
-  int p = -1, before = -1;
-  double most = -INFINITY;
-  for (int i = b->face[f].outside, last = -1; i >= 0; last = i, i = b->next[i]) {
-    double h = height(&b->face[f], at(b, i));
-    if (h > most) most = h, p = i, before = last;
-  }
-  if (before < 0)
-    b->face[f].outside = b->next[p];
-  else
-    b->next[before] = b->next[p];
-  int seen = find_horizon(b, f, at(b, p)), first = b->nface;
-  if (!seen) b->failed = 1;
-  if (b->failed || !add_fan(b, p)) return;
-  for (int i = 0; i < seen; i++) {
-    triangle *t = &b->face[b->stack[i]];
-    t->alive = 0;
-    for (int q = t->outside, after; q >= 0; q = after) {
-      after = b->next[q];
-      assign(b, q, first);
-    }
-    t->outside = -1;
-  }
-}
-
-static void grow_hull(builder *b) {
-  for (int f = 0; f < b->nface && !b->failed; f++) {
-    while (b->face[f].alive && b->face[f].outside >= 0 && !b->failed) extend(b, f);
-  }
-}
+#endif
 
 // --- result ---
 
@@ -535,26 +426,17 @@ cav_status cav_hull_build(const double *point, int n, cav_hull *hull) {
   builder b = {.point = point, .n = n};
   int v[4];
   *hull = (cav_hull){.nvertex = 0};
-  cav_status status = CAV_NO_MEMORY;
   int count = n > 0 ? extremes(&b, v) : 0;
-  b.next = malloc(sizeof *b.next * ((size_t)n + 1));
-  b.from = malloc(sizeof *b.from * ((size_t)n + 1));
-  if (b.next && b.from) {
-    for (int i = 0; i < n; i++) b.from[i] = -1;
-    if (count == 4 && start(&b, v)) {
-      grow_hull(&b);
-      if (!b.failed) status = finish(&b, hull);
-    } else if (count >= 3 && !b.failed) {
-      status = finish_polygon(&b, v, hull);
-    } else if (!b.failed) {
-      status = finish_line(&b, v, count, hull);
-    }
+  cav_status status;
+  if (count == 4) {
+    status = isfinite(b.size) ? triangulate(&b) : CAV_BAD_INPUT;
+    if (status == CAV_OK) status = finish(&b, hull);
+  } else if (count == 3) {
+    status = finish_polygon(&b, v, hull);
+  } else {
+    status = finish_line(&b, v, count, hull);
   }
-  free(b.next);
-  free(b.from);
   free(b.face);
-  free(b.stack);
-  free(b.horizon);
   if (status != CAV_OK) cav_hull_clear(hull);
   return status;
 }
