@@ -110,12 +110,12 @@ static inline int hull_set(int kind, double *point) {
 
 /// What is wrong with a hull, lengths as fractions of the size of the set.
 typedef struct hull_faults {
-  double outside;  ///< how far points reach beyond the vertices, over directions and face normals
-  double above;    ///< how far points are above planes of faces
-  double inverted; ///< how far faces look inwards: 1 for each corner sequence that is clockwise
-  int open;        ///< edges that are not of exactly two faces, one each way
-  int euler;       ///< V - E + F - 2 where there are faces
-  int lost;        ///< directions in which walking from neighbour to neighbour does not end at the top
+  double outside; ///< how far points reach beyond the vertices, over directions and face normals
+  double above;   ///< how far points are above planes of faces
+  int inverted;   ///< faces whose corners are clockwise from outside
+  int open;       ///< edges that are not of exactly two faces, one each way
+  int euler;      ///< V - E + F - 2 where there are faces
+  int lost;       ///< directions in which walking from neighbour to neighbour does not end at the top
 } hull_faults;
 
 static inline double hull_top(const double *x, int n, const double d[3]) {
