@@ -112,6 +112,7 @@ typedef struct cav_workspace {
   size_t solver_bytes;
   cav_memory *memory;
   int nmemory, memory_room;
+  struct cav_hessian *hessian; // made by the first Newton step
 } cav_workspace;
 
 /// Room for one more contact or row at the end of the state's arrays; NULL if memory runs out. storage.c.

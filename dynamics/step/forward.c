@@ -20,16 +20,22 @@
 #include <string.h>
 
 #include "algebra.h"
-#include "impulse.h"
+#include "hessian.h"
+#include "island.h"
 #include "math3.h"
 
-enum { BLOCK = CAV_IMPULSE_DIM * CAV_IMPULSE_DIM, DEFAULT_ITERATIONS = 100, SEARCH_STEPS = 60, STALLS = 4, POLISH = 2 };
+enum { BLOCK = CAV_CURVATURE, DEFAULT_ITERATIONS = 100, SEARCH_STEPS = 60, STALLS = 4, POLISH = 2 };
 
 static const double DEFAULT_TOLERANCE = 1e-13, SHORTEST_STEP = 0.02;
 
 // the solver's own arrays; names as in the text above
 typedef struct newton {
   cav_impulse problem;
+  cav_islands islands;
+  cav_impulse part; // the problem with the blocks of the island in hand, or all
+  int ndof;         // its dofs
+  const int *dof;   // [ndof]
+  cav_hessian *hessian;
   const double *q, *v, *u;
   double *y, *f;           // [nrow] J x and impulses there
   double *derivative;      // [nrow] J d
@@ -40,8 +46,8 @@ typedef struct newton {
   double *step, *momentum; // [nv] d; M (x - anchor) or M d
   double *gradient;        // [nv]
   double *best, *found;    // [nv] best iterate; inverse there
-  double *matrix;          // [nv*nv] Hessian, its factors
-  double *smooth;          // [nv*nv] derivative of h times the smooth inverse, not for euler
+  double *matrix;          // [nv*nv] derivative of h times the inverse, not for euler
+  double *smooth;          // [nv*nv] that of the smooth part alone, not for euler
   int have_smooth;
   double error, scale; // of the last measurement
   int iterations, limit;
@@ -63,9 +69,30 @@ static void copy(double *to, const double *from, int n) {
   if (n > 0) memcpy(to, from, (size_t)n * sizeof *to);
 }
 
+// from now on the island in hand is all there is: a problem of its own
+static void enter_island(newton *s, int island) {
+  const cav_islands *all = &s->islands;
+  s->part = s->problem;
+  s->part.block = s->problem.block + all->first_block[island];
+  s->part.nblock = all->first_block[island + 1] - all->first_block[island];
+  s->dof = all->dof + all->first_dof[island];
+  s->ndof = all->first_dof[island + 1] - all->first_dof[island];
+}
+
+static void leave_island(newton *s) {
+  s->part = s->problem;
+  s->dof = s->islands.dof;
+  s->ndof = s->problem.nv;
+}
+
 static cav_status prepare(newton *s, const cav_model *model, cav_state *state) {
-  const size_t matrices = cav_takes_mean(state) ? 2 : 1;
-  const cav_impulse_room room = {.per_block = BLOCK, .per_row = 5, .per_dof = 8, .per_dof_squared = matrices};
+  const size_t matrices = cav_takes_mean(state) ? 2 : 0;
+  const cav_impulse_room room = {.per_block = BLOCK + CAV_ISLAND_PER_BLOCK,
+                                 .per_row = 5,
+                                 .per_dof = 8 + CAV_ISLAND_PER_DOF,
+                                 .per_dof_squared = matrices};
+  cav_workspace *work = state->work;
+  if (!work->hessian && !(work->hessian = cav_hessian_new())) return CAV_NO_MEMORY;
   const cav_status status = cav_impulse_new(model, state, s->q, s->v, &room, &s->problem);
   if (status != CAV_OK) return status;
   const size_t nv = (size_t)model->nv, nrow = (size_t)s->problem.nrow, nblock = (size_t)s->problem.nblock;
@@ -77,23 +104,27 @@ static cav_status prepare(newton *s, const cav_model *model, cav_state *state) {
   s->curvature = at;
   s->matrix = s->curvature + BLOCK * nblock;
   s->smooth = s->matrix + nv * nv;
-  assert(s->matrix + matrices * nv * nv == s->problem.spare + s->problem.nspare);
+  const size_t room_of_islands = CAV_ISLAND_PER_BLOCK * nblock + CAV_ISLAND_PER_DOF * nv;
+  assert(s->matrix + matrices * nv * nv + room_of_islands == s->problem.spare + s->problem.nspare);
+  cav_islands_find(&s->problem, s->matrix + matrices * nv * nv, &s->islands);
+  s->hessian = work->hessian;
+  leave_island(s);
   return CAV_OK;
 }
 
 // impulses at y; with their curvature or the potential if asked
 static double laws(newton *s, const double *y, double *f, double *curvature, int potential) {
   double sum = 0.0, psi = 0.0;
-  for (int b = 0; b < s->problem.nblock; b++) {
-    cav_impulse_law(&s->problem, &s->problem.block[b], y, f, curvature ? curvature + BLOCK * b : NULL,
+  for (int b = 0; b < s->part.nblock; b++) {
+    cav_impulse_law(&s->part, &s->part.block[b], y, f, curvature ? curvature + BLOCK * b : NULL,
                     potential ? &psi : NULL);
     sum += psi;
   }
   return sum;
 }
 
-// matrix := matrix + J' H J, lower triangle only or whole
-static void add_constraints(newton *s, int whole) {
+// matrix := matrix + J' H J
+static void add_constraints(newton *s) {
   const int nv = s->problem.nv;
   for (int b = 0; b < s->problem.nblock; b++) {
     const cav_block *block = &s->problem.block[b];
@@ -105,7 +136,6 @@ static void add_constraints(newton *s, int whole) {
       for (int k = 0; k < dim; k++)
         for (int l = 0; l < dim; l++) bent[k] += H[k * dim + l] * J[l * n + i];
       for (int j = 0; j < n; j++) {
-        if (!whole && block->dof[j] > block->dof[i]) continue;
         double sum = 0.0;
         for (int k = 0; k < dim; k++) sum += bent[k] * J[k * n + j];
         to[block->dof[j]] += sum;
@@ -114,70 +144,51 @@ static void add_constraints(newton *s, int whole) {
   }
 }
 
-// matrix := M + J' H J, lower triangle
-static void fill_hessian(newton *s) {
-  const cav_impulse *p = &s->problem;
-  const cav_workspace *work = p->state->work;
-  memset(s->matrix, 0, (size_t)p->nv * (size_t)p->nv * sizeof *s->matrix);
-  for (int i = 0; i < p->nv; i++) {
-    const double *M = p->M + work->row[i];
-    for (int j = i, k = 0; j >= 0; j = work->parent[j], k++) s->matrix[i * p->nv + j] = M[k];
-  }
-  add_constraints(s, 0);
+// sums over the dofs of the island in hand
+static double largest_of(const newton *s, const double *x) {
+  double most = 0.0;
+  for (int e = 0; e < s->ndof; e++) most = fmax(most, fabs(x[s->dof[e]]));
+  return most;
 }
 
-// matrix = L' D L from the last dof to the first, touching only what is not zero. No pivot can fall below that of M
-// itself, so rounding in a very stiff constraint cannot make the matrix indefinite
-static void factor_hessian(newton *s) {
-  const int nv = s->problem.nv, *row = s->problem.state->work->row;
-  for (int k = nv - 1; k >= 0; k--) {
-    double *Ak = s->matrix + k * nv;
-    const double least = s->problem.L[row[k]];
-    if (!(Ak[k] >= least)) Ak[k] = least;
-    for (int i = k - 1; i >= 0; i--) {
-      if (Ak[i] == 0.0) continue;
-      const double ratio = Ak[i] / Ak[k];
-      double *Ai = s->matrix + i * nv;
-      for (int j = 0; j <= i; j++) Ai[j] -= ratio * Ak[j];
-      Ak[i] = ratio;
-    }
-  }
+static double dot_of(const newton *s, const double *a, const double *b) {
+  double sum = 0.0;
+  for (int e = 0; e < s->ndof; e++) sum += a[s->dof[e]] * b[s->dof[e]];
+  return sum;
 }
 
-static void solve_hessian(const newton *s, double *x) {
-  const int nv = s->problem.nv;
-  for (int k = nv - 1; k >= 0; k--)
-    for (int i = 0; i < k; i++) x[i] -= s->matrix[k * nv + i] * x[k];
-  for (int k = 0; k < nv; k++) {
-    x[k] /= s->matrix[k * nv + k];
-    for (int i = 0; i < k; i++) x[k] -= s->matrix[k * nv + i] * x[i];
-  }
-}
-
-// gradient of the convex potential at x
+// gradient of the convex potential at x, the island's
 static void fill_gradient(newton *s) {
-  const int nv = s->problem.nv;
-  for (int i = 0; i < nv; i++) s->step[i] = s->x[i] - s->anchor[i];
-  cav_impulse_inertia(&s->problem, s->step, s->momentum);
-  for (int i = 0; i < nv; i++) s->gradient[i] = s->momentum[i] + s->base[i];
-  cav_impulse_push(&s->problem, -1.0, s->f, s->gradient);
+  for (int e = 0; e < s->ndof; e++) s->step[s->dof[e]] = s->x[s->dof[e]] - s->anchor[s->dof[e]];
+  cav_island_inertia(&s->part, s->ndof, s->dof, s->step, s->momentum);
+  for (int e = 0; e < s->ndof; e++) s->gradient[s->dof[e]] = s->momentum[s->dof[e]] + s->base[s->dof[e]];
+  cav_impulse_push(&s->part, -1.0, s->f, s->gradient);
+}
+
+// sum over the rows of the island of a_i b_i
+static double dot_rows(const newton *s, const double *a, const double *b) {
+  double sum = 0.0;
+  for (int k = 0; k < s->part.nblock; k++)
+    sum += dot(a + s->part.block[k].first, b + s->part.block[k].first, s->part.block[k].dim);
+  return sum;
 }
 
 // least point of the potential along step, by its derivative: Newton within a shrinking bracket. Returns how far to go
 static double search(newton *s) {
-  const cav_impulse *p = &s->problem;
-  const int nv = p->nv, nrow = p->nrow;
-  double linear = 0.0, bend = 0.0, low = 0.0, high = INFINITY, length = 1.0;
-  for (int i = 0; i < nv; i++) linear += s->step[i] * (s->momentum[i] + s->base[i]);
-  cav_impulse_inertia(p, s->step, s->found);
-  bend = dot(s->step, s->found, nv);
+  const cav_impulse *p = &s->part;
+  double linear = dot_of(s, s->step, s->momentum) + dot_of(s, s->step, s->base), low = 0.0, high = INFINITY,
+         length = 1.0;
+  cav_island_inertia(p, s->ndof, s->dof, s->step, s->found);
+  const double bend = dot_of(s, s->step, s->found);
   cav_impulse_rows(p, s->step, s->derivative);
-  const double pull = dot(s->derivative, s->f, nrow), start = linear - pull;
+  const double pull = dot_rows(s, s->derivative, s->f), start = linear - pull;
   const double noise = 4.0 * DBL_EPSILON * (fabs(linear) + fabs(pull));
   for (int k = 0; k < SEARCH_STEPS; k++) {
-    for (int i = 0; i < nrow; i++) s->try_y[i] = s->y[i] + length * s->derivative[i];
+    for (int b = 0; b < p->nblock; b++)
+      for (int i = p->block[b].first; i < p->block[b].first + p->block[b].dim; i++)
+        s->try_y[i] = s->y[i] + length * s->derivative[i];
     laws(s, s->try_y, s->try_f, s->curvature, 0);
-    const double derivative = linear + length * bend - dot(s->derivative, s->try_f, nrow);
+    const double derivative = linear + length * bend - dot_rows(s, s->derivative, s->try_f);
     // short of the minimum a rough answer will do, beyond it a close one is needed to be sure of descent
     if ((derivative <= 0.0 && derivative >= 0.3 * start) || fabs(derivative) <= fmax(1e-3 * fabs(start), noise)) break;
     double curve = bend;
@@ -198,72 +209,116 @@ static double search(newton *s) {
 
 // start of the convex problem: where it is lower, x or where the smooth forces alone lead
 static void choose_start(newton *s) {
-  const cav_impulse *p = &s->problem;
-  const int nv = p->nv;
+  const cav_impulse *p = &s->part;
+  for (int e = 0; e < s->ndof; e++) s->step[s->dof[e]] = s->base[s->dof[e]];
+  cav_island_fall(p, s->ndof, s->dof, s->step);
+  const double fall = 0.5 * dot_of(s, s->base, s->step);
+  for (int e = 0; e < s->ndof; e++) s->step[s->dof[e]] = s->x[s->dof[e]] - s->step[s->dof[e]];
   cav_impulse_rows(p, s->x, s->y);
   const double stay = laws(s, s->y, s->f, NULL, 1);
-  copy(s->step, s->base, nv);
-  cav_ldl_solve(p->model, p->state->work, p->L, s->step);
-  const double fall = 0.5 * dot(s->base, s->step, nv);
-  for (int i = 0; i < nv; i++) s->step[i] = s->x[i] - s->step[i];
   cav_impulse_rows(p, s->step, s->try_y);
   const double go = laws(s, s->try_y, s->try_f, NULL, 1) - fall;
-  if (go < stay) copy(s->x, s->step, nv);
+  if (go < stay)
+    for (int e = 0; e < s->ndof; e++) s->x[s->dof[e]] = s->step[s->dof[e]];
 }
 
-// minimises the potential with smooth forces linear in M about x, to tolerance of the largest force or until it stalls
-static cav_status solve_convex(newton *s, double tolerance) {
-  const cav_impulse *p = &s->problem;
-  const int nv = p->nv;
-  copy(s->anchor, s->x, nv);
-  const cav_status status = cav_impulse_smooth(p, s->v, s->u, s->x, s->base);
-  if (status != CAV_OK) return status;
-  // impulses where v_next = v say nothing about those of the solution, so the first pass does not count them
-  const double scale = p->state->options.timestep * (s->iterations > 0 ? s->scale : largest(s->u, nv));
+// adds to error [nv] what rounding of J x and of v* changes in the force of one block, relative to the rounding
+static void add_row_rounding(const newton *s, int b, double *error) {
+  const cav_impulse *p = &s->part;
+  const cav_block *block = &p->block[b];
+  const double *H = s->curvature + BLOCK * b;
+  for (int i = 0; i < block->dim; i++) {
+    const double *J = block->J + i * block->ndof;
+    double size = fabs(p->target[block->first + i]);
+    for (int k = 0; k < block->ndof; k++) size += fabs(J[k] * s->x[block->dof[k]]);
+    for (int j = 0; j < block->dim; j++)
+      for (int k = 0; k < block->ndof; k++)
+        error[block->dof[k]] += fabs(block->J[j * block->ndof + k] * H[j * block->dim + i]) * size;
+  }
+}
+
+// largest error of a momentum that rounding of x causes: through inertia, terms times, and through the constraints with
+// their curvature at x. room [nv] is overwritten
+static double momentum_rounding(const newton *s, double terms, double *room) {
+  const cav_workspace *work = s->part.state->work;
+  for (int e = 0; e < s->ndof; e++) {
+    const int i = s->dof[e];
+    const double *M = s->part.M + work->row[i];
+    room[i] = terms * fabs(M[0] * s->x[i]);
+    for (int j = work->parent[i], k = 1; j >= 0; j = work->parent[j], k++) {
+      room[i] += terms * fabs(M[k] * s->x[j]);
+      room[j] += terms * fabs(M[k] * s->x[i]);
+    }
+  }
+  for (int b = 0; b < s->part.nblock; b++) add_row_rounding(s, b, room);
+  return DBL_EPSILON * largest_of(s, room);
+}
+
+// minimises the potential of the island in hand by at most limit iterations; taken counts them
+static cav_status solve_island(newton *s, const int *local, double tolerance, double scale, int limit, int *taken) {
+  const cav_impulse *p = &s->part;
+  cav_status status = CAV_OK;
+  int begun = 0;
+  double before = INFINITY; // largest gradient at the last iterate
+  *taken = 0;
   choose_start(s);
-  for (int first = 1; s->iterations < s->limit; first = 0) {
+  for (int first = 1; *taken < limit; first = 0) {
     cav_impulse_rows(p, s->x, s->y);
     laws(s, s->y, s->f, s->curvature, 0);
     fill_gradient(s);
-    const double inertial = fmax(largest(s->base, nv), largest(s->momentum, nv));
-    if (!first && largest(s->gradient, nv) <= tolerance * fmax(scale, inertial)) break;
-    fill_hessian(s);
-    factor_hessian(s);
-    for (int i = 0; i < nv; i++) s->step[i] = -s->gradient[i];
-    solve_hessian(s, s->step);
-    if (!all_finite(s->step, nv)) return CAV_NOT_FINITE;
-    s->iterations++;
+    const double inertial = fmax(largest_of(s, s->base), largest_of(s, s->momentum)),
+                 error = largest_of(s, s->gradient);
+    if (!first && error <= tolerance * fmax(scale, inertial)) break;
+    // at rounding the gradient only wanders
+    if (!first && error > 0.5 * before && error <= momentum_rounding(s, 1.0, s->step)) break;
+    before = error;
+    if (!begun) status = cav_hessian_begin(s->hessian, p, s->ndof, s->dof, local);
+    begun = 1;
+    if (status == CAV_OK) status = cav_hessian_factor(s->hessian, s->curvature);
+    if (status != CAV_OK) return status;
+    for (int e = 0; e < s->ndof; e++) s->step[s->dof[e]] = -s->gradient[s->dof[e]];
+    status = cav_hessian_solve(s->hessian, s->step);
+    if (status != CAV_OK) return status;
+    for (int e = 0; e < s->ndof; e++)
+      if (!isfinite(s->step[s->dof[e]])) return CAV_NOT_FINITE;
+    ++*taken;
     const double length = search(s);
-    for (int i = 0; i < nv; i++) s->x[i] += length * s->step[i];
-    if (length * largest(s->step, nv) <= 64.0 * DBL_EPSILON * largest(s->x, nv)) break;
+    for (int e = 0; e < s->ndof; e++) s->x[s->dof[e]] += length * s->step[s->dof[e]];
+    if (length * largest_of(s, s->step) <= 64.0 * DBL_EPSILON * largest_of(s, s->x)) break;
   }
   return CAV_OK;
+}
+
+// minimises the potential with smooth forces linear in M about x, island by island, to tolerance of the largest force or
+// to rounding. Iterations are those of the island that takes most
+static cav_status solve_convex(newton *s, double tolerance) {
+  const cav_impulse *p = &s->problem;
+  copy(s->anchor, s->x, p->nv);
+  cav_status status = cav_impulse_smooth(p, s->v, s->u, s->x, s->base);
+  // impulses where v_next = v say nothing about those of the solution, so the first pass does not count them
+  const double scale = p->state->options.timestep * (s->iterations > 0 ? s->scale : largest(s->u, p->nv));
+  int most = 0;
+  cav_hessian_restart(s->hessian);
+  for (int k = 0; k < s->islands.n && status == CAV_OK; k++) {
+    int taken = 0;
+    enter_island(s, k);
+    status = solve_island(s, s->islands.local, tolerance, scale, s->limit - s->iterations, &taken);
+    most = most > taken ? most : taken;
+  }
+  leave_island(s);
+  s->iterations += most;
+  return status;
 }
 
 // largest error of the generalised force that rounding causes: of x through inertia and stiff constraints, and of the
 // largest forces
 static double rounding(newton *s) {
   const cav_impulse *p = &s->problem;
-  double *error = s->gradient;
   cav_impulse_rows(p, s->x, s->y);
   laws(s, s->y, s->f, s->curvature, 0);
-  cav_impulse_inertia(p, s->x, error);
   // two momenta, each at poses that are rounded, or one change of velocity
   const double terms = p->state->options.order == CAV_ORDER_MOMENTUM ? 4.0 : 1.0;
-  for (int i = 0; i < p->nv; i++) error[i] = terms * fabs(error[i]);
-  for (int b = 0; b < p->nblock; b++) {
-    const cav_block *block = &p->block[b];
-    const double *H = s->curvature + BLOCK * b;
-    for (int i = 0; i < block->dim; i++) {
-      const double *J = block->J + i * block->ndof;
-      double size = fabs(p->target[block->first + i]);
-      for (int k = 0; k < block->ndof; k++) size += fabs(J[k] * s->x[block->dof[k]]);
-      for (int j = 0; j < block->dim; j++)
-        for (int k = 0; k < block->ndof; k++)
-          error[block->dof[k]] += fabs(block->J[j * block->ndof + k] * H[j * block->dim + i]) * size;
-    }
-  }
-  return DBL_EPSILON * (largest(error, p->nv) / p->state->options.timestep + 8.0 * s->scale);
+  return momentum_rounding(s, terms, s->gradient) / p->state->options.timestep + 8.0 * DBL_EPSILON * s->scale;
 }
 
 // derivative of h times the smooth inverse with respect to v_next, by columns. It is quadratic in v_next, or
@@ -333,7 +388,7 @@ static cav_status newton_step(newton *s, int *accepted) {
   cav_impulse_rows(&s->problem, s->x, s->y);
   laws(s, s->y, s->f, s->curvature, 0);
   copy(s->matrix, s->smooth, nv * nv);
-  add_constraints(s, 1);
+  add_constraints(s);
   for (int i = 0; i < nv; i++) s->step[i] = s->problem.state->options.timestep * (s->u[i] - s->momentum[i]);
   s->iterations++;
   if (!solve_general(nv, s->matrix, s->step)) return CAV_OK;

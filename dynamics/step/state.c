@@ -7,6 +7,7 @@
 
 #include "derivative_store.h"
 #include "half_step.h"
+#include "hessian.h"
 #include "math3.h"
 #include "step.h"
 
@@ -274,6 +275,7 @@ void cav_state_free(cav_state *state) {
   free(state->work->half_steps);
   cav_derivative_store_free(state->work->derivatives);
   free(state->work->coupling);
+  cav_hessian_free(state->work->hessian);
   free(state->work->solver);
   free(state->work->memory);
   free(state->contact);
@@ -292,4 +294,5 @@ void cav_state_bytes(const cav_state *state, size_t bytes[CAV_PARTS]) {
   bytes[CAV_PART_SOLVERS] += w->solver_bytes + w->readout_room * sizeof(double);
   bytes[CAV_PART_SOLVERS] += (size_t)w->memory_room * sizeof *w->memory + w->coupling_room * sizeof *w->coupling;
   bytes[CAV_PART_SOLVERS] += cav_derivative_store_bytes(w->derivatives);
+  bytes[CAV_PART_SOLVERS] += cav_hessian_bytes(w->hessian);
 }

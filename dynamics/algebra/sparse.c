@@ -1,0 +1,108 @@
+/// Sparse Cholesky factors by SuiteSparse's CHOLMOD: approximate minimum degree, supernodes where they pay. The only user of
+/// CHOLMOD. Same pattern and values, same bits: the ordering is a function of the pattern, and what CHOLMOD does by threads
+/// writes each entry once. The library allocates within every factorisation (the permuted matrix) even
+/// where pattern and factor stay; solutions reuse their room.
+#include "sparse.h"
+
+#include <stdlib.h>
+
+#ifdef CAVORT_HAVE_CHOLMOD
+#include <string.h>
+#include <suitesparse/cholmod.h>
+
+struct cav_sparse {
+  cholmod_common common;
+  cholmod_sparse matrix; // its arrays are the caller's
+  cholmod_factor *factor;
+  cholmod_dense *x, *y, *e; // solution and room of solves
+};
+
+static cav_status status_of(const cav_sparse *s) {
+  if (s->common.status == CHOLMOD_OUT_OF_MEMORY) return CAV_NO_MEMORY;
+  return s->common.status == CHOLMOD_OK ? CAV_OK : CAV_NOT_CONVERGED;
+}
+
+cav_sparse *cav_sparse_new(void) {
+  cav_sparse *s = calloc(1, sizeof *s);
+  if (!s) return NULL;
+  if (!cholmod_start(&s->common)) {
+    free(s);
+    return NULL;
+  }
+  s->common.print = 0;
+  s->common.nmethods = 1;
+  s->common.method[0].ordering = CHOLMOD_AMD;
+  s->common.quick_return_if_not_posdef = 1;
+  return s;
+}
+
+void cav_sparse_free(cav_sparse *s) {
+  if (!s) return;
+  cholmod_free_factor(&s->factor, &s->common);
+  cholmod_free_dense(&s->x, &s->common);
+  cholmod_free_dense(&s->y, &s->common);
+  cholmod_free_dense(&s->e, &s->common);
+  cholmod_finish(&s->common);
+  free(s);
+}
+
+// the caller's arrays, which CHOLMOD reads through pointers that are not const
+static void *borrowed(const void *array) {
+  void *pointer;
+  memcpy(&pointer, &array, sizeof pointer);
+  return pointer;
+}
+
+cav_status cav_sparse_analyse(cav_sparse *s, int n, const int *start, const int *row) {
+  const size_t size = (size_t)n;
+  s->matrix = (cholmod_sparse){.nrow = size,
+                               .ncol = size,
+                               .nzmax = (size_t)start[n],
+                               .p = borrowed(start),
+                               .i = borrowed(row),
+                               .stype = -1,
+                               .itype = CHOLMOD_INT,
+                               .xtype = CHOLMOD_PATTERN,
+                               .dtype = CHOLMOD_DOUBLE,
+                               .sorted = 1,
+                               .packed = 1};
+  cholmod_free_factor(&s->factor, &s->common);
+  s->factor = cholmod_analyze(&s->matrix, &s->common);
+  s->matrix.xtype = CHOLMOD_REAL;
+  return s->factor ? CAV_OK : CAV_NO_MEMORY;
+}
+
+double cav_sparse_entries(const cav_sparse *s) { return s->common.lnz; }
+double cav_sparse_work(const cav_sparse *s) { return s->common.fl; }
+
+cav_status cav_sparse_factor(cav_sparse *s, const double *value) {
+  s->matrix.x = borrowed(value);
+  if (!cholmod_factorize(&s->matrix, s->factor, &s->common)) return status_of(s);
+  return s->factor->minor == s->matrix.ncol ? status_of(s) : CAV_NOT_CONVERGED;
+}
+
+cav_status cav_sparse_solve(cav_sparse *s, const double *b, double *x) {
+  const size_t n = s->matrix.ncol;
+  cholmod_dense right = {
+      .nrow = n, .ncol = 1, .nzmax = n, .d = n, .x = borrowed(b), .xtype = CHOLMOD_REAL, .dtype = CHOLMOD_DOUBLE};
+  if (!cholmod_solve2(CHOLMOD_A, s->factor, &right, NULL, &s->x, NULL, &s->y, &s->e, &s->common)) return status_of(s);
+  memcpy(x, s->x->x, n * sizeof *x);
+  return CAV_OK;
+}
+
+#else
+
+cav_sparse *cav_sparse_new(void) { return NULL; }
+void cav_sparse_free(cav_sparse *sparse) { (void)sparse; }
+cav_status cav_sparse_analyse(cav_sparse *sparse, int n, const int *start, const int *row) {
+  return (void)sparse, (void)n, (void)start, (void)row, CAV_NOT_SUPPORTED;
+}
+double cav_sparse_entries(const cav_sparse *sparse) { return (void)sparse, 0; }
+double cav_sparse_work(const cav_sparse *sparse) { return (void)sparse, 0; }
+cav_status cav_sparse_factor(cav_sparse *sparse, const double *value) {
+  return (void)sparse, (void)value, CAV_NOT_SUPPORTED;
+}
+cav_status cav_sparse_solve(cav_sparse *sparse, const double *b, double *x) {
+  return (void)sparse, (void)b, (void)x, CAV_NOT_SUPPORTED;
+}
+#endif

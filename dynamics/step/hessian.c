@@ -1,0 +1,396 @@
+/// Hessian M + J' H J of one island and its factors, by whichever of two ways takes less work on its structure: elimination of a
+/// dense matrix from the leaves, which keeps the zeros of the trees but fills as the dofs are numbered, or CHOLMOD (sparse.c).
+/// A sparse pattern is that of the blocks' dofs, whether their impulses bend or not, so it holds for all iterations of a step, and
+/// for the next step while the same links are in touch; then nothing is analysed and only CHOLMOD itself allocates.
+#include "hessian.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sparse.h"
+
+// the matrix of one island by its pattern
+typedef struct slot {
+  cav_sparse *sparse;
+  size_t room;      // ints of data
+  int *data;        // all below
+  int nkey, *key;   // what the pattern follows from: sizes, dofs of the island, then of each clique
+  int *start, *row; // lower triangle by columns, local dofs
+  int *inertia;     // places of the entries of the tree-sparse rows, one dof after another
+  int nclique;
+  int *first;  // [nclique+1] of the dofs of each clique among those of all
+  int *place;  // [sum of squares] where each pair of a clique's dofs lies
+  int *square; // [nclique] first of them
+  int ndof, nentry;
+} slot;
+
+struct cav_hessian {
+  const cav_impulse *part; // of the island it is turned to
+  int ndof;
+  const int *dof, *local;
+  int nslot, used, room; // slots, how many of them this step has met
+  slot *slot, *at;       // at: NULL while dense
+  double *value, *x;     // matrix, dense or sparse; right-hand side in local order
+  size_t nvalue, nx;
+  int *clique; // [nblock] of each block
+  size_t nblock;
+};
+
+cav_hessian *cav_hessian_new(void) { return calloc(1, sizeof(cav_hessian)); }
+
+void cav_hessian_free(cav_hessian *h) {
+  if (!h) return;
+  for (int k = 0; k < h->nslot; k++) {
+    cav_sparse_free(h->slot[k].sparse);
+    free(h->slot[k].data);
+  }
+  free(h->slot), free(h->value), free(h->x), free(h->clique);
+  free(h);
+}
+
+size_t cav_hessian_bytes(const cav_hessian *h) {
+  if (!h) return 0;
+  size_t bytes = sizeof *h + (h->nvalue + h->nx) * sizeof(double) + h->nblock * sizeof(int);
+  for (int k = 0; k < h->nslot; k++)
+    bytes += sizeof(slot) + h->slot[k].room * sizeof(int) + (size_t)(8 * cav_sparse_entries(h->slot[k].sparse));
+  return bytes;
+}
+
+void cav_hessian_restart(cav_hessian *h) { h->used = 0; }
+
+// room for count items; what was there is lost. 0 if memory runs out
+static int make_room(void *array, size_t *room, size_t count, size_t size) {
+  void **items = array;
+  if (count <= *room) return 1;
+  free(*items);
+  *room = count + count / 2;
+  *items = malloc(*room * size);
+  if (!*items) *room = 0;
+  return *items != NULL;
+}
+
+// ---------------------------------------------------------------- pattern
+
+// cliques are runs of blocks that see the same dofs; returns their number, of every block its clique
+static int find_cliques(const cav_impulse *p, int *clique, int *ndofs, size_t *pairs) {
+  int n = 0;
+  *ndofs = 0, *pairs = 0;
+  for (int b = 0; b < p->nblock; b++) {
+    const cav_block *block = &p->block[b], *last = &p->block[b > 0 ? b - 1 : 0];
+    const int same =
+        b > 0 && last->ndof == block->ndof && !memcmp(last->dof, block->dof, (size_t)block->ndof * sizeof(int));
+    if (!same) {
+      n++;
+      *ndofs += block->ndof;
+      *pairs += (size_t)block->ndof * (size_t)block->ndof;
+    }
+    clique[b] = n - 1;
+  }
+  return n;
+}
+
+// key: number of dofs and cliques, the dofs, sizes of cliques, their dofs
+static int fill_key(const cav_hessian *h, int nclique, int *key) {
+  const cav_impulse *p = h->part;
+  int n = 2 + h->ndof;
+  key[0] = h->ndof, key[1] = nclique;
+  memcpy(key + 2, h->dof, (size_t)h->ndof * sizeof(int));
+  for (int b = 0; b < p->nblock; b++) {
+    if (b > 0 && h->clique[b] == h->clique[b - 1]) continue;
+    key[n++] = p->block[b].ndof;
+    memcpy(key + n, p->block[b].dof, (size_t)p->block[b].ndof * sizeof(int));
+    n += p->block[b].ndof;
+  }
+  return n;
+}
+
+// numbers in lists by dof: list of dof i is item[first[i]] .. item[first[i+1]-1]
+typedef struct lists {
+  int *first, *item;
+} lists;
+
+// local dofs, at most i, that share an entry with dof i; marked [ndof] holds i+1 for each. Returns their number
+static int neighbours(const cav_hessian *h, const slot *s, const int *member, const lists *of, int i, int *marked,
+                      int *found) {
+  const int *parent = h->part->state->work->parent;
+  int n = 0;
+  for (int j = h->dof[i]; j >= 0; j = parent[j]) {
+    marked[h->local[j]] = i + 1;
+    found[n++] = h->local[j];
+  }
+  for (int e = of->first[i]; e < of->first[i + 1]; e++) {
+    const int c = of->item[e];
+    for (int k = s->first[c]; k < s->first[c + 1]; k++) {
+      const int j = member[k];
+      if (j > i || marked[j] == i + 1) continue;
+      marked[j] = i + 1;
+      found[n++] = j;
+    }
+  }
+  return n;
+}
+
+// where entry (i, j), i >= j, lies
+static int entry_at(const slot *s, int i, int j) {
+  int low = s->start[j], high = s->start[j + 1] - 1;
+  while (low < high) {
+    const int middle = (low + high) / 2;
+    if (s->row[middle] < i)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low;
+}
+
+// places of the inertia's entries and of the pairs of every clique
+static void fill_places(const cav_hessian *h, slot *s, const int *member, const lists *of, int *at) {
+  const int *parent = h->part->state->work->parent;
+  for (int i = 0, e = 0; i < s->ndof; i++)
+    for (int j = h->dof[i]; j >= 0; j = parent[j]) s->inertia[e++] = entry_at(s, i, h->local[j]);
+  for (int j = 0; j < s->ndof; j++) {
+    for (int e = s->start[j]; e < s->start[j + 1]; e++) at[s->row[e]] = e;
+    for (int e = of->first[j]; e < of->first[j + 1]; e++) {
+      const int c = of->item[e], n = s->first[c + 1] - s->first[c], *in = member + s->first[c];
+      int own = 0;
+      while (in[own] != j) own++;
+      for (int k = 0; k < n; k++)
+        if (in[k] >= j) s->place[s->square[c] + k * n + own] = s->place[s->square[c] + own * n + k] = at[in[k]];
+    }
+  }
+}
+
+// room for the slot's arrays, laid out in one piece but for the rows, whose number is not known yet
+static cav_status fill_pattern(cav_hessian *h, slot *s, int *scratch, const int *member) {
+  const int n = s->ndof, members = s->first[s->nclique];
+  int *marked = scratch, *found = marked + n;
+  lists of = {.first = found + n, .item = found + 2 * n + 1};
+  memset(marked, 0, (size_t)n * sizeof(int));
+  memset(of.first, 0, (size_t)(n + 1) * sizeof(int));
+  for (int k = 0; k < members; k++) of.first[member[k] + 1]++;
+  for (int i = 0; i < n; i++) of.first[i + 1] += of.first[i];
+  for (int c = 0; c < s->nclique; c++)
+    for (int k = s->first[c]; k < s->first[c + 1]; k++) of.item[of.first[member[k]]++] = c;
+  for (int i = n; i > 0; i--) of.first[i] = of.first[i - 1];
+  of.first[0] = 0;
+
+  // counts of the columns, then their rows, ascending as i does
+  memset(s->start, 0, (size_t)(n + 1) * sizeof(int));
+  for (int i = 0; i < n; i++)
+    for (int k = neighbours(h, s, member, &of, i, marked, found) - 1; k >= 0; k--) s->start[found[k] + 1]++;
+  for (int j = 0; j < n; j++) s->start[j + 1] += s->start[j];
+  s->nentry = s->start[n];
+  memset(marked, 0, (size_t)n * sizeof(int));
+  int *next = of.item + members;
+  memcpy(next, s->start, (size_t)n * sizeof(int));
+  for (int i = 0; i < n; i++)
+    for (int k = neighbours(h, s, member, &of, i, marked, found) - 1; k >= 0; k--) s->row[next[found[k]]++] = i;
+  fill_places(h, s, member, &of, marked);
+  return cav_sparse_analyse(s->sparse, n, s->start, s->row);
+}
+
+// most entries that the lower triangle can have
+static size_t entry_bound(const cav_hessian *h, size_t pairs) {
+  const cav_impulse *p = h->part;
+  size_t entries = pairs;
+  for (int e = 0; e < h->ndof; e++)
+    entries += (size_t)(p->state->work->row[h->dof[e] + 1] - p->state->work->row[h->dof[e]]);
+  return entries;
+}
+
+// the pattern of the island in a slot, found again or analysed
+static cav_status set_pattern(cav_hessian *h, slot *s) {
+  const cav_impulse *p = h->part;
+  int members = 0;
+  size_t pairs = 0;
+  const int nclique = find_cliques(p, h->clique, &members, &pairs), n = h->ndof;
+  const size_t nkey = (size_t)(2 + n + nclique + members), inertia = entry_bound(h, 0), entries = entry_bound(h, pairs);
+  const size_t fixed = nkey + (size_t)n + 1 + inertia + 2 * (size_t)nclique + 1 + pairs + entries;
+  const size_t scratch = 4 * (size_t)n + 1 + 2 * (size_t)members + nkey;
+  if (fixed + scratch > s->room) {
+    int *data = malloc((fixed + scratch) * 3 / 2 * sizeof(int));
+    if (!data) return CAV_NO_MEMORY;
+    free(s->data);
+    s->data = s->key = data;
+    s->nkey = 0;
+    s->room = (fixed + scratch) * 3 / 2;
+  }
+  int *fresh = s->data + s->room - nkey;
+  const int ints = fill_key(h, nclique, fresh);
+  if (s->nkey == ints && !memcmp(fresh, s->key, nkey * sizeof(int))) return CAV_OK;
+  memmove(s->key, fresh, nkey * sizeof(int));
+  s->nkey = 0; // until it is whole
+  s->ndof = n;
+  s->nclique = nclique;
+  s->start = s->key + nkey;
+  s->inertia = s->start + n + 1;
+  s->first = s->inertia + inertia;
+  s->square = s->first + nclique + 1;
+  s->place = s->square + nclique;
+  s->row = s->place + pairs;
+  int *member = s->row + entries, *free_ints = member + members, e = 0;
+  s->first[0] = 0;
+  for (int b = 0, c = 0, squares = 0; b < p->nblock; b++) {
+    if (b > 0 && h->clique[b] == h->clique[b - 1]) continue;
+    for (int k = 0; k < p->block[b].ndof; k++) member[e++] = h->local[p->block[b].dof[k]];
+    s->square[c++] = squares;
+    s->first[c] = e;
+    squares += p->block[b].ndof * p->block[b].ndof;
+  }
+  const cav_status status = fill_pattern(h, s, free_ints, member);
+  if (status == CAV_OK) s->nkey = ints;
+  return status;
+}
+
+// the next slot, made if there is none
+static cav_status next_slot(cav_hessian *h) {
+  if (h->used == h->nslot) {
+    if (h->nslot == h->room) {
+      slot *larger = realloc(h->slot, (size_t)(2 * h->room + 1) * sizeof *larger);
+      if (!larger) return CAV_NO_MEMORY;
+      h->slot = larger;
+      h->room = 2 * h->room + 1;
+    }
+    h->slot[h->nslot] = (slot){.sparse = cav_sparse_new()};
+    if (!h->slot[h->nslot].sparse) return CAV_NO_MEMORY;
+    h->nslot++;
+  }
+  h->at = &h->slot[h->used++];
+  return CAV_OK;
+}
+
+cav_status cav_hessian_begin(cav_hessian *h, const cav_impulse *part, int ndof, const int *dof, const int *local) {
+  h->part = part;
+  h->ndof = ndof;
+  h->dof = dof;
+  h->local = local;
+  h->at = NULL;
+  if (!make_room(&h->x, &h->nx, (size_t)ndof, sizeof(double))) return CAV_NO_MEMORY;
+  if (ndof >= 150) {
+    if (!make_room(&h->clique, &h->nblock, (size_t)part->nblock, sizeof(int))) return CAV_NO_MEMORY;
+    cav_status status = next_slot(h);
+    if (status == CAV_OK) status = set_pattern(h, h->at);
+    if (status != CAV_OK) return status;
+  }
+  const size_t entries = h->at ? (size_t)h->at->nentry : (size_t)ndof * (size_t)ndof;
+  return make_room(&h->value, &h->nvalue, entries, sizeof(double)) ? CAV_OK : CAV_NO_MEMORY;
+}
+
+// ---------------------------------------------------------------- values
+
+static int is_zero(const double *H, int n) {
+  for (int i = 0; i < n; i++)
+    if (H[i] != 0.0) return 0;
+  return 1;
+}
+
+// adds J' H J of one block to the lower triangle: entry (k, l) of its dofs at place[k*n+l] of a sparse matrix, or with
+// place NULL by local dofs of a dense one
+static void add_block(cav_hessian *h, const cav_block *block, const double *H, const int *place) {
+  const int n = block->ndof, dim = block->dim, *dof = block->dof;
+  for (int i = 0; i < n; i++) {
+    double bent[6] = {0.0}, *to = h->value + (place ? 0 : (size_t)h->local[dof[i]] * (size_t)h->ndof);
+    for (int k = 0; k < dim; k++)
+      for (int l = 0; l < dim; l++) bent[k] += H[l * dim + k] * block->J[l * n + i];
+    for (int j = 0; j < n; j++) {
+      if (dof[j] > dof[i]) continue;
+      double sum = 0.0;
+      for (int k = 0; k < dim; k++) sum += bent[k] * block->J[k * n + j];
+      to[place ? place[i * n + j] : h->local[dof[j]]] += sum;
+    }
+  }
+}
+
+// adds all blocks whose impulses bend
+static void add_blocks(cav_hessian *h, const double *curvature) {
+  for (int b = 0; b < h->part->nblock; b++) {
+    const cav_block *block = &h->part->block[b];
+    const double *H = curvature + CAV_CURVATURE * b;
+    if (!is_zero(H, block->dim * block->dim))
+      add_block(h, block, H, h->at ? h->at->place + h->at->square[h->clique[b]] : NULL);
+  }
+}
+
+static void fill_sparse(cav_hessian *h, const double *curvature) {
+  const cav_impulse *p = h->part;
+  const slot *s = h->at;
+  const int *row = p->state->work->row;
+  memset(h->value, 0, (size_t)s->nentry * sizeof(double));
+  for (int i = 0, e = 0; i < h->ndof; i++) {
+    const double *M = p->M + row[h->dof[i]];
+    for (int k = 0; k < row[h->dof[i] + 1] - row[h->dof[i]]; k++) h->value[s->inertia[e++]] = M[k];
+  }
+  add_blocks(h, curvature);
+}
+
+static void fill_dense(cav_hessian *h, const double *curvature) {
+  const cav_impulse *p = h->part;
+  const cav_workspace *work = p->state->work;
+  const int n = h->ndof;
+  memset(h->value, 0, (size_t)n * (size_t)n * sizeof(double));
+  for (int e = 0; e < n; e++) {
+    const double *M = p->M + work->row[h->dof[e]];
+    for (int j = h->dof[e], k = 0; j >= 0; j = work->parent[j], k++) h->value[e * n + h->local[j]] = M[k];
+  }
+  add_blocks(h, curvature);
+}
+
+// ---------------------------------------------------------------- factors
+
+// matrix = L' D L from the last dof to the first, touching only what is not zero. No pivot can fall below that of M
+// itself, so rounding in a very stiff constraint cannot make the matrix indefinite
+static void factor_dense(cav_hessian *h) {
+  const int n = h->ndof, *row = h->part->state->work->row;
+  for (int k = n - 1; k >= 0; k--) {
+    double *Ak = h->value + (size_t)k * (size_t)n;
+    const double least = h->part->L[row[h->dof[k]]];
+    if (!(Ak[k] >= least)) Ak[k] = least;
+    for (int i = k - 1; i >= 0; i--) {
+      if (Ak[i] == 0.0) continue;
+      const double ratio = Ak[i] / Ak[k];
+      double *Ai = h->value + (size_t)i * (size_t)n;
+      for (int j = 0; j <= i; j++) Ai[j] -= ratio * Ak[j];
+      Ak[i] = ratio;
+    }
+  }
+}
+
+static void solve_dense(const cav_hessian *h, double *x) {
+  const int n = h->ndof;
+  for (int k = n - 1; k >= 0; k--) {
+    const double *Ak = h->value + (size_t)k * (size_t)n;
+    for (int i = 0; i < k; i++) x[i] -= Ak[i] * x[k];
+  }
+  for (int k = 0; k < n; k++) {
+    const double *Ak = h->value + (size_t)k * (size_t)n;
+    x[k] /= Ak[k];
+    for (int i = 0; i < k; i++) x[k] -= Ak[i] * x[i];
+  }
+}
+
+cav_status cav_hessian_factor(cav_hessian *h, const double *curvature) {
+  if (h->at) {
+    fill_sparse(h, curvature);
+    const cav_status status = cav_sparse_factor(h->at->sparse, h->value);
+    if (status != CAV_NOT_CONVERGED) return status;
+    // rounding in very stiff constraints: only the elimination that knows the least pivots can go on
+    h->at = NULL;
+    if (!make_room(&h->value, &h->nvalue, (size_t)h->ndof * (size_t)h->ndof, sizeof(double))) return CAV_NO_MEMORY;
+  }
+  fill_dense(h, curvature);
+  factor_dense(h);
+  return CAV_OK;
+}
+
+cav_status cav_hessian_solve(cav_hessian *h, double *x) {
+  for (int e = 0; e < h->ndof; e++) h->x[e] = x[h->dof[e]];
+  if (h->at) {
+    const cav_status status = cav_sparse_solve(h->at->sparse, h->x, h->x);
+    if (status != CAV_OK) return status;
+  } else {
+    solve_dense(h, h->x);
+  }
+  for (int e = 0; e < h->ndof; e++) x[h->dof[e]] = h->x[e];
+  return CAV_OK;
+}

@@ -1,0 +1,217 @@
+/// Time of one forward step of heaps of free bodies against its error, beside MuJoCo's Newton solver on the same states of
+/// the same model: elliptic cones, no warm start on either side, constraints of the file, MuJoCo's Jacobian dense and sparse.
+/// Error is that of v_next against the same library's own answer run to the end, relative to the largest entry: the two libraries
+/// find contacts of their own, so answers differ a little. For each number of iterations a time and an error; shown is the
+/// least time that reaches an error. A heap is dropped into a tray and followed by MuJoCo. Beside it scenes that come
+/// apart: the same bodies spread over the floor in piles, and lying alone.
+/// Usage: bench_heap [BODIES...]; default 30 100 300.
+#include "bench.h"
+
+#ifndef CAVORT_HAVE_MUJOCO
+int main(void) {
+  printf("skipped: built without MuJoCo\n");
+  return CHECK_SKIPPED;
+}
+#else
+
+enum { LEVELS = 3, LIMIT = 60, SETTLE = 300 };
+static const double level[LEVELS] = {1e-3, 1e-6, 1e-9};
+
+/// A scene, by both libraries.
+typedef struct heap {
+  mjModel *m;
+  mjData *d;
+  cav_model *model;
+  cav_state *state;
+  double *q, *v, *u, *found, *truth;
+} heap;
+
+/// Times, s, by error; rows and contacts; iterations and error of the last answer; time of what is not the solver.
+typedef struct curve {
+  double time[LEVELS], error, whole;
+  int iterations, contacts, rows;
+} curve;
+
+static double largest(const double *x, int n) {
+  double most = 0;
+  for (int i = 0; i < n; i++) most = fmax(most, fabs(x[i]));
+  return most;
+}
+
+static double apart(const double *a, const double *b, int n) {
+  double most = 0;
+  for (int i = 0; i < n; i++) most = fmax(most, fabs(a[i] - b[i]));
+  return most / fmax(largest(b, n), 1e-6);
+}
+
+static int side_of(int n) { return (int)ceil(cbrt(n)); }
+
+// where body i of n stands before it falls: a heap over a tray as wide as high, piles of five, or alone
+static void place(const char *layout, int i, int n, double at[3]) {
+  const int side = side_of(n);
+  if (!strcmp(layout, "heap")) {
+    const double middle = 0.5 * (side - 1);
+    at[0] = 0.26 * (i % side - middle), at[1] = 0.26 * (i / side % side - middle);
+    at[2] = 0.3 + 0.27 * (i / (side * side));
+  } else {
+    const int high = strcmp(layout, "alone") ? 5 : 1, pile = i / high;
+    at[0] = 1.5 * (pile % 16), at[1] = 1.5 * (pile / 16), at[2] = 0.11 + 0.21 * (i % high);
+  }
+}
+
+static char *text_of(const char *shape, const char *layout, int n) {
+  char *text = malloc(2000 + 300 * (size_t)n), *to = text;
+  const int spread = strcmp(layout, "heap") != 0;
+  to +=
+      sprintf(to,
+              "<mujoco><size nconmax='%d' njmax='%d' nstack='%d'/><option timestep='0.002' cone='elliptic'/><worldbody>"
+              "<geom type='plane' size='50 50 1'/>",
+              8 * n + 100, 24 * n + 300, 40000000);
+  const double half = 0.13 * side_of(n) + 0.15;
+  for (int k = 0; k < 4 && !spread; k++)
+    to += sprintf(to, "<geom type='box' size='%g %g 2' pos='%g %g 2'/>", k < 2 ? 0.1 : half, k < 2 ? half : 0.1,
+                  k < 2 ? half * (2 * k - 1) : 0.0, k < 2 ? 0.0 : half * (2 * k - 5));
+  for (int i = 0; i < n; i++) {
+    double at[3];
+    place(layout, i, n, at);
+    const double tilt = spread ? 0 : 40 * scene_uniform();
+    to += sprintf(to, "<body pos='%g %g %g' euler='%g %g %g'><freejoint/><geom %s density='500'/></body>",
+                  at[0] + (spread ? 0 : 0.02 * scene_uniform()), at[1], at[2], tilt, tilt, 3 * tilt,
+                  !strcmp(shape, "box") ? "type='box' size='.1 .1 .1'" : "type='capsule' size='.06 .07'");
+  }
+  sprintf(to, "</worldbody></mujoco>");
+  return text;
+}
+
+static int load(heap *h, const char *shape, const char *layout, int n) {
+  char path[] = "/tmp/cavort-heap-XXXXXX", why[1000] = "";
+  cav_error error = {0};
+  char *text = text_of(shape, layout, n);
+  const int file = mkstemp(path);
+  if (file < 0 || write(file, text, strlen(text)) != (ssize_t)strlen(text)) return 0;
+  close(file);
+  free(text);
+  *h = (heap){.m = mj_loadXML(path, NULL, why, sizeof why), .model = cav_model_load(path, &error)};
+  unlink(path);
+  if (!h->m || !h->model) {
+    fprintf(stderr, "%s%s\n", why, error.text);
+    return 0;
+  }
+  h->d = mj_makeData(h->m);
+  h->state = cav_state_new(h->model);
+  double **const all[] = {&h->v, &h->u, &h->found, &h->truth};
+  for (int k = 0; k < 4; k++) *all[k] = scene_vector(h->model->nv);
+  h->q = scene_vector(h->model->nq);
+  memset(h->u, 0, (size_t)h->model->nv * sizeof *h->u);
+  return h->state && h->d;
+}
+
+static void unload(heap *h) {
+  mj_deleteData(h->d), mj_deleteModel(h->m);
+  cav_state_free(h->state), cav_model_free(h->model);
+  free(h->q), free(h->v), free(h->u), free(h->found), free(h->truth);
+}
+
+// the heap as it lies after it has fallen
+static void settle(heap *h) {
+  const mjOption kept = h->m->opt;
+  h->m->opt.solver = mjSOL_CG;
+  h->m->opt.jacobian = mjJAC_SPARSE;
+  h->m->opt.iterations = 10;
+  h->m->opt.timestep = 0.004;
+  for (int t = 0; t < SETTLE; t++) mj_step(h->m, h->d);
+  h->m->opt = kept;
+  mju_copy(h->q, h->d->qpos, h->m->nq);
+  mju_copy(h->v, h->d->qvel, h->m->nv);
+}
+
+// one step of MuJoCo from scratch; v_next
+static void theirs(const heap *h, int iterations, double *v_next) {
+  mjModel *m = h->m;
+  m->opt.iterations = iterations;
+  mju_copy(h->d->qpos, h->q, m->nq);
+  mju_copy(h->d->qvel, h->v, m->nv);
+  mj_forward(m, h->d);
+  for (int i = 0; i < m->nv; i++) v_next[i] = h->v[i] + m->opt.timestep * h->d->qacc[i];
+}
+
+static int ours(const heap *h, int iterations, double *v_next) {
+  cav_forward_report report = {0};
+  cav_forward_newton(h->model, h->state, h->q, h->v, h->u, iterations, 1e-13, v_next, &report);
+  return report.iterations;
+}
+
+// jacobian -1: ours
+static curve measure(const heap *h, int jacobian) {
+  curve c = {.error = INFINITY};
+  for (int k = 0; k < LEVELS; k++) c.time[k] = INFINITY;
+  h->m->opt.solver = mjSOL_NEWTON;
+  h->m->opt.tolerance = 0;
+  h->m->opt.disableflags |= mjDSBL_WARMSTART;
+  if (jacobian >= 0) h->m->opt.jacobian = jacobian;
+  if (jacobian < 0)
+    ours(h, 200, h->truth);
+  else
+    theirs(h, 200, h->truth);
+  double before = 0;
+  for (int k = 1; k <= LIMIT && c.error > level[LEVELS - 1]; k++) {
+    double best = INFINITY;
+    int done = k;
+    for (int run = 0; run < 5 && (run < 1 || best < 0.3); run++) {
+      const double start = bench_seconds();
+      if (jacobian < 0)
+        done = ours(h, k, h->found);
+      else
+        theirs(h, k, h->found);
+      best = fmin(best, bench_seconds() - start);
+    }
+    c.error = apart(h->found, h->truth, h->m->nv);
+    for (int l = 0; l < LEVELS; l++)
+      if (c.error <= level[l]) c.time[l] = fmin(c.time[l], best);
+    c.iterations = done;
+    if (getenv("VERBOSE")) printf("    %d iterations: %.2e, %.2f ms\n", k, c.error, 1e3 * best);
+    before = best;
+  }
+  c.whole = before;
+  c.contacts = jacobian < 0 ? h->state->ncontact : h->d->ncon;
+  return c;
+}
+
+static void show(const char *name, const curve *c, const curve *best) {
+  printf("    %-22s %5d contacts, %2d iterations to %7.1e: ", name, c->contacts, c->iterations, c->error);
+  for (int l = 0; l < LEVELS; l++) {
+    printf(" %9.2f ms", 1e3 * c->time[l]);
+    if (best) printf(" (%.2f)", c->time[l] / best->time[l]);
+  }
+  printf("\n");
+}
+
+static void compare(const char *shape, const char *layout, int n) {
+  heap h;
+  if (!CHECK(load(&h, shape, layout, n))) return;
+  settle(&h);
+  const curve dense = n <= 100 ? measure(&h, mjJAC_DENSE) : (curve){.time = {INFINITY, INFINITY, INFINITY}};
+  const curve sparse = measure(&h, mjJAC_SPARSE), own = measure(&h, -1);
+  curve best = dense;
+  for (int l = 0; l < LEVELS; l++) best.time[l] = fmin(dense.time[l], sparse.time[l]);
+  printf("%d %s, %s\n", n, strcmp(shape, "box") ? "capsules" : "boxes", layout);
+  if (dense.contacts) show("MuJoCo, dense", &dense, NULL);
+  show("MuJoCo, sparse", &sparse, NULL);
+  show("cavort (over MuJoCo)", &own, &best);
+  fflush(stdout);
+  unload(&h);
+}
+
+int main(int argc, char **argv) {
+  static const int usual[] = {30, 100, 300};
+  printf("least time of a step whose v_next errs by %.0e, %.0e, %.0e\n", level[0], level[1], level[2]);
+  for (int i = 0; i < (argc > 1 ? argc - 1 : 3); i++) {
+    const int n = argc > 1 ? atoi(argv[i + 1]) : usual[i];
+    compare("box", "heap", n);
+    compare("capsule", "heap", n);
+    if (n == 100) compare("box", "piles", n);
+    if (n == 100) compare("box", "alone", n);
+  }
+  return check_result();
+}
+#endif
