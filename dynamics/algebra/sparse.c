@@ -17,6 +17,8 @@ struct cav_sparse {
   cholmod_dense *x, *y, *e; // solution and room of solves
 };
 
+int cav_sparse_available(void) { return 1; }
+
 static cav_status status_of(const cav_sparse *s) {
   if (s->common.status == CHOLMOD_OUT_OF_MEMORY) return CAV_NO_MEMORY;
   return s->common.status == CHOLMOD_OK ? CAV_OK : CAV_NOT_CONVERGED;
@@ -32,6 +34,7 @@ cav_sparse *cav_sparse_new(void) {
   s->common.print = 0;
   s->common.nmethods = 1;
   s->common.method[0].ordering = CHOLMOD_AMD;
+  s->common.final_ll = 1; // an LDL' factor would not tell a matrix that is not positive definite
   s->common.quick_return_if_not_posdef = 1;
   return s;
 }
@@ -92,6 +95,7 @@ cav_status cav_sparse_solve(cav_sparse *s, const double *b, double *x) {
 
 #else
 
+int cav_sparse_available(void) { return 0; }
 cav_sparse *cav_sparse_new(void) { return NULL; }
 void cav_sparse_free(cav_sparse *sparse) { (void)sparse; }
 cav_status cav_sparse_analyse(cav_sparse *sparse, int n, const int *start, const int *row) {

@@ -6,6 +6,9 @@
 
 typedef struct cav_sparse cav_sparse;
 
+/// Whether the library was built with CHOLMOD.
+int cav_sparse_available(void);
+
 /// NULL if memory runs out, or where the library was built without CHOLMOD.
 cav_sparse *cav_sparse_new(void);
 void cav_sparse_free(cav_sparse *sparse);

@@ -92,7 +92,7 @@ static cav_status prepare(newton *s, const cav_model *model, cav_state *state) {
                                  .per_dof = 8 + CAV_ISLAND_PER_DOF,
                                  .per_dof_squared = matrices};
   cav_workspace *work = state->work;
-  if (!work->hessian && !(work->hessian = cav_hessian_new())) return CAV_NO_MEMORY;
+  if (!work->hessian && !(work->hessian = cav_hessian_new(CAV_SPARSE_FROM))) return CAV_NO_MEMORY;
   const cav_status status = cav_impulse_new(model, state, s->q, s->v, &room, &s->problem);
   if (status != CAV_OK) return status;
   const size_t nv = (size_t)model->nv, nrow = (size_t)s->problem.nrow, nblock = (size_t)s->problem.nblock;
@@ -254,11 +254,24 @@ static double momentum_rounding(const newton *s, double terms, double *room) {
   return DBL_EPSILON * largest_of(s, room);
 }
 
+// step := (M + J' H J)^-1 step for the island in hand; where nothing touches it, the inertia has its factors already
+static cav_status solve_hessian(newton *s, const int *local, int begin) {
+  cav_status status = CAV_OK;
+  if (s->part.nblock == 0) {
+    cav_island_fall(&s->part, s->ndof, s->dof, s->step);
+  } else {
+    if (begin) status = cav_hessian_begin(s->hessian, &s->part, s->ndof, s->dof, local);
+    if (status == CAV_OK) status = cav_hessian_factor(s->hessian, s->curvature);
+    if (status == CAV_OK) status = cav_hessian_solve(s->hessian, s->step);
+  }
+  for (int e = 0; e < s->ndof && status == CAV_OK; e++)
+    if (!isfinite(s->step[s->dof[e]])) status = CAV_NOT_FINITE;
+  return status;
+}
+
 // minimises the potential of the island in hand by at most limit iterations; taken counts them
 static cav_status solve_island(newton *s, const int *local, double tolerance, double scale, int limit, int *taken) {
   const cav_impulse *p = &s->part;
-  cav_status status = CAV_OK;
-  int begun = 0;
   double before = INFINITY; // largest gradient at the last iterate
   *taken = 0;
   choose_start(s);
@@ -272,15 +285,9 @@ static cav_status solve_island(newton *s, const int *local, double tolerance, do
     // at rounding the gradient only wanders
     if (!first && error > 0.5 * before && error <= momentum_rounding(s, 1.0, s->step)) break;
     before = error;
-    if (!begun) status = cav_hessian_begin(s->hessian, p, s->ndof, s->dof, local);
-    begun = 1;
-    if (status == CAV_OK) status = cav_hessian_factor(s->hessian, s->curvature);
-    if (status != CAV_OK) return status;
     for (int e = 0; e < s->ndof; e++) s->step[s->dof[e]] = -s->gradient[s->dof[e]];
-    status = cav_hessian_solve(s->hessian, s->step);
+    const cav_status status = solve_hessian(s, local, *taken == 0);
     if (status != CAV_OK) return status;
-    for (int e = 0; e < s->ndof; e++)
-      if (!isfinite(s->step[s->dof[e]])) return CAV_NOT_FINITE;
     ++*taken;
     const double length = search(s);
     for (int e = 0; e < s->ndof; e++) s->x[s->dof[e]] += length * s->step[s->dof[e]];

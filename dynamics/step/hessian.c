@@ -4,6 +4,7 @@
 /// for the next step while the same links are in touch; then nothing is analysed and only CHOLMOD itself allocates.
 #include "hessian.h"
 
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,6 +27,7 @@ typedef struct slot {
 } slot;
 
 struct cav_hessian {
+  double sparse_from;
   const cav_impulse *part; // of the island it is turned to
   int ndof;
   const int *dof, *local;
@@ -33,11 +35,18 @@ struct cav_hessian {
   slot *slot, *at;       // at: NULL while dense
   double *value, *x;     // matrix, dense or sparse; right-hand side in local order
   size_t nvalue, nx;
-  int *clique; // [nblock] of each block
-  size_t nblock;
+  int nclique, members; // runs of blocks that see the same dofs; their dofs and pairs of dofs in all
+  size_t pairs;
+  int *clique;  // [nblock] of each block
+  double *pair; // [dofs of the largest clique, squared]
+  size_t nblock, npair;
 };
 
-cav_hessian *cav_hessian_new(void) { return calloc(1, sizeof(cav_hessian)); }
+cav_hessian *cav_hessian_new(double sparse_from) {
+  cav_hessian *h = calloc(1, sizeof *h);
+  if (h) h->sparse_from = sparse_from;
+  return h;
+}
 
 void cav_hessian_free(cav_hessian *h) {
   if (!h) return;
@@ -45,17 +54,19 @@ void cav_hessian_free(cav_hessian *h) {
     cav_sparse_free(h->slot[k].sparse);
     free(h->slot[k].data);
   }
-  free(h->slot), free(h->value), free(h->x), free(h->clique);
+  free(h->slot), free(h->value), free(h->x), free(h->clique), free(h->pair);
   free(h);
 }
 
 size_t cav_hessian_bytes(const cav_hessian *h) {
   if (!h) return 0;
-  size_t bytes = sizeof *h + (h->nvalue + h->nx) * sizeof(double) + h->nblock * sizeof(int);
+  size_t bytes = sizeof *h + (h->nvalue + h->nx + h->npair) * sizeof(double) + h->nblock * sizeof(int);
   for (int k = 0; k < h->nslot; k++)
     bytes += sizeof(slot) + h->slot[k].room * sizeof(int) + (size_t)(8 * cav_sparse_entries(h->slot[k].sparse));
   return bytes;
 }
+
+int cav_hessian_sparse_islands(const cav_hessian *h) { return h->used; }
 
 void cav_hessian_restart(cav_hessian *h) { h->used = 0; }
 
@@ -72,29 +83,34 @@ static int make_room(void *array, size_t *room, size_t count, size_t size) {
 
 // ---------------------------------------------------------------- pattern
 
-// cliques are runs of blocks that see the same dofs; returns their number, of every block its clique
-static int find_cliques(const cav_impulse *p, int *clique, int *ndofs, size_t *pairs) {
-  int n = 0;
-  *ndofs = 0, *pairs = 0;
+// cliques are runs of blocks that see the same dofs: numbers the blocks by them. CAV_NO_MEMORY
+static cav_status find_cliques(cav_hessian *h) {
+  const cav_impulse *p = h->part;
+  if (!make_room(&h->clique, &h->nblock, (size_t)p->nblock, sizeof(int))) return CAV_NO_MEMORY;
+  size_t most = 0;
+  h->nclique = h->members = 0;
+  h->pairs = 0;
   for (int b = 0; b < p->nblock; b++) {
     const cav_block *block = &p->block[b], *last = &p->block[b > 0 ? b - 1 : 0];
     const int same =
         b > 0 && last->ndof == block->ndof && !memcmp(last->dof, block->dof, (size_t)block->ndof * sizeof(int));
     if (!same) {
-      n++;
-      *ndofs += block->ndof;
-      *pairs += (size_t)block->ndof * (size_t)block->ndof;
+      const size_t square = (size_t)block->ndof * (size_t)block->ndof;
+      h->nclique++;
+      h->members += block->ndof;
+      h->pairs += square;
+      most = most > square ? most : square;
     }
-    clique[b] = n - 1;
+    h->clique[b] = h->nclique - 1;
   }
-  return n;
+  return h->pairs <= INT_MAX && make_room(&h->pair, &h->npair, most, sizeof(double)) ? CAV_OK : CAV_NO_MEMORY;
 }
 
 // key: number of dofs and cliques, the dofs, sizes of cliques, their dofs
-static int fill_key(const cav_hessian *h, int nclique, int *key) {
+static int fill_key(const cav_hessian *h, int *key) {
   const cav_impulse *p = h->part;
   int n = 2 + h->ndof;
-  key[0] = h->ndof, key[1] = nclique;
+  key[0] = h->ndof, key[1] = h->nclique;
   memcpy(key + 2, h->dof, (size_t)h->ndof * sizeof(int));
   for (int b = 0; b < p->nblock; b++) {
     if (b > 0 && h->clique[b] == h->clique[b - 1]) continue;
@@ -202,9 +218,8 @@ static size_t entry_bound(const cav_hessian *h, size_t pairs) {
 // the pattern of the island in a slot, found again or analysed
 static cav_status set_pattern(cav_hessian *h, slot *s) {
   const cav_impulse *p = h->part;
-  int members = 0;
-  size_t pairs = 0;
-  const int nclique = find_cliques(p, h->clique, &members, &pairs), n = h->ndof;
+  const int nclique = h->nclique, members = h->members, n = h->ndof;
+  const size_t pairs = h->pairs;
   const size_t nkey = (size_t)(2 + n + nclique + members), inertia = entry_bound(h, 0), entries = entry_bound(h, pairs);
   const size_t fixed = nkey + (size_t)n + 1 + inertia + 2 * (size_t)nclique + 1 + pairs + entries;
   const size_t scratch = 4 * (size_t)n + 1 + 2 * (size_t)members + nkey;
@@ -217,7 +232,7 @@ static cav_status set_pattern(cav_hessian *h, slot *s) {
     s->room = (fixed + scratch) * 3 / 2;
   }
   int *fresh = s->data + s->room - nkey;
-  const int ints = fill_key(h, nclique, fresh);
+  const int ints = fill_key(h, fresh);
   if (s->nkey == ints && !memcmp(fresh, s->key, nkey * sizeof(int))) return CAV_OK;
   memmove(s->key, fresh, nkey * sizeof(int));
   s->nkey = 0; // until it is whole
@@ -260,16 +275,35 @@ static cav_status next_slot(cav_hessian *h) {
   return CAV_OK;
 }
 
+// operations of the dense way: squares of what stands left of the diagonal in the rows, and four passes over the matrix.
+// low [ndof] is overwritten
+static double dense_work(const cav_hessian *h, double *low) {
+  const cav_impulse *p = h->part;
+  const int *parent = p->state->work->parent;
+  for (int e = 0; e < h->ndof; e++) low[e] = parent[h->dof[e]] < 0 ? e : low[h->local[parent[h->dof[e]]]];
+  for (int b = 0; b < p->nblock; b++) {
+    const cav_block *block = &p->block[b];
+    if (b > 0 && h->clique[b] == h->clique[b - 1]) continue;
+    double least = h->ndof;
+    for (int k = 0; k < block->ndof; k++) least = fmin(least, h->local[block->dof[k]]);
+    for (int k = 0; k < block->ndof; k++) low[h->local[block->dof[k]]] = fmin(low[h->local[block->dof[k]]], least);
+  }
+  double work = 4.0 * h->ndof * h->ndof;
+  for (int e = 0; e < h->ndof; e++) work += (e - low[e]) * (e - low[e]);
+  return work;
+}
+
 cav_status cav_hessian_begin(cav_hessian *h, const cav_impulse *part, int ndof, const int *dof, const int *local) {
   h->part = part;
   h->ndof = ndof;
   h->dof = dof;
   h->local = local;
   h->at = NULL;
+  cav_status status = find_cliques(h);
+  if (status != CAV_OK) return status;
   if (!make_room(&h->x, &h->nx, (size_t)ndof, sizeof(double))) return CAV_NO_MEMORY;
-  if (ndof >= 150) {
-    if (!make_room(&h->clique, &h->nblock, (size_t)part->nblock, sizeof(int))) return CAV_NO_MEMORY;
-    cav_status status = next_slot(h);
+  if (cav_sparse_available() && dense_work(h, h->x) >= h->sparse_from) {
+    status = next_slot(h);
     if (status == CAV_OK) status = set_pattern(h, h->at);
     if (status != CAV_OK) return status;
   }
@@ -285,30 +319,49 @@ static int is_zero(const double *H, int n) {
   return 1;
 }
 
-// adds J' H J of one block to the lower triangle: entry (k, l) of its dofs at place[k*n+l] of a sparse matrix, or with
-// place NULL by local dofs of a dense one
-static void add_block(cav_hessian *h, const cav_block *block, const double *H, const int *place) {
-  const int n = block->ndof, dim = block->dim, *dof = block->dof;
+// sum [n*n] of J' H J of one block, the part on and right of the diagonal
+static void bend_block(const cav_block *block, const double *H, double *sum) {
+  const int n = block->ndof, dim = block->dim;
   for (int i = 0; i < n; i++) {
-    double bent[6] = {0.0}, *to = h->value + (place ? 0 : (size_t)h->local[dof[i]] * (size_t)h->ndof);
-    for (int k = 0; k < dim; k++)
-      for (int l = 0; l < dim; l++) bent[k] += H[l * dim + k] * block->J[l * n + i];
-    for (int j = 0; j < n; j++) {
-      if (dof[j] > dof[i]) continue;
-      double sum = 0.0;
-      for (int k = 0; k < dim; k++) sum += bent[k] * block->J[k * n + j];
-      to[place ? place[i * n + j] : h->local[dof[j]]] += sum;
+    double *row = sum + (size_t)i * (size_t)n;
+    for (int k = 0; k < dim; k++) {
+      const double *J = block->J + k * n;
+      double bent = 0.0;
+      for (int l = 0; l < dim; l++) bent += H[l * dim + k] * block->J[l * n + i];
+      for (int j = i; j < n; j++) row[j] += bent * J[j];
     }
   }
 }
 
-// adds all blocks whose impulses bend
+// adds to the lower triangle what pairs of a clique's dofs sum up to: at place, or with place NULL by local dofs of a
+// dense matrix
+static void add_pairs(cav_hessian *h, int n, const int *dof, const int *place) {
+  const double *sum = h->pair;
+  for (int i = 0; i < n; i++) {
+    for (int j = i; j < n; j++) {
+      const int a = h->local[dof[i]], b = h->local[dof[j]];
+      const size_t at =
+          place ? (size_t)place[i * n + j] : (size_t)(a > b ? a : b) * (size_t)h->ndof + (size_t)(a > b ? b : a);
+      h->value[at] += sum[i * n + j];
+    }
+  }
+}
+
+// adds all blocks whose impulses bend, clique by clique
 static void add_blocks(cav_hessian *h, const double *curvature) {
-  for (int b = 0; b < h->part->nblock; b++) {
-    const cav_block *block = &h->part->block[b];
-    const double *H = curvature + CAV_CURVATURE * b;
-    if (!is_zero(H, block->dim * block->dim))
-      add_block(h, block, H, h->at ? h->at->place + h->at->square[h->clique[b]] : NULL);
+  const cav_impulse *p = h->part;
+  for (int b = 0; b < p->nblock;) {
+    const cav_block *block = &p->block[b];
+    const int clique = h->clique[b], n = block->ndof;
+    int any = 0;
+    for (; b < p->nblock && h->clique[b] == clique; b++) {
+      const double *H = curvature + CAV_CURVATURE * b;
+      if (is_zero(H, p->block[b].dim * p->block[b].dim)) continue;
+      if (!any) memset(h->pair, 0, (size_t)n * (size_t)n * sizeof(double));
+      bend_block(&p->block[b], H, h->pair);
+      any = 1;
+    }
+    if (any) add_pairs(h, n, block->dof, h->at ? h->at->place + h->at->square[clique] : NULL);
   }
 }
 

@@ -4,13 +4,18 @@
 
 #include "island.h"
 
-enum { CAV_CURVATURE = 36 }; ///< doubles of the curvature -df/dy of one block
+enum { CAV_SPARSE_FROM = 2000000 }; ///< where both ways take the same time on heaps (bench_heap)
+enum { CAV_CURVATURE = 36 };        ///< doubles of the curvature -df/dy of one block
 
 /// Kept by a state from step to step for its memory and its patterns; opaque. hessian.c.
 typedef struct cav_hessian cav_hessian;
-cav_hessian *cav_hessian_new(void);
+/// Islands go to CHOLMOD from sparse_from operations of the dense way on; usual is CAV_SPARSE_FROM.
+cav_hessian *cav_hessian_new(double sparse_from);
 void cav_hessian_free(cav_hessian *hessian);
 size_t cav_hessian_bytes(const cav_hessian *hessian);
+
+/// Islands of the last step that went to CHOLMOD.
+int cav_hessian_sparse_islands(const cav_hessian *hessian);
 
 /// A new step begins: patterns of the last one may be met again.
 void cav_hessian_restart(cav_hessian *hessian);
