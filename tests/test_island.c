@@ -143,7 +143,7 @@ static void test_factors(void) {
     if (j + 1 < N) row[n] = j + 1, value[n++] = -1;
   }
   start[N] = n;
-  cav_sparse *sparse = cav_sparse_new();
+  cav_sparse *sparse = cav_sparse_new(0);
   CHECK(cav_sparse_analyse(sparse, N, start, row) == CAV_OK);
   CHECK(cav_sparse_factor(sparse, value) == CAV_OK);
   CHECK(cav_sparse_entries(sparse) >= n);

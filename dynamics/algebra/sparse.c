@@ -1,7 +1,7 @@
-/// Sparse Cholesky factors by SuiteSparse's CHOLMOD: approximate minimum degree, supernodes where they pay. The only user of
-/// CHOLMOD. Same pattern and values, same bits: the ordering is a function of the pattern, and what CHOLMOD does by threads
-/// writes each entry once. The library allocates within every factorisation (the permuted matrix) even
-/// where pattern and factor stay; solutions reuse their room.
+/// Sparse Cholesky factors by SuiteSparse's CHOLMOD, ordered by approximate minimum degree. The only user of CHOLMOD. Same pattern
+/// and values, same bits: the ordering is a function of the pattern, and what CHOLMOD does by threads writes each entry once.
+/// The library allocates within every factorisation (the permuted matrix) even where pattern and factor stay; solutions
+/// reuse their room.
 #include "sparse.h"
 
 #include <stdlib.h>
@@ -24,7 +24,7 @@ static cav_status status_of(const cav_sparse *s) {
   return s->common.status == CHOLMOD_OK ? CAV_OK : CAV_NOT_CONVERGED;
 }
 
-cav_sparse *cav_sparse_new(void) {
+cav_sparse *cav_sparse_new(int blas) {
   cav_sparse *s = calloc(1, sizeof *s);
   if (!s) return NULL;
   if (!cholmod_start(&s->common)) {
@@ -32,6 +32,7 @@ cav_sparse *cav_sparse_new(void) {
     return NULL;
   }
   s->common.print = 0;
+  s->common.supernodal = blas ? CHOLMOD_AUTO : CHOLMOD_SIMPLICIAL;
   s->common.nmethods = 1;
   s->common.method[0].ordering = CHOLMOD_AMD;
   s->common.final_ll = 1; // an LDL' factor would not tell a matrix that is not positive definite
@@ -96,7 +97,7 @@ cav_status cav_sparse_solve(cav_sparse *s, const double *b, double *x) {
 #else
 
 int cav_sparse_available(void) { return 0; }
-cav_sparse *cav_sparse_new(void) { return NULL; }
+cav_sparse *cav_sparse_new(int blas) { return (void)blas, NULL; }
 void cav_sparse_free(cav_sparse *sparse) { (void)sparse; }
 cav_status cav_sparse_analyse(cav_sparse *sparse, int n, const int *start, const int *row) {
   return (void)sparse, (void)n, (void)start, (void)row, CAV_NOT_SUPPORTED;

@@ -9,8 +9,9 @@ typedef struct cav_sparse cav_sparse;
 /// Whether the library was built with CHOLMOD.
 int cav_sparse_available(void);
 
-/// NULL if memory runs out, or where the library was built without CHOLMOD.
-cav_sparse *cav_sparse_new(void);
+/// blas: supernodes by BLAS where they pay, which is for one thread at a time (OpenBLAS's serial build is not safe from two);
+/// 0: none, any number of threads. NULL if memory runs out, or where the library was built without CHOLMOD.
+cav_sparse *cav_sparse_new(int blas);
 void cav_sparse_free(cav_sparse *sparse);
 
 /// Takes the pattern of the lower triangle by columns: start [n+1], row [start[n]] ascending, the diagonal first. Both must

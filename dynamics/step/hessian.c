@@ -267,7 +267,7 @@ static cav_status next_slot(cav_hessian *h) {
       h->slot = larger;
       h->room = 2 * h->room + 1;
     }
-    h->slot[h->nslot] = (slot){.sparse = cav_sparse_new()};
+    h->slot[h->nslot] = (slot){.sparse = cav_sparse_new(0)};
     if (!h->slot[h->nslot].sparse) return CAV_NO_MEMORY;
     h->nslot++;
   }
