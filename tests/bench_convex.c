@@ -1,7 +1,7 @@
 /// Contacts of all convex pairs without a routine of their own, in poses that are hard: whether the contact is proven
-/// (proof.h), whether any direction is shorter, how smooth its gap is, median time; and what libccd alone finds. Directions
-/// to compare with come from our search, libccd, and climbs by distances of bodies moved apart, from a spiral of starts.
-/// Usage: bench_convex [POSES a pair and kind]
+/// (proof.h), whether any direction is shorter, how smooth its gap is, median time; and what libccd alone finds.
+/// Directions to compare with come from our search, libccd, and climbs by distances of bodies moved apart, from a
+/// spiral of starts. Usage: bench_convex [POSES a pair and kind]
 #include <time.h>
 
 #include "gjk.h"
@@ -122,8 +122,8 @@ static void place(const solid *a, solid *b, int kind) {
 
 // --- directions to compare with ---
 
-// from a direction to a least way out among its neighbours: the nearest points of the bodies moved apart along it tell the
-// next direction, whose gap is not smaller
+// from a direction to a least way out among its neighbours: the nearest points of the bodies moved apart along it
+// tell the next direction, whose gap is not smaller
 static double climb(const solid *a, const solid *b, const double start[3], double size, double small) {
   cav_shape moved = b->shape;
   cav_core ca = cav_core_of(&a->shape), cb = cav_core_of(&moved);

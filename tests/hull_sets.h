@@ -1,5 +1,5 @@
-/// Degenerate sets of points, and what a hull of points must be: measured without the code that builds it. Of each kind the
-/// sets differ in number of points, scale, place and turn.
+/// Degenerate sets of points, and what a hull of points must be: measured without the code that builds it. Of each
+/// kind the sets differ in number of points, scale, place and turn.
 #ifndef CAVORT_TESTS_HULL_SETS_H
 #define CAVORT_TESTS_HULL_SETS_H
 

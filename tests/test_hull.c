@@ -1,5 +1,6 @@
-/// Hulls of degenerate sets of points (hull_sets.h): every set has one, closed, of the right topology, no point outside, and
-/// walking along neighbours ends at the top. Usage: test_hull [SETS]; tests/results/hull.md is of 10,000.
+/// Hulls of degenerate sets of points (hull_sets.h): every set has one, closed, of the right topology, no point
+/// outside, and walking along neighbours ends at the top. Usage: test_hull [SETS]; tests/results/hull.md is of
+/// 10,000.
 #include "check.h"
 #include "hull_sets.h"
 

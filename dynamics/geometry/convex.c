@@ -26,7 +26,7 @@ enum { NEAR_MAX = 12, FEATURES_MAX = NEAR_MAX + NEAR_MAX * (NEAR_MAX - 1) / 2 + 
 // fraction of the size within which corners meet; sine below which a direction is square to another
 static const double MEETS = 1e-2, SQUARE = 1e-9;
 // fractions of the size: gaps that are equal; points that lie across from each other
-static const double TIE = 1e-13, ACROSS = 1e-12;
+static const double LEAST_GAIN = 1e-13, ACROSS = 1e-12;
 // fraction of the size by which the polish improves on a search that has not ended
 static const double LOOSE = 1e-6;
 
@@ -224,7 +224,7 @@ static void climb(const search *g, const feature *fa, const feature *fb, const d
       next = gap_of(g, fa, fb, m, t, r, H);
       // near the top rounding hides that it grows: the derivative falls instead
       double left = square ? fabs(r[0]) : sqrt(r[0] * r[0] + r[1] * r[1]);
-      if (next > gap + TIE * g->size || (next > gap - TIE * g->size && left < 0.9 * derivative)) break;
+      if (next > gap + LEAST_GAIN * g->size || (next > gap - LEAST_GAIN * g->size && left < 0.9 * derivative)) break;
       tangents(n, square, t);
     }
     if (halving == HALVINGS_MAX) return;
@@ -349,7 +349,7 @@ static void keep(search *g, const feature *fa, const feature *fb, const double n
   cav_core_support(g->core, back, far);
   sub3(d, far, x);
   c.separation.gap = dot3(d, n);
-  if (c.separation.gap < g->best.separation.gap - TIE * g->size) return;
+  if (c.separation.gap < g->best.separation.gap - LEAST_GAIN * g->size) return;
   if (fa->straight == 1 && fb->straight == 1) cross_lines(fa, fb, fb->corners ? fb->x[0] : far, x);
   // from the middle of a cap one step tells where it meets anything
   if (fa->straight == 2) copy3(x, g->a->pos);
@@ -366,7 +366,7 @@ static void keep(search *g, const feature *fa, const feature *fb, const double n
   sub3(d, y, x);
   axpy3(d, d, -c.separation.gap, n);
   c.miss = norm3(d);
-  if (c.separation.gap < g->best.separation.gap + TIE * g->size && c.miss >= g->best.miss) return;
+  if (c.separation.gap < g->best.separation.gap + LEAST_GAIN * g->size && c.miss >= g->best.miss) return;
   copy3(c.separation.n, n);
   copy3(c.separation.x, x);
   copy3(c.separation.y, y);
@@ -396,8 +396,8 @@ static int polish(search *g, const double start[3], double least) {
   return 0;
 }
 
-// the polytope ends short of the least way out where a body is in the middle of a large round one: then the axes of both are
-// tried too, either way
+// the polytope ends short of the least way out where a body is in the middle of a large round one: then the axes of
+// both are tried too, either way
 static void polish_elsewhere(search *g) {
   const cav_shape *shapes[2] = {g->a, g->b};
   for (int k = 0; k < 12; k++) {
@@ -406,7 +406,7 @@ static void polish_elsewhere(search *g) {
     column3(n, shapes[k & 1]->rotation, k / 4);
     if (k & 2) scale3(n, -1, n);
     polish(g, n, -INFINITY);
-    if (g->best.separation.gap < best.separation.gap + TIE * g->size) g->best = best;
+    if (g->best.separation.gap < best.separation.gap + LEAST_GAIN * g->size) g->best = best;
   }
 }
 

@@ -10,8 +10,8 @@ typedef struct cav_core {
   double radius;
 } cav_core;
 
-/// Direction of least overlap or of separation, unit, from a to b; points of both that meet along it; signed distance of
-/// the cores along n.
+/// Direction of least overlap or of separation, unit, from a to b; points of both that meet along it; signed distance
+/// of the cores along n.
 typedef struct cav_separation {
   double n[3], x[3], y[3], gap;
 } cav_separation;
@@ -37,8 +37,8 @@ double cav_shape_size(const cav_shape *shape);
 cav_core cav_core_of(const cav_shape *shape);
 void cav_core_support(const cav_core *core, const double direction[3], double point[3]);
 
-/// Finds it to rounding for polyhedra, with an ellipsoid or a cylinder to about 1e-5; 0 if the cores are further apart than
-/// most (out is unchanged). gjk.c.
+/// Finds it to rounding for polyhedra, with an ellipsoid or a cylinder to about 1e-5; 0 if the cores are further
+/// apart than most (out is unchanged). gjk.c.
 int cav_separation_find(const cav_core *a, const cav_core *b, double size, double most, cav_separation *out);
 
 /// The same, exact for all; 0 if the shapes are further apart than margin. convex.c.

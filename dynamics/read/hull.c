@@ -1,10 +1,10 @@
 /// Convex hull of points in space: the only user of Qhull (reentrant, libqhull_r).
 ///
 /// Sets that are flat to 1e-9 of their size are no task for Qhull: their hull in the plane, seen from both sides, a
-/// segment or a point. The others go to it about the origin at size 1, triangulated. Afterwards triangles in one plane to
-/// within 1e-6 of the size become one polygon, since files write coordinates in single precision; the vertices and their
-/// neighbours stay those of the triangles, thus support points are exact. tests/results/hull.md has the measurements
-/// against the quickhull that was here.
+/// segment or a point. The others go to it about the origin at size 1, triangulated. Afterwards triangles in one
+/// plane to within 1e-6 of the size become one polygon, since files write coordinates in single precision; the
+/// vertices and their neighbours stay those of the triangles, thus support points are exact. tests/results/hull.md
+/// has the measurements against the quickhull that was here.
 #include "hull.h"
 
 #include <stdlib.h>
@@ -114,7 +114,8 @@ static int extremes(builder *b, int found[4]) {
 
 #ifdef CAVORT_HAVE_QHULL
 
-// corners counterclockwise from outside and the triangles beyond their edges; the plane in the coordinates of the points
+// corners counterclockwise from outside and the triangles beyond their edges; the plane in the coordinates of the
+// points
 static void read_facet(const builder *b, qhT *qh, facetT *facet, triangle *t) {
   // Qhull's neighbour k is opposite to its vertex k, and its order is clockwise where it says so
   int order[3] = {0, facet->toporient ? 2 : 1, facet->toporient ? 1 : 2};

@@ -16,7 +16,8 @@ typedef struct cav_hull {
 
 /// Hull of points [n*3], finite. Points of no volume give a polygon with two faces, a segment or a single point without
 /// any. Faces that differ from a plane by less than 1e-6 of the size are one. CAV_OK, CAV_NO_MEMORY,
-/// CAV_NOT_SUPPORTED in a build without Qhull, where only flat sets have one, or CAV_BAD_INPUT if Qhull finds none. hull.c.
+/// CAV_NOT_SUPPORTED in a build without Qhull, where only flat sets have one, or CAV_BAD_INPUT if Qhull finds none.
+/// hull.c.
 cav_status cav_hull_build(const double *point, int n, cav_hull *hull);
 void cav_hull_clear(cav_hull *hull);
 
