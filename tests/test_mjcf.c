@@ -135,6 +135,9 @@ static const struct {
     {"sensor_ball", 9, "free or ball"},
     {"two_planes", 9, "two planes"},
     {"autolimits", 4, "is missing where range"},
+#ifndef CAVORT_HAVE_QHULL
+    {"hull_needed", 3, "needs Qhull, which this build is without"},
+#endif
 };
 
 static const char good[] =
