@@ -174,7 +174,55 @@ static void test_file(const char *costs) {
   cav_problem_free(p);
 }
 
+/// A cylinder and a box on a floor and a box on that: several points a pair.
+static const char heap[] =
+    "<mujoco><worldbody><geom name='floor' type='plane' size='1 1 1'/>"
+    "<body pos='0 0 .12'><freejoint/><geom type='cylinder' size='.1 .1' euler='170 8 20'/></body>"
+    "<body pos='.5 0 .1'><freejoint/><geom type='box' size='.1 .1 .1' euler='2 1 30'/></body>"
+    "<body pos='.5 0 .3'><freejoint/><geom type='box' size='.08 .09 .1' euler='3 -2 75'/></body></worldbody></mujoco>";
+
+/// Every point of a pair is read: the forces that a knot reads are those of the contacts of its state, in whose order it walks.
+static void test_every_point_is_read(void) {
+  cav_model *m = scene_load(heap);
+  if (!CHECK(m != NULL)) return;
+  double q0[64], zero[64] = {0};
+  memcpy(q0, m->q0, (size_t)m->nq * sizeof(double));
+  cav_problem p = cav_problem_default(m);
+  p.duration = 0.1;
+  p.q_start = p.q_goal = q0, p.v_start = zero;
+  cav_transcription *tr = transcribe(&p);
+  cav_trajectory *at = cav_trajectory_new(m, tr->nknot, p.timestep);
+  cav_state *state = cav_state_new(m);
+  for (int t = 0; t < at->nknot; t++) memcpy(at->q + t * at->nq, q0, (size_t)at->nq * sizeof(double));
+  cav_trajectory_velocities(m, at);
+  CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
+  state->options = tr->options;
+  double *u = scene_vector(m->nv);
+  CHECK(cav_inverse(m, state, q0, zero, zero, u) == CAV_OK);
+  const cav_knot *knot = &tr->knot[1];
+  double read = 0, borne = 0;
+  int several = 0;
+  for (int k = 0; k < knot->ncontact; k++) read += knot->y[CAV_CONTACT_READINGS * k + CAV_CONTACT_READINGS - 1];
+  for (int i = 0; i < state->ncontact; i++) {
+    const cav_contact *c = &state->contact[i];
+    borne += c->impulse[0] / (tr->h * tr->weight);
+    // several points of some pairs, in the order of pairs and features
+    if (i > 0) CHECK(c->pair > c[-1].pair || (c->pair == c[-1].pair && c->feature > c[-1].feature));
+    several += i > 0 && c->pair == c[-1].pair;
+  }
+  printf("%d contacts, which bear %.6f of the weight; %.6f is read\n", state->ncontact, borne, read);
+  CHECK(several > 3 && borne > 0.1);
+  // contacts that push with less than a millionth of the weight are not read
+  CHECK_NEAR(read, borne, 1e-6 * state->ncontact);
+  free(u);
+  cav_state_free(state);
+  cav_trajectory_free(at);
+  cav_transcription_free(tr);
+  cav_model_free(m);
+}
+
 int main(void) {
+  test_every_point_is_read();
   test_file("<slip from='0' to='end' weight='1'/><slip from='0' to='end' weight='1'/>");
   test_file("<force from='0.1' to='0.5' weight='1'/><slip from='0.1' to='0.7' weight='1'/>");
   static const scene_case cases[] = {{0},

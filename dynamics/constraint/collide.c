@@ -2,6 +2,7 @@
 /// narrow phase of pairs.c. Geoms in no pair are never placed; a geom's rotation is formed only if a narrow phase asks
 /// for it, once per call, and that of a geom fixed to the world once for all. Lists of CAV_SWEEP_FROM pairs and more are first
 /// pruned along an axis (sweep.c); bench_sweep measures where that begins to pay.
+#include <assert.h>
 #include <stdlib.h>
 
 #include "cavort/dynamics.h"
@@ -192,6 +193,10 @@ static cav_status push(const cav_model *model, cav_state *state, int p, const ca
   const cav_pair *pair = model->pair + p;
   cav_contact *contact = cav_contact_push(state);
   if (!contact) return CAV_NO_MEMORY;
+  // whoever reads contacts of two states side by side walks them in this order
+  assert(state->ncontact < 2 || contact[-1].pair < p ||
+         (contact[-1].pair == p && contact[-1].feature <= touch->feature));
+  assert(pair->dim >= 1 && pair->dim <= CAV_IMPULSE_DIM);
   contact->pair = p;
   contact->feature = touch->feature;
   contact->dim = pair->dim;
@@ -212,6 +217,7 @@ static inline cav_status collide_pair(const cav_model *model, cav_state *state, 
   cav_touch touch[CAV_TOUCH_MAX];
   const cav_shape *a = shape_of(state, cache, c->first), *b = shape_of(state, cache, c->second);
   int count = cav_collide_shapes(a, b, margin, touch);
+  assert(count <= CAV_TOUCH_MAX);
   cav_status status = CAV_OK;
   for (int k = 0; k < count && status == CAV_OK; k++) status = push(model, state, p, touch + k);
   return status;

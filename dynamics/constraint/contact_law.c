@@ -15,7 +15,7 @@
 
 #include "constraint.h"
 
-enum { DIM_MAX = 6 };
+enum { DIM_MAX = CAV_IMPULSE_DIM };
 
 /// Smoothed positive part at x = lambda/sigma, in pieces.
 typedef struct smooth {

@@ -85,6 +85,7 @@ static cav_status difference(const cav_contact *c, const cav_shape *a, const cav
                              geometry *g) {
   cav_touch touch[3][CAV_TOUCH_MAX];
   double shift = SHIFT_STEP * size;
+  // every routine keeps to CAV_TOUCH_MAX: collide.c asserts it for the same shapes
   const cav_touch *here = find(touch[2], cav_collide_shapes(a, b, margin + 4 * shift, touch[2]), c->feature);
   if (!here) return CAV_NOT_SUPPORTED;
   copy3(g->align, here->tangent);

@@ -7,6 +7,8 @@
 /// Points found by several prisms are one; of more than 8 the deepest is kept, then those furthest apart.
 /// A shape that sinks through the base is pushed up by its whole depth until it is below it altogether.
 /// Not done: what goes through the surface from below, or sideways through an outer wall deeper than its core, is pushed up.
+#include <assert.h>
+
 #include "gjk.h"
 #include "math3.h"
 #include "pairs.h"
@@ -128,6 +130,7 @@ static void collect(collection *all, const cav_touch *t) {
     return;
   }
   if (all->n == FOUND_MAX) all->n = cav_thin_out(all->at, all->n, FOUND_MAX / 2);
+  assert(all->n < FOUND_MAX);
   all->at[all->n++] = *t;
 }
 

@@ -81,6 +81,8 @@ typedef struct reader {
 
 // zeroed memory that lives as long as the tree
 static void *carve(cav_xml *xml, size_t size) {
+  // sizes come from files, which are bounded
+  assert(size <= 64 * (size_t)TOTAL_LIMIT);
   size = (size + 15) & ~(size_t)15;
   block *b = xml->memory;
   if (!b || b->size - b->used < size) {
@@ -126,6 +128,7 @@ static void explain(cav_error *error, cav_status status, const char *file, int l
   used += (size_t)n;
   if (element) used += (size_t)snprintf(error->text + used, room - used, "<%.60s>: ", element);
   if (attribute) used += (size_t)snprintf(error->text + used, room - used, "attribute '%.60s': ", attribute);
+  assert(used < room);
   vsnprintf(error->text + used, room - used, format, args);
 }
 

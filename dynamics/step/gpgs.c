@@ -93,8 +93,10 @@ static void minimise_in_ball(int n, const double *Q, const double *c, double rad
 
 // friction part of a contact with its normal impulse fixed. H is the contact's block of A + R, w the gradient at f
 static void update_friction(int dim, const double *H, const double *friction, const double *w, double *f) {
-  double Q[25], c[5], y[5];
-  int row[5], n = 0;
+  enum { ROWS_MAX = DIM_MAX - 1 };
+  double Q[ROWS_MAX * ROWS_MAX], c[ROWS_MAX], y[ROWS_MAX];
+  int row[ROWS_MAX], n = 0;
+  assert(dim <= DIM_MAX);
   for (int i = 1; i < dim; i++)
     if (friction[i - 1] > 0.0) row[n++] = i;
   for (int i = 0; i < n; i++) {
