@@ -79,6 +79,26 @@ cav_status cav_replay_steps(const cav_verification *verification, cav_replay *re
   return status;
 }
 
+// periods of a cycle in a row, each the image of the one before
+static cav_trajectory *unroll(const cav_verification *verification, const cav_trajectory *period) {
+  int last = verification->last, nq = period->nq, nv = period->nv;
+  cav_trajectory *all = cav_trajectory_new(verification->model, verification->periods * last + 1, period->timestep);
+  if (!all) return NULL;
+  memcpy(all->v, period->v, sizeof(double) * (size_t)nv);
+  for (size_t t = 0; t < (size_t)all->nknot; t++) {
+    double *q = all->q + t * nq, *u = all->u + t * nv;
+    if (t < (size_t)last) {
+      memcpy(q, period->q + t * nq, sizeof(double) * (size_t)nq);
+      memcpy(u, period->u + t * nv, sizeof(double) * (size_t)nv);
+    } else {
+      cav_cycle_image_configuration(verification->image, q - (size_t)last * nq, q);
+      cav_cycle_image_tangent(verification->image, 1, u - (size_t)last * nv, u);
+    }
+  }
+  cav_trajectory_velocities(verification->model, all);
+  return all;
+}
+
 // all periods of the motion; the last knot holds the force before it where none closes the motion
 static cav_trajectory *whole(const cav_verification *verification) {
   const cav_model *model = verification->model;
@@ -87,8 +107,7 @@ static cav_trajectory *whole(const cav_verification *verification) {
   cav_trajectory motion = {
       .nq = model->nq, .nv = model->nv, .nknot = verification->last + 1, .timestep = verification->h};
   motion.q = (double *)verification->q, motion.v = verification->v, motion.u = verification->u;
-  return verification->periodicity ? cav_periodicity_unroll(verification->periodicity, &motion, verification->periods)
-                                   : cav_trajectory_copy(&motion);
+  return verification->image ? unroll(verification, &motion) : cav_trajectory_copy(&motion);
 }
 
 cav_status cav_replay_open(const cav_verification *verification, cav_replay *replay) {
@@ -128,7 +147,7 @@ cav_status cav_replay_open(const cav_verification *verification, cav_replay *rep
 
 // generalised force of efforts within the limits at (q, v); moment [nv] is scratch
 static cav_status run_loop(const cav_verification *verification, const double *q, const double *v, const double *effort,
-                        double *moment, double *u) {
+                           double *moment, double *u) {
   const cav_model *model = verification->model;
   cav_status status = cav_position(model, verification->bare, q);
   memset(u, 0, sizeof(double) * model->nv);
@@ -145,7 +164,7 @@ static cav_status run_loop(const cav_verification *verification, const double *q
 // x [nv], a tangent, moved by a number of periods; scratch [nv]
 static void move(const cav_verification *verification, int periods, double *x, double *scratch) {
   for (int k = 0; k < abs(periods); k++) {
-    cav_periodicity_tangent(verification->periodicity, periods > 0 ? 1 : -1, x, scratch);
+    cav_cycle_image_tangent(verification->image, periods > 0 ? 1 : -1, x, scratch);
     memcpy(x, scratch, sizeof(double) * verification->model->nv);
   }
 }

@@ -4,7 +4,7 @@
 #define CAVORT_AUDIT_H
 
 #include "cavort/solve.h"
-#include "periodicity.h"
+#include "cycle_image.h"
 
 /// A worst value and where it was found.
 typedef struct cav_metric {
@@ -17,15 +17,15 @@ typedef struct cav_metric {
 typedef struct cav_verification {
   const cav_problem *problem;
   const cav_model *model;
-  cav_options law;              ///< claimed contact law, at the step of the knots
-  int last;                     ///< last knot, T
-  int rows;                     ///< knots 0 .. rows-1 have a force: T, or T+1 where the motion closes at rest
-  double h;                     ///< s
-  double weight;                ///< N, unit of forces
-  double arm;                   ///< m, unit of moments is weight*arm
-  cav_periodicity *periodicity; ///< cycles: from one period to the next; else NULL
-  int periods;                  ///< that replays run for
-  const double *q;              ///< [(T+1)*nq] knots
+  cav_options law;        ///< claimed contact law, at the step of the knots
+  int last;               ///< last knot, T
+  int rows;               ///< knots 0 .. rows-1 have a force: T, or T+1 where the motion closes at rest
+  double h;               ///< s
+  double weight;          ///< N, unit of forces
+  double arm;             ///< m, unit of moments is weight*arm
+  cav_cycle_image *image; ///< cycles: from one period to the next; else NULL
+  int periods;            ///< that replays run for
+  const double *q;        ///< [(T+1)*nq] knots
   double *v;        ///< [(T+2)*nv] from the knots; the last row closes the motion: zero, v_1 moved in a cycle, or v_T
                     ///< where nothing closes it
   double *u;        ///< [(T+1)*nv] inverse dynamics under the claimed law; meaningful for rows knots
@@ -41,9 +41,17 @@ void cav_metric_note(cav_metric *metric, double value, int knot, const char *for
 /// Name of a link's body for people: its name, or "body N".
 const char *cav_verification_link_name(const cav_model *model, int link, char buffer[32]);
 
-/// Range of an actuator's effort by its limits, infinite where open. scale: the larger finite
-/// magnitude of the two, 1 where there is none.
+/// Range of an actuator's effort by its constant limits, infinite where open. scale: the larger finite
+/// magnitude of the two, 1 where there is none. actuator_check.c.
 void cav_verification_actuator_range(const cav_model *model, int actuator, double range[2], double *scale);
+
+/// CAV_NOT_SUPPORTED with the name of the first actuator whose limits are not checked here, and why. actuator_check.c.
+cav_status cav_verification_actuators(const cav_model *model, cav_error *error);
+
+/// By how much an effort at knot t and velocity v is beyond an actuator's limits, relative to them; the state is at the knot, moment [nv]
+/// is scratch. suffix ends what is said of it. actuator_check.c.
+void cav_verification_effort(const cav_verification *verification, int t, int actuator, double effort, const double *v,
+                             double *moment, const char *suffix, cav_metric *metric);
 
 /// Balance of momentum of every tree over all knots against gravity and contacts with what is not of the tree:
 /// root mean square and worst knot, fraction of weight. momentum_balance.c.

@@ -1,14 +1,13 @@
 /// Certifies a motion from its knots alone, with code apart from the optimiser's: velocities, forces and contacts are
 /// recomputed from q; what a certificate requires is measured, and the first tolerance that is broken is named with its
 /// knot, body and size. METHOD.md, 6. Momentum: momentum_balance.c; hard terms: constraint_check.c; forward simulation: replay.c.
-/// It does not decides the cost, and it does not look between knots, except by the closed-loop replay.
+/// It does not decide on the cost, and it does not look between knots, except by the closed-loop replay.
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "plannable.h"
 #include "verification.h"
 
 static const double usual_gravity = 9.81; // m/s^2, unit of forces where the model has none
@@ -50,15 +49,6 @@ const char *cav_verification_link_name(const cav_model *model, int link, char bu
   if (*model->body[body].name) return model->body[body].name;
   snprintf(buffer, 32, "body %d", body);
   return buffer;
-}
-
-void cav_verification_actuator_range(const cav_model *model, int actuator, double range[2], double *scale) {
-  cav_actuator_effort_range(model, actuator, range);
-  double most = 0;
-  for (int k = 0; k < 2; k++) {
-    if (isfinite(range[k])) most = fmax(most, fabs(range[k]));
-  }
-  *scale = most > 0 ? most : 1;
 }
 
 static const char *joint_name(const cav_model *model, int joint, char buffer[32]) {
@@ -118,7 +108,7 @@ static cav_status admit(const cav_problem *problem, const cav_trajectory *trajec
 }
 
 static void verification_clear(cav_verification *verification) {
-  cav_periodicity_free(verification->periodicity);
+  cav_cycle_image_free(verification->image);
   cav_state_free(verification->state);
   cav_state_free(verification->bare);
   free(verification->v);
@@ -137,9 +127,9 @@ static void knot_velocities(cav_verification *verification) {
   }
   double *close = verification->v + (verification->last + 1) * nv;
   memset(close, 0, sizeof(double) * nv);
-  if (verification->periodicity) {
-    cav_periodicity_tangent(verification->periodicity, -1, close - nv, verification->v);
-    cav_periodicity_tangent(verification->periodicity, 1, verification->v + nv, close);
+  if (verification->image) {
+    cav_cycle_image_tangent(verification->image, -1, close - nv, verification->v);
+    cav_cycle_image_tangent(verification->image, 1, verification->v + nv, close);
   } else if (!verification->problem->close_at_rest) {
     memcpy(close, close - nv, sizeof(double) * nv);
   }
@@ -158,8 +148,8 @@ static cav_status verification_start(cav_verification *verification, const cav_p
                                      .q = trajectory->q};
   verification->periods = 1;
   if (problem->cycle.on) {
-    verification->periodicity = cav_periodicity_new(problem, error);
-    if (!verification->periodicity) return error->status;
+    verification->image = cav_cycle_image_new(problem, error);
+    if (!verification->image) return error->status;
     verification->periods = problem->cycle.mirror == CAV_MIRROR_NONE ? 2 : 4;
   }
   verification->rows = verification->last + (problem->close_at_rest && !problem->cycle.on ? 1 : 0);
@@ -202,82 +192,61 @@ static void note_duration(const cav_verification *verification, cav_metric *metr
   cav_metric_note(metric, beyond, verification->last, "duration, %.6g s of %.6g .. %.6g s", duration, least, most);
 }
 
-// the end of a cycle is its start moved: by coordinates, by where the links are, and by the step that leads to the start
+// the end of a cycle is its start moved: by coordinates, by the step that follows it, and by where the links are
 static cav_status note_periodicity(const cav_verification *verification, cav_metric *metric) {
   const cav_model *model = verification->model;
+  const cav_state *bare = verification->bare;
   int nq = model->nq, nv = model->nv;
-  const double *last = verification->q + verification->last * nq;
-  double *q = malloc(sizeof(double) * (size_t)(nq + nv + 3 * model->nlink)), *off = q + nq, *com = off + nv;
+  size_t nlink = (size_t)model->nlink, numbers = 2 * (size_t)nq + 2 * (size_t)nv + 3 * nlink;
+  const double *last = verification->q + (size_t)verification->last * nq;
+  double *q = malloc(sizeof(double) * numbers), *next = q + nq, *off = next + nq, *step = off + nv, *com = step + nv;
+  cav_pose *pose = malloc(nlink * sizeof *pose);
+  cav_status status = q && pose ? cav_position(model, verification->bare, verification->q) : CAV_NO_MEMORY;
   char name[32];
-  if (!q) return CAV_NO_MEMORY;
-  cav_periodicity_configuration(verification->periodicity, 1, verification->q, q);
-  cav_difference(model, q, last, 1, off);
-  for (int d = 0; d < nv; d++)
-    cav_metric_note(metric, fabs(off[d]), verification->last, "%s", joint_name(model, model->dof[d].joint, name));
-  cav_periodicity_configuration(verification->periodicity, -1, last - nq, q);
-  cav_difference(model, q, verification->q, 1, off);
-  for (int d = 0; d < nv; d++)
-    cav_metric_note(metric, fabs(off[d] - verification->h * verification->v[d]), 0, "step of %s",
-                    joint_name(model, model->dof[d].joint, name));
-  cav_status status = cav_position(model, verification->bare, verification->q);
-  memcpy(com, verification->bare->com, sizeof(double) * 3 * model->nlink);
-  if (status == CAV_OK) status = cav_position(model, verification->bare, last);
-  for (int l = 1; l < model->nlink && status == CAV_OK; l++) {
-    const double *there = verification->bare->com + 3 * cav_periodicity_link(verification->periodicity, l);
-    double moved[3], apart = 0;
-    cav_periodicity_point(verification->periodicity, com + 3 * l, moved);
-    for (int k = 0; k < 3; k++) apart += (moved[k] - there[k]) * (moved[k] - there[k]);
-    cav_metric_note(metric, sqrt(apart), verification->last, "%s", cav_verification_link_name(model, l, name));
+  if (status == CAV_OK) {
+    cav_cycle_image_configuration(verification->image, verification->q, q);
+    cav_difference(model, q, last, 1, off);
+    for (int d = 0; d < nv; d++)
+      cav_metric_note(metric, fabs(off[d]), verification->last, "%s", joint_name(model, model->dof[d].joint, name));
+    cav_cycle_image_configuration(verification->image, verification->q + nq, next);
+    cav_difference(model, q, next, 1, off);
+    cav_cycle_image_tangent(verification->image, 1, verification->v + nv, step);
+    for (int d = 0; d < nv; d++)
+      cav_metric_note(metric, fabs(off[d] - verification->h * step[d]), 1, "step of %s",
+                      joint_name(model, model->dof[d].joint, name));
+    memcpy(com, bare->com, sizeof(double) * 3 * nlink);
+    memcpy(pose, bare->link, sizeof *pose * nlink);
+    status = cav_position(model, verification->bare, last);
   }
+  for (int l = 1; l < model->nlink && status == CAV_OK; l++)
+    cav_metric_note(metric, cav_cycle_image_error(verification->image, l, pose, com, bare), verification->last, "%s",
+                    cav_verification_link_name(model, l, name));
+  free(pose);
   free(q);
   return status;
 }
 
-// whether the limits of its control, and not constant ones of its effort, bound an actuator
-static int bounded_by_control(const cav_actuator *a) {
-  return a->ctrllimited && !a->forcelimited && a->gain == CAV_GAIN_FIXED && a->bias == CAV_BIAS_AFFINE;
-}
-
-// control of a servo beyond its limits: what the nearest one within them does not give, over gain and limits
-static void note_servo(const cav_verification *verification, int t, int a, double effort, double *moment,
-                       metrics *found) {
+// what no actuator gives of u, and what actuators are asked for beyond their limits; work [nv]
+static void note_forces(const cav_verification *verification, int t, const double *v, const double *u, double *control,
+                        double *work, const char *suffix, metrics *found) {
   const cav_model *model = verification->model;
-  const cav_actuator *actuator = model->actuator + a;
-  double length = cav_actuator_length(model, verification->state, a, moment), velocity = 0, input;
-  for (int d = 0; d < model->nv; d++) velocity += moment[d] * verification->v[t * model->nv + d];
-  cav_actuator_input(model, a, length, velocity, effort, &input);
-  double missing = fabs(effort - cav_actuator_force(model, a, length, velocity, input));
-  double scale = fmax(fabs(actuator->ctrlrange[0]), fabs(actuator->ctrlrange[1])) * fabs(actuator->gain_parameter[0]);
-  cav_metric_note(&found->limit, missing / scale, t, "servo %.60s (%d), control at %.4g of %.4g .. %.4g",
-                  actuator->name, a, input, actuator->ctrlrange[0], actuator->ctrlrange[1]);
-}
-
-// what no actuator gives, and what actuators are asked for beyond their limits
-static void note_forces(const cav_verification *verification, int t, double *residual, metrics *found) {
-  const cav_model *model = verification->model;
-  double *control = verification->control + t * model->nu;
   char name[32], link[32];
-  cav_actuation(model, verification->state, verification->u + t * model->nv, residual, control);
+  cav_actuation(model, verification->state, u, work, control);
   for (int d = 0; d < model->nv; d++) {
     const cav_joint *joint = model->joint + model->dof[d].joint;
     int line = joint->type == CAV_JOINT_SLIDE || (joint->type == CAV_JOINT_FREE && d - joint->dof < 3);
-    double fraction = fabs(residual[d]) / (verification->weight * (line ? 1 : verification->arm));
-    cav_metric_note(&found->unactuated, fraction, t, "%.60s of %.60s, dof %d: %.4g %s",
+    double fraction = fabs(work[d]) / (verification->weight * (line ? 1 : verification->arm));
+    cav_metric_note(&found->unactuated, fraction, t, "%.60s of %.60s, dof %d: %.4g %s%s",
                     joint_name(model, model->dof[d].joint, name), cav_verification_link_name(model, joint->link, link),
-                    d, residual[d], line ? "N" : "N m");
+                    d, work[d], line ? "N" : "N m", suffix);
   }
-  for (int a = 0; a < model->nu; a++) {
-    double range[2], scale;
-    cav_verification_actuator_range(model, a, range, &scale);
-    double beyond = fmax(range[0] - control[a], control[a] - range[1]) / scale;
-    cav_metric_note(&found->limit, beyond, t, "actuator %.60s (%d) at %.4g of %.4g .. %.4g", model->actuator[a].name, a,
-                    control[a], range[0], range[1]);
-    if (bounded_by_control(&model->actuator[a])) note_servo(verification, t, a, control[a], residual, found);
-  }
+  for (int a = 0; a < model->nu; a++)
+    cav_verification_effort(verification, t, a, control[a], v, work, suffix, &found->limit);
 }
 
-// ranges of joints at q, a configuration of knot t or its image
-static void note_joints(const cav_verification *verification, int t, const double *q, cav_metric *metric) {
+// ranges of joints at q
+static void note_joints(const cav_verification *verification, int t, const double *q, const char *suffix,
+                        cav_metric *metric) {
   const cav_model *model = verification->model;
   char name[32];
   for (int j = 0; j < model->njoint; j++) {
@@ -288,93 +257,127 @@ static void note_joints(const cav_verification *verification, int t, const doubl
     if (joint->type == CAV_JOINT_BALL) {
       beyond = 2 * atan2(sqrt(x[1] * x[1] + x[2] * x[2] + x[3] * x[3]), fabs(x[0])) - joint->range[1];
     }
-    cav_metric_note(metric, beyond, t, "range of %.60s, in rad or m", joint_name(model, j, name));
+    cav_metric_note(metric, beyond, t, "range of %.60s, in rad or m%s", joint_name(model, j, name), suffix);
   }
 }
 
-// joint and tendon ranges; image [nq] is scratch
-static void note_ranges(const cav_verification *verification, int t, double *image, cav_metric *metric) {
+// joint and tendon ranges; the state is at q
+static void note_ranges(const cav_verification *verification, int t, const double *q, const char *suffix,
+                        cav_metric *metric) {
   const cav_model *model = verification->model;
-  const double *q = verification->q + t * model->nq;
   char name[32];
-  note_joints(verification, t, q, metric);
-  if (verification->periodicity) {
-    cav_periodicity_configuration(verification->periodicity, 1, q, image);
-    note_joints(verification, t, image, metric);
-  }
+  note_joints(verification, t, q, suffix, metric);
   // twist and swing of ball joints are rows where they are violated
   for (int i = 0; i < verification->state->nrow; i++) {
     const cav_row *row = verification->state->row + i;
     if (row->type != CAV_ROW_LIMIT_JOINT || row->side < 2) continue;
-    cav_metric_note(metric, -row->dist, t, "%s of %.60s, in rad", row->side < 4 ? "twist" : "swing",
-                    joint_name(model, row->object, name));
+    cav_metric_note(metric, -row->dist, t, "%s of %.60s, in rad%s", row->side < 4 ? "twist" : "swing",
+                    joint_name(model, row->object, name), suffix);
   }
   for (int i = 0; i < model->ntendon; i++) {
     const cav_tendon *tendon = model->tendon + i;
     if (!tendon->limited) continue;
     double length = verification->state->tendon_length[i];
     double beyond = fmax(tendon->range[0] - length, length - tendon->range[1]);
-    cav_metric_note(metric, beyond, t, "range of tendon %.60s (%d)", tendon->name, i);
+    cav_metric_note(metric, beyond, t, "range of tendon %.60s (%d)%s", tendon->name, i, suffix);
   }
 }
 
-// how deep, how fast under load
-static void note_contacts(const cav_verification *verification, int t, metrics *found) {
+// how deep
+static void note_penetration(const cav_verification *verification, int t, const char *suffix, cav_metric *metric) {
   const cav_model *model = verification->model;
   char name1[32], name2[32];
   for (int i = 0; i < verification->state->ncontact; i++) {
     const cav_contact *contact = verification->state->contact + i;
     const cav_pair *pair = model->pair + contact->pair;
-    cav_metric_note(&found->penetration, -contact->dist, t, "%.60s in %.60s", geom_name(model, pair->geom2, name2),
-                    geom_name(model, pair->geom1, name1));
-    if (t >= verification->rows || contact->dim < 3) continue;
+    cav_metric_note(metric, -contact->dist, t, "%.60s in %.60s%s", geom_name(model, pair->geom2, name2),
+                    geom_name(model, pair->geom1, name1), suffix);
+  }
+}
+
+// how fast under load
+static void add_slip(const cav_verification *verification, metrics *found) {
+  for (int i = 0; i < verification->state->ncontact; i++) {
+    const cav_contact *contact = verification->state->contact + i;
     double load = contact->impulse[0];
-    if (!(load > loaded * verification->weight * verification->h)) continue;
+    if (contact->dim < 3 || !(load > loaded * verification->weight * verification->h)) continue;
     found->load += load;
     found->slip += load * hypot(contact->velocity_next[1], contact->velocity_next[2]);
   }
 }
 
-// inverse dynamics knot by knot, and all that is measured there
+// what is required of knot t of a cycle one period on too, where the model or the ground may not be the same; work
+// [nq+4*nv+nu]
+static cav_status examine_image(const cav_verification *verification, int t, double *work, metrics *found) {
+  static const char *const suffix = ", one period on";
+  const cav_model *model = verification->model;
+  size_t nv = (size_t)model->nv;
+  double *q = work, *v = q + model->nq, *next = v + nv, *u = next + nv, *scratch = u + nv, *control = scratch + nv;
+  const double *knot_v = verification->v + (size_t)t * nv;
+  cav_cycle_image_configuration(verification->image, verification->q + (size_t)t * model->nq, q);
+  cav_cycle_image_tangent(verification->image, 1, knot_v, v);
+  cav_cycle_image_tangent(verification->image, 1, knot_v + nv, next);
+  cav_status status = cav_inverse(model, verification->state, q, v, next, u);
+  if (status != CAV_OK) return status;
+  note_ranges(verification, t, q, suffix, &found->limit);
+  note_penetration(verification, t, suffix, &found->penetration);
+  if (t < verification->rows) note_forces(verification, t, v, u, control, scratch, suffix, found);
+  return CAV_OK;
+}
+
+// inverse dynamics at knot t, and what is measured there but terms; the state is left at the knot
+static cav_status examine_knot(cav_verification *verification, int t, cav_balance *balance, double *work,
+                               metrics *found) {
+  const cav_model *model = verification->model;
+  size_t nv = (size_t)model->nv, knot = (size_t)t;
+  const double *q = verification->q + knot * model->nq, *v = verification->v + knot * nv;
+  if (verification->image) {
+    cav_status status = examine_image(verification, t, work, found);
+    if (status != CAV_OK) return status;
+  }
+  cav_status status = cav_inverse(model, verification->state, q, v, v + nv, work);
+  if (status != CAV_OK) return status;
+  note_ranges(verification, t, q, "", &found->limit);
+  note_penetration(verification, t, "", &found->penetration);
+  if (t >= verification->rows) return CAV_OK;
+  memcpy(verification->u + knot * nv, work, sizeof(double) * nv);
+  add_slip(verification, found);
+  note_forces(verification, t, v, work, verification->control + knot * model->nu, work + nv, "", found);
+  cav_balance_add(balance, verification, t);
+  return CAV_OK;
+}
+
+// knot by knot, and all that is measured there
 static cav_status examine(cav_verification *verification, cav_balance *balance, metrics *found, cav_error *error) {
   const cav_model *model = verification->model;
-  int nv = model->nv, room = 0;
-  double *work = NULL, *residual = malloc(sizeof(double) * (size_t)(2 * nv + model->nq + 1));
-  cav_status status = residual ? CAV_OK : CAV_NO_MEMORY;
-  if (status == CAV_OK && verification->periodicity) {
+  int room = 0;
+  double *terms = NULL, *work = malloc(sizeof(double) * (size_t)(model->nq + 4 * model->nv + model->nu + 1));
+  cav_status status = work ? CAV_OK : CAV_NO_MEMORY;
+  if (status == CAV_OK && verification->image) {
     status = note_periodicity(verification, &found->periodicity);
   } else if (status == CAV_OK) {
     note_start(verification, &found->term);
   }
   note_duration(verification, &found->term);
   for (int t = 0; t <= verification->last && status == CAV_OK; t++) {
-    const double *v = verification->v + t * nv;
-    double *u = residual + nv;
-    status = cav_inverse(model, verification->state, verification->q + t * model->nq, v, v + nv, u);
+    status = examine_knot(verification, t, balance, work, found);
     if (status != CAV_OK) {
       fail(error, status, "inverse dynamics at knot %d: %s", t, cav_status_name(status));
       break;
     }
     // contacts may have come
     if (cav_constraint_check_room(verification) > room) {
-      free(work);
+      free(terms);
       room = cav_constraint_check_room(verification);
-      work = malloc(sizeof(double) * (size_t)room);
-      if (!work) status = CAV_NO_MEMORY;
-      if (!work) break;
+      terms = malloc(sizeof(double) * (size_t)room);
+      if (!terms) status = CAV_NO_MEMORY;
+      if (!terms) break;
     }
-    note_ranges(verification, t, residual + 2 * nv, &found->limit);
-    note_contacts(verification, t, found);
-    if (t < verification->rows) {
-      memcpy(verification->u + t * nv, u, sizeof(double) * nv);
-      note_forces(verification, t, residual, found);
-      cav_balance_add(balance, verification, t);
-    }
-    cav_constraint_check(verification, t, work, &found->term);
+    cav_constraint_check(verification, t, terms, &found->term);
   }
   cav_balance_result(balance, verification, &found->defect);
-  free(residual);
   free(work);
+  free(terms);
   return status;
 }
 
@@ -477,7 +480,7 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
   cav_replay replay = {0};
   cav_balance *balance = NULL;
   if (error) *error = (cav_error){0};
-  status = cav_actuators_plannable(problem->model, error);
+  status = cav_verification_actuators(problem->model, error);
   if (status != CAV_OK) return status;
   cav_error refusal = {0};
   status = verification_start(&verification, problem, trajectory, contact, &refusal);
