@@ -88,7 +88,7 @@ static const cav_contact *find(const cav_state *at, int pair, int feature) {
 }
 
 // all readings of a state; those of a contact that is gone are not numbers
-static void read_all(const readings *r, const cav_state *at, double *value) {
+static void read_all(const readings *r, cav_state *at, double *value) {
   memcpy(value, at->u, (size_t)model->nv * sizeof *value);
   value += model->nv;
   for (int i = 0; i < r->ncontact; i++, value += 13) {

@@ -54,7 +54,7 @@ static void reference_column(int which, int j, double *out) {
   free(value);
 }
 
-static void read_u(const cav_model *m, const cav_state *s, void *context, double *value) {
+static void read_u(const cav_model *m, cav_state *s, void *context, double *value) {
   (*(int *)context)++;
   memcpy(value, s->u, (size_t)m->nv * sizeof *value);
 }

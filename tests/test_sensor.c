@@ -23,7 +23,7 @@ static const char tied_text[] =
     "<weld body1='a' body2='b' torquescale='.3'/><connect body1='b' body2='a' anchor='.1 .1 0'/></equality><sensor>"
     "<force site='a'/><torque site='a'/><force site='b'/><torque site='b'/></sensor></mujoco>";
 
-static void read_all(const cav_model *m, const cav_state *state, double *out) {
+static void read_all(const cav_model *m, cav_state *state, double *out) {
   for (int i = 0; i < m->nsensor; i++) cav_sensor_read(m, state, &m->sensor[i], out + m->sensor[i].adr);
 }
 

@@ -71,7 +71,7 @@ cav_status cav_actuation_compile(const cav_model *model, cav_state *state) {
 }
 
 // moments that depend on q, and what inverts them
-static void follow_position(const cav_model *model, const cav_state *state) {
+static void follow_position(const cav_model *model, cav_state *state) {
   cav_workspace *w = state->work;
   for (int i = 0; i < model->nactuator; i++) {
     if (!model->actuator[i].constant) { cav_transmission_length(state, i, w->gear + w->gear_start[i]); }
@@ -129,7 +129,7 @@ int cav_actuation_inputs(const cav_model *model, cav_state *state, const double 
   return missed;
 }
 
-double cav_actuator_part(const cav_state *state, int actuator) {
+double cav_actuator_part(cav_state *state, int actuator) {
   const cav_workspace *w = state->work;
   const cav_model *model = state->model;
   if (w->gear_varies) { follow_position(model, state); }

@@ -5,10 +5,10 @@
 #include "smooth.h"
 
 /// Rate of length of an actuator's transmission at v [nv], at the state's position. transmission.c.
-double cav_actuator_velocity(const cav_state *state, int actuator, const double *v);
+double cav_actuator_velocity(cav_state *state, int actuator, const double *v);
 
 /// Force of an actuator, before gear, among the least-norm ones that give the state's u. actuation.c.
-double cav_actuator_part(const cav_state *state, int actuator);
+double cav_actuator_part(cav_state *state, int actuator);
 
 /// Dofs that an actuator moves, dof NULL: only their number. Its length and moments along them, at the state's position.
 /// transmission.c.

@@ -179,7 +179,7 @@ double cav_transmission_length(const cav_state *state, int actuator, double *mom
   }
 }
 
-double cav_actuator_length(const cav_model *model, const cav_state *state, int actuator, double *moment) {
+double cav_actuator_length(const cav_model *model, cav_state *state, int actuator, double *moment) {
   cav_workspace *w = state->work;
   int start = w->gear_start[actuator];
   double length = cav_transmission_length(state, actuator, w->gear + start);
@@ -190,7 +190,7 @@ double cav_actuator_length(const cav_model *model, const cav_state *state, int a
   return length;
 }
 
-double cav_actuator_velocity(const cav_state *state, int actuator, const double *v) {
+double cav_actuator_velocity(cav_state *state, int actuator, const double *v) {
   cav_workspace *w = state->work;
   int start = w->gear_start[actuator];
   double sum = 0;

@@ -692,8 +692,7 @@ static void contact_column(const task *t, const cav_contact *c, const cav_contac
   }
 }
 
-cav_status cav_contact_derivatives(const cav_model *model, const cav_state *state, int contact,
-                                   cav_contact_derivative *out) {
+cav_status cav_contact_derivatives(const cav_model *model, cav_state *state, int contact, cav_contact_derivative *out) {
   cav_derivative_store *s = state->work->derivatives;
   if (!cav_state_evaluated(state) || !state->work->derived || contact < 0 || contact >= state->ncontact)
     return CAV_BAD_INPUT;
@@ -708,8 +707,7 @@ cav_status cav_contact_derivatives(const cav_model *model, const cav_state *stat
   for (int k = 0; k < 5; k++) {
     if (all[k]) memset(all[k], 0, rows);
   }
-  // the state is only read: the task's fields are not written through
-  task t = {.model = model, .state = (cav_state *)state, .s = s, .nv = model->nv};
+  task t = {.model = model, .state = state, .s = s, .nv = model->nv};
   for (int side = 0; side < 2; side++) {
     for (int j = last_dof(model, side ? c->link2 : c->link1); j >= 0; j = model->dof[j].parent) {
       contact_column(&t, c, &s->contact[contact], side, j, out);

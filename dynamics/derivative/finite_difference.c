@@ -140,7 +140,7 @@ cav_status cav_readout_differentiate(const cav_model *model, cav_state *state, c
   return status;
 }
 
-static void read_force(const cav_model *model, const cav_state *state, void *context, double *value) {
+static void read_force(const cav_model *model, cav_state *state, void *context, double *value) {
   (void)context;
   memcpy(value, state->u, (size_t)model->nv * sizeof *value);
 }

@@ -86,7 +86,7 @@ static void sum_up(const cav_model *model, double *r) {
 }
 
 // inertia and momentum of subtrees
-static void sum_half(const cav_model *model, const cav_state *state, cav_half_step *half) {
+static void sum_half(const cav_model *model, cav_state *state, cav_half_step *half) {
   const cav_posture at = {.com = half->com, .inertia = half->inertia, .reference = state->reference};
   cav_composites_at(model, &at, half->composite);
   memcpy(half->whole, half->momentum, 6 * (size_t)model->nlink * sizeof *half->whole);

@@ -250,8 +250,8 @@ static int offered(const cav_model *model, const cav_sensor *sensor) {
   }
 }
 
-cav_status cav_sensor_derivatives(const cav_model *model, const cav_state *state, const cav_sensor *sensor,
-                                  double *d_dq, double *d_dv_next) {
+cav_status cav_sensor_derivatives(const cav_model *model, cav_state *state, const cav_sensor *sensor, double *d_dq,
+                                  double *d_dv_next) {
   if (!offered(model, sensor)) return CAV_NOT_SUPPORTED;
   const cav_workspace *w = state->work;
   if (!cav_state_evaluated(state) || !w->derived) return CAV_BAD_INPUT;

@@ -48,8 +48,7 @@ static void weigh_dofs(const cav_model *model, const cav_workspace *w) {
 }
 
 // row of the velocity of point (kind 0) or of the angular velocity (kind 1) of a link along a world axis
-static void body_row(const cav_model *model, const cav_state *state, int link, const double point[3], int kind,
-                     int axis) {
+static void body_row(const cav_model *model, cav_state *state, int link, const double point[3], int kind, int axis) {
   const cav_workspace *w = state->work;
   clear_row(model, w);
   const cav_link *l = &model->link[link];
@@ -62,7 +61,7 @@ static void body_row(const cav_model *model, const cav_state *state, int link, c
   }
 }
 
-static void weigh_body(const cav_model *model, const cav_state *state, cav_body *body) {
+static void weigh_body(const cav_model *model, cav_state *state, cav_body *body) {
   double point[3], R[9];
   body->inverse_weight[0] = body->inverse_weight[1] = 0;
   if (body->link == 0) { return; }
@@ -83,7 +82,7 @@ static void weigh_body(const cav_model *model, const cav_state *state, cav_body 
   }
 }
 
-static void weigh_tendon(const cav_model *model, const cav_state *state, cav_tendon *tendon) {
+static void weigh_tendon(const cav_model *model, cav_state *state, cav_tendon *tendon) {
   const cav_workspace *w = state->work;
   clear_row(model, w);
   for (int e = tendon->dof; e < tendon->dof + tendon->ndof; e++)
@@ -92,7 +91,7 @@ static void weigh_tendon(const cav_model *model, const cav_state *state, cav_ten
 }
 
 // |M^-1 moments| of an actuator
-static void weigh_actuator(const cav_model *model, const cav_state *state, int i) {
+static void weigh_actuator(const cav_model *model, cav_state *state, int i) {
   const cav_workspace *w = state->work;
   double *x = w->scratch, sum = 0;
   cav_actuator_length(model, state, i, x);
@@ -101,7 +100,7 @@ static void weigh_actuator(const cav_model *model, const cav_state *state, int i
   ((cav_actuator *)&model->actuator[i])->acceleration = sqrt(sum);
 }
 
-static void weigh_all(const cav_model *model, const cav_state *state) {
+static void weigh_all(const cav_model *model, cav_state *state) {
   weigh_dofs(model, state->work);
   for (int i = 0; i < model->nbody; i++) { weigh_body(model, state, (cav_body *)&model->body[i]); }
   for (int i = 0; i < model->ntendon; i++) { weigh_tendon(model, state, (cav_tendon *)&model->tendon[i]); }

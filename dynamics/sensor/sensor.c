@@ -175,7 +175,7 @@ static void sense_site(const cav_model *model, const cav_state *state, const cav
   rotate_back(out, pose.rotation, world);
 }
 
-static double sense_actuator(const cav_model *model, const cav_state *state, const cav_sensor *sensor) {
+static double sense_actuator(const cav_model *model, cav_state *state, const cav_sensor *sensor) {
   switch (sensor->type) {
     case CAV_SENSOR_ACTUATORPOS:
       return cav_actuator_length(model, state, sensor->object, NULL);
@@ -230,7 +230,7 @@ static void sense_joint(const cav_model *model, const cav_state *state, const ca
   }
 }
 
-static void sense(const cav_model *model, const cav_state *state, const cav_sensor *sensor, double *out) {
+static void sense(const cav_model *model, cav_state *state, const cav_sensor *sensor, double *out) {
   switch (cav_sensor_rule_of(sensor->type)->target) {
     case CAV_TARGET_NONE:
       out[0] = state->time;
@@ -273,7 +273,7 @@ static void cut(const cav_sensor *sensor, double *out) {
   }
 }
 
-void cav_sensor_read(const cav_model *model, const cav_state *state, const cav_sensor *sensor, double *out) {
+void cav_sensor_read(const cav_model *model, cav_state *state, const cav_sensor *sensor, double *out) {
   sense(model, state, sensor, out);
   if (sensor->cutoff > 0) { cut(sensor, out); }
 }

@@ -96,7 +96,7 @@ static double add_wrapped(const cav_state *state, const cav_tendon_path_point *v
 }
 
 // length of one string; row [nv] is scratch
-static double follow(const cav_model *model, const cav_state *state, const cav_tendon *t, double *row) {
+static double follow(const cav_model *model, cav_state *state, const cav_tendon *t, double *row) {
   const cav_tendon_path_point *path = &model->tendon_path[t->path];
   double length = 0, scale = 1;
   for (int e = t->dof; e < t->dof + t->ndof; e++) { row[model->tendon_dof[e]] = 0; }

@@ -200,17 +200,17 @@ typedef struct cav_contact_derivative {
 
 /// Derivatives of contact number contact of the state, after cav_derivatives and before the next evaluation
 /// (CAV_BAD_INPUT otherwise). Writes where out points.
-CAV_API cav_status cav_contact_derivatives(const cav_model *model, const cav_state *state, int contact,
+CAV_API cav_status cav_contact_derivatives(const cav_model *model, cav_state *state, int contact,
                                            cav_contact_derivative *out);
 
 /// Derivatives of cav_sensor_read at the same point, [sensor->dim*nv] each; NULL = not needed. Readings do not depend on v.
 /// CAV_BAD_INPUT as above, CAV_NOT_SUPPORTED for a type of sensor without derivative.
-CAV_API cav_status cav_sensor_derivatives(const cav_model *model, const cav_state *state, const cav_sensor *sensor,
+CAV_API cav_status cav_sensor_derivatives(const cav_model *model, cav_state *state, const cav_sensor *sensor,
                                           double *d_dq, double *d_dv_next);
 
 /// A function of (q, v, v_next) read off a state after cav_inverse has filled it: writes n values.
-/// base is the state at the unperturbed point, equal to state for the base call itself.
-typedef void (*cav_readout)(const cav_model *model, const cav_state *state, void *context, double *value);
+/// It may call what uses scratch of the state, such as cav_sensor_read, and changes nothing else.
+typedef void (*cav_readout)(const cav_model *model, cav_state *state, void *context, double *value);
 
 /// Staged finite differences of any readout of n values. step 0: chosen by coordinate scale.
 /// method is one of the two differences (CAV_BAD_INPUT otherwise). value [n] at the point; d_dq, d_dv, d_dv_next [n*nv] row-major, NULL = not needed. dynamics/METHOD.md, 7.
@@ -229,8 +229,9 @@ CAV_API void cav_momentum(const cav_model *model, cav_state *state, const double
                           double *angular_momentum);
 
 /// Reading of a sensor at the state's last evaluation; out [sensor->dim]. Positions are there after cav_position; velocities
-/// (at v_next), accelerations and forces after cav_inverse or cav_forward, which leave them at (q, v, v_next).
-CAV_API void cav_sensor_read(const cav_model *model, const cav_state *state, const cav_sensor *sensor, double *out);
+/// (at v_next), accelerations and forces after cav_inverse or cav_forward, which leave them at (q, v, v_next). Uses scratch of
+/// the state, as all that takes a state that is not const.
+CAV_API void cav_sensor_read(const cav_model *model, cav_state *state, const cav_sensor *sensor, double *out);
 
 /// Link that carries an object; the world's, 0, for kinds without a frame.
 CAV_API int cav_object_link(const cav_model *model, cav_object_type type, int object);
@@ -252,7 +253,7 @@ CAV_API int cav_actuation_inputs(const cav_model *model, cav_state *state, const
 
 /// Length of an actuator's transmission, m or rad times gear, at the state's last position, and its moments [nv] (NULL:
 /// not needed): u per unit of force, rate of length per unit of v. Uses scratch of the state.
-CAV_API double cav_actuator_length(const cav_model *model, const cav_state *state, int actuator, double *moment);
+CAV_API double cav_actuator_length(const cav_model *model, cav_state *state, int actuator, double *moment);
 
 /// Force of an actuator at a length, velocity and input (control or activation), limits applied. N or N m, before gear.
 CAV_API double cav_actuator_force(const cav_model *model, int actuator, double length, double velocity, double input);

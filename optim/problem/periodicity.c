@@ -259,7 +259,7 @@ static cav_status fit_world(const cav_periodicity *w, const cav_state *state, ca
 }
 
 /// Every actuator has a counterpart with the image of its moments and of its range.
-static cav_status fit_actuators(const cav_periodicity *w, const cav_state *state, double *work, cav_error *error) {
+static cav_status fit_actuators(const cav_periodicity *w, cav_state *state, double *work, cav_error *error) {
   const cav_model *m = w->model;
   int nv = m->nv;
   double *moment = work, *mirrored = work + nv, *other = work + 2 * nv, range[2], found[2];

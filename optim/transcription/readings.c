@@ -32,7 +32,7 @@ static void read_contact(const cav_transcription *tr, const cav_contact *c, doub
   y[4] = fraction * fraction;
 }
 
-static void read_knot(const cav_model *model, const cav_state *state, void *context, double *value) {
+static void read_knot(const cav_model *model, cav_state *state, void *context, double *value) {
   const readings *r = context;
   const cav_transcription *tr = r->tr;
   const double *end_of_values = value + model->nv + tr->knot[r->t].nread;
@@ -231,7 +231,7 @@ typedef struct single_term {
   int t;
 } single_term;
 
-static void read_term(const cav_model *model, const cav_state *state, void *context, double *value) {
+static void read_term(const cav_model *model, cav_state *state, void *context, double *value) {
   const single_term *r = context;
   (void)model;
   cav_term_read(r->tr, state, r->term, r->t, value);

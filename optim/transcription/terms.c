@@ -92,7 +92,7 @@ void cav_rotation_between(const double a[4], const double b[4], double phi[3]) {
 }
 
 /// Value minus target of a sensor term, over its scale.
-void cav_term_read(const cav_transcription *tr, const cav_state *state, const cav_term *term, int t, double *y) {
+void cav_term_read(const cav_transcription *tr, cav_state *state, const cav_term *term, int t, double *y) {
   double reading[CAV_SENSOR_DIM_MAX], target[CAV_SENSOR_DIM_MAX];
   assert(term->sensor.dim <= CAV_SENSOR_DIM_MAX);
   cav_sensor_read(tr->model, state, &term->sensor, reading);
