@@ -8,11 +8,32 @@
 extern "C" {
 #endif
 
+/// Solvers, X(solver, word on the command line, library it needs or NONE, text). The enumeration, the dispatch of cav_solve, and
+/// words and help of the command line follow from this list (optim/solver/solvers.c).
+// clang-format off
+#define CAV_SOLVERS(X)                                                                                             \
+  X(GAUSS_NEWTON, gn, NONE, "own: continuation, trust region, augmented Lagrangian")                               \
+  X(IPOPT, ipopt, IPOPT, "Ipopt from the guess, the last stage's contacts")                                        \
+  X(BOTH, both, IPOPT, "own, then Ipopt from its result")
+// clang-format on
+
 typedef enum cav_solver {
-  CAV_SOLVER_GAUSS_NEWTON, ///< own: continuation, trust region, augmented Lagrangian
-  CAV_SOLVER_IPOPT,        ///< Ipopt from the guess, the last stage's contacts
-  CAV_SOLVER_BOTH          ///< own, then Ipopt from its result
+#define CAV_SOLVER_MEMBER(solver, ...) CAV_SOLVER_##solver,
+  CAV_SOLVERS(CAV_SOLVER_MEMBER)
+#undef CAV_SOLVER_MEMBER
+      CAV_SOLVER_TYPES
 } cav_solver;
+
+/// What holds for a solver.
+typedef struct cav_solver_rule {
+  const char *name;    ///< on the command line
+  const char *library; ///< whose options it takes, "" if it needs none
+  const char *missing; ///< NULL, or what this build lacks and what to do
+  const char *text;
+} cav_solver_rule;
+
+/// solver < CAV_SOLVER_TYPES.
+const cav_solver_rule *cav_solver_rule_of(cav_solver solver);
 
 /// One line of progress, and of the log.
 typedef struct cav_progress {

@@ -51,6 +51,9 @@ cav_status cav_minimise_infeasibility(cav_solve_run *run);
 /// Violation that planning leaves room for, by kind of row: what is planned with headroom may use half of it.
 void cav_run_allowed(const cav_solve_run *run, double allowed[CAV_BINDING_KINDS]);
 
+/// Multipliers of all rows where they hold, at the gathered normal equations of a linearisation that kept them. solution.c.
+cav_status cav_run_multipliers(cav_solve_run *run);
+
 /// Whether every row holds to that at the last values.
 int cav_run_met(const cav_solve_run *run);
 

@@ -8,8 +8,8 @@
 #include <string.h>
 
 #include "continuation.h"
-#include "ipopt.h"
 #include "lqr.h"
+#include "solvers.h"
 
 cav_solve_options cav_solve_options_default(void) {
   return (cav_solve_options){.solver = CAV_SOLVER_GAUSS_NEWTON,
@@ -102,11 +102,9 @@ static cav_status check(const cav_problem *p, const cav_solve_options *o, const 
   if (start && p->duration_most == 0 && fabs(start->timestep - p->timestep) > 1e-9 * p->timestep)
     return fail(error, CAV_BAD_INPUT,
                 "the step of the start trajectory is not the problem's: resample it, it does not fit");
-#ifndef CAVORT_HAVE_IPOPT
-  if (o->solver != CAV_SOLVER_GAUSS_NEWTON)
-    return fail(error, CAV_NOT_SUPPORTED,
-                "this build has no Ipopt: use --solver gn, or install coinor-libipopt-dev and build again");
-#endif
+  if (o->solver >= CAV_SOLVER_TYPES) return fail(error, CAV_BAD_INPUT, "there is no such solver");
+  if (cav_solver_rule_of(o->solver)->missing)
+    return fail(error, CAV_NOT_SUPPORTED, cav_solver_rule_of(o->solver)->missing);
   return CAV_OK;
 }
 
@@ -121,7 +119,7 @@ static double optimality(const cav_normal *normal, const cav_transcription *tr) 
 
 /// Multipliers of all rows where they hold, after a linearisation that has kept them. Rounds of the augmented Lagrangian end before
 /// cheap rows have settled, so multipliers are those after one more step, as in a quadratic programme.
-static cav_status estimate_multipliers(cav_solve_run *run) {
+cav_status cav_run_multipliers(cav_solve_run *run) {
   int n = cav_transcription_unknowns(run->tr);
   double *x = malloc(2 * (size_t)n * sizeof *x);
   if (!x) return CAV_NO_MEMORY;
@@ -142,7 +140,7 @@ static cav_status find_rows(cav_solve_run *run) {
   cav_status status = CAV_OK;
   cav_run_allowed(run, allowed);
   if (cav_run_met(run)) {
-    status = estimate_multipliers(run);
+    status = cav_run_multipliers(run);
   } else {
     cav_transcription_estimate_multipliers(run->tr, NULL);
   }
@@ -165,40 +163,9 @@ static cav_status conclude(cav_solve_run *run, cav_error *error) {
   return cav_choose_gains(run->problem, run->tr, run->at, run->solution, error);
 }
 
-#ifdef CAVORT_HAVE_IPOPT
-/// Multipliers for Ipopt to start from.
-static cav_status warm_start(cav_solve_run *run) {
-  if (!cav_transcription_keep_rows(run->tr)) return CAV_NO_MEMORY;
-  cav_status status = cav_transcription_linearise(run->tr, run->at);
-  if (status != CAV_OK) return status;
-  cav_normal_gather(run->normal, run->tr);
-  run->warm = 1;
-  return estimate_multipliers(run);
-}
-#endif
-
 static cav_status solve(cav_solve_run *run, cav_error *error) {
-  cav_status status = CAV_OK;
   const cav_solve_options *o = run->options;
-  if (o->solver == CAV_SOLVER_IPOPT) {
-    cav_stage_set(run->problem, 1, run->tr);
-  } else {
-    status = cav_continuation_run(run);
-    if (status == CAV_OK) status = cav_augmented_lagrangian(run);
-    if (status == CAV_OK) status = cav_restore(run);
-  }
-#ifdef CAVORT_HAVE_IPOPT
-  if (o->solver == CAV_SOLVER_BOTH && status == CAV_OK) status = warm_start(run);
-  if (o->solver != CAV_SOLVER_GAUSS_NEWTON && (status == CAV_OK || status == CAV_NOT_CONVERGED))
-    status = cav_ipopt(run, error);
-  if (o->solver != CAV_SOLVER_GAUSS_NEWTON && (status == CAV_OK || status == CAV_NOT_CONVERGED)) {
-    // what Ipopt left is worth bringing in, though it stays unfinished
-    cav_status restored = cav_restore(run);
-    if (status == CAV_OK || restored != CAV_NOT_CONVERGED) status = restored == CAV_OK ? status : restored;
-  }
-#else
-  (void)error;
-#endif
+  cav_status status = cav_solver_run(run, error);
   if (status != CAV_NOT_CONVERGED || !o->diagnose || cav_run_met(run)) return status;
   cav_status rest = cav_minimise_infeasibility(run);
   if (rest != CAV_OK) return rest;

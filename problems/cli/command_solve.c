@@ -227,7 +227,7 @@ static int solve(const cav_command_line *line, const cav_problem *problem, const
 
 int cav_command_solve(const cav_command_line *line) {
   cav_error error = {0};
-  if (line->nipopt && line->solver == CAV_SOLVER_GAUSS_NEWTON) {
+  if (line->nipopt && !*cav_solver_rule_of(line->solver)->library) {
     cav_file_fail(&error, CAV_BAD_INPUT, 0, "--ipopt needs --solver ipopt or both: the own solver has no such options");
     return cav_command_fail(&error);
   }

@@ -26,7 +26,7 @@ static const struct {
 } options[] = {
     {OPTION_MODEL, "--model", NULL, "FILE", "use this model instead of the one that the problem names"},
     {OPTION_OUTPUT, "--output", "-o", "DIR", "folder of the result (default: NAME.result)"},
-    {OPTION_SOLVER, "--solver", NULL, "WORD", "gn: own Gauss-Newton (default), ipopt, or both, one after the other"},
+    {OPTION_SOLVER, "--solver", NULL, "WORD", "how to solve"},
     {OPTION_IPOPT, "--ipopt", NULL, "NAME=VALUE",
      "an option of Ipopt, laid over the problem's; may be given several times"},
     {OPTION_STRATEGIES, "--strategies", NULL, "N",
@@ -74,6 +74,15 @@ static const command commands[] = {
 };
 enum { NCOMMAND = sizeof commands / sizeof *commands };
 
+// after the text of --solver
+static void print_solvers(void) {
+  for (cav_solver i = 0; i < CAV_SOLVER_TYPES; i++) {
+    const cav_solver_rule *rule = cav_solver_rule_of(i);
+    printf("%s %s, %s%s", i ? ";" : ":", rule->name, rule->text, rule->missing ? " (not in this build)" : "");
+    if (i == CAV_SOLVER_GAUSS_NEWTON) printf(" (default)");
+  }
+}
+
 static void print_command(const command *c) {
   printf("cavort %s %s\n  %s\n", c->name, c->operand, c->text);
   for (int i = 0; i < NOPTION; i++) {
@@ -81,7 +90,9 @@ static void print_command(const command *c) {
     if (!(c->options & (int)options[i].option)) continue;
     snprintf(text, sizeof text, "%s%s%s%s%s", options[i].brief ? options[i].brief : "", options[i].brief ? ", " : "",
              options[i].name, options[i].value ? " " : "", options[i].value ? options[i].value : "");
-    printf("  %-18s %s\n", text, options[i].text);
+    printf("  %-18s %s", text, options[i].text);
+    if (options[i].option == OPTION_SOLVER) print_solvers();
+    printf("\n");
   }
 }
 
@@ -135,8 +146,6 @@ static int take_ipopt(cav_command_line *line, char *text) {
 
 // takes the value of an option; returns 0 after telling what is wrong with it
 static int take_value(cav_command_line *line, enum option option, const char *name, char *value) {
-  static const char *const solvers[] = {
-      [CAV_SOLVER_GAUSS_NEWTON] = "gn", [CAV_SOLVER_IPOPT] = "ipopt", [CAV_SOLVER_BOTH] = "both"};
   char *end;
   long n;
   switch (option) {
@@ -147,11 +156,12 @@ static int take_value(cav_command_line *line, enum option option, const char *na
       line->output = value;
       return 1;
     case OPTION_SOLVER:
-      for (int i = 0; i < 3; i++) {
-        line->solver = (cav_solver)i;
-        if (!strcmp(value, solvers[i])) return 1;
-      }
-      fprintf(stderr, "cavort: %s: expected gn, ipopt or both, got '%s'\n", name, value);
+      for (line->solver = 0; line->solver < CAV_SOLVER_TYPES; line->solver++)
+        if (!strcmp(value, cav_solver_rule_of(line->solver)->name)) return 1;
+      fprintf(stderr, "cavort: %s: expected", name);
+      for (cav_solver i = 0; i < CAV_SOLVER_TYPES; i++)
+        fprintf(stderr, "%s%s", i == 0 ? " " : i + 1 < CAV_SOLVER_TYPES ? ", " : " or ", cav_solver_rule_of(i)->name);
+      fprintf(stderr, ", got '%s'\n", value);
       return 0;
     case OPTION_STRATEGIES:
       n = strtol(value, &end, 10);

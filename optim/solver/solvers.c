@@ -1,0 +1,73 @@
+/// The table of solvers, and the order in which the methods of each come. A solver is a line of CAV_SOLVERS and a function
+/// named by its word in a file of its own; those that put together the methods of continuation.c and ipopt.c are here.
+#include "solvers.h"
+
+#include <assert.h>
+
+#include "ipopt.h"
+
+#define NAME_NONE ""
+#define MISSING_NONE NULL
+#define RUN_NONE(run) run
+#define NAME_IPOPT "Ipopt"
+#ifdef CAVORT_HAVE_IPOPT
+#define MISSING_IPOPT NULL
+#define RUN_IPOPT(run) run
+#else
+#define MISSING_IPOPT "this build has no Ipopt: use --solver gn, or install coinor-libipopt-dev and build again"
+#define RUN_IPOPT(run) NULL
+#endif
+
+#define RULE(solver, word, library, text) [CAV_SOLVER_##solver] = {#word, NAME_##library, MISSING_##library, text},
+static const cav_solver_rule rules[CAV_SOLVER_TYPES] = {CAV_SOLVERS(RULE)};
+
+const cav_solver_rule *cav_solver_rule_of(cav_solver solver) {
+  assert(solver < CAV_SOLVER_TYPES);
+  return &rules[solver];
+}
+
+cav_status cav_solver_run(cav_solve_run *run, cav_error *error) {
+#define RUN(solver, word, library, text) [CAV_SOLVER_##solver] = RUN_##library(cav_solver_##word),
+  static cav_status (*const runs[CAV_SOLVER_TYPES])(cav_solve_run *, cav_error *) = {CAV_SOLVERS(RUN)};
+  assert(!rules[run->options->solver].missing);
+  return runs[run->options->solver](run, error);
+}
+
+cav_status cav_solver_gn(cav_solve_run *run, cav_error *error) {
+  (void)error;
+  cav_status status = cav_continuation_run(run);
+  if (status == CAV_OK) status = cav_augmented_lagrangian(run);
+  return status == CAV_OK ? cav_restore(run) : status;
+}
+
+#ifdef CAVORT_HAVE_IPOPT
+/// Multipliers for Ipopt to start from.
+static cav_status warm_start(cav_solve_run *run) {
+  if (!cav_transcription_keep_rows(run->tr)) return CAV_NO_MEMORY;
+  cav_status status = cav_transcription_linearise(run->tr, run->at);
+  if (status != CAV_OK) return status;
+  cav_normal_gather(run->normal, run->tr);
+  run->warm = 1;
+  return cav_run_multipliers(run);
+}
+
+static cav_status ipopt_from_here(cav_solve_run *run, cav_error *error) {
+  cav_status status = cav_ipopt(run, error);
+  if (status != CAV_OK && status != CAV_NOT_CONVERGED) return status;
+  // what Ipopt left is worth bringing in, though it stays unfinished
+  cav_status restored = cav_restore(run);
+  if (status == CAV_OK || restored != CAV_NOT_CONVERGED) status = restored == CAV_OK ? status : restored;
+  return status;
+}
+
+cav_status cav_solver_ipopt(cav_solve_run *run, cav_error *error) {
+  cav_stage_set(run->problem, 1, run->tr);
+  return ipopt_from_here(run, error);
+}
+
+cav_status cav_solver_both(cav_solve_run *run, cav_error *error) {
+  cav_status status = cav_solver_gn(run, error);
+  if (status == CAV_OK) status = warm_start(run);
+  return status == CAV_OK || status == CAV_NOT_CONVERGED ? ipopt_from_here(run, error) : status;
+}
+#endif
