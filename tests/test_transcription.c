@@ -69,7 +69,7 @@ static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) 
   cav_term base = term[0];
   base.quantity = CAV_QUANTITY_SENSOR;
   base.weight = 3;
-  for (int kind = 0; kind < 15; kind++) {
+  for (int kind = 0; kind < 17; kind++) {
     cav_term *t = &term[n++];
     *t = base;
     t->scale = 0.5 + 0.1 * kind;
@@ -95,6 +95,8 @@ static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) 
     if (kind == 12) t->quantity = CAV_QUANTITY_FORCE, t->target = NULL, t->norm = CAV_NORM_ABSOLUTE, t->scale = 0.2;
     if (kind == 13) t->quantity = CAV_QUANTITY_SLIP, t->target = NULL, t->body = trunk;
     if (kind == 14) t->quantity = CAV_QUANTITY_ACCELERATION, t->use = CAV_USE_EQUAL, t->target = NULL, t->scale = 50;
+    if (kind >= 15) t->quantity = CAV_QUANTITY_POWER, t->target = NULL, t->scale = 0.3;
+    if (kind == 16) t->norm = CAV_NORM_ABSOLUTE, t->scale = 0.05;
     if (kind >= 11) continue;
     // accelerations and forces, of the size of gravity and of weight
     if (kind >= 7) t->target = NULL, t->scale = 50;
@@ -360,7 +362,7 @@ typedef struct closing {
 static void test_scene(const char *scene, closing close, cav_order order) {
   cav_model *m = scene_load(scene);
   if (!CHECK(m != NULL)) return;
-  cav_term term[32];
+  cav_term term[40];
   double v_start[64] = {0}, q_start[64], q_goal[64];
   cav_problem p = cav_problem_default(m);
   p.order = order;
@@ -419,6 +421,55 @@ static void test_rotations(void) {
   }
 }
 
+/// Power of two motors that pull one slide, alone and by a geared tendon, and of one that turns a ball joint: each force times
+/// the mean velocity of its transmission over the weight, from Newton's law and least-norm forces by hand.
+static void test_power(void) {
+  static const char text[] =
+      "<mujoco><option gravity='0 0 -10'/><worldbody><body name='cart'><joint name='x' type='slide' axis='1 0 0'/>"
+      "<geom size='.1' mass='2' contype='0' conaffinity='0'/></body><body name='top' pos='0 0 1'><joint name='spin' "
+      "type='ball'/><inertial pos='0 0 0' mass='1' diaginertia='.3 .3 .3'/></body></worldbody>"
+      "<tendon><fixed name='rope'><joint joint='x' coef='.5'/></fixed></tendon>"
+      "<actuator><motor joint='x' gear='3' ctrllimited='true' ctrlrange='-20 20'/><motor tendon='rope' gear='4'/>"
+      "<motor joint='spin' gear='0 0 2'/></actuator></mujoco>";
+  cav_model *m = scene_load(text);
+  if (!CHECK(m != NULL)) return;
+  double q_start[5], v_start[4] = {0.4, 0, 0, 0.7};
+  memcpy(q_start, m->q0, sizeof q_start);
+  cav_term term = {.name = "power", .quantity = CAV_QUANTITY_POWER, .weight = 1, .scale = 1, .component = -1};
+  cav_problem p = cav_problem_default(m);
+  p.order = CAV_ORDER_EULER;
+  p.duration = 0.1;
+  p.q_start = p.q_goal = q_start, p.v_start = v_start;
+  p.term = &term, p.nterm = 1;
+  term.from = term.to = p.timestep;
+  cav_transcription *tr = cav_transcription_new(&p, 1, NULL);
+  if (!CHECK(tr != NULL)) return;
+  cav_trajectory *at = cav_trajectory_new(m, tr->nknot, p.timestep);
+  memcpy(at->q, q_start, sizeof q_start), memcpy(at->v, v_start, sizeof v_start);
+  for (int t = 1; t < at->nknot; t++) {
+    double step[4] = {0.01 * t * t, 0, 0, 0.02 * t};
+    cav_integrate(m, at->q + (t - 1) * 5, step, 1, at->q + t * 5);
+  }
+  cav_trajectory_velocities(m, at);
+  CHECK(cav_transcription_values(tr, at) == CAV_OK);
+  const double *v = at->v + 4, *next = at->v + 8, h = p.timestep, weight = 3 * 10;
+  // moments 3 and 2 along the slide: least-norm efforts share its force as 3 to 2
+  double force = 2 * (next[0] - v[0]) / h, torque = 0.3 * (next[3] - v[3]) / h;
+  double slide = force * (v[0] + next[0]) / 2 / weight, spin = torque * (v[3] + next[3]) / 2 / weight;
+  double power[3] = {slide * 9 / 13, slide * 4 / 13, spin}, cost = 0;
+  for (int k = 0; k < 3; k++) cost += 0.5 * power[k] * power[k];
+  CHECK(fabs(slide) > 0.05 && fabs(spin) > 1e-3);
+  CHECK_NEAR(cav_transcription_cost(tr), cost, 1e-12 * cost);
+  test_gradient(tr, at);
+  // far beyond its scale the absolute norm is the power itself: over distance, the cost of transport
+  term.norm = CAV_NORM_ABSOLUTE, term.scale = term.weight = 1e-9;
+  CHECK(cav_transcription_values(tr, at) == CAV_OK);
+  CHECK_NEAR(cav_transcription_cost(tr), fabs(power[0]) + fabs(power[1]) + fabs(power[2]), 1e-8);
+  cav_trajectory_free(at);
+  cav_transcription_free(tr);
+  cav_model_free(m);
+}
+
 /// What cannot be planned with is refused by name, before anything is solved.
 static void test_refusals(void) {
   static const char frame[] =
@@ -451,6 +502,7 @@ static void test_refusals(void) {
 int main(void) {
   test_rotations();
   test_refusals();
+  test_power();
   const closing rest = {.at_rest = 1}, open = {0}, timed = {.at_rest = 1, .free_step = 1}, adrift = {.free_step = 1};
   const closing moved = {.cycle = {.on = 1, .translation = {0.2, 0.1, 0}}};
   const closing turned = {.free_step = 1, .cycle = {.on = 1, .translation = {0.2, 0, 0}, .rotation = 0.4}};

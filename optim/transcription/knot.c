@@ -69,6 +69,9 @@ static row_count cost_rows(const cav_transcription *tr, const int *key, const ca
       n.rows = (size_t)tr->model->nu;
       for (int k = 0; k < tr->model->nu; k++) n.dense += (size_t)stands_alone(&tr->effort[k]);
       break;
+    case CAV_QUANTITY_POWER:
+      if (knot->has_force) n.rows = n.dense = (size_t)tr->model->nu;
+      break;
     case CAV_QUANTITY_GAP:
     case CAV_QUANTITY_SLIP:
     case CAV_QUANTITY_IMPACT:
@@ -407,6 +410,45 @@ static void add_effort(cav_sum *a, const cav_term *term, double weight) {
   }
 }
 
+/// Entries of the derivative of scale times the mean velocity of dof d over a step that leaves a knot.
+static int mean_velocity_entries(const cav_sum *a, int d, double scale, int *column, double *entry) {
+  const cav_transcription *tr = a->tr;
+  int n = 0, t = a->t, here = cav_knot_moves(tr, t);
+  if (here) n = velocity_entries(tr, t, d, tr->nv, cav_knot_moves(tr, t - 1), 0.5 * scale, column, entry);
+  if (t + 1 < tr->nknot) n += velocity_entries(tr, t + 1, d, 2 * tr->nv, here, 0.5 * scale, column + n, entry + n);
+  return n;
+}
+
+/// Power of actuator k over the weight, its derivative into row [3nv]. With the mean velocity its sum over steps is the work of
+/// the forces: that of u over (v + v_next)/2 is what kinetic energy gains in a step. Moments do not depend on q.
+static double power_row(cav_sum *a, int k, const double *v, const double *v_next, double *row) {
+  const cav_transcription *tr = a->tr;
+  double *moment = a->s->tangent, unit = tr->effort_unit[k] / tr->weight, velocity = 0, entry[12];
+  double force = unit * form_value(&tr->effort[k], a->knot->u);
+  int column[12];
+  cav_actuator_length(tr->model, a->s->state, k, moment);
+  for (int d = 0; d < tr->nv; d++) velocity += moment[d] * 0.5 * (v[d] + v_next[d]);
+  if (!a->jacobian) return force * velocity;
+  memset(row, 0, 3 * (size_t)tr->nv * sizeof(double));
+  put_force(a, &tr->effort[k], row);
+  for (int c = 0; c < 3 * tr->nv; c++) row[c] *= unit * velocity;
+  for (int d = 0; d < tr->nv; d++) {
+    int n = moment[d] != 0 ? mean_velocity_entries(a, d, force * moment[d], column, entry) : 0;
+    for (int i = 0; i < n; i++) row[column[i]] += entry[i];
+  }
+  return force * velocity;
+}
+
+static void add_power(cav_sum *a, const cav_term *term, double weight, const double *v, const double *v_next) {
+  if (!a->knot->has_force) return;
+  weight /= term->scale * term->scale;
+  for (int k = 0; k < a->tr->model->nu; k++) {
+    double r = power_row(a, k, v, v_next, a->s->row), w = weight;
+    begin_cost(a, term, term->scale, &w, &r);
+    add_dense(a, w, r, a->s->row);
+  }
+}
+
 static void add_contact(cav_sum *a, const cav_term *term, double weight) {
   contact_part part = contact_part_of(term->quantity);
   weight /= term->scale * term->scale;
@@ -445,6 +487,9 @@ static void add_cost(cav_sum *a, const cav_term *term, int reading, const double
       break;
     case CAV_QUANTITY_EFFORT:
       add_effort(a, term, weight);
+      break;
+    case CAV_QUANTITY_POWER:
+      add_power(a, term, weight, v, v_next);
       break;
     case CAV_QUANTITY_GAP:
     case CAV_QUANTITY_SLIP:

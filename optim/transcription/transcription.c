@@ -95,9 +95,10 @@ static int list_force_rows(cav_transcription *tr) {
   tr->unactuated = calloc((size_t)nv, sizeof *tr->unactuated);
   tr->effort = calloc((size_t)nu + 1, sizeof *tr->effort);
   tr->effort_range = malloc((size_t)(nu + 1) * sizeof *tr->effort_range);
+  tr->effort_unit = malloc((size_t)(nu + 1) * sizeof *tr->effort_unit);
   tr->servo = calloc((size_t)nu + 1, sizeof *tr->servo);
   if (!unit || !basis || !residual || !control || !effort || !tr->unactuated || !tr->effort || !tr->effort_range ||
-      !tr->servo)
+      !tr->effort_unit || !tr->servo)
     goto end;
 
   // project unit forces; orthonormalise what is left, twice for rounding
@@ -132,6 +133,7 @@ static int list_force_rows(cav_transcription *tr) {
     double scale = limit > 0 ? 1 / limit : 1;
     tr->effort_range[a][0] = lower * scale * tr->problem->effort_limit;
     tr->effort_range[a][1] = upper * scale * tr->problem->effort_limit;
+    tr->effort_unit[a] = m->actuator[a].unit / (per_effort * scale);
     for (int d = 0; d < nv; d++) effort[d] = control[(size_t)d * nu + a];
     if (!force_row_set(&tr->effort[a], nv, effort, per_effort * scale)) goto end;
   }
@@ -145,8 +147,7 @@ end:
 static int term_slots(const cav_transcription *tr, const cav_term *term, int t) {
   if (term->use == CAV_USE_COST || cav_term_weight(tr, term, t) == 0) return 0;
   // others are refused by cav_solve
-  assert(term->quantity == CAV_QUANTITY_SENSOR || term->quantity == CAV_QUANTITY_CONFIGURATION ||
-         term->quantity == CAV_QUANTITY_VELOCITY || term->quantity == CAV_QUANTITY_ACCELERATION);
+  assert(cav_quantity_rule_of(term->quantity)->hard);
   if (term->quantity == CAV_QUANTITY_SENSOR) return cav_term_dim(term);
   int n = 0;
   for (int d = 0; d < tr->nv; d++) n += cav_dof_selected(tr, term, d);
@@ -274,7 +275,8 @@ void cav_transcription_free(cav_transcription *tr) {
   for (int a = 0; tr->effort && a < tr->model->nu; a++) free(tr->effort[a].dof), free(tr->effort[a].coef);
   for (int a = 0; tr->servo && a < tr->model->nu; a++) cav_servo_free(&tr->servo[a]);
   free(tr->servo);
-  free(tr->unactuated), free(tr->effort), free(tr->effort_range), free(tr->rotation_dof), free(tr->rotation_of);
+  free(tr->unactuated), free(tr->effort), free(tr->effort_range), free(tr->effort_unit), free(tr->rotation_dof),
+      free(tr->rotation_of);
   free(tr->knot), free(tr->scratch), free(tr->before), free(tr->rotation_after);
   cav_periodicity_free(tr->periodicity);
   cav_parallel_free(tr->pool);

@@ -92,6 +92,7 @@ typedef struct cav_transcription {
   int nresidual;                ///< rows of unactuated
   cav_force_row *unactuated;    ///< orthonormal complement of the actuators' range, scaled to fractions of weight
   cav_force_row *effort;        ///< [nu] actuator force over its limit
+  double *effort_unit;          ///< [nu] force of its transmission, N or N m, that one unit of the row of effort is
   double (*effort_range)[2];    ///< [nu] limits of effort, scaled; of servos with limits of control, those
   cav_servo *servo;             ///< [nu]
   int nrotation;

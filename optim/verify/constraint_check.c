@@ -167,6 +167,21 @@ static int effort_values(const cav_verification *verification, const cav_term *t
   return model->nu;
 }
 
+// moment: room for one configuration
+static int power_values(const cav_verification *verification, const cav_term *term, int t, double *moment, double *x,
+                        double *target) {
+  const cav_model *model = verification->model;
+  const double *v = verification->v + t * model->nv, *next = v + model->nv;
+  for (int a = 0; a < model->nu; a++) {
+    double velocity = 0;
+    cav_actuator_length(model, verification->state, a, moment);
+    for (int d = 0; d < model->nv; d++) velocity += moment[d] * (v[d] + next[d]) / 2;
+    x[a] = verification->control[t * model->nu + a] * model->actuator[a].unit * velocity / verification->weight;
+  }
+  target_at(term, when(verification, t), model->nu, target);
+  return model->nu;
+}
+
 // one value per contact, a magnitude
 static int contact_values(const cav_verification *verification, const cav_term *term, double *x, double *target) {
   const cav_state *state = verification->state;
@@ -204,6 +219,8 @@ static int measure(const cav_verification *verification, const cav_term *term, i
       return forced ? velocity_values(verification, term, t, x, target) : 0;
     case CAV_QUANTITY_EFFORT:
       return forced ? effort_values(verification, term, t, x, target) : 0;
+    case CAV_QUANTITY_POWER:
+      return forced ? power_values(verification, term, t, q, x, target) : 0;
     case CAV_QUANTITY_GAP:
     case CAV_QUANTITY_SLIP:
     case CAV_QUANTITY_IMPACT:
