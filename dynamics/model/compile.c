@@ -11,6 +11,7 @@
 
 #include "compile.h"
 #include "math3.h"
+#include "objects.h"
 #include "spec.h"
 #include "step.h"
 
@@ -18,29 +19,29 @@
 typedef struct builder {
   cav_spec *spec;
   cav_model *model;
-  cav_body *body;
-  cav_link *link;
-  cav_joint *joint;
-  cav_dof *dof;
-  cav_geom *geom;
+#define ARRAY(type, name, count) type *name;
+  CAV_MODEL_ARRAYS(ARRAY)
+#undef ARRAY
   void *assets; // meshes and height fields, written by asset.c
-  cav_site *site;
-  cav_pair *pair;
-  cav_tendon *tendon;
-  cav_tendon_part *part;
-  cav_tendon_path_point *path;
-  int *tendon_dof;
-  cav_equality *equality;
-  cav_actuator *actuator;
-  cav_sensor *sensor;
-  cav_key *key;
-  double *q0, *keys; // keys: q and v of all keyframes
+  double *keys; // q and v of all keyframes
   char **warning;
   char *text, *text_end;
   int *weld;       // [nbody] the body at the top of the group that moves with a body
   int *link_of;    // [nbody]
   cav_pair *pairs; // list of filter.c
 } builder;
+
+// what a file names, and what to call too many of them: sizes, names and limits of the model follow
+#define NAMED_OBJECTS(X)              \
+  X(body, "bodies")                   \
+  X(joint, "joints")                  \
+  X(geom, "geoms")                    \
+  X(site, "sites")                    \
+  X(tendon, "tendons")                \
+  X(equality, "equality constraints") \
+  X(actuator, "actuators")            \
+  X(sensor, "sensors")                \
+  X(key, "keyframes")
 
 static const int joint_q[] = {[CAV_JOINT_FREE] = 7, [CAV_JOINT_BALL] = 4, [CAV_JOINT_SLIDE] = 1, [CAV_JOINT_HINGE] = 1};
 static const int joint_v[] = {[CAV_JOINT_FREE] = 6, [CAV_JOINT_BALL] = 3, [CAV_JOINT_SLIDE] = 1, [CAV_JOINT_HINGE] = 1};
@@ -84,17 +85,11 @@ static void check_unique(cav_spec *spec, const void *first, int n, size_t stride
 }
 
 static void check_names(cav_spec *spec) {
-  check_unique(spec, TABLE(spec->body));
-  check_unique(spec, TABLE(spec->joint));
-  check_unique(spec, TABLE(spec->geom));
+#define UNIQUE(list, ...) check_unique(spec, TABLE(spec->list));
+  NAMED_OBJECTS(UNIQUE)
+#undef UNIQUE
   check_unique(spec, TABLE(spec->mesh));
   check_unique(spec, TABLE(spec->hfield));
-  check_unique(spec, TABLE(spec->site));
-  check_unique(spec, TABLE(spec->tendon));
-  check_unique(spec, TABLE(spec->equality));
-  check_unique(spec, TABLE(spec->actuator));
-  check_unique(spec, TABLE(spec->sensor));
-  check_unique(spec, TABLE(spec->key));
 }
 
 // --- limits ---
@@ -171,17 +166,9 @@ static void *take(carver *c, int n, size_t size) {
 
 static size_t text_bytes(const cav_spec *spec) {
   size_t bytes = strlen(spec->name) + 1;
-#define ADD(list) \
-  for (int i = 0; i < (list).n; i++) bytes += strlen((list).at[i].name) + 1
-  ADD(spec->body);
-  ADD(spec->joint);
-  ADD(spec->geom);
-  ADD(spec->site);
-  ADD(spec->tendon);
-  ADD(spec->equality);
-  ADD(spec->actuator);
-  ADD(spec->sensor);
-  ADD(spec->key);
+#define ADD(list, ...) \
+  for (int i = 0; i < spec->list.n; i++) bytes += strlen(spec->list.at[i].name) + 1;
+  NAMED_OBJECTS(ADD)
 #undef ADD
   for (int i = 0; i < spec->warning.n; i++) bytes += strlen(spec->warning.at[i]) + 1;
   return bytes;
@@ -193,48 +180,22 @@ static void carve_model(builder *b, carver *c) {
   cav_model *at = take(c, 1, sizeof *at);
   if (at) *at = *m;
   b->model = at ? at : b->model;
-  b->body = take(c, m->nbody, sizeof *b->body);
-  b->link = take(c, m->nlink, sizeof *b->link);
-  b->joint = take(c, m->njoint, sizeof *b->joint);
-  b->dof = take(c, m->nv, sizeof *b->dof);
-  b->geom = take(c, m->ngeom, sizeof *b->geom);
+#define TAKE(type, name, count) b->name = take(c, m->count, sizeof *b->name);
+  CAV_MODEL_ARRAYS(TAKE)
+#undef TAKE
   b->assets = take(c, 1, cav_put_assets(b->spec, NULL, b->model));
-  b->site = take(c, m->nsite, sizeof *b->site);
-  b->pair = take(c, m->npair, sizeof *b->pair);
-  b->tendon = take(c, m->ntendon, sizeof *b->tendon);
-  b->part = take(c, m->ntendon_part, sizeof *b->part);
-  b->path = take(c, m->ntendon_path, sizeof *b->path);
-  b->tendon_dof = take(c, m->ntendon_dof, sizeof *b->tendon_dof);
-  b->equality = take(c, m->nequality, sizeof *b->equality);
-  b->actuator = take(c, m->nactuator, sizeof *b->actuator);
-  b->sensor = take(c, m->nsensor, sizeof *b->sensor);
-  b->key = take(c, m->nkey, sizeof *b->key);
-  b->q0 = take(c, m->nq, sizeof *b->q0);
   b->keys = take(c, m->nkey, (size_t)(m->nq + m->nv) * sizeof *b->keys);
   b->warning = take(c, m->nwarning, sizeof *b->warning);
   b->text = take(c, 1, text);
   b->text_end = b->text ? b->text + text : NULL;
 }
 
-static void fraction_arrays(builder *b) {
+static void publish_arrays(builder *b) {
   cav_model *m = b->model;
   cav_put_assets(b->spec, b->assets, m);
-  m->body = b->body;
-  m->link = b->link;
-  m->joint = b->joint;
-  m->dof = b->dof;
-  m->geom = b->geom;
-  m->site = b->site;
-  m->pair = b->pair;
-  m->tendon = b->tendon;
-  m->tendon_part = b->part;
-  m->tendon_path = b->path;
-  m->tendon_dof = b->tendon_dof;
-  m->equality = b->equality;
-  m->actuator = b->actuator;
-  m->sensor = b->sensor;
-  m->key = b->key;
-  m->q0 = b->q0;
+#define PUBLISH(type, name, count) m->name = b->name;
+  CAV_MODEL_ARRAYS(PUBLISH)
+#undef PUBLISH
   m->warning = (const char *const *)b->warning;
 }
 
@@ -591,7 +552,7 @@ static void fill_path(builder *b, const cav_spec_tendon *s, cav_tendon *t) {
   t->springlength = rests ? s->springlength : NAN;
   for (int k = s->path; k < s->path + s->npath; k++) {
     const cav_spec_tendon_path *p = &b->spec->path.at[k];
-    b->path[k] = (cav_tendon_path_point){p->type, p->object, p->side, p->divisor};
+    b->tendon_path[k] = (cav_tendon_path_point){p->type, p->object, p->side, p->divisor};
   }
 }
 
@@ -619,7 +580,7 @@ static void fill_tendons(builder *b) {
     for (int k = s->part; k < s->part + s->npart; k++) {
       const cav_spec_part *p = &spec->part.at[k];
       int joint = find_scalar_joint(b, p->node, p->joint, "a fixed tendon");
-      b->part[k] = (cav_tendon_part){joint, p->coef};
+      b->tendon_part[k] = (cav_tendon_part){joint, p->coef};
       if (!rests && running(b)) t->springlength += p->coef * b->joint[joint].springref;
     }
     if (s->spatial) fill_path(b, s, t);
@@ -664,7 +625,8 @@ static void check_tied(builder *b, const cav_spec_equality *s, const cav_equalit
     if (plane) cav_spec_fail(spec, s->node, NULL, "the distance between geoms of these two types is not computed");
   }
   if (coupled ? e->object[0] == e->object[1] : e->link[0] == e->link[1])
-    cav_spec_fail(spec, s->node, NULL, coupled ? "constrains one to itself; name two" : "the two move as one; remove it");
+    cav_spec_fail(spec, s->node, NULL,
+                  coupled ? "constrains one to itself; name two" : "the two move as one; remove it");
   cav_check_softness(spec, s->node, "", &s->softness);
   cav_check_not_negative(spec, s->node, "torquescale", s->torquescale);
 }
@@ -731,19 +693,15 @@ static int find_object(builder *b, const cav_spec_sensor *s, const char *attribu
                        const char *name) {
   cav_spec *spec = b->spec;
   switch (type) {
-    case CAV_OBJECT_JOINT:
-      return resolve(spec, s->node, attribute, "joint", name, TABLE(spec->joint));
-    case CAV_OBJECT_GEOM:
-      return resolve(spec, s->node, attribute, "geom", name, TABLE(spec->geom));
-    case CAV_OBJECT_SITE:
-      return resolve(spec, s->node, attribute, "site", name, TABLE(spec->site));
-    case CAV_OBJECT_TENDON:
-      return resolve(spec, s->node, attribute, "tendon", name, TABLE(spec->tendon));
-    case CAV_OBJECT_ACTUATOR:
-      return resolve(spec, s->node, attribute, "actuator", name, TABLE(spec->actuator));
-    default:
-      return resolve(spec, s->node, attribute, "body", name, TABLE(spec->body));
+#define FIND(object, list, attributes, text) \
+  case CAV_OBJECT_##object:                  \
+    return resolve(spec, s->node, attribute, text, name, TABLE(spec->list));
+    CAV_OBJECTS(FIND)
+#undef FIND
+    case CAV_OBJECT_TYPES:
+      break;
   }
+  return -1;
 }
 
 // a joint or tendon of the kind that a sensor needs
@@ -786,12 +744,8 @@ static void fill_sensors(builder *b) {
                       .cutoff = s->cutoff};
     m->nsensordata += rule->dim;
     if (rule->target == CAV_TARGET_NONE) continue;
-    static const char *const attributes[CAV_OBJECT_TYPES] = {[CAV_OBJECT_BODY] = "body",
-                                                             [CAV_OBJECT_JOINT] = "joint",
-                                                             [CAV_OBJECT_SITE] = "site",
-                                                             [CAV_OBJECT_TENDON] = "tendon",
-                                                             [CAV_OBJECT_ACTUATOR] = "actuator"};
-    const char *attribute = rule->target == CAV_TARGET_FRAME ? "objname" : attributes[s->object_type];
+    int framed = rule->target == CAV_TARGET_FRAME;
+    const char *attribute = framed ? "objname" : cav_object_kind_of(s->object_type)->attribute;
     x->object = find_object(b, s, attribute, s->object_type, s->object);
     if (running(b)) check_sensor(b, s, x->object);
     x->referred = s->reference != NULL;
@@ -869,33 +823,23 @@ static void set_options(builder *b) {
 static void count(builder *b) {
   const cav_spec *spec = b->spec;
   cav_model *m = b->model;
-  m->nbody = spec->body.n;
-  m->njoint = spec->joint.n;
-  m->ngeom = spec->geom.n;
-  m->nsite = spec->site.n;
-  m->ntendon = spec->tendon.n;
+#define COUNT(list, ...) m->n##list = spec->list.n;
+  NAMED_OBJECTS(COUNT)
+#undef COUNT
+  m->nu = m->nactuator;
   m->ntendon_part = spec->part.n;
   m->ntendon_path = spec->path.n;
-  m->nequality = spec->equality.n;
-  m->nactuator = m->nu = spec->actuator.n;
-  m->nsensor = spec->sensor.n;
-  m->nkey = spec->key.n;
   const struct {
     int n;
     const char *what;
-  } counts[] = {{m->nbody, "bodies"},
-                {m->njoint, "joints"},
-                {m->ngeom, "geoms"},
-                {m->nsite, "sites"},
-                {m->ntendon, "tendons"},
-                {m->ntendon_part, "tendon parts"},
-                {m->ntendon_path, "elements of tendon paths"},
-                {m->nequality, "equality constraints"},
-                {m->nactuator, "actuators"},
-                {m->nsensor, "sensors"},
-                {m->nkey, "keyframes"},
-                {spec->pair.n, "pairs"},
-                {spec->exclude.n, "excludes"}};
+  } counts[] = {
+#define AT_MOST(list, what) {spec->list.n, what},
+      NAMED_OBJECTS(AT_MOST)
+#undef AT_MOST
+          {spec->part.n, "tendon parts"},
+      {spec->path.n, "elements of tendon paths"},
+      {spec->pair.n, "pairs"},
+      {spec->exclude.n, "excludes"}};
   for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
     if (counts[i].n > CAV_SPEC_OBJECTS)
       cav_spec_fail(b->spec, spec->body.at[0].node, NULL, "%d %s; at most %d are read", counts[i].n, counts[i].what,
@@ -1010,7 +954,7 @@ static cav_model *build(builder *b) {
   carve_model(b, &c);
   assert(c.used == b->model->bytes);
   fill(b);
-  fraction_arrays(b);
+  publish_arrays(b);
   assert(!running(b) || b->text == b->text_end);
   if (running(b)) {
     cav_status status = cav_reference_weights(b->model);

@@ -469,6 +469,25 @@ CAV_API cav_status cav_options_check(const cav_options *options, cav_error *erro
 /// The same of any struct by its table of n fields; what: how the text calls it.
 CAV_API cav_status cav_fields_check(const cav_field *field, int n, const void *values, const char *what, cav_error *error);
 
+/// Arrays of a model, X(type, name, number): the members and their place in the model's memory follow from this list.
+#define CAV_MODEL_ARRAYS(X)                                       \
+  X(cav_body, body, nbody)                                        \
+  X(cav_link, link, nlink)                                        \
+  X(cav_joint, joint, njoint)                                     \
+  X(cav_dof, dof, nv)                                             \
+  X(cav_geom, geom, ngeom)                                        \
+  X(cav_site, site, nsite)                                        \
+  X(cav_pair, pair, npair)                                        \
+  X(cav_tendon, tendon, ntendon)                                  \
+  X(cav_tendon_part, tendon_part, ntendon_part)                   \
+  X(cav_tendon_path_point, tendon_path, ntendon_path)             \
+  X(int, tendon_dof, ntendon_dof) /* indices into v, by tendon */ \
+  X(cav_equality, equality, nequality)                            \
+  X(cav_actuator, actuator, nactuator)                            \
+  X(cav_sensor, sensor, nsensor)                                  \
+  X(cav_key, key, nkey)                                           \
+  X(double, q0, nq) /* configuration of the file, where reference quantities are taken */
+
 /// A compiled model. Built by cav_model_load; nothing but cav_model_perturb changes it, before any state of it exists.
 typedef struct cav_model {
   const char *name;
@@ -484,24 +503,11 @@ typedef struct cav_model {
   int nmesh, nhfield;
   int fused;       ///< 1: bodies without joints take the reference weights of the link they are part of
   int nsensordata; ///< length of the vector of all readings
-  const cav_body *body;
-  const cav_link *link;
-  const cav_joint *joint;
-  const cav_dof *dof; ///< [nv]
-  const cav_geom *geom;
+#define CAV_ARRAY_MEMBER(type, name, count) const type *name;
+  CAV_MODEL_ARRAYS(CAV_ARRAY_MEMBER)
+#undef CAV_ARRAY_MEMBER
   const cav_mesh *mesh;
   const cav_hfield *hfield;
-  const cav_site *site;
-  const cav_pair *pair;
-  const cav_tendon *tendon;
-  const cav_tendon_part *tendon_part;
-  const cav_tendon_path_point *tendon_path;
-  const int *tendon_dof; ///< [ntendon_dof] indices into v, by tendon
-  const cav_equality *equality;
-  const cav_actuator *actuator; ///< [nu]
-  const cav_sensor *sensor;
-  const cav_key *key;
-  const double *q0;           ///< [nq] configuration of the file, where reference quantities are taken
   const char *const *warning; ///< what the file asks for and this version leaves aside, with file and line
   double mass;                ///< kg, of all that moves
   size_t bytes;               ///< memory of the model
