@@ -1,4 +1,4 @@
-/// Contact points of convex bodies by one route: a mesh, a prism of a height field, an ellipsoid or a cylinder against
+/// Contact points of convex bodies by one way: a mesh, a prism of a height field, an ellipsoid or a cylinder against
 /// anything convex, but a sphere or a capsule outside a solid, which have routines of their own.
 ///
 /// convex.c gives the exact direction in which the two bodies are furthest apart or least inside each other. Where it

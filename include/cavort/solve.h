@@ -33,7 +33,7 @@ typedef struct cav_solver_rule {
 } cav_solver_rule;
 
 /// solver < CAV_SOLVER_TYPES.
-const cav_solver_rule *cav_solver_rule_of(cav_solver solver);
+CAV_API const cav_solver_rule *cav_solver_rule_of(cav_solver solver);
 
 /// One line of progress, and of the log.
 typedef struct cav_progress {
