@@ -2,6 +2,7 @@
 #ifndef CAVORT_NORMAL_EQUATIONS_H
 #define CAVORT_NORMAL_EQUATIONS_H
 
+#include "band.h"
 #include "transcription.h"
 
 /// Normal equations and their factor. Solvers read size, gradient and diagonal; the rest is normal_equations.c's.
@@ -14,9 +15,15 @@ typedef struct cav_normal {
   double *H;        ///< [core*band] lower triangle by columns: H[j*band + i - j] is H(i, j)
   double *B;        ///< [core*border] by columns of the core: B[i*core + j] is H(core + i, j)
   double *C;        ///< [border*border] lower triangle by columns
-  double *factor;   ///< [core*band]
-  double *Y, *S;    ///< [core*border] L^-1 B', [border*border] factor of what the core leaves of C
   double *gradient, *diagonal; ///< [size]
+
+  // trees that nothing joined at the last gathering are factored apart
+  int ntree, *tree; ///< [ntree+1] their first dofs
+  int *owner;       ///< [n] group of each dof
+  int ngroup;
+  int *first, *dof;   ///< [ngroup+1] of each group's in the dofs [n], ascending
+  cav_band *group;    ///< [ngroup] factors
+  double *factor, *x; ///< room of all factors; [size] right-hand side of one group
 } cav_normal;
 
 /// Of the unknowns of a transcription; NULL if memory runs out.
@@ -27,6 +34,9 @@ void cav_normal_free(cav_normal *normal);
 void cav_normal_gather(cav_normal *normal, const cav_transcription *transcription);
 const double *cav_normal_gradient(const cav_normal *normal);
 const double *cav_normal_diagonal(const cav_normal *normal);
+
+/// Groups of trees at the last gathering, and the largest number of dofs in one.
+int cav_normal_groups(const cav_normal *normal, int *most);
 
 /// Factors H + shift diag(H); CAV_NOT_CONVERGED if that is not positive definite.
 cav_status cav_normal_factor(cav_normal *normal, double shift);

@@ -1,0 +1,22 @@
+/// A symmetric positive definite band with a dense border, and its Cholesky factor. Private to optim/.
+#ifndef CAVORT_BAND_H
+#define CAVORT_BAND_H
+
+#include "cavort/model.h"
+
+/// The matrix before it is factored, its factor afterwards; arrays are the caller's. By columns.
+typedef struct cav_band {
+  int core, border; ///< rows in the band, and after it
+  int width;        ///< entries kept of a column of the band, itself and those below
+  double *A;        ///< [core*width] lower triangle: A[j*width + i - j] is entry (i, j)
+  double *Y;        ///< [core*border] rows of the border: Y[i*core + j] is entry (core + i, j)
+  double *S;        ///< [border*border] lower triangle
+} cav_band;
+
+/// Factors; CAV_NOT_CONVERGED if the matrix is not positive definite.
+cav_status cav_band_factor(cav_band *band);
+
+/// x := inverse times x [core+border].
+void cav_band_solve(const cav_band *band, double *x);
+
+#endif
