@@ -6,7 +6,6 @@
 /// exact. Constraint rows enter the merit by an augmented Lagrangian of two-sided rows: with z~ = z + multiplier/rho and
 /// e = z~ - clamp(z~), the row costs rho/2 e^2 and its next multiplier is rho e (Powell, Hestenes, Rockafellar).
 #include "knot.h"
-#include "lapack.h"
 
 #include <assert.h>
 #include <float.h>
@@ -277,7 +276,7 @@ void cav_transcription_free(cav_transcription *tr) {
   free(tr->servo);
   free(tr->unactuated), free(tr->effort), free(tr->effort_range), free(tr->effort_unit), free(tr->rotation_dof),
       free(tr->rotation_of);
-  free(tr->knot), free(tr->scratch), free(tr->before), free(tr->rotation_after);
+  free(tr->knot), free(tr->join), free(tr->scratch), free(tr->before), free(tr->rotation_after);
   cav_periodicity_free(tr->periodicity);
   cav_parallel_free(tr->pool);
   free(tr);
@@ -343,13 +342,10 @@ static void chain(const cav_transcription *tr, int t, int n, const double *dq, c
 // ---------------------------------------------------------------- evaluation
 
 /// Joins the dense rows of all knots into their Hessians. One thread only: not every BLAS may be called by two at once.
-static void join_rows(cav_transcription *tr) {
-  int width = 3 * tr->nv;
-  double one = 1;
-  for (int t = 0; t < tr->nknot; t++) {
-    cav_knot *knot = &tr->knot[t];
-    if (knot->ndense) dsyrk_("U", "N", &width, &knot->ndense, &one, knot->dense, &width, &one, knot->hessian, &width);
-  }
+static cav_status join_rows(cav_transcription *tr) {
+  cav_status status = CAV_OK;
+  for (int t = 0; t < tr->nknot && status == CAV_OK; t++) status = cav_rows_join(tr, &tr->knot[t]);
+  return status;
 }
 
 typedef struct pass {
@@ -503,7 +499,7 @@ static cav_status evaluate(cav_transcription *tr, cav_trajectory *at, int jacobi
   pass p = {tr, at, jacobian, status};
   cav_parallel_for(tr->pool, tr->nknot, evaluate_item, &p);
   for (int t = 0; t < tr->nknot && result == CAV_OK; t++) result = status[t];
-  if (jacobian && result == CAV_OK) join_rows(tr);
+  if (jacobian && result == CAV_OK) result = join_rows(tr);
   for (int i = 0; i < members; i++) dynamics += tr->scratch[i].seconds / members;
   tr->seconds_dynamics += dynamics;
   tr->seconds_assembly += now() - start - dynamics;

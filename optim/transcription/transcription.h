@@ -108,6 +108,8 @@ typedef struct cav_transcription {
   cav_knot *knot;                   ///< [nknot]
   struct cav_scratch *scratch;      ///< one a thread
   cav_parallel *pool;
+  double *join; ///< room of join.c
+  size_t join_room;
   double seconds_dynamics, seconds_assembly;
 } cav_transcription;
 
@@ -138,6 +140,9 @@ cav_status cav_transcription_values(cav_transcription *transcription, cav_trajec
 
 /// Values and derivatives: du, dy, hessian and gradient of the merit of every knot.
 cav_status cav_transcription_linearise(cav_transcription *transcription, cav_trajectory *trajectory);
+
+/// Adds the product of a knot's dense rows to its Hessian. One thread only. join.c. CAV_NO_MEMORY.
+cav_status cav_rows_join(cav_transcription *transcription, cav_knot *knot);
 
 /// Sums over knots of the last values.
 double cav_transcription_cost(const cav_transcription *transcription);

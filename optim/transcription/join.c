@@ -1,0 +1,106 @@
+/// Joins the dense rows of a knot into its Hessian, H += R'R (BLAS's dsyrk). Trees that no row joins make blocks of their own:
+/// which is read off the zeros of the rows, so bodies that touch nothing cost their own small products. One group gives the
+/// product of all.
+#include <stdlib.h>
+#include <string.h>
+
+#include "lapack.h"
+#include "transcription.h"
+
+/// Groups of trees: all by dof, and what is grown for them.
+typedef struct join {
+  int nv, ngroup;
+  int *tree;   ///< [nv] first dof of a dof's tree
+  int *owner;  ///< [nv] representative first dof of a tree's group, at first dofs
+  int *column; ///< [3*nv] those of one group
+  int *group;  ///< [rows] first dof of a row's group, -1 for a row of zeros
+} join;
+
+static int representative(const join *g, int tree) {
+  while (g->owner[tree] != tree) tree = g->owner[tree];
+  return tree;
+}
+
+/// Joins the trees of every row.
+static void find_groups(join *g, const cav_model *m, int n, const double *row) {
+  for (int d = 0; d < g->nv; d++) {
+    g->tree[d] = m->dof[d].parent < 0 ? d : g->tree[m->dof[d].parent];
+    g->owner[d] = d;
+  }
+  for (int i = 0; i < n; i++, row += 3 * (size_t)g->nv) {
+    g->group[i] = -1;
+    for (int k = 0, d = 0; k < 3 * g->nv; k++, d = d + 1 < g->nv ? d + 1 : 0) {
+      if (row[k] == 0) continue;
+      int tree = representative(g, g->tree[d]), other = g->group[i];
+      if (other < 0 || tree < other) g->group[i] = tree;
+      if (other >= 0) g->owner[tree < other ? other : tree] = tree < other ? tree : other;
+    }
+  }
+  g->ngroup = 0;
+  for (int d = 0; d < g->nv; d++) g->ngroup += g->tree[d] == d && g->owner[d] == d;
+}
+
+/// Columns of the group that starts with a tree; returns their number.
+static int list_columns(join *g, int first) {
+  int n = 0;
+  for (int d = 0; d < g->nv; d++)
+    if (representative(g, g->tree[d]) == first) g->column[n++] = d;
+  for (int k = 0; k < 2 * n; k++) g->column[n + k] = g->column[k] + g->nv;
+  return 3 * n;
+}
+
+/// Copies the group's block of the knot's Hessian, lower triangle, to H [n*n] or back.
+static void copy_block(const join *g, int n, double *hessian, double *H, int back) {
+  for (int i = 0; i < n; i++) {
+    double *row = hessian + (size_t)g->column[i] * 3 * (size_t)g->nv, *block = H + (size_t)i * (size_t)n;
+    if (back)
+      for (int k = 0; k <= i; k++) row[g->column[k]] = block[k];
+    else
+      for (int k = 0; k <= i; k++) block[k] = row[g->column[k]];
+  }
+}
+
+/// One group's part of the product, through room for its rows and block.
+static void join_group(join *g, int first, cav_knot *knot, double *room) {
+  int width = list_columns(g, first), count = 0;
+  double one = 1, *block = room, *row = room + (size_t)width * (size_t)width;
+  for (int i = 0; i < knot->ndense; i++) {
+    if (g->group[i] < 0 || representative(g, g->group[i]) != first) continue;
+    const double *from = knot->dense + (size_t)i * 3 * (size_t)g->nv;
+    double *to = row + (size_t)count++ * (size_t)width;
+    for (int k = 0; k < width; k++) to[k] = from[g->column[k]];
+  }
+  if (count == 0) return;
+  copy_block(g, width, knot->hessian, block, 0);
+  dsyrk_("U", "N", &width, &count, &one, row, &width, &one, block, &width);
+  copy_block(g, width, knot->hessian, block, 1);
+}
+
+cav_status cav_rows_join(cav_transcription *tr, cav_knot *knot) {
+  int width = 3 * tr->nv, n = knot->ndense;
+  double one = 1;
+  int trees = 0;
+  for (int d = 0; d < tr->nv; d++) trees += tr->model->dof[d].parent < 0;
+  if (n == 0) return CAV_OK;
+  if (trees == 1) {
+    dsyrk_("U", "N", &width, &n, &one, knot->dense, &width, &one, knot->hessian, &width);
+    return CAV_OK;
+  }
+  size_t nv = (size_t)tr->nv, ints = 5 * nv + (size_t)n, dense = 9 * nv * nv + 3 * nv * (size_t)n;
+  if (ints / 2 + 1 + dense > tr->join_room) {
+    free(tr->join);
+    tr->join_room = ints / 2 + 1 + dense;
+    tr->join = malloc(tr->join_room * sizeof(double));
+    if (!tr->join) return tr->join_room = 0, CAV_NO_MEMORY;
+  }
+  int *at = (int *)(tr->join + dense);
+  join g = {.nv = tr->nv, .tree = at, .owner = at + nv, .column = at + 2 * nv, .group = at + 5 * nv};
+  find_groups(&g, tr->model, n, knot->dense);
+  if (g.ngroup == 1) {
+    dsyrk_("U", "N", &width, &n, &one, knot->dense, &width, &one, knot->hessian, &width);
+    return CAV_OK;
+  }
+  for (int d = 0; d < tr->nv; d++)
+    if (g.tree[d] == d && g.owner[d] == d) join_group(&g, d, knot, tr->join);
+  return CAV_OK;
+}
