@@ -132,6 +132,18 @@ typedef struct cav_solution {
   cav_binding *row; ///< constraint rows that are violated or have a multiplier, by knot
 } cav_solution;
 
+/// How the own solver factors its normal equations at the problem's guess, first stage: a band with a border for each group of
+/// trees that nothing joins there.
+typedef struct cav_equations {
+  int unknowns;
+  int groups, largest; ///< groups of trees; dofs of the largest
+  int width, border;   ///< of its band: entries of a column; unknowns after it (of a cycle's last knots, the free step)
+  double bytes;        ///< of the matrix and its factors
+} cav_equations;
+
+/// Fails as cav_solve does where the problem or its guess cannot be evaluated. structure.c.
+cav_status cav_problem_equations(const cav_problem *problem, cav_equations *equations, cav_error *error);
+
 /// Solves from the problem's guess, or from start if not NULL. CAV_NOT_CONVERGED and CAV_INTERRUPTED leave the best iterate in
 /// the solution; NULL in *solution only where error says so.
 CAV_API cav_status cav_solve(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,

@@ -342,6 +342,19 @@ static void print_stage_ends(const cav_stage_options *first, const cav_stage_opt
   printf("\n\n");
 }
 
+// how the solver will factor
+static cav_status print_equations(const cav_problem *p, cav_error *error) {
+  cav_equations e;
+  cav_status status = cav_problem_equations(p, &e, error);
+  if (status) return status;
+  printf("  normal equations: %d unknowns, %.3g MB with factors, ", e.unknowns, e.bytes / 1e6);
+  if (e.groups > 1) printf("%d groups of trees that nothing joins at the guess, the largest ", e.groups);
+  printf("a band of %d", e.width);
+  if (e.border > 0) printf(" with a border of %d", e.border);
+  printf("\n");
+  return CAV_OK;
+}
+
 static cav_status print_problem(const cav_problem *p, cav_error *error) {
   static const char *const order[] = {"euler", "midpoint", "momentum"};
   int knots = (int)lround(p->duration / p->timestep) + 1;
@@ -365,7 +378,10 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
          p->guess == CAV_GUESS_HOLD ? "holds the start" : "goes from start to goal");
   if (p->nguess_pose > 0) printf(" by %d postures", p->nguess_pose);
   if (p->guess_height > 0) printf(", with an arc of %g m from %g to %g s", p->guess_height, p->guess_from, p->guess_to);
-  printf("\n  actuators up to %g of their limits, joints and tendons %g rad or m inside theirs\n", p->effort_limit,
+  printf("\n");
+  status = print_equations(p, error);
+  if (status) return status;
+  printf("  actuators up to %g of their limits, joints and tendons %g rad or m inside theirs\n", p->effort_limit,
          p->limit_margin);
   print_terms(p, 0);
   print_terms(p, 1);

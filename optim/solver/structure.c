@@ -1,0 +1,35 @@
+/// What the normal equations of a problem are made of, for who wants to know before a solve: evaluates the guess once and factors
+/// nothing.
+#include "continuation.h"
+
+/// The structure at the trajectory.
+static cav_status read_structure(cav_transcription *tr, cav_normal *normal, cav_trajectory *at, cav_equations *e) {
+  cav_status status = cav_transcription_linearise(tr, at);
+  if (status != CAV_OK) return status;
+  cav_normal_gather(normal, tr);
+  e->unknowns = normal->size;
+  e->groups = cav_normal_groups(normal, &e->largest);
+  e->width = 3 * e->largest;
+  e->border = (normal->cyclic ? 2 * e->largest : 0) + (normal->free_step != 0);
+  double core = normal->core, border = normal->border;
+  e->bytes = 2 * sizeof(double) * (core * normal->band + core * border + border * border);
+  return CAV_OK;
+}
+
+cav_status cav_problem_equations(const cav_problem *problem, cav_equations *equations, cav_error *error) {
+  *equations = (cav_equations){0};
+  cav_transcription *tr = cav_transcription_new(problem, 1, error);
+  if (!tr) return error ? error->status : CAV_NO_MEMORY;
+  cav_normal *normal = cav_normal_new(tr);
+  cav_trajectory *at = cav_trajectory_new(problem->model, tr->nknot, problem->timestep);
+  cav_status status = normal && at ? CAV_OK : CAV_NO_MEMORY;
+  if (status == CAV_OK) {
+    cav_guess_fill(problem, problem->q_goal, at);
+    cav_stage_set(problem, 0, tr);
+    status = read_structure(tr, normal, at, equations);
+  }
+  if (status != CAV_OK && error)
+    *error = (cav_error){status, 0, "the normal equations cannot be evaluated at the guess"};
+  cav_trajectory_free(at), cav_normal_free(normal), cav_transcription_free(tr);
+  return status;
+}
