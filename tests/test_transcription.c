@@ -7,6 +7,7 @@
 #include "gauss_newton.h"
 #include "readings.h"
 
+#include "rotation.h"
 #include "scene.h"
 
 /// A body that floats over and touches a floor, with a ball joint, a tendon, limits near their ends and an unactuated dof.
@@ -468,6 +469,22 @@ static void test_power(void) {
   cav_trajectory_free(at);
   cav_transcription_free(tr);
   cav_model_free(m);
+/// Their closed forms near no rotation and near half a turn, where digits are lost: against the product of series, which has an error
+/// below a^8/9!, and about an axis against half the cotangent of half the angle.
+static void test_rotation_digits(void) {
+  for (double a = 1e-6; a < 0.05; a *= 1.3) {
+    double phi[3] = {0, 0, a}, J[9], a2 = a * a;
+    cav_rotation_jacobian(phi, J);
+    // J x = sin a / a x - (1 - cos a) / a y in the plane
+    CHECK_NEAR(J[0], 1 - a2 / 6 * (1 - a2 / 20 * (1 - a2 / 42)), 3e-16);
+    CHECK_NEAR(J[3], -a / 2 * (1 - a2 / 12 * (1 - a2 / 30 * (1 - a2 / 56))), 1e-15);
+  }
+  for (double left = 1e-1; left > 1e-12; left *= 0.3) {
+    double phi[3] = {0, 0, M_PI - left}, inverse[9];
+    cav_rotation_jacobian_inverse(phi, inverse);
+    // a/2 cot(a/2), with the half of what is left to half a turn
+    CHECK_NEAR(inverse[0], phi[2] / 2 * tan(left / 2), 2e-15);
+  }
 }
 
 /// What cannot be planned with is refused by name, before anything is solved.
@@ -501,6 +518,7 @@ static void test_refusals(void) {
 
 int main(void) {
   test_rotations();
+  test_rotation_digits();
   test_refusals();
   test_power();
   const closing rest = {.at_rest = 1}, open = {0}, timed = {.at_rest = 1, .free_step = 1}, adrift = {.free_step = 1};

@@ -197,30 +197,6 @@ static inline void quat_log(double w[3], const double q[4]) {
   scale3(w, sign * s, q + 1);
 }
 
-/// Rate of the rotation vector w by angular velocity in body axes, w' = J omega: the inverse of the right Jacobian of
-/// rotations, 1 + [w]/2 + c [w]^2, row-major.
-static inline void turn_inverse(const double w[3], double J[9]) {
-  double a2 = dot3(w, w), a = sqrt(a2);
-  double c = a < 1e-3 ? 1.0 / 12 + a2 / 720 : 1 / a2 - 0.5 / (a * tan(0.5 * a));
-  double skew[9] = {0, -w[2], w[1], w[2], 0, -w[0], -w[1], w[0], 0};
-  for (int i = 0; i < 3; i++) {
-    for (int j = 0; j < 3; j++) { J[3 * i + j] = (i == j) + 0.5 * skew[3 * i + j] + c * (w[i] * w[j] - (i == j) * a2); }
-  }
-}
-
-/// Right Jacobian of rotations: body angular velocity = J w' of the rotation vector w, 1 - (1 - cos a)/a^2 [w] +
-/// (a - sin a)/a^3 [w]^2, a = |w|, row-major. The inverse of turn_inverse.
-static inline void turn_jacobian(const double w[3], double J[9]) {
-  double a2 = dot3(w, w), a = sqrt(a2);
-  int small = a < 1e-2;
-  double b = small ? 0.5 - a2 / 24 + a2 * a2 / 720 : (1 - cos(a)) / a2;
-  double c = small ? 1.0 / 6 - a2 / 120 + a2 * a2 / 5040 : (a - sin(a)) / (a2 * a);
-  double skew[9] = {0, -w[2], w[1], w[2], 0, -w[0], -w[1], w[0], 0};
-  for (int i = 0; i < 3; i++) {
-    for (int j = 0; j < 3; j++) { J[3 * i + j] = (i == j) - b * skew[3 * i + j] + c * (w[i] * w[j] - (i == j) * a2); }
-  }
-}
-
 // no loops over the six: compilers keep what is written out in registers
 
 static inline void copy6(double r[6], const double a[6]) {

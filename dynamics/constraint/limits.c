@@ -10,6 +10,7 @@
 /// SMOOTH_ACTIVATION delta from there: the two add up.
 #include "constraint.h"
 #include "math3.h"
+#include "rotation.h"
 
 static const double R_MIN = 1e-15, IMPEDANCE_MIN = 1e-4, IMPEDANCE_MAX = 0.9999, FRICTION_MIN = 1e-5;
 // fraction of smoothing distances beyond which the smoothed force is dropped: exp(-12) = 6e-6 of its value at contact
@@ -191,7 +192,7 @@ static cav_status limit_cylinder(cav_state *state, cav_row row, const cav_joint 
                                  double activation) {
   double w[3], J[9], n[3], away[3];
   quat_log(w, state->work->q + joint->q);
-  turn_inverse(w, J);
+  cav_rotation_jacobian_inverse(w, J);
   double twist = dot3(w, joint->axis);
   cav_status status = CAV_OK;
   if (joint->twist_limited) {

@@ -24,6 +24,7 @@
 #include "derivative.h"
 #include "half_step.h"
 #include "math3.h"
+#include "rotation.h"
 
 enum { BLOCK = 36, ALIGN = 8 };
 
@@ -465,7 +466,7 @@ static void add_turning_spring(const task *t, int dof, double stiffness, const d
   quat_normalise(from);
   quat_mul(between, from, q);
   quat_log(w, between);
-  turn_inverse(w, J);
+  cav_rotation_jacobian_inverse(w, J);
   for (int i = 0; i < 9; i++) t->dq[(dof + i / 3) * t->nv + dof + i % 3] += stiffness * J[i];
 }
 
@@ -538,7 +539,7 @@ static void add_ball_limit(const task *t, const cav_row *row, const cav_joint *j
   double turn[3], J[9], scale = -t->inverse_h;
   quat_log(turn, w->q + joint->q);
   double angle = norm3(turn);
-  turn_inverse(turn, J);
+  cav_rotation_jacobian_inverse(turn, J);
   for (int j = 0; j < 3; j++) {
     // axis = -turn/angle, and turn changes by a column of J
     double turned[3], axis[3], along;

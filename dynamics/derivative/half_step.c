@@ -9,6 +9,7 @@
 /// (S x* F), whatever they are, are added for the dofs above it together, as in analytic.c, whose contacts count on it.
 #include "half_step.h"
 #include "math3.h"
+#include "rotation.h"
 
 // r = w x* f: what a wrench about a fixed point becomes when carried along by a twist
 static void carry(double r[6], const double twist[6], const double f[6]) {
@@ -35,7 +36,7 @@ static void group_twists(cav_half_step *half, double step, int first, int end, i
     quat_exp(quat, angle);
     quat_matrix(carried, quat);
     scale3(angle, step, v + first);
-    turn_jacobian(angle, jacobian);
+    cav_rotation_jacobian(angle, jacobian);
   }
   for (int k = first; k < end; k++) {
     double *X = half->by_q + 12 * k, *Y = half->by_v + 12 * k;

@@ -13,6 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "rotation.h"
 #include "verification.h"
 
 /// Finer steps in a step of the motion.

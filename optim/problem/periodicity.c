@@ -10,6 +10,7 @@
 
 #include "cavort/dynamics.h"
 #include "file.h"
+#include "math3.h"
 
 static const double near = 1e-6;       // m and fractions: what files leave open
 static const double alike = 1e-6;      // fraction of the largest force by which two images may differ
@@ -33,28 +34,15 @@ struct cav_periodicity {
 
 // ---------------------------------------------------------------- applying
 
-static void times(const double *a, const double *b, double *out) {
-  double w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3];
-  double x = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2];
-  double y = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1];
-  double z = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
-  out[0] = w, out[1] = x, out[2] = y, out[3] = z;
-}
-
-static void conjugate(const double *a, double *out) {
-  out[0] = a[0];
-  for (int k = 1; k < 4; k++) out[k] = -a[k];
-}
-
 /// out := q0_image n^-1 q0^-1 q n
 static void mirror_rotation(const double *q0_image, const double *n, const double *q0, const double *q, double *out) {
   double back[4], x[4];
-  conjugate(q0, back);
-  times(back, q, x);
-  times(x, n, x);
-  conjugate(n, back);
-  times(back, x, x);
-  times(q0_image, x, out);
+  quat_conjugate(back, q0);
+  quat_mul(x, back, q);
+  quat_mul(x, x, n);
+  quat_conjugate(back, n);
+  quat_mul(x, back, x);
+  quat_mul(out, q0_image, x);
 }
 
 /// World direction: way 1 by the map, -1 by its inverse, which is its transpose.
@@ -89,7 +77,7 @@ static void orientation(const cav_periodicity *w, int way, int j, const double *
     mirror_rotation(q0_image, image->rotation, q0, quat, out);
   } else if (free) {
     double rotation[4] = {w->rotation[0], way * w->rotation[1], way * w->rotation[2], way * w->rotation[3]};
-    times(rotation, quat, out);
+    quat_mul(out, rotation, quat);
   } else {
     memcpy(out, quat, 4 * sizeof(double));
   }

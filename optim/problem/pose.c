@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "file.h"
+#include "math3.h"
 #include "problem_file.h"
 
 enum { DEEPEST = 16 }; // poses that name each other
@@ -124,15 +125,6 @@ static cav_status read_base(const cav_problem_reader *reader, const cav_xml_node
   return first == source[1] ? read_numbers(reader, node, q) : read_knot(reader, node, q);
 }
 
-// product of quaternions a b
-static void times(const double *a, const double *b, double *out) {
-  double w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3];
-  double x = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2];
-  double y = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1];
-  double z = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
-  out[0] = w, out[1] = x, out[2] = y, out[3] = z;
-}
-
 // the free joint that a <root> names, or the first; -1 and an error if it is none
 static int root_joint(const cav_problem_reader *reader, const cav_xml_node *node) {
   const cav_model *m = reader->model;
@@ -170,7 +162,7 @@ static cav_status lay_root(const cav_problem_reader *reader, const cav_xml_node 
     memset(rotation, 0, sizeof rotation);
     rotation[0] = cos(half);
     rotation[1 + i] = sin(half);
-    times(at + 3, rotation, at + 3);
+    quat_mul(at + 3, at + 3, rotation);
   }
   return CAV_OK;
 }

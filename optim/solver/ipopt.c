@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "ipopt_options.h"
+#include "rotation.h"
 
 /// Dual infeasibility that the noise of derivatives explains, and violation from which the last step brings all rows in.
 static const double noise = 1, acceptable = 1e-4;

@@ -3,6 +3,7 @@
 /// are gathered by dof, as they share the derivatives of u. A constraint row enters by an augmented Lagrangian. Where the step is
 /// free, every row's derivative by its logarithm is the difference of two passes that begin the same rows.
 #include "knot.h"
+#include "rotation.h"
 
 #include <assert.h>
 #include <float.h>

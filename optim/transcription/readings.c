@@ -2,6 +2,7 @@
 /// does not offer (a force or constraint of the model, contact points that come and go, a type of sensor) is differenced
 /// instead, only that, and counted; nothing else is mixed.
 #include "readings.h"
+#include "rotation.h"
 
 #include <assert.h>
 #include <math.h>

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "quantity.h"
+#include "rotation.h"
 #include "transcription.h"
 
 /// Fraction of a step by which a window may miss a knot and still hold it.
@@ -78,17 +79,6 @@ void cav_term_target(const cav_term *term, double time, int dim, double *target)
     double s = span > 0 ? fmin(fmax((time - term->waypoint_time[i]) / span, 0), 1) : 0;
     for (int k = 0; k < dim; k++) target[k] = (1 - s) * term->target[i * dim + k] + s * term->target[j * dim + k];
   }
-}
-
-/// Rotation vector that takes a to b, in a's axes.
-void cav_rotation_between(const double a[4], const double b[4], double phi[3]) {
-  double w = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
-  double x = a[0] * b[1] - a[1] * b[0] - a[2] * b[3] + a[3] * b[2];
-  double y = a[0] * b[2] + a[1] * b[3] - a[2] * b[0] - a[3] * b[1];
-  double z = a[0] * b[3] - a[1] * b[2] + a[2] * b[1] - a[3] * b[0];
-  double s = sqrt(x * x + y * y + z * z), sign = w < 0 ? -1 : 1;
-  double gain = s > 1e-12 ? 2 * atan2(s, fabs(w)) / s * sign : 2 * sign;
-  phi[0] = gain * x, phi[1] = gain * y, phi[2] = gain * z;
 }
 
 /// Value minus target of a sensor term, over its scale.

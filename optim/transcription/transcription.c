@@ -6,6 +6,7 @@
 /// exact. Constraint rows enter the merit by an augmented Lagrangian of two-sided rows: with z~ = z + multiplier/rho and
 /// e = z~ - clamp(z~), the row costs rho/2 e^2 and its next multiplier is rho e (Powell, Hestenes, Rockafellar).
 #include "knot.h"
+#include "rotation.h"
 
 #include <assert.h>
 #include <float.h>
@@ -19,29 +20,6 @@ static double now(void) {
   struct timespec t;
   clock_gettime(CLOCK_MONOTONIC, &t);
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-// ---------------------------------------------------------------- rotations
-
-void cav_rotation_jacobian(const double phi[3], double J[9]) {
-  double a2 = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2], a = sqrt(a2);
-  double s = a < 1e-4 ? 0.5 - a2 / 24 : (1 - cos(a)) / a2;
-  double c = a < 1e-4 ? 1.0 / 6 - a2 / 120 : (a - sin(a)) / (a2 * a);
-  // I - s [phi] + c [phi]^2
-  double x = phi[0], y = phi[1], z = phi[2];
-  double square[9] = {x * x - a2, x * y, x * z, x * y, y * y - a2, y * z, x * z, y * z, z * z - a2};
-  double skew[9] = {0, -z, y, z, 0, -x, -y, x, 0};
-  for (int i = 0; i < 9; i++) J[i] = (i % 4 == 0) - s * skew[i] + c * square[i];
-}
-
-void cav_rotation_jacobian_inverse(const double phi[3], double J[9]) {
-  double a2 = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2], a = sqrt(a2);
-  double c = a < 1e-3 ? 1.0 / 12 + a2 / 720 : 1 / a2 - (1 + cos(a)) / (2 * a * sin(a));
-  // I + [phi]/2 + c [phi]^2
-  double x = phi[0], y = phi[1], z = phi[2];
-  double square[9] = {x * x - a2, x * y, x * z, x * y, y * y - a2, y * z, x * z, y * z, z * z - a2};
-  double skew[9] = {0, -z, y, z, 0, -x, -y, x, 0};
-  for (int i = 0; i < 9; i++) J[i] = (i % 4 == 0) + 0.5 * skew[i] + c * square[i];
 }
 
 // ---------------------------------------------------------------- construction

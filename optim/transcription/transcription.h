@@ -186,13 +186,4 @@ double cav_knot_time(const cav_transcription *transcription, int t);
 /// Target of a term at a time, dim numbers: constant, between waypoints, or zeros.
 void cav_term_target(const cav_term *term, double time, int dim, double *target);
 
-/// Rotation vector that takes unit quaternion a to b, in a's axes.
-void cav_rotation_between(const double a[4], const double b[4], double phi[3]);
-
-/// Inverse of the right Jacobian of SO(3) at rotation vector phi, row-major; its transpose is the left one's. For angles below pi.
-void cav_rotation_jacobian_inverse(const double phi[3], double J[9]);
-
-/// Right Jacobian of SO(3).
-void cav_rotation_jacobian(const double phi[3], double J[9]);
-
 #endif
