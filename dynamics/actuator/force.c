@@ -64,13 +64,33 @@ static double muscle_bias(const cav_actuator *a, double length) {
 
 static double affine(const double *p, double length, double velocity) { return p[0] + p[1] * length + p[2] * velocity; }
 
+static double gain_of(const cav_actuator *a, double length, double velocity) {
+  switch (a->gain) {
+    case CAV_GAIN_FIXED:
+      break;
+    case CAV_GAIN_AFFINE:
+      return affine(a->gain_parameter, length, velocity);
+    case CAV_GAIN_MUSCLE:
+      return muscle_gain(a, length, velocity);
+  }
+  return a->gain_parameter[0];
+}
+
+static double bias_of(const cav_actuator *a, double length, double velocity) {
+  switch (a->bias) {
+    case CAV_BIAS_NONE:
+      break;
+    case CAV_BIAS_AFFINE:
+      return affine(a->bias_parameter, length, velocity);
+    case CAV_BIAS_MUSCLE:
+      return muscle_bias(a, length);
+  }
+  return 0;
+}
+
 static void gain_and_bias(const cav_actuator *a, double length, double velocity, double *gain, double *bias) {
-  *gain = a->gain_parameter[0];
-  *bias = 0;
-  if (a->gain == CAV_GAIN_AFFINE) { *gain = affine(a->gain_parameter, length, velocity); }
-  if (a->gain == CAV_GAIN_MUSCLE) { *gain = muscle_gain(a, length, velocity); }
-  if (a->bias == CAV_BIAS_AFFINE) { *bias = affine(a->bias_parameter, length, velocity); }
-  if (a->bias == CAV_BIAS_MUSCLE) { *bias = muscle_bias(a, length); }
+  *gain = gain_of(a, length, velocity);
+  *bias = bias_of(a, length, velocity);
 }
 
 static double clamp(double x, const double range[2]) { return fmin(fmax(x, range[0]), range[1]); }
