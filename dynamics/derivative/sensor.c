@@ -233,21 +233,53 @@ static void tendon(const task *t, int index, double *out) {
   }
 }
 
+// no default: the compiler names a type that is declared and neither here nor there
 static int offered(const cav_model *model, const cav_sensor *sensor) {
   if (sensor->cutoff > 0) return 0;
   if (sensor->referred) return sensor->type >= CAV_SENSOR_FRAMEPOS && sensor->type <= CAV_SENSOR_FRAMEZAXIS;
   switch (sensor->type) {
     case CAV_SENSOR_TENDONVEL:
       return model->tendon[sensor->object].npath == 0;
+    case CAV_SENSOR_JOINTPOS:
+    case CAV_SENSOR_JOINTVEL:
+    case CAV_SENSOR_FRAMEPOS:
+    case CAV_SENSOR_FRAMEQUAT:
+    case CAV_SENSOR_FRAMEXAXIS:
+    case CAV_SENSOR_FRAMEYAXIS:
+    case CAV_SENSOR_FRAMEZAXIS:
+    case CAV_SENSOR_FRAMELINVEL:
+    case CAV_SENSOR_FRAMEANGVEL:
+    case CAV_SENSOR_SUBTREECOM:
+    case CAV_SENSOR_SUBTREELINVEL:
+    case CAV_SENSOR_SUBTREEANGMOM:
     case CAV_SENSOR_VELOCIMETER:
     case CAV_SENSOR_GYRO:
     case CAV_SENSOR_TENDONPOS:
     case CAV_SENSOR_BALLANGVEL:
     case CAV_SENSOR_CLOCK:
       return 1;
-    default:
-      return sensor->type <= CAV_SENSOR_SUBTREEANGMOM;
+    case CAV_SENSOR_TOUCH:
+    case CAV_SENSOR_ACCELEROMETER:
+    case CAV_SENSOR_FORCE:
+    case CAV_SENSOR_TORQUE:
+    case CAV_SENSOR_MAGNETOMETER:
+    case CAV_SENSOR_RANGEFINDER:
+    case CAV_SENSOR_ACTUATORPOS:
+    case CAV_SENSOR_ACTUATORVEL:
+    case CAV_SENSOR_ACTUATORFRC:
+    case CAV_SENSOR_BALLQUAT:
+    case CAV_SENSOR_JOINTLIMITPOS:
+    case CAV_SENSOR_JOINTLIMITVEL:
+    case CAV_SENSOR_JOINTLIMITFRC:
+    case CAV_SENSOR_TENDONLIMITPOS:
+    case CAV_SENSOR_TENDONLIMITVEL:
+    case CAV_SENSOR_TENDONLIMITFRC:
+    case CAV_SENSOR_FRAMELINACC:
+    case CAV_SENSOR_FRAMEANGACC:
+    case CAV_SENSOR_TYPES:
+      break;
   }
+  return 0;
 }
 
 cav_status cav_sensor_derivatives(const cav_model *model, cav_state *state, const cav_sensor *sensor, double *d_dq,

@@ -230,34 +230,64 @@ static void sense_joint(const cav_model *model, const cav_state *state, const ca
   }
 }
 
+// no default: the compiler names a type that is declared and not read
 static void sense(const cav_model *model, cav_state *state, const cav_sensor *sensor, double *out) {
-  switch (cav_sensor_rule_of(sensor->type)->target) {
-    case CAV_TARGET_NONE:
+  switch (sensor->type) {
+    case CAV_SENSOR_CLOCK:
       out[0] = state->time;
       break;
-    case CAV_TARGET_FRAME:
-      sense_frame(model, state, sensor, out);
-      break;
-    case CAV_TARGET_BODY:
-      sense_subtree(model, state, sensor, out);
-      break;
-    case CAV_TARGET_SITE:
-      sense_site(model, state, sensor, out);
-      break;
-    case CAV_TARGET_SCALAR_JOINT:
-    case CAV_TARGET_BALL_JOINT:
+    case CAV_SENSOR_JOINTPOS:
+    case CAV_SENSOR_JOINTVEL:
+    case CAV_SENSOR_BALLQUAT:
+    case CAV_SENSOR_BALLANGVEL:
       sense_joint(model, state, sensor, out);
       break;
-    case CAV_TARGET_LIMITED_JOINT:
-    case CAV_TARGET_LIMITED_TENDON:
+    case CAV_SENSOR_FRAMEPOS:
+    case CAV_SENSOR_FRAMEQUAT:
+    case CAV_SENSOR_FRAMEXAXIS:
+    case CAV_SENSOR_FRAMEYAXIS:
+    case CAV_SENSOR_FRAMEZAXIS:
+    case CAV_SENSOR_FRAMELINVEL:
+    case CAV_SENSOR_FRAMEANGVEL:
+    case CAV_SENSOR_FRAMELINACC:
+    case CAV_SENSOR_FRAMEANGACC:
+      sense_frame(model, state, sensor, out);
+      break;
+    case CAV_SENSOR_SUBTREECOM:
+    case CAV_SENSOR_SUBTREELINVEL:
+    case CAV_SENSOR_SUBTREEANGMOM:
+      sense_subtree(model, state, sensor, out);
+      break;
+    case CAV_SENSOR_TOUCH:
+    case CAV_SENSOR_ACCELEROMETER:
+    case CAV_SENSOR_VELOCIMETER:
+    case CAV_SENSOR_GYRO:
+    case CAV_SENSOR_FORCE:
+    case CAV_SENSOR_TORQUE:
+    case CAV_SENSOR_MAGNETOMETER:
+    case CAV_SENSOR_RANGEFINDER:
+      sense_site(model, state, sensor, out);
+      break;
+    case CAV_SENSOR_TENDONPOS:
+      out[0] = state->tendon_length[sensor->object];
+      break;
+    case CAV_SENSOR_TENDONVEL:
+      out[0] = cav_tendon_velocity(state, sensor->object, state->work->v_next);
+      break;
+    case CAV_SENSOR_ACTUATORPOS:
+    case CAV_SENSOR_ACTUATORVEL:
+    case CAV_SENSOR_ACTUATORFRC:
+      out[0] = sense_actuator(model, state, sensor);
+      break;
+    case CAV_SENSOR_JOINTLIMITPOS:
+    case CAV_SENSOR_JOINTLIMITVEL:
+    case CAV_SENSOR_JOINTLIMITFRC:
+    case CAV_SENSOR_TENDONLIMITPOS:
+    case CAV_SENSOR_TENDONLIMITVEL:
+    case CAV_SENSOR_TENDONLIMITFRC:
       out[0] = sense_limit(state, sensor);
       break;
-    case CAV_TARGET_TENDON:
-      out[0] = sensor->type == CAV_SENSOR_TENDONPOS ? state->tendon_length[sensor->object]
-                                                    : cav_tendon_velocity(state, sensor->object, state->work->v_next);
-      break;
-    case CAV_TARGET_ACTUATOR:
-      out[0] = sense_actuator(model, state, sensor);
+    case CAV_SENSOR_TYPES:
       break;
   }
 }
