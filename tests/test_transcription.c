@@ -469,6 +469,8 @@ static void test_power(void) {
   cav_trajectory_free(at);
   cav_transcription_free(tr);
   cav_model_free(m);
+}
+
 /// Their closed forms near no rotation and near half a turn, where digits are lost: against the product of series, which has an error
 /// below a^8/9!, and about an axis against half the cotangent of half the angle.
 static void test_rotation_digits(void) {
