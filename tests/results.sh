@@ -1,6 +1,7 @@
 #!/bin/sh
 # Writes the tables of tests/results anew, each with machine, compiler and commit. Usage: sh tests/results.sh [NAME...], default
-# all of: inverse (time against MuJoCo, needs it and the shared models), heap (forward steps of heaps against MuJoCo), sweep (broad phase), conservation (drift of energy and
+# all of: inverse (time against MuJoCo, needs it and the shared models), heap (forward steps of heaps against MuJoCo), normal (normal
+# equations by bands, by groups of trees and by CHOLMOD), sweep (broad phase), conservation (drift of energy and
 # momentum), orders (error of the orders of the step against their time), absent (what features cost where a scene has none of
 # them), sensors, tendons, actuation, fluid (readings, strings, drives and
 # drag against MuJoCo's).
@@ -82,10 +83,11 @@ absent() {
   } >"$out/absent.txt"
 }
 
-for name in ${*:-inverse heap sweep conservation orders sensors tendons actuation fluid absent}; do
+for name in ${*:-inverse heap normal sweep conservation orders sensors tendons actuation fluid absent}; do
   case $name in
     inverse) run inverse bench_inverse ;;
     heap) run heap bench_heap ;;
+    normal) run normal bench_normal ;;
     sweep) run sweep bench_sweep ;;
     conservation) run conservation test_conservation ;;
     orders) run orders bench_orders ;;
@@ -94,6 +96,6 @@ for name in ${*:-inverse heap sweep conservation orders sensors tendons actuatio
     actuation) run actuation test_actuation ;;
     fluid) run fluid test_fluid ;;
     absent) absent ;;
-    *) echo "usage: sh tests/results.sh [inverse|heap|sweep|conservation|orders|sensors|tendons|actuation|fluid|absent]..." >&2 && exit 2 ;;
+    *) echo "usage: sh tests/results.sh [inverse|heap|normal|sweep|conservation|orders|sensors|tendons|actuation|fluid|absent]..." >&2 && exit 2 ;;
   esac
 done

@@ -406,6 +406,60 @@ static void test_scene(const char *scene, closing close, cav_order order) {
   cav_model_free(m);
 }
 
+/// Trees that nothing joins: the Hessian is the product of the rows, made here, and its solutions are those of the dense matrix; a
+/// body that reaches another makes one group of the two.
+static void test_apart(int cyclic, int touching) {
+  char text[2000];
+  snprintf(text, sizeof text,
+           "<mujoco><worldbody><body pos='0 0 1'><freejoint/><geom size='.1'/></body>"
+           "<body pos='3 0 1'><freejoint/><geom type='box' size='.1 .2 .1'/></body>"
+           "<body pos='%g 0 1'><freejoint/><geom size='.1'/></body>"
+           "<body pos='9 0 1'><joint axis='0 1 0'/><geom type='capsule' size='.1' fromto='0 0 0 .5 0 0'/></body>"
+           "</worldbody></mujoco>",
+           touching ? 0.201 : 6.0);
+  cav_model *m = scene_load(text);
+  if (!CHECK(m != NULL)) return;
+  double rest[64] = {0}, q[64];
+  cav_problem p = cav_problem_default(m);
+  p.duration = 0.15;
+  p.cycle.on = cyclic;
+  p.nterm = 0;
+  memcpy(q, m->q0, (size_t)m->nq * sizeof *q);
+  p.q_start = p.q_goal = q, p.v_start = rest;
+  cav_error error = {0};
+  cav_transcription *tr = cav_transcription_new(&p, 1, &error);
+  if (!CHECK(tr != NULL)) fprintf(stderr, "    %s\n", error.text);
+  if (tr) {
+    cav_trajectory *at = cav_trajectory_new(m, tr->nknot, p.timestep);
+    shake(at, m, 0.005);
+    close_cycle(tr, at);
+    tr->options.stabilisation = CAV_STABILISATION_DISCRETE;
+    tr->options.smoothing = 0.03;
+    tr->penalty = (cav_penalties){1e3, 100, 1000, 200};
+    CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
+    int width = 3 * tr->nv, most = 0;
+    double worst = 0, largest = 0;
+    for (int t = 2; t < tr->nknot - 1; t++) // knots beside the seam of a cycle hold more than the product
+      for (int i = 0; i < width; i++)
+        for (int j = 0; j <= i; j++) {
+          double sum = 0;
+          for (int k = 0; k < tr->knot[t].ndense; k++)
+            sum += tr->knot[t].dense[k * width + i] * tr->knot[t].dense[k * width + j];
+          worst = fmax(worst, fabs(sum - tr->knot[t].hessian[i * width + j]));
+          largest = fmax(largest, fabs(sum));
+        }
+    CHECK(largest > 0 && worst <= 1e-13 * largest);
+    cav_normal *normal = cav_normal_new(tr);
+    cav_normal_gather(normal, tr);
+    CHECK(cav_normal_groups(normal, &most) == (touching ? 3 : 4) && most == (touching ? 12 : 6));
+    cav_normal_free(normal);
+    test_normal(tr, at);
+    cav_trajectory_free(at);
+  }
+  cav_transcription_free(tr);
+  cav_model_free(m);
+}
+
 /// SO(3) Jacobians against differences of the exponential.
 static void test_rotations(void) {
   for (int k = 0; k < 200; k++) {
@@ -519,6 +573,7 @@ static void test_refusals(void) {
 }
 
 int main(void) {
+  for (int k = 0; k < 4; k++) test_apart(k & 1, k >> 1);
   test_rotations();
   test_rotation_digits();
   test_refusals();
