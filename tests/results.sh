@@ -3,7 +3,7 @@
 # all of: inverse (time against MuJoCo, needs it and the shared models), heap (forward steps of heaps against MuJoCo), normal (normal
 # equations by bands, by groups of trees and by CHOLMOD), sweep (broad phase), conservation (drift of energy and
 # momentum), orders (error of the orders of the step against their time), absent (what features cost where a scene has none of
-# them), sensors, tendons, actuation, fluid (readings, strings, drives and
+# them), optimum (optimal control against known optima), sensors, tendons, actuation, fluid (readings, strings, drives and
 # drag against MuJoCo's).
 # CAVORT_BUILD names a build folder, by default build.
 set -eu
@@ -83,7 +83,21 @@ absent() {
   } >"$out/absent.txt"
 }
 
-for name in ${*:-inverse heap normal sweep conservation orders sensors tendons actuation fluid absent}; do
+# errors of the own solver on problems whose optima are known, on four grids each
+optimum() {
+  ninja -C "$build" tests/test_optimum >/dev/null
+  {
+    echo "# Optimal control with known optima"
+    echo
+    provenance "\`sh tests/results.sh optimum\`: own solver, errors relative to the truth (tests/optimum); iterations in all, the most in one stage, and after the last stage" |
+      sed '/^$/d; s/^machine/\n- machine/; s/^compiler/- compiler/; s/^commit/- commit/'
+    echo
+    "$build/tests/test_optimum" table | grep '^|'
+  } >"$out/optimum.tmp"
+  mv "$out/optimum.tmp" "$out/optimum.md"
+}
+
+for name in ${*:-inverse heap normal sweep conservation orders sensors tendons actuation fluid optimum absent}; do
   case $name in
     inverse) run inverse bench_inverse ;;
     heap) run heap bench_heap ;;
@@ -95,7 +109,8 @@ for name in ${*:-inverse heap normal sweep conservation orders sensors tendons a
     tendons) run tendons test_tendon ;;
     actuation) run actuation test_actuation ;;
     fluid) run fluid test_fluid ;;
+    optimum) optimum ;;
     absent) absent ;;
-    *) echo "usage: sh tests/results.sh [inverse|heap|normal|sweep|conservation|orders|sensors|tendons|actuation|fluid|absent]..." >&2 && exit 2 ;;
+    *) echo "usage: sh tests/results.sh [inverse|heap|normal|sweep|conservation|orders|sensors|tendons|actuation|fluid|optimum|absent]..." >&2 && exit 2 ;;
   esac
 done

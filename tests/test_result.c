@@ -134,12 +134,23 @@ static void check_verdict(const cav_problem *problem) {
   snprintf(verdict.reason, sizeof verdict.reason, "too \"deep\"\n");
   CHECK(cav_result_write_verdict(folder, problem, &verdict, &error) == CAV_OK);
   const char *text = read_file("verdict.json");
-  const char *field[] = {
-      "\"certified\": false",           "\"model\": \"box \\\"1\\\"\"",  "\"reason\": \"too \\\"deep\\\"\\u000a\"",
-      "\"optimality\": null",           "\"penetration_max_m\": 0.02",   "\"iterations\": 9",
-      "\"unactuated_force_max\": ",     "\"momentum_defect_rms\": ",     "\"limit_violation_max\": ",
-      "\"constraint_violation_max\": ", "\"slip_mean_m_s\": ",           "\"replay_same_step_max_error\": ",
-      "\"closed_loop_seconds\": ",      "\"closed_loop_end_error_m\": ", "\"solve_seconds\": 0.25"};
+  const char *field[] = {"\"feasible\": true",
+                         "\"optimal\": false",
+                         "\"certified\": false",
+                         "\"model\": \"box \\\"1\\\"\"",
+                         "\"reason\": \"too \\\"deep\\\"\\u000a\"",
+                         "\"optimality\": null",
+                         "\"penetration_max_m\": 0.02",
+                         "\"iterations\": 9",
+                         "\"unactuated_force_max\": ",
+                         "\"momentum_defect_rms\": ",
+                         "\"limit_violation_max\": ",
+                         "\"constraint_violation_max\": ",
+                         "\"slip_mean_m_s\": ",
+                         "\"replay_same_step_max_error\": ",
+                         "\"closed_loop_seconds\": ",
+                         "\"closed_loop_end_error_m\": ",
+                         "\"solve_seconds\": 0.25"};
   for (size_t i = 0; i < sizeof field / sizeof *field; i++) {
     CHECK(strstr(text, field[i]) != NULL);
     if (!strstr(text, field[i])) fprintf(stderr, "    %s\n", field[i]);
@@ -152,6 +163,16 @@ static void check_verdict(const cav_problem *problem) {
   verdict.unactuated_force_max = NAN;
   n = cav_certificate_lines(&verdict, line);
   CHECK(line[0].passed == 0);
+  // optimal: feasible, and known to be within a ten-thousandth of the cost
+  CHECK(!cav_verdict_feasible(&verdict) && !cav_verdict_optimal(&verdict));
+  verdict.unactuated_force_max = 1e-7;
+  CHECK(cav_verdict_feasible(&verdict) && !cav_verdict_optimal(&verdict));
+  verdict.optimality = 1.1e-4;
+  CHECK(!cav_verdict_optimal(&verdict));
+  verdict.optimality = 0.9e-4;
+  CHECK(cav_verdict_optimal(&verdict));
+  verdict.limit_violation_max = 1e-3;
+  CHECK(!cav_verdict_feasible(&verdict) && !cav_verdict_optimal(&verdict));
   // what only the solver knew comes back from the file
   cav_result *result = cav_result_read(folder, NULL, &error);
   CHECK(result && isnan(result->optimality) && result->solve_seconds == 0.25 && result->iterations == 9);

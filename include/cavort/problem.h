@@ -142,8 +142,8 @@ typedef struct cav_guess_pose {
   REAL(smoothing_self, 0.002, 0.001, DBL_MIN, DBL_MAX, ALL, SAME, "m", "delta between links of one tree and of limits (rad)") \
   REAL(self_stiffness, 1e-3, 1, DBL_MIN, 1, ALL, SAME, "", "fraction of the stiffness of contacts between links of one tree; ends at 1") \
   REAL(penalty, 1e3, 1e5, DBL_MIN, DBL_MAX, HALF, NONE, "", "weight of the unactuated force (fraction of weight, squared)") \
-  WHOLE(iterations, 30, 100, 1, INT_MAX, "at most")                                                                \
-  REAL(tolerance, 1e-3, 1e-5, DBL_MIN, 1, KEEP, NONE, "", "relative decrease below which, twice in a row, the stage ends")
+  WHOLE(iterations, 30, 40, 1, INT_MAX, "at most")                                                                \
+  REAL(tolerance, 1e-3, 1e-4, DBL_MIN, 1, KEEP, NONE, "", "relative decrease below which, twice in a row, the stage ends")
 // clang-format on
 
 typedef struct cav_stage_options {

@@ -120,7 +120,9 @@ typedef struct cav_solution {
   cav_options contact;     ///< contact law the motion obeys
   double *gain_q, *gain_v; ///< [(nknot-1)*nv*nv] du_t = gain_q dq_t + gain_v dv_t, row-major
   double cost;
-  double optimality; ///< largest scaled component of the Lagrangian's gradient
+  double
+      optimality; ///< decrease of the cost along the constraints that the second-order model at the motion predicts, over the
+                  ///< cost: optimal to so much; NaN where the constraints do not hold
   double unactuated; ///< largest, fraction of weight
   int iterations;
   double seconds, seconds_dynamics, seconds_assembly, seconds_linear; ///< wall clock
@@ -191,6 +193,9 @@ CAV_API cav_status cav_strategy_solve(const cav_problem *problem, const cav_stra
 #define CAV_TOLERANCE_STEP 1e-8        ///< rad or m
 #define CAV_TOLERANCE_PERIODICITY 1e-9 ///< m, rad, and these per step
 
+/// What the word optimal requires of a verdict's optimality: a fraction of the cost.
+#define CAV_TOLERANCE_OPTIMAL 1e-4
+
 /// What verification found; from the knots alone, with code apart from the optimiser's. optim/METHOD.md, 6.
 /// optimality, solve_seconds and iterations are the solver's: cav_verify leaves them as they are.
 typedef struct cav_verdict {
@@ -220,6 +225,11 @@ typedef struct cav_verdict {
 
 /// What replay_same_step_seconds has to be, s: CAV_TOLERANCE_REPLAY, or the whole motion where that is shorter; less rounding.
 CAV_API double cav_verdict_replay(const cav_verdict *verdict);
+
+/// Whether the motion is feasible (forces, limits and constraints within their tolerances), and whether it is optimal, too: to
+/// CAV_TOLERANCE_OPTIMAL. Neither says that it is certified.
+CAV_API int cav_verdict_feasible(const cav_verdict *verdict);
+CAV_API int cav_verdict_optimal(const cav_verdict *verdict);
 
 /// Certifies a motion: q, v of the trajectory and the gains are used, all else is recomputed. contact is the law it claims.
 CAV_API cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,

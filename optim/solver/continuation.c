@@ -7,6 +7,8 @@
 #include <string.h>
 #include <time.h>
 
+#include "sqp.h"
+
 /// Weights of rows while they are only penalised, at the first stage; they end a hundred times higher. Rows are scaled, so these
 /// serve all models. Ranges are expensive from the start: a motion that leans on a limit, whose force is free, would have to be
 /// found anew where the limit takes it away, and rows of ranges are all but linear, so a high penalty costs nothing.
@@ -116,11 +118,11 @@ cav_status cav_continuation_run(cav_solve_run *run) {
     begin = run->solution->iterations;
     status = keep(&before, run->at) ? run_stage(run, fraction, &outcome) : CAV_NO_MEMORY;
     if (!before) break;
-    int again = outcome == CAV_OUTCOME_STALLED && retries < RETRIES && fraction > settled;
+    int again = outcome == CAV_OUTCOME_STALLED && retries < RETRIES && fraction > settled && fraction < 1;
     if (again) outcome = CAV_OUTCOME_AGAIN;
     if (!cav_run_note(run, fraction, begin, outcome)) status = CAV_NO_MEMORY;
-    if (status != CAV_OK || (!again && run->stage == stages && fraction >= 1)) break;
     if (outcome == CAV_OUTCOME_AGAIN || outcome == CAV_OUTCOME_STALLED) run->region.radius = 0;
+    if (status != CAV_OK || (!again && run->stage == stages && fraction >= 1)) break;
     if (again) {
       exchange(&run->at, &before);
       retries++;
@@ -313,8 +315,7 @@ cav_status cav_recover_feasible(cav_solve_run *run) {
   run->region.radius = 0;
   cav_status status = run_stage(run, 1, &outcome);
   if (!cav_run_note(run, 1, begin, outcome)) status = CAV_NO_MEMORY;
-  if (status == CAV_OK) status = cav_augmented_lagrangian(run);
-  if (status == CAV_OK) status = cav_restore(run);
+  if (status == CAV_OK) status = cav_to_optimum(run);
   if (status == CAV_NOT_CONVERGED) {
     // a motion that is possible is worth more than a cheaper one that is not
     exchange(&run->at, &feasible);

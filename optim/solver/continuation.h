@@ -17,7 +17,9 @@ typedef struct cav_solve_run {
   cav_solution *solution;
   const char *phase;
   int stage, stages;
-  int warm;          ///< the rows' multipliers are multipliers to start from
+  int warm;          ///< the rows' final multipliers are those to start from
+  int measured;      ///< optimality and the rows' multipliers are those of at
+  double optimality; ///< predicted decrease of the cost over the cost
   cav_status failed; ///< what went wrong in the report, CAV_OK: nothing
   double start;      ///< s
 } cav_solve_run;
@@ -50,9 +52,6 @@ cav_status cav_minimise_infeasibility(cav_solve_run *run);
 
 /// Violation that planning leaves room for, by kind of row: what is planned with headroom may use half of it.
 void cav_run_allowed(const cav_solve_run *run, double allowed[CAV_BINDING_KINDS]);
-
-/// Multipliers of all rows where they hold, at the gathered normal equations of a linearisation that kept them. solution.c.
-cav_status cav_run_multipliers(cav_solve_run *run);
 
 /// Whether every row holds to that at the last values.
 int cav_run_met(const cav_solve_run *run);

@@ -14,6 +14,12 @@ static const double jitter = 1e-10;
 /// Largest change of one unknown in a step, rad or m: rotations stay well inside their chart.
 static const double step_limit = 0.7;
 
+/// Fraction of the merit that rounding makes of its differences.
+static const double noise = 1e-10;
+
+/// Doublings of the radius on one linearisation, at most.
+enum { GROWTH = 12 };
+
 /// Fraction of the Newton step below which a radius that still shrinks is one that a jump of the merit holds.
 static const double collapse = 1e-6;
 
@@ -118,6 +124,66 @@ static cav_status prepare_at(dogleg *d, cav_normal *normal, const cav_transcript
   return prepare(d, normal);
 }
 
+/// A step tried, and what came of it.
+typedef struct trial {
+  double length, decrease, predicted;
+  int grown; ///< only the radius held it back
+} trial;
+
+/// Step of the present radius to a trajectory. The transcription ends at it.
+static cav_status try_radius(const cav_region *region, dogleg *d, const cav_normal *normal, cav_transcription *tr,
+                             const cav_trajectory *at, cav_trajectory *to, double merit, trial *t) {
+  t->predicted = bend(d, normal->gradient, region->radius);
+  t->length = scaled_norm(d, d->step);
+  cav_transcription_move(tr, at, d->step, to);
+  cav_status status = cav_transcription_values(tr, to);
+  t->decrease = status == CAV_OK ? merit - cav_transcription_merit(tr) : -INFINITY;
+  return status == CAV_NO_MEMORY ? status : CAV_OK;
+}
+
+/// Whether a step is as good as required, and only the radius holds it back.
+static int is_held_back(const cav_region *region, const dogleg *d, const trial *t) {
+  return t->decrease > 0.75 * t->predicted && t->length > 0.9 * region->radius && t->length < 0.99 * d->newton_norm;
+}
+
+/// Grows the radius while steps of this linearisation are as good as required, and gain. Ends with the best step in to.
+static cav_status grow(cav_region *region, dogleg *d, const cav_normal *normal, cav_transcription *tr,
+                       const cav_trajectory *at, cav_trajectory *to, double merit, trial *t) {
+  for (int i = 0; i < GROWTH && is_held_back(region, d, t); i++) {
+    trial longer;
+    double radius = region->radius;
+    region->radius *= 2;
+    cav_status status = try_radius(region, d, normal, tr, at, to, merit, &longer);
+    if (status != CAV_OK) return status;
+    if (longer.decrease > 1.01 * t->decrease) {
+      *t = longer;
+      continue;
+    }
+    // back to the shorter one; the radius stays for the next linearisation
+    region->radius = radius;
+    status = try_radius(region, d, normal, tr, at, to, merit, t);
+    region->radius = 2 * radius;
+    return status;
+  }
+  return CAV_OK;
+}
+
+/// Shrinks the radius until a step is as good as required, or grows it while it is. What is within rounding of the merit says
+/// nothing about the radius.
+static cav_status search(cav_region *region, dogleg *d, cav_normal *normal, cav_transcription *tr,
+                         const cav_trajectory *at, cav_trajectory *to, double merit, trial *t) {
+  for (int attempt = 0;; attempt++) {
+    cav_status status = try_radius(region, d, normal, tr, at, to, merit, t);
+    if (status != CAV_OK) return status;
+    double ratio = t->predicted > 0 ? t->decrease / t->predicted : -1;
+    if (t->predicted <= noise * merit) return CAV_OK;
+    t->grown = is_held_back(region, d, t);
+    if (t->grown) return grow(region, d, normal, tr, at, to, merit, t);
+    if (ratio < 0.25) region->radius = 0.5 * fmin(t->length, region->radius);
+    if (ratio > 1e-4 || attempt > 30) return CAV_OK;
+  }
+}
+
 cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_transcription *tr, cav_trajectory **at,
                                cav_trajectory **spare) {
   dogleg d;
@@ -133,38 +199,30 @@ cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_trans
     region->seconds_linear += now() - start;
     if (!(region->radius > 0)) region->radius = d.cauchy_norm;
 
-    // shrink the radius until the step is as good as required
-    double decrease = 0, predicted = 0, length = 0, first_predicted = 0;
-    int grown = 0;
-    for (int attempt = 0;; attempt++) {
-      predicted = bend(&d, normal->gradient, region->radius);
-      if (attempt == 0) first_predicted = predicted;
-      length = scaled_norm(&d, d.step);
-      cav_transcription_move(tr, *at, d.step, *spare);
-      cav_status trial = cav_transcription_values(tr, *spare);
-      decrease = trial == CAV_OK ? merit - cav_transcription_merit(tr) : -INFINITY;
-      double ratio = predicted > 0 ? decrease / predicted : -1;
-      if (trial == CAV_NO_MEMORY) status = trial;
-      if (ratio < 0.25) region->radius = 0.5 * fmin(length, region->radius);
-      grown = ratio > 0.75 && length > 0.9 * region->radius;
-      if (grown) region->radius *= 2;
-      if (ratio > 1e-4 || attempt > 30 || predicted <= 1e-14 * merit || status != CAV_OK) break;
+    // a Newton step that requires no more than rounding is the end
+    double promised = bend(&d, normal->gradient, INFINITY);
+    if (promised <= noise * merit) {
+      region->settled = 1;
+      fresh = 0;
+      break;
     }
+    trial t = {0};
+    status = search(region, &d, normal, tr, *at, *spare, merit, &t);
     region->done++;
-    fresh = decrease > 0;
+    fresh = t.decrease > 0;
     if (fresh) {
       cav_trajectory *swap = *at;
       *at = *spare;
       *spare = swap;
     }
     if (status != CAV_OK) break;
-    region->stalled = length < collapse * d.newton_norm || (!fresh && first_predicted > region->tolerance * merit);
+    region->stalled = t.length < collapse * d.newton_norm || (!fresh && promised > region->tolerance * merit);
     // a good step that only the radius held back says nothing about the end
-    int held = grown && length < 0.99 * d.newton_norm;
-    calm = decrease < region->tolerance * merit && !held ? calm + 1 : 0;
+    int held = t.grown && t.length < 0.99 * d.newton_norm;
+    calm = t.decrease < region->tolerance * merit && !held ? calm + 1 : 0;
     region->settled = (calm == 2 || !fresh) && !region->stalled;
     if (!fresh) break;
-    if (region->report && region->report(region->context, length, region->radius)) {
+    if (region->report && region->report(region->context, t.length, region->radius)) {
       status = CAV_INTERRUPTED;
       break;
     }

@@ -84,29 +84,17 @@ static double *entry_of(const cav_normal *normal, int i, int j) {
   return &normal->C[(size_t)(j - core) * normal->border + (i - core)];
 }
 
-/// Adds the part of a knot's Hessian between two of its blocks, the column's not after the row's.
-static void gather_blocks(cav_normal *normal, const cav_knot *knot, int row_block, int column_block, int r, int c) {
+/// Adds the part of a knot's Hessian [3n*3n] between two of its blocks, the column's not after the row's.
+static void gather_blocks(cav_normal *normal, const double *hessian, int row_block, int column_block, int r, int c) {
   int n = normal->n, width = 3 * n;
   for (int j = 0; j < n; j++) {
     // entries of a column lie evenly
     int first = r == c ? j : 0, row = row_block * n + first, column = column_block * n + j;
     double *out = entry_of(normal, row, column);
     ptrdiff_t stride = first + 1 < n ? entry_of(normal, row + 1, column) - out : 0;
-    const double *in = knot->hessian + (size_t)(r * n + first) * width + c * n + j;
+    const double *in = hessian + (size_t)(r * n + first) * width + c * n + j;
     for (int i = first; i < n; i++, out += stride, in += width) *out += *in;
   }
-}
-
-/// Adds what the step's logarithm meets.
-static void gather_step(cav_normal *normal, const cav_transcription *tr, int t) {
-  const cav_knot *knot = &tr->knot[t];
-  int n = normal->n, last = normal->size - 1;
-  for (int c = 0; c < 3; c++) {
-    int block = cav_transcription_block(tr, t, c);
-    for (int j = 0; block >= 0 && j < n; j++) *entry_of(normal, last, block * n + j) += knot->step_row[c * n + j];
-  }
-  *entry_of(normal, last, last) += knot->step_square;
-  normal->gradient[last] += knot->step_derivative;
 }
 
 /// Whether dofs of trees a and b meet in block column c and block row r, not above it.
@@ -158,24 +146,50 @@ static void find_groups(cav_normal *normal) {
   next[0] = 0;
 }
 
-void cav_normal_gather(cav_normal *normal, const cav_transcription *tr) {
-  int n = normal->n;
+void cav_normal_clear(cav_normal *normal) {
   size_t core = (size_t)normal->core, border = (size_t)normal->border;
   memset(normal->H, 0, core * (size_t)normal->band * sizeof(double));
   memset(normal->B, 0, core * border * sizeof(double));
   memset(normal->C, 0, border * border * sizeof(double));
+  memset(normal->diagonal, 0, (size_t)normal->size * sizeof(double));
   memset(normal->gradient, 0, (size_t)normal->size * sizeof(double));
+}
+
+void cav_normal_add_block(cav_normal *normal, const cav_transcription *tr, int t, const double *hessian,
+                          const double *step_row, double step_square) {
+  int n = normal->n, last = normal->size - 1;
+  for (int c = 0; c < 3; c++) {
+    int column = cav_transcription_block(tr, t, c);
+    for (int r = c; column >= 0 && r < 3; r++) {
+      int row = cav_transcription_block(tr, t, r);
+      if (row >= 0) gather_blocks(normal, hessian, row, column, r, c);
+    }
+    for (int j = 0; normal->free_step && column >= 0 && j < n; j++)
+      *entry_of(normal, last, column * n + j) += step_row[c * n + j];
+  }
+  if (normal->free_step) *entry_of(normal, last, last) += step_square;
+}
+
+void cav_normal_add_diagonal(cav_normal *normal, const double *diagonal) {
+  for (int j = 0; j < normal->size; j++) {
+    double *entry = entry_of(normal, j, j);
+    *entry += diagonal[j];
+    normal->diagonal[j] = *entry;
+  }
+  find_groups(normal);
+}
+
+void cav_normal_gather(cav_normal *normal, const cav_transcription *tr) {
+  int n = normal->n;
+  cav_normal_clear(normal);
   for (int t = 0; t < tr->nknot; t++) {
     const cav_knot *knot = &tr->knot[t];
+    cav_normal_add_block(normal, tr, t, knot->hessian, knot->step_row, knot->step_square);
     for (int c = 0; c < 3; c++) {
       int column = cav_transcription_block(tr, t, c);
       for (int j = 0; column >= 0 && j < n; j++) normal->gradient[column * n + j] += knot->gradient[c * n + j];
-      for (int r = c; column >= 0 && r < 3; r++) {
-        int row = cav_transcription_block(tr, t, r);
-        if (row >= 0) gather_blocks(normal, knot, row, column, r, c);
-      }
     }
-    if (normal->free_step) gather_step(normal, tr, t);
+    if (normal->free_step) normal->gradient[normal->size - 1] += knot->step_derivative;
   }
   for (int j = 0; j < normal->size; j++) normal->diagonal[j] = *entry_of(normal, j, j);
   find_groups(normal);

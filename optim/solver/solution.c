@@ -10,6 +10,7 @@
 #include "continuation.h"
 #include "lqr.h"
 #include "solvers.h"
+#include "sqp.h"
 
 cav_solve_options cav_solve_options_default(void) {
   return (cav_solve_options){.solver = CAV_SOLVER_GAUSS_NEWTON,
@@ -108,43 +109,11 @@ static cav_status check(const cav_problem *p, const cav_solve_options *o, const 
   return CAV_OK;
 }
 
-/// Largest cosine between the residual and a column of its Jacobian, at the gathered normal equations.
-static double optimality(const cav_normal *normal, const cav_transcription *tr) {
-  const double *gradient = cav_normal_gradient(normal), *diagonal = cav_normal_diagonal(normal);
-  double size = sqrt(2 * cav_transcription_merit(tr)), worst = 0;
-  for (int i = 0; i < cav_transcription_unknowns(tr); i++)
-    if (diagonal[i] > 0 && size > 0) worst = fmax(worst, fabs(gradient[i]) / (sqrt(diagonal[i]) * size));
-  return worst;
-}
-
-/// Multipliers of all rows where they hold, after a linearisation that has kept them. Rounds of the augmented Lagrangian end before
-/// cheap rows have settled, so multipliers are those after one more step, as in a quadratic programme.
-cav_status cav_run_multipliers(cav_solve_run *run) {
-  int n = cav_transcription_unknowns(run->tr);
-  double *x = malloc(2 * (size_t)n * sizeof *x);
-  if (!x) return CAV_NO_MEMORY;
-  cav_status status = CAV_NOT_CONVERGED;
-  for (double shift = 1e-12; status == CAV_NOT_CONVERGED && shift < 1; shift *= 100)
-    status = cav_normal_factor(run->normal, shift);
-  const double *gradient = cav_normal_gradient(run->normal);
-  for (int i = 0; i < n; i++) x[n + i] = -gradient[i], x[i] = 0;
-  if (status == CAV_OK) cav_normal_solve(run->normal, x + n, x);
-  cav_transcription_estimate_multipliers(run->tr, x);
-  free(x);
-  return CAV_OK;
-}
-
 /// Constraint rows that hold something back.
 static cav_status find_rows(cav_solve_run *run) {
   double allowed[CAV_BINDING_KINDS];
-  cav_status status = CAV_OK;
   cav_run_allowed(run, allowed);
-  if (cav_run_met(run)) {
-    status = cav_run_multipliers(run);
-  } else {
-    cav_transcription_estimate_multipliers(run->tr, NULL);
-  }
-  if (status != CAV_OK) return status;
+  if (!cav_run_met(run)) cav_transcription_estimate_multipliers(run->tr, NULL);
   return cav_transcription_rows(run->tr, allowed, &run->solution->row, &run->solution->nrow);
 }
 
@@ -153,8 +122,9 @@ static cav_status conclude(cav_solve_run *run, cav_error *error) {
   if (!cav_transcription_keep_rows(run->tr)) return CAV_NO_MEMORY;
   cav_status status = cav_transcription_linearise(run->tr, run->at);
   if (status != CAV_OK) return status;
-  cav_normal_gather(run->normal, run->tr);
-  run->solution->optimality = optimality(run->normal, run->tr);
+  if (cav_run_met(run) && !run->measured) status = cav_sqp_measure(run);
+  if (status != CAV_OK) return status;
+  run->solution->optimality = run->measured ? run->optimality : NAN;
   run->solution->cost = cav_transcription_cost(run->tr);
   run->solution->unactuated = cav_transcription_unactuated(run->tr, NULL);
   run->solution->contact = run->tr->options;

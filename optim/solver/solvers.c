@@ -5,6 +5,7 @@
 #include <assert.h>
 
 #include "ipopt.h"
+#include "sqp.h"
 
 #define NAME_NONE ""
 #define MISSING_NONE NULL
@@ -36,24 +37,20 @@ cav_status cav_solver_run(cav_solve_run *run, cav_error *error) {
 cav_status cav_solver_gn(cav_solve_run *run, cav_error *error) {
   (void)error;
   cav_status status = cav_continuation_run(run);
-  if (status == CAV_OK) status = cav_augmented_lagrangian(run);
-  return status == CAV_OK ? cav_restore(run) : status;
+  return status == CAV_OK ? cav_to_optimum(run) : status;
 }
 
 #ifdef CAVORT_HAVE_IPOPT
-/// Multipliers for Ipopt to start from.
+/// Multipliers for Ipopt to start from: the rows' final ones.
 static cav_status warm_start(cav_solve_run *run) {
-  if (!cav_transcription_keep_rows(run->tr)) return CAV_NO_MEMORY;
-  cav_status status = cav_transcription_linearise(run->tr, run->at);
-  if (status != CAV_OK) return status;
-  cav_normal_gather(run->normal, run->tr);
   run->warm = 1;
-  return cav_run_multipliers(run);
+  return cav_sqp_measure(run);
 }
 
 static cav_status ipopt_from_here(cav_solve_run *run, cav_error *error) {
   cav_status status = cav_ipopt(run, error);
   if (status != CAV_OK && status != CAV_NOT_CONVERGED) return status;
+  run->measured = 0;
   // what Ipopt left is worth bringing in, though it stays unfinished
   cav_status restored = cav_restore(run);
   if (status == CAV_OK || restored != CAV_NOT_CONVERGED) status = restored == CAV_OK ? status : restored;

@@ -477,7 +477,7 @@ static cav_status evaluate(cav_transcription *tr, cav_trajectory *at, int jacobi
   pass p = {tr, at, jacobian, status};
   cav_parallel_for(tr->pool, tr->nknot, evaluate_item, &p);
   for (int t = 0; t < tr->nknot && result == CAV_OK; t++) result = status[t];
-  if (jacobian && result == CAV_OK) result = join_rows(tr);
+  if (jacobian && result == CAV_OK && !tr->gradient_only) result = join_rows(tr);
   for (int i = 0; i < members; i++) dynamics += tr->scratch[i].seconds / members;
   tr->seconds_dynamics += dynamics;
   tr->seconds_assembly += now() - start - dynamics;

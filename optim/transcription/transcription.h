@@ -103,6 +103,7 @@ typedef struct cav_transcription {
   cav_derivative difference;        ///< what stands in where there is no analytic one
   int constraints_only;             ///< costs and multipliers are left out: the merit is the violation alone
   double slack_effort, slack_range; ///< how far constraints_only lets these rows pass their planned bounds
+  int gradient_only;                ///< linearisations leave the Hessians unfinished
   int keep_rows;                    ///< slot_row of the knots is filled by linearisations
   cav_options options;              ///< contact law of this stage
   cav_knot *knot;                   ///< [nknot]

@@ -396,6 +396,16 @@ double cav_verdict_replay(const cav_verdict *verdict) {
   return fmin(CAV_TOLERANCE_REPLAY, verdict->duration) * (1 - 1e-9);
 }
 
+int cav_verdict_feasible(const cav_verdict *verdict) {
+  return verdict->unactuated_force_max <= CAV_TOLERANCE_UNACTUATED &&
+         verdict->limit_violation_max <= CAV_TOLERANCE_LIMIT &&
+         verdict->constraint_violation_max <= CAV_TOLERANCE_CONSTRAINT;
+}
+
+int cav_verdict_optimal(const cav_verdict *verdict) {
+  return cav_verdict_feasible(verdict) && verdict->optimality <= CAV_TOLERANCE_OPTIMAL;
+}
+
 // writes the reason unless there is one, when a metric breaks its limit
 static void require(cav_verdict *verdict, const cav_metric *metric, double limit, const char *what, const char *help) {
   if (metric->value <= limit || *verdict->reason) return;

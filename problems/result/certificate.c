@@ -51,7 +51,7 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
   add_number(line, &n, "under the model's contact parameters, error at the end", v->model_contacts_end_error_m, NAN,
              1e3, " mm");
   add_number(line, &n, "open loop at the same step, largest error", v->replay_same_step_max_error, NAN, 1, "");
-  add_number(line, &n, "optimality", v->optimality, NAN, 1, "");
+  add_number(line, &n, "cost that optimality leaves, fraction", v->optimality, NAN, 1, "");
   return n;
 }
 
@@ -65,6 +65,12 @@ void cav_certificate_print(FILE *out, const char *problem, const char *model, co
             line[i].passed < 0 ? "" : mark[line[i].passed]);
   }
   if (!isnan(v->solve_seconds)) fprintf(out, "  solved in %.1f s, %d iterations\n", v->solve_seconds, v->iterations);
+  fprintf(out, "%s, ", cav_verdict_feasible(v) ? "feasible" : "NOT feasible");
+  if (isnan(v->optimality))
+    fprintf(out, "how optimal is not known\n");
+  else
+    fprintf(out, "%s to %.1g (the word needs %g)\n", cav_verdict_optimal(v) ? "optimal" : "NOT optimal, but",
+            v->optimality, CAV_TOLERANCE_OPTIMAL);
   fprintf(out, "%s: %s on %s", v->certified ? "certified" : "NOT certified", problem, model);
   fprintf(out, v->certified ? "\n" : "\n  %s\n", v->reason);
 }
@@ -96,6 +102,8 @@ void cav_certificate_json(FILE *out, const char *problem, const char *model, con
   fputs(",\n  \"model\": ", out);
   cav_certificate_json_text(out, model);
   fprintf(out, ",\n  \"certified\": %s", v->certified ? "true" : "false");
+  fprintf(out, ",\n  \"feasible\": %s", cav_verdict_feasible(v) ? "true" : "false");
+  fprintf(out, ",\n  \"optimal\": %s", cav_verdict_optimal(v) ? "true" : "false");
   fputs(",\n  \"reason\": ", out);
   cav_certificate_json_text(out, v->reason);
   write_number(out, "unactuated_force_max", v->unactuated_force_max);

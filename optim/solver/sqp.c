@@ -1,0 +1,411 @@
+/// Sequential quadratic programming on a transcription: from near an optimum to stationarity, all constraints held at once, in the
+/// metric of the costs' Gauss-Newton Hessian.
+///
+/// Each iteration solves the programme of quadratic.c in a box, whose rows have exact penalties (Fletcher 1985: S-l1-QP), and
+/// takes its step where cost plus penalties fall by a fraction of what the programme required; a step that misses the rows by their
+/// curvature is corrected once in the same metric (Maratos). Penalties are above every multiplier, row by row. The end is where
+/// the programme requires next to nothing: its tolerance over the cost is how optimal the motion is, in the full box.
+#include "sqp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "curvature.h"
+#include "quadratic.h"
+
+/// Iterations; the box at the start and at most (rad, m, log of the step), and where it is too small to go on.
+enum { ITERATIONS = 120, RAISES = 5, SETTLING = 20 };
+static const double first_radius = 0.1, most_radius = 0.7, least_radius = 1e-7;
+
+/// Shares of the cost: tolerance that ends a run; tolerance that ends it if it is not kept; gap of a programme. Smallest cost that counts as a scale.
+static const double stationary = 1e-9, predicted_enough = 1e-6, gap_fraction = 1e-11, least_cost = 1e-6;
+
+/// Decreases of the cost below this share, so many in a row, end a run.
+static const double slow = 1e-5;
+enum { PATIENCE = 3 };
+
+/// Penalties: over the multiplier; of its kind's largest multiplier; of the cost, a unit of the row.
+static const double over = 2, of_kind = 0.1, of_cost = 0.01;
+
+/// Smallest fraction of the curvature that is used.
+static const double least_fraction = 0.01;
+
+static double cost_scale(const cav_transcription *tr) { return fmax(cav_transcription_cost(tr), least_cost); }
+
+/// Sets aside the augmented Lagrangian, but for squares of the unactuated force: these leave the solution where it is, and
+/// make the Lagrangian convex across these rows.
+static void take_penalties(cav_transcription *tr) {
+  tr->penalty = (cav_penalties){.unactuated = tr->problem->schedule.last.penalty};
+  for (int t = 0; t < tr->nknot; t++)
+    for (int i = 0; i < tr->knot[t].layout.count; i++) tr->knot[t].slot[i].multiplier = 0;
+}
+
+static int kind_of(const cav_slot_layout *at, int i) { return (i >= at->effort) + (i >= at->joint) + (i >= at->term); }
+
+static void read_values(const cav_transcription *tr, double *value) {
+  for (int t = 0, k = 0; t < tr->nknot; t++)
+    for (int i = 0; i < tr->knot[t].layout.count; i++) value[k++] = tr->knot[t].slot[i].value;
+}
+
+/// Penalties from the slots' multipliers.
+static void set_penalties(const cav_transcription *tr, double *penalty) {
+  double most[4] = {0}, floor = of_cost * cost_scale(tr);
+  for (int t = 0; t < tr->nknot; t++)
+    for (int i = 0; i < tr->knot[t].layout.count; i++) {
+      double *kind = &most[kind_of(&tr->knot[t].layout, i)];
+      *kind = fmax(*kind, fabs(tr->knot[t].slot[i].multiplier));
+    }
+  for (int t = 0, k = 0; t < tr->nknot; t++)
+    for (int i = 0; i < tr->knot[t].layout.count; i++)
+      penalty[k++] = fmax(fmax(over * fabs(tr->knot[t].slot[i].multiplier), floor),
+                          of_kind * most[kind_of(&tr->knot[t].layout, i)]);
+}
+
+/// Raises penalties that the multipliers press against; how many.
+static int raise_penalties(cav_quadratic *qp) {
+  int raised = 0;
+  const double *y = cav_quadratic_multiplier(qp);
+  double *penalty = cav_quadratic_penalty(qp);
+  for (int k = 0; k < cav_quadratic_rows(qp); k++) {
+    if (fabs(y[k]) < 0.9 * penalty[k]) continue;
+    penalty[k] *= 10;
+    raised++;
+  }
+  return raised;
+}
+
+/// Cost and penalties at the last values.
+static double merit_of(const cav_transcription *tr, const double *penalty) {
+  double sum = cav_transcription_merit(tr);
+  for (int t = 0, k = 0; t < tr->nknot; t++)
+    for (int i = 0; i < tr->knot[t].layout.count; i++, k++) {
+      const cav_slot *slot = &tr->knot[t].slot[i];
+      sum += penalty[k] * fmax(fmax(slot->lower - slot->value, slot->value - slot->upper), 0);
+    }
+  return sum;
+}
+
+/// Bounds of the step's logarithm about where it is.
+static void step_bounds(const cav_transcription *tr, const cav_trajectory *at, double change[2]) {
+  change[0] = -INFINITY, change[1] = INFINITY;
+  if (!tr->free_step) return;
+  change[0] = log(tr->problem->duration_least / (tr->nknot - 1) / at->timestep);
+  change[1] = log(tr->problem->duration_most / (tr->nknot - 1) / at->timestep);
+}
+
+/// Solves the programme, raising penalties until they are exact or there is no more to be had by it. *solved: whether it could be.
+static cav_status solve_programme(cav_solve_run *run, cav_quadratic *qp, double radius, int *solved) {
+  double change[2], begin = cav_clock(), gap = gap_fraction * cost_scale(run->tr);
+  step_bounds(run->tr, run->at, change);
+  cav_status status = CAV_OK;
+  for (int i = 0; i < RAISES; i++) {
+    status = cav_quadratic_solve(qp, radius, change, gap);
+    if ((status != CAV_OK && status != CAV_NOT_CONVERGED) || !raise_penalties(qp)) break;
+  }
+  run->region.seconds_linear += cav_clock() - begin;
+  *solved = status == CAV_OK;
+  return status == CAV_NOT_CONVERGED ? CAV_OK : status;
+}
+
+/// A run of iterations: memory and the present state.
+typedef struct descent {
+  cav_quadratic *qp;
+  cav_curvature *curvature;
+  double *x, *offset, *multiplier; ///< [unknowns], [rows], [rows]
+  double radius, merit;
+  double predicted;              ///< decrease, by the last programme
+  double ratio;                  ///< of the decrease to it
+  int age;                       ///< iterations since the curvature was found; -1: it was not
+  double fraction;               ///< of the curvature that is in the model
+  double gain;                   ///< decrease of the step that was taken
+  cav_trajectory *second, *best; ///< corrected trial; best of those tried
+} descent;
+
+static int descent_new(descent *d, cav_solve_run *run) {
+  *d = (descent){.qp = cav_quadratic_new(run->tr, run->normal), .radius = first_radius, .ratio = 1, .age = -1};
+  size_t n = (size_t)cav_transcription_unknowns(run->tr), rows = d->qp ? (size_t)cav_quadratic_rows(d->qp) : 0;
+  d->curvature = cav_curvature_new(run->tr);
+  d->x = calloc(n + 2 * rows, sizeof(double));
+  d->second = cav_trajectory_copy(run->at);
+  d->best = cav_trajectory_copy(run->at);
+  if (!d->qp || !d->curvature || !d->x || !d->second || !d->best || !cav_transcription_keep_rows(run->tr)) return 0;
+  d->offset = d->x + n;
+  d->multiplier = d->offset + rows;
+  return 1;
+}
+
+static void descent_free(descent *d) {
+  cav_quadratic_free(d->qp);
+  cav_curvature_free(d->curvature);
+  cav_trajectory_free(d->second);
+  cav_trajectory_free(d->best);
+  free(d->x);
+}
+
+/// Adds the Lagrangian's curvature to the linearisation, or as much of it as leaves that convex along the rows that hold the motion:
+/// what is left out is a step in the metric of the costs.
+static void add_curvature(cav_solve_run *run, descent *d) {
+  double added = 0;
+  for (d->fraction = 1; d->fraction > least_fraction; d->fraction *= 0.7) {
+    cav_curvature_add(d->curvature, run->tr, d->fraction - added);
+    added = d->fraction;
+    if (cav_quadratic_convex(d->qp)) return;
+  }
+  cav_curvature_add(d->curvature, run->tr, -added);
+  d->fraction = 0;
+}
+
+/// Solves the model in a box, with less and less of the curvature until that can be done.
+static cav_status solve_model(cav_solve_run *run, descent *d, double radius) {
+  for (;;) {
+    int solved = 0;
+    cav_status status = solve_programme(run, d->qp, radius, &solved);
+    if (status != CAV_OK || solved || d->fraction == 0) return status;
+    double less = 0.4 * d->fraction > least_fraction ? 0.4 * d->fraction : 0;
+    cav_curvature_add(d->curvature, run->tr, less - d->fraction);
+    d->fraction = less;
+  }
+}
+
+/// Costs, rows and their model at run->at: Gauss-Newton's while that keeps its tolerance, then with the Lagrangian's curvature, which is
+/// found anew where the last one has not kept it.
+static cav_status model(cav_solve_run *run, descent *d) {
+  int poor = fabs(d->ratio - 1) > 0.2;
+  cav_status status = CAV_OK;
+  if (poor) {
+    status = cav_curvature_find(d->curvature, run->tr, run->at, run->spare, d->multiplier);
+    d->age = 0;
+  } else if (d->age >= 0) {
+    d->age++;
+  }
+  if (status == CAV_OK) status = cav_transcription_linearise(run->tr, run->at);
+  d->fraction = 0;
+  if (status == CAV_OK && d->age >= 0) add_curvature(run, d);
+  return status;
+}
+
+static void exchange(cav_trajectory **a, cav_trajectory **b) {
+  cav_trajectory *kept = *a;
+  *a = *b;
+  *b = kept;
+}
+
+/// Merit of a trajectory, infinite where it cannot be evaluated.
+static cav_status try_at(cav_solve_run *run, descent *d, cav_trajectory *at, double *merit) {
+  cav_status status = cav_transcription_values(run->tr, at);
+  *merit = status == CAV_OK ? merit_of(run->tr, cav_quadratic_penalty(d->qp)) : INFINITY;
+  return status == CAV_NO_MEMORY ? status : CAV_OK;
+}
+
+/// Takes a multiple of the programme's step to run->spare, corrected where it gains less than enough and that is better. Returns the
+/// merit there.
+static cav_status try_step(cav_solve_run *run, descent *d, double multiple, double enough, double *merit) {
+  int n = cav_transcription_unknowns(run->tr), rows = cav_quadratic_rows(d->qp);
+  const double *step = cav_quadratic_step(d->qp);
+  for (int i = 0; i < n; i++) d->x[i] = multiple * step[i];
+  cav_transcription_move(run->tr, run->at, d->x, run->spare);
+  cav_status status = try_at(run, d, run->spare, merit);
+  if (status != CAV_OK || !isfinite(*merit) || d->merit - *merit > enough) return status;
+  // what the rows are off by, of what they were to be
+  read_values(run->tr, d->offset);
+  const double *linear = cav_quadratic_prediction(d->qp);
+  for (int k = 0; k < rows; k++) d->offset[k] -= linear[k];
+  cav_quadratic_correct(d->qp, d->offset, d->x);
+  for (int i = 0; i < n; i++) d->x[i] += multiple * step[i];
+  cav_transcription_move(run->tr, run->at, d->x, d->second);
+  double corrected;
+  status = try_at(run, d, d->second, &corrected);
+  if (status == CAV_OK && corrected < *merit) {
+    *merit = corrected;
+    exchange(&run->spare, &d->second);
+  }
+  return status;
+}
+
+/// Longer and longer steps while they gain: where the curvature was made convex, the programme's step is too short.
+static cav_status extrapolate(cav_solve_run *run, descent *d, double *merit) {
+  double multiple = 2, limit = most_radius / cav_quadratic_length(d->qp);
+  for (; multiple <= limit; multiple *= 2) {
+    exchange(&run->spare, &d->best);
+    double longer;
+    cav_status status = try_step(run, d, multiple, INFINITY, &longer);
+    if (status != CAV_OK) return status;
+    if (longer < *merit) {
+      *merit = longer;
+      continue;
+    }
+    exchange(&run->spare, &d->best);
+    break;
+  }
+  return CAV_OK;
+}
+
+static cav_status iterate(cav_solve_run *run, descent *d, int *taken);
+
+/// The iteration over again, with the curvature of where it stands.
+static cav_status renew(cav_solve_run *run, descent *d, int *taken) {
+  cav_status status = model(run, d);
+  return status == CAV_OK ? iterate(run, d, taken) : status;
+}
+
+/// One iteration from a linearisation: programmes in smaller and smaller boxes until a step is accepted, or until the model has to be
+/// a better one. *taken: whether one was.
+static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
+  *taken = 0;
+  read_values(run->tr, cav_quadratic_value(d->qp));
+  while (d->radius > least_radius) {
+    cav_status status = solve_model(run, d, d->radius);
+    if (status != CAV_OK) return status;
+    double length = cav_quadratic_length(d->qp), scale = cost_scale(run->tr), trial;
+    d->merit = merit_of(run->tr, cav_quadratic_penalty(d->qp));
+    d->predicted = cav_quadratic_decrease(d->qp);
+    memcpy(d->multiplier, cav_quadratic_multiplier(d->qp), (size_t)cav_quadratic_rows(d->qp) * sizeof(double));
+    if (d->predicted <= stationary * scale) return CAV_OK;
+    status = try_step(run, d, 1, 0.9 * d->predicted, &trial);
+    if (status != CAV_OK) return status;
+    d->ratio = (d->merit - trial) / d->predicted;
+    if (d->ratio > 0.75 && length > 0.9 * d->radius) d->radius = fmin(2 * d->radius, most_radius);
+    if (d->ratio > 1e-4) {
+      if (d->ratio < 0.25) d->radius = 0.5 * fmin(length, d->radius);
+      if (d->ratio > 1.3 && (status = extrapolate(run, d, &trial)) != CAV_OK) return status;
+      d->gain = d->merit - trial;
+      exchange(&run->at, &run->spare);
+      *taken = 1;
+      return CAV_OK;
+    }
+    // values of the linearisation, which the trial has overwritten
+    status = cav_transcription_values(run->tr, run->at);
+    if (status != CAV_OK || (d->predicted <= predicted_enough * scale && cav_run_met(run))) return status;
+    if (d->age != 0) return renew(run, d, taken);
+    d->radius = (d->ratio < -1 ? 0.2 : 0.5) * fmin(length, d->radius);
+  }
+  return CAV_OK;
+}
+
+/// Brings rows in that are still off by what is not linear in them, along the last programme's metric.
+static cav_status settle_rows(cav_solve_run *run, descent *d) {
+  cav_transcription *tr = run->tr;
+  cav_status status = CAV_OK;
+  double worst = INFINITY;
+  for (int i = 0; i < SETTLING && status == CAV_OK; i++) {
+    double is = fmax(cav_transcription_unactuated(tr, NULL), cav_transcription_violation(tr));
+    if (!(is < 0.5 * worst) || is < 0.01 * run->options->tolerance) break;
+    worst = is;
+    for (int t = 0, k = 0; t < tr->nknot; t++)
+      for (int j = 0; j < tr->knot[t].layout.count; j++) {
+        const cav_slot *slot = &tr->knot[t].slot[j];
+        d->offset[k++] = slot->value - fmin(fmax(slot->value, slot->lower), slot->upper);
+      }
+    cav_quadratic_correct(d->qp, d->offset, d->x);
+    cav_transcription_move(tr, run->at, d->x, run->spare);
+    status = cav_transcription_values(tr, run->spare);
+    if (status == CAV_OK && fmax(cav_transcription_unactuated(tr, NULL), cav_transcription_violation(tr)) < is) {
+      exchange(&run->at, &run->spare);
+    } else if (status == CAV_OK) {
+      status = cav_transcription_values(tr, run->at);
+    }
+  }
+  return status;
+}
+
+/// Iterations to the end; *settled: whether that is stationary.
+static cav_status descend(cav_solve_run *run, descent *d, int *settled) {
+  int calm = 0, taken = 1;
+  cav_status status = CAV_OK;
+  for (int i = 0; i < ITERATIONS && status == CAV_OK && taken && calm < PATIENCE; i++) {
+    status = model(run, d);
+    if (status == CAV_OK) status = iterate(run, d, &taken);
+    if (status != CAV_OK || !taken) break;
+    calm = d->gain < slow * cost_scale(run->tr) ? calm + 1 : 0;
+    if (cav_run_report(run, cav_quadratic_length(d->qp), d->radius)) status = CAV_INTERRUPTED;
+  }
+  *settled = !taken || calm >= PATIENCE;
+  return status == CAV_OK ? settle_rows(run, d) : status;
+}
+
+/// Multipliers of the augmented Lagrangian at the last values, with which the penalties and the curvature begin.
+static void begin(cav_solve_run *run, descent *d) {
+  cav_transcription_multipliers(run->tr);
+  set_penalties(run->tr, cav_quadratic_penalty(d->qp));
+  for (int t = 0, k = 0; t < run->tr->nknot; t++)
+    for (int i = 0; i < run->tr->knot[t].layout.count; i++) d->multiplier[k++] = run->tr->knot[t].slot[i].multiplier;
+  take_penalties(run->tr);
+}
+
+/// How optimal run->at is by the present curvature, and the rows' multipliers.
+static cav_status measure(cav_solve_run *run, descent *d) {
+  cav_status status = cav_transcription_linearise(run->tr, run->at);
+  if (status != CAV_OK) return status;
+  d->fraction = 0;
+  if (d->age >= 0) add_curvature(run, d);
+  read_values(run->tr, cav_quadratic_value(d->qp));
+  status = solve_model(run, d, most_radius);
+  if (status != CAV_OK) return status;
+  // a bound: what the programme decreases, and what its gap leaves open
+  run->optimality = (fmax(cav_quadratic_decrease(d->qp), 0) + cav_quadratic_gap(d->qp)) / cost_scale(run->tr);
+  run->measured = 1;
+  memcpy(d->multiplier, cav_quadratic_multiplier(d->qp), (size_t)cav_quadratic_rows(d->qp) * sizeof(double));
+  for (int t = 0, k = 0; t < run->tr->nknot; t++)
+    for (int i = 0; i < run->tr->knot[t].layout.count; i++)
+      run->tr->knot[t].slot[i].final_multiplier = d->multiplier[k++];
+  return CAV_OK;
+}
+
+cav_status cav_sqp(cav_solve_run *run) {
+  descent d;
+  int first = run->solution->iterations, settled = 0;
+  cav_penalties kept = run->tr->penalty;
+  run->phase = "sqp";
+  run->stage = run->stages = 1;
+  cav_trajectory *entry = cav_trajectory_copy(run->at);
+  if (!entry) return CAV_NO_MEMORY;
+  cav_status status = descent_new(&d, run) ? cav_transcription_values(run->tr, run->at) : CAV_NO_MEMORY;
+  if (status == CAV_OK) begin(run, &d);
+  run->measured = 0;
+  if (status == CAV_OK) status = descend(run, &d, &settled);
+  if (status == CAV_OK && cav_run_met(run)) status = measure(run, &d);
+  run->tr->penalty = kept;
+  if (status == CAV_OK) status = cav_transcription_values(run->tr, run->at);
+  int met = status == CAV_OK && cav_run_met(run);
+  cav_outcome outcome = status != CAV_OK ? CAV_OUTCOME_STOPPED
+                        : !met           ? CAV_OUTCOME_STALLED
+                        : settled        ? CAV_OUTCOME_SETTLED
+                                         : CAV_OUTCOME_LIMIT;
+  if (!cav_run_note(run, 1, first, outcome)) status = CAV_NO_MEMORY;
+  if (status == CAV_OK && !met) {
+    exchange(&run->at, &entry);
+    status = cav_transcription_values(run->tr, run->at);
+    if (status == CAV_OK) status = CAV_NOT_CONVERGED;
+  }
+  cav_trajectory_free(entry);
+  descent_free(&d);
+  return status;
+}
+
+cav_status cav_sqp_measure(cav_solve_run *run) {
+  descent d;
+  cav_penalties kept = run->tr->penalty;
+  cav_status status = descent_new(&d, run) ? cav_transcription_values(run->tr, run->at) : CAV_NO_MEMORY;
+  if (status == CAV_OK) begin(run, &d);
+  // multipliers first, then the decrease with the curvature that goes with them
+  if (status == CAV_OK) status = measure(run, &d);
+  d.ratio = 0;
+  if (status == CAV_OK) status = model(run, &d);
+  if (status == CAV_OK) status = measure(run, &d);
+  run->tr->penalty = kept;
+  descent_free(&d);
+  return status;
+}
+
+cav_status cav_to_optimum(cav_solve_run *run) {
+  cav_stage_set(run->problem, 1, run->tr);
+  cav_status status = cav_sqp(run);
+  if (status != CAV_NOT_CONVERGED) return status;
+  // the augmented Lagrangian brings rows in from further away
+  status = cav_augmented_lagrangian(run);
+  if (status == CAV_OK) status = cav_restore(run);
+  if (status != CAV_OK) return status;
+  status = cav_sqp(run);
+  return status == CAV_NOT_CONVERGED ? CAV_OK : status;
+}
