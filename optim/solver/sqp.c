@@ -101,7 +101,7 @@ static cav_status solve_programme(cav_solve_run *run, cav_quadratic *qp, double 
   cav_status status = CAV_OK;
   for (int i = 0; i < RAISES; i++) {
     status = cav_quadratic_solve(qp, radius, change, gap);
-    if ((status != CAV_OK && status != CAV_NOT_CONVERGED) || !raise_penalties(qp)) break;
+    if (status != CAV_OK || !raise_penalties(qp)) break;
   }
   run->region.seconds_linear += cav_clock() - begin;
   *solved = status == CAV_OK;
