@@ -444,6 +444,72 @@ static void test_penetration(void) {
   }
 }
 
+// held up by the smoothed law at a height: what it bears there it bears on air from 3 mm on. softness by bisection as above
+static void hold_up(sample *s, double height) {
+  cav_state *state = cav_state_new(s->model);
+  double none[6] = {0}, u[6], low = 1e-6, high = 1e6;
+  s->problem.close_at_rest = 1;
+  s->law.smoothing = s->law.smoothing_self = 0.001;
+  s->law.time_constant = 0;
+  for (int t = 0; t <= 25; t++) knot(s, t)[2] = 0.1 + height;
+  s->q[2] = 0.1 + height;
+  for (int k = 0; k < 200; k++) {
+    s->law.softness = sqrt(low * high);
+    state->options = s->law;
+    state->options.timestep = 0.02;
+    CHECK(cav_inverse(s->model, state, s->q, none, none, u) == CAV_OK);
+    *(u[2] < 0 ? &low : &high) = s->law.softness;
+  }
+  cav_state_free(state);
+}
+
+// load on air: all of a body's that hovers, none of one that hovers lower or arrives, half of one that comes down in between
+static void test_hover(void) {
+  const double height[2] = {0.0025, 0.0035};
+  for (int i = 0; i < 2; i++) {
+    sample s = sample_new(resting, 25, 0.02, CAV_ORDER_MIDPOINT);
+    hold_up(&s, height[i]);
+    CHECK(verify(&s, NULL, NULL) == CAV_OK);
+    CHECK_NEAR(s.verdict.unactuated_force_max, 0, 1e-11);
+    CHECK_NEAR(s.verdict.hover_fraction, i, 1e-15);
+    CHECK(s.verdict.certified == (i == 0));
+    if (i) CHECK(strstr(s.verdict.reason, "gaps that stay open") && strstr(s.verdict.reason, "3.5 mm apart"));
+    sample_free(&s);
+  }
+  // far above: what is felt of the floor there is nothing
+  sample far = sample_new(resting, 25, 0.02, CAV_ORDER_MIDPOINT);
+  hold_up(&far, 0);
+  for (int t = 0; t <= 25; t++) knot(&far, t)[2] = 0.15;
+  far.q[2] = 0.15;
+  CHECK(verify(&far, NULL, NULL) == CAV_OK);
+  CHECK(far.verdict.hover_fraction < 1e-9);
+  sample_free(&far);
+  // from 20 mm in two steps to the floor: the law stops it a step before it is there
+  sample s = sample_new(resting, 25, 0.02, CAV_ORDER_MIDPOINT);
+  hold_up(&s, 0);
+  knot(&s, 0)[2] = 0.12, knot(&s, 1)[2] = 0.11;
+  CHECK(verify(&s, NULL, NULL) == CAV_OK);
+  CHECK(s.verdict.hover_fraction < 1e-3);
+  // its own count from the knots: half the time at 4 mm, half on the floor
+  hold_up(&s, 0);
+  for (int t = 0; t < 13; t++) knot(&s, t)[2] = 0.104;
+  CHECK(verify(&s, NULL, NULL) == CAV_OK);
+  cav_state *state = cav_state_new(s.model);
+  double open = 0, all = 0, v[12] = {0}, u[6];
+  state->options = s.law;
+  state->options.timestep = 0.02;
+  for (int t = 0; t <= 25; t++) {
+    v[2] = t == 13 ? -0.2 : 0, v[8] = t == 12 ? -0.2 : 0;
+    CHECK(cav_inverse(s.model, state, knot(&s, t), v, v + 6, u) == CAV_OK);
+    all += state->contact[0].impulse[0];
+    open += t < 12 ? state->contact[0].impulse[0] : 0;
+  }
+  CHECK_NEAR(s.verdict.hover_fraction, open / all, 1e-12);
+  CHECK(s.verdict.hover_fraction > 1e-3);
+  cav_state_free(state);
+  sample_free(&s);
+}
+
 static void test_slip(void) {
   const double speed[2] = {0, 0.3};
   for (int i = 0; i < 2; i++) {
@@ -634,6 +700,7 @@ int main(void) {
   test_cords();
   test_contact_balance();
   test_penetration();
+  test_hover();
   test_slip();
   test_terms();
   test_closed_loop();

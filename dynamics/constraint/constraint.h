@@ -74,6 +74,15 @@ void cav_row_push_force(const cav_state *state, const cav_row *row, double force
 void cav_law_cone(int dim, const double *R, const double *friction, double sigma, const double *g, double *f,
                   double *hessian, double *potential);
 
+/// Impulse of a contact by Coulomb's law, in the same words. hessian is not symmetric. With held, not NULL, the bound of
+/// friction is mu times that normal impulse instead of the contact's own: hessian is symmetric, psd, and there is a
+/// potential (without held: NULL). coulomb.c.
+void cav_law_coulomb(int dim, const double *R, const double *friction, double sigma, const double *held,
+                     const double *g, double *f, double *hessian, double *potential);
+
+/// By the law that the state's options choose; hessian may be NULL. coulomb.c.
+void cav_law_contact(const cav_state *state, const cav_contact *contact, const double *g, double *f, double *hessian);
+
 /// The same for one-sided rows (limits) and two-sided ones (friction loss, |f| <= bound).
 void cav_law_unilateral(double R, double sigma, double g, double *f, double *hessian, double *potential);
 void cav_law_bilateral(double R, double sigma, double bound, double g, double *f, double *hessian, double *potential);

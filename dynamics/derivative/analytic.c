@@ -336,7 +336,8 @@ typedef struct deep {
   double push[6];                      ///< the part of contacts in q
   double gyration[3];                  ///< rows beside a: angular
   double motion[6];                    ///< rows: contacts by motion
-  double now[6], next[6];              ///< both: contacts by v and v_next
+  double now[6], next[6];              ///< columns: contacts by v and v_next
+  double row_now[6], row_next[6];      ///< rows: the same
   int touched;
 } deep;
 
@@ -346,6 +347,17 @@ static void add_push(deep *d, const double *M, const double x[6], double scale) 
   multiply6(part, M, x);
   axpy6(d->q, d->q, scale, part);
   axpy6(d->push, d->push, scale, part);
+}
+
+// rows of the contacts: the convex law's matrices are symmetric
+static void fill_rows(const task *t, deep *d, const double *now, const double *next, const double *S, double scale) {
+  copy6(d->row_now, d->now);
+  copy6(d->row_next, d->next);
+  if (t->state->options.sliding == CAV_SLIDING_CONVEX) return;
+  multiply6_transposed(d->row_now, now, S);
+  multiply6_transposed(d->row_next, next, S);
+  scale6(d->row_now, scale, d->row_now);
+  scale6(d->row_next, -scale, d->row_next);
 }
 
 static void deepen(const task *t, int j, deep *d) {
@@ -366,11 +378,11 @@ static void deepen(const task *t, int j, deep *d) {
   if (!d->touched) return;
   const double *P = s->by_motion + BLOCK * i, *now = s->by_now + BLOCK * i, *next = s->by_next + BLOCK * i;
   double scale = -t->inverse_h;
-  // these two are symmetric
   multiply6(d->now, now, S);
   multiply6(d->next, next, S);
   scale6(d->now, scale, d->now);
   scale6(d->next, -scale, d->next);
+  fill_rows(t, d, now, next, S, scale);
   multiply6_transposed(d->motion, P, S);
   scale6(d->motion, scale, d->motion);
   add_push(d, P, S, scale);
@@ -403,9 +415,9 @@ static void pairs_of(const task *t, int j) {
       add_entry(t, at, q, dot6(d.a, s->rate + 6 * k) + dot3(d.gyration, S), a);
     }
     if (d.touched) {
-      t->dq[at] += dot6(d.motion, S) + dot6(d.now, s->drift_now + 6 * k) + dot6(d.next, s->drift_next + 6 * k);
-      t->dv[at] += dot6(d.now, S);
-      t->dn[at] += dot6(d.next, S);
+      t->dq[at] += dot6(d.motion, S) + dot6(d.row_now, s->drift_now + 6 * k) + dot6(d.row_next, s->drift_next + 6 * k);
+      t->dv[at] += dot6(d.row_now, S);
+      t->dn[at] += dot6(d.row_next, S);
     }
     // row k: j moves k only within its group
     if (k != j) {

@@ -2,7 +2,7 @@
 /// links moves by a small twist. The geometry depends on the relative pose of two geoms only: in closed form for a ball
 /// or a capsule on a plane, by centred differences of the narrow phase of that one pair in six directions otherwise.
 /// Everything after the geometry is exact: the frame turns with the normal, and about it with the tangent it is aligned
-/// to; the law has the derivative of its cone (contact_law.c), and of R and K by the distance where the impedance varies.
+/// to; the law has its own derivative (contact_law.c, coulomb.c), and of R and K by the distance where the impedance varies.
 ///
 /// In the law f(z, r, s) = F(z, s)/r with z = v* - v_next, r the common scale of R and s = h K delta, F is homogeneous of
 /// degree one in (z, s) together; so df = H dz - (dr/r) f + (ds/s)(f - H z), whatever the law's smoothing.
@@ -222,7 +222,7 @@ static void differentiate_law(const cav_model *model, const cav_state *state, co
     if (k == 0) z[k] -= c->stiffness * (c->dist - c->margin);
     g[k] = z[k] / c->regulariser[k];
   }
-  cav_law_cone(c->dim, c->regulariser, c->friction, c->sigma, g, f, H, NULL);
+  cav_law_contact(state, c, g, f, H);
   cav_law_rates(state, &model->pair[c->pair].softness, c->dist - c->margin, &regulariser, &stiffness);
   cav_contact_stiffness_ratio(state, c, &fraction);
   regulariser -= fraction;

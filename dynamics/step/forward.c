@@ -11,6 +11,9 @@
 /// torques at speeds near 2/h; the solutions traced there end in a fold). Then the best iterate is returned as not
 /// converged.
 ///
+/// Coulomb's law (coulomb.c) has no potential either: Newton from the convex law's solution, and where it does not
+/// descend, convex problems with the bounds of friction held. A solution need not exist nor be the only one (Painleve).
+///
 /// Stops when |inverse - u| is within tolerance of the largest force in the balance, or within what rounding of v_next
 /// to a double does to stiff constraints, whichever is larger; up to two more passes serve light links, whose forces
 /// are small against the largest. No step depends on earlier calls. Integrates no positions.
@@ -24,7 +27,7 @@
 #include "island.h"
 #include "math3.h"
 
-enum { BLOCK = CAV_CURVATURE, DEFAULT_ITERATIONS = 100, SEARCH_STEPS = 60, STALLS = 4, POLISH = 2 };
+enum { BLOCK = CAV_CURVATURE, DEFAULT_ITERATIONS = 100, SEARCH_STEPS = 60, STALLS = 4, CHANGES = 30, POLISH = 2 };
 
 static const double DEFAULT_TOLERANCE = 1e-13, SHORTEST_STEP = 0.02;
 
@@ -41,6 +44,7 @@ typedef struct newton {
   double *derivative;      // [nrow] J d
   double *try_y, *try_f;   // [nrow] the same along the line
   double *curvature;       // [nblock*36] -df/dy
+  double *held;            // [nblock] normal impulses held under Coulomb's law
   double *x, *anchor;      // [nv] iterate; where base was taken
   double *base;            // [nv] h (smooth inverse - u) at anchor
   double *step, *momentum; // [nv] d; M (x - anchor) or M d
@@ -75,6 +79,7 @@ static void enter_island(newton *s, int island) {
   s->part = s->problem;
   s->part.block = s->problem.block + all->first_block[island];
   s->part.nblock = all->first_block[island + 1] - all->first_block[island];
+  if (s->problem.held) s->part.held = s->problem.held + all->first_block[island];
   s->dof = all->dof + all->first_dof[island];
   s->ndof = all->first_dof[island + 1] - all->first_dof[island];
 }
@@ -85,9 +90,14 @@ static void leave_island(newton *s) {
   s->ndof = s->problem.nv;
 }
 
+// whether the step is the least point of one convex potential
+static int is_convex(const cav_state *state) {
+  return !cav_takes_mean(state) && state->options.sliding == CAV_SLIDING_CONVEX;
+}
+
 static cav_status prepare(newton *s, const cav_model *model, cav_state *state) {
-  const size_t matrices = cav_takes_mean(state) ? 2 : 0;
-  const cav_impulse_room room = {.per_block = BLOCK + CAV_ISLAND_PER_BLOCK,
+  const size_t matrices = is_convex(state) ? 0 : 2;
+  const cav_impulse_room room = {.per_block = BLOCK + 1 + CAV_ISLAND_PER_BLOCK,
                                  .per_row = 5,
                                  .per_dof = 8 + CAV_ISLAND_PER_DOF,
                                  .per_dof_squared = matrices};
@@ -102,7 +112,8 @@ static cav_status prepare(newton *s, const cav_model *model, cav_state *state) {
   for (int i = 0; i < 5; i++, at += nrow) *row[i] = at;
   for (int i = 0; i < 8; i++, at += nv) *dof[i] = at;
   s->curvature = at;
-  s->matrix = s->curvature + BLOCK * nblock;
+  s->held = s->curvature + BLOCK * nblock;
+  s->matrix = s->held + nblock;
   s->smooth = s->matrix + nv * nv;
   const size_t room_of_islands = CAV_ISLAND_PER_BLOCK * nblock + CAV_ISLAND_PER_DOF * nv;
   assert(s->matrix + matrices * nv * nv + room_of_islands == s->problem.spare + s->problem.nspare);
@@ -134,7 +145,7 @@ static void add_constraints(newton *s) {
     for (int i = 0; i < n; i++) {
       double bent[CAV_IMPULSE_DIM] = {0.0}, *to = s->matrix + block->dof[i] * nv;
       for (int k = 0; k < dim; k++)
-        for (int l = 0; l < dim; l++) bent[k] += H[k * dim + l] * J[l * n + i];
+        for (int l = 0; l < dim; l++) bent[k] += H[l * dim + k] * J[l * n + i];
       for (int j = 0; j < n; j++) {
         double sum = 0.0;
         for (int k = 0; k < dim; k++) sum += bent[k] * J[k * n + j];
@@ -328,10 +339,26 @@ static double rounding(newton *s) {
   return momentum_rounding(s, terms, s->gradient) / p->state->options.timestep + 8.0 * DBL_EPSILON * s->scale;
 }
 
-// derivative of h times the smooth inverse with respect to v_next, by columns. It is quadratic in v_next, or
-// nearly so: a one-sided difference errs by the step, 1e-5 of the Coriolis terms, which costs Newton nothing
+// matrix := M
+static void fill_inertia(const cav_impulse *p, double *matrix) {
+  const cav_workspace *work = p->state->work;
+  memset(matrix, 0, (size_t)p->nv * (size_t)p->nv * sizeof *matrix);
+  for (int i = 0; i < p->nv; i++) {
+    const double *M = p->M + work->row[i];
+    for (int j = i, k = 0; j >= 0; j = work->parent[j], k++) matrix[i * p->nv + j] = matrix[j * p->nv + i] = M[k];
+  }
+}
+
+// derivative of h times the smooth inverse with respect to v_next: the inertia, or at the mean velocity by columns. It is
+// quadratic in v_next, or nearly so: a one-sided difference errs by the step, 1e-5 of the Coriolis terms, which costs
+// Newton nothing
 static cav_status differentiate_smooth(newton *s) {
   const int nv = s->problem.nv;
+  if (!cav_takes_mean(s->problem.state)) {
+    fill_inertia(&s->problem, s->smooth);
+    s->have_smooth = 1;
+    return CAV_OK;
+  }
   cav_status status = cav_impulse_smooth(&s->problem, s->v, s->u, s->x, s->base);
   for (int j = 0; j < nv && status == CAV_OK; j++) {
     const double kept = s->x[j], step = 1e-5 * fmax(1.0, fabs(kept));
@@ -422,11 +449,43 @@ static double velocity_error(newton *s) {
   return error > 0.0 ? error / largest(s->x, p->nv) : 0.0;
 }
 
+// towards Coulomb's law from x by convex problems in which the bounds of friction are held (Tresca's friction): each takes
+// them from the impulses of the one before, half way from the second on. Their fixed point is Coulomb's law
+static cav_status solve_held(newton *s, int count, double tolerance) {
+  cav_impulse *p = &s->problem;
+  cav_status status = CAV_OK;
+  for (int k = 0; k < count && status == CAV_OK && s->iterations < s->limit; k++) {
+    cav_impulse_rows(p, s->x, s->y);
+    laws(s, s->y, s->f, NULL, 0);
+    for (int b = 0; b < p->nblock; b++) {
+      const double f = s->f[p->block[b].first];
+      s->held[b] = k > 0 ? 0.5 * (s->held[b] + f) : f;
+    }
+    p->held = s->held;
+    status = solve_convex(s, tolerance);
+    p->held = NULL;
+    leave_island(s);
+  }
+  return status;
+}
+
+// the convex law's solution, whatever the options say
+static cav_status solve_first(newton *s, double tolerance) {
+  s->problem.convex = 1;
+  const cav_status status = solve_convex(s, tolerance);
+  s->problem.convex = 0;
+  leave_island(s);
+  return status;
+}
+
 // passes until the inverse agrees with u; x is then the best iterate and the state evaluated there
 static cav_status iterate(newton *s, double tolerance) {
-  const int nv = s->problem.nv, mean = cav_takes_mean(s->problem.state);
+  const int nv = s->problem.nv, convex = is_convex(s->problem.state);
+  const int coulomb = s->problem.state->options.sliding == CAV_SLIDING_COULOMB;
+  // bounds of friction that change need not lower the error at once
+  const int patience = coulomb ? CHANGES : STALLS;
   double least = INFINITY;
-  int stalls = 0, accepted = 0, polished = 0;
+  int stalls = 0, accepted = 0, polished = 0, held = 1;
   copy(s->x, s->v, nv);
   for (int pass = 0;; pass++) {
     if (!accepted) {
@@ -440,11 +499,15 @@ static cav_status iterate(newton *s, double tolerance) {
     }
     if (least <= tolerance && (polished++ == POLISH || velocity_error(s) <= 10.0 * tolerance)) break;
     if (pass > 0 && s->error <= rounding(s)) break;
-    if (stalls >= STALLS || s->iterations >= s->limit) break;
+    if (stalls >= patience || s->iterations >= s->limit) break;
     accepted = 0;
     cav_status status = CAV_OK;
-    if (mean && pass > 0) status = newton_step(s, &accepted);
-    if (status == CAV_OK && !accepted) status = solve_convex(s, mean && pass == 0 ? 1e-2 : 0.1 * tolerance);
+    if (!convex && pass > 0) status = newton_step(s, &accepted);
+    if (status == CAV_OK && !accepted) {
+      const double aim = !convex && pass == 0 ? 1e-2 : 0.1 * tolerance;
+      status = coulomb && pass > 0 ? solve_held(s, held, aim) : solve_first(s, aim);
+      if (pass > 0 && held < CHANGES) held *= 2;
+    }
     if (status != CAV_OK) return status;
   }
   copy(s->x, s->best, nv);

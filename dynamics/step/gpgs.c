@@ -10,6 +10,8 @@
 ///
 /// Hard ones are the same with R_E = 0 and the pseudo-inverse of A_E for S.
 ///
+/// Under Coulomb's law the first of a contact's two updates moves its normal impulse alone: the fixed point is that law's.
+///
 /// Starts from the impulses of the last solve on the same state, matched object by object. For midpoint and momentum the smooth
 /// forces are taken anew after each sweep. The exact law only: the smoothed one has no bounded dual; use
 /// cav_forward_newton.
@@ -116,6 +118,13 @@ static void follow(int dim, const double *H, const double *d, double *w) {
   for (int i = 0; i < dim; i++) w[i] += dot(H + i * dim, d, dim);
 }
 
+// moves the normal impulse alone, as Coulomb's law has it
+static void update_normal(int dim, const double *H, double *w, double *f) {
+  const double step = fmax(-w[0] / H[0], -f[0]);
+  f[0] += step;
+  for (int i = 0; i < dim; i++) w[i] += step * H[i * dim];
+}
+
 // moves f along a ray of its cone: its own, or from the apex the one on which the cost falls most steeply
 static void update_ray(int dim, const double *H, const double *friction, double *w, double *f) {
   double ray[DIM_MAX] = {1.0}, bent[DIM_MAX] = {0.0}, least = -1.0;
@@ -141,13 +150,16 @@ static void update_ray(int dim, const double *H, const double *friction, double 
 // exact update of one contact
 static void update_contact(gpgs *s, const cav_block *block, const cav_contact *contact) {
   const int dim = block->dim, nrow = s->n;
-  double H[DIM_MAX * DIM_MAX], w[DIM_MAX], *f = s->f + block->first;
+  double H[DIM_MAX * DIM_MAX] = {0.0}, w[DIM_MAX] = {0.0}, *f = s->f + block->first;
   for (int i = 0; i < dim; i++) {
     const double *A = s->A + (block->first + i) * nrow;
     w[i] = dot(A, s->f, nrow) + s->offset[block->first + i];
     memcpy(H + i * dim, A + block->first, (size_t)dim * sizeof *H);
   }
-  update_ray(dim, H, contact->friction, w, f);
+  if (s->problem.state->options.sliding == CAV_SLIDING_COULOMB)
+    update_normal(dim, H, w, f);
+  else
+    update_ray(dim, H, contact->friction, w, f);
   if (dim > 1) update_friction(dim, H, contact->friction, w, f);
 }
 
@@ -379,6 +391,19 @@ static cav_status remember(const gpgs *s) {
   return CAV_OK;
 }
 
+// by how much Coulomb's law lowers the normal target of a contact: |mu w_t|, w = R f + y - v*
+static double lowered(const gpgs *s, const cav_block *block, const double *y, const double *f) {
+  const cav_impulse *p = &s->problem;
+  if (block->contact < 0 || p->state->options.sliding == CAV_SLIDING_CONVEX) return 0.0;
+  double square = 0.0;
+  for (int j = 1; j < block->dim; j++) {
+    const int i = block->first + j;
+    const double w = p->R[i] * f[i] + y[i] - p->target[i], mu = p->state->contact[block->contact].friction[j - 1];
+    square += mu * mu * w * w;
+  }
+  return sqrt(square);
+}
+
 // duality gap: that of Fenchel and Young for each object, f against its best reply f_i to the velocity it causes,
 // (f_i - f)' R (g - (f_i + f)/2). mismatch |f - f_i|
 static void fill_report(gpgs *s, cav_forward_report *report) {
@@ -392,6 +417,7 @@ static void fill_report(gpgs *s, cav_forward_report *report) {
       const double off = found[i] - s->f[i];
       square += off * off;
       gap += off * (p->target[i] - y[i] - 0.5 * p->R[i] * (found[i] + s->f[i]));
+      if (i == block->first) gap -= off * lowered(s, block, y, found);
     }
   }
   report->gap = gap;

@@ -154,7 +154,11 @@ void cav_impulse_law(const cav_impulse *p, const cav_block *block, const double 
   f += block->first;
   if (block->contact >= 0) {
     const cav_contact *contact = &p->state->contact[block->contact];
-    cav_law_cone(block->dim, R, contact->friction, contact->sigma, g, f, hessian, potential);
+    if (p->convex || p->state->options.sliding == CAV_SLIDING_CONVEX)
+      cav_law_cone(block->dim, R, contact->friction, contact->sigma, g, f, hessian, potential);
+    else
+      cav_law_coulomb(block->dim, R, contact->friction, contact->sigma, p->held ? p->held + (block - p->block) : NULL,
+                      g, f, hessian, potential);
     return;
   }
   if (block->equality >= 0) {

@@ -13,10 +13,13 @@ typedef struct cav_impulse {
   int nv, nblock, nrow;
   int nbound, nbound_row; ///< blocks and rows before those of equality constraints
   cav_block *block;       ///< [nblock] contacts in their order, then scalar rows, then equality constraints in theirs
-  double *target;         ///< v* [nrow], m/s or rad/s
-  double *R;              ///< regulariser [nrow], 1/kg
-  double *M; ///< tree-sparse, D included; at the mean velocity with half of the damping that acts during the step
-  double *L; ///< its factors by cav_ldl_factor
+  const double
+      *held;      ///< [nblock] normal impulses that bound friction under Coulomb's law; NULL: those of the law itself
+  int convex;     ///< 1: contacts by the convex law, whatever the options say
+  double *target; ///< v* [nrow], m/s or rad/s
+  double *R;      ///< regulariser [nrow], 1/kg
+  double *M;      ///< tree-sparse, D included; at the mean velocity with half of the damping that acts during the step
+  double *L;      ///< its factors by cav_ldl_factor
   double *force, *change; ///< scratch [nv]
   double *spare;          ///< [nspare] doubles asked for
   size_t nspare;
@@ -43,7 +46,7 @@ void cav_impulse_push(const cav_impulse *problem, double s, const double *f, dou
 void cav_impulse_inertia(const cav_impulse *problem, const double *x, double *r);
 
 /// Impulse of one block at its constraint velocity v_next: y, f [nrow] of the whole problem. hessian [dim*dim] and
-/// potential may be NULL.
+/// potential may be NULL; Coulomb's law has a potential only while held is given.
 void cav_impulse_law(const cav_impulse *problem, const cav_block *block, const double *y, double *f, double *hessian,
                      double *potential);
 

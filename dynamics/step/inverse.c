@@ -79,9 +79,9 @@ static void contact_push(cav_state *state, const cav_contact *c, double scale) {
   push_link(state, c->link1, c->pos, force, moment);
 }
 
-// f of one contact: the cone's projection of g = R^-1 (v* - v_next), v* = (1 - hB) x' - hK x in the normal row or as
+// f of one contact: its law at g = R^-1 (v* - v_next), v* = (1 - hB) x' - hK x in the normal row or as
 // coupled rows have it
-static void contact_impulse(cav_contact *c, const double *coupled) {
+static void contact_impulse(const cav_state *state, cav_contact *c, const double *coupled) {
   double g[6];
   for (int k = 0; k < c->dim; k++) {
     double target = (1 - c->damping[k]) * c->velocity[k];
@@ -89,7 +89,7 @@ static void contact_impulse(cav_contact *c, const double *coupled) {
     if (coupled) { target = coupled[k]; }
     g[k] = (target - c->velocity_next[k]) / c->regulariser[k];
   }
-  cav_law_cone(c->dim, c->regulariser, c->friction, c->sigma, g, c->impulse, NULL, NULL);
+  cav_law_contact(state, c, g, c->impulse, NULL);
 }
 
 // all contacts: velocities (those at v only if v has changed), impulses, wrenches
@@ -99,7 +99,7 @@ static void contacts(cav_state *state, const double *velocity_now, double scale)
     cav_contact *c = &state->contact[i];
     if (velocity_now) { cav_contact_velocity(state, c, velocity_now, c->velocity); }
     cav_contact_velocity(state, c, state->velocity_next, c->velocity_next);
-    contact_impulse(c, coupled);
+    contact_impulse(state, c, coupled);
     if (coupled) { coupled += c->dim; }
     contact_push(state, c, scale);
   }

@@ -139,7 +139,7 @@ CAV_API cav_status cav_forward(const cav_model *model, cav_state *state, const d
 typedef struct cav_forward_report {
   int iterations;
   double residual; ///< largest |inverse(q, v, v_next) - u| relative to the largest |u| involved
-  double gap;      ///< duality gap of (9), J (GPGS only)
+  double gap;      ///< duality gap of (9), v* lowered where Coulomb's law does, J (GPGS only)
   double mismatch; ///< |f_forward - f_inverse(v_next)| over all impulses, N s (GPGS only)
 } cav_forward_report;
 

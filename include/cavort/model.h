@@ -419,6 +419,11 @@ typedef struct cav_field {
   X(CAV_REGULARISER_REFERENCE, "reference", "constants of the configuration q0: smooth in q, cheap, MuJoCo's")     \
   X(CAV_REGULARISER_EXACT, "exact", "of J M_hat^-1 J' at q, the paper's: factors the inertia in every evaluation")
 
+/// What a contact obeys that slides; dynamics/METHOD.md, 9.
+#define CAV_SLIDINGS(X)                                                                                            \
+  X(CAV_SLIDING_CONVEX, "convex", "the paper's law: held off by h mu times the slip")                              \
+  X(CAV_SLIDING_COULOMB, "coulomb", "Coulomb's: gap and force complementary at any slip")
+
 /// How constraints are evaluated: REAL(stage, name, least, most, required, unit, text), WORD(stage, name, type, words, text) and
 /// FLAG(stage, name, text), which is 0 or 1. stage: the first stage of an evaluation that depends on it, which is not reused
 /// after a change. required: of a recorded law (<contact> of a problem file). The struct, the comparison, the checks, and
@@ -428,6 +433,7 @@ typedef struct cav_field {
   WORD(VELOCITY, order, cav_order, CAV_ORDERS, "velocity of the bias and passive forces")                          \
   WORD(POSITION, stabilisation, cav_stabilisation, CAV_STABILISATIONS, "how v* follows from the position error")   \
   WORD(POSITION, regulariser, cav_regulariser, CAV_REGULARISERS, "diagonal of A that scales R")                    \
+  WORD(VELOCITY, sliding, cav_sliding, CAV_SLIDINGS, "law of contacts that slide")                                 \
   REAL(POSITION, softness, DBL_MIN, DBL_MAX, 1, "", "epsilon of the discrete stabilisation")                       \
   REAL(POSITION, time_constant, 0, DBL_MAX, 1, "s", "kappa of the discrete stabilisation; 0: deadbeat")            \
   REAL(POSITION, smoothing, 0, DBL_MAX, 1, "m", "delta: distance at which the smoothed law is active; 0: the exact law (dynamics/METHOD.md, 3)") \
@@ -446,6 +452,7 @@ typedef struct cav_field {
 typedef enum cav_order { CAV_ORDERS(CAV_WORD_MEMBER) } cav_order;
 typedef enum cav_stabilisation { CAV_STABILISATIONS(CAV_WORD_MEMBER) } cav_stabilisation;
 typedef enum cav_regulariser { CAV_REGULARISERS(CAV_WORD_MEMBER) } cav_regulariser;
+typedef enum cav_sliding { CAV_SLIDINGS(CAV_WORD_MEMBER) } cav_sliding;
 #undef CAV_WORD_MEMBER
 
 /// A state starts with the model's; change state->options between calls at will.

@@ -188,6 +188,7 @@ CAV_API cav_status cav_strategy_solve(const cav_problem *problem, const cav_stra
 #define CAV_TOLERANCE_PENETRATION 0.005 ///< m, of contacts between moving links too
 #define CAV_TOLERANCE_MOMENTUM 0.005    ///< fraction of weight, root mean square
 #define CAV_TOLERANCE_SLIP 0.01         ///< m/s
+#define CAV_TOLERANCE_HOVER 0.05        ///< fraction of all contact force; CAV_HOVER_GAP says what counts
 #define CAV_TOLERANCE_REPLAY \
   0.5 ///< s, or the whole motion: the open loop at the same step reproduces the knots at least so long
 #define CAV_TOLERANCE_STEP 1e-8        ///< rad or m
@@ -195,6 +196,7 @@ CAV_API cav_status cav_strategy_solve(const cav_problem *problem, const cav_stra
 
 /// What the word optimal requires of a verdict's optimality: a fraction of the cost.
 #define CAV_TOLERANCE_OPTIMAL 1e-4
+#define CAV_HOVER_GAP 0.003 ///< m: a loaded contact farther apart, that stays so over a step, leans on air
 
 /// What verification found; from the knots alone, with code apart from the optimiser's. optim/METHOD.md, 6.
 /// optimality, solve_seconds and iterations are the solver's: cav_verify leaves them as they are.
@@ -206,7 +208,8 @@ typedef struct cav_verdict {
   double limit_violation_max;      ///< relative to the limit (effort), rad or m (range)
   double constraint_violation_max; ///< of the problem's hard terms, scaled
   double penetration_max_m;
-  double slip_mean_m_s; ///< of loaded contacts, weighted by force
+  double slip_mean_m_s;  ///< of loaded contacts, weighted by force
+  double hover_fraction; ///< of contact force, by impulse, across gaps that stay open
   double optimality;
   double replay_step_max_error;      ///< largest |v' - v_{t+1}| h of single forward steps from each knot, rad or m
   double replay_same_step_max_error; ///< largest |q - knot|, rad or m, open loop at the same step

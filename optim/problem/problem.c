@@ -40,7 +40,7 @@ cav_problem cav_problem_default(const cav_model *model) {
       .guess_to = 1,
       .effort_limit = 0.8,
       .limit_margin = 1e-3,
-      .schedule = {.stages = 16, .first = first_stage, .last = last_stage},
+      .schedule = {.stages = 16, .sliding = CAV_SLIDING_COULOMB, .first = first_stage, .last = last_stage},
   };
 }
 
@@ -303,6 +303,7 @@ static cav_status read_schedule(const cav_problem_reader *reader) {
   if (schedule->stages < 1 || schedule->stages > 1000) {
     return cav_xml_fail(reader->error, node, "stages", "expected 1 to 1000, got %d", schedule->stages);
   }
+  schedule->sliding = (cav_sliding)cav_xml_word(node, "sliding", schedule->sliding);
   int n;
   const cav_field *field = cav_stage_fields(&n);
   cav_status status = cav_problem_read_fields(reader, cav_problem_child(node, "first"), field, n, &schedule->first);

@@ -20,6 +20,10 @@ static double between(double from, double to, double s) {
   return from > 0 && to > 0 ? from * pow(to / from, s) : (1 - s) * from + s * to;
 }
 
+// fraction of the way from which on contacts slide by the schedule's law: before, forces that are active at a distance make up
+// for what is missing, and a convex law leads better (step-up ends in a corner without)
+static const double SLIDES_FROM = 0.5;
+
 cav_stage_options cav_schedule_at(const cav_schedule *schedule, double x) {
   const cav_stage_options *a = &schedule->first, *b = &schedule->last;
   cav_stage_options stage = x < 1 ? *a : *b;
@@ -35,6 +39,7 @@ cav_stage_options cav_schedule_at(const cav_schedule *schedule, double x) {
 void cav_stage_law(const cav_problem *problem, double x, double step, cav_options *law) {
   cav_stage_options stage = cav_schedule_at(&problem->schedule, x);
   law->stabilisation = CAV_STABILISATION_DISCRETE;
+  law->sliding = x >= SLIDES_FROM ? problem->schedule.sliding : CAV_SLIDING_CONVEX;
 #define LAW_SAME(name) law->name = stage.name;
 #define LAW_STEPS(name) law->name = stage.name * step;
 #define LAW_NONE(name)

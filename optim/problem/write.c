@@ -307,7 +307,9 @@ static void write_tail(FILE *out, const cav_problem *p) {
   fputs("  <limits", out);
   write_number(out, "effort", p->effort_limit);
   write_number(out, "margin", p->limit_margin);
-  fprintf(out, "/>\n  <schedule stages=\"%d\">\n", p->schedule.stages);
+  fprintf(out, "/>\n  <schedule stages=\"%d\"", p->schedule.stages);
+  write_text(out, "sliding", cav_problem_slidings[p->schedule.sliding]);
+  fputs(">\n", out);
   write_stage(out, "first", &p->schedule.first);
   write_stage(out, "last", &p->schedule.last);
   fputs("  </schedule>\n", out);

@@ -63,6 +63,14 @@ void cav_balance_add(cav_balance *balance, const cav_verification *verification,
 /// Root mean square of the worst tree, and its worst knot.
 void cav_balance_result(const cav_balance *balance, const cav_verification *verification, cav_metric *metric);
 
+/// Load carried across open gaps, fraction of all: value, and the largest one's knot. hover.c.
+typedef struct cav_hover cav_hover;
+cav_hover *cav_hover_new(void);
+void cav_hover_free(cav_hover *hover);
+/// Adds knot t, in their order up to the last; verification->state holds the inverse there. Fails with CAV_NO_MEMORY.
+cav_status cav_hover_add(cav_hover *hover, const cav_verification *verification, int t);
+void cav_hover_result(cav_hover *hover, const cav_verification *verification, cav_metric *metric);
+
 /// Hard terms of the problem at knot t; verification->state holds the inverse there. work holds cav_constraint_check_room values.
 /// constraint_check.c.
 int cav_constraint_check_room(const cav_verification *verification);

@@ -15,7 +15,7 @@ static const double loaded = 0.01;        // fraction of the weight from which o
 
 /// What was found at the knots.
 typedef struct metrics {
-  cav_metric unactuated, limit, term, penetration, defect, periodicity;
+  cav_metric unactuated, limit, term, penetration, defect, periodicity, hover;
   double slip, load;
 } metrics;
 
@@ -352,7 +352,8 @@ static cav_status examine(cav_verification *verification, cav_balance *balance, 
   const cav_model *model = verification->model;
   int room = 0;
   double *terms = NULL, *work = malloc(sizeof(double) * (size_t)(model->nq + 4 * model->nv + model->nu + 1));
-  cav_status status = work ? CAV_OK : CAV_NO_MEMORY;
+  cav_hover *hover = cav_hover_new();
+  cav_status status = work && hover ? CAV_OK : CAV_NO_MEMORY;
   if (status == CAV_OK && verification->image) {
     status = note_periodicity(verification, &found->periodicity);
   } else if (status == CAV_OK) {
@@ -365,6 +366,8 @@ static cav_status examine(cav_verification *verification, cav_balance *balance, 
       fail(error, status, "inverse dynamics at knot %d: %s", t, cav_status_name(status));
       break;
     }
+    status = cav_hover_add(hover, verification, t);
+    if (status != CAV_OK) break;
     // contacts may have come
     if (cav_constraint_check_room(verification) > room) {
       free(terms);
@@ -376,6 +379,8 @@ static cav_status examine(cav_verification *verification, cav_balance *balance, 
     cav_constraint_check(verification, t, terms, &found->term);
   }
   cav_balance_result(balance, verification, &found->defect);
+  if (hover) cav_hover_result(hover, verification, &found->hover);
+  cav_hover_free(hover);
   free(work);
   free(terms);
   return status;
@@ -437,6 +442,8 @@ static void decide(const cav_verification *verification, const metrics *found, c
   const cav_metric slip = {verdict->slip_mean_m_s, -1, "mean over loaded contacts"};
   require(verdict, &slip, CAV_TOLERANCE_SLIP, "slip, m/s,",
           "A lower softness or smoothing at the end of the schedule, or a higher weight of slip, usually helps.");
+  require(verdict, &found->hover, CAV_TOLERANCE_HOVER, "contact force across gaps that stay open, fraction of all,",
+          "Coulomb's law (sliding=\"coulomb\" in <schedule>), or a lower smoothing at its end usually helps.");
   const cav_metric step = {replay->step_error, replay->step_knot, "forward step from the knot against the next knot"};
   require(verdict, &step, CAV_TOLERANCE_STEP, "replay error, rad or m,",
           "Forward and inverse dynamics disagree: please report it.");
@@ -466,6 +473,7 @@ static void fill(const cav_verification *verification, const metrics *found, con
   verdict->constraint_violation_max = found->term.value;
   verdict->penetration_max_m = found->penetration.value;
   verdict->slip_mean_m_s = found->load > 0 ? found->slip / found->load : 0;
+  verdict->hover_fraction = found->hover.value;
   verdict->replay_step_max_error = replay->step_error;
   verdict->replay_same_step_max_error = replay->open_error;
   verdict->replay_same_step_seconds = replay->open_seconds;

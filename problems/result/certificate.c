@@ -35,6 +35,7 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
     add_number(line, &n, "end of the cycle on its start", v->periodicity_error, CAV_TOLERANCE_PERIODICITY, 1, "");
   add_number(line, &n, "penetration", v->penetration_max_m, CAV_TOLERANCE_PENETRATION, 1e3, " mm");
   add_number(line, &n, "slip of loaded contacts, mean", v->slip_mean_m_s, CAV_TOLERANCE_SLIP, 1e3, " mm/s");
+  add_number(line, &n, "contact force across open gaps, fraction", v->hover_fraction, CAV_TOLERANCE_HOVER, 100, " %");
   add_number(line, &n, "momentum defect, rms, fraction of weight", v->momentum_defect_rms, CAV_TOLERANCE_MOMENTUM, 100,
              " %");
   add_number(line, &n, "forward step from each knot, error", v->replay_step_max_error, CAV_TOLERANCE_STEP, 1, "");
@@ -113,6 +114,7 @@ void cav_certificate_json(FILE *out, const char *problem, const char *model, con
   write_number(out, "constraint_violation_max", v->constraint_violation_max);
   write_number(out, "penetration_max_m", v->penetration_max_m);
   write_number(out, "slip_mean_m_s", v->slip_mean_m_s);
+  write_number(out, "hover_fraction", v->hover_fraction);
   write_number(out, "optimality", v->optimality);
   write_number(out, "replay_step_max_error", v->replay_step_max_error);
   write_number(out, "replay_same_step_max_error", v->replay_same_step_max_error);
