@@ -16,7 +16,7 @@ typedef struct cav_ipopt_rule {
   const char *words;
 } cav_ipopt_rule;
 
-// name, type, least, most, strict, words: as Ipopt's manual has them
+// name, type, least, most, strict, words: as Ipopt's manual has them, but for hessian, which is ours (ipopt.c)
 #define CAV_IPOPT_OPTIONS(X)                                                               \
   X(acceptable_constr_viol_tol, CAV_IPOPT_REAL, 0, 1e300, 1, NULL)                         \
   X(acceptable_dual_inf_tol, CAV_IPOPT_REAL, 0, 1e300, 1, NULL)                            \
@@ -30,6 +30,7 @@ typedef struct cav_ipopt_rule {
   X(constr_viol_tol, CAV_IPOPT_REAL, 0, 1e300, 1, NULL)                                    \
   X(dual_inf_tol, CAV_IPOPT_REAL, 0, 1e300, 1, NULL)                                       \
   X(expect_infeasible_problem, CAV_IPOPT_WORD, 0, 0, 0, "no yes")                          \
+  X(hessian, CAV_IPOPT_WORD, 0, 0, 0, "auto exact gauss-newton")                           \
   X(hessian_approximation, CAV_IPOPT_WORD, 0, 0, 0, "exact limited-memory")                \
   X(limited_memory_max_history, CAV_IPOPT_WHOLE, 0, 1e9, 0, NULL)                          \
   X(linear_solver, CAV_IPOPT_WORD, 0, 0, 0, "mumps ma27 ma57 ma77 ma86 ma97 pardiso wsmp") \

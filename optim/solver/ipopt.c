@@ -1,8 +1,7 @@
-/// Ipopt on the transcription: unknowns are tangent increments about the trajectory it starts from, forces that no actuator can
-/// give are hard equalities, efforts, tendon ranges and hard terms are bounded rows, joint ranges bound the unknowns. The
-/// Hessian is Gauss-Newton's of the cost plus a diagonal that stands for the neglected curvature of the constraints, which
-/// grows with their multipliers
-/// (METHOD.md, 2). The only user of Ipopt; written against 3.11 and 3.14 (index and number are int and double in both).
+/// Ipopt on the transcription, stage by stage of the continuation: unknowns are tangent increments about the trajectory that a
+/// stage starts from, forces that no actuator can give are hard equalities, efforts, tendon ranges and hard terms are bounded
+/// rows, joint ranges bound the unknowns (METHOD.md, 2). The only user of Ipopt; written against 3.11 and 3.14 (index and
+/// number are int and double in both).
 #include "ipopt.h"
 
 #include <IpStdCInterface.h>
@@ -12,14 +11,30 @@
 #include <string.h>
 
 #include "ipopt_options.h"
+#include "lagrangian.h"
 #include "rotation.h"
 
-/// Dual infeasibility that the noise of derivatives explains, and violation from which the last step brings all rows in.
-static const double noise = 1, acceptable = 1e-4;
+/// Our own option among Ipopt's: which Hessian it gets.
+static const char hessian_option[] = "hessian";
 
-/// What stands for the curvature of the constraints on the diagonal: in proportion to the largest multiplier, and to the diagonal
-/// itself.
-static const double curvature = 3, curvature_fraction = 0.01;
+/// Dual infeasibility that the noise of derivatives explains where contacts act, and where none does; violation from which the
+/// last step brings all rows in.
+static const double contact_noise = 1, smooth_noise = 1e-6, acceptable = 1e-4;
+
+/// The continuation: stages of the problem's schedule to one of Ipopt's, and iterations of each but the last.
+enum { STAGES_IN_ONE = 2, STAGE_ITERATIONS = 40 };
+
+/// Gauss-Newton Hessians: added to the diagonal, per second of the step, 1/rad^2 or 1/m^2, at a stage's start and at least. It
+/// stands for the curvature that is left out: four times as much after a step that the line search cut, a quarter after a
+/// full one.
+static const double damping = 1.2, least_damping = 0.1, most_damping = 1e4, damping_change = 4;
+
+/// After Gauss-Newton's last stage: iterations with the exact Hessian, times degrees of freedom, as each takes about that much
+/// longer; fewer than the least are not worth it.
+enum { EXACT_ITERATIONS = 200, LEAST_EXACT_ITERATIONS = 10 };
+
+/// Differences of the Lagrangian's gradient by the step's logarithm.
+static const double step_shift = 1e-4;
 
 /// Ipopt's checker takes one-sided differences, at the start itself: away from it the law is stiff beyond any step. Contacts
 /// and their costs have second derivatives up to 3e7, so a step p is off by 1.5e7 p, and rounding of objective and forces by
@@ -35,9 +50,15 @@ typedef struct program {
   int *jacobian_row, *jacobian_column, *source; ///< [entries]; source: column among the row's 3nv
   double *x;                                    ///< [n] point of the last evaluation
   int known;                                    ///< 1: values at x are known, 2: derivatives too
-  double *full;                                 ///< [3nv+1] a row while it is turned, and its entry of the step
-  double infeasibility, dual;                   ///< of the last iterate, as Ipopt measures them
-  double *best_x;                               ///< [n] the iterate that is nearest to an optimum
+  double *full;                                 ///< [3nv+1] a row while it is rotated, and its entry of the step
+  double damping;                               ///< of Gauss-Newton Hessians, per second
+  double noise;                                 ///< of the dual
+  int exact;                                    ///< the Hessian has the curvature of all rows
+  double **hessian;                             ///< [nknot][9nv^2] of the Lagrangian
+  double *near;                                 ///< [3n] a point beside x and gradients there, where the step is free
+  int *entry;                 ///< [2*entries of the Hessian] its rows, then its columns, where the step is free
+  double infeasibility, dual; ///< of the last iterate, as Ipopt measures them
+  double *best_x;             ///< [n] the iterate that is nearest to an optimum
   double best_error, best_infeasibility, best_dual;
   int best_iteration; ///< -1: none yet
   int interrupted;
@@ -120,27 +141,118 @@ static Bool constraint_jacobian(int n, double *x, Bool fresh, int m, int entries
   return 1;
 }
 
+/// A lower triangle of size n onto the upper one, too; or the upper one zero.
+static void fill_upper(int n, double *H, int mirrored) {
+  for (int i = 0; i < n; i++)
+    for (int j = i + 1; j < n; j++) H[i * n + j] = mirrored ? H[j * n + i] : 0;
+}
+
+static void transpose(int n, double *H) {
+  for (int i = 0; i < n; i++) {
+    for (int j = 0; j < i; j++) {
+      double kept = H[i * n + j];
+      H[i * n + j] = H[j * n + i];
+      H[j * n + i] = kept;
+    }
+  }
+}
+
+/// A knot's Hessian over tangents at the configurations to one over the unknowns: Jr' H Jr.
+static void rotate_hessian(const program *p, int t) {
+  const cav_transcription *tr = p->run->tr;
+  int width = 3 * tr->nv;
+  double *H = tr->knot[t].hessian;
+  if (tr->nrotation == 0) return;
+  fill_upper(width, H, 1);
+  for (int side = 0; side < 2; side++) {
+    for (int i = 0; i < width; i++)
+      for (int c = 0; c < 3; c++) rotation_row(p, cav_transcription_block(tr, t, c), H + i * width + c * tr->nv);
+    transpose(width, H);
+  }
+  fill_upper(width, H, 0);
+}
+
+/// Gradient of the Lagrangian at x.
+static int lagrangian_gradient(program *p, const double *x, double factor, const double *multiplier, double *g) {
+  if (!evaluate(p, x, 1)) return 0;
+  const cav_transcription *tr = p->run->tr;
+  for (int i = 0; i < p->n; i++) g[i] = factor * cav_normal_gradient(p->run->normal)[i];
+  for (int i = 0; i < p->m; i++) {
+    int t = p->row_knot[i];
+    const double *row = tr->knot[t].slot_row + (size_t)p->row_slot[i] * 3 * tr->nv;
+    for (int c = 0; c < 3; c++) {
+      int block = cav_transcription_block(tr, t, c);
+      for (int d = 0; block >= 0 && d < tr->nv; d++) g[block * tr->nv + d] += multiplier[i] * row[c * tr->nv + d];
+    }
+    if (tr->free_step) g[p->n - 1] += multiplier[i] * tr->knot[t].slot_step[p->row_slot[i]];
+  }
+  for (int b = 0; b < tr->nknot - 1; b++) rotation_row(p, b, g + (size_t)b * tr->nv);
+  return 1;
+}
+
+/// Second derivatives by the step's logarithm, into the entries of the last row: every row bends with the step, so
+/// Gauss-Newton has nothing to offer here. Ends at x, with derivatives.
+static int step_hessian(program *p, const double *x, double factor, const double *multiplier, int entries,
+                        double *value) {
+  double *y = p->near, *after = y + p->n, *before = after + p->n;
+  memcpy(y, x, (size_t)p->n * sizeof *y);
+  y[p->n - 1] = x[p->n - 1] + step_shift;
+  if (!lagrangian_gradient(p, y, factor, multiplier, after)) return 0;
+  y[p->n - 1] = x[p->n - 1] - step_shift;
+  if (!lagrangian_gradient(p, y, factor, multiplier, before)) return 0;
+  for (int k = 0; k < entries; k++) {
+    int column = p->entry[entries + k];
+    if (p->entry[k] == p->n - 1) value[k] = (after[column] - before[column]) / (2 * step_shift);
+  }
+  return evaluate(p, x, 1);
+}
+
+/// Exchanges the knots' Hessians for those of the Lagrangian, or back.
+static void exchange_hessians(program *p) {
+  cav_transcription *tr = p->run->tr;
+  for (int t = 0; t < tr->nknot; t++) {
+    double *kept = tr->knot[t].hessian;
+    tr->knot[t].hessian = p->hessian[t];
+    p->hessian[t] = kept;
+  }
+}
+
+/// Gathers the Hessian of the Lagrangian at the last linearisation, which stays as it is.
+static int gather_hessian(program *p, double factor, const double *multiplier) {
+  cav_transcription *tr = p->run->tr;
+  int width = 3 * tr->nv;
+  cav_status status = CAV_OK;
+  for (int i = 0; i < p->m; i++) tr->knot[p->row_knot[i]].slot[p->row_slot[i]].final_multiplier = multiplier[i];
+  for (int t = 0; t < tr->nknot; t++)
+    for (int i = 0; i < width * width; i++) p->hessian[t][i] = factor * tr->knot[t].hessian[i];
+  exchange_hessians(p);
+  if (p->exact) status = cav_lagrangian_curvature(tr, p->run->at, factor);
+  for (int t = 0; t < tr->nknot; t++) rotate_hessian(p, t);
+  cav_normal_gather(p->run->normal, tr);
+  exchange_hessians(p);
+  return status == CAV_OK;
+}
+
 static Bool lagrangian_hessian(int n, double *x, Bool fresh, double factor, int m, double *multiplier,
                                Bool fresh_multiplier, int entries, int *row, int *column, double *value,
                                UserDataPtr data) {
   program *p = data;
-  (void)n, (void)fresh, (void)fresh_multiplier, (void)entries;
+  const cav_transcription *tr = p->run->tr;
+  (void)n, (void)fresh, (void)m, (void)fresh_multiplier;
   if (!value) {
     cav_normal_entries(p->run->normal, row, column, NULL);
     return 1;
   }
-  if (!evaluate(p, x, 1)) return 0;
-  double largest = 0;
-  for (int i = 0; i < m; i++) largest = fmax(largest, fabs(multiplier[i]));
+  if (!evaluate(p, x, 1) || !gather_hessian(p, factor, multiplier)) return 0;
   cav_normal_entries(p->run->normal, NULL, NULL, value);
-  cav_normal_shift_entries(p->run->normal, factor, curvature * largest, curvature_fraction, value);
-  return 1;
+  if (!p->exact) cav_normal_shift_entries(p->run->normal, 1, p->damping * tr->h, 0, value);
+  return !tr->free_step || step_hessian(p, x, factor, multiplier, entries, value);
 }
 
 /// Keeps the iterate if none was nearer to an optimum. A line search that meets the noise of the derivatives can wander off,
 /// and the restoration of Ipopt ends anywhere.
 static void keep_best(program *p, int iteration) {
-  double error = fmax(p->infeasibility / p->run->options->tolerance, p->dual / noise);
+  double error = fmax(p->infeasibility / p->run->options->tolerance, p->dual / p->noise);
   if (p->known < 2 || !(p->best_iteration < 0 || error < p->best_error)) return;
   memcpy(p->best_x, p->x, (size_t)p->n * sizeof(double));
   p->best_error = error;
@@ -152,11 +264,13 @@ static void keep_best(program *p, int iteration) {
 static Bool progress(int mode, int iteration, double cost, double infeasibility, double dual, double mu, double step,
                      double regularisation, double dual_step, double primal_step, int trials, UserDataPtr data) {
   program *p = data;
-  (void)cost, (void)mu, (void)regularisation, (void)dual_step, (void)trials;
-  p->run->stage = mode;
+  (void)cost, (void)mu, (void)regularisation, (void)dual_step;
   p->infeasibility = infeasibility;
   p->dual = dual;
   if (mode == 0) keep_best(p, iteration);
+  if (iteration > 0)
+    p->damping =
+        trials > 1 ? fmin(p->damping * damping_change, most_damping) : fmax(p->damping / damping_change, least_damping);
   if (!p->known) return 1;
   p->interrupted = cav_run_report(p->run, step * primal_step, 0) != 0;
   return !p->interrupted;
@@ -274,20 +388,23 @@ static void multipliers_of(const program *p, double *multiplier, int back) {
 static const cav_ipopt_option usual[] = {
     {"nlp_scaling_method", "none"},
     {"max_iter", "200"},
-    {"tol", "1e-3"},
-    {"acceptable_tol", "1e-1"},
     {"acceptable_iter", "10"},
     {"acceptable_constr_viol_tol", "1e-4"},
     {"mu_init", "1e-4"},
     {"mumps_mem_percent", "200"},
-    {"mumps_pivot_order", "0"},
+    {"mumps_pivot_order", "0"}, // AMD, 6 % faster here than METIS, which MUMPS would choose
     {"warm_start_bound_push", "1e-6"},
     {"warm_start_slack_bound_push", "1e-6"},
     {"warm_start_mult_bound_push", "1e-6"},
 };
 
+/// What a Hessian can reach: Gauss-Newton's creeps where constraints bend, the exact one ends at rounding.
+static const cav_ipopt_option rough[] = {{"tol", "1e-3"}, {"acceptable_tol", "1e-1"}},
+                              sharp[] = {{"tol", "1e-9"}, {"acceptable_tol", "1e-7"}, {"compl_inf_tol", "1e-10"}};
+
 static int set_option(IpoptProblem nlp, const cav_ipopt_option *option) {
   double number = 0;
+  if (!strcmp(option->name, hessian_option)) return 1;
   const cav_ipopt_rule *rule = cav_ipopt_check(option, &number, NULL);
   if (!rule) return 0;
   if (rule->type == CAV_IPOPT_WHOLE) return AddIpoptIntOption(nlp, (char *)option->name, (int)number);
@@ -295,16 +412,37 @@ static int set_option(IpoptProblem nlp, const cav_ipopt_option *option) {
   return AddIpoptStrOption(nlp, (char *)option->name, (char *)option->value);
 }
 
-static int set_options(IpoptProblem nlp, const cav_solve_run *run) {
+static int set_list(IpoptProblem nlp, int n, const cav_ipopt_option *option) {
+  int ok = 1;
+  for (int i = 0; i < n; i++) ok = ok && set_option(nlp, &option[i]);
+  return ok;
+}
+
+/// The last value that the problem or the caller gives an option; NULL: neither does.
+static const char *option_given(const cav_solve_run *run, const char *name) {
+  const char *value = NULL;
+  for (int i = 0; i < run->problem->nipopt; i++)
+    if (!strcmp(run->problem->ipopt[i].name, name)) value = run->problem->ipopt[i].value;
+  for (int i = 0; i < run->options->nipopt; i++)
+    if (!strcmp(run->options->ipopt[i].name, name)) value = run->options->ipopt[i].value;
+  return value;
+}
+
+/// Options of a stage, whose iterations are limited if that is not 0.
+static int set_options(IpoptProblem nlp, const program *p, int iterations) {
+  const cav_solve_run *run = p->run;
   const cav_solve_options *o = run->options;
   // silent, and deaf to a file ipopt.opt that happens to lie where the program runs
   int ok = AddIpoptIntOption(nlp, "print_level", 0) && AddIpoptStrOption(nlp, "sb", "yes") &&
            AddIpoptStrOption(nlp, "option_file_name", "");
-  for (size_t i = 0; i < sizeof usual / sizeof *usual; i++) ok = ok && set_option(nlp, &usual[i]);
+  ok = ok && set_list(nlp, sizeof usual / sizeof *usual, usual);
+  ok = ok && (p->exact ? set_list(nlp, sizeof sharp / sizeof *sharp, sharp)
+                       : set_list(nlp, sizeof rough / sizeof *rough, rough));
   ok = ok && AddIpoptNumOption(nlp, "constr_viol_tol", o->tolerance);
   if (run->warm) ok = ok && AddIpoptStrOption(nlp, "warm_start_init_point", "yes");
-  for (int i = 0; i < run->problem->nipopt; i++) ok = ok && set_option(nlp, &run->problem->ipopt[i]);
-  for (int i = 0; i < o->nipopt; i++) ok = ok && set_option(nlp, &o->ipopt[i]);
+  ok = ok && set_list(nlp, run->problem->nipopt, run->problem->ipopt) && set_list(nlp, o->nipopt, o->ipopt);
+  const char *most = option_given(run, "max_iter");
+  if (iterations > 0 && !(most && atoi(most) < iterations)) ok = ok && AddIpoptIntOption(nlp, "max_iter", iterations);
   if (o->ipopt_derivative_test) {
     ok = ok && AddIpoptStrOption(nlp, "derivative_test", "first-order");
     ok = ok && AddIpoptNumOption(nlp, "point_perturbation_radius", 0) &&
@@ -346,13 +484,12 @@ static cav_status conclude(const program *p, enum ApplicationReturnStatus code, 
     if (error && meaning[i].status != CAV_OK) {
       *error = (cav_error){.status = meaning[i].status};
       // where it ended, what is kept instead, and whether it is the derivatives' noise that keeps the dual up
-      const char *better = p->run->warm ? "" : " (from the guess alone: --solver both starts it from a better motion)";
-      int n = snprintf(error->text, sizeof error->text, "%s%s; constraints were left with %.2g, the dual with %.2g",
-                       meaning[i].text, better, p->infeasibility, p->dual);
+      int n = snprintf(error->text, sizeof error->text, "%s; constraints were left with %.2g, the dual with %.2g",
+                       meaning[i].text, p->infeasibility, p->dual);
       if (p->best_iteration >= 0)
         snprintf(error->text + n, sizeof error->text - (size_t)n, "; kept is its iterate %d, with %.2g and %.2g%s",
                  p->best_iteration, p->best_infeasibility, p->best_dual,
-                 p->best_infeasibility <= acceptable && p->best_dual < noise
+                 p->best_infeasibility <= acceptable && p->best_dual < p->noise
                      ? ": all but optimal, within the noise of the derivatives"
                      : "");
     }
@@ -365,36 +502,64 @@ static cav_status conclude(const program *p, enum ApplicationReturnStatus code, 
   return CAV_NOT_CONVERGED;
 }
 
-static void program_free(program *p) {
-  cav_trajectory_free(p->anchor);
-  free(p->row_knot), free(p->row_slot), free(p->jacobian_row), free(p->jacobian_column), free(p->source);
-  free(p->x), free(p->full), free(p->best_x);
+/// Whether the contact law, and so the continuation, has a part in the model: contacts, limits, or friction.
+static int law_acts(const cav_model *m) {
+  int acts = m->npair > 0 || m->nequality > 0;
+  for (int j = 0; j < m->njoint; j++) acts |= m->joint[j].limited;
+  for (int d = 0; d < m->nv; d++) acts |= m->dof[d].frictionloss > 0;
+  for (int k = 0; k < m->ntendon; k++) acts |= m->tendon[k].limited || m->tendon[k].frictionloss > 0;
+  return acts;
 }
 
-cav_status cav_ipopt(cav_solve_run *run, cav_error *error) {
+static void program_free(program *p) {
+  for (int t = 0; p->hessian && t < p->run->tr->nknot; t++) free(p->hessian[t]);
+  cav_trajectory_free(p->anchor);
+  free(p->row_knot), free(p->row_slot), free(p->jacobian_row), free(p->jacobian_column), free(p->source);
+  free(p->x), free(p->full), free(p->best_x), free(p->hessian), free(p->near), free(p->entry);
+}
+
+/// Memory of a program, and the structure of its Jacobian and Hessian.
+static int program_new(program *p) {
+  const cav_transcription *tr = p->run->tr;
+  size_t n = (size_t)p->n, width = 3 * (size_t)tr->nv;
+  int entries = cav_normal_entries(p->run->normal, NULL, NULL, NULL);
+  char *pattern = malloc(4 * (size_t)tr->nv);
+  p->x = calloc(n, sizeof(double));
+  p->full = malloc((width + 1) * sizeof(double));
+  p->best_x = malloc(n * sizeof(double));
+  p->hessian = calloc((size_t)tr->nknot, sizeof *p->hessian);
+  p->near = malloc(3 * n * sizeof(double));
+  p->entry = malloc(2 * (size_t)entries * sizeof(int));
+  int ok = p->anchor && p->x && p->full && p->best_x && pattern && p->hessian && p->near && p->entry;
+  for (int t = 0; ok && t < tr->nknot; t++) ok = (p->hessian[t] = malloc(width * width * sizeof(double))) != NULL;
+  ok = ok && list_rows(p, pattern);
+  if (ok) cav_normal_entries(p->run->normal, p->entry, p->entry + entries, NULL);
+  free(pattern);
+  return ok;
+}
+
+/// Solves at the transcription's law from run->at and leaves the result there: at a stage's end its last iterate, else the best.
+static cav_status solve_stage(cav_solve_run *run, int exact, int iterations, cav_error *error) {
   cav_transcription *tr = run->tr;
   cav_penalties kept = tr->penalty;
   cav_derivative difference = tr->difference;
-  program p = {
-      .run = run, .n = cav_transcription_unknowns(tr), .anchor = cav_trajectory_copy(run->at), .best_iteration = -1};
+  program p = {.run = run,
+               .n = cav_transcription_unknowns(tr),
+               .anchor = cav_trajectory_copy(run->at),
+               .best_iteration = -1,
+               .noise = law_acts(tr->model) ? contact_noise : smooth_noise,
+               .damping = damping,
+               .exact = exact};
   IpoptProblem nlp = NULL;
   double *bound = NULL, *start = NULL, *multiplier = NULL;
-  char *pattern = malloc(4 * (size_t)tr->nv);
   cav_status status = CAV_NO_MEMORY;
-  p.x = calloc((size_t)p.n, sizeof(double));
-  p.full = malloc((3 * (size_t)tr->nv + 1) * sizeof(double));
-  p.best_x = malloc((size_t)p.n * sizeof(double));
-  if (!p.anchor || !p.x || !p.full || !p.best_x || !pattern || !cav_transcription_keep_rows(tr) ||
-      !list_rows(&p, pattern))
-    goto end;
+  if (!cav_transcription_keep_rows(tr) || !program_new(&p)) goto end;
   bound = malloc((2 * (size_t)p.n + 2 * (size_t)p.m + 1) * sizeof(double));
   start = calloc((size_t)p.n, sizeof(double));
   multiplier = calloc(2 * (size_t)p.n + (size_t)p.m + 1, sizeof(double));
   if (!bound || !start || !multiplier) goto end;
 
   // costs alone are the objective: constraint rows get no weight of their own
-  run->phase = "ipopt";
-  run->stages = 0;
   tr->penalty = (cav_penalties){0};
   tr->difference = CAV_DERIVATIVE_CENTRED;
   if ((status = cav_transcription_values(tr, run->at)) != CAV_OK) goto end;
@@ -404,7 +569,7 @@ cav_status cav_ipopt(cav_solve_run *run, cav_error *error) {
                            objective_gradient, constraint_jacobian, lagrangian_hessian);
   status = CAV_NO_MEMORY;
   if (!nlp) goto end;
-  if (!set_options(nlp, run)) {
+  if (!set_options(nlp, &p, iterations)) {
     status = conclude(&p, Invalid_Option, error);
     goto end;
   }
@@ -414,7 +579,9 @@ cav_status cav_ipopt(cav_solve_run *run, cav_error *error) {
       IpoptSolve(nlp, start, NULL, NULL, multiplier, multiplier + p.m, multiplier + p.m + p.n, &p);
   status = conclude(&p, code, error);
   // one that failed or was stopped gives its best iterate, with the multipliers that it started from
-  int best = code != Solve_Succeeded && code != Solved_To_Acceptable_Level && p.best_iteration >= 0;
+  int ended = code == Solve_Succeeded || code == Solved_To_Acceptable_Level ||
+              (iterations > 0 && code == Maximum_Iterations_Exceeded);
+  int best = !ended && p.best_iteration >= 0;
   if (!best) multipliers_of(&p, multiplier, 1);
   cav_transcription_move(tr, p.anchor, best ? p.best_x : start, run->at);
 end:
@@ -422,6 +589,84 @@ end:
   tr->difference = difference;
   if (nlp) FreeIpoptProblem(nlp);
   program_free(&p);
-  free(bound), free(start), free(multiplier), free(pattern);
+  free(bound), free(start), free(multiplier);
   return status;
+}
+
+/// Whether Hessians have the curvature of all rows: as asked, or where no contact makes it change within a millimetre.
+static int is_exact(const cav_solve_run *run) {
+  const char *hessian = option_given(run, hessian_option);
+  if (hessian && strcmp(hessian, "auto")) return !strcmp(hessian, "exact");
+  return !law_acts(run->problem->model);
+}
+
+/// Largest violation of all rows at run->at, with its costs.
+static cav_status measure(cav_solve_run *run, double *violation, double *cost) {
+  cav_status status = cav_transcription_values(run->tr, run->at);
+  *violation = fmax(cav_transcription_unactuated(run->tr, NULL), cav_transcription_violation(run->tr));
+  *cost = cav_transcription_cost(run->tr);
+  return status;
+}
+
+/// One stage, noted.
+static cav_status run_stage(cav_solve_run *run, double fraction, int exact, int iterations, cav_error *error) {
+  int begin = run->solution->iterations;
+  run->stage++;
+  cav_status status = solve_stage(run, exact, iterations, error);
+  cav_outcome outcome = status == CAV_OK              ? CAV_OUTCOME_SETTLED
+                        : status == CAV_NOT_CONVERGED ? CAV_OUTCOME_LIMIT
+                                                      : CAV_OUTCOME_STOPPED;
+  return cav_run_note(run, fraction, begin, outcome) ? status : CAV_NO_MEMORY;
+}
+
+static int goes_on(cav_status status) { return status == CAV_OK || status == CAV_NOT_CONVERGED; }
+
+/// After Gauss-Newton the exact Hessian, whose steps are right where contacts have settled and wild where they have not: kept
+/// if it converges, or if it leaves less violation or, with no more of it, less cost.
+static cav_status sharpen(cav_solve_run *run, int iterations, cav_status before, cav_error *error) {
+  double violation, cost, was_violation, was_cost;
+  cav_error mine = {0};
+  cav_trajectory *kept = cav_trajectory_copy(run->at);
+  if (!kept) return CAV_NO_MEMORY;
+  cav_status status = measure(run, &was_violation, &was_cost);
+  run->phase = "sharpening";
+  if (status == CAV_OK) status = run_stage(run, 1, 1, iterations, &mine);
+  if (goes_on(status)) {
+    cav_status trial = measure(run, &violation, &cost);
+    int better = violation <= fmax(acceptable, was_violation) && (was_violation > 10 * acceptable || cost < was_cost);
+    if (trial != CAV_OK || !better) {
+      cav_trajectory *swap = run->at;
+      run->at = kept, kept = swap;
+      status = before;
+    } else if (error) {
+      *error = mine;
+    }
+  }
+  cav_trajectory_free(kept);
+  return status;
+}
+
+cav_status cav_ipopt(cav_solve_run *run, cav_error *error) {
+  int acts = law_acts(run->problem->model), alone = run->options->solver == CAV_SOLVER_IPOPT && acts;
+  int stages = alone && !run->options->ipopt_derivative_test ? (run->problem->schedule.stages + 1) / STAGES_IN_ONE : 1;
+  int exact = is_exact(run), iterations = acts && !exact ? EXACT_ITERATIONS / run->problem->model->nv : 0;
+  const char *approximation = option_given(run, "hessian_approximation");
+  if (iterations < LEAST_EXACT_ITERATIONS || option_given(run, hessian_option) ||
+      (approximation && !strcmp(approximation, "limited-memory")))
+    iterations = 0;
+  cav_status status = CAV_OK;
+  run->stages = stages + (iterations > 0);
+  run->stage = 0;
+  run->phase = "continuation";
+  for (int i = 0; i < stages - 1 && goes_on(status); i++) {
+    double fraction = i / (stages - 1.0);
+    cav_error passing; // that a stage is left at its limit is its nature
+    cav_stage_set(run->problem, fraction, run->tr);
+    status = run_stage(run, fraction, exact, STAGE_ITERATIONS, &passing);
+  }
+  if (!goes_on(status)) return status;
+  run->phase = "ipopt";
+  if (run->options->solver == CAV_SOLVER_IPOPT) cav_stage_set(run->problem, 1, run->tr);
+  status = run_stage(run, 1, exact, 0, error);
+  return iterations > 0 && goes_on(status) ? sharpen(run, iterations, status, error) : status;
 }

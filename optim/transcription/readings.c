@@ -290,3 +290,52 @@ cav_status cav_readings_derivatives(const cav_transcription *tr, cav_scratch *s,
   if (status == CAV_NOT_SUPPORTED) return difference(tr, s, t, q, v, v_next);
   return status == CAV_OK ? sensors(tr, s, t, q, v, v_next) : status;
 }
+
+/// g += weighted rows of n readings from the first on, which are in place.
+static void fold(const cav_transcription *tr, const cav_scratch *s, int first, int n, const double *weight, double *g) {
+  int nv = tr->nv;
+  for (int i = first; i < first + n; i++) {
+    if (weight[i] == 0) continue;
+    rows row = rows_at(tr, s, i);
+    for (int j = 0; j < nv; j++) {
+      g[j] += weight[i] * row.dq[j];
+      g[nv + j] += weight[i] * row.dv[j];
+      g[2 * nv + j] += weight[i] * row.dn[j];
+    }
+  }
+}
+
+static int weighs(const double *weight, int n) {
+  for (int i = 0; i < n; i++)
+    if (weight[i] != 0) return 1;
+  return 0;
+}
+
+cav_status cav_readings_adjoint(const cav_transcription *tr, cav_scratch *s, int t, const double *weight, double *g) {
+  const cav_knot *knot = &tr->knot[t];
+  int nv = tr->nv, at = nv;
+  memset(g, 0, 3 * (size_t)nv * sizeof *g);
+  cav_status status = cav_derivatives(tr->model, s->state, s->dq, s->dv, s->dn);
+  if (status != CAV_OK) return status;
+  fold(tr, s, 0, nv, weight, g);
+  for (int k = 0; k < knot->ncontact; k++, at += CAV_CONTACT_READINGS) {
+    const cav_contact *c = weighs(weight + at, CAV_CONTACT_READINGS) ? find_contact(s->state, s->key + 2 * k) : NULL;
+    if (!c) continue;
+    rows out = rows_at(tr, s, at);
+    status = knot->moving[k] ? self_penetration_rows(tr, s, c, out) : contact_rows(tr, s, c, out);
+    if (status != CAV_OK) return status;
+    fold(tr, s, at, CAV_CONTACT_READINGS, weight, g);
+  }
+  for (int i = 0; i < tr->problem->nterm; i++) {
+    const cav_term *term = &tr->problem->term[i];
+    if (!speaks(tr, term, t)) continue;
+    int dim = cav_term_dim(term);
+    if (weighs(weight + at, dim)) {
+      status = sensor_rows(tr, s, term, t, rows_at(tr, s, at));
+      if (status == CAV_OK) fold(tr, s, at, dim, weight, g);
+      if (status != CAV_OK && status != CAV_NOT_SUPPORTED) return status;
+    }
+    at += dim;
+  }
+  return CAV_OK;
+}

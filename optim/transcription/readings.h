@@ -41,4 +41,13 @@ void cav_readings_values(const cav_transcription *transcription, cav_scratch *sc
 cav_status cav_readings_derivatives(const cav_transcription *transcription, cav_scratch *scratch, int t,
                                     const double *q, const double *v, const double *v_next);
 
+/// Turns rows [n*3nv] whose columns are of the knots beside into rows over the unknowns, across the seam of a cycle.
+/// transcription.c.
+void cav_transcription_wrap(const cav_transcription *transcription, cav_scratch *scratch, int t, int n, double *row);
+
+/// g [3nv] := sum of weight[i] times the derivative of reading i by (q, v, v_next), at the state's last evaluation; weight
+/// [nv + nread]. A contact that has gone and a sensor without analytic derivatives add nothing.
+cav_status cav_readings_adjoint(const cav_transcription *transcription, cav_scratch *scratch, int t,
+                                const double *weight, double *g);
+
 #endif

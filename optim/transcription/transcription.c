@@ -270,12 +270,11 @@ int cav_transcription_block(const cav_transcription *tr, int t, int c) {
   return block >= 0 && block < blocks ? block : -1;
 }
 
-/// Velocity that reaches knot t, and the one that leaves it: that of the next knot, or what closes the motion.
-static const double *velocity_at(const cav_transcription *tr, const cav_trajectory *at, int t) {
+const double *cav_velocity_at(const cav_transcription *tr, const cav_trajectory *at, int t) {
   return t == 0 && tr->periodicity ? tr->before : at->v + (size_t)t * tr->nv;
 }
 
-static const double *velocity_after(const cav_transcription *tr, const cav_trajectory *at, int t) {
+const double *cav_velocity_after(const cav_transcription *tr, const cav_trajectory *at, int t) {
   return t + 1 < tr->nknot ? at->v + (size_t)(t + 1) * tr->nv : tr->after;
 }
 
@@ -315,6 +314,11 @@ static void chain(const cav_transcription *tr, int t, int n, const double *dq, c
       if (before) times_rotation(tr, dn, now_rotation, 1, -inverse, out);
     }
   }
+}
+
+void cav_transcription_chain(const cav_transcription *tr, int t, int n, const double *row, double *out) {
+  for (int i = 0; i < n; i++, row += 3 * tr->nv, out += 3 * tr->nv)
+    chain(tr, t, 1, row, row + tr->nv, row + 2 * tr->nv, out);
 }
 
 // ---------------------------------------------------------------- evaluation
@@ -357,8 +361,7 @@ static cav_status shift_step(const cav_transcription *tr, cav_scratch *s, int t,
   return CAV_OK;
 }
 
-/// Turns rows [n*3nv] whose columns are of the knots beside into rows over the unknowns, across the seam of a cycle.
-static void periodicity_rows(const cav_transcription *tr, cav_scratch *s, int t, int n, double *row) {
+void cav_transcription_wrap(const cav_transcription *tr, cav_scratch *s, int t, int n, double *row) {
   size_t nv = (size_t)tr->nv;
   for (int i = 0; i < n; i++, row += 3 * nv) {
     for (int c = 0; c < 3; c++) {
@@ -375,10 +378,10 @@ static void periodicity_knot(const cav_transcription *tr, cav_scratch *s, int t)
   cav_knot *knot = &tr->knot[t];
   int width = 3 * tr->nv;
   double *H = knot->hessian;
-  periodicity_rows(tr, s, t, knot->ndense, knot->dense);
-  periodicity_rows(tr, s, t, 1, knot->gradient);
-  periodicity_rows(tr, s, t, 1, knot->step_row);
-  if (tr->keep_rows) periodicity_rows(tr, s, t, knot->layout.count, knot->slot_row);
+  cav_transcription_wrap(tr, s, t, knot->ndense, knot->dense);
+  cav_transcription_wrap(tr, s, t, 1, knot->gradient);
+  cav_transcription_wrap(tr, s, t, 1, knot->step_row);
+  if (tr->keep_rows) cav_transcription_wrap(tr, s, t, knot->layout.count, knot->slot_row);
   // the Hessian from both sides
   for (int side = 0; side < 2; side++) {
     for (int i = 0; i < width; i++)
@@ -387,7 +390,7 @@ static void periodicity_knot(const cav_transcription *tr, cav_scratch *s, int t)
         if (side == 0) H[i * width + j] = H[j * width + i];
         if (side == 1) H[i * width + j] = H[j * width + i], H[j * width + i] = x;
       }
-    periodicity_rows(tr, s, t, width, H);
+    cav_transcription_wrap(tr, s, t, width, H);
   }
   for (int i = 0; i < width; i++)
     for (int j = i + 1; j < width; j++) H[i * width + j] = 0;
@@ -397,8 +400,8 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   cav_transcription *tr = p->tr;
   cav_knot *knot = &tr->knot[t];
   int nv = tr->nv;
-  const double *q = p->at->q + (size_t)t * p->at->nq, *v = velocity_at(tr, p->at, t);
-  const double *v_next = velocity_after(tr, p->at, t);
+  const double *q = p->at->q + (size_t)t * p->at->nq, *v = cav_velocity_at(tr, p->at, t);
+  const double *v_next = cav_velocity_after(tr, p->at, t);
   s->state->options = tr->options;
 
   // dynamics, first beside the step where that is an unknown
@@ -448,7 +451,7 @@ static void prepare_rotation(const cav_transcription *tr, const double *v, doubl
 
 static void prepare_rotations(cav_transcription *tr, const cav_trajectory *at) {
   for (int t = tr->periodicity ? 0 : 1; t < tr->nknot; t++)
-    prepare_rotation(tr, velocity_at(tr, at, t), tr->knot[t].rotation);
+    prepare_rotation(tr, cav_velocity_at(tr, at, t), tr->knot[t].rotation);
   if (tr->periodicity) prepare_rotation(tr, tr->after, tr->rotation_after);
 }
 

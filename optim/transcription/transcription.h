@@ -144,6 +144,12 @@ cav_status cav_transcription_linearise(cav_transcription *transcription, cav_tra
 
 /// Adds the product of a knot's dense rows to its Hessian. One thread only. join.c. CAV_NO_MEMORY.
 cav_status cav_rows_join(cav_transcription *transcription, cav_knot *knot);
+/// Chains rows [n*3nv] over (q_t, v_t, v_{t+1}) to rows over the three neighbouring knots, at the last linearisation.
+void cav_transcription_chain(const cav_transcription *transcription, int t, int n, const double *row, double *out);
+
+/// Velocity that reaches knot t, and the one that leaves it: that of the next knot, or what closes the motion.
+const double *cav_velocity_at(const cav_transcription *transcription, const cav_trajectory *at, int t);
+const double *cav_velocity_after(const cav_transcription *transcription, const cav_trajectory *at, int t);
 
 /// Sums over knots of the last values.
 double cav_transcription_cost(const cav_transcription *transcription);
