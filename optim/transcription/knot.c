@@ -48,13 +48,18 @@ static int counts(const cav_transcription *tr, const int *key, const cav_term *t
   return term->body <= 0 || m->geom[pair->geom1].link == link || m->geom[pair->geom2].link == link;
 }
 
+int cav_knot_contact(const cav_transcription *tr, const int *key, const cav_term *term, int t, int k, int *first) {
+  contact_part part = contact_part_of(term->quantity);
+  *first = part.first;
+  return part.n > 0 && tr->knot[t].moving[k] == part.self && counts(tr, key, term, k) ? part.n : 0;
+}
+
 /// Rows of a cost at knot t, whose contacts are listed.
 static row_count cost_rows(const cav_transcription *tr, const int *key, const cav_term *term, int t) {
   const cav_knot *knot = &tr->knot[t];
   row_count n = {0};
   if (cav_term_weight(tr, term, t) == 0) return n;
-  int rate = term->quantity == CAV_QUANTITY_ACCELERATION;
-  contact_part part = contact_part_of(term->quantity);
+  int rate = term->quantity == CAV_QUANTITY_ACCELERATION, first;
   switch (term->quantity) {
     case CAV_QUANTITY_SENSOR:
       n.rows = n.dense = (size_t)cav_term_dim(term);
@@ -78,8 +83,7 @@ static row_count cost_rows(const cav_transcription *tr, const int *key, const ca
     case CAV_QUANTITY_IMPACT:
     case CAV_QUANTITY_SELF_PENETRATION:
     case CAV_QUANTITY_FORCE:
-      for (int k = 0; k < knot->ncontact; k++)
-        if (knot->moving[k] == part.self && counts(tr, key, term, k)) n.rows += (size_t)part.n;
+      for (int k = 0; k < knot->ncontact; k++) n.rows += (size_t)cav_knot_contact(tr, key, term, t, k, &first);
       n.dense = n.rows;
       break;
     case CAV_QUANTITY_TYPES:

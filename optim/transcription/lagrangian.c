@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "readings.h"
+#include "knot.h"
 
 /// Differences: of configurations, rad or m; of velocities that times the step.
 static const double shift = 1e-6;
@@ -44,7 +44,7 @@ static double force_of(const cav_force_row *form, const double *u) {
 }
 
 /// What costs of a knot pull its readings by.
-static void pull_costs(const cav_transcription *tr, int t, double factor, double *pull) {
+static void pull_costs(const cav_transcription *tr, const int *key, int t, double factor, double *pull) {
   const cav_knot *knot = &tr->knot[t];
   int sensor = CAV_CONTACT_READINGS * knot->ncontact;
   for (int i = 0; i < tr->problem->nterm; i++) {
@@ -56,6 +56,10 @@ static void pull_costs(const cav_transcription *tr, int t, double factor, double
       pull[tr->nv + sensor + k] += derivative_of(term, weight, knot->y[sensor + k], 1);
     for (int k = 0; k < tr->model->nu && term->quantity == CAV_QUANTITY_EFFORT && knot->has_force; k++)
       pull_force(&tr->effort[k], derivative_of(term, weight, force_of(&tr->effort[k], knot->u), term->scale), pull);
+    for (int k = 0; k < knot->ncontact && term->use == CAV_USE_COST; k++) {
+      int first, n = cav_knot_contact(tr, key, term, t, k, &first), at = CAV_CONTACT_READINGS * k + first;
+      for (int r = at; r < at + n; r++) pull[tr->nv + r] += derivative_of(term, weight, knot->y[r], term->scale);
+    }
     sensor += dim;
   }
 }
@@ -115,7 +119,7 @@ static cav_status curve_knot(const curve *c, cav_scratch *s, int t, double *room
   if (!cav_readings_list(tr, s, t)) return CAV_NO_MEMORY;
   double *pull = calloc(nv + (size_t)knot->nread, sizeof *pull);
   if (!pull) return CAV_NO_MEMORY;
-  pull_costs(tr, t, c->factor, pull);
+  pull_costs(tr, s->key, t, c->factor, pull);
   pull_rows(tr, t, pull);
   status = cav_readings_adjoint(tr, s, t, pull, base);
   memset(K, 0, width * width * sizeof *K);

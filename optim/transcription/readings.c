@@ -328,8 +328,7 @@ cav_status cav_readings_adjoint(const cav_transcription *tr, cav_scratch *s, int
   }
   for (int i = 0; i < tr->problem->nterm; i++) {
     const cav_term *term = &tr->problem->term[i];
-    if (!speaks(tr, term, t)) continue;
-    int dim = cav_term_dim(term);
+    int dim = cav_term_readings(tr, term, t);
     if (weighs(weight + at, dim)) {
       status = sensor_rows(tr, s, term, t, rows_at(tr, s, at));
       if (status == CAV_OK) fold(tr, s, at, dim, weight, g);
