@@ -13,7 +13,7 @@ extern "C" {
 // clang-format off
 #define CAV_SOLVERS(X)                                                                                             \
   X(GAUSS_NEWTON, gn, NONE, "own: continuation, trust region, augmented Lagrangian")                               \
-  X(IPOPT, ipopt, IPOPT, "Ipopt from the guess, by stages of the same schedule")                                        \
+  X(IPOPT, ipopt, IPOPT, "Ipopt from the guess, by stages of the same schedule")                                     \
   X(BOTH, both, IPOPT, "own, then Ipopt from its result")
 // clang-format on
 

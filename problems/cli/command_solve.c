@@ -205,9 +205,9 @@ static int solve(const cav_command_line *line, const cav_problem *problem, const
   race.options.observer = observe;
   race.options.observer_context = &tick;
   catch_interrupts();
-  // a start that is given is the only one; Ipopt alone knows no schedule
+  // a start that is given is the only one
   int most = line->resume ? 1 : line->strategies ? line->strategies : CAV_STRATEGIES;
-  status = cav_race_open(&race, most, line->solver != CAV_SOLVER_IPOPT, &error);
+  status = cav_race_open(&race, most, &error);
   if (!status) status = run_race(&race, line, &tick, &error);
   int best = status ? -1 : cav_race_best(&race, line->strategies > 1), done = CAV_EXIT_INTERNAL;
   if (best >= 0) {

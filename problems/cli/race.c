@@ -15,16 +15,14 @@
 #include "csv.h"
 #include "file.h"
 
-cav_status cav_race_open(cav_race *race, int most, int schedules, cav_error *error) {
+cav_status cav_race_open(cav_race *race, int most, cav_error *error) {
   cav_strategy strategy[CAV_STRATEGIES];
   int n = 0;
   cav_status status = cav_strategy_list(race->problem, strategy, &n);
   if (status) return cav_file_fail(error, status, 0, "strategies cannot be listed: %s", cav_status_name(status));
   race->n = 0;
-  for (int i = 0; i < n && race->n < most; i++) {
-    if (i > 0 && strategy[i].stated && !schedules) continue;
+  for (int i = 0; i < n && race->n < most; i++)
     race->entry[race->n++] = (cav_race_entry){.strategy = strategy[i], .answer = -1, .order = -1};
-  }
   return CAV_OK;
 }
 

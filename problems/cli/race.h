@@ -49,8 +49,8 @@ typedef struct cav_race {
   cav_race_entry entry[CAV_STRATEGIES];
 } cav_race;
 
-/// The strategies of the problem, at most as many; those that differ in the schedule alone only if asked.
-cav_status cav_race_open(cav_race *race, int most, int schedules, cav_error *error);
+/// The strategies of the problem, at most as many.
+cav_status cav_race_open(cav_race *race, int most, cav_error *error);
 
 /// Solves by the first strategy in this process. CAV_NO_MEMORY, CAV_BAD_INPUT and the like with the reason in error.
 cav_status cav_race_first(cav_race *race, cav_error *error);

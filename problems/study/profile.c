@@ -119,7 +119,7 @@ static void write_profile(FILE *out, int nrun, const cav_study_run *run, const i
 }
 
 static void write_drawing(FILE *out, int nmethod, const int used[CAV_STUDY_METHODS]) {
-  static const char *const label[] = {"own", "own, other strategies where needed", "Ipopt, Gauss-Newton Hessian",
+  static const char *const label[] = {"own", "own, other strategies where needed", "Ipopt, by stages",
                                       "Ipopt, limited memory", "own, then Ipopt"};
   fputs(
       "set terminal svg size 900,400 background 'white'\nset output 'profile.svg'\nset datafile separator ','\n"

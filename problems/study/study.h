@@ -9,8 +9,8 @@ enum { CAV_STUDY_STARTS = 10 };
 typedef enum cav_study_method {
   CAV_STUDY_OWN,        ///< Gauss-Newton of our own
   CAV_STUDY_STRATEGIES, ///< the same, and other strategies one after the other until one is certified
-  CAV_STUDY_IPOPT,      ///< Ipopt with the Gauss-Newton Hessian, from the guess
-  CAV_STUDY_LIMITED,    ///< Ipopt with limited memory, from the guess
+  CAV_STUDY_IPOPT,      ///< Ipopt from the guess, by stages of the same schedule
+  CAV_STUDY_LIMITED,    ///< the same with limited memory
   CAV_STUDY_BOTH,       ///< own, then Ipopt
   CAV_STUDY_METHODS
 } cav_study_method;
