@@ -144,6 +144,7 @@ cav_status cav_transcription_linearise(cav_transcription *transcription, cav_tra
 
 /// Adds the product of a knot's dense rows to its Hessian. One thread only. join.c. CAV_NO_MEMORY.
 cav_status cav_rows_join(cav_transcription *transcription, cav_knot *knot);
+
 /// Chains rows [n*3nv] over (q_t, v_t, v_{t+1}) to rows over the three neighbouring knots, at the last linearisation.
 void cav_transcription_chain(const cav_transcription *transcription, int t, int n, const double *row, double *out);
 
