@@ -326,35 +326,12 @@ static const cav_xml_element actuator = {"actuator", 0, 0, NULL, actuator_childr
 // --- sensors ---
 
 #define READING REAL("cutoff"), SKIP("noise"), SKIP("user")
-#define SENSOR(id, target) LEAF(sensor_##id, #id, NAMED("name"), NEEDED(target), READING)
-SENSOR(jointpos, "joint");
-SENSOR(jointvel, "joint");
-SENSOR(ballquat, "joint");
-SENSOR(ballangvel, "joint");
-SENSOR(jointlimitpos, "joint");
-SENSOR(jointlimitvel, "joint");
-SENSOR(jointlimitfrc, "joint");
-SENSOR(subtreecom, "body");
-SENSOR(subtreelinvel, "body");
-SENSOR(subtreeangmom, "body");
-SENSOR(touch, "site");
-SENSOR(accelerometer, "site");
-SENSOR(velocimeter, "site");
-SENSOR(gyro, "site");
-SENSOR(force, "site");
-SENSOR(torque, "site");
-SENSOR(magnetometer, "site");
-SENSOR(rangefinder, "site");
-SENSOR(tendonpos, "tendon");
-SENSOR(tendonvel, "tendon");
-SENSOR(tendonlimitpos, "tendon");
-SENSOR(tendonlimitvel, "tendon");
-SENSOR(tendonlimitfrc, "tendon");
-SENSOR(actuatorpos, "actuator");
-SENSOR(actuatorvel, "actuator");
-SENSOR(actuatorfrc, "actuator");
-LEAF(sensor_clock, "clock", NAMED("name"), READING);
-
+static const cav_xml_attribute of_joint[] = {NAMED("name"), NEEDED("joint"), READING, END};
+static const cav_xml_attribute of_body[] = {NAMED("name"), NEEDED("body"), READING, END};
+static const cav_xml_attribute of_site[] = {NAMED("name"), NEEDED("site"), READING, END};
+static const cav_xml_attribute of_tendon[] = {NAMED("name"), NEEDED("tendon"), READING, END};
+static const cav_xml_attribute of_actuator[] = {NAMED("name"), NEEDED("actuator"), READING, END};
+static const cav_xml_attribute of_nothing[] = {NAMED("name"), READING, END};
 static const cav_xml_attribute place_attributes[] = {
     NAMED("name"), {"objtype", CAV_XML_WORD, 0, 0, objects, 1}, NEEDED("objname"), READING, END};
 static const cav_xml_attribute referred_attributes[] = {NAMED("name"),
@@ -364,57 +341,29 @@ static const cav_xml_attribute referred_attributes[] = {NAMED("name"),
                                                         NAMED("refname"),
                                                         READING,
                                                         END};
-#define FRAME_SENSOR(id, attributes) static const cav_xml_element sensor_##id = {#id, 0, 0, attributes, NULL, 0}
-FRAME_SENSOR(framepos, referred_attributes);
-FRAME_SENSOR(framequat, referred_attributes);
-FRAME_SENSOR(framexaxis, referred_attributes);
-FRAME_SENSOR(frameyaxis, referred_attributes);
-FRAME_SENSOR(framezaxis, referred_attributes);
-FRAME_SENSOR(framelinvel, referred_attributes);
-FRAME_SENSOR(frameangvel, referred_attributes);
-FRAME_SENSOR(framelinacc, place_attributes);
-FRAME_SENSOR(frameangacc, place_attributes);
 UNREAD(sensor_user, "user");
 
-static const cav_xml_element *const sensor_children[] = {&sensor_jointpos,
-                                                         &sensor_jointvel,
-                                                         &sensor_ballquat,
-                                                         &sensor_ballangvel,
-                                                         &sensor_jointlimitpos,
-                                                         &sensor_jointlimitvel,
-                                                         &sensor_jointlimitfrc,
-                                                         &sensor_subtreecom,
-                                                         &sensor_subtreelinvel,
-                                                         &sensor_subtreeangmom,
-                                                         &sensor_touch,
-                                                         &sensor_accelerometer,
-                                                         &sensor_velocimeter,
-                                                         &sensor_gyro,
-                                                         &sensor_force,
-                                                         &sensor_torque,
-                                                         &sensor_magnetometer,
-                                                         &sensor_rangefinder,
-                                                         &sensor_tendonpos,
-                                                         &sensor_tendonvel,
-                                                         &sensor_tendonlimitpos,
-                                                         &sensor_tendonlimitvel,
-                                                         &sensor_tendonlimitfrc,
-                                                         &sensor_actuatorpos,
-                                                         &sensor_actuatorvel,
-                                                         &sensor_actuatorfrc,
-                                                         &sensor_clock,
-                                                         &sensor_framepos,
-                                                         &sensor_framequat,
-                                                         &sensor_framexaxis,
-                                                         &sensor_frameyaxis,
-                                                         &sensor_framezaxis,
-                                                         &sensor_framelinvel,
-                                                         &sensor_frameangvel,
-                                                         &sensor_framelinacc,
-                                                         &sensor_frameangacc,
-                                                         &sensor_user,
-                                                         &include,
-                                                         NULL};
+// attributes by what a sensor looks at; frames, by what it reads
+#define OF_NONE(reads) of_nothing
+#define OF_BODY(reads) of_body
+#define OF_SITE(reads) of_site
+#define OF_SCALAR_JOINT(reads) of_joint
+#define OF_BALL_JOINT(reads) of_joint
+#define OF_LIMITED_JOINT(reads) of_joint
+#define OF_TENDON(reads) of_tendon
+#define OF_LIMITED_TENDON(reads) of_tendon
+#define OF_ACTUATOR(reads) of_actuator
+#define OF_FRAME(reads) OF_FRAME_##reads
+#define OF_FRAME_POSITION referred_attributes
+#define OF_FRAME_VELOCITY referred_attributes
+#define OF_FRAME_ACCELERATION place_attributes
+#define SENSOR_ELEMENT(type, name, dim, target, reads, text) \
+  [CAV_SENSOR_##type] = {name, 0, 0, OF_##target(reads), NULL, 0},
+#define SENSOR_CHILD(type, ...) &sensor_elements[CAV_SENSOR_##type],
+static const cav_xml_element sensor_elements[CAV_SENSOR_TYPES] = {CAV_SENSORS(SENSOR_ELEMENT)};
+// clang-format off
+static const cav_xml_element *const sensor_children[] = {CAV_SENSORS(SENSOR_CHILD) &sensor_user, &include, NULL};
+// clang-format on
 static const cav_xml_element sensor = {"sensor", 0, 0, NULL, sensor_children, 0};
 
 // --- keyframes ---
