@@ -96,6 +96,35 @@ static void check_defaults(void) {
   cav_problem_free(NULL);
 }
 
+/// Every quantity is a cost by its element, and a constraint where the table says so and nowhere else; read, written and read.
+static void check_quantities(void) {
+  for (cav_quantity k = 0; k < CAV_QUANTITY_TYPES; k++) {
+    const cav_quantity_rule *rule = cav_quantity_rule_of(k);
+    const char *what = k == CAV_QUANTITY_SENSOR ? " type='framepos' site='eye'" : "";
+    char text[600];
+    snprintf(text, sizeof text,
+             HEAD "<cost><%s name='it' weight='2' scale='3' norm='absolute' from='.2' to='.4'%s/></cost>" TAIL,
+             rule->name, what);
+    cav_problem *p = load(text), *back = NULL;
+    if (p && CHECK(cav_problem_write(copy_path, p, NULL, NULL) == CAV_OK))
+      back = cav_problem_load(copy_path, NULL, NULL);
+    for (int i = 0; p && CHECK(back != NULL) && i < 2; i++) {
+      const cav_term *term = find(i ? back : p, "it");
+      CHECK(term && term->quantity == k && term->weight == 2 && term->scale == 3 && term->from == .2 && term->to == .4);
+      CHECK(term && term->norm == CAV_NORM_ABSOLUTE && term->use == CAV_USE_COST);
+    }
+    cav_problem_free(p), cav_problem_free(back);
+    snprintf(text, sizeof text, HEAD "<constraint><%s name='it' lower='1'%s/></constraint>" TAIL, rule->name, what);
+    write_in("problem.xml", text);
+    cav_error error = {0};
+    p = cav_problem_load(path, NULL, &error);
+    CHECK((p != NULL) == rule->hard);
+    if (p) CHECK(find(p, "it")->quantity == k && find(p, "it")->use == CAV_USE_RANGE);
+    if (!p) CHECK(error.status == CAV_BAD_INPUT && strstr(error.text, rule->name));
+    cav_problem_free(p);
+  }
+}
+
 static void check_words(void) {
   cav_problem *p = load(
       "<problem name='&lt;q&gt;' model='leg.xml'>\n"
@@ -640,6 +669,7 @@ int main(void) {
   write_in("robot.urdf", turntable);
   check_defaults();
   check_words();
+  check_quantities();
   check_postures();
   check_scene();
   check_trajectory_ends();
