@@ -205,7 +205,7 @@ static void test_every_point_is_read(void) {
   for (int k = 0; k < knot->ncontact; k++) read += knot->y[CAV_CONTACT_READINGS * k + CAV_CONTACT_READINGS - 1];
   for (int i = 0; i < state->ncontact; i++) {
     const cav_contact *c = &state->contact[i];
-    borne += c->impulse[0] / (tr->h * tr->weight);
+    borne += c->impulse[0] / (tr->options.timestep * tr->weight);
     // several points of some pairs, in the order of pairs and features
     if (i > 0) CHECK(c->pair > c[-1].pair || (c->pair == c[-1].pair && c->feature > c[-1].feature));
     several += i > 0 && c->pair == c[-1].pair;

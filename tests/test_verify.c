@@ -133,6 +133,7 @@ static sample sample_new(const char *text, int last, double h, cav_order order) 
                             .effort_limit = 1};
   s.law = s.model->options;
   s.law.order = order;
+  s.law.timestep = h;
   s.law.stabilisation = CAV_STABILISATION_DISCRETE;
   s.law.softness = 0.01;
   return s;
@@ -678,6 +679,11 @@ static void test_refusals(void) {
   CHECK(cav_verify(&s.problem, s.motion, &s.law, NULL, NULL, &s.verdict, &error) == CAV_BAD_INPUT);
   CHECK(strstr(error.text, "step") != NULL);
   s.motion->timestep = 0.02;
+  // a law at another step than the knots': its softness would be another
+  s.law.timestep = 0.01;
+  CHECK(cav_verify(&s.problem, s.motion, &s.law, NULL, NULL, &s.verdict, &error) == CAV_BAD_INPUT);
+  CHECK(strstr(error.text, "law") != NULL && strstr(error.text, "0.01 s") != NULL);
+  s.law.timestep = 0.02;
   // no number
   knot(&s, 5)[1] = NAN;
   CHECK(cav_verify(&s.problem, s.motion, &s.law, NULL, NULL, &s.verdict, &error) == CAV_NOT_FINITE);

@@ -474,7 +474,8 @@ CAV_API const cav_field *cav_option_fields(int *n);
 CAV_API cav_status cav_options_check(const cav_options *options, cav_error *error);
 
 /// The same of any struct by its table of n fields; what: how the text calls it.
-CAV_API cav_status cav_fields_check(const cav_field *field, int n, const void *values, const char *what, cav_error *error);
+CAV_API cav_status cav_fields_check(const cav_field *field, int n, const void *values, const char *what,
+                                    cav_error *error);
 
 /// Arrays of a model, X(type, name, number): the members and their place in the model's memory follow from this list.
 #define CAV_MODEL_ARRAYS(X)                                       \
@@ -499,7 +500,7 @@ CAV_API cav_status cav_fields_check(const cav_field *field, int n, const void *v
 typedef struct cav_model {
   const char *name;
   int nq, nv, nu;  ///< sizes of q, v and of the control vector (one per actuator)
-  double timestep; ///< s
+  double timestep; ///< s, of the file: where options.timestep starts, which evaluations use
   double gravity[3];
   double density, viscosity, wind[3]; ///< of the medium: kg/m^3, kg/(m s), m/s; both 0: none
   double magnetic[3];                 ///< field that magnetometers read, world

@@ -144,7 +144,7 @@ typedef struct cav_equations {
 } cav_equations;
 
 /// Fails as cav_solve does where the problem or its guess cannot be evaluated. structure.c.
-cav_status cav_problem_equations(const cav_problem *problem, cav_equations *equations, cav_error *error);
+CAV_API cav_status cav_problem_equations(const cav_problem *problem, cav_equations *equations, cav_error *error);
 
 /// Solves from the problem's guess, or from start if not NULL. CAV_NOT_CONVERGED and CAV_INTERRUPTED leave the best iterate in
 /// the solution; NULL in *solution only where error says so.

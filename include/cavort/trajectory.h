@@ -12,7 +12,7 @@ extern "C" {
 /// u[t] = inverse(q[t], v[t], v[t+1]); the last row of u uses the velocity that closes the motion (optim/METHOD.md, 1).
 typedef struct cav_trajectory {
   int nq, nv, nknot;
-  double timestep; ///< s
+  double timestep; ///< s; the law that a motion obeys is at the same step
   double *q;       ///< [nknot*nq]
   double *v;       ///< [nknot*nv]
   double *u;       ///< [nknot*nv], N or N m

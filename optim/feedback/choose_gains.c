@@ -45,7 +45,7 @@ cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription 
   for (int i = 0; i < trials && status == CAV_OK && (first || !done(&best)); i++) {
     outcome now;
     cav_options law = tr->options;
-    cav_stage_law(problem, trial[i].fraction, tr->h, &law);
+    cav_stage_law(problem, trial[i].fraction, tr->options.timestep, &law);
     status = cav_feedback(tr, at, &law, &trial[i].penalty, gain, gain + n);
     // a regulator that does not exist is no reason to give up the motion
     if (status == CAV_NOT_CONVERGED || status == CAV_NOT_FINITE) status = CAV_OK;

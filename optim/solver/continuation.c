@@ -40,7 +40,7 @@ static double between(double from, double to, double s) {
 }
 
 void cav_stage_set(const cav_problem *problem, double x, cav_transcription *tr) {
-  cav_stage_law(problem, x, tr->h, &tr->options);
+  cav_stage_law(problem, x, tr->options.timestep, &tr->options);
   tr->penalty = penalised;
   tr->penalty.effort = between(penalised.effort, PENALTY_RISE * penalised.effort, x);
   tr->penalty.range = between(penalised.range, PENALTY_RISE * penalised.range, x);

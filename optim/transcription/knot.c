@@ -301,7 +301,7 @@ static void keep_reading(cav_sum *a, int i, int reading) {
 static int velocity_entries(const cav_transcription *tr, int step, int d, int base, int has_previous, double scale,
                             int *column, double *entry) {
   int n = 0, nv = tr->nv, k = tr->rotation_of[d];
-  double s = scale / tr->h;
+  double s = scale / tr->options.timestep;
   if (k < 0) {
     column[n] = base + d, entry[n++] = s;
     if (has_previous) column[n] = base - nv + d, entry[n++] = -s;
@@ -335,7 +335,7 @@ static void add_velocity(cav_sum *a, const cav_term *term, double weight, const 
 static int acceleration_entries(const cav_sum *a, int d, double scale, int *column, double *entry) {
   const cav_transcription *tr = a->tr;
   int n = 0, t = a->t, here = cav_knot_moves(tr, t);
-  scale /= tr->h;
+  scale /= tr->options.timestep;
   if (here) n = velocity_entries(tr, t, d, tr->nv, cav_knot_moves(tr, t - 1), -scale, column, entry);
   if (t + 1 < tr->nknot) n += velocity_entries(tr, t + 1, d, 2 * tr->nv, here, scale, column + n, entry + n);
   return n;
@@ -350,7 +350,7 @@ static void add_acceleration(cav_sum *a, const cav_term *term, double weight, co
   for (int d = 0; d < tr->nv; d++) {
     if (!cav_dof_selected(tr, term, d)) continue;
     int n = acceleration_entries(a, d, 1 / term->scale, column, entry);
-    double r = ((v_next[d] - v[d]) / tr->h - goal[d]) / term->scale, w = weight;
+    double r = ((v_next[d] - v[d]) / tr->options.timestep - goal[d]) / term->scale, w = weight;
     begin_cost(a, term, 1, &w, &r);
     add_sparse(a, w, r, n, column, entry);
   }
@@ -528,7 +528,7 @@ static void add_costs(cav_sum *a, const double *q, const double *v, const double
   assert(reading == a->knot->nread);
   // the duration's own penalty
   if (!has_duration(tr, a->t)) return;
-  double duration = (tr->nknot - 1) * tr->h;
+  double duration = (tr->nknot - 1) * tr->options.timestep;
   begin_row(a, tr->problem->duration_weight, duration);
   add_sparse(a, tr->problem->duration_weight, duration, 0, NULL, NULL);
 }
@@ -605,14 +605,14 @@ static void add_force_slots(cav_sum *a, const double *q, const double *v) {
   const cav_transcription *tr = a->tr;
   int i = a->knot->layout.unactuated, active;
   if (!a->knot->has_force) return;
-  double rho = tr->h * tr->penalty.unactuated;
+  double rho = tr->options.timestep * tr->penalty.unactuated;
   for (int k = 0; k < tr->nresidual; k++) {
     keep_force(a, i, &tr->unactuated[k]);
     double e = slot_residual(a, i++, form_value(&tr->unactuated[k], a->knot->u), 0, 0, rho, &active);
     add_force(a, rho, e, &tr->unactuated[k]);
   }
   assert(i == a->knot->layout.effort);
-  rho = tr->h * tr->penalty.effort;
+  rho = tr->options.timestep * tr->penalty.effort;
   for (int k = 0; k < tr->model->nu; k++) {
     const double *range = tr->effort_range[k];
     const cav_servo *servo = &tr->servo[k];
@@ -642,7 +642,7 @@ static int add_hard_dofs(cav_sum *a, const cav_term *term, int i, double lower, 
   for (int d = 0; d < tr->nv; d++) {
     if (!cav_dof_selected(tr, term, d)) continue;
     int n = 0;
-    double measured = rate ? (v_next[d] - v[d]) / tr->h : v[d];
+    double measured = rate ? (v_next[d] - v[d]) / tr->options.timestep : v[d];
     double value = (posture ? a->s->tangent[d] : measured - a->s->tangent[d]) / term->scale;
     if (here && posture) n = posture_entries(tr, a->s->tangent, d, 1 / term->scale, column, entry);
     if (rate) n = acceleration_entries(a, d, 1 / term->scale, column, entry);
@@ -715,7 +715,7 @@ void cav_knot_sum(cav_sum *a, const double *q, const double *v, const double *v_
   if (!tr->constraints_only) add_costs(a, q, v, v_next);
   knot->cost = knot->merit;
   add_force_slots(a, q, v);
-  add_ranges(a, q, tr->h * tr->penalty.range);
+  add_ranges(a, q, tr->options.timestep * tr->penalty.range);
   add_hard_terms(a, q, v, v_next);
   // every pass begins the same rows, or the derivatives by the step would pair residuals of different ones
   assert(a->row == knot->nrow);

@@ -25,7 +25,7 @@ static void read_contact(const cav_transcription *tr, const cav_contact *c, doub
     y[0] = fmax(-c->dist, 0);
     return;
   }
-  double fraction = sqrt(fmax(c->impulse[0], 0) / (tr->h * tr->weight));
+  double fraction = sqrt(fmax(c->impulse[0], 0) / (tr->options.timestep * tr->weight));
   y[0] = fraction * fmax(c->dist, 0);
   y[1] = c->dim > 1 ? fraction * c->velocity_next[1] : 0;
   y[2] = c->dim > 1 ? fraction * c->velocity_next[2] : 0;
@@ -83,7 +83,7 @@ int cav_readings_list(cav_transcription *tr, cav_scratch *s, int t) {
     for (int k = 0; k < s->state->ncontact; k++) {
       const cav_contact *c = &s->state->contact[k];
       int self = !tr->model->pair[c->pair].external;
-      if (self ? c->dist > 0 : c->impulse[0] < contact_floor * tr->h * tr->weight) continue;
+      if (self ? c->dist > 0 : c->impulse[0] < contact_floor * tr->options.timestep * tr->weight) continue;
       moving[ncontact] = (char)self;
       s->key[2 * ncontact] = c->pair;
       s->key[2 * ncontact++ + 1] = c->feature;
@@ -159,7 +159,7 @@ static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s
                               .impulse_dv_next = at + 25 * n};
   cav_status status = cav_contact_derivatives(tr->model, s->state, (int)(c - s->state->contact), &d);
   if (status != CAV_OK) return status;
-  double fraction = sqrt(fmax(c->impulse[0], 0) / (tr->h * tr->weight));
+  double fraction = sqrt(fmax(c->impulse[0], 0) / (tr->options.timestep * tr->weight));
   double half = c->impulse[0] > 0 ? 0.5 * fraction / c->impulse[0] : 0;
   for (int k = 0; k < 4; k++) {
     int row = k == 3 ? 0 : k, gap = k == 0, given = gap || row < c->dim;
@@ -173,7 +173,7 @@ static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s
       out.dn[k * nv + j] = half * value * d.impulse_dv_next[j] + fraction * by_next;
     }
   }
-  double unit = c->impulse[0] > 0 ? 1 / (tr->h * tr->weight) : 0;
+  double unit = c->impulse[0] > 0 ? 1 / (tr->options.timestep * tr->weight) : 0;
   for (int j = 0; j < nv; j++) {
     out.dq[4 * nv + j] = unit * d.impulse_dq[j];
     out.dv[4 * nv + j] = unit * d.impulse_dv[j];

@@ -33,7 +33,7 @@ double cav_term_weight(const cav_transcription *tr, const cav_term *term, int t)
   if (tr->periodicity && t == 0 && first == 0 && last == tr->nknot - 1 && term->use == CAV_USE_COST &&
       !reads_force(term))
     return 0;
-  return t >= first && t <= last ? tr->h : 0;
+  return t >= first && t <= last ? tr->options.timestep : 0;
 }
 
 /// Readings of a term: none but for sensors.

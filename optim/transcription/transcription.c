@@ -158,7 +158,7 @@ static int knot_new(cav_transcription *tr, int t) {
   cav_knot *knot = &tr->knot[t];
   int ok = 1;
   size_t n = (size_t)tr->nv;
-  knot->time = t * tr->h;
+  knot->time = t * tr->options.timestep;
   knot->has_force = t < tr->nknot - 1 || (tr->problem->close_at_rest && !tr->periodicity);
   knot->layout = layout_of(tr, t);
   knot->slot = room(&ok, (size_t)knot->layout.count, sizeof *knot->slot);
@@ -195,7 +195,6 @@ cav_transcription *cav_transcription_new(const cav_problem *problem, int threads
   tr->problem = problem;
   tr->model = problem->model;
   tr->nv = problem->model->nv;
-  tr->h = problem->timestep;
   tr->nknot = (int)lround(problem->duration / problem->timestep) + 1;
   // unknowns and entries of their rows are counted in int
   if ((double)tr->nknot * tr->nv > INT_MAX / 4) goto memory;
@@ -203,7 +202,7 @@ cav_transcription *cav_transcription_new(const cav_problem *problem, int threads
   tr->weight = problem->model->mass * sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
   if (!(tr->weight > 0)) tr->weight = problem->model->mass > 0 ? problem->model->mass : 1;
   tr->options = problem->model->options;
-  tr->options.timestep = tr->h;
+  tr->options.timestep = problem->timestep;
   tr->options.order = problem->order;
   tr->derivative = CAV_DERIVATIVE_ANALYTIC;
   tr->pool = cav_parallel_new(threads);
@@ -297,7 +296,7 @@ static void chain(const cav_transcription *tr, int t, int n, const double *dq, c
   const double *now_rotation = tr->knot[t].rotation,
                *next_rotation = t < last ? tr->knot[t + 1].rotation : tr->rotation_after;
   int here = cav_knot_moves(tr, t), before = cav_knot_moves(tr, t - 1), next = cav_knot_moves(tr, t + 1);
-  double inverse = 1 / tr->h;
+  double inverse = 1 / tr->options.timestep;
   if (n == 0) return;
   memset(out, 0, (size_t)n * 3 * nv * sizeof(double));
   for (int i = 0; i < n; i++, dq += nv, dv += nv, dn += nv, out += 3 * nv) {
@@ -344,13 +343,13 @@ static cav_status shift_step(const cav_transcription *tr, cav_scratch *s, int t,
   cav_knot *knot = &tr->knot[t];
   double fraction = exp(shifted == 1 ? -CAV_STEP_FRACTION : CAV_STEP_FRACTION), *v_here = s->rate,
          *v_then = s->rate + tr->nv;
-  near.h *= fraction;
   for (int d = 0; d < tr->nv; d++) {
     v_here[d] = v[d] / (t > 0 || tr->periodicity ? fraction : 1); // that of a given start stays
     v_then[d] = v_next[d] / fraction;
   }
-  s->state->options.timestep *= fraction;
-  s->state->options.time_constant *= fraction;
+  near.options.timestep *= fraction;
+  near.options.time_constant *= fraction;
+  s->state->options = near.options;
   cav_status status = cav_inverse(tr->model, s->state, q, v_here, v_then, knot->u);
   if (status == CAV_OK) cav_readings_values(&near, s, t);
   s->state->options = tr->options;
@@ -442,7 +441,7 @@ static void evaluate_item(void *context, int t, int member) {
 static void prepare_rotation(const cav_transcription *tr, const double *v, double *rotation) {
   for (int k = 0; k < tr->nrotation; k++) {
     double *J = rotation + CAV_ROTATION_SIZE * k;
-    for (int c = 0; c < 3; c++) J[18 + c] = tr->h * v[tr->rotation_dof[k] + c];
+    for (int c = 0; c < 3; c++) J[18 + c] = tr->options.timestep * v[tr->rotation_dof[k] + c];
     cav_rotation_jacobian_inverse(J + 18, J);
     for (int r = 0; r < 3; r++)
       for (int c = 0; c < 3; c++) J[9 + 3 * r + c] = J[3 * c + r];
@@ -458,8 +457,8 @@ static void prepare_rotations(cav_transcription *tr, const cav_trajectory *at) {
 /// The step of the trajectory, and the velocities at its ends.
 static void prepare_ends(cav_transcription *tr, const cav_trajectory *at) {
   const double *first = at->v + tr->nv, *last = at->v + (size_t)(tr->nknot - 1) * tr->nv;
-  if (at->timestep != tr->h) tr->options.time_constant *= at->timestep / tr->h;
-  tr->h = tr->options.timestep = at->timestep;
+  if (at->timestep != tr->options.timestep) tr->options.time_constant *= at->timestep / tr->options.timestep;
+  tr->options.timestep = at->timestep;
   memset(tr->after, 0, (size_t)tr->nv * sizeof(double));
   if (tr->periodicity) {
     cav_periodicity_tangent(tr->periodicity, -1, last, tr->before);
@@ -542,9 +541,9 @@ double cav_transcription_violation(const cav_transcription *tr) {
 
 /// Weight that evaluate gave the row.
 static double slot_rho(const cav_transcription *tr, const cav_slot_layout *at, int i) {
-  if (i < at->effort) return tr->h * tr->penalty.unactuated;
-  if (i < at->joint) return tr->h * tr->penalty.effort;
-  if (i < at->term) return tr->h * tr->penalty.range;
+  if (i < at->effort) return tr->options.timestep * tr->penalty.unactuated;
+  if (i < at->joint) return tr->options.timestep * tr->penalty.effort;
+  if (i < at->term) return tr->options.timestep * tr->penalty.range;
   return tr->penalty.term;
 }
 

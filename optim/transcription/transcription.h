@@ -84,7 +84,6 @@ typedef struct cav_transcription {
   const cav_model *model;
   int nv, nknot; ///< unknown blocks are knots 1 .. nknot-1
   int free_step; ///< 1: one more unknown after them, the logarithm of the step over that of the trajectory
-  double h;      ///< of the last trajectory
   cav_periodicity *periodicity; ///< cycles: from one period to the next; else NULL
   double *before, *after;       ///< [nv] velocity at knot 0 (cycles), and after the last one
   double *rotation_after;       ///< [nturn*CAV_ROTATION_SIZE] of the step after the last knot, in cycles
@@ -105,7 +104,7 @@ typedef struct cav_transcription {
   double slack_effort, slack_range; ///< how far constraints_only lets these rows pass their planned bounds
   int gradient_only;                ///< linearisations leave the Hessians unfinished
   int keep_rows;                    ///< slot_row of the knots is filled by linearisations
-  cav_options options;              ///< contact law of this stage
+  cav_options options;              ///< contact law of this stage; its timestep is the step of the last trajectory
   cav_knot *knot;                   ///< [nknot]
   struct cav_scratch *scratch;      ///< one a thread
   cav_parallel *pool;

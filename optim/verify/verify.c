@@ -93,6 +93,9 @@ static cav_status admit(const cav_problem *problem, const cav_trajectory *trajec
   }
   if (!(problem->timestep > 0) || !(trajectory->timestep > 0))
     return fail(error, CAV_BAD_INPUT, "the steps of the problem and of the trajectory must be positive");
+  if (!(fabs(contact->timestep - trajectory->timestep) <= 1e-9 * trajectory->timestep))
+    return fail(error, CAV_BAD_INPUT, "the claimed law is at a step of %.9g s, the trajectory's is %.9g s",
+                contact->timestep, trajectory->timestep);
   long knots = lround(problem->duration / problem->timestep) + 1;
   if (trajectory->nknot < 2 || trajectory->nknot != knots) {
     return fail(error, CAV_BAD_INPUT, "the trajectory has %d knots, the problem asks for %ld", trajectory->nknot,
