@@ -199,9 +199,9 @@ cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_trans
     region->seconds_linear += now() - start;
     if (!(region->radius > 0)) region->radius = d.cauchy_norm;
 
-    // a Newton step that requires no more than rounding is the end
-    double promised = bend(&d, normal->gradient, INFINITY);
-    if (promised <= noise * merit) {
+    // a Newton step that predicts no more than rounding is the end
+    double predicted = bend(&d, normal->gradient, INFINITY);
+    if (predicted <= noise * merit) {
       region->settled = 1;
       fresh = 0;
       break;
@@ -216,7 +216,7 @@ cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_trans
       *spare = swap;
     }
     if (status != CAV_OK) break;
-    region->stalled = t.length < collapse * d.newton_norm || (!fresh && promised > region->tolerance * merit);
+    region->stalled = t.length < collapse * d.newton_norm || (!fresh && predicted > region->tolerance * merit);
     // a good step that only the radius held back says nothing about the end
     int held = t.grown && t.length < 0.99 * d.newton_norm;
     calm = t.decrease < region->tolerance * merit && !held ? calm + 1 : 0;

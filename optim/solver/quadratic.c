@@ -16,7 +16,7 @@
 /// Iterations at most; part of the way to the boundary that a step goes; fraction of the cost that the gap
 /// starts with, and with what it starts again.
 enum { ITERATIONS = 60 };
-static const double boundary = 0.995, first_gap[] = {0.1, 1e4};
+static const double boundary = 0.995, first_gap[] = {0.1, 1e3, 1e6};
 enum { STARTS = sizeof first_gap / sizeof *first_gap };
 
 /// Entries up to which a row is added by itself.

@@ -2,9 +2,9 @@
 /// metric of the costs' Gauss-Newton Hessian.
 ///
 /// Each iteration solves the programme of quadratic.c in a box, whose rows have exact penalties (Fletcher 1985: S-l1-QP), and
-/// takes its step where cost plus penalties fall by a fraction of what the programme required; a step that misses the rows by their
+/// takes its step where cost plus penalties fall by a fraction of what the programme predicted; a step that misses the rows by their
 /// curvature is corrected once in the same metric (Maratos). Penalties are above every multiplier, row by row. The end is where
-/// the programme requires next to nothing: its tolerance over the cost is how optimal the motion is, in the full box.
+/// the programme predicts next to nothing: its prediction over the cost is how optimal the motion is, in the full box.
 #include "sqp.h"
 
 #include <math.h>
@@ -18,10 +18,11 @@
 enum { ITERATIONS = 120, RAISES = 5, SETTLING = 20 };
 static const double first_radius = 0.1, most_radius = 0.7, least_radius = 1e-7;
 
-/// Shares of the cost: tolerance that ends a run; tolerance that ends it if it is not kept; gap of a programme. Smallest cost that counts as a scale.
+/// Fractions of the cost: predicted decrease that ends a run; one that ends it if it does not come true; gap of a programme. Smallest
+/// cost that counts as a scale.
 static const double stationary = 1e-9, predicted_enough = 1e-6, gap_fraction = 1e-11, least_cost = 1e-6;
 
-/// Decreases of the cost below this share, so many in a row, end a run.
+/// Decreases of the cost below this fraction, so many in a row, end a run.
 static const double slow = 1e-5;
 enum { PATIENCE = 3 };
 
@@ -168,8 +169,8 @@ static cav_status solve_model(cav_solve_run *run, descent *d, double radius) {
   }
 }
 
-/// Costs, rows and their model at run->at: Gauss-Newton's while that keeps its tolerance, then with the Lagrangian's curvature, which is
-/// found anew where the last one has not kept it.
+/// Costs, rows and their model at run->at: Gauss-Newton's while its predictions come true, then with the Lagrangian's curvature, which is
+/// found anew where the last one's have not.
 static cav_status model(cav_solve_run *run, descent *d) {
   int poor = fabs(d->ratio - 1) > 0.2;
   cav_status status = CAV_OK;
