@@ -102,7 +102,7 @@ int main(void) {
     for (int i = 0; i < tr->knot[t].layout.count; i++) tr->knot[t].slot[i].final_multiplier = uniform();
   static const double fraction[] = {0, 0.5};
   for (int i = 0; i < 2; i++) {
-    cav_stage_law(problem, fraction[i], tr->h, &tr->options);
+    cav_stage_law(problem, fraction[i], tr->options.timestep, &tr->options);
     for (int factor = 0; factor < 2; factor++) {
       double with = mismatch(tr, normal, at, beside, factor, 1), without = mismatch(tr, normal, at, beside, factor, 0);
       printf("%g of the way, costs times %d: %.1e off, without curvature %.1e\n", fraction[i], factor, with, without);

@@ -245,7 +245,7 @@ static Bool lagrangian_hessian(int n, double *x, Bool fresh, double factor, int 
   }
   if (!evaluate(p, x, 1) || !gather_hessian(p, factor, multiplier)) return 0;
   cav_normal_entries(p->run->normal, NULL, NULL, value);
-  if (!p->exact) cav_normal_shift_entries(p->run->normal, 1, p->damping * tr->h, 0, value);
+  if (!p->exact) cav_normal_shift_entries(p->run->normal, 1, p->damping * tr->options.timestep, 0, value);
   return !tr->free_step || step_hessian(p, x, factor, multiplier, entries, value);
 }
 

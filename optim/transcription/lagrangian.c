@@ -125,7 +125,7 @@ static cav_status curve_knot(const curve *c, cav_scratch *s, int t, double *room
   memset(K, 0, width * width * sizeof *K);
   for (int j = 0; j < 3 * tr->nv && status == CAV_OK; j++) {
     if (!kind_moves(tr, t, j / tr->nv)) continue;
-    double distance = j < tr->nv ? shift : shift / tr->h;
+    double distance = j < tr->nv ? shift : shift / tr->options.timestep;
     status = adjoint_beside(c, s, t, j, distance, pull, moved, K + (size_t)j * width);
     // contact points of a pair may come and go on one side
     if (status == CAV_NOT_SUPPORTED) {
