@@ -47,7 +47,12 @@ static double inside(const cav_field *field, int k) {
 static void test_tables(void) {
   int n, nstage;
   const cav_field *field = cav_option_fields(&n), *stage = cav_stage_fields(&nstage);
-  CHECK(n == 16 && nstage == 8);
+  size_t size = 0, stage_size = 0;
+  for (int i = 0; i < n; i++) size += field[i].type == CAV_FIELD_REAL ? sizeof(double) : sizeof(int);
+  for (int i = 0; i < nstage; i++) stage_size += stage[i].type == CAV_FIELD_REAL ? sizeof(double) : sizeof(int);
+  // but for what aligns doubles
+  CHECK(sizeof(cav_options) - size < (size_t)n * sizeof(int) &&
+        sizeof(cav_stage_options) - stage_size < sizeof(double));
   for (int i = 0; i < n + nstage; i++) {
     const cav_field *f = i < n ? field + i : stage + (i - n);
     CHECK(*f->name && *f->text);
@@ -63,8 +68,9 @@ static void test_refused(void) {
   if (!CHECK(m != NULL)) return;
   cav_state *state = cav_state_new(m);
   double *v = scene_vector(m->nv), *u = scene_vector(m->nv), *same = scene_vector(m->nv);
-  int n, refused = 0;
+  int n, refused = 0, flags = 0;
   const cav_field *field = cav_option_fields(&n);
+  for (int i = 0; i < n; i++) flags += field[i].type == CAV_FIELD_FLAG;
   const cav_options own = state->options;
   CHECK(own.timestep == m->timestep && cav_options_check(&own, NULL) == CAV_OK);
   CHECK(cav_inverse(m, state, m->q0, v, v, same) == CAV_OK);
@@ -84,7 +90,7 @@ static void test_refused(void) {
     }
   }
   printf("%d options outside their table, all refused\n", refused);
-  CHECK(refused == 3 * n - 6 * 3);
+  CHECK(refused == 3 * (n - flags));
   cav_state_free(state);
   cav_model_free(m);
   free(v), free(u), free(same);
@@ -92,6 +98,7 @@ static void test_refused(void) {
 
 /// A change of any one option is told from none.
 static void test_same(void) {
+  static const char *const velocity_options[] = {"order", "sliding", "gravity", "passive"};
   int n;
   const cav_field *field = cav_option_fields(&n);
   cav_options a = {0};
@@ -102,8 +109,8 @@ static void test_same(void) {
     CHECK(cav_options_same(&a, &b, CAV_STAGE_VELOCITY));
     set(&b, &field[i], inside(&field[i], 1));
     CHECK(!cav_options_same(&a, &b, CAV_STAGE_VELOCITY));
-    int late =
-        !strcmp(field[i].name, "order") || !strcmp(field[i].name, "gravity") || !strcmp(field[i].name, "passive");
+    int late = 0;
+    for (int k = 0; k < 4; k++) late |= !strcmp(field[i].name, velocity_options[k]);
     CHECK(cav_options_same(&a, &b, CAV_STAGE_POSITION) == late);
   }
 }

@@ -27,7 +27,7 @@ static size_t room_of(const cav_transcription *tr) {
   return 18 * nv * nv + 9 * nv + (size_t)tr->model->nq;
 }
 
-/// Slope of a cost of weight times norm of a reading by the reading.
+/// Derivative of a cost of weight times norm of a reading by the reading.
 static double derivative_of(const cav_term *term, double weight, double reading, double unit) {
   double x = reading / unit;
   return weight * (term->norm == CAV_NORM_ABSOLUTE ? x / sqrt(1 + x * x) : x) / unit;
