@@ -93,7 +93,7 @@ static void gain_and_bias(const cav_actuator *a, double length, double velocity,
   *bias = bias_of(a, length, velocity);
 }
 
-static double clamp(double x, const double range[2]) { return fmin(fmax(x, range[0]), range[1]); }
+static double clamp_to(double x, const double range[2]) { return fmin(fmax(x, range[0]), range[1]); }
 
 // limits of the force; those of the model are in units of effort
 static void force_limits(const cav_actuator *a, double range[2]) {
@@ -122,7 +122,7 @@ double cav_actuator_force(const cav_model *model, int actuator, double length, d
   gain_and_bias(a, length, velocity, &gain, &bias);
   force_limits(a, most);
   input_limits(a, inputs);
-  return clamp(gain * clamp(input, inputs) + bias, most);
+  return clamp_to(gain * clamp_to(input, inputs) + bias, most);
 }
 
 int cav_actuator_input(const cav_model *model, int actuator, double length, double velocity, double force,
@@ -133,9 +133,9 @@ int cav_actuator_input(const cav_model *model, int actuator, double length, doub
   force_limits(a, most);
   input_limits(a, inputs);
   // an actuator that cannot push at all is best left alone
-  double wanted = gain != 0 ? (clamp(force, most) - bias) / gain : 0;
-  *input = clamp(wanted, inputs);
-  double reached = clamp(gain * *input + bias, most), scale = fabs(force) + fabs(bias);
+  double wanted = gain != 0 ? (clamp_to(force, most) - bias) / gain : 0;
+  *input = clamp_to(wanted, inputs);
+  double reached = clamp_to(gain * *input + bias, most), scale = fabs(force) + fabs(bias);
   return fabs(reached - force) <= 1e-9 * scale;
 }
 

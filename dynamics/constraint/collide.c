@@ -137,7 +137,7 @@ double cav_contact_activation(const cav_state *state, const cav_pair *pair) {
 }
 
 // a geom that moves as a shape, once it is placed
-static void turn(const cav_state *state, struct cav_geom_cache *cache, int i) {
+static void refresh_rotation(const cav_state *state, struct cav_geom_cache *cache, int i) {
   slot *s = cache->slot + i;
   copy3(s->shape.pos, cache->centre[i]);
   matmul3(s->shape.rotation, state->link[s->geom->link].rotation, s->geom->rotation);
@@ -152,7 +152,7 @@ static void place(const cav_state *state, struct cav_geom_cache *cache) {
     const cav_pose *link = state->link + s->geom->link;
     transform(cache->centre[i], link->pos, link->rotation, s->geom->pos);
     s->turned = 0;
-    if (s->geom->type == CAV_GEOM_PLANE) turn(state, cache, i);
+    if (s->geom->type == CAV_GEOM_PLANE) refresh_rotation(state, cache, i);
   }
 }
 
@@ -169,7 +169,7 @@ static inline int near(const struct cav_geom_cache *cache, const candidate *c, d
 
 // the geom as a shape, its rotation formed at the first request
 static const cav_shape *shape_of(const cav_state *state, struct cav_geom_cache *cache, int i) {
-  if (!cache->slot[i].turned) turn(state, cache, i);
+  if (!cache->slot[i].turned) refresh_rotation(state, cache, i);
   return &cache->slot[i].shape;
 }
 

@@ -30,7 +30,7 @@ static void points(const cav_state *state, const cav_equality *e, cav_equality_r
 }
 
 // x = s Im(conj(q2) q1), its rate s/2 Im(conj(q2) w q1) with w = w1 - w2 in world axes
-static void turn(const cav_state *state, const cav_equality *e, cav_equality_rows *eq) {
+static void weld_rotation(const cav_state *state, const cav_equality *e, cav_equality_rows *eq) {
   double frame[2][4], between[4];
   for (int k = 0; k < 2; k++) quat_mul(frame[k], state->link[e->link[k]].quat, e->quat[k]);
   quat_conjugate(frame[1], frame[1]);
@@ -101,7 +101,7 @@ void cav_equality_evaluate(const cav_model *model, cav_state *state) {
     eq->dim = e->dim;
     switch (e->type) {
       case CAV_EQUALITY_WELD:
-        turn(state, e, eq);
+        weld_rotation(state, e, eq);
         points(state, e, eq);
         break;
       case CAV_EQUALITY_CONNECT:

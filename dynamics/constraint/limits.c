@@ -24,7 +24,7 @@ static const double FADING = 0.3, CORE = 0.5, STIFFNESS_RATIO_MIN = 1e-12;
 
 static double larger(double a, double b) { return a > b ? a : b; }
 
-static double clamp(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
+static double clamp_between(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
 
 // sigmoid of solimp on [0, 1]: a power on either side of the midpoint, meeting there with equal derivative
 static double sigmoid(double x, double midpoint, double power) {
@@ -36,12 +36,13 @@ static double sigmoid(double x, double midpoint, double power) {
 
 // impedance d(x) of solimp at a violation x
 static double impedance(const double solimp[5], double x) {
-  double d0 = clamp(solimp[0], IMPEDANCE_MIN, IMPEDANCE_MAX), dw = clamp(solimp[1], IMPEDANCE_MIN, IMPEDANCE_MAX);
+  double d0 = clamp_between(solimp[0], IMPEDANCE_MIN, IMPEDANCE_MAX),
+         dw = clamp_between(solimp[1], IMPEDANCE_MIN, IMPEDANCE_MAX);
   double width = solimp[2];
   if (d0 == dw || width <= R_MIN) { return 0.5 * (d0 + dw); }
   if (x >= width) { return dw; }
   if (x <= 0) { return d0; }
-  double y = sigmoid(x / width, clamp(solimp[3], IMPEDANCE_MIN, IMPEDANCE_MAX), larger(1, solimp[4]));
+  double y = sigmoid(x / width, clamp_between(solimp[3], IMPEDANCE_MIN, IMPEDANCE_MAX), larger(1, solimp[4]));
   return d0 + y * (dw - d0);
 }
 
@@ -55,13 +56,14 @@ static double sigmoid_derivative(double x, double midpoint, double power) {
 void cav_law_rates(const cav_state *state, const cav_softness *softness, double gap, double *regulariser,
                    double *stiffness) {
   const double *solimp = softness->solimp;
-  double d0 = clamp(solimp[0], IMPEDANCE_MIN, IMPEDANCE_MAX), dw = clamp(solimp[1], IMPEDANCE_MIN, IMPEDANCE_MAX);
+  double d0 = clamp_between(solimp[0], IMPEDANCE_MIN, IMPEDANCE_MAX),
+         dw = clamp_between(solimp[1], IMPEDANCE_MIN, IMPEDANCE_MAX);
   double width = solimp[2];
   *regulariser = *stiffness = 0;
   if (state->options.stabilisation == CAV_STABILISATION_DISCRETE) { return; }
   if (d0 == dw || width <= R_MIN || -gap >= width || gap >= 0) { return; }
   double derivative =
-      sigmoid_derivative(-gap / width, clamp(solimp[3], IMPEDANCE_MIN, IMPEDANCE_MAX), larger(1, solimp[4]));
+      sigmoid_derivative(-gap / width, clamp_between(solimp[3], IMPEDANCE_MIN, IMPEDANCE_MAX), larger(1, solimp[4]));
   double d = impedance(solimp, -gap), rate = -derivative / width * (dw - d0);
   // R goes with (1 - d)/d, hK with d
   *regulariser = -rate / (d * (1 - d));
@@ -71,7 +73,7 @@ void cav_law_rates(const cav_state *state, const cav_softness *softness, double 
 // by solref and solimp; violation x >= 0
 static cav_law solref_law(const cav_state *state, const cav_softness *softness, double x, double weight) {
   double h = state->options.timestep, d = impedance(softness->solimp, x);
-  double dw = clamp(softness->solimp[1], IMPEDANCE_MIN, IMPEDANCE_MAX);
+  double dw = clamp_between(softness->solimp[1], IMPEDANCE_MIN, IMPEDANCE_MAX);
   double kappa = softness->solref[0], zeta = softness->solref[1];
   cav_law l = {larger(R_MIN, (1 - d) / d * weight), 0, 0};
   if (kappa > 0) {

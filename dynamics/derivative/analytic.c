@@ -66,7 +66,7 @@ static cav_derivative_store *derivatives_new(const cav_model *model) {
   return s;
 }
 
-static cav_derivative_store *prepare(const cav_model *model, cav_state *state) {
+static cav_derivative_store *store_ready(const cav_model *model, cav_state *state) {
   cav_workspace *w = state->work;
   if (!w->derivatives) w->derivatives = derivatives_new(model);
   cav_derivative_store *s = w->derivatives;
@@ -634,7 +634,7 @@ cav_status cav_derivatives(const cav_model *model, cav_state *state, double *du_
   if (cav_derivatives_missing(model)) return CAV_NOT_SUPPORTED;
   // laws that hang on all rows together
   if (state->options.regulariser == CAV_REGULARISER_EXACT || state->options.coupled) return CAV_NOT_SUPPORTED;
-  cav_derivative_store *s = prepare(model, state);
+  cav_derivative_store *s = store_ready(model, state);
   if (!s) return CAV_NO_MEMORY;
   int nv = model->nv;
   task t = {.model = model,

@@ -121,7 +121,7 @@ static void find_alignment(const cav_contact *c, geometry *g) {
   memset(g->tangent, 0, sizeof g->tangent);
 }
 
-static cav_status measure(const cav_model *model, const cav_state *state, const cav_contact *c, geometry *g) {
+static cav_status contact_geometry(const cav_model *model, const cav_state *state, const cav_contact *c, geometry *g) {
   const cav_pair *pair = &model->pair[c->pair];
   const cav_geom *first = &model->geom[pair->geom1], *second = &model->geom[pair->geom2];
   cav_status status = CAV_OK;
@@ -283,7 +283,7 @@ cav_status cav_contact_differentiate(const cav_model *model, const cav_state *st
   derivative->idle = !whole && is_flat(c, H);
   if (derivative->idle) return CAV_OK;
   geometry g;
-  cav_status status = measure(model, state, c, &g);
+  cav_status status = contact_geometry(model, state, c, &g);
   if (status != CAV_OK) return status;
   motion now, next;
   move(state, c, state->velocity, cav_takes_mean(state) ? state->velocity_next : NULL, &now);

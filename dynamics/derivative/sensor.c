@@ -141,7 +141,7 @@ typedef struct part {
   double V[6];   ///< about its centre of mass
 } part;
 
-static int measure(const task *t, int index, int root, part *p) {
+static int subtree_part(const task *t, int index, int root, part *p) {
   if (index == 0 || !cav_descends(t->model, index, root)) return 0;
   p->body = &t->model->body[index];
   int link = p->body->link;
@@ -166,7 +166,7 @@ static whole weigh(const task *t, int root) {
   whole s = {0};
   part p;
   for (int i = root; i < t->model->nbody; i++) {
-    if (!measure(t, i, root, &p)) continue;
+    if (!subtree_part(t, i, root, &p)) continue;
     s.mass += p.body->mass;
     axpy3(s.com, s.com, p.body->mass, p.pose.pos);
     axpy3(s.velocity, s.velocity, p.body->mass, p.V + 3);
@@ -218,7 +218,7 @@ static void subtree(const task *t, const cav_sensor *sensor) {
   whole s = weigh(t, sensor->object);
   part p;
   for (int i = sensor->object; i < t->model->nbody; i++) {
-    if (!measure(t, i, sensor->object, &p)) continue;
+    if (!subtree_part(t, i, sensor->object, &p)) continue;
     for (int j = last_dof(t->model, p.body->link); j >= 0; j = t->model->dof[j].parent) {
       body_column(t, sensor, &p, &s, j);
     }

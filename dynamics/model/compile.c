@@ -70,7 +70,7 @@ typedef struct carver {
   size_t used;
 } carver;
 
-static void *take(carver *c, int n, size_t size) {
+static void *carve_array(carver *c, int n, size_t size) {
   size_t at = (c->used + 15) & ~(size_t)15;
   assert(n >= 0 && size <= SIZE_MAX / 4 / ((size_t)n + 1));
   c->used = at + (size_t)n * size;
@@ -90,16 +90,16 @@ static size_t text_bytes(const cav_spec *spec) {
 static void carve_model(cav_builder *b, carver *c) {
   const cav_model *m = b->model;
   size_t text = text_bytes(b->spec);
-  cav_model *at = take(c, 1, sizeof *at);
+  cav_model *at = carve_array(c, 1, sizeof *at);
   if (at) *at = *m;
   b->model = at ? at : b->model;
-#define TAKE(type, name, count) b->name = take(c, m->count, sizeof *b->name);
+#define TAKE(type, name, count) b->name = carve_array(c, m->count, sizeof *b->name);
   CAV_MODEL_ARRAYS(TAKE)
 #undef TAKE
-  b->assets = take(c, 1, cav_put_assets(b->spec, NULL, b->model));
-  b->keys = take(c, m->nkey, (size_t)(m->nq + m->nv) * sizeof *b->keys);
-  b->warning = take(c, m->nwarning, sizeof *b->warning);
-  b->text = take(c, 1, text);
+  b->assets = carve_array(c, 1, cav_put_assets(b->spec, NULL, b->model));
+  b->keys = carve_array(c, m->nkey, (size_t)(m->nq + m->nv) * sizeof *b->keys);
+  b->warning = carve_array(c, m->nwarning, sizeof *b->warning);
+  b->text = carve_array(c, 1, text);
   b->text_end = b->text ? b->text + text : NULL;
 }
 

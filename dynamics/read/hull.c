@@ -354,7 +354,7 @@ static int by_place(const void *a, const void *b) {
   return p->point - q->point;
 }
 
-static double turn(const planar *p, const planar *q, const planar *r) {
+static double planar_orientation(const planar *p, const planar *q, const planar *r) {
   return (q->x - p->x) * (r->y - p->y) - (q->y - p->y) * (r->x - p->x);
 }
 
@@ -366,7 +366,7 @@ static int chain(planar *sorted, int n, double slack, planar *loop) {
     int base = count;
     for (int i = 0; i < n; i++) {
       const planar *p = &sorted[pass ? n - 1 - i : i];
-      while (count >= base + 2 && turn(&loop[count - 2], &loop[count - 1], p) <= slack) count--;
+      while (count >= base + 2 && planar_orientation(&loop[count - 2], &loop[count - 1], p) <= slack) count--;
       loop[count++] = *p;
     }
     count--;

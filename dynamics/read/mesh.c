@@ -39,7 +39,7 @@ __attribute__((format(printf, 3, 4))) static void fail(text *t, cav_status statu
 
 // --- growing lists ---
 
-static int grow(text *t, void **list, int *room, int n, size_t size) {
+static int list_grow(text *t, void **list, int *room, int n, size_t size) {
   if (n < *room) return 1;
   int more = 2 * *room + 256;
   void *moved = realloc(*list, (size_t)more * size);
@@ -54,13 +54,15 @@ static int grow(text *t, void **list, int *room, int n, size_t size) {
 
 static void push_vertex(text *t, cav_triangles *m, const double x[3]) {
   if (m->nvertex >= VERTEX_LIMIT) fail(t, CAV_BAD_INPUT, "more than %d vertices; make the mesh coarser", VERTEX_LIMIT);
-  if (t->status != CAV_OK || !grow(t, (void **)&m->vertex, &t->vertex_room, m->nvertex, 3 * sizeof(double))) return;
+  if (t->status != CAV_OK || !list_grow(t, (void **)&m->vertex, &t->vertex_room, m->nvertex, 3 * sizeof(double)))
+    return;
   copy3(m->vertex + 3 * m->nvertex++, x);
 }
 
 static void push_triangle(text *t, cav_triangles *m, int a, int b, int c) {
   if (m->ntriangle >= VERTEX_LIMIT) fail(t, CAV_BAD_INPUT, "more than %d triangles; make it coarser", VERTEX_LIMIT);
-  if (t->status != CAV_OK || !grow(t, (void **)&m->triangle, &t->triangle_room, m->ntriangle, 3 * sizeof(int))) return;
+  if (t->status != CAV_OK || !list_grow(t, (void **)&m->triangle, &t->triangle_room, m->ntriangle, 3 * sizeof(int)))
+    return;
   int *v = m->triangle + 3 * m->ntriangle++;
   v[0] = a;
   v[1] = b;

@@ -94,7 +94,7 @@ static cav_xml_node *find(cav_xml_node *node, const char *kind, const char *name
 }
 
 /// Takes out what refers to what is gone; returns whether there was such a thing.
-static int follow(omission *o, cav_xml_node *root) {
+static int remove_referring(omission *o, cav_xml_node *root) {
   static const char *const sections[] = {"tendon", "actuator", "sensor", "equality", "contact"};
   int found = 0;
   for (cav_xml_node *section = root->child; section; section = section->next) {
@@ -130,7 +130,7 @@ cav_status cav_xml_remove(cav_xml *xml, const cav_xml_node *scene, cav_error *er
     lose_all(&o, found);
     unlink_node(found);
   }
-  while (status == CAV_OK && o.n > 0 && follow(&o, root)) continue;
+  while (status == CAV_OK && o.n > 0 && remove_referring(&o, root)) continue;
   if (o.failed) status = cav_xml_fail_as(error, CAV_NO_MEMORY, scene, NULL, "not enough memory");
   free(o.item);
   return status;

@@ -20,7 +20,7 @@ static void body_motion(const cav_state *state, const cav_body *body, const cav_
   rotate(spin, pose->rotation, w);
 }
 
-static subtree measure(const cav_model *model, const cav_state *state, int root) {
+static subtree subtree_motion(const cav_model *model, const cav_state *state, int root) {
   subtree s = {0};
   double origin[3] = {0, 0, 0};
   for (int pass = 0; pass < 2; pass++) {
@@ -120,7 +120,7 @@ static void sense_frame(const cav_model *model, const cav_state *state, const ca
 }
 
 static void sense_subtree(const cav_model *model, const cav_state *state, const cav_sensor *sensor, double *out) {
-  subtree s = measure(model, state, sensor->object);
+  subtree s = subtree_motion(model, state, sensor->object);
   copy3(out, sensor->type == CAV_SENSOR_SUBTREECOM      ? s.com
              : sensor->type == CAV_SENSOR_SUBTREELINVEL ? s.velocity
                                                         : s.momentum);

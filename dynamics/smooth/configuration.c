@@ -27,7 +27,7 @@ void cav_configuration_normalise(const cav_model *model, double *q) {
 }
 
 // q_next = q exp(h w)
-static void turn(const double *q, const double *w, double h, double *q_next) {
+static void quat_advance(const double *q, const double *w, double h, double *q_next) {
   double angle[3], step[4];
   scale3(angle, h, w);
   quat_exp(step, angle);
@@ -43,10 +43,10 @@ void cav_integrate(const cav_model *model, const double *q, const double *v, dou
     switch (joint->type) {
       case CAV_JOINT_FREE:
         axpy3(b, a, h, s);
-        turn(a + 3, s + 3, h, b + 3);
+        quat_advance(a + 3, s + 3, h, b + 3);
         break;
       case CAV_JOINT_BALL:
-        turn(a, s, h, b);
+        quat_advance(a, s, h, b);
         break;
       default:
         b[0] = a[0] + h * s[0];
@@ -64,11 +64,11 @@ void cav_configuration_perturb(const cav_model *model, int dof, double step, dou
   }
   double w[3] = {0, 0, 0};
   w[joint->type == CAV_JOINT_FREE ? k - 3 : k] = 1;
-  turn(q + turning, w, step, q + turning);
+  quat_advance(q + turning, w, step, q + turning);
 }
 
 // w = log(a^-1 b) / h
-static void turn_between(const double *a, const double *b, double h, double *w) {
+static void quat_rate(const double *a, const double *b, double h, double *w) {
   double from[4], to[4], between[4];
   quat_conjugate(from, a);
   memcpy(to, b, sizeof to);
@@ -88,10 +88,10 @@ void cav_difference(const cav_model *model, const double *q0, const double *q1, 
       case CAV_JOINT_FREE:
         sub3(s, b, a);
         scale3(s, 1 / h, s);
-        turn_between(a + 3, b + 3, h, s + 3);
+        quat_rate(a + 3, b + 3, h, s + 3);
         break;
       case CAV_JOINT_BALL:
-        turn_between(a, b, h, s);
+        quat_rate(a, b, h, s);
         break;
       default:
         s[0] = (b[0] - a[0]) / h;

@@ -21,7 +21,7 @@
 
 enum { DOUBLES_PER_LINK = 3 + 6 + 6 + 6 + 10 + 6, DOUBLES_PER_DOF = 6 + 12 + 12 };
 
-static double *take(double **at, size_t n) {
+static double *carve_numbers(double **at, size_t n) {
   double *piece = *at;
   *at += n;
   return piece;
@@ -29,16 +29,16 @@ static double *take(double **at, size_t n) {
 
 static void carve(cav_half_step *half, double sign, double **at, size_t nlink, size_t nv, size_t nq) {
   half->sign = sign;
-  half->com = take(at, 3 * nlink);
-  half->inertia = take(at, 6 * nlink);
-  half->velocity = take(at, 6 * nlink);
-  half->momentum = take(at, 6 * nlink);
-  half->composite = take(at, 10 * nlink);
-  half->whole = take(at, 6 * nlink);
-  half->axis = take(at, 6 * nv);
-  half->by_q = take(at, 12 * nv);
-  half->by_v = take(at, 12 * nv);
-  half->q = take(at, nq);
+  half->com = carve_numbers(at, 3 * nlink);
+  half->inertia = carve_numbers(at, 6 * nlink);
+  half->velocity = carve_numbers(at, 6 * nlink);
+  half->momentum = carve_numbers(at, 6 * nlink);
+  half->composite = carve_numbers(at, 10 * nlink);
+  half->whole = carve_numbers(at, 6 * nlink);
+  half->axis = carve_numbers(at, 6 * nv);
+  half->by_q = carve_numbers(at, 12 * nv);
+  half->by_v = carve_numbers(at, 12 * nv);
+  half->q = carve_numbers(at, nq);
 }
 
 cav_status cav_half_steps_new(const cav_model *model, cav_state *state) {
@@ -54,9 +54,9 @@ cav_status cav_half_steps_new(const cav_model *model, cav_state *state) {
   double *at = (double *)(half_steps->after.link + n);
   carve(&half_steps->before, -1, &at, n, nv, nq);
   carve(&half_steps->after, 1, &at, n, nv, nq);
-  half_steps->v = take(&at, nv);
-  half_steps->missing = take(&at, 6 * n);
-  half_steps->inner = take(&at, 6 * n);
+  half_steps->v = carve_numbers(&at, nv);
+  half_steps->missing = carve_numbers(&at, 6 * n);
+  half_steps->inner = carve_numbers(&at, 6 * n);
   assert((char *)at == (char *)half_steps + bytes);
   // the world stays where it is
   half_steps->before.link[0] = half_steps->after.link[0] = state->link[0];

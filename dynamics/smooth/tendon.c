@@ -96,7 +96,7 @@ static double add_wrapped(const cav_state *state, const cav_tendon_path_point *v
 }
 
 // length of one string; row [nv] is scratch
-static double follow(const cav_model *model, cav_state *state, const cav_tendon *t, double *row) {
+static double tendon_path_length(const cav_model *model, cav_state *state, const cav_tendon *t, double *row) {
   const cav_tendon_path_point *path = &model->tendon_path[t->path];
   double length = 0, scale = 1;
   for (int e = t->dof; e < t->dof + t->ndof; e++) { row[model->tendon_dof[e]] = 0; }
@@ -126,7 +126,7 @@ void cav_tendon_lengths(const cav_model *model, cav_state *state) {
     state->tendon_length[i] = length;
   }
   for (int i = 0; i < w->nstring; i++) {
-    state->tendon_length[w->string[i]] = follow(model, state, &model->tendon[w->string[i]], w->scratch);
+    state->tendon_length[w->string[i]] = tendon_path_length(model, state, &model->tendon[w->string[i]], w->scratch);
   }
 }
 

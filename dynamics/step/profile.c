@@ -40,7 +40,7 @@ static void run_velocities(probe *p) {
 static void run_whole(probe *p) { cav_inverse(p->model, p->state, p->q, p->v, p->v_next, p->state->u); }
 
 // seconds of one call, positions and velocities being there
-static double measure(probe *p, void (*run)(probe *)) {
+static double stage_seconds(probe *p, void (*run)(probe *)) {
   double best = INFINITY;
   for (int k = 0; k < RUNS; k++) {
     run_whole(p);
@@ -59,12 +59,12 @@ cav_status cav_profile_inverse(const cav_model *model, cav_state *state, const d
   if (status != CAV_OK) { return status; }
   int bounded = w->nlimit + w->nfriction + w->ntendon_limit + w->ntendon_friction > 0;
   int held = state->ncontact + state->nrow + state->nequality > 0;
-  *profile = (cav_profile){.poses = measure(&p, run_poses), .motion = measure(&p, run_motion)};
-  if (bounded) { profile->rows = measure(&p, run_rows); }
-  if (model->npair > 0) { profile->contacts = measure(&p, run_contacts); }
-  if (model->nequality > 0) { profile->equalities = measure(&p, run_equalities); }
-  if (state->ncontact > 0) { profile->laws = measure(&p, run_laws); }
-  if (held) { profile->impulses = fmax(0, measure(&p, run_velocities) - profile->motion); }
-  profile->whole = measure(&p, run_whole);
+  *profile = (cav_profile){.poses = stage_seconds(&p, run_poses), .motion = stage_seconds(&p, run_motion)};
+  if (bounded) { profile->rows = stage_seconds(&p, run_rows); }
+  if (model->npair > 0) { profile->contacts = stage_seconds(&p, run_contacts); }
+  if (model->nequality > 0) { profile->equalities = stage_seconds(&p, run_equalities); }
+  if (state->ncontact > 0) { profile->laws = stage_seconds(&p, run_laws); }
+  if (held) { profile->impulses = fmax(0, stage_seconds(&p, run_velocities) - profile->motion); }
+  profile->whole = stage_seconds(&p, run_whole);
   return cav_inverse(model, state, q, v, v_next, state->u);
 }

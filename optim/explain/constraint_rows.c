@@ -25,7 +25,7 @@ typedef struct list {
   double *force; ///< [nv] scratch
 } list;
 
-static double excess(const cav_slot *slot) {
+static double slot_excess(const cav_slot *slot) {
   return fmax(fmax(slot->lower - slot->value, slot->value - slot->upper), 0);
 }
 
@@ -144,7 +144,7 @@ static int list_rows(list *all, const double allowed[CAV_BINDING_KINDS]) {
       origin_of(tr, t, i, &b);
       b.allowed = allowed[b.kind];
       b.multiplier = slot->final_multiplier;
-      if (excess(slot) <= b.allowed && fabs(slot->final_multiplier) <= floor_fraction * largest) continue;
+      if (slot_excess(slot) <= b.allowed && fabs(slot->final_multiplier) <= floor_fraction * largest) continue;
       if (!list_add(all, &(listed){b, i})) return 0;
     }
   }

@@ -44,7 +44,7 @@ typedef struct inquiry {
   double pulls;
 } inquiry;
 
-static double excess(const cav_binding *row) {
+static double binding_excess(const cav_binding *row) {
   double e = fmax(fmax(row->lower - row->value, row->value - row->upper), 0);
   return e > row->allowed ? e : 0;
 }
@@ -154,12 +154,12 @@ static group *group_of(inquiry *in, const cav_binding *row) {
 static cav_status gather(inquiry *in) {
   in->met = 1;
   for (int i = 0; i < in->nrow; i++)
-    if (in->row[i].kind != CAV_BINDING_PENETRATION && excess(&in->row[i]) > 0) in->met = 0;
+    if (in->row[i].kind != CAV_BINDING_PENETRATION && binding_excess(&in->row[i]) > 0) in->met = 0;
   for (int i = 0; i < in->nrow; i++) {
     const cav_binding *row = &in->row[i];
     group *g = group_of(in, row);
     if (!g) return CAV_NO_MEMORY;
-    double e = excess(row);
+    double e = binding_excess(row);
     if (e > 0) {
       if (!g->missed) g->missed_first = row->knot;
       g->missed_last = row->knot;
@@ -422,7 +422,7 @@ static void tell_cure(const inquiry *in, const cav_binding *row, char *out, size
 
 static cav_reason reason_of(const inquiry *in, const group *g, const cav_binding *row, int first, int last) {
   cav_reason reason = {.row = *row, .first = first, .last = last, .time = row->knot * in->timestep};
-  reason.violation = excess(row);
+  reason.violation = binding_excess(row);
   reason.pull = row->pull;
   reason.fraction = in->pulls > 0 ? g->sum / in->pulls : 0;
   tell(in, row, reason.what, sizeof reason.what);

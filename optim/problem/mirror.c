@@ -103,11 +103,11 @@ static void rotate(const double *R, const double *x, double *out) {
   for (int i = 0; i < 3; i++) out[i] = R[3 * i] * x[0] + R[3 * i + 1] * x[1] + R[3 * i + 2] * x[2];
 }
 
-static double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+static double dot_product(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 static double apart(const double *a, const double *b) {
   double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-  return sqrt(dot(d, d));
+  return sqrt(dot_product(d, d));
 }
 
 /// Unit quaternion of a proper rotation matrix, row-major.
@@ -155,11 +155,11 @@ static cav_status fit_joint(const cav_model *m, const cav_state *state, int axis
     double image_axis[3];
     rotate(A->rotation, a->axis, along), rotate(B->rotation, b->axis, along_b);
     reflect(axis, along, image_axis);
-    double s = dot(image_axis, along_b) * (a->type == CAV_JOINT_HINGE ? -1 : 1);
+    double s = dot_product(image_axis, along_b) * (a->type == CAV_JOINT_HINGE ? -1 : 1);
     if (fabs(fabs(s) - 1) > near) return unlike(m, j, other, "the axes", error);
     image->sign = s > 0 ? 1 : -1;
     // a hinge may sit anywhere on its axis, a slide anywhere
-    double off = dot(mirrored, along_b) - dot(at_b, along_b);
+    double off = dot_product(mirrored, along_b) - dot_product(at_b, along_b);
     for (int k = 0; k < 3; k++) mirrored[k] -= off * along_b[k];
   } else {
     // -N = -R_a' M R_b

@@ -283,7 +283,7 @@ static cav_status fit_actuators(const cav_periodicity *w, cav_state *state, doub
 }
 
 /// A number in -1 .. 1, by a fixed sequence.
-static double draw(int *count) { return 2 * fmod(++*count * golden, 1) - 1; }
+static double number_draw(int *count) { return 2 * fmod(++*count * golden, 1) - 1; }
 
 /// Brings joints into the ranges of themselves and their images, whose limits may differ.
 static void clip(const cav_periodicity *w, double *q) {
@@ -305,10 +305,10 @@ static cav_status fit_forces(const cav_periodicity *w, const cav_problem *proble
   double *q = work, *moved = q + m->nq, *v = moved + m->nq, *next = v + nv, *u = next + nv, *pv = u + nv, *pn = pv + nv,
          *pu = pn + nv, *found = pu + nv;
   for (int s = 0; s < STATES; s++) {
-    for (int d = 0; d < nv; d++) v[d] = 0.3 * draw(&count);
+    for (int d = 0; d < nv; d++) v[d] = 0.3 * number_draw(&count);
     cav_integrate(m, problem->q_start, v, s ? 1 : 0.05, q);
     clip(w, q);
-    for (int d = 0; d < nv; d++) v[d] = draw(&count), next[d] = v[d] + 0.1 * draw(&count);
+    for (int d = 0; d < nv; d++) v[d] = number_draw(&count), next[d] = v[d] + 0.1 * number_draw(&count);
     cav_periodicity_configuration(w, 1, q, moved);
     cav_periodicity_tangent(w, 1, v, pv);
     cav_periodicity_tangent(w, 1, next, pn);

@@ -75,8 +75,8 @@ static cav_status check_times(const cav_problem_reader *reader, const cav_xml_no
   return cav_xml_fail(reader->error, node, "file", "%s: expected at least one row of targets", table->path);
 }
 
-static cav_status take(const cav_problem_reader *reader, const cav_xml_node *node, const cav_table *table, int *column,
-                       cav_problem_targets *targets) {
+static cav_status target_columns(const cav_problem_reader *reader, const cav_xml_node *node, const cav_table *table,
+                                 int *column, cav_problem_targets *targets) {
   int time = column_of(table, "time"), count = targets->count;
   if (time < 0) return cav_xml_fail(reader->error, node, "file", "%s:1: expected a column 'time', s", table->path);
   cav_status status = cav_xml_get(node, "columns") ? named_columns(reader, node, table, count, column)
@@ -102,7 +102,7 @@ cav_status cav_problem_table(const cav_problem_reader *reader, const cav_xml_nod
   cav_error inner = {0};
   cav_table *table = status ? NULL : cav_table_read(path, &inner);
   if (!status && !table) status = cav_xml_fail_as(reader->error, inner.status, node, "file", "%s", inner.text);
-  if (!status) status = take(reader, node, table, column, targets);
+  if (!status) status = target_columns(reader, node, table, column, targets);
   cav_table_free(table);
   free(column);
   free(path);

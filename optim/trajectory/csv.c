@@ -76,7 +76,7 @@ static cav_status read_names(cav_table *table, char *text, int line, cav_error *
 }
 
 // room for one more row
-static cav_status grow(cav_table *table, int *room, int line, cav_error *error) {
+static cav_status table_grow(cav_table *table, int *room, int line, cav_error *error) {
   if (table->nrow < *room) return CAV_OK;
   if (*room > INT_MAX / 2)
     return cav_file_fail(error, CAV_BAD_INPUT, line, "%s:%d: more rows than are read, %d", table->path, line, *room);
@@ -100,7 +100,7 @@ static double number_of(const char *field) {
 }
 
 static cav_status read_row(cav_table *table, char *text, int line, int *room, cav_error *error) {
-  cav_status status = grow(table, room, line, error);
+  cav_status status = table_grow(table, room, line, error);
   if (status) return status;
   double *row = table->value + (size_t)table->nrow * (size_t)table->ncol;
   int column = 0;

@@ -269,7 +269,7 @@ static cav_status check_quaternions(const cav_model *model, double *q, const cav
   return CAV_OK;
 }
 
-static void take(const cav_table *table, const int *source, int row, int n, double *out) {
+static void row_values(const cav_table *table, const int *source, int row, int n, double *out) {
   for (int i = 0; i < n && source[0] >= 0; i++)
     out[i] = table->value[(size_t)row * (size_t)table->ncol + (size_t)source[i]];
 }
@@ -286,9 +286,9 @@ static cav_trajectory *from_table(const cav_table *table, const cav_model *model
   for (int t = 0; t < table->nrow; t++) {
     size_t at = (size_t)t * (size_t)model->nv;
     double *q = trajectory->q + (size_t)t * (size_t)model->nq;
-    if (model->nq) take(table, source_q, t, model->nq, q);
-    if (model->nv) take(table, source_v, t, model->nv, trajectory->v + at);
-    if (model->nv) take(table, source_u, t, model->nv, trajectory->u + at);
+    if (model->nq) row_values(table, source_q, t, model->nq, q);
+    if (model->nv) row_values(table, source_v, t, model->nv, trajectory->v + at);
+    if (model->nv) row_values(table, source_u, t, model->nv, trajectory->u + at);
     if (check_quaternions(model, q, table, t, error)) {
       cav_trajectory_free(trajectory);
       return NULL;

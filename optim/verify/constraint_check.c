@@ -204,8 +204,8 @@ static int contact_values(const cav_verification *verification, const cav_term *
 }
 
 // values of a term at knot t and their targets; their number, 0 where the term has no value
-static int measure(const cav_verification *verification, const cav_term *term, int t, double *q, double *x,
-                   double *target) {
+static int term_values(const cav_verification *verification, const cav_term *term, int t, double *q, double *x,
+                       double *target) {
   int forced = t < verification->rows;
   switch (term->quantity) {
     case CAV_QUANTITY_SENSOR:
@@ -246,7 +246,7 @@ void cav_constraint_check(const cav_verification *verification, int t, double *w
   for (int i = 0; i < verification->problem->nterm; i++) {
     const cav_term *term = verification->problem->term + i;
     if (term->use == CAV_USE_COST || !holds(verification, term, t)) continue;
-    int n = measure(verification, term, t, q, x, target);
+    int n = term_values(verification, term, t, q, x, target);
     for (int k = 0; k < n; k++) {
       double left = x[k] - target[k], missed = fabs(left);
       if (term->use == CAV_USE_RANGE) missed = fmax(fmax(term->lower - left, left - term->upper), 0);

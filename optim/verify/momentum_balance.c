@@ -34,7 +34,7 @@ struct cav_balance {
   double *wrench;   // [ntree*6] scratch: linear, angular about c
 };
 
-static double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+static double vector_dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 static void cross(const double *a, const double *b, double *out) {
   out[0] = a[1] * b[2] - a[2] * b[1];
@@ -301,15 +301,15 @@ static int project(const cav_balance *balance, const cav_verification *verificat
     for (int k = 0; k < 6; k++) size += e[k] * e[k];
     // Gram-Schmidt, carrying the joint's own force along
     for (int j = 0; j < n; j++) {
-      double along = dot(e, basis[j]) + dot(e + 3, basis[j] + 3);
+      double along = vector_dot(e, basis[j]) + vector_dot(e + 3, basis[j] + 3);
       for (int k = 0; k < 6; k++) e[k] -= along * basis[j][k];
       own -= along * force[j];
     }
-    double norm = sqrt(dot(e, e) + dot(e + 3, e + 3));
+    double norm = sqrt(vector_dot(e, e) + vector_dot(e + 3, e + 3));
     if (norm <= 1e-9 * sqrt(size)) continue;
     for (int k = 0; k < 6; k++) e[k] /= norm;
     force[n] = own / norm;
-    out[n] = (dot(e, fraction) + dot(e + 3, fraction + 3) - force[n]) / verification->weight;
+    out[n] = (vector_dot(e, fraction) + vector_dot(e + 3, fraction + 3) - force[n]) / verification->weight;
     n++;
   }
   return n;

@@ -20,9 +20,9 @@ typedef struct metrics {
 } metrics;
 
 // writes the reason of a failed call
-static cav_status fail(cav_error *error, cav_status status, const char *format, ...)
+static cav_status verification_fail(cav_error *error, cav_status status, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
-static cav_status fail(cav_error *error, cav_status status, const char *format, ...) {
+static cav_status verification_fail(cav_error *error, cav_status status, const char *format, ...) {
   if (!error) return status;
   va_list list;
   va_start(list, format);
@@ -75,39 +75,40 @@ static int all_finite(const double *x, size_t n) {
 static cav_status admit(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
                         const double *gain_q, const double *gain_v, cav_error *error) {
   if (!problem || !problem->model || !trajectory || !contact) {
-    return fail(error, CAV_BAD_INPUT, "verification needs a problem with a model, a trajectory and a contact law");
+    return verification_fail(error, CAV_BAD_INPUT,
+                             "verification needs a problem with a model, a trajectory and a contact law");
   }
   const cav_model *model = problem->model;
   if (trajectory->nq != model->nq || trajectory->nv != model->nv) {
-    return fail(error, CAV_BAD_INPUT,
-                "the trajectory has %d positions and %d velocities, the model %d and %d: "
-                "verify it with the model it was solved for",
-                trajectory->nq, trajectory->nv, model->nq, model->nv);
+    return verification_fail(error, CAV_BAD_INPUT,
+                             "the trajectory has %d positions and %d velocities, the model %d and %d: "
+                             "verify it with the model it was solved for",
+                             trajectory->nq, trajectory->nv, model->nq, model->nv);
   }
   if (!problem->q_start || !problem->v_start) {
-    return fail(error, CAV_BAD_INPUT, "the problem has no start: set q_start and v_start");
+    return verification_fail(error, CAV_BAD_INPUT, "the problem has no start: set q_start and v_start");
   }
   if (problem->duration_most == 0 && !(fabs(trajectory->timestep - problem->timestep) <= 1e-9 * problem->timestep)) {
-    return fail(error, CAV_BAD_INPUT, "the trajectory's step is %.9g s, the problem's %.9g s", trajectory->timestep,
-                problem->timestep);
+    return verification_fail(error, CAV_BAD_INPUT, "the trajectory's step is %.9g s, the problem's %.9g s",
+                             trajectory->timestep, problem->timestep);
   }
   if (!(problem->timestep > 0) || !(trajectory->timestep > 0))
-    return fail(error, CAV_BAD_INPUT, "the steps of the problem and of the trajectory must be positive");
+    return verification_fail(error, CAV_BAD_INPUT, "the steps of the problem and of the trajectory must be positive");
   if (!(fabs(contact->timestep - trajectory->timestep) <= 1e-9 * trajectory->timestep))
-    return fail(error, CAV_BAD_INPUT, "the claimed law is at a step of %.9g s, the trajectory's is %.9g s",
-                contact->timestep, trajectory->timestep);
+    return verification_fail(error, CAV_BAD_INPUT, "the claimed law is at a step of %.9g s, the trajectory's is %.9g s",
+                             contact->timestep, trajectory->timestep);
   long knots = lround(problem->duration / problem->timestep) + 1;
   if (trajectory->nknot < 2 || trajectory->nknot != knots) {
-    return fail(error, CAV_BAD_INPUT, "the trajectory has %d knots, the problem asks for %ld", trajectory->nknot,
-                knots);
+    return verification_fail(error, CAV_BAD_INPUT, "the trajectory has %d knots, the problem asks for %ld",
+                             trajectory->nknot, knots);
   }
   size_t n = (size_t)trajectory->nknot, gains = (n - 1) * (size_t)model->nv * (size_t)model->nv;
   int finite = all_finite(trajectory->q, n * (size_t)model->nq) && all_finite(problem->q_start, (size_t)model->nq) &&
                all_finite(problem->v_start, (size_t)model->nv) && (!gain_q || all_finite(gain_q, gains)) &&
                (!gain_v || all_finite(gain_v, gains));
-  return finite
-             ? CAV_OK
-             : fail(error, CAV_NOT_FINITE, "the trajectory, the start or the gains hold numbers that are not finite");
+  return finite ? CAV_OK
+                : verification_fail(error, CAV_NOT_FINITE,
+                                    "the trajectory, the start or the gains hold numbers that are not finite");
 }
 
 static void verification_clear(cav_verification *verification) {
@@ -366,7 +367,7 @@ static cav_status examine(cav_verification *verification, cav_balance *balance, 
   for (int t = 0; t <= verification->last && status == CAV_OK; t++) {
     status = examine_knot(verification, t, balance, work, found);
     if (status != CAV_OK) {
-      fail(error, status, "inverse dynamics at knot %d: %s", t, cav_status_name(status));
+      verification_fail(error, status, "inverse dynamics at knot %d: %s", t, cav_status_name(status));
       break;
     }
     status = cav_hover_add(hover, verification, t);
@@ -491,7 +492,7 @@ static void fill(const cav_verification *verification, const metrics *found, con
 
 cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
                       const double *gain_q, const double *gain_v, cav_verdict *verdict, cav_error *error) {
-  if (!verdict) return fail(error, CAV_BAD_INPUT, "verification needs a place for its verdict");
+  if (!verdict) return verification_fail(error, CAV_BAD_INPUT, "verification needs a place for its verdict");
   verdict->certified = 0;
   snprintf(verdict->reason, sizeof verdict->reason, "not verified");
   cav_status status = admit(problem, trajectory, contact, gain_q, gain_v, error);
@@ -520,7 +521,8 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
   }
   cav_balance_free(balance);
   verification_clear(&verification);
-  if (status != CAV_OK && error && !*error->text) fail(error, status, "verification: %s", cav_status_name(status));
+  if (status != CAV_OK && error && !*error->text)
+    verification_fail(error, status, "verification: %s", cav_status_name(status));
   return status;
 }
 

@@ -181,7 +181,7 @@ static cav_status run_race(cav_race *race, const cav_command_line *line, ticker 
   return cav_race_finish(race, at_once, error);
 }
 
-static int solve(const cav_command_line *line, const cav_problem *problem, const char *folder) {
+static int solve_into(const cav_command_line *line, const cav_problem *problem, const char *folder) {
   cav_error error = {0};
   cav_status status = prepare_folder(folder, line, problem, &error);
   if (status) return cav_command_fail(&error);
@@ -238,7 +238,7 @@ int cav_command_solve(const cav_command_line *line) {
   char *folder = folder_of(line, problem);
   int done;
   if (folder) {
-    done = solve(line, problem, folder);
+    done = solve_into(line, problem, folder);
   } else {
     error = (cav_error){.status = CAV_NO_MEMORY};
     done = cav_command_fail(&error);

@@ -139,7 +139,7 @@ static void write_drawing(FILE *out, int nmethod, const int used[CAV_STUDY_METHO
 }
 
 // gnuplot in the folder; 1 if it drew
-static int draw(const char *folder) {
+static int picture_draw(const char *folder) {
   int status = 1;
   fflush(NULL);
   pid_t child = fork();
@@ -171,6 +171,6 @@ cav_status cav_profile_write(const char *folder, int nmotion, const char *const 
     free(path);
   }
   free(work);
-  *drawn = !status && nmethod > 0 && draw(folder);
+  *drawn = !status && nmethod > 0 && picture_draw(folder);
   return status;
 }
