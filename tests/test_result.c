@@ -132,7 +132,7 @@ static void check_verdict(const cav_problem *problem) {
                          .solve_seconds = 0.25,
                          .iterations = 9};
   snprintf(verdict.reason, sizeof verdict.reason, "too \"deep\"\n");
-  CHECK(cav_result_write_verdict(folder, problem, &verdict, &error) == CAV_OK);
+  CHECK(cav_result_write_verdict(folder, problem, &verdict, NULL, &error) == CAV_OK);
   const char *text = read_file("verdict.json");
   const char *field[] = {"\"feasible\": true",
                          "\"optimal\": false",

@@ -94,6 +94,9 @@ typedef struct cav_term {
                  ///< [nq]; rates [nv]. NULL: zeros (quaternion: identity; configuration: the goal)
   int nwaypoint; ///< 0, or target is [nwaypoint*dim], linear between times, constant before and after
   const double *waypoint_time; ///< [nwaypoint], s, increasing
+  double
+      within; ///< tolerance of the target, in the unit of the quantity: the motion achieves it if off by at most this. 0:
+              ///< a usual one for goals at one time, none for windows; infinite: told only
   double lower,
       upper; ///< CAV_USE_RANGE, infinite where open; target is NULL then, or a posture or orientation to start from
 } cav_term;

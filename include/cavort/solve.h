@@ -197,6 +197,17 @@ CAV_API cav_status cav_strategy_solve(const cav_problem *problem, const cav_stra
 /// What the word optimal requires of a verdict's optimality: a fraction of the cost.
 #define CAV_TOLERANCE_OPTIMAL 1e-4
 #define CAV_HOVER_GAP 0.003 ///< m: a loaded contact farther apart, that stays so over a step, leans on air
+/// What a term asked and what the motion does.
+typedef struct cav_term_report {
+  double cost, fraction; ///< of a cost term, and of the motion's whole cost
+  int has_target;     ///< 0: nothing is to be reached: a running cost, a term over contacts, or no knot in its window
+  double time;        ///< s, of the knot at which it is missed most; of the value missed most there:
+  double wanted, got; ///< its target (of a range the nearest value allowed) and itself, in unit
+  double off;         ///< distance: of a sensor's vector its length, of dofs the largest
+  double within;      ///< tolerance: the term's, or for goals at one time a usual one; infinite: told only
+  int met;            ///< off <= within
+  char unit[16], what[64];
+} cav_term_report;
 
 /// What verification found; from the knots alone, with code apart from the optimiser's. optim/METHOD.md, 6.
 /// optimality, solve_seconds and iterations are the solver's: cav_verify leaves them as they are.
@@ -223,7 +234,11 @@ typedef struct cav_verdict {
   int periods;           ///< that the closed loop ran for: 1, of cycles more
   double duration, solve_seconds; ///< duration: of one period
   int iterations;
-  char reason[400]; ///< why not certified: the first condition missed; "" if certified
+  double cost;          ///< of the cost terms, summed anew from the knots
+  int achieved;         ///< every target with a tolerance is met
+  int ntarget, nmissed; ///< such targets, and those missed
+  char missed[240];     ///< the one missed most: name, by how much, wanted and got; "" if achieved
+  char reason[400];     ///< why not certified: the first condition missed; "" if certified
 } cav_verdict;
 
 /// What replay_same_step_seconds has to be, s: CAV_TOLERANCE_REPLAY, or the whole motion where that is shorter; less rounding.
@@ -237,6 +252,10 @@ CAV_API int cav_verdict_optimal(const cav_verdict *verdict);
 /// Certifies a motion: q, v of the trajectory and the gains are used, all else is recomputed. contact is the law it claims.
 CAV_API cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
                               const double *gain_q, const double *gain_v, cav_verdict *verdict, cav_error *error);
+
+/// What each term asked and got: report [problem->nterm]. Fails as cav_verify does. cost may be NULL.
+CAV_API cav_status cav_terms_report(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
+                            cav_term_report *report, double *cost, cav_error *error);
 
 /// Why a motion is as it is: one thing that is missed, or that pulls.
 typedef struct cav_reason {

@@ -66,7 +66,7 @@ static const cav_xml_element pose = {
 
 // terms: what is measured; when; and as a cost or as a constraint
 #define TABLE TEXT("file", 0), TEXT("columns", 0)
-#define WINDOW TEXT("name", 0), TEXT("from", 0), TEXT("to", 0), TEXT("at", 0), REAL("scale", 0)
+#define WINDOW TEXT("name", 0), TEXT("from", 0), TEXT("to", 0), TEXT("at", 0), REAL("scale", 0), TEXT("within", 0)
 #define DOFS WORD("dofs", cav_problem_dof_sets), TEXT("joint", 0)
 #define RATE_ATTRIBUTES DOFS, TABLE, REALS("target", 1, 0)
 #define POSTURE_ATTRIBUTES DOFS, TABLE, TEXT("key", 0), REALS("qpos", 1, 0)

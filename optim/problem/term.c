@@ -463,6 +463,17 @@ static cav_status read_values(const cav_problem_reader *reader, const cav_xml_no
   return CAV_OK;
 }
 
+// tolerance of a term's target: a number above 0, or "any": told only
+static cav_status read_within(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  const char *text = cav_xml_text(node, "within", NULL);
+  if (!text) return CAV_OK;
+  char *end = NULL;
+  term->within = strcmp(text, "any") ? strtod(text, &end) : INFINITY;
+  if (!end || (*text && !*end && term->within > 0 && isfinite(term->within))) return CAV_OK;
+  return cav_xml_fail(reader->error, node, "within",
+                      "expected a number above 0, in the unit of the quantity, or 'any', got '%.40s'", text);
+}
+
 // bounds of a constraint, or the weight of a cost
 static cav_status read_use(const cav_problem_reader *reader, const cav_xml_node *node, int hard, cav_term *term) {
   term->lower = cav_xml_real(node, "lower", -INFINITY);
@@ -477,7 +488,7 @@ static cav_status read_use(const cav_problem_reader *reader, const cav_xml_node 
     return cav_xml_fail(reader->error, node, "weight", "expected a number of 0 or more, got %g", term->weight);
   if (!(term->scale > 0))
     return cav_xml_fail(reader->error, node, "scale", "expected a number above 0, got %g", term->scale);
-  return CAV_OK;
+  return read_within(reader, node, term);
 }
 
 static cav_status read_term(const cav_problem_reader *reader, const cav_xml_node *node, int hard, cav_term *term) {

@@ -141,6 +141,8 @@ static int write_term(FILE *out, const cav_problem *p, const cav_term *term) {
   if (term->use == CAV_USE_RANGE && isfinite(term->lower)) write_number(out, "lower", term->lower);
   if (term->use == CAV_USE_RANGE && isfinite(term->upper)) write_number(out, "upper", term->upper);
   if (term->scale != 1) write_number(out, "scale", term->scale);
+  if (term->within > 0 && isfinite(term->within)) write_number(out, "within", term->within);
+  if (term->within > 0 && !isfinite(term->within)) write_text(out, "within", "any");
   if (!term->target || !term->nwaypoint) {
     fputs("/>\n", out);
     return 1;

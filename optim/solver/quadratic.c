@@ -15,7 +15,7 @@
 
 /// Iterations at most; part of the way to the boundary that a step goes; fraction of the cost that the gap
 /// starts with, and with what it starts again.
-enum { ITERATIONS = 60 };
+enum { ITERATIONS = 60, WINDOW = 10 };
 static const double boundary = 0.995, first_gap[] = {0.1, 1e3, 1e6};
 enum { STARTS = sizeof first_gap / sizeof *first_gap };
 
@@ -449,6 +449,7 @@ static void advance(cav_quadratic *p, double length) {
 /// as they do from a start that lies too near to the bounds for the residual that it has.
 static cav_status approach(cav_quadratic *p, double tolerance, double *left) {
   int held = 0;
+  double past = INFINITY;
   *left = 1;
   p->gap = gap_of(p);
   for (int i = 0; i < ITERATIONS && held < 3; i++) {
@@ -468,6 +469,10 @@ static cav_status approach(cav_quadratic *p, double tolerance, double *left) {
     *left *= 1 - length;
     p->gap = gap_of(p);
     if (!isfinite(p->gap)) return CAV_NOT_FINITE;
+    // one that converges does so in some twenty iterations; where the model is not convex the gap stands still
+    if (i % WINDOW < WINDOW - 1) continue;
+    if (p->gap > 0.1 * past) break;
+    past = p->gap;
   }
   return CAV_OK;
 }
@@ -488,6 +493,8 @@ cav_status cav_quadratic_solve(cav_quadratic *p, double radius, const double cha
     status = approach(p, tolerance, &left);
     // a little more is what rounding leaves
     if (status == CAV_OK && (p->gap > 1e4 * tolerance || left > 1e-4)) status = CAV_NOT_CONVERGED;
+    // another start helps where this one was held at its bounds, not where the gap stands still
+    if (left <= 1e-4) break;
   }
   // where the Hessian is not convex the conditions hold at what may be no minimum
   if (status == CAV_OK && (p->lifted > 1e-10 || cav_quadratic_decrease(p) < -1e6 * tolerance))

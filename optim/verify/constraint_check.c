@@ -14,13 +14,14 @@
 // time of a knot for windows and targets: a fraction of the problem's duration, whatever the step has become
 static double when(const cav_verification *verification, int t) { return t * verification->problem->timestep; }
 
-// 1 if the term's window holds knot t
-static int holds(const cav_verification *verification, const cav_term *term, int t) {
+int cav_verification_holds(const cav_verification *verification, const cav_term *term, int t, int *single, int *whole) {
   double h = verification->problem->timestep, duration = verification->last * h;
   double from = term->from < 0 || term->from > duration ? duration : term->from;
   double to = term->to < 0 || term->to > duration ? duration : term->to;
   int first = (int)ceil(from / h - 1e-6), last = (int)floor(to / h + 1e-6);
-  if (to - from < 1e-9 || first > last) first = last = (int)lround((from + to) / 2 / h);
+  *single = to - from < 1e-9 || first > last;
+  if (*single) first = last = (int)lround((from + to) / 2 / h);
+  *whole = first == 0 && last == verification->last;
   return t >= first && t <= last;
 }
 
@@ -95,8 +96,7 @@ static int sensor_values(const cav_verification *verification, const cav_term *t
   return 1;
 }
 
-// 1 if the term selects the dof
-static int selects(const cav_model *model, const cav_term *term, int dof) {
+int cav_verification_selects(const cav_model *model, const cav_term *term, int dof) {
   const cav_joint *joint = model->joint + model->dof[dof].joint;
   int free = joint->type == CAV_JOINT_FREE, place = dof - joint->dof;
   switch (term->dofs) {
@@ -118,7 +118,7 @@ static int selects(const cav_model *model, const cav_term *term, int dof) {
 static int select_dofs(const cav_model *model, const cav_term *term, double *x, double *target) {
   int n = 0;
   for (int d = 0; d < model->nv; d++) {
-    if (!selects(model, term, d)) continue;
+    if (!cav_verification_selects(model, term, d)) continue;
     x[n] = x[d];
     target[n++] = target[d];
   }
@@ -182,30 +182,37 @@ static int power_values(const cav_verification *verification, const cav_term *te
   return model->nu;
 }
 
+// 1 if a term over contacts looks at this one: those between trees or with the world, of one body alone if it names one;
+// self-penetration at those between two links of one tree
+static int looks_at(const cav_model *model, const cav_term *term, const cav_contact *contact) {
+  const cav_pair *pair = model->pair + contact->pair;
+  if (pair->external == (term->quantity == CAV_QUANTITY_SELF_PENETRATION)) return 0;
+  int link = model->body[term->body].link;
+  return term->body <= 0 || contact->link1 == link || contact->link2 == link;
+}
+
 // one value per contact, a magnitude
 static int contact_values(const cav_verification *verification, const cav_term *term, double *x, double *target) {
   const cav_state *state = verification->state;
+  int n = 0;
   for (int i = 0; i < state->ncontact; i++) {
     const cav_contact *contact = state->contact + i;
-    double load = sqrt(fmax(contact->impulse[0], 0) / verification->h / verification->weight),
-           value = fmax(contact->dist, 0);
+    if (!looks_at(verification->model, term, contact)) continue;
+    double part = fmax(contact->impulse[0], 0) / verification->h / verification->weight, load = sqrt(part);
     const double *rate = contact->velocity_next;
-    if (term->quantity == CAV_QUANTITY_SLIP) value = contact->dim > 1 ? hypot(rate[1], rate[2]) : 0;
-    if (term->quantity == CAV_QUANTITY_IMPACT) value = fabs(rate[0]);
-    if (term->quantity == CAV_QUANTITY_SELF_PENETRATION) {
-      int moving = !verification->model->pair[contact->pair].external;
-      load = 1, value = moving ? fmax(-contact->dist, 0) : 0;
-    }
-    if (term->quantity == CAV_QUANTITY_FORCE) value = verification->model->pair[contact->pair].external ? load : 0;
-    x[i] = load * value;
-    target[i] = 0;
+    double value = load * fmax(contact->dist, 0);
+    if (term->quantity == CAV_QUANTITY_SLIP) value = contact->dim > 1 ? load * hypot(rate[1], rate[2]) : 0;
+    if (term->quantity == CAV_QUANTITY_IMPACT) value = load * fabs(rate[0]);
+    if (term->quantity == CAV_QUANTITY_SELF_PENETRATION) value = fmax(-contact->dist, 0);
+    if (term->quantity == CAV_QUANTITY_FORCE) value = part;
+    x[n] = value;
+    target[n++] = 0;
   }
-  return state->ncontact;
+  return n;
 }
 
-// values of a term at knot t and their targets; their number, 0 where the term has no value
-static int term_values(const cav_verification *verification, const cav_term *term, int t, double *q, double *x,
-                       double *target) {
+int cav_verification_measure(const cav_verification *verification, const cav_term *term, int t, double *q, double *x,
+                             double *target) {
   int forced = t < verification->rows;
   switch (term->quantity) {
     case CAV_QUANTITY_SENSOR:
@@ -245,8 +252,9 @@ void cav_constraint_check(const cav_verification *verification, int t, double *w
   double *q = work, *x = q + verification->model->nq, *target = x + room;
   for (int i = 0; i < verification->problem->nterm; i++) {
     const cav_term *term = verification->problem->term + i;
-    if (term->use == CAV_USE_COST || !holds(verification, term, t)) continue;
-    int n = term_values(verification, term, t, q, x, target);
+    int single, whole;
+    if (term->use == CAV_USE_COST || !cav_verification_holds(verification, term, t, &single, &whole)) continue;
+    int n = cav_verification_measure(verification, term, t, q, x, target);
     for (int k = 0; k < n; k++) {
       double left = x[k] - target[k], missed = fabs(left);
       if (term->use == CAV_USE_RANGE) missed = fmax(fmax(term->lower - left, left - term->upper), 0);

@@ -70,6 +70,20 @@ void cav_hover_free(cav_hover *hover);
 /// Adds knot t, in their order up to the last; verification->state holds the inverse there. Fails with CAV_NO_MEMORY.
 cav_status cav_hover_add(cav_hover *hover, const cav_verification *verification, int t);
 void cav_hover_result(cav_hover *hover, const cav_verification *verification, cav_metric *metric);
+/// 1 if the term's window holds knot t; whether it is one knot, whether it is the whole horizon. constraint_check.c.
+int cav_verification_holds(const cav_verification *verification, const cav_term *term, int t, int *single, int *whole);
+
+/// 1 if a term over dofs selects this one. constraint_check.c.
+int cav_verification_selects(const cav_model *model, const cav_term *term, int dof);
+
+/// Values of a term at knot t and their targets, x and target [room], q [nq]; their number, 0 where the term has no value.
+/// verification->state holds the inverse there. constraint_check.c.
+int cav_verification_measure(const cav_verification *verification, const cav_term *term, int t, double *q, double *x,
+                             double *target);
+
+/// Adds knot t to the report of every term [nterm], zeroed at first; then what the verdict says of them. targets.c.
+void cav_targets_note(const cav_verification *verification, int t, double *work, cav_term_report *report);
+void cav_targets_verdict(const cav_verification *verification, cav_term_report *report, cav_verdict *verdict);
 
 /// Hard terms of the problem at knot t; verification->state holds the inverse there. work holds cav_constraint_check_room values.
 /// constraint_check.c.

@@ -352,7 +352,8 @@ static cav_status examine_knot(cav_verification *verification, int t, cav_balanc
 }
 
 // knot by knot, and all that is measured there
-static cav_status examine(cav_verification *verification, cav_balance *balance, metrics *found, cav_error *error) {
+static cav_status examine(cav_verification *verification, cav_balance *balance, metrics *found, cav_term_report *report,
+                          cav_error *error) {
   const cav_model *model = verification->model;
   int room = 0;
   double *terms = NULL, *work = malloc(sizeof(double) * (size_t)(model->nq + 4 * model->nv + model->nu + 1));
@@ -381,6 +382,7 @@ static cav_status examine(cav_verification *verification, cav_balance *balance, 
       if (!terms) break;
     }
     cav_constraint_check(verification, t, terms, &found->term);
+    cav_targets_note(verification, t, terms, report);
   }
   cav_balance_result(balance, verification, &found->defect);
   if (hover) cav_hover_result(hover, verification, &found->hover);
@@ -493,7 +495,7 @@ static void fill(const cav_verification *verification, const metrics *found, con
 cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
                       const double *gain_q, const double *gain_v, cav_verdict *verdict, cav_error *error) {
   if (!verdict) return verification_fail(error, CAV_BAD_INPUT, "verification needs a place for its verdict");
-  verdict->certified = 0;
+  verdict->certified = verdict->achieved = 0;
   snprintf(verdict->reason, sizeof verdict->reason, "not verified");
   cav_status status = admit(problem, trajectory, contact, gain_q, gain_v, error);
   if (status != CAV_OK) return status;
@@ -509,7 +511,9 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
   if (refusal.status != CAV_OK && error) *error = refusal;
   if (status == CAV_OK) balance = cav_balance_new(&verification);
   if (status == CAV_OK && !balance) status = CAV_NO_MEMORY;
-  if (status == CAV_OK) status = examine(&verification, balance, &found, error);
+  cav_term_report *report = status == CAV_OK ? calloc((size_t)problem->nterm + 1, sizeof *report) : NULL;
+  if (status == CAV_OK && !report) status = CAV_NO_MEMORY;
+  if (status == CAV_OK) status = examine(&verification, balance, &found, report, error);
   if (status == CAV_OK) status = cav_replay_steps(&verification, &replay);
   if (status == CAV_OK) status = cav_replay_open(&verification, &replay);
   if (status == CAV_OK) status = cav_replay_closed(&verification, contact, gain_q, gain_v, &replay.closed);
@@ -518,11 +522,34 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
     *verdict->reason = 0;
     fill(&verification, &found, &replay, verdict);
     decide(&verification, &found, &replay, verdict);
+    cav_targets_verdict(&verification, report, verdict);
   }
+  free(report);
   cav_balance_free(balance);
   verification_clear(&verification);
   if (status != CAV_OK && error && !*error->text)
     verification_fail(error, status, "verification: %s", cav_status_name(status));
+  return status;
+}
+
+cav_status cav_terms_report(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
+                            cav_term_report *report, double *cost, cav_error *error) {
+  cav_verification verification;
+  metrics found = {0};
+  cav_verdict verdict = {0};
+  cav_error refusal = {0};
+  cav_status status = admit(problem, trajectory, contact, NULL, NULL, error);
+  if (status != CAV_OK) return status;
+  status = verification_start(&verification, problem, trajectory, contact, &refusal);
+  if (refusal.status != CAV_OK && error) *error = refusal;
+  cav_balance *balance = status == CAV_OK ? cav_balance_new(&verification) : NULL;
+  if (status == CAV_OK && !balance) status = CAV_NO_MEMORY;
+  memset(report, 0, (size_t)problem->nterm * sizeof *report);
+  if (status == CAV_OK) status = examine(&verification, balance, &found, report, error);
+  if (status == CAV_OK) cav_targets_verdict(&verification, report, &verdict);
+  if (cost) *cost = verdict.cost;
+  cav_balance_free(balance);
+  verification_clear(&verification);
   return status;
 }
 

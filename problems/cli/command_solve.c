@@ -141,18 +141,21 @@ static int save(void *context, const cav_problem *problem, const cav_solution *s
   const cav_verdict *verdict = &report->verdict;
   cav_error error = {0};
   if (report->status) fprintf(stderr, "cavort: %s\n", report->text[0] ? report->text : why_stopped(report->status));
-  cav_status status = cav_result_write(to->folder, problem, solution, &error);
-  if (!status) status = cav_result_write_verdict(to->folder, problem, verdict, &error);
+  cav_term_report *terms = calloc((size_t)problem->nterm + 1, sizeof *terms);
+  cav_status status = terms ? cav_result_write(to->folder, problem, solution, &error) : CAV_NO_MEMORY;
+  if (!status) status = cav_terms_report(problem, solution->trajectory, &solution->contact, terms, NULL, &error);
+  if (!status) status = cav_result_write_verdict(to->folder, problem, verdict, terms, &error);
+  if (!status && line->json) cav_certificate_json(stdout, problem, verdict, terms);
+  if (!status && !line->quiet && !line->json) cav_certificate_print(stdout, problem, verdict, terms);
+  free(terms);
   if (status) return cav_command_fail(&error);
-  if (line->json) cav_certificate_json(stdout, problem->name, problem->model->name, verdict);
-  if (!line->quiet && !line->json) cav_certificate_print(stdout, problem->name, problem->model->name, verdict);
   // the page is a convenience: without three.js everything else stands
   if (cav_result_write_page(to->folder, problem, solution->trajectory, &solution->contact, verdict, &error)) {
     fprintf(stderr, "cavort: no page: %s\n", error.text);
   }
   if (!line->quiet && !line->json) printf("result: %s\n", to->folder);
   if (report->status == CAV_INTERRUPTED) return CAV_EXIT_INTERRUPTED;
-  return verdict->certified ? CAV_EXIT_CERTIFIED : CAV_EXIT_NOT_CERTIFIED;
+  return verdict->certified && verdict->achieved ? CAV_EXIT_CERTIFIED : CAV_EXIT_NOT_CERTIFIED;
 }
 
 // in processes whose lines no one reads
@@ -163,7 +166,9 @@ static int observe_quietly(void *context, const cav_progress *progress) {
 
 static void tell_more(const cav_race *race) {
   const cav_verdict *v = &race->entry[0].report.verdict;
-  fprintf(stderr, "not certified: %s\ntrying by other strategies:", v->reason);
+  if (!v->certified) fprintf(stderr, "not certified: %s\n", v->reason);
+  if (!v->achieved) fprintf(stderr, "not achieved: misses %s\n", v->missed);
+  fprintf(stderr, "trying by other strategies:");
   for (int i = 1; i < race->n; i++) fprintf(stderr, " %s", race->entry[i].strategy.name);
   fprintf(stderr, " (%d at a time; --strategies 1 for none)\n", race->processes);
 }
@@ -175,7 +180,7 @@ static cav_status run_race(cav_race *race, const cav_command_line *line, ticker 
   if (!at_once) {
     status = cav_race_first(race, error);
     if (tick->terminal && tick->shown) fputs("\r\033[K", stderr);
-    if (status || race->entry[0].report.verdict.certified || race->n == 1 || interrupted) return status;
+    if (status || cav_race_success(&race->entry[0].report) || race->n == 1 || interrupted) return status;
     if (race->tell) tell_more(race);
   }
   return cav_race_finish(race, at_once, error);

@@ -25,12 +25,15 @@ int cav_command_verify(const cav_command_line *line) {
   cav_result *result = cav_result_read(line->operand, line->model, &error);
   if (!result) return cav_command_fail(&error);
   cav_status status = certify(result, &verdict, &error);
-  const char *name = result->problem->name, *model = result->problem->model->name;
-  if (!status && line->json) cav_certificate_json(stdout, name, model, &verdict);
-  if (!status && !line->json && !line->quiet) cav_certificate_print(stdout, name, model, &verdict);
+  cav_term_report *terms = status ? NULL : calloc((size_t)result->problem->nterm + 1, sizeof *terms);
+  if (terms)
+    status = cav_terms_report(result->problem, result->trajectory, &result->problem->contact, terms, NULL, &error);
+  if (!status && line->json) cav_certificate_json(stdout, result->problem, &verdict, terms);
+  if (!status && !line->json && !line->quiet) cav_certificate_print(stdout, result->problem, &verdict, terms);
+  free(terms);
   cav_result_free(result);
   if (status) return cav_command_fail(&error);
-  return verdict.certified ? CAV_EXIT_CERTIFIED : CAV_EXIT_NOT_CERTIFIED;
+  return verdict.certified && verdict.achieved ? CAV_EXIT_CERTIFIED : CAV_EXIT_NOT_CERTIFIED;
 }
 
 int cav_command_view(const cav_command_line *line) {

@@ -120,7 +120,7 @@ static int help(const cav_command_line *line) {
     printf("\n");
   }
   cav_topics_print();
-  printf("exit status: 0 certified or done, 1 not certified, 2 bad input, 3 internal error, 130 interrupted\n");
+  printf("exit status: 0 certified and achieved or done, 1 not, 2 bad input, 3 internal error, 130 interrupted\n");
   return 0;
 }
 

@@ -1,6 +1,6 @@
 /// Strategies solved by processes: a child solves and certifies, reports through a pipe and waits; told to, it saves what it has, and
 /// where the pipe closes it ends. So a solution stays in the process that found it. Which one is kept depends on the
-/// reports alone: whatever comes after a certified strategy in the list is cancelled, what comes before it is waited for.
+/// reports alone: whatever comes after one that succeeds (certified, and what was asked is achieved) is cancelled, what comes before it is waited for.
 #include "race.h"
 
 #include <errno.h>
@@ -71,7 +71,8 @@ static const char *outcome(const cav_race_entry *e) {
       break;
   }
   if (!e->report.solution) return "failed";
-  return e->report.verdict.certified ? "certified" : "not certified";
+  if (!e->report.verdict.certified) return "not certified";
+  return e->report.verdict.achieved ? "certified" : "not achieved";
 }
 
 static void tell(const cav_race *race, const cav_race_entry *e) {
@@ -162,7 +163,9 @@ static void end(cav_race_entry *e) {
   e->answer = e->order = -1;
 }
 
-// what comes after a certified strategy cannot be kept any more
+int cav_race_success(const cav_race_report *report) { return report->verdict.certified && report->verdict.achieved; }
+
+// what comes after a strategy that succeeds cannot be kept any more
 static void cancel_after(cav_race *race, int certified) {
   for (int k = certified + 1; k < race->n; k++) {
     cav_race_entry *e = &race->entry[k];
@@ -174,9 +177,9 @@ static void cancel_after(cav_race *race, int certified) {
   }
 }
 
-static int first_certified(const cav_race *race) {
+static int first_success(const cav_race *race) {
   for (int i = 0; i < race->n; i++)
-    if (race->entry[i].state == CAV_RACE_DONE && race->entry[i].report.verdict.certified) return i;
+    if (race->entry[i].state == CAV_RACE_DONE && cav_race_success(&race->entry[i].report)) return i;
   return race->n;
 }
 
@@ -209,7 +212,7 @@ static void listen_to(cav_race *race, int *passed_on) {
 cav_status cav_race_finish(cav_race *race, int cheapest, cav_error *error) {
   int passed_on = 0;
   while (1) {
-    int most = cheapest ? race->n : first_certified(race), running = 0;
+    int most = cheapest ? race->n : first_success(race), running = 0;
     if (!cheapest) cancel_after(race, most);
     for (int i = 0; i < most; i++) running += race->entry[i].state == CAV_RACE_RUNNING;
     for (int i = 0; i < most && running < race->processes && !*race->interrupted; i++) {
@@ -222,7 +225,8 @@ cav_status cav_race_finish(cav_race *race, int cheapest, cav_error *error) {
   }
 }
 
-// whether a is the better motion: the one that keeps more of the certificate's requires, in their order; or misses the same one
+// whether a is the better motion: the one that is certified and achieves what was asked; of two that are certified alone the
+// cheaper one; otherwise the one that keeps more of the certificate's requires, in their order; or misses the same one
 // by less
 static int better(const cav_race_report *a, const cav_race_report *b, int cheapest) {
   const cav_verdict *v = &a->verdict, *w = &b->verdict;
@@ -232,7 +236,10 @@ static int better(const cav_race_report *a, const cav_race_report *b, int cheape
                               {v->penetration_max_m, w->penetration_max_m, CAV_TOLERANCE_PENETRATION},
                               {v->momentum_defect_rms, w->momentum_defect_rms, CAV_TOLERANCE_MOMENTUM},
                               {v->replay_step_max_error, w->replay_step_max_error, CAV_TOLERANCE_STEP}};
-  if (v->certified && w->certified) return cheapest && a->cost < b->cost;
+  if (cav_race_success(a) && cav_race_success(b)) return cheapest && a->cost < b->cost;
+  if (cav_race_success(a) || cav_race_success(b)) return cav_race_success(a);
+  // what was asked is in the cost
+  if (v->certified && w->certified) return a->cost < b->cost;
   if (v->certified || w->certified) return v->certified;
   for (size_t k = 0; k < sizeof missed / sizeof *missed; k++)
     if (missed[k][0] > missed[k][2] || missed[k][1] > missed[k][2]) return missed[k][0] < missed[k][1];

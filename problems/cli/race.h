@@ -49,6 +49,9 @@ typedef struct cav_race {
   cav_race_entry entry[CAV_STRATEGIES];
 } cav_race;
 
+/// Whether a strategy ended with what is wanted: certified, and every target with a tolerance met.
+int cav_race_success(const cav_race_report *report);
+
 /// The strategies of the problem, at most as many.
 cav_status cav_race_open(cav_race *race, int most, cav_error *error);
 

@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "csv.h"
+
 // adds a line; value and limit are already text
 static void add(cav_certificate_line *line, int *n, const char *label, const char *value, const char *limit,
                 int passed) {
@@ -56,7 +58,31 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
   return n;
 }
 
-void cav_certificate_print(FILE *out, const char *problem, const char *model, const cav_verdict *v) {
+enum { TARGETS_SHOWN = 12 };
+
+// targets, those missed first; a line for the rest
+static void print_targets(FILE *out, const cav_problem *problem, const cav_term_report *report) {
+  static const char *const mark[] = {"MISSED", "ok"};
+  int shown = 0, all = 0;
+  for (int i = 0; i < problem->nterm; i++) all += report[i].has_target;
+  if (all == 0) return;
+  fprintf(out, "%-32s %-18s %8s %10s %10s %10s %10s\n", "asked", "", "at, s", "wanted", "got", "off", "within");
+  for (int met = 0; met < 2; met++) {
+    for (int i = 0; i < problem->nterm && shown < TARGETS_SHOWN; i++) {
+      const cav_term_report *r = &report[i];
+      if (!r->has_target || r->met != met) continue;
+      char within[24] = "";
+      if (isfinite(r->within)) snprintf(within, sizeof within, "%.3g", r->within);
+      const char *name = problem->term[i].name && *problem->term[i].name ? problem->term[i].name : "unnamed";
+      fprintf(out, "  %-30.30s %-18.18s %8.4g %10.4g %10.4g %10.3g %10s %s %s\n", name, r->what, r->time, r->wanted,
+              r->got, r->off, within, r->unit, isfinite(r->within) ? mark[r->met] : "");
+      shown++;
+    }
+  }
+  if (shown < all) fprintf(out, "  and %d more in terms.csv\n", all - shown);
+}
+
+void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verdict *v, const cav_term_report *report) {
   static const char *const mark[] = {"NOT", "ok"};
   cav_certificate_line line[CAV_CERTIFICATE_LINES];
   int n = cav_certificate_lines(v, line);
@@ -65,6 +91,7 @@ void cav_certificate_print(FILE *out, const char *problem, const char *model, co
     fprintf(out, "  %-46s %12s  %10s  %s\n", line[i].label, line[i].value, line[i].limit,
             line[i].passed < 0 ? "" : mark[line[i].passed]);
   }
+  if (report) print_targets(out, problem, report);
   if (!isnan(v->solve_seconds)) fprintf(out, "  solved in %.1f s, %d iterations\n", v->solve_seconds, v->iterations);
   fprintf(out, "%s, ", cav_verdict_feasible(v) ? "feasible" : "NOT feasible");
   if (isnan(v->optimality))
@@ -72,8 +99,12 @@ void cav_certificate_print(FILE *out, const char *problem, const char *model, co
   else
     fprintf(out, "%s to %.1g (the word needs %g)\n", cav_verdict_optimal(v) ? "optimal" : "NOT optimal, but",
             v->optimality, CAV_TOLERANCE_OPTIMAL);
-  fprintf(out, "%s: %s on %s", v->certified ? "certified" : "NOT certified", problem, model);
-  fprintf(out, v->certified ? "\n" : "\n  %s\n", v->reason);
+  fprintf(out, "%s: %s on %s\n", v->certified ? "certified" : "NOT certified", problem->name, problem->model->name);
+  if (!v->certified) fprintf(out, "  %s\n", v->reason);
+  if (v->achieved) return;
+  fprintf(out, "NOT achieved: %s misses %s", v->certified ? "it obeys physics, but" : "it also", v->missed);
+  if (v->nmissed > 1) fprintf(out, ", and %d more of %d targets", v->nmissed - 1, v->ntarget);
+  fputc('\n', out);
 }
 
 void cav_certificate_json_text(FILE *out, const char *text) {
@@ -97,16 +128,61 @@ static void write_number(FILE *out, const char *name, double value) {
     fprintf(out, ",\n  \"%s\": null", name);
 }
 
-void cav_certificate_json(FILE *out, const char *problem, const char *model, const cav_verdict *v) {
+static void write_target(FILE *out, const char *name, const cav_term_report *r) {
+  fputs("    {\"name\": ", out);
+  cav_certificate_json_text(out, name ? name : "");
+  fputs(", \"what\": ", out);
+  cav_certificate_json_text(out, r->what);
+  fputs(", \"unit\": ", out);
+  cav_certificate_json_text(out, r->unit);
+  const struct {
+    const char *name;
+    double value;
+  } field[] = {{"time", r->time}, {"wanted", r->wanted}, {"got", r->got},
+               {"off", r->off},   {"within", r->within}, {"cost_fraction", r->fraction}};
+  for (size_t k = 0; k < sizeof field / sizeof *field; k++) {
+    if (isfinite(field[k].value))
+      fprintf(out, ", \"%s\": %.17g", field[k].name, field[k].value);
+    else
+      fprintf(out, ", \"%s\": null", field[k].name);
+  }
+  fprintf(out, ", \"met\": %s}", r->met ? "true" : "false");
+}
+
+void cav_certificate_terms(FILE *out, const cav_problem *problem, const cav_term_report *report) {
+  fputs("term,quantity_missed_most,unit,time,wanted,got,off,within,met,cost,cost_fraction\n", out);
+  for (int i = 0; i < problem->nterm; i++) {
+    const cav_term_report *r = &report[i];
+    const double value[] = {r->time, r->wanted, r->got, r->off, r->within};
+    cav_table_write_text(out, problem->term[i].name ? problem->term[i].name : "");
+    fputc(',', out);
+    cav_table_write_text(out, r->what);
+    fprintf(out, ",%s", r->unit);
+    for (int k = 0; k < 5; k++) {
+      fputc(',', out);
+      if (r->has_target) cav_table_write_number(out, value[k]);
+    }
+    fprintf(out, ",%s,", !r->has_target || !isfinite(r->within) ? "" : r->met ? "1" : "0");
+    cav_table_write_number(out, r->cost);
+    fputc(',', out);
+    cav_table_write_number(out, r->fraction);
+    fputc('\n', out);
+  }
+}
+
+void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdict *v, const cav_term_report *report) {
   fputs("{\n  \"problem\": ", out);
-  cav_certificate_json_text(out, problem);
+  cav_certificate_json_text(out, problem->name);
   fputs(",\n  \"model\": ", out);
-  cav_certificate_json_text(out, model);
+  cav_certificate_json_text(out, problem->model->name);
   fprintf(out, ",\n  \"certified\": %s", v->certified ? "true" : "false");
   fprintf(out, ",\n  \"feasible\": %s", cav_verdict_feasible(v) ? "true" : "false");
   fprintf(out, ",\n  \"optimal\": %s", cav_verdict_optimal(v) ? "true" : "false");
   fputs(",\n  \"reason\": ", out);
   cav_certificate_json_text(out, v->reason);
+  fprintf(out, ",\n  \"achieved\": %s,\n  \"missed\": ", v->achieved ? "true" : "false");
+  cav_certificate_json_text(out, v->missed);
+  write_number(out, "cost", v->cost);
   write_number(out, "unactuated_force_max", v->unactuated_force_max);
   write_number(out, "unactuated_force_knot", v->unactuated_force_knot);
   write_number(out, "momentum_defect_rms", v->momentum_defect_rms);
@@ -128,5 +204,12 @@ void cav_certificate_json(FILE *out, const char *problem, const char *model, con
   write_number(out, "duration", v->duration);
   write_number(out, "solve_seconds", v->solve_seconds);
   write_number(out, "iterations", isnan(v->solve_seconds) ? (double)NAN : (double)v->iterations);
-  fputs("\n}\n", out);
+  fputs(",\n  \"targets\": [", out);
+  for (int i = 0, first = 1; report && i < problem->nterm; i++) {
+    if (!report[i].has_target) continue;
+    fputs(first ? "\n" : ",\n", out);
+    write_target(out, problem->term[i].name, &report[i]);
+    first = 0;
+  }
+  fputs("]\n}\n", out);
 }

@@ -18,11 +18,17 @@ typedef struct cav_certificate_line {
 /// The lines of a verdict; returns their number.
 int cav_certificate_lines(const cav_verdict *verdict, cav_certificate_line line[CAV_CERTIFICATE_LINES]);
 
-/// Prints the table and the verdict in words.
-void cav_certificate_print(FILE *out, const char *problem, const char *model, const cav_verdict *verdict);
+/// Prints the table, what was asked and what the motion does (report [problem->nterm], NULL: left out), and the verdict in
+/// words.
+void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verdict *verdict,
+                           const cav_term_report *report);
 
 /// Writes the verdict as one JSON object with a line end; numbers that are not known are null.
-void cav_certificate_json(FILE *out, const char *problem, const char *model, const cav_verdict *verdict);
+void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdict *verdict,
+                          const cav_term_report *report);
+
+/// terms.csv: one line a term.
+void cav_certificate_terms(FILE *out, const cav_problem *problem, const cav_term_report *report);
 
 /// Writes text as a JSON string.
 void cav_certificate_json_text(FILE *out, const char *text);

@@ -75,6 +75,7 @@ static int verdict_lines(const cav_verdict *verdict, cav_certificate_line *told,
                          char seconds[64]) {
   int n = 0, count = cav_certificate_lines(verdict, told);
   if (!verdict->certified) line[n++] = (cav_view_line){"not certified", verdict->reason, -1};
+  if (!verdict->achieved) line[n++] = (cav_view_line){"misses", verdict->missed, -1};
   for (int i = 0; i < count; i++) line[n++] = (cav_view_line){told[i].label, told[i].value, told[i].passed};
   if (isnan(verdict->solve_seconds)) return n;
   snprintf(seconds, 64, "%.1f s, %d iterations", verdict->solve_seconds, verdict->iterations);
@@ -103,7 +104,7 @@ cav_status cav_page_write(const char *path, const cav_problem *problem, const ca
     memcpy(force[i].force, forces->force[i].force, sizeof force[i].force);
   }
   cav_certificate_line told[CAV_CERTIFICATE_LINES];
-  cav_view_line line[CAV_CERTIFICATE_LINES + 2];
+  cav_view_line line[CAV_CERTIFICATE_LINES + 3];
   char seconds[64], title[300];
   snprintf(title, sizeof title, "%.140s on %.140s", problem->name, model->name);
   cav_view_input input = {.title = title,

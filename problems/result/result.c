@@ -176,16 +176,21 @@ cav_status cav_result_write(const char *folder, const cav_problem *problem, cons
 }
 
 cav_status cav_result_write_verdict(const char *folder, const cav_problem *problem, const cav_verdict *verdict,
-                                    cav_error *error) {
-  char *path = cav_result_path(folder, "verdict.json");
-  if (!path) return no_memory(error);
+                                    const cav_term_report *report, cav_error *error) {
+  char *path = cav_result_path(folder, "verdict.json"), *terms = cav_result_path(folder, "terms.csv");
   cav_file file;
-  cav_status status = cav_file_begin(&file, path, error);
+  cav_status status = path && terms ? cav_file_begin(&file, path, error) : no_memory(error);
   if (!status) {
-    cav_certificate_json(file.stream, problem->name, problem->model->name, verdict);
+    cav_certificate_json(file.stream, problem, verdict, report);
+    status = cav_file_end(&file, error);
+  }
+  if (!status && report) status = cav_file_begin(&file, terms, error);
+  if (!status && report) {
+    cav_certificate_terms(file.stream, problem, report);
     status = cav_file_end(&file, error);
   }
   free(path);
+  free(terms);
   return status;
 }
 

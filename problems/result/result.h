@@ -25,9 +25,9 @@ cav_status cav_result_folder(const char *folder, cav_error *error);
 cav_status cav_result_write(const char *folder, const cav_problem *problem, const cav_solution *solution,
                             cav_error *error);
 
-/// Writes verdict.json.
+/// Writes verdict.json and, with the report of its terms (may be NULL), terms.csv.
 cav_status cav_result_write_verdict(const char *folder, const cav_problem *problem, const cav_verdict *verdict,
-                                    cav_error *error);
+                                    const cav_term_report *report, cav_error *error);
 
 /// Writes forces.csv and view.html from the motion; verdict may be NULL.
 cav_status cav_result_write_page(const char *folder, const cav_problem *problem, const cav_trajectory *trajectory,

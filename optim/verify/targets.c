@@ -1,0 +1,230 @@
+/// What was asked and what the motion does: every term of a problem with its cost, and for those with a target the knot at
+/// which it is missed most: what was wanted there, what is, how far off, and whether that is within the term's tolerance.
+/// Costs are summed here from the meaning of the terms in problem.h, apart from the optimiser's rows; the sum is the
+/// motion's cost (tests/test_targets.c holds it against the solver's).
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "verification.h"
+
+// tolerances of goals stated at one time, where the term gives none
+static const double within_length = 0.03, within_angle = 0.1, within_speed = 0.3, within_ratio = 0.1;
+
+// unit of a sensor's reading and the tolerance it has by default; 0: none, the quantity has no usual one
+static const char *sensor_unit(const cav_model *model, const cav_sensor *sensor, double *within) {
+  *within = 0;
+  switch (sensor->type) {
+    case CAV_SENSOR_FRAMEPOS:
+    case CAV_SENSOR_SUBTREECOM:
+    case CAV_SENSOR_RANGEFINDER:
+      *within = within_length;
+      return "m";
+    case CAV_SENSOR_JOINTPOS:
+    case CAV_SENSOR_JOINTLIMITPOS: {
+      int hinge = model->joint[sensor->object].type != CAV_JOINT_SLIDE;
+      *within = hinge ? within_angle : within_length;
+      return hinge ? "rad" : "m";
+    }
+    case CAV_SENSOR_FRAMEQUAT:
+    case CAV_SENSOR_BALLQUAT:
+      *within = within_angle;
+      return "rad";
+    case CAV_SENSOR_FRAMEXAXIS:
+    case CAV_SENSOR_FRAMEYAXIS:
+    case CAV_SENSOR_FRAMEZAXIS:
+      *within = within_ratio;
+      return "";
+    case CAV_SENSOR_JOINTVEL:
+    case CAV_SENSOR_JOINTLIMITVEL: {
+      int hinge = model->joint[sensor->object].type != CAV_JOINT_SLIDE;
+      *within = within_speed;
+      return hinge ? "rad/s" : "m/s";
+    }
+    case CAV_SENSOR_FRAMELINVEL:
+    case CAV_SENSOR_SUBTREELINVEL:
+    case CAV_SENSOR_VELOCIMETER:
+      *within = within_speed;
+      return "m/s";
+    case CAV_SENSOR_FRAMEANGVEL:
+    case CAV_SENSOR_GYRO:
+    case CAV_SENSOR_BALLANGVEL:
+      *within = within_speed;
+      return "rad/s";
+    case CAV_SENSOR_SUBTREEANGMOM:
+      return "kg m2/s";
+    case CAV_SENSOR_TOUCH:
+    case CAV_SENSOR_FORCE:
+    case CAV_SENSOR_TENDONLIMITFRC:
+      return "N";
+    case CAV_SENSOR_TORQUE:
+      return "N m";
+    case CAV_SENSOR_JOINTLIMITFRC:
+    case CAV_SENSOR_ACTUATORFRC:
+      return "N or N m";
+    case CAV_SENSOR_ACCELEROMETER:
+    case CAV_SENSOR_FRAMELINACC:
+      return "m/s2";
+    case CAV_SENSOR_FRAMEANGACC:
+      return "rad/s2";
+    case CAV_SENSOR_TENDONPOS:
+    case CAV_SENSOR_TENDONLIMITPOS:
+    case CAV_SENSOR_ACTUATORPOS:
+      *within = within_length;
+      return "m or rad";
+    case CAV_SENSOR_TENDONVEL:
+    case CAV_SENSOR_TENDONLIMITVEL:
+    case CAV_SENSOR_ACTUATORVEL:
+      *within = within_speed;
+      return "m/s or rad/s";
+    case CAV_SENSOR_CLOCK:
+      return "s";
+    case CAV_SENSOR_MAGNETOMETER:
+    case CAV_SENSOR_TYPES:
+      break;
+  }
+  return "";
+}
+
+// whether a term names a value to be reached: at one time, by a target of its own, or as a constraint
+static int states_target(const cav_term *term) {
+  if (cav_quantity_rule_of(term->quantity)->of == CAV_OF_CONTACTS) return 0;
+  return term->use != CAV_USE_COST || term->from == term->to || term->target != NULL || term->within > 0;
+}
+
+// tolerance that decides whether the term is met; infinite: told only
+static double tolerance_of(const cav_term *term, double usual) {
+  if (term->within > 0) return term->within;
+  if (term->use != CAV_USE_COST) return CAV_TOLERANCE_CONSTRAINT * term->scale;
+  return term->from == term->to && usual > 0 ? usual : INFINITY;
+}
+
+// number of the dof that the k-th selected value of a term belongs to
+static int selected_dof(const cav_model *model, const cav_term *term, int k) {
+  for (int d = 0; d < model->nv; d++)
+    if (cav_verification_selects(model, term, d) && k-- == 0) return d;
+  return -1;
+}
+
+// unit, usual tolerance and a text for the value that is missed most
+static void describe(const cav_model *model, const cav_term *term, int k, cav_term_report *r, double *usual) {
+  static const char *const axis[] = {"x", "y", "z"};
+  const char *unit = "";
+  *usual = 0;
+  r->what[0] = 0;
+  if (term->quantity == CAV_QUANTITY_SENSOR) {
+    int one = term->component >= 0 ? term->component : k, several = term->sensor.dim >= 3 && one < 3;
+    unit = sensor_unit(model, &term->sensor, usual);
+    snprintf(r->what, sizeof r->what, "%s%s%s", cav_sensor_rule_of(term->sensor.type)->name, several ? " " : "",
+             several ? axis[one] : "");
+  } else if (term->quantity == CAV_QUANTITY_EFFORT) {
+    unit = "of limit";
+    snprintf(r->what, sizeof r->what, "effort of %.40s", k < model->nu ? model->actuator[k].name : "");
+  } else {
+    int d = selected_dof(model, term, k);
+    const cav_joint *joint = d >= 0 ? &model->joint[model->dof[d].joint] : NULL;
+    int line = joint && (joint->type == CAV_JOINT_SLIDE || (joint->type == CAV_JOINT_FREE && d - joint->dof < 3));
+    static const char *const units[][2] = {{"rad", "m"}, {"rad/s", "m/s"}, {"rad/s2", "m/s2"}};
+    int rate = term->quantity == CAV_QUANTITY_VELOCITY ? 1 : term->quantity == CAV_QUANTITY_ACCELERATION ? 2 : 0;
+    unit = units[rate][line];
+    *usual = rate == 0 ? (line ? within_length : within_angle) : rate == 1 ? within_speed : 0;
+    if (joint) {
+      int several = joint->type == CAV_JOINT_FREE || joint->type == CAV_JOINT_BALL;
+      snprintf(r->what, sizeof r->what, "%.40s%s%s", *joint->name ? joint->name : "joint", several ? " " : "",
+               several ? axis[(d - joint->dof) % 3] : "");
+    }
+  }
+  snprintf(r->unit, sizeof r->unit, "%s", unit);
+}
+
+// distance of one value to what is wanted there: the target, or the nearest of a range
+static double miss_of(const cav_term *term, double x, double target, double *wanted) {
+  *wanted = target;
+  if (term->use != CAV_USE_RANGE) return x - target;
+  double left = x - target;
+  *wanted = target + fmin(fmax(left, term->lower), term->upper);
+  return x - *wanted;
+}
+
+// keeps knot t if the term is missed more there than at any knot before
+static void note_target(const cav_verification *verification, const cav_term *term, int t, int n, const double *x,
+                        const double *target, cav_term_report *r) {
+  int vector = term->quantity == CAV_QUANTITY_SENSOR && n > 1, worst = 0;
+  double square = 0, most = -1, wanted;
+  for (int k = 0; k < n; k++) {
+    double miss = fabs(miss_of(term, x[k], target[k], &wanted));
+    square += miss * miss;
+    if (!(miss <= most)) most = miss, worst = k;
+  }
+  double off = vector ? sqrt(square) : most, usual;
+  if (r->has_target && !(off > r->off)) return;
+  r->has_target = 1;
+  r->off = off;
+  r->got = x[worst];
+  miss_of(term, x[worst], target[worst], &r->wanted);
+  r->time = t * verification->h;
+  describe(verification->model, term, worst, r, &usual);
+  r->within = tolerance_of(term, usual);
+}
+
+// cost of one value
+static double norm_of(const cav_term *term, double x) {
+  return term->norm == CAV_NORM_ABSOLUTE ? sqrt(1 + x * x) - 1 : 0.5 * x * x;
+}
+
+// weight of a knot in the sum that a cost is: the step over a window, 1 at one knot; both ends of a cycle are one knot
+static double knot_weight(const cav_verification *verification, const cav_term *term, int t) {
+  int single, whole;
+  if (!cav_verification_holds(verification, term, t, &single, &whole)) return 0;
+  int forced = term->quantity != CAV_QUANTITY_CONFIGURATION && term->quantity != CAV_QUANTITY_VELOCITY;
+  if (term->quantity == CAV_QUANTITY_SENSOR)
+    forced = cav_sensor_rule_of(term->sensor.type)->stage == CAV_READS_ACCELERATION;
+  if (verification->problem->cycle.on && whole && t == 0 && !forced) return 0;
+  return single ? 1 : verification->h;
+}
+
+void cav_targets_note(const cav_verification *verification, int t, double *work, cav_term_report *report) {
+  int room = (cav_constraint_check_room(verification) - verification->model->nq) / 2;
+  double *q = work, *x = q + verification->model->nq, *target = x + room;
+  for (int i = 0; i < verification->problem->nterm; i++) {
+    const cav_term *term = verification->problem->term + i;
+    double weight = knot_weight(verification, term, t);
+    if (weight == 0) continue;
+    int n = cav_verification_measure(verification, term, t, q, x, target);
+    if (n > 0 && states_target(term)) note_target(verification, term, t, n, x, target, &report[i]);
+    if (term->use != CAV_USE_COST) continue;
+    // velocities and accelerations at the start are given: no cost is taken for what no unknown moves
+    int fixed = t == 0 && !verification->problem->cycle.on;
+    if (fixed && (term->quantity == CAV_QUANTITY_VELOCITY || term->quantity == CAV_QUANTITY_CONFIGURATION)) continue;
+    for (int k = 0; k < n; k++)
+      report[i].cost += weight * term->weight * norm_of(term, (x[k] - target[k]) / term->scale);
+  }
+}
+
+void cav_targets_verdict(const cav_verification *verification, cav_term_report *report, cav_verdict *verdict) {
+  const cav_problem *p = verification->problem;
+  double worst = 0, duration = verification->last * verification->h;
+  verdict->cost = p->duration_most > 0 ? 0.5 * p->duration_weight * duration * duration : 0;
+  verdict->ntarget = verdict->nmissed = 0;
+  verdict->missed[0] = 0;
+  for (int i = 0; i < p->nterm; i++) verdict->cost += report[i].cost;
+  for (int i = 0; i < p->nterm; i++) {
+    cav_term_report *r = &report[i];
+    r->fraction = verdict->cost > 0 ? r->cost / verdict->cost : 0;
+    if (!r->has_target) continue;
+    // a value that is not a number is not met
+    r->met = r->off <= r->within;
+    verdict->ntarget += isfinite(r->within);
+    if (r->met) continue;
+    verdict->nmissed++;
+    if (isnan(r->off) || r->off / r->within > worst) {
+      worst = isnan(r->off) ? INFINITY : r->off / r->within;
+      const char *name = p->term[i].name && *p->term[i].name ? p->term[i].name : r->what;
+      snprintf(verdict->missed, sizeof verdict->missed,
+               "'%.60s' by %.3g %s (within %.3g) at %.3g s: wanted %.4g, got %.4g", name, r->off, r->unit, r->within,
+               r->time, r->wanted, r->got);
+    }
+  }
+  verdict->achieved = verdict->nmissed == 0;
+}
