@@ -468,8 +468,8 @@ static cav_status read_within(const cav_problem_reader *reader, const cav_xml_no
   const char *text = cav_xml_text(node, "within", NULL);
   if (!text) return CAV_OK;
   char *end = NULL;
-  term->within = strcmp(text, "any") ? strtod(text, &end) : INFINITY;
-  if (!end || (*text && !*end && term->within > 0 && isfinite(term->within))) return CAV_OK;
+  term->within = strcmp(text, "any") ? cav_file_number(text, &end) : INFINITY;
+  if (!end || (end > text && !*end && term->within > 0 && isfinite(term->within))) return CAV_OK;
   return cav_xml_fail(reader->error, node, "within",
                       "expected a number above 0, in the unit of the quantity, or 'any', got '%.40s'", text);
 }
