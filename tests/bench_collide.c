@@ -1,5 +1,5 @@
-/// Time of cav_contacts_find on the humanoid against mj_collision, same states, in turns: a posture in the air, where the
-/// broad phase is nearly all, and random postures near the ground; exact law, and the smoothed law's longer reach.
+/// Time of cav_contacts_find on the humanoid against mj_collision, same states, in turns: a posture in the air, where
+/// the broad phase is nearly all, and random postures near the ground; exact law, and the smoothed law's longer reach.
 #include <time.h>
 
 #include "check.h"

@@ -1,8 +1,8 @@
-/// Error against time of the ways to du/dq, du/dv and du/dv_next: one-sided and centred staged differences, analytic, and
-/// MuJoCo's staged one-sided differences on the same states of the same model, by number of constraint rows. Errors are those
-/// of du/dq, which both libraries define alike, relative to its norm, against a sixth-order difference; states at which two
-/// steps of that disagree, at a kink, are left out. A time is the shortest of several runs; shown are medians over states.
-/// Usage: bench_derivative [MODEL]; default mujoco/humanoid.xml among the shared models.
+/// Error against time of the ways to du/dq, du/dv and du/dv_next: one-sided and centred staged differences, analytic,
+/// and MuJoCo's staged one-sided differences on the same states of the same model, by number of constraint rows. Errors
+/// are those of du/dq, which both libraries define alike, relative to its norm, against a sixth-order difference;
+/// states at which two steps of that disagree, at a kink, are left out. A time is the shortest of several runs; shown
+/// are medians over states. Usage: bench_derivative [MODEL]; default mujoco/humanoid.xml among the shared models.
 #include "bench.h"
 #include "step.h"
 

@@ -1,7 +1,7 @@
 /// The paper's figure 3: time of one step of the inverse and of the forward dynamics with 5 and with 50 sweeps of
-/// Gauss-Seidel, and their ratios, against the number of constraint rows, on the 27-dof humanoid dragged about by its trunk:
-/// a spring to a place that jumps takes the part of the mouse. As there, contacts have all friction directions, so that
-/// their Jacobian grows large: condim 6. Beside them Newton's method to convergence, whose answer is exact.
+/// Gauss-Seidel, and their ratios, against the number of constraint rows, on the 27-dof humanoid dragged about by its
+/// trunk: a spring to a place that jumps takes the part of the mouse. As there, contacts have all friction directions,
+/// so that their Jacobian grows large: condim 6. Beside them Newton's method to convergence, whose answer is exact.
 /// Times are the shortest of several runs of one state, the four by turns; shown are medians over the states of a bin.
 /// Usage: bench_forward [FILE]; FILE gets the table in columns. tests/figures.sh draws it.
 #include "bench.h"
@@ -43,7 +43,8 @@ static double *kept(const double *x, int n) {
   return copy;
 }
 
-// springs from the trunk to a place that jumps now and then, often below the floor, and weak random moments in the joints
+// springs from the trunk to a place that jumps now and then, often below the floor, and weak random moments in the
+// joints
 static void drag(const double *q, const double *v, double target[3], int step, double *u) {
   if (step % 80 == 0) {
     target[0] = q[0] + scene_uniform();

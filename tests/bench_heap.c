@@ -1,11 +1,10 @@
-/// Time of one forward step of heaps of free bodies against its error, beside MuJoCo's Newton solver on the same states of
-/// the same model: elliptic cones, no warm start on either side, constraints of the file, MuJoCo's Jacobian dense and sparse.
-/// Times are of the processor. Error is that of v_next against the same library's own answer run to the end, relative to the largest entry: the two libraries
-/// find contacts of their own, so answers differ a little. For each number of iterations a time and an error; shown is the
-/// least time that reaches an error. A heap is dropped into a tray and followed by MuJoCo
-/// to the middle of its fall and to its rest. Beside it scenes that come
-/// apart: the same bodies spread over the floor in piles, and lying alone.
-/// Usage: bench_heap [BODIES...]; default 30 100 300.
+/// Time of one forward step of heaps of free bodies against its error, beside MuJoCo's Newton solver on the same states
+/// of the same model: elliptic cones, no warm start on either side, constraints of the file, MuJoCo's Jacobian dense
+/// and sparse. Times are of the processor. Error is that of v_next against the same library's own answer run to the
+/// end, relative to the largest entry: the two libraries find contacts of their own, so answers differ a little. For
+/// each number of iterations a time and an error; shown is the least time that reaches an error. A heap is dropped into
+/// a tray and followed by MuJoCo to the middle of its fall and to its rest. Beside it scenes that come apart: the same
+/// bodies spread over the floor in piles, and lying alone. Usage: bench_heap [BODIES...]; default 30 100 300.
 #include "bench.h"
 #include "hessian.h"
 

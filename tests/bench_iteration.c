@@ -1,7 +1,7 @@
-/// Time of one Gauss-Newton iteration of our humanoid at 40 knots on one thread, split into dynamics with derivatives, assembly
-/// and factorisation, by method of derivatives. The motion is a stance from which every joint is moved a little, under the
-/// contact law of the schedule's first, middle and last stage. Times are the shortest of several runs.
-/// Usage: bench_iteration [PROBLEM]; default problems/motions/squat-jump.
+/// Time of one Gauss-Newton iteration of our humanoid at 40 knots on one thread, split into dynamics with derivatives,
+/// assembly and factorisation, by method of derivatives. The motion is a stance from which every joint is moved a
+/// little, under the contact law of the schedule's first, middle and last stage. Times are the shortest of several
+/// runs. Usage: bench_iteration [PROBLEM]; default problems/motions/squat-jump.
 #include "bench.h"
 #include "continuation.h"
 #include "transcription.h"

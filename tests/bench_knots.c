@@ -1,6 +1,7 @@
-/// Time and memory of a solve against the number of knots: a chain of our own, fixed to the world, that swings to a goal, over 50,
-/// 500 and 5,000 knots of the same step. Each size is a process of its own, so that the largest resident memory is its own;
-/// iterations are fixed, so that time is of equal work. Linear growth shows as equal numbers in the columns per knot.
+/// Time and memory of a solve against the number of knots: a chain of our own, fixed to the world, that swings to a
+/// goal, over 50, 500 and 5,000 knots of the same step. Each size is a process of its own, so that the largest resident
+/// memory is its own; iterations are fixed, so that time is of equal work. Linear growth shows as equal numbers in the
+/// columns per knot.
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>

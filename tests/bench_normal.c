@@ -1,6 +1,6 @@
-/// Time of the normal equations' factorisation and solution, as they are and by CHOLMOD on the same entries: a motion in a band, a
-/// cycle of 60 knots, and scenes with free bodies that touch nothing. Times are of the processor, shortest of several.
-/// Usage: bench_normal [PROBLEM]...
+/// Time of the normal equations' factorisation and solution, as they are and by CHOLMOD on the same entries: a motion
+/// in a band, a cycle of 60 knots, and scenes with free bodies that touch nothing. Times are of the processor, shortest
+/// of several. Usage: bench_normal [PROBLEM]...
 #include "bench.h"
 #include "continuation.h"
 #include "sparse.h"

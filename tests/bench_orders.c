@@ -1,9 +1,9 @@
-/// Error against run time of the orders of the step, on one thread. Forces: the inverse along a prescribed flight of a humanoid
-/// whose joints swing at up to 6 rad/s, against that of a step a hundred times finer; and what an inverse, its analytic
-/// derivatives and a Gauss-Newton iteration take. Motion: the humanoid thrown without weight, its joints free or at work,
-/// forwards, against a step much finer; with what becomes of momentum (half way between knots, where momentum keeps it) and
-/// energy. Velocities start half a step back, as the steps read them (optim/METHOD.md, 1). Times are the shortest of several.
-/// Usage: bench_orders [MODEL]; default problems/models/humanoid.xml.
+/// Error against run time of the orders of the step, on one thread. Forces: the inverse along a prescribed flight of a
+/// humanoid whose joints swing at up to 6 rad/s, against that of a step a hundred times finer; and what an inverse, its
+/// analytic derivatives and a Gauss-Newton iteration take. Motion: the humanoid thrown without weight, its joints free
+/// or at work, forwards, against a step much finer; with what becomes of momentum (half way between knots, where
+/// momentum keeps it) and energy. Velocities start half a step back, as the steps read them (optim/METHOD.md, 1). Times
+/// are the shortest of several. Usage: bench_orders [MODEL]; default problems/models/humanoid.xml.
 #include "bench.h"
 #include "continuation.h"
 #include "transcription.h"

@@ -1,7 +1,7 @@
-/// The broad phase. First what bounding spheres leave of the pairs of the shared models, in random postures: pairs, those whose
-/// bounds meet, those that touch. Then the time of cav_contacts_find and of a whole inverse with 10 to 800 free bodies scattered so
-/// that each touches a few others, when all pairs are looked at and when a sweep prunes them (sweep.c), by turns: where the two
-/// cross is CAV_SWEEP_FROM. Usage: bench_sweep.
+/// The broad phase. First what bounding spheres leave of the pairs of the shared models, in random postures: pairs,
+/// those whose bounds meet, those that touch. Then the time of cav_contacts_find and of a whole inverse with 10 to 800
+/// free bodies scattered so that each touches a few others, when all pairs are looked at and when a sweep prunes them
+/// (sweep.c), by turns: where the two cross is CAV_SWEEP_FROM. Usage: bench_sweep.
 #include "bench.h"
 #include "math3.h"
 #include "step.h"

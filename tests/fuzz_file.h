@@ -1,4 +1,5 @@
-/// What the fuzzers of model files share: bytes as a file in memory, loaded as a model and, where that works, evaluated once.
+/// What the fuzzers of model files share: bytes as a file in memory, loaded as a model and, where that works, evaluated
+/// once.
 #ifndef CAVORT_TESTS_FUZZ_FILE_H
 #define CAVORT_TESTS_FUZZ_FILE_H
 

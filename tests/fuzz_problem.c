@@ -1,6 +1,7 @@
-/// Fuzzer of problem files: any bytes give a problem or a reason; its first knots are evaluated with derivatives at an end of
-/// the schedule, and one step of the trust region is taken; some are solved for an iteration, verified and explained. Rows stay
-/// in their patterns. Models and tables lie in a folder of this process (tests/fuzz/models); no other file is opened.
+/// Fuzzer of problem files: any bytes give a problem or a reason; its first knots are evaluated with derivatives at an
+/// end of the schedule, and one step of the trust region is taken; some are solved for an iteration, verified and
+/// explained. Rows stay in their patterns. Models and tables lie in a folder of this process (tests/fuzz/models); no
+/// other file is opened.
 #include "fuzz_file.h"
 
 #include <dirent.h>

@@ -90,8 +90,9 @@ static inline cav_problem motion_window(const cav_problem *problem, const cav_tr
   return part;
 }
 
-/// Ipopt's first-order checker on gradient, Jacobian and its sparsity at every knot of a solution. The whole at once would take
-/// the cube of the number of knots, so windows of five knots are taken that overlap by two: rows see three neighbouring knots.
+/// Ipopt's first-order checker on gradient, Jacobian and its sparsity at every knot of a solution. The whole at once
+/// would take the cube of the number of knots, so windows of five knots are taken that overlap by two: rows see three
+/// neighbouring knots.
 static inline motion_findings motion_check_derivatives(const cav_problem *problem, const cav_trajectory *at) {
   enum { STEPS = 5, OVERLAP = 2 };
   static const cav_ipopt_option no_iterations = {"max_iter", "0"};

@@ -1,14 +1,14 @@
-/// A contact carries its own proof. With normal n and distance d, the points pos -+ n d/2 lie on the two surfaces, and the
-/// supporting planes there are d apart: then no translation shorter than |d| along n parts (or joins) the two. That no other
-/// direction does with less is asked of a dense set of directions and of climbs from the best of them.
+/// A contact carries its own proof. With normal n and distance d, the points pos -+ n d/2 lie on the two surfaces, and
+/// the supporting planes there are d apart: then no translation shorter than |d| along n parts (or joins) the two. That
+/// no other direction does with less is asked of a dense set of directions and of climbs from the best of them.
 #ifndef CAVORT_TESTS_PROOF_H
 #define CAVORT_TESTS_PROOF_H
 
 #include "check.h"
 #include "pairs.h"
 
-/// Signed distance of a world point to the surface of a shape; of a mesh from inside, from outside that to the planes of its
-/// faces, a lower bound; NAN of a height field.
+/// Signed distance of a world point to the surface of a shape; of a mesh from inside, from outside that to the planes
+/// of its faces, a lower bound; NAN of a height field.
 static inline double proof_height(const cav_shape *s, const double p[3]) {
   double d[3], x[3], n[3], most = -INFINITY;
   sub3(d, p, s->pos);
@@ -38,8 +38,8 @@ static inline double proof_height(const cav_shape *s, const double p[3]) {
   return NAN;
 }
 
-/// Gap between the supporting planes of two convex shapes along n, from a to b: a lower bound of their signed distance, which
-/// is the largest of these over all n.
+/// Gap between the supporting planes of two convex shapes along n, from a to b: a lower bound of their signed distance,
+/// which is the largest of these over all n.
 static inline double proof_gap(const cav_shape *a, const cav_shape *b, const double n[3]) {
   double x[3], y[3], back[3], d[3];
   scale3(back, -1, n);

@@ -1,5 +1,5 @@
-/// What was asked and what a motion does: reports of terms against motions whose misses are known, the verdict's word for it, and
-/// the cost of a motion summed anew against the solver's.
+/// What was asked and what a motion does: reports of terms against motions whose misses are known, the verdict's word
+/// for it, and the cost of a motion summed anew against the solver's.
 #include <string.h>
 #include <unistd.h>
 
@@ -42,7 +42,8 @@ static cav_problem *problem_with(const char *cost, cav_error *error) {
 
 static cav_trajectory *hanging(const cav_problem *p) { return cav_trajectory_new(p->model, 51, 0.02); }
 
-// a pendulum that hangs still obeys physics and misses a goal above it by half a turn, or by what its bob lacks in height
+// a pendulum that hangs still obeys physics and misses a goal above it by half a turn, or by what its bob lacks in
+// height
 static void test_hanging(void) {
   cav_error error = {0};
   cav_problem *p = problem_with(

@@ -1,5 +1,5 @@
-/// Actuators: moments against differences of lengths, the projection of u and the inputs that give it; lengths, moments,
-/// forces and parameters against MuJoCo's, on a scene with every kind and on arm26 and slider_crank.
+/// Actuators: moments against differences of lengths, the projection of u and the inputs that give it; lengths,
+/// moments, forces and parameters against MuJoCo's, on a scene with every kind and on arm26 and slider_crank.
 #include "scene.h"
 
 #ifdef CAVORT_HAVE_MUJOCO
@@ -80,8 +80,8 @@ static void test_inputs(const cav_model *m) {
 }
 
 #ifdef CAVORT_HAVE_MUJOCO
-// a site that pulls against another one: MuJoCo 2.2.2 composes their turns in the wrong order and so has another length,
-// and moves dofs that carry both, though the length does not depend on them
+// a site that pulls against another one: MuJoCo 2.2.2 composes their turns in the wrong order and so has another
+// length, and moves dofs that carry both, though the length does not depend on them
 static int joined(const cav_actuator *a) { return a->transmission == CAV_TRANSMISSION_SITE && a->reference >= 0; }
 
 // parameters as the file means them

@@ -1,8 +1,9 @@
-/// Analytic derivatives of the inverse, of contacts and of sensors against sixth-order differences, on every model at hand:
-/// all joints, limits, tendons, friction losses, springs, contacts of all pairs, exact and smoothed law, all orders,
-/// both stabilisations. A column is compared where two steps of the reference agree: elsewhere the law, the narrow phase
-/// or a limit has a kink within the step. Also: refusals are explicit, wrong calls fail. If this test fails because a new
-/// force or constraint has no derivative in dynamics/derivative/analytic.c yet, name it in cav_derivatives_missing.
+/// Analytic derivatives of the inverse, of contacts and of sensors against sixth-order differences, on every model at
+/// hand: all joints, limits, tendons, friction losses, springs, contacts of all pairs, exact and smoothed law, all
+/// orders, both stabilisations. A column is compared where two steps of the reference agree: elsewhere the law, the
+/// narrow phase or a limit has a kink within the step. Also: refusals are explicit, wrong calls fail. If this test
+/// fails because a new force or constraint has no derivative in dynamics/derivative/analytic.c yet, name it in
+/// cav_derivatives_missing.
 #include "scene.h"
 #include "step.h"
 

@@ -1,5 +1,5 @@
-/// Ipopt's own derivative checker, which has to find nothing where derivatives are right and a Jacobian or
-/// gradient that is wrong by a hundredth where they are not; motions solved by our own path and then Ipopt, and by Ipopt alone.
+/// Ipopt's own derivative checker, which has to find nothing where derivatives are right and a Jacobian or gradient
+/// that is wrong by a hundredth where they are not; motions solved by our own path and then Ipopt, and by Ipopt alone.
 /// The motions themselves go through the checker in test_solve.c, at their solutions.
 #include "motion.h"
 #include "transcription.h"

@@ -1,5 +1,5 @@
-/// The broad phase against the narrow phase of every pair, cav_contact_activation, the options that switch contacts off, contact
-/// axes, and MuJoCo's contacts on models no one here wrote.
+/// The broad phase against the narrow phase of every pair, cav_contact_activation, the options that switch contacts
+/// off, contact axes, and MuJoCo's contacts on models no one here wrote.
 #include "check.h"
 #include "math3.h"
 #include "step.h"

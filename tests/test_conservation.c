@@ -1,10 +1,10 @@
 /// Energy and momentum of systems that keep them: free fall, a body that tumbles about its middle axis in flight
-/// (Dzhanibekov), a chain of pendulums. The forward step runs without applied force. The drift of a quantity is its largest
-/// departure from its first value, relative to a scale of the motion; it falls with the step as the order of the step says:
-/// with the first power for `euler`, the second for `midpoint` and `momentum`; `momentum` keeps momenta to rounding, half way
-/// between knots, where it takes them (half_step.c). v_t = (q_t - q_{t-1})/h belongs half a step before its knot
-/// (optim/METHOD.md, 1), so quantities at a knot take the mean of the velocities that reach and leave it.
-/// Usage: test_conservation prints the table that is kept in results/conservation.txt.
+/// (Dzhanibekov), a chain of pendulums. The forward step runs without applied force. The drift of a quantity is its
+/// largest departure from its first value, relative to a scale of the motion; it falls with the step as the order of
+/// the step says: with the first power for `euler`, the second for `midpoint` and `momentum`; `momentum` keeps momenta
+/// to rounding, half way between knots, where it takes them (half_step.c). v_t = (q_t - q_{t-1})/h belongs half a step
+/// before its knot (optim/METHOD.md, 1), so quantities at a knot take the mean of the velocities that reach and leave
+/// it. Usage: test_conservation prints the table that is kept in results/conservation.txt.
 #include "scene.h"
 
 enum { STEPS = 5 };
@@ -121,8 +121,8 @@ static void check_order(const char *what, const double *d, cav_order order, int 
   }
   double power = derivative(d[0], d[STEPS - 1]);
   printf("| %s | %.2f |\n", what, power);
-  // bound: the next power of the step spoils a derivative by some percent; seen 0.96 to 1.03 and 1.99 to 2.02. The bounds of one order
-  // refuse the other
+  // bound: the next power of the step spoils a derivative by some percent; seen 0.96 to 1.03 and 1.99 to 2.02. The
+  // bounds of one order refuse the other
   CHECK_NEAR(power, order == CAV_ORDER_EULER ? 1 : 2, 0.1);
 }
 

@@ -1,6 +1,7 @@
-/// Coulomb's law of contacts: the closed form against its own conditions, against the convex law at de Saxce's lowered reference
-/// and against differences; and what bodies do under it, against closed forms: a block that slides, is pushed, a ball that
-/// comes to roll, a spinning ball, a foot that passes above the floor. Each also under the convex law, which must not do it.
+/// Coulomb's law of contacts: the closed form against its own conditions, against the convex law at de Saxce's lowered
+/// reference and against differences; and what bodies do under it, against closed forms: a block that slides, is
+/// pushed, a ball that comes to roll, a spinning ball, a foot that passes above the floor. Each also under the convex
+/// law, which must not do it.
 #include "constraint.h"
 #include "scene.h"
 
@@ -98,7 +99,8 @@ static void test_derivatives(void) {
     }
   }
   printf("derivatives: %.1e off, gradient of the potential %.1e\n", worst, gradient);
-  // differences over 1e-5: rounding 1e-11 of f, third derivatives 1e-10; a potential may be 1e4 times what it changes by
+  // differences over 1e-5: rounding 1e-11 of f, third derivatives 1e-10; a potential may be 1e4 times what it changes
+  // by
   CHECK(worst <= 1e-7 && gradient <= 1e-6);
 }
 
@@ -189,7 +191,8 @@ static double gap(void) {
   return q[2] - 0.1;
 }
 
-// a block that cannot turn, thrown over a floor: slows down at mu g and stays where it sank to at rest; the convex law lifts it
+// a block that cannot turn, thrown over a floor: slows down at mu g and stays where it sank to at rest; the convex law
+// lifts it
 static void test_block(void) {
   if (!open_scene("<mujoco><option timestep='.01'/><worldbody><geom type='plane' size='50 5 1' friction='.4 0 0'/>"
                   "<body pos='0 0 0'><joint type='slide' axis='1 0 0'/><joint type='slide' axis='0 1 0'/>"
@@ -241,7 +244,8 @@ static void test_block(void) {
   close_scene();
 }
 
-// a ball thrown without spin: m v r + I omega stays, so it rolls at 5/7 of the speed (less what it sank in), from 2 v0/(7 mu g) on
+// a ball thrown without spin: m v r + I omega stays, so it rolls at 5/7 of the speed (less what it sank in), from 2
+// v0/(7 mu g) on
 static void test_ball(void) {
   if (!open_scene("<mujoco><option timestep='.002'/><worldbody><geom type='plane' size='50 5 1' friction='.3 0 0'/>"
                   "<body pos='0 0 .1'><freejoint/><geom type='sphere' size='.1' mass='2' friction='.3 0 0'/></body>"
@@ -274,7 +278,8 @@ static void test_ball(void) {
   close_scene();
 }
 
-// a ball that spins about the normal: torsional friction mu_t m g, mu_t a length; one that rolls: mu_r m g against its rolling
+// a ball that spins about the normal: torsional friction mu_t m g, mu_t a length; one that rolls: mu_r m g against its
+// rolling
 static void test_spin(void) {
   if (!open_scene(
           "<mujoco><option timestep='.005'/><default><geom friction='.5 .02 .004' condim='6'/></default>"

@@ -1,6 +1,6 @@
-/// Cycles: the map from one period to the next on a body with every kind of joint (moved, turned, mirrored), what is refused and
-/// why, the element of problem files, and a hopper of our own that hops for ever: certified by both solvers, its wrap exact to
-/// rounding, with a free duration that moves to where the cost is least, or to its bound.
+/// Cycles: the map from one period to the next on a body with every kind of joint (moved, turned, mirrored), what is
+/// refused and why, the element of problem files, and a hopper of our own that hops for ever: certified by both
+/// solvers, its wrap exact to rounding, with a free duration that moves to where the cost is least, or to its bound.
 #include "cavort/cavort.h"
 #include "motion.h"
 #include "periodicity.h"

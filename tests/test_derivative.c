@@ -1,6 +1,6 @@
 /// Finite differences of the inverse: against a higher-order difference, one-sided and centred; staged columns are the
-/// columns of full evaluations; du/dv_next is M/h where nothing touches; the state ends at the point; failures leave the
-/// outputs alone.
+/// columns of full evaluations; du/dv_next is M/h where nothing touches; the state ends at the point; failures leave
+/// the outputs alone.
 #include "scene.h"
 #include "step.h"
 

@@ -1,5 +1,5 @@
-/// Heights of a field from files: binary and PNG images of our own making give their numbers, damaged ones a reason, what is no
-/// file is refused at once; the same image gives the same field in MuJoCo.
+/// Heights of a field from files: binary and PNG images of our own making give their numbers, damaged ones a reason,
+/// what is no file is refused at once; the same image gives the same field in MuJoCo.
 #include "elevation.h"
 
 #include <signal.h>

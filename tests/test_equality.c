@@ -1,5 +1,5 @@
-/// Equality constraints. Errors against their rates and their Jacobian rows; the inverse against both forward solvers, in
-/// open and closed chains; u against MuJoCo's mj_inverse. Each check has a control that must differ.
+/// Equality constraints. Errors against their rates and their Jacobian rows; the inverse against both forward solvers,
+/// in open and closed chains; u against MuJoCo's mj_inverse. Each check has a control that must differ.
 #include "impulse.h"
 #include "scene.h"
 #include "step.h"
@@ -164,8 +164,8 @@ static void test_round_trip(bench *b, const char *name, int gauss_seidel) {
   }
   printf("%-10s forward of the inverse: newton %.1e in %d, gauss-seidel %.1e in %d, mismatch %.1e\n", name, newton,
          iterations, gpgs, sweeps, mismatch);
-  // bound: tolerance of the solvers on u, whose entries go to 1e6 where velocities at random violate stiff ties, through
-  // the lightest link; seen 3e-9 and 7e-9
+  // bound: tolerance of the solvers on u, whose entries go to 1e6 where velocities at random violate stiff ties,
+  // through the lightest link; seen 3e-9 and 7e-9
   CHECK(newton < 1e-7);
   CHECK(gpgs < 1e-7);
 }

@@ -1,10 +1,11 @@
-/// Regularisers by the true diagonal of A, and coupled rows: against dense algebra done here, against both forward solvers,
-/// and that stages may be reused. Each has a control.
+/// Regularisers by the true diagonal of A, and coupled rows: against dense algebra done here, against both forward
+/// solvers, and that stages may be reused. Each has a control.
 #include "impulse.h"
 #include "scene.h"
 #include "step.h"
 
-/// Every kind of row at once: contacts of 1, 3, 4 and 6 rows, limits of hinge, slide, ball and tendon, friction losses, ties.
+/// Every kind of row at once: contacts of 1, 3, 4 and 6 rows, limits of hinge, slide, ball and tendon, friction losses,
+/// ties.
 static const char every_row[] =
     "<mujoco><compiler angle='degree'/><option timestep='.004'/><worldbody><geom type='plane' size='1 1 1'/>"
     "<body name='a' pos='0 0 .28'><freejoint/><geom type='box' size='.1 .2 .3' friction='.7 .02 .01' condim='6'/>"

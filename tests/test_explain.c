@@ -1,5 +1,6 @@
-/// optim/explain/explain.c, constraint_rows.c: problems made impossible on purpose, each named with the right row and knot; penalties on one that can
-/// be solved against what loosening its bound saves; rows of another problem refused; rows.csv bit for bit.
+/// optim/explain/explain.c, constraint_rows.c: problems made impossible on purpose, each named with the right row and
+/// knot; penalties on one that can be solved against what loosening its bound saves; rows of another problem refused;
+/// rows.csv bit for bit.
 #include <unistd.h>
 
 #include "cavort/cavort.h"
@@ -180,8 +181,8 @@ static void check_penalty(void) {
       multiplier += 0.5 * o.explanation.conflict[0].row.multiplier;
     done(&o);
   }
-  // mean of both ends against the derivative between; a lower bound's multiplier is negative. Bound 2 %: both solves stop at
-  // relative decreases of 1e-5
+  // mean of both ends against the derivative between; a lower bound's multiplier is negative. Bound 2 %: both solves
+  // stop at relative decreases of 1e-5
   CHECK(multiplier < 0);
   CHECK_NEAR((cost[1] - cost[0]) / 0.01, -multiplier, 0.02 * fabs(multiplier));
 }

@@ -1,4 +1,5 @@
-/// Gains of the regulator: those of a mass on a line against the closed form, and a spinning ball that they must bring back.
+/// Gains of the regulator: those of a mass on a line against the closed form, and a spinning ball that they must bring
+/// back.
 #include "lqr.h"
 
 #include "scene.h"
@@ -48,8 +49,8 @@ static void check_cart(void) {
   cav_model_free(model);
 }
 
-/// A block spins about its middle axis, which is unstable, by hand-made forces: in 3 s the gains bring an error of 0.05 rad/s
-/// down by a thousand, and without them it grows.
+/// A block spins about its middle axis, which is unstable, by hand-made forces: in 3 s the gains bring an error of 0.05
+/// rad/s down by a thousand, and without them it grows.
 static void check_ball(void) {
   cav_model *model = scene_load(ball);
   cav_problem problem = rest(model, 3);

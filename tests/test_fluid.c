@@ -1,5 +1,5 @@
-/// Drag and lift of a medium and gravity compensation: forces against MuJoCo's mj_inverse on a scene with both models of
-/// fluids, drag of a known shape by hand, forward against inverse, and weightless bodies.
+/// Drag and lift of a medium and gravity compensation: forces against MuJoCo's mj_inverse on a scene with both models
+/// of fluids, drag of a known shape by hand, forward against inverse, and weightless bodies.
 #include "scene.h"
 
 #ifdef CAVORT_HAVE_MUJOCO

@@ -237,8 +237,8 @@ static void choose(bench *b, const setting *s) {
   b->state->options.time_constant = 0.0;
 }
 
-// a random state and force whose step is one: at joint speeds near 2/h a step of the second order need not exist. Penetrations
-// close to a joint axis that the deadbeat law takes back at once lead there in one state of a hundred
+// a random state and force whose step is one: at joint speeds near 2/h a step of the second order need not exist.
+// Penetrations close to a joint axis that the deadbeat law takes back at once lead there in one state of a hundred
 static int random_problem(bench *b, const setting *s) {
   for (int trial = 0; trial < 100; trial++) {
     choose(b, s);
@@ -262,7 +262,8 @@ static int solved(cav_status status, int *without) {
   return status == CAV_OK;
 }
 
-// how far found is from the v_next that made u; another solution of Coulomb's law is counted, and is one to the last digits
+// how far found is from the v_next that made u; another solution of Coulomb's law is counted, and is one to the last
+// digits
 static double apart(bench *b, int *others) {
   const int nv = b->model->nv;
   const double error = difference(b->found, b->v_next, nv) / largest(b->v_next, nv);
@@ -619,8 +620,8 @@ static void test_stiff_and_fast(void) {
   bench_close(&b);
 }
 
-// long chains without a contact: the smooth problem is linear, so a step and its check suffice, and the answer is as good
-// as rounding in the balance allows, relative to the largest momentum
+// long chains without a contact: the smooth problem is linear, so a step and its check suffice, and the answer is as
+// good as rounding in the balance allows, relative to the largest momentum
 static void test_chains(void) {
   static const int links[] = {30, 50, 100};
   static char text[1 << 17];

@@ -1,5 +1,5 @@
-/// optim/solver/guess.c: the held start, the way from start to goal, postures on the way, turns, arcs and swings, each at its knots;
-/// and what a problem file may not ask of a guess.
+/// optim/solver/guess.c: the held start, the way from start to goal, postures on the way, turns, arcs and swings, each
+/// at its knots; and what a problem file may not ask of a guess.
 #include <unistd.h>
 
 #include "check.h"

@@ -1,7 +1,8 @@
-/// The order momentum: rows of roots against the same sums written out from poses of links, all others against midpoint; momenta of a body that tumbles
-/// about its middle axis (Dzhanibekov), of a humanoid thrown while its joints work, and of one that falls on the floor,
-/// over a thousand steps; that it and midpoint approach each other with the square of the step; that sensors of force
-/// read what the step exerts. Derivatives: test_analytic.c. Energy: test_conservation.c.
+/// The order momentum: rows of roots against the same sums written out from poses of links, all others against
+/// midpoint; momenta of a body that tumbles about its middle axis (Dzhanibekov), of a humanoid thrown while its joints
+/// work, and of one that falls on the floor, over a thousand steps; that it and midpoint approach each other with the
+/// square of the step; that sensors of force read what the step exerts. Derivatives: test_analytic.c. Energy:
+/// test_conservation.c.
 #include "scene.h"
 
 static const char tumbler[] =

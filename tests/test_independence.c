@@ -1,6 +1,6 @@
-/// The verifier shares nothing with what it verifies: each part of the optimiser that it could have used is broken here (calls are
-/// redirected by the linker), the optimiser goes along with the error, and the certificate is refused for that reason. Then
-/// its own map of a cycle against the optimiser's, on every kind of joint.
+/// The verifier shares nothing with what it verifies: each part of the optimiser that it could have used is broken here
+/// (calls are redirected by the linker), the optimiser goes along with the error, and the certificate is refused for
+/// that reason. Then its own map of a cycle against the optimiser's, on every kind of joint.
 #include "cavort/cavort.h"
 #include "cycle_image.h"
 #include "motion.h"
@@ -154,8 +154,8 @@ static const char *const sided =
     "<body name='arm_r' pos='-.1 -.1 .1' euler='-20 30 0'><joint name='shoulder_r' type='ball'/>"
     "<geom type='capsule' size='.03' fromto='0 0 0 .1 0 -.25' mass='.4'/></body></body></worldbody></mujoco>";
 
-// two rods that swap angles, seen by their mirror: in the period that is given the left one only sinks and the right one only
-// rises, which takes more. A left motor that could not raise its rod shows one period on, and nowhere else
+// two rods that swap angles, seen by their mirror: in the period that is given the left one only sinks and the right
+// one only rises, which takes more. A left motor that could not raise its rod shows one period on, and nowhere else
 static void check_second_period(double left, int expected) {
   enum { LAST = 25 };
   char text[1400];

@@ -1,6 +1,7 @@
-/// The inverse by identities: Newton-Euler is linear in the acceleration with M as its matrix; power balance; stages give
-/// the same bits as one call; the midpoint order; springs as gradients of their energy; limits, friction loss and contacts
-/// at rest, at saturation and between free bodies; discrete stabilisation; smoothing towards the exact law, which fades without a jump; bad numbers.
+/// The inverse by identities: Newton-Euler is linear in the acceleration with M as its matrix; power balance; stages
+/// give the same bits as one call; the midpoint order; springs as gradients of their energy; limits, friction loss and
+/// contacts at rest, at saturation and between free bodies; discrete stabilisation; smoothing towards the exact law,
+/// which fades without a jump; bad numbers.
 #include <malloc.h>
 
 #include "scene.h"
@@ -430,7 +431,8 @@ static void action_and_reaction(void) {
   close_bench(&b);
 }
 
-// the smoothed law: off the kink it is the exact one but for exp(-lambda/sigma); on it, sigma log 2; active at a distance
+// the smoothed law: off the kink it is the exact one but for exp(-lambda/sigma); on it, sigma log 2; active at a
+// distance
 static void smoothing(void) {
   bench b = open_bench(two_balls);
   cav_options *o = &b.state->options;
@@ -604,7 +606,8 @@ static double largest_jump(bench *b, double from, double to, double speed) {
   return jump / most;
 }
 
-// the smoothed law does not jump where a contact enters the list faster than its activation distance foresees, nor where axes cross
+// the smoothed law does not jump where a contact enters the list faster than its activation distance foresees, nor
+// where axes cross
 static void fading(void) {
   bench fast = open_bench(
       "<mujoco><option gravity='0 0 0' timestep='.02'/><worldbody><geom type='plane' size='1 1 1'/>"

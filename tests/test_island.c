@@ -1,6 +1,6 @@
-/// Forward steps of scenes that come apart and of heaps that CHOLMOD factors: against each other, against the parts alone, and
-/// for their bits. What tells that the parts are right: the sum of two scenes steps as each does, and dense and
-/// sparse factors lead to one answer.
+/// Forward steps of scenes that come apart and of heaps that CHOLMOD factors: against each other, against the parts
+/// alone, and for their bits. What tells that the parts are right: the sum of two scenes steps as each does, and dense
+/// and sparse factors lead to one answer.
 #include "hessian.h"
 #include "scene.h"
 #include "sparse.h"
@@ -100,8 +100,8 @@ static void test_ways(void) {
       CHECK(!cav_sparse_available() || cav_hessian_sparse_islands(s.state->work->hessian) == 2 - k);
       printf("softness %d, CHOLMOD from %.0e: apart from dense %.1e\n", soft, from[k],
              worst(dense, s.next, s.model->nv));
-      // rounding of J v_next by 1e-16 is an impulse larger by 1/softness, that a box without other contacts would follow;
-      // seen 2e-16, 3e-8, and 0 where CHOLMOD finds no factor and the dense way stands in
+      // rounding of J v_next by 1e-16 is an impulse larger by 1/softness, that a box without other contacts would
+      // follow; seen 2e-16, 3e-8, and 0 where CHOLMOD finds no factor and the dense way stands in
       const double bound[] = {1e-12, 1e-13 / 1e-6, 1e-13 / 1e-9};
       CHECK_NEAR(worst(dense, s.next, s.model->nv), 0, bound[soft]);
     }

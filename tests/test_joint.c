@@ -1,8 +1,8 @@
-/// The paper's figure 2: impulses of dry friction, contact and limit in a single joint under random control, by the forward
-/// dynamics (Gauss-Seidel) and by the inverse at the velocity that the forward step reaches. They are to agree to 1e-10; the
-/// paper shows 1e-5.
-/// Usage: test_joint [FILE]; FILE gets a line a step: time, angle, control, then friction, contact and limit impulses of the
-/// forward and of the inverse dynamics, N s and N m s. tests/figures.sh draws it.
+/// The paper's figure 2: impulses of dry friction, contact and limit in a single joint under random control, by the
+/// forward dynamics (Gauss-Seidel) and by the inverse at the velocity that the forward step reaches. They are to agree
+/// to 1e-10; the paper shows 1e-5. Usage: test_joint [FILE]; FILE gets a line a step: time, angle, control, then
+/// friction, contact and limit impulses of the forward and of the inverse dynamics, N s and N m s. tests/figures.sh
+/// draws it.
 #include "scene.h"
 #include "step.h"
 

@@ -1,6 +1,6 @@
-/// Kinematics, inertia and momentum by identities: frames are rotations, velocities are the derivatives of poses, M from
-/// composite bodies is the M that Newton-Euler shows column by column, the sparse factorisation solves, kinetic energy
-/// and momentum agree between their two definitions.
+/// Kinematics, inertia and momentum by identities: frames are rotations, velocities are the derivatives of poses, M
+/// from composite bodies is the M that Newton-Euler shows column by column, the sparse factorisation solves, kinetic
+/// energy and momentum agree between their two definitions.
 #include "scene.h"
 #include "step.h"
 

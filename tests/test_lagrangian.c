@@ -1,7 +1,7 @@
-/// optim/transcription/lagrangian.c: Gauss-Newton's Hessian of the costs plus the curvature that is left out of it is the Hessian of
-/// the Lagrangian: its products with directions against centred differences of the Lagrangian's gradient, on a planar leg that
-/// stands on a floor, with a hard sensor and multipliers at random. Seen: 6e-5 of the product (bound 1e-4); without the
-/// curvature 0.2 and more.
+/// optim/transcription/lagrangian.c: Gauss-Newton's Hessian of the costs plus the curvature that is left out of it is
+/// the Hessian of the Lagrangian: its products with directions against centred differences of the Lagrangian's
+/// gradient, on a planar leg that stands on a floor, with a hard sensor and multipliers at random. Seen: 6e-5 of the
+/// product (bound 1e-4); without the curvature 0.2 and more.
 #include "gauss_newton.h"
 #include "lagrangian.h"
 #include "scene.h"

@@ -1,7 +1,7 @@
-/// Memory: hot functions allocate nothing after their first call; what a scene does not have takes no byte; and where the
-/// n-th allocation fails, for every n, loading, states, inverse, forward and solving say CAV_NO_MEMORY, leave nothing behind
-/// and work the next time, to the same bits.
-/// The allocator is counted by taking its place (glibc); skipped under sanitizers, which take it themselves.
+/// Memory: hot functions allocate nothing after their first call; what a scene does not have takes no byte; and where
+/// the n-th allocation fails, for every n, loading, states, inverse, forward and solving say CAV_NO_MEMORY, leave
+/// nothing behind and work the next time, to the same bits. The allocator is counted by taking its place (glibc);
+/// skipped under sanitizers, which take it themselves.
 #include <errno.h>
 #include <malloc.h>
 

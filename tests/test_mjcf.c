@@ -1,6 +1,6 @@
 /// Broken model files: every one gives an error with file and line, never a crash and never a model. The files are in
-/// tests/broken; what no one wants in a repository (100 MB of brackets, binary junk, a folder, every truncation of a good
-/// file, random damage) is made here. Where no sanitizer owns malloc, the n-th allocation fails, for every n.
+/// tests/broken; what no one wants in a repository (100 MB of brackets, binary junk, a folder, every truncation of a
+/// good file, random damage) is made here. Where no sanitizer owns malloc, the n-th allocation fails, for every n.
 
 #include <errno.h>
 #include <locale.h>

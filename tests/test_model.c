@@ -1,6 +1,6 @@
-/// Loaded models against what MuJoCo makes of the same files: sizes, masses, frames, joints, tendons, actuators, sensors,
-/// keyframes, inverse weights, and the list of pairs with their mixed parameters. Plus what needs no peer: names, lookup,
-/// constancy, own extensions (frame). Peer checks are left out, visibly, without MuJoCo.
+/// Loaded models against what MuJoCo makes of the same files: sizes, masses, frames, joints, tendons, actuators,
+/// sensors, keyframes, inverse weights, and the list of pairs with their mixed parameters. Plus what needs no peer:
+/// names, lookup, constancy, own extensions (frame). Peer checks are left out, visibly, without MuJoCo.
 
 #include <unistd.h>
 
@@ -48,8 +48,9 @@ static const char features[] = CAVORT_SOURCE_ROOT "/tests/features.xml";
 
 // rounding of a short chain of operations; largest residual seen 3.1e-15 relative
 static const double rounding = 1e-11;
-// MuJoCo's eigenvalue routine (mju_eig3) stops at an error up to 1e-6: where a body has general inertia (only in the file of
-// features) its inertia and what depends on it agree to that; largest residual seen 9.1e-9. Ours is held to 1e-14 below
+// MuJoCo's eigenvalue routine (mju_eig3) stops at an error up to 1e-6: where a body has general inertia (only in the
+// file of features) its inertia and what depends on it agree to that; largest residual seen 9.1e-9. Ours is held to
+// 1e-14 below
 static double slack = 1e-11;
 
 static double worst, worst_slack;

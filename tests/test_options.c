@@ -1,5 +1,5 @@
-/// Options declared in tables: what is outside a table is refused everywhere by name, a change of any option is seen, and what
-/// is written of a law or a stage reads back to the same bits, field by field.
+/// Options declared in tables: what is outside a table is refused everywhere by name, a change of any option is seen,
+/// and what is written of a law or a stage reads back to the same bits, field by field.
 #include "cavort/solve.h"
 #include "check.h"
 #include "options.h"

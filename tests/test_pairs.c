@@ -1,6 +1,6 @@
-/// Contact of two shapes: each carries its own proof (proof.h), and in deep overlaps no other direction is shorter. Then
-/// invariance under motions of both, derivatives of the gap by small displacements, degenerate poses, and MuJoCo. Meshes and
-/// height fields have tests of their own (test_mesh.c).
+/// Contact of two shapes: each carries its own proof (proof.h), and in deep overlaps no other direction is shorter.
+/// Then invariance under motions of both, derivatives of the gap by small displacements, degenerate poses, and MuJoCo.
+/// Meshes and height fields have tests of their own (test_mesh.c).
 #include "proof.h"
 
 #ifdef CAVORT_HAVE_MUJOCO
@@ -371,8 +371,8 @@ static void test_manifolds(void) {
   CHECK(cav_collide_shapes(&above, &drum, 0, touch) == 2);
 }
 
-// push of a capsule by a box when force decays over decay metres with distance: force and moment, and its size; 0 where the
-// capsule is deeper than half its radius: near its axis the normal turns at once
+// push of a capsule by a box when force decays over decay metres with distance: force and moment, and its size; 0 where
+// the capsule is deeper than half its radius: near its axis the normal turns at once
 static double push(const cav_shape *capsule, const cav_shape *box, double decay, double wrench[6]) {
   cav_touch touch[CAV_TOUCH_MAX];
   double size = 0, arm[3], moment[3];
@@ -390,8 +390,8 @@ static double push(const cav_shape *capsule, const cav_shape *box, double decay,
   return size;
 }
 
-// a capsule led around and over a box: what pushes it changes by no more than the way it went, also where points are far.
-// Half of the ways cross faces and edges in parallel to them
+// a capsule led around and over a box: what pushes it changes by no more than the way it went, also where points are
+// far. Half of the ways cross faces and edges in parallel to them
 static void test_led_over_box(void) {
   enum { WAYS = 200, STEPS = 5000 };
   static const double size[3] = {0.3, 0.4, 0.2}, rod[2] = {0.03, 0.1}, decay = 0.05;

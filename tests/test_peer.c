@@ -2,9 +2,9 @@
 /// joints past their limits, bodies in the floor and in each other. MuJoCo's inverse leaves implicit damping out, so
 /// B h a is added to it. A state may differ only if contacts do, and each that does is explained twice:
 ///  - given our contacts in the place of its own, MuJoCo computes the same u;
-///  - of each pair of geoms whose contacts differ, ours carries its proof and beats every other direction tried (proof.h),
-///    and the deepest of MuJoCo's misses its own by more than rounding; where we have none the two are apart. Only a capsule
-///    on a box may differ in its second point alone.
+///  - of each pair of geoms whose contacts differ, ours carries its proof and beats every other direction tried
+///    (proof.h), and the deepest of MuJoCo's misses its own by more than rounding; where we have none the two are
+///    apart. Only a capsule on a box may differ in its second point alone.
 /// A level height field is proven as the plane that it is. Skipped without MuJoCo or without the models.
 #include "proof.h"
 #include "scene.h"

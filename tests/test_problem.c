@@ -1,5 +1,5 @@
-/// optim/problem*.c: defaults, what files say, postures and their heights, terms, the way back to a file, and every kind of
-/// broken problem file, each with the line and the word that its error names.
+/// optim/problem*.c: defaults, what files say, postures and their heights, terms, the way back to a file, and every
+/// kind of broken problem file, each with the line and the word that its error names.
 #include "cavort/problem.h"
 
 #include <unistd.h>
@@ -96,7 +96,8 @@ static void check_defaults(void) {
   cav_problem_free(NULL);
 }
 
-/// Every quantity is a cost by its element, and a constraint where the table says so and nowhere else; read, written and read.
+/// Every quantity is a cost by its element, and a constraint where the table says so and nowhere else; read, written
+/// and read.
 static void check_quantities(void) {
   for (cav_quantity k = 0; k < CAV_QUANTITY_TYPES; k++) {
     const cav_quantity_rule *rule = cav_quantity_rule_of(k);

@@ -1,5 +1,6 @@
-/// What a problem leaves out of a model's file: the bodies and geoms that it names, all that refers to them, all that refers to
-/// that, and nothing else, also where names of other kinds are the same; a name that is not there is told with its line.
+/// What a problem leaves out of a model's file: the bodies and geoms that it names, all that refers to them, all that
+/// refers to that, and nothing else, also where names of other kinds are the same; a name that is not there is told
+/// with its line.
 #include "cavort/cavort.h"
 #include "scene.h"
 

@@ -1,5 +1,5 @@
-/// Solved motions in MuJoCo, with the contacts of the model's own file: feedforward and gains through MuJoCo's actuators and
-/// their limits, at a tenth of the step. All bodies' centres of mass have to end within 5 cm of the plan.
+/// Solved motions in MuJoCo, with the contacts of the model's own file: feedforward and gains through MuJoCo's
+/// actuators and their limits, at a tenth of the step. All bodies' centres of mass have to end within 5 cm of the plan.
 #include "check.h"
 
 #ifndef CAVORT_HAVE_MUJOCO

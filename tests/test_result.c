@@ -1,5 +1,5 @@
-/// problems/result/result.c, forces.c, certificate.c: a folder written from a made-up solution and read back bit for bit, forces that
-/// carry the weight of what rests, a verdict as JSON and as a table, and folders that are broken.
+/// problems/result/result.c, forces.c, certificate.c: a folder written from a made-up solution and read back bit for
+/// bit, forces that carry the weight of what rests, a verdict as JSON and as a table, and folders that are broken.
 #include "result.h"
 
 #include <unistd.h>

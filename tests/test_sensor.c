@@ -1,9 +1,9 @@
 /// Sensors against MuJoCo's on a model with every kind of them and on shared models, in random states with contacts and
-/// limits active; and identities that need no peer: forces of actuators come back, an accelerometer is the difference of a
-/// velocimeter, a scale under a standing box reads its weight.
-/// MuJoCo reads everything at (q, v, a); ours reads velocities at v_next, so each state is evaluated twice: for a step from v
-/// by a, and for a step that keeps v. Under a weld MuJoCo 2.2.2's torque sensors differ from ours (by up to 6 N m on this
-/// model); ours balance u, which is tested instead.
+/// limits active; and identities that need no peer: forces of actuators come back, an accelerometer is the difference
+/// of a velocimeter, a scale under a standing box reads its weight. MuJoCo reads everything at (q, v, a); ours reads
+/// velocities at v_next, so each state is evaluated twice: for a step from v by a, and for a step that keeps v. Under a
+/// weld MuJoCo 2.2.2's torque sensors differ from ours (by up to 6 N m on this model); ours balance u, which is tested
+/// instead.
 #include "scene.h"
 
 // a box of 3 kg on the floor, with a lid of half a kilogram

@@ -1,7 +1,6 @@
-/// Stabilisation, predicted against measured (Todorov 2014, section V): depth at rest, decay of sliding, critical damping
-/// by the diagonal and by coupled rows, convergence of soft to hard equality constraints, ODE's parameters; limits of twist,
-/// swing and distance. Prints the tables of
-/// results/stabilisation.md.
+/// Stabilisation, predicted against measured (Todorov 2014, section V): depth at rest, decay of sliding, critical
+/// damping by the diagonal and by coupled rows, convergence of soft to hard equality constraints, ODE's parameters;
+/// limits of twist, swing and distance. Prints the tables of results/stabilisation.md.
 #include "scene.h"
 
 typedef struct bench {
@@ -229,8 +228,8 @@ static void test_critical(void) {
 
 // --- soft to hard ---
 
-// a five-bar loop closed in space, although it can only move in a plane: two of the three rows of its connect repeat what
-// the joints say, twice where it is closed twice. It stands on the floor with a free foot in contact
+// a five-bar loop closed in space, although it can only move in a plane: two of the three rows of its connect repeat
+// what the joints say, twice where it is closed twice. It stands on the floor with a free foot in contact
 static const char loop[] =
     "<mujoco><option timestep='.002'/><default><joint axis='0 1 0' damping='.01'/><geom type='capsule' "
     "size='.03'/></default>"
@@ -361,7 +360,8 @@ static void test_ode(void) {
   // bound: rounding of velocities about 10 m/s; seen 2e-15
   CHECK(worst < 1e-12);
 
-  // the other way: ODE's step with what the row amounts to follows it, where the row's own mass 1/R is 1e-4 of the body's
+  // the other way: ODE's step with what the row amounts to follows it, where the row's own mass 1/R is 1e-4 of the
+  // body's
   double cfm, erp, apart[2];
   for (int fine = 0; fine < 2; fine++) {
     double step_size = fine ? 1e-4 : 1e-3, x = 0.1, v = 0;

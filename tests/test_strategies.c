@@ -1,6 +1,6 @@
-/// Strategies: which are offered to which problem, that a gait is found with the right signs, that taking one changes guess and
-/// schedule alone; and stages of the continuation that stall: taken back, reached half way, noted. Stalls are made by the
-/// linker, which puts a region that claims one in the place of the true one.
+/// Strategies: which are offered to which problem, that a gait is found with the right signs, that taking one changes
+/// guess and schedule alone; and stages of the continuation that stall: taken back, reached half way, noted. Stalls are
+/// made by the linker, which puts a region that claims one in the place of the true one.
 #include "continuation.h"
 #include "scene.h"
 
@@ -77,7 +77,8 @@ static void test_gait(const char *text, double axis, double travel) {
     CHECK(taken.nswing == 4 && taken.swing == gait->swing && taken.q_goal == goal && taken.duration == p.duration);
     CHECK(gait->swing[0].joint == hip && gait->swing[2].joint == knee);
     CHECK(gait->swing[1].joint == cav_object_find(m, CAV_OBJECT_JOINT, "hip_right"));
-    // turning about +y takes a hanging leg backwards; the knee bends to where its range is, while the leg comes forwards
+    // turning about +y takes a hanging leg backwards; the knee bends to where its range is, while the leg comes
+    // forwards
     CHECK(gait->swing[0].amplitude * axis * travel < 0 && gait->swing[1].amplitude == gait->swing[0].amplitude);
     CHECK_NEAR(gait->swing[1].phase - gait->swing[0].phase, M_PI, 1e-15);
     CHECK(gait->swing[2].amplitude > 0 && fabs(gait->swing[2].phase - M_PI / 2) < 1e-15);

@@ -1,5 +1,6 @@
-/// problems/study/study.c, profile.c, command_study.c, dynamics/model/perturb.c: a varied model against one loaded from a file that says the same;
-/// one start always the same, another one different; a study that is counted, drawn, resumed and not done twice.
+/// problems/study/study.c, profile.c, command_study.c, dynamics/model/perturb.c: a varied model against one loaded from
+/// a file that says the same; one start always the same, another one different; a study that is counted, drawn, resumed
+/// and not done twice.
 #include "study.h"
 
 #include <sys/stat.h>
@@ -37,7 +38,8 @@ static cav_model *load_cart(double friction, double cart_mass, double pole_mass)
   return model;
 }
 
-// all that follows from masses and friction, against the compiler's own way; bound 1e-12 relative: the same sums in other orders
+// all that follows from masses and friction, against the compiler's own way; bound 1e-12 relative: the same sums in
+// other orders
 static void check_perturb(void) {
   cav_model *expected = load_cart(0.7, 2 * 1.04, 0.5 * 0.97), *model = load_cart(1, 2, 0.5);
   const double scale[3] = {1, 1.04, 0.97}, wrong[3] = {1, 0, 1};

@@ -1,5 +1,6 @@
-/// Targets of terms from tables: by order and by name, for sensors, one component of a sensor, orientations, rates and postures;
-/// as costs and as constraints; between rows; in results as waypoints; and what is wrong with a table, with both files' lines.
+/// Targets of terms from tables: by order and by name, for sensors, one component of a sensor, orientations, rates and
+/// postures; as costs and as constraints; between rows; in results as waypoints; and what is wrong with a table, with
+/// both files' lines.
 #include "cavort/cavort.h"
 #include "scene.h"
 #include "transcription.h"

@@ -1,6 +1,6 @@
-/// Spatial tendons: arms against differences of lengths, forward against inverse, both against MuJoCo's lengths, arms and
-/// mj_inverse where it is there, on a scene with every kind of path. Wrapping against shapes known by hand, and paths
-/// that do not hold together refused.
+/// Spatial tendons: arms against differences of lengths, forward against inverse, both against MuJoCo's lengths, arms
+/// and mj_inverse where it is there, on a scene with every kind of path. Wrapping against shapes known by hand, and
+/// paths that do not hold together refused.
 #include "scene.h"
 #include "wrap.h"
 
@@ -73,7 +73,8 @@ static double arm_error(const cav_model *m, cav_state *state, cav_state *moved, 
       for (int e = t->dof; e < t->dof + t->ndof; e++) {
         if (m->tendon_dof[e] == j) arm = state->tendon_arm[e];
       }
-      // where wrapping begins between the two the derivative is that of neither side: such pairs are far apart or nothing
+      // where wrapping begins between the two the derivative is that of neither side: such pairs are far apart or
+      // nothing
       if (fabs(derivative - arm) < 1e-3) worst = fmax(worst, fabs(derivative - arm));
       CHECK(fabs(derivative - arm) < 0.5);
     }
@@ -127,8 +128,8 @@ static void test_forward(const cav_model *m) {
 }
 
 #ifdef CAVORT_HAVE_MUJOCO
-// MuJoCo stops its search for the corner of a string that comes through at 1e-7; ours agrees with differences. The side of
-// the ring is inside in the plane of some strings
+// MuJoCo stops its search for the corner of a string that comes through at 1e-7; ours agrees with differences. The side
+// of the ring is inside in the plane of some strings
 static int cornered(const cav_tendon *t) { return !strncmp(t->name, "through", 7) || !strcmp(t->name, "beside_ring"); }
 
 // largest difference of lengths and arms

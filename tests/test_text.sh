@@ -69,7 +69,7 @@ for f in texts:
 for f in sources:
     for number, line in enumerate(texts[f].splitlines(), 1):
         checks += 1
-        if len(line) > 200 and '"' not in line:
+        if len(line) > 130 and '"' not in line:
             failures.append(f'{f}:{number}: {len(line)} columns')
 
 print('\n'.join('failed: ' + x for x in failures))

@@ -1,4 +1,5 @@
-/// optim/trajectory/trajectory.c: making, differencing, resampling, and the CSV file both ways, with every kind of broken file.
+/// optim/trajectory/trajectory.c: making, differencing, resampling, and the CSV file both ways, with every kind of
+/// broken file.
 #include "cavort/trajectory.h"
 
 #include <locale.h>
@@ -121,7 +122,8 @@ static double misread(const cav_model *model, double h) {
   return worst;
 }
 
-// cubics with central derivatives read a smooth motion to h^4 in the middle of a step: seen a factor 15.8 a halving. Geodesics: 4
+// cubics with central derivatives read a smooth motion to h^4 in the middle of a step: seen a factor 15.8 a halving.
+// Geodesics: 4
 static void check_smooth(const cav_model *model) {
   double coarse = misread(model, 0.04), fine = misread(model, 0.02);
   printf("motion read between knots: %.2g at 0.04 s, %.2g at 0.02 s\n", coarse, fine);

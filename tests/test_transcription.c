@@ -1,16 +1,18 @@
-/// Derivatives of whole problems: the gradient of the merit at every unknown, first and last knots included, the rows of the
-/// constraints and their sparsity, against centred differences of the values; the same bits with one and two threads. The same of
-/// cycles, whose ends meet, moved, turned or mirrored, and with the step as an unknown; products and solutions of their
-/// bordered normal equations against dense ones.
-/// Seen: gradients to 2e-8 of their norm (bound 1e-6); rows to 3e-6 (bound 1e-4: the difference that they are compared with);
-/// analytic derivatives and centred differences give the same Hessians to 2e-8 (bound 1e-6); no nonzero outside the pattern, and none of the pattern of forces and ranges that stays zero.
+/// Derivatives of whole problems: the gradient of the merit at every unknown, first and last knots included, the rows
+/// of the constraints and their sparsity, against centred differences of the values; the same bits with one and two
+/// threads. The same of cycles, whose ends meet, moved, turned or mirrored, and with the step as an unknown; products
+/// and solutions of their bordered normal equations against dense ones. Seen: gradients to 2e-8 of their norm (bound
+/// 1e-6); rows to 3e-6 (bound 1e-4: the difference that they are compared with); analytic derivatives and centred
+/// differences give the same Hessians to 2e-8 (bound 1e-6); no nonzero outside the pattern, and none of the pattern of
+/// forces and ranges that stays zero.
 #include "gauss_newton.h"
 #include "readings.h"
 
 #include "rotation.h"
 #include "scene.h"
 
-/// A body that floats over and touches a floor, with a ball joint, a tendon, limits near their ends and an unactuated dof.
+/// A body that floats over and touches a floor, with a ball joint, a tendon, limits near their ends and an unactuated
+/// dof.
 #define WALKER(CORD, MORE)                                                                                         \
   "<mujoco><worldbody><geom name='floor' type='plane' size='1 1 1'/>"                                              \
   "<body name='trunk' pos='0 0 .3'><freejoint name='root'/><geom type='sphere' size='.1' mass='3'/>"               \
@@ -169,8 +171,8 @@ static void test_gradient(cav_transcription *tr, cav_trajectory *at) {
   cav_trajectory_free(moved);
 }
 
-/// Rows of the constraints against differences of their values, and their pattern: all that is nonzero is in it, and all that
-/// is in it is nonzero somewhere (but for hard sensor terms, whose pattern is that of the whole reading).
+/// Rows of the constraints against differences of their values, and their pattern: all that is nonzero is in it, and
+/// all that is in it is nonzero somewhere (but for hard sensor terms, whose pattern is that of the whole reading).
 static void test_rows(cav_transcription *tr, cav_trajectory *at, int tries) {
   const cav_model *m = tr->model;
   int width = 3 * m->nv, extra = 0, total = 0, unused = 0;
@@ -406,8 +408,8 @@ static void test_scene(const char *scene, closing close, cav_order order) {
   cav_model_free(m);
 }
 
-/// Trees that nothing joins: the Hessian is the product of the rows, made here, and its solutions are those of the dense matrix; a
-/// body that reaches another makes one group of the two.
+/// Trees that nothing joins: the Hessian is the product of the rows, made here, and its solutions are those of the
+/// dense matrix; a body that reaches another makes one group of the two.
 static void test_apart(int cyclic, int touching) {
   char text[2000];
   snprintf(text, sizeof text,
@@ -476,8 +478,8 @@ static void test_rotations(void) {
   }
 }
 
-/// Power of two motors that pull one slide, alone and by a geared tendon, and of one that turns a ball joint: each force times
-/// the mean velocity of its transmission over the weight, from Newton's law and least-norm forces by hand.
+/// Power of two motors that pull one slide, alone and by a geared tendon, and of one that turns a ball joint: each
+/// force times the mean velocity of its transmission over the weight, from Newton's law and least-norm forces by hand.
 static void test_power(void) {
   static const char text[] =
       "<mujoco><option gravity='0 0 -10'/><worldbody><body name='cart'><joint name='x' type='slide' axis='1 0 0'/>"
@@ -525,8 +527,8 @@ static void test_power(void) {
   cav_model_free(m);
 }
 
-/// Their closed forms near no rotation and near half a turn, where digits are lost: against the product of series, which has an error
-/// below a^8/9!, and about an axis against half the cotangent of half the angle.
+/// Their closed forms near no rotation and near half a turn, where digits are lost: against the product of series,
+/// which has an error below a^8/9!, and about an axis against half the cotangent of half the angle.
 static void test_rotation_digits(void) {
   for (double a = 1e-6; a < 0.05; a *= 1.3) {
     double phi[3] = {0, 0, a}, J[9], a2 = a * a;

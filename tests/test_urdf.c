@@ -1,5 +1,5 @@
-/// Reader of URDF: a robot with every kind of joint and shape, faults by line, damage, and what is left aside. Models no
-/// one here wrote are compared with MuJoCo in test_peer.c.
+/// Reader of URDF: a robot with every kind of joint and shape, faults by line, damage, and what is left aside. Models
+/// no one here wrote are compared with MuJoCo in test_peer.c.
 
 #include "scene.h"
 
@@ -240,7 +240,8 @@ static void test_peer(void) {
     most = fmax(most, scene_error(u, expected, p->nv));
   }
   printf("robot against MuJoCo: relative error of u %.1e in %d states, %d touching\n", most, compared, touching);
-  // MuJoCo diagonalises general inertia to 1e-6 only (test_model.c); with diagonal inertia test_peer.c sees 1e-14. Seen: 5e-9
+  // MuJoCo diagonalises general inertia to 1e-6 only (test_model.c); with diagonal inertia test_peer.c sees 1e-14.
+  // Seen: 5e-9
   CHECK_NEAR(most, 0, 1e-7);
   CHECK(compared > 300 && touching > 100);
   mj_deleteData(d);

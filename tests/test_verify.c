@@ -1,8 +1,7 @@
 // Verification against motions made by hand whose faults are known: each fault has a sound motion beside it that must
-// pass, and is found with the size it was given.
-// Bounds of 1e-11 and 1e-12 are on fractions of weight, metres and radians of order one or less: rounding of positions of
-// a metre over h^2 = 4e-4 s^2 is 1e-13 of g. Seen: 6e-13 in forces, 9e-15 in momentum, 3e-15 in the others. Bounds that
-// stand for something else say so beside them.
+// pass, and is found with the size it was given. Bounds of 1e-11 and 1e-12 are on fractions of weight, metres and
+// radians of order one or less: rounding of positions of a metre over h^2 = 4e-4 s^2 is 1e-13 of g. Seen: 6e-13 in
+// forces, 9e-15 in momentum, 3e-15 in the others. Bounds that stand for something else say so beside them.
 #include <unistd.h>
 
 #include "cavort/cavort.h"
@@ -445,7 +444,8 @@ static void test_penetration(void) {
   }
 }
 
-// held up by the smoothed law at a height: what it bears there it bears on air from 3 mm on. softness by bisection as above
+// held up by the smoothed law at a height: what it bears there it bears on air from 3 mm on. softness by bisection as
+// above
 static void hold_up(sample *s, double height) {
   cav_state *state = cav_state_new(s->model);
   double none[6] = {0}, u[6], low = 1e-6, high = 1e6;
@@ -464,7 +464,8 @@ static void hold_up(sample *s, double height) {
   cav_state_free(state);
 }
 
-// load on air: all of a body's that hovers, none of one that hovers lower or arrives, half of one that comes down in between
+// load on air: all of a body's that hovers, none of one that hovers lower or arrives, half of one that comes down in
+// between
 static void test_hover(void) {
   const double height[2] = {0.0025, 0.0035};
   for (int i = 0; i < 2; i++) {

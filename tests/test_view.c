@@ -1,5 +1,5 @@
-/// The page of problems/result/view.c: complete in itself, its data valid JSON, hostile names harmless, errors instead of half
-/// pages. What it looks like is checked by eye: see README.md.
+/// The page of problems/result/view.c: complete in itself, its data valid JSON, hostile names harmless, errors instead
+/// of half pages. What it looks like is checked by eye: see README.md.
 #include "view.h"
 
 #include <ctype.h>

@@ -1,7 +1,8 @@
 /// Which forces actuators can give: the orthogonal projection of u on the range of the transmission T [nv*nu], whose
-/// column k is actuator k's moments times its unit of effort, and the least-norm efforts that reach it. T does not depend
-/// on q for joints and fixed tendons: there T'T is inverted once per state, by division where columns share no dof,
-/// otherwise as a pseudo-inverse by Jacobi rotations; with other transmissions at every call. Limits are not applied.
+/// column k is actuator k's moments times its unit of effort, and the least-norm efforts that reach it. T does not
+/// depend on q for joints and fixed tendons: there T'T is inverted once per state, by division where columns share no
+/// dof, otherwise as a pseudo-inverse by Jacobi rotations; with other transmissions at every call. Limits are not
+/// applied.
 #include <assert.h>
 #include <stdlib.h>
 

@@ -10,8 +10,8 @@ double cav_actuator_velocity(cav_state *state, int actuator, const double *v);
 /// Force of an actuator, before gear, among the least-norm ones that give the state's u. actuation.c.
 double cav_actuator_part(cav_state *state, int actuator);
 
-/// Dofs that an actuator moves, dof NULL: only their number. Its length and moments along them, at the state's position.
-/// transmission.c.
+/// Dofs that an actuator moves, dof NULL: only their number. Its length and moments along them, at the state's
+/// position. transmission.c.
 int cav_transmission_dofs(const cav_model *model, int actuator, int *dof);
 double cav_transmission_length(const cav_state *state, int actuator, double *moment);
 

@@ -1,5 +1,5 @@
-/// Force of an actuator from its length, velocity and input: gain * input + bias, clamped to the limits of the force. Gain
-/// and bias are constants, affine in length and velocity, or those of a muscle: MJCF's curves, unit force times
+/// Force of an actuator from its length, velocity and input: gain * input + bias, clamped to the limits of the force.
+/// Gain and bias are constants, affine in length and velocity, or those of a muscle: MJCF's curves, unit force times
 /// active force over length and over velocity, and passive force over length. The input is the control, or the
 /// activation where the actuator has one; how activation follows control is not computed.
 #include "actuator.h"

@@ -1,9 +1,10 @@
 /// How actuators move the model: length of each one's transmission and its moments, what a unit force of it adds to u.
-/// Joint: gear times the coordinate, or along the three or six dofs of a ball or free joint. Tendon: gear times its length.
-/// Site: a wrench in the site's axes, or in those of a reference site whose branch takes the reaction. Slider-crank: a rod
-/// of fixed length from the crank's site to a slider on the z axis of the other; where the rod is too short to reach the
-/// axis, the slider is at the foot of the perpendicular. MJCF's definitions; a reference site's turning is not part of
-/// the moments there, and so not here. Only dofs that move one end relative to the other are listed.
+/// Joint: gear times the coordinate, or along the three or six dofs of a ball or free joint. Tendon: gear times its
+/// length. Site: a wrench in the site's axes, or in those of a reference site whose branch takes the reaction.
+/// Slider-crank: a rod of fixed length from the crank's site to a slider on the z axis of the other; where the rod is
+/// too short to reach the axis, the slider is at the foot of the perpendicular. MJCF's definitions; a reference site's
+/// turning is not part of the moments there, and so not here. Only dofs that move one end relative to the other are
+/// listed.
 #include "actuator.h"
 #include "math3.h"
 
@@ -79,8 +80,8 @@ static void project(const cav_state *state, const pull *p, double *moment) {
   }
 }
 
-// rotation vector of a ball joint dotted with the gear, or 0 for a free joint; moments with the gear in the joint's axes or
-// in its parent's
+// rotation vector of a ball joint dotted with the gear, or 0 for a free joint; moments with the gear in the joint's
+// axes or in its parent's
 static double along_turning(const cav_state *state, const cav_actuator *a, const cav_joint *joint, double *moment) {
   int free = joint->type == CAV_JOINT_FREE;
   const double *quat = state->work->q + joint->q + 3 * free, *gear = a->gear + 3 * free;

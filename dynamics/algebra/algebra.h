@@ -10,7 +10,8 @@ void cav_pseudo_inverse(int n, double rank, double *G, double *A, double *E);
 /// principal_axes.c.
 void cav_principal_axes(const double S[6], double quat[4], double moment[3]);
 
-/// Quaternion of the rotation with columns x and y made orthonormal, x kept; and z their cross product. principal_axes.c.
+/// Quaternion of the rotation with columns x and y made orthonormal, x kept; and z their cross product.
+/// principal_axes.c.
 void cav_quat_of_axes(const double x[3], const double y[3], double quat[4]);
 
 #endif

@@ -1,5 +1,5 @@
-/// Rotation vectors: the one between two orientations, and the Jacobians of the exponential. Series near zero, where the closed
-/// forms lose digits: each is used where its error is below 1e-13.
+/// Rotation vectors: the one between two orientations, and the Jacobians of the exponential. Series near zero, where
+/// the closed forms lose digits: each is used where its error is below 1e-13.
 #include "rotation.h"
 
 #include "math3.h"

@@ -1,7 +1,7 @@
-/// Sparse Cholesky factors by SuiteSparse's CHOLMOD, ordered by approximate minimum degree. The only user of CHOLMOD. Same pattern
-/// and values, same bits: the ordering is a function of the pattern, and what CHOLMOD does by threads writes each entry once.
-/// The library allocates within every factorisation (the permuted matrix) even where pattern and factor stay; solutions
-/// reuse their room.
+/// Sparse Cholesky factors by SuiteSparse's CHOLMOD, ordered by approximate minimum degree. The only user of CHOLMOD.
+/// Same pattern and values, same bits: the ordering is a function of the pattern, and what CHOLMOD does by threads
+/// writes each entry once. The library allocates within every factorisation (the permuted matrix) even where pattern
+/// and factor stay; solutions reuse their room.
 #include "sparse.h"
 
 #include <stdlib.h>

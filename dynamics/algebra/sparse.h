@@ -9,13 +9,13 @@ typedef struct cav_sparse cav_sparse;
 /// Whether the library was built with CHOLMOD.
 int cav_sparse_available(void);
 
-/// blas: supernodes by BLAS where they pay, which is for one thread at a time (OpenBLAS's serial build is not safe from two);
-/// 0: none, any number of threads. NULL if memory runs out, or where the library was built without CHOLMOD.
+/// blas: supernodes by BLAS where they pay, which is for one thread at a time (OpenBLAS's serial build is not safe from
+/// two); 0: none, any number of threads. NULL if memory runs out, or where the library was built without CHOLMOD.
 cav_sparse *cav_sparse_new(int blas);
 void cav_sparse_free(cav_sparse *sparse);
 
-/// Takes the pattern of the lower triangle by columns: start [n+1], row [start[n]] ascending, the diagonal first. Both must
-/// outlive the factors. Orders it to fill in little and finds the pattern of the factor. CAV_NO_MEMORY.
+/// Takes the pattern of the lower triangle by columns: start [n+1], row [start[n]] ascending, the diagonal first. Both
+/// must outlive the factors. Orders it to fill in little and finds the pattern of the factor. CAV_NO_MEMORY.
 cav_status cav_sparse_analyse(cav_sparse *sparse, int n, const int *start, const int *row);
 
 /// Entries of the factor, and operations of one factorisation, of the last analysis.

@@ -1,7 +1,7 @@
 /// Which geoms touch: broad phase by bounding spheres over the list of pairs that the model was compiled to, then the
 /// narrow phase of pairs.c. Geoms in no pair are never placed; a geom's rotation is formed only if a narrow phase asks
-/// for it, once per call, and that of a geom fixed to the world once for all. Lists of CAV_SWEEP_FROM pairs and more are first
-/// pruned along an axis (sweep.c); bench_sweep measures where that begins to pay.
+/// for it, once per call, and that of a geom fixed to the world once for all. Lists of CAV_SWEEP_FROM pairs and more
+/// are first pruned along an axis (sweep.c); bench_sweep measures where that begins to pay.
 #include <assert.h>
 #include <stdlib.h>
 

@@ -1,5 +1,5 @@
-/// Contacts, limits, friction losses and equality constraints at a configuration, and the law that gives their impulses.
-/// Private to dynamics/.
+/// Contacts, limits, friction losses and equality constraints at a configuration, and the law that gives their
+/// impulses. Private to dynamics/.
 #ifndef CAVORT_CONSTRAINT_H
 #define CAVORT_CONSTRAINT_H
 
@@ -13,9 +13,9 @@ struct cav_geom_cache *cav_geom_cache_new(const cav_model *model, int sweep_from
 void cav_geom_cache_free(struct cav_geom_cache *cache);
 size_t cav_geom_cache_bytes(const struct cav_geom_cache *cache);
 
-/// Broad and narrow phase over model->pair at the state's poses: fills pair, feature, dim, links, pos, frame, dist, margin,
-/// friction of state->contact and ncontact. collide.c. The activation distance of a pair is its margin, or where the smoothed law is
-/// active (cav_contact_activation), whichever is larger.
+/// Broad and narrow phase over model->pair at the state's poses: fills pair, feature, dim, links, pos, frame, dist,
+/// margin, friction of state->contact and ncontact. collide.c. The activation distance of a pair is its margin, or
+/// where the smoothed law is active (cav_contact_activation), whichever is larger.
 cav_status cav_contacts_find(const cav_model *model, cav_state *state);
 
 /// Distance from which a pair's force is not negligible under the state's options.
@@ -30,12 +30,13 @@ cav_law cav_law_at(const cav_state *state, const cav_softness *softness, double 
 /// Fills state->equality constraint at the state's positions: errors, what their rates depend on, laws. equality.c.
 void cav_equality_evaluate(const cav_model *model, cav_state *state);
 
-/// Velocity of an equality constraint's rows, out [dim], at v [nv] with the links' spatial velocities [nlink*6]. equality.c.
+/// Velocity of an equality constraint's rows, out [dim], at v [nv] with the links' spatial velocities [nlink*6].
+/// equality.c.
 void cav_equality_velocity(const cav_model *model, const cav_state *state, const cav_equality_rows *eq, const double *v,
                            const double *velocity, double *out);
 
-/// Impulses of all equality constraints, v* taken at velocity_now (NULL: as it was); wrenches, times scale, into state->force. Then, once
-/// forces are projected: u [nv] += scale J' f of those between joints or tendons. equality.c.
+/// Impulses of all equality constraints, v* taken at velocity_now (NULL: as it was); wrenches, times scale, into
+/// state->force. Then, once forces are projected: u [nv] += scale J' f of those between joints or tendons. equality.c.
 void cav_equality_impulses(const cav_model *model, cav_state *state, const double *v, const double *velocity_now,
                            const double *v_next, double scale);
 void cav_equality_apply(const cav_model *model, const cav_state *state, double scale, double *u);
@@ -50,14 +51,15 @@ void cav_stabilisation_prepare(cav_state *state);
 cav_status cav_limits_find(const cav_model *model, cav_state *state);
 void cav_contacts_soften(cav_state *state);
 
-/// Fraction of its stiffness that a contact has, by which its R is divided, and the rate of its logarithm by the distance:
-/// self_stiffness between links of one tree. Where the law is smoothed it fades out towards the end of its activation distance, so that what
-/// comes faster than the activation distance foresees does not jump, and where the axes of two spheres or capsules meet, so that the force
-/// does not jump as the normal changes side; that is deeper than half the sum of their radii. limits.c.
+/// Fraction of its stiffness that a contact has, by which its R is divided, and the rate of its logarithm by the
+/// distance: self_stiffness between links of one tree. Where the law is smoothed it fades out towards the end of its
+/// activation distance, so that what comes faster than the activation distance foresees does not jump, and where the
+/// axes of two spheres or capsules meet, so that the force does not jump as the normal changes side; that is deeper
+/// than half the sum of their radii. limits.c.
 double cav_contact_stiffness_ratio(const cav_state *state, const cav_contact *contact, double *rate);
 
-/// Distance beyond the margin from which a limit or a contact counts: as far as the smoothed law of scale delta is active,
-/// and where the discrete law looks ahead, as far as an approach at speed gets within a step before that.
+/// Distance beyond the margin from which a limit or a contact counts: as far as the smoothed law of scale delta is
+/// active, and where the discrete law looks ahead, as far as an approach at speed gets within a step before that.
 /// limits.c.
 double cav_law_activation(const cav_state *state, double delta, double speed);
 
@@ -74,8 +76,8 @@ void cav_row_push_force(const cav_state *state, const cav_row *row, double force
 void cav_law_cone(int dim, const double *R, const double *friction, double sigma, const double *g, double *f,
                   double *hessian, double *potential);
 
-/// Impulse of a contact by Coulomb's law, in the same words. hessian is not symmetric. With held, not NULL, the bound of
-/// friction is mu times that normal impulse instead of the contact's own: hessian is symmetric, psd, and there is a
+/// Impulse of a contact by Coulomb's law, in the same words. hessian is not symmetric. With held, not NULL, the bound
+/// of friction is mu times that normal impulse instead of the contact's own: hessian is symmetric, psd, and there is a
 /// potential (without held: NULL). coulomb.c.
 void cav_law_coulomb(int dim, const double *R, const double *friction, double sigma, const double *held,
                      const double *g, double *f, double *hessian, double *potential);

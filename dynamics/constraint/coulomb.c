@@ -1,18 +1,20 @@
-/// Contact law without the sliding artefact of the convex one, in closed form (dynamics/METHOD.md, 9). The convex law of
-/// contact_law.c puts the slack w = R f + v_next - v* into the dual cone, so a contact that slides has w_n = |mu w_t|: it is held
-/// off. De Saxce's correction lowers v*_n by |mu w_t|; torsion and rolling enter with their own coefficients. The normal
-/// row is then alone, 0 <= f_n complementary to w_n >= 0, and friction is the nearest to g within the ellipse that the
-/// normal impulse allows:
+/// Contact law without the sliding artefact of the convex one, in closed form (dynamics/METHOD.md, 9). The convex law
+/// of contact_law.c puts the slack w = R f + v_next - v* into the dual cone, so a contact that slides has w_n = |mu
+/// w_t|: it is held off. De Saxce's correction lowers v*_n by |mu w_t|; torsion and rolling enter with their own
+/// coefficients. The normal row is then alone, 0 <= f_n complementary to w_n >= 0, and friction is the nearest to g
+/// within the ellipse that the normal impulse allows:
 ///
 ///   f_n = max(0, g_n),  f_j = mu_j h_j min(T, f_n)/T,  h_j = g_j/mu_j,  T = |h|.
 ///
-/// Smoothed: f_n by z of contact_law.c, and for the lesser of T and f_n, with a = sqrt(rho) T/tau and b = sqrt(rho) f_n/tau,
+/// Smoothed: f_n by z of contact_law.c, and for the lesser of T and f_n, with a = sqrt(rho) T/tau and b = sqrt(rho)
+/// f_n/tau,
 ///
 ///   m(a, b) = log cosh((a + b)/2) - log cosh((a - b)/2) < min(a, b),  tau = sigma tan(theta)/2,
 ///
-/// so that slow sliding meets the same friction as under the convex law: f_n times the slip over mu delta/h. It is odd in T,
-/// so nothing happens at zero slip; homogeneous in (g, sigma) as the convex law is, but no gradient of a potential: its
-/// derivative is not symmetric. With the normal impulse of friction held it is one, which a forward step makes use of.
+/// so that slow sliding meets the same friction as under the convex law: f_n times the slip over mu delta/h. It is odd
+/// in T, so nothing happens at zero slip; homogeneous in (g, sigma) as the convex law is, but no gradient of a
+/// potential: its derivative is not symmetric. With the normal impulse of friction held it is one, which a forward step
+/// makes use of.
 #include <math.h>
 
 #include "constraint.h"

@@ -8,9 +8,10 @@
 ///   tendon    the same of lengths
 ///   distance  the gap between two geoms, less the distance asked for
 ///
-/// Errors, weights and the impedance (by the length of x over all rows) are MuJoCo 2.2.2's, but for two things: it scales
-/// only the rate of a weld's rotation by torquescale and not the error, where both agree at 1; and it has no distance.
-/// Where the nearest points of a distance are not unique, the deepest point that the pair's routine gives first counts.
+/// Errors, weights and the impedance (by the length of x over all rows) are MuJoCo 2.2.2's, but for two things: it
+/// scales only the rate of a weld's rotation by torquescale and not the error, where both agree at 1; and it has no
+/// distance. Where the nearest points of a distance are not unique, the deepest point that the pair's routine gives
+/// first counts.
 #include "constraint.h"
 #include "math3.h"
 

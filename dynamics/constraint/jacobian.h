@@ -16,8 +16,8 @@ typedef struct cav_block {
   const double *J; ///< [dim*ndof] row-major
 } cav_block;
 
-/// Jacobian rows of all contacts, rows and equality constraints of the state, each with the dofs that move it. jacobian.c.
-/// block [n], n = ncontact+nrow+nequality, dof [n*nv], J [rows*nv]. Returns the number of rows.
+/// Jacobian rows of all contacts, rows and equality constraints of the state, each with the dofs that move it.
+/// jacobian.c. block [n], n = ncontact+nrow+nequality, dof [n*nv], J [rows*nv]. Returns the number of rows.
 int cav_jacobian(const cav_model *model, const cav_state *state, cav_block *block, int *dof, double *J);
 
 /// Number of constraint rows of the state; those of equality constraints alone. jacobian.c.

@@ -1,13 +1,13 @@
-/// Constraints at q: the rows of limits and friction losses, and what makes the law of each row and contact: R, h B, h K
-/// and the scale of smoothing (METHOD.md, 4). Two ways to them: MJCF's solref and solimp with their impedance curve,
-/// eqs. (27), (28); or the discrete step, critically damped with double pole z = exp(-h/kappa),
-/// h B = (1 + eps)(1 - z^2), h^2 K = (1 + eps)(1 - z)^2. Friction rows have K = 0. Contacts are found by collide.c,
-/// impulses are computed in inverse.c.
+/// Constraints at q: the rows of limits and friction losses, and what makes the law of each row and contact: R, h B, h
+/// K and the scale of smoothing (METHOD.md, 4). Two ways to them: MJCF's solref and solimp with their impedance curve,
+/// eqs. (27), (28); or the discrete step, critically damped with double pole z = exp(-h/kappa), h B = (1 + eps)(1 -
+/// z^2), h^2 K = (1 + eps)(1 - z)^2. Friction rows have K = 0. Contacts are found by collide.c, impulses are computed
+/// in inverse.c.
 ///
 /// Which limits are rows and which contacts are sought: distance below the margin with solref (MuJoCo's rule), and one
-/// rule for what reaches beyond it (cav_law_activation). The discrete law looks at where the step ends, x + h v_next, so there
-/// an object counts from speed h before the margin: slower than that, nothing is missed. The smoothed law is active up to
-/// SMOOTH_ACTIVATION delta from there: the two add up.
+/// rule for what reaches beyond it (cav_law_activation). The discrete law looks at where the step ends, x + h v_next,
+/// so there an object counts from speed h before the margin: slower than that, nothing is missed. The smoothed law is
+/// active up to SMOOTH_ACTIVATION delta from there: the two add up.
 #include "constraint.h"
 #include "math3.h"
 #include "rotation.h"
@@ -18,8 +18,8 @@ static const double SMOOTH_ACTIVATION = 12;
 // fastest approach to a limit met without a jump, rad/s or m/s
 static const double LIMIT_SPEED = 20;
 
-// contacts of the smoothed law: fraction of their activation distance over which they fade out at its end, fraction of the radii of round geoms
-// over which they fade out where axes meet, and the least that is left
+// contacts of the smoothed law: fraction of their activation distance over which they fade out at its end, fraction of
+// the radii of round geoms over which they fade out where axes meet, and the least that is left
 static const double FADING = 0.3, CORE = 0.5, STIFFNESS_RATIO_MIN = 1e-12;
 
 static double larger(double a, double b) { return a > b ? a : b; }
@@ -131,8 +131,8 @@ double cav_limit_activation(const cav_state *state, double margin) {
   return margin + cav_law_activation(state, self_smoothing(state), LIMIT_SPEED);
 }
 
-// one more row with its law. Friction loss (bound > 0) has no position error; where the law is smoothed, its corners are
-// rounded over the velocity at which a limit of the same softness would be
+// one more row with its law. Friction loss (bound > 0) has no position error; where the law is smoothed, its corners
+// are rounded over the velocity at which a limit of the same softness would be
 static cav_status add_row(cav_state *state, cav_row row, const cav_softness *softness, double weight) {
   int friction = row.type == CAV_ROW_FRICTION_DOF || row.type == CAV_ROW_FRICTION_TENDON;
   cav_law l = row_law(state, softness, friction ? 0 : row.dist - row.margin, weight);

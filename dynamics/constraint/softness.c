@@ -3,11 +3,12 @@
 ///
 ///   R = CFM/h,  v* = -(ERP/h) x,  so  h B = 1,  h^2 K = ERP:
 ///
-/// first order where (28) is second: the velocity that is there is forgotten, the error falls by the fraction ERP in each
-/// step whatever its length. Every row of ODE is one of ours, exactly; CFM is absolute, so R does not grow with A and light
-/// bodies are held more softly. The other way only slow motion is alike: a row of ours is a spring K/R, a damper B/R and,
-/// along the row, a mass 1/R, of which ODE has the first two: ERP = h k/(h k + b), CFM = 1/(h k + b). Rows are all this
-/// speaks of: what an engine does with them, a complementarity problem there, a convex one here, differs beside.
+/// first order where (28) is second: the velocity that is there is forgotten, the error falls by the fraction ERP in
+/// each step whatever its length. Every row of ODE is one of ours, exactly; CFM is absolute, so R does not grow with A
+/// and light bodies are held more softly. The other way only slow motion is alike: a row of ours is a spring K/R, a
+/// damper B/R and, along the row, a mass 1/R, of which ODE has the first two: ERP = h k/(h k + b), CFM = 1/(h k + b).
+/// Rows are all this speaks of: what an engine does with them, a complementarity problem there, a convex one here,
+/// differs beside.
 #include <math.h>
 
 #include "cavort/dynamics.h"

@@ -1,8 +1,8 @@
-/// Sweep and prune (Baraff 1992; Cohen, Lin, Manocha and Ponamgi 1995) along one axis, that on which the centres spread most:
-/// balls are sorted by their lower ends, and each is compared with those that begin before it ends. The order is kept from
-/// call to call, where it changes little. A table of all pairs of balls says which of them are pairs of the scene, and marks
-/// in a row of bits give them in ascending order: what is found does not depend on the order of before.
-/// Not done: boxes instead of balls, trees; balls as large as the scene are compared with all.
+/// Sweep and prune (Baraff 1992; Cohen, Lin, Manocha and Ponamgi 1995) along one axis, that on which the centres spread
+/// most: balls are sorted by their lower ends, and each is compared with those that begin before it ends. The order is
+/// kept from call to call, where it changes little. A table of all pairs of balls says which of them are pairs of the
+/// scene, and marks in a row of bits give them in ascending order: what is found does not depend on the order of
+/// before. Not done: boxes instead of balls, trees; balls as large as the scene are compared with all.
 #include "sweep.h"
 
 #include <assert.h>

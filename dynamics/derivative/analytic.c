@@ -1,7 +1,7 @@
 /// Derivatives of the inverse in closed form: du/dq, du/dv, du/dv_next at the state's last evaluation (METHOD.md, 7).
-/// With the pair of dofs (k, j) of which m is the deeper one, every term of the smooth part is S_k . (sum over the subtree
-/// of m) of something linear in dof j: as in Carpentier and Mansard (RSS 2018) and Singh, Russell and Wensing (2022), but
-/// derived and written for spatial vectors at one point of the tree:
+/// With the pair of dofs (k, j) of which m is the deeper one, every term of the smooth part is S_k . (sum over the
+/// subtree of m) of something linear in dof j: as in Carpentier and Mansard (RSS 2018) and Singh, Russell and Wensing
+/// (2022), but derived and written for spatial vectors at one point of the tree:
 ///
 ///   du_k/da_j = S_k . I S_j                          I  composite inertia
 ///   du_k/dv_j = S_k . (I (D + D*) + B S_j)           D  = V_before x S_j,  D* = V_after x S_j
@@ -436,7 +436,8 @@ static void pairs_of(const task *t, int j) {
   }
 }
 
-// gravity compensation: a force at a body's centre of mass that keeps its direction, where subtrees carry it along turning
+// gravity compensation: a force at a body's centre of mass that keeps its direction, where subtrees carry it along
+// turning
 static void add_buoyancy(const task *t) {
   const cav_workspace *w = t->state->work;
   if (!t->state->options.passive || !t->state->options.gravity) return;

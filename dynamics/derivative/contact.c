@@ -1,12 +1,13 @@
-/// Derivatives of one contact: how its distance, position and axes, velocities, impulse and wrench change when one of its two
-/// links moves by a small twist. The geometry depends on the relative pose of two geoms only: in closed form for a ball
-/// or a capsule on a plane, by centred differences of the narrow phase of that one pair in six directions otherwise.
-/// Everything after the geometry is exact: the frame turns with the normal, and about it with the tangent it is aligned
-/// to; the law has its own derivative (contact_law.c, coulomb.c), and of R and K by the distance where the impedance varies.
+/// Derivatives of one contact: how its distance, position and axes, velocities, impulse and wrench change when one of
+/// its two links moves by a small twist. The geometry depends on the relative pose of two geoms only: in closed form
+/// for a ball or a capsule on a plane, by centred differences of the narrow phase of that one pair in six directions
+/// otherwise. Everything after the geometry is exact: the frame turns with the normal, and about it with the tangent it
+/// is aligned to; the law has its own derivative (contact_law.c, coulomb.c), and of R and K by the distance where the
+/// impedance varies.
 ///
-/// In the law f(z, r, s) = F(z, s)/r with z = v* - v_next, r the common scale of R and s = h K delta, F is homogeneous of
-/// degree one in (z, s) together; so df = H dz - (dr/r) f + (ds/s)(f - H z), whatever the law's smoothing.
-/// At kinks of the exact law one element of the generalised derivative is taken, always the same.
+/// In the law f(z, r, s) = F(z, s)/r with z = v* - v_next, r the common scale of R and s = h K delta, F is homogeneous
+/// of degree one in (z, s) together; so df = H dz - (dr/r) f + (ds/s)(f - H z), whatever the law's smoothing. At kinks
+/// of the exact law one element of the generalised derivative is taken, always the same.
 #include "derivative.h"
 
 #include "math3.h"

@@ -6,14 +6,15 @@
 #include "sensor.h"
 #include "step.h"
 
-/// Derivatives of a contact at the state's last evaluation. CAV_NOT_SUPPORTED if the points of its pair come and go within the
-/// step of a difference, so that there is no derivative to take. Where the impulse and its derivative are below 1e-13 of what a
-/// contact that pushes has, it is idle and its geometry left alone, unless whole is asked for. contact.c.
+/// Derivatives of a contact at the state's last evaluation. CAV_NOT_SUPPORTED if the points of its pair come and go
+/// within the step of a difference, so that there is no derivative to take. Where the impulse and its derivative are
+/// below 1e-13 of what a contact that pushes has, it is idle and its geometry left alone, unless whole is asked for.
+/// contact.c.
 cav_status cav_contact_differentiate(const cav_model *model, const cav_state *state, const cav_contact *contact,
                                      int whole, cav_contact_jacobian *derivative);
 
-/// Adds what equality constraints between joints, tendons or links give du/dq, du/dv and du/dv_next [nv*nv], beyond what
-/// is carried along with the wrenches of subtrees. Not for distances. equality.c.
+/// Adds what equality constraints between joints, tendons or links give du/dq, du/dv and du/dv_next [nv*nv], beyond
+/// what is carried along with the wrenches of subtrees. Not for distances. equality.c.
 void cav_equality_derivatives(const cav_model *model, const cav_state *state, double *dq, double *dv, double *dn);
 
 /// Twist or drift of a dof about a point: r = (S angular, velocity at the point).

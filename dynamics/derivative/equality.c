@@ -1,10 +1,10 @@
-/// Derivatives of the forces of equality constraints, in closed form. The law is linear, f = R^-1 (v* - J v_next), with R
-/// and K by the length of the error x: df = (dz - z dR/R)/R, z = v* - J v_next.
+/// Derivatives of the forces of equality constraints, in closed form. The law is linear, f = R^-1 (v* - J v_next), with
+/// R and K by the length of the error x: df = (dz - z dR/R)/R, z = v* - J v_next.
 ///
-/// Between joints or tendons of constant arms a row sees two scalars; its gradient changes with the derivative of the polynomial.
-/// Between links a row sees one point and one frame on each. When a dof moves one of the links, the point moves along and
-/// the link keeps the velocity it had before the joint; the rotation rows change with the frames. Wrenches that turn with
-/// their link are in the sums over subtrees already (analytic.c) and are taken off here.
+/// Between joints or tendons of constant arms a row sees two scalars; its gradient changes with the derivative of the
+/// polynomial. Between links a row sees one point and one frame on each. When a dof moves one of the links, the point
+/// moves along and the link keeps the velocity it had before the joint; the rotation rows change with the frames.
+/// Wrenches that turn with their link are in the sums over subtrees already (analytic.c) and are taken off here.
 #include "derivative.h"
 #include "math3.h"
 

@@ -1,12 +1,14 @@
-/// Derivatives of the balance of momentum (half_step.c), in closed form. When a dof of q moves by a unit, its subtree moves half
-/// a step on by a twist X about the references: the axis there, or three axes turned into each other where the joint's own
-/// rotation lies between; and the velocity before the joint stays, so that
+/// Derivatives of the balance of momentum (half_step.c), in closed form. When a dof of q moves by a unit, its subtree
+/// moves half a step on by a twist X about the references: the axis there, or three axes turned into each other where
+/// the joint's own rotation lies between; and the velocity before the joint stays, so that
 ///
-///   d(momentum of the tree) = X x* L + I (V x X)     L momentum and I inertia of the subtree, V velocity before the joint
+///   d(momentum of the tree) = X x* L + I (V x X)     L momentum and I inertia of the subtree, V velocity before the
+///   joint
 ///
-/// By a dof of the velocity the twist is Y, half a step of the axis or of three times the right Jacobian of the rotation, and
-/// the change Y x* L + I (axis + V x Y). The weight moves along with the subtree. Forces that turn with the subtree of a dof
-/// (S x* F), whatever they are, are added for the dofs above it together, as in analytic.c, whose contacts count on it.
+/// By a dof of the velocity the twist is Y, half a step of the axis or of three times the right Jacobian of the
+/// rotation, and the change Y x* L + I (axis + V x Y). The weight moves along with the subtree. Forces that turn with
+/// the subtree of a dof (S x* F), whatever they are, are added for the dofs above it together, as in analytic.c, whose
+/// contacts count on it.
 #include "half_step.h"
 #include "math3.h"
 #include "rotation.h"

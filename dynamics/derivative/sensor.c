@@ -1,9 +1,9 @@
-/// Derivatives of sensor readings by q and v_next, in closed form at the state's last evaluation. What is fixed in a link
-/// moves with the axes of the dofs below it: a point by S at the point, a direction by the angular part. The velocity of
-/// a link changes by (drift of the axis) - V x S when a dof moves, the drift being (motion before the joint) x S, which
-/// cav_derivatives has left in the state. A pose in a moving frame changes by the twist of the object less that of the frame,
-/// both at the object. Readings do not depend on v. Not offered: forces, accelerations, ranges, limits, actuators, velocities
-/// in another frame, readings that are cut off.
+/// Derivatives of sensor readings by q and v_next, in closed form at the state's last evaluation. What is fixed in a
+/// link moves with the axes of the dofs below it: a point by S at the point, a direction by the angular part. The
+/// velocity of a link changes by (drift of the axis) - V x S when a dof moves, the drift being (motion before the
+/// joint) x S, which cav_derivatives has left in the state. A pose in a moving frame changes by the twist of the object
+/// less that of the frame, both at the object. Readings do not depend on v. Not offered: forces, accelerations, ranges,
+/// limits, actuators, velocities in another frame, readings that are cut off.
 #include "derivative.h"
 #include "math3.h"
 

@@ -1,9 +1,9 @@
 /// Box against box. The separating axis (3 + 3 face normals, 9 products of edges) of largest gap says how they meet:
 /// face: the opposite face of the other box is cut to the prism above it (Sutherland and Hodgman), up to 8 points, each
 /// with its own height; edges: one point. Apart, the gap along an axis is only a bound of the distance; unless a corner
-/// above the face proves it exact, the nearest corner or crossing edges are looked for and taken if nearer.
-/// What jumps: the choice of face or edges where two axes are equal. A face is kept until it loses by PREFER of the smallest
-/// half length, the first box's until the second's wins by as much: flat boxes keep their points under tiny rotations.
+/// above the face proves it exact, the nearest corner or crossing edges are looked for and taken if nearer. What jumps:
+/// the choice of face or edges where two axes are equal. A face is kept until it loses by PREFER of the smallest half
+/// length, the first box's until the second's wins by as much: flat boxes keep their points under tiny rotations.
 #include "pairs.h"
 
 static const double PREFER = 1e-4;

@@ -4,8 +4,8 @@
 
 #include "cavort/model.h"
 
-/// Contact point found by the narrow phase: world position midway between the surfaces, unit normal from the first to the
-/// second geom, signed gap. feature tells the points of one manifold apart and is stable between nearby poses.
+/// Contact point found by the narrow phase: world position midway between the surfaces, unit normal from the first to
+/// the second geom, signed gap. feature tells the points of one manifold apart and is stable between nearby poses.
 typedef struct cav_touch {
   double pos[3];
   double normal[3];
@@ -34,9 +34,9 @@ static inline cav_shape cav_shape_of(const cav_model *model, const cav_geom *geo
   return shape;
 }
 
-/// All contact points of two shapes with dist < margin; a->type <= b->type, in the order of their features. Returns their
-/// number, at most CAV_TOUCH_MAX.
-/// pairs.c: table over types; exact routines where they exist, polytope.c for the rest.
+/// All contact points of two shapes with dist < margin; a->type <= b->type, in the order of their features. Returns
+/// their number, at most CAV_TOUCH_MAX. pairs.c: table over types; exact routines where they exist, polytope.c for the
+/// rest.
 int cav_collide_shapes(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
 /// Distance along a ray, unit direction, to the surface of a shape; -1 if it misses. A ray that starts inside meets the

@@ -314,8 +314,8 @@ static int include(polytope *t, int nearest, const vertex *p, const double middl
   return edges > 0;
 }
 
-// the point nearest to the origin of the faces in one plane with a face, as points of both bodies: such faces are equal, and
-// the origin lies over one of them
+// the point nearest to the origin of the faces in one plane with a face, as points of both bodies: such faces are
+// equal, and the origin lies over one of them
 static void points_of_faces(const polytope *t, const sheet *best, double slack, cav_separation *out) {
   double least = INFINITY;
   for (int f = 0; f < t->nface; f++) {

@@ -1,12 +1,13 @@
 /// Contacts of a height field with sphere, capsule, ellipsoid, cylinder, box and mesh.
 ///
-/// The field is a solid made of prisms, two a cell, from its surface down to its base. Prisms under the bounding box of the
-/// other shape are tested one by one. Apart: polytope.c's contact with the prism, kept only where its normal supports the
-/// surface about the point: walls between prisms, and edges that lie in a plane or a valley, push nothing sideways.
-/// Overlapping: the points of the shape over the triangle, each with its height over the triangle's plane; the way out is up.
-/// Points found by several prisms are one; of more than 8 the deepest is kept, then those furthest apart.
-/// A shape that sinks through the base is pushed up by its whole depth until it is below it altogether.
-/// Not done: what goes through the surface from below, or sideways through an outer wall deeper than its core, is pushed up.
+/// The field is a solid made of prisms, two a cell, from its surface down to its base. Prisms under the bounding box of
+/// the other shape are tested one by one. Apart: polytope.c's contact with the prism, kept only where its normal
+/// supports the surface about the point: walls between prisms, and edges that lie in a plane or a valley, push nothing
+/// sideways. Overlapping: the points of the shape over the triangle, each with its height over the triangle's plane;
+/// the way out is up. Points found by several prisms are one; of more than 8 the deepest is kept, then those furthest
+/// apart. A shape that sinks through the base is pushed up by its whole depth until it is below it altogether. Not
+/// done: what goes through the surface from below, or sideways through an outer wall deeper than its core, is pushed
+/// up.
 #include <assert.h>
 
 #include "gjk.h"
@@ -14,7 +15,8 @@
 #include "pairs.h"
 
 enum { FOUND_MAX = 128 };
-// fractions of the size: points that are one; how far a neighbour may stick out of a supporting plane; cosine of one normal
+// fractions of the size: points that are one; how far a neighbour may stick out of a supporting plane; cosine of one
+// normal
 static const double ALIKE = 1e-7, STICKS_OUT = 1e-9, SAME_NORMAL = 1 - 1e-9;
 
 /// A prism as a mesh: its three upper corners counterclockwise, the same at the base below them.

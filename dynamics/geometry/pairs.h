@@ -22,8 +22,8 @@ int cav_collide_segment(const cav_shape *a, const cav_shape *b, double margin, c
 /// A mesh against a plane: up to 8 points. polytope.c.
 int cav_collide_plane_mesh(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
-/// Convex pairs without a routine of their own: ellipsoid, cylinder, box (not two) and mesh; sphere or capsule against mesh; a
-/// capsule whose segment cuts an ellipsoid, cylinder or box: up to 8 points. polytope.c.
+/// Convex pairs without a routine of their own: ellipsoid, cylinder, box (not two) and mesh; sphere or capsule against
+/// mesh; a capsule whose segment cuts an ellipsoid, cylinder or box: up to 8 points. polytope.c.
 int cav_collide_convex(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
 /// Keeps the deepest of n contacts and those furthest from the ones kept, most at most; returns how many. polytope.c.

@@ -1,6 +1,6 @@
-/// Where a ray meets a shape: for rangefinders and the zones of touch sensors. Convex solids are met on an interval of the
-/// ray, found in closed form in the shape's own axes: an ellipsoid by one quadratic, a box and a cylinder as intersections
-/// of slabs and a tube, a capsule as the union of a cylinder and two balls.
+/// Where a ray meets a shape: for rangefinders and the zones of touch sensors. Convex solids are met on an interval of
+/// the ray, found in closed form in the shape's own axes: an ellipsoid by one quadratic, a box and a cylinder as
+/// intersections of slabs and a tube, a capsule as the union of a cylinder and two balls.
 #include "geometry.h"
 #include "math3.h"
 #include "pairs.h"

@@ -1,17 +1,18 @@
-/// Capsule against ellipsoid, cylinder and box: a segment swept by a sphere.
-/// The signed distance to a convex solid is convex along the segment, so its lowest point is where the derivative, the
-/// surface normal's component along the segment, changes sign: bracketed false position (Illinois) with bisection. Where
-/// the derivative jumps (the segment cuts an edge from the inside) the element of the subgradient square to the
-/// segment is the normal of the edge contact. A capsule that lies along a face, a side or an edge has a second point,
-/// at the other end of the part above that feature; it exists by its own gap, so no test of parallelism decides. A
-/// segment that cuts the solid has no such lowest point: polytope.c finds the least translation that parts the two.
-/// On a box there are always two points, which move with the pose and never come or go: the lowest, and one that lies at the
-/// other end of the part above the feature where the capsule lies flat and draws near to the lowest the more it tilts. The
-/// part widens with the tilt of the normal, so that a foot may leave a face over its edge without a jump of force; an
-/// optimiser that looks ahead of contact needs that.
+/// Capsule against ellipsoid, cylinder and box: a segment swept by a sphere. The signed distance to a convex solid is
+/// convex along the segment, so its lowest point is where the derivative, the surface normal's component along the
+/// segment, changes sign: bracketed false position (Illinois) with bisection. Where the derivative jumps (the segment
+/// cuts an edge from the inside) the element of the subgradient square to the segment is the normal of the edge
+/// contact. A capsule that lies along a face, a side or an edge has a second point, at the other end of the part above
+/// that feature; it exists by its own gap, so no test of parallelism decides. A segment that cuts the solid has no such
+/// lowest point: polytope.c finds the least translation that parts the two. On a box there are always two points, which
+/// move with the pose and never come or go: the lowest, and one that lies at the other end of the part above the
+/// feature where the capsule lies flat and draws near to the lowest the more it tilts. The part widens with the tilt of
+/// the normal, so that a foot may leave a face over its edge without a jump of force; an optimiser that looks ahead of
+/// contact needs that.
 #include "pairs.h"
 
-// fraction of the capsule's size below which the segment and the solid touch: no height over the surface tells a direction
+// fraction of the capsule's size below which the segment and the solid touch: no height over the surface tells a
+// direction
 static const double TOUCHES = 1e-9;
 
 /// The segment in the solid's axes.
@@ -174,8 +175,8 @@ static int touch_at(const cav_shape *a, const cav_shape *b, const segment *g, do
   return 1;
 }
 
-// part of the segment above the face, edge or corner of a box around its lowest point: between the faces across the normal,
-// which recede as the normal turns to them
+// part of the segment above the face, edge or corner of a box around its lowest point: between the faces across the
+// normal, which recede as the normal turns to them
 static void clip_box(const segment *g, const lowest *best, double *low, double *high) {
   double room = norm3(g->half) + fmax(best->height, 0);
   *low = -1;
@@ -188,8 +189,8 @@ static void clip_box(const segment *g, const lowest *best, double *low, double *
   *high = fmax(*high, best->t);
 }
 
-// how far the second point goes from the lowest towards an end of the part: all the way where the segment lies flat, nowhere
-// where it rises steeper than FLAT
+// how far the second point goes from the lowest towards an end of the part: all the way where the segment lies flat,
+// nowhere where it rises steeper than FLAT
 static double draw(const segment *g, const lowest *best, double end) {
   static const double FLAT = 0.5; // sine
   double length = fabs(end - best->t) * norm3(g->half), normal[3];

@@ -1,5 +1,6 @@
-/// What a model has on its bodies and joints by their names: tendons, equality constraints, actuators, sensors, keyframes. Each
-/// reference is looked up here, and what it needs of its object checked, with the line of the element at fault.
+/// What a model has on its bodies and joints by their names: tendons, equality constraints, actuators, sensors,
+/// keyframes. Each reference is looked up here, and what it needs of its object checked, with the line of the element
+/// at fault.
 #include <assert.h>
 #include <stdlib.h>
 

@@ -1,5 +1,6 @@
-/// Bodies, links, joints, geoms and sites of a model. Bodies without joints are fused into the link they stand on: mass, centre
-/// and inertia add up, and geoms, sites and body frames are re-expressed in its frame. Ranges: whether they hold.
+/// Bodies, links, joints, geoms and sites of a model. Bodies without joints are fused into the link they stand on:
+/// mass, centre and inertia add up, and geoms, sites and body frames are re-expressed in its frame. Ranges: whether
+/// they hold.
 #include "builder.h"
 #include "math3.h"
 

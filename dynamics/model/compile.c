@@ -1,7 +1,7 @@
 /// Compiles a spec into the immutable model: one block of memory, carved once.
 ///
-/// Phases: masses; names and references; which bodies move as one (links) and their coordinates; sizes; carving (the same
-/// walk twice, first to measure, then to place); filling (bodies.c, attachments.c); pairs; reference weights.
+/// Phases: masses; names and references; which bodies move as one (links) and their coordinates; sizes; carving (the
+/// same walk twice, first to measure, then to place); filling (bodies.c, attachments.c); pairs; reference weights.
 /// Checks that need the whole model are here, with the line of the element at fault.
 
 #include <assert.h>

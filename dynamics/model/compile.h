@@ -4,8 +4,9 @@
 
 #include "spec.h"
 
-/// Fills the length ranges of muscles that the file leaves open, of a model under construction. Returns the first actuator
-/// whose length has no end within the ranges of the joints, nactuator if memory runs out, -1 if all is well. length_range.c.
+/// Fills the length ranges of muscles that the file leaves open, of a model under construction. Returns the first
+/// actuator whose length has no end within the ranges of the joints, nactuator if memory runs out, -1 if all is well.
+/// length_range.c.
 int cav_length_range_fill(cav_model *model);
 
 /// Fills inverse_weight of dofs, bodies, tendons and weight of pairs of a model under construction at q0. reference.c.
@@ -23,9 +24,9 @@ void cav_spec_mark_between(const cav_spec *spec, int body1, int body2, char *mar
 /// Marks the joints that can change a tendon's length, mark [joint.n], and returns their dofs. tendon_path.c.
 int cav_spec_tendon_joints(const cav_spec *spec, int tendon, char *mark);
 
-/// Pairs of geoms that may touch, explicit ones first, then in the order of body pairs; their parameters mixed. For each
-/// body [nbody] weld is the body at the top of the group that moves with it, link_of its link. Returns a list of malloc,
-/// *npair long, or NULL for an empty one. filter.c.
+/// Pairs of geoms that may touch, explicit ones first, then in the order of body pairs; their parameters mixed. For
+/// each body [nbody] weld is the body at the top of the group that moves with it, link_of its link. Returns a list of
+/// malloc, *npair long, or NULL for an empty one. filter.c.
 cav_pair *cav_filter_pairs(cav_spec *spec, const int *weld, const int *link_of, int *npair);
 
 /// Model of a complete spec; NULL on failure, noted in spec. compile.c.

@@ -1,9 +1,10 @@
 /// Which geoms may touch, and with what parameters: decided once, before anything moves.
 ///
-/// MJCF's rules: contype and conaffinity masks; never two geoms that move as one, nor parent and child unless one of them
-/// is fixed to the world or the flag filterparent is off; excluded bodies; explicit pairs come before all of these and
-/// replace the same two geoms. Mixing: the geom of higher priority decides; at equal priority condim, friction, margin and
-/// gap take the larger value, solref and solimp are averaged by solmix (direct solref: the smaller). Not done: two planes.
+/// MJCF's rules: contype and conaffinity masks; never two geoms that move as one, nor parent and child unless one of
+/// them is fixed to the world or the flag filterparent is off; excluded bodies; explicit pairs come before all of these
+/// and replace the same two geoms. Mixing: the geom of higher priority decides; at equal priority condim, friction,
+/// margin and gap take the larger value, solref and solimp are averaged by solmix (direct solref: the smaller). Not
+/// done: two planes.
 
 #include <stdlib.h>
 

@@ -1,6 +1,7 @@
-/// Shortest and longest transmission of muscles whose file does not say: what their curves are scaled by. MuJoCo pulls the
-/// model to both ends in a simulation; here the length itself is minimised and maximised over the ranges of the joints, by
-/// projected steps along its gradient from q0, to the nearest end each way. Contacts and other constraints are left out.
+/// Shortest and longest transmission of muscles whose file does not say: what their curves are scaled by. MuJoCo pulls
+/// the model to both ends in a simulation; here the length itself is minimised and maximised over the ranges of the
+/// joints, by projected steps along its gradient from q0, to the nearest end each way. Contacts and other constraints
+/// are left out.
 #include <stdlib.h>
 
 #include "compile.h"

@@ -1,9 +1,8 @@
 /// Masses and inertias: of geoms from their shape and density, of bodies from their geoms or from the file.
 ///
-/// Solid bodies of uniform density; a body's geoms add up by the parallel axis theorem, overlaps counting twice, as MJCF
-/// has it. Principal axes by Jacobi's rotations. Then MJCF's compiler options boundmass, boundinertia, balanceinertia and
-/// settotalmass, in this order. Meshes are weighed in asset.c. Not
-/// done: shells.
+/// Solid bodies of uniform density; a body's geoms add up by the parallel axis theorem, overlaps counting twice, as
+/// MJCF has it. Principal axes by Jacobi's rotations. Then MJCF's compiler options boundmass, boundinertia,
+/// balanceinertia and settotalmass, in this order. Meshes are weighed in asset.c. Not done: shells.
 
 #include "algebra.h"
 #include "compile.h"

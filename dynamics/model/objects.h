@@ -1,5 +1,5 @@
-/// Objects of a model by their kind, as CAV_OBJECTS declares them: names and what to call them. Private: for messages and for
-/// files that name objects.
+/// Objects of a model by their kind, as CAV_OBJECTS declares them: names and what to call them. Private: for messages
+/// and for files that name objects.
 #ifndef CAVORT_OBJECTS_H
 #define CAVORT_OBJECTS_H
 

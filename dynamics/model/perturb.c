@@ -1,6 +1,6 @@
-/// Models that differ a little from their file, for studies of robustness: masses of links scaled, sliding friction replaced, and
-/// all that was derived from them at load derived anew. Inertia scales with mass: the shape stays. Armature, damping, limits and
-/// torsional and rolling friction stay as they are.
+/// Models that differ a little from their file, for studies of robustness: masses of links scaled, sliding friction
+/// replaced, and all that was derived from them at load derived anew. Inertia scales with mass: the shape stays.
+/// Armature, damping, limits and torsional and rolling friction stay as they are.
 #include <math.h>
 
 #include "compile.h"

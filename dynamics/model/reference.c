@@ -1,8 +1,8 @@
 /// Inverse weights at the reference configuration q0: the `reference` diagonal of A (METHOD.md, 4). Per dof the
 /// diagonal of M^-1, averaged over a ball's three and over the two threes of a free joint; per body the mean
-/// translational and rotational diagonal of J M^-1 J' at its centre of mass; per tendon J M^-1 J'; per pair the sum over
-/// its two bodies. Also what equality constraints take from q0, the rest lengths of spatial tendons' springs, and per
-/// actuator the acceleration of a unit force. M is the inertia with armature and without implicit damping.
+/// translational and rotational diagonal of J M^-1 J' at its centre of mass; per tendon J M^-1 J'; per pair the sum
+/// over its two bodies. Also what equality constraints take from q0, the rest lengths of spatial tendons' springs, and
+/// per actuator the acceleration of a unit force. M is the inertia with armature and without implicit damping.
 #include <stdlib.h>
 
 #include "compile.h"

@@ -1,6 +1,6 @@
 /// Actuators of an MJCF file, read and compiled. MJCF has one kind, general; motor, position, velocity, intvelocity,
-/// damper, cylinder and muscle are short ways to write it, and they share one set of defaults: each sets what it implies
-/// and starts from what the class has for the rest. Not offered: adhesion, user-defined functions.
+/// damper, cylinder and muscle are short ways to write it, and they share one set of defaults: each sets what it
+/// implies and starts from what the class has for the rest. Not offered: adhesion, user-defined functions.
 
 #include "math3.h"
 #include "spec.h"

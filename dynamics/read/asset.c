@@ -1,10 +1,10 @@
 /// Meshes and height fields of a model: asked for while the file is read, loaded only where a geom uses them.
 ///
-/// A mesh collides as its convex hull and weighs as its triangles: it is scaled, moved by its reference pose, and expressed
-/// about its centre of mass and principal axes, to which its geoms are moved, as MuJoCo does. One without volume keeps the
-/// middle of its surface and must not be asked to weigh by density. A height field without a file is level; with one (see
-/// elevation.c) its heights are stretched to 0 to 1.
-/// Not done: fitting of simple shapes to meshes, MuJoCo's MSH format.
+/// A mesh collides as its convex hull and weighs as its triangles: it is scaled, moved by its reference pose, and
+/// expressed about its centre of mass and principal axes, to which its geoms are moved, as MuJoCo does. One without
+/// volume keeps the middle of its surface and must not be asked to weigh by density. A height field without a file is
+/// level; with one (see elevation.c) its heights are stretched to 0 to 1. Not done: fitting of simple shapes to meshes,
+/// MuJoCo's MSH format.
 
 #include <limits.h>
 #include <stdio.h>

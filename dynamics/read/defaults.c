@@ -1,5 +1,5 @@
-/// What an MJCF file says before its bodies: compiler, options, classes of defaults, assets. A class is complete: what its parents
-/// say is copied in. Defaults are those of the MJCF reference of MuJoCo 2.2.2.
+/// What an MJCF file says before its bodies: compiler, options, classes of defaults, assets. A class is complete: what
+/// its parents say is copied in. Defaults are those of the MJCF reference of MuJoCo 2.2.2.
 #include "math3.h"
 #include "mjcf.h"
 

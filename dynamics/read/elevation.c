@@ -1,9 +1,9 @@
-/// Reads heights of a field: a binary file of two 32-bit integers, rows and columns, and that many 32-bit floats, all little
-/// endian, or a PNG image, whose brightness is the height.
+/// Reads heights of a field: a binary file of two 32-bit integers, rows and columns, and that many 32-bit floats, all
+/// little endian, or a PNG image, whose brightness is the height.
 ///
-/// An image's rows go from high to low y, those of a binary file from low to high, as in MJCF. Grey images of 1 to 16 bits are
-/// taken as they are, without gamma; colours are weighed to grey by libpng (Rec. 709), transparency is dropped. Without libpng
-/// an image is refused with what to do. Not done: other image formats.
+/// An image's rows go from high to low y, those of a binary file from low to high, as in MJCF. Grey images of 1 to 16
+/// bits are taken as they are, without gamma; colours are weighed to grey by libpng (Rec. 709), transparency is
+/// dropped. Without libpng an image is refused with what to do. Not done: other image formats.
 #include "elevation.h"
 
 #include <math.h>

@@ -12,8 +12,8 @@ typedef struct cav_elevation {
   double *height; ///< [nrow*ncol], any finite scale
 } cav_elevation;
 
-/// Reads an image (PNG) or a binary file of heights; at most limit points along each side. On failure a reason, without the
-/// path, and CAV_BAD_INPUT or CAV_NO_MEMORY. elevation.c.
+/// Reads an image (PNG) or a binary file of heights; at most limit points along each side. On failure a reason, without
+/// the path, and CAV_BAD_INPUT or CAV_NO_MEMORY. elevation.c.
 cav_status cav_elevation_read(const char *path, int limit, cav_elevation *e, char *reason, size_t room);
 
 #endif

@@ -1,9 +1,9 @@
 /// Reads meshes, STL (binary and text) and OBJ, as plain triangles, and integrates their volume.
 ///
-/// STL: colours and normals are not read. OBJ: positions and faces only; polygons are cut into fans, negative indices count
-/// from the end; normals, texture, groups, materials, curves and lines are passed over. Every count is checked against the
-/// size of the file before memory is taken, every index against the vertices, every number must be finite. Not done: other
-/// formats, several solids kept apart.
+/// STL: colours and normals are not read. OBJ: positions and faces only; polygons are cut into fans, negative indices
+/// count from the end; normals, texture, groups, materials, curves and lines are passed over. Every count is checked
+/// against the size of the file before memory is taken, every index against the vertices, every number must be finite.
+/// Not done: other formats, several solids kept apart.
 #include "mesh.h"
 
 #include <locale.h>

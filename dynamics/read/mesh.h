@@ -27,8 +27,9 @@ cav_status cav_mesh_read_stl(const char *bytes, size_t size, cav_triangles *mesh
 cav_status cav_mesh_read_obj(const char *bytes, size_t size, cav_triangles *mesh, char *reason, size_t room);
 void cav_triangles_clear(cav_triangles *mesh);
 
-/// Bulk of the solid inside the triangles; exact 0: as the sum of pyramids from the middle of the surface to each triangle,
-/// none negative (MuJoCo's rule, larger where the surface is not convex); 1: signed, right for any closed surface. mesh.c.
+/// Bulk of the solid inside the triangles; exact 0: as the sum of pyramids from the middle of the surface to each
+/// triangle, none negative (MuJoCo's rule, larger where the surface is not convex); 1: signed, right for any closed
+/// surface. mesh.c.
 cav_bulk cav_mesh_bulk(const cav_triangles *mesh, int exact);
 
 #endif

@@ -1,9 +1,10 @@
-/// Reads an MJCF tree into a spec: defaults and classes applied (defaults.c), angles in radians, poses relative to bodies.
+/// Reads an MJCF tree into a spec: defaults and classes applied (defaults.c), angles in radians, poses relative to
+/// bodies.
 ///
-/// Source: the MJCF reference of MuJoCo 2.2.2, whose semantics and defaults hold, with extensions of later versions that
-/// no 2.2.2 file can contain: the frame element, gravcomp, and limits that hold where only a range is given.
-/// What would change the dynamics and is not offered is an error (meshes that collide or weigh, adhesion, composite
-/// bodies); what only changes how MuJoCo itself steps is a warning (integrator, cone, noslip). Names are resolved in compile.c.
+/// Source: the MJCF reference of MuJoCo 2.2.2, whose semantics and defaults hold, with extensions of later versions
+/// that no 2.2.2 file can contain: the frame element, gravcomp, and limits that hold where only a range is given. What
+/// would change the dynamics and is not offered is an error (meshes that collide or weigh, adhesion, composite bodies);
+/// what only changes how MuJoCo itself steps is a warning (integrator, cone, noslip). Names are resolved in compile.c.
 
 #include <stdlib.h>
 

@@ -1,4 +1,5 @@
-/// The ways MJCF writes an orientation, into unit quaternions: quat, axisangle, xyaxes, zaxis, euler, and fromto for poses.
+/// The ways MJCF writes an orientation, into unit quaternions: quat, axisangle, xyaxes, zaxis, euler, and fromto for
+/// poses.
 ///
 /// Angles are in the unit, euler sequences of the axes, that the file's compiler element sets.
 
@@ -70,7 +71,8 @@ void cav_read_orientation(cav_spec *spec, const cav_xml_node *node, double quat[
   }
 }
 
-// pose from fromto: the z axis runs from the second point to the first, the frame stands midway; returns half the length
+// pose from fromto: the z axis runs from the second point to the first, the frame stands midway; returns half the
+// length
 double cav_pose_of_fromto(const double *fromto, double pos[3], double quat[4]) {
   double d[3];
   sub3(d, fromto, fromto + 3);

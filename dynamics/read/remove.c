@@ -1,6 +1,7 @@
-/// Takes bodies and geoms out of the tree of an MJCF file before it is read as a model: walls, height fields, a ball that a
-/// motion has no use for. What refers to them goes too, and what refers to that, or the rest would not hold together. Works on
-/// names by kind, as references do; keyframes stay as they are, and fit only where no coordinates went.
+/// Takes bodies and geoms out of the tree of an MJCF file before it is read as a model: walls, height fields, a ball
+/// that a motion has no use for. What refers to them goes too, and what refers to that, or the rest would not hold
+/// together. Works on names by kind, as references do; keyframes stay as they are, and fit only where no coordinates
+/// went.
 #include "remove.h"
 
 #include <stdio.h>
@@ -51,7 +52,8 @@ static void lose_all(omission *o, const cav_xml_node *node) {
   for (const cav_xml_node *c = node->child; c; c = c->next) lose_all(o, c);
 }
 
-/// Whether the kind that an attribute names is that one: "joint2" and "jointinparent" name joints, "objname" what "objtype" says.
+/// Whether the kind that an attribute names is that one: "joint2" and "jointinparent" name joints, "objname" what
+/// "objtype" says.
 static int names(const cav_xml_node *node, const char *attribute, const char *kind) {
   const char *type = !strcmp(attribute, "objname")   ? cav_xml_text(node, "objtype", "")
                      : !strcmp(attribute, "refname") ? cav_xml_text(node, "reftype", "")

@@ -1,8 +1,8 @@
 /// The grammar of MJCF: which elements and attributes a model file may have, and of what type.
 ///
 /// Names and counts are those of the MJCF reference for MuJoCo 2.2.2, plus the frame element of later versions. What is
-/// only seen (visual, asset textures, camera, light, statistic, size, custom) is accepted unread. What has an effect but is
-/// not offered is in the table too: mjcf.c says so with the line, which is clearer than "unknown element".
+/// only seen (visual, asset textures, camera, light, statistic, size, custom) is accepted unread. What has an effect
+/// but is not offered is in the table too: mjcf.c says so with the line, which is clearer than "unknown element".
 
 #include "remove.h"
 #include "spec.h"

@@ -1,5 +1,5 @@
-/// What an MJCF file says after its bodies: contact, equality, tendon, actuator, sensor, keyframe. Names are resolved when the
-/// model is compiled.
+/// What an MJCF file says after its bodies: contact, equality, tendon, actuator, sensor, keyframe. Names are resolved
+/// when the model is compiled.
 #include "math3.h"
 #include "mjcf.h"
 

@@ -261,7 +261,8 @@ void cav_spec_warn(cav_spec *spec, const cav_xml_node *node, const char *attribu
 void cav_spec_unknown(cav_spec *spec, const cav_xml_node *node, const char *attribute, const char *kind,
                       const char *name, const void *first, int n, size_t stride);
 
-/// Checks that fail with the element's line: a number >= 0; solref and solimp (where: limit, friction or nothing); condim.
+/// Checks that fail with the element's line: a number >= 0; solref and solimp (where: limit, friction or nothing);
+/// condim.
 void cav_check_not_negative(cav_spec *spec, const cav_xml_node *node, const char *attribute, double value);
 void cav_check_softness(cav_spec *spec, const cav_xml_node *node, const char *where, const cav_softness *softness);
 void cav_check_condim(cav_spec *spec, const cav_xml_node *node, int condim);
@@ -281,8 +282,8 @@ extern const cav_xml_element cav_mjcf_root, cav_mjcf_extension;
 /// Fills spec from a checked tree. mjcf.c.
 void cav_mjcf_read(cav_spec *spec, const cav_xml *xml);
 
-/// Adds the scene's objects that stand in the world, with what the world has of its own; then its bodies, after all others.
-/// mjcf.c.
+/// Adds the scene's objects that stand in the world, with what the world has of its own; then its bodies, after all
+/// others. mjcf.c.
 void cav_scene_objects(cav_spec *spec);
 void cav_scene_bodies(cav_spec *spec);
 
@@ -300,7 +301,8 @@ int cav_add_mesh(cav_spec *spec, const cav_xml_node *node, const char *path, con
 /// Loads the meshes and height fields that geoms use, and moves those geoms to their frames. asset.c.
 void cav_spec_assets(cav_spec *spec);
 
-/// Copies them to base (16-byte aligned) and sets them in the model; base NULL: only counts. Returns the bytes. asset.c.
+/// Copies them to base (16-byte aligned) and sets them in the model; base NULL: only counts. Returns the bytes.
+/// asset.c.
 size_t cav_put_assets(const cav_spec *spec, void *base, cav_model *model);
 void cav_clear_assets(cav_spec *spec);
 

@@ -1,14 +1,14 @@
 /// Reads a URDF tree into a spec: links become bodies, joints move the body of their child link.
 ///
-/// Source: the URDF specification of ROS, and where it is silent, what MuJoCo makes of such files: the root link stands in
-/// the world unless a floating joint carries it (or the caller asks for a free base); links without an inertial element
-/// weigh what their collision shapes weigh at 1000 kg/m^3; limits hold where lower < upper. What is read beyond collision:
-/// visual geometry only on request, since it can neither touch nor weigh. Links joined by fixed joints move as one and keep
-/// their names; their reference weights are those of the whole, as if they were merged, unless the file's
-/// <mujoco><compiler fusestatic="false"/></mujoco> says otherwise. A joint with an effort limit gets a motor of that
-/// range; one that mimics another is tied to it by a joint equality.
-/// What the file asks for and is left aside is a warning with its line: velocity limits, safety controllers,
-/// elements that no table knows. Not done: soft limits, transmissions, xacro.
+/// Source: the URDF specification of ROS, and where it is silent, what MuJoCo makes of such files: the root link stands
+/// in the world unless a floating joint carries it (or the caller asks for a free base); links without an inertial
+/// element weigh what their collision shapes weigh at 1000 kg/m^3; limits hold where lower < upper. What is read beyond
+/// collision: visual geometry only on request, since it can neither touch nor weigh. Links joined by fixed joints move
+/// as one and keep their names; their reference weights are those of the whole, as if they were merged, unless the
+/// file's <mujoco><compiler fusestatic="false"/></mujoco> says otherwise. A joint with an effort limit gets a motor of
+/// that range; one that mimics another is tied to it by a joint equality. What the file asks for and is left aside is a
+/// warning with its line: velocity limits, safety controllers, elements that no table knows. Not done: soft limits,
+/// transmissions, xacro.
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,10 +1,11 @@
 /// Reads XML files against a grammar table. The only user of libxml2.
 ///
-/// libxml2's SAX interface hands over one tag at a time; each is checked against the table and appended to a tree of our
-/// own, so a broken file stops at its first fault and nothing that the table forbids is ever stored. Files are read whole,
-/// bounded in size, and scanned once for what would make the parser slow or is no text. Document types are refused, which
-/// leaves no entities to expand and no network to reach. Numbers are read in the C locale whatever the program's is.
-/// Not done: writing XML, namespaces, encodings other than what libxml2 detects in a file without zero bytes.
+/// libxml2's SAX interface hands over one tag at a time; each is checked against the table and appended to a tree of
+/// our own, so a broken file stops at its first fault and nothing that the table forbids is ever stored. Files are read
+/// whole, bounded in size, and scanned once for what would make the parser slow or is no text. Document types are
+/// refused, which leaves no entities to expand and no network to reach. Numbers are read in the C locale whatever the
+/// program's is. Not done: writing XML, namespaces, encodings other than what libxml2 detects in a file without zero
+/// bytes.
 
 #include "xml.h"
 

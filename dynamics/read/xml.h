@@ -1,10 +1,10 @@
 /// Reads XML files against a table that says what may stand where. Private: not installed.
 ///
-/// A grammar is a set of constant tables: cav_xml_element (name, how often, attributes, children) and
-/// cav_xml_attribute (name, type, how many values). cav_xml_read checks the whole file against it while reading, so code
-/// that walks the tree afterwards meets only what the table allows, already converted. Every complaint reads
-/// "FILE:LINE: <element>: attribute 'x': expected ..., got '...'; do ...".
-/// Not offered: document types and entities (refused), namespaces, text between tags (refused, but see CAV_XML_ANYTHING).
+/// A grammar is a set of constant tables: cav_xml_element (name, how often, attributes, children) and cav_xml_attribute
+/// (name, type, how many values). cav_xml_read checks the whole file against it while reading, so code that walks the
+/// tree afterwards meets only what the table allows, already converted. Every complaint reads "FILE:LINE: <element>:
+/// attribute 'x': expected ..., got '...'; do ...". Not offered: document types and entities (refused), namespaces,
+/// text between tags (refused, but see CAV_XML_ANYTHING).
 #ifndef CAVORT_XML_H
 #define CAVORT_XML_H
 
@@ -74,9 +74,10 @@ typedef struct cav_xml_node {
 
 typedef struct cav_xml cav_xml;
 
-/// Reads a file whose root is one of roots (ends with NULL). Included files are sought relative to the folder of path, and
-/// may be included once. former: names that have changed, NULL: none. NULL on failure with the reason in error (may be NULL): CAV_BAD_INPUT or CAV_NO_MEMORY.
-/// Bounds: 32 MB a file, 128 MB in all, 200 elements deep; files must be regular ones.
+/// Reads a file whose root is one of roots (ends with NULL). Included files are sought relative to the folder of path,
+/// and may be included once. former: names that have changed, NULL: none. NULL on failure with the reason in error (may
+/// be NULL): CAV_BAD_INPUT or CAV_NO_MEMORY. Bounds: 32 MB a file, 128 MB in all, 200 elements deep; files must be
+/// regular ones.
 cav_xml *cav_xml_read(const char *path, const cav_xml_element *const *roots, const cav_xml_former *former,
                       cav_error *error);
 
@@ -105,7 +106,8 @@ int cav_xml_int(const cav_xml_node *node, const char *name, int fallback);
 int cav_xml_bool(const cav_xml_node *node, const char *name, int fallback);
 int cav_xml_word(const cav_xml_node *node, const char *name, int fallback);
 
-/// Copies the numbers of an attribute to out (at most most) and returns how many the file gives; 0 if none: out untouched.
+/// Copies the numbers of an attribute to out (at most most) and returns how many the file gives; 0 if none: out
+/// untouched.
 int cav_xml_reals(const cav_xml_node *node, const char *name, double *out, int most);
 
 /// Fills error with "FILE:LINE: <element>: attribute 'x': " and the formatted text; attribute may be NULL, error too.

@@ -1,6 +1,6 @@
-/// Poses of objects and readings of sensors from a state's last evaluation. Velocities are those at v_next, accelerations
-/// and forces those of the step. Bodies welded into one link keep their own frames and masses here, so a subtree is a
-/// subtree of the file. Readings carry no noise. Nothing is computed for sensors that are not asked for.
+/// Poses of objects and readings of sensors from a state's last evaluation. Velocities are those at v_next,
+/// accelerations and forces those of the step. Bodies welded into one link keep their own frames and masses here, so a
+/// subtree is a subtree of the file. Readings carry no noise. Nothing is computed for sensors that are not asked for.
 #include "sensor.h"
 #include "math3.h"
 

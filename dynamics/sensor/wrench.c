@@ -1,8 +1,8 @@
-/// Forces inside a model, from the last evaluation of the inverse: what holds a body to its parent, and what presses on a
-/// zone of its surface. The first is the balance of the body's subtree in the file, Newton-Euler for each of its bodies
-/// less the contacts and equality constraints upon it, so it is there also for bodies that are fused into one link. Springs, dampers, actuators,
-/// limits and friction of joints and tendons act between bodies of the tree and are part of what it reports; so are, as in
-/// MuJoCo, drag of a fluid and lift against gravity, which act from outside.
+/// Forces inside a model, from the last evaluation of the inverse: what holds a body to its parent, and what presses on
+/// a zone of its surface. The first is the balance of the body's subtree in the file, Newton-Euler for each of its
+/// bodies less the contacts and equality constraints upon it, so it is there also for bodies that are fused into one
+/// link. Springs, dampers, actuators, limits and friction of joints and tendons act between bodies of the tree and are
+/// part of what it reports; so are, as in MuJoCo, drag of a fluid and lift against gravity, which act from outside.
 #include "half_step.h"
 #include "math3.h"
 #include "sensor.h"

@@ -1,8 +1,8 @@
 /// Forces of a medium of some density and viscosity, which may blow: drag and lift on whatever moves in it. Two models,
-/// those of MuJoCo's documentation (chapter "Fluid forces"), whose names the terms have here. A body is a box of the same
-/// inertia: quadratic drag of its faces and Stokes' linear drag of a sphere. A geom that asks for it (fluidshape) is an
-/// ellipsoid instead: added mass without its acceleration part, drag blunt and slender, Magnus and Kutta lift, Stokes'
-/// drag; its body is then no box. The medium's flow is the same everywhere and is not disturbed.
+/// those of MuJoCo's documentation (chapter "Fluid forces"), whose names the terms have here. A body is a box of the
+/// same inertia: quadratic drag of its faces and Stokes' linear drag of a sphere. A geom that asks for it (fluidshape)
+/// is an ellipsoid instead: added mass without its acceleration part, drag blunt and slender, Magnus and Kutta lift,
+/// Stokes' drag; its body is then no box. The medium's flow is the same everywhere and is not disturbed.
 #include <stdlib.h>
 
 #include "math3.h"

@@ -4,14 +4,15 @@
 ///
 ///   W = (l_after - l_before)/h - weight at q
 ///
-/// and the root link bears what the sum of its links' Newton-Euler forces at the mean velocity lacks of it: all other rows
-/// of u are those of midpoint, the rows of the root are S(q) . W. What is after one knot is before the next, so over a
-/// motion these add up to the balance of linear and angular momentum, exactly, whatever the step. Second order in h, and
-/// the same read backwards in time. Two more placements of the links are its cost; no matrix is formed.
+/// and the root link bears what the sum of its links' Newton-Euler forces at the mean velocity lacks of it: all other
+/// rows of u are those of midpoint, the rows of the root are S(q) . W. What is after one knot is before the next, so
+/// over a motion these add up to the balance of linear and angular momentum, exactly, whatever the step. Second order
+/// in h, and the same read backwards in time. Two more placements of the links are its cost; no matrix is formed.
 ///
-/// Tried and left: changes of momentum for the forces of every link, which is neater, but errs several times as much where
-/// limbs turn fast; and a discrete action (as in Lee, Liu, Park and Srinivasa 2016, arXiv 1609.02898), which keeps momentum too
-/// and errs more still, as it takes chords between knots for velocities. Not conserved exactly: energy.
+/// Tried and left: changes of momentum for the forces of every link, which is neater, but errs several times as much
+/// where limbs turn fast; and a discrete action (as in Lee, Liu, Park and Srinivasa 2016, arXiv 1609.02898), which
+/// keeps momentum too and errs more still, as it takes chords between knots for velocities. Not conserved exactly:
+/// energy.
 #include "half_step.h"
 
 #include <assert.h>

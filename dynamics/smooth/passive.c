@@ -1,6 +1,7 @@
-/// Forces of dofs and tendons that do not pass through links: armature, damping, springs. Springs of free and ball joints
-/// act along the rotation vector from q0, in body axes. Damping of joints and tendons is linear in one velocity, which
-/// the order of the step chooses. Also gravity compensation, a force at the centre of mass of a body. Fluids: fluid.c.
+/// Forces of dofs and tendons that do not pass through links: armature, damping, springs. Springs of free and ball
+/// joints act along the rotation vector from q0, in body axes. Damping of joints and tendons is linear in one velocity,
+/// which the order of the step chooses. Also gravity compensation, a force at the centre of mass of a body. Fluids:
+/// fluid.c.
 #include "math3.h"
 #include "smooth.h"
 

@@ -1,5 +1,5 @@
-/// Newton-Euler: spatial velocities and accelerations down the tree, forces up it. Gravity enters as the acceleration of
-/// the base. All vectors are at the tree's reference point (kinematics.c), so A and V only add from link to link:
+/// Newton-Euler: spatial velocities and accelerations down the tree, forces up it. Gravity enters as the acceleration
+/// of the base. All vectors are at the tree's reference point (kinematics.c), so A and V only add from link to link:
 /// A_child = A_parent + S a + V x S v with V the velocity before the joint. Forces balance about each link's centre of
 /// mass. A free joint is two groups of dofs, translation and rotation: the axes of a group turn with what is before it.
 #include "math3.h"

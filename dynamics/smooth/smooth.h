@@ -15,8 +15,8 @@ typedef struct cav_posture {
 /// Poses, centres of mass, world inertias and motion subspaces at a posture. kinematics.c.
 void cav_posture_place(const cav_model *model, struct cav_workspace *w, const cav_posture *at);
 
-/// Mass, first moment and inertia of every subtree about its reference, all [nlink*10], from com, inertia and reference of a
-/// posture. inertia.c.
+/// Mass, first moment and inertia of every subtree about its reference, all [nlink*10], from com, inertia and reference
+/// of a posture. inertia.c.
 void cav_composites_at(const cav_model *model, const cav_posture *at, double *all);
 
 /// Poses, centres of mass, world inertias, motion subspaces from q. kinematics.c.
@@ -69,7 +69,8 @@ void cav_composites(const cav_model *model, cav_state *state);
 /// Composite inertia at the state's poses without D, tree-sparse (row i: dof i, its parent, ...). inertia.c.
 void cav_composite_inertia(const cav_model *model, cav_state *state, double *M);
 
-/// M as a step sees it, tree-sparse: with D and, where a step takes the mean velocity, half of the damping that acts during the step. inertia.c.
+/// M as a step sees it, tree-sparse: with D and, where a step takes the mean velocity, half of the damping that acts
+/// during the step. inertia.c.
 void cav_step_inertia(const cav_model *model, cav_state *state, double *M);
 
 /// D of a dof under the state's options: armature, and damping times h where damping is implicit. inertia.c.

@@ -1,8 +1,8 @@
 /// Lengths of tendons and their gradients, the moment arms. A fixed tendon is a sum of joint coordinates with constant
-/// arms, written once. A spatial tendon is a string through sites and around geoms (wrap.c); a pulley divides the length
-/// of the branch behind it. Its arms are exact: of each straight piece between two links, the direction dotted with the
-/// velocity that a dof gives its ends relative to each other. Only dofs that move a piece's ends apart are listed
-/// (model->tendon_dof). A piece of no length has no direction and no arm.
+/// arms, written once. A spatial tendon is a string through sites and around geoms (wrap.c); a pulley divides the
+/// length of the branch behind it. Its arms are exact: of each straight piece between two links, the direction dotted
+/// with the velocity that a dof gives its ends relative to each other. Only dofs that move a piece's ends apart are
+/// listed (model->tendon_dof). A piece of no length has no direction and no arm.
 #include "math3.h"
 #include "smooth.h"
 #include "wrap.h"

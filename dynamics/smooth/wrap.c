@@ -1,13 +1,13 @@
-/// The shortest way of a string around a sphere or a cylinder, or through the inside of one, from point to point: straight
-/// lines that touch the surface, and the geodesic between. All in the frame of the geom, a cylinder is along z and has no
-/// end. A sphere is a circle in the plane of both points and its centre, a cylinder is one in the projection along its
-/// axis, where the string unrolls to a line of constant derivative.
+/// The shortest way of a string around a sphere or a cylinder, or through the inside of one, from point to point:
+/// straight lines that touch the surface, and the geodesic between. All in the frame of the geom, a cylinder is along z
+/// and has no end. A sphere is a circle in the plane of both points and its centre, a cylinder is one in the projection
+/// along its axis, where the string unrolls to a line of constant derivative.
 ///
-/// Outside, a string that clears the surface is straight, unless a side is given and it passes on the other one. Inside,
-/// it must come through the circle: where the straight line misses it, it bends at the one point of the circle where it
-/// meets the radius under equal angles. Whether a side is inside is checked in the plane of the string, as MuJoCo does. An
-/// end inside the geom: no wrapping. The geom's own motion along the string is
-/// of no account: at the shortest way it changes nothing, so the two touching points serve as fixed ones (tendon.c).
+/// Outside, a string that clears the surface is straight, unless a side is given and it passes on the other one.
+/// Inside, it must come through the circle: where the straight line misses it, it bends at the one point of the circle
+/// where it meets the radius under equal angles. Whether a side is inside is checked in the plane of the string, as
+/// MuJoCo does. An end inside the geom: no wrapping. The geom's own motion along the string is of no account: at the
+/// shortest way it changes nothing, so the two touching points serve as fixed ones (tendon.c).
 #include "wrap.h"
 
 #include "math3.h"
@@ -71,8 +71,8 @@ static double around(const double a[2], const double b[2], double radius, const 
   return arc;
 }
 
-// angle of sine z at the corner, from the law of sines on both sides: asin(Az) + asin(Bz) - 2 asin(z) + angle = 0 falls in
-// z on (0, 1) and is positive at 0. Newton within a bracket
+// angle of sine z at the corner, from the law of sines on both sides: asin(Az) + asin(Bz) - 2 asin(z) + angle = 0 falls
+// in z on (0, 1) and is positive at 0. Newton within a bracket
 static double corner_sine(double A, double B, double angle) {
   double low = 0, high = 1, z = 0.5;
   for (int k = 0; k < 100; k++) {

@@ -1,5 +1,5 @@
-/// What the analytic derivatives of a state keep: how each dof's motion drifts, sums over subtrees, and the derivatives of
-/// each contact. Made by the first call of cav_derivatives on a state, released with it. Private to dynamics/.
+/// What the analytic derivatives of a state keep: how each dof's motion drifts, sums over subtrees, and the derivatives
+/// of each contact. Made by the first call of cav_derivatives on a state, released with it. Private to dynamics/.
 #ifndef CAVORT_DERIVATIVE_STORE_H
 #define CAVORT_DERIVATIVE_STORE_H
 

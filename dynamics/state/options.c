@@ -1,5 +1,5 @@
-/// Options of an evaluation, by the table in model.h: checks and comparison. A struct with a table of its fields is checked by
-/// the table alone, so texts are the same wherever it comes from.
+/// Options of an evaluation, by the table in model.h: checks and comparison. A struct with a table of its fields is
+/// checked by the table alone, so texts are the same wherever it comes from.
 #include "options.h"
 
 #include <limits.h>

@@ -1,5 +1,5 @@
-/// Options of an evaluation, by their table: whether they are right, and what a change of them leaves as it was. Private to
-/// dynamics/.
+/// Options of an evaluation, by their table: whether they are right, and what a change of them leaves as it was.
+/// Private to dynamics/.
 #ifndef CAVORT_OPTIONS_H
 #define CAVORT_OPTIONS_H
 

@@ -90,8 +90,8 @@ typedef struct cav_workspace {
   double *gram;         ///< [nu*nu] its pseudo-inverse otherwise, with scratch behind; NULL if diagonal and constant
   double *control;      ///< [2*nu]
 
-  // coupled rows (coupled.c): I + R A^+ times what undoes the factor 1 + epsilon of each row [rows*rows], v* [rows] in the
-  // order of cav_jacobian; NULL without
+  // coupled rows (coupled.c): I + R A^+ times what undoes the factor 1 + epsilon of each row [rows*rows], v* [rows] in
+  // the order of cav_jacobian; NULL without
   double *coupling, *target;
   size_t coupling_room;
   int first_row, first_equality; // where in target rows and equality constraints begin
@@ -107,7 +107,8 @@ typedef struct cav_workspace {
   struct cav_derivative_store *derivatives;
   int derived;
 
-  // forward step: memory of its matrices, grown by impulse.c, and the impulses of its last Gauss-Seidel solve, by gpgs.c
+  // forward step: memory of its matrices, grown by impulse.c, and the impulses of its last Gauss-Seidel solve, by
+  // gpgs.c
   void *solver;
   size_t solver_bytes;
   cav_memory *memory;

@@ -2,14 +2,15 @@
 ///
 /// Exact diagonal: every R is the one by reference weights times (true diagonal / reference weight), so (27) holds with
 /// the true A_ii; friction rows go with their normal row, which keeps (22). Equality constraints take the diagonal of
-/// J_E M^-1 J_E', as M_hat depends on their R; the rest that of J M_hat^-1 J'. r_min is a millionth of the reference: a row
-/// that nothing can move stays finite.
+/// J_E M^-1 J_E', as M_hat depends on their R; the rest that of J M_hat^-1 J'. r_min is a millionth of the reference: a
+/// row that nothing can move stays finite.
 ///
 /// Coupled rows: B = (I + R A^+) 2/kappa, K = (I + R A^+)/kappa^2 solve A R^-1 B = (2/kappa)(I + A R^-1) and its like,
-/// which makes all rows together critically damped: x'' + (2/kappa) x' + x/kappa^2 = (I + A R^-1)^-1 a where the rows hold
-/// (not those that pull away, not friction at its bound). A takes all rows of the state, equality constraints among
-/// them, by M. A^+ is a generalised inverse, of A scaled to a unit diagonal. The diagonal law's h B and h K hold a factor
-/// 1 + epsilon for this coupling with the row itself; it is taken out first, so both laws are one where A is diagonal.
+/// which makes all rows together critically damped: x'' + (2/kappa) x' + x/kappa^2 = (I + A R^-1)^-1 a where the rows
+/// hold (not those that pull away, not friction at its bound). A takes all rows of the state, equality constraints
+/// among them, by M. A^+ is a generalised inverse, of A scaled to a unit diagonal. The diagonal law's h B and h K hold
+/// a factor 1 + epsilon for this coupling with the row itself; it is taken out first, so both laws are one where A is
+/// diagonal.
 #include <stdlib.h>
 
 #include <assert.h>
@@ -162,8 +163,8 @@ static double eased(const cav_state *state, const cav_block *block) {
   return block->contact < 0 ? 1 : 1 / cav_contact_stiffness_ratio(state, &state->contact[block->contact], &rate);
 }
 
-// (I + R A^+) diag(1/(1 + epsilon)); epsilon = R/weight of a block's first row is the one that h B and h K were made with.
-// exact says that the weights are the true diagonal
+// (I + R A^+) diag(1/(1 + epsilon)); epsilon = R/weight of a block's first row is the one that h B and h K were made
+// with. exact says that the weights are the true diagonal
 static cav_status fill_coupling(rows *r, int exact) {
   cav_state *state = r->p.state;
   cav_workspace *w = state->work;

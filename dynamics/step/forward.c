@@ -5,11 +5,10 @@
 /// semismooth Newton method, the smoothed law an ordinary one. Outer passes refine: they measure the inverse itself,
 /// not the model of it.
 ///
-/// midpoint, momentum: bias and passive forces depend on v_next. The convex problem with these frozen gives the start; Newton
-/// with their derivative (differences of the smooth inverse, reused while it serves) finishes. Nothing then is
-/// symmetric or convex: such a step need not exist once a body turns by a radian or so within it (gyroscopic
-/// torques at speeds near 2/h; the solutions traced there end in a fold). Then the best iterate is returned as not
-/// converged.
+/// midpoint, momentum: bias and passive forces depend on v_next. The convex problem with these frozen gives the start;
+/// Newton with their derivative (differences of the smooth inverse, reused while it serves) finishes. Nothing then is
+/// symmetric or convex: such a step need not exist once a body turns by a radian or so within it (gyroscopic torques at
+/// speeds near 2/h; the solutions traced there end in a fold). Then the best iterate is returned as not converged.
 ///
 /// Coulomb's law (coulomb.c) has no potential either: Newton from the convex law's solution, and where it does not
 /// descend, convex problems with the bounds of friction held. A solution need not exist nor be the only one (Painleve).
@@ -307,8 +306,8 @@ static cav_status solve_island(newton *s, const int *local, double tolerance, do
   return CAV_OK;
 }
 
-// minimises the potential with smooth forces linear in M about x, island by island, to tolerance of the largest force or
-// to rounding. Iterations are those of the island that takes most
+// minimises the potential with smooth forces linear in M about x, island by island, to tolerance of the largest force
+// or to rounding. Iterations are those of the island that takes most
 static cav_status solve_convex(newton *s, double tolerance) {
   const cav_impulse *p = &s->problem;
   copy(s->anchor, s->x, p->nv);
@@ -349,9 +348,9 @@ static void fill_inertia(const cav_impulse *p, double *matrix) {
   }
 }
 
-// derivative of h times the smooth inverse with respect to v_next: the inertia, or at the mean velocity by columns. It is
-// quadratic in v_next, or nearly so: a one-sided difference errs by the step, 1e-5 of the Coriolis terms, which costs
-// Newton nothing
+// derivative of h times the smooth inverse with respect to v_next: the inertia, or at the mean velocity by columns. It
+// is quadratic in v_next, or nearly so: a one-sided difference errs by the step, 1e-5 of the Coriolis terms, which
+// costs Newton nothing
 static cav_status differentiate_smooth(newton *s) {
   const int nv = s->problem.nv;
   if (!cav_takes_mean(s->problem.state)) {
@@ -449,8 +448,8 @@ static double velocity_error(newton *s) {
   return error > 0.0 ? error / largest(s->x, p->nv) : 0.0;
 }
 
-// towards Coulomb's law from x by convex problems in which the bounds of friction are held (Tresca's friction): each takes
-// them from the impulses of the one before, half way from the second on. Their fixed point is Coulomb's law
+// towards Coulomb's law from x by convex problems in which the bounds of friction are held (Tresca's friction): each
+// takes them from the impulses of the one before, half way from the second on. Their fixed point is Coulomb's law
 static cav_status solve_held(newton *s, int count, double tolerance) {
   cav_impulse *p = &s->problem;
   cav_status status = CAV_OK;

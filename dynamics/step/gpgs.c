@@ -1,19 +1,20 @@
 /// One step forward by generalised projected Gauss-Seidel on the impulse problem (9), Todorov 2014, section IV:
-/// minimise 1/2 f' (A + R) f + f' (v_minus - v*) over the cones, A = J M_hat^-1 J', one object at a time and each update
-/// exact. Limits and friction losses are clamped. A contact is moved first along the ray of its impulse, or from the
-/// apex along the steepest ray of its cone, then in its friction part with the normal fixed: a quadratic on an
+/// minimise 1/2 f' (A + R) f + f' (v_minus - v*) over the cones, A = J M_hat^-1 J', one object at a time and each
+/// update exact. Limits and friction losses are clamped. A contact is moved first along the ray of its impulse, or from
+/// the apex along the steepest ray of its cone, then in its friction part with the normal fixed: a quadratic on an
 /// ellipsoid, solved by Newton's method on the multiplier (Moré and Sorensen 1983).
 ///
-/// Equality constraints are not swept over but eliminated, eqs. (6), (7): M^-1 gives way to
-/// M_hat^-1 = M^-1 - M^-1 J_E' S J_E M^-1 with S = (A_E + R_E)^-1, and v to v_hat. So they hold to rounding in every sweep
-/// and stiff ones cost no more of them.
+/// Equality constraints are not swept over but eliminated, eqs. (6), (7): M^-1 gives way to M_hat^-1 = M^-1 - M^-1 J_E'
+/// S J_E M^-1 with S = (A_E + R_E)^-1, and v to v_hat. So they hold to rounding in every sweep and stiff ones cost no
+/// more of them.
 ///
 /// Hard ones are the same with R_E = 0 and the pseudo-inverse of A_E for S.
 ///
-/// Under Coulomb's law the first of a contact's two updates moves its normal impulse alone: the fixed point is that law's.
+/// Under Coulomb's law the first of a contact's two updates moves its normal impulse alone: the fixed point is that
+/// law's.
 ///
-/// Starts from the impulses of the last solve on the same state, matched object by object. For midpoint and momentum the smooth
-/// forces are taken anew after each sweep. The exact law only: the smoothed one has no bounded dual; use
+/// Starts from the impulses of the last solve on the same state, matched object by object. For midpoint and momentum
+/// the smooth forces are taken anew after each sweep. The exact law only: the smoothed one has no bounded dual; use
 /// cav_forward_newton.
 #include <assert.h>
 #include <math.h>

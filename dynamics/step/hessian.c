@@ -1,7 +1,8 @@
-/// Hessian M + J' H J of one island and its factors, by whichever of two ways takes less work on its structure: elimination of a
-/// dense matrix from the leaves, which keeps the zeros of the trees but fills as the dofs are numbered, or CHOLMOD (sparse.c).
-/// A sparse pattern is that of the blocks' dofs, whether their impulses bend or not, so it holds for all iterations of a step, and
-/// for the next step while the same links are in touch; then nothing is analysed and only CHOLMOD itself allocates.
+/// Hessian M + J' H J of one island and its factors, by whichever of two ways takes less work on its structure:
+/// elimination of a dense matrix from the leaves, which keeps the zeros of the trees but fills as the dofs are
+/// numbered, or CHOLMOD (sparse.c). A sparse pattern is that of the blocks' dofs, whether their impulses bend or not,
+/// so it holds for all iterations of a step, and for the next step while the same links are in touch; then nothing is
+/// analysed and only CHOLMOD itself allocates.
 #include "hessian.h"
 
 #include <limits.h>
@@ -275,8 +276,8 @@ static cav_status next_slot(cav_hessian *h) {
   return CAV_OK;
 }
 
-// operations of the dense way: squares of what stands left of the diagonal in the rows, and four passes over the matrix.
-// low [ndof] is overwritten
+// operations of the dense way: squares of what stands left of the diagonal in the rows, and four passes over the
+// matrix. low [ndof] is overwritten
 static double dense_work(const cav_hessian *h, double *low) {
   const cav_impulse *p = h->part;
   const int *parent = p->state->work->parent;

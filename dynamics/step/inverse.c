@@ -1,10 +1,11 @@
-/// The analytic inverse: u from (q, v, v_next), Todorov 2014, eqs. (2), (19)-(22). Kinematics, contacts and limits; link
-/// velocities; every impulse in closed form from the velocities of its own two bodies; one pass up the tree that carries
-/// the impulses along with the inertial forces. No matrix is formed.
+/// The analytic inverse: u from (q, v, v_next), Todorov 2014, eqs. (2), (19)-(22). Kinematics, contacts and limits;
+/// link velocities; every impulse in closed form from the velocities of its own two bodies; one pass up the tree that
+/// carries the impulses along with the inertial forces. No matrix is formed.
 ///
 /// The order of the step says at which velocity bias and passive forces are taken: v with joint damping at v_next
-/// (euler), or the mean of both (midpoint, momentum). For momentum the root link bears what is missing to the change of the
-/// momentum of its tree from half a step before to half a step after (half_step.c). Constraints always compare J v with J v_next at q.
+/// (euler), or the mean of both (midpoint, momentum). For momentum the root link bears what is missing to the change of
+/// the momentum of its tree from half a step before to half a step after (half_step.c). Constraints always compare J v
+/// with J v_next at q.
 ///
 /// What a stage may reuse depends on the options too: after a change of those that positions depend on, all is new.
 #include "half_step.h"

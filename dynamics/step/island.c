@@ -1,5 +1,5 @@
-/// Finds islands by joining the trees that a block's dofs belong to (union-find), and works on one island's fraction of the
-/// tree-sparse inertia. Blocks without dofs go with the first island.
+/// Finds islands by joining the trees that a block's dofs belong to (union-find), and works on one island's fraction of
+/// the tree-sparse inertia. Blocks without dofs go with the first island.
 #include "island.h"
 
 #include <string.h>

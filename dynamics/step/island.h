@@ -15,8 +15,8 @@ typedef struct cav_islands {
 /// Doubles of room that cav_islands_find needs, for each dof and for each block.
 enum { CAV_ISLAND_PER_DOF = 4, CAV_ISLAND_PER_BLOCK = (sizeof(cav_block) + sizeof(double) - 1) / sizeof(double) };
 
-/// Finds the islands and sorts the problem's blocks by them, rows staying where they are; blocks of one island keep their
-/// order. The islands lie in room. island.c.
+/// Finds the islands and sorts the problem's blocks by them, rows staying where they are; blocks of one island keep
+/// their order. The islands lie in room. island.c.
 void cav_islands_find(cav_impulse *problem, double *room, cav_islands *islands);
 
 /// r := M x and x := M^-1 x for the dofs of one island alone.

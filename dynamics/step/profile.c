@@ -1,6 +1,6 @@
-/// What the stages of one evaluation of the inverse take, by running each alone: for `cavort inspect` and for whoever wants to
-/// know where the time goes. A stage is repeated until it can be measured and the shortest of several such runs counts, so
-/// the caches are warm. What the velocity stages take is told apart by leaving the constraints out.
+/// What the stages of one evaluation of the inverse take, by running each alone: for `cavort inspect` and for whoever
+/// wants to know where the time goes. A stage is repeated until it can be measured and the shortest of several such
+/// runs counts, so the caches are warm. What the velocity stages take is told apart by leaving the constraints out.
 #include <time.h>
 
 #include "math3.h"

@@ -1,6 +1,6 @@
-/// The state of one thread: one block carved once, plus contacts and rows in two arrays that grow.
-/// Here the model is also compiled into the list of work it needs: which joints have springs or limits, which dofs
-/// friction, how the rows of the sparse inertia lie. A model without any of them gets empty lists. Nothing is evaluated.
+/// The state of one thread: one block carved once, plus contacts and rows in two arrays that grow. Here the model is
+/// also compiled into the list of work it needs: which joints have springs or limits, which dofs friction, how the rows
+/// of the sparse inertia lie. A model without any of them gets empty lists. Nothing is evaluated.
 #include <assert.h>
 #include <stdint.h>
 #include <stdlib.h>

@@ -5,8 +5,8 @@
 #include "actuator.h"
 #include "constraint.h"
 
-/// R by the true diagonal of A where the options ask, and what cav_coupled_targets needs. After all else of the position stage.
-/// Fails with CAV_NO_MEMORY, and with CAV_BAD_INPUT if the inertia is not positive definite. coupled.c.
+/// R by the true diagonal of A where the options ask, and what cav_coupled_targets needs. After all else of the
+/// position stage. Fails with CAV_NO_MEMORY, and with CAV_BAD_INPUT if the inertia is not positive definite. coupled.c.
 cav_status cav_coupled_prepare(const cav_model *model, cav_state *state);
 
 /// v* of all rows together from their velocities in the state, into its workspace. coupled.c.
@@ -18,14 +18,15 @@ void cav_contact_velocity(const cav_state *state, const cav_contact *contact, co
 /// Whether the state holds a whole evaluation of the inverse under its present options. inverse.c.
 int cav_state_evaluated(const cav_state *state);
 
-/// u [nv] of the step without constraints, at the state's positions: u = RNE + D a - p. Fills velocities. Under an order that
-/// the state has evaluated before. inverse.c.
+/// u [nv] of the step without constraints, at the state's positions: u = RNE + D a - p. Fills velocities. Under an
+/// order that the state has evaluated before. inverse.c.
 void cav_smooth_inverse(const cav_model *model, cav_state *state, const double *v, const double *v_next, double *u);
 
 /// Bytes of each part of a state as it is now. state.c.
 void cav_state_bytes(const cav_state *state, size_t bytes[CAV_PARTS]);
 
-/// Times of the stages of one evaluation of the inverse, s: each run alone often enough to be measured, shortest of several.
+/// Times of the stages of one evaluation of the inverse, s: each run alone often enough to be measured, shortest of
+/// several.
 typedef struct cav_profile {
   double poses, rows, contacts, equalities,
       laws;        ///< from q: links and tendons; limits; search of contacts; errors; R, B, K
@@ -38,7 +39,8 @@ typedef struct cav_profile {
 cav_status cav_profile_inverse(const cav_model *model, cav_state *state, const double *q, const double *v,
                                const double *v_next, cav_profile *profile);
 
-/// Memory of the state's solvers with room for that many bytes, what it held is lost; NULL if memory runs out. impulse.c.
+/// Memory of the state's solvers with room for that many bytes, what it held is lost; NULL if memory runs out.
+/// impulse.c.
 void *cav_solver_room(cav_workspace *w, size_t bytes);
 
 #endif

@@ -118,10 +118,10 @@ typedef enum cav_stage {
 /// Poses, motion subspaces, tendon lengths, contacts and limits at q [nq]. Fails with CAV_NOT_FINITE or CAV_NO_MEMORY.
 CAV_API cav_status cav_position(const cav_model *model, cav_state *state, const double *q);
 
-/// Generalised force that takes v to v_next in one step: u = RNE(q, v, a) + D a - p - (J' f)/h, a = (v_next - v)/h. Under
-/// the order momentum the change of momentum of whole trees stands for RNE in the rows of their root links.
-/// q [nq], v, v_next [nv] -> u [nv], N or N m. D = armature (+ h B for euler). Forms no matrix.
-/// Fails with CAV_NOT_FINITE, u untouched. Todorov 2014, eqs. (2), (19)-(22).
+/// Generalised force that takes v to v_next in one step: u = RNE(q, v, a) + D a - p - (J' f)/h, a = (v_next - v)/h.
+/// Under the order momentum the change of momentum of whole trees stands for RNE in the rows of their root links. q
+/// [nq], v, v_next [nv] -> u [nv], N or N m. D = armature (+ h B for euler). Forms no matrix. Fails with
+/// CAV_NOT_FINITE, u untouched. Todorov 2014, eqs. (2), (19)-(22).
 CAV_API cav_status cav_inverse(const cav_model *model, cav_state *state, const double *q, const double *v,
                                const double *v_next, double *u);
 
@@ -149,10 +149,10 @@ CAV_API cav_status cav_forward_gpgs(const cav_model *model, cav_state *state, co
                                     const double *u, int iterations, double tolerance, double *v_next,
                                     cav_forward_report *report);
 
-/// The same with equality constraints hard: R_E = 0, the limit that the soft ones approach as R_E does. Forward only, as
-/// it has no inverse: many u give one v_next. Rows may repeat or contradict each other; what cannot hold together holds in
-/// the least squares of the soft rows. residual of the report is the force missing from the balance, relative; the
-/// impulses that hold the constraints are left in state->equality constraint. Paper, section II C.
+/// The same with equality constraints hard: R_E = 0, the limit that the soft ones approach as R_E does. Forward only,
+/// as it has no inverse: many u give one v_next. Rows may repeat or contradict each other; what cannot hold together
+/// holds in the least squares of the soft rows. residual of the report is the force missing from the balance, relative;
+/// the impulses that hold the constraints are left in state->equality constraint. Paper, section II C.
 CAV_API cav_status cav_forward_hard(const cav_model *model, cav_state *state, const double *q, const double *v,
                                     const double *u, int iterations, double tolerance, double *v_next,
                                     cav_forward_report *report);
@@ -169,8 +169,9 @@ typedef enum cav_derivative {
   CAV_DERIVATIVE_ANALYTIC ///< closed form
 } cav_derivative;
 
-/// Derivatives of cav_inverse, nv x nv, row-major (du[i*nv+j] = du_i/dx_j); NULL = not needed. Positions are differentiated
-/// in the tangent: q (+) e_j. Staged one-sided differences with the default step; cav_inverse_jacobian_by chooses.
+/// Derivatives of cav_inverse, nv x nv, row-major (du[i*nv+j] = du_i/dx_j); NULL = not needed. Positions are
+/// differentiated in the tangent: q (+) e_j. Staged one-sided differences with the default step;
+/// cav_inverse_jacobian_by chooses.
 CAV_API cav_status cav_inverse_jacobian(const cav_model *model, cav_state *state, const double *q, const double *v,
                                         const double *v_next, double *du_dq, double *du_dv, double *du_dv_next);
 
@@ -184,9 +185,9 @@ CAV_API const char *cav_derivatives_missing(const cav_model *model);
 
 /// Analytic derivatives of u at the state's last cav_inverse, as cav_inverse_jacobian gives them; NULL = not needed.
 /// CAV_BAD_INPUT if the state holds no evaluation under its present options; CAV_NOT_SUPPORTED if
-/// cav_derivatives_missing names something, under the options CAV_REGULARISER_EXACT and coupled, or if contact points of a
-/// pair come and go within 1e-5 of the posture.
-/// Outputs are undefined after a failure. At kinks of the exact law one element of the generalised derivative.
+/// cav_derivatives_missing names something, under the options CAV_REGULARISER_EXACT and coupled, or if contact points
+/// of a pair come and go within 1e-5 of the posture. Outputs are undefined after a failure. At kinks of the exact law
+/// one element of the generalised derivative.
 CAV_API cav_status cav_derivatives(const cav_model *model, cav_state *state, double *du_dq, double *du_dv,
                                    double *du_dv_next);
 
@@ -203,8 +204,8 @@ typedef struct cav_contact_derivative {
 CAV_API cav_status cav_contact_derivatives(const cav_model *model, cav_state *state, int contact,
                                            cav_contact_derivative *out);
 
-/// Derivatives of cav_sensor_read at the same point, [sensor->dim*nv] each; NULL = not needed. Readings do not depend on v.
-/// CAV_BAD_INPUT as above, CAV_NOT_SUPPORTED for a type of sensor without derivative.
+/// Derivatives of cav_sensor_read at the same point, [sensor->dim*nv] each; NULL = not needed. Readings do not depend
+/// on v. CAV_BAD_INPUT as above, CAV_NOT_SUPPORTED for a type of sensor without derivative.
 CAV_API cav_status cav_sensor_derivatives(const cav_model *model, cav_state *state, const cav_sensor *sensor,
                                           double *d_dq, double *d_dv_next);
 
@@ -212,9 +213,10 @@ CAV_API cav_status cav_sensor_derivatives(const cav_model *model, cav_state *sta
 /// It may call what uses scratch of the state, such as cav_sensor_read, and changes nothing else.
 typedef void (*cav_readout)(const cav_model *model, cav_state *state, void *context, double *value);
 
-/// Staged finite differences of any readout of n values. step 0: chosen by coordinate scale.
-/// method is one of the two differences (CAV_BAD_INPUT otherwise). value [n] at the point; d_dq, d_dv, d_dv_next [n*nv] row-major, NULL = not needed. dynamics/METHOD.md, 7.
-/// A pass over v or v_next repeats no position work. The state is left at the point itself.
+/// Staged finite differences of any readout of n values. step 0: chosen by coordinate scale. method is one of the two
+/// differences (CAV_BAD_INPUT otherwise). value [n] at the point; d_dq, d_dv, d_dv_next [n*nv] row-major, NULL = not
+/// needed. dynamics/METHOD.md, 7. A pass over v or v_next repeats no position work. The state is left at the point
+/// itself.
 CAV_API cav_status cav_readout_differentiate(const cav_model *model, cav_state *state, cav_derivative method,
                                              double step, const double *q, const double *v, const double *v_next,
                                              cav_readout readout, void *context, int n, double *value, double *d_dq,
@@ -228,9 +230,9 @@ CAV_API cav_status cav_inertia(const cav_model *model, cav_state *state, const d
 CAV_API void cav_momentum(const cav_model *model, cav_state *state, const double *v, double *com, double *com_velocity,
                           double *angular_momentum);
 
-/// Reading of a sensor at the state's last evaluation; out [sensor->dim]. Positions are there after cav_position; velocities
-/// (at v_next), accelerations and forces after cav_inverse or cav_forward, which leave them at (q, v, v_next). Uses scratch of
-/// the state, as all that takes a state that is not const.
+/// Reading of a sensor at the state's last evaluation; out [sensor->dim]. Positions are there after cav_position;
+/// velocities (at v_next), accelerations and forces after cav_inverse or cav_forward, which leave them at (q, v,
+/// v_next). Uses scratch of the state, as all that takes a state that is not const.
 CAV_API void cav_sensor_read(const cav_model *model, cav_state *state, const cav_sensor *sensor, double *out);
 
 /// Link that carries an object; the world's, 0, for kinds without a frame.
@@ -240,14 +242,14 @@ CAV_API int cav_object_link(const cav_model *model, cav_object_type type, int ob
 CAV_API void cav_object_pose(const cav_model *model, const cav_state *state, cav_object_type type, int object,
                              cav_pose *pose);
 
-/// Force of each dof that actuators can give at the state's last position, for u [nv]: P u with P the orthogonal projector
-/// onto the range of the transmission. residual [nv] = u - P u, effort [nu] least-norm, limits not applied (a muscle only
-/// pulls). Any output may be NULL. Where all moments are constant, no position is needed.
+/// Force of each dof that actuators can give at the state's last position, for u [nv]: P u with P the orthogonal
+/// projector onto the range of the transmission. residual [nv] = u - P u, effort [nu] least-norm, limits not applied (a
+/// muscle only pulls). Any output may be NULL. Where all moments are constant, no position is needed.
 CAV_API void cav_actuation(const cav_model *model, cav_state *state, const double *u, double *residual, double *effort);
 
 /// Inputs that give efforts [nu] at the state's last position and the velocity v [nv]: controls, or activations of
-/// actuators that have one (what control brings them about is the caller's). input [nu] is the nearest within the limits;
-/// returns the number of actuators that cannot give their effort.
+/// actuators that have one (what control brings them about is the caller's). input [nu] is the nearest within the
+/// limits; returns the number of actuators that cannot give their effort.
 CAV_API int cav_actuation_inputs(const cav_model *model, cav_state *state, const double *v, const double *effort,
                                  double *input);
 
@@ -263,23 +265,23 @@ CAV_API double cav_actuator_force(const cav_model *model, int actuator, double l
 CAV_API int cav_actuator_input(const cav_model *model, int actuator, double length, double velocity, double force,
                                double *input);
 
-/// Range of effort that an actuator's limits leave whatever its length and velocity are; infinite where they do not bound
-/// it. The limits of a servo's control bound no effort of their own.
+/// Range of effort that an actuator's limits leave whatever its length and velocity are; infinite where they do not
+/// bound it. The limits of a servo's control bound no effort of their own.
 CAV_API void cav_actuator_effort_range(const cav_model *model, int actuator, double range[2]);
 
-/// The same law at another step: a discrete stabilisation keeps the fraction of a gap that it closes a second, and so its
-/// stiffness; deadbeat (time constant 0) where that is more than the whole gap in a step.
+/// The same law at another step: a discrete stabilisation keeps the fraction of a gap that it closes a second, and so
+/// its stiffness; deadbeat (time constant 0) where that is more than the whole gap in a step.
 CAV_API cav_options cav_options_at_step(const cav_options *options, double timestep);
 
 /// Softness of a row that acts as ODE's with that CFM (m/(N s), or rad/(N m s)) and ERP at that time step: J v_next =
 /// -(ERP/h) x - CFM F, exactly. weight is the diagonal of A that the row's R is scaled with (cav_pair.weight[0],
-/// cav_dof.inverse_weight, cav_tendon.inverse_weight, cav_equality.weight). CAV_BAD_INPUT if CFM is not between 1e-4 h and
-/// 1e4 h times the weight, where no impedance is used: softness is then untouched. Methods in softness.c.
+/// cav_dof.inverse_weight, cav_tendon.inverse_weight, cav_equality.weight). CAV_BAD_INPUT if CFM is not between 1e-4 h
+/// and 1e4 h times the weight, where no impedance is used: softness is then untouched. Methods in softness.c.
 CAV_API cav_status cav_softness_from_ode(double cfm, double erp, double timestep, double weight,
                                          cav_softness *softness);
 
-/// CFM and ERP of the spring and damper that a row amounts to under the state's options: alike where the step is short and
-/// inertia matters little, as a row also has a mass 1/R. CAV_BAD_INPUT if it has neither.
+/// CFM and ERP of the spring and damper that a row amounts to under the state's options: alike where the step is short
+/// and inertia matters little, as a row also has a mass 1/R. CAV_BAD_INPUT if it has neither.
 CAV_API cav_status cav_softness_to_ode(const cav_state *state, const cav_softness *softness, double weight, double *cfm,
                                        double *erp);
 

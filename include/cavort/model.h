@@ -35,7 +35,8 @@ typedef enum cav_transmission {
   CAV_TRANSMISSION_CRANK ///< slider-crank
 } cav_transmission;
 
-/// What the input of an actuator is: its control, or an activation that follows the control (a state MuJoCo integrates).
+/// What the input of an actuator is: its control, or an activation that follows the control (a state MuJoCo
+/// integrates).
 typedef enum cav_activation {
   CAV_ACTIVATION_NONE,
   CAV_ACTIVATION_INTEGRATOR,
@@ -45,9 +46,9 @@ typedef enum cav_activation {
 typedef enum cav_gain { CAV_GAIN_FIXED, CAV_GAIN_AFFINE, CAV_GAIN_MUSCLE } cav_gain;
 typedef enum cav_bias { CAV_BIAS_NONE, CAV_BIAS_AFFINE, CAV_BIAS_MUSCLE } cav_bias;
 
-/// What sensors measure, X(type, MJCF's name, length of a reading, what it looks at, last stage it needs, text): MJCF's names,
-/// shapes and conventions. Velocities are those at v_next; accelerations and forces are those of the step from v to v_next.
-/// The enumeration, the table of rules, the names in model and problem files and the help follow from it.
+/// What sensors measure, X(type, MJCF's name, length of a reading, what it looks at, last stage it needs, text): MJCF's
+/// names, shapes and conventions. Velocities are those at v_next; accelerations and forces are those of the step from v
+/// to v_next. The enumeration, the table of rules, the names in model and problem files and the help follow from it.
 // clang-format off
 #define CAV_SENSORS(X)                                                                                                     \
   X(JOINTPOS, "jointpos", 1, SCALAR_JOINT, POSITION, "rad or m")                                                           \
@@ -97,8 +98,9 @@ typedef enum cav_sensor_type {
 
 enum { CAV_SENSOR_DIM_MAX = 4 }; ///< most numbers of a reading
 
-/// What a frame sensor or a term looks at, X(type, array of the model, attribute that names one in problem files, what to call
-/// it). BODY is the frame at a body's centre of mass (MJCF "body"), XBODY that of the body as written in the file (MJCF "xbody").
+/// What a frame sensor or a term looks at, X(type, array of the model, attribute that names one in problem files, what
+/// to call it). BODY is the frame at a body's centre of mass (MJCF "body"), XBODY that of the body as written in the
+/// file (MJCF "xbody").
 #define CAV_OBJECTS(X)                          \
   X(BODY, body, "body", "body")                 \
   X(XBODY, body, "xbody", "body")               \
@@ -195,8 +197,8 @@ typedef struct cav_joint {
   double ref;      ///< q of a hinge or slide in the posture of the file
   int limited;     ///< 1 if range holds
   double range[2]; ///< rad or m; ball: range[1] is the largest rotation angle
-  /// Ball: the cylinder of Todorov 2014 in the rotation vector of its quaternion, rad: twist is its component along axis,
-  /// within a range, swing the length of the rest, at most a radius. Each holds where its flag is 1.
+  /// Ball: the cylinder of Todorov 2014 in the rotation vector of its quaternion, rad: twist is its component along
+  /// axis, within a range, swing the length of the rest, at most a radius. Each holds where its flag is 1.
   int twist_limited, swing_limited;
   double twist[2], swing;
   double margin; ///< limit acts from this distance on
@@ -341,10 +343,11 @@ typedef struct cav_equality {
 
 enum { CAV_ACTUATOR_PARAMETERS = 10 };
 
-/// Actuator: force = gain(length, velocity) input + bias(length, velocity), clamped; its fraction of u is force times the
-/// moments of its transmission. What is planned with is its effort: u = sum unit effort moment. A motor (fixed gain, no
-/// bias) has its gain as unit, so effort is the control; for every other one the unit is 1 and effort is the force, of
-/// which bias is a part, as the servo's pull towards its target: a law of control, not a passive force of the model.
+/// Actuator: force = gain(length, velocity) input + bias(length, velocity), clamped; its fraction of u is force times
+/// the moments of its transmission. What is planned with is its effort: u = sum unit effort moment. A motor (fixed
+/// gain, no bias) has its gain as unit, so effort is the control; for every other one the unit is 1 and effort is the
+/// force, of which bias is a part, as the servo's pull towards its target: a law of control, not a passive force of the
+/// model.
 typedef struct cav_actuator {
   const char *name;
   cav_transmission transmission;
@@ -401,8 +404,8 @@ typedef struct cav_field {
   const char *unit, *text;
 } cav_field;
 
-/// Which velocity the bias force c and the passive force p are evaluated at, or what takes their place; dynamics/METHOD.md, 2.
-/// X(enumerator, word, text), as all lists of words.
+/// Which velocity the bias force c and the passive force p are evaluated at, or what takes their place;
+/// dynamics/METHOD.md, 2. X(enumerator, word, text), as all lists of words.
 // clang-format off
 #define CAV_ORDERS(X)                                                                                              \
   X(CAV_ORDER_EULER, "euler", "at v; joint damping at v_next (implicit). The paper's step")                        \
@@ -424,10 +427,10 @@ typedef struct cav_field {
   X(CAV_SLIDING_CONVEX, "convex", "the paper's law: held off by h mu times the slip")                              \
   X(CAV_SLIDING_COULOMB, "coulomb", "Coulomb's: gap and force complementary at any slip")
 
-/// How constraints are evaluated: REAL(stage, name, least, most, required, unit, text), WORD(stage, name, type, words, text) and
-/// FLAG(stage, name, text), which is 0 or 1. stage: the first stage of an evaluation that depends on it, which is not reused
-/// after a change. required: of a recorded law (<contact> of a problem file). The struct, the comparison, the checks, and
-/// reading, writing, grammar and help of <contact> follow from this list.
+/// How constraints are evaluated: REAL(stage, name, least, most, required, unit, text), WORD(stage, name, type, words,
+/// text) and FLAG(stage, name, text), which is 0 or 1. stage: the first stage of an evaluation that depends on it,
+/// which is not reused after a change. required: of a recorded law (<contact> of a problem file). The struct, the
+/// comparison, the checks, and reading, writing, grammar and help of <contact> follow from this list.
 #define CAV_OPTIONS(REAL, WORD, FLAG)                                                                              \
   REAL(POSITION, timestep, DBL_MIN, DBL_MAX, 1, "s", "h: starts as the model's; every evaluation uses this one")   \
   WORD(VELOCITY, order, cav_order, CAV_ORDERS, "velocity of the bias and passive forces")                          \
@@ -469,8 +472,8 @@ typedef struct cav_options {
 /// The table of cav_options; its length in *n.
 CAV_API const cav_field *cav_option_fields(int *n);
 
-/// CAV_BAD_INPUT, with the member at fault and what it may be in error (may be NULL), if an option is outside the table.
-/// Evaluations refuse such options with the same status.
+/// CAV_BAD_INPUT, with the member at fault and what it may be in error (may be NULL), if an option is outside the
+/// table. Evaluations refuse such options with the same status.
 CAV_API cav_status cav_options_check(const cav_options *options, cav_error *error);
 
 /// The same of any struct by its table of n fields; what: how the text calls it.
@@ -532,16 +535,18 @@ CAV_API cav_load_options cav_load_options_default(void);
 /// cav_model_load with options.
 CAV_API cav_model *cav_model_load_with(const char *path, const cav_load_options *options, cav_error *error);
 
-/// Loads an MJCF or URDF file, told apart by the root element, with its includes and assets. NULL on failure with the reason in error (may be NULL).
-/// What is understood but not used becomes a model->warning. The result is freed with cav_model_free.
+/// Loads an MJCF or URDF file, told apart by the root element, with its includes and assets. NULL on failure with the
+/// reason in error (may be NULL). What is understood but not used becomes a model->warning. The result is freed with
+/// cav_model_free.
 CAV_API cav_model *cav_model_load(const char *path, cav_error *error);
 
 /// Frees a model; NULL is fine. No state of it may be used afterwards.
 CAV_API void cav_model_free(cav_model *model);
 
-/// Changes a model before any state of it exists: mass and inertia of link i times mass_scale[i] ([nlink], > 0; NULL: as they are),
-/// sliding friction of every contact (0: as it is); what the model derives from them follows. CAV_BAD_INPUT: a scale that is not
-/// positive, a negative friction, nothing changed; CAV_NO_MEMORY: do not use the model.
+/// Changes a model before any state of it exists: mass and inertia of link i times mass_scale[i] ([nlink], > 0; NULL:
+/// as they are), sliding friction of every contact (0: as it is); what the model derives from them follows.
+/// CAV_BAD_INPUT: a scale that is not positive, a negative friction, nothing changed; CAV_NO_MEMORY: do not use the
+/// model.
 CAV_API cav_status cav_model_perturb(cav_model *model, const double *mass_scale, double friction);
 
 /// Index of the object of that kind and name, -1 if there is none. CAV_OBJECT_BODY and _XBODY both look up bodies.

@@ -1,5 +1,5 @@
-/// What a motion should achieve: a model, a horizon, a start, a guess, costs and constraints. Everything a problem file can
-/// say, these structs can say.
+/// What a motion should achieve: a model, a horizon, a start, a guess, costs and constraints. Everything a problem file
+/// can say, these structs can say.
 #ifndef CAVORT_PROBLEM_H
 #define CAVORT_PROBLEM_H
 
@@ -9,9 +9,10 @@
 extern "C" {
 #endif
 
-/// What a term measures at a knot, X(quantity, element of problem files, what it has values of, what it reads, hard, unit, in
-/// words, text). Values are of a SENSOR, of a POSTURE (a tangent, by dofs), of RATEs of dofs, of ACTUATORS or of CONTACTS; hard 1:
-/// a constraint can be of it, too. The enumeration, reading, writing, grammar and help of <cost> and <constraint> follow from it.
+/// What a term measures at a knot, X(quantity, element of problem files, what it has values of, what it reads, hard,
+/// unit, in words, text). Values are of a SENSOR, of a POSTURE (a tangent, by dofs), of RATEs of dofs, of ACTUATORS or
+/// of CONTACTS; hard 1: a constraint can be of it, too. The enumeration, reading, writing, grammar and help of <cost>
+/// and <constraint> follow from it.
 // clang-format off
 #define CAV_QUANTITIES(X)                                                                                          \
   X(SENSOR, sensor, SENSOR, POSITION, 1, "its own", "sensor", "reading of a sensor; quaternions as the rotation vector to the target") \
@@ -112,8 +113,8 @@ typedef struct cav_swing {
 /// Axis that a cycle reflects.
 typedef enum cav_mirror { CAV_MIRROR_NONE, CAV_MIRROR_X, CAV_MIRROR_Y } cav_mirror;
 
-/// A motion without start and end: the last knot is the first one moved, and so are their velocities. With a mirror the horizon is
-/// half a stride, and the second half is the first one reflected, left for right.
+/// A motion without start and end: the last knot is the first one moved, and so are their velocities. With a mirror the
+/// horizon is half a stride, and the second half is the first one reflected, left for right.
 typedef struct cav_cycle {
   int on;                ///< 0: the motion has a start and an end
   double translation[3]; ///< m, from one period to the next, of all that floats or slides
@@ -131,12 +132,12 @@ typedef struct cav_guess_pose {
   const double *q; ///< [nq]
 } cav_guess_pose;
 
-/// Options of a stage of the continuation (optim/METHOD.md, 5): REAL(name, first, last, least, most, course, law, unit, text) and
-/// WHOLE(name, first, last, least, most, text), with the defaults of the first and the last stage.
-/// course: ALL goes from first to last over all stages, HALF over the first half of them, KEEP stays until the last stage, as
-/// whole numbers do. law: SAME is the option of that name of the contact law, STEPS too, in steps of the horizon, NONE is not.
-/// The struct, its defaults, interpolation and checks, and reading, writing, grammar and help of <first> and <last> in problem
-/// files follow from this list.
+/// Options of a stage of the continuation (optim/METHOD.md, 5): REAL(name, first, last, least, most, course, law, unit,
+/// text) and WHOLE(name, first, last, least, most, text), with the defaults of the first and the last stage. course:
+/// ALL goes from first to last over all stages, HALF over the first half of them, KEEP stays until the last stage, as
+/// whole numbers do. law: SAME is the option of that name of the contact law, STEPS too, in steps of the horizon, NONE
+/// is not. The struct, its defaults, interpolation and checks, and reading, writing, grammar and help of <first> and
+/// <last> in problem files follow from this list.
 // clang-format off
 #define CAV_STAGE_OPTIONS(REAL, WHOLE)                                                                             \
   REAL(softness, 4, 0.005, DBL_MIN, DBL_MAX, ALL, SAME, "", "epsilon of the contacts")                             \
@@ -180,8 +181,8 @@ typedef struct cav_problem {
   double duration, timestep; ///< s; knots are round(duration/timestep) + 1
   cav_order order;
   int close_at_rest; ///< 1: v after the last knot is zero, with rows there; 0: no rows at the last knot
-  /// Free duration: the step is an unknown, the same for all knots, between these; both 0: duration is what it is. Times
-  /// of windows and waypoints stay fractions of duration.
+  /// Free duration: the step is an unknown, the same for all knots, between these; both 0: duration is what it is.
+  /// Times of windows and waypoints stay fractions of duration.
   double duration_least, duration_most;
   double duration_weight; ///< cost weight/2 * (duration in s)^2 where the duration is free
   cav_cycle cycle;        ///< where on: close_at_rest and v_start do not count, and q_start is where the guess starts
@@ -214,8 +215,8 @@ typedef struct cav_problem {
 /// Weights, schedule and options that serve all motions; the caller sets duration, start, goal and terms. Owns nothing.
 CAV_API cav_problem cav_problem_default(const cav_model *model);
 
-/// The running costs that serve all motions: effort, velocities, accelerations, posture, gap, slip, impact, overlap. Writes the first
-/// most of them to term (may be NULL if most is 0) and returns how many there are.
+/// The running costs that serve all motions: effort, velocities, accelerations, posture, gap, slip, impact, overlap.
+/// Writes the first most of them to term (may be NULL if most is 0) and returns how many there are.
 CAV_API int cav_problem_default_terms(cav_term *term, int most);
 
 /// Reads a problem file and its model (model_path overrides the file's; NULL: as written). NULL on failure.
@@ -228,9 +229,9 @@ CAV_API cav_status cav_ipopt_option_check(const cav_ipopt_option *option, cav_er
 /// Frees a problem that cav_problem_load gave, and its model; NULL is fine.
 CAV_API void cav_problem_free(cav_problem *problem);
 
-/// Writes a problem such that reading it gives the same: poses as numbers, every term spelt out. model_path is written as it
-/// stands (NULL: problem->model_path). Replaces the file atomically. CAV_BAD_INPUT: path cannot be written, or a term looks
-/// at a body, site or geom without a name.
+/// Writes a problem such that reading it gives the same: poses as numbers, every term spelt out. model_path is written
+/// as it stands (NULL: problem->model_path). Replaces the file atomically. CAV_BAD_INPUT: path cannot be written, or a
+/// term looks at a body, site or geom without a name.
 CAV_API cav_status cav_problem_write(const char *path, const cav_problem *problem, const char *model_path,
                                      cav_error *error);
 

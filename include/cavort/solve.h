@@ -8,8 +8,8 @@
 extern "C" {
 #endif
 
-/// Solvers, X(solver, word on the command line, library it needs or NONE, text). The enumeration, the dispatch of cav_solve, and
-/// words and help of the command line follow from this list (optim/solver/solvers.c).
+/// Solvers, X(solver, word on the command line, library it needs or NONE, text). The enumeration, the dispatch of
+/// cav_solve, and words and help of the command line follow from this list (optim/solver/solvers.c).
 // clang-format off
 #define CAV_SOLVERS(X)                                                                                             \
   X(GAUSS_NEWTON, gn, NONE, "own: continuation, trust region, augmented Lagrangian")                               \
@@ -58,8 +58,8 @@ typedef struct cav_solve_options {
   void *observer_context;
   double tolerance; ///< unactuated force at the end, fraction of weight
   int diagnose;     ///< 1: where constraints cannot all hold, end at their least violation, which cav_explain needs
-  /// Of the dynamics: analytic, and what has none (cav_derivatives_missing, sensors) by one-sided differences, or all by
-  /// differences. Ipopt always takes centred ones.
+  /// Of the dynamics: analytic, and what has none (cav_derivatives_missing, sensors) by one-sided differences, or all
+  /// by differences. Ipopt always takes centred ones.
   cav_derivative derivative;
   int ipopt_derivative_test; ///< 1: Ipopt's first-order checker runs before its first iteration, at the start; its text goes to
                              ///< ipopt_output. Its time grows with the cube of the number of knots
@@ -134,8 +134,8 @@ typedef struct cav_solution {
   cav_binding *row; ///< constraint rows that are violated or have a multiplier, by knot
 } cav_solution;
 
-/// How the own solver factors its normal equations at the problem's guess, first stage: a band with a border for each group of
-/// trees that nothing joins there.
+/// How the own solver factors its normal equations at the problem's guess, first stage: a band with a border for each
+/// group of trees that nothing joins there.
 typedef struct cav_equations {
   int unknowns;
   int groups, largest; ///< groups of trees; dofs of the largest
@@ -146,8 +146,8 @@ typedef struct cav_equations {
 /// Fails as cav_solve does where the problem or its guess cannot be evaluated. structure.c.
 CAV_API cav_status cav_problem_equations(const cav_problem *problem, cav_equations *equations, cav_error *error);
 
-/// Solves from the problem's guess, or from start if not NULL. CAV_NOT_CONVERGED and CAV_INTERRUPTED leave the best iterate in
-/// the solution; NULL in *solution only where error says so.
+/// Solves from the problem's guess, or from start if not NULL. CAV_NOT_CONVERGED and CAV_INTERRUPTED leave the best
+/// iterate in the solution; NULL in *solution only where error says so.
 CAV_API cav_status cav_solve(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
                              cav_solution **solution, cav_error *error);
 CAV_API void cav_solution_free(cav_solution *solution);
@@ -165,15 +165,15 @@ typedef struct cav_strategy {
   cav_schedule schedule;
 } cav_strategy;
 
-/// Strategies for a problem, in the order in which they are worth trying; the first is the problem's own. CAV_NO_MEMORY, or what
-/// the dynamics says of the goal posture.
+/// Strategies for a problem, in the order in which they are worth trying; the first is the problem's own.
+/// CAV_NO_MEMORY, or what the dynamics says of the goal posture.
 CAV_API cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[CAV_STRATEGIES], int *n);
 
 /// The problem by a strategy: borrows all else from the problem, and the swings from the strategy.
 CAV_API void cav_strategy_apply(const cav_problem *problem, const cav_strategy *strategy, cav_problem *taken);
 
-/// Solves by a strategy: cav_solve of what cav_strategy_apply gives, after one under the midpoint order where the strategy says so, whose
-/// iterations and seconds are counted but whose log is not kept.
+/// Solves by a strategy: cav_solve of what cav_strategy_apply gives, after one under the midpoint order where the
+/// strategy says so, whose iterations and seconds are counted but whose log is not kept.
 CAV_API cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *strategy,
                                       const cav_solve_options *options, const cav_trajectory *start,
                                       cav_solution **solution, cav_error *error);
@@ -241,21 +241,24 @@ typedef struct cav_verdict {
   char reason[400];     ///< why not certified: the first condition missed; "" if certified
 } cav_verdict;
 
-/// What replay_same_step_seconds has to be, s: CAV_TOLERANCE_REPLAY, or the whole motion where that is shorter; less rounding.
+/// What replay_same_step_seconds has to be, s: CAV_TOLERANCE_REPLAY, or the whole motion where that is shorter; less
+/// rounding.
 CAV_API double cav_verdict_replay(const cav_verdict *verdict);
 
-/// Whether the motion is feasible (forces, limits and constraints within their tolerances), and whether it is optimal, too: to
-/// CAV_TOLERANCE_OPTIMAL. Neither says that it is certified.
+/// Whether the motion is feasible (forces, limits and constraints within their tolerances), and whether it is optimal,
+/// too: to CAV_TOLERANCE_OPTIMAL. Neither says that it is certified.
 CAV_API int cav_verdict_feasible(const cav_verdict *verdict);
 CAV_API int cav_verdict_optimal(const cav_verdict *verdict);
 
-/// Certifies a motion: q, v of the trajectory and the gains are used, all else is recomputed. contact is the law it claims.
+/// Certifies a motion: q, v of the trajectory and the gains are used, all else is recomputed. contact is the law it
+/// claims.
 CAV_API cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
                               const double *gain_q, const double *gain_v, cav_verdict *verdict, cav_error *error);
 
 /// What each term asked and got: report [problem->nterm]. Fails as cav_verify does. cost may be NULL.
-CAV_API cav_status cav_terms_report(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
-                            cav_term_report *report, double *cost, cav_error *error);
+CAV_API cav_status cav_terms_report(const cav_problem *problem, const cav_trajectory *trajectory,
+                                    const cav_options *contact, cav_term_report *report, double *cost,
+                                    cav_error *error);
 
 /// Why a motion is as it is: one thing that is missed, or that pulls.
 typedef struct cav_reason {

@@ -28,8 +28,8 @@ CAV_API void cav_trajectory_free(cav_trajectory *trajectory);
 /// v of knots 1 .. nknot-1 from q by differences; v of knot 0 stays.
 CAV_API void cav_trajectory_velocities(const cav_model *model, cav_trajectory *trajectory);
 
-/// The motion resampled at another step over the same duration. Through the knots, by cubics along the geodesics between
-/// them whose velocity at a knot is the mean of the steps before and after it; u is linear between knots.
+/// The motion resampled at another step over the same duration. Through the knots, by cubics along the geodesics
+/// between them whose velocity at a knot is the mean of the steps before and after it; u is linear between knots.
 CAV_API cav_trajectory *cav_trajectory_resample(const cav_model *model, const cav_trajectory *trajectory,
                                                 double timestep);
 

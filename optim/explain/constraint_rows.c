@@ -1,7 +1,8 @@
-/// Constraint rows of a solved transcription by what they come from: the way back from a knot's slots to actuators, joints,
-/// tendons and terms, with the penalty on each row and its pull: the force that penalty times gradient puts on the motion, summed with
-/// the rows of the same thing at the knots beside it, since what acts and recoils within one thing is no conflict. Only rows that
-/// are violated or have a multiplier are listed; what they mean in words is explain.c's.
+/// Constraint rows of a solved transcription by what they come from: the way back from a knot's slots to actuators,
+/// joints, tendons and terms, with the penalty on each row and its pull: the force that penalty times gradient puts on
+/// the motion, summed with the rows of the same thing at the knots beside it, since what acts and recoils within one
+/// thing is no conflict. Only rows that are violated or have a multiplier are listed; what they mean in words is
+/// explain.c's.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,13 +1,16 @@
-/// Why a motion misses what it was asked for: constraint rows of its solution gathered by what they come from, ranked twice.
+/// Why a motion misses what it was asked for: constraint rows of its solution gathered by what they come from, ranked
+/// twice.
 ///
-/// By violation: how far the worst knot of each is from its bound, scaled, beyond what planning leaves room for.
-/// By conflict: at a point where constraints cannot all hold, Gauss-Newton on the rows alone has come to rest, so their
-/// weighted violations times their gradients sum to zero: sum_i y_i dg_i = 0, a local certificate of infeasibility (Farkas).
-/// What one thing (an actuator, a joint, a component of a term) adds to that sum over its knots is its pull. It does not depend
-/// on the weights that spread the violation over the rows, so what pulls hardest is the contradiction, wherever its violation
-/// shows. Where all constraints hold the y_i are the multipliers, and the same ranking says what the cost hangs on.
+/// By violation: how far the worst knot of each is from its bound, scaled, beyond what planning leaves room for. By
+/// conflict: at a point where constraints cannot all hold, Gauss-Newton on the rows alone has come to rest, so their
+/// weighted violations times their gradients sum to zero: sum_i y_i dg_i = 0, a local certificate of infeasibility
+/// (Farkas). What one thing (an actuator, a joint, a component of a term) adds to that sum over its knots is its pull.
+/// It does not depend on the weights that spread the violation over the rows, so what pulls hardest is the
+/// contradiction, wherever its violation shows. Where all constraints hold the y_i are the multipliers, and the same
+/// ranking says what the cost hangs on.
 ///
-/// Penetrations are added from the knots. Costs are not explained, nor is a local minimum told from a true impossibility.
+/// Penetrations are added from the knots. Costs are not explained, nor is a local minimum told from a true
+/// impossibility.
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>

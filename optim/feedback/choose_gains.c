@@ -1,6 +1,7 @@
 /// Which feedback goes with a motion. Gains are those of a regulator (lqr.c), but what straying costs, and how hard the
-/// contacts are that it counts on, are not in the problem. So a few of each are tried in the closed loops of verification.
-/// Kept is what follows longest under the claimed contacts, then longest and nearest under the model's own.
+/// contacts are that it counts on, are not in the problem. So a few of each are tried in the closed loops of
+/// verification. Kept is what follows longest under the claimed contacts, then longest and nearest under the model's
+/// own.
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,11 +1,12 @@
-/// Linear feedback of a motion: the linear-quadratic regulator of the forward step along it. The motion is read at a finer step,
-/// du/dq, du/dv, du/dv' of the inverse there give the forward step's linear map, and a Riccati recursion from the last knot
-/// backwards gives du = gain_q dq + gain_v dv. Straying is penalised by its energy, dv' M dv and dq' M dq, against squared fractions of
-/// the actuators' limits, so one penalty serves all limbs. Gains of a knot are the mean of the finer steps up to the next knot.
+/// Linear feedback of a motion: the linear-quadratic regulator of the forward step along it. The motion is read at a
+/// finer step, du/dq, du/dv, du/dv' of the inverse there give the forward step's linear map, and a Riccati recursion
+/// from the last knot backwards gives du = gain_q dq + gain_v dv. Straying is penalised by its energy, dv' M dv and dq'
+/// M dq, against squared fractions of the actuators' limits, so one penalty serves all limbs. Gains of a knot are the
+/// mean of the finer steps up to the next knot.
 ///
-/// The step matters: gains of the plan's own step answer a touch with what undoes it within that step, and a tenth of the step
-/// later they answer again. Gains from the plan's Hessian carried motions a third as far (README.md).
-/// Does not know limits of actuators, and does not see contacts that the law at hand does not feel.
+/// The step matters: gains of the plan's own step answer a touch with what undoes it within that step, and a tenth of
+/// the step later they answer again. Gains from the plan's Hessian carried motions a third as far (README.md). Does not
+/// know limits of actuators, and does not see contacts that the law at hand does not feel.
 #include "lqr.h"
 #include "lapack.h"
 

@@ -10,9 +10,9 @@ typedef struct cav_feedback_penalty {
   double rate;     ///< rad/s: straying by an angle or way counts as a velocity of rate times that
 } cav_feedback_penalty;
 
-/// Gains du = gain_q dq + gain_v dv from knot t to t+1, t = 0 .. nknot-2, each [nv*nv] row-major, at tenths of the step and
-/// below, for contacts by law. q, v of the motion are used. CAV_NO_MEMORY, CAV_NOT_FINITE, CAV_NOT_CONVERGED: the motion
-/// is too far from any that a regulator can hold.
+/// Gains du = gain_q dq + gain_v dv from knot t to t+1, t = 0 .. nknot-2, each [nv*nv] row-major, at tenths of the step
+/// and below, for contacts by law. q, v of the motion are used. CAV_NO_MEMORY, CAV_NOT_FINITE, CAV_NOT_CONVERGED: the
+/// motion is too far from any that a regulator can hold.
 cav_status cav_feedback(const cav_transcription *transcription, const cav_trajectory *motion, const cav_options *law,
                         const cav_feedback_penalty *penalty, double *gain_q, double *gain_v);
 

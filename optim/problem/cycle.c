@@ -1,5 +1,5 @@
-/// <cycle> of a problem file: a motion that goes on where it began, moved, turned or mirrored. Whether model and ground allow that
-/// is checked by periodicity.c, here with file and line.
+/// <cycle> of a problem file: a motion that goes on where it began, moved, turned or mirrored. Whether model and ground
+/// allow that is checked by periodicity.c, here with file and line.
 #include <math.h>
 #include <stdlib.h>
 

@@ -1,5 +1,5 @@
-/// Structs with a table of their fields, as attributes of an element of a problem file: read and written field by field, so
-/// that what is written reads back the same.
+/// Structs with a table of their fields, as attributes of an element of a problem file: read and written field by
+/// field, so that what is written reads back the same.
 #include <float.h>
 #include <limits.h>
 

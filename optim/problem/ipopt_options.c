@@ -1,6 +1,6 @@
-/// Options of Ipopt by name and text: which there are, what they take, and what is wrong with one that does not fit. Known here
-/// so that files and command lines are checked where they are read, in builds without Ipopt too, and so that Ipopt, which
-/// prints its complaints, never has one.
+/// Options of Ipopt by name and text: which there are, what they take, and what is wrong with one that does not fit.
+/// Known here so that files and command lines are checked where they are read, in builds without Ipopt too, and so that
+/// Ipopt, which prints its complaints, never has one.
 #include "ipopt_options.h"
 
 #include <math.h>

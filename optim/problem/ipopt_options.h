@@ -1,5 +1,5 @@
-/// Ipopt's options that problem files and command lines may set: one table serves the grammar, the checks and Ipopt itself.
-/// Private to optim/.
+/// Ipopt's options that problem files and command lines may set: one table serves the grammar, the checks and Ipopt
+/// itself. Private to optim/.
 #ifndef CAVORT_IPOPT_OPTIONS_H
 #define CAVORT_IPOPT_OPTIONS_H
 

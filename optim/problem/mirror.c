@@ -1,10 +1,11 @@
-/// A model as its own mirror image: which joint takes whose place when the world is reflected along one horizontal axis.
-/// Counterparts are pairs that the problem declares, or joints whose names differ in the word for the side (left and right,
-/// l and r, FL and FR); all others stand for themselves. With M the reflection, at the configuration of the file q0: anchors
-/// go to M p, axes of slides to M a, axes of hinges, which are pseudovectors, to -M a; the signs that are left over are those of the
-/// coordinates. A rotation away from q0 is conjugated by N = R0' M R0_image, which is improper; -N is what is kept.
-/// Checked here: geometry and masses, each with a name in the complaint. What no one can list (contacts, springs, tendons) periodicity.c
-/// checks by the forces themselves; ranges may differ, and what both allow holds.
+/// A model as its own mirror image: which joint takes whose place when the world is reflected along one horizontal
+/// axis. Counterparts are pairs that the problem declares, or joints whose names differ in the word for the side (left
+/// and right, l and r, FL and FR); all others stand for themselves. With M the reflection, at the configuration of the
+/// file q0: anchors go to M p, axes of slides to M a, axes of hinges, which are pseudovectors, to -M a; the signs that
+/// are left over are those of the coordinates. A rotation away from q0 is conjugated by N = R0' M R0_image, which is
+/// improper; -N is what is kept. Checked here: geometry and masses, each with a name in the complaint. What no one can
+/// list (contacts, springs, tendons) periodicity.c checks by the forces themselves; ranges may differ, and what both
+/// allow holds.
 #include <ctype.h>
 #include <math.h>
 #include <stdlib.h>

@@ -1,7 +1,8 @@
-/// From one period of a cyclic motion to the next: reflect, turn about the vertical through the start's first free joint, translate.
-/// Dynamics and ground must be blind to it: checked on the planes of the world and on gravity with words of their own, and as
-/// a whole by the inverse dynamics at a few states, u(G q, P v, P v') = P u(q, v, v'), where P is the tangent map. P is constant:
-/// free joints move linearly in world axes and turn in their own. Which joint is whose image is mirror.c's.
+/// From one period of a cyclic motion to the next: reflect, turn about the vertical through the start's first free
+/// joint, translate. Dynamics and ground must be blind to it: checked on the planes of the world and on gravity with
+/// words of their own, and as a whole by the inverse dynamics at a few states, u(G q, P v, P v') = P u(q, v, v'), where
+/// P is the tangent map. P is constant: free joints move linearly in world axes and turn in their own. Which joint is
+/// whose image is mirror.c's.
 #include "periodicity.h"
 
 #include <math.h>

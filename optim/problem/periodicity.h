@@ -4,19 +4,20 @@
 
 #include "cavort/problem.h"
 
-/// A symmetry of model and world: a translation, a turn about the vertical, a reflection that swaps left and right; opaque.
+/// A symmetry of model and world: a translation, a turn about the vertical, a reflection that swaps left and right;
+/// opaque.
 typedef struct cav_periodicity cav_periodicity;
 
-/// That of a problem whose cycle is on. NULL with the reason in error: the ground is not the same a period on, a body cannot be
-/// moved so, the model is not its own mirror image (CAV_BAD_INPUT); CAV_NO_MEMORY.
+/// That of a problem whose cycle is on. NULL with the reason in error: the ground is not the same a period on, a body
+/// cannot be moved so, the model is not its own mirror image (CAV_BAD_INPUT); CAV_NO_MEMORY.
 cav_periodicity *cav_periodicity_new(const cav_problem *problem, cav_error *error);
 void cav_periodicity_free(cav_periodicity *periodicity);
 
 /// Configuration [nq] one period on (way 1) or back (way -1); out may not be q.
 void cav_periodicity_configuration(const cav_periodicity *periodicity, int way, const double *q, double *out);
 
-/// The same of a tangent [nv]: it does not depend on q. The map is orthogonal, so derivatives move as tangents do. out may not
-/// be v.
+/// The same of a tangent [nv]: it does not depend on q. The map is orthogonal, so derivatives move as tangents do. out
+/// may not be v.
 void cav_periodicity_tangent(const cav_periodicity *periodicity, int way, const double *v, double *out);
 
 /// Which components of a moved tangent may be nonzero, by those of the tangent [nv]; out may not be seen.
@@ -31,8 +32,8 @@ int cav_periodicity_link(const cav_periodicity *periodicity, int link);
 /// Range of a joint within which its image is in its own too.
 void cav_periodicity_range(const cav_periodicity *periodicity, int joint, double range[2]);
 
-/// A motion of several periods from one of them, whose last knot is its first one moved: q, v and the forces of its knots but
-/// the last. NULL if memory runs out.
+/// A motion of several periods from one of them, whose last knot is its first one moved: q, v and the forces of its
+/// knots but the last. NULL if memory runs out.
 cav_trajectory *cav_periodicity_unroll(const cav_periodicity *periodicity, const cav_trajectory *period, int periods);
 
 // mirror.c: images of joints and links under the reflection of a world axis
@@ -44,8 +45,9 @@ typedef struct cav_image {
   double rotation[4]; ///< ball and free: conjugation by this unit quaternion mirrors a rotation away from q0
 } cav_image;
 
-/// Fills image [njoint] and link [nlink] for a reflection of axis (0 x, 1 y) through the origin: counterparts by declared
-/// pairs, else by name (left and right), else a joint is its own; checked at q0. CAV_BAD_INPUT with the first mismatch.
+/// Fills image [njoint] and link [nlink] for a reflection of axis (0 x, 1 y) through the origin: counterparts by
+/// declared pairs, else by name (left and right), else a joint is its own; checked at q0. CAV_BAD_INPUT with the first
+/// mismatch.
 cav_status cav_mirror_find(const cav_problem *problem, int axis, cav_image *image, int *link, cav_error *error);
 
 #endif

@@ -1,5 +1,5 @@
-/// Which actuators a plan can use: those whose efforts are linear forms of u with limits that are constant, or that move with
-/// q and v as a servo's do.
+/// Which actuators a plan can use: those whose efforts are linear forms of u with limits that are constant, or that
+/// move with q and v as a servo's do.
 #include "plannable.h"
 
 #include <stdio.h>

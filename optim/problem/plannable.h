@@ -4,12 +4,13 @@
 
 #include "cavort/model.h"
 
-/// Whether efforts of all actuators are linear forms of u with constant limits, which plans and verification of them assume:
-/// moments constant in q, and limits that move with q and v at most as those of cav_servo_bounds. plannable.c. CAV_NOT_SUPPORTED with the actuator and why not.
+/// Whether efforts of all actuators are linear forms of u with constant limits, which plans and verification of them
+/// assume: moments constant in q, and limits that move with q and v at most as those of cav_servo_bounds. plannable.c.
+/// CAV_NOT_SUPPORTED with the actuator and why not.
 cav_status cav_actuators_plannable(const cav_model *model, cav_error *error);
 
-/// Whether the limits of a servo's control bound its effort by rows in u, q and v: fixed gain, affine bias, on a scalar joint
-/// or a fixed tendon, without limits of force. plannable.c.
+/// Whether the limits of a servo's control bound its effort by rows in u, q and v: fixed gain, affine bias, on a scalar
+/// joint or a fixed tendon, without limits of force. plannable.c.
 int cav_servo_bounds(const cav_model *model, int actuator);
 
 #endif

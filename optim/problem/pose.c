@@ -1,10 +1,10 @@
 /// Postures of a problem file: <start>, <goal>, <pose>.
 ///
-/// A posture is a base (a keyframe of the model, a <pose> of the file, numbers, a knot of a trajectory, or else the model's
-/// own configuration) on which root and joint values are laid, and which height="floor" then moves along its root until its
-/// lowest geom touches a plane of the world. So one file can set up models that share joint names, or list alternatives.
-/// The distance of a geom from a plane is by its support point, exact for every type here. Balance, contact between limbs
-/// and orientation to the floor are the file's business.
+/// A posture is a base (a keyframe of the model, a <pose> of the file, numbers, a knot of a trajectory, or else the
+/// model's own configuration) on which root and joint values are laid, and which height="floor" then moves along its
+/// root until its lowest geom touches a plane of the world. So one file can set up models that share joint names, or
+/// list alternatives. The distance of a geom from a plane is by its support point, exact for every type here. Balance,
+/// contact between limbs and orientation to the floor are the file's business.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -217,7 +217,8 @@ static double reach(const cav_geom *geom, const cav_pose *pose, const double n[3
   return 0;
 }
 
-// first joint that raises a tree: free, or a slide along the vertical. Its coordinate of height and how much that raises
+// first joint that raises a tree: free, or a slide along the vertical. Its coordinate of height and how much that
+// raises
 static int lifting(const cav_model *m, const cav_state *state, int root, double *gain) {
   const cav_link *link = &m->link[root];
   for (int j = link->joint; j < link->joint + link->njoint; j++) {
@@ -232,8 +233,8 @@ static int lifting(const cav_model *m, const cav_state *state, int root, double 
   return -1;
 }
 
-// moves one tree along its root until the lowest of its geoms that can touch a plane of the world touches it, and higher by
-// rise; returns whether there is such a geom
+// moves one tree along its root until the lowest of its geoms that can touch a plane of the world touches it, and
+// higher by rise; returns whether there is such a geom
 static int drop_tree(const cav_model *m, cav_state *state, int root, double rise, double *q) {
   double gain = 1, up = -INFINITY;
   int height = lifting(m, state, root, &gain);

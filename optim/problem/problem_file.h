@@ -68,8 +68,8 @@ cav_status cav_problem_key(const cav_problem_reader *reader, const cav_xml_node 
 cav_status cav_problem_real(const cav_problem_reader *reader, const cav_xml_node *node, const char *name, double least,
                             double most, double *value);
 
-/// A struct by the table of its n fields, an attribute each; what the file does not give stays, all of it if node is NULL.
-/// fields.c.
+/// A struct by the table of its n fields, an attribute each; what the file does not give stays, all of it if node is
+/// NULL. fields.c.
 cav_status cav_problem_read_fields(const cav_problem_reader *reader, const cav_xml_node *node, const cav_field *field,
                                    int n, void *values);
 
@@ -79,8 +79,8 @@ void cav_problem_write_fields(FILE *out, const cav_field *field, int n, const vo
 /// Text of the children of a <scene>, as it is written; NULL without memory. write.c.
 char *cav_problem_scene(cav_problem_owner *owner, const cav_xml_node *scene);
 
-/// Window of attributes from, to, at: seconds or "end". Left as they are where the file gives none; to < 0: the end. It holds
-/// a knot. term.c.
+/// Window of attributes from, to, at: seconds or "end". Left as they are where the file gives none; to < 0: the end. It
+/// holds a knot. term.c.
 cav_status cav_problem_window(const cav_problem_reader *reader, const cav_xml_node *node, double *from, double *to);
 
 /// <cycle>, once the start is known. cycle.c.

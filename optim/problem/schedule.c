@@ -20,8 +20,8 @@ static double between(double from, double to, double s) {
   return from > 0 && to > 0 ? from * pow(to / from, s) : (1 - s) * from + s * to;
 }
 
-// fraction of the way from which on contacts slide by the schedule's law: before, forces that are active at a distance make up
-// for what is missing, and a convex law leads better (step-up ends in a corner without)
+// fraction of the way from which on contacts slide by the schedule's law: before, forces that are active at a distance
+// make up for what is missing, and a convex law leads better (step-up ends in a corner without)
 static const double SLIDES_FROM = 0.75;
 
 cav_stage_options cav_schedule_at(const cav_schedule *schedule, double x) {

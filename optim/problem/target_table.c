@@ -1,5 +1,5 @@
-/// Targets of a term from a CSV file: a column 'time' and one column for each number of the target, by their names or in their
-/// order. Rows become waypoints. Complaints name the problem file with its line and the table with its own.
+/// Targets of a term from a CSV file: a column 'time' and one column for each number of the target, by their names or
+/// in their order. Rows become waypoints. Complaints name the problem file with its line and the table with its own.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

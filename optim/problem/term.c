@@ -1,9 +1,9 @@
 /// Terms of a problem file: <cost> and <constraint>.
 ///
-/// A cost without a window (from, to, at) takes the place of the default costs of its quantity; one with a window is added
-/// to them; weight 0 leaves a term out, so that it costs nothing. A constraint with lower or upper is a range, otherwise its
-/// value equals its target. Targets are expanded to the layout of cav_term and relative ones resolved here, so solvers see
-/// numbers only.
+/// A cost without a window (from, to, at) takes the place of the default costs of its quantity; one with a window is
+/// added to them; weight 0 leaves a term out, so that it costs nothing. A constraint with lower or upper is a range,
+/// otherwise its value equals its target. Targets are expanded to the layout of cav_term and relative ones resolved
+/// here, so solvers see numbers only.
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>

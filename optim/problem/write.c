@@ -1,7 +1,8 @@
 /// Problem files from problems: what problem.c reads, with nothing left to resolve.
 ///
-/// Postures are written as numbers, targets as they stand in the terms, every stage option spelt out; default costs that the
-/// problem does not have are written with weight 0, as a file says it. Numbers carry 17 digits, so reading gives the same bits.
+/// Postures are written as numbers, targets as they stand in the terms, every stage option spelt out; default costs
+/// that the problem does not have are written with weight 0, as a file says it. Numbers carry 17 digits, so reading
+/// gives the same bits.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,5 @@
-/// Cholesky factor of a band with a dense border, by LAPACK: A = L L' the band, Y = L^-1 B' for the border's rows B, and what is left
-/// of its corner C, S = C - Y'Y, as a dense matrix.
+/// Cholesky factor of a band with a dense border, by LAPACK: A = L L' the band, Y = L^-1 B' for the border's rows B,
+/// and what is left of its corner C, S = C - Y'Y, as a dense matrix.
 #include "band.h"
 
 #include "lapack.h"

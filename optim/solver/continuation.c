@@ -1,5 +1,5 @@
-/// Continuation from soft contacts active at a distance and a penalised helper force to the problem as stated, then an augmented
-/// Lagrangian that makes its constraints hold (METHOD.md, 5). The schedule is data: problem->schedule.
+/// Continuation from soft contacts active at a distance and a penalised helper force to the problem as stated, then an
+/// augmented Lagrangian that makes its constraints hold (METHOD.md, 5). The schedule is data: problem->schedule.
 #include "continuation.h"
 
 #include <math.h>
@@ -9,13 +9,15 @@
 
 #include "sqp.h"
 
-/// Weights of rows while they are only penalised, at the first stage; they end a hundred times higher. Rows are scaled, so these
-/// serve all models. Ranges are expensive from the start: a motion that leans on a limit, whose force is free, would have to be
-/// found anew where the limit takes it away, and rows of ranges are all but linear, so a high penalty costs nothing.
+/// Weights of rows while they are only penalised, at the first stage; they end a hundred times higher. Rows are scaled,
+/// so these serve all models. Ranges are expensive from the start: a motion that leans on a limit, whose force is free,
+/// would have to be found anew where the limit takes it away, and rows of ranges are all but linear, so a high penalty
+/// costs nothing.
 static const cav_penalties penalised = {.effort = 100, .range = 1e4, .term = 100};
 enum { PENALTY_RISE = 100 };
 
-/// Augmented Lagrangian: rounds, iterations a round, tolerance of a round, and the unactuated force from which restoration is safe.
+/// Augmented Lagrangian: rounds, iterations a round, tolerance of a round, and the unactuated force from which
+/// restoration is safe.
 enum { ROUNDS = 6, ROUND_ITERATIONS = 15 };
 static const double round_tolerance = 1e-5, near = 1e-3;
 
@@ -143,7 +145,8 @@ cav_status cav_continuation_run(cav_solve_run *run) {
   return status;
 }
 
-/// Largest violation of each kind of row, and how much of it is allowed: what is planned with headroom may use half of that.
+/// Largest violation of each kind of row, and how much of it is allowed: what is planned with headroom may use half of
+/// that.
 typedef struct violation {
   double unactuated, effort, range, term;
 } violation;

@@ -24,30 +24,30 @@ typedef struct cav_solve_run {
   double start;      ///< s
 } cav_solve_run;
 
-/// The problem's guess: start held, or the geodesic to end [nq], with a ballistic arc if asked; cycles always go to their end, at
-/// constant speed. q and v of at are filled.
+/// The problem's guess: start held, or the geodesic to end [nq], with a ballistic arc if asked; cycles always go to
+/// their end, at constant speed. q and v of at are filled.
 void cav_guess_fill(const cav_problem *problem, const double *end, cav_trajectory *at);
 
-/// The guess into run->at, moved a little off its symmetries: a straight or symmetric one can be a saddle of all costs and
-/// constraints at once, which exact derivatives never leave.
+/// The guess into run->at, moved a little off its symmetries: a straight or symmetric one can be a saddle of all costs
+/// and constraints at once, which exact derivatives never leave.
 cav_status cav_guess_take(cav_solve_run *run);
 
 /// Contact law and weights at a fraction of the way from the first to the last stage.
 void cav_stage_set(const cav_problem *problem, double fraction, cav_transcription *transcription);
 
-/// Stages first to last: softness, activation distance and the penalty on unactuated force go geometrically to their ends. One that stalls is
-/// taken back and reached by a stage half way there.
+/// Stages first to last: softness, activation distance and the penalty on unactuated force go geometrically to their
+/// ends. One that stalls is taken back and reached by a stage half way there.
 cav_status cav_continuation_run(cav_solve_run *run);
 
 /// Augmented Lagrangian on all constraint rows, at the last stage's law, until they nearly hold.
 cav_status cav_augmented_lagrangian(cav_solve_run *run);
 
-/// Gauss-Newton on the constraint rows alone, shortest steps first: from nearly holding to the tolerance. Costs have no say, so
-/// it is for the last millimetre only. CAV_NOT_CONVERGED if the rows do not come in.
+/// Gauss-Newton on the constraint rows alone, shortest steps first: from nearly holding to the tolerance. Costs have no
+/// say, so it is for the last millimetre only. CAV_NOT_CONVERGED if the rows do not come in.
 cav_status cav_restore(cav_solve_run *run);
 
-/// Where constraints cannot all hold: to the point of least violation, where the violations balance and so say what contradicts
-/// what (explain.c): the lower of two, from the iterate and from the guess.
+/// Where constraints cannot all hold: to the point of least violation, where the violations balance and so say what
+/// contradicts what (explain.c): the lower of two, from the iterate and from the guess.
 cav_status cav_minimise_infeasibility(cav_solve_run *run);
 
 /// Violation that planning leaves room for, by kind of row: what is planned with headroom may use half of it.

@@ -1,12 +1,14 @@
-/// Hessian of the Lagrangian by differences of its gradient. A knot sees three neighbouring blocks of unknowns, so blocks that no
-/// knot sees together are moved at once: three colours (up to five in cycles), and the step's logarithm where that is free.
-/// Symmetrised; what Gauss-Newton has of it is subtracted, so the sum stays right where the costs' residuals move on.
+/// Hessian of the Lagrangian by differences of its gradient. A knot sees three neighbouring blocks of unknowns, so
+/// blocks that no knot sees together are moved at once: three colours (up to five in cycles), and the step's logarithm
+/// where that is free. Symmetrised; what Gauss-Newton has of it is subtracted, so the sum stays right where the costs'
+/// residuals move on.
 #include "curvature.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/// Difference of an unknown, rad or m, for a step of one second: what moves a knot by it moves rates by this, whatever the step.
+/// Difference of an unknown, rad or m, for a step of one second: what moves a knot by it moves rates by this, whatever
+/// the step.
 static const double rate_difference = 1e-4;
 
 /// Difference of the step's logarithm.

@@ -1,6 +1,6 @@
-/// Gauss-Newton: one factorisation of the normal equations (normal_equations.c) an iteration, and Powell's dogleg in the
-/// norm of sqrt(diag H), which is blind to the units of the unknowns. The radius outlives a run, so a continuation keeps
-/// what it has learnt.
+/// Gauss-Newton: one factorisation of the normal equations (normal_equations.c) an iteration, and Powell's dogleg in
+/// the norm of sqrt(diag H), which is blind to the units of the unknowns. The radius outlives a run, so a continuation
+/// keeps what it has learnt.
 #include "gauss_newton.h"
 
 #include <float.h>
@@ -168,8 +168,8 @@ static cav_status grow(cav_region *region, dogleg *d, const cav_normal *normal, 
   return CAV_OK;
 }
 
-/// Shrinks the radius until a step is as good as required, or grows it while it is. What is within rounding of the merit says
-/// nothing about the radius.
+/// Shrinks the radius until a step is as good as required, or grows it while it is. What is within rounding of the
+/// merit says nothing about the radius.
 static cav_status search(cav_region *region, dogleg *d, cav_normal *normal, cav_transcription *tr,
                          const cav_trajectory *at, cav_trajectory *to, double merit, trial *t) {
   for (int attempt = 0;; attempt++) {

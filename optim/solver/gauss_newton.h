@@ -17,9 +17,9 @@ typedef struct cav_region {
   void *context;
 } cav_region;
 
-/// Minimises the transcription's merit from *at by Gauss-Newton steps (dogleg in the norm of sqrt(diag H)). *at and *spare are
-/// exchanged as steps are taken; on return the transcription holds the values at *at.
-/// CAV_INTERRUPTED if report asked; CAV_NOT_FINITE if *at itself cannot be evaluated.
+/// Minimises the transcription's merit from *at by Gauss-Newton steps (dogleg in the norm of sqrt(diag H)). *at and
+/// *spare are exchanged as steps are taken; on return the transcription holds the values at *at. CAV_INTERRUPTED if
+/// report asked; CAV_NOT_FINITE if *at itself cannot be evaluated.
 cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_transcription *transcription,
                                cav_trajectory **at, cav_trajectory **spare);
 

@@ -1,8 +1,9 @@
 /// Guesses: the trajectory that a solve starts from.
 ///
-/// From start to goal along the geodesic of the configuration space with a cubic of time; or by postures on the way, linear in
-/// time between them; or the start held. On that a rotation of the first free joint, a ballistic arc of the roots, and sines
-/// laid over single joints. Cycles go from their start to where that is a period on, at constant speed. Asks nothing of contacts or forces.
+/// From start to goal along the geodesic of the configuration space with a cubic of time; or by postures on the way,
+/// linear in time between them; or the start held. On that a rotation of the first free joint, a ballistic arc of the
+/// roots, and sines laid over single joints. Cycles go from their start to where that is a period on, at constant
+/// speed. Asks nothing of contacts or forces.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,7 +1,7 @@
-/// Ipopt on the transcription, stage by stage of the continuation: unknowns are tangent increments about the trajectory that a
-/// stage starts from, forces that no actuator can give are hard equalities, efforts, tendon ranges and hard terms are bounded
-/// rows, joint ranges bound the unknowns (METHOD.md, 2). The only user of Ipopt; written against 3.11 and 3.14 (index and
-/// number are int and double in both).
+/// Ipopt on the transcription, stage by stage of the continuation: unknowns are tangent increments about the trajectory
+/// that a stage starts from, forces that no actuator can give are hard equalities, efforts, tendon ranges and hard
+/// terms are bounded rows, joint ranges bound the unknowns (METHOD.md, 2). The only user of Ipopt; written against 3.11
+/// and 3.14 (index and number are int and double in both).
 #include "ipopt.h"
 
 #include <IpStdCInterface.h>
@@ -17,28 +17,28 @@
 /// Our own option among Ipopt's: which Hessian it gets.
 static const char hessian_option[] = "hessian";
 
-/// Dual infeasibility that the noise of derivatives explains where contacts act, and where none does; violation from which the
-/// last step brings all rows in.
+/// Dual infeasibility that the noise of derivatives explains where contacts act, and where none does; violation from
+/// which the last step brings all rows in.
 static const double contact_noise = 1, smooth_noise = 1e-6, acceptable = 1e-4;
 
 /// The continuation: stages of the problem's schedule to one of Ipopt's, and iterations of each but the last.
 enum { STAGES_IN_ONE = 2, STAGE_ITERATIONS = 40 };
 
-/// Gauss-Newton Hessians: added to the diagonal, per second of the step, 1/rad^2 or 1/m^2, at a stage's start and at least. It
-/// stands for the curvature that is left out: four times as much after a step that the line search cut, a quarter after a
-/// full one.
+/// Gauss-Newton Hessians: added to the diagonal, per second of the step, 1/rad^2 or 1/m^2, at a stage's start and at
+/// least. It stands for the curvature that is left out: four times as much after a step that the line search cut, a
+/// quarter after a full one.
 static const double damping = 1.2, least_damping = 0.1, most_damping = 1e4, damping_change = 4;
 
-/// After Gauss-Newton's last stage: iterations with the exact Hessian, times degrees of freedom, as each takes about that much
-/// longer; fewer than the least are not worth it.
+/// After Gauss-Newton's last stage: iterations with the exact Hessian, times degrees of freedom, as each takes about
+/// that much longer; fewer than the least are not worth it.
 enum { EXACT_ITERATIONS = 200, LEAST_EXACT_ITERATIONS = 10 };
 
 /// Differences of the Lagrangian's gradient by the step's logarithm.
 static const double step_shift = 1e-4;
 
-/// Ipopt's checker takes one-sided differences, at the start itself: away from it the law is stiff beyond any step. Contacts
-/// and their costs have second derivatives up to 3e7, so a step p is off by 1.5e7 p, and rounding of objective and forces by
-/// about 5e-13 / p: least near 2e-10, where both together stay below the tolerance.
+/// Ipopt's checker takes one-sided differences, at the start itself: away from it the law is stiff beyond any step.
+/// Contacts and their costs have second derivatives up to 3e7, so a step p is off by 1.5e7 p, and rounding of objective
+/// and forces by about 5e-13 / p: least near 2e-10, where both together stay below the tolerance.
 static const double test_step = 2e-10, test_tolerance = 8e-3;
 
 typedef struct program {
@@ -249,8 +249,8 @@ static Bool lagrangian_hessian(int n, double *x, Bool fresh, double factor, int 
   return !tr->free_step || step_hessian(p, x, factor, multiplier, entries, value);
 }
 
-/// Keeps the iterate if none was nearer to an optimum. A line search that meets the noise of the derivatives can wander off,
-/// and the restoration of Ipopt ends anywhere.
+/// Keeps the iterate if none was nearer to an optimum. A line search that meets the noise of the derivatives can wander
+/// off, and the restoration of Ipopt ends anywhere.
 static void keep_best(program *p, int iteration) {
   double error = fmax(p->infeasibility / p->run->options->tolerance, p->dual / p->noise);
   if (p->known < 2 || !(p->best_iteration < 0 || error < p->best_error)) return;
@@ -362,7 +362,8 @@ static void set_bounds(const program *p, double *x_lower, double *x_upper, doubl
   }
 }
 
-/// Multipliers of rows [m], lower and upper bounds [n] each: from the rows' multipliers, or back into their multipliers.
+/// Multipliers of rows [m], lower and upper bounds [n] each: from the rows' multipliers, or back into their
+/// multipliers.
 static void multipliers_of(const program *p, double *multiplier, int back) {
   const cav_transcription *tr = p->run->tr;
   double *lower = multiplier + p->m, *upper = lower + p->n;
@@ -538,7 +539,8 @@ static int program_new(program *p) {
   return ok;
 }
 
-/// Solves at the transcription's law from run->at and leaves the result there: at a stage's end its last iterate, else the best.
+/// Solves at the transcription's law from run->at and leaves the result there: at a stage's end its last iterate, else
+/// the best.
 static cav_status solve_stage(cav_solve_run *run, int exact, int iterations, cav_error *error) {
   cav_transcription *tr = run->tr;
   cav_penalties kept = tr->penalty;
@@ -621,8 +623,8 @@ static cav_status run_stage(cav_solve_run *run, double fraction, int exact, int 
 
 static int goes_on(cav_status status) { return status == CAV_OK || status == CAV_NOT_CONVERGED; }
 
-/// After Gauss-Newton the exact Hessian, whose steps are right where contacts have settled and wild where they have not: kept
-/// if it converges, or if it leaves less violation or, with no more of it, less cost.
+/// After Gauss-Newton the exact Hessian, whose steps are right where contacts have settled and wild where they have
+/// not: kept if it converges, or if it leaves less violation or, with no more of it, less cost.
 static cav_status sharpen(cav_solve_run *run, int iterations, cav_status before, cav_error *error) {
   double violation, cost, was_violation, was_cost;
   cav_error mine = {0};

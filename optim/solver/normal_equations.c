@@ -1,6 +1,6 @@
-/// Normal equations of a transcription, block-banded with a border: three neighbouring knots fill a band. In a cycle the last two
-/// knots meet the first two, and a free step meets all: these unknowns stand last, as the border.
-/// Trees that neither contacts nor rows join at these knots are independent: groups of them are found by what is zero after
+/// Normal equations of a transcription, block-banded with a border: three neighbouring knots fill a band. In a cycle
+/// the last two knots meet the first two, and a free step meets all: these unknowns stand last, as the border. Trees
+/// that neither contacts nor rows join at these knots are independent: groups of them are found by what is zero after
 /// gathering, and each is a narrower band of its own (band.c). A free step joins all. Measured against CHOLMOD with
 /// supernodes (bench_normal): 5 times dpbtrf's time on the band of a humanoid, 4 times on a cycle of 60 knots.
 #include "normal_equations.h"

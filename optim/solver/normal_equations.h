@@ -38,8 +38,8 @@ const double *cav_normal_diagonal(const cav_normal *normal);
 /// Groups of trees at the last gathering, and the largest number of dofs in one.
 int cav_normal_groups(const cav_normal *normal, int *most);
 
-/// The same in parts, the gradient left out: nothing; plus a knot's Hessian [3nv*3nv] (lower triangle), with what the step's logarithm
-/// meets where that is free; plus a diagonal [unknowns], which has to come last.
+/// The same in parts, the gradient left out: nothing; plus a knot's Hessian [3nv*3nv] (lower triangle), with what the
+/// step's logarithm meets where that is free; plus a diagonal [unknowns], which has to come last.
 void cav_normal_clear(cav_normal *normal);
 void cav_normal_add_block(cav_normal *normal, const cav_transcription *transcription, int t, const double *hessian,
                           const double *step_row, double step_square);

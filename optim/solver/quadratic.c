@@ -1,10 +1,11 @@
-/// Interior point for the quadratic programme of one linearisation. Rows have exact penalties (elastic rows: Fletcher's S-l1-QP), so
-/// every programme has a solution, and a box holds the step.
+/// Interior point for the quadratic programme of one linearisation. Rows have exact penalties (elastic rows: Fletcher's
+/// S-l1-QP), so every programme has a solution, and a box holds the step.
 ///
-/// A side of a row with signed slack d (value minus lower, or upper minus value) has s - e = d, s >= 0, e >= 0 at the penalty e
-/// times its penalty p; its multiplier y is in [0, p], and on the central path s y = e (p - y) = mu. Newton's step
-/// with both eliminated adds to the Hessian w J'J with 1/w = s/y + e/(p - y), so one banded factor of the own solver serves,
-/// whatever rows are active. Predictor and corrector as in Mehrotra (1992); the start is the point of the central path at x = 0.
+/// A side of a row with signed slack d (value minus lower, or upper minus value) has s - e = d, s >= 0, e >= 0 at the
+/// penalty e times its penalty p; its multiplier y is in [0, p], and on the central path s y = e (p - y) = mu. Newton's
+/// step with both eliminated adds to the Hessian w J'J with 1/w = s/y + e/(p - y), so one banded factor of the own
+/// solver serves, whatever rows are active. Predictor and corrector as in Mehrotra (1992); the start is the point of
+/// the central path at x = 0.
 #include "quadratic.h"
 
 #include <math.h>
@@ -410,7 +411,8 @@ static double longest(const cav_quadratic *p) {
   return length;
 }
 
-/// Right-hand sides of the complementarities for a target mu, with the products of the predictor's step where second is 1.
+/// Right-hand sides of the complementarities for a target mu, with the products of the predictor's step where second is
+/// 1.
 static void aim(cav_quadratic *p, double mu, int second) {
   for (int r = 0; r < 2 * p->rows; r++) {
     side *z = &p->row[r];
@@ -445,8 +447,8 @@ static void advance(cav_quadratic *p, double length) {
   for (int j = 0; j < 2 * p->n; j++) p->box[j].s += length * p->box[j].ds, p->box[j].y += length * p->box[j].dy;
 }
 
-/// Iterations from the start with a gap; *left: what is left of the first dual residual. Ends early where steps come to nothing,
-/// as they do from a start that lies too near to the bounds for the residual that it has.
+/// Iterations from the start with a gap; *left: what is left of the first dual residual. Ends early where steps come to
+/// nothing, as they do from a start that lies too near to the bounds for the residual that it has.
 static cav_status approach(cav_quadratic *p, double tolerance, double *left) {
   int held = 0;
   double past = INFINITY;

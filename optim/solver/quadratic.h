@@ -1,5 +1,5 @@
-/// The quadratic programme of one linearisation: the costs' Gauss-Newton model, linear rows with exact penalties, a box. Private to
-/// optim/.
+/// The quadratic programme of one linearisation: the costs' Gauss-Newton model, linear rows with exact penalties, a
+/// box. Private to optim/.
 #ifndef CAVORT_QUADRATIC_H
 #define CAVORT_QUADRATIC_H
 
@@ -8,25 +8,28 @@
 /// With g, H of the costs and c, J of the constraint rows at the last linearisation (whose rows were kept, under no
 /// penalties):
 ///
-///     minimise  g'x + x'Hx/2 + sum of penalty_i * distance(c_i + J_i x, [lower_i, upper_i])   subject to  |x| <= radius
+///     minimise  g'x + x'Hx/2 + sum of penalty_i * distance(c_i + J_i x, [lower_i, upper_i])   subject to  |x| <=
+///     radius
 typedef struct cav_quadratic cav_quadratic;
 
 /// NULL if memory runs out.
 cav_quadratic *cav_quadratic_new(const cav_transcription *transcription, cav_normal *normal);
 void cav_quadratic_free(cav_quadratic *quadratic);
 
-/// Solves it by a primal-dual interior point, to a duality gap in units of the cost. The step's logarithm stays within change[0] ..
-/// change[1], too. CAV_NOT_CONVERGED: the gap was not reached; the best iterate stands.
+/// Solves it by a primal-dual interior point, to a duality gap in units of the cost. The step's logarithm stays within
+/// change[0] .. change[1], too. CAV_NOT_CONVERGED: the gap was not reached; the best iterate stands.
 cav_status cav_quadratic_solve(cav_quadratic *quadratic, double radius, const double change[2], double gap);
 
-/// Further step from the solution x, in the metric that it was found in, towards rows that are off by offset [rows]. Writes x [unknowns].
+/// Further step from the solution x, in the metric that it was found in, towards rows that are off by offset [rows].
+/// Writes x [unknowns].
 void cav_quadratic_correct(cav_quadratic *quadratic, const double *offset, double *x);
 
-/// Whether the costs' Hessian of the knots is convex along the rows that hold the last solution. 1 before the first one where it is
-/// positive definite by itself.
+/// Whether the costs' Hessian of the knots is convex along the rows that hold the last solution. 1 before the first one
+/// where it is positive definite by itself.
 int cav_quadratic_convex(cav_quadratic *quadratic);
 
-/// Results, and what the caller sets before it solves: penalties and values of the rows, by knot and slot. [unknowns], [rows]
+/// Results, and what the caller sets before it solves: penalties and values of the rows, by knot and slot. [unknowns],
+/// [rows]
 const double *cav_quadratic_step(const cav_quadratic *quadratic);
 const double *cav_quadratic_multiplier(const cav_quadratic *quadratic); ///< positive at upper bounds
 double *cav_quadratic_penalty(cav_quadratic *quadratic);

@@ -1,5 +1,5 @@
-/// From a problem to a solution: guess, continuation, multipliers, optionally Ipopt, then gains. What each of them does is in
-/// its own file; this one only puts them in order.
+/// From a problem to a solution: guess, continuation, multipliers, optionally Ipopt, then gains. What each of them does
+/// is in its own file; this one only puts them in order.
 #include "cavort/solve.h"
 
 #include <math.h>

@@ -1,5 +1,6 @@
-/// The table of solvers, and the order in which the methods of each come. A solver is a line of CAV_SOLVERS and a function
-/// named by its word in a file of its own; those that put together the methods of continuation.c and ipopt.c are here.
+/// The table of solvers, and the order in which the methods of each come. A solver is a line of CAV_SOLVERS and a
+/// function named by its word in a file of its own; those that put together the methods of continuation.c and ipopt.c
+/// are here.
 #include "solvers.h"
 
 #include <assert.h>

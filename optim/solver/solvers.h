@@ -4,9 +4,9 @@
 
 #include "continuation.h"
 
-/// One function a solver, named by its word: from run->at to a trajectory whose rows hold, left in run->at; run->tr has the values
-/// there. It evaluates values, linearises, and exchanges rows, bounds and multipliers through transcription.h.
-/// CAV_NOT_CONVERGED: rows do not come in; where it is not the own solver, with its reason in error.
+/// One function a solver, named by its word: from run->at to a trajectory whose rows hold, left in run->at; run->tr has
+/// the values there. It evaluates values, linearises, and exchanges rows, bounds and multipliers through
+/// transcription.h. CAV_NOT_CONVERGED: rows do not come in; where it is not the own solver, with its reason in error.
 #define CAV_SOLVER_RUN(solver, word, ...) cav_status cav_solver_##word(cav_solve_run *run, cav_error *error);
 CAV_SOLVERS(CAV_SOLVER_RUN)
 #undef CAV_SOLVER_RUN

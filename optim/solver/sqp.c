@@ -1,10 +1,11 @@
-/// Sequential quadratic programming on a transcription: from near an optimum to stationarity, all constraints held at once, in the
-/// metric of the costs' Gauss-Newton Hessian.
+/// Sequential quadratic programming on a transcription: from near an optimum to stationarity, all constraints held at
+/// once, in the metric of the costs' Gauss-Newton Hessian.
 ///
-/// Each iteration solves the programme of quadratic.c in a box, whose rows have exact penalties (Fletcher 1985: S-l1-QP), and
-/// takes its step where cost plus penalties fall by a fraction of what the programme predicted; a step that misses the rows by their
-/// curvature is corrected once in the same metric (Maratos). Penalties are above every multiplier, row by row. The end is where
-/// the programme predicts next to nothing: its prediction over the cost is how optimal the motion is, in the full box.
+/// Each iteration solves the programme of quadratic.c in a box, whose rows have exact penalties (Fletcher 1985:
+/// S-l1-QP), and takes its step where cost plus penalties fall by a fraction of what the programme predicted; a step
+/// that misses the rows by their curvature is corrected once in the same metric (Maratos). Penalties are above every
+/// multiplier, row by row. The end is where the programme predicts next to nothing: its prediction over the cost is how
+/// optimal the motion is, in the full box.
 #include "sqp.h"
 
 #include <math.h>
@@ -18,8 +19,8 @@
 enum { ITERATIONS = 120, RAISES = 5, SETTLING = 20 };
 static const double first_radius = 0.1, most_radius = 0.7, least_radius = 1e-7;
 
-/// Fractions of the cost: predicted decrease that ends a run; one that ends it if it does not come true; gap of a programme. Smallest
-/// cost that counts as a scale.
+/// Fractions of the cost: predicted decrease that ends a run; one that ends it if it does not come true; gap of a
+/// programme. Smallest cost that counts as a scale.
 static const double stationary = 1e-9, predicted_enough = 1e-6, gap_fraction = 1e-11, least_cost = 1e-6;
 
 /// Decreases of the cost below this fraction, so many in a row, end a run.
@@ -34,8 +35,8 @@ static const double least_fraction = 0.01;
 
 static double cost_scale(const cav_transcription *tr) { return fmax(cav_transcription_cost(tr), least_cost); }
 
-/// Sets aside the augmented Lagrangian, but for squares of the unactuated force: these leave the solution where it is, and
-/// make the Lagrangian convex across these rows.
+/// Sets aside the augmented Lagrangian, but for squares of the unactuated force: these leave the solution where it is,
+/// and make the Lagrangian convex across these rows.
 static void take_penalties(cav_transcription *tr) {
   tr->penalty = (cav_penalties){.unactuated = tr->problem->schedule.last.penalty};
   for (int t = 0; t < tr->nknot; t++)
@@ -95,7 +96,8 @@ static void step_bounds(const cav_transcription *tr, const cav_trajectory *at, d
   change[1] = log(tr->problem->duration_most / (tr->nknot - 1) / at->timestep);
 }
 
-/// Solves the programme, raising penalties until they are exact or there is no more to be had by it. *solved: whether it could be.
+/// Solves the programme, raising penalties until they are exact or there is no more to be had by it. *solved: whether
+/// it could be.
 static cav_status solve_programme(cav_solve_run *run, cav_quadratic *qp, double radius, int *solved) {
   double change[2], begin = cav_clock(), gap = gap_fraction * cost_scale(run->tr);
   step_bounds(run->tr, run->at, change);
@@ -144,8 +146,8 @@ static void descent_free(descent *d) {
   free(d->x);
 }
 
-/// Adds the Lagrangian's curvature to the linearisation, or as much of it as leaves that convex along the rows that hold the motion:
-/// what is left out is a step in the metric of the costs.
+/// Adds the Lagrangian's curvature to the linearisation, or as much of it as leaves that convex along the rows that
+/// hold the motion: what is left out is a step in the metric of the costs.
 static void add_curvature(cav_solve_run *run, descent *d) {
   double added = 0;
   for (d->fraction = 1; d->fraction > least_fraction; d->fraction *= 0.7) {
@@ -169,8 +171,8 @@ static cav_status solve_model(cav_solve_run *run, descent *d, double radius) {
   }
 }
 
-/// Costs, rows and their model at run->at: Gauss-Newton's while its predictions come true, then with the Lagrangian's curvature, which is
-/// found anew where the last one's have not.
+/// Costs, rows and their model at run->at: Gauss-Newton's while its predictions come true, then with the Lagrangian's
+/// curvature, which is found anew where the last one's have not.
 static cav_status model(cav_solve_run *run, descent *d) {
   int poor = fabs(d->ratio - 1) > 0.2;
   cav_status status = CAV_OK;
@@ -199,8 +201,8 @@ static cav_status try_at(cav_solve_run *run, descent *d, cav_trajectory *at, dou
   return status == CAV_NO_MEMORY ? status : CAV_OK;
 }
 
-/// Takes a multiple of the programme's step to run->spare, corrected where it gains less than enough and that is better. Returns the
-/// merit there.
+/// Takes a multiple of the programme's step to run->spare, corrected where it gains less than enough and that is
+/// better. Returns the merit there.
 static cav_status try_step(cav_solve_run *run, descent *d, double multiple, double enough, double *merit) {
   int n = cav_transcription_unknowns(run->tr), rows = cav_quadratic_rows(d->qp);
   const double *step = cav_quadratic_step(d->qp);
@@ -250,8 +252,8 @@ static cav_status renew(cav_solve_run *run, descent *d, int *taken) {
   return status == CAV_OK ? iterate(run, d, taken) : status;
 }
 
-/// One iteration from a linearisation: programmes in smaller and smaller boxes until a step is accepted, or until the model has to be
-/// a better one. *taken: whether one was.
+/// One iteration from a linearisation: programmes in smaller and smaller boxes until a step is accepted, or until the
+/// model has to be a better one. *taken: whether one was.
 static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
   *taken = 0;
   read_values(run->tr, cav_quadratic_value(d->qp));

@@ -1,10 +1,11 @@
-/// Ways to a motion: guesses and schedules to start from where the one that a problem states does not lead to a certificate.
-/// Data only: a caller solves them one after the other, or at once in processes of its own, and keeps what it likes.
+/// Ways to a motion: guesses and schedules to start from where the one that a problem states does not lead to a
+/// certificate. Data only: a caller solves them one after the other, or at once in processes of its own, and keeps what
+/// it likes.
 ///
 /// One guess has to be found in the model: a gait, that is the limbs that carry the body swinging against each other
-/// (METHOD.md, 7: without it a walk becomes a hop). Left and right are those of mirror.c; the limbs are those that touch the world in
-/// the goal posture; of their hinges across the direction of travel the first swings, forwards as a sine, and the second
-/// bends while the limb comes forwards.
+/// (METHOD.md, 7: without it a walk becomes a hop). Left and right are those of mirror.c; the limbs are those that
+/// touch the world in the goal posture; of their hinges across the direction of travel the first swings, forwards as a
+/// sine, and the second bends while the limb comes forwards.
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
@@ -13,7 +14,8 @@
 #include "continuation.h"
 #include "periodicity.h"
 
-/// Gap below which a limb carries, m; travel from which there is a gait, m; cosine from which a hinge lies across the travel.
+/// Gap below which a limb carries, m; travel from which there is a gait, m; cosine from which a hinge lies across the
+/// travel.
 static const double touching = 0.02, least_travel = 0.3, across = 0.7;
 
 /// The gait: how far the first and the second hinge go, rad, and its frequency where the hip is a metre up, Hz.
@@ -22,7 +24,8 @@ static const double swing_angle = 0.25, bend_angle = 0.4, pace = 1.2;
 /// How much softer, and how much slower than stated.
 enum { SOFTER = 2, CHEAPER = 10, SLOWER = 2 };
 
-/// Where a motion solved under another order goes on: fraction of the schedule's way, and stages from there (METHOD.md, 7).
+/// Where a motion solved under another order goes on: fraction of the schedule's way, and stages from there (METHOD.md,
+/// 7).
 static const double resumed_fraction = 0.4;
 enum { RESUMED_STAGES = 10 };
 
@@ -67,7 +70,8 @@ static cav_status find_support(walker *w) {
   return status;
 }
 
-/// Fraction of a hinge's axis across the travel, in the goal posture; 0 for other joints and those that stand for themselves.
+/// Fraction of a hinge's axis across the travel, in the goal posture; 0 for other joints and those that stand for
+/// themselves.
 static double crosses(const walker *w, int j) {
   const cav_joint *joint = &w->problem->model->joint[j];
   if (joint->type != CAV_JOINT_HINGE || w->image[j].joint == j || !w->carries[joint->link]) return 0;

@@ -1,5 +1,5 @@
-/// What the normal equations of a problem are made of, for who wants to know before a solve: evaluates the guess once and factors
-/// nothing.
+/// What the normal equations of a problem are made of, for who wants to know before a solve: evaluates the guess once
+/// and factors nothing.
 #include "continuation.h"
 
 /// The structure at the trajectory.

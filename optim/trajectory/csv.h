@@ -14,8 +14,8 @@ typedef struct cav_table {
   int *line;     ///< [nrow] where each row stands in the file
 } cav_table;
 
-/// Reads a file of one line of names and lines of as many numbers, all finite; blank lines are passed over. NULL on failure
-/// with the reason in error (may be NULL): CAV_BAD_INPUT or CAV_NO_MEMORY.
+/// Reads a file of one line of names and lines of as many numbers, all finite; blank lines are passed over. NULL on
+/// failure with the reason in error (may be NULL): CAV_BAD_INPUT or CAV_NO_MEMORY.
 cav_table *cav_table_read(const char *path, cav_error *error);
 
 /// Frees a table; NULL is fine.

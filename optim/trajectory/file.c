@@ -1,5 +1,5 @@
-/// Files that appear whole: written under a temporary name in the same folder, flushed to the disk, renamed over the old
-/// one (POSIX rename is atomic within a file system). Does not keep the old file's owner or mode, nor follow links.
+/// Files that appear whole: written under a temporary name in the same folder, flushed to the disk, renamed over the
+/// old one (POSIX rename is atomic within a file system). Does not keep the old file's owner or mode, nor follow links.
 #include "file.h"
 
 #include <errno.h>

@@ -1,9 +1,10 @@
 /// Motions as knots: making, copying, differencing, resampling, and trajectory.csv.
 ///
-/// Velocities are backward differences on the manifold, v_t = (q_t (-) q_{t-1})/h. Resampling follows the geodesic between
-/// two knots at constant velocity; forces are held from the knot before, as a forward step applies them. Columns of the
-/// file: time, qpos_<joint>, qvel_<joint>, u_<joint>, with _0, _1, ... where a joint has several values, and #3 for the
-/// joint 3 that has no name. Does not compute forces: what u means is the transcription's or the reader's business.
+/// Velocities are backward differences on the manifold, v_t = (q_t (-) q_{t-1})/h. Resampling follows the geodesic
+/// between two knots at constant velocity; forces are held from the knot before, as a forward step applies them.
+/// Columns of the file: time, qpos_<joint>, qvel_<joint>, u_<joint>, with _0, _1, ... where a joint has several values,
+/// and #3 for the joint 3 that has no name. Does not compute forces: what u means is the transcription's or the
+/// reader's business.
 #include "cavort/trajectory.h"
 
 #include <math.h>
@@ -60,7 +61,8 @@ void cav_trajectory_velocities(const cav_model *model, cav_trajectory *trajector
   }
 }
 
-// x := way from a knot to a fraction of the step after it, over the step: cubic from 0 to v_{t+1} with the derivatives of the knots
+// x := way from a knot to a fraction of the step after it, over the step: cubic from 0 to v_{t+1} with the derivatives
+// of the knots
 static void along(const cav_trajectory *trajectory, int t, double fraction, double *x) {
   int nv = trajectory->nv;
   const double *v = trajectory->v + ((size_t)t + 1) * (size_t)nv;

@@ -1,6 +1,6 @@
-/// Joins the dense rows of a knot into its Hessian, H += R'R (BLAS's dsyrk). Trees that no row joins make blocks of their own:
-/// which is read off the zeros of the rows, so bodies that touch nothing cost their own small products. One group gives the
-/// product of all.
+/// Joins the dense rows of a knot into its Hessian, H += R'R (BLAS's dsyrk). Trees that no row joins make blocks of
+/// their own: which is read off the zeros of the rows, so bodies that touch nothing cost their own small products. One
+/// group gives the product of all.
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,7 +1,8 @@
-/// Rows of one knot: costs and constraints, from readings, forces and velocities to residuals, gradient and Gauss-Newton Hessian.
-/// Rows with few columns are added at once, dense ones gathered for one product (transcription.c); forces along single dofs
-/// are gathered by dof, as they share the derivatives of u. A constraint row enters by an augmented Lagrangian. Where the step is
-/// free, every row's derivative by its logarithm is the difference of two passes that begin the same rows.
+/// Rows of one knot: costs and constraints, from readings, forces and velocities to residuals, gradient and
+/// Gauss-Newton Hessian. Rows with few columns are added at once, dense ones gathered for one product
+/// (transcription.c); forces along single dofs are gathered by dof, as they share the derivatives of u. A constraint
+/// row enters by an augmented Lagrangian. Where the step is free, every row's derivative by its logarithm is the
+/// difference of two passes that begin the same rows.
 #include "knot.h"
 #include "rotation.h"
 
@@ -156,8 +157,8 @@ int cav_knot_reserve(cav_transcription *tr, cav_scratch *s, int t) {
 
 // ---------------------------------------------------------------- rows
 
-/// Starts a row of weight/2 r^2. Where the step is free its derivative by the step's logarithm is the difference of two passes that
-/// begin the same rows; weights count with it, as integrals are sums over steps.
+/// Starts a row of weight/2 r^2. Where the step is free its derivative by the step's logarithm is the difference of two
+/// passes that begin the same rows; weights count with it, as integrals are sums over steps.
 static void begin_row(cav_sum *a, double weight, double r) {
   int i = a->row++;
   assert(i < a->knot->nrow);
@@ -173,8 +174,8 @@ static void begin_row(cav_sum *a, double weight, double r) {
   a->knot->step_derivative += a->derivative * a->root * r;
 }
 
-/// Starts the row of a cost, and turns its norm into a square: with x = r/unit and y^2/2 the norm of x, the residual is y and its row
-/// dy/dx times that of x, which goes into weight and residual.
+/// Starts the row of a cost, and turns its norm into a square: with x = r/unit and y^2/2 the norm of x, the residual is
+/// y and its row dy/dx times that of x, which goes into weight and residual.
 static void begin_cost(cav_sum *a, const cav_term *term, double unit, double *weight, double *r) {
   if (term->norm == CAV_NORM_ABSOLUTE) {
     double x = *r / unit, root = sqrt(1 + x * x);
@@ -226,7 +227,8 @@ static void put_force(const cav_sum *a, const cav_force_row *form, double *row) 
   }
 }
 
-/// Adds weight/2 r^2 with r a linear form of u, begun: along one dof it joins that dof's row, otherwise it is a row of its own.
+/// Adds weight/2 r^2 with r a linear form of u, begun: along one dof it joins that dof's row, otherwise it is a row of
+/// its own.
 static void add_force(cav_sum *a, double weight, double r, const cav_force_row *form) {
   const cav_transcription *tr = a->tr;
   if (!stands_alone(form)) {
@@ -273,7 +275,8 @@ static double slot_residual(cav_sum *a, int i, double value, double lower, doubl
   return e;
 }
 
-/// Derivative of constraint row i, kept where the transcription is asked to (for solvers that want the rows themselves).
+/// Derivative of constraint row i, kept where the transcription is asked to (for solvers that want the rows
+/// themselves).
 static double *kept_row(cav_sum *a, int i) {
   if (!a->jacobian || !a->tr->keep_rows) return NULL;
   double *row = a->knot->slot_row + (size_t)i * 3 * a->tr->nv;
@@ -297,7 +300,8 @@ static void keep_reading(cav_sum *a, int i, int reading) {
   if (row) memcpy(row, a->knot->dy + (size_t)reading * 3 * a->tr->nv, 3 * (size_t)a->tr->nv * sizeof(double));
 }
 
-/// Entries of the derivative of v_t [dof d] over the columns; base is the column block of q_t, q_{t-1} stands before it.
+/// Entries of the derivative of v_t [dof d] over the columns; base is the column block of q_t, q_{t-1} stands before
+/// it.
 static int velocity_entries(const cav_transcription *tr, int step, int d, int base, int has_previous, double scale,
                             int *column, double *entry) {
   int n = 0, nv = tr->nv, k = tr->rotation_of[d];
@@ -424,8 +428,9 @@ static int mean_velocity_entries(const cav_sum *a, int d, double scale, int *col
   return n;
 }
 
-/// Power of actuator k over the weight, its derivative into row [3nv]. With the mean velocity its sum over steps is the work of
-/// the forces: that of u over (v + v_next)/2 is what kinetic energy gains in a step. Moments do not depend on q.
+/// Power of actuator k over the weight, its derivative into row [3nv]. With the mean velocity its sum over steps is the
+/// work of the forces: that of u over (v + v_next)/2 is what kinetic energy gains in a step. Moments do not depend on
+/// q.
 static double power_row(cav_sum *a, int k, const double *v, const double *v_next, double *row) {
   const cav_transcription *tr = a->tr;
   double *moment = a->s->tangent, unit = tr->effort_unit[k] / tr->weight, velocity = 0, entry[12];
@@ -508,8 +513,8 @@ static void add_cost(cav_sum *a, const cav_term *term, int reading, const double
   }
 }
 
-/// Cost terms. reading counts through the readings of sensors, which stand in the order of the terms. Each begins the rows that
-/// were counted for it.
+/// Cost terms. reading counts through the readings of sensors, which stand in the order of the terms. Each begins the
+/// rows that were counted for it.
 static void add_costs(cav_sum *a, const double *q, const double *v, const double *v_next) {
   const cav_transcription *tr = a->tr;
   int reading = CAV_CONTACT_READINGS * a->knot->ncontact;

@@ -22,14 +22,17 @@ typedef struct cav_sum {
 /// Whether the configuration of knot t moves with an unknown.
 int cav_knot_moves(const cav_transcription *transcription, int t);
 
-/// Counts the rows of knot t, whose contacts are listed, and makes room for them; 0 if memory runs out. Rows are laid as counted.
+/// Counts the rows of knot t, whose contacts are listed, and makes room for them; 0 if memory runs out. Rows are laid
+/// as counted.
 int cav_knot_reserve(cav_transcription *transcription, cav_scratch *scratch, int t);
 
-/// Readings that a cost takes of the k-th contact listed at knot t, key [2*contacts]: their number, 0: none, and the first.
+/// Readings that a cost takes of the k-th contact listed at knot t, key [2*contacts]: their number, 0: none, and the
+/// first.
 int cav_knot_contact(const cav_transcription *transcription, const int *key, const cav_term *term, int t, int k,
                      int *first);
 
-/// Values of a knot's rows at the state's last evaluation, and with derivatives in place its part of the normal equations.
+/// Values of a knot's rows at the state's last evaluation, and with derivatives in place its part of the normal
+/// equations.
 void cav_knot_sum(cav_sum *sum, const double *q, const double *v, const double *v_next);
 
 #endif

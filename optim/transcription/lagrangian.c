@@ -1,8 +1,9 @@
-/// Second derivatives of the Lagrangian that Gauss-Newton leaves out, knot by knot. What is nonlinear at a knot are its readings
-/// y(q, v, v'): forces, contacts, sensors. With the pull p = dL/dy held, the curvature is the derivative of the adjoint
-/// product (dy/dz)' p by z = (q, v, v'), taken by differences of analytic derivatives, made symmetric and chained to the
-/// three neighbouring knots. Rows that are linear in the unknowns (rates, accelerations, postures, ranges) have none but for
-/// the curvature of rotations, whose sum over all rows vanishes where the Lagrangian is stationary, and which is left out.
+/// Second derivatives of the Lagrangian that Gauss-Newton leaves out, knot by knot. What is nonlinear at a knot are its
+/// readings y(q, v, v'): forces, contacts, sensors. With the pull p = dL/dy held, the curvature is the derivative of
+/// the adjoint product (dy/dz)' p by z = (q, v, v'), taken by differences of analytic derivatives, made symmetric and
+/// chained to the three neighbouring knots. Rows that are linear in the unknowns (rates, accelerations, postures,
+/// ranges) have none but for the curvature of rotations, whose sum over all rows vanishes where the Lagrangian is
+/// stationary, and which is left out.
 #include "lagrangian.h"
 
 #include <math.h>

@@ -4,9 +4,9 @@
 
 #include "transcription.h"
 
-/// Adds the curvature of factor times the costs and of the rows, whose multipliers are the slots' final_multiplier, to the
-/// knots' Hessians. The transcription holds the linearisation at the trajectory and keeps it. Knots where the dynamics has no
-/// analytic derivatives (cav_derivatives_missing) get none.
+/// Adds the curvature of factor times the costs and of the rows, whose multipliers are the slots' final_multiplier, to
+/// the knots' Hessians. The transcription holds the linearisation at the trajectory and keeps it. Knots where the
+/// dynamics has no analytic derivatives (cav_derivatives_missing) get none.
 cav_status cav_lagrangian_curvature(cav_transcription *transcription, const cav_trajectory *at, double factor);
 
 #endif

@@ -1,5 +1,6 @@
-/// Which unknowns a constraint row can depend on, from the structure of the model alone: the force of a dof sees the dofs above
-/// and below it in its tree, those that share a tendon with it, and those across a pair of geoms that may touch.
+/// Which unknowns a constraint row can depend on, from the structure of the model alone: the force of a dof sees the
+/// dofs above and below it in its tree, those that share a tendon with it, and those across a pair of geoms that may
+/// touch.
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,6 +1,6 @@
 /// Readings of one knot, and their derivatives by (q_t, v_t, v_{t+1}): analytic where the dynamics offers them. What it
-/// does not offer (a force or constraint of the model, contact points that come and go, a type of sensor) is differenced
-/// instead, only that, and counted; nothing else is mixed.
+/// does not offer (a force or constraint of the model, contact points that come and go, a type of sensor) is
+/// differenced instead, only that, and counted; nothing else is mixed.
 #include "readings.h"
 #include "rotation.h"
 

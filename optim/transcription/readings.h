@@ -1,4 +1,5 @@
-/// What is read off the dynamics at one knot, with derivatives: u, CAV_CONTACT_READINGS numbers a contact, sensors. Private to optim/.
+/// What is read off the dynamics at one knot, with derivatives: u, CAV_CONTACT_READINGS numbers a contact, sensors.
+/// Private to optim/.
 #ifndef CAVORT_READINGS_H
 #define CAVORT_READINGS_H
 
@@ -45,8 +46,8 @@ cav_status cav_readings_derivatives(const cav_transcription *transcription, cav_
 /// transcription.c.
 void cav_transcription_wrap(const cav_transcription *transcription, cav_scratch *scratch, int t, int n, double *row);
 
-/// g [3nv] := sum of weight[i] times the derivative of reading i by (q, v, v_next), at the state's last evaluation; weight
-/// [nv + nread]. A contact that has gone and a sensor without analytic derivatives add nothing.
+/// g [3nv] := sum of weight[i] times the derivative of reading i by (q, v, v_next), at the state's last evaluation;
+/// weight [nv + nread]. A contact that has gone and a sensor without analytic derivatives add nothing.
 cav_status cav_readings_adjoint(const cav_transcription *transcription, cav_scratch *scratch, int t,
                                 const double *weight, double *g);
 

@@ -1,7 +1,7 @@
 /// Servos in plans: what an actuator gives is planned as effort, a force; the control behind it is that force less the
 /// servo's bias, over its gain. Where control is limited, the limits move with length and velocity, and the row of its
-/// effort becomes one of control, linear in u, q and v. Offered for fixed gains with affine bias on scalar joints and fixed
-/// tendons; what else moves its limits, or its moments, is refused by name.
+/// effort becomes one of control, linear in u, q and v. Offered for fixed gains with affine bias on scalar joints and
+/// fixed tendons; what else moves its limits, or its moments, is refused by name.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

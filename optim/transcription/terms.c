@@ -1,5 +1,5 @@
-/// What a term measures at a knot: its window, its dofs, its target, and the reading of a sensor against it. The sums over
-/// dofs and contacts, which know derivatives, are in knot.c.
+/// What a term measures at a knot: its window, its dofs, its target, and the reading of a sensor against it. The sums
+/// over dofs and contacts, which know derivatives, are in knot.c.
 #include <assert.h>
 #include <math.h>
 #include <string.h>

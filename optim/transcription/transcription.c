@@ -1,10 +1,10 @@
-/// Rows of a problem over its knots and their Gauss-Newton normal equations. Every knot t sees q_{t-1}, q_t, q_{t+1} through
-/// v_t, v_{t+1} and the inverse dynamics u_t (METHOD.md, 1), so its part of the Hessian is one dense block of three
-/// neighbours and knots are evaluated in any order, by any number of threads, with the same result.
+/// Rows of a problem over its knots and their Gauss-Newton normal equations. Every knot t sees q_{t-1}, q_t, q_{t+1}
+/// through v_t, v_{t+1} and the inverse dynamics u_t (METHOD.md, 1), so its part of the Hessian is one dense block of
+/// three neighbours and knots are evaluated in any order, by any number of threads, with the same result.
 ///
 /// Derivatives of u, contacts and sensors come from readings.c; those of v, accelerations, postures and ranges are
-/// exact. Constraint rows enter the merit by an augmented Lagrangian of two-sided rows: with z~ = z + multiplier/rho and
-/// e = z~ - clamp(z~), the row costs rho/2 e^2 and its next multiplier is rho e (Powell, Hestenes, Rockafellar).
+/// exact. Constraint rows enter the merit by an augmented Lagrangian of two-sided rows: with z~ = z + multiplier/rho
+/// and e = z~ - clamp(z~), the row costs rho/2 e^2 and its next multiplier is rho e (Powell, Hestenes, Rockafellar).
 #include "knot.h"
 #include "rotation.h"
 

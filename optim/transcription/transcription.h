@@ -36,9 +36,9 @@ enum { CAV_ROTATION_SIZE = 21 };
 /// Readings of a contact: gap or depth, slip (2), impact, force.
 enum { CAV_CONTACT_READINGS = 5 };
 
-/// One knot. Columns of its derivatives: tangent increments of q_{t-1}, q_t, q_{t+1}; those of knots that are not unknowns
-/// are zero. In cycles q_{-1}, q_0 and q_{T+1} are the unknowns of q_{T-1}, q_T and q_1 moved: columns of hessian, gradient,
-/// step_row and slot_row are of the unknowns themselves, those of du and dy of the knots beside.
+/// One knot. Columns of its derivatives: tangent increments of q_{t-1}, q_t, q_{t+1}; those of knots that are not
+/// unknowns are zero. In cycles q_{-1}, q_0 and q_{T+1} are the unknowns of q_{T-1}, q_T and q_1 moved: columns of
+/// hessian, gradient, step_row and slot_row are of the unknowns themselves, those of du and dy of the knots beside.
 typedef struct cav_knot {
   double time;
   int has_force; ///< u is defined here
@@ -72,8 +72,8 @@ typedef struct cav_penalties {
   double unactuated, effort, range, term;
 } cav_penalties;
 
-/// What a servo's bias adds to its row: control = effort over gain - constant - sum of weights times q and v of dofs, scaled
-/// as the row. n 0: the row is that of the effort alone. servo.c.
+/// What a servo's bias adds to its row: control = effort over gain - constant - sum of weights times q and v of dofs,
+/// scaled as the row. n 0: the row is that of the effort alone. servo.c.
 typedef struct cav_servo {
   int n, *dof;
   double constant, *of_q, *of_v; ///< [n]
@@ -113,8 +113,8 @@ typedef struct cav_transcription {
   double seconds_dynamics, seconds_assembly;
 } cav_transcription;
 
-/// Fills the row of such a servo: what control is per unit of effort (per_effort), its limits over the larger of them, and
-/// what q and v add. Returns 0 if memory runs out. servo.c.
+/// Fills the row of such a servo: what control is per unit of effort (per_effort), its limits over the larger of them,
+/// and what q and v add. Returns 0 if memory runs out. servo.c.
 int cav_servo_set(const cav_model *model, int actuator, cav_servo *servo, double *per_effort, double range[2]);
 void cav_servo_free(cav_servo *servo);
 
@@ -128,11 +128,13 @@ void cav_transcription_free(cav_transcription *transcription);
 /// From now on linearisations keep the derivative of every constraint row; 0 if memory runs out.
 int cav_transcription_keep_rows(cav_transcription *transcription);
 
-/// Number of unknowns, and the block 0 .. nknot-2 of them that columns c*nv .. (c+1)*nv-1 of knot t belong to; -1: none.
+/// Number of unknowns, and the block 0 .. nknot-2 of them that columns c*nv .. (c+1)*nv-1 of knot t belong to; -1:
+/// none.
 int cav_transcription_unknowns(const cav_transcription *transcription);
 int cav_transcription_block(const cav_transcription *transcription, int t, int c);
 
-/// Columns (of 3nv) in which constraint row i of knot t may be nonzero: pattern [3nv] is 1 there; the nv after them are scratch. pattern.c.
+/// Columns (of 3nv) in which constraint row i of knot t may be nonzero: pattern [3nv] is 1 there; the nv after them are
+/// scratch. pattern.c.
 void cav_transcription_pattern(const cav_transcription *transcription, int t, int i, char *pattern);
 
 /// Values at a trajectory: u, constraint rows, cost and merit of every knot. Fills trajectory->u.
@@ -162,25 +164,26 @@ double cav_transcription_violation(const cav_transcription *transcription);
 /// Multiplier update of the augmented Lagrangian at the last values.
 void cav_transcription_multipliers(cav_transcription *transcription);
 
-/// Multipliers of all rows at the last linearisation, whose rows were kept: the multipliers after a step x [unknowns], or with x
-/// NULL the weighted violations alone.
+/// Multipliers of all rows at the last linearisation, whose rows were kept: the multipliers after a step x [unknowns],
+/// or with x NULL the weighted violations alone.
 void cav_transcription_estimate_multipliers(cav_transcription *transcription, const double *x);
 
-/// Rows that are violated or have a multiplier, with where they come from, at the last linearisation, whose rows were kept; in fresh
-/// memory. allowed: violation, by kind of row. CAV_NO_MEMORY. constraint_rows.c.
+/// Rows that are violated or have a multiplier, with where they come from, at the last linearisation, whose rows were
+/// kept; in fresh memory. allowed: violation, by kind of row. CAV_NO_MEMORY. constraint_rows.c.
 cav_status cav_transcription_rows(const cav_transcription *transcription, const double allowed[CAV_BINDING_KINDS],
                                   cav_binding **row, int *n);
 
-/// q_t := q_t (+) x_t for every unknown knot, the step by its unknown within its bounds; v follows, and in cycles q_0 and v_0.
-/// x [unknowns].
+/// q_t := q_t (+) x_t for every unknown knot, the step by its unknown within its bounds; v follows, and in cycles q_0
+/// and v_0. x [unknowns].
 void cav_transcription_move(const cav_transcription *transcription, const cav_trajectory *from, const double *x,
                             cav_trajectory *to);
 
-/// Weight with which a term speaks at knot t: the step for an integral, 1 at a single knot, 0 outside its window. terms.c.
+/// Weight with which a term speaks at knot t: the step for an integral, 1 at a single knot, 0 outside its window.
+/// terms.c.
 double cav_term_weight(const cav_transcription *transcription, const cav_term *term, int t);
 
-/// Readings of a term (sensors only) where it speaks, and at knot t: 0 where it does not; whether it selects a dof; and value
-/// minus target over scale of a sensor at knot t.
+/// Readings of a term (sensors only) where it speaks, and at knot t: 0 where it does not; whether it selects a dof; and
+/// value minus target over scale of a sensor at knot t.
 int cav_term_dim(const cav_term *term);
 int cav_term_readings(const cav_transcription *transcription, const cav_term *term, int t);
 int cav_dof_selected(const cav_transcription *transcription, const cav_term *term, int dof);

@@ -1,8 +1,8 @@
-/// Limits of actuators for verification, from the model's numbers alone: force = gain * input + bias, in [N] or [N m] of one
-/// unit of effort. The input is the control, or the integrated activation of an actuator that has one; what an effort
-/// takes of it is (force - bias) / gain, against the limits of the input; the force itself against those of the force.
-/// An actuator without bias gives what its limits of input and force let through, whatever its length and velocity are. Muscles,
-/// moments that vary, and limited controls behind gains that vary are refused by name.
+/// Limits of actuators for verification, from the model's numbers alone: force = gain * input + bias, in [N] or [N m]
+/// of one unit of effort. The input is the control, or the integrated activation of an actuator that has one; what an
+/// effort takes of it is (force - bias) / gain, against the limits of the input; the force itself against those of the
+/// force. An actuator without bias gives what its limits of input and force let through, whatever its length and
+/// velocity are. Muscles, moments that vary, and limited controls behind gains that vary are refused by name.
 #include <math.h>
 #include <stdio.h>
 

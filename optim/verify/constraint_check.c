@@ -182,8 +182,8 @@ static int power_values(const cav_verification *verification, const cav_term *te
   return model->nu;
 }
 
-// 1 if a term over contacts looks at this one: those between trees or with the world, of one body alone if it names one;
-// self-penetration at those between two links of one tree
+// 1 if a term over contacts looks at this one: those between trees or with the world, of one body alone if it names
+// one; self-penetration at those between two links of one tree
 static int looks_at(const cav_model *model, const cav_term *term, const cav_contact *contact) {
   const cav_pair *pair = model->pair + contact->pair;
   if (pair->external == (term->quantity == CAV_QUANTITY_SELF_PENETRATION)) return 0;

@@ -1,14 +1,16 @@
-/// One period on, by the verifier's own arithmetic: from what problem.h says of a cycle, poses of links and motion subspaces at
-/// the model's configuration, with nothing of the optimiser's map (periodicity.c, mirror.c).
-/// The world moves by x -> A (x - c) + c + d, where A is the rotation about the vertical or the reflection. A frame R of a
-/// link goes to A R S on the link's counterpart; S makes a left-handed frame right-handed again and is what the two
-/// frames at the model's configuration say, S = R' A R_image. Hence, with det the determinant of A and at q0 both images of each other:
+/// One period on, by the verifier's own arithmetic: from what problem.h says of a cycle, poses of links and motion
+/// subspaces at the model's configuration, with nothing of the optimiser's map (periodicity.c, mirror.c). The world
+/// moves by x -> A (x - c) + c + d, where A is the rotation about the vertical or the reflection. A frame R of a link
+/// goes to A R S on the link's counterpart; S makes a left-handed frame right-handed again and is what the two frames
+/// at the model's configuration say, S = R' A R_image. Hence, with det the determinant of A and at q0 both images of
+/// each other:
 ///   free   x -> A (x - c) + c + d, R -> A R S;   linear velocity A v, angular velocity det S' w (body axes)
 ///   ball   Q -> Q0_image S' Q0' Q S;             angular velocity det S' w
-///   slide, hinge   x -> x0_image + s (x - x0) + shift of a root's slide, with s the sign by which the images of their axes agree
-/// Counterparts are the pairs that the problem declares, or joints whose names differ in the word or letter of the side;
-/// all others are their own. Whether the model is blind to the map is not asked here: verification measures
-/// the knots one period on as it does the knots (verify.c), and cav_cycle_image_error compares poses of links.
+///   slide, hinge   x -> x0_image + s (x - x0) + shift of a root's slide, with s the sign by which the images of their
+///   axes agree
+/// Counterparts are the pairs that the problem declares, or joints whose names differ in the word or letter of the
+/// side; all others are their own. Whether the model is blind to the map is not asked here: verification measures the
+/// knots one period on as it does the knots (verify.c), and cav_cycle_image_error compares poses of links.
 #include "cycle_image.h"
 
 #include <ctype.h>

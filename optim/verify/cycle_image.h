@@ -7,8 +7,8 @@
 /// The isometry of the world that a problem's cycle states, and what it makes of joints; opaque.
 typedef struct cav_cycle_image cav_cycle_image;
 
-/// That of a problem whose cycle is on. NULL with the reason in error: CAV_BAD_INPUT where a joint has no counterpart that
-/// moves alike, or a root cannot follow; CAV_NO_MEMORY.
+/// That of a problem whose cycle is on. NULL with the reason in error: CAV_BAD_INPUT where a joint has no counterpart
+/// that moves alike, or a root cannot follow; CAV_NO_MEMORY.
 cav_cycle_image *cav_cycle_image_new(const cav_problem *problem, cav_error *error);
 void cav_cycle_image_free(cav_cycle_image *image);
 
@@ -19,7 +19,8 @@ void cav_cycle_image_configuration(const cav_cycle_image *image, const double *q
 void cav_cycle_image_tangent(const cav_cycle_image *image, int way, const double *v, double *out);
 
 /// How far the links are at two configurations from being images of each other: pose at q is [nlink] poses and com
-/// [3*nlink] centres of mass, the other those of the state. Distance of centres of mass, m, or rotation, rad, whichever is more.
+/// [3*nlink] centres of mass, the other those of the state. Distance of centres of mass, m, or rotation, rad, whichever
+/// is more.
 double cav_cycle_image_error(const cav_cycle_image *image, int link, const cav_pose *pose, const double *com,
                              const cav_state *state);
 

@@ -1,9 +1,9 @@
-/// Load that a motion carries across open gaps: the fraction of all normal impulse between knots t and t+1 that acts on a contact
-/// more than CAV_HOVER_GAP apart at t and still so at t+1. A contact that closes within the step is an arrival, which laws that
-/// look at the end of the step catch in flight; one that stays open leans on air. The gap is that of the same point of the
-/// same pair at the next knot, or, where that point is gone, of its motion from there. Gaps are counted from the pair's margin,
-/// where the file has its contacts begin. What bears less than a hundredth of the weight on average, the tail of the smoothed law
-/// in flight, is held against that.
+/// Load that a motion carries across open gaps: the fraction of all normal impulse between knots t and t+1 that acts on
+/// a contact more than CAV_HOVER_GAP apart at t and still so at t+1. A contact that closes within the step is an
+/// arrival, which laws that look at the end of the step catch in flight; one that stays open leans on air. The gap is
+/// that of the same point of the same pair at the next knot, or, where that point is gone, of its motion from there.
+/// Gaps are counted from the pair's margin, where the file has its contacts begin. What bears less than a hundredth of
+/// the weight on average, the tail of the smoothed law in flight, is held against that.
 #include <stdio.h>
 #include <stdlib.h>
 

@@ -1,6 +1,6 @@
 /// Momentum defect: how well a motion obeys the balance of linear and angular momentum that no discretisation can bend.
-/// For each tree of bodies, with c its centre of mass at the knots, P its linear momentum and L its angular momentum about
-/// the point c_t, both taken half way between knots (configuration q_t (+) h v_{t+1}/2, velocity v_{t+1}):
+/// For each tree of bodies, with c its centre of mass at the knots, P its linear momentum and L its angular momentum
+/// about the point c_t, both taken half way between knots (configuration q_t (+) h v_{t+1}/2, velocity v_{t+1}):
 ///   F = (P_{t+1/2} - P_{t-1/2})/h - m g - sum f
 ///   N = (L_{t+1/2} - L_{t-1/2})/h - sum ((p - c_t) x f + torque)
 /// over contacts with what is not of the tree. What is lost at one knot is lost for good: the momenta after a knot are

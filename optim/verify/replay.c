@@ -1,14 +1,11 @@
-/// Forward simulation of a motion, three ways.
-/// Single steps: from every knot's own (q_t, v_t) with the whole u_t, one step of the claimed law: how well the forward
-/// step undoes the inverse.
-/// Open loop at the step of the knots: from (q_0, v_0), only what the actuators give of u_t. Errors grow as the
-/// body's own instability makes them; how long they stay small is the figure.
-/// Closed loop at a tenth of the step, by the paper's Euler step: forces u + K_q (q (-) q_ref) + K_v (v - v_ref) brought to
-/// the actuators and clipped to their limits. Once under the claimed contact law, with the time constant that keeps its
-/// stiffness at the finer step, and once under the model as its file says (its own solref contacts, exact law).
-/// Between knots the motion is read as cav_trajectory_resample does; gains of knot t hold until knot t+1.
-/// Cycles run for several periods.
-/// METHOD.md, 6 and 8.
+/// Forward simulation of a motion, three ways. Single steps: from every knot's own (q_t, v_t) with the whole u_t, one
+/// step of the claimed law: how well the forward step undoes the inverse. Open loop at the step of the knots: from
+/// (q_0, v_0), only what the actuators give of u_t. Errors grow as the body's own instability makes them; how long they
+/// stay small is the figure. Closed loop at a tenth of the step, by the paper's Euler step: forces u + K_q (q (-)
+/// q_ref) + K_v (v - v_ref) brought to the actuators and clipped to their limits. Once under the claimed contact law,
+/// with the time constant that keeps its stiffness at the finer step, and once under the model as its file says (its
+/// own solref contacts, exact law). Between knots the motion is read as cav_trajectory_resample does; gains of knot t
+/// hold until knot t+1. Cycles run for several periods. METHOD.md, 6 and 8.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -141,7 +138,8 @@ cav_status cav_replay_open(const cav_verification *verification, cav_replay *rep
   }
   free(q);
   cav_trajectory_free(motion);
-  // a simulation that ends in numbers that are not finite or in a step without solution ends the figure, not the verification
+  // a simulation that ends in numbers that are not finite or in a step without solution ends the figure, not the
+  // verification
   return status == CAV_NO_MEMORY ? status : CAV_OK;
 }
 

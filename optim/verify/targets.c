@@ -1,7 +1,7 @@
-/// What was asked and what the motion does: every term of a problem with its cost, and for those with a target the knot at
-/// which it is missed most: what was wanted there, what is, how far off, and whether that is within the term's tolerance.
-/// Costs are summed here from the meaning of the terms in problem.h, apart from the optimiser's rows; the sum is the
-/// motion's cost (tests/test_targets.c holds it against the solver's).
+/// What was asked and what the motion does: every term of a problem with its cost, and for those with a target the knot
+/// at which it is missed most: what was wanted there, what is, how far off, and whether that is within the term's
+/// tolerance. Costs are summed here from the meaning of the terms in problem.h, apart from the optimiser's rows; the
+/// sum is the motion's cost (tests/test_targets.c holds it against the solver's).
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

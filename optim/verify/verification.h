@@ -48,8 +48,8 @@ void cav_verification_actuator_range(const cav_model *model, int actuator, doubl
 /// CAV_NOT_SUPPORTED with the name of the first actuator whose limits are not checked here, and why. actuator_check.c.
 cav_status cav_verification_actuators(const cav_model *model, cav_error *error);
 
-/// By how much an effort at knot t and velocity v is beyond an actuator's limits, relative to them; the state is at the knot, moment [nv]
-/// is scratch. suffix ends what is said of it. actuator_check.c.
+/// By how much an effort at knot t and velocity v is beyond an actuator's limits, relative to them; the state is at the
+/// knot, moment [nv] is scratch. suffix ends what is said of it. actuator_check.c.
 void cav_verification_effort(const cav_verification *verification, int t, int actuator, double effort, const double *v,
                              double *moment, const char *suffix, cav_metric *metric);
 
@@ -76,8 +76,8 @@ int cav_verification_holds(const cav_verification *verification, const cav_term 
 /// 1 if a term over dofs selects this one. constraint_check.c.
 int cav_verification_selects(const cav_model *model, const cav_term *term, int dof);
 
-/// Values of a term at knot t and their targets, x and target [room], q [nq]; their number, 0 where the term has no value.
-/// verification->state holds the inverse there. constraint_check.c.
+/// Values of a term at knot t and their targets, x and target [room], q [nq]; their number, 0 where the term has no
+/// value. verification->state holds the inverse there. constraint_check.c.
 int cav_verification_measure(const cav_verification *verification, const cav_term *term, int t, double *q, double *x,
                              double *target);
 
@@ -85,8 +85,8 @@ int cav_verification_measure(const cav_verification *verification, const cav_ter
 void cav_targets_note(const cav_verification *verification, int t, double *work, cav_term_report *report);
 void cav_targets_verdict(const cav_verification *verification, cav_term_report *report, cav_verdict *verdict);
 
-/// Hard terms of the problem at knot t; verification->state holds the inverse there. work holds cav_constraint_check_room values.
-/// constraint_check.c.
+/// Hard terms of the problem at knot t; verification->state holds the inverse there. work holds
+/// cav_constraint_check_room values. constraint_check.c.
 int cav_constraint_check_room(const cav_verification *verification);
 void cav_constraint_check(const cav_verification *verification, int t, double *work, cav_metric *metric);
 

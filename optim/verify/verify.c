@@ -1,7 +1,7 @@
 /// Certifies a motion from its knots alone, with code apart from the optimiser's: velocities, forces and contacts are
 /// recomputed from q; what a certificate requires is measured, and the first tolerance that is broken is named with its
-/// knot, body and size. METHOD.md, 6. Momentum: momentum_balance.c; hard terms: constraint_check.c; forward simulation: replay.c.
-/// It does not decide on the cost, and it does not look between knots, except by the closed-loop replay.
+/// knot, body and size. METHOD.md, 6. Momentum: momentum_balance.c; hard terms: constraint_check.c; forward simulation:
+/// replay.c. It does not decide on the cost, and it does not look between knots, except by the closed-loop replay.
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>

@@ -1,5 +1,5 @@
-/// cavort explain: what the motion of a result folder misses and which constraints pull against each other, from its files. Exit
-/// status 0 if every constraint holds, 1 if not.
+/// cavort explain: what the motion of a result folder misses and which constraints pull against each other, from its
+/// files. Exit status 0 if every constraint holds, 1 if not.
 #include <stdio.h>
 #include <stdlib.h>
 

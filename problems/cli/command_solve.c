@@ -1,6 +1,6 @@
-/// cavort solve: reads a problem, solves it, certifies the result, writes its folder. What the stated guess does not lead to is
-/// tried by other strategies, in processes (race.c). The first Ctrl-C ends the solve with
-/// the best iterate saved; another one, a second later, ends the program at once.
+/// cavort solve: reads a problem, solves it, certifies the result, writes its folder. What the stated guess does not
+/// lead to is tried by other strategies, in processes (race.c). The first Ctrl-C ends the solve with the best iterate
+/// saved; another one, a second later, ends the program at once.
 #include <math.h>
 #include <signal.h>
 #include <stdio.h>

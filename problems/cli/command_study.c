@@ -1,6 +1,6 @@
-/// cavort study: motions from perturbed starts by several methods, each run in a process of its own (linear solvers of Ipopt are not
-/// safe in threads, and a run that crashes takes nothing with it). What is done stands in DIR/runs and is not done again, so a
-/// study that was stopped goes on where it was. Exit status 0 if all runs are certified, 1 if not.
+/// cavort study: motions from perturbed starts by several methods, each run in a process of its own (linear solvers of
+/// Ipopt are not safe in threads, and a run that crashes takes nothing with it). What is done stands in DIR/runs and is
+/// not done again, so a study that was stopped goes on where it was. Exit status 0 if all runs are certified, 1 if not.
 #include <dirent.h>
 #include <math.h>
 #include <stdio.h>

@@ -1,5 +1,5 @@
-/// cavort verify and cavort view: what a result folder holds, certified again or shown. verify writes nothing; view writes
-/// forces.csv and view.html.
+/// cavort verify and cavort view: what a result folder holds, certified again or shown. verify writes nothing; view
+/// writes forces.csv and view.html.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
-/// cavort inspect: what a model holds, what an evaluation of it runs and leaves out and why; for a problem also its terms and
-/// schedule in words. Counts come from the compiled model, times from running it. Solves nothing.
+/// cavort inspect: what a model holds, what an evaluation of it runs and leaves out and why; for a problem also its
+/// terms and schedule in words. Counts come from the compiled model, times from running it. Solves nothing.
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>

@@ -1,4 +1,5 @@
-/// The cavort command: reads the command line and calls one command. Commands are a table; each says which options it takes.
+/// The cavort command: reads the command line and calls one command. Commands are a table; each says which options it
+/// takes.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,7 @@
-/// Strategies solved by processes: a child solves and certifies, reports through a pipe and waits; told to, it saves what it has, and
-/// where the pipe closes it ends. So a solution stays in the process that found it. Which one is kept depends on the
-/// reports alone: whatever comes after one that succeeds (certified, and what was asked is achieved) is cancelled, what comes before it is waited for.
+/// Strategies solved by processes: a child solves and certifies, reports through a pipe and waits; told to, it saves
+/// what it has, and where the pipe closes it ends. So a solution stays in the process that found it. Which one is kept
+/// depends on the reports alone: whatever comes after one that succeeds (certified, and what was asked is achieved) is
+/// cancelled, what comes before it is waited for.
 #include "race.h"
 
 #include <errno.h>
@@ -225,9 +226,9 @@ cav_status cav_race_finish(cav_race *race, int cheapest, cav_error *error) {
   }
 }
 
-// whether a is the better motion: the one that is certified and achieves what was asked; of two that are certified alone the
-// cheaper one; otherwise the one that keeps more of the certificate's requires, in their order; or misses the same one
-// by less
+// whether a is the better motion: the one that is certified and achieves what was asked; of two that are certified
+// alone the cheaper one; otherwise the one that keeps more of the certificate's requires, in their order; or misses the
+// same one by less
 static int better(const cav_race_report *a, const cav_race_report *b, int cheapest) {
   const cav_verdict *v = &a->verdict, *w = &b->verdict;
   const double missed[][3] = {{v->unactuated_force_max, w->unactuated_force_max, CAV_TOLERANCE_UNACTUATED},

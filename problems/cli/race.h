@@ -58,12 +58,12 @@ cav_status cav_race_open(cav_race *race, int most, cav_error *error);
 /// Solves by the first strategy in this process. CAV_NO_MEMORY, CAV_BAD_INPUT and the like with the reason in error.
 cav_status cav_race_first(cav_race *race, cav_error *error);
 
-/// Solves by all that wait, in processes. cheapest 0: ends as soon as one is certified and all before it are not; 1: when all
-/// have ended.
+/// Solves by all that wait, in processes. cheapest 0: ends as soon as one is certified and all before it are not; 1:
+/// when all have ended.
 cav_status cav_race_finish(cav_race *race, int cheapest, cav_error *error);
 
-/// The entry to keep: the first certified one, or the cheapest; without any, the one that keeps most of what a certificate requires.
-/// -1: none has a solution. The same whichever ended first.
+/// The entry to keep: the first certified one, or the cheapest; without any, the one that keeps most of what a
+/// certificate requires. -1: none has a solution. The same whichever ended first.
 int cav_race_best(const cav_race *race, int cheapest);
 
 /// Has the entry saved by the process that solved it; its exit status.

@@ -1,5 +1,5 @@
-/// Topics of cavort help: what problem files may say, printed from the tables that reading and writing use. Nothing is told
-/// here that a table does not say.
+/// Topics of cavort help: what problem files may say, printed from the tables that reading and writing use. Nothing is
+/// told here that a table does not say.
 #include <stdio.h>
 #include <string.h>
 

@@ -1,5 +1,5 @@
-/// The certificate: a table for people, JSON for programs, from one verdict. What is required stands in solve.h; whether a
-/// motion is certified is decided by cav_verify alone, the marks here only show which line it fell on.
+/// The certificate: a table for people, JSON for programs, from one verdict. What is required stands in solve.h;
+/// whether a motion is certified is decided by cav_verify alone, the marks here only show which line it fell on.
 #include "certificate.h"
 
 #include <math.h>

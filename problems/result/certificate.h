@@ -18,8 +18,8 @@ typedef struct cav_certificate_line {
 /// The lines of a verdict; returns their number.
 int cav_certificate_lines(const cav_verdict *verdict, cav_certificate_line line[CAV_CERTIFICATE_LINES]);
 
-/// Prints the table, what was asked and what the motion does (report [problem->nterm], NULL: left out), and the verdict in
-/// words.
+/// Prints the table, what was asked and what the motion does (report [problem->nterm], NULL: left out), and the verdict
+/// in words.
 void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verdict *verdict,
                            const cav_term_report *report);
 

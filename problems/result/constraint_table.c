@@ -1,5 +1,5 @@
-/// Constraint rows as a table of numbers: one line a row, by knot. Open bounds are written as numbers beyond 1e300, since a table
-/// holds finite numbers only.
+/// Constraint rows as a table of numbers: one line a row, by knot. Open bounds are written as numbers beyond 1e300,
+/// since a table holds finite numbers only.
 #include "constraint_table.h"
 
 #include <math.h>

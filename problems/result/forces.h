@@ -25,13 +25,14 @@ typedef struct cav_forces {
   double *depth;            ///< [nknot] deepest penetration of a contact, m
 } cav_forces;
 
-/// Forces by the law contact; at_rest: the velocity after the last knot is zero, otherwise the last knot has none. A contact
-/// counts as loaded from a millionth of the weight on. NULL on failure, with the reason in error.
+/// Forces by the law contact; at_rest: the velocity after the last knot is zero, otherwise the last knot has none. A
+/// contact counts as loaded from a millionth of the weight on. NULL on failure, with the reason in error.
 cav_forces *cav_forces_new(const cav_model *model, const cav_trajectory *trajectory, const cav_options *contact,
                            int at_rest, cav_error *error);
 void cav_forces_free(cav_forces *forces);
 
-/// Writes forces.csv: knot, time, geoms by name (or #number), position, force on the second geom, gap. Replaces atomically.
+/// Writes forces.csv: knot, time, geoms by name (or #number), position, force on the second geom, gap. Replaces
+/// atomically.
 cav_status cav_forces_write(const char *path, const cav_model *model, const cav_trajectory *trajectory,
                             const cav_forces *forces, cav_error *error);
 

@@ -1,5 +1,5 @@
-/// Charts and verdict lines of a result's page; view.c draws them. Efforts are fractions of an actuator's own limit, contact
-/// forces and unactuated forces fractions of the weight.
+/// Charts and verdict lines of a result's page; view.c draws them. Efforts are fractions of an actuator's own limit,
+/// contact forces and unactuated forces fractions of the weight.
 #include "page.h"
 
 #include <math.h>

@@ -1,8 +1,8 @@
 /// Result folders. Every file is replaced atomically and alone: a folder that was interrupted holds whole files.
 ///
-/// gains.csv: one row for each knot that has a step after it and each dof i, in that order: knot, time, dof, then the rows of
-/// both matrices, q_0 .. q_{nv-1}, v_0 .. v_{nv-1}: u_i changes by sum_j q_j dq_j + v_j dv_j, with dq the tangent difference
-/// of the configuration from the knot's and dv that of the velocity.
+/// gains.csv: one row for each knot that has a step after it and each dof i, in that order: knot, time, dof, then the
+/// rows of both matrices, q_0 .. q_{nv-1}, v_0 .. v_{nv-1}: u_i changes by sum_j q_j dq_j + v_j dv_j, with dq the
+/// tangent difference of the configuration from the knot's and dv that of the velocity.
 #include "result.h"
 
 #include <errno.h>
@@ -92,8 +92,8 @@ static cav_status write_log(const char *path, const cav_solution *solution, cav_
   return cav_file_end(&file, error);
 }
 
-// path of a file as seen from a folder, both absolute, the folder ending in a slash: through the folders that they share, or
-// absolute if that is the root alone
+// path of a file as seen from a folder, both absolute, the folder ending in a slash: through the folders that they
+// share, or absolute if that is the root alone
 static char *seen_from(const char *folder, const char *file) {
   size_t shared = 0, up = 0;
   for (size_t i = 0; folder[i] && folder[i] == file[i]; i++) {

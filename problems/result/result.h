@@ -20,8 +20,8 @@ char *cav_result_path(const char *folder, const char *name);
 /// Makes a folder and those above it that are missing.
 cav_status cav_result_folder(const char *folder, cav_error *error);
 
-/// Writes trajectory.csv, gains.csv, log.csv, stages.csv, rows.csv and problem.xml, each atomically. The model's path is written relative to the
-/// folder where the two share a folder other than the root, absolute otherwise.
+/// Writes trajectory.csv, gains.csv, log.csv, stages.csv, rows.csv and problem.xml, each atomically. The model's path
+/// is written relative to the folder where the two share a folder other than the root, absolute otherwise.
 cav_status cav_result_write(const char *folder, const cav_problem *problem, const cav_solution *solution,
                             cav_error *error);
 
@@ -33,8 +33,8 @@ cav_status cav_result_write_verdict(const char *folder, const cav_problem *probl
 cav_status cav_result_write_page(const char *folder, const cav_problem *problem, const cav_trajectory *trajectory,
                                  const cav_options *contact, const cav_verdict *verdict, cav_error *error);
 
-/// Reads a folder; model_path replaces the model that problem.xml names, NULL: as it says. NULL on failure with the reason in
-/// error. Freed with cav_result_free.
+/// Reads a folder; model_path replaces the model that problem.xml names, NULL: as it says. NULL on failure with the
+/// reason in error. Freed with cav_result_free.
 cav_result *cav_result_read(const char *folder, const char *model_path, cav_error *error);
 void cav_result_free(cav_result *result);
 

@@ -1,7 +1,7 @@
-/// Writes a motion as one self-contained page: the template viewer.html with three.js and a block of JSON in its places.
-/// Poses of the links at every knot come from the dynamics library; the page interpolates between them. Numbers carry
-/// six digits (positions) or five, enough for the eye; the exact motion is in trajectory.csv. The page's own script is
-/// in viewer.html. Nothing here reads results from disk or computes forces: the caller hands them over.
+/// Writes a motion as one self-contained page: the template viewer.html with three.js and a block of JSON in its
+/// places. Poses of the links at every knot come from the dynamics library; the page interpolates between them. Numbers
+/// carry six digits (positions) or five, enough for the eye; the exact motion is in trajectory.csv. The page's own
+/// script is in viewer.html. Nothing here reads results from disk or computes forces: the caller hands them over.
 #include "view.h"
 
 #include <errno.h>

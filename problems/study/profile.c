@@ -1,6 +1,6 @@
-/// What a study found: every run as a table; by motion and method the fraction certified and the middle of time and iterations; and
-/// the fraction certified within a time, in seconds and as a multiple of the fastest method's on the same run (the performance
-/// profile of Dolan and More, 2002), drawn by gnuplot where it is installed.
+/// What a study found: every run as a table; by motion and method the fraction certified and the middle of time and
+/// iterations; and the fraction certified within a time, in seconds and as a multiple of the fastest method's on the
+/// same run (the performance profile of Dolan and More, 2002), drawn by gnuplot where it is installed.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
-/// One run of a study: the problem with a start, masses and friction that differ a little from its file, by a generator that
-/// depends on the number of the start alone, so that every method meets the same ones.
+/// One run of a study: the problem with a start, masses and friction that differ a little from its file, by a generator
+/// that depends on the number of the start alone, so that every method meets the same ones.
 #include "study.h"
 
 #include <math.h>
@@ -31,7 +31,8 @@ static double processor_seconds(void) {
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/// Lowest gap between what moves and the world, seen from afar through the activation distance of the smoothed law; infinite if nothing is near.
+/// Lowest gap between what moves and the world, seen from afar through the activation distance of the smoothed law;
+/// infinite if nothing is near.
 static cav_status lowest_gap(const cav_model *m, cav_state *state, const double *q, double *gap) {
   state->options.smoothing = state->options.smoothing_self = 1;
   cav_status status = cav_position(m, state, q);

@@ -29,14 +29,15 @@ typedef struct cav_study_run {
   double cost, unactuated, end_error; ///< m at the end of the closed loop; -1: none
 } cav_study_run;
 
-/// Reads, perturbs, solves and certifies: start k of a motion always the same. Joints move by up to 0.03 rad or 3 % of their
-/// range within it, the root so that what stood still stands; masses of links within 5 %; friction 0.6 to 1. Gives up after
-/// 120 s of processor time. reason: why it is not certified, "" if it is. Fails where the problem cannot be read or perturbed.
+/// Reads, perturbs, solves and certifies: start k of a motion always the same. Joints move by up to 0.03 rad or 3 % of
+/// their range within it, the root so that what stood still stands; masses of links within 5 %; friction 0.6 to 1.
+/// Gives up after 120 s of processor time. reason: why it is not certified, "" if it is. Fails where the problem cannot
+/// be read or perturbed.
 cav_status cav_study_solve(const char *path, const char *model_path, cav_study_run *run, char reason[400],
                            cav_error *error);
 
-/// Writes study.csv (every run), study.txt (table of motions and methods), and the fraction certified within a time as profile.csv,
-/// profile.gp and, where gnuplot is installed, profile.svg. *drawn: 1 if it is.
+/// Writes study.csv (every run), study.txt (table of motions and methods), and the fraction certified within a time as
+/// profile.csv, profile.gp and, where gnuplot is installed, profile.svg. *drawn: 1 if it is.
 cav_status cav_profile_write(const char *folder, int nmotion, const char *const *motion, int nrun,
                              const cav_study_run *run, int *drawn, cav_error *error);
 

@@ -47,7 +47,8 @@ static void fill_fast(int n, double mass, double force, optimum_truth *truth) {
 static void truth_unit(int n, optimum_truth *truth) { fill_fast(n, 1, 1, truth); }
 static void truth_heavy(int n, optimum_truth *truth) { fill_fast(n, 2, 50, truth); }
 
-// ---------------------------------------------------------------- singular arc: half of x^2 + v^2 over 5 s, |u| <= 1, from (0, 1)
+// ---------------------------------------------------------------- singular arc: half of x^2 + v^2 over 5 s, |u| <= 1,
+// from (0, 1)
 
 static void build_singular(optimum_problem *p, int n) {
   (void)n;
@@ -79,7 +80,8 @@ static void truth_singular(int n, optimum_truth *truth) {
   }
 }
 
-// ---------------------------------------------------------------- x <= 1/9 from (0, 1) to (0, -1) in 1 s: Bryson and Denham
+// ---------------------------------------------------------------- x <= 1/9 from (0, 1) to (0, -1) in 1 s: Bryson and
+// Denham
 
 static const double ceiling = 1 / 9.0;
 

@@ -3,8 +3,8 @@
 
 static const double gravity = 9.81;
 
-/// Height at which the law of the last stage holds what rests: started deeper, it would be thrown. By bisection of the force that is
-/// missing on the vertical dof.
+/// Height at which the law of the last stage holds what rests: started deeper, it would be thrown. By bisection of the
+/// force that is missing on the vertical dof.
 static double rest_height(const optimum_problem *p, int dof) {
   const cav_model *m = p->problem.model;
   const cav_stage_options *last = &p->problem.schedule.last;
@@ -31,7 +31,8 @@ static double rest_height(const optimum_problem *p, int dof) {
   return low;
 }
 
-// ---------------------------------------------------------------- a block on the floor, thrust upwards to a height at the end
+// ---------------------------------------------------------------- a block on the floor, thrust upwards to a height at
+// the end
 
 static const char block[] =
     "<mujoco><worldbody><geom name='floor' type='plane' size='1 1 1'/><body name='block' pos='0 0 .1'>"
@@ -46,7 +47,8 @@ static void build_lift(optimum_problem *p, int n) {
   optimum_fix(p, CAV_QUANTITY_CONFIGURATION, p->problem.duration, &lift_height);
 }
 
-// it rests until tau before the end, tau^2 = 6 H/g, then u = 12 H s/tau^3, s the time to go, from 2 g to 0: J = 24 H^2/tau^3
+// it rests until tau before the end, tau^2 = 6 H/g, then u = 12 H s/tau^3, s the time to go, from 2 g to 0: J = 24
+// H^2/tau^3
 static void truth_lift(int n, optimum_truth *truth) {
   double H = lift_height, tau = sqrt(6 * H / gravity), c = 12 * H / (tau * tau * tau);
   truth->duration = lift_duration;
@@ -69,7 +71,8 @@ static double impulse_lift(const cav_problem *p, const cav_solution *s) {
   return fabs(given - is) / is;
 }
 
-// ---------------------------------------------------------------- a fall and what catches it: nothing to do, all is the floor's
+// ---------------------------------------------------------------- a fall and what catches it: nothing to do, all is
+// the floor's
 
 static void build_fall(optimum_problem *p, int n) {
   (void)n;

@@ -1,5 +1,5 @@
-/// Optimal-control problems whose optima are known in closed form, or from an independent solution, as a table: each entry builds
-/// its problem on a grid and knows the truth at the grid's times. runner in test_optimum.c.
+/// Optimal-control problems whose optima are known in closed form, or from an independent solution, as a table: each
+/// entry builds its problem on a grid and knows the truth at the grid's times. runner in test_optimum.c.
 #ifndef CAVORT_TESTS_OPTIMUM_H
 #define CAVORT_TESTS_OPTIMUM_H
 
@@ -23,7 +23,8 @@ typedef struct optimum_truth {
   double *q, *u; ///< [(n+1)*nv] row-major; u at the times of the knots; NAN: not known
 } optimum_truth;
 
-/// Error of a figure at the finest grid, relative to its scale, and the order at which it has to fall with the step. 0: not checked.
+/// Error of a figure at the finest grid, relative to its scale, and the order at which it has to fall with the step. 0:
+/// not checked.
 typedef struct optimum_bound {
   double error, order;
 } optimum_bound;

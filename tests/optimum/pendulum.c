@@ -1,5 +1,5 @@
-/// Swing-ups whose optima have no closed form: the values are those of Pontryagin's conditions, solved by multiple shooting (20 and 40
-/// arcs of 100 Runge-Kutta steps, residual 1e-9) with equations of motion of their own.
+/// Swing-ups whose optima have no closed form: the values are those of Pontryagin's conditions, solved by multiple
+/// shooting (20 and 40 arcs of 100 Runge-Kutta steps, residual 1e-9) with equations of motion of their own.
 #include "optimum.h"
 
 static const char cartpole[] =

@@ -1,8 +1,9 @@
-/// Problems without bounds: linear-quadratic ones, least effort with a fixed and with a free duration, a spline, a rotation, and an
-/// oscillator that tracks a sine for ever.
+/// Problems without bounds: linear-quadratic ones, least effort with a fixed and with a free duration, a spline, a
+/// rotation, and an oscillator that tracks a sine for ever.
 #include "optimum.h"
 
-// ---------------------------------------------------------------- linear systems: x' = A x + B u, least integral of u^2/2
+// ---------------------------------------------------------------- linear systems: x' = A x + B u, least integral of
+// u^2/2
 
 enum { LINEAR_MOST = 8 };
 
@@ -232,7 +233,8 @@ static double price_spline(const cav_problem *p, const cav_solution *s) {
   return fabs(sum - 24) / 24;
 }
 
-// ---------------------------------------------------------------- rotation: a ball of inertia 2 turned by 2 rad about a skew axis
+// ---------------------------------------------------------------- rotation: a ball of inertia 2 turned by 2 rad about
+// a skew axis
 
 static const char ball[] =
     "<mujoco><option gravity='0 0 0'/><worldbody><body name='ball'><joint name='ball' type='ball'/>"

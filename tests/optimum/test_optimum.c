@@ -1,7 +1,7 @@
-/// Optimal control with known optima: cost, duration, states, forces and multipliers against the truth on grids from coarse to ten
-/// times as fine, errors falling at the stated order, iterations of linear-quadratic problems, and how optimal the solver and
-/// the verifier say that the motion is.
-/// Usage: test_optimum [gn|ipopt|both] [table] [NAME...]. table prints the whole decade as Markdown; else two grids are run.
+/// Optimal control with known optima: cost, duration, states, forces and multipliers against the truth on grids from
+/// coarse to ten times as fine, errors falling at the stated order, iterations of linear-quadratic problems, and how
+/// optimal the solver and the verifier say that the motion is. Usage: test_optimum [gn|ipopt|both] [table] [NAME...].
+/// table prints the whole decade as Markdown; else two grids are run.
 #include "optimum.h"
 
 // ---------------------------------------------------------------- construction
