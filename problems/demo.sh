@@ -1,7 +1,7 @@
 #!/bin/sh
 # From a fresh clone to a certified motion: sh problems/demo.sh [FOLDER]
 # Installs what is missing, builds, solves "squat to stand, then jump" on the project's own humanoid and says where to look.
-# FOLDER takes the result, by default results/squat-jump. The exit status is that of the solve: 0 certified, 1 not.
+# FOLDER takes the result, by default results/squat-jump. The exit status is that of the solve: 0 certified and achieved, 1 not.
 set -u
 cd "$(dirname "$0")/.." || exit 1
 out=${1:-results/squat-jump}
