@@ -10,6 +10,16 @@
 
 enum { CHECK_SKIPPED = 77 }; ///< exit status by which meson knows a skipped test
 
+/// A sanitizer owns malloc, and everything takes several times as long.
+#if defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
+#define SANITIZED 1
+#endif
+#endif
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define SANITIZED 1
+#endif
+
 static int check_count, check_failed;
 
 // one more check; returns whether it held

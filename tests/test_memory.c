@@ -9,12 +9,7 @@
 #include "scene.h"
 #include "step.h"
 
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
-#define SANITIZED 1
-#endif
-#endif
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(__GLIBC__)
+#if !defined(SANITIZED) && !defined(__GLIBC__)
 #define SANITIZED 1
 #endif
 
