@@ -1,0 +1,162 @@
+/// Complaints about XML files: place, element and attribute before the text, and what a misspelt or renamed name may
+/// have meant. What is wrong is found elsewhere; here it is said, and the reader of the file told to stop.
+#include <assert.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "xml_parts.h"
+
+enum { WORD_LIMIT = 48 }; // characters compared when guessing a name
+
+// place and text into error; text beyond its room is cut
+static void explain(cav_error *error, cav_status status, const char *file, int line, const char *element,
+                    const char *attribute, const char *format, va_list args) {
+  if (!error) return;
+  size_t room = sizeof error->text, used = 0;
+  error->status = status;
+  error->line = line;
+  int n =
+      line > 0 ? snprintf(error->text, room, "%.400s:%d: ", file, line) : snprintf(error->text, room, "%.400s: ", file);
+  used += (size_t)n;
+  if (element) used += (size_t)snprintf(error->text + used, room - used, "<%.60s>: ", element);
+  if (attribute) used += (size_t)snprintf(error->text + used, room - used, "attribute '%.60s': ", attribute);
+  assert(used < room);
+  vsnprintf(error->text + used, room - used, format, args);
+}
+
+cav_status cav_xml_fail_as(cav_error *error, cav_status status, const cav_xml_node *node, const char *attribute,
+                           const char *format, ...) {
+  va_list args;
+  va_start(args, format);
+  explain(error, status, node->file, node->line, node->rule->name, attribute, format, args);
+  va_end(args);
+  return status;
+}
+
+cav_status cav_xml_fail(cav_error *error, const cav_xml_node *node, const char *attribute, const char *format, ...) {
+  va_list args;
+  va_start(args, format);
+  explain(error, CAV_BAD_INPUT, node->file, node->line, node->rule->name, attribute, format, args);
+  va_end(args);
+  return CAV_BAD_INPUT;
+}
+
+void cav_xml_source_fail(cav_xml_source *s, cav_status status, int line, const char *element, const char *attribute,
+                         const char *format, ...) {
+  cav_xml_reader *r = s->reader;
+  if (r->status == CAV_OK) {
+    r->status = status;
+    va_list args;
+    va_start(args, format);
+    explain(r->error, status, s->path, line, element, attribute, format, args);
+    va_end(args);
+  }
+  cav_xml_stop(s);
+}
+
+// --- guessing names ---
+
+// edits that turn a into b, both cut at WORD_LIMIT characters
+static int distance(const char *a, const char *b) {
+  int row[WORD_LIMIT + 1];
+  int n = (int)strnlen(b, WORD_LIMIT);
+  for (int j = 0; j <= n; j++) row[j] = j;
+  for (int i = 0; i < WORD_LIMIT && a[i]; i++) {
+    int diagonal = row[0];
+    row[0] = i + 1;
+    for (int j = 0; j < n; j++) {
+      int best = diagonal + (a[i] != b[j]);
+      if (row[j + 1] + 1 < best) best = row[j + 1] + 1;
+      if (row[j] + 1 < best) best = row[j] + 1;
+      diagonal = row[j + 1];
+      row[j + 1] = best;
+    }
+  }
+  return row[n];
+}
+
+const char *cav_xml_nearest(const char *word, const void *names, int n, size_t stride) {
+  const char *best = NULL;
+  int length = (int)strnlen(word, WORD_LIMIT), least = length < 3 ? 2 : 2 + length / 4;
+  for (int i = 0; i < n; i++) {
+    const char *name = *(const char *const *)((const char *)names + (size_t)i * stride);
+    if (!name || !*name) continue;
+    int d = distance(word, name);
+    if (d < least && d < length) least = d, best = name;
+  }
+  return best;
+}
+
+// names of a list into text, for an error
+static void list_names(char *text, size_t room, const char *const *names) {
+  size_t used = 0;
+  text[0] = 0;
+  for (int i = 0; names[i] && used + 4 < room; i++) {
+    int n = snprintf(text + used, room - used, "%s%s", i ? ", " : "", names[i]);
+    if (n < 0) return;
+    if ((size_t)n >= room - used) {
+      memcpy(text + room - 4, "...", 4);
+      return;
+    }
+    used += (size_t)n;
+  }
+}
+
+// --- names that no table knows ---
+
+// what a child or an attribute is called now that was called name before; NULL if none was
+static const char *renamed(const cav_xml_source *s, const char *inside, const char *name, int attribute) {
+  for (const cav_xml_former *f = s->reader->former; f && f->inside; f++) {
+    if (f->attribute == attribute && !strcmp(f->inside, inside) && !strcmp(f->was, name)) return f->now;
+  }
+  return NULL;
+}
+
+void cav_xml_unknown_attribute(cav_xml_source *s, int line, const cav_xml_element *rule, const char *name) {
+  const char *now = renamed(s, rule->name, name, 1);
+  if (now) {
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name, "is called '%s' now; rename it", now);
+    return;
+  }
+  const cav_xml_attribute *a = rule->attribute;
+  int n = 0;
+  while (a && a[n].name) n++;
+  const char *near = n ? cav_xml_nearest(name, a, n, sizeof *a) : NULL;
+  if (near)
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name, "not known here; did you mean '%s'?", near);
+  else
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name, "not known here; remove it or check its spelling");
+}
+
+void cav_xml_unknown_element(cav_xml_source *s, int line, const cav_xml_element *parent,
+                             const cav_xml_element *const *allowed, const char *name) {
+  const char *now = parent ? renamed(s, parent->name, name, 0) : NULL;
+  if (now) {
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, name, NULL, "is called <%s> now; rename it", now);
+    return;
+  }
+  const char *names[120];
+  int n = 0;
+  for (; allowed && allowed[n] && n < 119; n++) names[n] = allowed[n]->name;
+  names[n] = NULL;
+  char list[300];
+  list_names(list, sizeof list, names);
+  const char *near = n ? cav_xml_nearest(name, names, n, sizeof *names) : NULL;
+  const char *inside = parent ? parent->name : "the file";
+  if (near)
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, name, NULL, "not known inside %s; did you mean <%s>?", inside, near);
+  else if (n)
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, name, NULL, "not known inside %s; expected one of: %s", inside, list);
+  else
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, name, NULL, "%s has no elements inside; remove it", inside);
+}
+
+void cav_xml_unknown_word(cav_xml_source *s, int line, const char *element, const cav_xml_value *value,
+                          const char *const *words, int n) {
+  char list[200];
+  list_names(list, sizeof list, words);
+  const char *near = cav_xml_nearest(value->text, words, n, sizeof *words);
+  cav_xml_source_fail(s, CAV_BAD_INPUT, line, element, value->rule->name, "expected one of: %s; got '%.60s'%s%s%s",
+                      list, value->text, near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
+}
