@@ -4,7 +4,7 @@
 /// Between joints or tendons of constant arms a row sees two scalars; its gradient changes with the derivative of the
 /// polynomial. Between links a row sees one point and one frame on each. When a dof moves one of the links, the point
 /// moves along and the link keeps the velocity it had before the joint; the rotation rows change with the frames.
-/// Wrenches that turn with their link are in the sums over subtrees already (analytic.c) and are taken off here.
+/// Wrenches that turn with their link are in the sums over subtrees already (smooth.c) and are taken off here.
 #include "derivative.h"
 #include "math3.h"
 

@@ -7,8 +7,8 @@
 ///
 /// By a dof of the velocity the twist is Y, half a step of the axis or of three times the right Jacobian of the
 /// rotation, and the change Y x* L + I (axis + V x Y). The weight moves along with the subtree. Forces that turn with
-/// the subtree of a dof (S x* F), whatever they are, are added for the dofs above it together, as in analytic.c, whose
-/// contacts count on it.
+/// the subtree of a dof (S x* F), whatever they are, are added for the dofs above it together, as in smooth.c, where
+/// the sums of contacts count on it.
 #include "half_step.h"
 #include "math3.h"
 #include "rotation.h"

@@ -1,0 +1,80 @@
+/// Passive forces in the derivatives, added entry by entry: armature, dampers and springs of joints, gravity
+/// compensation, springs and dampers of tendons of constant arms. Limits and friction losses are row.c's.
+#include "analytic.h"
+#include "rotation.h"
+
+static void add_diagonals(const cav_derivative_task *t) {
+  const cav_workspace *w = t->state->work;
+  for (int i = 0; i < t->nv; i++) {
+    int at = i * (t->nv + 1);
+    add_entry(t, at, 0, 0, w->armature[i]);
+    if (!t->state->options.passive) continue;
+    t->dv[at] += t->mean ? 0.5 * w->damping[i] : 0;
+    t->dn[at] += (t->mean ? 0.5 : 1) * w->damping[i];
+  }
+}
+
+// du/dq of the spring of three rotations
+static void add_turning_spring(const cav_derivative_task *t, int dof, double stiffness, const double *q,
+                               const double *rest) {
+  double from[4], between[4], w[3], J[9];
+  quat_conjugate(from, rest);
+  quat_normalise(from);
+  quat_mul(between, from, q);
+  quat_log(w, between);
+  cav_rotation_jacobian_inverse(w, J);
+  for (int i = 0; i < 9; i++) t->dq[(dof + i / 3) * t->nv + dof + i % 3] += stiffness * J[i];
+}
+
+static void add_springs(const cav_derivative_task *t) {
+  const cav_workspace *w = t->state->work;
+  if (!t->state->options.passive) return;
+  for (int i = 0; i < w->nspring; i++) {
+    const cav_joint *joint = &t->model->joint[w->spring[i]];
+    const double *rest = t->model->q0 + joint->q, *q = w->q + joint->q;
+    int linear = joint->type == CAV_JOINT_BALL ? 0 : joint->type == CAV_JOINT_FREE ? 3 : 1, dof = joint->dof;
+    for (int k = 0; k < linear; k++) t->dq[(dof + k) * (t->nv + 1)] += joint->stiffness;
+    if (joint->type == CAV_JOINT_FREE) add_turning_spring(t, dof + 3, joint->stiffness, q + 3, rest + 3);
+    if (joint->type == CAV_JOINT_BALL) add_turning_spring(t, dof, joint->stiffness, q, rest);
+  }
+}
+
+// gravity compensation: a force at a body's centre of mass that keeps its direction, where subtrees carry it along
+// turning
+static void add_buoyancy(const cav_derivative_task *t) {
+  const cav_workspace *w = t->state->work;
+  if (!t->state->options.passive || !t->state->options.gravity) return;
+  for (int i = 0; i < w->nbuoy; i++) {
+    const cav_body *body = &t->model->body[w->buoy[i]];
+    const double *reference = t->state->reference + 3 * body->link;
+    cav_pose pose;
+    double force[3];
+    cav_mass_pose(t->state, body, &pose);
+    scale3(force, body->buoyancy * body->mass, t->model->gravity);
+    for (int j = last_dof(t->model, body->link); j >= 0; j = w->parent[j]) {
+      double back[3], S[6];
+      cross3(back, force, t->state->axis + 6 * j);
+      for (int k = last_dof(t->model, body->link); k >= 0; k = w->parent[k]) {
+        motion_at(S, t->state->axis + 6 * k, reference, pose.pos);
+        t->dq[k * t->nv + j] += dot3(S + 3, back);
+      }
+    }
+  }
+}
+
+static void add_tendon_forces(const cav_derivative_task *t) {
+  const cav_workspace *w = t->state->work;
+  if (!t->state->options.passive) return;
+  for (int i = 0; i < w->ntendon_spring; i++) {
+    const cav_tendon *tendon = &t->model->tendon[w->tendon_spring[i]];
+    double half = 0.5 * tendon->damping;
+    add_along_tendon(t, w->tendon_spring[i], tendon->stiffness, t->mean ? half : tendon->damping, t->mean ? half : 0);
+  }
+}
+
+void cav_derivative_passive(const cav_derivative_task *t) {
+  add_diagonals(t);
+  add_springs(t);
+  add_buoyancy(t);
+  add_tendon_forces(t);
+}
