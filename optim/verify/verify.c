@@ -452,7 +452,10 @@ static void decide(const cav_verification *verification, const metrics *found, c
           "Coulomb's law (sliding=\"coulomb\" in <schedule>), or a lower smoothing at its end usually helps.");
   const cav_metric step = {replay->step_error, replay->step_knot, "forward step from the knot against the next knot"};
   require(verdict, &step, CAV_TOLERANCE_STEP, "replay error, rad or m,",
-          "Forward and inverse dynamics disagree: please report it.");
+          verification->law.sliding == CAV_SLIDING_COULOMB
+              ? "A step of Coulomb's law may have another solution than the planned one; the convex law has one only "
+                "(sliding='convex' in <schedule>)."
+              : "Forward and inverse dynamics disagree: please report it.");
   double least = cav_verdict_replay(verdict);
   if (replay->open_seconds < least && !*verdict->reason) {
     snprintf(verdict->reason, sizeof verdict->reason,
