@@ -1,22 +1,36 @@
 #include <cavort/cavort.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
-// the forces that hold a humanoid still for one step, and the step that they lead to
+// a model lowered until something touches: the forces that hold it still for one step, and the step that they lead to
 int main(int argc, char **argv) {
   cav_error error = {0};
   cav_model *model = cav_model_load(argc > 1 ? argv[1] : "problems/models/humanoid.xml", &error);
   if (!model) return fprintf(stderr, "%s\n", error.text), EXIT_FAILURE;
   cav_state *state = cav_state_new(model);
-  double *v = calloc(3 * (size_t)model->nv, sizeof *v), *u = v + model->nv, *v_next = u + model->nv;
-  if (!state || !v) return EXIT_FAILURE;
+  double *q = calloc((size_t)(model->nq + 3 * model->nv), sizeof *q);
+  if (!state || !q) return EXIT_FAILURE;
+  double *v = q + model->nq, *u = v + model->nv, *v_next = u + model->nv;
+  memcpy(q, model->q0, (size_t)model->nq * sizeof *q);
 
-  cav_status status = cav_inverse(model, state, model->q0, v, v, u);
-  if (!status) status = cav_forward(model, state, model->q0, v, u, v_next);
-  printf("%s: %d contacts, %.1f N on the root's height, velocity after %g s: %.1e m/s\n", cav_status_name(status),
-         state->ncontact, u[2], model->timestep, v_next[2]);
+  cav_status status = cav_position(model, state, q);
+  int floats = model->njoint > 0 && model->joint[0].type == CAV_JOINT_FREE;
+  for (int i = 0; floats && !status && state->ncontact == 0 && i < 5000; i++) {
+    q[2] -= 0.0005;
+    status = cav_position(model, state, q);
+  }
+  if (!status) status = cav_inverse(model, state, q, v, v, u);
+  for (int i = 0; !status && i < state->ncontact; i++)
+    printf("contact %d: %.1f N along its normal\n", i, state->contact[i].impulse[0] / model->timestep);
+  if (!status) status = cav_forward(model, state, q, v, u, v_next);
+  double fastest = 0;
+  for (int i = 0; i < model->nv; i++)
+    fastest = v_next[i] > fastest ? v_next[i] : -v_next[i] > fastest ? -v_next[i] : fastest;
+  printf("%s: %d contacts, fastest dof after %g s: %.1e\n", cav_status_name(status), state->ncontact, model->timestep,
+         fastest);
   cav_state_free(state);
   cav_model_free(model);
-  free(v);
+  free(q);
   return status;
 }

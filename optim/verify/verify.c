@@ -436,7 +436,7 @@ static void decide(const cav_verification *verification, const metrics *found, c
   require(verdict, &found->unactuated, CAV_TOLERANCE_UNACTUATED, "unactuated force, fraction of weight,",
           "More iterations, a longer motion or a start nearer to balance usually help.");
   require(verdict, &found->limit, CAV_TOLERANCE_LIMIT, "limit exceeded by",
-          "A longer motion or a lower effort_limit usually helps.");
+          "A longer motion, or less to do in it, usually helps.");
   require(verdict, &found->term, CAV_TOLERANCE_CONSTRAINT, "constraint missed by",
           "Constraints may contradict each other or the limits.");
   require(verdict, &found->periodicity, CAV_TOLERANCE_PERIODICITY, "end of the cycle away from its start, m or rad,",

@@ -1,5 +1,5 @@
-/// cavort explain: what the motion of a result folder misses and which constraints pull against each other, from its
-/// files. Exit status 0 if every constraint holds, 1 if not.
+/// cavort explain: what the motion of a result folder misses, first of its certificate and of what was asked, then by rows; and
+/// which constraints pull against each other. Exit status as that of verify: 0 certified and achieved, 1 if not.
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -14,8 +14,13 @@ static void print_when(const cav_reason *r) {
   printf(": %s\n    %s\n", r->what, r->cure);
 }
 
-static void print_table(const cav_explanation *e) {
-  printf(e->nviolation ? "missed, by size:\n" : "nothing is missed\n");
+static void print_table(const cav_explanation *e, const cav_verdict *verdict) {
+  if (!verdict->certified) printf("not certified: %s\n", verdict->reason);
+  if (!verdict->achieved) printf("not achieved: misses %s\n", verdict->missed);
+  if (e->nviolation)
+    printf("constraints missed, by size:\n");
+  else
+    printf(verdict->certified && verdict->achieved ? "nothing is missed\n" : "every constraint of the solver holds\n");
   for (int i = 0; i < e->nviolation; i++) {
     printf("%2d. %.3g", i + 1, e->violation[i].violation);
     print_when(&e->violation[i]);
@@ -55,17 +60,26 @@ int cav_command_explain(const cav_command_line *line) {
   if (!status)
     status =
         cav_explain(result->problem, result->trajectory, &result->problem->contact, nrow, row, &explanation, &error);
+  cav_verdict verdict = {0};
+  if (!status)
+    status = cav_verify(result->problem, result->trajectory, &result->problem->contact, result->gain_q, result->gain_v,
+                        &verdict, &error);
   if (!status && line->json) {
-    printf("{\n  \"met\": %s", explanation.met ? "true" : "false");
+    printf("{\n  \"met\": %s,\n  \"certified\": %s,\n  \"achieved\": %s,\n  \"reason\": ",
+           explanation.met ? "true" : "false", verdict.certified ? "true" : "false",
+           verdict.achieved ? "true" : "false");
+    cav_certificate_json_text(stdout, verdict.reason);
+    printf(",\n  \"missed\": ");
+    cav_certificate_json_text(stdout, verdict.missed);
     print_reasons("violation", explanation.nviolation, explanation.violation);
     print_reasons("conflict", explanation.nconflict, explanation.conflict);
     printf("\n}\n");
   } else if (!status) {
-    print_table(&explanation);
+    print_table(&explanation, &verdict);
   }
   free(path);
   free(row);
   cav_result_free(result);
   if (status) return cav_command_fail(&error);
-  return explanation.nviolation ? CAV_EXIT_NOT_CERTIFIED : CAV_EXIT_CERTIFIED;
+  return verdict.certified && verdict.achieved ? CAV_EXIT_CERTIFIED : CAV_EXIT_NOT_CERTIFIED;
 }
