@@ -73,7 +73,7 @@ row() {
     row $motion dm_control/humanoid.xml
   done
   echo
-  echo "The first seven and walk-cycle are tests (test_solve); the others stand as the table says. Joint, tendon and actuator limits hold to 1e-6 in every certified row."
+  echo "Those of test_solve are tests; the others stand as the table says. Joint, tendon and actuator limits hold to 1e-6 in every certified row."
 } >"$work/solve.md"
 mv "$work/solve.md" tests/results/solve.md
 cat tests/results/solve.md
