@@ -295,7 +295,7 @@ static void test_hop(void) {
   double cheap = hop(p, CAV_SOLVER_GAUSS_NEWTON, &verdict);
   CHECK(cheap > 0.3 && cheap <= 0.8 && fabs(cheap - 0.5) > 1e-3);
   p->duration_least = 0.45, p->duration_weight = 1e4;
-  // the restoration of rows at the end asks no penalty and may leave the bound a little: seen 5e-8
+  // the restoration of rows at the end takes no cost into account and may leave the bound a little: seen 5e-8
   CHECK(fabs(hop(p, CAV_SOLVER_GAUSS_NEWTON, &verdict) - 0.45) < 1e-6);
   cav_problem_free(p);
 }

@@ -155,7 +155,7 @@ static void check_verdict(const cav_problem *problem) {
     CHECK(strstr(text, field[i]) != NULL);
     if (!strstr(text, field[i])) fprintf(stderr, "    %s\n", field[i]);
   }
-  // the marks follow the requires: only the penetration is missed; not a number is missed too
+  // the marks follow the conditions: only the penetration is missed; not a number is missed too
   cav_certificate_line line[CAV_CERTIFICATE_LINES];
   int n = cav_certificate_lines(&verdict, line), missed = 0;
   for (int i = 0; i < n; i++) missed += line[i].passed == 0;

@@ -1,6 +1,6 @@
 /// The whole way, problem file to certificate: the project's motions on its own humanoid and, where they are, on models
 /// that no one here wrote. Each is certified, close to what its folder says to expect, its derivatives pass Ipopt's
-/// checker at the solution, and a motion spoilt afterwards is not certified. Then the requires of cav_solve: the same
+/// checker at the solution, and a motion spoilt afterwards is not certified. Then what cav_solve guarantees: the same
 /// bits at 1 and 2 threads, an end when the observer asks with the best iterate kept, and refusal of what makes no
 /// sense.
 #include "motion.h"

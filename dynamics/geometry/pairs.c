@@ -210,7 +210,7 @@ static int capsule_capsule(const cav_shape *a, const cav_shape *b, double margin
   cross3(cross, g.u, g.w);
   double sine2 = dot3(cross, cross);
   if (sine2 > PARALLEL * PARALLEL) {
-    // nearest points of the lines, then clamped: the square distance is convex, two half steps reach its minimum
+    // nearest points of the lines, then clamped: the square distance is convex, two clamped updates reach its minimum
     double turned[3];
     cross3(turned, g.d, g.w);
     double s = dot3(turned, cross) / sine2, t = s * g.uw - g.wd;

@@ -6,7 +6,7 @@
 /// opposite face cut to the prism above it, both ends of a segment, three points of a rim. At most 8: the deepest, then
 /// those furthest from the ones taken. Else one point, at the middle of what meets.
 /// Round edges (spheres, capsules) are the core grown by a radius, margins likewise: no case of their own.
-/// Not done: choosing between two ways out of an overlap by history; an equality constraint may jump.
+/// Not done: choosing between two ways out of an overlap by history; ways of equal depth may jump.
 #include "gjk.h"
 #include "math3.h"
 #include "pairs.h"
@@ -345,7 +345,7 @@ static int meet(contact_pair *g, cav_touch *touch) {
   int count = touch_face(g, touch);
   double lowest = INFINITY;
   for (int k = 0; k < count; k++) lowest = fmin(lowest, touch[k].dist);
-  // a face whose points all stand higher than what was found is not what meets: a rim, a derivative
+  // a face whose points all stand higher than what was found is not what meets: a rim, a slanting side
   if (count && lowest < dist + 1e-6 * g->size) return count;
   cav_touch last;
   touch_single(g, dist, &last);

@@ -9,7 +9,7 @@
 #include "schedule.h"
 #include "verification.h"
 
-/// Trials in order: multipliers, and the fraction of the schedule whose contact law is taken.
+/// Trials in order: penalties on straying, and the fraction of the schedule whose contact law is taken.
 static const struct trial {
   cav_feedback_penalty penalty;
   double fraction;

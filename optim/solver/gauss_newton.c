@@ -141,12 +141,12 @@ static cav_status try_radius(const cav_region *region, dogleg *d, const cav_norm
   return status == CAV_NO_MEMORY ? status : CAV_OK;
 }
 
-/// Whether a step is as good as required, and only the radius holds it back.
+/// Whether a step is as good as predicted, and only the radius holds it back.
 static int is_held_back(const cav_region *region, const dogleg *d, const trial *t) {
   return t->decrease > 0.75 * t->predicted && t->length > 0.9 * region->radius && t->length < 0.99 * d->newton_norm;
 }
 
-/// Grows the radius while steps of this linearisation are as good as required, and gain. Ends with the best step in to.
+/// Grows the radius while steps of this linearisation are as good as predicted, and gain. Ends with the best step in to.
 static cav_status grow(cav_region *region, dogleg *d, const cav_normal *normal, cav_transcription *tr,
                        const cav_trajectory *at, cav_trajectory *to, double merit, trial *t) {
   for (int i = 0; i < GROWTH && is_held_back(region, d, t); i++) {
@@ -168,7 +168,7 @@ static cav_status grow(cav_region *region, dogleg *d, const cav_normal *normal, 
   return CAV_OK;
 }
 
-/// Shrinks the radius until a step is as good as required, or grows it while it is. What is within rounding of the
+/// Shrinks the radius until a step is as good as predicted, or grows it while it is. What is within rounding of the
 /// merit says nothing about the radius.
 static cav_status search(cav_region *region, dogleg *d, cav_normal *normal, cav_transcription *tr,
                          const cav_trajectory *at, cav_trajectory *to, double merit, trial *t) {

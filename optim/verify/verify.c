@@ -426,7 +426,7 @@ static void require(cav_verdict *verdict, const cav_metric *metric, double limit
            metric->where, help);
 }
 
-// the requires in order
+// the conditions in order
 static void decide(const cav_verification *verification, const metrics *found, const cav_replay *replay,
                    cav_verdict *verdict) {
   const char *missing = left_out(verification);

@@ -227,7 +227,7 @@ cav_status cav_race_finish(cav_race *race, int cheapest, cav_error *error) {
 }
 
 // whether a is the better motion: the one that is certified and achieves what was asked; of two that are certified
-// alone the cheaper one; otherwise the one that keeps more of the certificate's requires, in their order; or misses the
+// alone the cheaper one; otherwise the one that keeps more of the certificate's conditions, in their order; or misses the
 // same one by less
 static int better(const cav_race_report *a, const cav_race_report *b, int cheapest) {
   const cav_verdict *v = &a->verdict, *w = &b->verdict;
