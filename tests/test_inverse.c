@@ -246,7 +246,9 @@ static double spring_energy(const cav_model *model, const double *q) {
       const cav_tendon_part *part = &model->tendon_part[tendon->part + k];
       length += part->coef * q[model->joint[part->joint].q];
     }
-    sum += 0.5 * tendon->stiffness * (length - tendon->springlength) * (length - tendon->springlength);
+    double stretch = length - tendon->springlength[0];
+    CHECK(tendon->springlength[0] == tendon->springlength[1]);
+    sum += 0.5 * tendon->stiffness * stretch * stretch;
   }
   free(turn);
   return sum;

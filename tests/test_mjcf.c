@@ -26,7 +26,6 @@ static const struct {
     {"unknown_attribute", 5, "did you mean 'size'"},
     {"wrong_place", 2, "not known inside mujoco"},
     {"wrong_root", 1, "expected one of: mujoco"},
-    {"text", 5, "text between tags"},
     {"doctype", 2, "document types"},
     {"entity", 1, "not well-formed"},
     {"missing_include", 3, "is_not_there.xml: cannot be opened"},
@@ -36,7 +35,7 @@ static const struct {
     {"cyclic_part", 2, "in a circle"},
     {"twice", 3, "included twice"},
     {"part", 1, "expected one of: mujoco"},
-    {"include_root", 1, "an included file must have the root"},
+    {"include_root", 2, "not known inside mujoco"},
     {"nan", 5, "got 'nan'"},
     {"infinite", 5, "got '1e999'"},
     {"hexadecimal", 5, "got '0x1p-3'"},
@@ -76,7 +75,6 @@ static const struct {
     {"key_qpos", 9, "expected 1 numbers"},
     {"key_qvel", 9, "expected 1 numbers"},
     {"no_world", 1, "the model is empty"},
-    {"nothing_moves", 2, "nothing moves"},
     {"world_inertia", 3, "not known inside worldbody"},
     {"world_joint", 3, "not known inside worldbody"},
     {"two_orientations", 5, "quat gives the orientation"},
@@ -96,7 +94,6 @@ static const struct {
     {"impratio", 2, "ratio > 0"},
     {"eulerseq", 2, "three of xyzXYZ"},
     {"global", 2, "global coordinates"},
-    {"override", 3, "override is not supported"},
     {"fluid", 2, "expected a number >= 0"},
     {"twist_hinge", 4, "only for ball joints"},
     {"swing", 4, "expected an angle > 0"},
@@ -113,7 +110,6 @@ static const struct {
     {"muscle", 9, "lengthrange"},
     {"servo_gain", 9, "a gain of 0"},
     {"user_drive", 9, "user-defined"},
-    {"adhesion", 9, "adhesion"},
     {"crank", 9, "slidersite"},
     {"cranklength", 9, "cranklength"},
     {"refsite", 9, "for the transmission by a site"},
@@ -278,7 +274,7 @@ static void test_huge(void) {
   memset(brackets, '[', sizeof brackets - 1);
   expect_error(write_repeated("big.xml", "", brackets, 100, ""), 0, "more than is read");
   expect_error(write_repeated("big.xml", "", "<<<<<<<<<<", 300000, ""), 1, "not well-formed");
-  expect_error(write_repeated("big.xml", "<mujoco>", brackets, 31, ""), 1, "text between tags");
+  expect_error(write_repeated("big.xml", "<mujoco>", brackets, 31, ""), 1, "not well-formed");
   expect_error(write_repeated("big.xml", "<mujoco>\n<worldbody>", "<body>", 400000, ""), 2, "nested more than");
   expect_error(write_repeated("big.xml", "<mujoco><visual>", "<a>", 400000, ""), 1, "nested more than");
   expect_error(write_repeated("big.xml", "<mujoco>\n<worldbody\n", "a='1' ", 400000, "/></mujoco>"), 3, "attributes");

@@ -197,7 +197,7 @@ static void compare_tendons(const cav_model *m, const mjModel *p) {
     near(t->stiffness, p->tendon_stiffness[i], "tendon stiffness", t->name);
     near(t->damping, p->tendon_damping[i], "tendon damping", t->name);
     near(t->frictionloss, p->tendon_frictionloss[i], "tendon frictionloss", t->name);
-    near(t->springlength, p->tendon_lengthspring[i], "tendon springlength", t->name);
+    near(t->springlength[0], p->tendon_lengthspring[i], "tendon springlength", t->name);
     near_slack(t->inverse_weight, p->tendon_invweight0[i], "tendon inverse weight", t->name);
     compare_softness(&t->limit, p->tendon_solref_lim + 2 * i, p->tendon_solimp_lim + 5 * i, t->name);
     compare_softness(&t->friction, p->tendon_solref_fri + 2 * i, p->tendon_solimp_fri + 5 * i, t->name);

@@ -166,7 +166,8 @@ static void test_peer(const cav_model *m) {
   int same = 0, far = 0;
   for (int i = 0; i < m->ntendon; i++) {
     // bound: rounding, of weights through the inverse of M; seen 2e-13
-    CHECK_NEAR(m->tendon[i].springlength, p->tendon_lengthspring[i], 1e-12);
+    CHECK_NEAR(m->tendon[i].springlength[0], p->tendon_lengthspring[i], 1e-12);
+    CHECK_NEAR(m->tendon[i].springlength[1], p->tendon_lengthspring[i], 1e-12);
     double slack = cornered(&m->tendon[i]) ? 1e-6 : 1e-10;
     CHECK_NEAR(m->tendon[i].inverse_weight, p->tendon_invweight0[i], slack * p->tendon_invweight0[i]);
   }

@@ -130,11 +130,32 @@ int cav_actuation_inputs(const cav_model *model, cav_state *state, const double 
   return missed;
 }
 
-double cav_actuator_part(cav_state *state, int actuator) {
+// least-norm efforts that give the state's u, in w->control
+static void least_efforts(cav_state *state) {
   const cav_workspace *w = state->work;
   const cav_model *model = state->model;
   if (w->gear_varies) { follow_position(model, state); }
   into_efforts(model, w, state->u, w->control);
   solve_gram(model, w, w->control, w->control + model->nactuator);
+}
+
+double cav_actuators_at(cav_state *state, int dof) {
+  const cav_workspace *w = state->work;
+  const cav_model *model = state->model;
+  double sum = 0;
+  if (model->nactuator == 0) { return 0; }
+  least_efforts(state);
+  for (int i = 0; i < model->nactuator; i++) {
+    for (int e = w->gear_start[i]; e < w->gear_start[i + 1]; e++) {
+      if (w->gear_dof[e] == dof) { sum += w->gear[e] * model->actuator[i].unit * w->control[i]; }
+    }
+  }
+  return sum;
+}
+
+double cav_actuator_part(cav_state *state, int actuator) {
+  const cav_workspace *w = state->work;
+  const cav_model *model = state->model;
+  least_efforts(state);
   return model->actuator[actuator].unit * w->control[actuator];
 }

@@ -251,7 +251,7 @@ static double weigh(const cav_model *model, const cav_equality *e) {
 void cav_equality_settle(const cav_model *model, const cav_state *state, cav_equality *e) {
   const double *frame = e->quat[0];
   int given = frame[0] != 0 || frame[1] != 0 || frame[2] != 0 || frame[3] != 0;
-  if (e->type == CAV_EQUALITY_CONNECT) { move_point(state, e, 0, 1); }
+  if (e->type == CAV_EQUALITY_CONNECT && !e->placed) { move_point(state, e, 0, 1); }
   if (e->type == CAV_EQUALITY_WELD && !given) {
     move_point(state, e, 1, 0);
     align(state, e);

@@ -68,7 +68,9 @@ static void add_tendon_forces(const cav_derivative_task *t) {
   for (int i = 0; i < w->ntendon_spring; i++) {
     const cav_tendon *tendon = &t->model->tendon[w->tendon_spring[i]];
     double half = 0.5 * tendon->damping;
-    add_along_tendon(t, w->tendon_spring[i], tendon->stiffness, t->mean ? half : tendon->damping, t->mean ? half : 0);
+    int slack = cav_tendon_stretch(tendon, t->state->tendon_length[w->tendon_spring[i]]) == 0;
+    add_along_tendon(t, w->tendon_spring[i], slack ? 0 : tendon->stiffness, t->mean ? half : tendon->damping,
+                     t->mean ? half : 0);
   }
 }
 

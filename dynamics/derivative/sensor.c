@@ -267,6 +267,7 @@ static int offered(const cav_model *model, const cav_sensor *sensor) {
     case CAV_SENSOR_ACTUATORPOS:
     case CAV_SENSOR_ACTUATORVEL:
     case CAV_SENSOR_ACTUATORFRC:
+    case CAV_SENSOR_JOINTACTUATORFRC:
     case CAV_SENSOR_BALLQUAT:
     case CAV_SENSOR_JOINTLIMITPOS:
     case CAV_SENSOR_JOINTLIMITVEL:

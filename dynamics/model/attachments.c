@@ -49,10 +49,23 @@ int cav_builder_tendon_dofs(cav_builder *b, int *out) {
   return n;
 }
 
+// a spring rests where its joints' springs do, unless the file gives its length; MJCF writes -1 for not given
+static int rests(const cav_spec_tendon *s) { return s->has_springlength && s->springlength[0] >= 0; }
+
+static void check_tendon(cav_spec *spec, const cav_spec_tendon *s) {
+  if (rests(s) && s->springlength[0] > s->springlength[1])
+    cav_spec_fail(spec, s->node, "springlength", "expected lower <= upper, got %g %g", s->springlength[0],
+                  s->springlength[1]);
+  cav_check_not_negative(spec, s->node, "stiffness", s->stiffness);
+  cav_check_not_negative(spec, s->node, "damping", s->damping);
+  cav_check_not_negative(spec, s->node, "frictionloss", s->frictionloss);
+  cav_check_softness(spec, s->node, "limit", &s->limit);
+  cav_check_softness(spec, s->node, "friction", &s->friction);
+}
+
 // length of a spatial tendon's spring; NAN where the file gives none, until reference.c measures it
 static void fill_path(cav_builder *b, const cav_spec_tendon *s, cav_tendon *t) {
-  int rests = s->has_springlength && s->springlength >= 0;
-  t->springlength = rests ? s->springlength : NAN;
+  if (!rests(s)) t->springlength[0] = t->springlength[1] = NAN;
   for (int k = s->path; k < s->path + s->npath; k++) {
     const cav_spec_tendon_path *p = &b->spec->path.at[k];
     b->tendon_path[k] = (cav_tendon_path_point){p->type, p->object, p->side, p->divisor};
@@ -77,21 +90,18 @@ static void fill_tendons(cav_builder *b) {
     t->limited = cav_builder_limits(spec, s->node, "limited", "range", s->limited, s->range) && spec->option.limit;
     memcpy(t->range, s->range, sizeof t->range);
     t->frictionloss = spec->option.frictionloss ? s->frictionloss : 0;
-    // a spring rests where its joints' springs do, unless the file gives its length; MJCF writes -1 for not given
-    int rests = s->has_springlength && s->springlength >= 0;
-    if (rests) t->springlength = s->springlength;
+    if (!spec->option.spring) t->stiffness = 0;
+    if (!spec->option.damper) t->damping = 0;
+    if (rests(s)) memcpy(t->springlength, s->springlength, sizeof t->springlength);
     for (int k = s->part; k < s->part + s->npart; k++) {
       const cav_spec_part *p = &spec->part.at[k];
       int joint = find_scalar_joint(b, p->node, p->joint, "a fixed tendon");
       b->tendon_part[k] = (cav_tendon_part){joint, p->coef};
-      if (!rests && cav_builder_running(b)) t->springlength += p->coef * b->joint[joint].springref;
+      if (!rests(s) && cav_builder_running(b)) t->springlength[0] += p->coef * b->joint[joint].springref;
     }
+    if (!rests(s)) t->springlength[1] = t->springlength[0];
     if (s->spatial) fill_path(b, s, t);
-    cav_check_not_negative(spec, s->node, "stiffness", s->stiffness);
-    cav_check_not_negative(spec, s->node, "damping", s->damping);
-    cav_check_not_negative(spec, s->node, "frictionloss", s->frictionloss);
-    cav_check_softness(spec, s->node, "limit", &s->limit);
-    cav_check_softness(spec, s->node, "friction", &s->friction);
+    check_tendon(spec, s);
   }
   if (cav_builder_running(b)) cav_builder_tendon_dofs(b, b->tendon_dof);
 }
@@ -107,6 +117,11 @@ static int find_tied(cav_builder *b, const cav_spec_equality *s, int side) {
                                              [CAV_EQUALITY_DISTANCE] = {"geom1", "geom2"}};
   cav_spec *spec = b->spec;
   const char *at = attribute[s->type][side], *name = s->object[side];
+  if (s->sites) {
+    at = side ? "site2" : "site1";
+    if (!name) cav_spec_fail(spec, s->node, at, "is missing; name both sites, or bodies instead");
+    return name ? resolve(spec, s->node, at, "site", name, CAV_BUILDER_TABLE(spec->site)) : 0;
+  }
   int body = s->type == CAV_EQUALITY_CONNECT || s->type == CAV_EQUALITY_WELD;
   if (!name) return body ? 0 : -1;
   if (body) return resolve(spec, s->node, at, "body", name, CAV_BUILDER_TABLE(spec->body));
@@ -135,6 +150,17 @@ static void check_tied(cav_builder *b, const cav_spec_equality *s, const cav_equ
   cav_check_not_negative(spec, s->node, "torquescale", s->torquescale);
 }
 
+// frames of two sites that are to be one; the objects become their bodies
+static void place_at_sites(const cav_builder *b, cav_equality *e) {
+  e->placed = 1;
+  for (int k = 0; k < 2; k++) {
+    const cav_site *site = &b->site[e->object[k]];
+    copy3(e->pos[k], site->pos);
+    memcpy(e->quat[k], site->quat, sizeof e->quat[k]);
+    e->object[k] = site->body;
+  }
+}
+
 static void fill_equalities(cav_builder *b) {
   static const int dim[] = {[CAV_EQUALITY_CONNECT] = 3,
                             [CAV_EQUALITY_WELD] = 6,
@@ -155,10 +181,14 @@ static void fill_equalities(cav_builder *b) {
     for (int k = 0; k < 2; k++) e->object[k] = find_tied(b, s, k);
     if (!cav_builder_running(b)) return;
     int bodies = s->type == CAV_EQUALITY_CONNECT || s->type == CAV_EQUALITY_WELD;
+    if (s->sites) place_at_sites(b, e);
     for (int k = 0; k < 2 && (bodies || s->type == CAV_EQUALITY_DISTANCE); k++)
       e->link[k] = b->link_of[bodies ? e->object[k] : b->geom[e->object[k]].body];
     check_tied(b, s, e);
-    if (!bodies) continue;
+    if (!bodies || s->sites) continue;
+    if (!s->object[0]) cav_spec_fail(b->spec, s->node, "body1", "is missing; name a body, or two sites");
+    if (s->type == CAV_EQUALITY_CONNECT && !cav_xml_get(s->node, "anchor"))
+      cav_spec_fail(b->spec, s->node, "anchor", "is missing; give the point that the two bodies have in common");
     // a connect has its anchor in the first body, a weld in the second; the rest of both follows at q0
     const cav_body *first = &b->body[e->object[0]], *second = &b->body[e->object[1]];
     double quat[4];

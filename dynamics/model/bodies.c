@@ -60,7 +60,6 @@ void cav_builder_links(cav_builder *b) {
   if (m->nv > CAV_SPEC_DOFS)
     cav_spec_fail(spec, spec->body.at[0].node, NULL, "%d degrees of freedom; at most %d are read", m->nv,
                   CAV_SPEC_DOFS);
-  if (m->nv == 0) cav_spec_fail(spec, spec->body.at[0].node, NULL, "nothing moves: no body has a joint; add one");
 }
 
 // --- bodies, links, joints ---
@@ -80,6 +79,22 @@ static void place_body(const cav_spec *spec, cav_body *body, int i) {
   quat_normalise(x->quat);
 }
 
+// fraction of a body's weight that is taken off; where all joints that carry it give that by their actuators, nothing
+static double buoyancy(cav_builder *b, int body) {
+  const cav_spec *spec = b->spec;
+  const cav_spec_body *s = &spec->body.at[body];
+  int passive = 0, active = 0;
+  for (int i = body; i > 0 && s->gravcomp != 0; i = spec->body.at[i].parent) {
+    const cav_spec_body *up = &spec->body.at[i];
+    for (int k = up->joint; k < up->joint + up->njoint; k++) *(spec->joint.at[k].gravcomp ? &active : &passive) += 1;
+  }
+  if (active && passive)
+    cav_spec_fail(b->spec, s->node, "gravcomp",
+                  "some of the joints that carry this body have actuatorgravcomp and some have not, which is not "
+                  "supported; give it to all or to none");
+  return active ? 0 : s->gravcomp;
+}
+
 static void fill_bodies(cav_builder *b) {
   const cav_spec *spec = b->spec;
   for (int i = 0; i < spec->body.n; i++) {
@@ -91,7 +106,7 @@ static void fill_bodies(cav_builder *b) {
                     .geom = s->geom,
                     .ngeom = s->ngeom,
                     .mass = s->inertia.mass,
-                    .buoyancy = s->gravcomp};
+                    .buoyancy = buoyancy(b, i)};
     copy3(x->com, s->inertia.com);
     copy3(x->inertia, s->inertia.moment);
     memcpy(x->iquat, s->inertia.quat, sizeof x->iquat);
@@ -208,7 +223,11 @@ static void fill_joint(cav_builder *b, int i, int q, int dof) {
                    .dof = dof,
                    .margin = s->margin,
                    .limit = s->limit,
-                   .stiffness = s->stiffness};
+                   .stiffness = spec->option.spring ? s->stiffness : 0};
+  int given = s->effort_range[0] != 0 || s->effort_range[1] != 0;
+  j->effort_limited =
+      cav_builder_is_scalar(s->type) && (s->effort == CAV_LIMITED_YES || (s->effort == CAV_LIMITED_AUTO && given));
+  memcpy(j->effort_range, s->effort_range, sizeof j->effort_range);
   j->limited = cav_builder_joint_limits(spec, s);
   memcpy(j->range, s->range, sizeof j->range);
   set3(j->axis, 0, 0, 1);
@@ -223,8 +242,6 @@ static void fill_joint(cav_builder *b, int i, int q, int dof) {
     j->ref = s->ref;
     j->springref = s->springref;
   }
-  if (s->springdamper[0] > 0 || s->springdamper[1] > 0)
-    cav_spec_fail(spec, s->node, "springdamper", "not supported; write stiffness and damping instead");
   cav_check_not_negative(spec, s->node, "stiffness", s->stiffness);
   cav_check_not_negative(spec, s->node, "damping", s->damping);
   cav_check_not_negative(spec, s->node, "armature", s->armature);
@@ -269,7 +286,7 @@ static void fill_joints(cav_builder *b) {
       b->dof[dof] = (cav_dof){.link = link,
                               .joint = i,
                               .parent = parent,
-                              .damping = s->damping,
+                              .damping = spec->option.damper ? s->damping : 0,
                               .armature = s->armature,
                               .friction = s->friction};
       b->dof[dof].frictionloss = spec->option.frictionloss ? s->frictionloss : 0;

@@ -158,7 +158,7 @@ static void set_options(cav_builder *b) {
                              .contact = o->contact,
                              .constraint = o->constraint,
                              .gravity = o->weight,
-                             .passive = o->passive};
+                             .passive = o->spring || o->damper};
 }
 
 static void count(cav_builder *b) {
@@ -206,7 +206,7 @@ static void check_results(cav_builder *b) {
     cav_builder_finite(spec, spec->joint.at[m->dof[i].joint].node, &m->dof[i].inverse_weight, 1);
   for (int i = 0; i < m->ntendon; i++) {
     cav_builder_finite(spec, spec->tendon.at[i].node, &m->tendon[i].inverse_weight, 1);
-    cav_builder_finite(spec, spec->tendon.at[i].node, &m->tendon[i].springlength, 1);
+    cav_builder_finite(spec, spec->tendon.at[i].node, m->tendon[i].springlength, 2);
   }
 }
 
@@ -297,6 +297,7 @@ static cav_model *build(cav_builder *b) {
     else
       check_results(b);
     if (cav_builder_running(b)) find_strokes(b);
+    if (cav_builder_running(b) && !cav_settle_gains(spec, b->model)) cav_spec_no_memory(spec);
   }
   if (cav_builder_running(b)) return b->model;
   free(b->model);

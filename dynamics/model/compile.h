@@ -12,6 +12,10 @@ int cav_length_range_fill(cav_model *model);
 /// Fills inverse_weight of dofs, bodies, tendons and weight of pairs of a model under construction at q0. reference.c.
 cav_status cav_reference_weights(cav_model *model);
 
+/// Springs and dampers of joints by time constant and damping ratio, and velocity gains of servos by damping ratio, from
+/// the inertia at q0, of a model whose reference weights are known. 0: no memory. gains.c.
+int cav_settle_gains(const cav_spec *spec, cav_model *model);
+
 /// Masses, centres and principal moments of geoms and bodies. mass.c.
 void cav_spec_masses(cav_spec *spec);
 

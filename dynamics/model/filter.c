@@ -113,8 +113,16 @@ static cav_pair *push(cav_spec *spec, list *l, const cav_geom *geom, int g1, int
   return pair;
 }
 
-// friction below this would make the cone's shape degenerate; MuJoCo's bound too
-static void bound_friction(cav_pair *pair) {
+// the values that the flag override gives all contacts; then friction, which below this would make the cone's shape
+// degenerate; MuJoCo's bound too
+static void bound_friction(const cav_spec *spec, cav_pair *pair) {
+  const cav_spec_option *o = &spec->option;
+  if (o->override) {
+    memcpy(pair->friction, o->o_friction, sizeof pair->friction);
+    pair->softness = o->o_softness;
+    pair->margin = o->o_margin;
+    pair->gap = 0;
+  }
   for (int i = 0; i < 5; i++) pair->friction[i] = larger(pair->friction[i], 1e-5);
 }
 
@@ -131,7 +139,7 @@ static void add_bodies(cav_spec *spec, list *l, const cav_geom *geom, int b1, in
       if (has_key(explicit_pairs, i, j)) continue;
       cav_pair *pair = push(spec, l, geom, i, j);
       if (!pair) return;
-      bound_friction(pair);
+      bound_friction(spec, pair);
     }
   }
 }
@@ -203,7 +211,7 @@ static void add_explicit(cav_spec *spec, list *l, const cav_geom *geom, const in
       cav_pair *pair = push(spec, l, geom, g1, g2);
       if (!pair) return;
       replace(p, pair);
-      bound_friction(pair);
+      bound_friction(spec, pair);
     }
   }
   if (explicit_pairs->n) qsort(explicit_pairs->at, (size_t)explicit_pairs->n, sizeof(keyed), compare_keys);

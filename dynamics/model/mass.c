@@ -2,7 +2,7 @@
 ///
 /// Solid bodies of uniform density; a body's geoms add up by the parallel axis theorem, overlaps counting twice, as
 /// MJCF has it. Principal axes by Jacobi's rotations. Then MJCF's compiler options boundmass, boundinertia,
-/// balanceinertia and settotalmass, in this order. Meshes are weighed in asset.c. Not done: shells.
+/// balanceinertia and settotalmass, in this order. Meshes are weighed in asset.c.
 
 #include "algebra.h"
 #include "compile.h"
@@ -19,6 +19,25 @@ static int size_count(int type) {
                                             [CAV_GEOM_CYLINDER] = 2,
                                             [CAV_GEOM_BOX] = 3};
   return count[type];
+}
+
+// area; of an ellipsoid by Thomsen's formula, within 1.1 %
+static double area(int type, const double *s) {
+  const double p = 1.6075, ab = s[0] * s[1], bc = s[1] * s[2], ca = s[2] * s[0];
+  switch (type) {
+    case CAV_GEOM_SPHERE:
+      return 4 * M_PI * s[0] * s[0];
+    case CAV_GEOM_CAPSULE:
+      return 4 * M_PI * s[0] * (s[0] + s[1]);
+    case CAV_GEOM_ELLIPSOID:
+      return 4 * M_PI * pow((pow(ab, p) + pow(bc, p) + pow(ca, p)) / 3, 1 / p);
+    case CAV_GEOM_CYLINDER:
+      return 2 * M_PI * s[0] * (s[0] + 2 * s[1]);
+    case CAV_GEOM_BOX:
+      return 8 * (ab + bc + ca);
+    default:
+      return 0;
+  }
 }
 
 static double volume(int type, const double *s) {
@@ -75,6 +94,43 @@ static void moments(int type, double m, const double *s, double moment[3]) {
   }
 }
 
+// a layer of even thickness on a box or an ellipsoid: what the solid's moments gain as all axes grow alike
+static void moments_of_layer(double m, const double *s, double parts, double moment[3]) {
+  double areas = s[0] * s[1] + s[1] * s[2] + s[2] * s[0], all = 2 * s[0] * s[1] * s[2];
+  for (int k = 0; k < 3; k++) {
+    double b = s[(k + 1) % 3], c = s[(k + 2) % 3];
+    moment[k] = m * (areas * (b * b + c * c) + all * (b + c)) / (parts * areas);
+  }
+}
+
+// moments of a surface of that mass
+static void shell_moments(int type, double m, const double *s, double moment[3]) {
+  double r = s[0], h = s[1], tube, ends;
+  switch (type) {
+    case CAV_GEOM_SPHERE:
+      set3(moment, 2 * m * r * r / 3, 2 * m * r * r / 3, 2 * m * r * r / 3);
+      break;
+    case CAV_GEOM_CAPSULE:
+      tube = m * h / (r + h), ends = m - tube;
+      moment[0] = moment[1] = tube * (r * r / 2 + h * h / 3) + ends * (2 * r * r / 3 + h * h + h * r);
+      moment[2] = tube * r * r + ends * 2 * r * r / 3;
+      break;
+    case CAV_GEOM_CYLINDER:
+      tube = m * 2 * h / (r + 2 * h), ends = m - tube;
+      moment[0] = moment[1] = tube * (r * r / 2 + h * h / 3) + ends * (r * r / 4 + h * h);
+      moment[2] = tube * r * r + ends * r * r / 2;
+      break;
+    case CAV_GEOM_ELLIPSOID:
+      moments_of_layer(m, s, 5, moment);
+      break;
+    case CAV_GEOM_BOX:
+      moments_of_layer(m, s, 3, moment);
+      break;
+    default:
+      zero3(moment);
+  }
+}
+
 static void weigh_geom(cav_spec *spec, cav_spec_geom *g) {
   static const char *const names[CAV_GEOM_TYPES] = {"plane",    "sphere", "capsule", "ellipsoid",
                                                     "cylinder", "box",    "mesh",    "height field"};
@@ -88,13 +144,15 @@ static void weigh_geom(cav_spec *spec, cav_spec_geom *g) {
     cav_spec_fail(spec, g->node, "density", "expected a density >= 0, got %g", g->density);
   if (spec->status != CAV_OK) return;
   int solid = g->type != CAV_GEOM_PLANE && g->type != CAV_GEOM_HFIELD;
-  double mass = !solid ? 0 : g->has_mass ? g->mass : g->density * volume(g->type, g->size);
+  double mass = !solid ? 0 : g->has_mass ? g->mass : g->density * (g->shell ? area : volume)(g->type, g->size);
   // a mesh has been weighed by asset.c
   if (g->type == CAV_GEOM_MESH) mass = g->inertia.mass;
   g->inertia.mass = mass;
   copy3(g->inertia.com, g->pos);
   memcpy(g->inertia.quat, g->quat, sizeof g->quat);
-  if (g->type != CAV_GEOM_MESH) moments(g->type, mass, g->size, g->inertia.moment);
+  if (g->type != CAV_GEOM_MESH) (g->shell ? shell_moments : moments)(g->type, mass, g->size, g->inertia.moment);
+  if (g->type == CAV_GEOM_MESH && g->shell)
+    cav_spec_fail(spec, g->node, "shellinertia", "for a mesh write inertia=\"shell\" in its asset");
   if (!isfinite(mass) || !isfinite(norm3(g->inertia.moment)))
     cav_spec_fail(spec, g->node, NULL, "mass or inertia is not finite; make size, mass or density smaller");
 }

@@ -125,7 +125,7 @@ static void measure_springs(const cav_model *model, cav_state *state) {
   cav_kinematics(model, state, q);
   for (int i = 0; i < model->ntendon; i++) {
     cav_tendon *tendon = (cav_tendon *)&model->tendon[i];
-    if (isnan(tendon->springlength)) { tendon->springlength = state->tendon_length[i]; }
+    if (isnan(tendon->springlength[0])) tendon->springlength[0] = tendon->springlength[1] = state->tendon_length[i];
   }
 }
 

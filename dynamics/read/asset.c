@@ -2,9 +2,9 @@
 ///
 /// A mesh collides as its convex hull and weighs as its triangles: it is scaled, moved by its reference pose, and
 /// expressed about its centre of mass and principal axes, to which its geoms are moved, as MuJoCo does. One without
-/// volume keeps the middle of its surface and must not be asked to weigh by density. A height field without a file is
-/// level; with one (see elevation.c) its heights are stretched to 0 to 1. Not done: fitting of simple shapes to meshes,
-/// MuJoCo's MSH format.
+/// volume keeps the middle of its surface and must not be asked to weigh by density. A simple shape that names a mesh
+/// is fitted to it: to the box of its inertia, or to its bounding box. A height field without a file is level; with
+/// one (see elevation.c) its heights are stretched to 0 to 1. Not done: MuJoCo's MSH format, built-in meshes.
 
 #include <limits.h>
 #include <stdio.h>
@@ -42,7 +42,7 @@ static const char *name_of(cav_spec *spec, const char *file) {
 
 // --- asking ---
 
-void cav_read_mesh(cav_spec *spec, const cav_xml_node *node, const double scale[3]) {
+void cav_read_mesh(cav_spec *spec, const cav_xml_node *node, const double scale[3], cav_mesh_inertia inertia) {
   cav_spec_mesh *m = CAV_SPEC_PUSH(spec, &spec->mesh);
   if (!m) return;
   *m = (cav_spec_mesh){.node = node, .refquat = {1, 0, 0, 0}, .index = -1};
@@ -51,6 +51,11 @@ void cav_read_mesh(cav_spec *spec, const cav_xml_node *node, const double scale[
   m->face = cav_xml_get(node, "face");
   m->name = cav_xml_text(node, "name", NULL);
   if (!m->name) m->name = file ? name_of(spec, file) : "";
+  m->inertia = (cav_mesh_inertia)cav_xml_word(node, "inertia", (int)inertia);
+  if (cav_xml_get(node, "builtin")) {
+    m->builtin = 1;
+    return;
+  }
   if (!file == !m->vertex)
     cav_spec_fail(spec, node, NULL, "expected one of file and vertex; say where the mesh comes from");
   m->path = file ? asset_path(spec, file) : NULL;
@@ -67,7 +72,7 @@ void cav_read_mesh(cav_spec *spec, const cav_xml_node *node, const double scale[
 int cav_add_mesh(cav_spec *spec, const cav_xml_node *node, const char *path, const double scale[3]) {
   for (int i = 0; i < spec->mesh.n; i++) {
     const cav_spec_mesh *m = &spec->mesh.at[i];
-    if (!strcmp(m->path, path) && !memcmp(m->scale, scale, sizeof m->scale)) return i;
+    if (m->path && !strcmp(m->path, path) && !memcmp(m->scale, scale, sizeof m->scale)) return i;
   }
   cav_spec_mesh *m = CAV_SPEC_PUSH(spec, &spec->mesh);
   if (!m) return 0;
@@ -86,6 +91,7 @@ void cav_read_hfield(cav_spec *spec, const cav_xml_node *node) {
   h->name = cav_xml_text(node, "name", NULL);
   if (!h->name) h->name = file ? name_of(spec, file) : "";
   h->path = file ? asset_path(spec, file) : NULL;
+  h->elevation = cav_xml_get(node, "elevation");
   h->nrow = cav_xml_int(node, "nrow", 0);
   h->ncol = cav_xml_int(node, "ncol", 0);
   cav_xml_reals(node, "size", h->size, 4);
@@ -164,7 +170,8 @@ static void transform_mesh(const cav_spec_mesh *m, cav_triangles *t) {
 
 // bulk, principal axes, and all vertices into them
 static void weigh_mesh(cav_spec *spec, cav_spec_mesh *m, cav_triangles *t) {
-  cav_bulk bulk = cav_mesh_bulk(t, spec->compiler.exact_mesh);
+  int exact = spec->compiler.exact_mesh && m->inertia == CAV_MESH_LEGACY;
+  cav_bulk bulk = cav_mesh_bulk(t, exact ? CAV_MESH_EXACT : m->inertia);
   double size = 0, back[4];
   for (int i = 0; i < 3 * t->nvertex; i++) size = fmax(size, fabs(t->vertex[i]));
   m->volume = bulk.volume > 1e-15 * size * size * size ? bulk.volume : 0;
@@ -172,11 +179,14 @@ static void weigh_mesh(cav_spec *spec, cav_spec_mesh *m, cav_triangles *t) {
   m->quat[0] = 1;
   if (m->volume > 0) cav_principal_axes(bulk.inertia, m->quat, m->moment);
   quat_conjugate(back, m->quat);
+  set3(m->low, INFINITY, INFINITY, INFINITY);
+  set3(m->high, -INFINITY, -INFINITY, -INFINITY);
   for (int i = 0; i < t->nvertex; i++) {
     double *x = t->vertex + 3 * i;
     sub3(x, x, m->pos);
     quat_rotate(x, back, x);
     for (int k = 0; k < 3; k++) m->half[k] = fmax(m->half[k], fabs(x[k]));
+    for (int k = 0; k < 3; k++) m->low[k] = fmin(m->low[k], x[k]), m->high[k] = fmax(m->high[k], x[k]);
     m->bound = fmax(m->bound, norm3(x));
   }
   if (!isfinite(m->volume) || !isfinite(m->bound) || !all_finite(m->moment, 3))
@@ -196,9 +206,21 @@ static void build_hull(cav_spec *spec, cav_spec_mesh *m, const cav_triangles *t)
     cav_spec_fail(spec, m->node, NULL, "Qhull finds no convex hull of its %d points", t->nvertex);
 }
 
+// the triangles become those of the hull
+static void take_hull(cav_spec *spec, cav_spec_mesh *m, cav_triangles *t) {
+  build_hull(spec, m, t);
+  if (spec->status == CAV_OK && !triangles_of_hull(&m->hull, t)) cav_spec_no_memory(spec);
+  cav_hull_clear(&m->hull);
+}
+
 static void load_mesh(cav_spec *spec, cav_spec_mesh *m) {
   cav_triangles t = {0};
   char reason[200] = "";
+  m->loaded = 1;
+  if (m->builtin) {
+    cav_spec_fail(spec, m->node, "builtin", "built-in meshes are not supported; give a file or vertices");
+    return;
+  }
   if (m->path) {
     cav_status status = cav_mesh_read(m->path, &t, reason, sizeof reason);
     if (status == CAV_NO_MEMORY)
@@ -210,13 +232,9 @@ static void load_mesh(cav_spec *spec, cav_spec_mesh *m) {
   }
   if (spec->status == CAV_OK) transform_mesh(m, &t);
   // points alone: their hull is the solid
-  if (spec->status == CAV_OK && !t.ntriangle) {
-    build_hull(spec, m, &t);
-    if (spec->status == CAV_OK && !triangles_of_hull(&m->hull, &t)) cav_spec_no_memory(spec);
-    cav_hull_clear(&m->hull);
-  }
+  if (spec->status == CAV_OK && (!t.ntriangle || m->inertia == CAV_MESH_CONVEX)) take_hull(spec, m, &t);
   if (spec->status == CAV_OK) weigh_mesh(spec, m, &t);
-  if (spec->status == CAV_OK) build_hull(spec, m, &t);
+  if (spec->status == CAV_OK && m->index >= 0) build_hull(spec, m, &t);
   cav_triangles_clear(&t);
 }
 
@@ -236,11 +254,25 @@ static void read_heights(cav_spec *spec, cav_spec_hfield *h) {
   h->ncol = e.ncol;
 }
 
+// heights that the file of the model itself gives; its first row lies at the far end of y
+static void read_elevation(cav_spec *spec, cav_spec_hfield *h) {
+  int n = h->nrow * h->ncol;
+  if (h->elevation->count != n) {
+    cav_spec_fail(spec, h->node, "elevation", "expected %d numbers, one for each point, got %d", n,
+                  h->elevation->count);
+    return;
+  }
+  for (int r = 0; r < h->nrow; r++)
+    memcpy(h->height + r * h->ncol, h->elevation->number + (h->nrow - 1 - r) * h->ncol,
+           sizeof *h->height * (size_t)h->ncol);
+}
+
 static void load_hfield(cav_spec *spec, cav_spec_hfield *h) {
   if (h->path) read_heights(spec, h);
   size_t n = (size_t)h->nrow * (size_t)h->ncol;
   if (!h->path) h->height = calloc(n, sizeof *h->height);
   if (!h->path && !h->height) cav_spec_no_memory(spec);
+  if (h->height && !h->path && h->elevation) read_elevation(spec, h);
   if (spec->status != CAV_OK) return;
   // heights from 0 to 1 over the range of the file, times the height asked for
   double low = INFINITY, high = -INFINITY;
@@ -270,19 +302,78 @@ static void place_on_mesh(cav_spec *spec, cav_spec_geom *g, const cav_spec_mesh 
         "mass of 0");
 }
 
+// half lengths of the box that a shape is fitted to, and its middle, in the mesh's frame
+static void box_of_mesh(cav_spec *spec, const cav_spec_geom *g, const cav_spec_mesh *m, double half[3], double at[3]) {
+  zero3(at);
+  if (spec->compiler.fit_box) {
+    sub3(half, m->high, m->low);
+    scale3(half, 0.5, half);
+    add3(at, m->high, m->low);
+    scale3(at, 0.5, at);
+    return;
+  }
+  if (m->volume == 0)
+    cav_spec_fail(spec, g->node, "mesh", "the mesh has no volume: no shape has its inertia; give the geom a size");
+  double sum = m->moment[0] + m->moment[1] + m->moment[2];
+  for (int k = 0; k < 3 && m->volume > 0; k++) half[k] = sqrt(fmax(0, 1.5 * (sum - 2 * m->moment[k]) / m->volume));
+}
+
+// MJCF's rules: round shapes take the mean (of the box of the inertia) or the larger (of the bounding box) half length
+static void fit_to_mesh(cav_spec *spec, cav_spec_geom *g, const cav_spec_mesh *m) {
+  double half[3] = {0, 0, 0}, at[3], turned[3];
+  int box = spec->compiler.fit_box;
+  box_of_mesh(spec, g, m, half, at);
+  double across = box ? fmax(half[0], half[1]) : (half[0] + half[1]) / 2, along = half[2];
+  switch (g->type) {
+    case CAV_GEOM_SPHERE:
+      across = box ? fmax(across, along) : (half[0] + half[1] + half[2]) / 3;
+      set3(g->size, across, 0, 0);
+      break;
+    case CAV_GEOM_CAPSULE:
+      set3(g->size, across, along - (box ? across : across / 2), 0);
+      break;
+    case CAV_GEOM_CYLINDER:
+      set3(g->size, across, along, 0);
+      break;
+    case CAV_GEOM_ELLIPSOID:
+    case CAV_GEOM_BOX:
+      copy3(g->size, half);
+      break;
+    default:
+      cav_spec_fail(spec, g->node, "mesh", "a plane or height field is not fitted to a mesh; name another type");
+  }
+  scale3(g->size, g->fitscale, g->size);
+  quat_rotate(at, m->quat, at);
+  add3(at, at, m->pos);
+  quat_rotate(turned, g->quat, at);
+  add3(g->pos, g->pos, turned);
+  quat_mul(g->quat, g->quat, m->quat);
+}
+
+// meshes that collide, in the order of their geoms
+static int number_meshes(cav_spec *spec) {
+  int n = 0;
+  for (int i = 0; i < spec->geom.n; i++) {
+    const cav_spec_geom *g = &spec->geom.at[i];
+    if (g->type == CAV_GEOM_MESH && spec->mesh.at[g->asset].index < 0) spec->mesh.at[g->asset].index = n++;
+  }
+  return n;
+}
+
 void cav_spec_assets(cav_spec *spec) {
-  int meshes = 0, fields = 0;
+  int fields = 0;
+  number_meshes(spec);
   for (int i = 0; i < spec->geom.n && spec->status == CAV_OK; i++) {
     cav_spec_geom *g = &spec->geom.at[i];
+    cav_spec_mesh *m = g->mesh || g->type == CAV_GEOM_MESH ? &spec->mesh.at[g->asset] : NULL;
+    if (m && !m->loaded) load_mesh(spec, m);
+    if (spec->status != CAV_OK) return;
     if (g->type == CAV_GEOM_MESH) {
-      cav_spec_mesh *m = &spec->mesh.at[g->asset];
-      if (m->index < 0) {
-        m->index = meshes++;
-        load_mesh(spec, m);
-      }
-      if (spec->status == CAV_OK) place_on_mesh(spec, g, m);
+      place_on_mesh(spec, g, m);
       g->bound = m->bound;
       g->asset = m->index;
+    } else if (m) {
+      fit_to_mesh(spec, g, m);
     } else if (g->type == CAV_GEOM_HFIELD) {
       cav_spec_hfield *h = &spec->hfield.at[g->asset];
       if (h->index < 0) {

@@ -39,6 +39,8 @@ void cav_mjcf_read_compiler(cav_mjcf_reader *r, const cav_xml_node *node) {
   read_text(node, "assetdir", &c->mesh_folder);
   read_text(node, "meshdir", &c->mesh_folder);
   if (!cav_xml_bool(node, "discardvisual", 1)) r->spec->load.visual = 1;
+  c->fit_box = cav_xml_bool(node, "fitaabb", c->fit_box);
+  c->align_free = cav_xml_bool(node, "alignfree", c->align_free);
 }
 
 static void read_flags(cav_mjcf_reader *r, const cav_xml_node *node) {
@@ -47,17 +49,19 @@ static void read_flags(cav_mjcf_reader *r, const cav_xml_node *node) {
     const char *name;
     int *flag;
   } flags[] = {{"constraint", &o->constraint}, {"equality", &o->equality}, {"frictionloss", &o->frictionloss},
-               {"limit", &o->limit},           {"contact", &o->contact},   {"passive", &o->passive},
-               {"gravity", &o->weight},        {"clampctrl", &o->clamp},   {"filterparent", &o->filter_parent},
-               {"refsafe", &o->refsafe}};
+               {"limit", &o->limit},           {"contact", &o->contact},   {"spring", &o->spring},
+               {"damper", &o->damper},         {"gravity", &o->weight},    {"clampctrl", &o->clamp},
+               {"refsafe", &o->refsafe},       {"override", &o->override}, {"filterparent", &o->filter_parent}};
   for (size_t i = 0; i < sizeof flags / sizeof *flags; i++)
     *flags[i].flag = cav_xml_word(node, flags[i].name, *flags[i].flag);
-  if (cav_xml_word(node, "override", 0))
-    cav_spec_fail(r->spec, node, "override", "contact override is not supported; write the values into the geoms");
+  // one flag for both, until MuJoCo 3.3
+  if (!cav_xml_word(node, "passive", 1)) o->spring = o->damper = 0;
   if (!cav_xml_word(node, "actuation", 1))
     cav_spec_warn(r->spec, node, "actuation", "left aside: actuators stay available");
-  if (cav_xml_word(node, "multiccd", 0))
-    cav_spec_warn(r->spec, node, "multiccd", "left aside: contact points of a pair are found by its own routine");
+  if (!cav_xml_word(node, "eulerdamp", 1))
+    cav_spec_warn(r->spec, node, "eulerdamp", "left aside: damping of joints is implicit in the order euler");
+  if (cav_xml_word(node, "ipc", 0))
+    cav_spec_lack(r->spec, node, "ipc", "contacts by barriers are not supported; remove the flag");
 }
 
 void cav_mjcf_read_option(cav_mjcf_reader *r, const cav_xml_node *node) {
@@ -75,6 +79,16 @@ void cav_mjcf_read_option(cav_mjcf_reader *r, const cav_xml_node *node) {
   cav_xml_reals(node, "wind", o->wind, 3);
   cav_check_not_negative(spec, node, "density", o->density);
   cav_check_not_negative(spec, node, "viscosity", o->viscosity);
+  read_real(node, "o_margin", &o->o_margin);
+  read_softness(node, "o_solref", "o_solimp", &o->o_softness);
+  cav_xml_reals(node, "o_friction", o->o_friction, 5);
+  const cav_xml_value *groups = cav_xml_get(node, "actuatorgroupdisable");
+  for (int i = 0; groups && i < groups->count; i++) {
+    if (groups->number[i] < 0 || groups->number[i] > 30)
+      cav_spec_fail(spec, node, "actuatorgroupdisable", "expected groups from 0 to 30, got %g", groups->number[i]);
+    else
+      o->disabled_groups |= 1u << (int)groups->number[i];
+  }
   // what only MuJoCo's own step or solver does
   if (cav_xml_word(node, "integrator", 0))
     cav_spec_warn(spec, node, "integrator", "left aside: steps are semi-implicit (velocity first)");
@@ -88,6 +102,15 @@ void cav_mjcf_read_option(cav_mjcf_reader *r, const cav_xml_node *node) {
 
 // --- defaults and materials ---
 
+// a constant, where MuJoCo 3.14 lets stiffness and damping be polynomials
+static void read_constant(cav_spec *spec, const cav_xml_node *node, const char *name, double *out) {
+  double number[3] = {*out, 0, 0};
+  cav_xml_reals(node, name, number, 3);
+  *out = number[0];
+  if (number[1] != 0 || number[2] != 0)
+    cav_spec_lack(spec, node, name, "stiffness and damping that vary are not supported; give one number");
+}
+
 void cav_mjcf_joint_values(cav_spec *spec, const cav_xml_node *node, cav_spec_joint *j) {
   j->type = (cav_joint_type)cav_xml_word(node, "type", (int)j->type);
   cav_xml_reals(node, "pos", j->pos, 3);
@@ -100,14 +123,16 @@ void cav_mjcf_joint_values(cav_spec *spec, const cav_xml_node *node, cav_spec_jo
   read_real(node, "swingrange", &j->swing);
   read_softness(node, "solreflimit", "solimplimit", &j->limit);
   read_softness(node, "solreffriction", "solimpfriction", &j->friction);
-  read_real(node, "stiffness", &j->stiffness);
+  read_constant(spec, node, "stiffness", &j->stiffness);
   read_real(node, "margin", &j->margin);
   read_real(node, "ref", &j->ref);
   read_real(node, "springref", &j->springref);
   read_real(node, "armature", &j->armature);
-  read_real(node, "damping", &j->damping);
+  read_constant(spec, node, "damping", &j->damping);
   read_real(node, "frictionloss", &j->frictionloss);
-  (void)spec;
+  read_limited(node, "actuatorfrclimited", &j->effort);
+  cav_xml_reals(node, "actuatorfrcrange", j->effort_range, 2);
+  j->gravcomp = cav_xml_bool(node, "actuatorgravcomp", j->gravcomp);
 }
 
 void cav_mjcf_geom_values(cav_spec *spec, const cav_xml_node *node, cav_spec_geom *g) {
@@ -135,8 +160,15 @@ void cav_mjcf_geom_values(cav_spec *spec, const cav_xml_node *node, cav_spec_geo
   read_text(node, "material", &g->material);
   read_text(node, "mesh", &g->mesh);
   read_text(node, "hfield", &g->hfield);
-  if (cav_xml_bool(node, "shellinertia", 0))
-    cav_spec_fail(spec, node, "shellinertia", "inertia of a shell is not supported; give the body an inertial element");
+  g->shell = cav_xml_bool(node, "shellinertia", g->shell);
+  read_real(node, "fitscale", &g->fitscale);
+  double speed[6] = {0};
+  cav_xml_reals(node, "surfacevel", speed, 6);
+  for (int k = 0; k < 6; k++) {
+    if (speed[k] != 0) cav_spec_lack(spec, node, "surfacevel", "surfaces that move like a belt are not supported");
+  }
+  if (cav_xml_real(node, "adhesion", 0) != 0)
+    cav_spec_lack(spec, node, "adhesion", "geoms that stick are not supported; give them friction instead");
 }
 
 void cav_mjcf_site_values(cav_spec *spec, const cav_xml_node *node, cav_spec_site *s) {
@@ -148,7 +180,10 @@ void cav_mjcf_site_values(cav_spec *spec, const cav_xml_node *node, cav_spec_sit
 }
 
 void cav_mjcf_pair_values(cav_spec *spec, const cav_xml_node *node, cav_spec_pair *p) {
-  (void)spec;
+  if (cav_xml_get(node, "solreffriction"))
+    cav_spec_leave(spec, node, "solreffriction", "left aside: friction is as soft as solref and impratio say");
+  if (cav_xml_real(node, "adhesion", 0) != 0)
+    cav_spec_lack(spec, node, "adhesion", "geoms that stick are not supported; give them friction instead");
   read_int(node, "condim", &p->condim);
   cav_xml_reals(node, "friction", p->friction, 5);
   read_softness(node, "solref", "solimp", &p->softness);
@@ -163,17 +198,20 @@ void cav_mjcf_equality_values(cav_spec *spec, const cav_xml_node *node, cav_spec
 }
 
 void cav_mjcf_tendon_values(cav_spec *spec, const cav_xml_node *node, cav_spec_tendon *t) {
-  (void)spec;
+  if (cav_xml_real(node, "armature", 0) != 0)
+    cav_spec_lack(spec, node, "armature", "inertia of a tendon is not supported; give its joints armature instead");
+  read_limited(node, "actuatorfrclimited", &t->effort);
+  cav_xml_reals(node, "actuatorfrcrange", t->effort_range, 2);
   read_limited(node, "limited", &t->limited);
   cav_xml_reals(node, "range", t->range, 2);
   read_softness(node, "solreflimit", "solimplimit", &t->limit);
   read_softness(node, "solreffriction", "solimpfriction", &t->friction);
   read_real(node, "margin", &t->margin);
-  read_real(node, "stiffness", &t->stiffness);
-  read_real(node, "damping", &t->damping);
+  read_constant(spec, node, "stiffness", &t->stiffness);
+  read_constant(spec, node, "damping", &t->damping);
   read_real(node, "frictionloss", &t->frictionloss);
   if (cav_xml_get(node, "springlength")) t->has_springlength = 1;
-  read_real(node, "springlength", &t->springlength);
+  if (cav_xml_reals(node, "springlength", t->springlength, 2) == 1) t->springlength[1] = t->springlength[0];
 }
 
 static const cav_softness soft = {{0.02, 1}, {0.9, 0.95, 0.001, 0.5, 2}};
@@ -182,7 +220,8 @@ static const cav_softness soft = {{0.02, 1}, {0.9, 0.95, 0.001, 0.5, 2}};
 cav_mjcf_class cav_mjcf_first_class(void) {
   cav_mjcf_class d = {.name = "main"};
   d.joint = (cav_spec_joint){
-      .type = CAV_JOINT_HINGE, .axis = {0, 0, 1}, .limited = CAV_LIMITED_AUTO, .limit = soft, .friction = soft};
+      .type = CAV_JOINT_HINGE, .axis = {0, 0, 1}, .limited = CAV_LIMITED_AUTO, .effort = CAV_LIMITED_AUTO};
+  d.joint.limit = d.joint.friction = soft;
   d.geom = (cav_spec_geom){.type = CAV_GEOM_SPHERE,
                            .quat = {1, 0, 0, 0},
                            .contype = 1,
@@ -191,12 +230,14 @@ cav_mjcf_class cav_mjcf_first_class(void) {
                            .friction = {1, 0.005, 0.0001},
                            .solmix = 1,
                            .density = 1000,
+                           .fitscale = 1,
                            .softness = soft,
                            .fluidcoef = {0.5, 0.25, 1.5, 1, 1},
                            .rgba = {0.5, 0.5, 0.5, 1}};
   d.site = (cav_spec_site){.quat = {1, 0, 0, 0}, .type = CAV_GEOM_SPHERE, .size = {0.005, 0.005, 0.005}};
   d.pair = (cav_spec_pair){.condim = 3, .friction = {1, 1, 0.005, 0.0001, 0.0001}, .softness = soft};
-  d.tendon = (cav_spec_tendon){.limited = CAV_LIMITED_AUTO, .limit = soft, .friction = soft};
+  d.tendon =
+      (cav_spec_tendon){.limited = CAV_LIMITED_AUTO, .effort = CAV_LIMITED_AUTO, .limit = soft, .friction = soft};
   d.equality = (cav_spec_equality){.active = 1, .softness = soft};
   d.actuator = (cav_spec_actuator){.ctrllimited = CAV_LIMITED_AUTO,
                                    .forcelimited = CAV_LIMITED_AUTO,
@@ -229,9 +270,10 @@ static void read_default_values(cav_mjcf_reader *r, const cav_xml_node *node, ca
     cav_mjcf_equality_values(spec, node, &d->equality);
   else if (!strcmp(name, "tendon"))
     cav_mjcf_tendon_values(spec, node, &d->tendon);
-  else if (!strcmp(name, "mesh"))
+  else if (!strcmp(name, "mesh")) {
     cav_xml_reals(node, "scale", d->scale, 3);
-  else if (!strcmp(name, "material"))
+    d->inertia = (cav_mesh_inertia)cav_xml_word(node, "inertia", (int)d->inertia);
+  } else if (!strcmp(name, "material"))
     cav_xml_reals(node, "rgba", d->rgba, 4);
   else if (cav_xml_accepts(node, "ctrlrange"))
     cav_actuator_read_values(node, &d->actuator);
@@ -289,7 +331,10 @@ void cav_mjcf_check_childclass(cav_mjcf_reader *r, const cav_xml_node *node) {
 
 void cav_mjcf_read_assets(cav_mjcf_reader *r, const cav_xml_node *node) {
   for (const cav_xml_node *c = node->child; c; c = c->next) {
-    if (node_is(c, "mesh")) cav_read_mesh(r->spec, c, cav_mjcf_class_of(r, c, NULL)->scale);
+    if (node_is(c, "mesh")) {
+      const cav_mjcf_class *class = cav_mjcf_class_of(r, c, NULL);
+      cav_read_mesh(r->spec, c, class->scale, class->inertia);
+    }
     if (node_is(c, "hfield")) cav_read_hfield(r->spec, c);
     if (!node_is(c, "material")) continue;
     cav_mjcf_material *m = CAV_SPEC_PUSH(r->spec, &r->materials);

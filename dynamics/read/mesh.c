@@ -297,11 +297,20 @@ static void middle_of(const cav_triangles *m, double middle[3]) {
     copy3(middle, m->vertex);
 }
 
-cav_bulk cav_mesh_bulk(const cav_triangles *m, int exact) {
+static double area_of(double x[3][3]) {
+  double u[3], w[3], n[3];
+  sub3(u, x[1], x[0]);
+  sub3(w, x[2], x[0]);
+  cross3(n, u, w);
+  return norm3(n) / 2;
+}
+
+cav_bulk cav_mesh_bulk(const cav_triangles *m, cav_mesh_inertia what) {
   cav_bulk bulk = {0};
   double middle[3], first[3] = {0, 0, 0}, S[6] = {0};
   middle_of(m, middle);
-  // pyramids from the middle: volume, first and second moments about it
+  int shell = what == CAV_MESH_SHELL;
+  // pyramids from the middle, or triangles about it: size, first and second moments about it
   for (int i = 0; i < m->ntriangle; i++) {
     double x[3][3], c[3], sum[3] = {0, 0, 0};
     for (int k = 0; k < 3; k++) {
@@ -310,14 +319,15 @@ cav_bulk cav_mesh_bulk(const cav_triangles *m, int exact) {
     }
     cross3(c, x[1], x[2]);
     double v = dot3(x[0], c) / 6;
-    if (!exact) v = fabs(v);
+    if (what == CAV_MESH_LEGACY) v = fabs(v);
+    if (shell) v = area_of(x);
     bulk.volume += v;
-    axpy3(first, first, v / 4, sum);
+    axpy3(first, first, v / (shell ? 3 : 4), sum);
     static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
     for (int k = 0; k < 6; k++) {
       double squares = sum[row[k]] * sum[column[k]];
       for (int j = 0; j < 3; j++) squares += x[j][row[k]] * x[j][column[k]];
-      S[k] += v / 20 * squares;
+      S[k] += v / (shell ? 12 : 20) * squares;
     }
   }
   // triangles that are clockwise from outside enclose a negative volume

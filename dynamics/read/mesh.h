@@ -27,9 +27,17 @@ cav_status cav_mesh_read_stl(const char *bytes, size_t size, cav_triangles *mesh
 cav_status cav_mesh_read_obj(const char *bytes, size_t size, cav_triangles *mesh, char *reason, size_t room);
 void cav_triangles_clear(cav_triangles *mesh);
 
-/// Bulk of the solid inside the triangles; exact 0: as the sum of pyramids from the middle of the surface to each
-/// triangle, none negative (MuJoCo's rule, larger where the surface is not convex); 1: signed, right for any closed
-/// surface. mesh.c.
-cav_bulk cav_mesh_bulk(const cav_triangles *mesh, int exact);
+/// What of a mesh weighs. MJCF's words.
+typedef enum cav_mesh_inertia {
+  CAV_MESH_LEGACY, ///< sum of pyramids from the middle of the surface to each triangle, none negative: too large where
+                   ///< the surface is not convex
+  CAV_MESH_EXACT,  ///< the same signed: right for any closed surface
+  CAV_MESH_CONVEX, ///< the solid of its hull
+  CAV_MESH_SHELL   ///< the surface, by area
+} cav_mesh_inertia;
+
+/// Bulk of what the triangles enclose, or of their surface (a volume in m^2); CAV_MESH_CONVEX is for the hull's
+/// triangles and counts as exact. mesh.c.
+cav_bulk cav_mesh_bulk(const cav_triangles *mesh, cav_mesh_inertia what);
 
 #endif

@@ -1,10 +1,10 @@
 /// Reads an MJCF tree into a spec: defaults and classes applied (defaults.c), angles in radians, poses relative to
 /// bodies.
 ///
-/// Source: the MJCF reference of MuJoCo 2.2.2, whose semantics and defaults hold, with extensions of later versions
-/// that no 2.2.2 file can contain: the frame element, gravcomp, and limits that hold where only a range is given. What
-/// would change the dynamics and is not offered is an error (meshes that collide or weigh, adhesion, composite bodies);
-/// what only changes how MuJoCo itself steps is a warning (integrator, cone, noslip). Names are resolved in compile.c.
+/// Source: the MJCF reference of MuJoCo 3.14, and that of 2.2.2 for what has gone since. What would change the dynamics
+/// and is not offered is an error that names all of it in one run (flexible bodies, plugins that act, composite
+/// bodies); what only changes how MuJoCo itself steps or senses is a warning (integrator, cone, noslip). Names are
+/// resolved in compile.c.
 
 #include <stdlib.h>
 
@@ -77,30 +77,37 @@ static void read_colour(cav_mjcf_reader *r, cav_spec_geom *g) {
 static int find_asset(cav_mjcf_reader *r, cav_spec_geom *g) {
   cav_spec *spec = r->spec;
   int is_mesh = g->type == CAV_GEOM_MESH, is_field = g->type == CAV_GEOM_HFIELD;
-  const char *kind = is_mesh ? "mesh" : "hfield", *name = is_mesh ? g->mesh : g->hfield;
-  if (g->mesh && !is_mesh)
-    cav_spec_fail(spec, g->node, "mesh", "fitting a shape to a mesh is not supported; write type=\"mesh\" or the size");
+  const char *kind = is_field ? "hfield" : "mesh", *name = is_field ? g->hfield : g->mesh;
+  int fitted = g->mesh && !is_mesh && !is_field;
   if (g->hfield && !is_field)
     cav_spec_fail(spec, g->node, "hfield", "is for geoms of type hfield; write type=\"hfield\"");
-  if (!is_mesh && !is_field) return 1;
+  if (!is_mesh && !is_field && !fitted) return 1;
   if (!name) {
     cav_spec_fail(spec, g->node, kind, "is missing; name the asset");
     return 0;
   }
-  g->asset = is_mesh ? cav_name_find(spec->mesh.at, spec->mesh.n, sizeof *spec->mesh.at, name)
-                     : cav_name_find(spec->hfield.at, spec->hfield.n, sizeof *spec->hfield.at, name);
-  if (g->asset < 0 && is_mesh)
+  g->asset = !is_field ? cav_name_find(spec->mesh.at, spec->mesh.n, sizeof *spec->mesh.at, name)
+                       : cav_name_find(spec->hfield.at, spec->hfield.n, sizeof *spec->hfield.at, name);
+  if (g->asset < 0 && !is_field)
     cav_spec_unknown(spec, g->node, kind, kind, name, spec->mesh.at, spec->mesh.n, sizeof *spec->mesh.at);
   if (g->asset < 0 && is_field)
     cav_spec_unknown(spec, g->node, kind, kind, name, spec->hfield.at, spec->hfield.n, sizeof *spec->hfield.at);
   g->weighs = cav_geom_weighs(spec, g);
   if (g->contype || g->conaffinity || g->weighs || spec->load.visual) return g->asset >= 0;
-  cav_spec_warn(spec, g->node, NULL, "left out: it can neither touch nor weigh, and is only seen");
+  cav_spec_leave(spec, g->node, NULL, "left out: it can neither touch nor weigh, and is only seen");
   return 0;
+}
+
+// a shape that a plugin gives has none of its own
+static void check_plugin(cav_spec *spec, const cav_xml_node *node, const char *text) {
+  for (const cav_xml_node *c = node->child; c; c = c->next) {
+    if (node_is(c, "plugin")) cav_spec_lack(spec, c, NULL, text);
+  }
 }
 
 static void read_geom(cav_mjcf_reader *r, const cav_xml_node *node, const place *at) {
   cav_spec *spec = r->spec;
+  check_plugin(spec, node, "geoms whose shape a plugin gives are not supported; use a mesh");
   cav_spec_geom *g = CAV_SPEC_PUSH(spec, &spec->geom);
   if (!g) return;
   *g = cav_mjcf_class_of(r, node, at->childclass)->geom;
@@ -182,7 +189,9 @@ static void read_objects(cav_mjcf_reader *r, const cav_xml_node *node, const pla
     if (node_is(c, "geom")) read_geom(r, c, at);
     if (node_is(c, "site")) read_site(r, c, at);
     if (node_is(c, "composite"))
-      cav_spec_fail(r->spec, c, NULL, "composite bodies are not supported; write the bodies out");
+      cav_spec_lack(r->spec, c, NULL, "composite bodies are not supported; write the bodies out");
+    if (node_is(c, "flexcomp")) cav_spec_lack(r->spec, c, NULL, "flexible bodies are not supported; remove them");
+    if (node_is(c, "plugin")) cav_spec_lack(r->spec, c, NULL, "plugins that act on bodies are not supported");
     if (node_is(c, "frame")) {
       place inner = inner_place(r, c, at);
       read_objects(r, c, &inner);
@@ -209,7 +218,7 @@ static void read_bodies(cav_mjcf_reader *r, const cav_xml_node *node, const plac
     move_to(at, b->pos, b->quat);
     cav_mjcf_check_childclass(r, c);
     read_real(c, "gravcomp", &b->gravcomp);
-    if (cav_xml_bool(c, "mocap", 0)) cav_spec_warn(spec, c, "mocap", "left aside: the body stays where it is");
+    if (cav_xml_bool(c, "mocap", 0)) cav_spec_leave(spec, c, "mocap", "left aside: the body stays where it is");
     place in = {spec->body.n - 1, {0, 0, 0}, {1, 0, 0, 0}, cav_xml_text(c, "childclass", at->childclass)};
     for (const cav_xml_node *i = c->child; i; i = i->next) {
       if (node_is(i, "inertial")) read_inertial(r, i, in.body);
@@ -291,7 +300,10 @@ void cav_mjcf_first_options(cav_spec *spec) {
                                    .frictionloss = 1,
                                    .limit = 1,
                                    .contact = 1,
-                                   .passive = 1,
+                                   .spring = 1,
+                                   .damper = 1,
+                                   .o_friction = {1, 1, 0.005, 0.0001, 0.0001},
+                                   .o_softness = {{0.02, 1}, {0.9, 0.95, 0.001, 0.5, 2}},
                                    .weight = 1,
                                    .clamp = 1,
                                    .filter_parent = 1,
@@ -318,6 +330,8 @@ void cav_mjcf_read(cav_spec *spec, const cav_xml *xml) {
   read_sections(&r, root, "asset", cav_mjcf_read_assets);
   read_world(&r, root);
   cav_mjcf_read_sections(&r, root);
+  cav_spec_warn_of_prose(spec);
+  cav_spec_settle_notes(spec);
   if (!spec->body.n) cav_spec_fail(spec, root, NULL, "no worldbody: the model is empty; add bodies");
   free(r.classes.at);
   free(r.materials.at);

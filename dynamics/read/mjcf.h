@@ -16,6 +16,7 @@ typedef struct cav_mjcf_class {
   cav_spec_actuator actuator;
   double rgba[4];  ///< of a material
   double scale[3]; ///< of a mesh
+  cav_mesh_inertia inertia;
 } cav_mjcf_class;
 
 typedef struct cav_mjcf_material {

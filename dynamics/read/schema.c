@@ -1,8 +1,8 @@
 /// The grammar of MJCF: which elements and attributes a model file may have, and of what type.
 ///
-/// Names and counts are those of the MJCF reference for MuJoCo 2.2.2, plus the frame element of later versions. What is
-/// only seen (visual, asset textures, camera, light, statistic, size, custom) is accepted unread. What has an effect
-/// but is not offered is in the table too: mjcf.c says so with the line, which is clearer than "unknown element".
+/// Names and counts are those that MuJoCo 3.14 takes, and those of 2.2.2 that it no longer does. What is only seen or
+/// tunes a solver (visual, asset textures, camera, light, statistic, size, custom, extension) is accepted unread. What
+/// has an effect but is not offered is in the table too: the readers name it with its line, all of it in one run.
 
 #include "remove.h"
 #include "spec.h"
@@ -17,6 +17,8 @@
   { name, CAV_XML_INT, 1, 1, NULL, 0 }
 #define INTS(name, n) \
   { name, CAV_XML_INT, n, n, NULL, 0 }
+#define INTS_ANY(name) \
+  { name, CAV_XML_INT, 0, 0, NULL, 0 }
 #define REAL(name) \
   { name, CAV_XML_REAL, 1, 1, NULL, 0 }
 #define REALS(name, least, most) \
@@ -40,6 +42,12 @@ static const char *const collisions[] = {
     [CAV_COLLISION_ALL] = "all", [CAV_COLLISION_PAIRS] = "predefined", [CAV_COLLISION_GEOMS] = "dynamic", NULL};
 static const char *const cones[] = {"elliptic", "pyramidal", NULL};
 static const char *const integrators[] = {"Euler", "RK4", "implicit", "implicitfast", NULL};
+static const char *const aligns[] = {"false", "true", "auto", NULL};
+static const char *const mesh_inertias[] = {[CAV_MESH_LEGACY] = "legacy",
+                                            [CAV_MESH_EXACT] = "exact",
+                                            [CAV_MESH_CONVEX] = "convex",
+                                            [CAV_MESH_SHELL] = "shell",
+                                            NULL};
 static const char *const joints[] = {[CAV_JOINT_FREE] = "free",
                                      [CAV_JOINT_BALL] = "ball",
                                      [CAV_JOINT_SLIDE] = "slide",
@@ -51,52 +59,62 @@ static const char *const geoms[CAV_GEOM_TYPES + 1] = {
     [CAV_GEOM_MESH] = "mesh",           [CAV_GEOM_HFIELD] = "hfield"};
 static const char *const shapes[] = {"none", "ellipsoid", NULL};
 static const char *const objects[] = {"body", "xbody", "geom", "site", "camera", NULL};
-static const char *const dyntypes[] = {"none", "integrator", "filter", "muscle", "user", NULL};
-static const char *const gaintypes[] = {"fixed", "affine", "muscle", "user", NULL};
-static const char *const biastypes[] = {"none", "affine", "muscle", "user", NULL};
+static const char *const dyntypes[] = {"none",        "integrator", "filter",  "muscle",
+                                       "filterexact", "user",       "dcmotor", NULL};
+static const char *const gaintypes[] = {"fixed", "affine", "muscle", "user", "dcmotor", NULL};
+static const char *const biastypes[] = {"none", "affine", "muscle", "user", "dcmotor", NULL};
 
 // --- attributes shared by defaults and objects ---
 
 #define ORIENTATION \
   REALS("quat", 4, 4), REALS("axisangle", 4, 4), REALS("xyaxes", 6, 6), REALS("zaxis", 3, 3), REALS("euler", 3, 3)
 
-#define JOINT                                                                                                      \
-  WORD("type", joints), SKIP("group"), REALS("pos", 3, 3), REALS("axis", 3, 3), REALS("springdamper", 2, 2),       \
-      WORD("limited", truth), REALS("twistrange", 2, 2), REAL("swingrange"), REALS("solreflimit", 1, 2),           \
-      REALS("solimplimit", 1, 5), REALS("solreffriction", 1, 2), REALS("solimpfriction", 1, 5), REAL("stiffness"), \
-      REALS("range", 2, 2), REAL("margin"), REAL("ref"), REAL("springref"), REAL("armature"), REAL("damping"),     \
-      REAL("frictionloss"), SKIP("user")
+#define EFFORT WORD("actuatorfrclimited", truth), REALS("actuatorfrcrange", 2, 2)
+
+#define JOINT                                                                                                \
+  WORD("type", joints), SKIP("group"), REALS("pos", 3, 3), REALS("axis", 3, 3), REALS("springdamper", 2, 2), \
+      WORD("limited", truth), REALS("twistrange", 2, 2), REAL("swingrange"), REALS("solreflimit", 1, 2),     \
+      REALS("solimplimit", 1, 5), REALS("solreffriction", 1, 2), REALS("solimpfriction", 1, 5),              \
+      REALS("stiffness", 1, 3), REALS("range", 2, 2), REAL("margin"), REAL("ref"), REAL("springref"),        \
+      REAL("armature"), REALS("damping", 1, 3), REAL("frictionloss"), SKIP("user"), EFFORT, BOOL("actuatorgravcomp")
 
 #define GEOM                                                                                                        \
   WORD("type", geoms), REALS("pos", 3, 3), ORIENTATION, INT("contype"), INT("conaffinity"), INT("condim"),          \
       INT("group"), INT("priority"), REALS("size", 1, 3), NAMED("material"), REALS("friction", 1, 3), REAL("mass"), \
       REAL("density"), BOOL("shellinertia"), REAL("solmix"), REALS("solref", 1, 2), REALS("solimp", 1, 5),          \
-      REAL("margin"), REAL("gap"), REALS("fromto", 6, 6), NAMED("hfield"), NAMED("mesh"), SKIP("fitscale"),         \
-      REALS("rgba", 4, 4), WORD("fluidshape", shapes), REALS("fluidcoef", 1, 5), SKIP("user")
+      REAL("margin"), REAL("gap"), REALS("fromto", 6, 6), NAMED("hfield"), NAMED("mesh"), REAL("fitscale"),         \
+      REALS("rgba", 4, 4), WORD("fluidshape", shapes), REALS("fluidcoef", 1, 5), SKIP("user"), REAL("adhesion"),    \
+      REALS("surfacevel", 1, 6)
 
 #define SITE                                                                                                  \
   WORD("type", geoms), SKIP("group"), REALS("pos", 3, 3), ORIENTATION, SKIP("material"), REALS("size", 1, 3), \
-      REALS("fromto", 6, 6), SKIP("rgba"), SKIP("user")
+      REALS("fromto", 6, 6), SKIP("rgba"), SKIP("user"), SKIP("mesh")
 
-#define PAIR \
-  INT("condim"), REALS("friction", 1, 5), REALS("solref", 1, 2), REALS("solimp", 1, 5), REAL("gap"), REAL("margin")
+#define PAIR                                                                                                         \
+  INT("condim"), REALS("friction", 1, 5), REALS("solref", 1, 2), REALS("solimp", 1, 5), REAL("gap"), REAL("margin"), \
+      REALS("solreffriction", 1, 2), REAL("adhesion")
 
 #define EQUALITY BOOL("active"), REALS("solref", 1, 2), REALS("solimp", 1, 5)
 
 #define TENDON                                                                                                         \
   SKIP("group"), WORD("limited", truth), REALS("range", 2, 2), REALS("solreflimit", 1, 2), REALS("solimplimit", 1, 5), \
-      REALS("solreffriction", 1, 2), REALS("solimpfriction", 1, 5), REAL("frictionloss"), REAL("springlength"),        \
-      SKIP("width"), SKIP("material"), REAL("margin"), REAL("stiffness"), REAL("damping"), SKIP("rgba"), SKIP("user")
+      REALS("solreffriction", 1, 2), REALS("solimpfriction", 1, 5), REAL("frictionloss"), REALS("springlength", 1, 2), \
+      SKIP("width"), SKIP("material"), REAL("margin"), REALS("stiffness", 1, 3), REALS("damping", 1, 3), SKIP("rgba"), \
+      SKIP("user"), EFFORT, REAL("armature")
 
-#define ACTUATOR                                                                                                \
-  WORD("ctrllimited", truth), WORD("forcelimited", truth), REALS("ctrlrange", 2, 2), REALS("forcerange", 2, 2), \
-      REALS("gear", 1, 6), REAL("cranklength"), SKIP("user"), SKIP("group")
+#define ACTUATOR                                                                                                      \
+  WORD("ctrllimited", truth), WORD("forcelimited", truth), REALS("ctrlrange", 2, 2), REALS("forcerange", 2, 2),       \
+      REALS("gear", 1, 6), REAL("cranklength"), SKIP("user"), INT("group"), REAL("armature"), REALS("damping", 1, 3), \
+      REAL("delay"), SKIP("nsample"), SKIP("interp")
 
 #define ACTRANGE WORD("actlimited", truth), REALS("actrange", 2, 2)
 
-#define GENERAL                                                                                  \
-  ACTRANGE, WORD("dyntype", dyntypes), WORD("gaintype", gaintypes), WORD("biastype", biastypes), \
-      REALS("dynprm", 1, 10), REALS("gainprm", 1, 10), REALS("biasprm", 1, 10)
+#define GENERAL                                                                                                  \
+  ACTRANGE, WORD("dyntype", dyntypes), WORD("gaintype", gaintypes), WORD("biastype", biastypes),                 \
+      REALS("dynprm", 1, 10), REALS("gainprm", 1, 10), REALS("biasprm", 1, 10), INT("actdim"), SKIP("actearly"), \
+      SKIP("velrange"), SKIP("ffrange")
+
+#define SERVO REAL("kp"), REAL("kv"), REAL("dampratio"), REAL("inheritrange")
 
 #define CYLINDER REAL("timeconst"), REAL("area"), REAL("diameter"), REALS("bias", 3, 3)
 
@@ -129,6 +147,11 @@ UNREAD(skin, "skin");
 UNREAD(camera, "camera");
 UNREAD(light, "light");
 UNREAD(composite, "composite");
+UNREAD(flexcomp, "flexcomp");
+UNREAD(plugin, "plugin");
+UNREAD(flex, "flex");
+UNREAD(layer, "layer");
+UNREAD(extension, "extension");
 
 static const cav_xml_attribute compiler_attributes[] = {BOOL("autolimits"),
                                                         REAL("boundmass"),
@@ -138,7 +161,7 @@ static const cav_xml_attribute compiler_attributes[] = {BOOL("autolimits"),
                                                         BOOL("strippath"),
                                                         WORD("coordinate", coordinates),
                                                         WORD("angle", angles),
-                                                        SKIP("fitaabb"),
+                                                        BOOL("fitaabb"),
                                                         NAMED("eulerseq"),
                                                         TEXT("meshdir"),
                                                         SKIP("texturedir"),
@@ -150,6 +173,9 @@ static const cav_xml_attribute compiler_attributes[] = {BOOL("autolimits"),
                                                         WORD("inertiafromgeom", truth),
                                                         INTS("inertiagrouprange", 2),
                                                         BOOL("exactmeshinertia"),
+                                                        SKIP("saveinertial"),
+                                                        BOOL("alignfree"),
+                                                        SKIP("conflict"),
                                                         END};
 static const cav_xml_element *const compiler_children[] = {&lengthrange, &include, NULL};
 static const cav_xml_element compiler = {"compiler", 0, 0, compiler_attributes, compiler_children, 0};
@@ -158,7 +184,9 @@ LEAF(flag, "flag", WORD("constraint", onoff), WORD("equality", onoff), WORD("fri
      WORD("limit", onoff), WORD("contact", onoff), WORD("passive", onoff), WORD("gravity", onoff),
      WORD("clampctrl", onoff), SKIP("warmstart"), WORD("filterparent", onoff), WORD("actuation", onoff),
      WORD("refsafe", onoff), SKIP("sensor"), WORD("override", onoff), SKIP("energy"), SKIP("fwdinv"),
-     SKIP("sensornoise"), WORD("multiccd", onoff));
+     SKIP("sensornoise"), SKIP("multiccd"), WORD("spring", onoff), WORD("damper", onoff), SKIP("midphase"),
+     SKIP("nativeccd"), SKIP("island"), WORD("eulerdamp", onoff), SKIP("autoreset"), SKIP("invdiscrete"), SKIP("sleep"),
+     SKIP("diagexact"), WORD("ipc", onoff));
 static const cav_xml_attribute option_attributes[] = {REAL("timestep"),
                                                       SKIP("apirate"),
                                                       REAL("impratio"),
@@ -170,9 +198,10 @@ static const cav_xml_attribute option_attributes[] = {REAL("timestep"),
                                                       REALS("magnetic", 3, 3),
                                                       REAL("density"),
                                                       REAL("viscosity"),
-                                                      SKIP("o_margin"),
-                                                      SKIP("o_solref"),
-                                                      SKIP("o_solimp"),
+                                                      REAL("o_margin"),
+                                                      REALS("o_solref", 1, 2),
+                                                      REALS("o_solimp", 1, 5),
+                                                      REALS("o_friction", 1, 5),
                                                       WORD("integrator", integrators),
                                                       WORD("collision", collisions),
                                                       WORD("cone", cones),
@@ -181,15 +210,27 @@ static const cav_xml_attribute option_attributes[] = {REAL("timestep"),
                                                       SKIP("iterations"),
                                                       INT("noslip_iterations"),
                                                       SKIP("mpr_iterations"),
+                                                      SKIP("ls_iterations"),
+                                                      SKIP("ls_tolerance"),
+                                                      SKIP("ccd_iterations"),
+                                                      SKIP("ccd_tolerance"),
+                                                      SKIP("sdf_iterations"),
+                                                      SKIP("sdf_initpoints"),
+                                                      SKIP("sleep_tolerance"),
+                                                      INTS_ANY("actuatorgroupdisable"),
                                                       END};
 static const cav_xml_element *const option_children[] = {&flag, &include, NULL};
 static const cav_xml_element option = {"option", 0, 0, option_attributes, option_children, 0};
 
 // --- defaults ---
 
-LEAF(default_mesh, "mesh", REALS("scale", 3, 3));
-LEAF(default_material, "material", SKIP("texture"), SKIP("emission"), SKIP("specular"), SKIP("shininess"),
-     SKIP("reflectance"), REALS("rgba", 4, 4), SKIP("texrepeat"), SKIP("texuniform"));
+#define MATERIAL                                                                                                 \
+  SKIP("texture"), SKIP("texrepeat"), SKIP("texuniform"), SKIP("emission"), SKIP("specular"), SKIP("shininess"), \
+      SKIP("reflectance"), SKIP("metallic"), SKIP("roughness"), REALS("rgba", 4, 4)
+static const cav_xml_element *const material_children[] = {&layer, &include, NULL};
+LEAF(default_mesh, "mesh", REALS("scale", 3, 3), SKIP("maxhullvert"), WORD("inertia", mesh_inertias));
+static const cav_xml_attribute default_material_attributes[] = {MATERIAL, END};
+static const cav_xml_element default_material = {"material", 0, 0, default_material_attributes, material_children, 0};
 LEAF(default_joint, "joint", JOINT);
 LEAF(default_geom, "geom", GEOM);
 LEAF(default_site, "site", SITE);
@@ -198,13 +239,16 @@ LEAF(default_equality, "equality", EQUALITY);
 LEAF(default_tendon, "tendon", TENDON);
 LEAF(default_general, "general", ACTUATOR, GENERAL);
 LEAF(default_motor, "motor", ACTUATOR);
-LEAF(default_position, "position", ACTUATOR, REAL("kp"));
+LEAF(default_position, "position", ACTUATOR, SERVO, REAL("timeconst"));
 LEAF(default_velocity, "velocity", ACTUATOR, REAL("kv"));
-LEAF(default_intvelocity, "intvelocity", ACTUATOR, ACTRANGE, REAL("kp"));
+LEAF(default_intvelocity, "intvelocity", ACTUATOR, ACTRANGE, SERVO);
 LEAF(default_damper, "damper", ACTUATOR, REAL("kv"));
 LEAF(default_cylinder, "cylinder", ACTUATOR, CYLINDER);
 LEAF(default_muscle, "muscle", ACTUATOR, MUSCLE);
-LEAF(default_adhesion, "adhesion", ACTUATOR, SKIP("gain"));
+UNREAD(adhesion, "adhesion");
+UNREAD(dcmotor, "dcmotor");
+UNREAD(pid, "pid");
+UNREAD(orientation, "orientation");
 
 static const cav_xml_attribute default_attributes[] = {NAMED("class"), END};
 static const cav_xml_element defaults;
@@ -223,7 +267,10 @@ static const cav_xml_element *const default_children[] = {&default_mesh,
                                                           &default_damper,
                                                           &default_cylinder,
                                                           &default_muscle,
-                                                          &default_adhesion,
+                                                          &adhesion,
+                                                          &dcmotor,
+                                                          &pid,
+                                                          &orientation,
                                                           &default_intvelocity,
                                                           &camera,
                                                           &light,
@@ -234,13 +281,34 @@ static const cav_xml_element defaults = {"default", 0, 0, default_attributes, de
 
 // --- assets ---
 
-LEAF(material, "material", NEEDED("name"), NAMED("class"), SKIP("texture"), SKIP("texrepeat"), SKIP("texuniform"),
-     SKIP("emission"), SKIP("specular"), SKIP("shininess"), SKIP("reflectance"), REALS("rgba", 4, 4));
-LEAF(mesh, "mesh", NAMED("name"), NAMED("class"), NAMED("file"), REALS("scale", 3, 3), REALS("refpos", 3, 3),
-     REALS("refquat", 4, 4), REALS("vertex", 0, 0), REALS("face", 0, 0), SKIP("normal"), SKIP("texcoord"),
-     SKIP("smoothnormal"));
-LEAF(hfield, "hfield", NAMED("name"), NAMED("file"), INT("nrow"), INT("ncol"), {"size", CAV_XML_REAL, 4, 4, NULL, 1});
-static const cav_xml_element *const asset_children[] = {&texture, &hfield, &mesh, &skin, &material, &include, NULL};
+static const cav_xml_attribute material_attributes[] = {NEEDED("name"), NAMED("class"), MATERIAL, END};
+static const cav_xml_element material = {"material", 0, 0, material_attributes, material_children, 0};
+static const cav_xml_attribute mesh_attributes[] = {NAMED("name"),
+                                                    NAMED("class"),
+                                                    NAMED("file"),
+                                                    SKIP("content_type"),
+                                                    SKIP("material"),
+                                                    REALS("scale", 3, 3),
+                                                    REALS("refpos", 3, 3),
+                                                    REALS("refquat", 4, 4),
+                                                    REALS("vertex", 0, 0),
+                                                    REALS("face", 0, 0),
+                                                    SKIP("normal"),
+                                                    SKIP("texcoord"),
+                                                    SKIP("smoothnormal"),
+                                                    SKIP("maxhullvert"),
+                                                    WORD("inertia", mesh_inertias),
+                                                    TEXT("builtin"),
+                                                    SKIP("params"),
+                                                    SKIP("octree_maxdepth"),
+                                                    END};
+static const cav_xml_element *const mesh_children[] = {&plugin, &include, NULL};
+static const cav_xml_element mesh = {"mesh", 0, 0, mesh_attributes, mesh_children, 0};
+LEAF(hfield, "hfield", NAMED("name"), NAMED("file"), SKIP("content_type"), INT("nrow"), INT("ncol"),
+     REALS("elevation", 0, 0), {"size", CAV_XML_REAL, 4, 4, NULL, 1});
+LEAF(model_asset, "model", NAMED("name"), NEEDED("file"), SKIP("content_type"));
+static const cav_xml_element *const asset_children[] = {&texture,  &hfield,      &mesh,    &skin,
+                                                        &material, &model_asset, &include, NULL};
 static const cav_xml_element asset = {"asset", 0, 0, NULL, asset_children, 0};
 
 // --- bodies ---
@@ -253,23 +321,36 @@ static const cav_xml_attribute inertial_attributes[] = {{"pos", CAV_XML_REAL, 3,
                                                         END};
 static const cav_xml_element inertial = {"inertial", 0, 1, inertial_attributes, NULL, 0};
 LEAF(joint, "joint", NAMED("name"), NAMED("class"), JOINT);
-LEAF(freejoint, "freejoint", NAMED("name"), SKIP("group"));
-LEAF(geom, "geom", NAMED("name"), NAMED("class"), GEOM);
+LEAF(freejoint, "freejoint", NAMED("name"), SKIP("group"), WORD("align", aligns));
+static const cav_xml_attribute geom_attributes[] = {NAMED("name"), NAMED("class"), GEOM, END};
+static const cav_xml_element *const geom_children[] = {&plugin, &include, NULL};
+static const cav_xml_element geom = {"geom", 0, 0, geom_attributes, geom_children, 0};
+LEAF(attach, "attach", NEEDED("model"), NAMED("body"), TEXT("prefix"), NAMED("frame"));
 LEAF(site, "site", NAMED("name"), NAMED("class"), SITE);
 static const cav_xml_attribute frame_attributes[] = {NAMED("name"), NAMED("childclass"), REALS("pos", 3, 3),
                                                      ORIENTATION, END};
-static const cav_xml_attribute body_attributes[] = {NAMED("name"), NAMED("childclass"), REALS("pos", 3, 3), ORIENTATION,
-                                                    BOOL("mocap"), REAL("gravcomp"),    SKIP("user"),       END};
+static const cav_xml_attribute body_attributes[] = {NAMED("name"), NAMED("childclass"), REALS("pos", 3, 3),
+                                                    ORIENTATION,   BOOL("mocap"),       REAL("gravcomp"),
+                                                    SKIP("user"),  SKIP("sleep"),       END};
 static const cav_xml_element body, frame;
-static const cav_xml_element *const body_children[] = {&inertial, &joint,     &freejoint, &geom, &site,    &camera,
-                                                       &light,    &composite, &frame,     &body, &include, NULL};
-static const cav_xml_element *const frame_children[] = {&joint,     &freejoint, &geom, &site,    &camera, &light,
-                                                        &composite, &frame,     &body, &include, NULL};
-#define WORLD_CHILDREN &geom, &site, &camera, &light, &composite, &frame, &body, &include
+#define WORLD_CHILDREN                                                                                           \
+  &geom, &site, &camera, &light, &composite, &flexcomp, &plugin, &frame, &cav_replicate_element, &attach, &body, \
+      &include
+static const cav_xml_element *const body_children[] = {&inertial, &joint, &freejoint, WORLD_CHILDREN, NULL};
+static const cav_xml_element *const frame_children[] = {&joint, &freejoint, WORLD_CHILDREN, NULL};
+static const cav_xml_attribute replicate_attributes[] = {{"count", CAV_XML_INT, 1, 1, NULL, 1},
+                                                         REALS("offset", 3, 3),
+                                                         REALS("euler", 3, 3),
+                                                         TEXT("sep"),
+                                                         NAMED("childclass"),
+                                                         END};
+const cav_xml_element cav_replicate_element = {"replicate", 0, 0, replicate_attributes, frame_children, 0};
 static const cav_xml_element *const world_children[] = {WORLD_CHILDREN, NULL};
 static const cav_xml_element frame = {"frame", 0, 0, frame_attributes, frame_children, 0};
+const cav_xml_element *const cav_frame_element = &frame;
 static const cav_xml_element body = {"body", 0, 0, body_attributes, body_children, 0};
-static const cav_xml_attribute world_attributes[] = {NAMED("name"), NAMED("childclass"), END};
+static const cav_xml_attribute world_attributes[] = {NAMED("name"),    NAMED("childclass"), SKIP("pos"), SKIP("quat"),
+                                                     SKIP("gravcomp"), SKIP("user"),        END};
 static const cav_xml_element worldbody = {"worldbody", 0, 0, world_attributes, world_children, 0};
 static const cav_xml_element *const scene_children[] = {WORLD_CHILDREN, &cav_remove_element, NULL};
 const cav_xml_element cav_scene_element = {"scene", 0, 1, NULL, scene_children, 0};
@@ -281,18 +362,26 @@ LEAF(exclude, "exclude", NAMED("name"), NEEDED("body1"), NEEDED("body2"));
 static const cav_xml_element *const contact_children[] = {&pair, &exclude, &include, NULL};
 static const cav_xml_element contact = {"contact", 0, 0, NULL, contact_children, 0};
 
-LEAF(connect, "connect", NAMED("name"), NAMED("class"), EQUALITY, NEEDED("body1"), NAMED("body2"),
-     {"anchor", CAV_XML_REAL, 3, 3, NULL, 1});
-LEAF(weld, "weld", NAMED("name"), NAMED("class"), EQUALITY, NEEDED("body1"), NAMED("body2"), REALS("relpose", 7, 7),
-     REALS("anchor", 3, 3), REAL("torquescale"));
+LEAF(connect, "connect", NAMED("name"), NAMED("class"), EQUALITY, NAMED("body1"), NAMED("body2"), NAMED("site1"),
+     NAMED("site2"), REALS("anchor", 3, 3));
+LEAF(weld, "weld", NAMED("name"), NAMED("class"), EQUALITY, NAMED("body1"), NAMED("body2"), NAMED("site1"),
+     NAMED("site2"), REALS("relpose", 7, 7), REALS("anchor", 3, 3), REAL("torquescale"));
+UNREAD(flex_equality, "flex");
+UNREAD(flexvert_equality, "flexvert");
+UNREAD(flexstrain_equality, "flexstrain");
 LEAF(equality_joint, "joint", NAMED("name"), NAMED("class"), EQUALITY, NEEDED("joint1"), NAMED("joint2"),
      REALS("polycoef", 1, 5));
 LEAF(equality_tendon, "tendon", NAMED("name"), NAMED("class"), EQUALITY, NEEDED("tendon1"), NAMED("tendon2"),
      REALS("polycoef", 1, 5));
 LEAF(equality_distance, "distance", NAMED("name"), NAMED("class"), EQUALITY, NEEDED("geom1"), NEEDED("geom2"),
      REAL("distance"));
-static const cav_xml_element *const equality_children[] = {
-    &connect, &weld, &equality_joint, &equality_tendon, &equality_distance, &include, NULL};
+static const cav_xml_element *const equality_children[] = {&connect,           &weld,
+                                                           &equality_joint,    &equality_tendon,
+                                                           &equality_distance, &flex_equality,
+                                                           &flexvert_equality, &flexstrain_equality,
+                                                           &include,           NULL};
+static const cav_xml_element *const deformable_children[] = {&flex, &skin, &include, NULL};
+static const cav_xml_element deformable = {"deformable", 0, 0, NULL, deformable_children, 0};
 static const cav_xml_element equality = {"equality", 0, 0, NULL, equality_children, 0};
 
 static const cav_xml_attribute part_attributes[] = {NEEDED("joint"), {"coef", CAV_XML_REAL, 1, 1, NULL, 1}, END};
@@ -312,23 +401,24 @@ static const cav_xml_element tendon = {"tendon", 0, 0, NULL, tendon_children, 0}
 
 LEAF(general, "general", TRANSMISSION, ACTUATOR, GENERAL);
 LEAF(motor, "motor", TRANSMISSION, ACTUATOR);
-LEAF(position, "position", TRANSMISSION, ACTUATOR, REAL("kp"));
+LEAF(position, "position", TRANSMISSION, ACTUATOR, SERVO, REAL("timeconst"));
 LEAF(velocity, "velocity", TRANSMISSION, ACTUATOR, REAL("kv"));
-LEAF(intvelocity, "intvelocity", TRANSMISSION, ACTUATOR, ACTRANGE, REAL("kp"));
+LEAF(intvelocity, "intvelocity", TRANSMISSION, ACTUATOR, ACTRANGE, SERVO);
 LEAF(damper, "damper", TRANSMISSION, ACTUATOR, REAL("kv"));
 LEAF(cylinder, "cylinder", TRANSMISSION, ACTUATOR, CYLINDER);
 LEAF(muscle, "muscle", TRANSMISSION, ACTUATOR, MUSCLE);
-UNREAD(adhesion, "adhesion");
-static const cav_xml_element *const actuator_children[] = {
-    &general, &motor, &position, &velocity, &intvelocity, &damper, &cylinder, &muscle, &adhesion, &include, NULL};
+static const cav_xml_element *const actuator_children[] = {&general, &motor,    &position,    &velocity, &intvelocity,
+                                                           &damper,  &cylinder, &muscle,      &plugin,   &adhesion,
+                                                           &dcmotor, &pid,      &orientation, &include,  NULL};
 static const cav_xml_element actuator = {"actuator", 0, 0, NULL, actuator_children, 0};
 
 // --- sensors ---
 
-#define READING REAL("cutoff"), SKIP("noise"), SKIP("user")
+#define READING \
+  REAL("cutoff"), SKIP("noise"), SKIP("user"), SKIP("delay"), SKIP("nsample"), SKIP("interp"), SKIP("interval")
 static const cav_xml_attribute of_joint[] = {NAMED("name"), NEEDED("joint"), READING, END};
 static const cav_xml_attribute of_body[] = {NAMED("name"), NEEDED("body"), READING, END};
-static const cav_xml_attribute of_site[] = {NAMED("name"), NEEDED("site"), READING, END};
+static const cav_xml_attribute of_site[] = {NAMED("name"), NAMED("site"), SKIP("camera"), SKIP("data"), READING, END};
 static const cav_xml_attribute of_tendon[] = {NAMED("name"), NEEDED("tendon"), READING, END};
 static const cav_xml_attribute of_actuator[] = {NAMED("name"), NEEDED("actuator"), READING, END};
 static const cav_xml_attribute of_nothing[] = {NAMED("name"), READING, END};
@@ -341,7 +431,12 @@ static const cav_xml_attribute referred_attributes[] = {NAMED("name"),
                                                         NAMED("refname"),
                                                         READING,
                                                         END};
-UNREAD(sensor_user, "user");
+#define UNREAD_SENSORS(X) \
+  X(user)                 \
+  X(plugin)               \
+  X(camprojection) X(insidesite) X(distance) X(normal) X(fromto) X(contact) X(tactile) X(e_potential) X(e_kinetic)
+#define UNREAD_SENSOR(name) UNREAD(sensor_##name, #name);
+UNREAD_SENSORS(UNREAD_SENSOR)
 
 // attributes by what a sensor looks at; frames, by what it reads
 #define OF_NONE(reads) of_nothing
@@ -359,10 +454,11 @@ UNREAD(sensor_user, "user");
 #define OF_FRAME_ACCELERATION place_attributes
 #define SENSOR_ELEMENT(type, name, dim, target, reads, text) \
   [CAV_SENSOR_##type] = {name, 0, 0, OF_##target(reads), NULL, 0},
+#define UNREAD_CHILD(name) &sensor_##name,
 #define SENSOR_CHILD(type, ...) &sensor_elements[CAV_SENSOR_##type],
 static const cav_xml_element sensor_elements[CAV_SENSOR_TYPES] = {CAV_SENSORS(SENSOR_ELEMENT)};
 // clang-format off
-static const cav_xml_element *const sensor_children[] = {CAV_SENSORS(SENSOR_CHILD) &sensor_user, &include, NULL};
+static const cav_xml_element *const sensor_children[] = {CAV_SENSORS(SENSOR_CHILD) UNREAD_SENSORS(UNREAD_CHILD) &include, NULL};
 // clang-format on
 static const cav_xml_element sensor = {"sensor", 0, 0, NULL, sensor_children, 0};
 
@@ -377,8 +473,8 @@ static const cav_xml_element keyframe = {"keyframe", 0, 0, NULL, keyframe_childr
 
 static const cav_xml_attribute mujoco_attributes[] = {TEXT("model"), END};
 static const cav_xml_element *const mujoco_children[] = {
-    &compiler, &option,   &size,   &visual,   &statistic, &defaults, &custom,  &asset, &worldbody,
-    &contact,  &equality, &tendon, &actuator, &sensor,    &keyframe, &include, NULL};
-const cav_xml_element cav_mjcf_root = {"mujoco", 0, 0, mujoco_attributes, mujoco_children, 0};
+    &compiler, &option, &size,     &visual, &statistic, &defaults, &custom,     &asset,     &worldbody, &contact,
+    &equality, &tendon, &actuator, &sensor, &keyframe,  &include,  &deformable, &extension, NULL};
+const cav_xml_element cav_mjcf_root = {"mujoco", 0, 0, mujoco_attributes, mujoco_children, CAV_XML_PROSE};
 static const cav_xml_element *const extension_children[] = {&compiler, &option, &size, NULL};
 const cav_xml_element cav_mjcf_extension = {"mujoco", 0, 0, mujoco_attributes, extension_children, 0};

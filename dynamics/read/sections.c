@@ -36,6 +36,8 @@ static void read_equality_objects(const cav_xml_node *node, cav_spec_equality *e
   while (!node_is(node, names[type][0])) type++;
   e->type = (cav_equality_type)type;
   for (int k = 0; k < 2; k++) e->object[k] = cav_xml_text(node, names[type][1 + k], NULL);
+  e->sites = type <= CAV_EQUALITY_WELD && (cav_xml_get(node, "site1") || cav_xml_get(node, "site2"));
+  for (int k = 0; k < 2 && e->sites; k++) e->object[k] = cav_xml_text(node, k ? "site2" : "site1", NULL);
   if (cav_xml_accepts(node, "anchor")) cav_xml_reals(node, "anchor", e->anchor, 3);
   if (cav_xml_accepts(node, "relpose")) cav_xml_reals(node, "relpose", e->relpose, 7);
   if (cav_xml_accepts(node, "polycoef")) cav_xml_reals(node, "polycoef", e->polycoef, 5);
@@ -44,10 +46,14 @@ static void read_equality_objects(const cav_xml_node *node, cav_spec_equality *e
 static void read_equality(cav_mjcf_reader *r, const cav_xml_node *node) {
   cav_spec *spec = r->spec;
   for (const cav_xml_node *c = node->child; c; c = c->next) {
+    if (!strncmp(c->rule->name, "flex", 4)) {
+      cav_spec_lack(spec, c, NULL, "flexible bodies are not supported; remove them");
+      continue;
+    }
     cav_spec_equality e = cav_mjcf_class_of(r, c, NULL)->equality;
     cav_mjcf_equality_values(spec, c, &e);
     if (!e.active || !spec->option.equality || !spec->option.constraint) {
-      cav_spec_warn(spec, c, NULL, "left out: the constraint is switched off");
+      cav_spec_leave(spec, c, NULL, "left out: the constraint is switched off");
       continue;
     }
     e.name = cav_xml_text(c, "name", "");
@@ -100,13 +106,32 @@ static void read_tendon(cav_mjcf_reader *r, const cav_xml_node *node) {
   }
 }
 
+// what is not read as an actuator; 1: one that is
+static int is_actuator(cav_spec *spec, const cav_xml_node *node) {
+  if (node_is(node, "adhesion") || (cav_xml_accepts(node, "body") && cav_xml_get(node, "body")))
+    cav_spec_leave(spec, node, NULL, "left out: adhesion is not supported; this is the model with that control at 0");
+  else if (node_is(node, "plugin"))
+    cav_spec_lack(spec, node, NULL, "actuators that are plugins are not supported; write a general one instead");
+  else if (!cav_xml_accepts(node, "ctrlrange"))
+    cav_spec_lack(spec, node, NULL, "actuators of this kind are not supported; write a general one instead");
+  else
+    return 1;
+  return 0;
+}
+
 static void read_actuators(cav_mjcf_reader *r, const cav_xml_node *node) {
   cav_spec *spec = r->spec;
   for (const cav_xml_node *c = node->child; c && spec->status == CAV_OK; c = c->next) {
-    cav_spec_actuator *a = CAV_SPEC_PUSH(spec, &spec->actuator);
-    if (!a) return;
-    *a = cav_mjcf_class_of(r, c, NULL)->actuator;
-    cav_actuator_read(spec, c, a);
+    if (!is_actuator(spec, c)) continue;
+    cav_spec_actuator a = cav_mjcf_class_of(r, c, NULL)->actuator;
+    cav_actuator_read(spec, c, &a);
+    if (a.group >= 0 && a.group < 31 && spec->option.disabled_groups >> a.group & 1) {
+      cav_spec_leave(spec, c, NULL, "left out: the actuators of its group are switched off");
+      continue;
+    }
+    cav_spec_actuator *slot = CAV_SPEC_PUSH(spec, &spec->actuator);
+    if (!slot) return;
+    *slot = a;
   }
 }
 
@@ -143,25 +168,44 @@ static void read_sensor(cav_mjcf_reader *r, const cav_xml_node *node, cav_sensor
     if (known && cav_xml_accepts(node, "refname") && cav_xml_get(node, "refname"))
       known = read_frame(node, "reftype", "refname", &s.reference_type, &s.reference);
     if (!known) {
-      cav_spec_warn(spec, node, NULL, "left out: cameras have no frame here");
+      cav_spec_leave(spec, node, NULL, "left out: cameras have no frame here");
       return;
     }
   } else if (target != CAV_TARGET_NONE) {
     s.object_type = objects[target].kind;
-    s.object = cav_xml_text(node, objects[target].attribute, "");
+    s.object = cav_xml_text(node, objects[target].attribute, NULL);
+    if (!s.object) {
+      cav_spec_leave(spec, node, NULL, "left out: cameras have no frame here");
+      return;
+    }
   }
   cav_spec_sensor *slot = CAV_SPEC_PUSH(spec, &spec->sensor);
   if (slot) *slot = s;
+}
+
+// a sensor of an actuator that has been left out
+static int is_of_missing(const cav_spec *spec, const cav_xml_node *node) {
+  if (!cav_xml_accepts(node, "actuator")) return 0;
+  const cav_xml_node *root = cav_xml_root(spec->xml);
+  const char *name = cav_xml_text(node, "actuator", "");
+  if (cav_name_find(spec->actuator.at, spec->actuator.n, sizeof *spec->actuator.at, name) >= 0) return 0;
+  for (const cav_xml_node *s = root->child; s; s = s->next) {
+    for (const cav_xml_node *c = node_is(s, "actuator") ? s->child : NULL; c; c = c->next) {
+      if (c->rule->flags & CAV_XML_ANYTHING) return 1;
+      if (!strcmp(cav_xml_text(c, "name", ""), name)) return 1;
+    }
+  }
+  return 0;
 }
 
 static void read_sensors(cav_mjcf_reader *r, const cav_xml_node *node) {
   for (const cav_xml_node *c = node->child; c; c = c->next) {
     int type = 0;
     while (type < CAV_SENSOR_TYPES && !node_is(c, cav_sensor_rule_of((cav_sensor_type)type)->name)) type++;
-    if (type < CAV_SENSOR_TYPES)
+    if (type < CAV_SENSOR_TYPES && !is_of_missing(r->spec, c))
       read_sensor(r, c, (cav_sensor_type)type);
     else
-      cav_spec_warn(r->spec, c, NULL, "left out: what it reads is not in the file");
+      cav_spec_leave(r->spec, c, NULL, "left out: a sensor of this kind, or of something left out, is not read");
   }
 }
 
@@ -180,6 +224,12 @@ static void read_keys(cav_mjcf_reader *r, const cav_xml_node *node) {
   }
 }
 
+static void read_deformables(cav_mjcf_reader *r, const cav_xml_node *node) {
+  for (const cav_xml_node *c = node->child; c; c = c->next) {
+    if (node_is(c, "flex")) cav_spec_lack(r->spec, c, NULL, "flexible bodies are not supported; remove them");
+  }
+}
+
 void cav_mjcf_read_sections(cav_mjcf_reader *r, const cav_xml_node *root) {
   read_sections(r, root, "contact", read_contact);
   read_sections(r, root, "equality", read_equality);
@@ -187,4 +237,6 @@ void cav_mjcf_read_sections(cav_mjcf_reader *r, const cav_xml_node *root) {
   read_sections(r, root, "actuator", read_actuators);
   read_sections(r, root, "sensor", read_sensors);
   read_sections(r, root, "keyframe", read_keys);
+  read_sections(r, root, "deformable", read_deformables);
+  cav_actuators_settle(r->spec);
 }

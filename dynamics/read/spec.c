@@ -66,6 +66,65 @@ void cav_spec_warn(cav_spec *spec, const cav_xml_node *node, const char *attribu
   if (!*warning) cav_spec_no_memory(spec);
 }
 
+static void note(cav_spec *spec, const cav_xml_node *node, const char *attribute, const char *text, int lacking) {
+  for (int i = 0; i < spec->note.n; i++) {
+    if (strcmp(spec->note.at[i].text, text)) continue;
+    spec->note.at[i].count++;
+    return;
+  }
+  cav_spec_note *n = CAV_SPEC_PUSH(spec, &spec->note);
+  if (n) *n = (cav_spec_note){node, attribute, text, 1, lacking};
+}
+
+void cav_spec_leave(cav_spec *spec, const cav_xml_node *node, const char *attribute, const char *text) {
+  note(spec, node, attribute, text, 0);
+}
+
+void cav_spec_lack(cav_spec *spec, const cav_xml_node *node, const char *attribute, const char *text) {
+  note(spec, node, attribute, text, 1);
+}
+
+// all that is lacking in one text, at the place of the first
+static void fail_for_notes(cav_spec *spec) {
+  char text[600] = "";
+  size_t used = 0;
+  const cav_spec_note *first = NULL;
+  for (int i = 0; i < spec->note.n && used + 1 < sizeof text; i++) {
+    const cav_spec_note *n = &spec->note.at[i];
+    if (!n->lacking) continue;
+    int more = first ? snprintf(text + used, sizeof text - used, ". Also <%s> in line %d: %s", n->node->rule->name,
+                                n->node->line, n->text)
+                     : snprintf(text, sizeof text, "%s", n->text);
+    if (!first) first = n;
+    used += more > 0 ? (size_t)more : 0;
+    if (n->count > 1 && used + 1 < sizeof text) {
+      more = snprintf(text + used, sizeof text - used, " (%d times)", n->count);
+      used += more > 0 ? (size_t)more : 0;
+    }
+  }
+  if (first) cav_spec_fail(spec, first->node, first->attribute, "%s", text);
+}
+
+void cav_spec_settle_notes(cav_spec *spec) {
+  fail_for_notes(spec);
+  for (int i = 0; i < spec->note.n && spec->status == CAV_OK; i++) {
+    const cav_spec_note *n = &spec->note.at[i];
+    if (n->count > 1)
+      cav_spec_warn(spec, n->node, n->attribute, "%s (and %d more)", n->text, n->count - 1);
+    else
+      cav_spec_warn(spec, n->node, n->attribute, "%s", n->text);
+  }
+  spec->note.n = 0;
+}
+
+void cav_spec_warn_of_prose(cav_spec *spec) {
+  const char *file;
+  int line, n = cav_xml_prose(spec->xml, &file, &line);
+  cav_xml_node at = {.rule = cav_xml_root(spec->xml)->rule, .file = file, .line = line};
+  if (n > 1) cav_spec_warn(spec, &at, NULL, "text between tags is passed over, here and in %d more places", n - 1);
+  if (n == 1) cav_spec_warn(spec, &at, NULL, "text between tags is passed over");
+}
+
 void cav_spec_unknown(cav_spec *spec, const cav_xml_node *node, const char *attribute, const char *kind,
                       const char *name, const void *first, int n, size_t stride) {
   const char *near = cav_xml_nearest(name, first, n, stride);
@@ -80,6 +139,7 @@ void cav_spec_clear(cav_spec *spec) {
   for (int i = 0; i < spec->kept.n; i++) free(spec->kept.at[i]);
   free(spec->kept.at);
   free(spec->warning.at);
+  free(spec->note.at);
   free(spec->body.at);
   free(spec->joint.at);
   free(spec->geom.at);

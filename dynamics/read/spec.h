@@ -42,6 +42,9 @@ typedef struct cav_spec_joint {
   int has_twist, has_swing;
   cav_softness limit, friction;
   double stiffness, damping, armature, frictionloss, springdamper[2];
+  cav_limited effort; ///< whether effort_range holds, of the sum of what actuators do to the joint
+  double effort_range[2];
+  int gravcomp; ///< compensation of weight is part of what actuators do
 } cav_spec_joint;
 
 typedef struct cav_spec_geom {
@@ -52,7 +55,8 @@ typedef struct cav_spec_geom {
   int has_fromto;
   int contype, conaffinity, condim, priority, group;
   double friction[3], margin, gap, solmix, mass, density;
-  int has_mass;
+  int has_mass, shell;
+  double fitscale;
   cav_softness softness;
   double rgba[4];
   const char *material, *mesh, *hfield;
@@ -71,16 +75,20 @@ typedef struct cav_spec_mesh {
   const char *path; ///< NULL: vertex and face
   const cav_xml_value *vertex, *face;
   double scale[3], refpos[3], refquat[4];
+  cav_mesh_inertia inertia;
+  int builtin, loaded;
   int index;                              ///< in the model; -1: no geom uses it
   double volume, moment[3];               ///< moments of inertia of density 1
   double pos[3], quat[4], half[3], bound; ///< centre of mass and principal axes; its box and sphere about these
+  double low[3], high[3];                 ///< its box, not about the centre
   cav_hull hull;
 } cav_spec_mesh;
 
 typedef struct cav_spec_hfield {
   const char *name;
   const cav_xml_node *node;
-  const char *path; ///< NULL: level
+  const char *path; ///< NULL: elevation, or level
+  const cav_xml_value *elevation;
   int nrow, ncol, index;
   double size[4]; ///< half lengths along x and y, height, depth of the base
   double *height; ///< [nrow*ncol] m; of malloc
@@ -128,9 +136,11 @@ typedef struct cav_spec_tendon {
   const cav_xml_node *node;
   int spatial, part, npart, path, npath;
   cav_limited limited;
-  double range[2], margin, stiffness, damping, frictionloss, springlength;
+  double range[2], margin, stiffness, damping, frictionloss, springlength[2];
   int has_springlength;
   cav_softness limit, friction;
+  cav_limited effort; ///< whether effort_range holds, of the sum of what actuators do to it
+  double effort_range[2];
 } cav_spec_tendon;
 
 typedef struct cav_spec_equality {
@@ -138,6 +148,7 @@ typedef struct cav_spec_equality {
   const cav_xml_node *node;
   cav_equality_type type;
   const char *object[2]; ///< NULL: none, or the world
+  int sites;             ///< the objects are sites
   int active;
   double anchor[3], relpose[7], torquescale, polycoef[5], distance;
   cav_softness softness;
@@ -151,7 +162,10 @@ typedef struct cav_spec_actuator {
   cav_transmission transmission;
   const char *target_kind, *target, *reference_kind, *reference; ///< attributes and what they name; NULL: no reference
   cav_limited ctrllimited, forcelimited, actlimited;
-  double ctrlrange[2], forcerange[2], actrange[2], lengthrange[2], gear[6], cranklength;
+  double ctrlrange[2], forcerange[2], actrange[2], lengthrange[2], gear[6], cranklength, armature, damping[3];
+  double inherit; ///< > 0: the range of its control is that of its joint or tendon times this, about the middle
+  int integrates; ///< that of its activation instead
+  int group;
   int activation, gain, bias; ///< words of the file, in the order of the enumerations; one more is "user"
   double dynprm[CAV_SPEC_ACTUATOR_PARAMETERS], gainprm[CAV_SPEC_ACTUATOR_PARAMETERS],
       biasprm[CAV_SPEC_ACTUATOR_PARAMETERS];
@@ -178,6 +192,8 @@ typedef struct cav_spec_compiler {
   int degree, autolimits, balance, from_geoms; ///< from_geoms, autolimits: 0 no, 1 yes, 2 not said
   int group_range[2];
   double bound_mass, bound_inertia, total_mass;
+  int fit_box, align_free;
+  int repair; ///< moments of inertia that no solid has are mended or let pass, with a warning
   char euler[4];
   int exact_mesh;          ///< volume of meshes by signed sums
   int fuse;                ///< bodies that move as one take the reference weights of the whole
@@ -190,8 +206,19 @@ typedef enum cav_collision { CAV_COLLISION_ALL, CAV_COLLISION_PAIRS, CAV_COLLISI
 typedef struct cav_spec_option {
   double timestep, gravity[3], density, viscosity, wind[3], magnetic[3], impratio;
   cav_collision collision;
-  int constraint, equality, frictionloss, limit, contact, passive, weight, clamp, filter_parent, refsafe; ///< flags
+  int constraint, equality, frictionloss, limit, contact, spring, damper, weight, clamp, filter_parent, refsafe,
+      override; ///< flags
+  double o_margin, o_friction[5];
+  cav_softness o_softness;  ///< of every contact where override is set
+  unsigned disabled_groups; ///< of actuators, one bit each
 } cav_spec_option;
+
+/// Something that is left aside or not offered, said once however often it occurs.
+typedef struct cav_spec_note {
+  const cav_xml_node *node; ///< of the first
+  const char *attribute, *text;
+  int count, lacking; ///< lacking: the file cannot be read without it
+} cav_spec_note;
 
 /// A growing list of one kind.
 #define CAV_SPEC_LIST(type) \
@@ -226,6 +253,7 @@ typedef struct cav_spec {
   CAV_SPEC_LIST(cav_spec_sensor) sensor;
   CAV_SPEC_LIST(cav_spec_key) key;
   CAV_SPEC_LIST(char *) warning;
+  CAV_SPEC_LIST(cav_spec_note) note;
   CAV_SPEC_LIST(char *) kept; ///< texts made while reading
 } cav_spec;
 
@@ -257,6 +285,15 @@ void cav_spec_no_memory(cav_spec *spec);
 void cav_spec_warn(cav_spec *spec, const cav_xml_node *node, const char *attribute, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 
+/// Notes what is left aside, or cannot be (lacking), by a text that lives as long as the spec: equal texts become one
+/// warning with a count, and all that is lacking one failure, when cav_spec_settle_notes is called.
+void cav_spec_leave(cav_spec *spec, const cav_xml_node *node, const char *attribute, const char *text);
+void cav_spec_lack(cav_spec *spec, const cav_xml_node *node, const char *attribute, const char *text);
+void cav_spec_settle_notes(cav_spec *spec);
+
+/// Warns of text between tags, where there is any.
+void cav_spec_warn_of_prose(cav_spec *spec);
+
 /// Notes that there is no object of that kind and name, and which is near.
 void cav_spec_unknown(cav_spec *spec, const cav_xml_node *node, const char *attribute, const char *kind,
                       const char *name, const void *first, int n, size_t stride);
@@ -277,7 +314,8 @@ int cav_geom_weighs(const cav_spec *spec, const cav_spec_geom *geom);
 void cav_spec_clear(cav_spec *spec);
 
 /// Root of the grammar of MJCF, and the same element where a URDF file has one: options only. schema.c.
-extern const cav_xml_element cav_mjcf_root, cav_mjcf_extension;
+extern const cav_xml_element cav_mjcf_root, cav_mjcf_extension, cav_replicate_element;
+extern const cav_xml_element *const cav_frame_element;
 
 /// Fills spec from a checked tree. mjcf.c.
 void cav_mjcf_read(cav_spec *spec, const cav_xml *xml);
@@ -294,7 +332,7 @@ void cav_mjcf_default_joint(cav_spec_joint *joint);
 void cav_mjcf_default_geom(cav_spec_geom *geom);
 
 /// Mesh and hfield elements of MJCF into the lists of a spec; a mesh by path and scale, once: its index. asset.c.
-void cav_read_mesh(cav_spec *spec, const cav_xml_node *node, const double scale[3]);
+void cav_read_mesh(cav_spec *spec, const cav_xml_node *node, const double scale[3], cav_mesh_inertia inertia);
 void cav_read_hfield(cav_spec *spec, const cav_xml_node *node);
 int cav_add_mesh(cav_spec *spec, const cav_xml_node *node, const char *path, const double scale[3]);
 
@@ -322,5 +360,9 @@ void cav_actuator_read_values(const cav_xml_node *node, cav_spec_actuator *actua
 /// The whole element: values, name, transmission. Then everything but name and the three limits. actuator.c.
 void cav_actuator_read(cav_spec *spec, const cav_xml_node *node, cav_spec_actuator *actuator);
 void cav_actuator_compile(cav_spec *spec, const cav_spec_actuator *s, cav_actuator *actuator);
+
+/// What actuators take from the joints and tendons they act on, once all are read: ranges of control, limits of effort,
+/// armature and damping. actuator.c.
+void cav_actuators_settle(cav_spec *spec);
 
 #endif

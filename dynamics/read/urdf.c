@@ -85,7 +85,7 @@ PARENT(joint, "joint", 0, 0, joint_children, TEXT("name", 1), {"type", CAV_XML_W
 static const cav_xml_element *const robot_children[] = {&robot_link,         &joint, &material, &gazebo, &transmission,
                                                         &cav_mjcf_extension, NULL};
 static const cav_xml_attribute robot_attributes[] = {TEXT("name", 0), SKIP("version"), END};
-const cav_xml_element cav_urdf_root = {"robot", 0, 0, robot_attributes, robot_children, CAV_XML_OPEN};
+const cav_xml_element cav_urdf_root = {"robot", 0, 0, robot_attributes, robot_children, CAV_XML_OPEN | CAV_XML_PROSE};
 
 // --- the tree of links ---
 

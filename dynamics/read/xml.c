@@ -81,6 +81,7 @@ static void read_include(cav_xml_source *s, const cav_xml_node *node) {
 // root of a file: of the main one it starts the tree, of an included one it is left out
 static int is_included_root(cav_xml_source *s, const char *name, int line) {
   if (!s->from || s->depth != 1) return 0;
+  if (s->reader->xml->root->rule->flags & CAV_XML_PROSE) return 1;
   const char *root = s->reader->xml->root->rule->name;
   size_t length = strlen(root);
   if (strncmp(name, root, length) || (name[length] && strcmp(name + length, "include")))
@@ -214,6 +215,10 @@ static void on_text(void *context, const xmlChar *text, int length) {
     // libxml2 stands at the end of the text
     int show = 0, line = s->parser->input->line;
     for (int k = i; k < length; k++) line -= text[k] == '\n';
+    if (r->xml->root && (r->xml->root->rule->flags & CAV_XML_PROSE)) {
+      if (!r->xml->prose++) r->xml->prose_line = line, r->xml->prose_file = s->path;
+      return;
+    }
     while (i + show < length && show < 40 && text[i + show] != '\n') show++;
     cav_xml_source_fail(s, CAV_BAD_INPUT, line, r->at ? r->at->rule->name : NULL, NULL,
                         "text between tags is not read: '%.*s'; remove it", show, (const char *)text + i);
@@ -233,6 +238,11 @@ static void on_doctype(void *context, const xmlChar *name, const xmlChar *id, co
 static void on_error(void *context, xmlErrorPtr error) {
   cav_xml_source *s = context;
   if (!error || error->level < XML_ERR_ERROR) return;
+  // two hyphens in a comment hide nothing, and other readers of models let them pass
+  if (error->code == XML_ERR_HYPHEN_IN_COMMENT) {
+    s->lenient = 1;
+    return;
+  }
   if (error->code == XML_ERR_NO_MEMORY) {
     cav_xml_source_fail(s, CAV_NO_MEMORY, error->line, NULL, NULL, "no memory to parse the file");
     return;
@@ -266,11 +276,13 @@ static void parse(cav_xml_source *s) {
   sax->endDocument = on_document_end;
   sax->serror = on_error;
   s->parser->userData = s;
-  // entities here are only the five of XML itself: "noent" replaces them by their characters
-  xmlDoc *none = xmlCtxtReadMemory(s->parser, s->text, (int)s->size, s->path, NULL, XML_PARSE_NONET | XML_PARSE_NOENT);
+  // entities here are only the five of XML itself: "noent" replaces them by their characters; "recover" goes on where
+  // on_error does not stop
+  xmlDoc *none = xmlCtxtReadMemory(s->parser, s->text, (int)s->size, s->path, NULL,
+                                   XML_PARSE_NONET | XML_PARSE_NOENT | XML_PARSE_RECOVER);
   if (none) xmlFreeDoc(none);
   // all other faults were reported on the way: what stops without a word ran out of memory
-  if (!s->ended || !s->parser->wellFormed)
+  if (!s->ended || !(s->parser->wellFormed || s->lenient))
     cav_xml_source_fail(s, CAV_NO_MEMORY, 0, NULL, NULL, "no memory to parse the file");
   xmlFreeParserCtxt(s->parser);
   xmlResetLastError();

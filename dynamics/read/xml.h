@@ -4,7 +4,7 @@
 /// (name, type, how many values). cav_xml_read checks the whole file against it while reading, so code that walks the
 /// tree afterwards meets only what the table allows, already converted. Every complaint reads "FILE:LINE: <element>:
 /// attribute 'x': expected ..., got '...'; do ...". Not offered: document types and entities (refused), namespaces,
-/// text between tags (refused, but see CAV_XML_ANYTHING).
+/// text between tags (refused, but see CAV_XML_ANYTHING and CAV_XML_PROSE).
 #ifndef CAVORT_XML_H
 #define CAVORT_XML_H
 
@@ -34,7 +34,8 @@ enum {
   CAV_XML_ANYTHING = 1, ///< attributes, children and text of it are accepted unread, children are not kept
   CAV_XML_INCLUDE = 2,  ///< replaced by the children of the root of the file that its attribute 'file' names
   CAV_XML_OPEN = 4,     ///< may hold what the table does not know: kept by name, unread, with CAV_XML_STRANGE
-  CAV_XML_STRANGE = 8   ///< an element or (as min of its rule) an attribute that no table knows
+  CAV_XML_STRANGE = 8,  ///< an element or (as min of its rule) an attribute that no table knows
+  CAV_XML_PROSE = 16    ///< of a root: text between tags is passed over and counted; included files may have any root
 };
 
 typedef struct cav_xml_element {
@@ -88,6 +89,9 @@ const cav_xml_node *cav_xml_root(const cav_xml *xml);
 
 /// Path of the file read.
 const char *cav_xml_path(const cav_xml *xml);
+
+/// Pieces of text between tags that were passed over; the first is in *line of *file.
+int cav_xml_prose(const cav_xml *xml, const char **file, int *line);
 
 /// Next sibling of the same rule, or first child with that rule; NULL if none. For looping over one kind.
 const cav_xml_node *cav_xml_child(const cav_xml_node *node, const cav_xml_element *rule);

@@ -13,6 +13,8 @@ struct cav_xml {
   struct cav_xml_block *memory;
   const char *path;
   cav_xml_node *root;
+  int prose, prose_line; ///< pieces of text passed over, and where the first is
+  const char *prose_file;
 };
 
 typedef struct cav_xml_block cav_xml_block;
@@ -29,6 +31,7 @@ typedef struct cav_xml_source {
   int depth;                     ///< open elements of this file
   int include;                   ///< depth at which an include element is open, 0: none
   int ended;                     ///< libxml2 came to the end of the document
+  int lenient;                   ///< it met a fault that is let pass
   dev_t device;
   ino_t inode;
 } cav_xml_source;

@@ -124,4 +124,20 @@ static int is_new(cav_xml_source *s, const cav_xml_node *asked) {
   return 1;
 }
 
-int cav_xml_load(cav_xml_source *s, const cav_xml_node *asked) { return load(s, asked) && is_new(s, asked) && scan(s); }
+// a declaration behind blank lines says nothing that XML allows there: it is blanked too
+static void blank_late_declaration(cav_xml_source *s) {
+  char *p = s->text, *end = s->text + s->size;
+  while (p < end && is_space(*p)) p++;
+  if (p == s->text || end - p < 6 || memcmp(p, "<?xml ", 6)) return;
+  for (char last = 0; p < end && !(last == '?' && *p == '>'); p++) {
+    last = *p;
+    if (last != '\n') *p = ' ';
+  }
+  if (p < end) *p = ' ';
+}
+
+int cav_xml_load(cav_xml_source *s, const cav_xml_node *asked) {
+  if (!load(s, asked) || !is_new(s, asked)) return 0;
+  blank_late_declaration(s);
+  return scan(s);
+}

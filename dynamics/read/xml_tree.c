@@ -52,6 +52,12 @@ const cav_xml_node *cav_xml_root(const cav_xml *xml) { return xml->root; }
 
 const char *cav_xml_path(const cav_xml *xml) { return xml->path; }
 
+int cav_xml_prose(const cav_xml *xml, const char **file, int *line) {
+  *file = xml->prose_file;
+  *line = xml->prose_line;
+  return xml->prose;
+}
+
 static const cav_xml_node *first_of(const cav_xml_node *node, const cav_xml_element *rule) {
   while (node && node->rule != rule) node = node->next;
   return node;

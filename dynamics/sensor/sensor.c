@@ -279,6 +279,9 @@ static void sense(const cav_model *model, cav_state *state, const cav_sensor *se
     case CAV_SENSOR_ACTUATORFRC:
       out[0] = sense_actuator(model, state, sensor);
       break;
+    case CAV_SENSOR_JOINTACTUATORFRC:
+      out[0] = cav_actuators_at(state, model->joint[sensor->object].dof);
+      break;
     case CAV_SENSOR_JOINTLIMITPOS:
     case CAV_SENSOR_JOINTLIMITVEL:
     case CAV_SENSOR_JOINTLIMITFRC:

@@ -64,7 +64,7 @@ void cav_add_tendon_forces(const cav_model *model, const cav_state *state, const
   for (int i = 0; i < w->ntendon_spring; i++) {
     int k = w->tendon_spring[i];
     const cav_tendon *tendon = &model->tendon[k];
-    double stretch = state->tendon_length[k] - tendon->springlength;
+    double stretch = cav_tendon_stretch(tendon, state->tendon_length[k]);
     double force = tendon->stiffness * stretch + tendon->damping * cav_tendon_velocity(state, k, v);
     cav_tendon_pull(state, k, force, u);
   }

@@ -35,6 +35,12 @@ void cav_inertial_forces(const cav_model *model, const cav_state *state, double 
 
 /// Forces on links that only (q, v) make, taken off state->force after cav_newton_euler: gravity compensation, drag and
 /// lift of a medium at state->velocity. passive.c, fluid.c.
+/// How far a tendon's spring is from the lengths between which it is slack. passive.c.
+static inline double cav_tendon_stretch(const cav_tendon *tendon, double length) {
+  const double *rest = tendon->springlength;
+  return length < rest[0] ? length - rest[0] : length > rest[1] ? length - rest[1] : 0;
+}
+
 void cav_add_buoyancy(const cav_model *model, cav_state *state);
 void cav_add_fluid_forces(const cav_model *model, cav_state *state);
 

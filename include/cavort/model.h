@@ -76,6 +76,7 @@ typedef enum cav_bias { CAV_BIAS_NONE, CAV_BIAS_AFFINE, CAV_BIAS_MUSCLE } cav_bi
   X(ACTUATORPOS, "actuatorpos", 1, ACTUATOR, POSITION, "length of the transmission, gear included")                        \
   X(ACTUATORVEL, "actuatorvel", 1, ACTUATOR, VELOCITY, "its rate")                                                         \
   X(ACTUATORFRC, "actuatorfrc", 1, ACTUATOR, ACCELERATION, "N or N m before gear: least-norm forces of all actuators that give u") \
+  X(JOINTACTUATORFRC, "jointactuatorfrc", 1, SCALAR_JOINT, ACCELERATION, "N m or N, what those forces do to the joint")      \
   X(BALLQUAT, "ballquat", 4, BALL_JOINT, POSITION, "unit quaternion")                                                      \
   X(BALLANGVEL, "ballangvel", 3, BALL_JOINT, VELOCITY, "rad/s, body axes")                                                 \
   X(JOINTLIMITPOS, "jointlimitpos", 1, LIMITED_JOINT, POSITION, "distance to the nearer limit minus margin; 0 where no limit acts, as the next five") \
@@ -205,6 +206,10 @@ typedef struct cav_joint {
   cav_softness limit;
   double stiffness; ///< N m/rad or N/m
   double springref; ///< hinge and slide: q at rest of the spring
+  /// Limit on what all actuators together do to a hinge or slide, N m or N (actuatorfrcrange of MJCF); the force ranges
+  /// of those actuators are within it.
+  int effort_limited;
+  double effort_range[2];
 } cav_joint;
 
 /// One degree of freedom, index into v.
@@ -310,7 +315,8 @@ typedef struct cav_tendon {
   double range[2];
   double margin;
   cav_softness limit;
-  double stiffness, damping, springlength;
+  double stiffness, damping;
+  double springlength[2]; ///< the spring is slack between these lengths, m or rad
   double frictionloss;
   cav_softness friction;
   double inverse_weight; ///< J M^-1 J' at q0
@@ -330,6 +336,7 @@ typedef struct cav_equality {
   cav_equality_type type;
   int dim;             ///< rows: connect 3, weld 6, others 1
   int object[2];       ///< bodies, joints, tendons or geoms; the second joint or tendon may be -1: none
+  int placed;          ///< connect, weld: both points and frames are the file's own (sites), not those of q0
   int link[2];         ///< of bodies and geoms
   double pos[2][3];    ///< connect, weld: the points that are one, each in its link's frame, m
   double quat[2][4];   ///< weld: the frames that are one, each in its link's frame

@@ -117,6 +117,8 @@ static cav_sensor_stage sensor_pattern(const cav_transcription *tr, const cav_se
     case CAV_TARGET_BALL_JOINT:
     case CAV_TARGET_LIMITED_JOINT:
       joint_pattern(m, sensor->object, seen);
+      // fractions of u among all actuators
+      if (sensor->type == CAV_SENSOR_JOINTACTUATORFRC) memset(seen, 1, (size_t)m->nv);
       break;
     case CAV_TARGET_TENDON:
     case CAV_TARGET_LIMITED_TENDON:

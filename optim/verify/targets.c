@@ -62,6 +62,7 @@ static const char *sensor_unit(const cav_model *model, const cav_sensor *sensor,
       return "N m";
     case CAV_SENSOR_JOINTLIMITFRC:
     case CAV_SENSOR_ACTUATORFRC:
+    case CAV_SENSOR_JOINTACTUATORFRC:
       return "N or N m";
     case CAV_SENSOR_ACCELEROMETER:
     case CAV_SENSOR_FRAMELINACC:
