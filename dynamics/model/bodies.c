@@ -13,7 +13,7 @@ int cav_builder_limits(cav_spec *spec, const cav_xml_node *node, const char *att
                        cav_limited limited, const double range[2]) {
   int given = range[0] != 0 || range[1] != 0, holds = limited == CAV_LIMITED_YES;
   if (limited == CAV_LIMITED_AUTO && given) {
-    if (spec->compiler.autolimits == 0)
+    if (cav_compiler_of(spec, node)->autolimits == 0)
       cav_spec_fail(spec, node, attribute, "is missing where %s is given; write true or false, or set autolimits",
                     range_name);
     holds = 1;

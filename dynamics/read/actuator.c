@@ -46,7 +46,7 @@ static void read_servo(const cav_xml_node *node, cav_spec_actuator *a) {
   read_real(node, "inheritrange", &a->inherit);
   a->integrates = integrates;
   if (integrates) {
-    a->actlimited = CAV_LIMITED_YES;
+    if (a->actlimited != CAV_LIMITED_NO) a->actlimited = CAV_LIMITED_AUTO;
     return;
   }
   read_real(node, "timeconst", &a->dynprm[0]);

@@ -19,9 +19,11 @@
 // --- files ---
 
 // path of an asset: relative to the asset folder, that to the model's file; of its path only the name counts with strip
-static const char *asset_path(cav_spec *spec, const char *file) {
-  const char *model = cav_xml_path(spec->xml), *slash = strrchr(model, '/'), *folder = spec->compiler.mesh_folder;
-  if (spec->compiler.strip && strrchr(file, '/')) file = strrchr(file, '/') + 1;
+static const char *asset_path(cav_spec *spec, const cav_xml_node *node, const char *file) {
+  const cav_spec_compiler *compiler = cav_compiler_of(spec, node);
+  const char *model = node->part ? spec->parts.at[node->part - 1].path : cav_xml_path(spec->xml);
+  const char *slash = strrchr(model, '/'), *folder = compiler->mesh_folder;
+  if (compiler->strip && strrchr(file, '/')) file = strrchr(file, '/') + 1;
   int base = slash && *folder != '/' && *file != '/' ? (int)(slash - model) + 1 : 0;
   if (*file == '/') folder = "";
   size_t length = strlen(folder), room = strlen(model) + length + strlen(file) + 3;
@@ -31,12 +33,14 @@ static const char *asset_path(cav_spec *spec, const char *file) {
   return path;
 }
 
-// a file's name without folder and ending
-static const char *name_of(cav_spec *spec, const char *file) {
+// a file's name without folder and ending, behind the prefix of the part
+static const char *name_of(cav_spec *spec, const cav_xml_node *node, const char *file) {
   const char *slash = strrchr(file, '/'), *start = slash ? slash + 1 : file, *dot = strrchr(start, '.');
   size_t length = dot ? (size_t)(dot - start) : strlen(start);
-  char *name = cav_spec_keep_text(spec, length + 1);
-  if (name) memcpy(name, start, length);
+  const char *prefix = node->part ? spec->parts.at[node->part - 1].prefix : "";
+  char *name = cav_spec_keep_text(spec, strlen(prefix) + length + 1);
+  if (name) memcpy(name, prefix, strlen(prefix));
+  if (name) memcpy(name + strlen(prefix), start, length);
   return name ? name : "";
 }
 
@@ -50,7 +54,7 @@ void cav_read_mesh(cav_spec *spec, const cav_xml_node *node, const double scale[
   m->vertex = cav_xml_get(node, "vertex");
   m->face = cav_xml_get(node, "face");
   m->name = cav_xml_text(node, "name", NULL);
-  if (!m->name) m->name = file ? name_of(spec, file) : "";
+  if (!m->name) m->name = file ? name_of(spec, node, file) : "";
   m->inertia = (cav_mesh_inertia)cav_xml_word(node, "inertia", (int)inertia);
   if (cav_xml_get(node, "builtin")) {
     m->builtin = 1;
@@ -58,7 +62,7 @@ void cav_read_mesh(cav_spec *spec, const cav_xml_node *node, const double scale[
   }
   if (!file == !m->vertex)
     cav_spec_fail(spec, node, NULL, "expected one of file and vertex; say where the mesh comes from");
-  m->path = file ? asset_path(spec, file) : NULL;
+  m->path = file ? asset_path(spec, node, file) : NULL;
   copy3(m->scale, scale);
   cav_xml_reals(node, "scale", m->scale, 3);
   cav_xml_reals(node, "refpos", m->refpos, 3);
@@ -89,8 +93,8 @@ void cav_read_hfield(cav_spec *spec, const cav_xml_node *node) {
   const char *file = cav_xml_text(node, "file", NULL);
   *h = (cav_spec_hfield){.node = node, .index = -1};
   h->name = cav_xml_text(node, "name", NULL);
-  if (!h->name) h->name = file ? name_of(spec, file) : "";
-  h->path = file ? asset_path(spec, file) : NULL;
+  if (!h->name) h->name = file ? name_of(spec, node, file) : "";
+  h->path = file ? asset_path(spec, node, file) : NULL;
   h->elevation = cav_xml_get(node, "elevation");
   h->nrow = cav_xml_int(node, "nrow", 0);
   h->ncol = cav_xml_int(node, "ncol", 0);
@@ -170,7 +174,7 @@ static void transform_mesh(const cav_spec_mesh *m, cav_triangles *t) {
 
 // bulk, principal axes, and all vertices into them
 static void weigh_mesh(cav_spec *spec, cav_spec_mesh *m, cav_triangles *t) {
-  int exact = spec->compiler.exact_mesh && m->inertia == CAV_MESH_LEGACY;
+  int exact = cav_compiler_of(spec, m->node)->exact_mesh && m->inertia == CAV_MESH_LEGACY;
   cav_bulk bulk = cav_mesh_bulk(t, exact ? CAV_MESH_EXACT : m->inertia);
   double size = 0, back[4];
   for (int i = 0; i < 3 * t->nvertex; i++) size = fmax(size, fabs(t->vertex[i]));

@@ -303,19 +303,35 @@ static void read_class(cav_mjcf_reader *r, const cav_xml_node *node, int class) 
   }
 }
 
+void cav_mjcf_start_parts(cav_mjcf_reader *r) {
+  cav_spec *spec = r->spec;
+  for (int i = 0; i < spec->parts.n; i++) {
+    cav_spec_part_of_file *p = &spec->parts.at[i];
+    char *name = cav_spec_keep_text(spec, strlen(p->prefix) + sizeof "main");
+    cav_mjcf_class *class = CAV_SPEC_PUSH(spec, &r->classes);
+    if (!name || !class) return;
+    *class = cav_mjcf_first_class();
+    strcpy(name, p->prefix);
+    strcat(name, "main");
+    class->name = name;
+    p->class = r->classes.n - 1;
+  }
+}
+
 void cav_mjcf_read_defaults(cav_mjcf_reader *r, const cav_xml_node *node) {
-  const char *name = cav_xml_text(node, "class", NULL), **first = &r->classes.at[0].name;
+  int class = node->part ? r->spec->parts.at[node->part - 1].class : 0;
+  const char *name = cav_xml_text(node, "class", NULL), **first = &r->classes.at[class].name;
   // the outermost class may have any name, but there is only one
-  if (name && strcmp(*first, "main") && strcmp(*first, name))
+  if (!class && name && strcmp(*first, "main") && strcmp(*first, name))
     cav_spec_fail(r->spec, node, "class", "the outermost class is '%.60s' already; put this one inside it", *first);
   if (name) *first = name;
-  read_class(r, node, 0);
+  read_class(r, node, class);
 }
 
 // the class an object takes: its own, that of its bodies, or the outermost
 const cav_mjcf_class *cav_mjcf_class_of(cav_mjcf_reader *r, const cav_xml_node *node, const char *childclass) {
   const char *name = cav_xml_text(node, "class", childclass);
-  int i = find_class(r, name);
+  int i = name || !node->part ? find_class(r, name) : r->spec->parts.at[node->part - 1].class;
   if (i >= 0) return &r->classes.at[i];
   const char *near = cav_xml_nearest(name, r->classes.at, r->classes.n, sizeof(cav_mjcf_class));
   cav_spec_fail(r->spec, node, "class", "no default class '%.60s'%s%.60s%s", name, near ? "; did you mean '" : "",

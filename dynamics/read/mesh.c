@@ -305,44 +305,54 @@ static double area_of(double x[3][3]) {
   return norm3(n) / 2;
 }
 
-cav_bulk cav_mesh_bulk(const cav_triangles *m, cav_mesh_inertia what) {
-  cav_bulk bulk = {0};
-  double middle[3], first[3] = {0, 0, 0}, S[6] = {0};
-  middle_of(m, middle);
+// size, first and second moments about an apex: xx yy zz xy xz yz
+typedef struct sums {
+  double size, first[3], second[6];
+} sums;
+
+// of pyramids from the apex to each triangle, or of the triangles themselves
+static sums sum_up(const cav_triangles *m, cav_mesh_inertia what, const double apex[3]) {
+  static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
   int shell = what == CAV_MESH_SHELL;
-  // pyramids from the middle, or triangles about it: size, first and second moments about it
+  sums s = {0};
   for (int i = 0; i < m->ntriangle; i++) {
     double x[3][3], c[3], sum[3] = {0, 0, 0};
     for (int k = 0; k < 3; k++) {
-      sub3(x[k], m->vertex + 3 * m->triangle[3 * i + k], middle);
+      sub3(x[k], m->vertex + 3 * m->triangle[3 * i + k], apex);
       add3(sum, sum, x[k]);
     }
     cross3(c, x[1], x[2]);
     double v = dot3(x[0], c) / 6;
     if (what == CAV_MESH_LEGACY) v = fabs(v);
     if (shell) v = area_of(x);
-    bulk.volume += v;
-    axpy3(first, first, v / (shell ? 3 : 4), sum);
-    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    s.size += v;
+    axpy3(s.first, s.first, v / (shell ? 3 : 4), sum);
     for (int k = 0; k < 6; k++) {
       double squares = sum[row[k]] * sum[column[k]];
       for (int j = 0; j < 3; j++) squares += x[j][row[k]] * x[j][column[k]];
-      S[k] += v / (shell ? 12 : 20) * squares;
+      s.second[k] += v / (shell ? 12 : 20) * squares;
     }
   }
+  return s;
+}
+
+cav_bulk cav_mesh_bulk(const cav_triangles *m, cav_mesh_inertia what) {
+  cav_bulk bulk = {0};
+  double middle[3], d[3] = {0, 0, 0};
+  middle_of(m, middle);
+  sums s = sum_up(m, what, middle);
   // triangles that are clockwise from outside enclose a negative volume
-  if (bulk.volume < 0) {
-    bulk.volume = -bulk.volume;
-    scale3(first, -1, first);
-    for (int k = 0; k < 6; k++) S[k] = -S[k];
-  }
-  double d[3] = {0, 0, 0};
-  if (bulk.volume > 0) scale3(d, 1 / bulk.volume, first);
+  double sign = s.size < 0 ? -1 : 1;
+  if (s.size != 0) scale3(d, 1 / s.size, s.first);
   add3(bulk.centre, middle, d);
-  for (int k = 0; k < 3; k++) S[k] -= bulk.volume * d[k] * d[k];
-  S[3] -= bulk.volume * d[0] * d[1];
-  S[4] -= bulk.volume * d[0] * d[2];
-  S[5] -= bulk.volume * d[1] * d[2];
+  // where no pyramid is negative their sizes depend on the apex: MuJoCo takes those from the centre
+  if (what == CAV_MESH_LEGACY) s = sum_up(m, what, bulk.centre), zero3(d);
+  bulk.volume = sign * s.size;
+  double *S = s.second;
+  for (int k = 0; k < 3; k++) S[k] = sign * (S[k] - s.size * d[k] * d[k]);
+  S[3] = sign * (S[3] - s.size * d[0] * d[1]);
+  S[4] = sign * (S[4] - s.size * d[0] * d[2]);
+  S[5] = sign * (S[5] - s.size * d[1] * d[2]);
   const double inertia[6] = {S[1] + S[2], S[0] + S[2], S[0] + S[1], -S[3], -S[4], -S[5]};
   memcpy(bulk.inertia, inertia, sizeof inertia);
   return bulk;

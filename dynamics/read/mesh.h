@@ -29,8 +29,8 @@ void cav_triangles_clear(cav_triangles *mesh);
 
 /// What of a mesh weighs. MJCF's words.
 typedef enum cav_mesh_inertia {
-  CAV_MESH_LEGACY, ///< sum of pyramids from the middle of the surface to each triangle, none negative: too large where
-                   ///< the surface is not convex
+  CAV_MESH_LEGACY, ///< sum of pyramids from their centre to each triangle, none negative: too large where the surface
+                   ///< is not convex
   CAV_MESH_EXACT,  ///< the same signed: right for any closed surface
   CAV_MESH_CONVEX, ///< the solid of its hull
   CAV_MESH_SHELL   ///< the surface, by area

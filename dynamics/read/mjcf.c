@@ -8,12 +8,13 @@
 
 #include <stdlib.h>
 
+#include "expand.h"
 #include "math3.h"
 #include "mjcf.h"
 
 // pose of a frame element in its body, and the class its content takes
 typedef struct place {
-  int body;
+  int body, part;
   double pos[3], quat[4];
   const char *childclass;
 } place;
@@ -28,8 +29,8 @@ static void move_to(const place *at, double pos[3], double quat[4]) {
 
 // --- bodies and what they hold ---
 
-static double angle_unit(const cav_spec *spec, cav_joint_type type) {
-  return spec->compiler.degree && (type == CAV_JOINT_HINGE || type == CAV_JOINT_BALL) ? M_PI / 180 : 1;
+static double angle_unit(const cav_spec *spec, const cav_xml_node *node, cav_joint_type type) {
+  return cav_compiler_of(spec, node)->degree && (type == CAV_JOINT_HINGE || type == CAV_JOINT_BALL) ? M_PI / 180 : 1;
 }
 
 static void read_joint(cav_mjcf_reader *r, const cav_xml_node *node, const place *at) {
@@ -50,7 +51,7 @@ static void read_joint(cav_mjcf_reader *r, const cav_xml_node *node, const place
   j->body = at->body;
   move_to(at, j->pos, NULL);
   quat_rotate(j->axis, at->quat, j->axis);
-  double unit = angle_unit(spec, j->type);
+  double unit = angle_unit(spec, node, j->type);
   j->range[0] *= unit;
   j->range[1] *= unit;
   j->ref *= unit;
@@ -173,12 +174,14 @@ static void read_inertial(cav_mjcf_reader *r, const cav_xml_node *node, int body
 
 // frame element: its pose in the body, on top of the frames around it
 static place inner_place(cav_mjcf_reader *r, const cav_xml_node *node, const place *outer) {
-  place at = {.body = outer->body, .quat = {1, 0, 0, 0}};
+  place at = {.body = outer->body, .part = node->part, .quat = {1, 0, 0, 0}};
+  // classes do not reach into a file that is attached
+  const char *class = node->part == outer->part ? outer->childclass : NULL;
   cav_xml_reals(node, "pos", at.pos, 3);
   cav_read_orientation(r->spec, node, at.quat);
   move_to(outer, at.pos, at.quat);
   cav_mjcf_check_childclass(r, node);
-  at.childclass = cav_xml_text(node, "childclass", outer->childclass);
+  at.childclass = cav_xml_text(node, "childclass", class);
   return at;
 }
 
@@ -219,7 +222,8 @@ static void read_bodies(cav_mjcf_reader *r, const cav_xml_node *node, const plac
     cav_mjcf_check_childclass(r, c);
     read_real(c, "gravcomp", &b->gravcomp);
     if (cav_xml_bool(c, "mocap", 0)) cav_spec_leave(spec, c, "mocap", "left aside: the body stays where it is");
-    place in = {spec->body.n - 1, {0, 0, 0}, {1, 0, 0, 0}, cav_xml_text(c, "childclass", at->childclass)};
+    place in = {.body = spec->body.n - 1, .part = c->part, .quat = {1, 0, 0, 0}};
+    in.childclass = cav_xml_text(c, "childclass", at->childclass);
     for (const cav_xml_node *i = c->child; i; i = i->next) {
       if (node_is(i, "inertial")) read_inertial(r, i, in.body);
     }
@@ -241,7 +245,7 @@ static void read_world(cav_mjcf_reader *r, const cav_xml_node *root) {
             .name = "world", .node = c, .parent = -1, .quat = {1, 0, 0, 0}, .inertia.quat = {1, 0, 0, 0}};
       }
       cav_mjcf_check_childclass(r, c);
-      place at = {0, {0, 0, 0}, {1, 0, 0, 0}, cav_xml_text(c, "childclass", NULL)};
+      place at = {.quat = {1, 0, 0, 0}, .childclass = cav_xml_text(c, "childclass", NULL)};
       if (pass == 0)
         read_objects(r, c, &at);
       else
@@ -316,7 +320,7 @@ void cav_mjcf_read_options(cav_spec *spec, const cav_xml_node *node) {
   read_sections(&r, node, "option", cav_mjcf_read_option);
 }
 
-void cav_mjcf_read(cav_spec *spec, const cav_xml *xml) {
+void cav_mjcf_read(cav_spec *spec, cav_xml *xml) {
   const cav_xml_node *root = cav_xml_root(xml);
   cav_mjcf_reader r = {.spec = spec};
   spec->name = cav_xml_text(root, "model", "");
@@ -326,6 +330,8 @@ void cav_mjcf_read(cav_spec *spec, const cav_xml *xml) {
 
   // each section needs those before it, wherever they stand in the file
   cav_mjcf_read_options(spec, root);
+  cav_expand(spec, xml);
+  cav_mjcf_start_parts(&r);
   read_sections(&r, root, "default", cav_mjcf_read_defaults);
   read_sections(&r, root, "asset", cav_mjcf_read_assets);
   read_world(&r, root);

@@ -73,6 +73,7 @@ void cav_mjcf_pair_values(cav_spec *spec, const cav_xml_node *node, cav_spec_pai
 void cav_mjcf_equality_values(cav_spec *spec, const cav_xml_node *node, cav_spec_equality *e);
 void cav_mjcf_tendon_values(cav_spec *spec, const cav_xml_node *node, cav_spec_tendon *t);
 cav_mjcf_class cav_mjcf_first_class(void);
+void cav_mjcf_start_parts(cav_mjcf_reader *r); ///< the outermost classes of files that are attached
 void cav_mjcf_read_defaults(cav_mjcf_reader *r, const cav_xml_node *node);
 const cav_mjcf_class *cav_mjcf_class_of(cav_mjcf_reader *r, const cav_xml_node *node, const char *childclass);
 void cav_mjcf_check_childclass(cav_mjcf_reader *r, const cav_xml_node *node);

@@ -8,12 +8,12 @@
 #include "spec.h"
 
 // rotation given as a sequence of three angles about the axes named by the compiler option eulerseq
-static void read_euler(const cav_spec *spec, const double *angle, double quat[4]) {
+static void read_euler(const cav_spec_compiler *compiler, const double *angle, double quat[4]) {
   double q[4] = {1, 0, 0, 0};
   for (int i = 0; i < 3; i++) {
-    char axis = spec->compiler.euler[i];
+    char axis = compiler->euler[i];
     int fixed = axis < 'a', k = axis - (fixed ? 'X' : 'x');
-    double half = angle[i] * (spec->compiler.degree ? M_PI / 180 : 1) / 2, turn[4] = {cos(half), 0, 0, 0};
+    double half = angle[i] * (compiler->degree ? M_PI / 180 : 1) / 2, turn[4] = {cos(half), 0, 0, 0};
     turn[1 + k] = sin(half);
     // lower case turns about the axes that move along, upper case about fixed ones
     if (fixed)
@@ -52,7 +52,7 @@ void cav_read_orientation(cav_spec *spec, const cav_xml_node *node, double quat[
       bad = !(a[0] * a[0] + dot3(a + 1, a + 1) > 0);
       quat_normalise(quat);
     } else if (i == 1) {
-      double half = a[3] * (spec->compiler.degree ? M_PI / 180 : 1) / 2;
+      double half = a[3] * (cav_compiler_of(spec, node)->degree ? M_PI / 180 : 1) / 2;
       bad = normalise3(a) < 1e-14;
       quat[0] = cos(half);
       scale3(quat + 1, sin(half), a);
@@ -65,7 +65,7 @@ void cav_read_orientation(cav_spec *spec, const cav_xml_node *node, double quat[
       bad = norm3(a) < 1e-14;
       quat_of_z(a, quat);
     } else {
-      read_euler(spec, a, quat);
+      read_euler(cav_compiler_of(spec, node), a, quat);
     }
     if (bad) cav_spec_fail(spec, node, ways[i], "expected a direction, got one of no length or two that are parallel");
   }

@@ -138,6 +138,9 @@ void cav_spec_clear(cav_spec *spec) {
   for (int i = 0; i < spec->warning.n; i++) free(spec->warning.at[i]);
   for (int i = 0; i < spec->kept.n; i++) free(spec->kept.at[i]);
   free(spec->kept.at);
+  for (int i = 0; i < spec->others.n; i++) cav_xml_free(spec->others.at[i]);
+  free(spec->others.at);
+  free(spec->parts.at);
   free(spec->warning.at);
   free(spec->note.at);
   free(spec->body.at);

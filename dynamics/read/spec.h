@@ -201,6 +201,13 @@ typedef struct cav_spec_compiler {
   const char *mesh_folder; ///< never NULL
 } cav_spec_compiler;
 
+/// A file that another one attaches: what its nodes, whose part counts from 1, are read by.
+typedef struct cav_spec_part_of_file {
+  const char *path, *prefix;
+  cav_spec_compiler compiler;
+  int class; ///< its outermost class of defaults, by defaults.c
+} cav_spec_part_of_file;
+
 typedef enum cav_collision { CAV_COLLISION_ALL, CAV_COLLISION_PAIRS, CAV_COLLISION_GEOMS } cav_collision;
 
 typedef struct cav_spec_option {
@@ -254,7 +261,9 @@ typedef struct cav_spec {
   CAV_SPEC_LIST(cav_spec_key) key;
   CAV_SPEC_LIST(char *) warning;
   CAV_SPEC_LIST(cav_spec_note) note;
-  CAV_SPEC_LIST(char *) kept; ///< texts made while reading
+  CAV_SPEC_LIST(char *) kept;      ///< texts made while reading
+  CAV_SPEC_LIST(cav_xml *) others; ///< files that are attached
+  CAV_SPEC_LIST(cav_spec_part_of_file) parts;
 } cav_spec;
 
 enum {
@@ -263,6 +272,11 @@ enum {
   CAV_SPEC_DOFS = 5000,     ///< most degrees of freedom
   CAV_SPEC_PAIRS = 2000000  ///< most pairs that may touch
 };
+
+/// Compiler settings that an element is read by.
+static inline const cav_spec_compiler *cav_compiler_of(const cav_spec *spec, const cav_xml_node *node) {
+  return node->part ? &spec->parts.at[node->part - 1].compiler : &spec->compiler;
+}
 
 /// spec.c: lists and complaints.
 
@@ -318,7 +332,7 @@ extern const cav_xml_element cav_mjcf_root, cav_mjcf_extension, cav_replicate_el
 extern const cav_xml_element *const cav_frame_element;
 
 /// Fills spec from a checked tree. mjcf.c.
-void cav_mjcf_read(cav_spec *spec, const cav_xml *xml);
+void cav_mjcf_read(cav_spec *spec, cav_xml *xml);
 
 /// Adds the scene's objects that stand in the world, with what the world has of its own; then its bodies, after all
 /// others. mjcf.c.

@@ -71,6 +71,7 @@ typedef struct cav_xml_node {
   int nvalue;
   const cav_xml_value *value;
   struct cav_xml_node *last; ///< child, while reading
+  int part;                  ///< number of the file that it was attached from, 0: the file itself (expand.c)
 } cav_xml_node;
 
 typedef struct cav_xml cav_xml;

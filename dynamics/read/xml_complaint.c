@@ -78,7 +78,7 @@ static int distance(const char *a, const char *b) {
 
 const char *cav_xml_nearest(const char *word, const void *names, int n, size_t stride) {
   const char *best = NULL;
-  int length = (int)strnlen(word, WORD_LIMIT), least = length < 3 ? 2 : 2 + length / 4;
+  int length = (int)strnlen(word, WORD_LIMIT), least = length < 3 ? 1 : 2 + length / 4;
   for (int i = 0; i < n; i++) {
     const char *name = *(const char *const *)((const char *)names + (size_t)i * stride);
     if (!name || !*name) continue;

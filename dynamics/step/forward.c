@@ -520,6 +520,11 @@ cav_status cav_forward_newton(const cav_model *model, cav_state *state, const do
                               cav_forward_report *report) {
   if (iterations < 0 || !(tolerance >= 0.0)) return CAV_BAD_INPUT;
   if (!all_finite(u, model->nv) || !all_finite(v, model->nv)) return CAV_NOT_FINITE;
+  // where nothing moves there is no step to look for
+  if (model->nv == 0) {
+    if (report) *report = (cav_forward_report){0};
+    return cav_inverse(model, state, q, v, v_next, v_next);
+  }
   newton s = {.q = q, .v = v, .u = u, .limit = iterations};
   cav_status status = prepare(&s, model, state);
   if (status != CAV_OK) return status;
