@@ -99,7 +99,7 @@ static void test_options(void) {
   cav_error error = {0};
   cav_load_options options = {.visual = 1};
   cav_model *m = load_with(robot, &options, &error);
-  if (CHECK(m != NULL)) CHECK(warns(m, ":6: <mesh>: attribute 'filename': 'absent.stl' is not found") == 1);
+  if (CHECK(m != NULL)) CHECK(warns(m, ":6: <mesh>: attribute 'filename': 'absent.stl': the file is not found") == 1);
   cav_model_free(m);
   static const char two[] = "<robot name='two'><link name='a'>" MASS(
       "1") "<visual><geometry><box size='1 1 1'/></geometry></visual></link></robot>";
@@ -113,6 +113,95 @@ static void test_options(void) {
   // a floating base as such: nothing stands in the world, a step of the inverse without contacts is the weight
   m = load_with(robot, &(cav_load_options){.floating = 1}, &error);
   CHECK(m == NULL);
+}
+
+#define BAR(ixx, iyy, izz)                                                                                             \
+  "<robot name='bar'>some text<link name='a'/><link name='b'><inertial><mass value='1'/><inertia ixx='" ixx            \
+  "' iyy='" iyy "' izz='" izz                                                                                          \
+  "'/></inertial><collision><geometry><mesh filename='package:///x/shape.dae'/>"                                       \
+  "</geometry></collision><collision><geometry/></collision></link><joint name='j' type='revolute'><parent link='a'/>" \
+  "<child link='b'/><limit lower='-1' upper='1' effort='3' velocity='1' acceleration='9'/></joint></robot>"
+
+// inertias as robots have them: mended where rounding explains it, told where not, refused where they are none
+static void test_inertias(void) {
+  cav_error error = {0};
+  cav_model *m = load(BAR("2", "2", "4.02"), &error);
+  if (CHECK(m != NULL)) {
+    // 0.02 too much, a third of it to each: the nearest moments that a flat body has
+    const double *I = m->body[2].inertia;
+    CHECK_NEAR(fmax(I[0], fmax(I[1], I[2])), 4.02 - .02 / 3, 1e-12);
+    CHECK_NEAR(fmin(I[0], fmin(I[1], I[2])), 2 + .02 / 3, 1e-12);
+    CHECK(warns(m, "by rounding: mended") == 1 && warns(m, "text between tags") == 1);
+    CHECK(warns(m, "the file is not found") == 1 && warns(m, "no shape inside") == 1);
+    CHECK(warns(m, "attribute 'acceleration'") == 1 && m->nwarning == 6);
+    CHECK(m->nactuator == 1 && m->actuator[0].ctrlrange[1] == 3);
+  }
+  cav_model_free(m);
+  m = load(BAR("1", "1", "4"), &error);
+  if (CHECK(m != NULL)) CHECK(warns(m, "which no solid has; taken as it stands") == 1 && m->link[1].inertia[2] == 4);
+  cav_model_free(m);
+  m = load(BAR("2", "2", "-1e-6"), &error);
+  if (CHECK(m != NULL)) CHECK(warns(m, "below 0 by rounding") == 1);
+  cav_model_free(m);
+  m = load(BAR("2", "2", "-1"), &error);
+  CHECK(!m && strstr(error.text, "expected numbers >= 0"));
+  cav_model_free(m);
+  // a link without mass may carry one that has it
+  m = load("<robot><link name='a'/><link name='b'/><link name='c'>" MASS("1")
+           "</link><joint name='j' type='revolute'><parent link='a'/><child link='b'/></joint>"
+           "<joint name='k' type='revolute'><parent link='b'/><child link='c'/><axis xyz='0 1 0'/></joint></robot>",
+           &error);
+  CHECK(m && m->nv == 2);
+  cav_model_free(m);
+}
+
+static void write_file(const char *folder, const char *name, const char *text) {
+  char path[200];
+  snprintf(path, sizeof path, "%s/%s", folder, name);
+  FILE *file = fopen(path, "w");
+  if (!CHECK(file != NULL)) return;
+  fputs(text, file);
+  fclose(file);
+}
+
+// pairs that do not touch and postures, from the file that planners write
+static void test_srdf(void) {
+  static const char balls[] =
+      "<robot name='balls'><link name='a'>" MASS("1") "<collision><geometry><sphere radius='1'/></geometry></collision>"
+      "</link><link name='b'>" MASS("1") "</link><link name='c'>" MASS("1")
+      "<collision><geometry><sphere radius='1'/></geometry></collision></link>"
+      "<joint name='j' type='revolute'><parent link='a'/><child link='b'/></joint>"
+      "<joint name='k' type='prismatic'><parent link='b'/><child link='c'/></joint></robot>";
+  char folder[] = "/tmp/cavort-srdf-XXXXXX", path[200];
+  if (!CHECK(mkdtemp(folder) != NULL)) return;
+  write_file(folder, "model.urdf", balls);
+  snprintf(path, sizeof path, "%s/model.urdf", folder);
+  cav_load_options options = {.floating = 1};
+  cav_error error = {0};
+  cav_model *m = cav_model_load_with(path, &options, &error);
+  CHECK(m && m->npair == 1 && m->nkey == 0);
+  cav_model_free(m);
+  write_file(folder, "balls.srdf",
+             "<robot name='balls'><group name='all'/><disable_collisions link1='c' link2='a' reason='Never'/>"
+             "<disable_collisions link1='c' link2='absent'/><group_state name='half_sitting' group='all'>"
+             "<joint name='root_joint' value='1 2 3 0 0 1 0'/><joint name='j' value='.5'/></group_state>"
+             "<group_state name='half_sitting' group='more'><joint name='k' value='-.25'/></group_state></robot>");
+  m = cav_model_load_with(path, &options, &error);
+  if (CHECK(m && m->npair == 0 && m->nkey == 1 && m->nq == 9)) {
+    const double expected[9] = {1, 2, 3, 0, 0, 0, 1, .5, -.25};
+    CHECK_TEXT(m->key[0].name, "half_sitting");
+    CHECK_NEAR_ALL(m->key[0].q, expected, 9, 1e-15);
+    CHECK(warns(m, "1 pairs of links that do not touch, 1 keyframes") == 1);
+  }
+  cav_model_free(m);
+  write_file(folder, "balls.srdf", "<robot><");
+  m = cav_model_load_with(path, &options, &error);
+  CHECK(m && m->npair == 1 && warns(m, "the SRDF file beside it is left aside") == 1);
+  cav_model_free(m);
+  unlink(path);
+  snprintf(path, sizeof path, "%s/balls.srdf", folder);
+  unlink(path);
+  rmdir(folder);
 }
 
 // faults: line and words
@@ -149,7 +238,6 @@ static void test_faults(void) {
            "1") "</link><joint name='j' type='revolute'><parent link='a'/>"
                 "<child link='b'/>\n<limit lower='1' upper='0'/></joint></robot>",
        ":2: <limit>: attribute 'upper': expected lower < upper"},
-      {"<robot><link name='a'>\n<collision><geometry/></collision></link></robot>", ":2: <geometry>: no shape inside"},
       {"<robot><link name='a'/><link name='b'>\n<inertial><mass value='-1'/><inertia ixx='1' iyy='1' "
        "izz='1'/></inertial>"
        "</link><joint name='j' type='fixed'><parent link='a'/><child link='b'/></joint></robot>",
@@ -254,6 +342,8 @@ static void test_peer(void) {
 int main(void) {
   test_robot();
   test_options();
+  test_inertias();
+  test_srdf();
   test_faults();
   test_damage();
 #ifdef CAVORT_HAVE_MUJOCO

@@ -1,6 +1,8 @@
 /// Bodies, links, joints, geoms and sites of a model. Bodies without joints are fused into the link they stand on:
 /// mass, centre and inertia add up, and geoms, sites and body frames are re-expressed in its frame. Ranges: whether
 /// they hold.
+#include <stdlib.h>
+
 #include "builder.h"
 #include "math3.h"
 
@@ -167,20 +169,32 @@ static void fill_link_inertias(cav_builder *b) {
   }
 }
 
-// what moves has weight, and what turns has inertia
+// what moves has weight, and what turns has inertia, of its own or by what it carries
 static void check_link_inertias(cav_builder *b) {
+  double *carried = calloc(2 * (size_t)b->model->nlink, sizeof *carried);
+  if (!carried) {
+    cav_spec_no_memory(b->spec);
+    return;
+  }
+  for (int i = b->model->nlink - 1; i > 0; i--) {
+    const cav_link *l = &b->link[i];
+    carried[2 * i] += l->mass;
+    carried[2 * i + 1] += l->inertia[0] + l->inertia[1] + l->inertia[2];
+    for (int k = 0; k < 2; k++) carried[2 * l->parent + k] += carried[2 * i + k];
+  }
   for (int i = 0; i < b->model->nlink; i++) {
     const cav_link *l = &b->link[i];
     const cav_xml_node *node = b->spec->body.at[l->body].node;
     cav_builder_finite(b->spec, node, l->com, 3);
     cav_builder_finite(b->spec, node, l->inertia, 6);
     if (i == 0) continue;
-    if (!(l->mass > 1e-15))
+    if (!(carried[2 * i] > 1e-15))
       cav_spec_fail(b->spec, node, NULL, "moves but has no mass; give it a geom with mass, or an inertial element");
-    if (!(l->inertia[0] + l->inertia[1] + l->inertia[2] > 3e-15))
+    if (!(carried[2 * i + 1] > 3e-15))
       cav_spec_fail(b->spec, node, NULL, "moves but has no inertia; give its geoms a size or it an inertial element");
     b->model->mass += l->mass;
   }
+  free(carried);
 }
 
 int cav_builder_joint_limits(cav_spec *spec, const cav_spec_joint *s) {

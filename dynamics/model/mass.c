@@ -200,10 +200,31 @@ static void weigh_by_geoms(cav_spec *spec, cav_spec_body *b) {
   b->inertia = sum;
 }
 
+// moments that miss what a solid has by rounding: those below 0 are set to 0, and a largest one above the sum of the
+// others moves to the nearest that is not. What misses it by more is told and stays
+static void repair_inertia(cav_spec *spec, cav_spec_body *b) {
+  static const double rounding = 0.01; // of the largest moment
+  double *I = b->inertia.moment, most = fmax(I[0], fmax(I[1], I[2])), least = fmin(I[0], fmin(I[1], I[2]));
+  if (least < 0 && least >= -rounding * most) {
+    for (int k = 0; k < 3; k++) I[k] = fmax(I[k], 0);
+    cav_spec_leave(spec, b->node, NULL, "a moment of inertia is below 0 by rounding: set to 0");
+  }
+  double excess = 2 * most - (I[0] + I[1] + I[2]);
+  if (!(excess > 1e-12 * most)) return;
+  if (excess > rounding * most) {
+    cav_spec_leave(spec, b->node, NULL,
+                   "one moment of inertia is above the sum of the others, which no solid has; taken as it stands");
+    return;
+  }
+  for (int k = 0; k < 3; k++) I[k] += I[k] == most ? -excess / 3 : excess / 3;
+  cav_spec_leave(spec, b->node, NULL, "one moment of inertia is above the sum of the others by rounding: mended");
+}
+
 // bounds, signs and the triangle inequality of moments
 static void check_inertia(cav_spec *spec, cav_spec_body *b) {
   const cav_spec_compiler *c = &spec->compiler;
   double *I = b->inertia.moment;
+  if (c->repair) repair_inertia(spec, b);
   if (!isfinite(I[0] + I[1] + I[2]) || fmin(I[0], fmin(I[1], I[2])) < 0)
     cav_spec_fail(spec, b->node, NULL,
                   "principal moments of inertia %g %g %g: expected numbers >= 0; correct the inertia", I[0], I[1],
@@ -212,7 +233,7 @@ static void check_inertia(cav_spec *spec, cav_spec_body *b) {
   for (int i = 0; i < 3; i++) I[i] = fmax(I[i], c->bound_inertia);
   double most = fmax(I[0], fmax(I[1], I[2])), sum = I[0] + I[1] + I[2];
   // rounding of a flat body's sum is no fault
-  if (2 * most <= sum * (1 + 1e-12)) return;
+  if (2 * most <= sum * (1 + 1e-12) || (c->repair && !c->balance)) return;
   if (c->balance)
     set3(I, sum / 3, sum / 3, sum / 3);
   else
@@ -235,6 +256,7 @@ void cav_spec_masses(cav_spec *spec) {
     check_inertia(spec, b);
     if (own) total += b->inertia.mass;
   }
+  cav_spec_settle_notes(spec);
   // all of the model that is not the world scaled to the total asked for
   if (!(c->total_mass > 0) || !(total > 0)) return;
   for (int i = 1; i < spec->own_bodies; i++) {

@@ -360,7 +360,8 @@ static cav_xml *read_other(expansion *e, const cav_xml_node *asset, int depth) {
 static void expand(expansion *e, cav_xml *xml, int depth);
 
 // sections of the other file behind those of the host: what comes whole, and what refers to the attached alone
-static void append_sections(expansion *e, cav_xml_node *root, const cav_xml_node *other, change *c, names *list, int all) {
+static void append_sections(expansion *e, cav_xml_node *root, const cav_xml_node *other, change *c, names *list,
+                            int all) {
   static const char *const ordered[] = {"default", "asset", "tendon", "actuator", "contact", "equality", "sensor"};
   for (size_t i = 0; i < sizeof ordered / sizeof *ordered; i++) {
     for (const cav_xml_node *s = other->child; s && e->spec->status == CAV_OK; s = s->next) {

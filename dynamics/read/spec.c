@@ -109,10 +109,13 @@ void cav_spec_settle_notes(cav_spec *spec) {
   fail_for_notes(spec);
   for (int i = 0; i < spec->note.n && spec->status == CAV_OK; i++) {
     const cav_spec_note *n = &spec->note.at[i];
+    const cav_xml_value *value = n->attribute ? cav_xml_get(n->node, n->attribute) : NULL;
+    const char *given = value ? value->text : "", *quote = *given ? "'" : "", *end = *given ? "': " : "";
     if (n->count > 1)
-      cav_spec_warn(spec, n->node, n->attribute, "%s (and %d more)", n->text, n->count - 1);
+      cav_spec_warn(spec, n->node, n->attribute, "%s%.200s%s%s (and %d more)", quote, given, end, n->text,
+                    n->count - 1);
     else
-      cav_spec_warn(spec, n->node, n->attribute, "%s", n->text);
+      cav_spec_warn(spec, n->node, n->attribute, "%s%.200s%s%s", quote, given, end, n->text);
   }
   spec->note.n = 0;
 }

@@ -362,6 +362,9 @@ void cav_clear_assets(cav_spec *spec);
 extern const cav_xml_element cav_urdf_root;
 void cav_urdf_read(cav_spec *spec, const cav_xml *xml);
 
+/// The SRDF file beside a URDF file, where there is one, once all bodies and joints are read. srdf.c.
+void cav_srdf_read(cav_spec *spec);
+
 /// Orientation of an element, by whichever attribute gives it; quat stays where none does. orientation.c.
 void cav_read_orientation(cav_spec *spec, const cav_xml_node *node, double quat[4]);
 

@@ -6,12 +6,14 @@
 /// collision: visual geometry only on request, since it can neither touch nor weigh. Links joined by fixed joints move
 /// as one and keep their names; their reference weights are those of the whole, as if they were merged, unless the
 /// file's <mujoco><compiler fusestatic="false"/></mujoco> says otherwise. A joint with an effort limit gets a motor of
-/// that range; one that mimics another is tied to it by a joint equality. What the file asks for and is left aside is a
-/// warning with its line: velocity limits, safety controllers, elements that no table knows. Not done: soft limits,
-/// transmissions, xacro.
+/// that range; one that mimics another is tied to it by a joint equality. Moments of inertia that no solid has are
+/// mended where rounding explains them, and let pass where not, as by other readers of URDF; both are told. What the
+/// file asks for and is left aside is a warning, once with a count: velocity limits, safety controllers, elements that
+/// no table knows. Not done: soft limits, transmissions, xacro.
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <strings.h>
 #include <unistd.h>
 
 #include "math3.h"
@@ -232,9 +234,13 @@ static void read_inertial(reader *r, const cav_xml_node *node, cav_spec_body *b)
 // path of a mesh: of a package, sought in the folders above the file; or relative to the file, or its name alone there
 static const char *find_file(cav_spec *spec, const char *name) {
   const char *file = cav_xml_path(spec->xml), *slash = strrchr(file, '/'), *rest = name, *last = strrchr(name, '/');
-  int folder = slash ? (int)(slash - file) + 1 : 0;
-  if (!strncmp(name, "package://", 10)) rest = name + 10;
+  int folder = slash ? (int)(slash - file) + 1 : 0, package = !strncmp(name, "package://", 10);
+  if (package) rest = name + 10;
+  // without a package's name the path starts at one of the folders above
+  while (package && *rest == '/') rest++;
   if (!strncmp(name, "file://", 7)) rest = name + 7;
+  // the folder that a package was cloned into may have another name
+  const char *inside = package && strchr(rest, '/') ? strchr(rest, '/') + 1 : rest;
   size_t room = strlen(file) + strlen(name) + strlen(spec->compiler.mesh_folder) + 4;
   char *path = cav_spec_keep_text(spec, room);
   if (!path) return NULL;
@@ -246,6 +252,8 @@ static const char *find_file(cav_spec *spec, const char *name) {
     while (end > 0 && file[end - 1] != '/') end--;
     snprintf(path, room, "%.*s%s", end, file, rest);
     if (!access(path, F_OK)) return path;
+    snprintf(path, room, "%.*s%s", end, file, inside);
+    if (!access(path, F_OK)) return path;
     if (end == 0 || rest == name) break;
   }
   if (!spec->compiler.strip) return NULL;
@@ -255,13 +263,26 @@ static const char *find_file(cav_spec *spec, const char *name) {
   return access(path, F_OK) ? NULL : path;
 }
 
-// a mesh that is absent cannot be touched; said, not fatal, for robots travel without their meshes
+// whether a file is of a kind that mesh.c reads
+static int is_readable(const char *path) {
+  const char *dot = strrchr(path, '.');
+  return dot && (!strcasecmp(dot, ".stl") || !strcasecmp(dot, ".obj"));
+}
+
+// a mesh that is absent, or of a format that is not read, cannot be touched; said, not fatal, for robots travel without
+// their meshes
 static int read_mesh(cav_spec *spec, const cav_xml_node *node, const double scale[3], int seen_only, cav_spec_geom *g) {
   const char *name = cav_xml_text(node, "filename", ""), *path = find_file(spec, name);
-  if (spec->status == CAV_OK && !path)
-    cav_spec_warn(spec, node, "filename", "'%.200s' is not found: the shape is left out, nothing %s it", name,
-                  seen_only ? "shows" : "touches");
-  if (!path) return 0;
+  if (spec->status != CAV_OK) return 0;
+  if (!path || !is_readable(path)) {
+    static const char *const text[2][2] = {
+        {"the file is not found: the shape is left out, nothing touches it",
+         "the file is not found: the shape is left out, nothing shows it"},
+        {"neither .stl nor .obj: the shape is left out, nothing touches it; convert the file",
+         "neither .stl nor .obj: the shape is left out, nothing shows it; convert the file"}};
+    cav_spec_leave(spec, node, "filename", text[path != NULL][seen_only]);
+    return 0;
+  }
   g->type = CAV_GEOM_MESH;
   g->asset = cav_add_mesh(spec, node, path, scale);
   g->weighs = cav_geom_weighs(spec, g);
@@ -274,7 +295,7 @@ static int read_shape(reader *r, const cav_xml_node *node, int seen_only, cav_sp
   const cav_xml_node *shape = node->child;
   while (shape && (shape->rule->flags & CAV_XML_STRANGE)) shape = shape->next;
   if (!shape) {
-    cav_spec_fail(spec, node, NULL, "no shape inside; give a box, sphere, cylinder, capsule or mesh");
+    cav_spec_leave(spec, node, NULL, "left out: no shape inside; give a box, sphere, cylinder, capsule or mesh");
     return 0;
   }
   if (shape->rule == &box) {
@@ -431,7 +452,7 @@ static void read_joint(reader *r, const cav_xml_node *node, int body) {
   if (a) cav_xml_reals(a, "xyz", direction, 3);
   if (m) read_mimic(r->spec, m, name);
   const cav_xml_node *s = cav_xml_child(node, &safety);
-  if (s) cav_spec_warn(r->spec, s, NULL, "left aside: soft limits of a controller are not part of the dynamics");
+  if (s) cav_spec_leave(r->spec, s, NULL, "left aside: soft limits of a controller are not part of the dynamics");
   if (type == FIXED) return;
   if (!(norm3(direction) > 1e-14))
     cav_spec_fail(r->spec, a, "xyz", "expected a direction, got %g %g %g", direction[0], direction[1], direction[2]);
@@ -507,22 +528,30 @@ static void read_link(reader *r, int index, int up, int depth) {
     if (c->rule == &collision || (c->rule == &visual && spec->load.visual)) read_geom(r, c, body);
   }
   if (!i && spec->body.at[body].ngeom && moves(spec, body))
-    cav_spec_warn(spec, p->node, NULL,
-                  "no inertial element: weighs what its collision shapes weigh at 1000 kg/m^3; give it one");
+    cav_spec_leave(spec, p->node, NULL,
+                   "no inertial element: weighs what its collision shapes weigh at 1000 kg/m^3; give it one");
   for (int k = p->first; k >= 0 && spec->status == CAV_OK; k = r->parts.at[k].next) read_link(r, k, body, depth + 1);
 }
 
 // --- what is left aside ---
 
+// why something of a name is left aside
+static const char *keep_name(cav_spec *spec, const char *what, const char *name) {
+  size_t room = strlen(what) + strlen(name) + 40;
+  char *text = cav_spec_keep_text(spec, room);
+  if (text) snprintf(text, room, "left aside: %s '%s' not known", what, name);
+  return text ? text : "";
+}
+
 // elements and attributes that no table knows
 static void warn_strangers(cav_spec *spec, const cav_xml_node *node) {
   for (int i = 0; i < node->nvalue; i++) {
     if (node->value[i].rule->min == CAV_XML_STRANGE)
-      cav_spec_warn(spec, node, node->value[i].rule->name, "left aside: not known here");
+      cav_spec_leave(spec, node, node->value[i].rule->name, keep_name(spec, "attribute", node->value[i].rule->name));
   }
   for (const cav_xml_node *c = node->child; c; c = c->next) {
     if (c->rule->flags & CAV_XML_STRANGE)
-      cav_spec_warn(spec, c, NULL, "left aside: not known inside %s", node->rule->name);
+      cav_spec_leave(spec, c, NULL, keep_name(spec, "element inside", node->rule->name));
     else
       warn_strangers(spec, c);
   }
@@ -569,6 +598,7 @@ void cav_urdf_read(cav_spec *spec, const cav_xml *xml) {
   spec->compiler.degree = 0;
   spec->compiler.fuse = 1;
   spec->compiler.strip = 1;
+  spec->compiler.repair = 1;
   memcpy(spec->compiler.euler, "XYZ", 3);
   for (const cav_xml_node *c = cav_xml_child(root, &cav_mjcf_extension); c; c = cav_xml_next(c))
     cav_mjcf_read_options(spec, c);
@@ -584,9 +614,12 @@ void cav_urdf_read(cav_spec *spec, const cav_xml *xml) {
   if (first >= 0 && spec->status == CAV_OK && spec->body.n - (strcmp(r.parts.at[first].name, "world") != 0) < r.parts.n)
     cav_spec_fail(spec, root, NULL, "some links carry each other in a circle, apart from the root; connect them to it");
   if (spec->status == CAV_OK) settle_names(spec);
+  if (spec->status == CAV_OK) cav_srdf_read(spec);
   cav_scene_bodies(spec);
   if (r.velocities && spec->status == CAV_OK)
     cav_spec_warn(spec, root, NULL, "left aside: the velocity limits of %d joints", r.velocities);
   if (spec->status == CAV_OK) warn_strangers(spec, root);
+  cav_spec_warn_of_prose(spec);
+  cav_spec_settle_notes(spec);
   free(r.parts.at);
 }
