@@ -50,12 +50,7 @@ static void make_mesh(solid *s) {
     for (int k = 0; k < 3; k++) point[3 * i + k] = s->size[k] * x[k];
   }
   if (cav_hull_build(point, n, &s->hull) != CAV_OK) exit(EXIT_FAILURE);
-  const cav_hull *h = &s->hull;
-  s->mesh = (cav_mesh){.name = "", .nvertex = h->nvertex, .nface = h->nface, .vertex = h->vertex, .plane = h->plane};
-  s->mesh.face = h->face;
-  s->mesh.corner = h->corner;
-  s->mesh.neighbour_start = h->neighbour_start;
-  s->mesh.neighbour = h->neighbour;
+  s->mesh = cav_hull_mesh(&s->hull);
   s->shape.mesh = &s->mesh;
 }
 

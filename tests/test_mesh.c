@@ -13,18 +13,6 @@ static const char *const names[] = {"plane", "sphere", "capsule", "ellipsoid", "
 
 static double uniform(double low, double high) { return low + (high - low) * (scene_uniform() + 1) / 2; }
 
-static cav_mesh mesh_of(const cav_hull *h) {
-  return (cav_mesh){.name = "",
-                    .nvertex = h->nvertex,
-                    .nface = h->nface,
-                    .vertex = h->vertex,
-                    .plane = h->plane,
-                    .face = h->face,
-                    .corner = h->corner,
-                    .neighbour_start = h->neighbour_start,
-                    .neighbour = h->neighbour};
-}
-
 /// A shape with room for what it points to.
 typedef struct solid {
   double size[3];
@@ -43,7 +31,7 @@ static void random_place(cav_shape *s) {
 
 static void make_mesh(solid *s, const double *point, int n) {
   CHECK(cav_hull_build(point, n, &s->hull) == CAV_OK);
-  s->mesh = mesh_of(&s->hull);
+  s->mesh = cav_hull_mesh(&s->hull);
   s->shape.type = CAV_GEOM_MESH;
   s->shape.mesh = &s->mesh;
   for (int i = 0; i < n; i++) {

@@ -22,11 +22,12 @@
 #include <ccd/ccd.h>
 #endif
 
-enum { NEAR_MAX = 12, FEATURES_MAX = NEAR_MAX + NEAR_MAX * (NEAR_MAX - 1) / 2 + 8 };
-// fraction of the size within which corners meet; sine below which a direction is square to another
-static const double MEETS = 1e-2, SQUARE = 1e-9;
-// fractions of the size: gaps that are equal; points that lie across from each other
-static const double LEAST_GAIN = 1e-13, ACROSS = 1e-12;
+enum { NEAR_MAX = 12, FLAT_MAX = 8, FEATURES_MAX = NEAR_MAX + NEAR_MAX * (NEAR_MAX - 1) / 2 + FLAT_MAX };
+// fractions of the size within which corners may meet: the few nearest ones first, which mostly are enough; sine below
+// which a direction is square to another; 1 - cosine below which two are one
+static const double FEW = 1e-6, MEETS = 1e-2, SQUARE = 1e-9, PARALLEL = 1e-14;
+// fractions of the size: gaps that are equal; points that lie across from each other, or nearly
+static const double LEAST_GAIN = 1e-13, ACROSS = 1e-12, NEARLY_ACROSS = 1e-9;
 // fraction of the size by which the polish improves on a search that has not ended
 static const double LOOSE = 1e-6;
 
@@ -49,7 +50,7 @@ typedef struct candidate {
 typedef struct search {
   const cav_shape *a, *b; ///< a is curved
   const cav_core *core;   ///< of b
-  double size;
+  double size, meets;
   candidate best;
 } search;
 
@@ -68,39 +69,73 @@ static void add_cylinder(const cav_shape *s, const double n[3], feature *f, int 
   }
 }
 
-// corners furthest along n, to a fraction of the size; their number
-static int near_corners(const cav_shape *s, const double n[3], double size, int near[NEAR_MAX]) {
-  double height[NEAR_MAX], x[3], top = -INFINITY;
-  int count = 0, all = cav_shape_corners(s);
-  for (int v = 0; v < all; v++) {
-    cav_shape_corner(s, v, x);
-    top = fmax(top, dot3(n, x));
-  }
-  for (int v = 0; v < all; v++) {
-    cav_shape_corner(s, v, x);
-    double h = dot3(n, x);
-    if (!(h > top - MEETS * size) || (count == NEAR_MAX && h <= height[NEAR_MAX - 1])) continue;
-    // sorted by height; the lowest falls off the end
-    int k = count < NEAR_MAX ? count++ : NEAR_MAX - 1;
-    for (; k > 0 && height[k - 1] < h; k--) {
-      height[k] = height[k - 1];
-      near[k] = near[k - 1];
+// corners of a mesh furthest along n, highest first: each time the highest neighbour of those found, as what is higher
+// than a plane is connected on a convex body
+static int near_vertices(const cav_shape *s, const double n[3], double band, int near[NEAR_MAX]) {
+  const cav_mesh *m = s->mesh;
+  double local[3];
+  rotate_back(local, s->rotation, n);
+  near[0] = cav_mesh_summit(m, local);
+  double top = dot3(local, m->vertex + 3 * near[0]);
+  int count = 1;
+  while (count < NEAR_MAX) {
+    double most = top - band;
+    int best = -1;
+    for (int i = 0; i < count; i++) {
+      for (int k = m->neighbour_start[near[i]]; k < m->neighbour_start[near[i] + 1]; k++) {
+        int known = 0, v = m->neighbour[k];
+        double h = dot3(local, m->vertex + 3 * v);
+        for (int j = 0; j < count && h > most; j++) known |= near[j] == v;
+        if (h > most && !known) most = h, best = v;
+      }
     }
-    height[k] = h;
-    near[k] = v;
+    if (best < 0) break;
+    near[count++] = best;
   }
   return count;
 }
 
-static void add_polyhedron(const cav_shape *s, const double n[3], double size, feature *f, int *count) {
-  int near[NEAR_MAX], corners = near_corners(s, n, size, near), flat = 0;
-  for (int face = 0; face < cav_shape_faces(s) && flat < 8; face++) {
-    double normal[3];
-    cav_shape_normal(s, face, normal);
-    if (dot3(normal, n) < 1 - MEETS) continue;
-    f[*count] = (feature){.corners = 3, .face = face, .straight = 2};
-    copy3(f[(*count)++].axis, normal);
-    flat++;
+// corners furthest along n, to within a band; their number
+static int near_corners(const cav_shape *s, const double n[3], double band, int near[NEAR_MAX]) {
+  double height[8], x[3], top = -INFINITY;
+  int count = 0, all = cav_shape_corners(s);
+  if (s->type == CAV_GEOM_MESH) return near_vertices(s, n, band, near);
+  for (int v = 0; v < all; v++) {
+    cav_shape_corner(s, v, x);
+    height[v] = dot3(n, x);
+    top = fmax(top, height[v]);
+  }
+  for (int v = 0; v < all; v++) {
+    if (height[v] > top - band) near[count++] = v;
+  }
+  return count;
+}
+
+// faces that look along n, to a cosine: of a mesh those that meet at corners near n; their number
+static int near_faces(const cav_shape *s, const double n[3], double cosine, const int *near, int corners,
+                      int face[FLAT_MAX]) {
+  const cav_mesh *m = s->type == CAV_GEOM_MESH && s->mesh->meeting ? s->mesh : NULL;
+  int count = 0;
+  for (int i = 0; i < (m ? corners : 1); i++) {
+    int first = m ? m->meeting_start[near[i]] : 0, end = m ? m->meeting_start[near[i] + 1] : cav_shape_faces(s);
+    for (int k = first; k < end && count < FLAT_MAX; k++) {
+      int f = m ? m->meeting[k] : k, known = 0;
+      double normal[3];
+      for (int j = 0; j < count; j++) known |= face[j] == f;
+      if (known) continue;
+      cav_shape_normal(s, f, normal);
+      if (dot3(normal, n) >= cosine) face[count++] = f;
+    }
+  }
+  return count;
+}
+
+static void add_polyhedron(const cav_shape *s, const double n[3], double meets, double size, feature *f, int *count) {
+  int near[NEAR_MAX], face[FLAT_MAX], corners = near_corners(s, n, meets * size, near);
+  int flat = near_faces(s, n, 1 - meets, near, corners, face);
+  for (int i = 0; i < flat; i++) {
+    f[*count] = (feature){.corners = 3, .face = face[i], .straight = 2};
+    cav_shape_normal(s, face[i], f[(*count)++].axis);
   }
   for (int i = 0; i < corners; i++) {
     feature corner = {.corners = 1};
@@ -118,14 +153,14 @@ static void add_polyhedron(const cav_shape *s, const double n[3], double size, f
   }
 }
 
-static int features_along(const cav_shape *s, const double n[3], double size, feature f[FEATURES_MAX]) {
+static int features_along(const cav_shape *s, const double n[3], double meets, double size, feature f[FEATURES_MAX]) {
   int count = 0;
   if (s->type == CAV_GEOM_CYLINDER)
     add_cylinder(s, n, f, &count);
   else if (s->type == CAV_GEOM_ELLIPSOID)
     f[count++] = (feature){.corners = 0};
   else
-    add_polyhedron(s, n, size, f, &count);
+    add_polyhedron(s, n, meets, size, f, &count);
   return count;
 }
 
@@ -236,6 +271,8 @@ static void climb(const search *g, const feature *fa, const feature *fb, const d
 // the direction about a start in which two features meet; 0 if there is none
 static int solve(const search *g, const feature *fa, const feature *fb, const double start[3], double n[3]) {
   const double *square = fa->straight == 1 ? fa->axis : fb->straight == 1 ? fb->axis : NULL;
+  // of two flat ones a direction has only one unless they are parallel: else a corner or an edge of the other meets it
+  if (fa->straight == 2 && fb->straight == 2 && dot3(fa->axis, fb->axis) > PARALLEL - 1) return 0;
   if (fa->straight == 2 || fb->straight == 2) {
     scale3(n, fa->straight == 2 ? 1 : -1, fa->straight == 2 ? fa->axis : fb->axis);
     return 1;
@@ -373,6 +410,13 @@ static void keep(search *g, const feature *fa, const feature *fb, const double n
   g->best = c;
 }
 
+// bodies that are apart: whatever else there is, their distance lies between the gap and what the points that meet are
+// apart, gap + miss^2/(2 gap)
+static int is_proven_apart(const search *g) {
+  double gap = g->best.separation.gap, miss = g->best.miss;
+  return gap > 0 && miss < NEARLY_ACROSS * g->size && miss * miss < 2 * gap * LEAST_GAIN * g->size;
+}
+
 // all pairs of features about a direction, again about the best of them until that is proven, or its gap falls short of
 // least; 1 if it is proven
 static int polish(search *g, const double start[3], double least) {
@@ -383,10 +427,11 @@ static int polish(search *g, const double start[3], double least) {
   g->best = (candidate){.separation = {.gap = -INFINITY}, .miss = INFINITY};
   for (int round = 0; round < ROUNDS_MAX; round++) {
     scale3(back, -1, about);
-    int na = features_along(g->a, about, g->size, fa), nb = features_along(g->b, back, g->size, fb);
+    int na = features_along(g->a, about, g->meets, g->size, fa), nb = features_along(g->b, back, g->meets, g->size, fb);
     for (int i = 0; i < na; i++) {
       for (int j = 0; j < nb; j++) {
         if (solve(g, &fa[i], &fb[j], about, n)) keep(g, &fa[i], &fb[j], n);
+        if (is_proven_apart(g)) return 1;
       }
     }
     if (g->best.separation.gap < least) return 0;
@@ -472,15 +517,18 @@ int cav_separation_solve(const cav_shape *a, const cav_shape *b, double margin, 
   search g = {.a = swap ? b : a, .b = swap ? a : b, .size = fmax(cav_shape_size(a), cav_shape_size(b))};
   cav_core ca = cav_core_of(g.a), cb = cav_core_of(g.b);
   g.core = &cb;
+  g.meets = MEETS;
   double most = margin + ca.radius + cb.radius;
   if (!is_curved(g.a)) return cav_separation_find(&ca, &cb, g.size, most, out);
-  int proven = 0;
+  if (!cav_separation_find(&ca, &cb, g.size, most, out)) return 0;
+  g.meets = FEW;
+  int proven = out->gap > 0 && polish(&g, out->n, 0);
+  g.meets = MEETS;
 #ifdef CAVORT_HAVE_CCD
   double n[3];
-  proven = ask_libccd(&ca, &cb, g.size, most, n) && polish(&g, n, 0);
+  if (!proven && out->gap > 0) proven = ask_libccd(&ca, &cb, g.size, most, n) && polish(&g, n, 0);
 #endif
   if (!proven) {
-    if (!cav_separation_find(&ca, &cb, g.size, most, out)) return 0;
     polish(&g, out->n, -INFINITY);
     if (g.best.separation.gap < 0 && g.best.separation.gap > out->gap + LOOSE * g.size) polish_elsewhere(&g);
     // what the search found stays where the polish does not improve on it

@@ -16,10 +16,14 @@ cav_surface cav_surface_box, cav_surface_cylinder, cav_surface_ellipsoid;
 /// surface.c.
 void cav_shape_support(const cav_shape *shape, const double direction[3], double point[3]);
 
+/// Vertex of a mesh furthest along a direction [3] in its axes: of few the furthest of all; else from a vertex known for
+/// directions about this one uphill from neighbour to neighbour, which on a convex body ends at the top. surface.c.
+int cav_mesh_summit(const cav_mesh *mesh, const double direction[3]);
+
 /// Segment swept by a sphere (the capsule a) against a solid b with a surface: up to 2 points. segment.c.
 int cav_collide_segment(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
-/// A mesh against a plane: up to 8 points. polytope.c.
+/// A mesh against a plane: its lowest vertex, and those that would be lowest if it leant to four sides. polytope.c.
 int cav_collide_plane_mesh(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
 /// Convex pairs without a routine of their own: ellipsoid, cylinder, box (not two) and mesh; sphere or capsule against

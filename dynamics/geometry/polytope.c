@@ -13,6 +13,9 @@
 
 // cosine beyond which the direction is a face's normal (1.4e-5 rad)
 static const double ON_NORMAL = 1 - 1e-10;
+// slope to which a mesh on a plane leans to find what else could touch: less misses the far end of a limb that lies
+// down, more finds the outer edges of a rounded sole instead of the sole
+static const double LEAN = 0.5;
 
 // --- polyhedra: meshes, boxes, and the segments and points that are cores ---
 
@@ -93,37 +96,46 @@ double cav_shape_size(const cav_shape *s) {
 
 // --- faces ---
 
-// of the faces of a mesh at its furthest corner along a direction the one that looks most along it; the corner alone if
-// there is none
-static void lowest_face(const cav_shape *s, const double n[3], cav_outline *o) {
-  const cav_mesh *m = s->mesh;
-  double local[3], top = -INFINITY, most = -1;
-  int face = -1, best = 0;
-  rotate_back(local, s->rotation, n);
-  for (int v = 0; v < m->nvertex; v++) {
-    double h = dot3(local, m->vertex + 3 * v);
-    if (h > top) top = h, best = v;
-  }
-  for (int f = 0; f < m->nface; f++) {
+// of the faces of a mesh that meet at its furthest corner along a direction in its axes the one that looks most along
+// it; -1 if there is none
+static int mesh_face_along(const cav_mesh *m, int corner, const double local[3]) {
+  double most = -1;
+  int best = -1, first = m->meeting ? m->meeting_start[corner] : 0;
+  int end = m->meeting ? m->meeting_start[corner + 1] : m->nface;
+  for (int k = first; k < end; k++) {
+    int f = m->meeting ? m->meeting[k] : k;
     double c = dot3(m->plane + 4 * f, local);
-    if (c <= most) continue;
-    for (int k = m->face[f]; k < m->face[f + 1]; k++) {
-      if (m->corner[k] == best) most = c, face = f;
-    }
+    if (c > most) most = c, best = f;
   }
+  return best;
+}
+
+// that face, or where there is none the corner alone
+static void lowest_face(const cav_shape *s, const double n[3], cav_outline *o) {
+  double local[3];
+  rotate_back(local, s->rotation, n);
+  int corner = cav_mesh_summit(s->mesh, local), face = mesh_face_along(s->mesh, corner, local);
   o->n = 0;
   if (face >= 0) {
     cav_outline_push(s, face, o);
     return;
   }
-  cav_shape_corner(s, best, o->x[0]);
+  cav_shape_corner(s, corner, o->x[0]);
   o->n = 1;
+}
+
+// the face of a box that looks most along n
+static int box_face_along(const cav_shape *s, const double n[3]) {
+  double local[3];
+  rotate_back(local, s->rotation, n);
+  int axis = fabs(local[1]) > fabs(local[0]) ? 1 : 0;
+  if (fabs(local[2]) > fabs(local[axis])) axis = 2;
+  return 2 * axis + (local[axis] < 0);
 }
 
 // the face of a body that looks most along n: outline, normal out of it; returns the cosine, -1 where there is none.
 // A cylinder's cap has a normal but no outline
 static double face_along(const cav_shape *s, const double n[3], cav_outline *o, double normal[3]) {
-  double most = -1, m[3];
   int best = -1;
   o->n = 0;
   if (s->type == CAV_GEOM_CYLINDER) {
@@ -131,15 +143,17 @@ static double face_along(const cav_shape *s, const double n[3], cav_outline *o, 
     if (dot3(normal, n) < 0) scale3(normal, -1, normal);
     return dot3(normal, n);
   }
-  for (int f = 0; f < cav_shape_faces(s); f++) {
-    cav_shape_normal(s, f, m);
-    double c = dot3(m, n);
-    if (c <= most) continue;
-    most = c;
-    best = f;
-    copy3(normal, m);
+  if (s->type == CAV_GEOM_BOX) best = box_face_along(s, n);
+  if (s->type == CAV_GEOM_MESH) {
+    double local[3];
+    rotate_back(local, s->rotation, n);
+    best = mesh_face_along(s->mesh, cav_mesh_summit(s->mesh, local), local);
   }
-  if (best >= 0) cav_outline_push(s, best, o);
+  if (best < 0) return -1;
+  cav_shape_normal(s, best, normal);
+  double most = dot3(normal, n);
+  // the outline is of use only where the normal is met
+  if (most >= ON_NORMAL) cav_outline_push(s, best, o);
   return most;
 }
 
@@ -257,7 +271,8 @@ static double worth(const cav_touch *touch, int taken, const cav_touch *t) {
   }
   for (int j = 0; j < taken; j++) {
     sub3(d, t->pos, touch[j].pos);
-    least = fmin(least, dot3(d, d));
+    double length2 = dot3(d, d);
+    if (length2 < least) least = length2;
   }
   return least;
 }
@@ -379,26 +394,36 @@ int cav_collide_convex(const cav_shape *a, const cav_shape *b, double margin, ca
 }
 
 int cav_collide_plane_mesh(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
-  enum { FOUND_MAX = 128 };
+  enum { SIDES = 4 };
   const cav_mesh *m = b->mesh;
-  cav_touch found[FOUND_MAX];
-  double n[3], local[3], d[3];
-  int count = 0;
+  double n[3], local[3], d[3], side[2][3], axis[3] = {0, 0, 0};
   column3(n, a->rotation, 2);
   rotate_back(local, b->rotation, n);
   sub3(d, b->pos, a->pos);
   double base = dot3(d, n);
-  for (int v = 0; v < m->nvertex; v++) {
+  // sides: the diagonals of two of the mesh's axes, its principal ones, seen along the plane's normal
+  int most = fabs(local[1]) > fabs(local[0]) ? 1 : 0;
+  if (fabs(local[2]) > fabs(local[most])) most = 2;
+  axis[(most + 1) % 3] = axis[(most + 2) % 3] = 1;
+  axpy3(side[0], axis, -dot3(axis, local), local);
+  normalise3(side[0]);
+  cross3(side[1], local, side[0]);
+  int count = 0;
+  for (int k = 0; k <= SIDES; k++) {
+    double down[3];
+    scale3(down, -1, local);
+    if (k) axpy3(down, down, k % 2 ? LEAN : -LEAN, side[(k - 1) / 2]);
+    int v = cav_mesh_summit(m, down), known = 0;
     double height = base + dot3(local, m->vertex + 3 * v), x[3];
-    if (!(height < margin)) continue;
-    cav_touch t = {.dist = height, .feature = v};
+    for (int i = 0; i < count; i++) known |= touch[i].feature == v;
+    if (known || !(height < margin)) continue;
+    cav_touch *t = &touch[count++];
     cav_shape_corner(b, v, x);
-    axpy3(t.pos, x, -height / 2, n);
-    copy3(t.normal, n);
-    if (count == FOUND_MAX) count = cav_thin_out(found, count, FOUND_MAX / 2);
-    found[count++] = t;
+    axpy3(t->pos, x, -height / 2, n);
+    copy3(t->normal, n);
+    zero3(t->tangent);
+    t->dist = height;
+    t->feature = v;
   }
-  count = cav_thin_out(found, count, CAV_TOUCH_MAX);
-  for (int k = 0; k < count; k++) touch[k] = found[k];
   return count;
 }

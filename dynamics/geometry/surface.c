@@ -3,6 +3,7 @@
 /// largest root of sum (a_i y_i/(t + a_i^2))^2 = 1, convex and decreasing right of its poles, so that Newton started
 /// left of the root rises to it without a safeguard. Where a point has several nearest ones (an axis, the focal
 /// ellipse), one is picked, always the same: the normal jumps there, the distance does not.
+#include "direction.h"
 #include "pairs.h"
 
 // +1 or -1, never 0
@@ -126,12 +127,10 @@ static void support_local(cav_geom_type type, const double *size, const double d
   zero3(x);
 }
 
-// corner of a mesh furthest along a direction: all of them, or uphill from neighbour to neighbour, which on a convex
-// body ends at the top
-static const double *support_mesh(const cav_mesh *m, const double d[3]) {
+int cav_mesh_summit(const cav_mesh *m, const double d[3]) {
   enum { FEW = 32 };
-  int best = 0;
-  double most = dot3(m->vertex, d);
+  int best = m->summit && m->nvertex > FEW ? m->summit[direction_cell(d)] : 0;
+  double most = dot3(m->vertex + 3 * best, d);
   for (int v = 1; v < m->nvertex && m->nvertex <= FEW; v++) {
     double h = dot3(m->vertex + 3 * v, d);
     if (h > most) most = h, best = v;
@@ -143,14 +142,14 @@ static const double *support_mesh(const cav_mesh *m, const double d[3]) {
       if (h > most) most = h, best = m->neighbour[k];
     }
   }
-  return m->vertex + 3 * best;
+  return best;
 }
 
 void cav_shape_support(const cav_shape *shape, const double direction[3], double point[3]) {
   double d[3], x[3];
   rotate_back(d, shape->rotation, direction);
   if (shape->type == CAV_GEOM_MESH) {
-    copy3(x, support_mesh(shape->mesh, d));
+    copy3(x, shape->mesh->vertex + 3 * cav_mesh_summit(shape->mesh, d));
   } else {
     support_local(shape->type, shape->size, d, x);
   }

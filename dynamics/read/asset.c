@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "algebra.h"
+#include "direction.h"
 #include "elevation.h"
 #include "math3.h"
 #include "spec.h"
@@ -417,6 +418,9 @@ static void put_mesh(carver *c, const cav_spec_mesh *m, cav_mesh *out) {
   mesh.corner = put(c, h->corner, sizeof *h->corner * (size_t)h->ncorner);
   mesh.neighbour_start = put(c, h->neighbour_start, sizeof *h->neighbour_start * ((size_t)h->nvertex + 1));
   mesh.neighbour = put(c, h->neighbour, sizeof *h->neighbour * (size_t)h->nneighbour);
+  mesh.meeting_start = put(c, h->meeting_start, sizeof *h->meeting_start * ((size_t)h->nvertex + 1));
+  mesh.meeting = put(c, h->meeting, sizeof *h->meeting * (size_t)h->nmeeting);
+  mesh.summit = put(c, h->summit, sizeof *h->summit * CAV_DIRECTION_CELLS);
   if (out) *out = mesh;
 }
 

@@ -9,6 +9,7 @@
 
 #include <stdlib.h>
 
+#include "direction.h"
 #include "math3.h"
 
 #ifdef CAVORT_HAVE_QHULL
@@ -21,6 +22,7 @@ typedef struct triangle {
   int v[3], next[3]; ///< next[i]: across the edge from v[i] to v[i+1]
   double plane[4];
   int alive, mark; ///< alive: 1 until it is part of a polygon, then 2
+  int polygon;     ///< that one
 } triangle;
 
 typedef struct builder {
@@ -184,7 +186,11 @@ static int allocate(cav_hull *h, int vertices, int faces, int corners, int neigh
   h->corner = calloc((size_t)corners + 1, sizeof *h->corner);
   h->neighbour_start = calloc((size_t)vertices + 1, sizeof *h->neighbour_start);
   h->neighbour = calloc((size_t)neighbours + 1, sizeof *h->neighbour);
-  return h->vertex && h->plane && h->face && h->corner && h->neighbour_start && h->neighbour;
+  h->meeting_start = calloc((size_t)vertices + 1, sizeof *h->meeting_start);
+  h->meeting = calloc((size_t)corners + 1, sizeof *h->meeting);
+  h->summit = calloc(CAV_DIRECTION_CELLS, sizeof *h->summit);
+  return h->vertex && h->plane && h->face && h->corner && h->neighbour_start && h->neighbour && h->meeting_start &&
+         h->meeting && h->summit;
 }
 
 // the boundary of a region of triangles marked with mark, as one loop into corners; 0 if it is none
@@ -285,6 +291,22 @@ static void write_neighbours(const builder *b, const int *index, cav_hull *h) {
   fill[0] = 0;
 }
 
+// the polygons that meet at each vertex: those of its triangles, so that a vertex inside a polygon has that one
+static void write_meeting(const builder *b, const int *index, cav_hull *h) {
+  int *fill = h->meeting_start;
+  for (int f = 0; f < b->nface; f++) {
+    for (int k = 0; k < 3 && b->face[f].alive; k++) fill[index[b->face[f].v[k]] + 1]++;
+  }
+  for (int v = 0; v < h->nvertex; v++) fill[v + 1] += fill[v];
+  h->nmeeting = fill[h->nvertex];
+  for (int f = 0; f < b->nface; f++) {
+    for (int k = 0; k < 3 && b->face[f].alive; k++) h->meeting[fill[index[b->face[f].v[k]]]++] = b->face[f].polygon;
+  }
+  // each start has moved to its end
+  for (int v = h->nvertex; v > 0; v--) fill[v] = fill[v - 1];
+  fill[0] = 0;
+}
+
 // polygons from the largest triangles on
 static int write_faces(builder *b, const ranked *order, int count, const int *index, int *region, int *after,
                        cav_hull *h) {
@@ -296,7 +318,10 @@ static int write_faces(builder *b, const ranked *order, int count, const int *in
       n = 1;
       for (corners = 0; corners < 3; corners++) corner[corners] = b->face[f].v[corners];
     }
-    for (int k = 0; k < n; k++) b->face[region[k]].alive = 2;
+    for (int k = 0; k < n; k++) {
+      b->face[region[k]].alive = 2;
+      b->face[region[k]].polygon = h->nface;
+    }
     double *plane = h->plane + 4 * h->nface;
     memcpy(plane, b->face[f].plane, 4 * sizeof *plane);
     for (int k = 0; k < corners; k++) plane[3] = fmax(plane[3], dot3(plane, at(b, corner[k])));
@@ -330,6 +355,7 @@ static cav_status finish(builder *b, cav_hull *h) {
       qsort(order, (size_t)count, sizeof *order, by_area);
       write_neighbours(b, index, h);
       write_faces(b, order, count, index, region, after, h);
+      write_meeting(b, index, h);
       status = CAV_OK;
     }
   }
@@ -388,7 +414,7 @@ static cav_status finish_polygon(const builder *b, const int v[3], cav_hull *h) 
     int n = chain(sorted, b->n, ON_FACE * b->size * b->size, loop);
     h->nvertex = n;
     h->nface = 2;
-    h->ncorner = h->nneighbour = 2 * n;
+    h->ncorner = h->nneighbour = h->nmeeting = 2 * n;
     if (allocate(h, n, 2, 2 * n, 2 * n)) {
       for (int i = 0; i < n; i++) {
         copy3(h->vertex + 3 * i, at(b, loop[i].point));
@@ -397,6 +423,8 @@ static cav_status finish_polygon(const builder *b, const int v[3], cav_hull *h) 
         h->neighbour[2 * i] = (i + 1) % n;
         h->neighbour[2 * i + 1] = (i + n - 1) % n;
         h->neighbour_start[i + 1] = 2 * i + 2;
+        h->meeting[2 * i + 1] = 1;
+        h->meeting_start[i + 1] = 2 * i + 2;
       }
       h->face[1] = n;
       h->face[2] = 2 * n;
@@ -423,6 +451,18 @@ static cav_status finish_line(const builder *b, const int *v, int n, cav_hull *h
   return CAV_OK;
 }
 
+// the furthest vertex along the middle of each cell of directions, by looking at all: made once, and no walk is needed
+static void index_summits(cav_hull *h) {
+  for (int cell = 0; cell < CAV_DIRECTION_CELLS; cell++) {
+    double d[3], top = -INFINITY;
+    direction_of_cell(cell, d);
+    for (int v = 0; v < h->nvertex; v++) {
+      double height = dot3(d, h->vertex + 3 * v);
+      if (height > top) top = height, h->summit[cell] = v;
+    }
+  }
+}
+
 cav_status cav_hull_build(const double *point, int n, cav_hull *hull) {
   builder b = {.point = point, .n = n};
   int v[4];
@@ -438,8 +478,12 @@ cav_status cav_hull_build(const double *point, int n, cav_hull *hull) {
     status = finish_line(&b, v, count, hull);
   }
   free(b.face);
-  if (status != CAV_OK) cav_hull_clear(hull);
-  return status;
+  if (status != CAV_OK) {
+    cav_hull_clear(hull);
+    return status;
+  }
+  index_summits(hull);
+  return CAV_OK;
 }
 
 void cav_hull_clear(cav_hull *hull) {
@@ -449,5 +493,8 @@ void cav_hull_clear(cav_hull *hull) {
   free(hull->corner);
   free(hull->neighbour_start);
   free(hull->neighbour);
+  free(hull->meeting_start);
+  free(hull->meeting);
+  free(hull->summit);
   *hull = (cav_hull){.nvertex = 0};
 }

@@ -232,6 +232,8 @@ typedef struct cav_mesh {
   const int *face;      ///< [nface+1] first entry of each polygon in corner
   const int *corner;    ///< [face[nface]] vertices, counterclockwise from outside
   const int *neighbour_start, *neighbour; ///< [nvertex+1], vertices across an edge from each
+  const int *meeting_start, *meeting;     ///< [nvertex+1], faces that meet at each
+  const int *summit;                      ///< vertex furthest along the middle of each cell of directions (direction.h)
 } cav_mesh;
 
 /// Heights over a grid in the x-y plane, solid down to -base; x grows along columns, y along rows, both about 0.
