@@ -63,66 +63,79 @@ static vertex support(const bodies *g, const double d[3]) {
 
 // --- nearest point of a simplex ---
 
-// weights of the point of the affine hull of points nearest to the origin; 0 if one is not positive or they are
-// dependent
-static int weights_of(const vertex *const p[4], int n, double weight[4]) {
-  double e[3][3], G[3][3], r[3];
-  for (int i = 1; i < n; i++) sub3(e[i - 1], p[i]->w, p[0]->w);
-  int m = n - 1;
+/// A simplex about its last point: products of the edges to the others, and of these with the way to the origin.
+typedef struct products {
+  double G[3][3], r[3];
+} products;
+
+// weights of the point nearest to the origin of the affine hull of the last point and m others; 0 if one is not positive
+// or they are dependent
+static int weights_of(const products *all, const int *other, int m, double weight[4]) {
+  double G[3][3], r[3];
   for (int i = 0; i < m; i++) {
-    r[i] = -dot3(e[i], p[0]->w);
-    for (int j = 0; j < m; j++) G[i][j] = dot3(e[i], e[j]);
+    r[i] = all->r[other[i]];
+    for (int j = 0; j < m; j++) G[i][j] = all->G[other[i]][other[j]];
   }
   // elimination without pivots: G is positive definite, or the points are dependent
   for (int i = 0; i < m; i++) {
-    if (!(G[i][i] > 1e-28 * dot3(e[i], e[i])) || !(G[i][i] > 0)) return 0;
+    if (!(G[i][i] > 1e-28 * all->G[other[i]][other[i]]) || !(G[i][i] > 0)) return 0;
     for (int k = i + 1; k < m; k++) {
       double f = G[k][i] / G[i][i];
       for (int j = i; j < m; j++) G[k][j] -= f * G[i][j];
       r[k] -= f * r[i];
     }
   }
-  weight[0] = 1;
+  weight[m] = 1;
   for (int i = m - 1; i >= 0; i--) {
     for (int j = i + 1; j < m; j++) r[i] -= G[i][j] * r[j];
     r[i] /= G[i][i];
-    weight[i + 1] = r[i];
-    weight[0] -= r[i];
+    weight[i] = r[i];
+    weight[m] -= r[i];
     if (!(r[i] > 0)) return 0;
   }
-  return weight[0] > 0;
+  return weight[m] > 0;
 }
 
-static void blend(const vertex *const p[4], const double *weight, int n, double w[3]) {
-  zero3(w);
-  for (int i = 0; i < n; i++) axpy3(w, w, weight[i], p[i]->w);
-}
-
-// reduces a simplex to the part that holds its point nearest to the origin, and finds that
+// reduces a simplex to the part with its last point that holds the point nearest to the origin, and finds that. Of a
+// search that has got nearer by its last point all parts that matter have it
 static void reduce(simplex *s, double nearest[3]) {
-  double best = INFINITY;
-  simplex kept = {.n = 0};
-  for (int set = 1; set < 1 << s->n; set++) {
-    const vertex *p[4];
+  const int others = s->n - 1;
+  const double *last = s->p[others].w;
+  double best = INFINITY, e[3][3];
+  products all;
+  for (int i = 0; i < others; i++) {
+    sub3(e[i], s->p[i].w, last);
+    all.r[i] = -dot3(e[i], last);
+    for (int j = 0; j <= i; j++) all.G[i][j] = all.G[j][i] = dot3(e[i], e[j]);
+  }
+  int kept[4], n = 0;
+  double keep[4];
+  for (int set = 0; set < 1 << others; set++) {
+    int other[3], m = 0;
     double weight[4], w[3];
-    int n = 0;
-    for (int i = 0; i < s->n; i++) {
-      if (set >> i & 1) p[n++] = &s->p[i];
+    for (int i = 0; i < others; i++) {
+      if (set >> i & 1) other[m++] = i;
     }
-    if (!weights_of(p, n, weight)) continue;
-    blend(p, weight, n, w);
-    double length2 = n == 4 ? 0 : dot3(w, w);
+    if (!weights_of(&all, other, m, weight)) continue;
+    copy3(w, last);
+    for (int i = 0; i < m; i++) axpy3(w, w, weight[i], e[other[i]]);
+    double length2 = m == 3 ? 0 : dot3(w, w);
     if (!(length2 < best)) continue;
     best = length2;
     copy3(nearest, w);
-    if (n == 4) zero3(nearest);
-    kept.n = n;
+    if (m == 3) zero3(nearest);
+    n = m + 1;
     for (int i = 0; i < n; i++) {
-      kept.p[i] = *p[i];
-      kept.weight[i] = weight[i];
+      kept[i] = i < m ? other[i] : others;
+      keep[i] = weight[i];
     }
   }
-  *s = kept;
+  // in the order of the points, so that each moves to an earlier place
+  for (int i = 0; i < n; i++) {
+    s->p[i] = s->p[kept[i]];
+    s->weight[i] = keep[i];
+  }
+  s->n = n;
 }
 
 static void points_of(const simplex *s, cav_separation *out) {
@@ -183,7 +196,7 @@ static outcome walk(const bodies *g, double most, simplex *s, cav_separation *ou
       return OVERLAP;
     }
     // no progress: as near as rounding lets it
-    if (!next.n || !(norm3(w) < length)) break;
+    if (!(norm3(w) < length)) break;
     *s = next;
     copy3(v, w);
   }
@@ -320,13 +333,16 @@ static void points_of_faces(const polytope *t, const sheet *best, double slack, 
   double least = INFINITY;
   for (int f = 0; f < t->nface; f++) {
     if (t->face[f].d > best->d + slack || dot3(t->face[f].n, best->n) < 1 - 1e-9) continue;
-    simplex s = {.n = 3};
-    double v[3];
-    for (int k = 0; k < 3; k++) s.p[k] = t->p[t->face[f].v[k]];
-    reduce(&s, v);
-    if (!s.n || !(dot3(v, v) < least)) continue;
-    least = dot3(v, v);
-    points_of(&s, out);
+    // each of its corners last
+    for (int turn = 0; turn < 3; turn++) {
+      simplex s = {.n = 3};
+      double v[3];
+      for (int k = 0; k < 3; k++) s.p[k] = t->p[t->face[f].v[(turn + k) % 3]];
+      reduce(&s, v);
+      if (!(dot3(v, v) < least)) continue;
+      least = dot3(v, v);
+      points_of(&s, out);
+    }
   }
 }
 
