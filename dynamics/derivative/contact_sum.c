@@ -1,5 +1,5 @@
 /// Contacts in the derivatives: their matrices at their links, carried to one point of the tree and summed over
-/// subtrees; the blocks between two moving links; derivatives of one contact by the dofs. Those of a contact by its
+/// subtrees; those between two moving links; derivatives of one contact by the dofs. Those of a contact by its
 /// links' twists are contact.c's; the products of the sums with axes of dofs are smooth.c's.
 #include "analytic.h"
 
@@ -22,16 +22,21 @@ static void shift_add(double *sum, const double *M, const double d[3], double sc
   }
 }
 
+// the wrench of a contact on its second link, about its position
+static void add_impulse(const cav_contact *c, double wrench[6]) {
+  for (int i = 0; i < c->dim; i++) {
+    double *part = i < 3 ? wrench + 3 : wrench;
+    axpy3(part, part, c->impulse[i], c->frame + 3 * (i % 3));
+  }
+}
+
 // matrices of one contact at one of its links: own wrench by own motion, less what is carried along with the link
 static void contact_at_link(const cav_derivative_task *t, const cav_contact *c, const cav_contact_jacobian *derivative,
                             int side) {
   int link = side ? c->link2 : c->link1;
   double d[3], whole[6] = {0}, own[36], sign = side ? 1 : -1;
   sub3(d, c->pos, t->state->reference + 3 * link);
-  for (int i = 0; i < c->dim; i++) {
-    double *part = i < 3 ? whole + 3 : whole;
-    axpy3(part, part, c->impulse[i], c->frame + 3 * (i % 3));
-  }
+  add_impulse(c, whole);
   for (int k = 0; k < 6; k++) {
     double twist[6] = {0}, carried[6];
     twist[k] = 1;
@@ -46,6 +51,23 @@ static void contact_at_link(const cav_derivative_task *t, const cav_contact *c, 
   shift_add(t->s->by_next + CAV_TWIST_BLOCK * link, &derivative->by_velocity[0][0], d, 1);
 }
 
+// last dof that moves both of two links, -1 if there is none
+static int common_dof(const cav_model *model, const int link[2]) {
+  int a = last_dof(model, link[0]), b = last_dof(model, link[1]);
+  while (a != b) {
+    if (a > b)
+      a = model->dof[a].parent;
+    else
+      b = model->dof[b].parent;
+  }
+  return a;
+}
+
+// whether some dof moves both links of a contact: then contact_between does all of it
+static int is_within_tree(const cav_model *model, const cav_contact *c) {
+  return c->link1 > 0 && c->link2 > 0 && common_dof(model, (int[]){c->link1, c->link2}) >= 0;
+}
+
 cav_status cav_derivative_contacts(const cav_derivative_task *t) {
   cav_derivative_store *s = t->s;
   size_t n = (size_t)t->model->nlink;
@@ -56,7 +78,7 @@ cav_status cav_derivative_contacts(const cav_derivative_task *t) {
     const cav_contact *c = &t->state->contact[i];
     cav_status status = cav_contact_differentiate(t->model, t->state, c, 0, &s->contact[i]);
     if (status != CAV_OK) return status;
-    if (s->contact[i].idle) continue;
+    if (s->contact[i].idle || is_within_tree(t->model, c)) continue;
     if (c->link1 > 0) contact_at_link(t, c, &s->contact[i], 0);
     if (c->link2 > 0) contact_at_link(t, c, &s->contact[i], 1);
   }
@@ -85,45 +107,84 @@ static void column_at(const cav_derivative_task *t, const cav_contact *c, int do
   motion_at(out->next, t->s->drift_next + 6 * dof, reference, c->pos);
 }
 
-// blocks of a contact between two moving links: wrench on the one by the motion of the other
-static void contact_across(const cav_derivative_task *t, const cav_contact *c, const cav_contact_jacobian *derivative) {
-  int nv = t->nv, link[2] = {c->link1, c->link2};
+// axes about a contact of the dofs from one to another that is left out, towards the root; their number
+static int axes_about(const cav_derivative_task *t, const cav_contact *c, int from, int to, double *S) {
+  int n = 0;
+  for (int k = from; k != to; k = t->model->dof[k].parent, n++) {
+    motion_at(S + 6 * n, t->state->axis + 6 * k, t->state->reference + 3 * t->model->dof[k].link, c->pos);
+  }
+  return n;
+}
+
+/// A contact between two moving links: dofs that move the one, the other, and both, and their axes about it.
+typedef struct between {
+  int link[2], common;
+  double *axes[2], *shared;
+} between;
+
+// one column: the wrenches on both links by one dof that moves the one of side
+static void between_column(const cav_derivative_task *t, const cav_contact *c, const cav_contact_jacobian *derivative,
+                           const between *b, const double whole[6], int side, int j) {
   const double *K = &derivative->by_velocity[0][0], keep = 1 - c->damping[0];
-  double *axes[2] = {t->s->across, t->s->across + 6 * nv};
-  for (int side = 0; side < 2; side++) {
-    double *S = axes[side];
-    for (int k = last_dof(t->model, link[side]); k >= 0; k = t->model->dof[k].parent, S += 6) {
-      motion_at(S, t->state->axis + 6 * k, t->state->reference + 3 * t->model->dof[k].link, c->pos);
-    }
+  const double sign = side ? 1 : -1, on = sign * t->inverse_h;
+  int nv = t->nv;
+  column col;
+  double dq[6], now[6], next[6], drift[6], carried[6], own[6];
+  column_at(t, c, j, &col);
+  multiply6_transposed(dq, &derivative->wrench[side][0][0], col.axis);
+  for (int i = 0; i < 6; i++) drift[i] = sign * (keep * col.now[i] - col.next[i]);
+  multiply6(now, K, drift);
+  accumulate6(dq, now);
+  multiply6(next, K, col.axis);
+  scale6(next, sign, next);
+  const double *S = b->axes[!side];
+  for (int k = last_dof(t->model, b->link[!side]); k != b->common; k = t->model->dof[k].parent, S += 6) {
+    double push = dot6(S, next) * on;
+    t->dq[k * nv + j] += on * dot6(S, dq);
+    t->dv[k * nv + j] += keep * push;
+    t->dn[k * nv + j] -= push;
+  }
+  if (b->common < 0) return;
+  // rows of the same link: there smooth.c carries the wrench along with it; the dofs that move both links feel nothing
+  cross3(carried, col.axis, whole);
+  cross_add3(carried, col.axis + 3, whole + 3);
+  cross3(carried + 3, col.axis, whole + 3);
+  for (int i = 0; i < 6; i++) own[i] = dq[i] - carried[i];
+  S = b->axes[side];
+  for (int k = last_dof(t->model, b->link[side]); k != b->common; k = t->model->dof[k].parent, S += 6) {
+    double push = dot6(S, next) * on;
+    t->dq[k * nv + j] -= on * dot6(S, own);
+    t->dv[k * nv + j] -= keep * push;
+    t->dn[k * nv + j] += push;
+  }
+  S = b->shared;
+  for (int k = b->common; k >= 0; k = t->model->dof[k].parent, S += 6) t->dq[k * nv + j] += on * dot6(S, carried);
+}
+
+// what a contact between two moving links gives: of two trees the wrench on the one by the motion of the other, of one
+// tree all, by the dofs between the links only: the others move both, and nothing changes
+static void contact_between(const cav_derivative_task *t, const cav_contact *c,
+                            const cav_contact_jacobian *derivative) {
+  between b = {.link = {c->link1, c->link2}};
+  double whole[6] = {0};
+  b.common = common_dof(t->model, b.link);
+  b.axes[0] = t->s->across;
+  b.axes[1] = b.axes[0] + 6 * axes_about(t, c, last_dof(t->model, c->link1), b.common, b.axes[0]);
+  b.shared = b.axes[1] + 6 * axes_about(t, c, last_dof(t->model, c->link2), b.common, b.axes[1]);
+  if (b.common >= 0) {
+    axes_about(t, c, b.common, -1, b.shared);
+    add_impulse(c, whole);
   }
   for (int side = 0; side < 2; side++) {
-    // columns of this side, rows of the other; the wrench on link2 is that of the law
-    double sign = side ? 1 : -1, on = (side ? 1 : -1) * t->inverse_h;
-    for (int j = last_dof(t->model, link[side]); j >= 0; j = t->model->dof[j].parent) {
-      column col;
-      double dq[6], now[6], next[6], drift[6];
-      column_at(t, c, j, &col);
-      multiply6_transposed(dq, &derivative->wrench[side][0][0], col.axis);
-      for (int i = 0; i < 6; i++) drift[i] = sign * (keep * col.now[i] - col.next[i]);
-      multiply6(now, K, drift);
-      accumulate6(dq, now);
-      multiply6(next, K, col.axis);
-      scale6(next, sign, next);
-      const double *S = axes[!side];
-      for (int k = last_dof(t->model, link[!side]); k >= 0; k = t->model->dof[k].parent, S += 6) {
-        double push = dot6(S, next) * on;
-        t->dq[k * nv + j] += on * dot6(S, dq);
-        t->dv[k * nv + j] += keep * push;
-        t->dn[k * nv + j] -= push;
-      }
-    }
+    for (int j = last_dof(t->model, b.link[side]); j != b.common; j = t->model->dof[j].parent)
+      between_column(t, c, derivative, &b, whole, side, j);
   }
 }
 
 void cav_derivative_across(const cav_derivative_task *t) {
   for (int i = 0; i < t->state->ncontact; i++) {
     const cav_contact *c = &t->state->contact[i];
-    if (c->link1 > 0 && c->link2 > 0 && !t->s->contact[i].idle) contact_across(t, c, &t->s->contact[i]);
+    if (c->link1 > 0 && c->link2 > 0 && !t->s->contact[i].idle) contact_between(t, c, &t->s->contact[i]);
   }
 }
 

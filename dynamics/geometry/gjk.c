@@ -145,6 +145,11 @@ static void points_of(const simplex *s, cav_separation *out) {
     axpy3(out->x, out->x, s->weight[i], s->p[i].x);
     axpy3(out->y, out->y, s->weight[i], s->p[i].y);
   }
+  out->corners = s->n < 4 ? s->n : 0;
+  for (int i = 0; i < out->corners; i++) {
+    copy3(out->corner_a[i], s->p[i].x);
+    copy3(out->corner_b[i], s->p[i].y);
+  }
 }
 
 // the direction of the point nearest to the origin: of three points the normal of their plane, which is sharper near 0
@@ -382,6 +387,7 @@ static int expand(const bodies *g, const simplex *s, cav_separation *out) {
   scale3(out->n, -1, best.n);
   copy3(out->x, t.p[best.v[0]].x);
   copy3(out->y, t.p[best.v[0]].y);
+  out->corners = 0;
   points_of_faces(&t, &best, 1e-11 * g->size, out);
   return 1;
 }
@@ -402,6 +408,7 @@ static int is_curved(const cav_core *c) {
 static void try_planes(const bodies *g, cav_separation *out) {
   const cav_core *cores[2] = {g->a, g->b};
   out->gap = -INFINITY;
+  out->corners = 0;
   for (int side = 0; side < 2; side++) {
     const cav_shape *s = cores[side]->shape;
     int faces = s->type == CAV_GEOM_MESH ? s->mesh->nface : 0;

@@ -11,9 +11,12 @@ typedef struct cav_core {
 } cav_core;
 
 /// Direction of least overlap or of separation, unit, from a to b; points of both that meet along it; signed distance
-/// of the cores along n.
+/// of the cores along n. Of polyhedra also the corners that meet: the points of a and of b whose differences span the
+/// part of b - a that is nearest, 1 to 3, each as often as it has a part in it; 0 if not known.
 typedef struct cav_separation {
   double n[3], x[3], y[3], gap;
+  int corners;
+  double corner_a[3][3], corner_b[3][3];
 } cav_separation;
 
 /// Corners of a face, an edge or a rim in the world, in order.
