@@ -72,8 +72,8 @@ void cav_derivative_gyrations(const cav_derivative_task *t);
 /// smooth.c.
 void cav_derivative_pairs(const cav_derivative_task *t, int j);
 
-/// Differentiates the contacts and sums them over subtrees. Fails as cav_contact_differentiate does. contact_sum.c.
-cav_status cav_derivative_contacts(const cav_derivative_task *t);
+/// Differentiates the contacts and sums them over subtrees. contact_sum.c.
+void cav_derivative_contacts(const cav_derivative_task *t);
 
 /// Adds the blocks across of contacts between two moving links. contact_sum.c.
 void cav_derivative_across(const cav_derivative_task *t);

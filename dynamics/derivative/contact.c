@@ -1,14 +1,16 @@
 /// Derivatives of one contact: how its distance, position and axes, velocities, impulse and wrench change when one of
 /// its two links moves by a small twist. The geometry depends on the relative pose of two geoms only: in closed form
-/// for a ball or a capsule on a plane, by centred differences of the narrow phase of that one pair in six directions
-/// otherwise. Everything after the geometry is exact: the frame turns with the normal, and about it with the tangent it
-/// is aligned to; the law has its own derivative (contact_law.c, coulomb.c), and of R and K by the distance where the
-/// impedance varies.
+/// for balls, capsules and corners on a plane and for the nearest points of meshes against anything without a curve but
+/// its radius; otherwise by centred differences of the narrow phase in six directions, for all points of a pair at once.
+/// Everything after the geometry is exact: the frame turns with the normal, and about it with the tangent it is aligned
+/// to; the law has its own derivative (contact_law.c, coulomb.c), and of R and K by the distance where the impedance
+/// varies.
 ///
 /// In the law f(z, r, s) = F(z, s)/r with z = v* - v_next, r the common scale of R and s = h K delta, F is homogeneous
 /// of degree one in (z, s) together; so df = H dz - (dr/r) f + (ds/s)(f - H z), whatever the law's smoothing. At kinks
 /// of the exact law one element of the generalised derivative is taken, always the same.
 #include "derivative.h"
+#include "gjk.h"
 
 #include "math3.h"
 
@@ -21,6 +23,9 @@ typedef struct geometry {
 
 // steps of differences of the narrow phase: rad, and fraction of the size of the smaller geom
 static const double ROTATION_STEP = 1e-5, SHIFT_STEP = 1e-5;
+// fraction of the size of the smaller geom below which corners are one and parts have no length; sine below which parts
+// are parallel
+static const double THIN = 1e-7;
 // fraction of the curvature of a contact that pushes below which there is none
 static const double FLAT = 1e-13;
 
@@ -37,12 +42,24 @@ static void unit(double twist[6], int k) {
   for (int i = 0; i < 6; i++) twist[i] = i == k;
 }
 
-// a ball about a point that moves with the second geom, on a plane
-static void ball_on_plane(const cav_contact *c, const cav_shape *ball, geometry *g) {
+// whether points of a shape on a plane are balls about points that move with the shape: ends, or corners of no radius
+static int has_fixed_points(const cav_shape *s) {
+  return s->type == CAV_GEOM_SPHERE || s->type == CAV_GEOM_CAPSULE || s->type == CAV_GEOM_BOX ||
+         s->type == CAV_GEOM_MESH;
+}
+
+// the radius about such points, and the direction of a capsule, which aligns the axes of its contacts
+static double end_radius(const cav_shape *s, double axis[3]) {
+  zero3(axis);
+  if (s->type == CAV_GEOM_CAPSULE) column3(axis, s->rotation, 2);
+  return s->type == CAV_GEOM_SPHERE || s->type == CAV_GEOM_CAPSULE ? s->size[0] : 0;
+}
+
+// a ball about a point that moves with the second geom, on a plane of the first
+static void ball_on_plane(const cav_contact *c, double radius, const double axis[3], geometry *g) {
   const double *n = c->frame;
-  double reach = ball->size[0] + 0.5 * c->dist, arm[3], axis[3] = {0, 0, 0};
+  double reach = radius + 0.5 * c->dist, arm[3];
   scale3(arm, reach, n);
-  if (ball->type == CAV_GEOM_CAPSULE) column3(axis, ball->rotation, 2);
   copy3(g->align, axis);
   for (int k = 0; k < 6; k++) {
     double twist[6];
@@ -81,34 +98,164 @@ static const cav_touch *find(const cav_touch *touch, int count, int feature) {
   return NULL;
 }
 
-// the narrow phase differenced in six directions; one-sided where the point is gone on one side
-static cav_status difference(const cav_contact *c, const cav_shape *a, const cav_shape *b, double size, double margin,
-                             geometry *g) {
-  cav_touch touch[3][CAV_TOUCH_MAX];
-  double shift = SHIFT_STEP * size;
+// the narrow phase of a pair as it is and after small twists of the second geom about a point, both ways
+static void displace_pair(const cav_pair_manifolds *m, const double point[3], cav_pair_manifolds *out) {
+  const double margin = m->margin + 4 * m->shift;
+  copy3(out->point, point);
+  out->count[12] = cav_collide_shapes(&m->a, &m->b, margin, out->touch[12]);
+  for (int k = 0; k < 12; k++) {
+    double step = k / 2 < 3 ? ROTATION_STEP : m->shift;
+    cav_shape moved;
+    twist_shape(&m->b, point, k / 2, k % 2 ? step : -step, &moved);
+    out->count[k] = cav_collide_shapes(&m->a, &moved, margin, out->touch[k]);
+  }
+  out->displaced = 1;
+}
+
+// differences of those manifolds, one-sided where the point is gone on one side; 0 if it is gone on both
+static int difference(const cav_contact *c, cav_pair_manifolds *m, geometry *g) {
+  geometry about;
   // every routine keeps to CAV_TOUCH_MAX: collide.c asserts it for the same shapes
-  const cav_touch *here = find(touch[2], cav_collide_shapes(a, b, margin + 4 * shift, touch[2]), c->feature);
-  if (!here) return CAV_NOT_SUPPORTED;
+  if (!m->displaced) displace_pair(m, c->pos, m);
+  const cav_touch *here = find(m->touch[12], m->count[12], c->feature);
+  if (!here) return 0;
   copy3(g->align, here->tangent);
   for (int k = 0; k < 6; k++) {
-    double step = k < 3 ? ROTATION_STEP : shift;
     const cav_touch *at[2];
-    for (int side = 0; side < 2; side++) {
-      cav_shape moved;
-      twist_shape(b, c->pos, k, side ? step : -step, &moved);
-      at[side] = find(touch[side], cav_collide_shapes(a, &moved, margin + 4 * shift, touch[side]), c->feature);
-    }
-    if (!at[0] && !at[1]) return CAV_NOT_SUPPORTED;
-    double inverse = 1 / (at[0] && at[1] ? 2 * step : step);
+    for (int side = 0; side < 2; side++) at[side] = find(m->touch[2 * k + side], m->count[2 * k + side], c->feature);
+    if (!at[0] && !at[1]) return 0;
+    double step = k < 3 ? ROTATION_STEP : m->shift, inverse = 1 / (at[0] && at[1] ? 2 * step : step);
     const cav_touch *low = at[0] ? at[0] : here, *high = at[1] ? at[1] : here;
-    g->dist[k] = (high->dist - low->dist) * inverse;
+    about.dist[k] = (high->dist - low->dist) * inverse;
     for (int i = 0; i < 3; i++) {
-      g->pos[k][i] = (high->pos[i] - low->pos[i]) * inverse;
-      g->normal[k][i] = (high->normal[i] - low->normal[i]) * inverse;
-      g->tangent[k][i] = (high->tangent[i] - low->tangent[i]) * inverse;
+      about.pos[k][i] = (high->pos[i] - low->pos[i]) * inverse;
+      about.normal[k][i] = (high->normal[i] - low->normal[i]) * inverse;
+      about.tangent[k][i] = (high->tangent[i] - low->tangent[i]) * inverse;
     }
   }
-  return CAV_OK;
+  // a turn about the contact is one about that point and a shift
+  double arm[3];
+  sub3(arm, m->point, c->pos);
+  for (int k = 0; k < 6; k++) {
+    double shift[3] = {0, 0, 0}, turn[3] = {k == 0, k == 1, k == 2};
+    if (k < 3) cross3(shift, turn, arm);
+    g->dist[k] = about.dist[k] + dot3(shift, about.dist + 3);
+    copy3(g->pos[k], about.pos[k]);
+    copy3(g->normal[k], about.normal[k]);
+    copy3(g->tangent[k], about.tangent[k]);
+    for (int i = 0; i < 3; i++) {
+      axpy3(g->pos[k], g->pos[k], shift[i], about.pos[3 + i]);
+      axpy3(g->normal[k], g->normal[k], shift[i], about.normal[3 + i]);
+      axpy3(g->tangent[k], g->tangent[k], shift[i], about.tangent[3 + i]);
+    }
+  }
+  return 1;
+}
+
+// --- nearest points of polyhedra ---
+
+/// Parts of two bodies that are nearest: directions that each part contains, unit, square to the normal; in all at most
+/// two, not parallel.
+typedef struct parts {
+  int n, of_b[2];
+  double along[2][3];
+} parts;
+
+// adds the directions between corners of one body; 0 if there are too many
+static int add_part(parts *p, double corner[3][3], int corners, int of_b, double size) {
+  int first = p->n;
+  for (int i = 1; i < corners; i++) {
+    double e[3];
+    sub3(e, corner[i], corner[0]);
+    for (int k = first; k < p->n; k++) axpy3(e, e, -dot3(e, p->along[k]), p->along[k]);
+    if (normalise3(e) < THIN * size) continue;
+    if (p->n == 2) return 0;
+    copy3(p->along[p->n], e);
+    p->of_b[p->n++] = of_b;
+  }
+  return 1;
+}
+
+// x with a0 x0 + b0 x1 = r0, a1 x0 + b1 x1 = r1; 0 if the rows are dependent
+static int solve_two(const double a[2], const double b[2], const double r[2], double x[2]) {
+  double det = a[0] * b[1] - a[1] * b[0];
+  if (!(fabs(det) > THIN)) return 0;
+  x[0] = (r[0] * b[1] - r[1] * b[0]) / det;
+  x[1] = (a[0] * r[1] - a[1] * r[0]) / det;
+  return 1;
+}
+
+// the nearest points of two bodies without a curve but a radius: the normal stays square to what both parts contain, and
+// where they contain less than a plane it turns with the line between the points. 0 if the parts do not say how
+static int nearest_points(const cav_contact *c, const cav_shape *a, const cav_shape *b, double size, geometry *g) {
+  cav_core ca = cav_core_of(a), cb = cav_core_of(b);
+  cav_separation s;
+  double most = c->dist + ca.radius + cb.radius + size;
+  if (!cav_separation_find(&ca, &cb, fmax(cav_shape_size(a), cav_shape_size(b)), most, &s) || !s.corners) return 0;
+  parts p = {.n = 0};
+  if (!add_part(&p, s.corner_a, s.corners, 0, size) || !add_part(&p, s.corner_b, s.corners, 1, size)) return 0;
+  if (p.n < 2 && fabs(s.gap) < THIN * size) return 0;
+  // two directions square to the normal: the first part and the one across it
+  double t[2][3];
+  if (p.n) {
+    copy3(t[0], p.along[0]);
+    axpy3(t[0], t[0], -dot3(t[0], s.n), s.n);
+  } else {
+    const double e[3] = {fabs(s.n[0]) < 0.5, fabs(s.n[0]) >= 0.5, 0};
+    cross3(t[0], s.n, e);
+  }
+  normalise3(t[0]);
+  cross3(t[1], s.n, t[0]);
+  double row[2][2];
+  for (int i = 0; i < p.n; i++) {
+    for (int k = 0; k < 2; k++) row[i][k] = dot3(p.along[i], t[k]);
+  }
+  memset(g, 0, sizeof *g);
+  for (int k = 0; k < 6; k++) {
+    double arm[3], move[3], twist[6], right[2], turn[2], slide[2], left[3];
+    unit(twist, k);
+    sub3(arm, s.y, c->pos);
+    copy3(move, twist + 3);
+    cross_add3(move, twist, arm);
+    g->dist[k] = dot3(s.n, move);
+    // the normal: square to both parts
+    for (int i = 0; i < p.n; i++) {
+      double turned[3];
+      cross3(turned, twist, p.along[i]);
+      right[i] = p.of_b[i] ? -dot3(s.n, turned) : 0;
+    }
+    if (p.n < 2) {
+      // across what they contain it follows the points
+      for (int i = p.n; i < 2; i++) {
+        row[i][0] = i == 0, row[i][1] = i == 1;
+        right[i] = dot3(t[i], move) / s.gap;
+      }
+    }
+    if (!solve_two((double[]){row[0][0], row[1][0]}, (double[]){row[0][1], row[1][1]}, right, turn)) return 0;
+    for (int i = 0; i < 2; i++) axpy3(g->normal[k], g->normal[k], turn[i], t[i]);
+    // the points slide along their parts until the line between them is the normal again
+    axpy3(left, move, -s.gap, g->normal[k]);
+    double rest[2] = {dot3(left, t[0]), dot3(left, t[1])};
+    slide[0] = slide[1] = 0;
+    if (p.n == 1) slide[0] = rest[0] / row[0][0];
+    if (p.n == 2 && !solve_two(row[0], row[1], rest, slide)) return 0;
+    copy3(g->pos[k], move);
+    for (int i = 0; i < p.n; i++) {
+      // x + slide a = y + move + slide b: of b the other way
+      axpy3(g->pos[k], g->pos[k], p.of_b[i] ? -2 * slide[i] : 0, p.along[i]);
+      axpy3(g->pos[k], g->pos[k], slide[i], p.along[i]);
+    }
+    axpy3(g->pos[k], g->pos[k], ca.radius - cb.radius, g->normal[k]);
+    scale3(g->pos[k], 0.5, g->pos[k]);
+  }
+  return 1;
+}
+
+// whether a contact is the one between the nearest points that gjk.c finds
+static int is_nearest(const cav_contact *c, const cav_shape *a, const cav_shape *b) {
+  int straight =
+      a->type == CAV_GEOM_SPHERE || a->type == CAV_GEOM_CAPSULE || a->type == CAV_GEOM_BOX || a->type == CAV_GEOM_MESH;
+  return b->type == CAV_GEOM_MESH && straight && c->feature == 0;
 }
 
 // what the second contact axis is aligned with, by the rule of collide.c
@@ -122,20 +269,27 @@ static void find_alignment(const cav_contact *c, geometry *g) {
   memset(g->tangent, 0, sizeof g->tangent);
 }
 
-static cav_status contact_geometry(const cav_model *model, const cav_state *state, const cav_contact *c, geometry *g) {
+static void contact_geometry(const cav_model *model, const cav_state *state, const cav_contact *c,
+                             cav_pair_manifolds *m, geometry *g) {
   const cav_pair *pair = &model->pair[c->pair];
   const cav_geom *first = &model->geom[pair->geom1], *second = &model->geom[pair->geom2];
-  cav_status status = CAV_OK;
-  cav_shape a, b;
-  place(model, state, pair->geom2, &b);
-  if (first->type == CAV_GEOM_PLANE && (second->type == CAV_GEOM_SPHERE || second->type == CAV_GEOM_CAPSULE)) {
-    ball_on_plane(c, &b, g);
-  } else {
-    place(model, state, pair->geom1, &a);
-    status = difference(c, &a, &b, fmin(1, fmin(first->bound, second->bound)), cav_contact_activation(state, pair), g);
+  if (m->pair != c->pair) {
+    double size = fmin(1, fmin(first->bound, second->bound));
+    *m = (cav_pair_manifolds){.pair = c->pair, .size = size, .shift = SHIFT_STEP * size};
+    m->margin = cav_contact_activation(state, pair);
+    place(model, state, pair->geom1, &m->a);
+    place(model, state, pair->geom2, &m->b);
   }
-  if (status == CAV_OK) find_alignment(c, g);
-  return status;
+  double axis[3] = {0, 0, 0};
+  if (first->type == CAV_GEOM_PLANE && has_fixed_points(&m->b)) {
+    double radius = end_radius(&m->b, axis);
+    ball_on_plane(c, radius, axis, g);
+  } else if (!is_nearest(c, &m->a, &m->b) || !nearest_points(c, &m->a, &m->b, m->size, g)) {
+    // where the points of a pair come and go there is no derivative: one that moves with the second geom over a plane of
+    // the first has the right rate of the gap
+    if (!difference(c, m, g)) ball_on_plane(c, 0, axis, g);
+  }
+  find_alignment(c, g);
 }
 
 /// Velocities of the two links at a contact's position, and of the second against the first.
@@ -276,16 +430,15 @@ static int is_flat(const cav_contact *c, const double *H) {
   return fraction < FLAT;
 }
 
-cav_status cav_contact_differentiate(const cav_model *model, const cav_state *state, const cav_contact *c, int whole,
-                                     cav_contact_jacobian *derivative) {
+void cav_contact_differentiate(const cav_model *model, const cav_state *state, const cav_contact *c, int whole,
+                               cav_pair_manifolds *manifolds, cav_contact_jacobian *derivative) {
   law_derivative law;
   double H[36];
   differentiate_law(model, state, c, H, &law);
   derivative->idle = !whole && is_flat(c, H);
-  if (derivative->idle) return CAV_OK;
+  if (derivative->idle) return;
   geometry g;
-  cav_status status = contact_geometry(model, state, c, &g);
-  if (status != CAV_OK) return status;
+  contact_geometry(model, state, c, manifolds, &g);
   motion now, next;
   move(state, c, state->velocity, cav_takes_mean(state) ? state->velocity_next : NULL, &now);
   move(state, c, state->velocity_next, NULL, &next);
@@ -305,5 +458,4 @@ cav_status cav_contact_differentiate(const cav_model *model, const cav_state *st
       }
     }
   }
-  return CAV_OK;
 }

@@ -68,16 +68,17 @@ static int is_within_tree(const cav_model *model, const cav_contact *c) {
   return c->link1 > 0 && c->link2 > 0 && common_dof(model, (int[]){c->link1, c->link2}) >= 0;
 }
 
-cav_status cav_derivative_contacts(const cav_derivative_task *t) {
+void cav_derivative_contacts(const cav_derivative_task *t) {
   cav_derivative_store *s = t->s;
   size_t n = (size_t)t->model->nlink;
   memset(s->touched, 0, n * sizeof *s->touched);
-  if (t->state->ncontact == 0) return CAV_OK;
+  if (t->state->ncontact == 0) return;
+  cav_pair_manifolds manifolds;
+  manifolds.pair = -1;
   memset(s->by_motion, 0, 3 * CAV_TWIST_BLOCK * n * sizeof *s->by_motion);
   for (int i = 0; i < t->state->ncontact; i++) {
     const cav_contact *c = &t->state->contact[i];
-    cav_status status = cav_contact_differentiate(t->model, t->state, c, 0, &s->contact[i]);
-    if (status != CAV_OK) return status;
+    cav_contact_differentiate(t->model, t->state, c, 0, &manifolds, &s->contact[i]);
     if (s->contact[i].idle || is_within_tree(t->model, c)) continue;
     if (c->link1 > 0) contact_at_link(t, c, &s->contact[i], 0);
     if (c->link2 > 0) contact_at_link(t, c, &s->contact[i], 1);
@@ -92,7 +93,6 @@ cav_status cav_derivative_contacts(const cav_derivative_task *t) {
       s->by_next[CAV_TWIST_BLOCK * parent + k] += s->by_next[CAV_TWIST_BLOCK * i + k];
     }
   }
-  return CAV_OK;
 }
 
 // a dof's axis and the drifts of it about a contact
@@ -227,8 +227,9 @@ cav_status cav_contact_derivatives(const cav_model *model, cav_state *state, int
     return CAV_BAD_INPUT;
   const cav_contact *c = &state->contact[contact];
   if (s->contact[contact].idle) {
-    cav_status status = cav_contact_differentiate(model, state, c, 1, &s->contact[contact]);
-    if (status != CAV_OK) return status;
+    cav_pair_manifolds manifolds;
+    manifolds.pair = -1;
+    cav_contact_differentiate(model, state, c, 1, &manifolds, &s->contact[contact]);
   }
   size_t row = (size_t)model->nv * sizeof(double), rows = (size_t)c->dim * row;
   if (out->dist_dq) memset(out->dist_dq, 0, row);

@@ -3,15 +3,25 @@
 #define CAVORT_SLOPE_H
 
 #include "derivative_store.h"
+#include "geometry.h"
 #include "sensor.h"
 #include "step.h"
 
-/// Derivatives of a contact at the state's last evaluation. CAV_NOT_SUPPORTED if the points of its pair come and go
-/// within the step of a difference, so that there is no derivative to take. Where the impulse and its derivative are
-/// below 1e-13 of what a contact that pushes has, it is idle and its geometry left alone, unless whole is asked for.
-/// contact.c.
-cav_status cav_contact_differentiate(const cav_model *model, const cav_state *state, const cav_contact *contact,
-                                     int whole, cav_contact_jacobian *derivative);
+/// Contact points of one pair as it is and displaced, for differences. pair is -1 at the start.
+typedef struct cav_pair_manifolds {
+  int pair, displaced;
+  cav_shape a, b;
+  double margin, size, shift; ///< m: reach; of the smaller geom; step of a displacement
+  double point[3];            ///< of the twists
+  int count[13];              ///< after -, + each of six unit twists, then as it is
+  cav_touch touch[13][CAV_TOUCH_MAX];
+} cav_pair_manifolds;
+
+/// Derivatives of a contact at the state's last evaluation. Where the impulse and its derivative are below 1e-13 of what
+/// a contact that pushes has, it is idle and its geometry left alone, unless whole is asked for. manifolds is kept from
+/// one contact to the next, so that those of one pair share its narrow phases. contact.c.
+void cav_contact_differentiate(const cav_model *model, const cav_state *state, const cav_contact *contact, int whole,
+                               cav_pair_manifolds *manifolds, cav_contact_jacobian *derivative);
 
 /// Adds what equality constraints between joints, tendons or links give du/dq, du/dv and du/dv_next [nv*nv], beyond
 /// what is carried along with the wrenches of subtrees. Not for distances. equality.c.

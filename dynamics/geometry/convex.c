@@ -2,7 +2,8 @@
 /// polish.
 /// The only user of libccd.
 ///
-/// Search. Bodies without a curve: gjk.c alone, which ends at a feature, to rounding. With an ellipsoid or a cylinder:
+/// Search. Bodies without a curve: gjk.c alone, which ends at a feature, to rounding; so too an ellipsoid or a cylinder
+/// against a mesh of more than a few corners, polished at the few corners about that direction. Other curved ones:
 /// libccd's portal refinement on both cores grown by half the reach gives a direction of separation. Where they are
 /// apart the polish proves its answer from there, and all is done. It is no search for the least way out of an overlap,
 /// and that it finds none is true to its tolerance only: these go through gjk.c's polytope, as does everything in a
@@ -520,14 +521,20 @@ int cav_separation_solve(const cav_shape *a, const cav_shape *b, double margin, 
   g.meets = MEETS;
   double most = margin + ca.radius + cb.radius;
   if (!is_curved(g.a)) return cav_separation_find(&ca, &cb, g.size, most, out);
-  if (!cav_separation_find(&ca, &cb, g.size, most, out)) return 0;
-  g.meets = FEW;
-  int proven = out->gap > 0 && polish(&g, out->n, 0);
-  g.meets = MEETS;
+  // of many corners those near a rough direction are too many to try: first the exact one, then the few about it
+  int many = cav_shape_corners(g.b) > NEAR_MAX, proven = 0;
 #ifdef CAVORT_HAVE_CCD
   double n[3];
-  if (!proven && out->gap > 0) proven = ask_libccd(&ca, &cb, g.size, most, n) && polish(&g, n, 0);
+  proven = !many && ask_libccd(&ca, &cb, g.size, most, n) && polish(&g, n, 0);
 #endif
+  if (!proven) {
+    if (!cav_separation_find(&ca, &cb, g.size, most, out)) return 0;
+    if (many && out->gap > 0) {
+      g.meets = FEW;
+      proven = polish(&g, out->n, 0);
+      g.meets = MEETS;
+    }
+  }
   if (!proven) {
     polish(&g, out->n, -INFINITY);
     if (g.best.separation.gap < 0 && g.best.separation.gap > out->gap + LOOSE * g.size) polish_elsewhere(&g);

@@ -13,8 +13,8 @@
 
 // cosine beyond which the direction is a face's normal (1.4e-5 rad)
 static const double ON_NORMAL = 1 - 1e-10;
-// slope to which a mesh on a plane leans to find what else could touch: less misses the far end of a limb that lies
-// down, more finds the outer edges of a rounded sole instead of the sole
+// tangent of the angle by which a mesh on a plane leans to find what else could touch: a smaller one misses the far end
+// of a limb that lies down, a larger one finds the outer edges of a rounded sole instead of the sole
 static const double LEAN = 0.5;
 
 // --- polyhedra: meshes, boxes, and the segments and points that are cores ---

@@ -185,9 +185,9 @@ CAV_API const char *cav_derivatives_missing(const cav_model *model);
 
 /// Analytic derivatives of u at the state's last cav_inverse, as cav_inverse_jacobian gives them; NULL = not needed.
 /// CAV_BAD_INPUT if the state holds no evaluation under its present options; CAV_NOT_SUPPORTED if
-/// cav_derivatives_missing names something, under the options CAV_REGULARISER_EXACT and coupled, or if contact points
-/// of a pair come and go within 1e-5 of the posture. Outputs are undefined after a failure. At kinks of the exact law
-/// one element of the generalised derivative.
+/// cav_derivatives_missing names something or under the options CAV_REGULARISER_EXACT and coupled. Outputs are
+/// undefined after a failure. At kinks one element of the generalised derivative: of the exact law, and where contact
+/// points of a pair come and go within 1e-5 of the posture (the rate of their gap is exact).
 CAV_API cav_status cav_derivatives(const cav_model *model, cav_state *state, double *du_dq, double *du_dv,
                                    double *du_dv_next);
 
