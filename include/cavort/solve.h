@@ -121,8 +121,8 @@ typedef struct cav_solution {
   double *gain_q, *gain_v; ///< [(nknot-1)*nv*nv] du_t = gain_q dq_t + gain_v dv_t, row-major
   double cost;
   double
-      optimality; ///< decrease of the cost along the constraints that the second-order model at the motion predicts, over the
-                  ///< cost: optimal to so much; NaN where the constraints do not hold
+      optimality; ///< the solver's own: decrease of the cost along the constraints that its last model predicts, over
+                  ///< the cost; NaN where the constraints do not hold. A verdict's is the verifier's
   double unactuated; ///< largest, fraction of weight
   int iterations;
   double seconds, seconds_dynamics, seconds_assembly, seconds_linear; ///< wall clock
@@ -210,7 +210,8 @@ typedef struct cav_term_report {
 } cav_term_report;
 
 /// What verification found; from the knots alone, with code apart from the optimiser's. optim/METHOD.md, 6.
-/// optimality, solve_seconds and iterations are the solver's: cav_verify leaves them as they are.
+/// optimality is filled by cav_verify_optimality; solve_seconds and iterations are the solver's. cav_verify leaves these
+/// as they are.
 typedef struct cav_verdict {
   int certified;
   double unactuated_force_max; ///< fraction of weight
@@ -219,9 +220,9 @@ typedef struct cav_verdict {
   double limit_violation_max;      ///< relative to the limit (effort), rad or m (range)
   double constraint_violation_max; ///< of the problem's hard terms, scaled
   double penetration_max_m;
-  double slip_mean_m_s;  ///< of loaded contacts, weighted by force
-  double hover_fraction; ///< of contact force, by impulse, across gaps that stay open
-  double optimality;
+  double slip_mean_m_s;              ///< of loaded contacts, weighted by force
+  double hover_fraction;             ///< of contact force, by impulse, across gaps that stay open
+  double optimality;                 ///< fraction of the cost that a step may still save at most; cav_verify_optimality
   double replay_step_max_error;      ///< largest |v' - v_{t+1}| h of single forward steps from each knot, rad or m
   double replay_same_step_max_error; ///< largest |q - knot|, rad or m, open loop at the same step
   double replay_same_step_seconds;   ///< how long it stays within 1e-6
@@ -254,6 +255,14 @@ CAV_API int cav_verdict_optimal(const cav_verdict *verdict);
 /// claims.
 CAV_API cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
                               const double *gain_q, const double *gain_v, cav_verdict *verdict, cav_error *error);
+
+/// How optimal a verified motion is, into verdict->optimality: no step of 0.5 rad or m (root mean square over knots)
+/// along the linearised constraints decreases the cost by a larger fraction, to second order in the cost's residuals.
+/// From the knots, the problem and the multipliers of bounds among the solution's rows [nrow], which can be wrong: then
+/// it is larger, never smaller. NaN where the verdict, as cav_verify left it, is not feasible. Fails as cav_verify does.
+CAV_API cav_status cav_verify_optimality(const cav_problem *problem, const cav_trajectory *trajectory,
+                                         const cav_options *contact, int nrow, const cav_binding *row,
+                                         cav_verdict *verdict, cav_error *error);
 
 /// What each term asked and got: report [problem->nterm]. Fails as cav_verify does. cost may be NULL.
 CAV_API cav_status cav_terms_report(const cav_problem *problem, const cav_trajectory *trajectory,

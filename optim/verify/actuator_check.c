@@ -59,6 +59,16 @@ cav_status cav_verification_actuators(const cav_model *model, cav_error *error) 
   return CAV_OK;
 }
 
+// the input of a servo that an effort takes at the state and a velocity
+static double servo_input(const cav_verification *verification, int actuator, double effort, const double *v,
+                          double *moment) {
+  const cav_actuator *a = verification->model->actuator + actuator;
+  double length = cav_actuator_length(verification->model, verification->state, actuator, moment), velocity = 0;
+  for (int d = 0; d < verification->model->nv; d++) velocity += moment[d] * v[d];
+  const double *p = a->bias_parameter;
+  return (a->unit * effort - p[0] - p[1] * length - p[2] * velocity) / a->gain_parameter[0];
+}
+
 void cav_verification_effort(const cav_verification *verification, int t, int actuator, double effort, const double *v,
                              double *moment, const char *suffix, cav_metric *metric) {
   const cav_model *model = verification->model;
@@ -69,13 +79,22 @@ void cav_verification_effort(const cav_verification *verification, int t, int ac
                   "actuator %.60s (%d) at %.4g of %.4g .. %.4g%s", a->name, actuator, effort, range[0], range[1],
                   suffix);
   if (a->bias == CAV_BIAS_NONE || !input_range(a, range)) return;
-  // a servo: the input that the effort takes here
-  double length = cav_actuator_length(model, verification->state, actuator, moment), velocity = 0;
-  for (int d = 0; d < model->nv; d++) velocity += moment[d] * v[d];
-  const double *p = a->bias_parameter;
-  double bias = p[0] + p[1] * length + p[2] * velocity;
-  double input = (a->unit * effort - bias) / a->gain_parameter[0], most = fmax(fabs(range[0]), fabs(range[1]));
+  double input = servo_input(verification, actuator, effort, v, moment), most = fmax(fabs(range[0]), fabs(range[1]));
   cav_metric_note(metric, fmax(range[0] - input, input - range[1]) / (most > 0 ? most : 1), t,
                   "servo %.60s (%d), control at %.4g of %.4g .. %.4g%s", a->name, actuator, input, range[0], range[1],
                   suffix);
+}
+
+double cav_verification_effort_row(const cav_verification *verification, int actuator, double effort, const double *v,
+                                   double *moment, double range[2]) {
+  const cav_actuator *a = verification->model->actuator + actuator;
+  double scale, value = effort;
+  cav_verification_actuator_range(verification->model, actuator, range, &scale);
+  if (a->bias != CAV_BIAS_NONE && input_range(a, range)) {
+    value = servo_input(verification, actuator, effort, v, moment);
+    double most = fmax(fabs(range[0]), fabs(range[1]));
+    scale = most > 0 ? most : 1;
+  }
+  for (int k = 0; k < 2; k++) range[k] *= verification->problem->effort_limit / scale;
+  return value / scale;
 }

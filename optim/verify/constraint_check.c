@@ -182,32 +182,37 @@ static int power_values(const cav_verification *verification, const cav_term *te
   return model->nu;
 }
 
-// 1 if a term over contacts looks at this one: those between trees or with the world, of one body alone if it names
-// one; self-penetration at those between two links of one tree
-static int looks_at(const cav_model *model, const cav_term *term, const cav_contact *contact) {
+int cav_verification_looks_at(const cav_model *model, const cav_term *term, const cav_contact *contact) {
   const cav_pair *pair = model->pair + contact->pair;
   if (pair->external == (term->quantity == CAV_QUANTITY_SELF_PENETRATION)) return 0;
   int link = model->body[term->body].link;
   return term->body <= 0 || contact->link1 == link || contact->link2 == link;
 }
 
-// one value per contact, a magnitude
+int cav_verification_contact(const cav_verification *verification, const cav_term *term, const cav_contact *contact,
+                             double value[2]) {
+  double part = fmax(contact->impulse[0], 0) / verification->h / verification->weight, load = sqrt(part);
+  const double *rate = contact->velocity_next;
+  value[0] = load * fmax(contact->dist, 0);
+  if (term->quantity == CAV_QUANTITY_SLIP) {
+    for (int k = 0; k < 2; k++) value[k] = contact->dim > 1 ? load * rate[1 + k] : 0;
+    return 2;
+  }
+  if (term->quantity == CAV_QUANTITY_IMPACT) value[0] = load * rate[0];
+  if (term->quantity == CAV_QUANTITY_SELF_PENETRATION) value[0] = fmax(-contact->dist, 0);
+  if (term->quantity == CAV_QUANTITY_FORCE) value[0] = part;
+  return 1;
+}
+
+// those of every contact
 static int contact_values(const cav_verification *verification, const cav_term *term, double *x, double *target) {
   const cav_state *state = verification->state;
   int n = 0;
   for (int i = 0; i < state->ncontact; i++) {
-    const cav_contact *contact = state->contact + i;
-    if (!looks_at(verification->model, term, contact)) continue;
-    double part = fmax(contact->impulse[0], 0) / verification->h / verification->weight, load = sqrt(part);
-    const double *rate = contact->velocity_next;
-    double value = load * fmax(contact->dist, 0);
-    if (term->quantity == CAV_QUANTITY_SLIP) value = contact->dim > 1 ? load * hypot(rate[1], rate[2]) : 0;
-    if (term->quantity == CAV_QUANTITY_IMPACT) value = load * fabs(rate[0]);
-    if (term->quantity == CAV_QUANTITY_SELF_PENETRATION) value = fmax(-contact->dist, 0);
-    if (term->quantity == CAV_QUANTITY_FORCE) value = part;
-    x[n] = value;
-    target[n++] = 0;
+    if (!cav_verification_looks_at(verification->model, term, state->contact + i)) continue;
+    n += cav_verification_contact(verification, term, state->contact + i, x + n);
   }
+  memset(target, 0, sizeof(double) * n);
   return n;
 }
 
@@ -243,7 +248,7 @@ int cav_verification_measure(const cav_verification *verification, const cav_ter
 int cav_constraint_check_room(const cav_verification *verification) {
   const cav_model *model = verification->model;
   int most = model->nv > model->nu ? model->nv : model->nu;
-  if (verification->state->ncontact > most) most = verification->state->ncontact;
+  if (2 * verification->state->ncontact > most) most = 2 * verification->state->ncontact;
   return model->nq + 2 * (most > 4 ? most : 4);
 }
 

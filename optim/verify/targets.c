@@ -174,8 +174,7 @@ static double norm_of(const cav_term *term, double x) {
   return term->norm == CAV_NORM_ABSOLUTE ? sqrt(1 + x * x) - 1 : 0.5 * x * x;
 }
 
-// weight of a knot in the sum that a cost is: the step over a window, 1 at one knot; both ends of a cycle are one knot
-static double knot_weight(const cav_verification *verification, const cav_term *term, int t) {
+double cav_verification_weight(const cav_verification *verification, const cav_term *term, int t) {
   int single, whole;
   if (!cav_verification_holds(verification, term, t, &single, &whole)) return 0;
   int forced = term->quantity != CAV_QUANTITY_CONFIGURATION && term->quantity != CAV_QUANTITY_VELOCITY;
@@ -190,7 +189,7 @@ void cav_targets_note(const cav_verification *verification, int t, double *work,
   double *q = work, *x = q + verification->model->nq, *target = x + room;
   for (int i = 0; i < verification->problem->nterm; i++) {
     const cav_term *term = verification->problem->term + i;
-    double weight = knot_weight(verification, term, t);
+    double weight = cav_verification_weight(verification, term, t);
     if (weight == 0) continue;
     int n = cav_verification_measure(verification, term, t, q, x, target);
     if (n > 0 && states_target(term)) note_target(verification, term, t, n, x, target, &report[i]);

@@ -34,6 +34,12 @@ typedef struct cav_verification {
   cav_state *bare;  ///< positions only: no contacts, no constraints
 } cav_verification;
 
+/// Admits a motion for examination and fills its velocities; what is not admitted is told in error. End it in any case.
+cav_status cav_verification_begin(cav_verification *verification, const cav_problem *problem,
+                                  const cav_trajectory *trajectory, const cav_options *contact, const double *gain_q,
+                                  const double *gain_v, cav_error *error);
+void cav_verification_end(cav_verification *verification);
+
 /// Keeps the larger of the two; a value that is not a number counts as larger. Writes where by printf's rules.
 void cav_metric_note(cav_metric *metric, double value, int knot, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
@@ -52,6 +58,11 @@ cav_status cav_verification_actuators(const cav_model *model, cav_error *error);
 /// knot, moment [nv] is scratch. suffix ends what is said of it. actuator_check.c.
 void cav_verification_effort(const cav_verification *verification, int t, int actuator, double effort, const double *v,
                              double *moment, const char *suffix, cav_metric *metric);
+
+/// What is bounded of an actuator in planning, over the size of its limits, and these with the problem's headroom: its
+/// effort, or the control of a servo whose control is limited. actuator_check.c.
+double cav_verification_effort_row(const cav_verification *verification, int actuator, double effort, const double *v,
+                                   double *moment, double range[2]);
 
 /// Balance of momentum of every tree over all knots against gravity and contacts with what is not of the tree:
 /// root mean square and worst knot, fraction of weight. momentum_balance.c.
@@ -76,10 +87,22 @@ int cav_verification_holds(const cav_verification *verification, const cav_term 
 /// 1 if a term over dofs selects this one. constraint_check.c.
 int cav_verification_selects(const cav_model *model, const cav_term *term, int dof);
 
+/// 1 if a term over contacts looks at this one: those between trees or with the world, of one body alone if it names
+/// one; self-penetration at those between two links of one tree. constraint_check.c.
+int cav_verification_looks_at(const cav_model *model, const cav_term *term, const cav_contact *contact);
+
+/// What a term over contacts measures of one: one value, of slip two. constraint_check.c.
+int cav_verification_contact(const cav_verification *verification, const cav_term *term, const cav_contact *contact,
+                             double value[2]);
+
 /// Values of a term at knot t and their targets, x and target [room], q [nq]; their number, 0 where the term has no
 /// value. verification->state holds the inverse there. constraint_check.c.
 int cav_verification_measure(const cav_verification *verification, const cav_term *term, int t, double *q, double *x,
                              double *target);
+
+/// Weight of a term's norm at knot t in the sum that a cost is: the step over a window, 1 at one knot; both ends of a
+/// cycle are one knot. targets.c.
+double cav_verification_weight(const cav_verification *verification, const cav_term *term, int t);
 
 /// Adds knot t to the report of every term [nterm], zeroed at first; then what the verdict says of them. targets.c.
 void cav_targets_note(const cav_verification *verification, int t, double *work, cav_term_report *report);

@@ -111,7 +111,7 @@ static cav_status admit(const cav_problem *problem, const cav_trajectory *trajec
                                     "the trajectory, the start or the gains hold numbers that are not finite");
 }
 
-static void verification_clear(cav_verification *verification) {
+void cav_verification_end(cav_verification *verification) {
   cav_cycle_image_free(verification->image);
   cav_state_free(verification->state);
   cav_state_free(verification->bare);
@@ -173,6 +173,19 @@ static cav_status verification_start(cav_verification *verification, const cav_p
   verification->bare->options.contact = verification->bare->options.constraint = 0;
   knot_velocities(verification);
   return CAV_OK;
+}
+
+cav_status cav_verification_begin(cav_verification *verification, const cav_problem *problem,
+                                  const cav_trajectory *trajectory, const cav_options *contact, const double *gain_q,
+                                  const double *gain_v, cav_error *error) {
+  *verification = (cav_verification){0};
+  cav_status status = admit(problem, trajectory, contact, gain_q, gain_v, error);
+  if (status != CAV_OK) return status;
+  if (error) *error = (cav_error){0};
+  cav_error refusal = {0};
+  status = verification_start(verification, problem, trajectory, contact, &refusal);
+  if (refusal.status != CAV_OK && error) *error = refusal;
+  return status;
 }
 
 // the motion begins where the problem says
@@ -500,18 +513,12 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
   if (!verdict) return verification_fail(error, CAV_BAD_INPUT, "verification needs a place for its verdict");
   verdict->certified = verdict->achieved = 0;
   snprintf(verdict->reason, sizeof verdict->reason, "not verified");
-  cav_status status = admit(problem, trajectory, contact, gain_q, gain_v, error);
-  if (status != CAV_OK) return status;
   cav_verification verification;
   metrics found = {0};
   cav_replay replay = {0};
   cav_balance *balance = NULL;
-  if (error) *error = (cav_error){0};
-  status = cav_verification_actuators(problem->model, error);
-  if (status != CAV_OK) return status;
-  cav_error refusal = {0};
-  status = verification_start(&verification, problem, trajectory, contact, &refusal);
-  if (refusal.status != CAV_OK && error) *error = refusal;
+  cav_status status = cav_verification_begin(&verification, problem, trajectory, contact, gain_q, gain_v, error);
+  if (status == CAV_OK) status = cav_verification_actuators(problem->model, error);
   if (status == CAV_OK) balance = cav_balance_new(&verification);
   if (status == CAV_OK && !balance) status = CAV_NO_MEMORY;
   cav_term_report *report = status == CAV_OK ? calloc((size_t)problem->nterm + 1, sizeof *report) : NULL;
@@ -529,7 +536,7 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
   }
   free(report);
   cav_balance_free(balance);
-  verification_clear(&verification);
+  cav_verification_end(&verification);
   if (status != CAV_OK && error && !*error->text)
     verification_fail(error, status, "verification: %s", cav_status_name(status));
   return status;
@@ -540,19 +547,15 @@ cav_status cav_terms_report(const cav_problem *problem, const cav_trajectory *tr
   cav_verification verification;
   metrics found = {0};
   cav_verdict verdict = {0};
-  cav_error refusal = {0};
-  cav_status status = admit(problem, trajectory, contact, NULL, NULL, error);
-  if (status != CAV_OK) return status;
-  status = verification_start(&verification, problem, trajectory, contact, &refusal);
-  if (refusal.status != CAV_OK && error) *error = refusal;
+  cav_status status = cav_verification_begin(&verification, problem, trajectory, contact, NULL, NULL, error);
   cav_balance *balance = status == CAV_OK ? cav_balance_new(&verification) : NULL;
   if (status == CAV_OK && !balance) status = CAV_NO_MEMORY;
-  memset(report, 0, (size_t)problem->nterm * sizeof *report);
+  if (status == CAV_OK) memset(report, 0, (size_t)problem->nterm * sizeof *report);
   if (status == CAV_OK) status = examine(&verification, balance, &found, report, error);
   if (status == CAV_OK) cav_targets_verdict(&verification, report, &verdict);
   if (cost) *cost = verdict.cost;
   cav_balance_free(balance);
-  verification_clear(&verification);
+  cav_verification_end(&verification);
   return status;
 }
 
@@ -560,12 +563,8 @@ cav_status cav_closed_loops(const cav_problem *problem, const cav_trajectory *tr
                             const double *gain_q, const double *gain_v, struct cav_follow *claimed,
                             struct cav_follow *own, cav_error *error) {
   cav_verification verification;
-  cav_status status = admit(problem, trajectory, contact, gain_q, gain_v, error);
-  if (status != CAV_OK) return status;
-  cav_error refusal = {0};
-  status = verification_start(&verification, problem, trajectory, contact, &refusal);
-  if (refusal.status != CAV_OK && error) *error = refusal;
-  int nv = verification.model->nv;
+  cav_status status = cav_verification_begin(&verification, problem, trajectory, contact, gain_q, gain_v, error);
+  int nv = status == CAV_OK ? verification.model->nv : 0;
   for (int t = 0; t < verification.rows && status == CAV_OK; t++) {
     const double *v = verification.v + t * nv;
     status = cav_inverse(verification.model, verification.state, verification.q + t * verification.model->nq, v, v + nv,
@@ -573,6 +572,6 @@ cav_status cav_closed_loops(const cav_problem *problem, const cav_trajectory *tr
   }
   if (status == CAV_OK) status = cav_replay_closed(&verification, contact, gain_q, gain_v, claimed);
   if (status == CAV_OK) status = cav_replay_closed(&verification, NULL, gain_q, gain_v, own);
-  verification_clear(&verification);
+  cav_verification_end(&verification);
   return status;
 }

@@ -5,7 +5,6 @@
 
 #include "certificate.h"
 #include "command.h"
-#include "constraint_table.h"
 #include "result.h"
 
 static void print_when(const cav_reason *r) {
@@ -52,14 +51,9 @@ int cav_command_explain(const cav_command_line *line) {
   cav_error error = {0};
   cav_result *result = cav_result_read(line->operand, line->model, &error);
   if (!result) return cav_command_fail(&error);
-  char *path = cav_result_path(line->operand, "rows.csv");
-  cav_binding *row = NULL;
-  int nrow = 0;
   static cav_explanation explanation; // some kilobytes
-  cav_status status = path ? cav_rows_read(path, &nrow, &row, &error) : (error.status = CAV_NO_MEMORY);
-  if (!status)
-    status =
-        cav_explain(result->problem, result->trajectory, &result->problem->contact, nrow, row, &explanation, &error);
+  cav_status status = cav_explain(result->problem, result->trajectory, &result->problem->contact, result->nrow,
+                                  result->row, &explanation, &error);
   cav_verdict verdict = {0};
   if (!status)
     status = cav_verify(result->problem, result->trajectory, &result->problem->contact, result->gain_q, result->gain_v,
@@ -77,8 +71,6 @@ int cav_command_explain(const cav_command_line *line) {
   } else if (!status) {
     print_table(&explanation, &verdict);
   }
-  free(path);
-  free(row);
   cav_result_free(result);
   if (status) return cav_command_fail(&error);
   return verdict.certified && verdict.achieved ? CAV_EXIT_CERTIFIED : CAV_EXIT_NOT_CERTIFIED;

@@ -13,7 +13,9 @@ static cav_status certify(const cav_result *result, cav_verdict *verdict, cav_er
   memset(verdict, 0, sizeof *verdict);
   cav_status status = cav_verify(result->problem, result->trajectory, &result->problem->contact, result->gain_q,
                                  result->gain_v, verdict, error);
-  verdict->optimality = result->optimality;
+  if (!status)
+    status = cav_verify_optimality(result->problem, result->trajectory, &result->problem->contact, result->nrow,
+                                   result->row, verdict, error);
   verdict->solve_seconds = result->solve_seconds;
   verdict->iterations = result->iterations;
   return status;

@@ -44,7 +44,9 @@ static cav_solution *run(const cav_race *race, int i, const cav_solve_options *o
   if (solution && counts(status)) {
     cav_status verified = cav_verify(taken, solution->trajectory, &solution->contact, solution->gain_q,
                                      solution->gain_v, &report->verdict, &verification);
-    report->verdict.optimality = solution->optimality;
+    if (verified == CAV_OK)
+      verified = cav_verify_optimality(taken, solution->trajectory, &solution->contact, solution->nrow, solution->row,
+                                       &report->verdict, &verification);
     report->verdict.solve_seconds = solution->seconds;
     report->verdict.iterations = solution->iterations;
     report->cost = solution->cost;

@@ -54,7 +54,7 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
   add_number(line, &n, "under the model's contact parameters, error at the end", v->model_contacts_end_error_m, NAN,
              1e3, " mm");
   add_number(line, &n, "open loop at the same step, largest error", v->replay_same_step_max_error, NAN, 1, "");
-  add_number(line, &n, "cost that optimality leaves, fraction", v->optimality, NAN, 1, "");
+  add_number(line, &n, "cost that a step may still save, fraction", v->optimality, NAN, 1, "");
   return n;
 }
 

@@ -277,7 +277,6 @@ static void read_record(const char *path, cav_result *result) {
   size_t n = file ? fread(text, 1, sizeof text - 1, file) : 0;
   if (file) fclose(file);
   text[n] = 0;
-  result->optimality = recorded(text, "optimality");
   result->solve_seconds = recorded(text, "solve_seconds");
   double iterations = recorded(text, "iterations");
   result->iterations = iterations >= 0 && iterations < INT_MAX ? (int)iterations : 0;
@@ -287,7 +286,8 @@ cav_result *cav_result_read(const char *folder, const char *model_path, cav_erro
   cav_result *result = calloc(1, sizeof *result);
   char *problem = cav_result_path(folder, "problem.xml"), *trajectory = cav_result_path(folder, "trajectory.csv");
   char *gains = cav_result_path(folder, "gains.csv"), *verdict = cav_result_path(folder, "verdict.json");
-  cav_status status = result && problem && trajectory && gains && verdict ? CAV_OK : no_memory(error);
+  char *rows = cav_result_path(folder, "rows.csv");
+  cav_status status = result && problem && trajectory && gains && verdict && rows ? CAV_OK : no_memory(error);
   if (!status && !(result->problem = cav_problem_load(problem, model_path, error))) status = error->status;
   if (!status && !result->problem->solved) {
     status = cav_file_fail(error, CAV_BAD_INPUT, 0,
@@ -296,11 +296,13 @@ cav_result *cav_result_read(const char *folder, const char *model_path, cav_erro
   if (!status && !(result->trajectory = cav_trajectory_read(trajectory, result->problem->model, error)))
     status = error->status;
   if (!status) status = read_gains(gains, result, error);
+  if (!status) status = cav_rows_read(rows, &result->nrow, &result->row, error);
   if (!status) read_record(verdict, result);
   free(problem);
   free(trajectory);
   free(gains);
   free(verdict);
+  free(rows);
   if (!status) return result;
   cav_result_free(result);
   return NULL;
@@ -310,6 +312,7 @@ void cav_result_free(cav_result *result) {
   if (!result) return;
   free(result->gain_q);
   free(result->gain_v);
+  free(result->row);
   cav_trajectory_free(result->trajectory);
   cav_problem_free(result->problem);
   free(result);

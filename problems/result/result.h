@@ -9,8 +9,10 @@
 typedef struct cav_result {
   cav_problem *problem; ///< with the contact law of the motion
   cav_trajectory *trajectory;
-  double *gain_q, *gain_v;          ///< [(nknot-1)*nv*nv]
-  double optimality, solve_seconds; ///< as the solver left them in verdict.json; NaN: not recorded
+  double *gain_q, *gain_v; ///< [(nknot-1)*nv*nv]
+  int nrow;
+  cav_binding *row;     ///< [nrow] constraint rows of rows.csv, with their multipliers
+  double solve_seconds; ///< as the solver left it in verdict.json; NaN: not recorded
   int iterations;
 } cav_result;
 

@@ -40,7 +40,8 @@ typedef struct optimum {
   double (*multiplier)(const cav_problem *problem,
                        const cav_solution *solution); ///< relative error of one; may be NULL
   optimum_bound multiplier_error;
-  int quadratic; ///< linear-quadratic: at most 5 iterations a stage, 1 after the last
+  double optimal; ///< at most this by the verifier; 0: 1e-4
+  int quadratic;  ///< linear-quadratic: at most 5 iterations a stage, 1 after the last
 } optimum;
 
 /// Rows of one file each.

@@ -103,6 +103,15 @@ static void compare(const optimum *o, const cav_problem *problem, const cav_solu
   free(truth.q), free(truth.u);
 }
 
+/// How optimal the verifier says that a solution is.
+static double verify(const cav_problem *problem, const cav_solution *s) {
+  cav_verdict verdict = {.cost = s->cost};
+  cav_error error = {0};
+  if (!CHECK(cav_verify_optimality(problem, s->trajectory, &s->contact, s->nrow, s->row, &verdict, &error) == CAV_OK))
+    fprintf(stderr, "    %s\n", error.text);
+  return verdict.optimality;
+}
+
 static outcome solve(const optimum *o, const cav_model *model, int n, cav_solver solver) {
   optimum_problem p = {.problem = cav_problem_default(model)};
   outcome out = {0};
@@ -131,6 +140,7 @@ static outcome solve(const optimum *o, const cav_model *model, int n, cav_solver
     compare(o, &p.problem, solution, n, &out);
     count_iterations(solution, &out);
     out.optimality = solution->optimality;
+    out.verified = verify(&p.problem, solution);
   }
   cav_solution_free(solution);
   free(ends), free(p.table), free(p.times);
@@ -169,6 +179,10 @@ static void judge_all(const optimum *o, const outcome *coarse, const outcome *fi
     const outcome *is = i ? fine : coarse;
     if (!CHECK(is->optimality <= 1e-4))
       fprintf(stderr, "    %s: optimal to %.2g only at a step of %g s\n", o->name, is->optimality, is->step);
+    double most = o->optimal > 0 ? o->optimal : 1e-4;
+    if (!CHECK(is->verified <= most))
+      fprintf(stderr, "    %s: by the verifier optimal to %.2g only at a step of %g s\n", o->name, is->verified,
+              is->step);
     if (!CHECK(!o->quadratic || (is->stage_most <= 5 && is->after <= 1)))
       fprintf(stderr, "    %s: %d iterations in a stage and %d after the last at a step of %g s\n", o->name,
               is->stage_most, is->after, is->step);
@@ -176,9 +190,9 @@ static void judge_all(const optimum *o, const outcome *coarse, const outcome *fi
 }
 
 static void print_row(const optimum *o, const outcome *out) {
-  printf("| %s | %.4g | %s | %d | %d | %d | %.1e | %.1e | %.1e | %.1e | %.1e | %.1e |\n", o->name, out->step,
+  printf("| %s | %.4g | %s | %d | %d | %d | %.1e | %.1e | %.1e | %.1e | %.1e | %.1e | %.1e |\n", o->name, out->step,
          out->status == CAV_OK ? "yes" : "no", out->iterations, out->stage_most, out->after, out->cost, out->time,
-         out->state, out->force, out->multiplier_error, out->optimality);
+         out->state, out->force, out->multiplier_error, out->optimality, out->verified);
   fflush(stdout);
 }
 
@@ -222,7 +236,8 @@ int main(int argc, char **argv) {
   if (table)
     printf(
         "| problem | step, s | solved | iterations | most in a stage | after the last | cost | duration | states | "
-        "forces | multiplier or impulse | optimal to |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+        "forces | multiplier or impulse | optimal to | by the verifier "
+        "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (int k = 0; k < 4; k++)
     for (int j = 0; j < part[k].n; j++)
       if (wanted(part[k].row[j].name, argc - i, argv + i)) run(&part[k].row[j], solver, table);
