@@ -139,6 +139,7 @@ run 0 verify swing.result
 says out "certified: swing on pendulum"
 run 0 verify swing.result --json
 says out '"certified": true'
+check "as optimal from the files as when it was solved" [ "$(grep '"optimality"' out)" = "$(grep '"optimality"' before.json)" ]
 check "verify writes nothing" cmp -s before.json swing.result/verdict.json
 rm swing.result/view.html
 run 0 view swing.result

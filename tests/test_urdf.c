@@ -90,6 +90,7 @@ static void test_robot(void) {
   CHECK(m->equality[0].object[1] == t && m->equality[0].coef[0] == 0.1 && m->equality[0].coef[1] == 2);
   // seen only, thus not read; said: velocities, strangers
   CHECK(m->ngeom == 5 && warns(m, "absent.stl") == 0);
+  CHECK(m->joint[t].speed == 2 && m->joint[spin].speed == 0);
   CHECK(warns(m, "velocity limits of 2 joints") == 1 && warns(m, "<oddity>") == 1);
   for (int i = 0; i < m->ngeom; i++) CHECK(m->geom[i].rgba[1] < 0.4f || m->geom[i].rgba[1] > 0.4f);
   cav_model_free(m);

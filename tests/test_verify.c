@@ -316,6 +316,24 @@ static void test_effort(void) {
   sample_free(&s);
 }
 
+// a wheel of 2 kg m^2 spun up at 3 rad/s^2 by a motor behind a gear of 4: its power is the moment times the mean speed
+static void test_rates(void) {
+  static const char wheel[] =
+      "<mujoco><option gravity='0 0 0'/><worldbody><body><joint name='axle' axis='0 0 1'/>"
+      "<inertial pos='0 0 0' mass='1' diaginertia='2 2 2'/></body></worldbody><actuator><motor joint='axle' "
+      "gear='4'/></actuator></mujoco>";
+  sample s = sample_new(wheel, 20, 0.05, CAV_ORDER_MIDPOINT);
+  for (int t = 0; t <= 20; t++) knot(&s, t)[0] = 3 * 0.05 * 0.05 * t * (t + 1) / 2;
+  CHECK(verify(&s, NULL, NULL) == CAV_OK);
+  CHECK_NEAR(s.verdict.power_max_w, 2 * 3 * 3 * 0.05 * 19.5, 1e-9);
+  CHECK_NEAR(s.verdict.joint_speed_max_rad_s, 3, 1e-12);
+  CHECK(isnan(s.verdict.joint_speed_over_limit));
+  ((cav_joint *)s.model->joint)->speed = 4;
+  CHECK(verify(&s, NULL, NULL) == CAV_OK);
+  CHECK_NEAR(s.verdict.joint_speed_over_limit, 0.75, 1e-12);
+  sample_free(&s);
+}
+
 // the control of a servo that holds is where it is and what its pull takes: 2 angle + m g l sin(angle) / 8
 static void test_servo(void) {
   sample s = sample_new(servo, 25, 0.02, CAV_ORDER_MIDPOINT);
@@ -702,6 +720,7 @@ int main(void) {
   test_tumble();
   test_held_roots();
   test_effort();
+  test_rates();
   test_servo();
   test_range();
   test_cords();

@@ -255,6 +255,7 @@ static void fill_joint(cav_builder *b, int i, int q, int dof) {
   if (cav_builder_is_scalar(s->type)) {
     j->ref = s->ref;
     j->springref = s->springref;
+    j->speed = s->speed;
   }
   cav_check_not_negative(spec, s->node, "stiffness", s->stiffness);
   cav_check_not_negative(spec, s->node, "damping", s->damping);

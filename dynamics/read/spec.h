@@ -36,7 +36,7 @@ typedef struct cav_spec_joint {
   const cav_xml_node *node;
   int body;
   cav_joint_type type;
-  double pos[3], axis[3], ref, springref, range[2], margin;
+  double pos[3], axis[3], ref, springref, range[2], margin, speed;
   cav_limited limited;
   double twist[2], swing; ///< ball: the cylinder, where has_twist and has_swing
   int has_twist, has_swing;

@@ -8,9 +8,10 @@
 /// file's <mujoco><compiler fusestatic="false"/></mujoco> says otherwise. A joint with an effort limit gets a motor of
 /// that range; one that mimics another is tied to it by a joint equality. Moments of inertia that no solid has are
 /// mended where rounding explains them, and let pass where not, as by other readers of URDF; both are told. What the
-/// file asks for and is left aside is a warning, once with a count: velocity limits, safety controllers, elements that
-/// no table knows. Not done: soft limits, transmissions, xacro.
+/// file asks for and is left aside is a warning, once with a count: safety controllers, elements that no table knows,
+/// and velocity limits, which are kept for certificates to tell. Not done: soft limits, transmissions, xacro.
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <strings.h>
@@ -101,7 +102,7 @@ typedef struct part {
 typedef struct reader {
   cav_spec *spec;
   CAV_SPEC_LIST(part) parts; // by name
-  int velocities;            // joints whose velocity limit is left aside
+  int velocities;            // joints with a velocity limit
 } reader;
 
 enum { DEPTH_MAX = 1000 }; // links one after another
@@ -426,7 +427,8 @@ static void read_motion(reader *r, const cav_xml_node *node, int type, cav_spec_
   if (type != CONTINUOUS && j->range[0] < j->range[1]) j->limited = CAV_LIMITED_YES;
   if (type != CONTINUOUS && j->range[0] > j->range[1])
     cav_spec_fail(spec, l, "upper", "expected lower < upper, got %g %g", j->range[0], j->range[1]);
-  if (cav_xml_real(l, "velocity", 0) > 0) r->velocities++;
+  j->speed = fmax(cav_xml_real(l, "velocity", 0), 0);
+  r->velocities += j->speed > 0;
   push_motor(spec, node, j->name, cav_xml_real(l, "effort", 0));
 }
 
@@ -617,7 +619,8 @@ void cav_urdf_read(cav_spec *spec, const cav_xml *xml) {
   if (spec->status == CAV_OK) cav_srdf_read(spec);
   cav_scene_bodies(spec);
   if (r.velocities && spec->status == CAV_OK)
-    cav_spec_warn(spec, root, NULL, "left aside: the velocity limits of %d joints", r.velocities);
+    cav_spec_warn(spec, root, NULL, "told in certificates, but not obeyed: the velocity limits of %d joints",
+                  r.velocities);
   if (spec->status == CAV_OK) warn_strangers(spec, root);
   cav_spec_warn_of_prose(spec);
   cav_spec_settle_notes(spec);

@@ -210,6 +210,7 @@ typedef struct cav_joint {
   /// of those actuators are within it.
   int effort_limited;
   double effort_range[2];
+  double speed; ///< hinge and slide: limit in the file, rad/s or m/s, told in certificates, obeyed by nothing; 0: none
 } cav_joint;
 
 /// One degree of freedom, index into v.

@@ -81,6 +81,16 @@ void cav_hover_free(cav_hover *hover);
 /// Adds knot t, in their order up to the last; verification->state holds the inverse there. Fails with CAV_NO_MEMORY.
 cav_status cav_hover_add(cav_hover *hover, const cav_verification *verification, int t);
 void cav_hover_result(cav_hover *hover, const cav_verification *verification, cav_metric *metric);
+
+/// Rates that are told: of an actuator W, of joints rad/s and over the limit of the model's file (negative: none has
+/// one). rates.c.
+typedef struct cav_rates {
+  double power, speed, over_limit;
+} cav_rates;
+
+/// Adds knot t, whose forces, where it has them, are in verification->control; moment [nv] is scratch.
+void cav_rates_add(const cav_verification *verification, int t, double *moment, cav_rates *rates);
+
 /// 1 if the term's window holds knot t; whether it is one knot, whether it is the whole horizon. constraint_check.c.
 int cav_verification_holds(const cav_verification *verification, const cav_term *term, int t, int *single, int *whole);
 

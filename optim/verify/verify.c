@@ -17,6 +17,7 @@ static const double loaded = 0.01;        // fraction of the weight from which o
 typedef struct metrics {
   cav_metric unactuated, limit, term, penetration, defect, periodicity, hover;
   double slip, load;
+  cav_rates rates;
 } metrics;
 
 // writes the reason of a failed call
@@ -356,10 +357,12 @@ static cav_status examine_knot(cav_verification *verification, int t, cav_balanc
   if (status != CAV_OK) return status;
   note_ranges(verification, t, q, "", &found->limit);
   note_penetration(verification, t, "", &found->penetration);
+  if (t >= verification->rows) cav_rates_add(verification, t, work + nv, &found->rates);
   if (t >= verification->rows) return CAV_OK;
   memcpy(verification->u + knot * nv, work, sizeof(double) * nv);
   add_slip(verification, found);
   note_forces(verification, t, v, work, verification->control + knot * model->nu, work + nv, "", found);
+  cav_rates_add(verification, t, work + nv, &found->rates);
   cav_balance_add(balance, verification, t);
   return CAV_OK;
 }
@@ -496,6 +499,9 @@ static void fill(const cav_verification *verification, const metrics *found, con
   verdict->penetration_max_m = found->penetration.value;
   verdict->slip_mean_m_s = found->load > 0 ? found->slip / found->load : 0;
   verdict->hover_fraction = found->hover.value;
+  verdict->power_max_w = found->rates.power;
+  verdict->joint_speed_max_rad_s = found->rates.speed;
+  verdict->joint_speed_over_limit = found->rates.over_limit < 0 ? NAN : found->rates.over_limit;
   verdict->replay_step_max_error = replay->step_error;
   verdict->replay_same_step_max_error = replay->open_error;
   verdict->replay_same_step_seconds = replay->open_seconds;
@@ -514,7 +520,7 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
   verdict->certified = verdict->achieved = 0;
   snprintf(verdict->reason, sizeof verdict->reason, "not verified");
   cav_verification verification;
-  metrics found = {0};
+  metrics found = {.rates.over_limit = -1};
   cav_replay replay = {0};
   cav_balance *balance = NULL;
   cav_status status = cav_verification_begin(&verification, problem, trajectory, contact, gain_q, gain_v, error);
@@ -545,7 +551,7 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
 cav_status cav_terms_report(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
                             cav_term_report *report, double *cost, cav_error *error) {
   cav_verification verification;
-  metrics found = {0};
+  metrics found = {.rates.over_limit = -1};
   cav_verdict verdict = {0};
   cav_status status = cav_verification_begin(&verification, problem, trajectory, contact, NULL, NULL, error);
   cav_balance *balance = status == CAV_OK ? cav_balance_new(&verification) : NULL;

@@ -54,6 +54,10 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
   add_number(line, &n, "under the model's contact parameters, error at the end", v->model_contacts_end_error_m, NAN,
              1e3, " mm");
   add_number(line, &n, "open loop at the same step, largest error", v->replay_same_step_max_error, NAN, 1, "");
+  add_number(line, &n, "power of an actuator, largest", v->power_max_w, NAN, 1, " W");
+  add_number(line, &n, "speed of a joint, largest", v->joint_speed_max_rad_s, NAN, 1, " rad/s");
+  if (!isnan(v->joint_speed_over_limit))
+    add_number(line, &n, "speed of a joint over the limit in its file", v->joint_speed_over_limit, NAN, 1, "");
   add_number(line, &n, "cost that a step may still save, fraction", v->optimality, NAN, 1, "");
   return n;
 }
@@ -191,6 +195,9 @@ void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdi
   write_number(out, "penetration_max_m", v->penetration_max_m);
   write_number(out, "slip_mean_m_s", v->slip_mean_m_s);
   write_number(out, "hover_fraction", v->hover_fraction);
+  write_number(out, "power_max_w", v->power_max_w);
+  write_number(out, "joint_speed_max_rad_s", v->joint_speed_max_rad_s);
+  write_number(out, "joint_speed_over_limit", v->joint_speed_over_limit);
   write_number(out, "optimality", v->optimality);
   write_number(out, "replay_step_max_error", v->replay_step_max_error);
   write_number(out, "replay_same_step_max_error", v->replay_same_step_max_error);

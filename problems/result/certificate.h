@@ -6,7 +6,7 @@
 
 #include "cavort/solve.h"
 
-enum { CAV_CERTIFICATE_LINES = 16 };
+enum { CAV_CERTIFICATE_LINES = 19 };
 
 /// One line: what, its value and limit as they are to be read; passed: 1 held, 0 missed, -1 only told.
 typedef struct cav_certificate_line {
