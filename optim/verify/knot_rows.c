@@ -153,10 +153,11 @@ static cav_status list_ranges(const cav_verification *verification, int t, cav_k
 // component that a value of a hard term has in cav_binding
 static int component_of(const cav_model *model, const cav_term *term, int k) {
   if (term->quantity == CAV_QUANTITY_SENSOR) return term->component >= 0 ? term->component : k;
-  for (int d = 0; d < model->nv; d++)
-    if (cav_verification_selects(model, term, d) && k-- == 0) return d;
-  assert(!"a value of a dof that the term does not select");
-  return -1;
+  int dof = -1;
+  for (int d = 0; d < model->nv && dof < 0; d++)
+    if (cav_verification_selects(model, term, d) && k-- == 0) dof = d;
+  assert(dof >= 0);
+  return dof;
 }
 
 static cav_status list_hard(const cav_verification *verification, int t, cav_knot_rows *rows) {

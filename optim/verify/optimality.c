@@ -58,7 +58,8 @@ static void add_gradient(model *s, int t, double factor, const double *row) {
 static void add_cost(model *s, int t, const cav_knot_row *row, double x, const double *J) {
   int width = s->knot.width, last = width - 1, free_step = s->knot.free_step;
   double root = row->term->norm == CAV_NORM_ABSOLUTE ? sqrt(1 + x * x) : 1;
-  double second = row->weight / (root * root * root), step = free_step ? J[last] : 0;
+  // of a norm other than a square, y^2/2 is the norm: the derivative of y, squared
+  double second = row->weight * (1 + root) / (2 * root * root), step = free_step ? J[last] : 0;
   add_gradient(s, t, row->weight * x / root, J);
   if (free_step && row->windowed) {
     s->gradient[s->knot.unknowns - 1] += row->weight * (row->term->norm == CAV_NORM_ABSOLUTE ? root - 1 : 0.5 * x * x);
@@ -261,7 +262,7 @@ static cav_status measure(const cav_verification *verification, const int *first
       is = bound(&s, scale);
     }
     // costs are sums of squares: no more than all of it can be saved
-    *optimality = fmin(is / scale, 1);
+    *optimality = fmin(is, cost) / scale;
   }
   model_clear(&s);
   return status;

@@ -45,8 +45,8 @@ typedef struct optimum {
 } optimum;
 
 /// Rows of one file each.
-extern const optimum optimum_smooth[], optimum_bounded[], optimum_contact[], optimum_pendulum[];
-extern const int optimum_nsmooth, optimum_nbounded, optimum_ncontact, optimum_npendulum;
+extern const optimum optimum_smooth[], optimum_bounded[], optimum_contact[], optimum_pendulum[], optimum_further[];
+extern const int optimum_nsmooth, optimum_nbounded, optimum_ncontact, optimum_npendulum, optimum_nfurther;
 
 /// Adds a cost of weight/2 times the square over the whole horizon, or at its end. Targets are zeros.
 cav_term *optimum_cost(optimum_problem *problem, cav_quantity quantity, double weight);

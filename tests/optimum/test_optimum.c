@@ -226,7 +226,8 @@ int main(int argc, char **argv) {
   } const part[] = {{optimum_smooth, optimum_nsmooth},
                     {optimum_bounded, optimum_nbounded},
                     {optimum_contact, optimum_ncontact},
-                    {optimum_pendulum, optimum_npendulum}};
+                    {optimum_pendulum, optimum_npendulum},
+                    {optimum_further, optimum_nfurther}};
   cav_solver solver = CAV_SOLVER_GAUSS_NEWTON;
   int i = 1, table = 0;
   if (i < argc && !strcmp(argv[i], "gn")) i++;
@@ -238,7 +239,7 @@ int main(int argc, char **argv) {
         "| problem | step, s | solved | iterations | most in a stage | after the last | cost | duration | states | "
         "forces | multiplier or impulse | optimal to | by the verifier "
         "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
-  for (int k = 0; k < 4; k++)
+  for (size_t k = 0; k < sizeof part / sizeof *part; k++)
     for (int j = 0; j < part[k].n; j++)
       if (wanted(part[k].row[j].name, argc - i, argv + i)) run(&part[k].row[j], solver, table);
   return check_result();
