@@ -70,9 +70,10 @@ static void term_origin(const cav_transcription *tr, int t, int i, cav_binding *
   }
 }
 
-/// Kind, object and component of slot i of knot t.
-static void origin_of(const cav_transcription *tr, int t, int i, cav_binding *b) {
+void cav_transcription_origin(const cav_transcription *tr, int t, int i, cav_binding *b) {
   const cav_slot_layout *at = &tr->knot[t].layout;
+  const cav_slot *slot = &tr->knot[t].slot[i];
+  *b = (cav_binding){.knot = t, .value = slot->value, .lower = slot->lower, .upper = slot->upper};
   if (i < at->effort) {
     b->kind = CAV_BINDING_UNACTUATED, b->object = main_dof(&tr->unactuated[i]), b->component = i;
   } else if (i < at->joint) {
@@ -141,8 +142,8 @@ static int list_rows(list *all, const double allowed[CAV_BINDING_KINDS]) {
     all->first[t] = all->n;
     for (int i = 0; i < tr->knot[t].layout.count; i++) {
       const cav_slot *slot = &tr->knot[t].slot[i];
-      cav_binding b = {.knot = t, .value = slot->value, .lower = slot->lower, .upper = slot->upper};
-      origin_of(tr, t, i, &b);
+      cav_binding b;
+      cav_transcription_origin(tr, t, i, &b);
       b.allowed = allowed[b.kind];
       b.multiplier = slot->final_multiplier;
       if (slot_excess(slot) <= b.allowed && fabs(slot->final_multiplier) <= floor_fraction * largest) continue;

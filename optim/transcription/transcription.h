@@ -173,6 +173,9 @@ void cav_transcription_estimate_multipliers(cav_transcription *transcription, co
 cav_status cav_transcription_rows(const cav_transcription *transcription, const double allowed[CAV_BINDING_KINDS],
                                   cav_binding **row, int *n);
 
+/// Where row i of knot t comes from, and its value and bounds. constraint_rows.c.
+void cav_transcription_origin(const cav_transcription *transcription, int t, int i, cav_binding *binding);
+
 /// q_t := q_t (+) x_t for every unknown knot, the step by its unknown within its bounds; v follows, and in cycles q_0
 /// and v_0. x [unknowns].
 void cav_transcription_move(const cav_transcription *transcription, const cav_trajectory *from, const double *x,
