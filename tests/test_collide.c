@@ -1,6 +1,8 @@
 /// The broad phase against the narrow phase of every pair, cav_contact_activation, the options that switch contacts
-/// off, contact axes, and MuJoCo's contacts on models no one here wrote.
+/// off, contact axes, and MuJoCo's contacts on models no one here wrote; what stands
+/// far away is left out, and what is near never.
 #include "check.h"
+#include "fixed.h"
 #include "math3.h"
 #include "step.h"
 
@@ -47,6 +49,21 @@ static void random_geom(cav_geom *g, cav_geom_type type) {
                                         : norm3(g->size);
 }
 
+static void add_pairs(heap *h) {
+  cav_model *m = &h->model;
+  for (int a = 0; a < GEOMS; a++) {
+    for (int b = a + 1; b < GEOMS; b++) {
+      int swap = h->geom[a].type > h->geom[b].type;
+      if (h->geom[a].link == h->geom[b].link) continue;
+      cav_pair *p = h->pair + m->npair++;
+      *p = (cav_pair){.geom1 = swap ? b : a, .geom2 = swap ? a : b, .dim = 3, .friction = {1, 1, 0.1, 0.2, 0.3}};
+      p->external = !h->geom[a].link || !h->geom[b].link;
+      p->margin = uniform(0, 0.1);
+      p->gap = p->margin / 3;
+    }
+  }
+}
+
 static void fill(heap *h) {
   *h = (heap){.model = {.name = "heap", .nbody = LINKS, .nlink = LINKS, .ngeom = GEOMS}};
   cav_model *m = &h->model;
@@ -64,17 +81,7 @@ static void fill(heap *h) {
     random_geom(h->geom + g, g < 2 ? CAV_GEOM_PLANE : (cav_geom_type)(1 + g % CAV_GEOM_BOX));
     h->geom[g].link = h->geom[g].body = g == 1 ? 3 : g * LINKS / GEOMS;
   }
-  for (int a = 0; a < GEOMS; a++) {
-    for (int b = a + 1; b < GEOMS; b++) {
-      int swap = h->geom[a].type > h->geom[b].type;
-      if (h->geom[a].link == h->geom[b].link) continue;
-      cav_pair *p = h->pair + m->npair++;
-      *p = (cav_pair){.geom1 = swap ? b : a, .geom2 = swap ? a : b, .dim = 3, .friction = {1, 1, 0.1, 0.2, 0.3}};
-      p->external = !h->geom[a].link || !h->geom[b].link;
-      p->margin = uniform(0, 0.1);
-      p->gap = p->margin / 3;
-    }
-  }
+  add_pairs(h);
 }
 
 static void scatter(cav_state *state) {
@@ -160,6 +167,103 @@ static void test_heap(int sweep_from) {
   state->options.constraint = 0;
   CHECK(cav_contacts_find(&h.model, state) == CAV_OK && state->ncontact == 0);
   cav_state_free(state);
+}
+
+// half of the geoms stand in the world, spread over some metres, and the links wander there as so many trees: what is left out
+// by blocks is missed nowhere
+static void test_standing(int trees) {
+  static heap h;
+  fill(&h);
+  h.model.npair = 0;
+  for (int g = 2; g < GEOMS; g++) {
+    h.geom[g].link = h.geom[g].body = g % 2 ? 0 : 1 + g / 2 % (LINKS - 1);
+    for (int i = 0; i < 3 && g % 2; i++) h.geom[g].pos[i] = uniform(-3, 3);
+  }
+  for (int l = 1; l < LINKS; l++) h.link[l].root = 1 + l % trees;
+  add_pairs(&h);
+  cav_state *state = cav_state_new(&h.model);
+  if (!CHECK(state != NULL)) return;
+  int contacts = 0;
+  for (int pose = 0; pose < 500; pose++) {
+    scatter(state);
+    for (int l = 1; l < LINKS; l++)
+      for (int i = 0; i < 3; i++) state->link[l].pos[i] += uniform(-3, 3) * (pose % 4 > 0);
+    CHECK(cav_contacts_find(&h.model, state) == CAV_OK);
+    compare(state);
+    contacts += state->ncontact;
+  }
+  CHECK(contacts > 500);
+  cav_state_free(state);
+}
+
+enum { BALLS = 120 };
+
+// every pair of balls that is near is in a run; far away none is, at the edge some are
+static void test_blocks(void) {
+  static double centre[BALLS][3], radius[BALLS];
+  static int tree[BALLS];
+  static cav_sweep_pair pair[BALLS * BALLS];
+  int npair = 0, most = 0, least = 0;
+  for (int i = 0; i < BALLS; i++) {
+    tree[i] = i < BALLS / 2 ? -1 : i % 3;
+    radius[i] = uniform(0.05, 0.3);
+    for (int k = 0; k < 3; k++) centre[i][k] = uniform(-5, 5);
+  }
+  for (int i = 0; i < BALLS; i++)
+    for (int j = 0; j < i; j++)
+      if (tree[i] != tree[j]) pair[npair++] = (cav_sweep_pair){i % 2 ? j : i, i % 2 ? i : j};
+  pair[7].first = -1;
+  cav_fixed *fixed = cav_fixed_new(BALLS, (const double(*)[3])centre, radius, tree, npair, pair);
+  if (!CHECK(fixed && cav_fixed_pays(fixed))) return;
+  for (int pose = 0; pose < 400; pose++) {
+    double far = pose == 0 ? 1e3 : uniform(0, 8), margin = uniform(0, 0.2);
+    for (int i = 0; i < BALLS; i++)
+      for (int k = 0; k < 3 && tree[i] >= 0; k++) centre[i][k] = far * (tree[i] - 1) * (k + 1) / 3 + uniform(-0.5, 0.5);
+    const cav_run *run;
+    int nrun, at = 0, missed = 0, count = cav_fixed_find(fixed, (const double(*)[3])centre, margin, &run, &nrun),
+              listed = 0;
+    for (int r = 0; r < nrun; r++) {
+      CHECK(run[r].first < run[r].end && run[r].end <= npair && (r == 0 || run[r].first > run[r - 1].end));
+      listed += run[r].end - run[r].first;
+    }
+    CHECK(listed == count);
+    for (int p = 0; p < npair; p++) {
+      while (at < nrun && run[at].end <= p) at++;
+      int in = at < nrun && run[at].first <= p;
+      double d[3], sum = radius[pair[p].second] + margin;
+      if (pair[p].first < 0) missed += !in;
+      if (in || pair[p].first < 0) continue;
+      sub3(d, centre[pair[p].first], centre[pair[p].second]);
+      sum += radius[pair[p].first];
+      missed += dot3(d, d) < sum * sum;
+    }
+    CHECK(missed == 0);
+    most = count > most ? count : most;
+    if (pose == 0) least = count;
+  }
+  // one tree stays at the origin, two are a kilometre off
+  CHECK(least < npair / 2 && most > least);
+  cav_fixed_free(fixed);
+}
+
+// one ball beside another along each axis: listed if nearer than the margin by ten nanometres, left out if farther
+static void test_edge(void) {
+  const double radius[] = {0.1, 0.2}, from[3] = {3, -20, 500};
+  const int tree[] = {-1, 0};
+  const cav_sweep_pair pair = {0, 1};
+  double centre[2][3];
+  memcpy(centre[0], from, sizeof from);
+  cav_fixed *fixed = cav_fixed_new(2, (const double(*)[3])centre, radius, tree, 1, &pair);
+  if (!CHECK(fixed != NULL)) return;
+  for (int side = 0; side < 12; side++) {
+    double off = side / 6 ? 1e-8 : -1e-8, distance = 0.1 + 0.2 + 0.05 + off;
+    const cav_run *run;
+    int nrun;
+    memcpy(centre[1], from, sizeof from);
+    centre[1][side % 3] += side / 3 % 2 ? distance : -distance;
+    CHECK(cav_fixed_find(fixed, (const double(*)[3])centre, 0.05, &run, &nrun) == (off < 0));
+  }
+  cav_fixed_free(fixed);
 }
 
 static void test_reach(void) {
@@ -285,6 +389,10 @@ static void test_model(const char *folder, const char *name) {
 int main(void) {
   test_heap(CAV_SWEEP_FROM);
   test_heap(0);
+  test_standing(LINKS - 1);
+  test_standing(3);
+  test_blocks();
+  test_edge();
   test_reach();
 #ifdef CAVORT_HAVE_MUJOCO
   static const char *const models[] = {"mujoco/humanoid.xml",     "dm_control/acrobot.xml",  "dm_control/cartpole.xml",

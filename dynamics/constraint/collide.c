@@ -1,12 +1,14 @@
 /// Which geoms touch: broad phase by bounding spheres over the list of pairs that the model was compiled to, then the
 /// narrow phase of pairs.c. Geoms in no pair are never placed; a geom's rotation is formed only if a narrow phase asks
-/// for it, once per call, and that of a geom fixed to the world once for all. Lists of CAV_SWEEP_FROM pairs and more
-/// are first pruned along an axis (sweep.c); bench_sweep measures where that begins to pay.
+/// for it, once per call, and that of a geom fixed to the world once for all. Pairs with
+/// what stands in the world out of reach are left out by blocks (fixed.c); where CAV_SWEEP_FROM pairs and more are left
+/// they are pruned along an axis (sweep.c); bench_sweep measures where that begins to pay.
 #include <assert.h>
 #include <stdlib.h>
 
 #include "cavort/dynamics.h"
 #include "constraint.h"
+#include "fixed.h"
 #include "math3.h"
 #include "sweep.h"
 
@@ -33,10 +35,13 @@ struct cav_geom_cache {
   size_t bytes;
   int nslot;
   slot *slot;
+  int nmoving, *moving; ///< slots that are not fixed
   double (*centre)[3];  ///< [nslot] world
   candidate *candidate; ///< [npair]
-  cav_sweep *sweep;     ///< NULL: all pairs are looked at
-  double margin;        ///< largest of all pairs, for the sweep
+  cav_fixed *fixed;     ///< NULL: there is little to leave out
+  cav_sweep *sweep;     ///< NULL: all pairs that are left are looked at
+  int sweep_from;
+  double margin; ///< largest of all pairs
 };
 
 // places a geom fixed to the world, or prepares one that moves
@@ -62,6 +67,7 @@ static void open_slots(const cav_model *model, struct cav_geom_cache *cache, int
       if (slot_of[geoms[k]] >= 0) continue;
       slot_of[geoms[k]] = cache->nslot;
       open_slot(model, model->geom + geoms[k], cache->slot + cache->nslot, cache->centre[cache->nslot]);
+      if (!cache->slot[cache->nslot].fixed) cache->moving[cache->nmoving++] = cache->nslot;
       cache->nslot++;
     }
     const cav_geom *a = model->geom + pair->geom1, *b = model->geom + pair->geom2;
@@ -75,22 +81,43 @@ static void open_slots(const cav_model *model, struct cav_geom_cache *cache, int
   }
 }
 
-// what prunes the pairs along an axis; 0 if memory runs out
-static int open_sweep(const cav_model *model, struct cav_geom_cache *cache) {
-  double *radius = malloc(sizeof *radius * (size_t)cache->nslot);
-  cav_sweep_pair *pair = malloc(sizeof *pair * (size_t)model->npair);
-  if (radius && pair) {
+// trees of the geoms, numbered from 0; -1: of the world
+static void number_trees(const cav_model *model, const struct cav_geom_cache *cache, int *tree) {
+  int count = 0, *number = tree + cache->nslot;
+  for (int l = 0; l < model->nlink; l++) number[l] = -1;
+  for (int i = 0; i < cache->nslot; i++) {
+    int root = model->link[cache->slot[i].geom->link].root;
+    if (!cache->slot[i].fixed && number[root] < 0) number[root] = count++;
+    tree[i] = cache->slot[i].fixed ? -1 : number[root];
+  }
+}
+
+// what prunes the pairs by blocks and along an axis; 0 if memory runs out
+static int open_pruning(const cav_model *model, struct cav_geom_cache *cache, int sweep_from) {
+  double *radius = malloc(sizeof *radius * ((size_t)cache->nslot + 1));
+  cav_sweep_pair *pair = malloc(sizeof *pair * ((size_t)model->npair + 1));
+  int *tree = malloc(sizeof *tree * (size_t)(cache->nslot + model->nlink)), ok = radius && pair && tree;
+  if (ok) {
     for (int i = 0; i < cache->nslot; i++) radius[i] = cache->slot[i].geom->bound;
     for (int p = 0; p < model->npair; p++) {
       const candidate *c = cache->candidate + p;
       pair[p] = (cav_sweep_pair){c->plane ? -1 : c->first, c->second};
       cache->margin = fmax(cache->margin, c->margin);
     }
-    cache->sweep = cav_sweep_new(cache->nslot, radius, model->npair, pair);
+    number_trees(model, cache, tree);
+    cache->fixed = cav_fixed_new(cache->nslot, (const double(*)[3])cache->centre, radius, tree, model->npair, pair);
+    cache->sweep_from = sweep_from;
+    if (model->npair >= sweep_from) cache->sweep = cav_sweep_new(cache->nslot, radius, model->npair, pair);
+    ok = cache->fixed && (cache->sweep || model->npair < sweep_from);
+  }
+  if (ok && !cav_fixed_pays(cache->fixed)) {
+    cav_fixed_free(cache->fixed);
+    cache->fixed = NULL;
   }
   free(radius);
   free(pair);
-  return cache->sweep != NULL;
+  free(tree);
+  return ok;
 }
 
 struct cav_geom_cache *cav_geom_cache_new(const cav_model *model, int sweep_from) {
@@ -99,22 +126,23 @@ struct cav_geom_cache *cav_geom_cache_new(const cav_model *model, int sweep_from
   int *slot_of = malloc(sizeof *slot_of * (size_t)(model->ngeom + 1));
   if (cache) {
     cache->slot = calloc((size_t)model->ngeom + 1, sizeof *cache->slot);
+    cache->moving = calloc((size_t)model->ngeom + 1, sizeof *cache->moving);
     cache->centre = calloc((size_t)model->ngeom + 1, sizeof *cache->centre);
     cache->candidate = calloc((size_t)model->npair + 1, sizeof *cache->candidate);
   }
-  if (!cache || !slot_of || !cache->slot || !cache->centre || !cache->candidate) {
+  if (!cache || !slot_of || !cache->slot || !cache->moving || !cache->centre || !cache->candidate) {
     free(slot_of);
     cav_geom_cache_free(cache);
     return NULL;
   }
   open_slots(model, cache, slot_of);
   free(slot_of);
-  if (model->npair >= sweep_from && !open_sweep(model, cache)) {
+  if (!open_pruning(model, cache, sweep_from)) {
     cav_geom_cache_free(cache);
     return NULL;
   }
-  cache->bytes = cav_sweep_bytes(cache->sweep) + sizeof *cache +
-                 ((size_t)model->ngeom + 1) * (sizeof *cache->slot + sizeof *cache->centre);
+  cache->bytes = cav_sweep_bytes(cache->sweep) + cav_fixed_bytes(cache->fixed) + sizeof *cache +
+                 ((size_t)model->ngeom + 1) * (sizeof *cache->slot + sizeof *cache->moving + sizeof *cache->centre);
   cache->bytes += ((size_t)model->npair + 1) * sizeof *cache->candidate;
   return cache;
 }
@@ -124,7 +152,9 @@ size_t cav_geom_cache_bytes(const struct cav_geom_cache *cache) { return cache ?
 void cav_geom_cache_free(struct cav_geom_cache *cache) {
   if (!cache) return;
   cav_sweep_free(cache->sweep);
+  cav_fixed_free(cache->fixed);
   free(cache->slot);
+  free(cache->moving);
   free(cache->centre);
   free(cache->candidate);
   free(cache);
@@ -146,9 +176,9 @@ static void refresh_rotation(const cav_state *state, struct cav_geom_cache *cach
 
 // centres of all geoms that move, and rotations of planes that do
 static void place(const cav_state *state, struct cav_geom_cache *cache) {
-  for (int i = 0; i < cache->nslot; i++) {
+  for (int k = 0; k < cache->nmoving; k++) {
+    int i = cache->moving[k];
     slot *s = cache->slot + i;
-    if (s->fixed) continue;
     const cav_pose *link = state->link + s->geom->link;
     transform(cache->centre[i], link->pos, link->rotation, s->geom->pos);
     s->turned = 0;
@@ -224,16 +254,29 @@ static inline cav_status collide_pair(const cav_model *model, cav_state *state, 
 }
 
 // contacts of the pairs that a sweep leaves
-static cav_status collide_swept(const cav_model *model, cav_state *state, const double activation[2]) {
+static cav_status collide_swept(const cav_model *model, cav_state *state, const double activation[2], double most) {
   struct cav_geom_cache *cache = state->work->geom;
   const int *found;
-  double most = cache->margin + fmax(activation[0], activation[1]);
   int count = cav_sweep_find(cache->sweep, (const double(*)[3])cache->centre, most, &found);
   for (int i = 0; i < count; i++) {
     const candidate *c = cache->candidate + found[i];
     double margin = c->margin + activation[c->external];
     if (!near(cache, c, margin)) continue;
     cav_status status = collide_pair(model, state, found[i], margin);
+    if (status) return status;
+  }
+  return CAV_OK;
+}
+
+// contacts of consecutive pairs
+static inline cav_status collide_run(const cav_model *model, cav_state *state, cav_run run,
+                                     const double activation[2]) {
+  const struct cav_geom_cache *cache = state->work->geom;
+  for (int p = run.first; p < run.end; p++) {
+    const candidate *c = cache->candidate + p;
+    double margin = c->margin + activation[c->external];
+    if (!near(cache, c, margin)) continue;
+    cav_status status = collide_pair(model, state, p, margin);
     if (status) return status;
   }
   return CAV_OK;
@@ -247,12 +290,14 @@ cav_status cav_contacts_find(const cav_model *model, cav_state *state) {
   // reach is the margin plus one of two distances: found once, not per pair
   const cav_pair alone[2] = {{.external = 0}, {.external = 1}};
   double activation[2] = {cav_contact_activation(state, alone), cav_contact_activation(state, alone + 1)};
-  if (cache->sweep) return collide_swept(model, state, activation);
-  const candidate *first = cache->candidate;
-  for (const candidate *c = first, *end = first + model->npair; c < end; c++) {
-    double margin = c->margin + activation[c->external];
-    if (!near(cache, c, margin)) continue;
-    cav_status status = collide_pair(model, state, (int)(c - first), margin);
+  double most = cache->margin + fmax(activation[0], activation[1]);
+  cav_run all = {0, model->npair};
+  const cav_run *run = &all;
+  int nrun = 1, count = model->npair;
+  if (cache->fixed) count = cav_fixed_find(cache->fixed, (const double(*)[3])cache->centre, most, &run, &nrun);
+  if (cache->sweep && count >= cache->sweep_from) return collide_swept(model, state, activation, most);
+  for (int r = 0; r < nrun; r++) {
+    cav_status status = collide_run(model, state, run[r], activation);
     if (status) return status;
   }
   return CAV_OK;
