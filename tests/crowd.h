@@ -2,6 +2,7 @@
 #ifndef CAVORT_TESTS_CROWD_H
 #define CAVORT_TESTS_CROWD_H
 
+#include "cavort/problem.h"
 #include "scene.h"
 
 /// Writes the model into a temporary file, whose name it puts into path ("...XXXXXX"): so many free balls that lie ten
@@ -12,7 +13,12 @@ static inline int crowd_write(int balls, int boxes, char *path) {
   const size_t size = file ? fread(text, 1, sizeof text - 1, file) : 0;
   if (file) fclose(file);
   text[size] = 0;
-  char *end = strstr(text, "</worldbody>");
+  char *end = strstr(text, "</worldbody>"), *total = strstr(text, "settotalmass=");
+  // of the whole model, which the humanoid would share with the balls: its own density instead
+  for (int quotes = 0; total && quotes < 2; total++) {
+    quotes += *total == '"';
+    *total = ' ';
+  }
   const int out = mkstemp(path);
   file = out >= 0 ? fdopen(out, "w") : NULL;
   if (!CHECK(end && file)) return 0;

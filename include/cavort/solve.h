@@ -138,6 +138,7 @@ typedef struct cav_solution {
 /// group of trees that nothing joins there.
 typedef struct cav_equations {
   int unknowns;
+  int left_out, left_out_dofs; ///< trees that the plan leaves out, and their dofs (optim/METHOD.md, 1)
   int groups, largest; ///< groups of trees; dofs of the largest
   int width, border;   ///< of its band: entries of a column; unknowns after it (of a cycle's last knots, the free step)
   double bytes;        ///< of the matrix and its factors

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "continuation.h"
+#include "idle.h"
 #include "lqr.h"
 #include "solvers.h"
 #include "sqp.h"
@@ -155,14 +156,12 @@ static cav_status take_start(cav_solve_run *run) {
   return CAV_OK;
 }
 
-cav_status cav_solve(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
-                     cav_solution **solution, cav_error *error) {
-  cav_solve_options defaults = cav_solve_options_default();
-  cav_solve_run run = {.problem = problem, .options = options ? options : &defaults, .start = cav_clock()};
+/// All of a problem, which was checked.
+static cav_status solve_whole(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
+                              cav_solution **solution, cav_error *error) {
+  cav_solve_run run = {.problem = problem, .options = options, .start = cav_clock()};
   *solution = NULL;
-  cav_status status = check(problem, run.options, start, error), end = CAV_OK;
-  if (status != CAV_OK) return status;
-
+  cav_status status = CAV_OK, end = CAV_OK;
   cav_error refusal = {0};
   run.tr = cav_transcription_new(problem, run.options->threads, &refusal);
   if (!run.tr) {
@@ -206,5 +205,41 @@ cav_status cav_solve(const cav_problem *problem, const cav_solve_options *option
   cav_solution_free(run.solution);
   cav_normal_free(run.normal);
   cav_transcription_free(run.tr);
+  return status;
+}
+
+/// A problem without its idle trees, and these beside it. *alone 0: they are not, and nothing was solved.
+static cav_status solve_part(const cav_idle *idle, const cav_solve_options *options, const cav_trajectory *start,
+                             cav_solution **solution, int *alone, cav_error *error) {
+  cav_trajectory *part = start ? cav_idle_reduce(idle, start) : NULL;
+  if (start && !part) return CAV_NO_MEMORY;
+  cav_status status = solve_whole(&idle->problem, options, part, solution, error);
+  cav_trajectory_free(part);
+  *alone = 1;
+  if (!*solution) return status;
+  cav_status expanded = cav_idle_expand(idle, options->tolerance, *solution, alone);
+  // one that was stopped is not begun anew
+  if (status == CAV_INTERRUPTED && (*solution)->trajectory->nv == idle->whole->model->nv) *alone = 1;
+  if (expanded == CAV_OK && *alone) return status;
+  cav_solution_free(*solution);
+  *solution = NULL;
+  return expanded == CAV_OK ? status : expanded;
+}
+
+cav_status cav_solve(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
+                     cav_solution **solution, cav_error *error) {
+  cav_solve_options defaults = cav_solve_options_default();
+  if (!options) options = &defaults;
+  *solution = NULL;
+  cav_status status = check(problem, options, start, error);
+  if (status != CAV_OK) return status;
+  cav_idle idle;
+  int alone = 0;
+  status = cav_idle_find(problem, &idle);
+  if (status == CAV_OK && idle.ntree > 0) status = solve_part(&idle, options, start, solution, &alone, error);
+  if (status == CAV_NO_MEMORY && !*solution) fail(error, status, "not enough memory for this problem");
+  if (status != CAV_NO_MEMORY && !alone && !*solution && error) *error = (cav_error){0};
+  if (status != CAV_NO_MEMORY && !alone && !*solution) status = solve_whole(problem, options, start, solution, error);
+  cav_idle_clear(&idle);
   return status;
 }

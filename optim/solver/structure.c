@@ -1,6 +1,7 @@
 /// What the normal equations of a problem are made of, for who wants to know before a solve: evaluates the guess once
 /// and factors nothing.
 #include "continuation.h"
+#include "idle.h"
 
 /// The structure at the trajectory.
 static cav_status read_structure(cav_transcription *tr, cav_normal *normal, cav_trajectory *at, cav_equations *e) {
@@ -16,8 +17,8 @@ static cav_status read_structure(cav_transcription *tr, cav_normal *normal, cav_
   return CAV_OK;
 }
 
-cav_status cav_problem_equations(const cav_problem *problem, cav_equations *equations, cav_error *error) {
-  *equations = (cav_equations){0};
+/// Of a problem of which all is planned.
+static cav_status equations_of(const cav_problem *problem, cav_equations *equations, cav_error *error) {
   cav_transcription *tr = cav_transcription_new(problem, 1, error);
   if (!tr) return error ? error->status : CAV_NO_MEMORY;
   cav_normal *normal = cav_normal_new(tr);
@@ -31,5 +32,17 @@ cav_status cav_problem_equations(const cav_problem *problem, cav_equations *equa
   if (status != CAV_OK && error)
     *error = (cav_error){status, 0, "the normal equations cannot be evaluated at the guess"};
   cav_trajectory_free(at), cav_normal_free(normal), cav_transcription_free(tr);
+  return status;
+}
+
+cav_status cav_problem_equations(const cav_problem *problem, cav_equations *equations, cav_error *error) {
+  cav_idle idle;
+  *equations = (cav_equations){0};
+  cav_status status = cav_idle_find(problem, &idle);
+  if (status != CAV_OK && error) *error = (cav_error){status, 0, "not enough memory for this problem"};
+  equations->left_out = idle.ntree;
+  equations->left_out_dofs = idle.ndof;
+  if (status == CAV_OK) status = equations_of(idle.ntree ? &idle.problem : problem, equations, error);
+  cav_idle_clear(&idle);
   return status;
 }

@@ -48,7 +48,11 @@ int cav_term_readings(const cav_transcription *tr, const cav_term *term, int t) 
 }
 
 int cav_dof_selected(const cav_transcription *tr, const cav_term *term, int d) {
-  const cav_joint *joint = &tr->model->joint[tr->model->dof[d].joint];
+  return cav_term_selects(tr->model, term, d);
+}
+
+int cav_term_selects(const cav_model *m, const cav_term *term, int d) {
+  const cav_joint *joint = &m->joint[m->dof[d].joint];
   int free_joint = joint->type == CAV_JOINT_FREE;
   switch (term->dofs) {
     case CAV_DOFS_ALL:
@@ -60,7 +64,7 @@ int cav_dof_selected(const cav_transcription *tr, const cav_term *term, int d) {
     case CAV_DOFS_JOINTS:
       return !free_joint;
     case CAV_DOFS_ONE:
-      return tr->model->dof[d].joint == term->joint;
+      return m->dof[d].joint == term->joint;
   }
   return 0;
 }

@@ -347,6 +347,9 @@ static cav_status print_equations(const cav_problem *p, cav_error *error) {
   cav_equations e;
   cav_status status = cav_problem_equations(p, &e, error);
   if (status) return status;
+  if (e.left_out > 0)
+    printf("  left out: %d tree%s of %d dofs that nothing moves or asks for and nothing comes near\n", e.left_out,
+           e.left_out > 1 ? "s" : "", e.left_out_dofs);
   printf("  normal equations: %d unknowns, %.3g MB with factors, ", e.unknowns, e.bytes / 1e6);
   if (e.groups > 1) printf("%d groups of trees that nothing joins at the guess, the largest ", e.groups);
   printf("a band of %d", e.width);
