@@ -1,13 +1,17 @@
-/// Time of the normal equations' factorisation and solution, as they are and by CHOLMOD on the same entries: a motion
-/// in a band, a cycle of 60 knots, and scenes with free bodies that touch nothing. Times are of the processor, shortest
-/// of several. Usage: bench_normal [PROBLEM]...
+/// Factor and solution of the normal equations, as they are and by CHOLMOD on the same entries without those that are zero
+/// by structure: a motion in a band, a cycle of 60 knots, scenes with free bodies, and the same with a free duration, whose
+/// unknown meets all; the ways by turns. Time of the processor, median and quartiles; residual of the shifted equations;
+/// bits, which are checked to be the same in every turn. Usage: bench_normal [bits]: bits alone, to be compared between
+/// kinds of processors (OPENBLAS_CORETYPE)
 #include "bench.h"
 #include "continuation.h"
+#include "crowd.h"
 #include "sparse.h"
 #include "transcription.h"
 
-enum { RUNS = 7 };
+enum { TURNS = 15, WAYS = 3 };
 static const double SHIFT = 1e-6;
+static const char *const way_name[WAYS] = {"one band", "groups", "CHOLMOD"};
 
 static double seconds(void) {
   struct timespec t;
@@ -15,85 +19,115 @@ static double seconds(void) {
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-static double relative(const double *a, const double *b, int n) {
-  double most = 0, apart = 0;
-  for (int i = 0; i < n; i++) most = fmax(most, fabs(b[i])), apart = fmax(apart, fabs(a[i] - b[i]));
-  return apart / most;
+static double quantile(double *x, int n, double fraction) {
+  qsort(x, (size_t)n, sizeof *x, bench_ascending);
+  return x[(int)(fraction * (n - 1) + 0.5)];
 }
 
-// the same by CHOLMOD: analysis, factor and solution, ms; largest difference of solutions
-static void by_sparse(cav_normal *normal, const double *b, const double *expected, double time[2], double *apart) {
-  const int n = normal->size, entries = cav_normal_entries(normal, NULL, NULL, NULL);
-  int *row = malloc(2 * (size_t)entries * sizeof *row), *column = row + entries,
-      *start = calloc((size_t)n + 1, sizeof *start);
-  double *value = scene_vector(entries), *x = scene_vector(n);
-  cav_normal_entries(normal, row, column, value);
-  cav_normal_shift_entries(normal, 1, 0, SHIFT, value);
-  for (int k = 0; k < entries; k++) start[column[k] + 1]++;
-  for (int j = 0; j < n; j++) start[j + 1] += start[j];
+static uint64_t bits_of(const double *x, int n) {
+  uint64_t sum = 14695981039346656037u, bits;
+  for (int i = 0; i < n; i++) {
+    memcpy(&bits, x + i, sizeof bits);
+    sum = (sum ^ bits) * 1099511628211u;
+  }
+  return sum;
+}
+
+// entries of the shifted matrix that trees of one group have, or the free step with any
+typedef struct entries {
+  int n, *row, *column, *start;
+  double *value;
+} entries;
+
+static entries list_entries(const cav_normal *normal) {
+  const int all = cav_normal_entries(normal, NULL, NULL, NULL), size = normal->size, last = size - 1;
+  entries e = {.row = malloc((size_t)all * sizeof(int)),
+               .column = malloc((size_t)all * sizeof(int)),
+               .start = calloc((size_t)size + 1, sizeof(int)),
+               .value = scene_vector(all)};
+  cav_normal_entries(normal, e.row, e.column, e.value);
+  cav_normal_shift_entries(normal, 1, 0, SHIFT, e.value);
+  for (int k = 0; k < all; k++) {
+    int i = e.row[k], j = e.column[k], step = normal->free_step && i == last;
+    if (!step && normal->owner[i % normal->n] != normal->owner[j % normal->n]) continue;
+    e.row[e.n] = i, e.column[e.n] = j, e.value[e.n++] = e.value[k];
+  }
+  for (int k = 0; k < e.n; k++) e.start[e.column[k] + 1]++;
+  for (int j = 0; j < size; j++) e.start[j + 1] += e.start[j];
+  return e;
+}
+
+static double residual(const entries *e, const double *x, const double *b, int n) {
+  double *r = scene_vector(n), off = 0, most = 0;
+  for (int i = 0; i < n; i++) r[i] = -b[i], most = fmax(most, fabs(b[i]));
+  for (int k = 0; k < e->n; k++) {
+    r[e->row[k]] += e->value[k] * x[e->column[k]];
+    if (e->row[k] != e->column[k]) r[e->column[k]] += e->value[k] * x[e->row[k]];
+  }
+  for (int i = 0; i < n; i++) off = fmax(off, fabs(r[i]));
+  free(r);
+  return off / most;
+}
+
+// one group of all trees, or as they are
+static void set_groups(cav_normal *normal, const cav_transcription *tr, int apart) {
+  const int trees = normal->ntree, first = normal->tree[1];
+  if (!apart) normal->ntree = 1, normal->tree[1] = normal->n;
+  cav_normal_gather(normal, tr);
+  normal->ntree = trees, normal->tree[1] = first;
+}
+
+static void compare(cav_normal *normal, const cav_transcription *tr, int turns, int bits_only) {
+  static double time[WAYS][TURNS];
+  uint64_t bits[WAYS] = {0};
+  double *x = scene_vector(normal->size), off[WAYS] = {0}, begin;
+  set_groups(normal, tr, 1);
+  int most = 0, groups = cav_normal_groups(normal, &most);
+  entries e = list_entries(normal);
   cav_sparse *sparse = cav_sparse_new(1);
-  double begin = seconds();
-  CHECK(cav_sparse_analyse(sparse, n, start, row) == CAV_OK);
-  time[0] = 1e3 * (seconds() - begin);
-  time[1] = INFINITY;
-  for (int r = 0; r < RUNS; r++) {
-    begin = seconds();
-    CHECK(cav_sparse_factor(sparse, value) == CAV_OK);
-    CHECK(cav_sparse_solve(sparse, b, x) == CAV_OK);
-    time[1] = fmin(time[1], 1e3 * (seconds() - begin));
+  begin = seconds();
+  CHECK(cav_sparse_analyse(sparse, normal->size, e.start, e.row) == CAV_OK);
+  const double analysis = 1e3 * (seconds() - begin);
+  for (int turn = 0; turn < turns; turn++) {
+    for (int way = 0; way < WAYS; way++) {
+      if (way < 2) set_groups(normal, tr, way);
+      begin = seconds();
+      if (way < 2) {
+        CHECK(cav_normal_factor(normal, SHIFT) == CAV_OK);
+        cav_normal_solve(normal, normal->gradient, x);
+      } else {
+        CHECK(cav_sparse_factor(sparse, e.value) == CAV_OK && cav_sparse_solve(sparse, normal->gradient, x) == CAV_OK);
+      }
+      time[way][turn] = 1e3 * (seconds() - begin);
+      uint64_t now = bits_of(x, normal->size);
+      CHECK(turn == 0 || now == bits[way]);
+      bits[way] = now;
+      off[way] = residual(&e, x, normal->gradient, normal->size);
+      CHECK(off[way] < 1e-6);
+    }
   }
-  *apart = relative(x, expected, n);
+  if (!bits_only)
+    printf("    %d groups of at most %d dofs, analysis by CHOLMOD %.2f ms, %d entries, %.0f in its factor\n", groups,
+           most, analysis, e.n, cav_sparse_entries(sparse));
+  if (bits_only) printf("    %-9s %016llx\n", "matrix", (unsigned long long)bits_of(e.value, e.n));
+  for (int way = 0; way < WAYS; way++) {
+    printf("    %-9s", way_name[way]);
+    if (!bits_only)
+      printf(" %9.3f ms (%.3f, %.3f), residual %.0e, bits", quantile(time[way], turns, 0.5),
+             quantile(time[way], turns, 0.25), quantile(time[way], turns, 0.75), off[way]);
+    printf(" %016llx\n", (unsigned long long)bits[way]);
+  }
   cav_sparse_free(sparse);
-  free(row), free(start), free(value), free(x);
+  free(e.row), free(e.column), free(e.start), free(e.value), free(x);
 }
 
-// times of gathering and of factor and solution, ms
-static void factor(cav_normal *normal, const cav_transcription *tr, double *x, double time[2]) {
-  time[0] = time[1] = INFINITY;
-  for (int r = 0; r < RUNS && (r == 0 || time[1] < 300); r++) {
-    double begin = seconds();
-    cav_normal_gather(normal, tr);
-    time[0] = fmin(time[0], 1e3 * (seconds() - begin));
-    begin = seconds();
-    CHECK(cav_normal_factor(normal, SHIFT) == CAV_OK);
-    cav_normal_solve(normal, normal->gradient, x);
-    time[1] = fmin(time[1], 1e3 * (seconds() - begin));
-  }
-}
-
-// our humanoid with so many free balls that lie ten metres away, as a file
-static int add_balls(int n, char *path) {
-  static char text[1 << 18];
-  FILE *file = fopen(CAVORT_SOURCE_ROOT "/problems/models/humanoid.xml", "r");
-  const size_t size = file ? fread(text, 1, sizeof text - 1, file) : 0;
-  if (file) fclose(file);
-  text[size] = 0;
-  char *end = strstr(text, "</worldbody>");
-  const int out = mkstemp(path);
-  file = out >= 0 ? fdopen(out, "w") : NULL;
-  if (!CHECK(end && file)) return 0;
-  fprintf(file, "%.*s", (int)(end - text), text);
-  for (int i = 0; i < n; i++)
-    fprintf(file, "<body pos='%g %g .0999'><freejoint/><geom type='sphere' size='.1'/></body>", 10.0 + i % 15,
-            i / 15 * 1.0);
-  // postures of the file have no balls
-  const char *keys = strstr(end, "<keyframe>"), *after = keys ? strstr(keys, "</keyframe>") : NULL;
-  fprintf(file, "%.*s%s", (int)((after ? keys : end) - end), end, after ? after + strlen("</keyframe>") : end);
-  return fclose(file) == 0;
-}
-
-// with so many balls, or none for the model of the problem
-static void measure(const char *path, int knots, int balls) {
-  char model[] = "/tmp/cavort-balls-XXXXXX";
-  if (balls && !add_balls(balls, model)) return;
+// with so many balls, -1 for the model of the problem; free: its duration within a tenth
+static void measure(const char *path, int knots, int balls, int free_duration, int bits_only) {
   cav_error error = {0};
-  cav_problem *p = cav_problem_load(path, balls ? model : NULL, &error);
-  if (balls) unlink(model);
-  if (!CHECK(p != NULL)) {
-    fprintf(stderr, "%s\n", error.text);
-    return;
-  }
+  cav_problem *p = balls < 0 ? cav_problem_load(path, NULL, &error) : crowd_problem(path, balls, 0);
+  if (!CHECK(p != NULL)) return;
   p->duration = (knots - 1) * p->timestep;
+  if (free_duration) p->duration_least = 0.9 * p->duration, p->duration_most = 1.1 * p->duration;
   cav_transcription *tr = cav_transcription_new(p, 1, &error);
   cav_normal *normal = tr ? cav_normal_new(tr) : NULL;
   cav_trajectory *at = tr ? cav_trajectory_new(p->model, tr->nknot, p->timestep) : NULL;
@@ -103,45 +137,25 @@ static void measure(const char *path, int knots, int balls) {
   }
   cav_guess_fill(p, p->q_goal, at);
   cav_stage_set(p, 0.5, tr);
-  double best = INFINITY;
-  for (int r = 0; r < (balls > 100 ? 2 : RUNS); r++) {
-    const double begin = seconds();
-    CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
-    best = fmin(best, 1e3 * (seconds() - begin));
-  }
-  printf("%-12s %4d dofs %3d knots %6d unknowns: rows, derivatives and blocks %.2f ms\n", p->name, tr->nv, tr->nknot,
-         normal->size, best);
-  double *x = scene_vector(normal->size), *whole = scene_vector(normal->size), sparse[2] = {0}, apart = 0, own[2];
-  const int trees = normal->ntree, second = normal->tree[1];
-  for (int apart_too = 0; apart_too < (trees > 1 ? 2 : 1); apart_too++) {
-    normal->ntree = apart_too ? trees : 1;
-    normal->tree[1] = apart_too ? second : normal->n;
-    factor(normal, tr, x, own);
-    if (!apart_too) memcpy(whole, x, (size_t)normal->size * sizeof *x);
-    int most = 0, groups = cav_normal_groups(normal, &most);
-    printf(
-        "    %3d group%s of at most %4d dofs: gather %9.2f ms, factor and solve %9.2f ms, apart from one group %.0e\n",
-        groups, groups > 1 ? "s" : " ", most, own[0], own[1], relative(x, whole, normal->size));
-  }
-  if (normal->size < 5000) {
-    by_sparse(normal, normal->gradient, whole, sparse, &apart);
-    printf("    CHOLMOD, analysis %.2f ms: %22s factor and solve %9.2f ms, apart from one group %.0e\n", sparse[0], "",
-           sparse[1], apart);
-  }
+  CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
+  printf("%-12s %4d dofs %3d knots %6d unknowns%s\n", p->name, tr->nv, tr->nknot, normal->size,
+         free_duration ? ", duration free" : "");
+  compare(normal, tr, bits_only ? 2 : tr->nv > 500 ? 5 : TURNS, bits_only);
   fflush(stdout);
   cav_trajectory_free(at), cav_normal_free(normal), cav_transcription_free(tr), cav_problem_free(p);
-  free(x), free(whole);
 }
 
 int main(int argc, char **argv) {
+  const int bits_only = argc > 1 && !strcmp(argv[1], "bits");
   if (!cav_sparse_available()) return printf("skipped: built without CHOLMOD\n"), CHECK_SKIPPED;
-  for (int i = 1; i < argc; i++) measure(argv[i], 60, 0);
-  if (argc > 1) return check_result();
-  const char *jump = CAVORT_SOURCE_ROOT "/problems/motions/squat-jump/problem.xml";
-  measure(jump, 60, 0);
-  measure(CAVORT_SOURCE_ROOT "/problems/motions/walk-cycle/problem.xml", 60, 0);
-  measure(jump, 60, 5);
-  measure(jump, 60, 20);
-  measure(jump, 4, 200);
+  const char *jump = CAVORT_SOURCE_ROOT "/problems/motions/squat-jump/problem.xml",
+             *cycle = CAVORT_SOURCE_ROOT "/problems/motions/walk-cycle/problem.xml";
+  for (int k = 0; k < 2; k++) {
+    measure(jump, 60, -1, k, bits_only);
+    measure(cycle, 60, -1, k, bits_only);
+    measure(jump, 60, 5, k, bits_only);
+    if (!bits_only) measure(jump, 60, 20, k, 0);
+  }
+  if (!bits_only) measure(jump, 4, 200, 0, 0), measure(jump, 4, 200, 1, 0);
   return check_result();
 }

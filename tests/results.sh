@@ -34,6 +34,20 @@ run() {
   rm "$out/$1.tmp"
 }
 
+# times and bits of the normal equations, and their bits by OpenBLAS's routines for other processors
+normal() {
+  run normal bench_normal
+  {
+    echo
+    echo "Bits by OPENBLAS_CORETYPE, of the matrix (dsyrk has a part in it) and of its solutions:"
+    for core in Haswell Zen SkylakeX Sandybridge; do
+      echo
+      echo "$core"
+      OPENBLAS_CORETYPE=$core "$build/tests/bench_normal" bits | sed '$d'
+    done
+  } >>"$out/normal.txt"
+}
+
 # a humanoid's file with all that a scene can have and leave out: a mesh and a height field that are only seen, a constraint that
 # is switched off
 declare_unused() {
@@ -101,7 +115,7 @@ for name in ${*:-inverse heap normal unused sweep conservation orders sensors te
   case $name in
     inverse) run inverse bench_inverse ;;
     heap) run heap bench_heap ;;
-    normal) run normal bench_normal ;;
+    normal) normal ;;
     unused) run unused bench_unused ;;
     sweep) run sweep bench_sweep ;;
     conservation) run conservation test_conservation ;;

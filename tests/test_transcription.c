@@ -409,8 +409,8 @@ static void test_scene(const char *scene, closing close, cav_order order) {
 }
 
 /// Trees that nothing joins: the Hessian is the product of the rows, made here, and its solutions are those of the
-/// dense matrix; a body that reaches another makes one group of the two.
-static void test_apart(int cyclic, int touching) {
+/// dense matrix; a body that reaches another makes one group of the two, and a free step none.
+static void test_apart(int cyclic, int touching, int free_step) {
   char text[2000];
   snprintf(text, sizeof text,
            "<mujoco><worldbody><body pos='0 0 1'><freejoint/><geom size='.1'/></body>"
@@ -424,6 +424,7 @@ static void test_apart(int cyclic, int touching) {
   double rest[64] = {0}, q[64];
   cav_problem p = cav_problem_default(m);
   p.duration = 0.15;
+  if (free_step) p.duration_least = 0.1, p.duration_most = 0.3;
   p.cycle.on = cyclic;
   p.nterm = 0;
   memcpy(q, m->q0, (size_t)m->nq * sizeof *q);
@@ -575,7 +576,7 @@ static void test_refusals(void) {
 }
 
 int main(void) {
-  for (int k = 0; k < 4; k++) test_apart(k & 1, k >> 1);
+  for (int k = 0; k < 8; k++) test_apart(k & 1, k >> 1 & 1, k >> 2);
   test_rotations();
   test_rotation_digits();
   test_refusals();

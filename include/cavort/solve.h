@@ -134,14 +134,17 @@ typedef struct cav_solution {
   cav_binding *row; ///< constraint rows that are violated or have a multiplier, by knot
 } cav_solution;
 
-/// How the own solver factors its normal equations at the problem's guess, first stage: a band with a border for each
-/// group of trees that nothing joins there.
+/// What a plan is made of, and how the own solver factors its normal equations, at the problem's guess, first stage: a
+/// band with a border for each group of trees that nothing joins there; a free step beside several of them as an arrow.
 typedef struct cav_equations {
   int unknowns;
   int left_out, left_out_dofs; ///< trees that the plan leaves out, and their dofs (optim/METHOD.md, 1)
-  int groups, largest; ///< groups of trees; dofs of the largest
-  int width, border;   ///< of its band: entries of a column; unknowns after it (of a cycle's last knots, the free step)
-  double bytes;        ///< of the matrix and its factors
+  int rows, constraints; ///< of costs and constraints over all knots; the latter
+  int blocks;            ///< of unknowns, one a knot
+  int groups, largest;   ///< groups of trees; dofs of the largest
+  int width, border;     ///< of its band: entries of a column; unknowns after it (of a cycle's last knots, the free step)
+  int arrow;             ///< 1: the free step stands beside the groups
+  double bytes;          ///< of the matrix and its factors
 } cav_equations;
 
 /// Fails as cav_solve does where the problem or its guess cannot be evaluated. structure.c.

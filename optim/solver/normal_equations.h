@@ -22,8 +22,10 @@ typedef struct cav_normal {
   int *owner;       ///< [n] group of each dof
   int ngroup;
   int *first, *dof;   ///< [ngroup+1] of each group's in the dofs [n], ascending
+  int *unknown;       ///< [size] of each group's in turn, by blocks
   cav_band *group;    ///< [ngroup] factors
   double *factor, *x; ///< room of all factors; [size] right-hand side of one group
+  double *arrow; ///< [2*size] row of a free step beside several groups, and their inverse times it with its pivot last
 } cav_normal;
 
 /// Of the unknowns of a transcription; NULL if memory runs out.

@@ -9,9 +9,12 @@ static cav_status read_structure(cav_transcription *tr, cav_normal *normal, cav_
   if (status != CAV_OK) return status;
   cav_normal_gather(normal, tr);
   e->unknowns = normal->size;
+  e->blocks = normal->blocks;
+  for (int t = 0; t < tr->nknot; t++) e->rows += tr->knot[t].nrow, e->constraints += tr->knot[t].layout.count;
   e->groups = cav_normal_groups(normal, &e->largest);
   e->width = 3 * e->largest;
-  e->border = (normal->cyclic ? 2 * e->largest : 0) + (normal->free_step != 0);
+  e->border = (normal->cyclic ? 2 * e->largest : 0) + (normal->free_step && e->groups == 1);
+  e->arrow = normal->free_step && e->groups > 1;
   double core = normal->core, border = normal->border;
   e->bytes = 2 * sizeof(double) * (core * normal->band + core * border + border * border);
   return CAV_OK;

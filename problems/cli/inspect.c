@@ -350,10 +350,18 @@ static cav_status print_equations(const cav_problem *p, cav_error *error) {
   if (e.left_out > 0)
     printf("  left out: %d tree%s of %d dofs that nothing moves or asks for and nothing comes near\n", e.left_out,
            e.left_out > 1 ? "s" : "", e.left_out_dofs);
-  printf("  normal equations: %d unknowns, %.3g MB with factors, ", e.unknowns, e.bytes / 1e6);
-  if (e.groups > 1) printf("%d groups of trees that nothing joins at the guess, the largest ", e.groups);
-  printf("a band of %d", e.width);
-  if (e.border > 0) printf(" with a border of %d", e.border);
+  printf("  normal equations: %d unknowns in %d blocks from %d rows, %d of them constraints; %.3g MB with factors\n",
+         e.unknowns, e.blocks, e.rows, e.constraints, e.bytes / 1e6);
+  printf("  factored as ");
+  if (e.groups > 1)
+    printf("%d bands, one for each group of trees that nothing joins at the guess, the largest ", e.groups);
+  printf("%s of %d, as knots see their neighbours", e.groups > 1 ? "one" : "a band", e.width);
+  if (e.border > 0)
+    printf("; a border of %d, %s", e.border,
+           !p->cycle.on   ? "of the free duration"
+           : e.border % 2 ? "of a cycle's last two knots, which meet the first, and of the free duration"
+                          : "of a cycle's last two knots, which meet the first");
+  if (e.arrow) printf("; the free duration beside them as an arrow");
   printf("\n");
   return CAV_OK;
 }
