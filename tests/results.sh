@@ -1,6 +1,7 @@
 #!/bin/sh
 # Writes the tables of tests/results anew, each with machine, compiler and commit. Usage: sh tests/results.sh [NAME...], default
-# all of: inverse (time against MuJoCo, needs it and the shared models), heap (forward steps of heaps against MuJoCo), normal (normal
+# all of: inverse (time against MuJoCo, needs it and the shared models), heap (forward steps of heaps against MuJoCo), update (updates
+# of their factors against new ones), normal (normal
 # equations by bands, by groups of trees and by CHOLMOD), unused (what a plan pays for things out of its reach), sweep (broad phase), conservation (drift of energy and
 # momentum), orders (error of the orders of the step against their time), absent (what features cost where a scene has none of
 # them), optimum (optimal control against known optima), sensors, tendons, actuation, fluid (readings, strings, drives and
@@ -111,10 +112,11 @@ optimum() {
   mv "$out/optimum.tmp" "$out/optimum.md"
 }
 
-for name in ${*:-inverse heap normal unused sweep conservation orders sensors tendons actuation fluid optimum absent}; do
+for name in ${*:-inverse heap update normal unused sweep conservation orders sensors tendons actuation fluid optimum absent}; do
   case $name in
     inverse) run inverse bench_inverse ;;
     heap) run heap bench_heap ;;
+    update) run update bench_update ;;
     normal) normal ;;
     unused) run unused bench_unused ;;
     sweep) run sweep bench_sweep ;;
@@ -126,6 +128,6 @@ for name in ${*:-inverse heap normal unused sweep conservation orders sensors te
     fluid) run fluid test_fluid ;;
     optimum) optimum ;;
     absent) absent ;;
-    *) echo "usage: sh tests/results.sh [inverse|heap|normal|unused|sweep|conservation|orders|sensors|tendons|actuation|fluid|optimum|absent]..." >&2 && exit 2 ;;
+    *) echo "usage: sh tests/results.sh [inverse|heap|update|normal|unused|sweep|conservation|orders|sensors|tendons|actuation|fluid|optimum|absent]..." >&2 && exit 2 ;;
   esac
 done
