@@ -164,7 +164,19 @@ says err "overwrite"
 
 sed 's/ctrlrange="-1 1"/ctrlrange="-.001 .001"/' model.xml >weak.xml
 sed 's/<cost>/<constraint><posture dofs="all" at="end"\/><\/constraint><cost>/' problem.xml >strict.xml
+# --- proven before anything is solved, in the first line; solved all the same if asked ---
+
 run 1 solve strict.xml --model weak.xml -o weak
+check "the first line names the cause" sh -c 'head -n 1 err | grep -q "^cavort: impossible: .*too high for the actuators"'
+says err "--force"
+silent out
+check "nothing was written" [ ! -e weak ]
+run 1 solve strict.xml --model weak.xml -o weak --json --quiet
+says out '"impossible": "joint'
+run 0 inspect strict.xml --model weak.xml
+check "inspect says so first" sh -c 'head -n 1 out | grep -q "^impossible: "'
+run 1 solve strict.xml --model weak.xml -o weak --force
+check "the first line still names the cause" sh -c 'head -n 1 err | grep -q "^cavort: impossible: "'
 says out "NOT certified"
 has weak/verdict.json
 says weak/verdict.json '"certified": false'

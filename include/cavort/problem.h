@@ -62,6 +62,10 @@ typedef enum cav_norm {
   CAV_NORM_ABSOLUTE ///< sqrt(1 + x^2) - 1: x^2/2 within the scale, |x| far beyond it, where it pulls no harder
 } cav_norm;
 
+/// Tolerances of goals stated at one time where the term gives none, by what is measured.
+#define CAV_WITHIN_LENGTH 0.03 ///< m
+#define CAV_WITHIN_ANGLE 0.1   ///< rad
+
 typedef enum cav_term_use {
   CAV_USE_COST, ///< weight times norm of every component, integrated over the window; at a single knot not multiplied by time
   CAV_USE_EQUAL, ///< x = target, hard
@@ -234,6 +238,40 @@ CAV_API void cav_problem_free(cav_problem *problem);
 /// term looks at a body, site or geom without a name.
 CAV_API cav_status cav_problem_write(const char *path, const cav_problem *problem, const char *model_path,
                                      cav_error *error);
+
+/// Why a problem cannot have a solution, X(condition, word, text): necessary conditions that it may break.
+// clang-format off
+#define CAV_CONDITIONS(X)                                                                                          \
+  X(CONTRADICTION, "contradiction", "two targets, or a target and the start, exclude each other")                  \
+  X(RANGE, "range", "a target outside the range of a joint")                                                       \
+  X(DISTANCE, "distance", "targets farther apart, or nearer, than links and ranges of joints allow")               \
+  X(SOLID, "solid", "a posture or a target inside a solid")                                                        \
+  X(MOMENTUM, "momentum", "no force from outside that could move the centre of mass so far")                       \
+  X(STRENGTH, "strength", "a posture to be held that actuators and contacts cannot hold")                          \
+  X(ENERGY, "energy", "more energy, or a faster motion, than actuators can give in the time")
+// clang-format on
+
+typedef enum cav_condition {
+#define CAV_CONDITION_MEMBER(condition, ...) CAV_CONDITION_##condition,
+  CAV_CONDITIONS(CAV_CONDITION_MEMBER)
+#undef CAV_CONDITION_MEMBER
+      CAV_CONDITION_TYPES
+} cav_condition;
+
+/// A proof that a problem has no solution.
+typedef struct cav_impossibility {
+  cav_condition condition;
+  int term;       ///< that asks for it, -1: none
+  int knot;       ///< at which
+  char what[400]; ///< the cause, in words
+  char cure[160]; ///< what helps
+} cav_impossibility;
+
+/// Proofs that no motion can be certified and achieve what a problem asks, most at most, *n found; the first is the
+/// cause to tell. Necessary conditions of values at knots, on the safe side: a possible problem has none, an impossible
+/// one need not have any. Takes milliseconds and solves nothing. optim/METHOD.md, 10. CAV_NO_MEMORY, CAV_NOT_FINITE.
+CAV_API cav_status cav_problem_impossible(const cav_problem *problem, cav_impossibility *found, int most, int *n,
+                                          cav_error *error);
 
 #ifdef __cplusplus
 }

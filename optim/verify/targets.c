@@ -10,7 +10,8 @@
 #include "verification.h"
 
 // tolerances of goals stated at one time, where the term gives none
-static const double within_length = 0.03, within_angle = 0.1, within_speed = 0.3, within_ratio = 0.1;
+static const double within_length = CAV_WITHIN_LENGTH, within_angle = CAV_WITHIN_ANGLE, within_speed = 0.3,
+                    within_ratio = 0.1;
 
 // unit of a sensor's reading and the tolerance it has by default; 0: none, the quantity has no usual one
 static const char *sensor_unit(const cav_model *model, const cav_sensor *sensor, double *within) {

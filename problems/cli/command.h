@@ -2,6 +2,8 @@
 #ifndef CAVORT_COMMAND_H
 #define CAVORT_COMMAND_H
 
+#include <stdio.h>
+
 #include "cavort/solve.h"
 
 /// Exit status of the tool.
@@ -26,6 +28,8 @@ typedef struct cav_command_line {
   int threads;
   int strategies; ///< --strategies: 0 auto, else how many at once
   int resume, quiet, json;
+  int all;             ///< --all: explain everything
+  int force;           ///< --force: solve what is proven impossible
   const char *methods; ///< --methods, NULL: own
   int nipopt;          ///< --ipopt, any number of times
   cav_ipopt_option ipopt[CAV_COMMAND_IPOPT];
@@ -40,6 +44,14 @@ int cav_command_view(const cav_command_line *line);
 
 /// Prints "cavort: text" on standard error; returns the exit status that goes with the error's status.
 int cav_command_fail(const cav_error *error);
+
+/// Prints why a problem cannot have a solution, most proofs at most, each after a text; how many, -1 with an error.
+/// impossible.c.
+int cav_command_impossible(FILE *out, const char *before, const cav_problem *problem, int most, cav_error *error);
+
+/// Before a solve: tells the one cause why a problem cannot have a solution, if there is one. 0: solve it; otherwise the
+/// exit status.
+int cav_command_refuse(const cav_command_line *line, const cav_problem *problem);
 
 /// Prints a topic of cavort help; 0 if there is none of that name. topics.c.
 int cav_topic_print(const char *name);

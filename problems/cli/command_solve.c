@@ -238,6 +238,11 @@ int cav_command_solve(const cav_command_line *line) {
   }
   cav_problem *problem = cav_problem_load(line->operand, line->model, &error);
   if (!problem) return cav_command_fail(&error);
+  int refused = cav_command_refuse(line, problem);
+  if (refused) {
+    cav_problem_free(problem);
+    return refused;
+  }
   for (int i = 0; i < problem->model->nwarning && !line->quiet; i++)
     fprintf(stderr, "cavort: %s\n", problem->model->warning[i]);
   char *folder = folder_of(line, problem);

@@ -418,7 +418,8 @@ int cav_command_inspect(const cav_command_line *line) {
   if (!strcmp(root, "problem")) {
     cav_problem *problem = cav_problem_load(line->operand, line->model, &error);
     if (!problem) return cav_command_fail(&error);
-    cav_status status = print_problem(problem, &error);
+    cav_status status = cav_command_impossible(stdout, "", problem, 3, &error) < 0 ? error.status : CAV_OK;
+    if (!status) status = print_problem(problem, &error);
     if (!status) print_model(problem->model);
     cav_problem_free(problem);
     return status ? cav_command_fail(&error) : 0;

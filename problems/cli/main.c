@@ -17,7 +17,8 @@ enum option {
   OPTION_JSON = 64,
   OPTION_IPOPT = 128,
   OPTION_METHODS = 256,
-  OPTION_STRATEGIES = 512
+  OPTION_STRATEGIES = 512,
+  OPTION_FORCE = 1024
 };
 
 // options: spelling, value's name or NULL, what it does
@@ -41,7 +42,8 @@ static const struct {
      "threads to use (default: all processors); the result does not depend on it"},
     {OPTION_RESUME, "--resume", NULL, NULL, "start from the trajectory that the result folder holds"},
     {OPTION_QUIET, "--quiet", "-q", NULL, "no progress and no table; errors and the exit status remain"},
-    {OPTION_JSON, "--json", NULL, NULL, "print the verdict as JSON instead of a table"},
+    {OPTION_FORCE, "--force", NULL, NULL, "solve what is proven impossible all the same"},
+    {OPTION_JSON, "--json", NULL, NULL, "print as JSON what would be a table"},
 };
 enum { NOPTION = sizeof options / sizeof *options };
 
@@ -59,7 +61,7 @@ static const command commands[] = {
     {"solve", "PROBLEM", "find the motion that a problem file asks for, certify it and write a result folder",
      cav_command_solve,
      OPTION_MODEL | OPTION_OUTPUT | OPTION_SOLVER | OPTION_IPOPT | OPTION_THREADS | OPTION_STRATEGIES | OPTION_RESUME |
-         OPTION_QUIET | OPTION_JSON},
+         OPTION_FORCE | OPTION_QUIET | OPTION_JSON},
     {"verify", "DIR", "certify the motion of a result folder again, from its files alone", cav_command_verify,
      OPTION_MODEL | OPTION_QUIET | OPTION_JSON},
     {"explain", "DIR", "say why the motion of a result folder is as it is: what it misses, and which constraints pull",
@@ -187,6 +189,8 @@ static int take_value(cav_command_line *line, enum option option, const char *na
       return line->quiet = 1;
     case OPTION_JSON:
       return line->json = 1;
+    case OPTION_FORCE:
+      return line->force = 1;
   }
   return 0;
 }

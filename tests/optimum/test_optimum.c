@@ -133,6 +133,11 @@ static outcome solve(const optimum *o, const cav_model *model, int n, cav_solver
   cav_solution *solution = NULL;
   cav_error error = {0};
   options.solver = solver;
+  // an optimum is known, so no proof says that there is none, however near the bounds it lies
+  cav_impossibility proof;
+  int proofs = -1;
+  CHECK(cav_problem_impossible(&p.problem, &proof, 1, &proofs, &error) == CAV_OK && proofs == 0);
+  if (proofs > 0) fprintf(stderr, "    %s: %s\n", o->name, proof.what);
   out.status = cav_solve(&p.problem, &options, NULL, &solution, &error);
   if (out.status != CAV_OK)
     fprintf(stderr, "    %s, %d steps: %s: %s\n", o->name, n, cav_status_name(out.status), error.text);

@@ -1,0 +1,87 @@
+/// Necessary conditions of a problem, in parts: what is required at which knot, and proofs that it cannot be. Private to
+/// the room.
+#ifndef CAVORT_FEASIBILITY_H
+#define CAVORT_FEASIBILITY_H
+
+#include "cavort/dynamics.h"
+#include "cavort/problem.h"
+
+/// What a requirement is about.
+typedef enum cav_requirement_kind {
+  CAV_REQUIRE_POINT,     ///< a point of a link, world coordinates
+  CAV_REQUIRE_CENTRE,    ///< the centre of mass of a body's subtree, world coordinates
+  CAV_REQUIRE_COORDINATE ///< q of a hinge or slide
+} cav_requirement_kind;
+
+/// A value that a motion has to have at a knot, or it is not certified or does not achieve what is asked.
+typedef struct cav_requirement {
+  int term, knot;
+  cav_requirement_kind kind;
+  int object;             ///< link, body or joint
+  double point[3];        ///< POINT: in the link's frame
+  double low[3], high[3]; ///< infinite where open; COORDINATE: the first alone
+} cav_requirement;
+
+/// An examination in progress.
+typedef struct cav_examination {
+  const cav_problem *problem;
+  const cav_model *model;
+  cav_state *start;   ///< at q_start, at rest; no constraint but contacts is evaluated
+  cav_state *scratch; ///< at any posture
+  int nknot;
+  double longest; ///< largest duration over the stated one
+  int n, room;
+  cav_requirement *requirement; ///< [n] by knot, then by term
+  int most, nfound;
+  cav_impossibility *found; ///< [most]
+} cav_examination;
+
+/// Least and largest distance of two points over all postures within the ranges of joints.
+typedef struct cav_distance_range {
+  double least, largest;
+} cav_distance_range;
+
+/// Collects requirements of terms that are constraints or have a tolerance. requirement.c.
+cav_status cav_requirements_collect(cav_examination *e);
+
+/// Knots of a term's window. requirement.c.
+void cav_requirement_window(const cav_examination *e, const cav_term *term, int *first, int *last);
+
+/// Latest time at which a knot can be, s. requirement.c.
+double cav_requirement_time(const cav_examination *e, int knot);
+
+/// What is required, in words: "'grasp' wants site 'tip' at x 1.5 at 0.8 s". requirement.c.
+void cav_requirement_words(const cav_examination *e, const cav_requirement *r, char *out, size_t size);
+
+/// A proof more, with its text in printf's manner; those beyond the room are dropped. feasibility.c.
+void cav_impossible(cav_examination *e, cav_condition condition, const cav_requirement *r, const char *cure,
+                    const char *format, ...) __attribute__((format(printf, 5, 6)));
+
+/// Name of a joint, link or geom for messages. feasibility.c.
+const char *cav_name_or(const char *name, const char *kind, int i, char buffer[48]);
+
+/// Distance of two points of one tree, or of a point and the world where other is 0; CAV_BAD_INPUT: of two trees.
+/// anchor: of the world, [3] least and [3] largest coordinates of the highest point that does not rotate, to which the
+/// distance is. distance.c.
+int cav_distance_between(const cav_model *model, int link, const double point[3], int other,
+                         const double other_point[3], double anchor[6], cav_distance_range *range);
+
+/// Largest distance of the centre of mass of a body's subtree (0: of the tree of link) from a point of a link, infinite
+/// where nothing bounds it. distance.c.
+double cav_distance_to_centre(const cav_model *model, int body, int link, const double point[3]);
+
+/// Centre of mass of a body in its link's frame. distance.c.
+void cav_body_centre(const cav_body *body, double centre[3]);
+
+/// Whether a body is a descendant of another, or it. distance.c.
+int cav_body_within(const cav_model *model, int body, int ancestor);
+
+/// The conditions, each with its proofs.
+cav_status cav_examine_contradictions(cav_examination *e); // contradiction.c
+cav_status cav_examine_distances(cav_examination *e);      // distance.c
+cav_status cav_examine_solids(cav_examination *e);         // solid.c
+cav_status cav_examine_momentum(cav_examination *e);       // momentum.c
+cav_status cav_examine_strength(cav_examination *e);       // strength.c
+cav_status cav_examine_energy(cav_examination *e);         // energy.c
+
+#endif

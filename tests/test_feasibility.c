@@ -1,0 +1,343 @@
+/// optim/feasibility: impossible problems, each proven so with its cause, and a twin of each just inside the limit that is
+/// not refused; no proof against any motion of problems/motions, nor against problems whose optimum is known.
+#include <dirent.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "cavort/cavort.h"
+#include "scene.h"
+
+static char folder[] = "/tmp/cavort-feasibility-XXXXXX";
+
+// an arm of two links in the vertical plane, reach 1 m, on the world; each link 1 kg: held level it needs 9.81 N m
+#define ARM(TORQUE, ELBOW)                                                                                            \
+  "<mujoco><worldbody><body name='upper' pos='0 0 2'><joint name='shoulder' axis='0 1 0' limited='true' range='-170 " \
+  "170'/><geom name='upper' type='capsule' fromto='0 0 0 .5 0 0' size='.03' mass='1'/>"                               \
+  "<body name='lower' pos='.5 0 0'><joint name='elbow' axis='0 1 0' limited='true' range='" ELBOW                     \
+  "'/>"                                                                                                               \
+  "<geom name='lower' type='capsule' fromto='0 0 0 .5 0 0' size='.03' mass='1'/><site name='tip' pos='.5 0 0'/>"      \
+  "</body></body><geom name='wall' type='box' pos='.9 0 1.5' size='.2 .5 .2'/></worldbody><actuator>"                 \
+  "<motor name='shoulder' joint='shoulder' gear='" TORQUE                                                             \
+  "' ctrllimited='true' ctrlrange='-1 1'/>"                                                                           \
+  "<motor name='elbow' joint='elbow' gear='40' ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>"
+
+// a mass on a slide, along x without gravity's part, or upright
+#define SLIDE(AXIS, MASS, FORCE)                                                                                \
+  "<mujoco><worldbody><body name='block'><joint name='slide' type='slide' axis='" AXIS                          \
+  "'/><geom type='box' "                                                                                        \
+  "size='.1 .1 .1' mass='" MASS "'/></body></worldbody><actuator><motor name='push' joint='slide' gear='" FORCE \
+  "' ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>"
+
+// a pendulum of 1 kg at 1 m with a motor of 1 N m; it hangs at 0
+#define PENDULUM                                                                                           \
+  "<mujoco><worldbody><body name='rod'><joint name='pivot' axis='0 1 0'/><inertial pos='0 0 -1' mass='1' " \
+  "diaginertia='1e-6 1e-6 1e-6'/></body></worldbody><actuator><motor name='motor' joint='pivot' gear='1' " \
+  "ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>"
+
+// a crawler on a floor with friction: a trunk and a mass that slides in it
+#define CRAWLER(FRICTION)                                                                                            \
+  "<mujoco><worldbody><geom name='floor' type='plane' size='9 9 1' friction='" FRICTION                              \
+  " 0 0'/><body name='trunk' "                                                                                       \
+  "pos='0 0 .1'><freejoint/><geom name='belly' type='box' size='.2 .2 .1' mass='4' friction='" FRICTION              \
+  " 0 0'/>"                                                                                                          \
+  "<body name='weight' pos='0 0 .2'><joint name='along' type='slide' axis='1 0 0' limited='true' range='-.2 .2'/>"   \
+  "<geom type='sphere' size='.05' mass='2' contype='0' conaffinity='0'/></body></body></worldbody><actuator><motor " \
+  "joint='along' gear='200' ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>"
+
+// a table that is lifted by a motor, with a box fixed on it
+#define TABLE(MASS)                                                                                                 \
+  "<mujoco><worldbody><body name='table'><joint name='lift' type='slide' axis='0 0 1' limited='true' range='0 1'/>" \
+  "<geom type='box' size='.4 .4 .02' mass='5'/><body name='box' pos='0 0 .3'><geom type='box' size='.2 .2 .2' "     \
+  "mass='" MASS                                                                                                     \
+  "'/></body></body></worldbody><actuator><motor name='jack' joint='lift' gear='300' "                              \
+  "ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>"
+
+// a hand on a base that stands in the world
+#define BASE                                                                                                           \
+  "<mujoco><worldbody><body name='base' pos='0 0 1'><geom type='box' size='.1 .1 .1'/><body name='hand' pos='.2 0 0'>" \
+  "<joint name='wrist' axis='0 0 1'/><geom type='sphere' size='.05'/></body></body></worldbody><actuator><motor "      \
+  "joint='wrist'/></actuator></mujoco>"
+
+typedef struct pair {
+  const char *name, *model, *twin_model;            ///< twin_model NULL: the same
+  const char *horizon, *start, *terms, *twin_terms; ///< twin_terms NULL: the same
+  cav_condition condition;
+  const char *cause; ///< in the text
+} pair;
+
+#define SECOND "duration='1' timestep='.05'"
+#define CONSTRAINT(...) "<constraint>" __VA_ARGS__ "</constraint>"
+#define TIP(TARGET) CONSTRAINT("<sensor name='grasp' type='framepos' site='tip' target='" TARGET "' at='.8'/>")
+
+static const pair pairs[] = {
+    {"out of reach", ARM("60", "-150 150"), NULL, SECOND, "", TIP("0 0 3.01"), TIP("0 0 2.99"), CAV_CONDITION_DISTANCE,
+     "out of reach by 0.01 m"},
+    {"too near for the elbow", ARM("60", "-90 90"), NULL, SECOND, "", TIP("0 0 2.69"), TIP("0 0 2.72"),
+     CAV_CONDITION_DISTANCE, "too near by 0.0171 m"},
+    {"too weak", ARM("9.7", "-150 150"), ARM("9.9", "-150 150"), SECOND, "",
+     CONSTRAINT("<posture name='level' dofs='joints' from='.5' to='1'/>"), NULL, CAV_CONDITION_STRENGTH,
+     "'shoulder' needs -9.81 N m"},
+    {"too high to pump in the time", PENDULUM, NULL, "duration='3' timestep='.05' close='open'", "",
+     CONSTRAINT("<posture name='up' joint='pivot' qpos='3.1416' at='3'/>"),
+     CONSTRAINT("<posture name='up' joint='pivot' qpos='1' at='3'/>"), CAV_CONDITION_ENERGY, "pumping takes at least"},
+    {"too fast", SLIDE("1 0 0", "2", "4"), NULL, "duration='1' timestep='.01' close='open'", "",
+     CONSTRAINT("<posture name='far' joint='slide' qpos='8' at='1'/>"),
+     CONSTRAINT("<posture name='far' joint='slide' qpos='.99' at='1'/>"), CAV_CONDITION_ENERGY, "too far for the time"},
+    {"contradicting", ARM("60", "-150 150"), NULL, SECOND, "",
+     CONSTRAINT("<sensor name='high' type='framepos' site='tip' component='z' target='2.2' at='.6'/>"
+                "<sensor name='low' type='framepos' site='tip' component='z' target='1.8' at='.6'/>"),
+     CONSTRAINT("<sensor name='high' type='framepos' site='tip' component='z' target='2.2' at='.6'/>"
+                "<sensor name='low' type='framepos' site='tip' component='z' target='1.8' at='.65'/>"),
+     CAV_CONDITION_CONTRADICTION, "'high'"},
+    {"inside a wall", ARM("60", "-150 150"), NULL, SECOND, "", TIP(".75 0 1.6"), TIP(".65 0 1.6"), CAV_CONDITION_SOLID,
+     "inside 'wall'"},
+    {"no friction", CRAWLER("0"), CRAWLER("1"), SECOND, "",
+     "<cost><sensor name='forth' type='subtreecom' body='trunk' component='x' target='.2' at='end' weight='1' "
+     "within='.01'/></cost>",
+     NULL, CAV_CONDITION_MOMENTUM, "there is no friction"},
+    {"a range that ends before", ARM("60", "-90 90"), NULL, SECOND, "",
+     CONSTRAINT("<sensor name='bend' type='jointpos' joint='elbow' target='1.6' at='end'/>"),
+     CONSTRAINT("<sensor name='bend' type='jointpos' joint='elbow' target='1.57' at='end'/>"), CAV_CONDITION_RANGE,
+     "its range is -1.571 to 1.571"},
+    {"a base that is fixed", BASE, NULL, SECOND, "",
+     CONSTRAINT("<sensor name='go' type='framepos' body='base' target='1 0 1' at='end'/>"),
+     CONSTRAINT("<sensor name='go' type='framepos' body='base' target='0 0 1' at='end'/>"), CAV_CONDITION_DISTANCE,
+     "fixed to the world"},
+    {"a box that is too heavy", TABLE("26"), TABLE("25"), SECOND, "<root/>",
+     CONSTRAINT("<posture name='lifted' dofs='joints' qpos='.5' from='.5' to='1'/>"), NULL, CAV_CONDITION_STRENGTH,
+     "'jack' at its limit"},
+    {"a start inside a solid", ARM("60", "-150 150"), NULL, SECOND, "<joint name='shoulder' degrees='30'/>",
+     TIP("0 0 2.9"), NULL, CAV_CONDITION_SOLID, "the start: geom"},
+};
+
+static cav_problem *load(const char *model, const char *horizon, const char *start, const char *terms) {
+  char path[160], text[4000];
+  cav_error error = {0};
+  scene_write(folder, "model.xml", model);
+  snprintf(text, sizeof text, "<problem name='p' model='model.xml'>\n<horizon %s/>\n<start>%s</start>\n%s</problem>\n",
+           horizon, start, terms);
+  scene_write(folder, "problem.xml", text);
+  snprintf(path, sizeof path, "%s/problem.xml", folder);
+  cav_problem *p = cav_problem_load(path, NULL, &error);
+  CHECK(p != NULL);
+  if (!p) fprintf(stderr, "    %s\n", error.text);
+  return p;
+}
+
+static double processor_seconds(void) { return (double)clock() / CLOCKS_PER_SEC; }
+
+// proofs against a problem; prints the first where there should be none
+static int proofs(const char *name, const cav_problem *p, cav_impossibility *found, int most, int wanted) {
+  int n = -1;
+  cav_error error = {0};
+  double from = processor_seconds();
+  CHECK(cav_problem_impossible(p, found, most, &n, &error) == CAV_OK);
+  double seconds = processor_seconds() - from;
+  CHECK(seconds < 1); // seen below 0.01
+  if (seconds >= 1 || (n > 0) != wanted)
+    fprintf(stderr, "    %s: %d proofs in %.3f s: %s\n", name, n, seconds, n > 0 ? found[0].what : "");
+  return n;
+}
+
+static void check_pair(const pair *c) {
+  cav_impossibility found[4];
+  const char *start = strcmp(c->start, "<root/>") ? c->start : "";
+  cav_problem *p = load(c->model, c->horizon, start, c->terms);
+  if (p) {
+    int n = proofs(c->name, p, found, 4, 1);
+    CHECK(n > 0 && found[0].condition == c->condition && strstr(found[0].what, c->cause) && *found[0].cure);
+    if (n > 0 && !strstr(found[0].what, c->cause)) fprintf(stderr, "    %s: %s\n", c->name, found[0].what);
+  }
+  cav_problem_free(p);
+  int same = !c->twin_model && !c->twin_terms; // only the start is what cannot be
+  p = load(c->twin_model ? c->twin_model : c->model, c->horizon, same ? "" : start,
+           c->twin_terms ? c->twin_terms : c->terms);
+  if (p) CHECK(proofs(c->name, p, found, 4, 0) == 0);
+  cav_problem_free(p);
+}
+
+// ---------------------------------------------------------------- what is possible
+
+// a problem file on a model; 0: does not load
+static int check_file(const char *path, const char *model) {
+  cav_error error = {0};
+  cav_impossibility found[1];
+  cav_problem *p = cav_problem_load(path, model, &error);
+  if (p) CHECK(proofs(path, p, found, 1, 0) == 0);
+  cav_problem_free(p);
+  return p != NULL;
+}
+
+static void check_motions(void) {
+  static const char *const models[] = {"mujoco/humanoid.xml",   "dm_control/humanoid.xml", "dm_control/hopper.xml",
+                                       "dm_control/walker.xml", "dm_control/cheetah.xml",  "dm_control/quadruped.xml"};
+  const char *shared = check_shared_models();
+  DIR *all = opendir(CAVORT_SOURCE_ROOT "/problems/motions");
+  int n = 0, others = 0;
+  CHECK(all != NULL);
+  for (struct dirent *entry; all && (entry = readdir(all));) {
+    char path[600], model[5000];
+    snprintf(path, sizeof path, "%s/problems/motions/%.200s/problem.xml", CAVORT_SOURCE_ROOT, entry->d_name);
+    if (entry->d_name[0] == '.' || access(path, R_OK)) continue;
+    n += check_file(path, NULL);
+    for (size_t i = 0; shared && i < sizeof models / sizeof *models; i++) {
+      snprintf(model, sizeof model, "%s/%s", shared, models[i]);
+      others += check_file(path, model);
+    }
+  }
+  if (all) closedir(all);
+  n += check_file(CAVORT_SOURCE_ROOT "/tests/sliding/bowl.xml", NULL);
+  n += check_file(CAVORT_SOURCE_ROOT "/tests/sliding/push.xml", NULL);
+  CHECK(n >= 17);
+  CHECK(!shared || others >= 30);
+  printf("%d problems on their models, %d on others\n", n, others);
+}
+
+// ---------------------------------------------------------------- what has happened is possible
+
+enum { STEPS = 60, ROLLOUTS = 12 };
+
+// full effort of every actuator, this way or that, changed now and then; the knots reached [STEPS*nq], the last in q
+static int simulate(const cav_model *m, cav_state *state, int rollout, double *q, double *v) {
+  double *u = scene_vector(4 * m->nv + m->nu), *next = u + m->nv, *moment = next + m->nv, *effort = moment + m->nv;
+  int ok = u != NULL;
+  for (int t = 0; t < STEPS && ok; t++) {
+    memset(u, 0, sizeof(double) * (size_t)m->nv);
+    ok = cav_position(m, state, q) == CAV_OK;
+    for (int i = 0; i < m->nu && ok; i++) {
+      double range[2];
+      // rollouts start with a constant push, which is what goes farthest
+      if (t % 15 == 0 && (t == 0 || rollout > 3))
+        effort[i] = rollout == 0 ? 1 : rollout == 1 ? -1 : scene_uniform() > 0 ? 1 : -1;
+      cav_actuator_effort_range(m, i, range);
+      double force = effort[i] > 0 ? range[1] : range[0];
+      if (!isfinite(force)) force = 0;
+      cav_actuator_length(m, state, i, moment);
+      for (int d = 0; d < m->nv; d++) u[d] += force * m->actuator[i].unit * moment[d];
+    }
+    ok = ok && cav_forward(m, state, q, v, u, next) == CAV_OK;
+    if (!ok) break;
+    memcpy(v, next, sizeof(double) * (size_t)m->nv);
+    cav_integrate(m, q, v, state->options.timestep, q);
+  }
+  free(u);
+  return ok;
+}
+
+static int strict; // rollouts that end within all ranges
+
+static int is_inside(const cav_model *m, const double *q) {
+  int inside = 1;
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    if (joint->limited && joint->type >= CAV_JOINT_SLIDE)
+      inside &= q[joint->q] >= joint->range[0] - 1e-6 && q[joint->q] <= joint->range[1] + 1e-6;
+  }
+  return inside;
+}
+
+// a problem that asks for what a simulation came to, at its end
+static void check_reached(const char *name, const cav_model *m, const double *q0, const double *v0, const double *q) {
+  enum { TERMS = 40 };
+  cav_term term[TERMS];
+  double target[TERMS][3];
+  cav_impossibility found[8];
+  cav_error error = {0};
+  cav_state *state = cav_state_new(m);
+  double *ends = scene_vector(2 * m->nq + m->nv);
+  cav_problem p = cav_problem_default(m);
+  int n = 0, proofs = -1;
+  p.timestep = m->timestep, p.duration = STEPS * m->timestep, p.close_at_rest = 0;
+  p.q_start = ends, p.v_start = ends + m->nq, p.q_goal = p.v_start + m->nv;
+  memcpy(p.q_start, q0, sizeof(double) * (size_t)m->nq);
+  memcpy(p.v_start, v0, sizeof(double) * (size_t)m->nv);
+  memcpy(p.q_goal, q, sizeof(double) * (size_t)m->nq);
+  CHECK(cav_position(m, state, q) == CAV_OK);
+  const cav_term any = {
+      .name = "", .use = CAV_USE_EQUAL, .component = -1, .from = p.duration, .to = p.duration, .scale = 1};
+  term[n] = any;
+  term[n].quantity = CAV_QUANTITY_CONFIGURATION;
+  n++;
+  for (int b = 1; b < m->nbody && n + 2 < TERMS; b++) {
+    for (int kind = 0; kind < 2; kind++, n++) {
+      cav_sensor s = {.name = "", .object_type = CAV_OBJECT_BODY, .object = b, .dim = 3};
+      s.type = kind ? CAV_SENSOR_SUBTREECOM : CAV_SENSOR_FRAMEPOS;
+      cav_sensor_read(m, state, &s, target[n]);
+      term[n] = any;
+      term[n].sensor = s;
+      term[n].target = target[n];
+    }
+  }
+  p.term = term, p.nterm = n;
+  CHECK(cav_problem_impossible(&p, found, 8, &proofs, &error) == CAV_OK && proofs >= 0);
+  // a simulation may start or end deep in a solid; what its soft limits let pass is no posture within the ranges
+  int inside = is_inside(m, q);
+  strict += inside;
+  for (int i = 0; i < proofs; i++) {
+    cav_condition c = found[i].condition;
+    int lengths = c == CAV_CONDITION_RANGE || c == CAV_CONDITION_DISTANCE || c == CAV_CONDITION_MOMENTUM;
+    int excused = c == CAV_CONDITION_SOLID || (lengths && !inside);
+    CHECK(excused);
+    if (!excused) fprintf(stderr, "    %s: %s\n", name, found[i].what);
+  }
+  cav_state_free(state);
+  free(ends);
+}
+
+static void check_simulated(const char *name, const cav_model *m) {
+  double *q = scene_vector(m->nq), *v = scene_vector(m->nv), *v0 = scene_vector(m->nv);
+  cav_state *state = cav_state_new(m);
+  int done = 0;
+  for (int i = 0; i < ROLLOUTS; i++) {
+    if (i % 2) scene_normals(v0, m->nv, 0.3);
+    memcpy(q, m->q0, sizeof(double) * (size_t)m->nq);
+    memcpy(v, v0, sizeof(double) * (size_t)m->nv);
+    if (!simulate(m, state, i, q, v)) continue;
+    check_reached(name, m, m->q0, v0, q);
+    done++;
+  }
+  CHECK(done > 0);
+  cav_state_free(state);
+  free(q), free(v), free(v0);
+}
+
+static void check_histories(void) {
+  static const char *const own[] = {
+      SLIDE("1 0 0", "2", "4"), SLIDE("0 0 1", "2", "40"), PENDULUM, CRAWLER("0"), CRAWLER("1"), TABLE("26"),
+      ARM("60", "-150 150"),    ARM("5", "-90 90")};
+  static const char *const others[] = {
+      "mujoco/humanoid.xml",     "dm_control/hopper.xml",  "dm_control/walker.xml",
+      "dm_control/cheetah.xml",  "dm_control/acrobot.xml", "dm_control/cartpole.xml",
+      "dm_control/pendulum.xml", "dm_control/reacher.xml", "dm_control/point_mass.xml"};
+  const char *shared = check_shared_models();
+  for (size_t i = 0; i < sizeof own / sizeof *own; i++) {
+    cav_model *m = scene_load(own[i]);
+    CHECK(m != NULL);
+    if (m) check_simulated("own", m);
+    cav_model_free(m);
+  }
+  for (size_t i = 0; shared && i < sizeof others / sizeof *others; i++) {
+    char path[5000];
+    snprintf(path, sizeof path, "%s/%s", shared, others[i]);
+    cav_model *m = cav_model_load(path, NULL);
+    if (m) check_simulated(others[i], m);
+    cav_model_free(m);
+  }
+  CHECK(strict >= 30);
+  printf("%d rollouts within their ranges\n", strict);
+}
+
+int main(void) {
+  if (!mkdtemp(folder)) return EXIT_FAILURE;
+  for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) check_pair(&pairs[i]);
+  check_motions();
+  check_histories();
+  static const char *const file[] = {"model.xml", "problem.xml"};
+  for (int i = 0; i < 2; i++) {
+    char path[160];
+    snprintf(path, sizeof path, "%s/%s", folder, file[i]);
+    unlink(path);
+  }
+  CHECK(rmdir(folder) == 0);
+  return check_result();
+}
