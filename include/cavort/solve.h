@@ -284,6 +284,8 @@ typedef struct cav_reason {
   double violation; ///< scaled, 0 if within what is allowed
   double pull;      ///< of row
   double fraction;  ///< of all pulls, over all its knots
+  double saving; ///< where all holds: what the cost falls by if its bound gives way by one at all its knots, to first order, in
+                 ///< the unit of the problem (effort: the whole limit); of an equality if its target moves by one
   char what[320];   ///< what, of which body, how far, in words
   char cure[400];   ///< what usually helps
 } cav_reason;
@@ -292,7 +294,7 @@ enum { CAV_REASONS = 10 };
 
 /// Reasons in order of their size, twice: by violation, and by fraction of the conflict.
 typedef struct cav_explanation {
-  int met; ///< 1: every constraint holds, and what pulls is what the motion's cost hangs on
+  int met; ///< 1: every constraint holds, and what pulls is what the motion's cost hangs on: rows at their bounds
   int nviolation, nconflict;
   cav_reason violation[CAV_REASONS], conflict[CAV_REASONS];
 } cav_explanation;

@@ -7,7 +7,8 @@
 /// (Farkas). What one thing (an actuator, a joint, a component of a term) adds to that sum over its knots is its pull.
 /// It does not depend on the weights that spread the violation over the rows, so what pulls hardest is the
 /// contradiction, wherever its violation shows. Where all constraints hold the y_i are the multipliers, and the same
-/// ranking says what the cost hangs on.
+/// ranking says what the cost hangs on. Then only rows at their bounds count, and what a thing saves by giving way is
+/// the sum over its knots; tests/test_explain.c holds it against solves with the bound moved.
 ///
 /// Penetrations are added from the knots. Costs are not explained, nor is a local minimum told from a true
 /// impossibility.
@@ -20,9 +21,13 @@
 #include "cavort/solve.h"
 #include "file.h"
 #include "problem_file.h"
+#include "transcription.h"
 
 /// A contact counts as deep where planning would not have left it.
 static const double deep = CAV_TOLERANCE_PENETRATION;
+
+/// Scaled distance from a bound within which a row is at it.
+static const double at_bound = 1e-4;
 
 /// Same thing over all its knots.
 typedef struct group {
@@ -32,6 +37,7 @@ typedef struct group {
   int missed_first, missed_last;      ///< knots
   int pulled_first, pulled_last;      ///< knots with at least a tenth of the worst pull
   double violation, pull, sum;        ///< worst and worst, sum of pulls
+  double saving;                      ///< sum of multipliers
 } group;
 
 /// An explanation in progress.
@@ -50,6 +56,12 @@ typedef struct inquiry {
 static double binding_excess(const cav_binding *row) {
   double e = fmax(fmax(row->lower - row->value, row->value - row->upper), 0);
   return e > row->allowed ? e : 0;
+}
+
+/// Whether a row is at the bound that its multiplier is of.
+static int is_active(const cav_binding *row) {
+  double bound = row->multiplier < 0 ? row->lower : row->upper;
+  return fabs(row->value - bound) <= fmax(row->allowed, at_bound);
 }
 
 // ---------------------------------------------------------------- gathering
@@ -169,7 +181,9 @@ static cav_status gather(inquiry *in) {
       if (!g->missed || e > g->violation) g->missed = row, g->violation = e;
     }
     // the laws of motion hold back everything: no news where they hold
-    if (in->met && row->kind == CAV_BINDING_UNACTUATED) continue;
+    if (in->met && (row->kind == CAV_BINDING_UNACTUATED || !is_active(row))) continue;
+    // a bound gives way on either side, a target to one
+    g->saving += row->lower < row->upper ? fabs(row->multiplier) : row->multiplier;
     if (row->pull > 0 && (!g->pulled || row->pull > g->pull)) g->pulled = row, g->pull = row->pull;
     g->sum += row->pull;
     in->pulls += row->pull;
@@ -177,7 +191,7 @@ static cav_status gather(inquiry *in) {
   for (int i = 0; i < in->nrow; i++) {
     const cav_binding *row = &in->row[i];
     group *g = group_of(in, row);
-    if (!g || !g->pulled || row->pull < 0.1 * g->pull) continue;
+    if (!g || !g->pulled || row->pull < 0.1 * g->pull || (in->met && !is_active(row))) continue;
     if (row->knot < g->pulled_first) g->pulled_first = row->knot;
     if (row->knot > g->pulled_last) g->pulled_last = row->knot;
   }
@@ -290,6 +304,44 @@ static void tell_subject(const inquiry *in, const cav_binding *row, char *out, s
   }
 }
 
+/// What a component of a term is held against at a knot, in its unit; NAN where it has no number of its own: rotations.
+static double target_of(const inquiry *in, const cav_term *term, const cav_binding *row) {
+  const cav_model *m = in->model;
+  double time = row->knot * in->problem->timestep, one[CAV_SENSOR_DIM_MAX];
+  if (term->quantity == CAV_QUANTITY_SENSOR) {
+    if (term->sensor.dim == 4) return NAN;
+    cav_term_target(term, time, term->sensor.dim, one);
+    return one[row->component];
+  }
+  int posture = term->quantity == CAV_QUANTITY_CONFIGURATION, n = posture ? m->nq : m->nv, at = row->component;
+  if (posture) {
+    const cav_joint *joint = &m->joint[m->dof[at].joint];
+    int line = joint->type == CAV_JOINT_FREE && at - joint->dof < 3;
+    if ((joint->type == CAV_JOINT_FREE && !line) || joint->type == CAV_JOINT_BALL) return NAN;
+    at = joint->q + (line ? at - joint->dof : 0);
+    if (!term->target) return in->problem->q_goal[at];
+  }
+  double *all = malloc(sizeof(double) * (size_t)n), target = NAN;
+  if (!all) return NAN;
+  cav_term_target(term, time, n, all);
+  target = all[at];
+  free(all);
+  return target;
+}
+
+/// A term with its numbers: how far off, and where it has numbers of its own, what is wanted and what is.
+static void tell_target(const inquiry *in, const cav_binding *row, double off, const char *subject, char *out,
+                        size_t size) {
+  const cav_term *term = &in->problem->term[hard_term(in->problem, row->object)];
+  double target = target_of(in, term, row), got = target + row->value * term->scale;
+  int n = off != 0 || isnan(target) ? snprintf(out, size, "%s: off by %.4g", subject, off * term->scale)
+                                    : snprintf(out, size, "%s: at %.4g", subject, got);
+  if (isnan(target) || off == 0 || n >= (int)size) return;
+  double wanted = got - off * term->scale;
+  snprintf(out + n, size - (size_t)n, ", wanted %s%.4g, got %.4g",
+           term->use == CAV_USE_RANGE ? (off < 0 ? "at least " : "at most ") : "", wanted, got);
+}
+
 /// The same with its numbers, in the units of the user.
 static void tell(const inquiry *in, const cav_binding *row, char *out, size_t size) {
   char subject[200];
@@ -311,8 +363,7 @@ static void tell(const inquiry *in, const cav_binding *row, char *out, size_t si
       snprintf(out, size, "%s: at %.4g, planned with %.4g .. %.4g", subject, row->value, row->lower, row->upper);
       break;
     case CAV_BINDING_TERM:
-      snprintf(out, size, "%s: off by %.4g", subject,
-               off * in->problem->term[hard_term(in->problem, row->object)].scale);
+      tell_target(in, row, off, subject, out, size);
       break;
     case CAV_BINDING_PENETRATION:
     case CAV_BINDING_KINDS:
@@ -375,6 +426,8 @@ static void cure_term(const inquiry *in, const cav_binding *row, const cav_bindi
     snprintf(out, size, "The actuators are too weak for it: more time, a nearer target, a larger effort limit.");
   } else if (against && (against->kind == CAV_BINDING_JOINT || against->kind == CAV_BINDING_TENDON)) {
     snprintf(out, size, "A range ends before it is reached: move the target, or check the range.");
+  } else if (against && against->kind == CAV_BINDING_UNACTUATED && in->model->npair == 0) {
+    snprintf(out, size, "Nothing drives the body that way: more time, or a target nearer to what moves by itself.");
   } else if (against && against->kind == CAV_BINDING_UNACTUATED) {
     snprintf(out, size,
              "Contacts cannot carry the body that way: more time, a target nearer to balance, or a guess that "
@@ -384,7 +437,7 @@ static void cure_term(const inquiry *in, const cav_binding *row, const cav_bindi
   }
 }
 
-static void tell_cure(const inquiry *in, const cav_binding *row, char *out, size_t size) {
+static void tell_cure(const inquiry *in, const cav_binding *row, double saving, char *out, size_t size) {
   static const char *const usual[] = {
       [CAV_BINDING_UNACTUATED] =
           "Nothing can push there: more time, a start and goal that stand, a guess that touches the "
@@ -403,15 +456,19 @@ static void tell_cure(const inquiry *in, const cav_binding *row, char *out, size
   const cav_binding *against = opponent(in, row);
   char subject[200];
   if (in->met && row->kind != CAV_BINDING_PENETRATION) {
-    // the multiplier in the units of the user
-    double scale = row->kind == CAV_BINDING_TERM ? in->problem->term[hard_term(in->problem, row->object)].scale : 1;
-    const char *unit = row->kind == CAV_BINDING_EFFORT ? "fraction of the limit" : "rad or m";
-    snprintf(out, size, "The cost falls by about %.3g for each 0.01 (%s) that it gives way.",
-             0.01 * fabs(row->multiplier) / scale, row->kind == CAV_BINDING_TERM ? "in its unit" : unit);
+    int term = row->kind == CAV_BINDING_TERM, equal = !(row->lower < row->upper);
+    const char *unit = row->kind == CAV_BINDING_EFFORT ? " of the limit" : term ? "" : " rad or m";
+    if (equal)
+      snprintf(out, size, "The cost falls by about %.3g for each 0.01 that its target %s.", 0.01 * fabs(saving),
+               saving > 0 ? "grows" : "shrinks");
+    else
+      snprintf(out, size, "The cost falls by about %.3g for each 0.01%s that it gives way.", 0.01 * saving, unit);
     return;
   }
   if (row->kind == CAV_BINDING_TERM) {
     cure_term(in, row, against, out, size);
+  } else if (row->kind == CAV_BINDING_UNACTUATED && in->model->npair == 0) {
+    snprintf(out, size, "Nothing can push there: more time, a guess that swings, or more stages.");
   } else {
     snprintf(out, size, "%s", usual[row->kind]);
   }
@@ -423,13 +480,20 @@ static void tell_cure(const inquiry *in, const cav_binding *row, char *out, size
 
 // ---------------------------------------------------------------- ranking
 
+/// What a group saves by giving way by one, in the units of the user: rows of terms are over their scale.
+static double saving_of(const inquiry *in, const group *g, const cav_binding *row) {
+  double scale = row->kind == CAV_BINDING_TERM ? in->problem->term[hard_term(in->problem, row->object)].scale : 1;
+  return g->saving / scale;
+}
+
 static cav_reason reason_of(const inquiry *in, const group *g, const cav_binding *row, int first, int last) {
   cav_reason reason = {.row = *row, .first = first, .last = last, .time = row->knot * in->timestep};
   reason.violation = binding_excess(row);
   reason.pull = row->pull;
   reason.fraction = in->pulls > 0 ? g->sum / in->pulls : 0;
   tell(in, row, reason.what, sizeof reason.what);
-  tell_cure(in, row, reason.cure, sizeof reason.cure);
+  if (in->met) reason.saving = saving_of(in, g, row);
+  tell_cure(in, row, reason.saving, reason.cure, sizeof reason.cure);
   return reason;
 }
 

@@ -1,5 +1,6 @@
-/// cavort explain: what the motion of a result folder misses, first of its certificate and of what was asked, then by rows; and
-/// which constraints pull against each other. Exit status as that of verify: 0 certified and achieved, 1 if not.
+/// cavort explain: why the motion of a result folder is as it is, in three lines: a proof that the problem cannot be solved, what
+/// the certificate and what was asked miss, and the one cause; --all lists what is missed by rows, and which constraints pull
+/// against each other. Exit status as that of verify: 0 certified and achieved, 1 if not.
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -11,6 +12,31 @@ static void print_when(const cav_reason *r) {
   printf("  knot %d, %.4g s", r->row.knot, r->time);
   if (r->last > r->first) printf(" (knots %d to %d)", r->first, r->last);
   printf(": %s\n    %s\n", r->what, r->cure);
+}
+
+// at most this many, unless all are asked for
+enum { LINES = 3 };
+
+static void print_cause(const cav_reason *r, const char *before) {
+  printf("%s%s, at %.4g s. %s\n", before, r->what, r->time, r->cure);
+}
+
+// what is missed, and why, in a few lines
+static void print_brief(const cav_explanation *e, const cav_verdict *verdict, const cav_impossibility *impossible) {
+  int n = 0, good = verdict->certified && verdict->achieved;
+  if (impossible) n += printf("impossible: %s. %s\n", impossible->what, impossible->cure) > 0;
+  if (!verdict->certified) n += printf("not certified: %s\n", verdict->reason) > 0;
+  if (!verdict->achieved && n < LINES) n += printf("not achieved: misses %s\n", verdict->missed) > 0;
+  if (good)
+    n += printf("nothing is missed; %s\n",
+                e->nconflict ? "what the cost hangs on:" : "no limit or constraint holds the cost back") > 0;
+  if (e->met || impossible) {
+    for (int i = 0; i < e->nconflict && n < LINES && !impossible; i++, n++) print_cause(&e->conflict[i], "  ");
+  } else if (n < LINES && e->nconflict) {
+    print_cause(&e->conflict[0], "cause: ");
+  } else if (n < LINES && e->nviolation) {
+    print_cause(&e->violation[0], "cause: ");
+  }
 }
 
 static void print_table(const cav_explanation *e, const cav_verdict *verdict) {
@@ -25,6 +51,7 @@ static void print_table(const cav_explanation *e, const cav_verdict *verdict) {
     print_when(&e->violation[i]);
   }
   if (e->nconflict) printf(e->met ? "what the cost hangs on:\n" : "what pulls against each other, by fraction:\n");
+  if (!e->nconflict && e->met) printf("no limit or constraint holds the cost back\n");
   for (int i = 0; i < e->nconflict; i++) {
     printf("%2d. %.0f %%", i + 1, 100 * e->conflict[i].fraction);
     print_when(&e->conflict[i]);
@@ -37,8 +64,8 @@ static void print_reasons(const char *name, int n, const cav_reason *reason) {
     const cav_reason *r = &reason[i];
     printf(
         "%s\n    {\"knot\": %d, \"first\": %d, \"last\": %d, \"time\": %.17g, \"violation\": %.17g, \"pull\": %.17g, "
-        "\"fraction\": %.17g,\n     \"what\": ",
-        i ? "," : "", r->row.knot, r->first, r->last, r->time, r->violation, r->pull, r->fraction);
+        "\"fraction\": %.17g, \"saving\": %.17g,\n     \"what\": ",
+        i ? "," : "", r->row.knot, r->first, r->last, r->time, r->violation, r->pull, r->fraction, r->saving);
     cav_certificate_json_text(stdout, r->what);
     printf(",\n     \"cure\": ");
     cav_certificate_json_text(stdout, r->cure);
@@ -58,6 +85,9 @@ int cav_command_explain(const cav_command_line *line) {
   if (!status)
     status = cav_verify(result->problem, result->trajectory, &result->problem->contact, result->gain_q, result->gain_v,
                         &verdict, &error);
+  cav_impossibility impossible;
+  int proofs = 0;
+  if (!status) status = cav_problem_impossible(result->problem, &impossible, 1, &proofs, &error);
   if (!status && line->json) {
     printf("{\n  \"met\": %s,\n  \"certified\": %s,\n  \"achieved\": %s,\n  \"reason\": ",
            explanation.met ? "true" : "false", verdict.certified ? "true" : "false",
@@ -65,11 +95,16 @@ int cav_command_explain(const cav_command_line *line) {
     cav_certificate_json_text(stdout, verdict.reason);
     printf(",\n  \"missed\": ");
     cav_certificate_json_text(stdout, verdict.missed);
+    printf(",\n  \"impossible\": ");
+    cav_certificate_json_text(stdout, proofs ? impossible.what : "");
     print_reasons("violation", explanation.nviolation, explanation.violation);
     print_reasons("conflict", explanation.nconflict, explanation.conflict);
     printf("\n}\n");
-  } else if (!status) {
+  } else if (!status && line->all) {
+    if (proofs) printf("impossible: %s\n  %s\n", impossible.what, impossible.cure);
     print_table(&explanation, &verdict);
+  } else if (!status) {
+    print_brief(&explanation, &verdict, proofs ? &impossible : NULL);
   }
   cav_result_free(result);
   if (status) return cav_command_fail(&error);

@@ -18,7 +18,8 @@ enum option {
   OPTION_IPOPT = 128,
   OPTION_METHODS = 256,
   OPTION_STRATEGIES = 512,
-  OPTION_FORCE = 1024
+  OPTION_FORCE = 1024,
+  OPTION_ALL = 2048
 };
 
 // options: spelling, value's name or NULL, what it does
@@ -43,6 +44,7 @@ static const struct {
     {OPTION_RESUME, "--resume", NULL, NULL, "start from the trajectory that the result folder holds"},
     {OPTION_QUIET, "--quiet", "-q", NULL, "no progress and no table; errors and the exit status remain"},
     {OPTION_FORCE, "--force", NULL, NULL, "solve what is proven impossible all the same"},
+    {OPTION_ALL, "--all", NULL, NULL, "all that is missed, and all that pulls, with what usually helps"},
     {OPTION_JSON, "--json", NULL, NULL, "print as JSON what would be a table"},
 };
 enum { NOPTION = sizeof options / sizeof *options };
@@ -65,7 +67,7 @@ static const command commands[] = {
     {"verify", "DIR", "certify the motion of a result folder again, from its files alone", cav_command_verify,
      OPTION_MODEL | OPTION_QUIET | OPTION_JSON},
     {"explain", "DIR", "say why the motion of a result folder is as it is: what it misses, and which constraints pull",
-     cav_command_explain, OPTION_MODEL | OPTION_JSON},
+     cav_command_explain, OPTION_MODEL | OPTION_ALL | OPTION_JSON},
     {"view", "DIR", "write the page of a result folder anew and say where it is", cav_command_view,
      OPTION_MODEL | OPTION_QUIET},
     {"study", "[MOTION...]",
@@ -191,6 +193,8 @@ static int take_value(cav_command_line *line, enum option option, const char *na
       return line->json = 1;
     case OPTION_FORCE:
       return line->force = 1;
+    case OPTION_ALL:
+      return line->all = 1;
   }
   return 0;
 }
