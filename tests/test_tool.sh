@@ -178,7 +178,16 @@ check "inspect says so first" sh -c 'head -n 1 out | grep -q "^impossible: "'
 run 1 solve strict.xml --model weak.xml -o weak --force
 check "the first line still names the cause" sh -c 'head -n 1 err | grep -q "^cavort: impossible: "'
 says out "NOT certified"
+says out "wanted 1, got"
 has weak/verdict.json
+run 1 explain weak
+says out "impossible: joint 'pivot'"
+check "three lines at most" [ "$(wc -l <out)" -le 3 ]
+check "no word of contacts where there are none" sh -c '! grep -qi "contact\|touch" out'
+run 1 explain weak --all
+says out "pulls against"
+run 1 explain weak --json
+says out '"impossible": "joint'
 says weak/verdict.json '"certified": false'
 
 # --- a motion that the stated guess does not lead to: a pendulum too weak to rise without a swing ---

@@ -230,8 +230,11 @@ static int is_line(const cav_model *m, int d) {
   return j->type == CAV_JOINT_SLIDE || (j->type == CAV_JOINT_FREE && d - j->dof < 3);
 }
 
-static const char *term_name(const cav_problem *p, int k, char buffer[48]) {
-  return or_number(p->term[hard_term(p, k)].name, "constraint", k, buffer);
+/// Name of a hard term; "" where it has but that of its element, which does not tell it from others.
+static const char *term_name(const cav_problem *p, int k) {
+  const cav_term *term = &p->term[hard_term(p, k)];
+  int named = term->name && *term->name && strcmp(term->name, cav_quantity_rule_of(term->quantity)->name);
+  return named ? term->name : "";
 }
 
 /// What a sensor looks at: kind and name; "" where it is not of a body.
@@ -251,7 +254,7 @@ static void tell_sensor(const cav_model *m, const cav_sensor *s, char *out, size
 static void tell_term(const cav_problem *p, const cav_binding *row, char *out, size_t size) {
   static const char *const component[] = {"x", "y", "z", "w"};
   const cav_term *term = &p->term[hard_term(p, row->object)];
-  char name[48], of[160] = "";
+  char of[160] = "";
   const char *which = "";
   if (term->quantity == CAV_QUANTITY_SENSOR) {
     tell_sensor(p->model, &term->sensor, of, sizeof of);
@@ -262,8 +265,9 @@ static void tell_term(const cav_problem *p, const cav_binding *row, char *out, s
   }
   const char *kind = term->quantity == CAV_QUANTITY_SENSOR ? cav_sensor_rule_of(term->sensor.type)->name
                                                            : cav_quantity_rule_of(term->quantity)->name;
-  snprintf(out, size, "constraint '%.60s', %s%s%s%s", term_name(p, row->object, name), kind, of, *which ? ", " : "",
-           which);
+  const char *name = term_name(p, row->object);
+  snprintf(out, size, "constraint%s%.60s%s, %s%s%s%s", *name ? " '" : "", name, *name ? "'" : "", kind, of,
+           *which ? ", " : "", which);
 }
 
 /// What a row is about, without its numbers.
@@ -414,16 +418,15 @@ static void cure_term(const inquiry *in, const cav_binding *row, const cav_bindi
   const cav_term *term = &in->problem->term[hard_term(in->problem, row->object)];
   int link = term->quantity == CAV_QUANTITY_SENSOR ? sensor_link(in->model, &term->sensor) : 0;
   const cav_binding *deepest = link > 0 ? buried(in, link, row->knot) : NULL;
-  char other[48];
   if (deepest) {
     snprintf(out, size, "What it asks for leads %.3g mm inside a solid: move the target out of it.",
              1e3 * deepest->value);
   } else if (against && against->kind == CAV_BINDING_TERM && against->object != row->object) {
-    snprintf(out, size,
-             "It contradicts constraint '%.60s' at this time: drop or loosen one, or set them apart in time.",
-             term_name(in->problem, against->object, other));
+    char other[200];
+    tell_term(in->problem, against, other, sizeof other);
+    snprintf(out, size, "It contradicts %s at this time: drop or loosen one, or set them apart in time.", other);
   } else if (against && against->kind == CAV_BINDING_EFFORT) {
-    snprintf(out, size, "The actuators are too weak for it: more time, a nearer target, a larger effort limit.");
+    snprintf(out, size, "The actuators are too weak for it: more time, a nearer target, or stronger actuators.");
   } else if (against && (against->kind == CAV_BINDING_JOINT || against->kind == CAV_BINDING_TENDON)) {
     snprintf(out, size, "A range ends before it is reached: move the target, or check the range.");
   } else if (against && against->kind == CAV_BINDING_UNACTUATED && in->model->npair == 0) {
@@ -437,14 +440,14 @@ static void cure_term(const inquiry *in, const cav_binding *row, const cav_bindi
   }
 }
 
-static void tell_cure(const inquiry *in, const cav_binding *row, double saving, char *out, size_t size) {
+static void tell_cure(const inquiry *in, const group *g, const cav_binding *row, double saving, char *out,
+                      size_t size) {
   static const char *const usual[] = {
       [CAV_BINDING_UNACTUATED] =
           "Nothing can push there: more time, a start and goal that stand, a guess that touches the "
           "ground where it should push, or more stages.",
       [CAV_BINDING_EFFORT] =
-          "The actuator is too weak for what is asked: more time, a nearer target, a stronger actuator, or "
-          "<limits effort> nearer to 1.",
+          "The actuator is too weak for what is asked: more time, a nearer target, or a stronger actuator.",
       [CAV_BINDING_JOINT] =
           "The range ends too early for what is asked: move the target, or check the range in the model.",
       [CAV_BINDING_TENDON] =
@@ -469,6 +472,11 @@ static void tell_cure(const inquiry *in, const cav_binding *row, double saving, 
     cure_term(in, row, against, out, size);
   } else if (row->kind == CAV_BINDING_UNACTUATED && in->model->npair == 0) {
     snprintf(out, size, "Nothing can push there: more time, a guess that swings, or more stages.");
+  } else if (row->kind == CAV_BINDING_EFFORT && in->problem->effort_limit < 1 &&
+             !(g->missed && fabs(g->missed->value) > 1)) {
+    snprintf(out, size,
+             "It is within the actuator's limit, not within what is planned with: <limits effort> nearer to 1, more "
+             "time, or a nearer target.");
   } else {
     snprintf(out, size, "%s", usual[row->kind]);
   }
@@ -493,7 +501,7 @@ static cav_reason reason_of(const inquiry *in, const group *g, const cav_binding
   reason.fraction = in->pulls > 0 ? g->sum / in->pulls : 0;
   tell(in, row, reason.what, sizeof reason.what);
   if (in->met) reason.saving = saving_of(in, g, row);
-  tell_cure(in, row, reason.saving, reason.cure, sizeof reason.cure);
+  tell_cure(in, g, row, reason.saving, reason.cure, sizeof reason.cure);
   return reason;
 }
 

@@ -265,8 +265,10 @@ void cav_constraint_check(const cav_verification *verification, int t, double *w
       if (term->use == CAV_USE_RANGE) missed = fmax(fmax(term->lower - left, left - term->upper), 0);
       // fmax drops what is not a number: keep it
       if (isnan(left)) missed = left;
-      cav_metric_note(metric, missed / term->scale, t, "term %d%s%s, component %d, value %.6g", i,
-                      term->name && *term->name ? " " : "", term->name ? term->name : "", k, x[k]);
+      char words[200];
+      if (missed / term->scale <= metric->value) continue;
+      cav_target_words(verification, term, t, k, x[k], target[k], words, sizeof words);
+      cav_metric_note(metric, missed / term->scale, t, "%s", words);
     }
   }
 }

@@ -149,6 +149,25 @@ static double miss_of(const cav_term *term, double x, double target, double *wan
   return x - *wanted;
 }
 
+// whether a term has a name other than its element's, which says nothing of which it is
+static int is_named(const cav_term *term) {
+  return term->name && *term->name && strcmp(term->name, cav_quantity_rule_of(term->quantity)->name);
+}
+
+// a posture's difference as the coordinate itself where it is one: of hinges, slides and the place of a free joint
+static void make_coordinate(const cav_verification *verification, const cav_term *term, int t, int k,
+                            cav_term_report *r) {
+  const cav_model *model = verification->model;
+  int d = selected_dof(model, term, k);
+  if (term->quantity != CAV_QUANTITY_CONFIGURATION || d < 0) return;
+  const cav_joint *joint = &model->joint[model->dof[d].joint];
+  int line = joint->type == CAV_JOINT_FREE && d - joint->dof < 3;
+  if (!line && joint->type != CAV_JOINT_HINGE && joint->type != CAV_JOINT_SLIDE) return;
+  double at = verification->q[(size_t)t * (size_t)model->nq + (size_t)(joint->q + (line ? d - joint->dof : 0))];
+  r->wanted += at - r->got;
+  r->got = at;
+}
+
 // keeps knot t if the term is missed more there than at any knot before
 static void note_target(const cav_verification *verification, const cav_term *term, int t, int n, const double *x,
                         const double *target, cav_term_report *r) {
@@ -165,9 +184,22 @@ static void note_target(const cav_verification *verification, const cav_term *te
   r->off = off;
   r->got = x[worst];
   miss_of(term, x[worst], target[worst], &r->wanted);
+  make_coordinate(verification, term, t, worst, r);
   r->time = t * verification->h;
   describe(verification->model, term, worst, r, &usual);
   r->within = tolerance_of(term, usual);
+}
+
+void cav_target_words(const cav_verification *verification, const cav_term *term, int t, int k, double x, double target,
+                      char *out, size_t size) {
+  cav_term_report r = {.got = x};
+  double usual;
+  miss_of(term, x, target, &r.wanted);
+  make_coordinate(verification, term, t, k, &r);
+  describe(verification->model, term, k, &r, &usual);
+  int named = is_named(term);
+  snprintf(out, size, "%s%.60s%s%s, wanted %.4g, got %.4g", named ? "'" : "", named ? term->name : "",
+           named ? "' " : "", r.what, r.wanted, r.got);
 }
 
 // cost of one value
@@ -221,7 +253,8 @@ void cav_targets_verdict(const cav_verification *verification, cav_term_report *
     verdict->nmissed++;
     if (isnan(r->off) || r->off / r->within > worst) {
       worst = isnan(r->off) ? INFINITY : r->off / r->within;
-      const char *name = p->term[i].name && *p->term[i].name ? p->term[i].name : r->what;
+      const cav_term *term = &p->term[i];
+      const char *name = is_named(term) ? term->name : r->what;
       snprintf(verdict->missed, sizeof verdict->missed,
                "'%.60s' by %.3g %s (within %.3g) at %.3g s: wanted %.4g, got %.4g", name, r->off, r->unit, r->within,
                r->time, r->wanted, r->got);

@@ -118,6 +118,10 @@ double cav_verification_weight(const cav_verification *verification, const cav_t
 void cav_targets_note(const cav_verification *verification, int t, double *work, cav_term_report *report);
 void cav_targets_verdict(const cav_verification *verification, cav_term_report *report, cav_verdict *verdict);
 
+/// A value of a term at knot t in words: name, what it is of, wanted and got. targets.c.
+void cav_target_words(const cav_verification *verification, const cav_term *term, int t, int k, double x, double target,
+                      char *out, size_t size);
+
 /// Hard terms of the problem at knot t; verification->state holds the inverse there. work holds
 /// cav_constraint_check_room values. constraint_check.c.
 int cav_constraint_check_room(const cav_verification *verification);

@@ -101,7 +101,7 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
   if (isnan(v->optimality))
     fprintf(out, "how optimal is not known\n");
   else
-    fprintf(out, "%s to %.1g (the word needs %g)\n", cav_verdict_optimal(v) ? "optimal" : "NOT optimal, but",
+    fprintf(out, "%s to %.1g (the word needs %g)\n", cav_verdict_optimal(v) ? "locally optimal" : "NOT optimal, but",
             v->optimality, CAV_TOLERANCE_OPTIMAL);
   fprintf(out, "%s: %s on %s\n", v->certified ? "certified" : "NOT certified", problem->name, problem->model->name);
   if (!v->certified) fprintf(out, "  %s\n", v->reason);
