@@ -63,6 +63,8 @@ static int count(const cav_problem *p, cav_quantity quantity) {
   return n;
 }
 
+static void refuse_cost(const char *element, const char *words);
+
 static const cav_term *find(const cav_problem *p, const char *name) {
   for (int i = 0; i < p->nterm; i++) {
     if (!strcmp(p->term[i].name, name)) return &p->term[i];
@@ -212,6 +214,41 @@ static void check_same(const cav_problem *a, const cav_problem *b);
   "size='.1'/></body></scene>\n"
 #define SCENE_HEAD \
   "<problem name='p' model='leg.xml'>\n" SCENE "<horizon duration='1' timestep='.05'/>\n<start key='bent'/>\n"
+
+// height='floor' leaves a box on a table, lets one fall that stands on nothing, and by rise counts from the plane alone
+static void check_table(void) {
+  static const double place[3][2] = {{.5, .9}, {3, 1.1}, {.5, 0.25}};
+  static const char *const rise[3] = {"", "", " rise='.15'"};
+  static const double wanted[3] = {.5, .1, .25};
+  for (int i = 0; i < 3; i++) {
+    char text[2000];
+    snprintf(
+        text, sizeof text,
+        "<problem name='p' model='leg.xml'>\n<scene><geom name='table' type='box' pos='.5 0 .2' size='.4 .4 .2'/>"
+        "<body name='crate' pos='0 0 5'><freejoint name='crate'/><geom type='box' size='.1 .1 .1' mass='1'/></body>"
+        "</scene><horizon duration='1' timestep='.05'/>\n<start key='bent' height='floor'%s><joint name='x' pos='-3'/>"
+        "<root joint='crate' pos='%g 0 %g'/></start>\n" TAIL,
+        rise[i], place[i][0], place[i][1]);
+    cav_problem *p = load(text);
+    if (!p) continue;
+    CHECK_NEAR(p->q_start[6], wanted[i], 1e-9); // bisection; seen 1e-12
+    cav_problem_free(p);
+  }
+}
+
+// one joint over time, without the rest of the posture
+static void check_one_joint(void) {
+  cav_problem *p = load(HEAD
+                        "<cost><posture name='bend' joint='knee' weight='1'><waypoint time='0' qpos='-.1'/>"
+                        "<waypoint time='1' qpos='-.9'/></posture></cost>\n" TAIL);
+  if (!p) return;
+  const cav_term *bend = find(p, "bend");
+  CHECK(bend && bend->nwaypoint == 2 && bend->target[3] == -.1 && bend->target[7] == -.9);
+  cav_problem_free(p);
+  refuse_cost("<posture joint='knee' qpos='1 2' weight='1'/>",
+              "expected 4 numbers for the model 'leg', or one for the joint");
+  refuse_cost("<posture qpos='1' weight='1'/>", "expected 4 numbers for the model 'leg', got 1");
+}
 
 // bodies and geoms that the file puts into the model's world, after the model's own
 static void check_scene(void) {
@@ -673,6 +710,10 @@ int main(void) {
   check_quantities();
   check_postures();
   check_scene();
+  check_table();
+  check_one_joint();
+  refuse_cost("<sensor type='framepos' body='floor' weight='1'/>",
+              "no body 'floor', but a geom of that name: give it as attribute 'geom'");
   check_trajectory_ends();
   check_costs();
   check_constraints();

@@ -2,7 +2,8 @@
 ///
 /// A posture is a base (a keyframe of the model, a <pose> of the file, numbers, a knot of a trajectory, or else the
 /// model's own configuration) on which root and joint values are laid, and which height="floor" then moves along its
-/// root until its lowest geom touches a plane of the world. So one file can set up models that share joint names, or
+/// root until its lowest geom touches a plane of the world, or, going down, something else that stands in the world: a
+/// box on a table stays on the table. With rise the planes alone count. So one file can set up models that share joint names, or
 /// list alternatives. The distance of a geom from a plane is by its support point, exact for every type here. Balance,
 /// contact between limbs and orientation to the floor are the file's business.
 #include <math.h>
@@ -233,12 +234,10 @@ static int lifting(const cav_model *m, const cav_state *state, int root, double 
   return -1;
 }
 
-// moves one tree along its root until the lowest of its geoms that can touch a plane of the world touches it, and
-// higher by rise; returns whether there is such a geom
-static int drop_tree(const cav_model *m, cav_state *state, int root, double rise, double *q) {
-  double gain = 1, up = -INFINITY;
-  int height = lifting(m, state, root, &gain);
-  if (height < 0) return 0;
+// way up that brings a tree to where the lowest of its geoms that can touch a plane of the world touches it; infinite:
+// there is no such geom
+static double way_to_plane(const cav_model *m, const cav_state *state, int root) {
+  double up = -INFINITY;
   for (int p = 0; p < m->npair; p++) {
     const cav_geom *plane = &m->geom[m->pair[p].geom1], *geom = &m->geom[m->pair[p].geom2];
     if (plane->type != CAV_GEOM_PLANE || plane->link != 0 || m->link[geom->link].root != root) continue;
@@ -250,9 +249,65 @@ static int drop_tree(const cav_model *m, cav_state *state, int root, double rise
     for (int i = 0; i < 3; i++) distance += n[i] * (at.pos[i] - floor.pos[i]);
     up = fmax(up, -distance / n[2]);
   }
-  if (isinf(up)) return 0;
+  return up;
+}
+
+// whether a tree is inside something that stands in the world and is no plane
+static cav_status is_inside(const cav_model *m, cav_state *state, int root, const double *q, int *inside) {
+  cav_status status = cav_position(m, state, q);
+  *inside = 0;
+  for (int i = 0; i < state->ncontact && !status; i++) {
+    const cav_geom *a = &m->geom[m->pair[state->contact[i].pair].geom1],
+                   *b = &m->geom[m->pair[state->contact[i].pair].geom2];
+    const cav_geom *stands = a->link == 0 ? a : b, *moves = a->link == 0 ? b : a;
+    if (stands->link != 0 || stands->type == CAV_GEOM_PLANE || m->link[moves->link].root != root) continue;
+    *inside |= state->contact[i].dist < 0;
+  }
+  return status;
+}
+
+// how far a tree can go down, at most that far, before it touches something: step by step, then by bisection
+static cav_status way_down(const cav_model *m, cav_state *state, int root, int height, double gain, double most,
+                           double *q, double *way) {
+  static const double step = 0.005; // m: thinner things are passed
+  double from = q[height], free = 0, blocked = 0;
+  int inside;
+  cav_status status = is_inside(m, state, root, q, &inside);
+  *way = most;
+  // what starts inside of something is not stopped by it
+  if (status || inside) return status;
+  while (!status && !inside && blocked < most) {
+    free = blocked;
+    blocked = fmin(blocked + fmax(step, most / 4000), most);
+    q[height] = from - blocked / gain;
+    status = is_inside(m, state, root, q, &inside);
+  }
+  for (int i = 0; i < 40 && inside && !status; i++) {
+    double middle = (free + blocked) / 2;
+    int deep;
+    q[height] = from - middle / gain;
+    status = is_inside(m, state, root, q, &deep);
+    *(deep ? &blocked : &free) = middle;
+  }
+  q[height] = from;
+  if (inside) *way = free;
+  return status;
+}
+
+// moves one tree along its root to what it stands on, and higher by rise; *moved 0 where there is nothing
+static cav_status drop_tree(const cav_model *m, cav_state *state, int root, int planes_alone, double rise, double *q,
+                            int *moved) {
+  double gain = 1, up = way_to_plane(m, state, root), down;
+  int height = lifting(m, state, root, &gain);
+  *moved = height >= 0 && !isinf(up);
+  if (!*moved) return CAV_OK;
+  if (up < 0 && !planes_alone) {
+    cav_status status = way_down(m, state, root, height, gain, -up, q, &down);
+    if (status) return status;
+    up = -down;
+  }
   q[height] += (up + rise) / gain;
-  return 1;
+  return CAV_OK;
 }
 
 static cav_status drop(const cav_problem_reader *reader, const cav_xml_node *node, double *q) {
@@ -261,10 +316,17 @@ static cav_status drop(const cav_problem_reader *reader, const cav_xml_node *nod
   if (status)
     return cav_xml_fail_as(reader->error, status, node, "height", "the posture cannot be evaluated: %s",
                            cav_status_name(status));
-  int dropped = 0;
-  for (int i = 1; i < m->nlink; i++) {
-    if (m->link[i].parent == 0) dropped += drop_tree(m, reader->state, i, cav_xml_real(node, "rise", 0), q);
+  int dropped = 0, moved, planes_alone = cav_xml_get(node, "rise") != NULL;
+  for (int i = 1; i < m->nlink && !status; i++) {
+    if (m->link[i].parent != 0) continue;
+    status = drop_tree(m, reader->state, i, planes_alone, cav_xml_real(node, "rise", 0), q, &moved);
+    dropped += moved;
+    // where the others are is read off the posture as it stands
+    if (!status) status = cav_position(m, reader->state, q);
   }
+  if (status)
+    return cav_xml_fail_as(reader->error, status, node, "height", "the posture cannot be evaluated: %s",
+                           cav_status_name(status));
   if (dropped) return CAV_OK;
   return cav_xml_fail(reader->error, node, "height",
                       "nothing of the model '%s' can be lowered to a plane: it needs a plane in the world, a geom that "

@@ -82,6 +82,16 @@ cav_status cav_problem_no_memory(const cav_problem_reader *reader) {
   return cav_file_fail(reader->error, CAV_NO_MEMORY, 0, "%s: no memory for the problem", reader->path);
 }
 
+// another kind that has an object of that name; CAV_OBJECT_TYPES: none
+static cav_object_type other_kind(const cav_model *model, cav_object_type type, const char *name) {
+  const char *kind = cav_object_kind_of(type)->text;
+  cav_object_type other = 0;
+  while (other < CAV_OBJECT_TYPES &&
+         (cav_object_kind_of(other)->text == kind || cav_object_find(model, other, name) < 0))
+    other++;
+  return other;
+}
+
 int cav_problem_find(const cav_problem_reader *reader, const cav_xml_node *node, const char *attribute,
                      cav_object_type type) {
   const char *list = cav_xml_text(node, attribute, "");
@@ -103,6 +113,16 @@ int cav_problem_find(const cav_problem_reader *reader, const cav_xml_node *node,
     const void *names = cav_object_names(reader->model, type, &n, &stride);
     copy[strcspn(copy, " |")] = 0;
     const char *near = n ? cav_xml_nearest(copy, names, n, stride) : NULL;
+    cav_object_type other = other_kind(reader->model, type, copy);
+    if (other != CAV_OBJECT_TYPES) {
+      const char *given = cav_object_kind_of(other)->text;
+      cav_xml_fail(reader->error, node, attribute, "the model '%s' has no %s '%.100s', but a %s of that name%s%s%s",
+                   reader->model->name, kind, copy, given,
+                   cav_xml_accepts(node, given) ? ": give it as attribute '" : "",
+                   cav_xml_accepts(node, given) ? given : "", cav_xml_accepts(node, given) ? "'" : "");
+      free(copy);
+      return -1;
+    }
     cav_xml_fail(reader->error, node, attribute, "the model '%s' has no %s of that name, got '%.200s'%s%s%s",
                  reader->model->name, kind, list, near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
   }

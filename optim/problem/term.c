@@ -176,8 +176,9 @@ static cav_status make_targets(const cav_problem_reader *reader, const cav_xml_n
   return CAV_OK;
 }
 
-// a posture by keyframe or numbers; neither: found stays 0
-static cav_status posture_of(const cav_problem_reader *reader, const cav_xml_node *node, double *q, int *found) {
+// a posture by keyframe or numbers, or by one number where the term is of one hinge or slide; neither: found stays 0
+static cav_status posture_of(const cav_problem_reader *reader, const cav_xml_node *node, const cav_term *term,
+                             double *q, int *found) {
   const cav_model *m = reader->model;
   const cav_xml_value *numbers = cav_xml_get(node, "qpos");
   if (numbers && cav_xml_get(node, "key"))
@@ -185,9 +186,15 @@ static cav_status posture_of(const cav_problem_reader *reader, const cav_xml_nod
   *found = numbers || cav_xml_get(node, "key");
   if (!*found) return CAV_OK;
   if (!numbers) return cav_problem_key(reader, node, q);
+  const cav_joint *one = term->dofs == CAV_DOFS_ONE ? &m->joint[term->joint] : NULL;
+  if (one && numbers->count == 1 && (one->type == CAV_JOINT_HINGE || one->type == CAV_JOINT_SLIDE)) {
+    memcpy(q, reader->problem->q_goal, (size_t)m->nq * sizeof *q);
+    cav_xml_reals(node, "qpos", q + one->q, 1);
+    return CAV_OK;
+  }
   if (numbers->count != m->nq) {
-    return cav_xml_fail(reader->error, node, "qpos", "expected %d numbers for the model '%s', got %d", m->nq, m->name,
-                        numbers->count);
+    return cav_xml_fail(reader->error, node, "qpos", "expected %d numbers for the model '%s'%s, got %d", m->nq, m->name,
+                        one ? ", or one for the joint" : "", numbers->count);
   }
   cav_xml_reals(node, "qpos", q, m->nq);
   cav_configuration_normalise(m, q);
@@ -208,9 +215,9 @@ static cav_status read_posture(const cav_problem_reader *reader, const cav_xml_n
   double *target;
   int nq = reader->model->nq;
   status = make_targets(reader, node, nq, term, &target);
-  if (!status && own) return posture_of(reader, node, target, &found);
+  if (!status && own) return posture_of(reader, node, term, target, &found);
   for (int i = 0; waypoint && !status; i++, waypoint = cav_xml_next(waypoint)) {
-    status = posture_of(reader, waypoint, target + i * nq, &found);
+    status = posture_of(reader, waypoint, term, target + i * nq, &found);
     if (!status && !found) status = cav_xml_fail(reader->error, waypoint, "key", "is missing; give 'key' or 'qpos'");
   }
   return status;

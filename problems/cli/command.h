@@ -56,6 +56,9 @@ int cav_command_refuse(const cav_command_line *line, const cav_problem *problem)
 /// Prints a topic of cavort help; 0 if there is none of that name. topics.c.
 int cav_topic_print(const char *name);
 
+/// The topic whose name is nearest to a word, NULL: none is near.
+const char *cav_topic_nearest(const char *word);
+
 /// Prints the list of topics.
 void cav_topics_print(void);
 

@@ -66,13 +66,16 @@ static int observe(void *context, const cav_progress *progress) {
   return interrupted;
 }
 
-// folder of the result: as asked, or NAME.result; NULL if memory runs out
+// folder of the result: as asked, or NAME.result: after the problem, or, where it has no name, after its file
 static char *folder_of(const cav_command_line *line, const cav_problem *problem) {
   if (line->output) return strdup(line->output);
-  const char *name = problem->name[0] ? problem->name : "motion";
-  char *folder = malloc(strlen(name) + 8);
+  const char *slash = strrchr(line->operand, '/'), *name = problem->name;
+  if (!*name) name = slash ? slash + 1 : line->operand;
+  size_t length = strlen(name);
+  if (!*problem->name && length > 4 && !strcmp(name + length - 4, ".xml")) length -= 4;
+  char *folder = malloc(length + 8);
   if (!folder) return NULL;
-  sprintf(folder, "%s.result", name);
+  sprintf(folder, "%.*s.result", (int)length, name);
   // a name is no path
   for (char *c = folder; *c; c++) {
     if (*c == '/') *c = '-';

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "command.h"
+#include "xml.h"
 
 enum option {
   OPTION_MODEL = 1,
@@ -28,7 +29,8 @@ static const struct {
   const char *name, *brief, *value, *text;
 } options[] = {
     {OPTION_MODEL, "--model", NULL, "FILE", "use this model instead of the one that the problem names"},
-    {OPTION_OUTPUT, "--output", "-o", "DIR", "folder of the result (default: NAME.result)"},
+    {OPTION_OUTPUT, "--output", "-o", "DIR",
+     "folder of the result (default: NAME.result, NAME of the problem or else of its file)"},
     {OPTION_SOLVER, "--solver", NULL, "WORD", "how to solve"},
     {OPTION_IPOPT, "--ipopt", NULL, "NAME=VALUE",
      "an option of Ipopt, laid over the problem's; may be given several times"},
@@ -108,11 +110,19 @@ static const command *find_command(const char *name) {
   return NULL;
 }
 
+// "; did you mean 'solve'?" on the way to the end of a complaint
+static void suggest(const char *near) {
+  if (near) fprintf(stderr, "; did you mean '%s'?", near);
+}
+
 static int help(const cav_command_line *line) {
   const command *c = line->operand ? find_command(line->operand) : NULL;
   if (line->operand && !c && cav_topic_print(line->operand)) return 0;
   if (line->operand && !c) {
-    fprintf(stderr, "cavort: there is no command or topic '%s'; see cavort help\n", line->operand);
+    const char *near = cav_xml_nearest(line->operand, &commands->name, NCOMMAND, sizeof *commands);
+    fprintf(stderr, "cavort: there is no command or topic '%s'", line->operand);
+    suggest(near ? near : cav_topic_nearest(line->operand));
+    fprintf(stderr, "; see cavort help\n");
     return CAV_EXIT_BAD_INPUT;
   }
   if (c) {
@@ -248,9 +258,13 @@ static int read_line(const command *c, int argc, char **argv, cav_command_line *
       const char *now = option_renamed(argv[i]);
       if (now)
         fprintf(stderr, "cavort %s: %.*s is called %s now\n", c->name, (int)strcspn(argv[i], "="), argv[i], now);
-      else
-        fprintf(stderr, "cavort %s: %s is not an option of this command; see cavort help %s\n", c->name, argv[i],
-                c->name);
+      else {
+        char name[64];
+        snprintf(name, sizeof name, "%.*s", (int)strcspn(argv[i], "="), argv[i]);
+        fprintf(stderr, "cavort %s: %s is not an option of this command", c->name, argv[i]);
+        suggest(cav_xml_nearest(name, &options->name, NOPTION, sizeof *options));
+        fprintf(stderr, "; see cavort help %s\n", c->name);
+      }
       return 0;
     }
     if (options[k].value && !value && (i + 1 == argc || !*(value = argv[++i]))) {
@@ -282,7 +296,9 @@ int main(int argc, char **argv) {
   }
   const command *c = find_command(name);
   if (!c) {
-    fprintf(stderr, "cavort: there is no command '%s'; see cavort help\n", name);
+    fprintf(stderr, "cavort: there is no command '%s'", name);
+    suggest(cav_xml_nearest(name, &commands->name, NCOMMAND, sizeof *commands));
+    fprintf(stderr, "; see cavort help\n");
     return CAV_EXIT_BAD_INPUT;
   }
   for (int i = 2; i < argc; i++) {

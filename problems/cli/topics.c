@@ -152,6 +152,8 @@ int cav_topic_print(const char *name) {
   return 0;
 }
 
+const char *cav_topic_nearest(const char *word) { return cav_xml_nearest(word, &topics->name, NTOPIC, sizeof *topics); }
+
 void cav_topics_print(void) {
   printf("topics of cavort help\n");
   for (int i = 0; i < NTOPIC; i++) printf("  %-18s %s\n", topics[i].name, topics[i].text);
