@@ -83,6 +83,12 @@ run 2 verify a.result --threads 2
 says err "not an option"
 run 2 verify nowhere
 run 2 view nowhere
+run 2 solv
+says err "did you mean 'solve'"
+run 2 help sensor
+says err "did you mean 'sensors'"
+run 2 solve a.xml --thread 2
+says err "did you mean '--threads'"
 
 # --- input that is wrong ---
 
@@ -112,6 +118,13 @@ check "nothing was written" [ ! -e swing.result ]
 run 0 inspect problem.xml
 says out "pendulum"
 run 0 inspect model.xml
+run 0 view problem.xml
+says out "start: inside nothing"
+says out "goal:  inside nothing"
+has problem.view.html
+sed 's/ name="swing"//' problem.xml >nameless.xml
+run 0 solve nameless.xml --quiet
+has nameless.result/verdict.json
 
 # --- solving ---
 

@@ -156,6 +156,9 @@ CAV_API cav_status cav_solve(const cav_problem *problem, const cav_solve_options
                              cav_solution **solution, cav_error *error);
 CAV_API void cav_solution_free(cav_solution *solution);
 
+/// The trajectory that a solve starts from: the problem's guess, without forces. NULL with the reason in error.
+CAV_API cav_trajectory *cav_problem_guess(const cav_problem *problem, cav_error *error);
+
 enum { CAV_STRATEGIES = 8, CAV_STRATEGY_SWINGS = 4 };
 
 /// A way to a motion: the guess and the schedule that a solve starts from.
@@ -284,10 +287,11 @@ typedef struct cav_reason {
   double violation; ///< scaled, 0 if within what is allowed
   double pull;      ///< of row
   double fraction;  ///< of all pulls, over all its knots
-  double saving; ///< where all holds: what the cost falls by if its bound gives way by one at all its knots, to first order, in
-                 ///< the unit of the problem (effort: the whole limit); of an equality if its target moves by one
-  char what[320];   ///< what, of which body, how far, in words
-  char cure[400];   ///< what usually helps
+  double
+      saving; ///< where all holds: what the cost falls by if its bound gives way by one at all its knots, to first order, in
+              ///< the unit of the problem (effort: the whole limit); of an equality if its target moves by one
+  char what[320]; ///< what, of which body, how far, in words
+  char cure[400]; ///< what usually helps
 } cav_reason;
 
 enum { CAV_REASONS = 10 };

@@ -102,11 +102,14 @@ static void examine_posture(cav_examination *e, const cav_state *state, const ch
     if (!deepest || state->contact[i].dist < deepest->dist) deepest = &state->contact[i];
   if (!deepest || -deepest->dist <= CAV_TOLERANCE_PENETRATION) return;
   const cav_pair *pair = &m->pair[deepest->pair];
+  // what stands is named last
+  int stands = m->geom[pair->geom2].link == 0 ? pair->geom2 : pair->geom1;
+  int moves = stands == pair->geom1 ? pair->geom2 : pair->geom1;
   cav_impossible(e, CAV_CONDITION_SOLID, NULL,
                  "Change the posture; height='floor' lifts it onto a floor, cavort inspect shows its depths.",
                  "%s: geom '%.48s' is %.3g mm inside '%.48s', and a certificate allows %g", which,
-                 cav_name_or(m->geom[pair->geom2].name, "geom", pair->geom2, one), -1e3 * deepest->dist,
-                 cav_name_or(m->geom[pair->geom1].name, "geom", pair->geom1, other), 1e3 * CAV_TOLERANCE_PENETRATION);
+                 cav_name_or(m->geom[moves].name, "geom", moves, one), -1e3 * deepest->dist,
+                 cav_name_or(m->geom[stands].name, "geom", stands, other), 1e3 * CAV_TOLERANCE_PENETRATION);
 }
 
 cav_status cav_examine_solids(cav_examination *e) {

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "continuation.h"
+#include "file.h"
 
 /// How far a guess is moved off its symmetries, rad or m, by a fixed sequence; golden section.
 static const double nudge = 1e-6, golden = 0.6180339887498949;
@@ -96,6 +97,25 @@ void cav_guess_fill(const cav_problem *problem, const double *end, cav_trajector
   }
   memcpy(at->v, problem->v_start, (size_t)m->nv * sizeof(double));
   cav_trajectory_velocities(m, at);
+}
+
+cav_trajectory *cav_problem_guess(const cav_problem *problem, cav_error *error) {
+  int nknot = (int)lround(problem->duration / problem->timestep) + 1, cycle = problem->cycle.on;
+  cav_periodicity *periodicity = cycle ? cav_periodicity_new(problem, error) : NULL;
+  if (cycle && !periodicity) return NULL;
+  cav_trajectory *at = cav_trajectory_new(problem->model, nknot, problem->timestep);
+  double *end = malloc((size_t)problem->model->nq * sizeof *end);
+  if (at && end) {
+    if (cycle) cav_periodicity_configuration(periodicity, 1, problem->q_start, end);
+    cav_guess_fill(problem, cycle ? end : problem->q_goal, at);
+  } else {
+    cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for the guess");
+    cav_trajectory_free(at);
+    at = NULL;
+  }
+  free(end);
+  cav_periodicity_free(periodicity);
+  return at;
 }
 
 cav_status cav_guess_take(cav_solve_run *run) {

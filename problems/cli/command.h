@@ -42,6 +42,9 @@ int cav_command_study(const cav_command_line *line);
 int cav_command_verify(const cav_command_line *line);
 int cav_command_view(const cav_command_line *line);
 
+/// cavort view of a problem file. preview.c.
+int cav_command_preview(const cav_command_line *line);
+
 /// Prints "cavort: text" on standard error; returns the exit status that goes with the error's status.
 int cav_command_fail(const cav_error *error);
 

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "certificate.h"
 #include "command.h"
@@ -40,6 +41,9 @@ int cav_command_verify(const cav_command_line *line) {
 
 int cav_command_view(const cav_command_line *line) {
   cav_error error = {0};
+  struct stat info;
+  // a file is a problem
+  if (!stat(line->operand, &info) && S_ISREG(info.st_mode)) return cav_command_preview(line);
   cav_verdict verdict;
   cav_result *result = cav_result_read(line->operand, line->model, &error);
   if (!result) return cav_command_fail(&error);

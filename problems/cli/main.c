@@ -70,8 +70,11 @@ static const command commands[] = {
      OPTION_MODEL | OPTION_QUIET | OPTION_JSON},
     {"explain", "DIR", "say why the motion of a result folder is as it is: what it misses, and which constraints pull",
      cav_command_explain, OPTION_MODEL | OPTION_ALL | OPTION_JSON},
-    {"view", "DIR", "write the page of a result folder anew and say where it is", cav_command_view,
-     OPTION_MODEL | OPTION_QUIET},
+    {"view", "DIR|PROBLEM",
+     "write the page of a result folder anew and say where it is; of a problem file, before anything is solved: a page "
+     "of\n"
+     "  the guess from start to goal, and how deep start, guess and goal are in what",
+     cav_command_view, OPTION_MODEL | OPTION_QUIET},
     {"study", "[MOTION...]",
      "solve motions from ten perturbed starts each, in N processes, and count: problem files, or all of "
      "problems/motions;\n"

@@ -1,0 +1,116 @@
+/// cavort view PROBLEM: what a solve would start from, before anything is solved: start, guess and goal, how deep each is in
+/// what, a proof that the problem cannot be solved if there is one, and a page that plays the guess and ends with the goal.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "command.h"
+#include "file.h"
+#include "view.h"
+
+/// The deepest contact of some postures.
+typedef struct penetration {
+  double depth; ///< m, 0: none
+  int knot, pair;
+} penetration;
+
+static cav_status note_depth(const cav_model *m, cav_state *state, const double *q, int knot, penetration *p) {
+  cav_status status = cav_position(m, state, q);
+  for (int i = 0; i < state->ncontact && !status; i++)
+    if (-state->contact[i].dist > p->depth) *p = (penetration){-state->contact[i].dist, knot, state->contact[i].pair};
+  return status;
+}
+
+static const char *geom_name(const cav_model *m, int geom, char buffer[32]) {
+  if (*m->geom[geom].name) return m->geom[geom].name;
+  snprintf(buffer, 32, "geom %d", geom);
+  return buffer;
+}
+
+// "2.1 mm: 'a' in 'b'"
+static void tell(const cav_model *m, const penetration *p, double timestep, int when, char *out, size_t size) {
+  char a[32], b[32], time[40] = "";
+  if (p->depth < 1e-6) {
+    snprintf(out, size, "inside nothing");
+    return;
+  }
+  if (when) snprintf(time, sizeof time, " at %.4g s", p->knot * timestep);
+  // what stands is named last
+  const cav_pair *pair = &m->pair[p->pair];
+  int stands = m->geom[pair->geom2].link == 0 ? pair->geom2 : pair->geom1;
+  int moves = stands == pair->geom1 ? pair->geom2 : pair->geom1;
+  snprintf(out, size, "deepest %.3g mm%s: '%.60s' in '%.60s'", 1e3 * p->depth, time, geom_name(m, moves, a),
+           geom_name(m, stands, b));
+}
+
+// FILE.view.html, in the folder of the command
+static char *page_path(const char *operand) {
+  const char *slash = strrchr(operand, '/'), *name = slash ? slash + 1 : operand;
+  size_t length = strlen(name);
+  if (length > 4 && !strcmp(name + length - 4, ".xml")) length -= 4;
+  char *path = malloc(length + 11);
+  if (path) sprintf(path, "%.*s.view.html", (int)length, name);
+  return path;
+}
+
+static cav_status write_page(const char *path, const cav_problem *p, const cav_trajectory *guess, char text[3][200],
+                             const cav_impossibility *cause, cav_error *error) {
+  const cav_model *m = p->model;
+  size_t size = (size_t)guess->nknot * (size_t)m->nq, nq = (size_t)m->nq;
+  double *q = malloc((size + nq) * sizeof *q);
+  if (!q) return cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for the page");
+  memcpy(q, guess->q, size * sizeof *q);
+  memcpy(q + size, p->q_goal, nq * sizeof *q);
+  const cav_view_line line[] = {{"before solving", "the guess; the last picture is the goal", -1},
+                                {"start", text[0], -1},
+                                {"guess", text[1], -1},
+                                {"goal", text[2], -1},
+                                {"impossible", cause ? cause->what : "", 0}};
+  char title[340];
+  snprintf(title, sizeof title, "%.140s on %.140s, before solving", p->name, m->name);
+  cav_view_input input = {.title = title,
+                          .nknot = guess->nknot + 1,
+                          .timestep = guess->timestep,
+                          .q = q,
+                          .nline = cause ? 5 : 4,
+                          .line = line};
+  cav_status status = cav_view_write(path, m, &input, error);
+  free(q);
+  return status;
+}
+
+int cav_command_preview(const cav_command_line *line) {
+  cav_error error = {0};
+  cav_problem *p = cav_problem_load(line->operand, line->model, &error);
+  if (!p) return cav_command_fail(&error);
+  penetration deepest[3] = {0};
+  char text[3][200];
+  cav_impossibility cause;
+  int proofs = 0;
+  cav_state *state = cav_state_new(p->model);
+  cav_trajectory *guess = cav_problem_guess(p, &error);
+  char *path = page_path(line->operand);
+  cav_status status = guess ? CAV_OK : error.status;
+  if (!status && !(state && path)) status = cav_file_fail(&error, CAV_NO_MEMORY, 0, "no memory for the page");
+  if (!status) status = note_depth(p->model, state, p->q_start, 0, &deepest[0]);
+  for (int t = 0; !status && t < guess->nknot; t++)
+    status = note_depth(p->model, state, guess->q + (size_t)t * (size_t)guess->nq, t, &deepest[1]);
+  if (!status) status = note_depth(p->model, state, p->q_goal, 0, &deepest[2]);
+  if (status && !*error.text) cav_file_fail(&error, status, 0, "a posture of the problem cannot be evaluated");
+  if (!status) status = cav_problem_impossible(p, &cause, 1, &proofs, &error);
+  for (int i = 0; i < 3 && !status; i++) tell(p->model, &deepest[i], p->timestep, i == 1, text[i], sizeof text[i]);
+  if (!status && !line->quiet) {
+    if (proofs) printf("impossible: %s\n  %s\n", cause.what, cause.cure);
+    printf("start: %s\nguess: %s\ngoal:  %s\n", text[0], text[1], text[2]);
+  }
+  if (!status) status = write_page(path, p, guess, text, proofs ? &cause : NULL, &error);
+  char *full = status ? NULL : realpath(path, NULL);
+  if (full && !line->quiet) printf("open in a browser: file://%s\n", full);
+  free(full);
+  free(path);
+  cav_trajectory_free(guess);
+  cav_state_free(state);
+  cav_problem_free(p);
+  return status ? cav_command_fail(&error) : 0;
+}
