@@ -276,6 +276,80 @@ static void test_multipliers(void) {
   }
 }
 
+/// A body of 1 kg that bounds of every kind hold.
+#define SWUNG(JOINT, MORE, ACTUATOR)                                                                     \
+  "<mujoco><option gravity='0 0 0'/><worldbody><body><joint name='x' type='slide' axis='1 0 0' " JOINT   \
+  "/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/></body></worldbody>" MORE "<actuator>" ACTUATOR \
+  "</actuator></mujoco>"
+
+// what a solver finds at its bounds is optimal by its multipliers, and not without them
+static void judge_bounds(const bench *b, const char *what) {
+  double cost;
+  cav_solution *s = solve(b);
+  if (!s) return;
+  double is = measure(&b->problem, s->trajectory, &s->contact, s->nrow, s->row, &cost);
+  double bare = measure(&b->problem, s->trajectory, &s->contact, 0, NULL, &cost);
+  printf("%-30s optimal to %.1e, without multipliers %.1e\n", what, is, bare);
+  CHECK(is < 1e-6 && bare > 1e-3);
+  CHECK_NEAR(cost, s->cost, 1e-12 * cost);
+  cav_solution_free(s);
+}
+
+static void test_bounds(void) {
+  static const struct {
+    const char *what, *model;
+    double margin, fraction;
+  } kind[] = {
+      {"range of a joint", SWUNG("limited='true' range='-1 .25'", "", "<motor joint='x'/>"), 0.05, 1},
+      {"range of a tendon",
+       SWUNG("", "<tendon><fixed limited='true' range='-1 .45'><joint joint='x' coef='2'/></fixed></tendon>",
+             "<motor joint='x'/>"),
+       0.05, 1},
+      {"motor behind a gear", SWUNG("", "", "<motor joint='x' gear='4' ctrllimited='true' ctrlrange='-1.1 1.1'/>"), 0,
+       0.5},
+      {"force of a servo", SWUNG("", "", "<position joint='x' kp='3' forcelimited='true' forcerange='-4.4 4.4'/>"), 0,
+       0.5},
+      {"control of a servo",
+       SWUNG("", "", "<position joint='x' kp='3' gear='2' ctrllimited='true' ctrlrange='-1.74 1.74'/>"), 0, 0.9},
+  };
+  for (size_t i = 0; i < sizeof kind / sizeof *kind; i++) {
+    bench b;
+    if (!make(&b, kind[i].model, 1.5, 30)) return;
+    b.problem.limit_margin = kind[i].margin;
+    b.problem.effort_limit = kind[i].fraction;
+    // ranges: thrown and back; actuators: from rest to rest
+    b.v_start[0] = kind[i].margin > 0;
+    end_at(&b, kind[i].margin == 0, 0);
+    b.v_end[0] = -b.v_start[0];
+    judge_bounds(&b, kind[i].what);
+    cav_model_free(b.model);
+  }
+}
+
+// half a stride of two bodies, of which one may not go as far as the other: so neither may
+static void test_counterparts(void) {
+  static const char pair[] =
+      "<mujoco><option gravity='0 0 0'/><worldbody>"
+      "<body pos='0 1 0'><joint name='left' type='slide' axis='1 0 0' stiffness='4' limited='true' range='-.5 .5'/>"
+      "<inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/></body>"
+      "<body pos='0 -1 0'><joint name='right' type='slide' axis='1 0 0' stiffness='4' limited='true' range='-.2 .3'/>"
+      "<inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/></body></worldbody>"
+      "<actuator><motor joint='left'/><motor joint='right'/></actuator></mujoco>";
+  bench b;
+  if (!make(&b, pair, 1.25, 20)) return;
+  b.problem.cycle = (cav_cycle){.on = 1, .mirror = CAV_MIRROR_Y};
+  cav_term *track = add(&b, CAV_USE_COST, CAV_QUANTITY_VELOCITY);
+  for (int t = 0; t <= 20; t++) {
+    b.times[t] = 1.25 * t / 20;
+    b.table[2 * t] = cos(M_PI * (t - .5) / 20);
+    b.table[2 * t + 1] = -b.table[2 * t];
+  }
+  track->weight = 5;
+  track->target = b.table, track->waypoint_time = b.times, track->nwaypoint = 21;
+  judge_bounds(&b, "range of a counterpart");
+  cav_model_free(b.model);
+}
+
 // no multipliers make a motion look better than it is
 static void test_lies(void) {
   bench b;
@@ -353,6 +427,8 @@ int main(void) {
   test_other_cost();
   test_other_duration();
   test_multipliers();
+  test_bounds();
+  test_counterparts();
   test_lies();
   test_dishonest();
   test_edges();

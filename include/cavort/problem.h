@@ -19,7 +19,7 @@ extern "C" {
   X(CONFIGURATION, posture, POSTURE, POSITION, 1, "rad or m", "posture", "q (-) target, tangent, of the selected dofs") \
   X(VELOCITY, velocity, RATE, VELOCITY, 1, "rad/s or m/s", "velocity", "v_t of the selected dofs")                 \
   X(ACCELERATION, acceleration, RATE, ACCELERATION, 1, "rad/s^2 or m/s^2", "acceleration", "(v_{t+1} - v_t)/h of the selected dofs") \
-  X(EFFORT, effort, ACTUATORS, ACCELERATION, 0, "of limits", "effort of actuators", "force of every actuator over its limit (force itself where there is none)") \
+  X(EFFORT, effort, ACTUATORS, ACCELERATION, 0, "of limits", "effort of actuators", "force of every actuator over its limit, of a servo over what the limit of its control gives (force itself where there is none)") \
   X(POWER, power, ACTUATORS, ACCELERATION, 0, "m/s", "power of actuators", "power of every actuator over the weight, at its mean velocity of the step; norm=\"absolute\" with a small scale: the cost of transport") \
   X(GAP, gap, CONTACTS, ACCELERATION, 0, "m", "gap of loaded contacts", "sqrt(f_n/weight) * max(gap, 0) of every contact: force only where there is touch") \
   X(SLIP, slip, CONTACTS, ACCELERATION, 0, "m/s", "slip of loaded contacts", "sqrt(f_n/weight) * tangential velocity of every contact") \

@@ -85,6 +85,15 @@ void cav_verification_effort(const cav_verification *verification, int t, int ac
                   suffix);
 }
 
+double cav_verification_effort_scale(const cav_model *model, int actuator) {
+  const cav_actuator *a = model->actuator + actuator;
+  double range[2], scale;
+  cav_verification_actuator_range(model, actuator, range, &scale);
+  if (a->bias == CAV_BIAS_NONE || !input_range(a, range)) return scale;
+  double most = fmax(fabs(range[0]), fabs(range[1]));
+  return most > 0 ? fabs(a->gain_parameter[0]) * most / a->unit : 1;
+}
+
 double cav_verification_effort_row(const cav_verification *verification, int actuator, double effort, const double *v,
                                    double *moment, double range[2]) {
   const cav_actuator *a = verification->model->actuator + actuator;

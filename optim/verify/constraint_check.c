@@ -158,11 +158,8 @@ static int velocity_values(const cav_verification *verification, const cav_term 
 
 static int effort_values(const cav_verification *verification, const cav_term *term, int t, double *x, double *target) {
   const cav_model *model = verification->model;
-  for (int a = 0; a < model->nu; a++) {
-    double range[2], scale;
-    cav_verification_actuator_range(model, a, range, &scale);
-    x[a] = verification->control[t * model->nu + a] / scale;
-  }
+  for (int a = 0; a < model->nu; a++)
+    x[a] = verification->control[t * model->nu + a] / cav_verification_effort_scale(model, a);
   target_at(term, when(verification, t), model->nu, target);
   return model->nu;
 }

@@ -283,6 +283,10 @@ cav_status cav_verify_optimality(const cav_problem *problem, const cav_trajector
   int last = status == CAV_OK ? verification.last : 0, *first = calloc((size_t)last + 2, sizeof *first);
   cav_binding *sorted = malloc(((size_t)nrow + 1) * sizeof *sorted);
   if (status == CAV_OK && (!first || !sorted)) status = CAV_NO_MEMORY;
+  if (status == CAV_OK && verification.image && last < 3) {
+    status = CAV_BAD_INPUT;
+    if (error) snprintf(error->text, sizeof error->text, "a cycle needs at least three steps");
+  }
   if (status == CAV_OK && cav_verdict_feasible(verdict)) {
     if (nrow) memcpy(sorted, row, (size_t)nrow * sizeof *sorted);
     qsort(sorted, (size_t)nrow, sizeof *sorted, by_knot);
@@ -292,8 +296,8 @@ cav_status cav_verify_optimality(const cav_problem *problem, const cav_trajector
     }
     status = measure(&verification, first, sorted, verdict->cost, &verdict->optimality);
   }
+  if (status != CAV_OK && error) error->status = status;
   if (status != CAV_OK && error && !*error->text) {
-    error->status = status;
     snprintf(error->text, sizeof error->text, "optimality: %s", cav_status_name(status));
   }
   free(first), free(sorted);

@@ -59,6 +59,10 @@ cav_status cav_verification_actuators(const cav_model *model, cav_error *error);
 void cav_verification_effort(const cav_verification *verification, int t, int actuator, double effort, const double *v,
                              double *moment, const char *suffix, cav_metric *metric);
 
+/// Effort that costs count as one: the limit, of a servo whose control is limited what that gives, 1 where there is
+/// none. actuator_check.c.
+double cav_verification_effort_scale(const cav_model *model, int actuator);
+
 /// What is bounded of an actuator in planning, over the size of its limits, and these with the problem's headroom: its
 /// effort, or the control of a servo whose control is limited. actuator_check.c.
 double cav_verification_effort_row(const cav_verification *verification, int actuator, double effort, const double *v,
