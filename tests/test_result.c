@@ -260,6 +260,7 @@ int main(void) {
   free(solution.gain_v);
   free(solution.progress);
   free(solution.stage);
+  free(solution.row);
   cav_problem_free(problem);
   remove_all();
   return check_result();
