@@ -351,6 +351,16 @@ static cav_status move_alone(const cav_idle *idle, const cav_options *law, cav_t
   return status;
 }
 
+/// Whether the idle trees end at rest, where the motion closes so: within the speed that a ten millionth of their
+/// weight gives in a step.
+static int ends_well(const cav_idle *idle, const cav_options *law) {
+  const cav_trajectory *at = idle->alone;
+  const double *v = at->v + (size_t)(at->nknot - 1) * (size_t)at->nv;
+  double fastest = 0;
+  for (int d = 0; d < at->nv; d++) fastest = fmax(fastest, fabs(v[d]));
+  return !idle->whole->close_at_rest || fastest <= 1e-6 * law->timestep;
+}
+
 /// Law of the last stage at the problem's step.
 static cav_options last_law(const cav_problem *p) {
   cav_options law = p->model->options;
@@ -378,6 +388,7 @@ static cav_status split_apart(marks *a, char *here, box *room, extent *space, ca
     idle->alone = cav_trajectory_new(idle->idle.model, nknot, a->problem->timestep);
     if (!guess || !idle->alone) status = CAV_NO_MEMORY;
     if (status == CAV_OK) status = move_alone(idle, &law, idle->alone);
+    if (status == CAV_OK && !ends_well(idle, &law)) status = CAV_NOT_CONVERGED;
     for (int l = 0; l < m->nlink; l++) space->box[l] = nowhere, space->size[l] = 0;
     if (status == CAV_OK) {
       cav_guess_fill(&idle->problem, idle->problem.q_goal, guess);
@@ -385,7 +396,7 @@ static cav_status split_apart(marks *a, char *here, box *room, extent *space, ca
     }
     if (status == CAV_OK) status = find_space(m, &idle->idle, idle->alone, room, space);
     cav_trajectory_free(guess);
-    // what cannot be moved by itself is planned with the rest
+    // what cannot be moved by itself, or not as asked, is planned with the rest
     if (status != CAV_OK && status != CAV_NO_MEMORY) {
       keep_all(a);
       continue;
