@@ -60,9 +60,9 @@ static inline void take(box *b, const double centre[3], double radius) {
 }
 
 static inline int meet(const box *a, const box *b) {
-  int apart = 0;
-  for (int k = 0; k < 3; k++) apart |= (a->low[k] > b->high[k]) | (b->low[k] > a->high[k]);
-  return !apart;
+  for (int k = 0; k < 3; k++)
+    if (a->low[k] > b->high[k] || b->low[k] > a->high[k]) return 0;
+  return 1;
 }
 
 /// Grows a box by a length and by what rounding can take.
@@ -167,8 +167,13 @@ int cav_fixed_pays(const cav_fixed *f) { return f->pruned >= WORTH; }
 static inline void surround(const cav_fixed *f, const double (*centre)[3], int t, double margin) {
   box b;
   empty(&b);
-  for (const int *ball = f->moving + f->first[t], *end = f->moving + f->first[t + 1]; ball < end; ball++)
-    take(&b, centre[*ball], 0);
+  for (const int *ball = f->moving + f->first[t], *end = f->moving + f->first[t + 1]; ball < end; ball++) {
+    const double *at = centre[*ball];
+    for (int k = 0; k < 3; k++) {
+      b.low[k] = at[k] < b.low[k] ? at[k] : b.low[k];
+      b.high[k] = at[k] > b.high[k] ? at[k] : b.high[k];
+    }
+  }
   grow(&b, f->reach[t] + margin);
   f->about[t] = b;
 }
