@@ -7,10 +7,13 @@
 /// for it is taken to be less than a kilometre up.
 #include <math.h>
 
+#include "cavort/solve.h"
 #include "feasibility.h"
 #include "math3.h"
 
 static const double highest = 1000; // m: of any motion
+// of the tolerance of momentum, of g t^2: what a force of that root mean square can shift, 1/sqrt(3), and a little more
+static const double unexplained = 0.6;
 
 /// A tree as it stands outside of itself.
 typedef struct surroundings {
@@ -98,7 +101,8 @@ static void examine_one(cav_examination *e, const cav_requirement *r) {
   if (r->kind == CAV_REQUIRE_CENTRE && m->link[s.root].body != r->object) return;
   double rise = fmin(r->high[2] + wide - centre[2], highest);
   double fall = -m->gravity[2] * t * t / 2 + rise - velocity[2] * t;
-  double push = s.friction > 0 ? s.friction * fmax(fall, 0) : 0, defect = 0.05 * t * t;
+  double push = s.friction > 0 ? s.friction * fmax(fall, 0) : 0,
+         defect = unexplained * CAV_TOLERANCE_MOMENTUM * -m->gravity[2] * t * t;
   for (int k = 0; k < 2; k++) {
     double middle = centre[k] + velocity[k] * t, way = push + wide + defect + 1e-3;
     // a duration that is free gives any time up to the longest
