@@ -1,5 +1,6 @@
 /// optim/feasibility: impossible problems, each proven so with its cause, and a twin of each just inside the limit that is
-/// not refused, is solved and certified; no proof against any motion of problems/motions, nor against problems whose optimum is known.
+/// not refused, is solved and certified; no proof against any motion of problems/motions, nor against what simulations
+/// under full effort come to.
 #include <dirent.h>
 #include <time.h>
 #include <unistd.h>

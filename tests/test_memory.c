@@ -453,6 +453,24 @@ static cav_status try_solve(void *context, double *result) {
   return status;
 }
 
+static cav_status try_impossible(void *context, double *result) {
+  cav_error error = {0};
+  cav_impossibility found[4];
+  int n = 0;
+  cav_status status = cav_problem_impossible(context, found, 4, &n, &error);
+  if (status == CAV_OK) result[0] = n;
+  if (status != CAV_OK) CHECK(error.status == status && error.text[0]);
+  return status;
+}
+
+static cav_status try_guess(void *context, double *result) {
+  cav_error error = {0};
+  cav_trajectory *guess = cav_problem_guess(context, &error);
+  if (guess) result[0] = guess->nknot;
+  cav_trajectory_free(guess);
+  return guess ? CAV_OK : error.status;
+}
+
 static void test_problems(void) {
   if (!CHECK(mkdtemp(folder) != NULL)) return;
   snprintf(problem_path, sizeof problem_path, "%s/fall.xml", folder);
@@ -463,6 +481,8 @@ static void test_problems(void) {
   cav_problem *problem = cav_problem_load(problem_path, NULL, &error);
   if (CHECK(problem != NULL)) {
     fail_each("problem", try_problem, problem_path, 20000, 0);
+    fail_each("impossible", try_impossible, problem, 20000, 0);
+    fail_each("guess", try_guess, problem, 20000, 0);
     fail_each("solve", try_solve, problem, 20000, 0);
   } else {
     fprintf(stderr, "    %s\n", error.text);

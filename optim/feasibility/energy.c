@@ -101,10 +101,10 @@ static int is_covered(const cav_model *m) {
 }
 
 /// c of the model; negative where an actuator has no limit, or a joint of its no least inertia.
-static double supply_rate(cav_examination *e) {
+static cav_status supply_rate(cav_examination *e, double *rate) {
   const cav_model *m = e->model;
   double sum = 0, *moment = malloc((size_t)(2 * m->nv + 1) * sizeof *moment), *force = moment + m->nv;
-  if (!moment) return -1;
+  if (!moment) return CAV_NO_MEMORY;
   for (int d = 0; d < m->nv; d++) force[d] = 0;
   for (int i = 0; i < m->nu; i++) {
     double range[2];
@@ -118,7 +118,8 @@ static double supply_rate(cav_examination *e) {
   for (int d = 0; d < m->nv; d++)
     if (force[d] > 0) sum += force[d] / sqrt(2 * least_inertia(m, d));
   free(moment);
-  return isfinite(sum) ? sum : -1;
+  *rate = isfinite(sum) ? sum : -1;
+  return CAV_OK;
 }
 
 /// Lowest and highest of what can be the height of a point above the world, -INFINITY: not known.
@@ -166,7 +167,9 @@ static cav_status survey(cav_examination *e, supply *s) {
   const cav_model *m = e->model;
   int level = m->gravity[0] == 0 && m->gravity[1] == 0 && m->gravity[2] <= 0;
   double g = norm3(m->gravity);
-  s->rate = is_covered(m) ? margin * supply_rate(e) : -1;
+  cav_status status = supply_rate(e, &s->rate);
+  if (status) return status;
+  s->rate = is_covered(m) ? margin * s->rate : -1;
   s->gravity = g * sqrt(m->mass / 2);
   s->potential = potential_at(m, e->start);
   s->least = level ? least_potential(m) : -INFINITY;
