@@ -164,6 +164,10 @@ static void solve(const cav_problem *p) {
   cav_solution *s = NULL;
   cav_error error = {0};
   options.observer = stop;
+  cav_impossibility proof;
+  int proofs = 0;
+  cav_status examined = cav_problem_impossible(p, &proof, 1, &proofs, &error);
+  fuzz_require(examined ? error.text[0] : proofs == 0 || (proof.what[0] && proof.cure[0]));
   cav_status status = cav_solve(p, &options, NULL, &s, &error);
   fuzz_require(s || (status != CAV_OK && error.text[0]));
   if (!s) return;
