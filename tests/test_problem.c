@@ -294,6 +294,17 @@ static void check_scene(void) {
   CHECK(p->model->nbody == 5 && p->model->nq == 1 + 7 + 1 && cav_object_find(p->model, CAV_OBJECT_GEOM, "step") == 0);
   CHECK_NEAR_ALL(p->q_start + 1, start + 4, 7, 1e-15);
   cav_problem_free(p);
+
+  // its base freed, and still so once written and read back
+  p = load_as(
+      "<problem name='p' model='robot.urdf' floating='true'><horizon duration='1' timestep='.05'/><start/>" TAIL, NULL);
+  if (!p) return;
+  CHECK(p->floating && p->model->nq == 8);
+  CHECK(cav_problem_write(copy_path, p, NULL, &error) == CAV_OK);
+  q = cav_problem_load(copy_path, NULL, &error);
+  CHECK(q && q->floating && q->model->nq == 8);
+  cav_problem_free(q);
+  cav_problem_free(p);
 }
 
 static void check_trajectory_ends(void) {

@@ -36,7 +36,8 @@ static const char walker[] = WALKER("", "");
 
 /// The same with servos, whose limits of control move with their lengths and velocities.
 static const char served[] = WALKER("",
-                                    "<position joint='ankle' kp='3' gear='2' ctrllimited='true' ctrlrange='-.1 .2'/>"
+                                    "<position joint='ankle' kp='3' gear='2' ctrllimited='true' ctrlrange='-.1 .2'"
+                                    " forcelimited='true' forcerange='-.3 .2'/>"
                                     "<general tendon='string' gear='-1.5' gainprm='-4' biastype='affine' biasprm='.5 "
                                     "-3 -.7' dyntype='filter' dynprm='.1' "
                                     "ctrllimited='true' ctrlrange='-.3 .1'/>");
@@ -262,7 +263,8 @@ static void test_methods(cav_transcription *tr, cav_trajectory *at) {
   free(hessian);
 }
 
-/// Rows of servos are their controls over the limit: effort less what the actuator does without control, over its gain.
+/// Rows of servos are their controls over the limit: effort less what the actuator does without control, over its gain;
+/// those whose force is limited too have a row of that before.
 static void test_controls(const cav_transcription *tr, const cav_trajectory *at) {
   const cav_model *m = tr->model;
   cav_state *state = cav_state_new(m);
@@ -270,14 +272,18 @@ static void test_controls(const cav_transcription *tr, const cav_trajectory *at)
   for (int t = 1; t + 1 < tr->nknot; t++) {
     CHECK(cav_position(m, state, at->q + t * at->nq) == CAV_OK);
     cav_actuation(m, state, tr->knot[t].u, NULL, effort);
-    for (int a = 0; a < m->nu; a++) {
-      if (!cav_servo_bounds(m, a)) continue;
+    for (int k = 0; k < tr->nlimit; k++) {
+      int a = tr->limited[k];
       const cav_actuator *x = &m->actuator[a];
+      double value = tr->knot[t].slot[tr->knot[t].layout.effort + k].value;
+      if (k < m->nu && x->forcelimited)
+        CHECK_NEAR(value, effort[a] / fmax(fabs(x->forcerange[0]), fabs(x->forcerange[1])), 1e-9 * (1 + fabs(value)));
+      if (!cav_servo_bounds(m, a) || (k < m->nu && x->forcelimited)) continue;
       double length = cav_actuator_length(m, state, a, moment), velocity = 0;
       for (int d = 0; d < m->nv; d++) velocity += moment[d] * at->v[t * m->nv + d];
-      double control = (effort[a] - cav_actuator_force(m, a, length, velocity, 0)) / x->gain_parameter[0];
+      const double *p = x->bias_parameter;
+      double control = (effort[a] - p[0] - p[1] * length - p[2] * velocity) / x->gain_parameter[0];
       double limit = fmax(fabs(x->ctrlrange[0]), fabs(x->ctrlrange[1]));
-      double value = tr->knot[t].slot[tr->knot[t].layout.effort + a].value;
       CHECK_NEAR(value, control / limit, 1e-9 * (1 + fabs(value)));
     }
   }
@@ -560,7 +566,7 @@ static void test_refusals(void) {
       {"<muscle name='arm' joint='j'/>", "a muscle"},
       {"<motor joint='j' gear='3' ctrllimited='true' ctrlrange='-1 1'/>", NULL},
       {"<position joint='j' kp='3' ctrllimited='true' ctrlrange='-1 1'/>", NULL},
-      {"<position joint='j' ctrllimited='true' ctrlrange='-1 1' forcelimited='true' forcerange='-1 1'/>", "move"},
+      {"<position joint='j' ctrllimited='true' ctrlrange='-1 1' forcelimited='true' forcerange='-1 1'/>", NULL},
       {"<damper joint='j' kv='3' ctrllimited='true' ctrlrange='0 1'/>", "move"},
       {"<position joint='j' kp='3' forcelimited='true' forcerange='-1 1'/>", NULL}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {

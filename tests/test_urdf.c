@@ -111,6 +111,15 @@ static void test_options(void) {
     CHECK_NEAR(m->mass, 1, 0);
   }
   cav_model_free(m);
+  // only a URDF has no way to say it itself
+  char path[] = "/tmp/cavort-float-XXXXXX";
+  int file = mkstemp(path);
+  static const char mjcf[] = "<mujoco><worldbody/></mujoco>";
+  CHECK(file >= 0 && write(file, mjcf, sizeof mjcf - 1) > 0);
+  close(file);
+  m = cav_model_load_with(path, &(cav_load_options){.floating = 1}, &error);
+  CHECK(!m && strstr(error.text, "floating is for URDF files"));
+  unlink(path);
   // a floating base as such: nothing stands in the world, a step of the inverse without contacts is the weight
   m = load_with(robot, &(cav_load_options){.floating = 1}, &error);
   CHECK(m == NULL);

@@ -22,7 +22,11 @@ static cav_model *load(const char *path, const cav_load_options *options, const 
     return NULL;
   }
   cav_spec spec = {.xml = xml, .error = error, .load = *options, .scene = scene};
-  if (cav_xml_root(xml)->rule == &cav_urdf_root)
+  int urdf = cav_xml_root(xml)->rule == &cav_urdf_root;
+  if (options->floating && !urdf)
+    cav_spec_fail(&spec, cav_xml_root(xml), NULL,
+                  "floating is for URDF files, which have no other way to say it; give the body a <freejoint/>");
+  if (urdf)
     cav_urdf_read(&spec, xml);
   else
     cav_mjcf_read(&spec, xml);
@@ -41,9 +45,9 @@ cav_model *cav_model_load_with(const char *path, const cav_load_options *options
   return load(path, options, NULL, error);
 }
 
-cav_model *cav_model_load_scene(const char *path, const cav_xml_node *scene, cav_error *error) {
-  cav_load_options options = cav_load_options_default();
-  return load(path, &options, scene, error);
+cav_model *cav_model_load_scene(const char *path, const cav_load_options *options, const cav_xml_node *scene,
+                                cav_error *error) {
+  return load(path, options, scene, error);
 }
 
 void cav_model_free(cav_model *model) { free(model); }

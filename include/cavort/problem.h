@@ -213,6 +213,7 @@ typedef struct cav_problem {
   int solved;             ///< 1: read from a result folder, contact holds
   cav_options contact;    ///< the law that the recorded motion obeys, for verification; solving does not use it
   const char *model_path; ///< file the model was read from; NULL: made in C
+  int floating;           ///< 1: the root link of that file, a URDF, floats
   void *owner;            ///< memory of a problem read from a file
 } cav_problem;
 
@@ -229,6 +230,9 @@ CAV_API cav_problem *cav_problem_load(const char *path, const char *model_path, 
 
 /// Whether an option of Ipopt may be set and its value fits; CAV_BAD_INPUT with the reason in error (may be NULL).
 CAV_API cav_status cav_ipopt_option_check(const cav_ipopt_option *option, cav_error *error);
+
+/// Why motions cannot be planned with an actuator of a model; NULL: they can.
+CAV_API const char *cav_actuator_unplannable(const cav_model *model, int actuator);
 
 /// Frees a problem that cav_problem_load gave, and its model; NULL is fine.
 CAV_API void cav_problem_free(cav_problem *problem);

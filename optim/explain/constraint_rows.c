@@ -77,7 +77,8 @@ void cav_transcription_origin(const cav_transcription *tr, int t, int i, cav_bin
   if (i < at->effort) {
     b->kind = CAV_BINDING_UNACTUATED, b->object = main_dof(&tr->unactuated[i]), b->component = i;
   } else if (i < at->joint) {
-    b->kind = CAV_BINDING_EFFORT, b->object = i - at->effort;
+    b->kind = CAV_BINDING_EFFORT, b->object = tr->limited[i - at->effort];
+    b->component = i - at->effort >= tr->model->nu;
   } else if (i < at->tendon) {
     b->kind = CAV_BINDING_JOINT, b->object = limited_joint(tr->model, i - at->joint);
   } else if (i < at->term) {

@@ -147,7 +147,7 @@ const cav_xml_element cav_problem_element = {
     "problem",
     1,
     1,
-    ATTRIBUTES(TEXT("name", 0), TEXT("model", 0)),
+    ATTRIBUTES(TEXT("name", 0), TEXT("model", 0), FLAG("floating")),
     CHILDREN(&cav_scene_element, &horizon, &cycle, &start, &goal, &pose, &guess, &cost, &constraint, &limits, &schedule, &ipopt,
              &contact),
     0};

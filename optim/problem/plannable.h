@@ -9,8 +9,8 @@
 /// CAV_NOT_SUPPORTED with the actuator and why not.
 cav_status cav_actuators_plannable(const cav_model *model, cav_error *error);
 
-/// Whether the limits of a servo's control bound its effort by rows in u, q and v: fixed gain, affine bias, on a scalar
-/// joint or a fixed tendon, without limits of force. plannable.c.
+/// Whether the limits of a servo's control bound its effort by rows in u, q and v, beside those of its force if it has
+/// any: fixed gain, affine bias, on a scalar joint or a fixed tendon. plannable.c.
 int cav_servo_bounds(const cav_model *model, int actuator);
 
 #endif

@@ -386,7 +386,9 @@ static cav_status load_model(cav_problem_reader *reader, const char *model_path)
   if (!path) return cav_problem_no_memory(reader);
   cav_error inner = {0};
   const cav_xml_node *scene = cav_problem_child(reader->root, "scene");
-  reader->owner->model = cav_model_load_scene(path, scene, &inner);
+  cav_load_options options = cav_load_options_default();
+  options.floating = cav_xml_bool(reader->root, "floating", 0);
+  reader->owner->model = cav_model_load_scene(path, &options, scene, &inner);
   reader->problem->model_path = cav_problem_text(reader->owner, path);
   free(path);
   if (!reader->owner->model) {
@@ -412,6 +414,7 @@ static cav_status read_problem(cav_problem_reader *reader, const char *model_pat
     return cav_problem_no_memory(reader);
   reader->problem->owner = reader->owner;
   reader->problem->model_path = path;
+  reader->problem->floating = cav_xml_bool(reader->root, "floating", 0);
   reader->problem->name = cav_problem_text(reader->owner, cav_xml_text(reader->root, "name", ""));
   if (!reader->problem->name) return cav_problem_no_memory(reader);
   status = read_horizon(reader);

@@ -284,6 +284,7 @@ static void write_head(FILE *out, const cav_problem *p, const char *model_path) 
   fputs("<problem", out);
   write_text(out, "name", p->name && *p->name ? p->name : "motion");
   write_text(out, "model", model_path);
+  if (p->floating) write_text(out, "floating", "true");
   fputs(">\n", out);
   if (p->scene) fprintf(out, "  <scene>\n%s  </scene>\n", p->scene);
   fputs("  <horizon", out);

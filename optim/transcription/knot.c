@@ -98,7 +98,7 @@ static row_count constraint_rows(const cav_transcription *tr, int t) {
   row_count n = {.rows = (size_t)tr->knot[t].layout.count};
   if (tr->knot[t].has_force) {
     for (int k = 0; k < tr->nresidual; k++) n.dense += (size_t)stands_alone(&tr->unactuated[k]);
-    for (int k = 0; k < tr->model->nu; k++) n.dense += tr->servo[k].n > 0 || stands_alone(&tr->effort[k]);
+    for (int k = 0; k < tr->nlimit; k++) n.dense += tr->servo[k].n > 0 || stands_alone(&tr->effort[k]);
   }
   for (int i = 0; i < tr->problem->nterm; i++) {
     const cav_term *term = &tr->problem->term[i];
@@ -618,7 +618,7 @@ static void add_force_slots(cav_sum *a, const double *q, const double *v) {
   }
   assert(i == a->knot->layout.effort);
   rho = tr->options.timestep * tr->penalty.effort;
-  for (int k = 0; k < tr->model->nu; k++) {
+  for (int k = 0; k < tr->nlimit; k++) {
     const double *range = tr->effort_range[k];
     const cav_servo *servo = &tr->servo[k];
     double value = form_value(&tr->effort[k], a->knot->u);

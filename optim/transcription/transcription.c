@@ -62,6 +62,23 @@ static int force_row_set(cav_force_row *row, int nv, const double *dense, double
   return 1;
 }
 
+/// Row k of effort from the dense form of its actuator's [nv], with its range. Margins of control lie at both ends, those
+/// of effort at 0.
+static int limit_row_set(cav_transcription *tr, int k, const double *effort) {
+  const cav_model *m = tr->model;
+  int a = tr->limited[k], servo = cav_servo_bounds(m, a) && (k >= m->nu || !m->actuator[a].forcelimited);
+  double range[2], per_effort = 1, part = tr->problem->effort_limit;
+  cav_actuator_effort_range(m, a, range);
+  if (servo && !cav_servo_set(m, a, &tr->servo[k], &per_effort, range)) return 0;
+  double lower = range[0], upper = range[1], middle = servo ? (lower + upper) / 2 : 0;
+  double limit = fmax(isfinite(lower) ? fabs(lower) : 0, isfinite(upper) ? fabs(upper) : 0);
+  double scale = limit > 0 ? 1 / limit : 1;
+  tr->effort_range[k][0] = scale * (middle + (lower - middle) * part);
+  tr->effort_range[k][1] = scale * (middle + (upper - middle) * part);
+  tr->effort_unit[k] = m->actuator[a].unit / (per_effort * scale);
+  return force_row_set(&tr->effort[k], m->nv, effort, per_effort * scale);
+}
+
 /// Linear forms of u: an orthonormal basis of what actuators cannot give, and the least-norm actuator efforts.
 static int list_force_rows(cav_transcription *tr) {
   const cav_model *m = tr->model;
@@ -70,12 +87,13 @@ static int list_force_rows(cav_transcription *tr) {
   double *residual = malloc((size_t)nv * sizeof(double)), *control = calloc((size_t)nv * (nu + 1), sizeof(double));
   double *effort = malloc((size_t)nv * sizeof(double));
   tr->unactuated = calloc((size_t)nv, sizeof *tr->unactuated);
-  tr->effort = calloc((size_t)nu + 1, sizeof *tr->effort);
-  tr->effort_range = malloc((size_t)(nu + 1) * sizeof *tr->effort_range);
-  tr->effort_unit = malloc((size_t)(nu + 1) * sizeof *tr->effort_unit);
-  tr->servo = calloc((size_t)nu + 1, sizeof *tr->servo);
+  tr->effort = calloc(2 * (size_t)nu + 1, sizeof *tr->effort);
+  tr->limited = malloc((size_t)(2 * nu + 1) * sizeof *tr->limited);
+  tr->effort_range = malloc((size_t)(2 * nu + 1) * sizeof *tr->effort_range);
+  tr->effort_unit = malloc((size_t)(2 * nu + 1) * sizeof *tr->effort_unit);
+  tr->servo = calloc(2 * (size_t)nu + 1, sizeof *tr->servo);
   if (!unit || !basis || !residual || !control || !effort || !tr->unactuated || !tr->effort || !tr->effort_range ||
-      !tr->effort_unit || !tr->servo)
+      !tr->effort_unit || !tr->servo || !tr->limited)
     goto end;
 
   // project unit forces; orthonormalise what is left, twice for rounding
@@ -100,19 +118,14 @@ static int list_force_rows(cav_transcription *tr) {
     if (!force_row_set(&tr->unactuated[tr->nresidual++], nv, direction, 1 / unit_force)) goto end;
   }
 
-  // efforts: control over its limit, or plain force where there is none
-  for (int a = 0; a < nu; a++) {
-    double range[2], per_effort = 1;
-    cav_actuator_effort_range(m, a, range);
-    if (cav_servo_bounds(m, a) && !cav_servo_set(m, a, &tr->servo[a], &per_effort, range)) goto end;
-    double lower = range[0], upper = range[1];
-    double limit = fmax(isfinite(lower) ? fabs(lower) : 0, isfinite(upper) ? fabs(upper) : 0);
-    double scale = limit > 0 ? 1 / limit : 1;
-    tr->effort_range[a][0] = lower * scale * tr->problem->effort_limit;
-    tr->effort_range[a][1] = upper * scale * tr->problem->effort_limit;
-    tr->effort_unit[a] = m->actuator[a].unit / (per_effort * scale);
+  // efforts: control over its limit, or plain force where there is none; servos limited in both have both
+  for (int a = 0; a < nu; a++) tr->limited[tr->nlimit++] = a;
+  for (int a = 0; a < nu; a++)
+    if (cav_servo_bounds(m, a) && m->actuator[a].forcelimited) tr->limited[tr->nlimit++] = a;
+  for (int k = 0; k < tr->nlimit; k++) {
+    int a = tr->limited[k];
     for (int d = 0; d < nv; d++) effort[d] = control[(size_t)d * nu + a];
-    if (!force_row_set(&tr->effort[a], nv, effort, per_effort * scale)) goto end;
+    if (!limit_row_set(tr, k, effort)) goto end;
   }
   ok = 1;
 end:
@@ -136,7 +149,7 @@ static cav_slot_layout layout_of(const cav_transcription *tr, int t) {
   cav_slot_layout at = {0};
   int has_force = tr->knot[t].has_force;
   at.effort = has_force ? tr->nresidual : 0;
-  at.joint = at.effort + (has_force ? m->nu : 0);
+  at.joint = at.effort + (has_force ? tr->nlimit : 0);
   at.tendon = at.joint;
   if (t > 0)
     for (int j = 0; j < m->njoint; j++) at.tendon += m->joint[j].limited;
@@ -248,9 +261,9 @@ void cav_transcription_free(cav_transcription *tr) {
     free(s->force_step), free(s->rate), free(s->trace[0]), free(s->trace[1]), free(s->slot[0]), free(s->slot[1]);
   }
   for (int k = 0; k < tr->nresidual; k++) free(tr->unactuated[k].dof), free(tr->unactuated[k].coef);
-  for (int a = 0; tr->effort && a < tr->model->nu; a++) free(tr->effort[a].dof), free(tr->effort[a].coef);
-  for (int a = 0; tr->servo && a < tr->model->nu; a++) cav_servo_free(&tr->servo[a]);
-  free(tr->servo);
+  for (int a = 0; tr->effort && a < tr->nlimit; a++) free(tr->effort[a].dof), free(tr->effort[a].coef);
+  for (int a = 0; tr->servo && a < tr->nlimit; a++) cav_servo_free(&tr->servo[a]);
+  free(tr->servo), free(tr->limited);
   free(tr->unactuated), free(tr->effort), free(tr->effort_range), free(tr->effort_unit), free(tr->rotation_dof),
       free(tr->rotation_of);
   free(tr->knot), free(tr->join), free(tr->scratch), free(tr->before), free(tr->rotation_after);

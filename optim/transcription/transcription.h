@@ -90,10 +90,12 @@ typedef struct cav_transcription {
   double weight;                ///< N: model mass times gravity
   int nresidual;                ///< rows of unactuated
   cav_force_row *unactuated;    ///< orthonormal complement of the actuators' range, scaled to fractions of weight
-  cav_force_row *effort;        ///< [nu] actuator force over its limit
-  double *effort_unit;          ///< [nu] force of its transmission, N or N m, that one unit of the row of effort is
-  double (*effort_range)[2];    ///< [nu] limits of effort, scaled; of servos with limits of control, those
-  cav_servo *servo;             ///< [nu]
+  int nlimit;                   ///< rows of effort: one an actuator; then of control, of servos limited in both
+  int *limited;                 ///< [nlimit] the actuator of each
+  cav_force_row *effort;        ///< [nlimit] actuator force over its limit
+  double *effort_unit;          ///< [nlimit] force of its transmission, N or N m, that one unit of the row of effort is
+  double (*effort_range)[2];    ///< [nlimit] limits of effort, scaled; of servos with limits of control alone, those
+  cav_servo *servo;             ///< [nlimit]
   int nrotation;
   int *rotation_dof; ///< [nturn] first of three rotational dofs
   int *rotation_of;  ///< [nv] index into turn_dof or -1

@@ -23,6 +23,7 @@ typedef struct cav_command_line {
   int noperand;        ///< of commands that take several
   char **operands;     ///< [noperand]
   const char *model;   ///< --model, NULL: as the problem says
+  int floating;        ///< --floating
   const char *output;  ///< -o, NULL: named after the problem
   cav_solver solver;
   int threads;
@@ -55,6 +56,9 @@ int cav_command_impossible(FILE *out, const char *before, const cav_problem *pro
 /// Before a solve: tells the one cause why a problem cannot have a solution, if there is one. 0: solve it; otherwise the
 /// exit status.
 int cav_command_refuse(const cav_command_line *line, const cav_problem *problem);
+
+/// Where actuators have no limit of effort, so that a plan may use any force of them: tells it. command.c.
+void cav_command_warn_efforts(const cav_model *model, FILE *out);
 
 /// Prints a topic of cavort help; 0 if there is none of that name. topics.c.
 int cav_topic_print(const char *name);

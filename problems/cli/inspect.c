@@ -232,6 +232,26 @@ static void print_costs(const cav_model *m) {
   free(v);
 }
 
+// which actuators plans can use and which not, one line for each reason
+static void print_actuators(const cav_model *m) {
+  int planned = 0;
+  for (int i = 0; i < m->nu; i++) planned += cav_actuator_unplannable(m, i) == NULL;
+  if (!m->nu) return;
+  printf("\nmotions can be planned with %d of %d actuators\n", planned, m->nu);
+  for (int i = 0; i < m->nu; i++) {
+    const char *why = cav_actuator_unplannable(m, i);
+    int before = 0, after = 0;
+    for (int k = 0; why && k < m->nu; k++) *(k < i ? &before : &after) += cav_actuator_unplannable(m, k) == why;
+    if (!why || before) continue;
+    printf("  not with '%.60s'", m->actuator[i].name);
+    if (after > 1) printf(" and %d more", after - 1);
+    printf(": %s\n", why);
+  }
+  if (planned < m->nu)
+    printf("  solve refuses the model; motors along joints or fixed tendons in their place are planned\n");
+  cav_command_warn_efforts(m, stdout);
+}
+
 static void print_warnings(const cav_model *m) {
   if (m->nwarning) printf("\nunderstood but left aside\n");
   for (int i = 0; i < m->nwarning; i++) printf("  %s\n", m->warning[i]);
@@ -408,6 +428,7 @@ static void print_model(const cav_model *m) {
   print_bodies(m);
   print_stages(m);
   print_costs(m);
+  print_actuators(m);
   print_warnings(m);
 }
 
@@ -416,6 +437,10 @@ int cav_command_inspect(const cav_command_line *line) {
   char root[32];
   first_element(line->operand, root);
   if (!strcmp(root, "problem")) {
+    if (line->floating) {
+      cav_file_fail(&error, CAV_BAD_INPUT, 0, "%s: is a problem file; write floating=\"true\" into it", line->operand);
+      return cav_command_fail(&error);
+    }
     cav_problem *problem = cav_problem_load(line->operand, line->model, &error);
     if (!problem) return cav_command_fail(&error);
     cav_status status = cav_command_impossible(stdout, "", problem, 3, &error) < 0 ? error.status : CAV_OK;
@@ -428,7 +453,9 @@ int cav_command_inspect(const cav_command_line *line) {
     cav_file_fail(&error, CAV_BAD_INPUT, 0, "%s: is not a problem file; --model has no meaning here", line->operand);
     return cav_command_fail(&error);
   }
-  cav_model *model = cav_model_load(line->operand, &error);
+  cav_load_options options = cav_load_options_default();
+  options.floating = line->floating;
+  cav_model *model = cav_model_load_with(line->operand, &options, &error);
   if (!model) return cav_command_fail(&error);
   print_model(model);
   cav_model_free(model);

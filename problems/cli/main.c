@@ -20,7 +20,8 @@ enum option {
   OPTION_METHODS = 256,
   OPTION_STRATEGIES = 512,
   OPTION_FORCE = 1024,
-  OPTION_ALL = 2048
+  OPTION_ALL = 2048,
+  OPTION_FLOATING = 4096
 };
 
 // options: spelling, value's name or NULL, what it does
@@ -29,6 +30,7 @@ static const struct {
   const char *name, *brief, *value, *text;
 } options[] = {
     {OPTION_MODEL, "--model", NULL, "FILE", "use this model instead of the one that the problem names"},
+    {OPTION_FLOATING, "--floating", NULL, NULL, "the root link of a URDF floats (a problem says floating=\"true\")"},
     {OPTION_OUTPUT, "--output", "-o", "DIR",
      "folder of the result (default: NAME.result, NAME of the problem or else of its file)"},
     {OPTION_SOLVER, "--solver", NULL, "WORD", "how to solve"},
@@ -61,7 +63,7 @@ static int help(const cav_command_line *line);
 
 static const command commands[] = {
     {"inspect", "MODEL|PROBLEM", "say what a model or a problem holds, what it runs and what it leaves out",
-     cav_command_inspect, OPTION_MODEL},
+     cav_command_inspect, OPTION_MODEL | OPTION_FLOATING},
     {"solve", "PROBLEM", "find the motion that a problem file asks for, certify it and write a result folder",
      cav_command_solve,
      OPTION_MODEL | OPTION_OUTPUT | OPTION_SOLVER | OPTION_IPOPT | OPTION_THREADS | OPTION_STRATEGIES | OPTION_RESUME |
@@ -169,6 +171,9 @@ static int take_value(cav_command_line *line, enum option option, const char *na
   switch (option) {
     case OPTION_MODEL:
       line->model = value;
+      return 1;
+    case OPTION_FLOATING:
+      line->floating = 1;
       return 1;
     case OPTION_OUTPUT:
       line->output = value;
