@@ -1,23 +1,21 @@
-/// Hessian of the Lagrangian by differences of its gradient. A knot sees three neighbouring blocks of unknowns, so
-/// blocks that no knot sees together are moved at once: three colours (up to five in cycles), and the step's logarithm
-/// where that is free. Symmetrised; what Gauss-Newton has of it is subtracted, so the sum stays right where the costs'
-/// residuals move on.
+/// What the Hessian of the Lagrangian has beside Gauss-Newton's, kept knot by knot, so that a part of it can be added to
+/// a linearisation here or nearby: the unknowns' own (lagrangian.c), and where the step is free the row of its
+/// logarithm, by differences of the knots' gradients.
 #include "curvature.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/// Difference of an unknown, rad or m, for a step of one second: what moves a knot by it moves rates by this, whatever
-/// the step.
-static const double rate_difference = 1e-4;
+#include "lagrangian.h"
 
 /// Difference of the step's logarithm.
 static const double step_difference = 1e-5;
 
 struct cav_curvature {
   int nknot, width, free_step; ///< width: 3nv
-  double *block;               ///< [nknot*(width+1)*(width+1)] row-major
-  double *base, *moved;        ///< [nknot*(width+1)] gradients
+  double **block;              ///< [nknot][width*width] lower triangles
+  double *step;                ///< [nknot*(width+1)] by the step's logarithm: of the columns, and its square
+  double *before;              ///< [nknot*(width+1)] gradients at a shorter step
   double *x;                   ///< [unknowns]
 };
 
@@ -27,12 +25,14 @@ cav_curvature *cav_curvature_new(const cav_transcription *tr) {
   c->nknot = tr->nknot;
   c->width = 3 * tr->nv;
   c->free_step = tr->free_step;
-  size_t knots = (size_t)c->nknot, side = (size_t)c->width + 1;
-  c->block = calloc(knots * side * side, sizeof(double));
-  c->base = malloc(2 * knots * side * sizeof(double));
+  size_t knots = (size_t)c->nknot, width = (size_t)c->width;
+  c->block = calloc(knots, sizeof *c->block);
+  c->step = calloc(2 * knots * (width + 1), sizeof(double));
   c->x = calloc((size_t)cav_transcription_unknowns(tr), sizeof(double));
-  if (c->block && c->base && c->x) {
-    c->moved = c->base + knots * side;
+  int whole = c->block && c->step && c->x;
+  for (size_t t = 0; whole && t < knots; t++) whole = (c->block[t] = calloc(width * width, sizeof(double))) != NULL;
+  if (whole) {
+    c->before = c->step + knots * (width + 1);
     return c;
   }
   cav_curvature_free(c);
@@ -41,108 +41,89 @@ cav_curvature *cav_curvature_new(const cav_transcription *tr) {
 
 void cav_curvature_free(cav_curvature *c) {
   if (!c) return;
-  free(c->block), free(c->base), free(c->x);
+  for (int t = 0; c->block && t < c->nknot; t++) free(c->block[t]);
+  free(c->block), free(c->step), free(c->x);
   free(c);
 }
 
-/// Gradients of the knots' Lagrangians at the last linearisation.
-static void read_gradients(const cav_curvature *c, const cav_transcription *tr, const double *multiplier, double *out) {
+/// Gradients of the knots' Lagrangians at a step whose logarithm is moved.
+static cav_status gradients_beside(cav_curvature *c, cav_transcription *tr, const cav_trajectory *at,
+                                   cav_trajectory *spare, double change, double *out) {
   size_t width = (size_t)c->width;
-  for (int t = 0; t < c->nknot; t++, out += width + 1) {
+  c->x[cav_transcription_unknowns(tr) - 1] = change;
+  cav_transcription_move(tr, at, c->x, spare);
+  cav_status status = cav_transcription_linearise(tr, spare);
+  for (int t = 0; t < c->nknot && status == CAV_OK; t++, out += width + 1) {
     const cav_knot *knot = &tr->knot[t];
     memcpy(out, knot->gradient, width * sizeof(double));
     out[width] = knot->step_derivative;
-    for (int i = 0; i < knot->layout.count; i++, multiplier++) {
-      if (*multiplier == 0) continue;
+    for (int i = 0; i < knot->layout.count; i++) {
+      double y = knot->slot[i].final_multiplier;
       const double *row = knot->slot_row + (size_t)i * width;
-      for (size_t k = 0; k < width; k++) out[k] += *multiplier * row[k];
-      if (c->free_step) out[width] += *multiplier * knot->slot_step[i];
+      for (size_t k = 0; k < width && y != 0; k++) out[k] += y * row[k];
+      out[width] += y * knot->slot_step[i];
     }
   }
+  return status;
 }
 
-/// Colour of a block: no knot sees two of one.
-static int colour_of(const cav_transcription *tr, int block) {
-  int blocks = tr->nknot - 1, whole = tr->periodicity ? blocks - blocks % 3 : blocks;
-  return block < whole ? block % 3 : 3 + block - whole;
-}
-
-/// Gradients with the chosen unknowns moved, and what that says of the knots' columns.
-static cav_status move(cav_curvature *c, cav_transcription *tr, const cav_trajectory *at, cav_trajectory *spare,
-                       const double *multiplier, int colour, int dof) {
-  int nv = tr->nv, side = c->width + 1, last = cav_transcription_unknowns(tr) - 1;
-  double change = rate_difference * at->timestep;
-  memset(c->x, 0, (size_t)(last + 1) * sizeof(double));
-  for (int b = 0; b < tr->nknot - 1; b++)
-    if (colour_of(tr, b) == colour) c->x[b * nv + dof] = change;
-  if (colour < 0) {
-    // the step's logarithm, away from its upper bound
-    int high = at->timestep * (1 + 2 * step_difference) > tr->problem->duration_most / (tr->nknot - 1);
-    c->x[last] = change = high ? -step_difference : step_difference;
-  }
-  cav_transcription_move(tr, at, c->x, spare);
-  cav_status status = cav_transcription_linearise(tr, spare);
-  if (status != CAV_OK) return status;
-  read_gradients(c, tr, multiplier, c->moved);
-  for (int t = 0; t < c->nknot; t++) {
-    for (int k = 0; k < 3; k++) {
-      int b = cav_transcription_block(tr, t, k), column = colour < 0 ? c->width : k * nv + dof;
-      if (colour >= 0 && (b < 0 || colour_of(tr, b) != colour)) continue;
-      double *block = c->block + (size_t)t * (size_t)side * (size_t)side;
-      const double *base = c->base + (size_t)t * (size_t)side, *moved = c->moved + (size_t)t * (size_t)side;
-      for (int i = 0; i < side; i++) block[i * side + column] = (moved[i] - base[i]) / change;
-    }
-  }
-  return CAV_OK;
-}
-
-/// Symmetrises the blocks and takes off what the knots' Hessians have.
-static void finish(cav_curvature *c, const cav_transcription *tr) {
-  int width = c->width, side = width + 1;
-  for (int t = 0; t < c->nknot; t++) {
-    double *block = c->block + (size_t)t * (size_t)side * (size_t)side;
+/// The step's rows, less what the knots' Gauss-Newton has of them.
+static cav_status find_step(cav_curvature *c, cav_transcription *tr, cav_trajectory *at, cav_trajectory *spare) {
+  size_t width = (size_t)c->width, side = width + 1;
+  double change = step_difference, steps = tr->nknot - 1;
+  cav_penalties kept = tr->penalty;
+  tr->penalty = (cav_penalties){0};
+  // both sides of the step, or of where its bounds let both be
+  int high = at->timestep * (1 + 2 * change) > tr->problem->duration_most / steps;
+  int low = at->timestep * (1 - 2 * change) < tr->problem->duration_least / steps;
+  cav_status status = gradients_beside(c, tr, at, spare, low ? 0 : -change, c->before);
+  if (status == CAV_OK) status = gradients_beside(c, tr, at, spare, high ? 0 : change, c->step);
+  if (status == CAV_OK) status = cav_transcription_linearise(tr, at);
+  double distance = (2 - (low != 0) - (high != 0)) * change;
+  for (int t = 0; t < c->nknot && status == CAV_OK; t++) {
     const cav_knot *knot = &tr->knot[t];
-    for (int i = 0; i < side; i++) {
-      for (int j = 0; j <= i; j++) {
-        double mean = 0.5 * (block[i * side + j] + block[j * side + i]);
-        if (i < width) mean -= knot->hessian[(size_t)i * (size_t)width + (size_t)j];
-        if (i == width) mean -= j < width ? knot->step_row[j] : knot->step_square;
-        block[i * side + j] = block[j * side + i] = mean;
-      }
+    double *row = c->step + (size_t)t * side, *before = c->before + (size_t)t * side;
+    for (size_t k = 0; k < side; k++) {
+      row[k] = distance > 0 ? (row[k] - before[k]) / distance : 0;
+      if (distance > 0) row[k] -= k < width ? knot->step_row[k] : knot->step_square;
     }
+  }
+  tr->penalty = kept;
+  return status;
+}
+
+/// Exchanges the knots' Hessians for the blocks, or back.
+static void exchange(cav_curvature *c, cav_transcription *tr) {
+  for (int t = 0; t < c->nknot; t++) {
+    double *kept = tr->knot[t].hessian;
+    tr->knot[t].hessian = c->block[t];
+    c->block[t] = kept;
   }
 }
 
 cav_status cav_curvature_find(cav_curvature *c, cav_transcription *tr, cav_trajectory *at, cav_trajectory *spare,
                               const double *multiplier) {
-  size_t side = (size_t)c->width + 1;
-  cav_penalties kept = tr->penalty;
-  memset(c->block, 0, (size_t)c->nknot * side * side * sizeof(double));
-  tr->penalty = (cav_penalties){0};
-  cav_status status = cav_transcription_linearise(tr, at);
-  if (status == CAV_OK) read_gradients(c, tr, multiplier, c->base);
-  tr->gradient_only = 1;
-  for (int colour = 0; colour < 5 && status == CAV_OK; colour++) {
-    if (colour > 2 && !tr->periodicity) break;
-    for (int d = 0; d < tr->nv && status == CAV_OK; d++) status = move(c, tr, at, spare, multiplier, colour, d);
-  }
-  if (status == CAV_OK && c->free_step) status = move(c, tr, at, spare, multiplier, -1, 0);
-  tr->gradient_only = 0;
+  size_t width = (size_t)c->width;
+  for (int t = 0; t < tr->nknot; t++)
+    for (int i = 0; i < tr->knot[t].layout.count; i++) tr->knot[t].slot[i].final_multiplier = *multiplier++;
+  cav_status status = c->free_step ? find_step(c, tr, at, spare) : CAV_OK;
   if (status == CAV_OK) status = cav_transcription_linearise(tr, at);
-  if (status == CAV_OK) finish(c, tr);
-  tr->penalty = kept;
+  if (status != CAV_OK) return status;
+  for (int t = 0; t < c->nknot; t++) memset(c->block[t], 0, width * width * sizeof(double));
+  exchange(c, tr);
+  status = cav_lagrangian_curvature(tr, at, 1);
+  exchange(c, tr);
   return status;
 }
 
 void cav_curvature_add(const cav_curvature *c, cav_transcription *tr, double fraction) {
-  int width = c->width, side = width + 1;
+  size_t width = (size_t)c->width;
   for (int t = 0; t < c->nknot; t++) {
-    const double *block = c->block + (size_t)t * (size_t)side * (size_t)side;
+    const double *block = c->block[t], *row = c->step + (size_t)t * (width + 1);
     cav_knot *knot = &tr->knot[t];
-    for (int i = 0; i < width; i++)
-      for (int j = 0; j <= i; j++)
-        knot->hessian[(size_t)i * (size_t)width + (size_t)j] += fraction * block[i * side + j];
-    for (int j = 0; j < width; j++) knot->step_row[j] += fraction * block[width * side + j];
-    knot->step_square += fraction * block[width * side + width];
+    for (size_t i = 0; i < width; i++)
+      for (size_t j = 0; j <= i; j++) knot->hessian[i * width + j] += fraction * block[i * width + j];
+    for (size_t j = 0; j < width; j++) knot->step_row[j] += fraction * row[j];
+    knot->step_square += fraction * row[width];
   }
 }

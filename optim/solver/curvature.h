@@ -11,9 +11,8 @@ typedef struct cav_curvature cav_curvature;
 cav_curvature *cav_curvature_new(const cav_transcription *transcription);
 void cav_curvature_free(cav_curvature *curvature);
 
-/// By differences of the Lagrangian's gradient at a trajectory, a linearisation for each of the unknowns that a knot
-/// sees; rows must be kept. multiplier: by knot and slot, positive at upper bounds. spare is overwritten, and the
-/// transcription ends at at, linearised under no penalties.
+/// At a trajectory, where the transcription ends, linearised; rows must be kept. multiplier: by knot and slot, positive
+/// at upper bounds; becomes the slots' final_multiplier. spare is overwritten.
 cav_status cav_curvature_find(cav_curvature *curvature, cav_transcription *transcription, cav_trajectory *at,
                               cav_trajectory *spare, const double *multiplier);
 

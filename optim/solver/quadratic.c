@@ -153,30 +153,34 @@ static void add_rows(const cav_quadratic *p, const double *y, double *out) {
   }
 }
 
+/// image := H x of a knot's costs alone; local [3nv+1] holds x.
+static void knot_times(const cav_quadratic *p, int t) {
+  int width = 3 * p->tr->nv;
+  const cav_knot *knot = &p->tr->knot[t];
+  memset(p->image, 0, (size_t)(width + 1) * sizeof(double));
+  for (int i = 0; i < width; i++) {
+    const double *row = knot->hessian + (size_t)i * (size_t)width;
+    double sum = row[i] * p->local[i];
+    for (int j = 0; j < i; j++) {
+      sum += row[j] * p->local[j];
+      p->image[j] += row[j] * p->local[i];
+    }
+    p->image[i] += sum;
+  }
+  if (!p->tr->free_step) return;
+  p->image[width] = knot->step_square * p->local[width];
+  for (int k = 0; k < width; k++) {
+    p->image[width] += knot->step_row[k] * p->local[k];
+    p->image[k] += knot->step_row[k] * p->local[width];
+  }
+}
+
 /// product := H x, of the costs alone.
 static void costs_times(const cav_quadratic *p, const double *x, double *product) {
-  int width = 3 * p->tr->nv;
   memset(product, 0, (size_t)p->n * sizeof(double));
   for (int t = 0; t < p->tr->nknot; t++) {
-    const cav_knot *knot = &p->tr->knot[t];
     take(p, t, x, p->local);
-    memset(p->image, 0, (size_t)(width + 1) * sizeof(double));
-    for (int i = 0; i < width; i++) {
-      const double *row = knot->hessian + (size_t)i * (size_t)width;
-      double sum = row[i] * p->local[i];
-      for (int j = 0; j < i; j++) {
-        sum += row[j] * p->local[j];
-        p->image[j] += row[j] * p->local[i];
-      }
-      p->image[i] += sum;
-    }
-    if (p->tr->free_step) {
-      p->image[width] = knot->step_square * p->local[width];
-      for (int k = 0; k < width; k++) {
-        p->image[width] += knot->step_row[k] * p->local[k];
-        p->image[k] += knot->step_row[k] * p->local[width];
-      }
-    }
+    knot_times(p, t);
     give(p, t, p->image, product);
   }
 }
@@ -197,19 +201,27 @@ const double *cav_quadratic_prediction(cav_quadratic *p) {
   return p->change;
 }
 
-double cav_quadratic_decrease(cav_quadratic *p) {
-  costs_times(p, p->x, p->work);
-  rows_times(p, p->x, p->change);
-  double decrease = -dot(p->n, p->gradient, p->x) - 0.5 * dot(p->n, p->work, p->x);
-  for (int t = 0; t < p->tr->nknot; t++) {
-    for (int i = 0; i < p->tr->knot[t].layout.count; i++) {
-      const cav_slot *slot = &p->tr->knot[t].slot[i];
-      int k = p->first[t] + i;
-      double before = p->value[k], after = before + p->change[k];
-      decrease += p->penalty[k] * (fmax(fmax(slot->lower - before, before - slot->upper), 0) -
-                                   fmax(fmax(slot->lower - after, after - slot->upper), 0));
-    }
+double cav_quadratic_knot_decrease(cav_quadratic *p, int t) {
+  int width = 3 * p->tr->nv;
+  const cav_knot *knot = &p->tr->knot[t];
+  take(p, t, p->x, p->local);
+  knot_times(p, t);
+  double decrease = -dot(width, knot->gradient, p->local) - 0.5 * dot(width + 1, p->image, p->local);
+  if (p->tr->free_step) decrease -= knot->step_derivative * p->local[width];
+  for (int i = 0; i < knot->layout.count; i++) {
+    const cav_slot *slot = &knot->slot[i];
+    int k = p->first[t] + i;
+    double before = p->value[k], after = before + p->change[k];
+    decrease += p->penalty[k] * (fmax(fmax(slot->lower - before, before - slot->upper), 0) -
+                                 fmax(fmax(slot->lower - after, after - slot->upper), 0));
   }
+  return decrease;
+}
+
+double cav_quadratic_decrease(cav_quadratic *p) {
+  double decrease = 0;
+  rows_times(p, p->x, p->change);
+  for (int t = 0; t < p->tr->nknot; t++) decrease += cav_quadratic_knot_decrease(p, t);
   return decrease;
 }
 
@@ -230,12 +242,13 @@ static side centred(double d, double penalty, double mu) {
   return (side){.on = 1, .s = s, .e = e, .y = mu / s, .z = mu / e};
 }
 
-static void start(cav_quadratic *p, double radius, const double change[2], double gap) {
+static void start(cav_quadratic *p, const double *radius, const double change[2], double gap) {
   p->sides = 0;
   for (int j = 0; j < p->n; j++) {
     int step = p->tr->free_step && j == p->n - 1;
-    p->bound[2 * j] = step ? fmax(-radius, change[0]) : -radius;
-    p->bound[2 * j + 1] = step ? fmin(radius, change[1]) : radius;
+    double r = radius[j / p->tr->nv];
+    p->bound[2 * j] = step ? fmax(-r, change[0]) : -r;
+    p->bound[2 * j + 1] = step ? fmin(r, change[1]) : r;
     double width = p->bound[2 * j + 1] - p->bound[2 * j];
     p->x[j] = fmin(fmax(0, p->bound[2 * j] + 0.05 * width), p->bound[2 * j + 1] - 0.05 * width);
     p->sides += 2;
@@ -479,7 +492,7 @@ static cav_status approach(cav_quadratic *p, double tolerance, double *left) {
   return CAV_OK;
 }
 
-cav_status cav_quadratic_solve(cav_quadratic *p, double radius, const double change[2], double tolerance) {
+cav_status cav_quadratic_solve(cav_quadratic *p, const double *radius, const double change[2], double tolerance) {
   double scale = 0, left = 1;
   for (int t = 0; t < p->tr->nknot; t++) scale += p->tr->knot[t].cost;
   memset(p->gradient, 0, (size_t)p->n * sizeof(double));

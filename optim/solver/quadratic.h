@@ -18,7 +18,7 @@ void cav_quadratic_free(cav_quadratic *quadratic);
 
 /// Solves it by a primal-dual interior point, to a duality gap in units of the cost. The step's logarithm stays within
 /// change[0] .. change[1], too. CAV_NOT_CONVERGED: the gap was not reached; the best iterate stands.
-cav_status cav_quadratic_solve(cav_quadratic *quadratic, double radius, const double change[2], double gap);
+cav_status cav_quadratic_solve(cav_quadratic *quadratic, const double *radius, const double change[2], double gap);
 
 /// Further step from the solution x, in the metric that it was found in, towards rows that are off by offset [rows].
 /// Writes x [unknowns].
@@ -41,6 +41,9 @@ const double *cav_quadratic_prediction(cav_quadratic *quadratic);
 
 /// Decrease of the objective from x = 0 to the solution.
 double cav_quadratic_decrease(cav_quadratic *quadratic);
+
+/// A knot's part of that, which was asked for before.
+double cav_quadratic_knot_decrease(cav_quadratic *quadratic, int t);
 
 /// Duality gap of the solution, in units of the cost: no step decreases a convex objective by more than this beyond it.
 double cav_quadratic_gap(const cav_quadratic *quadratic);

@@ -1,11 +1,13 @@
 /// Sequential quadratic programming on a transcription: from near an optimum to stationarity, all constraints held at
-/// once, in the metric of the costs' Gauss-Newton Hessian.
+/// once, in the metric of the Lagrangian's Hessian.
 ///
 /// Each iteration solves the programme of quadratic.c in a box, whose rows have exact penalties (Fletcher 1985:
 /// S-l1-QP), and takes its step where cost plus penalties fall by a fraction of what the programme predicted; a step
-/// that misses the rows by their curvature is corrected once in the same metric (Maratos). Penalties are above every
-/// multiplier, row by row. The end is where the programme predicts next to nothing: its prediction over the cost is how
-/// optimal the motion is, in the full box.
+/// that misses the rows by their curvature is corrected in the same metric (Maratos). Penalties are above every
+/// multiplier, row by row. Every knot has a box of its own: merit and prediction are sums over knots, so what a step
+/// misses is known by knot, and one at which a contact comes or goes does not hold the others back. The end is where
+/// the programme of a Hessian found there predicts next to nothing: its prediction over the cost is how optimal the
+/// motion is, in the full box.
 #include "sqp.h"
 
 #include <math.h>
@@ -15,23 +17,34 @@
 #include "curvature.h"
 #include "quadratic.h"
 
-/// Iterations; the box at the start and at most (rad, m, log of the step), and where it is too small to go on.
-enum { ITERATIONS = 120, RAISES = 5, SETTLING = 20 };
+/// Iterations; raises of the penalties for a programme; programmes for a linearisation; corrections of a step.
+enum { ITERATIONS = 250, RAISES = 5, ATTEMPTS = 20, CORRECTIONS = 4, SETTLING = 20 };
+
+/// Boxes at the start and at most (rad, m, log of the step), and where they are too small to go on.
 static const double first_radius = 0.1, most_radius = 0.7, least_radius = 1e-7;
 
 /// Fractions of the cost: predicted decrease that ends a run; one that ends it if it does not come true; gap of a
 /// programme. Smallest cost that counts as a scale.
 static const double stationary = 1e-9, predicted_enough = 1e-6, gap_fraction = 1e-11, least_cost = 1e-6;
 
-/// Decreases of the cost below this fraction, so many in a row, end a run.
-static const double slow = 1e-5;
-enum { PATIENCE = 3 };
+/// Decreases of the cost below this fraction, so many in a row, end a run; below that the Hessian is found anew.
+static const double slow = 1e-6, old_gain = 1e-5;
+enum { PATIENCE = 8 };
+
+/// What is optimal, as a fraction of the cost. Where it is not: steps across jumps of the merit, the boxes they are
+/// tried in, and what they may lose.
+static const double optimal = 1e-6, leap_box[] = {1e-2, 3e-3, 1e-3, 3e-4, 1e-4}, leap_loss = 1e-3;
+enum { LEAPS = 4, LEAP_BOXES = sizeof leap_box / sizeof *leap_box };
+
+/// How far the ratio of a decrease to what was predicted may be from 1 before the Hessian is found anew; how much of
+/// the decrease a knot has to miss for its box to be at fault instead.
+static const double poor_ratio = 0.2, far = 2;
+
+/// Squares of the step, rad or m, that make a programme convex: of the cost, and at most.
+static const double least_shift = 1, most_shift = 1e6;
 
 /// Penalties: over the multiplier; of its kind's largest multiplier; of the cost, a unit of the row.
 static const double over = 2, of_kind = 0.1, of_cost = 0.01;
-
-/// Smallest fraction of the curvature that is used.
-static const double least_fraction = 0.01;
 
 static double cost_scale(const cav_transcription *tr) { return fmax(cav_transcription_cost(tr), least_cost); }
 
@@ -77,14 +90,17 @@ static int raise_penalties(cav_quadratic *qp) {
   return raised;
 }
 
-/// Cost and penalties at the last values.
-static double merit_of(const cav_transcription *tr, const double *penalty) {
-  double sum = cav_transcription_merit(tr);
-  for (int t = 0, k = 0; t < tr->nknot; t++)
+/// Cost and penalties at the last values; part [nknot]: of the knots.
+static double merit_of(const cav_transcription *tr, const double *penalty, double *part) {
+  double sum = 0;
+  for (int t = 0, k = 0; t < tr->nknot; t++) {
+    part[t] = tr->knot[t].merit;
     for (int i = 0; i < tr->knot[t].layout.count; i++, k++) {
       const cav_slot *slot = &tr->knot[t].slot[i];
-      sum += penalty[k] * fmax(fmax(slot->lower - slot->value, slot->value - slot->upper), 0);
+      part[t] += penalty[k] * fmax(fmax(slot->lower - slot->value, slot->value - slot->upper), 0);
     }
+    sum += part[t];
+  }
   return sum;
 }
 
@@ -98,7 +114,7 @@ static void step_bounds(const cav_transcription *tr, const cav_trajectory *at, d
 
 /// Solves the programme, raising penalties until they are exact or there is no more to be had by it. *solved: whether
 /// it could be.
-static cav_status solve_programme(cav_solve_run *run, cav_quadratic *qp, double radius, int *solved) {
+static cav_status solve_programme(cav_solve_run *run, cav_quadratic *qp, const double *radius, int *solved) {
   double change[2], begin = cav_clock(), gap = gap_fraction * cost_scale(run->tr);
   step_bounds(run->tr, run->at, change);
   cav_status status = CAV_OK;
@@ -116,25 +132,40 @@ typedef struct descent {
   cav_quadratic *qp;
   cav_curvature *curvature;
   double *x, *offset, *multiplier; ///< [unknowns], [rows], [rows]
-  double radius, merit;
+  double *radius;                  ///< [nknot] box about the blocks of unknowns, then about the step's logarithm
+  double *before, *after, *tried; ///< [nknot] the knots' parts of the merit: here, at the step to take, at the last one
+  double *forecast, *next;        ///< [nknot] of the decrease; boxes to come
+  double merit;
   double predicted;              ///< decrease, by the last programme
   double ratio;                  ///< of the decrease to it
   int age;                       ///< iterations since the curvature was found; -1: it was not
-  double fraction;               ///< of the curvature that is in the model
+  double shift;                  ///< what the squares of the unknowns cost besides
   double gain;                   ///< decrease of the step that was taken
   cav_trajectory *second, *best; ///< corrected trial; best of those tried
 } descent;
 
+static void set_radius(const cav_transcription *tr, double *radius, double value) {
+  for (int b = 0; b < tr->nknot; b++) radius[b] = value;
+}
+
 static int descent_new(descent *d, cav_solve_run *run) {
-  *d = (descent){.qp = cav_quadratic_new(run->tr, run->normal), .radius = first_radius, .ratio = 1, .age = -1};
+  *d = (descent){.qp = cav_quadratic_new(run->tr, run->normal), .ratio = 1, .age = -1};
   size_t n = (size_t)cav_transcription_unknowns(run->tr), rows = d->qp ? (size_t)cav_quadratic_rows(d->qp) : 0;
   d->curvature = cav_curvature_new(run->tr);
-  d->x = calloc(n + 2 * rows, sizeof(double));
+  size_t knots = (size_t)run->tr->nknot;
+  d->x = calloc(n + 2 * rows + 6 * knots, sizeof(double));
   d->second = cav_trajectory_copy(run->at);
   d->best = cav_trajectory_copy(run->at);
   if (!d->qp || !d->curvature || !d->x || !d->second || !d->best || !cav_transcription_keep_rows(run->tr)) return 0;
   d->offset = d->x + n;
   d->multiplier = d->offset + rows;
+  d->radius = d->multiplier + rows;
+  d->before = d->radius + knots;
+  d->after = d->before + knots;
+  d->tried = d->after + knots;
+  d->forecast = d->tried + knots;
+  d->next = d->forecast + knots;
+  set_radius(run->tr, d->radius, first_radius);
   return 1;
 }
 
@@ -146,44 +177,51 @@ static void descent_free(descent *d) {
   free(d->x);
 }
 
-/// Adds the Lagrangian's curvature to the linearisation, or as much of it as leaves that convex along the rows that
-/// hold the motion: what is left out is a step in the metric of the costs.
-static void add_curvature(cav_solve_run *run, descent *d) {
-  double added = 0;
-  for (d->fraction = 1; d->fraction > least_fraction; d->fraction *= 0.7) {
-    cav_curvature_add(d->curvature, run->tr, d->fraction - added);
-    added = d->fraction;
-    if (cav_quadratic_convex(d->qp)) return;
-  }
-  cav_curvature_add(d->curvature, run->tr, -added);
-  d->fraction = 0;
+/// Raises the shift of the unknowns' own squares, and with it their steps' cost.
+static void raise_shift(const cav_transcription *tr, descent *d, double least) {
+  double next = d->shift > 0 ? 10 * d->shift : least;
+  size_t nv = (size_t)tr->nv, width = 3 * nv;
+  for (int t = 0; t < tr->nknot; t++)
+    for (size_t i = nv; i < 2 * nv; i++) tr->knot[t].hessian[i * width + i] += next - d->shift;
+  d->shift = next;
 }
 
-/// Solves the model in a box, with less and less of the curvature until that can be done.
-static cav_status solve_model(cav_solve_run *run, descent *d, double radius) {
+/// Adds the Lagrangian's curvature to the linearisation, with squares of the step that make it convex along the rows
+/// that hold the motion.
+static void add_curvature(cav_solve_run *run, descent *d) {
+  cav_curvature_add(d->curvature, run->tr, 1);
+  while (!cav_quadratic_convex(d->qp) && d->shift < most_shift)
+    raise_shift(run->tr, d, least_shift * cost_scale(run->tr));
+}
+
+/// Solves the model in a box, with more and more squares until that can be done.
+static cav_status solve_model(cav_solve_run *run, descent *d) {
   for (;;) {
     int solved = 0;
-    cav_status status = solve_programme(run, d->qp, radius, &solved);
-    if (status != CAV_OK || solved || d->fraction == 0) return status;
-    double less = 0.4 * d->fraction > least_fraction ? 0.4 * d->fraction : 0;
-    cav_curvature_add(d->curvature, run->tr, less - d->fraction);
-    d->fraction = less;
+    cav_status status = solve_programme(run, d->qp, d->radius, &solved);
+    if (status != CAV_OK || solved || d->shift > most_shift) return status;
+    raise_shift(run->tr, d, least_shift * cost_scale(run->tr));
   }
+}
+
+/// What a knot's part of the merit misses of its forecast.
+static double missed(const descent *d, int t) {
+  return isfinite(d->after[t]) ? d->forecast[t] - (d->before[t] - d->after[t]) : INFINITY;
 }
 
 /// Costs, rows and their model at run->at: Gauss-Newton's while its predictions come true, then with the Lagrangian's
 /// curvature, which is found anew where the last one's have not.
 static cav_status model(cav_solve_run *run, descent *d) {
-  int poor = fabs(d->ratio - 1) > 0.2;
+  int poor = fabs(d->ratio - 1) > poor_ratio, little = d->age > 0 && d->gain < old_gain * cost_scale(run->tr);
   cav_status status = CAV_OK;
-  if (poor) {
+  if (poor || little) {
     status = cav_curvature_find(d->curvature, run->tr, run->at, run->spare, d->multiplier);
     d->age = 0;
-  } else if (d->age >= 0) {
-    d->age++;
+  } else {
+    status = cav_transcription_linearise(run->tr, run->at);
+    if (d->age >= 0) d->age++;
   }
-  if (status == CAV_OK) status = cav_transcription_linearise(run->tr, run->at);
-  d->fraction = 0;
+  d->shift = 0;
   if (status == CAV_OK && d->age >= 0) add_curvature(run, d);
   return status;
 }
@@ -197,8 +235,14 @@ static void exchange(cav_trajectory **a, cav_trajectory **b) {
 /// Merit of a trajectory, infinite where it cannot be evaluated.
 static cav_status try_at(cav_solve_run *run, descent *d, cav_trajectory *at, double *merit) {
   cav_status status = cav_transcription_values(run->tr, at);
-  *merit = status == CAV_OK ? merit_of(run->tr, cav_quadratic_penalty(d->qp)) : INFINITY;
+  *merit = status == CAV_OK ? merit_of(run->tr, cav_quadratic_penalty(d->qp), d->tried) : INFINITY;
   return status == CAV_NO_MEMORY ? status : CAV_OK;
+}
+
+static void keep_parts(descent *d) {
+  double *kept = d->after;
+  d->after = d->tried;
+  d->tried = kept;
 }
 
 /// Takes a multiple of the programme's step to run->spare, corrected where it gains less than enough and that is
@@ -209,19 +253,22 @@ static cav_status try_step(cav_solve_run *run, descent *d, double multiple, doub
   for (int i = 0; i < n; i++) d->x[i] = multiple * step[i];
   cav_transcription_move(run->tr, run->at, d->x, run->spare);
   cav_status status = try_at(run, d, run->spare, merit);
+  keep_parts(d);
   if (status != CAV_OK || !isfinite(*merit) || d->merit - *merit > enough) return status;
-  // what the rows are off by, of what they were to be
-  read_values(run->tr, d->offset);
   const double *linear = cav_quadratic_prediction(d->qp);
-  for (int k = 0; k < rows; k++) d->offset[k] -= linear[k];
-  cav_quadratic_correct(d->qp, d->offset, d->x);
-  for (int i = 0; i < n; i++) d->x[i] += multiple * step[i];
-  cav_transcription_move(run->tr, run->at, d->x, d->second);
-  double corrected;
-  status = try_at(run, d, d->second, &corrected);
-  if (status == CAV_OK && corrected < *merit) {
+  for (int round = 0; round < CORRECTIONS; round++) {
+    // what the rows are off by, of what they were to be
+    read_values(run->tr, d->offset);
+    for (int k = 0; k < rows; k++) d->offset[k] -= linear[k];
+    cav_quadratic_correct(d->qp, d->offset, d->x);
+    cav_transcription_move(run->tr, run->spare, d->x, d->second);
+    double corrected;
+    status = try_at(run, d, d->second, &corrected);
+    if (status != CAV_OK || !(corrected < *merit)) return status;
     *merit = corrected;
     exchange(&run->spare, &d->second);
+    keep_parts(d);
+    if (d->merit - *merit > enough) break;
   }
   return status;
 }
@@ -248,8 +295,53 @@ static cav_status iterate(cav_solve_run *run, descent *d, int *taken);
 
 /// The iteration over again, with the curvature of where it stands.
 static cav_status renew(cav_solve_run *run, descent *d, int *taken) {
+  d->ratio = 0;
   cav_status status = model(run, d);
   return status == CAV_OK ? iterate(run, d, taken) : status;
+}
+
+/// Largest step within a block of unknowns.
+static double block_length(const cav_transcription *tr, const double *x, int block) {
+  double most = 0;
+  if (block == tr->nknot - 1) return tr->free_step ? fabs(x[block * tr->nv]) : 0;
+  for (int i = 0; i < tr->nv; i++) most = fmax(most, fabs(x[block * tr->nv + i]));
+  return most;
+}
+
+/// Boxes of the unknowns that a knot sees become factor times their steps at most.
+static void shrink(const cav_solve_run *run, descent *d, int t, double factor) {
+  const double *x = cav_quadratic_step(d->qp);
+  for (int c = 0; c < 3; c++) {
+    int b = cav_transcription_block(run->tr, t, c);
+    if (b >= 0) d->next[b] = fmin(d->next[b], factor * fmin(block_length(run->tr, x, b), d->radius[b]));
+  }
+}
+
+/// Boxes for the next programme: smaller about knots that keep a step from what it should gain, larger about those that
+/// do as forecast, where they held the step.
+static void set_boxes(const cav_solve_run *run, descent *d) {
+  const cav_transcription *tr = run->tr;
+  const double *x = cav_quadratic_step(d->qp);
+  double most = 0;
+  for (int t = 0; t < tr->nknot; t++) most = fmax(most, missed(d, t));
+  double bad = d->ratio < 0.25 ? fmin(0.1 * d->predicted, 0.5 * most) : 0.25 * d->predicted;
+  for (int b = 0; b < tr->nknot; b++)
+    d->next[b] = block_length(tr, x, b) > 0.9 * d->radius[b] && d->ratio > 0.25 ? fmin(2 * d->radius[b], most_radius)
+                                                                                : d->radius[b];
+  for (int t = 0; t < tr->nknot; t++) {
+    double off = missed(d, t);
+    if (off >= bad && d->ratio < 0.75)
+      shrink(run, d, t, off > 10 * d->predicted ? 0.2 : 0.5);
+    else if (off > 0.1 * d->predicted && d->ratio < 0.75)
+      shrink(run, d, t, 1);
+  }
+  memcpy(d->radius, d->next, (size_t)tr->nknot * sizeof(double));
+}
+
+static double largest_radius(const cav_transcription *tr, const double *radius) {
+  double most = 0;
+  for (int b = 0; b < tr->nknot - (tr->free_step == 0); b++) most = fmax(most, radius[b]);
+  return most;
 }
 
 /// One iteration from a linearisation: programmes in smaller and smaller boxes until a step is accepted, or until the
@@ -257,20 +349,20 @@ static cav_status renew(cav_solve_run *run, descent *d, int *taken) {
 static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
   *taken = 0;
   read_values(run->tr, cav_quadratic_value(d->qp));
-  while (d->radius > least_radius) {
-    cav_status status = solve_model(run, d, d->radius);
+  for (int i = 0; i < ATTEMPTS; i++) {
+    cav_status status = solve_model(run, d);
     if (status != CAV_OK) return status;
-    double length = cav_quadratic_length(d->qp), scale = cost_scale(run->tr), trial;
-    d->merit = merit_of(run->tr, cav_quadratic_penalty(d->qp));
+    double scale = cost_scale(run->tr), trial;
+    d->merit = merit_of(run->tr, cav_quadratic_penalty(d->qp), d->before);
     d->predicted = cav_quadratic_decrease(d->qp);
+    for (int t = 0; t < run->tr->nknot; t++) d->forecast[t] = cav_quadratic_knot_decrease(d->qp, t);
     memcpy(d->multiplier, cav_quadratic_multiplier(d->qp), (size_t)cav_quadratic_rows(d->qp) * sizeof(double));
-    if (d->predicted <= stationary * scale) return CAV_OK;
+    if (d->predicted <= stationary * scale) return d->age == 0 ? CAV_OK : renew(run, d, taken);
     status = try_step(run, d, 1, 0.9 * d->predicted, &trial);
     if (status != CAV_OK) return status;
     d->ratio = (d->merit - trial) / d->predicted;
-    if (d->ratio > 0.75 && length > 0.9 * d->radius) d->radius = fmin(2 * d->radius, most_radius);
     if (d->ratio > 1e-4) {
-      if (d->ratio < 0.25) d->radius = 0.5 * fmin(length, d->radius);
+      set_boxes(run, d);
       if (d->ratio > 1.3 && (status = extrapolate(run, d, &trial)) != CAV_OK) return status;
       d->gain = d->merit - trial;
       exchange(&run->at, &run->spare);
@@ -279,9 +371,13 @@ static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
     }
     // values of the linearisation, which the trial has overwritten
     status = cav_transcription_values(run->tr, run->at);
-    if (status != CAV_OK || (d->predicted <= predicted_enough * scale && cav_run_met(run))) return status;
-    if (d->age != 0) return renew(run, d, taken);
-    d->radius = (d->ratio < -1 ? 0.2 : 0.5) * fmin(length, d->radius);
+    if (status != CAV_OK) return status;
+    if (d->age == 0 && d->predicted <= predicted_enough * scale && cav_run_met(run)) return CAV_OK;
+    double miss = 0;
+    for (int t = 0; t < run->tr->nknot; t++) miss = fmax(miss, missed(d, t));
+    if (d->age != 0 && (d->age < 0 || miss < far * d->predicted)) return renew(run, d, taken);
+    set_boxes(run, d);
+    if (largest_radius(run->tr, d->radius) < least_radius) break;
   }
   return CAV_OK;
 }
@@ -312,21 +408,6 @@ static cav_status settle_rows(cav_solve_run *run, descent *d) {
   return status;
 }
 
-/// Iterations to the end; *settled: whether that is stationary.
-static cav_status descend(cav_solve_run *run, descent *d, int *settled) {
-  int calm = 0, taken = 1;
-  cav_status status = CAV_OK;
-  for (int i = 0; i < ITERATIONS && status == CAV_OK && taken && calm < PATIENCE; i++) {
-    status = model(run, d);
-    if (status == CAV_OK) status = iterate(run, d, &taken);
-    if (status != CAV_OK || !taken) break;
-    calm = d->gain < slow * cost_scale(run->tr) ? calm + 1 : 0;
-    if (cav_run_report(run, cav_quadratic_length(d->qp), d->radius)) status = CAV_INTERRUPTED;
-  }
-  *settled = !taken || calm >= PATIENCE;
-  return status == CAV_OK ? settle_rows(run, d) : status;
-}
-
 /// Multipliers of the augmented Lagrangian at the last values, with which the penalties and the curvature begin.
 static void begin(cav_solve_run *run, descent *d) {
   cav_transcription_multipliers(run->tr);
@@ -336,14 +417,18 @@ static void begin(cav_solve_run *run, descent *d) {
   take_penalties(run->tr);
 }
 
-/// How optimal run->at is by the present curvature, and the rows' multipliers.
-static cav_status measure(cav_solve_run *run, descent *d) {
-  cav_status status = cav_transcription_linearise(run->tr, run->at);
+/// How optimal run->at is, by the Lagrangian's Hessian of the last multipliers, or by the costs' alone; and the rows'
+/// multipliers.
+static cav_status measure(cav_solve_run *run, descent *d, int curved) {
+  cav_status status = curved ? cav_curvature_find(d->curvature, run->tr, run->at, run->spare, d->multiplier)
+                             : cav_transcription_linearise(run->tr, run->at);
   if (status != CAV_OK) return status;
-  d->fraction = 0;
-  if (d->age >= 0) add_curvature(run, d);
+  d->shift = 0;
+  d->ratio = 0;
+  if (curved) add_curvature(run, d);
   read_values(run->tr, cav_quadratic_value(d->qp));
-  status = solve_model(run, d, most_radius);
+  set_radius(run->tr, d->radius, most_radius);
+  status = solve_model(run, d);
   if (status != CAV_OK) return status;
   // a bound: what the programme decreases, and what its gap leaves open
   run->optimality = (fmax(cav_quadratic_decrease(d->qp), 0) + cav_quadratic_gap(d->qp)) / cost_scale(run->tr);
@@ -353,6 +438,71 @@ static cav_status measure(cav_solve_run *run, descent *d) {
     for (int i = 0; i < run->tr->knot[t].layout.count; i++)
       run->tr->knot[t].slot[i].final_multiplier = d->multiplier[k++];
   return CAV_OK;
+}
+
+/// Iterations to where no step gains; *settled: whether that is so.
+static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled) {
+  int calm = 0, taken = 1;
+  cav_status status = CAV_OK;
+  for (; *left > 0 && calm < PATIENCE; --*left) {
+    status = model(run, d);
+    if (status == CAV_OK) status = iterate(run, d, &taken);
+    if (status != CAV_OK || !taken) break;
+    calm = d->gain < slow * cost_scale(run->tr) ? calm + 1 : 0;
+    if (cav_run_report(run, cav_quadratic_length(d->qp), largest_radius(run->tr, d->radius))) status = CAV_INTERRUPTED;
+  }
+  *settled = !taken || calm >= PATIENCE;
+  return status == CAV_OK ? settle_rows(run, d) : status;
+}
+
+/// A step across a jump of the merit, in the largest box in which it loses little. *taken: whether there is one.
+static cav_status leap(cav_solve_run *run, descent *d, int *taken) {
+  *taken = 0;
+  double scale = cost_scale(run->tr), trial;
+  cav_status status = CAV_OK;
+  for (int i = 0; i < LEAP_BOXES && !*taken; i++) {
+    set_radius(run->tr, d->radius, leap_box[i]);
+    status = solve_model(run, d);
+    if (status != CAV_OK) return status;
+    d->merit = merit_of(run->tr, cav_quadratic_penalty(d->qp), d->before);
+    status = try_step(run, d, 1, cav_quadratic_decrease(d->qp), &trial);
+    if (status != CAV_OK) return status;
+    *taken = trial - d->merit < leap_loss * scale;
+    if (!*taken) status = cav_transcription_values(run->tr, run->at);
+    if (status != CAV_OK) return status;
+  }
+  if (*taken) exchange(&run->at, &run->spare);
+  return CAV_OK;
+}
+
+/// Iterations to the end. Where they end before the motion is optimal a jump of the merit holds them: a contact comes
+/// or goes there. Steps across are tried, and the best of the ends is kept. *settled: whether that is one.
+static cav_status descend(cav_solve_run *run, descent *d, int *settled) {
+  int left = ITERATIONS, taken = 1, ended;
+  cav_trajectory *best = NULL;
+  double cost = INFINITY;
+  cav_status status = CAV_OK;
+  for (int i = 0; taken && status == CAV_OK; i++) {
+    status = settle(run, d, &left, &ended);
+    if (status != CAV_OK) break;
+    double reached = cav_run_met(run) ? cav_transcription_cost(run->tr) : INFINITY;
+    if (i == 0 && !cav_run_met(run)) break;
+    if (!(reached < (1 - slow) * cost)) {
+      if (reached >= cost) exchange(&run->at, &best);
+      status = cav_transcription_values(run->tr, run->at);
+      if (status == CAV_OK) status = measure(run, d, 1);
+      break;
+    }
+    cost = reached;
+    *settled = ended;
+    cav_trajectory_free(best);
+    best = cav_trajectory_copy(run->at);
+    status = best ? measure(run, d, 1) : CAV_NO_MEMORY;
+    if (status != CAV_OK || run->optimality < optimal || i == LEAPS || left <= 0) break;
+    status = leap(run, d, &taken);
+  }
+  cav_trajectory_free(best);
+  return status;
 }
 
 cav_status cav_sqp(cav_solve_run *run) {
@@ -367,7 +517,6 @@ cav_status cav_sqp(cav_solve_run *run) {
   if (status == CAV_OK) begin(run, &d);
   run->measured = 0;
   if (status == CAV_OK) status = descend(run, &d, &settled);
-  if (status == CAV_OK && cav_run_met(run)) status = measure(run, &d);
   run->tr->penalty = kept;
   if (status == CAV_OK) status = cav_transcription_values(run->tr, run->at);
   int met = status == CAV_OK && cav_run_met(run);
@@ -392,10 +541,8 @@ cav_status cav_sqp_measure(cav_solve_run *run) {
   cav_status status = descent_new(&d, run) ? cav_transcription_values(run->tr, run->at) : CAV_NO_MEMORY;
   if (status == CAV_OK) begin(run, &d);
   // multipliers first, then the decrease with the curvature that goes with them
-  if (status == CAV_OK) status = measure(run, &d);
-  d.ratio = 0;
-  if (status == CAV_OK) status = model(run, &d);
-  if (status == CAV_OK) status = measure(run, &d);
+  if (status == CAV_OK) status = measure(run, &d, 0);
+  if (status == CAV_OK) status = measure(run, &d, 1);
   run->tr->penalty = kept;
   descent_free(&d);
   return status;

@@ -1,9 +1,9 @@
 /// Second derivatives of the Lagrangian that Gauss-Newton leaves out, knot by knot. What is nonlinear at a knot are its
 /// readings y(q, v, v'): forces, contacts, sensors. With the pull p = dL/dy held, the curvature is the derivative of
 /// the adjoint product (dy/dz)' p by z = (q, v, v'), taken by differences of analytic derivatives, made symmetric and
-/// chained to the three neighbouring knots. Rows that are linear in the unknowns (rates, accelerations, postures,
-/// ranges) have none but for the curvature of rotations, whose sum over all rows vanishes where the Lagrangian is
-/// stationary, and which is left out.
+/// chained to the three neighbouring knots. Rates bend where they are rotations', with both ends of their step: by the
+/// pull of all rows on them, costs and constraints of rates included. Left out are rotation vectors to a posture, and
+/// the products of cost terms over power.
 #include "lagrangian.h"
 
 #include <math.h>
@@ -11,9 +11,13 @@
 #include <string.h>
 
 #include "knot.h"
+#include "rotation.h"
 
 /// Differences: of configurations, rad or m; of velocities that times the step.
-static const double shift = 1e-6;
+static const double shift = 3e-7;
+
+/// Differences of a rotation's Jacobian, rad.
+static const double rotation_shift = 1e-5;
 
 typedef struct curve {
   cav_transcription *tr;
@@ -85,6 +89,87 @@ static void pull_rows(const cav_transcription *tr, int t, double *pull) {
   }
 }
 
+/// Adds what a term over rates pulls v_t and v_{t+1} by, out [2nv]; multiplier: of its rows, where it is a hard one.
+static void pull_rates(const curve *c, cav_scratch *s, const cav_term *term, int t, const cav_slot *slot, double *out) {
+  const cav_transcription *tr = c->tr;
+  int nv = tr->nv, rate = term->quantity == CAV_QUANTITY_ACCELERATION;
+  const double *v = cav_velocity_at(tr, c->at, t), *v_next = cav_velocity_after(tr, c->at, t);
+  double h = tr->options.timestep, weight = c->factor * term->weight * cav_term_weight(tr, term, t);
+  if (!rate && term->quantity != CAV_QUANTITY_VELOCITY) return;
+  cav_term_target(term, tr->knot[t].time, nv, s->tangent);
+  for (int d = 0; d < nv; d++) {
+    if (!cav_dof_selected(tr, term, d)) continue;
+    double r = ((rate ? (v_next[d] - v[d]) / h : v[d]) - s->tangent[d]) / term->scale;
+    double pull = term->use == CAV_USE_COST ? derivative_of(term, weight, r, 1) : (slot++)->final_multiplier;
+    pull /= rate ? term->scale * h : term->scale;
+    out[d] += rate ? -pull : pull;
+    if (rate) out[nv + d] += pull;
+  }
+}
+
+/// The same of all terms of a knot.
+static void pull_all_rates(const curve *c, cav_scratch *s, int t, double *out) {
+  const cav_transcription *tr = c->tr;
+  const cav_slot *slot = tr->knot[t].slot + tr->knot[t].layout.term;
+  for (int j = 0; j < tr->problem->nterm; j++) {
+    const cav_term *term = &tr->problem->term[j];
+    if (cav_term_weight(tr, term, t) == 0) continue;
+    if (term->use != CAV_USE_COST || tr->knot[t].has_force || term->quantity != CAV_QUANTITY_ACCELERATION)
+      pull_rates(c, s, term, t, slot, out);
+    if (term->use == CAV_USE_COST) continue;
+    for (int d = 0; term->quantity != CAV_QUANTITY_SENSOR && d < tr->nv; d++) slot += cav_dof_selected(tr, term, d);
+    slot += cav_term_readings(tr, term, t);
+  }
+}
+
+/// Derivative by phi of row' J, J = Jr^-1 or its transpose Jl^-1: out[c][k] = sum over r of row[r] dJ[r][c]/dphi[k].
+static void bend_rotation(const double phi[3], const double row[3], int start, double out[3][3]) {
+  for (int k = 0; k < 3; k++) {
+    double J[2][9];
+    for (int side = 0; side < 2; side++) {
+      double beside[3] = {phi[0], phi[1], phi[2]};
+      beside[k] += side ? rotation_shift : -rotation_shift;
+      cav_rotation_jacobian_inverse(beside, J[side]);
+    }
+    for (int c = 0; c < 3; c++) {
+      out[c][k] = 0;
+      for (int r = 0; r < 3; r++) {
+        int at = start ? 3 * c + r : 3 * r + c;
+        out[c][k] += row[r] * (J[1][at] - J[0][at]) / (2 * rotation_shift);
+      }
+    }
+  }
+}
+
+/// Adds to H [3nv*3nv], over the three knots, the curvature of a step's rotation that is pulled by row [nv]: column
+/// blocks from and to of its ends, -1: held. rotation: of the step (CAV_ROTATION_SIZE a joint).
+static void curve_rotations(const cav_transcription *tr, const double *rotation, const double *row, int from, int to,
+                            double *H) {
+  int nv = tr->nv, width = 3 * nv, end[2] = {to, from};
+  double h = tr->options.timestep;
+  for (int k = 0; k < tr->nrotation; k++) {
+    const double *J = rotation + CAV_ROTATION_SIZE * k;
+    int dof = tr->rotation_dof[k];
+    for (int a = 0; a < 2; a++) {
+      double bent[3][3];
+      if (end[a] < 0) continue;
+      bend_rotation(J + 18, row + dof, a, bent);
+      for (int b = 0; b < 2; b++) {
+        if (end[b] < 0) continue;
+        // gradient by an end: (a ? -Jl^-1 : Jr^-1)' row / h; the rotation moves by b ? -Jl^-1 : Jr^-1. Half to each
+        // triangle makes it symmetric
+        for (int i = 0; i < 9; i++) {
+          double sum = 0, sign = a == b ? 1 : -1;
+          for (int m = 0; m < 3; m++) sum += bent[i / 3][m] * J[9 * b + 3 * m + i % 3];
+          int r = end[a] * nv + dof + i / 3, column = end[b] * nv + dof + i % 3;
+          H[(size_t)r * (size_t)width + (size_t)column] += 0.5 * sign * sum / h;
+          H[(size_t)column * (size_t)width + (size_t)r] += 0.5 * sign * sum / h;
+        }
+      }
+    }
+  }
+}
+
 /// The adjoint product at z moved by a distance along coordinate j.
 static cav_status adjoint_beside(const curve *c, cav_scratch *s, int t, int j, double distance, const double *pull,
                                  double *moved, double *g) {
@@ -97,7 +182,8 @@ static cav_status adjoint_beside(const curve *c, cav_scratch *s, int t, int j, d
   (kind == 0 ? step : kind == 1 ? v : v_next)[j % nv] += distance;
   const double *here = c->at->q + (size_t)t * c->at->nq;
   if (kind == 0) cav_integrate(tr->model, here, step, 1, q);
-  cav_status status = cav_inverse(tr->model, s->state, kind == 0 ? q : here, v, v_next, s->value);
+  cav_stage same = kind == 0 ? CAV_STAGE_NONE : CAV_STAGE_POSITION;
+  cav_status status = cav_inverse_from(tr->model, s->state, same, kind == 0 ? q : here, v, v_next, s->value);
   return status == CAV_OK ? cav_readings_adjoint(tr, s, t, pull, g) : status;
 }
 
@@ -105,6 +191,17 @@ static cav_status adjoint_beside(const curve *c, cav_scratch *s, int t, int j, d
 static int kind_moves(const cav_transcription *tr, int t, int kind) {
   int closed = t == tr->nknot - 1 && !tr->periodicity;
   return kind == 2 ? !closed || !tr->problem->close_at_rest : tr->periodicity || t > 0;
+}
+
+/// Adds the curvature of the rates about a knot, that readings pull by pull [2nv], which is added to.
+static void curve_rates(const curve *c, cav_scratch *s, int t, double *pull, double *H) {
+  const cav_transcription *tr = c->tr;
+  int here = cav_knot_moves(tr, t), closed = t == tr->nknot - 1 && !tr->periodicity;
+  pull_all_rates(c, s, t, pull);
+  if (here) curve_rotations(tr, tr->knot[t].rotation, pull, cav_knot_moves(tr, t - 1) ? 0 : -1, 1, H);
+  if (!closed)
+    curve_rotations(tr, t + 1 < tr->nknot ? tr->knot[t + 1].rotation : tr->rotation_after, pull + tr->nv, here ? 1 : -1,
+                    2, H);
 }
 
 static cav_status curve_knot(const curve *c, cav_scratch *s, int t, double *room) {
@@ -124,7 +221,9 @@ static cav_status curve_knot(const curve *c, cav_scratch *s, int t, double *room
   pull_rows(tr, t, pull);
   status = cav_readings_adjoint(tr, s, t, pull, base);
   memset(K, 0, width * width * sizeof *K);
-  for (int j = 0; j < 3 * tr->nv && status == CAV_OK; j++) {
+  // velocities first, while the state's positions stand
+  for (int k = 0; k < 3 * tr->nv && status == CAV_OK; k++) {
+    int j = (k + tr->nv) % (3 * tr->nv);
     if (!kind_moves(tr, t, j / tr->nv)) continue;
     double distance = j < tr->nv ? shift : shift / tr->options.timestep;
     status = adjoint_beside(c, s, t, j, distance, pull, moved, K + (size_t)j * width);
@@ -145,6 +244,7 @@ static cav_status curve_knot(const curve *c, cav_scratch *s, int t, double *room
   for (size_t i = 0; i < width; i++)
     for (size_t j = 0; j < width; j++) K[i * width + j] = half[j * width + i];
   cav_transcription_chain(tr, t, (int)width, K, half);
+  curve_rates(c, s, t, base + nv, half);
   if (tr->periodicity && (t < 2 || t == tr->nknot - 1)) {
     cav_transcription_wrap(tr, s, t, (int)width, half);
     for (size_t i = 0; i < width; i++)
