@@ -483,7 +483,12 @@ static cav_status approach(cav_quadratic *p, double tolerance, double *left) {
     held = length < 1e-3 ? held + 1 : 0;
     *left *= 1 - length;
     p->gap = gap_of(p);
-    if (!isfinite(p->gap)) return CAV_NOT_FINITE;
+    // as from a model that is far from convex: no step then
+    if (!isfinite(p->gap)) {
+      memset(p->x, 0, (size_t)p->n * sizeof(double));
+      p->gap = INFINITY;
+      break;
+    }
     // one that converges does so in some twenty iterations; where the model is not convex the gap stands still
     if (i % WINDOW < WINDOW - 1) continue;
     if (p->gap > 0.1 * past) break;

@@ -9,7 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/// Contacts that push less than this fraction of the weight get no rows of their own.
+/// Contacts that push less than this fraction of the weight get no rows of their own; those of the others begin at zero
+/// there, or the cost would jump where one comes.
 static const double contact_floor = 1e-6;
 
 /// What is read off a state at knot t: u, four numbers a contact, the sensors of the terms that speak there.
@@ -19,18 +20,26 @@ typedef struct readings {
   const int *key;
 } readings;
 
+/// What gap and velocities of a contact are weighted by: the root of its fraction f of the weight, less floor over root.
+/// slope: derivative by its impulse.
+static double contact_weight(const cav_transcription *tr, const cav_contact *c, double *slope) {
+  double unit = tr->options.timestep * tr->weight, f = c->impulse[0] / unit, root = sqrt(fmax(f, contact_floor));
+  if (slope) *slope = f > contact_floor ? 0.5 * (1 + contact_floor / f) / (root * unit) : 0;
+  return root - contact_floor / root;
+}
+
 static void read_contact(const cav_transcription *tr, const cav_contact *c, double *y) {
   memset(y, 0, CAV_CONTACT_READINGS * sizeof *y);
   if (!tr->model->pair[c->pair].external) {
     y[0] = fmax(-c->dist, 0);
     return;
   }
-  double fraction = sqrt(fmax(c->impulse[0], 0) / (tr->options.timestep * tr->weight));
+  double fraction = contact_weight(tr, c, NULL);
   y[0] = fraction * fmax(c->dist, 0);
   y[1] = c->dim > 1 ? fraction * c->velocity_next[1] : 0;
   y[2] = c->dim > 1 ? fraction * c->velocity_next[2] : 0;
   y[3] = fraction * c->velocity_next[0];
-  y[4] = fraction * fraction;
+  y[4] = fmax(c->impulse[0], 0) / (tr->options.timestep * tr->weight);
 }
 
 static void read_knot(const cav_model *model, cav_state *state, void *context, double *value) {
@@ -159,8 +168,7 @@ static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s
                               .impulse_dv_next = at + 25 * n};
   cav_status status = cav_contact_derivatives(tr->model, s->state, (int)(c - s->state->contact), &d);
   if (status != CAV_OK) return status;
-  double fraction = sqrt(fmax(c->impulse[0], 0) / (tr->options.timestep * tr->weight));
-  double half = c->impulse[0] > 0 ? 0.5 * fraction / c->impulse[0] : 0;
+  double slope, fraction = contact_weight(tr, c, &slope);
   for (int k = 0; k < 4; k++) {
     int row = k == 3 ? 0 : k, gap = k == 0, given = gap || row < c->dim;
     double value = gap ? fmax(c->dist, 0) : given ? c->velocity_next[row] : 0, open = c->dist > 0;
@@ -168,9 +176,9 @@ static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s
       int i = row * nv + j;
       double by_q = gap ? open * d.dist_dq[j] : given ? d.velocity_dq[i] : 0;
       double by_next = gap || !given ? 0 : d.velocity_dv_next[i];
-      out.dq[k * nv + j] = half * value * d.impulse_dq[j] + fraction * by_q;
-      out.dv[k * nv + j] = half * value * d.impulse_dv[j];
-      out.dn[k * nv + j] = half * value * d.impulse_dv_next[j] + fraction * by_next;
+      out.dq[k * nv + j] = slope * value * d.impulse_dq[j] + fraction * by_q;
+      out.dv[k * nv + j] = slope * value * d.impulse_dv[j];
+      out.dn[k * nv + j] = slope * value * d.impulse_dv_next[j] + fraction * by_next;
     }
   }
   double unit = c->impulse[0] > 0 ? 1 / (tr->options.timestep * tr->weight) : 0;
