@@ -34,7 +34,7 @@ static int done(const outcome *o) {
   return !*o->claimed.lost && !*o->own.lost && o->claimed.error <= near_enough && o->own.error <= near_enough;
 }
 
-cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription *tr, const cav_trajectory *at,
+cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription *tr, const cav_trajectory *at, int sets,
                             cav_solution *solution, cav_error *error) {
   size_t n = ((size_t)tr->nknot - 1) * (size_t)tr->nv * (size_t)tr->nv;
   double *gain = malloc(2 * n * sizeof *gain);
@@ -42,7 +42,7 @@ cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription 
   solution->gain_v = calloc(n, sizeof(double));
   cav_status status = gain && solution->gain_q && solution->gain_v ? CAV_OK : CAV_NO_MEMORY;
   outcome best = {0};
-  int trials = (int)(sizeof trial / sizeof *trial), first = 1;
+  int all = (int)(sizeof trial / sizeof *trial), trials = sets > 0 && sets < all ? sets : all, first = 1;
   for (int i = 0; i < trials && status == CAV_OK && (first || !done(&best)); i++) {
     outcome now;
     cav_options law = tr->options;

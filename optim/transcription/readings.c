@@ -21,10 +21,10 @@ typedef struct readings {
 } readings;
 
 /// What gap and velocities of a contact are weighted by: the root of its fraction f of the weight, less floor over root.
-/// slope: derivative by its impulse.
-static double contact_weight(const cav_transcription *tr, const cav_contact *c, double *slope) {
+/// derivative: of that by its impulse.
+static double contact_weight(const cav_transcription *tr, const cav_contact *c, double *derivative) {
   double unit = tr->options.timestep * tr->weight, f = c->impulse[0] / unit, root = sqrt(fmax(f, contact_floor));
-  if (slope) *slope = f > contact_floor ? 0.5 * (1 + contact_floor / f) / (root * unit) : 0;
+  if (derivative) *derivative = f > contact_floor ? 0.5 * (1 + contact_floor / f) / (root * unit) : 0;
   return root - contact_floor / root;
 }
 
@@ -168,7 +168,7 @@ static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s
                               .impulse_dv_next = at + 25 * n};
   cav_status status = cav_contact_derivatives(tr->model, s->state, (int)(c - s->state->contact), &d);
   if (status != CAV_OK) return status;
-  double slope, fraction = contact_weight(tr, c, &slope);
+  double derivative, fraction = contact_weight(tr, c, &derivative);
   for (int k = 0; k < 4; k++) {
     int row = k == 3 ? 0 : k, gap = k == 0, given = gap || row < c->dim;
     double value = gap ? fmax(c->dist, 0) : given ? c->velocity_next[row] : 0, open = c->dist > 0;
@@ -176,9 +176,9 @@ static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s
       int i = row * nv + j;
       double by_q = gap ? open * d.dist_dq[j] : given ? d.velocity_dq[i] : 0;
       double by_next = gap || !given ? 0 : d.velocity_dv_next[i];
-      out.dq[k * nv + j] = slope * value * d.impulse_dq[j] + fraction * by_q;
-      out.dv[k * nv + j] = slope * value * d.impulse_dv[j];
-      out.dn[k * nv + j] = slope * value * d.impulse_dv_next[j] + fraction * by_next;
+      out.dq[k * nv + j] = derivative * value * d.impulse_dq[j] + fraction * by_q;
+      out.dv[k * nv + j] = derivative * value * d.impulse_dv[j];
+      out.dn[k * nv + j] = derivative * value * d.impulse_dv_next[j] + fraction * by_next;
     }
   }
   double unit = c->impulse[0] > 0 ? 1 / (tr->options.timestep * tr->weight) : 0;
