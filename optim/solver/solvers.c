@@ -45,7 +45,7 @@ cav_status cav_solver_gn(cav_solve_run *run, cav_error *error) {
 /// Multipliers for Ipopt to start from: the rows' final ones.
 static cav_status warm_start(cav_solve_run *run) {
   run->warm = 1;
-  return cav_sqp_measure(run);
+  return run->measured ? CAV_OK : cav_sqp_measure(run);
 }
 
 static cav_status ipopt_from_here(cav_solve_run *run, cav_error *error) {
