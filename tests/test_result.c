@@ -179,6 +179,20 @@ static void check_verdict(const cav_problem *problem) {
   CHECK(!cav_verdict_optimal(&verdict));
   verdict.optimality = 0.9e-4;
   CHECK(cav_verdict_optimal(&verdict));
+  // a motion that the model's own contact parameters lose carries a mark, one that they keep none
+  for (int lost = 0; lost < 2; lost++) {
+    char table[8000];
+    verdict.periods = 2, verdict.duration = 1.5, verdict.model_contacts_seconds = lost ? 2.25 : 3;
+    FILE *out = fopen(problem_path, "w+");
+    CHECK(out != NULL);
+    if (!out) return;
+    cav_certificate_print(out, problem, &verdict, NULL);
+    rewind(out);
+    table[fread(table, 1, sizeof table - 1, out)] = 0;
+    fclose(out);
+    CHECK((strstr(table, "is lost at 2.25 of 3 s") != NULL) == lost);
+  }
+  write_file(problem_path, problem_text);
   verdict.limit_violation_max = 1e-3;
   CHECK(!cav_verdict_feasible(&verdict) && !cav_verdict_optimal(&verdict));
   // what only the solver knew comes back from the file

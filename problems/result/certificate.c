@@ -105,6 +105,11 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
             v->optimality, CAV_TOLERANCE_OPTIMAL);
   fprintf(out, "%s: %s on %s\n", v->certified ? "certified" : "NOT certified", problem->name, problem->model->name);
   if (!v->certified) fprintf(out, "  %s\n", v->reason);
+  // told, not required: the motion is planned under its own law of contacts
+  double whole = v->periods * v->duration;
+  if (v->model_contacts_seconds < whole * (1 - 1e-9))
+    fprintf(out, "  note: under the contact parameters of the model's file its closed loop is lost at %.3g of %.3g s\n",
+            v->model_contacts_seconds, whole);
   if (v->achieved) return;
   fprintf(out, "NOT achieved: %s misses %s", v->certified ? "it obeys physics, but" : "it also", v->missed);
   if (v->nmissed > 1) fprintf(out, ", and %d more of %d targets", v->nmissed - 1, v->ntarget);
