@@ -59,6 +59,16 @@ static char folder[] = "/tmp/cavort-feasibility-XXXXXX";
   "<joint name='wrist' axis='0 0 1'/><geom type='sphere' size='.05'/></body></body></worldbody><actuator><motor "      \
   "joint='wrist'/></actuator></mujoco>"
 
+// a ball that slides three ways over a floor, and a cell with walls; its door closed or open
+#define CELL(DOOR)                                                                                                     \
+  "<mujoco><worldbody><body name='ball' pos='0 0 .1'><joint name='x' type='slide' axis='1 0 0'/><joint name='y' "      \
+  "type='slide' axis='0 1 0'/><joint name='z' type='slide' axis='0 0 1'/><geom name='ball' type='sphere' size='.08'/>" \
+  "</body><geom type='box' pos='.5 0 .1' size='.02 .3 .3'/><geom type='box' pos='1.1 0 .1' size='.02 .3 .3'/>"         \
+  "<geom type='box' pos='.8 .3 .1' size='.3 .02 .3'/>" DOOR                                                            \
+  "<geom type='box' pos='.8 0 .4' size='.3 .3 .02'/>"                                                                  \
+  "<geom type='box' pos='.8 0 -.2' size='.3 .3 .02'/></worldbody><actuator><motor joint='x' gear='300'/><motor "       \
+  "joint='y' gear='300'/><motor joint='z' gear='300'/></actuator></mujoco>"
+
 typedef struct pair {
   const char *name, *model, *twin_model;            ///< twin_model NULL: the same
   const char *horizon, *start, *terms, *twin_terms; ///< twin_terms NULL: the same
@@ -107,6 +117,11 @@ static const pair pairs[] = {
     {"a box that is too heavy", TABLE("26"), TABLE("25"), SECOND, "<joint name='lift' pos='.5'/>",
      CONSTRAINT("<posture name='lifted' dofs='joints' qpos='.505' from='.5' to='1'/>"), NULL, CAV_CONDITION_STRENGTH,
      "'jack' at its limit"},
+    {"a target that is enclosed", CELL("<geom type='box' pos='.8 -.3 .1' size='.3 .02 .3'/>"), CELL(""), SECOND, "",
+     "<goal><joint name='x' pos='.8'/></goal><guess><waypoint time='.5'><joint name='x' pos='.8'/><joint name='y' "
+     "pos='-.8'/></waypoint></guess>" CONSTRAINT(
+         "<sensor name='in' type='framepos' geom='ball' target='.8 0 .1' at='end'/>"),
+     NULL, CAV_CONDITION_SOLID, "enclose it"},
     {"a start inside a solid", ARM("60", "-150 150"), NULL, SECOND, "<joint name='shoulder' degrees='30'/>",
      TIP("0 0 2.9"), NULL, CAV_CONDITION_SOLID, "the start: geom"},
 };

@@ -80,6 +80,7 @@ int cav_body_within(const cav_model *model, int body, int ancestor);
 cav_status cav_examine_contradictions(cav_examination *e); // contradiction.c
 cav_status cav_examine_distances(cav_examination *e);      // distance.c
 cav_status cav_examine_solids(cav_examination *e);         // solid.c
+cav_status cav_examine_enclosures(cav_examination *e);     // enclosure.c
 cav_status cav_examine_momentum(cav_examination *e);       // momentum.c
 cav_status cav_examine_strength(cav_examination *e);       // strength.c
 cav_status cav_examine_energy(cav_examination *e);         // energy.c
