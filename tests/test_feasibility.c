@@ -95,10 +95,10 @@ static const pair pairs[] = {
      CONSTRAINT("<posture name='far' joint='slide' qpos='8' at='1'/>"),
      CONSTRAINT("<posture name='far' joint='slide' qpos='.99' at='1'/>"), CAV_CONDITION_ENERGY, "too far for the time"},
     {"contradicting", ARM("60", "-150 150"), NULL, SECOND, "",
-     CONSTRAINT("<sensor name='high' type='framepos' site='tip' component='z' target='2.2' at='.6'/>"
-                "<sensor name='low' type='framepos' site='tip' component='z' target='1.8' at='.6'/>"),
-     CONSTRAINT("<sensor name='high' type='framepos' site='tip' component='z' target='2.2' at='.6'/>"
-                "<sensor name='low' type='framepos' site='tip' component='z' target='1.8' at='.65'/>"),
+     CONSTRAINT("<sensor name='high' type='framepos' site='tip' component='z' target='2.2' at='.5'/>"
+                "<sensor name='low' type='framepos' site='tip' component='z' target='2' at='.5'/>"),
+     CONSTRAINT("<sensor name='high' type='framepos' site='tip' component='z' target='2.2' at='.5'/>"
+                "<sensor name='low' type='framepos' site='tip' component='z' target='2' at='.65'/>"),
      CAV_CONDITION_CONTRADICTION, "'high'"},
     {"inside a wall", ARM("60", "-150 150"), NULL, SECOND, "", TIP(".75 0 1.6"), TIP(".65 0 1.6"), CAV_CONDITION_SOLID,
      "inside 'wall'"},
