@@ -24,6 +24,21 @@ static const double contact_noise = 1, smooth_noise = 1e-6, acceptable = 1e-4;
 /// The continuation: stages of the problem's schedule to one of Ipopt's, and iterations of each but the last.
 enum { STAGES_IN_ONE = 2, STAGE_ITERATIONS = 40 };
 
+/// Barrier parameter of the continuation's first and last stage, geometrically between: at a small one from the start the
+/// bounds, which a guess violates or touches, cut all steps to a tenth and less.
+static const double first_barrier = 1e-2, last_barrier = 1e-4;
+
+/// Gauss-Newton Hessians, whose dual infeasibility says nothing where contacts act: a stage has settled where the cost
+/// stays within a fraction of itself over a window of iterations, its rows not far off. A stage on the way ends there.
+/// The last one is closed: steps that the damping makes the shortest bring the rows in, within so many iterations.
+typedef struct settling {
+  int window;
+  double change;
+} settling;
+static const settling on_the_way = {8, 1e-2}, at_the_end = {12, 2e-3};
+static const double settled_violation = 0.1, closing_damping = 1e4;
+enum { CLOSING_ITERATIONS = 25, WINDOW_MOST = 16 };
+
 /// Gauss-Newton Hessians: added to the diagonal, per second of the step, 1/rad^2 or 1/m^2, at a stage's start and at
 /// least. It stands for the curvature that is left out: four times as much after a step that the line search cut, a
 /// quarter after a full one.
@@ -53,14 +68,20 @@ typedef struct program {
   double *full;                                 ///< [3nv+1] a row while it is rotated, and its entry of the step
   double damping;                               ///< of Gauss-Newton Hessians, per second
   double noise;                                 ///< of the dual
+  double barrier;                               ///< parameter that the stage starts from
   int exact;                                    ///< the Hessian has the curvature of all rows
   double **hessian;                             ///< [nknot][9nv^2] of the Lagrangian
   double *near;                                 ///< [3n] a point beside x and gradients there, where the step is free
   int *entry;                 ///< [2*entries of the Hessian] its rows, then its columns, where the step is free
+  int settles;                ///< with a Hessian of Gauss-Newton that the damping can steer
   double infeasibility, dual; ///< of the last iterate, as Ipopt measures them
   double *best_x;             ///< [n] the iterate that is nearest to an optimum
   double best_error, best_infeasibility, best_dual;
-  int best_iteration; ///< -1: none yet
+  int best_iteration;              ///< -1: none yet
+  int passing;                     ///< a stage on the way to the last
+  double recent_cost[WINDOW_MOST]; ///< a ring
+  int window_start, settled;       ///< iteration from which costs count; one at which they had settled, 0: not yet
+  int finished;                    ///< stopped by us: settled, and where it is the last stage with its rows in
   int interrupted;
 } program;
 
@@ -261,19 +282,41 @@ static void keep_best(program *p, int iteration) {
   p->best_iteration = iteration;
 }
 
+/// Notes an iterate's cost; whether the window up to it has settled. Restoration knows no cost: the window begins anew.
+static int has_settled(program *p, int mode, int iteration, double cost) {
+  const settling *rule = p->passing ? &on_the_way : &at_the_end;
+  double least = cost, most = cost;
+  p->recent_cost[iteration % WINDOW_MOST] = cost;
+  if (mode) p->window_start = iteration + 1;
+  if (!p->settles || iteration < p->window_start + rule->window || p->infeasibility > settled_violation) return 0;
+  for (int i = 1; i <= rule->window; i++) {
+    least = fmin(least, p->recent_cost[(iteration - i) % WINDOW_MOST]);
+    most = fmax(most, p->recent_cost[(iteration - i) % WINDOW_MOST]);
+  }
+  return most - least < rule->change * fabs(cost);
+}
+
+/// Whether Ipopt is to stop here: a stage that has settled, the last one also closed.
+static int is_finished(program *p, int mode, int iteration, double cost) {
+  if (!p->settled && has_settled(p, mode, iteration, cost)) p->settled = iteration;
+  if (!p->settled) return 0;
+  p->damping = closing_damping;
+  return p->passing || p->infeasibility <= p->run->options->tolerance || iteration >= p->settled + CLOSING_ITERATIONS;
+}
+
 static Bool progress(int mode, int iteration, double cost, double infeasibility, double dual, double mu, double step,
                      double regularisation, double dual_step, double primal_step, int trials, UserDataPtr data) {
   program *p = data;
-  (void)cost, (void)mu, (void)regularisation, (void)dual_step;
+  (void)mu, (void)regularisation, (void)dual_step;
   p->infeasibility = infeasibility;
   p->dual = dual;
   if (mode == 0) keep_best(p, iteration);
   if (iteration > 0)
     p->damping =
         trials > 1 ? fmin(p->damping * damping_change, most_damping) : fmax(p->damping / damping_change, least_damping);
-  if (!p->known) return 1;
-  p->interrupted = cav_run_report(p->run, step * primal_step, 0) != 0;
-  return !p->interrupted;
+  p->finished = is_finished(p, mode, iteration, cost);
+  if (p->known) p->interrupted = cav_run_report(p->run, step * primal_step, 0) != 0;
+  return !p->interrupted && !p->finished;
 }
 
 /// Rows: every slot but the ranges of scalar joints, which bound the unknowns.
@@ -391,7 +434,6 @@ static const cav_ipopt_option usual[] = {
     {"max_iter", "200"},
     {"acceptable_iter", "10"},
     {"acceptable_constr_viol_tol", "1e-4"},
-    {"mu_init", "1e-4"},
     {"mumps_mem_percent", "200"},
     {"mumps_pivot_order", "0"}, // AMD, 6 % faster here than METIS, which MUMPS would choose
     {"warm_start_bound_push", "1e-6"},
@@ -439,7 +481,7 @@ static int set_options(IpoptProblem nlp, const program *p, int iterations) {
   ok = ok && set_list(nlp, sizeof usual / sizeof *usual, usual);
   ok = ok && (p->exact ? set_list(nlp, sizeof sharp / sizeof *sharp, sharp)
                        : set_list(nlp, sizeof rough / sizeof *rough, rough));
-  ok = ok && AddIpoptNumOption(nlp, "constr_viol_tol", o->tolerance);
+  ok = ok && AddIpoptNumOption(nlp, "constr_viol_tol", o->tolerance) && AddIpoptNumOption(nlp, "mu_init", p->barrier);
   if (run->warm) ok = ok && AddIpoptStrOption(nlp, "warm_start_init_point", "yes");
   ok = ok && set_list(nlp, run->problem->nipopt, run->problem->ipopt) && set_list(nlp, o->nipopt, o->ipopt);
   const char *most = option_given(run, "max_iter");
@@ -469,6 +511,7 @@ static cav_status conclude(const program *p, enum ApplicationReturnStatus code, 
        "Ipopt's steps became too small: the noise of the derivatives bounds what it can reach"},
       {Diverging_Iterates, CAV_NOT_CONVERGED, "Ipopt's iterates diverge"},
       {Maximum_Iterations_Exceeded, CAV_NOT_CONVERGED, "Ipopt reached its iteration limit (max_iter)"},
+      {User_Requested_Stop, CAV_NOT_CONVERGED, "Ipopt's costs settled before its constraints held"},
       {Maximum_CpuTime_Exceeded, CAV_NOT_CONVERGED, "Ipopt reached its time limit (max_cpu_time)"},
       {Not_Enough_Degrees_Of_Freedom, CAV_NOT_CONVERGED, "the problem has more equality constraints than unknowns"},
       {Invalid_Number_Detected, CAV_NOT_FINITE, "the dynamics gave Ipopt a number that is not finite"},
@@ -478,6 +521,7 @@ static cav_status conclude(const program *p, enum ApplicationReturnStatus code, 
       {Insufficient_Memory, CAV_NO_MEMORY, "Ipopt ran out of memory"},
   };
   if (p->interrupted) return CAV_INTERRUPTED;
+  if (p->finished && (p->passing || p->infeasibility <= p->run->options->tolerance)) return CAV_OK;
   for (size_t i = 0; i < sizeof meaning / sizeof *meaning; i++) {
     if (meaning[i].code != code) continue;
     // an iterate whose rows hold and whose dual is noise is a solution, however Ipopt went on from there
@@ -539,9 +583,15 @@ static int program_new(program *p) {
   return ok;
 }
 
+/// Whether Ipopt is to approximate the Hessian by itself.
+static int is_limited(const cav_solve_run *run) {
+  const char *approximation = option_given(run, "hessian_approximation");
+  return approximation && !strcmp(approximation, "limited-memory");
+}
+
 /// Solves at the transcription's law from run->at and leaves the result there: at a stage's end its last iterate, else
 /// the best.
-static cav_status solve_stage(cav_solve_run *run, int exact, int iterations, cav_error *error) {
+static cav_status solve_stage(cav_solve_run *run, double fraction, int exact, int iterations, cav_error *error) {
   cav_transcription *tr = run->tr;
   cav_penalties kept = tr->penalty;
   cav_derivative difference = tr->difference;
@@ -550,8 +600,11 @@ static cav_status solve_stage(cav_solve_run *run, int exact, int iterations, cav
                .anchor = cav_trajectory_copy(run->at),
                .best_iteration = -1,
                .noise = law_acts(tr->model) ? contact_noise : smooth_noise,
+               .barrier = first_barrier * pow(last_barrier / first_barrier, fraction),
                .damping = damping,
-               .exact = exact};
+               .exact = exact,
+               .settles = !exact && !is_limited(run),
+               .passing = iterations > 0};
   IpoptProblem nlp = NULL;
   double *bound = NULL, *start = NULL, *multiplier = NULL;
   cav_status status = CAV_NO_MEMORY;
@@ -581,7 +634,7 @@ static cav_status solve_stage(cav_solve_run *run, int exact, int iterations, cav
       IpoptSolve(nlp, start, NULL, NULL, multiplier, multiplier + p.m, multiplier + p.m + p.n, &p);
   status = conclude(&p, code, error);
   // one that failed or was stopped gives its best iterate, with the multipliers that it started from
-  int ended = code == Solve_Succeeded || code == Solved_To_Acceptable_Level ||
+  int ended = code == Solve_Succeeded || code == Solved_To_Acceptable_Level || p.finished ||
               (iterations > 0 && code == Maximum_Iterations_Exceeded);
   int best = !ended && p.best_iteration >= 0;
   if (!best) multipliers_of(&p, multiplier, 1);
@@ -614,7 +667,7 @@ static cav_status measure(cav_solve_run *run, double *violation, double *cost) {
 static cav_status run_stage(cav_solve_run *run, double fraction, int exact, int iterations, cav_error *error) {
   int begin = run->solution->iterations;
   run->stage++;
-  cav_status status = solve_stage(run, exact, iterations, error);
+  cav_status status = solve_stage(run, fraction, exact, iterations, error);
   cav_outcome outcome = status == CAV_OK              ? CAV_OUTCOME_SETTLED
                         : status == CAV_NOT_CONVERGED ? CAV_OUTCOME_LIMIT
                                                       : CAV_OUTCOME_STOPPED;
@@ -652,10 +705,7 @@ cav_status cav_ipopt(cav_solve_run *run, cav_error *error) {
   int acts = law_acts(run->problem->model), alone = run->options->solver == CAV_SOLVER_IPOPT && acts;
   int stages = alone && !run->options->ipopt_derivative_test ? (run->problem->schedule.stages + 1) / STAGES_IN_ONE : 1;
   int exact = is_exact(run), iterations = acts && !exact ? EXACT_ITERATIONS / run->problem->model->nv : 0;
-  const char *approximation = option_given(run, "hessian_approximation");
-  if (iterations < LEAST_EXACT_ITERATIONS || option_given(run, hessian_option) ||
-      (approximation && !strcmp(approximation, "limited-memory")))
-    iterations = 0;
+  if (iterations < LEAST_EXACT_ITERATIONS || option_given(run, hessian_option) || is_limited(run)) iterations = 0;
   cav_status status = CAV_OK;
   run->stages = stages + (iterations > 0);
   run->stage = 0;

@@ -52,6 +52,9 @@ static cav_status ipopt_from_here(cav_solve_run *run, cav_error *error) {
   cav_status status = cav_ipopt(run, error);
   if (status != CAV_OK && status != CAV_NOT_CONVERGED) return status;
   run->measured = 0;
+  cav_status values = cav_transcription_values(run->tr, run->at);
+  if (values != CAV_OK) return values;
+  if (cav_run_met(run)) return status;
   // what Ipopt left is worth bringing in, though it stays unfinished
   cav_status restored = cav_restore(run);
   if (status == CAV_OK || restored != CAV_NOT_CONVERGED) status = restored == CAV_OK ? status : restored;
