@@ -4,7 +4,8 @@
 # of their factors against new ones), normal (normal
 # equations by bands, by groups of trees and by CHOLMOD), unused (what a plan pays for things out of its reach), sweep (broad phase), conservation (drift of energy and
 # momentum), orders (error of the orders of the step against their time), absent (what features cost where a scene has none of
-# them), optimum (optimal control against known optima), sensors, tendons, actuation, fluid (readings, strings, drives and
+# them), optimum (optimal control against known optima), methods (own solver and Ipopt on the same),
+# sensors, tendons, actuation, fluid (readings, strings, drives and
 # drag against MuJoCo's).
 # CAVORT_BUILD names a build folder, by default build.
 set -eu
@@ -112,7 +113,21 @@ optimum() {
   mv "$out/optimum.tmp" "$out/optimum.md"
 }
 
-for name in ${*:-inverse heap update normal unused sweep conservation orders sensors tendons actuation fluid optimum absent}; do
+# the same problems on one grid by the own solver and by Ipopt with each Hessian
+methods() {
+  ninja -C "$build" tests/test_optimum >/dev/null
+  {
+    echo "# Methods on problems with known optima"
+    echo
+    provenance "\`sh tests/results.sh methods\`: each problem of tests/optimum on the second grid of its decade; cost off: relative to the truth, which the step bounds from below; seconds of one processor" |
+      sed '/^$/d; s/^machine/\n- machine/; s/^compiler/- compiler/; s/^commit/- commit/'
+    echo
+    "$build/tests/test_optimum" methods | grep '^|'
+  } >"$out/methods.tmp"
+  mv "$out/methods.tmp" "$out/methods.md"
+}
+
+for name in ${*:-inverse heap update normal unused sweep conservation orders sensors tendons actuation fluid optimum methods absent}; do
   case $name in
     inverse) run inverse bench_inverse ;;
     heap) run heap bench_heap ;;
@@ -127,7 +142,8 @@ for name in ${*:-inverse heap update normal unused sweep conservation orders sen
     actuation) run actuation test_actuation ;;
     fluid) run fluid test_fluid ;;
     optimum) optimum ;;
+    methods) methods ;;
     absent) absent ;;
-    *) echo "usage: sh tests/results.sh [inverse|heap|update|normal|unused|sweep|conservation|orders|sensors|tendons|actuation|fluid|optimum|absent]..." >&2 && exit 2 ;;
+    *) echo "usage: sh tests/results.sh [inverse|heap|update|normal|unused|sweep|conservation|orders|sensors|tendons|actuation|fluid|optimum|methods|absent]..." >&2 && exit 2 ;;
   esac
 done

@@ -1,8 +1,11 @@
 /// Optimal control with known optima: cost, duration, states, forces and multipliers against the truth on grids from
 /// coarse to ten times as fine, errors falling at the stated order, iterations of linear-quadratic problems, and how
 /// optimal the solver and the verifier say that the motion is. Usage: test_optimum [gn|ipopt|both] [table] [NAME...].
-/// table prints the whole decade as Markdown; else two grids are run.
+/// table prints the whole decade as Markdown; else two grids are run. test_optimum methods [NAME...] compares methods on
+/// one grid, the second of the decade, and judges nothing.
 #include "optimum.h"
+
+#include <time.h>
 
 // ---------------------------------------------------------------- construction
 
@@ -64,8 +67,17 @@ double optimum_multiplier_sum(const cav_solution *s, cav_binding_kind kind, int 
 typedef struct outcome {
   cav_status status;
   double step, cost, time, state, force, multiplier_error, optimality, verified;
+  double seconds;                    ///< processor time
   int iterations, stage_most, after; ///< of the solve, of one stage, after the last stage
 } outcome;
+
+/// A way to solve.
+typedef struct method {
+  const char *name;
+  cav_solver solver;
+  int noption;
+  cav_ipopt_option option;
+} method;
 
 /// Largest or mean |a - b| over the largest |b|; 0 where b is not known.
 static double distance(int n, const double *a, const double *b, int in_mean) {
@@ -112,7 +124,15 @@ static double verify(const cav_problem *problem, const cav_solution *s) {
   return verdict.optimality;
 }
 
-static outcome solve(const optimum *o, const cav_model *model, int n, cav_solver solver) {
+static const method methods[] = {
+    {"own", CAV_SOLVER_GAUSS_NEWTON, 0, {0}},
+    {"Ipopt, auto", CAV_SOLVER_IPOPT, 0, {0}},
+    {"Ipopt, exact", CAV_SOLVER_IPOPT, 1, {"hessian", "exact"}},
+    {"Ipopt, Gauss-Newton", CAV_SOLVER_IPOPT, 1, {"hessian", "gauss-newton"}},
+    {"Ipopt, limited memory", CAV_SOLVER_IPOPT, 1, {"hessian_approximation", "limited-memory"}}};
+enum { METHODS = sizeof methods / sizeof *methods };
+
+static outcome solve(const optimum *o, const cav_model *model, int n, const method *by) {
   optimum_problem p = {.problem = cav_problem_default(model)};
   outcome out = {0};
   double *ends = calloc((size_t)(2 * model->nq + model->nv), sizeof(double));
@@ -132,13 +152,17 @@ static outcome solve(const optimum *o, const cav_model *model, int n, cav_solver
   cav_solve_options options = cav_solve_options_default();
   cav_solution *solution = NULL;
   cav_error error = {0};
-  options.solver = solver;
+  options.solver = by->solver;
+  options.ipopt = &by->option;
+  options.nipopt = by->noption;
   // an optimum is known, so no proof says that there is none, however near the bounds it lies
   cav_impossibility proof;
   int proofs = -1;
   CHECK(cav_problem_impossible(&p.problem, &proof, 1, &proofs, &error) == CAV_OK && proofs == 0);
   if (proofs > 0) fprintf(stderr, "    %s: %s\n", o->name, proof.what);
+  double begin = (double)clock();
   out.status = cav_solve(&p.problem, &options, NULL, &solution, &error);
+  out.seconds = ((double)clock() - begin) / CLOCKS_PER_SEC;
   if (out.status != CAV_OK)
     fprintf(stderr, "    %s, %d steps: %s: %s\n", o->name, n, cav_status_name(out.status), error.text);
   if (solution) {
@@ -204,14 +228,26 @@ static void print_row(const optimum *o, const outcome *out) {
 static const int refinement[] = {1, 2, 5, 10};
 enum { GRIDS = sizeof refinement / sizeof *refinement };
 
-static void run(const optimum *o, cav_solver solver, int table) {
+static void compare_methods(const optimum *o) {
+  cav_model *model = scene_load(o->model);
+  if (!CHECK(model != NULL)) return;
+  for (int k = 0; k < METHODS; k++) {
+    outcome out = solve(o, model, refinement[1] * o->coarsest, &methods[k]);
+    printf("| %s | %s | %s | %.1e | %.1e | %d | %.2f |\n", o->name, methods[k].name,
+           out.status == CAV_OK ? "yes" : "no", out.cost, out.optimality, out.iterations, out.seconds);
+    fflush(stdout);
+  }
+  cav_model_free(model);
+}
+
+static void run(const optimum *o, const method *by, int table) {
   cav_model *model = scene_load(o->model);
   if (!CHECK(model != NULL)) return;
   outcome out[GRIDS] = {0};
   int last = GRIDS - 1;
   for (int i = 0; i <= last; i++) {
     if (!table && i > 0 && i < last) continue;
-    out[i] = solve(o, model, refinement[i] * o->coarsest, solver);
+    out[i] = solve(o, model, refinement[i] * o->coarsest, by);
     if (table) print_row(o, &out[i]);
   }
   judge_all(o, &out[0], &out[last], refinement[last]);
@@ -233,12 +269,15 @@ int main(int argc, char **argv) {
                     {optimum_contact, optimum_ncontact},
                     {optimum_pendulum, optimum_npendulum},
                     {optimum_further, optimum_nfurther}};
-  cav_solver solver = CAV_SOLVER_GAUSS_NEWTON;
-  int i = 1, table = 0;
+  method by = {.name = "gn", .solver = CAV_SOLVER_GAUSS_NEWTON};
+  int i = 1, table = 0, compared = i < argc && !strcmp(argv[i], "methods");
+  if (compared) i++;
   if (i < argc && !strcmp(argv[i], "gn")) i++;
-  if (i < argc && !strcmp(argv[i], "ipopt")) solver = CAV_SOLVER_IPOPT, i++;
-  if (i < argc && !strcmp(argv[i], "both")) solver = CAV_SOLVER_BOTH, i++;
+  if (i < argc && !strcmp(argv[i], "ipopt")) by.solver = CAV_SOLVER_IPOPT, i++;
+  if (i < argc && !strcmp(argv[i], "both")) by.solver = CAV_SOLVER_BOTH, i++;
   if (i < argc && !strcmp(argv[i], "table")) table = 1, i++;
+  if (compared)
+    printf("| problem | method | solved | cost off | optimal to | iterations | s |\n|---|---|---|---|---|---|---|\n");
   if (table)
     printf(
         "| problem | step, s | solved | iterations | most in a stage | after the last | cost | duration | states | "
@@ -246,6 +285,7 @@ int main(int argc, char **argv) {
         "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (size_t k = 0; k < sizeof part / sizeof *part; k++)
     for (int j = 0; j < part[k].n; j++)
-      if (wanted(part[k].row[j].name, argc - i, argv + i)) run(&part[k].row[j], solver, table);
+      if (wanted(part[k].row[j].name, argc - i, argv + i))
+        compared ? compare_methods(&part[k].row[j]) : run(&part[k].row[j], &by, table);
   return check_result();
 }
