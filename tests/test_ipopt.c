@@ -1,6 +1,6 @@
 /// optim/solver/ipopt.c, ipopt_options.c: the same motion and multipliers from Ipopt as from the own solver;
 /// multipliers as a warm start; options from the problem and from the caller, and which of the two wins; a
-/// limited-memory Hessian; limits told in words; deaf to an ipopt.opt where the program runs.
+/// limited-memory Hessian; limits told in words; stages that end where costs settle; deaf to an ipopt.opt where the program runs.
 #include <unistd.h>
 
 #include "cavort/cavort.h"
@@ -128,6 +128,44 @@ static void check_limited_memory(const cav_problem *problem) {
   cav_solution_free(solution);
 }
 
+// a body on an actuated leg that leaves the floor and lands
+static const char leg[] =
+    "<mujoco><worldbody><geom type='plane' size='5 5 .1'/><body pos='0 0 .62'><joint name='up' type='slide' axis='0 0 "
+    "1'/>"
+    "<geom type='sphere' size='.1' mass='3' contype='0' conaffinity='0'/><site name='body'/>"
+    "<body><joint name='reach' type='slide' axis='0 0 1' limited='true' range='-.2 .3'/>"
+    "<geom type='capsule' fromto='0 0 -.1 0 0 -.6' size='.02' mass='.5'/></body></body></worldbody>"
+    "<actuator><motor joint='reach' gear='200' ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>";
+static const char jump[] =
+    "<problem name='jump' model='leg.xml'>\n<horizon duration='1.2' timestep='.02'/>\n<start/>\n<cost><sensor "
+    "type='framepos' site='body' component='z' target='.9' at='.6' weight='100'/><effort "
+    "weight='.1'/></cost>\n</problem>";
+
+// with contacts the dual never tells that a stage is over: costs that have settled do, and Ipopt brings the rows in
+static void check_settled(void) {
+  static const cav_ipopt_option rough[] = {{"hessian", "gauss-newton"}};
+  cav_error error = {0};
+  scene_write(folder, "leg.xml", leg);
+  scene_write(folder, "jump.xml", jump);
+  cav_problem *problem = cav_problem_load("jump.xml", NULL, &error);
+  if (!CHECK(problem != NULL)) fprintf(stderr, "    %s\n", error.text);
+  cav_solution *solution = problem ? solve(problem, CAV_SOLVER_IPOPT, 1, rough, CAV_OK, &error) : NULL;
+  cav_solution *own = problem ? solve(problem, CAV_SOLVER_GAUSS_NEWTON, 0, NULL, CAV_OK, &error) : NULL;
+  if (solution && own) {
+    printf("a jump: cost %.5g, own solver %.5g; %d iterations of the last stage, %d of restoration, force left %.1e\n",
+           solution->cost, own->cost, iterations(solution, "ipopt"), iterations(solution, "restoration"),
+           solution->unactuated);
+    CHECK(iterations(solution, "ipopt") < 100);
+    CHECK(iterations(solution, "restoration") == 0);
+    CHECK(solution->unactuated <= cav_solve_options_default().tolerance);
+    CHECK_NEAR(solution->cost, own->cost, 0.05 * own->cost);
+  }
+  cav_solution_free(solution);
+  cav_solution_free(own);
+  cav_problem_free(problem);
+  CHECK(unlink("leg.xml") == 0 && unlink("jump.xml") == 0);
+}
+
 int main(void) {
   if (!mkdtemp(folder) || chdir(folder) != 0) return EXIT_FAILURE;
   scene_write(folder, "arm.xml", arm);
@@ -140,6 +178,7 @@ int main(void) {
   }
   cav_problem_free(problem);
   check_options();
+  check_settled();
   static const char *const file[] = {"arm.xml", "problem.xml", "ipopt.opt"};
   for (int i = 0; i < 3; i++) CHECK(unlink(file[i]) == 0);
   CHECK(rmdir(folder) == 0);
