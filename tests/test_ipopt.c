@@ -1,6 +1,7 @@
 /// optim/solver/ipopt.c, ipopt_options.c: the same motion and multipliers from Ipopt as from the own solver;
 /// multipliers as a warm start; options from the problem and from the caller, and which of the two wins; a
-/// limited-memory Hessian; limits told in words; stages that end where costs settle; deaf to an ipopt.opt where the program runs.
+/// limited-memory Hessian; limits told in words; stages that end where costs settle; deaf to an ipopt.opt
+/// where the program runs.
 #include <unistd.h>
 
 #include "cavort/cavort.h"
