@@ -25,8 +25,9 @@ static const double contact_noise = 1, smooth_noise = 1e-6, acceptable = 1e-4;
 enum { STAGES_IN_ONE = 2, STAGE_ITERATIONS = 40 };
 
 /// Barrier parameter of the continuation's first and last stage, geometrically between: at a small one from the start the
-/// bounds, which a guess violates or touches, cut all steps to a tenth and less.
-static const double first_barrier = 1e-2, last_barrier = 1e-4;
+/// bounds, which a guess violates or touches, cut all steps to a tenth and less. From an optimum with its multipliers a
+/// barrier only leads away: hopper-hop's cost grows by half from 1e-4.
+static const double first_barrier = 1e-2, last_barrier = 1e-4, warm_barrier = 1e-8;
 
 /// Gauss-Newton Hessians, whose dual infeasibility says nothing where contacts act: a stage has settled where the cost
 /// stays within a fraction of itself over a window of iterations, its rows not far off. A stage on the way ends there.
@@ -600,7 +601,7 @@ static cav_status solve_stage(cav_solve_run *run, double fraction, int exact, in
                .anchor = cav_trajectory_copy(run->at),
                .best_iteration = -1,
                .noise = law_acts(tr->model) ? contact_noise : smooth_noise,
-               .barrier = first_barrier * pow(last_barrier / first_barrier, fraction),
+               .barrier = run->warm ? warm_barrier : first_barrier * pow(last_barrier / first_barrier, fraction),
                .damping = damping,
                .exact = exact,
                .settles = !exact && !is_limited(run),
