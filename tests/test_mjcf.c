@@ -74,7 +74,6 @@ static const struct {
     {"ball_range", 4, "range starts at 0"},
     {"key_qpos", 9, "expected 1 numbers"},
     {"key_qvel", 9, "expected 1 numbers"},
-    {"no_world", 1, "the model is empty"},
     {"world_inertia", 3, "not known inside worldbody"},
     {"world_joint", 3, "not known inside worldbody"},
     {"two_orientations", 5, "quat gives the orientation"},

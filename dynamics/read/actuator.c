@@ -215,6 +215,13 @@ static double moment_on(const cav_spec *spec, const cav_spec_actuator *a, const 
   return sum;
 }
 
+// one whose moments vary with the posture
+static int acts_along_paths(const cav_spec *spec, const cav_spec_actuator *a) {
+  if (a->transmission != CAV_TRANSMISSION_TENDON) return !is_on_joint(a);
+  int i = cav_name_find(spec->tendon.at, spec->tendon.n, sizeof *spec->tendon.at, a->target);
+  return i >= 0 && spec->tendon.at[i].spatial;
+}
+
 // force of an actuator kept within a range times 1 / moment, and within what it has
 static void narrow_force(cav_spec *spec, cav_spec_actuator *a, const double range[2], double moment) {
   double low = fmin(range[0] / moment, range[1] / moment), high = fmax(range[0] / moment, range[1] / moment);
@@ -241,6 +248,12 @@ static void limit_effort(cav_spec *spec, const cav_xml_node *node, const char *j
     cav_spec_actuator *a = &spec->actuator.at[i];
     double moment = moment_on(spec, a, joint, tendon);
     if (moment != 0) narrow_force(spec, a, range, n * moment);
+  }
+  for (int i = 0; i < spec->actuator.n && !tendon; i++) {
+    if (acts_along_paths(spec, &spec->actuator.at[i]))
+      cav_spec_leave(spec, node, "actuatorfrcrange",
+                     "held for actuators at joints and fixed tendons, not for those at sites, cranks and strings along "
+                     "paths, with which no motion is planned");
   }
   if (n > 1)
     cav_spec_leave(

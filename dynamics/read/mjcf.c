@@ -232,6 +232,14 @@ static void read_bodies(cav_mjcf_reader *r, const cav_xml_node *node, const plac
   }
 }
 
+// a file of materials, say, that others include
+static void start_empty_world(cav_spec *spec, const cav_xml_node *root) {
+  cav_spec_body *b = CAV_SPEC_PUSH(spec, &spec->body);
+  if (!b) return;
+  *b = (cav_spec_body){.name = "world", .node = root, .parent = -1, .quat = {1, 0, 0, 0}, .inertia.quat = {1, 0, 0, 0}};
+  cav_spec_warn(spec, root, NULL, "no worldbody: the model is empty");
+}
+
 // the world's own objects come before those of all bodies, in however many sections they are
 static void read_world(cav_mjcf_reader *r, const cav_xml_node *root) {
   cav_spec *spec = r->spec;
@@ -251,7 +259,8 @@ static void read_world(cav_mjcf_reader *r, const cav_xml_node *root) {
       else
         read_bodies(r, c, &at);
     }
-    if (pass == 0 && spec->body.n) cav_scene_objects(spec);
+    if (pass == 0 && !spec->body.n) start_empty_world(spec, root);
+    if (pass == 0) cav_scene_objects(spec);
   }
   cav_scene_bodies(spec);
 }
@@ -338,7 +347,6 @@ void cav_mjcf_read(cav_spec *spec, cav_xml *xml) {
   cav_mjcf_read_sections(&r, root);
   cav_spec_warn_of_prose(spec);
   cav_spec_settle_notes(spec);
-  if (!spec->body.n) cav_spec_fail(spec, root, NULL, "no worldbody: the model is empty; add bodies");
   free(r.classes.at);
   free(r.materials.at);
 }

@@ -183,8 +183,23 @@ static void read_sensor(cav_mjcf_reader *r, const cav_xml_node *node, cav_sensor
   if (slot) *slot = s;
 }
 
-// a sensor of an actuator that has been left out
+// whether a geom of that name stands in the file below a node
+static int has_geom(const cav_xml_node *node, const char *name) {
+  for (const cav_xml_node *c = node->child; c; c = c->next) {
+    if (node_is(c, "geom") && !strcmp(cav_xml_text(c, "name", ""), name)) return 1;
+    if (has_geom(c, name)) return 1;
+  }
+  return 0;
+}
+
+// a sensor of a geom or an actuator that has been left out
 static int is_of_missing(const cav_spec *spec, const cav_xml_node *node) {
+  const cav_xml_value *type = cav_xml_accepts(node, "objtype") ? cav_xml_get(node, "objtype") : NULL;
+  if (type && !strcmp(type->text, "geom")) {
+    const char *name = cav_xml_text(node, "objname", "");
+    if (cav_name_find(spec->geom.at, spec->geom.n, sizeof *spec->geom.at, name) >= 0) return 0;
+    return has_geom(cav_xml_root(spec->xml), name);
+  }
   if (!cav_xml_accepts(node, "actuator")) return 0;
   const cav_xml_node *root = cav_xml_root(spec->xml);
   const char *name = cav_xml_text(node, "actuator", "");
