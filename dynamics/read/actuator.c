@@ -172,10 +172,13 @@ static void inherit_range(cav_spec *spec, cav_spec_actuator *a) {
   const double *range = NULL;
   if (is_on_joint(a)) {
     int i = cav_name_find(spec->joint.at, spec->joint.n, sizeof *spec->joint.at, a->target);
-    if (i >= 0) range = spec->joint.at[i].range;
+    // a name that there is none of is told when names are resolved
+    if (i < 0) return;
+    range = spec->joint.at[i].range;
   } else if (a->transmission == CAV_TRANSMISSION_TENDON) {
     int i = cav_name_find(spec->tendon.at, spec->tendon.n, sizeof *spec->tendon.at, a->target);
-    if (i >= 0) range = spec->tendon.at[i].range;
+    if (i < 0) return;
+    range = spec->tendon.at[i].range;
   }
   if (!range || !(range[0] < range[1])) {
     cav_spec_fail(spec, a->node, "inheritrange", "'%.60s' has no range to take; give that one, or %s here", a->target,

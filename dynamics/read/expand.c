@@ -13,7 +13,7 @@
 #include "math3.h"
 #include "xml_parts.h"
 
-enum { COPIES_MAX = 100000, NODES_MAX = 2000000 };
+enum { COPIES_MAX = 100000, NODES_MAX = 500000 };
 
 /// A named element that has been copied.
 typedef struct original {
@@ -24,7 +24,7 @@ typedef struct original {
 typedef struct change {
   const char *prefix, *suffix;
   const original *named;
-  int nnamed, part;
+  int nnamed, sorted, part;
 } change;
 
 typedef struct expansion {
@@ -70,7 +70,15 @@ static const char *referred_kind(const cav_xml_node *node, const char *attribute
   return NULL;
 }
 
+static int compare_originals(const void *a, const void *b) {
+  const original *x = a, *y = b;
+  int order = strcmp(x->kind, y->kind);
+  return order ? order : strcmp(x->name, y->name);
+}
+
 static int has(const change *c, const char *kind, const char *name) {
+  const original key = {kind, name};
+  if (c->sorted) return bsearch(&key, c->named, (size_t)c->nnamed, sizeof key, compare_originals) != NULL;
   for (int i = 0; i < c->nnamed; i++) {
     if (!strcmp(c->named[i].kind, kind) && !strcmp(c->named[i].name, name)) return 1;
   }
@@ -272,7 +280,8 @@ static void write_out_replicate(expansion *e, cav_xml_node *root, cav_xml_node *
   names list = {0};
   for (const cav_xml_node *k = node->child; k; k = k->next) collect_names(e, &list, k);
   static const original nothing = {"", ""};
-  change c = {.prefix = "", .suffix = "", .named = list.n ? list.at : &nothing, .nnamed = list.n};
+  if (list.n) qsort(list.at, (size_t)list.n, sizeof *list.at, compare_originals);
+  change c = {.prefix = "", .suffix = "", .named = list.n ? list.at : &nothing, .nnamed = list.n, .sorted = 1};
   const char **suffix = cav_xml_carve(e->xml, sizeof *suffix * (size_t)count);
   cav_xml_node *first = NULL, *last = NULL;
   if (!suffix) no_memory(e);
@@ -454,26 +463,23 @@ static void write_out_attach(expansion *e, cav_xml_node *root, cav_xml_node *nod
 
 // --- the tree ---
 
-// innermost first; returns whether something was written out
-static int expand_first(expansion *e, cav_xml_node *root, cav_xml_node *node, int depth) {
-  for (cav_xml_node *c = node->child; c; c = c->next) {
-    if (expand_first(e, root, c, depth)) return 1;
+// innermost first; what takes the place of an element needs no more
+static void expand_all(expansion *e, cav_xml_node *root, cav_xml_node *node, int depth) {
+  for (cav_xml_node *c = node->child, *next; c && e->spec->status == CAV_OK; c = next) {
+    next = c->next;
+    expand_all(e, root, c, depth);
+    if (e->spec->status != CAV_OK) return;
     if (c->rule == &cav_replicate_element)
       write_out_replicate(e, root, c);
     else if (is(c, "attach"))
       write_out_attach(e, root, c, depth);
-    else
-      continue;
-    return 1;
   }
-  return 0;
 }
 
 static void expand(expansion *e, cav_xml *xml, int depth) {
   cav_xml_node *root = (cav_xml_node *)cav_xml_root(xml);
   for (cav_xml_node *s = root->child; s && e->spec->status == CAV_OK; s = s->next) {
-    if (!is(s, "worldbody")) continue;
-    while (e->spec->status == CAV_OK && expand_first(e, root, s, depth)) continue;
+    if (is(s, "worldbody")) expand_all(e, root, s, depth);
   }
 }
 
