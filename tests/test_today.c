@@ -390,8 +390,8 @@ static void compare(const cav_model *m, const char *feature_name, const char *na
   }
 }
 
-// the script's lines; returns the largest difference of inverses over 1 + their size
-static double follow_peer(const cav_model *m, const feature *f, FILE *from, int *states) {
+// the script's lines; returns the largest difference of inverses over 1 + their size, and how many are within 1e-9
+static double follow_peer(const cav_model *m, const feature *f, FILE *from, int *states, int *agree) {
   enum { ROOM = 64 };
   static char line[20000];
   double q[ROOM], v[ROOM], a[ROOM], x[ROOM], v_next[ROOM], u[ROOM], worst = 0;
@@ -409,8 +409,13 @@ static double follow_peer(const cav_model *m, const feature *f, FILE *from, int 
     for (int i = 0; i < m->nv; i++) v_next[i] = v[i] + m->timestep * a[i];
     CHECK(cav_inverse(m, state, q, v, v_next, u) == CAV_OK);
     // MuJoCo's inverse leaves implicit damping out
-    for (int i = 0; i < m->nv; i++)
-      worst = fmax(worst, fabs(u[i] - x[i] - m->timestep * m->dof[i].damping * a[i]) / (1 + fabs(x[i])));
+    double error = 0, size = 1;
+    for (int i = 0; i < m->nv; i++) {
+      error = fmax(error, fabs(u[i] - x[i] - m->timestep * m->dof[i].damping * a[i]));
+      size = fmax(size, fabs(x[i]));
+    }
+    worst = fmax(worst, error / size);
+    *agree += error <= 1e-9 * size;
     ++*states;
   }
   cav_state_free(state);
@@ -420,16 +425,17 @@ static double follow_peer(const cav_model *m, const feature *f, FILE *from, int 
 static void compare_with_peer(const cav_model *m, const feature *f, const char *path) {
   if (!peer()) return;
   char command[700];
-  int states = 0;
+  int states = 0, agree = 0;
   snprintf(command, sizeof command, "node '%s/tests/peer_mujoco3.mjs' '%s' %d 2>&1", CAVORT_SOURCE_ROOT, path,
            f->states);
   FILE *from = popen(command, "r");
   if (!CHECK(from != NULL)) return;
-  double worst = follow_peer(m, f, from, &states);
+  double worst = follow_peer(m, f, from, &states, &agree);
   CHECK(states == f->states);
-  if (f->states) printf("%-45s %d inverses differ from MuJoCo's by %.1e\n", f->name, states, worst);
-  // bound: rounding of forces of about 100; seen 4e-14
-  if (f->states) CHECK_NEAR(worst, 0, 1e-11);
+  if (f->states)
+    printf("%-45s %d of %d inverses as MuJoCo's, the rest up to %.1e off\n", f->name, agree, states, worst);
+  // bound: rounding of forces of about 100; seen 1e-13. Files given by name may have contacts that MuJoCo makes otherwise
+  if (f->states && *f->text) CHECK_NEAR(worst, 0, 1e-11);
   pclose(from);
 }
 
@@ -537,7 +543,22 @@ static void test_static(void) {
   cav_model_free(m);
 }
 
-int main(void) {
+// a file of anyone's against MuJoCo 3
+static void test_file(const char *path) {
+  const feature f = {.name = path, .text = "", .states = 100};
+  cav_error error = {0};
+  cav_model *m = cav_model_load(path, &error);
+  if (CHECK(m != NULL))
+    compare_with_peer(m, &f, path);
+  else
+    fprintf(stderr, "    %s\n", error.text);
+  cav_model_free(m);
+}
+
+// test_today [FILE...]: those files are compared with MuJoCo 3, and nothing else done
+int main(int argc, char **argv) {
+  for (int i = 1; i < argc; i++) test_file(argv[i]);
+  if (argc > 1) return check_result();
   if (!CHECK(mkdtemp(folder) != NULL)) return check_result();
   if (!peer()) printf("SKIPPED: MuJoCo 3, set CAVORT_MUJOCO_JS to the mujoco.js of @mujoco/mujoco to compare\n");
   for (size_t i = 0; i < sizeof features / sizeof *features; i++) test_feature(&features[i]);
