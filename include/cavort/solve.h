@@ -37,8 +37,10 @@ CAV_API const cav_solver_rule *cav_solver_rule_of(cav_solver solver);
 
 /// One line of progress, and of the log.
 typedef struct cav_progress {
-  const char *phase; ///< "continuation", "multipliers", "restoration", "ipopt", "diagnosis", "recovery"
+  const char *phase; ///< "continuation", "sqp", "multipliers", "restoration", "ipopt", "diagnosis", "recovery",
+                     ///< "feedback"
   int stage, stages;
+  double fraction;   ///< of the whole solve that is done, by the stages that are behind it: an estimate
   int iteration;     ///< over the whole solve
   double cost;       ///< of the cost terms alone
   double unactuated; ///< largest unactuated force, fraction of weight (moments: per 0.3 m)
@@ -48,16 +50,83 @@ typedef struct cav_progress {
   int knot; ///< knot of the largest unactuated force
 } cav_progress;
 
-/// Called after every iteration; a nonzero return ends the solve with CAV_INTERRUPTED and the best iterate.
+/// Called after every iteration, and before each trial of feedback; a nonzero return ends the solve with
+/// CAV_INTERRUPTED and the best iterate.
 typedef int (*cav_observer)(void *context, const cav_progress *progress);
+
+/// Asked many times an iteration, by the thread that solves; nonzero ends the solve as an observer does.
+typedef int (*cav_stop)(void *context);
+
+/// Places of a solve between two of its parts, X(place, word in files, what comes next). A solve goes through them in
+/// this order; only where rows do not come in does it come to those after the first programme.
+// clang-format off
+#define CAV_PLACES(X)                                                      \
+  X(CONTINUATION, continuation, "a stage of the schedule")                 \
+  X(SQP, sqp, "sequential quadratic programming")                          \
+  X(MULTIPLIERS, multipliers, "a round of the augmented Lagrangian")       \
+  X(RESTORATION, restoration, "restoration of the rows")                   \
+  X(SQP_AGAIN, sqp_again, "sequential quadratic programming, once more")   \
+  X(IPOPT, ipopt, "Ipopt")                                                 \
+  X(DIAGNOSIS, diagnosis, "the point of least violation")                  \
+  X(RECOVERY, recovery, "costs again, from a point that is feasible")      \
+  X(FEEDBACK, feedback, "the choice of gains")
+// clang-format on
+
+typedef enum cav_place {
+#define CAV_PLACE_MEMBER(place, ...) CAV_PLACE_##place,
+  CAV_PLACES(CAV_PLACE_MEMBER)
+#undef CAV_PLACE_MEMBER
+      CAV_PLACE_TYPES
+} cav_place;
+
+/// All that a solve needs to go on between two of its parts and end with the same bits as if it had not stopped.
+typedef struct cav_checkpoint {
+  char key[96];             ///< the caller's mark of problem and model, "" if none; kept in files, not looked at
+  cav_place place;          ///< what comes next
+  cav_order order;          ///< of the problem that is being solved: a strategy may solve one before
+  int stage, stages;        ///< of the schedule or of the rounds of multipliers, from 1
+  double fraction, settled; ///< of the schedule: this stage's, and that of the stage before it
+  int retries;              ///< how often this stage was taken back
+  double radius;            ///< of the trust region
+  int iterations;           ///< so far
+  double seconds;           ///< so far, wall clock
+  cav_status status;        ///< of the solve, at CAV_PLACE_FEEDBACK
+  double optimality;        ///< as in cav_solution, NaN: not measured
+  cav_trajectory *trajectory;
+  int nmultiplier;
+  double *multiplier;       ///< [nmultiplier] of the augmented Lagrangian, row by row as in cav_solution
+  double *final_multiplier; ///< [nmultiplier] of the programme
+} cav_checkpoint;
+
+/// Called at every place; the checkpoint and what it holds last as long as the call. Nonzero ends the solve.
+typedef int (*cav_keeper)(void *context, const cav_checkpoint *checkpoint);
+
+/// Writes a checkpoint as one file, atomically, and reads it: bits come back as they were. Freed with
+/// cav_checkpoint_free. CAV_BAD_INPUT: a file that cannot be written or read, or that is no checkpoint of this model;
+/// CAV_NO_MEMORY. optim/solver/checkpoint.c.
+CAV_API cav_status cav_checkpoint_write(const char *path, const cav_checkpoint *checkpoint, cav_error *error);
+CAV_API cav_checkpoint *cav_checkpoint_read(const char *path, const cav_model *model, cav_error *error);
+CAV_API void cav_checkpoint_free(cav_checkpoint *checkpoint);
 
 typedef struct cav_solve_options {
   cav_solver solver;
   int threads;           ///< over knots, >= 1; the result does not depend on it
   cav_observer observer; ///< may be NULL
   void *observer_context;
-  double tolerance; ///< unactuated force at the end, fraction of weight
-  int diagnose;     ///< 1: where constraints cannot all hold, end at their least violation, which cav_explain needs
+  cav_stop stop; ///< may be NULL
+  void *stop_context;
+  cav_keeper keeper; ///< may be NULL
+  void *keeper_context;
+  const cav_checkpoint *resume; ///< where to go on, of the same problem, by the same solver; NULL: from the beginning
+  int first_stage; ///< of the schedule, from 1 (0 is 1); more than it has stages: straight to the optimum, from a start
+                   ///< that is near it. Of the own solver
+  int max_iterations;       ///< of this call; 0: no limit. It ends as if it were interrupted
+  double max_seconds;       ///< of this call before gains are chosen, wall clock; 0: no limit
+  int gains;                ///< 1: feedback gains are chosen, where the motion may be certified with them
+  int nmultiplier;          ///< 0, or number of rows: cav_solution's of a solve of the same knots and rows
+  const double *multiplier; ///< [nmultiplier] to start with, NULL: zeros
+  double tolerance;         ///< unactuated force at the end, fraction of weight
+  int diagnose; ///< 1: where constraints cannot all hold, end at their least violation, which cav_explain needs
   /// Of the dynamics: analytic, and what has none (cav_derivatives_missing, sensors) by one-sided differences, or all
   /// by differences. Ipopt always takes centred ones.
   cav_derivative derivative;
@@ -118,7 +187,8 @@ typedef struct cav_binding {
 typedef struct cav_solution {
   cav_trajectory *trajectory;
   cav_options contact;     ///< contact law the motion obeys
-  double *gain_q, *gain_v; ///< [(nknot-1)*nv*nv] du_t = gain_q dq_t + gain_v dv_t, row-major
+  double *gain_q, *gain_v; ///< [(nknot-1)*nv*nv] du_t = gain_q dq_t + gain_v dv_t, row-major; NULL: none were asked
+                           ///< for, or none help: it was interrupted, or misses what a certificate requires
   double cost;
   double
       optimality; ///< the solver's own: decrease of the cost along the constraints that its last model predicts, over
@@ -132,6 +202,10 @@ typedef struct cav_solution {
   cav_stage_record *stage; ///< its stages in order
   int nrow;
   cav_binding *row; ///< constraint rows that are violated or have a multiplier, by knot
+  int nmultiplier;
+  double
+      *multiplier; ///< [nmultiplier] of every constraint row, scaled as the solver sees it, positive at upper bounds.
+                   ///< Rows by knot; of a knot: unactuated forces, efforts, ranges of joints and of tendons, hard terms
 } cav_solution;
 
 /// What a plan is made of, and how the own solver factors its normal equations, at the problem's guess, first stage: a
@@ -151,7 +225,8 @@ typedef struct cav_equations {
 CAV_API cav_status cav_problem_equations(const cav_problem *problem, cav_equations *equations, cav_error *error);
 
 /// Solves from the problem's guess, or from start if not NULL. CAV_NOT_CONVERGED and CAV_INTERRUPTED leave the best
-/// iterate in the solution; NULL in *solution only where error says so.
+/// iterate in the solution; NULL in *solution only where error says so. CAV_BAD_INPUT: multipliers or a checkpoint of
+/// another number of rows or knots, besides what is wrong in the problem.
 CAV_API cav_status cav_solve(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
                              cav_solution **solution, cav_error *error);
 CAV_API void cav_solution_free(cav_solution *solution);

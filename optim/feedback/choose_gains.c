@@ -35,7 +35,8 @@ static int done(const outcome *o) {
 }
 
 cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription *tr, const cav_trajectory *at, int sets,
-                            cav_solution *solution, cav_error *error) {
+                            int (*report)(void *context, int set, int most), void *context, cav_solution *solution,
+                            cav_error *error) {
   size_t n = ((size_t)tr->nknot - 1) * (size_t)tr->nv * (size_t)tr->nv;
   double *gain = malloc(2 * n * sizeof *gain);
   solution->gain_q = calloc(n, sizeof(double));
@@ -45,6 +46,10 @@ cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription 
   int all = (int)(sizeof trial / sizeof *trial), trials = sets > 0 && sets < all ? sets : all, first = 1;
   for (int i = 0; i < trials && status == CAV_OK && (first || !done(&best)); i++) {
     outcome now;
+    if (report(context, i + 1, trials)) {
+      status = CAV_INTERRUPTED;
+      break;
+    }
     cav_options law = tr->options;
     cav_stage_law(problem, trial[i].fraction, tr->options.timestep, &law);
     status = cav_feedback(tr, at, &law, &trial[i].penalty, gain, gain + n);
@@ -59,5 +64,7 @@ cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription 
     first = 0;
   }
   free(gain);
+  // zeros are no gains
+  if (first) free(solution->gain_q), free(solution->gain_v), solution->gain_q = solution->gain_v = NULL;
   return status;
 }

@@ -198,7 +198,7 @@ static cav_status sweep(regulator *r, const cav_transcription *tr, const cav_tra
   cav_status status = CAV_OK;
   for (int k = fine->nknot - 2; k >= 0 && status == CAV_OK; k--) {
     const double *q = fine->q + (size_t)k * nq, *v = fine->v + (size_t)k * nv;
-    status = cav_inertia(tr->model, bare, q, r->M);
+    status = cav_transcription_stopped(tr) ? CAV_INTERRUPTED : cav_inertia(tr->model, bare, q, r->M);
     if (status == CAV_OK) status = find_derivative(r, tr->model, state, q, v);
     if (status != CAV_OK) break;
     // at the end a second's straying is penalised

@@ -50,6 +50,27 @@ void cav_stage_set(const cav_problem *problem, double x, cav_transcription *tr) 
   tr->penalty.term = between(penalised.term, PENALTY_RISE * penalised.term, fmin(2 * x, 1));
 }
 
+/// How much of a solve is behind its parts where they begin and end, as a rule; and iterations in which half of a part
+/// is done, where it has no stages.
+static const double part[CAV_PLACE_TYPES][2] = {
+    [CAV_PLACE_CONTINUATION] = {0, 0.65},  [CAV_PLACE_SQP] = {0.65, 0.85},      [CAV_PLACE_MULTIPLIERS] = {0.7, 0.75},
+    [CAV_PLACE_RESTORATION] = {0.75, 0.8}, [CAV_PLACE_SQP_AGAIN] = {0.8, 0.85}, [CAV_PLACE_IPOPT] = {0.6, 0.85},
+    [CAV_PLACE_DIAGNOSIS] = {0.85, 0.9},   [CAV_PLACE_RECOVERY] = {0.87, 0.92}, [CAV_PLACE_FEEDBACK] = {0.92, 0.97}};
+static const double half = 10;
+
+static double done(const cav_solve_run *run) {
+  const double *p = part[run->checkpoint.place];
+  double n = run->solution->iterations - run->checkpoint.iterations, within = n / (n + half);
+  if (run->checkpoint.place == CAV_PLACE_CONTINUATION) within = (run->stage - 1 + within) / run->stages;
+  return p[0] + within * (p[1] - p[0]);
+}
+
+int cav_run_stop(void *context) {
+  const cav_solve_run *run = context;
+  const cav_solve_options *o = run->options;
+  return (o->stop && o->stop(o->stop_context)) || cav_clock() >= run->deadline;
+}
+
 int cav_run_report(void *context, double step, double radius) {
   cav_solve_run *run = context;
   cav_solution *solution = run->solution;
@@ -59,11 +80,26 @@ int cav_run_report(void *context, double step, double radius) {
   line.unactuated = cav_transcription_unactuated(run->tr, &line.knot);
   line.violation = cav_transcription_violation(run->tr);
   line.seconds = cav_clock() - run->start;
+  line.fraction = done(run);
   if (!cav_solution_log(solution, &line)) {
     run->failed = CAV_NO_MEMORY;
     return 1;
   }
-  return run->options->observer && run->options->observer(run->options->observer_context, &line);
+  if (run->options->observer && run->options->observer(run->options->observer_context, &line)) return 1;
+  int most = run->options->max_iterations;
+  return (most > 0 && solution->iterations - run->begin >= most) || cav_run_stop(run);
+}
+
+int cav_run_feedback(void *context, int trial, int trials) {
+  cav_solve_run *run = context;
+  cav_progress line = {.phase = run->phase, .stage = trial, .stages = trials, .iteration = run->solution->iterations};
+  line.cost = run->solution->cost;
+  line.unactuated = cav_transcription_unactuated(run->tr, &line.knot);
+  line.violation = cav_transcription_violation(run->tr);
+  line.seconds = cav_clock() - run->start;
+  const double *p = part[CAV_PLACE_FEEDBACK];
+  line.fraction = p[0] + (p[1] - p[0]) * (trial - 1) / trials;
+  return (run->options->observer && run->options->observer(run->options->observer_context, &line)) || cav_run_stop(run);
 }
 
 int cav_run_note(cav_solve_run *run, double fraction, int begin, cav_outcome outcome) {
@@ -107,16 +143,36 @@ static cav_status run_stage(cav_solve_run *run, double fraction, cav_outcome *ou
   return status;
 }
 
+/// Where continuation begins: the first stage, the one that the options name, or that of a checkpoint.
+static void first_stage(cav_solve_run *run, double *fraction, double *settled, int *retries) {
+  int stages = run->problem->schedule.stages, first = run->options->first_stage;
+  run->stage = first > 1 ? first : 1;
+  *retries = 0;
+  *fraction = stages > 1 ? (double)(run->stage - 1) / (stages - 1) : 1;
+  // the first one is not taken back
+  *settled = run->stage > 1 ? *fraction : 0;
+  if (!run->resume) return;
+  run->stage = run->resume->stage;
+  *fraction = run->resume->fraction;
+  *settled = run->resume->settled;
+  *retries = run->resume->retries;
+}
+
 cav_status cav_continuation_run(cav_solve_run *run) {
   int stages = run->problem->schedule.stages, retries = 0, begin;
-  double fraction = stages > 1 ? 0 : 1, settled = 0; // of this stage, and of the one before it
+  double fraction, settled; // of this stage, and of the one before it
   cav_trajectory *before = NULL;
   cav_status status = CAV_OK;
+  if (run->options->first_stage > stages || (run->resume && run->resume->place > CAV_PLACE_CONTINUATION)) return status;
   run->phase = "continuation";
   run->stages = stages;
-  run->stage = 1;
+  first_stage(run, &fraction, &settled, &retries);
   while (status == CAV_OK) {
-    cav_outcome outcome;
+    cav_outcome outcome = CAV_OUTCOME_STOPPED;
+    run->checkpoint.fraction = fraction;
+    run->checkpoint.settled = settled;
+    run->checkpoint.retries = retries;
+    if (!cav_run_reaches(run, CAV_PLACE_CONTINUATION, &status)) break;
     begin = run->solution->iterations;
     status = keep(&before, run->at) ? run_stage(run, fraction, &outcome) : CAV_NO_MEMORY;
     if (!before) break;
@@ -191,6 +247,16 @@ void cav_run_allowed(const cav_solve_run *run, double allowance[CAV_BINDING_KIND
   allowance[CAV_BINDING_PENETRATION] = CAV_TOLERANCE_PENETRATION;
 }
 
+int cav_run_certifiable(const cav_solve_run *run) {
+  violation most = allowed(run), is = measure(run->tr);
+  most.unactuated = fmax(most.unactuated, CAV_TOLERANCE_UNACTUATED);
+  most.term = fmax(most.term, CAV_TOLERANCE_CONSTRAINT);
+  // a limit may be passed by its headroom, and a little
+  most.effort = fmax(most.effort, 1 - run->problem->effort_limit + CAV_TOLERANCE_LIMIT);
+  most.range = fmax(most.range, run->problem->limit_margin + CAV_TOLERANCE_LIMIT);
+  return holds(&is, &most);
+}
+
 int cav_run_met(const cav_solve_run *run) {
   violation most = allowed(run), is = measure(run->tr);
   return holds(&is, &most);
@@ -203,9 +269,11 @@ cav_status cav_augmented_lagrangian(cav_solve_run *run) {
   run->phase = "multipliers";
   run->stages = ROUNDS;
   cav_status status = cav_transcription_values(run->tr, run->at);
-  for (int round = 0; round < ROUNDS && status == CAV_OK; round++) {
+  int first = run->resume && run->resume->place == CAV_PLACE_MULTIPLIERS ? run->resume->stage - 1 : 0;
+  for (int round = first; round < ROUNDS && status == CAV_OK; round++) {
     int begin = run->solution->iterations;
     run->stage = round + 1;
+    if (!cav_run_reaches(run, CAV_PLACE_MULTIPLIERS, &status)) break;
     cav_transcription_multipliers(run->tr);
     run->region.iterations = ROUND_ITERATIONS;
     run->region.tolerance = round_tolerance;
@@ -316,9 +384,11 @@ cav_status cav_recover_feasible(cav_solve_run *run) {
   run->phase = "recovery";
   run->stage = run->stages = 1;
   run->region.radius = 0;
+  run->nested = 1;
   cav_status status = run_stage(run, 1, &outcome);
   if (!cav_run_note(run, 1, begin, outcome)) status = CAV_NO_MEMORY;
   if (status == CAV_OK) status = cav_to_optimum(run);
+  run->nested = 0;
   if (status == CAV_NOT_CONVERGED) {
     // a motion that is possible is worth more than a cheaper one that is not
     exchange(&run->at, &feasible);

@@ -17,12 +17,42 @@ typedef struct cav_solve_run {
   cav_solution *solution;
   const char *phase;
   int stage, stages;
-  int warm;          ///< the rows' final multipliers are those to start from
-  int measured;      ///< optimality and the rows' multipliers are those of at
-  double optimality; ///< predicted decrease of the cost over the cost
-  cav_status failed; ///< what went wrong in the report, CAV_OK: nothing
-  double start;      ///< s
+  int warm;                     ///< the rows' final multipliers are those to start from
+  int measured;                 ///< optimality and the rows' multipliers are those of at
+  double optimality;            ///< predicted decrease of the cost over the cost
+  cav_status failed;            ///< what went wrong in the report, CAV_OK: nothing
+  double start;                 ///< s
+  double deadline;              ///< s, infinite: none
+  int begin;                    ///< iterations before this call
+  const cav_checkpoint *resume; ///< where it goes on, until it has come there; NULL: it has
+  int nested;                   ///< inside of a part that has its checkpoint before it: no others are made
+  cav_checkpoint checkpoint;    ///< the next one's, but for what is the run's
 } cav_solve_run;
+
+/// Whether a part is still to be done: not of a solve that is resumed after it. Tells the keeper of the place. *status:
+/// CAV_INTERRUPTED if that asks for the end. checkpoint.c.
+int cav_run_reaches(cav_solve_run *run, cav_place place, cav_status *status);
+
+/// Takes up run->resume, or the options' multipliers: trajectory, multipliers, what was counted. CAV_BAD_INPUT with the
+/// reason in error: they do not fit. checkpoint.c.
+cav_status cav_run_resume(cav_solve_run *run, cav_error *error);
+
+/// Multipliers of all rows, into a fresh array [number]; NULL if memory runs out. final: the programme's.
+/// checkpoint.c.
+double *cav_run_multipliers(const cav_solve_run *run, int final, int *n);
+
+/// Tells the observer of a trial of gains; nonzero if it asks to stop. Report of cav_choose_gains.
+int cav_run_feedback(void *run, int trial, int trials);
+
+/// Whether somebody asks for the end; context is the run. Transcription's stop.
+int cav_run_stop(void *run);
+
+/// cav_solve of a problem that a solve of so many iterations and seconds came before. solution.c.
+cav_status cav_solve_after(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
+                           const cav_solution *before, cav_solution **solution, cav_error *error);
+
+/// Whether rows are so near to holding that feedback may make a certified motion of it.
+int cav_run_certifiable(const cav_solve_run *run);
 
 /// The problem's guess: start held, or the geodesic to end [nq], with a ballistic arc if asked; cycles always go to
 /// their end, at constant speed. q and v of at are filled.

@@ -138,7 +138,7 @@ static cav_status try_radius(const cav_region *region, dogleg *d, const cav_norm
   cav_transcription_move(tr, at, d->step, to);
   cav_status status = cav_transcription_values(tr, to);
   t->decrease = status == CAV_OK ? merit - cav_transcription_merit(tr) : -INFINITY;
-  return status == CAV_NO_MEMORY ? status : CAV_OK;
+  return status == CAV_NO_MEMORY || status == CAV_INTERRUPTED ? status : CAV_OK;
 }
 
 /// Whether a step is as good as predicted, and only the radius holds it back.
@@ -209,7 +209,7 @@ cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_trans
     trial t = {0};
     status = search(region, &d, normal, tr, *at, *spare, merit, &t);
     region->done++;
-    fresh = t.decrease > 0;
+    fresh = t.decrease > 0 && status == CAV_OK;
     if (fresh) {
       cav_trajectory *swap = *at;
       *at = *spare;

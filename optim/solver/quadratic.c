@@ -469,6 +469,7 @@ static cav_status approach(cav_quadratic *p, double tolerance, double *left) {
   p->gap = gap_of(p);
   for (int i = 0; i < ITERATIONS && held < 3; i++) {
     if (p->gap <= tolerance && *left <= 1e-8) break;
+    if (cav_transcription_stopped(p->tr)) return CAV_INTERRUPTED;
     cav_status status = factor(p);
     if (status != CAV_OK) return status;
     // predictor, then the corrector towards what it shows to be within reach

@@ -17,7 +17,7 @@ cav_quadratic *cav_quadratic_new(const cav_transcription *transcription, cav_nor
 void cav_quadratic_free(cav_quadratic *quadratic);
 
 /// Solves it by a primal-dual interior point, to a duality gap in units of the cost. The step's logarithm stays within
-/// change[0] .. change[1], too. CAV_NOT_CONVERGED: the gap was not reached; the best iterate stands.
+/// change[0] .. change[1], too. CAV_NOT_CONVERGED: the gap was not reached; the best iterate stands. CAV_INTERRUPTED.
 cav_status cav_quadratic_solve(cav_quadratic *quadratic, const double *radius, const double change[2], double gap);
 
 /// Further step from the solution x, in the metric that it was found in, towards rows that are off by offset [rows].

@@ -18,6 +18,7 @@ cav_solve_options cav_solve_options_default(void) {
                              .derivative = CAV_DERIVATIVE_ANALYTIC,
                              .threads = 1,
                              .diagnose = 1,
+                             .gains = 1,
                              .tolerance = 2e-7};
 }
 
@@ -48,7 +49,7 @@ void cav_solution_free(cav_solution *solution) {
   if (!solution) return;
   cav_trajectory_free(solution->trajectory);
   free(solution->gain_q), free(solution->gain_v), free(solution->progress), free(solution->stage);
-  free(solution->row);
+  free(solution->row), free(solution->multiplier);
   free(solution);
 }
 
@@ -78,6 +79,10 @@ static cav_status check(const cav_problem *p, const cav_solve_options *o, const 
     return fail(error, CAV_BAD_INPUT, "effort_limit must be in (0, 1]");
   if (o->threads < 1) return fail(error, CAV_BAD_INPUT, "threads must be at least 1");
   if (!(o->tolerance > 0)) return fail(error, CAV_BAD_INPUT, "tolerance must be positive");
+  if (o->first_stage < 0 || o->max_iterations < 0 || !(o->max_seconds >= 0) || o->nmultiplier < 0 ||
+      (o->nmultiplier > 0 && !o->multiplier))
+    return fail(error, CAV_BAD_INPUT,
+                "first_stage, max_iterations, max_seconds and nmultiplier must not be negative, and multipliers there");
   if (p->schedule.stages < 1) return fail(error, CAV_BAD_INPUT, "the schedule needs at least one stage");
   int nfield;
   const cav_field *field = cav_stage_fields(&nfield);
@@ -118,12 +123,22 @@ static cav_status find_rows(cav_solve_run *run) {
   return cav_transcription_rows(run->tr, allowed, &run->solution->row, &run->solution->nrow);
 }
 
-/// What the solution says of its last iterate, and its gains.
-static cav_status conclude(cav_solve_run *run, cav_error *error) {
+/// Gains, of what may be certified with them.
+static cav_status find_gains(cav_solve_run *run, cav_error *error) {
+  if (!run->options->gains || !cav_run_certifiable(run)) return CAV_OK;
+  run->phase = "feedback";
+  run->stage = run->stages = 1;
+  // a motion whose rows do not quite hold is not worth more than one set
+  int sets = cav_run_met(run) ? 0 : 1;
+  return cav_choose_gains(run->problem, run->tr, run->at, sets, cav_run_feedback, run, run->solution, error);
+}
+
+/// What the solution says of its last iterate, and its gains unless it was interrupted.
+static cav_status conclude(cav_solve_run *run, int interrupted, cav_error *error) {
   if (!cav_transcription_keep_rows(run->tr)) return CAV_NO_MEMORY;
   cav_status status = cav_transcription_linearise(run->tr, run->at);
   if (status != CAV_OK) return status;
-  if (cav_run_met(run) && !run->measured) status = cav_sqp_measure(run);
+  if (cav_run_met(run) && !run->measured && !interrupted) status = cav_sqp_measure(run);
   if (status != CAV_OK) return status;
   run->solution->optimality = run->measured ? run->optimality : NAN;
   run->solution->cost = cav_transcription_cost(run->tr);
@@ -131,19 +146,46 @@ static cav_status conclude(cav_solve_run *run, cav_error *error) {
   run->solution->contact = run->tr->options;
   status = find_rows(run);
   if (status != CAV_OK) return status;
-  // a motion whose rows do not hold misses its certificate whatever follows it
-  int sets = cav_run_met(run) ? 0 : 1;
-  return cav_choose_gains(run->problem, run->tr, run->at, sets, run->solution, error);
+  run->solution->multiplier = cav_run_multipliers(run, 1, &run->solution->nmultiplier);
+  if (!run->solution->multiplier) return CAV_NO_MEMORY;
+  return interrupted ? CAV_OK : find_gains(run, error);
 }
 
 static cav_status solve(cav_solve_run *run, cav_error *error) {
   const cav_solve_options *o = run->options;
-  cav_status status = cav_solver_run(run, error);
-  if (status != CAV_NOT_CONVERGED || !o->diagnose || cav_run_met(run)) return status;
-  cav_status rest = cav_minimise_infeasibility(run);
-  if (rest != CAV_OK) return rest;
-  // not the motion that was stopped at, but one that can be
-  return cav_run_met(run) && o->solver != CAV_SOLVER_IPOPT ? cav_recover_feasible(run) : status;
+  cav_place place = run->resume ? run->resume->place : CAV_PLACE_CONTINUATION;
+  cav_status status = place < CAV_PLACE_DIAGNOSIS ? cav_solver_run(run, error) : CAV_NOT_CONVERGED;
+  if (place <= CAV_PLACE_DIAGNOSIS) {
+    if (status != CAV_NOT_CONVERGED || !o->diagnose || (place < CAV_PLACE_DIAGNOSIS && cav_run_met(run))) return status;
+    if (!cav_run_reaches(run, CAV_PLACE_DIAGNOSIS, &status)) return status;
+    cav_status rest = cav_minimise_infeasibility(run);
+    if (rest != CAV_OK) return rest;
+    // not the motion that was stopped at, but one that can be
+    if (!cav_run_met(run) || o->solver == CAV_SOLVER_IPOPT) return status;
+  }
+  return cav_run_reaches(run, CAV_PLACE_RECOVERY, &status) ? cav_recover_feasible(run) : status;
+}
+
+/// The solve and what it is worth: gains are chosen, or the run ends before them.
+static cav_status solve_and_conclude(cav_solve_run *run, cav_status *end, cav_error *error) {
+  int solved = run->resume && run->resume->place == CAV_PLACE_FEEDBACK;
+  cav_status status = solved ? run->resume->status : solve(run, error);
+  if (run->failed != CAV_OK) status = run->failed;
+  run->checkpoint.status = status;
+  run->deadline = INFINITY;
+  if (status == CAV_OK || status == CAV_NOT_CONVERGED) cav_run_reaches(run, CAV_PLACE_FEEDBACK, &status);
+  // the iterate that stands is told of, whoever asks for the end
+  if (status == CAV_INTERRUPTED) run->tr->stop = NULL;
+  // the reason of the solve goes before what verification of the gains says
+  cav_error inner = {0};
+  *end = conclude(run, status == CAV_INTERRUPTED, &inner);
+  if (*end == CAV_INTERRUPTED) {
+    status = CAV_INTERRUPTED;
+    run->tr->stop = NULL;
+    *end = run->solution->multiplier ? CAV_OK : conclude(run, 1, &inner);
+  }
+  if (*end != CAV_OK && status == CAV_OK && error) *error = inner;
+  return status;
 }
 
 /// A given start, brought to where unknowns can be: its step within the bounds, its ends those of a cycle.
@@ -160,8 +202,9 @@ static cav_status take_start(cav_solve_run *run) {
 
 /// All of a problem, which was checked.
 static cav_status solve_whole(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
-                              cav_solution **solution, cav_error *error) {
+                              const cav_solution *before, cav_solution **solution, cav_error *error) {
   cav_solve_run run = {.problem = problem, .options = options, .start = cav_clock()};
+  run.deadline = run.options->max_seconds > 0 ? run.start + run.options->max_seconds : INFINITY;
   *solution = NULL;
   cav_status status = CAV_OK, end = CAV_OK;
   cav_error refusal = {0};
@@ -171,6 +214,8 @@ static cav_status solve_whole(const cav_problem *problem, const cav_solve_option
     return refusal.status;
   }
   run.tr->derivative = run.options->derivative;
+  run.tr->stop = cav_run_stop;
+  run.tr->stop_context = &run;
   if (run.tr->derivative == CAV_DERIVATIVE_CENTRED) run.tr->difference = CAV_DERIVATIVE_CENTRED;
   run.normal = cav_normal_new(run.tr);
   run.at = start ? cav_trajectory_copy(start) : cav_trajectory_new(problem->model, run.tr->nknot, problem->timestep);
@@ -182,13 +227,12 @@ static cav_status solve_whole(const cav_problem *problem, const cav_solve_option
   if (status == CAV_OK) {
     memcpy(run.at->q, problem->q_start, (size_t)problem->model->nq * sizeof(double));
     memcpy(run.at->v, problem->v_start, (size_t)problem->model->nv * sizeof(double));
+    if (before) run.solution->iterations = before->iterations, run.start -= before->seconds;
     status = start ? take_start(&run) : cav_guess_take(&run);
-    if (status == CAV_OK) status = solve(&run, error);
-    // the reason of the solve goes before what verification of the gains says
-    cav_error inner = {0};
-    end = conclude(&run, &inner);
-    if (run.failed != CAV_OK) status = run.failed;
-    if (end != CAV_OK && status == CAV_OK && error) *error = inner;
+    if (status == CAV_OK) status = cav_run_resume(&run, error);
+    run.begin = run.solution->iterations;
+    if (status == CAV_OK) status = solve_and_conclude(&run, &end, error);
+    if (status == CAV_BAD_INPUT) goto end;
     run.solution->seconds = cav_clock() - run.start;
     run.solution->seconds_dynamics = run.tr->seconds_dynamics;
     run.solution->seconds_assembly = run.tr->seconds_assembly;
@@ -202,6 +246,7 @@ static cav_status solve_whole(const cav_problem *problem, const cav_solve_option
   if (status == CAV_NO_MEMORY) fail(error, status, "not enough memory for this problem");
   if (status == CAV_NOT_FINITE)
     fail(error, status, "a number that is not finite came up; the last finite iterate is kept");
+end:
   cav_trajectory_free(run.at);
   cav_trajectory_free(run.spare);
   cav_solution_free(run.solution);
@@ -212,10 +257,10 @@ static cav_status solve_whole(const cav_problem *problem, const cav_solve_option
 
 /// A problem without its idle trees, and these beside it. *alone 0: they are not, and nothing was solved.
 static cav_status solve_part(const cav_idle *idle, const cav_solve_options *options, const cav_trajectory *start,
-                             cav_solution **solution, int *alone, cav_error *error) {
+                             const cav_solution *before, cav_solution **solution, int *alone, cav_error *error) {
   cav_trajectory *part = start ? cav_idle_reduce(idle, start) : NULL;
   if (start && !part) return CAV_NO_MEMORY;
-  cav_status status = solve_whole(&idle->problem, options, part, solution, error);
+  cav_status status = solve_whole(&idle->problem, options, part, before, solution, error);
   cav_trajectory_free(part);
   *alone = 1;
   if (!*solution) return status;
@@ -230,18 +275,27 @@ static cav_status solve_part(const cav_idle *idle, const cav_solve_options *opti
 
 cav_status cav_solve(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
                      cav_solution **solution, cav_error *error) {
-  cav_solve_options defaults = cav_solve_options_default();
-  if (!options) options = &defaults;
+  return cav_solve_after(problem, options, start, NULL, solution, error);
+}
+
+cav_status cav_solve_after(const cav_problem *problem, const cav_solve_options *given, const cav_trajectory *start,
+                           const cav_solution *before, cav_solution **solution, cav_error *error) {
+  cav_solve_options options = given ? *given : cav_solve_options_default();
   *solution = NULL;
-  cav_status status = check(problem, options, start, error);
+  cav_status status = check(problem, &options, start, error);
   if (status != CAV_OK) return status;
   cav_idle idle;
   int alone = 0;
+  // a checkpoint of all trees is one of a solve that found them not to be alone
+  int whole = options.resume && options.resume->trajectory->nv == problem->model->nv;
   status = cav_idle_find(problem, &idle);
-  if (status == CAV_OK && idle.ntree > 0) status = solve_part(&idle, options, start, solution, &alone, error);
+  int part = status == CAV_OK && idle.ntree > 0 && !whole;
+  if (part) status = solve_part(&idle, &options, start, before, solution, &alone, error);
+  if (part) options.resume = NULL;
   if (status == CAV_NO_MEMORY && !*solution) fail(error, status, "not enough memory for this problem");
   if (status != CAV_NO_MEMORY && !alone && !*solution && error) *error = (cav_error){0};
-  if (status != CAV_NO_MEMORY && !alone && !*solution) status = solve_whole(problem, options, start, solution, error);
+  if (status != CAV_NO_MEMORY && !alone && !*solution)
+    status = solve_whole(problem, &options, start, before, solution, error);
   cav_idle_clear(&idle);
   return status;
 }

@@ -62,12 +62,14 @@ static cav_status ipopt_from_here(cav_solve_run *run, cav_error *error) {
 }
 
 cav_status cav_solver_ipopt(cav_solve_run *run, cav_error *error) {
+  cav_status status = CAV_OK;
   cav_stage_set(run->problem, 1, run->tr);
-  return ipopt_from_here(run, error);
+  return cav_run_reaches(run, CAV_PLACE_IPOPT, &status) ? ipopt_from_here(run, error) : status;
 }
 
 cav_status cav_solver_both(cav_solve_run *run, cav_error *error) {
   cav_status status = cav_solver_gn(run, error);
+  if (status == CAV_OK && !cav_run_reaches(run, CAV_PLACE_IPOPT, &status)) return status;
   if (status == CAV_OK) status = warm_start(run);
   return status == CAV_OK || status == CAV_NOT_CONVERGED ? ipopt_from_here(run, error) : status;
 }

@@ -236,7 +236,7 @@ static void exchange(cav_trajectory **a, cav_trajectory **b) {
 static cav_status try_at(cav_solve_run *run, descent *d, cav_trajectory *at, double *merit) {
   cav_status status = cav_transcription_values(run->tr, at);
   *merit = status == CAV_OK ? merit_of(run->tr, cav_quadratic_penalty(d->qp), d->tried) : INFINITY;
-  return status == CAV_NO_MEMORY ? status : CAV_OK;
+  return status == CAV_NO_MEMORY || status == CAV_INTERRUPTED ? status : CAV_OK;
 }
 
 static void keep_parts(descent *d) {
@@ -550,12 +550,15 @@ cav_status cav_sqp_measure(cav_solve_run *run) {
 
 cav_status cav_to_optimum(cav_solve_run *run) {
   cav_stage_set(run->problem, 1, run->tr);
-  cav_status status = cav_sqp(run);
+  cav_status status = CAV_NOT_CONVERGED;
+  if (cav_run_reaches(run, CAV_PLACE_SQP, &status)) status = cav_sqp(run);
   if (status != CAV_NOT_CONVERGED) return status;
   // the augmented Lagrangian brings rows in from further away
   status = cav_augmented_lagrangian(run);
-  if (status == CAV_OK) status = cav_restore(run);
-  if (status != CAV_OK) return status;
-  status = cav_sqp(run);
+  if (status == CAV_OK && cav_run_reaches(run, CAV_PLACE_RESTORATION, &status)) status = cav_restore(run);
+  if (status == CAV_OK && cav_run_reaches(run, CAV_PLACE_SQP_AGAIN, &status))
+    status = cav_sqp(run);
+  else
+    return status;
   return status == CAV_NOT_CONVERGED ? CAV_OK : status;
 }

@@ -205,10 +205,16 @@ cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *st
                               cav_error *error) {
   cav_problem taken;
   cav_strategy_apply(problem, strategy, &taken);
-  if (!strategy->first_midpoint || start) return cav_solve(&taken, options, start, solution, error);
-  cav_solve_options first = options ? *options : cav_solve_options_default();
+  const cav_checkpoint *resume = options ? options->resume : NULL;
+  int second = resume && resume->order == problem->order;
+  if (!strategy->first_midpoint || start || second) {
+    if (strategy->first_midpoint && second) taken.schedule = resumed(&taken.schedule);
+    return cav_solve(&taken, options, start, solution, error);
+  }
+  cav_solve_options first = options ? *options : cav_solve_options_default(), rest = first;
   cav_solution *before = NULL;
-  first.diagnose = 0;
+  first.diagnose = first.gains = 0;
+  rest.resume = NULL;
   taken.order = CAV_ORDER_MIDPOINT;
   cav_status status = cav_solve(&taken, &first, NULL, &before, error);
   // one that was stopped, or has no motion, ends here
@@ -218,9 +224,7 @@ cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *st
   }
   taken.order = problem->order;
   taken.schedule = resumed(&taken.schedule);
-  status = cav_solve(&taken, options, before->trajectory, solution, error);
-  if (*solution) (*solution)->iterations += before->iterations;
-  if (*solution) (*solution)->seconds += before->seconds;
+  status = cav_solve_after(&taken, &rest, before->trajectory, before, solution, error);
   cav_solution_free(before);
   return status;
 }

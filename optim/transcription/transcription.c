@@ -510,8 +510,15 @@ int cav_transcription_keep_rows(cav_transcription *tr) {
   return 1;
 }
 
-cav_status cav_transcription_values(cav_transcription *tr, cav_trajectory *at) { return evaluate(tr, at, 0); }
-cav_status cav_transcription_linearise(cav_transcription *tr, cav_trajectory *at) { return evaluate(tr, at, 1); }
+int cav_transcription_stopped(const cav_transcription *tr) { return tr->stop && tr->stop(tr->stop_context); }
+
+cav_status cav_transcription_values(cav_transcription *tr, cav_trajectory *at) {
+  return cav_transcription_stopped(tr) ? CAV_INTERRUPTED : evaluate(tr, at, 0);
+}
+
+cav_status cav_transcription_linearise(cav_transcription *tr, cav_trajectory *at) {
+  return cav_transcription_stopped(tr) ? CAV_INTERRUPTED : evaluate(tr, at, 1);
+}
 
 // ---------------------------------------------------------------- sums over knots
 

@@ -106,9 +106,11 @@ typedef struct cav_transcription {
   double slack_effort, slack_range; ///< how far constraints_only lets these rows pass their planned bounds
   int gradient_only;                ///< linearisations leave the Hessians unfinished
   int keep_rows;                    ///< slot_row of the knots is filled by linearisations
-  cav_options options;              ///< contact law of this stage; its timestep is the step of the last trajectory
-  cav_knot *knot;                   ///< [nknot]
-  struct cav_scratch *scratch;      ///< one a thread
+  int (*stop)(void *context);       ///< asked before every evaluation; nonzero: CAV_INTERRUPTED. NULL: none asks
+  void *stop_context;
+  cav_options options;         ///< contact law of this stage; its timestep is the step of the last trajectory
+  cav_knot *knot;              ///< [nknot]
+  struct cav_scratch *scratch; ///< one a thread
   cav_parallel *pool;
   double *join; ///< room of join.c
   size_t join_room;
@@ -139,7 +141,11 @@ int cav_transcription_block(const cav_transcription *transcription, int t, int c
 /// scratch. pattern.c.
 void cav_transcription_pattern(const cav_transcription *transcription, int t, int i, char *pattern);
 
-/// Values at a trajectory: u, constraint rows, cost and merit of every knot. Fills trajectory->u.
+/// Whether somebody asks for the end.
+int cav_transcription_stopped(const cav_transcription *transcription);
+
+/// Values at a trajectory: u, constraint rows, cost and merit of every knot. Fills trajectory->u. CAV_INTERRUPTED, as
+/// the next: stopped asks for the end, and nothing was evaluated.
 cav_status cav_transcription_values(cav_transcription *transcription, cav_trajectory *trajectory);
 
 /// Values and derivatives: du, dy, hessian and gradient of the merit of every knot.
