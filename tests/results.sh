@@ -6,7 +6,7 @@
 # momentum), orders (error of the orders of the step against their time), absent (what features cost where a scene has none of
 # them), optimum (optimal control against known optima), methods (own solver and Ipopt on the same),
 # sensors, tendons, actuation, fluid (readings, strings, drives and
-# drag against MuJoCo's).
+# drag against MuJoCo's), interruption (solves killed and interrupted at random moments, half an hour).
 # CAVORT_BUILD names a build folder, by default build.
 set -eu
 cd "$(dirname "$0")/.."
@@ -127,6 +127,18 @@ methods() {
   mv "$out/methods.tmp" "$out/methods.md"
 }
 
+# the tool is ended at random moments: of a motion that is certified at once, of one that three strategies are tried for
+interruption() {
+  ninja -C "$build" problems/cavort >/dev/null
+  {
+    provenance "sh tests/results.sh interruption"
+    sh tests/interruption.sh "$build/problems/cavort" problems/motions/kick/problem.xml 50 20 1 --threads 1
+    echo
+    sh tests/interruption.sh "$build/problems/cavort" tests/rise.xml 50 20 2
+  } >"$out/interruption.tmp"
+  mv "$out/interruption.tmp" "$out/interruption.txt"
+}
+
 for name in ${*:-inverse heap update normal unused sweep conservation orders sensors tendons actuation fluid optimum methods absent}; do
   case $name in
     inverse) run inverse bench_inverse ;;
@@ -144,6 +156,7 @@ for name in ${*:-inverse heap update normal unused sweep conservation orders sen
     optimum) optimum ;;
     methods) methods ;;
     absent) absent ;;
-    *) echo "usage: sh tests/results.sh [inverse|heap|update|normal|unused|sweep|conservation|orders|sensors|tendons|actuation|fluid|optimum|methods|absent]..." >&2 && exit 2 ;;
+    interruption) interruption ;;
+    *) echo "usage: sh tests/results.sh [inverse|heap|update|normal|unused|sweep|conservation|orders|sensors|tendons|actuation|fluid|optimum|methods|absent|interruption]..." >&2 && exit 2 ;;
   esac
 done

@@ -140,7 +140,7 @@ static void check_verdict(const cav_problem *problem) {
                          .solve_seconds = 0.25,
                          .iterations = 9};
   snprintf(verdict.reason, sizeof verdict.reason, "too \"deep\"\n");
-  CHECK(cav_result_write_verdict(folder, problem, &verdict, NULL, &error) == CAV_OK);
+  CHECK(cav_result_write_verdict(folder, problem, &verdict, NULL, NULL, &error) == CAV_OK);
   const char *text = read_file("verdict.json");
   const char *field[] = {"\"feasible\": true",
                          "\"optimal\": false",
@@ -244,7 +244,31 @@ static void remove_all(void) {
   CHECK(rmdir(folder) == 0 && rmdir(upper) == 0 && rmdir(top) == 0);
 }
 
+// the vectors of FIPS 180-4, and a million letters
+static void test_digest(void) {
+  static const struct {
+    const char *text;
+    int times;
+    const char *hash;
+  } vector[] = {{"", 1, "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"},
+                {"abc", 1, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"},
+                {"abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq", 1,
+                 "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1"},
+                {"aaaaaaaaaa", 100000, "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0"}};
+  for (size_t i = 0; i < sizeof vector / sizeof *vector; i++) {
+    char text[CAV_DIGEST_TEXT];
+    FILE *file = tmpfile();
+    if (!CHECK(file != NULL)) return;
+    for (int k = 0; k < vector[i].times; k++) fputs(vector[i].text, file);
+    rewind(file);
+    cav_digest(file, text);
+    CHECK_TEXT(text, vector[i].hash);
+    fclose(file);
+  }
+}
+
 int main(void) {
+  test_digest();
   CHECK(mkdtemp(top) != NULL);
   snprintf(folder, sizeof folder, "%s/some/where", top);
   snprintf(model_path, sizeof model_path, "%s/box.xml", top);

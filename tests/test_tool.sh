@@ -54,6 +54,7 @@ run 2 help nothing
 says err "no command or topic 'nothing'"
 run 0 --version
 check "a version" grep -qE '^cavort [0-9]+\.[0-9]+\.[0-9]+' out
+for field in commit compiler features; do check "its $field" grep -q "^$field [^ ]" out; done
 run 2
 run 2 fly
 says err "no command 'fly'"
@@ -132,6 +133,23 @@ run 0 solve problem.xml
 says out "certified: swing on pendulum"
 says err "continuation"
 for name in trajectory.csv forces.csv gains.csv log.csv stages.csv problem.xml strategies.csv verdict.json view.html; do has "swing.result/$name"; done
+sum() { sha256sum "$1" | cut -d' ' -f1; }
+says swing.result/verdict.json "\"problem_sha256\": \"$(sum problem.xml)\", \"model_sha256\": \"$(sum model.xml)\""
+says swing.result/verdict.json 'cavort solve problem.xml"'
+for field in version commit compiler features machine date; do
+  check "a result's $field" grep -q "\"$field\": \"[^\"]" swing.result/verdict.json
+done
+# an earlier result is not replaced, nor moved with what is not its own
+run 0 solve modelless.xml --model model.xml -o twice
+cp twice/verdict.json first.json
+run 0 solve modelless.xml --model model.xml -o twice
+says err "the earlier result is in twice.1 now"
+check "the earlier one as it was" cmp -s first.json twice.1/verdict.json
+has twice/verdict.json
+echo mine >twice/notes.txt
+run 2 solve modelless.xml --model model.xml -o twice
+says err "other files (notes.txt)"
+has twice/notes.txt
 run 0 solve modelless.xml --model model.xml -o given --quiet
 silent out
 silent err
@@ -243,6 +261,8 @@ while [ "$tries" -lt 600 ] && ! grep -qs 'continuation  [2-9]' caught.err; do
   sleep 0.1
   tries=$((tries + 1))
 done
+run 2 solve "$motion" -o caught
+says err "another solve writes into it (process $child)"
 # a shell lets what it starts in the background ignore SIGINT, but the command asks for it itself
 kill -INT "$child"
 wait "$child"
@@ -251,7 +271,9 @@ mv caught.out out
 mv caught.err err
 check "interrupted: status $status, expected 130" [ "$status" -eq 130 ]
 says err "best iterate is saved"
-for name in trajectory.csv gains.csv log.csv stages.csv problem.xml verdict.json; do has "caught/$name"; done
+says err "stopped at stage"
+for name in trajectory.csv log.csv stages.csv problem.xml checkpoint.csv verdict.json; do has "caught/$name"; done
+check "no gains of what cannot be certified" [ ! -e caught/gains.csv ]
 says caught/verdict.json '"certified": false'
 lines=$(wc -l <caught/log.csv)
 check "the log ends early: $lines lines" [ "$lines" -lt 200 ]
@@ -265,6 +287,18 @@ sed 's/timestep=".025"/timestep=".0125"/' problem.xml >finer.xml
 run 0 solve finer.xml -o swing.result --resume --quiet
 check "on the finer knots" [ "$(wc -l <swing.result/trajectory.csv)" -eq 82 ]
 run 2 solve problem.xml -o empty --resume
+# a changed weight from the motion and its multipliers: at once at its optimum
+sed 's/weight="900"/weight="800"/' problem.xml >lighter.xml
+run 0 solve problem.xml -o weighed --quiet
+run 0 solve lighter.xml -o weighed --resume --quiet
+has weighed.1/verdict.json
+check "no stages" [ "$(grep -c continuation weighed/stages.csv)" -eq 0 ]
+check "few iterations" [ "$(wc -l <weighed/log.csv)" -le 3 ]
+
+# a checkpoint that is none
+echo nonsense >weighed/checkpoint.csv
+run 2 solve lighter.xml -o weighed --resume
+says err "weighed/checkpoint.csv:1: expected"
 
 # --- where nothing can be written ---
 

@@ -22,6 +22,10 @@ void cav_command_warn_efforts(const cav_model *model, FILE *out) {
           n, model->nu, model->actuator[first].name, n == 1 ? "it" : "them");
 }
 
+#include "provenance.h"
+
+void cav_command_version(void) { cav_provenance_print_build(stdout); }
+
 int cav_command_fail(const cav_error *error) {
   fprintf(stderr, "cavort: %s\n", error->text[0] ? error->text : cav_status_name(error->status));
   switch (error->status) {

@@ -19,12 +19,13 @@ enum { CAV_COMMAND_IPOPT = 32 };
 
 /// A command line as read by main.c.
 typedef struct cav_command_line {
-  const char *operand; ///< MODEL, PROBLEM, DIR or TOPIC; NULL: none
-  int noperand;        ///< of commands that take several
-  char **operands;     ///< [noperand]
-  const char *model;   ///< --model, NULL: as the problem says
-  int floating;        ///< --floating
-  const char *output;  ///< -o, NULL: named after the problem
+  const char *arguments; ///< the command line as it was given
+  const char *operand;   ///< MODEL, PROBLEM, DIR or TOPIC; NULL: none
+  int noperand;          ///< of commands that take several
+  char **operands;       ///< [noperand]
+  const char *model;     ///< --model, NULL: as the problem says
+  int floating;          ///< --floating
+  const char *output;    ///< -o, NULL: named after the problem
   cav_solver solver;
   int threads;
   int strategies; ///< --strategies: 0 auto, else how many at once
@@ -45,6 +46,9 @@ int cav_command_view(const cav_command_line *line);
 
 /// cavort view of a problem file. preview.c.
 int cav_command_preview(const cav_command_line *line);
+
+/// Prints version, commit, compiler and features.
+void cav_command_version(void);
 
 /// Prints "cavort: text" on standard error; returns the exit status that goes with the error's status.
 int cav_command_fail(const cav_error *error);

@@ -1,6 +1,7 @@
 /// cavort solve: reads a problem, solves it, certifies the result, writes its folder. What the stated guess does not
-/// lead to is tried by other strategies, in processes (race.c). The first Ctrl-C ends the solve with the best iterate
-/// saved; another one, a second later, ends the program at once.
+/// lead to is tried by other strategies, in processes (race.c). The first Ctrl-C (SIGINT, SIGTERM, SIGHUP) ends the solve
+/// with the best iterate saved; another one, a second later, ends the program at once. What is in the folder at any
+/// moment can be read and gone on from (store.c).
 #include <math.h>
 #include <signal.h>
 #include <stdio.h>
@@ -14,6 +15,7 @@
 #include "file.h"
 #include "race.h"
 #include "result.h"
+#include "store.h"
 
 static volatile sig_atomic_t interrupted, first_second;
 
@@ -35,6 +37,7 @@ static void catch_interrupts(void) {
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, NULL);
   sigaction(SIGTERM, &action, NULL);
+  sigaction(SIGHUP, &action, NULL);
 }
 
 // what the progress line remembers
@@ -53,10 +56,13 @@ static void show_progress(ticker *tick, const cav_progress *p) {
   tick->stage = p->stage;
   tick->last = p->seconds;
   tick->shown = 1;
+  char left[32] = "";
+  if (p->fraction > 0.05) snprintf(left, sizeof left, ", %.0f s left", p->seconds * (1 / p->fraction - 1));
   fprintf(stderr,
-          "%s%-12s %2d/%-2d  iteration %4d  cost %9.4g  unactuated %8.2e at knot %3d  violation %8.2e  %6.1f s%s",
+          "%s%-12s %2d/%-2d  iteration %4d  cost %9.4g  unactuated %8.2e at knot %3d  violation %8.2e  %6.1f s  %2.0f "
+          "%%%s%s",
           tick->terminal ? "\r" : "", p->phase, p->stage, p->stages, p->iteration, p->cost, p->unactuated, p->knot,
-          p->violation, p->seconds, tick->terminal ? "\033[K" : "\n");
+          p->violation, p->seconds, 100 * p->fraction, left, tick->terminal ? "\033[K" : "\n");
   fflush(stderr);
 }
 
@@ -83,11 +89,9 @@ static char *folder_of(const cav_command_line *line, const cav_problem *problem)
   return folder;
 }
 
-// the folder, made; refuses one whose problem.xml is the problem file itself, which would be overwritten
-static cav_status prepare_folder(const char *folder, const cav_command_line *line, const cav_problem *problem,
-                                 cav_error *error) {
-  cav_status status = cav_result_folder(folder, error);
-  if (status || problem->solved) return status;
+// refuses a folder whose problem.xml is the problem file itself, which would be overwritten
+static cav_status check_folder(const char *folder, const cav_command_line *line, cav_error *error) {
+  cav_status status = CAV_OK;
   char *copy = cav_result_path(folder, "problem.xml");
   char *there = copy ? realpath(copy, NULL) : NULL, *here = realpath(line->operand, NULL);
   if (there && here && !strcmp(there, here)) {
@@ -101,8 +105,8 @@ static cav_status prepare_folder(const char *folder, const cav_command_line *lin
   return status;
 }
 
-// trajectory to start from: the folder's, on this problem's knots
-static cav_trajectory *resume_from(const char *folder, const cav_problem *problem, cav_error *error) {
+// trajectory to start from: that of another problem's solve, on this problem's knots
+static cav_trajectory *start_from(const char *folder, const cav_problem *problem, cav_error *error) {
   char *path = cav_result_path(folder, "trajectory.csv");
   cav_trajectory *start = path ? cav_trajectory_read(path, problem->model, error) : NULL;
   double h = problem->timestep, duration = start ? (start->nknot - 1) * start->timestep : 0;
@@ -124,14 +128,67 @@ static cav_trajectory *resume_from(const char *folder, const cav_problem *proble
   return start;
 }
 
+// where a solve starts, by what its folder holds: from the guess, on from checkpoints, or from a motion
+typedef struct beginning {
+  int resume;
+  cav_trajectory *start;
+  cav_checkpoint *motion; ///< of the motion, with multipliers that fit; NULL: none
+} beginning;
+
+// the mark of checkpoints: problem, model and solver
+static void mark(const cav_command_line *line, const cav_provenance *p, char key[96]) {
+  snprintf(key, 96, "%.24s-%.24s-%s", p->problem, p->model, cav_solver_rule_of(line->solver)->name);
+}
+
+// whether a checkpoint's multipliers are of as many rows as the problem has, at the same knots
+static int fits(const cav_problem *problem, const cav_checkpoint *c) {
+  cav_equations equations;
+  cav_error ignored = {0};
+  int knots = (int)lround(problem->duration / problem->timestep) + 1;
+  return c->place > CAV_PLACE_CONTINUATION && c->trajectory->nknot == knots &&
+         c->trajectory->nv == problem->model->nv && c->order == problem->order &&
+         (problem->duration_most > 0 || fabs(c->trajectory->timestep - problem->timestep) < 1e-9 * problem->timestep) &&
+         !cav_problem_equations(problem, &equations, &ignored) && equations.constraints == c->nmultiplier;
+}
+
+// reads what --resume goes on from
+static cav_status find_beginning(const char *folder, const cav_problem *problem, const char *key, beginning *b,
+                                 cav_error *error) {
+  char *path = cav_store_checkpoint(folder, "stated");
+  if (!path) return cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
+  cav_checkpoint *c = NULL;
+  if (access(path, F_OK) == 0 && !(c = cav_checkpoint_read(path, problem->model, error))) {
+    free(path);
+    return error->status;
+  }
+  free(path);
+  b->resume = c && !strcmp(c->key, key);
+  if (!b->resume && c && fits(problem, c)) {
+    b->motion = c;
+    b->start = cav_trajectory_copy(c->trajectory);
+    return b->start ? CAV_OK : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
+  }
+  cav_checkpoint_free(c);
+  if (!b->resume && !(b->start = start_from(folder, problem, error))) return error->status;
+  return CAV_OK;
+}
+
 // what saving needs to know
 typedef struct destination {
   const cav_command_line *line;
   const char *folder;
+  const cav_provenance *provenance;
 } destination;
 
+// while the stated strategy is solved the folder can be read as a result
+static void snapshot(void *context, const cav_problem *problem, const cav_checkpoint *checkpoint, int first) {
+  const destination *to = context;
+  cav_error error = {0};
+  if (cav_result_write_unfinished(to->folder, problem, checkpoint->trajectory, first, &error))
+    fprintf(stderr, "cavort: %s\n", error.text);
+}
+
 static const char *why_stopped(int status) {
-  if (status == CAV_INTERRUPTED) return "interrupted; the best iterate is saved";
   if (status == CAV_NOT_FINITE) return "a number that is not finite came up; the last finite iterate is saved";
   return "the solver did not reach its tolerance; the best iterate is saved";
 }
@@ -143,28 +200,29 @@ static int save(void *context, const cav_problem *problem, const cav_solution *s
   const cav_command_line *line = to->line;
   const cav_verdict *verdict = &report->verdict;
   cav_error error = {0};
-  if (report->status) fprintf(stderr, "cavort: %s\n", report->text[0] ? report->text : why_stopped(report->status));
+  // it may also have been stopped while other strategies were tried, and this one was verified before
+  int stopped = report->status == CAV_INTERRUPTED, ended = stopped || (interrupted && !cav_race_success(report));
+  if (ended)
+    fprintf(stderr, "cavort: %s; the best iterate is saved, the same command with --resume goes on\n",
+            stopped ? verdict->reason : "stopped while other strategies were tried");
+  else if (report->status)
+    fprintf(stderr, "cavort: %s\n", report->text[0] ? report->text : why_stopped(report->status));
   cav_term_report *terms = calloc((size_t)problem->nterm + 1, sizeof *terms);
   cav_status status = terms ? cav_result_write(to->folder, problem, solution, &error) : CAV_NO_MEMORY;
   if (!status) status = cav_terms_report(problem, solution->trajectory, &solution->contact, terms, NULL, &error);
-  if (!status) status = cav_result_write_verdict(to->folder, problem, verdict, terms, &error);
-  if (!status && line->json) cav_certificate_json(stdout, problem, verdict, terms);
-  if (!status && !line->quiet && !line->json) cav_certificate_print(stdout, problem, verdict, terms);
+  if (!status) status = cav_result_write_verdict(to->folder, problem, verdict, terms, to->provenance, &error);
+  if (!status && line->json) cav_certificate_json(stdout, problem, verdict, terms, to->provenance);
+  if (!status && !line->quiet && !line->json && !stopped) cav_certificate_print(stdout, problem, verdict, terms);
   free(terms);
   if (status) return cav_command_fail(&error);
   // the page is a convenience: without three.js everything else stands
-  if (cav_result_write_page(to->folder, problem, solution->trajectory, &solution->contact, verdict, &error)) {
+  if (!stopped &&
+      cav_result_write_page(to->folder, problem, solution->trajectory, &solution->contact, verdict, &error)) {
     fprintf(stderr, "cavort: no page: %s\n", error.text);
   }
   if (!line->quiet && !line->json) printf("result: %s\n", to->folder);
-  if (report->status == CAV_INTERRUPTED) return CAV_EXIT_INTERRUPTED;
+  if (ended) return CAV_EXIT_INTERRUPTED;
   return verdict->certified && verdict->achieved ? CAV_EXIT_CERTIFIED : CAV_EXIT_NOT_CERTIFIED;
-}
-
-// in processes whose lines no one reads
-static int observe_quietly(void *context, const cav_progress *progress) {
-  (void)context, (void)progress;
-  return interrupted;
 }
 
 static void tell_more(const cav_race *race) {
@@ -189,18 +247,18 @@ static cav_status run_race(cav_race *race, const cav_command_line *line, ticker 
   return cav_race_finish(race, at_once, error);
 }
 
-static int solve_into(const cav_command_line *line, const cav_problem *problem, const char *folder) {
+static int solve_from(const cav_command_line *line, const cav_problem *problem, const char *folder,
+                      const cav_provenance *provenance, const char *key, const beginning *b) {
   cav_error error = {0};
-  cav_status status = prepare_folder(folder, line, problem, &error);
-  if (status) return cav_command_fail(&error);
-  cav_trajectory *start = line->resume ? resume_from(folder, problem, &error) : NULL;
-  if (line->resume && !start) return cav_command_fail(&error);
   ticker tick = {.quiet = line->quiet, .terminal = isatty(STDERR_FILENO)};
-  destination to = {line, folder};
+  destination to = {line, folder, provenance};
   cav_race race = {.problem = problem,
-                   .start = start,
+                   .start = b->start,
+                   .folder = folder,
+                   .key = key,
+                   .resume = b->resume,
+                   .snapshot = snapshot,
                    .options = cav_solve_options_default(),
-                   .quiet = observe_quietly,
                    .interrupted = &interrupted,
                    .processes = line->threads,
                    .tell = !line->quiet,
@@ -212,10 +270,15 @@ static int solve_into(const cav_command_line *line, const cav_problem *problem, 
   race.options.ipopt = line->ipopt;
   race.options.observer = observe;
   race.options.observer_context = &tick;
+  if (b->motion) {
+    race.options.first_stage = problem->schedule.stages + 1;
+    race.options.nmultiplier = b->motion->nmultiplier;
+    race.options.multiplier = b->motion->final_multiplier;
+  }
   catch_interrupts();
   // a start that is given is the only one
-  int most = line->resume ? 1 : line->strategies ? line->strategies : CAV_STRATEGIES;
-  status = cav_race_open(&race, most, &error);
+  int most = b->start ? 1 : line->strategies ? line->strategies : CAV_STRATEGIES;
+  cav_status status = cav_race_open(&race, most, &error);
   if (!status) status = run_race(&race, line, &tick, &error);
   int best = status ? -1 : cav_race_best(&race, line->strategies > 1), done = CAV_EXIT_INTERNAL;
   if (best >= 0) {
@@ -229,8 +292,29 @@ static int solve_into(const cav_command_line *line, const cav_problem *problem, 
   if (race.n > 1 && race.tell && best > 0) fprintf(stderr, "kept: strategy %s\n", race.entry[best].strategy.name);
   if (status) done = cav_command_fail(&error);
   cav_race_close(&race);
-  cav_trajectory_free(start);
   return done;
+}
+
+static int solve_into(const cav_command_line *line, const cav_problem *problem, const char *folder) {
+  cav_error error = {0};
+  cav_provenance provenance;
+  cav_store store;
+  beginning b = {0};
+  char key[96];
+  cav_provenance_take(&provenance, line->arguments, line->operand, problem->model_path);
+  mark(line, &provenance, key);
+  cav_status status = problem->solved ? CAV_OK : check_folder(folder, line, &error);
+  if (!status && line->resume) status = find_beginning(folder, problem, key, &b, &error);
+  int done = 0;
+  if (!status) {
+    status = cav_store_open(&store, folder, b.resume, &error);
+    if (!status && store.aside && !line->quiet) fprintf(stderr, "the earlier result is in %s now\n", store.aside);
+    if (!status) done = solve_from(line, problem, folder, &provenance, key, &b);
+    cav_store_close(&store);
+  }
+  cav_checkpoint_free(b.motion);
+  cav_trajectory_free(b.start);
+  return status ? cav_command_fail(&error) : done;
 }
 
 int cav_command_solve(const cav_command_line *line) {

@@ -31,7 +31,7 @@ int cav_command_verify(const cav_command_line *line) {
   cav_term_report *terms = status ? NULL : calloc((size_t)result->problem->nterm + 1, sizeof *terms);
   if (terms)
     status = cav_terms_report(result->problem, result->trajectory, &result->problem->contact, terms, NULL, &error);
-  if (!status && line->json) cav_certificate_json(stdout, result->problem, &verdict, terms);
+  if (!status && line->json) cav_certificate_json(stdout, result->problem, &verdict, terms, NULL);
   if (!status && !line->json && !line->quiet) cav_certificate_print(stdout, result->problem, &verdict, terms);
   free(terms);
   cav_result_free(result);

@@ -45,7 +45,8 @@ static const struct {
      "limited memory), both"},
     {OPTION_THREADS, "--threads", NULL, "N",
      "threads to use (default: all processors); the result does not depend on it"},
-    {OPTION_RESUME, "--resume", NULL, NULL, "start from the trajectory that the result folder holds"},
+    {OPTION_RESUME, "--resume", NULL, NULL,
+     "go on where the solve of the result folder was stopped; if the problem has changed since, start from its motion"},
     {OPTION_QUIET, "--quiet", "-q", NULL, "no progress and no table; errors and the exit status remain"},
     {OPTION_FORCE, "--force", NULL, NULL, "solve what is proven impossible all the same"},
     {OPTION_ALL, "--all", NULL, NULL, "all that is missed, and all that pulls, with what usually helps"},
@@ -286,9 +287,22 @@ static int read_line(const command *c, int argc, char **argv, cav_command_line *
   return 0;
 }
 
-int main(int argc, char **argv) {
+// the command line in one text, in memory that lasts as long as the program; NULL if there is none
+static char *join(int argc, char **argv) {
+  size_t room = 1;
+  for (int i = 0; i < argc; i++) room += strlen(argv[i]) + 3;
+  char *text = malloc(room), *end = text;
+  for (int i = 0; i < argc && text; i++) {
+    const char *quote = strpbrk(argv[i], " \t'\"") ? "'" : "";
+    end += sprintf(end, "%s%s%s%s", i ? " " : "", quote, argv[i], quote);
+  }
+  return text;
+}
+
+static int run(int argc, char **argv, const char *arguments) {
   long processors = sysconf(_SC_NPROCESSORS_ONLN);
-  cav_command_line line = {.solver = CAV_SOLVER_GAUSS_NEWTON,
+  cav_command_line line = {.arguments = arguments,
+                           .solver = CAV_SOLVER_GAUSS_NEWTON,
                            .threads = processors < 1      ? 1
                                       : processors > 1024 ? 1024
                                                           : (int)processors};
@@ -299,7 +313,7 @@ int main(int argc, char **argv) {
   const char *name = argv[1];
   if (!strcmp(name, "--help") || !strcmp(name, "-h")) name = "help";
   if (!strcmp(name, "--version")) {
-    printf("cavort %s\n", cav_version());
+    cav_command_version();
     return 0;
   }
   const command *c = find_command(name);
@@ -321,5 +335,12 @@ int main(int argc, char **argv) {
     fprintf(stderr, "cavort: standard output cannot be written\n");
     status = CAV_EXIT_INTERNAL;
   }
+  return status;
+}
+
+int main(int argc, char **argv) {
+  char *arguments = join(argc, argv);
+  int status = run(argc, argv, arguments ? arguments : "");
+  free(arguments);
   return status;
 }

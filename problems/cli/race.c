@@ -5,6 +5,7 @@
 #include "race.h"
 
 #include <errno.h>
+#include <math.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,6 +16,7 @@
 #include "command.h"
 #include "csv.h"
 #include "file.h"
+#include "store.h"
 
 cav_status cav_race_open(cav_race *race, int most, cav_error *error) {
   cav_strategy strategy[CAV_STRATEGIES];
@@ -32,6 +34,108 @@ static int counts(cav_status status) {
   return status == CAV_OK || status == CAV_NOT_CONVERGED || status == CAV_INTERRUPTED || status == CAV_NOT_FINITE;
 }
 
+// by a signal, or because the process that this one works for is no more
+static int asks_for_the_end(void *context) {
+  const cav_race *race = context;
+  return *race->interrupted || (race->parent && getppid() != race->parent);
+}
+
+// where checkpoints of a strategy go
+typedef struct shelf {
+  const cav_race *race;
+  const cav_problem *problem;
+  char *path;
+  int strategy, n, failed;
+} shelf;
+
+static int keep(void *context, const cav_checkpoint *checkpoint) {
+  shelf *s = context;
+  cav_checkpoint marked = *checkpoint;
+  cav_error error = {0};
+  snprintf(marked.key, sizeof marked.key, "%s", s->race->key);
+  if (s->race->snapshot && s->strategy == 0) s->race->snapshot(s->race->context, s->problem, checkpoint, s->n++ == 0);
+  // a solve that cannot be kept is still worth its end
+  if (!s->failed && cav_checkpoint_write(s->path, &marked, &error)) {
+    s->failed = 1;
+    fprintf(stderr, "cavort: no checkpoints: %s\n", error.text);
+  }
+  return 0;
+}
+
+// solves, from a checkpoint if there is one; it stays there
+static cav_status solve(const cav_race *race, int i, const cav_solve_options *given, const cav_problem *taken,
+                        cav_solution **solution, cav_error *error) {
+  const cav_strategy *strategy = &race->entry[i].strategy;
+  cav_solve_options options = *given;
+  shelf s = {.race = race, .problem = taken, .strategy = i};
+  options.stop = asks_for_the_end;
+  options.stop_context = (void *)race;
+  if (race->folder) s.path = cav_store_checkpoint(race->folder, strategy->name);
+  if (race->folder && !s.path) return cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
+  if (s.path) options.keeper = keep, options.keeper_context = &s;
+  cav_checkpoint *before = NULL;
+  cav_status status = CAV_OK;
+  if (s.path && race->resume && access(s.path, F_OK) == 0) {
+    before = cav_checkpoint_read(s.path, race->problem->model, error);
+    if (!before) status = error->status;
+  }
+  options.resume = before;
+  if (!status)
+    status = cav_strategy_solve(race->problem, strategy, &options, i == 0 ? race->start : NULL, solution, error);
+  cav_checkpoint_free(before);
+  free(s.path);
+  return status;
+}
+
+// where a solve was stopped, in words
+static void say_where(const cav_solution *solution, char *text, size_t room) {
+  const cav_stage_record *last = solution->nstage ? &solution->stage[solution->nstage - 1] : NULL;
+  if (!last)
+    snprintf(text, room, "stopped before its first stage");
+  else if (last->outcome != CAV_OUTCOME_STOPPED)
+    snprintf(text, room, "stopped after %s %d of %d", last->phase, last->stage, last->stages);
+  else if (!strcmp(last->phase, "continuation"))
+    snprintf(text, room, "stopped at stage %d of %d", last->stage, last->stages);
+  else
+    snprintf(text, room, "stopped in phase %s, %d of %d", last->phase, last->stage, last->stages);
+}
+
+// what is known of a motion that was not verified, since somebody waits
+static void leave_unverified(const cav_solution *solution, cav_verdict *v) {
+  *v = (cav_verdict){.unactuated_force_max = solution->unactuated, .unactuated_force_knot = -1};
+  double *const unknown[] = {&v->momentum_defect_rms,
+                             &v->limit_violation_max,
+                             &v->constraint_violation_max,
+                             &v->penetration_max_m,
+                             &v->slip_mean_m_s,
+                             &v->hover_fraction,
+                             &v->replay_step_max_error,
+                             &v->replay_same_step_max_error,
+                             &v->replay_same_step_seconds,
+                             &v->closed_loop_seconds,
+                             &v->closed_loop_end_error_m,
+                             &v->model_contacts_seconds,
+                             &v->periodicity_error,
+                             &v->model_contacts_end_error_m};
+  for (size_t i = 0; i < sizeof unknown / sizeof *unknown; i++) *unknown[i] = NAN;
+  const cav_trajectory *at = solution->trajectory;
+  v->duration = (at->nknot - 1) * at->timestep;
+  v->cost = solution->cost;
+  v->optimality = solution->optimality;
+  v->solve_seconds = solution->seconds;
+  v->iterations = solution->iterations;
+  say_where(solution, v->reason, sizeof v->reason);
+}
+
+static void tell_verification(const cav_solve_options *options, const cav_solution *solution) {
+  cav_progress line = {.phase = "verification", .stage = 1, .stages = 1, .fraction = 0.97, .knot = -1};
+  line.iteration = solution->iterations;
+  line.cost = solution->cost;
+  line.unactuated = solution->unactuated;
+  line.seconds = solution->seconds;
+  if (options->observer) options->observer(options->observer_context, &line);
+}
+
 // solves and certifies, in whichever process
 static cav_solution *run(const cav_race *race, int i, const cav_solve_options *options, cav_problem *taken,
                          cav_race_report *report) {
@@ -39,9 +143,13 @@ static cav_solution *run(const cav_race *race, int i, const cav_solve_options *o
   cav_error error = {0}, verification = {0};
   *report = (cav_race_report){0};
   cav_strategy_apply(race->problem, &race->entry[i].strategy, taken);
-  cav_status status = cav_strategy_solve(race->problem, &race->entry[i].strategy, options, i == 0 ? race->start : NULL,
-                                         &solution, &error);
-  if (solution && counts(status)) {
+  cav_status status = solve(race, i, options, taken, &solution, &error);
+  if (solution && status == CAV_INTERRUPTED) {
+    leave_unverified(solution, &report->verdict);
+    report->cost = solution->cost;
+    report->solution = 1;
+  } else if (solution && counts(status)) {
+    tell_verification(options, solution);
     cav_status verified = cav_verify(taken, solution->trajectory, &solution->contact, solution->gain_q,
                                      solution->gain_v, &report->verdict, &verification);
     if (verified == CAV_OK)
@@ -74,6 +182,7 @@ static const char *outcome(const cav_race_entry *e) {
       break;
   }
   if (!e->report.solution) return "failed";
+  if (e->report.status == CAV_INTERRUPTED) return "stopped";
   if (!e->report.verdict.certified) return "not certified";
   return e->report.verdict.achieved ? "certified" : "not achieved";
 }
@@ -123,7 +232,7 @@ static void work(cav_race *race, int i) {
   signal(SIGPIPE, SIG_IGN);
   cav_solve_options options = race->options;
   options.threads = 1;
-  options.observer = race->quiet;
+  options.observer = NULL;
   cav_solution *solution = run(race, i, &options, &taken, &report);
   int done = 0;
   if (whole(e->answer, &report, sizeof report, 1) && whole(e->order, &order, 1, 0) && solution)
@@ -142,8 +251,9 @@ static int start(cav_race *race, int i) {
     return 0;
   }
   fflush(NULL);
-  pid_t child = fork();
+  pid_t parent = getpid(), child = fork();
   if (child == 0) {
+    race->parent = parent;
     close(answer[0]), close(order[1]);
     e->answer = answer[1], e->order = order[0];
     work(race, i);
@@ -239,6 +349,9 @@ static int better(const cav_race_report *a, const cav_race_report *b, int cheape
                               {v->penetration_max_m, w->penetration_max_m, CAV_TOLERANCE_PENETRATION},
                               {v->momentum_defect_rms, w->momentum_defect_rms, CAV_TOLERANCE_MOMENTUM},
                               {v->replay_step_max_error, w->replay_step_max_error, CAV_TOLERANCE_STEP}};
+  // what was stopped was not verified
+  int stopped = a->status == CAV_INTERRUPTED, other = b->status == CAV_INTERRUPTED;
+  if (stopped || other) return !stopped;
   if (cav_race_success(a) && cav_race_success(b)) return cheapest && a->cost < b->cost;
   if (cav_race_success(a) || cav_race_success(b)) return cav_race_success(a);
   // what was asked is in the cost

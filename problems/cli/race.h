@@ -37,13 +37,18 @@ typedef struct cav_race_entry {
 typedef struct cav_race {
   const cav_problem *problem;
   const cav_trajectory *start;        ///< for the first strategy, may be NULL
-  cav_solve_options options;          ///< of a solve in this process; children use one thread and no observer but quiet
-  cav_observer quiet;                 ///< asks children for their end
+  cav_solve_options options;          ///< of a solve in this process; children use one thread and no observer
+  const char *folder;                 ///< where checkpoints go; NULL: nowhere
+  const char *key;                    ///< that they get
+  int resume;                         ///< 1: strategies go on from those that are there
+  pid_t parent;                       ///< in a child: whose it is; 0: no child
   volatile sig_atomic_t *interrupted; ///< nonzero: start nothing more
   int processes;                      ///< at most
   int tell;                           ///< 1: lines on standard error about what starts and ends
   /// Saves a solution; called in the process that has it. Returns an exit status.
   int (*save)(void *context, const cav_problem *problem, const cav_solution *solution, const cav_race_report *report);
+  /// Called in this process at every checkpoint of the first strategy, whose problem it is; first: the first time.
+  void (*snapshot)(void *context, const cav_problem *problem, const cav_checkpoint *checkpoint, int first);
   void *context;
   int n;
   cav_race_entry entry[CAV_STRATEGIES];

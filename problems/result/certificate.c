@@ -179,7 +179,8 @@ void cav_certificate_terms(FILE *out, const cav_problem *problem, const cav_term
   }
 }
 
-void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdict *v, const cav_term_report *report) {
+void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdict *v, const cav_term_report *report,
+                          const cav_provenance *provenance) {
   fputs("{\n  \"problem\": ", out);
   cav_certificate_json_text(out, problem->name);
   fputs(",\n  \"model\": ", out);
@@ -223,5 +224,7 @@ void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdi
     write_target(out, problem->term[i].name, &report[i]);
     first = 0;
   }
-  fputs("]\n}\n", out);
+  fputc(']', out);
+  if (provenance) fputs(",\n  \"provenance\": ", out), cav_provenance_json(out, provenance);
+  fputs("\n}\n", out);
 }

@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "certificate.h"
 #include "constraint_table.h"
@@ -18,6 +19,7 @@
 #include "file.h"
 #include "page.h"
 #include "periodicity.h"
+#include "schedule.h"
 
 char *cav_result_path(const char *folder, const char *name) {
   size_t n = strlen(folder);
@@ -175,18 +177,37 @@ cav_status cav_result_write(const char *folder, const cav_problem *problem, cons
   return status;
 }
 
+cav_status cav_result_write_unfinished(const char *folder, const cav_problem *problem, const cav_trajectory *trajectory,
+                                       int first, cav_error *error) {
+  char *path = cav_result_path(folder, "trajectory.csv"), *copy = cav_result_path(folder, "problem.xml");
+  char *rows = cav_result_path(folder, "rows.csv");
+  cav_options contact = problem->model->options;
+  contact.timestep = trajectory->timestep;
+  contact.order = problem->order;
+  cav_stage_law(problem, 1, contact.timestep, &contact);
+  cav_status status = path && copy && rows ? CAV_OK : no_memory(error);
+  if (!status) status = cav_trajectory_write(path, problem->model, trajectory, error);
+  if (!status && first) status = cav_rows_write(rows, trajectory->timestep, 0, NULL, error);
+  if (!status && first) status = write_problem(folder, copy, problem, &contact, error);
+  free(path);
+  free(copy);
+  free(rows);
+  return status;
+}
+
 cav_status cav_result_write_verdict(const char *folder, const cav_problem *problem, const cav_verdict *verdict,
-                                    const cav_term_report *report, cav_error *error) {
+                                    const cav_term_report *report, const cav_provenance *provenance, cav_error *error) {
   char *path = cav_result_path(folder, "verdict.json"), *terms = cav_result_path(folder, "terms.csv");
   cav_file file;
-  cav_status status = path && terms ? cav_file_begin(&file, path, error) : no_memory(error);
-  if (!status) {
-    cav_certificate_json(file.stream, problem, verdict, report);
-    status = cav_file_end(&file, error);
-  }
+  cav_status status = path && terms ? CAV_OK : no_memory(error);
   if (!status && report) status = cav_file_begin(&file, terms, error);
   if (!status && report) {
     cav_certificate_terms(file.stream, problem, report);
+    status = cav_file_end(&file, error);
+  }
+  if (!status) status = cav_file_begin(&file, path, error);
+  if (!status) {
+    cav_certificate_json(file.stream, problem, verdict, report, provenance);
     status = cav_file_end(&file, error);
   }
   free(path);
@@ -232,6 +253,8 @@ cav_status cav_result_write_page(const char *folder, const cav_problem *problem,
 
 // gains.csv into the two matrices
 static cav_status read_gains(const char *path, cav_result *result, cav_error *error) {
+  // what is not certified has none
+  if (access(path, F_OK) != 0) return CAV_OK;
   cav_table *table = cav_table_read(path, error);
   if (!table) return error->status;
   int nv = result->problem->model->nv, rows = (result->trajectory->nknot - 1) * nv;

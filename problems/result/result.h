@@ -4,12 +4,13 @@
 
 #include "cavort/solve.h"
 #include "forces.h"
+#include "provenance.h"
 
 /// A result folder as read: enough to certify and to show the motion again.
 typedef struct cav_result {
   cav_problem *problem; ///< with the contact law of the motion
   cav_trajectory *trajectory;
-  double *gain_q, *gain_v; ///< [(nknot-1)*nv*nv]
+  double *gain_q, *gain_v; ///< [(nknot-1)*nv*nv]; NULL: there is no gains.csv
   int nrow;
   cav_binding *row;     ///< [nrow] constraint rows of rows.csv, with their multipliers
   double solve_seconds; ///< as the solver left it in verdict.json; NaN: not recorded
@@ -27,9 +28,15 @@ cav_status cav_result_folder(const char *folder, cav_error *error);
 cav_status cav_result_write(const char *folder, const cav_problem *problem, const cav_solution *solution,
                             cav_error *error);
 
-/// Writes verdict.json and, with the report of its terms (may be NULL), terms.csv.
+/// Writes what can be read as a result before there is one: trajectory.csv, and if it is the first time problem.xml
+/// with the law at the end of the schedule, and rows.csv without rows.
+cav_status cav_result_write_unfinished(const char *folder, const cav_problem *problem, const cav_trajectory *trajectory,
+                                       int first, cav_error *error);
+
+/// Writes, with the report of its terms (may be NULL), terms.csv; and, after all other files of a motion, verdict.json.
+/// provenance may be NULL.
 cav_status cav_result_write_verdict(const char *folder, const cav_problem *problem, const cav_verdict *verdict,
-                                    const cav_term_report *report, cav_error *error);
+                                    const cav_term_report *report, const cav_provenance *provenance, cav_error *error);
 
 /// Writes forces.csv and view.html from the motion; verdict may be NULL.
 cav_status cav_result_write_page(const char *folder, const cav_problem *problem, const cav_trajectory *trajectory,
