@@ -150,13 +150,14 @@ static int is_held_back(const cav_region *region, const dogleg *d, const trial *
 static cav_status grow(cav_region *region, dogleg *d, const cav_normal *normal, cav_transcription *tr,
                        const cav_trajectory *at, cav_trajectory *to, double merit, trial *t) {
   for (int i = 0; i < GROWTH && is_held_back(region, d, t); i++) {
-    trial longer;
+    trial longer = {0};
     double radius = region->radius;
     region->radius *= 2;
     cav_status status = try_radius(region, d, normal, tr, at, to, merit, &longer);
     if (status != CAV_OK) return status;
     if (longer.decrease > 1.01 * t->decrease) {
       *t = longer;
+      t->grown = is_held_back(region, d, t);
       continue;
     }
     // back to the shorter one; the radius stays for the next linearisation
