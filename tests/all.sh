@@ -97,7 +97,8 @@ TEXT
   # a shared library is found where it was installed to
   run="env LD_LIBRARY_PATH=$(dirname "$folder")"
   gcc -std=c17 -Wall -Werror "$out/user.c" -o "$out/user" $flags && $run "$out/user" && "$prefix/bin/cavort" help || return 1
-  gcc -std=c17 -Wall -Wextra -Werror problems/example.c -o "$out/example" $flags && $run "$out/example"
+  gcc -std=c17 -Wall -Wextra -Werror problems/example.c -o "$out/example" $flags && $run "$out/example" || return 1
+  gcc -std=c17 -Wall -Wextra -Werror problems/example_replan.c -o "$out/replan" $flags && $run "$out/replan"
 }
 
 # the example of README.md is the file that was just built

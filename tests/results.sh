@@ -4,7 +4,7 @@
 # of their factors against new ones), normal (normal
 # equations by bands, by groups of trees and by CHOLMOD), unused (what a plan pays for things out of its reach), sweep (broad phase), conservation (drift of energy and
 # momentum), orders (error of the orders of the step against their time), absent (what features cost where a scene has none of
-# them), optimum (optimal control against known optima), methods (own solver and Ipopt on the same),
+# them), warm (a changed weight solved again, an iteration by itself), optimum (optimal control against known optima), methods (own solver and Ipopt on the same),
 # sensors, tendons, actuation, fluid (readings, strings, drives and
 # drag against MuJoCo's), interruption (solves killed and interrupted at random moments, half an hour).
 # CAVORT_BUILD names a build folder, by default build.
@@ -156,7 +156,8 @@ for name in ${*:-inverse heap update normal unused sweep conservation orders sen
     optimum) optimum ;;
     methods) methods ;;
     absent) absent ;;
+    warm) run warm bench_warm ;;
     interruption) interruption ;;
-    *) echo "usage: sh tests/results.sh [inverse|heap|update|normal|unused|sweep|conservation|orders|sensors|tendons|actuation|fluid|optimum|methods|absent|interruption]..." >&2 && exit 2 ;;
+    *) echo "usage: sh tests/results.sh [inverse|heap|update|normal|unused|sweep|conservation|orders|sensors|tendons|actuation|fluid|optimum|methods|absent|warm|interruption]..." >&2 && exit 2 ;;
   esac
 done

@@ -491,6 +491,27 @@ static void test_problems(void) {
   remove(problem_path), remove(model_path), remove(folder);
 }
 
+// iterations and shifts of a solver that has its memory allocate nothing
+static void test_optimiser(void) {
+  cav_error error = {0};
+  cav_problem *problem = cav_problem_load(CAVORT_SOURCE_ROOT "/problems/motions/kick/problem.xml", NULL, &error);
+  cav_optimiser *o = problem ? cav_optimiser_new(problem, NULL, NULL, &error) : NULL;
+  if (!CHECK(o != NULL)) return;
+  long before = calls;
+  // as soft as nothing is: what touches first makes room
+  for (int i = 0; i < 8; i++) CHECK(cav_optimiser_iterate(o, 1, NULL) == CAV_OK);
+  long first = calls - before;
+  before = calls;
+  for (int i = 0; i < 4; i++) {
+    CHECK(cav_optimiser_iterate(o, 1, NULL) == CAV_OK);
+    CHECK(cav_optimiser_shift(o, 0, NULL, NULL) == CAV_OK);
+  }
+  printf("optimiser: %ld allocations at first, %ld again\n", first, calls - before);
+  CHECK(calls == before && first > 0);
+  cav_optimiser_free(o);
+  cav_problem_free(problem);
+}
+
 int main(void) {
   // what printf and the XML library keep for themselves
   printf("allocations are counted\n");
@@ -507,6 +528,7 @@ int main(void) {
   fail_each("load", try_load, (void *)humanoid, 100000, 1);
   test_states();
   test_problems();
+  test_optimiser();
   return check_result();
 }
 #endif

@@ -13,7 +13,7 @@ static const char pendulum[] =
     "<geom type='sphere' pos='0 0 -.5' size='.05' mass='1'/></body></worldbody>"
     "<actuator><motor name='drive' joint='pivot' gear='%s' ctrlrange='-1 1' ctrllimited='true'/></actuator></mujoco>";
 static const char rise[] =
-    "<problem name='rise' model='model.xml'><horizon duration='%s' timestep='.025'/><start/>"
+    "<problem name='rise' model='model.xml'><horizon duration='%s' timestep='.025' %s/><start/>"
     "<goal><joint name='pivot' pos='%s'/></goal>"
     "<constraint><posture dofs='all' at='end'/></constraint>"
     "<cost><posture dofs='all' at='end' weight='900'/></cost></problem>";
@@ -112,12 +112,13 @@ static void test_goes_on(const cav_problem *p, const cav_strategy *strategy, int
   cav_solution_free(whole);
 }
 
-static cav_problem *load_pendulum(const char *folder, const char *gear, const char *duration, const char *goal) {
+static cav_problem *load_pendulum(const char *folder, const char *gear, const char *duration, const char *horizon,
+                                  const char *goal) {
   char text[2000], path[300];
   cav_error error = {0};
   snprintf(text, sizeof text, pendulum, gear);
   scene_write(folder, "model.xml", text);
-  snprintf(text, sizeof text, rise, duration, goal);
+  snprintf(text, sizeof text, rise, duration, horizon, goal);
   scene_write(folder, "problem.xml", text);
   snprintf(path, sizeof path, "%.250s/problem.xml", folder);
   cav_problem *p = cav_problem_load(path, NULL, &error);
@@ -125,26 +126,30 @@ static cav_problem *load_pendulum(const char *folder, const char *gear, const ch
   return p;
 }
 
-// strategies of pendulums: easy, impossible (to the least violation), and what has to swing
+// pendulums: easy, of free duration, impossible (to the least violation), and what has to swing
 static void test_pendulums(const char *folder, int *reached) {
   static const struct {
-    const char *gear, *duration, *goal;
+    const char *gear, *duration, *horizon, *goal;
     cav_status expected;
-  } cases[] = {{"10", "1", "1", CAV_OK}, {".05", "1", "1", CAV_NOT_CONVERGED}, {"2.3", "3", "3", CAV_NOT_CONVERGED}};
+  } cases[] = {{"10", "1", "", "1", CAV_OK},
+               {"10", "1", "range='.3 2' weight='1'", "1", CAV_OK},
+               {".05", "1", "", "1", CAV_NOT_CONVERGED},
+               {"2.3", "3", "range='1 4' weight='.1'", "3", CAV_NOT_CONVERGED},
+               {"2.3", "3", "", "3", CAV_NOT_CONVERGED}};
   for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
-    cav_problem *p = load_pendulum(folder, cases[k].gear, cases[k].duration, cases[k].goal);
+    cav_problem *p = load_pendulum(folder, cases[k].gear, cases[k].duration, cases[k].horizon, cases[k].goal);
     if (!p) continue;
     cav_strategy strategy[CAV_STRATEGIES];
     int n;
     CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
-    test_goes_on(p, &strategy[0], k == 0 ? 1 : 8, folder, cases[k].expected, reached);
+    test_goes_on(p, &strategy[0], k < 2 ? 1 : 8, folder, cases[k].expected, reached);
     cav_problem_free(p);
   }
 }
 
 // a strategy that solves under another order first
 static void test_two_orders(const char *folder, int *reached) {
-  cav_problem *p = load_pendulum(folder, "10", "1", "1");
+  cav_problem *p = load_pendulum(folder, "10", "1", "", "1");
   if (!p) return;
   p->order = CAV_ORDER_MOMENTUM;
   cav_strategy strategy[CAV_STRATEGIES];
@@ -306,7 +311,7 @@ int main(void) {
   CHECK(reached[CAV_PLACE_CONTINUATION] && reached[CAV_PLACE_SQP] && reached[CAV_PLACE_MULTIPLIERS] &&
         reached[CAV_PLACE_RESTORATION] && reached[CAV_PLACE_DIAGNOSIS] && reached[CAV_PLACE_FEEDBACK]);
   for (int i = 0; i < CAV_PLACE_TYPES; i++) printf("place %d: %d checkpoints\n", i, reached[i]);
-  cav_problem *p = load_pendulum(folder, "10", "1", "1");
+  cav_problem *p = load_pendulum(folder, "10", "1", "", "1");
   if (p) {
     test_limits(p);
     test_warm(p);

@@ -81,17 +81,18 @@ typedef enum cav_place {
 
 /// All that a solve needs to go on between two of its parts and end with the same bits as if it had not stopped.
 typedef struct cav_checkpoint {
-  char key[96];             ///< the caller's mark of problem and model, "" if none; kept in files, not looked at
-  cav_place place;          ///< what comes next
-  cav_order order;          ///< of the problem that is being solved: a strategy may solve one before
-  int stage, stages;        ///< of the schedule or of the rounds of multipliers, from 1
-  double fraction, settled; ///< of the schedule: this stage's, and that of the stage before it
-  int retries;              ///< how often this stage was taken back
-  double radius;            ///< of the trust region
-  int iterations;           ///< so far
-  double seconds;           ///< so far, wall clock
-  cav_status status;        ///< of the solve, at CAV_PLACE_FEEDBACK
-  double optimality;        ///< as in cav_solution, NaN: not measured
+  char key[96];                   ///< the caller's mark of problem and model, "" if none; kept in files, not looked at
+  cav_place place;                ///< what comes next
+  cav_order order;                ///< of the problem that is being solved: a strategy may solve one before
+  int stage, stages;              ///< of the schedule or of the rounds of multipliers, from 1
+  double fraction, settled;       ///< of the schedule: this stage's, and that of the stage before it
+  int retries;                    ///< how often this stage was taken back
+  double radius;                  ///< of the trust region
+  double law_step, time_constant; ///< s, of the contact law, which follows the step where that is free
+  int iterations;                 ///< so far
+  double seconds;                 ///< so far, wall clock
+  cav_status status;              ///< of the solve, at CAV_PLACE_FEEDBACK
+  double optimality;              ///< as in cav_solution, NaN: not measured
   cav_trajectory *trajectory;
   int nmultiplier;
   double *multiplier;       ///< [nmultiplier] of the augmented Lagrangian, row by row as in cav_solution
@@ -213,12 +214,12 @@ typedef struct cav_solution {
 typedef struct cav_equations {
   int unknowns;
   int left_out, left_out_dofs; ///< trees that the plan leaves out, and their dofs (optim/METHOD.md, 1)
-  int rows, constraints; ///< of costs and constraints over all knots; the latter
-  int blocks;            ///< of unknowns, one a knot
-  int groups, largest;   ///< groups of trees; dofs of the largest
-  int width, border;     ///< of its band: entries of a column; unknowns after it (of a cycle's last knots, the free step)
-  int arrow;             ///< 1: the free step stands beside the groups
-  double bytes;          ///< of the matrix and its factors
+  int rows, constraints;       ///< of costs and constraints over all knots; the latter
+  int blocks;                  ///< of unknowns, one a knot
+  int groups, largest;         ///< groups of trees; dofs of the largest
+  int width, border; ///< of its band: entries of a column; unknowns after it (of a cycle's last knots, the free step)
+  int arrow;         ///< 1: the free step stands beside the groups
+  double bytes;      ///< of the matrix and its factors
 } cav_equations;
 
 /// Fails as cav_solve does where the problem or its guess cannot be evaluated. structure.c.
@@ -233,6 +234,42 @@ CAV_API void cav_solution_free(cav_solution *solution);
 
 /// The trajectory that a solve starts from: the problem's guess, without forces. NULL with the reason in error.
 CAV_API cav_trajectory *cav_problem_guess(const cav_problem *problem, cav_error *error);
+
+/// A solver that is made once, for one problem, and keeps its memory, motion and multipliers between solves: for
+/// problems whose weights and targets change a little, and for planning while moving (shift, iterate). It reads the
+/// problem's terms anew at every call: their weights, targets and scales may be changed in place, not their number,
+/// kind, use and window. optim/METHOD.md, 5.
+typedef struct cav_optimiser cav_optimiser;
+
+/// At the problem's guess, or at start if not NULL, with options->multiplier if there are any. Copies the options and
+/// the problem's start; all else of the problem is borrowed. gains, keeper, resume and first_stage of the options have
+/// no meaning here. NULL with the reason in error, as cav_solve.
+CAV_API cav_optimiser *cav_optimiser_new(const cav_problem *problem, const cav_solve_options *options,
+                                         const cav_trajectory *start, cav_error *error);
+CAV_API void cav_optimiser_free(cav_optimiser *optimiser);
+
+/// Solves from where it is, as cav_solve does from first_stage of the schedule on (1: all; more than it has: straight
+/// to the optimum, from near it), and keeps the multipliers. Statuses of cav_solve. last may be NULL.
+CAV_API cav_status cav_optimiser_solve(cav_optimiser *optimiser, int first_stage, cav_progress *last, cav_error *error);
+
+/// At most so many Gauss-Newton iterations at the last stage's law, then an update of the multipliers (augmented
+/// Lagrangian). From the second call on allocates nothing unless more touches than ever before. Each costs a
+/// linearisation, a factor and an evaluation. It ends before where no step decreases the merit. CAV_OK, CAV_INTERRUPTED,
+/// CAV_NOT_FINITE, CAV_NO_MEMORY; CAV_BAD_INPUT for iterations < 1. last, of the last iteration, may be NULL.
+CAV_API cav_status cav_optimiser_iterate(cav_optimiser *optimiser, int iterations, cav_progress *last);
+
+/// Takes so many knots off the front and starts the rest at q [nq], v [nv], both NULL: as planned there. The knots
+/// that are new at the end hold the last configuration. Multipliers move along where rows of two knots are alike.
+/// Windows and targets of terms stay at their times after the new start. CAV_BAD_INPUT: not 0 to all knots but two, or
+/// q or v not finite; CAV_NOT_SUPPORTED: a cycle. Allocates nothing.
+CAV_API cav_status cav_optimiser_shift(cav_optimiser *optimiser, int knots, const double *q, const double *v);
+
+/// The motion, the problem with the present start, and the contact law of the motion, as cav_verify takes them; the
+/// multipliers of all rows [n]. All until the next call.
+CAV_API const cav_trajectory *cav_optimiser_trajectory(const cav_optimiser *optimiser);
+CAV_API const cav_problem *cav_optimiser_problem(const cav_optimiser *optimiser);
+CAV_API const cav_options *cav_optimiser_contact(const cav_optimiser *optimiser);
+CAV_API const double *cav_optimiser_multipliers(cav_optimiser *optimiser, int *n);
 
 enum { CAV_STRATEGIES = 8, CAV_STRATEGY_SWINGS = 4 };
 

@@ -58,6 +58,8 @@ static cav_status tell(cav_solve_run *run) {
   c->stage = run->stage;
   c->stages = run->stages;
   c->radius = run->region.radius;
+  c->law_step = run->tr->options.timestep;
+  c->time_constant = run->tr->options.time_constant;
   c->seconds = cav_clock() - run->start;
   c->optimality = run->measured ? run->optimality : NAN;
   c->trajectory = run->at;
@@ -125,7 +127,9 @@ cav_status cav_run_resume(cav_solve_run *run, cav_error *error) {
   run->stage = c->stage;
   run->stages = c->stages;
   // parts after continuation are under the last stage's law, and ask whether rows hold
+  run->tr->options.timestep = c->law_step;
   cav_stage_set(run->problem, 1, run->tr);
+  run->tr->options.time_constant = c->time_constant;
   return CAV_OK;
 }
 
@@ -140,7 +144,10 @@ static void write_row(FILE *out, const char *name, int knot, size_t n, const dou
 
 /// Scalars in the order in which they stand.
 #define SCALARS(X) \
-  X(stage) X(stages) X(fraction) X(settled) X(retries) X(radius) X(iterations) X(seconds) X(status) X(optimality)
+  X(stage)         \
+  X(stages)        \
+  X(fraction)      \
+  X(settled) X(retries) X(radius) X(law_step) X(time_constant) X(iterations) X(seconds) X(status) X(optimality)
 
 cav_status cav_checkpoint_write(const char *path, const cav_checkpoint *c, cav_error *error) {
   cav_file file;
@@ -249,13 +256,16 @@ static void scalars(reader *r, cav_checkpoint *c) {
   name(r, "settled"), c->settled = number(r);
   name(r, "retries"), c->retries = whole(r, 0, INT_MAX);
   name(r, "radius"), c->radius = number(r);
+  name(r, "law_step"), c->law_step = number(r);
+  name(r, "time_constant"), c->time_constant = number(r);
   name(r, "iterations"), c->iterations = whole(r, 0, INT_MAX);
   name(r, "seconds"), c->seconds = number(r);
   name(r, "status"), c->status = (cav_status)whole(r, CAV_OK, CAV_INTERNAL);
   name(r, "optimality"), c->optimality = number(r);
   if (!(c->fraction >= 0 && c->fraction <= 1 && c->settled >= 0 && c->settled <= c->fraction && c->radius >= 0 &&
-        c->seconds >= 0 && isfinite(c->seconds)))
-    fail(r, "fractions from 0 to 1, a radius and seconds");
+        c->seconds >= 0 && isfinite(c->seconds) && c->law_step > 0 && isfinite(c->law_step) && c->time_constant >= 0 &&
+        isfinite(c->time_constant)))
+    fail(r, "fractions from 0 to 1, a radius, steps and seconds");
 }
 
 static void arrays(reader *r, const cav_model *model, cav_checkpoint *c) {

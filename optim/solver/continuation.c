@@ -81,7 +81,8 @@ int cav_run_report(void *context, double step, double radius) {
   line.violation = cav_transcription_violation(run->tr);
   line.seconds = cav_clock() - run->start;
   line.fraction = done(run);
-  if (!cav_solution_log(solution, &line)) {
+  run->last = line;
+  if (!run->quiet && !cav_solution_log(solution, &line)) {
     run->failed = CAV_NO_MEMORY;
     return 1;
   }
@@ -109,7 +110,7 @@ int cav_run_note(cav_solve_run *run, double fraction, int begin, cav_outcome out
   line.unactuated = cav_transcription_unactuated(run->tr, NULL);
   line.violation = cav_transcription_violation(run->tr);
   line.outcome = outcome;
-  if (!cav_solution_note(run->solution, &line)) run->failed = CAV_NO_MEMORY;
+  if (!run->quiet && !cav_solution_note(run->solution, &line)) run->failed = CAV_NO_MEMORY;
   return run->failed == CAV_OK;
 }
 

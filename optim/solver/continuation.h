@@ -25,7 +25,9 @@ typedef struct cav_solve_run {
   double deadline;              ///< s, infinite: none
   int begin;                    ///< iterations before this call
   const cav_checkpoint *resume; ///< where it goes on, until it has come there; NULL: it has
+  int quiet;                    ///< 1: no log and no records of stages are kept
   int nested;                   ///< inside of a part that has its checkpoint before it: no others are made
+  cav_progress last;            ///< line of progress
   cav_checkpoint checkpoint;    ///< the next one's, but for what is the run's
 } cav_solve_run;
 
@@ -46,6 +48,15 @@ int cav_run_feedback(void *run, int trial, int trials);
 
 /// Whether somebody asks for the end; context is the run. Transcription's stop.
 int cav_run_stop(void *run);
+
+/// Makes a run at its beginning: the guess, the start or the options' checkpoint; error says why not. Closed whatever
+/// this returns. run must stay where it is. solution.c.
+cav_status cav_run_open(cav_solve_run *run, const cav_problem *problem, const cav_solve_options *options,
+                        const cav_trajectory *start, cav_error *error);
+void cav_run_close(cav_solve_run *run);
+
+/// By the options' solver, and where rows do not come in to the point of least violation. solution.c.
+cav_status cav_run_solve(cav_solve_run *run, cav_error *error);
 
 /// cav_solve of a problem that a solve of so many iterations and seconds came before. solution.c.
 cav_status cav_solve_after(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,

@@ -100,13 +100,12 @@ static double bend(dogleg *d, const double *gradient, double radius) {
   return -(a * gc + b * gn) - 0.5 * curve;
 }
 
-static int dogleg_new(dogleg *d, int size) {
+static void dogleg_set(dogleg *d, const cav_normal *normal) {
+  int size = normal->size;
+  double *block = normal->room;
   *d = (dogleg){.size = size};
-  double *block = malloc(5 * (size_t)size * sizeof(double));
-  if (!block) return 0;
   d->newton = block, d->cauchy = block + size, d->product = block + 2 * size, d->step = block + 3 * size;
   d->scale = block + 4 * size;
-  return 1;
 }
 
 /// Whether the step would leave its bounds, at one of which it is.
@@ -179,16 +178,17 @@ static cav_status search(cav_region *region, dogleg *d, cav_normal *normal, cav_
     double ratio = t->predicted > 0 ? t->decrease / t->predicted : -1;
     if (t->predicted <= noise * merit) return CAV_OK;
     t->grown = is_held_back(region, d, t);
-    if (t->grown) return grow(region, d, normal, tr, at, to, merit, t);
+    if (t->grown && !region->single) return grow(region, d, normal, tr, at, to, merit, t);
+    if (t->grown) region->radius *= 2;
     if (ratio < 0.25) region->radius = 0.5 * fmin(t->length, region->radius);
-    if (ratio > 1e-4 || attempt > 30) return CAV_OK;
+    if (ratio > 1e-4 || attempt > 30 || region->single) return CAV_OK;
   }
 }
 
 cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_transcription *tr, cav_trajectory **at,
                                cav_trajectory **spare) {
   dogleg d;
-  if (!dogleg_new(&d, normal->size)) return CAV_NO_MEMORY;
+  dogleg_set(&d, normal);
   int calm = 0, fresh = 0; // consecutive small decreases; whether the transcription holds values at *at
   region->stalled = region->settled = 0;
   cav_status status = CAV_OK;
@@ -229,6 +229,5 @@ cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_trans
     }
   }
   if (!fresh && status == CAV_OK) status = cav_transcription_values(tr, *at);
-  free(d.newton);
   return status;
 }

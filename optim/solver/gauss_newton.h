@@ -9,6 +9,7 @@ typedef struct cav_region {
   double radius;    ///< kept from run to run; 0: first Cauchy step
   int iterations;   ///< at most
   double tolerance; ///< two relative decreases in a row below it end the run
+  int single;       ///< 1: one step is tried an iteration, and a worse one costs it
   int done;         ///< iterations made, over all runs
   int stalled; ///< the last run ended at a jump: the step that helped was a millionth of the one wanted, or none did
   int settled; ///< the last run ended by its tolerance

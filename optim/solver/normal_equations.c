@@ -61,8 +61,9 @@ cav_normal *cav_normal_new(const cav_transcription *tr) {
   normal->x = malloc(size * sizeof(double));
   normal->unknown = malloc(size * sizeof(int));
   normal->arrow = malloc(2 * size * sizeof(double));
+  normal->room = malloc(5 * size * sizeof(double));
   int whole = normal->H && normal->factor && normal->B && normal->C && normal->gradient && normal->diagonal &&
-              normal->x && normal->arrow && normal->unknown;
+              normal->x && normal->arrow && normal->unknown && normal->room;
   if (whole && set_trees(normal, tr->model)) return normal;
   cav_normal_free(normal);
   return NULL;
@@ -71,8 +72,8 @@ cav_normal *cav_normal_new(const cav_transcription *tr) {
 void cav_normal_free(cav_normal *normal) {
   if (!normal) return;
   free(normal->H), free(normal->factor), free(normal->B), free(normal->C), free(normal->gradient),
-      free(normal->diagonal), free(normal->x), free(normal->arrow), free(normal->unknown), free(normal->group),
-      free(normal->tree);
+      free(normal->diagonal), free(normal->x), free(normal->arrow), free(normal->unknown), free(normal->room),
+      free(normal->group), free(normal->tree);
   free(normal);
 }
 

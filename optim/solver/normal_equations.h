@@ -26,6 +26,7 @@ typedef struct cav_normal {
   cav_band *group;    ///< [ngroup] factors
   double *factor, *x; ///< room of all factors; [size] right-hand side of one group
   double *arrow; ///< [2*size] row of a free step beside several groups, and their inverse times it with its pivot last
+  double *room;  ///< [5*size] of a method's iteration
 } cav_normal;
 
 /// Of the unknowns of a transcription; NULL if memory runs out.

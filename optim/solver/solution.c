@@ -151,7 +151,7 @@ static cav_status conclude(cav_solve_run *run, int interrupted, cav_error *error
   return interrupted ? CAV_OK : find_gains(run, error);
 }
 
-static cav_status solve(cav_solve_run *run, cav_error *error) {
+cav_status cav_run_solve(cav_solve_run *run, cav_error *error) {
   const cav_solve_options *o = run->options;
   cav_place place = run->resume ? run->resume->place : CAV_PLACE_CONTINUATION;
   cav_status status = place < CAV_PLACE_DIAGNOSIS ? cav_solver_run(run, error) : CAV_NOT_CONVERGED;
@@ -169,7 +169,7 @@ static cav_status solve(cav_solve_run *run, cav_error *error) {
 /// The solve and what it is worth: gains are chosen, or the run ends before them.
 static cav_status solve_and_conclude(cav_solve_run *run, cav_status *end, cav_error *error) {
   int solved = run->resume && run->resume->place == CAV_PLACE_FEEDBACK;
-  cav_status status = solved ? run->resume->status : solve(run, error);
+  cav_status status = solved ? run->resume->status : cav_run_solve(run, error);
   if (run->failed != CAV_OK) status = run->failed;
   run->checkpoint.status = status;
   run->deadline = INFINITY;
@@ -200,39 +200,54 @@ static cav_status take_start(cav_solve_run *run) {
   return CAV_OK;
 }
 
-/// All of a problem, which was checked.
-static cav_status solve_whole(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
-                              const cav_solution *before, cav_solution **solution, cav_error *error) {
-  cav_solve_run run = {.problem = problem, .options = options, .start = cav_clock()};
-  run.deadline = run.options->max_seconds > 0 ? run.start + run.options->max_seconds : INFINITY;
-  *solution = NULL;
-  cav_status status = CAV_OK, end = CAV_OK;
+cav_status cav_run_open(cav_solve_run *run, const cav_problem *problem, const cav_solve_options *options,
+                        const cav_trajectory *start, cav_error *error) {
+  *run = (cav_solve_run){.problem = problem, .options = options, .start = cav_clock()};
+  run->deadline = options->max_seconds > 0 ? run->start + options->max_seconds : INFINITY;
+  cav_status status = check(problem, options, start, error);
+  if (status != CAV_OK) return status;
   cav_error refusal = {0};
-  run.tr = cav_transcription_new(problem, run.options->threads, &refusal);
-  if (!run.tr) {
+  run->tr = cav_transcription_new(problem, options->threads, &refusal);
+  if (!run->tr) {
     if (error) *error = refusal;
     return refusal.status;
   }
-  run.tr->derivative = run.options->derivative;
-  run.tr->stop = cav_run_stop;
-  run.tr->stop_context = &run;
-  if (run.tr->derivative == CAV_DERIVATIVE_CENTRED) run.tr->difference = CAV_DERIVATIVE_CENTRED;
-  run.normal = cav_normal_new(run.tr);
-  run.at = start ? cav_trajectory_copy(start) : cav_trajectory_new(problem->model, run.tr->nknot, problem->timestep);
-  run.spare = cav_trajectory_new(problem->model, run.tr->nknot, problem->timestep);
-  run.solution = calloc(1, sizeof *run.solution);
-  run.region = (cav_region){.report = cav_run_report, .context = &run};
-  status = run.normal && run.at && run.spare && run.solution ? CAV_OK : CAV_NO_MEMORY;
+  run->tr->derivative = options->derivative;
+  run->tr->stop = cav_run_stop;
+  run->tr->stop_context = run;
+  if (run->tr->derivative == CAV_DERIVATIVE_CENTRED) run->tr->difference = CAV_DERIVATIVE_CENTRED;
+  run->normal = cav_normal_new(run->tr);
+  run->at = start ? cav_trajectory_copy(start) : cav_trajectory_new(problem->model, run->tr->nknot, problem->timestep);
+  run->spare = cav_trajectory_new(problem->model, run->tr->nknot, problem->timestep);
+  run->solution = calloc(1, sizeof *run->solution);
+  run->region = (cav_region){.report = cav_run_report, .context = run};
+  if (!run->normal || !run->at || !run->spare || !run->solution)
+    return fail(error, CAV_NO_MEMORY, "not enough memory for this problem");
+  memcpy(run->at->q, problem->q_start, (size_t)problem->model->nq * sizeof(double));
+  memcpy(run->at->v, problem->v_start, (size_t)problem->model->nv * sizeof(double));
+  status = start ? take_start(run) : cav_guess_take(run);
+  if (status == CAV_NO_MEMORY) fail(error, status, "not enough memory for this problem");
+  return status == CAV_OK ? cav_run_resume(run, error) : status;
+}
 
+void cav_run_close(cav_solve_run *run) {
+  cav_trajectory_free(run->at);
+  cav_trajectory_free(run->spare);
+  cav_solution_free(run->solution);
+  cav_normal_free(run->normal);
+  cav_transcription_free(run->tr);
+}
+
+/// All of a problem.
+static cav_status solve_whole(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
+                              const cav_solution *before, cav_solution **solution, cav_error *error) {
+  cav_solve_run run;
+  *solution = NULL;
+  cav_status end = CAV_OK, status = cav_run_open(&run, problem, options, start, error);
   if (status == CAV_OK) {
-    memcpy(run.at->q, problem->q_start, (size_t)problem->model->nq * sizeof(double));
-    memcpy(run.at->v, problem->v_start, (size_t)problem->model->nv * sizeof(double));
     if (before) run.solution->iterations = before->iterations, run.start -= before->seconds;
-    status = start ? take_start(&run) : cav_guess_take(&run);
-    if (status == CAV_OK) status = cav_run_resume(&run, error);
     run.begin = run.solution->iterations;
-    if (status == CAV_OK) status = solve_and_conclude(&run, &end, error);
-    if (status == CAV_BAD_INPUT) goto end;
+    status = solve_and_conclude(&run, &end, error);
     run.solution->seconds = cav_clock() - run.start;
     run.solution->seconds_dynamics = run.tr->seconds_dynamics;
     run.solution->seconds_assembly = run.tr->seconds_assembly;
@@ -246,12 +261,7 @@ static cav_status solve_whole(const cav_problem *problem, const cav_solve_option
   if (status == CAV_NO_MEMORY) fail(error, status, "not enough memory for this problem");
   if (status == CAV_NOT_FINITE)
     fail(error, status, "a number that is not finite came up; the last finite iterate is kept");
-end:
-  cav_trajectory_free(run.at);
-  cav_trajectory_free(run.spare);
-  cav_solution_free(run.solution);
-  cav_normal_free(run.normal);
-  cav_transcription_free(run.tr);
+  cav_run_close(&run);
   return status;
 }
 

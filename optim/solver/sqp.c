@@ -549,7 +549,8 @@ cav_status cav_sqp_measure(cav_solve_run *run) {
 }
 
 cav_status cav_to_optimum(cav_solve_run *run) {
-  cav_stage_set(run->problem, 1, run->tr);
+  // of a checkpoint the law is what it was
+  if (!run->resume || run->resume->place == CAV_PLACE_CONTINUATION) cav_stage_set(run->problem, 1, run->tr);
   cav_status status = CAV_NOT_CONVERGED;
   if (cav_run_reaches(run, CAV_PLACE_SQP, &status)) status = cav_sqp(run);
   if (status != CAV_NOT_CONVERGED) return status;

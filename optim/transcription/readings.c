@@ -85,9 +85,13 @@ int cav_readings_list(cav_transcription *tr, cav_scratch *s, int t) {
     s->key = key;
     s->key_room = s->state->ncontact;
   }
-  char *moving = realloc(knot->moving, (size_t)s->state->ncontact + 1);
-  if (!moving) return 0;
-  knot->moving = moving;
+  if (!knot->moving || s->state->ncontact > knot->moving_room) {
+    char *more = realloc(knot->moving, 2 * (size_t)s->state->ncontact + 1);
+    if (!more) return 0;
+    knot->moving = more;
+    knot->moving_room = 2 * s->state->ncontact;
+  }
+  char *moving = knot->moving;
   if (knot->has_force) {
     for (int k = 0; k < s->state->ncontact; k++) {
       const cav_contact *c = &s->state->contact[k];

@@ -235,7 +235,8 @@ cav_transcription *cav_transcription_new(const cav_problem *problem, int threads
     if (!scratch_new(tr, &tr->scratch[i])) goto memory;
   if (!list_force_rows(tr)) goto memory;
   tr->knot = calloc((size_t)tr->nknot, sizeof *tr->knot);
-  if (!tr->knot) goto memory;
+  tr->status = calloc((size_t)tr->nknot, sizeof *tr->status);
+  if (!tr->knot || !tr->status) goto memory;
   for (int t = 0; t < tr->nknot; t++)
     if (!knot_new(tr, t)) goto memory;
   return tr;
@@ -266,7 +267,7 @@ void cav_transcription_free(cav_transcription *tr) {
   free(tr->servo), free(tr->limited);
   free(tr->unactuated), free(tr->effort), free(tr->effort_range), free(tr->effort_unit), free(tr->rotation_dof),
       free(tr->rotation_of);
-  free(tr->knot), free(tr->join), free(tr->scratch), free(tr->before), free(tr->rotation_after);
+  free(tr->knot), free(tr->status), free(tr->join), free(tr->scratch), free(tr->before), free(tr->rotation_after);
   cav_periodicity_free(tr->periodicity);
   cav_parallel_free(tr->pool);
   free(tr);
@@ -484,8 +485,8 @@ static void prepare_ends(cav_transcription *tr, const cav_trajectory *at) {
 static cav_status evaluate(cav_transcription *tr, cav_trajectory *at, int jacobian) {
   double start = now(), dynamics = 0;
   int members = cav_parallel_size(tr->pool);
-  cav_status *status = calloc((size_t)tr->nknot, sizeof *status), result = CAV_OK;
-  if (!status) return CAV_NO_MEMORY;
+  cav_status *status = tr->status, result = CAV_OK;
+  memset(status, 0, (size_t)tr->nknot * sizeof *status);
   prepare_ends(tr, at);
   if (jacobian) prepare_rotations(tr, at);
   for (int i = 0; i < members; i++) tr->scratch[i].seconds = 0;
@@ -496,7 +497,6 @@ static cav_status evaluate(cav_transcription *tr, cav_trajectory *at, int jacobi
   for (int i = 0; i < members; i++) dynamics += tr->scratch[i].seconds / members;
   tr->seconds_dynamics += dynamics;
   tr->seconds_assembly += now() - start - dynamics;
-  free(status);
   return result;
 }
 

@@ -43,13 +43,14 @@ typedef struct cav_knot {
   double time;
   int has_force; ///< u is defined here
   cav_slot_layout layout;
-  cav_slot *slot;         ///< [layout.count]
-  double *slot_row;       ///< [layout.count*3nv] derivatives of the slots' values, if kept
-  double *slot_step;      ///< [layout.count] the same by the logarithm of the step, where that is free
-  double *u;              ///< [nv]
-  double *du;             ///< [nv*3nv] row-major
-  int nread, ncontact;    ///< readings beside u: CAV_CONTACT_READINGS a contact, then sensors
-  int room;               ///< readings for which y, dy have space
+  cav_slot *slot;      ///< [layout.count]
+  double *slot_row;    ///< [layout.count*3nv] derivatives of the slots' values, if kept
+  double *slot_step;   ///< [layout.count] the same by the logarithm of the step, where that is free
+  double *u;           ///< [nv]
+  double *du;          ///< [nv*3nv] row-major
+  int nread, ncontact; ///< readings beside u: CAV_CONTACT_READINGS a contact, then sensors
+  int room;            ///< readings for which y, dy have space
+  int moving_room;
   char *moving;           ///< [ncontact] 1: between two links of one tree, its first reading is the depth
   double *y;              ///< [nread]
   double *dy;             ///< [nread*3nv]
@@ -112,7 +113,8 @@ typedef struct cav_transcription {
   cav_knot *knot;              ///< [nknot]
   struct cav_scratch *scratch; ///< one a thread
   cav_parallel *pool;
-  double *join; ///< room of join.c
+  cav_status *status; ///< [nknot] of an evaluation
+  double *join;       ///< room of join.c
   size_t join_room;
   double seconds_dynamics, seconds_assembly;
 } cav_transcription;
