@@ -93,7 +93,7 @@ typedef struct cav_checkpoint {
   double seconds;                 ///< so far, wall clock
   cav_status status;              ///< of the solve, at CAV_PLACE_FEEDBACK
   double optimality;              ///< as in cav_solution, NaN: not measured
-  cav_trajectory *trajectory;
+  cav_trajectory *trajectory;     ///< of the trees that are planned: the dofs of others are not in it
   int nmultiplier;
   double *multiplier;       ///< [nmultiplier] of the augmented Lagrangian, row by row as in cav_solution
   double *final_multiplier; ///< [nmultiplier] of the programme

@@ -280,13 +280,16 @@ static void arrays(reader *r, const cav_model *model, cav_checkpoint *c) {
   name(r, "multipliers");
   c->nmultiplier = whole(r, 0, INT_MAX / 16);
   if (r->status == CAV_OK && !(timestep > 0 && isfinite(timestep))) fail(r, "a timestep");
-  if (r->status == CAV_OK && (nq != model->nq || nv != model->nv)) fail(r, "as many coordinates as the model has");
+  if (r->status == CAV_OK && (nq > model->nq || nv > model->nv)) fail(r, "no more coordinates than the model has");
   // no more memory than the file could fill
   size_t numbers = strlen(r->at) / 2;
   if (r->status == CAV_OK && ((size_t)knots * (size_t)(nq + nv) > numbers || 2 * (size_t)c->nmultiplier > numbers))
     fail(r, "all of its numbers");
   if (r->status != CAV_OK) return;
-  c->trajectory = cav_trajectory_new(model, knots, timestep);
+  // of a plan that leaves out trees: fewer than the model's
+  cav_trajectory *at = cav_trajectory_new(model, knots, timestep);
+  if (at) at->nq = nq, at->nv = nv;
+  c->trajectory = at;
   c->multiplier = malloc(((size_t)c->nmultiplier + 1) * sizeof(double));
   c->final_multiplier = malloc(((size_t)c->nmultiplier + 1) * sizeof(double));
   if (!c->trajectory || !c->multiplier || !c->final_multiplier) {

@@ -184,6 +184,8 @@ typedef struct destination {
 static void snapshot(void *context, const cav_problem *problem, const cav_checkpoint *checkpoint, int first) {
   const destination *to = context;
   cav_error error = {0};
+  // of a plan that leaves out trees there is no whole motion yet
+  if (checkpoint->trajectory->nv != problem->model->nv) return;
   if (cav_result_write_unfinished(to->folder, problem, checkpoint->trajectory, first, &error))
     fprintf(stderr, "cavort: %s\n", error.text);
 }
