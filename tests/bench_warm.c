@@ -7,7 +7,7 @@
 #include "motion.h"
 #include "transcription.h"
 
-enum { RUNS = 8, CALLS = 6 };
+enum { RUNS = 4, CALLS = 25 };
 
 static const motion_case cases[] = {{"kick", NULL},
                                     {"squat-jump", NULL},

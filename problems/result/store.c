@@ -94,13 +94,17 @@ static cav_status move_aside(cav_store *store, cav_error *error) {
                        store->folder, strerror(errno));
 }
 
-// removes what a finished motion alone has, the verdict first, and what was half written
-static void clear(const char *folder) {
+// removes what a finished motion alone has, the verdict first
+static void clear_finished(const char *folder) {
   for (int i = 0; i < NFILE; i++) {
     char *path = files[i].after ? cav_result_path(folder, files[i].name) : NULL;
     if (path) unlink(path);
     free(path);
   }
+}
+
+// removes what processes that were killed left half written
+static void clear_temporary(const char *folder) {
   DIR *all = opendir(folder);
   for (const struct dirent *e; all && (e = readdir(all));) {
     char *path = is_temporary(e->d_name) ? cav_result_path(folder, e->d_name) : NULL;
@@ -117,7 +121,8 @@ cav_status cav_store_open(cav_store *store, const char *folder, int keep, cav_er
   if (status) return status;
   if ((store->lock[0] = lock(folder, error)) < 0) return error->status;
   int n = look(folder, other, sizeof other);
-  if (keep) clear(folder);
+  clear_temporary(folder);
+  if (keep) clear_finished(folder);
   if (keep || n == 0) return CAV_OK;
   if (*other) {
     return cav_file_fail(error, CAV_BAD_INPUT, 0,
@@ -132,6 +137,7 @@ cav_status cav_store_open(cav_store *store, const char *folder, int keep, cav_er
 }
 
 void cav_store_close(cav_store *store) {
+  if (store->lock[0] >= 0) clear_temporary(store->folder);
   for (int i = 0; i < 2; i++)
     if (store->lock[i] >= 0) close(store->lock[i]);
   free(store->aside);
