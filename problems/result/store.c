@@ -29,7 +29,12 @@ static int ends_with(const char *name, const char *end) {
 }
 
 // what a solve that was killed left half written
-static int is_temporary(const char *name) { return ends_with(name, ".tmp"); }
+static int is_temporary(const char *name) {
+  if (!ends_with(name, ".tmp")) return 0;
+  for (int i = 0; i < NFILE; i++)
+    if (!strncmp(name, files[i].name, strlen(files[i].name))) return 1;
+  return !strncmp(name, "checkpoint", 10);
+}
 
 static int is_checkpoint(const char *name) { return !strncmp(name, "checkpoint", 10) && ends_with(name, ".csv"); }
 
