@@ -16,9 +16,9 @@ typedef struct cav_feedback_penalty {
 cav_status cav_feedback(const cav_transcription *transcription, const cav_trajectory *motion, const cav_options *law,
                         const cav_feedback_penalty *penalty, double *gain_q, double *gain_v);
 
-/// Feedback gains of a motion into its solution: the best of a number of sets, 0: of all, by the closed loops of verification. report
-/// is called before each set, from 1 to most, and ends the search by a nonzero return: CAV_INTERRUPTED with the best so
-/// far, NULL if there is none. choose_gains.c.
+/// Feedback gains of a motion into its solution: the best of a number of sets, 0: of all, by the closed loops of
+/// verification. report is called before each set, from 1 to most, and ends the search by a nonzero return:
+/// CAV_INTERRUPTED with the best so far, NULL if there is none. choose_gains.c.
 cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription *transcription,
                             const cav_trajectory *at, int sets, int (*report)(void *context, int set, int most),
                             void *context, cav_solution *solution, cav_error *error);
