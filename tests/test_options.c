@@ -98,7 +98,8 @@ static void test_refused(void) {
 
 /// A change of any one option is told from none.
 static void test_same(void) {
-  static const char *const velocity_options[] = {"order", "sliding", "gravity", "passive"};
+  static const char *const velocity_options[] = {"order", "sliding", "next_gap", "gravity", "passive"};
+  enum { LATE = sizeof velocity_options / sizeof *velocity_options };
   int n;
   const cav_field *field = cav_option_fields(&n);
   cav_options a = {0};
@@ -110,7 +111,7 @@ static void test_same(void) {
     set(&b, &field[i], inside(&field[i], 1));
     CHECK(!cav_options_same(&a, &b, CAV_STAGE_VELOCITY));
     int late = 0;
-    for (int k = 0; k < 4; k++) late |= !strcmp(field[i].name, velocity_options[k]);
+    for (int k = 0; k < LATE; k++) late |= !strcmp(field[i].name, velocity_options[k]);
     CHECK(cav_options_same(&a, &b, CAV_STAGE_POSITION) == late);
   }
 }

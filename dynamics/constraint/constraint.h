@@ -85,6 +85,48 @@ void cav_law_coulomb(int dim, const double *R, const double *friction, double si
 /// By the law that the state's options choose; hessian may be NULL. coulomb.c.
 void cav_law_contact(const cav_state *state, const cav_contact *contact, const double *g, double *f, double *hessian);
 
+/// A contact after the step, at q (+) h v_next, and what its normal row sees of it: the velocity (gap there - gap)/h in
+/// place of n.v_next, where excess is what the first has over the second.
+typedef struct cav_next_contact {
+  double excess;             ///< m/s
+  double by_next, by_linear; ///< h times its rate by the gap there, and by the linear one, gap + h n.v_next
+  double pos[3], normal[3];  ///< there, world
+  double margin;             ///< within which it was found
+  double gradient[6];        ///< of the gap there by twists about pos of the second geom against the first
+} cav_next_contact;
+
+/// Links and contacts after the step; made by the first evaluation with CAV_NEXT_GAP_EXACT.
+typedef struct cav_next_knot {
+  double *q; ///< [nq]
+  cav_pose *link;
+  double *com, *inertia, *axis;
+  double *by_q, *by_v; ///< [nv*6] cav_displaced_twists
+  size_t bytes;
+  int room;
+  cav_next_contact *contact; ///< [room]
+} cav_next_knot;
+
+/// Room for the state's contacts after the step. CAV_NO_MEMORY. next_gap.c.
+cav_status cav_next_knot_new(const cav_model *model, cav_state *state);
+void cav_next_knot_free(cav_next_knot *next);
+size_t cav_next_knot_bytes(const cav_next_knot *next);
+
+/// All contacts after the step, from their velocity_next and v_next of the workspace. next_gap.c.
+void cav_next_gaps_find(const cav_model *model, cav_state *state);
+
+/// Then what their derivatives are made of. next_gap.c.
+void cav_next_gaps_differentiate(const cav_model *model, cav_state *state);
+
+/// Rate of the gap of a contact after the step by a dof that moves its second link, negative by one that moves its
+/// first: by q [0] and by v_next [1]. After cav_next_gaps_differentiate. next_gap.c.
+void cav_next_gap_rates(const cav_model *model, const cav_state *state, int contact, int dof, double rate[2]);
+
+/// What the normal row of a contact of the state's sees beyond n.v_next.
+static inline double cav_contact_excess(const cav_state *state, const cav_contact *contact) {
+  if (state->options.next_gap == CAV_NEXT_GAP_LINEAR) return 0;
+  return state->work->next->contact[contact - state->contact].excess;
+}
+
 /// The same for one-sided rows (limits) and two-sided ones (friction loss, |f| <= bound).
 void cav_law_unilateral(double R, double sigma, double g, double *f, double *hessian, double *potential);
 void cav_law_bilateral(double R, double sigma, double bound, double g, double *f, double *hessian, double *potential);

@@ -17,8 +17,7 @@ static void contact_column(const cav_model *model, const cav_state *state, const
     J[i * stride] = sign * (i < 3 ? dot3(contact->frame + 3 * i, linear) : dot3(contact->frame + 3 * (i - 3), axis));
 }
 
-// dofs of a contact, from the leaves to where the two branches meet; returns their number
-static int contact_dofs(const cav_model *model, const cav_contact *contact, int *dof) {
+int cav_contact_dofs(const cav_model *model, const cav_contact *contact, int *dof) {
   int i = cav_last_dof(model, contact->link1), j = cav_last_dof(model, contact->link2), n = 0;
   while (i != j) {
     // the higher index cannot be an ancestor of the other; the complement marks dofs of link1
@@ -34,7 +33,7 @@ static int contact_dofs(const cav_model *model, const cav_contact *contact, int 
 
 static int contact_block(const cav_model *model, const cav_state *state, int index, int *dof, double *J) {
   const cav_contact *contact = &state->contact[index];
-  const int n = contact_dofs(model, contact, dof);
+  const int n = cav_contact_dofs(model, contact, dof);
   for (int k = 0; k < n; k++) {
     const double sign = dof[k] < 0 ? -1.0 : 1.0;
     if (dof[k] < 0) dof[k] = ~dof[k];

@@ -20,6 +20,10 @@ typedef struct cav_block {
 /// jacobian.c. block [n], n = ncontact+nrow+nequality, dof [n*nv], J [rows*nv]. Returns the number of rows.
 int cav_jacobian(const cav_model *model, const cav_state *state, cav_block *block, int *dof, double *J);
 
+/// Dofs of a contact, dof [nv], from the leaves to where the branches of its two links meet: those of link2 by index,
+/// those of link1 by its complement. Their number. jacobian.c.
+int cav_contact_dofs(const cav_model *model, const cav_contact *contact, int *dof);
+
 /// Number of constraint rows of the state; those of equality constraints alone. jacobian.c.
 int cav_jacobian_rows(const cav_state *state);
 int cav_equality_row_count(const cav_state *state);

@@ -33,11 +33,12 @@ static cav_derivative_store *derivatives_new(const cav_model *model) {
   size_t nv = (size_t)model->nv, n = (size_t)model->nlink;
   size_t doubles = 5 * 6 * nv + (12 + 3 * CAV_TWIST_BLOCK) * n + 12 * nv + nv * nv;
   s->drift = calloc(doubles + ALIGN, sizeof(double));
-  s->touched = calloc(n + 1, sizeof(int));
+  s->touched = calloc(n + nv + 1, sizeof(int));
   if (!s->drift || !s->touched) {
     cav_derivative_store_free(s);
     return NULL;
   }
+  s->dof = s->touched + n + 1;
   s->drift_now = s->drift + 6 * nv;
   s->drift_next = s->drift_now + 6 * nv;
   s->second = s->drift_next + 6 * nv;
@@ -49,7 +50,7 @@ static cav_derivative_store *derivatives_new(const cav_model *model) {
   s->across = s->by_next + CAV_TWIST_BLOCK * n;
   s->spare = s->across + 12 * nv;
   assert(s->spare + nv * nv == s->drift + doubles);
-  s->bytes = sizeof *s + (doubles + ALIGN) * sizeof(double) + (n + 1) * sizeof(int);
+  s->bytes = sizeof *s + (doubles + ALIGN) * sizeof(double) + (n + nv + 1) * sizeof(int);
   return s;
 }
 
@@ -105,6 +106,7 @@ cav_status cav_derivatives(const cav_model *model, cav_state *state, double *du_
   state->work->derived = 0;
   cav_derivative_drifts(&t);
   cav_derivative_contacts(&t);
+  if (state->options.next_gap == CAV_NEXT_GAP_EXACT) cav_next_gaps_differentiate(model, state);
   state->work->derived = 1;
   if (!du_dq && !du_dv && !du_dv_next) return CAV_OK;
 
@@ -122,6 +124,7 @@ cav_status cav_derivatives(const cav_model *model, cav_state *state, double *du_
     if (t.momentum) cav_half_steps_column(model, state, j, t.dq, t.dv, t.dn);
   }
   cav_derivative_across(&t);
+  if (state->options.next_gap == CAV_NEXT_GAP_EXACT) cav_derivative_next_gaps(&t);
 
   // what acts on dofs
   cav_derivative_passive(&t);

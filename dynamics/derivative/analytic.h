@@ -78,6 +78,10 @@ void cav_derivative_contacts(const cav_derivative_task *t);
 /// Adds the blocks across of contacts between two moving links. contact_sum.c.
 void cav_derivative_across(const cav_derivative_task *t);
 
+/// Adds what the normal rows of contacts see after the step; the same for the derivatives of one contact. next_gap.c.
+void cav_derivative_next_gaps(const cav_derivative_task *t);
+void cav_contact_next_gap(const cav_derivative_task *t, int contact, cav_contact_derivative *out);
+
 /// Adds armature, dampers, springs, buoyancy and those of tendons. passive.c.
 void cav_derivative_passive(const cav_derivative_task *t);
 

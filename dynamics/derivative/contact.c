@@ -21,8 +21,6 @@ typedef struct geometry {
   int carried;     ///< it moves with the geoms; otherwise it is an axis of the world
 } geometry;
 
-// steps of differences of the narrow phase: rad, and fraction of the size of the smaller geom
-static const double ROTATION_STEP = 1e-5, SHIFT_STEP = 1e-5;
 // fraction of the size of the smaller geom below which corners are one and parts have no length; sine below which parts
 // are parallel
 static const double THIN = 1e-7;
@@ -73,81 +71,16 @@ static void ball_on_plane(const cav_contact *c, double radius, const double axis
   }
 }
 
-// moves a shape by a fraction of a unit twist about a point
-static void twist_shape(const cav_shape *from, const double point[3], int k, double step, cav_shape *to) {
-  *to = *from;
-  if (k >= 3) {
-    to->pos[k - 3] += step;
-    return;
-  }
-  double w[3] = {0, 0, 0}, quat[4], R[9], arm[3];
-  w[k] = step;
-  quat_exp(quat, w);
-  quat_matrix(R, quat);
-  matmul3(to->rotation, R, from->rotation);
-  sub3(arm, from->pos, point);
-  rotate(arm, R, arm);
-  add3(to->pos, point, arm);
-}
-
-// the point of a manifold with that feature, NULL if it is not there
-static const cav_touch *find(const cav_touch *touch, int count, int feature) {
-  for (int i = 0; i < count; i++) {
-    if (touch[i].feature == feature) return &touch[i];
-  }
-  return NULL;
-}
-
-// the narrow phase of a pair as it is and after small twists of the second geom about a point, both ways
-static void displace_pair(const cav_pair_manifolds *m, const double point[3], cav_pair_manifolds *out) {
-  const double margin = m->margin + 4 * m->shift;
-  copy3(out->point, point);
-  out->count[12] = cav_collide_shapes(&m->a, &m->b, margin, out->touch[12]);
-  for (int k = 0; k < 12; k++) {
-    double step = k / 2 < 3 ? ROTATION_STEP : m->shift;
-    cav_shape moved;
-    twist_shape(&m->b, point, k / 2, k % 2 ? step : -step, &moved);
-    out->count[k] = cav_collide_shapes(&m->a, &moved, margin, out->touch[k]);
-  }
-  out->displaced = 1;
-}
-
-// differences of those manifolds, one-sided where the point is gone on one side; 0 if it is gone on both
+// by differences of the narrow phase, those of the pair's points shared; 0 where the point comes and goes
 static int difference(const cav_contact *c, cav_pair_manifolds *m, geometry *g) {
-  geometry about;
-  // every routine keeps to CAV_TOUCH_MAX: collide.c asserts it for the same shapes
-  if (!m->displaced) displace_pair(m, c->pos, m);
-  const cav_touch *here = find(m->touch[12], m->count[12], c->feature);
-  if (!here) return 0;
-  copy3(g->align, here->tangent);
+  cav_touch here, rate[6];
+  if (!cav_touch_rates(m, c->pos, c->feature, &here, rate)) return 0;
+  copy3(g->align, here.tangent);
   for (int k = 0; k < 6; k++) {
-    const cav_touch *at[2];
-    for (int side = 0; side < 2; side++) at[side] = find(m->touch[2 * k + side], m->count[2 * k + side], c->feature);
-    if (!at[0] && !at[1]) return 0;
-    double step = k < 3 ? ROTATION_STEP : m->shift, inverse = 1 / (at[0] && at[1] ? 2 * step : step);
-    const cav_touch *low = at[0] ? at[0] : here, *high = at[1] ? at[1] : here;
-    about.dist[k] = (high->dist - low->dist) * inverse;
-    for (int i = 0; i < 3; i++) {
-      about.pos[k][i] = (high->pos[i] - low->pos[i]) * inverse;
-      about.normal[k][i] = (high->normal[i] - low->normal[i]) * inverse;
-      about.tangent[k][i] = (high->tangent[i] - low->tangent[i]) * inverse;
-    }
-  }
-  // a turn about the contact is one about that point and a shift
-  double arm[3];
-  sub3(arm, m->point, c->pos);
-  for (int k = 0; k < 6; k++) {
-    double shift[3] = {0, 0, 0}, turn[3] = {k == 0, k == 1, k == 2};
-    if (k < 3) cross3(shift, turn, arm);
-    g->dist[k] = about.dist[k] + dot3(shift, about.dist + 3);
-    copy3(g->pos[k], about.pos[k]);
-    copy3(g->normal[k], about.normal[k]);
-    copy3(g->tangent[k], about.tangent[k]);
-    for (int i = 0; i < 3; i++) {
-      axpy3(g->pos[k], g->pos[k], shift[i], about.pos[3 + i]);
-      axpy3(g->normal[k], g->normal[k], shift[i], about.normal[3 + i]);
-      axpy3(g->tangent[k], g->tangent[k], shift[i], about.tangent[3 + i]);
-    }
+    g->dist[k] = rate[k].dist;
+    copy3(g->pos[k], rate[k].pos);
+    copy3(g->normal[k], rate[k].normal);
+    copy3(g->tangent[k], rate[k].tangent);
   }
   return 1;
 }
@@ -274,9 +207,7 @@ static void contact_geometry(const cav_model *model, const cav_state *state, con
   const cav_pair *pair = &model->pair[c->pair];
   const cav_geom *first = &model->geom[pair->geom1], *second = &model->geom[pair->geom2];
   if (m->pair != c->pair) {
-    double size = fmin(1, fmin(first->bound, second->bound));
-    *m = (cav_pair_manifolds){.pair = c->pair, .size = size, .shift = SHIFT_STEP * size};
-    m->margin = cav_contact_activation(state, pair);
+    cav_manifolds_start(m, c->pair, fmin(1, fmin(first->bound, second->bound)), cav_contact_activation(state, pair));
     place(model, state, pair->geom1, &m->a);
     place(model, state, pair->geom2, &m->b);
   }
@@ -374,7 +305,7 @@ static void differentiate_law(const cav_model *model, const cav_state *state, co
   double z[6], g[6], f[6], reaction[6], regulariser, stiffness, fraction;
   for (int k = 0; k < c->dim; k++) {
     z[k] = (1 - c->damping[k]) * c->velocity[k] - c->velocity_next[k];
-    if (k == 0) z[k] -= c->stiffness * (c->dist - c->margin);
+    if (k == 0) z[k] -= c->stiffness * (c->dist - c->margin) + cav_contact_excess(state, c);
     g[k] = z[k] / c->regulariser[k];
   }
   cav_law_contact(state, c, g, f, H);

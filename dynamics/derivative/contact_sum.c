@@ -243,5 +243,6 @@ cav_status cav_contact_derivatives(const cav_model *model, cav_state *state, int
       contact_column(&t, c, &s->contact[contact], side, j, out);
     }
   }
+  if (state->options.next_gap == CAV_NEXT_GAP_EXACT) cav_contact_next_gap(&t, contact, out);
   return CAV_OK;
 }

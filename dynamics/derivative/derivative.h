@@ -4,18 +4,9 @@
 
 #include "derivative_store.h"
 #include "geometry.h"
+#include "jacobian.h"
 #include "sensor.h"
 #include "step.h"
-
-/// Contact points of one pair as it is and displaced, for differences. pair is -1 at the start.
-typedef struct cav_pair_manifolds {
-  int pair, displaced;
-  cav_shape a, b;
-  double margin, size, shift; ///< m: reach; of the smaller geom; step of a displacement
-  double point[3];            ///< of the twists
-  int count[13];              ///< after -, + each of six unit twists, then as it is
-  cav_touch touch[13][CAV_TOUCH_MAX];
-} cav_pair_manifolds;
 
 /// Derivatives of a contact at the state's last evaluation. Where the impulse and its derivative are below 1e-13 of what
 /// a contact that pushes has, it is idle and its geometry left alone, unless whole is asked for. manifolds is kept from

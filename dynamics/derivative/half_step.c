@@ -11,7 +11,6 @@
 /// the sums of contacts count on it.
 #include "half_step.h"
 #include "math3.h"
-#include "rotation.h"
 
 // r = w x* f: what a wrench about a fixed point becomes when carried along by a twist
 static void carry(double r[6], const double twist[6], const double f[6]) {
@@ -20,53 +19,23 @@ static void carry(double r[6], const double twist[6], const double f[6]) {
   cross3(r + 3, twist, f + 3);
 }
 
-// r = sum of three axes times a column of a 3 x 3 matrix
-static void mix(double r[6], const double *axes, const double T[9], int column) {
-  scale6(r, T[column], axes);
-  axpy6(r, r, T[3 + column], axes + 6);
-  axpy6(r, r, T[6 + column], axes + 12);
-}
-
 // twists by the dofs of one group of the joint, which share the velocity V before them
-static void group_twists(cav_half_step *half, double step, int first, int end, int turns, const double *v,
-                         const double V[6]) {
-  const double *axes = half->axis + 6 * first;
-  double carried[9], jacobian[9];
-  if (turns) {
-    double angle[3], quat[4];
-    scale3(angle, -step, v + first);
-    quat_exp(quat, angle);
-    quat_matrix(carried, quat);
-    scale3(angle, step, v + first);
-    cav_rotation_jacobian(angle, jacobian);
-  }
+static void group_twists(const cav_half_step *half, int first, int end, const double V[6]) {
   for (int k = first; k < end; k++) {
     double *X = half->by_q + 12 * k, *Y = half->by_v + 12 * k;
-    const double *axis = half->axis + 6 * k;
-    if (turns) {
-      mix(X, axes, carried, k - first);
-      mix(Y, axes, jacobian, k - first);
-    } else {
-      copy6(X, axis);
-      copy6(Y, axis);
-    }
-    scale6(Y, step, Y);
+    copy6(X, half->twist_q + 6 * k);
+    copy6(Y, half->twist_v + 6 * k);
     zero3(X + 6), zero3(X + 9);
     motion_cross_add(X + 6, V, X);
-    copy6(Y + 6, axis);
+    copy6(Y + 6, half->axis + 6 * k);
     motion_cross_add(Y + 6, V, Y);
   }
 }
 
-// whether dof k starts three rotations about axes of the turned body
-static int starts_turn(const cav_model *model, int k) {
-  const cav_joint *joint = &model->joint[model->dof[k].joint];
-  return (joint->type == CAV_JOINT_BALL && k == joint->dof) || (joint->type == CAV_JOINT_FREE && k == joint->dof + 3);
-}
-
-static void twists(const cav_model *model, const cav_state *state, cav_half_step *half, const double *v) {
+static void twists(const cav_model *model, const cav_state *state, const cav_half_step *half, const double *v) {
   const int *group = state->work->group;
   double step = 0.5 * half->sign * state->options.timestep;
+  cav_displaced_twists(model, step, v, half->axis, half->twist_q, half->twist_v);
   for (int i = 1; i < model->nlink; i++) {
     const cav_link *link = &model->link[i];
     double V[6];
@@ -74,7 +43,7 @@ static void twists(const cav_model *model, const cav_state *state, cav_half_step
     int end = link->dof + link->ndof;
     for (int first = link->dof, last; first < end; first = last) {
       for (last = first + 1; last < end && !group[last]; last++) continue;
-      group_twists(half, step, first, last, starts_turn(model, first), v, V);
+      group_twists(half, first, last, V);
       for (int k = first; k < last; k++) axpy6(V, V, v[k], half->axis + 6 * k);
     }
   }

@@ -39,6 +39,23 @@ static inline cav_shape cav_shape_of(const cav_model *model, const cav_geom *geo
 /// rest.
 int cav_collide_shapes(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
+/// Contact points of one pair as it is and displaced, for differences. pair is -1 at the start.
+typedef struct cav_pair_manifolds {
+  int pair, displaced;
+  cav_shape a, b;
+  double margin, size; ///< m: reach; size of the smaller shape, of which steps are a fraction
+  double point[3];     ///< of the twists
+  int count[13];       ///< after -, + each of six unit twists, then as it is
+  cav_touch touch[13][CAV_TOUCH_MAX];
+} cav_pair_manifolds;
+
+/// Takes up a pair whose shapes a and b the caller fills in. touch_rates.c.
+void cav_manifolds_start(cav_pair_manifolds *m, int pair, double size, double margin);
+
+/// The point with that feature, and its rates by unit twists (angular, linear) of the second shape about a world point.
+/// 0 where the point is not there, or comes and goes within a step. touch_rates.c.
+int cav_touch_rates(cav_pair_manifolds *m, const double point[3], int feature, cav_touch *here, cav_touch rate[6]);
+
 /// Distance along a ray, unit direction, to the surface of a shape; -1 if it misses. A ray that starts inside meets the
 /// surface where it leaves; a plane is met from above only, within its size where that is not 0. ray.c.
 double cav_ray(const cav_shape *shape, const double point[3], const double direction[3]);

@@ -1,6 +1,7 @@
 /// Configurations as a manifold: q (+) h v and its inverse. Quaternions advance by the exponential in body axes; the
 /// rotation vector of a difference is the shortest, so its length is at most pi.
 #include "math3.h"
+#include "rotation.h"
 #include "smooth.h"
 
 void cav_configuration_reset(const cav_model *model, double *q) {
@@ -96,5 +97,42 @@ void cav_difference(const cav_model *model, const double *q0, const double *q1, 
       default:
         s[0] = (b[0] - a[0]) / h;
     }
+  }
+}
+
+// whether dof k starts three rotations about axes of the turned body
+static int starts_turn(const cav_model *model, int k) {
+  const cav_joint *joint = &model->joint[model->dof[k].joint];
+  return (joint->type == CAV_JOINT_BALL && k == joint->dof) || (joint->type == CAV_JOINT_FREE && k == joint->dof + 3);
+}
+
+// r = sum of three axes times a column of a 3 x 3 matrix
+static void mix(double r[6], const double *axes, const double T[9], int column) {
+  scale6(r, T[column], axes);
+  axpy6(r, r, T[3 + column], axes + 6);
+  axpy6(r, r, T[6 + column], axes + 12);
+}
+
+void cav_displaced_twists(const cav_model *model, double distance, const double *v, const double *axis, double *by_q,
+                          double *by_v) {
+  for (int k = 0; k < model->nv; k++) {
+    if (!starts_turn(model, k)) {
+      copy6(by_q + 6 * k, axis + 6 * k);
+      scale6(by_v + 6 * k, distance, axis + 6 * k);
+      continue;
+    }
+    // the rotation on the way turns the first into the axes there, the right Jacobian of it the second
+    double back[3], on[3], quat[4], carried[9], jacobian[9];
+    scale3(back, -distance, v + k);
+    scale3(on, distance, v + k);
+    quat_exp(quat, back);
+    quat_matrix(carried, quat);
+    cav_rotation_jacobian(on, jacobian);
+    for (int i = 0; i < 3; i++) {
+      mix(by_q + 6 * (k + i), axis + 6 * k, carried, i);
+      mix(by_v + 6 * (k + i), axis + 6 * k, jacobian, i);
+      scale6(by_v + 6 * (k + i), distance, by_v + 6 * (k + i));
+    }
+    k += 2;
   }
 }

@@ -20,7 +20,7 @@
 
 #include "math3.h"
 
-enum { DOUBLES_PER_LINK = 3 + 6 + 6 + 6 + 10 + 6, DOUBLES_PER_DOF = 6 + 12 + 12 };
+enum { DOUBLES_PER_LINK = 3 + 6 + 6 + 6 + 10 + 6, DOUBLES_PER_DOF = 6 + 12 + 12 + 6 + 6 };
 
 static double *carve_numbers(double **at, size_t n) {
   double *piece = *at;
@@ -39,6 +39,8 @@ static void carve(cav_half_step *half, double sign, double **at, size_t nlink, s
   half->axis = carve_numbers(at, 6 * nv);
   half->by_q = carve_numbers(at, 12 * nv);
   half->by_v = carve_numbers(at, 12 * nv);
+  half->twist_q = carve_numbers(at, 6 * nv);
+  half->twist_v = carve_numbers(at, 6 * nv);
   half->q = carve_numbers(at, nq);
 }
 

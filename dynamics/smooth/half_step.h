@@ -18,6 +18,7 @@ typedef struct cav_half_step {
   // what it moves and what inertia multiplies
   double *composite, *whole; ///< [nlink*10], [nlink*6]
   double *by_q, *by_v;       ///< [nv*12]
+  double *twist_q, *twist_v; ///< [nv*6] cav_displaced_twists
 } cav_half_step;
 
 typedef struct cav_half_steps {

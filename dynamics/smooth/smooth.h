@@ -19,6 +19,11 @@ void cav_posture_place(const cav_model *model, struct cav_workspace *w, const ca
 /// of a posture. inertia.c.
 void cav_composites_at(const cav_model *model, const cav_posture *at, double *all);
 
+/// By each dof of q, and of v, the twist that it gives what it moves at q (+) distance v; axis [nv*6] are those there,
+/// by_q and by_v [nv*6]. configuration.c.
+void cav_displaced_twists(const cav_model *model, double distance, const double *v, const double *axis, double *by_q,
+                          double *by_v);
+
 /// Poses, centres of mass, world inertias, motion subspaces from q. kinematics.c.
 void cav_kinematics(const cav_model *model, cav_state *state, const double *q);
 

@@ -30,6 +30,7 @@ typedef struct cav_derivative_store {
   double *by_motion; ///< [nlink*36] of contact wrenches by the motion of the link, those carried along left out
   double *by_now;    ///< [nlink*36] of contact wrenches by v
   double *by_next;   ///< [nlink*36] and by -v_next
+  int *dof;          ///< [nv] of one contact
   double *across;    ///< [12*nv] axes of the dofs of two links about a contact
   double *spare;     ///< [nv*nv] for outputs that are not asked for
   size_t bytes;      ///< of all but contact

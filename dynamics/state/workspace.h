@@ -32,6 +32,7 @@ typedef struct cav_memory {
 
 struct cav_geom_cache;
 struct cav_half_steps;
+struct cav_next_knot;
 struct cav_derivative_store;
 
 typedef struct cav_workspace {
@@ -102,6 +103,9 @@ typedef struct cav_workspace {
 
   // momenta half a step before and after: made by the first evaluation of the order that takes them
   struct cav_half_steps *half_steps;
+
+  // where links and contacts are after the step: made by the first evaluation that looks there
+  struct cav_next_knot *next;
 
   // analytic derivatives: made by the first call, and whether they are of the last evaluation
   struct cav_derivative_store *derivatives;

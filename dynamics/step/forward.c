@@ -12,6 +12,8 @@
 ///
 /// Coulomb's law (coulomb.c) has no potential either: Newton from the convex law's solution, and where it does not
 /// descend, convex problems with the bounds of friction held. A solution need not exist nor be the only one (Painleve).
+/// Nor have gaps after the step (next_gap.c), whose derivative Newton takes along, or which are followed: frozen for a
+/// solution, taken anew where it ends.
 ///
 /// Stops when |inverse - u| is within tolerance of the largest force in the balance, or within what rounding of v_next
 /// to a double does to stiff constraints, whichever is larger; up to two more passes serve light links, whose forces
@@ -26,9 +28,17 @@
 #include "island.h"
 #include "math3.h"
 
-enum { BLOCK = CAV_CURVATURE, DEFAULT_ITERATIONS = 100, SEARCH_STEPS = 60, STALLS = 4, CHANGES = 30, POLISH = 2 };
+enum {
+  BLOCK = CAV_CURVATURE,
+  DEFAULT_ITERATIONS = 200,
+  SEARCH_STEPS = 60,
+  STALLS = 4,
+  CHANGES = 30,
+  POLISH = 2,
+  FEW = 2
+};
 
-static const double DEFAULT_TOLERANCE = 1e-13, SHORTEST_STEP = 0.02;
+static const double DEFAULT_TOLERANCE = 1e-13, ROUGH = 1e-9, NEAR = 1e-2, SHORTEST_STEP = 0.02;
 
 // the solver's own arrays; names as in the text above
 typedef struct newton {
@@ -43,6 +53,8 @@ typedef struct newton {
   double *derivative;      // [nrow] J d
   double *try_y, *try_f;   // [nrow] the same along the line
   double *curvature;       // [nblock*36] -df/dy
+  double *excess;          // [nblock] of normal rows beyond J x, as last measured
+  double *ahead;           // [ncontact*nv] its rate by the dofs of each contact's block
   double *held;            // [nblock] normal impulses held under Coulomb's law
   double *x, *anchor;      // [nv] iterate; where base was taken
   double *base;            // [nv] h (smooth inverse - u) at anchor
@@ -52,6 +64,7 @@ typedef struct newton {
   double *matrix;          // [nv*nv] derivative of h times the inverse, not for euler
   double *smooth;          // [nv*nv] that of the smooth part alone, not for euler
   int have_smooth;
+  int frozen;          // the excess stays as it is
   double error, scale; // of the last measurement
   int iterations, limit;
 } newton;
@@ -79,6 +92,7 @@ static void enter_island(newton *s, int island) {
   s->part.block = s->problem.block + all->first_block[island];
   s->part.nblock = all->first_block[island + 1] - all->first_block[island];
   if (s->problem.held) s->part.held = s->problem.held + all->first_block[island];
+  if (s->problem.excess) s->part.excess = s->problem.excess + all->first_block[island];
   s->dof = all->dof + all->first_dof[island];
   s->ndof = all->first_dof[island + 1] - all->first_dof[island];
 }
@@ -91,13 +105,15 @@ static void leave_island(newton *s) {
 
 // whether the step is the least point of one convex potential
 static int is_convex(const cav_state *state) {
-  return !cav_takes_mean(state) && state->options.sliding == CAV_SLIDING_CONVEX;
+  return !cav_takes_mean(state) && state->options.sliding == CAV_SLIDING_CONVEX &&
+         state->options.next_gap == CAV_NEXT_GAP_LINEAR;
 }
 
 static cav_status prepare(newton *s, const cav_model *model, cav_state *state) {
-  const size_t matrices = is_convex(state) ? 0 : 2;
-  const cav_impulse_room room = {.per_block = BLOCK + 1 + CAV_ISLAND_PER_BLOCK,
+  const size_t matrices = is_convex(state) ? 0 : 2, looks = state->options.next_gap == CAV_NEXT_GAP_EXACT;
+  const cav_impulse_room room = {.per_block = BLOCK + 2 + CAV_ISLAND_PER_BLOCK,
                                  .per_row = 5,
+                                 .per_row_and_dof = looks,
                                  .per_dof = 8 + CAV_ISLAND_PER_DOF,
                                  .per_dof_squared = matrices};
   cav_workspace *work = state->work;
@@ -112,7 +128,10 @@ static cav_status prepare(newton *s, const cav_model *model, cav_state *state) {
   for (int i = 0; i < 8; i++, at += nv) *dof[i] = at;
   s->curvature = at;
   s->held = s->curvature + BLOCK * nblock;
-  s->matrix = s->held + nblock;
+  s->excess = s->held + nblock;
+  s->problem.excess = looks ? s->excess : NULL;
+  s->ahead = s->excess + nblock;
+  s->matrix = s->ahead + looks * nrow * nv;
   s->smooth = s->matrix + nv * nv;
   const size_t room_of_islands = CAV_ISLAND_PER_BLOCK * nblock + CAV_ISLAND_PER_DOF * nv;
   assert(s->matrix + matrices * nv * nv + room_of_islands == s->problem.spare + s->problem.nspare);
@@ -133,12 +152,38 @@ static double laws(newton *s, const double *y, double *f, double *curvature, int
   return sum;
 }
 
-// matrix := matrix + J' H J
+// rates of the excess of each contact by the dofs of its block, at the state's last evaluation
+static void fill_ahead(newton *s) {
+  const cav_impulse *p = &s->problem;
+  const double rate = 1.0 / p->state->options.timestep;
+  cav_next_gaps_differentiate(p->model, p->state);
+  for (int b = 0; b < p->nblock; b++) {
+    const cav_block *block = &p->block[b];
+    if (block->contact < 0) continue;
+    const cav_contact *contact = &p->state->contact[block->contact];
+    const cav_next_contact *next = &p->state->work->next->contact[block->contact];
+    double *to = s->ahead + (size_t)block->contact * (size_t)p->nv;
+    int second = cav_last_dof(p->model, contact->link2);
+    for (int k = 0; k < block->ndof; k++) {
+      // dofs from the leaves: of the second link, or of the first
+      const int dof = block->dof[k];
+      const double sign = dof == second ? 1.0 : -1.0;
+      double there[2];
+      cav_next_gap_rates(p->model, p->state, block->contact, dof, there);
+      to[k] = rate * sign * next->by_next * there[1] + next->by_linear * block->J[k];
+      if (dof == second) second = p->model->dof[dof].parent;
+    }
+  }
+}
+
+// matrix := matrix + J' H (J + what rows see beyond it)
 static void add_constraints(newton *s) {
   const int nv = s->problem.nv;
   for (int b = 0; b < s->problem.nblock; b++) {
     const cav_block *block = &s->problem.block[b];
     const double *H = s->curvature + BLOCK * b, *J = block->J;
+    const double *ahead =
+        s->problem.excess && !s->frozen && block->contact >= 0 ? s->ahead + block->contact * nv : NULL;
     const int n = block->ndof, dim = block->dim;
     if (largest(H, dim * dim) == 0.0) continue;
     for (int i = 0; i < n; i++) {
@@ -148,6 +193,7 @@ static void add_constraints(newton *s) {
       for (int j = 0; j < n; j++) {
         double sum = 0.0;
         for (int k = 0; k < dim; k++) sum += bent[k] * J[k * n + j];
+        if (ahead) sum += bent[0] * ahead[j];
         to[block->dof[j]] += sum;
       }
     }
@@ -240,6 +286,9 @@ static void add_row_rounding(const newton *s, int b, double *error) {
   for (int i = 0; i < block->dim; i++) {
     const double *J = block->J + i * block->ndof;
     double size = fabs(p->target[block->first + i]);
+    // of positions after the step, which come about by several roundings
+    if (p->excess && block->contact >= 0 && i == 0)
+      size += 8.0 * norm3(p->state->contact[block->contact].pos) / p->state->options.timestep;
     for (int k = 0; k < block->ndof; k++) size += fabs(J[k] * s->x[block->dof[k]]);
     for (int j = 0; j < block->dim; j++)
       for (int k = 0; k < block->ndof; k++)
@@ -400,9 +449,24 @@ static int solve_general(int n, double *A, double *b) {
   return all_finite(b, n);
 }
 
-// measures the inverse at x
+// measures the inverse at x; while the excess is frozen, with the impulses that it gives
 static cav_status measure(newton *s) {
-  return cav_impulse_check(&s->problem, s->q, s->v, s->u, s->x, s->found, s->f, &s->error, &s->scale);
+  const cav_impulse *p = &s->problem;
+  const cav_status status = cav_impulse_check(p, s->q, s->v, s->u, s->x, s->found, s->f, &s->error, &s->scale);
+  if (!p->excess || status != CAV_OK) return status;
+  for (int b = 0; b < p->nblock && !s->frozen; b++) {
+    const int contact = p->block[b].contact;
+    s->excess[b] = contact >= 0 ? cav_contact_excess(p->state, &p->state->contact[contact]) : 0.0;
+  }
+  if (!s->frozen) return CAV_OK;
+  cav_impulse_rows(p, s->x, s->y);
+  laws(s, s->y, s->try_f, NULL, 0);
+  for (int i = 0; i < p->nrow; i++) s->f[i] -= s->try_f[i];
+  cav_impulse_push(p, 1.0 / p->state->options.timestep, s->f, s->found);
+  copy(s->f, s->try_f, p->nrow);
+  s->error = 0.0;
+  for (int i = 0; i < p->nv; i++) s->error = fmax(s->error, fabs(s->found[i] - s->u[i]));
+  return CAV_OK;
 }
 
 static double residual(const newton *s) { return s->error > 0.0 ? s->error / s->scale : 0.0; }
@@ -414,6 +478,7 @@ static cav_status newton_step(newton *s, int *accepted) {
   const double before = residual(s);
   *accepted = 0;
   copy(s->momentum, s->found, nv);
+  if (s->problem.excess && !s->frozen) fill_ahead(s);
   if (!s->have_smooth) {
     const cav_status status = differentiate_smooth(s);
     if (status != CAV_OK) return status;
@@ -448,19 +513,23 @@ static double velocity_error(newton *s) {
   return error > 0.0 ? error / largest(s->x, p->nv) : 0.0;
 }
 
-// towards Coulomb's law from x by convex problems in which the bounds of friction are held (Tresca's friction): each
-// takes them from the impulses of the one before, half way from the second on. Their fixed point is Coulomb's law
+// towards the law from x by convex problems in which what is not convex is held: the bounds of friction (Tresca's
+// friction), from the impulses of the one before, half way from the second on; gaps after the step beyond the linear
+// ones. Their fixed point is the law
 static cav_status solve_held(newton *s, int count, double tolerance) {
   cav_impulse *p = &s->problem;
+  const int coulomb = p->state->options.sliding == CAV_SLIDING_COULOMB;
   cav_status status = CAV_OK;
   for (int k = 0; k < count && status == CAV_OK && s->iterations < s->limit; k++) {
+    if (k > 0 && p->excess) status = measure(s);
+    if (status != CAV_OK) break;
     cav_impulse_rows(p, s->x, s->y);
     laws(s, s->y, s->f, NULL, 0);
     for (int b = 0; b < p->nblock; b++) {
       const double f = s->f[p->block[b].first];
       s->held[b] = k > 0 ? 0.5 * (s->held[b] + f) : f;
     }
-    p->held = s->held;
+    p->held = coulomb ? s->held : NULL;
     status = solve_convex(s, tolerance);
     p->held = NULL;
     leave_island(s);
@@ -468,25 +537,34 @@ static cav_status solve_held(newton *s, int count, double tolerance) {
   return status;
 }
 
-// the convex law's solution, whatever the options say
-static cav_status solve_first(newton *s, double tolerance) {
-  s->problem.convex = 1;
+// the convex law's solution with linear gaps, whatever the options say; or without friction, which lifts nothing that
+// slides
+static cav_status solve_first(newton *s, int friction, double tolerance) {
+  cav_impulse *p = &s->problem;
+  const double *excess = p->excess;
+  for (int b = 0; b < p->nblock && !friction; b++) s->held[b] = 0.0;
+  p->convex = friction;
+  p->held = friction ? NULL : s->held;
+  p->excess = NULL;
   const cav_status status = solve_convex(s, tolerance);
-  s->problem.convex = 0;
+  p->convex = 0;
+  p->held = NULL;
+  p->excess = excess;
   leave_island(s);
   return status;
 }
 
-// passes until the inverse agrees with u; x is then the best iterate and the state evaluated there
-static cav_status iterate(newton *s, double tolerance) {
+// passes from v, or with go_on from x, until the inverse agrees with u; x is then the best iterate and the state
+// evaluated there
+static cav_status iterate(newton *s, int go_on, double tolerance) {
   const int nv = s->problem.nv, convex = is_convex(s->problem.state);
-  const int coulomb = s->problem.state->options.sliding == CAV_SLIDING_COULOMB;
-  // bounds of friction that change need not lower the error at once
-  const int patience = coulomb ? CHANGES : STALLS;
+  const int coulomb = s->problem.state->options.sliding == CAV_SLIDING_COULOMB, changes = coulomb || s->problem.excess;
+  // bounds of friction or gaps that change need not lower the error at once
+  const int patience = changes ? CHANGES : STALLS;
   double least = INFINITY;
   int stalls = 0, accepted = 0, polished = 0, held = 1;
-  copy(s->x, s->v, nv);
-  for (int pass = 0;; pass++) {
+  if (!go_on) copy(s->x, s->v, nv);
+  for (int pass = go_on;; pass++) {
     if (!accepted) {
       const cav_status status = measure(s);
       if (status != CAV_OK) return status;
@@ -499,20 +577,44 @@ static cav_status iterate(newton *s, double tolerance) {
     if (least <= tolerance && (polished++ == POLISH || velocity_error(s) <= 10.0 * tolerance)) break;
     if (pass > 0 && s->error <= rounding(s)) break;
     if (stalls >= patience || s->iterations >= s->limit) break;
+    // gaps that move with x are better followed
+    if (s->problem.excess && !s->frozen && !go_on && held > FEW) break;
     accepted = 0;
     cav_status status = CAV_OK;
     if (!convex && pass > 0) status = newton_step(s, &accepted);
     if (status == CAV_OK && !accepted) {
       const double aim = !convex && pass == 0 ? 1e-2 : 0.1 * tolerance;
-      status = coulomb && pass > 0 ? solve_held(s, held, aim) : solve_first(s, aim);
+      if (changes && pass > 0)
+        status = coulomb && held == 2 ? solve_first(s, 0, aim) : solve_held(s, held, aim);
+      else
+        status = solve_first(s, 1, aim);
       if (pass > 0 && held < CHANGES) held *= 2;
     }
+    // held problems may run away where their fixed point repels
+    if (status == CAV_NOT_FINITE && pass > 0) break;
     if (status != CAV_OK) return status;
   }
   copy(s->x, s->best, nv);
   const cav_status status = measure(s);
   if (status != CAV_OK) return status;
   return residual(s) <= tolerance || s->error <= 4.0 * rounding(s) ? CAV_OK : CAV_NOT_CONVERGED;
+}
+
+// where Newton finds no way with gaps after the step that move: solutions with their excess frozen, each where the one
+// before ends, the first with none. Their fixed point is the law; the excess is small against the velocities that it
+// hangs on, so it mostly attracts
+static cav_status follow_gaps(newton *s, double tolerance) {
+  for (int b = 0; b < s->problem.nblock; b++) s->excess[b] = 0.0;
+  for (int k = 0; s->iterations < s->limit; k++) {
+    s->frozen = 1;
+    cav_status status = iterate(s, k > 0, fmax(ROUGH, tolerance));
+    s->frozen = 0;
+    if (status != CAV_OK && status != CAV_NOT_CONVERGED) return status;
+    status = measure(s);
+    if (status != CAV_OK) return status;
+    if (residual(s) <= NEAR) break;
+  }
+  return iterate(s, 1, tolerance);
 }
 
 cav_status cav_forward_newton(const cav_model *model, cav_state *state, const double *q, const double *v,
@@ -528,7 +630,8 @@ cav_status cav_forward_newton(const cav_model *model, cav_state *state, const do
   newton s = {.q = q, .v = v, .u = u, .limit = iterations};
   cav_status status = prepare(&s, model, state);
   if (status != CAV_OK) return status;
-  status = iterate(&s, tolerance);
+  status = iterate(&s, 0, tolerance);
+  if (status == CAV_NOT_CONVERGED && s.problem.excess) status = follow_gaps(&s, tolerance);
   if (status != CAV_OK && status != CAV_NOT_CONVERGED) return status;
   copy(v_next, s.x, model->nv);
   if (report) *report = (cav_forward_report){.iterations = s.iterations, .residual = residual(&s)};

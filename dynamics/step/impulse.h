@@ -14,12 +14,13 @@ typedef struct cav_impulse {
   int nbound, nbound_row; ///< blocks and rows before those of equality constraints
   cav_block *block;       ///< [nblock] contacts in their order, then scalar rows, then equality constraints in theirs
   const double
-      *held;      ///< [nblock] normal impulses that bound friction under Coulomb's law; NULL: those of the law itself
-  int convex;     ///< 1: contacts by the convex law, whatever the options say
-  double *target; ///< v* [nrow], m/s or rad/s
-  double *R;      ///< regulariser [nrow], 1/kg
-  double *M;      ///< tree-sparse, D included; at the mean velocity with half of the damping that acts during the step
-  double *L;      ///< its factors by cav_ldl_factor
+      *held; ///< [nblock] normal impulses that bound friction under Coulomb's law; NULL: those of the law itself
+  const double *excess; ///< [nblock] of normal rows beyond J v_next (cav_next_contact); NULL: none
+  int convex;           ///< 1: contacts by the convex law, whatever the options say
+  double *target;       ///< v* [nrow], m/s or rad/s
+  double *R;            ///< regulariser [nrow], 1/kg
+  double *M; ///< tree-sparse, D included; at the mean velocity with half of the damping that acts during the step
+  double *L; ///< its factors by cav_ldl_factor
   double *force, *change; ///< scratch [nv]
   double *spare;          ///< [nspare] doubles asked for
   size_t nspare;

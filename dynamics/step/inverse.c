@@ -88,18 +88,22 @@ static void contact_impulse(const cav_state *state, cav_contact *c, const double
     double target = (1 - c->damping[k]) * c->velocity[k];
     if (k == 0) { target -= c->stiffness * (c->dist - c->margin); }
     if (coupled) { target = coupled[k]; }
-    g[k] = (target - c->velocity_next[k]) / c->regulariser[k];
+    g[k] = (target - c->velocity_next[k] - (k == 0 ? cav_contact_excess(state, c) : 0)) / c->regulariser[k];
   }
   cav_law_contact(state, c, g, c->impulse, NULL);
 }
 
 // all contacts: velocities (those at v only if v has changed), impulses, wrenches
-static void contacts(cav_state *state, const double *velocity_now, double scale) {
+static void contacts(const cav_model *model, cav_state *state, const double *velocity_now, double scale) {
   const double *coupled = state->options.coupled ? state->work->target : NULL;
   for (int i = 0; i < state->ncontact; i++) {
     cav_contact *c = &state->contact[i];
     if (velocity_now) { cav_contact_velocity(state, c, velocity_now, c->velocity); }
     cav_contact_velocity(state, c, state->velocity_next, c->velocity_next);
+  }
+  if (state->options.next_gap == CAV_NEXT_GAP_EXACT) { cav_next_gaps_find(model, state); }
+  for (int i = 0; i < state->ncontact; i++) {
+    cav_contact *c = &state->contact[i];
     contact_impulse(state, c, coupled);
     if (coupled) { coupled += c->dim; }
     contact_push(state, c, scale);
@@ -181,7 +185,7 @@ static void evaluate(const cav_model *model, cav_state *state, int with_constrai
   }
   if (with_constraints && new_velocity && state->options.coupled) { couple(model, state, now); }
   if (links) {
-    contacts(state, now, scale);
+    contacts(model, state, now, scale);
     if (state->nequality > 0) { cav_equality_impulses(model, state, w->v, now, w->v_next, scale); }
   }
 
@@ -222,6 +226,10 @@ cav_status cav_inverse_from(const cav_model *model, cav_state *state, cav_stage 
   }
   if (state->options.order == CAV_ORDER_MOMENTUM) {
     cav_status status = cav_half_steps_new(model, state);
+    if (status) { return status; }
+  }
+  if (state->options.next_gap == CAV_NEXT_GAP_EXACT) {
+    cav_status status = cav_next_knot_new(model, state);
     if (status) { return status; }
   }
   copy(w->v, v, model->nv);

@@ -273,6 +273,7 @@ void cav_state_free(cav_state *state) {
   free(state->work->floats);
   free(state->work->readout);
   free(state->work->half_steps);
+  cav_next_knot_free(state->work->next);
   cav_derivative_store_free(state->work->derivatives);
   free(state->work->coupling);
   cav_hessian_free(state->work->hessian);
@@ -288,6 +289,7 @@ void cav_state_bytes(const cav_state *state, size_t bytes[CAV_PARTS]) {
   memcpy(bytes, w->bytes, sizeof w->bytes);
   bytes[CAV_PART_ROWS] += (size_t)w->row_room * sizeof *state->row;
   bytes[CAV_PART_MOTION] += cav_fluid_bytes(w) + (w->half_steps ? w->half_steps->bytes : 0);
+  bytes[CAV_PART_CONTACTS] += cav_next_knot_bytes(w->next);
   bytes[CAV_PART_CONTACTS] += (size_t)w->contact_room * sizeof *state->contact + cav_geom_cache_bytes(w->geom);
   size_t nu = (size_t)state->model->nactuator;
   bytes[CAV_PART_ACTUATION] += w->gram ? 3 * nu * nu * sizeof(double) : 0;

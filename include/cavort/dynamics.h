@@ -144,7 +144,8 @@ typedef struct cav_forward_report {
 } cav_forward_report;
 
 /// Forward step by generalised projected Gauss-Seidel on (9), exact law only. At most iterations sweeps, fewer when the
-/// largest change of an impulse, relative, falls below tolerance. report may be NULL. Paper, section IV.
+/// largest change of an impulse, relative, falls below tolerance. report may be NULL. CAV_NOT_SUPPORTED for the smoothed
+/// law and for CAV_NEXT_GAP_EXACT. Paper, section IV.
 CAV_API cav_status cav_forward_gpgs(const cav_model *model, cav_state *state, const double *q, const double *v,
                                     const double *u, int iterations, double tolerance, double *v_next,
                                     cav_forward_report *report);

@@ -437,6 +437,11 @@ typedef struct cav_field {
   X(CAV_SLIDING_CONVEX, "convex", "the paper's law: held off by h mu times the slip")                              \
   X(CAV_SLIDING_COULOMB, "coulomb", "Coulomb's: gap and force complementary at any slip")
 
+/// The gap after the step that the normal row of a contact sees; dynamics/METHOD.md, 10.
+#define CAV_NEXT_GAPS(X)                                                                                           \
+  X(CAV_NEXT_GAP_LINEAR, "linear", "the paper's: gap + h n.v_next, off by h^2 where links turn")                   \
+  X(CAV_NEXT_GAP_EXACT, "exact", "that of the same point at q (+) h v_next: one more placement of links and contacts")
+
 /// How constraints are evaluated: REAL(stage, name, least, most, required, unit, text), WORD(stage, name, type, words,
 /// text) and FLAG(stage, name, text), which is 0 or 1. stage: the first stage of an evaluation that depends on it,
 /// which is not reused after a change. required: of a recorded law (<contact> of a problem file). The struct, the
@@ -447,6 +452,7 @@ typedef struct cav_field {
   WORD(POSITION, stabilisation, cav_stabilisation, CAV_STABILISATIONS, "how v* follows from the position error")   \
   WORD(POSITION, regulariser, cav_regulariser, CAV_REGULARISERS, "diagonal of A that scales R")                    \
   WORD(VELOCITY, sliding, cav_sliding, CAV_SLIDINGS, "law of contacts that slide")                                 \
+  WORD(VELOCITY, next_gap, cav_next_gap, CAV_NEXT_GAPS, "gap after the step that contacts see")                    \
   REAL(POSITION, softness, DBL_MIN, DBL_MAX, 1, "", "epsilon of the discrete stabilisation")                       \
   REAL(POSITION, time_constant, 0, DBL_MAX, 1, "s", "kappa of the discrete stabilisation; 0: deadbeat")            \
   REAL(POSITION, smoothing, 0, DBL_MAX, 1, "m", "delta: distance at which the smoothed law is active; 0: the exact law (dynamics/METHOD.md, 3)") \
@@ -466,6 +472,7 @@ typedef enum cav_order { CAV_ORDERS(CAV_WORD_MEMBER) } cav_order;
 typedef enum cav_stabilisation { CAV_STABILISATIONS(CAV_WORD_MEMBER) } cav_stabilisation;
 typedef enum cav_regulariser { CAV_REGULARISERS(CAV_WORD_MEMBER) } cav_regulariser;
 typedef enum cav_sliding { CAV_SLIDINGS(CAV_WORD_MEMBER) } cav_sliding;
+typedef enum cav_next_gap { CAV_NEXT_GAPS(CAV_WORD_MEMBER) } cav_next_gap;
 #undef CAV_WORD_MEMBER
 
 /// A state starts with the model's; change state->options between calls at will.

@@ -168,7 +168,8 @@ CAV_API const cav_field *cav_stage_fields(int *n);
 /// The schedule: stages go geometrically from first to last; the penalty reaches its end at half way.
 typedef struct cav_schedule {
   int stages;
-  cav_sliding sliding; ///< law of contacts that slide from three quarters of the way on; before it is the convex one
+  cav_sliding sliding;   ///< law of contacts that slide from three quarters of the way on; before it is the convex one
+  cav_next_gap next_gap; ///< gap after the step that contacts see from half way on; before it is the linear one
   cav_stage_options first, last;
 } cav_schedule;
 

@@ -19,6 +19,7 @@ static const char *const sensors[CAV_SENSOR_TYPES + 1] = {CAV_SENSORS(SENSOR_NAM
 const char *const cav_problem_stabilisations[] = {CAV_STABILISATIONS(WORD_TEXT) NULL};
 const char *const cav_problem_regularisers[] = {CAV_REGULARISERS(WORD_TEXT) NULL};
 const char *const cav_problem_slidings[] = {CAV_SLIDINGS(WORD_TEXT) NULL};
+const char *const cav_problem_next_gaps[] = {CAV_NEXT_GAPS(WORD_TEXT) NULL};
 const char *const cav_problem_norms[] = {[CAV_NORM_SQUARE] = "square", [CAV_NORM_ABSOLUTE] = "absolute", NULL};
 const char *const cav_problem_mirrors[] = {
     [CAV_MIRROR_NONE] = "none", [CAV_MIRROR_X] = "x", [CAV_MIRROR_Y] = "y", NULL};
@@ -133,7 +134,7 @@ static const cav_xml_element limits = {"limits", 0, 1, ATTRIBUTES(REAL("effort",
 static const cav_xml_element schedule_first = {"first", 0, 1, STAGE, NULL, 0};
 static const cav_xml_element schedule_last = {"last", 0, 1, STAGE, NULL, 0};
 static const cav_xml_element schedule = {
-    "schedule", 0, 1, ATTRIBUTES(WHOLE("stages", 0), WORD("sliding", cav_problem_slidings)), CHILDREN(&schedule_first, &schedule_last), 0};
+    "schedule", 0, 1, ATTRIBUTES(WHOLE("stages", 0), WORD("sliding", cav_problem_slidings), WORD("next_gap", cav_problem_next_gaps)), CHILDREN(&schedule_first, &schedule_last), 0};
 #define IPOPT(name, type, least, most, strict, words) TEXT(#name, 0),
 static const cav_xml_element ipopt = {
     "ipopt", 0, 1, (const cav_xml_attribute[]){CAV_IPOPT_OPTIONS(IPOPT) END}, NULL, 0};

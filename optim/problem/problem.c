@@ -324,6 +324,7 @@ static cav_status read_schedule(const cav_problem_reader *reader) {
     return cav_xml_fail(reader->error, node, "stages", "expected 1 to 1000, got %d", schedule->stages);
   }
   schedule->sliding = (cav_sliding)cav_xml_word(node, "sliding", schedule->sliding);
+  schedule->next_gap = (cav_next_gap)cav_xml_word(node, "next_gap", schedule->next_gap);
   int n;
   const cav_field *field = cav_stage_fields(&n);
   cav_status status = cav_problem_read_fields(reader, cav_problem_child(node, "first"), field, n, &schedule->first);

@@ -43,6 +43,7 @@ extern const char *const cav_problem_guesses[];
 extern const char *const cav_problem_dof_sets[];
 extern const char *const cav_problem_stabilisations[];
 extern const char *const cav_problem_slidings[];
+extern const char *const cav_problem_next_gaps[];
 extern const char *const cav_problem_regularisers[];
 extern const char *const cav_problem_mirrors[];
 extern const char *const cav_problem_norms[];

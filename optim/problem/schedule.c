@@ -23,6 +23,9 @@ static double between(double from, double to, double s) {
 // fraction of the way from which on contacts slide by the schedule's law: before, forces that are active at a distance
 // make up for what is missing, and a convex law leads better (step-up ends in a corner without)
 static const double SLIDES_FROM = 0.75;
+// fraction of the way from which on contacts see the gap where the step ends; from three quarters on walker-jump and
+// cheetah-jump are not certified
+static const double LOOKS_FROM = 0.5;
 
 cav_stage_options cav_schedule_at(const cav_schedule *schedule, double x) {
   const cav_stage_options *a = &schedule->first, *b = &schedule->last;
@@ -40,6 +43,7 @@ void cav_stage_law(const cav_problem *problem, double x, double step, cav_option
   cav_stage_options stage = cav_schedule_at(&problem->schedule, x);
   law->stabilisation = CAV_STABILISATION_DISCRETE;
   law->sliding = x >= SLIDES_FROM ? problem->schedule.sliding : CAV_SLIDING_CONVEX;
+  law->next_gap = x >= LOOKS_FROM ? problem->schedule.next_gap : CAV_NEXT_GAP_LINEAR;
 #define LAW_SAME(name) law->name = stage.name;
 #define LAW_STEPS(name) law->name = stage.name * step;
 #define LAW_NONE(name)

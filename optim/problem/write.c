@@ -313,6 +313,7 @@ static void write_tail(FILE *out, const cav_problem *p) {
   write_number(out, "margin", p->limit_margin);
   fprintf(out, "/>\n  <schedule stages=\"%d\"", p->schedule.stages);
   write_text(out, "sliding", cav_problem_slidings[p->schedule.sliding]);
+  write_text(out, "next_gap", cav_problem_next_gaps[p->schedule.next_gap]);
   fputs(">\n", out);
   write_stage(out, "first", &p->schedule.first);
   write_stage(out, "last", &p->schedule.last);

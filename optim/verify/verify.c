@@ -464,8 +464,10 @@ static void decide(const cav_verification *verification, const metrics *found, c
   const cav_metric slip = {verdict->slip_mean_m_s, -1, "mean over loaded contacts"};
   require(verdict, &slip, CAV_TOLERANCE_SLIP, "slip, m/s,",
           "A lower softness or smoothing at the end of the schedule, or a higher weight of slip, usually helps.");
-  require(verdict, &found->hover, CAV_TOLERANCE_HOVER, "contact force across gaps that stay open, fraction of all,",
-          "Coulomb's law (sliding=\"coulomb\" in <schedule>), or a lower smoothing at its end usually helps.");
+  require(
+      verdict, &found->hover, CAV_TOLERANCE_HOVER, "contact force across gaps that stay open, fraction of all,",
+      "Coulomb's law and the exact gap (sliding=\"coulomb\" next_gap=\"exact\" in <schedule>), or a lower smoothing at "
+      "its end usually helps.");
   const cav_metric step = {replay->step_error, replay->step_knot, "forward step from the knot against the next knot"};
   require(verdict, &step, CAV_TOLERANCE_STEP, "replay error, rad or m,",
           verification->law.sliding == CAV_SLIDING_COULOMB
