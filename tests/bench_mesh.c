@@ -1,7 +1,7 @@
 /// What meshes cost: the inverse and its derivatives at the smoothings of a schedule's stages, of a model with collision
-/// meshes and of the same model with its primitives alone, whose meshes the text of the file has lost; in one run, by
-/// turns. Shown are means over postures about the initial one, microseconds of processor time.
-/// Usage: bench_mesh MODEL [PRIMITIVES].
+/// meshes and of another, say with primitives in their place, or of the same without contacts; in one run, by turns.
+/// Shown are means over postures about the initial one, microseconds of processor time.
+/// Usage: bench_mesh [MODEL [OTHER]]; default unitree/g1/scene_29dof.xml among the shared models.
 #include "bench.h"
 
 enum { POSTURES = 60, MODELS = 2, STAGES = 6 };
@@ -48,31 +48,36 @@ static int measure(const cav_model *m, cav_state *state, int stage, cost *out) {
 int main(int argc, char **argv) {
   cav_model *model[MODELS] = {NULL};
   cav_state *state[MODELS] = {NULL};
-  int models = argc > 2 ? 2 : 1, ok = argc > 1;
-  if (!ok) {
-    printf("skipped: usage: bench_mesh MODEL [PRIMITIVES]\n");
+  char usual[4200];
+  const char *shared = argc > 1 ? "" : check_shared_models();
+  if (!shared) {
+    printf("skipped: no shared models\n");
     return CHECK_SKIPPED;
   }
-  for (int i = 0; i < models && ok; i++) {
+  snprintf(usual, sizeof usual, "%s/unitree/g1/scene_29dof.xml", shared);
+  int ok = 1;
+  for (int i = 0; i < MODELS && ok; i++) {
     cav_error error = {0};
-    model[i] = cav_model_load(argv[i + 1], &error);
+    model[i] = cav_model_load(argc > i + 1 ? argv[i + 1] : argc > 1 ? argv[1] : usual, &error);
     state[i] = model[i] ? cav_state_new(model[i]) : NULL;
     ok = state[i] != NULL;
     if (!ok) fprintf(stderr, "%s\n", error.text);
   }
-  if (ok) printf("%8s %8s %10s %12s %12s\n", "delta, m", "model", "contacts", "inverse, us", "derivatives");
+  if (ok && argc < 3) state[1]->options.contact = 0;
+  const char *const names[MODELS] = {"meshes", argc > 2 ? "other" : "without contacts"};
+  if (ok) printf("%8s %-16s %10s %12s %12s\n", "delta, m", "model", "contacts", "inverse, us", "derivatives");
   for (int stage = 0; stage < STAGES && ok; stage++) {
     cost c[MODELS];
     // the first round warms up
     for (int round = 0; round < 2; round++) {
-      for (int i = 0; i < models && ok; i++) ok = measure(model[i], state[i], stage, &c[i]);
+      for (int i = 0; i < MODELS && ok; i++) ok = measure(model[i], state[i], stage, &c[i]);
     }
-    for (int i = 0; i < models && ok; i++) {
-      printf("%8g %8s %10.1f %12.1f %12.1f\n", contact_delta[stage], i ? "second" : "first", c[i].contacts,
-             c[i].inverse, c[i].derivatives);
+    for (int i = 0; i < MODELS && ok; i++) {
+      printf("%8g %-16s %10.1f %12.1f %12.1f\n", contact_delta[stage], names[i], c[i].contacts, c[i].inverse,
+             c[i].derivatives);
     }
   }
-  for (int i = 0; i < models; i++) {
+  for (int i = 0; i < MODELS; i++) {
     cav_state_free(state[i]);
     cav_model_free(model[i]);
   }

@@ -2,7 +2,7 @@
 # Writes the tables of tests/results anew, each with machine, compiler and commit. Usage: sh tests/results.sh [NAME...], default
 # all of: inverse (time against MuJoCo, needs it and the shared models), heap (forward steps of heaps against MuJoCo), update (updates
 # of their factors against new ones), normal (normal
-# equations by bands, by groups of trees and by CHOLMOD), unused (what a plan pays for things out of its reach), sweep (broad phase), conservation (drift of energy and
+# equations by bands, by groups of trees and by CHOLMOD), unused (what a plan pays for things out of its reach), sweep (broad phase), mesh (collision meshes of a robot at each stage), conservation (drift of energy and
 # momentum), orders (error of the orders of the step against their time), absent (what features cost where a scene has none of
 # them), warm (a changed weight solved again, an iteration by itself), optimum (optimal control against known optima), methods (own solver and Ipopt on the same),
 # sensors, tendons, actuation, fluid (readings, strings, drives and
@@ -139,7 +139,7 @@ interruption() {
   mv "$out/interruption.tmp" "$out/interruption.txt"
 }
 
-for name in ${*:-inverse heap update normal unused sweep conservation orders sensors tendons actuation fluid optimum methods absent}; do
+for name in ${*:-inverse heap update normal unused sweep mesh conservation orders sensors tendons actuation fluid optimum methods absent}; do
   case $name in
     inverse) run inverse bench_inverse ;;
     heap) run heap bench_heap ;;
@@ -147,6 +147,7 @@ for name in ${*:-inverse heap update normal unused sweep conservation orders sen
     normal) normal ;;
     unused) run unused bench_unused ;;
     sweep) run sweep bench_sweep ;;
+    mesh) run mesh bench_mesh ;;
     conservation) run conservation test_conservation ;;
     orders) run orders bench_orders ;;
     sensors) run sensors test_sensor ;;
@@ -158,6 +159,6 @@ for name in ${*:-inverse heap update normal unused sweep conservation orders sen
     absent) absent ;;
     warm) run warm bench_warm ;;
     interruption) interruption ;;
-    *) echo "usage: sh tests/results.sh [inverse|heap|update|normal|unused|sweep|conservation|orders|sensors|tendons|actuation|fluid|optimum|methods|absent|warm|interruption]..." >&2 && exit 2 ;;
+    *) echo "usage: sh tests/results.sh [inverse|heap|update|normal|unused|sweep|mesh|conservation|orders|sensors|tendons|actuation|fluid|optimum|methods|absent|warm|interruption]..." >&2 && exit 2 ;;
   esac
 done
