@@ -462,6 +462,46 @@ static void test_penetration(void) {
   }
 }
 
+// a toe that flies along x at 4 m/s and an arm that turns at 20 rad/s, and a bar of 6 cm in the way of either, which
+// both pass between two knots 12 cm and 0.6 rad apart, by motors that stand against any contact force; or a bar that
+// stands 1 cm beside the way
+#define TOE                                                                                                 \
+  "<body name='foot'><joint name='x' type='slide' axis='1 0 0'/><geom name='toe' type='sphere' size='0.02'" \
+  " mass='1'/></body>"
+#define ARM                                                                                         \
+  "<body name='limb'><joint name='turn' type='hinge' axis='0 0 1'/><geom name='arm' type='capsule'" \
+  " fromto='0 0 0 0.5 0 0' size='0.01' mass='1'/></body>"
+#define BAR(place) "<geom name='bar' type='box' size='0.03 0.1 0.1' pos='" place "'/>"
+#define POST(place) "<geom name='bar' type='box' size='0.03 0.03 0.1' pos='" place "'/>"
+#define DRIVEN(joint) "</worldbody><actuator><motor joint='" joint "'/></actuator></mujoco>"
+
+static void test_passage(void) {
+  static const struct {
+    const char *text;
+    double start, speed, depth;
+  } way[] = {{HEAD TOE BAR("0.0611 0 0") DRIVEN("x"), -0.6, 4, 0.05},
+             {HEAD TOE BAR("0.0611 0 0.13") DRIVEN("x"), -0.6, 4, 0},
+             {HEAD ARM POST("0.45 0 0") DRIVEN("turn"), -3.3, 20, 0.04},
+             {HEAD ARM POST("0.55 0 0") DRIVEN("turn"), -3.3, 20, 0}};
+  for (size_t i = 0; i < sizeof way / sizeof *way; i++) {
+    sample s = sample_new(way[i].text, 10, 0.03, CAV_ORDER_MIDPOINT);
+    s.q[0] = way[i].start;
+    s.v[0] = way[i].speed;
+    for (int t = 0; t <= 10; t++) *knot(&s, t) = way[i].start + 0.03 * t * way[i].speed;
+    CHECK(verify(&s, NULL, NULL) == CAV_OK);
+    CHECK(s.verdict.penetration_max_m == 0);
+    // looks are at most 2.5 mm apart, so the deepest is missed by no more than half of that
+    CHECK(s.verdict.penetration_between_m <= way[i].depth + 1e-9);
+    CHECK(s.verdict.penetration_between_m >= way[i].depth - 1.25e-3);
+    if (way[i].depth > 0) {
+      CHECK(!s.verdict.certified && strstr(s.verdict.reason, "penetration between knots") &&
+            strstr(s.verdict.reason, "at knot 5:"));
+      CHECK(strstr(s.verdict.reason, "bar in") || strstr(s.verdict.reason, "in bar"));
+    }
+    sample_free(&s);
+  }
+}
+
 // held up by the smoothed law at a height: what it bears there it bears on air from 3 mm on. softness by bisection as
 // above
 static void hold_up(sample *s, double height) {
@@ -726,6 +766,7 @@ int main(void) {
   test_cords();
   test_contact_balance();
   test_penetration();
+  test_passage();
   test_hover();
   test_slip();
   test_terms();

@@ -338,7 +338,7 @@ typedef struct cav_verdict {
   double momentum_defect_rms;      ///< fraction of weight
   double limit_violation_max;      ///< relative to the limit (effort), rad or m (range)
   double constraint_violation_max; ///< of the problem's hard terms, scaled
-  double penetration_max_m;
+  double penetration_max_m, penetration_between_m; ///< at the knots; along the steps between them
   double slip_mean_m_s;              ///< of loaded contacts, weighted by force
   double hover_fraction;             ///< of contact force, by impulse, across gaps that stay open
   double power_max_w;                ///< of an actuator: mechanical, at the mean velocity of a step, either way

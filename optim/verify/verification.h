@@ -78,6 +78,11 @@ void cav_balance_add(cav_balance *balance, const cav_verification *verification,
 /// Root mean square of the worst tree, and its worst knot.
 void cav_balance_result(const cav_balance *balance, const cav_verification *verification, cav_metric *metric);
 
+/// Depths of the contacts that the state has, which is at knot t or near it; suffix ends what is said of it. Then those
+/// along the steps between knots, which leaves the state between them. penetration.c.
+void cav_verification_penetration(const cav_verification *verification, int t, const char *suffix, cav_metric *metric);
+cav_status cav_verification_between(const cav_verification *verification, cav_metric *metric);
+
 /// Load carried across open gaps, fraction of all: value, and the largest one's knot. hover.c.
 typedef struct cav_hover cav_hover;
 cav_hover *cav_hover_new(void);

@@ -1,7 +1,7 @@
 /// Certifies a motion from its knots alone, with code apart from the optimiser's: velocities, forces and contacts are
 /// recomputed from q; what a certificate requires is measured, and the first tolerance that is broken is named with its
-/// knot, body and size. METHOD.md, 6. Momentum: momentum_balance.c; hard terms: constraint_check.c; forward simulation:
-/// replay.c. It does not decide on the cost, and it does not look between knots, except by the closed-loop replay.
+/// knot, body and size. METHOD.md, 6. Momentum: momentum_balance.c; hard terms: constraint_check.c; depths, between knots
+/// too: penetration.c; forward simulation: replay.c. It does not decide on the cost.
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -15,7 +15,7 @@ static const double loaded = 0.01;        // fraction of the weight from which o
 
 /// What was found at the knots.
 typedef struct metrics {
-  cav_metric unactuated, limit, term, penetration, defect, periodicity, hover;
+  cav_metric unactuated, limit, term, penetration, between, defect, periodicity, hover;
   double slip, load;
   cav_rates rates;
 } metrics;
@@ -55,12 +55,6 @@ const char *cav_verification_link_name(const cav_model *model, int link, char bu
 static const char *joint_name(const cav_model *model, int joint, char buffer[32]) {
   if (*model->joint[joint].name) return model->joint[joint].name;
   snprintf(buffer, 32, "joint %d", joint);
-  return buffer;
-}
-
-static const char *geom_name(const cav_model *model, int geom, char buffer[32]) {
-  if (*model->geom[geom].name) return model->geom[geom].name;
-  snprintf(buffer, 32, "geom %d", geom);
   return buffer;
 }
 
@@ -301,18 +295,6 @@ static void note_ranges(const cav_verification *verification, int t, const doubl
   }
 }
 
-// how deep
-static void note_penetration(const cav_verification *verification, int t, const char *suffix, cav_metric *metric) {
-  const cav_model *model = verification->model;
-  char name1[32], name2[32];
-  for (int i = 0; i < verification->state->ncontact; i++) {
-    const cav_contact *contact = verification->state->contact + i;
-    const cav_pair *pair = model->pair + contact->pair;
-    cav_metric_note(metric, -contact->dist, t, "%.60s in %.60s%s", geom_name(model, pair->geom2, name2),
-                    geom_name(model, pair->geom1, name1), suffix);
-  }
-}
-
 // how fast under load
 static void add_slip(const cav_verification *verification, metrics *found) {
   for (int i = 0; i < verification->state->ncontact; i++) {
@@ -338,7 +320,7 @@ static cav_status examine_image(const cav_verification *verification, int t, dou
   cav_status status = cav_inverse(model, verification->state, q, v, next, u);
   if (status != CAV_OK) return status;
   note_ranges(verification, t, q, suffix, &found->limit);
-  note_penetration(verification, t, suffix, &found->penetration);
+  cav_verification_penetration(verification, t, suffix, &found->penetration);
   if (t < verification->rows) note_forces(verification, t, v, u, control, scratch, suffix, found);
   return CAV_OK;
 }
@@ -356,7 +338,7 @@ static cav_status examine_knot(cav_verification *verification, int t, cav_balanc
   cav_status status = cav_inverse(model, verification->state, q, v, v + nv, work);
   if (status != CAV_OK) return status;
   note_ranges(verification, t, q, "", &found->limit);
-  note_penetration(verification, t, "", &found->penetration);
+  cav_verification_penetration(verification, t, "", &found->penetration);
   if (t >= verification->rows) cav_rates_add(verification, t, work + nv, &found->rates);
   if (t >= verification->rows) return CAV_OK;
   memcpy(verification->u + knot * nv, work, sizeof(double) * nv);
@@ -459,6 +441,8 @@ static void decide(const cav_verification *verification, const metrics *found, c
           "It was cut or resampled after it was solved: solve it again from there.");
   require(verdict, &found->penetration, CAV_TOLERANCE_PENETRATION, "penetration, m,",
           "A lower softness or smoothing at the end of the schedule usually helps.");
+  require(verdict, &found->between, CAV_TOLERANCE_PENETRATION, "penetration between knots, m,",
+          "A smaller time step, or a way around, usually helps.");
   require(verdict, &found->defect, CAV_TOLERANCE_MOMENTUM, "momentum defect, fraction of weight rms,",
           "The order momentum keeps it exactly; a smaller time step usually helps too.");
   const cav_metric slip = {verdict->slip_mean_m_s, -1, "mean over loaded contacts"};
@@ -499,6 +483,7 @@ static void fill(const cav_verification *verification, const metrics *found, con
   verdict->limit_violation_max = found->limit.value;
   verdict->constraint_violation_max = found->term.value;
   verdict->penetration_max_m = found->penetration.value;
+  verdict->penetration_between_m = found->between.value;
   verdict->slip_mean_m_s = found->load > 0 ? found->slip / found->load : 0;
   verdict->hover_fraction = found->hover.value;
   verdict->power_max_w = found->rates.power;
@@ -532,6 +517,7 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
   cav_term_report *report = status == CAV_OK ? calloc((size_t)problem->nterm + 1, sizeof *report) : NULL;
   if (status == CAV_OK && !report) status = CAV_NO_MEMORY;
   if (status == CAV_OK) status = examine(&verification, balance, &found, report, error);
+  if (status == CAV_OK) status = cav_verification_between(&verification, &found.between);
   if (status == CAV_OK) status = cav_replay_steps(&verification, &replay);
   if (status == CAV_OK) status = cav_replay_open(&verification, &replay);
   if (status == CAV_OK) status = cav_replay_closed(&verification, contact, gain_q, gain_v, &replay.closed);

@@ -347,6 +347,7 @@ static int better(const cav_race_report *a, const cav_race_report *b, int cheape
                               {v->limit_violation_max, w->limit_violation_max, CAV_TOLERANCE_LIMIT},
                               {v->constraint_violation_max, w->constraint_violation_max, CAV_TOLERANCE_CONSTRAINT},
                               {v->penetration_max_m, w->penetration_max_m, CAV_TOLERANCE_PENETRATION},
+                              {v->penetration_between_m, w->penetration_between_m, CAV_TOLERANCE_PENETRATION},
                               {v->momentum_defect_rms, w->momentum_defect_rms, CAV_TOLERANCE_MOMENTUM},
                               {v->replay_step_max_error, w->replay_step_max_error, CAV_TOLERANCE_STEP}};
   // what was stopped was not verified

@@ -36,6 +36,7 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
   if (v->periods > 1)
     add_number(line, &n, "end of the cycle on its start", v->periodicity_error, CAV_TOLERANCE_PERIODICITY, 1, "");
   add_number(line, &n, "penetration", v->penetration_max_m, CAV_TOLERANCE_PENETRATION, 1e3, " mm");
+  add_number(line, &n, "penetration between knots", v->penetration_between_m, CAV_TOLERANCE_PENETRATION, 1e3, " mm");
   add_number(line, &n, "slip of loaded contacts, mean", v->slip_mean_m_s, CAV_TOLERANCE_SLIP, 1e3, " mm/s");
   add_number(line, &n, "contact force across open gaps, fraction", v->hover_fraction, CAV_TOLERANCE_HOVER, 100, " %");
   add_number(line, &n, "momentum defect, rms, fraction of weight", v->momentum_defect_rms, CAV_TOLERANCE_MOMENTUM, 100,
@@ -199,6 +200,7 @@ void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdi
   write_number(out, "limit_violation_max", v->limit_violation_max);
   write_number(out, "constraint_violation_max", v->constraint_violation_max);
   write_number(out, "penetration_max_m", v->penetration_max_m);
+  write_number(out, "penetration_between_m", v->penetration_between_m);
   write_number(out, "slip_mean_m_s", v->slip_mean_m_s);
   write_number(out, "hover_fraction", v->hover_fraction);
   write_number(out, "power_max_w", v->power_max_w);
