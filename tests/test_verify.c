@@ -17,6 +17,14 @@ static const char *const resting = HEAD
     "<geom name='floor' type='plane' size='5 5 1'/><body name='ball' pos='0 0 0.1'><freejoint name='root'/>"
     "<geom name='skin' type='sphere' size='0.1' mass='2'/></body></worldbody></mujoco>";
 
+// the same on ground whose contacts in the file give way like a fall
+static const char *const yielding = HEAD
+    "<geom name='floor' type='plane' size='5 5 1' solref='10 1' solimp='0.01 0.01 0.001'/><body name='ball' pos='0 0 "
+    "0.1'><freejoint "
+    "name='root'/>"
+    "<geom name='skin' type='sphere' size='0.1' mass='2' solref='10 1' solimp='0.01 0.01 "
+    "0.001'/></body></worldbody></mujoco>";
+
 static const char *const brick = HEAD
     "<body name='brick'><freejoint name='root'/><geom type='box' size='0.1 0.2 0.3' "
     "mass='3'/></body></worldbody></mujoco>";
@@ -431,25 +439,31 @@ static void test_contact_balance(void) {
   sample_free(&s);
 }
 
-// sunk to where the contact carries the weight: everything in order but the depth
+// sunk to where the contact carries the weight
+static void sink(sample *s, double depth) {
+  cav_state *state = cav_state_new(s->model);
+  double none[6] = {0}, u[6], low = 1e-6, high = 1e6;
+  s->problem.close_at_rest = 1;
+  s->law.time_constant = 0.1;
+  s->q[2] = 0.1 - depth;
+  // softness at which the force is the weight, by bisection of its logarithm
+  for (int k = 0; k < 200; k++) {
+    s->law.softness = sqrt(low * high);
+    state->options = s->law;
+    state->options.timestep = 0.02;
+    CHECK(cav_inverse(s->model, state, s->q, none, none, u) == CAV_OK);
+    *(u[2] < 0 ? &low : &high) = s->law.softness;
+  }
+  for (int t = 0; t <= 25; t++) memcpy(knot(s, t), s->q, sizeof(double) * 7);
+  cav_state_free(state);
+}
+
+// everything in order but the depth
 static void test_penetration(void) {
   const double depth[2] = {0.002, 0.02};
   for (int i = 0; i < 2; i++) {
     sample s = sample_new(resting, 25, 0.02, CAV_ORDER_MIDPOINT);
-    cav_state *state = cav_state_new(s.model);
-    double none[6] = {0}, u[6], low = 1e-6, high = 1e6;
-    s.problem.close_at_rest = 1;
-    s.law.time_constant = 0.1;
-    s.q[2] = 0.1 - depth[i];
-    // softness at which the force is the weight, by bisection of its logarithm
-    for (int k = 0; k < 200; k++) {
-      s.law.softness = sqrt(low * high);
-      state->options = s.law;
-      state->options.timestep = 0.02;
-      CHECK(cav_inverse(s.model, state, s.q, none, none, u) == CAV_OK);
-      *(u[2] < 0 ? &low : &high) = s.law.softness;
-    }
-    for (int t = 0; t <= 25; t++) memcpy(knot(&s, t), s.q, sizeof(double) * 7);
+    sink(&s, depth[i]);
     CHECK(verify(&s, NULL, NULL) == CAV_OK);
     CHECK_NEAR(s.verdict.unactuated_force_max, 0, 1e-11);
     CHECK_NEAR(s.verdict.momentum_defect_rms, 0, 1e-11);
@@ -457,9 +471,20 @@ static void test_penetration(void) {
     CHECK_NEAR(s.verdict.slip_mean_m_s, 0, 1e-15);
     CHECK(s.verdict.certified == (i == 0));
     if (i) CHECK(strstr(s.verdict.reason, "penetration") && strstr(s.verdict.reason, "skin in floor"));
-    cav_state_free(state);
     sample_free(&s);
   }
+}
+
+// everything in order but the contacts of the model's file, which let the ball fall nearly freely: half a metre takes
+// sqrt(2 0.5 / 9.81) = 0.32 s
+static void test_own_contacts(void) {
+  sample s = sample_new(yielding, 25, 0.02, CAV_ORDER_MIDPOINT);
+  sink(&s, 0.002);
+  CHECK(verify(&s, NULL, NULL) == CAV_OK);
+  CHECK_NEAR(s.verdict.closed_loop_seconds, 0.5, 1e-12);
+  CHECK_NEAR(s.verdict.model_contacts_seconds, sqrt(1 / 9.81), 0.02);
+  CHECK(!s.verdict.certified && strstr(s.verdict.reason, "contacts of the model's file"));
+  sample_free(&s);
 }
 
 // a toe that flies along x at 4 m/s and an arm that turns at 20 rad/s, and a bar of 6 cm in the way of either, which
@@ -766,6 +791,7 @@ int main(void) {
   test_cords();
   test_contact_balance();
   test_penetration();
+  test_own_contacts();
   test_passage();
   test_hover();
   test_slip();

@@ -471,6 +471,12 @@ static void decide(const cav_verification *verification, const metrics *found, c
              "Stiffer gains, more slack in the effort limits or a slower motion usually help.",
              replay->closed.seconds, verdict->periods * verdict->duration, replay->closed.lost);
   }
+  if (*replay->own.lost && !*verdict->reason) {
+    snprintf(verdict->reason, sizeof verdict->reason,
+             "closed loop under the contacts of the model's file ends after %.3g of %.3g s: %s. "
+             "Stiffer gains, a lower softness or a slower motion usually help.",
+             replay->own.seconds, verdict->periods * verdict->duration, replay->own.lost);
+  }
   verdict->certified = !*verdict->reason;
 }
 

@@ -51,7 +51,9 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
   add(line, &n, "closed loop at a tenth of the step, until", value, limit,
       v->closed_loop_seconds >= v->periods * v->duration * (1 - 1e-9));
   add_number(line, &n, "closed loop, error at the end", v->closed_loop_end_error_m, NAN, 1e3, " mm");
-  add_number(line, &n, "the same under the model's contact parameters, until", v->model_contacts_seconds, NAN, 1, " s");
+  snprintf(value, sizeof value, "%.4g s", v->model_contacts_seconds);
+  add(line, &n, "the same under the model's contact parameters, until", value, limit,
+      v->model_contacts_seconds >= v->periods * v->duration * (1 - 1e-9));
   add_number(line, &n, "under the model's contact parameters, error at the end", v->model_contacts_end_error_m, NAN,
              1e3, " mm");
   add_number(line, &n, "open loop at the same step, largest error", v->replay_same_step_max_error, NAN, 1, "");
