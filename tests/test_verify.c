@@ -319,8 +319,14 @@ static void test_effort(void) {
     CHECK(s.verdict.certified == (i == 0));
     CHECK_NEAR(s.verdict.limit_violation_max, i ? lever * sin(1) / 2 - 1 : 0, 1e-12);
     CHECK_NEAR(s.verdict.momentum_defect_rms, 0, 1e-15);
+    CHECK_NEAR(s.verdict.feedback_effort_max, lever * sin(angle[i]) / 2, 1e-9);
     if (i) CHECK(strstr(s.verdict.reason, "limit") && strstr(s.verdict.reason, "drive"));
   }
+  // what is clipped lets it fall, and feedback asks for more the farther it is
+  double gain[25];
+  for (int t = 0; t < 25; t++) gain[t] = -1000;
+  CHECK(verify(&s, gain, NULL) == CAV_OK);
+  CHECK(s.verdict.feedback_effort_max > 5 * lever);
   sample_free(&s);
 }
 
@@ -717,6 +723,7 @@ static void test_closed_loop(void) {
   CHECK(verify(&s, NULL, NULL) == CAV_OK);
   CHECK(!s.verdict.certified && strstr(s.verdict.reason, "closed loop") && strstr(s.verdict.reason, "rod"));
   CHECK(s.verdict.closed_loop_seconds < 3);
+  CHECK(s.verdict.feedback_effort_max == 0); // the drive has no limit
   printf("inverted pendulum without gains: %.3g s\n", s.verdict.closed_loop_seconds);
   // the inverse is exact at the step of the knots: errors there grow from rounding alone
   CHECK_NEAR(s.verdict.replay_step_max_error, 0, 1e-12);

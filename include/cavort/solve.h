@@ -352,6 +352,7 @@ typedef struct cav_verdict {
       closed_loop_seconds; ///< how long the closed loop at a tenth of the step follows (all links within 0.5 m, roots 1 rad)
   double closed_loop_end_error_m;                            ///< largest distance of a body's centre of mass at the end
   double model_contacts_seconds, model_contacts_end_error_m; ///< the same under the contacts of the model's file
+  double feedback_effort_max; ///< largest effort that either closed loop asks of an actuator, over its limit, before clipping
   double
       periodicity_error; ///< cycles: how far the last knot is from the first one moved, m, rad, or their rates; else 0
   int periods;           ///< that the closed loop ran for: 1, of cycles more

@@ -261,6 +261,15 @@ static cav_options claimed_options(const cav_verification *verification, const c
   return claimed;
 }
 
+// notes the largest effort asked for, over its limit; of actuators that have one
+static void note_asked(const cav_model *model, const double *effort, struct cav_follow *follow) {
+  for (int a = 0; a < model->nu; a++) {
+    const cav_actuator *actuator = model->actuator + a;
+    if (!actuator->ctrllimited && !actuator->forcelimited && !actuator->actlimited) continue;
+    follow->asked = fmax(follow->asked, fabs(effort[a]) / cav_verification_effort_scale(model, a));
+  }
+}
+
 // the motion read at the finer step
 static cav_trajectory *finer(const cav_verification *verification) {
   cav_trajectory *motion = whole(verification), *fine = NULL;
@@ -287,6 +296,7 @@ static cav_status advance(const cav_verification *verification, simulation *s, i
   for (int d = 0; d < model->nv; d++) s->dv[d] = s->v[d] - v_ref[d];
   cav_status status = command(verification, i / SUBSTEPS, s->motion->u + i * model->nv, s->gain_q, s->gain_v, s->q,
                               s->v, s->dq, s->dv, s->control, s->next, s->u);
+  if (status == CAV_OK) note_asked(model, s->control, follow);
   if (status == CAV_OK) status = step(verification, s->state, 1e-9, s->q, s->v, s->u, s->next);
   if (status == CAV_NO_MEMORY) return status;
   if (status != CAV_OK) {

@@ -140,6 +140,7 @@ void cav_constraint_check(const cav_verification *verification, int t, double *w
 struct cav_follow {
   double seconds;
   double error;   ///< m, at its end
+  double asked;   ///< largest effort that forces and feedback ask of an actuator, over its limit, before it is clipped
   char lost[160]; ///< why it ended early, "" if it did not
 };
 

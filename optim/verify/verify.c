@@ -500,6 +500,7 @@ static void fill(const cav_verification *verification, const metrics *found, con
   verdict->replay_same_step_seconds = replay->open_seconds;
   verdict->closed_loop_seconds = replay->closed.seconds;
   verdict->closed_loop_end_error_m = replay->closed.error;
+  verdict->feedback_effort_max = fmax(replay->closed.asked, replay->own.asked);
   verdict->model_contacts_seconds = replay->own.seconds;
   verdict->model_contacts_end_error_m = replay->own.error;
   verdict->periodicity_error = found->periodicity.value;

@@ -56,6 +56,7 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
       v->model_contacts_seconds >= v->periods * v->duration * (1 - 1e-9));
   add_number(line, &n, "under the model's contact parameters, error at the end", v->model_contacts_end_error_m, NAN,
              1e3, " mm");
+  add_number(line, &n, "effort asked for in closed loop, of the limit", v->feedback_effort_max, NAN, 100, " %");
   add_number(line, &n, "open loop at the same step, largest error", v->replay_same_step_max_error, NAN, 1, "");
   add_number(line, &n, "power of an actuator, largest", v->power_max_w, NAN, 1, " W");
   add_number(line, &n, "speed of a joint, largest", v->joint_speed_max_rad_s, NAN, 1, " rad/s");
@@ -214,6 +215,7 @@ void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdi
   write_number(out, "replay_same_step_seconds", v->replay_same_step_seconds);
   write_number(out, "closed_loop_seconds", v->closed_loop_seconds);
   write_number(out, "closed_loop_end_error_m", v->closed_loop_end_error_m);
+  write_number(out, "feedback_effort_max", v->feedback_effort_max);
   write_number(out, "model_contacts_seconds", v->model_contacts_seconds);
   write_number(out, "model_contacts_end_error_m", v->model_contacts_end_error_m);
   write_number(out, "periodicity_error", v->periodicity_error);
