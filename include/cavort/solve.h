@@ -362,7 +362,7 @@ typedef struct cav_verdict {
   int achieved;         ///< every target with a tolerance is met
   int ntarget, nmissed; ///< such targets, and those missed
   char missed[240];     ///< the one missed most: name, by how much, wanted and got; "" if achieved
-  char reason[400];     ///< why not certified: the first condition missed; "" if certified
+  char reason[480];     ///< why not certified: the first condition missed; "" if certified
 } cav_verdict;
 
 /// What replay_same_step_seconds has to be, s: CAV_TOLERANCE_REPLAY, or the whole motion where that is shorter; less
