@@ -181,7 +181,7 @@ static void read_record(const study *s, cav_study_run *run) {
 
 // in the child: never returns
 static void work(const study *s, cav_study_run run) {
-  char reason[400] = "";
+  char reason[480] = "";
   cav_error error = {0};
   cav_status status = cav_study_solve(s->path[run.motion], s->line->model, &run, reason, &error);
   // a run that could not even be checked is a run that failed

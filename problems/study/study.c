@@ -128,7 +128,7 @@ static cav_status solve_by(const cav_problem *problem, const cav_strategy *strat
   return status;
 }
 
-cav_status cav_study_solve(const char *path, const char *model_path, cav_study_run *run, char reason[400],
+cav_status cav_study_solve(const char *path, const char *model_path, cav_study_run *run, char reason[480],
                            cav_error *error) {
   double begin = processor_seconds();
   cav_problem *problem = cav_problem_load(path, model_path, error);
@@ -143,7 +143,7 @@ cav_status cav_study_solve(const char *path, const char *model_path, cav_study_r
     cav_verdict verdict = {.closed_loop_end_error_m = -1};
     status = solve_by(problem, &strategy[i], run, &begin, &verdict, error);
     // of many that fail the stated one says why
-    if (i == 0 || run->certified) snprintf(reason, 400, "%s", verdict.reason);
+    if (i == 0 || run->certified) snprintf(reason, 480, "%s", verdict.reason);
   }
   run->seconds = processor_seconds() - begin;
   cav_problem_free(problem);

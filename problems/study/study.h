@@ -33,7 +33,7 @@ typedef struct cav_study_run {
 /// their range within it, the root so that what stood still stands; masses of links within 5 %; friction 0.6 to 1.
 /// Gives up after 120 s of processor time. reason: why it is not certified, "" if it is. Fails where the problem cannot
 /// be read or perturbed.
-cav_status cav_study_solve(const char *path, const char *model_path, cav_study_run *run, char reason[400],
+cav_status cav_study_solve(const char *path, const char *model_path, cav_study_run *run, char reason[480],
                            cav_error *error);
 
 /// Writes study.csv (every run), study.txt (table of motions and methods), and the fraction certified within a time as
