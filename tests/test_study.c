@@ -73,7 +73,7 @@ static void check_perturb(void) {
 
 static void check_starts(const char *problem) {
   cav_study_run run[3] = {{.start = 3}, {.start = 3}, {.start = 4}};
-  char reason[400];
+  char reason[480];
   cav_error error = {0};
   for (int i = 0; i < 3; i++) {
     CHECK(cav_study_solve(problem, NULL, &run[i], reason, &error) == CAV_OK && run[i].known);
