@@ -30,7 +30,7 @@
 
 enum {
   BLOCK = CAV_CURVATURE,
-  DEFAULT_ITERATIONS = 200,
+  DEFAULT_ITERATIONS = 100,
   SEARCH_STEPS = 60,
   STALLS = 4,
   CHANGES = 30,
@@ -640,5 +640,7 @@ cav_status cav_forward_newton(const cav_model *model, cav_state *state, const do
 
 cav_status cav_forward(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
                        double *v_next) {
-  return cav_forward_newton(model, state, q, v, u, DEFAULT_ITERATIONS, DEFAULT_TOLERANCE, v_next, NULL);
+  // followed gaps take as many again
+  const int limit = DEFAULT_ITERATIONS * (state->options.next_gap == CAV_NEXT_GAP_EXACT ? 2 : 1);
+  return cav_forward_newton(model, state, q, v, u, limit, DEFAULT_TOLERANCE, v_next, NULL);
 }
