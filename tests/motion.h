@@ -98,7 +98,9 @@ static inline cav_problem motion_window(const cav_problem *problem, const cav_tr
 /// neighbouring knots.
 static inline motion_findings motion_check_derivatives(const cav_problem *problem, const cav_trajectory *at) {
   enum { STEPS = 5, OVERLAP = 2 };
-  static const cav_ipopt_option no_iterations = {"max_iter", "0"};
+  // rounding of costs differs from step to step, a wrong derivative does not: what the checker finds it finds again
+  static const cav_ipopt_option once[] = {{"max_iter", "0"}},
+                                again[] = {{"max_iter", "0"}, {"derivative_test_perturbation", "4e-10"}};
   motion_findings found = {0};
   char log[] = "/tmp/cavort-ipopt-XXXXXX";
   int file = mkstemp(log);
@@ -110,21 +112,28 @@ static inline motion_findings motion_check_derivatives(const cav_problem *proble
     cav_problem part = motion_window(problem, at, first, last, terms);
     cav_trajectory *start = cav_trajectory_new(problem->model, last - first + 1, problem->timestep);
     cav_solve_options options = cav_solve_options_default();
-    cav_solution *solution = NULL;
-    cav_error error = {0};
     options.solver = CAV_SOLVER_IPOPT;
-    options.nipopt = 1;
-    options.ipopt = &no_iterations;
     options.ipopt_derivative_test = 1;
     options.ipopt_output = log;
     options.diagnose = 0;
     memcpy(start->q, part.q_start, (size_t)(last - first + 1) * at->nq * sizeof(double));
     memcpy(start->v, part.v_start, (size_t)at->nv * sizeof(double));
-    cav_status status = cav_solve(&part, &options, start, &solution, &error);
-    CHECK(status == CAV_OK || status == CAV_NOT_CONVERGED);
-    motion_read_log(log, &found);
+    motion_findings seen = {0};
+    for (int k = 0; k < 2 && (k == 0 || seen.errors); k++) {
+      cav_solution *solution = NULL;
+      cav_error error = {0};
+      options.nipopt = k + 1;
+      options.ipopt = k ? again : once;
+      seen = (motion_findings){0};
+      cav_status status = cav_solve(&part, &options, start, &solution, &error);
+      CHECK(status == CAV_OK || status == CAV_NOT_CONVERGED);
+      motion_read_log(log, &seen);
+      cav_solution_free(solution);
+    }
+    found.errors += seen.errors;
+    found.silent += seen.silent;
+    found.worst = fmax(found.worst, seen.worst);
     found.windows++;
-    cav_solution_free(solution);
     cav_trajectory_free(start);
   }
   unlink(log);

@@ -89,7 +89,8 @@ static void check_motion(const motion_case *c) {
 #ifdef CAVORT_HAVE_IPOPT
     motion_findings found = motion_check_derivatives(problem, s->trajectory);
     CHECK(found.windows > 0 && found.silent == 0 && found.errors == 0);
-    if (found.errors) fprintf(stderr, "    %d entries differ, the worst by %g\n", found.errors, found.worst);
+    if (found.errors)
+      fprintf(stderr, "    %s: %d entries differ, the worst by %g\n", c->motion, found.errors, found.worst);
 #endif
     // expected.json is about the problem's own model, or the one it was written for
     int record = !c->model || strcmp(c->motion, "squat-jump");

@@ -37,6 +37,7 @@ typedef struct cav_ipopt_rule {
   X(max_cpu_time, CAV_IPOPT_REAL, 0, 1e300, 1, NULL)                                       \
   X(max_iter, CAV_IPOPT_WHOLE, 0, 1e9, 0, NULL)                                            \
   X(max_soc, CAV_IPOPT_WHOLE, 0, 1e9, 0, NULL)                                             \
+  X(derivative_test_perturbation, CAV_IPOPT_REAL, 0, 1e300, 1, NULL)                       \
   X(mu_init, CAV_IPOPT_REAL, 0, 1e300, 1, NULL)                                            \
   X(mu_strategy, CAV_IPOPT_WORD, 0, 0, 0, "monotone adaptive")                             \
   X(mu_target, CAV_IPOPT_REAL, 0, 1e300, 0, NULL)                                          \

@@ -484,15 +484,15 @@ static int set_options(IpoptProblem nlp, const program *p, int iterations) {
                        : set_list(nlp, sizeof rough / sizeof *rough, rough));
   ok = ok && AddIpoptNumOption(nlp, "constr_viol_tol", o->tolerance) && AddIpoptNumOption(nlp, "mu_init", p->barrier);
   if (run->warm) ok = ok && AddIpoptStrOption(nlp, "warm_start_init_point", "yes");
-  ok = ok && set_list(nlp, run->problem->nipopt, run->problem->ipopt) && set_list(nlp, o->nipopt, o->ipopt);
-  const char *most = option_given(run, "max_iter");
-  if (iterations > 0 && !(most && atoi(most) < iterations)) ok = ok && AddIpoptIntOption(nlp, "max_iter", iterations);
   if (o->ipopt_derivative_test) {
     ok = ok && AddIpoptStrOption(nlp, "derivative_test", "first-order");
     ok = ok && AddIpoptNumOption(nlp, "point_perturbation_radius", 0) &&
          AddIpoptNumOption(nlp, "derivative_test_perturbation", test_step);
     ok = ok && AddIpoptNumOption(nlp, "derivative_test_tol", test_tolerance);
   }
+  ok = ok && set_list(nlp, run->problem->nipopt, run->problem->ipopt) && set_list(nlp, o->nipopt, o->ipopt);
+  const char *most = option_given(run, "max_iter");
+  if (iterations > 0 && !(most && atoi(most) < iterations)) ok = ok && AddIpoptIntOption(nlp, "max_iter", iterations);
   if (o->ipopt_output) ok = ok && OpenIpoptOutputFile(nlp, (char *)o->ipopt_output, 5);
   return ok;
 }
