@@ -335,12 +335,12 @@ typedef struct cav_verdict {
   int certified;
   double unactuated_force_max; ///< fraction of weight
   int unactuated_force_knot;
-  double momentum_defect_rms;      ///< fraction of weight
-  double limit_violation_max;      ///< relative to the limit (effort), rad or m (range)
-  double constraint_violation_max; ///< of the problem's hard terms, scaled
+  double momentum_defect_rms;                      ///< fraction of weight
+  double limit_violation_max;                      ///< relative to the limit (effort), rad or m (range)
+  double constraint_violation_max;                 ///< of the problem's hard terms, scaled
   double penetration_max_m, penetration_between_m; ///< at the knots; along the steps between them
-  double slip_mean_m_s;              ///< of loaded contacts, weighted by force
-  double hover_fraction;             ///< of contact force, by impulse, across gaps that stay open
+  double slip_mean_m_s;                            ///< of loaded contacts, weighted by force
+  double hover_fraction;                           ///< of contact force, by impulse, across gaps that stay open
   double power_max_w;                ///< of an actuator: mechanical, at the mean velocity of a step, either way
   double joint_speed_max_rad_s;      ///< of hinges and ball joints
   double joint_speed_over_limit;     ///< of joints whose file states a limit, the largest ratio; NaN where none does
@@ -352,7 +352,8 @@ typedef struct cav_verdict {
       closed_loop_seconds; ///< how long the closed loop at a tenth of the step follows (all links within 0.5 m, roots 1 rad)
   double closed_loop_end_error_m;                            ///< largest distance of a body's centre of mass at the end
   double model_contacts_seconds, model_contacts_end_error_m; ///< the same under the contacts of the model's file
-  double feedback_effort_max; ///< largest effort that either closed loop asks of an actuator, over its limit, before clipping
+  double
+      feedback_effort_max; ///< largest effort that either closed loop asks of an actuator, over its limit, before clipping
   double
       periodicity_error; ///< cycles: how far the last knot is from the first one moved, m, rad, or their rates; else 0
   int periods;           ///< that the closed loop ran for: 1, of cycles more
