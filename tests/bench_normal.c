@@ -1,11 +1,11 @@
 /// Factor and solution of the normal equations, as they are and by CHOLMOD on the same entries without those that are zero
 /// by structure: a motion in a band, a cycle of 60 knots, scenes with free bodies, and the same with a free duration, whose
 /// unknown meets all; the ways by turns. Time of the processor, median and quartiles; residual of the shifted equations;
-/// bits, which are checked to be the same in every turn. Usage: bench_normal [bits]: bits alone, to be compared between
-/// kinds of processors (OPENBLAS_CORETYPE)
+/// bits, which are checked to be the same in every turn and, but for CHOLMOD, by the vectors of other processors
 #include "bench.h"
 #include "continuation.h"
 #include "crowd.h"
+#include "dense.h"
 #include "sparse.h"
 #include "transcription.h"
 
@@ -77,7 +77,7 @@ static void set_groups(cav_normal *normal, const cav_transcription *tr, int apar
   normal->ntree = trees, normal->tree[1] = first;
 }
 
-static void compare(cav_normal *normal, const cav_transcription *tr, int turns, int bits_only) {
+static void compare(cav_normal *normal, const cav_transcription *tr, int turns) {
   static double time[WAYS][TURNS];
   uint64_t bits[WAYS] = {0};
   double *x = scene_vector(normal->size), off[WAYS] = {0}, begin;
@@ -106,23 +106,28 @@ static void compare(cav_normal *normal, const cav_transcription *tr, int turns, 
       CHECK(off[way] < 1e-6);
     }
   }
-  if (!bits_only)
-    printf("    %d groups of at most %d dofs, analysis by CHOLMOD %.2f ms, %d entries, %.0f in its factor\n", groups,
-           most, analysis, e.n, cav_sparse_entries(sparse));
-  if (bits_only) printf("    %-9s %016llx\n", "matrix", (unsigned long long)bits_of(e.value, e.n));
+  printf("    %d groups of at most %d dofs, analysis by CHOLMOD %.2f ms, %d entries, %.0f in its factor\n", groups,
+         most, analysis, e.n, cav_sparse_entries(sparse));
+  for (int lanes = 4; lanes >= 2; lanes /= 2)
+    for (int way = 0; way < 2; way++) {
+      cav_dense_limit_lanes(lanes);
+      set_groups(normal, tr, way);
+      CHECK(cav_normal_factor(normal, SHIFT) == CAV_OK);
+      cav_normal_solve(normal, normal->gradient, x);
+      CHECK(bits_of(x, normal->size) == bits[way]);
+    }
+  cav_dense_limit_lanes(8);
   for (int way = 0; way < WAYS; way++) {
     printf("    %-9s", way_name[way]);
-    if (!bits_only)
-      printf(" %9.3f ms (%.3f, %.3f), residual %.0e, bits", quantile(time[way], turns, 0.5),
-             quantile(time[way], turns, 0.25), quantile(time[way], turns, 0.75), off[way]);
-    printf(" %016llx\n", (unsigned long long)bits[way]);
+    printf(" %9.3f ms (%.3f, %.3f), residual %.0e, bits %016llx\n", quantile(time[way], turns, 0.5),
+           quantile(time[way], turns, 0.25), quantile(time[way], turns, 0.75), off[way], (unsigned long long)bits[way]);
   }
   cav_sparse_free(sparse);
   free(e.row), free(e.column), free(e.start), free(e.value), free(x);
 }
 
 // with so many balls, -1 for the model of the problem; free: its duration within a tenth
-static void measure(const char *path, int knots, int balls, int free_duration, int bits_only) {
+static void measure(const char *path, int knots, int balls, int free_duration) {
   cav_error error = {0};
   cav_problem *p = balls < 0 ? cav_problem_load(path, NULL, &error) : crowd_problem(path, balls, 0);
   if (!CHECK(p != NULL)) return;
@@ -140,22 +145,21 @@ static void measure(const char *path, int knots, int balls, int free_duration, i
   CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
   printf("%-12s %4d dofs %3d knots %6d unknowns%s\n", p->name, tr->nv, tr->nknot, normal->size,
          free_duration ? ", duration free" : "");
-  compare(normal, tr, bits_only ? 2 : tr->nv > 500 ? 5 : TURNS, bits_only);
+  compare(normal, tr, tr->nv > 500 ? 5 : TURNS);
   fflush(stdout);
   cav_trajectory_free(at), cav_normal_free(normal), cav_transcription_free(tr), cav_problem_free(p);
 }
 
-int main(int argc, char **argv) {
-  const int bits_only = argc > 1 && !strcmp(argv[1], "bits");
+int main(void) {
   if (!cav_sparse_available()) return printf("skipped: built without CHOLMOD\n"), CHECK_SKIPPED;
   const char *jump = CAVORT_SOURCE_ROOT "/problems/motions/squat-jump/problem.xml",
              *cycle = CAVORT_SOURCE_ROOT "/problems/motions/walk-cycle/problem.xml";
   for (int k = 0; k < 2; k++) {
-    measure(jump, 60, -1, k, bits_only);
-    measure(cycle, 60, -1, k, bits_only);
-    measure(jump, 60, 5, k, bits_only);
-    if (!bits_only) measure(jump, 60, 20, k, 0);
+    measure(jump, 60, -1, k);
+    measure(cycle, 60, -1, k);
+    measure(jump, 60, 5, k);
+    measure(jump, 60, 20, k);
   }
-  if (!bits_only) measure(jump, 4, 200, 0, 0), measure(jump, 4, 200, 1, 0);
+  measure(jump, 4, 200, 0), measure(jump, 4, 200, 1);
   return check_result();
 }

@@ -36,19 +36,8 @@ run() {
   rm "$out/$1.tmp"
 }
 
-# times and bits of the normal equations, and their bits by OpenBLAS's routines for other processors
-normal() {
-  run normal bench_normal
-  {
-    echo
-    echo "Bits by OPENBLAS_CORETYPE, of the matrix (dsyrk has a part in it) and of its solutions:"
-    for core in Haswell Zen SkylakeX Sandybridge; do
-      echo
-      echo "$core"
-      OPENBLAS_CORETYPE=$core "$build/tests/bench_normal" bits | sed '$d'
-    done
-  } >>"$out/normal.txt"
-}
+# times and bits of the normal equations
+normal() { run normal bench_normal; }
 
 # a humanoid's file with all that a scene can have and leave out: a mesh and a height field that are only seen, a constraint that
 # is switched off

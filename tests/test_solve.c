@@ -3,6 +3,7 @@
 /// checker at the solution, and a motion spoilt afterwards is not certified. Then what cav_solve guarantees: the same
 /// bits at 1 and 2 threads, an end when the observer asks with the best iterate kept, and refusal of what makes no
 /// sense.
+#include "dense.h"
 #include "motion.h"
 
 // --- expected.json: flat, one "name": number or word a line ---
@@ -117,25 +118,29 @@ static cav_problem *load_short(void) {
   return problem;
 }
 
-static void check_threads(const cav_problem *problem) {
-  cav_solution *s[2] = {NULL};
-  for (int i = 0; i < 2; i++) {
+// the same bits by one thread and two, and by the vectors of other processors
+static void check_bits(const cav_problem *problem) {
+  static const struct { int threads, lanes; } way[] = {{1, 8}, {2, 8}, {1, 4}, {2, 2}};
+  enum { WAYS = sizeof way / sizeof *way };
+  cav_solution *s[WAYS] = {NULL};
+  for (int i = 0; i < WAYS; i++) {
     cav_solve_options options = cav_solve_options_default();
-    options.threads = 1 + i;
+    options.threads = way[i].threads;
+    cav_dense_limit_lanes(way[i].lanes);
     cav_status status = cav_solve(problem, &options, NULL, &s[i], NULL);
     CHECK(s[i] && (status == CAV_OK || status == CAV_NOT_CONVERGED));
   }
-  if (s[0] && s[1]) {
-    const cav_trajectory *a = s[0]->trajectory, *b = s[1]->trajectory;
+  cav_dense_limit_lanes(8);
+  for (int i = 1; i < WAYS && s[0] && s[i]; i++) {
+    const cav_trajectory *a = s[0]->trajectory, *b = s[i]->trajectory;
     size_t gains = (size_t)(a->nknot - 1) * a->nv * a->nv;
     CHECK(!memcmp(a->q, b->q, (size_t)a->nknot * a->nq * sizeof *a->q));
     CHECK(!memcmp(a->u, b->u, (size_t)(a->nknot - 1) * a->nv * sizeof *a->u));
-    CHECK(!memcmp(s[0]->gain_q, s[1]->gain_q, gains * sizeof(double)));
-    CHECK(!memcmp(s[0]->gain_v, s[1]->gain_v, gains * sizeof(double)));
-    CHECK(s[0]->iterations == s[1]->iterations && s[0]->cost == s[1]->cost);
+    CHECK(!memcmp(s[0]->gain_q, s[i]->gain_q, gains * sizeof(double)));
+    CHECK(!memcmp(s[0]->gain_v, s[i]->gain_v, gains * sizeof(double)));
+    CHECK(s[0]->iterations == s[i]->iterations && s[0]->cost == s[i]->cost);
   }
-  cav_solution_free(s[0]);
-  cav_solution_free(s[1]);
+  for (int i = 0; i < WAYS; i++) cav_solution_free(s[i]);
 }
 
 /// What an observer sees, and after how many calls it asks for the end.
@@ -226,7 +231,7 @@ static void check_refusals(const cav_problem *problem) {
 int main(void) {
   cav_problem *problem = load_short();
   if (problem) {
-    check_threads(problem);
+    check_bits(problem);
     check_interruption(problem);
     check_refusals(problem);
   }

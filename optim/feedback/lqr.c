@@ -8,12 +8,12 @@
 /// the step later they answer again. Gains from the plan's Hessian carried motions a third as far (README.md). Does not
 /// know limits of actuators, and does not see contacts that the law at hand does not feel.
 #include "lqr.h"
-#include "lapack.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "dense.h"
 #include "rotation.h"
 #include "verification.h"
 
@@ -35,14 +35,8 @@ typedef struct regulator {
   double *dq, *dv, *dn; ///< [nv*nv] of the inverse, row-major
   double *M;            ///< [nv*nv]
   double *u;            ///< [nv]
-  int *pivot;           ///< [nv]
   void *memory;
 } regulator;
-
-static void product(char ta, int m, int n, int k, double alpha, const double *A, int lda, const double *B, int ldb,
-                    double beta, double *C, int ldc) {
-  dgemm_(&ta, "N", &m, &n, &k, &alpha, A, &lda, B, &ldb, &beta, C, &ldc);
-}
 
 static int regulator_make(regulator *r, const cav_model *model) {
   int nv = model->nv, nu = model->nu, n = 2 * nv;
@@ -50,8 +44,7 @@ static int regulator_make(regulator *r, const cav_model *model) {
   *r = (regulator){.nv = nv, .nu = nu, .n = n};
   double *m = calloc(v * u + 3 * s * s + 2 * s * u + u * u + 2 * u * s + v * (s + u) + 4 * v * v + v + 1, sizeof *m);
   r->memory = m;
-  r->pivot = malloc((v + 1) * sizeof *r->pivot);
-  if (!m || !r->pivot) return 0;
+  if (!m) return 0;
   r->force = m, m += v * u;
   r->A = m, m += s * s;
   r->P = m, m += s * s;
@@ -70,7 +63,7 @@ static int regulator_make(regulator *r, const cav_model *model) {
   return 1;
 }
 
-static void regulator_free(regulator *r) { free(r->memory), free(r->pivot); }
+static void regulator_free(regulator *r) { free(r->memory); }
 
 /// Generalised force of each actuator at its limit; moments are constant (cav_actuators_plannable).
 static cav_status find_forces(regulator *r, const cav_model *model, cav_state *state, const double *q) {
@@ -87,7 +80,7 @@ static cav_status find_forces(regulator *r, const cav_model *model, cav_state *s
 /// derivative := derivatives of v' by (q, v) and the inputs, from those of the inverse.
 static cav_status find_derivative(regulator *r, const cav_model *model, cav_state *state, const double *q,
                                   const double *v) {
-  int nv = r->nv, columns = r->n + r->nu, info = 0;
+  int nv = r->nv, columns = r->n + r->nu;
   const double *next = v + nv;
   cav_status status = cav_inverse(model, state, q, v, next, r->u);
   if (status == CAV_OK) status = cav_derivatives(model, state, r->dq, r->dv, r->dn);
@@ -102,8 +95,7 @@ static cav_status find_derivative(regulator *r, const cav_model *model, cav_stat
       r->derivative[(nv + j) * nv + i] = -r->dv[i * nv + j];
     }
   memcpy(r->derivative + (size_t)r->n * nv, r->force, (size_t)nv * r->nu * sizeof(double));
-  dgesv_(&nv, &columns, system, &nv, r->pivot, r->derivative, &nv, &info);
-  return info ? CAV_NOT_CONVERGED : CAV_OK;
+  return cav_dense_solve_general(nv, system, nv, columns, r->derivative, nv) ? CAV_OK : CAV_NOT_CONVERGED;
 }
 
 /// Three rows of dq' for a rotation over phi: Exp(-phi) dq + h Jr(phi) dv'.
@@ -150,15 +142,20 @@ static void add_penalty(regulator *r, double scale) {
 
 /// One step back: K, and P of the step before without the penalty on its state. H is there already.
 static cav_status riccati(regulator *r) {
-  int n = r->n, nu = r->nu, info = 0;
-  product('N', n, n, n, 1, r->P, n, r->A, n, 0, r->PA, n);
-  product('T', n, n, n, 1, r->A, n, r->PA, n, 0, r->P, n);
+  int n = r->n, nu = r->nu;
+  size_t square = (size_t)n * (size_t)n * sizeof(double), wide = (size_t)nu * (size_t)n * sizeof(double);
+  memset(r->PA, 0, square);
+  cav_dense_product(n, n, n, 1, r->P, n, r->A, n, r->PA, n);
+  memset(r->P, 0, square);
+  cav_dense_product_transposed(CAV_PART_ALL, n, n, n, 1, r->A, n, r->PA, n, r->P, n);
   if (nu > 0) {
-    product('T', nu, n, n, 1, r->B, n, r->PA, n, 0, r->G, nu);
-    memcpy(r->K, r->G, (size_t)nu * n * sizeof(double));
-    dposv_("L", &nu, &n, r->H, &nu, r->K, &nu, &info);
-    if (info) return CAV_NOT_CONVERGED;
-    product('T', n, n, nu, -1, r->G, nu, r->K, nu, 1, r->P, n);
+    memset(r->G, 0, wide);
+    cav_dense_product_transposed(CAV_PART_ALL, nu, n, n, 1, r->B, n, r->PA, n, r->G, nu);
+    memcpy(r->K, r->G, wide);
+    if (!cav_dense_factor(nu, nu - 1, r->H, nu)) return CAV_NOT_CONVERGED;
+    cav_dense_solve_lower(nu, nu - 1, r->H, nu, n, r->K, nu);
+    cav_dense_solve_upper(nu, nu - 1, r->H, nu, n, r->K, nu);
+    cav_dense_product_transposed(CAV_PART_ALL, n, n, nu, -1, r->G, nu, r->K, nu, r->P, n);
   }
   for (int i = 0; i < n; i++)
     for (int j = 0; j < i; j++) {
@@ -172,8 +169,10 @@ static cav_status riccati(regulator *r) {
 static void penalty_inputs(regulator *r) {
   int n = r->n, nu = r->nu;
   if (nu == 0) return;
-  product('N', n, nu, n, 1, r->P, n, r->B, n, 0, r->PB, n);
-  product('T', nu, nu, n, 1, r->B, n, r->PB, n, 0, r->H, nu);
+  memset(r->PB, 0, (size_t)n * (size_t)nu * sizeof(double));
+  memset(r->H, 0, (size_t)nu * (size_t)nu * sizeof(double));
+  cav_dense_product(n, nu, n, 1, r->P, n, r->B, n, r->PB, n);
+  cav_dense_product_transposed(CAV_PART_ALL, nu, nu, n, 1, r->B, n, r->PB, n, r->H, nu);
   for (int i = 0; i < nu; i++) r->H[i * nu + i] += r->h;
 }
 

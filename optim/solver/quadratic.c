@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "lapack.h"
+#include "dense.h"
 
 /// Iterations at most; part of the way to the boundary that a step goes; fraction of the cost that the gap
 /// starts with, and with what it starts again.
@@ -323,8 +323,7 @@ static void weigh_rows(cav_quadratic *p, int t, double *step_row, double *step_s
     for (int k = 0; k < width; k++) step_row[k] += w * knot->slot_step[i] * row[k];
     *step_square += w * knot->slot_step[i] * knot->slot_step[i];
   }
-  double one = 1;
-  if (ndense) dsyrk_("U", "N", &width, &ndense, &one, p->dense, &width, &one, p->block, &width);
+  cav_dense_square(width, ndense, p->dense, width, p->block, width);
 }
 
 /// Gathers the costs' Hessian with weighted rows.

@@ -1,10 +1,11 @@
-/// Joins the dense rows of a knot into its Hessian, H += R'R (BLAS's dsyrk). Trees that no row joins make blocks of
+/// Joins the dense rows of a knot into its Hessian, H += R'R (cav_dense_square). Trees that no row joins make blocks of
 /// their own: which is read off the zeros of the rows, so bodies that touch nothing cost their own small products. One
 /// group gives the product of all.
 #include <stdlib.h>
 #include <string.h>
 
-#include "lapack.h"
+#include "dense.h"
+#include "readings.h"
 #include "transcription.h"
 
 /// Groups of trees: all by dof, and what is grown for them.
@@ -63,7 +64,7 @@ static void copy_block(const join *g, int n, double *hessian, double *H, int bac
 /// One group's part of the product, through room for its rows and block.
 static void join_group(join *g, int first, cav_knot *knot, double *room) {
   int width = list_columns(g, first), count = 0;
-  double one = 1, *block = room, *row = room + (size_t)width * (size_t)width;
+  double *block = room, *row = room + (size_t)width * (size_t)width;
   for (int i = 0; i < knot->ndense; i++) {
     if (g->group[i] < 0 || representative(g, g->group[i]) != first) continue;
     const double *from = knot->dense + (size_t)i * 3 * (size_t)g->nv;
@@ -72,35 +73,34 @@ static void join_group(join *g, int first, cav_knot *knot, double *room) {
   }
   if (count == 0) return;
   copy_block(g, width, knot->hessian, block, 0);
-  dsyrk_("U", "N", &width, &count, &one, row, &width, &one, block, &width);
+  cav_dense_square(width, count, row, width, block, width);
   copy_block(g, width, knot->hessian, block, 1);
 }
 
-cav_status cav_rows_join(cav_transcription *tr, cav_knot *knot) {
+cav_status cav_rows_join(const cav_transcription *tr, cav_scratch *s, cav_knot *knot) {
   int width = 3 * tr->nv, n = knot->ndense;
-  double one = 1;
   int trees = 0;
   for (int d = 0; d < tr->nv; d++) trees += tr->model->dof[d].parent < 0;
   if (n == 0) return CAV_OK;
   if (trees == 1) {
-    dsyrk_("U", "N", &width, &n, &one, knot->dense, &width, &one, knot->hessian, &width);
+    cav_dense_square(width, n, knot->dense, width, knot->hessian, width);
     return CAV_OK;
   }
   size_t nv = (size_t)tr->nv, ints = 5 * nv + (size_t)n, dense = 9 * nv * nv + 3 * nv * (size_t)n;
-  if (ints / 2 + 1 + dense > tr->join_room) {
-    free(tr->join);
-    tr->join_room = ints / 2 + 1 + dense;
-    tr->join = malloc(tr->join_room * sizeof(double));
-    if (!tr->join) return tr->join_room = 0, CAV_NO_MEMORY;
+  if (ints / 2 + 1 + dense > s->join_room) {
+    free(s->join);
+    s->join_room = ints / 2 + 1 + dense;
+    s->join = malloc(s->join_room * sizeof(double));
+    if (!s->join) return s->join_room = 0, CAV_NO_MEMORY;
   }
-  int *at = (int *)(tr->join + dense);
+  int *at = (int *)(s->join + dense);
   join g = {.nv = tr->nv, .tree = at, .owner = at + nv, .column = at + 2 * nv, .group = at + 5 * nv};
   find_groups(&g, tr->model, n, knot->dense);
   if (g.ngroup == 1) {
-    dsyrk_("U", "N", &width, &n, &one, knot->dense, &width, &one, knot->hessian, &width);
+    cav_dense_square(width, n, knot->dense, width, knot->hessian, width);
     return CAV_OK;
   }
   for (int d = 0; d < tr->nv; d++)
-    if (g.tree[d] == d && g.owner[d] == d) join_group(&g, d, knot, tr->join);
+    if (g.tree[d] == d && g.owner[d] == d) join_group(&g, d, knot, s->join);
   return CAV_OK;
 }

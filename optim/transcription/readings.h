@@ -29,6 +29,8 @@ typedef struct cav_scratch {
   double *derivative; ///< [CAV_DERIVATIVE_ROWS*nv] derivatives of one contact or sensor
   int differenced;    ///< calls in which differences stood in for analytic derivatives
   double seconds;
+  double *join; ///< room of join.c
+  size_t join_room;
 } cav_scratch;
 
 /// Lists the contacts that carry load at the state and makes room for all readings of knot t; 0 if memory runs out.

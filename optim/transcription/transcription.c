@@ -257,7 +257,7 @@ void cav_transcription_free(cav_transcription *tr) {
   for (int i = 0; tr->scratch && i < cav_parallel_size(tr->pool); i++) {
     cav_scratch *s = &tr->scratch[i];
     cav_state_free(s->state);
-    free(s->value), free(s->dq), free(s->dv), free(s->dn), free(s->key), free(s->derivative);
+    free(s->value), free(s->join), free(s->dq), free(s->dv), free(s->dn), free(s->key), free(s->derivative);
     free(s->force_weight), free(s->force_derivative), free(s->row), free(s->column), free(s->tangent), free(s->posture);
     free(s->force_step), free(s->rate), free(s->trace[0]), free(s->trace[1]), free(s->slot[0]), free(s->slot[1]);
   }
@@ -267,7 +267,7 @@ void cav_transcription_free(cav_transcription *tr) {
   free(tr->servo), free(tr->limited);
   free(tr->unactuated), free(tr->effort), free(tr->effort_range), free(tr->effort_unit), free(tr->rotation_dof),
       free(tr->rotation_of);
-  free(tr->knot), free(tr->status), free(tr->join), free(tr->scratch), free(tr->before), free(tr->rotation_after);
+  free(tr->knot), free(tr->status), free(tr->scratch), free(tr->before), free(tr->rotation_after);
   cav_periodicity_free(tr->periodicity);
   cav_parallel_free(tr->pool);
   free(tr);
@@ -335,13 +335,6 @@ void cav_transcription_chain(const cav_transcription *tr, int t, int n, const do
 }
 
 // ---------------------------------------------------------------- evaluation
-
-/// Joins the dense rows of all knots into their Hessians. One thread only: not every BLAS may be called by two at once.
-static cav_status join_rows(cav_transcription *tr) {
-  cav_status status = CAV_OK;
-  for (int t = 0; t < tr->nknot && status == CAV_OK; t++) status = cav_rows_join(tr, &tr->knot[t]);
-  return status;
-}
 
 typedef struct pass {
   cav_transcription *tr;
@@ -443,7 +436,8 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   cav_sum a = {.tr = tr, .s = s, .knot = knot, .t = t, .jacobian = p->jacobian};
   cav_knot_sum(&a, q, v, v_next);
   if (p->jacobian && tr->periodicity && (t < 2 || t == tr->nknot - 1)) periodicity_knot(tr, s, t);
-  return isfinite(knot->merit) ? CAV_OK : CAV_NOT_FINITE;
+  if (!isfinite(knot->merit)) return CAV_NOT_FINITE;
+  return p->jacobian && !tr->gradient_only ? cav_rows_join(tr, s, knot) : CAV_OK;
 }
 
 static void evaluate_item(void *context, int t, int member) {
@@ -493,7 +487,6 @@ static cav_status evaluate(cav_transcription *tr, cav_trajectory *at, int jacobi
   pass p = {tr, at, jacobian, status};
   cav_parallel_for(tr->pool, tr->nknot, evaluate_item, &p);
   for (int t = 0; t < tr->nknot && result == CAV_OK; t++) result = status[t];
-  if (jacobian && result == CAV_OK && !tr->gradient_only) result = join_rows(tr);
   for (int i = 0; i < members; i++) dynamics += tr->scratch[i].seconds / members;
   tr->seconds_dynamics += dynamics;
   tr->seconds_assembly += now() - start - dynamics;

@@ -114,8 +114,6 @@ typedef struct cav_transcription {
   struct cav_scratch *scratch; ///< one a thread
   cav_parallel *pool;
   cav_status *status; ///< [nknot] of an evaluation
-  double *join;       ///< room of join.c
-  size_t join_room;
   double seconds_dynamics, seconds_assembly;
 } cav_transcription;
 
@@ -153,8 +151,8 @@ cav_status cav_transcription_values(cav_transcription *transcription, cav_trajec
 /// Values and derivatives: du, dy, hessian and gradient of the merit of every knot.
 cav_status cav_transcription_linearise(cav_transcription *transcription, cav_trajectory *trajectory);
 
-/// Adds the product of a knot's dense rows to its Hessian. One thread only. join.c. CAV_NO_MEMORY.
-cav_status cav_rows_join(cav_transcription *transcription, cav_knot *knot);
+/// Adds the product of a knot's dense rows to its Hessian, by this thread's room. join.c. CAV_NO_MEMORY.
+cav_status cav_rows_join(const cav_transcription *transcription, struct cav_scratch *scratch, cav_knot *knot);
 
 /// Chains rows [n*3nv] over (q_t, v_t, v_{t+1}) to rows over the three neighbouring knots, at the last linearisation.
 void cav_transcription_chain(const cav_transcription *transcription, int t, int n, const double *row, double *out);

@@ -1,0 +1,37 @@
+/// Products and factors of dense matrices and bands with one order of operations on every processor: wider vectors compute more
+/// entries at once, never another sum. Matrices by columns, entry (i, j) of A at A[i + j * lda]. Nothing is allocated.
+#ifndef CAVORT_DENSE_H
+#define CAVORT_DENSE_H
+
+/// Which entries of a product are added; the others of C stay.
+typedef enum cav_part { CAV_PART_ALL, CAV_PART_LOWER, CAV_PART_UPPER } cav_part;
+
+/// C += sign * A B: A [m*k], B [k*n], C [m*n].
+void cav_dense_product(int m, int n, int k, double sign, const double *A, int lda, const double *B, int ldb, double *C,
+                       int ldc);
+
+/// C += sign * A' B, or the part of it: A [k*m], B [k*n], C [m*n].
+void cav_dense_product_transposed(cav_part part, int m, int n, int k, double sign, const double *A, int lda,
+                                  const double *B, int ldb, double *C, int ldc);
+
+/// Upper triangle of C += A A': A [n*k], C [n*n].
+void cav_dense_square(int n, int k, const double *A, int lda, double *C, int ldc);
+
+/// Cholesky factor L of the lower triangle of A [n*n] in its place. Entries further than `below` under the diagonal are zero and
+/// are not touched: a band keeps its columns at a distance of `below` + 1, which is lda = below. Zero if a pivot is not
+/// positive.
+int cav_dense_factor(int n, int below, double *A, int lda);
+
+/// X := L^-1 X for X [n*m], L as cav_dense_factor left it.
+void cav_dense_solve_lower(int n, int below, const double *L, int lda, int m, double *X, int ldx);
+
+/// X := L'^-1 X.
+void cav_dense_solve_upper(int n, int below, const double *L, int lda, int m, double *X, int ldx);
+
+/// X := A^-1 X for X [n*m] by rows exchanged; A becomes its factors. Zero if A is singular.
+int cav_dense_solve_general(int n, double *A, int lda, int m, double *X, int ldx);
+
+/// For tests: no vectors longer than so many numbers from now on (8, 4 or 2). The results are the same.
+void cav_dense_limit_lanes(int lanes);
+
+#endif

@@ -1,0 +1,139 @@
+/// Dense products and factors: against sums in extended precision, and the same bits by vectors of every length.
+#include "dense.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cavort/cavort.h"
+#include "check.h"
+
+enum { MOST = 150 };
+
+static unsigned seed = 1;
+static double number(void) {
+  seed = seed * 1664525u + 1013904223u;
+  return (double)(seed >> 8) / (1 << 24) - 0.5;
+}
+
+static double *numbers(size_t n) {
+  double *x = malloc((n + 1) * sizeof *x);
+  CHECK(x != NULL);
+  for (size_t i = 0; x && i < n; i++) x[i] = number();
+  return x;
+}
+
+/// The largest difference of C - C0 from sign * sum over k of A(i, k) B(k, j), within the part; elsewhere C is C0.
+static double product_error(cav_part part, int m, int n, int k, double sign, const double *A, int ai, int ak,
+                            const double *B, int bk, int bj, const double *C0, const double *C, int ldc) {
+  double worst = 0;
+  for (int j = 0; j < n; j++)
+    for (int i = 0; i < m; i++) {
+      long double sum = C0[i + j * ldc];
+      if (part == CAV_PART_ALL || (part == CAV_PART_LOWER ? i >= j : i <= j))
+        for (int p = 0; p < k; p++)
+          sum += (long double)sign * (long double)A[i * ai + p * ak] * (long double)B[p * bk + j * bj];
+      worst = fmax(worst, fabs((double)(sum - C[i + j * ldc])));
+    }
+  return worst;
+}
+
+/// Products of a size, by vectors of every length.
+static void check_products(int m, int n, int k) {
+  int ld = 4 + (m > k ? m : k), ldb = k + 3, ldc = (m > n ? m : n) + 2;
+  double *A = numbers((size_t)ld * (size_t)(m > k ? m : k)), *B = numbers((size_t)ldb * (size_t)(n > k ? n : k));
+  double *C0 = numbers((size_t)ldc * (size_t)(m > n ? m : n)), *C = numbers((size_t)ldc * (size_t)(m > n ? m : n));
+  double *kept = numbers((size_t)ldc * (size_t)(m > n ? m : n));
+  size_t bytes = (size_t)ldc * (size_t)(m > n ? m : n) * sizeof(double);
+  for (int what = 0; what < 3; what++)
+    for (int lanes = 8; lanes >= 2; lanes /= 2) {
+      double worst;
+      cav_dense_limit_lanes(lanes);
+      memcpy(C, C0, bytes);
+      if (what == 0) {
+        cav_dense_product(m, n, k, -1, A, ld, B, ldb, C, ldc);
+        worst = product_error(CAV_PART_ALL, m, n, k, -1, A, 1, ld, B, 1, ldb, C0, C, ldc);
+      } else if (what == 1) {
+        cav_dense_product_transposed(CAV_PART_LOWER, m, n, k, 1, A, ld, B, ldb, C, ldc);
+        worst = product_error(CAV_PART_LOWER, m, n, k, 1, A, ld, 1, B, 1, ldb, C0, C, ldc);
+      } else {
+        cav_dense_square(m, k, A, ld, C, ldc);
+        worst = product_error(CAV_PART_UPPER, m, m, k, 1, A, 1, ld, A, ld, 1, C0, C, ldc);
+      }
+      CHECK(worst < 1e-15 * (k + 4));
+      if (lanes == 8) memcpy(kept, C, bytes);
+      CHECK(memcmp(kept, C, bytes) == 0);
+    }
+  free(A), free(B), free(C0), free(C), free(kept);
+}
+
+/// A band is factored and solved with; its entries out of the band hold what must not be read.
+static void check_band(int n, int below, int dense, int m) {
+  int lda = dense ? n : below;
+  size_t entries = (size_t)(below + 1) * (size_t)n + (size_t)n * (size_t)lda;
+  double *A = malloc((entries + 1) * sizeof *A), *L = malloc((entries + 1) * sizeof *L);
+  double *x = numbers((size_t)n * (size_t)m), *b = calloc((size_t)n * (size_t)m + 1, sizeof *b),
+         *first = numbers((size_t)n * (size_t)m);
+  for (size_t i = 0; i < entries; i++) A[i] = dense ? NAN : 0;
+  for (int j = 0; j < n; j++)
+    for (int i = j; i < n && i <= j + below; i++)
+      A[(size_t)i + (size_t)j * (size_t)lda] = i == j ? 1 + below : number();
+  for (int r = 0; r < m; r++)
+    for (int j = 0; j < n; j++)
+      for (int i = j; i < n && i <= j + below; i++) {
+        double a = A[(size_t)i + (size_t)j * (size_t)lda];
+        b[i + r * n] += a * x[j + r * n];
+        if (i != j) b[j + r * n] += a * x[i + r * n];
+      }
+  for (int lanes = 8; lanes >= 2; lanes /= 2) {
+    cav_dense_limit_lanes(lanes);
+    memcpy(L, A, entries * sizeof *A);
+    double *y = malloc(((size_t)n * (size_t)m + 1) * sizeof *y), worst = 0;
+    memcpy(y, b, (size_t)n * (size_t)m * sizeof *y);
+    CHECK(cav_dense_factor(n, below, L, lda));
+    cav_dense_solve_lower(n, below, L, lda, m, y, n);
+    cav_dense_solve_upper(n, below, L, lda, m, y, n);
+    for (int i = 0; i < n * m; i++) worst = fmax(worst, fabs(y[i] - x[i]));
+    CHECK(worst < 1e-13);
+    if (lanes == 8) memcpy(first, y, (size_t)n * (size_t)m * sizeof *y);
+    CHECK(memcmp(first, y, (size_t)n * (size_t)m * sizeof *y) == 0);
+    free(y);
+  }
+  // not positive definite
+  memcpy(L, A, entries * sizeof *A);
+  L[(size_t)(n - 1) * (size_t)(lda + 1)] = -1;
+  CHECK(!cav_dense_factor(n, below, L, lda));
+  free(A), free(L), free(x), free(b), free(first);
+}
+
+/// A general matrix; a zero on the diagonal asks for exchanges.
+static void check_general(int n, int m) {
+  double *A = numbers((size_t)n * (size_t)n), *F = numbers((size_t)n * (size_t)n), *x = numbers((size_t)n * (size_t)m);
+  double *b = calloc((size_t)n * (size_t)m + 1, sizeof *b), worst = 0;
+  if (n > 1) A[0] = 0;
+  memcpy(F, A, (size_t)n * (size_t)n * sizeof *A);
+  cav_dense_product(n, m, n, 1, A, n, x, n, b, n);
+  CHECK(cav_dense_solve_general(n, F, n, m, b, n));
+  for (int i = 0; i < n * m; i++) worst = fmax(worst, fabs(b[i] - x[i]));
+  CHECK(worst < 1e-10);
+  for (int i = 0; i < n; i++) A[i * n] = 0;
+  CHECK(!cav_dense_solve_general(n, A, n, m, b, n));
+  free(A), free(F), free(x), free(b);
+}
+
+int main(void) {
+  static const int size[] = {1, 2, 7, 8, 16, 17, 31, 81, MOST};
+  enum { SIZES = sizeof size / sizeof *size };
+  for (int a = 0; a < SIZES; a++)
+    for (int b = 0; b < SIZES; b++) check_products(size[a], size[b], size[(a + b) % SIZES]);
+  check_products(20, 20, 300);
+  check_products(9, 5, 0);
+  for (int a = 0; a < SIZES; a++)
+    for (int b = 0; b < SIZES; b++) {
+      if (size[b] <= size[a]) check_band(size[a], size[b] - 1, 0, 1 + 3 * (b % 3));
+      check_band(size[a], size[a] - 1, 1, 1 + b);
+    }
+  check_band(500, 80, 0, 9);
+  for (int a = 0; a < SIZES; a++) check_general(size[a], 1 + a);
+  return check_result();
+}
