@@ -9,6 +9,7 @@ cd "$(dirname "$0")/.." || exit 1
 
 out=${CAVORT_BUILD:-build-ci}
 mkdir -p "$out" && out=$(cd "$out" && pwd) || exit 1
+rm -f "$out/failures.txt"
 passed=0
 failed=0
 skipped=0
@@ -44,6 +45,7 @@ build() {
 # tests NAME: the tests of one build, each counted
 tests() {
   folder=$out/$1
+  start=$(date +%s)
   shift
   meson test -C "$folder" --no-rebuild --print-errorlogs "$@" >"$folder/tests.log" 2>&1
   status=$?
@@ -57,12 +59,29 @@ tests() {
   passed=$((passed + good))
   failed=$((failed + bad))
   skipped=$((skipped + ${left:-0}))
+  took=$(($(date +%s) - start))
   if [ "$bad" -eq 0 ]; then
-    grep -E '^ *[0-9]+/[0-9]+ ' "$folder/tests.log" | sed 's/^/    /'
+    echo "ok       $good tests of this build ($took s)"
   else
-    echo "FAILED   $bad of the tests of this build"
-    tail -n 200 "$folder/tests.log" | sed 's/^/    /'
+    echo "FAILED   $bad of $((good + bad)) tests of this build ($took s), what they printed is below"
+    failures "$folder" >>"$out/failures.txt"
   fi
+}
+
+# failures FOLDER: name and last words of each test of a build that did not pass
+failures() {
+  python3 - "$1/meson-logs/testlog.json" <<'TEXT'
+import json, sys
+for line in open(sys.argv[1]):
+    test = json.loads(line)
+    if test['result'] in ('OK', 'SKIP', 'EXPECTEDFAIL'):
+        continue
+    print('%s: %s, exit status %s: %s' % (test['result'], test['name'], test['returncode'], ' '.join(test['command'])))
+    words = (test.get('stdout', '') + test.get('stderr', '')).splitlines()
+    told = [word for word in words if 'failed:' in word or 'ERROR' in word]
+    for word in told[:20] + ['...'] + words[-20:]:
+        print('    ' + word[:300])
+TEXT
 }
 
 # every public header compiles on its own
@@ -125,6 +144,7 @@ else
   failed=1
 fi
 
+[ -s "$out/failures.txt" ] && cat "$out/failures.txt"
 [ "$skipped" -gt 0 ] && echo "$skipped skipped"
 echo "$passed passed, $failed failed"
 [ "$failed" -eq 0 ] && [ "$passed" -gt 0 ]
