@@ -50,17 +50,26 @@ typedef struct motion_findings {
   int windows, silent; ///< silent: runs in which the checker did not report at all
   int errors;
   double worst;
+  char name[64][64]; ///< of the first entries
 } motion_findings;
+enum { MOTION_NAMES = sizeof((motion_findings *)NULL)->name / sizeof *((motion_findings *)NULL)->name };
 
-// reads Ipopt's log: each entry that differs has a line "* ... [ error]", and the checker ends with a word of its own
-static inline void motion_read_log(const char *path, motion_findings *found) {
+// reads Ipopt's log: each entry that differs has a line "* name = ... [ error]", and the checker ends with a word of
+// its own. Counted are entries among those that the run before found, where there was one and it kept all their names
+static inline void motion_read_log(const char *path, const motion_findings *before, motion_findings *found) {
   char line[512];
   FILE *file = fopen(path, "r");
   int spoke = 0;
   while (file && fgets(line, sizeof line, file)) {
-    const char *bracket = strrchr(line, '[');
+    const char *bracket = strrchr(line, '['), *equals = strchr(line, '=');
     spoke |= strstr(line, "No errors detected by derivative checker") || strstr(line, "Derivative checker detected");
-    if (line[0] != '*' || !bracket) continue;
+    if (line[0] != '*' || !bracket || !equals) continue;
+    char name[64];
+    snprintf(name, sizeof name, "%.*s", (int)(equals - line), line);
+    int known = !before || before->errors > MOTION_NAMES;
+    for (int i = 0; !known && i < before->errors; i++) known = !strcmp(name, before->name[i]);
+    if (!known) continue;
+    if (found->errors < MOTION_NAMES) memcpy(found->name[found->errors], name, sizeof name);
     found->errors++;
     found->worst = fmax(found->worst, strtod(bracket + 1, NULL));
   }
@@ -98,7 +107,8 @@ static inline cav_problem motion_window(const cav_problem *problem, const cav_tr
 /// neighbouring knots.
 static inline motion_findings motion_check_derivatives(const cav_problem *problem, const cav_trajectory *at) {
   enum { STEPS = 5, OVERLAP = 2 };
-  // what curvature or rounding shows at one step is gone at another, a wrong derivative is not: all is found again
+  // what rounding or curvature shows at one step is gone at another, a wrong derivative is not: an entry counts that is
+  // found at both
   static const cav_ipopt_option once[] = {{"max_iter", "0"}},
                                 again[] = {{"max_iter", "0"}, {"derivative_test_perturbation", "1e-10"}};
   motion_findings found = {0};
@@ -118,16 +128,17 @@ static inline motion_findings motion_check_derivatives(const cav_problem *proble
     options.diagnose = 0;
     memcpy(start->q, part.q_start, (size_t)(last - first + 1) * at->nq * sizeof(double));
     memcpy(start->v, part.v_start, (size_t)at->nv * sizeof(double));
-    motion_findings seen = {0};
+    motion_findings seen = {0}, before;
     for (int k = 0; k < 2 && (k == 0 || seen.errors); k++) {
       cav_solution *solution = NULL;
       cav_error error = {0};
       options.nipopt = k + 1;
       options.ipopt = k ? again : once;
+      before = seen;
       seen = (motion_findings){0};
       cav_status status = cav_solve(&part, &options, start, &solution, &error);
       CHECK(status == CAV_OK || status == CAV_NOT_CONVERGED);
-      motion_read_log(log, &seen);
+      motion_read_log(log, k ? &before : NULL, &seen);
       cav_solution_free(solution);
     }
     found.errors += seen.errors;

@@ -241,7 +241,7 @@ static void check_derivatives(const cav_problem *p, const cav_trajectory *at) {
   options.diagnose = 0;
   cav_status status = cav_solve(p, &options, at, &solution, NULL);
   CHECK(status == CAV_OK || status == CAV_NOT_CONVERGED);
-  motion_read_log(log, &found);
+  motion_read_log(log, NULL, &found);
   CHECK(found.silent == 0 && found.errors == 0);
   if (found.errors) fprintf(stderr, "    %d entries differ, the worst by %g\n", found.errors, found.worst);
   cav_solution_free(solution);

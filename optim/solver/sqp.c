@@ -398,12 +398,11 @@ static cav_status settle_rows(cav_solve_run *run, descent *d) {
       }
     cav_quadratic_correct(d->qp, d->offset, d->x);
     cav_transcription_move(tr, run->at, d->x, run->spare);
-    status = cav_transcription_values(tr, run->spare);
-    if (status == CAV_OK && fmax(cav_transcription_unactuated(tr, NULL), cav_transcription_violation(tr)) < is) {
-      exchange(&run->at, &run->spare);
-    } else if (status == CAV_OK) {
-      status = cav_transcription_values(tr, run->at);
-    }
+    double merit;
+    status = try_at(run, d, run->spare, &merit);
+    int nearer = isfinite(merit) && fmax(cav_transcription_unactuated(tr, NULL), cav_transcription_violation(tr)) < is;
+    if (nearer) exchange(&run->at, &run->spare);
+    if (!nearer && status == CAV_OK) status = cav_transcription_values(tr, run->at);
   }
   return status;
 }
