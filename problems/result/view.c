@@ -11,31 +11,16 @@
 #include <string.h>
 
 #include "file.h"
+#include "utf8.h"
 #include "viewer_page.h"
 
 // --- JSON ---
-
-// length of the UTF-8 sequence at s, 0 if it is not one
-static int utf8_length(const unsigned char *s) {
-  int n = s[0] < 0x80                   ? 1
-          : s[0] >= 0xC2 && s[0] < 0xE0 ? 2
-          : (s[0] & 0xF0) == 0xE0       ? 3
-          : s[0] >= 0xF0 && s[0] < 0xF5 ? 4
-                                        : 0;
-  for (int i = 1; i < n; i++) {
-    if ((s[i] & 0xC0) != 0x80) return 0;
-  }
-  // overlong forms, surrogates and what lies beyond Unicode
-  if (n == 3 && ((s[0] == 0xE0 && s[1] < 0xA0) || (s[0] == 0xED && s[1] >= 0xA0))) return 0;
-  if (n == 4 && ((s[0] == 0xF0 && s[1] < 0x90) || (s[0] == 0xF4 && s[1] >= 0x90))) return 0;
-  return n;
-}
 
 // a string of JSON that is safe inside a script element too: '<', '>' and '&' never appear as themselves
 static void write_string(FILE *out, const char *text) {
   putc('"', out);
   for (const unsigned char *s = (const unsigned char *)(text ? text : ""); *s;) {
-    int n = utf8_length(s);
+    int n = cav_utf8_length(s);
     if (n == 0) {
       fputs("\\ufffd", out);
       s++;
