@@ -328,11 +328,20 @@ static cav_status solve_hessian(newton *s, const int *local, int begin) {
   return status;
 }
 
+// least point of the potential of an island that nothing touches: one step from the anchor
+static cav_status fall(newton *s) {
+  for (int e = 0; e < s->ndof; e++) s->step[s->dof[e]] = -s->base[s->dof[e]];
+  const cav_status status = solve_hessian(s, NULL, 0);
+  for (int e = 0; e < s->ndof && status == CAV_OK; e++) s->x[s->dof[e]] += s->step[s->dof[e]];
+  return status;
+}
+
 // minimises the potential of the island in hand by at most limit iterations; taken counts them
 static cav_status solve_island(newton *s, const int *local, double tolerance, double scale, int limit, int *taken) {
   const cav_impulse *p = &s->part;
   double before = INFINITY; // largest gradient at the last iterate
-  *taken = 0;
+  *taken = p->nblock == 0 && limit > 0;
+  if (p->nblock == 0) return *taken ? fall(s) : CAV_OK;
   choose_start(s);
   for (int first = 1; *taken < limit; first = 0) {
     cav_impulse_rows(p, s->x, s->y);
@@ -360,7 +369,13 @@ static cav_status solve_island(newton *s, const int *local, double tolerance, do
 static cav_status solve_convex(newton *s, double tolerance) {
   const cav_impulse *p = &s->problem;
   copy(s->anchor, s->x, p->nv);
-  cav_status status = cav_impulse_smooth(p, s->v, s->u, s->x, s->base);
+  cav_status status = CAV_OK;
+  if (p->nblock > 0) {
+    status = cav_impulse_smooth(p, s->v, s->u, s->x, s->base);
+  } else {
+    // the inverse is smooth, and was measured at x
+    for (int i = 0; i < p->nv; i++) s->base[i] = p->state->options.timestep * (s->found[i] - s->u[i]);
+  }
   // impulses where v_next = v say nothing about those of the solution, so the first pass does not count them
   const double scale = p->state->options.timestep * (s->iterations > 0 ? s->scale : largest(s->u, p->nv));
   int most = 0;
@@ -575,7 +590,8 @@ static cav_status iterate(newton *s, int go_on, double tolerance) {
       copy(s->best, s->x, nv);
     }
     if (least <= tolerance && (polished++ == POLISH || velocity_error(s) <= 10.0 * tolerance)) break;
-    if (pass > 0 && s->error <= rounding(s)) break;
+    // one solve of a system as badly conditioned as a long chain is not at rounding yet
+    if (pass > (s->problem.nblock == 0) && s->error <= rounding(s)) break;
     if (stalls >= patience || s->iterations >= s->limit) break;
     // gaps that move with x are better followed
     if (s->problem.excess && !s->frozen && !go_on && held > FEW) break;
