@@ -1,8 +1,9 @@
 /// Hessian M + J' H J of one island and its factors, by whichever of two ways takes less work on its structure:
 /// elimination of a dense matrix from the leaves, which keeps the zeros of the trees but fills as the dofs are
-/// numbered, or CHOLMOD (sparse.c). A sparse pattern is that of the blocks' dofs, whether their impulses bend or not,
-/// so it holds for all iterations of a step, and for the next step while the same links are in touch; then nothing is
-/// analysed and only CHOLMOD itself allocates.
+/// numbered, or CHOLMOD (sparse.c). A sparse pattern is that of the dofs of links that touch, whether their impulses
+/// bend or not, so it holds for all iterations of a step, and for the next step while the same links touch; then nothing
+/// is analysed and only CHOLMOD itself allocates. Contacts that are still apart, of which the discrete law sees many
+/// ahead, enter when their impulses first bend.
 #include "hessian.h"
 
 #include <limits.h>
@@ -11,6 +12,8 @@
 #include <string.h>
 
 #include "sparse.h"
+
+static const double NEGLIGIBLE = 1e-20; ///< curvature relative to 1/R
 
 // the matrix of one island by its pattern
 typedef struct slot {
@@ -38,9 +41,11 @@ struct cav_hessian {
   size_t nvalue, nx;
   int nclique, members; // runs of blocks that see the same dofs; their dofs and pairs of dofs in all
   size_t pairs;
-  int *clique;  // [nblock] of each block
+  int *clique; // [nblock] of each block
+  int *live;   // [nclique] its number among those of the sparse pattern, or -1
+  int nlive, stale;
   double *pair; // [dofs of the largest clique, squared]
-  size_t nblock, npair;
+  size_t nblock, nclique_room, npair;
 };
 
 cav_hessian *cav_hessian_new(double sparse_from) {
@@ -55,13 +60,14 @@ void cav_hessian_free(cav_hessian *h) {
     cav_sparse_free(h->slot[k].sparse);
     free(h->slot[k].data);
   }
-  free(h->slot), free(h->value), free(h->x), free(h->clique), free(h->pair);
+  free(h->slot), free(h->value), free(h->x), free(h->clique), free(h->live), free(h->pair);
   free(h);
 }
 
 size_t cav_hessian_bytes(const cav_hessian *h) {
   if (!h) return 0;
-  size_t bytes = sizeof *h + (h->nvalue + h->nx + h->npair) * sizeof(double) + h->nblock * sizeof(int);
+  size_t bytes =
+      sizeof *h + (h->nvalue + h->nx + h->npair) * sizeof(double) + (h->nblock + h->nclique_room) * sizeof(int);
   for (int k = 0; k < h->nslot; k++)
     bytes += sizeof(slot) + h->slot[k].room * sizeof(int) + (size_t)(8 * cav_sparse_entries(h->slot[k].sparse));
   return bytes;
@@ -107,14 +113,59 @@ static cav_status find_cliques(cav_hessian *h) {
   return h->pairs <= INT_MAX && make_room(&h->pair, &h->npair, most, sizeof(double)) ? CAV_OK : CAV_NO_MEMORY;
 }
 
+// whether a block is there whatever the velocity: all but surfaces that are apart
+static int touches(const cav_impulse *p, const cav_block *block) {
+  if (block->contact >= 0) {
+    const cav_contact *contact = &p->state->contact[block->contact];
+    return contact->dist <= contact->margin;
+  }
+  return 1;
+}
+
+// whether the curvature H of a block's impulse counts beside 1/R
+static int bends(const cav_impulse *p, const cav_block *block, const double *H) {
+  const double *R = p->R + block->first;
+  for (int i = 0; i < block->dim; i++)
+    for (int j = 0; j < block->dim; j++)
+      if (H[i * block->dim + j] * H[i * block->dim + j] * R[i] * R[j] > NEGLIGIBLE * NEGLIGIBLE) return 1;
+  return 0;
+}
+
+// cliques of the sparse pattern: those that touch, at first, and all that have bent since; curvature may be NULL.
+// members and pairs become theirs. Whether there are more than before
+static int find_live(cav_hessian *h, const double *curvature) {
+  const cav_impulse *p = h->part;
+  const int before = h->nlive;
+  for (int b = 0; b < p->nblock; b++) {
+    int *live = &h->live[h->clique[b]];
+    if (*live < 0 && (curvature ? bends(p, &p->block[b], curvature + CAV_CURVATURE * b) : touches(p, &p->block[b])))
+      *live = h->nlive++;
+  }
+  if (h->nlive == before && curvature) return 0;
+  h->members = h->nlive = 0;
+  h->pairs = 0;
+  for (int b = 0; b < p->nblock; b++) {
+    if (h->live[h->clique[b]] < 0 || (b > 0 && h->clique[b] == h->clique[b - 1])) continue;
+    h->live[h->clique[b]] = h->nlive++;
+    h->members += p->block[b].ndof;
+    h->pairs += (size_t)p->block[b].ndof * (size_t)p->block[b].ndof;
+  }
+  return 1;
+}
+
+// the first block of a clique of the sparse pattern
+static int begins_live(const cav_hessian *h, int b) {
+  return h->live[h->clique[b]] >= 0 && (b == 0 || h->clique[b] != h->clique[b - 1]);
+}
+
 // key: number of dofs and cliques, the dofs, sizes of cliques, their dofs
 static int fill_key(const cav_hessian *h, int *key) {
   const cav_impulse *p = h->part;
   int n = 2 + h->ndof;
-  key[0] = h->ndof, key[1] = h->nclique;
+  key[0] = h->ndof, key[1] = h->nlive;
   memcpy(key + 2, h->dof, (size_t)h->ndof * sizeof(int));
   for (int b = 0; b < p->nblock; b++) {
-    if (b > 0 && h->clique[b] == h->clique[b - 1]) continue;
+    if (!begins_live(h, b)) continue;
     key[n++] = p->block[b].ndof;
     memcpy(key + n, p->block[b].dof, (size_t)p->block[b].ndof * sizeof(int));
     n += p->block[b].ndof;
@@ -219,7 +270,7 @@ static size_t entry_bound(const cav_hessian *h, size_t pairs) {
 // the pattern of the island in a slot, found again or analysed
 static cav_status set_pattern(cav_hessian *h, slot *s) {
   const cav_impulse *p = h->part;
-  const int nclique = h->nclique, members = h->members, n = h->ndof;
+  const int nclique = h->nlive, members = h->members, n = h->ndof;
   const size_t pairs = h->pairs;
   const size_t nkey = (size_t)(2 + n + nclique + members), inertia = entry_bound(h, 0), entries = entry_bound(h, pairs);
   const size_t fixed = nkey + (size_t)n + 1 + inertia + 2 * (size_t)nclique + 1 + pairs + entries;
@@ -248,7 +299,7 @@ static cav_status set_pattern(cav_hessian *h, slot *s) {
   int *member = s->row + entries, *free_ints = member + members, e = 0;
   s->first[0] = 0;
   for (int b = 0, c = 0, squares = 0; b < p->nblock; b++) {
-    if (b > 0 && h->clique[b] == h->clique[b - 1]) continue;
+    if (!begins_live(h, b)) continue;
     for (int k = 0; k < p->block[b].ndof; k++) member[e++] = h->local[p->block[b].dof[k]];
     s->square[c++] = squares;
     s->first[c] = e;
@@ -303,13 +354,23 @@ cav_status cav_hessian_begin(cav_hessian *h, const cav_impulse *part, int ndof, 
   cav_status status = find_cliques(h);
   if (status != CAV_OK) return status;
   if (!make_room(&h->x, &h->nx, (size_t)ndof, sizeof(double))) return CAV_NO_MEMORY;
-  if (cav_sparse_available() && dense_work(h, h->x) >= h->sparse_from) {
-    status = next_slot(h);
-    if (status == CAV_OK) status = set_pattern(h, h->at);
-    if (status != CAV_OK) return status;
-  }
-  const size_t entries = h->at ? (size_t)h->at->nentry : (size_t)ndof * (size_t)ndof;
-  return make_room(&h->value, &h->nvalue, entries, sizeof(double)) ? CAV_OK : CAV_NO_MEMORY;
+  if (!cav_sparse_available() || dense_work(h, h->x) < h->sparse_from)
+    return make_room(&h->value, &h->nvalue, (size_t)ndof * (size_t)ndof, sizeof(double)) ? CAV_OK : CAV_NO_MEMORY;
+  if (!make_room(&h->live, &h->nclique_room, (size_t)h->nclique, sizeof(int))) return CAV_NO_MEMORY;
+  for (int c = 0; c < h->nclique; c++) h->live[c] = -1;
+  h->nlive = 0;
+  h->stale = find_live(h, NULL);
+  return next_slot(h);
+}
+
+// the pattern with all that bends
+static cav_status follow_pattern(cav_hessian *h, const double *curvature) {
+  h->stale |= find_live(h, curvature);
+  if (!h->stale) return CAV_OK;
+  const cav_status status = set_pattern(h, h->at);
+  if (status != CAV_OK) return status;
+  h->stale = 0;
+  return make_room(&h->value, &h->nvalue, (size_t)h->at->nentry, sizeof(double)) ? CAV_OK : CAV_NO_MEMORY;
 }
 
 // ---------------------------------------------------------------- values
@@ -353,16 +414,16 @@ static void add_blocks(cav_hessian *h, const double *curvature) {
   const cav_impulse *p = h->part;
   for (int b = 0; b < p->nblock;) {
     const cav_block *block = &p->block[b];
-    const int clique = h->clique[b], n = block->ndof;
+    const int clique = h->clique[b], n = block->ndof, seen = !h->at || h->live[clique] >= 0;
     int any = 0;
     for (; b < p->nblock && h->clique[b] == clique; b++) {
       const double *H = curvature + CAV_CURVATURE * b;
-      if (is_zero(H, p->block[b].dim * p->block[b].dim)) continue;
+      if (!seen || is_zero(H, p->block[b].dim * p->block[b].dim)) continue;
       if (!any) memset(h->pair, 0, (size_t)n * (size_t)n * sizeof(double));
       bend_block(&p->block[b], H, h->pair);
       any = 1;
     }
-    if (any) add_pairs(h, n, block->dof, h->at ? h->at->place + h->at->square[clique] : NULL);
+    if (any) add_pairs(h, n, block->dof, h->at ? h->at->place + h->at->square[h->live[clique]] : NULL);
   }
 }
 
@@ -425,8 +486,10 @@ static void solve_dense(const cav_hessian *h, double *x) {
 
 cav_status cav_hessian_factor(cav_hessian *h, const double *curvature) {
   if (h->at) {
+    cav_status status = follow_pattern(h, curvature);
+    if (status != CAV_OK) return status;
     fill_sparse(h, curvature);
-    const cav_status status = cav_sparse_factor(h->at->sparse, h->value);
+    status = cav_sparse_factor(h->at->sparse, h->value);
     if (status != CAV_NOT_CONVERGED) return status;
     // rounding in very stiff constraints: only the elimination that knows the least pivots can go on
     h->at = NULL;
