@@ -435,30 +435,36 @@ static cav_status differentiate_smooth(newton *s) {
   return status;
 }
 
-// b := A^-1 b by elimination with row exchanges, A overwritten; returns 0 if A is singular
-static int solve_general(int n, double *A, double *b) {
-  for (int k = 0; k < n; k++) {
-    int pivot = k;
-    for (int i = k + 1; i < n; i++)
+// b := A^-1 b by elimination from the last dof, so that what hangs on few others fills little, A overwritten; rows are
+// exchanged where the diagonal is small. found [n] ints of room. Returns 0 if A is singular
+static int solve_general(int n, double *A, double *b, int *found) {
+  for (int k = n - 1; k >= 0; k--) {
+    int pivot = k, count = 0;
+    for (int i = k - 1; i >= 0; i--)
       if (fabs(A[i * n + k]) > fabs(A[pivot * n + k])) pivot = i;
     if (!(fabs(A[pivot * n + k]) > 0.0)) return 0;
-    for (int j = k; pivot != k && j < n; j++) {
+    const int exchange = fabs(A[k * n + k]) < 0.1 * fabs(A[pivot * n + k]);
+    for (int j = 0; exchange && j <= k; j++) {
       const double held = A[k * n + j];
       A[k * n + j] = A[pivot * n + j];
       A[pivot * n + j] = held;
     }
-    const double held = b[k];
-    b[k] = b[pivot];
-    b[pivot] = held;
-    for (int i = k + 1; i < n; i++) {
+    if (exchange) {
+      const double held = b[k];
+      b[k] = b[pivot];
+      b[pivot] = held;
+    }
+    for (int j = 0; j < k; j++)
+      if (A[k * n + j] != 0.0) found[count++] = j;
+    for (int i = 0; i < k; i++) {
       const double ratio = A[i * n + k] / A[k * n + k];
       if (ratio == 0.0) continue;
-      for (int j = k + 1; j < n; j++) A[i * n + j] -= ratio * A[k * n + j];
+      for (int e = 0; e < count; e++) A[i * n + found[e]] -= ratio * A[k * n + found[e]];
       b[i] -= ratio * b[k];
     }
   }
-  for (int i = n - 1; i >= 0; i--) {
-    for (int j = i + 1; j < n; j++) b[i] -= A[i * n + j] * b[j];
+  for (int i = 0; i < n; i++) {
+    for (int j = 0; j < i; j++) b[i] -= A[i * n + j] * b[j];
     b[i] /= A[i * n + i];
   }
   return all_finite(b, n);
@@ -504,7 +510,7 @@ static cav_status newton_step(newton *s, int *accepted) {
   add_constraints(s);
   for (int i = 0; i < nv; i++) s->step[i] = s->problem.state->options.timestep * (s->u[i] - s->momentum[i]);
   s->iterations++;
-  if (!solve_general(nv, s->matrix, s->step)) return CAV_OK;
+  if (!solve_general(nv, s->matrix, s->step, (int *)s->momentum)) return CAV_OK;
   copy(s->anchor, s->x, nv);
   for (double length = 1.0; length > SHORTEST_STEP; length *= 0.5) {
     for (int i = 0; i < nv; i++) s->x[i] = s->anchor[i] + length * s->step[i];
