@@ -3,7 +3,7 @@
 # all of: inverse (time against MuJoCo, needs it and the shared models), heap (forward steps of heaps against MuJoCo), update (updates
 # of their factors against new ones), normal (normal
 # equations by bands, by groups of trees and by CHOLMOD), unused (what a plan pays for things out of its reach), sweep (broad phase), mesh (collision meshes of a robot at each stage), conservation (drift of energy and
-# momentum), orders (error of the orders of the step against their time), absent (what features cost where a scene has none of
+# momentum), orders (error of the forces of the orders of the step, and what an evaluation costs), absent (what features cost where a scene has none of
 # them), warm (a changed weight solved again, an iteration by itself), optimum (optimal control against known optima), methods (own solver and Ipopt on the same),
 # sensors, tendons, actuation, fluid (readings, strings, drives and
 # drag against MuJoCo's), interruption (solves killed and interrupted at random moments, half an hour).

@@ -300,6 +300,31 @@ echo nonsense >weighed/checkpoint.csv
 run 2 solve lighter.xml -o weighed --resume
 says err "weighed/checkpoint.csv:1: expected"
 
+# --- a report: a page and tables of what accuracy costs ---
+
+run 0 help report
+says out "--quick"
+run 0 report model.xml --quick -o measured
+says out "measured/report.html"
+says err "forward solvers"
+says err "derivatives"
+for file in report.html forward.csv step.csv derivative.csv law.csv; do has measured/$file; done
+check "no solvers of a problem" [ ! -e measured/plan.csv ]
+check "what to use" grep -q "What to use on this scene" measured/report.html
+check "columns" [ "$(head -n 1 measured/step.csv | cut -d, -f1-4)" = "motion,order,step_s,time_ms" ]
+run 0 report problem.xml --quick -q
+silent out
+silent err
+for file in report.html plan.csv plan_trace.csv; do has swing.report/$file; done
+check "our solver ends" grep -q '^"own","midpoint","converged",' swing.report/plan.csv
+run 2 report nothing.xml
+says err "nothing.xml"
+run 2 report model.xml --model model.xml
+echo '<mujoco><worldbody><geom type="plane" size="1 1 1"/></worldbody></mujoco>' >still.xml
+run 2 report still.xml --quick
+says err "nothing moves"
+run 2 report model.xml --solver gn
+
 # --- where nothing can be written ---
 
 if [ "$(id -u)" -ne 0 ]; then
@@ -308,6 +333,7 @@ if [ "$(id -u)" -ne 0 ]; then
 fi
 : >file
 run 2 solve problem.xml -o file/result
+run 2 report model.xml --quick -q -o file/report
 
 echo "$checks checks, $failed failed"
 [ "$failed" -eq 0 ]

@@ -1,7 +1,60 @@
-/// How commands tell an error, and the exit status that goes with it; what several of them warn of.
+/// What several commands do: read a model or a problem, warn, tell an error and the exit status that goes with it.
 #include "command.h"
 
 #include <math.h>
+#include <string.h>
+
+#include "file.h"
+#include "provenance.h"
+
+// name of the first element of a file, "" if there is none in its first part
+static void first_element(const char *path, char name[32]) {
+  static char text[65536];
+  FILE *file = fopen(path, "r");
+  size_t n = file ? fread(text, 1, sizeof text - 1, file) : 0;
+  if (file) fclose(file);
+  text[n] = 0;
+  name[0] = 0;
+  for (const char *at = strchr(text, '<'); at; at = strchr(at, '<')) {
+    const char *end = !strncmp(at, "<!--", 4) ? strstr(at, "-->") : at[1] == '?' ? strstr(at, "?>") : NULL;
+    if (end) {
+      at = end;
+      continue;
+    }
+    size_t length = strcspn(at + 1, " \t\r\n/>");
+    snprintf(name, 32, "%.*s", length < 31 ? (int)length : 31, at + 1);
+    return;
+  }
+}
+
+cav_status cav_command_load(const cav_command_line *line, cav_command_scene *scene, cav_error *error) {
+  char root[32];
+  *scene = (cav_command_scene){0};
+  first_element(line->operand, root);
+  if (!strcmp(root, "problem")) {
+    if (line->floating)
+      return cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: is a problem file; write floating=\"true\" into it",
+                           line->operand);
+    scene->problem = cav_problem_load(line->operand, line->model, error);
+    if (scene->problem) scene->model = scene->problem->model;
+    return scene->problem ? CAV_OK : error->status;
+  }
+  if (line->model)
+    return cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: is not a problem file; --model has no meaning here",
+                         line->operand);
+  cav_load_options options = cav_load_options_default();
+  options.floating = line->floating;
+  scene->model = cav_model_load_with(line->operand, &options, error);
+  return scene->model ? CAV_OK : error->status;
+}
+
+void cav_command_free(cav_command_scene *scene) {
+  if (scene->problem)
+    cav_problem_free(scene->problem);
+  else
+    cav_model_free((cav_model *)scene->model);
+  *scene = (cav_command_scene){0};
+}
 
 void cav_command_warn_efforts(const cav_model *model, FILE *out) {
   int n = 0, first = -1;
@@ -21,8 +74,6 @@ void cav_command_warn_efforts(const cav_model *model, FILE *out) {
           "actuatorfrcrange, or a motor a ctrlrange\n",
           n, model->nu, model->actuator[first].name, n == 1 ? "it" : "them");
 }
-
-#include "provenance.h"
 
 void cav_command_version(void) { cav_provenance_print_build(stdout); }
 

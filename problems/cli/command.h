@@ -30,6 +30,7 @@ typedef struct cav_command_line {
   int threads;
   int strategies; ///< --strategies: 0 auto, else how many at once
   int resume, quiet, json;
+  int quick;           ///< --quick: a report in seconds
   int all;             ///< --all: explain everything
   int force;           ///< --force: solve what is proven impossible
   const char *methods; ///< --methods, NULL: own
@@ -37,8 +38,19 @@ typedef struct cav_command_line {
   cav_ipopt_option ipopt[CAV_COMMAND_IPOPT];
 } cav_command_line;
 
+/// What MODEL|PROBLEM names.
+typedef struct cav_command_scene {
+  cav_problem *problem;   ///< NULL: the file is a model
+  const cav_model *model; ///< the problem's, or the file's own
+} cav_command_scene;
+
+/// Reads the operand, a model or a problem, told apart by the first element, with --model and --floating. command.c.
+cav_status cav_command_load(const cav_command_line *line, cav_command_scene *scene, cav_error *error);
+void cav_command_free(cav_command_scene *scene);
+
 int cav_command_inspect(const cav_command_line *line);
 int cav_command_explain(const cav_command_line *line);
+int cav_command_report(const cav_command_line *line);
 int cav_command_solve(const cav_command_line *line);
 int cav_command_study(const cav_command_line *line);
 int cav_command_verify(const cav_command_line *line);

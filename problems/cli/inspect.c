@@ -16,26 +16,6 @@ static const char *const geom_name[] = {"plane",    "sphere", "capsule", "ellips
                                         "cylinder", "box",    "mesh",    "height field"};
 static const char *const joint_name[] = {"free", "ball", "slide", "hinge"};
 
-// name of the first element of a file, "" if there is none in its first part
-static void first_element(const char *path, char name[32]) {
-  static char text[65536];
-  FILE *file = fopen(path, "r");
-  size_t n = file ? fread(text, 1, sizeof text - 1, file) : 0;
-  if (file) fclose(file);
-  text[n] = 0;
-  name[0] = 0;
-  for (const char *at = strchr(text, '<'); at; at = strchr(at, '<')) {
-    const char *end = !strncmp(at, "<!--", 4) ? strstr(at, "-->") : at[1] == '?' ? strstr(at, "?>") : NULL;
-    if (end) {
-      at = end;
-      continue;
-    }
-    size_t length = strcspn(at + 1, " \t\r\n/>");
-    snprintf(name, 32, "%.*s", length < 31 ? (int)length : 31, at + 1);
-    return;
-  }
-}
-
 static void print_sizes(const cav_model *m) {
   int tree = 0;
   for (int i = 1; i < m->nlink; i++) tree += m->link[i].parent == 0;
@@ -435,30 +415,14 @@ static void print_model(const cav_model *m) {
 
 int cav_command_inspect(const cav_command_line *line) {
   cav_error error = {0};
-  char root[32];
-  first_element(line->operand, root);
-  if (!strcmp(root, "problem")) {
-    if (line->floating) {
-      cav_file_fail(&error, CAV_BAD_INPUT, 0, "%s: is a problem file; write floating=\"true\" into it", line->operand);
-      return cav_command_fail(&error);
-    }
-    cav_problem *problem = cav_problem_load(line->operand, line->model, &error);
-    if (!problem) return cav_command_fail(&error);
-    cav_status status = cav_command_impossible(stdout, "", problem, 3, &error) < 0 ? error.status : CAV_OK;
-    if (!status) status = print_problem(problem, &error);
-    if (!status) print_model(problem->model);
-    cav_problem_free(problem);
-    return status ? cav_command_fail(&error) : 0;
+  cav_command_scene scene;
+  if (cav_command_load(line, &scene, &error)) return cav_command_fail(&error);
+  cav_status status = CAV_OK;
+  if (scene.problem) {
+    if (cav_command_impossible(stdout, "", scene.problem, 3, &error) < 0) status = error.status;
+    if (!status) status = print_problem(scene.problem, &error);
   }
-  if (line->model) {
-    cav_file_fail(&error, CAV_BAD_INPUT, 0, "%s: is not a problem file; --model has no meaning here", line->operand);
-    return cav_command_fail(&error);
-  }
-  cav_load_options options = cav_load_options_default();
-  options.floating = line->floating;
-  cav_model *model = cav_model_load_with(line->operand, &options, &error);
-  if (!model) return cav_command_fail(&error);
-  print_model(model);
-  cav_model_free(model);
-  return 0;
+  if (!status) print_model(scene.model);
+  cav_command_free(&scene);
+  return status ? cav_command_fail(&error) : 0;
 }

@@ -21,7 +21,8 @@ enum option {
   OPTION_STRATEGIES = 512,
   OPTION_FORCE = 1024,
   OPTION_ALL = 2048,
-  OPTION_FLOATING = 4096
+  OPTION_FLOATING = 4096,
+  OPTION_QUICK = 8192
 };
 
 // options: spelling, value's name or NULL, what it does
@@ -32,7 +33,7 @@ static const struct {
     {OPTION_MODEL, "--model", NULL, "FILE", "use this model instead of the one that the problem names"},
     {OPTION_FLOATING, "--floating", NULL, NULL, "the root link of a URDF floats (a problem says floating=\"true\")"},
     {OPTION_OUTPUT, "--output", "-o", "DIR",
-     "folder of the result (default: NAME.result, NAME of the problem or else of its file)"},
+     "folder of the result (default: NAME.result, of a report NAME.report; NAME of the problem or else of its file)"},
     {OPTION_SOLVER, "--solver", NULL, "WORD", "how to solve"},
     {OPTION_IPOPT, "--ipopt", NULL, "NAME=VALUE",
      "an option of Ipopt, laid over the problem's; may be given several times"},
@@ -48,6 +49,7 @@ static const struct {
     {OPTION_RESUME, "--resume", NULL, NULL,
      "go on where the solve of the result folder was stopped; if the problem has changed since, start from its motion"},
     {OPTION_QUIET, "--quiet", "-q", NULL, "no progress and no table; errors and the exit status remain"},
+    {OPTION_QUICK, "--quick", NULL, NULL, "in about ten seconds instead of minutes: fewer states, steps and repeats"},
     {OPTION_FORCE, "--force", NULL, NULL, "solve what is proven impossible all the same"},
     {OPTION_ALL, "--all", NULL, NULL, "all that is missed, and all that pulls, with what usually helps"},
     {OPTION_JSON, "--json", NULL, NULL, "print as JSON what would be a table"},
@@ -78,6 +80,11 @@ static const command commands[] = {
      "of\n"
      "  the guess from start to goal, and how deep start, guess and goal are in what",
      cav_command_view, OPTION_MODEL | OPTION_QUIET},
+    {"report", "MODEL|PROBLEM",
+     "measure error against run time of a scene on this machine: forward solvers, time steps and orders, derivatives, "
+     "the\n"
+     "  contact law and, of a problem, its solvers; write a page (report.html) and tables (CSV), and say what to use",
+     cav_command_report, OPTION_MODEL | OPTION_FLOATING | OPTION_OUTPUT | OPTION_QUICK | OPTION_QUIET},
     {"study", "[MOTION...]",
      "solve motions from ten perturbed starts each, in N processes, and count: problem files, or all of "
      "problems/motions;\n"
@@ -210,6 +217,8 @@ static int take_value(cav_command_line *line, enum option option, const char *na
       return line->quiet = 1;
     case OPTION_JSON:
       return line->json = 1;
+    case OPTION_QUICK:
+      return line->quick = 1;
     case OPTION_FORCE:
       return line->force = 1;
     case OPTION_ALL:

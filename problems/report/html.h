@@ -75,7 +75,8 @@ typedef struct cav_html_series {
   const double *x, *y;      ///< [n]; where y is not finite, a cross at the plot's top says so
   const int *marked;        ///< [n] 1: filled, as of the Pareto set; NULL: none
   const char *const *label; ///< [n] what a point is, shown when pointed at; NULL: none
-  enum { CAV_HTML_LINE, CAV_HTML_POINTS, CAV_HTML_GUIDE } kind; ///< joined points, points, a dashed line without points
+  /// Joined points; points; a dashed line; a line without points.
+  enum { CAV_HTML_LINE, CAV_HTML_POINTS, CAV_HTML_GUIDE, CAV_HTML_CURVE } kind;
 } cav_html_series;
 
 /// A plot. On a logarithmic axis what is not positive is drawn in a strip of its own, labelled 0.

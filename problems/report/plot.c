@@ -206,7 +206,8 @@ static void draw_series(FILE *out, const axis *x, const axis *y, const cav_html_
     if (drawn)
       fputs(series->kind == CAV_HTML_GUIDE ? "\" stroke-dasharray=\"5 4\"/>\n" : "\" stroke-width=\"1.3\"/>\n", out);
   }
-  for (int i = 0; series->kind != CAV_HTML_GUIDE && i < series->n; i++) {
+  const int has_points = series->kind == CAV_HTML_LINE || series->kind == CAV_HTML_POINTS;
+  for (int i = 0; has_points && i < series->n; i++) {
     if (!isfinite(series->x[i])) continue;
     double at = place(x, series->x[i]);
     if (isfinite(series->y[i])) {
@@ -230,8 +231,9 @@ static void draw_key(FILE *out, const cav_html_plot *plot) {
   for (int s = 0; s < plot->nseries; s++) {
     const cav_html_series *series = &plot->series[s];
     fprintf(out, "<span><svg class=\"c%d\" viewBox=\"0 0 18 14\">", s % 8);
-    if (series->kind == CAV_HTML_GUIDE) {
-      fputs("<path d=\"M0 7H18\" stroke=\"currentColor\" stroke-dasharray=\"5 3\"/>", out);
+    if (series->kind == CAV_HTML_GUIDE || series->kind == CAV_HTML_CURVE) {
+      fprintf(out, "<path d=\"M0 7H18\" stroke=\"currentColor\"%s/>",
+              series->kind == CAV_HTML_GUIDE ? " stroke-dasharray=\"5 3\"" : "");
     } else {
       draw_marker(out, s, 9, 7, 0);
       end_marker(out, s);
