@@ -435,32 +435,38 @@ static cav_status differentiate_smooth(newton *s) {
   return status;
 }
 
+// exchanges rows k and l of A up to column k, and entries of b
+static void exchange_rows(int n, double *A, double *b, int k, int l) {
+  for (int j = 0; j <= k; j++) {
+    const double held = A[k * n + j];
+    A[k * n + j] = A[l * n + j];
+    A[l * n + j] = held;
+  }
+  const double held = b[k];
+  b[k] = b[l];
+  b[l] = held;
+}
+
 // b := A^-1 b by elimination from the last dof, so that what hangs on few others fills little, A overwritten; rows are
-// exchanged where the diagonal is small. found [n] ints of room. Returns 0 if A is singular
+// exchanged where the diagonal is small. found [2*n] is overwritten. Returns 0 if A is singular
 static int solve_general(int n, double *A, double *b, int *found) {
+  int *row = found, *column = found + n;
   for (int k = n - 1; k >= 0; k--) {
-    int pivot = k, count = 0;
-    for (int i = k - 1; i >= 0; i--)
-      if (fabs(A[i * n + k]) > fabs(A[pivot * n + k])) pivot = i;
-    if (!(fabs(A[pivot * n + k]) > 0.0)) return 0;
-    const int exchange = fabs(A[k * n + k]) < 0.1 * fabs(A[pivot * n + k]);
-    for (int j = 0; exchange && j <= k; j++) {
-      const double held = A[k * n + j];
-      A[k * n + j] = A[pivot * n + j];
-      A[pivot * n + j] = held;
-    }
-    if (exchange) {
-      const double held = b[k];
-      b[k] = b[pivot];
-      b[pivot] = held;
-    }
-    for (int j = 0; j < k; j++)
-      if (A[k * n + j] != 0.0) found[count++] = j;
+    int pivot = k, nrow = 0, ncolumn = 0;
     for (int i = 0; i < k; i++) {
-      const double ratio = A[i * n + k] / A[k * n + k];
-      if (ratio == 0.0) continue;
-      for (int e = 0; e < count; e++) A[i * n + found[e]] -= ratio * A[k * n + found[e]];
-      b[i] -= ratio * b[k];
+      if (A[i * n + k] == 0.0) continue;
+      row[nrow++] = i;
+      if (fabs(A[i * n + k]) > fabs(A[pivot * n + k])) pivot = i;
+    }
+    if (!(fabs(A[pivot * n + k]) > 0.0)) return 0;
+    if (fabs(A[k * n + k]) < 0.1 * fabs(A[pivot * n + k])) exchange_rows(n, A, b, k, pivot);
+    for (int j = 0; j < k; j++)
+      if (A[k * n + j] != 0.0) column[ncolumn++] = j;
+    for (int r = 0; r < nrow; r++) {
+      double *Ai = A + row[r] * n;
+      const double ratio = Ai[k] / A[k * n + k];
+      for (int e = 0; e < ncolumn; e++) Ai[column[e]] -= ratio * A[k * n + column[e]];
+      b[row[r]] -= ratio * b[k];
     }
   }
   for (int i = 0; i < n; i++) {
