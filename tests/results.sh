@@ -5,7 +5,7 @@
 # equations by bands, by groups of trees and by CHOLMOD), unused (what a plan pays for things out of its reach), sweep (broad phase), mesh (collision meshes of a robot at each stage), conservation (drift of energy and
 # momentum), orders (error of the forces of the orders of the step, and what an evaluation costs), absent (what features cost where a scene has none of
 # them), warm (a changed weight solved again, an iteration by itself), optimum (optimal control against known optima), methods (own solver and Ipopt on the same),
-# sensors, tendons, actuation, fluid (readings, strings, drives and
+# stiff (forward steps at softness 1e-2 to 1e-14 against quadruple precision), sensors, tendons, actuation, fluid (readings, strings, drives and
 # drag against MuJoCo's), interruption (solves killed and interrupted at random moments, half an hour).
 # CAVORT_BUILD names a build folder, by default build.
 set -eu
@@ -116,6 +116,18 @@ methods() {
   mv "$out/methods.tmp" "$out/methods.md"
 }
 
+# forward steps where a rounding is worth a force, against quadruple precision
+stiff() {
+  ninja -C "$build" tests/test_stiff >/dev/null
+  {
+    provenance "# Steps where a rounding is worth a force
+
+\`sh tests/results.sh stiff\`" | sed 's/^machine/- machine/; s/^compiler/- compiler/; s/^commit/- commit/'
+    "$build/tests/test_stiff" table
+  } >"$out/stiff.tmp"
+  mv "$out/stiff.tmp" "$out/stiff.md"
+}
+
 # the tool is ended at random moments: of a motion that is certified at once, of one that three strategies are tried for
 interruption() {
   ninja -C "$build" problems/cavort >/dev/null
@@ -128,7 +140,7 @@ interruption() {
   mv "$out/interruption.tmp" "$out/interruption.txt"
 }
 
-for name in ${*:-inverse heap update normal unused sweep mesh conservation orders sensors tendons actuation fluid optimum methods absent}; do
+for name in ${*:-inverse heap update normal unused sweep mesh conservation orders sensors tendons actuation fluid optimum methods absent stiff}; do
   case $name in
     inverse) run inverse bench_inverse ;;
     heap) run heap bench_heap ;;
@@ -145,9 +157,10 @@ for name in ${*:-inverse heap update normal unused sweep mesh conservation order
     fluid) run fluid test_fluid ;;
     optimum) optimum ;;
     methods) methods ;;
+    stiff) stiff ;;
     absent) absent ;;
     warm) run warm bench_warm ;;
     interruption) interruption ;;
-    *) echo "usage: sh tests/results.sh [inverse|heap|update|normal|unused|sweep|mesh|conservation|orders|sensors|tendons|actuation|fluid|optimum|methods|absent|warm|interruption]..." >&2 && exit 2 ;;
+    *) echo "usage: sh tests/results.sh [inverse|heap|update|normal|unused|sweep|mesh|conservation|orders|sensors|tendons|actuation|fluid|optimum|methods|absent|stiff|warm|interruption]..." >&2 && exit 2 ;;
   esac
 done

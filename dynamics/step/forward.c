@@ -15,6 +15,9 @@
 /// Nor have gaps after the step (next_gap.c), whose derivative Newton takes along, or which are followed: frozen for a
 /// solution, taken anew where it ends.
 ///
+/// Stiff rows of the exact law are come to from softer ones by the proximal point method (proximal.c), which all of the
+/// above is the inner solver of.
+///
 /// Stops when |inverse - u| is within tolerance of the largest force in the balance, or within what rounding of v_next
 /// to a double does to stiff constraints, whichever is larger; up to two more passes serve light links, whose forces
 /// are small against the largest. No step depends on earlier calls. Integrates no positions.
@@ -27,6 +30,7 @@
 #include "hessian.h"
 #include "island.h"
 #include "math3.h"
+#include "proximal.h"
 
 enum {
   BLOCK = CAV_CURVATURE,
@@ -35,10 +39,14 @@ enum {
   STALLS = 4,
   CHANGES = 30,
   POLISH = 2,
-  FEW = 2
+  FEW = 2,
+  LEVELS = 8
 };
 
 static const double DEFAULT_TOLERANCE = 1e-13, ROUGH = 1e-9, NEAR = 1e-2, SHORTEST_STEP = 0.02;
+// of the proximal point method: softness below which it is taken, ratio of levels and the least, change of a velocity at
+// which it ends and the most that counts as an end
+static const double STIFF = 1e-5, LEVEL_STEP = 1e-2, LEAST_LEVEL = 1e-10, AT_REST = 1e-15, CLOSE = 1e-10;
 
 // the solver's own arrays; names as in the text above
 typedef struct newton {
@@ -65,6 +73,9 @@ typedef struct newton {
   double *smooth;          // [nv*nv] that of the smooth part alone, not for euler
   int have_smooth;
   int frozen;          // the excess stays as it is
+  int raised;          // the problem's rows are softer than the state's
+  double *room;        // of proximal.c
+  double *ended;       // [nv] where it ended
   double error, scale; // of the last measurement
   int iterations, limit;
 } newton;
@@ -111,10 +122,10 @@ static int is_convex(const cav_state *state) {
 
 static cav_status prepare(newton *s, const cav_model *model, cav_state *state) {
   const size_t matrices = is_convex(state) ? 0 : 2, looks = state->options.next_gap == CAV_NEXT_GAP_EXACT;
-  const cav_impulse_room room = {.per_block = BLOCK + 2 + CAV_ISLAND_PER_BLOCK,
-                                 .per_row = 5,
+  const cav_impulse_room room = {.per_block = BLOCK + 2 + CAV_PROXIMAL_PER_BLOCK + CAV_ISLAND_PER_BLOCK,
+                                 .per_row = 5 + CAV_PROXIMAL_PER_ROW,
                                  .per_row_and_dof = looks,
-                                 .per_dof = 8 + CAV_ISLAND_PER_DOF,
+                                 .per_dof = 9 + CAV_ISLAND_PER_DOF,
                                  .per_dof_squared = matrices};
   cav_workspace *work = state->work;
   if (!work->hessian && !(work->hessian = cav_hessian_new(CAV_SPARSE_FROM))) return CAV_NO_MEMORY;
@@ -122,10 +133,13 @@ static cav_status prepare(newton *s, const cav_model *model, cav_state *state) {
   if (status != CAV_OK) return status;
   const size_t nv = (size_t)model->nv, nrow = (size_t)s->problem.nrow, nblock = (size_t)s->problem.nblock;
   double **const row[] = {&s->y, &s->f, &s->derivative, &s->try_y, &s->try_f};
-  double **const dof[] = {&s->x, &s->anchor, &s->base, &s->step, &s->momentum, &s->gradient, &s->best, &s->found};
+  double **const dof[] = {&s->x,        &s->anchor, &s->base,  &s->step, &s->momentum,
+                          &s->gradient, &s->best,   &s->found, &s->ended};
   double *at = s->problem.spare;
+  s->room = at;
+  at += CAV_PROXIMAL_PER_ROW * nrow + CAV_PROXIMAL_PER_BLOCK * nblock;
   for (int i = 0; i < 5; i++, at += nrow) *row[i] = at;
-  for (int i = 0; i < 8; i++, at += nv) *dof[i] = at;
+  for (int i = 0; i < 9; i++, at += nv) *dof[i] = at;
   s->curvature = at;
   s->held = s->curvature + BLOCK * nblock;
   s->excess = s->held + nblock;
@@ -476,15 +490,36 @@ static int solve_general(int n, double *A, double *b, int *found) {
   return all_finite(b, n);
 }
 
+// measures the inverse at x with the problem's own rows in the place of the state's
+static cav_status measure_raised(newton *s) {
+  const cav_impulse *p = &s->problem;
+  const double h = p->state->options.timestep;
+  const cav_status status = cav_impulse_smooth(p, s->v, s->u, s->x, s->found);
+  cav_impulse_rows(p, s->x, s->y);
+  laws(s, s->y, s->f, NULL, 0);
+  cav_impulse_push(p, -1.0, s->f, s->found);
+  for (int i = 0; i < p->nv; i++) p->change[i] = s->x[i] - s->v[i];
+  cav_impulse_inertia(p, p->change, p->force);
+  s->scale = fmax(largest(s->u, p->nv), largest(p->force, p->nv) / h);
+  memset(p->force, 0, (size_t)p->nv * sizeof *p->force);
+  cav_impulse_push(p, 1.0 / h, s->f, p->force);
+  s->scale = fmax(s->scale, largest(p->force, p->nv));
+  s->error = largest(s->found, p->nv) / h;
+  for (int i = 0; i < p->nv; i++) s->found[i] = s->u[i] + s->found[i] / h;
+  return status;
+}
+
 // measures the inverse at x; while the excess is frozen, with the impulses that it gives
 static cav_status measure(newton *s) {
   const cav_impulse *p = &s->problem;
+  if (s->raised && !p->excess) return measure_raised(s);
   const cav_status status = cav_impulse_check(p, s->q, s->v, s->u, s->x, s->found, s->f, &s->error, &s->scale);
   if (!p->excess || status != CAV_OK) return status;
   for (int b = 0; b < p->nblock && !s->frozen; b++) {
     const int contact = p->block[b].contact;
     s->excess[b] = contact >= 0 ? cav_contact_excess(p->state, &p->state->contact[contact]) : 0.0;
   }
+  if (s->raised) return measure_raised(s);
   if (!s->frozen) return CAV_OK;
   cav_impulse_rows(p, s->x, s->y);
   laws(s, s->y, s->try_f, NULL, 0);
@@ -645,6 +680,53 @@ static cav_status follow_gaps(newton *s, double tolerance) {
   return iterate(s, 1, tolerance);
 }
 
+// the last digits with the problem's own rows, from where the proximal point method ended; taken back where elimination
+// does not bear them
+static cav_status finish(newton *s, double tolerance) {
+  const int nv = s->problem.nv;
+  double *kept = s->ended;
+  copy(kept, s->x, nv);
+  const cav_status status = iterate(s, 1, tolerance);
+  double change = 0.0;
+  for (int i = 0; i < nv; i++) change = fmax(change, fabs(s->x[i] - kept[i]));
+  if (status == CAV_OK && change <= CLOSE * largest(kept, nv)) return CAV_OK;
+  copy(s->x, kept, nv);
+  return measure(s);
+}
+
+// stiff rows by the proximal point method: solutions with R raised to a level, each from the one before, the level
+// lowered until R is the problem's own or the least that elimination bears; then until nothing changes
+static cav_status approach(newton *s, double tolerance) {
+  cav_proximal proximal;
+  cav_proximal_begin(&proximal, &s->problem, s->room);
+  cav_status status = CAV_OK;
+  double change = INFINITY;
+  int whole = 0;
+  for (int k = 0; !whole && change > AT_REST && k < LEVELS; k++) {
+    const double level = fmax(pow(LEVEL_STEP, k + 1), LEAST_LEVEL);
+    whole = cav_proximal_set(&proximal, level);
+    s->raised = !whole;
+    leave_island(s);
+    status = iterate(s, k > 0, level > LEAST_LEVEL && !whole ? fmax(ROUGH, tolerance) : tolerance);
+    if (status != CAV_OK && status != CAV_NOT_CONVERGED) break;
+    cav_impulse_rows(&s->problem, s->x, s->y);
+    laws(s, s->y, s->f, NULL, 0);
+    change = cav_proximal_update(&proximal, s->f, s->y);
+  }
+  cav_proximal_end(&proximal);
+  s->raised = 0;
+  if (whole || (status != CAV_OK && status != CAV_NOT_CONVERGED)) return status;
+  const cav_status finished = finish(s, tolerance);
+  if (finished != CAV_OK) return finished;
+  return change <= CLOSE ? status : CAV_NOT_CONVERGED;
+}
+
+// whether rows are so stiff that nothing is lost by coming from softer ones
+static int is_stiff(const cav_state *state) {
+  const cav_options *o = &state->options;
+  return o->stabilisation == CAV_STABILISATION_DISCRETE && o->softness < STIFF && !(o->smoothing > 0.0);
+}
+
 cav_status cav_forward_newton(const cav_model *model, cav_state *state, const double *q, const double *v,
                               const double *u, int iterations, double tolerance, double *v_next,
                               cav_forward_report *report) {
@@ -658,7 +740,8 @@ cav_status cav_forward_newton(const cav_model *model, cav_state *state, const do
   newton s = {.q = q, .v = v, .u = u, .limit = iterations};
   cav_status status = prepare(&s, model, state);
   if (status != CAV_OK) return status;
-  status = iterate(&s, 0, tolerance);
+  const int stiff = is_stiff(state) && s.problem.nrow > 0;
+  status = stiff ? approach(&s, tolerance) : iterate(&s, 0, tolerance);
   if (status == CAV_NOT_CONVERGED && s.problem.excess) status = follow_gaps(&s, tolerance);
   if (status != CAV_OK && status != CAV_NOT_CONVERGED) return status;
   copy(v_next, s.x, model->nv);

@@ -130,7 +130,8 @@ CAV_API cav_status cav_inverse_from(const cav_model *model, cav_state *state, ca
                                     const double *v, const double *v_next, double *u);
 
 /// One step forward: v_next from u [nv], by Newton on the convex potential (9) in v_next, exact or smoothed law.
-/// Inverse of cav_inverse to 1e-9; starts from v.
+/// Inverse of cav_inverse to 1e-9, or to what a rounding of v_next is worth in force where constraints are stiff; v_next
+/// is right to 1e-10 at any softness (dynamics/METHOD.md, 11). Starts from v.
 /// CAV_NOT_CONVERGED leaves the best iterate. The position afterwards is cav_integrate(q, v_next, timestep).
 CAV_API cav_status cav_forward(const cav_model *model, cav_state *state, const double *q, const double *v,
                                const double *u, double *v_next);

@@ -1,0 +1,213 @@
+/// Forward steps where a rounding is worth a force: softness from 1e-2 to 1e-14 times scenes with few, many and redundant
+/// contacts, against a step in quadruple precision (quad.h). With "table" prints what tests/results/stiff.md is made of.
+#include "quad.h"
+#include "scene.h"
+
+enum { SOFTNESSES = 7, SCENES_MAX = 16 };
+
+static double largest(const double *x, int n) {
+  double most = 0;
+  for (int i = 0; i < n; i++) most = fmax(most, fabs(x[i]));
+  return most;
+}
+
+static double apart(const double *a, const double *b, int n) {
+  double most = 0;
+  for (int i = 0; i < n; i++) most = fmax(most, fabs(a[i] - b[i]));
+  return most;
+}
+
+// a model at (q, v, u), and what its steps came to at each softness
+typedef struct scene {
+  char name[80];
+  cav_model *model;
+  cav_state *state;
+  double *q, *v, *u, *v_next, *truth;
+  cav_model *part; // one of the parts that the scene is copies of; NULL: it is one part
+  int contacts, iterations[SOFTNESSES];
+  cav_status status[SOFTNESSES];
+  double error[SOFTNESSES], mismatch[SOFTNESSES];
+} scene;
+
+static const double softness[SOFTNESSES] = {1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14};
+
+static int scene_open(scene *s, const char *name, cav_model *model) {
+  *s = (scene){.model = model};
+  snprintf(s->name, sizeof s->name, "%s", name);
+  if (!CHECK(model != NULL)) return 0;
+  s->state = cav_state_new(model);
+  const size_t n = (size_t)model->nq + 1;
+  double **const all[] = {&s->q, &s->v, &s->u, &s->v_next, &s->truth};
+  for (int i = 0; i < 5; i++) *all[i] = calloc(n, sizeof(double));
+  cav_configuration_reset(model, s->q);
+  s->state->options.stabilisation = CAV_STABILISATION_DISCRETE;
+  s->state->options.time_constant = s->state->options.smoothing = 0;
+  return CHECK(s->state != NULL);
+}
+
+static void scene_close(scene *s) {
+  double *const all[] = {s->q, s->v, s->u, s->v_next, s->truth};
+  for (int i = 0; i < 5; i++) free(all[i]);
+  cav_state_free(s->state);
+  cav_model_free(s->model);
+  cav_model_free(s->part);
+}
+
+static void scene_throw(scene *s, double v, double u) {
+  for (int i = 0; i < s->model->nv; i++) s->v[i] = v * scene_uniform(), s->u[i] = u * scene_uniform();
+}
+
+// one body on so many spheres, all of which touch: six dofs, redundant contacts
+static cav_model *bed(int n) {
+  static char text[1 << 16];
+  const int wide = (int)ceil(sqrt(n));
+  char *at = text + sprintf(text,
+                            "<mujoco><option timestep='0.005'/><worldbody><geom type='plane' size='9 9 1'/>"
+                            "<body pos='0 0 .099'><freejoint/>");
+  for (int i = 0; i < n; i++)
+    at += sprintf(at, "<geom type='sphere' size='.1' pos='%g %g %g' mass='.1'/>", 0.3 * (i % wide), 0.3 * (i / wide),
+                  2e-5 * scene_uniform());
+  sprintf(at, "</body></worldbody></mujoco>");
+  return scene_load(text);
+}
+
+// so many piles of boxes, each box ratio times heavier than the one that it stands on
+static cav_model *piles(int n, int high, double ratio) {
+  static char text[1 << 17];
+  char *at = text + sprintf(text, "<mujoco><option timestep='0.005'/><worldbody><geom type='plane' size='9 9 1'/>");
+  for (int i = 0; i < n; i++)
+    for (int k = 0; k < high; k++)
+      at += sprintf(at, "<body pos='%g %g %g'><freejoint/><geom type='box' size='.1 .1 .1' mass='%g'/></body>",
+                    0.5 * (i % 8), 0.5 * (i / 8), 0.0995 + 0.1995 * k, pow(ratio, k));
+  sprintf(at, "</worldbody></mujoco>");
+  return scene_load(text);
+}
+
+static double deepest(const cav_state *state) {
+  double most = 0;
+  for (int i = 0; i < state->ncontact; i++) most = fmax(most, -state->contact[i].dist);
+  return most;
+}
+
+// our humanoid lying half a centimetre in the floor
+static void lay(scene *s, double bend) {
+  for (int i = 7; i < s->model->nq; i++) s->q[i] += bend * scene_uniform();
+  s->q[3] = s->q[5] = 1, s->q[4] = s->q[6] = 0;
+  cav_configuration_normalise(s->model, s->q);
+  double low = 0, high = 2;
+  for (int k = 0; k < 30; k++) {
+    s->q[2] = 0.5 * (low + high);
+    CHECK(cav_position(s->model, s->state, s->q) == CAV_OK);
+    if (deepest(s->state) > 0.005)
+      low = s->q[2];
+    else
+      high = s->q[2];
+  }
+}
+
+static int open_scenes(scene *all) {
+  int n = 0;
+  char name[80];
+  for (int k = 0; k < 2; k++)
+    for (int count = 17; count <= 170; count *= 10) {
+      snprintf(name, sizeof name, "body on %d spheres, %s", count, k ? "at rest" : "thrown");
+      if (!scene_open(&all[n], name, bed(count))) return n;
+      if (!k) scene_throw(&all[n], 1, 5);
+      n++;
+    }
+  static const int piles_of[] = {8, 72, 4};
+  for (int k = 0; k < 3; k++) {
+    snprintf(name, sizeof name, "%d piles of 3 boxes%s", piles_of[k], k == 2 ? ", masses 1, 30, 900" : "");
+    if (!scene_open(&all[n], name, piles(piles_of[k], 3, k == 2 ? 30 : 1))) return n;
+    all[n].part = piles(1, 3, k == 2 ? 30 : 1);
+    scene_throw(&all[n], 0.2, 1);
+    n++;
+  }
+  for (int k = 0; k < 4; k++) {
+    cav_error error;
+    snprintf(name, sizeof name, "humanoid, lying, %d", k + 1);
+    if (!scene_open(&all[n], name, cav_model_load(CAVORT_SOURCE_ROOT "/problems/models/humanoid.xml", &error)))
+      return n;
+    lay(&all[n], 0.06 * k);
+    scene_throw(&all[n], 0.5, 20);
+    n++;
+  }
+  return n;
+}
+
+// v_next in quadruple precision, part by part as nothing joins them
+static void find_truth(scene *s, double from, double at) {
+  const cav_model *part = s->part ? s->part : s->model;
+  cav_state *state = cav_state_new(part);
+  state->options = s->state->options;
+  for (int q = 0, v = 0; v < s->model->nv; q += part->nq, v += part->nv) {
+    quad_step step;
+    if (!quad_open(&step, part, state, s->q + q, s->v + v, s->u + v)) break;
+    // its last step; where the problem has a kink Newton may go to and fro over it by less than shows
+    CHECK(quad_forward(&step, from, at, s->truth + v) < 1e-12);
+    quad_free(&step);
+  }
+  cav_state_free(state);
+}
+
+// all softnesses of a scene against the truth
+static void sweep(scene *s) {
+  const int nv = s->model->nv;
+  for (int k = 0; k < SOFTNESSES; k++) {
+    s->state->options.softness = softness[k];
+    cav_forward_report report = {0};
+    s->status[k] = cav_forward_newton(s->model, s->state, s->q, s->v, s->u, 100, 1e-13, s->v_next, &report);
+    s->iterations[k] = report.iterations;
+    s->mismatch[k] = report.residual;
+    s->contacts = s->state->ncontact;
+    if (k == 0) memcpy(s->truth, s->v, (size_t)nv * sizeof *s->v);
+    find_truth(s, k > 0 ? 0.1 * softness[k - 1] : softness[k], softness[k]);
+    s->error[k] = apart(s->v_next, s->truth, nv) / largest(s->truth, nv);
+  }
+}
+
+static void print_table(const scene *all, int n) {
+  printf(
+      "\n## Softness\n\nIterations, error of v_next over the largest velocity, mismatch of the inverse over the "
+      "largest force"
+      "\n(a rounding of v_next is worth 1.1e-16 of it over the softness, times what speeds are over those that"
+      "\nimpulses change).\n\n");
+  printf("| scene | contacts |");
+  for (int k = 0; k < SOFTNESSES; k++) printf(" %.0e |", softness[k]);
+  printf("\n|---|--:|");
+  for (int k = 0; k < SOFTNESSES; k++) printf("---|");
+  printf("\n");
+  for (int i = 0; i < n; i++) {
+    printf("| %s | %d |", all[i].name, all[i].contacts);
+    for (int k = 0; k < SOFTNESSES; k++)
+      printf(" %d, %.0e, %.0e%s |", all[i].iterations[k], all[i].error[k], all[i].mismatch[k],
+             all[i].status[k] == CAV_OK ? "" : ", not converged");
+    printf("\n");
+  }
+}
+
+static void test_softness(int table) {
+  scene all[SCENES_MAX];
+  const int n = open_scenes(all);
+  for (int i = 0; i < n; i++) {
+    sweep(&all[i]);
+    for (int k = 0; k < SOFTNESSES; k++) {
+      const int right = all[i].status[k] == CAV_OK && all[i].error[k] <= 1e-10;
+      if (!right)
+        fprintf(stderr, "%s, softness %.0e: %s, error of v_next %.1e\n", all[i].name, softness[k],
+                cav_status_name(all[i].status[k]), all[i].error[k]);
+      CHECK(right);
+      CHECK(all[i].iterations[k] <= 100);
+      // a rounding of v_next is worth 1.1e-16 |v|/(h R); seen 1.2e-15
+      CHECK(all[i].mismatch[k] <= 1e-12 + 1e-14 / softness[k]);
+    }
+  }
+  if (table) print_table(all, n);
+  for (int i = 0; i < n; i++) scene_close(&all[i]);
+}
+
+int main(int count, char **arguments) {
+  const int table = count > 1 && !strcmp(arguments[1], "table");
+  test_softness(table);
+  return table ? check_failed > 0 : check_result();
+}
