@@ -1,5 +1,5 @@
-/// Gains of the regulator: those of a mass on a line against the closed form, and a spinning ball that they must bring
-/// back.
+/// Gains of the regulator: those of a mass on a line against the closed form, those of a spring that may be there or not
+/// against steps of two numbers, and a spinning ball that they must bring back.
 #include "lqr.h"
 
 #include "scene.h"
@@ -35,13 +35,70 @@ static void check_cart(void) {
   cav_trajectory *motion = cav_trajectory_new(model, tr->nknot, problem.timestep);
   double *gain = malloc(2 * (size_t)tr->nknot * sizeof *gain), *rate = gain + tr->nknot;
   cav_feedback_penalty penalty = {.tracking = 6, .rate = 3};
-  CHECK(cav_feedback(tr, motion, &tr->options, &penalty, gain, rate) == CAV_OK);
+  CHECK(cav_feedback(tr, motion, &tr->options, 1, &penalty, gain, rate) == CAV_OK);
   double m = 2, force = 5, a = penalty.tracking / (tr->weight * CAV_MOMENT_ARM), r2 = penalty.rate * penalty.rate;
   double k1 = sqrt(a * r2 * m), k2 = sqrt(a * m + 2 * k1 * m / force);
   // a step of 1 ms against a pole at 14/s: half of that product, seen 0.7 %
   CHECK_NEAR(gain[0], -force * k1, 0.01 * force * k1);
   CHECK_NEAR(rate[0], -force * k2, 0.01 * force * k2);
   printf("cart: %.4f %.4f against %.4f %.4f\n", gain[0], rate[0], -force * k1, -force * k2);
+  free(gain);
+  free(problem.v_start);
+  cav_trajectory_free(motion);
+  cav_transcription_free(tr);
+  cav_model_free(model);
+}
+
+/// Gains of the first knot by position and velocity: steps back of the expectation over laws x'' = F/m w - k/m x.
+static void expected_gain(const double stiffness[2], double m, double force, double a, double r2, double h, int steps,
+                          double gain[2]) {
+  double P[2][2] = {{a * r2 * m, 0}, {0, a * m}}, mean[2] = {0};
+  for (int step = 0; step < steps; step++) {
+    double S[2][2] = {{0}}, G[2] = {0}, H = h, b = h * force / m, B[2] = {h * b, b};
+    for (int law = 0; law < 2; law++) {
+      double fall = -h * stiffness[law] / m, A[2][2] = {{1 + h * fall, h}, {fall, 1}}, PA[2][2], PB[2];
+      for (int i = 0; i < 2; i++) {
+        for (int j = 0; j < 2; j++) PA[i][j] = P[i][0] * A[0][j] + P[i][1] * A[1][j];
+        PB[i] = P[i][0] * B[0] + P[i][1] * B[1];
+      }
+      for (int i = 0; i < 2; i++) {
+        for (int j = 0; j < 2; j++) S[i][j] += (A[0][i] * PA[0][j] + A[1][i] * PA[1][j]) / 2;
+        G[i] += (B[0] * PA[0][i] + B[1] * PA[1][i]) / 2;
+        H += B[i] * PB[i] / 2;
+      }
+    }
+    for (int i = 0; i < 2; i++)
+      for (int j = 0; j < 2; j++) P[i][j] = S[i][j] - G[i] * G[j] / H + (i == j ? h * a * m * (i ? 1 : r2) : 0);
+    // of the first knot: its steps are the last twenty
+    for (int i = 0; i < 2 && step >= steps - 20; i++) mean[i] -= force * G[i] / H / 20;
+  }
+  memcpy(gain, mean, sizeof mean);
+}
+
+/// A mass on a spring that one law has and another has not.
+static void check_laws(void) {
+  static const char sprung[] = HEAD
+      "<body><joint name='x' type='slide' axis='1 0 0' stiffness='40'/><geom type='sphere' size='.1' mass='2'/>"
+      "</body></worldbody><actuator><motor joint='x' gear='5' ctrllimited='true' ctrlrange='-1 "
+      "1'/></actuator></mujoco>";
+  cav_model *model = scene_load(sprung);
+  cav_problem problem = rest(model, 1);
+  problem.order = CAV_ORDER_EULER;
+  cav_transcription *tr = cav_transcription_new(&problem, 1, NULL);
+  cav_trajectory *motion = cav_trajectory_new(model, tr->nknot, problem.timestep);
+  double *gain = malloc(2 * (size_t)tr->nknot * sizeof *gain), *rate = gain + tr->nknot;
+  cav_feedback_penalty penalty = {.tracking = 6, .rate = 3};
+  cav_options law[2] = {tr->options, tr->options};
+  law[1].passive = 0;
+  double a = penalty.tracking / (tr->weight * CAV_MOMENT_ARM);
+  for (int laws = 1; laws <= 2; laws++) {
+    double stiffness[2] = {40, laws == 1 ? 40 : 0}, wanted[2];
+    CHECK(cav_feedback(tr, motion, law, laws, &penalty, gain, rate) == CAV_OK);
+    expected_gain(stiffness, 2, 5, a, 9, 0.001, 20 * (tr->nknot - 1), wanted);
+    CHECK_NEAR(gain[0], wanted[0], 1e-6 * fabs(wanted[0]));
+    CHECK_NEAR(rate[0], wanted[1], 1e-6 * fabs(wanted[1]));
+    printf("%d laws: %.6f %.6f against %.6f %.6f\n", laws, gain[0], rate[0], wanted[0], wanted[1]);
+  }
   free(gain);
   free(problem.v_start);
   cav_trajectory_free(motion);
@@ -66,7 +123,7 @@ static void check_ball(void) {
   size_t n = 9 * (size_t)(tr->nknot - 1);
   double *gain = malloc(2 * n * sizeof *gain);
   cav_feedback_penalty penalty = {.tracking = 36, .rate = 3};
-  CHECK(cav_feedback(tr, motion, &tr->options, &penalty, gain, gain + n) == CAV_OK);
+  CHECK(cav_feedback(tr, motion, &tr->options, 1, &penalty, gain, gain + n) == CAV_OK);
 
   enum { FINER = 10 };
   double end[2];
@@ -104,6 +161,7 @@ static void check_ball(void) {
 
 int main(void) {
   check_cart();
+  check_laws();
   check_ball();
   return check_result();
 }

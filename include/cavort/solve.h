@@ -350,8 +350,9 @@ typedef struct cav_verdict {
   double replay_same_step_seconds;   ///< how long it stays within 1e-6
   double
       closed_loop_seconds; ///< how long the closed loop at a tenth of the step follows (all links within 0.5 m, roots 1 rad)
-  double closed_loop_end_error_m;                            ///< largest distance of a body's centre of mass at the end
-  double model_contacts_seconds, model_contacts_end_error_m; ///< the same under the contacts of the model's file
+  double closed_loop_end_error_m; ///< largest distance of a body's centre of mass at the end
+  double model_contacts_seconds,
+      model_contacts_end_error_m; ///< the same under the contacts of the model's file, the worse of steps of 2 and 1 ms
   double
       feedback_effort_max; ///< largest effort that either closed loop asks of an actuator, over its limit, before clipping
   double

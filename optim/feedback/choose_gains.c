@@ -1,7 +1,9 @@
 /// Which feedback goes with a motion. Gains are those of a regulator (lqr.c), but what straying costs, and how hard the
-/// contacts are that it counts on, are not in the problem. So a few of each are tried in the closed loops of
-/// verification. Kept is what follows longest under the claimed contacts, then longest and nearest under the model's
-/// own.
+/// contacts are that it counts on, are not in the problem. So sets of these are tried in closed loops: those of
+/// verification, and two with a small push, without which gains are found that fit one course of the simulation and
+/// lose the next. A few that serve different motions come first; where none of them ends near enough, a search by
+/// coordinates goes on from the best. Kept is what follows in most loops, in their order, then nearest at the end.
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -9,62 +11,127 @@
 #include "schedule.h"
 #include "verification.h"
 
-/// Trials in order: penalties on straying, and the fraction of the schedule whose contact law is taken.
-static const struct trial {
+enum { LAWS = 2, TRIALS = 40 };
+
+/// What a regulator is made of: penalties on straying, and the fractions of the schedule whose contact laws it reckons
+/// with.
+typedef struct set {
   cav_feedback_penalty penalty;
-  double fraction;
-} trial[] = {{{36, 3}, 1},    {{36, 3}, 0.95}, {{12, 3}, 1},  {{100, 3}, 0.95},
-             {{12, 3}, 0.85}, {{36, 5}, 0.8},  {{12, 3}, 0.7}};
+  int laws;
+  double fraction[LAWS];
+} set;
+
+static const set seed[] = {{{36, 3}, 1, {1}},        {{12, 3}, 1, {1}},    {{36, 1.5}, 1, {0.85}}, {{12, 3}, 1, {0.85}},
+                           {{4, 3}, 2, {0.85, 0.6}}, {{0.1, 1.5}, 1, {1}}, {{100, 6}, 1, {0.85}},  {{36, 5}, 1, {0.8}}};
+enum { SEEDS = sizeof seed / sizeof *seed };
 
 /// End error that ends the search, m.
 static const double near_enough = 0.03;
 
-/// What a set of gains does.
+/// What a set does: loops that follow, how long the next one does, squares of the end errors of all.
 typedef struct outcome {
-  struct cav_follow claimed, own;
+  int follows;
+  double seconds, square, largest;
 } outcome;
 
 static int better(const outcome *a, const outcome *b) {
-  if (a->claimed.seconds != b->claimed.seconds) return a->claimed.seconds > b->claimed.seconds;
-  if (a->own.seconds != b->own.seconds) return a->own.seconds > b->own.seconds;
-  return a->claimed.error + a->own.error < b->claimed.error + b->own.error;
+  if (a->follows != b->follows) return a->follows > b->follows;
+  if (a->follows < CAV_LOOPS) return a->seconds > b->seconds;
+  return a->square < b->square;
 }
 
-static int done(const outcome *o) {
-  return !*o->claimed.lost && !*o->own.lost && o->claimed.error <= near_enough && o->own.error <= near_enough;
+static int done(const outcome *o) { return o->follows == CAV_LOOPS && o->largest <= near_enough; }
+
+/// The search: where it is, and the best so far in the solution.
+typedef struct search {
+  const cav_problem *problem;
+  const cav_transcription *tr;
+  const cav_trajectory *at;
+  cav_solution *solution;
+  double *gain; ///< [2*n]
+  size_t n;
+  set best;
+  outcome reached;
+  int found; ///< 1: there is a best
+} search;
+
+/// The regulator of a set, into gain.
+static cav_status regulate(const search *s, const set *one) {
+  cav_options law[LAWS];
+  for (int i = 0; i < one->laws; i++) {
+    law[i] = s->tr->options;
+    cav_stage_law(s->problem, one->fraction[i], s->tr->options.timestep, &law[i]);
+  }
+  cav_status status = cav_feedback(s->tr, s->at, law, one->laws, &one->penalty, s->gain, s->gain + s->n);
+  // a regulator that does not exist is no reason to give up the motion
+  return status == CAV_NOT_CONVERGED || status == CAV_NOT_FINITE ? CAV_OK : status;
+}
+
+/// Tries a set and keeps it if it is better.
+static cav_status try(search *s, const set *one, cav_error *error) {
+  struct cav_follow follow[CAV_LOOPS];
+  outcome now = {0};
+  int ran = 0;
+  cav_status status = regulate(s, one);
+  if (status == CAV_OK)
+    status = cav_closed_loops(s->problem, s->at, &s->solution->contact, s->gain, s->gain + s->n, follow, &ran, error);
+  if (status != CAV_OK) return status;
+  for (int i = 0; i < ran; i++) {
+    if (*follow[i].lost) now.seconds = follow[i].seconds;
+    if (*follow[i].lost) break;
+    now.follows++;
+    now.square += follow[i].error * follow[i].error;
+    now.largest = fmax(now.largest, follow[i].error);
+  }
+  if (s->found && !better(&now, &s->reached)) return CAV_OK;
+  memcpy(s->solution->gain_q, s->gain, s->n * sizeof *s->gain);
+  memcpy(s->solution->gain_v, s->gain + s->n, s->n * sizeof *s->gain);
+  s->best = *one;
+  s->reached = now;
+  s->found = 1;
+  return CAV_OK;
+}
+
+/// x in [0, 1] between two ends, around a middle within a part of the way, or anywhere.
+static double spread(double x, double from, double to, double middle, int near) {
+  double part = near ? 0.3 : 1, start = near ? middle - 0.5 * part * (to - from) : from;
+  return fmin(fmax(start + part * x * (to - from), from), to);
+}
+
+/// The set of a trial: the seeds, then points that fill the range of all (Roberts's additive recurrence), every other
+/// one near the best.
+static set sample(const search *s, int trial) {
+  if (trial < SEEDS) return seed[trial];
+  // powers of the root of x^5 = x + 1
+  static const double step[] = {0.8566748838545029, 0.7338918566271259, 0.6287067210378087, 0.5385972572236101};
+  const set *best = &s->best;
+  double x[4];
+  int near = trial % 2;
+  for (int k = 0; k < 4; k++) x[k] = fmod(0.5 + (trial - SEEDS + 1) * step[k], 1);
+  set to = {.laws = near ? best->laws : x[3] < 0.5 ? 1 : 2};
+  to.penalty.tracking = exp(spread(x[0], log(1), log(100), log(best->penalty.tracking), near));
+  to.penalty.rate = exp(spread(x[1], log(1), log(6), log(best->penalty.rate), near));
+  to.fraction[0] = spread(x[2], 0.6, 1, best->fraction[0], near);
+  to.fraction[1] = spread(x[3], 0.3, 0.9, best->fraction[1], near);
+  return to;
 }
 
 cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription *tr, const cav_trajectory *at, int sets,
                             int (*report)(void *context, int set, int most), void *context, cav_solution *solution,
                             cav_error *error) {
-  size_t n = ((size_t)tr->nknot - 1) * (size_t)tr->nv * (size_t)tr->nv;
-  double *gain = malloc(2 * n * sizeof *gain);
-  solution->gain_q = calloc(n, sizeof(double));
-  solution->gain_v = calloc(n, sizeof(double));
-  cav_status status = gain && solution->gain_q && solution->gain_v ? CAV_OK : CAV_NO_MEMORY;
-  outcome best = {0};
-  int all = (int)(sizeof trial / sizeof *trial), trials = sets > 0 && sets < all ? sets : all, first = 1;
-  for (int i = 0; i < trials && status == CAV_OK && (first || !done(&best)); i++) {
-    outcome now;
-    if (report(context, i + 1, trials)) {
-      status = CAV_INTERRUPTED;
-      break;
-    }
-    cav_options law = tr->options;
-    cav_stage_law(problem, trial[i].fraction, tr->options.timestep, &law);
-    status = cav_feedback(tr, at, &law, &trial[i].penalty, gain, gain + n);
-    // a regulator that does not exist is no reason to give up the motion
-    if (status == CAV_NOT_CONVERGED || status == CAV_NOT_FINITE) status = CAV_OK;
-    if (status == CAV_OK)
-      status = cav_closed_loops(problem, at, &solution->contact, gain, gain + n, &now.claimed, &now.own, error);
-    if (status != CAV_OK || !(first || better(&now, &best))) continue;
-    memcpy(solution->gain_q, gain, n * sizeof *gain);
-    memcpy(solution->gain_v, gain + n, n * sizeof *gain);
-    best = now;
-    first = 0;
+  search s = {.problem = problem, .tr = tr, .at = at, .solution = solution};
+  s.n = ((size_t)tr->nknot - 1) * (size_t)tr->nv * (size_t)tr->nv;
+  s.gain = malloc(2 * s.n * sizeof *s.gain);
+  solution->gain_q = calloc(s.n, sizeof(double));
+  solution->gain_v = calloc(s.n, sizeof(double));
+  cav_status status = s.gain && solution->gain_q && solution->gain_v ? CAV_OK : CAV_NO_MEMORY;
+  int trials = sets > 0 && sets < TRIALS ? sets : TRIALS;
+  for (int i = 0; i < trials && status == CAV_OK && !(s.found && done(&s.reached)); i++) {
+    const set one = sample(&s, i);
+    status = report(context, i + 1, trials) ? CAV_INTERRUPTED : try(&s, &one, error);
   }
-  free(gain);
+  free(s.gain);
   // zeros are no gains
-  if (first) free(solution->gain_q), free(solution->gain_v), solution->gain_q = solution->gain_v = NULL;
+  if (!s.found) free(solution->gain_q), free(solution->gain_v), solution->gain_q = solution->gain_v = NULL;
   return status;
 }

@@ -4,6 +4,10 @@
 /// M dq, against squared fractions of the actuators' limits, so one penalty serves all limbs. Gains of a knot are the
 /// mean of the finer steps up to the next knot.
 ///
+/// When a contact comes and how hard it is is not known to a step or a millimetre. So the recursion takes several
+/// contact laws, one of which holds at each step, by chance and apart from the others: the expectation of what is left
+/// stands for what is left (de Koning, Automatica 18, 1982), and gains are those that serve all of them.
+///
 /// The step matters: gains of the plan's own step answer a touch with what undoes it within that step, and a tenth of
 /// the step later they answer again. Gains from the plan's Hessian carried motions a third as far (README.md). Does not
 /// know limits of actuators, and does not see contacts that the law at hand does not feel.
@@ -29,8 +33,9 @@ typedef struct regulator {
   double *A, *B;        ///< [n*n], [n*nu] the step
   double *P;            ///< [n*n] penalty of what is left
   double *PA, *PB;      ///< [n*n], [n*nu]
-  double *H;            ///< [nu*nu]
-  double *G, *K;        ///< [nu*n] G = B'PA; K = H^-1 G: input -K x
+  double *S;            ///< [n*n] mean of A'PA over the laws
+  double *H;            ///< [nu*nu] of B'PB, and the penalty on inputs
+  double *G, *K;        ///< [nu*n] G of B'PA; K = H^-1 G: input -K x
   double *derivative;   ///< [nv*(n+nu)] derivatives of v' by dq, dv and inputs
   double *dq, *dv, *dn; ///< [nv*nv] of the inverse, row-major
   double *M;            ///< [nv*nv]
@@ -42,13 +47,14 @@ static int regulator_make(regulator *r, const cav_model *model) {
   int nv = model->nv, nu = model->nu, n = 2 * nv;
   size_t v = (size_t)nv, u = (size_t)nu, s = (size_t)n;
   *r = (regulator){.nv = nv, .nu = nu, .n = n};
-  double *m = calloc(v * u + 3 * s * s + 2 * s * u + u * u + 2 * u * s + v * (s + u) + 4 * v * v + v + 1, sizeof *m);
+  double *m = calloc(v * u + 4 * s * s + 2 * s * u + u * u + 2 * u * s + v * (s + u) + 4 * v * v + v + 1, sizeof *m);
   r->memory = m;
   if (!m) return 0;
   r->force = m, m += v * u;
   r->A = m, m += s * s;
   r->P = m, m += s * s;
   r->PA = m, m += s * s;
+  r->S = m, m += s * s;
   r->B = m, m += s * u;
   r->PB = m, m += s * u;
   r->H = m, m += u * u;
@@ -140,18 +146,28 @@ static void add_penalty(regulator *r, double scale) {
     }
 }
 
-/// One step back: K, and P of the step before without the penalty on its state. H is there already.
+/// Adds A and B of one law, of which there are so many: S += A'PA, G += B'PA, H += B'PB.
+static void add_law(regulator *r, int laws) {
+  int n = r->n, nu = r->nu;
+  double part = 1.0 / laws;
+  memset(r->PA, 0, (size_t)n * (size_t)n * sizeof(double));
+  cav_dense_product(n, n, n, part, r->P, n, r->A, n, r->PA, n);
+  cav_dense_product_transposed(CAV_PART_ALL, n, n, n, 1, r->A, n, r->PA, n, r->S, n);
+  if (nu == 0) return;
+  cav_dense_product_transposed(CAV_PART_ALL, nu, n, n, 1, r->B, n, r->PA, n, r->G, nu);
+  memset(r->PB, 0, (size_t)n * (size_t)nu * sizeof(double));
+  cav_dense_product(n, nu, n, part, r->P, n, r->B, n, r->PB, n);
+  cav_dense_product_transposed(CAV_PART_ALL, nu, nu, n, 1, r->B, n, r->PB, n, r->H, nu);
+}
+
+/// One step back, from S, G and H: K, and P of the step before without the penalty on its state. The penalty on inputs
+/// is one a second.
 static cav_status riccati(regulator *r) {
   int n = r->n, nu = r->nu;
-  size_t square = (size_t)n * (size_t)n * sizeof(double), wide = (size_t)nu * (size_t)n * sizeof(double);
-  memset(r->PA, 0, square);
-  cav_dense_product(n, n, n, 1, r->P, n, r->A, n, r->PA, n);
-  memset(r->P, 0, square);
-  cav_dense_product_transposed(CAV_PART_ALL, n, n, n, 1, r->A, n, r->PA, n, r->P, n);
+  memcpy(r->P, r->S, (size_t)n * (size_t)n * sizeof(double));
   if (nu > 0) {
-    memset(r->G, 0, wide);
-    cav_dense_product_transposed(CAV_PART_ALL, nu, n, n, 1, r->B, n, r->PA, n, r->G, nu);
-    memcpy(r->K, r->G, wide);
+    for (int i = 0; i < nu; i++) r->H[i * nu + i] += r->h;
+    memcpy(r->K, r->G, (size_t)nu * (size_t)n * sizeof(double));
     if (!cav_dense_factor(nu, nu - 1, r->H, nu)) return CAV_NOT_CONVERGED;
     cav_dense_solve_lower(nu, nu - 1, r->H, nu, n, r->K, nu);
     cav_dense_solve_upper(nu, nu - 1, r->H, nu, n, r->K, nu);
@@ -163,17 +179,6 @@ static cav_status riccati(regulator *r) {
       r->P[(size_t)i * n + j] = r->P[(size_t)j * n + i] = mean;
     }
   return CAV_OK;
-}
-
-/// H = B'PB + h, the penalty on inputs being one a second.
-static void penalty_inputs(regulator *r) {
-  int n = r->n, nu = r->nu;
-  if (nu == 0) return;
-  memset(r->PB, 0, (size_t)n * (size_t)nu * sizeof(double));
-  memset(r->H, 0, (size_t)nu * (size_t)nu * sizeof(double));
-  cav_dense_product(n, nu, n, 1, r->P, n, r->B, n, r->PB, n);
-  cav_dense_product_transposed(CAV_PART_ALL, nu, nu, n, 1, r->B, n, r->PB, n, r->H, nu);
-  for (int i = 0; i < nu; i++) r->H[i * nu + i] += r->h;
 }
 
 /// Adds the gains of this step, as generalised forces, to those of the knot.
@@ -189,31 +194,47 @@ static void add_gains(const regulator *r, double *gain_q, double *gain_v) {
     }
 }
 
+/// S, G and H at (q, v) under all laws, from P.
+static cav_status add_laws(regulator *r, const cav_transcription *tr, const cav_options *law, int laws,
+                           cav_state *state, const double *q, const double *v) {
+  size_t n = (size_t)r->n, nu = (size_t)r->nu;
+  memset(r->S, 0, n * n * sizeof(double));
+  memset(r->G, 0, nu * n * sizeof(double));
+  memset(r->H, 0, nu * nu * sizeof(double));
+  for (int i = 0; i < laws; i++) {
+    state->options = cav_options_at_step(&law[i], r->h);
+    state->options.order = CAV_ORDER_EULER;
+    cav_status status = find_derivative(r, tr->model, state, q, v);
+    if (status != CAV_OK) return status;
+    step_columns(r, tr, v + r->nv, r->derivative, r->n, 1, r->A);
+    step_columns(r, tr, v + r->nv, r->derivative + n * (size_t)r->nv, r->nu, 0, r->B);
+    add_law(r, laws);
+  }
+  return CAV_OK;
+}
+
 /// Back over a motion; gains of the first knots are kept.
-static cav_status sweep(regulator *r, const cav_transcription *tr, const cav_trajectory *fine, cav_state *state,
-                        cav_state *bare, int knots, double *gain_q, double *gain_v) {
+static cav_status sweep(regulator *r, const cav_transcription *tr, const cav_trajectory *fine, const cav_options *law,
+                        int laws, cav_state *state, cav_state *bare, int knots, double *gain_q, double *gain_v) {
   int nq = fine->nq, nv = fine->nv;
   size_t square = (size_t)nv * nv;
   cav_status status = CAV_OK;
   for (int k = fine->nknot - 2; k >= 0 && status == CAV_OK; k--) {
     const double *q = fine->q + (size_t)k * nq, *v = fine->v + (size_t)k * nv;
     status = cav_transcription_stopped(tr) ? CAV_INTERRUPTED : cav_inertia(tr->model, bare, q, r->M);
-    if (status == CAV_OK) status = find_derivative(r, tr->model, state, q, v);
-    if (status != CAV_OK) break;
     // at the end a second's straying is penalised
-    if (k == fine->nknot - 2) add_penalty(r, 1);
-    step_columns(r, tr, v + nv, r->derivative, r->n, 1, r->A);
-    step_columns(r, tr, v + nv, r->derivative + (size_t)r->n * nv, r->nu, 0, r->B);
-    penalty_inputs(r);
-    status = riccati(r);
+    if (status == CAV_OK && k == fine->nknot - 2) add_penalty(r, 1);
+    if (status == CAV_OK) status = add_laws(r, tr, law, laws, state, q, v);
+    if (status == CAV_OK) status = riccati(r);
+    if (status != CAV_OK) break;
     add_penalty(r, r->h);
     int t = k / FINER;
-    if (status == CAV_OK && t < knots) add_gains(r, gain_q + (size_t)t * square, gain_v + (size_t)t * square);
+    if (t < knots) add_gains(r, gain_q + (size_t)t * square, gain_v + (size_t)t * square);
   }
   return status;
 }
 
-cav_status cav_feedback(const cav_transcription *tr, const cav_trajectory *motion, const cav_options *law,
+cav_status cav_feedback(const cav_transcription *tr, const cav_trajectory *motion, const cav_options *law, int laws,
                         const cav_feedback_penalty *penalty, double *gain_q, double *gain_v) {
   size_t n = ((size_t)motion->nknot - 1) * (size_t)motion->nv * (size_t)motion->nv;
   memset(gain_q, 0, n * sizeof *gain_q);
@@ -231,12 +252,10 @@ cav_status cav_feedback(const cav_transcription *tr, const cav_trajectory *motio
     r.h = motion->timestep / FINER;
     r.v = penalty->tracking / (tr->weight * CAV_MOMENT_ARM);
     r.q = r.v * penalty->rate * penalty->rate;
-    state->options = cav_options_at_step(law, r.h);
-    state->options.order = CAV_ORDER_EULER;
     bare->options.contact = bare->options.constraint = 0;
     status = find_forces(&r, tr->model, bare, motion->q);
   }
-  if (status == CAV_OK) status = sweep(&r, tr, fine, state, bare, motion->nknot - 1, gain_q, gain_v);
+  if (status == CAV_OK) status = sweep(&r, tr, fine, law, laws, state, bare, motion->nknot - 1, gain_q, gain_v);
   cav_state_free(state);
   cav_state_free(bare);
   cav_trajectory_free(whole);

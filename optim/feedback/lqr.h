@@ -11,10 +11,10 @@ typedef struct cav_feedback_penalty {
 } cav_feedback_penalty;
 
 /// Gains du = gain_q dq + gain_v dv from knot t to t+1, t = 0 .. nknot-2, each [nv*nv] row-major, at tenths of the step
-/// and below, for contacts by law. q, v of the motion are used. CAV_NO_MEMORY, CAV_NOT_FINITE, CAV_NOT_CONVERGED: the
-/// motion is too far from any that a regulator can hold.
+/// and below, for contacts by any of the laws [laws], at least one, each as likely. q, v of the motion are used.
+/// CAV_NO_MEMORY, CAV_NOT_FINITE, CAV_NOT_CONVERGED: the motion is too far from any that a regulator can hold.
 cav_status cav_feedback(const cav_transcription *transcription, const cav_trajectory *motion, const cav_options *law,
-                        const cav_feedback_penalty *penalty, double *gain_q, double *gain_v);
+                        int laws, const cav_feedback_penalty *penalty, double *gain_q, double *gain_v);
 
 /// Feedback gains of a motion into its solution: the best of a number of sets, 0: of all, by the closed loops of
 /// verification. report is called before each set, from 1 to most, and ends the search by a nonzero return:

@@ -154,13 +154,31 @@ typedef struct cav_replay {
 } cav_replay;
 cav_status cav_replay_steps(const cav_verification *verification, cav_replay *replay);
 cav_status cav_replay_open(const cav_verification *verification, cav_replay *replay);
-/// law is what the simulation obeys, its timestep apart; law NULL: the model's own.
+/// law is what the simulation obeys, its timestep apart.
 cav_status cav_replay_closed(const cav_verification *verification, const cav_options *law, const double *gain_q,
                              const double *gain_v, struct cav_follow *follow);
 
-/// The closed loops of a verification alone, for the choice of gains. Fails as cav_verify does.
+/// Under the contacts of the model's file, at each of the steps that simulators take: the worst; where it is lost at
+/// one, that one.
+cav_status cav_replay_own(const cav_verification *verification, const double *gain_q, const double *gain_v,
+                          struct cav_follow *follow);
+
+/// An impulse on the centre of mass of a root link, at a fraction of the motion.
+typedef struct cav_push {
+  int link;
+  double fraction, impulse[3]; ///< N s, world
+} cav_push;
+
+/// Under the contacts of the model's file at the longest of those steps, with a push.
+cav_status cav_replay_pushed(const cav_verification *verification, const double *gain_q, const double *gain_v,
+                             const cav_push *push, struct cav_follow *follow);
+
+/// The closed loops of a motion with its gains, for their choice: of a verification, and then two small pushes.
+enum { CAV_LOOP_OWN, CAV_LOOP_CLAIMED, CAV_LOOP_PUSHED, CAV_LOOP_PUSHED_BACK, CAV_LOOPS };
+
+/// Runs them in this order up to the first that is lost; returns their number in *n. Fails as cav_verify does.
 cav_status cav_closed_loops(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
-                            const double *gain_q, const double *gain_v, struct cav_follow *claimed,
-                            struct cav_follow *own, cav_error *error);
+                            const double *gain_q, const double *gain_v, struct cav_follow follow[CAV_LOOPS], int *n,
+                            cav_error *error);
 
 #endif

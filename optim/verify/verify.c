@@ -390,6 +390,9 @@ static cav_status examine(cav_verification *verification, cav_balance *balance, 
   return status;
 }
 
+// s: impulse of a small push over the weight, a tenth of what one gives by a hand
+static const double small_push = 0.003;
+
 // what the model has and the claimed law leaves out, NULL if nothing
 static const char *left_out(const cav_verification *verification) {
   const cav_options *own = &verification->model->options, *law = &verification->law;
@@ -528,7 +531,7 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
   if (status == CAV_OK) status = cav_replay_steps(&verification, &replay);
   if (status == CAV_OK) status = cav_replay_open(&verification, &replay);
   if (status == CAV_OK) status = cav_replay_closed(&verification, contact, gain_q, gain_v, &replay.closed);
-  if (status == CAV_OK) status = cav_replay_closed(&verification, NULL, gain_q, gain_v, &replay.own);
+  if (status == CAV_OK) status = cav_replay_own(&verification, gain_q, gain_v, &replay.own);
   if (status == CAV_OK) {
     *verdict->reason = 0;
     fill(&verification, &found, &replay, verdict);
@@ -560,9 +563,34 @@ cav_status cav_terms_report(const cav_problem *problem, const cav_trajectory *tr
   return status;
 }
 
+// the root link of the heaviest tree that an actuator moves, 0 if there is none
+static int pushed_link(const cav_verification *verification) {
+  const cav_model *model = verification->model;
+  int found = 0;
+  double most = 0;
+  for (int root = 1; root < model->nlink; root++) {
+    if (model->link[root].root != root) continue;
+    double mass = 0;
+    for (int l = root; l < model->nlink; l++) mass += model->link[l].root == root ? model->link[l].mass : 0;
+    if (mass > most) most = mass, found = root;
+  }
+  return found;
+}
+
+// a loop after the others
+static cav_status run_loop(const cav_verification *verification, int loop, const cav_options *contact,
+                           const double *gain_q, const double *gain_v, struct cav_follow *follow) {
+  if (loop == CAV_LOOP_OWN) return cav_replay_own(verification, gain_q, gain_v, follow);
+  if (loop == CAV_LOOP_CLAIMED) return cav_replay_closed(verification, contact, gain_q, gain_v, follow);
+  // along a diagonal, so that planar motions feel it too
+  double along = (loop == CAV_LOOP_PUSHED ? 1 : -1) * small_push * verification->weight * sqrt(0.5);
+  const cav_push push = {pushed_link(verification), 1.0 / 3, {along, along, 0}};
+  return cav_replay_pushed(verification, gain_q, gain_v, &push, follow);
+}
+
 cav_status cav_closed_loops(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
-                            const double *gain_q, const double *gain_v, struct cav_follow *claimed,
-                            struct cav_follow *own, cav_error *error) {
+                            const double *gain_q, const double *gain_v, struct cav_follow follow[CAV_LOOPS], int *n,
+                            cav_error *error) {
   cav_verification verification;
   cav_status status = cav_verification_begin(&verification, problem, trajectory, contact, gain_q, gain_v, error);
   int nv = status == CAV_OK ? verification.model->nv : 0;
@@ -571,8 +599,11 @@ cav_status cav_closed_loops(const cav_problem *problem, const cav_trajectory *tr
     status = cav_inverse(verification.model, verification.state, verification.q + t * verification.model->nq, v, v + nv,
                          verification.u + t * nv);
   }
-  if (status == CAV_OK) status = cav_replay_closed(&verification, contact, gain_q, gain_v, claimed);
-  if (status == CAV_OK) status = cav_replay_closed(&verification, NULL, gain_q, gain_v, own);
+  *n = 0;
+  while (*n < CAV_LOOPS && status == CAV_OK && (*n == 0 || !*follow[*n - 1].lost)) {
+    status = run_loop(&verification, *n, contact, gain_q, gain_v, &follow[*n]);
+    if (status == CAV_OK) ++*n;
+  }
   cav_verification_end(&verification);
   return status;
 }
