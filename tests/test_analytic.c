@@ -200,6 +200,7 @@ static int one_state(readings *r, int k, double lift) {
   o->next_gap = next_gap;
   // a step over which links turn
   o->timestep = next_gap == CAV_NEXT_GAP_EXACT ? 0.02 : model->timestep;
+  o->spring = (cav_spring)(k / 3 % 2);
   o->gravity = k % 5 > 0;
   o->passive = k % 7 > 0;
   other->options = *o;

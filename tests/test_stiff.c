@@ -1,5 +1,6 @@
-/// Forward steps where a rounding is worth a force: softness from 1e-2 to 1e-14 times scenes with few, many and redundant
-/// contacts, against a step in quadruple precision (quad.h). With "table" prints what tests/results/stiff.md is made of.
+/// Stiff constraints and springs. Forward steps where a rounding is worth a force: softness from 1e-2 to 1e-14 times
+/// scenes with few, many and redundant contacts, against a step in quadruple precision (quad.h). With "table" prints
+/// what tests/results/stiff.md is made of.
 #include "quad.h"
 #include "scene.h"
 
@@ -206,8 +207,170 @@ static void test_softness(int table) {
   for (int i = 0; i < n; i++) scene_close(&all[i]);
 }
 
+// ---------------------------------------------------------------- springs
+
+enum { SPRING_STEPS = 2000, KINDS = 4 };
+static const double spring_h = 0.01, stiffnesses[] = {1e2, 1e4, 1e7, 1e12};
+
+// one coordinate x on a spring, mass one, by its closed form: v_next from x and v
+static double spring_step(cav_order order, double k, double x, double v) {
+  const double a = spring_h * spring_h * k;
+  if (order == CAV_ORDER_EULER) return (v - spring_h * k * x) / (1 + a);
+  return v - spring_h * k * x / (1 + 0.25 * a);
+}
+
+// a slide; a ball joint turning about one axis; a free body along one; two slides that a tendon joins, of which what is
+// between them has half the mass
+static cav_model *spring_model(int kind, double k) {
+  static const char head[] = "<mujoco><option timestep='.01' gravity='0 0 0'/><worldbody>";
+  static const char ball[] = "<geom type='sphere' size='.1' mass='%g' contype='0' conaffinity='0'/></body>";
+  char text[2000], mass[200];
+  snprintf(mass, sizeof mass, ball, kind == 1 ? 1 / (0.4 * 0.1 * 0.1) : kind == 3 ? 2.0 : 1.0);
+  if (kind == 3)
+    snprintf(text, sizeof text,
+             "%s<body><joint name='a' type='slide' axis='1 0 0'/>%s<body><joint name='b' type='slide' axis='1 0 0'/>%s"
+             "</worldbody><tendon><fixed stiffness='%g' springlength='0'><joint joint='a' coef='1'/>"
+             "<joint joint='b' coef='-1'/></fixed></tendon></mujoco>",
+             head, mass, mass, k);
+  else
+    snprintf(text, sizeof text, "%s<body><joint type='%s' axis='1 0 0' stiffness='%g'/>%s</worldbody></mujoco>", head,
+             kind == 0   ? "slide"
+             : kind == 1 ? "ball"
+                         : "free",
+             k, mass);
+  return scene_load(text);
+}
+
+// springs of any stiffness step as their closed forms, and energy does what the order says
+static void test_springs(void) {
+  for (int kind = 0; kind < KINDS; kind++)
+    for (size_t n = 0; n < sizeof stiffnesses / sizeof *stiffnesses; n++)
+      for (int order = 0; order < 3; order++) {
+        scene s;
+        const double k = stiffnesses[n];
+        if (!scene_open(&s, "spring", spring_model(kind, k))) return;
+        const int nv = s.model->nv;
+        s.state->options.order = (cav_order)order;
+        s.state->options.spring = CAV_SPRING_IMPLICIT;
+        // at its rest half way between knots, as of the other orders a stiffer spring turns by more each step
+        double x = 0.01, v = order ? 2 * x / spring_h : 0.3, before = x - spring_h * v, worst = 0, size = 0;
+        double *start = calloc((size_t)nv, sizeof *start);
+        start[0] = kind == 3 ? 0.5 * x : x;
+        if (kind == 3) start[1] = -0.5 * x;
+        cav_integrate(s.model, s.model->q0, start, 1, s.q);
+        s.v[0] = kind == 3 ? 0.5 * v : v;
+        if (kind == 3) s.v[1] = -0.5 * v;
+        const double energy = v * v + k * (order ? 0.25 * (x + before) * (x + before) : x * x);
+        double drift = 0;
+        for (int step = 0; step < SPRING_STEPS; step++) {
+          if (!CHECK(cav_forward(s.model, s.state, s.q, s.v, s.u, s.v_next) == CAV_OK)) {
+            fprintf(stderr, "kind %d, stiffness %g, order %d, step %d\n", kind, k, order, step);
+            break;
+          }
+          v = spring_step((cav_order)order, k, x, v);
+          before = x;
+          x += spring_h * v;
+          const double found = kind == 3 ? s.v_next[0] - s.v_next[1] : s.v_next[0];
+          size = fmax(size, fabs(v));
+          worst = fmax(worst, fabs(found - v));
+          memcpy(s.v, s.v_next, (size_t)nv * sizeof *s.v);
+          cav_integrate(s.model, s.q, s.v, spring_h, s.q);
+          // of the coordinate as found: kinetic, and of the spring half way between knots
+          if (kind == 0 && order) {
+            const double middle = s.q[0] - 0.5 * spring_h * found;
+            drift = fmax(drift, fabs((found * found + k * middle * middle) / energy - 1));
+          }
+        }
+        // rounding adds up over the steps; seen 2e-12
+        CHECK(worst <= 1e-9 * size);
+        CHECK(drift <= 1e-9);
+        if (worst > 1e-9 * size || drift > 1e-9)
+          fprintf(stderr, "kind %d, stiffness %g, order %d: %g of %g, drift %g\n", kind, k, order, worst, size, drift);
+        free(start);
+        scene_close(&s);
+      }
+}
+
+// the control: at q a spring explodes beyond h omega = 2
+static void test_springs_at_q(void) {
+  scene s;
+  if (!scene_open(&s, "spring", spring_model(0, 1e5))) return;
+  s.q[0] = 0.01;
+  for (int step = 0; step < 20; step++) {
+    CHECK(cav_forward(s.model, s.state, s.q, s.v, s.u, s.v_next) == CAV_OK);
+    memcpy(s.v, s.v_next, sizeof *s.v);
+    cav_integrate(s.model, s.q, s.v, spring_h, s.q);
+  }
+  CHECK(fabs(s.q[0]) > 1e5);
+  scene_close(&s);
+}
+
+// a spring that is slack between two lengths: each piece in closed form
+static void test_slack(void) {
+  scene s;
+  const double h = spring_h, k = 1e6;
+  if (!scene_open(
+          &s, "slack",
+          scene_load("<mujoco><option timestep='.01' gravity='0 0 0'/><worldbody><body>"
+                     "<joint name='a' type='slide' axis='1 0 0'/><geom type='sphere' size='.1' mass='1'/></body>"
+                     "</worldbody><tendon><fixed stiffness='1e6' springlength='.1 .4'>"
+                     "<joint joint='a' coef='2'/></fixed></tendon></mujoco>")))
+    return;
+  s.state->options.spring = CAV_SPRING_IMPLICIT;
+  for (int i = 0; i < 200; i++) {
+    const double x = 0.125 + 0.2 * scene_uniform(), v = 10 * scene_uniform();
+    s.q[0] = x, s.v[0] = v;
+    CHECK(cav_forward(s.model, s.state, s.q, s.v, s.u, s.v_next) == CAV_OK);
+    // free flight, and where that ends beyond an end of what is slack
+    double truth = v;
+    if (2 * (x + h * v) > 0.4) truth = (v - h * k * 2 * (2 * x - 0.4)) / (1 + 4 * h * h * k);
+    if (2 * (x + h * v) < 0.1) truth = (v - h * k * 2 * (2 * x - 0.1)) / (1 + 4 * h * h * k);
+    CHECK_NEAR(s.v_next[0], truth, 1e-9);
+    CHECK(cav_inverse(s.model, s.state, s.q, s.v, s.v_next, s.truth) == CAV_OK);
+    CHECK_NEAR(s.truth[0], 0, 1e-6);
+  }
+  scene_close(&s);
+}
+
+// there and back with every kind of joint and a tendon, springs made stiff; the other solver where it can
+static void test_springs_and_back(void) {
+  scene s;
+  static char text[sizeof scene_joints + 200];
+  if (!CHECK(strstr(scene_joints, "stiffness='10'") && strstr(scene_joints, "stiffness='7'"))) return;
+  // two of the springs a thousand times and more stiffer
+  const char *one = strstr(scene_joints, "stiffness='10'"), *two = strstr(scene_joints, "stiffness='7'");
+  snprintf(text, sizeof text, "%.*sstiffness='1e5'%.*sstiffness='1e6'%s", (int)(one - scene_joints), scene_joints,
+           (int)(two - one) - (int)strlen("stiffness='10'"), one + strlen("stiffness='10'"),
+           two + strlen("stiffness='7'"));
+  if (!scene_open(&s, "joints", scene_load(text))) return;
+  const int nv = s.model->nv;
+  double worst = 0, *step = calloc((size_t)nv, sizeof *step);
+  for (int i = 0; i < 120; i++) {
+    s.state->options.order = (cav_order)(i % 3);
+    s.state->options.spring = (cav_spring)(i / 3 % 4 > 0);
+    s.state->options.softness = 0.1;
+    for (int k = 0; k < nv; k++) step[k] = 0.1 * scene_uniform(), s.v[k] = 0.5 * scene_uniform();
+    cav_integrate(s.model, s.model->q0, step, 1, s.q);
+    for (int k = 0; k < nv; k++) s.truth[k] = s.v[k] + 0.1 * scene_uniform();
+    CHECK(cav_inverse(s.model, s.state, s.q, s.v, s.truth, s.u) == CAV_OK);
+    CHECK(cav_forward(s.model, s.state, s.q, s.v, s.u, s.v_next) == CAV_OK);
+    worst = fmax(worst, apart(s.v_next, s.truth, nv));
+    if (i / 3 % 4 > 0)
+      CHECK(cav_forward_gpgs(s.model, s.state, s.q, s.v, s.u, 9, 1e-9, s.v_next, NULL) == CAV_NOT_SUPPORTED);
+  }
+  CHECK(worst <= 1e-9);
+  printf("springs there and back: %.1e\n", worst);
+  free(step);
+  scene_close(&s);
+}
+
 int main(int count, char **arguments) {
   const int table = count > 1 && !strcmp(arguments[1], "table");
   test_softness(table);
-  return table ? check_failed > 0 : check_result();
+  if (table) return check_failed > 0;
+  test_springs();
+  test_springs_at_q();
+  test_slack();
+  test_springs_and_back();
+  return check_result();
 }

@@ -4,11 +4,13 @@
 
 #include "constraint.h"
 
-/// The rows of one constraint object and what their Jacobian is made of: only dofs that move the object are listed.
+/// The rows of one constraint object, or in a step of an implicit spring, and what their Jacobian is made of: only dofs
+/// that move the object are listed.
 typedef struct cav_block {
   int contact;  ///< index into state->contact, or -1
   int row;      ///< index into state->row, or -1
   int equality; ///< index into state->equality constraint, or -1
+  int spring;   ///< where all three are -1: the tendon
   int dim;      ///< number of rows
   int first;    ///< first of them among all rows
   int ndof;

@@ -26,9 +26,24 @@ static void add_turning_spring(const cav_derivative_task *t, int dof, double sti
   for (int i = 0; i < 9; i++) t->dq[(dof + i / 3) * t->nv + dof + i % 3] += stiffness * J[i];
 }
 
+// by the velocities that implicit springs see; all dofs of a joint alike
+static void add_springs_ahead(const cav_derivative_task *t) {
+  const cav_workspace *w = t->state->work;
+  const cav_springs_ahead ahead = cav_look_along_springs(t->state);
+  for (int i = 0; i < w->nspring; i++) {
+    const cav_joint *joint = &t->model->joint[w->spring[i]];
+    if (!(joint->stiffness > 0)) continue;
+    for (int k = joint->dof; k < t->nv && t->model->dof[k].joint == w->spring[i]; k++) {
+      t->dv[k * (t->nv + 1)] -= ahead.now * joint->stiffness;
+      t->dn[k * (t->nv + 1)] += ahead.next * joint->stiffness;
+    }
+  }
+}
+
 static void add_springs(const cav_derivative_task *t) {
   const cav_workspace *w = t->state->work;
   if (!t->state->options.passive) return;
+  if (t->state->options.spring == CAV_SPRING_IMPLICIT) add_springs_ahead(t);
   for (int i = 0; i < w->nspring; i++) {
     const cav_joint *joint = &t->model->joint[w->spring[i]];
     const double *rest = t->model->q0 + joint->q, *q = w->q + joint->q;
@@ -64,13 +79,15 @@ static void add_buoyancy(const cav_derivative_task *t) {
 
 static void add_tendon_forces(const cav_derivative_task *t) {
   const cav_workspace *w = t->state->work;
+  const cav_springs_ahead ahead = cav_look_along_springs(t->state);
   if (!t->state->options.passive) return;
   for (int i = 0; i < w->ntendon_spring; i++) {
     const cav_tendon *tendon = &t->model->tendon[w->tendon_spring[i]];
     double half = 0.5 * tendon->damping;
-    int slack = cav_tendon_stretch(tendon, t->state->tendon_length[w->tendon_spring[i]]) == 0;
-    add_along_tendon(t, w->tendon_spring[i], slack ? 0 : tendon->stiffness, t->mean ? half : tendon->damping,
-                     t->mean ? half : 0);
+    int slack = cav_tendon_stretch(tendon, cav_tendon_spring_length(t->state, w->tendon_spring[i])) == 0;
+    double stiffness = slack ? 0 : tendon->stiffness, implicit = stiffness > 0 ? stiffness : 0;
+    add_along_tendon(t, w->tendon_spring[i], stiffness, (t->mean ? half : tendon->damping) - ahead.now * implicit,
+                     (t->mean ? half : 0) + ahead.next * implicit);
   }
 }
 

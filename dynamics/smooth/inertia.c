@@ -34,8 +34,11 @@ void cav_composites(const cav_model *model, cav_state *state) {
 
 double cav_added_inertia(const cav_model *model, const cav_state *state, int dof) {
   const cav_dof *d = &model->dof[dof];
-  int implicit = state->options.order == CAV_ORDER_EULER && state->options.passive;
-  return d->armature + (implicit ? state->options.timestep * d->damping : 0);
+  double h = state->options.timestep, inertia = d->armature, stiffness = model->joint[d->joint].stiffness;
+  if (!state->options.passive) { return inertia; }
+  if (state->options.order == CAV_ORDER_EULER) { inertia += h * d->damping; }
+  if (stiffness > 0) { inertia += h * cav_look_along_springs(state).next * stiffness; }
+  return inertia;
 }
 
 void cav_composite_inertia(const cav_model *model, cav_state *state, double *M) {

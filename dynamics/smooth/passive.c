@@ -1,7 +1,8 @@
 /// Forces of dofs and tendons that do not pass through links: armature, damping, springs. Springs of free and ball
-/// joints act along the rotation vector from q0, in body axes. Damping of joints and tendons is linear in one velocity,
-/// which the order of the step chooses. Also gravity compensation, a force at the centre of mass of a body. Fluids:
-/// fluid.c.
+/// joints act along the rotation vector from q0, in body axes; implicit ones see it change by the angular velocity
+/// itself, of which its rate is the symmetric part but for the second order in the rotation from rest. Damping of
+/// joints and tendons is linear in one velocity, which the order of the step chooses. Also gravity compensation, a
+/// force at the centre of mass of a body. Fluids: fluid.c.
 #include "math3.h"
 #include "smooth.h"
 
@@ -48,6 +49,18 @@ void cav_add_buoyancy(const cav_model *model, cav_state *state) {
   }
 }
 
+// what springs of joints see of the velocities, where they are implicit
+static void look_along_springs(const cav_model *model, const cav_state *state, double *u) {
+  const cav_workspace *w = state->work;
+  const cav_springs_ahead ahead = cav_look_along_springs(state);
+  for (int i = 0; i < w->nspring; i++) {
+    const cav_joint *joint = &model->joint[w->spring[i]];
+    if (!(joint->stiffness > 0)) continue;
+    for (int k = joint->dof; k < model->nv && model->dof[k].joint == w->spring[i]; k++)
+      u[k] += joint->stiffness * ahead.next * w->v_next[k] - joint->stiffness * ahead.now * w->v[k];
+  }
+}
+
 void cav_add_joint_forces(const cav_model *model, const cav_state *state, const double *v, const double *a, double *u) {
   const cav_workspace *w = state->work;
   for (int i = 0; i < model->nv; i++) { u[i] += w->armature[i] * a[i]; }
@@ -56,6 +69,15 @@ void cav_add_joint_forces(const cav_model *model, const cav_state *state, const 
     for (int i = 0; i < model->nv; i++) { u[i] += w->damping[i] * v[i]; }
   }
   for (int i = 0; i < w->nspring; i++) { joint_spring(model, &model->joint[w->spring[i]], w->q, u); }
+  if (state->options.spring == CAV_SPRING_IMPLICIT) { look_along_springs(model, state, u); }
+}
+
+double cav_tendon_spring_length(const cav_state *state, int k) {
+  const cav_springs_ahead ahead = cav_look_along_springs(state);
+  double length = state->tendon_length[k];
+  if (ahead.next == 0 || !(state->model->tendon[k].stiffness > 0)) { return length; }
+  length += ahead.next * cav_tendon_velocity(state, k, state->work->v_next);
+  return ahead.now == 0 ? length : length - ahead.now * cav_tendon_velocity(state, k, state->work->v);
 }
 
 void cav_add_tendon_forces(const cav_model *model, const cav_state *state, const double *v, double *u) {
@@ -64,7 +86,7 @@ void cav_add_tendon_forces(const cav_model *model, const cav_state *state, const
   for (int i = 0; i < w->ntendon_spring; i++) {
     int k = w->tendon_spring[i];
     const cav_tendon *tendon = &model->tendon[k];
-    double stretch = cav_tendon_stretch(tendon, state->tendon_length[k]);
+    double stretch = cav_tendon_stretch(tendon, cav_tendon_spring_length(state, k));
     double force = tendon->stiffness * stretch + tendon->damping * cav_tendon_velocity(state, k, v);
     cav_tendon_pull(state, k, force, u);
   }

@@ -84,7 +84,8 @@ void cav_composite_inertia(const cav_model *model, cav_state *state, double *M);
 /// during the step. inertia.c.
 void cav_step_inertia(const cav_model *model, cav_state *state, double *M);
 
-/// D of a dof under the state's options: armature, and damping times h where damping is implicit. inertia.c.
+/// D of a dof under the state's options: armature, damping times h where damping is implicit, and what springs of
+/// joints add that are. inertia.c.
 double cav_added_inertia(const cav_model *model, const cav_state *state, int dof);
 
 /// Factors a tree-sparse matrix, M = L' D L; L may be M. Returns 0 if M is not positive definite. ldl.c.
@@ -95,6 +96,20 @@ void cav_ldl_solve(const cav_model *model, const cav_workspace *w, const double 
 
 /// Whether a step takes bias and passive forces at the mean of v and v_next, not at v.
 static inline int cav_takes_mean(const cav_state *state) { return state->options.order != CAV_ORDER_EULER; }
+
+/// Where springs act between knots: at their stretch plus next times its rate at v_next less now times that at v, s.
+typedef struct cav_springs_ahead {
+  double next, now;
+} cav_springs_ahead;
+
+static inline cav_springs_ahead cav_look_along_springs(const cav_state *state) {
+  const double h = state->options.timestep;
+  if (state->options.spring == CAV_SPRING_EXPLICIT) return (cav_springs_ahead){0, 0};
+  return cav_takes_mean(state) ? (cav_springs_ahead){0.25 * h, 0.25 * h} : (cav_springs_ahead){h, 0};
+}
+
+/// Length at which the spring of a tendon acts. passive.c.
+double cav_tendon_spring_length(const cav_state *state, int tendon);
 
 /// What a medium acts on, if there is one. fluid.c.
 cav_status cav_fluid_compile(const cav_model *model, cav_workspace *w);

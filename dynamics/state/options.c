@@ -8,6 +8,7 @@
 #define COUNT_WORD(...) +1
 #define WORD_TEXT(enumerator, word, text) [enumerator] = word,
 static const char *const order_words[] = {CAV_ORDERS(WORD_TEXT) NULL};
+static const char *const spring_words[] = {CAV_SPRINGS(WORD_TEXT) NULL};
 static const char *const stabilisation_words[] = {CAV_STABILISATIONS(WORD_TEXT) NULL};
 static const char *const regulariser_words[] = {CAV_REGULARISERS(WORD_TEXT) NULL};
 static const char *const sliding_words[] = {CAV_SLIDINGS(WORD_TEXT) NULL};

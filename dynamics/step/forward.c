@@ -299,7 +299,7 @@ static void add_row_rounding(const newton *s, int b, double *error) {
   const double *H = s->curvature + BLOCK * b;
   for (int i = 0; i < block->dim; i++) {
     const double *J = block->J + i * block->ndof;
-    double size = fabs(p->target[block->first + i]);
+    double size = fabs(p->target[block->first + i]) + DBL_MIN;
     // of positions after the step, which come about by several roundings
     if (p->excess && block->contact >= 0 && i == 0)
       size += 8.0 * norm3(p->state->contact[block->contact].pos) / p->state->options.timestep;
@@ -317,7 +317,8 @@ static double momentum_rounding(const newton *s, double terms, double *room) {
   for (int e = 0; e < s->ndof; e++) {
     const int i = s->dof[e];
     const double *M = s->part.M + work->row[i];
-    room[i] = terms * fabs(M[0] * s->x[i]);
+    // a number near zero is rounded to what the least normal one is
+    room[i] = terms * fabs(M[0]) * (fabs(s->x[i]) + DBL_MIN);
     for (int j = work->parent[i], k = 1; j >= 0; j = work->parent[j], k++) {
       room[i] += terms * fabs(M[k] * s->x[j]);
       room[j] += terms * fabs(M[k] * s->x[i]);
@@ -413,7 +414,8 @@ static double rounding(newton *s) {
   laws(s, s->y, s->f, s->curvature, 0);
   // two momenta, each at poses that are rounded, or one change of velocity
   const double terms = p->state->options.order == CAV_ORDER_MOMENTUM ? 4.0 : 1.0;
-  return momentum_rounding(s, terms, s->gradient) / p->state->options.timestep + 8.0 * DBL_EPSILON * s->scale;
+  return momentum_rounding(s, terms, s->gradient) / p->state->options.timestep +
+         8.0 * DBL_EPSILON * (s->scale + DBL_MIN / p->state->options.timestep);
 }
 
 // matrix := M
@@ -623,7 +625,7 @@ static cav_status iterate(newton *s, int go_on, double tolerance) {
   const int coulomb = s->problem.state->options.sliding == CAV_SLIDING_COULOMB, changes = coulomb || s->problem.excess;
   // bounds of friction or gaps that change need not lower the error at once
   const int patience = changes ? CHANGES : STALLS;
-  double least = INFINITY;
+  double least = INFINITY, least_error = INFINITY;
   int stalls = 0, accepted = 0, polished = 0, held = 1;
   if (!go_on) copy(s->x, s->v, nv);
   for (int pass = go_on;; pass++) {
@@ -634,11 +636,16 @@ static cav_status iterate(newton *s, int go_on, double tolerance) {
     stalls = residual(s) < 0.99 * least ? 0 : stalls + 1;
     if (residual(s) < least) {
       least = residual(s);
+      least_error = s->error;
       copy(s->best, s->x, nv);
     }
     if (least <= tolerance && (polished++ == POLISH || velocity_error(s) <= 10.0 * tolerance)) break;
     // one solve of a system as badly conditioned as a long chain is not at rounding yet
-    if (pass > (s->problem.nblock == 0) && s->error <= rounding(s)) break;
+    if (pass > (s->problem.nblock == 0) && s->error <= rounding(s)) {
+      // where no force is larger than the error, the least residual is not the least error
+      if (s->error < least_error) copy(s->best, s->x, nv);
+      break;
+    }
     if (stalls >= patience || s->iterations >= s->limit) break;
     // gaps that move with x are better followed
     if (s->problem.excess && !s->frozen && !go_on && held > FEW) break;

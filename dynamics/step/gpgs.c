@@ -452,6 +452,7 @@ static cav_status prepare(gpgs *s, const cav_model *model, cav_state *state, con
   const cav_impulse_room room = {.per_row = 7, .per_row_squared = squares, .per_row_and_dof = 1, .per_dof = 5};
   const cav_status status = cav_impulse_new(model, state, q, v, &room, p);
   if (status != CAV_OK) return status;
+  if (p->nspring > 0) return CAV_NOT_SUPPORTED;
   const size_t rows = (size_t)p->nrow, nv = (size_t)model->nv;
   s->n = p->nbound_row;
   s->m = p->nrow - s->n;

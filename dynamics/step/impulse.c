@@ -31,9 +31,46 @@ static cav_status fill_inertia(cav_impulse *p) {
   return cav_ldl_factor(p->model, p->state->work, p->M, p->L) ? CAV_OK : CAV_BAD_INPUT;
 }
 
+static int is_spring(const cav_block *block) { return block->contact < 0 && block->row < 0 && block->equality < 0; }
+
+static int is_implicit(const cav_state *state, int tendon) {
+  const cav_tendon *t = &state->model->tendon[tendon];
+  return state->options.spring == CAV_SPRING_IMPLICIT && state->options.passive && t->stiffness > 0 && t->ndof > 0;
+}
+
+static int count_springs(const cav_state *state) {
+  int n = 0;
+  for (int i = 0; i < state->work->ntendon_spring; i++) n += is_implicit(state, state->work->tendon_spring[i]);
+  return n;
+}
+
+// implicit springs as rows: impulse -h k (x + next y - now x'(v)) of the rate y after the step, x from the upper end of
+// what is slack
+static void add_springs(cav_impulse *p, int block, int row) {
+  const cav_state *state = p->state;
+  const cav_springs_ahead ahead = cav_look_along_springs(state);
+  for (int i = 0; i < state->work->ntendon_spring; i++) {
+    const int k = state->work->tendon_spring[i];
+    if (!is_implicit(state, k)) continue;
+    const cav_tendon *t = &p->model->tendon[k];
+    const double stretch = state->tendon_length[k] - t->springlength[1];
+    p->block[block++] = (cav_block){.contact = -1,
+                                    .row = -1,
+                                    .equality = -1,
+                                    .spring = k,
+                                    .dim = 1,
+                                    .first = row,
+                                    .ndof = t->ndof,
+                                    .dof = p->model->tendon_dof + t->dof,
+                                    .J = state->tendon_arm + t->dof};
+    p->R[row] = 1.0 / (state->options.timestep * ahead.next * t->stiffness);
+    p->target[row++] = (ahead.now * cav_tendon_velocity(state, k, state->work->v) - stretch) / ahead.next;
+  }
+}
+
 // v* = (1 - hB) x' - hK x and R of every row
 static void fill_targets(cav_impulse *p) {
-  for (int b = 0; b < p->nblock; b++) {
+  for (int b = 0; b < p->nblock - p->nspring; b++) {
     const cav_block *block = &p->block[b];
     double *target = p->target + block->first, *R = p->R + block->first;
     if (block->contact >= 0) {
@@ -56,15 +93,17 @@ static void fill_targets(cav_impulse *p) {
     }
   }
   const double *coupled = p->state->work->target;
-  if (p->state->options.coupled && p->nrow > 0) memcpy(p->target, coupled, (size_t)p->nrow * sizeof *coupled);
+  const int nrow = p->nrow - p->nspring;
+  if (p->state->options.coupled && nrow > 0) memcpy(p->target, coupled, (size_t)nrow * sizeof *coupled);
 }
 
 cav_status cav_impulse_new(const cav_model *model, cav_state *state, const double *q, const double *v,
                            const cav_impulse_room *room, cav_impulse *p) {
   cav_status status = cav_position(model, state, q);
   if (status != CAV_OK) return status;
-  const size_t nv = (size_t)model->nv, nblock = (size_t)(state->ncontact + state->nrow + state->nequality);
-  const size_t nrow = (size_t)cav_jacobian_rows(state), entries = (size_t)state->work->row[model->nv];
+  const size_t nv = (size_t)model->nv, nspring = (size_t)count_springs(state);
+  const size_t nblock = (size_t)(state->ncontact + state->nrow + state->nequality) + nspring;
+  const size_t nrow = (size_t)cav_jacobian_rows(state) + nspring, entries = (size_t)state->work->row[model->nv];
 
   // one piece of memory: doubles first, then blocks, then indices
   const size_t spare = room->per_block * nblock + room->per_row * nrow + room->per_row_squared * nrow * nrow +
@@ -75,7 +114,8 @@ cav_status cav_impulse_new(const cav_model *model, cav_state *state, const doubl
   if (!at) return CAV_NO_MEMORY;
   *p = (cav_impulse){.model = model, .state = state, .nv = (int)nv, .nblock = (int)nblock, .nrow = (int)nrow};
   p->nbound = state->ncontact + state->nrow;
-  p->nbound_row = (int)nrow - cav_equality_row_count(state);
+  p->nspring = (int)nspring;
+  p->nbound_row = (int)(nrow - nspring) - cav_equality_row_count(state);
   p->target = at;
   p->R = p->target + nrow;
   double *J = p->R + nrow;
@@ -93,9 +133,9 @@ cav_status cav_impulse_new(const cav_model *model, cav_state *state, const doubl
   status = cav_inverse_from(model, state, CAV_STAGE_POSITION, q, v, v, state->u);
   if (status != CAV_OK) return status;
   const int rows = cav_jacobian(model, state, p->block, dof, J);
-  assert(rows == p->nrow);
-  (void)rows;
+  assert(rows == p->nrow - p->nspring);
   fill_targets(p);
+  if (nspring > 0) add_springs(p, (int)(nblock - nspring), rows);
   return fill_inertia(p);
 }
 
@@ -146,6 +186,13 @@ static void equality_law(int dim, const double *R, const double *g, double *f, d
   if (potential) *potential = sum;
 }
 
+// implicit spring: slack over what a tendon's is, else f = g from either end
+static void spring_law(double R, double slack, double g, double *f, double *hessian, double *potential) {
+  *f = g < 0.0 ? g : R * g > slack ? g - slack / R : 0.0;
+  if (hessian) *hessian = *f != 0.0 || slack == 0.0 ? 1.0 / R : 0.0;
+  if (potential) *potential = 0.5 * R * *f * *f;
+}
+
 void cav_impulse_law(const cav_impulse *p, const cav_block *block, const double *y, double *f, double *hessian,
                      double *potential) {
   double g[DIM_MAX];
@@ -166,6 +213,11 @@ void cav_impulse_law(const cav_impulse *p, const cav_block *block, const double 
     equality_law(block->dim, R, g, f, hessian, potential);
     return;
   }
+  if (is_spring(block)) {
+    const double *rest = p->model->tendon[block->spring].springlength;
+    spring_law(R[0], (rest[1] - rest[0]) / cav_look_along_springs(p->state).next, g[0], f, hessian, potential);
+    return;
+  }
   const cav_row *row = &p->state->row[block->row];
   if (row->type == CAV_ROW_FRICTION_DOF || row->type == CAV_ROW_FRICTION_TENDON)
     cav_law_bilateral(R[0], row->sigma, row->bound, g[0], f, hessian, potential);
@@ -173,8 +225,16 @@ void cav_impulse_law(const cav_impulse *p, const cav_block *block, const double 
     cav_law_unilateral(R[0], row->sigma, g[0], f, hessian, potential);
 }
 
+// what an implicit spring pulls with at the state's velocities
+static double spring_force(const cav_impulse *p, const cav_block *block) {
+  const cav_tendon *t = &p->model->tendon[block->spring];
+  return t->stiffness * cav_tendon_stretch(t, cav_tendon_spring_length(p->state, block->spring));
+}
+
 cav_status cav_impulse_smooth(const cav_impulse *p, const double *v, const double *u, const double *x, double *r) {
   cav_smooth_inverse(p->model, p->state, v, x, r);
+  for (int b = 0; b < p->nblock && p->nspring > 0; b++)
+    if (is_spring(&p->block[b])) cav_tendon_pull(p->state, p->block[b].spring, -spring_force(p, &p->block[b]), r);
   for (int i = 0; i < p->nv; i++) r[i] = p->state->options.timestep * (r[i] - u[i]);
   return all_finite(r, p->nv) ? CAV_OK : CAV_NOT_FINITE;
 }
@@ -186,6 +246,8 @@ void cav_impulse_read(const cav_impulse *p, double *f) {
       memcpy(f + block->first, p->state->contact[block->contact].impulse, (size_t)block->dim * sizeof *f);
     else if (block->equality >= 0)
       memcpy(f + block->first, p->state->equality[block->equality].impulse, (size_t)block->dim * sizeof *f);
+    else if (is_spring(block))
+      f[block->first] = -p->state->options.timestep * spring_force(p, block);
     else
       f[block->first] = p->state->row[block->row].impulse;
   }

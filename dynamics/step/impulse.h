@@ -12,7 +12,8 @@ typedef struct cav_impulse {
   cav_state *state;
   int nv, nblock, nrow;
   int nbound, nbound_row; ///< blocks and rows before those of equality constraints
-  cav_block *block;       ///< [nblock] contacts in their order, then scalar rows, then equality constraints in theirs
+  int nspring;            ///< blocks behind those: implicit springs of tendons
+  cav_block *block; ///< [nblock] contacts in their order, then scalar rows, equality constraints, springs in theirs
   const double
       *held; ///< [nblock] normal impulses that bound friction under Coulomb's law; NULL: those of the law itself
   const double *excess; ///< [nblock] of normal rows beyond J v_next (cav_next_contact); NULL: none
@@ -51,8 +52,8 @@ void cav_impulse_inertia(const cav_impulse *problem, const double *x, double *r)
 void cav_impulse_law(const cav_impulse *problem, const cav_block *block, const double *y, double *f, double *hessian,
                      double *potential);
 
-/// Momentum missing without constraints: r := h (smooth inverse at x - u), zero where u alone takes v to x. Leaves the
-/// state's contacts as they are. v, u, x, r [nv]. Fails with CAV_NOT_FINITE.
+/// Momentum missing without constraints and implicit springs of tendons: r := h (smooth inverse at x - u), zero where u
+/// alone takes v to x. Leaves the state's contacts as they are. v, u, x, r [nv]. Fails with CAV_NOT_FINITE.
 cav_status cav_impulse_smooth(const cav_impulse *problem, const double *v, const double *u, const double *x, double *r);
 
 /// Impulses found by the state's last evaluation, f [nrow].

@@ -146,7 +146,7 @@ typedef struct cav_forward_report {
 
 /// Forward step by generalised projected Gauss-Seidel on (9), exact law only. At most iterations sweeps, fewer when the
 /// largest change of an impulse, relative, falls below tolerance. report may be NULL. CAV_NOT_SUPPORTED for the smoothed
-/// law and for CAV_NEXT_GAP_EXACT. Paper, section IV.
+/// law, for CAV_NEXT_GAP_EXACT and for implicit springs of tendons. Paper, section IV.
 CAV_API cav_status cav_forward_gpgs(const cav_model *model, cav_state *state, const double *q, const double *v,
                                     const double *u, int iterations, double tolerance, double *v_next,
                                     cav_forward_report *report);
@@ -154,7 +154,8 @@ CAV_API cav_status cav_forward_gpgs(const cav_model *model, cav_state *state, co
 /// The same with equality constraints hard: R_E = 0, the limit that the soft ones approach as R_E does. Forward only,
 /// as it has no inverse: many u give one v_next. Rows may repeat or contradict each other; what cannot hold together
 /// holds in the least squares of the soft rows. residual of the report is the force missing from the balance, relative;
-/// the impulses that hold the constraints are left in state->equality constraint. Paper, section II C.
+/// the impulses that hold the constraints are left in state->equality constraint. CAV_NOT_SUPPORTED as above. Paper,
+/// section II C.
 CAV_API cav_status cav_forward_hard(const cav_model *model, cav_state *state, const double *q, const double *v,
                                     const double *u, int iterations, double tolerance, double *v_next,
                                     cav_forward_report *report);

@@ -422,6 +422,12 @@ typedef struct cav_field {
   X(CAV_ORDER_MIDPOINT, "midpoint", "at (v + v_next)/2, damping too; second order where it matters")               \
   X(CAV_ORDER_MOMENTUM, "momentum", "as midpoint, but the rows of a root link balance the momentum of its tree half a step before and after: exact in flight")
 
+/// Where springs of joints and tendons act, stiffness above 0: their stretch x there by its rate at q;
+/// dynamics/METHOD.md, 12.
+#define CAV_SPRINGS(X)                                                                                             \
+  X(CAV_SPRING_EXPLICIT, "explicit", "at q: a step of sqrt(2) (euler) over their frequency and more explodes")    \
+  X(CAV_SPRING_IMPLICIT, "implicit", "at x + h x'(v_next) under euler, which damps them; at x + h (x'(v_next) - x'(v))/4 under the other orders, which keeps their energy. Stable at any stiffness")
+
 /// How v* is made from a constraint's position error; dynamics/METHOD.md, 4.
 #define CAV_STABILISATIONS(X)                                                                                      \
   X(CAV_STABILISATION_SOLREF, "solref", "eq. (28) from each constraint's solref and solimp, as MuJoCo does")       \
@@ -449,6 +455,7 @@ typedef struct cav_field {
 #define CAV_OPTIONS(REAL, WORD, FLAG)                                                                              \
   REAL(POSITION, timestep, DBL_MIN, DBL_MAX, 1, "s", "h: starts as the model's; every evaluation uses this one")   \
   WORD(VELOCITY, order, cav_order, CAV_ORDERS, "velocity of the bias and passive forces")                          \
+  WORD(POSITION, spring, cav_spring, CAV_SPRINGS, "where springs of joints and tendons act")                       \
   WORD(POSITION, stabilisation, cav_stabilisation, CAV_STABILISATIONS, "how v* follows from the position error")   \
   WORD(POSITION, regulariser, cav_regulariser, CAV_REGULARISERS, "diagonal of A that scales R")                    \
   WORD(VELOCITY, sliding, cav_sliding, CAV_SLIDINGS, "law of contacts that slide")                                 \
@@ -469,6 +476,7 @@ typedef struct cav_field {
 
 #define CAV_WORD_MEMBER(enumerator, word, text) enumerator,
 typedef enum cav_order { CAV_ORDERS(CAV_WORD_MEMBER) } cav_order;
+typedef enum cav_spring { CAV_SPRINGS(CAV_WORD_MEMBER) } cav_spring;
 typedef enum cav_stabilisation { CAV_STABILISATIONS(CAV_WORD_MEMBER) } cav_stabilisation;
 typedef enum cav_regulariser { CAV_REGULARISERS(CAV_WORD_MEMBER) } cav_regulariser;
 typedef enum cav_sliding { CAV_SLIDINGS(CAV_WORD_MEMBER) } cav_sliding;

@@ -16,6 +16,7 @@ const char *const cav_problem_dof_sets[] = {[CAV_DOFS_ALL] = "all",
                                             NULL};
 #define SENSOR_NAME(type, name, ...) [CAV_SENSOR_##type] = name,
 static const char *const sensors[CAV_SENSOR_TYPES + 1] = {CAV_SENSORS(SENSOR_NAME)};
+const char *const cav_problem_springs[] = {CAV_SPRINGS(WORD_TEXT) NULL};
 const char *const cav_problem_stabilisations[] = {CAV_STABILISATIONS(WORD_TEXT) NULL};
 const char *const cav_problem_regularisers[] = {CAV_REGULARISERS(WORD_TEXT) NULL};
 const char *const cav_problem_slidings[] = {CAV_SLIDINGS(WORD_TEXT) NULL};

@@ -41,6 +41,7 @@ extern const char *const cav_problem_orders[];
 extern const char *const cav_problem_closings[];
 extern const char *const cav_problem_guesses[];
 extern const char *const cav_problem_dof_sets[];
+extern const char *const cav_problem_springs[];
 extern const char *const cav_problem_stabilisations[];
 extern const char *const cav_problem_slidings[];
 extern const char *const cav_problem_next_gaps[];
