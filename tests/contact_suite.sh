@@ -31,4 +31,4 @@ ninja -C "$build" tests/contact_suite >/dev/null
   grep '^|' "$work/rows"
 } >"$work/table"
 mv "$work/table" "$table"
-grep '^- ' "$table"
+sed -n '/^## Pareto/,/^## Table/p' "$table"
