@@ -138,7 +138,7 @@ typedef struct cav_measure_plan {
   cav_sheet sheet, trace;
   double limit; ///< s, processor time of each solve
 } cav_measure_plan;
-cav_status cav_measure_plans(cav_measure *m, cav_measure_plan *out, cav_error *error);
+cav_status cav_measure_plans(cav_measure *m, cav_measure_plan *out);
 
 // columns of numbers of the sheets
 enum {

@@ -146,8 +146,7 @@ static cav_status solve(cav_measure *m, cav_measure_plan *out, const variant *v,
   return row ? CAV_OK : CAV_NO_MEMORY;
 }
 
-cav_status cav_measure_plans(cav_measure *m, cav_measure_plan *out, cav_error *error) {
-  (void)error;
+cav_status cav_measure_plans(cav_measure *m, cav_measure_plan *out) {
   *out = (cav_measure_plan){
       .sheet = {.name = "plan", .ntext = 3, .nnumber = CAV_PLAN_NUMBERS, .column = columns},
       .trace = {.name = "plan_trace", .ntext = 1, .nnumber = CAV_TRACE_NUMBERS, .column = trace_columns},

@@ -156,7 +156,7 @@ static cav_status refer(cav_measure *m, const motion *a, int n, double *referenc
     run_result r = {.q = w[k]};
     cav_status status = run(m, a, CAV_ORDER_MIDPOINT, n << k, 0, &r);
     if (status) return status;
-    if (m->tell(m->context, "time steps: the reference", 0)) return CAV_INTERRUPTED;
+    if (m->tell(m->context, "time steps: the reference", 0.5 * a->contacts)) return CAV_INTERRUPTED;
   }
   double coarse = distance(m, w[0], w[1]), fine = distance(m, w[1], w[2]);
   told->order = coarse > 0 && fine > 0 ? log2(coarse / fine) : NAN;

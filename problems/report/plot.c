@@ -7,7 +7,17 @@
 
 #include "html.h"
 
-enum { WIDTH = 460, HEIGHT = 320, LEFT = 58, RIGHT = 14, TOP = 26, BOTTOM = 42, STRIP = 30, TICKS = 32 };
+enum {
+  WIDTH = 460,
+  HEIGHT = 320,
+  LEFT = 58,
+  RIGHT = 14,
+  TOP = 26,
+  BOTTOM = 42,
+  STRIP = 30,
+  SIDE_STRIP = 46,
+  TICKS = 32
+};
 
 // from numbers to places: lower and upper are logarithms where the axis is logarithmic
 typedef struct axis {
@@ -26,7 +36,7 @@ static double clamp(const axis *a, double value) {
 
 static double place(const axis *a, double value) {
   value = clamp(a, value);
-  if (a->logarithmic && !(value > 0)) return a->first + (a->first < a->last ? -0.5 : 0.5) * STRIP;
+  if (a->logarithmic && !(value > 0)) return a->first + (a->first < a->last ? -0.5 * SIDE_STRIP : 0.5 * STRIP);
   double s = ((a->logarithmic ? log10(value) : value) - a->lower) / (a->upper - a->lower);
   return a->first + s * (a->last - a->first);
 }
@@ -99,7 +109,7 @@ static int axis_of(axis *a, const cav_html_plot *plot, int horizontal) {
   else
     round_linear(a);
   if (horizontal) {
-    a->first = LEFT + (a->zero ? STRIP : 0);
+    a->first = LEFT + (a->zero ? SIDE_STRIP : 0);
     a->last = WIDTH - RIGHT;
   } else {
     a->first = HEIGHT - BOTTOM - (a->zero ? STRIP : 0);

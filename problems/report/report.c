@@ -340,8 +340,8 @@ static void write_forward(const report *r, cav_html *page) {
                                         "setting",
                                         "states",
                                         "us",
-                                        "quartile",
-                                        "quartile",
+                                        "25 %",
+                                        "75 %",
                                         "iterations",
                                         "error, median",
                                         "error, largest",
@@ -403,7 +403,7 @@ static int is_contacts(const cav_sheet *sheet, int row) { return !strcmp(sheet->
 static void write_motion(const report *r, cav_html *page, int contacts) {
   static const int columns[] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, -1};
   static const char *const heading[] = {
-      "order",          "step, s",      "ms",          "quartile",      "quartile",    "error, m or rad",
+      "order",          "step, s",      "ms",          "25 %",          "75 %",        "error, m or rad",
       "observed order", "energy drift", "linear, m/s", "angular, m²/s", "failed steps"};
   const cav_sheet *sheet = &r->step.sheet;
   const cav_measure_motion *motion = &r->step.motion[contacts];
@@ -500,9 +500,8 @@ static void write_derivative(const report *r, cav_html *page) {
   static const char *const title[2][3] = {{"By q, no constraints", "By v, no constraints", "By v_next, no constraints"},
                                           {"By q, with contacts", "By v, with contacts", "By v_next, with contacts"}};
   static const int columns[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, -1};
-  static const char *const heading[] = {"states", "block",         "method",         "step",
-                                        "count",  "error, median", "error, largest", "reference's",
-                                        "us",     "quartile",      "quartile",       "failed"};
+  static const char *const heading[] = {"states",         "block",       "method", "step", "count", "error, median",
+                                        "error, largest", "reference's", "us",     "25 %", "75 %",  "failed"};
   const cav_sheet *sheet = &r->derivative.sheet;
   cav_html_heading(page, "Derivatives");
   cav_html_paragraph(page,
@@ -557,7 +556,7 @@ static void write_law(const report *r, cav_html *page) {
   static const char *const heading[] = {
       "swept",          "softness",   "time constant, s", "smoothing, m", "deepest, mm",
       "mean depth, mm", "slip, mm/s", "hover, mm",        "µ h v, mm",    "us",
-      "quartile",       "quartile",   "iterations",       "failed"};
+      "25 %",           "75 %",       "iterations",       "failed"};
   const cav_sheet *sheet = &r->law.sheet;
   cav_html_heading(page, "Contact law");
   if (sheet->nrow == 0 || !r->law.contacts) {
@@ -566,7 +565,7 @@ static void write_law(const report *r, cav_html *page) {
   }
   cav_html_paragraph(
       page,
-      "The scene under random forces for %g s in steps of %g s, from where it has most constraint rows, with one "
+      "The scene under random forces for %g s in steps of %g s, from where it has come to by itself, with one "
       "number of "
       "the law changed at a time. Softness and time constant say how fast and how stiffly penetration is taken back; "
       "smoothing makes contacts act before they touch. Hover is the gap across which force acts; the convex law "
@@ -679,7 +678,7 @@ static cav_status measure(report *r, cav_error *error) {
   section(r, 0.2 * rest);
   if (!status) status = cav_measure_laws(&r->m, &r->law);
   section(r, 1 - rest);
-  if (!status && problem) status = cav_measure_plans(&r->m, &r->plan, error);
+  if (!status && problem) status = cav_measure_plans(&r->m, &r->plan);
   if (!status) cav_advice_take(&r->forward, &r->step, problem ? &r->plan : NULL, &r->advice);
   if (status && error && !*error->text)
     cav_file_fail(error, status, 0, "the scene could not be measured: %s", cav_status_name(status));
