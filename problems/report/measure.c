@@ -298,7 +298,7 @@ static cav_status let_go(cav_measure *m) {
   memset(v, 0, (size_t)model->nv * sizeof *v);
   memset(u, 0, (size_t)model->nv * sizeof *u);
   m->contact_rows = 0;
-  for (int t = 0; t * h < least_rest || (m->contact_rows == 0 && t * h < most_rest); t++) {
+  for (int t = 0; (t * h < least_rest || (m->contact_rows == 0 && t * h < most_rest)) && !cav_measure_late(m); t++) {
     cav_status status = cav_forward_newton(model, m->state, q, v, u, 100, 1e-12, next, NULL);
     if (status == CAV_NO_MEMORY) return status;
     m->contact_rows = 0;
@@ -325,9 +325,15 @@ cav_status cav_measure_collect(cav_measure *m) {
   for (int e = 0; e < episodes && !cav_measure_late(m); e++) {
     cav_status status = run_episode(m, e, count, most);
     if (status) return status;
-    if (m->tell(m->context, "states of the scene", 0.04 * e / episodes)) return CAV_INTERRUPTED;
+    if (m->tell(m->context, "states of the scene", 0.4 * e / episodes)) return CAV_INTERRUPTED;
   }
-  for (int i = 0; i < m->nsample; i++) refer(m, &m->sample[i]);
+  for (int i = 0; i < m->nsample; i++) m->sample[i].uncertainty = NAN;
+  cav_measure_section(m, 1, 10);
+  for (int i = 0; i < m->nsample && !cav_measure_late(m); i++) {
+    refer(m, &m->sample[i]);
+    if (m->tell(m->context, "states of the scene", 0.4 + 0.6 * i / m->nsample)) return CAV_INTERRUPTED;
+  }
+  cav_measure_section(m, 1, 10);
   return let_go(m);
 }
 

@@ -95,7 +95,8 @@ double cav_measure_push(const cav_model *model, int dof, double acceleration);
 /// Forward solvers: errors and times of Newton's method and Gauss-Seidel.
 typedef struct cav_measure_forward {
   cav_sheet sheet;
-  int states, without;        ///< states; those whose reference is not known well enough
+  int states, without;        ///< states that count; those whose reference is not known well enough
+  int unmeasured;             ///< those that there was no time for
   double uncertainty;         ///< largest of the references
   const char *sweeps_missing; ///< why Gauss-Seidel has no rows; NULL: it has
 } cav_measure_forward;
@@ -104,6 +105,7 @@ cav_status cav_measure_forwards(cav_measure *m, cav_measure_forward *out);
 /// Orders and steps: errors of a motion, drift of what is conserved.
 typedef struct cav_measure_motion {
   int known;          ///< 0: there is no such motion
+  int slow;           ///< 1: as it would have taken too long
   double size;        ///< largest way of a dof, m or rad
   double uncertainty; ///< of the reference, m or rad
   double order;       ///< observed in the steps that it is taken from; NaN: none
@@ -121,7 +123,8 @@ cav_status cav_measure_steps(cav_measure *m, cav_measure_step *out);
 /// Derivatives of the inverse.
 typedef struct cav_measure_derivative {
   cav_sheet sheet;
-  int states[2]; ///< without constraints and with
+  int states[2];  ///< without constraints and with
+  double seconds; ///< that a reference takes, where that is more than there is time for; 0: it is not
 } cav_measure_derivative;
 cav_status cav_measure_derivatives(cav_measure *m, cav_measure_derivative *out);
 

@@ -37,6 +37,7 @@ typedef struct method {
 typedef struct outcome {
   double time[REPEATS], error, mismatch;
   int iterations, failed;
+  int repeats; // 0: there was no time for it
 } outcome;
 
 static int list_methods(const cav_measure *m, int sweeps, method *list) {
@@ -75,6 +76,7 @@ static void measure(cav_measure *m, const cav_measure_sample *s, const method *k
   double begin = cav_measure_processor();
   cav_status status = CAV_OK;
   for (int c = 0; c < calls; c++) status = call(m, s, k, x, &report);
+  out->repeats = repeat + 1;
   out->time[repeat] = 1e6 * (cav_measure_processor() - begin) / calls;
   if (repeat > 0) return;
   out->failed = status != CAV_OK && status != CAV_NOT_CONVERGED;
@@ -86,7 +88,7 @@ static void measure(cav_measure *m, const cav_measure_sample *s, const method *k
 
 // a row of the sheet: one method over the states of a bin, -1: of all
 static int summarise(cav_measure *m, cav_measure_forward *out, const method *k, int bin, int nmethod, int at,
-                     int repeats, const outcome *found, double *work) {
+                     const outcome *found, double *work) {
   double *time = work, *ratio = time + m->nsample, *error = ratio + m->nsample * REPEATS,
          *mismatch = error + m->nsample;
   double *iterations = mismatch + m->nsample;
@@ -94,11 +96,11 @@ static int summarise(cav_measure *m, cav_measure_forward *out, const method *k, 
   double rows = 0;
   for (int i = 0; i < m->nsample; i++) {
     const outcome *o = &found[i * nmethod + at];
-    if (!(m->sample[i].uncertainty <= CAV_MEASURE_KNOWN) || (bin >= 0 && m->sample[i].bin != bin)) continue;
+    if (o->repeats == 0 || (bin >= 0 && m->sample[i].bin != bin)) continue;
     double sorted[REPEATS];
     memcpy(sorted, o->time, sizeof sorted);
-    time[n] = cav_measure_quantile(sorted, repeats, 0.5);
-    for (int r = 0; r < repeats; r++) ratio[nratio++] = o->time[r] / time[n];
+    time[n] = cav_measure_quantile(sorted, o->repeats, 0.5);
+    for (int r = 0; r < o->repeats; r++) ratio[nratio++] = o->time[r] / time[n];
     n++;
     rows += m->sample[i].rows;
     failed += o->failed;
@@ -156,7 +158,7 @@ cav_status cav_measure_forwards(cav_measure *m, cav_measure_forward *out) {
     out->sweeps_missing = "Gauss-Seidel knows the exact law alone, and this scene's is smoothed";
   else if (m->options.next_gap == CAV_NEXT_GAP_EXACT)
     out->sweeps_missing = "Gauss-Seidel does not follow gaps to the end of the step, as this scene's law does";
-  int nmethod = list_methods(m, !out->sweeps_missing, list), repeats = m->quick ? 3 : REPEATS, done = 0;
+  int nmethod = list_methods(m, !out->sweeps_missing, list), repeats = m->quick ? 3 : REPEATS;
   size_t ns = (size_t)m->nsample;
   outcome *found = calloc(ns * (size_t)nmethod + 1, sizeof *found);
   double *work = calloc(ns * (4 + REPEATS) + 1, sizeof *work);
@@ -166,20 +168,24 @@ cav_status cav_measure_forwards(cav_measure *m, cav_measure_forward *out) {
   for (int i = 0; i < m->nsample; i++) {
     double known = m->sample[i].uncertainty;
     if (known <= CAV_MEASURE_KNOWN) out->uncertainty = fmax(out->uncertainty, known);
-    out->without += !(known <= CAV_MEASURE_KNOWN);
   }
-  for (int r = 0; r < repeats && !status && (r == 0 || !cav_measure_late(m)); r++, done = r) {
-    for (int i = 0; i < m->nsample && !status; i++) {
+  for (int r = 0; r < repeats && !status && !cav_measure_late(m); r++) {
+    // a state is measured by all methods or by none, the first of them in any case
+    for (int i = 0; i < m->nsample && !status && (i == 0 || !cav_measure_late(m)); i++) {
       for (int k = 0; k < nmethod; k++)
         if (m->sample[i].uncertainty <= CAV_MEASURE_KNOWN)
           measure(m, &m->sample[i], &list[k], r, &found[i * nmethod + k]);
       if (m->tell(m->context, "forward solvers", (r + (double)i / m->nsample) / repeats)) status = CAV_INTERRUPTED;
     }
   }
-  out->states = m->nsample - out->without;
+  for (int i = 0; i < m->nsample; i++) {
+    out->without += !(m->sample[i].uncertainty <= CAV_MEASURE_KNOWN);
+    out->states += found && found[i * nmethod].repeats > 0;
+  }
+  out->unmeasured = m->nsample - out->without - out->states;
   for (int k = 0; k < nmethod && !status; k++)
     for (int bin = -1; bin < CAV_MEASURE_BINS && !status; bin++)
-      if (!summarise(m, out, &list[k], bin, nmethod, k, done, found, work)) status = CAV_NO_MEMORY;
+      if (!summarise(m, out, &list[k], bin, nmethod, k, found, work)) status = CAV_NO_MEMORY;
   if (!status) mark(&out->sheet);
   free(found);
   free(work);

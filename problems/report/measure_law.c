@@ -57,6 +57,7 @@ static cav_status run(cav_measure *m, const cav_options *options, int n, double 
   memcpy(q, m->contact_q, (size_t)model->nq * sizeof *q);
   memcpy(v, m->contact_v, (size_t)model->nv * sizeof *v);
   for (int t = 0; t < n && !status; t++) {
+    if (cav_measure_late(m)) return CAV_INTERRUPTED;
     for (int d = 0; d < model->nv && t % hold == 0; d++) {
       int root = model->joint[model->dof[d].joint].type == CAV_JOINT_FREE;
       u[d] = cav_measure_push(model, d, (root ? push_root : push_joint) * cav_measure_normal(&seed));
@@ -100,7 +101,11 @@ static cav_status add(cav_measure *m, cav_measure_law *out, const char *swept, c
     row[CAV_LAW_TIME_CONSTANT] = options->time_constant;
   }
   row[CAV_LAW_SMOOTHING] = options->smoothing;
-  return run(m, options, n, row, &out->contacts);
+  cav_status status = run(m, options, n, row, &out->contacts);
+  if (status != CAV_INTERRUPTED) return status;
+  // there was no time to end it
+  out->sheet.nrow--;
+  return CAV_OK;
 }
 
 cav_status cav_measure_laws(cav_measure *m, cav_measure_law *out) {

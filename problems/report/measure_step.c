@@ -22,7 +22,7 @@ static const cav_sheet_column columns[] = {
     {"angular_drift", "free: largest change of angular momentum about the centre of mass, over mass, m^2/s"},
     {"failed", "steps that did not converge"}};
 
-enum { LEVELS = 9, COARSEST = 8, REPEATS = 5, ORDERS = 3 };
+enum { LEVELS = 9, COARSEST = 8, LEAST_LEVELS = 3, PILOT = 8, REPEATS = 5, ORDERS = 3 };
 static const char *const order_name[ORDERS] = {"euler", "midpoint", "momentum"};
 static const double motion_seconds = 0.32;
 
@@ -183,6 +183,7 @@ static cav_status measure_order(cav_measure *m, const motion *a, cav_order order
   double before = NAN;
   int repeats = m->quick ? 3 : REPEATS, conserves = !a->contacts && m->model->nequality == 0;
   for (int level = 0; level < levels; level++) {
+    if (level >= LEAST_LEVELS && cav_measure_late(m)) break;
     double time[REPEATS], error = NAN;
     int n = COARSEST << level, failed = 0, repeat = 0;
     cav_status status = CAV_OK;
@@ -204,7 +205,7 @@ static cav_status measure_order(cav_measure *m, const motion *a, cav_order order
     // below what is known of the reference, and of rounding, an order says nothing
     if (before > 0 && error > 10 * out->motion[a->contacts].uncertainty) row[CAV_STEP_ORDER] = log2(before / error);
     before = error;
-    if (conserves) {
+    if (conserves && (level == 0 || !cav_measure_late(m))) {
       motion still = *a;
       still.push = 0;
       still.options.passive = 0;
@@ -219,25 +220,27 @@ static cav_status measure_order(cav_measure *m, const motion *a, cav_order order
 }
 
 // levels that fit into the section's time, and in *n the steps of the first of the three references
+// 0: not even three of them
 static int plan_levels(const cav_measure *m, double step_seconds, int *n) {
   int levels = m->quick ? 7 : LEVELS;
   // 3 orders, repeated, with their drift, and the references: 28 times the finest motion
-  while (levels > 3) {
+  for (; levels >= LEAST_LEVELS; levels--) {
     double finest = step_seconds * (COARSEST << (levels - 1));
-    if (finest * (28 + 3 * (m->quick ? 3 : REPEATS)) < 0.45 * m->seconds) break;
-    levels--;
+    if (finest * (28 + 3 * (m->quick ? 3 : REPEATS)) < (levels > LEAST_LEVELS ? 1 : 3) * m->seconds) break;
   }
   *n = 2 * (COARSEST << (levels - 1));
-  return levels;
+  return levels < LEAST_LEVELS ? 0 : levels;
 }
 
 static cav_status measure_motion(cav_measure *m, const motion *a, cav_measure_step *out) {
   run_result r = {.q = m->vector[12]};
   double *reference = m->vector[13];
   int n;
-  cav_status status = run(m, a, CAV_ORDER_MIDPOINT, 4 * COARSEST, 0, &r);
+  cav_status status = run(m, a, CAV_ORDER_MIDPOINT, PILOT, 0, &r);
   if (status == CAV_NO_MEMORY) return status;
-  int levels = plan_levels(m, status ? 0 : r.seconds / (4 * COARSEST), &n);
+  int levels = plan_levels(m, status ? 0 : r.seconds / PILOT, &n);
+  out->motion[a->contacts].slow = levels == 0;
+  if (levels == 0) return CAV_OK;
   status = refer(m, a, n, reference, &out->motion[a->contacts]);
   if (status == CAV_NO_MEMORY || status == CAV_INTERRUPTED) return status;
   for (int order = 0; order < ORDERS; order++) {
@@ -283,9 +286,10 @@ cav_status cav_measure_steps(cav_measure *m, cav_measure_step *out) {
     free_motion.options.constraint = 0;
   else
     free_motion.options.contact = 0;
-  cav_measure_section(m, 3, 40);
+  cav_measure_section(m, 1.5, 20);
   cav_status status = measure_motion(m, &free_motion, out);
   if (m->contact_rows > 0 && !status) {
+    cav_measure_section(m, 1.5, 20);
     motion contacts = {.contacts = 1, .q = m->contact_q, .v = m->contact_v, .push = 5, .options = m->options};
     status = measure_motion(m, &contacts, out);
   }

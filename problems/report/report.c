@@ -122,8 +122,8 @@ static void advise_step(const report *r, cav_html *page) {
   if (a->motion < 0) {
     cav_html_entry(
         page, "Step and order",
-        "No advice: the motions tried depend so much on the step, even on the finest, that no reference is known to a "
-        "thousandth of their size.");
+        "No advice: no motion is known to a thousandth of its size. It depends on the step, even on the finest, or it "
+        "takes too long.");
     return;
   }
   const char *which = a->both ? "with contacts, and of one without," : a->motion ? "with contacts" : "without contacts";
@@ -366,6 +366,7 @@ static void write_forward(const report *r, cav_html *page) {
   if (r->forward.without)
     cav_html_paragraph(page, "%d more states have no reference that is known to 1e-7 and are left out of this section.",
                        r->forward.without);
+  if (r->forward.unmeasured) cav_html_paragraph(page, "There was no time for %d more states.", r->forward.unmeasured);
   if (r->forward.sweeps_missing) cav_html_paragraph(page, "%s.", r->forward.sweeps_missing);
   for (int k = 0; k < (r->forward.sweeps_missing ? 2 : 3); k++) {
     const char *const text[] = {kinds[k], "all", NULL};
@@ -410,6 +411,12 @@ static void write_motion(const report *r, cav_html *page, int contacts) {
   const char *name = contacts ? "contacts" : "free";
   char x[3][CAV_HTML_NUMBER];
   drawing d[2] = {0};
+  if (motion->slow) {
+    cav_html_paragraph(page, "The motion %s is left out: its reference would take too long%s.",
+                       contacts ? "with contacts" : "without contacts",
+                       r->request->quick ? "; without --quick there is more time" : "");
+    return;
+  }
   if (!motion->known) {
     cav_html_paragraph(page, contacts
                                  ? "Motion with contacts: the scene made none, or its motion could not be computed."
@@ -514,6 +521,12 @@ static void write_derivative(const report *r, cav_html *page) {
                      "come and go, a small one rounding.");
   const char *missing = cav_derivatives_missing(r->request->model);
   if (missing) cav_html_paragraph(page, "This model has no analytic derivatives: %s.", missing);
+  if (r->derivative.seconds > 0) {
+    char x[CAV_HTML_NUMBER];
+    cav_html_paragraph(page, "Left out: a reference would take %s s%s.", number(r->derivative.seconds, x),
+                       r->request->quick ? "; without --quick there is more time" : "");
+    return;
+  }
   for (int k = 0; k < 2; k++) {
     drawing d[3] = {0};
     cav_html_plot plots[3];
