@@ -629,9 +629,9 @@ static void write_plan(const report *r, cav_html *page) {
     add(&d[2], &r->plan.trace, names[k], text, CAV_TRACE_SECONDS, CAV_TRACE_VIOLATION, -1, CAV_HTML_CURVE, 0);
   }
   const cav_html_plot plots[] = {
-      plot_of(&d[0], "Cost against time", "s", "cost", 1, 1),
-      plot_of(&d[1], "Unactuated force against time", "s", "fraction of the weight", 1, 1),
-      plot_of(&d[2], "Violation of limits and constraints against time", "s", "scaled", 1, 1)};
+      plot_of(&d[0], "Cost against time", "s of processor time", "cost", 1, 1),
+      plot_of(&d[1], "Unactuated force against time", "s of processor time", "fraction of the weight", 1, 1),
+      plot_of(&d[2], "Violation of limits and constraints against time", "s of processor time", "scaled", 1, 1)};
   cav_html_plots(page, 3, plots);
   cav_sheet_show(&r->plan.sheet, page, "Solves", columns, heading, NULL);
   cav_sheet_link(&r->plan.sheet, page, "the same");
