@@ -101,7 +101,8 @@ typedef struct cav_term {
   const double *waypoint_time; ///< [nwaypoint], s, increasing
   double
       within; ///< tolerance of the target, in the unit of the quantity: the motion achieves it if off by at most this. 0:
-              ///< a usual one for goals at one time, none for windows; infinite: told only
+              ///< a usual one for goals at one time, none for windows; infinite: told only. Of slip, m/s: up to which
+              ///< contacts may slide, in a certificate
   double lower,
       upper; ///< CAV_USE_RANGE, infinite where open; target is NULL then, or a posture or orientation to start from
 } cav_term;

@@ -91,6 +91,9 @@ cav_status cav_problem_cycle(const cav_problem_reader *reader);
 /// Terms of <cost> and <constraint>, with the defaults that they leave in place. term.c.
 cav_status cav_problem_terms(const cav_problem_reader *reader);
 
+/// Whether a term has a say: a cost with a weight, a constraint, or how fast contacts may slide. term.c.
+int cav_term_counts(const cav_term *term);
+
 /// Targets of a term as a table gives them.
 typedef struct cav_problem_targets {
   int count;            ///< numbers of a target, given

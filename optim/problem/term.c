@@ -444,6 +444,8 @@ static cav_status read_sensor(const cav_problem_reader *reader, const cav_xml_no
 }
 
 static cav_status read_touch(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  if (term->within > 0 && term->quantity != CAV_QUANTITY_SLIP)
+    return cav_xml_fail(reader->error, node, "within", "this term has no target; of contacts, slip has a tolerance");
   if (!cav_xml_get(node, "body")) return CAV_OK;
   term->body = cav_problem_find(reader, node, "body", CAV_OBJECT_BODY);
   if (term->body < 0) return CAV_BAD_INPUT;
@@ -524,6 +526,10 @@ static int replaced(const cav_xml_node *cost, cav_quantity quantity) {
   return 0;
 }
 
+int cav_term_counts(const cav_term *term) {
+  return term->weight > 0 || term->use != CAV_USE_COST || (term->quantity == CAV_QUANTITY_SLIP && term->within > 0);
+}
+
 cav_status cav_problem_terms(const cav_problem_reader *reader) {
   const cav_xml_node *cost = cav_problem_child(reader->root, "cost"),
                      *constraint = cav_problem_child(reader->root, "constraint");
@@ -541,7 +547,7 @@ cav_status cav_problem_terms(const cav_problem_reader *reader) {
   cav_status status = CAV_OK;
   for (const cav_xml_node *node = cost ? cost->child : NULL; node && !status; node = node->next) {
     status = read_term(reader, node, 0, &p->term[p->nterm]);
-    p->nterm += p->term[p->nterm].weight > 0;
+    p->nterm += cav_term_counts(&p->term[p->nterm]);
   }
   for (const cav_xml_node *node = constraint ? constraint->child : NULL; node && !status; node = node->next) {
     status = read_term(reader, node, 1, &p->term[p->nterm++]);

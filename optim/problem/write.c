@@ -183,7 +183,7 @@ static int write_terms(FILE *out, const cav_problem *p) {
   fputs("  <cost>\n", out);
   write_absent(out, p);
   for (int i = 0; i < p->nterm; i++) {
-    if (p->term[i].use == CAV_USE_COST && p->term[i].weight > 0 && !write_term(out, p, &p->term[i])) return i;
+    if (p->term[i].use == CAV_USE_COST && cav_term_counts(&p->term[i]) && !write_term(out, p, &p->term[i])) return i;
   }
   fputs("  </cost>\n", out);
   int hard = 0;

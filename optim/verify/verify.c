@@ -295,14 +295,29 @@ static void note_ranges(const cav_verification *verification, int t, const doubl
   }
 }
 
-// how fast under load
-static void add_slip(const cav_verification *verification, metrics *found) {
+// m/s, up to which the problem lets a contact slide at knot t
+static double may_slide(const cav_verification *verification, int t, const cav_contact *contact) {
+  const cav_problem *problem = verification->problem;
+  double speed = 0;
+  int single, whole;
+  for (int i = 0; i < problem->nterm; i++) {
+    const cav_term *term = problem->term + i;
+    if (term->quantity != CAV_QUANTITY_SLIP || !(term->within > speed)) continue;
+    if (!cav_verification_holds(verification, term, t, &single, &whole)) continue;
+    if (cav_verification_looks_at(verification->model, term, contact)) speed = term->within;
+  }
+  return speed;
+}
+
+// how fast under load, beyond what is asked
+static void add_slip(const cav_verification *verification, int t, metrics *found) {
   for (int i = 0; i < verification->state->ncontact; i++) {
     const cav_contact *contact = verification->state->contact + i;
     double load = contact->impulse[0];
     if (contact->dim < 3 || !(load > loaded * verification->weight * verification->h)) continue;
     found->load += load;
-    found->slip += load * hypot(contact->velocity_next[1], contact->velocity_next[2]);
+    double speed = hypot(contact->velocity_next[1], contact->velocity_next[2]);
+    found->slip += load * fmax(speed - may_slide(verification, t, contact), 0);
   }
 }
 
@@ -342,7 +357,7 @@ static cav_status examine_knot(cav_verification *verification, int t, cav_balanc
   if (t >= verification->rows) cav_rates_add(verification, t, work + nv, &found->rates);
   if (t >= verification->rows) return CAV_OK;
   memcpy(verification->u + knot * nv, work, sizeof(double) * nv);
-  add_slip(verification, found);
+  add_slip(verification, t, found);
   note_forces(verification, t, v, work, verification->control + knot * model->nu, work + nv, "", found);
   cav_rates_add(verification, t, work + nv, &found->rates);
   cav_balance_add(balance, verification, t);
