@@ -358,10 +358,37 @@ static void check_histories(void) {
   printf("%d rollouts within their ranges\n", strict);
 }
 
+// a rod with damping d that is pumped by a torque F: I v' = 1.1 (F - d v) up to the speed of the largest power, F/2d,
+// from there on 1.1 F²/4d of power. The horizon from which on there is no proof is that time, less a step
+static void check_damped(void) {
+  double inertia = 1 + 1e-6, d = 0.1, energy = 2 * 9.81, most = 1 / (4 * d), below = inertia / (8 * d * d);
+  double time = inertia / d * log(2) / 1.1 + (energy - below) / (1.1 * most);
+  for (int longer = 0; longer < 2; longer++) {
+    char horizon[80], up[120];
+    double duration = time - 0.05 + (longer ? 0.05 : -0.1);
+    int steps = (int)lround(duration / 0.05), n = 0;
+    snprintf(horizon, sizeof horizon, "duration='%.17g' timestep='.05' close='open'", 0.05 * steps);
+    snprintf(up, sizeof up, CONSTRAINT("<posture name='up' joint='pivot' qpos='3.14159' at='end'/>"));
+    cav_problem *p = load(
+        "<mujoco><worldbody><body name='rod'><joint name='pivot' axis='0 1 0' damping='.1'/><inertial pos='0 0 -1' "
+        "mass='1' diaginertia='1e-6 1e-6 1e-6'/></body></worldbody><actuator><motor name='motor' joint='pivot' "
+        "gear='1' "
+        "ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>",
+        horizon, "", up);
+    if (!p) return;
+    cav_impossibility found;
+    CHECK(cav_problem_impossible(p, &found, 1, &n, NULL) == CAV_OK);
+    CHECK(n == !longer);
+    if (n) printf("%s\n", found.what);
+    cav_problem_free(p);
+  }
+}
+
 int main(void) {
   if (!mkdtemp(folder)) return EXIT_FAILURE;
   for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) check_pair(&pairs[i]);
   check_motions();
+  check_damped();
   check_histories();
   static const char *const file[] = {"model.xml", "problem.xml"};
   for (int i = 0; i < 2; i++) {

@@ -85,22 +85,27 @@ static void test_gait(const char *text, double axis, double travel) {
   }
   // no gait where it stands, nor where the guess swings already; a guess that is held is not held twice
   goal[0] = q[0];
-  CHECK(offers(&p, "stated soft hold slow"));
+  CHECK(offers(&p, "stated soft hold slow momentum longer"));
   p.guess = CAV_GUESS_HOLD;
-  CHECK(offers(&p, "stated soft line slow"));
+  CHECK(offers(&p, "stated soft line slow momentum longer"));
   p.guess = CAV_GUESS_INTERPOLATE;
   p.guess_height = 0.3;
-  CHECK(offers(&p, "stated soft line hold slow"));
+  CHECK(offers(&p, "stated soft line hold slow momentum longer"));
   goal[0] += travel;
   p.nswing = 1;
   p.swing = &(cav_swing){.joint = 1, .amplitude = 0.1, .frequency = 1};
-  CHECK(offers(&p, "stated soft line hold slow"));
+  CHECK(offers(&p, "stated soft line hold slow momentum longer"));
   // taking one leaves the problem as it was
   CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK);
   cav_strategy_apply(&p, &strategy[0], &taken);
   CHECK(taken.nswing == 1 && taken.guess_height == 0.3 && taken.schedule.stages == p.schedule.stages);
   cav_strategy_apply(&p, find(strategy, n, "slow"), &taken);
   CHECK(taken.nswing == 1 && taken.schedule.stages == 2 * p.schedule.stages);
+  cav_strategy_apply(&p, find(strategy, n, "longer"), &taken);
+  CHECK(taken.nswing == 1 && taken.duration_least == p.duration && taken.duration_most == 2 * p.duration);
+  CHECK(find(strategy, n, "longer")->use == CAV_STRATEGY_DIAGNOSIS && p.duration_most == 0);
+  cav_strategy_apply(&p, find(strategy, n, "momentum"), &taken);
+  CHECK(taken.order == CAV_ORDER_MOMENTUM && taken.duration_most == 0 && p.order == CAV_ORDER_MIDPOINT);
   cav_strategy_apply(&p, find(strategy, n, "hold"), &taken);
   CHECK(taken.nswing == 0 && taken.guess_height == 0 && taken.guess == CAV_GUESS_HOLD && p.guess_height == 0.3);
   cav_model_free(m);
@@ -111,7 +116,7 @@ static void check_order(cav_problem *p) {
   cav_strategy strategy[CAV_STRATEGIES];
   int n;
   p->order = CAV_ORDER_MOMENTUM;
-  CHECK(offers(p, "stated midpoint soft hold slow"));
+  CHECK(offers(p, "stated midpoint soft hold slow longer"));
   CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
   cav_solution *straight = NULL, *round = NULL;
   runs = first_stall = last_stall = 0;

@@ -129,7 +129,11 @@ typedef struct cav_cycle {
   const int (*pair)[2];  ///< [npair] joints
 } cav_cycle;
 
-typedef enum cav_guess { CAV_GUESS_HOLD, CAV_GUESS_INTERPOLATE } cav_guess;
+typedef enum cav_guess {
+  CAV_GUESS_HOLD,
+  CAV_GUESS_INTERPOLATE,
+  CAV_GUESS_PUMP ///< simulated under laws that pump energy, contacts left out: a swing-up (optim/METHOD.md, 7)
+} cav_guess;
 
 /// A posture that the guess passes.
 typedef struct cav_guess_pose {

@@ -271,18 +271,40 @@ CAV_API const cav_problem *cav_optimiser_problem(const cav_optimiser *optimiser)
 CAV_API const cav_options *cav_optimiser_contact(const cav_optimiser *optimiser);
 CAV_API const double *cav_optimiser_multipliers(cav_optimiser *optimiser, int *n);
 
-enum { CAV_STRATEGIES = 8, CAV_STRATEGY_SWINGS = 4 };
+enum { CAV_STRATEGIES = 10, CAV_STRATEGY_SWINGS = 4 };
+
+/// When a strategy is worth trying.
+typedef enum cav_strategy_use {
+  CAV_STRATEGY_TRY,      ///< where none before it succeeds
+  CAV_STRATEGY_MOMENTUM, ///< where, besides, the balance of momentum is the first condition that one of them misses
+  CAV_STRATEGY_DIAGNOSIS ///< where none of all succeeds: what it finds is told and not kept, since more was given than
+                         ///< asked: a duration free up to twice the stated one, times of windows in proportion
+} cav_strategy_use;
 
 /// A way to a motion: the guess and the schedule that a solve starts from.
 typedef struct cav_strategy {
   const char *name, *text; ///< in a word, and in words
   int stated;              ///< 1: the problem's own guess, 0: guess and swing
-  int first_midpoint;      ///< 1: solved under CAV_ORDER_MIDPOINT, then from there under the problem's order
+  cav_order order;         ///< that the motion obeys
+  int first_midpoint;      ///< 1: solved under CAV_ORDER_MIDPOINT, then from there under order
+  cav_strategy_use use;    ///< when
   cav_guess guess;
   int nswing;
   cav_swing swing[CAV_STRATEGY_SWINGS];
   cav_schedule schedule;
 } cav_strategy;
+
+/// What it takes to swing up: found by simulating laws that pump energy into the model, so that is enough; less may be
+/// (optim/METHOD.md, 7). Energies that bound it from below: cav_problem_impossible.
+typedef struct cav_pumping {
+  int needed;     ///< 1: start and goal stand by themselves, nothing touches, and actuators cannot hold what is between
+  double seconds; ///< in which it came near the goal with the efforts planned with; infinite: not in eight durations
+  double efforts; ///< multiple of these efforts with which it came near the goal in the duration; infinite: not with 9
+} cav_pumping;
+
+/// Takes seconds where pumping is needed, milliseconds where it is not. CAV_NO_MEMORY, or what the dynamics says of
+/// start and goal.
+CAV_API cav_status cav_problem_pumping(const cav_problem *problem, cav_pumping *pumping);
 
 /// Strategies for a problem, in the order in which they are worth trying; the first is the problem's own.
 /// CAV_NO_MEMORY, or what the dynamics says of the goal posture.

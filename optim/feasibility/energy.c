@@ -1,10 +1,12 @@
 /// What actuators can give in a time.
 ///
 /// Actuators give power sum tau_i q'_i, and q'_i <= sqrt(2 T/m_i) with the kinetic energy T and a least inertia m_i that
-/// moving one joint has whatever the others do. Contacts, limits and damping take energy only. So for the energy E above
-/// its least possible value d sqrt(E)/dt <= c, c = sum tau_i/sqrt(2 m_i): a swing-up needs the time, however it pumps. With
-/// gravity as one more force on all that moves, d sqrt(T)/dt <= c + g sqrt(M/2) holds where no least energy is known,
-/// and bounds how far a point comes: its speed is at most sqrt(2 T/m) with a least mass m of its own.
+/// moving one joint has whatever the others do. Contacts and limits take energy only, damping d_i q'_i² of it. So the
+/// energy E above its least possible value grows by at most P(E) = sum of the largest tau_i v - d_i v² with v up to
+/// sqrt(2 E/m_i): a swing-up needs the integral of dE/P, however it pumps. Without damping that is d sqrt(E)/dt <= c,
+/// c = sum tau_i/sqrt(2 m_i); with gravity as one more force on all that moves, d sqrt(T)/dt <= c + g sqrt(M/2) holds
+/// where no least energy is known, and bounds how far a point comes: its speed is at most sqrt(2 T/m) with a least mass
+/// m of its own.
 ///
 /// Nothing is said of models with springs, media, equality constraints, gravity compensation, or with an actuator that
 /// has no limit or acts on a joint of which no least inertia is known.
@@ -12,16 +14,20 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "algebra.h"
 #include "feasibility.h"
 #include "math3.h"
 
 static const double margin = 1.1; // of bounds on rates, for the error of a step
+enum { PARTS = 200, MOST_TIMES = 1000 };
 
 /// What is known of a model as a whole.
 typedef struct supply {
   double rate;      ///< c, sqrt(W)/sqrt(s); negative: unknown
+  double *force;    ///< [nv] tau_i, N or N m
+  double *inertia;  ///< [nv] m_i
   double gravity;   ///< what g adds to it
   double kinetic;   ///< T at the start, J
   double potential; ///< at the start, J
@@ -101,11 +107,10 @@ static int is_covered(const cav_model *m) {
 }
 
 /// c of the model; negative where an actuator has no limit, or a joint of its no least inertia.
-static cav_status supply_rate(cav_examination *e, double *rate) {
+static cav_status supply_rate(cav_examination *e, double *force, double *rate) {
   const cav_model *m = e->model;
-  double sum = 0, *moment = malloc((size_t)(2 * m->nv + 1) * sizeof *moment), *force = moment + m->nv;
+  double sum = 0, *moment = malloc((size_t)(m->nv + 1) * sizeof *moment);
   if (!moment) return CAV_NO_MEMORY;
-  for (int d = 0; d < m->nv; d++) force[d] = 0;
   for (int i = 0; i < m->nu; i++) {
     double range[2];
     cav_actuator_effort_range(m, i, range);
@@ -167,7 +172,10 @@ static cav_status survey(cav_examination *e, supply *s) {
   const cav_model *m = e->model;
   int level = m->gravity[0] == 0 && m->gravity[1] == 0 && m->gravity[2] <= 0;
   double g = norm3(m->gravity);
-  cav_status status = supply_rate(e, &s->rate);
+  s->force = calloc(2 * (size_t)m->nv + 1, sizeof *s->force);
+  s->inertia = s->force ? s->force + m->nv : NULL;
+  for (int d = 0; s->force && d < m->nv; d++) s->inertia[d] = least_inertia(m, d);
+  cav_status status = s->force ? supply_rate(e, s->force, &s->rate) : CAV_NO_MEMORY;
   if (status) return status;
   s->rate = is_covered(m) ? margin * s->rate : -1;
   s->gravity = g * sqrt(m->mass / 2);
@@ -289,36 +297,79 @@ static cav_status potential_of_posture(cav_examination *e, int first, int last, 
   return status;
 }
 
+/// Largest power at an energy above the least, with so many times the forces.
+static double largest_power(const cav_model *m, const supply *s, double energy, double times) {
+  double sum = 0;
+  for (int d = 0; d < m->nv; d++) {
+    double force = times * s->force[d], damping = m->options.passive ? m->dof[d].damping : 0;
+    if (force == 0) continue;
+    double v = sqrt(2 * energy / s->inertia[d]);
+    if (damping > 0) v = fmin(v, force / (2 * damping));
+    sum += force * v - damping * v * v;
+  }
+  return margin * sum;
+}
+
+/// Least time in which pumping raises the energy above the least from one value to another: the integral of 1/P, P
+/// taken at the upper end of each part. Ends at *reached, if not NULL, where a time is over.
+static double pumping_time(const cav_model *m, const supply *s, double from, double to, double times, double most,
+                           double *reached) {
+  double a = sqrt(from), step = (sqrt(to) - a) / PARTS, time = 0;
+  for (int i = 0; i < PARTS; i++) {
+    double low = (a + i * step) * (a + i * step), high = (a + (i + 1) * step) * (a + (i + 1) * step);
+    double power = largest_power(m, s, high, times);
+    time += power > 0 ? (high - low) / power : INFINITY;
+    if (reached && time <= most) *reached = high;
+    if (reached && time > most) break;
+  }
+  return time;
+}
+
+/// Least multiple of the forces by which a time is enough, infinite: none up to MOST_TIMES.
+static double effort_for(const cav_model *m, const supply *s, double from, double to, double time) {
+  double low = 1, high = MOST_TIMES;
+  if (pumping_time(m, s, from, to, high, 0, NULL) > time) return INFINITY;
+  while (high - low > 1e-3 * high) {
+    double middle = (low + high) / 2;
+    if (pumping_time(m, s, from, to, middle, 0, NULL) > time)
+      low = middle;
+    else
+      high = middle;
+  }
+  return low;
+}
+
 static cav_status examine_height(cav_examination *e, const supply *s, int first, int last) {
   const cav_requirement *r = &e->requirement[first];
   double posture, t = cav_requirement_time(e, r->knot) + e->problem->timestep;
   cav_status status = potential_of_posture(e, first, last, &posture);
   if (status || isinf(s->least)) return status;
   double needs = fmax(potential_with(e, first, last), posture) - s->least;
-  double has = fmax(s->kinetic + s->potential - s->least, 0), can = sqrt(has) + s->rate * t;
-  if (!(sqrt(fmax(needs, 0)) > can + 1e-6) || needs - has < 1e-6) return CAV_OK;
+  double has = fmax(s->kinetic + s->potential - s->least, 0), can = has;
+  if (!(needs > has + 1e-6) || pumping_time(e->model, s, has, needs, 1, t, &can) <= t) return CAV_OK;
   char what[160], time[80] = "no time is enough";
   cav_requirement_words(e, r, what, sizeof what);
-  if (s->rate > 0)
-    snprintf(time, sizeof time, "pumping takes at least %.3g s, or %.2g times the effort",
-             (sqrt(needs) - sqrt(has)) / s->rate, (sqrt(needs) - sqrt(has)) / (s->rate * t));
+  double least = pumping_time(e->model, s, has, needs, 1, 0, NULL), times = effort_for(e->model, s, has, needs, t);
+  if (isfinite(least)) snprintf(time, sizeof time, "pumping takes at least %.3g s", least);
+  size_t n = strlen(time);
+  if (isfinite(times)) snprintf(time + n, sizeof time - n, ", or %.3g times the effort", times);
   cav_impossible(
       e, CAV_CONDITION_ENERGY, r, "More time, a lower target, or stronger actuators.",
       "%s, too high for the actuators: it needs %.3g J more than the start has, they give at most %.3g J by then; %s",
-      what, needs - has, can * can - has, time);
+      what, needs - has, can - has, time);
   return CAV_OK;
 }
 
 cav_status cav_examine_energy(cav_examination *e) {
-  supply s;
+  supply s = {0};
   if (e->problem->cycle.on || e->n == 0) return CAV_OK;
   cav_status status = survey(e, &s);
-  if (status || s.rate < 0) return status;
   int before = e->nfound;
-  for (int i = 0, last; i < e->n && !status && e->nfound == before; i = last) {
+  for (int i = 0, last; i < e->n && !status && s.rate >= 0 && e->nfound == before; i = last) {
     for (last = i; last < e->n && e->requirement[last].knot == e->requirement[i].knot;) last++;
     status = examine_height(e, &s, i, last);
     for (int k = i; k < last && e->nfound == before && !status; k++) examine_way(e, &s, &e->requirement[k]);
   }
+  free(s.force);
   return status;
 }

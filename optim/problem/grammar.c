@@ -8,7 +8,8 @@
 #define WORD_TEXT(enumerator, word, text) [enumerator] = word,
 const char *const cav_problem_orders[] = {CAV_ORDERS(WORD_TEXT) NULL};
 const char *const cav_problem_closings[] = {"open", "rest", NULL};
-const char *const cav_problem_guesses[] = {[CAV_GUESS_HOLD] = "hold", [CAV_GUESS_INTERPOLATE] = "interpolate", NULL};
+const char *const cav_problem_guesses[] = {
+    [CAV_GUESS_HOLD] = "hold", [CAV_GUESS_INTERPOLATE] = "interpolate", [CAV_GUESS_PUMP] = "pump", NULL};
 const char *const cav_problem_dof_sets[] = {[CAV_DOFS_ALL] = "all",
                                             [CAV_DOFS_ROOT_LINEAR] = "root_linear",
                                             [CAV_DOFS_ROOT_ANGULAR] = "root_angular",

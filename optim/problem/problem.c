@@ -263,8 +263,9 @@ static cav_status read_guess_poses(const cav_problem_reader *reader, const cav_x
   int n = 0;
   for (const cav_xml_node *w = first; w; w = cav_xml_next(w)) n++;
   if (n == 0) return CAV_OK;
-  if (p->guess == CAV_GUESS_HOLD)
-    return cav_xml_fail(reader->error, first, NULL, "contradicts type='hold'; remove one of the two");
+  if (p->guess != CAV_GUESS_INTERPOLATE)
+    return cav_xml_fail(reader->error, first, NULL, "contradicts type='%s'; remove one of the two",
+                        cav_problem_guesses[p->guess]);
   cav_guess_pose *list = cav_problem_alloc(reader->owner, (size_t)n * sizeof *list);
   double *q = cav_problem_alloc(reader->owner, (size_t)n * (size_t)m->nq * sizeof *q), before = 0;
   if (!list || !q) return cav_problem_no_memory(reader);

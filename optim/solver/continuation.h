@@ -66,8 +66,9 @@ cav_status cav_solve_after(const cav_problem *problem, const cav_solve_options *
 int cav_run_certifiable(const cav_solve_run *run);
 
 /// The problem's guess: start held, or the geodesic to end [nq], with a ballistic arc if asked; cycles always go to
-/// their end, at constant speed. q and v of at are filled.
-void cav_guess_fill(const cav_problem *problem, const double *end, cav_trajectory *at);
+/// their end, at constant speed; or what cav_pump_fill simulates. q and v of at are filled. CAV_NO_MEMORY, or what the
+/// dynamics says of start and goal.
+cav_status cav_guess_fill(const cav_problem *problem, const double *end, cav_trajectory *at);
 
 /// The guess into run->at, moved a little off its symmetries: a straight or symmetric one can be a saddle of all costs
 /// and constraints at once, which exact derivatives never leave.

@@ -3,13 +3,14 @@
 /// From start to goal along the geodesic of the configuration space with a cubic of time; or by postures on the way,
 /// linear in time between them; or the start held. On that a rotation of the first free joint, a ballistic arc of the
 /// roots, and sines laid over single joints. Cycles go from their start to where that is a period on, at constant
-/// speed. Asks nothing of contacts or forces.
+/// speed. Asks nothing of contacts or forces. A swing-up is simulated (pump.c).
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "continuation.h"
 #include "file.h"
+#include "pump.h"
 
 /// How far a guess is moved off its symmetries, rad or m, by a fixed sequence; golden section.
 static const double nudge = 1e-6, golden = 0.6180339887498949;
@@ -83,20 +84,23 @@ static void follow(const cav_problem *problem, const double *end, double time, d
   cav_integrate(m, a.q, tangent, s, q);
 }
 
-void cav_guess_fill(const cav_problem *problem, const double *end, cav_trajectory *at) {
+cav_status cav_guess_fill(const cav_problem *problem, const double *end, cav_trajectory *at) {
   const cav_model *m = problem->model;
   double *tangent = at->v + (size_t)(at->nknot - 1) * m->nv; // scratch until velocities are filled below
   double span = problem->guess_to - problem->guess_from;
+  cav_status status = problem->guess == CAV_GUESS_PUMP ? cav_pump_fill(problem, at) : CAV_OK;
+  if (status) return status;
   for (int t = 0; t < at->nknot; t++) {
     double time = t * problem->timestep, *q = at->q + (size_t)t * at->nq;
     double x = span > 0 ? (time - problem->guess_from) / span : -1;
-    follow(problem, end, time, tangent, q);
+    if (problem->guess != CAV_GUESS_PUMP) follow(problem, end, time, tangent, q);
     swing(problem, time, q);
     rotation(problem, smoothstep(x), q);
     if (x > 0 && x < 1) lift(m, 4 * problem->guess_height * x * (1 - x), q);
   }
   memcpy(at->v, problem->v_start, (size_t)m->nv * sizeof(double));
   cav_trajectory_velocities(m, at);
+  return CAV_OK;
 }
 
 cav_trajectory *cav_problem_guess(const cav_problem *problem, cav_error *error) {
@@ -105,11 +109,12 @@ cav_trajectory *cav_problem_guess(const cav_problem *problem, cav_error *error) 
   if (cycle && !periodicity) return NULL;
   cav_trajectory *at = cav_trajectory_new(problem->model, nknot, problem->timestep);
   double *end = malloc((size_t)problem->model->nq * sizeof *end);
-  if (at && end) {
-    if (cycle) cav_periodicity_configuration(periodicity, 1, problem->q_start, end);
-    cav_guess_fill(problem, cycle ? end : problem->q_goal, at);
-  } else {
-    cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for the guess");
+  cav_status status = at && end ? CAV_OK : CAV_NO_MEMORY;
+  if (!status && cycle) cav_periodicity_configuration(periodicity, 1, problem->q_start, end);
+  if (!status) status = cav_guess_fill(problem, cycle ? end : problem->q_goal, at);
+  if (status) {
+    cav_file_fail(error, status, 0,
+                  status == CAV_NO_MEMORY ? "no memory for the guess" : "the guess cannot be simulated");
     cav_trajectory_free(at);
     at = NULL;
   }
@@ -129,12 +134,12 @@ cav_status cav_guess_take(cav_solve_run *run) {
     end = run->spare->q;
   }
   run->at->timestep = run->problem->timestep;
-  cav_guess_fill(run->problem, end, run->at);
+  cav_status status = cav_guess_fill(run->problem, end, run->at);
   for (int i = 0; i < n; i++) x[i] = nudge * (2 * fmod((i + 1) * golden, 1) - 1);
   cav_transcription_move(run->tr, run->at, x, run->spare);
   cav_trajectory *moved = run->spare;
   run->spare = run->at;
   run->at = moved;
   free(x);
-  return CAV_OK;
+  return status;
 }

@@ -390,10 +390,8 @@ static cav_status split_apart(marks *a, char *here, box *room, extent *space, ca
     if (status == CAV_OK) status = move_alone(idle, &law, idle->alone);
     if (status == CAV_OK && !ends_well(idle, &law)) status = CAV_NOT_CONVERGED;
     for (int l = 0; l < m->nlink; l++) space->box[l] = nowhere, space->size[l] = 0;
-    if (status == CAV_OK) {
-      cav_guess_fill(&idle->problem, idle->problem.q_goal, guess);
-      status = find_space(m, &idle->plan, guess, room, space);
-    }
+    if (status == CAV_OK) { status = cav_guess_fill(&idle->problem, idle->problem.q_goal, guess); }
+    if (status == CAV_OK) { status = find_space(m, &idle->plan, guess, room, space); }
     if (status == CAV_OK) status = find_space(m, &idle->idle, idle->alone, room, space);
     cav_trajectory_free(guess);
     // what cannot be moved by itself, or not as asked, is planned with the rest

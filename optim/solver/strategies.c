@@ -13,6 +13,7 @@
 
 #include "continuation.h"
 #include "periodicity.h"
+#include "pump.h"
 
 /// Gap below which a limb carries, m; travel from which there is a gait, m; cosine from which a hinge lies across the
 /// travel.
@@ -21,8 +22,11 @@ static const double touching = 0.02, least_travel = 0.3, across = 0.7;
 /// The gait: how far the first and the second hinge go, rad, and its frequency where the hip is a metre up, Hz.
 static const double swing_angle = 0.25, bend_angle = 0.4, pace = 1.2;
 
-/// How much softer, and how much slower than stated.
-enum { SOFTER = 2, CHEAPER = 10, SLOWER = 2 };
+/// How much softer and how much slower than stated, and how much longer a diagnosis may last.
+enum { SOFTER = 2, CHEAPER = 10, SLOWER = 2, LONGER = 2 };
+
+/// What the duration of a diagnosis costs, 1/s², so that it is not far from the shortest.
+static const double haste = 100;
 
 /// Where a motion solved under another order goes on: fraction of the schedule's way, and stages from there (METHOD.md,
 /// 7).
@@ -147,7 +151,8 @@ static void add(cav_strategy *strategy, int *n, const cav_strategy *from, const 
 }
 
 cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[CAV_STRATEGIES], int *n) {
-  const cav_strategy stated = {.guess = problem->guess, .stated = 1, .schedule = problem->schedule};
+  const cav_strategy stated = {
+      .guess = problem->guess, .stated = 1, .order = problem->order, .schedule = problem->schedule};
   *n = 0;
   add(strategy, n, &stated, "stated", "the problem's guess and schedule");
 
@@ -157,13 +162,22 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
     add(strategy, n, &twice, "midpoint", "under the midpoint order first, then from there under the order of momentum");
   }
 
+  cav_strategy pump = {.guess = CAV_GUESS_PUMP, .order = CAV_ORDER_MOMENTUM, .schedule = problem->schedule};
+  int swings_up = 0;
+  cav_status status = problem->guess == CAV_GUESS_PUMP ? CAV_OK : cav_pump_needed(problem, &swings_up);
+  if (status != CAV_OK) return status;
+  if (swings_up)
+    add(strategy, n, &pump, "pump", "energy pumped in, too little at a time for the way from start to goal");
+
   cav_strategy soft = stated;
   soft.schedule.first.smoothing *= SOFTER;
   soft.schedule.first.penalty /= CHEAPER;
   add(strategy, n, &soft, "soft", "contacts active from twice as far, unactuated force ten times cheaper at first");
 
-  cav_strategy plain = {.guess = CAV_GUESS_INTERPOLATE, .schedule = problem->schedule}, walk = plain;
-  cav_status status = problem->nswing ? CAV_OK : gait(problem, &walk);
+  cav_strategy plain = stated;
+  plain.guess = CAV_GUESS_INTERPOLATE, plain.stated = 0;
+  cav_strategy walk = plain;
+  status = problem->nswing ? CAV_OK : gait(problem, &walk);
   if (status != CAV_OK) return status;
   if (walk.nswing) add(strategy, n, &walk, "swing", "from start to goal with the limbs that carry swinging in turn");
 
@@ -177,6 +191,17 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   cav_strategy slow = stated;
   slow.schedule.stages *= SLOWER;
   add(strategy, n, &slow, "slow", "twice as many stages");
+
+  if (problem->order != CAV_ORDER_MOMENTUM) {
+    cav_strategy exact = stated;
+    exact.order = CAV_ORDER_MOMENTUM, exact.first_midpoint = 1, exact.use = CAV_STRATEGY_MOMENTUM;
+    add(strategy, n, &exact, "momentum", "under the order of momentum, from a motion of the midpoint order");
+  }
+  // what a swing-up takes is told by cav_problem_pumping
+  cav_strategy longer = stated;
+  longer.use = CAV_STRATEGY_DIAGNOSIS;
+  if (!problem->cycle.on && problem->duration_most == 0 && !swings_up)
+    add(strategy, n, &longer, "longer", "with a duration free up to twice the stated one");
   return CAV_OK;
 }
 
@@ -184,6 +209,12 @@ void cav_strategy_apply(const cav_problem *problem, const cav_strategy *strategy
   *taken = *problem;
   taken->guess = strategy->guess;
   taken->schedule = strategy->schedule;
+  taken->order = strategy->order;
+  if (strategy->use == CAV_STRATEGY_DIAGNOSIS) {
+    taken->duration_least = problem->duration;
+    taken->duration_most = LONGER * problem->duration;
+    taken->duration_weight = haste;
+  }
   if (strategy->stated) return;
   taken->guess_height = 0;
   memset(taken->guess_rotation, 0, sizeof taken->guess_rotation);
@@ -206,7 +237,7 @@ cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *st
   cav_problem taken;
   cav_strategy_apply(problem, strategy, &taken);
   const cav_checkpoint *resume = options ? options->resume : NULL;
-  int second = resume && resume->order == problem->order;
+  int second = resume && resume->order == strategy->order;
   if (!strategy->first_midpoint || start || second) {
     if (strategy->first_midpoint && second) taken.schedule = resumed(&taken.schedule);
     return cav_solve(&taken, options, start, solution, error);
@@ -222,7 +253,7 @@ cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *st
     *solution = before;
     return status;
   }
-  taken.order = problem->order;
+  taken.order = strategy->order;
   taken.schedule = resumed(&taken.schedule);
   status = cav_solve_after(&taken, &rest, before->trajectory, before, solution, error);
   cav_solution_free(before);

@@ -28,10 +28,10 @@ static cav_status equations_of(const cav_problem *problem, cav_equations *equati
   cav_trajectory *at = cav_trajectory_new(problem->model, tr->nknot, problem->timestep);
   cav_status status = normal && at ? CAV_OK : CAV_NO_MEMORY;
   if (status == CAV_OK) {
-    cav_guess_fill(problem, problem->q_goal, at);
+    status = cav_guess_fill(problem, problem->q_goal, at);
     cav_stage_set(problem, 0, tr);
-    status = read_structure(tr, normal, at, equations);
   }
+  if (status == CAV_OK) { status = read_structure(tr, normal, at, equations); }
   if (status != CAV_OK && error)
     *error = (cav_error){status, 0, "the normal equations cannot be evaluated at the guess"};
   cav_trajectory_free(at), cav_normal_free(normal), cav_transcription_free(tr);

@@ -69,6 +69,12 @@ int cav_command_fail(const cav_error *error);
 /// impossible.c.
 int cav_command_impossible(FILE *out, const char *before, const cav_problem *problem, int most, cav_error *error);
 
+enum { CAV_PUMPING_TEXT = 600 };
+
+/// What it takes to swing up, in words, where a problem needs that; nonzero: it does not, or that cannot be told.
+/// impossible.c.
+int cav_command_pumping(const cav_problem *problem, char text[CAV_PUMPING_TEXT]);
+
 /// Before a solve: tells the one cause why a problem cannot have a solution, if there is one. 0: solve it; otherwise the
 /// exit status.
 int cav_command_refuse(const cav_command_line *line, const cav_problem *problem);

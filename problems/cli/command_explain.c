@@ -22,16 +22,19 @@ static void print_cause(const cav_reason *r, const char *before) {
 }
 
 // what is missed, and why, in a few lines
-static void print_brief(const cav_explanation *e, const cav_verdict *verdict, const cav_impossibility *impossible) {
+static void print_brief(const cav_explanation *e, const cav_verdict *verdict, const cav_impossibility *impossible,
+                        const char *pumping) {
   int n = 0, good = verdict->certified && verdict->achieved;
   if (impossible) n += printf("impossible: %s. %s\n", impossible->what, impossible->cure) > 0;
+  if (!impossible && *pumping) n += printf("cause: %s\n", pumping) > 0;
   if (!verdict->certified) n += printf("not certified: %s\n", verdict->reason) > 0;
   if (!verdict->achieved && n < LINES) n += printf("not achieved: misses %s\n", verdict->missed) > 0;
   if (good)
     n += printf("nothing is missed; %s\n",
                 e->nconflict ? "what the cost hangs on:" : "no limit or constraint holds the cost back") > 0;
-  if (e->met || impossible) {
-    for (int i = 0; i < e->nconflict && n < LINES && !impossible; i++, n++) print_cause(&e->conflict[i], "  ");
+  int known = impossible || *pumping;
+  if (e->met || known) {
+    for (int i = 0; i < e->nconflict && n < LINES && !known; i++, n++) print_cause(&e->conflict[i], "  ");
   } else if (n < LINES && e->nconflict) {
     print_cause(&e->conflict[0], "cause: ");
   } else if (n < LINES && e->nviolation) {
@@ -87,6 +90,9 @@ int cav_command_explain(const cav_command_line *line) {
                         &verdict, &error);
   cav_impossibility impossible;
   int proofs = 0;
+  char pumping[CAV_PUMPING_TEXT] = "";
+  if (!status && !(verdict.certified && verdict.achieved) && cav_command_pumping(result->problem, pumping))
+    *pumping = 0;
   if (!status) status = cav_problem_impossible(result->problem, &impossible, 1, &proofs, &error);
   if (!status && line->json) {
     printf("{\n  \"met\": %s,\n  \"certified\": %s,\n  \"achieved\": %s,\n  \"reason\": ",
@@ -97,14 +103,17 @@ int cav_command_explain(const cav_command_line *line) {
     cav_certificate_json_text(stdout, verdict.missed);
     printf(",\n  \"impossible\": ");
     cav_certificate_json_text(stdout, proofs ? impossible.what : "");
+    printf(",\n  \"pumping\": ");
+    cav_certificate_json_text(stdout, pumping);
     print_reasons("violation", explanation.nviolation, explanation.violation);
     print_reasons("conflict", explanation.nconflict, explanation.conflict);
     printf("\n}\n");
   } else if (!status && line->all) {
     if (proofs) printf("impossible: %s\n  %s\n", impossible.what, impossible.cure);
+    if (!proofs && *pumping) printf("cause: %s\n", pumping);
     print_table(&explanation, &verdict);
   } else if (!status) {
-    print_brief(&explanation, &verdict, proofs ? &impossible : NULL);
+    print_brief(&explanation, &verdict, proofs ? &impossible : NULL, pumping);
   }
   cav_result_free(result);
   if (status) return cav_command_fail(&error);

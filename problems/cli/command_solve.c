@@ -232,7 +232,8 @@ static void tell_more(const cav_race *race) {
   if (!v->certified) fprintf(stderr, "not certified: %s\n", v->reason);
   if (!v->achieved) fprintf(stderr, "not achieved: misses %s\n", v->missed);
   fprintf(stderr, "trying by other strategies:");
-  for (int i = 1; i < race->n; i++) fprintf(stderr, " %s", race->entry[i].strategy.name);
+  for (int i = 1; i < race->n; i++)
+    if (race->entry[i].strategy.use == CAV_STRATEGY_TRY) fprintf(stderr, " %s", race->entry[i].strategy.name);
   fprintf(stderr, " (%d at a time; --strategies 1 for none)\n", race->processes);
 }
 
@@ -247,6 +248,23 @@ static cav_status run_race(cav_race *race, const cav_command_line *line, ticker 
     if (race->tell) tell_more(race);
   }
   return cav_race_finish(race, at_once, error);
+}
+
+// what would help where nothing did: found, and not kept
+static void tell_cause(const cav_race *race) {
+  const cav_problem *p = race->problem;
+  char text[CAV_PUMPING_TEXT];
+  if (!cav_command_pumping(p, text)) fprintf(stderr, "cavort: %s\n", text);
+  for (int i = 0; i < race->n; i++) {
+    const cav_race_entry *e = &race->entry[i];
+    if (e->strategy.use != CAV_STRATEGY_DIAGNOSIS || e->state != CAV_RACE_DONE || !cav_race_success(&e->report))
+      continue;
+    fprintf(stderr,
+            "cavort: not in %.4g s, but in %.4g s, certified and achieved, times of windows in proportion; if it may "
+            "last so "
+            "long: <horizon duration=\"%.4g\" range=\"%.4g %.4g\"/>\n",
+            p->duration, e->report.verdict.duration, p->duration, p->duration, 2 * p->duration);
+  }
 }
 
 static int solve_from(const cav_command_line *line, const cav_problem *problem, const char *folder,
@@ -283,6 +301,7 @@ static int solve_from(const cav_command_line *line, const cav_problem *problem, 
   cav_status status = cav_race_open(&race, most, &error);
   if (!status) status = run_race(&race, line, &tick, &error);
   int best = status ? -1 : cav_race_best(&race, line->strategies > 1), done = CAV_EXIT_INTERNAL;
+  if (best >= 0 && race.tell && !interrupted && !cav_race_success(&race.entry[best].report)) tell_cause(&race);
   if (best >= 0) {
     done = cav_race_save(&race, best);
     char *path = cav_result_path(folder, "strategies.csv");

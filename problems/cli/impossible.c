@@ -1,4 +1,5 @@
-/// What the commands say of a problem that cannot have a solution.
+/// What the commands say of a problem that cannot have a solution, or needs more than it gives.
+#include <math.h>
 #include <stdio.h>
 
 #include "certificate.h"
@@ -13,6 +14,30 @@ int cav_command_impossible(FILE *out, const char *before, const cav_problem *pro
   if (status) return -1;
   for (int i = 0; i < n; i++) fprintf(out, "%simpossible: %s\n  %s\n", before, found[i].what, found[i].cure);
   return n;
+}
+
+int cav_command_pumping(const cav_problem *p, char text[CAV_PUMPING_TEXT]) {
+  cav_pumping pumping;
+  char time[80], effort[80];
+  if (cav_problem_pumping(p, &pumping) || !pumping.needed) return 1;
+  double seconds = pumping.seconds, efforts = pumping.efforts, suggested = ceil(11 * seconds) / 10;
+  if (isfinite(seconds))
+    snprintf(time, sizeof time, "takes %.3g s, of %.3g s given", seconds, p->duration);
+  else
+    snprintf(time, sizeof time, "does not come there in %.3g s", 8 * p->duration);
+  if (efforts > 1 && isfinite(efforts))
+    snprintf(effort, sizeof effort, "; with %.3g times the effort it would do", efforts);
+  else
+    snprintf(effort, sizeof effort, "%s", efforts > 1 ? "; nor would 9 times the effort do" : "");
+  int n =
+      snprintf(text, CAV_PUMPING_TEXT,
+               "actuators are too weak to go there directly, so energy has to be pumped in: by simulated laws, at the "
+               "efforts planned with (%.3g of the limits), that %s%s.",
+               p->effort_limit, time, effort);
+  if (isfinite(seconds) && seconds > p->duration)
+    snprintf(text + n, CAV_PUMPING_TEXT - (size_t)n, " Try <horizon duration=\"%.3g\"/>%s", suggested,
+             p->effort_limit < 1 && efforts * p->effort_limit <= 1 ? " or <limits effort=\"1\"/>." : ".");
+  return 0;
 }
 
 int cav_command_refuse(const cav_command_line *line, const cav_problem *problem) {

@@ -386,7 +386,9 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
   if (!status) status = print_posture(p, "goal", p->q_goal, error);
   if (status) return status;
   printf("  %d unknowns; the guess %s", (knots - 1) * p->model->nv + (p->duration_most > 0),
-         p->guess == CAV_GUESS_HOLD ? "holds the start" : "goes from start to goal");
+         p->guess == CAV_GUESS_HOLD   ? "holds the start"
+         : p->guess == CAV_GUESS_PUMP ? "is simulated, pumping energy"
+                                      : "goes from start to goal");
   if (p->nguess_pose > 0) printf(" by %d postures", p->nguess_pose);
   if (p->guess_height > 0) printf(", with an arc of %g m from %g to %g s", p->guess_height, p->guess_from, p->guess_to);
   printf("\n");

@@ -292,8 +292,34 @@ static void cancel_after(cav_race *race, int certified) {
 
 static int first_success(const cav_race *race) {
   for (int i = 0; i < race->n; i++)
-    if (race->entry[i].state == CAV_RACE_DONE && cav_race_success(&race->entry[i].report)) return i;
+    if (race->entry[i].state == CAV_RACE_DONE && race->entry[i].strategy.use != CAV_STRATEGY_DIAGNOSIS &&
+        cav_race_success(&race->entry[i].report))
+      return i;
   return race->n;
+}
+
+// whether the balance of momentum is what a motion misses first
+static int misses_momentum(const cav_race_report *report) {
+  const cav_verdict *v = &report->verdict;
+  return report->solution && report->status != CAV_INTERRUPTED && cav_verdict_feasible(v) &&
+         v->penetration_max_m <= CAV_TOLERANCE_PENETRATION && v->penetration_between_m <= CAV_TOLERANCE_PENETRATION &&
+         v->slip_mean_m_s <= CAV_TOLERANCE_SLIP && v->hover_fraction <= CAV_TOLERANCE_HOVER &&
+         v->momentum_defect_rms > CAV_TOLERANCE_MOMENTUM;
+}
+
+// whether a strategy that waits may start: those for a case only after all before them
+static int may_start(const cav_race *race, int i) {
+  cav_strategy_use use = race->entry[i].strategy.use;
+  int momentum = 0, success = 0;
+  if (use == CAV_STRATEGY_TRY) return 1;
+  for (int k = 0; k < i; k++) {
+    const cav_race_entry *e = &race->entry[k];
+    int waits = e->state == CAV_RACE_WAITING && (e->strategy.use == CAV_STRATEGY_TRY || may_start(race, k));
+    if (waits || e->state == CAV_RACE_RUNNING) return 0;
+    momentum |= e->state == CAV_RACE_DONE && misses_momentum(&e->report);
+    success |= e->state == CAV_RACE_DONE && cav_race_success(&e->report);
+  }
+  return use == CAV_STRATEGY_MOMENTUM ? momentum : !success;
 }
 
 // waits for reports; interruption is passed on once
@@ -329,7 +355,7 @@ cav_status cav_race_finish(cav_race *race, int cheapest, cav_error *error) {
     if (!cheapest) cancel_after(race, most);
     for (int i = 0; i < most; i++) running += race->entry[i].state == CAV_RACE_RUNNING;
     for (int i = 0; i < most && running < race->processes && !*race->interrupted; i++) {
-      if (race->entry[i].state != CAV_RACE_WAITING) continue;
+      if (race->entry[i].state != CAV_RACE_WAITING || !may_start(race, i)) continue;
       if (!start(race, i)) return cav_file_fail(error, CAV_NO_MEMORY, 0, "no process for another strategy");
       running++;
     }
@@ -367,7 +393,7 @@ int cav_race_best(const cav_race *race, int cheapest) {
   int best = -1;
   for (int i = 0; i < race->n; i++) {
     const cav_race_entry *e = &race->entry[i];
-    if (e->state != CAV_RACE_DONE || !e->report.solution) continue;
+    if (e->state != CAV_RACE_DONE || !e->report.solution || e->strategy.use == CAV_STRATEGY_DIAGNOSIS) continue;
     if (best < 0 || better(&e->report, &race->entry[best].report, cheapest)) best = i;
   }
   return best;

@@ -140,6 +140,7 @@ cav_status cav_study_solve(const char *path, const char *model_path, cav_study_r
   if (status) cav_file_fail(error, status, 0, "%s: cannot be perturbed: %s", path, cav_status_name(status));
   if (run->method != CAV_STUDY_STRATEGIES && n > 1) n = 1;
   for (int i = 0; i < n && !status && !run->certified && processor_seconds() - begin < most_seconds; i++) {
+    if (strategy[i].use != CAV_STRATEGY_TRY) continue;
     cav_verdict verdict = {.closed_loop_end_error_m = -1};
     status = solve_by(problem, &strategy[i], run, &begin, &verdict, error);
     // of many that fail the stated one says why
