@@ -221,6 +221,10 @@ run 1 explain weak --json
 says out '"impossible": "joint'
 says weak/verdict.json '"certified": false'
 
+# what was asked is marked in the charts: 1 rad at the last knot; the goal is shown
+check "the target in its chart" grep -qE '"wanted":\[(null,)+57\.296\]' swing.result/view.html
+check "the goal" grep -q '"goal":\[' swing.result/view.html
+
 # --- a motion that the stated guess does not lead to: a pendulum too weak to rise without a swing ---
 
 sed 's/gear="10"/gear="2.3"/' model.xml >lazy.xml

@@ -162,15 +162,16 @@ static cav_view_input hostile_input(void) {
   static const double q[3 * 7] = {0, 0, 1, 1, 0, 0, 0, 0, 0, 0.9, 0.8, 0.6, 0, 0, 0.125, 0, 0.5, 0, 1, 0, 0};
   static const int nforce[3] = {0, 0, 1};
   static const cav_view_force force[1] = {{{0.125, 0, 0}, {0, 3, 400}}};
-  static const double value[3] = {1, -2.5, NAN};
+  static const double value[3] = {1, -2.5, NAN}, wanted[3] = {NAN, 7, NAN}, goal[7] = {0, 0, 2, 1, 0, 0, 0};
   static cav_view_series series[1];
   static const cav_view_line line[2] = {{"</script><script>alert(1)</script>", "1 < 2 \"quoted\" \xE2\x9C\x93", 1},
                                         {"bad bytes \xFF\xC0\x80", "\xED\xA0\x80 \x01", 0}};
-  series[0] = (cav_view_series){"<i>", "a\tb", NULL, value, -INFINITY, 2};
+  series[0] = (cav_view_series){"<i>", "a\tb", NULL, value, -INFINITY, 2, wanted};
   return (cav_view_input){.title = "</title><img src=x onerror=alert(1)>",
                           .nknot = 3,
                           .timestep = 0.025,
                           .q = q,
+                          .goal = goal,
                           .nforce = nforce,
                           .force = force,
                           .nseries = 1,
@@ -217,7 +218,8 @@ static void check_data(const char *data) {
   CHECK(strstr(data, "1 \\u003c 2 \\u0022quoted\\u0022 \xE2\x9C\x93") != NULL);
   CHECK(strstr(data, "bad bytes \\ufffd\\ufffd\\ufffd") != NULL);
   CHECK(strstr(data, "\\ufffd\\ufffd\\ufffd \\u0001") != NULL);
-  CHECK(strstr(data, "\"lower\":null,\"upper\":2,\"value\":[1,-2.5,null]") != NULL);
+  CHECK(strstr(data, "\"lower\":null,\"upper\":2,\"value\":[1,-2.5,null],\"wanted\":[null,7,null]") != NULL);
+  CHECK(strstr(data, "\"goal\":[0,0,2,1,0,0,0]") != NULL);
   CHECK(strstr(data, "[0.125,0,0,0,3,400]") != NULL);
   CHECK(strstr(data, "\"rgba\":[1,0,0,0.5]") != NULL);
   // the ball's poses: where q puts it, the quaternion too

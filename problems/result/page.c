@@ -8,20 +8,114 @@
 
 #include "certificate.h"
 #include "file.h"
+#include "problem_file.h"
 #include "view.h"
 
 // charts on their way: series, and the numbers that they point at
 typedef struct charts {
   int n, nknot;
   cav_view_series *series;
-  double *value;
+  double *value, *wanted; ///< [nknot] of each
 } charts;
 
 // a new chart; returns where its values go
 static double *add(charts *c, const char *group, const char *name, const char *unit, double lower, double upper) {
   double *value = c->value + (size_t)c->n * (size_t)c->nknot;
-  c->series[c->n++] = (cav_view_series){group, name, unit, value, lower, upper};
+  c->series[c->n++] = (cav_view_series){group, name, unit, value, lower, upper, NULL};
   return value;
+}
+
+// ---------------------------------------------------------------- what was asked
+
+// whether a term asks for a value: a target that is not only a pull over the whole time
+static int asks(const cav_term *term) {
+  int posture = term->quantity == CAV_QUANTITY_CONFIGURATION, sensor = term->quantity == CAV_QUANTITY_SENSOR;
+  if (!posture && !sensor) return 0;
+  return term->use == CAV_USE_EQUAL ||
+         (term->use == CAV_USE_COST && (term->from == term->to || term->nwaypoint > 0 || term->within > 0));
+}
+
+// knots of a term's window, one at least
+static void find_knots(const charts *c, const cav_problem *p, const cav_term *term, int *first, int *last) {
+  double h = p->duration / (c->nknot - 1), to = term->to < 0 ? p->duration : fmin(term->to, p->duration);
+  double from = term->from < 0 ? p->duration : fmin(term->from, p->duration);
+  *first = (int)ceil(from / h - 1e-6), *last = (int)floor(to / h + 1e-6);
+  if (from == to || *first > *last) *first = *last = (int)lround((from + to) / (2 * h));
+}
+
+// number k of a term's target at a time, linear between waypoints; dim numbers each
+static double wanted_at(const cav_term *term, double time, int dim, int k) {
+  const double *target = term->target, *when = term->waypoint_time;
+  int i = 0;
+  if (!target) return 0;
+  while (i < term->nwaypoint && when[i] <= time) i++;
+  if (term->nwaypoint == 0 || i == 0) return target[k];
+  if (i == term->nwaypoint) return target[(i - 1) * dim + k];
+  double s = (time - when[i - 1]) / (when[i] - when[i - 1]);
+  return (1 - s) * target[(i - 1) * dim + k] + s * target[i * dim + k];
+}
+
+// marks a value as asked for in the chart that was made last, or in one of an index
+static void mark(charts *c, int chart, int knot, double value) {
+  double *wanted = c->wanted + (size_t)chart * (size_t)c->nknot;
+  if (!c->series[chart].wanted)
+    for (int t = 0; t < c->nknot; t++) wanted[t] = NAN;
+  c->series[chart].wanted = wanted;
+  wanted[knot] = value;
+}
+
+// marks of a joint's chart: postures, and sensors of its angle
+static void mark_joint(charts *c, int chart, const cav_problem *p, int j, double scale) {
+  const cav_joint *joint = &p->model->joint[j];
+  for (int i = 0; i < p->nterm; i++) {
+    const cav_term *term = &p->term[i];
+    int posture = term->quantity == CAV_QUANTITY_CONFIGURATION, first, last;
+    if (!asks(term) || (posture && !cav_problem_selects(p->model, term, joint->dof))) continue;
+    if (!posture && (term->sensor.type != CAV_SENSOR_JOINTPOS || term->sensor.object != j)) continue;
+    find_knots(c, p, term, &first, &last);
+    for (int t = first; t <= last; t++) {
+      double time = t * p->duration / (c->nknot - 1);
+      double goal = posture ? wanted_at(term, time, p->model->nq, joint->q) : wanted_at(term, time, 1, 0);
+      mark(c, chart, t, scale * (posture && !term->target ? p->q_goal[joint->q] : goal));
+    }
+  }
+}
+
+// a chart of one component of a sensor that is asked for, with its marks; what follows from postures alone
+static cav_status add_sensor(charts *c, const cav_problem *p, const cav_term *term, int k, cav_state *state,
+                             const double *q) {
+  static const char *const unit[2][4] = {{NULL, "x", "y", "z"}, {"m", "m, x", "m, y", "m, z"}};
+  int length = term->sensor.type == CAV_SENSOR_FRAMEPOS || term->sensor.type == CAV_SENSOR_SUBTREECOM;
+  double reading[CAV_SENSOR_DIM_MAX];
+  int first, last;
+  const char *along = unit[length][term->sensor.dim > 1 ? k + 1 : 0];
+  double *value = add(c, "Asked", *term->name ? term->name : "unnamed", along, NAN, NAN);
+  for (int t = 0; t < c->nknot; t++) {
+    cav_status status = cav_position(p->model, state, q + (size_t)t * (size_t)p->model->nq);
+    if (status) return status;
+    cav_sensor_read(p->model, state, &term->sensor, reading);
+    value[t] = reading[k];
+  }
+  find_knots(c, p, term, &first, &last);
+  for (int t = first; t <= last; t++)
+    mark(c, c->n - 1, t, wanted_at(term, t * p->duration / (c->nknot - 1), term->sensor.dim, k));
+  return CAV_OK;
+}
+
+static int is_charted(const cav_term *term) {
+  return asks(term) && term->quantity == CAV_QUANTITY_SENSOR && term->sensor.dim <= 3 &&
+         term->sensor.type != CAV_SENSOR_JOINTPOS && cav_sensor_rule_of(term->sensor.type)->stage == CAV_READS_POSITION;
+}
+
+static cav_status add_asked(charts *c, const cav_problem *p, const double *q) {
+  cav_state *state = cav_state_new(p->model);
+  cav_status status = state ? CAV_OK : CAV_NO_MEMORY;
+  for (int i = 0; i < p->nterm && !status; i++)
+    for (int k = 0; k < 3 && !status && is_charted(&p->term[i]); k++)
+      if (k < p->term[i].sensor.dim && (p->term[i].component < 0 || p->term[i].component == k))
+        status = add_sensor(c, p, &p->term[i], k, state, q);
+  cav_state_free(state);
+  return status;
 }
 
 static void add_whole(charts *c, const cav_model *model, const cav_trajectory *trajectory, const cav_forces *forces,
@@ -53,7 +147,9 @@ static void add_whole(charts *c, const cav_model *model, const cav_trajectory *t
   (void)trajectory;
 }
 
-static void add_each(charts *c, const cav_model *model, const cav_trajectory *trajectory, const cav_forces *forces) {
+static void add_each(charts *c, const cav_problem *problem, const cav_trajectory *trajectory,
+                     const cav_forces *forces) {
+  const cav_model *model = problem->model;
   for (int a = 0; a < model->nu; a++) {
     double range[2];
     cav_actuator_effort_range(model, a, range);
@@ -67,7 +163,15 @@ static void add_each(charts *c, const cav_model *model, const cav_trajectory *tr
     double *value = add(c, "Joints", joint->name, joint->type == CAV_JOINT_HINGE ? "deg" : "m",
                         joint->limited ? scale * joint->range[0] : NAN, joint->limited ? scale * joint->range[1] : NAN);
     for (int t = 0; t < c->nknot; t++) value[t] = scale * trajectory->q[t * model->nq + joint->q];
+    mark_joint(c, c->n - 1, problem, j, scale);
   }
+}
+
+// whether the goal is another posture than the start, and the motion has one
+static int has_goal(const cav_problem *p) {
+  double apart = 0;
+  for (int i = 0; i < p->model->nq; i++) apart = fmax(apart, fabs(p->q_goal[i] - p->q_start[i]));
+  return !p->cycle.on && apart > 1e-3;
 }
 
 // lines of the certificate, and the solver's time
@@ -88,8 +192,8 @@ cav_status cav_page_write(const char *path, const cav_problem *problem, const ca
   const cav_model *model = problem->model;
   const double *g = model->gravity;
   double weight = model->mass * sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
-  size_t most = (size_t)(5 + model->nu + model->njoint), nknot = (size_t)trajectory->nknot;
-  charts c = {0, trajectory->nknot, calloc(most, sizeof *c.series), calloc(most * nknot, sizeof *c.value)};
+  size_t most = (size_t)(5 + model->nu + model->njoint + 3 * problem->nterm), nknot = (size_t)trajectory->nknot;
+  charts c = {0, trajectory->nknot, calloc(most, sizeof *c.series), calloc(2 * most * nknot, sizeof *c.value), NULL};
   cav_view_force *force = calloc((size_t)forces->nforce + 1, sizeof *force);
   if (!c.series || !c.value || !force) {
     free(c.series);
@@ -97,8 +201,10 @@ cav_status cav_page_write(const char *path, const cav_problem *problem, const ca
     free(force);
     return cav_file_fail(error, CAV_NO_MEMORY, 0, "%s: no memory for the page", path);
   }
+  c.wanted = c.value + most * nknot;
   add_whole(&c, model, trajectory, forces, weight > 0 ? weight : 1);
-  add_each(&c, model, trajectory, forces);
+  cav_status status = add_asked(&c, problem, trajectory->q);
+  add_each(&c, problem, trajectory, forces);
   for (int i = 0; i < forces->nforce; i++) {
     memcpy(force[i].pos, forces->force[i].pos, sizeof force[i].pos);
     memcpy(force[i].force, forces->force[i].force, sizeof force[i].force);
@@ -111,13 +217,15 @@ cav_status cav_page_write(const char *path, const cav_problem *problem, const ca
                           .nknot = trajectory->nknot,
                           .timestep = trajectory->timestep,
                           .q = trajectory->q,
+                          .goal = has_goal(problem) ? problem->q_goal : NULL,
                           .nforce = forces->count,
                           .force = force,
                           .nseries = c.n,
                           .series = c.series,
                           .nline = verdict ? verdict_lines(verdict, told, line, seconds) : 0,
                           .line = line};
-  cav_status status = cav_view_write(path, model, &input, error);
+  if (status) cav_file_fail(error, status, 0, "%s: no charts of what was asked", path);
+  if (!status) status = cav_view_write(path, model, &input, error);
   free(c.series);
   free(c.value);
   free(force);

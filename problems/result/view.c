@@ -133,7 +133,27 @@ static void write_links(FILE *out, const cav_model *model) {
   putc(']', out);
 }
 
-// one row per knot: position and quaternion of each link but the world
+// a row: position and quaternion of each link but the world
+static cav_status write_pose(FILE *out, const cav_model *model, cav_state *state, const double *q) {
+  cav_status status = cav_position(model, state, q);
+  if (status) return status;
+  putc('[', out);
+  for (int i = 1; i < model->nlink; i++) {
+    if (i > 1) putc(',', out);
+    for (int k = 0; k < 3; k++) {
+      write_number(out, state->link[i].pos[k], 6);
+      putc(',', out);
+    }
+    for (int k = 0; k < 4; k++) {
+      if (k > 0) putc(',', out);
+      write_number(out, state->link[i].quat[k], 5);
+    }
+  }
+  putc(']', out);
+  return CAV_OK;
+}
+
+// one row per knot, and that of the goal
 static cav_status write_poses(FILE *out, const cav_model *model, const cav_view_input *input, cav_error *error) {
   cav_state *state = cav_state_new(model);
   if (!state) return cav_file_fail(error, CAV_NO_MEMORY, 0, "view: out of memory");
@@ -142,27 +162,19 @@ static cav_status write_poses(FILE *out, const cav_model *model, const cav_view_
   cav_status status = CAV_OK;
   fputs("\"poses\":[", out);
   for (int t = 0; t < input->nknot && status == CAV_OK; t++) {
-    status = cav_position(model, state, input->q + (size_t)t * (size_t)model->nq);
-    if (status != CAV_OK) {
+    fputs(t > 0 ? ",\n" : "\n", out);
+    status = write_pose(out, model, state, input->q + (size_t)t * (size_t)model->nq);
+    if (status)
       cav_file_fail(error, status, 0, "view: the configuration at knot %d has no poses (%s)", t,
                     cav_status_name(status));
-      break;
-    }
-    fprintf(out, "%s[", t > 0 ? ",\n" : "\n");
-    for (int i = 1; i < model->nlink; i++) {
-      if (i > 1) putc(',', out);
-      for (int k = 0; k < 3; k++) {
-        write_number(out, state->link[i].pos[k], 6);
-        putc(',', out);
-      }
-      for (int k = 0; k < 4; k++) {
-        if (k > 0) putc(',', out);
-        write_number(out, state->link[i].quat[k], 5);
-      }
-    }
-    putc(']', out);
   }
-  fputs("\n]", out);
+  fputs("\n],\n\"goal\":", out);
+  if (!status && input->goal) {
+    status = write_pose(out, model, state, input->goal);
+    if (status) cav_file_fail(error, status, 0, "view: the goal has no poses (%s)", cav_status_name(status));
+  } else {
+    fputs("null", out);
+  }
   cav_state_free(state);
   return status;
 }
@@ -209,6 +221,11 @@ static void write_series(FILE *out, const cav_view_input *input) {
     write_number(out, series->upper, 5);
     fputs(",\"value\":", out);
     write_numbers(out, series->value, input->nknot, 5);
+    fputs(",\"wanted\":", out);
+    if (series->wanted)
+      write_numbers(out, series->wanted, input->nknot, 5);
+    else
+      fputs("null", out);
     putc('}', out);
   }
   fputs("\n]", out);

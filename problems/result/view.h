@@ -14,9 +14,10 @@ typedef struct cav_view_force {
 typedef struct cav_view_series {
   const char *group; ///< heading the chart stands under; NULL: none
   const char *name;
-  const char *unit;    ///< NULL: none
-  const double *value; ///< [nknot]
-  double lower, upper; ///< limits to draw; not finite: none
+  const char *unit;     ///< NULL: none
+  const double *value;  ///< [nknot]
+  double lower, upper;  ///< limits to draw; not finite: none
+  const double *wanted; ///< [nknot] what was asked of it there, not finite: nothing; NULL: nothing anywhere
 } cav_view_series;
 
 /// One line of the verdict.
@@ -32,6 +33,7 @@ typedef struct cav_view_input {
   int nknot;                   ///< >= 1
   double timestep;             ///< s, > 0
   const double *q;             ///< [nknot*nq]
+  const double *goal;          ///< [nq] posture to show as a ghost; NULL: none
   const int *nforce;           ///< [nknot] forces at each knot; NULL: no forces
   const cav_view_force *force; ///< of all knots, one after the other
   int nseries;
