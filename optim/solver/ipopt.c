@@ -21,6 +21,10 @@ static const char hessian_option[] = "hessian";
 /// which the last step brings all rows in.
 static const double contact_noise = 1, smooth_noise = 1e-6, acceptable = 1e-4;
 
+/// Fraction of the continuation from which on hard terms are rows. Under a soft law that acts at a distance they may ask
+/// for what it makes expensive beyond measure (rest next to a wall), and a motion bent to that leads nowhere.
+static const double hard_from = 0.5;
+
 /// The continuation: stages of the problem's schedule to one of Ipopt's, and iterations of each but the last.
 enum { STAGES_IN_ONE = 2, STAGE_ITERATIONS = 40 };
 
@@ -81,6 +85,7 @@ typedef struct program {
   double best_error, best_infeasibility, best_dual;
   int best_iteration;              ///< -1: none yet
   int passing;                     ///< a stage on the way to the last
+  int soft_terms;                  ///< hard terms are penalised in place of rows
   double recent_cost[WINDOW_MOST]; ///< a ring
   int window_start, settled;       ///< iteration from which costs count; one at which they had settled, 0: not yet
   int finished;                    ///< stopped by us: settled, and where it is the last stage with its rows in
@@ -118,7 +123,7 @@ static Bool objective(int n, double *x, Bool fresh, double *value, UserDataPtr d
   program *p = data;
   (void)n, (void)fresh;
   if (!evaluate(p, x, 0)) return 0;
-  *value = cav_transcription_cost(p->run->tr);
+  *value = cav_transcription_merit(p->run->tr);
   return 1;
 }
 
@@ -316,8 +321,11 @@ static Bool progress(int mode, int iteration, double cost, double infeasibility,
   if (iteration > 0)
     p->damping =
         trials > 1 ? fmin(p->damping * damping_change, most_damping) : fmax(p->damping / damping_change, least_damping);
+  // the Hessian is next, and with other duals another one
+  if (p->known == 2 && cav_absolute_advance(p->run->tr, iteration > 0 ? primal_step : 0)) p->known = 1;
   p->finished = is_finished(p, mode, iteration, cost);
-  if (p->known) p->interrupted = cav_run_report(p->run, step * primal_step, 0) != 0;
+  // the start is none of its iterations
+  if (p->known) p->interrupted = iteration > 0 ? cav_run_report(p->run, step * primal_step, 0) : cav_run_stop(p->run);
   return !p->interrupted && !p->finished;
 }
 
@@ -331,6 +339,26 @@ static int is_bound(const cav_transcription *tr, int t, int i, int *dof) {
   return tr->model->joint[joint - 1].type != CAV_JOINT_BALL;
 }
 
+/// Whether the contact law, and so the continuation, has a part in the model: contacts, limits, or friction.
+static int law_acts(const cav_model *m) {
+  int acts = m->npair > 0 || m->nequality > 0;
+  for (int j = 0; j < m->njoint; j++) acts |= m->joint[j].limited;
+  for (int d = 0; d < m->nv; d++) acts |= m->dof[d].frictionloss > 0;
+  for (int k = 0; k < m->ntendon; k++) acts |= m->tendon[k].limited || m->tendon[k].frictionloss > 0;
+  return acts;
+}
+
+/// Whether slot i of knot t is a row of its own. Where the contact law acts, one without bounds is none: Ipopt would give it a
+/// slack, and count the distance to it as violation, so that its filter takes steps that make the cost worse. Elsewhere such
+/// a row lifts the force to an unknown of its own, which bends less.
+static int is_row(const program *p, int t, int i) {
+  const cav_transcription *tr = p->run->tr;
+  const cav_slot *slot = &tr->knot[t].slot[i];
+  int dof;
+  if (p->soft_terms && i >= tr->knot[t].layout.term) return 0;
+  return !is_bound(tr, t, i, &dof) && (!law_acts(tr->model) || isfinite(slot->lower) || isfinite(slot->upper));
+}
+
 /// Whether a row depends on the step: forces, and terms that read more than the configuration.
 static int sees_step(const cav_transcription *tr, int t, int i) {
   const cav_slot_layout *at = &tr->knot[t].layout;
@@ -339,12 +367,12 @@ static int sees_step(const cav_transcription *tr, int t, int i) {
 
 static int list_rows(program *p, char *pattern) {
   const cav_transcription *tr = p->run->tr;
-  int nv = tr->nv, dof;
+  int nv = tr->nv;
   for (int pass = 0; pass < 2; pass++) {
     int m = 0, entries = 0;
     for (int t = 0; t < tr->nknot; t++) {
       for (int i = 0; i < tr->knot[t].layout.count; i++) {
-        if (is_bound(tr, t, i, &dof)) continue;
+        if (!is_row(p, t, i)) continue;
         if (pass) p->row_knot[m] = t, p->row_slot[m] = i;
         cav_transcription_pattern(tr, t, i, pattern);
         for (int c = 0; c < 3 * nv; c++) {
@@ -549,15 +577,6 @@ static cav_status conclude(const program *p, enum ApplicationReturnStatus code, 
   return CAV_NOT_CONVERGED;
 }
 
-/// Whether the contact law, and so the continuation, has a part in the model: contacts, limits, or friction.
-static int law_acts(const cav_model *m) {
-  int acts = m->npair > 0 || m->nequality > 0;
-  for (int j = 0; j < m->njoint; j++) acts |= m->joint[j].limited;
-  for (int d = 0; d < m->nv; d++) acts |= m->dof[d].frictionloss > 0;
-  for (int k = 0; k < m->ntendon; k++) acts |= m->tendon[k].limited || m->tendon[k].frictionloss > 0;
-  return acts;
-}
-
 static void program_free(program *p) {
   for (int t = 0; p->hessian && t < p->run->tr->nknot; t++) free(p->hessian[t]);
   cav_trajectory_free(p->anchor);
@@ -606,25 +625,27 @@ static cav_status solve_stage(cav_solve_run *run, double fraction, int exact, in
                .damping = damping,
                .exact = exact,
                .settles = !exact && !is_limited(run),
-               .passing = iterations > 0};
+               .passing = iterations > 0,
+               .soft_terms = iterations > 0 && fraction < hard_from};
   IpoptProblem nlp = NULL;
   double *bound = NULL, *start = NULL, *multiplier = NULL;
   cav_status status = CAV_NO_MEMORY;
+  // costs are the objective: constraint rows get no weight of their own, but for terms that are none yet
+  tr->penalty = (cav_penalties){.term = p.soft_terms ? kept.term : 0};
+  tr->difference = CAV_DERIVATIVE_CENTRED;
+  if ((status = cav_transcription_values(tr, run->at)) != CAV_OK) goto end;
+  status = CAV_NO_MEMORY;
   if (!cav_transcription_keep_rows(tr) || !program_new(&p)) goto end;
+  if (!is_limited(run) && !cav_absolute_begin(tr)) goto end;
   bound = malloc((2 * (size_t)p.n + 2 * (size_t)p.m + 1) * sizeof(double));
   start = calloc((size_t)p.n, sizeof(double));
   multiplier = calloc(2 * (size_t)p.n + (size_t)p.m + 1, sizeof(double));
   if (!bound || !start || !multiplier) goto end;
 
-  // costs alone are the objective: constraint rows get no weight of their own
-  tr->penalty = (cav_penalties){0};
-  tr->difference = CAV_DERIVATIVE_CENTRED;
-  if ((status = cav_transcription_values(tr, run->at)) != CAV_OK) goto end;
   set_bounds(&p, bound, bound + p.n, bound + 2 * p.n, bound + 2 * p.n + p.m);
   nlp = CreateIpoptProblem(p.n, bound, bound + p.n, p.m, bound + 2 * p.n, bound + 2 * p.n + p.m, p.entries,
                            cav_normal_entries(run->normal, NULL, NULL, NULL), 0, objective, constraints,
                            objective_gradient, constraint_jacobian, lagrangian_hessian);
-  status = CAV_NO_MEMORY;
   if (!nlp) goto end;
   if (!set_options(nlp, &p, iterations)) {
     status = conclude(&p, Invalid_Option, error);
@@ -644,6 +665,7 @@ static cav_status solve_stage(cav_solve_run *run, double fraction, int exact, in
 end:
   tr->penalty = kept;
   tr->difference = difference;
+  cav_absolute_drop(tr);
   if (nlp) FreeIpoptProblem(nlp);
   program_free(&p);
   free(bound), free(start), free(multiplier);

@@ -162,6 +162,7 @@ int cav_knot_reserve(cav_transcription *tr, cav_scratch *s, int t) {
 static void begin_row(cav_sum *a, double weight, double r) {
   int i = a->row++;
   assert(i < a->knot->nrow);
+  a->bend = 0;
   if (!a->tr->free_step || !(a->jacobian || a->shifted)) return;
   assert(i < a->s->trace_room);
   a->root = sqrt(weight);
@@ -174,30 +175,49 @@ static void begin_row(cav_sum *a, double weight, double r) {
   a->knot->step_derivative += a->derivative * a->root * r;
 }
 
+/// Curvature of the present row's norm by its dual, where it has one; else that of the square that stands for it.
+static double curvature_of(cav_sum *a, const cav_term *term, double x, double square) {
+  if (a->knot->nabsolute == 0 || !a->jacobian || contact_part_of(term->quantity).n > 0) return square;
+  assert(a->nabsolute < a->knot->nabsolute);
+  cav_absolute *row = &a->knot->absolute[a->nabsolute++];
+  row->x = x;
+  return cav_absolute_curvature(row);
+}
+
 /// Starts the row of a cost, and turns its norm into a square: with x = r/unit and y^2/2 the norm of x, the residual is
 /// y and its row dy/dx times that of x, which goes into weight and residual.
 static void begin_cost(cav_sum *a, const cav_term *term, double unit, double *weight, double *r) {
+  double bend = 0;
   if (term->norm == CAV_NORM_ABSOLUTE) {
     double x = *r / unit, root = sqrt(1 + x * x);
     // y = x sqrt(2/(1 + root)), which is exact for small x; dy/dx = x/(root y)
-    double part = sqrt(2 / (1 + root)), derivative = 1 / (root * part);
-    *weight *= derivative * derivative;
+    double part = sqrt(2 / (1 + root)), derivative = 1 / (root * part), square = derivative * derivative;
+    bend = *weight * (curvature_of(a, term, x, square) - square);
+    *weight *= square;
     *r = unit * x * part / derivative;
   }
   begin_row(a, *weight, *r);
+  a->bend = bend;
+}
+
+/// Adds weight times the square of a row to the Hessian.
+static void add_square(cav_sum *a, double weight, int n, const int *column, const double *entry) {
+  int width = 3 * a->tr->nv;
+  for (int i = 0; i < n; i++) {
+    int row = column ? column[i] : i;
+    for (int j = 0; j < n; j++)
+      if ((column ? column[j] : j) <= row)
+        a->knot->hessian[row * width + (column ? column[j] : j)] += weight * entry[i] * entry[j];
+  }
 }
 
 /// Adds weight/2 (r + row dx)^2 for a row with n entries, begun.
 static void add_sparse(cav_sum *a, double weight, double r, int n, const int *column, const double *entry) {
   a->knot->merit += 0.5 * weight * r * r;
   if (!a->jacobian) return;
-  int width = 3 * a->tr->nv;
   for (int i = 0; i < n && a->tr->free_step; i++) a->knot->step_row[column[i]] += a->derivative * a->root * entry[i];
-  for (int i = 0; i < n; i++) {
-    a->knot->gradient[column[i]] += weight * r * entry[i];
-    for (int j = 0; j < n; j++)
-      if (column[j] <= column[i]) a->knot->hessian[column[i] * width + column[j]] += weight * entry[i] * entry[j];
-  }
+  for (int i = 0; i < n; i++) a->knot->gradient[column[i]] += weight * r * entry[i];
+  add_square(a, weight + a->bend, n, column, entry);
 }
 
 /// Space for one more dense row [3nv] with its residual.
@@ -216,6 +236,7 @@ static void add_dense(cav_sum *a, double weight, double r, const double *row) {
   double root = sqrt(weight), *out = new_dense(a, root * r);
   for (int k = 0; k < width; k++) out[k] = root * row[k];
   for (int k = 0; k < width && a->tr->free_step; k++) a->knot->step_row[k] += a->derivative * out[k];
+  if (a->bend != 0) add_square(a, a->bend, width, NULL, row);
 }
 
 /// Adds a linear form of u to a row [3nv].
@@ -233,7 +254,7 @@ static void add_force(cav_sum *a, double weight, double r, const cav_force_row *
   const cav_transcription *tr = a->tr;
   if (!stands_alone(form)) {
     a->knot->merit += 0.5 * weight * r * r;
-    a->s->force_weight[form->dof[0]] += weight * form->coef[0] * form->coef[0];
+    a->s->force_weight[form->dof[0]] += (weight + a->bend) * form->coef[0] * form->coef[0];
     a->s->force_derivative[form->dof[0]] += weight * r * form->coef[0];
     if (a->jacobian && tr->free_step) a->s->force_step[form->dof[0]] += a->derivative * a->root * form->coef[0];
     return;
@@ -707,7 +728,7 @@ void cav_knot_sum(cav_sum *a, const double *q, const double *v, const double *v_
   int nv = tr->nv;
   knot->merit = 0;
   knot->ndense = 0;
-  a->row = 0;
+  a->row = a->nabsolute = 0;
   memset(a->s->force_weight, 0, (size_t)nv * sizeof(double));
   memset(a->s->force_derivative, 0, (size_t)nv * sizeof(double));
   memset(a->s->force_step, 0, (size_t)nv * sizeof(double));

@@ -13,8 +13,10 @@ typedef struct cav_sum {
   cav_scratch *s;
   cav_knot *knot;
   int t, jacobian;
-  int shifted; ///< 1, 2: at a shorter or longer step, whose residuals are noted only; 0: at the step itself
-  int row;     ///< rows begun
+  int shifted;   ///< 1, 2: at a shorter or longer step, whose residuals are noted only; 0: at the step itself
+  int row;       ///< rows begun
+  int nabsolute; ///< rows with an absolute norm and a dual begun
+  double bend;   ///< of the present row: what its norm bends by beyond the square that stands for it
   double root,
       derivative; ///< of the present row: root of its weight, and what the step's logarithm does to root times residual
 } cav_sum;

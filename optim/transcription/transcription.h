@@ -31,6 +31,12 @@ typedef struct cav_force_row {
   double *coef;
 } cav_force_row;
 
+/// A cost row with an absolute norm sqrt(1 + x^2) - 1: its argument at the last linearisation and at the iterate before,
+/// and the dual w of x/sqrt(1 + x^2), -1 .. 1, that its Hessian is taken with.
+typedef struct cav_absolute {
+  double x, before, dual;
+} cav_absolute;
+
 enum { CAV_ROTATION_SIZE = 21 };
 
 /// Readings of a contact: gap or depth, slip (2), impact, force.
@@ -66,6 +72,10 @@ typedef struct cav_knot {
   double
       *rotation; ///< [nturn*CAV_ROTATION_SIZE] of the step that ends here: Jr^-1, Jl^-1 and the rotation vector itself
   double cost, merit; ///< cost terms; and with penalties
+  int nabsolute;
+  cav_absolute
+      *absolute; ///< [nabsolute] of the rows with an absolute norm that are not of contacts, in their order; where
+                 ///< nabsolute is 0 their Hessian is that of the squares that stand for them
 } cav_knot;
 
 /// Weights of the augmented Lagrangian, per kind of row.
@@ -150,6 +160,19 @@ cav_status cav_transcription_values(cav_transcription *transcription, cav_trajec
 
 /// Values and derivatives: du, dy, hessian and gradient of the merit of every knot.
 cav_status cav_transcription_linearise(cav_transcription *transcription, cav_trajectory *trajectory);
+
+/// Gives rows with an absolute norm duals, all 0, from which their Hessians are taken until they are dropped; 0 if memory
+/// runs out. absolute.c.
+int cav_absolute_begin(cav_transcription *transcription);
+void cav_absolute_drop(cav_transcription *transcription);
+
+/// Moves the duals along with an iterate: the one of the last linearisation is a fraction of the step away from the one
+/// at which this was called before, 0: it is the first. Returns whether there are any: Hessians stay those of the last
+/// linearisation.
+int cav_absolute_advance(cav_transcription *transcription, double fraction);
+
+/// What an absolute norm bends by at argument x, with its dual. absolute.c.
+double cav_absolute_curvature(const cav_absolute *row);
 
 /// Adds the product of a knot's dense rows to its Hessian, by this thread's room. join.c. CAV_NO_MEMORY.
 cav_status cav_rows_join(const cav_transcription *transcription, struct cav_scratch *scratch, cav_knot *knot);

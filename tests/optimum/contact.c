@@ -135,6 +135,36 @@ static void truth_push(int n, optimum_truth *truth) {
   }
 }
 
+// ---------------------------------------------------------------- a ball driven against a wall, which stops it at the
+// end
+
+static const char walled[] =
+    "<mujoco><option gravity='0 0 0'/><worldbody>"
+    "<geom name='wall' type='plane' size='1 1 1' pos='1.1 0 0' zaxis='-1 0 0'/>"
+    "<body><joint name='x' type='slide' axis='1 0 0'/><geom type='sphere' size='.1' mass='1'/></body></worldbody>"
+    "<actuator><motor joint='x'/></actuator></mujoco>";
+
+static void build_wall(optimum_problem *p, int n) {
+  (void)n;
+  p->problem.q_goal[0] = 1;
+  optimum_cost(p, CAV_QUANTITY_EFFORT, 1);
+  // how near the wall holds it is for the law to say
+  cav_term *near = optimum_range(p, CAV_QUANTITY_CONFIGURATION, .95, INFINITY);
+  near->from = near->to = p->problem.duration;
+  optimum_fix(p, CAV_QUANTITY_VELOCITY, p->problem.duration, (double[]){0});
+}
+
+// it arrives with the speed that costs least: u = 3 (T - t) for T = 1, from rest over 1 m; J = 3/2, without the wall 6
+static void truth_wall(int n, optimum_truth *truth) {
+  truth->duration = 1;
+  truth->cost = 1.5;
+  for (int i = 0; i <= n; i++) {
+    double t = (double)i / n;
+    truth->q[i] = 1.5 * t * t - t * t * t / 2;
+    truth->u[i] = 3 * (1 - t);
+  }
+}
+
 const optimum optimum_contact[] = {
     {.name = "lift-off",
      .text = "a block rests on the floor until it is thrust to a height",
@@ -169,6 +199,17 @@ const optimum optimum_contact[] = {
      .build = build_push,
      .truth = truth_push,
      .cost = {.02, 0},
+     .state = {.05, 1},
+     .force = {.05, 1},
+     .force_in_mean = 1},
+    {.name = "wall",
+     .text = "a ball is stopped by a wall at the end",
+     .model = walled,
+     .duration = 1,
+     .coarsest = 10,
+     .build = build_wall,
+     .truth = truth_wall,
+     .cost = {.05, 1},
      .state = {.05, 1},
      .force = {.05, 1},
      .force_in_mean = 1},

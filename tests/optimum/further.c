@@ -218,6 +218,82 @@ static void truth_fuel(int n, optimum_truth *truth) {
   }
 }
 
+// ---------------------------------------------------------------- the same with a damper
+
+static double damped_fuel_duration(void) { return 3.5; }
+
+// v' = u - v, so the way is the integral of u: 1 = t1 - t2, and the second push ends the speed that is left: t2 = log(1 +
+// v)
+static double damped_fuel(double t1) {
+  double T = damped_fuel_duration(), t2 = t1 - 1;
+  return t2 - log(1 + (1 - exp(-t1)) * exp(-(T - t1 - t2)));
+}
+
+static void truth_damped_fuel(int n, optimum_truth *truth) {
+  double T = damped_fuel_duration(), t1 = root_of(damped_fuel, 1, (T + 1) / 2), t2 = t1 - 1, v1 = 1 - exp(-t1);
+  double v2 = v1 * exp(-(T - t1 - t2));
+  truth->duration = T;
+  truth->cost = t1 + t2;
+  for (int i = 0; i <= n; i++) {
+    double t = T * i / n, s = fmin(fmax(t - t1, 0), T - t1 - t2), r = fmax(t - (T - t2), 0), push = fmin(t, t1);
+    truth->q[i] = push - 1 + exp(-push) + v1 * (1 - exp(-s)) + (1 + v2) * (1 - exp(-r)) - r;
+    truth->u[i] = t < t1 ? 1 : t < T - t2 ? 0 : -1;
+  }
+}
+
+// ---------------------------------------------------------------- fuel and duration: 3 times the integral of |u|, and
+// T^2/2
+
+static const double fuel_price = 3;
+
+static void build_fuel_time(optimum_problem *p, int n) {
+  build_fuel(p, n);
+  p->term[0].weight *= fuel_price;
+  p->problem.duration_least = 2;
+  p->problem.duration_most = 8;
+  p->problem.duration_weight = 1;
+}
+
+// T = t1 + 1/t1: the derivative of 2 price t1 + T^2/2
+static double fuel_time_slope(double t1) { return 2 * fuel_price + (t1 + 1 / t1) * (1 - 1 / (t1 * t1)); }
+
+static void truth_fuel_time(int n, optimum_truth *truth) {
+  double t1 = root_of(fuel_time_slope, .1, 1), T = t1 + 1 / t1;
+  truth->duration = T;
+  truth->cost = 2 * fuel_price * t1 + T * T / 2;
+  for (int i = 0; i <= n; i++) {
+    double t = T * i / n, s = fmin(t, T - t), r = fmin(s, t1), x = r * r / 2 + t1 * fmax(s - t1, 0);
+    truth->q[i] = t <= T / 2 ? x : 1 - x;
+    truth->u[i] = s >= t1 ? 0 : t <= T / 2 ? 1 : -1;
+  }
+}
+
+// ---------------------------------------------------------------- fuel and effort without a bound: u is the costate,
+// shortened by 1
+
+static void build_sparse(optimum_problem *p, int n) {
+  build_fuel(p, n);
+  optimum_cost(p, CAV_QUANTITY_EFFORT, 1);
+}
+
+// u = a (1 - t/t1) until t1 = T a/(2 (a + 1)), nothing, and back: the way minus 1
+static double sparse_way(double a) {
+  double T = 3, t1 = T * a / (2 * (a + 1));
+  return 2 * a * t1 * t1 / 3 + a * t1 / 2 * (T - 2 * t1) - 1;
+}
+
+static void truth_sparse(int n, optimum_truth *truth) {
+  double T = 3, a = root_of(sparse_way, .1, 10), t1 = T * a / (2 * (a + 1));
+  truth->duration = T;
+  truth->cost = a * a * t1 / 3 + a * t1;
+  for (int i = 0; i <= n; i++) {
+    double t = T * i / n, s = fmin(t, T - t), r = fmin(s, t1);
+    double x = a * (r * r / 2 - r * r * r / (6 * t1)) + a * t1 / 2 * fmax(s - t1, 0);
+    truth->q[i] = t <= T / 2 ? x : 1 - x;
+    truth->u[i] = (t <= T / 2 ? 1 : -1) * a * (1 - r / t1);
+  }
+}
+
 // ---------------------------------------------------------------- a pendulum of 0.5 m swings to 1.5 rad: no effort, at
 // its own period
 
@@ -340,6 +416,40 @@ const optimum optimum_further[] = {
      .state = {.05, 1},
      .force = {.05, 1},
      .force_in_mean = 1},
+    {.name = "fuel-damped",
+     .text = "least fuel with a damper: two pushes of unequal length",
+     .model = damped,
+     .duration = 3.5,
+     .coarsest = 14,
+     .build = build_fuel,
+     .truth = truth_damped_fuel,
+     .cost = {.05, 1},
+     .state = {.05, 1},
+     .force = {.05, 1},
+     .force_in_mean = 1},
+    {.name = "fuel-time",
+     .text = "least fuel and duration",
+     .model = unit,
+     .duration = 3,
+     .coarsest = 12,
+     .build = build_fuel_time,
+     .truth = truth_fuel_time,
+     // the norm is a thousandth less than |u|, which does not fall with the step
+     .cost = {5e-3, 0},
+     .time = {.05, 1},
+     .state = {.05, 1},
+     .force = {.05, 1},
+     .force_in_mean = 1},
+    {.name = "sparse",
+     .text = "least fuel and effort: nothing is done for a while",
+     .model = point,
+     .duration = 3,
+     .coarsest = 12,
+     .build = build_sparse,
+     .truth = truth_sparse,
+     .cost = {5e-3, 0},
+     .state = {.05, 1},
+     .force = {.05, 1}},
     {.name = "swing",
      .text = "cycle: a pendulum that swings by itself, its period free",
      .model = pendulum,
