@@ -41,7 +41,8 @@ typedef struct optimum {
                        const cav_solution *solution); ///< relative error of one; may be NULL
   optimum_bound multiplier_error;
   double optimal; ///< at most this by the verifier; 0: 1e-4
-  int quadratic;  ///< linear-quadratic: at most 5 iterations a stage, 1 after the last
+  int quadratic; ///< linear-quadratic: by the own solver at most 5 iterations a stage, 1 after the last; 2: and on grids
+                 ///< of up to twenty times the coarsest's steps
 } optimum;
 
 /// Rows of one file each.
