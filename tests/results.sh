@@ -94,10 +94,16 @@ optimum() {
   {
     echo "# Optimal control with known optima"
     echo
-    provenance "\`sh tests/results.sh optimum\`: own solver, errors relative to the truth (tests/optimum); iterations in all, the most in one stage, and after the last stage" |
+    provenance "\`sh tests/results.sh optimum\`: errors relative to the truth (tests/optimum); iterations in all, the most in one stage, and after the last stage" |
       sed '/^$/d; s/^machine/\n- machine/; s/^compiler/- compiler/; s/^commit/- commit/'
     echo
+    echo "## Own solver"
+    echo
     "$build/tests/test_optimum" table | grep '^|'
+    echo
+    echo "## Ipopt"
+    echo
+    "$build/tests/test_optimum" ipopt table | grep '^|'
   } >"$out/optimum.tmp"
   mv "$out/optimum.tmp" "$out/optimum.md"
 }
