@@ -91,6 +91,28 @@ says err "did you mean 'sensors'"
 run 2 solve a.xml --thread 2
 says err "did you mean '--threads'"
 
+# --- a scene at its edges ---
+
+run 0 help stress
+says out "--quick"
+cat >swing.xml <<'TEXT'
+<mujoco model="swing"><worldbody><body pos="0 0 2"><joint name="hub" axis="0 1 0" stiffness="3"/>
+<geom type="capsule" size=".05" fromto="0 0 0 0 0 -.5"/></body></worldbody></mujoco>
+TEXT
+run 0 stress swing.xml --quick --threads 2
+says out "a spring of hub"
+says err "stress: "
+for file in stress.html ranges.csv points.csv; do has swing.stress/$file; done
+says swing.stress/stress.html "swing under stress"
+cp swing.stress/points.csv points.csv
+run 0 stress swing.xml --quick --threads 1 --quiet -o other
+silent out
+silent err
+check "the same at any number of threads" cmp -s points.csv other/points.csv
+run 2 stress nothing.xml
+run 2 stress swing.xml --model swing.xml
+says err "is not a problem file"
+
 # --- input that is wrong ---
 
 cat >model.xml <<'TEXT'

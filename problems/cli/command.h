@@ -30,7 +30,7 @@ typedef struct cav_command_line {
   int threads;
   int strategies; ///< --strategies: 0 auto, else how many at once
   int resume, quiet, json;
-  int quick;           ///< --quick: a report in seconds
+  int quick;           ///< --quick: less, in seconds
   int all;             ///< --all: explain everything
   int force;           ///< --force: solve what is proven impossible
   const char *methods; ///< --methods, NULL: own
@@ -52,6 +52,7 @@ int cav_command_inspect(const cav_command_line *line);
 int cav_command_explain(const cav_command_line *line);
 int cav_command_report(const cav_command_line *line);
 int cav_command_solve(const cav_command_line *line);
+int cav_command_stress(const cav_command_line *line);
 int cav_command_study(const cav_command_line *line);
 int cav_command_verify(const cav_command_line *line);
 int cav_command_view(const cav_command_line *line);

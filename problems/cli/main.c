@@ -33,7 +33,9 @@ static const struct {
     {OPTION_MODEL, "--model", NULL, "FILE", "use this model instead of the one that the problem names"},
     {OPTION_FLOATING, "--floating", NULL, NULL, "the root link of a URDF floats (a problem says floating=\"true\")"},
     {OPTION_OUTPUT, "--output", "-o", "DIR",
-     "folder of the result (default: NAME.result, of a report NAME.report; NAME of the problem or else of its file)"},
+     "folder of the result (default: NAME.result, of a report NAME.report, of stress NAME.stress; NAME of the problem "
+     "or "
+     "else of its file)"},
     {OPTION_SOLVER, "--solver", NULL, "WORD", "how to solve"},
     {OPTION_IPOPT, "--ipopt", NULL, "NAME=VALUE",
      "an option of Ipopt, laid over the problem's; may be given several times"},
@@ -49,7 +51,7 @@ static const struct {
     {OPTION_RESUME, "--resume", NULL, NULL,
      "go on where the solve of the result folder was stopped; if the problem has changed since, start from its motion"},
     {OPTION_QUIET, "--quiet", "-q", NULL, "no progress and no table; errors and the exit status remain"},
-    {OPTION_QUICK, "--quick", NULL, NULL, "in about ten seconds instead of minutes: fewer states, steps and repeats"},
+    {OPTION_QUICK, "--quick", NULL, NULL, "in seconds instead of minutes: fewer values, states, steps and repeats"},
     {OPTION_FORCE, "--force", NULL, NULL, "solve what is proven impossible all the same"},
     {OPTION_ALL, "--all", NULL, NULL, "all that is missed, and all that pulls, with what usually helps"},
     {OPTION_JSON, "--json", NULL, NULL, "print as JSON what would be a table"},
@@ -90,6 +92,10 @@ static const command commands[] = {
      "problems/motions;\n"
      "  what a folder holds already is not solved again",
      cav_command_study, OPTION_MODEL | OPTION_OUTPUT | OPTION_METHODS | OPTION_THREADS | OPTION_QUIET},
+    {"stress", "MODEL|PROBLEM",
+     "push a scene to its edges: each parameter swept over its decades, the range in which all holds, the first value\n"
+     "  that breaks, and why. Writes a page and two tables",
+     cav_command_stress, OPTION_MODEL | OPTION_FLOATING | OPTION_OUTPUT | OPTION_THREADS | OPTION_QUICK | OPTION_QUIET},
     {"help", "[COMMAND|TOPIC]", "say how to use the tool, one of its commands, or what problem files may say", help, 0},
 };
 enum { NCOMMAND = sizeof commands / sizeof *commands };
