@@ -91,6 +91,18 @@ says err "did you mean 'sensors'"
 run 2 solve a.xml --thread 2
 says err "did you mean '--threads'"
 
+# --- more knots than fit into any memory ---
+
+awk 'BEGIN { printf "<mujoco><worldbody>"
+  for (i = 0; i < 90; i++) printf "<body pos=\"0 0 -.1\"><joint/><geom size=\".02\"/>"
+  for (i = 0; i < 90; i++) printf "</body>"
+  print "</worldbody></mujoco>" }' >chain.xml
+echo '<problem name="long" model="chain.xml"><horizon duration="9900" timestep="0.01"/><start/><goal/></problem>' >long.xml
+for command in inspect solve; do
+  run 2 $command long.xml
+  says err "a plan of 990001 knots of 90 dofs takes 1155 GB at least"
+done
+
 # --- a scene at its edges ---
 
 run 0 help stress

@@ -1,8 +1,12 @@
 /// Which actuators a plan can use: those whose efforts are linear forms of u with limits that are constant, or that
-/// move with q and v as a servo's do.
+/// move with q and v as a servo's do. And how many knots: a machine that gives memory before it has it ends the program
+/// where there is none left, so what a plan needs is counted first.
 #include "plannable.h"
 
+#include <math.h>
 #include <stdio.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include "cavort/problem.h"
 
@@ -41,4 +45,34 @@ cav_status cav_actuators_plannable(const cav_model *model, cav_error *error) {
     return CAV_NOT_SUPPORTED;
   }
   return CAV_OK;
+}
+
+// bytes that this process may have, INFINITY: unknown
+static double memory_most(void) {
+  double most = INFINITY;
+  const long pages = sysconf(_SC_PHYS_PAGES), size = sysconf(_SC_PAGESIZE);
+  if (pages > 0 && size > 0) most = (double)pages * (double)size;
+  static const int limits[] = {RLIMIT_AS, RLIMIT_DATA};
+  for (int i = 0; i < 2; i++) {
+    struct rlimit limit;
+    if (getrlimit(limits[i], &limit) == 0 && limit.rlim_cur != RLIM_INFINITY) most = fmin(most, (double)limit.rlim_cur);
+  }
+  return most;
+}
+
+cav_status cav_knots_plannable(double knots, int dofs, cav_error *error) {
+  // of a knot: the inverse's derivatives, 3, and what is gathered from them, 9 blocks; the band of the normal equations
+  // and its factors, 3 each
+  const double block = (double)dofs * dofs * sizeof(double), least = knots * (3 + 9 + 2 * 3) * block;
+  const double most = memory_most();
+  if (least <= most) return CAV_OK;
+  if (error) {
+    *error = (cav_error){.status = CAV_BAD_INPUT};
+    snprintf(
+        error->text, sizeof error->text,
+        "a plan of %.0f knots of %d dofs takes %.4g GB at least, expected at most the %.4g GB of this machine; take "
+        "longer steps or a shorter duration, or plan it in parts",
+        knots, dofs, least / 1e9, most / 1e9);
+  }
+  return CAV_BAD_INPUT;
 }

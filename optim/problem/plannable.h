@@ -1,4 +1,4 @@
-/// Which actuators a plan can use. Private to optim/.
+/// What can be planned: which actuators, and how many knots. Private to optim/.
 #ifndef CAVORT_PLANNABLE_H
 #define CAVORT_PLANNABLE_H
 
@@ -12,5 +12,9 @@ cav_status cav_actuators_plannable(const cav_model *model, cav_error *error);
 /// Whether the limits of a servo's control bound its effort by rows in u, q and v, beside those of its force if it has
 /// any: fixed gain, affine bias, on a scalar joint or a fixed tendon. plannable.c.
 int cav_servo_bounds(const cav_model *model, int actuator);
+
+/// Whether a plan of so many knots of so many dofs fits into the memory of the machine, and into what the process may
+/// take of it, before any is taken: CAV_BAD_INPUT with what it needs at least and what to do. plannable.c.
+cav_status cav_knots_plannable(double knots, int dofs, cav_error *error);
 
 #endif

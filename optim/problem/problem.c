@@ -16,6 +16,7 @@
 #include "file.h"
 #include "ipopt_options.h"
 #include "objects.h"
+#include "plannable.h"
 #include "problem_file.h"
 #include "scene.h"
 
@@ -130,6 +131,16 @@ int cav_problem_find(const cav_problem_reader *reader, const cav_xml_node *node,
   return found;
 }
 
+// dofs of the smallest tree
+static int smallest_tree(const cav_model *m) {
+  int least = m->nv;
+  for (int i = 1, n = 0; i < m->nlink; i++) {
+    n = m->link[i].parent == 0 ? m->link[i].ndof : n + m->link[i].ndof;
+    if ((i + 1 == m->nlink || m->link[i + 1].parent == 0) && n < least) least = n;
+  }
+  return least;
+}
+
 static cav_status read_horizon(const cav_problem_reader *reader) {
   cav_problem *p = reader->problem;
   const cav_xml_node *node = cav_problem_child(reader->root, "horizon");
@@ -146,6 +157,10 @@ static cav_status read_horizon(const cav_problem_reader *reader) {
                         "expected a whole number of steps of %g s, got %g; %g s would be one", p->timestep, steps,
                         round(steps) * p->timestep);
   }
+  // trees that nothing moves or asks for are left out of plans: of one alone, the smallest
+  cav_error needs;
+  if (cav_knots_plannable(round(steps) + 1, smallest_tree(reader->model), &needs) != CAV_OK)
+    return cav_xml_fail(reader->error, node, "duration", "%s", needs.text);
   double range[2];
   status = cav_problem_real(reader, node, "weight", 0, DBL_MAX, &p->duration_weight);
   if (status) return status;

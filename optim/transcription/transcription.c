@@ -203,6 +203,8 @@ static int scratch_new(cav_transcription *tr, cav_scratch *s) {
 
 cav_transcription *cav_transcription_new(const cav_problem *problem, int threads, cav_error *error) {
   if (cav_actuators_plannable(problem->model, error) != CAV_OK) return NULL;
+  const double knots = round(problem->duration / problem->timestep) + 1;
+  if (cav_knots_plannable(knots, problem->model->nv, error) != CAV_OK) return NULL;
   cav_transcription *tr = calloc(1, sizeof *tr);
   if (!tr) goto memory;
   tr->problem = problem;

@@ -109,7 +109,7 @@ static cav_status write_all(const char *folder, const cav_stress_report *report,
 
 static cav_status run(const cav_command_line *line, const char *folder, const cav_stress_scene *scene, int *well,
                       cav_error *error) {
-  ticker tick = {line->quiet, isatty(STDERR_FILENO), 0};
+  ticker tick = {line->quiet, isatty(STDERR_FILENO), -10};
   const cav_stress_options options = {
       .quick = line->quick, .threads = line->threads, .observer = observe, .context = &tick};
   cav_stress_report report;
