@@ -49,8 +49,8 @@ typedef struct worker {
 static plan plan_of(const cav_stress_options *options, int nv) {
   // steps of a large scene cost more, and in fewer of them what explodes has exploded
   const int steps = nv > 60 ? (nv > 240 ? 25 : 6000 / nv) : 100;
-  if (options->quick) return (plan){{1, steps < 40 ? steps : 40, 5}, 9, 3};
-  return (plan){{3, steps, 8}, GRID_MOST, BISECTIONS_MOST};
+  if (options->quick) return (plan){{1, steps < 40 ? steps : 40, 4}, 9, 3};
+  return (plan){{3, steps, 6}, GRID_MOST, BISECTIONS_MOST};
 }
 
 // --- one sweep ---
@@ -267,6 +267,7 @@ cav_status cav_stress_run(const cav_stress_scene *scene, const cav_stress_option
   if (!status) {
     describe(report, &all[0].bench);
     w.plan = plan_of(options, report->nv);
+    if (options->observer) w.stop = options->observer(options->context, 0);
     pthread_mutex_init(&w.lock, NULL);
     pthread_mutex_lock(&w.lock);
     start_workers(&w, all, n);

@@ -66,7 +66,7 @@ static int tell_springs(const cav_bench *b, char *why) {
   const char *name = "";
   const double h = b->pushed.timestep, implicit = b->pushed.order == CAV_ORDER_EULER ? h : 0;
   const double number = b->pushed.passive ? cav_model_stiffest(b->model, implicit, &name) * h * h : 0;
-  if (!(number > 2)) return 0;
+  if (!(number > 1)) return 0;
   add(why,
       ": a spring of %s has k h^2/m = %.3g, m with its damper's part; taken where a step begins it is stable below "
       "4, less where several act on one link, more where contacts hold it",
@@ -141,8 +141,9 @@ static void tell_cause(const cav_bench *b, cav_stress_sweep sweep, int above, co
   if (tell_push(b, e, why)) return;
   if (forward && tell_springs(b, why)) return;
   if (forward && tell_rotation(b, e, why)) return;
+  // of a derivative these say nothing
   const char *text = general[sweep][above];
-  if (text && *text) add(why, ": %s", text);
+  if (forward && *text) add(why, ": %s", text);
 }
 
 void cav_stress_rate(const cav_bench *b, cav_stress_sweep sweep, double own, const cav_stress_trace *trace,
