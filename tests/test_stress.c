@@ -131,6 +131,19 @@ static void test_noticed(void) {
   silent = 0;
 }
 
+/// So heavy that R is the least there is (dynamics/METHOD.md, 4), which the impedance moves no more: the derivatives by q
+/// know. They were 2e-2 off here, and above some ten thousand times the size of a humanoid.
+static void test_least_regulariser(void) {
+  cav_stress_report report;
+  if (!run("<mujoco><worldbody><geom type='plane' size='1 1 1'/><body pos='0 0 1'><freejoint/>"
+           "<geom size='.1' mass='3e14'/></body></worldbody></mujoco>",
+           1, &report))
+    return;
+  const cav_stress_point *p = own_point(&report);
+  CHECK(p->contacts > 0 && p->measure[CAV_STRESS_DERIVATIVE] < 1e-6);
+  cav_stress_report_clear(&report);
+}
+
 static void test_threads(void) {
   cav_stress_report one, two;
   if (!run(ball, 1, &one)) return;
@@ -237,6 +250,7 @@ int main(void) {
   test_spring();
   test_solref();
   test_noticed();
+  test_least_regulariser();
   test_threads();
   test_refused();
   test_similar();

@@ -131,9 +131,9 @@ static inline double cav_contact_excess(const cav_state *state, const cav_contac
 void cav_law_unilateral(double R, double sigma, double g, double *f, double *hessian, double *potential);
 void cav_law_bilateral(double R, double sigma, double bound, double g, double *f, double *hessian, double *potential);
 
-/// Rates by the distance to the constraint (dist - margin) of ln R and of ln hK of a row or contact's normal.
-/// limits.c.
-void cav_law_rates(const cav_state *state, const cav_softness *softness, double gap, double *regulariser,
+/// Rates by the distance to the constraint (dist - margin) of ln R and of ln hK of a row or contact's normal whose
+/// regulariser is R. limits.c.
+void cav_law_rates(const cav_state *state, const cav_softness *softness, double gap, double R, double *regulariser,
                    double *stiffness);
 
 #endif

@@ -53,7 +53,7 @@ static double sigmoid_derivative(double x, double midpoint, double power) {
   return power * pow((1 - x) / (1 - midpoint), power - 1);
 }
 
-void cav_law_rates(const cav_state *state, const cav_softness *softness, double gap, double *regulariser,
+void cav_law_rates(const cav_state *state, const cav_softness *softness, double gap, double R, double *regulariser,
                    double *stiffness) {
   const double *solimp = softness->solimp;
   double d0 = clamp_between(solimp[0], IMPEDANCE_MIN, IMPEDANCE_MAX),
@@ -65,8 +65,8 @@ void cav_law_rates(const cav_state *state, const cav_softness *softness, double 
   double derivative =
       sigmoid_derivative(-gap / width, clamp_between(solimp[3], IMPEDANCE_MIN, IMPEDANCE_MAX), larger(1, solimp[4]));
   double d = impedance(solimp, -gap), rate = -derivative / width * (dw - d0);
-  // R goes with (1 - d)/d, hK with d
-  *regulariser = -rate / (d * (1 - d));
+  // R goes with (1 - d)/d above its least value, hK with d
+  *regulariser = R > R_MIN ? -rate / (d * (1 - d)) : 0;
   *stiffness = rate / d;
 }
 

@@ -309,7 +309,8 @@ static void differentiate_law(const cav_model *model, const cav_state *state, co
     g[k] = z[k] / c->regulariser[k];
   }
   cav_law_contact(state, c, g, f, H);
-  cav_law_rates(state, &model->pair[c->pair].softness, c->dist - c->margin, &regulariser, &stiffness);
+  cav_law_rates(state, &model->pair[c->pair].softness, c->dist - c->margin, c->regulariser[0], &regulariser,
+                &stiffness);
   cav_contact_stiffness_ratio(state, c, &fraction);
   regulariser -= fraction;
   double target = -c->stiffness * (1 + stiffness * (c->dist - c->margin));

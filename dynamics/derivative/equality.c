@@ -17,8 +17,10 @@ typedef struct task {
 } task;
 
 // rates of ln R and ln hK by the length of the error
-static void law_rates(const task *t, const cav_equality *e, double length, double *regulariser, double *stiffness) {
-  cav_law_rates(t->state, &e->softness, -length, regulariser, stiffness);
+static void law_rates(const task *t, const cav_equality_rows *eq, double length, double *regulariser,
+                      double *stiffness) {
+  cav_law_rates(t->state, &t->model->equality[eq->equality].softness, -length, eq->regulariser[0], regulariser,
+                stiffness);
   *regulariser = -*regulariser;
   *stiffness = -*stiffness;
 }
@@ -32,7 +34,7 @@ static void impulse_rate(const task *t, const cav_equality_rows *eq, const doubl
     along += eq->error[i] * error[i];
   }
   double length = sqrt(square), stretch = length > 0 ? along / length : 0;
-  law_rates(t, &t->model->equality[eq->equality], length, &regulariser, &stiffness);
+  law_rates(t, eq, length, &regulariser, &stiffness);
   for (int i = 0; i < eq->dim; i++) {
     double target = (1 - eq->damping) * now[i] - eq->stiffness * (error[i] + stiffness * stretch * eq->error[i]);
     out[i] = (target - next[i]) / eq->regulariser[i] - regulariser * stretch * eq->impulse[i];
