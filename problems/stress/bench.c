@@ -81,10 +81,8 @@ static cav_options options_of(const cav_bench *b) {
   return o;
 }
 
-cav_status cav_bench_open(cav_bench *b, const cav_stress_scene *scene, cav_error *error) {
-  *b = (cav_bench){0};
-  cav_status status = load(b, scene, error);
-  if (status) return status;
+// what a loaded scene needs
+static cav_status set_up(cav_bench *b, cav_error *error) {
   const cav_model *m = b->model;
   const size_t nq = (size_t)m->nq, nv = (size_t)m->nv;
   b->kept = cav_model_keep(m);
@@ -96,10 +94,19 @@ cav_status cav_bench_open(cav_bench *b, const cav_stress_scene *scene, cav_error
   if (nq > 0) memcpy(start, b->problem ? b->problem->q_start : m->q0, nq * sizeof *start);
   b->start = start;
   b->options = options_of(b);
-  if (nv == 0)
-    return cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: nothing moves in this scene: there is nothing to sweep",
-                         scene->path);
+  if (nv == 0) return cav_file_fail(error, CAV_BAD_INPUT, 0, "nothing moves in this scene: there is nothing to sweep");
   return CAV_OK;
+}
+
+cav_status cav_bench_open(cav_bench *b, const cav_stress_scene *scene, cav_error *error) {
+  *b = (cav_bench){0};
+  cav_status status = load(b, scene, error);
+  return status ? status : set_up(b, error);
+}
+
+cav_status cav_bench_take(cav_bench *b, cav_model *model, cav_error *error) {
+  *b = (cav_bench){.model = model};
+  return set_up(b, error);
 }
 
 void cav_bench_close(cav_bench *b) {

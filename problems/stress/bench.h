@@ -32,6 +32,9 @@ typedef struct cav_bench {
 cav_status cav_bench_open(cav_bench *bench, const cav_stress_scene *scene, cav_error *error);
 void cav_bench_close(cav_bench *bench);
 
+/// The same with a model that is loaded already, and now the bench's.
+cav_status cav_bench_take(cav_bench *bench, cav_model *model, cav_error *error);
+
 /// Why a scene has nothing of a parameter; NULL: it has. Of the scene as it is.
 const char *cav_bench_absent(const cav_bench *bench, cav_stress_sweep sweep);
 

@@ -62,6 +62,34 @@ static double largest_rotation(const cav_bench *b, const double *v) {
   return most;
 }
 
+// fastest velocity that a constraint asks for, m/s; of angles at L
+static double asked_for(const cav_bench *b) {
+  double most = 0;
+  for (int i = 0; i < b->state->ncontact; i++) {
+    const cav_contact *c = &b->state->contact[i];
+    most = fmax(most, fabs(c->stiffness * (c->dist - c->margin)));
+  }
+  for (int i = 0; i < b->state->nrow; i++) {
+    const cav_row *r = &b->state->row[i];
+    if (r->type != CAV_ROW_LIMIT_JOINT) continue;
+    const double unit = b->unit[b->model->joint[r->object].dof];
+    most = fmax(most, fabs(r->stiffness * (r->dist - r->margin)) / unit);
+  }
+  return most;
+}
+
+// whether the step to another v' is one by the same forces: an order that is not convex may have several
+static int is_another(cav_bench *b, const double *u, const double *other) {
+  const int n = b->model->nv;
+  double *there = b->scratch + 2 * n, most = 0, error = 0;
+  if (cav_inverse(b->model, b->state, b->q, b->v, other, there)) return 0;
+  for (int i = 0; i < n; i++) {
+    error = fmax(error, fabs(there[i] - u[i]) * b->unit[i]);
+    most = fmax(most, fmax(fabs(u[i]), fabs(there[i])) * b->unit[i]);
+  }
+  return error <= 1e-9 * most;
+}
+
 static cav_status step_forward(cav_bench *b, cav_stress_trace *e, cav_stress_point *p, const double *q, const double *v,
                                const double *u, double *v_next) {
   // as cav_forward: its tolerance and limit
@@ -81,6 +109,7 @@ static cav_status measure_round_trip(cav_bench *b, cav_stress_point *p, cav_stre
   int most = -1;
   cav_status status = cav_inverse(m, b->state, b->q, b->v, b->v_next, u);
   if (status == CAV_NO_MEMORY) return status;
+  const double asked = asked_for(b);
   if (b->state->ncontact > p->contacts) p->contacts = b->state->ncontact;
   if (!usable(e, "the inverse", status, u, m->nv)) {
     worsen(&p->measure[CAV_STRESS_ROUND_TRIP], INFINITY);
@@ -91,12 +120,15 @@ static cav_status measure_round_trip(cav_bench *b, cav_stress_point *p, cav_stre
   if (status == CAV_NO_MEMORY) return status;
   if (usable(e, "the forward step", status, back, m->nv)) {
     const double scale =
-        fmax(fmax(speed_of(b, b->v), speed_of(b, b->v_next)), b->gravity * b->pushed.timestep) + DBL_MIN;
+        fmax(fmax(speed_of(b, b->v), speed_of(b, b->v_next)), fmax(asked, b->gravity * b->pushed.timestep)) + DBL_MIN;
     for (int i = 0; i < m->nv; i++) {
       const double error = fabs(back[i] - b->v_next[i]) / b->unit[i] / scale;
       if (error > worst) worst = error, most = i;
     }
-    if (!(worst <= p->measure[CAV_STRESS_ROUND_TRIP])) e->dof = most;
+    if (!(worst <= p->measure[CAV_STRESS_ROUND_TRIP])) {
+      e->dof = most;
+      e->another = !status && worst > 1e-6 && is_another(b, u, back);
+    }
     worsen(&p->measure[CAV_STRESS_ROUND_TRIP], worst);
   } else {
     worsen(&p->measure[CAV_STRESS_ROUND_TRIP], INFINITY);

@@ -16,6 +16,7 @@ typedef struct cav_stress_trace {
   const char *call;         ///< which that was; NULL: none did
   int silent;               ///< a call came back as good with a number that is not finite
   int dof;                  ///< where the round trip misses most, -1: nowhere
+  int another;              ///< it misses v' for another v' that the same forces lead to
   int block;                ///< of the derivative that misses most: q, v, v'
   int step;                 ///< of the passive run, at which energy was highest
   int unsolved, solves;     ///< forward steps

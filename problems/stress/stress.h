@@ -30,7 +30,7 @@
 
 /// What is measured at each value, X(enumerator, name, most where all is well, least where it is broken, text).
 #define CAV_STRESS_MEASURES(X)                                                                                       \
-  X(ROUND_TRIP, "round-trip", 1e-10, 1e-3, "forward(inverse(v')) against v', relative to the largest of v, v', g h") \
+  X(ROUND_TRIP, "round-trip", 1e-10, 1e-3, "forward(inverse(v')) against v', relative to the largest of v, v', g h and what constraints ask for") \
   X(DERIVATIVE, "derivative", 1e-5, 1e-1, "analytic against centred differences along a direction, at the step that tells most")   \
   X(UNSOLVED, "unsolved", 0, 0.1, "fraction of forward steps that missed their tolerance")                           \
   X(ENERGY, "energy", 0.1, 100, "energy that a passive run gains, of its own and m g L")

@@ -42,6 +42,7 @@ static void tell_seen(const cav_bench *b, const cav_stress_trace *e, const cav_s
     case CAV_STRESS_ROUND_TRIP:
       add(why, "forward(inverse(v')) misses v' by %.1e (well up to %.0e)", seen, good);
       if (e->dof >= 0) add(why, ", most at joint %s", name_of(b->model, e->dof));
+      if (e->another) add(why, "; the same forces lead to both");
       break;
     case CAV_STRESS_DERIVATIVE:
       add(why, "the derivative by %s is %.1e off the difference quotient (well up to %.0e)", block[e->block], seen,
