@@ -348,6 +348,20 @@ int cav_quadratic_convex(cav_quadratic *p) {
   return cav_normal_factor(p->normal, 1e-10) == CAV_OK;
 }
 
+int cav_quadratic_knot_convex(cav_quadratic *p, int t, double shift) {
+  int width = 3 * p->tr->nv;
+  double square = 0;
+  memcpy(p->block, p->tr->knot[t].hessian, (size_t)width * (size_t)width * sizeof(double));
+  weigh_rows(p, t, p->local, &square);
+  for (int i = 0; i < width; i++) {
+    double *d = &p->block[i * width + i];
+    // columns of knots that are no unknowns are empty
+    *d = *d == 0 ? 1 : *d + 1e-10 * fabs(*d) + shift;
+    for (int j = 0; j < i; j++) p->block[j * width + i] = p->block[i * width + j];
+  }
+  return cav_dense_factor(width, width - 1, p->block, width);
+}
+
 /// Factors the costs' Hessian with all sides.
 static cav_status factor(cav_quadratic *p) {
   for (int r = 0; r < p->rows; r++) {
@@ -516,8 +530,8 @@ cav_status cav_quadratic_solve(cav_quadratic *p, const double *radius, const dou
     // another start helps where this one was held at its bounds, not where the gap stands still
     if (left <= 1e-4) break;
   }
-  // where the Hessian is not convex the conditions hold at what may be no minimum
-  if (status == CAV_OK && (p->lifted > 1e-10 || cav_quadratic_decrease(p) < -1e6 * tolerance))
+  // where the Hessian is not convex the conditions hold at what may be no minimum, or one above the start
+  if (status == CAV_OK && (p->lifted > 1e-10 || cav_quadratic_decrease(p) < -10 * fmax(p->gap, tolerance)))
     status = CAV_NOT_CONVERGED;
   for (int r = 0; r < p->rows; r++) p->multiplier[r] = p->row[2 * r + 1].y - p->row[2 * r].y;
   return status;

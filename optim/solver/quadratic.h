@@ -28,6 +28,9 @@ void cav_quadratic_correct(cav_quadratic *quadratic, const double *offset, doubl
 /// where it is positive definite by itself.
 int cav_quadratic_convex(cav_quadratic *quadratic);
 
+/// Whether a knot's own part of it is, with so much added to its diagonal. Where all are, their sum is convex.
+int cav_quadratic_knot_convex(cav_quadratic *quadratic, int t, double shift);
+
 /// Results, and what the caller sets before it solves: penalties and values of the rows, by knot and slot. [unknowns],
 /// [rows]
 const double *cav_quadratic_step(const cav_quadratic *quadratic);

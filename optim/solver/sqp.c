@@ -40,8 +40,9 @@ enum { LEAPS = 4, LEAP_BOXES = sizeof leap_box / sizeof *leap_box };
 /// the decrease a knot has to miss for its box to be at fault instead.
 static const double poor_ratio = 0.2, far = 2;
 
-/// Squares of the step, rad or m, that make a programme convex: of the cost, and at most.
-static const double least_shift = 1, most_shift = 1e6;
+/// Squares of the step, rad or m, that make a programme convex, of the cost: of all knots, and of single ones.
+/// A wave of these takes what is within this fraction of the largest.
+static const double least_shift = 1, most_shift[2] = {10, 1e6}, most_knot_shift = 1e14, wave = 0.05;
 
 /// Penalties: over the multiplier; of its kind's largest multiplier; of the cost, a unit of the row.
 static const double over = 2, of_kind = 0.1, of_cost = 0.01;
@@ -136,12 +137,15 @@ typedef struct descent {
   double *before, *after, *tried; ///< [nknot] the knots' parts of the merit: here, at the step to take, at the last one
   double *forecast, *next;        ///< [nknot] of the decrease; boxes to come
   double merit;
-  double predicted;              ///< decrease, by the last programme
-  double ratio;                  ///< of the decrease to it
-  int age;                       ///< iterations since the curvature was found; -1: it was not
-  double shift;                  ///< what the squares of the unknowns cost besides
+  double predicted; ///< decrease, by the last programme
+  double ratio;     ///< of the decrease to it
+  int age;          ///< iterations since the curvature was found; -1: it was not
+  double shift;     ///< what the squares of the unknowns cost besides
+  double *need;     ///< [nknot] what those of one knot would have to cost; 0: nothing, or they do
+  int needs_known;
   double gain;                   ///< decrease of the step that was taken
   cav_trajectory *second, *best; ///< corrected trial; best of those tried
+  const cav_trajectory *last;    ///< what was evaluated last
 } descent;
 
 static void set_radius(const cav_transcription *tr, double *radius, double value) {
@@ -153,7 +157,7 @@ static int descent_new(descent *d, cav_solve_run *run) {
   size_t n = (size_t)cav_transcription_unknowns(run->tr), rows = d->qp ? (size_t)cav_quadratic_rows(d->qp) : 0;
   d->curvature = cav_curvature_new(run->tr);
   size_t knots = (size_t)run->tr->nknot;
-  d->x = calloc(n + 2 * rows + 6 * knots, sizeof(double));
+  d->x = calloc(n + 2 * rows + 7 * knots, sizeof(double));
   d->second = cav_trajectory_copy(run->at);
   d->best = cav_trajectory_copy(run->at);
   if (!d->qp || !d->curvature || !d->x || !d->second || !d->best || !cav_transcription_keep_rows(run->tr)) return 0;
@@ -165,6 +169,7 @@ static int descent_new(descent *d, cav_solve_run *run) {
   d->tried = d->after + knots;
   d->forecast = d->tried + knots;
   d->next = d->forecast + knots;
+  d->need = d->next + knots;
   set_radius(run->tr, d->radius, first_radius);
   return 1;
 }
@@ -177,21 +182,61 @@ static void descent_free(descent *d) {
   free(d->x);
 }
 
-/// Raises the shift of the unknowns' own squares, and with it their steps' cost.
-static void raise_shift(const cav_transcription *tr, descent *d, double least) {
-  double next = d->shift > 0 ? 10 * d->shift : least;
+/// Changes what all unknowns' own squares cost besides.
+static void shift_all(const cav_transcription *tr, descent *d, double next) {
   size_t nv = (size_t)tr->nv, width = 3 * nv;
   for (int t = 0; t < tr->nknot; t++)
     for (size_t i = nv; i < 2 * nv; i++) tr->knot[t].hessian[i * width + i] += next - d->shift;
   d->shift = next;
 }
 
+/// What each knot's part needs to be convex by itself.
+static void find_needs(const cav_transcription *tr, descent *d) {
+  double least = least_shift * cost_scale(tr);
+  for (int t = 0; t < tr->nknot; t++) {
+    d->need[t] = 0;
+    while (d->need[t] < most_knot_shift * least && !cav_quadratic_knot_convex(d->qp, t, d->need[t]))
+      d->need[t] = d->need[t] > 0 ? 10 * d->need[t] : least;
+  }
+  d->needs_known = 1;
+}
+
+/// Makes the model more convex: by squares of all unknowns; then, in their place, by those of the knots that need most,
+/// where a contact comes or goes, and of more and more knots; then by those of all beside. 0: there is no more to be
+/// had.
+static int raise_shift(const cav_transcription *tr, descent *d) {
+  double least = least_shift * cost_scale(tr);
+  if (!d->needs_known && d->shift < most_shift[0] * least) {
+    shift_all(tr, d, d->shift > 0 ? 10 * d->shift : least);
+    return 1;
+  }
+  if (!d->needs_known) {
+    shift_all(tr, d, 0);
+    find_needs(tr, d);
+  }
+  int width = 3 * tr->nv;
+  double most = 0;
+  for (int t = 0; t < tr->nknot; t++) most = fmax(most, d->need[t]);
+  if (most == 0) {
+    if (d->shift >= most_shift[1] * least) return 0;
+    shift_all(tr, d, d->shift > 0 ? 10 * d->shift : most_shift[0] * least);
+    return 1;
+  }
+  for (int t = 0; t < tr->nknot; t++) {
+    if (d->need[t] < wave * most) continue;
+    for (int i = 0; i < width; i++) tr->knot[t].hessian[i * width + i] += d->need[t];
+    d->need[t] = 0;
+  }
+  return 1;
+}
+
 /// Adds the Lagrangian's curvature to the linearisation, with squares of the step that make it convex along the rows
 /// that hold the motion.
 static void add_curvature(cav_solve_run *run, descent *d) {
   cav_curvature_add(d->curvature, run->tr, 1);
-  while (!cav_quadratic_convex(d->qp) && d->shift < most_shift)
-    raise_shift(run->tr, d, least_shift * cost_scale(run->tr));
+  d->shift = 0;
+  d->needs_known = 0;
+  while (!cav_quadratic_convex(d->qp) && raise_shift(run->tr, d)) continue;
 }
 
 /// Solves the model in a box, with more and more squares until that can be done.
@@ -199,8 +244,7 @@ static cav_status solve_model(cav_solve_run *run, descent *d) {
   for (;;) {
     int solved = 0;
     cav_status status = solve_programme(run, d->qp, d->radius, &solved);
-    if (status != CAV_OK || solved || d->shift > most_shift) return status;
-    raise_shift(run->tr, d, least_shift * cost_scale(run->tr));
+    if (status != CAV_OK || solved || !raise_shift(run->tr, d)) return status;
   }
 }
 
@@ -222,6 +266,7 @@ static cav_status model(cav_solve_run *run, descent *d) {
     if (d->age >= 0) d->age++;
   }
   d->shift = 0;
+  d->needs_known = 0;
   if (status == CAV_OK && d->age >= 0) add_curvature(run, d);
   return status;
 }
@@ -235,6 +280,7 @@ static void exchange(cav_trajectory **a, cav_trajectory **b) {
 /// Merit of a trajectory, infinite where it cannot be evaluated.
 static cav_status try_at(cav_solve_run *run, descent *d, cav_trajectory *at, double *merit) {
   cav_status status = cav_transcription_values(run->tr, at);
+  d->last = at;
   *merit = status == CAV_OK ? merit_of(run->tr, cav_quadratic_penalty(d->qp), d->tried) : INFINITY;
   return status == CAV_NO_MEMORY || status == CAV_INTERRUPTED ? status : CAV_OK;
 }
@@ -367,7 +413,7 @@ static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
       d->gain = d->merit - trial;
       exchange(&run->at, &run->spare);
       *taken = 1;
-      return CAV_OK;
+      return d->last == run->at ? CAV_OK : cav_transcription_values(run->tr, run->at);
     }
     // values of the linearisation, which the trial has overwritten
     status = cav_transcription_values(run->tr, run->at);
@@ -423,6 +469,7 @@ static cav_status measure(cav_solve_run *run, descent *d, int curved) {
                              : cav_transcription_linearise(run->tr, run->at);
   if (status != CAV_OK) return status;
   d->shift = 0;
+  d->needs_known = 0;
   d->ratio = 0;
   if (curved) add_curvature(run, d);
   read_values(run->tr, cav_quadratic_value(d->qp));

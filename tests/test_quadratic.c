@@ -1,0 +1,125 @@
+/// optim/solver/quadratic.c on programmes whose Hessians are convex nowhere in particular: what is said to be solved is not above
+/// where it began, and knots that are convex each by itself make a programme that is, which is solved.
+#include <unistd.h>
+
+#include "quadratic.h"
+#include "scene.h"
+
+static const char model_text[] =
+    "<mujoco><worldbody><body name='trunk' pos='0 0 1'><joint name='z' type='slide' axis='0 0 1'/>"
+    "<geom type='sphere' size='.1' mass='4'/><body name='arm'><joint name='hip' axis='0 1 0' range='-40 40' "
+    "limited='true'/><geom type='capsule' fromto='0 0 0 0 0 -.25' size='.03' mass='1'/></body></body></worldbody>"
+    "<actuator><motor joint='hip' gear='4' ctrlrange='-1 1' ctrllimited='true'/>"
+    "<motor joint='z' gear='60' ctrlrange='-1 1' ctrllimited='true'/></actuator></mujoco>";
+
+enum { KNOTS = 8, TRIALS = 1500 };
+
+typedef struct bench {
+  cav_problem *problem;
+  cav_trajectory *at;
+  cav_transcription *tr;
+  cav_normal *normal;
+  cav_quadratic *qp;
+  double radius[KNOTS];
+} bench;
+
+// costs are the usual ones of effort, velocity and acceleration
+static int make(bench *b) {
+  static const char problem[] =
+      "<problem name='p' model='model.xml'><horizon duration='.35' timestep='.05'/>"
+      "<start/></problem>";
+  char folder[] = "/tmp/cavort-quadratic-XXXXXX", path[80];
+  cav_error error = {0};
+  if (!CHECK(mkdtemp(folder) != NULL)) return 0;
+  scene_write(folder, "model.xml", model_text);
+  scene_write(folder, "problem.xml", problem);
+  snprintf(path, sizeof path, "%s/problem.xml", folder);
+  b->problem = cav_problem_load(path, NULL, &error);
+  unlink(path);
+  snprintf(path, sizeof path, "%s/model.xml", folder);
+  unlink(path);
+  rmdir(folder);
+  if (!CHECK(b->problem != NULL)) return 0;
+  b->tr = cav_transcription_new(b->problem, 1, &error);
+  b->at = cav_trajectory_new(b->problem->model, KNOTS, b->problem->timestep);
+  b->normal = b->tr ? cav_normal_new(b->tr) : NULL;
+  b->qp = b->normal ? cav_quadratic_new(b->tr, b->normal) : NULL;
+  return CHECK(b->qp && b->at && b->tr->nknot == KNOTS && cav_transcription_keep_rows(b->tr));
+}
+
+static double centred(void) { return 2 * scene_uniform() - 1; }
+
+// a programme at random: costs that bend anyhow, so much, and rows at random distances from their bounds
+static void draw(bench *b, double bend) {
+  int width = 3 * b->tr->nv;
+  memset(b->at->q, 0, (size_t)(KNOTS * b->at->nq) * sizeof(double));
+  for (int i = b->at->nq; i < KNOTS * b->at->nq; i++) b->at->q[i] = 0.02 * centred();
+  cav_trajectory_velocities(b->problem->model, b->at);
+  CHECK(cav_transcription_linearise(b->tr, b->at) == CAV_OK);
+  double *value = cav_quadratic_value(b->qp), *penalty = cav_quadratic_penalty(b->qp);
+  for (int t = 0, k = 0; t < KNOTS; t++) {
+    b->radius[t] = pow(10, -2 * scene_uniform());
+    for (int i = 0; i < b->tr->knot[t].layout.count; i++, k++) {
+      value[k] = b->tr->knot[t].slot[i].value + 0.3 * centred();
+      penalty[k] = pow(10, 4 * scene_uniform());
+    }
+    for (int i = 0; i < width; i++) {
+      // columns of what is no unknown are empty
+      if (b->tr->knot[t].hessian[i * width + i] == 0) continue;
+      b->tr->knot[t].gradient[i] += bend * centred();
+      for (int j = 0; j <= i; j++)
+        if (b->tr->knot[t].hessian[j * width + j] != 0) b->tr->knot[t].hessian[i * width + j] += bend * centred();
+    }
+  }
+}
+
+// what is said to be a minimum is not above where the programme began
+static void test_solved(bench *b) {
+  const double change[2] = {-INFINITY, INFINITY};
+  int solved = 0;
+  double worst = 0;
+  for (int i = 0; i < TRIALS; i++) {
+    draw(b, pow(10, 6 * scene_uniform() - 1));
+    double scale = cav_transcription_cost(b->tr), gap = 1e-11 * scale;
+    if (cav_quadratic_solve(b->qp, b->radius, change, gap) != CAV_OK) continue;
+    solved++;
+    double least = fmax(cav_quadratic_gap(b->qp), gap);
+    worst = fmin(worst, cav_quadratic_decrease(b->qp) / least);
+  }
+  printf("%d of %d programmes at random said to be solved; the worst ends %.3g gaps above its start\n", solved, TRIALS,
+         -worst);
+  CHECK(solved > TRIALS / 100 && worst >= -10);
+}
+
+static void test_knots(bench *b) {
+  const double change[2] = {-INFINITY, INFINITY};
+  int width = 3 * b->tr->nv, bent = 0;
+  for (int i = 0; i < 100; i++) {
+    draw(b, pow(10, 4 * scene_uniform()));
+    bent += !cav_quadratic_convex(b->qp);
+    for (int t = 0; t < KNOTS; t++) {
+      double need = 0;
+      while (need < 1e9 && !cav_quadratic_knot_convex(b->qp, t, need)) need = need > 0 ? 10 * need : 1;
+      for (int j = 0; j < width; j++) b->tr->knot[t].hessian[j * width + j] += need;
+    }
+    CHECK(cav_quadratic_convex(b->qp));
+    double gap = 1e-11 * cav_transcription_cost(b->tr);
+    CHECK(cav_quadratic_solve(b->qp, b->radius, change, gap) == CAV_OK);
+    CHECK(cav_quadratic_decrease(b->qp) >= -cav_quadratic_gap(b->qp) - gap);
+  }
+  CHECK(bent > 50);
+}
+
+int main(void) {
+  bench b = {0};
+  if (make(&b)) {
+    test_solved(&b);
+    test_knots(&b);
+  }
+  cav_quadratic_free(b.qp);
+  cav_normal_free(b.normal);
+  cav_trajectory_free(b.at);
+  cav_transcription_free(b.tr);
+  cav_problem_free(b.problem);
+  return check_result();
+}
