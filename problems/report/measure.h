@@ -140,6 +140,7 @@ cav_status cav_measure_laws(cav_measure *m, cav_measure_law *out);
 typedef struct cav_measure_plan {
   cav_sheet sheet, trace;
   double limit; ///< s, processor time of each solve
+  double wall;  ///< s, wall clock of each, which ends it on a machine that others use
 } cav_measure_plan;
 cav_status cav_measure_plans(cav_measure *m, cav_measure_plan *out);
 

@@ -28,9 +28,6 @@ static const cav_sheet_column trace_columns[] = {
     {"unactuated", "largest force without an actuator, fraction of the weight"},
     {"violation", "largest scaled violation of limits and constraints"}};
 
-// how much longer than its processor time a solve may last
-static const double patience = 2.5;
-
 static const char *const order_name[] = {"euler", "midpoint", "momentum"};
 static const cav_ipopt_option limited[] = {{"hessian_approximation", "limited-memory"}},
                               exact[] = {{"hessian", "exact"}}, gauss_newton[] = {{"hessian", "gauss-newton"}};
@@ -58,7 +55,7 @@ typedef struct watching {
 static int stop(void *context) {
   watching *w = context;
   double limit = w->out->limit;
-  w->late |= cav_measure_processor() - w->processor > limit || cav_measure_clock() - w->wall > patience * limit;
+  w->late |= cav_measure_processor() - w->processor > limit || cav_measure_clock() - w->wall > w->out->wall;
   return w->stopped || w->late;
 }
 
@@ -150,7 +147,8 @@ cav_status cav_measure_plans(cav_measure *m, cav_measure_plan *out) {
   *out = (cav_measure_plan){
       .sheet = {.name = "plan", .ntext = 3, .nnumber = CAV_PLAN_NUMBERS, .column = columns},
       .trace = {.name = "plan_trace", .ntext = 1, .nnumber = CAV_TRACE_NUMBERS, .column = trace_columns},
-      .limit = m->quick ? 1.5 : 60};
+      .limit = m->quick ? 1.5 : 60,
+      .wall = m->quick ? 3 : 150};
   cav_order order = m->problem->order;
   const variant list[] = {{"own", CAV_SOLVER_GAUSS_NEWTON, NULL, order, 1, 1},
                           {"Ipopt, exact", CAV_SOLVER_IPOPT, exact, order, 1, 1},

@@ -228,18 +228,18 @@ static void advise_plan(const report *r, cav_html *page) {
   char x[4][CAV_HTML_NUMBER];
   if (!r->request->problem) return;
   if (r->advice.plan < 0 && r->advice.nearest < 0) {
-    cav_html_entry(page, "Solver of the problem", "No advice: no solver came to a motion within %g s each.",
-                   r->plan.limit);
+    cav_html_entry(page, "Solver of the problem",
+                   "No advice: no solver came to a motion within %g s of processor time.", r->plan.limit);
     return;
   }
   if (r->advice.plan < 0) {
     int near = r->advice.nearest;
     cav_html_entry(page, "Solver of the problem",
-                   "%s: no solver came to a feasible motion within %g s each%s; this one is the nearest, with an "
-                   "unactuated force of %s of the "
-                   "weight, a violation of %s and a cost of %s.",
-                   sheet->row[near].label[0], r->plan.limit,
-                   r->request->quick ? " (without --quick they have more)" : "",
+                   "%s: no solver came to a feasible motion in its time%s; this one was the nearest after %s s, with "
+                   "an unactuated force of %s of "
+                   "the weight, a violation of %s and a cost of %s.",
+                   sheet->row[near].label[0], r->request->quick ? " (without --quick they have more)" : "",
+                   number(cav_sheet_get(sheet, near, CAV_PLAN_SECONDS), x[3]),
                    number(cav_sheet_get(sheet, near, CAV_PLAN_UNACTUATED), x[0]),
                    number(cav_sheet_get(sheet, near, CAV_PLAN_VIOLATION), x[1]),
                    number(cav_sheet_get(sheet, near, CAV_PLAN_COST), x[2]));
@@ -612,13 +612,14 @@ static void write_plan(const report *r, cav_html *page) {
   cav_html_heading(page, "Solvers of the problem");
   cav_html_paragraph(
       page,
-      "Each solver from the problem's guess, one thread, at most %g s of processor time. Unactuated is the largest "
+      "Each solver from the problem's guess, one thread, at most %g s of processor time and %g s in all. Unactuated is "
+      "the largest "
       "force that no "
       "actuator can give "
       "over the weight, violation that of limits and constraints; feasible and optimality are the verifier's. What was "
       "stopped "
       "is told as it stood. Solves with another step or order are other problems: their costs are near, not the same.",
-      r->plan.limit);
+      r->plan.limit, r->plan.wall);
   for (int k = 0; k < 4; k++) {
     const char *const text[] = {names[k], NULL, NULL};
     int there = 0;
