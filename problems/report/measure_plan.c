@@ -32,6 +32,8 @@ static const char *const order_name[] = {"euler", "midpoint", "momentum"};
 static const cav_ipopt_option limited[] = {{"hessian_approximation", "limited-memory"}},
                               exact[] = {{"hessian", "exact"}}, gauss_newton[] = {{"hessian", "gauss-newton"}};
 
+enum { VARIANTS = 9 };
+
 typedef struct variant {
   const char *name;
   cav_solver solver;
@@ -71,8 +73,8 @@ static int observe(void *context, const cav_progress *p) {
       row[CAV_TRACE_UNACTUATED] = p->unactuated;
       row[CAV_TRACE_VIOLATION] = p->violation;
     }
-    // some hundred points of a solve are enough
-    w->last = seconds + w->out->limit / 150;
+    // some hundred points of a solve are enough, as many for each decade
+    w->last = 1.06 * seconds;
   }
   w->stopped = w->m->tell(w->m->context, w->v->name, w->done);
   return stop(w);
@@ -143,6 +145,21 @@ static cav_status solve(cav_measure *m, cav_measure_plan *out, const variant *v,
   return row ? CAV_OK : CAV_NO_MEMORY;
 }
 
+// the Pareto set of seconds and cost among the feasible ones that solve the problem itself
+static void mark(const cav_problem *p, cav_sheet *sheet) {
+  double x[VARIANTS], y[VARIANTS];
+  int marked[VARIANTS];
+  for (int r = 0; r < sheet->nrow; r++) {
+    int counts = cav_sheet_get(sheet, r, CAV_PLAN_FEASIBLE) == 1 &&
+                 cav_sheet_get(sheet, r, CAV_PLAN_STEP) == p->timestep &&
+                 !strcmp(sheet->row[r].label[1], order_name[p->order]);
+    x[r] = counts ? cav_sheet_get(sheet, r, CAV_PLAN_SECONDS) : NAN;
+    y[r] = counts ? cav_sheet_get(sheet, r, CAV_PLAN_COST) : NAN;
+  }
+  cav_html_pareto(sheet->nrow, x, y, marked);
+  for (int r = 0; r < sheet->nrow; r++) sheet->row[r].marked = marked[r];
+}
+
 cav_status cav_measure_plans(cav_measure *m, cav_measure_plan *out) {
   *out = (cav_measure_plan){
       .sheet = {.name = "plan", .ntext = 3, .nnumber = CAV_PLAN_NUMBERS, .column = columns},
@@ -150,16 +167,16 @@ cav_status cav_measure_plans(cav_measure *m, cav_measure_plan *out) {
       .limit = m->quick ? 1.5 : 60,
       .wall = m->quick ? 3 : 150};
   cav_order order = m->problem->order;
-  const variant list[] = {{"own", CAV_SOLVER_GAUSS_NEWTON, NULL, order, 1, 1},
-                          {"Ipopt, exact", CAV_SOLVER_IPOPT, exact, order, 1, 1},
-                          {"Ipopt, Gauss-Newton", CAV_SOLVER_IPOPT, gauss_newton, order, 1, 1},
-                          {"Ipopt, limited memory", CAV_SOLVER_IPOPT, limited, order, 1, 1},
-                          {"own", CAV_SOLVER_GAUSS_NEWTON, NULL, order, 2, 0},
-                          {"own", CAV_SOLVER_GAUSS_NEWTON, NULL, order, 0.5, 0},
-                          {"own", CAV_SOLVER_GAUSS_NEWTON, NULL, CAV_ORDER_EULER, 1, 0},
-                          {"own", CAV_SOLVER_GAUSS_NEWTON, NULL, CAV_ORDER_MIDPOINT, 1, 0},
-                          {"own", CAV_SOLVER_GAUSS_NEWTON, NULL, CAV_ORDER_MOMENTUM, 1, 0}};
-  int n = m->quick ? 4 : (int)(sizeof list / sizeof *list);
+  const variant list[VARIANTS] = {{"own", CAV_SOLVER_GAUSS_NEWTON, NULL, order, 1, 1},
+                                  {"Ipopt, exact", CAV_SOLVER_IPOPT, exact, order, 1, 1},
+                                  {"Ipopt, Gauss-Newton", CAV_SOLVER_IPOPT, gauss_newton, order, 1, 1},
+                                  {"Ipopt, limited memory", CAV_SOLVER_IPOPT, limited, order, 1, 1},
+                                  {"own", CAV_SOLVER_GAUSS_NEWTON, NULL, order, 2, 0},
+                                  {"own", CAV_SOLVER_GAUSS_NEWTON, NULL, order, 0.5, 0},
+                                  {"own", CAV_SOLVER_GAUSS_NEWTON, NULL, CAV_ORDER_EULER, 1, 0},
+                                  {"own", CAV_SOLVER_GAUSS_NEWTON, NULL, CAV_ORDER_MIDPOINT, 1, 0},
+                                  {"own", CAV_SOLVER_GAUSS_NEWTON, NULL, CAV_ORDER_MOMENTUM, 1, 0}};
+  int n = m->quick ? 4 : VARIANTS;
   cav_status status = CAV_OK;
   for (int i = 0; i < n && !status; i++) {
     double steps = m->problem->duration / (list[i].step * m->problem->timestep);
@@ -169,5 +186,6 @@ cav_status cav_measure_plans(cav_measure *m, cav_measure_plan *out) {
     if (fabs(steps - round(steps)) > 1e-6 * steps || steps < 2) continue;
     status = solve(m, out, &list[i], (double)i / n);
   }
+  mark(m->problem, &out->sheet);
   return status;
 }

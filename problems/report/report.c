@@ -618,7 +618,9 @@ static void write_plan(const report *r, cav_html *page) {
       "actuator can give "
       "over the weight, violation that of limits and constraints; feasible and optimality are the verifier's. What was "
       "stopped "
-      "is told as it stood. Solves with another step or order are other problems: their costs are near, not the same.",
+      "is told as it stood. Solves with another step or order are other problems: their costs are near, not the same. "
+      "Coloured rows are the Pareto set: of the feasible motions of the problem itself none is both faster and "
+      "cheaper.",
       r->plan.limit, r->plan.wall);
   for (int k = 0; k < 4; k++) {
     const char *const text[] = {names[k], NULL, NULL};
