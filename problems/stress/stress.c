@@ -12,7 +12,7 @@
 
 #include "cavort/dynamics.h"
 #include "file.h"
-#include "measure.h"
+#include "probe.h"
 
 #define SWEEP_RULE(enumerator, name, unit, least, most, text) \
   [CAV_STRESS_##enumerator] = {name, unit, least, most, text},

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "edit.h"
-#include "measure.h"
+#include "probe.h"
 
 static void add(char why[CAV_STRESS_WHY], const char *format, ...) __attribute__((format(printf, 2, 3)));
 static void add(char why[CAV_STRESS_WHY], const char *format, ...) {
@@ -43,6 +43,7 @@ static void tell_seen(const cav_bench *b, const cav_stress_trace *e, const cav_s
       add(why, "forward(inverse(v')) misses v' by %.1e (well up to %.0e)", seen, good);
       if (e->dof >= 0) add(why, ", most at joint %s", name_of(b->model, e->dof));
       if (e->another) add(why, "; the same forces lead to both");
+      if (seen <= e->rounding_of_u) add(why, "; rounding of the forces that lead there does as much");
       break;
     case CAV_STRESS_DERIVATIVE:
       add(why, "the derivative by %s is %.1e off the difference quotient (well up to %.0e)", block[e->block], seen,

@@ -9,7 +9,7 @@
 /// compensation, and of the springs of joints and tendons; constraints, dampers and friction losses can only take
 /// it, up to what a violated constraint gives back. A medium that moves gives energy too: with wind nothing is said
 /// of it.
-#include "measure.h"
+#include "probe.h"
 
 #include <float.h>
 #include <math.h>
@@ -78,6 +78,14 @@ static double asked_for(const cav_bench *b) {
   return most;
 }
 
+// what rounding of u itself does to v', m/s; angles at L: forces of stiff constraints are large, and what they leave of
+// the motion is a difference of them
+static double rounding_of(const cav_bench *b, const double *u) {
+  double most = 0;
+  for (int i = 0; i < b->model->nv; i++) most = fmax(most, fabs(u[i]) * b->model->dof[i].inverse_weight / b->unit[i]);
+  return ROUNDINGS * DBL_EPSILON * b->pushed.timestep * most;
+}
+
 // whether the step to another v' is one by the same forces: an order that is not convex may have several
 static int is_another(cav_bench *b, const double *u, const double *other) {
   const int n = b->model->nv;
@@ -127,6 +135,7 @@ static cav_status measure_round_trip(cav_bench *b, cav_stress_point *p, cav_stre
     }
     if (!(worst <= p->measure[CAV_STRESS_ROUND_TRIP])) {
       e->dof = most;
+      e->rounding_of_u = rounding_of(b, u) / scale;
       e->another = !status && worst > 1e-6 && is_another(b, u, back);
     }
     worsen(&p->measure[CAV_STRESS_ROUND_TRIP], worst);

@@ -1,6 +1,6 @@
 /// What holds at one value of one parameter, and why what does not. Private to stress/.
-#ifndef CAVORT_MEASURE_H
-#define CAVORT_MEASURE_H
+#ifndef CAVORT_PROBE_H
+#define CAVORT_PROBE_H
 
 #include "bench.h"
 
@@ -16,6 +16,7 @@ typedef struct cav_stress_trace {
   const char *call;         ///< which that was; NULL: none did
   int silent;               ///< a call came back as good with a number that is not finite
   int dof;                  ///< where the round trip misses most, -1: nowhere
+  double rounding_of_u;     ///< what of the miss rounding of the forces explains
   int another;              ///< it misses v' for another v' that the same forces lead to
   int block;                ///< of the derivative that misses most: q, v, v'
   int step;                 ///< of the passive run, at which energy was highest
@@ -24,7 +25,7 @@ typedef struct cav_stress_trace {
   double rounding;          ///< m, of the furthest coordinate
 } cav_stress_trace;
 
-/// Measures the pushed scene. CAV_NO_MEMORY or CAV_OK: what fails otherwise is what is measured. measure.c.
+/// Measures the pushed scene. CAV_NO_MEMORY or CAV_OK: what fails otherwise is what is measured. probe.c.
 cav_status cav_stress_measure_point(cav_bench *bench, const cav_stress_effort *effort, cav_stress_point *point,
                                     cav_stress_trace *trace);
 
