@@ -209,7 +209,7 @@ int main(int argc, char **argv) {
       "confirmed\n",
       n, t.all[RIGHT], t.all[ROUNDED], t.all[TOLD], t.all[WRONG], t.inside[RIGHT], inside, t.unconfirmed);
   if (all) print_tables(&t);
-  // at a softness of 1e-8 one cell in two hundred is off by up to 1e-7: outside the stated range
+  // at a softness of 1e-8, outside the stated range, one cell in a thousand is wrong (results/matrix.md)
   int wrong = 0;
   for (int k = 0; k < COUNT(laws); k++) wrong += laws[k].value == 1e-8 ? 0 : t.count[AXIS_laws][k][WRONG];
   CHECK(n > 300 && wrong == 0 && t.inside[WRONG] == 0);
