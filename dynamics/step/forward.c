@@ -8,7 +8,8 @@
 /// midpoint, momentum: bias and passive forces depend on v_next. The convex problem with these frozen gives the start;
 /// Newton with their derivative (differences of the smooth inverse, reused while it serves) finishes. Nothing then is
 /// symmetric or convex: such a step need not exist once a body turns by a radian or so within it (gyroscopic torques at
-/// speeds near 2/h; the solutions traced there end in a fold). Then the best iterate is returned as not converged.
+/// speeds near 2/h; the solutions traced there end in a fold). A second start has v_next = -v; then the best iterate is
+/// returned as not converged. Past a fold, which the sign of the derivative's determinant tells, the report says so.
 ///
 /// Coulomb's law (coulomb.c) has no potential either: Newton from the convex law's solution, and where it does not
 /// descend, convex problems with the bounds of friction held. A solution need not exist nor be the only one (Painleve).
@@ -44,8 +45,8 @@ enum {
 };
 
 static const double DEFAULT_TOLERANCE = 1e-13, ROUGH = 1e-9, NEAR = 1e-2, SHORTEST_STEP = 0.02;
-// of the proximal point method: softness below which it is taken, ratio of levels and the least, change of a velocity at
-// which it ends and the most that counts as an end
+// of the proximal point method: softness below which it is taken, ratio of levels and the least, change of a velocity
+// at which it ends and the most that counts as an end
 static const double STIFF = 1e-5, LEVEL_STEP = 1e-2, LEAST_LEVEL = 1e-10, AT_REST = 1e-15, CLOSE = 1e-10;
 
 // the solver's own arrays; names as in the text above
@@ -73,9 +74,10 @@ typedef struct newton {
   double *smooth;          // [nv*nv] that of the smooth part alone, not for euler
   int have_smooth;
   int frozen;          // the excess stays as it is
+  int sign;            // of the determinant of the last Newton step's derivative; 0: none was taken
   int raised;          // the problem's rows are softer than the state's
   double *room;        // of proximal.c
-  double *ended;       // [nv] where it ended
+  double *ended;       // [nv] where it ended, or how far a trace came
   double error, scale; // of the last measurement
   int iterations, limit;
 } newton;
@@ -464,9 +466,10 @@ static void exchange_rows(int n, double *A, double *b, int k, int l) {
 }
 
 // b := A^-1 b by elimination from the last dof, so that what hangs on few others fills little, A overwritten; rows are
-// exchanged where the diagonal is small. found [2*n] is overwritten. Returns 0 if A is singular
+// exchanged where the diagonal is small. found [2*n] is overwritten. Returns the sign of the determinant,
+// 0 if A is singular
 static int solve_general(int n, double *A, double *b, int *found) {
-  int *row = found, *column = found + n;
+  int *row = found, *column = found + n, sign = 1;
   for (int k = n - 1; k >= 0; k--) {
     int pivot = k, nrow = 0, ncolumn = 0;
     for (int i = 0; i < k; i++) {
@@ -475,7 +478,9 @@ static int solve_general(int n, double *A, double *b, int *found) {
       if (fabs(A[i * n + k]) > fabs(A[pivot * n + k])) pivot = i;
     }
     if (!(fabs(A[pivot * n + k]) > 0.0)) return 0;
-    if (fabs(A[k * n + k]) < 0.1 * fabs(A[pivot * n + k])) exchange_rows(n, A, b, k, pivot);
+    const int exchanges = fabs(A[k * n + k]) < 0.1 * fabs(A[pivot * n + k]);
+    if (exchanges) exchange_rows(n, A, b, k, pivot);
+    if (exchanges != (A[k * n + k] < 0.0)) sign = -sign;
     for (int j = 0; j < k; j++)
       if (A[k * n + j] != 0.0) column[ncolumn++] = j;
     for (int r = 0; r < nrow; r++) {
@@ -489,7 +494,7 @@ static int solve_general(int n, double *A, double *b, int *found) {
     for (int j = 0; j < i; j++) b[i] -= A[i * n + j] * b[j];
     b[i] /= A[i * n + i];
   }
-  return all_finite(b, n);
+  return all_finite(b, n) ? sign : 0;
 }
 
 // measures the inverse at x with the problem's own rows in the place of the state's
@@ -553,7 +558,8 @@ static cav_status newton_step(newton *s, int *accepted) {
   add_constraints(s);
   for (int i = 0; i < nv; i++) s->step[i] = s->problem.state->options.timestep * (s->u[i] - s->momentum[i]);
   s->iterations++;
-  if (!solve_general(nv, s->matrix, s->step, (int *)s->momentum)) return CAV_OK;
+  s->sign = solve_general(nv, s->matrix, s->step, (int *)s->momentum);
+  if (s->sign == 0) return CAV_OK;
   copy(s->anchor, s->x, nv);
   for (double length = 1.0; length > SHORTEST_STEP; length *= 0.5) {
     for (int i = 0; i < nv; i++) s->x[i] = s->anchor[i] + length * s->step[i];
@@ -728,6 +734,13 @@ static cav_status approach(newton *s, double tolerance) {
   return change <= CLOSE ? status : CAV_NOT_CONVERGED;
 }
 
+// where Newton finds no step of the mean velocity: from where that is zero, and with it all that is quadratic in it
+static cav_status turn_back(newton *s, double tolerance) {
+  for (int i = 0; i < s->problem.nv; i++) s->x[i] = -s->v[i];
+  s->have_smooth = 0;
+  return iterate(s, 1, tolerance);
+}
+
 // whether rows are so stiff that nothing is lost by coming from softer ones
 static int is_stiff(const cav_state *state) {
   const cav_options *o = &state->options;
@@ -750,9 +763,11 @@ cav_status cav_forward_newton(const cav_model *model, cav_state *state, const do
   const int stiff = is_stiff(state) && s.problem.nrow > 0;
   status = stiff ? approach(&s, tolerance) : iterate(&s, 0, tolerance);
   if (status == CAV_NOT_CONVERGED && s.problem.excess) status = follow_gaps(&s, tolerance);
+  if (status == CAV_NOT_CONVERGED && cav_takes_mean(state)) status = turn_back(&s, tolerance);
   if (status != CAV_OK && status != CAV_NOT_CONVERGED) return status;
   copy(v_next, s.x, model->nv);
-  if (report) *report = (cav_forward_report){.iterations = s.iterations, .residual = residual(&s)};
+  if (report)
+    *report = (cav_forward_report){.iterations = s.iterations, .residual = residual(&s), .folded = s.sign < 0};
   return status;
 }
 

@@ -1,7 +1,7 @@
 /// Proximal point method on the dual problem (9), Rockafellar 1976: minimise 1/2 f' (A + R) f + f' b + 1/2 |f - f_k|^2
 /// in the metric (r - 1) R, and again from the f found. Each is the same problem with R made larger and v* shifted, so
-/// the laws keep their closed form and (22); its fixed point is the problem with its own R, under Coulomb's law too. So
-/// what Newton factors is never stiffer than the least level, and impulses are sums of what was found, not differences
+/// the laws keep their closed form and (22); its fixed point is the problem with its own R, under Coulomb's law too.
+/// So what Newton factors is never stiffer than the least level, and impulses are sums of what was found, not differences
 /// of velocities over R. Directions in which A is not singular converge by level/A a time; impulses that no motion tells
 /// apart stay nearly what they are, which is the least that does.
 ///

@@ -130,8 +130,8 @@ CAV_API cav_status cav_inverse_from(const cav_model *model, cav_state *state, ca
                                     const double *v, const double *v_next, double *u);
 
 /// One step forward: v_next from u [nv], by Newton on the convex potential (9) in v_next, exact or smoothed law.
-/// Inverse of cav_inverse to 1e-9, or to what a rounding of v_next is worth in force where constraints are stiff; v_next
-/// is right to 1e-10 at any softness (dynamics/METHOD.md, 11). Starts from v.
+/// Inverse of cav_inverse to 1e-9, or to what a rounding of v_next is worth in force where constraints are stiff;
+/// v_next is right to 1e-10 at any softness (dynamics/METHOD.md, 11). Starts from v.
 /// CAV_NOT_CONVERGED leaves the best iterate. The position afterwards is cav_integrate(q, v_next, timestep).
 CAV_API cav_status cav_forward(const cav_model *model, cav_state *state, const double *q, const double *v,
                                const double *u, double *v_next);
@@ -139,14 +139,15 @@ CAV_API cav_status cav_forward(const cav_model *model, cav_state *state, const d
 /// What a forward solve did.
 typedef struct cav_forward_report {
   int iterations;
+  int folded;      ///< 1: past a fold, where steps that are not convex come in pairs (Newton only)
   double residual; ///< largest |inverse(q, v, v_next) - u| relative to the largest |u| involved
   double gap;      ///< duality gap of (9), v* lowered where Coulomb's law does, J (GPGS only)
   double mismatch; ///< |f_forward - f_inverse(v_next)| over all impulses, N s (GPGS only)
 } cav_forward_report;
 
 /// Forward step by generalised projected Gauss-Seidel on (9), exact law only. At most iterations sweeps, fewer when the
-/// largest change of an impulse, relative, falls below tolerance. report may be NULL. CAV_NOT_SUPPORTED for the smoothed
-/// law, for CAV_NEXT_GAP_EXACT and for implicit springs of tendons. Paper, section IV.
+/// largest change of an impulse, relative, falls below tolerance. report may be NULL. CAV_NOT_SUPPORTED for the
+/// smoothed law, for CAV_NEXT_GAP_EXACT and for implicit springs of tendons. Paper, section IV.
 CAV_API cav_status cav_forward_gpgs(const cav_model *model, cav_state *state, const double *q, const double *v,
                                     const double *u, int iterations, double tolerance, double *v_next,
                                     cav_forward_report *report);
