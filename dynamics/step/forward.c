@@ -41,10 +41,12 @@ enum {
   CHANGES = 30,
   POLISH = 2,
   FEW = 2,
-  LEVELS = 8
+  LEVELS = 8,
+  PATIENCE = 15
 };
 
-static const double DEFAULT_TOLERANCE = 1e-13, ROUGH = 1e-9, NEAR = 1e-2, SHORTEST_STEP = 0.02;
+static const double DEFAULT_TOLERANCE = 1e-13, ROUGH = 1e-9, NEAR = 1e-2, SHORTEST_STEP = 0.02, SOFTER = 1024.0,
+                    SHARPER = 32.0;
 // of the proximal point method: softness below which it is taken, ratio of levels and the least, change of a velocity
 // at which it ends and the most that counts as an end
 static const double STIFF = 1e-5, LEVEL_STEP = 1e-2, LEAST_LEVEL = 1e-10, AT_REST = 1e-15, CLOSE = 1e-10;
@@ -353,13 +355,11 @@ static cav_status fall(newton *s) {
   return status;
 }
 
-// minimises the potential of the island in hand by at most limit iterations; taken counts them
-static cav_status solve_island(newton *s, const int *local, double tolerance, double scale, int limit, int *taken) {
+// minimises the potential of the island in hand from x by at most limit iterations; taken counts them, on top of those
+// before
+static cav_status descend(newton *s, const int *local, double tolerance, double scale, int limit, int *taken) {
   const cav_impulse *p = &s->part;
   double before = INFINITY; // largest gradient at the last iterate
-  *taken = p->nblock == 0 && limit > 0;
-  if (p->nblock == 0) return *taken ? fall(s) : CAV_OK;
-  choose_start(s);
   for (int first = 1; *taken < limit; first = 0) {
     cav_impulse_rows(p, s->x, s->y);
     laws(s, s->y, s->f, s->curvature, 0);
@@ -379,6 +379,31 @@ static cav_status solve_island(newton *s, const int *local, double tolerance, do
     if (length * largest_of(s, s->step) <= 64.0 * DBL_EPSILON * largest_of(s, s->x)) break;
   }
   return CAV_OK;
+}
+
+// R of all rows of the island by a power of two, which rounds nothing
+static void soften(newton *s, double factor) {
+  for (int b = 0; b < s->part.nblock; b++) {
+    const cav_block *block = &s->part.block[b];
+    for (int i = block->first; i < block->first + block->dim; i++) s->part.R[i] *= factor;
+  }
+}
+
+// least point of the potential of the island in hand by at most limit iterations; taken counts them. Where many contacts
+// begin to slide at once the line search holds Newton back at their cones; then the island is come to from a softer one,
+// whose cones are wider apart
+static cav_status solve_island(newton *s, const int *local, double tolerance, double scale, int limit, int *taken) {
+  *taken = s->part.nblock == 0 && limit > 0;
+  if (s->part.nblock == 0) return *taken ? fall(s) : CAV_OK;
+  choose_start(s);
+  cav_status status = descend(s, local, tolerance, scale, limit < PATIENCE ? limit : PATIENCE, taken);
+  if (*taken < PATIENCE) return status;
+  for (double factor = SOFTER; factor > 1.0 && status == CAV_OK; factor /= SHARPER) {
+    soften(s, factor);
+    status = descend(s, local, NEAR, scale, limit, taken);
+    soften(s, 1.0 / factor);
+  }
+  return status == CAV_OK ? descend(s, local, tolerance, scale, limit, taken) : status;
 }
 
 // minimises the potential with smooth forces linear in M about x, island by island, to tolerance of the largest force
