@@ -184,17 +184,23 @@ static int ask(void *context) {
 
 static void test_stops(const cav_problem *p) {
   double worst = 0;
-  asker all = {.from = INT_MAX};
+  asker all = {.from = INT_MAX}, before = all;
   cav_solve_options options = cav_solve_options_default();
   cav_error error = {0};
   cav_solution *s = NULL;
   options.stop = ask;
-  options.stop_context = &all;
-  CHECK(cav_solve(p, &options, NULL, &s, &error) == CAV_OK);
-  CHECK(s && s->gain_q);
-  cav_solution_free(s);
+  // without gains, then with them
+  for (int gains = 0; gains < 2; gains++) {
+    options.gains = gains;
+    options.stop_context = gains ? &all : &before;
+    CHECK(cav_solve(p, &options, NULL, &s, &error) == CAV_OK);
+    CHECK(s && !s->gain_q == !gains);
+    cav_solution_free(s);
+  }
+  int chosen = all.questions - before.questions;
   for (int k = 0; k < 4; k++) {
-    asker a = {.from = 1 + (int)((double)all.questions * k / 4)};
+    // twice before gains are chosen, and twice while they are
+    asker a = {.from = 1 + (k < 2 ? before.questions * k / 2 : before.questions + chosen * (k - 2) / 2)};
     options.stop_context = &a;
     CHECK(cav_solve(p, &options, NULL, &s, &error) == CAV_INTERRUPTED);
     if (!CHECK(s && s->trajectory && s->nmultiplier > 0 && isfinite(s->cost))) continue;
@@ -202,7 +208,8 @@ static void test_stops(const cav_problem *p) {
     if (k < 2) CHECK(!s->gain_q && !s->gain_v);
     cav_solution_free(s);
   }
-  printf("%s: an answer takes %.3f s at most\n", p->name, worst);
+  printf("%s: asked %d times before gains are chosen, %d times there; an answer takes %.3f s at most\n", p->name,
+         before.questions, chosen, worst);
 #ifndef SANITIZED
   CHECK(worst < 0.5);
 #endif
