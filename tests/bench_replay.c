@@ -28,7 +28,7 @@ static void report(replay *s, const char *folder) {
     replay_end p = replay_play(s, 1e-3 * ms, 1);
     printf(" %.2f | %.0f | %.0f |", p.seconds, 1e3 * p.body, 1e3 * p.root);
   }
-  printf("\n");
+  printf(" %.1f |\n", v.push_survived_n_s);
   free(path);
 }
 
@@ -40,11 +40,12 @@ static void run(const char *folder, double factor) {
   if (!result) return;
   const cav_model *model = result->problem->model;
   size_t gains = (size_t)(result->trajectory->nknot - 1) * (size_t)(model->nv * model->nv);
-  for (size_t k = 0; k < gains; k++) result->gain_q[k] *= factor, result->gain_v[k] *= factor;
+  for (size_t k = 0; k < gains && result->gain_q; k++) result->gain_q[k] *= factor, result->gain_v[k] *= factor;
   replay s = {.problem = result->problem, .plan = result->trajectory};
   s.gain_q = result->gain_q, s.gain_v = result->gain_v;
   char *path = cav_result_path(folder, "problem.xml");
-  if (replay_open(&s, path)) report(&s, folder);
+  if (!result->gain_q) fprintf(stderr, "    %s: has no gains\n", folder);
+  if (CHECK(result->gain_q) && replay_open(&s, path)) report(&s, folder);
   replay_close(&s);
   free(path);
   cav_result_free(result);

@@ -2,7 +2,8 @@
 # Plays solved motions in MuJoCo, under the contacts of the models' own files, and writes results/replay.md: how long each follows and
 # how near it ends, beside what the certificate says; then the same with gains of half and of none, which have to be told apart.
 # Usage: sh tests/replay.sh [FOLDER...]   (result folders; without any, all motions are solved first: an hour)
-# CAVORT_BUILD names a release build with MuJoCo, by default build. FOLDERs are named after their motions, or r-MOTION.
+# CAVORT_BUILD names a release build with MuJoCo, by default build. FOLDERs are named after their motions, or r-MOTION. Models of
+# dm_control come from $CAVORT_SHARED_MODELS or ../shared/models.
 set -eu
 cd "$(dirname "$0")/.."
 build=${CAVORT_BUILD:-build}
@@ -12,7 +13,16 @@ trap 'rm -rf "$work"' EXIT
 if [ $# -eq 0 ]; then
   for motion in problems/motions/*/; do
     motion=$(basename "$motion")
-    "$build/problems/cavort" solve "problems/motions/$motion/problem.xml" -o "$work/$motion" --threads 1 --quiet || true
+    case $motion in
+      cheetah-*) model=cheetah ;;
+      hop | hopper-*) model=hopper ;;
+      quadruped-*) model=quadruped ;;
+      walker-*) model=walker ;;
+      *) model= ;;
+    esac
+    file=${CAVORT_SHARED_MODELS:-../shared/models}/dm_control/$model.xml
+    [ -z "$model" ] || [ -f "$file" ] || continue
+    "$build/problems/cavort" solve "problems/motions/$motion/problem.xml" -o "$work/$motion" --threads 1 --quiet ${model:+--model "$file"} || true
     set -- "$@" "$work/$motion"
   done
 fi
@@ -20,15 +30,15 @@ fi
 # table FACTOR FOLDER...
 table() {
   echo
-  echo "| motion | certified | achieved | lasts, s | closed loop until, s | ends, mm | model's contacts until, s | end, mm | MuJoCo 1 ms until, s | end, mm | root, mm | MuJoCo 2 ms until, s | end, mm | root, mm |"
-  echo "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|"
+  echo "| motion | certified | achieved | lasts, s | closed loop until, s | ends, mm | model's contacts until, s | end, mm | MuJoCo 1 ms until, s | end, mm | root, mm | MuJoCo 2 ms until, s | end, mm | root, mm | push survived, N s |"
+  echo "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|"
   "$build/tests/bench_replay" "$@"
 }
 
 {
   echo "# Motions replayed in MuJoCo"
   echo
-  echo "\`sh tests/replay.sh\`: solved motions in MuJoCo with the contacts of the model's file, feedforward and gains through MuJoCo's actuators. Until: all bodies within 0.5 m and roots within 1 rad; end: the farthest centre of mass then. The closed loop under the claimed law and under the model's contacts are the certificate's. Cycles run for their \`periods\`."
+  echo "\`sh tests/replay.sh\`: solved motions in MuJoCo with the contacts of the model's file, feedforward and gains through MuJoCo's actuators. Until: all bodies within 0.5 m and roots within 1 rad; end: the farthest centre of mass then. The closed loop under the claimed law and under the model's contacts, the worse of steps of 1 and 2 ms, are the certificate's. Cycles run for their \`periods\`."
   echo
   echo "- machine: $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1)"
   echo "- compiler: $(cc --version | head -n 1)"

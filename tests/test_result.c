@@ -134,6 +134,7 @@ static void check_verdict(const cav_problem *problem) {
   cav_verdict verdict = {.certified = 0,
                          .penetration_max_m = 0.02,
                          .optimality = NAN,
+                         .push_survived_n_s = 12.5,
                          .duration = 0.1,
                          .closed_loop_seconds = 0.1,
                          .replay_same_step_seconds = 0.1,
@@ -158,6 +159,7 @@ static void check_verdict(const cav_problem *problem) {
                          "\"replay_same_step_max_error\": ",
                          "\"closed_loop_seconds\": ",
                          "\"closed_loop_end_error_m\": ",
+                         "\"push_survived_n_s\": 12.5",
                          "\"solve_seconds\": 0.25"};
   for (size_t i = 0; i < sizeof field / sizeof *field; i++) {
     CHECK(strstr(text, field[i]) != NULL);

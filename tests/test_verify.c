@@ -507,6 +507,18 @@ static void test_loop_steps(void) {
   sample_free(&s);
 }
 
+// a mass of 2 kg on a line, pushed after one of three seconds and not brought back: at 0.024 s times 2 kg 9.81 m/s^2 it
+// ends 0.47 m away, and half a metre is lost
+static void test_push(void) {
+  sample s = sample_new(
+      "<mujoco><option gravity='0 0 0'/><worldbody><body><joint name='x' type='slide' axis='1 0 0'/>"
+      "<geom size='0.1' mass='2'/></body></worldbody></mujoco>",
+      150, 0.02, CAV_ORDER_EULER);
+  CHECK(verify(&s, NULL, NULL) == CAV_OK);
+  CHECK_NEAR(s.verdict.push_survived_n_s, 0.024 * 2 * 9.81, 1e-12);
+  sample_free(&s);
+}
+
 // a toe that flies along x at 4 m/s and an arm that turns at 20 rad/s, and a bar of 6 cm in the way of either, which
 // both pass between two knots 12 cm and 0.6 rad apart, by motors that stand against any contact force; or a bar that
 // stands 1 cm beside the way
@@ -814,6 +826,7 @@ int main(void) {
   test_penetration();
   test_own_contacts();
   test_loop_steps();
+  test_push();
   test_passage();
   test_hover();
   test_slip();

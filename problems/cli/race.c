@@ -116,6 +116,7 @@ static void leave_unverified(const cav_solution *solution, cav_verdict *v) {
                              &v->closed_loop_end_error_m,
                              &v->model_contacts_seconds,
                              &v->periodicity_error,
+                             &v->push_survived_n_s,
                              &v->model_contacts_end_error_m};
   for (size_t i = 0; i < sizeof unknown / sizeof *unknown; i++) *unknown[i] = NAN;
   const cav_trajectory *at = solution->trajectory;

@@ -56,6 +56,7 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
       v->model_contacts_seconds >= v->periods * v->duration * (1 - 1e-9));
   add_number(line, &n, "under the model's contact parameters, error at the end", v->model_contacts_end_error_m, NAN,
              1e3, " mm");
+  add_number(line, &n, "push survived there, along x and y", v->push_survived_n_s, NAN, 1, " N s");
   add_number(line, &n, "effort asked for in closed loop, of the limit", v->feedback_effort_max, NAN, 100, " %");
   add_number(line, &n, "open loop at the same step, largest error", v->replay_same_step_max_error, NAN, 1, "");
   add_number(line, &n, "power of an actuator, largest", v->power_max_w, NAN, 1, " W");
@@ -218,6 +219,7 @@ void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdi
   write_number(out, "feedback_effort_max", v->feedback_effort_max);
   write_number(out, "model_contacts_seconds", v->model_contacts_seconds);
   write_number(out, "model_contacts_end_error_m", v->model_contacts_end_error_m);
+  write_number(out, "push_survived_n_s", v->push_survived_n_s);
   write_number(out, "periodicity_error", v->periodicity_error);
   write_number(out, "periods", v->periods);
   write_number(out, "duration", v->duration);
