@@ -5,6 +5,7 @@
 
 #include "cavort/cavort.h"
 #include "constraint_table.h"
+#include "contradiction.h"
 #include "scene.h"
 
 static char folder[] = "/tmp/cavort-explain-XXXXXX";
@@ -372,12 +373,31 @@ static void check_rows(void) {
   done(&o);
 }
 
+// three targets of which any two go together: told where rows of equalities can be factored; none where nothing is missed
+static void check_three(void) {
+  static const char *const terms[] = {
+      "<constraint><posture name='bent' joint='elbow' qpos='.5' at='.5'/><posture name='raised' joint='shoulder' "
+      "qpos='.3' at='.5'/><sensor name='hand' type='framexaxis' site='tip' component='z' target='-.9' at='.5'/>"
+      "</constraint>",
+      "<constraint><posture name='bent' joint='elbow' qpos='.5' at='.5'/><posture name='raised' joint='shoulder' "
+      "qpos='.3' at='.5'/></constraint>"};
+  if (!cav_contradictions_available()) return;
+  outcome three = solve(arm_of("60"), terms[0]), two = solve(arm_of("60"), terms[1]);
+  const char *text = three.explanation.contradiction;
+  CHECK(names(text, "cannot hold together") && names(text, "'bent'") && names(text, "'raised'") &&
+        names(text, "'hand'") && names(text, "at 0.5 s"));
+  printf("%s\n", text);
+  CHECK(two.explanation.met && !*two.explanation.contradiction);
+  done(&three), done(&two);
+}
+
 int main(void) {
   if (!mkdtemp(folder)) return EXIT_FAILURE;
   check_out_of_reach();
   check_too_weak();
   check_inside_the_floor();
   check_contradiction();
+  check_three();
   check_penalty();
   check_speed_limit();
   check_effort_limit();

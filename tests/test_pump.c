@@ -73,6 +73,11 @@ static void test_offered(void) {
            BODY("0 0 2", "<joint name='swing' axis='0 1 0' stiffness='1'/><geom type='sphere' size='.1' pos='0 0 1'/>"),
            MOTOR("swing", "3")),
        "", 0},
+      {"nothing can touch",
+       "<mujoco><option><flag constraint='disable'/></option><worldbody><geom type='plane' size='1 1 1' pos='0 0 "
+       "1'/><body pos='0 0 2'><joint name='swing' axis='0 1 0'/><geom type='capsule' size='.05' fromto='0 0 0 0 0 1' "
+       "mass='1'/></body></worldbody><actuator>" MOTOR("swing", "3") "</actuator></mujoco>",
+       "", 1},
       {"something touches",
        MODEL("<geom type='box' size='.2 .2 .2' pos='0 0 .795'/>" BODY(
                  "0 0 2", "<joint name='swing' axis='0 1 0'/><geom type='sphere' size='.1' pos='0 0 .9'/>"),

@@ -441,6 +441,9 @@ typedef struct cav_explanation {
   int met; ///< 1: every constraint holds, and what pulls is what the motion's cost hangs on: rows at their bounds
   int nviolation, nconflict;
   cav_reason violation[CAV_REASONS], conflict[CAV_REASONS];
+  char contradiction
+      [400]; ///< equalities of which, near this motion, each follows from the others but for its value, and
+             ///< how far they are apart; "": none, or built without SPQR (optim/METHOD.md, 9)
 } cav_explanation;
 
 /// Ranks what a motion misses and which constraints pull against each other, from the rows of its solution.

@@ -19,6 +19,7 @@
 #include <string.h>
 
 #include "cavort/solve.h"
+#include "contradiction.h"
 #include "file.h"
 #include "problem_file.h"
 #include "transcription.h"
@@ -531,6 +532,60 @@ static void rank(inquiry *in, cav_explanation *out) {
   }
 }
 
+// ---------------------------------------------------------------- contradictions
+
+/// The rows of a group in words, each thing once with its knots.
+static void tell_rows(const inquiry *in, const cav_row_group *rows, const cav_binding *row, char *out, size_t size) {
+  int n = snprintf(out, size, "cannot hold together, %.3g apart: ", fabs(rows->mismatch)), more = 0;
+  for (int i = 0; i < rows->n; i++) {
+    const cav_binding *r = &row[rows->row[i]];
+    int told = 0, last = r->knot;
+    char subject[200], when[80];
+    for (int k = 0; k < rows->n; k++) {
+      const cav_binding *other = &row[rows->row[k]];
+      if (other->kind != r->kind || other->object != r->object || other->component != r->component) continue;
+      told |= k < i;
+      last = other->knot > last ? other->knot : last;
+    }
+    if (told) continue;
+    tell_subject(in, r, subject, sizeof subject);
+    if (last > r->knot)
+      snprintf(when, sizeof when, " from %.4g to %.4g s", r->knot * in->timestep, last * in->timestep);
+    else
+      snprintf(when, sizeof when, " at %.4g s", r->knot * in->timestep);
+    // room for the count of those left out
+    if ((size_t)n + strlen(subject) + strlen(when) + 20 < size)
+      n += snprintf(out + n, size - (size_t)n, "%s%s%s", i ? "; " : "", subject, when);
+    else
+      more++;
+  }
+  if (more) snprintf(out + n, size - (size_t)n, "; and %d more", more);
+}
+
+/// Equalities that contradict each other at the motion; nothing where derivatives are not exact enough to tell.
+static cav_status find_contradiction(const inquiry *in, const cav_trajectory *trajectory, const cav_options *contact,
+                                     cav_explanation *out) {
+  if (!cav_contradictions_available() || cav_derivatives_missing(in->model)) return CAV_OK;
+  cav_row_groups groups;
+  cav_binding *row = NULL;
+  cav_transcription *tr = cav_transcription_new(in->problem, 1, NULL);
+  if (!tr) return CAV_NO_MEMORY;
+  tr->options = *contact;
+  tr->derivative = CAV_DERIVATIVE_ANALYTIC;
+  cav_trajectory *at = cav_trajectory_copy(trajectory);
+  cav_status status = at && cav_transcription_keep_rows(tr) ? CAV_OK : CAV_NO_MEMORY;
+  if (!status) status = cav_transcription_linearise(tr, at);
+  if (!status) status = cav_transcription_contradictions(tr, CAV_TOLERANCE_CONSTRAINT, &groups, &row);
+  for (int g = 0; !status && g < groups.n && !*out->contradiction; g++)
+    if (groups.group[g].contradicts)
+      tell_rows(in, &groups.group[g], row, out->contradiction, sizeof out->contradiction);
+  if (!status) cav_row_groups_clear(&groups);
+  free(row);
+  cav_trajectory_free(at);
+  cav_transcription_free(tr);
+  return status;
+}
+
 cav_status cav_explain(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
                        int nrow, const cav_binding *row, cav_explanation *explanation, cav_error *error) {
   inquiry in = {.problem = problem, .model = problem->model, .timestep = trajectory->timestep};
@@ -541,6 +596,7 @@ cav_status cav_explain(const cav_problem *problem, const cav_trajectory *traject
   if (status == CAV_OK) status = take_penetrations(&in, trajectory, contact);
   if (status == CAV_OK) status = gather(&in);
   if (status == CAV_OK && in.ngroup > 0) rank(&in, explanation);
+  if (status == CAV_OK && !in.met) status = find_contradiction(&in, trajectory, contact, explanation);
   free(in.row);
   free(in.group);
   if (status == CAV_NO_MEMORY) cav_file_fail(error, status, 0, "not enough memory to explain this motion");

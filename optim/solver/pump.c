@@ -321,10 +321,10 @@ cav_status cav_pump_fill(const cav_problem *problem, cav_trajectory *at) {
 
 // ---------------------------------------------------------------- when
 
-/// Whether anything touches at a posture.
+/// Whether anything touches at a posture, where the model lets it.
 static cav_status find_touch(pump *p, const double *q, int *touches) {
   cav_options simulated = p->state->options;
-  p->state->options.contact = p->state->options.constraint = 1;
+  p->state->options.contact = p->model->options.contact;
   p->state->options.smoothing = p->state->options.smoothing_self = free_gap;
   cav_status status = cav_position(p->model, p->state, q);
   for (int i = 0; i < p->state->ncontact && !status; i++) *touches |= p->state->contact[i].dist < free_gap;

@@ -27,12 +27,14 @@ static void print_brief(const cav_explanation *e, const cav_verdict *verdict, co
   int n = 0, good = verdict->certified && verdict->achieved;
   if (impossible) n += printf("impossible: %s. %s\n", impossible->what, impossible->cure) > 0;
   if (!impossible && *pumping) n += printf("cause: %s\n", pumping) > 0;
+  int apart = !impossible && !*pumping && *e->contradiction;
+  if (apart) n += printf("cause: %s\n", e->contradiction) > 0;
   if (!verdict->certified) n += printf("not certified: %s\n", verdict->reason) > 0;
   if (!verdict->achieved && n < LINES) n += printf("not achieved: misses %s\n", verdict->missed) > 0;
   if (good)
     n += printf("nothing is missed; %s\n",
                 e->nconflict ? "what the cost hangs on:" : "no limit or constraint holds the cost back") > 0;
-  int known = impossible || *pumping;
+  int known = impossible || *pumping || apart;
   if (e->met || known) {
     for (int i = 0; i < e->nconflict && n < LINES && !known; i++, n++) print_cause(&e->conflict[i], "  ");
   } else if (n < LINES && e->nconflict) {
@@ -105,12 +107,15 @@ int cav_command_explain(const cav_command_line *line) {
     cav_certificate_json_text(stdout, proofs ? impossible.what : "");
     printf(",\n  \"pumping\": ");
     cav_certificate_json_text(stdout, pumping);
+    printf(",\n  \"contradiction\": ");
+    cav_certificate_json_text(stdout, explanation.contradiction);
     print_reasons("violation", explanation.nviolation, explanation.violation);
     print_reasons("conflict", explanation.nconflict, explanation.conflict);
     printf("\n}\n");
   } else if (!status && line->all) {
     if (proofs) printf("impossible: %s\n  %s\n", impossible.what, impossible.cure);
     if (!proofs && *pumping) printf("cause: %s\n", pumping);
+    if (*explanation.contradiction) printf("cause: %s\n", explanation.contradiction);
     print_table(&explanation, &verdict);
   } else if (!status) {
     print_brief(&explanation, &verdict, proofs ? &impossible : NULL, pumping);

@@ -154,6 +154,10 @@ static int help(const cav_command_line *line) {
     printf("\n");
   }
   cav_topics_print();
+  printf(
+      "certified: obeys physics and limits; achieved: does what was asked; optimal: a local optimum, another guess may "
+      "lead\n"
+      "to a better one\n");
   printf("exit status: 0 certified and achieved or done, 1 not, 2 bad input, 3 internal error, 130 interrupted\n");
   return 0;
 }
