@@ -1,9 +1,8 @@
 /// A matrix of scenes made by code: kinds of joints, shapes, grounds, contact dimensions, sizes, laws, steps and orders,
 /// each with each. In every cell the forward step has to undo the inverse, the analytic derivatives to agree with
-/// differences, or the library to say in words that it cannot. What is neither is wrong, and there may be none but at a
-/// softness of 1e-8.
+/// differences, or the library to say in words that it cannot. What is neither is wrong, and there may be none.
 ///
-///     build/tests/test_matrix          every 97th cell, for the suite: seconds
+///     build/tests/test_matrix          every 11th cell, for the suite: seconds
 ///     build/tests/test_matrix all      all of them, and the tables of results/matrix.md: minutes
 ///
 /// Right to the rounding of u: what 32 roundings of the forces do to v', which are large where constraints are stiff.
@@ -175,7 +174,7 @@ static void print_tables(const tally *t) {
 }
 
 int main(int argc, char **argv) {
-  const int all = argc > 1 && !strcmp(argv[1], "all"), stride = all ? 1 : 97;
+  const int all = argc > 1 && !strcmp(argv[1], "all"), stride = all ? 1 : 11;
   static tally t;
   int at[NAXIS] = {0}, models = 1, cells = 1, n = 0;
   for (int i = 0; i < AXIS_laws; i++) models *= axes[i].n;
@@ -209,10 +208,7 @@ int main(int argc, char **argv) {
       "confirmed\n",
       n, t.all[RIGHT], t.all[ROUNDED], t.all[TOLD], t.all[WRONG], t.inside[RIGHT], inside, t.unconfirmed);
   if (all) print_tables(&t);
-  // at a softness of 1e-8, outside the stated range, one cell in a thousand is wrong (results/matrix.md)
-  int wrong = 0;
-  for (int k = 0; k < COUNT(laws); k++) wrong += laws[k].value == 1e-8 ? 0 : t.count[AXIS_laws][k][WRONG];
-  CHECK(n > 300 && wrong == 0 && t.inside[WRONG] == 0);
+  CHECK(n > 5000 && t.all[WRONG] == 0);
   CHECK(t.inside[RIGHT] >= 0.99 * inside);
   return check_result();
 }

@@ -10,6 +10,8 @@
 /// symmetric or convex: such a step need not exist once a body turns by a radian or so within it (gyroscopic torques at
 /// speeds near 2/h; the solutions traced there end in a fold). A second start has v_next = -v; then the best iterate is
 /// returned as not converged. Past a fold, which the sign of the derivative's determinant tells, the report says so.
+/// What forces a thousand times those of the convex problem hold at an absurd speed is no step: errors are judged against
+/// no more than that, and there CAV_OK is never said.
 ///
 /// Coulomb's law (coulomb.c) has no potential either: Newton from the convex law's solution, and where it does not
 /// descend, convex problems with the bounds of friction held. A solution need not exist nor be the only one (Painleve).
@@ -46,7 +48,7 @@ enum {
 };
 
 static const double DEFAULT_TOLERANCE = 1e-13, ROUGH = 1e-9, NEAR = 1e-2, SHORTEST_STEP = 0.02, SOFTER = 1024.0,
-                    SHARPER = 32.0;
+                    SHARPER = 32.0, RUNAWAY = 1e3;
 // of the proximal point method: softness below which it is taken, ratio of levels and the least, change of a velocity
 // at which it ends and the most that counts as an end
 static const double STIFF = 1e-5, LEVEL_STEP = 1e-2, LEAST_LEVEL = 1e-10, AT_REST = 1e-15, CLOSE = 1e-10;
@@ -81,6 +83,7 @@ typedef struct newton {
   double *room;        // of proximal.c
   double *ended;       // [nv] where it ended, or how far a trace came
   double error, scale; // of the last measurement
+  double most;         // scale beyond which x is no step
   int iterations, limit;
 } newton;
 
@@ -563,7 +566,16 @@ static cav_status measure(newton *s) {
   return CAV_OK;
 }
 
-static double residual(const newton *s) { return s->error > 0.0 ? s->error / s->scale : 0.0; }
+// relative to the forces at x as far as those are a step's: what runs away is not nearer for what it runs against
+static double residual(const newton *s) { return s->error > 0.0 ? s->error / fmin(s->scale, s->most) : 0.0; }
+
+// forces that a step of the mean velocity can come to, from those of the convex problem, just measured, and the momentum
+// that it begins with. What is quadratic in v_next has other roots, at speeds that turn links by thousands of radians
+static void bound_forces(newton *s) {
+  const cav_impulse *p = &s->problem;
+  cav_impulse_inertia(p, s->v, p->force);
+  s->most = RUNAWAY * fmax(s->scale, largest(p->force, p->nv) / p->state->options.timestep);
+}
 
 // one Newton step on the inverse itself, smooth derivative included, from a point just measured; shortened until the
 // error falls. accepted tells whether it did; x is measured afterwards in either case
@@ -664,6 +676,7 @@ static cav_status iterate(newton *s, int go_on, double tolerance) {
       const cav_status status = measure(s);
       if (status != CAV_OK) return status;
     }
+    if (pass == 1 && !go_on && cav_takes_mean(s->problem.state)) bound_forces(s);
     stalls = residual(s) < 0.99 * least ? 0 : stalls + 1;
     if (residual(s) < least) {
       least = residual(s);
@@ -698,6 +711,7 @@ static cav_status iterate(newton *s, int go_on, double tolerance) {
   copy(s->x, s->best, nv);
   const cav_status status = measure(s);
   if (status != CAV_OK) return status;
+  if (s->scale > s->most) return CAV_NOT_CONVERGED;
   return residual(s) <= tolerance || s->error <= 4.0 * rounding(s) ? CAV_OK : CAV_NOT_CONVERGED;
 }
 
@@ -739,14 +753,19 @@ static cav_status approach(newton *s, double tolerance) {
   cav_proximal_begin(&proximal, &s->problem, s->room);
   cav_status status = CAV_OK;
   double change = INFINITY;
-  int whole = 0;
-  for (int k = 0; !whole && change > AT_REST && k < LEVELS; k++) {
+  int whole = 0, rough = 1, go_on = 0;
+  for (int k = 0; !whole && (rough || change > AT_REST) && k < LEVELS; k++) {
     const double level = fmax(pow(LEVEL_STEP, k + 1), LEAST_LEVEL);
     whole = cav_proximal_set(&proximal, level);
+    // the last solution is a close one: what a level leaves as it is, the next one ends
+    rough = level > LEAST_LEVEL && !whole && change > AT_REST;
     s->raised = !whole;
     leave_island(s);
-    status = iterate(s, k > 0, level > LEAST_LEVEL && !whole ? fmax(ROUGH, tolerance) : tolerance);
+    status = iterate(s, go_on, rough ? fmax(ROUGH, tolerance) : tolerance);
     if (status != CAV_OK && status != CAV_NOT_CONVERGED) break;
+    // a level whose rows are too soft for any step near by leaves nothing to go on from
+    go_on = !cav_takes_mean(s->problem.state) || status == CAV_OK || residual(s) <= NEAR;
+    if (!go_on) continue;
     cav_impulse_rows(&s->problem, s->x, s->y);
     laws(s, s->y, s->f, NULL, 0);
     change = cav_proximal_update(&proximal, s->f, s->y);
@@ -782,7 +801,7 @@ cav_status cav_forward_newton(const cav_model *model, cav_state *state, const do
     if (report) *report = (cav_forward_report){0};
     return cav_inverse(model, state, q, v, v_next, v_next);
   }
-  newton s = {.q = q, .v = v, .u = u, .limit = iterations};
+  newton s = {.q = q, .v = v, .u = u, .limit = iterations, .most = INFINITY};
   cav_status status = prepare(&s, model, state);
   if (status != CAV_OK) return status;
   const int stiff = is_stiff(state) && s.problem.nrow > 0;
