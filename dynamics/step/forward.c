@@ -746,6 +746,15 @@ static cav_status finish(newton *s, double tolerance) {
   return measure(s);
 }
 
+// the convex problem with what is quadratic in v_next frozen at v: at a v_next that soft rows let run off it is no guess
+static cav_status solve_frozen(newton *s, double tolerance) {
+  copy(s->x, s->v, s->problem.nv);
+  cav_status status = solve_first(s, 1, tolerance);
+  if (status == CAV_OK) status = measure(s);
+  if (status == CAV_OK) bound_forces(s);
+  return status;
+}
+
 // stiff rows by the proximal point method: solutions with R raised to a level, each from the one before, the level
 // lowered until R is the problem's own or the least that elimination bears; then until nothing changes
 static cav_status approach(newton *s, double tolerance) {
@@ -753,7 +762,7 @@ static cav_status approach(newton *s, double tolerance) {
   cav_proximal_begin(&proximal, &s->problem, s->room);
   cav_status status = CAV_OK;
   double change = INFINITY;
-  int whole = 0, rough = 1, go_on = 0;
+  int whole = 0, rough = 1;
   for (int k = 0; !whole && (rough || change > AT_REST) && k < LEVELS; k++) {
     const double level = fmax(pow(LEVEL_STEP, k + 1), LEAST_LEVEL);
     whole = cav_proximal_set(&proximal, level);
@@ -761,11 +770,11 @@ static cav_status approach(newton *s, double tolerance) {
     rough = level > LEAST_LEVEL && !whole && change > AT_REST;
     s->raised = !whole;
     leave_island(s);
-    status = iterate(s, go_on, rough ? fmax(ROUGH, tolerance) : tolerance);
+    if (rough && cav_takes_mean(s->problem.state))
+      status = solve_frozen(s, fmax(ROUGH, tolerance));
+    else
+      status = iterate(s, k > 0, rough ? fmax(ROUGH, tolerance) : tolerance);
     if (status != CAV_OK && status != CAV_NOT_CONVERGED) break;
-    // a level whose rows are too soft for any step near by leaves nothing to go on from
-    go_on = !cav_takes_mean(s->problem.state) || status == CAV_OK || residual(s) <= NEAR;
-    if (!go_on) continue;
     cav_impulse_rows(&s->problem, s->x, s->y);
     laws(s, s->y, s->f, NULL, 0);
     change = cav_proximal_update(&proximal, s->f, s->y);

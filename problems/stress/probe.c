@@ -79,10 +79,11 @@ static double asked_for(const cav_bench *b) {
 }
 
 // what rounding of u itself does to v', m/s; angles at L: forces of stiff constraints are large, and what they leave of
-// the motion is a difference of them
+// the motion is a difference of them. Those of one dof move others by no more than the mean of both inverse weights
 static double rounding_of(const cav_bench *b, const double *u) {
-  double most = 0;
-  for (int i = 0; i < b->model->nv; i++) most = fmax(most, fabs(u[i]) * b->model->dof[i].inverse_weight / b->unit[i]);
+  double sum = 0, most = 0;
+  for (int i = 0; i < b->model->nv; i++) sum += fabs(u[i]) * sqrt(b->model->dof[i].inverse_weight);
+  for (int i = 0; i < b->model->nv; i++) most = fmax(most, sum * sqrt(b->model->dof[i].inverse_weight) / b->unit[i]);
   return ROUNDINGS * DBL_EPSILON * b->pushed.timestep * most;
 }
 
