@@ -1,9 +1,11 @@
 #!/bin/sh
 # The command itself: exit statuses, what goes to standard output and what to standard error, folders, interruption, resuming.
-# Usage: test_tool.sh CAVORT SOURCE_ROOT. Prints what is wrong and fails if anything is.
+# Usage: test_tool.sh CAVORT SOURCE_ROOT [LIBRARY=SONAME...], the libraries that are loaded where they are used. Prints what is wrong and fails if anything is.
 set -u
 cavort=$(cd "$(dirname "$1")" && pwd)/$(basename "$1")
 root=$2
+shift 2
+libraries=$*
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
@@ -402,6 +404,34 @@ echo '<mujoco><worldbody><geom type="plane" size="1 1 1"/></worldbody></mujoco>'
 run 2 report still.xml --quick
 says err "nothing moves"
 run 2 report model.xml --solver gn
+
+# --- libraries that were there when the tool was built: what is no library stands before them ---
+
+mkdir gone
+for library in $libraries; do : >"gone/${library#*=}"; done
+# without LIBRARY WANTED ARGUMENT...: as run, but they cannot be loaded; what needs one says which
+without() {
+  library=$1
+  shift
+  soname=$(echo "$libraries" | tr ' ' '\n' | sed -n "s/^$library=//p")
+  [ -n "$soname" ] || return 0
+  export LD_LIBRARY_PATH="$work/gone"
+  run "$@"
+  unset LD_LIBRARY_PATH
+  says err "$soname of Debian's package"
+}
+echo '<mujoco><asset><hfield name="hill" file="hill.png" size="1 1 1 .1"/></asset><worldbody><geom type="hfield" hfield="hill"/></worldbody></mujoco>' >hill.xml
+printf '\211PNG\r\n\032\n and no more' >hill.png
+without png 2 inspect hill.xml
+[ -z "$libraries" ] || says err "hill.xml:1"
+without ipopt 2 solve problem.xml --solver ipopt -o gone/ipopt
+without ipopt 2 solve problem.xml --solver both -o gone/both
+without spqr 2 explain weak
+export LD_LIBRARY_PATH="$work/gone"
+run 0 help
+silent err
+run 0 --version
+unset LD_LIBRARY_PATH
 
 # --- where nothing can be written ---
 

@@ -6,18 +6,42 @@
 
 #include <stdlib.h>
 
-#ifdef CAVORT_HAVE_CHOLMOD
+#ifdef CAVORT_LOADS_CHOLMOD
 #include <string.h>
 #include <suitesparse/cholmod.h>
 
+#include "library.h"
+
+// clang-format off
+#define FUNCTIONS(X) \
+  X(cholmod_start) X(cholmod_finish) X(cholmod_analyze) X(cholmod_factorize) X(cholmod_solve2) \
+  X(cholmod_free_factor) X(cholmod_free_dense)
+// clang-format on
+
+typedef struct functions {
+  FUNCTIONS(CAV_LIBRARY_POINTER)
+} functions;
+
+static const cav_library library = {
+    "CHOLMOD", CAVORT_LOADS_CHOLMOD, "libsuitesparse-dev", {FUNCTIONS(CAV_LIBRARY_NAME) NULL}};
+
 struct cav_sparse {
+  functions call;
   cholmod_common common;
   cholmod_sparse matrix; // its arrays are the caller's
   cholmod_factor *factor;
   cholmod_dense *x, *y, *e; // solution and room of solves
 };
 
-int cav_sparse_available(void) { return 1; }
+static int load(functions *call) {
+  char reason[200]; // those who ask go the dense way, as in a build without CHOLMOD
+  return cav_library_load(&library, call, sizeof *call, reason, sizeof reason) == CAV_OK;
+}
+
+int cav_sparse_available(void) {
+  functions call;
+  return load(&call);
+}
 
 static cav_status status_of(const cav_sparse *s) {
   if (s->common.status == CHOLMOD_OUT_OF_MEMORY) return CAV_NO_MEMORY;
@@ -27,7 +51,7 @@ static cav_status status_of(const cav_sparse *s) {
 cav_sparse *cav_sparse_new(int blas) {
   cav_sparse *s = calloc(1, sizeof *s);
   if (!s) return NULL;
-  if (!cholmod_start(&s->common)) {
+  if (!load(&s->call) || !s->call.cholmod_start(&s->common)) {
     free(s);
     return NULL;
   }
@@ -42,11 +66,11 @@ cav_sparse *cav_sparse_new(int blas) {
 
 void cav_sparse_free(cav_sparse *s) {
   if (!s) return;
-  cholmod_free_factor(&s->factor, &s->common);
-  cholmod_free_dense(&s->x, &s->common);
-  cholmod_free_dense(&s->y, &s->common);
-  cholmod_free_dense(&s->e, &s->common);
-  cholmod_finish(&s->common);
+  s->call.cholmod_free_factor(&s->factor, &s->common);
+  s->call.cholmod_free_dense(&s->x, &s->common);
+  s->call.cholmod_free_dense(&s->y, &s->common);
+  s->call.cholmod_free_dense(&s->e, &s->common);
+  s->call.cholmod_finish(&s->common);
   free(s);
 }
 
@@ -70,8 +94,8 @@ cav_status cav_sparse_analyse(cav_sparse *s, int n, const int *start, const int 
                                .dtype = CHOLMOD_DOUBLE,
                                .sorted = 1,
                                .packed = 1};
-  cholmod_free_factor(&s->factor, &s->common);
-  s->factor = cholmod_analyze(&s->matrix, &s->common);
+  s->call.cholmod_free_factor(&s->factor, &s->common);
+  s->factor = s->call.cholmod_analyze(&s->matrix, &s->common);
   s->matrix.xtype = CHOLMOD_REAL;
   return s->factor ? CAV_OK : CAV_NO_MEMORY;
 }
@@ -81,7 +105,7 @@ double cav_sparse_work(const cav_sparse *s) { return s->common.fl; }
 
 cav_status cav_sparse_factor(cav_sparse *s, const double *value) {
   s->matrix.x = borrowed(value);
-  if (!cholmod_factorize(&s->matrix, s->factor, &s->common)) return status_of(s);
+  if (!s->call.cholmod_factorize(&s->matrix, s->factor, &s->common)) return status_of(s);
   return s->factor->minor == s->matrix.ncol ? status_of(s) : CAV_NOT_CONVERGED;
 }
 
@@ -89,7 +113,8 @@ cav_status cav_sparse_solve(cav_sparse *s, const double *b, double *x) {
   const size_t n = s->matrix.ncol;
   cholmod_dense right = {
       .nrow = n, .ncol = 1, .nzmax = n, .d = n, .x = borrowed(b), .xtype = CHOLMOD_REAL, .dtype = CHOLMOD_DOUBLE};
-  if (!cholmod_solve2(CHOLMOD_A, s->factor, &right, NULL, &s->x, NULL, &s->y, &s->e, &s->common)) return status_of(s);
+  if (!s->call.cholmod_solve2(CHOLMOD_A, s->factor, &right, NULL, &s->x, NULL, &s->y, &s->e, &s->common))
+    return status_of(s);
   memcpy(x, s->x->x, n * sizeof *x);
   return CAV_OK;
 }

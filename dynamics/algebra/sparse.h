@@ -6,11 +6,11 @@
 
 typedef struct cav_sparse cav_sparse;
 
-/// Whether the library was built with CHOLMOD.
+/// Whether the library was built with CHOLMOD and finds it; loads it.
 int cav_sparse_available(void);
 
 /// blas: supernodes by BLAS where they pay, which is for one thread at a time (OpenBLAS's serial build is not safe from
-/// two); 0: none, any number of threads. NULL if memory runs out, or where the library was built without CHOLMOD.
+/// two); 0: none, any number of threads. NULL if memory runs out, or where CHOLMOD is not available.
 cav_sparse *cav_sparse_new(int blas);
 void cav_sparse_free(cav_sparse *sparse);
 

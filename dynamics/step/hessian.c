@@ -354,7 +354,8 @@ cav_status cav_hessian_begin(cav_hessian *h, const cav_impulse *part, int ndof, 
   cav_status status = find_cliques(h);
   if (status != CAV_OK) return status;
   if (!make_room(&h->x, &h->nx, (size_t)ndof, sizeof(double))) return CAV_NO_MEMORY;
-  if (!cav_sparse_available() || dense_work(h, h->x) < h->sparse_from)
+  // what has slots has CHOLMOD; it is not loaded before it pays
+  if (dense_work(h, h->x) < h->sparse_from || (h->nslot == 0 && !cav_sparse_available()))
     return make_room(&h->value, &h->nvalue, (size_t)ndof * (size_t)ndof, sizeof(double)) ? CAV_OK : CAV_NO_MEMORY;
   if (!make_room(&h->live, &h->nclique_room, (size_t)h->nclique, sizeof(int))) return CAV_NO_MEMORY;
   for (int c = 0; c < h->nclique; c++) h->live[c] = -1;

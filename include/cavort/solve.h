@@ -447,7 +447,8 @@ typedef struct cav_explanation {
 } cav_explanation;
 
 /// Ranks what a motion misses and which constraints pull against each other, from the rows of its solution.
-/// CAV_BAD_INPUT: a row that is not of this problem; CAV_NO_MEMORY; CAV_NOT_FINITE.
+/// CAV_BAD_INPUT: a row that is not of this problem; CAV_NO_MEMORY; CAV_NOT_FINITE; CAV_NOT_SUPPORTED: SPQR, which the build
+/// found, is not on this machine.
 CAV_API cav_status cav_explain(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
                                int nrow, const cav_binding *row, cav_explanation *explanation, cav_error *error);
 

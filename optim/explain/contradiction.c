@@ -10,20 +10,46 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "file.h"
+
 void cav_row_groups_clear(cav_row_groups *groups) {
   free(groups->owner);
   *groups = (cav_row_groups){0};
 }
 
-#ifdef CAVORT_HAVE_SPQR
+#ifdef CAVORT_LOADS_SPQR
 #include <suitesparse/SuiteSparseQR_C.h>
 
+#include "library.h"
+
+/// SPQR's library brings CHOLMOD's along, in which the loader looks too.
+// clang-format off
+#define FUNCTIONS(X) \
+  X(SuiteSparseQR_C) X(cholmod_l_start) X(cholmod_l_finish) X(cholmod_l_allocate_sparse) \
+  X(cholmod_l_free_sparse) X(cholmod_l_free)
+// clang-format on
+
+typedef struct functions {
+  FUNCTIONS(CAV_LIBRARY_POINTER)
+} functions;
+
+static const cav_library library = {
+    "SPQR", CAVORT_LOADS_SPQR, "libsuitesparse-dev", {FUNCTIONS(CAV_LIBRARY_NAME) NULL}};
+
 int cav_contradictions_available(void) { return 1; }
+
+cav_status cav_contradictions_load(cav_error *error) {
+  functions call;
+  char reason[300];
+  cav_status status = cav_library_load(&library, &call, sizeof call, reason, sizeof reason);
+  return status == CAV_OK ? status : cav_file_fail(error, status, 0, "%s", reason);
+}
 
 /// Combinations below this fraction of the largest weight are rounding.
 static const double weight_floor = 1e-6;
 
 typedef struct factors {
+  functions call;
   cholmod_common common;
   cholmod_sparse *matrix, *R;
   SuiteSparse_long *order; ///< column of the matrix at each place of R; NULL: as they are
@@ -39,8 +65,8 @@ static double length_of(const cav_linear_rows *rows, int i) {
 /// The rows, scaled, as columns; rows of zeros stay so.
 static int fill_matrix(factors *f, const cav_linear_rows *rows) {
   size_t entries = (size_t)rows->start[rows->nrow];
-  f->matrix =
-      cholmod_l_allocate_sparse((size_t)rows->ncolumn, (size_t)rows->nrow, entries, 1, 1, 0, CHOLMOD_REAL, &f->common);
+  f->matrix = f->call.cholmod_l_allocate_sparse((size_t)rows->ncolumn, (size_t)rows->nrow, entries, 1, 1, 0,
+                                                CHOLMOD_REAL, &f->common);
   if (!f->matrix) return 0;
   SuiteSparse_long *start = f->matrix->p, *index = f->matrix->i;
   double *value = f->matrix->x;
@@ -137,24 +163,29 @@ cav_status cav_contradictions_find(const cav_linear_rows *rows, double dependenc
   *groups = (cav_row_groups){0};
   if (rows->nrow == 0) return CAV_OK;
   factors f = {0};
-  if (!cholmod_l_start(&f.common)) return CAV_NO_MEMORY;
+  char reason[300];
+  if (cav_library_load(&library, &f.call, sizeof f.call, reason, sizeof reason) != CAV_OK) return CAV_NOT_SUPPORTED;
+  if (!f.call.cholmod_l_start(&f.common)) return CAV_NO_MEMORY;
   f.common.print = 0;
   cav_status status = CAV_NO_MEMORY;
   if (fill_matrix(&f, rows)) {
-    f.rank = SuiteSparseQR_C(SPQR_ORDERING_COLAMD, dependence, 0, 0, f.matrix, NULL, NULL, NULL, NULL, &f.R, &f.order,
-                             NULL, NULL, NULL, &f.common);
+    f.rank = f.call.SuiteSparseQR_C(SPQR_ORDERING_COLAMD, dependence, 0, 0, f.matrix, NULL, NULL, NULL, NULL, &f.R,
+                                    &f.order, NULL, NULL, NULL, &f.common);
     if (f.rank >= 0) status = fill_groups(&f, rows, tolerance, groups);
   }
-  cholmod_l_free_sparse(&f.matrix, &f.common);
-  cholmod_l_free_sparse(&f.R, &f.common);
-  cholmod_l_free((size_t)rows->nrow, sizeof(SuiteSparse_long), f.order, &f.common);
-  cholmod_l_finish(&f.common);
+  f.call.cholmod_l_free_sparse(&f.matrix, &f.common);
+  f.call.cholmod_l_free_sparse(&f.R, &f.common);
+  f.call.cholmod_l_free((size_t)rows->nrow, sizeof(SuiteSparse_long), f.order, &f.common);
+  f.call.cholmod_l_finish(&f.common);
   return status;
 }
 
 #else
 
 int cav_contradictions_available(void) { return 0; }
+cav_status cav_contradictions_load(cav_error *error) {
+  return cav_file_fail(error, CAV_NOT_SUPPORTED, 0, "this build has no SPQR");
+}
 
 cav_status cav_contradictions_find(const cav_linear_rows *rows, double dependence, double tolerance,
                                    cav_row_groups *groups) {

@@ -32,6 +32,9 @@ typedef struct cav_row_groups {
 /// Whether the library was built with SPQR; without it groups are not found and nothing else is lost.
 int cav_contradictions_available(void);
 
+/// Loads SPQR. CAV_NOT_SUPPORTED where a build with it does not find it any more, with what is missing.
+cav_status cav_contradictions_load(cav_error *error);
+
 /// Groups of dependent rows, one for each row beyond the rank: rows scaled to length 1 count as dependent within
 /// dependence (1e-8 for derivatives that are analytic), as contradicting each other beyond tolerance. CAV_NOT_SUPPORTED
 /// without SPQR, CAV_NO_MEMORY. Freed by cav_row_groups_clear.

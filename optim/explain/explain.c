@@ -564,8 +564,9 @@ static void tell_rows(const inquiry *in, const cav_row_group *rows, const cav_bi
 
 /// Equalities that contradict each other at the motion; nothing where derivatives are not exact enough to tell.
 static cav_status find_contradiction(const inquiry *in, const cav_trajectory *trajectory, const cav_options *contact,
-                                     cav_explanation *out) {
+                                     cav_explanation *out, cav_error *error) {
   if (!cav_contradictions_available() || cav_derivatives_missing(in->model)) return CAV_OK;
+  if (cav_contradictions_load(error) != CAV_OK) return CAV_NOT_SUPPORTED;
   cav_row_groups groups;
   cav_binding *row = NULL;
   cav_transcription *tr = cav_transcription_new(in->problem, 1, NULL);
@@ -596,7 +597,7 @@ cav_status cav_explain(const cav_problem *problem, const cav_trajectory *traject
   if (status == CAV_OK) status = take_penetrations(&in, trajectory, contact);
   if (status == CAV_OK) status = gather(&in);
   if (status == CAV_OK && in.ngroup > 0) rank(&in, explanation);
-  if (status == CAV_OK && !in.met) status = find_contradiction(&in, trajectory, contact, explanation);
+  if (status == CAV_OK && !in.met) status = find_contradiction(&in, trajectory, contact, explanation, error);
   free(in.row);
   free(in.group);
   if (status == CAV_NO_MEMORY) cav_file_fail(error, status, 0, "not enough memory to explain this motion");

@@ -10,9 +10,24 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "file.h"
 #include "ipopt_options.h"
 #include "lagrangian.h"
+#include "library.h"
 #include "rotation.h"
+
+// clang-format off
+#define FUNCTIONS(X) \
+  X(CreateIpoptProblem) X(FreeIpoptProblem) X(AddIpoptStrOption) X(AddIpoptNumOption) X(AddIpoptIntOption) \
+  X(OpenIpoptOutputFile) X(SetIntermediateCallback) X(IpoptSolve)
+// clang-format on
+
+typedef struct functions {
+  FUNCTIONS(CAV_LIBRARY_POINTER)
+} functions;
+
+static const cav_library library = {
+    "Ipopt", CAVORT_LOADS_IPOPT, "coinor-libipopt-dev", {FUNCTIONS(CAV_LIBRARY_NAME) NULL}};
 
 /// Our own option among Ipopt's: which Hessian it gets.
 static const char hessian_option[] = "hessian";
@@ -63,6 +78,8 @@ static const double step_shift = 1e-4;
 static const double test_step = 2e-10, test_tolerance = 8e-3;
 
 typedef struct program {
+  functions call;
+  IpoptProblem nlp;
   cav_solve_run *run;
   cav_trajectory *anchor; ///< x = 0
   int n, m;
@@ -475,19 +492,19 @@ static const cav_ipopt_option usual[] = {
 static const cav_ipopt_option rough[] = {{"tol", "1e-3"}, {"acceptable_tol", "1e-1"}},
                               sharp[] = {{"tol", "1e-9"}, {"acceptable_tol", "1e-7"}, {"compl_inf_tol", "1e-10"}};
 
-static int set_option(IpoptProblem nlp, const cav_ipopt_option *option) {
+static int set_option(const program *p, const cav_ipopt_option *option) {
   double number = 0;
   if (!strcmp(option->name, hessian_option)) return 1;
   const cav_ipopt_rule *rule = cav_ipopt_check(option, &number, NULL);
   if (!rule) return 0;
-  if (rule->type == CAV_IPOPT_WHOLE) return AddIpoptIntOption(nlp, (char *)option->name, (int)number);
-  if (rule->type == CAV_IPOPT_REAL) return AddIpoptNumOption(nlp, (char *)option->name, number);
-  return AddIpoptStrOption(nlp, (char *)option->name, (char *)option->value);
+  if (rule->type == CAV_IPOPT_WHOLE) return p->call.AddIpoptIntOption(p->nlp, (char *)option->name, (int)number);
+  if (rule->type == CAV_IPOPT_REAL) return p->call.AddIpoptNumOption(p->nlp, (char *)option->name, number);
+  return p->call.AddIpoptStrOption(p->nlp, (char *)option->name, (char *)option->value);
 }
 
-static int set_list(IpoptProblem nlp, int n, const cav_ipopt_option *option) {
+static int set_list(const program *p, int n, const cav_ipopt_option *option) {
   int ok = 1;
-  for (int i = 0; i < n; i++) ok = ok && set_option(nlp, &option[i]);
+  for (int i = 0; i < n; i++) ok = ok && set_option(p, &option[i]);
   return ok;
 }
 
@@ -502,27 +519,29 @@ static const char *option_given(const cav_solve_run *run, const char *name) {
 }
 
 /// Options of a stage, whose iterations are limited if that is not 0.
-static int set_options(IpoptProblem nlp, const program *p, int iterations) {
+static int set_options(const program *p, int iterations) {
   const cav_solve_run *run = p->run;
   const cav_solve_options *o = run->options;
   // silent, and deaf to a file ipopt.opt that happens to lie where the program runs
-  int ok = AddIpoptIntOption(nlp, "print_level", 0) && AddIpoptStrOption(nlp, "sb", "yes") &&
-           AddIpoptStrOption(nlp, "option_file_name", "");
-  ok = ok && set_list(nlp, sizeof usual / sizeof *usual, usual);
-  ok = ok && (p->exact ? set_list(nlp, sizeof sharp / sizeof *sharp, sharp)
-                       : set_list(nlp, sizeof rough / sizeof *rough, rough));
-  ok = ok && AddIpoptNumOption(nlp, "constr_viol_tol", o->tolerance) && AddIpoptNumOption(nlp, "mu_init", p->barrier);
-  if (run->warm) ok = ok && AddIpoptStrOption(nlp, "warm_start_init_point", "yes");
+  int ok = p->call.AddIpoptIntOption(p->nlp, "print_level", 0) && p->call.AddIpoptStrOption(p->nlp, "sb", "yes") &&
+           p->call.AddIpoptStrOption(p->nlp, "option_file_name", "");
+  ok = ok && set_list(p, sizeof usual / sizeof *usual, usual);
+  ok = ok &&
+       (p->exact ? set_list(p, sizeof sharp / sizeof *sharp, sharp) : set_list(p, sizeof rough / sizeof *rough, rough));
+  ok = ok && p->call.AddIpoptNumOption(p->nlp, "constr_viol_tol", o->tolerance) &&
+       p->call.AddIpoptNumOption(p->nlp, "mu_init", p->barrier);
+  if (run->warm) ok = ok && p->call.AddIpoptStrOption(p->nlp, "warm_start_init_point", "yes");
   if (o->ipopt_derivative_test) {
-    ok = ok && AddIpoptStrOption(nlp, "derivative_test", "first-order");
-    ok = ok && AddIpoptNumOption(nlp, "point_perturbation_radius", 0) &&
-         AddIpoptNumOption(nlp, "derivative_test_perturbation", test_step);
-    ok = ok && AddIpoptNumOption(nlp, "derivative_test_tol", test_tolerance);
+    ok = ok && p->call.AddIpoptStrOption(p->nlp, "derivative_test", "first-order");
+    ok = ok && p->call.AddIpoptNumOption(p->nlp, "point_perturbation_radius", 0) &&
+         p->call.AddIpoptNumOption(p->nlp, "derivative_test_perturbation", test_step);
+    ok = ok && p->call.AddIpoptNumOption(p->nlp, "derivative_test_tol", test_tolerance);
   }
-  ok = ok && set_list(nlp, run->problem->nipopt, run->problem->ipopt) && set_list(nlp, o->nipopt, o->ipopt);
+  ok = ok && set_list(p, run->problem->nipopt, run->problem->ipopt) && set_list(p, o->nipopt, o->ipopt);
   const char *most = option_given(run, "max_iter");
-  if (iterations > 0 && !(most && atoi(most) < iterations)) ok = ok && AddIpoptIntOption(nlp, "max_iter", iterations);
-  if (o->ipopt_output) ok = ok && OpenIpoptOutputFile(nlp, (char *)o->ipopt_output, 5);
+  if (iterations > 0 && !(most && atoi(most) < iterations))
+    ok = ok && p->call.AddIpoptIntOption(p->nlp, "max_iter", iterations);
+  if (o->ipopt_output) ok = ok && p->call.OpenIpoptOutputFile(p->nlp, (char *)o->ipopt_output, 5);
   return ok;
 }
 
@@ -610,6 +629,17 @@ static int is_limited(const cav_solve_run *run) {
   return approximation && !strcmp(approximation, "limited-memory");
 }
 
+static cav_status load(functions *call, cav_error *error) {
+  char reason[300];
+  cav_status status = cav_library_load(&library, call, sizeof *call, reason, sizeof reason);
+  return status == CAV_OK ? status : cav_file_fail(error, status, 0, "%s", reason);
+}
+
+cav_status cav_ipopt_load(cav_error *error) {
+  functions call;
+  return load(&call, error);
+}
+
 /// Solves at the transcription's law from run->at and leaves the result there: at a stage's end its last iterate, else
 /// the best.
 static cav_status solve_stage(cav_solve_run *run, double fraction, int exact, int iterations, cav_error *error) {
@@ -627,9 +657,9 @@ static cav_status solve_stage(cav_solve_run *run, double fraction, int exact, in
                .settles = !exact && !is_limited(run),
                .passing = iterations > 0,
                .soft_terms = iterations > 0 && fraction < hard_from};
-  IpoptProblem nlp = NULL;
   double *bound = NULL, *start = NULL, *multiplier = NULL;
-  cav_status status = CAV_NO_MEMORY;
+  cav_status status = load(&p.call, error);
+  if (status != CAV_OK) goto end;
   // costs are the objective: constraint rows get no weight of their own, but for terms that are none yet
   tr->penalty = (cav_penalties){.term = p.soft_terms ? kept.term : 0};
   tr->difference = CAV_DERIVATIVE_CENTRED;
@@ -643,18 +673,18 @@ static cav_status solve_stage(cav_solve_run *run, double fraction, int exact, in
   if (!bound || !start || !multiplier) goto end;
 
   set_bounds(&p, bound, bound + p.n, bound + 2 * p.n, bound + 2 * p.n + p.m);
-  nlp = CreateIpoptProblem(p.n, bound, bound + p.n, p.m, bound + 2 * p.n, bound + 2 * p.n + p.m, p.entries,
-                           cav_normal_entries(run->normal, NULL, NULL, NULL), 0, objective, constraints,
-                           objective_gradient, constraint_jacobian, lagrangian_hessian);
-  if (!nlp) goto end;
-  if (!set_options(nlp, &p, iterations)) {
+  p.nlp = p.call.CreateIpoptProblem(p.n, bound, bound + p.n, p.m, bound + 2 * p.n, bound + 2 * p.n + p.m, p.entries,
+                                    cav_normal_entries(run->normal, NULL, NULL, NULL), 0, objective, constraints,
+                                    objective_gradient, constraint_jacobian, lagrangian_hessian);
+  if (!p.nlp) goto end;
+  if (!set_options(&p, iterations)) {
     status = conclude(&p, Invalid_Option, error);
     goto end;
   }
-  SetIntermediateCallback(nlp, progress);
+  p.call.SetIntermediateCallback(p.nlp, progress);
   multipliers_of(&p, multiplier, 0);
   enum ApplicationReturnStatus code =
-      IpoptSolve(nlp, start, NULL, NULL, multiplier, multiplier + p.m, multiplier + p.m + p.n, &p);
+      p.call.IpoptSolve(p.nlp, start, NULL, NULL, multiplier, multiplier + p.m, multiplier + p.m + p.n, &p);
   status = conclude(&p, code, error);
   // one that failed or was stopped gives its best iterate, with the multipliers that it started from
   int ended = code == Solve_Succeeded || code == Solved_To_Acceptable_Level || p.finished ||
@@ -666,7 +696,7 @@ end:
   tr->penalty = kept;
   tr->difference = difference;
   cav_absolute_drop(tr);
-  if (nlp) FreeIpoptProblem(nlp);
+  if (p.nlp) p.call.FreeIpoptProblem(p.nlp);
   program_free(&p);
   free(bound), free(start), free(multiplier);
   return status;

@@ -110,9 +110,7 @@ static cav_status check(const cav_problem *p, const cav_solve_options *o, const 
     return fail(error, CAV_BAD_INPUT,
                 "the step of the start trajectory is not the problem's: resample it, it does not fit");
   if (o->solver >= CAV_SOLVER_TYPES) return fail(error, CAV_BAD_INPUT, "there is no such solver");
-  if (cav_solver_rule_of(o->solver)->missing)
-    return fail(error, CAV_NOT_SUPPORTED, cav_solver_rule_of(o->solver)->missing);
-  return CAV_OK;
+  return cav_solver_load(o->solver, error);
 }
 
 /// Constraint rows that hold something back.

@@ -5,19 +5,23 @@
 
 #include <assert.h>
 
+#include "file.h"
 #include "ipopt.h"
 #include "sqp.h"
 
 #define NAME_NONE ""
 #define MISSING_NONE NULL
 #define RUN_NONE(run) run
+#define LOAD_NONE NULL
 #define NAME_IPOPT "Ipopt"
-#ifdef CAVORT_HAVE_IPOPT
+#ifdef CAVORT_LOADS_IPOPT
 #define MISSING_IPOPT NULL
 #define RUN_IPOPT(run) run
+#define LOAD_IPOPT cav_ipopt_load
 #else
 #define MISSING_IPOPT "this build has no Ipopt: use --solver gn, or install coinor-libipopt-dev and build again"
 #define RUN_IPOPT(run) NULL
+#define LOAD_IPOPT NULL
 #endif
 
 #define RULE(solver, word, library, text) [CAV_SOLVER_##solver] = {#word, NAME_##library, MISSING_##library, text},
@@ -26,6 +30,14 @@ static const cav_solver_rule rules[CAV_SOLVER_TYPES] = {CAV_SOLVERS(RULE)};
 const cav_solver_rule *cav_solver_rule_of(cav_solver solver) {
   assert(solver < CAV_SOLVER_TYPES);
   return &rules[solver];
+}
+
+cav_status cav_solver_load(cav_solver solver, cav_error *error) {
+#define LOAD(solver, word, library, text) [CAV_SOLVER_##solver] = LOAD_##library,
+  static cav_status (*const loads[CAV_SOLVER_TYPES])(cav_error *) = {CAV_SOLVERS(LOAD)};
+  const char *missing = cav_solver_rule_of(solver)->missing;
+  if (missing) return cav_file_fail(error, CAV_NOT_SUPPORTED, 0, "%s", missing);
+  return loads[solver] ? loads[solver](error) : CAV_OK;
 }
 
 cav_status cav_solver_run(cav_solve_run *run, cav_error *error) {
@@ -41,7 +53,7 @@ cav_status cav_solver_gn(cav_solve_run *run, cav_error *error) {
   return status == CAV_OK ? cav_to_optimum(run) : status;
 }
 
-#ifdef CAVORT_HAVE_IPOPT
+#ifdef CAVORT_LOADS_IPOPT
 /// Multipliers for Ipopt to start from: the rows' final ones.
 static cav_status warm_start(cav_solve_run *run) {
   run->warm = 1;

@@ -11,6 +11,9 @@
 CAV_SOLVERS(CAV_SOLVER_RUN)
 #undef CAV_SOLVER_RUN
 
+/// Loads the library that a solver needs. CAV_NOT_SUPPORTED with what this build lacks, or this machine.
+cav_status cav_solver_load(cav_solver solver, cav_error *error);
+
 /// The one that the options ask for.
 cav_status cav_solver_run(cav_solve_run *run, cav_error *error);
 
