@@ -4,9 +4,11 @@
 
 #include <errno.h>
 #include <locale.h>
+#include <pthread.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "cavort/dynamics.h"
 #include "cavort/model.h"
 #include "check.h"
 
@@ -287,6 +289,74 @@ static void test_huge(void) {
   remove(path);
 }
 
+enum { CHAIN = 1000 };
+
+// in each other so many bodies of 1/4 kg, each on a slide along z in the one before; tail: in the innermost
+static const char *write_chain(const char *name, const char *head, int bodies, const char *tail) {
+  remove(in_folder(name));
+  FILE *file = fopen(path, "wb");
+  if (!file) return path;
+  fputs(head, file);
+  for (int i = 0; i < bodies; i++)
+    fprintf(
+        file,
+        "<body name='b%d'><joint type='slide' axis='0 0 1'/><inertial pos='0 0 0' mass='.25' diaginertia='1 1 1'/>\n",
+        i);
+  fputs(tail, file);
+  for (int i = 0; i < bodies; i++) fputs("</body>\n", file);
+  fputs("</worldbody></mujoco>\n", file);
+  fclose(file);
+  return path;
+}
+
+// moves as one in free fall; relative positions of points of mass m: M^-1 is 1/m, then 2/m; of each point 1/m along z
+static void *fall(void *unused) {
+  (void)unused;
+  cav_error error = {0};
+  cav_model *model = cav_model_load(write_chain("deep.xml", "<mujoco><worldbody>\n", CHAIN, ""), &error);
+  if (!CHECK(model != NULL)) {
+    fprintf(stderr, "    %s\n", error.text);
+    return NULL;
+  }
+  CHECK(model->nv == CHAIN);
+  double weight = 0, moved = 0;
+  for (int i = 0; i < CHAIN; i++) {
+    weight = fmax(weight, fabs(model->dof[i].inverse_weight - (i ? 8 : 4)));
+    weight = fmax(weight, fabs(model->body[i + 1].inverse_weight[0] - 4. / 3));
+    weight = fmax(weight, fabs(model->body[i + 1].inverse_weight[1]));
+  }
+  CHECK(weight < 1e-9);
+  static double v[CHAIN], u[CHAIN], next[CHAIN];
+  cav_state *state = cav_state_new(model);
+  if (CHECK(state && cav_forward(model, state, model->q0, v, u, next) == CAV_OK)) {
+    for (int i = 0; i < CHAIN; i++) moved = fmax(moved, fabs(next[i] + (i ? 0 : 9.81 * model->timestep)));
+    CHECK(moved < 1e-9);
+  }
+  printf("%d bodies in each other: weights to %.1e, a step to %.1e\n", CHAIN, weight, moved);
+  cav_state_free(state);
+  cav_model_free(model);
+  return NULL;
+}
+
+// bodies in each other on a stack of half a megabyte, and no more than are read, attached ones counted in
+static void test_deep(void) {
+  pthread_attr_t small;
+  pthread_t thread;
+  pthread_attr_init(&small);
+#ifdef SANITIZED
+  CHECK(pthread_attr_setstacksize(&small, 4 << 20) == 0);
+#else
+  CHECK(pthread_attr_setstacksize(&small, 512 << 10) == 0);
+#endif
+  if (CHECK(pthread_create(&thread, &small, fall, NULL) == 0)) pthread_join(thread, NULL);
+  pthread_attr_destroy(&small);
+  expect_error(write_chain("deep.xml", "<mujoco><worldbody>\n", 2000, ""), 1999, "nested more than 2000 deep");
+  // attaches itself, which would go on
+  expect_error(write_chain("deep.xml", "<mujoco><asset><model name='m' file='deep.xml'/></asset><worldbody>\n", 1500,
+                           "<attach model='m' prefix='a'/>"),
+               499, "nested more than 2000 deep, with what is attached");
+}
+
 // every beginning of a good file, and the file with one byte changed: an error or a model, no more is asked
 static void test_damage(void) {
   size_t size = sizeof good - 1;
@@ -372,11 +442,12 @@ int main(void) {
   test_no_file();
   test_junk();
   test_huge();
+  test_deep();
   test_damage();
   test_memory();
   test_locale();
-  static const char *const made[] = {"empty.xml", "blank.xml", "junk.xml", "wide.xml",   "latin.xml",
-                                     "big.xml",   "cut.xml",   "good.xml", "changed.xml"};
+  static const char *const made[] = {"empty.xml", "blank.xml", "junk.xml", "wide.xml",    "latin.xml",
+                                     "big.xml",   "cut.xml",   "good.xml", "changed.xml", "deep.xml"};
   for (size_t i = 0; i < sizeof made / sizeof *made; i++) remove(in_folder(made[i]));
   rmdir(folder);
   return check_result();

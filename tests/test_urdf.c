@@ -349,6 +349,42 @@ static void test_peer(void) {
 }
 #endif
 
+// prismatic joints one after another between masses m: a unit force on a joint moves its two neighbours apart
+static void test_chain(void) {
+  enum { LINKS = 1001, ROOM = 400 * LINKS };
+  const double m = 0.25;
+  char *text = malloc(ROOM);
+  if (!CHECK(text != NULL)) return;
+  for (int links = LINKS; links <= LINKS + 1; links++) {
+    size_t used = (size_t)snprintf(text, ROOM, "<robot name='chain'>\n");
+    for (int i = 0; i < links; i++)
+      used += (size_t)snprintf(text + used, ROOM - used, "<link name='l%d'>" MASS(".25") "</link>\n", i);
+    for (int i = 1; i < links; i++)
+      used += (size_t)snprintf(text + used, ROOM - used,
+                               "<joint name='j%d' type='prismatic'><parent link='l%d'/><child link='l%d'/>"
+                               "<limit lower='-1' upper='1' effort='1' velocity='1'/></joint>\n",
+                               i, i - 1, i);
+    used += (size_t)snprintf(text + used, ROOM - used, "</robot>\n");
+    CHECK(used < ROOM);
+    cav_error error = {0};
+    cav_model *model = load(text, &error);
+    CHECK((model != NULL) == (links == LINKS));
+    if (links > LINKS) CHECK(strstr(error.text, ":1003: <link>: more than 1000 links one after another"));
+    double most = 0;
+    for (int i = 0; model && i < model->nactuator; i++) {
+      double squares = i == 0 ? 2 : i + 1 < model->nactuator ? 6 : 5;
+      most = fmax(most, fabs(model->actuator[i].acceleration - sqrt(squares) / m));
+      most = fmax(most, fabs(model->dof[i].inverse_weight - (i ? 2 : 1) / m));
+    }
+    if (model) {
+      CHECK(model->nactuator == LINKS - 1 && most < 1e-9);
+      printf("%d links one after another: weights to %.1e\n", links, most);
+    }
+    cav_model_free(model);
+  }
+  free(text);
+}
+
 int main(void) {
   test_robot();
   test_options();
@@ -356,6 +392,7 @@ int main(void) {
   test_srdf();
   test_faults();
   test_damage();
+  test_chain();
 #ifdef CAVORT_HAVE_MUJOCO
   test_peer();
 #else

@@ -9,18 +9,58 @@
 #include "math3.h"
 #include "step.h"
 
-// x' M^-1 x for a row x given in w->scratch[0..nv)
-static double inverse_norm(const cav_model *model, const cav_workspace *w) {
-  double *x = w->scratch, *y = w->scratch + model->nv, sum = 0;
-  memcpy(y, x, (size_t)model->nv * sizeof *y);
-  cav_ldl_solve(model, w, w->L, y);
-  for (int i = 0; i < model->nv; i++) { sum += x[i] * y[i]; }
-  return sum;
+enum { TOGETHER = 8 };
+
+// rows x that are solved together: M^-1 x at the dofs that any of them moves and those before these towards the root
+typedef struct rows {
+  double (*x)[TOGETHER], (*solved)[TOGETHER]; // [nv]
+  char *reached;                              // [nv]
+} rows;
+
+static void clear_rows(const cav_model *model, rows *r) {
+  memset(r->x, 0, (size_t)model->nv * sizeof *r->x);
+  memset(r->reached, 0, (size_t)model->nv);
 }
 
-static void clear_row(const cav_model *model, const cav_workspace *w) {
-  memset(w->scratch, 0, (size_t)model->nv * sizeof *w->scratch);
+static void set_entry(const cav_workspace *w, rows *r, int row, int dof, double value) {
+  r->x[dof][row] = value;
+  for (int i = dof; i >= 0 && !r->reached[i]; i = w->parent[i]) r->reached[i] = 1;
 }
+
+// as cav_ldl_solve, term by term: what it adds beside these terms are zeros
+static void solve_rows(const cav_model *model, const cav_workspace *w, rows *r) {
+  double(*y)[TOGETHER] = r->solved;
+  memcpy(y, r->x, (size_t)model->nv * sizeof *y);
+  for (int k = model->nv - 1; k >= 0; k--) {
+    if (!r->reached[k]) continue;
+    const double *L = w->L + w->row[k];
+    for (int i = w->parent[k], a = 1; i >= 0; i = w->parent[i], a++) {
+      for (int c = 0; c < TOGETHER; c++) y[i][c] -= L[a] * y[k][c];
+    }
+  }
+  for (int k = 0; k < model->nv; k++) {
+    if (!r->reached[k]) continue;
+    const double *L = w->L + w->row[k];
+    double sum[TOGETHER];
+    for (int c = 0; c < TOGETHER; c++) sum[c] = y[k][c] / L[0];
+    for (int i = w->parent[k], a = 1; i >= 0; i = w->parent[i], a++) {
+      for (int c = 0; c < TOGETHER; c++) sum[c] -= L[a] * y[i][c];
+    }
+    memcpy(y[k], sum, sizeof sum);
+  }
+}
+
+// x' M^-1 x of each row
+static void inverse_norms(const cav_model *model, const cav_workspace *w, rows *r, double norm[TOGETHER]) {
+  solve_rows(model, w, r);
+  for (int c = 0; c < TOGETHER; c++) norm[c] = 0;
+  for (int i = 0; i < model->nv; i++) {
+    if (!r->reached[i]) continue;
+    for (int c = 0; c < TOGETHER; c++) norm[c] += r->x[i][c] * r->solved[i][c];
+  }
+}
+
+static int at_most(int n) { return n < TOGETHER ? n : TOGETHER; }
 
 // mean of weight over n dofs
 static void average(cav_dof *dof, int n) {
@@ -29,12 +69,15 @@ static void average(cav_dof *dof, int n) {
   for (int k = 0; k < n; k++) { dof[k].inverse_weight = sum / n; }
 }
 
-static void weigh_dofs(const cav_model *model, const cav_workspace *w) {
+static void weigh_dofs(const cav_model *model, const cav_workspace *w, rows *r) {
   cav_dof *dof = (cav_dof *)model->dof;
-  for (int i = 0; i < model->nv; i++) {
-    clear_row(model, w);
-    w->scratch[i] = 1;
-    dof[i].inverse_weight = inverse_norm(model, w);
+  for (int i = 0; i < model->nv; i += TOGETHER) {
+    double norm[TOGETHER];
+    int n = at_most(model->nv - i);
+    clear_rows(model, r);
+    for (int c = 0; c < n; c++) set_entry(w, r, c, i + c, 1);
+    inverse_norms(model, w, r, norm);
+    for (int c = 0; c < n; c++) dof[i + c].inverse_weight = norm[c];
   }
   for (int i = 0; i < model->njoint; i++) {
     const cav_joint *joint = &model->joint[i];
@@ -47,22 +90,24 @@ static void weigh_dofs(const cav_model *model, const cav_workspace *w) {
   }
 }
 
-// row of the velocity of point (kind 0) or of the angular velocity (kind 1) of a link along a world axis
-static void body_row(const cav_model *model, cav_state *state, int link, const double point[3], int kind, int axis) {
+// rows of the velocity of a point of a link along the world's axes, and of the link's angular velocity about them
+static void body_rows(const cav_model *model, cav_state *state, rows *r, int link, const double point[3]) {
   const cav_workspace *w = state->work;
-  clear_row(model, w);
+  clear_rows(model, r);
   const cav_link *l = &model->link[link];
-  int last = l->dof + l->ndof - 1;
-  for (int i = last; i >= 0; i = w->parent[i]) {
+  for (int i = l->dof + l->ndof - 1; i >= 0; i = w->parent[i]) {
     const double *S = state->axis + 6 * i;
     double velocity[3];
     velocity_at(velocity, S, state->reference + 3 * link, point);
-    w->scratch[i] = kind ? S[axis] : velocity[axis];
+    for (int axis = 0; axis < 3; axis++) {
+      set_entry(w, r, axis, i, velocity[axis]);
+      set_entry(w, r, 3 + axis, i, S[axis]);
+    }
   }
 }
 
-static void weigh_body(const cav_model *model, cav_state *state, cav_body *body) {
-  double point[3], R[9];
+static void weigh_body(const cav_model *model, cav_state *state, rows *r, cav_body *body) {
+  double point[3], R[9], norm[TOGETHER];
   body->inverse_weight[0] = body->inverse_weight[1] = 0;
   if (body->link == 0) { return; }
   const cav_pose *link = &state->link[body->link];
@@ -74,37 +119,54 @@ static void weigh_body(const cav_model *model, cav_state *state, cav_body *body)
   }
   quat_matrix(R, link->quat);
   transform(point, link->pos, R, point);
-  for (int kind = 0; kind < 2; kind++) {
-    for (int axis = 0; axis < 3; axis++) {
-      body_row(model, state, body->link, point, kind, axis);
-      body->inverse_weight[kind] += inverse_norm(model, state->work) / 3;
+  body_rows(model, state, r, body->link, point);
+  inverse_norms(model, state->work, r, norm);
+  for (int c = 0; c < 6; c++) { body->inverse_weight[c / 3] += norm[c] / 3; }
+}
+
+static void weigh_tendons(const cav_model *model, const cav_state *state, rows *r) {
+  cav_tendon *tendon = (cav_tendon *)model->tendon;
+  for (int i = 0; i < model->ntendon; i += TOGETHER) {
+    double norm[TOGETHER];
+    int n = at_most(model->ntendon - i);
+    clear_rows(model, r);
+    for (int c = 0; c < n; c++) {
+      const cav_tendon *t = tendon + i + c;
+      for (int e = t->dof; e < t->dof + t->ndof; e++)
+        set_entry(state->work, r, c, model->tendon_dof[e], state->tendon_arm[e]);
+    }
+    inverse_norms(model, state->work, r, norm);
+    for (int c = 0; c < n; c++) tendon[i + c].inverse_weight = norm[c];
+  }
+}
+
+// |M^-1 moments| of the actuators
+static void weigh_actuators(const cav_model *model, cav_state *state, rows *r) {
+  cav_actuator *actuator = (cav_actuator *)model->actuator;
+  double *moment = state->work->scratch;
+  for (int i = 0; i < model->nactuator; i += TOGETHER) {
+    int n = at_most(model->nactuator - i);
+    clear_rows(model, r);
+    // a force on one dof moves all
+    memset(r->reached, 1, (size_t)model->nv);
+    for (int c = 0; c < n; c++) {
+      cav_actuator_length(model, state, i + c, moment);
+      for (int k = 0; k < model->nv; k++) { r->x[k][c] = moment[k]; }
+    }
+    solve_rows(model, state->work, r);
+    for (int c = 0; c < n; c++) {
+      double sum = 0;
+      for (int k = 0; k < model->nv; k++) { sum += r->solved[k][c] * r->solved[k][c]; }
+      actuator[i + c].acceleration = sqrt(sum);
     }
   }
 }
 
-static void weigh_tendon(const cav_model *model, cav_state *state, cav_tendon *tendon) {
-  const cav_workspace *w = state->work;
-  clear_row(model, w);
-  for (int e = tendon->dof; e < tendon->dof + tendon->ndof; e++)
-    w->scratch[model->tendon_dof[e]] = state->tendon_arm[e];
-  tendon->inverse_weight = inverse_norm(model, w);
-}
-
-// |M^-1 moments| of an actuator
-static void weigh_actuator(const cav_model *model, cav_state *state, int i) {
-  const cav_workspace *w = state->work;
-  double *x = w->scratch, sum = 0;
-  cav_actuator_length(model, state, i, x);
-  cav_ldl_solve(model, w, w->L, x);
-  for (int k = 0; k < model->nv; k++) { sum += x[k] * x[k]; }
-  ((cav_actuator *)&model->actuator[i])->acceleration = sqrt(sum);
-}
-
-static void weigh_all(const cav_model *model, cav_state *state) {
-  weigh_dofs(model, state->work);
-  for (int i = 0; i < model->nbody; i++) { weigh_body(model, state, (cav_body *)&model->body[i]); }
-  for (int i = 0; i < model->ntendon; i++) { weigh_tendon(model, state, (cav_tendon *)&model->tendon[i]); }
-  for (int i = 0; i < model->nactuator; i++) { weigh_actuator(model, state, i); }
+static void weigh_all(const cav_model *model, cav_state *state, rows *r) {
+  weigh_dofs(model, state->work, r);
+  for (int i = 0; i < model->nbody; i++) { weigh_body(model, state, r, (cav_body *)&model->body[i]); }
+  weigh_tendons(model, state, r);
+  weigh_actuators(model, state, r);
   for (int i = 0; i < model->npair; i++) {
     cav_pair *pair = (cav_pair *)&model->pair[i];
     const cav_body *a = &model->body[model->geom[pair->geom1].body], *b = &model->body[model->geom[pair->geom2].body];
@@ -137,12 +199,12 @@ cav_status cav_reference_weights(cav_model *model) {
   cav_kinematics(model, state, model->q0);
   cav_composite_inertia(model, state, w->M);
   for (int i = 0; i < model->nv; i++) { w->M[w->row[i]] += w->armature[i]; }
-  cav_status status = CAV_OK;
-  if (cav_ldl_factor(model, w, w->M, w->L)) {
-    weigh_all(model, state);
-  } else {
-    status = CAV_BAD_INPUT;
-  }
+  size_t n = (size_t)model->nv + 1;
+  rows r = {malloc(n * sizeof *r.x), malloc(n * sizeof *r.solved), malloc(n)};
+  cav_status status = r.x && r.solved && r.reached ? CAV_OK : CAV_NO_MEMORY;
+  if (status == CAV_OK && !cav_ldl_factor(model, w, w->M, w->L)) { status = CAV_BAD_INPUT; }
+  if (status == CAV_OK) { weigh_all(model, state, &r); }
+  free(r.x), free(r.solved), free(r.reached);
   cav_state_free(state);
   return status;
 }

@@ -31,6 +31,7 @@ typedef struct expansion {
   cav_spec *spec;
   cav_xml *xml; ///< keeps the copies
   int nodes;
+  int nested; ///< open elements of the worldbody, those around the place of an attachment counted in
 } expansion;
 
 static int is(const cav_xml_node *node, const char *name) { return !strcmp(node->rule->name, name); }
@@ -408,7 +409,7 @@ static int settle_other(expansion *e, cav_xml *other, const char *prefix, int de
   cav_mjcf_first_options(spec);
   cav_mjcf_read_options(spec, cav_xml_root(other));
   const cav_spec_compiler own = spec->compiler;
-  expansion inner = {spec, other, e->nodes};
+  expansion inner = {spec, other, e->nodes, e->nested};
   if (spec->status == CAV_OK) expand(&inner, other, depth + 1);
   e->nodes = inner.nodes;
   spec->compiler = hosts;
@@ -465,15 +466,22 @@ static void write_out_attach(expansion *e, cav_xml_node *root, cav_xml_node *nod
 
 // innermost first; what takes the place of an element needs no more
 static void expand_all(expansion *e, cav_xml_node *root, cav_xml_node *node, int depth) {
+  if (e->nested >= CAV_XML_DEPTH_LIMIT) {
+    cav_spec_fail(e->spec, node, NULL, "elements are nested more than %d deep, with what is attached; attach less",
+                  CAV_XML_DEPTH_LIMIT);
+    return;
+  }
+  e->nested++;
   for (cav_xml_node *c = node->child, *next; c && e->spec->status == CAV_OK; c = next) {
     next = c->next;
     expand_all(e, root, c, depth);
-    if (e->spec->status != CAV_OK) return;
+    if (e->spec->status != CAV_OK) break;
     if (c->rule == &cav_replicate_element)
       write_out_replicate(e, root, c);
     else if (is(c, "attach"))
       write_out_attach(e, root, c, depth);
   }
+  e->nested--;
 }
 
 static void expand(expansion *e, cav_xml *xml, int depth) {
@@ -484,6 +492,6 @@ static void expand(expansion *e, cav_xml *xml, int depth) {
 }
 
 void cav_expand(cav_spec *spec, cav_xml *xml) {
-  expansion e = {spec, xml, 0};
+  expansion e = {spec, xml, 0, 0};
   expand(&e, xml, 0);
 }

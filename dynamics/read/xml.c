@@ -18,10 +18,7 @@
 
 #include "xml_parts.h"
 
-enum {
-  DEPTH_LIMIT = 200, // elements inside each other
-  INCLUDE_LIMIT = 20 // files inside each other
-};
+enum { INCLUDE_LIMIT = 20 }; // files inside each other
 
 void cav_xml_stop(cav_xml_source *s) {
   for (; s; s = s->from) {
@@ -128,9 +125,9 @@ static void on_start(void *context, const xmlChar *local, const xmlChar *prefix,
   s->depth++;
   r->depth++;
   int line = tag_line(s);
-  if (r->depth > DEPTH_LIMIT) {
+  if (r->depth > CAV_XML_DEPTH_LIMIT) {
     cav_xml_source_fail(s, CAV_BAD_INPUT, line, name, NULL, "elements are nested more than %d deep; flatten the file",
-                        DEPTH_LIMIT);
+                        CAV_XML_DEPTH_LIMIT);
     return;
   }
   if (r->unread) {
@@ -277,9 +274,9 @@ static void parse(cav_xml_source *s) {
   sax->serror = on_error;
   s->parser->userData = s;
   // entities here are only the five of XML itself: "noent" replaces them by their characters; "recover" goes on where
-  // on_error does not stop
+  // on_error does not stop; "huge" lifts its bound of 256 on nesting, and bounds on sizes that ours of a file take in
   xmlDoc *none = xmlCtxtReadMemory(s->parser, s->text, (int)s->size, s->path, NULL,
-                                   XML_PARSE_NONET | XML_PARSE_NOENT | XML_PARSE_RECOVER);
+                                   XML_PARSE_NONET | XML_PARSE_NOENT | XML_PARSE_RECOVER | XML_PARSE_HUGE);
   if (none) xmlFreeDoc(none);
   // all other faults were reported on the way: what stops without a word ran out of memory
   if (!s->ended || !(s->parser->wellFormed || s->lenient))

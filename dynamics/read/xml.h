@@ -12,6 +12,9 @@
 
 #include "cavort/status.h"
 
+/// Elements inside each other, at most: readers recurse over a tree. libxml2 itself stops at 2048.
+enum { CAV_XML_DEPTH_LIMIT = 2000 };
+
 typedef enum cav_xml_type {
   CAV_XML_TEXT, ///< any text; min 1: not empty
   CAV_XML_INT,  ///< min to max whole numbers
