@@ -10,7 +10,7 @@
 /// symmetric or convex: such a step need not exist once a body turns by a radian or so within it (gyroscopic torques at
 /// speeds near 2/h; the solutions traced there end in a fold). A second start has v_next = -v; then the best iterate is
 /// returned as not converged. Past a fold, which the sign of the derivative's determinant tells, the report says so.
-/// What forces a thousand times those of the convex problem hold at an absurd speed is no step: errors are judged against
+/// What forces a thousand times those of the convex problem hold at an absurd speed is no step: errors are relative to
 /// no more than that, and there CAV_OK is never said.
 ///
 /// Coulomb's law (coulomb.c) has no potential either: Newton from the convex law's solution, and where it does not
