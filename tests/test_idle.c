@@ -51,6 +51,7 @@ static int left_out(const char *world, const char *joined, const char *actuators
   cav_idle_clear(&idle);
   cav_equations equations;
   CHECK(cav_problem_equations(p, &equations, NULL) == CAV_OK && equations.left_out == trees);
+  CHECK(equations.rows_time > 0 && equations.sums_time > 0 && equations.factor_time > 0);
   done(p);
   return trees;
 }

@@ -154,6 +154,8 @@ says err "--model FILE"
 check "nothing was written" [ ! -e swing.result ]
 run 0 inspect problem.xml
 says out "pendulum"
+says out "left out: no tree"
+says out "us, factors "
 run 0 inspect model.xml
 run 0 view problem.xml
 says out "start: inside nothing"

@@ -220,6 +220,8 @@ typedef struct cav_equations {
   int width, border; ///< of its band: entries of a column; unknowns after it (of a cycle's last knots, the free step)
   int arrow;         ///< 1: the free step stands beside the groups
   double bytes;      ///< of the matrix and its factors
+  double rows_time, sums_time; ///< s, once, by one thread: rows with derivatives; the normal equations from them
+  double factor_time;          ///< s, of their factors; -1: they are not positive definite at the guess
 } cav_equations;
 
 /// Fails as cav_solve does where the problem or its guess cannot be evaluated. structure.c.

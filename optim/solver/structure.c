@@ -1,13 +1,17 @@
 /// What the normal equations of a problem are made of, for who wants to know before a solve: evaluates the guess once
-/// and factors nothing.
+/// and factors once.
 #include "continuation.h"
 #include "idle.h"
 
 /// The structure at the trajectory.
 static cav_status read_structure(cav_transcription *tr, cav_normal *normal, cav_trajectory *at, cav_equations *e) {
+  double start = cav_clock();
   cav_status status = cav_transcription_linearise(tr, at);
   if (status != CAV_OK) return status;
+  e->rows_time = cav_clock() - start;
+  start = cav_clock();
   cav_normal_gather(normal, tr);
+  e->sums_time = cav_clock() - start;
   e->unknowns = normal->size;
   e->blocks = normal->blocks;
   for (int t = 0; t < tr->nknot; t++) e->rows += tr->knot[t].nrow, e->constraints += tr->knot[t].layout.count;
@@ -17,7 +21,10 @@ static cav_status read_structure(cav_transcription *tr, cav_normal *normal, cav_
   e->arrow = normal->free_step && e->groups > 1;
   double core = normal->core, border = normal->border;
   e->bytes = 2 * sizeof(double) * (core * normal->band + core * border + border * border);
-  return CAV_OK;
+  start = cav_clock();
+  status = cav_normal_factor(normal, 1);
+  e->factor_time = status == CAV_OK ? cav_clock() - start : -1;
+  return status == CAV_NOT_CONVERGED ? CAV_OK : status;
 }
 
 /// Of a problem of which all is planned.
