@@ -32,8 +32,9 @@ scene() {
 page() {
   folder=$out/$1 command=report threads=
   case $1 in stress-*) folder=$out/stress/${1#stress-} command=stress threads='--threads 1' ;; esac
+  # status 1: the scene is not well at its own values, which its page says
   # shellcheck disable=SC2086
-  "$build/problems/cavort" "$command" "$(scene "$1")" -o "$folder" $threads --quiet
+  "$build/problems/cavort" "$command" "$(scene "$1")" -o "$folder" $threads --quiet || [ "$command $?" = "stress 1" ]
   [ "$(wc -c <"$folder/$command.html")" -le 300000 ] || { echo "pages.sh: $folder/$command.html is beyond 300 kB" >&2; exit 1; }
 }
 
@@ -97,8 +98,9 @@ load. For a scene of your own run these two commands.
 ## What to use
 
 A motion of 0.32 s, once without contacts and once with: the cheapest order and step that ends within a fraction of
-the largest way of a coordinate, and its time. *No step tried*: none of the steps measured, down to 0.16 ms where the
-time allowed it, came that near. Contacts are made and lost within a step, so with them a higher order gains little.
+the largest way of a coordinate, as order, step: processor time of the motion. *No step tried*: none of the steps
+measured, down to 0.16 ms where the time allowed it, came that near. Contacts are made and lost within a step, so with
+them a higher order gains little. Under each scene stands what its report advises, and the edges that are near.
 
 ![error against time of the humanoid, three orders of the step](accuracy.svg)
 
