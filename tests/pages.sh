@@ -81,6 +81,21 @@ near() {
     }'
 }
 
+# solves of a problem as a table: the first to a feasible motion is seldom the one to use
+solves() {
+  [ -f "$out/report-$1/plan.csv" ] || return 0
+  echo
+  echo "| solver | order, step | processor time | cost | of which may be saved, at most | feasible |"
+  echo "|---|---|---|---|---|---|"
+  sed '1d; s/, /;/; s/"//g' "$out/report-$1/plan.csv" | awk -F, '{
+    sub(/;/, ", ", $1)
+    printf "| %s | %s, %g ms | %.3g s | %.3g ", $1, $2, 1e3 * $5, $6, $8
+    printf "| %s | %s |\n", $11 == "" ? "" : sprintf("%.2g", $11), $12 == 1 ? "yes" : "no"
+  }'
+  echo
+  echo "Where several are feasible, weigh cost against time: the first may still waste most of its cost."
+}
+
 # the commit that a page names
 commit() { sed -n 's|^<dt>commit</dt><dd> *\(.*\)</dd>$|\1|p' "$1"; }
 
@@ -123,6 +138,7 @@ TEXT
         said=$(advice "$report" "$term")
         [ -z "$said" ] || echo "- **$term.** $said"
       done
+      solves "$report"
       echo
       echo "Edges within a factor of ten of its own values:"
       echo
