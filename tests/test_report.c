@@ -316,6 +316,23 @@ static void test_advice(void) {
   step.motion[0].uncertainty = 0.01;
   cav_advice_take(&forward, &step, NULL, &a);
   CHECK(a.motion == -1 && a.step[CAV_ADVICE_TARGET].row == -1 && a.forward == -1);
+  // of the solvers the fastest of those that are hardly dearer than the best, of the problem itself
+  static const struct {
+    const char *order;
+    double feasible, seconds, cost;
+  } solves[] = {{"euler", 1, 5, 426}, {"euler", 1, 30, 3.4},    {"euler", 1, 20, 3.6},
+                {"euler", 0, 1, 0.1}, {"momentum", 1, 2, 2.57}, {"euler", 1, 10, 4}};
+  cav_measure_plan plan = {.sheet = {.name = "p", .ntext = 3, .nnumber = CAV_PLAN_NUMBERS}};
+  for (int i = 0; i < 6; i++) {
+    double *row = cav_sheet_add(&plan.sheet, "solver", solves[i].order, "");
+    row[CAV_PLAN_STEP] = 0.02;
+    row[CAV_PLAN_FEASIBLE] = solves[i].feasible;
+    row[CAV_PLAN_SECONDS] = solves[i].seconds;
+    row[CAV_PLAN_COST] = solves[i].cost;
+  }
+  cav_advice_take(&forward, &step, &plan, &a);
+  CHECK(a.plan == 2);
+  cav_sheet_free(&plan.sheet);
   cav_sheet_free(&forward.sheet);
   cav_sheet_free(&step.sheet);
 }

@@ -64,13 +64,22 @@ static double off(const cav_sheet *sheet, int row) {
   return isfinite(x) && isfinite(y) ? fmax(x, y) : INFINITY;
 }
 
+// other steps and orders are other problems
+static int own_problem(const cav_sheet *sheet, int r) {
+  return cav_sheet_get(sheet, r, CAV_PLAN_STEP) == cav_sheet_get(sheet, 0, CAV_PLAN_STEP) &&
+         !strcmp(sheet->row[r].label[1], sheet->row[0].label[1]);
+}
+
 static void choose_plan(const cav_sheet *sheet, cav_advice *a) {
+  double least = INFINITY;
   for (int r = 0; r < sheet->nrow; r++) {
-    // other steps and orders are other problems
-    if (cav_sheet_get(sheet, r, CAV_PLAN_STEP) != cav_sheet_get(sheet, 0, CAV_PLAN_STEP)) continue;
-    if (strcmp(sheet->row[r].label[1], sheet->row[0].label[1])) continue;
+    if (!own_problem(sheet, r)) continue;
     if (isfinite(off(sheet, r)) && (a->nearest < 0 || off(sheet, r) < off(sheet, a->nearest))) a->nearest = r;
-    if (cav_sheet_get(sheet, r, CAV_PLAN_FEASIBLE) != 1) continue;
+    if (cav_sheet_get(sheet, r, CAV_PLAN_FEASIBLE) == 1) least = fmin(least, cav_sheet_get(sheet, r, CAV_PLAN_COST));
+  }
+  for (int r = 0; r < sheet->nrow; r++) {
+    if (!own_problem(sheet, r) || cav_sheet_get(sheet, r, CAV_PLAN_FEASIBLE) != 1) continue;
+    if (cav_sheet_get(sheet, r, CAV_PLAN_COST) > hardly * least) continue;
     if (a->plan < 0 || cav_sheet_get(sheet, r, CAV_PLAN_SECONDS) < cav_sheet_get(sheet, a->plan, CAV_PLAN_SECONDS))
       a->plan = r;
   }

@@ -22,7 +22,7 @@ typedef struct cav_advice {
   int forward;  ///< row of the forward solver to use, -1: none stays within it
   int cheapest; ///< that of the cheapest within it
   int sweeps;   ///< cheapest Gauss-Seidel within it, -1: none
-  int plan;     ///< row of the fastest feasible solve of the problem's own step and order, -1: none
+  int plan;     ///< row of the fastest feasible solve within 10 % of the least cost, own step and order, -1: none
   int nearest;  ///< that of the least violation, where none is feasible
 } cav_advice;
 

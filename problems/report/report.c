@@ -247,7 +247,8 @@ static void advise_plan(const report *r, cav_html *page) {
   }
   int row = r->advice.plan;
   double optimality = cav_sheet_get(sheet, row, CAV_PLAN_OPTIMALITY);
-  cav_html_entry(page, "Solver of the problem", "%s: the first to a feasible motion, %s s, cost %s%s%s.",
+  cav_html_entry(page, "Solver of the problem",
+                 "%s: the first to a feasible motion within 10 %% of the least cost, %s s, cost %s%s%s.",
                  sheet->row[row].label[0], number(cav_sheet_get(sheet, row, CAV_PLAN_SECONDS), x[0]),
                  number(cav_sheet_get(sheet, row, CAV_PLAN_COST), x[1]),
                  isfinite(optimality) ? ", of which at most a fraction may still be saved: " : "",
