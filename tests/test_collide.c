@@ -2,7 +2,6 @@
 /// off, contact axes, and MuJoCo's contacts on models no one here wrote; what stands
 /// far away is left out, and what is near never.
 #include "check.h"
-#include "fixed.h"
 #include "math3.h"
 #include "step.h"
 
@@ -196,76 +195,6 @@ static void test_standing(int trees) {
   cav_state_free(state);
 }
 
-enum { BALLS = 120 };
-
-// every pair of balls that is near is in a run; far away none is, at the edge some are
-static void test_blocks(void) {
-  static double centre[BALLS][3], radius[BALLS];
-  static int tree[BALLS];
-  static cav_sweep_pair pair[BALLS * BALLS];
-  int npair = 0, most = 0, least = 0;
-  for (int i = 0; i < BALLS; i++) {
-    tree[i] = i < BALLS / 2 ? -1 : i % 3;
-    radius[i] = uniform(0.05, 0.3);
-    for (int k = 0; k < 3; k++) centre[i][k] = uniform(-5, 5);
-  }
-  for (int i = 0; i < BALLS; i++)
-    for (int j = 0; j < i; j++)
-      if (tree[i] != tree[j]) pair[npair++] = (cav_sweep_pair){i % 2 ? j : i, i % 2 ? i : j};
-  pair[7].first = -1;
-  cav_fixed *fixed = cav_fixed_new(BALLS, (const double(*)[3])centre, radius, tree, npair, pair);
-  if (!CHECK(fixed && cav_fixed_pays(fixed))) return;
-  for (int pose = 0; pose < 400; pose++) {
-    double far = pose == 0 ? 1e3 : uniform(0, 8), margin = uniform(0, 0.2);
-    for (int i = 0; i < BALLS; i++)
-      for (int k = 0; k < 3 && tree[i] >= 0; k++) centre[i][k] = far * (tree[i] - 1) * (k + 1) / 3 + uniform(-0.5, 0.5);
-    const cav_run *run;
-    int nrun, at = 0, missed = 0, count = cav_fixed_find(fixed, (const double(*)[3])centre, margin, &run, &nrun),
-              listed = 0;
-    for (int r = 0; r < nrun; r++) {
-      CHECK(run[r].first < run[r].end && run[r].end <= npair && (r == 0 || run[r].first > run[r - 1].end));
-      listed += run[r].end - run[r].first;
-    }
-    CHECK(listed == count);
-    for (int p = 0; p < npair; p++) {
-      while (at < nrun && run[at].end <= p) at++;
-      int in = at < nrun && run[at].first <= p;
-      double d[3], sum = radius[pair[p].second] + margin;
-      if (pair[p].first < 0) missed += !in;
-      if (in || pair[p].first < 0) continue;
-      sub3(d, centre[pair[p].first], centre[pair[p].second]);
-      sum += radius[pair[p].first];
-      missed += dot3(d, d) < sum * sum;
-    }
-    CHECK(missed == 0);
-    most = count > most ? count : most;
-    if (pose == 0) least = count;
-  }
-  // one tree stays at the origin, two are a kilometre off
-  CHECK(least < npair / 2 && most > least);
-  cav_fixed_free(fixed);
-}
-
-// one ball beside another along each axis: listed if nearer than the margin by ten nanometres, left out if farther
-static void test_edge(void) {
-  const double radius[] = {0.1, 0.2}, from[3] = {3, -20, 500};
-  const int tree[] = {-1, 0};
-  const cav_sweep_pair pair = {0, 1};
-  double centre[2][3];
-  memcpy(centre[0], from, sizeof from);
-  cav_fixed *fixed = cav_fixed_new(2, (const double(*)[3])centre, radius, tree, 1, &pair);
-  if (!CHECK(fixed != NULL)) return;
-  for (int side = 0; side < 12; side++) {
-    double off = side / 6 ? 1e-8 : -1e-8, distance = 0.1 + 0.2 + 0.05 + off;
-    const cav_run *run;
-    int nrun;
-    memcpy(centre[1], from, sizeof from);
-    centre[1][side % 3] += side / 3 % 2 ? distance : -distance;
-    CHECK(cav_fixed_find(fixed, (const double(*)[3])centre, 0.05, &run, &nrun) == (off < 0));
-  }
-  cav_fixed_free(fixed);
-}
-
 static void test_reach(void) {
   static heap h;
   fill(&h);
@@ -391,8 +320,6 @@ int main(void) {
   test_heap(0);
   test_standing(LINKS - 1);
   test_standing(3);
-  test_blocks();
-  test_edge();
   test_reach();
 #ifdef CAVORT_HAVE_MUJOCO
   static const char *const models[] = {"mujoco/humanoid.xml",     "dm_control/acrobot.xml",  "dm_control/cartpole.xml",

@@ -1,7 +1,7 @@
 /// Which geoms touch: broad phase by bounding spheres over the list of pairs that the model was compiled to, then the
 /// narrow phase of pairs.c. Geoms in no pair are never placed; a geom's rotation is formed only if a narrow phase asks
 /// for it, once per call, and that of a geom fixed to the world once for all. Pairs with
-/// what stands in the world out of reach are left out by blocks (fixed.c); where CAV_SWEEP_FROM pairs and more are left
+/// what stands in the world out of reach are left out by trees and blocks (fixed.c); where CAV_SWEEP_FROM pairs and more are left
 /// they are pruned along an axis (sweep.c); bench_sweep measures where that begins to pay.
 #include <assert.h>
 #include <stdlib.h>
@@ -17,10 +17,11 @@ static const double APPROACH_SPEED = 5;
 
 /// A pair as the broad phase wants it: all it reads, in order.
 typedef struct candidate {
-  int first, second;   ///< slots
-  int plane, external; ///< 1 if the first geom is a plane; as in the pair
-  double margin;       ///< of the pair
-  double bound;        ///< sum of bounding radii; of the second geom alone if the first is a plane
+  int first, second;         ///< slots
+  int pair;                  ///< its number
+  short int plane, external; ///< 1 if the first geom is a plane; as in the pair
+  double margin;             ///< of the pair
+  double bound;              ///< sum of bounding radii; of the second geom alone if the first is a plane
 } candidate;
 
 /// A geom in some pair.
@@ -37,7 +38,9 @@ struct cav_geom_cache {
   slot *slot;
   int nmoving, *moving; ///< slots that are not fixed
   double (*centre)[3];  ///< [nslot] world
-  candidate *candidate; ///< [npair]
+  candidate *candidate; ///< [npair], and behind them once more those that fixed never leaves out
+  int ntree, *tree;     ///< [ntree] root links of the trees with slots that move
+  double (*root)[3];    ///< [ntree] where these are
   cav_fixed *fixed;     ///< NULL: there is little to leave out
   cav_sweep *sweep;     ///< NULL: all pairs that are left are looked at
   int sweep_from;
@@ -72,9 +75,10 @@ static void open_slots(const cav_model *model, struct cav_geom_cache *cache, int
     }
     const cav_geom *a = model->geom + pair->geom1, *b = model->geom + pair->geom2;
     candidate *c = cache->candidate + p;
+    c->pair = p;
     c->first = slot_of[pair->geom1];
     c->second = slot_of[pair->geom2];
-    c->external = pair->external;
+    c->external = (short)pair->external;
     c->margin = pair->margin;
     c->plane = a->type == CAV_GEOM_PLANE;
     c->bound = b->bound + (c->plane ? 0 : a->bound);
@@ -82,21 +86,64 @@ static void open_slots(const cav_model *model, struct cav_geom_cache *cache, int
 }
 
 // trees of the geoms, numbered from 0; -1: of the world
-static void number_trees(const cav_model *model, const struct cav_geom_cache *cache, int *tree) {
-  int count = 0, *number = tree + cache->nslot;
+static void number_trees(const cav_model *model, struct cav_geom_cache *cache, int *tree) {
+  int *number = tree + cache->nslot;
   for (int l = 0; l < model->nlink; l++) number[l] = -1;
   for (int i = 0; i < cache->nslot; i++) {
     int root = model->link[cache->slot[i].geom->link].root;
-    if (!cache->slot[i].fixed && number[root] < 0) number[root] = count++;
+    if (!cache->slot[i].fixed && number[root] < 0) {
+      cache->tree[cache->ntree] = root;
+      number[root] = cache->ntree++;
+    }
     tree[i] = cache->slot[i].fixed ? -1 : number[root];
+  }
+}
+
+// farthest that a link's origin comes from its parent's: from there to the anchor of its first joint, on to that of the next and
+// from the last one to the origin is as far in every posture, unless one of them slides
+static double arm_of(const cav_model *model, const cav_link *link) {
+  double at[3] = {0, 0, 0}, length = 0;
+  for (int j = link->joint; j < link->joint + link->njoint; j++) {
+    const cav_joint *joint = model->joint + j;
+    double d[3];
+    if (joint->type == CAV_JOINT_SLIDE || joint->type == CAV_JOINT_FREE) return INFINITY;
+    if (j == link->joint) {
+      quat_rotate(d, link->quat, joint->pos);
+      add3(d, d, link->pos);
+    } else {
+      sub3(d, joint->pos, at);
+    }
+    length += norm3(d);
+    copy3(at, joint->pos);
+  }
+  return length + norm3(link->njoint ? at : link->pos);
+}
+
+// farthest that any point of a ball about a slot comes from the root of its tree; reach [ntree], room [nlink] for the
+// distances of the links' origins
+static void find_reaches(const cav_model *model, const struct cav_geom_cache *cache, double *reach, double *origin) {
+  // in no tree
+  origin[0] = INFINITY;
+  for (int l = 1; l < model->nlink; l++) {
+    const cav_link *link = model->link + l;
+    origin[l] = link->root == l ? 0 : origin[link->parent] + arm_of(model, link);
+  }
+  for (int t = 0; t < cache->ntree; t++) {
+    reach[t] = 0;
+    for (int i = 0; i < cache->nslot; i++) {
+      const cav_geom *geom = cache->slot[i].geom;
+      if (cache->slot[i].fixed || model->link[geom->link].root != cache->tree[t] || !isfinite(geom->bound)) continue;
+      reach[t] = fmax(reach[t], origin[geom->link] + norm3(geom->pos) + geom->bound);
+    }
   }
 }
 
 // what prunes the pairs by blocks and along an axis; 0 if memory runs out
 static int open_pruning(const cav_model *model, struct cav_geom_cache *cache, int sweep_from) {
-  double *radius = malloc(sizeof *radius * ((size_t)cache->nslot + 1));
+  size_t slots = (size_t)cache->nslot + 1, links = (size_t)model->nlink;
+  double *radius = malloc(sizeof *radius * slots), *reach = malloc(sizeof *reach * 2 * links);
   cav_sweep_pair *pair = malloc(sizeof *pair * ((size_t)model->npair + 1));
-  int *tree = malloc(sizeof *tree * (size_t)(cache->nslot + model->nlink)), ok = radius && pair && tree;
+  int *tree = malloc(sizeof *tree * (slots + links)), ok = radius && reach && pair && tree;
   if (ok) {
     for (int i = 0; i < cache->nslot; i++) radius[i] = cache->slot[i].geom->bound;
     for (int p = 0; p < model->npair; p++) {
@@ -105,7 +152,9 @@ static int open_pruning(const cav_model *model, struct cav_geom_cache *cache, in
       cache->margin = fmax(cache->margin, c->margin);
     }
     number_trees(model, cache, tree);
-    cache->fixed = cav_fixed_new(cache->nslot, (const double(*)[3])cache->centre, radius, tree, model->npair, pair);
+    find_reaches(model, cache, reach, reach + links);
+    cache->fixed =
+        cav_fixed_new(cache->nslot, (const double(*)[3])cache->centre, radius, tree, reach, model->npair, pair);
     cache->sweep_from = sweep_from;
     if (model->npair >= sweep_from) cache->sweep = cav_sweep_new(cache->nslot, radius, model->npair, pair);
     ok = cache->fixed && (cache->sweep || model->npair < sweep_from);
@@ -114,7 +163,13 @@ static int open_pruning(const cav_model *model, struct cav_geom_cache *cache, in
     cav_fixed_free(cache->fixed);
     cache->fixed = NULL;
   }
+  if (ok && cache->fixed) {
+    int count;
+    const int *always = cav_fixed_always(cache->fixed, &count);
+    for (int i = 0; i < count; i++) cache->candidate[model->npair + i] = cache->candidate[always[i]];
+  }
   free(radius);
+  free(reach);
   free(pair);
   free(tree);
   return ok;
@@ -128,9 +183,12 @@ struct cav_geom_cache *cav_geom_cache_new(const cav_model *model, int sweep_from
     cache->slot = calloc((size_t)model->ngeom + 1, sizeof *cache->slot);
     cache->moving = calloc((size_t)model->ngeom + 1, sizeof *cache->moving);
     cache->centre = calloc((size_t)model->ngeom + 1, sizeof *cache->centre);
-    cache->candidate = calloc((size_t)model->npair + 1, sizeof *cache->candidate);
+    cache->candidate = calloc(2 * (size_t)model->npair + 1, sizeof *cache->candidate);
+    cache->tree = calloc((size_t)model->nlink, sizeof *cache->tree);
+    cache->root = calloc((size_t)model->nlink, sizeof *cache->root);
   }
-  if (!cache || !slot_of || !cache->slot || !cache->moving || !cache->centre || !cache->candidate) {
+  if (!cache || !slot_of || !cache->slot || !cache->moving || !cache->centre || !cache->candidate || !cache->tree ||
+      !cache->root) {
     free(slot_of);
     cav_geom_cache_free(cache);
     return NULL;
@@ -143,7 +201,8 @@ struct cav_geom_cache *cav_geom_cache_new(const cav_model *model, int sweep_from
   }
   cache->bytes = cav_sweep_bytes(cache->sweep) + cav_fixed_bytes(cache->fixed) + sizeof *cache +
                  ((size_t)model->ngeom + 1) * (sizeof *cache->slot + sizeof *cache->moving + sizeof *cache->centre);
-  cache->bytes += ((size_t)model->npair + 1) * sizeof *cache->candidate;
+  cache->bytes += (2 * (size_t)model->npair + 1) * sizeof *cache->candidate;
+  cache->bytes += (size_t)model->nlink * (sizeof *cache->tree + sizeof *cache->root);
   return cache;
 }
 
@@ -157,6 +216,8 @@ void cav_geom_cache_free(struct cav_geom_cache *cache) {
   free(cache->moving);
   free(cache->centre);
   free(cache->candidate);
+  free(cache->tree);
+  free(cache->root);
   free(cache);
 }
 
@@ -241,15 +302,14 @@ static cav_status push(const cav_model *model, cav_state *state, int p, const ca
 }
 
 // contacts of one pair whose bounds are near
-static inline cav_status collide_pair(const cav_model *model, cav_state *state, int p, double margin) {
+static inline cav_status collide_pair(const cav_model *model, cav_state *state, const candidate *c, double margin) {
   struct cav_geom_cache *cache = state->work->geom;
-  const candidate *c = cache->candidate + p;
   cav_touch touch[CAV_TOUCH_MAX];
   const cav_shape *a = shape_of(state, cache, c->first), *b = shape_of(state, cache, c->second);
   int count = cav_collide_shapes(a, b, margin, touch);
   assert(count <= CAV_TOUCH_MAX);
   cav_status status = CAV_OK;
-  for (int k = 0; k < count && status == CAV_OK; k++) status = push(model, state, p, touch + k);
+  for (int k = 0; k < count && status == CAV_OK; k++) status = push(model, state, c->pair, touch + k);
   return status;
 }
 
@@ -262,7 +322,7 @@ static cav_status collide_swept(const cav_model *model, cav_state *state, const 
     const candidate *c = cache->candidate + found[i];
     double margin = c->margin + activation[c->external];
     if (!near(cache, c, margin)) continue;
-    cav_status status = collide_pair(model, state, found[i], margin);
+    cav_status status = collide_pair(model, state, c, margin);
     if (status) return status;
   }
   return CAV_OK;
@@ -276,10 +336,18 @@ static inline cav_status collide_run(const cav_model *model, cav_state *state, c
     const candidate *c = cache->candidate + p;
     double margin = c->margin + activation[c->external];
     if (!near(cache, c, margin)) continue;
-    cav_status status = collide_pair(model, state, p, margin);
+    cav_status status = collide_pair(model, state, c, margin);
     if (status) return status;
   }
   return CAV_OK;
+}
+
+// the pairs that what stands out of reach leaves
+static int leave_out(const cav_state *state, struct cav_geom_cache *cache, double most, const cav_run **run,
+                     int *nrun) {
+  for (int t = 0; t < cache->ntree; t++) copy3(cache->root[t], state->link[cache->tree[t]].pos);
+  return cav_fixed_find(cache->fixed, (const double(*)[3])cache->centre, (const double(*)[3])cache->root, most, run,
+                        nrun);
 }
 
 cav_status cav_contacts_find(const cav_model *model, cav_state *state) {
@@ -294,7 +362,7 @@ cav_status cav_contacts_find(const cav_model *model, cav_state *state) {
   cav_run all = {0, model->npair};
   const cav_run *run = &all;
   int nrun = 1, count = model->npair;
-  if (cache->fixed) count = cav_fixed_find(cache->fixed, (const double(*)[3])cache->centre, most, &run, &nrun);
+  if (cache->fixed) count = leave_out(state, cache, most, &run, &nrun);
   if (cache->sweep && count >= cache->sweep_from) return collide_swept(model, state, activation, most);
   for (int r = 0; r < nrun; r++) {
     cav_status status = collide_run(model, state, run[r], activation);
