@@ -21,53 +21,70 @@
 #include "rotation.h"
 #include "verification.h"
 
-/// Finer steps in a step of the motion.
-enum { FINER = 20 };
+/// s: the longest step of a regulator. With 2 ms weak gains lose a squat-jump that they carry with this.
+static const double longest = 0.00125;
 
-/// The regulator at one step: state (dq, dv), input fractions of the actuators' limits. Matrices are column-major.
+/// The regulator at one step: state (dq, dv), input fractions of the actuators' limits. Matrices are column-major. The
+/// step is dv' = D (dq, dv) + Du w, dq' = E dq + h J dv', where E and J are 1 but for the blocks of rotations.
 typedef struct regulator {
-  int nv, nu, n;        ///< n = 2 nv
-  double h;             ///< finer step, s
-  double q, v;          ///< penalties on dq' M dq and dv' M dv a second
-  double *force;        ///< [nv*nu] generalised force of an input
-  double *A, *B;        ///< [n*n], [n*nu] the step
-  double *P;            ///< [n*n] penalty of what is left
-  double *PA, *PB;      ///< [n*n], [n*nu]
-  double *S;            ///< [n*n] mean of A'PA over the laws
-  double *H;            ///< [nu*nu] of B'PB, and the penalty on inputs
-  double *G, *K;        ///< [nu*n] G of B'PA; K = H^-1 G: input -K x
-  double *derivative;   ///< [nv*(n+nu)] derivatives of v' by dq, dv and inputs
-  double *dq, *dv, *dn; ///< [nv*nv] of the inverse, row-major
-  double *M;            ///< [nv*nv]
-  double *u;            ///< [nv]
+  int nv, nu, n;            ///< n = 2 nv
+  int finer;                ///< finer steps in a step of the motion
+  double h;                 ///< finer step, s
+  double q, v;              ///< penalties on dq' M dq and dv' M dv a second
+  double *P;                ///< [n*n] penalty of what is left
+  double *T;                ///< [n*nv] P (h J; 1)
+  double *Q;                ///< [nv*nv] penalty of dv': (h J; 1)' T
+  double *L;                ///< [nv*n] of dv' against the dq of before: (E' T above)', 0
+  double *W, *Wu;           ///< [nv*n] Q D + L, [nv*nu] Q Du
+  double *S;                ///< [n*n] mean of the penalty of the state before over the laws
+  double *H;                ///< [nu*nu] of the inputs', and the penalty on inputs
+  double *G, *K;            ///< [nu*n] G of both; K = H^-1 G: input -K x
+  double *D;                ///< [nv*(n+nu)] derivatives of v' by dq, dv and inputs
+  double *right;            ///< [nv*(n+nu)] of the inverse by dq and dv, and forces of inputs
+  double *system;           ///< [nv*nv] of the inverse by v'
+  double *inverse, *unit;   ///< [nv*nv] of the system, [nu*nu] of H
+  double *dq, *dv, *dn;     ///< [nv*nv] of the inverse, row-major
+  double *M;                ///< [nv*nv]
+  double *u;                ///< [nv]
+  double (*rotation)[2][9]; ///< [nrotation] blocks of E and J, row-major
   void *memory;
 } regulator;
 
-static int regulator_make(regulator *r, const cav_model *model) {
-  int nv = model->nv, nu = model->nu, n = 2 * nv;
+static int regulator_make(regulator *r, const cav_transcription *tr) {
+  int nv = tr->model->nv, nu = tr->model->nu, n = 2 * nv;
   size_t v = (size_t)nv, u = (size_t)nu, s = (size_t)n;
   *r = (regulator){.nv = nv, .nu = nu, .n = n};
-  double *m = calloc(v * u + 4 * s * s + 2 * s * u + u * u + 2 * u * s + v * (s + u) + 4 * v * v + v + 1, sizeof *m);
+  double *m = calloc(v * u + 2 * s * s + 3 * v * s + 2 * u * u + 2 * u * s + 2 * v * (s + u) + 7 * v * v + v +
+                         18 * (size_t)tr->nrotation + 1,
+                     sizeof *m);
   r->memory = m;
   if (!m) return 0;
-  r->force = m, m += v * u;
-  r->A = m, m += s * s;
   r->P = m, m += s * s;
-  r->PA = m, m += s * s;
+  r->T = m, m += s * v;
+  r->Q = m, m += v * v;
+  r->L = m, m += v * s;
+  r->W = m, m += v * s;
+  r->Wu = m, m += v * u;
   r->S = m, m += s * s;
-  r->B = m, m += s * u;
-  r->PB = m, m += s * u;
   r->H = m, m += u * u;
   r->G = m, m += u * s;
   r->K = m, m += u * s;
-  r->derivative = m, m += v * (s + u);
+  r->D = m, m += v * (s + u);
+  r->right = m, m += v * (s + u);
+  r->inverse = m, m += v * v;
+  r->unit = m, m += u * u;
+  r->system = m, m += v * v;
   r->dq = m, m += v * v;
   r->dv = m, m += v * v;
   r->dn = m, m += v * v;
   r->M = m, m += v * v;
-  r->u = m;
+  r->u = m, m += v;
+  r->rotation = (double(*)[2][9])m;
   return 1;
 }
+
+/// Generalised forces of the inputs, [nv*nu].
+static double *force_of(const regulator *r) { return r->right + (size_t)r->n * r->nv; }
 
 static void regulator_free(regulator *r) { free(r->memory); }
 
@@ -75,7 +92,7 @@ static void regulator_free(regulator *r) { free(r->memory); }
 static cav_status find_forces(regulator *r, const cav_model *model, cav_state *state, const double *q) {
   cav_status status = cav_position(model, state, q);
   for (int a = 0; a < r->nu && status == CAV_OK; a++) {
-    double range[2], scale, *force = r->force + (size_t)a * r->nv;
+    double range[2], scale, *force = force_of(r) + (size_t)a * r->nv;
     cav_actuator_length(model, state, a, force);
     cav_verification_actuator_range(model, a, range, &scale);
     for (int d = 0; d < r->nv; d++) force[d] *= scale;
@@ -83,7 +100,7 @@ static cav_status find_forces(regulator *r, const cav_model *model, cav_state *s
   return status;
 }
 
-/// derivative := derivatives of v' by (q, v) and the inputs, from those of the inverse.
+/// D := derivatives of v' by (q, v) and the inputs, from those of the inverse.
 static cav_status find_derivative(regulator *r, const cav_model *model, cav_state *state, const double *q,
                                   const double *v) {
   int nv = r->nv, columns = r->n + r->nu;
@@ -93,47 +110,71 @@ static cav_status find_derivative(regulator *r, const cav_model *model, cav_stat
   if (status == CAV_NOT_SUPPORTED) status = cav_inverse_jacobian(model, state, q, v, next, r->dq, r->dv, r->dn);
   if (status != CAV_OK) return status;
   // column-major: the matrix of the system is dn's transpose in memory
-  double *system = r->PA;
   for (int i = 0; i < nv; i++)
     for (int j = 0; j < nv; j++) {
-      system[j * nv + i] = r->dn[i * nv + j];
-      r->derivative[j * nv + i] = -r->dq[i * nv + j];
-      r->derivative[(nv + j) * nv + i] = -r->dv[i * nv + j];
+      r->system[j * nv + i] = r->dn[i * nv + j];
+      r->inverse[j * nv + i] = i == j;
+      r->right[j * nv + i] = -r->dq[i * nv + j];
+      r->right[(nv + j) * nv + i] = -r->dv[i * nv + j];
     }
-  memcpy(r->derivative + (size_t)r->n * nv, r->force, (size_t)nv * r->nu * sizeof(double));
-  return cav_dense_solve_general(nv, system, nv, columns, r->derivative, nv) ? CAV_OK : CAV_NOT_CONVERGED;
+  // a product takes less time than a solution of so many columns
+  if (!cav_dense_solve_general(nv, r->system, nv, nv, r->inverse, nv)) return CAV_NOT_CONVERGED;
+  memset(r->D, 0, (size_t)nv * columns * sizeof *r->D);
+  cav_dense_product(nv, columns, nv, 1, r->inverse, nv, r->right, nv, r->D, nv);
+  return CAV_OK;
 }
 
-/// Three rows of dq' for a rotation over phi: Exp(-phi) dq + h Jr(phi) dv'.
-static void rotation_rows(const regulator *r, int dof, const double *v, const double *derivative, int columns,
-                          int with_q, double *out) {
-  double phi[3], right[9], inverse[9], back[9] = {0};
-  for (int c = 0; c < 3; c++) phi[c] = r->h * v[dof + c];
-  cav_rotation_jacobian(phi, right);
-  cav_rotation_jacobian_inverse(phi, inverse);
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++)
-      for (int k = 0; k < 3; k++) back[3 * i + j] += right[3 * i + k] * inverse[3 * j + k];
-  for (int j = 0; j < columns; j++)
-    for (int i = 0; i < 3; i++) {
-      double sum = 0;
-      for (int k = 0; k < 3; k++) sum += right[3 * i + k] * derivative[j * r->nv + dof + k];
-      out[(size_t)j * r->n + dof + i] = r->h * sum;
-      if (with_q && j >= dof && j < dof + 3) out[(size_t)j * r->n + dof + i] += back[3 * i + j - dof];
-    }
+/// Blocks of E and J of the rotations over h v': Exp(-phi) and Jr(phi).
+static void find_rotations(regulator *r, const cav_transcription *tr, const double *v_next) {
+  for (int k = 0; k < tr->nrotation; k++) {
+    double phi[3], inverse[9], *back = r->rotation[k][0], *right = r->rotation[k][1];
+    for (int c = 0; c < 3; c++) phi[c] = r->h * v_next[tr->rotation_dof[k] + c];
+    cav_rotation_jacobian(phi, right);
+    cav_rotation_jacobian_inverse(phi, inverse);
+    memset(back, 0, 9 * sizeof *back);
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++)
+        for (int c = 0; c < 3; c++) back[3 * i + j] += right[3 * i + c] * inverse[3 * j + c];
+  }
 }
 
-/// Columns of the step, from derivative: dv' below, dq' = dq + h dv' above.
-static void step_columns(const regulator *r, const cav_transcription *tr, const double *v_next,
-                         const double *derivative, int columns, int with_q, double *out) {
-  int nv = r->nv;
-  for (int j = 0; j < columns; j++)
-    for (int i = 0; i < nv; i++) {
-      out[(size_t)j * r->n + nv + i] = derivative[j * nv + i];
-      out[(size_t)j * r->n + i] = r->h * derivative[j * nv + i] + (with_q && i == j);
+/// X [rows*nv] := X B for B that is 1 but for its blocks of rotations, those of E or J.
+static void turn_columns(const regulator *r, const cav_transcription *tr, int which, int rows, double *X, int ldx) {
+  for (int k = 0; k < tr->nrotation; k++) {
+    const double *block = r->rotation[k][which];
+    double *x = X + (size_t)tr->rotation_dof[k] * ldx;
+    for (int i = 0; i < rows; i++) {
+      const double a = x[i], b = x[ldx + i], c = x[2 * ldx + i];
+      for (int j = 0; j < 3; j++) x[j * ldx + i] = a * block[j] + b * block[3 + j] + c * block[6 + j];
     }
-  for (int k = 0; k < tr->nrotation; k++)
-    rotation_rows(r, tr->rotation_dof[k], v_next, derivative, columns, with_q, out);
+  }
+}
+
+/// From P what no law has a part in: T, Q, L, and S of a step that keeps its velocity.
+static void carry_back(regulator *r, const cav_transcription *tr) {
+  int nv = r->nv, n = r->n;
+  for (int j = 0; j < nv; j++) memcpy(r->T + (size_t)j * n, r->P + (size_t)j * n, (size_t)n * sizeof(double));
+  turn_columns(r, tr, 1, n, r->T, n);
+  for (int j = 0; j < nv; j++)
+    for (int i = 0; i < n; i++) r->T[j * n + i] = r->h * r->T[j * n + i] + r->P[(size_t)(nv + j) * n + i];
+  // transposed: L = (T above)' E, and Q = (T above)' h J + (T below)'
+  memset(r->L, 0, (size_t)nv * n * sizeof(double));
+  for (int j = 0; j < nv; j++)
+    for (int i = 0; i < nv; i++) r->L[i * nv + j] = r->Q[i * nv + j] = r->T[j * n + i];
+  turn_columns(r, tr, 0, nv, r->L, nv);
+  turn_columns(r, tr, 1, nv, r->Q, nv);
+  for (int j = 0; j < nv; j++)
+    for (int i = 0; i < nv; i++) r->Q[i * nv + j] = r->h * r->Q[i * nv + j] + r->T[j * n + nv + i];
+  // E' P11 E: P11 E, transposed, and E once more
+  memset(r->S, 0, (size_t)n * n * sizeof(double));
+  for (int j = 0; j < nv; j++) memcpy(r->S + (size_t)j * n, r->P + (size_t)j * n, (size_t)nv * sizeof(double));
+  turn_columns(r, tr, 0, nv, r->S, n);
+  for (int j = 0; j < nv; j++)
+    for (int i = 0; i < j; i++) {
+      const double a = r->S[j * n + i];
+      r->S[j * n + i] = r->S[i * n + j], r->S[i * n + j] = a;
+    }
+  turn_columns(r, tr, 0, nv, r->S, n);
 }
 
 /// P += scale * penalty of straying.
@@ -146,18 +187,24 @@ static void add_penalty(regulator *r, double scale) {
     }
 }
 
-/// Adds A and B of one law, of which there are so many: S += A'PA, G += B'PA, H += B'PB.
+/// Adds D of one law, of which there are so many: S += part (D'QD + L'D + D'L), G += part Du'(QD + L), H += part
+/// Du'QDu. Of the lower triangle of S.
 static void add_law(regulator *r, int laws) {
-  int n = r->n, nu = r->nu;
-  double part = 1.0 / laws;
-  memset(r->PA, 0, (size_t)n * (size_t)n * sizeof(double));
-  cav_dense_product(n, n, n, part, r->P, n, r->A, n, r->PA, n);
-  cav_dense_product_transposed(CAV_PART_ALL, n, n, n, 1, r->A, n, r->PA, n, r->S, n);
-  if (nu == 0) return;
-  cav_dense_product_transposed(CAV_PART_ALL, nu, n, n, 1, r->B, n, r->PA, n, r->G, nu);
-  memset(r->PB, 0, (size_t)n * (size_t)nu * sizeof(double));
-  cav_dense_product(n, nu, n, part, r->P, n, r->B, n, r->PB, n);
-  cav_dense_product_transposed(CAV_PART_ALL, nu, nu, n, 1, r->B, n, r->PB, n, r->H, nu);
+  int nv = r->nv, n = r->n, nu = r->nu;
+  const size_t all = (size_t)nv * n, inputs = (size_t)nv * nu;
+  const double part = 1.0 / laws, *Du = r->D + all;
+  memset(r->W, 0, all * sizeof *r->W);
+  cav_dense_product(nv, n, nv, part, r->Q, nv, r->D, nv, r->W, nv);
+  for (size_t i = 0; i < all; i++) r->W[i] += part * r->L[i];
+  if (nu > 0) {
+    memset(r->Wu, 0, inputs * sizeof *r->Wu);
+    cav_dense_product(nv, nu, nv, part, r->Q, nv, Du, nv, r->Wu, nv);
+    cav_dense_product_transposed(CAV_PART_ALL, nu, n, nv, 1, Du, nv, r->W, nv, r->G, nu);
+    cav_dense_product_transposed(CAV_PART_ALL, nu, nu, nv, 1, Du, nv, r->Wu, nv, r->H, nu);
+  }
+  cav_dense_product_transposed(CAV_PART_LOWER, n, n, nv, 1, r->D, nv, r->W, nv, r->S, n);
+  // L'D, whose rows below are zero: of the lower triangle what is on the left
+  cav_dense_product_transposed(CAV_PART_LOWER, nv, nv, nv, part, r->L, nv, r->D, nv, r->S, n);
 }
 
 /// One step back, from S, G and H: K, and P of the step before without the penalty on its state. The penalty on inputs
@@ -167,17 +214,16 @@ static cav_status riccati(regulator *r) {
   memcpy(r->P, r->S, (size_t)n * (size_t)n * sizeof(double));
   if (nu > 0) {
     for (int i = 0; i < nu; i++) r->H[i * nu + i] += r->h;
-    memcpy(r->K, r->G, (size_t)nu * (size_t)n * sizeof(double));
     if (!cav_dense_factor(nu, nu - 1, r->H, nu)) return CAV_NOT_CONVERGED;
-    cav_dense_solve_lower(nu, nu - 1, r->H, nu, n, r->K, nu);
-    cav_dense_solve_upper(nu, nu - 1, r->H, nu, n, r->K, nu);
-    cav_dense_product_transposed(CAV_PART_ALL, n, n, nu, -1, r->G, nu, r->K, nu, r->P, n);
+    for (int i = 0; i < nu * nu; i++) r->unit[i] = i % (nu + 1) == 0;
+    cav_dense_solve_lower(nu, nu - 1, r->H, nu, nu, r->unit, nu);
+    cav_dense_solve_upper(nu, nu - 1, r->H, nu, nu, r->unit, nu);
+    memset(r->K, 0, (size_t)nu * n * sizeof *r->K);
+    cav_dense_product(nu, n, nu, 1, r->unit, nu, r->G, nu, r->K, nu);
+    cav_dense_product_transposed(CAV_PART_LOWER, n, n, nu, -1, r->G, nu, r->K, nu, r->P, n);
   }
-  for (int i = 0; i < n; i++)
-    for (int j = 0; j < i; j++) {
-      double mean = 0.5 * (r->P[(size_t)i * n + j] + r->P[(size_t)j * n + i]);
-      r->P[(size_t)i * n + j] = r->P[(size_t)j * n + i] = mean;
-    }
+  for (int j = 0; j < n; j++)
+    for (int i = j + 1; i < n; i++) r->P[(size_t)i * n + j] = r->P[(size_t)j * n + i];
   return CAV_OK;
 }
 
@@ -186,19 +232,20 @@ static void add_gains(const regulator *r, double *gain_q, double *gain_v) {
   int nv = r->nv;
   for (int j = 0; j < nv; j++)
     for (int a = 0; a < r->nu; a++) {
-      double q = r->K[(size_t)j * r->nu + a] / FINER, v = r->K[(size_t)(nv + j) * r->nu + a] / FINER;
+      double q = r->K[(size_t)j * r->nu + a] / r->finer, v = r->K[(size_t)(nv + j) * r->nu + a] / r->finer;
       for (int i = 0; i < nv; i++) {
-        gain_q[i * nv + j] -= r->force[(size_t)a * nv + i] * q;
-        gain_v[i * nv + j] -= r->force[(size_t)a * nv + i] * v;
+        gain_q[i * nv + j] -= force_of(r)[(size_t)a * nv + i] * q;
+        gain_v[i * nv + j] -= force_of(r)[(size_t)a * nv + i] * v;
       }
     }
 }
 
-/// S, G and H at (q, v) under all laws, from P.
+/// S, below its diagonal, G and H at (q, v) under all laws, from P.
 static cav_status add_laws(regulator *r, const cav_transcription *tr, const cav_options *law, int laws,
                            cav_state *state, const double *q, const double *v) {
   size_t n = (size_t)r->n, nu = (size_t)r->nu;
-  memset(r->S, 0, n * n * sizeof(double));
+  find_rotations(r, tr, v + r->nv);
+  carry_back(r, tr);
   memset(r->G, 0, nu * n * sizeof(double));
   memset(r->H, 0, nu * nu * sizeof(double));
   for (int i = 0; i < laws; i++) {
@@ -206,8 +253,6 @@ static cav_status add_laws(regulator *r, const cav_transcription *tr, const cav_
     state->options.order = CAV_ORDER_EULER;
     cav_status status = find_derivative(r, tr->model, state, q, v);
     if (status != CAV_OK) return status;
-    step_columns(r, tr, v + r->nv, r->derivative, r->n, 1, r->A);
-    step_columns(r, tr, v + r->nv, r->derivative + n * (size_t)r->nv, r->nu, 0, r->B);
     add_law(r, laws);
   }
   return CAV_OK;
@@ -228,7 +273,7 @@ static cav_status sweep(regulator *r, const cav_transcription *tr, const cav_tra
     if (status == CAV_OK) status = riccati(r);
     if (status != CAV_OK) break;
     add_penalty(r, r->h);
-    int t = k / FINER;
+    int t = k / r->finer;
     if (t < knots) add_gains(r, gain_q + (size_t)t * square, gain_v + (size_t)t * square);
   }
   return status;
@@ -240,16 +285,17 @@ cav_status cav_feedback(const cav_transcription *tr, const cav_trajectory *motio
   memset(gain_q, 0, n * sizeof *gain_q);
   memset(gain_v, 0, n * sizeof *gain_v);
   regulator r;
-  int ready = regulator_make(&r, tr->model);
+  int ready = regulator_make(&r, tr);
   // a cycle goes on: two strides are looked ahead
   int ahead = tr->problem->cycle.mirror == CAV_MIRROR_NONE ? 2 : 4;
   cav_trajectory *whole =
       tr->periodicity ? cav_periodicity_unroll(tr->periodicity, motion, ahead) : cav_trajectory_copy(motion);
-  cav_trajectory *fine = whole ? cav_trajectory_resample(tr->model, whole, motion->timestep / FINER) : NULL;
+  r.finer = (int)fmax(1, ceil(motion->timestep / longest - 1e-9));
+  r.h = motion->timestep / r.finer;
+  cav_trajectory *fine = whole ? cav_trajectory_resample(tr->model, whole, r.h) : NULL;
   cav_state *state = cav_state_new(tr->model), *bare = cav_state_new(tr->model);
   cav_status status = ready && fine && state && bare ? CAV_OK : CAV_NO_MEMORY;
   if (status == CAV_OK) {
-    r.h = motion->timestep / FINER;
     r.v = penalty->tracking / (tr->weight * CAV_MOMENT_ARM);
     r.q = r.v * penalty->rate * penalty->rate;
     bare->options.contact = bare->options.constraint = 0;

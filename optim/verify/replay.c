@@ -21,7 +21,8 @@ static const double far = 0.5, turned = 1;   // m, rad: a replay that has lost t
 static const double exact_tolerance = 1e-12; // relative residual asked of forward steps
 static const double poor = 1e-6;             // fraction of weight that a forward step may leave unexplained
 // s: steps that simulators take. A motion on the edge follows at one and falls at another
-static const double own_step[] = {0.002, 0.001};
+enum { OWN_STEPS = 2 };
+static const double own_step[OWN_STEPS] = {0.002, 0.001};
 
 // largest tangent component from q0 to q1
 static double apart(const cav_model *model, const double *q0, const double *q1, double *work) {
@@ -370,11 +371,16 @@ cav_status cav_replay_closed(const cav_verification *verification, const cav_opt
   return closed(verification, law, verification->h / SUBSTEPS, gain_q, gain_v, NULL, follow);
 }
 
-cav_status cav_replay_own(const cav_verification *verification, const double *gain_q, const double *gain_v,
-                          struct cav_follow *follow) {
-  for (size_t i = 0; i < sizeof own_step / sizeof *own_step; i++) {
+cav_status cav_replay_own(const cav_verification *verification, int finer, const double *gain_q, const double *gain_v,
+                          const cav_push *push, struct cav_follow *follow) {
+  return closed(verification, NULL, own_step[finer], gain_q, gain_v, push, follow);
+}
+
+cav_status cav_replay_own_worst(const cav_verification *verification, const double *gain_q, const double *gain_v,
+                                struct cav_follow *follow) {
+  for (int i = 0; i < OWN_STEPS; i++) {
     struct cav_follow now;
-    cav_status status = closed(verification, NULL, own_step[i], gain_q, gain_v, NULL, &now);
+    cav_status status = cav_replay_own(verification, i, gain_q, gain_v, NULL, &now);
     if (status != CAV_OK) return status;
     double asked = i ? fmax(now.asked, follow->asked) : now.asked;
     int lost = !!*now.lost, was = i && *follow->lost;
@@ -385,9 +391,4 @@ cav_status cav_replay_own(const cav_verification *verification, const double *ga
     if (lost) break;
   }
   return CAV_OK;
-}
-
-cav_status cav_replay_pushed(const cav_verification *verification, const double *gain_q, const double *gain_v,
-                             const cav_push *push, struct cav_follow *follow) {
-  return closed(verification, NULL, *own_step, gain_q, gain_v, push, follow);
 }

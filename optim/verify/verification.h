@@ -158,27 +158,28 @@ cav_status cav_replay_open(const cav_verification *verification, cav_replay *rep
 cav_status cav_replay_closed(const cav_verification *verification, const cav_options *law, const double *gain_q,
                              const double *gain_v, struct cav_follow *follow);
 
-/// Under the contacts of the model's file, at each of the steps that simulators take: the worst; where it is lost at
-/// one, that one.
-cav_status cav_replay_own(const cav_verification *verification, const double *gain_q, const double *gain_v,
-                          struct cav_follow *follow);
-
 /// An impulse on the centre of mass of a root link, at a fraction of the motion.
 typedef struct cav_push {
   int link;
   double fraction, impulse[3]; ///< N s, world
 } cav_push;
 
-/// Under the contacts of the model's file at the longest of those steps, with a push.
-cav_status cav_replay_pushed(const cav_verification *verification, const double *gain_q, const double *gain_v,
-                             const cav_push *push, struct cav_follow *follow);
+/// Under the contacts of the model's file at the longest of the steps that simulators take, or at the next finer one;
+/// with a push unless that is NULL.
+cav_status cav_replay_own(const cav_verification *verification, int finer, const double *gain_q, const double *gain_v,
+                          const cav_push *push, struct cav_follow *follow);
 
-/// The closed loops of a motion with its gains, for their choice: of a verification, and then two small pushes.
-enum { CAV_LOOP_OWN, CAV_LOOP_CLAIMED, CAV_LOOP_PUSHED, CAV_LOOP_PUSHED_BACK, CAV_LOOPS };
+/// The same at each of these steps, without a push: the worst; where it is lost at one, that one.
+cav_status cav_replay_own_worst(const cav_verification *verification, const double *gain_q, const double *gain_v,
+                                struct cav_follow *follow);
 
-/// Runs them in this order up to the first that is lost; returns their number in *n. Fails as cav_verify does.
-cav_status cav_closed_loops(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
-                            const double *gain_q, const double *gain_v, struct cav_follow follow[CAV_LOOPS], int *n,
-                            cav_error *error);
+/// The closed loops of a motion with its gains, for their choice: those of a verification, and then two small pushes.
+enum { CAV_LOOP_OWN, CAV_LOOP_FINE, CAV_LOOP_CLAIMED, CAV_LOOP_PUSHED, CAV_LOOP_PUSHED_BACK, CAV_LOOPS };
+
+/// Makes a motion ready for them; ended as any verification, in any case. Then runs one of them.
+cav_status cav_closed_loops_begin(cav_verification *verification, const cav_problem *problem,
+                                  const cav_trajectory *trajectory, const cav_options *contact, cav_error *error);
+cav_status cav_closed_loop(const cav_verification *verification, int loop, const double *gain_q, const double *gain_v,
+                           struct cav_follow *follow);
 
 #endif

@@ -435,7 +435,7 @@ static cav_status find_push(const cav_verification *verification, const double *
     for (int i = 0; i < 4; i++) {
       struct cav_follow follow;
       push.impulse[0] = size * way[i][0], push.impulse[1] = size * way[i][1];
-      cav_status status = cav_replay_pushed(verification, gain_q, gain_v, &push, &follow);
+      cav_status status = cav_replay_own(verification, 0, gain_q, gain_v, &push, &follow);
       if (status != CAV_OK || *follow.lost) return status;
     }
     *survived = size;
@@ -581,7 +581,7 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
   if (status == CAV_OK) status = cav_replay_steps(&verification, &replay);
   if (status == CAV_OK) status = cav_replay_open(&verification, &replay);
   if (status == CAV_OK) status = cav_replay_closed(&verification, contact, gain_q, gain_v, &replay.closed);
-  if (status == CAV_OK) status = cav_replay_own(&verification, gain_q, gain_v, &replay.own);
+  if (status == CAV_OK) status = cav_replay_own_worst(&verification, gain_q, gain_v, &replay.own);
   verdict->push_survived_n_s = NAN;
   if (status == CAV_OK && !*replay.own.lost)
     status = find_push(&verification, gain_q, gain_v, &verdict->push_survived_n_s);
@@ -616,33 +616,25 @@ cav_status cav_terms_report(const cav_problem *problem, const cav_trajectory *tr
   return status;
 }
 
-// a loop after the others
-static cav_status run_loop(const cav_verification *verification, int loop, const cav_options *contact,
-                           const double *gain_q, const double *gain_v, struct cav_follow *follow) {
-  if (loop == CAV_LOOP_OWN) return cav_replay_own(verification, gain_q, gain_v, follow);
-  if (loop == CAV_LOOP_CLAIMED) return cav_replay_closed(verification, contact, gain_q, gain_v, follow);
+cav_status cav_closed_loops_begin(cav_verification *verification, const cav_problem *problem,
+                                  const cav_trajectory *trajectory, const cav_options *contact, cav_error *error) {
+  cav_status status = cav_verification_begin(verification, problem, trajectory, contact, NULL, NULL, error);
+  int nv = status == CAV_OK ? verification->model->nv : 0;
+  for (int t = 0; t < verification->rows && status == CAV_OK; t++) {
+    const double *v = verification->v + t * nv;
+    status = cav_inverse(verification->model, verification->state, verification->q + t * verification->model->nq, v,
+                         v + nv, verification->u + t * nv);
+  }
+  return status;
+}
+
+cav_status cav_closed_loop(const cav_verification *verification, int loop, const double *gain_q, const double *gain_v,
+                           struct cav_follow *follow) {
+  if (loop == CAV_LOOP_OWN || loop == CAV_LOOP_FINE)
+    return cav_replay_own(verification, loop == CAV_LOOP_FINE, gain_q, gain_v, NULL, follow);
+  if (loop == CAV_LOOP_CLAIMED) return cav_replay_closed(verification, &verification->law, gain_q, gain_v, follow);
   // along a diagonal, so that planar motions feel it too
   double along = (loop == CAV_LOOP_PUSHED ? 1 : -1) * small_push * verification->weight * sqrt(0.5);
   const cav_push push = {pushed_link(verification), 1.0 / 3, {along, along, 0}};
-  return cav_replay_pushed(verification, gain_q, gain_v, &push, follow);
-}
-
-cav_status cav_closed_loops(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
-                            const double *gain_q, const double *gain_v, struct cav_follow follow[CAV_LOOPS], int *n,
-                            cav_error *error) {
-  cav_verification verification;
-  cav_status status = cav_verification_begin(&verification, problem, trajectory, contact, gain_q, gain_v, error);
-  int nv = status == CAV_OK ? verification.model->nv : 0;
-  for (int t = 0; t < verification.rows && status == CAV_OK; t++) {
-    const double *v = verification.v + t * nv;
-    status = cav_inverse(verification.model, verification.state, verification.q + t * verification.model->nq, v, v + nv,
-                         verification.u + t * nv);
-  }
-  *n = 0;
-  while (*n < CAV_LOOPS && status == CAV_OK && (*n == 0 || !*follow[*n - 1].lost)) {
-    status = run_loop(&verification, *n, contact, gain_q, gain_v, &follow[*n]);
-    if (status == CAV_OK) ++*n;
-  }
-  cav_verification_end(&verification);
-  return status;
+  return cav_replay_own(verification, 0, gain_q, gain_v, &push, follow);
 }
