@@ -358,6 +358,29 @@ static void check_histories(void) {
   printf("%d rollouts within their ranges\n", strict);
 }
 
+// a hinge without gravity goes d rad to a speed of w, that of one step of its torque a, in (2 v - w)/a with v² = a d + w²/2:
+// the proof by extremals holds up to a step less, no longer
+static void check_shortest(void) {
+  double h = 0.02, a = 1 / 1.000001, way = 2, w = h * a, v = sqrt(a * way + w * w / 2), time = (2 * v - w) / a - h;
+  for (int longer = 0; longer < 2; longer++) {
+    char horizon[80];
+    // a hundredth of a second and a part of a step are left
+    int steps = (int)(time / h) + (longer ? 1 : -1), n = 0;
+    snprintf(horizon, sizeof horizon, "duration='%.17g' timestep='%.17g'", h * steps, h);
+    cav_problem *p = load(
+        "<mujoco><option gravity='0 0 0'/><worldbody><body name='rod'><joint name='pivot' axis='0 1 0'/><inertial "
+        "pos='0 0 -1' mass='1' diaginertia='1e-6 1e-6 1e-6'/></body></worldbody><actuator><motor name='motor' "
+        "joint='pivot' gear='1' ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>",
+        horizon, "", CONSTRAINT("<posture name='there' joint='pivot' qpos='2' at='end'/>"));
+    if (!p) return;
+    cav_impossibility found;
+    CHECK(cav_problem_impossible(p, &found, 1, &n, NULL) == CAV_OK);
+    CHECK(n == !longer);
+    if (n) printf("%s\n", found.what);
+    cav_problem_free(p);
+  }
+}
+
 // a rod with damping d that is pumped by a torque F: I v' = 1.1 (F - d v) up to the speed of the largest power, F/2d,
 // from there on 1.1 F²/4d of power. The horizon from which on there is no proof is that time, less a step
 static void check_damped(void) {
@@ -370,8 +393,9 @@ static void check_damped(void) {
     snprintf(horizon, sizeof horizon, "duration='%.17g' timestep='.05' close='open'", 0.05 * steps);
     snprintf(up, sizeof up, CONSTRAINT("<posture name='up' joint='pivot' qpos='3.14159' at='end'/>"));
     cav_problem *p = load(
-        "<mujoco><worldbody><body name='rod'><joint name='pivot' axis='0 1 0' damping='.1'/><inertial pos='0 0 -1' "
-        "mass='1' diaginertia='1e-6 1e-6 1e-6'/></body></worldbody><actuator><motor name='motor' joint='pivot' "
+        "<mujoco><worldbody><body name='rod'><joint name='pivot' axis='0 1 0' damping='.1' "
+        "limited='true' range='-999 999'/><inertial pos='0 0 -1' mass='1' diaginertia='1e-6 1e-6 "
+        "1e-6'/></body></worldbody><actuator><motor name='motor' joint='pivot' "
         "gear='1' "
         "ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>",
         horizon, "", up);
@@ -389,6 +413,7 @@ int main(void) {
   for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) check_pair(&pairs[i]);
   check_motions();
   check_damped();
+  check_shortest();
   check_histories();
   static const char *const file[] = {"model.xml", "problem.xml"};
   for (int i = 0; i < 2; i++) {

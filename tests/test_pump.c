@@ -148,8 +148,8 @@ static void test_times(void) {
 }
 
 // from the guess to a certificate
-static void test_solved(const char *name, const char *model, double duration) {
-  cav_problem *p = problem_of(model, duration, 0.025, ""), taken;
+static void test_solved(const char *name, const char *model, double duration, const char *more) {
+  cav_problem *p = problem_of(model, duration, 0.025, more), taken;
   cav_strategy pump;
   cav_solution *s = NULL;
   cav_verdict v = {0};
@@ -165,6 +165,29 @@ static void test_solved(const char *name, const char *model, double duration) {
   }
   cav_solution_free(s);
   cav_problem_free(p);
+}
+
+// what is exact from both sides: at full effort a motion of a fifteenth of a second more than the least time is found, and
+// one of as much less proven impossible
+static void test_least_time(void) {
+  static const double limits = 0.05, step = 0.025;
+  cav_impossibility found;
+  cav_pumping pumping;
+  cav_error error = {0};
+  int n = 0;
+  cav_problem *p = problem_of(PENDULUM("3", ""), 5, step, "<limits effort='1'/>");
+  if (!p) return;
+  CHECK(cav_problem_pumping(p, &pumping) == CAV_OK && pumping.exact);
+  cav_problem_free(p);
+  double least = pumping.seconds, less = step * floor((least - limits) / step - 1);
+  printf("at full effort in %.3f s at least\n", least);
+  p = problem_of(PENDULUM("3", ""), less, step, "<limits effort='1'/>");
+  if (!p) return;
+  CHECK(cav_problem_impossible(p, &found, 1, &n, &error) == CAV_OK && n == 1);
+  if (n) CHECK(strstr(found.what, "exact for one hinge") != NULL), printf("%.3f s: %s\n", less, found.what);
+  cav_problem_free(p);
+  test_solved("pendulum in its least time", PENDULUM("3", ""), step * ceil((least + limits) / step),
+              "<limits effort='1'/>");
 }
 
 // as written and read again, and what contradicts it
@@ -193,10 +216,11 @@ int main(void) {
   test_guess(PENDULUM("3", ""), 8, 0, 3);
   test_guess(CHAIN(MOTOR("elbow", "2")), 8, 1, 2);
   test_times();
-  test_solved("pendulum", PENDULUM("3", ""), 5);
-  test_solved("acrobot", CHAIN(MOTOR("elbow", "2")), 8);
-  test_solved("pendubot", CHAIN(MOTOR("swing", "6")), 6);
-  test_solved("cart", CART("-1 1", "9"), 5);
+  test_least_time();
+  test_solved("pendulum", PENDULUM("3", ""), 5, "");
+  test_solved("acrobot", CHAIN(MOTOR("elbow", "2")), 8, "");
+  test_solved("pendubot", CHAIN(MOTOR("swing", "6")), 6, "");
+  test_solved("cart", CART("-1 1", "9"), 5, "");
   static const char *const file[] = {"model.xml", "problem.xml"};
   for (int i = 0; i < 2; i++) {
     char path[160];

@@ -297,11 +297,12 @@ typedef struct cav_strategy {
 } cav_strategy;
 
 /// What it takes to swing up: found by simulating laws that pump energy into the model, so that is enough; less may be
-/// (optim/METHOD.md, 7). Energies that bound it from below: cav_problem_impossible.
+/// (optim/METHOD.md, 7); of a model that is one hinge the least, exact. Bounds from below: cav_problem_impossible.
 typedef struct cav_pumping {
   int needed;     ///< 1: start and goal stand by themselves, nothing touches, and actuators cannot hold what is between
   double seconds; ///< in which it came near the goal with the efforts planned with; infinite: not in eight durations
   double efforts; ///< multiple of these efforts with which it came near the goal in the duration; infinite: not with 9
+  int exact;      ///< 1: less time, or less effort, is not enough
 } cav_pumping;
 
 /// Takes seconds where pumping is needed, milliseconds where it is not. CAV_NO_MEMORY, or what the dynamics says of

@@ -83,6 +83,7 @@ cav_status cav_examine_solids(cav_examination *e);         // solid.c
 cav_status cav_examine_enclosures(cav_examination *e);     // enclosure.c
 cav_status cav_examine_momentum(cav_examination *e);       // momentum.c
 cav_status cav_examine_strength(cav_examination *e);       // strength.c
+cav_status cav_examine_hinge(cav_examination *e);          // hinge.c
 cav_status cav_examine_energy(cav_examination *e);         // energy.c
 
 #endif

@@ -11,6 +11,9 @@
 /// push sets it off. None of this is known to lead to a goal: a fixed sequence of laws is simulated, the best of them
 /// are refined, and that which comes nearest, in angles and rates alike, is the guess. Contacts are left out, and a
 /// joint that leaves its range ends a simulation.
+///
+/// A model that is one hinge has shortest motions that are known (hinge.c): there a law is an extremal, found by the
+/// direction of its adjoint at the start.
 #include "pump.h"
 
 #include <assert.h>
@@ -18,12 +21,17 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "hinge.h"
 #include "math3.h"
 
 enum { GAIN, SHARPNESS, STIFFNESS, DAMPING, PUSH, PARAMETERS };
 
 /// Laws tried; those kept to be refined; refinements.
 enum { LAWS = 800, BEST = 8, REFINEMENTS = 800 };
+
+/// Parts of a step over which an extremal's torque is averaged; the last size of refinements of its direction, of the first.
+enum { SWITCHES = 8 };
+static const double last_direction = 1e-6;
 
 /// Range of each parameter, geometric. Stiffness and damping are none in the first part of theirs. PUSH in 1/frequency.
 static const double range[PARAMETERS][2] = {{1, 100}, {3, 90}, {0.05, 3}, {0.05, 1.5}, {0.3, 2.3}};
@@ -52,7 +60,9 @@ typedef struct pump {
   const cav_problem *problem;
   const cav_model *model;
   cav_state *state;
-  int steps;                      ///< of a simulation
+  int steps;    ///< of a simulation
+  int extremal; ///< 1: the model is the hinge, and laws are extremals by their first parameter
+  cav_hinge hinge;
   int soonest;                    ///< 1: what counts is when it is near, 0: how near it comes
   double efforts;                 ///< multiple of those planned with
   double goal, rise;              ///< V_goal, V_goal - V_start, J
@@ -143,7 +153,10 @@ static void measure_actuators(pump *p) {
 }
 
 static cav_status pump_measure(pump *p) {
-  cav_status status = measure_rise(p);
+  cav_options options = p->state->options;
+  cav_status status = cav_hinge_of(p->model, p->state, &p->hinge, &p->extremal);
+  p->state->options = options;
+  if (!status) status = measure_rise(p);
   if (!status) measure_actuators(p);
   return status;
 }
@@ -188,6 +201,17 @@ static void apply_law(pump *p, const law *l, const double *x, double lack, int p
   }
 }
 
+/// Torque of an extremal over the step from where the hinge is, and its adjoint after it.
+static void apply_extremal(pump *p, double adjoint[2]) {
+  double x[4] = {p->q[0], p->v[0], adjoint[0], adjoint[1]}, efforts = p->efforts * p->problem->effort_limit;
+  p->u[0] = 0;
+  for (int i = 0; i < SWITCHES; i++) {
+    p->u[0] += efforts * p->hinge.torque[x[3] > 0] / SWITCHES;
+    cav_hinge_step(&p->hinge, efforts, p->problem->timestep / SWITCHES, x);
+  }
+  adjoint[0] = x[2], adjoint[1] = x[3];
+}
+
 static int within_ranges(const pump *p) {
   for (int j = 0; j < p->model->njoint; j++) {
     const cav_joint *joint = &p->model->joint[j];
@@ -224,6 +248,7 @@ static cav_status observe(pump *p, double *distance, double *lack) {
 static cav_status simulate(pump *p, law *l, double *way) {
   const cav_model *m = p->model;
   double h = p->problem->timestep, x[PARAMETERS], distance, lack, least = INFINITY, near = near_dof * sqrt(m->nv);
+  double adjoint[2] = {cos(2 * M_PI * l->x[0]), sin(2 * M_PI * l->x[0])};
   for (int i = 0; i < PARAMETERS; i++) x[i] = parameter(l, i);
   memcpy(p->q, p->problem->q_start, (size_t)m->nq * sizeof *p->q);
   memcpy(p->v, p->problem->v_start, (size_t)m->nv * sizeof *p->v);
@@ -235,7 +260,10 @@ static cav_status simulate(pump *p, law *l, double *way) {
     if (way) memcpy(way + (size_t)t * (size_t)m->nq, p->q, (size_t)m->nq * sizeof *way);
     if (distance < least) least = distance, l->knot = t;
     if (p->soonest && sqrt(distance) < near) break;
-    apply_law(p, l, x, lack, t * h < x[PUSH] / p->rate);
+    if (p->extremal)
+      apply_extremal(p, adjoint);
+    else
+      apply_law(p, l, x, lack, t * h < x[PUSH] / p->rate);
     status = cav_forward(m, p->state, p->q, p->v, p->u, p->next);
     if (status == CAV_NO_MEMORY) return status;
     if (status) break;
@@ -256,6 +284,16 @@ static double evenly(int i, int dimension) {
   static const double root = 1.1347241384015194;
   assert(PARAMETERS == 5);
   return fmod(0.5 + (i + 1) * pow(1 / root, dimension + 1), 1);
+}
+
+/// The same of extremals: directions evenly around, then nearer and nearer to the best.
+static law proposed_extremal(int i, const law best[BEST]) {
+  law l = {.x = {(double)i / LAWS}};
+  if (i < LAWS) return l;
+  int number = i - LAWS;
+  l = best[number % BEST];
+  l.x[0] += pow(last_direction, (double)number / REFINEMENTS) * (2 * evenly(number, 0) - 1) / LAWS;
+  return l;
 }
 
 /// The law to try as number i, where the best are known.
@@ -279,7 +317,7 @@ static cav_status search(pump *p, law *found) {
   law best[BEST];
   for (int k = 0; k < BEST; k++) best[k] = (law){.score = INFINITY};
   for (int i = 0; i < LAWS + REFINEMENTS; i++) {
-    law l = proposal(i, best);
+    law l = p->extremal ? proposed_extremal(i, best) : proposal(i, best);
     cav_status status = simulate(p, &l, NULL);
     if (status) return status;
     // a law takes the place of the worst one, a refinement that of what it refines
@@ -408,12 +446,33 @@ cav_status cav_pump_needed(const cav_problem *problem, int *needed) {
   return status;
 }
 
+/// The same of one hinge, exactly: to the goal within the usual tolerance, at a rate that would take it away in a radian
+/// of a small swing.
+static void tell_extremal(const pump *p, cav_pumping *pumping) {
+  const cav_problem *problem = p->problem;
+  double goal = problem->q_goal[0], off = CAV_WITHIN_ANGLE;
+  double rate = off * sqrt(hypot(p->hinge.gravity[0], p->hinge.gravity[1]) / p->hinge.inertia);
+  const double start[2] = {problem->q_start[0], problem->v_start[0]};
+  const double low[2] = {goal - off, -rate}, high[2] = {goal + off, rate};
+  double planned = problem->effort_limit, time = problem->duration;
+  cav_hinge weak = p->hinge;
+  weak.torque[0] *= planned, weak.torque[1] *= planned;
+  pumping->exact = 1;
+  pumping->seconds = cav_hinge_time(&weak, 1, start, low, high, MOST_TIMES * time);
+  pumping->efforts = pumping->seconds <= time ? 1 : cav_hinge_efforts(&weak, start, low, high, time);
+}
+
 cav_status cav_problem_pumping(const cav_problem *problem, cav_pumping *pumping) {
   pump p;
   law best;
   *pumping = (cav_pumping){.seconds = INFINITY, .efforts = INFINITY};
   cav_status status = is_covered(problem) ? examine(problem, &p, &pumping->needed) : CAV_OK;
   if (status || !is_covered(problem)) return status;
+  if (p.extremal && pumping->needed) {
+    tell_extremal(&p, pumping);
+    pump_close(&p);
+    return CAV_OK;
+  }
   int steps = p.steps;
   p.soonest = 1;
   if (pumping->needed) {

@@ -22,21 +22,27 @@ int cav_command_pumping(const cav_problem *p, char text[CAV_PUMPING_TEXT]) {
   if (cav_problem_pumping(p, &pumping) || !pumping.needed) return 1;
   double seconds = pumping.seconds, efforts = pumping.efforts, suggested = ceil(11 * seconds) / 10;
   if (isfinite(seconds))
-    snprintf(time, sizeof time, "takes %.3g s, of %.3g s given", seconds, p->duration);
+    snprintf(time, sizeof time, "takes %s%.3g s, of %.3g s given", pumping.exact ? "at least " : "", seconds,
+             p->duration);
   else
     snprintf(time, sizeof time, "does not come there in %.3g s", 8 * p->duration);
   if (efforts > 1 && isfinite(efforts))
-    snprintf(effort, sizeof effort, "; with %.3g times the effort it would do", efforts);
+    snprintf(effort, sizeof effort,
+             pumping.exact ? "; it needs %.3g times the effort" : "; with %.3g times the effort it would do", efforts);
   else
     snprintf(effort, sizeof effort, "%s", efforts > 1 ? "; nor would 9 times the effort do" : "");
   int n =
       snprintf(text, CAV_PUMPING_TEXT,
-               "actuators are too weak to go there directly, so energy has to be pumped in: by simulated laws, at the "
-               "efforts planned with (%.3g of the limits), that %s%s.",
-               p->effort_limit, time, effort);
-  if (isfinite(seconds) && seconds > p->duration)
-    snprintf(text + n, CAV_PUMPING_TEXT - (size_t)n, " Try <horizon duration=\"%.3g\"/>%s", suggested,
-             p->effort_limit < 1 && efforts * p->effort_limit <= 1 ? " or <limits effort=\"1\"/>." : ".");
+               "actuators are too weak to go there directly, so energy has to be pumped in: %sat the efforts planned "
+               "with (%.3g of the limits), that %s%s.",
+               pumping.exact ? "" : "by simulated laws, ", p->effort_limit, time, effort);
+  double effort_limit = ceil(102 * efforts * p->effort_limit) / 100;
+  if (!isfinite(seconds) || seconds <= p->duration) return 0;
+  n += snprintf(text + n, CAV_PUMPING_TEXT - (size_t)n, " Try <horizon duration=\"%.3g\"/>", suggested);
+  if (effort_limit <= 1)
+    snprintf(text + n, CAV_PUMPING_TEXT - (size_t)n, " or <limits effort=\"%.3g\"/>.", effort_limit);
+  else
+    snprintf(text + n, CAV_PUMPING_TEXT - (size_t)n, ".");
   return 0;
 }
 
