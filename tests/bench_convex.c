@@ -49,7 +49,7 @@ static void make_mesh(solid *s) {
     if (form == 4) set3(x, cos(i % 6 * M_PI / 3), sin(i % 6 * M_PI / 3), i < 6 ? -1 : 1);
     for (int k = 0; k < 3; k++) point[3 * i + k] = s->size[k] * x[k];
   }
-  if (cav_hull_build(point, n, &s->hull) != CAV_OK) exit(EXIT_FAILURE);
+  if (cav_hull_build(point, n, 0, &s->hull) != CAV_OK) exit(EXIT_FAILURE);
   s->mesh = cav_hull_mesh(&s->hull);
   s->shape.mesh = &s->mesh;
 }

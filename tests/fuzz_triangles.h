@@ -17,7 +17,7 @@ static inline void fuzz_triangles(fuzz_mesh_reader read, const uint8_t *data, si
     cav_hull hull;
     cav_mesh_bulk(&mesh, 0);
     // numbers whose differences are not finite have no hull
-    status = cav_hull_build(mesh.vertex, mesh.nvertex, &hull);
+    status = cav_hull_build(mesh.vertex, mesh.nvertex, 0, &hull);
     fuzz_require(status == CAV_OK || status == CAV_BAD_INPUT || status == CAV_NOT_SUPPORTED);
     cav_hull_clear(&hull);
   }

@@ -13,7 +13,7 @@ int main(int argc, char **argv) {
     for (int k = 0; k < count; k++) {
       int n = hull_set(kind, point);
       cav_hull h;
-      cav_status status = cav_hull_build(point, n, &h);
+      cav_status status = cav_hull_build(point, n, 0, &h);
       refused += status == CAV_NOT_SUPPORTED;
 #ifdef CAVORT_HAVE_QHULL
       CHECK(status == CAV_OK);

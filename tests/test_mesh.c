@@ -30,7 +30,7 @@ static void random_place(cav_shape *s) {
 }
 
 static void make_mesh(solid *s, const double *point, int n) {
-  CHECK(cav_hull_build(point, n, &s->hull) == CAV_OK);
+  CHECK(cav_hull_build(point, n, 0, &s->hull) == CAV_OK);
   s->mesh = cav_hull_mesh(&s->hull);
   s->shape.type = CAV_GEOM_MESH;
   s->shape.mesh = &s->mesh;
@@ -431,7 +431,7 @@ static void test_damage(void) {
       cav_hull h;
       read++;
       cav_mesh_bulk(&t, 0);
-      CHECK(cav_hull_build(t.vertex, t.nvertex, &h) == CAV_OK);
+      CHECK(cav_hull_build(t.vertex, t.nvertex, 0, &h) == CAV_OK);
       cav_hull_clear(&h);
     }
     cav_triangles_clear(&t);

@@ -29,6 +29,8 @@
   compiler                                                                                                   \
       "<asset><mesh name='b' vertex='-1 -2 -3 1 -2 -3 -1 2 -3 1 2 -3 -1 -2 3 1 -2 3 -1 2 3 1 2 3'/></asset>" \
       "<worldbody><body><freejoint/><geom mesh='b' type=" type "/></body></worldbody>"
+// four corners of a volume of 5, and a fifth point a little outside of it
+#define TETRAHEDRON "<asset><mesh name='t' vertex='-3 0 0 3 0 0 0 2.5 0 0 0 2 0 -.1 -.1'/></asset>"
 #define SHELL(shape) "<worldbody><body><freejoint/><geom shellinertia='true' " shape "/></body></worldbody>"
 
 typedef struct expected {
@@ -159,6 +161,21 @@ static const feature features[] = {
     {"mesh of a class",
      "<default><mesh inertia='exact' maxhullvert='20'/></default>" L_MESH(""),
      {{"mass", 1, 768}},
+     0,
+     0},
+    {"hull of four vertices",
+     "<default><mesh maxhullvert='4'/></default>" TETRAHEDRON
+     "<worldbody><body><freejoint/><geom type='mesh' mesh='t'/>"
+     "</body></worldbody>",
+     {{"mass", 1, 5000}},
+     20,
+     0},
+    {"mesh that only a pair lets touch",
+     TETRAHEDRON
+     "<default><geom contype='0' conaffinity='0'/></default><worldbody><geom name='floor' type='plane' "
+     "size='1 1 1'/><body><freejoint/>" MASS "<geom name='t' type='mesh' mesh='t' mass='0'/><geom type='mesh' "
+     "mesh='t' mass='0'/></body></worldbody><contact><pair geom1='floor' geom2='t' margin='.07'/></contact>",
+     {{"pair margin", 0, .07}, {"warnings", 0, 1}},
      0,
      0},
     {"box fitted",

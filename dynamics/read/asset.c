@@ -47,7 +47,8 @@ static const char *name_of(cav_spec *spec, const cav_xml_node *node, const char 
 
 // --- asking ---
 
-void cav_read_mesh(cav_spec *spec, const cav_xml_node *node, const double scale[3], cav_mesh_inertia inertia) {
+void cav_read_mesh(cav_spec *spec, const cav_xml_node *node, const double scale[3], cav_mesh_inertia inertia,
+                   int hull_vertices) {
   cav_spec_mesh *m = CAV_SPEC_PUSH(spec, &spec->mesh);
   if (!m) return;
   *m = (cav_spec_mesh){.node = node, .refquat = {1, 0, 0, 0}, .index = -1};
@@ -57,6 +58,9 @@ void cav_read_mesh(cav_spec *spec, const cav_xml_node *node, const double scale[
   m->name = cav_xml_text(node, "name", NULL);
   if (!m->name) m->name = file ? name_of(spec, node, file) : "";
   m->inertia = (cav_mesh_inertia)cav_xml_word(node, "inertia", (int)inertia);
+  m->hull_vertices = cav_xml_int(node, "maxhullvert", hull_vertices);
+  if (m->hull_vertices < 4 && m->hull_vertices != -1)
+    cav_spec_fail(spec, node, "maxhullvert", "expected -1 (all) or at least 4, got %d", m->hull_vertices);
   if (cav_xml_get(node, "builtin")) {
     m->builtin = 1;
     return;
@@ -199,7 +203,7 @@ static void weigh_mesh(cav_spec *spec, cav_spec_mesh *m, cav_triangles *t) {
 }
 
 static void build_hull(cav_spec *spec, cav_spec_mesh *m, const cav_triangles *t) {
-  cav_status status = cav_hull_build(t->vertex, t->nvertex, &m->hull);
+  cav_status status = cav_hull_build(t->vertex, t->nvertex, m->hull_vertices, &m->hull);
   if (status == CAV_NO_MEMORY)
     cav_spec_no_memory(spec);
   else if (status == CAV_NOT_SUPPORTED)

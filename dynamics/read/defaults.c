@@ -218,7 +218,7 @@ static const cav_softness soft = {{0.02, 1}, {0.9, 0.95, 0.001, 0.5, 2}};
 
 // the defaults of MJCF itself
 cav_mjcf_class cav_mjcf_first_class(void) {
-  cav_mjcf_class d = {.name = "main"};
+  cav_mjcf_class d = {.name = "main", .hull_vertices = -1};
   d.joint = (cav_spec_joint){
       .type = CAV_JOINT_HINGE, .axis = {0, 0, 1}, .limited = CAV_LIMITED_AUTO, .effort = CAV_LIMITED_AUTO};
   d.joint.limit = d.joint.friction = soft;
@@ -273,6 +273,7 @@ static void read_default_values(cav_mjcf_reader *r, const cav_xml_node *node, ca
   else if (!strcmp(name, "mesh")) {
     cav_xml_reals(node, "scale", d->scale, 3);
     d->inertia = (cav_mesh_inertia)cav_xml_word(node, "inertia", (int)d->inertia);
+    d->hull_vertices = cav_xml_int(node, "maxhullvert", d->hull_vertices);
   } else if (!strcmp(name, "material"))
     cav_xml_reals(node, "rgba", d->rgba, 4);
   else if (cav_xml_accepts(node, "ctrlrange"))
@@ -349,7 +350,7 @@ void cav_mjcf_read_assets(cav_mjcf_reader *r, const cav_xml_node *node) {
   for (const cav_xml_node *c = node->child; c; c = c->next) {
     if (node_is(c, "mesh")) {
       const cav_mjcf_class *class = cav_mjcf_class_of(r, c, NULL);
-      cav_read_mesh(r->spec, c, class->scale, class->inertia);
+      cav_read_mesh(r->spec, c, class->scale, class->inertia, class->hull_vertices);
     }
     if (node_is(c, "hfield")) cav_read_hfield(r->spec, c);
     if (!node_is(c, "material")) continue;

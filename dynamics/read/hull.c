@@ -7,6 +7,7 @@
 /// has the measurements against the quickhull that was here.
 #include "hull.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 
 #include "direction.h"
@@ -144,9 +145,10 @@ static cav_status read_facets(builder *b, qhT *qh) {
   return CAV_OK;
 }
 
-// triangles of the hull of points that are not flat
-static cav_status triangulate(builder *b) {
-  char command[] = "qhull Qt", *said = NULL;
+// triangles of the hull of points that are not flat; Qhull begins with four of them and adds the outermost one
+static cav_status triangulate(builder *b, int most) {
+  char command[40] = "qhull Qt", *said = NULL;
+  if (most >= 4) snprintf(command, sizeof command, "qhull Qt TA%d", most - 4);
   size_t length;
   double *moved = malloc(sizeof *moved * 3 * (size_t)b->n);
   // Qhull wants a file for what it has to say: one that nobody reads
@@ -171,8 +173,8 @@ static cav_status triangulate(builder *b) {
 }
 #else
 
-static cav_status triangulate(builder *b) {
-  (void)b;
+static cav_status triangulate(builder *b, int most) {
+  (void)b, (void)most;
   return CAV_NOT_SUPPORTED;
 }
 #endif
@@ -463,14 +465,14 @@ static void index_summits(cav_hull *h) {
   }
 }
 
-cav_status cav_hull_build(const double *point, int n, cav_hull *hull) {
+cav_status cav_hull_build(const double *point, int n, int most, cav_hull *hull) {
   builder b = {.point = point, .n = n};
   int v[4];
   *hull = (cav_hull){.nvertex = 0};
   int count = n > 0 ? extremes(&b, v) : 0;
   cav_status status;
   if (count == 4) {
-    status = isfinite(b.size) ? triangulate(&b) : CAV_BAD_INPUT;
+    status = isfinite(b.size) ? triangulate(&b, most) : CAV_BAD_INPUT;
     if (status == CAV_OK) status = finish(&b, hull);
   } else if (count == 3) {
     status = finish_polygon(&b, v, hull);

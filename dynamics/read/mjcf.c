@@ -74,6 +74,19 @@ static void read_colour(cav_mjcf_reader *r, cav_spec_geom *g) {
   if (!memcmp(g->rgba, plain, sizeof plain)) memcpy(g->rgba, r->materials.at[i].rgba, sizeof g->rgba);
 }
 
+// whether a pair, a distance, a sensor or a tendon names that geom
+static int is_referred(const cav_xml_node *node, const char *name) {
+  static const char *const attributes[] = {"geom", "geom1", "geom2", "objname", "refname"};
+  for (int i = 0; i < node->nvalue; i++) {
+    if (strcmp(node->value[i].text, name)) continue;
+    for (size_t k = 0; k < sizeof attributes / sizeof *attributes; k++)
+      if (!strcmp(node->value[i].rule->name, attributes[k])) return 1;
+  }
+  for (const cav_xml_node *c = node->child; c; c = c->next)
+    if (is_referred(c, name)) return 1;
+  return 0;
+}
+
 // the mesh or height field that a geom names; 0 where it is left out because it is only seen
 static int find_asset(cav_mjcf_reader *r, cav_spec_geom *g) {
   cav_spec *spec = r->spec;
@@ -95,6 +108,7 @@ static int find_asset(cav_mjcf_reader *r, cav_spec_geom *g) {
     cav_spec_unknown(spec, g->node, kind, kind, name, spec->hfield.at, spec->hfield.n, sizeof *spec->hfield.at);
   g->weighs = cav_geom_weighs(spec, g);
   if (g->contype || g->conaffinity || g->weighs || spec->load.visual) return g->asset >= 0;
+  if (*g->name && is_referred(cav_xml_root(spec->xml), g->name)) return g->asset >= 0;
   cav_spec_leave(spec, g->node, NULL, "left out: it can neither touch nor weigh, and is only seen");
   return 0;
 }

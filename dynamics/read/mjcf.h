@@ -17,6 +17,7 @@ typedef struct cav_mjcf_class {
   double rgba[4];  ///< of a material
   double scale[3]; ///< of a mesh
   cav_mesh_inertia inertia;
+  int hull_vertices; ///< at most, of a mesh; below 4: all
 } cav_mjcf_class;
 
 typedef struct cav_mjcf_material {

@@ -228,7 +228,7 @@ static const cav_xml_element option = {"option", 0, 0, option_attributes, option
   SKIP("texture"), SKIP("texrepeat"), SKIP("texuniform"), SKIP("emission"), SKIP("specular"), SKIP("shininess"), \
       SKIP("reflectance"), SKIP("metallic"), SKIP("roughness"), REALS("rgba", 4, 4)
 static const cav_xml_element *const material_children[] = {&layer, &include, NULL};
-LEAF(default_mesh, "mesh", REALS("scale", 3, 3), SKIP("maxhullvert"), WORD("inertia", mesh_inertias));
+LEAF(default_mesh, "mesh", REALS("scale", 3, 3), INT("maxhullvert"), WORD("inertia", mesh_inertias));
 static const cav_xml_attribute default_material_attributes[] = {MATERIAL, END};
 static const cav_xml_element default_material = {"material", 0, 0, default_material_attributes, material_children, 0};
 LEAF(default_joint, "joint", JOINT);
@@ -296,7 +296,7 @@ static const cav_xml_attribute mesh_attributes[] = {NAMED("name"),
                                                     SKIP("normal"),
                                                     SKIP("texcoord"),
                                                     SKIP("smoothnormal"),
-                                                    SKIP("maxhullvert"),
+                                                    INT("maxhullvert"),
                                                     WORD("inertia", mesh_inertias),
                                                     TEXT("builtin"),
                                                     SKIP("params"),

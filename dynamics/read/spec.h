@@ -76,6 +76,7 @@ typedef struct cav_spec_mesh {
   const cav_xml_value *vertex, *face;
   double scale[3], refpos[3], refquat[4];
   cav_mesh_inertia inertia;
+  int hull_vertices; ///< at most; below 4: all
   int builtin, loaded;
   int index;                              ///< in the model; -1: no geom uses it
   double volume, moment[3];               ///< moments of inertia of density 1
@@ -346,7 +347,8 @@ void cav_mjcf_default_joint(cav_spec_joint *joint);
 void cav_mjcf_default_geom(cav_spec_geom *geom);
 
 /// Mesh and hfield elements of MJCF into the lists of a spec; a mesh by path and scale, once: its index. asset.c.
-void cav_read_mesh(cav_spec *spec, const cav_xml_node *node, const double scale[3], cav_mesh_inertia inertia);
+void cav_read_mesh(cav_spec *spec, const cav_xml_node *node, const double scale[3], cav_mesh_inertia inertia,
+                   int hull_vertices);
 void cav_read_hfield(cav_spec *spec, const cav_xml_node *node);
 int cav_add_mesh(cav_spec *spec, const cav_xml_node *node, const char *path, const double scale[3]);
 
