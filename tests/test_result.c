@@ -6,6 +6,7 @@
 
 #include "certificate.h"
 #include "check.h"
+#include "csv.h"
 
 static char top[] = "/tmp/cavort-result-XXXXXX";
 static char folder[128], model_path[128], problem_path[128];
@@ -127,6 +128,38 @@ static void check_forces(const cav_problem *problem, const cav_solution *solutio
   CHECK(forces && forces->nforce == 20 && isnan(forces->unactuated[5]) && isnan(forces->u[5 * 6]));
   cav_forces_free(forces);
   cav_forces_free(NULL);
+}
+
+// a servo and a motor without a name that hold 2 kg, 1 m from their hinges, by the closed form
+static void test_controls(void) {
+  static const char text[] =
+      "<mujoco><worldbody><body><joint name='a' axis='0 1 0'/><inertial mass='2' pos='1 0 0' "
+      "diaginertia='1 1 1'/></body><body><joint name='b' axis='0 1 0'/><inertial mass='2' "
+      "pos='1 0 0' diaginertia='1 1 1'/></body></worldbody><actuator><position name='servo' "
+      "joint='a' kp='100' gear='2'/><motor joint='b' gear='-4'/></actuator></mujoco>";
+  char path[160];
+  snprintf(path, sizeof path, "%s/controls.csv", top);
+  write_file(model_path, text);
+  cav_model *model = cav_model_load(model_path, NULL);
+  cav_trajectory *motion = model ? cav_trajectory_new(model, 3, .02) : NULL;
+  if (!CHECK(motion != NULL)) return;
+  for (int t = 0; t < 3; t++) motion->q[2 * t] = 0.5;
+  cav_options contact = model->options;
+  cav_forces *forces = cav_forces_new(model, motion, &contact, 0, NULL);
+  CHECK(forces && cav_controls_write(path, model, motion, forces, NULL) == CAV_OK);
+  cav_table *table = cav_table_read(path, NULL);
+  if (CHECK(table && table->nrow == 2 && table->ncol == 5)) {
+    CHECK_TEXT(table->name[1], "ctrl_servo");
+    CHECK_TEXT(table->name[4], "force_#1");
+    double hold = -2 * 9.81 * cos(0.5) / 2;
+    const double expected[5] = {0.02, hold / 100 + 2 * 0.5, 2 * 9.81 / 4, hold, 2 * 9.81 / 4};
+    CHECK_NEAR_ALL(table->value + 5, expected, 5, 1e-12);
+  }
+  cav_table_free(table);
+  cav_forces_free(forces);
+  cav_trajectory_free(motion);
+  cav_model_free(model);
+  remove(path);
 }
 
 static void check_verdict(const cav_problem *problem) {
@@ -275,6 +308,7 @@ int main(void) {
   snprintf(folder, sizeof folder, "%s/some/where", top);
   snprintf(model_path, sizeof model_path, "%s/box.xml", top);
   snprintf(problem_path, sizeof problem_path, "%s/rest.xml", top);
+  test_controls();
   write_file(model_path, model_text);
   write_file(problem_path, problem_text);
   cav_error error = {0};

@@ -170,7 +170,7 @@ has nameless.result/verdict.json
 run 0 solve problem.xml
 says out "certified: swing on pendulum"
 says err "continuation"
-for name in trajectory.csv forces.csv gains.csv log.csv stages.csv problem.xml strategies.csv verdict.json view.html; do has "swing.result/$name"; done
+for name in trajectory.csv forces.csv controls.csv gains.csv log.csv stages.csv problem.xml strategies.csv verdict.json view.html; do has "swing.result/$name"; done
 sum() { sha256sum "$1" | cut -d' ' -f1; }
 says swing.result/verdict.json "\"problem_sha256\": \"$(sum problem.xml)\", \"model_sha256\": \"$(sum model.xml)\""
 says swing.result/verdict.json 'cavort solve problem.xml"'

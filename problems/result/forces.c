@@ -17,6 +17,7 @@ void cav_forces_free(cav_forces *forces) {
   free(forces->force);
   free(forces->u);
   free(forces->control);
+  free(forces->input);
   free(forces->unactuated);
   free(forces->com);
   free(forces->depth);
@@ -32,10 +33,11 @@ static cav_forces *make(const cav_model *model, int nknot) {
   f->count = calloc(n, sizeof *f->count);
   f->u = calloc(n * (size_t)model->nv + 1, sizeof *f->u);
   f->control = calloc(n * (size_t)model->nu + 1, sizeof *f->control);
+  f->input = calloc(n * (size_t)model->nu + 1, sizeof *f->input);
   f->unactuated = calloc(n, sizeof *f->unactuated);
   f->com = calloc(3 * n, sizeof *f->com);
   f->depth = calloc(n, sizeof *f->depth);
-  if (f->count && f->u && f->control && f->unactuated && f->com && f->depth) return f;
+  if (f->count && f->u && f->control && f->input && f->unactuated && f->com && f->depth) return f;
   cav_forces_free(f);
   return NULL;
 }
@@ -72,6 +74,8 @@ static cav_status note_knot(cav_forces *f, const cav_model *model, cav_state *st
   cav_status status = cav_inverse(model, state, trajectory->q + t * model->nq, trajectory->v + t * model->nv, next, u);
   if (status) return status;
   cav_actuation(model, state, u, residual, f->control + t * model->nu);
+  cav_actuation_inputs(model, state, trajectory->v + t * model->nv, f->control + t * model->nu,
+                       f->input + t * model->nu);
   for (int d = 0; d < model->nv; d++) f->unactuated[t] = fmax(f->unactuated[t], fabs(residual[d]));
   return note_contacts(f, model, state, t, least) ? CAV_OK : CAV_NO_MEMORY;
 }
@@ -94,7 +98,7 @@ cav_forces *cav_forces_new(const cav_model *model, const cav_trajectory *traject
     } else {
       status = cav_position(model, state, trajectory->q + t * model->nq);
       for (int d = 0; d < nv; d++) f->u[t * nv + d] = NAN;
-      for (int a = 0; a < model->nu; a++) f->control[t * model->nu + a] = NAN;
+      for (int a = 0; a < model->nu; a++) f->control[t * model->nu + a] = f->input[t * model->nu + a] = NAN;
       f->unactuated[t] = NAN;
     }
     if (!status) cav_momentum(model, state, trajectory->v + t * nv, f->com + 3 * t, NULL, NULL);
@@ -137,6 +141,43 @@ cav_status cav_forces_write(const char *path, const cav_model *model, const cav_
     for (int k = 0; k < 7; k++) {
       fputc(',', out);
       cav_table_write_number(out, value[k]);
+    }
+    fputc('\n', out);
+  }
+  return cav_file_end(&file, error);
+}
+
+// a column of an actuator, by its number where it has no name
+static void write_column(FILE *out, const cav_model *model, const char *what, int actuator) {
+  char name[300];
+  const char *own = model->actuator[actuator].name;
+  if (*own)
+    snprintf(name, sizeof name, "%s_%.256s", what, own);
+  else
+    snprintf(name, sizeof name, "%s_#%d", what, actuator);
+  fputc(',', out);
+  cav_table_write_text(out, name);
+}
+
+cav_status cav_controls_write(const char *path, const cav_model *model, const cav_trajectory *trajectory,
+                              const cav_forces *forces, cav_error *error) {
+  cav_file file;
+  cav_status status = cav_file_begin(&file, path, error);
+  if (status) return status;
+  FILE *out = file.stream;
+  fputs("time", out);
+  for (int a = 0; a < model->nu; a++)
+    write_column(out, model, model->actuator[a].activation == CAV_ACTIVATION_NONE ? "ctrl" : "act", a);
+  for (int a = 0; a < model->nu; a++) write_column(out, model, "force", a);
+  fputc('\n', out);
+  // the last knot of a motion that goes on after it has no forces
+  for (int t = 0; t < forces->nknot && (model->nv == 0 || isfinite(forces->u[t * model->nv])); t++) {
+    cav_table_write_number(out, t * trajectory->timestep);
+    for (int k = 0; k < 2 * model->nu; k++) {
+      int a = t * model->nu + k % model->nu;
+      fputc(',', out);
+      cav_table_write_number(
+          out, k < model->nu ? forces->input[a] : model->actuator[k % model->nu].unit * forces->control[a]);
     }
     fputc('\n', out);
   }

@@ -19,7 +19,8 @@ typedef struct cav_forces {
   int *count;               ///< [nknot] loaded contacts at each knot
   cav_contact_force *force; ///< [nforce] in the order of the knots
   double *u;                ///< [nknot*nv]; rows without a force are NaN
-  double *control;          ///< [nknot*nu] least-norm controls; NaN likewise
+  double *control;          ///< [nknot*nu] least-norm efforts; NaN likewise
+  double *input;            ///< [nknot*nu] controls, or activations, that give them; NaN likewise
   double *unactuated;       ///< [nknot] largest force that no actuator can give, N or N m; NaN likewise
   double *com;              ///< [nknot*3] centre of mass of all that moves, m
   double *depth;            ///< [nknot] deepest penetration of a contact, m
@@ -35,5 +36,10 @@ void cav_forces_free(cav_forces *forces);
 /// atomically.
 cav_status cav_forces_write(const char *path, const cav_model *model, const cav_trajectory *trajectory,
                             const cav_forces *forces, cav_error *error);
+
+/// Writes controls.csv: time, then of every actuator its control (ctrl_NAME; of one that has an activation that, act_NAME)
+/// and its force before the gear (force_NAME), at the knots that have forces. Replaces atomically.
+cav_status cav_controls_write(const char *path, const cav_model *model, const cav_trajectory *trajectory,
+                              const cav_forces *forces, cav_error *error);
 
 #endif

@@ -238,7 +238,9 @@ cav_status cav_result_write_page(const char *folder, const cav_problem *problem,
   cav_forces *forces = cav_forces_new(problem->model, trajectory, contact, at_rest, error);
   if (!forces) return error->status;
   char *table = cav_result_path(folder, "forces.csv"), *page = cav_result_path(folder, "view.html");
-  cav_status status = table && page ? CAV_OK : no_memory(error);
+  char *controls = cav_result_path(folder, "controls.csv");
+  cav_status status = table && page && controls ? CAV_OK : no_memory(error);
+  if (!status) status = cav_controls_write(controls, problem->model, trajectory, forces, error);
   if (!status) status = cav_forces_write(table, problem->model, trajectory, forces, error);
   if (!status && problem->cycle.on) {
     status = write_strides(page, problem, trajectory, contact, verdict, error);
@@ -247,6 +249,7 @@ cav_status cav_result_write_page(const char *folder, const cav_problem *problem,
   }
   free(table);
   free(page);
+  free(controls);
   cav_forces_free(forces);
   return status;
 }
