@@ -23,6 +23,15 @@
 #define LEG "<joint name='right hip' axis='.2 -1 .1' limited='true' range='-40 30'/>"
 #define HIP "<motor joint='right hip' gear='20' ctrllimited='true' ctrlrange='-.5 1'/>"
 
+/// Two legs half a metre apart on a trunk whose centre of mass is off the middle.
+#define TILTED(Y)                                                                                                  \
+  "<mujoco><worldbody><geom name='floor' type='plane' size='1 1 1'/><body name='trunk' pos='0 0 .5'>"              \
+  "<freejoint name='root'/><inertial pos='.02 " Y                                                                  \
+  " 0' mass='3' diaginertia='.2 .2 .2'/>"                                                                          \
+  "<body name='left leg' pos='0 .25 0'><joint name='left hip' axis='0 1 0'/><inertial pos='0 0 -.2' mass='.5' "    \
+  "diaginertia='.01 .01 .01'/></body><body name='right leg' pos='0 -.25 0'><joint name='right hip' axis='0 1 0'/>" \
+  "<inertial pos='0 0 -.2' mass='.5' diaginertia='.01 .01 .01'/></body></body></worldbody></mujoco>"
+
 /// A torso that stays upright on a leg of two links with a round foot, in the x-z plane.
 static const char hopper[] =
     "<mujoco model='hopper'><compiler angle='degree'/><worldbody><geom name='floor' type='plane' size='1 1 1'/>"
@@ -110,7 +119,7 @@ static void test_refusals(void) {
   const cav_cycle paired = {.mirror = CAV_MIRROR_Y, .npair = 1, .pair = pair};
   refuse(SIDED("<joint name='right hip' axis='.2 -1 .3' limited='true' range='-40 30'/>", HIP), mirror,
          "axes of joint");
-  refuse(SIDED("<joint name='right hip' axis='.2 -1 .1' pos='0 .01 0' limited='true' range='-40 30'/>", HIP), mirror,
+  refuse(SIDED("<joint name='right hip' axis='.2 -1 .1' pos='0 .05 0' limited='true' range='-40 30'/>", HIP), mirror,
          "anchors of joint 'left hip'");
   refuse(SIDED("<joint name='right hip' axis='.2 -1 .1'/>", HIP), mirror, "ranges of joint");
   refuse(SIDED("<joint name='right hipp' axis='.2 -1 .1' limited='true' range='-40 30'/>", ""), mirror,
@@ -132,6 +141,34 @@ static void test_refusals(void) {
   // a spring on one side is seen by the forces
   refuse(SIDED("<joint name='right hip' axis='.2 -1 .1' limited='true' range='-40 30' stiffness='2'/>", HIP), mirror,
          "own mirror image");
+}
+
+/// A trunk whose mass is off the middle by 2 mm, as robots are, is 4 mm from its image; one off by 10 mm has none.
+static void test_asymmetry(void) {
+  double length = -1, force = -1;
+  cav_model *m = scene_load(SIDED(LEG, HIP));
+  if (!CHECK(m != NULL)) return;
+  cav_problem p = with_cycle(m, (cav_cycle){.mirror = CAV_MIRROR_Y});
+  cav_periodicity *periodicity = cav_periodicity_new(&p, NULL);
+  if (CHECK(periodicity != NULL)) cav_periodicity_asymmetry(periodicity, &length, &force);
+  CHECK(length == 0 && force == 0);
+  cav_periodicity_free(periodicity);
+  cav_model_free(m);
+  for (int k = 0; k < 2; k++) {
+    m = scene_load(k ? TILTED(".01") : TILTED(".002"));
+    if (!CHECK(m != NULL)) return;
+    p = with_cycle(m, (cav_cycle){.mirror = CAV_MIRROR_Y});
+    cav_error error = {0};
+    periodicity = cav_periodicity_new(&p, &error);
+    if (k) CHECK(!periodicity && strstr(error.text, "masses of body 'trunk'") != NULL);
+    if (!k && CHECK(periodicity != NULL)) {
+      cav_periodicity_asymmetry(periodicity, &length, &force);
+      CHECK_NEAR(length, 0.004, 1e-9);
+      CHECK(force > 1e-4 && force < 0.05);
+    }
+    cav_periodicity_free(periodicity);
+    cav_model_free(m);
+  }
 }
 
 /// Where ranges differ, what both allow holds: -30 40 and the mirror of -35 20 degrees, which is -20 35.
@@ -312,6 +349,7 @@ int main(void) {
   if (CHECK(m != NULL)) test_map(m, (cav_cycle){.translation = {1, 0, 0}, .mirror = CAV_MIRROR_Y});
   cav_model_free(m);
   test_refusals();
+  test_asymmetry();
   test_ranges();
   test_files();
   test_hop();

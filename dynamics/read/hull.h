@@ -17,9 +17,9 @@ typedef struct cav_hull {
 } cav_hull;
 
 /// Hull of points [n*3], finite. Points of no volume give a polygon with two faces, a segment or a single point without
-/// any. Of a solid at most that many vertices, the outermost first; below 4: all. Faces that differ from a plane by less than 1e-6 of the size are one. CAV_OK, CAV_NO_MEMORY,
-/// CAV_NOT_SUPPORTED in a build without Qhull, where only flat sets have one, or CAV_BAD_INPUT if Qhull finds none.
-/// hull.c.
+/// any. Of a solid at most that many vertices, the outermost first; below 4: all. Faces that differ from a plane by less
+/// than 1e-6 of the size are one. CAV_OK, CAV_NO_MEMORY, CAV_NOT_SUPPORTED in a build without Qhull, where only flat sets
+/// have one, or CAV_BAD_INPUT if Qhull finds none. hull.c.
 cav_status cav_hull_build(const double *point, int n, int most, cav_hull *hull);
 void cav_hull_clear(cav_hull *hull);
 

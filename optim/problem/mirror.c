@@ -3,7 +3,8 @@
 /// and right, l and r, FL and FR); all others stand for themselves. With M the reflection, at the configuration of the
 /// file q0: anchors go to M p, axes of slides to M a, axes of hinges, which are pseudovectors, to -M a; the signs that
 /// are left over are those of the coordinates. A rotation away from q0 is conjugated by N = R0' M R0_image, which is
-/// improper; -N is what is kept. Checked here: geometry and masses, each with a name in the complaint. What no one can
+/// improper; -N is what is kept. Checked here: geometry and masses, each with a name in the complaint; real robots are
+/// symmetric to some millimetres, so what is off by little is passed and measured. What no one can
 /// list (contacts, springs, tendons) periodicity.c checks by the forces themselves; ranges may differ, and what both
 /// allow holds.
 #include <ctype.h>
@@ -15,7 +16,19 @@
 #include "file.h"
 #include "periodicity.h"
 
-static const double near = 1e-6; // m, rad, or relative: files carry few digits
+// how far a robot may be from its image: lengths by its extent, axes (1 degree), masses, moments of inertia
+static const double least = 0.01, axis_least = 1.5e-4, mass_least = 0.02, moment_least = 0.1;
+static const double near = 1e-6; // m or relative: files carry few digits
+
+/// A model beside its image.
+typedef struct comparison {
+  const cav_model *model;
+  const cav_state *state;
+  int axis;
+  double length;    ///< m, the most that may be between a point and its image
+  double asymmetry; ///< the largest so far, as a length
+  cav_error *error;
+} comparison;
 
 // ---------------------------------------------------------------- names
 
@@ -111,6 +124,12 @@ static double apart(const double *a, const double *b) {
   return sqrt(dot_product(d, d));
 }
 
+// a length between a thing and its image counts as asymmetry
+static int is_near(comparison *c, double length) {
+  c->asymmetry = fmax(c->asymmetry, length);
+  return length <= c->length;
+}
+
 /// Unit quaternion of a proper rotation matrix, row-major.
 static void to_quaternion(const double *R, double *q) {
   double trace = R[0] + R[4] + R[8];
@@ -137,8 +156,11 @@ static cav_status unlike(const cav_model *m, int j, int other, const char *what,
 }
 
 /// Fills the image of one joint and checks that it is one.
-static cav_status fit_joint(const cav_model *m, const cav_state *state, int axis, int j, cav_image *image,
-                            cav_error *error) {
+static cav_status fit_joint(comparison *c, int j, cav_image *image) {
+  const cav_model *m = c->model;
+  const cav_state *state = c->state;
+  cav_error *error = c->error;
+  int axis = c->axis;
   int other = image->joint;
   const cav_joint *a = &m->joint[j], *b = &m->joint[other];
   const cav_pose *A = &state->link[a->link], *B = &state->link[b->link];
@@ -157,7 +179,7 @@ static cav_status fit_joint(const cav_model *m, const cav_state *state, int axis
     rotate(A->rotation, a->axis, along), rotate(B->rotation, b->axis, along_b);
     reflect(axis, along, image_axis);
     double s = dot_product(image_axis, along_b) * (a->type == CAV_JOINT_HINGE ? -1 : 1);
-    if (fabs(fabs(s) - 1) > near) return unlike(m, j, other, "the axes", error);
+    if (fabs(fabs(s) - 1) > axis_least) return unlike(m, j, other, "the axes", error);
     image->sign = s > 0 ? 1 : -1;
     // a hinge may sit anywhere on its axis, a slide anywhere
     double off = dot_product(mirrored, along_b) - dot_product(at_b, along_b);
@@ -166,14 +188,15 @@ static cav_status fit_joint(const cav_model *m, const cav_state *state, int axis
     // -N = -R_a' M R_b
     double N[9];
     for (int r = 0; r < 3; r++)
-      for (int c = 0; c < 3; c++) {
+      for (int i = 0; i < 3; i++) {
         double sum = 0;
-        for (int k = 0; k < 3; k++) sum += A->rotation[3 * k + r] * (k == axis ? -1 : 1) * B->rotation[3 * k + c];
-        N[3 * r + c] = -sum;
+        for (int k = 0; k < 3; k++) sum += A->rotation[3 * k + r] * (k == axis ? -1 : 1) * B->rotation[3 * k + i];
+        N[3 * r + i] = -sum;
       }
     to_quaternion(N, image->rotation);
   }
-  if (a->type != CAV_JOINT_SLIDE && apart(mirrored, at_b) > near) return unlike(m, j, other, "the anchors", error);
+  if (a->type != CAV_JOINT_SLIDE && !is_near(c, apart(mirrored, at_b)))
+    return unlike(m, j, other, "the anchors", error);
   if (a->limited != b->limited) return unlike(m, j, other, "the ranges", error);
   return CAV_OK;
 }
@@ -181,19 +204,25 @@ static cav_status fit_joint(const cav_model *m, const cav_state *state, int axis
 static const char *body_of(const cav_model *m, int link) { return m->body[m->link[link].body].name; }
 
 /// Masses of a link and its image, and where they are.
-static cav_status fit_link(const cav_model *m, const cav_state *state, int axis, int l, int other, cav_error *error) {
+static cav_status fit_link(comparison *c, int l, int other) {
+  const cav_model *m = c->model;
+  const cav_state *state = c->state;
+  int axis = c->axis;
   const double *I = state->inertia + 6 * l, *J = state->inertia + 6 * other;
   static const int first[] = {0, 1, 2, 0, 0, 1}, second[] = {0, 1, 2, 1, 2, 2};
   double com[3], scale = I[0] + I[1] + I[2];
   reflect(axis, state->com + 3 * l, com);
-  int same = fabs(m->link[l].mass - m->link[other].mass) <= near * (1 + m->link[l].mass) &&
-             (m->link[l].mass == 0 || apart(com, state->com + 3 * other) <= near);
+  double heavier = fabs(m->link[l].mass - m->link[other].mass) / (m->link[l].mass + near), turned = 0;
+  int same = m->link[l].mass == 0 || is_near(c, apart(com, state->com + 3 * other));
   for (int k = 0; k < 6; k++) {
     int flips = (first[k] == axis) != (second[k] == axis);
-    same = same && fabs((flips ? -I[k] : I[k]) - J[k]) <= near * (scale + near);
+    turned = fmax(turned, fabs((flips ? -I[k] : I[k]) - J[k]) / (scale + near));
   }
+  // masses that differ are a point that is off by that fraction of the extent, say
+  same = same && heavier <= mass_least && turned <= moment_least;
+  c->asymmetry = fmax(c->asymmetry, fmax(heavier, turned) * c->length);
   if (same) return CAV_OK;
-  return cav_file_fail(error, CAV_BAD_INPUT, 0,
+  return cav_file_fail(c->error, CAV_BAD_INPUT, 0,
                        "the model is not its own mirror image: the masses of body '%.60s' and of its counterpart "
                        "'%.60s' differ",
                        body_of(m, l), body_of(m, other));
@@ -206,33 +235,46 @@ static int touches(const cav_model *m, int g) {
 }
 
 /// Every geom that may touch has one like it on the image of its link.
-static cav_status fit_geoms(const cav_model *m, const cav_state *state, int axis, const int *link, cav_error *error) {
+static cav_status fit_geoms(comparison *c, const int *link) {
+  const cav_model *m = c->model;
+  const cav_state *state = c->state;
   for (int g = 0; g < m->ngeom; g++) {
     const cav_geom *a = &m->geom[g];
     if (a->link == 0 || !touches(m, g)) continue;
     cav_pose at, there;
     double mirrored[3];
     cav_object_pose(m, state, CAV_OBJECT_GEOM, g, &at);
-    reflect(axis, at.pos, mirrored);
-    int found = 0;
-    for (int i = 0; i < m->ngeom && !found; i++) {
+    reflect(c->axis, at.pos, mirrored);
+    double best = INFINITY;
+    for (int i = 0; i < m->ngeom; i++) {
       const cav_geom *b = &m->geom[i];
       if (b->link != link[a->link] || b->type != a->type || !touches(m, i)) continue;
       cav_object_pose(m, state, CAV_OBJECT_GEOM, i, &there);
-      found = apart(mirrored, there.pos) <= near;
-      for (int k = 0; k < 3; k++) found = found && fabs(a->size[k] - b->size[k]) <= near;
+      double off = apart(mirrored, there.pos);
+      for (int k = 0; k < 3; k++) off = fmax(off, fabs(a->size[k] - b->size[k]));
+      best = fmin(best, off);
     }
-    if (!found)
+    if (!(best <= c->length))
       return cav_file_fail(
-          error, CAV_BAD_INPUT, 0,
+          c->error, CAV_BAD_INPUT, 0,
           "the model is not its own mirror image: geom %d ('%.60s') of body '%.60s' has no counterpart on "
           "'%.60s'",
           g, a->name, body_of(m, a->link), body_of(m, link[a->link]));
+    is_near(c, best);
   }
   return CAV_OK;
 }
 
-cav_status cav_mirror_find(const cav_problem *problem, int axis, cav_image *image, int *link, cav_error *error) {
+// the largest distance between centres of mass of what moves
+static double extent(const cav_model *m, const cav_state *state) {
+  double most = 0;
+  for (int i = 1; i < m->nlink; i++)
+    for (int k = 1; k < i; k++) most = fmax(most, apart(state->com + 3 * i, state->com + 3 * k));
+  return most;
+}
+
+cav_status cav_mirror_find(const cav_problem *problem, int axis, cav_image *image, int *link, double *asymmetry,
+                           cav_error *error) {
   const cav_model *m = problem->model;
   cav_status status = pair_joints(problem, image, error);
   if (status != CAV_OK) return status;
@@ -240,10 +282,13 @@ cav_status cav_mirror_find(const cav_problem *problem, int axis, cav_image *imag
   if (!state) return cav_file_fail(error, CAV_NO_MEMORY, 0, "not enough memory for the mirror image of this model");
   status = cav_position(m, state, m->q0);
   if (status != CAV_OK) cav_file_fail(error, status, 0, "the model's own configuration cannot be evaluated");
-  for (int j = 0; j < m->njoint && status == CAV_OK; j++) status = fit_joint(m, state, axis, j, &image[j], error);
+  comparison c = {.model = m, .state = state, .axis = axis, .error = error};
+  if (status == CAV_OK) c.length = least * extent(m, state) + near;
+  for (int j = 0; j < m->njoint && status == CAV_OK; j++) status = fit_joint(&c, j, &image[j]);
   for (int l = 0; l < m->nlink; l++) link[l] = l == 0 ? 0 : m->joint[image[m->link[l].joint].joint].link;
-  for (int l = 1; l < m->nlink && status == CAV_OK; l++) status = fit_link(m, state, axis, l, link[l], error);
-  if (status == CAV_OK) status = fit_geoms(m, state, axis, link, error);
+  for (int l = 1; l < m->nlink && status == CAV_OK; l++) status = fit_link(&c, l, link[l]);
+  if (status == CAV_OK) status = fit_geoms(&c, link);
+  *asymmetry = c.asymmetry > near ? c.asymmetry : 0;
   cav_state_free(state);
   return status;
 }

@@ -15,6 +15,7 @@
 
 static const double near = 1e-6;       // m and fractions: what files leave open
 static const double alike = 1e-6;      // fraction of the largest force by which two images may differ
+static const double likeness = 0.05;   // the same of a model that is its image but for some millimetres
 static const double golden = 0.618034; // states are drawn by its multiples
 static const double inside = 0.02;     // rad or m from a limit, where it does not act
 enum { STATES = 3 };
@@ -25,6 +26,8 @@ struct cav_periodicity {
   double rotation[4]; ///< the rotation alone, as a quaternion
   double centre[3], shift[3];
   int mirror;        ///< 1: images are not the identity
+  double asymmetry;  ///< m, of the model beside its mirror image
+  double forces;     ///< fraction of the largest by which forces of images differ
   cav_image *image;  ///< [njoint]
   double *along;     ///< [njoint] what the shift adds to slides
   int *link;         ///< [nlink]
@@ -299,12 +302,14 @@ static void clip(const cav_periodicity *w, double *q) {
 }
 
 /// The forces of images are images of forces.
-static cav_status fit_forces(const cav_periodicity *w, const cav_problem *problem, cav_state *state, double *work,
+static cav_status fit_forces(cav_periodicity *w, const cav_problem *problem, cav_state *state, double *work,
                              cav_error *error) {
   const cav_model *m = w->model;
   int nv = m->nv, count = 0;
   double *q = work, *moved = q + m->nq, *v = moved + m->nq, *next = v + nv, *u = next + nv, *pv = u + nv, *pn = pv + nv,
          *pu = pn + nv, *found = pu + nv;
+  // millimetres are much to a contact: geoms have been compared
+  if (w->asymmetry > 0) state->options.contact = 0;
   for (int s = 0; s < STATES; s++) {
     for (int d = 0; d < nv; d++) v[d] = 0.3 * number_draw(&count);
     cav_integrate(m, problem->q_start, v, s ? 1 : 0.05, q);
@@ -323,7 +328,8 @@ static cav_status fit_forces(const cav_periodicity *w, const cav_problem *proble
       largest = fmax(largest, fabs(pu[d]));
       if (fabs(pu[d] - found[d]) > worst) worst = fabs(pu[d] - found[d]), where = d;
     }
-    if (worst <= alike * largest) continue;
+    if (w->asymmetry > 0) w->forces = fmax(w->forces, worst / largest);
+    if (worst <= (w->asymmetry > 0 ? likeness : alike) * largest) continue;
     return cav_file_fail(error, CAV_BAD_INPUT, 0,
                          "the dynamics are not the same a period on: the force on joint '%.60s' differs by %.2g of the "
                          "largest; %s",
@@ -398,7 +404,8 @@ cav_periodicity *cav_periodicity_new(const cav_problem *problem, cav_error *erro
   for (int j = 0; j < m->njoint; j++) w->image[j] = (cav_image){.joint = j, .sign = 1, .rotation = {1, 0, 0, 0}};
   for (int l = 0; l < m->nlink; l++) w->link[l] = l;
   if (w->mirror)
-    status = cav_mirror_find(problem, problem->cycle.mirror == CAV_MIRROR_X ? 0 : 1, w->image, w->link, error);
+    status = cav_mirror_find(problem, problem->cycle.mirror == CAV_MIRROR_X ? 0 : 1, w->image, w->link, &w->asymmetry,
+                             error);
   if (status == CAV_OK) list_entries(w);
   if (status == CAV_OK) status = cav_position(m, state, m->q0);
   if (status == CAV_OK) status = fit_shift(w, state, error);
@@ -411,6 +418,11 @@ end:
   if (status == CAV_OK) return w;
   cav_periodicity_free(w);
   return NULL;
+}
+
+void cav_periodicity_asymmetry(const cav_periodicity *periodicity, double *length, double *force) {
+  *length = periodicity->asymmetry;
+  *force = periodicity->forces;
 }
 
 void cav_periodicity_free(cav_periodicity *periodicity) {

@@ -13,6 +13,10 @@ typedef struct cav_periodicity cav_periodicity;
 cav_periodicity *cav_periodicity_new(const cav_problem *problem, cav_error *error);
 void cav_periodicity_free(cav_periodicity *periodicity);
 
+/// How far points of the model are from those of its mirror image, m, and by which fraction of the largest force those
+/// of images differ; both 0 where the model is symmetric.
+void cav_periodicity_asymmetry(const cav_periodicity *periodicity, double *length, double *force);
+
 /// Configuration [nq] one period on (way 1) or back (way -1); out may not be q.
 void cav_periodicity_configuration(const cav_periodicity *periodicity, int way, const double *q, double *out);
 
@@ -46,8 +50,10 @@ typedef struct cav_image {
 } cav_image;
 
 /// Fills image [njoint] and link [nlink] for a reflection of axis (0 x, 1 y) through the origin: counterparts by
-/// declared pairs, else by name (left and right), else a joint is its own; checked at q0. CAV_BAD_INPUT with the first
-/// mismatch.
-cav_status cav_mirror_find(const cav_problem *problem, int axis, cav_image *image, int *link, cav_error *error);
+/// declared pairs, else by name (left and right), else a joint is its own; checked at q0. asymmetry: how far points of the
+/// model are from their images, m; 0 below what files leave open. CAV_BAD_INPUT with the first mismatch that is more than
+/// a hundredth of the model's extent.
+cav_status cav_mirror_find(const cav_problem *problem, int axis, cav_image *image, int *link, double *asymmetry,
+                           cav_error *error);
 
 #endif

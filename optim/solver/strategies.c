@@ -133,7 +133,8 @@ static cav_status gait(const cav_problem *problem, cav_strategy *strategy) {
   cav_status status = w.state && w.image && w.carries && link ? CAV_OK : CAV_NO_MEMORY;
   // a model that is not its own mirror image has no gait of this kind
   cav_error unlike;
-  cav_status mirrored = status == CAV_OK ? cav_mirror_find(problem, w.side, w.image, link, &unlike) : status;
+  double asymmetry;
+  cav_status mirrored = status == CAV_OK ? cav_mirror_find(problem, w.side, w.image, link, &asymmetry, &unlike) : status;
   if (mirrored == CAV_NO_MEMORY) status = mirrored;
   if (mirrored == CAV_OK) status = find_support(&w);
   if (mirrored == CAV_OK && status == CAV_OK) find_gait(&w, travel[along], strategy);

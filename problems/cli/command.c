@@ -1,5 +1,6 @@
 /// What several commands do: read a model or a problem, warn, tell an error and the exit status that goes with it.
 #include "command.h"
+#include "periodicity.h"
 
 #include <math.h>
 #include <string.h>
@@ -69,10 +70,24 @@ void cav_command_warn_efforts(const cav_model *model, FILE *out) {
   if (!n) return;
   fprintf(out, "cavort: WARNING: %s (",
           n == model->nu ? "no actuator has a limit of effort" : "some actuators have no limit of effort");
-  fprintf(out,
-          "%d of %d, the first is '%.60s'): a plan may take any force of %s; give a forcerange, the joint an "
-          "actuatorfrcrange, or a motor a ctrlrange\n",
-          n, model->nu, model->actuator[first].name, n == 1 ? "it" : "them");
+  fprintf(
+      out,
+      "%d of %d, the first is number %d, '%.60s'): a plan may take any force of %s; give a forcerange, the joint an "
+      "actuatorfrcrange, or a motor a ctrlrange\n",
+      n, model->nu, first, model->actuator[first].name, n == 1 ? "it" : "them");
+}
+
+void cav_command_tell_asymmetry(const cav_problem *problem, FILE *out) {
+  double length = 0, force = 0;
+  cav_periodicity *periodicity =
+      problem->cycle.on && problem->cycle.mirror != CAV_MIRROR_NONE ? cav_periodicity_new(problem, NULL) : NULL;
+  if (periodicity) cav_periodicity_asymmetry(periodicity, &length, &force);
+  cav_periodicity_free(periodicity);
+  if (length > 0)
+    fprintf(out,
+            "cavort: the model is its own mirror image but for %.2g mm and %.2g %% of its largest force: the mirrored "
+            "half stride is off by as much, and feedback makes it up\n",
+            1e3 * length, 1e2 * force);
 }
 
 void cav_command_version(void) { cav_provenance_print_build(stdout); }

@@ -83,6 +83,9 @@ int cav_command_refuse(const cav_command_line *line, const cav_problem *problem)
 /// Where actuators have no limit of effort, so that a plan may use any force of them: tells it. command.c.
 void cav_command_warn_efforts(const cav_model *model, FILE *out);
 
+/// Tells how far the model of a mirrored cycle is from its mirror image, where it is not that.
+void cav_command_tell_asymmetry(const cav_problem *problem, FILE *out);
+
 /// Prints a topic of cavort help; 0 if there is none of that name. topics.c.
 int cav_topic_print(const char *name);
 

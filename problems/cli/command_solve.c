@@ -354,6 +354,7 @@ int cav_command_solve(const cav_command_line *line) {
   for (int i = 0; i < problem->model->nwarning && !line->quiet; i++)
     fprintf(stderr, "cavort: %s\n", problem->model->warning[i]);
   cav_command_warn_efforts(problem->model, stderr);
+  cav_command_tell_asymmetry(problem, stderr);
   char *folder = folder_of(line, problem);
   int done;
   if (folder) {

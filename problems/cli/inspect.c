@@ -389,6 +389,7 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
            p->cycle.mirror == CAV_MIRROR_X   ? ", mirrored along x"
            : p->cycle.mirror == CAV_MIRROR_Y ? ", mirrored along y"
                                              : "");
+  cav_command_tell_asymmetry(p, stdout);
   cav_status status = print_posture(p, "start", p->q_start, error);
   if (!status) status = print_posture(p, "goal", p->q_goal, error);
   if (status) return status;
