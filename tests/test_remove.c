@@ -64,6 +64,28 @@ static void check_left(void) {
   cav_problem_free(p);
 }
 
+// geoms without names by their number in a body, of the file: the world's first and the cart's both; and their labels
+static void check_numbered(void) {
+  cav_error error = {0};
+  char label[CAV_GEOM_LABEL];
+  cav_problem *p = load("<remove body='cart' geom='1'/>", &error);
+  if (CHECK(p != NULL)) {
+    const cav_model *m = p->model;
+    CHECK(m->ngeom == 6 && cav_object_find(m, CAV_OBJECT_GEOM, "cart") < 0);
+    CHECK_TEXT(cav_geom_label(m, 2, label), "geom 2 of cart");
+    CHECK(m->geom[2].size[0] == 0.05);
+    CHECK_TEXT(cav_geom_label(m, 1, label), "wall");
+  }
+  cav_problem_free(p);
+  p = load(
+      "<remove body='cart' geom='1'/><remove body='cart' geom='2'/><remove body='world' geom='1'/>"
+      "<remove body='cart' geom='2'/>",
+      &error);
+  CHECK(p && p->model->ngeom == 4 && cav_object_find(p->model, CAV_OBJECT_GEOM, "floor") < 0);
+  CHECK(p && p->model->nu == 4);
+  cav_problem_free(p);
+}
+
 static void refuse(const char *scene, int line, const char *says) {
   cav_error error = {0};
   cav_problem *p = load(scene, &error);
@@ -84,6 +106,9 @@ int main(void) {
   refuse("\n<remove geom='ball'/>", 4, "no geom of that name");
   refuse("<remove/>", 3, "body and geom");
   refuse("<remove body='ball' geom='wall'/>", 3, "body and geom");
+  refuse("<remove body='ball' geom='0'/>", 3, "from 1");
+  refuse("\n<remove body='cart' geom='3'/>", 4, "no geom number 3");
+  check_numbered();
   refuse("<remove body='ball'/><remove geom='skin'/>", 3, "no geom of that name");
   return check_result();
 }

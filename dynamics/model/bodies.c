@@ -354,6 +354,7 @@ static void fill_geoms(cav_builder *b) {
                     .type = (cav_geom_type)s->type,
                     .body = s->body,
                     .link = b->link_of[s->body],
+                    .number = s->number,
                     .contype = s->contype,
                     .conaffinity = s->conaffinity,
                     .condim = s->condim,

@@ -1,5 +1,6 @@
 /// Loading, freeing and searching models; names of statuses; the version.
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -74,6 +75,17 @@ int cav_object_find(const cav_model *model, cav_object_type type, const char *na
   size_t stride;
   const char *const *names = cav_object_names(model, type, &n, &stride);
   return cav_name_find(names, n, stride, name);
+}
+
+const char *cav_geom_label(const cav_model *model, int geom, char label[CAV_GEOM_LABEL]) {
+  const cav_geom *g = &model->geom[geom];
+  if (*g->name) return g->name;
+  const char *body = model->body[g->body].name;
+  if (*body)
+    snprintf(label, CAV_GEOM_LABEL, "geom %d of %.48s", g->number, body);
+  else
+    snprintf(label, CAV_GEOM_LABEL, "geom %d of body %d", g->number, g->body);
+  return label;
 }
 
 const char *cav_object_name(const cav_model *model, cav_object_type type, int object) {

@@ -130,6 +130,7 @@ static void read_geom(cav_mjcf_reader *r, const cav_xml_node *node, const place 
   g->name = cav_xml_text(node, "name", "");
   g->node = node;
   g->body = at->body;
+  g->number = node->number ? node->number : ++spec->body.at[at->body].geoms;
   if (!find_asset(r, g)) {
     spec->geom.n--;
     return;

@@ -113,25 +113,87 @@ static int remove_referring(omission *o, cav_xml_node *root) {
   return found;
 }
 
+/// Counts the geoms of each body, in the order of the file: what is removed leaves the others their numbers.
+static void number_geoms(cav_xml_node *node, int *count) {
+  for (cav_xml_node *c = node->child; c; c = c->next) {
+    int inner = 0;
+    if (is(c, "geom")) c->number = ++*count;
+    number_geoms(c, is(c, "body") ? &inner : count);
+  }
+}
+
+/// The geom of that number in a body; bodies inside it are others.
+static cav_xml_node *find_number(cav_xml_node *body, long number) {
+  for (cav_xml_node *c = body->child; c; c = c->next) {
+    if (is(c, "geom") && c->number == number) return c;
+    cav_xml_node *below = is(c, "body") ? NULL : find_number(c, number);
+    if (below) return below;
+  }
+  return NULL;
+}
+
+/// What a <remove> names, NULL with the reason in error.
+static cav_xml_node *find_named(cav_xml *xml, const cav_xml_node *remove, cav_error *error) {
+  const char *body = cav_xml_text(remove, "body", NULL), *geom = cav_xml_text(remove, "geom", NULL);
+  const char *kind = body ? "body" : "geom", *name = body ? body : geom;
+  char *end = NULL;
+  long number = body && geom ? strtol(geom, &end, 10) : 0;
+  if ((!body && !geom) || (end && (*end || end == geom || number < 1))) {
+    cav_xml_fail(error, remove, NULL,
+                 "expected one of the attributes body and geom, or a body and the number of a geom in it, from 1");
+    return NULL;
+  }
+  cav_xml_node *found = NULL;
+  for (cav_xml_node *c = ((cav_xml_node *)cav_xml_root(xml))->child; c && !found; c = c->next)
+    if (is(c, "worldbody")) found = body && !strcmp(body, "world") && number ? c : find(c, kind, name);
+  if (!found)
+    cav_xml_fail(error, remove, kind, "the file '%s' has no %s of that name, got '%.200s'", cav_xml_path(xml), kind,
+                 name);
+  if (!found || !number) return found;
+  found = find_number(found, number);
+  if (!found)
+    cav_xml_fail(error, remove, "geom", "the body '%.100s' has no geom number %ld in that file", body, number);
+  return found;
+}
+
+static int has_number(const cav_xml_node *remove) { return cav_xml_get(remove, "body") && cav_xml_get(remove, "geom"); }
+
 cav_status cav_xml_remove(cav_xml *xml, const cav_xml_node *scene, cav_error *error) {
   // the tree is ours alone until it has been read
   cav_xml_node *root = (cav_xml_node *)cav_xml_root(xml);
+  const cav_xml_node *first = cav_xml_child(scene, &cav_remove_element);
   omission o = {0};
   cav_status status = CAV_OK;
-  for (const cav_xml_node *leave = cav_xml_child(scene, &cav_remove_element); leave; leave = cav_xml_next(leave)) {
-    const char *body = cav_xml_text(leave, "body", NULL), *geom = cav_xml_text(leave, "geom", NULL);
-    const char *kind = body ? "body" : "geom", *name = body ? body : geom;
-    if (!body == !geom) status = cav_xml_fail(error, leave, NULL, "expected one of the attributes body and geom");
-    cav_xml_node *found = NULL;
-    for (cav_xml_node *c = root->child; c && status == CAV_OK && !found; c = c->next)
-      if (is(c, "worldbody")) found = find(c, kind, name);
-    if (status == CAV_OK && !found)
-      status = cav_xml_fail(error, leave, kind, "the file '%s' has no %s of that name, got '%.200s'", cav_xml_path(xml),
-                            kind, name);
-    if (status != CAV_OK) break;
+  int n = 0, k = 0;
+  for (const cav_xml_node *r = first; r; r = cav_xml_next(r)) n++;
+  cav_xml_node **numbered = calloc((size_t)n + 1, sizeof(cav_xml_node *));
+  if (!numbered) return cav_xml_fail_as(error, CAV_NO_MEMORY, scene, NULL, "not enough memory");
+  int count = 0;
+  for (cav_xml_node *c = root->child; c; c = c->next)
+    if (is(c, "worldbody")) number_geoms(c, &count);
+  // found before anything goes
+  for (const cav_xml_node *r = first; r && status == CAV_OK; r = cav_xml_next(r)) {
+    if (has_number(r) && !(numbered[k++] = find_named(xml, r, error))) status = CAV_BAD_INPUT;
+  }
+  for (const cav_xml_node *r = first; r && status == CAV_OK; r = cav_xml_next(r)) {
+    if (has_number(r)) continue;
+    cav_xml_node *found = find_named(xml, r, error);
+    if (!found) {
+      status = CAV_BAD_INPUT;
+      break;
+    }
     lose_all(&o, found);
     unlink_node(found);
   }
+  for (int i = 0; i < k && status == CAV_OK; i++) {
+    // the same number twice is gone once
+    int again = 0;
+    for (int j = 0; j < i; j++) again |= numbered[j] == numbered[i];
+    if (again) continue;
+    lose_all(&o, numbered[i]);
+    unlink_node(numbered[i]);
+  }
+  free(numbered);
   while (status == CAV_OK && o.n > 0 && remove_referring(&o, root)) continue;
   if (o.failed) status = cav_xml_fail_as(error, CAV_NO_MEMORY, scene, NULL, "not enough memory");
   free(o.item);

@@ -25,6 +25,7 @@ typedef struct cav_spec_body {
   double pos[3], quat[4];
   int joint, njoint, geom, ngeom;
   double gravcomp;
+  int geoms;        ///< elements so far, those left out too
   int has_inertial; ///< the file gives inertia explicitly
   double full[6];   ///< fullinertia where has_full: xx yy zz xy xz yz
   int has_full;
@@ -50,6 +51,7 @@ typedef struct cav_spec_joint {
 typedef struct cav_spec_geom {
   const char *name;
   const cav_xml_node *node;
+  int number; ///< in its body, from 1
   int body, type;
   double pos[3], quat[4], size[3], fromto[6];
   int has_fromto;

@@ -340,6 +340,7 @@ static void read_geom(reader *r, const cav_xml_node *node, int body) {
   g.name = cav_xml_text(node, "name", "");
   g.node = node;
   g.body = body;
+  g.number = ++spec->body.at[body].geoms;
   read_origin(node, g.pos, g.quat);
   read_colour(cav_xml_root(spec->xml), node, g.rgba);
   if (seen_only) {

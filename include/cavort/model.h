@@ -250,6 +250,7 @@ typedef struct cav_geom {
   const char *name;
   cav_geom_type type;
   int body, link;
+  int number;    ///< in its body, from 1, in the order of the file and with those that are left out
   double pos[3]; ///< in the link frame
   double quat[4];
   double rotation[9]; ///< of quat, row-major
@@ -575,6 +576,10 @@ CAV_API void cav_model_free(cav_model *model);
 CAV_API cav_status cav_model_perturb(cav_model *model, const double *mass_scale, double friction);
 
 /// Index of the object of that kind and name, -1 if there is none. CAV_OBJECT_BODY and _XBODY both look up bodies.
+/// Name of a geom, or where it has none "geom 2 of BODY", by its number in its body, written into label.
+enum { CAV_GEOM_LABEL = 96 };
+CAV_API const char *cav_geom_label(const cav_model *model, int geom, char label[CAV_GEOM_LABEL]);
+
 CAV_API int cav_object_find(const cav_model *model, cav_object_type type, const char *name);
 
 /// Name, length and needs of a type of sensor; type < CAV_SENSOR_TYPES.

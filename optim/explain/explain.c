@@ -211,10 +211,6 @@ static const char *body_name(const cav_model *m, int body, char buffer[48]) {
   return body == 0 ? "the world" : or_number(m->body[body].name, "body", body, buffer);
 }
 
-static const char *geom_name(const cav_model *m, int geom, char buffer[48]) {
-  return or_number(m->geom[geom].name, "geom", geom, buffer);
-}
-
 /// A dof as "joint, what of it, of body".
 static void tell_dof(const cav_model *m, int d, char *out, size_t size) {
   static const char *const along[] = {"x", "y", "z", "turn about x", "turn about y", "turn about z"};
@@ -240,12 +236,12 @@ static const char *term_name(const cav_problem *p, int k) {
 
 /// What a sensor looks at: kind and name; "" where it is not of a body.
 static void tell_sensor(const cav_model *m, const cav_sensor *s, char *out, size_t size) {
-  char buffer[48];
+  char buffer[CAV_GEOM_LABEL];
   int i = s->object;
   *out = 0;
   if (s->object_type == CAV_OBJECT_BODY || s->object_type == CAV_OBJECT_XBODY)
     snprintf(out, size, " of body '%.60s'", body_name(m, i, buffer));
-  if (s->object_type == CAV_OBJECT_GEOM) snprintf(out, size, " of geom '%.60s'", geom_name(m, i, buffer));
+  if (s->object_type == CAV_OBJECT_GEOM) snprintf(out, size, " of geom '%.60s'", cav_geom_label(m, i, buffer));
   if (s->object_type == CAV_OBJECT_SITE)
     snprintf(out, size, " of site '%.60s'", or_number(m->site[i].name, "site", i, buffer));
   if (s->object_type == CAV_OBJECT_JOINT)
@@ -274,7 +270,7 @@ static void tell_term(const cav_problem *p, const cav_binding *row, char *out, s
 /// What a row is about, without its numbers.
 static void tell_subject(const inquiry *in, const cav_binding *row, char *out, size_t size) {
   const cav_model *m = in->model;
-  char a[48], b[48], dof[160];
+  char a[CAV_GEOM_LABEL], b[CAV_GEOM_LABEL], dof[160];
   switch (row->kind) {
     case CAV_BINDING_UNACTUATED:
       tell_dof(m, row->object, dof, sizeof dof);
@@ -302,8 +298,8 @@ static void tell_subject(const inquiry *in, const cav_binding *row, char *out, s
     case CAV_BINDING_PENETRATION:
     case CAV_BINDING_KINDS: {
       const cav_pair *pair = &m->pair[row->object];
-      snprintf(out, size, "penetration of geom '%.60s' into '%.60s'", geom_name(m, pair->geom2, a),
-               geom_name(m, pair->geom1, b));
+      snprintf(out, size, "penetration of geom '%.60s' into '%.60s'", cav_geom_label(m, pair->geom2, a),
+               cav_geom_label(m, pair->geom1, b));
       break;
     }
   }

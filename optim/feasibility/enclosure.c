@@ -156,11 +156,11 @@ static cav_status examine_geom(cav_examination *e, const cav_requirement *r, int
     ok = g.seen && g.queue;
     transform(start, e->start->link[r->object].pos, e->start->link[r->object].rotation, r->point);
     if (ok && fill(e, &g) && !is_among(&g, start)) {
-      char what[160], name[48];
+      char what[160], name[CAV_GEOM_LABEL];
       cav_requirement_words(e, r, what, sizeof what);
       cav_impossible(e, CAV_CONDITION_SOLID, r, "Open a way to the target, or start inside.",
                      "%s, but solids of the world enclose it, and geom '%.48s' does not fit between them", what,
-                     cav_name_or(one->name, "geom", geom, name));
+                     cav_geom_label(m, geom, name));
     }
   }
   free(g.wall), free(g.seen), free(g.queue);

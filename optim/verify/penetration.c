@@ -12,20 +12,14 @@ enum { MOST = 64 };
 
 static const double fine = CAV_TOLERANCE_PENETRATION / 2; // m
 
-static const char *geom_name(const cav_model *model, int geom, char buffer[32]) {
-  if (*model->geom[geom].name) return model->geom[geom].name;
-  snprintf(buffer, 32, "geom %d", geom);
-  return buffer;
-}
-
 void cav_verification_penetration(const cav_verification *verification, int t, const char *suffix, cav_metric *metric) {
   const cav_model *model = verification->model;
-  char name1[32], name2[32];
+  char name1[CAV_GEOM_LABEL], name2[CAV_GEOM_LABEL];
   for (int i = 0; i < verification->state->ncontact; i++) {
     const cav_contact *contact = verification->state->contact + i;
     const cav_pair *pair = model->pair + contact->pair;
-    cav_metric_note(metric, -contact->dist, t, "%.60s in %.60s%s", geom_name(model, pair->geom2, name2),
-                    geom_name(model, pair->geom1, name1), suffix);
+    cav_metric_note(metric, -contact->dist, t, "%.60s in %.60s%s", cav_geom_label(model, pair->geom2, name2),
+                    cav_geom_label(model, pair->geom1, name1), suffix);
   }
 }
 

@@ -22,15 +22,9 @@ static cav_status note_depth(const cav_model *m, cav_state *state, const double 
   return status;
 }
 
-static const char *geom_name(const cav_model *m, int geom, char buffer[32]) {
-  if (*m->geom[geom].name) return m->geom[geom].name;
-  snprintf(buffer, 32, "geom %d", geom);
-  return buffer;
-}
-
 // "2.1 mm: 'a' in 'b'"
 static void tell(const cav_model *m, const penetration *p, double timestep, int when, char *out, size_t size) {
-  char a[32], b[32], time[40] = "";
+  char a[CAV_GEOM_LABEL], b[CAV_GEOM_LABEL], time[40] = "";
   if (p->depth < 1e-6) {
     snprintf(out, size, "inside nothing");
     return;
@@ -40,8 +34,8 @@ static void tell(const cav_model *m, const penetration *p, double timestep, int 
   const cav_pair *pair = &m->pair[p->pair];
   int stands = m->geom[pair->geom2].link == 0 ? pair->geom2 : pair->geom1;
   int moves = stands == pair->geom1 ? pair->geom2 : pair->geom1;
-  snprintf(out, size, "deepest %.3g mm%s: '%.60s' in '%.60s'", 1e3 * p->depth, time, geom_name(m, moves, a),
-           geom_name(m, stands, b));
+  snprintf(out, size, "deepest %.3g mm%s: '%.60s' in '%.60s'", 1e3 * p->depth, time, cav_geom_label(m, moves, a),
+           cav_geom_label(m, stands, b));
 }
 
 // FILE.view.html, in the folder of the command
