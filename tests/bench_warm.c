@@ -1,7 +1,7 @@
 /// Solves again: five motions cold, then with the weight of their first cost term a tenth higher, cold again and warm, from the
 /// motion and multipliers of the first solve; and one iteration through cav_optimiser_iterate against its parts called by
 /// themselves, as bench_iteration does: linearisation, gathering and factorisation at the same motion, by turns, the shortest
-/// of several. One thread, no gains. Needs the shared models. Usage: bench_warm [MOTION...].
+/// of several. One thread, no gains. Usage: bench_warm [MOTION...].
 #include "bench.h"
 #include "continuation.h"
 #include "motion.h"
@@ -9,11 +9,8 @@
 
 enum { RUNS = 4, CALLS = 25 };
 
-static const motion_case cases[] = {{"kick", NULL},
-                                    {"squat-jump", NULL},
-                                    {"walker-walk", "dm_control/walker.xml"},
-                                    {"cheetah-gallop", "dm_control/cheetah.xml"},
-                                    {"hopper-hop", "dm_control/hopper.xml"}};
+static const motion_case cases[] = {
+    {"kick", NULL}, {"squat-jump", NULL}, {"walker-walk", NULL}, {"cheetah-gallop", NULL}, {"hopper-hop", NULL}};
 
 // the parts of an iteration at a motion; seconds
 static double parts(cav_transcription *tr, cav_normal *normal, cav_trajectory *at) {

@@ -3,19 +3,15 @@
 # guess alone, each for a bounded time, after which it is interrupted and verifies what it has. Fails where an assert or a
 # sanitizer speaks; whether a motion is certified is no matter here. Usage:
 #   sh tests/debug.sh [BUILD [SECONDS [MOTION...]]]   (default: build-debug, made where it is absent; 60 s a motion)
-# Motions that name no model take those that no one here wrote, from $CAVORT_SHARED_MODELS or ../shared/models; they are told
-# as skipped where these are absent.
 set -u
 cd "$(dirname "$0")/.."
 build=${1:-build-debug}
 seconds=${2:-60}
 [ $# -lt 2 ] || shift
 [ $# -eq 0 ] || shift
-shared=${CAVORT_SHARED_MODELS:-../shared/models}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 failed=0
-skipped=0
 
 [ -d "$build" ] || meson setup "$build" --buildtype=debugoptimized -Db_ndebug=false -Db_sanitize=address,undefined \
   -Db_lundef=false >/dev/null || exit 1
@@ -28,29 +24,10 @@ meson introspect --buildoptions "$build" | tr '{' '\n' | grep -q '"name": "b_nde
 # an exit status of its own for sanitizers: 1 says not certified
 export ASAN_OPTIONS=exitcode=77 UBSAN_OPTIONS=halt_on_error=1:exitcode=77
 
-# model MOTION: of those that name none
-model() {
-  case $1 in
-    hop | hopper-hop) echo hopper ;;
-    walker-*) echo walker ;;
-    cheetah-*) echo cheetah ;;
-    quadruped-*) echo quadruped ;;
-  esac
-}
-
 for motion in ${*:-$(ls problems/motions)}; do
   file=problems/motions/$motion/problem.xml
-  set --
-  if ! grep -q ' model="' "$file"; then
-    set -- --model "$shared/dm_control/$(model "$motion").xml"
-    if [ ! -f "$2" ]; then
-      echo "$motion: skipped, no $2"
-      skipped=$((skipped + 1))
-      continue
-    fi
-  fi
   timeout -s INT -k 300 "$seconds" "$build/problems/cavort" solve "$file" -o "$work/out" --threads 1 --strategies 1 --quiet \
-    "$@" 2>"$work/log"
+    2>"$work/log"
   status=$?
   # certified, not certified, interrupted (by us: 124 of timeout)
   case $status in
@@ -70,5 +47,5 @@ for motion in ${*:-$(ls problems/motions)}; do
     failed=$((failed + 1))
   fi
 done
-echo "$failed failed, $skipped skipped"
+echo "$failed failed"
 [ "$failed" -eq 0 ]

@@ -2,8 +2,8 @@
 # Solves the motions, one after the other, and writes results/solve.md: time, iterations, what the certificate says.
 # Usage: sh tests/motions.sh [BUILD [MOTION...]]   (folder of a release build, by default build; with motions only their rows are
 # solved anew, and the others stay, each with the commit it was measured at)
-# CAVORT_HUMANOIDS=all tries the motions of our humanoid on MuJoCo's and dm_control's, too.
-# The models that no one here wrote come from $CAVORT_SHARED_MODELS or ../shared/models; rows of absent ones are left out.
+# CAVORT_OTHERS=all tries the motions on models that no one here wrote, too, those of MuJoCo and dm_control in $CAVORT_SHARED_MODELS or
+# ../shared/models; rows of absent ones are left out.
 set -eu
 cd "$(dirname "$0")/.."
 build=${1:-build}
@@ -28,7 +28,8 @@ row() {
     [ -f "$shared/$2" ] || return 0
     set -- "$1" "$2" --model "$shared/$2"
   else
-    set -- "$1" "problems/models/humanoid.xml"
+    set -- "$1" "problems/motions/$1/$(sed -n 's/^<problem .*model="\([^"]*\)".*/\1/p' "problems/motions/$1/problem.xml")"
+    set -- "$1" "$(realpath --relative-to=. "$2")"
   fi
   motion=$1
   name=$2
@@ -57,18 +58,23 @@ row() {
   echo "| motion | model | certified | achieved | cost | optimal to | hover, % | strategy | s, all strategies | iterations | unactuated force, of weight | momentum defect, % | penetration, mm | slip, mm/s | same-step replay within 1e-6, s | closed loop, end, mm | commit |"
   echo "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|"
   row squat-jump
-  [ "${CAVORT_HUMANOIDS:-own}" != all ] || row squat-jump mujoco/humanoid.xml
-  [ "${CAVORT_HUMANOIDS:-own}" != all ] || row squat-jump dm_control/humanoid.xml
-  row hopper-hop dm_control/hopper.xml
-  row walker-jump dm_control/walker.xml
-  row cheetah-jump dm_control/cheetah.xml
-  row hop dm_control/hopper.xml
-  row walker-walk dm_control/walker.xml
-  row cheetah-gallop dm_control/cheetah.xml
-  row quadruped-trot dm_control/quadruped.xml
+  [ "${CAVORT_OTHERS:-own}" != all ] || row squat-jump mujoco/humanoid.xml
+  [ "${CAVORT_OTHERS:-own}" != all ] || row squat-jump dm_control/humanoid.xml
+  row hopper-hop
+  row walker-jump
+  row cheetah-jump
+  row hop
+  row walker-walk
+  row cheetah-gallop
+  row quadruped-trot
+  if [ "${CAVORT_OTHERS:-own}" = all ]; then
+    for pair in hopper-hop:hopper walker-jump:walker cheetah-jump:cheetah hop:hopper walker-walk:walker cheetah-gallop:cheetah; do
+      row "${pair%:*}" "dm_control/${pair#*:}.xml"
+    done
+  fi
   for motion in jump kick reach get-up-back get-up-front walk walk-cycle run step-up roll handstand cartwheel backflip lift; do
     row $motion
-    [ "${CAVORT_HUMANOIDS:-own}" = all ] || continue
+    [ "${CAVORT_OTHERS:-own}" = all ] || continue
     row $motion mujoco/humanoid.xml
     row $motion dm_control/humanoid.xml
   done

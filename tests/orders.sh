@@ -48,9 +48,9 @@ row() {
     row $motion "$shared/mujoco/humanoid.xml" MuJoCo
     row $motion "$shared/dm_control/humanoid.xml" dm_control
   done
-  row hopper-hop "$shared/dm_control/hopper.xml" hopper
-  row walker-jump "$shared/dm_control/walker.xml" walker
-  row cheetah-jump "$shared/dm_control/cheetah.xml" cheetah
+  row hopper-hop problems/models/hopper.xml hopper
+  row walker-jump problems/models/walker.xml walker
+  row cheetah-jump problems/models/cheetah.xml cheetah
 } >"$work/orders.md"
 awk -F'|' 'NF > 10 { a += $4 ~ /yes/; b += $8 ~ /yes/; i += $5; j += $9 }
   END { printf "\nTogether: midpoint %d certified, %d iterations; momentum %d certified, %d iterations.\n", a, i, b, j }' \

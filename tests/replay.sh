@@ -2,8 +2,7 @@
 # Plays solved motions in MuJoCo, under the contacts of the models' own files, and writes results/replay.md: how long each follows and
 # how near it ends, beside what the certificate says; then the same with gains of half and of none, which have to be told apart.
 # Usage: sh tests/replay.sh [FOLDER...]   (result folders; without any, all motions are solved first: an hour)
-# CAVORT_BUILD names a release build with MuJoCo, by default build. FOLDERs are named after their motions, or r-MOTION. Models of
-# dm_control come from $CAVORT_SHARED_MODELS or ../shared/models.
+# CAVORT_BUILD names a release build with MuJoCo, by default build. FOLDERs are named after their motions, or r-MOTION.
 set -eu
 cd "$(dirname "$0")/.."
 build=${CAVORT_BUILD:-build}
@@ -13,16 +12,7 @@ trap 'rm -rf "$work"' EXIT
 if [ $# -eq 0 ]; then
   for motion in problems/motions/*/; do
     motion=$(basename "$motion")
-    case $motion in
-      cheetah-*) model=cheetah ;;
-      hop | hopper-*) model=hopper ;;
-      quadruped-*) model=quadruped ;;
-      walker-*) model=walker ;;
-      *) model= ;;
-    esac
-    file=${CAVORT_SHARED_MODELS:-../shared/models}/dm_control/$model.xml
-    [ -z "$model" ] || [ -f "$file" ] || continue
-    "$build/problems/cavort" solve "problems/motions/$motion/problem.xml" -o "$work/$motion" --threads 1 --quiet ${model:+--model "$file"} || true
+    "$build/problems/cavort" solve "problems/motions/$motion/problem.xml" -o "$work/$motion" --threads 1 --quiet || true
     set -- "$@" "$work/$motion"
   done
 fi

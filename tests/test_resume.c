@@ -326,7 +326,7 @@ int main(void) {
     test_refusals(p, folder);
     cav_problem_free(p);
   }
-  static const motion_case walk = {"walker-walk", "dm_control/walker.xml"};
+  static const motion_case walk = {"walker-walk", NULL};
   if ((p = motion_load(&walk))) {
 #ifndef SANITIZED
     cav_strategy strategy[CAV_STRATEGIES];
