@@ -94,7 +94,55 @@ static void refuse(const char *scene, int line, const char *says) {
   cav_problem_free(p);
 }
 
+// a turret on a box, an arm of three links on it: geoms of the first and third link overlap by 20 mm where the arm is
+// straight, a ball of another tree by 10 mm with the first link
+#define ROBOT(GAP, KEYS, MORE)                                                                                   \
+  "<mujoco><worldbody><body name='base'><geom type='box' size='.1 .1 .1'/><body name='turret' pos='0 0 .1'>"     \
+  "<joint axis='0 0 1'/><geom type='cylinder' size='.05 .05'/><body name='a' pos='0 0 .1'><joint axis='0 1 0'/>" \
+  "<geom name='low' size='.03'/><body name='b' pos='0 0 .02'><joint axis='0 1 0'/><geom size='.01'/><body "      \
+  "name='c' pos='0 0 " GAP                                                                                       \
+  "'><joint axis='0 1 0'/><geom name='high' size='.03'/></body></body></body></body>"                            \
+  "</body><body pos='.05 0 .2'><freejoint/><geom name='ball' size='.03'/></body></worldbody>" MORE               \
+  "<keyframe>"                                                                                                   \
+  "<key qpos='0 .1 0 0 .05 0 .2 1 0 0 0'/>" KEYS "</keyframe></mujoco>"
+
+static void test_overlaps(void) {
+  static const struct {
+    const char *text, *says;
+    int left;
+  } robot[] = {
+      {ROBOT(".02", "", ""), "2 pairs of geoms that overlap at rest, 'geom 1 of turret' and 'geom 1 of base' by 50 mm",
+       2},
+      // a pair of the file, one that a keyframe shows apart (b turned round), fingers that just touch
+      {ROBOT(".02", "", "<contact><pair geom1='low' geom2='high'/></contact>"), "1 pair of geoms", 1},
+      {ROBOT("-.05", "<key qpos='0 0 3.1416 0 .05 0 .2 1 0 0 0'/>", ""), "1 pair of geoms", 1},
+      {ROBOT("-.05", "", ""), "3 pairs of geoms", 3},
+      {ROBOT(".0395", "", ""), "1 pair of geoms", 1},
+      {"<mujoco><worldbody><geom type='plane' size='1 1 1'/><body pos='0 0 .05'><freejoint/><geom size='.1'/></body>"
+       "</worldbody></mujoco>",
+       NULL, 0}};
+  for (size_t i = 0; i < sizeof robot / sizeof *robot; i++) {
+    char path[] = "/tmp/cavort-overlap-XXXXXX";
+    int file = mkstemp(path);
+    if (!CHECK(file >= 0 && write(file, robot[i].text, strlen(robot[i].text)) > 0)) return;
+    close(file);
+    cav_load_options options = cav_load_options_default();
+    cav_model *whole = cav_model_load_with(path, &options, NULL);
+    options.overlaps = 1;
+    cav_model *m = cav_model_load_with(path, &options, NULL);
+    if (CHECK(whole && m)) {
+      CHECK(whole->npair - m->npair == robot[i].left && m->nwarning - whole->nwarning == (robot[i].says != NULL));
+      if (robot[i].says && !CHECK(strstr(m->warning[m->nwarning - 1], robot[i].says)))
+        fprintf(stderr, "    %s\n", m->warning[m->nwarning - 1]);
+    }
+    cav_model_free(whole);
+    cav_model_free(m);
+    unlink(path);
+  }
+}
+
 int main(void) {
+  test_overlaps();
   check_left();
   // a geom alone takes no body, joint or actuator with it
   cav_error error = {0};

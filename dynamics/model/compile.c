@@ -263,6 +263,27 @@ static void find_strokes(cav_builder *b) {
                   "is missing, and the joints let this muscle become as long or as short as it likes; give it");
 }
 
+// what is left out is known once there is a model: its warning has room before
+enum { OVERLAP_TEXT = 300 };
+
+static void reserve_overlaps(cav_spec *spec) {
+  if (!spec->load.overlaps) return;
+  char blank[OVERLAP_TEXT];
+  memset(blank, ' ', sizeof blank);
+  blank[sizeof blank - 1] = 0;
+  cav_spec_warn(spec, spec->body.at[0].node, NULL, "%s", blank);
+}
+
+static void leave_overlaps(cav_builder *b) {
+  cav_spec *spec = b->spec;
+  if (!spec->load.overlaps) return;
+  cav_model *m = b->model;
+  char *place = strchr(b->warning[m->nwarning - 1], 0) - (OVERLAP_TEXT - 1);
+  int n = cav_overlaps_leave(m, place, OVERLAP_TEXT);
+  if (n < 0) cav_spec_no_memory(spec);
+  if (n == 0) m->nwarning--;
+}
+
 static cav_model *build(cav_builder *b) {
   cav_spec *spec = b->spec;
   count(b);
@@ -272,6 +293,7 @@ static cav_model *build(cav_builder *b) {
   if (cav_builder_running(b)) b->model->ntendon_dof = cav_builder_tendon_dofs(b, NULL);
   if (cav_builder_running(b)) b->pairs = cav_filter_pairs(spec, b->weld, b->link_of, &b->model->npair);
   if (cav_builder_running(b)) warn_guarded(b);
+  if (cav_builder_running(b)) reserve_overlaps(spec);
   if (!cav_builder_running(b)) return NULL;
   b->model->nwarning = spec->warning.n;
   carver c = {NULL, 0};
@@ -298,6 +320,7 @@ static cav_model *build(cav_builder *b) {
       check_results(b);
     if (cav_builder_running(b)) find_strokes(b);
     if (cav_builder_running(b) && !cav_settle_gains(spec, b->model)) cav_spec_no_memory(spec);
+    if (cav_builder_running(b)) leave_overlaps(b);
   }
   if (cav_builder_running(b)) return b->model;
   free(b->model);

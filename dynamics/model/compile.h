@@ -33,6 +33,10 @@ int cav_spec_tendon_joints(const cav_spec *spec, int tendon, char *mark);
 /// malloc, *npair long, or NULL for an empty one. filter.c.
 cav_pair *cav_filter_pairs(cav_spec *spec, const int *weld, const int *link_of, int *npair);
 
+/// Takes pairs that overlap at rest out of a model under construction, and writes what was left out. Returns how many, -1
+/// if memory runs out. overlap.c.
+int cav_overlaps_leave(cav_model *model, char *text, size_t room);
+
 /// Model of a complete spec; NULL on failure, noted in spec. compile.c.
 cav_model *cav_compile(cav_spec *spec);
 

@@ -211,6 +211,7 @@ static void add_explicit(cav_spec *spec, list *l, const cav_geom *geom, const in
       cav_pair *pair = push(spec, l, geom, g1, g2);
       if (!pair) return;
       replace(p, pair);
+      pair->listed = 1;
       bound_friction(spec, pair);
     }
   }

@@ -282,6 +282,7 @@ typedef struct cav_site {
 typedef struct cav_pair {
   int geom1, geom2;   ///< geom1's type <= geom2's type
   int dim;            ///< 1, 3, 4 or 6 rows
+  int listed;         ///< 1: the file lists this pair, whatever masks say
   int external;       ///< 1 if one of the two stands in the world, or they hang from the world by different roots
   double friction[5]; ///< two tangential, torsional (m), two rolling (m)
   double margin, gap; ///< m
@@ -554,6 +555,7 @@ typedef struct cav_model {
 typedef struct cav_load_options {
   int visual; ///< 1: geometry that can neither touch nor weigh too, for a viewer
   int floating; ///< 1: the root link of a URDF floats (joint "root"); 0: it stands in the world unless the file says otherwise
+  int overlaps; ///< 1: pairs of geoms of one robot that overlap at rest are left out, and told in a warning
 } cav_load_options;
 
 CAV_API cav_load_options cav_load_options_default(void);

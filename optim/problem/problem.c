@@ -405,6 +405,7 @@ static cav_status load_model(cav_problem_reader *reader, const char *model_path)
   const cav_xml_node *scene = cav_problem_child(reader->root, "scene");
   cav_load_options options = cav_load_options_default();
   options.floating = cav_xml_bool(reader->root, "floating", 0);
+  options.overlaps = 1;
   reader->owner->model = cav_model_load_scene(path, &options, scene, &inner);
   reader->problem->model_path = cav_problem_text(reader->owner, path);
   free(path);

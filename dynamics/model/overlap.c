@@ -1,0 +1,79 @@
+/// Pairs of geoms of one robot that are inside each other at rest: covers around a joint, a base and what turns on it.
+/// Their makers do not mean them to push, and an engine that lets them does so for good. Left out on demand: pairs of
+/// two links of one tree, or of a link and a body that carries it and stands in the world, that overlap by more than a
+/// millimetre in the model's own configuration and in every keyframe. Pairs that the file lists are kept.
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cavort/dynamics.h"
+#include "compile.h"
+
+static const double least = 1e-3; // m: fingers that close on each other overlap by rounding
+
+// whether a body stands on the way from a link's body to the world, the world itself left aside
+static int carries(const cav_model *m, int body, int link) {
+  for (int b = m->link[link].body; b > 0; b = m->body[b].parent)
+    if (b == body) return 1;
+  return 0;
+}
+
+static int of_one_robot(const cav_model *m, const cav_pair *pair) {
+  const cav_geom *g1 = &m->geom[pair->geom1], *g2 = &m->geom[pair->geom2];
+  if (g1->link && g2->link) return m->link[g1->link].root == m->link[g2->link].root;
+  return g1->link ? carries(m, g2->body, g1->link) : carries(m, g1->body, g2->link);
+}
+
+// counts for each pair the configurations in which it overlaps, and how deep at most
+static cav_status note(const cav_model *m, cav_state *state, const double *q, int *times, double *depth, char *seen) {
+  cav_status status = cav_position(m, state, q);
+  memset(seen, 0, (size_t)m->npair + 1);
+  for (int i = 0; i < state->ncontact && status == CAV_OK; i++) {
+    const cav_contact *c = &state->contact[i];
+    if (-c->dist > depth[c->pair]) depth[c->pair] = -c->dist;
+    if (-c->dist > least && !seen[c->pair]) seen[c->pair] = 1, times[c->pair]++;
+  }
+  return status;
+}
+
+// takes the pairs out that overlap in all configurations; the deepest is named
+static int take_out(cav_model *m, int configurations, const int *times, const double *depth, char *text, size_t room) {
+  cav_pair *pair = (cav_pair *)m->pair;
+  int n = 0, deepest = -1, taken = 0;
+  char one[CAV_GEOM_LABEL], other[CAV_GEOM_LABEL];
+  for (int i = 0; i < m->npair; i++) {
+    int out = times[i] == configurations && !pair[i].listed && of_one_robot(m, &pair[i]);
+    if (out && (deepest < 0 || depth[i] > depth[deepest])) deepest = i;
+    taken += out;
+  }
+  if (taken) {
+    snprintf(
+        text, room,
+        "left out: %d %s of geoms that overlap at rest, '%.60s' and '%.60s' by %.3g mm%s; list a <pair> to keep one",
+        taken, taken == 1 ? "pair" : "pairs", cav_geom_label(m, pair[deepest].geom1, one),
+        cav_geom_label(m, pair[deepest].geom2, other), 1e3 * depth[deepest], taken == 1 ? "" : " the most");
+  }
+  for (int i = 0; i < m->npair; i++) {
+    int out = times[i] == configurations && !pair[i].listed && of_one_robot(m, &pair[i]);
+    if (!out) pair[n++] = pair[i];
+  }
+  m->npair = n;
+  return taken;
+}
+
+int cav_overlaps_leave(cav_model *model, char *text, size_t room) {
+  cav_state *state = cav_state_new(model);
+  int *times = calloc((size_t)model->npair + 1, sizeof *times), taken = -1;
+  double *depth = calloc((size_t)model->npair + 1, sizeof *depth);
+  char *seen = calloc((size_t)model->npair + 1, 1);
+  cav_status status = state && times && depth && seen ? CAV_OK : CAV_NO_MEMORY;
+  if (!status) status = note(model, state, model->q0, times, depth, seen);
+  for (int k = 0; k < model->nkey && !status; k++) status = note(model, state, model->key[k].q, times, depth, seen);
+  // where there are no poses nothing is said of them here
+  if (status != CAV_NO_MEMORY) taken = status ? 0 : take_out(model, 1 + model->nkey, times, depth, text, room);
+  cav_state_free(state);
+  free(times);
+  free(depth);
+  free(seen);
+  return taken;
+}
