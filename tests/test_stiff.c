@@ -367,7 +367,7 @@ static void test_springs_and_back(void) {
 // ---------------------------------------------------------------- large steps of the mean velocity
 
 // a bead at r on an arm that turns, whatever its angle. With w the mean of the arm's two velocities a step
-// of midpoint is a cubic in w, which always has a root, and three where the bead comes in fast; past the first fold the
+// of midpoint is a cubic in w, which always has a root, and three where the bead comes in fast; between the folds the
 // cubic falls
 static void test_bead(void) {
   static const double steps[] = {0.02, 0.2, 0.5};
@@ -387,7 +387,7 @@ static void test_bead(void) {
     s.q[0] = 3 * scene_uniform(), s.q[1] = r;
     scene_throw(&s, 5, 5);
     cav_forward_report report;
-    const cav_status status = cav_forward_newton(s.model, s.state, s.q, s.v, s.u, 200, 1e-13, s.v_next, &report);
+    const cav_status status = cav_forward_newton(s.model, s.state, s.q, s.v, s.u, 1000, 1e-13, s.v_next, &report);
     CHECK(status == CAV_OK || status == CAV_NOT_CONVERGED);
     without += status != CAV_OK;
     const double a = I + m * r * r, w = 0.5 * (s.v[0] + s.v_next[0]), b = s.v[1] + 0.5 * h * s.u[1] / m;
@@ -400,8 +400,8 @@ static void test_bead(void) {
     folded += report.folded, single += slope >= 0;
   }
   CHECK(single > 1000);
-  // all have a solution; Newton from the frozen bias alone misses 136
-  CHECK(without <= 45);
+  // all have a solution, and one that is not past a fold, seen for all but one; Newton from the frozen bias alone misses 136
+  CHECK(without == 0 && folded <= 2);
   printf("bead on an arm: %d of 3000 steps past a fold, %d not found\n", folded, without);
   scene_close(&s);
 }
@@ -452,8 +452,8 @@ static void test_folds(void) {
     scene_throw(&s, 1, 0);
     for (int k = 0; k < s.model->nv; k++) s.q[k] = 0.2 * scene_uniform();
     cav_forward_report report;
-    const cav_status status = cav_forward_newton(s.model, s.state, s.q, s.v, s.u, 200, 1e-13, s.v_next, &report);
-    CHECK(status == CAV_OK || (large && status == CAV_NOT_CONVERGED));
+    const cav_status status = cav_forward_newton(s.model, s.state, s.q, s.v, s.u, 1000, 1e-13, s.v_next, &report);
+    CHECK(status == CAV_OK || (large && status == CAV_NOT_CONVERGED && report.folded));
     without += status != CAV_OK;
     if (status != CAV_OK) continue;
     told[large] += report.folded;

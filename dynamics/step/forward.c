@@ -6,8 +6,9 @@
 /// midpoint, momentum: bias and passive forces depend on v_next. The convex problem with these frozen gives the start;
 /// Newton with their derivative (differences of the smooth inverse, reused while it serves) finishes. Nothing then is
 /// symmetric or convex: such a step need not exist once a body turns by a radian or so within it (gyroscopic torques at
-/// speeds near 2/h; the solutions traced there end in a fold). A second start has v_next = -v; then the best iterate is
-/// returned as not converged. Past a fold, which the sign of the derivative's determinant tells, the report says so.
+/// speeds near 2/h). A second start has v_next = -v; then the curve of solutions is followed from the convex problem
+/// (path.c), and where it ends in a fold the best iterate is returned as not converged. Past a fold, which the sign of the
+/// derivative's determinant tells, and where the curve ends in one, the report says so.
 /// What forces a thousand times those of the convex problem hold at an absurd speed is no step: errors are relative to
 /// no more than that, and there CAV_OK is never said.
 ///
@@ -31,7 +32,7 @@
 #include "newton.h"
 #include "proximal.h"
 
-enum { DEFAULT_ITERATIONS = 100, LEVELS = 8 };
+enum { DEFAULT_ITERATIONS = 100, PATH_ITERATIONS = 1000, LEVELS = 8 };
 
 static const double DEFAULT_TOLERANCE = 1e-13, ROUGH = 1e-9, NEAR = 1e-2;
 // of the proximal point method: softness below which it is taken, ratio of levels and the least, change of a velocity
@@ -117,6 +118,12 @@ static cav_status turn_back(cav_newton *s, double tolerance) {
   return cav_newton_iterate(s, 1, tolerance);
 }
 
+// whether a step of the mean velocity is convex but for what is quadratic in it
+static int has_path(const cav_state *state) {
+  return cav_takes_mean(state) && state->options.sliding == CAV_SLIDING_CONVEX &&
+         state->options.next_gap == CAV_NEXT_GAP_LINEAR;
+}
+
 // whether rows are so stiff that nothing is lost by coming from softer ones
 static int is_stiff(const cav_state *state) {
   const cav_options *o = &state->options;
@@ -140,17 +147,21 @@ cav_status cav_forward_newton(const cav_model *model, cav_state *state, const do
   status = stiff ? approach(&s, tolerance) : cav_newton_iterate(&s, 0, tolerance);
   if (status == CAV_NOT_CONVERGED && s.problem.excess) status = follow_gaps(&s, tolerance);
   if (status == CAV_NOT_CONVERGED && cav_takes_mean(state)) status = turn_back(&s, tolerance);
+  if (has_path(state) && (status == CAV_NOT_CONVERGED || (status == CAV_OK && s.sign < 0)))
+    status = cav_newton_follow(&s, tolerance, status);
   if (status != CAV_OK && status != CAV_NOT_CONVERGED) return status;
   copy(v_next, s.x, model->nv);
   if (report)
-    *report =
-        (cav_forward_report){.iterations = s.iterations, .residual = cav_newton_residual(&s), .folded = s.sign < 0};
+    *report = (cav_forward_report){.iterations = s.iterations,
+                                   .residual = cav_newton_residual(&s),
+                                   .folded = s.sign < 0 && (status == CAV_OK || has_path(state))};
   return status;
 }
 
 cav_status cav_forward(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
                        double *v_next) {
-  // followed gaps take as many again
-  const int limit = DEFAULT_ITERATIONS * (state->options.next_gap == CAV_NEXT_GAP_EXACT ? 2 : 1);
+  // followed gaps take as many again, a curve its steps
+  const int gaps = state->options.next_gap == CAV_NEXT_GAP_EXACT;
+  const int limit = has_path(state) ? PATH_ITERATIONS : (1 + gaps) * DEFAULT_ITERATIONS;
   return cav_forward_newton(model, state, q, v, u, limit, DEFAULT_TOLERANCE, v_next, NULL);
 }

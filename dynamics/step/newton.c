@@ -18,12 +18,13 @@ int cav_newton_is_convex(const cav_state *state) {
 }
 
 cav_status cav_newton_prepare(cav_newton *s, const cav_model *model, cav_state *state) {
-  const size_t matrices = cav_newton_is_convex(state) ? 0 : 2, looks = state->options.next_gap == CAV_NEXT_GAP_EXACT;
+  const size_t matrices = cav_newton_is_convex(state) ? 0 : 2, looks = state->options.next_gap == CAV_NEXT_GAP_EXACT,
+               mean = cav_takes_mean(state) != 0;
   const cav_impulse_room room = {.per_block = BLOCK + 2 + CAV_PROXIMAL_PER_BLOCK + CAV_ISLAND_PER_BLOCK,
                                  .per_row = 5 + CAV_PROXIMAL_PER_ROW,
                                  .per_row_and_dof = looks,
-                                 .per_dof = 9 + CAV_ISLAND_PER_DOF,
-                                 .per_dof_squared = matrices};
+                                 .per_dof = 9 + CAV_ISLAND_PER_DOF + mean * CAV_PATH_PER_DOF,
+                                 .per_dof_squared = matrices + mean * CAV_PATH_PER_DOF_SQUARED};
   cav_workspace *work = state->work;
   if (!work->hessian && !(work->hessian = cav_hessian_new(CAV_SPARSE_FROM))) return CAV_NO_MEMORY;
   const cav_status status = cav_impulse_new(model, state, s->q, s->v, &room, &s->problem);
@@ -44,9 +45,10 @@ cav_status cav_newton_prepare(cav_newton *s, const cav_model *model, cav_state *
   s->ahead = s->excess + nblock;
   s->matrix = s->ahead + looks * nrow * nv;
   s->smooth = s->matrix + nv * nv;
-  const size_t room_of_islands = CAV_ISLAND_PER_BLOCK * nblock + CAV_ISLAND_PER_DOF * nv;
-  assert(s->matrix + matrices * nv * nv + room_of_islands == s->problem.spare + s->problem.nspare);
-  cav_islands_find(&s->problem, s->matrix + matrices * nv * nv, &s->islands);
+  s->path = s->matrix + matrices * nv * nv;
+  double *islands = s->path + mean * (CAV_PATH_PER_DOF * nv + CAV_PATH_PER_DOF_SQUARED * nv * nv);
+  assert(islands + CAV_ISLAND_PER_BLOCK * nblock + CAV_ISLAND_PER_DOF * nv == s->problem.spare + s->problem.nspare);
+  cav_islands_find(&s->problem, islands, &s->islands);
   s->hessian = work->hessian;
   cav_newton_leave_island(s);
   return CAV_OK;
@@ -76,8 +78,7 @@ static void fill_ahead(cav_newton *s) {
   }
 }
 
-// matrix := matrix + J' H (J + what rows see beyond it)
-static void add_constraints(cav_newton *s) {
+void cav_newton_add_constraints(cav_newton *s) {
   const int nv = s->problem.nv;
   for (int b = 0; b < s->problem.nblock; b++) {
     const cav_block *block = &s->problem.block[b];
@@ -112,8 +113,7 @@ static double rounding(cav_newton *s) {
          8.0 * DBL_EPSILON * (s->scale + DBL_MIN / p->state->options.timestep);
 }
 
-// matrix := M
-static void fill_inertia(const cav_impulse *p, double *matrix) {
+void cav_newton_fill_inertia(const cav_impulse *p, double *matrix) {
   const cav_workspace *work = p->state->work;
   memset(matrix, 0, (size_t)p->nv * (size_t)p->nv * sizeof *matrix);
   for (int i = 0; i < p->nv; i++) {
@@ -122,13 +122,10 @@ static void fill_inertia(const cav_impulse *p, double *matrix) {
   }
 }
 
-// derivative of h times the smooth inverse with respect to v_next: the inertia, or at the mean velocity by columns. It
-// is quadratic in v_next, or nearly so: a one-sided difference errs by the step, 1e-5 of the Coriolis terms, which
-// costs Newton nothing
-static cav_status differentiate_smooth(cav_newton *s) {
+cav_status cav_newton_differentiate_smooth(cav_newton *s) {
   const int nv = s->problem.nv;
   if (!cav_takes_mean(s->problem.state)) {
-    fill_inertia(&s->problem, s->smooth);
+    cav_newton_fill_inertia(&s->problem, s->smooth);
     s->have_smooth = 1;
     return CAV_OK;
   }
@@ -157,10 +154,7 @@ static void exchange_rows(int n, double *A, double *b, int k, int l) {
   b[l] = held;
 }
 
-// b := A^-1 b by elimination from the last dof, so that what hangs on few others fills little, A overwritten; rows are
-// exchanged where the diagonal is small. found [2*n] is overwritten. Returns the sign of the determinant,
-// 0 if A is singular
-static int solve_general(int n, double *A, double *b, int *found) {
+int cav_newton_solve_general(int n, double *A, double *b, int *found) {
   int *row = found, *column = found + n, sign = 1;
   for (int k = n - 1; k >= 0; k--) {
     int pivot = k, nrow = 0, ncolumn = 0;
@@ -246,16 +240,16 @@ static cav_status newton_step(cav_newton *s, int *accepted) {
   copy(s->momentum, s->found, nv);
   if (s->problem.excess && !s->frozen) fill_ahead(s);
   if (!s->have_smooth) {
-    const cav_status status = differentiate_smooth(s);
+    const cav_status status = cav_newton_differentiate_smooth(s);
     if (status != CAV_OK) return status;
   }
   cav_impulse_rows(&s->problem, s->x, s->y);
   cav_newton_laws(s, s->y, s->f, s->curvature, 0);
   copy(s->matrix, s->smooth, nv * nv);
-  add_constraints(s);
+  cav_newton_add_constraints(s);
   for (int i = 0; i < nv; i++) s->step[i] = s->problem.state->options.timestep * (s->u[i] - s->momentum[i]);
   s->iterations++;
-  s->sign = solve_general(nv, s->matrix, s->step, (int *)s->momentum);
+  s->sign = cav_newton_solve_general(nv, s->matrix, s->step, (int *)s->momentum);
   if (s->sign == 0) return CAV_OK;
   copy(s->anchor, s->x, nv);
   for (double length = 1.0; length > SHORTEST_STEP; length *= 0.5) {

@@ -8,6 +8,9 @@
 #include "hessian.h"
 #include "island.h"
 
+/// Doubles that path.c needs at the mean velocity, by what they grow with.
+enum { CAV_PATH_PER_DOF = 20, CAV_PATH_PER_DOF_SQUARED = 2 };
+
 /// The solver's own arrays, and where it is.
 typedef struct cav_newton {
   cav_impulse problem;
@@ -35,7 +38,7 @@ typedef struct cav_newton {
   int frozen;          ///< the excess stays as it is
   int sign;            ///< of the determinant of the last Newton step's derivative; 0: none was taken
   int raised;          ///< the problem's rows are softer than the state's
-  double *room;        ///< of proximal.c
+  double *room, *path; ///< of proximal.c; of path.c
   double *ended;       ///< [nv] where it ended, or how far a trace came
   double error, scale; ///< of the last measurement
   double most;         ///< scale beyond which x is no step
@@ -81,6 +84,22 @@ cav_status cav_newton_prepare(cav_newton *newton, const cav_model *model, cav_st
 /// Measures the inverse at x; while the excess is frozen, with the impulses that it gives. newton.c.
 cav_status cav_newton_measure(cav_newton *newton);
 
+/// matrix := M. newton.c.
+void cav_newton_fill_inertia(const cav_impulse *problem, double *matrix);
+
+/// smooth := derivative of h times the smooth inverse with respect to v_next at x: the inertia, or at the mean velocity by
+/// columns, base there. It is quadratic in v_next, or nearly so: a one-sided difference errs by the step, 1e-5 of the Coriolis
+/// terms, which costs Newton nothing. newton.c.
+cav_status cav_newton_differentiate_smooth(cav_newton *newton);
+
+/// matrix := matrix + J' H (J + what rows see beyond it). newton.c.
+void cav_newton_add_constraints(cav_newton *newton);
+
+/// b := A^-1 b by elimination from the last dof, so that what hangs on few others fills little, A [n*n] overwritten; rows
+/// are exchanged where the diagonal is small. found [2*n] is overwritten. Returns the sign of the determinant, 0 if A is
+/// singular. newton.c.
+int cav_newton_solve_general(int n, double *A, double *b, int *found);
+
 /// What was measured relative to the forces at x as far as those are a step's: what runs away is not nearer for what it runs
 /// against. newton.c.
 double cav_newton_residual(const cav_newton *newton);
@@ -97,5 +116,10 @@ cav_status cav_newton_first(cav_newton *newton, int friction, double tolerance);
 /// Passes from v, or with go_on from x, until the inverse agrees with u; x is then the best iterate and the state
 /// evaluated there. newton.c.
 cav_status cav_newton_iterate(cav_newton *newton, int go_on, double tolerance);
+
+/// From the convex problem along the curve of solutions to one of the mean velocity, where there is one on it. Of a step that
+/// was found past a fold (status CAV_OK) only one that is not replaces it; of one that was not found, x stays where it is if
+/// there is none, and sign is negative if the curve turned before it was lost. Convex law and linear gaps alone. path.c.
+cav_status cav_newton_follow(cav_newton *newton, double tolerance, cav_status status);
 
 #endif

@@ -139,7 +139,9 @@ CAV_API cav_status cav_forward(const cav_model *model, cav_state *state, const d
 /// What a forward solve did.
 typedef struct cav_forward_report {
   int iterations;
-  int folded;      ///< 1: past a fold, where steps that are not convex come in pairs (Newton only)
+  /// 1: past a fold, where steps that are not convex come in pairs; with CAV_NOT_CONVERGED: there is no step, the curve of
+  /// those of shorter ones turns before it (Newton only).
+  int folded;
   double residual; ///< largest |inverse(q, v, v_next) - u| relative to the largest |u| involved
   double gap;      ///< duality gap of (9), v* lowered where Coulomb's law does, J (GPGS only)
   double mismatch; ///< |f_forward - f_inverse(v_next)| over all impulses, N s (GPGS only)
