@@ -34,7 +34,7 @@
 
 enum { DEFAULT_ITERATIONS = 100, PATH_ITERATIONS = 1000, LEVELS = 8 };
 
-static const double DEFAULT_TOLERANCE = 1e-13, ROUGH = 1e-9, NEAR = 1e-2;
+static const double ROUGH = 1e-9, NEAR = 1e-2;
 // of the proximal point method: softness below which it is taken, ratio of levels and the least, change of a velocity
 // at which it ends and the most that counts as an end
 static const double STIFF = 1e-5, LEVEL_STEP = 1e-2, LEAST_LEVEL = 1e-10, AT_REST = 1e-15, CLOSE = 1e-10;
@@ -158,10 +158,13 @@ cav_status cav_forward_newton(const cav_model *model, cav_state *state, const do
   return status;
 }
 
-cav_status cav_forward(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
-                       double *v_next) {
+int cav_forward_limit(const cav_state *state) {
   // followed gaps take as many again, a curve its steps
   const int gaps = state->options.next_gap == CAV_NEXT_GAP_EXACT;
-  const int limit = has_path(state) ? PATH_ITERATIONS : (1 + gaps) * DEFAULT_ITERATIONS;
-  return cav_forward_newton(model, state, q, v, u, limit, DEFAULT_TOLERANCE, v_next, NULL);
+  return has_path(state) ? PATH_ITERATIONS : (1 + gaps) * DEFAULT_ITERATIONS;
+}
+
+cav_status cav_forward(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
+                       double *v_next) {
+  return cav_forward_newton(model, state, q, v, u, cav_forward_limit(state), CAV_FORWARD_TOLERANCE, v_next, NULL);
 }

@@ -22,6 +22,10 @@ int cav_state_evaluated(const cav_state *state);
 /// order that the state has evaluated before. inverse.c.
 void cav_smooth_inverse(const cav_model *model, cav_state *state, const double *v, const double *v_next, double *u);
 
+/// What cav_forward passes to cav_forward_newton: its tolerance, and the most iterations under the state's options. forward.c.
+#define CAV_FORWARD_TOLERANCE 1e-13
+int cav_forward_limit(const cav_state *state);
+
 /// Bytes of each part of a state as it is now. state.c.
 void cav_state_bytes(const cav_state *state, size_t bytes[CAV_PARTS]);
 

@@ -36,6 +36,33 @@ static int observe(void *context, double fraction) {
   return interrupted;
 }
 
+// where a side of the scene's own value is broken
+static void print_broken(const cav_stress_result *r, int side) {
+  const int at = r->edge[side].broken;
+  if (at < 0)
+    printf(" %12s", "-");
+  else if (at == r->own_point)
+    printf(" %12s", "here");
+  else
+    printf(" %12.3g", r->point[at].value);
+}
+
+// the first point of a side that is not safe, and the first that is broken, with why
+static void print_edges(const cav_stress_result *r, int side) {
+  const cav_stress_edge *edge = &r->edge[side];
+  const int both[2] = {edge->worse, edge->broken != edge->worse ? edge->broken : -1};
+  for (int k = 0; k < 2; k++) {
+    // what is wrong at the scene's own value is one thing, not two
+    if (both[k] < 0 || (both[k] == r->own_point && side)) continue;
+    const cav_stress_point *p = &r->point[both[k]];
+    printf("  %s %s %s%.3g: %s\n",
+           both[k] == r->own_point ? "here"
+           : side                  ? "above"
+                                   : "below",
+           cav_stress_level_names[p->level], both[k] == r->own_point ? "at " : "from ", p->value, p->why);
+  }
+}
+
 // one parameter
 static void print_range(cav_stress_sweep sweep, const cav_stress_result *r) {
   const cav_stress_sweep_rule *rule = &cav_stress_sweep_rules[sweep];
@@ -46,39 +73,26 @@ static void print_range(cav_stress_sweep sweep, const cav_stress_result *r) {
   }
   printf("%9.3g ", r->own);
   if (isnan(r->edge[0].safe) || isnan(r->edge[1].safe))
-    printf("%20s", "not safe");
+    printf("%20s", "not safe here");
   else
     printf("%9.3g..%-9.3g", r->edge[0].safe, r->edge[1].safe);
-  for (int side = 0; side < 2; side++) {
-    const int at = r->edge[side].broken;
-    if (at < 0)
-      printf(" %10s", "-");
-    else
-      printf(" %10.3g", r->point[at].value);
-  }
+  for (int side = 0; side < 2; side++) print_broken(r, side);
   printf("\n");
-  for (int side = 0; side < 2; side++) {
-    const int at = r->edge[side].broken >= 0 ? r->edge[side].broken : r->edge[side].worse;
-    // what is wrong at the scene's own value is one thing, not two
-    if (at < 0 || (at == r->own_point && side)) continue;
-    printf("  %s, at %.3g: %s\n",
-           at == r->own_point ? "here"
-           : side             ? "above"
-                              : "below",
-           r->point[at].value, r->point[at].why);
-  }
+  if (r->other_law) printf("  of the stabilisation that this scene does not use\n");
+  for (int side = 0; side < 2; side++) print_edges(r, side);
 }
 
 static int holds(const cav_stress_report *report) {
-  for (int i = 0; i < CAV_STRESS_SWEEPS; i++)
-    if (!report->sweep[i].absent && report->sweep[i].point[report->sweep[i].own_point].level != CAV_STRESS_SAFE)
-      return 0;
+  for (int i = 0; i < CAV_STRESS_SWEEPS; i++) {
+    const cav_stress_result *r = &report->sweep[i];
+    if (!r->absent && !r->other_law && r->point[r->own_point].level != CAV_STRESS_SAFE) return 0;
+  }
   return 1;
 }
 
 static void print_report(const cav_stress_report *report) {
-  printf("%-12s %-17s %9s %20s %10s %10s\n", "parameter", "unit", "scene's", "safe from..to", "breaks low",
-         "breaks high");
+  printf("%-12s %-17s %9s %20s %12s %12s\n", "parameter", "unit", "scene's", "safe from..to", "broken below",
+         "broken above");
   for (int i = 0; i < CAV_STRESS_SWEEPS; i++) print_range(i, &report->sweep[i]);
 }
 

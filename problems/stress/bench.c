@@ -10,11 +10,13 @@
 #include "cavort/dynamics.h"
 #include "edit.h"
 #include "file.h"
+#include "math3.h"
 
 enum { BISECTIONS = 60 };
 static const double nearness = 1e-4; // of L, how deep contacts are where nothing is said
 static const double swing = 0.3;     // rad, of samples about the scene's posture
 static const double deep = 1e-3;     // of L, how much deeper links may be in each other there
+static const double upright = 0.99;  // cosine of a slide along the vertical
 
 int cav_bench_turns(const cav_model *model, int i) {
   const cav_joint *joint = &model->joint[model->dof[i].joint];
@@ -152,12 +154,41 @@ static int rubs(const cav_model *m) {
   return 0;
 }
 
-static int can_be_lowered(const cav_model *m) {
-  int floats = 0;
-  for (int i = 0; i < m->njoint; i++) floats += m->joint[i].type == CAV_JOINT_FREE;
-  for (int i = 0; i < m->npair && floats; i++)
-    if (m->geom[m->pair[i].geom1].link == 0 || m->geom[m->pair[i].geom2].link == 0) return 1;
+// by how much a joint of a root link has to move to lift its tree by 1: a free joint along z, a slide along the vertical that
+// no joint before it turns and no limit holds; 0: it lifts nothing
+static double lift_of(const cav_model *m, const cav_joint *joint) {
+  const cav_link *link = &m->link[joint->link];
+  double axis[3];
+  if (link->parent != 0) return 0;
+  if (joint->type == CAV_JOINT_FREE) return 1;
+  if (joint->type != CAV_JOINT_SLIDE || joint->limited) return 0;
+  for (const cav_joint *before = m->joint + link->joint; before < joint; before++)
+    if (before->type != CAV_JOINT_SLIDE) return 0;
+  quat_rotate(axis, link->quat, joint->axis);
+  return fabs(axis[2]) > upright ? 1 / axis[2] : 0;
+}
+
+// whether the tree of a geom can be moved along the vertical
+static int rises(const cav_model *m, int geom) {
+  const cav_link *root = &m->link[m->link[m->geom[geom].link].root];
+  for (int i = root->joint; i < root->joint + root->njoint; i++)
+    if (lift_of(m, &m->joint[i]) != 0) return 1;
   return 0;
+}
+
+// why no contact with the world can be made as deep as asked; NULL: it can
+static const char *not_lowered(const cav_model *m) {
+  int ground = 0;
+  for (int i = 0; i < m->npair; i++) {
+    const int first = m->geom[m->pair[i].geom1].link == 0, second = m->geom[m->pair[i].geom2].link == 0;
+    if (!first && !second) continue;
+    ground = 1;
+    if (rises(m, first ? m->pair[i].geom2 : m->pair[i].geom1)) return NULL;
+  }
+  return ground ? "what can touch the world neither floats nor slides along the vertical without a limit: how deep it "
+                  "is depends "
+                  "on the posture"
+                : "the scene has nothing that stands in the world and can be touched, no floor say";
 }
 
 const char *cav_bench_absent(const cav_bench *b, cav_stress_sweep sweep) {
@@ -178,7 +209,7 @@ const char *cav_bench_absent(const cav_bench *b, cav_stress_sweep sweep) {
     case CAV_STRESS_IMPRATIO:
       return rubs(m) ? NULL : "no contacts with friction";
     case CAV_STRESS_PENETRATION:
-      return can_be_lowered(m) ? NULL : "nothing that floats can touch the world";
+      return not_lowered(m);
     case CAV_STRESS_QUATERNIONS:
       return has_quaternions(m) ? NULL : "no free or ball joint";
     default:
@@ -235,6 +266,12 @@ double cav_bench_own(const cav_bench *b, cav_stress_sweep sweep) {
       break;
   }
   return 1;
+}
+
+int cav_bench_other_law(const cav_bench *b, cav_stress_sweep sweep) {
+  const int discrete = b->options.stabilisation == CAV_STABILISATION_DISCRETE;
+  if (sweep == CAV_STRESS_SOLREF) return discrete;
+  return (sweep == CAV_STRESS_SOFTNESS || sweep == CAV_STRESS_TIME_CONSTANT) && !discrete;
 }
 
 // every other link down each tree, trees by turns
@@ -391,7 +428,7 @@ static void swing_all(cav_bench *b, uint64_t seed, double by) {
   cav_integrate(m, old, w, 1, b->q);
 }
 
-// depth of the deepest contact that moving what floats leaves as it is; -INFINITY: none
+// depth of the deepest contact that moving what floats or slides upright leaves as it is; -INFINITY: none
 static double deepest_inside(const cav_bench *b) {
   double most = -INFINITY;
   if (cav_position(b->model, b->state, b->q)) return most;
@@ -416,8 +453,10 @@ static void take_posture(cav_bench *b, int k) {
 }
 
 static void raise(const cav_bench *b, double by) {
-  for (int i = 0; i < b->model->njoint; i++)
-    if (b->model->joint[i].type == CAV_JOINT_FREE) b->q[b->model->joint[i].q + 2] += by;
+  for (int i = 0; i < b->model->njoint; i++) {
+    const cav_joint *joint = &b->model->joint[i];
+    b->q[joint->q + (joint->type == CAV_JOINT_FREE ? 2 : 0)] += by * lift_of(b->model, joint);
+  }
 }
 
 // depth of the deepest contact with the world, -INFINITY: none. Its status in *status
@@ -431,9 +470,9 @@ static double deepest(const cav_bench *b, cav_status *status) {
   return most;
 }
 
-// moves what floats along z until the deepest contact with the world is as deep as asked, if it can be
+// moves what floats or slides so along z until the deepest contact with the world is as deep as asked, if it can be
 static cav_status lower(cav_bench *b) {
-  if (!can_be_lowered(b->model)) return CAV_OK;
+  if (not_lowered(b->model)) return CAV_OK;
   cav_status status;
   double low = 0, high = 0, step = 0.05 * b->size, now = deepest(b, &status);
   const int down = now < b->depth;

@@ -41,11 +41,15 @@ const char *cav_bench_absent(const cav_bench *bench, cav_stress_sweep sweep);
 /// The scene's own value of a parameter.
 double cav_bench_own(const cav_bench *bench, cav_stress_sweep sweep);
 
+/// Whether the sweep is of the stabilisation that the scene does not use.
+int cav_bench_other_law(const cav_bench *bench, cav_stress_sweep sweep);
+
 /// Pushes the scene to a value of a parameter, all others its own. CAV_BAD_INPUT: there is no such scene, why in error.
 cav_status cav_bench_push(cav_bench *bench, cav_stress_sweep sweep, double value, cav_error *error);
 
 /// Makes sample number k: the posture of the scene (0) or near it, with the deepest contact with the world as deep as
-/// asked where free trees can be lowered to one; v and v_next at random; u of random size. Fails as cav_position.
+/// asked where trees that float or slide along the vertical can be lowered to one; v and v_next at random; u of random size.
+/// Fails as cav_position.
 cav_status cav_bench_sample(cav_bench *bench, int k);
 
 /// Whether dof i is an angle.

@@ -53,7 +53,9 @@ static void value_text(const cav_stress_result *r, int i, char text[TEXT]) {
 static void range_text(const cav_stress_result *r, char *text, size_t size) {
   char low[CAV_HTML_NUMBER], high[CAV_HTML_NUMBER];
   if (isnan(r->edge[0].safe) || isnan(r->edge[1].safe)) {
-    snprintf(text, size, "none: not at the scene's own value");
+    snprintf(text, size,
+             r->other_law ? "none: not at what the scene has for this law, which it does not use"
+                          : "none: not at the scene's own value");
     return;
   }
   cav_html_number_text(r->edge[0].safe, 3, low);
@@ -73,6 +75,10 @@ static void broken_text(const cav_stress_result *r, int side, char *text, size_t
   char number[CAV_HTML_NUMBER];
   snprintf(text, size, "-");
   if (at < 0) return;
+  if (at == r->own_point) {
+    snprintf(text, size, "here");
+    return;
+  }
   cav_html_number_text(r->point[at].value, 3, number);
   snprintf(text, size, "%s%s", number, r->point[at].level == CAV_STRESS_REFUSED ? ", refused" : "");
 }
@@ -143,16 +149,21 @@ static void write_map(cav_html *page, const cav_stress_report *report) {
 // --- one parameter ---
 
 static void write_edges(cav_html *page, const cav_stress_result *r) {
-  static const char *const side_name[] = {"below", "above"};
   for (int side = 0; side < 2; side++) {
     const cav_stress_edge *edge = &r->edge[side];
     char term[80], number[CAV_HTML_NUMBER];
     const int both[2] = {edge->worse, edge->broken != edge->worse ? edge->broken : -1};
     for (int k = 0; k < 2; k++) {
-      if (both[k] < 0) continue;
+      const int here = both[k] == r->own_point;
+      // what is wrong at the scene's own value is one thing, not two
+      if (both[k] < 0 || (here && side)) continue;
       const cav_stress_point *p = &r->point[both[k]];
       cav_html_number_text(p->value, 3, number);
-      snprintf(term, sizeof term, "%s, at %s: %s", side_name[side], number, cav_stress_level_names[p->level]);
+      snprintf(term, sizeof term, "%s %s %s %s",
+               here   ? "here"
+               : side ? "above"
+                      : "below",
+               cav_stress_level_names[p->level], here ? "at" : "from", number);
       cav_html_entry(page, term, "%s", p->why);
     }
   }
@@ -171,7 +182,10 @@ static void write_strip(cav_html *page, const cav_stress_result *r, cav_stress_s
       const double measured = r->point[index[k]].measure[m];
       value[m * n + k] = way_of(&r->point[index[k]], m);
       text[m * n + k][0] = 0;
-      if (!isnan(measured)) cav_html_number_text(measured, 2, text[m * n + k]);
+      if (isnan(measured))
+        snprintf(text[m * n + k], TEXT, "-");
+      else
+        cav_html_number_text(measured, 2, text[m * n + k]);
       cell[m * n + k] = text[m * n + k];
     }
   }
@@ -196,6 +210,11 @@ static void write_sweep(cav_html *page, const cav_stress_report *report, cav_str
   cav_html_heading(page, rule->name);
   range_text(r, range, sizeof range);
   cav_html_paragraph(page, "%s (%s). This scene: %.3g. Safe: %s.", rule->text, rule->unit, r->own, range);
+  if (r->other_law)
+    cav_html_paragraph(
+        page,
+        "This scene stabilises otherwise: what follows is of the same scene under this law, at the value that "
+        "it has for it.");
   write_strip(page, r, sweep);
   write_edges(page, r);
 }
@@ -214,6 +233,11 @@ static void write_head(cav_html *page, const cav_stress_report *report) {
     const cav_stress_measure_rule *rule = &cav_stress_measure_rules[k];
     cav_html_entry(page, rule->name, "%s. Well up to %g, broken from %g on.", rule->text, rule->good, rule->bad);
   }
+  cav_html_paragraph(
+      page,
+      "0: none; of a derivative, none that rounding of the differences does not hide. -: not measured; of a "
+      "derivative, rounding or a kink hides all. Safe: all four are well. Degraded: one is not well, none is "
+      "broken. \"From\": the value nearest to the scene's own at which it was seen.");
 }
 
 cav_status cav_stress_write_page(const char *path, const cav_stress_report *report, const cav_provenance *provenance,

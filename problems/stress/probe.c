@@ -18,6 +18,7 @@
 
 #include "cavort/dynamics.h"
 #include "smooth.h"
+#include "step.h"
 
 enum {
   ROUNDINGS = 32, // of a force, on its way through the tree
@@ -101,11 +102,12 @@ static int is_another(cav_bench *b, const double *u, const double *other) {
 
 static cav_status step_forward(cav_bench *b, cav_stress_trace *e, cav_stress_point *p, const double *q, const double *v,
                                const double *u, double *v_next) {
-  // as cav_forward: its tolerance and limit
+  // as cav_forward
   cav_forward_report report = {0};
-  const int limit = b->pushed.next_gap == CAV_NEXT_GAP_EXACT ? 200 : 100;
-  cav_status status = cav_forward_newton(b->model, b->state, q, v, u, limit, 1e-13, v_next, &report);
+  cav_status status = cav_forward_newton(b->model, b->state, q, v, u, cav_forward_limit(b->state),
+                                         CAV_FORWARD_TOLERANCE, v_next, &report);
   e->solves++;
+  e->none += status == CAV_NOT_CONVERGED && report.folded;
   e->unsolved += status != CAV_OK;
   if (report.iterations > p->iterations) p->iterations = report.iterations;
   return status;

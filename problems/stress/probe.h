@@ -21,6 +21,7 @@ typedef struct cav_stress_trace {
   int block;                ///< of the derivative that misses most: q, v, v'
   int step;                 ///< of the passive run, at which energy was highest
   int unsolved, solves;     ///< forward steps
+  int none;                 ///< of those unsolved, that do not exist
   double rotation;          ///< rad, largest of one dof in one step of the passive run
   double rounding;          ///< m, of the furthest coordinate
 } cav_stress_trace;
@@ -29,9 +30,9 @@ typedef struct cav_stress_trace {
 cav_status cav_stress_measure_point(cav_bench *bench, const cav_stress_effort *effort, cav_stress_point *point,
                                     cav_stress_trace *trace);
 
-/// Sets the level of a point of a sweep about the scene's own value and, where it is not safe, in words what is not
-/// well and what that comes from. why.c.
-void cav_stress_rate(const cav_bench *bench, cav_stress_sweep sweep, double own, const cav_stress_trace *trace,
-                     cav_stress_point *point);
+/// Sets the level of a point of a sweep and, where it is not safe, in words what is not well and what that comes from. here: the
+/// point of the scene's own value, NULL: that is this one. why.c.
+void cav_stress_rate(const cav_bench *bench, cav_stress_sweep sweep, const cav_stress_point *here,
+                     const cav_stress_trace *trace, cav_stress_point *point);
 
 #endif

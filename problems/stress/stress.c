@@ -99,7 +99,10 @@ static int measure(sweep *s, double value) {
   } else {
     cav_stress_trace trace;
     s->status = cav_stress_measure_point(s->bench, &s->work->plan.effort, p, &trace);
-    if (!s->status) cav_stress_rate(s->bench, s->type, s->result->own, &trace, p);
+    const cav_stress_point *own = NULL;
+    for (int i = 0; i < r->npoint; i++)
+      if (i != at && near(r->point[i].value, r->own)) own = &r->point[i];
+    if (!s->status) cav_stress_rate(s->bench, s->type, own, &trace, p);
   }
   return at;
 }
@@ -168,6 +171,7 @@ static void run_sweep(sweep *s) {
   if (s->status) return;
   r->absent = cav_bench_absent(s->bench, s->type);
   if (r->absent) return;
+  r->other_law = cav_bench_other_law(s->bench, s->type);
   r->own = cav_bench_own(s->bench, s->type);
   r->point = calloc(POINTS_MOST, sizeof *r->point);
   if (!r->point) {

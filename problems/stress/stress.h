@@ -86,6 +86,7 @@ typedef struct cav_stress_edge {
 /// One parameter swept.
 typedef struct cav_stress_result {
   const char *absent; ///< why there is nothing to sweep in this scene; NULL: it was swept
+  int other_law;      ///< 1: of the stabilisation that the scene does not use: own is what it would have
   double own;         ///< the scene's value
   int npoint, own_point;
   cav_stress_point *point; ///< [npoint] by value

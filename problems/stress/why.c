@@ -3,10 +3,17 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
+#include "cavort/dynamics.h"
+#include "dense.h"
 #include "edit.h"
 #include "probe.h"
+
+enum { POWERS = 100 };
+// from which on a spring taken where a step begins is unstable; how much worse than at the scene's own value is another thing
+static const double SPRING_BOUND = 4, WORSE = 3;
 
 static void add(char why[CAV_STRESS_WHY], const char *format, ...) __attribute__((format(printf, 2, 3)));
 static void add(char why[CAV_STRESS_WHY], const char *format, ...) {
@@ -51,6 +58,8 @@ static void tell_seen(const cav_bench *b, const cav_stress_trace *e, const cav_s
       break;
     case CAV_STRESS_UNSOLVED:
       add(why, "%d of %d forward steps miss their tolerance", e->unsolved, e->solves);
+      if (e->none > 0)
+        add(why, ", %d of them because there is no such step: those of shorter ones end before", e->none);
       break;
     case CAV_STRESS_ENERGY:
       if (isfinite(seen))
@@ -63,21 +72,52 @@ static void tell_seen(const cav_bench *b, const cav_stress_trace *e, const cav_s
   }
 }
 
-// springs taken at the start of a step are stable while k h^2 is below 4 m; what a damper adds to m is implicit
+// largest k h^2/m of any motion at the sample: k of the joints' springs, m with what dampers add to it, which is implicit, under
+// the order that takes them so; 0 if it cannot be said
+static double stiffest_motion(const cav_bench *b) {
+  const cav_model *m = b->model;
+  const int n = m->nv;
+  const double h = b->pushed.timestep;
+  double *M = calloc((size_t)n * (size_t)(n + 2), sizeof *M), *k = M + n * n, *x = k + n, most = 0;
+  if (!M) return 0;
+  int known = cav_inertia(m, b->state, b->q, M) == CAV_OK;
+  for (int i = 0; i < n && known; i++) {
+    k[i] = m->joint[m->dof[i].joint].stiffness;
+    x[i] = 1 + 0.1 * cos(i);
+    if (b->pushed.order == CAV_ORDER_EULER) M[i * n + i] += h * m->dof[i].damping;
+  }
+  known = known && cav_dense_factor(n, n - 1, M, n);
+  // powers of L^-1 K L'^-1
+  for (int t = 0; t < POWERS && known; t++) {
+    double size = 0;
+    for (int i = 0; i < n; i++) size += x[i] * x[i];
+    if (!(size > 0) || !isfinite(size)) break;
+    most = sqrt(size);
+    for (int i = 0; i < n; i++) x[i] /= most;
+    cav_dense_solve_upper(n, n - 1, M, n, 1, x, n);
+    for (int i = 0; i < n; i++) x[i] *= k[i] * h * h;
+    cav_dense_solve_lower(n, n - 1, M, n, 1, x, n);
+  }
+  free(M);
+  return known ? most : 0;
+}
+
 static int tell_springs(const cav_bench *b, char *why) {
   const char *name = "";
   const double h = b->pushed.timestep, implicit = b->pushed.order == CAV_ORDER_EULER ? h : 0;
-  const double number = b->pushed.passive ? cav_model_stiffest(b->model, implicit, &name) * h * h : 0;
-  if (!(number > 1)) return 0;
+  const double alone = b->pushed.passive ? cav_model_stiffest(b->model, implicit, &name) * h * h : 0;
+  const double number = alone > 0 ? fmax(alone, stiffest_motion(b)) : 0;
+  // what swings by much is met a little before
+  if (!(number > 0.95 * SPRING_BOUND)) return 0;
   add(why,
-      ": a spring of %s has k h^2/m = %.3g, m with its damper's part; taken where a step begins it is stable below "
-      "4, less where several act on one link, more where contacts hold it",
-      *name ? name : "a joint", number);
+      ": springs, that of %s the stiffest, have k h^2/m = %.3g in their fastest motion; taken where a step begins they "
+      "are unstable from %g on, unless constraints hold them",
+      *name ? name : "a joint", number, SPRING_BOUND);
   return 1;
 }
 
 static int tell_rotation(const cav_bench *b, const cav_stress_trace *e, char *why) {
-  if (!(e->rotation > 0.5)) return 0;
+  if (!(e->rotation > 0.5) || (e->worst == CAV_STRESS_UNSOLVED && b->pushed.order == CAV_ORDER_EULER)) return 0;
   add(why, ": a link rotates by %.2g rad in one step", e->rotation);
   if (b->pushed.order != CAV_ORDER_EULER)
     add(why, "; under this order there need be no such step from about one on, nor one alone");
@@ -137,19 +177,33 @@ static const char *const general[CAV_STRESS_SWEEPS][2] = {
     [CAV_STRESS_QUATERNIONS] = {"squares of their components underflow", "squares of their components overflow"},
 };
 
-static void tell_cause(const cav_bench *b, cav_stress_sweep sweep, int above, const cav_stress_trace *e, char *why) {
-  const int forward = e->worst != CAV_STRESS_DERIVATIVE;
+// whether a value is beyond the bound that the words of a side name
+static int is_passed(cav_stress_sweep sweep, int above, double value) {
+  if (sweep == CAV_STRESS_SOLREF && !above) return value < 1.02 / 0.83;
+  if (sweep == CAV_STRESS_SOFTNESS && !above) return value < 1e-8;
+  return 1;
+}
+
+static void tell_cause(const cav_bench *b, cav_stress_sweep sweep, const cav_stress_trace *e,
+                       const cav_stress_point *here, const cav_stress_point *p, char *why) {
+  const int forward = e->worst != CAV_STRESS_DERIVATIVE, above = here && p->value > here->value;
+  const double own = here ? here->measure[e->worst] : NAN;
+  // what is hardly worse than without the parameter does not come from it
+  if (!e->call && own > 0 && isfinite(own) && p->measure[e->worst] < WORSE * own) {
+    add(why, "; at the scene's own value it is %.2g already", own);
+    return;
+  }
   if (tell_rounding(b, e, why)) return;
   if (tell_push(b, e, why)) return;
   if (forward && tell_springs(b, why)) return;
   if (forward && tell_rotation(b, e, why)) return;
   // of a derivative these say nothing
   const char *text = general[sweep][above];
-  if (forward && *text) add(why, ": %s", text);
+  if (forward && here && *text && is_passed(sweep, above, p->value)) add(why, ": %s", text);
 }
 
-void cav_stress_rate(const cav_bench *b, cav_stress_sweep sweep, double own, const cav_stress_trace *trace,
-                     cav_stress_point *p) {
+void cav_stress_rate(const cav_bench *b, cav_stress_sweep sweep, const cav_stress_point *here,
+                     const cav_stress_trace *trace, cav_stress_point *p) {
   cav_stress_trace e = *trace;
   double most = 0;
   p->level = CAV_STRESS_SAFE;
@@ -174,5 +228,5 @@ void cav_stress_rate(const cav_bench *b, cav_stress_sweep sweep, double own, con
   } else {
     return;
   }
-  tell_cause(b, sweep, p->value > own, &e, p->why);
+  tell_cause(b, sweep, &e, here, p, p->why);
 }
