@@ -125,8 +125,8 @@ static void test_roll(void) {
   close_model();
 }
 
-// two balls: one that would be through the other after the step is held off as along its line; one that passes by is
-// let pass
+// two balls: one that would be through the other after the step is held off as along its line, wherever it is hit; one
+// that passes by is let pass
 static void test_balls(void) {
   if (!open_model(scene_load(
           "<mujoco><option gravity='0 0 0'/><worldbody><body><joint type='slide' axis='1 0 0'/>"
@@ -157,6 +157,15 @@ static void test_balls(void) {
     before = f;
   }
   CHECK(jump <= 3e-3 * most);
+  // one that is 3 mm off before the step and after it, and 5 to 50 mm deep on the way, is held off
+  for (int k = 0; k <= 45; k++) {
+    const double aside = 0.05 + 0.001 * k, ahead = sqrt(0.103 * 0.103 - aside * aside);
+    q[1] = ahead - 0.11, q[2] = aside;
+    next[0] = next[2] = 0, next[1] = -2 * ahead / 0.025;
+    CHECK(cav_inverse(model, state, q, v, next, u) == CAV_OK);
+    CHECK_NEAR(state->contact[0].dist, 0.003, 1e-15);
+    CHECK(state->contact[0].impulse[0] > 1);
+  }
   close_model();
 }
 
