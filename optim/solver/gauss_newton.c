@@ -31,9 +31,10 @@ static double now(void) {
 
 /// Directions of one iteration and the model's numbers along them.
 typedef struct dogleg {
+  const cav_normal *normal;
   int size;
   double *newton, *cauchy, *product, *step, *scale; ///< product = H cauchy; scale = diag H
-  double newton_norm, cauchy_norm;
+  double newton_norm, cauchy_norm;                  ///< cauchy_norm negative: its point was not needed yet
 } dogleg;
 
 static double scaled_norm(const dogleg *d, const double *x) {
@@ -48,7 +49,19 @@ static double dot(int n, const double *a, const double *b) {
   return sum;
 }
 
-/// Newton and Cauchy points of the gathered equations; the shift grows until the factor exists.
+/// Cauchy point, unless it is known.
+static void find_cauchy(dogleg *d) {
+  if (d->cauchy_norm >= 0) return;
+  const double *gradient = d->normal->gradient;
+  for (int i = 0; i < d->size; i++) d->cauchy[i] = -gradient[i] / d->scale[i];
+  cav_normal_multiply(d->normal, d->cauchy, d->product);
+  double derivative = dot(d->size, gradient, d->cauchy), curve = dot(d->size, d->cauchy, d->product);
+  double length = curve > 0 ? -derivative / curve : 1;
+  for (int i = 0; i < d->size; i++) d->cauchy[i] *= length, d->product[i] *= length;
+  d->cauchy_norm = scaled_norm(d, d->cauchy);
+}
+
+/// Newton point of the gathered equations; the shift grows until the factor exists.
 static cav_status prepare(dogleg *d, cav_normal *normal) {
   const double *gradient = normal->gradient;
   cav_status status = CAV_NOT_CONVERGED;
@@ -57,22 +70,19 @@ static cav_status prepare(dogleg *d, cav_normal *normal) {
   if (status != CAV_OK) return status;
   for (int i = 0; i < d->size; i++) {
     d->scale[i] = normal->diagonal[i] > 0 ? normal->diagonal[i] : 1;
-    d->cauchy[i] = -gradient[i] / d->scale[i];
     d->step[i] = -gradient[i];
   }
   cav_normal_solve(normal, d->step, d->newton);
-  cav_normal_multiply(normal, d->cauchy, d->product);
-  double derivative = dot(d->size, gradient, d->cauchy), curve = dot(d->size, d->cauchy, d->product);
-  double length = curve > 0 ? -derivative / curve : 1;
-  for (int i = 0; i < d->size; i++) d->cauchy[i] *= length, d->product[i] *= length;
   d->newton_norm = scaled_norm(d, d->newton);
-  d->cauchy_norm = scaled_norm(d, d->cauchy);
+  d->cauchy_norm = -1;
   return CAV_OK;
 }
 
 /// Dogleg step of scaled length radius at most. Returns the decrease that the quadratic model predicts.
-static double bend(dogleg *d, const double *gradient, double radius) {
+static double bend(dogleg *d, double radius) {
+  const double *gradient = d->normal->gradient;
   double a, b; // step = a cauchy + b newton
+  if (d->newton_norm > radius) find_cauchy(d);
   if (d->newton_norm <= radius) {
     a = 0, b = 1;
   } else if (d->cauchy_norm >= radius) {
@@ -87,7 +97,7 @@ static double bend(dogleg *d, const double *gradient, double radius) {
   }
   double largest = 0;
   for (int i = 0; i < d->size; i++) {
-    d->step[i] = a * d->cauchy[i] + b * d->newton[i];
+    d->step[i] = (a != 0 ? a * d->cauchy[i] : 0) + b * d->newton[i];
     largest = fmax(largest, fabs(d->step[i]));
   }
   if (largest > step_limit) {
@@ -95,15 +105,15 @@ static double bend(dogleg *d, const double *gradient, double radius) {
     for (int i = 0; i < d->size; i++) d->step[i] *= step_limit / largest;
   }
   // H newton = -gradient
-  double gc = dot(d->size, gradient, d->cauchy), gn = dot(d->size, gradient, d->newton);
-  double curve = a * a * dot(d->size, d->cauchy, d->product) - 2 * a * b * gc - b * b * gn;
+  double gc = a != 0 ? dot(d->size, gradient, d->cauchy) : 0, gn = dot(d->size, gradient, d->newton);
+  double curve = (a != 0 ? a * a * dot(d->size, d->cauchy, d->product) : 0) - 2 * a * b * gc - b * b * gn;
   return -(a * gc + b * gn) - 0.5 * curve;
 }
 
 static void dogleg_set(dogleg *d, const cav_normal *normal) {
   int size = normal->size;
   double *block = normal->room;
-  *d = (dogleg){.size = size};
+  *d = (dogleg){.normal = normal, .size = size};
   d->newton = block, d->cauchy = block + size, d->product = block + 2 * size, d->step = block + 3 * size;
   d->scale = block + 4 * size;
 }
@@ -115,7 +125,7 @@ static int step_is_held(const cav_transcription *tr, const cav_trajectory *at, d
          (at->timestep >= most * (1 - DBL_EPSILON) && change > 0);
 }
 
-/// Newton and Cauchy points at a trajectory whose normal equations are gathered.
+/// Newton point at a trajectory whose normal equations are gathered.
 static cav_status prepare_at(dogleg *d, cav_normal *normal, const cav_transcription *tr, const cav_trajectory *at) {
   cav_status status = prepare(d, normal);
   if (status != CAV_OK || !tr->free_step || !step_is_held(tr, at, d->newton[d->size - 1])) return status;
@@ -130,9 +140,9 @@ typedef struct trial {
 } trial;
 
 /// Step of the present radius to a trajectory. The transcription ends at it.
-static cav_status try_radius(const cav_region *region, dogleg *d, const cav_normal *normal, cav_transcription *tr,
-                             const cav_trajectory *at, cav_trajectory *to, double merit, trial *t) {
-  t->predicted = bend(d, normal->gradient, region->radius);
+static cav_status try_radius(const cav_region *region, dogleg *d, cav_transcription *tr, const cav_trajectory *at,
+                             cav_trajectory *to, double merit, trial *t) {
+  t->predicted = bend(d, region->radius);
   t->length = scaled_norm(d, d->step);
   cav_transcription_move(tr, at, d->step, to);
   cav_status status = cav_transcription_values(tr, to);
@@ -146,13 +156,13 @@ static int is_held_back(const cav_region *region, const dogleg *d, const trial *
 }
 
 /// Grows the radius while steps of this linearisation are as good as predicted, and gain. Ends with the best step in to.
-static cav_status grow(cav_region *region, dogleg *d, const cav_normal *normal, cav_transcription *tr,
-                       const cav_trajectory *at, cav_trajectory *to, double merit, trial *t) {
+static cav_status grow(cav_region *region, dogleg *d, cav_transcription *tr, const cav_trajectory *at,
+                       cav_trajectory *to, double merit, trial *t) {
   for (int i = 0; i < GROWTH && is_held_back(region, d, t); i++) {
     trial longer = {0};
     double radius = region->radius;
     region->radius *= 2;
-    cav_status status = try_radius(region, d, normal, tr, at, to, merit, &longer);
+    cav_status status = try_radius(region, d, tr, at, to, merit, &longer);
     if (status != CAV_OK) return status;
     if (longer.decrease > 1.01 * t->decrease) {
       *t = longer;
@@ -161,7 +171,7 @@ static cav_status grow(cav_region *region, dogleg *d, const cav_normal *normal, 
     }
     // back to the shorter one; the radius stays for the next linearisation
     region->radius = radius;
-    status = try_radius(region, d, normal, tr, at, to, merit, t);
+    status = try_radius(region, d, tr, at, to, merit, t);
     region->radius = 2 * radius;
     return status;
   }
@@ -170,15 +180,15 @@ static cav_status grow(cav_region *region, dogleg *d, const cav_normal *normal, 
 
 /// Shrinks the radius until a step is as good as predicted, or grows it while it is. What is within rounding of the
 /// merit says nothing about the radius.
-static cav_status search(cav_region *region, dogleg *d, cav_normal *normal, cav_transcription *tr,
-                         const cav_trajectory *at, cav_trajectory *to, double merit, trial *t) {
+static cav_status search(cav_region *region, dogleg *d, cav_transcription *tr, const cav_trajectory *at,
+                         cav_trajectory *to, double merit, trial *t) {
   for (int attempt = 0;; attempt++) {
-    cav_status status = try_radius(region, d, normal, tr, at, to, merit, t);
+    cav_status status = try_radius(region, d, tr, at, to, merit, t);
     if (status != CAV_OK) return status;
     double ratio = t->predicted > 0 ? t->decrease / t->predicted : -1;
     if (t->predicted <= noise * merit) return CAV_OK;
     t->grown = is_held_back(region, d, t);
-    if (t->grown && !region->single) return grow(region, d, normal, tr, at, to, merit, t);
+    if (t->grown && !region->single) return grow(region, d, tr, at, to, merit, t);
     if (t->grown) region->radius *= 2;
     if (ratio < 0.25) region->radius = 0.5 * fmin(t->length, region->radius);
     if (ratio > 1e-4 || attempt > 30 || region->single) return CAV_OK;
@@ -198,17 +208,20 @@ cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_trans
     cav_normal_gather(normal, tr);
     if ((status = prepare_at(&d, normal, tr, *at)) != CAV_OK) break;
     region->seconds_linear += now() - start;
-    if (!(region->radius > 0)) region->radius = d.cauchy_norm;
+    if (!(region->radius > 0)) {
+      find_cauchy(&d);
+      region->radius = d.cauchy_norm;
+    }
 
     // a Newton step that predicts no more than rounding is the end
-    double predicted = bend(&d, normal->gradient, INFINITY);
+    double predicted = bend(&d, INFINITY);
     if (predicted <= noise * merit) {
       region->settled = 1;
       fresh = 0;
       break;
     }
     trial t = {0};
-    status = search(region, &d, normal, tr, *at, *spare, merit, &t);
+    status = search(region, &d, tr, *at, *spare, merit, &t);
     region->done++;
     fresh = t.decrease > 0 && status == CAV_OK;
     if (fresh) {

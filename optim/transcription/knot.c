@@ -69,7 +69,7 @@ static row_count cost_rows(const cav_transcription *tr, const int *key, const ca
     case CAV_QUANTITY_VELOCITY:
     case CAV_QUANTITY_ACCELERATION:
       if (rate ? !knot->has_force : !cav_knot_moves(tr, t)) break;
-      for (int d = 0; d < tr->nv; d++) n.rows += (size_t)cav_dof_selected(tr, term, d);
+      n.rows = (size_t)cav_term_window(tr, term)->dofs;
       break;
     case CAV_QUANTITY_EFFORT:
       if (!knot->has_force) break;
@@ -156,6 +156,11 @@ int cav_knot_reserve(cav_transcription *tr, cav_scratch *s, int t) {
 }
 
 // ---------------------------------------------------------------- rows
+
+/// Whether a term selects a dof.
+static inline int selects(const cav_transcription *tr, const cav_term *term, int d) {
+  return cav_term_window(tr, term)->dofs == tr->nv || cav_dof_selected(tr, term, d);
+}
 
 /// Starts a row of weight/2 r^2. Where the step is free its derivative by the step's logarithm is the difference of two
 /// passes that begin the same rows; weights count with it, as integrals are sums over steps.
@@ -348,8 +353,10 @@ static void add_velocity(cav_sum *a, const cav_term *term, double weight, const 
   if (!cav_knot_moves(tr, a->t)) return;
   cav_term_target(term, a->knot->time, tr->nv, goal);
   for (int d = 0; d < tr->nv; d++) {
-    if (!cav_dof_selected(tr, term, d)) continue;
-    int n = velocity_entries(tr, a->t, d, tr->nv, cav_knot_moves(tr, a->t - 1), 1 / term->scale, column, entry);
+    if (!selects(tr, term, d)) continue;
+    int n = 0;
+    if (a->jacobian)
+      n = velocity_entries(tr, a->t, d, tr->nv, cav_knot_moves(tr, a->t - 1), 1 / term->scale, column, entry);
     double r = (v[d] - goal[d]) / term->scale, w = weight;
     begin_cost(a, term, 1, &w, &r);
     add_sparse(a, w, r, n, column, entry);
@@ -373,8 +380,8 @@ static void add_acceleration(cav_sum *a, const cav_term *term, double weight, co
   if (!a->knot->has_force) return;
   cav_term_target(term, a->knot->time, tr->nv, goal);
   for (int d = 0; d < tr->nv; d++) {
-    if (!cav_dof_selected(tr, term, d)) continue;
-    int n = acceleration_entries(a, d, 1 / term->scale, column, entry);
+    if (!selects(tr, term, d)) continue;
+    int n = a->jacobian ? acceleration_entries(a, d, 1 / term->scale, column, entry) : 0;
     double r = ((v_next[d] - v[d]) / tr->options.timestep - goal[d]) / term->scale, w = weight;
     begin_cost(a, term, 1, &w, &r);
     add_sparse(a, w, r, n, column, entry);
@@ -421,8 +428,8 @@ static void add_posture(cav_sum *a, const cav_term *term, double weight, const d
   if (!cav_knot_moves(tr, a->t)) return;
   posture_difference(a, term, q, a->s->tangent);
   for (int d = 0; d < tr->nv; d++) {
-    if (!cav_dof_selected(tr, term, d)) continue;
-    int n = posture_entries(tr, a->s->tangent, d, 1 / term->scale, column, entry);
+    if (!selects(tr, term, d)) continue;
+    int n = a->jacobian ? posture_entries(tr, a->s->tangent, d, 1 / term->scale, column, entry) : 0;
     double r = a->s->tangent[d] / term->scale, w = weight;
     begin_cost(a, term, 1, &w, &r);
     add_sparse(a, w, r, n, column, entry);
@@ -534,22 +541,15 @@ static void add_cost(cav_sum *a, const cav_term *term, int reading, const double
   }
 }
 
-/// Cost terms. reading counts through the readings of sensors, which stand in the order of the terms. Each begins the
-/// rows that were counted for it.
+/// Cost terms. reading counts through the readings of sensors, which stand in the order of the terms.
 static void add_costs(cav_sum *a, const double *q, const double *v, const double *v_next) {
   const cav_transcription *tr = a->tr;
   int reading = CAV_CONTACT_READINGS * a->knot->ncontact;
   for (int i = 0; i < tr->problem->nterm; i++) {
     const cav_term *term = &tr->problem->term[i];
-    row_count before = {(size_t)a->row, (size_t)a->knot->ndense};
     if (cav_term_weight(tr, term, a->t) == 0) continue;
-    if (term->use == CAV_USE_COST) {
-      add_cost(a, term, reading, q, v, v_next);
-      row_count n = cost_rows(tr, a->s->key, term, a->t);
-      assert((size_t)a->row == before.rows + n.rows && (size_t)a->knot->ndense <= before.dense + n.dense);
-      (void)before, (void)n;
-    }
-    reading += cav_term_readings(tr, term, a->t);
+    if (term->use == CAV_USE_COST) add_cost(a, term, reading, q, v, v_next);
+    reading += cav_term_dim(term);
   }
   assert(reading == a->knot->nread);
   // the duration's own penalty
@@ -666,7 +666,7 @@ static int add_hard_dofs(cav_sum *a, const cav_term *term, int i, double lower, 
     cav_term_target(term, a->knot->time, tr->nv, a->s->tangent);
   }
   for (int d = 0; d < tr->nv; d++) {
-    if (!cav_dof_selected(tr, term, d)) continue;
+    if (!selects(tr, term, d)) continue;
     int n = 0;
     double measured = rate ? (v_next[d] - v[d]) / tr->options.timestep : v[d];
     double value = (posture ? a->s->tangent[d] : measured - a->s->tangent[d]) / term->scale;
@@ -687,7 +687,7 @@ static void add_hard_terms(cav_sum *a, const double *q, const double *v, const d
   for (int k = 0; k < tr->problem->nterm; k++) {
     const cav_term *term = &tr->problem->term[k];
     if (cav_term_weight(tr, term, a->t) == 0) continue;
-    int dim = cav_term_readings(tr, term, a->t), range = term->use == CAV_USE_RANGE;
+    int dim = cav_term_dim(term), range = term->use == CAV_USE_RANGE;
     double lower = range ? term->lower / term->scale : 0, upper = range ? term->upper / term->scale : 0;
     if (term->use == CAV_USE_COST) {
       reading += dim;

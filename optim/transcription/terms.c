@@ -14,26 +14,34 @@ static const double near_knot = 1e-6;
 /// Whether what a term measures needs the forces of a knot.
 static int reads_force(const cav_term *term) { return cav_term_stage(term) == CAV_READS_ACCELERATION; }
 
-/// Whether a term measures an acceleration or a force at a last knot that nothing leaves.
-static int is_unforced(const cav_transcription *tr, const cav_term *term, int t) {
-  return !tr->knot[t].has_force && reads_force(term);
-}
-
 double cav_knot_time(const cav_transcription *tr, int t) { return t * tr->problem->timestep; }
 
-/// Whether a term speaks at a knot; its weight there (time step of an integral, or 1 at a single knot).
-double cav_term_weight(const cav_transcription *tr, const cav_term *term, int t) {
-  if (is_unforced(tr, term, t)) return 0;
+/// Knots at which a term speaks.
+static cav_window window_of(const cav_transcription *tr, const cav_term *term) {
   double h = tr->problem->timestep, end = (tr->nknot - 1) * h, to = fmin(term->to < 0 ? end : term->to, end);
   double from = fmin(term->from < 0 ? end : term->from, end);
-  int first = (int)ceil(from / h - near_knot), last = (int)floor(to / h + near_knot);
+  cav_window w = {.first = (int)ceil(from / h - near_knot), .last = (int)floor(to / h + near_knot)};
   // one instant, or a window between two knots: the knot nearest to its middle
-  if (to - from < 1e-9 || first > last) return t == (int)lround((from + to) / (2 * h)) ? 1 : 0;
+  w.single = to - from < 1e-9 || w.first > w.last;
+  if (w.single) w.first = w.last = (int)lround((from + to) / (2 * h));
   // both ends of a cycle are one knot: costs count it once, at its end, or where its forces are
-  if (tr->periodicity && t == 0 && first == 0 && last == tr->nknot - 1 && term->use == CAV_USE_COST &&
+  if (tr->periodicity && !w.single && w.first == 0 && w.last == tr->nknot - 1 && term->use == CAV_USE_COST &&
       !reads_force(term))
-    return 0;
-  return t >= first && t <= last ? tr->options.timestep : 0;
+    w.first = 1;
+  // a last knot that nothing leaves has no acceleration and no force
+  if (reads_force(term) && w.last == tr->nknot - 1 && !cav_knot_has_force(tr, w.last)) w.last--;
+  for (int d = 0; d < tr->nv; d++) w.dofs += cav_dof_selected(tr, term, d);
+  return w;
+}
+
+void cav_term_windows(cav_transcription *tr) {
+  for (int i = 0; i < tr->problem->nterm; i++) tr->window[i] = window_of(tr, &tr->problem->term[i]);
+}
+
+double cav_term_weight(const cav_transcription *tr, const cav_term *term, int t) {
+  const cav_window *w = cav_term_window(tr, term);
+  if (t < w->first || t > w->last) return 0;
+  return w->single ? 1 : tr->options.timestep;
 }
 
 /// Readings of a term: none but for sensors.
@@ -44,7 +52,8 @@ int cav_term_dim(const cav_term *term) {
 }
 
 int cav_term_readings(const cav_transcription *tr, const cav_term *term, int t) {
-  return cav_term_weight(tr, term, t) == 0 ? 0 : cav_term_dim(term);
+  int n = cav_term_dim(term);
+  return n > 0 && cav_term_weight(tr, term, t) == 0 ? 0 : n;
 }
 
 int cav_dof_selected(const cav_transcription *tr, const cav_term *term, int d) {

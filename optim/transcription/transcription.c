@@ -139,9 +139,7 @@ static int term_slots(const cav_transcription *tr, const cav_term *term, int t) 
   // others are refused by cav_solve
   assert(cav_quantity_rule_of(term->quantity)->hard);
   if (term->quantity == CAV_QUANTITY_SENSOR) return cav_term_dim(term);
-  int n = 0;
-  for (int d = 0; d < tr->nv; d++) n += cav_dof_selected(tr, term, d);
-  return n;
+  return cav_term_window(tr, term)->dofs;
 }
 
 static cav_slot_layout layout_of(const cav_transcription *tr, int t) {
@@ -167,12 +165,16 @@ static void *room(int *ok, size_t n, size_t size) {
   return p;
 }
 
+int cav_knot_has_force(const cav_transcription *tr, int t) {
+  return t < tr->nknot - 1 || (tr->problem->close_at_rest && !tr->periodicity);
+}
+
 static int knot_new(cav_transcription *tr, int t) {
   cav_knot *knot = &tr->knot[t];
   int ok = 1;
   size_t n = (size_t)tr->nv;
   knot->time = t * tr->options.timestep;
-  knot->has_force = t < tr->nknot - 1 || (tr->problem->close_at_rest && !tr->periodicity);
+  knot->has_force = cav_knot_has_force(tr, t);
   knot->layout = layout_of(tr, t);
   knot->slot = room(&ok, (size_t)knot->layout.count, sizeof *knot->slot);
   knot->u = room(&ok, n, sizeof(double));
@@ -229,7 +231,9 @@ cav_transcription *cav_transcription_new(const cav_problem *problem, int threads
   if (!tr->pool || !list_rotations(tr)) goto memory;
   tr->before = calloc(2 * (size_t)tr->nv + 1, sizeof(double));
   tr->rotation_after = calloc(CAV_ROTATION_SIZE * (size_t)tr->nrotation + 1, sizeof(double));
-  if (!tr->before || !tr->rotation_after) goto memory;
+  tr->window = calloc((size_t)problem->nterm + 1, sizeof *tr->window);
+  if (!tr->before || !tr->rotation_after || !tr->window) goto memory;
+  cav_term_windows(tr);
   tr->after = tr->before + tr->nv;
   tr->scratch = calloc((size_t)cav_parallel_size(tr->pool), sizeof *tr->scratch);
   if (!tr->scratch) goto memory;
@@ -269,7 +273,7 @@ void cav_transcription_free(cav_transcription *tr) {
   free(tr->servo), free(tr->limited);
   free(tr->unactuated), free(tr->effort), free(tr->effort_range), free(tr->effort_unit), free(tr->rotation_dof),
       free(tr->rotation_of);
-  free(tr->knot), free(tr->status), free(tr->scratch), free(tr->before), free(tr->rotation_after);
+  free(tr->knot), free(tr->status), free(tr->scratch), free(tr->before), free(tr->rotation_after), free(tr->window);
   cav_periodicity_free(tr->periodicity);
   cav_parallel_free(tr->pool);
   free(tr);
@@ -413,7 +417,7 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   s->state->options = tr->options;
 
   // dynamics, first beside the step where that is an unknown
-  double start = now();
+  double start = p->jacobian ? now() : 0;
   cav_status status = cav_inverse(tr->model, s->state, q, v, v_next, knot->u);
   if (status != CAV_OK) return status;
   if (!cav_readings_list(tr, s, t) || !cav_knot_reserve(tr, s, t)) return CAV_NO_MEMORY;
@@ -432,7 +436,7 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
     chain(tr, t, nv, s->dq, s->dv, s->dn, knot->du);
     chain(tr, t, knot->nread, s->dq + (size_t)nv * nv, s->dv + (size_t)nv * nv, s->dn + (size_t)nv * nv, knot->dy);
   }
-  s->seconds += now() - start;
+  if (p->jacobian) s->seconds += now() - start;
 
   // rows
   cav_sum a = {.tr = tr, .s = s, .knot = knot, .t = t, .jacobian = p->jacobian};
@@ -484,12 +488,15 @@ static cav_status evaluate(cav_transcription *tr, cav_trajectory *at, int jacobi
   cav_status *status = tr->status, result = CAV_OK;
   memset(status, 0, (size_t)tr->nknot * sizeof *status);
   prepare_ends(tr, at);
+  cav_term_windows(tr);
   if (jacobian) prepare_rotations(tr, at);
   for (int i = 0; i < members; i++) tr->scratch[i].seconds = 0;
   pass p = {tr, at, jacobian, status};
   cav_parallel_for(tr->pool, tr->nknot, evaluate_item, &p);
   for (int t = 0; t < tr->nknot && result == CAV_OK; t++) result = status[t];
   for (int i = 0; i < members; i++) dynamics += tr->scratch[i].seconds / members;
+  // values alone are dynamics: a clock at every knot would take a twentieth of their time
+  if (!jacobian) dynamics = now() - start;
   tr->seconds_dynamics += dynamics;
   tr->seconds_assembly += now() - start - dynamics;
   return result;

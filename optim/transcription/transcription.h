@@ -2,6 +2,9 @@
 #ifndef CAVORT_TRANSCRIPTION_H
 #define CAVORT_TRANSCRIPTION_H
 
+#include <assert.h>
+#include <stddef.h>
+
 #include "cavort/solve.h"
 #include "parallel.h"
 #include "periodicity.h"
@@ -90,6 +93,13 @@ typedef struct cav_servo {
   double constant, *of_q, *of_v; ///< [n]
 } cav_servo;
 
+/// Where a term speaks.
+typedef struct cav_window {
+  int first, last; ///< knots, none where last is below first
+  int single;      ///< 1: at one knot with weight 1; 0: an integral
+  int dofs;        ///< number that it selects
+} cav_window;
+
 typedef struct cav_transcription {
   const cav_problem *problem;
   const cav_model *model;
@@ -108,8 +118,9 @@ typedef struct cav_transcription {
   double (*effort_range)[2];    ///< [nlimit] limits of effort, scaled; of servos with limits of control alone, those
   cav_servo *servo;             ///< [nlimit]
   int nrotation;
-  int *rotation_dof; ///< [nturn] first of three rotational dofs
-  int *rotation_of;  ///< [nv] index into turn_dof or -1
+  int *rotation_dof;  ///< [nturn] first of three rotational dofs
+  int *rotation_of;   ///< [nv] index into turn_dof or -1
+  cav_window *window; ///< [nterm]
   cav_penalties penalty;
   cav_derivative derivative;        ///< of u, contacts and sensors
   cav_derivative difference;        ///< what stands in where there is no analytic one
@@ -212,8 +223,19 @@ void cav_transcription_origin(const cav_transcription *transcription, int t, int
 void cav_transcription_move(const cav_transcription *transcription, const cav_trajectory *from, const double *x,
                             cav_trajectory *to);
 
-/// Weight with which a term speaks at knot t: the step for an integral, 1 at a single knot, 0 outside its window.
-/// terms.c.
+/// Windows of the terms from the problem; evaluations find them anew. Window of a term of the problem. terms.c.
+void cav_term_windows(cav_transcription *transcription);
+static inline const cav_window *cav_term_window(const cav_transcription *transcription, const cav_term *term) {
+  const ptrdiff_t i = term - transcription->problem->term;
+  assert(i >= 0 && i < transcription->problem->nterm);
+  return &transcription->window[i];
+}
+
+/// Whether something leaves knot t, so that it has forces.
+int cav_knot_has_force(const cav_transcription *transcription, int t);
+
+/// Weight with which a term of the problem speaks at knot t: the step for an integral, 1 at a single knot, 0 outside its
+/// window. terms.c.
 double cav_term_weight(const cav_transcription *transcription, const cav_term *term, int t);
 
 /// Readings of a term (sensors only) where it speaks, and at knot t: 0 where it does not; whether it selects a dof; and
