@@ -1,5 +1,6 @@
-/// Result folders played in MuJoCo at 1 ms and 2 ms, beside what the certificate says of the same motion. Usage:
-/// bench_replay FACTOR FOLDER...: a row of a table for each, with gains times the factor.
+/// Result folders played in MuJoCo. Usage: bench_replay FACTOR FOLDER...: a row of a table for each, at 1 ms and 2 ms,
+/// beside what the certificate says of the same motion, with gains times the factor; bench_replay apart FOLDER...: at
+/// steps and from starts that no gains were chosen by.
 #include "check.h"
 
 #ifndef CAVORT_HAVE_MUJOCO
@@ -13,26 +14,46 @@ int main(void) {
 #include "replay.h"
 #include "result.h"
 
+enum { STARTS = 8 };
+static const double off = 0.003; // m or rad; velocities m/s or rad/s ten times that
+
+// a row of a motion at steps of 0.5 and 4 ms, and at 1 ms from starts that are a little off
+static void report_apart(replay *s, const char *motion) {
+  const double duration = s->problem->duration * s->periods;
+  int follow = 0;
+  replay_end worst = {0};
+  printf("| %s | %.2f |", motion, duration);
+  for (int fourfold = 0; fourfold < 2; fourfold++) {
+    replay_end p = replay_play(s, fourfold ? 0.004 : 0.0005, 1, 0);
+    printf(" %.2f | %.0f |", p.seconds, 1e3 * p.body);
+  }
+  scene_seed = 1;
+  for (int i = 0; i < STARTS; i++) {
+    replay_end p = replay_play(s, 0.001, 1, off);
+    const int whole = p.seconds >= duration * (1 - 1e-9);
+    follow += whole;
+    if (whole) worst.body = fmax(worst.body, p.body);
+  }
+  printf(" %d of %d | %.0f |\n", follow, STARTS, 1e3 * worst.body);
+}
+
 // one row
-static void report(replay *s, const char *folder) {
+static void report(replay *s, const char *motion) {
   cav_verdict v = {0};
   cav_error error = {0};
   const cav_problem *problem = s->problem;
   CHECK(cav_verify(problem, s->plan, &problem->contact, s->gain_q, s->gain_v, &v, &error) == CAV_OK);
-  char *path = strdup(folder), *name = basename(path);
-  const char *motion = strncmp(name, "r-", 2) ? name : name + 2;
   printf("| %s | %s | %s | %.2f | %.2f | %.0f | %.2f | %.0f |", motion, v.certified ? "yes" : "no",
          v.achieved ? "yes" : "no", v.duration * v.periods, v.closed_loop_seconds, 1e3 * v.closed_loop_end_error_m,
          v.model_contacts_seconds, 1e3 * v.model_contacts_end_error_m);
   for (int ms = 1; ms <= 2; ms++) {
-    replay_end p = replay_play(s, 1e-3 * ms, 1);
+    replay_end p = replay_play(s, 1e-3 * ms, 1, 0);
     printf(" %.2f | %.0f | %.0f |", p.seconds, 1e3 * p.body, 1e3 * p.root);
   }
   printf(" %.1f |\n", v.push_survived_n_s);
-  free(path);
 }
 
-static void run(const char *folder, double factor) {
+static void run(const char *folder, int apart, double factor) {
   cav_error error = {0};
   cav_result *result = cav_result_read(folder, NULL, &error);
   CHECK(result != NULL);
@@ -43,17 +64,20 @@ static void run(const char *folder, double factor) {
   for (size_t k = 0; k < gains && result->gain_q; k++) result->gain_q[k] *= factor, result->gain_v[k] *= factor;
   replay s = {.problem = result->problem, .plan = result->trajectory};
   s.gain_q = result->gain_q, s.gain_v = result->gain_v;
-  char *path = cav_result_path(folder, "problem.xml");
+  char *path = cav_result_path(folder, "problem.xml"), *copy = strdup(folder), *name = basename(copy);
+  const char *motion = strncmp(name, "r-", 2) ? name : name + 2;
   if (!result->gain_q) fprintf(stderr, "    %s: has no gains\n", folder);
-  if (CHECK(result->gain_q) && replay_open(&s, path)) report(&s, folder);
+  if (CHECK(result->gain_q) && replay_open(&s, path)) (apart ? report_apart : report)(&s, motion);
   replay_close(&s);
   free(path);
+  free(copy);
   cav_result_free(result);
 }
 
 int main(int argc, char **argv) {
   for (int i = 2; i < argc; i++) {
-    run(argv[i], strtod(argv[1], NULL));
+    const int apart = !strcmp(argv[1], "apart");
+    run(argv[i], apart, apart ? 1 : strtod(argv[1], NULL));
     fflush(stdout);
   }
   return check_failed > 0;

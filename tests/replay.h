@@ -10,6 +10,7 @@
 #include "cavort/cavort.h"
 #include "check.h"
 #include "cycle_image.h"
+#include "scene.h"
 
 /// A motion being played.
 typedef struct replay {
@@ -151,14 +152,19 @@ static inline int replay_follows(const replay *s, int i, replay_end *p) {
   return p->body <= 0.5 && turn <= 1;
 }
 
-/// The motion in MuJoCo at a step, s; forces 0: without those of the motion and without gains.
-static inline replay_end replay_play(replay *s, double step, int forces) {
+/// The motion in MuJoCo at a step, s; forces 0: without those of the motion and without gains. off: slides and hinges
+/// start off the plan by up to so many m or rad, velocities by up to ten times that, as scene_uniform says.
+static inline replay_end replay_play(replay *s, double step, int forces, double off) {
   replay_end p = {0};
   s->motion = cav_trajectory_resample(s->model, s->all, step);
   s->theirs->opt.timestep = s->motion->timestep;
   mj_resetData(s->theirs, s->data);
   for (int k = 0; k < s->model->nq; k++) s->data->qpos[s->q_at[k]] = s->motion->q[k];
   for (int d = 0; d < s->model->nv; d++) s->data->qvel[s->v_at[d]] = s->motion->v[d];
+  for (int d = 0; d < s->model->nv && off > 0; d++) s->data->qvel[s->v_at[d]] += 10 * off * scene_uniform();
+  for (int j = 0; j < s->model->njoint && off > 0; j++)
+    if (s->model->joint[j].type >= CAV_JOINT_SLIDE)
+      s->data->qpos[s->q_at[s->model->joint[j].q]] += off * scene_uniform();
   for (int i = 0; i + 1 < s->motion->nknot; i++) {
     if (forces) replay_control(s, i);
     mj_step(s->theirs, s->data);
@@ -167,6 +173,20 @@ static inline replay_end replay_play(replay *s, double step, int forces) {
   }
   cav_trajectory_free(s->motion);
   return p;
+}
+
+// A copy of a model's file without its keys, which are too short once bodies are added; 0 where it has none.
+static inline int replay_drop_keys(const char *model_path, char *copy) {
+  static char text[1 << 16];
+  FILE *stream = fopen(model_path, "r");
+  text[stream ? fread(text, 1, sizeof text - 1, stream) : 0] = 0;
+  if (stream) fclose(stream);
+  char *from = strstr(text, "<keyframe>"), *to = from ? strstr(from, "</keyframe>") : NULL;
+  if (!to) return 0;
+  const int descriptor = mkstemps(copy, 4);
+  dprintf(descriptor, "%.*s%s", (int)(from - text), text, to + strlen("</keyframe>"));
+  close(descriptor);
+  return 1;
 }
 
 // MuJoCo's model of the problem's file, with what the problem's scene puts into the world; path: the problem's file
@@ -182,8 +202,10 @@ static inline mjModel *replay_load(const char *path, const char *model_path) {
   for (char *line = from ? strtok(from + strlen("<scene>"), "\n") : NULL; line; line = strtok(NULL, "\n"))
     if (!strstr(line, "<remove")) strcat(added, line);
   const int adds = strchr(added, '<') != NULL, descriptor = adds ? mkstemps(file, 4) : -1;
+  char bare[] = "/tmp/cavort-replay-XXXXXX.xml";
+  const int keyless = adds ? replay_drop_keys(model_path, bare) : 0;
   if (adds) {
-    char *full = realpath(model_path, NULL);
+    char *full = keyless ? strdup(bare) : realpath(model_path, NULL);
     dprintf(descriptor, "<mujoco><include file=\"..%s\"/><worldbody>%s</worldbody></mujoco>", full, added);
     close(descriptor);
     free(full);
@@ -191,6 +213,7 @@ static inline mjModel *replay_load(const char *path, const char *model_path) {
   mjModel *model = mj_loadXML(adds ? file : model_path, NULL, text, sizeof text);
   if (!model) fprintf(stderr, "    %s\n", text);
   if (adds) unlink(file);
+  if (keyless) unlink(bare);
   return model;
 }
 

@@ -26,7 +26,8 @@ static void check_motion(const motion_case *c) {
     replay s = {.problem = problem, .plan = solution->trajectory};
     s.gain_q = solution->gain_q, s.gain_v = solution->gain_v;
     if (replay_open(&s, path)) {
-      replay_end fine = replay_play(&s, 0.001, 1), coarse = replay_play(&s, 0.002, 1), limp = replay_play(&s, 0.002, 0);
+      replay_end fine = replay_play(&s, 0.001, 1, 0), coarse = replay_play(&s, 0.002, 1, 0),
+                 limp = replay_play(&s, 0.002, 0, 0);
       double duration = problem->duration * s.periods * (1 - 1e-9);
       printf("%-14s %-26s ends %4.0f and %4.0f mm from the plan (limp after %.2f of %.2f s)\n", c->motion,
              problem->model->name, 1e3 * fine.body, 1e3 * coarse.body, limp.seconds, duration);
