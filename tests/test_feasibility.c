@@ -90,7 +90,7 @@ static const pair pairs[] = {
      "'shoulder' needs -9.81 N m"},
     {"too high to pump in the time", PENDULUM, NULL, "duration='3' timestep='.05' close='open'", "",
      CONSTRAINT("<posture name='up' joint='pivot' qpos='3.1416' at='3'/>"),
-     CONSTRAINT("<posture name='up' joint='pivot' qpos='.4' at='3'/>"), CAV_CONDITION_ENERGY, "pumping takes at least"},
+     CONSTRAINT("<posture name='up' joint='pivot' qpos='.4' at='3'/>"), CAV_CONDITION_ENERGY, "it takes at least"},
     {"too fast", SLIDE("1 0 0", "2", "4"), NULL, "duration='1' timestep='.01' close='open'", "",
      CONSTRAINT("<posture name='far' joint='slide' qpos='8' at='1'/>"),
      CONSTRAINT("<posture name='far' joint='slide' qpos='.99' at='1'/>"), CAV_CONDITION_ENERGY, "too far for the time"},

@@ -85,16 +85,16 @@ static void test_gait(const char *text, double axis, double travel) {
   }
   // no gait where it stands, nor where the guess swings already; a guess that is held is not held twice
   goal[0] = q[0];
-  CHECK(offers(&p, "stated soft hold slow momentum longer"));
+  CHECK(offers(&p, "stated soft hold slow momentum repair-1 repair-2 repair-3 repair-4 longer"));
   p.guess = CAV_GUESS_HOLD;
-  CHECK(offers(&p, "stated soft line slow momentum longer"));
+  CHECK(offers(&p, "stated soft line slow momentum repair-1 repair-2 repair-3 repair-4 longer"));
   p.guess = CAV_GUESS_INTERPOLATE;
   p.guess_height = 0.3;
-  CHECK(offers(&p, "stated soft line hold slow momentum longer"));
+  CHECK(offers(&p, "stated soft line hold slow momentum repair-1 repair-2 repair-3 repair-4 longer"));
   goal[0] += travel;
   p.nswing = 1;
   p.swing = &(cav_swing){.joint = 1, .amplitude = 0.1, .frequency = 1};
-  CHECK(offers(&p, "stated soft line hold slow momentum longer"));
+  CHECK(offers(&p, "stated soft line hold slow momentum repair-1 repair-2 repair-3 repair-4 longer"));
   // taking one leaves the problem as it was
   CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK);
   cav_strategy_apply(&p, &strategy[0], &taken);
@@ -116,7 +116,7 @@ static void check_order(cav_problem *p) {
   cav_strategy strategy[CAV_STRATEGIES];
   int n;
   p->order = CAV_ORDER_MOMENTUM;
-  CHECK(offers(p, "stated midpoint soft hold slow longer"));
+  CHECK(offers(p, "stated midpoint soft hold slow repair-1 repair-2 repair-3 repair-4 longer"));
   CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
   cav_solution *straight = NULL, *round = NULL;
   runs = first_stall = last_stall = 0;
@@ -179,10 +179,82 @@ static void test_stalls(void) {
   cav_model_free(m);
 }
 
+// the usual cure of what is missed first, one more at each call; the problem stays as it was
+static void test_repair(void) {
+  cav_model *m = scene_load(BIPED("1"));
+  if (!CHECK(m != NULL)) return;
+  double q[20], v[20] = {0};
+  cav_configuration_reset(m, q);
+  cav_term terms[] = {
+      {.name = "goal", .quantity = CAV_QUANTITY_CONFIGURATION, .weight = 900, .from = 1, .to = 1, .scale = 1},
+      {.name = "slip", .quantity = CAV_QUANTITY_SLIP, .weight = 200, .to = -1, .scale = 1}};
+  cav_problem p = cav_problem_default(m), taken;
+  p.q_start = p.q_goal = q, p.v_start = v, p.term = terms, p.nterm = 2;
+  cav_strategy strategy[CAV_STRATEGIES], once, twice;
+  cav_verdict good = {.certified = 0, .achieved = 1}, lost = good, slips = good, hangs = {.certified = 1};
+  slips.slip_mean_m_s = 0.02;
+  int n, found;
+  CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK);
+  // closed loops that are lost: contact forces cost something, then half the step
+  CHECK(cav_strategy_repair(&p, &strategy[0], &lost, 0, &once, &found) == CAV_OK && found);
+  cav_strategy_apply(&p, &once, &taken);
+  CHECK(taken.nterm == 3 && taken.term[2].quantity == CAV_QUANTITY_FORCE && taken.term[2].weight == 1);
+  CHECK(taken.timestep == p.timestep && !strcmp(once.changed, "<force weight=\"1\"/>"));
+  CHECK(cav_strategy_repair(&p, &once, &lost, 1, &twice, &found) == CAV_OK && found);
+  cav_strategy_apply(&p, &twice, &taken);
+  CHECK(taken.nterm == 3 && taken.timestep == p.timestep / 2 && strstr(twice.changed, "<force") &&
+        strstr(twice.changed, "timestep"));
+  cav_strategy_clear(&once), cav_strategy_clear(&twice);
+  // slip weighs ten times as much; a goal that is missed gets effort, then weight; what is good needs nothing
+  CHECK(cav_strategy_repair(&p, &strategy[0], &slips, 0, &once, &found) == CAV_OK && found);
+  CHECK(once.nterm == 3 && once.term[1].weight + once.term[2].weight == 2000);
+  cav_strategy_clear(&once);
+  CHECK(cav_strategy_repair(&p, &strategy[0], &hangs, 0, &once, &found) == CAV_OK && found && once.effort_limit == 0.9);
+  CHECK(cav_strategy_repair(&p, &once, &hangs, 1, &twice, &found) == CAV_OK && found && twice.term[0].weight == 9000);
+  CHECK(twice.term[1].weight == 200 && !strcmp(twice.changed, "weights of goals 10 times, <limits effort=\"0.9\"/>"));
+  cav_strategy_clear(&once), cav_strategy_clear(&twice);
+  hangs.achieved = 1;
+  CHECK(cav_strategy_repair(&p, &strategy[0], &hangs, 0, &once, &found) == CAV_OK && !found);
+  CHECK(p.nterm == 2 && terms[0].weight == 900 && terms[1].weight == 200 && p.effort_limit == 0.8);
+  cav_model_free(m);
+}
+
+// a height that is asked for above the way from start to goal: an arc about that time, ballistic
+static void test_leap(void) {
+  cav_model *m = scene_load(BIPED("1"));
+  if (!CHECK(m != NULL)) return;
+  double q[20], v[20] = {0}, target[3] = {0, 0, 0};
+  cav_configuration_reset(m, q);
+  cav_state *state = cav_state_new(m);
+  cav_term term = {.name = "apex", .from = 1, .to = 1, .weight = 900, .scale = 1, .component = 2, .target = target};
+  term.sensor =
+      (cav_sensor){.name = "", .type = CAV_SENSOR_SUBTREECOM, .object_type = CAV_OBJECT_BODY, .object = 1, .dim = 3};
+  cav_problem p = cav_problem_default(m), taken;
+  p.q_start = p.q_goal = q, p.v_start = v, p.term = &term, p.nterm = 1, p.duration = 2;
+  cav_strategy strategy[CAV_STRATEGIES];
+  int n;
+  CHECK(state && cav_position(m, state, q) == CAV_OK);
+  cav_sensor_read(m, state, &term.sensor, target);
+  CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK && !find(strategy, n, "leap"));
+  target[2] += 0.3;
+  CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK);
+  const cav_strategy *leap = find(strategy, n, "leap");
+  if (CHECK(leap != NULL)) {
+    cav_strategy_apply(&p, leap, &taken);
+    CHECK_NEAR(taken.guess_height, 0.3, 1e-12);
+    CHECK_NEAR(taken.guess_to - taken.guess_from, 2 * sqrt(2 * 0.3 / 9.81), 1e-12);
+    CHECK_NEAR(taken.guess_to + taken.guess_from, 2, 1e-12);
+  }
+  cav_state_free(state);
+  cav_model_free(m);
+}
+
 int main(void) {
   test_gait(BIPED("1"), 1, 2);
   test_gait(BIPED("1"), 1, -2);
   test_gait(BIPED("-1"), -1, 2);
   test_stalls();
+  test_repair();
+  test_leap();
   return check_result();
 }

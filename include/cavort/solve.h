@@ -273,12 +273,14 @@ CAV_API const cav_problem *cav_optimiser_problem(const cav_optimiser *optimiser)
 CAV_API const cav_options *cav_optimiser_contact(const cav_optimiser *optimiser);
 CAV_API const double *cav_optimiser_multipliers(cav_optimiser *optimiser, int *n);
 
-enum { CAV_STRATEGIES = 10, CAV_STRATEGY_SWINGS = 4 };
+enum { CAV_STRATEGIES = 16, CAV_STRATEGY_SWINGS = 4, CAV_STRATEGY_CHANGES = 160 };
 
 /// When a strategy is worth trying.
 typedef enum cav_strategy_use {
   CAV_STRATEGY_TRY,      ///< where none before it succeeds
   CAV_STRATEGY_MOMENTUM, ///< where, besides, the balance of momentum is the first condition that one of them misses
+  CAV_STRATEGY_REPAIR, ///< where, besides, the best motion of those before misses something that has a usual cure: what
+                       ///< to do is known then alone (cav_strategy_repair)
   CAV_STRATEGY_DIAGNOSIS ///< where none of all succeeds: what it finds is told and not kept, since more was given than
                          ///< asked: a duration free up to twice the stated one, times of windows in proportion
 } cav_strategy_use;
@@ -293,7 +295,12 @@ typedef struct cav_strategy {
   cav_guess guess;
   int nswing;
   cav_swing swing[CAV_STRATEGY_SWINGS];
+  double height, from, to; ///< not stated: of a ballistic arc, m, and when, s
   cav_schedule schedule;
+  double effort_limit, timestep; ///< those of the problem where 0
+  int nterm;
+  cav_term *term; ///< [nterm] in the place of the problem's, whose names and targets they borrow; NULL
+  char changed[CAV_STRATEGY_CHANGES]; ///< what a repair changes in the problem, in words
 } cav_strategy;
 
 /// What it takes to swing up: found by simulating laws that pump energy into the model, so that is enough; less may be
@@ -312,6 +319,9 @@ CAV_API cav_status cav_problem_pumping(const cav_problem *problem, cav_pumping *
 /// Strategies for a problem, in the order in which they are worth trying; the first is the problem's own.
 /// CAV_NO_MEMORY, or what the dynamics says of the goal posture.
 CAV_API cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[CAV_STRATEGIES], int *n);
+
+/// Frees what a repaired strategy owns.
+CAV_API void cav_strategy_clear(cav_strategy *strategy);
 
 /// The problem by a strategy: borrows all else from the problem, and the swings from the strategy.
 CAV_API void cav_strategy_apply(const cav_problem *problem, const cav_strategy *strategy, cav_problem *taken);
@@ -394,6 +404,12 @@ typedef struct cav_verdict {
   char missed[240];     ///< the one missed most: name, by how much, wanted and got; "" if achieved
   char reason[480];     ///< why not certified: the first condition missed; "" if certified
 } cav_verdict;
+
+/// A strategy with one change more: number k of the usual cures of what a motion found by it misses first. *found 0: there
+/// are no more. changed says all that differs from the problem: that of the strategy given where the cure changes nothing.
+/// To be cleared. CAV_NO_MEMORY.
+CAV_API cav_status cav_strategy_repair(const cav_problem *problem, const cav_strategy *from, const cav_verdict *verdict,
+                                       int k, cav_strategy *repaired, int *found);
 
 /// What replay_same_step_seconds has to be, s: CAV_TOLERANCE_REPLAY, or the whole motion where that is shorter; less
 /// rounding.

@@ -198,14 +198,17 @@ static void examine_time(cav_examination *e, const cav_hinge *hinge, const cav_r
   double low[2] = {r->low[0], -speed}, high[2] = {r->high[0], speed};
   double margin = cav_hinge_margin(hinge, e->problem->order, h);
   if (!isinf(cav_hinge_time(hinge, margin, start, low, high, time))) return;
-  char what[160], least[80] = "no time is enough", more[80] = "";
+  char what[160], least[80], more[80] = "";
   double needs = cav_hinge_time(hinge, 1, start, low, high, longer * time);
   double efforts = cav_hinge_efforts(hinge, start, low, high, time);
-  if (isfinite(needs)) snprintf(least, sizeof least, "pumping takes at least %.3g s at full effort", needs);
+  if (isfinite(needs))
+    snprintf(least, sizeof least, "it takes at least %.3g s at full effort", needs);
+  else
+    snprintf(least, sizeof least, "%.3g s at full effort would not do either", longer * time);
   if (isfinite(efforts)) snprintf(more, sizeof more, ", or %.3g times the effort", efforts);
   cav_requirement_words(e, r, what, sizeof what);
   cav_impossible(e, CAV_CONDITION_ENERGY, r, "More time, or a stronger actuator.",
-                 "%s, too soon for the actuators: %s%s (exact for one hinge)", what, least, more);
+                 "%s, too much for the actuators in the time: %s%s (exact for one hinge)", what, least, more);
 }
 
 cav_status cav_examine_hinge(cav_examination *e) {

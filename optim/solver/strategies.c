@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "continuation.h"
+#include "leap.h"
 #include "periodicity.h"
 #include "pump.h"
 
@@ -23,7 +24,7 @@ static const double touching = 0.02, least_travel = 0.3, across = 0.7;
 static const double swing_angle = 0.25, bend_angle = 0.4, pace = 1.2;
 
 /// How much softer and how much slower than stated, and how much longer a diagnosis may last.
-enum { SOFTER = 2, CHEAPER = 10, SLOWER = 2, LONGER = 2 };
+enum { SOFTER = 2, CHEAPER = 10, SLOWER = 2, LONGER = 2, REPAIRS = 4 };
 
 /// What the duration of a diagnosis costs, 1/s², so that it is not far from the shortest.
 static const double haste = 100;
@@ -182,6 +183,12 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   if (status != CAV_OK) return status;
   if (walk.nswing) add(strategy, n, &walk, "swing", "from start to goal with the limbs that carry swinging in turn");
 
+  cav_strategy leap = plain;
+  status = problem->guess_height != 0 ? CAV_OK : cav_leap_find(problem, &leap.height, &leap.from, &leap.to);
+  if (status != CAV_OK) return status;
+  if (leap.height > 0)
+    add(strategy, n, &leap, "leap", "straight from start to goal with an arc as high as is asked for");
+
   int decorated = problem->guess_height != 0 || problem->nguess_pose || problem->nswing;
   for (int k = 0; k < 3; k++) decorated |= problem->guess_rotation[k] != 0;
   if (decorated || problem->guess == CAV_GUESS_HOLD) add(strategy, n, &plain, "line", "straight from start to goal");
@@ -198,6 +205,11 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
     exact.order = CAV_ORDER_MOMENTUM, exact.first_midpoint = 1, exact.use = CAV_STRATEGY_MOMENTUM;
     add(strategy, n, &exact, "momentum", "under the order of momentum, from a motion of the midpoint order");
   }
+  static const char *const repair[] = {"repair-1", "repair-2", "repair-3", "repair-4"};
+  cav_strategy repaired = stated;
+  repaired.use = CAV_STRATEGY_REPAIR;
+  for (int k = 0; k < REPAIRS && !problem->cycle.on; k++)
+    add(strategy, n, &repaired, repair[k], "the best one so far, with the usual cure of what it misses first");
   // what a swing-up takes is told by cav_problem_pumping
   cav_strategy longer = stated;
   longer.use = CAV_STRATEGY_DIAGNOSIS;
@@ -211,13 +223,17 @@ void cav_strategy_apply(const cav_problem *problem, const cav_strategy *strategy
   taken->guess = strategy->guess;
   taken->schedule = strategy->schedule;
   taken->order = strategy->order;
+  if (strategy->timestep > 0) taken->timestep = strategy->timestep;
+  if (strategy->effort_limit > 0) taken->effort_limit = strategy->effort_limit;
+  if (strategy->term) taken->term = strategy->term, taken->nterm = strategy->nterm;
   if (strategy->use == CAV_STRATEGY_DIAGNOSIS) {
     taken->duration_least = problem->duration;
     taken->duration_most = LONGER * problem->duration;
     taken->duration_weight = haste;
   }
   if (strategy->stated) return;
-  taken->guess_height = 0;
+  taken->guess_height = strategy->height;
+  if (strategy->height > 0) taken->guess_from = strategy->from, taken->guess_to = strategy->to;
   memset(taken->guess_rotation, 0, sizeof taken->guess_rotation);
   taken->nguess_pose = 0;
   taken->nswing = strategy->nswing;

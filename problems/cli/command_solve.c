@@ -209,11 +209,13 @@ static int save(void *context, const cav_problem *problem, const cav_solution *s
             stopped ? verdict->reason : "stopped while other strategies were tried");
   else if (report->status)
     fprintf(stderr, "cavort: %s\n", report->text[0] ? report->text : why_stopped(report->status));
+  cav_provenance provenance = *to->provenance;
+  if (*report->changed) provenance.repaired = report->changed;
   cav_term_report *terms = calloc((size_t)problem->nterm + 1, sizeof *terms);
   cav_status status = terms ? cav_result_write(to->folder, problem, solution, &error) : CAV_NO_MEMORY;
   if (!status) status = cav_terms_report(problem, solution->trajectory, &solution->contact, terms, NULL, &error);
-  if (!status) status = cav_result_write_verdict(to->folder, problem, verdict, terms, to->provenance, &error);
-  if (!status && line->json) cav_certificate_json(stdout, problem, verdict, terms, to->provenance);
+  if (!status) status = cav_result_write_verdict(to->folder, problem, verdict, terms, &provenance, &error);
+  if (!status && line->json) cav_certificate_json(stdout, problem, verdict, terms, &provenance);
   if (!status && !line->quiet && !line->json && !stopped) cav_certificate_print(stdout, problem, verdict, terms);
   free(terms);
   if (status) return cav_command_fail(&error);
@@ -222,6 +224,9 @@ static int save(void *context, const cav_problem *problem, const cav_solution *s
       cav_result_write_page(to->folder, problem, solution->trajectory, &solution->contact, verdict, &error)) {
     fprintf(stderr, "cavort: no page: %s\n", error.text);
   }
+  if (!line->quiet && !line->json && *report->changed)
+    printf("strategy repaired: not as the problem states it, but with %s (the folder's problem.xml has it)\n",
+           report->changed);
   if (!line->quiet && !line->json) printf("result: %s\n", to->folder);
   if (ended) return CAV_EXIT_INTERRUPTED;
   return verdict->certified && verdict->achieved ? CAV_EXIT_CERTIFIED : CAV_EXIT_NOT_CERTIFIED;

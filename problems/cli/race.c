@@ -18,6 +18,9 @@
 #include "file.h"
 #include "store.h"
 
+// how much more than the cheapest one a motion may cost that is repaired
+static const double dearer = 2;
+
 cav_status cav_race_open(cav_race *race, int most, cav_error *error) {
   cav_strategy strategy[CAV_STRATEGIES];
   int n = 0;
@@ -143,6 +146,7 @@ static cav_solution *run(const cav_race *race, int i, const cav_solve_options *o
   cav_solution *solution = NULL;
   cav_error error = {0}, verification = {0};
   *report = (cav_race_report){0};
+  snprintf(report->changed, sizeof report->changed, "%s", race->entry[i].strategy.changed);
   cav_strategy_apply(race->problem, &race->entry[i].strategy, taken);
   cav_status status = solve(race, i, options, taken, &solution, &error);
   if (solution && status == CAV_INTERRUPTED) {
@@ -190,7 +194,7 @@ static const char *outcome(const cav_race_entry *e) {
 
 static void tell(const cav_race *race, const cav_race_entry *e) {
   if (!race->tell) return;
-  fprintf(stderr, "strategy %-7s %s", e->strategy.name, outcome(e));
+  fprintf(stderr, "strategy %-8s %s", e->strategy.name, outcome(e));
   if (e->state == CAV_RACE_DONE && e->report.solution)
     fprintf(stderr, ", cost %.4g, %d iterations, %.1f s", e->report.cost, e->report.verdict.iterations,
             e->report.verdict.solve_seconds);
@@ -308,6 +312,65 @@ static int misses_momentum(const cav_race_report *report) {
          v->momentum_defect_rms > CAV_TOLERANCE_MOMENTUM;
 }
 
+// whether a is the better motion: the one that is certified and achieves what was asked; of two that are certified
+// alone the cheaper one; otherwise the one that keeps more of the certificate's conditions, in their order; or misses the
+// same one by less
+static int better(const cav_race_report *a, const cav_race_report *b, int cheapest) {
+  const cav_verdict *v = &a->verdict, *w = &b->verdict;
+  const double missed[][3] = {{v->unactuated_force_max, w->unactuated_force_max, CAV_TOLERANCE_UNACTUATED},
+                              {v->limit_violation_max, w->limit_violation_max, CAV_TOLERANCE_LIMIT},
+                              {v->constraint_violation_max, w->constraint_violation_max, CAV_TOLERANCE_CONSTRAINT},
+                              {v->penetration_max_m, w->penetration_max_m, CAV_TOLERANCE_PENETRATION},
+                              {v->penetration_between_m, w->penetration_between_m, CAV_TOLERANCE_PENETRATION},
+                              {v->momentum_defect_rms, w->momentum_defect_rms, CAV_TOLERANCE_MOMENTUM},
+                              {v->replay_step_max_error, w->replay_step_max_error, CAV_TOLERANCE_STEP}};
+  // what was stopped was not verified
+  int stopped = a->status == CAV_INTERRUPTED, other = b->status == CAV_INTERRUPTED;
+  if (stopped || other) return !stopped;
+  if (cav_race_success(a) && cav_race_success(b)) return cheapest && a->cost < b->cost;
+  if (cav_race_success(a) || cav_race_success(b)) return cav_race_success(a);
+  // what was asked is in the cost
+  if (v->certified && w->certified) return a->cost < b->cost;
+  if (v->certified || w->certified) return v->certified;
+  for (size_t k = 0; k < sizeof missed / sizeof *missed; k++)
+    if (missed[k][0] > missed[k][2] || missed[k][1] > missed[k][2]) return missed[k][0] < missed[k][1];
+  return v->closed_loop_seconds > w->closed_loop_seconds;
+}
+
+// the motion to repair: the best of those that cost little more than the cheapest that keeps limits and constraints, since
+// what was asked is in the cost: one that stands still is not mended by what would certify it. -1: none
+static int find_broken(const cav_race *race) {
+  int best = -1;
+  double least = INFINITY;
+  for (int pass = 0; pass < 2; pass++) {
+    for (int k = 0; k < race->n; k++) {
+      const cav_race_entry *e = &race->entry[k];
+      if (e->state != CAV_RACE_DONE || !e->report.solution || e->strategy.use == CAV_STRATEGY_DIAGNOSIS) continue;
+      if (!cav_verdict_feasible(&e->report.verdict)) continue;
+      least = pass == 0 ? fmin(least, e->report.cost) : least;
+      if (pass == 0 || e->report.cost > dearer * least) continue;
+      if (best < 0 || better(&e->report, &race->entry[best].report, 0)) best = k;
+    }
+  }
+  return best >= 0 ? best : cav_race_best(race, 0);
+}
+
+// the strategy that repairs it by a cure that was not tried; to be cleared where there is one
+static int find_repair(const cav_race *race, int i, cav_strategy *repaired) {
+  int best = find_broken(race), found = best >= 0;
+  for (int k = 0; found; k++) {
+    const cav_race_entry *from = &race->entry[best];
+    if (cav_strategy_repair(race->problem, &from->strategy, &from->report.verdict, k, repaired, &found) || !found)
+      return 0;
+    int known = 0;
+    for (int j = 0; j < i; j++) known |= !strcmp(repaired->changed, race->entry[j].strategy.changed);
+    if (!known) break;
+    cav_strategy_clear(repaired);
+  }
+  if (found) repaired->name = race->entry[i].strategy.name;
+  return found;
+}
+
 // whether a strategy that waits may start: those for a case only after all before them
 static int may_start(const cav_race *race, int i) {
   cav_strategy_use use = race->entry[i].strategy.use;
@@ -320,7 +383,19 @@ static int may_start(const cav_race *race, int i) {
     momentum |= e->state == CAV_RACE_DONE && misses_momentum(&e->report);
     success |= e->state == CAV_RACE_DONE && cav_race_success(&e->report);
   }
-  return use == CAV_STRATEGY_MOMENTUM ? momentum : !success;
+  cav_strategy repaired;
+  int repairs = use == CAV_STRATEGY_REPAIR && !success && find_repair(race, i, &repaired);
+  if (repairs) cav_strategy_clear(&repaired);
+  return use == CAV_STRATEGY_MOMENTUM ? momentum : use == CAV_STRATEGY_REPAIR ? repairs : !success;
+}
+
+// takes up what a repair does, once it is known
+static void settle(cav_race *race, int i) {
+  cav_race_entry *e = &race->entry[i];
+  cav_strategy repaired;
+  if (e->strategy.use != CAV_STRATEGY_REPAIR || *e->strategy.changed || !find_repair(race, i, &repaired)) return;
+  e->strategy = repaired;
+  if (race->tell) fprintf(stderr, "strategy %-8s with %s\n", e->strategy.name, e->strategy.changed);
 }
 
 // waits for reports; interruption is passed on once
@@ -357,37 +432,13 @@ cav_status cav_race_finish(cav_race *race, int cheapest, cav_error *error) {
     for (int i = 0; i < most; i++) running += race->entry[i].state == CAV_RACE_RUNNING;
     for (int i = 0; i < most && running < race->processes && !*race->interrupted; i++) {
       if (race->entry[i].state != CAV_RACE_WAITING || !may_start(race, i)) continue;
+      settle(race, i);
       if (!start(race, i)) return cav_file_fail(error, CAV_NO_MEMORY, 0, "no process for another strategy");
       running++;
     }
     if (running == 0) return CAV_OK;
     listen_to(race, &passed_on);
   }
-}
-
-// whether a is the better motion: the one that is certified and achieves what was asked; of two that are certified
-// alone the cheaper one; otherwise the one that keeps more of the certificate's conditions, in their order; or misses the
-// same one by less
-static int better(const cav_race_report *a, const cav_race_report *b, int cheapest) {
-  const cav_verdict *v = &a->verdict, *w = &b->verdict;
-  const double missed[][3] = {{v->unactuated_force_max, w->unactuated_force_max, CAV_TOLERANCE_UNACTUATED},
-                              {v->limit_violation_max, w->limit_violation_max, CAV_TOLERANCE_LIMIT},
-                              {v->constraint_violation_max, w->constraint_violation_max, CAV_TOLERANCE_CONSTRAINT},
-                              {v->penetration_max_m, w->penetration_max_m, CAV_TOLERANCE_PENETRATION},
-                              {v->penetration_between_m, w->penetration_between_m, CAV_TOLERANCE_PENETRATION},
-                              {v->momentum_defect_rms, w->momentum_defect_rms, CAV_TOLERANCE_MOMENTUM},
-                              {v->replay_step_max_error, w->replay_step_max_error, CAV_TOLERANCE_STEP}};
-  // what was stopped was not verified
-  int stopped = a->status == CAV_INTERRUPTED, other = b->status == CAV_INTERRUPTED;
-  if (stopped || other) return !stopped;
-  if (cav_race_success(a) && cav_race_success(b)) return cheapest && a->cost < b->cost;
-  if (cav_race_success(a) || cav_race_success(b)) return cav_race_success(a);
-  // what was asked is in the cost
-  if (v->certified && w->certified) return a->cost < b->cost;
-  if (v->certified || w->certified) return v->certified;
-  for (size_t k = 0; k < sizeof missed / sizeof *missed; k++)
-    if (missed[k][0] > missed[k][2] || missed[k][1] > missed[k][2]) return missed[k][0] < missed[k][1];
-  return v->closed_loop_seconds > w->closed_loop_seconds;
 }
 
 int cav_race_best(const cav_race *race, int cheapest) {
@@ -421,14 +472,21 @@ void cav_race_close(cav_race *race) {
     end(&race->entry[i]);
     cav_solution_free(race->entry[i].solution);
     race->entry[i].solution = NULL;
+    cav_strategy_clear(&race->entry[i].strategy);
   }
+}
+
+static void write_quoted(FILE *out, const char *text) {
+  fputs(",\"", out);
+  for (const char *c = text; *c; c++) fputc(*c == '"' ? '\'' : *c, out);
+  fputc('"', out);
 }
 
 cav_status cav_race_write(const cav_race *race, int kept, const char *path, cav_error *error) {
   cav_file file;
   cav_status status = cav_file_begin(&file, path, error);
   if (status) return status;
-  fputs("strategy,kept,outcome,cost,iterations,seconds,unactuated,closed_loop_seconds,reason\n", file.stream);
+  fputs("strategy,kept,outcome,cost,iterations,seconds,unactuated,closed_loop_seconds,changed,reason\n", file.stream);
   for (int i = 0; i < race->n; i++) {
     const cav_race_entry *e = &race->entry[i];
     const cav_verdict *v = &e->report.verdict;
@@ -440,9 +498,9 @@ cav_status cav_race_write(const cav_race *race, int kept, const char *path, cav_
       fputc(',', file.stream);
       if (known) cav_table_write_number(file.stream, value[k]);
     }
-    fputs(",\"", file.stream);
-    for (const char *c = known ? v->reason : e->report.text; *c; c++) fputc(*c == '"' ? '\'' : *c, file.stream);
-    fputs("\"\n", file.stream);
+    write_quoted(file.stream, e->strategy.changed);
+    write_quoted(file.stream, known ? v->reason : e->report.text);
+    fputc('\n', file.stream);
   }
   return cav_file_end(&file, error);
 }

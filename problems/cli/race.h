@@ -13,7 +13,8 @@ typedef struct cav_race_report {
   int solution; ///< 1: there is one, and verdict, cost and iterations are about it
   cav_verdict verdict;
   double cost;
-  char text[400]; ///< what the solver said
+  char text[400];                     ///< what the solver said
+  char changed[CAV_STRATEGY_CHANGES]; ///< in the problem, by a repair
 } cav_race_report;
 
 typedef enum cav_race_state {

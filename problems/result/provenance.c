@@ -72,5 +72,6 @@ void cav_provenance_json(FILE *out, const cav_provenance *p) {
     fprintf(out, "%s\"%s\": ", i ? ", " : "{", field[i].name);
     cav_certificate_json_text(out, field[i].text);
   }
+  if (p->repaired) fputs(", \"repaired\": ", out), cav_certificate_json_text(out, p->repaired);
   fputc('}', out);
 }

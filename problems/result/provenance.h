@@ -10,6 +10,7 @@ typedef struct cav_provenance {
   char date[32];                 ///< UTC, ISO 8601: when the solve began
   char machine[320];             ///< system, architecture, processor and their number
   const char *arguments;         ///< command line
+  const char *repaired;          ///< what a repair changed in the problem; NULL: nothing
   char problem[CAV_DIGEST_TEXT]; ///< SHA-256 of the problem's file
   char model[CAV_DIGEST_TEXT];   ///< of the model's; files that these include or name are not in it
 } cav_provenance;

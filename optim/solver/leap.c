@@ -1,0 +1,67 @@
+/// Arcs that a problem asks for: where a term wants a point or a centre of mass higher at one time than it is on the
+/// straight way from start to goal, what floats has to be thrown there, and a guess that stays on the ground is drawn to
+/// the optimum next to it, which stands still. The arc is ballistic: of the largest rise r that is asked for, it lasts
+/// 2 sqrt(2 r/g) about that time, cut to the horizon.
+#include "leap.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "continuation.h"
+#include "math3.h"
+#include "transcription.h"
+
+static const double least_rise = 0.05; // m: less is done by stretching
+
+/// Whether a root can rise by itself: nothing holds it down.
+static int can_rise(const cav_model *m) {
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    if (m->link[joint->link].parent != 0) continue;
+    if (joint->type == CAV_JOINT_FREE || (joint->type == CAV_JOINT_SLIDE && fabs(joint->axis[2]) > 0.9)) return 1;
+  }
+  return 0;
+}
+
+/// How far above the straight way a term wants its height, m; 0 for terms that want none.
+static cav_status rise_of(const cav_problem *p, const cav_term *term, cav_state *state, const cav_trajectory *way,
+                          double *rise) {
+  const cav_sensor *s = &term->sensor;
+  double target[CAV_SENSOR_DIM_MAX], at[CAV_SENSOR_DIM_MAX];
+  int upright = term->quantity == CAV_QUANTITY_SENSOR && (term->component < 0 || term->component == 2) &&
+                (s->type == CAV_SENSOR_SUBTREECOM || (s->type == CAV_SENSOR_FRAMEPOS && !s->referred));
+  *rise = 0;
+  if (!upright || term->from != term->to || (term->use == CAV_USE_COST && term->weight == 0)) return CAV_OK;
+  double time = term->to < 0 ? p->duration : fmin(term->to, p->duration);
+  int t = (int)lround(time / p->timestep);
+  cav_status status = cav_position(p->model, state, way->q + (size_t)t * (size_t)way->nq);
+  if (status) return status;
+  cav_sensor_read(p->model, state, s, at);
+  cav_term_target(term, time, s->dim, target);
+  *rise = target[2] + (term->use == CAV_USE_RANGE ? fmax(term->lower, -1e3) : 0) - at[2];
+  return CAV_OK;
+}
+
+cav_status cav_leap_find(const cav_problem *problem, double *height, double *from, double *to) {
+  cav_problem straight = *problem;
+  double time = 0, g = norm3(problem->model->gravity), rise;
+  *height = *from = *to = 0;
+  if (problem->cycle.on || g == 0 || !can_rise(problem->model)) return CAV_OK;
+  straight.guess = CAV_GUESS_INTERPOLATE, straight.guess_height = 0, straight.nguess_pose = straight.nswing = 0;
+  zero3(straight.guess_rotation);
+  cav_trajectory *way = cav_problem_guess(&straight, NULL);
+  cav_state *state = cav_state_new(problem->model);
+  cav_status status = way && state ? CAV_OK : CAV_NO_MEMORY;
+  for (int i = 0; i < problem->nterm && !status; i++) {
+    const cav_term *term = &problem->term[i];
+    status = rise_of(problem, term, state, way, &rise);
+    if (!status && rise > fmax(*height, least_rise)) *height = rise, time = term->to < 0 ? problem->duration : term->to;
+  }
+  double half = sqrt(2 * *height / g);
+  *from = fmax(time - half, 0), *to = fmin(time + half, problem->duration);
+  // at the end there is nothing to come down to
+  if (*to - time < half / 2) *height = 0;
+  cav_state_free(state);
+  cav_trajectory_free(way);
+  return status;
+}

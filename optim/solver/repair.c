@@ -1,0 +1,198 @@
+/// Strategies out of what another one missed: the first condition that its motion misses has usual cures, those that the
+/// certificate names. One is laid over it at a time. What they change is not what was asked but how it is planned; it is
+/// told with the result (cav_strategy.changed).
+#include <assert.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cavort/solve.h"
+
+/// What can be changed.
+typedef enum cure {
+  NONE,
+  FORCE,    ///< contact forces cost something: loads are spread, and nothing stands on an edge
+  GOALS,    ///< heavier weights of goals
+  SLIP,     ///< a heavier weight of slip
+  SLIDING,  ///< the convex law of contacts that slide: it has one solution
+  ORDER,    ///< the order of momentum
+  GAP,      ///< contacts see the gap where a step ends
+  STEP,     ///< half the step
+  SOFTNESS, ///< harder contacts at the end
+  EFFORT,   ///< half of what planning keeps from the actuators is given
+  SLACK     ///< more of it is kept, for feedback
+} cure;
+
+enum { CURES = 3 };
+static const double force_weight = 1, heavier = 10, harder = 4, slack = 0.75;
+
+/// What a motion misses first, in the order of a certificate (METHOD.md, 6), and its cures.
+static const cure *cures_of(const cav_verdict *v) {
+  static const cure forces[] = {EFFORT, STEP, NONE}, deep[] = {SOFTNESS, STEP, NONE}, between[] = {STEP, NONE},
+                    turned[] = {ORDER, STEP, NONE}, slip[] = {SLIP, SOFTNESS, NONE}, hover[] = {GAP, STEP, NONE},
+                    fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK}, target[] = {EFFORT, GOALS, NONE},
+                    none[] = {NONE};
+  if (v->certified) return v->achieved ? none : target;
+  if (!cav_verdict_feasible(v)) return forces;
+  if (v->penetration_max_m > CAV_TOLERANCE_PENETRATION) return deep;
+  if (v->penetration_between_m > CAV_TOLERANCE_PENETRATION) return between;
+  if (v->momentum_defect_rms > CAV_TOLERANCE_MOMENTUM) return turned;
+  if (v->slip_mean_m_s > CAV_TOLERANCE_SLIP) return slip;
+  if (v->hover_fraction > CAV_TOLERANCE_HOVER) return hover;
+  if (v->replay_step_max_error > CAV_TOLERANCE_STEP) return fold;
+  return lost;
+}
+
+// ---------------------------------------------------------------- changes
+
+/// Gives a strategy terms of its own, those that it has with room for one more.
+static cav_status own_terms(const cav_problem *p, cav_strategy *s) {
+  int n = s->term ? s->nterm : p->nterm;
+  cav_term *all = calloc((size_t)n + 1, sizeof *all);
+  if (!all) return CAV_NO_MEMORY;
+  memcpy(all, s->term ? s->term : p->term, (size_t)n * sizeof *all);
+  free(s->term);
+  s->term = all;
+  s->nterm = n;
+  return CAV_OK;
+}
+
+static cav_status add_term(const cav_problem *p, cav_strategy *s, const cav_term *term) {
+  cav_status status = own_terms(p, s);
+  if (!status) s->term[s->nterm++] = *term;
+  return status;
+}
+
+/// Costs that have to be met: at one time, or within a tolerance.
+static int is_goal(const cav_term *term) {
+  int contacts = cav_quantity_rule_of(term->quantity)->of == CAV_OF_CONTACTS;
+  return !contacts && term->use == CAV_USE_COST && isfinite(term->within) &&
+         (term->from == term->to || term->within > 0);
+}
+
+static cav_status weigh_goals(const cav_problem *p, cav_strategy *s) {
+  cav_status status = own_terms(p, s);
+  for (int i = 0; i < s->nterm && !status; i++)
+    if (is_goal(&s->term[i])) s->term[i].weight *= heavier;
+  return status;
+}
+
+static cav_status weigh_forces(const cav_problem *p, cav_strategy *s) {
+  cav_term term = {.name = "force", .quantity = CAV_QUANTITY_FORCE, .use = CAV_USE_COST, .component = -1};
+  term.to = -1, term.weight = force_weight, term.scale = 1;
+  return add_term(p, s, &term);
+}
+
+/// Beside the weight that is there.
+static cav_status weigh_slip(const cav_problem *p, cav_strategy *s) {
+  for (int i = 0; i < p->nterm; i++) {
+    cav_term more = p->term[i];
+    if (more.quantity != CAV_QUANTITY_SLIP || !(more.weight > 0)) continue;
+    more.weight *= heavier - 1;
+    return add_term(p, s, &more);
+  }
+  return CAV_OK;
+}
+
+static cav_status change(const cav_problem *p, cure c, cav_strategy *s) {
+  double effort = s->effort_limit > 0 ? s->effort_limit : p->effort_limit;
+  switch (c) {
+    case FORCE:
+      return weigh_forces(p, s);
+    case GOALS:
+      return weigh_goals(p, s);
+    case SLIP:
+      return weigh_slip(p, s);
+    case SLIDING:
+      s->schedule.sliding = CAV_SLIDING_CONVEX;
+      break;
+    case ORDER:
+      s->order = CAV_ORDER_MOMENTUM;
+      break;
+    case GAP:
+      s->schedule.next_gap = CAV_NEXT_GAP_EXACT;
+      break;
+    case STEP:
+      s->timestep = (s->timestep > 0 ? s->timestep : p->timestep) / 2;
+      break;
+    case SOFTNESS:
+      s->schedule.last.softness /= harder;
+      break;
+    case EFFORT:
+      if (effort < 0.99) s->effort_limit = (1 + effort) / 2;
+      break;
+    case SLACK:
+      s->effort_limit = slack * effort;
+      break;
+    case NONE:
+      break;
+  }
+  return CAV_OK;
+}
+
+/// What differs from the problem, as it would stand in its file.
+static void describe(const cav_problem *p, cav_strategy *s) {
+  char *out = s->changed;
+  size_t room = sizeof s->changed;
+  *out = 0;
+  for (int i = 0; i < p->nterm && s->term && !*out; i++)
+    if (is_goal(&p->term[i]) && p->term[i].weight > 0)
+      snprintf(out, room, ", weights of goals %g times", s->term[i].weight / p->term[i].weight);
+  if (!strcmp(out, ", weights of goals 1 times")) *out = 0;
+  for (int i = p->nterm; i < s->nterm; i++) {
+    size_t n = strlen(out);
+    snprintf(out + n, room - n, ", %s<%s weight=\"%g\"/>", s->term[i].quantity == CAV_QUANTITY_SLIP ? "one more " : "",
+             cav_quantity_rule_of(s->term[i].quantity)->name, s->term[i].weight);
+  }
+  const struct {
+    int differs;
+    const char *format;
+    double value;
+  } number[] = {{s->effort_limit > 0, ", <limits effort=\"%.3g\"/>", s->effort_limit},
+                {s->timestep > 0, ", timestep=\"%.4g\"", s->timestep},
+                {s->schedule.last.softness != p->schedule.last.softness, ", <last softness=\"%.3g\"/>",
+                 s->schedule.last.softness}};
+  for (size_t i = 0; i < sizeof number / sizeof *number; i++) {
+    size_t n = strlen(out);
+    if (number[i].differs) snprintf(out + n, room - n, number[i].format, number[i].value);
+  }
+  size_t n = strlen(out);
+  snprintf(out + n, room - n, "%s%s%s", s->order != p->order ? ", order=\"momentum\"" : "",
+           s->schedule.sliding != p->schedule.sliding ? ", sliding=\"convex\"" : "",
+           s->schedule.next_gap != p->schedule.next_gap ? ", next_gap=\"exact\"" : "");
+  if (*out) memmove(out, out + 2, strlen(out + 2) + 1);
+}
+
+cav_status cav_strategy_repair(const cav_problem *problem, const cav_strategy *from, const cav_verdict *verdict, int k,
+                               cav_strategy *repaired, int *found) {
+  const cure *cures = cures_of(verdict);
+  int n = 0;
+  *found = 0;
+  while (n < CURES && cures[n] != NONE) n++;
+  if (k >= n || problem->cycle.on) return CAV_OK;
+  *repaired = *from;
+  repaired->use = CAV_STRATEGY_REPAIR;
+  repaired->term = NULL;
+  repaired->nterm = 0;
+  cav_status status = CAV_OK;
+  if (from->term) {
+    cav_problem with = *problem;
+    with.term = from->term, with.nterm = from->nterm;
+    status = own_terms(&with, repaired);
+  }
+  if (!status) status = change(problem, cures[k], repaired);
+  if (status) {
+    cav_strategy_clear(repaired);
+    return status;
+  }
+  describe(problem, repaired);
+  *found = 1;
+  return CAV_OK;
+}
+
+void cav_strategy_clear(cav_strategy *strategy) {
+  free(strategy->term);
+  strategy->term = NULL;
+  strategy->nterm = 0;
+}
