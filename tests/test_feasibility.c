@@ -59,6 +59,13 @@ static char folder[] = "/tmp/cavort-feasibility-XXXXXX";
   "<joint name='wrist' axis='0 0 1'/><geom type='sphere' size='.05'/></body></body></worldbody><actuator><motor "      \
   "joint='wrist'/></actuator></mujoco>"
 
+// a body in the vertical plane x, z: two slides and a hinge about y
+#define PLANAR                                                                                                       \
+  "<mujoco><worldbody><body name='body' pos='0 0 1'><joint name='x' type='slide' axis='1 0 0'/><joint name='z' "     \
+  "type='slide' axis='0 0 1'/><joint name='pitch' axis='0 1 0'/><geom type='box' size='.1 .1 .1' mass='1'/><site "   \
+  "name='nose' pos='.2 .1 0'/></body></worldbody><actuator><motor joint='x' gear='30'/><motor joint='z' gear='30'/>" \
+  "<motor joint='pitch' gear='5'/></actuator></mujoco>"
+
 // a ball that slides three ways over a floor, and a cell with walls; its door closed or open
 #define CELL(DOOR)                                                                                                     \
   "<mujoco><worldbody><body name='ball' pos='0 0 .1'><joint name='x' type='slide' axis='1 0 0'/><joint name='y' "      \
@@ -114,6 +121,10 @@ static const pair pairs[] = {
      CONSTRAINT("<sensor name='go' type='framepos' body='base' target='1 0 1' at='end'/>"),
      CONSTRAINT("<sensor name='go' type='framepos' body='base' target='0 0 1' at='end'/>"), CAV_CONDITION_DISTANCE,
      "fixed to the world"},
+    {"sideways in a plane", PLANAR, NULL, SECOND, "",
+     CONSTRAINT("<sensor name='aside' type='framepos' site='nose' target='.3 .2 1.1' at='end'/>"),
+     CONSTRAINT("<sensor name='along' type='framepos' site='nose' target='.3 .1 1.1' at='end'/>"),
+     CAV_CONDITION_DISTANCE, "no joint moves it along y: it stays at 0.1, 0.1 m off"},
     {"a box that is too heavy", TABLE("26"), TABLE("25"), SECOND, "<joint name='lift' pos='.5'/>",
      CONSTRAINT("<posture name='lifted' dofs='joints' qpos='.505' from='.5' to='1'/>"), NULL, CAV_CONDITION_STRENGTH,
      "'jack' at its limit"},

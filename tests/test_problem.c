@@ -98,6 +98,36 @@ static void check_defaults(void) {
   cav_problem_free(NULL);
 }
 
+/// The default posture holds no wheel at an angle: an unlimited hinge through the centre of mass of what it turns. It does hold
+/// other joints, and a wheel where the file says so.
+static void check_wheels(void) {
+  write_in(
+      "cart.xml",
+      "<mujoco><worldbody><body name='cart' pos='0 0 .2'><freejoint/><geom type='box' size='.2 .1 .05'/>"
+      "<body name='wheel'><joint name='wheel' axis='0 1 0'/><geom type='cylinder' size='.1 .02' euler='90 0 0'/></body>"
+      "<body name='crank'><joint name='crank' axis='0 1 0'/><geom type='sphere' size='.05' pos='.1 0 0'/></body>"
+      "<body name='arm'><joint name='arm' axis='0 1 0' limited='true' range='-90 90'/><geom type='sphere' "
+      "size='.05'/></body></body></worldbody></mujoco>");
+  static const char *const cost[] = {"", "<cost><posture weight='.2'/></cost>"};
+  for (int given = 0; given < 2; given++) {
+    char text[400];
+    int n = 0, wheels = 0;
+    snprintf(text, sizeof text, "<problem model='cart.xml'><horizon duration='1'/><start/>%s</problem>", cost[given]);
+    cav_problem *p = load(text), *back = NULL;
+    if (p && CHECK(cav_problem_write(copy_path, p, NULL, NULL) == CAV_OK))
+      back = cav_problem_load(copy_path, NULL, NULL);
+    if (!CHECK(p && back)) return;
+    CHECK(back->nterm == p->nterm);
+    for (int i = 0; i < p->nterm; i++) {
+      if (p->term[i].quantity != CAV_QUANTITY_CONFIGURATION) continue;
+      n++;
+      wheels += (p->term[i].dofs == CAV_DOFS_JOINTS || p->term[i].joint == 1);
+    }
+    CHECK(n == (given ? 1 : 2) && wheels == given);
+    cav_problem_free(p), cav_problem_free(back);
+  }
+}
+
 /// Every quantity is a cost by its element, and a constraint where the table says so and nowhere else; read, written
 /// and read.
 static void check_quantities(void) {
@@ -717,6 +747,7 @@ int main(void) {
   write_in("flyer.xml", flyer);
   write_in("robot.urdf", turntable);
   check_defaults();
+  check_wheels();
   check_words();
   check_quantities();
   check_postures();
@@ -736,8 +767,8 @@ int main(void) {
   check_broken_terms();
   check_other_model();
   check_motions();
-  const char *made[] = {"problem.xml", "copy.xml", "motion.csv", "leg.xml", "flyer.xml", "robot.urdf"};
-  for (int i = 0; i < 6; i++) {
+  const char *made[] = {"problem.xml", "copy.xml", "motion.csv", "leg.xml", "flyer.xml", "cart.xml", "robot.urdf"};
+  for (size_t i = 0; i < sizeof made / sizeof *made; i++) {
     char full[160];
     snprintf(full, sizeof full, "%s/%s", folder, made[i]);
     remove(full);

@@ -79,6 +79,7 @@ int cav_body_within(const cav_model *model, int body, int ancestor);
 /// The conditions, each with its proofs.
 cav_status cav_examine_contradictions(cav_examination *e); // contradiction.c
 cav_status cav_examine_distances(cav_examination *e);      // distance.c
+cav_status cav_examine_directions(cav_examination *e);     // direction.c
 cav_status cav_examine_solids(cav_examination *e);         // solid.c
 cav_status cav_examine_enclosures(cav_examination *e);     // enclosure.c
 cav_status cav_examine_momentum(cav_examination *e);       // momentum.c

@@ -10,8 +10,10 @@
 #include <string.h>
 
 #include "file.h"
+#include "math3.h"
 #include "objects.h"
 #include "problem_file.h"
+#include "quantity.h"
 
 static const double near_knot = 1e-6; // of a step
 
@@ -530,6 +532,33 @@ int cav_term_counts(const cav_term *term) {
   return term->weight > 0 || term->use != CAV_USE_COST || (term->quantity == CAV_QUANTITY_SLIP && term->within > 0);
 }
 
+int cav_problem_is_wheel(const cav_model *m, int j) {
+  const cav_joint *joint = &m->joint[j];
+  const cav_link *link = &m->link[joint->link];
+  double arm[3], off[3];
+  if (joint->type != CAV_JOINT_HINGE || joint->limited || joint->stiffness != 0 || link->njoint != 1) return 0;
+  for (int i = joint->link + 1; i < m->nlink; i++)
+    if (m->link[i].parent == joint->link) return 0;
+  sub3(arm, link->com, joint->pos);
+  cross3(off, arm, joint->axis);
+  return norm3(off) < 1e-6;
+}
+
+// adds a default: that of the posture for each joint but wheels, by itself where there are any
+static void add_default(cav_problem *p, const cav_term *term) {
+  const cav_model *m = p->model;
+  int wheels = 0, posture = term->quantity == CAV_QUANTITY_CONFIGURATION;
+  for (int j = 0; j < m->njoint && posture; j++) wheels += cav_problem_is_wheel(m, j);
+  if (!wheels) p->term[p->nterm++] = *term;
+  for (int j = 0; j < m->njoint && wheels; j++) {
+    if (m->joint[j].type == CAV_JOINT_FREE || cav_problem_is_wheel(m, j)) continue;
+    cav_term *one = &p->term[p->nterm++];
+    *one = *term;
+    one->dofs = CAV_DOFS_ONE;
+    one->joint = j;
+  }
+}
+
 cav_status cav_problem_terms(const cav_problem_reader *reader) {
   const cav_xml_node *cost = cav_problem_child(reader->root, "cost"),
                      *constraint = cav_problem_child(reader->root, "constraint");
@@ -537,13 +566,13 @@ cav_status cav_problem_terms(const cav_problem_reader *reader) {
   for (const cav_xml_node *node = cost ? cost->child : NULL; node; node = node->next) most++;
   for (const cav_xml_node *node = constraint ? constraint->child : NULL; node; node = node->next) most++;
   cav_problem *p = reader->problem;
-  p->term = cav_problem_alloc(reader->owner, (size_t)most * sizeof *p->term);
+  cav_term defaults[CAV_DEFAULT_TERMS];
+  p->term = cav_problem_alloc(reader->owner, (size_t)(most + p->model->njoint) * sizeof *p->term);
   if (!p->term) return cav_problem_no_memory(reader);
   // defaults that the file leaves in place, then its own
-  cav_problem_default_terms(p->term, ndefault);
-  for (int i = 0; i < ndefault; i++) {
-    if (!replaced(cost, p->term[i].quantity)) p->term[p->nterm++] = p->term[i];
-  }
+  cav_problem_default_terms(defaults, CAV_DEFAULT_TERMS);
+  for (int i = 0; i < ndefault; i++)
+    if (!replaced(cost, defaults[i].quantity)) add_default(p, &defaults[i]);
   cav_status status = CAV_OK;
   for (const cav_xml_node *node = cost ? cost->child : NULL; node && !status; node = node->next) {
     status = read_term(reader, node, 0, &p->term[p->nterm]);

@@ -3,17 +3,22 @@
 /// From start to goal along the geodesic of the configuration space with a cubic of time; or by postures on the way,
 /// linear in time between them; or the start held. On that a rotation of the first free joint, a ballistic arc of the
 /// roots, and sines laid over single joints. Cycles go from their start to where that is a period on, at constant
-/// speed. Asks nothing of contacts or forces. A swing-up is simulated (pump.c).
+/// speed. Wheels on the ground roll along. Asks nothing else of contacts or forces. A swing-up is simulated (pump.c).
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "continuation.h"
 #include "file.h"
+#include "math3.h"
+#include "problem_file.h"
 #include "pump.h"
 
 /// How far a guess is moved off its symmetries, rad or m, by a fixed sequence; golden section.
 static const double nudge = 1e-6, golden = 0.6180339887498949;
+
+/// Gap within which a wheel stands on the ground, m.
+static const double near_ground = 0.01;
 
 /// Cubic that leaves 0 and reaches 1 at rest.
 static double smoothstep(double s) {
@@ -84,6 +89,47 @@ static void follow(const cav_problem *problem, const double *end, double time, d
   cav_integrate(m, a.q, tangent, s, q);
 }
 
+/// Radius of a wheel, from its centre down to where it touches the world at the state; 0: it does not.
+static double wheel_radius(const cav_state *state, int link) {
+  for (int i = 0; i < state->ncontact; i++) {
+    const cav_contact *c = &state->contact[i];
+    if (c->dist < near_ground && ((c->link1 == 0 && c->link2 == link) || (c->link2 == 0 && c->link1 == link)))
+      return fmax(state->com[3 * (size_t)link + 2] - c->pos[2], 0);
+  }
+  return 0;
+}
+
+/// Rolls the wheels that touch the ground at the start along with the guess, those whose goal is no other angle.
+static cav_status roll(const cav_problem *problem, cav_trajectory *at) {
+  const cav_model *m = problem->model;
+  static const double up[3] = {0, 0, 1};
+  int wheels = 0;
+  for (int j = 0; j < m->njoint; j++) wheels += cav_problem_is_wheel(m, j);
+  if (wheels == 0) return CAV_OK;
+  cav_state *state = cav_state_new(m);
+  double *before = calloc(3 * (size_t)m->nlink + (size_t)m->njoint + 1, sizeof *before);
+  double *radius = before ? before + 3 * (size_t)m->nlink : NULL, forwards[3], way[3];
+  cav_status status = state && before ? CAV_OK : CAV_NO_MEMORY;
+  if (state) state->options.smoothing = near_ground;
+  for (int t = 0; t < at->nknot && !status; t++) {
+    double *q = at->q + (size_t)t * (size_t)at->nq;
+    status = cav_position(m, state, q);
+    for (int j = 0; j < m->njoint && !status; j++) {
+      const cav_joint *joint = &m->joint[j];
+      const double *centre = state->com + 3 * (size_t)joint->link;
+      if (!cav_problem_is_wheel(m, j) || problem->q_goal[joint->q] != problem->q_start[joint->q]) continue;
+      if (t == 0) radius[j] = wheel_radius(state, joint->link);
+      cross3(forwards, state->axis + 6 * (size_t)joint->dof, up);
+      sub3(way, centre, before + 3 * (size_t)joint->link);
+      copy3(before + 3 * (size_t)joint->link, centre);
+      if (t > 0) q[joint->q] = q[joint->q - at->nq] + (radius[j] > 0 ? dot3(way, forwards) / radius[j] : 0);
+    }
+  }
+  cav_state_free(state);
+  free(before);
+  return status;
+}
+
 cav_status cav_guess_fill(const cav_problem *problem, const double *end, cav_trajectory *at) {
   const cav_model *m = problem->model;
   double *tangent = at->v + (size_t)(at->nknot - 1) * m->nv; // scratch until velocities are filled below
@@ -98,9 +144,10 @@ cav_status cav_guess_fill(const cav_problem *problem, const double *end, cav_tra
     rotation(problem, smoothstep(x), q);
     if (x > 0 && x < 1) lift(m, 4 * problem->guess_height * x * (1 - x), q);
   }
+  if (!problem->cycle.on && problem->guess != CAV_GUESS_PUMP) status = roll(problem, at);
   memcpy(at->v, problem->v_start, (size_t)m->nv * sizeof(double));
   cav_trajectory_velocities(m, at);
-  return CAV_OK;
+  return status;
 }
 
 cav_trajectory *cav_problem_guess(const cav_problem *problem, cav_error *error) {
