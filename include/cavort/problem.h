@@ -62,7 +62,7 @@ typedef enum cav_norm {
   CAV_NORM_ABSOLUTE ///< sqrt(1 + x^2) - 1: x^2/2 within the scale, |x| far beyond it, where it pulls no harder
 } cav_norm;
 
-/// Tolerances of goals stated at one time where the term gives none, by what is measured.
+/// Tolerances of goals where the term gives none, by what is measured.
 #define CAV_WITHIN_LENGTH 0.03 ///< m
 #define CAV_WITHIN_ANGLE 0.1   ///< rad
 
@@ -101,8 +101,8 @@ typedef struct cav_term {
   const double *waypoint_time; ///< [nwaypoint], s, increasing
   double
       within; ///< tolerance of the target, in the unit of the quantity: the motion achieves it if off by at most this. 0:
-              ///< a usual one for goals at one time, none for windows; infinite: told only. Of slip, m/s: up to which
-              ///< contacts may slide, in a certificate
+      ///< a usual one for goals, at one time or held over a window, none for prices (problems/README.md); infinite: told only. Of slip, m/s: up to which
+      ///< contacts may slide, in a certificate
   double lower,
       upper; ///< CAV_USE_RANGE, infinite where open; target is NULL then, or a posture or orientation to start from
 } cav_term;

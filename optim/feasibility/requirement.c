@@ -33,7 +33,10 @@ double cav_requirement_time(const cav_examination *e, int knot) {
 static double tolerance_of(const cav_term *term, double usual) {
   if (term->within > 0) return term->within;
   if (term->use != CAV_USE_COST) return 1e-6 * term->scale;
-  return term->from == term->to ? usual : INFINITY;
+  // costs that are goals: at one time, or a value held over a window of its own
+  int whole = term->from == 0 && term->to < 0, posture = term->quantity == CAV_QUANTITY_CONFIGURATION;
+  int held = !whole && term->nwaypoint == 0 && (term->target || posture);
+  return term->from == term->to || held ? usual : INFINITY;
 }
 
 static cav_status add(cav_examination *e, const cav_requirement *r) {

@@ -9,7 +9,7 @@
 
 #include "verification.h"
 
-// tolerances of goals stated at one time, where the term gives none
+// tolerances of goals, where the term gives none
 static const double within_length = CAV_WITHIN_LENGTH, within_angle = CAV_WITHIN_ANGLE, within_speed = 0.3,
                     within_ratio = 0.1;
 
@@ -89,17 +89,24 @@ static const char *sensor_unit(const cav_model *model, const cav_sensor *sensor,
   return "";
 }
 
+// whether a cost is a goal: at one time, or held over a window of its own at one value; what is tracked, or costs over the
+// whole motion, is a price
+static int is_goal(const cav_term *term) {
+  int whole = term->from == 0 && term->to < 0, posture = term->quantity == CAV_QUANTITY_CONFIGURATION;
+  return term->from == term->to || (!whole && term->nwaypoint == 0 && (term->target || posture));
+}
+
 // whether a term names a value to be reached: at one time, by a target of its own, or as a constraint
 static int states_target(const cav_term *term) {
   if (cav_quantity_rule_of(term->quantity)->of == CAV_OF_CONTACTS) return 0;
-  return term->use != CAV_USE_COST || term->from == term->to || term->target != NULL || term->within > 0;
+  return term->use != CAV_USE_COST || is_goal(term) || term->target != NULL || term->within > 0;
 }
 
 // tolerance that decides whether the term is met; infinite: told only
 static double tolerance_of(const cav_term *term, double usual) {
   if (term->within > 0) return term->within;
   if (term->use != CAV_USE_COST) return CAV_TOLERANCE_CONSTRAINT * term->scale;
-  return term->from == term->to && usual > 0 ? usual : INFINITY;
+  return is_goal(term) && usual > 0 ? usual : INFINITY;
 }
 
 // number of the dof that the k-th selected value of a term belongs to
