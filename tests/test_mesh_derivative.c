@@ -63,7 +63,68 @@ static void test_shape(const char *type, const char *attributes) {
   cav_model_free(m);
 }
 
+// the inverse at (q, v, v_next) with the contacts that bear something there, and with all of them
+static void compare_sought(const cav_model *m, cav_state *state, const double *q, const double *v, const double *next,
+                           double *J, int contacts[2], double *worst) {
+  int nv = m->nv;
+  size_t block = (size_t)nv * (size_t)nv;
+  double *u = J + 6 * block;
+  for (int all = 0; all < 2; all++) {
+    double *to = J + 3 * block * (size_t)all;
+    cav_status status = all ? cav_position(m, state, q) : CAV_OK;
+    CHECK(!status &&
+          cav_inverse_from(m, state, all ? CAV_STAGE_POSITION : CAV_STAGE_NONE, q, v, next, u + all * nv) == CAV_OK);
+    contacts[all] += state->ncontact;
+    CHECK(cav_derivatives(m, state, to, to + block, to + 2 * block) == CAV_OK);
+  }
+  *worst = fmax(*worst, scene_error(u, u + nv, nv));
+  for (int part = 0; part < 3; part++)
+    *worst = fmax(*worst, scene_error(J + part * block, J + (3 + part) * block, (int)block));
+  // far velocities from the same q: nothing is missed
+  for (int i = 0; i < nv; i++) J[i] = next[i] - 3;
+  CHECK(cav_inverse(m, state, q, v, next, u) == CAV_OK);
+  CHECK(cav_inverse_from(m, state, CAV_STAGE_POSITION, q, v, J, u) == CAV_OK);
+  CHECK(cav_position(m, state, q) == CAV_OK &&
+        cav_inverse_from(m, state, CAV_STAGE_POSITION, q, v, J, u + nv) == CAV_OK);
+  *worst = fmax(*worst, scene_error(u, u + nv, nv));
+}
+
+// what contacts of meshes are not sought, since they bear nothing at both velocities, changes no force
+static void test_narrowed(void) {
+  char model_text[2000];
+  snprintf(model_text, sizeof model_text, text, "mesh", "mesh='rock' condim='6'");
+  cav_model *m = scene_load(model_text);
+  cav_state *state = m ? cav_state_new(m) : NULL;
+  if (!CHECK(state != NULL)) return;
+  int nv = m->nv, contacts[2] = {0};
+  double *q = scene_vector(m->nq), *v = scene_vector(nv), *next = scene_vector(nv), worst = 0;
+  double *J = scene_vector(6 * nv * nv + 2 * nv);
+  state->options.stabilisation = CAV_STABILISATION_DISCRETE;
+  for (int k = 0; k < 300; k++) {
+    // smoothings, laws, orders, time constants, and speeds up to 5 m/s by turns
+    state->options.smoothing = k % 3 ? 0.004 * (k % 3) : 0;
+    state->options.smoothing_self = state->options.smoothing / 4;
+    state->options.sliding = k % 2 ? CAV_SLIDING_COULOMB : CAV_SLIDING_CONVEX;
+    state->options.order = k / 2 % 2 ? CAV_ORDER_MIDPOINT : CAV_ORDER_EULER;
+    state->options.timestep = 0.04;
+    state->options.time_constant = k / 4 % 2 ? 0.03 : 0;
+    double speed = k / 8 % 3 == 0 ? 0.03 : k / 8 % 3 == 1 ? 0.3 : 2;
+    scene_posture(m, q, v, 0.4);
+    scene_normals(v, nv, speed);
+    scene_normals(next, nv, speed);
+    compare_sought(m, state, q, v, next, J, contacts, &worst);
+  }
+  printf("%d of %d contacts sought, forces and derivatives within %.1e\n", contacts[0], contacts[1], worst);
+  CHECK(contacts[0] < contacts[1]);
+  // bound: exp(-25) = 1.4e-11 of a contact, over its distance of smoothing in derivatives
+  CHECK_NEAR(worst, 0, 1e-9);
+  cav_state_free(state);
+  cav_model_free(m);
+  free(q), free(v), free(next), free(J);
+}
+
 int main(void) {
+  test_narrowed();
   test_shape("sphere", "size='.08'");
   test_shape("capsule", "size='.05 .08'");
   test_shape("box", "size='.09 .06 .07'");

@@ -2,7 +2,8 @@
 /// narrow phase of pairs.c. Geoms in no pair are never placed; a geom's rotation is formed only if a narrow phase asks
 /// for it, once per call, and that of a geom fixed to the world once for all. Pairs with
 /// what stands in the world out of reach are left out by trees and blocks (fixed.c); where CAV_SWEEP_FROM pairs and more are left
-/// they are pruned along an axis (sweep.c); bench_sweep measures where that begins to pay.
+/// they are pruned along an axis (sweep.c); bench_sweep measures where that begins to pay. Where v and v_next are known
+/// pairs with a mesh are sought only as far as something may push at them.
 #include <assert.h>
 #include <stdlib.h>
 
@@ -17,11 +18,12 @@ static const double APPROACH_SPEED = 5;
 
 /// A pair as the broad phase wants it: all it reads, in order.
 typedef struct candidate {
-  int first, second;         ///< slots
-  int pair;                  ///< its number
-  short int plane, external; ///< 1 if the first geom is a plane; as in the pair
-  double margin;             ///< of the pair
-  double bound;              ///< sum of bounding radii; of the second geom alone if the first is a plane
+  int first, second;               ///< slots
+  int pair;                        ///< its number
+  short int plane;                 ///< 1 if the first geom is a plane
+  signed char external, expensive; ///< as in the pair; 1 if one of the two is a mesh, whose search is worth saving
+  double margin;                   ///< of the pair
+  double bound;                    ///< sum of bounding radii; of the second geom alone if the first is a plane
 } candidate;
 
 /// A geom in some pair.
@@ -45,6 +47,7 @@ struct cav_geom_cache {
   cav_sweep *sweep;     ///< NULL: all pairs that are left are looked at
   int sweep_from;
   double margin; ///< largest of all pairs
+  int expensive; ///< some pair is
 };
 
 // places a geom fixed to the world, or prepares one that moves
@@ -78,9 +81,11 @@ static void open_slots(const cav_model *model, struct cav_geom_cache *cache, int
     c->pair = p;
     c->first = slot_of[pair->geom1];
     c->second = slot_of[pair->geom2];
-    c->external = (short)pair->external;
+    c->external = (signed char)pair->external;
     c->margin = pair->margin;
     c->plane = a->type == CAV_GEOM_PLANE;
+    c->expensive = a->type == CAV_GEOM_MESH || b->type == CAV_GEOM_MESH;
+    cache->expensive |= c->expensive;
     c->bound = b->bound + (c->plane ? 0 : a->bound);
   }
 }
@@ -258,6 +263,52 @@ static inline int near(const struct cav_geom_cache *cache, const candidate *c, d
   return activation > 0 && dot3(d, d) < activation * activation;
 }
 
+// how fast a point within radius of a place can move between two links, m/s; turn: the same of their rotation, rad/s
+static double speed_between(const cav_state *state, const double *velocity, int one, int other, const double place[3],
+                            double radius, double *turn) {
+  double linear[3] = {0, 0, 0}, angular[3] = {0, 0, 0}, at[3];
+  for (int k = 0; k < 2; k++) {
+    int link = k ? other : one;
+    if (link == 0) continue;
+    const double *V = velocity + 6 * link;
+    velocity_at(at, V, state->reference + 3 * link, place);
+    axpy3(linear, linear, k ? 1 : -1, at);
+    axpy3(angular, angular, k ? 1 : -1, V);
+  }
+  *turn = norm3(angular);
+  return norm3(linear) + *turn * radius;
+}
+
+// the distance below which a contact bears anything at v and v_next, or what the margin is: under the discrete law
+// v* - v_next, friction included, is what both velocities make up, less h K times the gap; the smoothed law trails off
+// below that by exp(-gap/delta)
+static double reach(const cav_model *model, const cav_state *state, int p, double margin) {
+  static const double TAIL = 25, SLACK = 0.05; // exp(-25) = 1e-11; m/s, for velocities a little off those
+  const struct cav_geom_cache *cache = state->work->geom;
+  const cav_workspace *w = state->work;
+  const candidate *c = cache->candidate + p;
+  const cav_pair *pair = model->pair + p;
+  const slot *a = cache->slot + c->first, *b = cache->slot + c->second;
+  double radius = b->geom->bound + margin, turn[2], mu = 0, roll = 0;
+  const double *place = cache->centre[c->second];
+  double now = speed_between(state, w->velocity_now, a->geom->link, b->geom->link, place, radius, &turn[0]);
+  double next = speed_between(state, state->velocity_next, a->geom->link, b->geom->link, place, radius, &turn[1]);
+  for (int k = 0; k + 1 < pair->dim; k++) *(k < 2 ? &mu : &roll) = fmax(k < 2 ? mu : roll, pair->friction[k]);
+  double kept = fabs(1 - w->discrete_damping), most = (1 + mu) * (kept * now + next + SLACK);
+  most += roll * (kept * turn[0] + turn[1]);
+  double delta =
+      state->options.smoothing > 0 ? c->external ? state->options.smoothing : state->options.smoothing_self : 0;
+  double far = c->margin + most / w->discrete_stiffness + TAIL * delta;
+  return far < margin ? far : margin;
+}
+
+int cav_contacts_narrow(const cav_state *state) {
+  const cav_options *o = &state->options;
+  const struct cav_geom_cache *cache = state->work->geom;
+  return cache && cache->expensive && o->contact && o->constraint && o->stabilisation == CAV_STABILISATION_DISCRETE &&
+         o->next_gap == CAV_NEXT_GAP_LINEAR && !o->coupled;
+}
+
 // the geom as a shape, its rotation formed at the first request
 static const cav_shape *shape_of(const cav_state *state, struct cav_geom_cache *cache, int i) {
   if (!cache->slot[i].turned) refresh_rotation(state, cache, i);
@@ -304,6 +355,7 @@ static cav_status push(const cav_model *model, cav_state *state, int p, const ca
 // contacts of one pair whose bounds are near
 static inline cav_status collide_pair(const cav_model *model, cav_state *state, const candidate *c, double margin) {
   struct cav_geom_cache *cache = state->work->geom;
+  if (c->expensive && !near(cache, c, margin)) return CAV_OK;
   cav_touch touch[CAV_TOUCH_MAX];
   const cav_shape *a = shape_of(state, cache, c->first), *b = shape_of(state, cache, c->second);
   int count = cav_collide_shapes(a, b, margin, touch);
@@ -322,6 +374,7 @@ static cav_status collide_swept(const cav_model *model, cav_state *state, const 
     const candidate *c = cache->candidate + found[i];
     double margin = c->margin + activation[c->external];
     if (!near(cache, c, margin)) continue;
+    if (c->expensive && state->work->narrowed) margin = reach(model, state, c->pair, margin);
     cav_status status = collide_pair(model, state, c, margin);
     if (status) return status;
   }
@@ -336,6 +389,7 @@ static inline cav_status collide_run(const cav_model *model, cav_state *state, c
     const candidate *c = cache->candidate + p;
     double margin = c->margin + activation[c->external];
     if (!near(cache, c, margin)) continue;
+    if (c->expensive && state->work->narrowed) margin = reach(model, state, c->pair, margin);
     cav_status status = collide_pair(model, state, c, margin);
     if (status) return status;
   }

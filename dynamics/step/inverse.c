@@ -13,7 +13,14 @@
 #include "options.h"
 #include "step.h"
 
-cav_status cav_position(const cav_model *model, cav_state *state, const double *q) {
+static void copy(double *to, const double *from, int n) {
+  if (n > 0 && to != from) { memcpy(to, from, (size_t)n * sizeof *to); }
+}
+
+// v NULL: all contacts; else those that bear something at v and v_next or may do so near them
+static cav_status find_position(const cav_model *model, cav_state *state, const double *q, const double *v,
+                                const double *v_next) {
+  cav_workspace *w = state->work;
   state->work->valid = CAV_STAGE_NONE;
   state->ncontact = state->nrow = state->nequality = 0;
   if (!cav_options_valid(&state->options)) { return CAV_BAD_INPUT; }
@@ -22,6 +29,13 @@ cav_status cav_position(const cav_model *model, cav_state *state, const double *
   cav_stabilisation_prepare(state);
   cav_status status = cav_limits_find(model, state);
   if (status) { return status; }
+  w->narrowed = v && cav_contacts_narrow(state);
+  if (w->narrowed) {
+    copy(w->narrow_v, v, model->nv);
+    copy(w->narrow_v + model->nv, v_next, model->nv);
+    cav_link_velocities(model, state, w->narrow_v, w->velocity_now);
+    cav_link_velocities(model, state, w->narrow_v + model->nv, state->velocity_next);
+  }
   status = cav_contacts_find(model, state);
   if (status) { return status; }
   if (model->nequality) { cav_equality_evaluate(model, state); }
@@ -33,6 +47,18 @@ cav_status cav_position(const cav_model *model, cav_state *state, const double *
   state->work->valid = CAV_STAGE_POSITION;
   state->work->options = state->options;
   return CAV_OK;
+}
+
+cav_status cav_position(const cav_model *model, cav_state *state, const double *q) {
+  return find_position(model, state, q, NULL, NULL);
+}
+
+// whether velocities are so near to those that contacts were sought for that none is missed (SLACK of reach, collide.c)
+static int is_within_reach(const cav_workspace *w, const double *v, const double *v_next, int nv) {
+  for (int i = 0; i < nv; i++) {
+    if (!(fabs(v[i] - w->narrow_v[i]) <= 1e-3) || !(fabs(v_next[i] - w->narrow_v[nv + i]) <= 1e-3)) return 0;
+  }
+  return 1;
 }
 
 // velocity of the contact point and angular velocity of a link, added with a sign; the world has none
@@ -145,10 +171,6 @@ static const double *step_velocities(const cav_model *model, cav_state *state, d
   return mean ? bias : w->v_next;
 }
 
-static void copy(double *to, const double *from, int n) {
-  if (n > 0 && to != from) { memcpy(to, from, (size_t)n * sizeof *to); }
-}
-
 // v* of coupled rows: from the velocities of all at v, those of links at velocity_now
 static void couple(const cav_model *model, cav_state *state, const double *velocity_now) {
   const double *v = state->work->v;
@@ -220,9 +242,12 @@ cav_status cav_inverse_from(const cav_model *model, cav_state *state, cav_stage 
   if (!cav_options_same(&state->options, &w->options, CAV_STAGE_POSITION)) unchanged = CAV_STAGE_NONE;
   if (!cav_options_same(&state->options, &w->options, CAV_STAGE_VELOCITY) && unchanged > CAV_STAGE_POSITION)
     unchanged = CAV_STAGE_POSITION;
-  if (unchanged == CAV_STAGE_NONE) {
-    cav_status status = cav_position(model, state, q);
+  // velocities move on from the same q: once all contacts, for any velocity
+  int moved = unchanged != CAV_STAGE_NONE && w->narrowed && !is_within_reach(w, v, v_next, model->nv);
+  if (moved || unchanged == CAV_STAGE_NONE) {
+    cav_status status = find_position(model, state, q, moved ? NULL : v, v_next);
     if (status) { return status; }
+    unchanged = CAV_STAGE_NONE;
   }
   if (state->options.order == CAV_ORDER_MOMENTUM) {
     cav_status status = cav_half_steps_new(model, state);

@@ -100,6 +100,7 @@ static size_t layout(const cav_model *model, char *base, cav_state *s, cav_works
   w->v_next = carve(base, &used, nv, d);
   w->acceleration = carve(base, &used, 6 * n, d);
   w->velocity_now = carve(base, &used, 6 * n, d);
+  w->narrow_v = carve(base, &used, 2 * nv, d);
   w->scratch = carve(base, &used, 4 * nv, d);
   w->group = carve(base, &used, nv, i);
   w->armature = carve(base, &used, nv, d);

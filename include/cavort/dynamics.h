@@ -121,7 +121,8 @@ CAV_API cav_status cav_position(const cav_model *model, cav_state *state, const 
 /// Generalised force that takes v to v_next in one step: u = RNE(q, v, a) + D a - p - (J' f)/h, a = (v_next - v)/h.
 /// Under the order momentum the change of momentum of whole trees stands for RNE in the rows of their root links. q
 /// [nq], v, v_next [nv] -> u [nv], N or N m. D = armature (+ h B for euler). Forms no matrix. Fails with
-/// CAV_NOT_FINITE, u untouched. Todorov 2014, eqs. (2), (19)-(22).
+/// CAV_NOT_FINITE, u untouched. Todorov 2014, eqs. (2), (19)-(22). Contacts of meshes that bear nothing at v and v_next
+/// may be missing from the state: cav_position lists all.
 CAV_API cav_status cav_inverse(const cav_model *model, cav_state *state, const double *q, const double *v,
                                const double *v_next, double *u);
 
