@@ -286,10 +286,19 @@ double cav_contact_stiffness_ratio(const cav_state *state, const cav_contact *c,
   return fraction;
 }
 
+// inverse weight of a contact. Next to a base that is fixed, a link (the turret of an arm) has almost none where its joints
+// cannot move it, and its softness would be as small: a smoothed law, which reaches across gaps, would press with forces
+// beyond any bound. There it has at least that of all that moves, halved: less than any body has whose base is free, in
+// a plane, too.
+static double contact_weight(const cav_state *state, const cav_pair *pair) {
+  const cav_model *model = state->model;
+  return state->options.smoothing > 0 && model->mass > 0 ? larger(pair->weight[0], 0.5 / model->mass) : pair->weight[0];
+}
+
 // R of the friction rows so that R_j mu_j^2 is the same for all (22); all rows share the damping
 static void soften_contact(cav_state *state, cav_contact *c, double inverse_impratio) {
   const cav_pair *pair = &state->model->pair[c->pair];
-  double rate, weight = pair->weight[0] / cav_contact_stiffness_ratio(state, c, &rate);
+  double rate, weight = contact_weight(state, pair) / cav_contact_stiffness_ratio(state, c, &rate);
   cav_law l = row_law(state, &pair->softness, c->dist - c->margin, weight);
   c->stiffness = l.stiffness;
   c->sigma = smoothing_scale(&l, pair->external ? state->options.smoothing : self_smoothing(state));
