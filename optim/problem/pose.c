@@ -13,6 +13,7 @@
 #include "file.h"
 #include "math3.h"
 #include "problem_file.h"
+#include "stand.h"
 
 enum { DEEPEST = 16 }; // poses that name each other
 
@@ -36,6 +37,26 @@ static const char *nearest_key(const cav_problem_reader *reader, const char *wor
   return near;
 }
 
+static int names_stand(const char *list) {
+  const char *last = strrchr(list, '|');
+  last = last ? last + 1 : list;
+  last += strspn(last, " ");
+  return !strncmp(last, "stand", 5) && !last[5 + strspn(last + 5, " ")];
+}
+
+static cav_status find_stand(const cav_problem_reader *reader, const cav_xml_node *node, double *q) {
+  cav_stand stand;
+  cav_status status = cav_stand_find(reader->model, reader->state, q, &stand);
+  if (status == CAV_BAD_INPUT)
+    return cav_xml_fail(reader->error, node, "key",
+                        "neither the model '%s' nor this file has a keyframe or pose 'stand', and %s",
+                        reader->model->name, stand.why);
+  if (status)
+    cav_xml_fail_as(reader->error, status, node, "key", "a posture that stands cannot be evaluated: %s",
+                    cav_status_name(status));
+  return status;
+}
+
 // the first of the names, separated by |, that is a keyframe of the model or else a <pose>
 static cav_status read_key(const cav_problem_reader *reader, const cav_xml_node *node, int depth, double *q) {
   const cav_model *m = reader->model;
@@ -52,6 +73,11 @@ static cav_status read_key(const cav_problem_reader *reader, const cav_xml_node 
     if (key < 0) return read_pose(reader, pose, depth + 1, q);
     memcpy(q, m->key[key].q, (size_t)m->nq * sizeof(double));
     return CAV_OK;
+  }
+  // of any model that has feet, by whatever names
+  if (names_stand(list)) {
+    free(copy);
+    return find_stand(reader, node, q);
   }
   copy[strcspn(copy, " ")] = 0;
   const char *near = nearest_key(reader, copy);
@@ -192,8 +218,7 @@ static cav_status lay_joint(const cav_problem_reader *reader, const cav_xml_node
   return CAV_OK;
 }
 
-// how far a geom reaches from its centre against the unit direction n
-static double reach(const cav_geom *geom, const cav_pose *pose, const double n[3]) {
+double cav_geom_reach(const cav_geom *geom, const cav_pose *pose, const double n[3]) {
   const double *r = pose->rotation, *s = geom->size;
   double x = n[0] * r[0] + n[1] * r[3] + n[2] * r[6];
   double y = n[0] * r[1] + n[1] * r[4] + n[2] * r[7];
@@ -244,7 +269,7 @@ static double way_to_plane(const cav_model *m, const cav_state *state, int root)
     cav_pose floor, at;
     cav_object_pose(m, state, CAV_OBJECT_GEOM, m->pair[p].geom1, &floor);
     cav_object_pose(m, state, CAV_OBJECT_GEOM, m->pair[p].geom2, &at);
-    double n[3] = {floor.rotation[2], floor.rotation[5], floor.rotation[8]}, distance = -reach(geom, &at, n);
+    double n[3] = {floor.rotation[2], floor.rotation[5], floor.rotation[8]}, distance = -cav_geom_reach(geom, &at, n);
     if (n[2] < 0.1) continue;
     for (int i = 0; i < 3; i++) distance += n[i] * (at.pos[i] - floor.pos[i]);
     up = fmax(up, -distance / n[2]);

@@ -18,6 +18,7 @@
 #include "objects.h"
 #include "plannable.h"
 #include "problem_file.h"
+#include "role.h"
 #include "scene.h"
 
 static const double most_knots = 1e6;
@@ -93,42 +94,75 @@ static cav_object_type other_kind(const cav_model *model, cav_object_type type, 
   return other;
 }
 
-int cav_problem_find(const cav_problem_reader *reader, const cav_xml_node *node, const char *attribute,
-                     cav_object_type type) {
-  const char *list = cav_xml_text(node, attribute, "");
-  char *copy = strdup(list), *rest = copy, *name = NULL;
-  if (!copy) {
-    cav_problem_no_memory(reader);
-    return -1;
+// the body, or the geom at its end, that has a role by that name; -1: there is none
+static int find_role(const char *name, const cav_roles *roles, cav_object_type *type) {
+  cav_role role = cav_role_named(name);
+  if (role == CAV_ROLE_TYPES || roles->body[role] < 0) return -1;
+  if (roles->geom[role] < 0) return roles->body[role];
+  *type = CAV_OBJECT_GEOM;
+  return roles->geom[role];
+}
+
+// nothing of that name: what is near, or what else is called so
+static void refuse_name(const cav_problem_reader *reader, const cav_xml_node *node, const char *attribute,
+                        cav_object_type type, const char *first, const cav_roles *roles) {
+  const cav_model *m = reader->model;
+  const char *kind = cav_object_kind_of(type)->text;
+  cav_object_type other = other_kind(m, type, first);
+  if (other != CAV_OBJECT_TYPES) {
+    const char *given = cav_object_kind_of(other)->text;
+    int accepted = cav_xml_accepts(node, given);
+    cav_xml_fail(reader->error, node, attribute, "the model '%s' has no %s '%.100s', but a %s of that name%s%s%s",
+                 m->name, kind, first, given, accepted ? ": give it as attribute '" : "", accepted ? given : "",
+                 accepted ? "'" : "");
+    return;
   }
-  int found = -1;
-  while (found < 0 && (name = strsep(&rest, "|"))) {
+  int n = 0;
+  size_t stride = 0;
+  const void *names = cav_object_names(m, type, &n, &stride);
+  const char *near = n ? cav_xml_nearest(first, names, n, stride) : NULL, *role_name[CAV_ROLE_TYPES];
+  char known[480] = "", parts[240];
+  if (roles) {
+    for (int r = 0; r < CAV_ROLE_TYPES; r++) role_name[r] = cav_role_name((cav_role)r);
+    if (!near && cav_role_named(first) == CAV_ROLE_TYPES)
+      near = cav_xml_nearest(first, role_name, CAV_ROLE_TYPES, sizeof *role_name);
+    cav_roles_list(roles, parts, sizeof parts);
+    snprintf(known, sizeof known, "; roles found (%s): %s", cav_build_name(roles->build), *parts ? parts : roles->why);
+  }
+  cav_xml_fail(reader->error, node, attribute, "the model '%s' has no %s of that name, got '%.200s'%s%s%s%s", m->name,
+               kind, cav_xml_text(node, attribute, ""), near ? "; did you mean '" : "", near ? near : "",
+               near ? "'?" : "", known);
+}
+
+int cav_problem_find_frame(const cav_problem_reader *reader, const cav_xml_node *node, const char *attribute,
+                           cav_object_type *type) {
+  char *copy = strdup(cav_xml_text(node, attribute, "")), *rest = copy, *name = NULL, *first = NULL;
+  int found = -1, may = *type == CAV_OBJECT_BODY || *type == CAV_OBJECT_XBODY, known = 0;
+  cav_roles roles;
+  cav_status status = copy ? CAV_OK : CAV_NO_MEMORY;
+  while (found < 0 && !status && (name = strsep(&rest, "|"))) {
     name += strspn(name, " ");
     for (size_t n = strlen(name); n && name[n - 1] == ' '; n--) name[n - 1] = 0;
-    if (*name) found = cav_object_find(reader->model, type, name);
+    if (!first) first = name;
+    if (*name) found = cav_object_find(reader->model, *type, name);
+    if (found >= 0 || !may) continue;
+    if (!known++) status = cav_roles_find(reader->model, reader->state, &roles);
+    if (!status) found = find_role(name, &roles, type);
   }
-  if (found < 0) {
-    int n = 0;
-    size_t stride = 0;
-    const char *kind = cav_object_kind_of(type)->text;
-    const void *names = cav_object_names(reader->model, type, &n, &stride);
-    copy[strcspn(copy, " |")] = 0;
-    const char *near = n ? cav_xml_nearest(copy, names, n, stride) : NULL;
-    cav_object_type other = other_kind(reader->model, type, copy);
-    if (other != CAV_OBJECT_TYPES) {
-      const char *given = cav_object_kind_of(other)->text;
-      cav_xml_fail(reader->error, node, attribute, "the model '%s' has no %s '%.100s', but a %s of that name%s%s%s",
-                   reader->model->name, kind, copy, given,
-                   cav_xml_accepts(node, given) ? ": give it as attribute '" : "",
-                   cav_xml_accepts(node, given) ? given : "", cav_xml_accepts(node, given) ? "'" : "");
-      free(copy);
-      return -1;
-    }
-    cav_xml_fail(reader->error, node, attribute, "the model '%s' has no %s of that name, got '%.200s'%s%s%s",
-                 reader->model->name, kind, list, near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
-  }
+  if (status)
+    cav_xml_fail_as(reader->error, status, node, attribute, "the roles of bodies cannot be found: %s",
+                    cav_status_name(status));
+  else if (found < 0)
+    refuse_name(reader, node, attribute, *type, first, known ? &roles : NULL);
   free(copy);
   return found;
+}
+
+int cav_problem_find(const cav_problem_reader *reader, const cav_xml_node *node, const char *attribute,
+                     cav_object_type type) {
+  cav_object_type found = type;
+  int object = cav_problem_find_frame(reader, node, attribute, &found);
+  return object >= 0 && found != type ? reader->model->geom[object].body : object;
 }
 
 // dofs of the smallest tree

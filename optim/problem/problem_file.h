@@ -60,6 +60,11 @@ const cav_xml_node *cav_problem_child(const cav_xml_node *node, const char *name
 int cav_problem_find(const cav_problem_reader *reader, const cav_xml_node *node, const char *attribute,
                      cav_object_type type);
 
+/// The same for what has a frame. The name of a role (role.h) stands for a body, after the model's own names; type
+/// becomes that of a geom where the role is of a part of its body.
+int cav_problem_find_frame(const cav_problem_reader *reader, const cav_xml_node *node, const char *attribute,
+                           cav_object_type *type);
+
 /// Configuration q [nq] of <start>, <goal> or <pose>, from keyframes, numbers, a trajectory and joint values. pose.c.
 cav_status cav_problem_pose(const cav_problem_reader *reader, const cav_xml_node *node, double *q);
 

@@ -307,7 +307,7 @@ static cav_status read_reference(const cav_problem_reader *reader, const cav_xml
     return cav_xml_fail(reader->error, node, "refname", "a %s reads in no other frame", rule->name);
   sensor->referred = 1;
   sensor->reference_type = types[cav_xml_word(node, "reftype", 0)];
-  sensor->reference = cav_problem_find(reader, node, "refname", sensor->reference_type);
+  sensor->reference = cav_problem_find_frame(reader, node, "refname", &sensor->reference_type);
   return sensor->reference < 0 ? CAV_BAD_INPUT : CAV_OK;
 }
 
@@ -336,7 +336,7 @@ static cav_status read_object(const cav_problem_reader *reader, const cav_xml_no
                         wanted);
   if (framed ? !has_frame(sensor->object_type) : sensor->object_type != wanted_of[rule->target].type)
     return cav_xml_fail(reader->error, node, given, "a %s looks at a %s", rule->name, wanted);
-  sensor->object = cav_problem_find(reader, node, given, sensor->object_type);
+  sensor->object = cav_problem_find_frame(reader, node, given, &sensor->object_type);
   if (sensor->object < 0) return CAV_BAD_INPUT;
   cav_status status = check_object(reader, node, given, sensor);
   return status ? status : read_reference(reader, node, sensor);

@@ -10,6 +10,7 @@
 #include "file.h"
 #include "objects.h"
 #include "quantity.h"
+#include "stand.h"
 #include "step.h"
 
 static const char *const geom_name[] = {"plane",    "sphere", "capsule", "ellipsoid",
@@ -56,6 +57,41 @@ static void print_bodies(const cav_model *m) {
     printf("\n");
   }
   printf("\n");
+}
+
+// what key="stand" is
+static void print_stand(const cav_model *m, cav_state *state) {
+  cav_stand stand;
+  double *q = calloc((size_t)m->nq + 1, sizeof *q);
+  cav_status status = q ? cav_stand_find(m, state, q, &stand) : CAV_NO_MEMORY;
+  if (status == CAV_OK && stand.key)
+    printf("  %-20s keyframe '%s'\n", "stand", stand.key);
+  else if (status == CAV_OK)
+    printf("  %-20s found: centre of mass %.1f mm from the middle of the feet\n", "stand", 1e3 * stand.aside);
+  else if (status == CAV_BAD_INPUT)
+    printf("  %-20s none: %s\n", "stand", stand.why);
+  free(q);
+}
+
+// which bodies have a role that problem files can name
+static void print_roles(const cav_model *m) {
+  cav_roles roles;
+  cav_state *state = cav_state_new(m);
+  cav_status status = state ? cav_roles_find(m, state, &roles) : CAV_NO_MEMORY;
+  if (status) {
+    cav_state_free(state);
+    return;
+  }
+  printf("roles: %s%s%s\n", cav_build_name(roles.build), *roles.why ? ": " : "", roles.why);
+  for (int r = 0; r < CAV_ROLE_TYPES; r++) {
+    int body = roles.body[r], geom = roles.geom[r];
+    if (body < 0) continue;
+    printf("  %-20s %s%s%s\n", cav_role_name((cav_role)r), m->body[body].name, geom < 0 ? "" : ", geom ",
+           geom < 0 ? "" : m->geom[geom].name);
+  }
+  print_stand(m, state);
+  printf("\n");
+  cav_state_free(state);
 }
 
 // what a model has, counted
@@ -417,6 +453,7 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
 static void print_model(const cav_model *m) {
   print_sizes(m);
   print_bodies(m);
+  print_roles(m);
   print_stages(m);
   print_costs(m);
   print_actuators(m);

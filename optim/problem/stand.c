@@ -1,0 +1,360 @@
+/// Standing without names: least squares by Gauss-Newton with a Levenberg-Marquardt damping, on the manifold of
+/// configurations, derivatives by differences. Rows: the tilt of the soles of bipeds (a sole is flat where it was flat in the
+/// model's own configuration), heights of all feet, the centre of mass over their middle, the height of the trunk, and, with
+/// small weights, the way from the model's own configuration. Legs that are straight there, whose length can only fall, are bent:
+/// the trunk comes down by a fixed fraction, and hinges start off towards the middle of their ranges. Joints stay in
+/// their ranges. Limbs that touch each other are the file's business, as in all postures.
+#include "stand.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double straight = 0.93;   // leg's length over that of its parts
+static const double biped_bent = 0.96; // of the height of straight legs
+static const double quadruped_bent = 0.75;
+static const double start_bend = 0.3;    // rad
+static const double inside = 0.02;       // rad from a limit
+static const double length_weight = 100; // 1/m
+static const double joint_weight = 0.03, root_weight = 0.3;
+static const double tilt_weight = 30;
+static const double level = 1e-3; // m and rad: what a posture that stands may be off by
+enum { FEET = 4, MOST = 80 };
+
+typedef struct stander {
+  const cav_model *model;
+  cav_state *state;
+  const cav_roles *roles;
+  int nfoot, foot[FEET], first[FEET]; // bodies
+  double point[FEET][3], up[FEET][3]; // of the sole, and the vertical, in the frame of the foot's body
+  int root;                           // body at the top of the tree
+  double rise;                        // of the trunk over the feet that is wanted
+  int nrow;
+  double *q0, *q, *trial, *step;
+} stander;
+
+// world point of a point of a body
+static void place(const cav_pose *at, const double *p, double *out) {
+  const double *r = at->rotation;
+  for (int i = 0; i < 3; i++) out[i] = at->pos[i] + r[3 * i] * p[0] + r[3 * i + 1] * p[1] + r[3 * i + 2] * p[2];
+}
+
+static void unplace(const cav_pose *at, const double *x, double *out) {
+  const double *r = at->rotation, d[3] = {x[0] - at->pos[0], x[1] - at->pos[1], x[2] - at->pos[2]};
+  for (int i = 0; i < 3; i++) out[i] = r[i] * d[0] + r[3 + i] * d[1] + r[6 + i] * d[2];
+}
+
+// middle of the sole of a foot: of its box along the world's axes, at its lowest
+static void find_sole(stander *s, int k, int geom) {
+  const cav_model *m = s->model;
+  const cav_body *body = &m->body[s->foot[k]];
+  cav_pose foot, at;
+  cav_object_pose(m, s->state, CAV_OBJECT_XBODY, s->foot[k], &foot);
+  double least[3] = {INFINITY, INFINITY, INFINITY}, most[3] = {-INFINITY, -INFINITY, -INFINITY}, sole[3];
+  int from = geom < 0 ? body->geom : geom, to = geom < 0 ? body->geom + body->ngeom : geom + 1;
+  for (int g = from; g < to; g++) {
+    cav_object_pose(m, s->state, CAV_OBJECT_GEOM, g, &at);
+    for (int i = 0; i < 3; i++) {
+      double n[3] = {i == 0, i == 1, i == 2}, reach = cav_geom_reach(&m->geom[g], &at, n);
+      least[i] = fmin(least[i], at.pos[i] - reach), most[i] = fmax(most[i], at.pos[i] + reach);
+    }
+  }
+  cav_object_pose(m, s->state, CAV_OBJECT_BODY, s->foot[k], &at);
+  for (int i = 0; i < 3; i++) sole[i] = from == to ? at.pos[i] : i < 2 ? (least[i] + most[i]) / 2 : least[i];
+  unplace(&foot, sole, s->point[k]);
+  memcpy(s->up[k], foot.rotation + 6, sizeof s->up[k]);
+}
+
+// whether a leg is straight: from its first body to its sole as long as all its parts
+static int is_straight(const stander *s, int k) {
+  const cav_model *m = s->model;
+  cav_pose at;
+  double from[3], to[3], parts = 0, whole = 0;
+  cav_object_pose(m, s->state, CAV_OBJECT_XBODY, s->foot[k], &at);
+  place(&at, s->point[k], from);
+  double sole[3] = {from[0], from[1], from[2]};
+  for (int i = s->foot[k];; i = m->body[i].parent) {
+    cav_object_pose(m, s->state, CAV_OBJECT_XBODY, i, &at);
+    for (int c = 0; c < 3; c++) to[c] = at.pos[c];
+    parts += sqrt((to[0] - from[0]) * (to[0] - from[0]) + (to[2] - from[2]) * (to[2] - from[2]));
+    memcpy(from, to, sizeof from);
+    if (i == s->first[k] || m->body[i].parent <= 0) break;
+  }
+  whole = sqrt((to[0] - sole[0]) * (to[0] - sole[0]) + (to[2] - sole[2]) * (to[2] - sole[2]));
+  return whole > straight * parts;
+}
+
+// starts a leg's hinges about the sideways axis off to where there is room
+static void bend(stander *s, int k) {
+  const cav_model *m = s->model;
+  int count = 0, quadruped = s->nfoot == 4;
+  int chain[MOST], n = 0;
+  for (int i = s->foot[k]; n < MOST; i = m->body[i].parent) {
+    chain[n++] = i;
+    if (i == s->first[k] || m->body[i].parent <= 0) break;
+  }
+  while (n-- > 0) {
+    const cav_link *link = &m->link[m->body[chain[n]].link];
+    if (link->body != chain[n]) continue;
+    for (int j = link->joint; j < link->joint + link->njoint; j++) {
+      const cav_joint *joint = &m->joint[j];
+      const double *axis = s->state->axis + 6 * joint->dof;
+      double side = axis[0] * s->roles->left[0] + axis[1] * s->roles->left[1];
+      if (joint->type != CAV_JOINT_HINGE || fabs(side) < 0.8) continue;
+      double *q = &s->q[joint->q], room = (joint->range[0] + joint->range[1]) / 2 - *q;
+      // without a side to go to: hip and knee of a crouch
+      static const double crouch[3] = {-1, 2, -1};
+      if (!joint->limited || fabs(room) < 0.2)
+        *q += count < 3 ? (quadruped ? -1 : 1) * copysign(start_bend, side) * crouch[count] : 0;
+      else
+        *q += copysign(fmin(start_bend, fabs(room)), room);
+      count++;
+    }
+  }
+}
+
+// the range that a joint is kept in
+static void kept_range(const cav_joint *joint, double range[2]) {
+  int scalar = joint->limited && (joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE);
+  double room = scalar ? fmin(inside, (joint->range[1] - joint->range[0]) / 4) : 0;
+  range[0] = scalar ? joint->range[0] + room : -INFINITY;
+  range[1] = scalar ? joint->range[1] - room : INFINITY;
+}
+
+static void clip(const cav_model *m, double *q) {
+  double range[2];
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    kept_range(joint, range);
+    if (joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE)
+      q[joint->q] = fmin(fmax(q[joint->q], range[0]), range[1]);
+  }
+}
+
+// whether a dof is at an end of its range and would go beyond it
+static int is_pinned(const stander *s, int d, double way) {
+  const cav_joint *joint = &s->model->joint[s->model->dof[d].joint];
+  double range[2];
+  kept_range(joint, range);
+  return (way > 0 && s->q[joint->q] >= range[1]) || (way < 0 && s->q[joint->q] <= range[0]);
+}
+
+// weight of the way of dof d from the model's own configuration
+static double holding(const cav_model *m, int d) {
+  const cav_joint *joint = &m->joint[m->dof[d].joint];
+  if (m->link[joint->link].parent != 0) return joint_weight;
+  if (joint->type == CAV_JOINT_FREE) return d - joint->dof == 2 ? 1e-4 : d - joint->dof < 2 ? 0.01 : root_weight;
+  return joint->type == CAV_JOINT_SLIDE ? 1e-3 : root_weight;
+}
+
+// rows at q; what the posture is off by in stand
+static cav_status rows(stander *s, const double *q, double *row, cav_stand *stand) {
+  const cav_model *m = s->model;
+  cav_status status = cav_position(m, s->state, q);
+  if (status) return status;
+  double middle[3] = {0}, com[3], x[FEET][3];
+  cav_pose at;
+  int n = 0;
+  *stand = (cav_stand){0};
+  for (int k = 0; k < s->nfoot; k++) {
+    cav_object_pose(m, s->state, CAV_OBJECT_XBODY, s->foot[k], &at);
+    place(&at, s->point[k], x[k]);
+    for (int i = 0; i < 3; i++) middle[i] += x[k][i] / s->nfoot;
+    for (int i = 0; i < 2 && s->nfoot == 2; i++) {
+      const double *r = at.rotation + 3 * i;
+      row[n] = r[0] * s->up[k][0] + r[1] * s->up[k][1] + r[2] * s->up[k][2];
+      stand->tilt = fmax(stand->tilt, fabs(row[n]));
+      row[n++] *= tilt_weight;
+    }
+  }
+  for (int k = 0; k < s->nfoot; k++) {
+    row[n++] = length_weight * x[k][2];
+    stand->uneven = fmax(stand->uneven, fabs(x[k][2]));
+  }
+  const cav_sensor sensor = {
+      .name = "", .type = CAV_SENSOR_SUBTREECOM, .object_type = CAV_OBJECT_BODY, .object = s->root, .dim = 3};
+  cav_sensor_read(m, s->state, &sensor, com);
+  for (int i = 0; i < 2; i++) row[n++] = length_weight * (com[i] - middle[i]);
+  stand->aside = hypot(com[0] - middle[0], com[1] - middle[1]);
+  cav_object_pose(m, s->state, CAV_OBJECT_XBODY, s->root, &at);
+  row[n++] = length_weight * (at.pos[2] - middle[2] - s->rise);
+  cav_difference(m, s->q0, q, 1, s->step);
+  for (int d = 0; d < m->nv; d++) row[n++] = holding(m, d) * s->step[d];
+  s->nrow = n;
+  return CAV_OK;
+}
+
+static double square(const double *row, int n) {
+  double sum = 0;
+  for (int i = 0; i < n; i++) sum += row[i] * row[i];
+  return sum;
+}
+
+// solves A x = b, A symmetric and positive definite [n n], in place
+static void solve(double *a, double *b, int n) {
+  for (int j = 0; j < n; j++) {
+    for (int k = 0; k < j; k++) a[j * n + j] -= a[j * n + k] * a[j * n + k];
+    a[j * n + j] = sqrt(fmax(a[j * n + j], 1e-14));
+    for (int i = j + 1; i < n; i++) {
+      for (int k = 0; k < j; k++) a[i * n + j] -= a[i * n + k] * a[j * n + k];
+      a[i * n + j] /= a[j * n + j];
+    }
+  }
+  for (int i = 0; i < n; i++) {
+    for (int k = 0; k < i; k++) b[i] -= a[i * n + k] * b[k];
+    b[i] /= a[i * n + i];
+  }
+  for (int i = n - 1; i >= 0; i--) {
+    for (int k = i + 1; k < n; k++) b[i] -= a[k * n + i] * b[k];
+    b[i] /= a[i * n + i];
+  }
+}
+
+// one step from s->q with that damping; work [nrow (nv+2) + nv^2 + 2 nv]. *better: whether it was taken
+static cav_status iterate(stander *s, double damping, double *work, int *better, cav_stand *stand) {
+  static const double difference = 1e-6;
+  const cav_model *m = s->model;
+  int nv = m->nv, most = 16 + nv;
+  double *row = work, *moved = row + most, *jacobian = moved + most, *a = jacobian + (size_t)most * (size_t)nv,
+         *b = a + (size_t)nv * (size_t)nv, *unit = b + nv;
+  cav_status status = rows(s, s->q, row, stand);
+  int n = s->nrow;
+  for (int d = 0; d < nv && !status; d++) {
+    cav_stand ignored;
+    memset(unit, 0, (size_t)nv * sizeof *unit);
+    unit[d] = difference;
+    cav_integrate(m, s->q, unit, 1, s->trial);
+    status = rows(s, s->trial, moved, &ignored);
+    for (int i = 0; i < n; i++) jacobian[i * nv + d] = (moved[i] - row[i]) / difference;
+  }
+  if (status) return status;
+  for (int d = 0; d < nv; d++) {
+    for (int e = 0; e <= d; e++) {
+      a[d * nv + e] = d == e ? damping : 0;
+      for (int i = 0; i < n; i++) a[d * nv + e] += jacobian[i * nv + d] * jacobian[i * nv + e];
+    }
+    b[d] = 0;
+    for (int i = 0; i < n; i++) b[d] -= jacobian[i * nv + d] * row[i];
+  }
+  for (int d = 0; d < nv; d++) {
+    if (!is_pinned(s, d, b[d])) continue;
+    for (int e = 0; e < nv; e++) a[d > e ? d * nv + e : e * nv + d] = d == e;
+    b[d] = 0;
+  }
+  solve(a, b, nv);
+  cav_integrate(m, s->q, b, 1, s->trial);
+  clip(m, s->trial);
+  cav_stand after;
+  status = rows(s, s->trial, moved, &after);
+  *better = !status && square(moved, n) < square(row, n);
+  if (!*better) return status;
+  memcpy(s->q, s->trial, (size_t)m->nq * sizeof *s->q);
+  *stand = after;
+  return CAV_OK;
+}
+
+static cav_status search(stander *s, cav_stand *stand) {
+  enum { ITERATIONS = 100 };
+  int nv = s->model->nv, most = 16 + nv;
+  double *work = calloc((size_t)most * (size_t)(nv + 2) + (size_t)nv * (size_t)nv + 2 * (size_t)nv, sizeof *work);
+  cav_status status = work ? CAV_OK : CAV_NO_MEMORY;
+  double damping = 1e-3;
+  for (int i = 0; i < ITERATIONS && damping < 1e6 && !status; i++) {
+    int better = 0;
+    status = iterate(s, damping, work, &better, stand);
+    damping = better ? fmax(damping / 5, 1e-9) : damping * 5;
+  }
+  free(work);
+  return status;
+}
+
+// feet out of the roles, soles and the height wanted at the model's own configuration
+static cav_status prepare(stander *s) {
+  static const cav_role feet[2][FEET] = {
+      {CAV_ROLE_RIGHT_FOOT, CAV_ROLE_LEFT_FOOT},
+      {CAV_ROLE_FRONT_RIGHT_FOOT, CAV_ROLE_FRONT_LEFT_FOOT, CAV_ROLE_BACK_RIGHT_FOOT, CAV_ROLE_BACK_LEFT_FOOT}};
+  const cav_model *m = s->model;
+  cav_status status = cav_position(m, s->state, s->q0);
+  if (status) return status;
+  int stretched = 1;
+  double ground = 0;
+  s->nfoot = s->roles->build == CAV_BUILD_QUADRUPED ? 4 : 2;
+  for (int k = 0; k < s->nfoot; k++) {
+    cav_role role = feet[s->nfoot == 4][k];
+    s->foot[k] = s->roles->body[role], s->first[k] = s->roles->limb[role];
+    find_sole(s, k, s->roles->geom[role]);
+    stretched &= is_straight(s, k);
+    cav_pose at;
+    double x[3];
+    cav_object_pose(m, s->state, CAV_OBJECT_XBODY, s->foot[k], &at);
+    place(&at, s->point[k], x);
+    ground += x[2] / s->nfoot;
+  }
+  s->root = s->foot[0];
+  while (m->body[s->root].parent > 0) s->root = m->body[s->root].parent;
+  cav_pose at;
+  cav_object_pose(m, s->state, CAV_OBJECT_XBODY, s->root, &at);
+  s->rise = at.pos[2] - ground;
+  // legs end where limbs begin: what is lowered is a fraction of them, not of the trunk above
+  cav_object_pose(m, s->state, CAV_OBJECT_XBODY, s->first[0], &at);
+  double leg = at.pos[2] - ground;
+  memcpy(s->q, s->q0, (size_t)m->nq * sizeof *s->q);
+  if (stretched) {
+    s->rise -= leg * (1 - (s->nfoot == 4 ? quadruped_bent : biped_bent));
+    for (int k = 0; k < s->nfoot; k++) bend(s, k);
+  }
+  clip(m, s->q);
+  return CAV_OK;
+}
+
+static cav_status stand_on_feet(const cav_model *m, cav_state *state, const cav_roles *roles, double *q,
+                                cav_stand *stand) {
+  stander s = {.model = m, .state = state, .roles = roles};
+  s.q0 = calloc((size_t)(3 * m->nq + m->nv), sizeof *s.q0);
+  if (!s.q0) return CAV_NO_MEMORY;
+  s.q = s.q0 + m->nq, s.trial = s.q + m->nq, s.step = s.trial + m->nq;
+  memcpy(s.q0, m->q0, (size_t)m->nq * sizeof *s.q0);
+  // links alone: contacts take most of the time, and say nothing here
+  int contact = state->options.contact;
+  state->options.contact = 0;
+  cav_status status = prepare(&s);
+  if (!status) status = search(&s, stand);
+  state->options.contact = contact;
+  if (!status && (stand->tilt > level || stand->uneven > level || stand->aside > level)) {
+    snprintf(
+        stand->why, sizeof stand->why,
+        "no posture was found with level feet below the centre of mass: soles tilt by %.2g rad, feet are %.2g m from "
+        "level, the centre of mass %.2g m from their middle",
+        stand->tilt, stand->uneven, stand->aside);
+    status = CAV_BAD_INPUT;
+  }
+  if (!status) memcpy(q, s.q, (size_t)m->nq * sizeof *q);
+  free(s.q0);
+  return status;
+}
+
+cav_status cav_stand_find(const cav_model *m, cav_state *state, double *q, cav_stand *stand) {
+  static const char *const keys[] = {"stand", "home"};
+  *stand = (cav_stand){0};
+  for (int i = 0; i < 2; i++) {
+    int key = cav_object_find(m, CAV_OBJECT_KEY, keys[i]);
+    if (key < 0) continue;
+    stand->key = m->key[key].name;
+    memcpy(q, m->key[key].q, (size_t)m->nq * sizeof *q);
+    return CAV_OK;
+  }
+  cav_roles roles;
+  cav_status status = cav_roles_find(m, state, &roles);
+  if (status) return status;
+  int feet = roles.build == CAV_BUILD_BIPED || roles.build == CAV_BUILD_QUADRUPED;
+  if (feet && roles.base == CAV_BASE_FIXED) {
+    snprintf(stand->why, sizeof stand->why,
+             "its base is fixed to the world; floating='true' on <problem> frees that of a URDF");
+    return CAV_BAD_INPUT;
+  }
+  if (feet) return stand_on_feet(m, state, &roles, q, stand);
+  snprintf(stand->why, sizeof stand->why, "no feet were found to stand on (%s%s%s)", cav_build_name(roles.build),
+           *roles.why ? ": " : "", roles.why);
+  return CAV_BAD_INPUT;
+}

@@ -1,0 +1,21 @@
+/// A posture that stands, of any model that has feet. Private to optim/ and the tool.
+#ifndef CAVORT_STAND_H
+#define CAVORT_STAND_H
+
+#include "role.h"
+
+/// What was found, and how well it stands.
+typedef struct cav_stand {
+  const char *key; ///< keyframe that it is; NULL: it was found
+  double tilt;     ///< of the soles, rad
+  double uneven;   ///< heights of the feet, m
+  double aside;    ///< horizontal distance of the centre of mass from the middle of the feet, m
+  char why[200];   ///< where nothing was found: why
+} cav_stand;
+
+/// q [nq] of a posture that stands: the keyframe "stand" or "home", or else the one nearest the model's own in which
+/// the feet are as flat as there and level, the centre of mass is above their middle, and legs that were straight are bent.
+/// CAV_BAD_INPUT: there is none, why in stand->why. Uses the state.
+cav_status cav_stand_find(const cav_model *model, cav_state *state, double *q, cav_stand *stand);
+
+#endif
