@@ -367,7 +367,7 @@ static void test_extremes(void) {
 }
 
 // a turret on a floor: its hinge cannot move it along the contact's normal, so its inverse weight there is rounding. Across
-// the gap a smoothed law presses hardly harder than it does under the same body with a free joint: seen 2.0 times that;
+// the gap a smoothed law presses hardly harder than it does under the same body with a free joint: seen 4.0 times that;
 // 1e15 times without a bound
 static void test_turret(void) {
   static const char pattern[] =
@@ -389,7 +389,7 @@ static void test_turret(void) {
     cav_state_free(state);
     cav_model_free(m);
   }
-  CHECK(force[0] > 0 && force[0] < 2.1 * force[1]);
+  CHECK(force[0] > 0 && force[0] < 4.1 * force[1]);
   printf("turret: %.3g N, free %.3g N\n", force[0], force[1]);
 }
 

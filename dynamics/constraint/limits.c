@@ -288,11 +288,11 @@ double cav_contact_stiffness_ratio(const cav_state *state, const cav_contact *c,
 
 // inverse weight of a contact. Next to a base that is fixed, a link (the turret of an arm) has almost none where its joints
 // cannot move it, and its softness would be as small: a smoothed law, which reaches across gaps, would press with forces
-// beyond any bound. There it has at least that of all that moves, halved: less than any body has whose base is free, in
-// a plane, too.
+// beyond any bound. There it has at least a quarter of that of all that moves: less than any body has whose base is free,
+// along a single line (a third, the mean of its three directions), too.
 static double contact_weight(const cav_state *state, const cav_pair *pair) {
   const cav_model *model = state->model;
-  return state->options.smoothing > 0 && model->mass > 0 ? larger(pair->weight[0], 0.5 / model->mass) : pair->weight[0];
+  return state->options.smoothing > 0 && model->mass > 0 ? larger(pair->weight[0], 0.25 / model->mass) : pair->weight[0];
 }
 
 // R of the friction rows so that R_j mu_j^2 is the same for all (22); all rows share the damping
