@@ -84,6 +84,7 @@ run 2 solve a.xml --colour
 says err "not an option"
 run 2 verify a.result --threads 2
 says err "not an option"
+check "no other spelling of what is spelt right" [ "$(grep -c 'did you mean' err)" = 0 ]
 run 2 verify nowhere
 run 2 view nowhere
 run 2 solv

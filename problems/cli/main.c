@@ -290,7 +290,8 @@ static int read_line(const command *c, int argc, char **argv, cav_command_line *
         char name[64];
         snprintf(name, sizeof name, "%.*s", (int)strcspn(argv[i], "="), argv[i]);
         fprintf(stderr, "cavort %s: %s is not an option of this command", c->name, argv[i]);
-        suggest(cav_xml_nearest(name, &options->name, NOPTION, sizeof *options));
+        // one of another command is spelt right
+        if (k < 0) suggest(cav_xml_nearest(name, &options->name, NOPTION, sizeof *options));
         fprintf(stderr, "; see cavort help %s\n", c->name);
       }
       return 0;
