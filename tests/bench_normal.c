@@ -5,7 +5,7 @@
 #include "bench.h"
 #include "continuation.h"
 #include "crowd.h"
-#include "dense.h"
+#include "lanes.h"
 #include "sparse.h"
 #include "transcription.h"
 
@@ -110,13 +110,13 @@ static void compare(cav_normal *normal, const cav_transcription *tr, int turns) 
          most, analysis, e.n, cav_sparse_entries(sparse));
   for (int lanes = 4; lanes >= 2; lanes /= 2)
     for (int way = 0; way < 2; way++) {
-      cav_dense_limit_lanes(lanes);
+      lanes_most = lanes;
       set_groups(normal, tr, way);
       CHECK(cav_normal_factor(normal, SHIFT) == CAV_OK);
       cav_normal_solve(normal, normal->gradient, x);
       CHECK(bits_of(x, normal->size) == bits[way]);
     }
-  cav_dense_limit_lanes(8);
+  lanes_most = 8;
   for (int way = 0; way < WAYS; way++) {
     printf("    %-9s", way_name[way]);
     printf(" %9.3f ms (%.3f, %.3f), residual %.0e, bits %016llx\n", quantile(time[way], turns, 0.5),

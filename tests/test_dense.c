@@ -1,5 +1,5 @@
 /// Dense products and factors: against sums in extended precision, and the same bits by vectors of every length.
-#include "dense.h"
+#include "lanes.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -48,7 +48,7 @@ static void check_products(int m, int n, int k) {
   for (int what = 0; what < 3; what++)
     for (int lanes = 8; lanes >= 2; lanes /= 2) {
       double worst;
-      cav_dense_limit_lanes(lanes);
+      lanes_most = lanes;
       memcpy(C, C0, bytes);
       if (what == 0) {
         cav_dense_product(m, n, k, -1, A, ld, B, ldb, C, ldc);
@@ -86,7 +86,7 @@ static void check_band(int n, int below, int dense, int m) {
         if (i != j) b[j + r * n] += a * x[i + r * n];
       }
   for (int lanes = 8; lanes >= 2; lanes /= 2) {
-    cav_dense_limit_lanes(lanes);
+    lanes_most = lanes;
     memcpy(L, A, entries * sizeof *A);
     double *y = malloc(((size_t)n * (size_t)m + 1) * sizeof *y), worst = 0;
     memcpy(y, b, (size_t)n * (size_t)m * sizeof *y);

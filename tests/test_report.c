@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 
 #include "advice.h"
+#include "random.h"
 #include "scene.h"
 
 // a damped pendulum of known inertia: mass 1 at 0.5 m
@@ -65,7 +66,7 @@ static void test_numbers(void) {
   uint64_t seed = 1;
   double mean = 0, square = 0;
   for (int i = 0; i < 20000; i++) {
-    double n = cav_measure_normal(&seed);
+    double n = cav_random_normal(&seed);
     mean += n / 20000, square += n * n / 20000;
   }
   CHECK_NEAR(mean, 0, 0.03);
@@ -175,7 +176,7 @@ static void test_steps(void) {
   cav_measure m = begin(pendulum_text);
   cav_measure_step out;
   uint64_t seed = 5;
-  double v = cav_measure_normal(&seed), push = cav_measure_push(m.model, 0, 8);
+  double v = cav_random_normal(&seed), push = cav_measure_push(m.model, 0, 8);
   CHECK_NEAR(push, 8 * inertia, 1e-12);
   CHECK(cav_measure_collect(&m) == CAV_OK);
   CHECK(cav_measure_steps(&m, &out) == CAV_OK);

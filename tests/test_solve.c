@@ -3,7 +3,7 @@
 /// checker at the solution, and a motion spoilt afterwards is not certified. Then what cav_solve guarantees: the same
 /// bits at 1 and 2 threads, an end when the observer asks with the best iterate kept, and refusal of what makes no
 /// sense.
-#include "dense.h"
+#include "lanes.h"
 #include "motion.h"
 
 // --- expected.json: flat, one "name": number or word a line ---
@@ -125,11 +125,11 @@ static void check_bits(const cav_problem *problem) {
   for (int i = 0; i < WAYS; i++) {
     cav_solve_options options = cav_solve_options_default();
     options.threads = way[i].threads;
-    cav_dense_limit_lanes(way[i].lanes);
+    lanes_most = way[i].lanes;
     cav_status status = cav_solve(problem, &options, NULL, &s[i], NULL);
     CHECK(s[i] && (status == CAV_OK || status == CAV_NOT_CONVERGED));
   }
-  cav_dense_limit_lanes(8);
+  lanes_most = 8;
   for (int i = 1; i < WAYS && s[0] && s[i]; i++) {
     const cav_trajectory *a = s[0]->trajectory, *b = s[i]->trajectory;
     size_t gains = (size_t)(a->nknot - 1) * a->nv * a->nv;

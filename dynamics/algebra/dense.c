@@ -4,7 +4,6 @@
 #include "dense.h"
 
 #include <math.h>
-#include <stdatomic.h>
 #include <stddef.h>
 
 enum {
@@ -63,18 +62,14 @@ WAY(four, __attribute__((target("avx2"))), 4, 2, 6)
 #endif
 WAY(two, , 2, 2, 4)
 
-static atomic_int most_lanes = 8;
-
-void cav_dense_limit_lanes(int count) { atomic_store(&most_lanes, count); }
-
 static const lanes *way(void) {
   static const lanes two = {4, 4, two_tile, two_subtract, two_dot};
 #if defined(__x86_64__)
   static const lanes eight = {16, 8, eight_tile, eight_subtract, eight_dot};
   static const lanes four = {8, 6, four_tile, four_subtract, four_dot};
-  int most = atomic_load_explicit(&most_lanes, memory_order_relaxed);
-  if (most >= 8 && __builtin_cpu_supports("avx512f")) return &eight;
-  if (most >= 4 && __builtin_cpu_supports("avx2")) return &four;
+  const int most = cav_dense_lanes();
+  if (most == 8) return &eight;
+  if (most == 4) return &four;
 #endif
   return &two;
 }

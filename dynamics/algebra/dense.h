@@ -31,7 +31,7 @@ void cav_dense_solve_upper(int n, int below, const double *L, int lda, int m, do
 /// X := A^-1 X for X [n*m] by rows exchanged; A becomes its factors. Zero if A is singular.
 int cav_dense_solve_general(int n, double *A, int lda, int m, double *X, int ldx);
 
-/// For tests: no vectors longer than so many numbers from now on (8, 4 or 2). The results are the same.
-void cav_dense_limit_lanes(int lanes);
+/// How many numbers a vector of this processor has: 8, 4 or 2. The results are the same. lanes.c.
+int cav_dense_lanes(void);
 
 #endif

@@ -6,6 +6,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "random.h"
 #include "schedule.h"
 
 const char *const cav_measure_bin_names[CAV_MEASURE_BINS] = {"0",        "1 to 9",   "10 to 19",   "20 to 29",
@@ -17,21 +18,7 @@ static const double push_joint = 15, push_root = 3, hold_seconds = 0.1, episode_
 // how long the scene is left alone, s
 static const double least_rest = 0.5, most_rest = 2;
 
-// --- numbers ---
-
-double cav_measure_uniform(uint64_t *seed) {
-  // splitmix64
-  uint64_t z = *seed += 0x9e3779b97f4a7c15u;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  z ^= z >> 31;
-  return 2 * (double)(z >> 11) / 9007199254740992.0 - 1;
-}
-
-double cav_measure_normal(uint64_t *seed) {
-  double a = 0.5 * (1 + cav_measure_uniform(seed)), b = cav_measure_uniform(seed);
-  return sqrt(-2 * log(a + 1e-300)) * cos(M_PI * b);
-}
+// --- clocks ---
 
 static double read_clock(clockid_t clock) {
   struct timespec t;
@@ -211,7 +198,7 @@ static void random_posture(const cav_measure *m, uint64_t *seed, double spread, 
   memcpy(q, m->start, (size_t)model->nq * sizeof *q);
   for (int j = 0; j < model->njoint; j++) {
     const cav_joint *joint = &model->joint[j];
-    double shift = spread * cav_measure_uniform(seed);
+    double shift = spread * cav_random_uniform(seed);
     int scalar = joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE;
     if (!scalar || !joint->limited) continue;
     double *x = q + joint->q, width = fmin(joint->range[1] - joint->range[0], 2);
@@ -225,7 +212,7 @@ static int is_root(const cav_model *model, int dof) {
 
 static void random_forces(const cav_model *model, uint64_t *seed, double *u) {
   for (int d = 0; d < model->nv; d++)
-    u[d] = cav_measure_push(model, d, (is_root(model, d) ? push_root : push_joint) * cav_measure_normal(seed));
+    u[d] = cav_measure_push(model, d, (is_root(model, d) ? push_root : push_joint) * cav_random_normal(seed));
 }
 
 static int bin_of(int rows) {
@@ -266,7 +253,7 @@ static cav_status run_episode(cav_measure *m, int episode, int *count, int most)
   int hold = (int)fmax(1, hold_seconds / h), n = (int)fmin(fmax(10, episode_seconds / h), 1000),
       taken[CAV_MEASURE_BINS] = {0};
   random_posture(m, &seed, episode ? 0.25 : 0, q);
-  for (int d = 0; d < model->nv; d++) v[d] = (is_root(model, d) ? 0.3 : 1) * cav_measure_normal(&seed);
+  for (int d = 0; d < model->nv; d++) v[d] = (is_root(model, d) ? 0.3 : 1) * cav_random_normal(&seed);
   for (int t = 0; t < n && !cav_measure_late(m); t++) {
     if (t % hold == 0) random_forces(model, &seed, u);
     cav_status status = cav_forward_newton(model, m->state, q, v, u, 100, 1e-12, next, NULL);

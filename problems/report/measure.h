@@ -62,10 +62,6 @@ int cav_measure_late(const cav_measure *m);
 /// Both states get options.
 void cav_measure_set(cav_measure *m, const cav_options *options);
 
-/// One of numbers -1 .. 1; a normal one. From a seed of the caller.
-double cav_measure_uniform(uint64_t *seed);
-double cav_measure_normal(uint64_t *seed);
-
 /// Wall clock, s; processor time of this thread, s, which others on the machine disturb less.
 double cav_measure_clock(void);
 double cav_measure_processor(void);

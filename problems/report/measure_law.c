@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "measure.h"
+#include "random.h"
 
 static const cav_sheet_column columns[] = {
     {"swept", "what was changed from the scene's law; none: as it is"},
@@ -60,7 +61,7 @@ static cav_status run(cav_measure *m, const cav_options *options, int n, double 
     if (cav_measure_late(m)) return CAV_INTERRUPTED;
     for (int d = 0; d < model->nv && t % hold == 0; d++) {
       int root = model->joint[model->dof[d].joint].type == CAV_JOINT_FREE;
-      u[d] = cav_measure_push(model, d, (root ? push_root : push_joint) * cav_measure_normal(&seed));
+      u[d] = cav_measure_push(model, d, (root ? push_root : push_joint) * cav_random_normal(&seed));
     }
     cav_forward_report report = {0};
     double begin = cav_measure_processor();

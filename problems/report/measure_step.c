@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "measure.h"
+#include "random.h"
 
 static const cav_sheet_column columns[] = {
     {"motion", "free: without contacts, limits and friction losses; contacts: as the scene is"},
@@ -279,7 +280,7 @@ cav_status cav_measure_steps(cav_measure *m, cav_measure_step *out) {
   const cav_model *model = m->model;
   double *v = m->vector[14];
   uint64_t seed = 5;
-  for (int d = 0; d < model->nv; d++) v[d] = cav_measure_normal(&seed);
+  for (int d = 0; d < model->nv; d++) v[d] = cav_random_normal(&seed);
   motion free_motion = {.q = m->start, .v = v, .push = 8, .options = m->options};
   // closed chains stay closed
   if (model->nequality == 0)

@@ -11,6 +11,7 @@
 #include "edit.h"
 #include "file.h"
 #include "math3.h"
+#include "random.h"
 
 enum { BISECTIONS = 60 };
 static const double nearness = 1e-4; // of L, how deep contacts are where nothing is said
@@ -22,15 +23,6 @@ int cav_bench_turns(const cav_model *model, int i) {
   const cav_joint *joint = &model->joint[model->dof[i].joint];
   return joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_BALL ||
          (joint->type == CAV_JOINT_FREE && i >= joint->dof + 3);
-}
-
-// --- random numbers ---
-
-static double uniform(uint64_t *seed) {
-  *seed ^= *seed << 13;
-  *seed ^= *seed >> 7;
-  *seed ^= *seed << 17;
-  return 2.0 * (double)(*seed >> 11) / 9007199254740992.0 - 1.0;
 }
 
 // --- the scene ---
@@ -415,7 +407,7 @@ static void swing_joint(const cav_joint *joint, double by, double *q) {
 static void swing_all(cav_bench *b, uint64_t seed, double by) {
   const cav_model *m = b->model;
   double *w = b->scratch, *old = b->scratch + m->nv;
-  for (int i = 0; i < m->nv; i++) w[i] = by * uniform(&seed);
+  for (int i = 0; i < m->nv; i++) w[i] = by * cav_random_uniform(&seed);
   for (int i = 0; i < m->njoint; i++) {
     const cav_joint *joint = &m->joint[i];
     if (joint->type == CAV_JOINT_HINGE) swing_joint(joint, w[joint->dof], &b->q[joint->q]);
@@ -521,12 +513,12 @@ cav_status cav_bench_sample(cav_bench *b, int k) {
   if (status) return status;
   stretch_quaternions(b);
   for (int i = 0; i < m->nv; i++) {
-    const double a = b->gravity * uniform(&seed);
-    b->v[i] = b->speed * uniform(&seed) * b->unit[i];
+    const double a = b->gravity * cav_random_uniform(&seed);
+    b->v[i] = b->speed * cav_random_uniform(&seed) * b->unit[i];
     // slow motions change as slowly, so that all numbers are as small
-    b->v_next[i] = b->v[i] + (b->slow ? 0.1 * b->speed * uniform(&seed) : h * b->force * a) * b->unit[i];
+    b->v_next[i] = b->v[i] + (b->slow ? 0.1 * b->speed * cav_random_uniform(&seed) : h * b->force * a) * b->unit[i];
     // a weight on what one dof moves
-    b->u[i] = b->force * b->gravity * b->unit[i] * uniform(&seed) / m->dof[i].inverse_weight;
+    b->u[i] = b->force * b->gravity * b->unit[i] * cav_random_uniform(&seed) / m->dof[i].inverse_weight;
     if (!isfinite(b->u[i])) b->u[i] = 0;
   }
   return CAV_OK;

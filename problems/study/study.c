@@ -10,20 +10,12 @@
 #include <time.h>
 
 #include "file.h"
+#include "random.h"
 
 const char *const cav_study_method_names[CAV_STUDY_METHODS] = {"own", "strategies", "ipopt", "limited", "both"};
 
 static const double joint_noise = 0.03, mass_noise = 0.05, least_friction = 0.6, most_friction = 1;
 static const double most_seconds = 120;
-
-/// Uniform in -1 .. 1: splitmix64.
-static double uniform(uint64_t *state) {
-  uint64_t z = *state += 0x9e3779b97f4a7c15u;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  z ^= z >> 31;
-  return 2 * (double)(z >> 11) / 9007199254740992.0 - 1;
-}
 
 static double processor_seconds(void) {
   struct timespec t;
@@ -65,7 +57,7 @@ static cav_status perturb_posture(const cav_model *m, double *q, uint64_t *seed)
   for (int j = 0; j < m->njoint; j++) {
     const cav_joint *joint = &m->joint[j];
     int scalar = joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE;
-    double shift = uniform(seed);
+    double shift = cav_random_uniform(seed);
     if (!scalar || is_root(m, joint)) continue;
     double width = joint->limited ? fmin(1, joint->range[1] - joint->range[0]) : 1, *x = q + joint->q;
     *x += joint_noise * width * shift;
@@ -83,8 +75,8 @@ static cav_status perturb(cav_problem *p, int start) {
   uint64_t seed = 1000003u * (uint64_t)(start + 1);
   double *scale = malloc((size_t)m->nlink * sizeof *scale);
   if (!scale) return CAV_NO_MEMORY;
-  for (int i = 0; i < m->nlink; i++) scale[i] = 1 + mass_noise * uniform(&seed);
-  double fraction = 0.5 * (1 + uniform(&seed));
+  for (int i = 0; i < m->nlink; i++) scale[i] = 1 + mass_noise * cav_random_uniform(&seed);
+  double fraction = 0.5 * (1 + cav_random_uniform(&seed));
   cav_status status = cav_model_perturb(m, scale, least_friction + fraction * (most_friction - least_friction));
   free(scale);
   return status ? status : perturb_posture(m, p->q_start, &seed);
