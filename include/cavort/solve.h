@@ -387,7 +387,8 @@ typedef struct cav_verdict {
       closed_loop_seconds; ///< how long the closed loop at a tenth of the step follows (all links within 0.5 m, roots 1 rad)
   double closed_loop_end_error_m; ///< largest distance of a body's centre of mass at the end
   double model_contacts_seconds,
-      model_contacts_end_error_m; ///< the same under the contacts of the model's file, the worse of steps of 2 and 1 ms
+      model_contacts_end_error_m; ///< the same under the contacts of the model's file: the worst of steps of 2 and 1 ms, and of
+                                  ///< four starts a little off
   double
       feedback_effort_max; ///< largest effort that either closed loop asks of an actuator, over its limit, before clipping
   /// Impulse on the root link a third of the way, along x and y either way, with which the motion follows under the model's

@@ -1,10 +1,10 @@
 /// Which feedback goes with a motion. Gains are those of a regulator (lqr.c), but what straying costs, and how hard the
 /// contacts are that it counts on, are not in the problem. So sets of these are tried in closed loops: those of
-/// verification, and two with a small push, without which gains are found that fit one course of the simulation and
-/// lose the next. A few that serve different motions come first; where none of them ends near enough, points that fill
-/// the range of all follow, and the longer it takes the less is near enough. Kept is what follows in most loops, in
-/// their order, then what ends nearest in the worst of them. A trial ends with the first loop that is lost or shows that
-/// it is no better.
+/// verification, some of which start a little off, and two with a small push: gains that fit one course of the
+/// simulation may lose the next. A few that serve different motions come first; where none of them ends near enough,
+/// points that fill the range of all follow, and the longer it takes the less is near enough. Kept is what follows in
+/// most loops, in their order, then what ends nearest in the worst of them. A trial ends with the first loop that is
+/// lost or shows that it is no better.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -31,8 +31,8 @@ enum { SEEDS = sizeof seed / sizeof *seed };
 /// End error that ends the search after so many trials, m.
 static double near_enough(int trials) { return trials <= SEEDS ? 0.03 : trials <= 2 * SEEDS ? 0.04 : 0.05; }
 
-/// Part of the end error that counts after a push: that is to be survived rather than undone.
-static const double pushed_part = 0.25;
+/// Part of the end error that counts where the loop is disturbed: that is to be survived rather than undone.
+static const double disturbed_part = 0.25;
 
 /// What a set does: loops that follow, how long the next one does, the worst end error.
 typedef struct outcome {
@@ -82,7 +82,7 @@ static cav_status try(search *s, const set *one) {
     now.seconds = follow.seconds;
     if (*follow.lost) break;
     now.follows++;
-    now.error = fmax(now.error, follow.error * (loop < CAV_LOOP_PUSHED ? 1 : pushed_part));
+    now.error = fmax(now.error, follow.error * (loop < CAV_LOOP_START ? 1 : disturbed_part));
     if (s->found && s->reached.follows == CAV_LOOPS && now.error >= s->reached.error) return CAV_OK;
   }
   if (status != CAV_OK || (s->found && !better(&now, &s->reached))) return status;

@@ -24,6 +24,9 @@ static const double poor = 1e-6;             // fraction of weight that a forwar
 enum { OWN_STEPS = 2 };
 static const double own_step[OWN_STEPS] = {0.002, 0.001};
 
+// by how much at most a start is off: m or rad, m/s or rad/s. What two simulators make of a touch differs by more
+static const double off_position = 0.001, off_velocity = 0.01;
+
 // largest tangent component from q0 to q1
 static double apart(const cav_model *model, const double *q0, const double *q1, double *work) {
   double most = 0;
@@ -288,7 +291,7 @@ static cav_trajectory *finer(const cav_verification *verification, double h) {
 typedef struct simulation {
   const cav_trajectory *motion; ///< at the finer step
   const double *gain_q, *gain_v;
-  const cav_push *push; ///< within the next step, or NULL
+  const cav_disturbance *push; ///< within the next step, or NULL
   cav_state *state;
   double *q, *v, *dq, *dv, *u, *next, *control, *place;
 } simulation;
@@ -336,9 +339,25 @@ static cav_status advance(const cav_verification *verification, simulation *s, i
   return status;
 }
 
-// a simulation to its end; push NULL: undisturbed
+// number k of an even sequence over (-1, 1), of which each start has its own
+static double spread(int start, int k) {
+  return 2 * fmod(0.5 + start * 0.7548776662466927 + k * 0.6180339887498949, 1) - 1;
+}
+
+// moves a start off: joints, and velocities of all
+static void move_start(const cav_model *model, int start, double *q, double *v) {
+  for (int d = 0; d < model->nv; d++) v[d] += off_velocity * spread(start, d);
+  for (int j = 0; j < model->njoint; j++) {
+    const cav_joint *joint = model->joint + j;
+    if (joint->type == CAV_JOINT_SLIDE || joint->type == CAV_JOINT_HINGE)
+      q[joint->q] += off_position * spread(start, model->nv + j);
+  }
+}
+
+// a simulation to its end; disturbance NULL: none
 static cav_status closed(const cav_verification *verification, const cav_options *law, double h, const double *gain_q,
-                         const double *gain_v, const cav_push *push, struct cav_follow *follow) {
+                         const double *gain_v, const cav_disturbance *disturbance, struct cav_follow *follow) {
+  const cav_disturbance *push = disturbance && disturbance->link ? disturbance : NULL;
   const cav_model *model = verification->model;
   size_t nq = (size_t)model->nq, nv = (size_t)model->nv;
   double *q = malloc(sizeof(double) * (nq + 6 * nv + (size_t)model->nu + 7 * (size_t)model->nlink));
@@ -354,6 +373,7 @@ static cav_status closed(const cav_verification *verification, const cav_options
     state->options = law ? claimed_options(verification, law, h) : own_options(verification, h);
     memcpy(s.q, verification->q, sizeof(double) * nq);
     memcpy(s.v, verification->v, sizeof(double) * nv);
+    if (disturbance && disturbance->start) move_start(model, disturbance->start, s.q, s.v);
     int on = 1;
     for (int i = 0; i + 1 < motion->nknot && on && status == CAV_OK; i++) {
       s.push = push && i == (int)(push->fraction * (motion->nknot - 1)) ? push : NULL;
@@ -372,23 +392,26 @@ cav_status cav_replay_closed(const cav_verification *verification, const cav_opt
 }
 
 cav_status cav_replay_own(const cav_verification *verification, int finer, const double *gain_q, const double *gain_v,
-                          const cav_push *push, struct cav_follow *follow) {
-  return closed(verification, NULL, own_step[finer], gain_q, gain_v, push, follow);
+                          const cav_disturbance *disturbance, struct cav_follow *follow) {
+  return closed(verification, NULL, own_step[finer], gain_q, gain_v, disturbance, follow);
 }
 
 cav_status cav_replay_own_worst(const cav_verification *verification, const double *gain_q, const double *gain_v,
                                 struct cav_follow *follow) {
-  for (int i = 0; i < OWN_STEPS; i++) {
+  *follow = (struct cav_follow){0};
+  for (int i = 0; i < OWN_STEPS + CAV_STARTS && !*follow->lost; i++) {
     struct cav_follow now;
-    cav_status status = cav_replay_own(verification, i, gain_q, gain_v, NULL, &now);
+    const cav_disturbance off = {.start = i - OWN_STEPS + 1};
+    cav_status status = i < OWN_STEPS ? cav_replay_own(verification, i, gain_q, gain_v, NULL, &now)
+                                      : cav_replay_own(verification, 0, gain_q, gain_v, &off, &now);
     if (status != CAV_OK) return status;
-    double asked = i ? fmax(now.asked, follow->asked) : now.asked;
-    int lost = !!*now.lost, was = i && *follow->lost;
-    if (i == 0 || lost > was || (lost == was && (lost ? now.seconds < follow->seconds : now.error > follow->error)))
-      *follow = now;
+    double asked = fmax(now.asked, follow->asked);
+    if (i == 0 || *now.lost || now.error > follow->error) *follow = now;
     follow->asked = asked;
-    // nothing is worse than this
-    if (lost) break;
+    const size_t said = strlen(follow->lost);
+    if (*now.lost && off.start > 0)
+      snprintf(follow->lost + said, sizeof follow->lost - said, ", from a start that is %g rad and rad/s off",
+               off_velocity);
   }
   return CAV_OK;
 }

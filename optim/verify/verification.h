@@ -158,23 +158,36 @@ cav_status cav_replay_open(const cav_verification *verification, cav_replay *rep
 cav_status cav_replay_closed(const cav_verification *verification, const cav_options *law, const double *gain_q,
                              const double *gain_v, struct cav_follow *follow);
 
-/// An impulse on the centre of mass of a root link, at a fraction of the motion.
-typedef struct cav_push {
-  int link;
+/// What a replay meets that the motion does not know of: an impulse on the centre of mass of a root link, at a fraction
+/// of the motion, or a start that is a little off.
+typedef struct cav_disturbance {
+  int link;                    ///< 0: no impulse
   double fraction, impulse[3]; ///< N s, world
-} cav_push;
+  int start;                   ///< 1 .. CAV_STARTS: one of these; 0: the motion's own
+} cav_disturbance;
+enum { CAV_STARTS = 4 };
 
 /// Under the contacts of the model's file at the longest of the steps that simulators take, or at the next finer one;
-/// with a push unless that is NULL.
+/// disturbance NULL: none.
 cav_status cav_replay_own(const cav_verification *verification, int finer, const double *gain_q, const double *gain_v,
-                          const cav_push *push, struct cav_follow *follow);
+                          const cav_disturbance *disturbance, struct cav_follow *follow);
 
-/// The same at each of these steps, without a push: the worst; where it is lost at one, that one.
+/// The same at each of these steps, and at the longest from each of the starts that are off: the worst; where it is
+/// lost in one, the first of these.
 cav_status cav_replay_own_worst(const cav_verification *verification, const double *gain_q, const double *gain_v,
                                 struct cav_follow *follow);
 
-/// The closed loops of a motion with its gains, for their choice: those of a verification, and then two small pushes.
-enum { CAV_LOOP_OWN, CAV_LOOP_FINE, CAV_LOOP_CLAIMED, CAV_LOOP_PUSHED, CAV_LOOP_PUSHED_BACK, CAV_LOOPS };
+/// The closed loops of a motion with its gains, for their choice: those of a verification, the last of which start off,
+/// and then two small pushes.
+enum {
+  CAV_LOOP_OWN,
+  CAV_LOOP_FINE,
+  CAV_LOOP_CLAIMED,
+  CAV_LOOP_START,
+  CAV_LOOP_PUSHED = CAV_LOOP_START + CAV_STARTS,
+  CAV_LOOP_PUSHED_BACK,
+  CAV_LOOPS
+};
 
 /// Makes a motion ready for them; ended as any verification, in any case. Then runs one of them.
 cav_status cav_closed_loops_begin(cav_verification *verification, const cav_problem *problem,

@@ -428,7 +428,7 @@ static int pushed_link(const cav_verification *verification) {
 static cav_status find_push(const cav_verification *verification, const double *gain_q, const double *gain_v,
                             double *survived) {
   static const double way[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
-  cav_push push = {.link = pushed_link(verification), .fraction = 1.0 / 3};
+  cav_disturbance push = {.link = pushed_link(verification), .fraction = 1.0 / 3};
   *survived = push.link > 0 ? 0 : NAN;
   for (int rung = 0; rung < PUSHES && push.link > 0; rung++) {
     double size = ldexp(small_push * verification->weight, rung);
@@ -633,8 +633,13 @@ cav_status cav_closed_loop(const cav_verification *verification, int loop, const
   if (loop == CAV_LOOP_OWN || loop == CAV_LOOP_FINE)
     return cav_replay_own(verification, loop == CAV_LOOP_FINE, gain_q, gain_v, NULL, follow);
   if (loop == CAV_LOOP_CLAIMED) return cav_replay_closed(verification, &verification->law, gain_q, gain_v, follow);
-  // along a diagonal, so that planar motions feel it too
-  double along = (loop == CAV_LOOP_PUSHED ? 1 : -1) * small_push * verification->weight * sqrt(0.5);
-  const cav_push push = {pushed_link(verification), 1.0 / 3, {along, along, 0}};
-  return cav_replay_own(verification, 0, gain_q, gain_v, &push, follow);
+  cav_disturbance disturbance = {0};
+  if (loop < CAV_LOOP_PUSHED) {
+    disturbance.start = loop - CAV_LOOP_START + 1;
+  } else {
+    // along a diagonal, so that planar motions feel it too
+    double along = (loop == CAV_LOOP_PUSHED ? 1 : -1) * small_push * verification->weight * sqrt(0.5);
+    disturbance = (cav_disturbance){pushed_link(verification), 1.0 / 3, {along, along, 0}, 0};
+  }
+  return cav_replay_own(verification, 0, gain_q, gain_v, &disturbance, follow);
 }
