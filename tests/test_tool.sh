@@ -230,6 +230,26 @@ says err "gains.csv"
 run 2 solve problem.xml -o .
 says err "overwrite"
 
+# --- what is given where something else is wanted: what it is, and the command that was meant ---
+
+run 2 explain problem.xml
+says err "is a problem file; explain is about a motion that was solved: cavort solve problem.xml -o DIR"
+run 2 verify swing.result/problem.xml
+says err "say its folder: cavort verify swing.result"
+run 2 verify model.xml
+says err "is a model; verify is about the folder of a solved motion"
+run 2 solve model.xml
+says err "is a model; solve wants a problem file that names it"
+run 2 view model.xml
+says err "is a model; view wants a problem file"
+run 2 solve swing.result
+says err "cavort solve swing.result/problem.xml"
+mkdir bare
+run 2 explain bare
+says err "holds no result"
+run 2 explain nowhere
+says err "there is no such folder"
+
 # --- a motion that cannot be: no certificate, and still a result ---
 
 sed 's/ctrlrange="-1 1"/ctrlrange="-.001 .001"/' model.xml >weak.xml

@@ -99,10 +99,10 @@ typedef struct cav_term {
                  ///< [nq]; rates [nv]. NULL: zeros (quaternion: identity; configuration: the goal)
   int nwaypoint; ///< 0, or target is [nwaypoint*dim], linear between times, constant before and after
   const double *waypoint_time; ///< [nwaypoint], s, increasing
-  double
-      within; ///< tolerance of the target, in the unit of the quantity: the motion achieves it if off by at most this. 0:
-      ///< a usual one for goals, at one time or held over a window, none for prices (problems/README.md); infinite: told only. Of slip, m/s: up to which
-      ///< contacts may slide, in a certificate
+  double within; ///< tolerance of the target, in the unit of the quantity: the motion achieves it if off by at most
+                 ///< this. 0: a usual one for goals, at one time or held over a window, none for running costs
+                 ///< (problems/README.md); infinite: told only. Of slip, m/s: up to which contacts may slide, in a
+                 ///< certificate
   double lower,
       upper; ///< CAV_USE_RANGE, infinite where open; target is NULL then, or a posture or orientation to start from
 } cav_term;

@@ -90,7 +90,7 @@ static const char *sensor_unit(const cav_model *model, const cav_sensor *sensor,
 }
 
 // whether a cost is a goal: at one time, or held over a window of its own at one value; what is tracked, or costs over the
-// whole motion, is a price
+// whole motion, is none
 static int is_goal(const cav_term *term) {
   int whole = term->from == 0 && term->to < 0, posture = term->quantity == CAV_QUANTITY_CONFIGURATION;
   return term->from == term->to || (!whole && term->nwaypoint == 0 && (term->target || posture));

@@ -8,8 +8,7 @@
 #include "file.h"
 #include "provenance.h"
 
-// name of the first element of a file, "" if there is none in its first part
-static void first_element(const char *path, char name[32]) {
+void cav_command_first_element(const char *path, char name[32]) {
   static char text[65536];
   FILE *file = fopen(path, "r");
   size_t n = file ? fread(text, 1, sizeof text - 1, file) : 0;
@@ -31,7 +30,7 @@ static void first_element(const char *path, char name[32]) {
 cav_status cav_command_load(const cav_command_line *line, cav_command_scene *scene, cav_error *error) {
   char root[32];
   *scene = (cav_command_scene){0};
-  first_element(line->operand, root);
+  cav_command_first_element(line->operand, root);
   if (!strcmp(root, "problem")) {
     if (line->floating)
       return cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: is a problem file; write floating=\"true\" into it",

@@ -48,6 +48,13 @@ typedef struct cav_command_scene {
 cav_status cav_command_load(const cav_command_line *line, cav_command_scene *scene, cav_error *error);
 void cav_command_free(cav_command_scene *scene);
 
+/// Name of the first element of a file, "" if there is none in its first part. command.c.
+void cav_command_first_element(const char *path, char name[32]);
+
+/// Whether an operand can be what a command wants, in the words of its usage (DIR, PROBLEM, MODEL); if not, what it is and
+/// what was meant. operand.c.
+cav_status cav_command_expect(const char *command, const char *wanted, const char *path, cav_error *error);
+
 int cav_command_inspect(const cav_command_line *line);
 int cav_command_explain(const cav_command_line *line);
 int cav_command_report(const cav_command_line *line);

@@ -349,7 +349,10 @@ static int run(int argc, char **argv, const char *arguments) {
     return 0;
   }
   if (!read_line(c, argc - 2, argv + 2, &line)) return CAV_EXIT_BAD_INPUT;
-  int status = c->run(&line);
+  cav_error error = {0};
+  int one = c->run != help && c->run != cav_command_study;
+  int status =
+      one && cav_command_expect(c->name, c->operand, line.operand, &error) ? cav_command_fail(&error) : c->run(&line);
   // a full disk or a closed pipe must not pass for success
   if (fflush(stdout) != 0 && status == 0) {
     fprintf(stderr, "cavort: standard output cannot be written\n");
