@@ -57,7 +57,7 @@ static void test_shape(const char *type, const char *attributes) {
   printf("%-8s %5d contacts, %5d columns, %3d at kinks, the rest within %.1e\n", type, contacts, columns, kinks, worst);
   CHECK(contacts > 3 * POSES);
   // seen: none; columns where a nearest part changes within the step of a difference
-  CHECK(kinks < columns / 50);
+  CHECK(kinks < columns / 1000);
   free(q), free(v), free(next), free(J);
   cav_state_free(state);
   cav_model_free(m);

@@ -1,7 +1,7 @@
 /// Derivatives of one contact: how its distance, position and axes, velocities, impulse and wrench change when one of
 /// its two links moves by a small twist. The geometry depends on the relative pose of two geoms only: in closed form
-/// for balls, capsules and corners on a plane and for the nearest points of meshes against anything without a curve but
-/// its radius; otherwise by centred differences of the narrow phase in six directions, for all points of a pair at once.
+/// for balls, capsules and corners on a plane, and for the nearest points of meshes against anything without a curve but
+/// its radius and points over a face of such a pair; otherwise by centred differences of the narrow phase in six directions, for all points of a pair at once.
 /// Everything after the geometry is exact: the frame turns with the normal, and about it with the tangent it is aligned
 /// to; the law has its own derivative (contact_law.c, coulomb.c), and of R and K by the distance where the impedance
 /// varies.
@@ -184,6 +184,41 @@ static int nearest_points(const cav_contact *c, const cav_shape *a, const cav_sh
   return 1;
 }
 
+// a point over a face, from the body that has the face: how it moves with a unit twist of the other one
+static void over_face(const cav_face_point *p, const double twist[6], const double arm[3], double move[3]) {
+  copy3(move, twist + 3);
+  cross_add3(move, twist, arm);
+  // over a side of the face it slides along the other body's side, over a corner it only rises
+  double along = dot3(p->side, p->over), square = dot3(p->face, p->normal);
+  if (along != 0) axpy3(move, move, -dot3(p->over, move) / along, p->side);
+  if (square != 0) scale3(move, dot3(p->face, move) / square, p->normal);
+}
+
+// points over a face of one of two polyhedra: those of the other move against it, the direction with it
+static int face_point(const cav_contact *c, const cav_pair_manifolds *m, geometry *g) {
+  const cav_face_point *p = NULL;
+  for (int i = 0; i < m->faces && !p; i++)
+    if (m->face[i].feature == c->feature) p = &m->face[i];
+  if (!p) return 0;
+  double arm[3], back = p->on_b ? -1 : 1;
+  sub3(arm, p->place, c->pos);
+  memset(g, 0, sizeof *g);
+  for (int k = 0; k < 6; k++) {
+    double twist[6], other[6], move[3];
+    unit(twist, k);
+    scale6(other, back, twist);
+    over_face(p, other, arm, move);
+    g->dist[k] = dot3(p->normal, move);
+    axpy3(g->pos[k], move, -g->dist[k] / 2, p->normal);
+    if (!p->on_b) continue;
+    // the face moves, and carries what was found from it
+    add3(g->pos[k], g->pos[k], twist + 3);
+    cross3(g->normal[k], twist, p->normal);
+    scale3(g->normal[k], -1, g->normal[k]);
+  }
+  return 1;
+}
+
 // whether a contact is the one between the nearest points that gjk.c finds
 static int is_nearest(const cav_contact *c, const cav_shape *a, const cav_shape *b) {
   int straight =
@@ -215,7 +250,14 @@ static void contact_geometry(const cav_model *model, const cav_state *state, con
   if (first->type == CAV_GEOM_PLANE && has_fixed_points(&m->b)) {
     double radius = end_radius(&m->b, axis);
     ball_on_plane(c, radius, axis, g);
-  } else if (!is_nearest(c, &m->a, &m->b) || !nearest_points(c, &m->a, &m->b, m->size, g)) {
+    find_alignment(c, g);
+    return;
+  }
+  if (second->type == CAV_GEOM_MESH && c->feature > 0 && m->faces < 0)
+    m->faces = cav_face_points(&m->a, &m->b, m->margin, m->face);
+  int known = c->feature > 0 ? m->faces > 0 && face_point(c, m, g)
+                             : is_nearest(c, &m->a, &m->b) && nearest_points(c, &m->a, &m->b, m->size, g);
+  if (!known) {
     // where the points of a pair come and go there is no derivative: one that moves with the second geom over a plane of
     // the first has the right rate of the gap
     if (!difference(c, m, g)) ball_on_plane(c, 0, axis, g);

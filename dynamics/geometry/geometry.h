@@ -39,9 +39,27 @@ static inline cav_shape cav_shape_of(const cav_model *model, const cav_geom *geo
 /// rest.
 int cav_collide_shapes(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
+/// A contact point over a face of one of two bodies: a corner of the other body, or a point of one of its sides over a
+/// side of the face, or of its face over a corner of the face.
+typedef struct cav_face_point {
+  int feature, on_b;
+  double normal[3];        ///< out of the face
+  double place[3];         ///< of the other body, without its round edge
+  double side[3], over[3]; ///< its side's direction and normal of the plane over the face's side; or 0 0 0
+  double face[3];          ///< normal of its face, where the point is over a corner; or 0 0 0
+} cav_face_point;
+
+enum { CAV_FACE_POINTS = 64 };
+
+/// Points over a face as cav_collide_convex makes them, before they are thinned out. 0: there is
+/// no face, or something round is in it. polytope.c.
+int cav_face_points(const cav_shape *a, const cav_shape *b, double margin, cav_face_point point[CAV_FACE_POINTS]);
+
 /// Contact points of one pair as it is and displaced, for differences. pair is -1 at the start.
 typedef struct cav_pair_manifolds {
   int pair, displaced;
+  int faces; ///< points over a face of one of the two, -1: not looked for
+  cav_face_point face[CAV_FACE_POINTS];
   cav_shape a, b;
   double margin, size; ///< m: reach; size of the smaller shape, of which steps are a fraction
   double point[3];     ///< of the twists

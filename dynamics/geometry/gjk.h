@@ -19,11 +19,13 @@ typedef struct cav_separation {
   double corner_a[3][3], corner_b[3][3];
 } cav_separation;
 
-/// Corners of a face, an edge or a rim in the world, in order.
-enum { CAV_OUTLINE_MAX = 64 };
+/// Corners of a face, an edge or a rim in the world, in order. Each lies on two lines, from the corner before and to the
+/// next one: side k of the whole outline, or CAV_OUTLINE_CUT + k where the plane over side k of a face has cut it.
+enum { CAV_OUTLINE_MAX = 64, CAV_OUTLINE_CUT = 1 << 16 };
 typedef struct cav_outline {
   int n;
   double x[CAV_OUTLINE_MAX][3];
+  int line[CAV_OUTLINE_MAX][2];
 } cav_outline;
 
 /// Corners and faces of a mesh, a box, and the core of a capsule or a sphere, in the world. polytope.c.

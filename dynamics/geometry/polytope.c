@@ -56,9 +56,14 @@ void cav_shape_normal(const cav_shape *s, int face, double n[3]) {
   if (face & 1) scale3(n, -1, n);
 }
 
-static void push_corner(cav_outline *o, const double x[3]) {
-  if (o->n < CAV_OUTLINE_MAX) copy3(o->x[o->n++], x);
+static void push_point(cav_outline *o, const double x[3], int from, int to) {
+  if (o->n == CAV_OUTLINE_MAX) return;
+  copy3(o->x[o->n], x);
+  o->line[o->n][0] = from;
+  o->line[o->n++][1] = to;
 }
+
+static void push_corner(cav_outline *o, const double x[3]) { push_point(o, x, o->n - 1, o->n); }
 
 void cav_outline_push(const cav_shape *s, int face, cav_outline *o) {
   double x[3];
@@ -200,31 +205,46 @@ static void lying_on(const cav_shape *s, const double m[3], cav_outline *o) {
   }
 }
 
-// cuts away where direction . x > bound
-static void cut(cav_outline *o, const double direction[3], double bound) {
-  cav_outline kept = {.n = 0};
+// of an outline what is not cut away, where direction . x > bound, by the plane over side of a face
+static void cut(const cav_outline *o, const double direction[3], double bound, int side, cav_outline *kept) {
   int closed = o->n > 2;
+  kept->n = 0;
   for (int k = 0; k < o->n; k++) {
     const double *x = o->x[k], *y = o->x[(k + 1) % o->n];
     double hx = dot3(direction, x) - bound, hy = dot3(direction, y) - bound;
-    if (hx <= 0) push_corner(&kept, x);
+    int line = o->line[k][1];
+    if (hx <= 0) push_point(kept, x, o->line[k][0], line);
     if ((hx <= 0) == (hy <= 0) || (!closed && k == o->n - 1)) continue;
     double d[3], p[3];
     sub3(d, y, x);
     axpy3(p, x, hx / (hx - hy), d);
-    push_corner(&kept, p);
+    push_point(kept, p, hx <= 0 ? line : CAV_OUTLINE_CUT + side, hx <= 0 ? CAV_OUTLINE_CUT + side : line);
   }
-  *o = kept;
+}
+
+// outward normal of the plane over a side of a face; its length, 0: none
+static double over_side(const cav_outline *face, int k, const double normal[3], double out[3]) {
+  double e[3];
+  sub3(e, face->x[(k + 1) % face->n], face->x[k]);
+  cross3(out, e, normal);
+  return normalise3(out);
 }
 
 // cuts to the prism over a face, or to the disk of a cylinder's cap by dropping what is outside
 static void cut_to_face(cav_outline *o, const cav_outline *face, const double normal[3], const cav_shape *ground) {
-  for (int k = 0; k < face->n && o->n; k++) {
-    double e[3], out[3];
-    sub3(e, face->x[(k + 1) % face->n], face->x[k]);
-    cross3(out, e, normal);
-    double length = normalise3(out);
-    if (length > 0) cut(o, out, dot3(out, face->x[k]) + 1e-12 * length);
+  cav_outline spare, *from = o, *to = &spare;
+  for (int k = 0; k < face->n && from->n; k++) {
+    double out[3], length = over_side(face, k, normal, out);
+    if (!(length > 0)) continue;
+    cut(from, out, dot3(out, face->x[k]) + 1e-12 * length, k, to);
+    cav_outline *swap = from;
+    from = to;
+    to = swap;
+  }
+  if (from != o) {
+    o->n = from->n;
+    memcpy(o->x, from->x, (size_t)from->n * sizeof *from->x);
+    memcpy(o->line, from->line, (size_t)from->n * sizeof *from->line);
   }
   if (face->n) return;
   int kept = 0;
@@ -305,33 +325,48 @@ static double width_of(const cav_shape *s, const cav_outline *face, const double
   return face->n ? most : s->size[0];
 }
 
-// points over a face that the direction stands square on; 0 if none
-static int touch_face(const contact_pair *g, cav_touch *touch) {
-  cav_outline face_a, face_b, lying;
-  double normal_a[3], normal_b[3], back[3];
+/// What stands over a face that the direction is square to.
+typedef struct standing {
+  const cav_shape *ground, *other;
+  int on_b;
+  double m[3], top; ///< normal out of the face, and its height along that
+  cav_outline face, lying;
+} standing;
+
+// finds it; 0 if the direction is no face's normal
+static int stand(const contact_pair *g, standing *s) {
+  cav_outline face_b;
+  double normal_a[3], normal_b[3], back[3], x[3];
   scale3(back, -1, g->separation.n);
-  double ca = face_along(g->a, g->separation.n, &face_a, normal_a), cb = face_along(g->b, back, &face_b, normal_b);
-  int on_b = cb >= ca - 1e-9;
+  double ca = face_along(g->a, g->separation.n, &s->face, normal_a), cb = face_along(g->b, back, &face_b, normal_b);
+  s->on_b = cb >= ca - 1e-9;
   if (fmax(ca, cb) < ON_NORMAL) return 0;
   // face on face: whatever is narrower than a cap stands on it
-  if (on_b && ca >= ON_NORMAL && g->a->type == CAV_GEOM_CYLINDER)
-    on_b = width_of(g->a, &face_a, normal_a) < width_of(g->b, &face_b, normal_b);
-  const cav_shape *ground = on_b ? g->b : g->a, *other = on_b ? g->a : g->b;
-  const double *m = on_b ? normal_b : normal_a;
-  const cav_outline *face = on_b ? &face_b : &face_a;
-  double x[3];
-  cav_shape_support(ground, m, x);
-  double top = dot3(m, x);
-  lying_on(other, m, &lying);
-  cut_to_face(&lying, face, m, ground);
+  if (s->on_b && ca >= ON_NORMAL && g->a->type == CAV_GEOM_CYLINDER)
+    s->on_b = width_of(g->a, &s->face, normal_a) < width_of(g->b, &face_b, normal_b);
+  s->ground = s->on_b ? g->b : g->a;
+  s->other = s->on_b ? g->a : g->b;
+  copy3(s->m, s->on_b ? normal_b : normal_a);
+  if (s->on_b) s->face = face_b;
+  cav_shape_support(s->ground, s->m, x);
+  s->top = dot3(s->m, x);
+  lying_on(s->other, s->m, &s->lying);
+  cut_to_face(&s->lying, &s->face, s->m, s->ground);
+  return 1;
+}
+
+// points over a face that the direction stands square on; 0 if none
+static int touch_face(const contact_pair *g, cav_touch *touch) {
+  standing s;
+  if (!stand(g, &s)) return 0;
   cav_touch found[CAV_OUTLINE_MAX];
   int count = 0;
-  for (int k = 0; k < lying.n; k++) {
-    double height = dot3(m, lying.x[k]) - top;
+  for (int k = 0; k < s.lying.n; k++) {
+    double height = dot3(s.m, s.lying.x[k]) - s.top;
     if (!(height < g->margin)) continue;
     cav_touch *t = &found[count++];
-    axpy3(t->pos, lying.x[k], -height / 2, m);
-    scale3(t->normal, on_b ? -1 : 1, m);
+    axpy3(t->pos, s.lying.x[k], -height / 2, s.m);
+    scale3(t->normal, s.on_b ? -1 : 1, s.m);
     zero3(t->tangent);
     t->dist = height;
     t->feature = 1 + k;
@@ -339,6 +374,44 @@ static int touch_face(const contact_pair *g, cav_touch *touch) {
   count = cav_thin_out(found, count, CAV_TOUCH_MAX);
   for (int k = 0; k < count; k++) touch[k] = found[k];
   return count;
+}
+
+// normal of a plane polygon
+static void normal_of(const cav_outline *o, double n[3]) {
+  zero3(n);
+  for (int k = 2; k < o->n; k++) {
+    double u[3], w[3], c[3];
+    sub3(u, o->x[k - 1], o->x[0]);
+    sub3(w, o->x[k], o->x[0]);
+    cross3(c, u, w);
+    add3(n, n, c);
+  }
+  normalise3(n);
+}
+
+_Static_assert((int)CAV_FACE_POINTS == (int)CAV_OUTLINE_MAX, "a point for each corner of an outline");
+
+int cav_face_points(const cav_shape *a, const cav_shape *b, double margin, cav_face_point point[CAV_FACE_POINTS]) {
+  contact_pair g = {.a = a, .b = b, .size = fmax(cav_shape_size(a), cav_shape_size(b)), .margin = margin};
+  standing s;
+  cav_outline whole;
+  if (!cav_separation_solve(a, b, margin, &g.separation) || !stand(&g, &s)) return 0;
+  if (s.ground->type == CAV_GEOM_CYLINDER || s.other->type == CAV_GEOM_CYLINDER) return 0;
+  lying_on(s.other, s.m, &whole);
+  for (int k = 0; k < s.lying.n; k++) {
+    cav_face_point *p = &point[k];
+    const int *line = s.lying.line[k], cuts = (line[0] >= CAV_OUTLINE_CUT) + (line[1] >= CAV_OUTLINE_CUT);
+    *p = (cav_face_point){.feature = 1 + k, .on_b = s.on_b};
+    copy3(p->normal, s.m);
+    axpy3(p->place, s.lying.x[k], cav_core_of(s.other).radius, s.m);
+    if (cuts == 2) normal_of(&whole, p->face);
+    if (cuts != 1) continue;
+    int cut_by = line[line[1] >= CAV_OUTLINE_CUT], own = line[line[0] >= CAV_OUTLINE_CUT];
+    over_side(&s.face, cut_by - CAV_OUTLINE_CUT, s.m, p->over);
+    sub3(p->side, whole.x[(own + 1) % whole.n], whole.x[own]);
+    normalise3(p->side);
+  }
+  return s.lying.n;
 }
 
 static int touch_single(const contact_pair *g, double dist, cav_touch *touch) {

@@ -34,6 +34,7 @@ static const cav_touch *find(const cav_touch *touch, int count, int feature) {
 void cav_manifolds_start(cav_pair_manifolds *m, int pair, double size, double margin) {
   m->pair = pair;
   m->displaced = 0;
+  m->faces = -1;
   m->size = size;
   m->margin = margin;
 }
