@@ -396,6 +396,40 @@ static void test_controls(void) {
   close_scene();
 }
 
+// so many piles of boxes that slide: friction of all is solved at once, and takes more iterations than of one pile
+static void test_piles(void) {
+  enum { PILES = 28, HIGH = 3 };
+  static char text[1 << 15];
+  char *at = text + sprintf(text, "<mujoco><option timestep='.005'/><worldbody><geom type='plane' size='9 9 1'/>");
+  for (int i = 0; i < PILES * HIGH; i++)
+    at += sprintf(at, "<body pos='%g %g %g'><freejoint/><geom type='box' size='.1 .1 .1' mass='1'/></body>",
+                  0.5 * (i / HIGH % 9), 0.5 * (i / HIGH / 9), 0.1 + 0.1999 * (i % HIGH) - 1e-4);
+  sprintf(at, "</worldbody></mujoco>");
+  cav_model *m = scene_load(text);
+  cav_state *s = m ? cav_state_new(m) : NULL;
+  if (!CHECK(s != NULL)) return;
+  double *before = scene_vector(m->nv), *push = scene_vector(m->nv), *after = scene_vector(m->nv),
+         *back = scene_vector(m->nv), worst = 0;
+  s->options.stabilisation = CAV_STABILISATION_DISCRETE;
+  s->options.softness = 1e-2;
+  s->options.sliding = CAV_SLIDING_COULOMB;
+  int most = 0;
+  for (int k = 0; k < 5; k++) {
+    cav_forward_report report;
+    for (int i = 0; i < m->nv; i++) before[i] = 0.2 * scene_uniform(), push[i] = scene_uniform();
+    CHECK(cav_forward(m, s, m->q0, before, push, after) == CAV_OK && s->ncontact == 4 * PILES * HIGH);
+    CHECK(cav_inverse(m, s, m->q0, before, after, back) == CAV_OK);
+    for (int i = 0; i < m->nv; i++) worst = fmax(worst, fabs(back[i] - push[i]));
+    CHECK(cav_forward_newton(m, s, m->q0, before, push, 500, 1e-13, after, &report) == CAV_OK);
+    most = report.iterations > most ? report.iterations : most;
+  }
+  printf("%d piles that slide: at most %d iterations, forces %.1e off\n", PILES, most, worst);
+  CHECK(most > 100 && worst < 1e-8);
+  free(before), free(push), free(after), free(back);
+  cav_state_free(s);
+  cav_model_free(m);
+}
+
 int main(void) {
   test_conditions();
   test_derivatives();
@@ -405,5 +439,6 @@ int main(void) {
   test_spin();
   test_swing();
   test_controls();
+  test_piles();
   return check_result();
 }

@@ -32,7 +32,7 @@
 #include "newton.h"
 #include "proximal.h"
 
-enum { DEFAULT_ITERATIONS = 100, PATH_ITERATIONS = 1000, LEVELS = 8 };
+enum { DEFAULT_ITERATIONS = 100, PATH_ITERATIONS = 1000, COULOMB_ITERATIONS = 500, LEVELS = 8 };
 
 static const double ROUGH = 1e-9, NEAR = 1e-2;
 // of the proximal point method: softness below which it is taken, ratio of levels and the least, change of a velocity
@@ -159,9 +159,12 @@ cav_status cav_forward_newton(const cav_model *model, cav_state *state, const do
 }
 
 int cav_forward_limit(const cav_state *state) {
-  // followed gaps take as many again, a curve its steps
-  const int gaps = state->options.next_gap == CAV_NEXT_GAP_EXACT;
-  return has_path(state) ? PATH_ITERATIONS : (1 + gaps) * DEFAULT_ITERATIONS;
+  const cav_options *o = &state->options;
+  if (has_path(state)) return PATH_ITERATIONS;
+  // friction by Coulomb's law is solved for all piles of a heap at once, and some of them need another round each
+  if (o->sliding == CAV_SLIDING_COULOMB) return COULOMB_ITERATIONS;
+  // followed gaps take as many again
+  return (o->next_gap == CAV_NEXT_GAP_EXACT ? 2 : 1) * DEFAULT_ITERATIONS;
 }
 
 cav_status cav_forward(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,
