@@ -29,7 +29,7 @@ table() {
 {
   echo "# Motions replayed in MuJoCo"
   echo
-  echo "\`sh tests/replay.sh\`: solved motions in MuJoCo with the contacts of the model's file, feedforward and gains through MuJoCo's actuators. Until: all bodies within 0.5 m and roots within 1 rad; end: the farthest centre of mass then. The closed loop under the claimed law and under the model's contacts, the worse of steps of 1 and 2 ms, are the certificate's. Cycles run for their \`periods\`."
+  echo "\`sh tests/replay.sh\`: solved motions in MuJoCo with the contacts of the model's file, feedforward and gains through MuJoCo's actuators. Until: all bodies within 0.5 m and roots within 1 rad; end: the farthest centre of mass then. The closed loop under the claimed law and under the model's contacts, the worst of steps of 1 and 2 ms and of four starts a little off, are the certificate's. Cycles run for their \`periods\`."
   echo
   echo "- machine: $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1)"
   echo "- compiler: $(cc --version | head -n 1)"
