@@ -2,12 +2,14 @@
 ///
 /// A coordinate along n of a point is what it is at the start if every joint between the point and the world is a slide
 /// across n or a hinge about n: turning about n changes no coordinate along n, of points or of the axes of joints that
-/// follow, so what holds of these axes in one posture holds in all. Of a centre of mass, if it holds for all its bodies.
+/// follow, so what holds of these axes in one posture holds in all. Of a centre of mass, if it holds for all its bodies; of an
+/// axis of a body, slides do not count.
 #include <math.h>
 #include <stdio.h>
 
 #include "feasibility.h"
 #include "math3.h"
+#include "objects.h"
 
 static const double slack = 1e-3; // m: rounding, and what limits give way
 static const double right = 1e-9; // cosine of an angle that counts as right, sine of one that counts as none
@@ -59,6 +61,47 @@ static void examine_direction(cav_examination *e, const cav_requirement *r) {
   }
 }
 
+/// An axis of a body keeps its component along n where all joints slide or turn about n.
+static int is_unturned(const cav_examination *e, int link, const double n[3]) {
+  const cav_model *m = e->model;
+  for (; link > 0; link = m->link[link].parent) {
+    for (int j = m->link[link].joint; j < m->link[link].joint + m->link[link].njoint; j++) {
+      double across[3];
+      cross3(across, e->start->axis + 6 * (size_t)m->joint[j].dof, n);
+      int slide = m->joint[j].type == CAV_JOINT_SLIDE,
+          about = m->joint[j].type == CAV_JOINT_HINGE && norm3(across) < right;
+      if (!slide && !about) return 0;
+    }
+  }
+  return 1;
+}
+
+static void examine_axis(cav_examination *e, int i) {
+  static const char *const axis[] = {"x", "y", "z"};
+  static const double usual = 0.1;
+  const cav_term *term = &e->problem->term[i];
+  const cav_sensor *s = &term->sensor;
+  double low[3], high[3], at[CAV_SENSOR_DIM_MAX];
+  int first, last;
+  int looks =
+      term->quantity == CAV_QUANTITY_SENSOR &&
+      (s->type == CAV_SENSOR_FRAMEXAXIS || s->type == CAV_SENSOR_FRAMEYAXIS || s->type == CAV_SENSOR_FRAMEZAXIS);
+  if (!looks) return;
+  cav_requirement_window(e, term, &first, &last);
+  if (!cav_requirement_interval(e, term, last, usual, low, high)) return;
+  cav_sensor_read(e->model, e->start, s, at);
+  for (int k = 0; k < 3; k++) {
+    double n[3] = {k == 0, k == 1, k == 2}, off = fmax(low[k] - at[k], at[k] - high[k]);
+    if (!(off > slack) || !is_unturned(e, cav_object_link(e->model, s->object_type, s->object), n)) continue;
+    const cav_requirement r = {.term = i, .knot = last};
+    char what[160];
+    cav_requirement_sensor_words(e, term, last, what, sizeof what);
+    cav_impossible(e, CAV_CONDITION_DISTANCE, &r, "Give it a joint that turns it so, or ask for another direction.",
+                   "%s with %s %.3g off, but no joint turns it that way: it stays at %.3g", what, axis[k], off, at[k]);
+    return;
+  }
+}
+
 cav_status cav_examine_directions(cav_examination *e) {
   int before = e->nfound;
   for (int i = 0; i < e->n && e->nfound == before; i++) {
@@ -67,5 +110,6 @@ cav_status cav_examine_directions(cav_examination *e) {
     if (r->kind == CAV_REQUIRE_COORDINATE || (r->kind == CAV_REQUIRE_POINT && r->object == 0)) continue;
     examine_direction(e, r);
   }
+  for (int i = 0; i < e->problem->nterm && e->nfound == before; i++) examine_axis(e, i);
   return CAV_OK;
 }

@@ -19,8 +19,10 @@
 #include "algebra.h"
 #include "feasibility.h"
 #include "math3.h"
+#include "objects.h"
 
-static const double margin = 1.1; // of bounds on rates, for the error of a step
+static const double usual_rate = 0.3; // tolerance of a rate, m/s or rad/s
+static const double margin = 1.1;     // of bounds on rates, for the error of a step
 enum { PARTS = 200, MOST_TIMES = 1000 };
 
 /// What is known of a model as a whole.
@@ -233,6 +235,53 @@ static void examine_way(cav_examination *e, const supply *s, const cav_requireme
                  what, way, unit, can, unit);
 }
 
+// ---------------------------------------------------------------- how fast
+
+/// Least mass or inertia of what a sensor of a rate is of, T >= mass/2 times its square; 0: not known, or no such sensor.
+static double rated_mass(const cav_examination *e, const cav_sensor *s) {
+  static const double zero[3] = {0};
+  const cav_model *m = e->model;
+  double mass = 0;
+  if (s->type == CAV_SENSOR_JOINTVEL) return least_inertia(m, m->joint[s->object].dof);
+  if (s->type == CAV_SENSOR_SUBTREELINVEL)
+    for (int i = s->object; i < m->nbody; i++)
+      if (cav_body_within(m, i, s->object)) mass += m->body[i].mass;
+  if (s->type != CAV_SENSOR_FRAMELINVEL) return mass;
+  int link = cav_object_link(m, s->object_type, s->object);
+  const double *point = s->object_type == CAV_OBJECT_SITE   ? m->site[s->object].pos
+                        : s->object_type == CAV_OBJECT_GEOM ? m->geom[s->object].pos
+                                                            : m->body[s->object].pos;
+  double centre[3];
+  if (s->object_type == CAV_OBJECT_BODY) cav_body_centre(&m->body[s->object], centre), point = centre;
+  return link ? point_mass(&m->link[link], point ? point : zero) : 0;
+}
+
+static void examine_rate(cav_examination *e, const supply *s, int i) {
+  const cav_term *term = &e->problem->term[i];
+  double low[3], high[3], needs = 0, mass;
+  int first, last;
+  if (term->quantity != CAV_QUANTITY_SENSOR || !((mass = rated_mass(e, &term->sensor)) > 0)) return;
+  cav_requirement_window(e, term, &first, &last);
+  if (!cav_requirement_interval(e, term, first, usual_rate, low, high)) return;
+  for (int k = 0; k < 3; k++) {
+    double least = fmax(fmax(low[k], -high[k]), 0);
+    if (k < term->sensor.dim) needs += least * least;
+  }
+  double t = cav_requirement_time(e, first) + e->problem->timestep * fmax(e->longest, 1);
+  double top = s->least > -INFINITY ? s->kinetic + s->potential - s->least : INFINITY;
+  double root = fmin(sqrt(s->kinetic) + (s->rate + s->gravity) * t, sqrt(fmax(top, 0)) + s->rate * t);
+  double can = sqrt(2 / mass) * root;
+  if (!(sqrt(needs) > can + 1e-3)) return;
+  const cav_requirement r = {.term = i, .knot = first};
+  char what[160];
+  cav_requirement_sensor_words(e, term, first, what, sizeof what);
+  int turns = term->sensor.type == CAV_SENSOR_JOINTVEL && e->model->joint[term->sensor.object].type == CAV_JOINT_HINGE;
+  cav_impossible(
+      e, CAV_CONDITION_ENERGY, &r, "More time, a lower speed, or stronger actuators.",
+      "%s, too fast for the time: %.3g %s are asked for, and actuators at full effort bring it to %.3g at most", what,
+      sqrt(needs), turns ? "rad/s" : "m/s", can);
+}
+
 // ---------------------------------------------------------------- how high
 
 /// Least potential energy with what is required at a knot, by all its requirements there.
@@ -362,9 +411,10 @@ static cav_status examine_height(cav_examination *e, const supply *s, int first,
 
 cav_status cav_examine_energy(cav_examination *e) {
   supply s = {0};
-  if (e->problem->cycle.on || e->n == 0) return CAV_OK;
+  if (e->problem->cycle.on) return CAV_OK;
   cav_status status = survey(e, &s);
   int before = e->nfound;
+  for (int i = 0; i < e->problem->nterm && !status && s.rate >= 0 && e->nfound == before; i++) examine_rate(e, &s, i);
   for (int i = 0, last; i < e->n && !status && s.rate >= 0 && e->nfound == before; i = last) {
     for (last = i; last < e->n && e->requirement[last].knot == e->requirement[i].knot;) last++;
     status = examine_height(e, &s, i, last);

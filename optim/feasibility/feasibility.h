@@ -53,6 +53,14 @@ double cav_requirement_time(const cav_examination *e, int knot);
 /// What is required, in words: "'grasp' wants site 'tip' at x 1.5 at 0.8 s". requirement.c.
 void cav_requirement_words(const cav_examination *e, const cav_requirement *r, char *out, size_t size);
 
+/// The interval of each component that a term on a sensor requires at a knot, infinite where open; zero: it requires none.
+/// usual: its tolerance where it gives none. requirement.c.
+int cav_requirement_interval(const cav_examination *e, const cav_term *term, int knot, double usual, double low[3],
+                             double high[3]);
+
+/// Such a term in words: "'spin' wants a jointvel of joint 'hub' at 0.5 s". requirement.c.
+void cav_requirement_sensor_words(const cav_examination *e, const cav_term *term, int knot, char *out, size_t size);
+
 /// A proof more, with its text in printf's manner; those beyond the room are dropped. feasibility.c.
 void cav_impossible(cav_examination *e, cav_condition condition, const cav_requirement *r, const char *cure,
                     const char *format, ...) __attribute__((format(printf, 5, 6)));

@@ -58,6 +58,19 @@ static void bound(const cav_term *term, double target, double tolerance, double 
   *high = target + (range ? term->upper : 0) + tolerance;
 }
 
+int cav_requirement_interval(const cav_examination *e, const cav_term *term, int knot, double usual, double low[3],
+                             double high[3]) {
+  double target[CAV_SENSOR_DIM_MAX], tolerance = tolerance_of(term, usual);
+  int dim = term->sensor.dim;
+  if (isinf(tolerance) || dim > 3 || term->sensor.cutoff > 0 || term->sensor.referred) return 0;
+  cav_term_target(term, knot * e->problem->timestep, dim, target);
+  for (int k = 0; k < 3; k++) {
+    low[k] = -INFINITY, high[k] = INFINITY;
+    if (k < dim && (term->component < 0 || term->component == k)) bound(term, target[k], tolerance, &low[k], &high[k]);
+  }
+  return 1;
+}
+
 /// The object of a position sensor in the world; 0 if it is none of those that are collected.
 static int is_position(const cav_model *m, const cav_sensor *s, cav_requirement *r) {
   cav_sensor_type type = s->type;
@@ -157,6 +170,17 @@ static int tell_value(char *out, size_t size, const char *axis, double low, doub
   double middle = (low + high) / 2;
   if (high - low < 1e-4) return snprintf(out, size, " %s%s%.4g", axis, *axis ? " " : "", middle);
   return snprintf(out, size, " %s%s%.4g (to %.2g)", axis, *axis ? " " : "", middle, (high - low) / 2);
+}
+
+void cav_requirement_sensor_words(const cav_examination *e, const cav_term *term, int knot, char *out, size_t size) {
+  const cav_sensor *s = &term->sensor;
+  const char *kind = cav_object_kind_of(s->object_type)->text;
+  char buffer[48];
+  int named = *term->name && strcmp(term->name, cav_quantity_rule_of(term->quantity)->name);
+  snprintf(out, size, "%s%.48s%s%s of %s '%.48s' at %.4g s", named ? "'" : "", named ? term->name : "",
+           named ? "' wants a " : "", cav_sensor_rule_of(s->type)->name, kind,
+           cav_name_or(cav_object_name(e->model, s->object_type, s->object), kind, s->object, buffer),
+           knot * e->problem->timestep);
 }
 
 void cav_requirement_words(const cav_examination *e, const cav_requirement *r, char *out, size_t size) {
