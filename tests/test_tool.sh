@@ -346,6 +346,15 @@ says hop.result/verdict.json '"repaired": "<force weight=\"1\"/>"'
 says hop.result/problem.xml "<force "
 run 0 verify hop.result --quiet
 
+# one that does not pay: certified, and why it is not achieved
+sed 's/name="hop"/name="stay"/; s/target=".3" at=".5" weight="900"/target=".3" at=".5" weight=".001"/; /name="foot"/d' hop.xml >stay.xml
+sed -i 's/<posture dofs="all" at="end" weight="900"\/>/&<force weight="1"\/>/' stay.xml
+run 1 solve stay.xml --threads 1 --strategies 1
+run 1 explain stay.result
+says out "not achieved: misses 'apex'"
+says out "cause: 'apex' is 0.3 m from where the start has it, and the motion goes"
+says out '<guess apex="0.3" from="0.253" to="0.747"/> leads elsewhere'
+
 # rest to rest with 4 N on 2 kg, 0.8 of it planned with: 2 sqrt(0.6/1.6) s, of which the step that closes is one of 41
 cat >block.xml <<'END'
 <mujoco><worldbody><body name="block"><joint name="slide" type="slide" axis="1 0 0"/><geom type="box" size=".1 .1 .1"

@@ -83,6 +83,12 @@ enum { CAV_PUMPING_TEXT = 600 };
 /// impossible.c.
 int cav_command_pumping(const cav_problem *problem, char text[CAV_PUMPING_TEXT]);
 
+/// Why a certified motion misses what was asked: how much of the way it goes, and what would lead elsewhere. Zero: nothing is
+/// missed, or nothing is known. missed.c.
+enum { CAV_MISSED_TEXT = 700 };
+int cav_command_missed(const cav_problem *problem, const cav_trajectory *motion, const cav_explanation *explanation,
+                       char text[CAV_MISSED_TEXT]);
+
 /// Before a solve: tells the one cause why a problem cannot have a solution, if there is one. 0: solve it; otherwise the
 /// exit status.
 int cav_command_refuse(const cav_command_line *line, const cav_problem *problem);

@@ -23,7 +23,7 @@ static void print_cause(const cav_reason *r, const char *before) {
 
 // what is missed, and why, in a few lines
 static void print_brief(const cav_explanation *e, const cav_verdict *verdict, const cav_impossibility *impossible,
-                        const char *pumping) {
+                        const char *pumping, const char *missed) {
   int n = 0, good = verdict->certified && verdict->achieved;
   if (impossible) n += printf("impossible: %s. %s\n", impossible->what, impossible->cure) > 0;
   if (!impossible && *pumping) n += printf("cause: %s\n", pumping) > 0;
@@ -35,6 +35,7 @@ static void print_brief(const cav_explanation *e, const cav_verdict *verdict, co
     n += printf("nothing is missed; %s\n",
                 e->nconflict ? "what the cost hangs on:" : "no limit or constraint holds the cost back") > 0;
   int known = impossible || *pumping || apart;
+  if (!known && *missed) n += printf("cause: %s\n", missed) > 0, known = 1;
   if (e->met || known) {
     for (int i = 0; i < e->nconflict && n < LINES && !known; i++, n++) print_cause(&e->conflict[i], "  ");
   } else if (n < LINES && e->nconflict) {
@@ -96,6 +97,9 @@ int cav_command_explain(const cav_command_line *line) {
   if (!status && !(verdict.certified && verdict.achieved) && cav_command_pumping(result->problem, pumping))
     *pumping = 0;
   if (!status) status = cav_problem_impossible(result->problem, &impossible, 1, &proofs, &error);
+  char missed[CAV_MISSED_TEXT] = "";
+  if (!status && verdict.certified && !verdict.achieved)
+    cav_command_missed(result->problem, result->trajectory, &explanation, missed);
   if (!status && line->json) {
     printf("{\n  \"met\": %s,\n  \"certified\": %s,\n  \"achieved\": %s,\n  \"reason\": ",
            explanation.met ? "true" : "false", verdict.certified ? "true" : "false",
@@ -109,6 +113,8 @@ int cav_command_explain(const cav_command_line *line) {
     cav_certificate_json_text(stdout, pumping);
     printf(",\n  \"contradiction\": ");
     cav_certificate_json_text(stdout, explanation.contradiction);
+    printf(",\n  \"short\": ");
+    cav_certificate_json_text(stdout, missed);
     print_reasons("violation", explanation.nviolation, explanation.violation);
     print_reasons("conflict", explanation.nconflict, explanation.conflict);
     printf("\n}\n");
@@ -116,9 +122,10 @@ int cav_command_explain(const cav_command_line *line) {
     if (proofs) printf("impossible: %s\n  %s\n", impossible.what, impossible.cure);
     if (!proofs && *pumping) printf("cause: %s\n", pumping);
     if (*explanation.contradiction) printf("cause: %s\n", explanation.contradiction);
+    if (!proofs && !*pumping && *missed) printf("cause: %s\n", missed);
     print_table(&explanation, &verdict);
   } else if (!status) {
-    print_brief(&explanation, &verdict, proofs ? &impossible : NULL, pumping);
+    print_brief(&explanation, &verdict, proofs ? &impossible : NULL, pumping, missed);
   }
   cav_result_free(result);
   if (status) return cav_command_fail(&error);

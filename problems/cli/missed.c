@@ -1,0 +1,86 @@
+/// Why a motion that is certified does not do what was asked, where no limit and no proof says it: how much of the way to
+/// the target it goes, against a motion that holds the start. One that goes none of it stays at the optimum next to its
+/// guess; one that goes most of it trades the rest against other costs.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "command.h"
+
+static const double still = 0.2; // part of the way up to which a motion stays where it starts
+
+/// The term that is missed by the most tolerances; -1: none.
+static int worst_of(const cav_problem *p, const cav_term_report *report) {
+  int worst = -1;
+  for (int i = 0; i < p->nterm; i++) {
+    const cav_term_report *r = &report[i];
+    if (!r->has_target || r->met || !(r->within > 0)) continue;
+    if (worst < 0 || r->off / r->within > report[worst].off / report[worst].within) worst = i;
+  }
+  return worst;
+}
+
+/// A guess that goes there, as it would stand in the file: an arc where that is what strategies would try.
+static void suggest(const cav_problem *p, char *text, size_t size) {
+  cav_strategy strategy[CAV_STRATEGIES];
+  int n = 0;
+  if (cav_strategy_list(p, strategy, &n)) n = 0;
+  snprintf(text, size, "postures on the way to it (<waypoint> in <guess>) lead elsewhere");
+  for (int i = 0; i < n; i++)
+    if (strategy[i].height > 0)
+      snprintf(text, size, "<guess apex=\"%.3g\" from=\"%.3g\" to=\"%.3g\"/> leads elsewhere", strategy[i].height,
+               strategy[i].from, strategy[i].to);
+}
+
+static void tell(const cav_problem *p, const cav_term_report *got, const cav_term_report *held, int i,
+                 const cav_explanation *e, char *text, size_t size) {
+  const cav_term *term = &p->term[i];
+  int named = *term->name && strcmp(term->name, cav_quantity_rule_of(term->quantity)->name);
+  const char *name = named ? term->name : got[i].what, *unit = got[i].unit, *gap = *unit ? " " : "";
+  double way = held[i].off, done = way - got[i].off;
+  char hint[160];
+  if (way <= got[i].within) {
+    snprintf(text, size,
+             "the start has '%.60s' to %.3g%s%s, and the motion leaves it by %.3g%s%s at %.3g s%s%.160s. It is traded "
+             "against other "
+             "costs: a weight %.2g times as large brings it nearer.",
+             name, way, gap, unit, got[i].off, gap, unit, got[i].time, e->nconflict ? "; what holds it: " : "",
+             e->nconflict ? e->conflict[0].what : "", 2 * got[i].off / got[i].within);
+  } else if (done < still * way) {
+    suggest(p, hint, sizeof hint);
+    snprintf(
+        text, size,
+        "'%.60s' is %.3g%s%s from where the start has it, and the motion goes %.2g%s%s of that by %.3g s%s%.160s. It "
+        "stays at the optimum next to its guess: %s, or a higher weight does.",
+        name, way, gap, unit, fmax(done, 0), gap, unit, got[i].time,
+        e->nconflict ? "; what holds it back: " : ", though no limit or constraint holds it back",
+        e->nconflict ? e->conflict[0].what : "", hint);
+  } else {
+    snprintf(text, size,
+             "'%.60s' is %.3g%s%s from where the start has it, and the motion goes %.0f %% of that by %.3g s%s%.160s. "
+             "The rest "
+             "is traded against other costs: a weight %.2g times as large brings it nearer.",
+             name, way, gap, unit, 100 * done / way, got[i].time, e->nconflict ? "; what holds it back: " : "",
+             e->nconflict ? e->conflict[0].what : "", 2 * got[i].off / got[i].within);
+  }
+}
+
+int cav_command_missed(const cav_problem *p, const cav_trajectory *motion, const cav_explanation *e,
+                       char text[CAV_MISSED_TEXT]) {
+  cav_error error = {0};
+  cav_term_report *got = calloc(2 * (size_t)p->nterm + 2, sizeof *got), *held = got ? got + p->nterm + 1 : NULL;
+  cav_trajectory *start = cav_trajectory_copy(motion);
+  int worst = -1;
+  *text = 0;
+  for (int t = 1; start && t < start->nknot; t++)
+    memcpy(start->q + (size_t)t * (size_t)start->nq, start->q, (size_t)start->nq * sizeof *start->q);
+  if (start) memset(start->v, 0, (size_t)start->nknot * (size_t)start->nv * sizeof *start->v);
+  if (got && start && !p->cycle.on && !cav_terms_report(p, motion, &p->contact, got, NULL, &error) &&
+      !cav_terms_report(p, start, &p->contact, held, NULL, &error))
+    worst = worst_of(p, got);
+  if (worst >= 0) tell(p, got, held, worst, e, text, CAV_MISSED_TEXT);
+  cav_trajectory_free(start);
+  free(got);
+  return *text != 0;
+}
