@@ -1,7 +1,8 @@
 /// Derivatives of one contact: how its distance, position and axes, velocities, impulse and wrench change when one of
 /// its two links moves by a small twist. The geometry depends on the relative pose of two geoms only: in closed form
 /// for balls, capsules and corners on a plane, and for the nearest points of meshes against anything without a curve but
-/// its radius and points over a face of such a pair; otherwise by centred differences of the narrow phase in six directions, for all points of a pair at once.
+/// its radius and points over a face of such a pair; otherwise by centred differences of the narrow phase in six
+/// directions, for all points of a pair at once.
 /// Everything after the geometry is exact: the frame turns with the normal, and about it with the tangent it is aligned
 /// to; the law has its own derivative (contact_law.c, coulomb.c), and of R and K by the distance where the impedance
 /// varies.

@@ -70,7 +70,7 @@ typedef struct products {
 
 // weights of the point nearest to the origin of the affine hull of the last point and m others; 0 if one is not positive
 // or they are dependent
-static int weights_of(const products *all, const int *other, int m, double weight[4]) {
+static inline int weights_of(const products *all, const int *other, const int m, double weight[4]) {
   double G[3][3], r[3];
   for (int i = 0; i < m; i++) {
     r[i] = all->r[other[i]];
@@ -116,7 +116,12 @@ static void reduce(simplex *s, double nearest[3]) {
     for (int i = 0; i < others; i++) {
       if (set >> i & 1) other[m++] = i;
     }
-    if (!weights_of(&all, other, m, weight)) continue;
+    // each number of points by itself, so that its loops are written out
+    int ok = m == 3   ? weights_of(&all, other, 3, weight)
+             : m == 2 ? weights_of(&all, other, 2, weight)
+             : m == 1 ? weights_of(&all, other, 1, weight)
+                      : weights_of(&all, other, 0, weight);
+    if (!ok) continue;
     copy3(w, last);
     for (int i = 0; i < m; i++) axpy3(w, w, weight[i], e[other[i]]);
     double length2 = m == 3 ? 0 : dot3(w, w);

@@ -242,7 +242,7 @@ static void sort(cav_touch *touch, int count) {
 }
 
 // the last two columns of every row
-#define MESH cav_collide_convex, cav_collide_hfield
+#define MESH cav_collide_mesh, cav_collide_hfield
 
 typedef int routine(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 

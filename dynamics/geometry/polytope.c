@@ -466,6 +466,38 @@ int cav_collide_convex(const cav_shape *a, const cav_shape *b, double margin, ca
   return cav_separation_solve(a, b, margin, &g.separation) ? meet(&g, touch) : 0;
 }
 
+// half lengths of a box about a shape's centre, in its axes
+static void box_of(const cav_shape *s, double half[3]) {
+  copy3(half, s->size);
+  if (s->type == CAV_GEOM_SPHERE) set3(half, s->size[0], s->size[0], s->size[0]);
+  if (s->type == CAV_GEOM_CAPSULE) set3(half, s->size[0], s->size[0], s->size[0] + s->size[1]);
+  if (s->type == CAV_GEOM_CYLINDER) set3(half, s->size[0], s->size[0], s->size[1]);
+}
+
+// whether boxes about two shapes are further apart than a margin along an axis of one of them
+static int boxes_apart(const cav_shape *a, const cav_shape *b, double margin) {
+  double half[2][3], R[9], d[3], between[2][3];
+  box_of(a, half[0]);
+  box_of(b, half[1]);
+  sub3(d, b->pos, a->pos);
+  rotate_back(between[0], a->rotation, d);
+  rotate_back(between[1], b->rotation, d);
+  for (int i = 0; i < 3; i++)
+    for (int k = 0; k < 3; k++)
+      R[3 * i + k] = fabs(a->rotation[i] * b->rotation[k] + a->rotation[3 + i] * b->rotation[3 + k] +
+                          a->rotation[6 + i] * b->rotation[6 + k]);
+  for (int i = 0; i < 3; i++) {
+    double one = half[0][i] + dot3(R + 3 * i, half[1]);
+    double other = half[1][i] + R[i] * half[0][0] + R[3 + i] * half[0][1] + R[6 + i] * half[0][2];
+    if (fabs(between[0][i]) - one > margin || fabs(between[1][i]) - other > margin) return 1;
+  }
+  return 0;
+}
+
+int cav_collide_mesh(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
+  return boxes_apart(a, b, margin) ? 0 : cav_collide_convex(a, b, margin, touch);
+}
+
 int cav_collide_plane_mesh(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
   enum { SIDES = 4 };
   const cav_mesh *m = b->mesh;
