@@ -78,6 +78,7 @@ row() {
     row $motion mujoco/humanoid.xml
     row $motion dm_control/humanoid.xml
   done
+  row quadruped-jump
   row robot-squat
   row arm-gate
   echo
