@@ -5,9 +5,9 @@
 /// the inverse v_next is known: it stays closed. The derivative of a distance by its geoms' twists is exact whatever
 /// they touch with, so no geometry is differenced.
 ///
-/// A distance tells no side once a geom is through the other: from touching on, by the linear gap, which does, the linear
-/// gap takes over, all of it at half of the geoms' thickness deep. Planes and height fields have no other side; a mesh
-/// is given no thickness of its own. Where the point is gone after the step (edges, faces and manifolds have
+/// A distance tells no side once a geom is through the other, nor through its edge: from a tenth of the geoms' thickness
+/// deep on, by the linear gap, which does, the linear gap takes over, all of it at 0.35 of it. Planes and height fields
+/// have no other side; a mesh is given no thickness of its own. Where the point is gone after the step (edges, faces and manifolds have
 /// points that come and go), the linear gap stands too.
 #include <math.h>
 #include <stdlib.h>
@@ -15,8 +15,8 @@
 #include "constraint.h"
 #include "math3.h"
 
-// fraction of the thickness over which the linear gap takes over
-static const double CORE = 0.5;
+// fractions of the thickness between which the linear gap takes over
+static const double SHELL = 0.1, CORE = 0.35;
 
 static cav_next_knot *knot_new(const cav_model *model, const cav_state *state) {
   size_t n = (size_t)model->nlink, nv = (size_t)model->nv, nq = (size_t)model->nq;
@@ -86,9 +86,9 @@ static double trust(double linear, double thickness, double *derivative) {
   *derivative = 0;
   if (!(thickness < INFINITY)) return 1;
   if (!(thickness > 0)) return linear >= 0;
-  double x = 1 + linear / (CORE * thickness);
+  double x = (linear / thickness + CORE) / (CORE - SHELL);
   if (x <= 0 || x >= 1) return x >= 1;
-  *derivative = 6 * x * (1 - x) / (CORE * thickness);
+  *derivative = 6 * x * (1 - x) / ((CORE - SHELL) * thickness);
   return x * x * (3 - 2 * x);
 }
 
