@@ -1,7 +1,7 @@
 /// Ipopt on the transcription, stage by stage of the continuation: unknowns are tangent increments about the trajectory
-/// that a stage starts from, forces that no actuator can give are hard equalities, efforts, tendon ranges and hard
-/// terms are bounded rows, joint ranges bound the unknowns (METHOD.md, 2). The only user of Ipopt; written against 3.11
-/// and 3.14 (index and number are int and double in both).
+/// that a stage starts from. On the way constraints are penalised; at the end forces that no actuator can give are hard
+/// equalities, efforts, tendon ranges and hard terms are bounded rows, joint ranges bound the unknowns (METHOD.md, 2).
+/// The only user of Ipopt; written against 3.11 and 3.14 (index and number are int and double in both).
 #include "ipopt.h"
 
 #include <IpStdCInterface.h>
@@ -36,26 +36,27 @@ static const char hessian_option[] = "hessian";
 /// which the last step brings all rows in.
 static const double contact_noise = 1, smooth_noise = 1e-6, acceptable = 1e-4;
 
-/// Fraction of the continuation from which on hard terms are rows. Under a soft law that acts at a distance they may ask
-/// for what it makes expensive beyond measure (rest next to a wall), and a motion bent to that leads nowhere.
-static const double hard_from = 0.5;
+/// Iterations of a stage on the way, at most.
+enum { STAGE_ITERATIONS = 60 };
 
-/// The continuation: stages of the problem's schedule to one of Ipopt's, and iterations of each but the last.
-enum { STAGES_IN_ONE = 2, STAGE_ITERATIONS = 40 };
+/// Barrier parameters: of a solve that begins with the rows; after the continuation, which ends near the optimum, where
+/// a barrier only leads away; and from an optimum with its multipliers. After the continuation Ipopt may not push its
+/// start off the bounds by more than that: pushed by its usual 1e-2 rad contacts give forces of hundreds of weights.
+static const double cold_barrier = 1e-4, near_barrier = 1e-6, warm_barrier = 1e-8;
+static const char near_push[] = "1e-6";
 
-/// Barrier parameter of the continuation's first and last stage, geometrically between: at a small one from the start the
-/// bounds, which a guess violates or touches, cut all steps to a tenth and less. From an optimum with its multipliers a
-/// barrier only leads away: hopper-hop's cost grows by half from 1e-4.
-static const double first_barrier = 1e-2, last_barrier = 1e-4, warm_barrier = 1e-8;
+/// After the continuation the filter takes no iterate whose rows are farther off, all together, than at its start, or
+/// than this: by its usual 1e4 times that, steps of a Gauss-Newton Hessian leave for where nothing comes back from.
+static const double near_violation = 1;
 
-/// Gauss-Newton Hessians, whose dual infeasibility says nothing where contacts act: a stage has settled where the cost
-/// stays within a fraction of itself over a window of iterations, its rows not far off. A stage on the way ends there.
+/// Gauss-Newton Hessians, whose dual infeasibility says nothing where contacts act: a stage has settled where what it
+/// minimises stays within a fraction of itself over a window of iterations, its rows not far off. On the way it ends.
 /// The last one is closed: steps that the damping makes the shortest bring the rows in, within so many iterations.
 typedef struct settling {
   int window;
   double change;
 } settling;
-static const settling on_the_way = {8, 1e-2}, at_the_end = {12, 2e-3};
+static const settling on_the_way = {4, 2.5e-3}, at_the_end = {12, 2e-3};
 static const double settled_violation = 0.1, closing_damping = 1e4;
 enum { CLOSING_ITERATIONS = 25, WINDOW_MOST = 16 };
 
@@ -77,6 +78,15 @@ static const double step_shift = 1e-4;
 /// of 5e7 occur (squat-jump on another humanoid): tests look again at half of the step (tests/motion.h).
 static const double test_step = 2e-10, test_tolerance = 8e-3;
 
+/// What one run of Ipopt is to do.
+typedef struct stage {
+  double fraction; ///< of the schedule
+  int passing;     ///< on the way to the last: rows and bounds are penalised in the objective
+  int near;        ///< starts where stages on the way ended
+  int exact;       ///< the Hessian has the curvature of all rows
+  int iterations;  ///< at most, 0: as the options say
+} stage;
+
 typedef struct program {
   functions call;
   IpoptProblem nlp;
@@ -92,17 +102,16 @@ typedef struct program {
   double damping;                               ///< of Gauss-Newton Hessians, per second
   double noise;                                 ///< of the dual
   double barrier;                               ///< parameter that the stage starts from
-  int exact;                                    ///< the Hessian has the curvature of all rows
-  double **hessian;                             ///< [nknot][9nv^2] of the Lagrangian
-  double *near;                                 ///< [3n] a point beside x and gradients there, where the step is free
+  int exact;
+  double **hessian;           ///< [nknot][9nv^2] of the Lagrangian
+  double *near;               ///< [3n] a point beside x and gradients there, where the step is free
   int *entry;                 ///< [2*entries of the Hessian] its rows, then its columns, where the step is free
   int settles;                ///< with a Hessian of Gauss-Newton that the damping can steer
   double infeasibility, dual; ///< of the last iterate, as Ipopt measures them
   double *best_x;             ///< [n] the iterate that is nearest to an optimum
   double best_error, best_infeasibility, best_dual;
   int best_iteration;              ///< -1: none yet
-  int passing;                     ///< a stage on the way to the last
-  int soft_terms;                  ///< hard terms are penalised in place of rows
+  int passing, begins_near;        ///< as of the stage
   double recent_cost[WINDOW_MOST]; ///< a ring
   int window_start, settled;       ///< iteration from which costs count; one at which they had settled, 0: not yet
   int finished;                    ///< stopped by us: settled, and where it is the last stage with its rows in
@@ -262,12 +271,22 @@ static void exchange_hessians(program *p) {
   }
 }
 
+/// What each slot pulls with: its row's multiplier, or on the way its penalty.
+static void take_multipliers(program *p, double factor, const double *multiplier) {
+  cav_transcription *tr = p->run->tr;
+  for (int i = 0; i < p->m; i++) tr->knot[p->row_knot[i]].slot[p->row_slot[i]].final_multiplier = multiplier[i];
+  if (!p->passing) return;
+  cav_transcription_estimate_multipliers(tr, NULL);
+  for (int t = 0; t < tr->nknot; t++)
+    for (int i = 0; i < tr->knot[t].layout.count; i++) tr->knot[t].slot[i].final_multiplier *= factor;
+}
+
 /// Gathers the Hessian of the Lagrangian at the last linearisation, which stays as it is.
 static int gather_hessian(program *p, double factor, const double *multiplier) {
   cav_transcription *tr = p->run->tr;
   int width = 3 * tr->nv;
   cav_status status = CAV_OK;
-  for (int i = 0; i < p->m; i++) tr->knot[p->row_knot[i]].slot[p->row_slot[i]].final_multiplier = multiplier[i];
+  take_multipliers(p, factor, multiplier);
   for (int t = 0; t < tr->nknot; t++)
     for (int i = 0; i < width * width; i++) p->hessian[t][i] = factor * tr->knot[t].hessian[i];
   exchange_hessians(p);
@@ -295,9 +314,9 @@ static Bool lagrangian_hessian(int n, double *x, Bool fresh, double factor, int 
 }
 
 /// Keeps the iterate if none was nearer to an optimum. A line search that meets the noise of the derivatives can wander
-/// off, and the restoration of Ipopt ends anywhere.
-static void keep_best(program *p, int iteration) {
-  double error = fmax(p->infeasibility / p->run->options->tolerance, p->dual / p->noise);
+/// off, and the restoration of Ipopt ends anywhere. On the way, where there are no rows, cost is what tells.
+static void keep_best(program *p, int iteration, double cost) {
+  double error = p->passing ? cost : fmax(p->infeasibility / p->run->options->tolerance, p->dual / p->noise);
   if (p->known < 2 || !(p->best_iteration < 0 || error < p->best_error)) return;
   memcpy(p->best_x, p->x, (size_t)p->n * sizeof(double));
   p->best_error = error;
@@ -334,7 +353,7 @@ static Bool progress(int mode, int iteration, double cost, double infeasibility,
   (void)mu, (void)regularisation, (void)dual_step;
   p->infeasibility = infeasibility;
   p->dual = dual;
-  if (mode == 0) keep_best(p, iteration);
+  if (mode == 0) keep_best(p, iteration, cost);
   if (iteration > 0)
     p->damping =
         trials > 1 ? fmin(p->damping * damping_change, most_damping) : fmax(p->damping / damping_change, least_damping);
@@ -343,7 +362,9 @@ static Bool progress(int mode, int iteration, double cost, double infeasibility,
   p->finished = is_finished(p, mode, iteration, cost);
   // the start is none of its iterations
   if (p->known) p->interrupted = iteration > 0 ? cav_run_report(p->run, step * primal_step, 0) : cav_run_stop(p->run);
-  return !p->interrupted && !p->finished;
+  // from near an optimum the restoration of Ipopt only leads away, for as long as it may
+  int leaves = p->begins_near && p->settles && mode;
+  return !p->interrupted && !p->finished && !leaves;
 }
 
 /// Rows: every slot but the ranges of scalar joints, which bound the unknowns.
@@ -372,7 +393,7 @@ static int is_row(const program *p, int t, int i) {
   const cav_transcription *tr = p->run->tr;
   const cav_slot *slot = &tr->knot[t].slot[i];
   int dof;
-  if (p->soft_terms && i >= tr->knot[t].layout.term) return 0;
+  if (p->passing) return 0;
   return !is_bound(tr, t, i, &dof) && (!law_acts(tr->model) || isfinite(slot->lower) || isfinite(slot->upper));
 }
 
@@ -437,7 +458,7 @@ static void set_bounds(const program *p, double *x_lower, double *x_upper, doubl
     x_lower[p->n - 1] = log(tr->problem->duration_least / (steps * p->anchor->timestep));
     x_upper[p->n - 1] = log(tr->problem->duration_most / (steps * p->anchor->timestep));
   }
-  for (int t = 1; t < tr->nknot; t++) {
+  for (int t = 1; t < tr->nknot && !p->passing; t++) {
     for (int i = tr->knot[t].layout.joint; i < tr->knot[t].layout.tendon; i++) {
       if (!is_bound(tr, t, i, &dof)) continue;
       const cav_slot *slot = &tr->knot[t].slot[i];
@@ -463,7 +484,7 @@ static void multipliers_of(const program *p, double *multiplier, int back) {
     if (back) slot->multiplier = multiplier[i];
     multiplier[i] = slot->final_multiplier;
   }
-  for (int t = 1; t < tr->nknot; t++) {
+  for (int t = 1; t < tr->nknot && !p->passing; t++) {
     for (int i = tr->knot[t].layout.joint; i < tr->knot[t].layout.tendon; i++) {
       if (!is_bound(tr, t, i, &dof)) continue;
       int k = (t - 1) * tr->nv + dof;
@@ -519,7 +540,7 @@ static const char *option_given(const cav_solve_run *run, const char *name) {
 }
 
 /// Options of a stage, whose iterations are limited if that is not 0.
-static int set_options(const program *p, int iterations) {
+static int set_options(const program *p, const stage *what) {
   const cav_solve_run *run = p->run;
   const cav_solve_options *o = run->options;
   // silent, and deaf to a file ipopt.opt that happens to lie where the program runs
@@ -530,6 +551,10 @@ static int set_options(const program *p, int iterations) {
        (p->exact ? set_list(p, sizeof sharp / sizeof *sharp, sharp) : set_list(p, sizeof rough / sizeof *rough, rough));
   ok = ok && p->call.AddIpoptNumOption(p->nlp, "constr_viol_tol", o->tolerance) &&
        p->call.AddIpoptNumOption(p->nlp, "mu_init", p->barrier);
+  const cav_ipopt_option push[] = {{"bound_push", near_push}, {"bound_frac", near_push}};
+  if (what->near)
+    ok = ok && set_list(p, sizeof push / sizeof *push, push) &&
+         p->call.AddIpoptNumOption(p->nlp, "theta_max_fact", near_violation);
   if (run->warm) ok = ok && p->call.AddIpoptStrOption(p->nlp, "warm_start_init_point", "yes");
   if (o->ipopt_derivative_test) {
     ok = ok && p->call.AddIpoptStrOption(p->nlp, "derivative_test", "first-order");
@@ -539,8 +564,9 @@ static int set_options(const program *p, int iterations) {
   }
   ok = ok && set_list(p, run->problem->nipopt, run->problem->ipopt) && set_list(p, o->nipopt, o->ipopt);
   const char *most = option_given(run, "max_iter");
-  if (iterations > 0 && !(most && atoi(most) < iterations))
-    ok = ok && p->call.AddIpoptIntOption(p->nlp, "max_iter", iterations);
+  if (what->passing) ok = ok && p->call.AddIpoptIntOption(p->nlp, "watchdog_shortened_iter_trigger", 0);
+  if (what->iterations > 0 && !(most && atoi(most) < what->iterations))
+    ok = ok && p->call.AddIpoptIntOption(p->nlp, "max_iter", what->iterations);
   if (o->ipopt_output) ok = ok && p->call.OpenIpoptOutputFile(p->nlp, (char *)o->ipopt_output, 5);
   return ok;
 }
@@ -560,7 +586,8 @@ static cav_status conclude(const program *p, enum ApplicationReturnStatus code, 
        "Ipopt's steps became too small: the noise of the derivatives bounds what it can reach"},
       {Diverging_Iterates, CAV_NOT_CONVERGED, "Ipopt's iterates diverge"},
       {Maximum_Iterations_Exceeded, CAV_NOT_CONVERGED, "Ipopt reached its iteration limit (max_iter)"},
-      {User_Requested_Stop, CAV_NOT_CONVERGED, "Ipopt's costs settled before its constraints held"},
+      {User_Requested_Stop, CAV_NOT_CONVERGED,
+       "Ipopt was stopped, its costs settled or its restoration begun, before its constraints held"},
       {Maximum_CpuTime_Exceeded, CAV_NOT_CONVERGED, "Ipopt reached its time limit (max_cpu_time)"},
       {Not_Enough_Degrees_Of_Freedom, CAV_NOT_CONVERGED, "the problem has more equality constraints than unknowns"},
       {Invalid_Number_Detected, CAV_NOT_FINITE, "the dynamics gave Ipopt a number that is not finite"},
@@ -574,7 +601,8 @@ static cav_status conclude(const program *p, enum ApplicationReturnStatus code, 
   for (size_t i = 0; i < sizeof meaning / sizeof *meaning; i++) {
     if (meaning[i].code != code) continue;
     // an iterate whose rows hold and whose dual is noise is a solution, however Ipopt went on from there
-    if (meaning[i].status == CAV_NOT_CONVERGED && p->best_error <= 1 && p->best_iteration >= 0) return CAV_OK;
+    if (meaning[i].status == CAV_NOT_CONVERGED && !p->passing && p->best_error <= 1 && p->best_iteration >= 0)
+      return CAV_OK;
     if (error && meaning[i].status != CAV_OK) {
       *error = (cav_error){.status = meaning[i].status};
       // where it ended, what is kept instead, and whether it is the derivatives' noise that keeps the dual up
@@ -642,7 +670,7 @@ cav_status cav_ipopt_load(cav_error *error) {
 
 /// Solves at the transcription's law from run->at and leaves the result there: at a stage's end its last iterate, else
 /// the best.
-static cav_status solve_stage(cav_solve_run *run, double fraction, int exact, int iterations, cav_error *error) {
+static cav_status solve_stage(cav_solve_run *run, const stage *what, cav_error *error) {
   cav_transcription *tr = run->tr;
   cav_penalties kept = tr->penalty;
   cav_derivative difference = tr->difference;
@@ -651,17 +679,19 @@ static cav_status solve_stage(cav_solve_run *run, double fraction, int exact, in
                .anchor = cav_trajectory_copy(run->at),
                .best_iteration = -1,
                .noise = law_acts(tr->model) ? contact_noise : smooth_noise,
-               .barrier = run->warm ? warm_barrier : first_barrier * pow(last_barrier / first_barrier, fraction),
+               .barrier = run->warm    ? warm_barrier
+                          : what->near ? near_barrier
+                                       : cold_barrier,
                .damping = damping,
-               .exact = exact,
-               .settles = !exact && !is_limited(run),
-               .passing = iterations > 0,
-               .soft_terms = iterations > 0 && fraction < hard_from};
+               .exact = what->exact,
+               .settles = !what->exact && !is_limited(run),
+               .passing = what->passing,
+               .begins_near = what->near};
   double *bound = NULL, *start = NULL, *multiplier = NULL;
   cav_status status = load(&p.call, error);
   if (status != CAV_OK) goto end;
-  // costs are the objective: constraint rows get no weight of their own, but for terms that are none yet
-  tr->penalty = (cav_penalties){.term = p.soft_terms ? kept.term : 0};
+  // costs are the objective: constraint rows get a weight of their own on the way alone
+  if (!p.passing) tr->penalty = (cav_penalties){0};
   tr->difference = CAV_DERIVATIVE_CENTRED;
   if ((status = cav_transcription_values(tr, run->at)) != CAV_OK) goto end;
   status = CAV_NO_MEMORY;
@@ -677,7 +707,7 @@ static cav_status solve_stage(cav_solve_run *run, double fraction, int exact, in
                                     cav_normal_entries(run->normal, NULL, NULL, NULL), 0, objective, constraints,
                                     objective_gradient, constraint_jacobian, lagrangian_hessian);
   if (!p.nlp) goto end;
-  if (!set_options(&p, iterations)) {
+  if (!set_options(&p, what)) {
     status = conclude(&p, Invalid_Option, error);
     goto end;
   }
@@ -688,7 +718,7 @@ static cav_status solve_stage(cav_solve_run *run, double fraction, int exact, in
   status = conclude(&p, code, error);
   // one that failed or was stopped gives its best iterate, with the multipliers that it started from
   int ended = code == Solve_Succeeded || code == Solved_To_Acceptable_Level || p.finished ||
-              (iterations > 0 && code == Maximum_Iterations_Exceeded);
+              (what->iterations > 0 && code == Maximum_Iterations_Exceeded);
   int best = !ended && p.best_iteration >= 0;
   if (!best) multipliers_of(&p, multiplier, 1);
   cav_transcription_move(tr, p.anchor, best ? p.best_x : start, run->at);
@@ -718,28 +748,28 @@ static cav_status measure(cav_solve_run *run, double *violation, double *cost) {
 }
 
 /// One stage, noted.
-static cav_status run_stage(cav_solve_run *run, double fraction, int exact, int iterations, cav_error *error) {
+static cav_status run_stage(cav_solve_run *run, const stage *what, cav_error *error) {
   int begin = run->solution->iterations;
   run->stage++;
-  cav_status status = solve_stage(run, fraction, exact, iterations, error);
+  cav_status status = solve_stage(run, what, error);
   cav_outcome outcome = status == CAV_OK              ? CAV_OUTCOME_SETTLED
                         : status == CAV_NOT_CONVERGED ? CAV_OUTCOME_LIMIT
                                                       : CAV_OUTCOME_STOPPED;
-  return cav_run_note(run, fraction, begin, outcome) ? status : CAV_NO_MEMORY;
+  return cav_run_note(run, what->fraction, begin, outcome) ? status : CAV_NO_MEMORY;
 }
 
 static int goes_on(cav_status status) { return status == CAV_OK || status == CAV_NOT_CONVERGED; }
 
 /// After Gauss-Newton the exact Hessian, whose steps are right where contacts have settled and wild where they have
 /// not: kept if it converges, or if it leaves less violation or, with no more of it, less cost.
-static cav_status sharpen(cav_solve_run *run, int iterations, cav_status before, cav_error *error) {
+static cav_status sharpen(cav_solve_run *run, const stage *what, cav_status before, cav_error *error) {
   double violation, cost, was_violation, was_cost;
   cav_error mine = {0};
   cav_trajectory *kept = cav_trajectory_copy(run->at);
   if (!kept) return CAV_NO_MEMORY;
   cav_status status = measure(run, &was_violation, &was_cost);
   run->phase = "sharpening";
-  if (status == CAV_OK) status = run_stage(run, 1, 1, iterations, &mine);
+  if (status == CAV_OK) status = run_stage(run, what, &mine);
   if (goes_on(status)) {
     cav_status trial = measure(run, &violation, &cost);
     int better = violation <= fmax(acceptable, was_violation) && (was_violation > 10 * acceptable || cost < was_cost);
@@ -757,22 +787,25 @@ static cav_status sharpen(cav_solve_run *run, int iterations, cav_status before,
 
 cav_status cav_ipopt(cav_solve_run *run, cav_error *error) {
   int acts = law_acts(run->problem->model), alone = run->options->solver == CAV_SOLVER_IPOPT && acts;
-  int stages = alone && !run->options->ipopt_derivative_test ? (run->problem->schedule.stages + 1) / STAGES_IN_ONE : 1;
+  int stages = alone && !run->options->ipopt_derivative_test ? run->problem->schedule.stages : 0;
   int exact = is_exact(run), iterations = acts && !exact ? EXACT_ITERATIONS / run->problem->model->nv : 0;
   if (iterations < LEAST_EXACT_ITERATIONS || option_given(run, hessian_option) || is_limited(run)) iterations = 0;
   cav_status status = CAV_OK;
-  run->stages = stages + (iterations > 0);
+  run->stages = stages + 1 + (iterations > 0);
   run->stage = 0;
   run->phase = "continuation";
-  for (int i = 0; i < stages - 1 && goes_on(status); i++) {
-    double fraction = i / (stages - 1.0);
+  for (int i = 0; i < stages && goes_on(status); i++) {
+    double fraction = stages > 1 ? i / (stages - 1.0) : 1;
+    stage way = {.fraction = fraction, .passing = 1, .exact = exact, .iterations = STAGE_ITERATIONS};
     cav_error passing; // that a stage is left at its limit is its nature
     cav_stage_set(run->problem, fraction, run->tr);
-    status = run_stage(run, fraction, exact, STAGE_ITERATIONS, &passing);
+    status = run_stage(run, &way, &passing);
   }
   if (!goes_on(status)) return status;
   run->phase = "ipopt";
   if (run->options->solver == CAV_SOLVER_IPOPT) cav_stage_set(run->problem, 1, run->tr);
-  status = run_stage(run, 1, exact, 0, error);
-  return iterations > 0 && goes_on(status) ? sharpen(run, iterations, status, error) : status;
+  stage last = {.fraction = 1, .near = stages > 0, .exact = exact};
+  status = run_stage(run, &last, error);
+  stage sharper = {.fraction = 1, .near = stages > 0, .exact = 1, .iterations = iterations};
+  return iterations > 0 && goes_on(status) ? sharpen(run, &sharper, status, error) : status;
 }
