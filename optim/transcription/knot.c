@@ -157,11 +157,6 @@ int cav_knot_reserve(cav_transcription *tr, cav_scratch *s, int t) {
 
 // ---------------------------------------------------------------- rows
 
-/// Whether a term selects a dof.
-static inline int selects(const cav_transcription *tr, const cav_term *term, int d) {
-  return cav_term_window(tr, term)->dofs == tr->nv || cav_dof_selected(tr, term, d);
-}
-
 /// Starts a row of weight/2 r^2. Where the step is free its derivative by the step's logarithm is the difference of two
 /// passes that begin the same rows; weights count with it, as integrals are sums over steps.
 static void begin_row(cav_sum *a, double weight, double r) {
@@ -352,8 +347,9 @@ static void add_velocity(cav_sum *a, const cav_term *term, double weight, const 
   double entry[6], *goal = a->s->tangent;
   if (!cav_knot_moves(tr, a->t)) return;
   cav_term_target(term, a->knot->time, tr->nv, goal);
+  const int all = cav_term_window(tr, term)->dofs == tr->nv;
   for (int d = 0; d < tr->nv; d++) {
-    if (!selects(tr, term, d)) continue;
+    if (!all && !cav_dof_selected(tr, term, d)) continue;
     int n = 0;
     if (a->jacobian)
       n = velocity_entries(tr, a->t, d, tr->nv, cav_knot_moves(tr, a->t - 1), 1 / term->scale, column, entry);
@@ -379,8 +375,9 @@ static void add_acceleration(cav_sum *a, const cav_term *term, double weight, co
   double entry[12], *goal = a->s->tangent;
   if (!a->knot->has_force) return;
   cav_term_target(term, a->knot->time, tr->nv, goal);
+  const int all = cav_term_window(tr, term)->dofs == tr->nv;
   for (int d = 0; d < tr->nv; d++) {
-    if (!selects(tr, term, d)) continue;
+    if (!all && !cav_dof_selected(tr, term, d)) continue;
     int n = a->jacobian ? acceleration_entries(a, d, 1 / term->scale, column, entry) : 0;
     double r = ((v_next[d] - v[d]) / tr->options.timestep - goal[d]) / term->scale, w = weight;
     begin_cost(a, term, 1, &w, &r);
@@ -427,8 +424,9 @@ static void add_posture(cav_sum *a, const cav_term *term, double weight, const d
   double entry[3];
   if (!cav_knot_moves(tr, a->t)) return;
   posture_difference(a, term, q, a->s->tangent);
+  const int all = cav_term_window(tr, term)->dofs == tr->nv;
   for (int d = 0; d < tr->nv; d++) {
-    if (!selects(tr, term, d)) continue;
+    if (!all && !cav_dof_selected(tr, term, d)) continue;
     int n = a->jacobian ? posture_entries(tr, a->s->tangent, d, 1 / term->scale, column, entry) : 0;
     double r = a->s->tangent[d] / term->scale, w = weight;
     begin_cost(a, term, 1, &w, &r);
@@ -502,9 +500,8 @@ static void add_contact(cav_sum *a, const cav_term *term, double weight) {
 }
 
 /// One cost, whose readings, if it is of a sensor, are the knot's from reading on.
-static void add_cost(cav_sum *a, const cav_term *term, int reading, const double *q, const double *v,
+static void add_cost(cav_sum *a, const cav_term *term, double weight, int reading, const double *q, const double *v,
                      const double *v_next) {
-  double weight = cav_term_weight(a->tr, term, a->t) * term->weight;
   size_t width = 3 * (size_t)a->tr->nv;
   switch (term->quantity) {
     case CAV_QUANTITY_SENSOR:
@@ -547,8 +544,9 @@ static void add_costs(cav_sum *a, const double *q, const double *v, const double
   int reading = CAV_CONTACT_READINGS * a->knot->ncontact;
   for (int i = 0; i < tr->problem->nterm; i++) {
     const cav_term *term = &tr->problem->term[i];
-    if (cav_term_weight(tr, term, a->t) == 0) continue;
-    if (term->use == CAV_USE_COST) add_cost(a, term, reading, q, v, v_next);
+    double weight = cav_term_weight(tr, term, a->t);
+    if (weight == 0) continue;
+    if (term->use == CAV_USE_COST) add_cost(a, term, weight * term->weight, reading, q, v, v_next);
     reading += cav_term_dim(term);
   }
   assert(reading == a->knot->nread);
@@ -666,7 +664,7 @@ static int add_hard_dofs(cav_sum *a, const cav_term *term, int i, double lower, 
     cav_term_target(term, a->knot->time, tr->nv, a->s->tangent);
   }
   for (int d = 0; d < tr->nv; d++) {
-    if (!selects(tr, term, d)) continue;
+    if (!cav_dof_selected(tr, term, d)) continue;
     int n = 0;
     double measured = rate ? (v_next[d] - v[d]) / tr->options.timestep : v[d];
     double value = (posture ? a->s->tangent[d] : measured - a->s->tangent[d]) / term->scale;
