@@ -56,7 +56,8 @@ static void examine_direction(cav_examination *e, const cav_requirement *r) {
     char what[160];
     cav_requirement_words(e, r, what, sizeof what);
     cav_impossible(e, CAV_CONDITION_DISTANCE, r, "Give it a joint that way, or ask for a direction in which it moves.",
-                   "%s, but no joint moves it along %s: it stays at %.4g, %.3g m off", what, axis[k], at[k], off);
+                   "%s, but no joint moves it along %s: it stays at %.4g, %.3g m off", what, axis[k],
+                   fabs(at[k]) < slack ? 0 : at[k], off);
     return;
   }
 }

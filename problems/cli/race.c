@@ -21,7 +21,7 @@
 // how much more than the cheapest one a motion may cost that is repaired
 static const double dearer = 2;
 
-// force without an actuator, fraction of the weight, up to which a motion nearly obeys the dynamics
+// force without an actuator, fraction of the weight, and violation of limits and constraints up to which it nearly keeps them
 static const double nearly = 1e-3;
 
 cav_status cav_race_open(cav_race *race, int most, cav_error *error) {
@@ -340,8 +340,8 @@ static int better(const cav_race_report *a, const cav_race_report *b, int cheape
   return v->closed_loop_seconds > w->closed_loop_seconds;
 }
 
-// the motion to repair: the best of those that cost little more than the cheapest that nearly obeys the dynamics, since
-// what was asked is in the cost: one that stands still is not mended by what would certify it. -1: none
+// the motion to repair: the best of those that cost little more than the cheapest that nearly keeps forces, limits and
+// constraints, since what was asked is in the cost: one that stands still is not mended by what would certify it. -1: none
 static int find_broken(const cav_race *race) {
   int best = -1;
   double least = INFINITY;
@@ -349,7 +349,8 @@ static int find_broken(const cav_race *race) {
     for (int k = 0; k < race->n; k++) {
       const cav_race_entry *e = &race->entry[k];
       if (e->state != CAV_RACE_DONE || !e->report.solution || e->strategy.use == CAV_STRATEGY_DIAGNOSIS) continue;
-      if (e->report.verdict.unactuated_force_max > nearly) continue;
+      const cav_verdict *v = &e->report.verdict;
+      if (fmax(v->unactuated_force_max, fmax(v->limit_violation_max, v->constraint_violation_max)) > nearly) continue;
       least = pass == 0 ? fmin(least, e->report.cost) : least;
       if (pass == 0 || e->report.cost > dearer * least) continue;
       if (best < 0 || better(&e->report, &race->entry[best].report, 0)) best = k;
