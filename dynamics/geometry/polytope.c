@@ -125,8 +125,9 @@ static void lowest_face(const cav_shape *s, const double n[3], cav_outline *o) {
     cav_outline_push(s, face, o);
     return;
   }
-  cav_shape_corner(s, corner, o->x[0]);
-  o->n = 1;
+  double x[3];
+  cav_shape_corner(s, corner, x);
+  push_corner(o, x);
 }
 
 // the face of a box that looks most along n
