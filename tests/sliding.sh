@@ -50,7 +50,7 @@ both() {
 {
   echo "# Laws of sliding contacts"
   echo
-  echo "\`sh tests/sliding.sh\`: one solve each from the problem's own guess, one thread, the default schedule but for the law (coulomb from three quarters of the way on). Leaning on air: contact force, by impulse, across gaps over 3 mm that stay open at the next knot; at most 2 % in a certified motion. Push and bowl slide all the time or at first, which no certificate allows (slip); the known optima are 0.0638 and 0."
+  echo "\`sh tests/sliding.sh\`: one solve each from the problem's own guess, one thread, the default schedule but for the law (coulomb from three quarters of the way on). Leaning on air: contact force, by impulse, across gaps over 3 mm that stay open at the next knot; at most 3 % in a certified motion. Push and bowl slide all the time or at first, which no certificate allows (slip); the known optima are 0.0638 and 0."
   echo
   echo "- machine: $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1), $(nproc) processors"
   echo "- compiler: $(cc --version | head -n 1)"

@@ -342,7 +342,7 @@ CAV_API cav_status cav_strategy_solve(const cav_problem *problem, const cav_stra
 #define CAV_TOLERANCE_PENETRATION 0.005 ///< m, of contacts between moving links too
 #define CAV_TOLERANCE_MOMENTUM 0.005    ///< fraction of weight, root mean square
 #define CAV_TOLERANCE_SLIP 0.01         ///< m/s
-#define CAV_TOLERANCE_HOVER 0.02        ///< fraction of all contact force; CAV_HOVER_GAP says what counts
+#define CAV_TOLERANCE_HOVER 0.03        ///< fraction of all contact force; CAV_HOVER_GAP says what counts
 #define CAV_TOLERANCE_REPLAY \
   0.5 ///< s, or the whole motion: the open loop at the same step reproduces the knots at least so long
 #define CAV_TOLERANCE_STEP 1e-8        ///< rad or m
