@@ -6,9 +6,9 @@
 /// they touch with, so no geometry is differenced.
 ///
 /// A distance tells no side once a geom is through the other, nor through its edge: from a tenth of the geoms' thickness
-/// deep on, by the linear gap, which does, the linear gap takes over, all of it at 0.35 of it. Planes and height fields
-/// have no other side; a mesh is given no thickness of its own. Where the point is gone after the step (edges, faces and manifolds have
-/// points that come and go), the linear gap stands too.
+/// deep on, by the linear gap, which does, the linear gap takes over, all of it at 0.35 of the thickness. Planes and
+/// height fields have no other side; a mesh is given no thickness of its own. Where the point is gone after the step
+/// (edges, faces and manifolds have points that come and go), the linear gap stands too.
 #include <math.h>
 #include <stdlib.h>
 
