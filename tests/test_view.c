@@ -253,6 +253,50 @@ static void test_page(const cav_model *model) {
   free(page);
 }
 
+// a ball of 8,000 corners is drawn by those of a grid
+static void test_fine_mesh(void) {
+#ifdef CAVORT_HAVE_QHULL
+  enum { POINTS = 8000 };
+  FILE *file = fopen(in_folder("model.xml"), "w");
+  if (!CHECK(file != NULL)) return;
+  fputs("<mujoco><asset><mesh name='m' vertex='", file);
+  for (int i = 0; i < POINTS; i++) {
+    double z = 1 - (2.0 * i + 1) / POINTS, r = sqrt(1 - z * z), a = 2.399963229728653 * i;
+    fprintf(file, "%.5f %.5f %.5f ", r * cos(a), r * sin(a), z);
+  }
+  fputs("'/></asset><worldbody><body><freejoint/><geom type='mesh' mesh='m'/></body></worldbody></mujoco>", file);
+  fclose(file);
+  cav_model *m = cav_model_load(in_folder("model.xml"), NULL);
+  if (!CHECK(m && m->mesh[0].nvertex > 7000)) return;
+  cav_view_input input = {.nknot = 1, .timestep = 0.01, .q = m->q0};
+  CHECK(cav_view_write(in_folder("view.html"), m, &input, NULL) == CAV_OK);
+  char *page = read_file(in_folder("view.html"));
+  const char *at = page ? strstr(page, "\"corners\":[") : NULL;
+  int corners = 0, triangles = 0, wrong = 0;
+  double radius = 0, least = INFINITY;
+  for (at = at ? at + 11 : NULL; at && *at != ']'; corners++) {
+    double square = 0;
+    for (int k = 0; k < 3; k++) {
+      double x = strtod(at + 1, (char **)&at);
+      square += x * x;
+    }
+    radius = fmax(radius, sqrt(square)), least = fmin(least, sqrt(square));
+  }
+  at = page ? strstr(page, "\"triangles\":[") : NULL;
+  for (at = at ? at + 13 : NULL; at && *at != ']'; triangles++) {
+    for (int k = 0; k < 3; k++) {
+      long corner = strtol(at + 1, (char **)&at, 10);
+      wrong += corner < 0 || corner >= corners;
+    }
+  }
+  // a closed surface has twice as many triangles as corners; where cells fold it, some more
+  CHECK(corners > 500 && corners < 3000 && triangles > 1.9 * corners && triangles < 2.1 * corners && !wrong);
+  CHECK(radius < 1.001 && least > 0.999);
+  free(page);
+  cav_model_free(m);
+#endif
+}
+
 // what goes wrong says why and leaves no page
 static void test_errors(const cav_model *model) {
   cav_view_input input = hostile_input();
@@ -321,6 +365,7 @@ int main(void) {
     test_installed(model);
   }
   cav_model_free(model);
+  test_fine_mesh();
   static const char *const left[] = {"model.xml", "three.js", "bad.js", "empty.js", "view.html", "full.html"};
   for (size_t i = 0; i < sizeof left / sizeof *left; i++) remove(in_folder(left[i]));
   CHECK(rmdir(folder) == 0);

@@ -54,19 +54,64 @@ static void write_numbers(FILE *out, const double *x, int n, int digits) {
 
 // --- parts of the motion ---
 
+// meshes of more corners are drawn by those of a grid of so many cells along their largest side: what is finer no page
+// shows, and a robot's sixty meshes would make it tens of megabytes
+enum { CORNERS_SHOWN = 200, GRID = 20 };
+
+// the corner that stands for each, of those in one cell the first; the identity where there are few
+static void thin_corners(const cav_mesh *m, int *stand_in) {
+  double low[3] = {INFINITY, INFINITY, INFINITY}, side = 0;
+  for (int k = 0; k < 3; k++) {
+    double high = -INFINITY;
+    for (int v = 0; v < m->nvertex; v++) {
+      low[k] = fmin(low[k], m->vertex[3 * v + k]);
+      high = fmax(high, m->vertex[3 * v + k]);
+    }
+    side = fmax(side, high - low[k]);
+  }
+  int first[(GRID + 1) * (GRID + 1) * (GRID + 1)];
+  for (size_t i = 0; i < sizeof first / sizeof *first; i++) first[i] = -1;
+  for (int v = 0; v < m->nvertex; v++) {
+    stand_in[v] = v;
+    if (m->nvertex <= CORNERS_SHOWN || !(side > 0)) continue;
+    int cell = 0;
+    for (int k = 0; k < 3; k++) cell = cell * (GRID + 1) + (int)(GRID * (m->vertex[3 * v + k] - low[k]) / side);
+    if (first[cell] < 0) first[cell] = v;
+    stand_in[v] = first[cell];
+  }
+}
+
 // the hull of a mesh as corners and triangles
 static void write_mesh(FILE *out, const cav_mesh *m) {
-  fputs(",\"corners\":", out);
-  write_numbers(out, m->vertex, 3 * m->nvertex, 6);
-  fputs(",\"triangles\":[", out);
+  int *stand_in = malloc(2 * ((size_t)m->nvertex + 1) * sizeof *stand_in), n = 0;
+  if (!stand_in) {
+    fputs(",\"corners\":[],\"triangles\":[]", out);
+    return;
+  }
+  int *number = stand_in + m->nvertex;
+  thin_corners(m, stand_in);
+  fputs(",\"corners\":[", out);
+  for (int v = 0; v < m->nvertex; v++) {
+    if (stand_in[v] != v) continue;
+    number[v] = n;
+    for (int k = 0; k < 3; k++) {
+      if (n > 0 || k > 0) putc(',', out);
+      write_number(out, m->vertex[3 * v + k], 5);
+    }
+    n++;
+  }
+  fputs("],\"triangles\":[", out);
   const char *comma = "";
   for (int f = 0; f < m->nface; f++) {
     for (int k = m->face[f] + 2; k < m->face[f + 1]; k++) {
-      fprintf(out, "%s%d,%d,%d", comma, m->corner[m->face[f]], m->corner[k - 1], m->corner[k]);
+      int a = stand_in[m->corner[m->face[f]]], b = stand_in[m->corner[k - 1]], c = stand_in[m->corner[k]];
+      if (a == b || b == c || c == a) continue;
+      fprintf(out, "%s%d,%d,%d", comma, number[a], number[b], number[c]);
       comma = ",";
     }
   }
   putc(']', out);
+  free(stand_in);
 }
 
 // at most so many cells of a height field along each side: a page is looked at, not measured
