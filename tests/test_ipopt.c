@@ -95,7 +95,8 @@ static void check_both(const cav_problem *problem) {
   cav_solution_free(without);
 }
 
-// the caller's option is laid over the problem's; limits, where one stage comes before, are told; an impossible value is refused before anything runs
+// the caller's option is laid over the problem's; limits, where one stage comes before, are told; an impossible value is
+// refused before anything runs
 static void check_options(void) {
   cav_error error;
   cav_problem *problem = load("<schedule stages='1'/>\n<ipopt max_iter='1'/>\n");
