@@ -292,7 +292,8 @@ double cav_contact_stiffness_ratio(const cav_state *state, const cav_contact *c,
 // along a single line (a third, the mean of its three directions), too.
 static double contact_weight(const cav_state *state, const cav_pair *pair) {
   const cav_model *model = state->model;
-  return state->options.smoothing > 0 && model->mass > 0 ? larger(pair->weight[0], 0.25 / model->mass) : pair->weight[0];
+  return state->options.smoothing > 0 && model->mass > 0 ? larger(pair->weight[0], 0.25 / model->mass)
+                                                         : pair->weight[0];
 }
 
 // R of the friction rows so that R_j mu_j^2 is the same for all (22); all rows share the damping

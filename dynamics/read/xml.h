@@ -75,7 +75,7 @@ typedef struct cav_xml_node {
   const cav_xml_value *value;
   struct cav_xml_node *last; ///< child, while reading
   int part;                  ///< number of the file that it was attached from, 0: the file itself (expand.c)
-  int number; ///< of a geom in its body, from 1, where some are removed; 0 elsewhere
+  int number;                ///< of a geom in its body, from 1, where some are removed; 0 elsewhere
 } cav_xml_node;
 
 typedef struct cav_xml cav_xml;
