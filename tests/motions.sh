@@ -80,9 +80,11 @@ row() {
   done
   row quadruped-jump
   row robot-squat
+  row robot-reach
   row arm-gate
   if [ "${CAVORT_OTHERS:-own}" = all ]; then
     row quadruped-jump menagerie/unitree_go1/scene.xml
+    row robot-reach unitree/g1/scene_29dof.xml
     row robot-squat unitree/g1/scene_29dof.xml
     row arm-gate menagerie/ufactory_xarm7/xarm7.xml
   fi
