@@ -81,6 +81,7 @@ row() {
   row quadruped-jump
   row robot-squat
   row robot-reach
+  row robot-jump
   row arm-gate
   if [ "${CAVORT_OTHERS:-own}" = all ]; then
     row quadruped-jump menagerie/unitree_go1/scene.xml
