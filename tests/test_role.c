@@ -94,7 +94,7 @@ static void centre(const cav_model *m, const cav_state *state, int root, double 
 }
 
 // the posture stands: the sole's vertical is that of the model's own configuration, feet are level, the centre of mass lies
-// within their box, joints lie in their ranges
+// within their box, joints lie in their ranges, links of two legs are not inside each other
 static void check_stand(const cav_model *m, cav_state *state, const char *name) {
   double *q = scene_vector(m->nq), com[3], least[2] = {INFINITY, INFINITY}, most[2] = {-INFINITY, -INFINITY};
   double lowest = INFINITY, highest = -INFINITY, up[CAV_ROLE_TYPES][9];
@@ -109,6 +109,8 @@ static void check_stand(const cav_model *m, cav_state *state, const char *name) 
   }
   if (CHECK(cav_stand_find(m, state, q, &stand) == CAV_OK)) {
     CHECK(cav_position(m, state, q) == CAV_OK);
+    for (int i = 0; i < state->ncontact && !stand.key && roles.build == CAV_BUILD_BIPED; i++)
+      CHECK(m->pair[state->contact[i].pair].external || state->contact[i].dist > -1e-3);
     for (int r = CAV_ROLE_RIGHT_FOOT; r <= CAV_ROLE_BACK_LEFT_FOOT; r++) {
       if (roles.body[r] < 0) continue;
       cav_object_pose(m, state, CAV_OBJECT_XBODY, roles.body[r], &at);
@@ -175,17 +177,20 @@ typedef struct oddity {
   int arms;      // pairs above
   double turned; // degrees
   double uneven; // m
+  double hips;   // m, half of the way between the legs, which then go sideways, too; 0: 0.1, and they do not
 } oddity;
 
-static int add_limb(char *text, int at, const char *name, double x, double y, double z, double length, double foot) {
+static int add_limb(char *text, int at, const char *name, double x, double y, double z, double length, double foot,
+                    const char *sideways) {
   return at + snprintf(text + at, (size_t)(ROOM - at),
-                       "<body name='%s0' pos='%g %g %g'><joint axis='0 1 0' range='-100 100'/>"
+                       "<body name='%s0' pos='%g %g %g'>%s<joint axis='0 1 0' range='-100 100'/>"
                        "<geom type='capsule' size='.03' fromto='0 0 0 0 0 %g'/>"
                        "<body name='%s1' pos='0 0 %g'><joint axis='0 1 0' range='-5 120'/>"
                        "<geom type='capsule' size='.03' fromto='0 0 0 0 0 %g'/>"
-                       "<body name='%s2' pos='0 0 %g'><joint axis='0 1 0' range='-60 60'/>"
-                       "<geom type='box' pos='%g 0 -.02' size='.08 .03 .01'/></body></body></body>",
-                       name, x, y, z, -length, name, -length, -length, name, -length, foot);
+                       "<body name='%s2' pos='0 0 %g'>%s<joint axis='0 1 0' range='-60 60'/>"
+                       "<geom type='box' pos='%g 0 -.02' size='.08 %g .01'/></body></body></body>",
+                       name, x, y, z, sideways, -length, name, -length, -length, name, -length, sideways, foot,
+                       *sideways ? .05 : .03);
 }
 
 static void write_odd(char *text, const oddity *o) {
@@ -199,16 +204,18 @@ static void write_odd(char *text, const oddity *o) {
     char name[8];
     double x = o->pairs > 1 ? .25 - .5 * p / (o->pairs - 1) : 0;
     snprintf(name, sizeof name, "a%d", p % 10);
-    at = add_limb(text, at, name, x, .1, -.02, .4, .04);
+    double y = o->hips > 0 ? o->hips : .1;
+    const char *sideways = o->hips > 0 ? "<joint axis='1 0 0' range='-40 40'/>" : "";
+    at = add_limb(text, at, name, x, y, -.02, .4, .04, sideways);
     *name = 'b';
-    at = add_limb(text, at, name, x + o->uneven, -.1, -.02, .4, .04);
+    at = add_limb(text, at, name, x + o->uneven, -y, -.02, .4, .04, sideways);
   }
   if (o->arms) {
     at += snprintf(text + at, (size_t)(ROOM - at),
                    "<body name='y' pos='0 0 .3'><joint axis='0 0 1' range='-50 50'/>"
                    "<geom type='box' size='.05 .1 .15' mass='8'/>");
-    at = add_limb(text, at, "c", 0, .16, .12, .2, 0);
-    at = add_limb(text, at, "d", 0, -.16, .12, .2, 0);
+    at = add_limb(text, at, "c", 0, .16, .12, .2, 0, "");
+    at = add_limb(text, at, "d", 0, -.16, .12, .2, 0, "");
     at += snprintf(text + at, (size_t)(ROOM - at),
                    "<body name='e' pos='0 0 .25'><geom type='sphere' size='.08'/></body></body>");
   }
@@ -243,14 +250,16 @@ static void check_oddities(void) {
   static const expectation legs = {"two legs", 0, CAV_BUILD_BIPED, BIPED("x", "x", NULL, "b02", "a02", NULL, NULL)};
   static const expectation four = {"four legs", 0, CAV_BUILD_QUADRUPED, QUADRUPED("x", "b02", "a02", "b12", "a12")};
   static const expectation none = {"none", 0, CAV_BUILD_NONE, {NULL}};
-  for (int turn = 0; turn < 4; turn++) check_odd(&(oddity){1, 1, 90 * turn, 0}, &man, NULL);
-  check_odd(&(oddity){1, 0, 0, 0}, &legs, NULL);
-  check_odd(&(oddity){2, 0, 0, 0}, &four, NULL);
+  for (int turn = 0; turn < 4; turn++) check_odd(&(oddity){1, 1, 90 * turn, 0, 0}, &man, NULL);
+  // feet inside each other: they stand apart
+  check_odd(&(oddity){1, 1, 90, 0, 0.04}, &man, NULL);
+  check_odd(&(oddity){1, 0, 0, 0, 0}, &legs, NULL);
+  check_odd(&(oddity){2, 0, 0, 0, 0}, &four, NULL);
   // real robots are uneven by millimetres; what is off by more than a twentieth of its size is no image
-  check_odd(&(oddity){1, 1, 0, 0.004}, &man, NULL);
-  check_odd(&(oddity){2, 0, 0, 0.004}, &four, NULL);
-  check_odd(&(oddity){1, 0, 0, 0.1}, &none, "no limbs in pairs");
-  check_odd(&(oddity){3, 0, 0, 0}, &none, "6 limbs reach the ground");
+  check_odd(&(oddity){1, 1, 0, 0.004, 0}, &man, NULL);
+  check_odd(&(oddity){2, 0, 0, 0.004, 0}, &four, NULL);
+  check_odd(&(oddity){1, 0, 0, 0.1, 0}, &none, "no limbs in pairs");
+  check_odd(&(oddity){3, 0, 0, 0, 0}, &none, "6 limbs reach the ground");
 }
 
 // ---------------------------------------------------------------- problem files

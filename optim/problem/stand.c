@@ -3,9 +3,10 @@
 /// model's own configuration), heights of all feet, the centre of mass over their middle, the height of the trunk, and, with
 /// small weights, the way from the model's own configuration. Legs that are straight there, whose length can only fall, are bent:
 /// the trunk comes down by a fixed fraction, and hinges start off towards the middle of their ranges. Joints stay in
-/// their ranges. Limbs that touch each other are the file's business, as in all postures.
+/// their ranges. Where links are inside each other so the feet of a biped go farther apart.
 #include "stand.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,8 +20,9 @@ static const double inside = 0.02;       // rad from a limit
 static const double length_weight = 100; // 1/m
 static const double joint_weight = 0.03, root_weight = 0.3;
 static const double tilt_weight = 30;
-static const double level = 1e-3; // m and rad: what a posture that stands may be off by
-enum { FEET = 4, MOST = 80 };
+static const double touching = 1e-3, clearance = 0.01; // m: links this deep in each other go apart, by so much more
+static const double level = 1e-3;                      // m and rad: what a posture that stands may be off by
+enum { FEET = 4, MOST = 80, OTHER_ROWS = 16 };         // OTHER_ROWS: beside one for each dof
 
 typedef struct stander {
   const cav_model *model;
@@ -30,6 +32,7 @@ typedef struct stander {
   double point[FEET][3], up[FEET][3]; // of the sole, and the vertical, in the frame of the foot's body
   int root;                           // body at the top of the tree
   double rise;                        // of the trunk over the feet that is wanted
+  double apart, width;                // feet of a biped, sideways: as wanted, 0 for wherever; as they are
   int nrow;
   double *q0, *q, *trial, *step;
 } stander;
@@ -179,8 +182,12 @@ static cav_status rows(stander *s, const double *q, double *row, cav_stand *stan
   stand->aside = hypot(com[0] - middle[0], com[1] - middle[1]);
   cav_object_pose(m, s->state, CAV_OBJECT_XBODY, s->root, &at);
   row[n++] = length_weight * (at.pos[2] - middle[2] - s->rise);
+  s->width = 0;
+  for (int i = 0; i < 2; i++) s->width += s->roles->left[i] * (x[1][i] - x[0][i]);
+  if (s->apart > 0) row[n++] = length_weight * (s->width - s->apart);
   cav_difference(m, s->q0, q, 1, s->step);
   for (int d = 0; d < m->nv; d++) row[n++] = holding(m, d) * s->step[d];
+  assert(n <= OTHER_ROWS + m->nv);
   s->nrow = n;
   return CAV_OK;
 }
@@ -215,7 +222,7 @@ static void solve(double *a, double *b, int n) {
 static cav_status iterate(stander *s, double damping, double *work, int *better, cav_stand *stand) {
   static const double difference = 1e-6;
   const cav_model *m = s->model;
-  int nv = m->nv, most = 16 + nv;
+  int nv = m->nv, most = OTHER_ROWS + nv;
   double *row = work, *moved = row + most, *jacobian = moved + most, *a = jacobian + (size_t)most * (size_t)nv,
          *b = a + (size_t)nv * (size_t)nv, *unit = b + nv;
   cav_status status = rows(s, s->q, row, stand);
@@ -256,7 +263,7 @@ static cav_status iterate(stander *s, double damping, double *work, int *better,
 
 static cav_status search(stander *s, cav_stand *stand) {
   enum { ITERATIONS = 100 };
-  int nv = s->model->nv, most = 16 + nv;
+  int nv = s->model->nv, most = OTHER_ROWS + nv;
   double *work = calloc((size_t)most * (size_t)(nv + 2) + (size_t)nv * (size_t)nv + 2 * (size_t)nv, sizeof *work);
   cav_status status = work ? CAV_OK : CAV_NO_MEMORY;
   double damping = 1e-3;
@@ -266,6 +273,33 @@ static cav_status search(stander *s, cav_stand *stand) {
     damping = better ? fmax(damping / 5, 1e-9) : damping * 5;
   }
   free(work);
+  return status;
+}
+
+// how deep links are inside each other at s->q
+static cav_status find_overlap(const stander *s, double *deepest) {
+  cav_state *state = s->state;
+  int contact = state->options.contact;
+  state->options.contact = 1;
+  cav_status status = cav_position(s->model, state, s->q);
+  state->options.contact = contact;
+  *deepest = 0;
+  for (int i = 0; i < state->ncontact && !status; i++)
+    if (!s->model->pair[state->contact[i].pair].external) *deepest = fmax(*deepest, -state->contact[i].dist);
+  return status;
+}
+
+// a posture; farther and farther apart while links are inside each other. Feet that cannot go farther stay
+static cav_status search_clear(stander *s, cav_stand *stand) {
+  enum { TRIES = 6 };
+  cav_status status = search(s, stand);
+  for (int i = 0; i < TRIES && !status && s->nfoot == 2; i++) {
+    double overlap;
+    status = find_overlap(s, &overlap);
+    if (status || overlap <= touching) break;
+    s->apart = s->width + overlap + clearance;
+    status = search(s, stand);
+  }
   return status;
 }
 
@@ -319,7 +353,7 @@ static cav_status stand_on_feet(const cav_model *m, cav_state *state, const cav_
   int contact = state->options.contact;
   state->options.contact = 0;
   cav_status status = prepare(&s);
-  if (!status) status = search(&s, stand);
+  if (!status) status = search_clear(&s, stand);
   state->options.contact = contact;
   if (!status && (stand->tilt > level || stand->uneven > level || stand->aside > level)) {
     snprintf(
