@@ -33,7 +33,7 @@ END
   echo "|---|---|---|---|"
   for seconds in 4 5 6 7 8 9 10; do row pendulum hinge $seconds; done
   for seconds in 2 3 4 6 8; do row cartpole hinge_1 $seconds; done
-  for seconds in 7 8; do row acrobot shoulder $seconds; done
+  for seconds in 5 6 7 8; do row acrobot shoulder $seconds; done
 } >"$work/swings.md"
 mv "$work/swings.md" tests/results/swings.md
 cat tests/results/swings.md

@@ -241,7 +241,9 @@ static void explain_differences(const report *r, cav_html *page) {
                        "to %s here, and centred ones for Ipopt alone.",
                        number(one, x[3]));
   else
-    cav_html_paragraph(page, "cavort takes the analytic ones of the dynamics for all that it does, never differences.");
+    cav_html_paragraph(page,
+                       "cavort takes the analytic ones of the dynamics; what has none, as some sensors in costs, is "
+                       "differenced by itself.");
 }
 
 static void advise_derivative(const report *r, cav_html *page) {
