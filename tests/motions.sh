@@ -4,6 +4,7 @@
 # solved anew, and the others stay, each with the commit it was measured at)
 # CAVORT_OTHERS=all tries the motions on models that no one here wrote, too, those of MuJoCo and dm_control in $CAVORT_SHARED_MODELS or
 # ../shared/models; rows of absent ones are left out.
+# CAVORT_RESULTS=DIR keeps the result folders as DIR/MOTION, for tests/replay.sh.
 set -eu
 cd "$(dirname "$0")/.."
 build=${1:-build}
@@ -14,13 +15,13 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 # number NAME SCALE FORMAT: a field of the last verdict
-number() { sed -n "s/^ *\"$1\": \([^,]*\),*$/\1/p" "$work/out/verdict.json" | awk -v s="$2" -v f="$3" '{ printf f, $1 * s }'; }
+number() { sed -n "s/^ *\"$1\": \([^,]*\),*$/\1/p" "$out/verdict.json" | awk -v s="$2" -v f="$3" '{ printf f, $1 * s }'; }
 
 # word NAME: a field that is true or false, as yes or no
-word() { sed -n "s/^ *\"$1\": \(true\|false\),*$/\1/p" "$work/out/verdict.json" | sed 's/true/yes/; s/false/no/'; }
+word() { sed -n "s/^ *\"$1\": \(true\|false\),*$/\1/p" "$out/verdict.json" | sed 's/true/yes/; s/false/no/'; }
 
 # tried EXPRESSION: of awk over the strategies that were tried: $1 name, $2 kept, $6 seconds
-tried() { awk -F , "NR > 1 && \$6 != \"\" { $1 } END { $2 }" "$work/out/strategies.csv"; }
+tried() { awk -F , "NR > 1 && \$6 != \"\" { $1 } END { $2 }" "$out/strategies.csv"; }
 
 # row MOTION [MODEL]
 row() {
@@ -32,13 +33,14 @@ row() {
     set -- "$1" "$(realpath --relative-to=. "$2")"
   fi
   motion=$1
+  out=${CAVORT_RESULTS:-$work}/$motion
   name=$2
   shift 2
   case "$chosen" in
     "  " | *" $motion "*) ;;
     *) grep -F "| $motion | $name |" tests/results/solve.md && return 0 ;;
   esac
-  "$build/problems/cavort" solve "problems/motions/$motion/problem.xml" -o "$work/out" --threads 1 --quiet "$@" || true
+  "$build/problems/cavort" solve "problems/motions/$motion/problem.xml" -o "$out" --threads 1 --quiet "$@" || true
   printf '| %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s |\n' "$motion" "$name" \
     "$(word certified)" "$(word achieved)" "$(number cost 1 %.4g)" "$(number optimality 1 %.0e)" "$(number hover_fraction 100 %.2f)" \
     "$(tried 'if ($2) print $1' '')" "$(tried 's += $6' 'printf "%.1f", s')" "$(number iterations 1 %d)" "$(number unactuated_force_max 1 %.0e)" \
