@@ -61,6 +61,23 @@ static void test_effort(void) {
   sample_free(&s);
 }
 
+// limits are those planned with: held at 0.72 of the control, and 2 angle + m g l sin(angle) / 8 = 0.78 of a servo's
+static void test_planned(void) {
+  static const char *const model[2] = {pendulum, servo};
+  const double share[2] = {9.81 * 0.5 * sin(0.3) / 2, 0.6 + 9.81 * 0.5 * sin(0.3) / 8};
+  for (int i = 0; i < 4; i++) {
+    sample s = sample_new(model[i / 2], 25, 0.02, CAV_ORDER_MIDPOINT);
+    s.problem.close_at_rest = 1;
+    s.problem.effort_limit = share[i / 2] + (i % 2 ? -0.01 : 0.01);
+    s.q[0] = 0.3;
+    for (int t = 0; t <= 25; t++) knot(&s, t)[0] = 0.3;
+    CHECK(verify(&s, NULL, NULL) == CAV_OK);
+    CHECK(s.verdict.certified == (i % 2 == 0));
+    CHECK_NEAR(s.verdict.limit_violation_max, i % 2 ? 0.01 : 0, 1e-12);
+    sample_free(&s);
+  }
+}
+
 // a wheel of 2 kg m^2 spun up at 3 rad/s^2 by a motor behind a gear of 4: its power is the moment times the mean speed
 static void test_rates(void) {
   static const char wheel[] =
@@ -159,6 +176,7 @@ static void test_cords(void) {
 
 int main(void) {
   test_effort();
+  test_planned();
   test_rates();
   test_servo();
   test_range();

@@ -230,6 +230,21 @@ says err "gains.csv"
 run 2 solve problem.xml -o .
 says err "overwrite"
 
+# --- a servo at the end of its control ---
+
+cat >servo.xml <<'TEXT'
+<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="j" axis="0 1 0" damping="0.1"/>
+<geom type="capsule" fromto="0 0 0 0 0 -0.5" size="0.03" mass="1"/></body></worldbody>
+<actuator><position name="p" joint="j" kp="20" kv="2" ctrlrange="-1 1" forcerange="-50 50"/></actuator></mujoco>
+TEXT
+cat >told.xml <<'TEXT'
+<problem name="told" model="servo.xml"><horizon duration="0.6" timestep="0.025"/><start qpos="0"/><goal qpos="0.9"/>
+<cost><posture dofs="all" at="end" weight="900"/></cost></problem>
+TEXT
+run 0 solve told.xml
+run 0 explain told.result
+says out "effort of actuator 'p'"
+
 # --- what is given where something else is wanted: what it is, and the command that was meant ---
 
 run 2 explain problem.xml

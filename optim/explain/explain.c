@@ -108,6 +108,7 @@ static int objects(const cav_problem *p, cav_binding_kind kind) {
 /// Components of a row of that kind and object.
 static int components(const cav_problem *p, const cav_binding *row) {
   if (row->kind == CAV_BINDING_UNACTUATED) return p->model->nv;
+  if (row->kind == CAV_BINDING_EFFORT) return 2; // the force, and the control of a servo
   if (row->kind != CAV_BINDING_TERM) return 1;
   int i = hard_term(p, row->object);
   if (i < 0) return 0;

@@ -135,7 +135,8 @@ static cav_status gait(const cav_problem *problem, cav_strategy *strategy) {
   // a model that is not its own mirror image has no gait of this kind
   cav_error unlike;
   double asymmetry;
-  cav_status mirrored = status == CAV_OK ? cav_mirror_find(problem, w.side, w.image, link, &asymmetry, &unlike) : status;
+  cav_status mirrored =
+      status == CAV_OK ? cav_mirror_find(problem, w.side, w.image, link, &asymmetry, &unlike) : status;
   if (mirrored == CAV_NO_MEMORY) status = mirrored;
   if (mirrored == CAV_OK) status = find_support(&w);
   if (mirrored == CAV_OK && status == CAV_OK) find_gait(&w, travel[along], strategy);

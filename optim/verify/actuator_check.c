@@ -2,7 +2,8 @@
 /// of one unit of effort. The input is the control, or the integrated activation of an actuator that has one; what an
 /// effort takes of it is (force - bias) / gain, against the limits of the input; the force itself against those of the
 /// force. An actuator without bias gives what its limits of input and force let through, whatever its length and
-/// velocity are. Muscles, moments that vary, and limited controls behind gains that vary are refused by name.
+/// velocity are. A motion keeps to the fraction of the limits that it is planned with (effort_limit). Muscles, moments
+/// that vary, and limited controls behind gains that vary are refused by name.
 #include <math.h>
 #include <stdio.h>
 
@@ -75,11 +76,14 @@ void cav_verification_effort(const cav_verification *verification, int t, int ac
   const cav_actuator *a = model->actuator + actuator;
   double range[2], scale;
   cav_verification_actuator_range(model, actuator, range, &scale);
+  const double planned = verification->problem->effort_limit;
+  range[0] *= planned, range[1] *= planned;
   cav_metric_note(metric, fmax(range[0] - effort, effort - range[1]) / scale, t,
                   "actuator %.60s (%d) at %.4g of %.4g .. %.4g%s", a->name, actuator, effort, range[0], range[1],
                   suffix);
   if (a->bias == CAV_BIAS_NONE || !input_range(a, range)) return;
   double input = servo_input(verification, actuator, effort, v, moment), most = fmax(fabs(range[0]), fabs(range[1]));
+  range[0] *= planned, range[1] *= planned;
   cav_metric_note(metric, fmax(range[0] - input, input - range[1]) / (most > 0 ? most : 1), t,
                   "servo %.60s (%d), control at %.4g of %.4g .. %.4g%s", a->name, actuator, input, range[0], range[1],
                   suffix);
