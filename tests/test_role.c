@@ -155,6 +155,9 @@ static void check_model(const char *path, const expectation *e) {
   cav_load_options options = cav_load_options_default();
   options.floating = e->floating;
   cav_model *m = cav_model_load_with(path, &options, &error);
+#ifndef CAVORT_HAVE_QHULL
+  if (!m && strstr(error.text, "needs Qhull")) return; // robots with meshes, in a build without them
+#endif
   if (!CHECK(m != NULL)) {
     fprintf(stderr, "    %s\n", error.text);
     return;
