@@ -12,6 +12,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "dense.h"
+
 static const double straight = 0.93;   // leg's length over that of its parts
 static const double biped_bent = 0.96; // of the height of straight legs
 static const double quadruped_bent = 0.75;
@@ -198,26 +200,6 @@ static double square(const double *row, int n) {
   return sum;
 }
 
-// solves A x = b, A symmetric and positive definite [n n], in place
-static void solve(double *a, double *b, int n) {
-  for (int j = 0; j < n; j++) {
-    for (int k = 0; k < j; k++) a[j * n + j] -= a[j * n + k] * a[j * n + k];
-    a[j * n + j] = sqrt(fmax(a[j * n + j], 1e-14));
-    for (int i = j + 1; i < n; i++) {
-      for (int k = 0; k < j; k++) a[i * n + j] -= a[i * n + k] * a[j * n + k];
-      a[i * n + j] /= a[j * n + j];
-    }
-  }
-  for (int i = 0; i < n; i++) {
-    for (int k = 0; k < i; k++) b[i] -= a[i * n + k] * b[k];
-    b[i] /= a[i * n + i];
-  }
-  for (int i = n - 1; i >= 0; i--) {
-    for (int k = i + 1; k < n; k++) b[i] -= a[k * n + i] * b[k];
-    b[i] /= a[i * n + i];
-  }
-}
-
 // one step from s->q with that damping; work [nrow (nv+2) + nv^2 + 2 nv]. *better: whether it was taken
 static cav_status iterate(stander *s, double damping, double *work, int *better, cav_stand *stand) {
   static const double difference = 1e-6;
@@ -238,18 +220,21 @@ static cav_status iterate(stander *s, double damping, double *work, int *better,
   if (status) return status;
   for (int d = 0; d < nv; d++) {
     for (int e = 0; e <= d; e++) {
-      a[d * nv + e] = d == e ? damping : 0;
-      for (int i = 0; i < n; i++) a[d * nv + e] += jacobian[i * nv + d] * jacobian[i * nv + e];
+      a[e * nv + d] = d == e ? damping : 0;
+      for (int i = 0; i < n; i++) a[e * nv + d] += jacobian[i * nv + d] * jacobian[i * nv + e];
     }
     b[d] = 0;
     for (int i = 0; i < n; i++) b[d] -= jacobian[i * nv + d] * row[i];
   }
   for (int d = 0; d < nv; d++) {
     if (!is_pinned(s, d, b[d])) continue;
-    for (int e = 0; e < nv; e++) a[d > e ? d * nv + e : e * nv + d] = d == e;
+    for (int e = 0; e < nv; e++) a[d > e ? e * nv + d : d * nv + e] = d == e;
     b[d] = 0;
   }
-  solve(a, b, nv);
+  *better = cav_dense_factor(nv, nv - 1, a, nv);
+  if (!*better) return CAV_OK;
+  cav_dense_solve_lower(nv, nv - 1, a, nv, 1, b, nv);
+  cav_dense_solve_upper(nv, nv - 1, a, nv, 1, b, nv);
   cav_integrate(m, s->q, b, 1, s->trial);
   clip(m, s->trial);
   cav_stand after;

@@ -20,12 +20,12 @@ typedef enum cure {
   GAP,      ///< contacts see the gap where a step ends
   STEP,     ///< half the step
   SOFTNESS, ///< harder contacts at the end
-  EFFORT,   ///< half of what planning keeps from the actuators is given
+  EFFORT,   ///< half of the usual reserve of the actuators is given; less than that was asked for, and stays
   SLACK     ///< more of it is kept, for feedback
 } cure;
 
 enum { CURES = 3 };
-static const double force_weight = 1, heavier = 10, harder = 4, slack = 0.75;
+static const double force_weight = 1, heavier = 10, harder = 4, slack = 0.75, usual_effort = 0.8;
 
 /// What a motion misses first, in the order of a certificate (METHOD.md, 6), and its cures.
 static const cure *cures_of(const cav_verdict *v) {
@@ -120,7 +120,7 @@ static cav_status change(const cav_problem *p, cure c, cav_strategy *s) {
       s->schedule.last.softness /= harder;
       break;
     case EFFORT:
-      if (effort < 0.99) s->effort_limit = (1 + effort) / 2;
+      if (effort >= usual_effort && effort < 0.99) s->effort_limit = (1 + effort) / 2;
       break;
     case SLACK:
       s->effort_limit = slack * effort;
