@@ -213,6 +213,11 @@ static void test_repair(void) {
   CHECK(cav_strategy_repair(&p, &once, &hangs, 1, &twice, &found) == CAV_OK && found && twice.term[0].weight == 9000);
   CHECK(twice.term[1].weight == 200 && !strcmp(twice.changed, "weights of goals 10 times, <limits effort=\"0.9\"/>"));
   cav_strategy_clear(&once), cav_strategy_clear(&twice);
+  // less effort than usual was asked for
+  p.effort_limit = 0.3;
+  CHECK(cav_strategy_repair(&p, &strategy[0], &hangs, 0, &once, &found) == CAV_OK && !strstr(once.changed, "effort"));
+  cav_strategy_clear(&once);
+  p.effort_limit = 0.8;
   hangs.achieved = 1;
   CHECK(cav_strategy_repair(&p, &strategy[0], &hangs, 0, &once, &found) == CAV_OK && !found);
   CHECK(p.nterm == 2 && terms[0].weight == 900 && terms[1].weight == 200 && p.effort_limit == 0.8);
