@@ -25,7 +25,7 @@ typedef enum cure {
 } cure;
 
 enum { CURES = 3 };
-static const double force_weight = 1, heavier = 10, harder = 4, slack = 0.75, usual_effort = 0.8;
+static const double force_weight = 1, heavier = 10, harder = 4, slack = 0.75;
 
 /// What a motion misses first, in the order of a certificate (METHOD.md, 6), and its cures.
 static const cure *cures_of(const cav_verdict *v) {
@@ -120,7 +120,7 @@ static cav_status change(const cav_problem *p, cure c, cav_strategy *s) {
       s->schedule.last.softness /= harder;
       break;
     case EFFORT:
-      if (effort >= usual_effort && effort < 0.99) s->effort_limit = (1 + effort) / 2;
+      if (effort >= cav_problem_default(p->model).effort_limit && effort < 0.99) s->effort_limit = (1 + effort) / 2;
       break;
     case SLACK:
       s->effort_limit = slack * effort;
