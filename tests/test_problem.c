@@ -129,9 +129,12 @@ static void check_wheels(void) {
 }
 
 /// Every quantity is a cost by its element, and a constraint where the table says so and nowhere else; read, written
-/// and read.
+/// and read. One's own is none of files.
 static void check_quantities(void) {
-  for (cav_quantity k = 0; k < CAV_QUANTITY_TYPES; k++) {
+  cav_error own = {0};
+  write_in("problem.xml", HEAD "<cost><user name='it' weight='2'/></cost>" TAIL);
+  CHECK(!cav_problem_load(path, NULL, &own) && own.status == CAV_BAD_INPUT && strstr(own.text, "<user>"));
+  for (cav_quantity k = 0; k < CAV_QUANTITY_USER; k++) {
     const cav_quantity_rule *rule = cav_quantity_rule_of(k);
     const char *what = k == CAV_QUANTITY_SENSOR ? " type='framepos' site='eye'" : "";
     char text[600];

@@ -234,6 +234,12 @@ int cav_state_evaluated(const cav_state *state) {
          cav_options_same(&state->options, &state->work->options, CAV_STAGE_VELOCITY);
 }
 
+void cav_state_point(const cav_state *state, const double **q, const double **v, const double **v_next) {
+  if (q) *q = state->work->q;
+  if (v) *v = state->work->v;
+  if (v_next) *v_next = state->work->v_next;
+}
+
 cav_status cav_inverse_from(const cav_model *model, cav_state *state, cav_stage unchanged, const double *q,
                             const double *v, const double *v_next, double *u) {
   cav_workspace *w = state->work;

@@ -220,6 +220,10 @@ CAV_API cav_status cav_sensor_derivatives(const cav_model *model, cav_state *sta
 /// It may call what uses scratch of the state, such as cav_sensor_read, and changes nothing else.
 typedef void (*cav_readout)(const cav_model *model, cav_state *state, void *context, double *value);
 
+/// The point of the state's last cav_inverse: q [nq], its quaternions brought to unit length, v and v_next [nv]. Theirs is
+/// the state's memory, until its next evaluation. NULL = not needed.
+CAV_API void cav_state_point(const cav_state *state, const double **q, const double **v, const double **v_next);
+
 /// Staged finite differences of any readout of n values. step 0: chosen by coordinate scale. method is one of the two
 /// differences (CAV_BAD_INPUT otherwise). value [n] at the point; d_dq, d_dv, d_dv_next [n*nv] row-major, NULL = not
 /// needed. dynamics/METHOD.md, 7. A pass over v or v_next repeats no position work. The state is left at the point

@@ -32,7 +32,8 @@ typedef enum cav_quantity {
 #define CAV_QUANTITY_MEMBER(quantity, ...) CAV_QUANTITY_##quantity,
   CAV_QUANTITIES(CAV_QUANTITY_MEMBER)
 #undef CAV_QUANTITY_MEMBER
-      CAV_QUANTITY_TYPES
+      CAV_QUANTITY_USER, ///< one's own: term->user. In code alone: files cannot name a function
+  CAV_QUANTITY_TYPES
 } cav_quantity;
 
 /// What a quantity has values of.
@@ -41,20 +42,84 @@ typedef enum cav_values_of {
   CAV_OF_POSTURE,   ///< the dofs that a term selects, against a configuration
   CAV_OF_RATE,      ///< the dofs that a term selects
   CAV_OF_ACTUATORS, ///< all actuators
-  CAV_OF_CONTACTS   ///< the contacts of a knot, or those of term->body
+  CAV_OF_CONTACTS,  ///< the contacts of a knot, or those of term->body
+  CAV_OF_USER       ///< term->user, or one component of it
 } cav_values_of;
 
 /// What holds for all terms of a quantity.
 typedef struct cav_quantity_rule {
   const char *name; ///< its element in problem files
   cav_values_of of;
-  cav_sensor_stage reads; ///< of sensors: what cav_sensor_rule_of tells
+  cav_sensor_stage reads; ///< of sensors: what cav_sensor_rule_of tells; of one's own: what it says itself
   int hard;               ///< 1: a constraint can be of it, too
   const char *unit, *words, *text;
 } cav_quantity_rule;
 
 /// quantity < CAV_QUANTITY_TYPES.
 CAV_API const cav_quantity_rule *cav_quantity_rule_of(cav_quantity quantity);
+
+/// What a quantity of one's own is read off: one knot, at which the state holds cav_inverse. All of it lasts as long as the
+/// call. Contacts are state->contact [state->ncontact], their forces impulse/timestep, N; efforts [nu]: cav_actuation of
+/// u. What uses scratch of the state alone may be called with it (cav_sensor_read, cav_object_pose, cav_actuation,
+/// cav_actuator_length), no evaluation. At a knot without forces, the last of a motion that does not close at rest, v_next
+/// is v, and a quantity that reads CAV_READS_ACCELERATION is not asked.
+typedef struct cav_knot_view {
+  const cav_model *model;
+  cav_state *state;
+  double time;     ///< s: that of windows and targets, a fraction of the problem's duration where that is free
+  double timestep; ///< s
+  const double *q, *v, *v_next; ///< [nq], [nv], [nv]: accelerations are (v_next - v)/timestep
+  const double *u;              ///< [nv] N or N m
+} cav_knot_view;
+
+/// Derivatives of dim values by all that they are made of, row-major, zeros at first; what a value has of one through
+/// another is added by the library: of u and of the impulses through q, v and v_next. Velocities and impulses are that
+/// of the view, positions are moved in the tangent, q (+) e_j.
+typedef struct cav_view_jacobian {
+  double *dq, *dv, *dv_next, *du; ///< [dim*nv]
+  double *dimpulse;               ///< [dim*6*ncontact] by impulse[k] of contact i: column 6*i + k, k < contact[i].dim
+} cav_view_jacobian;
+
+/// Writes the values [dim] at a knot; returns 0. Anything else ends the solve with CAV_BAD_INPUT. A value that is not
+/// finite refuses a step of the optimiser there, and is an error (CAV_NOT_FINITE) at a motion that it has to be taken
+/// at. Called from all threads of a solve at once, so it changes nothing but values, and the same view gives the same
+/// bits.
+typedef int (*cav_user_value)(void *context, const cav_knot_view *view, double *value);
+
+/// Adds the derivatives at a knot, likewise. cav_derivatives has been called: cav_contact_derivatives and
+/// cav_sensor_derivatives, for what of contacts (gap, slip) and sensors a value is made of, may be called with the
+/// view's state; what they give goes into dq, dv and dv_next.
+typedef int (*cav_user_jacobian)(void *context, const cav_knot_view *view, const cav_view_jacobian *jacobian);
+
+enum { CAV_USER_DIM_MAX = 64 }; ///< most values of a quantity of one's own
+
+/// A quantity of one's own (CAV_QUANTITY_USER): terms, reports, explanations and certificates treat it as those of the
+/// list. Its second derivatives are those of the Jacobian, by differences, where the solver takes any (Ipopt, the last
+/// programmes); without Jacobian only the squares of Gauss and Newton. optim/METHOD.md, 4.
+typedef struct cav_user_quantity {
+  const char *name;       ///< what reports and errors call it, never NULL
+  const char *unit;       ///< of its values; NULL: none
+  int dim;                ///< number of values, 1 .. CAV_USER_DIM_MAX
+  cav_sensor_stage reads; ///< the last stage that it looks at: of q alone, of q and v_next, or of anything
+  cav_user_value value;
+  /// NULL: by differences of value, as of all that has no closed form: 3 nv evaluations of the dynamics a knot, one-sided
+  /// with a relative step of 1e-7 (positions) and 1e-6 (velocities), for Ipopt centred with 1e-5 and 1e-4
+  /// (cav_readout_differentiate). Right to some 1e-6 or 1e-9 where value is smooth; at a kink the derivative of one of
+  /// its sides, or of Ipopt's their mean.
+  cav_user_jacobian jacobian;
+  void *context; ///< the functions' first argument
+  double within; ///< usual tolerance of a goal that states none, in its unit; 0: there is none
+} cav_user_quantity;
+
+/// Largest relative difference of a quantity's Jacobian from centred differences of its values at a point q [nq], v and
+/// v_next [nv] under the state's options, over the largest entry of its row (1e-3 of the largest of all rows at least);
+/// where: number of the value and the dof of the worst entry, and whether that is by q (0), v (1) or v_next (2); may be
+/// NULL. The state is left at the point. CAV_BAD_INPUT: the quantity has no Jacobian, or is refused as a term;
+/// CAV_NOT_SUPPORTED: the model has no analytic derivatives (cav_derivatives_missing), so the Jacobian is not used;
+/// CAV_NOT_FINITE, CAV_NO_MEMORY.
+CAV_API cav_status cav_user_quantity_check(const cav_user_quantity *quantity, cav_state *state, const double *q,
+                                           const double *v, const double *v_next, double *error_relative, int where[3],
+                                           cav_error *error);
 
 /// What a cost makes of a residual x, value minus target over scale.
 typedef enum cav_norm {
@@ -85,19 +150,19 @@ typedef struct cav_term {
   const char *name; ///< for logs and explanations; "" is fine
   cav_quantity quantity;
   cav_term_use use;
-  cav_sensor sensor; ///< CAV_QUANTITY_SENSOR: from the model or declared by the problem
-  int component;     ///< sensor component, -1: all
+  cav_sensor sensor;             ///< CAV_QUANTITY_SENSOR: from the model or declared by the problem
+  const cav_user_quantity *user; ///< CAV_QUANTITY_USER: borrowed; NULL for others
+  int component;                 ///< component of a sensor or of user, -1: all
   cav_dof_set dofs;
-  int joint;       ///< CAV_DOFS_ONE
-  double from, to; ///< window, s; equal: one knot (the nearest). to < 0: the end
-  double weight;   ///< cost
-  cav_norm norm;   ///< cost
-  int body;        ///< over contacts: those of this body's link alone; 0: all
-  double scale;    ///< values are divided by it, > 0, unit of the quantity
-  const double
-      *target;   ///< constant: sensors [sensor.dim], all of them even if one component counts; configurations a q
-                 ///< [nq]; rates [nv]. NULL: zeros (quaternion: identity; configuration: the goal)
-  int nwaypoint; ///< 0, or target is [nwaypoint*dim], linear between times, constant before and after
+  int joint;            ///< CAV_DOFS_ONE
+  double from, to;      ///< window, s; equal: one knot (the nearest). to < 0: the end
+  double weight;        ///< cost
+  cav_norm norm;        ///< cost
+  int body;             ///< over contacts: those of this body's link alone; 0: all
+  double scale;         ///< values are divided by it, > 0, unit of the quantity
+  const double *target; ///< constant: sensors [sensor.dim], user [user->dim], all of them even if one component counts;
+      ///< configurations a q [nq]; rates [nv]. NULL: zeros (quaternion: identity; configuration: the goal)
+  int nwaypoint;               ///< 0, or target is [nwaypoint*dim], linear between times, constant before and after
   const double *waypoint_time; ///< [nwaypoint], s, increasing
   double within; ///< tolerance of the target, in the unit of the quantity: the motion achieves it if off by at most
                  ///< this. 0: a usual one for goals, at one time or held over a window, none for running costs
@@ -245,7 +310,7 @@ CAV_API void cav_problem_free(cav_problem *problem);
 
 /// Writes a problem such that reading it gives the same: poses as numbers, every term spelt out. model_path is written
 /// as it stands (NULL: problem->model_path). Replaces the file atomically. CAV_BAD_INPUT: path cannot be written, or a
-/// term looks at a body, site or geom without a name.
+/// term looks at a body, site or geom without a name, or is of a quantity of one's own.
 CAV_API cav_status cav_problem_write(const char *path, const cav_problem *problem, const char *model_path,
                                      cav_error *error);
 

@@ -257,7 +257,8 @@ CAV_API cav_status cav_optimiser_solve(cav_optimiser *optimiser, int first_stage
 /// At most so many Gauss-Newton iterations at the last stage's law, then an update of the multipliers (augmented
 /// Lagrangian). From the second call on allocates nothing unless more touches than ever before. Each costs a
 /// linearisation, a factor and an evaluation. It ends before where no step decreases the merit. CAV_OK, CAV_INTERRUPTED,
-/// CAV_NOT_FINITE, CAV_NO_MEMORY; CAV_BAD_INPUT for iterations < 1. last, of the last iteration, may be NULL.
+/// CAV_NOT_FINITE, CAV_NO_MEMORY; CAV_BAD_INPUT for iterations < 1, or where a quantity of one's own refuses. last, of
+/// the last iteration, may be NULL.
 CAV_API cav_status cav_optimiser_iterate(cav_optimiser *optimiser, int iterations, cav_progress *last);
 
 /// Takes so many knots off the front and starts the rest at q [nq], v [nv], both NULL: as planned there. The knots

@@ -58,11 +58,11 @@ static void term_origin(const cav_transcription *tr, int t, int i, cav_binding *
     const cav_term *term = &tr->problem->term[k];
     hard += term->use != CAV_USE_COST;
     if (term->use == CAV_USE_COST || cav_term_weight(tr, term, t) == 0) continue;
-    int dim = cav_term_dim(term), sensor = term->quantity == CAV_QUANTITY_SENSOR;
+    int dim = cav_term_dim(term), reading = cav_term_is_reading(term);
     b->object = hard;
-    b->component = sensor && term->component >= 0 ? term->component : i;
-    if (sensor && i < dim) return;
-    for (int d = 0; !sensor && d < tr->nv; d++) {
+    b->component = reading && term->component >= 0 ? term->component : i;
+    if (reading && i < dim) return;
+    for (int d = 0; !reading && d < tr->nv; d++) {
       b->component = d;
       if (cav_dof_selected(tr, term, d) && i-- == 0) return;
     }

@@ -113,6 +113,7 @@ static int components(const cav_problem *p, const cav_binding *row) {
   int i = hard_term(p, row->object);
   if (i < 0) return 0;
   const cav_term *term = &p->term[i];
+  if (term->quantity == CAV_QUANTITY_USER) return term->user->dim;
   return term->quantity == CAV_QUANTITY_SENSOR ? term->sensor.dim : p->model->nv;
 }
 
@@ -254,17 +255,22 @@ static void tell_term(const cav_problem *p, const cav_binding *row, char *out, s
   const cav_term *term = &p->term[hard_term(p, row->object)];
   char of[160] = "";
   const char *which = "";
+  char number[32] = "";
   if (term->quantity == CAV_QUANTITY_SENSOR) {
     tell_sensor(p->model, &term->sensor, of, sizeof of);
     if (term->sensor.dim > 1) which = component[row->component & 3];
+  } else if (term->quantity == CAV_QUANTITY_USER) {
+    snprintf(number, sizeof number, "value %d", row->component);
+    if (term->user->dim > 1) which = number;
   } else {
     of[0] = ',', of[1] = ' ';
     tell_dof(p->model, row->component, of + 2, sizeof of - 2);
   }
   const char *kind = term->quantity == CAV_QUANTITY_SENSOR ? cav_sensor_rule_of(term->sensor.type)->name
+                     : term->quantity == CAV_QUANTITY_USER ? term->user->name
                                                            : cav_quantity_rule_of(term->quantity)->name;
   const char *name = term_name(p, row->object);
-  snprintf(out, size, "constraint%s%.60s%s, %s%s%s%s", *name ? " '" : "", name, *name ? "'" : "", kind, of,
+  snprintf(out, size, "constraint%s%.60s%s, %.60s%s%s%s", *name ? " '" : "", name, *name ? "'" : "", kind, of,
            *which ? ", " : "", which);
 }
 
@@ -309,10 +315,14 @@ static void tell_subject(const inquiry *in, const cav_binding *row, char *out, s
 /// What a component of a term is held against at a knot, in its unit; NAN where it has no number of its own: rotations.
 static double target_of(const inquiry *in, const cav_term *term, const cav_binding *row) {
   const cav_model *m = in->model;
-  double time = row->knot * in->problem->timestep, one[CAV_SENSOR_DIM_MAX];
+  double time = row->knot * in->problem->timestep, one[CAV_USER_DIM_MAX];
   if (term->quantity == CAV_QUANTITY_SENSOR) {
     if (term->sensor.dim == 4) return NAN;
     cav_term_target(term, time, term->sensor.dim, one);
+    return one[row->component];
+  }
+  if (term->quantity == CAV_QUANTITY_USER) {
+    cav_term_target(term, time, term->user->dim, one);
     return one[row->component];
   }
   int posture = term->quantity == CAV_QUANTITY_CONFIGURATION, n = posture ? m->nq : m->nv, at = row->component;

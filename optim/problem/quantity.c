@@ -6,7 +6,9 @@
 
 #define RULE(quantity, element, of, reads, hard, unit, words, text) \
   [CAV_QUANTITY_##quantity] = {#element, CAV_OF_##of, CAV_READS_##reads, hard, unit, words, text},
-static const cav_quantity_rule rules[CAV_QUANTITY_TYPES] = {CAV_QUANTITIES(RULE)};
+static const cav_quantity_rule rules[CAV_QUANTITY_TYPES] = {
+    CAV_QUANTITIES(RULE)[CAV_QUANTITY_USER] = {"user", CAV_OF_USER, CAV_READS_ACCELERATION, 1, "its own",
+                                               "quantity of one's own", "what a function of the caller's measures"}};
 
 const cav_quantity_rule *cav_quantity_rule_of(cav_quantity quantity) {
   assert(quantity < CAV_QUANTITY_TYPES);
@@ -15,6 +17,7 @@ const cav_quantity_rule *cav_quantity_rule_of(cav_quantity quantity) {
 
 cav_sensor_stage cav_term_stage(const cav_term *term) {
   int sensor = term->quantity == CAV_QUANTITY_SENSOR;
+  if (term->quantity == CAV_QUANTITY_USER) return term->user->reads;
   return sensor ? cav_sensor_rule_of(term->sensor.type)->stage : cav_quantity_rule_of(term->quantity)->reads;
 }
 

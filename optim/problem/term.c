@@ -469,6 +469,7 @@ static cav_status read_values(const cav_problem_reader *reader, const cav_xml_no
     case CAV_OF_CONTACTS:
       return read_touch(reader, node, term);
     case CAV_OF_ACTUATORS:
+    case CAV_OF_USER:
       break;
   }
   return CAV_OK;

@@ -124,6 +124,7 @@ static int is_running(const cav_problem *p, const cav_term *term) {
 }
 
 static int write_term(FILE *out, const cav_problem *p, const cav_term *term) {
+  if (term->quantity == CAV_QUANTITY_USER) return 0;
   const char *element = cav_quantity_rule_of(term->quantity)->name;
   fprintf(out, "    <%s", element);
   if (term->quantity == CAV_QUANTITY_SENSOR) {
@@ -171,7 +172,7 @@ static int has_running(const cav_problem *p, cav_quantity quantity) {
 static void write_absent(FILE *out, const cav_problem *p) {
   cav_term term[CAV_DEFAULT_TERMS];
   int n = cav_problem_default_terms(term, CAV_DEFAULT_TERMS);
-  for (cav_quantity quantity = 0; quantity < CAV_QUANTITY_TYPES; quantity++) {
+  for (cav_quantity quantity = 0; quantity < CAV_QUANTITY_USER; quantity++) {
     int absent = 0;
     for (int i = 0; i < n; i++) absent |= term[i].quantity == quantity && !has_running(p, quantity);
     if (absent) fprintf(out, "    <%s weight=\"0\"/>\n", cav_quantity_rule_of(quantity)->name);
@@ -341,6 +342,11 @@ cav_status cav_problem_write(const char *path, const cav_problem *problem, const
   if (bad < 0) return cav_file_end(&file, error);
   cav_file_abandon(&file);
   const char *name = problem->term[bad].name ? problem->term[bad].name : "";
+  if (problem->term[bad].quantity == CAV_QUANTITY_USER)
+    return cav_file_fail(error, CAV_BAD_INPUT, 0,
+                         "%s: not written: term %d '%s' is of a quantity of one's own, '%s', and a file cannot name a "
+                         "function; leave the term out and add it in code after reading",
+                         path, bad, name, problem->term[bad].user->name);
   return cav_file_fail(error, CAV_BAD_INPUT, 0,
                        "%s: not written: term %d '%s' looks at something without a name; name it in the model", path,
                        bad, name);

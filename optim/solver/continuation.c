@@ -68,7 +68,8 @@ static double done(const cav_solve_run *run) {
 int cav_run_stop(void *context) {
   const cav_solve_run *run = context;
   const cav_solve_options *o = run->options;
-  return (o->stop && o->stop(o->stop_context)) || cav_clock() >= run->deadline;
+  int refused = run->tr && run->tr->failure.status == CAV_BAD_INPUT;
+  return refused || (o->stop && o->stop(o->stop_context)) || cav_clock() >= run->deadline;
 }
 
 int cav_run_report(void *context, double step, double radius) {

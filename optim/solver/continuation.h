@@ -21,6 +21,7 @@ typedef struct cav_solve_run {
   int measured;                 ///< optimality and the rows' multipliers are those of at
   double optimality;            ///< predicted decrease of the cost over the cost
   cav_status failed;            ///< what went wrong in the report, CAV_OK: nothing
+  cav_error refusal;            ///< of a quantity of one's own, which ended the solve
   double start;                 ///< s
   double deadline;              ///< s, infinite: none
   int begin;                    ///< iterations before this call
@@ -48,6 +49,10 @@ int cav_run_feedback(void *run, int trial, int trials);
 
 /// Whether somebody asks for the end; context is the run. Transcription's stop.
 int cav_run_stop(void *run);
+
+/// Status of a run that ended with this one: a refusal of a quantity of one's own goes before it, where that is why, with
+/// its text in error. solution.c.
+cav_status cav_run_refused(const cav_solve_run *run, cav_status status, cav_error *error);
 
 /// Makes a run at its beginning: the guess, the start or the options' checkpoint; error says why not. Closed whatever
 /// this returns. run must stay where it is. solution.c.

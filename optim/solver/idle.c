@@ -123,6 +123,7 @@ static void keep_asked(const marks *a, const cav_term *term) {
   const cav_model *m = a->problem->model;
   cav_values_of of = cav_quantity_rule_of(term->quantity)->of;
   if (of == CAV_OF_SENSOR) keep_sensed(a, &term->sensor);
+  if (of == CAV_OF_USER) keep_all(a); // what it looks at it alone knows, by the numbers of this model
   if (of == CAV_OF_CONTACTS && term->body > 0) keep_object(a, CAV_OBJECT_BODY, term->body);
   for (int d = 0; (of == CAV_OF_POSTURE || of == CAV_OF_RATE) && d < m->nv; d++) {
     if (!cav_term_selects(m, term, d)) continue;
@@ -524,7 +525,7 @@ static void renumber_row(const cav_idle *idle, cav_binding *row) {
       for (int i = 0; i < idle->whole->nterm; i++) {
         const cav_term *term = &idle->whole->term[i];
         hard += term->use != CAV_USE_COST;
-        if (hard != row->object || term->use == CAV_USE_COST || term->quantity == CAV_QUANTITY_SENSOR) continue;
+        if (hard != row->object || term->use == CAV_USE_COST || cav_term_is_reading(term)) continue;
         row->component = index_of(m->nv, part->dof, row->component);
       }
       break;

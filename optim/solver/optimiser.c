@@ -67,6 +67,7 @@ static void begin(cav_optimiser *o) {
   run->deadline = o->options.max_seconds > 0 ? run->start + o->options.max_seconds : INFINITY;
   run->begin = run->solution->iterations;
   run->failed = CAV_OK;
+  run->refusal = run->tr->failure = (cav_error){0};
 }
 
 /// Values at the motion, whoever asks for the end.
@@ -97,7 +98,7 @@ cav_status cav_optimiser_solve(cav_optimiser *o, int first_stage, cav_progress *
   cav_status end = evaluate(run);
   run->region.radius = 0;
   if (last) *last = run->last;
-  return status == CAV_OK ? end : status;
+  return cav_run_refused(run, status == CAV_OK ? end : status, error);
 }
 
 cav_status cav_optimiser_iterate(cav_optimiser *o, int iterations, cav_progress *last) {
@@ -118,7 +119,7 @@ cav_status cav_optimiser_iterate(cav_optimiser *o, int iterations, cav_progress 
   run->region.single = 0;
   if (status == CAV_OK) cav_transcription_multipliers(run->tr);
   if (last) *last = run->last;
-  return status;
+  return cav_run_refused(run, status, NULL);
 }
 
 static int all_finite(const double *x, int n) {

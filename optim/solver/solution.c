@@ -94,7 +94,10 @@ static cav_status check(const cav_problem *p, const cav_solve_options *o, const 
     const cav_term *term = &p->term[i];
     if (term->quantity >= CAV_QUANTITY_TYPES) return fail(error, CAV_BAD_INPUT, "a term is of no quantity");
     if (term->use != CAV_USE_COST && !cav_quantity_rule_of(term->quantity)->hard)
-      return fail(error, CAV_BAD_INPUT, "a constraint must be over a sensor, a posture, a velocity or an acceleration");
+      return fail(
+          error, CAV_BAD_INPUT,
+          "a constraint must be over a sensor, a posture, a velocity, an acceleration or a quantity of one's own");
+    if (cav_user_term_check(term, error) != CAV_OK) return CAV_BAD_INPUT;
     if (!(term->scale > 0) || !(term->weight >= 0))
       return fail(error, CAV_BAD_INPUT, "a term needs a positive scale and a weight that is not negative");
   }
@@ -164,6 +167,20 @@ cav_status cav_run_solve(cav_solve_run *run, cav_error *error) {
   return cav_run_reaches(run, CAV_PLACE_RECOVERY, &status) ? cav_recover_feasible(run) : status;
 }
 
+cav_status cav_run_refused(const cav_solve_run *run, cav_status status, cav_error *error) {
+  const cav_error *own = run->refusal.status != CAV_OK || !run->tr ? &run->refusal : &run->tr->failure;
+  if (own->status != CAV_BAD_INPUT && !(own->status == CAV_NOT_FINITE && status == CAV_NOT_FINITE)) return status;
+  if (error) *error = *own;
+  return own->status;
+}
+
+/// Nobody is asked any more: the iterate that stands is told of, whoever asked for the end.
+static void end_anyhow(cav_solve_run *run) {
+  run->tr->stop = NULL;
+  if (run->tr->failure.status == CAV_BAD_INPUT) run->refusal = run->tr->failure;
+  run->tr->failure = (cav_error){0};
+}
+
 /// The solve and what it is worth: gains are chosen, or the run ends before them.
 static cav_status solve_and_conclude(cav_solve_run *run, cav_status *end, cav_error *error) {
   int solved = run->resume && run->resume->place == CAV_PLACE_FEEDBACK;
@@ -172,14 +189,14 @@ static cav_status solve_and_conclude(cav_solve_run *run, cav_status *end, cav_er
   run->checkpoint.status = status;
   run->deadline = INFINITY;
   if (status == CAV_OK || status == CAV_NOT_CONVERGED) cav_run_reaches(run, CAV_PLACE_FEEDBACK, &status);
-  // the iterate that stands is told of, whoever asks for the end
-  if (status == CAV_INTERRUPTED) run->tr->stop = NULL;
+  if (run->tr->failure.status == CAV_BAD_INPUT) status = CAV_INTERRUPTED;
+  if (status == CAV_INTERRUPTED) end_anyhow(run);
   // the reason of the solve goes before what verification of the gains says
   cav_error inner = {0};
   *end = conclude(run, status == CAV_INTERRUPTED, &inner);
   if (*end == CAV_INTERRUPTED) {
     status = CAV_INTERRUPTED;
-    run->tr->stop = NULL;
+    end_anyhow(run);
     *end = run->solution->multiplier ? CAV_OK : conclude(run, 1, &inner);
   }
   if (*end != CAV_OK && status == CAV_OK && error) *error = inner;
@@ -259,6 +276,7 @@ static cav_status solve_whole(const cav_problem *problem, const cav_solve_option
   if (status == CAV_NO_MEMORY) fail(error, status, "not enough memory for this problem");
   if (status == CAV_NOT_FINITE)
     fail(error, status, "a number that is not finite came up; the last finite iterate is kept");
+  status = cav_run_refused(&run, status, error);
   cav_run_close(&run);
   return status;
 }

@@ -40,7 +40,8 @@ static cav_status equations_of(const cav_problem *problem, cav_equations *equati
   }
   if (status == CAV_OK) { status = read_structure(tr, normal, at, equations); }
   if (status != CAV_OK && error)
-    *error = (cav_error){status, 0, "the normal equations cannot be evaluated at the guess"};
+    *error = tr->failure.status ? tr->failure
+                                : (cav_error){status, 0, "the normal equations cannot be evaluated at the guess"};
   cav_trajectory_free(at), cav_normal_free(normal), cav_transcription_free(tr);
   return status;
 }

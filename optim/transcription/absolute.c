@@ -20,7 +20,7 @@ double cav_absolute_curvature(const cav_absolute *row) {
 static int rows_most(const cav_transcription *tr, const cav_term *term) {
   if (term->use != CAV_USE_COST || term->norm != CAV_NORM_ABSOLUTE) return 0;
   int forces = term->quantity == CAV_QUANTITY_EFFORT || term->quantity == CAV_QUANTITY_POWER;
-  return term->quantity == CAV_QUANTITY_SENSOR ? cav_term_dim(term) : forces ? tr->model->nu : tr->nv;
+  return cav_term_is_reading(term) ? cav_term_dim(term) : forces ? tr->model->nu : tr->nv;
 }
 
 int cav_absolute_begin(cav_transcription *tr) {

@@ -63,6 +63,7 @@ static row_count cost_rows(const cav_transcription *tr, const int *key, const ca
   int rate = term->quantity == CAV_QUANTITY_ACCELERATION, first;
   switch (term->quantity) {
     case CAV_QUANTITY_SENSOR:
+    case CAV_QUANTITY_USER:
       n.rows = n.dense = (size_t)cav_term_dim(term);
       break;
     case CAV_QUANTITY_CONFIGURATION:
@@ -499,12 +500,13 @@ static void add_contact(cav_sum *a, const cav_term *term, double weight) {
   }
 }
 
-/// One cost, whose readings, if it is of a sensor, are the knot's from reading on.
+/// One cost, whose readings, if it has any, are the knot's from reading on.
 static void add_cost(cav_sum *a, const cav_term *term, double weight, int reading, const double *q, const double *v,
                      const double *v_next) {
   size_t width = 3 * (size_t)a->tr->nv;
   switch (term->quantity) {
     case CAV_QUANTITY_SENSOR:
+    case CAV_QUANTITY_USER:
       for (int k = 0; k < cav_term_dim(term); k++) {
         double r = a->knot->y[reading + k], w = weight;
         begin_cost(a, term, 1, &w, &r);
@@ -691,7 +693,7 @@ static void add_hard_terms(cav_sum *a, const double *q, const double *v, const d
       reading += dim;
       continue;
     }
-    if (term->quantity != CAV_QUANTITY_SENSOR) i = add_hard_dofs(a, term, i, lower, upper, q, v, v_next);
+    if (!cav_term_is_reading(term)) i = add_hard_dofs(a, term, i, lower, upper, q, v, v_next);
     for (int c = 0; c < dim; c++, reading++) {
       keep_reading(a, i, reading);
       double e = slot_residual(a, i++, a->knot->y[reading], lower, upper, rho, &active);

@@ -82,7 +82,7 @@ static void pull_rows(const cav_transcription *tr, int t, double *pull) {
     if (cav_term_weight(tr, term, t) == 0) continue;
     int dim = cav_term_dim(term);
     if (term->use != CAV_USE_COST) {
-      for (int d = 0; term->quantity != CAV_QUANTITY_SENSOR && d < tr->nv; d++) i += cav_dof_selected(tr, term, d);
+      for (int d = 0; !cav_term_is_reading(term) && d < tr->nv; d++) i += cav_dof_selected(tr, term, d);
       for (int k = 0; k < dim; k++) pull[tr->nv + sensor + k] += knot->slot[i++].final_multiplier;
     }
     sensor += dim;
@@ -117,7 +117,7 @@ static void pull_all_rates(const curve *c, cav_scratch *s, int t, double *out) {
     if (term->use != CAV_USE_COST || tr->knot[t].has_force || term->quantity != CAV_QUANTITY_ACCELERATION)
       pull_rates(c, s, term, t, slot, out);
     if (term->use == CAV_USE_COST) continue;
-    for (int d = 0; term->quantity != CAV_QUANTITY_SENSOR && d < tr->nv; d++) slot += cav_dof_selected(tr, term, d);
+    for (int d = 0; !cav_term_is_reading(term) && d < tr->nv; d++) slot += cav_dof_selected(tr, term, d);
     slot += cav_term_readings(tr, term, t);
   }
 }
@@ -219,6 +219,7 @@ static cav_status curve_knot(const curve *c, cav_scratch *s, int t, double *room
   if (!pull) return CAV_NO_MEMORY;
   pull_costs(tr, s->key, t, c->factor, pull);
   pull_rows(tr, t, pull);
+  knot->refusal = (cav_user_refusal){0};
   status = cav_readings_adjoint(tr, s, t, pull, base);
   memset(K, 0, width * width * sizeof *K);
   // velocities first, while the state's positions stand
@@ -235,6 +236,7 @@ static cav_status curve_knot(const curve *c, cav_scratch *s, int t, double *room
     for (size_t i = 0; i < width; i++) K[(size_t)j * width + i] = (K[(size_t)j * width + i] - base[i]) / distance;
   }
   free(pull);
+  if (status == CAV_OK) status = cav_user_refused(&knot->refusal);
   if (status == CAV_NOT_SUPPORTED) return CAV_OK;
   if (status != CAV_OK) return status;
   // symmetric, then T' K T
@@ -268,7 +270,7 @@ cav_status cav_lagrangian_curvature(cav_transcription *tr, const cav_trajectory 
   c.room = malloc((size_t)members * room_of(tr) * sizeof(double));
   cav_status status = c.status && c.room ? CAV_OK : CAV_NO_MEMORY;
   if (status == CAV_OK) cav_parallel_for(tr->pool, tr->nknot, curve_item, &c);
-  for (int t = 0; t < tr->nknot && status == CAV_OK; t++) status = c.status[t];
+  if (status == CAV_OK) status = cav_transcription_conclude(tr, c.status);
   free(c.status), free(c.room);
   return status;
 }

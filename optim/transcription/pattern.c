@@ -170,7 +170,7 @@ static const cav_term *term_of(const cav_transcription *tr, int t, int i, int *c
     const cav_term *term = &tr->problem->term[k];
     if (term->use == CAV_USE_COST || cav_term_weight(tr, term, t) == 0) continue;
     int n = cav_term_dim(term);
-    for (int d = 0; term->quantity != CAV_QUANTITY_SENSOR && d < tr->nv; d++) {
+    for (int d = 0; !cav_term_is_reading(term) && d < tr->nv; d++) {
       if (!cav_dof_selected(tr, term, d)) continue;
       if (n++ == i) *component = d;
     }
@@ -203,8 +203,10 @@ void cav_transcription_pattern(const cav_transcription *tr, int t, int i, char *
     int dof = 0;
     const cav_term *term = term_of(tr, t, i - at->term, &dof);
     if (!term) return;
-    if (term->quantity == CAV_QUANTITY_SENSOR) {
-      cav_sensor_stage stage = sensor_pattern(tr, &term->sensor, seen);
+    if (cav_term_is_reading(term)) {
+      int own = term->quantity == CAV_QUANTITY_USER;
+      cav_sensor_stage stage = own ? term->user->reads : sensor_pattern(tr, &term->sensor, seen);
+      if (own) memset(seen, 1, (size_t)m->nv); // what it looks at it alone knows
       spread_rotations(tr, seen);
       int open = t == tr->nknot - 1 && !tr->problem->close_at_rest && !tr->periodicity; // there v_next is v_t
       int moving = stage != CAV_READS_POSITION, before = stage == CAV_READS_ACCELERATION || (moving && open);

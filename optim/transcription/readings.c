@@ -1,5 +1,6 @@
 /// Readings of one knot, and their derivatives by (q_t, v_t, v_{t+1}): analytic where the dynamics offers them. What it
-/// does not offer (a force or constraint of the model, contact points that come and go, a type of sensor) is
+/// does not offer (a force or constraint of the model, contact points that come and go, a type of sensor, a quantity
+/// of one's own without Jacobian) is
 /// differenced instead, only that, and counted; nothing else is mixed.
 #include "readings.h"
 #include "rotation.h"
@@ -13,7 +14,8 @@
 /// there, or the cost would jump where one comes.
 static const double contact_floor = 1e-6;
 
-/// What is read off a state at knot t: u, four numbers a contact, the sensors of the terms that speak there.
+/// What is read off a state at knot t: u, four numbers a contact, the sensors and own quantities
+/// of the terms that speak there.
 typedef struct readings {
   const cav_transcription *tr;
   int t, ncontact;
@@ -237,6 +239,24 @@ static cav_status sensor_rows(const cav_transcription *tr, const cav_scratch *s,
   return CAV_OK;
 }
 
+/// Of a quantity of one's own, from its Jacobian and the derivatives of u, which stand first.
+static cav_status user_rows(const cav_transcription *tr, cav_scratch *s, const cav_term *term, int t, rows out) {
+  double *by[3], *to[3] = {out.dq, out.dv, out.dn};
+  const double *du[3] = {s->dq, s->dv, s->dn};
+  cav_user_refusal *refusal = &tr->knot[t].refusal;
+  int before = refusal->refused, nv = tr->nv, first = term->component < 0 ? 0 : term->component;
+  cav_status status = cav_user_differentiate(term->user, s->state, cav_knot_time(tr, t), du, &s->user, by, refusal);
+  if (refusal->refused && !before) tr->knot[t].refused_term = (int)(term - tr->problem->term);
+  if (status != CAV_OK) return status;
+  for (int k = 0; k < 3; k++)
+    for (int i = 0; i < cav_term_dim(term) * nv; i++) to[k][i] = by[k][first * nv + i] / term->scale;
+  return CAV_OK;
+}
+
+static cav_status term_rows(const cav_transcription *tr, cav_scratch *s, const cav_term *term, int t, rows out) {
+  return term->quantity == CAV_QUANTITY_USER ? user_rows(tr, s, term, t, out) : sensor_rows(tr, s, term, t, out);
+}
+
 /// Readings of one term alone, for differences.
 typedef struct single_term {
   const cav_transcription *tr;
@@ -250,9 +270,9 @@ static void read_term(const cav_model *model, cav_state *state, void *context, d
   cav_term_read(r->tr, state, r->term, r->t, value);
 }
 
-/// Sensors: those with derivatives first, as differences move the state.
-static cav_status sensors(const cav_transcription *tr, cav_scratch *s, int t, const double *q, const double *v,
-                          const double *v_next) {
+/// Sensors and quantities of one's own: those with derivatives first, as differences move the state.
+static cav_status terms(const cav_transcription *tr, cav_scratch *s, int t, const double *q, const double *v,
+                        const double *v_next) {
   int missing = 0, first = tr->nv + CAV_CONTACT_READINGS * tr->knot[t].ncontact;
   for (int pass = 0; pass < 1 + (missing > 0); pass++) {
     for (int i = 0, at = first; i < tr->problem->nterm; i++) {
@@ -264,10 +284,11 @@ static cav_status sensors(const cav_transcription *tr, cav_scratch *s, int t, co
       assert(at <= tr->nv + tr->knot[t].nread);
       cav_status status = CAV_OK;
       if (pass == 0) {
-        status = sensor_rows(tr, s, term, t, out);
-        missing += status == CAV_NOT_SUPPORTED;
-        if (status == CAV_NOT_SUPPORTED) status = CAV_OK;
-      } else if (cav_sensor_derivatives(tr->model, s->state, &term->sensor, NULL, NULL) == CAV_NOT_SUPPORTED) {
+        status = term_rows(tr, s, term, t, out);
+        s->missing[i] = status == CAV_NOT_SUPPORTED;
+        missing += s->missing[i];
+        if (s->missing[i]) status = CAV_OK;
+      } else if (s->missing[i]) {
         single_term single = {tr, term, t};
         status = cav_readout_differentiate(tr->model, s->state, tr->difference, 0, q, v, v_next, read_term, &single, n,
                                            NULL, out.dq, out.dv, out.dn);
@@ -300,7 +321,7 @@ cav_status cav_readings_derivatives(const cav_transcription *tr, cav_scratch *s,
     status = tr->knot[t].moving[k] ? self_penetration_rows(tr, s, c, out) : contact_rows(tr, s, c, out);
   }
   if (status == CAV_NOT_SUPPORTED) return difference(tr, s, t, q, v, v_next);
-  return status == CAV_OK ? sensors(tr, s, t, q, v, v_next) : status;
+  return status == CAV_OK ? terms(tr, s, t, q, v, v_next) : status;
 }
 
 /// g += weighted rows of n readings from the first on, which are in place.
@@ -342,7 +363,7 @@ cav_status cav_readings_adjoint(const cav_transcription *tr, cav_scratch *s, int
     const cav_term *term = &tr->problem->term[i];
     int dim = cav_term_readings(tr, term, t);
     if (weighs(weight + at, dim)) {
-      status = sensor_rows(tr, s, term, t, rows_at(tr, s, at));
+      status = term_rows(tr, s, term, t, rows_at(tr, s, at));
       if (status == CAV_OK) fold(tr, s, at, dim, weight, g);
       if (status != CAV_OK && status != CAV_NOT_SUPPORTED) return status;
     }

@@ -1,4 +1,5 @@
-/// What is read off the dynamics at one knot, with derivatives: u, CAV_CONTACT_READINGS numbers a contact, sensors.
+/// What is read off the dynamics at one knot, with derivatives: u, CAV_CONTACT_READINGS numbers a contact, sensors
+/// and quantities of one's own, in the order of the terms.
 /// Private to optim/.
 #ifndef CAVORT_READINGS_H
 #define CAVORT_READINGS_H
@@ -27,6 +28,8 @@ typedef struct cav_scratch {
   double *slot[2]; ///< [slot_room] values of its constraint rows there
   int slot_room;
   double *derivative; ///< [CAV_DERIVATIVE_ROWS*nv] derivatives of one contact or sensor
+  char *missing;      ///< [nterm] 1: readings without analytic derivatives at this knot
+  cav_user_room user; ///< derivatives of a quantity of one's own
   int differenced;    ///< calls in which differences stood in for analytic derivatives
   double seconds;
   double *join; ///< room of join.c

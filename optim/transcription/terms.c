@@ -2,6 +2,7 @@
 /// over dofs and contacts, which know derivatives, are in knot.c.
 #include <assert.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "quantity.h"
@@ -44,10 +45,15 @@ double cav_term_weight(const cav_transcription *tr, const cav_term *term, int t)
   return w->single ? 1 : tr->options.timestep;
 }
 
-/// Readings of a term: none but for sensors.
+int cav_term_is_reading(const cav_term *term) {
+  return term->quantity == CAV_QUANTITY_SENSOR || term->quantity == CAV_QUANTITY_USER;
+}
+
+/// Readings of a term: none but for sensors and quantities of one's own.
 int cav_term_dim(const cav_term *term) {
-  if (term->quantity != CAV_QUANTITY_SENSOR) return 0;
+  if (!cav_term_is_reading(term)) return 0;
   if (term->component >= 0) return 1;
+  if (term->quantity == CAV_QUANTITY_USER) return term->user->dim;
   return term->sensor.dim == 4 ? 3 : term->sensor.dim;
 }
 
@@ -94,9 +100,44 @@ void cav_term_target(const cav_term *term, double time, int dim, double *target)
   }
 }
 
-/// Value minus target of a sensor term, over its scale.
+cav_status cav_user_term_check(const cav_term *term, cav_error *error) {
+  const cav_user_quantity *user = term->user;
+  const char *reason = NULL;
+  if (term->quantity != CAV_QUANTITY_USER) return CAV_OK;
+  if (!user || !user->value || !user->name)
+    reason = "is of a quantity of one's own without a name or a function for its values: fill term.user";
+  else if (user->dim < 1 || user->dim > CAV_USER_DIM_MAX)
+    reason = "is of a quantity whose dim is not 1 to CAV_USER_DIM_MAX";
+  else if (user->reads < CAV_READS_POSITION || user->reads > CAV_READS_ACCELERATION)
+    reason = "is of a quantity that does not say what it reads: CAV_READS_POSITION, _VELOCITY or _ACCELERATION";
+  else if (term->component < -1 || term->component >= user->dim)
+    reason = "is of a component that its quantity does not have; -1: all of them";
+  if (!reason) return CAV_OK;
+  if (error) {
+    *error = (cav_error){.status = CAV_BAD_INPUT};
+    snprintf(error->text, sizeof error->text, "term '%.80s' %s", term->name ? term->name : "", reason);
+  }
+  return CAV_BAD_INPUT;
+}
+
+/// Value minus target of a quantity of one's own, over the scale.
+static void read_user(const cav_transcription *tr, cav_state *state, const cav_term *term, int t, double *y) {
+  double value[CAV_USER_DIM_MAX], target[CAV_USER_DIM_MAX], time = cav_knot_time(tr, t);
+  cav_user_refusal *refusal = &tr->knot[t].refusal;
+  int before = refusal->refused, first = term->component < 0 ? 0 : term->component, n = cav_term_dim(term);
+  cav_user_read(term->user, state, time, value, refusal);
+  if (refusal->refused && !before) tr->knot[t].refused_term = (int)(term - tr->problem->term);
+  cav_term_target(term, time, term->user->dim, target);
+  for (int k = 0; k < n; k++) y[k] = (value[first + k] - target[first + k]) / term->scale;
+}
+
+/// Value minus target of a term with readings, over its scale.
 void cav_term_read(const cav_transcription *tr, cav_state *state, const cav_term *term, int t, double *y) {
   double reading[CAV_SENSOR_DIM_MAX], target[CAV_SENSOR_DIM_MAX];
+  if (term->quantity == CAV_QUANTITY_USER) {
+    read_user(tr, state, term, t, y);
+    return;
+  }
   assert(term->sensor.dim <= CAV_SENSOR_DIM_MAX);
   cav_sensor_read(tr->model, state, &term->sensor, reading);
   cav_term_target(term, cav_knot_time(tr, t), term->sensor.dim, target);

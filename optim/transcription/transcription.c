@@ -138,7 +138,7 @@ static int term_slots(const cav_transcription *tr, const cav_term *term, int t) 
   if (term->use == CAV_USE_COST || cav_term_weight(tr, term, t) == 0) return 0;
   // others are refused by cav_solve
   assert(cav_quantity_rule_of(term->quantity)->hard);
-  if (term->quantity == CAV_QUANTITY_SENSOR) return cav_term_dim(term);
+  if (cav_term_is_reading(term)) return cav_term_dim(term);
   return cav_term_window(tr, term)->dofs;
 }
 
@@ -200,6 +200,7 @@ static int scratch_new(cav_transcription *tr, cav_scratch *s) {
   s->posture = room(&ok, (size_t)tr->model->nq, sizeof(double));
   s->force_step = room(&ok, n, sizeof(double));
   s->rate = room(&ok, 2 * n, sizeof(double));
+  s->missing = room(&ok, (size_t)tr->problem->nterm, 1);
   return ok && s->state;
 }
 
@@ -207,6 +208,8 @@ cav_transcription *cav_transcription_new(const cav_problem *problem, int threads
   if (cav_actuators_plannable(problem->model, error) != CAV_OK) return NULL;
   const double knots = round(problem->duration / problem->timestep) + 1;
   if (cav_knots_plannable(knots, problem->model->nv, error) != CAV_OK) return NULL;
+  for (int i = 0; i < problem->nterm; i++)
+    if (cav_user_term_check(&problem->term[i], error) != CAV_OK) return NULL;
   cav_transcription *tr = calloc(1, sizeof *tr);
   if (!tr) goto memory;
   tr->problem = problem;
@@ -265,7 +268,8 @@ void cav_transcription_free(cav_transcription *tr) {
     cav_state_free(s->state);
     free(s->value), free(s->join), free(s->dq), free(s->dv), free(s->dn), free(s->key), free(s->derivative);
     free(s->force_weight), free(s->force_derivative), free(s->row), free(s->column), free(s->tangent), free(s->posture);
-    free(s->force_step), free(s->rate), free(s->trace[0]), free(s->trace[1]), free(s->slot[0]), free(s->slot[1]);
+    free(s->force_step), free(s->rate), free(s->missing), free(s->user.x), free(s->trace[0]), free(s->trace[1]),
+        free(s->slot[0]), free(s->slot[1]);
   }
   for (int k = 0; k < tr->nresidual; k++) free(tr->unactuated[k].dof), free(tr->unactuated[k].coef);
   for (int a = 0; tr->effort && a < tr->nlimit; a++) free(tr->effort[a].dof), free(tr->effort[a].coef);
@@ -366,6 +370,7 @@ static cav_status shift_step(const cav_transcription *tr, cav_scratch *s, int t,
   cav_status status = cav_inverse(tr->model, s->state, q, v_here, v_then, knot->u);
   if (status == CAV_OK) cav_readings_values(&near, s, t);
   s->state->options = tr->options;
+  if (status == CAV_OK) status = cav_user_refused(&knot->refusal);
   if (status != CAV_OK) return status;
   if (knot->nread) memcpy(knot->y, s->value + tr->nv, (size_t)knot->nread * sizeof(double));
   cav_sum a = {.tr = &near, .s = s, .knot = knot, .t = t, .shifted = shifted};
@@ -415,6 +420,7 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   const double *q = p->at->q + (size_t)t * p->at->nq, *v = cav_velocity_at(tr, p->at, t);
   const double *v_next = cav_velocity_after(tr, p->at, t);
   s->state->options = tr->options;
+  knot->refusal = (cav_user_refusal){0};
 
   // dynamics, first beside the step where that is an unknown
   double start = p->jacobian ? now() : 0;
@@ -428,10 +434,12 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
     if (status != CAV_OK) return status;
   }
   cav_readings_values(tr, s, t);
+  if ((status = cav_user_refused(&knot->refusal)) != CAV_OK) return status;
   if (knot->nread) memcpy(knot->y, s->value + nv, (size_t)knot->nread * sizeof(double));
   memcpy(p->at->u + (size_t)t * nv, knot->u, (size_t)nv * sizeof(double));
   if (p->jacobian) {
     status = cav_readings_derivatives(tr, s, t, q, v, v_next);
+    if (status == CAV_OK) status = cav_user_refused(&knot->refusal);
     if (status != CAV_OK) return status;
     chain(tr, t, nv, s->dq, s->dv, s->dn, knot->du);
     chain(tr, t, knot->nread, s->dq + (size_t)nv * nv, s->dv + (size_t)nv * nv, s->dn + (size_t)nv * nv, knot->dy);
@@ -482,10 +490,21 @@ static void prepare_ends(cav_transcription *tr, const cav_trajectory *at) {
   }
 }
 
+cav_status cav_transcription_conclude(cav_transcription *tr, const cav_status *status) {
+  int t = 0;
+  while (t < tr->nknot && status[t] == CAV_OK) t++;
+  if (tr->failure.status != CAV_BAD_INPUT) tr->failure = (cav_error){0};
+  if (t == tr->nknot) return CAV_OK;
+  const cav_knot *knot = &tr->knot[t];
+  if (knot->refusal.refused)
+    cav_user_tell(&tr->problem->term[knot->refused_term], &knot->refusal, t, t * tr->options.timestep, &tr->failure);
+  return status[t];
+}
+
 static cav_status evaluate(cav_transcription *tr, cav_trajectory *at, int jacobian) {
   double start = now(), dynamics = 0;
   int members = cav_parallel_size(tr->pool);
-  cav_status *status = tr->status, result = CAV_OK;
+  cav_status *status = tr->status;
   memset(status, 0, (size_t)tr->nknot * sizeof *status);
   prepare_ends(tr, at);
   cav_term_windows(tr);
@@ -493,13 +512,12 @@ static cav_status evaluate(cav_transcription *tr, cav_trajectory *at, int jacobi
   for (int i = 0; i < members; i++) tr->scratch[i].seconds = 0;
   pass p = {tr, at, jacobian, status};
   cav_parallel_for(tr->pool, tr->nknot, evaluate_item, &p);
-  for (int t = 0; t < tr->nknot && result == CAV_OK; t++) result = status[t];
   for (int i = 0; i < members; i++) dynamics += tr->scratch[i].seconds / members;
   // values alone are dynamics: a clock at every knot would take a twentieth of their time
   if (!jacobian) dynamics = now() - start;
   tr->seconds_dynamics += dynamics;
   tr->seconds_assembly += now() - start - dynamics;
-  return result;
+  return cav_transcription_conclude(tr, status);
 }
 
 int cav_transcription_keep_rows(cav_transcription *tr) {
@@ -512,7 +530,9 @@ int cav_transcription_keep_rows(cav_transcription *tr) {
   return 1;
 }
 
-int cav_transcription_stopped(const cav_transcription *tr) { return tr->stop && tr->stop(tr->stop_context); }
+int cav_transcription_stopped(const cav_transcription *tr) {
+  return tr->failure.status == CAV_BAD_INPUT || (tr->stop && tr->stop(tr->stop_context));
+}
 
 cav_status cav_transcription_values(cav_transcription *tr, cav_trajectory *at) {
   return cav_transcription_stopped(tr) ? CAV_INTERRUPTED : evaluate(tr, at, 0);

@@ -9,6 +9,7 @@
 #include "parallel.h"
 #include "periodicity.h"
 #include "plannable.h"
+#include "user.h"
 
 /// A constraint row lower <= value <= upper, scaled; equalities have lower = upper.
 typedef struct cav_slot {
@@ -74,7 +75,9 @@ typedef struct cav_knot {
   double step_square, step_derivative;
   double
       *rotation; ///< [nturn*CAV_ROTATION_SIZE] of the step that ends here: Jr^-1, Jl^-1 and the rotation vector itself
-  double cost, merit; ///< cost terms; and with penalties
+  double cost, merit;       ///< cost terms; and with penalties
+  cav_user_refusal refusal; ///< of a quantity of one's own, in the knot's last evaluation
+  int refused_term;         ///< whose it is
   int nabsolute;
   cav_absolute
       *absolute; ///< [nabsolute] of the rows with an absolute norm that are not of contacts, in their order; where
@@ -135,6 +138,7 @@ typedef struct cav_transcription {
   struct cav_scratch *scratch; ///< one a thread
   cav_parallel *pool;
   cav_status *status; ///< [nknot] of an evaluation
+  cav_error failure;  ///< what a quantity of one's own refused in the last one; CAV_BAD_INPUT: from then on, all end
   double seconds_dynamics, seconds_assembly;
 } cav_transcription;
 
@@ -238,8 +242,12 @@ int cav_knot_has_force(const cav_transcription *transcription, int t);
 /// window. terms.c.
 double cav_term_weight(const cav_transcription *transcription, const cav_term *term, int t);
 
-/// Readings of a term (sensors only) where it speaks, and at knot t: 0 where it does not; whether it selects a dof; and
-/// value minus target over scale of a sensor at knot t.
+/// Status of an evaluation by those of its knots: the first that is not CAV_OK, with the refusal behind it told.
+cav_status cav_transcription_conclude(cav_transcription *transcription, const cav_status *status);
+
+/// Readings of a term (of sensors and quantities of one's own: those alone have any) where it speaks, and at knot t: 0
+/// where it does not; whether it selects a dof; and value minus target over scale at knot t.
+int cav_term_is_reading(const cav_term *term);
 int cav_term_dim(const cav_term *term);
 int cav_term_readings(const cav_transcription *transcription, const cav_term *term, int t);
 int cav_dof_selected(const cav_transcription *transcription, const cav_term *term, int dof);

@@ -6,6 +6,7 @@
 /// after the target. Velocity sensors read the velocity that leaves the knot; at a last knot that nothing leaves, the
 /// velocity that reaches it. What needs a force or an acceleration has no value there.
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -91,6 +92,32 @@ static int sensor_values(const cav_verification *verification, const cav_term *t
     target_at(term, when(verification, t), n, target);
   }
   if (term->component < 0) return n;
+  x[0] = x[term->component];
+  target[0] = target[term->component];
+  return 1;
+}
+
+// values of a quantity of one's own and their target. What it refuses, or what is not finite, is told in failure
+static int user_values(const cav_verification *verification, const cav_term *term, int t, double *x, double *target) {
+  const cav_user_quantity *user = term->user;
+  cav_error *failure = verification->failure;
+  cav_knot_view view = {.model = verification->model, .state = verification->state};
+  view.time = when(verification, t);
+  view.timestep = verification->h;
+  view.u = verification->state->u;
+  cav_state_point(verification->state, &view.q, &view.v, &view.v_next);
+  memset(x, 0, sizeof(double) * (size_t)user->dim);
+  int code = user->value(user->context, &view, x), bad = 0;
+  while (bad < user->dim && isfinite(x[bad])) bad++;
+  if ((code || bad < user->dim) && failure->status == CAV_OK) {
+    char what[40];
+    snprintf(what, sizeof what, code ? "returned %d" : "gave value %d, not finite,", code ? code : bad);
+    failure->status = code ? CAV_BAD_INPUT : CAV_NOT_FINITE;
+    snprintf(failure->text, sizeof failure->text, "term '%.80s': the quantity '%.80s' %s at knot %d (%.4g s)",
+             term->name && *term->name ? term->name : user->name, user->name, what, t, t * verification->h);
+  }
+  target_at(term, when(verification, t), user->dim, target);
+  if (term->component < 0) return user->dim;
   x[0] = x[term->component];
   target[0] = target[term->component];
   return 1;
@@ -236,6 +263,8 @@ int cav_verification_measure(const cav_verification *verification, const cav_ter
     case CAV_QUANTITY_SELF_PENETRATION:
     case CAV_QUANTITY_FORCE:
       return forced ? contact_values(verification, term, x, target) : 0;
+    case CAV_QUANTITY_USER:
+      return forced || term->user->reads != CAV_READS_ACCELERATION ? user_values(verification, term, t, x, target) : 0;
     case CAV_QUANTITY_TYPES:
       break;
   }
@@ -246,7 +275,7 @@ int cav_constraint_check_room(const cav_verification *verification) {
   const cav_model *model = verification->model;
   int most = model->nv > model->nu ? model->nv : model->nu;
   if (2 * verification->state->ncontact > most) most = 2 * verification->state->ncontact;
-  return model->nq + 2 * (most > 4 ? most : 4);
+  return model->nq + 2 * (most > CAV_USER_DIM_MAX ? most : CAV_USER_DIM_MAX);
 }
 
 void cav_constraint_check(const cav_verification *verification, int t, double *work, cav_metric *metric) {

@@ -152,7 +152,8 @@ static cav_status list_ranges(const cav_verification *verification, int t, cav_k
 
 // component that a value of a hard term has in cav_binding
 static int component_of(const cav_model *model, const cav_term *term, int k) {
-  if (term->quantity == CAV_QUANTITY_SENSOR) return term->component >= 0 ? term->component : k;
+  if (term->quantity == CAV_QUANTITY_SENSOR || term->quantity == CAV_QUANTITY_USER)
+    return term->component >= 0 ? term->component : k;
   int dof = -1;
   for (int d = 0; d < model->nv && dof < 0; d++)
     if (cav_verification_selects(model, term, d) && k-- == 0) dof = d;
@@ -300,5 +301,5 @@ cav_status cav_knot_rows_read(const cav_verification *verification, int t, cav_k
     if (p->term[k].use != CAV_USE_COST && cav_verification_holds(verification, p->term + k, t, &single, &whole))
       i += read_term(verification, p->term + k, t, rows, value + i);
   assert(i == rows->n);
-  return CAV_OK;
+  return verification->failure->status;
 }

@@ -296,6 +296,7 @@ cav_status cav_verify_optimality(const cav_problem *problem, const cav_trajector
     }
     status = measure(&verification, first, sorted, verdict->cost, &verdict->optimality);
   }
+  if (status != CAV_OK && error && verification.failure && verification.failure->status) *error = *verification.failure;
   if (status != CAV_OK && error) error->status = status;
   if (status != CAV_OK && error && !*error->text) {
     snprintf(error->text, sizeof error->text, "optimality: %s", cav_status_name(status));

@@ -127,6 +127,12 @@ static void describe(const cav_model *model, const cav_term *term, int k, cav_te
     unit = sensor_unit(model, &term->sensor, usual);
     snprintf(r->what, sizeof r->what, "%s%s%s", cav_sensor_rule_of(term->sensor.type)->name, several ? " " : "",
              several ? axis[one] : "");
+  } else if (term->quantity == CAV_QUANTITY_USER) {
+    int one = term->component >= 0 ? term->component : k;
+    unit = term->user->unit ? term->user->unit : "";
+    *usual = term->user->within;
+    int n = snprintf(r->what, sizeof r->what, "%.50s", term->user->name);
+    if (term->user->dim > 1) snprintf(r->what + n, sizeof r->what - (size_t)n, " %d", one);
   } else if (term->quantity == CAV_QUANTITY_EFFORT) {
     unit = "of limit";
     snprintf(r->what, sizeof r->what, "effort of %.40s", k < model->nu ? model->actuator[k].name : "");
@@ -220,6 +226,7 @@ double cav_verification_weight(const cav_verification *verification, const cav_t
   int forced = term->quantity != CAV_QUANTITY_CONFIGURATION && term->quantity != CAV_QUANTITY_VELOCITY;
   if (term->quantity == CAV_QUANTITY_SENSOR)
     forced = cav_sensor_rule_of(term->sensor.type)->stage == CAV_READS_ACCELERATION;
+  if (term->quantity == CAV_QUANTITY_USER) forced = term->user->reads == CAV_READS_ACCELERATION;
   if (verification->problem->cycle.on && whole && t == 0 && !forced) return 0;
   return single ? 1 : verification->h;
 }

@@ -26,12 +26,13 @@ typedef struct cav_verification {
   cav_cycle_image *image; ///< cycles: from one period to the next; else NULL
   int periods;            ///< that replays run for
   const double *q;        ///< [(T+1)*nq] knots
-  double *v;        ///< [(T+2)*nv] from the knots; the last row closes the motion: zero, v_1 moved in a cycle, or v_T
-                    ///< where nothing closes it
-  double *u;        ///< [(T+1)*nv] inverse dynamics under the claimed law; meaningful for rows knots
-  double *control;  ///< [(T+1)*nu] least-norm fraction of the actuators
-  cav_state *state; ///< claimed law
-  cav_state *bare;  ///< positions only: no contacts, no constraints
+  double *v;          ///< [(T+2)*nv] from the knots; the last row closes the motion: zero, v_1 moved in a cycle, or v_T
+                      ///< where nothing closes it
+  double *u;          ///< [(T+1)*nv] inverse dynamics under the claimed law; meaningful for rows knots
+  double *control;    ///< [(T+1)*nu] least-norm fraction of the actuators
+  cav_state *state;   ///< claimed law
+  cav_state *bare;    ///< positions only: no contacts, no constraints
+  cav_error *failure; ///< what a quantity of one's own refused first; CAV_OK: nothing
 } cav_verification;
 
 /// Admits a motion for examination and fills its velocities; what is not admitted is told in error. End it in any case.

@@ -80,6 +80,14 @@ static cav_status admit(const cav_problem *problem, const cav_trajectory *trajec
                              "verify it with the model it was solved for",
                              trajectory->nq, trajectory->nv, model->nq, model->nv);
   }
+  for (int i = 0; i < problem->nterm; i++) {
+    const cav_term *term = &problem->term[i];
+    const cav_user_quantity *user = term->user;
+    if (term->quantity != CAV_QUANTITY_USER) continue;
+    if (!user || !user->name || !user->value || user->dim < 1 || user->dim > CAV_USER_DIM_MAX ||
+        term->component >= user->dim)
+      return verification_fail(error, CAV_BAD_INPUT, "term %d is of a quantity of one's own that is not filled", i);
+  }
   if (!problem->q_start || !problem->v_start) {
     return verification_fail(error, CAV_BAD_INPUT, "the problem has no start: set q_start and v_start");
   }
@@ -110,6 +118,7 @@ void cav_verification_end(cav_verification *verification) {
   cav_cycle_image_free(verification->image);
   cav_state_free(verification->state);
   cav_state_free(verification->bare);
+  free(verification->failure);
   free(verification->v);
   free(verification->u);
   free(verification->control);
@@ -162,6 +171,8 @@ static cav_status verification_start(cav_verification *verification, const cav_p
   verification->v = malloc(sizeof(double) * (n + 1) * (nv + 1));
   verification->u = calloc(n * (nv + 1), sizeof(double));
   verification->control = calloc(n * ((size_t)model->nu + 1), sizeof(double));
+  verification->failure = calloc(1, sizeof *verification->failure);
+  if (!verification->failure) return CAV_NO_MEMORY;
   if (!verification->state || !verification->bare || !verification->v || !verification->u || !verification->control)
     return CAV_NO_MEMORY;
   verification->state->options = verification->law;
@@ -396,6 +407,7 @@ static cav_status examine(cav_verification *verification, cav_balance *balance, 
     }
     cav_constraint_check(verification, t, terms, &found->term);
     cav_targets_note(verification, t, terms, report);
+    if ((status = verification->failure->status) != CAV_OK && error) *error = *verification->failure;
   }
   cav_balance_result(balance, verification, &found->defect);
   if (hover) cav_hover_result(hover, verification, &found->hover);

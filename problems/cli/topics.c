@@ -33,7 +33,7 @@ static void print_defaults(cav_quantity quantity, const char *name) {
 
 static void print_terms(void) {
   printf("terms of <cost> and, where marked, of <constraint>: element, unit, what it measures\n");
-  for (cav_quantity k = 0; k < CAV_QUANTITY_TYPES; k++) {
+  for (cav_quantity k = 0; k < CAV_QUANTITY_USER; k++) {
     const cav_quantity_rule *rule = cav_quantity_rule_of(k);
     printf("  %-17s %-16s %s", rule->name, rule->unit, rule->text);
     print_defaults(k, rule->name);
@@ -42,7 +42,7 @@ static void print_terms(void) {
   printf("\nattributes, * required\n");
   const cav_xml_element *cost = child_of(&cav_problem_element, "cost");
   const cav_xml_element *hard = child_of(&cav_problem_element, "constraint");
-  for (cav_quantity k = 0; k < CAV_QUANTITY_TYPES; k++) {
+  for (cav_quantity k = 0; k < CAV_QUANTITY_USER; k++) {
     const char *name = cav_quantity_rule_of(k)->name;
     printf("  %-17s ", name);
     print_attributes(child_of(cost, name));
