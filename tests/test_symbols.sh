@@ -1,9 +1,11 @@
 #!/bin/sh
-# What the library exports is what the public headers declare, both ways. Usage: test_symbols.sh LIBRARY SOURCE, where LIBRARY
-# is libcavort.so or libcavort.a; of an archive, what a link of its objects into a shared library would export
+# What the library exports is what the public headers declare, both ways, and a shared library has the name of its interface:
+# major version, before 1.0 major and minor. Usage: test_symbols.sh LIBRARY SOURCE VERSION, where LIBRARY is
+# libcavort.so.VERSION or libcavort.a; of an archive, what a link of its objects into a shared library would export
 set -u
 library=$1
 source=$2
+version=$3
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 
@@ -41,5 +43,21 @@ done
 for name in $(comm -13 "$work/declared" "$work/exported"); do
   echo "failed: $name is exported and not declared in include/cavort" && failed=$((failed + 1))
 done
+case $library in
+  *.a) ;;
+  *)
+    # two links lead to the file: one that programs are started with, one that they are built with
+    major=${version%%.*} rest=${version#*.}
+    interface=$major
+    [ "$major" = 0 ] && interface=0.${rest%%.*}
+    name=$(readelf -d "$library" | sed -n 's/.*(SONAME).*\[\(.*\)\]/\1/p')
+    [ "$name" = "libcavort.so.$interface" ] ||
+      { echo "failed: the library calls itself '$name', not libcavort.so.$interface" && failed=$((failed + 1)); }
+    for link in "$name" libcavort.so; do
+      [ "$(readlink -f "$(dirname "$library")/$link")" = "$(readlink -f "$library")" ] &&
+        [ "${library##*/}" = "libcavort.so.$version" ] ||
+        { echo "failed: $link does not lead to libcavort.so.$version" && failed=$((failed + 1)); }
+    done ;;
+esac
 echo "$count symbols, $failed failed"
 [ "$failed" -eq 0 ] && [ "$count" -gt 50 ]
