@@ -233,6 +233,26 @@ CAV_API cav_status cav_readout_differentiate(const cav_model *model, cav_state *
                                              cav_readout readout, void *context, int n, double *value, double *d_dq,
                                              double *d_dv, double *d_dv_next);
 
+/// Many points at once, one a row: q [n*nq], v, v_next, u [n*nv]. Threads (>= 1, the caller's among them) share them out;
+/// a row depends on its own point alone, so its bits are those of the single call at any number of threads. options: of the
+/// evaluations, NULL: the model's. status [n], of each row, may be NULL; rows that fail are left as the single call leaves
+/// them, and all others are done. Returns the status of the first row that failed; CAV_BAD_INPUT for n < 0, threads < 1;
+/// CAV_NO_MEMORY. Each call makes its states anew.
+CAV_API cav_status cav_inverse_batch(const cav_model *model, const cav_options *options, int threads, int n,
+                                     const double *q, const double *v, const double *v_next, double *u,
+                                     cav_status *status);
+
+/// cav_forward of every row: u [n*nv] -> v_next [n*nv].
+CAV_API cav_status cav_forward_batch(const cav_model *model, const cav_options *options, int threads, int n,
+                                     const double *q, const double *v, const double *u, double *v_next,
+                                     cav_status *status);
+
+/// cav_inverse_jacobian_by of every row: du_dq, du_dv, du_dv_next [n*nv*nv], NULL = not needed.
+CAV_API cav_status cav_inverse_jacobian_batch(const cav_model *model, const cav_options *options, cav_derivative method,
+                                              int threads, int n, const double *q, const double *v,
+                                              const double *v_next, double *du_dq, double *du_dv, double *du_dv_next,
+                                              cav_status *status);
+
 /// Inertia matrix M(q) with D, dense [nv*nv] row-major. q [nq].
 CAV_API cav_status cav_inertia(const cav_model *model, cav_state *state, const double *q, double *M);
 

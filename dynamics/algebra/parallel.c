@@ -22,7 +22,7 @@ struct cav_parallel {
   void *context;
 };
 
-static void knots_draw(cav_parallel *team, int member) {
+static void draw(cav_parallel *team, int member) {
   for (int item = atomic_fetch_add(&team->next, 1); item < team->n; item = atomic_fetch_add(&team->next, 1))
     team->body(team->context, item, member);
 }
@@ -37,7 +37,7 @@ static void *serve(void *argument) {
     if (team->stop) break;
     seen = team->round;
     pthread_mutex_unlock(&team->mutex);
-    knots_draw(team, self->index);
+    draw(team, self->index);
     pthread_mutex_lock(&team->mutex);
     if (--team->busy == 0) pthread_cond_signal(&team->done);
   }
@@ -93,7 +93,7 @@ void cav_parallel_for(cav_parallel *team, int n, void (*body)(void *context, int
   pthread_cond_broadcast(&team->work);
   pthread_mutex_unlock(&team->mutex);
 
-  knots_draw(team, 0);
+  draw(team, 0);
 
   pthread_mutex_lock(&team->mutex);
   while (team->busy > 0) pthread_cond_wait(&team->done, &team->mutex);
