@@ -120,6 +120,23 @@ TEXT
   gcc -std=c17 -Wall -Wextra -Werror problems/example_replan.c -o "$out/replan" $flags && $run "$out/replan"
 }
 
+# the Python package installed beside a shared library, then a wheel of its own around that library, and a line that uses it
+python_package() {
+  python=/usr/bin/python3
+  [ -x "$python" ] || python=python3
+  root=$out/root-$1
+  folder=$(dirname "$(find "$root" -name cavort.pc)")
+  prefix=$root$(sed -n 's/^prefix=//p' "$folder/cavort.pc")
+  line='import cavort; print(cavort.__file__, cavort.Model("problems/models/humanoid.xml"))'
+  PYTHONPATH=$(dirname "$(dirname "$(find "$root" -name _interface.py)")") "$python" -c "$line" || return 1
+  rm -rf "$out/wheel" "$out/site" "$out/package"
+  cp -r problems/python "$out/package" && mkdir "$out/wheel" || return 1
+  PKG_CONFIG="env PKG_CONFIG_PATH=$folder pkg-config --define-variable=prefix=$prefix" \
+    "$python" -m pip wheel "$out/package" --no-build-isolation --no-deps --no-index -w "$out/wheel" -q &&
+    "$python" -m pip install --no-deps --no-index --target "$out/site" -q "$out"/wheel/cavort-*-py3-none-*.whl &&
+    PYTHONPATH=$out/site "$python" -c "$line" | grep -F "$out/site"
+}
+
 # the example of README.md is the file that was just built
 example() { awk '/^```$/ { on = 0 } on { print } /^```c$/ { on = 1 }' README.md | cmp - problems/example.c; }
 
@@ -137,8 +154,9 @@ if sh problems/install.sh test; then
   fi
   check "install, pkg-config, the example" installed gcc
   check "shared library: build, gcc" build shared gcc --buildtype=release -Ddefault_library=shared &&
-    tests shared symbols tool &&
-    check "shared library: install, pkg-config, the example" installed shared
+    tests shared symbols tool python &&
+    check "shared library: install, pkg-config, the example" installed shared &&
+    check "Python: install, wheel, a line that uses it" python_package shared
   check "the example as README.md has it" example
 else
   failed=1

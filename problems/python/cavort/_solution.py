@@ -1,0 +1,207 @@
+"""A solved motion: what it is, whether it holds, and why."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _library
+from ._library import Array, Options, Record, check, ffi, lib, new_error, pointer_to, text
+from ._problem import Frozen, Problem
+from ._state import State
+
+CONTACT = np.dtype(
+    [("knot", "i4"), ("geom1", "i4"), ("geom2", "i4"), ("pos", "f8", (3,)), ("force", "f8", (3,)), ("gap", "f8")]
+)
+LOADED = 1e-6  # fraction of the weight from which on a contact is listed, as in forces.csv
+
+
+class Solution:
+    """A motion over knots, as a solve left it.
+
+    q [nknot, nq], v, u [nknot, nv] look at the solution's memory; time [nknot] in s. status: "success", or
+    "not converged" or "interrupted" with the best iterate. What verdict and the reports say is of the problem as it was
+    when it was solved.
+    """
+
+    problem: Problem
+
+    def __init__(self, problem: Problem, frozen: Frozen, pointer: Any, status: int) -> None:
+        self.problem = problem
+        self._frozen = frozen
+        self._c = pointer
+        self._status = status
+        self._verdict: Record | None = None
+
+    def __repr__(self) -> str:
+        return f"<cavort.Solution of {self.problem.name!r}: {self.status}, {len(self.q)} knots, cost {self.cost:.6g}>"
+
+    @property
+    def status(self) -> str:
+        """How the solve ended, in a word or two."""
+        return "success" if self._status == lib.CAV_OK else text(lib.cav_status_name(self._status))
+
+    @property
+    def timestep(self) -> float:
+        """s between knots."""
+        return float(self._c.trajectory.timestep)
+
+    @property
+    def time(self) -> Array:
+        """Of the knots [nknot], s."""
+        return self.timestep * np.arange(self._c.trajectory.nknot)
+
+    def _rows(self, name: str, length: str) -> Array:
+        motion = self._c.trajectory
+        return _library.view(self, getattr(motion, name), (motion.nknot, getattr(motion, length)))
+
+    @property
+    def q(self) -> Array:
+        """Configurations [nknot, nq]."""
+        return self._rows("q", "nq")
+
+    @property
+    def v(self) -> Array:
+        """Velocities [nknot, nv]: v[t] leads to q[t]."""
+        return self._rows("v", "nv")
+
+    @property
+    def u(self) -> Array:
+        """Generalised forces [nknot, nv], N or N m: u[t] = inverse(q[t], v[t], v[t+1]) under the law contact."""
+        return self._rows("u", "nv")
+
+    @property
+    def contact(self) -> Options:
+        """The contact law that the motion obeys, a copy."""
+        return _library.contact_options(ffi.new("cav_options *", self._c.contact))
+
+    @property
+    def gains(self) -> tuple[Array, Array] | None:
+        """Feedback (by q, by v) [nknot - 1, nv, nv]: du = by_q dq + by_v dv with dq = difference(planned, q); None: there is none."""
+        if not self._c.gain_q:
+            return None
+        nv, n = self._c.trajectory.nv, self._c.trajectory.nknot - 1
+        return _library.view(self, self._c.gain_q, (n, nv, nv)), _library.view(self, self._c.gain_v, (n, nv, nv))
+
+    @property
+    def cost(self) -> float:
+        """Of the cost terms, as the solver counts it."""
+        return float(self._c.cost)
+
+    @property
+    def iterations(self) -> int:
+        """Of the solve."""
+        return int(self._c.iterations)
+
+    @property
+    def seconds(self) -> float:
+        """Of the solve, wall clock."""
+        return float(self._c.seconds)
+
+    @property
+    def log(self) -> list[Record]:
+        """One record an iteration: phase, stage, cost, unactuated, violation, seconds and more."""
+        return [_library.record(self._c.progress[i]) for i in range(self._c.nprogress)]
+
+    def _evaluated(self) -> Any:
+        # a state at every knot that has forces: knot, state, u
+        model, motion = self._frozen.model, self._c.trajectory
+        state = State(model)
+        state._c.options = self._c.contact
+        q, v = self.q, self.v
+        for t in range(motion.nknot):
+            if t + 1 < motion.nknot:
+                v_next = v[t + 1]
+            elif self._frozen.c.close_at_rest and not self._frozen.c.cycle.on:
+                v_next = np.zeros(model.nv)
+            else:
+                return
+            yield t, state, state.inverse(q[t], v[t], v_next)
+
+    @property
+    def effort(self) -> Array:
+        """Efforts of the actuators [nknot, nu]: controls of motors, else forces; NaN at a last knot without forces."""
+        out = np.full((self._c.trajectory.nknot, self._frozen.model.nu), np.nan)
+        for t, state, u in self._evaluated():
+            out[t] = state.actuation(u).effort
+        return out
+
+    @property
+    def contacts(self) -> NDArray[Any]:
+        """All loaded contacts: knot, geom1, geom2, pos (m, world), force (N, world, on geom2), gap (m)."""
+        model, rows = self._frozen.model, []
+        least = LOADED * model.mass * float(np.linalg.norm(model.gravity))
+        for t, state, _ in self._evaluated():
+            touching, pairs = state.contacts, model.pair
+            for contact in touching[touching["impulse"][:, 0] > least * self.timestep]:
+                axes, n = contact["frame"].reshape(3, 3), min(int(contact["dim"]), 3)
+                force = contact["impulse"][:n] @ axes[:n] / self.timestep
+                pair = pairs[contact["pair"]]
+                rows.append((t, pair["geom1"], pair["geom2"], contact["pos"], force, contact["dist"]))
+        return np.array(rows, dtype=CONTACT)
+
+    def _motion(self) -> tuple[Any, Any, Any]:
+        return self._frozen.c, self._c.trajectory, ffi.addressof(self._c, "contact")
+
+    @property
+    def verdict(self) -> Record:
+        """Whether the motion holds: certified, achieved, reason, missed, and every figure, as attributes and items.
+
+        Found by code apart from the solver's the first time that it is asked for, which takes about a second.
+        """
+        if self._verdict is None:
+            verdict, error = ffi.new("cav_verdict *"), new_error()
+            verdict.solve_seconds, verdict.iterations = self._c.seconds, self._c.iterations
+            motion = self._motion()
+            self._frozen.check(
+                lib.cav_verify(*motion, self._c.gain_q, self._c.gain_v, verdict, error), "the verification", error
+            )
+            self._frozen.check(
+                lib.cav_verify_optimality(*motion, self._c.nrow, self._c.row, verdict, error), "the verification", error
+            )
+            self._verdict = _library.record(verdict, ("certified", "achieved"))
+        return self._verdict
+
+    @property
+    def terms(self) -> list[Record]:
+        """What each term of the problem asked and got: name, wanted, got, off, within, met, cost and more."""
+        count, error = self._frozen.c.nterm, new_error()
+        report = ffi.new("cav_term_report[]", max(1, count))
+        self._frozen.check(
+            lib.cav_terms_report(*self._motion(), report, ffi.NULL, error), "the report of terms", error
+        )
+        records = [_library.record(report[i], ("has_target", "met")) for i in range(count)]
+        return [Record({"name": name, **record}) for name, record in zip(self._frozen.names, records)]
+
+    def explain(self) -> Record:
+        """Why the motion is as it is: violation and conflict, lists of reasons (what, cure, time, ...) by size; met."""
+        found, error = ffi.new("cav_explanation *"), new_error()
+        self._frozen.check(
+            lib.cav_explain(*self._motion(), self._c.nrow, self._c.row, found, error), "the explanation", error
+        )
+        lists = {"violation": found.nviolation, "conflict": found.nconflict}
+        told: dict[str, Any] = {
+            name: [_library.record(getattr(found, name)[i]) for i in range(count)] for name, count in lists.items()
+        }
+        return Record(met=bool(found.met), contradiction=text(found.contradiction), **told)
+
+    def sample(self, timestep: float) -> tuple[Array, Array, Array]:
+        """q, v, u of the motion at another step, by cubics through the knots (u linear): copies."""
+        model = self._frozen.model
+        pointer = lib.cav_trajectory_resample(model._c, self._c.trajectory, timestep)
+        if not pointer:
+            raise MemoryError("no memory for the motion")
+        motion = ffi.gc(pointer, lib.cav_trajectory_free)
+        n = motion.nknot
+        widths = (("q", model.nq), ("v", model.nv), ("u", model.nv))
+        q, v, u = (_library.view(motion, getattr(motion, name), (n, width)).copy() for name, width in widths)
+        return q, v, u
+
+    def save_trajectory(self, path: str) -> None:
+        """Writes trajectory.csv: time, q in MuJoCo's layout, v, u; one row a knot."""
+        error = new_error()
+        check(
+            lib.cav_trajectory_write(str(path).encode(), self._frozen.model._c, self._c.trajectory, error), str(path), error
+        )

@@ -1,0 +1,107 @@
+"""Solves a problem."""
+
+from __future__ import annotations
+
+from typing import Any, Callable
+
+from . import _library
+from ._library import Record, failure, ffi, lib, new_error
+from ._problem import Frozen, Problem
+from ._solution import Solution
+
+
+class _Watch:
+    """The callbacks of a solve: progress to the caller, and the end where an exception or Ctrl-C comes up."""
+
+    def __init__(self, callback: Callable[[Record], Any] | None) -> None:
+        self.callback = callback
+        self.raised: BaseException | None = None
+        self.observer = ffi.callback("cav_observer", self._observe, onerror=self._note, error=1)
+        # asked many times an iteration: here Python sees its signals
+        self.stop = ffi.callback("cav_stop", self._stopped, onerror=self._note, error=1)
+
+    def _note(self, kind: Any, raised: BaseException, trace: Any) -> None:
+        self.raised = self.raised or raised
+
+    def _observe(self, context: Any, progress: Any) -> int:
+        if self.callback is None:
+            return 0
+        return int(bool(self.callback(_library.record(progress))))
+
+    def _stopped(self, context: Any) -> int:
+        return int(self.raised is not None)
+
+
+def _start_warm(frozen: Frozen, options: Any, warm: Solution) -> Any:
+    # the motion to start from, resampled where the step differs; with its multipliers straight to the optimum
+    motion = warm._c.trajectory
+    if (motion.nq, motion.nv) != (frozen.model.nq, frozen.model.nv):
+        raise ValueError("warm: the solution is of another model")
+    problem = frozen.c
+    fixed = problem.duration_most == 0
+    duration = (motion.nknot - 1) * motion.timestep
+    knots = round(problem.duration / problem.timestep) + 1
+    if fixed and abs(duration - problem.duration) > 0.5 * problem.timestep:
+        raise ValueError(f"warm: the solution lasts {duration:g} s, the problem {problem.duration:g} s")
+    step = problem.timestep if fixed else duration / (knots - 1)
+    equations, error = ffi.new("cav_equations *"), new_error()
+    if abs(motion.timestep - step) > 1e-9 * step:
+        pointer = lib.cav_trajectory_resample(frozen.model._c, motion, step)
+        if not pointer:
+            raise MemoryError("no memory for the motion")
+        return ffi.gc(pointer, lib.cav_trajectory_free)
+    if motion.nknot == knots and warm._frozen.c.order == problem.order and warm._c.nmultiplier:
+        frozen.check(lib.cav_problem_equations(problem, equations, error), "the problem", error)
+        if equations.constraints == warm._c.nmultiplier:
+            options.nmultiplier, options.multiplier = warm._c.nmultiplier, warm._c.multiplier
+            options.first_stage = problem.schedule.stages + 1
+    return motion
+
+
+def solve(
+    problem: Problem,
+    callback: Callable[[Record], Any] | None = None,
+    *,
+    warm: Solution | None = None,
+    threads: int = 1,
+    max_seconds: float = 0.0,
+    max_iterations: int = 0,
+    solver: str = "gn",
+    gains: bool = True,
+) -> Solution:
+    """Solves a problem from its guess, or from a solution that is near (warm).
+
+    callback is called after every iteration with its record (phase, stage, fraction, iteration, cost, unactuated,
+    violation, seconds, ...); a true answer ends the solve. Ctrl-C ends it, too: the KeyboardInterrupt has the best iterate
+    as its attribute solution (None: there is none). warm: a solution of the same model and duration; one of as many knots
+    and constraints goes straight to the optimum. max_seconds, max_iterations: 0, or a limit. gains: chooses feedback, which
+    a certificate needs. The result does not depend on threads; the GIL is released, except in callbacks.
+
+    Raises Error where the problem cannot be solved at all, with the text of the library; a motion that misses something
+    is told in Solution.status and Solution.verdict.
+    """
+    frozen, error, watch = problem._freeze(), new_error(), _Watch(callback)
+    options = ffi.new("cav_solve_options *", lib.cav_solve_options_default())
+    known = [_library.text(lib.cav_solver_rule_of(i).name) for i in range(lib.CAV_SOLVER_TYPES)]
+    if solver not in known:
+        raise ValueError(f"solver: expected one of {', '.join(known)}, got {solver!r}")
+    if threads < 1:
+        raise ValueError(f"threads: expected 1 or more, got {threads}")
+    options.solver, options.threads, options.gains = known.index(solver), threads, int(gains)
+    options.max_seconds, options.max_iterations = max_seconds, max_iterations
+    options.observer, options.stop = watch.observer, watch.stop
+    start = _start_warm(frozen, options, warm) if warm is not None else ffi.NULL
+    out = ffi.new("cav_solution **")
+    status = lib.cav_solve(frozen.c, options, start, out, error)
+    found = None
+    if out[0]:
+        found = Solution(problem, frozen, ffi.gc(out[0], lib.cav_solution_free), status)
+    if watch.raised is not None:
+        raised = watch.raised
+        if isinstance(raised, KeyboardInterrupt):
+            raised.solution = found  # type: ignore[attr-defined]
+        raise raised
+    if found is None or status not in (lib.CAV_OK, lib.CAV_NOT_CONVERGED, lib.CAV_INTERRUPTED):
+        frozen.check(status, "the solve", error)
+        raise failure(status, "the solve", error)
+    return found

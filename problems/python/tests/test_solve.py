@@ -1,0 +1,194 @@
+"""Solves: from files and built in code, watched, interrupted, warm; what a solution says."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import cavort
+import numpy as np
+import pytest
+
+SOURCE = os.environ["CAVORT_SOURCE"]
+
+
+def built(arm):
+    """The problem of swing.xml, in code."""
+    problem = cavort.Problem(cavort.Model(arm, overlaps=True), 1.0, 0.05, name="swing")
+    problem.q_goal = [1.0]
+    problem.cost("posture", 900, dofs="all", at=1.0, name="there")
+    return problem
+
+
+def hard_swing(path):
+    """A problem whose efforts are at their limits: some 26 iterations."""
+    problem = cavort.Problem.load(path)
+    problem.effort_limit, problem.q_goal = 0.3, [2.5]
+    return problem
+
+
+def test_file_and_code(arm, swing, tmp_path):
+    """A problem built in code is that of the file, bit by bit, and writes one that reads the same."""
+    loaded, made = cavort.Problem.load(swing), built(arm)
+    a, b = cavort.solve(loaded), cavort.solve(made)
+    assert a.status == "success" and np.array_equal(a.q, b.q) and a.cost == b.cost
+    made.save(str(tmp_path / "made.xml"))
+    c = cavort.solve(cavort.Problem.load(str(tmp_path / "made.xml")))
+    assert np.array_equal(a.q, c.q)
+    # a weight that differs leads elsewhere
+    made.terms[-1].weight = 1.0
+    assert not np.array_equal(cavort.solve(made).q, a.q)
+
+
+def test_solution(swing):
+    problem = cavort.Problem.load(swing)
+    solution = cavort.solve(problem)
+    assert solution.q.shape == (21, 1) and solution.time[-1] == pytest.approx(1)
+    verdict = solution.verdict
+    assert verdict.certified is True and verdict["achieved"] is True and verdict.reason == ""
+    term = next(term for term in solution.terms if term.name == "there")
+    assert term.met and term.wanted == pytest.approx(1) and abs(term.got - 1) < 0.03
+    # efforts are u over the gear, and u is the inverse under the motion's law
+    assert np.allclose(20 * solution.effort, solution.u)
+    law = solution.contact
+    assert np.allclose(
+        problem.model.inverse(solution.q[:-1], solution.v[:-1], solution.v[1:], options=law), solution.u[:-1]
+    )
+    assert len(solution.contacts) == 0 and solution.log[-1].iteration == solution.iterations
+    assert solution.explain().met is True
+    by_q, by_v = solution.gains
+    assert by_q.shape == (20, 1, 1)
+    q, v, u = solution.sample(0.01)
+    assert np.allclose(q[::5], solution.q)
+    # what is changed afterwards is not the solution's
+    problem.terms[-1].target = [3.0]
+    problem.q_start[0] = 0.5
+    again = cavort.Solution(problem, solution._frozen, solution._c, 0)
+    assert again.verdict == verdict or np.isnan(verdict.joint_speed_over_limit)
+    assert again.verdict.certified
+
+
+def test_contacts():
+    problem = cavort.Problem.load(os.path.join(SOURCE, "problems", "motions", "squat-jump", "problem.xml"))
+    stopped = cavort.solve(problem, max_iterations=2, gains=False)
+    assert stopped.status == "interrupted"
+    touching = stopped.contacts
+    weight = problem.model.mass * 9.81
+    first = touching[touching["knot"] == 0]
+    assert len(first) and first["force"][:, 2].sum() > 0.1 * weight
+    floor = problem.model.index("geom", "floor")
+    assert set(np.unique(touching["geom1"])) >= {floor}
+
+
+def test_observed(swing):
+    seen = []
+    problem = hard_swing(swing)
+    solution = cavort.solve(problem, seen.append)
+    assert seen[-1].phase and len(seen) >= solution.iterations > 10
+    stopped = cavort.solve(problem, lambda record: record.iteration >= 3)
+    assert stopped.status == "interrupted" and stopped.iterations < solution.iterations
+
+    def breaks(record):
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        cavort.solve(problem, breaks)
+
+
+def test_warm_and_threads(swing):
+    problem = hard_swing(swing)
+    cold = cavort.solve(problem)
+    assert np.array_equal(cavort.solve(problem, threads=3).q, cold.q)
+    problem.terms[-1].weight *= 1.1
+    warm = cavort.solve(problem, warm=cold)
+    assert warm.status == "success" and warm.iterations < cold.iterations / 2
+    assert warm.verdict.certified
+    problem.timestep = 0.025
+    finer = cavort.solve(problem, warm=cold)
+    assert finer.q.shape == (41, 1) and finer.status == "success"
+    problem.duration = 2.0
+    with pytest.raises(ValueError, match="lasts 1 s, the problem 2 s"):
+        cavort.solve(problem, warm=cold)
+
+
+def test_refused(arm, swing):
+    problem = built(arm)
+    with pytest.raises(ValueError, match="no quantity 'posturee'"):
+        problem.cost("posturee")
+    with pytest.raises(TypeError, match="did you mean 'joint'"):
+        problem.cost("velocity", jiont="pivot")
+    with pytest.raises(KeyError, match="pivot"):
+        problem.cost("velocity", joint="pivto")
+    with pytest.raises(ValueError, match="cost alone"):
+        problem.constraint("effort")
+    with pytest.raises(ValueError, match="looks at"):
+        problem.cost("sensor", type="jointpos", body="rod")
+    with pytest.raises(ValueError, match="target has the shape"):
+        problem.cost("sensor", type="framepos", body="rod", target=[1, 2])
+    problem.cost("velocity", at=3.0)
+    with pytest.raises(ValueError, match="not within the horizon"):
+        cavort.solve(problem)
+    with pytest.raises(ValueError, match="solver: expected one of gn"):
+        cavort.solve(cavort.Problem.load(swing), solver="magic")
+    odd = built(arm)
+    odd.timestep = 0.03
+    with pytest.raises(ValueError, match="whole number of steps"):
+        cavort.solve(odd)
+
+
+def test_impossible(arm):
+    problem = built(arm)
+    assert problem.impossible() == []
+    problem.constraint("sensor", type="framepos", site="tip", at=1.0, target=[5, 0, 0])
+    proofs = problem.impossible()
+    assert proofs and proofs[0].what and proofs[0].cure
+
+
+def test_targets(arm):
+    problem = built(arm)
+    term = problem.cost("sensor", 5, type="framepos", site="tip", component="z", relative="goal", target=0.1, at=1.0)
+    assert np.allclose(term.target, [0, 0, -0.5 * np.cos(1) + 0.1]) and term.dim == 3
+    term = problem.cost("velocity", joint="pivot", waypoints=[(0, 0.0), (0.5, 2.0), (1, 0.0)])
+    assert np.array_equal(term.target, [[0], [2], [0]])
+    hard = problem.constraint("velocity", joint="pivot", lower=-1.5, upper=1.5)
+    solution = cavort.solve(problem)
+    assert hard.hard and solution.status == "success" and np.abs(solution.v).max() < 1.5 + 1e-6
+
+
+def test_interpreter_runs(swing):
+    """Other threads of Python run while the library solves."""
+    problem = cavort.Problem.load(os.path.join(SOURCE, "problems", "motions", "squat-jump", "problem.xml"))
+    counted, done = 0, threading.Event()
+    thread = threading.Thread(target=lambda: (cavort.solve(problem, max_iterations=20, gains=False), done.set()))
+    thread.start()
+    while not done.is_set():
+        counted += 1
+        time.sleep(0.001)
+    thread.join()
+    assert counted > 20
+
+
+INTERRUPTED = """
+import cavort, sys
+problem = cavort.Problem.load(sys.argv[1])
+def told(record):
+    if record.iteration == 2: print("solving", flush=True)
+try:
+    cavort.solve(problem, told)
+except KeyboardInterrupt as interrupt:
+    print("interrupted", interrupt.solution.status, interrupt.solution.q.shape)
+"""
+
+
+def test_interrupt():
+    """Ctrl-C ends a solve in a second and hands over the best iterate."""
+    path = os.path.join(SOURCE, "problems", "motions", "squat-jump", "problem.xml")
+    process = subprocess.Popen([sys.executable, "-c", INTERRUPTED, path], stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "solving\n"
+    sent = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    told = process.communicate(timeout=60)[0]
+    assert told == "interrupted interrupted (81, 28)\n" and process.returncode == 0
+    assert time.monotonic() - sent < 10
