@@ -19,7 +19,8 @@ OBJECTS = ("body", "xbody", "site", "geom", "joint", "tendon", "actuator")
 class Knot(NamedTuple):
     """What a quantity of one's own is read off: one knot of a motion, during the call only.
 
-    state holds the evaluation there (poses, contacts, sensors; evaluate nothing with it). time and timestep in s,
+    state holds the evaluation there (poses, contacts, sensors; evaluate nothing with it, and do not keep it). Its model is that
+    of the plan: without trees that nothing touches, so look up numbers by name there. time and timestep in s,
     q [nq], v, v_next [nv] (accelerations are (v_next - v)/timestep), u [nv], N or N m.
     """
 
@@ -65,7 +66,6 @@ class Quantity:
     ) -> None:
         self.name, self.dim, self.value, self.jacobian = name, dim, value, jacobian
         self.raised: BaseException | None = None
-        self._models: dict[int, Model] = {}
         self._text = ffi.new("char[]", name.encode()), ffi.new("char[]", unit.encode())
         self._call = (
             ffi.callback("cav_user_value", self._value, onerror=self._raise, error=1),
@@ -82,12 +82,10 @@ class Quantity:
         self.raised = self.raised or raised
 
     def _knot(self, view: Any) -> Knot:
-        address = int(ffi.cast("uintptr_t", view.model))
-        if address not in self._models:
-            self._models[address] = Model._of(view.model, None)
-        model = self._models[address]
+        # a plan may leave out trees that nothing touches: the model is the view's. Copies, since its memory ends with the call
+        model = Model._of(view.model, None)
         q, v, v_next, u = (
-            _library.view(None, pointer, (n,))
+            _library.view(None, pointer, (n,)).copy()
             for pointer, n in ((view.q, model.nq), (view.v, model.nv), (view.v_next, model.nv), (view.u, model.nv))
         )
         return Knot(State._of(model, view.state), view.time, view.timestep, q, v, v_next, u)
@@ -102,10 +100,12 @@ class Quantity:
     def _jacobian(self, context: Any, view: Any, out: Any) -> int:
         assert self.jacobian
         nv, contacts = view.model.nv, view.state.ncontact
-        by_dofs = [_library.view(None, x, (self.dim, nv), True) for x in (out.dq, out.dv, out.dv_next, out.du)]
-        by_impulses = _library.view(None, out.dimpulse, (self.dim, contacts, 6), True)
-        dq, dv, dv_next, du = by_dofs
-        self.jacobian(self._knot(view), Jacobian(dq, dv, dv_next, du, by_impulses))
+        dq, dv, dv_next, du = (np.zeros((self.dim, nv)) for _ in range(4))
+        found = Jacobian(dq, dv, dv_next, du, np.zeros((self.dim, contacts, 6)))
+        self.jacobian(self._knot(view), found)
+        for to, array in zip((out.dq, out.dv, out.dv_next, out.du, out.dimpulse), found):
+            if array.size:
+                ffi.memmove(to, pointer_to(array.reshape(-1)), array.nbytes)
         return 0
 
     def check(self, state: State, q: ArrayLike, v: ArrayLike, v_next: ArrayLike) -> float:
@@ -168,6 +168,11 @@ class Term:
     def hard(self) -> bool:
         """Whether it is a constraint."""
         return bool(self._c.use != lib.CAV_USE_COST)
+
+    @property
+    def quantity(self) -> Quantity | str:
+        """One's own, or the name of a built-in one."""
+        return self._user or text(lib.cav_quantity_rule_of(self._c.quantity).name)
 
     @property
     def dim(self) -> int:
