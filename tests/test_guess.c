@@ -7,7 +7,7 @@
 #include "scene.h"
 
 static char folder[] = "/tmp/cavort-guess-XXXXXX";
-static char path[128], model_path[128];
+static char path[128], model_path[128], motion_path[128];
 
 static const char model[] =
     "<mujoco model='m'><worldbody><geom type='plane' size='1 1 1'/><body name='a' pos='0 0 1'><freejoint/>"
@@ -130,6 +130,34 @@ static void refuse(const char *text, int line, const char *part) {
   cav_problem_free(p);
 }
 
+// a motion on file, from a time of it on: between its knots, and up to the goal after its end
+static void check_file(void) {
+  cav_problem *p;
+  cav_error error = {0};
+  cav_trajectory *at = guess(HEAD TAIL, &p), *motion = at && p ? cav_trajectory_new(p->model, 4, .2) : NULL;
+  for (int t = 0; motion && t < 4; t++)
+    motion->q[t * 8] = t * t, motion->q[t * 8 + 2] = 3, motion->q[t * 8 + 7] = -.1 * t;
+  CHECK(motion && !cav_trajectory_write(motion_path, p->model, motion, &error));
+  cav_trajectory_free(motion);
+  cav_trajectory_free(at);
+  cav_problem_free(p);
+  at = guess(HEAD "<guess file='motion.csv' offset='.1'/>" TAIL, &p);
+  if (at) {
+    CHECK(p->nguess_pose == 3);
+    check_knot(at, 1, (double[]){1, 0, 3}, -.1);
+    check_knot(at, 2, (double[]){2.5, 0, 3}, -.15);
+    check_knot(at, 5, (double[]){9, 0, 3}, -.3);
+    check_knot(at, 10, (double[]){1, 0, 2}, 0);
+  }
+  cav_trajectory_free(at);
+  cav_problem_free(p);
+  refuse(HEAD "<guess offset='1'/>" TAIL, 5, "attribute 'file', which is missing");
+  refuse(HEAD "<guess type='hold' file='motion.csv'/>" TAIL, 5, "contradicts attribute 'type'");
+  refuse(HEAD "<guess file='motion.csv' offset='.7'/>" TAIL, 5, "it lasts 0.6 s, got 0.7");
+  refuse(HEAD "<guess file='none.csv'/>" TAIL, 5, "none.csv");
+  unlink(motion_path);
+}
+
 static void check_broken(void) {
   refuse(HEAD "<guess>\n<waypoint key='bent'/></guess>" TAIL, 6, "'time': is missing");
   refuse(HEAD "<guess>\n<waypoint time='.5' key='bent'/></guess>" TAIL, 6, "has a keyframe or pose");
@@ -143,10 +171,12 @@ int main(void) {
   CHECK(mkdtemp(folder) != NULL);
   snprintf(path, sizeof path, "%s/p.xml", folder);
   snprintf(model_path, sizeof model_path, "%s/m.xml", folder);
+  snprintf(motion_path, sizeof motion_path, "%s/motion.csv", folder);
   scene_write(folder, "m.xml", model);
   check_ways();
   check_postures();
   check_broken();
+  check_file();
   unlink(path);
   unlink(model_path);
   rmdir(folder);

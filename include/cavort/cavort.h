@@ -3,6 +3,7 @@
 #define CAVORT_CAVORT_H
 
 #include "cavort/dynamics.h"
+#include "cavort/mocap.h"
 #include "cavort/model.h"
 #include "cavort/problem.h"
 #include "cavort/solve.h"

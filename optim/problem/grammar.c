@@ -127,7 +127,7 @@ static const cav_xml_element swing = {
 static const cav_xml_element guess_waypoint = {
     "waypoint", 0, 0, ATTRIBUTES(REAL("time", 1), POSE_SOURCE), CHILDREN(&pose_root, &pose_joint), 0};
 static const cav_xml_element guess = {
-    "guess", 0, 1, ATTRIBUTES(WORD("type", cav_problem_guesses), REAL("apex", 0), REALS("rotation", 3, 3), TEXT("from", 0), TEXT("to", 0)),
+    "guess", 0, 1, ATTRIBUTES(WORD("type", cav_problem_guesses), REAL("apex", 0), REALS("rotation", 3, 3), TEXT("from", 0), TEXT("to", 0), TEXT("file", 0), REAL("offset", 0)),
     CHILDREN(&guess_waypoint, &swing), 0};
 static const cav_xml_element limits = {"limits", 0, 1, ATTRIBUTES(REAL("effort", 0), REAL("margin", 0)), NULL, 0};
 #define STAGE_REAL(name, ...) REAL(#name, 0),

@@ -334,6 +334,43 @@ static cav_status read_guess_poses(const cav_problem_reader *reader, const cav_x
   return CAV_OK;
 }
 
+// a motion on file as postures on the way, from `offset` of its time on
+static cav_status read_guess_file(const cav_problem_reader *reader, const cav_xml_node *node) {
+  cav_problem *p = reader->problem;
+  if (!cav_xml_get(node, "file"))
+    return cav_xml_get(node, "offset")
+               ? cav_xml_fail(reader->error, node, "offset", "is a time of attribute 'file', which is missing")
+               : CAV_OK;
+  if (p->nguess_pose || p->guess != CAV_GUESS_INTERPOLATE)
+    return cav_xml_fail(reader->error, node, "file", "contradicts %s; remove one of the two",
+                        p->nguess_pose ? "<waypoint>" : "attribute 'type'");
+  cav_error inner = {0};
+  char *path = cav_file_beside(reader->path, cav_xml_text(node, "file", ""));
+  cav_trajectory *motion = path ? cav_trajectory_read(path, reader->model, &inner) : NULL;
+  free(path);
+  if (!motion && inner.status) return cav_xml_fail_as(reader->error, inner.status, node, "file", "%s", inner.text);
+  if (!motion) return cav_problem_no_memory(reader);
+  double offset = cav_xml_real(node, "offset", 0), length = (motion->nknot - 1) * motion->timestep;
+  size_t nq = (size_t)motion->nq, size = (size_t)motion->nknot * nq;
+  cav_guess_pose *list = cav_problem_alloc(reader->owner, (size_t)motion->nknot * sizeof *list);
+  double *q = cav_problem_alloc(reader->owner, size * sizeof *q);
+  cav_status status = list && q ? CAV_OK : cav_problem_no_memory(reader);
+  if (!status && !(offset > -p->duration && offset < length))
+    status = cav_xml_fail(reader->error, node, "offset",
+                          "expected a time at which the motion of the file is under way, it lasts %g s, got %g", length,
+                          offset);
+  if (!status) {
+    memcpy(q, motion->q, size * sizeof *q);
+    p->guess_pose = list;
+    for (int t = 0; t < motion->nknot; t++) {
+      double time = t * motion->timestep - offset;
+      if (time > 0 && time < p->duration) list[p->nguess_pose++] = (cav_guess_pose){time, q + (size_t)t * nq};
+    }
+  }
+  cav_trajectory_free(motion);
+  return status;
+}
+
 static cav_status read_guess(const cav_problem_reader *reader) {
   cav_problem *p = reader->problem;
   const cav_xml_node *node = cav_problem_child(reader->root, "guess");
@@ -346,6 +383,7 @@ static cav_status read_guess(const cav_problem_reader *reader) {
   for (int i = 0; i < 3; i++) p->guess_rotation[i] = rotation[i] * M_PI / 180;
   int turned = rotation[0] != 0 || rotation[1] != 0 || rotation[2] != 0;
   cav_status status = read_guess_poses(reader, node);
+  if (!status) status = read_guess_file(reader, node);
   if (!status) status = read_swings(reader, node);
   if (!status) status = cav_problem_real(reader, node, "apex", 0, DBL_MAX, &p->guess_height);
   if (!status) status = cav_problem_window(reader, node, &p->guess_from, &p->guess_to);

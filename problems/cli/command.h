@@ -34,6 +34,7 @@ typedef struct cav_command_line {
   int all;             ///< --all: explain everything
   int force;           ///< --force: solve what is proven impossible
   const char *methods; ///< --methods, NULL: own
+  const char *markers; ///< --markers
   int nipopt;          ///< --ipopt, any number of times
   cav_ipopt_option ipopt[CAV_COMMAND_IPOPT];
 } cav_command_line;
@@ -57,6 +58,7 @@ cav_status cav_command_expect(const char *command, const char *wanted, const cha
 
 int cav_command_inspect(const cav_command_line *line);
 int cav_command_explain(const cav_command_line *line);
+int cav_command_ik(const cav_command_line *line);
 int cav_command_report(const cav_command_line *line);
 int cav_command_solve(const cav_command_line *line);
 int cav_command_stress(const cav_command_line *line);

@@ -22,7 +22,8 @@ enum option {
   OPTION_FORCE = 1024,
   OPTION_ALL = 2048,
   OPTION_FLOATING = 4096,
-  OPTION_QUICK = 8192
+  OPTION_QUICK = 8192,
+  OPTION_MARKERS = 16384
 };
 
 // options: spelling, value's name or NULL, what it does
@@ -33,7 +34,8 @@ static const struct {
     {OPTION_MODEL, "--model", NULL, "FILE", "use this model instead of the one that the problem names"},
     {OPTION_FLOATING, "--floating", NULL, NULL, "the root link of a URDF floats (a problem says floating=\"true\")"},
     {OPTION_OUTPUT, "--output", "-o", "DIR",
-     "folder of the result (default: NAME.result, of a report NAME.report, of stress NAME.stress; NAME of the problem "
+     "folder of the result (default: NAME.result, of a report NAME.report, of stress NAME.stress, of ik NAME.ik; NAME "
+     "of the problem "
      "or "
      "else of its file)"},
     {OPTION_SOLVER, "--solver", NULL, "WORD", "how to solve"},
@@ -46,6 +48,7 @@ static const struct {
      "what to compare, with commas: own (default), strategies (own, other strategies where needed), ipopt, limited "
      "(Ipopt with "
      "limited memory), both"},
+    {OPTION_MARKERS, "--markers", NULL, "FILE", "marker set: which marker of the clip sits where on which body"},
     {OPTION_THREADS, "--threads", NULL, "N",
      "threads to use (default: all processors); the result does not depend on it"},
     {OPTION_RESUME, "--resume", NULL, NULL,
@@ -82,6 +85,11 @@ static const command commands[] = {
      "of\n"
      "  the guess from start to goal, and how deep start, guess and goal are in what",
      cav_command_view, OPTION_MODEL | OPTION_QUIET},
+    {"ik", "CLIP",
+     "fit a model to a recorded clip (.trc, .c3d, .bvh, .csv, .xml): the motion nearest to its markers, without "
+     "forces;\n"
+     "  writes trajectory.csv, residuals of markers, the marker set with the places that were found, and a page",
+     cav_command_ik, OPTION_MODEL | OPTION_MARKERS | OPTION_OUTPUT | OPTION_QUIET},
     {"report", "MODEL|PROBLEM",
      "measure error against run time of a scene on this machine: forward solvers, time steps and orders, derivatives, "
      "the\n"
@@ -215,6 +223,9 @@ static int take_value(cav_command_line *line, enum option option, const char *na
       return 1;
     case OPTION_IPOPT:
       return take_ipopt(line, value);
+    case OPTION_MARKERS:
+      line->markers = value;
+      return 1;
     case OPTION_THREADS:
       n = strtol(value, &end, 10);
       line->threads = (int)n;
@@ -350,7 +361,7 @@ static int run(int argc, char **argv, const char *arguments) {
   }
   if (!read_line(c, argc - 2, argv + 2, &line)) return CAV_EXIT_BAD_INPUT;
   cav_error error = {0};
-  int one = c->run != help && c->run != cav_command_study;
+  int one = c->run != help && c->run != cav_command_study && c->run != cav_command_ik;
   int status =
       one && cav_command_expect(c->name, c->operand, line.operand, &error) ? cav_command_fail(&error) : c->run(&line);
   // a full disk or a closed pipe must not pass for success

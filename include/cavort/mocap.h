@@ -1,0 +1,116 @@
+/// Recorded motion: places of markers over time, which marker sits where on which body, and the kinematic fit of a
+/// model to them.
+#ifndef CAVORT_MOCAP_H
+#define CAVORT_MOCAP_H
+
+#include "cavort/trajectory.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/// Places of markers, frame by frame, in the world of the models: m, z up. A marker that was not seen is NaN in all
+/// three.
+typedef struct cav_record {
+  int nframe, nmarker;
+  double *time;     ///< [nframe] s, increasing
+  char **name;      ///< [nmarker] unique
+  double *position; ///< [nframe*nmarker*3] m
+  int assumed;      ///< which of the options below the file did not say and nobody gave: CAV_ASSUMED_...
+} cav_record;
+
+/// Bits of cav_record.assumed.
+enum { CAV_ASSUMED_UNIT = 1, CAV_ASSUMED_UP = 2, CAV_ASSUMED_RATE = 4 };
+
+/// What a file of recorded motion may leave out. Zeros: as the file says, or as its format has it.
+typedef struct cav_record_options {
+  double unit;       ///< m that one of the file's units is; 0: as the file says, else m, of BVH 0.01
+  char up;           ///< axis of the file that points up, 'x', 'y' or 'z'; 0: of TRC and BVH 'y', else 'z'
+  double rate;       ///< frames a second; 0: as the file says, of key frames without times 30
+  double from, to;   ///< s: frames outside are left out; to 0: to the end
+  const char *names; ///< of key frames: names of the mocap bodies in their order, by blanks; NULL: those in the file
+} cav_record_options;
+
+/// Reads a clip, by the end of its name: .trc (markers, OpenSim and motion capture systems), .c3d (points), .bvh (a
+/// marker at every joint and end), .csv (columns time, NAME_x, NAME_y, NAME_z, empty where not seen), .xml (MJCF key
+/// frames with mpos: a marker for each mocap body). options may be NULL. NULL on failure with the reason in error
+/// (may be NULL): CAV_BAD_INPUT, CAV_NO_MEMORY, CAV_NOT_SUPPORTED. Freed by cav_record_free.
+CAV_API cav_record *cav_record_read(const char *path, const cav_record_options *options, cav_error *error);
+
+/// nframe frames of nmarker markers at a rate (frames a second, > 0), names NULL and nothing seen: to be filled by
+/// the caller, names from malloc. NULL if memory runs out or a size is below 1.
+CAV_API cav_record *cav_record_new(int nframe, int nmarker, double rate);
+CAV_API void cav_record_free(cav_record *record);
+
+/// Writes a clip as CSV, as cav_record_read reads it. Replaces the file atomically.
+CAV_API cav_status cav_record_write(const char *path, const cav_record *record, cav_error *error);
+
+/// One marker on a body.
+typedef struct cav_marker {
+  char *name;
+  int body;        ///< of the model
+  double place[3]; ///< m, in the body's frame
+  int placed;      ///< 1: place is known; 0: it is where a search for it starts
+  double weight;   ///< 1/m^2 relative to other markers, >= 0
+} cav_marker;
+
+/// Which markers a subject or a robot wears, and how their clips are to be read.
+typedef struct cav_marker_set {
+  int nmarker;
+  cav_marker *marker;      ///< [nmarker] names are unique
+  double adjust;           ///< m: how far off places that are known may be; they are fitted, too. 0: they are exact
+  cav_record_options clip; ///< for cav_record_read; names is memory of the set
+} cav_marker_set;
+
+/// Reads a marker set: an XML file <markers> of elements <marker name= body= pos= weight=>. body is one of the model
+/// or a part that any body has ("right foot"); without pos the place is unknown and starts at the middle of the
+/// body's mass.
+/// <markers> has, where needed, adjust= (m), and what clips leave out: unit= (m), up= (x, y or z), rate= (1/s) and
+/// names= (by blanks).
+/// NULL on failure with the reason in error (may be NULL): CAV_BAD_INPUT, CAV_NO_MEMORY. Freed by cav_marker_set_free.
+CAV_API cav_marker_set *cav_marker_set_read(const char *path, const cav_model *model, cav_error *error);
+CAV_API void cav_marker_set_free(cav_marker_set *set);
+
+/// Writes a marker set, every place as known. Replaces the file atomically. CAV_BAD_INPUT: a marker's body has no
+/// name, or path cannot be written.
+CAV_API cav_status cav_marker_set_write(const char *path, const cav_model *model, const cav_marker_set *set,
+                                        cav_error *error);
+
+/// How a model is fitted to a clip.
+typedef struct cav_ik_options {
+  double posture;   ///< weight of the way from the model's own configuration, m/rad: settles what no marker tells
+  double roughness; ///< weight of the change from the frame before, m/rad: bridges gaps
+  int iterations;   ///< at most, a frame
+} cav_ik_options;
+
+CAV_API cav_ik_options cav_ik_options_default(void);
+
+/// What a fit found. Errors are distances of markers, m.
+typedef struct cav_ik_report {
+  int nframe, nmarker; ///< markers of the set that the clip has, in the set's order
+  int missing;         ///< markers of the clip that the set does not name
+  int *marker;         ///< [nmarker] of the set
+  double *rms, *worst; ///< [nmarker] over the frames that have it
+  int *seen;           ///< [nmarker] frames that have it
+  double *frame_rms;   ///< [nframe] over the markers seen; NaN: none was
+  double total_rms;    ///< over all
+  int iterations;      ///< in all
+} cav_ik_report;
+
+CAV_API void cav_ik_report_free(cav_ik_report *report);
+
+/// Fits a model to a clip: first the places of markers that are not known, together with configurations of frames
+/// spread over the clip; then frame after frame, least squares of weighted distances of markers over configurations
+/// within the ranges of joints, each frame from the one before. Frames keep the clip's times if they are
+/// equidistant, otherwise the mean step is taken between interpolated frames. set: places that were fitted are
+/// written into it. *trajectory has q and v; u is zero. report may be NULL, *report is freed by cav_ik_report_free.
+/// CAV_BAD_INPUT: no marker of the set is in the clip, fewer than two frames, or no frame shows a marker;
+/// CAV_NO_MEMORY, CAV_NOT_FINITE. optim/METHOD.md, 11.
+CAV_API cav_status cav_ik(const cav_model *model, const cav_record *record, cav_marker_set *set,
+                          const cav_ik_options *options, cav_trajectory **trajectory, cav_ik_report **report,
+                          cav_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

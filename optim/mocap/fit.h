@@ -1,0 +1,52 @@
+/// Least squares of markers at one frame: rows, and the normal equations of a configuration. Private to optim/mocap.
+#ifndef CAVORT_FIT_H
+#define CAVORT_FIT_H
+
+#include "cavort/mocap.h"
+
+/// A model, the markers that a clip and a set share, and the work of one fit.
+typedef struct cav_fit {
+  const cav_model *model;
+  cav_state *state;
+  const cav_ik_options *options;
+  const cav_marker_set *set;
+  int n;                      ///< markers of both
+  int *marker, *column;       ///< [n] in the set, in the clip
+  int nframe, nmarker;        ///< of the clip, at equal steps
+  double step;                ///< s
+  const double *position;     ///< [nframe*nmarker*3]
+  double *H, *g, *try, *move; ///< [nv*nv] lower, by columns; [nv]; [nq]; [nv]
+} cav_fit;
+
+/// Where marker i of the fit was seen at a frame; NULL: it was not.
+const double *cav_fit_seen(const cav_fit *fit, int frame, int i);
+
+/// World place of marker i of the fit at the state's position.
+void cav_fit_place(const cav_fit *fit, int i, double world[3]);
+
+/// Jacobian column of a point of a link by dof d, which is of the link or of one before it.
+void cav_fit_column(const cav_fit *fit, int d, const double point[3], double column[3]);
+
+/// Half the squares of all rows at q: markers seen, posture, and the change from before (NULL: none). Leaves the
+/// state at q.
+cav_status cav_fit_cost(const cav_fit *fit, int frame, const double *q, const double *before, double *cost);
+
+/// H and g of the same at the state's position, which is that of q.
+void cav_fit_normal(const cav_fit *fit, int frame, const double *q, const double *before);
+
+/// Dofs at an end of their range that a step would pass are taken out of H, g and B [nv*n] by columns; a step stays
+/// in the ranges.
+void cav_fit_pin(const cav_fit *fit, const double *q, double *B, int n);
+void cav_fit_clip(const cav_model *model, double *q);
+
+/// q [nq] to the least cost from where it is. *iterations grows.
+cav_status cav_fit_frame(cav_fit *fit, int frame, const double *before, double *q, int *iterations);
+
+/// Turns and moves q's free root so that markers lie as near as can be to where they were seen at a frame; nothing
+/// where there is no free root or fewer than three markers.
+cav_status cav_fit_align(const cav_fit *fit, int frame, double *q);
+
+/// Places of markers that are to be found, with the configurations of frames spread over the clip.
+cav_status cav_fit_places(cav_fit *fit, cav_marker_set *set, const double *q, int *iterations);
+
+#endif

@@ -1,0 +1,162 @@
+/// cavort ik: a model fitted to a recorded clip. Writes a folder with trajectory.csv, markers.csv (residuals),
+/// markers.xml (the set with the places that were found) and view.html. Exit status 0 if the fit was made.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "cavort/mocap.h"
+#include "command.h"
+#include "csv.h"
+#include "file.h"
+#include "result.h"
+#include "view.h"
+
+typedef struct fit {
+  const cav_command_line *line;
+  cav_model *model;
+  cav_marker_set *set;
+  cav_record *record;
+  cav_trajectory *motion;
+  cav_ik_report *report;
+  char *folder;
+  double seconds;
+} fit;
+
+static cav_status read_all(fit *f, cav_error *error) {
+  const cav_command_line *line = f->line;
+  if (!line->model)
+    return cav_file_fail(error, CAV_BAD_INPUT, 0, "ik: expected --model FILE, the model that is fitted to the clip");
+  if (!line->markers)
+    return cav_file_fail(error, CAV_BAD_INPUT, 0,
+                         "ik: expected --markers FILE, which says where markers sit: <markers> <marker name=\"R.Heel\" "
+                         "body=\"right foot\"/> ...");
+  if ((f->model = cav_model_load(line->model, error)) && (f->set = cav_marker_set_read(line->markers, f->model, error)))
+    f->record = cav_record_read(line->operand, &f->set->clip, error);
+  return f->record ? CAV_OK : error->status;
+}
+
+// NAME.ik of dir/NAME.trc
+static char *default_folder(const char *clip) {
+  const char *slash = strrchr(clip, '/'), *name = slash ? slash + 1 : clip, *dot = strrchr(name, '.');
+  int n = dot ? (int)(dot - name) : (int)strlen(name);
+  char *folder = malloc((size_t)n + 4);
+  if (folder) sprintf(folder, "%.*s.ik", n, name);
+  return folder;
+}
+
+static cav_status write_residuals(const fit *f, cav_error *error) {
+  cav_file file;
+  char *path = cav_result_path(f->folder, "markers.csv");
+  cav_status status = path ? cav_file_begin(&file, path, error) : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
+  if (!status) {
+    fputs("marker,body,frames,rms_m,worst_m\n", file.stream);
+    for (int i = 0; i < f->report->nmarker; i++) {
+      const cav_marker *marker = &f->set->marker[f->report->marker[i]];
+      cav_table_write_text(file.stream, marker->name);
+      fputc(',', file.stream);
+      cav_table_write_text(file.stream, f->model->body[marker->body].name);
+      fprintf(file.stream, ",%d,", f->report->seen[i]);
+      cav_table_write_number(file.stream, f->report->rms[i]);
+      fputc(',', file.stream);
+      cav_table_write_number(file.stream, f->report->worst[i]);
+      fputc('\n', file.stream);
+    }
+    status = cav_file_end(&file, error);
+  }
+  free(path);
+  return status;
+}
+
+static cav_status write_page(const fit *f, cav_error *error) {
+  char title[340], markers[80], rms[80], clip[200];
+  double *millimetres = malloc((size_t)f->motion->nknot * sizeof *millimetres);
+  char *path = cav_result_path(f->folder, "view.html");
+  if (!millimetres || !path) {
+    free(millimetres), free(path);
+    return cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for the page");
+  }
+  for (int t = 0; t < f->motion->nknot; t++) millimetres[t] = 1e3 * f->report->frame_rms[t];
+  snprintf(title, sizeof title, "%.140s on %.140s, kinematic fit", f->line->operand, f->model->name);
+  snprintf(clip, sizeof clip, "%.180s", f->line->operand);
+  snprintf(markers, sizeof markers, "%d, over %d frames", f->report->nmarker, f->motion->nknot);
+  snprintf(rms, sizeof rms, "%.1f mm", 1e3 * f->report->total_rms);
+  const cav_view_line line[] = {{"clip", clip, -1},
+                                {"markers", markers, -1},
+                                {"distance of markers, rms", rms, -1},
+                                {"forces", "none: a fit of kinematics alone", -1}};
+  const cav_view_series series = {"markers", "distance, rms", "mm", millimetres, NAN, NAN, NULL};
+  cav_view_input input = {.title = title,
+                          .nknot = f->motion->nknot,
+                          .timestep = f->motion->timestep,
+                          .q = f->motion->q,
+                          .nseries = 1,
+                          .series = &series,
+                          .nline = 4,
+                          .line = line};
+  cav_status status = cav_view_write(path, f->model, &input, error);
+  free(millimetres);
+  free(path);
+  return status;
+}
+
+static cav_status write_all(const fit *f, cav_error *error) {
+  cav_status status =
+      f->folder ? cav_result_folder(f->folder, error) : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
+  char *motion = cav_result_path(f->folder, "trajectory.csv"), *set = cav_result_path(f->folder, "markers.xml");
+  if (!status && !(motion && set)) status = cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
+  if (!status) status = cav_trajectory_write(motion, f->model, f->motion, error);
+  if (!status) status = cav_marker_set_write(set, f->model, f->set, error);
+  if (!status) status = write_residuals(f, error);
+  if (!status) status = write_page(f, error);
+  free(motion);
+  free(set);
+  return status;
+}
+
+static void print(const fit *f) {
+  static const char *const assumed[] = {"lengths in the format's usual unit (unit= of the marker set)",
+                                        "the format's usual axis up (up=)", "30 frames a second (rate=)"};
+  const cav_ik_report *r = f->report;
+  for (int k = 0; k < 3; k++)
+    if (f->record->assumed >> k & 1) printf("assumed: %s\n", assumed[k]);
+  printf("%-20s %-20s %7s %9s %9s\n", "marker", "body", "frames", "rms mm", "worst mm");
+  for (int i = 0; i < r->nmarker; i++) {
+    const cav_marker *marker = &f->set->marker[r->marker[i]];
+    printf("%-20.20s %-20.20s %7d %9.1f %9.1f\n", marker->name, f->model->body[marker->body].name, r->seen[i],
+           1e3 * r->rms[i], 1e3 * r->worst[i]);
+  }
+  if (r->missing) printf("%d markers of the clip are not in the marker set\n", r->missing);
+  int absent = f->set->nmarker - r->nmarker;
+  if (absent) printf("%d markers of the set are not in the clip\n", absent);
+  printf("%d frames, %d markers, rms %.2f mm, %.2f s (%.2f s a thousand frames)\n", r->nframe, r->nmarker,
+         1e3 * r->total_rms, f->seconds, 1e3 * f->seconds / r->nframe);
+  printf("wrote %s: trajectory.csv, markers.csv, markers.xml, view.html\n", f->folder);
+}
+
+static double now(void) {
+  struct timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+int cav_command_ik(const cav_command_line *line) {
+  cav_error error = {0};
+  fit f = {.line = line};
+  cav_ik_options options = cav_ik_options_default();
+  cav_status status = read_all(&f, &error);
+  f.seconds = now();
+  if (!status) status = cav_ik(f.model, f.record, f.set, &options, &f.motion, &f.report, &error);
+  f.seconds = now() - f.seconds;
+  f.folder = line->output ? strdup(line->output) : default_folder(line->operand);
+  if (!status) status = write_all(&f, &error);
+  if (!status && !line->quiet) print(&f);
+  cav_ik_report_free(f.report);
+  cav_trajectory_free(f.motion);
+  cav_record_free(f.record);
+  cav_marker_set_free(f.set);
+  cav_model_free(f.model);
+  free(f.folder);
+  return status ? cav_command_fail(&error) : 0;
+}
