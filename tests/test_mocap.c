@@ -329,6 +329,7 @@ static double off(const truth *c, const cav_trajectory *motion) {
 static cav_ik_options bare(void) {
   cav_ik_options options = cav_ik_options_default();
   options.posture = options.roughness = 1e-7;
+  options.floor = 0;
   return options;
 }
 
@@ -427,6 +428,58 @@ static void test_noise(const truth *c) {
   cav_trajectory_free(motion);
 }
 
+// lowest point of the feet by the model's own contacts with the floor: penetration counts below 0
+static double lowest(const cav_model *m, cav_state *state, const double *q) {
+  double least = INFINITY;
+  state->options.smoothing = 0.1;
+  CHECK(!cav_position(m, state, q));
+  for (int i = 0; i < state->ncontact; i++) {
+    const cav_pair *pair = &m->pair[state->contact[i].pair];
+    int foot = !strncmp(m->geom[pair->geom1].name, "foot", 4) || !strncmp(m->geom[pair->geom2].name, "foot", 4);
+    if (pair->external && foot) least = fmin(least, state->contact[i].dist);
+  }
+  return least;
+}
+
+// a body that stands and raises an arm, by markers that are worn 15 mm lower than the set says: it is below the floor,
+// unless feet stand on it
+static void test_floor(const truth *c) {
+  const cav_model *m = c->model;
+  cav_error error = {0};
+  cav_ik_options options = cav_ik_options_default();
+  cav_record *r = cav_record_new(40, c->set->nmarker, 100);
+  cav_state *state = cav_state_new(m);
+  double *q = malloc((size_t)m->nq * sizeof *q);
+  int stand = cav_object_find(m, CAV_OBJECT_KEY, "stand"),
+      bend = cav_object_find(m, CAV_OBJECT_JOINT, "shoulder2_right");
+  for (int i = 0; i < c->set->nmarker; i++) r->name[i] = strdup(c->set->marker[i].name);
+  for (int t = 0; t < 40; t++) {
+    memcpy(q, m->key[stand].q, (size_t)m->nq * sizeof *q);
+    q[m->joint[bend].q] += 0.01 * t;
+    CHECK(!cav_position(m, state, q));
+    for (int i = 0; i < c->set->nmarker; i++) {
+      cav_pose pose;
+      double *x = r->position + 3 * ((size_t)t * (size_t)c->set->nmarker + (size_t)i);
+      cav_object_pose(m, state, CAV_OBJECT_XBODY, c->set->marker[i].body, &pose);
+      transform(x, pose.pos, pose.rotation, c->set->marker[i].place);
+      x[2] -= 0.015;
+    }
+  }
+  for (int with = 0; with < 2; with++) {
+    cav_trajectory *motion;
+    options.floor = with ? 1e4 : 0;
+    CHECK(!cav_ik(m, r, c->set, &options, &motion, NULL, &error));
+    double worst = 0;
+    for (int t = 0; motion && t < 40; t++) worst = fmax(worst, fabs(lowest(m, state, motion->q + t * m->nq)));
+    printf("feet %s the floor: off by %.1e m\n", with ? "on" : "anywhere near", worst);
+    CHECK(with ? worst < 3e-4 : fabs(worst - 0.0155) < 1e-3);
+    cav_trajectory_free(motion);
+  }
+  free(q);
+  cav_state_free(state);
+  cav_record_free(r);
+}
+
 static void test_refusals(const truth *c) {
   cav_ik_options options = cav_ik_options_default();
   cav_trajectory *motion;
@@ -460,6 +513,7 @@ int main(void) {
   test_gaps(&c);
   test_places(&c);
   test_noise(&c);
+  test_floor(&c);
   test_refusals(&c);
   cav_record_free(c.record);
   cav_marker_set_free(c.set);

@@ -80,7 +80,8 @@ CAV_API cav_status cav_marker_set_write(const char *path, const cav_model *model
 typedef struct cav_ik_options {
   double posture;   ///< weight of the way from the model's own configuration, m/rad: settles what no marker tells
   double roughness; ///< weight of the change from the frame before, m/rad: bridges gaps
-  int iterations;   ///< at most, a frame
+  double floor;   ///< 1/m^2 relative to markers: feet that stand are on the plane z = 0, others not below; 0: wherever
+  int iterations; ///< at most, a frame
 } cav_ik_options;
 
 CAV_API cav_ik_options cav_ik_options_default(void);

@@ -4,18 +4,22 @@
 
 #include "cavort/mocap.h"
 
+enum { CAV_FIT_FEET = 6 };
+
 /// A model, the markers that a clip and a set share, and the work of one fit.
 typedef struct cav_fit {
   const cav_model *model;
   cav_state *state;
   const cav_ik_options *options;
   const cav_marker_set *set;
-  int n;                      ///< markers of both
-  int *marker, *column;       ///< [n] in the set, in the clip
-  int nframe, nmarker;        ///< of the clip, at equal steps
-  double step;                ///< s
-  const double *position;     ///< [nframe*nmarker*3]
-  double *H, *g, *try, *move; ///< [nv*nv] lower, by columns; [nv]; [nq]; [nv]
+  int n;                         ///< markers of both
+  int *marker, *column;          ///< [n] in the set, in the clip
+  int nframe, nmarker;           ///< of the clip, at equal steps
+  double step;                   ///< s
+  const double *position;        ///< [nframe*nmarker*3]
+  int nfoot, foot[CAV_FIT_FEET]; ///< bodies
+  char *stands;                  ///< [nframe*CAV_FIT_FEET] 1: that foot stands
+  double *H, *g, *try, *move;    ///< [nv*nv] lower, by columns; [nv]; [nq]; [nv]
 } cav_fit;
 
 /// Where marker i of the fit was seen at a frame; NULL: it was not.
@@ -27,7 +31,13 @@ void cav_fit_place(const cav_fit *fit, int i, double world[3]);
 /// Jacobian column of a point of a link by dof d, which is of the link or of one before it.
 void cav_fit_column(const cav_fit *fit, int d, const double point[3], double column[3]);
 
-/// Half the squares of all rows at q: markers seen, posture, and the change from before (NULL: none). Leaves the
+/// Finds feet and when they stand. floor.c.
+cav_status cav_fit_floor(cav_fit *fit);
+
+/// Whether foot f has a row at a frame, and its lowest point, whose height is that row. floor.c.
+int cav_fit_floor_row(const cav_fit *fit, int frame, int f, double point[3]);
+
+/// Half the squares of all rows at q: markers seen, feet, posture, and the change from before (NULL: none). Leaves the
 /// state at q.
 cav_status cav_fit_cost(const cav_fit *fit, int frame, const double *q, const double *before, double *cost);
 

@@ -8,7 +8,7 @@
 #include "math3.h"
 
 cav_ik_options cav_ik_options_default(void) {
-  return (cav_ik_options){.posture = 1e-3, .roughness = 1e-3, .iterations = 100};
+  return (cav_ik_options){.posture = 1e-3, .roughness = 1e-3, .floor = 10, .iterations = 100};
 }
 
 void cav_ik_report_free(cav_ik_report *report) {
@@ -136,7 +136,8 @@ static cav_status run(cav_fit *fit, cav_marker_set *set, cav_trajectory **trajec
   if (!status) {
     memcpy(q, fit->model->q0, (size_t)fit->model->nq * sizeof *q);
     cav_fit_clip(fit->model, q);
-    status = cav_fit_align(fit, first, q);
+    if (fit->options->floor > 0) status = cav_fit_floor(fit);
+    if (!status) status = cav_fit_align(fit, first, q);
   }
   if (!status) status = cav_fit_frame(fit, first, NULL, q, &report->iterations);
   if (!status) status = cav_fit_places(fit, set, q, &report->iterations);
@@ -154,7 +155,7 @@ cav_status cav_ik(const cav_model *model, const cav_record *record, cav_marker_s
   size_t nv = (size_t)model->nv;
   *trajectory = NULL;
   if (report) *report = NULL;
-  if (!(options->posture >= 0 && options->roughness >= 0 && options->iterations > 0))
+  if (!(options->posture >= 0 && options->roughness >= 0 && options->floor >= 0 && options->iterations > 0))
     return cav_file_fail(error, CAV_BAD_INPUT, 0, "expected weights of at least 0 and one iteration or more");
   cav_status status = match(&fit, record, error);
   if (!status) status = equal_steps(&fit, record, &made, error);
@@ -178,6 +179,6 @@ cav_status cav_ik(const cav_model *model, const cav_record *record, cav_marker_s
   else
     cav_ik_report_free(told);
   cav_state_free(fit.state);
-  free(work), free(made), free(fit.marker), free(fit.column);
+  free(work), free(made), free(fit.marker), free(fit.column), free(fit.stands);
   return status;
 }
