@@ -89,7 +89,11 @@ run 2 verify nowhere
 run 2 view nowhere
 run 2 solv
 says err "did you mean 'solve'"
-run 2 help sensor
+run 0 help sensor
+says out "<sensor> in <cost>"
+run 0 help within
+says out "attribute within of <sensor>"
+run 2 help sensrs
 says err "did you mean 'sensors'"
 run 2 solve a.xml --thread 2
 says err "did you mean '--threads'"

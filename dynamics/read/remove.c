@@ -8,9 +8,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+// clang-format off
 static const cav_xml_attribute remove_attributes[] = {
-    {"body", CAV_XML_TEXT, 1, 0, NULL, 0}, {"geom", CAV_XML_TEXT, 1, 0, NULL, 0}, {NULL, CAV_XML_SKIP, 0, 0, NULL, 0}};
-const cav_xml_element cav_remove_element = {"remove", 0, 0, remove_attributes, NULL, 0};
+    {"body", CAV_XML_TEXT, 1, 0, NULL, 0, &(const cav_xml_note){"", "(a geom by its name)", "body that goes, with all that it carries; beside geom= the body of that geom"}},
+    {"geom", CAV_XML_TEXT, 1, 0, NULL, 0, &(const cav_xml_note){"", "(the whole body)", "geom that goes, by its name, or by its number in the body, from 1"}},
+    {NULL, CAV_XML_SKIP, 0, 0, NULL, 0, NULL}};
+const cav_xml_element cav_remove_element = {
+    "remove", 0, 0, remove_attributes, NULL, 0,
+    "takes a body or a geom out of the model's file (MJCF), with all that refers to it"};
+// clang-format on
 
 /// A name that is gone, of a kind that references know.
 typedef struct lost {

@@ -8,29 +8,29 @@
 #include "spec.h"
 
 #define TEXT(name) \
-  { name, CAV_XML_TEXT, 0, 0, NULL, 0 }
+  { name, CAV_XML_TEXT, 0, 0, NULL, 0, NULL }
 #define NAMED(name) \
-  { name, CAV_XML_TEXT, 1, 0, NULL, 0 }
+  { name, CAV_XML_TEXT, 1, 0, NULL, 0, NULL }
 #define NEEDED(name) \
-  { name, CAV_XML_TEXT, 1, 0, NULL, 1 }
+  { name, CAV_XML_TEXT, 1, 0, NULL, 1, NULL }
 #define INT(name) \
-  { name, CAV_XML_INT, 1, 1, NULL, 0 }
+  { name, CAV_XML_INT, 1, 1, NULL, 0, NULL }
 #define INTS(name, n) \
-  { name, CAV_XML_INT, n, n, NULL, 0 }
+  { name, CAV_XML_INT, n, n, NULL, 0, NULL }
 #define INTS_ANY(name) \
-  { name, CAV_XML_INT, 0, 0, NULL, 0 }
+  { name, CAV_XML_INT, 0, 0, NULL, 0, NULL }
 #define REAL(name) \
-  { name, CAV_XML_REAL, 1, 1, NULL, 0 }
+  { name, CAV_XML_REAL, 1, 1, NULL, 0, NULL }
 #define REALS(name, least, most) \
-  { name, CAV_XML_REAL, least, most, NULL, 0 }
+  { name, CAV_XML_REAL, least, most, NULL, 0, NULL }
 #define WORD(name, words) \
-  { name, CAV_XML_WORD, 0, 0, words, 0 }
+  { name, CAV_XML_WORD, 0, 0, words, 0, NULL }
 #define BOOL(name) \
-  { name, CAV_XML_BOOL, 0, 0, NULL, 0 }
+  { name, CAV_XML_BOOL, 0, 0, NULL, 0, NULL }
 #define SKIP(name) \
-  { name, CAV_XML_SKIP, 0, 0, NULL, 0 }
+  { name, CAV_XML_SKIP, 0, 0, NULL, 0, NULL }
 #define END \
-  { NULL, CAV_XML_SKIP, 0, 0, NULL, 0 }
+  { NULL, CAV_XML_SKIP, 0, 0, NULL, 0, NULL }
 
 // words by the enumerations that mjcf.c casts them to
 static const char *const truth[] = {
@@ -129,13 +129,13 @@ static const char *const biastypes[] = {"none", "affine", "muscle", "user", "dcm
 // --- elements without children, or with children of no interest ---
 
 static const cav_xml_attribute include_attributes[] = {NEEDED("file"), END};
-static const cav_xml_element include = {"include", 0, 0, include_attributes, NULL, CAV_XML_INCLUDE};
+static const cav_xml_element include = {"include", 0, 0, include_attributes, NULL, CAV_XML_INCLUDE, NULL};
 
 #define LEAF(id, name, ...)                                              \
   static const cav_xml_attribute id##_attributes[] = {__VA_ARGS__, END}; \
-  static const cav_xml_element id = {name, 0, 0, id##_attributes, NULL, 0}
+  static const cav_xml_element id = {name, 0, 0, id##_attributes, NULL, 0, NULL}
 
-#define UNREAD(id, name) static const cav_xml_element id = {name, 0, 0, NULL, NULL, CAV_XML_ANYTHING}
+#define UNREAD(id, name) static const cav_xml_element id = {name, 0, 0, NULL, NULL, CAV_XML_ANYTHING, NULL}
 
 UNREAD(size, "size");
 UNREAD(visual, "visual");
@@ -178,7 +178,7 @@ static const cav_xml_attribute compiler_attributes[] = {BOOL("autolimits"),
                                                         SKIP("conflict"),
                                                         END};
 static const cav_xml_element *const compiler_children[] = {&lengthrange, &include, NULL};
-static const cav_xml_element compiler = {"compiler", 0, 0, compiler_attributes, compiler_children, 0};
+static const cav_xml_element compiler = {"compiler", 0, 0, compiler_attributes, compiler_children, 0, NULL};
 
 LEAF(flag, "flag", WORD("constraint", onoff), WORD("equality", onoff), WORD("frictionloss", onoff),
      WORD("limit", onoff), WORD("contact", onoff), WORD("passive", onoff), WORD("gravity", onoff),
@@ -220,7 +220,7 @@ static const cav_xml_attribute option_attributes[] = {REAL("timestep"),
                                                       INTS_ANY("actuatorgroupdisable"),
                                                       END};
 static const cav_xml_element *const option_children[] = {&flag, &include, NULL};
-static const cav_xml_element option = {"option", 0, 0, option_attributes, option_children, 0};
+static const cav_xml_element option = {"option", 0, 0, option_attributes, option_children, 0, NULL};
 
 // --- defaults ---
 
@@ -230,7 +230,8 @@ static const cav_xml_element option = {"option", 0, 0, option_attributes, option
 static const cav_xml_element *const material_children[] = {&layer, &include, NULL};
 LEAF(default_mesh, "mesh", REALS("scale", 3, 3), INT("maxhullvert"), WORD("inertia", mesh_inertias));
 static const cav_xml_attribute default_material_attributes[] = {MATERIAL, END};
-static const cav_xml_element default_material = {"material", 0, 0, default_material_attributes, material_children, 0};
+static const cav_xml_element default_material = {"material",        0, 0,   default_material_attributes,
+                                                 material_children, 0, NULL};
 LEAF(default_joint, "joint", JOINT);
 LEAF(default_geom, "geom", GEOM);
 LEAF(default_site, "site", SITE);
@@ -277,12 +278,12 @@ static const cav_xml_element *const default_children[] = {&default_mesh,
                                                           &defaults,
                                                           &include,
                                                           NULL};
-static const cav_xml_element defaults = {"default", 0, 0, default_attributes, default_children, 0};
+static const cav_xml_element defaults = {"default", 0, 0, default_attributes, default_children, 0, NULL};
 
 // --- assets ---
 
 static const cav_xml_attribute material_attributes[] = {NEEDED("name"), NAMED("class"), MATERIAL, END};
-static const cav_xml_element material = {"material", 0, 0, material_attributes, material_children, 0};
+static const cav_xml_element material = {"material", 0, 0, material_attributes, material_children, 0, NULL};
 static const cav_xml_attribute mesh_attributes[] = {NAMED("name"),
                                                     NAMED("class"),
                                                     NAMED("file"),
@@ -303,28 +304,28 @@ static const cav_xml_attribute mesh_attributes[] = {NAMED("name"),
                                                     SKIP("octree_maxdepth"),
                                                     END};
 static const cav_xml_element *const mesh_children[] = {&plugin, &include, NULL};
-static const cav_xml_element mesh = {"mesh", 0, 0, mesh_attributes, mesh_children, 0};
+static const cav_xml_element mesh = {"mesh", 0, 0, mesh_attributes, mesh_children, 0, NULL};
 LEAF(hfield, "hfield", NAMED("name"), NAMED("file"), SKIP("content_type"), INT("nrow"), INT("ncol"),
-     REALS("elevation", 0, 0), {"size", CAV_XML_REAL, 4, 4, NULL, 1});
+     REALS("elevation", 0, 0), {"size", CAV_XML_REAL, 4, 4, NULL, 1, NULL});
 LEAF(model_asset, "model", NAMED("name"), NEEDED("file"), SKIP("content_type"));
 static const cav_xml_element *const asset_children[] = {&texture,  &hfield,      &mesh,    &skin,
                                                         &material, &model_asset, &include, NULL};
-static const cav_xml_element asset = {"asset", 0, 0, NULL, asset_children, 0};
+static const cav_xml_element asset = {"asset", 0, 0, NULL, asset_children, 0, NULL};
 
 // --- bodies ---
 
-static const cav_xml_attribute inertial_attributes[] = {{"pos", CAV_XML_REAL, 3, 3, NULL, 1},
+static const cav_xml_attribute inertial_attributes[] = {{"pos", CAV_XML_REAL, 3, 3, NULL, 1, NULL},
                                                         ORIENTATION,
-                                                        {"mass", CAV_XML_REAL, 1, 1, NULL, 1},
+                                                        {"mass", CAV_XML_REAL, 1, 1, NULL, 1, NULL},
                                                         REALS("diaginertia", 3, 3),
                                                         REALS("fullinertia", 6, 6),
                                                         END};
-static const cav_xml_element inertial = {"inertial", 0, 1, inertial_attributes, NULL, 0};
+static const cav_xml_element inertial = {"inertial", 0, 1, inertial_attributes, NULL, 0, NULL};
 LEAF(joint, "joint", NAMED("name"), NAMED("class"), JOINT);
 LEAF(freejoint, "freejoint", NAMED("name"), SKIP("group"), WORD("align", aligns));
 static const cav_xml_attribute geom_attributes[] = {NAMED("name"), NAMED("class"), GEOM, END};
 static const cav_xml_element *const geom_children[] = {&plugin, &include, NULL};
-static const cav_xml_element geom = {"geom", 0, 0, geom_attributes, geom_children, 0};
+static const cav_xml_element geom = {"geom", 0, 0, geom_attributes, geom_children, 0, NULL};
 LEAF(attach, "attach", NEEDED("model"), NAMED("body"), TEXT("prefix"), NAMED("frame"));
 LEAF(site, "site", NAMED("name"), NAMED("class"), SITE);
 static const cav_xml_attribute frame_attributes[] = {NAMED("name"), NAMED("childclass"), REALS("pos", 3, 3),
@@ -338,29 +339,36 @@ static const cav_xml_element body, frame;
       &include
 static const cav_xml_element *const body_children[] = {&inertial, &joint, &freejoint, WORLD_CHILDREN, NULL};
 static const cav_xml_element *const frame_children[] = {&joint, &freejoint, WORLD_CHILDREN, NULL};
-static const cav_xml_attribute replicate_attributes[] = {{"count", CAV_XML_INT, 1, 1, NULL, 1},
+static const cav_xml_attribute replicate_attributes[] = {{"count", CAV_XML_INT, 1, 1, NULL, 1, NULL},
                                                          REALS("offset", 3, 3),
                                                          REALS("euler", 3, 3),
                                                          TEXT("sep"),
                                                          NAMED("childclass"),
                                                          END};
-const cav_xml_element cav_replicate_element = {"replicate", 0, 0, replicate_attributes, frame_children, 0};
+const cav_xml_element cav_replicate_element = {"replicate", 0, 0, replicate_attributes, frame_children, 0, NULL};
 static const cav_xml_element *const world_children[] = {WORLD_CHILDREN, NULL};
-static const cav_xml_element frame = {"frame", 0, 0, frame_attributes, frame_children, 0};
+static const cav_xml_element frame = {"frame", 0, 0, frame_attributes, frame_children, 0, NULL};
 const cav_xml_element *const cav_frame_element = &frame;
-static const cav_xml_element body = {"body", 0, 0, body_attributes, body_children, 0};
+static const cav_xml_element body = {"body", 0, 0, body_attributes, body_children, 0, NULL};
 static const cav_xml_attribute world_attributes[] = {NAMED("name"),    NAMED("childclass"), SKIP("pos"), SKIP("quat"),
                                                      SKIP("gravcomp"), SKIP("user"),        END};
-static const cav_xml_element worldbody = {"worldbody", 0, 0, world_attributes, world_children, 0};
+static const cav_xml_element worldbody = {"worldbody", 0, 0, world_attributes, world_children, 0, NULL};
 static const cav_xml_element *const scene_children[] = {WORLD_CHILDREN, &cav_remove_element, NULL};
-const cav_xml_element cav_scene_element = {"scene", 0, 1, NULL, scene_children, 0};
+const cav_xml_element cav_scene_element = {
+    "scene",
+    0,
+    1,
+    NULL,
+    scene_children,
+    0,
+    "bodies and geoms that are added to the world of the model, as MJCF's worldbody has them, angles in degrees"};
 
 // --- contact, equality, tendon ---
 
 LEAF(pair, "pair", NAMED("name"), NAMED("class"), NEEDED("geom1"), NEEDED("geom2"), PAIR);
 LEAF(exclude, "exclude", NAMED("name"), NEEDED("body1"), NEEDED("body2"));
 static const cav_xml_element *const contact_children[] = {&pair, &exclude, &include, NULL};
-static const cav_xml_element contact = {"contact", 0, 0, NULL, contact_children, 0};
+static const cav_xml_element contact = {"contact", 0, 0, NULL, contact_children, 0, NULL};
 
 LEAF(connect, "connect", NAMED("name"), NAMED("class"), EQUALITY, NAMED("body1"), NAMED("body2"), NAMED("site1"),
      NAMED("site2"), REALS("anchor", 3, 3));
@@ -381,21 +389,21 @@ static const cav_xml_element *const equality_children[] = {&connect,           &
                                                            &flexvert_equality, &flexstrain_equality,
                                                            &include,           NULL};
 static const cav_xml_element *const deformable_children[] = {&flex, &skin, &include, NULL};
-static const cav_xml_element deformable = {"deformable", 0, 0, NULL, deformable_children, 0};
-static const cav_xml_element equality = {"equality", 0, 0, NULL, equality_children, 0};
+static const cav_xml_element deformable = {"deformable", 0, 0, NULL, deformable_children, 0, NULL};
+static const cav_xml_element equality = {"equality", 0, 0, NULL, equality_children, 0, NULL};
 
-static const cav_xml_attribute part_attributes[] = {NEEDED("joint"), {"coef", CAV_XML_REAL, 1, 1, NULL, 1}, END};
-static const cav_xml_element part = {"joint", 1, 0, part_attributes, NULL, 0};
+static const cav_xml_attribute part_attributes[] = {NEEDED("joint"), {"coef", CAV_XML_REAL, 1, 1, NULL, 1, NULL}, END};
+static const cav_xml_element part = {"joint", 1, 0, part_attributes, NULL, 0, NULL};
 static const cav_xml_attribute tendon_attributes[] = {NAMED("name"), NAMED("class"), TENDON, END};
 static const cav_xml_element *const fixed_children[] = {&part, &include, NULL};
-static const cav_xml_element fixed = {"fixed", 0, 0, tendon_attributes, fixed_children, 0};
+static const cav_xml_element fixed = {"fixed", 0, 0, tendon_attributes, fixed_children, 0, NULL};
 LEAF(via_site, "site", NEEDED("site"));
 LEAF(via_geom, "geom", NEEDED("geom"), NAMED("sidesite"));
-LEAF(pulley, "pulley", {"divisor", CAV_XML_REAL, 1, 1, NULL, 1});
+LEAF(pulley, "pulley", {"divisor", CAV_XML_REAL, 1, 1, NULL, 1, NULL});
 static const cav_xml_element *const spatial_children[] = {&via_site, &via_geom, &pulley, &include, NULL};
-static const cav_xml_element spatial = {"spatial", 0, 0, tendon_attributes, spatial_children, 0};
+static const cav_xml_element spatial = {"spatial", 0, 0, tendon_attributes, spatial_children, 0, NULL};
 static const cav_xml_element *const tendon_children[] = {&fixed, &spatial, &include, NULL};
-static const cav_xml_element tendon = {"tendon", 0, 0, NULL, tendon_children, 0};
+static const cav_xml_element tendon = {"tendon", 0, 0, NULL, tendon_children, 0, NULL};
 
 // --- actuators ---
 
@@ -410,7 +418,7 @@ LEAF(muscle, "muscle", TRANSMISSION, ACTUATOR, MUSCLE);
 static const cav_xml_element *const actuator_children[] = {&general, &motor,    &position,    &velocity, &intvelocity,
                                                            &damper,  &cylinder, &muscle,      &plugin,   &adhesion,
                                                            &dcmotor, &pid,      &orientation, &include,  NULL};
-static const cav_xml_element actuator = {"actuator", 0, 0, NULL, actuator_children, 0};
+static const cav_xml_element actuator = {"actuator", 0, 0, NULL, actuator_children, 0, NULL};
 
 // --- sensors ---
 
@@ -423,9 +431,9 @@ static const cav_xml_attribute of_tendon[] = {NAMED("name"), NEEDED("tendon"), R
 static const cav_xml_attribute of_actuator[] = {NAMED("name"), NEEDED("actuator"), READING, END};
 static const cav_xml_attribute of_nothing[] = {NAMED("name"), READING, END};
 static const cav_xml_attribute place_attributes[] = {
-    NAMED("name"), {"objtype", CAV_XML_WORD, 0, 0, objects, 1}, NEEDED("objname"), READING, END};
+    NAMED("name"), {"objtype", CAV_XML_WORD, 0, 0, objects, 1, NULL}, NEEDED("objname"), READING, END};
 static const cav_xml_attribute referred_attributes[] = {NAMED("name"),
-                                                        {"objtype", CAV_XML_WORD, 0, 0, objects, 1},
+                                                        {"objtype", CAV_XML_WORD, 0, 0, objects, 1, NULL},
                                                         NEEDED("objname"),
                                                         WORD("reftype", objects),
                                                         NAMED("refname"),
@@ -453,21 +461,21 @@ UNREAD_SENSORS(UNREAD_SENSOR)
 #define OF_FRAME_VELOCITY referred_attributes
 #define OF_FRAME_ACCELERATION place_attributes
 #define SENSOR_ELEMENT(type, name, dim, target, reads, text) \
-  [CAV_SENSOR_##type] = {name, 0, 0, OF_##target(reads), NULL, 0},
+  [CAV_SENSOR_##type] = {name, 0, 0, OF_##target(reads), NULL, 0, NULL},
 #define UNREAD_CHILD(name) &sensor_##name,
 #define SENSOR_CHILD(type, ...) &sensor_elements[CAV_SENSOR_##type],
 static const cav_xml_element sensor_elements[CAV_SENSOR_TYPES] = {CAV_SENSORS(SENSOR_ELEMENT)};
 // clang-format off
 static const cav_xml_element *const sensor_children[] = {CAV_SENSORS(SENSOR_CHILD) UNREAD_SENSORS(UNREAD_CHILD) &include, NULL};
 // clang-format on
-static const cav_xml_element sensor = {"sensor", 0, 0, NULL, sensor_children, 0};
+static const cav_xml_element sensor = {"sensor", 0, 0, NULL, sensor_children, 0, NULL};
 
 // --- keyframes ---
 
 LEAF(key, "key", NAMED("name"), REAL("time"), REALS("qpos", 0, 0), REALS("qvel", 0, 0), SKIP("act"), SKIP("mpos"),
      SKIP("mquat"), SKIP("ctrl"));
 static const cav_xml_element *const keyframe_children[] = {&key, &include, NULL};
-static const cav_xml_element keyframe = {"keyframe", 0, 0, NULL, keyframe_children, 0};
+static const cav_xml_element keyframe = {"keyframe", 0, 0, NULL, keyframe_children, 0, NULL};
 
 // --- the file ---
 
@@ -475,6 +483,6 @@ static const cav_xml_attribute mujoco_attributes[] = {TEXT("model"), END};
 static const cav_xml_element *const mujoco_children[] = {
     &compiler, &option, &size,     &visual, &statistic, &defaults, &custom,     &asset,     &worldbody, &contact,
     &equality, &tendon, &actuator, &sensor, &keyframe,  &include,  &deformable, &extension, NULL};
-const cav_xml_element cav_mjcf_root = {"mujoco", 0, 0, mujoco_attributes, mujoco_children, CAV_XML_PROSE};
+const cav_xml_element cav_mjcf_root = {"mujoco", 0, 0, mujoco_attributes, mujoco_children, CAV_XML_PROSE, NULL};
 static const cav_xml_element *const extension_children[] = {&compiler, &option, &size, NULL};
-const cav_xml_element cav_mjcf_extension = {"mujoco", 0, 0, mujoco_attributes, extension_children, 0};
+const cav_xml_element cav_mjcf_extension = {"mujoco", 0, 0, mujoco_attributes, extension_children, 0, NULL};

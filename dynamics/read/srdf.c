@@ -10,22 +10,25 @@
 #include "math3.h"
 #include "spec.h"
 
-static const cav_xml_attribute pair_attributes[] = {{"link1", CAV_XML_TEXT, 1, 0, NULL, 1},
-                                                    {"link2", CAV_XML_TEXT, 1, 0, NULL, 1},
-                                                    {"reason", CAV_XML_SKIP, 0, 0, NULL, 0},
-                                                    {NULL, CAV_XML_SKIP, 0, 0, NULL, 0}};
-static const cav_xml_attribute value_attributes[] = {
-    {"name", CAV_XML_TEXT, 1, 0, NULL, 1}, {"value", CAV_XML_REAL, 0, 0, NULL, 1}, {NULL, CAV_XML_SKIP, 0, 0, NULL, 0}};
-static const cav_xml_attribute state_attributes[] = {
-    {"name", CAV_XML_TEXT, 1, 0, NULL, 1}, {"group", CAV_XML_SKIP, 0, 0, NULL, 0}, {NULL, CAV_XML_SKIP, 0, 0, NULL, 0}};
-static const cav_xml_attribute robot_attributes[] = {{"name", CAV_XML_TEXT, 0, 0, NULL, 0},
-                                                     {NULL, CAV_XML_SKIP, 0, 0, NULL, 0}};
-static const cav_xml_element pair = {"disable_collisions", 0, 0, pair_attributes, NULL, CAV_XML_OPEN};
-static const cav_xml_element value = {"joint", 0, 0, value_attributes, NULL, CAV_XML_OPEN};
+static const cav_xml_attribute pair_attributes[] = {{"link1", CAV_XML_TEXT, 1, 0, NULL, 1, NULL},
+                                                    {"link2", CAV_XML_TEXT, 1, 0, NULL, 1, NULL},
+                                                    {"reason", CAV_XML_SKIP, 0, 0, NULL, 0, NULL},
+                                                    {NULL, CAV_XML_SKIP, 0, 0, NULL, 0, NULL}};
+static const cav_xml_attribute value_attributes[] = {{"name", CAV_XML_TEXT, 1, 0, NULL, 1, NULL},
+                                                     {"value", CAV_XML_REAL, 0, 0, NULL, 1, NULL},
+                                                     {NULL, CAV_XML_SKIP, 0, 0, NULL, 0, NULL}};
+static const cav_xml_attribute state_attributes[] = {{"name", CAV_XML_TEXT, 1, 0, NULL, 1, NULL},
+                                                     {"group", CAV_XML_SKIP, 0, 0, NULL, 0, NULL},
+                                                     {NULL, CAV_XML_SKIP, 0, 0, NULL, 0, NULL}};
+static const cav_xml_attribute robot_attributes[] = {{"name", CAV_XML_TEXT, 0, 0, NULL, 0, NULL},
+                                                     {NULL, CAV_XML_SKIP, 0, 0, NULL, 0, NULL}};
+static const cav_xml_element pair = {"disable_collisions", 0, 0, pair_attributes, NULL, CAV_XML_OPEN, NULL};
+static const cav_xml_element value = {"joint", 0, 0, value_attributes, NULL, CAV_XML_OPEN, NULL};
 static const cav_xml_element *const state_children[] = {&value, NULL};
-static const cav_xml_element state = {"group_state", 0, 0, state_attributes, state_children, CAV_XML_OPEN};
+static const cav_xml_element state = {"group_state", 0, 0, state_attributes, state_children, CAV_XML_OPEN, NULL};
 static const cav_xml_element *const robot_children[] = {&pair, &state, NULL};
-static const cav_xml_element robot = {"robot", 0, 0, robot_attributes, robot_children, CAV_XML_OPEN | CAV_XML_PROSE};
+static const cav_xml_element robot = {"robot", 0, 0, robot_attributes, robot_children, CAV_XML_OPEN | CAV_XML_PROSE,
+                                      NULL};
 
 // path of the file by one name, length characters long, in one folder; NULL if there is none
 static const char *try_path(cav_spec *spec, int folder, const char *between, const char *name, int length) {

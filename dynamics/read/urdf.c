@@ -23,20 +23,20 @@
 // --- grammar ---
 
 #define TEXT(name, needed) \
-  { name, CAV_XML_TEXT, 1, 0, NULL, needed }
+  { name, CAV_XML_TEXT, 1, 0, NULL, needed, NULL }
 #define NUMBERS(name, n, needed) \
-  { name, CAV_XML_REAL, n, n, NULL, needed }
+  { name, CAV_XML_REAL, n, n, NULL, needed, NULL }
 #define SKIP(name) \
-  { name, CAV_XML_SKIP, 0, 0, NULL, 0 }
+  { name, CAV_XML_SKIP, 0, 0, NULL, 0, NULL }
 #define END \
-  { NULL, CAV_XML_SKIP, 0, 0, NULL, 0 }
+  { NULL, CAV_XML_SKIP, 0, 0, NULL, 0, NULL }
 #define ELEMENT(id, name, least, most, ...)                              \
   static const cav_xml_attribute id##_attributes[] = {__VA_ARGS__, END}; \
-  static const cav_xml_element id = {name, least, most, id##_attributes, NULL, CAV_XML_OPEN}
+  static const cav_xml_element id = {name, least, most, id##_attributes, NULL, CAV_XML_OPEN, NULL}
 #define PARENT(id, name, least, most, children, ...)                     \
   static const cav_xml_attribute id##_attributes[] = {__VA_ARGS__, END}; \
-  static const cav_xml_element id = {name, least, most, id##_attributes, children, CAV_XML_OPEN}
-#define UNREAD(id, name) static const cav_xml_element id = {name, 0, 0, NULL, NULL, CAV_XML_ANYTHING}
+  static const cav_xml_element id = {name, least, most, id##_attributes, children, CAV_XML_OPEN, NULL}
+#define UNREAD(id, name) static const cav_xml_element id = {name, 0, 0, NULL, NULL, CAV_XML_ANYTHING, NULL}
 
 static const char *const joint_types[] = {"revolute", "continuous", "prismatic", "fixed", "floating", "planar", NULL};
 enum { REVOLUTE, CONTINUOUS, PRISMATIC, FIXED, FLOATING, PLANAR };
@@ -57,18 +57,18 @@ PARENT(inertial, "inertial", 0, 1, inertial_children, SKIP("name"));
 ELEMENT(color, "color", 0, 1, NUMBERS("rgba", 4, 1));
 UNREAD(texture, "texture");
 static const cav_xml_element *const material_children[] = {&color, &texture, NULL};
-PARENT(material, "material", 0, 0, material_children, {"name", CAV_XML_TEXT, 0, 0, NULL, 0});
+PARENT(material, "material", 0, 0, material_children, {"name", CAV_XML_TEXT, 0, 0, NULL, 0, NULL});
 
 ELEMENT(box, "box", 0, 1, NUMBERS("size", 3, 1));
 ELEMENT(sphere, "sphere", 0, 1, NUMBERS("radius", 1, 1));
 ELEMENT(cylinder, "cylinder", 0, 1, NUMBERS("radius", 1, 1), NUMBERS("length", 1, 1));
 ELEMENT(capsule, "capsule", 0, 1, NUMBERS("radius", 1, 1), NUMBERS("length", 1, 1));
-ELEMENT(mesh, "mesh", 0, 1, TEXT("filename", 1), {"scale", CAV_XML_REAL, 1, 3, NULL, 0});
+ELEMENT(mesh, "mesh", 0, 1, TEXT("filename", 1), {"scale", CAV_XML_REAL, 1, 3, NULL, 0, NULL});
 static const cav_xml_element *const geometry_children[] = {&box, &sphere, &cylinder, &capsule, &mesh, NULL};
 PARENT(geometry, "geometry", 1, 1, geometry_children, SKIP("name"));
 static const cav_xml_element *const shape_children[] = {&origin, &geometry, &material, &verbose, NULL};
-PARENT(visual, "visual", 0, 0, shape_children, {"name", CAV_XML_TEXT, 0, 0, NULL, 0});
-PARENT(collision, "collision", 0, 0, shape_children, {"name", CAV_XML_TEXT, 0, 0, NULL, 0}, SKIP("group"));
+PARENT(visual, "visual", 0, 0, shape_children, {"name", CAV_XML_TEXT, 0, 0, NULL, 0, NULL});
+PARENT(collision, "collision", 0, 0, shape_children, {"name", CAV_XML_TEXT, 0, 0, NULL, 0, NULL}, SKIP("group"));
 static const cav_xml_element *const link_children[] = {&inertial, &visual, &collision, NULL};
 PARENT(robot_link, "link", 0, 0, link_children, TEXT("name", 1), SKIP("type"));
 
@@ -83,12 +83,13 @@ ELEMENT(safety, "safety_controller", 0, 1, SKIP("soft_lower_limit"), SKIP("soft_
         SKIP("k_velocity"));
 static const cav_xml_element *const joint_children[] = {&origin,   &parent, &child,  &axis,        &limit,
                                                         &dynamics, &mimic,  &safety, &calibration, NULL};
-PARENT(joint, "joint", 0, 0, joint_children, TEXT("name", 1), {"type", CAV_XML_WORD, 0, 0, joint_types, 1});
+PARENT(joint, "joint", 0, 0, joint_children, TEXT("name", 1), {"type", CAV_XML_WORD, 0, 0, joint_types, 1, NULL});
 
 static const cav_xml_element *const robot_children[] = {&robot_link,         &joint, &material, &gazebo, &transmission,
                                                         &cav_mjcf_extension, NULL};
 static const cav_xml_attribute robot_attributes[] = {TEXT("name", 0), SKIP("version"), END};
-const cav_xml_element cav_urdf_root = {"robot", 0, 0, robot_attributes, robot_children, CAV_XML_OPEN | CAV_XML_PROSE};
+const cav_xml_element cav_urdf_root = {"robot", 0, 0, robot_attributes, robot_children, CAV_XML_OPEN | CAV_XML_PROSE,
+                                       NULL};
 
 // --- the tree of links ---
 

@@ -52,7 +52,7 @@ static const cav_xml_element *rule_of_stranger(cav_xml_source *s, int line, cons
     cav_xml_source_fail(s, CAV_NO_MEMORY, line, name, NULL, "no memory for its name");
     return NULL;
   }
-  *rule = (cav_xml_element){copy, 0, 0, NULL, NULL, CAV_XML_ANYTHING | CAV_XML_STRANGE};
+  *rule = (cav_xml_element){copy, 0, 0, NULL, NULL, CAV_XML_ANYTHING | CAV_XML_STRANGE, NULL};
   return rule;
 }
 

@@ -24,12 +24,20 @@ typedef enum cav_xml_type {
   CAV_XML_SKIP  ///< accepted, unread
 } cav_xml_type;
 
+/// What people are told of an attribute (cavort help), in the table that declares it.
+typedef struct cav_xml_note {
+  const char *unit;     ///< "": none
+  const char *fallback; ///< value that leaving it out stands for, or in words what then holds
+  const char *text;     ///< what it means
+} cav_xml_note;
+
 typedef struct cav_xml_attribute {
   const char *name; ///< NULL ends a table
   cav_xml_type type;
   int min, max;             ///< count of values, both 0 for types without
   const char *const *words; ///< CAV_XML_WORD: ends with NULL; the value is the index
   int required;
+  const cav_xml_note *note; ///< NULL: of another format, which has a manual of its own
 } cav_xml_attribute;
 
 /// How an element is checked.
@@ -47,6 +55,7 @@ typedef struct cav_xml_element {
   const cav_xml_attribute *attribute;         ///< ends with name NULL; NULL: none
   const struct cav_xml_element *const *child; ///< ends with NULL; NULL: none
   int flags;
+  const char *text; ///< what it means; NULL: of another format
 } cav_xml_element;
 
 /// A name that files of earlier versions have: an error that meets it says what it is called now.

@@ -97,7 +97,7 @@ static void keep_stranger(cav_xml_source *s, int line, const cav_xml_element *ru
     cav_xml_source_fail(s, CAV_NO_MEMORY, line, rule->name, name, "no memory for its name");
     return;
   }
-  *stranger = (cav_xml_attribute){copy, CAV_XML_SKIP, CAV_XML_STRANGE, 0, NULL, 0};
+  *stranger = (cav_xml_attribute){copy, CAV_XML_SKIP, CAV_XML_STRANGE, 0, NULL, 0, NULL};
   value->rule = stranger;
   value->text = "";
 }

@@ -6,20 +6,21 @@
 #include "clip.h"
 #include "xml.h"
 
-static const cav_xml_attribute key_attributes[] = {{"name", CAV_XML_TEXT, 0, 0, NULL, 0},
-                                                   {"time", CAV_XML_REAL, 1, 1, NULL, 0},
-                                                   {"mpos", CAV_XML_REAL, 1, 0, NULL, 0},
+static const cav_xml_attribute key_attributes[] = {{"name", CAV_XML_TEXT, 0, 0, NULL, 0, NULL},
+                                                   {"time", CAV_XML_REAL, 1, 1, NULL, 0, NULL},
+                                                   {"mpos", CAV_XML_REAL, 1, 0, NULL, 0, NULL},
                                                    {0}};
 static const cav_xml_attribute body_attributes[] = {
-    {"name", CAV_XML_TEXT, 0, 0, NULL, 0}, {"mocap", CAV_XML_BOOL, 0, 0, NULL, 0}, {0}};
-static const cav_xml_element key = {"key", 0, 0, key_attributes, NULL, CAV_XML_OPEN};
-static const cav_xml_element keyframe = {"keyframe",  0, 0, NULL, (const cav_xml_element *const[]){&key, NULL},
-                                         CAV_XML_OPEN};
-static const cav_xml_element body = {"body", 0, 0, body_attributes, NULL, CAV_XML_OPEN};
-static const cav_xml_element world = {"worldbody", 0, 0, NULL, (const cav_xml_element *const[]){&body, NULL},
-                                      CAV_XML_OPEN};
+    {"name", CAV_XML_TEXT, 0, 0, NULL, 0, NULL}, {"mocap", CAV_XML_BOOL, 0, 0, NULL, 0, NULL}, {0}};
+static const cav_xml_element key = {"key", 0, 0, key_attributes, NULL, CAV_XML_OPEN, NULL};
+static const cav_xml_element keyframe = {"keyframe",   0,   0, NULL, (const cav_xml_element *const[]){&key, NULL},
+                                         CAV_XML_OPEN, NULL};
+static const cav_xml_element body = {"body", 0, 0, body_attributes, NULL, CAV_XML_OPEN, NULL};
+static const cav_xml_element world = {"worldbody",  0,   0, NULL, (const cav_xml_element *const[]){&body, NULL},
+                                      CAV_XML_OPEN, NULL};
 static const cav_xml_element root = {
-    "mujoco", 0, 0, NULL, (const cav_xml_element *const[]){&keyframe, &world, NULL}, CAV_XML_OPEN | CAV_XML_PROSE};
+    "mujoco", 0, 0, NULL, (const cav_xml_element *const[]){&keyframe, &world, NULL}, CAV_XML_OPEN | CAV_XML_PROSE,
+    NULL};
 
 // mocap bodies of the world, which are nowhere else; names NULL: counted alone
 static int mocap_bodies(const cav_xml_node *top, char **name) {

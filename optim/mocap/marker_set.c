@@ -7,19 +7,19 @@
 #include "file.h"
 #include "problem_file.h"
 
-static const cav_xml_attribute attributes[] = {{"name", CAV_XML_TEXT, 1, 0, NULL, 1},
-                                               {"body", CAV_XML_TEXT, 1, 0, NULL, 1},
-                                               {"pos", CAV_XML_REAL, 3, 3, NULL, 0},
-                                               {"weight", CAV_XML_REAL, 1, 1, NULL, 0},
+static const cav_xml_attribute attributes[] = {{"name", CAV_XML_TEXT, 1, 0, NULL, 1, NULL},
+                                               {"body", CAV_XML_TEXT, 1, 0, NULL, 1, NULL},
+                                               {"pos", CAV_XML_REAL, 3, 3, NULL, 0, NULL},
+                                               {"weight", CAV_XML_REAL, 1, 1, NULL, 0, NULL},
                                                {0}};
-static const cav_xml_element marker = {"marker", 1, 0, attributes, NULL, 0};
+static const cav_xml_element marker = {"marker", 1, 0, attributes, NULL, 0, NULL};
 static const char *const axes[] = {"x", "y", "z", NULL};
 static const cav_xml_attribute set_attributes[] = {
-    {"adjust", CAV_XML_REAL, 1, 1, NULL, 0}, {"unit", CAV_XML_REAL, 1, 1, NULL, 0},
-    {"up", CAV_XML_WORD, 0, 0, axes, 0},     {"rate", CAV_XML_REAL, 1, 1, NULL, 0},
-    {"names", CAV_XML_TEXT, 1, 0, NULL, 0},  {0}};
+    {"adjust", CAV_XML_REAL, 1, 1, NULL, 0, NULL}, {"unit", CAV_XML_REAL, 1, 1, NULL, 0, NULL},
+    {"up", CAV_XML_WORD, 0, 0, axes, 0, NULL},     {"rate", CAV_XML_REAL, 1, 1, NULL, 0, NULL},
+    {"names", CAV_XML_TEXT, 1, 0, NULL, 0, NULL},  {0}};
 static const cav_xml_element markers = {
-    "markers", 1, 1, set_attributes, (const cav_xml_element *const[]){&marker, NULL}, 0};
+    "markers", 1, 1, set_attributes, (const cav_xml_element *const[]){&marker, NULL}, 0, NULL};
 
 void cav_marker_set_free(cav_marker_set *set) {
   if (!set) return;

@@ -33,21 +33,25 @@ static const char *const relations[] = {"none", "start", "goal", NULL};
 
 // the tables below read as rows
 // clang-format off
-// name, type, least and most values, words, required
-#define TEXT(name, required) \
-  { name, CAV_XML_TEXT, 1, 0, NULL, required }
-#define REAL(name, required) \
-  { name, CAV_XML_REAL, 1, 1, NULL, required }
-#define REALS(name, least, most) \
-  { name, CAV_XML_REAL, least, most, NULL, 0 }
-#define WHOLE(name, required) \
-  { name, CAV_XML_INT, 1, 1, NULL, required }
-#define WORD(name, words) \
-  { name, CAV_XML_WORD, 0, 0, words, 0 }
-#define FLAG(name) \
-  { name, CAV_XML_BOOL, 0, 0, NULL, 0 }
+// name, type, least and most values, words, required; unit, what holds where it is left out (in parentheses: in words),
+// meaning
+#define NOTE(unit, fallback, text) &(const cav_xml_note) { unit, fallback, text }
+#define TEXT(name, fallback, text) \
+  { name, CAV_XML_TEXT, 1, 0, NULL, 0, NOTE("", fallback, text) }
+#define NEEDED(name, text) \
+  { name, CAV_XML_TEXT, 1, 0, NULL, 1, NOTE("", NULL, text) }
+#define REAL(name, required, unit, fallback, text) \
+  { name, CAV_XML_REAL, 1, 1, NULL, required, NOTE(unit, fallback, text) }
+#define REALS(name, least, most, unit, fallback, text) \
+  { name, CAV_XML_REAL, least, most, NULL, 0, NOTE(unit, fallback, text) }
+#define WHOLE(name, fallback, text) \
+  { name, CAV_XML_INT, 1, 1, NULL, 0, NOTE("", fallback, text) }
+#define WORD(name, words, fallback, text) \
+  { name, CAV_XML_WORD, 0, 0, words, 0, NOTE("", fallback, text) }
+#define FLAG(name, fallback, text) \
+  { name, CAV_XML_BOOL, 0, 0, NULL, 0, NOTE("", fallback, text) }
 #define END \
-  { NULL, CAV_XML_SKIP, 0, 0, NULL, 0 }
+  { NULL, CAV_XML_SKIP, 0, 0, NULL, 0, NULL }
 #define ATTRIBUTES(...) \
   (const cav_xml_attribute[]) { __VA_ARGS__, END }
 #define CHILDREN(...) \
@@ -55,105 +59,197 @@ static const char *const relations[] = {"none", "start", "goal", NULL};
 
 // postures
 static const cav_xml_element pose_root = {
-    "root", 0, 0, ATTRIBUTES(TEXT("joint", 0), REALS("pos", 3, 3), REALS("quat", 4, 4), REALS("euler", 3, 3)), NULL, 0};
+    "root", 0, 0,
+    ATTRIBUTES(
+        TEXT("joint", "(the first free joint)", "free joint that is placed"),
+        REALS("pos", 3, 3, "m", "(as it was)", "position in the world"),
+        REALS("quat", 4, 4, "", "(as it was)", "orientation as a quaternion w x y z, brought to unit length"),
+        REALS("euler", 3, 3, "degrees", "(as it was)", "orientation by rotations about x, then the new y, then the new z")),
+    NULL, 0, "places a free joint: position and orientation of what floats"};
 static const cav_xml_element pose_joint = {
-    "joint", 0, 0, ATTRIBUTES(TEXT("name", 1), REALS("pos", 1, 1), REALS("degrees", 1, 1), REALS("quat", 4, 4)),
-    NULL,    0};
-#define POSE_SOURCE TEXT("key", 0), REALS("qpos", 1, 0), TEXT("file", 0), WORD("knot", ends), WORD("height", heights), REAL("rise", 0), \
-  WORD("ranges", clippings)
+    "joint", 0, 0,
+    ATTRIBUTES(
+        NEEDED("name", "joint that is set"),
+        REALS("pos", 1, 1, "rad or m", "(one of the three is given)", "angle of a hinge, distance of a slide"),
+        REALS("degrees", 1, 1, "degrees", "(one of the three is given)", "angle of a hinge"),
+        REALS("quat", 4, 4, "", "(one of the three is given)", "orientation of a ball joint, w x y z")),
+    NULL, 0, "sets one joint"};
+#define POSE_SOURCE                                                                                                    \
+  TEXT("key", "(the model's own configuration)", "keyframe of the model or else <pose> of this file to begin with; \"stand\" serves any model with feet"), \
+  REALS("qpos", 1, 0, "rad or m", "(the model's own configuration)", "all nq coordinates to begin with, in MuJoCo's layout"), \
+  TEXT("file", "(the model's own configuration)", "trajectory.csv to take a knot of, relative to this file"),          \
+  WORD("knot", ends, "last", "knot of that file"),                                                                     \
+  WORD("height", heights, "keep", "floor: each tree that is free or slides upright is raised or lowered until it stands"), \
+  REAL("rise", 0, "m", "(0; what stands in the way down stops it)", "with height=\"floor\": so far above the plane, whatever lies between"), \
+  WORD("ranges", clippings, "keep", "clip: joints are brought into their ranges first")
 static const cav_xml_element start = {
-    "start", 1, 1, ATTRIBUTES(POSE_SOURCE, REALS("qvel", 1, 0)), CHILDREN(&pose_root, &pose_joint), 0};
-static const cav_xml_element goal = {"goal", 0, 1, ATTRIBUTES(POSE_SOURCE), CHILDREN(&pose_root, &pose_joint), 0};
+    "start", 1, 1, ATTRIBUTES(POSE_SOURCE, REALS("qvel", 1, 0, "rad/s or m/s", "(zeros)", "velocity at the start, nv numbers")),
+    CHILDREN(&pose_root, &pose_joint), 0, "posture and velocity that the motion begins with"};
+static const cav_xml_element goal = {
+    "goal", 0, 1, ATTRIBUTES(POSE_SOURCE), CHILDREN(&pose_root, &pose_joint), 0,
+    "posture that the guess leads to and that <posture> terms have as their target; without it the start"};
 static const cav_xml_element pose = {
-    "pose", 0, 0, ATTRIBUTES(TEXT("name", 1), POSE_SOURCE), CHILDREN(&pose_root, &pose_joint), 0};
+    "pose", 0, 0, ATTRIBUTES(NEEDED("name", "name by which key= finds it"), POSE_SOURCE), CHILDREN(&pose_root, &pose_joint), 0,
+    "a posture with a name, where the model has no keyframe of it"};
 
 // terms: what is measured; when; and as a cost or as a constraint
-#define TABLE TEXT("file", 0), TEXT("columns", 0)
-#define WINDOW TEXT("name", 0), TEXT("from", 0), TEXT("to", 0), TEXT("at", 0), REAL("scale", 0), TEXT("within", 0)
-#define DOFS WORD("dofs", cav_problem_dof_sets), TEXT("joint", 0)
-#define RATE_ATTRIBUTES DOFS, TABLE, REALS("target", 1, 0)
-#define POSTURE_ATTRIBUTES DOFS, TABLE, TEXT("key", 0), REALS("qpos", 1, 0)
-#define SENSOR_ATTRIBUTES \
-  WORD("type", sensors), TEXT("body", 0), TEXT("xbody", 0), TEXT("geom", 0), TEXT("site", 0),     \
-      TEXT("joint", 0), TEXT("tendon", 0), TEXT("actuator", 0), WORD("reftype", frames), TEXT("refname", 0), \
-      TEXT("component", 0), TABLE, REALS("target", 1, 0), WORD("relative", relations)
+#define TABLE                                                                                                          \
+  TEXT("file", "(no table)", "CSV table of targets, linear between its times: column time in s, then one for each number of a target"), \
+  TEXT("columns", "(all, in the order of the target)", "columns of that table to take, separated by |")
+#define WINDOW                                                                                                         \
+  TEXT("name", "(the element's name)", "name in logs and tables; of a <sensor> without type= the name of a sensor of the model"), \
+  TEXT("from", "(0)", "begin of the window, s or \"end\""),                                                            \
+  TEXT("to", "(end)", "end of the window, s or \"end\""),                                                              \
+  TEXT("at", "(the window)", "one time in the place of a window, s or \"end\": the nearest knot"),                     \
+  REAL("scale", 0, "of the term", "1", "residuals are divided by it: the size of an error that counts as one"),        \
+  TEXT("within", "(0.03 m, 0.1 rad, 0.3 m/s or rad/s, 0.1 of an axis for goals; none for running costs)",              \
+       "tolerance of the target, in the unit of the term: the motion has achieved it if off by at most this; \"any\": reported only. Of slip, m/s: so fast contacts may slide")
+#define DOFS                                                                                                           \
+  WORD("dofs", cav_problem_dof_sets, "joints", "dofs that count: joints are all but free joints"),                     \
+  TEXT("joint", "(dofs)", "one joint in the place of a set of dofs")
+#define RATE_ATTRIBUTES                                                                                                \
+  DOFS, TABLE, REALS("target", 1, 0, "of the term", "(0)", "wanted rate: one number, or one for each selected dof")
+#define POSTURE_ATTRIBUTES                                                                                             \
+  DOFS, TABLE, TEXT("key", "(the goal)", "wanted posture: keyframe of the model or <pose> of this file"),              \
+  REALS("qpos", 1, 0, "rad or m", "(the goal)", "wanted posture: all nq coordinates, or of one hinge or slide its number")
+#define SENSOR_ATTRIBUTES                                                                                              \
+  WORD("type", sensors, "(the sensor of the model by that name)", "what is read, by MJCF's names"),                    \
+  TEXT("body", "(another object)", "object: frame at the centre of mass of a body, with its principal axes; roles such as \"right foot\" stand for bodies"), \
+  TEXT("xbody", "(another object)", "object: frame of a body as the model's file writes it"),                          \
+  TEXT("geom", "(another object)", "object: a geom"), TEXT("site", "(another object)", "object: a site"),              \
+  TEXT("joint", "(another object)", "object: a joint"), TEXT("tendon", "(another object)", "object: a tendon"),        \
+  TEXT("actuator", "(another object)", "object: an actuator"),                                                         \
+  WORD("reftype", frames, "(the world)", "kind of the frame that a position, velocity or orientation is read in"),     \
+  TEXT("refname", "(the world)", "name of that frame"),                                                                \
+  TEXT("component", "(all)", "x, y or z: the one value that counts"), TABLE,                                           \
+  REALS("target", 1, 0, "of the sensor", "(0; the unit quaternion)", "wanted reading: all values, or that of the component"), \
+  WORD("relative", relations, "none", "the target is counted from the reading at the start or the goal posture")
 static const cav_xml_element posture_waypoint = {
-    "waypoint", 0, 0, ATTRIBUTES(REAL("time", 1), TEXT("key", 0), REALS("qpos", 1, 0)), NULL, 0};
+    "waypoint", 0, 0,
+    ATTRIBUTES(
+        REAL("time", 1, "s", NULL, "when"), TEXT("key", "(qpos)", "posture wanted then: a keyframe or a <pose>"),
+        REALS("qpos", 1, 0, "rad or m", "(key)", "posture wanted then, as numbers")),
+    NULL, 0, "target of a <posture> at a time, linear between such times"};
 static const cav_xml_element value_waypoint = {
-    "waypoint", 0, 0, ATTRIBUTES(REAL("time", 1), {"target", CAV_XML_REAL, 1, 0, NULL, 1}), NULL, 0};
+    "waypoint", 0, 0,
+    ATTRIBUTES(
+        REAL("time", 1, "s", NULL, "when"),
+        {"target", CAV_XML_REAL, 1, 0, NULL, 1, NOTE("of the term", NULL, "value wanted then")}),
+    NULL, 0, "target of a term at a time, linear between such times"};
 
 // attributes and children of a term by what it has values of
 #define TERM_SENSOR(use) ATTRIBUTES(SENSOR_ATTRIBUTES, WINDOW, use), CHILDREN(&value_waypoint)
 #define TERM_POSTURE(use) ATTRIBUTES(POSTURE_ATTRIBUTES, WINDOW, use), CHILDREN(&posture_waypoint)
 #define TERM_RATE(use) ATTRIBUTES(RATE_ATTRIBUTES, WINDOW, use), CHILDREN(&value_waypoint)
 #define TERM_ACTUATORS(use) ATTRIBUTES(WINDOW, use), NULL
-#define TERM_CONTACTS(use) ATTRIBUTES(TEXT("body", 0), WINDOW, use), NULL
+#define TERM_CONTACTS(use) ATTRIBUTES(TEXT("body", "(all contacts)", "contacts of this body's link alone; such a term is added to the default one"), WINDOW, use), NULL
 
-#define COST REAL("weight", 1), WORD("norm", cav_problem_norms)
-#define COST_ELEMENT(quantity, element, of, ...) \
-  static const cav_xml_element cost_##element = {#element, 0, 0, TERM_##of(COST), 0};
+#define COST                                                                                                           \
+  REAL("weight", 1, "", NULL, "the cost is weight/2 times the squared residual, integrated over the window in s, or at one knot as it is; 0 removes a default"), \
+  WORD("norm", cav_problem_norms, "square", "square: x^2/2 of each residual x; absolute: sqrt(1 + x^2) - 1, linear far beyond the scale")
+#define COST_ELEMENT(quantity, element, of, reads, hard, unit, words, text) \
+  static const cav_xml_element cost_##element = {#element, 0, 0, TERM_##of(COST), 0, text};
 #define COST_CHILD(quantity, element, ...) &cost_##element,
 CAV_QUANTITIES(COST_ELEMENT)
 static const cav_xml_element cost = {
-    "cost", 0, 1, NULL, (const cav_xml_element *const[]){CAV_QUANTITIES(COST_CHILD) NULL}, 0};
+    "cost", 0, 1, NULL, (const cav_xml_element *const[]){CAV_QUANTITIES(COST_CHILD) NULL}, 0, "terms that are minimised"};
 
-#define BOUNDS REAL("lower", 0), REAL("upper", 0)
-#define HARD_ELEMENT_0(element, of)
-#define HARD_ELEMENT_1(element, of) \
-  static const cav_xml_element hard_##element = {#element, 0, 0, TERM_##of(BOUNDS), 0};
+#define BOUNDS                                                                                                         \
+  REAL("lower", 0, "of the term", "(open)", "least value; without either bound the value equals its target"),          \
+  REAL("upper", 0, "of the term", "(open)", "greatest value")
+#define HARD_ELEMENT_0(element, of, text)
+#define HARD_ELEMENT_1(element, of, text) \
+  static const cav_xml_element hard_##element = {#element, 0, 0, TERM_##of(BOUNDS), 0, text};
 #define HARD_CHILD_0(element)
 #define HARD_CHILD_1(element) &hard_##element,
-#define HARD_ELEMENT(quantity, element, of, reads, hard, ...) HARD_ELEMENT_##hard(element, of)
+#define HARD_ELEMENT(quantity, element, of, reads, hard, unit, words, text) HARD_ELEMENT_##hard(element, of, text)
 #define HARD_CHILD(quantity, element, of, reads, hard, ...) HARD_CHILD_##hard(element)
 CAV_QUANTITIES(HARD_ELEMENT)
 static const cav_xml_element constraint = {
-    "constraint", 0, 1, NULL, (const cav_xml_element *const[]){CAV_QUANTITIES(HARD_CHILD) NULL}, 0};
+    "constraint", 0, 1, NULL, (const cav_xml_element *const[]){CAV_QUANTITIES(HARD_CHILD) NULL}, 0, "terms that have to hold"};
 
 // the rest
 static const cav_xml_element horizon = {
-    "horizon",
-    1,
-    1,
-    ATTRIBUTES(REAL("duration", 1), REAL("timestep", 0), WORD("order", cav_problem_orders),
-               WORD("close", cav_problem_closings), REALS("range", 2, 2), REAL("weight", 0)),
-    NULL,
-    0};
-static const cav_xml_element cycle_pair = {"pair", 0, 0, ATTRIBUTES(TEXT("joint", 1), TEXT("other", 1)), NULL, 0};
+    "horizon", 1, 1,
+    ATTRIBUTES(
+        REAL("duration", 1, "s", NULL, "length of the motion, a whole number of steps"),
+        REAL("timestep", 0, "s", "0.025", "time between knots"),
+        WORD("order", cav_problem_orders, "midpoint", "where in a step bias forces are taken; momentum: exact in flight"),
+        WORD("close", cav_problem_closings, "rest", "rest: at rest after the last knot, with forces there; open: no forces at the last knot"),
+        REALS("range", 2, 2, "s", "(fixed duration)", "shortest and longest duration: the solver finds it, times of windows scale with it"),
+        REAL("weight", 0, "", "0", "cost of a free duration: weight/2 times its square in s^2")),
+    NULL, 0, "duration, time step and the order of the integrator"};
+static const cav_xml_element cycle_pair = {
+    "pair", 0, 0, ATTRIBUTES(NEEDED("joint", "a joint"), NEEDED("other", "its counterpart on the other side")), NULL, 0,
+    "counterparts under the mirror, where names (left and right, l and r) do not tell"};
 static const cav_xml_element cycle = {
-    "cycle", 0, 1, ATTRIBUTES(REALS("translation", 3, 3), REAL("rotation", 0), WORD("mirror", cav_problem_mirrors)),
-    CHILDREN(&cycle_pair), 0};
+    "cycle", 0, 1,
+    ATTRIBUTES(
+        REALS("translation", 3, 3, "m", "0 0 0", "way from one period to the next"),
+        REAL("rotation", 0, "degrees", "0", "rotation about the vertical from one period to the next"),
+        WORD("mirror", cav_problem_mirrors, "none", "axis that is reflected: the horizon is half a stride, the other half has left and right exchanged")),
+    CHILDREN(&cycle_pair), 0, "the end is the start, moved: a gait; start is where the guess begins"};
 static const cav_xml_element swing = {
-    "swing", 0, 0, ATTRIBUTES(TEXT("joint", 1), REAL("amplitude", 1), REAL("frequency", 1), REAL("phase", 0)), NULL, 0};
+    "swing", 0, 0,
+    ATTRIBUTES(
+        NEEDED("joint", "hinge or slide that swings"), REAL("amplitude", 1, "rad or m", NULL, "half of the way back and forth"),
+        REAL("frequency", 1, "Hz", NULL, "swings in a second"), REAL("phase", 0, "degrees", "0", "phase at the start")),
+    NULL, 0, "sine laid over one joint of the guess, within its range, fading in and out"};
 static const cav_xml_element guess_waypoint = {
-    "waypoint", 0, 0, ATTRIBUTES(REAL("time", 1), POSE_SOURCE), CHILDREN(&pose_root, &pose_joint), 0};
+    "waypoint", 0, 0, ATTRIBUTES(REAL("time", 1, "s", NULL, "when, after 0 and before the end"), POSE_SOURCE),
+    CHILDREN(&pose_root, &pose_joint), 0, "posture that the guess passes, linear in time between such postures"};
 static const cav_xml_element guess = {
-    "guess", 0, 1, ATTRIBUTES(WORD("type", cav_problem_guesses), REAL("apex", 0), REALS("rotation", 3, 3), TEXT("from", 0), TEXT("to", 0), TEXT("file", 0), REAL("offset", 0)),
-    CHILDREN(&guess_waypoint, &swing), 0};
-static const cav_xml_element limits = {"limits", 0, 1, ATTRIBUTES(REAL("effort", 0), REAL("margin", 0)), NULL, 0};
-#define STAGE_REAL(name, ...) REAL(#name, 0),
-#define STAGE_WHOLE(name, ...) WHOLE(#name, 0),
-#define STAGE (const cav_xml_attribute[]) { CAV_STAGE_OPTIONS(STAGE_REAL, STAGE_WHOLE) END }
-static const cav_xml_element schedule_first = {"first", 0, 1, STAGE, NULL, 0};
-static const cav_xml_element schedule_last = {"last", 0, 1, STAGE, NULL, 0};
+    "guess", 0, 1,
+    ATTRIBUTES(
+        WORD("type", cav_problem_guesses, "interpolate", "interpolate: from start to goal; hold: the start; pump: a swing-up found by simulation"),
+        REAL("apex", 0, "m", "0", "height of a ballistic arc that is added between from and to"),
+        REALS("rotation", 3, 3, "degrees", "0 0 0", "rotation of the first free joint between from and to, as a rotation vector"),
+        TEXT("from", "0", "begin of the arc and the rotation, s or \"end\""), TEXT("to", "end", "end of them, s or \"end\""),
+        TEXT("file", "(none)", "motion to follow: a trajectory.csv of the same model, such as ik and solve write"),
+        REAL("offset", 0, "s", "0", "time of that motion at which the guess begins")),
+    CHILDREN(&guess_waypoint, &swing), 0, "motion that the solver starts from; it obeys nothing yet"};
+static const cav_xml_element limits = {
+    "limits", 0, 1,
+    ATTRIBUTES(
+        REAL("effort", 0, "", "0.8", "fraction of the actuators' limits to plan with, the rest is for feedback"),
+        REAL("margin", 0, "rad or m", "0.001", "distance kept from the limits of joints and tendons")),
+    NULL, 0, "reserve that a plan keeps from limits"};
+#define STAGE_REAL_first(name, first, last, least, most, course, law, unit, text) REAL(#name, 0, unit, #first, text),
+#define STAGE_WHOLE_first(name, first, last, least, most, text) WHOLE(#name, #first, text),
+#define STAGE_REAL_last(name, first, last, least, most, course, law, unit, text) REAL(#name, 0, unit, #last, text),
+#define STAGE_WHOLE_last(name, first, last, least, most, text) WHOLE(#name, #last, text),
+#define STAGE(end) (const cav_xml_attribute[]) { CAV_STAGE_OPTIONS(STAGE_REAL_##end, STAGE_WHOLE_##end) END }
+static const cav_xml_element schedule_first = {"first", 0, 1, STAGE(first), NULL, 0, "values of the first stage: soft and blurred, easy to solve"};
+static const cav_xml_element schedule_last = {"last", 0, 1, STAGE(last), NULL, 0, "values of the last stage: the contact law that the motion is certified under"};
 static const cav_xml_element schedule = {
-    "schedule", 0, 1, ATTRIBUTES(WHOLE("stages", 0), WORD("sliding", cav_problem_slidings), WORD("next_gap", cav_problem_next_gaps)), CHILDREN(&schedule_first, &schedule_last), 0};
-#define IPOPT(name, type, least, most, strict, words) TEXT(#name, 0),
+    "schedule", 0, 1,
+    ATTRIBUTES(
+        WHOLE("stages", "16", "number of stages, geometric from first to last"),
+        WORD("sliding", cav_problem_slidings, "coulomb", "law of contacts that slide, from three quarters of the stages on"),
+        WORD("next_gap", cav_problem_next_gaps, "linear", "gap after a step that contacts see, from half of the stages on")),
+    CHILDREN(&schedule_first, &schedule_last), 0, "continuation from soft, blurred contacts to hard, sharp ones"};
+#define IPOPT(name, type, least, most, strict, words, text) TEXT(#name, "(Ipopt's own, or what the stages set)", text),
 static const cav_xml_element ipopt = {
-    "ipopt", 0, 1, (const cav_xml_attribute[]){CAV_IPOPT_OPTIONS(IPOPT) END}, NULL, 0};
-#define OPTION_REAL(stage, name, least, most, required, ...) REAL(#name, required),
-#define OPTION_WORD(stage, name, ...) WORD(#name, cav_problem_##name##s),
-#define OPTION_FLAG(stage, name, ...) FLAG(#name),
+    "ipopt", 0, 1, (const cav_xml_attribute[]){CAV_IPOPT_OPTIONS(IPOPT) END}, NULL, 0,
+    "options for --solver ipopt and both; --ipopt NAME=VALUE on the command line takes precedence"};
+#define OPTION_REAL(stage, name, least, most, required, unit, text) REAL(#name, required, unit, required ? NULL : "(the model's)", text),
+#define OPTION_WORD(stage, name, type, words, text) WORD(#name, cav_problem_##name##s, "(the model's)", text),
+#define OPTION_FLAG(stage, name, text) FLAG(#name, "(the model's)", text),
 static const cav_xml_element contact = {
-    "contact", 0, 1, (const cav_xml_attribute[]){CAV_OPTIONS(OPTION_REAL, OPTION_WORD, OPTION_FLAG) END}, NULL, 0};
+    "contact", 0, 1, (const cav_xml_attribute[]){CAV_OPTIONS(OPTION_REAL, OPTION_WORD, OPTION_FLAG) END}, NULL, 0,
+    "in result folders alone: the contact law that the recorded motion obeys"};
 
 const cav_xml_element cav_problem_element = {
     "problem",
     1,
     1,
-    ATTRIBUTES(TEXT("name", 0), TEXT("model", 0), FLAG("floating")),
+    ATTRIBUTES(
+        TEXT("name", "(the file's name)", "names the result folder and the page"),
+        TEXT("model", "(given by --model)", "model file, MJCF or URDF, relative to this file"),
+        FLAG("floating", "false", "the root link of a URDF floats")),
     CHILDREN(&cav_scene_element, &horizon, &cycle, &start, &goal, &pose, &guess, &cost, &constraint, &limits, &schedule, &ipopt,
              &contact),
-    0};
+    0, "root of a problem file: one motion that is wanted of a model"};
 
 // names of earlier versions
 #define FORMER_CHILD(inside, was, now) { inside, was, now, 0 }

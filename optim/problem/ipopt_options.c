@@ -9,7 +9,7 @@
 #include "file.h"
 #include "xml.h"
 
-#define RULE(name, type, least, most, strict, words) {#name, type, least, most, strict, words},
+#define RULE(name, type, least, most, strict, words, text) {#name, type, least, most, strict, words, text},
 static const cav_ipopt_rule rule[] = {CAV_IPOPT_OPTIONS(RULE)};
 enum { RULES = sizeof rule / sizeof *rule };
 

@@ -101,13 +101,4 @@ void cav_command_warn_efforts(const cav_model *model, FILE *out);
 /// Tells how far the model of a mirrored cycle is from its mirror image, where it is not that.
 void cav_command_tell_asymmetry(const cav_problem *problem, FILE *out);
 
-/// Prints a topic of cavort help; 0 if there is none of that name. topics.c.
-int cav_topic_print(const char *name);
-
-/// The topic whose name is nearest to a word, NULL: none is near.
-const char *cav_topic_nearest(const char *word);
-
-/// Prints the list of topics.
-void cav_topics_print(void);
-
 #endif

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "command.h"
+#include "manual.h"
 #include "xml.h"
 
 enum option {
@@ -26,11 +27,10 @@ enum option {
   OPTION_MARKERS = 16384
 };
 
-// options: spelling, value's name or NULL, what it does
-static const struct {
-  enum option option;
-  const char *name, *brief, *value, *text;
-} options[] = {
+#define SOLVER_NAME(solver, name, ...) "|" #name
+
+// options: bit, spelling, short spelling or NULL, value's name or NULL, what it does
+static const cav_manual_option options[] = {
     {OPTION_MODEL, "--model", NULL, "FILE", "use this model instead of the one that the problem names"},
     {OPTION_FLOATING, "--floating", NULL, NULL, "the root link of a URDF floats (a problem says floating=\"true\")"},
     {OPTION_OUTPUT, "--output", "-o", "DIR",
@@ -38,7 +38,7 @@ static const struct {
      "of the problem "
      "or "
      "else of its file)"},
-    {OPTION_SOLVER, "--solver", NULL, "WORD", "how to solve"},
+    {OPTION_SOLVER, "--solver", NULL, &(CAV_SOLVERS(SOLVER_NAME))[1], "how to solve"},
     {OPTION_IPOPT, "--ipopt", NULL, "NAME=VALUE",
      "an option of Ipopt, laid over the problem's; may be given several times"},
     {OPTION_STRATEGIES, "--strategies", NULL, "N",
@@ -61,15 +61,9 @@ static const struct {
 };
 enum { NOPTION = sizeof options / sizeof *options };
 
-typedef struct command {
-  const char *name, *operand, *text;
-  int (*run)(const cav_command_line *);
-  int options;
-} command;
-
 static int help(const cav_command_line *line);
 
-static const command commands[] = {
+static const cav_manual_command commands[] = {
     {"inspect", "MODEL|PROBLEM", "say what a model or a problem holds, what it runs and what it leaves out",
      cav_command_inspect, OPTION_MODEL | OPTION_FLOATING},
     {"solve", "PROBLEM", "find the motion that a problem file asks for, certify it and write a result folder",
@@ -104,7 +98,10 @@ static const command commands[] = {
      "push a scene to its edges: each parameter swept over its decades, the range in which all holds, the first value\n"
      "  that breaks, and why. Writes a page and two tables",
      cav_command_stress, OPTION_MODEL | OPTION_FLOATING | OPTION_OUTPUT | OPTION_THREADS | OPTION_QUICK | OPTION_QUIET},
-    {"help", "[COMMAND|TOPIC]", "say how to use the tool, one of its commands, or what problem files may say", help, 0},
+    {"help", "[COMMAND|TOPIC|NAME]",
+     "say how to use the tool, one of its commands, or what problem files may say: a topic, an element, an attribute, "
+     "a term",
+     help, 0},
 };
 enum { NCOMMAND = sizeof commands / sizeof *commands };
 
@@ -117,20 +114,20 @@ static void print_solvers(void) {
   }
 }
 
-static void print_command(const command *c) {
+static void print_command(const cav_manual_command *c) {
   printf("cavort %s %s\n  %s\n", c->name, c->operand, c->text);
   for (int i = 0; i < NOPTION; i++) {
     char text[64];
-    if (!(c->options & (int)options[i].option)) continue;
+    if (!(c->options & options[i].bit)) continue;
     snprintf(text, sizeof text, "%s%s%s%s%s", options[i].brief ? options[i].brief : "", options[i].brief ? ", " : "",
              options[i].name, options[i].value ? " " : "", options[i].value ? options[i].value : "");
     printf("  %-18s %s", text, options[i].text);
-    if (options[i].option == OPTION_SOLVER) print_solvers();
+    if (options[i].bit == OPTION_SOLVER) print_solvers();
     printf("\n");
   }
 }
 
-static const command *find_command(const char *name) {
+static const cav_manual_command *find_command(const char *name) {
   for (int i = 0; i < NCOMMAND; i++) {
     if (!strcmp(commands[i].name, name)) return &commands[i];
   }
@@ -142,16 +139,38 @@ static void suggest(const char *near) {
   if (near) fprintf(stderr, "; did you mean '%s'?", near);
 }
 
-static int help(const cav_command_line *line) {
-  const command *c = line->operand ? find_command(line->operand) : NULL;
-  if (line->operand && !c && cav_topic_print(line->operand)) return 0;
-  if (line->operand && !c) {
-    const char *near = cav_xml_nearest(line->operand, &commands->name, NCOMMAND, sizeof *commands);
-    fprintf(stderr, "cavort: there is no command or topic '%s'", line->operand);
-    suggest(near ? near : cav_topic_nearest(line->operand));
-    fprintf(stderr, "; see cavort help\n");
-    return CAV_EXIT_BAD_INPUT;
+// a topic, or else elements, attributes and sensors of that name; 0: there is none. A topic may have such a name, too
+static int print_named(const cav_manual *manual, const char *name) {
+  int told = 0;
+  for (int i = 0; i < manual->ntopic; i++) {
+    if (strcmp(manual->topic[i].name, name)) continue;
+    manual->topic[i].print(stdout, manual);
+    told++;
   }
+  return told + cav_manual_explain(stdout, name);
+}
+
+static void print_topics(const cav_manual *manual) {
+  printf("topics of cavort help\n");
+  for (int i = 0; i < manual->ntopic; i++) printf("  %-18s %s\n", manual->topic[i].name, manual->topic[i].text);
+  printf("  %-18s %s\n\n", "NAME", "an element, an attribute, a term or a sensor of problem files by its name");
+}
+
+static int no_help(const cav_manual *manual, const char *name) {
+  const char *near = cav_xml_nearest(name, &commands->name, NCOMMAND, sizeof *commands);
+  if (!near) near = cav_xml_nearest(name, &manual->topic->name, manual->ntopic, sizeof *manual->topic);
+  if (!near) near = cav_manual_nearest(name);
+  fprintf(stderr, "cavort: there is no command or topic '%s'", name);
+  suggest(near);
+  fprintf(stderr, "; see cavort help\n");
+  return CAV_EXIT_BAD_INPUT;
+}
+
+static int help(const cav_command_line *line) {
+  cav_manual manual = {.command = commands, .option = options, .ncommand = NCOMMAND, .noption = NOPTION};
+  manual.topic = cav_manual_topics(&manual.ntopic);
+  const cav_manual_command *c = line->operand ? find_command(line->operand) : NULL;
+  if (line->operand && !c) return print_named(&manual, line->operand) ? 0 : no_help(&manual, line->operand);
   if (c) {
     print_command(c);
     return 0;
@@ -161,12 +180,12 @@ static int help(const cav_command_line *line) {
     print_command(&commands[i]);
     printf("\n");
   }
-  cav_topics_print();
+  print_topics(&manual);
   printf(
       "certified: obeys physics and limits; achieved: does what was asked; optimal: a local optimum, another guess may "
       "lead\n"
       "to a better one\n");
-  printf("exit status: 0 certified and achieved or done, 1 not, 2 bad input, 3 internal error, 130 interrupted\n");
+  printf("exit status: " CAV_MANUAL_EXIT "\n");
   return 0;
 }
 
@@ -275,7 +294,7 @@ static const char *option_renamed(const char *argument) {
 }
 
 // reads what follows the command's name; returns 0 after telling what is wrong
-static int read_line(const command *c, int argc, char **argv, cav_command_line *line) {
+static int read_line(const cav_manual_command *c, int argc, char **argv, cav_command_line *line) {
   for (int i = 0; i < argc; i++) {
     char *value;
     if (argv[i][0] != '-' || !argv[i][1]) {
@@ -293,7 +312,7 @@ static int read_line(const command *c, int argc, char **argv, cav_command_line *
       continue;
     }
     int k = option_of(argv[i], &value);
-    if (k < 0 || !(c->options & (int)options[k].option)) {
+    if (k < 0 || !(c->options & options[k].bit)) {
       const char *now = option_renamed(argv[i]);
       if (now)
         fprintf(stderr, "cavort %s: %.*s is called %s now\n", c->name, (int)strcspn(argv[i], "="), argv[i], now);
@@ -311,7 +330,7 @@ static int read_line(const command *c, int argc, char **argv, cav_command_line *
       fprintf(stderr, "cavort %s: %s needs a value: %s\n", c->name, options[k].name, options[k].value);
       return 0;
     }
-    if (!take_value(line, options[k].option, options[k].name, value)) return 0;
+    if (!take_value(line, (enum option)options[k].bit, options[k].name, value)) return 0;
   }
   if (line->operand || c->operand[0] == '[') return 1;
   fprintf(stderr, "cavort %s: expected %s; see cavort help %s\n", c->name, c->operand, c->name);
@@ -347,7 +366,7 @@ static int run(int argc, char **argv, const char *arguments) {
     cav_command_version();
     return 0;
   }
-  const command *c = find_command(name);
+  const cav_manual_command *c = find_command(name);
   if (!c) {
     fprintf(stderr, "cavort: there is no command '%s'", name);
     suggest(cav_xml_nearest(name, &commands->name, NCOMMAND, sizeof *commands));

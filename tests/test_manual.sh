@@ -1,0 +1,122 @@
+#!/bin/sh
+# What the tool prints of itself. Usage: test_manual.sh TOOL SOURCE. The committed reference is the one that is printed; the
+# schema takes every problem file of the repository and refuses what the reader refuses for a name, a word or a number; the man
+# page renders without a warning; completion completes. What a program is missing for is said, and not checked.
+set -u
+tool=$1
+source=$2
+folder=$(mktemp -d) || exit 1
+trap 'rm -rf "$folder"' EXIT
+checks=0
+failed=0
+check() {
+  text=$1
+  shift
+  checks=$((checks + 1))
+  "$@" >"$folder/told" 2>&1 && return
+  failed=$((failed + 1))
+  echo "failed: $text"
+  head -n 12 "$folder/told" | sed 's/^/    /'
+}
+not() { ! "$@"; }
+
+# --- the reference ---
+
+"$tool" help reference >"$folder/reference.md"
+check "problems/reference.md is what cavort help reference prints: record it anew" \
+  diff "$folder/reference.md" "$source/problems/reference.md"
+for command in $("$tool" help | sed -n 's/^cavort \([a-z]*\) .*/\1/p'); do
+  [ "$command" = cavort ] || check "$command has a section" grep -q "^### cavort $command " "$folder/reference.md"
+done
+
+# --- the schema ---
+
+if command -v xmllint >/dev/null 2>&1; then
+  "$tool" help xsd >"$folder/problem.xsd"
+  by_schema() { xmllint --noout --schema "$folder/problem.xsd" "$1"; }
+  n=0
+  for file in $(find "$source/problems" "$source/tests" -name '*.xml'); do
+    grep -q '<problem' "$file" || continue
+    # the corpus of the fuzzer holds names of earlier versions, on purpose
+    case $file in */fuzz/*) continue ;; esac
+    n=$((n + 1))
+    check "$file against the schema" by_schema "$file"
+  done
+  check "there are problem files" [ "$n" -gt 25 ]
+
+  # one fault in a file that is right: refused by the reader and by the schema
+  cp "$source/tests/rise_model.xml" "$folder/model.xml"
+  cat >"$folder/right.xml" <<'TEXT'
+<problem name="right" model="model.xml"><horizon duration="1" timestep="0.05" order="euler"/>
+<start><joint name="pivot" pos="0.1"/></start><guess apex="0"><swing joint="pivot" amplitude="1" frequency="1"/></guess>
+<cost><posture at="end" weight="3" dofs="all"/><effort weight="1"/></cost>
+<schedule stages="4"><first softness="1"/></schedule></problem>
+TEXT
+  by_reader() { "$tool" inspect "$1"; }
+  check "a right file, by the reader" by_reader "$folder/right.xml"
+  check "a right file, by the schema" by_schema "$folder/right.xml"
+  while IFS='|' read -r what command; do
+    sed "$command" "$folder/right.xml" >"$folder/wrong.xml"
+    check "a fault is made: $what" not cmp -s "$folder/right.xml" "$folder/wrong.xml"
+    check "the reader refuses $what" not by_reader "$folder/wrong.xml"
+    check "the schema refuses $what" not by_schema "$folder/wrong.xml"
+  done <<'TEXT'
+an attribute that there is not|s/timestep=/timestap=/
+an attribute of the root|s/name="right"/nome="right"/
+an attribute of a term|s/dofs="all"/dof="all"/
+an element|s/<effort/<efort/
+an element in the wrong place|s/<swing/<horizon/
+a word|s/order="euler"/order="heun"/
+another word|s/dofs="all"/dofs="most"/
+too many numbers|s/pos="0.1"/pos="0.1 0.2"/
+no number|s/weight="3"/weight="much"/
+a hexadecimal number|s/weight="3"/weight="0x3"/
+a number that is not finite|s/weight="3"/weight="inf"/
+a fraction of a stage|s/stages="4"/stages="4.5"/
+a missing attribute|s/ duration="1"//
+a missing weight|s/<effort weight="1"/<effort/
+a missing name|s/<joint name="pivot"/<joint/
+an empty text|s/joint name="pivot"/joint name=""/
+a stage twice|s/<first softness="1"\/>/<first softness="1"\/><first softness="2"\/>/
+TEXT
+else
+  echo "no xmllint here: the schema is not checked"
+fi
+
+# --- the man page ---
+
+if command -v groff >/dev/null 2>&1; then
+  "$tool" help man >"$folder/cavort.1"
+  check "the man page renders" sh -c "groff -man -ww -Tascii -P-c -P-b '$folder/cavort.1' 2>'$folder/warnings' | grep -q 'cavort solve'"
+  check "without a warning" not test -s "$folder/warnings"
+else
+  echo "no groff here: the man page is not rendered"
+fi
+
+# --- completion ---
+
+if command -v bash >/dev/null 2>&1; then
+  "$tool" help bash >"$folder/cavort.bash"
+  # what completes the last of some words
+  complete() {
+    bash -c 'source "$1"; shift; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _cavort; echo "${COMPREPLY[*]}"' \
+      bash "$folder/cavort.bash" "$@"
+  }
+  check "commands" test "$(complete cavort so)" = solve
+  check "options" test "$(complete cavort solve --str)" = --strategies
+  check "no option of another command" test -z "$(complete cavort solve --quick)"
+  check "words of an option" test "$(complete cavort solve --solver ip)" = ipopt
+  check "topics" test "$(complete cavort help sche)" = schedule
+  check "files" test "$(cd "$folder" && complete cavort inspect mod)" = "$([ -f "$folder/model.xml" ] && echo model.xml)"
+else
+  echo "no bash here: its completion is not checked"
+fi
+if command -v zsh >/dev/null 2>&1; then
+  "$tool" help zsh >"$folder/_cavort"
+  check "completion for zsh" zsh -n "$folder/_cavort"
+else
+  echo "no zsh here: its completion is not checked"
+fi
+
+echo "$checks checks, $failed failed"
+[ "$failed" -eq 0 ] && [ "$checks" -gt 10 ]
