@@ -45,6 +45,8 @@ names = {os.path.basename(f) for f in files}
 declared = set(re.findall(r'\b(cav_\w+)', ' '.join(re.sub(r'//[^\n]*', '', texts[f]) for f in sources)))
 sections = {l: set(re.findall(r'^## (\d+)\.', texts[l + '/METHOD.md'], re.M)) for l in ('dynamics', 'optim')}
 made = {'viewer_page.h', 'cavort.pc', 'meson-private'}
+# and what a document tells its reader to write
+made |= {name for f in texts if f.endswith('.md') for name in re.findall(r'^```\w+ file=(\S+)', texts[f], re.M)}
 for f in texts:
     layer = f.split('/')[0]
     for number, line in enumerate(texts[f].splitlines(), 1):
