@@ -28,6 +28,8 @@ static const double THIN = 1e-7;
 // fraction of the curvature of a contact that pushes below which there is none
 static const double FLAT = 1e-13;
 
+static int is_curved(const cav_shape *s) { return s->type == CAV_GEOM_ELLIPSOID || s->type == CAV_GEOM_CYLINDER; }
+
 static void place(const cav_model *model, const cav_state *state, int index, cav_shape *shape) {
   const cav_geom *geom = &model->geom[index];
   const cav_pose *link = &state->link[geom->link];
@@ -119,18 +121,58 @@ static int solve_two(const double a[2], const double b[2], const double r[2], do
   return 1;
 }
 
-// the nearest points of two bodies without a curve but a radius: the normal stays square to what both parts contain, and
-// where they contain less than a plane it turns with the line between the points. 0 if the parts do not say how
-static int nearest_points(const cav_contact *c, const cav_shape *a, const cav_shape *b, double size, geometry *g) {
+// the separation of two shapes and what of both meets; 0 where that is not known. A curved shape is the first
+static int find_parts(const cav_contact *c, const cav_shape *a, const cav_shape *b, double size, cav_separation *s,
+                      parts *p) {
   cav_core ca = cav_core_of(a), cb = cav_core_of(b);
+  int curved = is_curved(a);
+  *p = (parts){.n = 0};
+  if (!curved) {
+    double most = c->dist + ca.radius + cb.radius + size;
+    return cav_separation_find(&ca, &cb, fmax(cav_shape_size(a), cav_shape_size(b)), most, s) && s->corners &&
+           add_part(p, s->corner_a, s->corners, 0, size) && add_part(p, s->corner_b, s->corners, 1, size);
+  }
+  if (!cav_separation_solve(a, b, c->dist + size, s) || !s->corners || s->straight == 2) return 0;
+  if (s->straight) column3(p->along[p->n++], a->rotation, 2);
+  return add_part(p, s->corner_b, s->corners, 1, size);
+}
+
+// how the normal turns, in two directions square to it, and how far the points slide along their parts until the line
+// between them is the normal again: G (turn) + slides = rest, and as many rows say how far the normal turns along a
+// part. t[0] is along the first part. 0 if they do not say how
+static int turn_and_slide(const parts *p, double row[2][2], double G[2][2], const double right[2], const double rest[2],
+                          double least, double turn[2], double slide[2]) {
+  slide[0] = slide[1] = 0;
+  if (p->n == 2) {
+    double left[2];
+    if (!solve_two((double[]){row[0][0], row[1][0]}, (double[]){row[0][1], row[1][1]}, right, turn)) return 0;
+    for (int k = 0; k < 2; k++) left[k] = rest[k] - G[k][0] * turn[0] - G[k][1] * turn[1];
+    return solve_two(row[0], row[1], left, slide);
+  }
+  if (p->n == 1) {
+    if (!(fabs(G[1][1]) > least)) return 0;
+    turn[0] = right[0] / row[0][0];
+    turn[1] = (rest[1] - G[1][0] * turn[0]) / G[1][1];
+    slide[0] = (rest[0] - G[0][0] * turn[0] - G[0][1] * turn[1]) / row[0][0];
+    return 1;
+  }
+  double det = G[0][0] * G[1][1] - G[0][1] * G[1][0];
+  if (!(fabs(det) > least * least)) return 0;
+  turn[0] = (rest[0] * G[1][1] - rest[1] * G[0][1]) / det;
+  turn[1] = (G[0][0] * rest[1] - G[1][0] * rest[0]) / det;
+  return 1;
+}
+
+// the nearest points of two bodies: the normal stays square to what both parts contain, and where they contain less
+// than a plane it turns with the line between the points, which on a curved body move with the normal. 0 if the parts do
+// not say how
+static int nearest_points(const cav_contact *c, const cav_shape *a, const cav_shape *b, double size, geometry *g) {
   cav_separation s;
-  double most = c->dist + ca.radius + cb.radius + size;
-  if (!cav_separation_find(&ca, &cb, fmax(cav_shape_size(a), cav_shape_size(b)), most, &s) || !s.corners) return 0;
-  parts p = {.n = 0};
-  if (!add_part(&p, s.corner_a, s.corners, 0, size) || !add_part(&p, s.corner_b, s.corners, 1, size)) return 0;
-  if (p.n < 2 && fabs(s.gap) < THIN * size) return 0;
+  parts p;
+  if (!find_parts(c, a, b, size, &s, &p)) return 0;
+  double radius_a = cav_core_of(a).radius, radius_b = cav_core_of(b).radius;
   // two directions square to the normal: the first part and the one across it
-  double t[2][3];
+  double t[2][3], row[2][2], H[2][2] = {{0}}, G[2][2];
   if (p.n) {
     copy3(t[0], p.along[0]);
     axpy3(t[0], t[0], -dot3(t[0], s.n), s.n);
@@ -140,46 +182,37 @@ static int nearest_points(const cav_contact *c, const cav_shape *a, const cav_sh
   }
   normalise3(t[0]);
   cross3(t[1], s.n, t[0]);
-  double row[2][2];
   for (int i = 0; i < p.n; i++) {
     for (int k = 0; k < 2; k++) row[i][k] = dot3(p.along[i], t[k]);
   }
+  if (is_curved(a)) cav_shape_bend(a, s.n, t, H);
+  for (int i = 0; i < 2; i++) {
+    for (int k = 0; k < 2; k++) G[i][k] = H[i][k] + (i == k) * s.gap;
+  }
   memset(g, 0, sizeof *g);
   for (int k = 0; k < 6; k++) {
-    double arm[3], move[3], twist[6], right[2], turn[2], slide[2], left[3];
+    double arm[3], move[3], twist[6], right[2], turn[2], slide[2];
     unit(twist, k);
     sub3(arm, s.y, c->pos);
     copy3(move, twist + 3);
     cross_add3(move, twist, arm);
     g->dist[k] = dot3(s.n, move);
-    // the normal: square to both parts
+    // the normal stays square to the parts of the second body as they turn
     for (int i = 0; i < p.n; i++) {
       double turned[3];
       cross3(turned, twist, p.along[i]);
       right[i] = p.of_b[i] ? -dot3(s.n, turned) : 0;
     }
-    if (p.n < 2) {
-      // across what they contain it follows the points
-      for (int i = p.n; i < 2; i++) {
-        row[i][0] = i == 0, row[i][1] = i == 1;
-        right[i] = dot3(t[i], move) / s.gap;
-      }
-    }
-    if (!solve_two((double[]){row[0][0], row[1][0]}, (double[]){row[0][1], row[1][1]}, right, turn)) return 0;
-    for (int i = 0; i < 2; i++) axpy3(g->normal[k], g->normal[k], turn[i], t[i]);
-    // the points slide along their parts until the line between them is the normal again
-    axpy3(left, move, -s.gap, g->normal[k]);
-    double rest[2] = {dot3(left, t[0]), dot3(left, t[1])};
-    slide[0] = slide[1] = 0;
-    if (p.n == 1) slide[0] = rest[0] / row[0][0];
-    if (p.n == 2 && !solve_two(row[0], row[1], rest, slide)) return 0;
+    const double rest[2] = {dot3(move, t[0]), dot3(move, t[1])};
+    if (!turn_and_slide(&p, row, G, right, rest, THIN * size, turn, slide)) return 0;
     copy3(g->pos[k], move);
-    for (int i = 0; i < p.n; i++) {
-      // x + slide a = y + move + slide b: of b the other way
-      axpy3(g->pos[k], g->pos[k], p.of_b[i] ? -2 * slide[i] : 0, p.along[i]);
-      axpy3(g->pos[k], g->pos[k], slide[i], p.along[i]);
+    for (int i = 0; i < 2; i++) {
+      axpy3(g->normal[k], g->normal[k], turn[i], t[i]);
+      axpy3(g->pos[k], g->pos[k], H[i][0] * turn[0] + H[i][1] * turn[1], t[i]);
     }
-    axpy3(g->pos[k], g->pos[k], ca.radius - cb.radius, g->normal[k]);
+    // x + slide a = y + move + slide b: of b the other way
+    for (int i = 0; i < p.n; i++) axpy3(g->pos[k], g->pos[k], p.of_b[i] ? -slide[i] : slide[i], p.along[i]);
+    axpy3(g->pos[k], g->pos[k], radius_a - radius_b, g->normal[k]);
     scale3(g->pos[k], 0.5, g->pos[k]);
   }
   return 1;
@@ -189,6 +222,7 @@ static int nearest_points(const cav_contact *c, const cav_shape *a, const cav_sh
 static void over_face(const cav_face_point *p, const double twist[6], const double arm[3], double move[3]) {
   copy3(move, twist + 3);
   cross_add3(move, twist, arm);
+  axpy3(move, move, dot3(p->turning, twist), p->roll);
   // over a side of the face it slides along the other body's side, over a corner it only rises
   double along = dot3(p->side, p->over), square = dot3(p->face, p->normal);
   if (along != 0) axpy3(move, move, -dot3(p->over, move) / along, p->side);
@@ -220,11 +254,9 @@ static int face_point(const cav_contact *c, const cav_pair_manifolds *m, geometr
   return 1;
 }
 
-// whether a contact is the one between the nearest points that gjk.c finds
+// whether a contact is the one between the nearest points that gjk.c or convex.c finds
 static int is_nearest(const cav_contact *c, const cav_shape *a, const cav_shape *b) {
-  int straight =
-      a->type == CAV_GEOM_SPHERE || a->type == CAV_GEOM_CAPSULE || a->type == CAV_GEOM_BOX || a->type == CAV_GEOM_MESH;
-  return b->type == CAV_GEOM_MESH && straight && c->feature == 0;
+  return b->type == CAV_GEOM_MESH && a->type != CAV_GEOM_PLANE && c->feature == 0;
 }
 
 // what the second contact axis is aligned with, by the rule of collide.c

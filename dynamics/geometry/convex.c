@@ -167,40 +167,52 @@ static int features_along(const cav_shape *s, const double n[3], double meets, d
 
 // --- direction of a pair of features ---
 
+void cav_shape_bend(const cav_shape *s, const double n[3], double t[2][3], double H[2][2]) {
+  double m[3], u[2][3], w[3], x[3];
+  rotate_back(m, s->rotation, n);
+  for (int i = 0; i < 2; i++) rotate_back(u[i], s->rotation, t[i]);
+  if (s->type == CAV_GEOM_ELLIPSOID) {
+    for (int k = 0; k < 3; k++) x[k] = s->size[k] * m[k];
+    double length = norm3(x);
+    for (int k = 0; k < 3; k++) x[k] *= s->size[k] / length;
+    for (int i = 0; i < 2; i++) {
+      for (int j = 0; j < 2; j++) {
+        for (int k = 0; k < 3; k++) H[i][j] += u[i][k] * s->size[k] * s->size[k] * u[j][k] / length;
+        H[i][j] -= dot3(x, u[i]) * dot3(x, u[j]) / length;
+      }
+    }
+    return;
+  }
+  double length = sqrt(m[0] * m[0] + m[1] * m[1]);
+  set3(w, length > 0 ? -m[1] / length : 0, length > 0 ? m[0] / length : 1, 0);
+  for (int i = 0; i < 2; i++) {
+    for (int j = 0; j < 2; j++) H[i][j] += s->size[0] / fmax(length, 1e-300) * dot3(w, u[i]) * dot3(w, u[j]);
+  }
+}
+
 // point of a feature furthest along n; H += t_i' (derivative of that point by n) t_j
 static void follow(const cav_shape *s, const feature *f, const double n[3], double t[2][3], double x[3],
                    double H[2][2]) {
-  double m[3], u[2][3], w[3], length = 0;
+  double m[3], local[3], axis[3];
   if (f->corners) {
     copy3(x, f->x[0]);
     return;
   }
+  cav_shape_bend(s, n, t, H);
   rotate_back(m, s->rotation, n);
-  for (int i = 0; i < 2; i++) rotate_back(u[i], s->rotation, t[i]);
   if (s->type == CAV_GEOM_ELLIPSOID) {
-    double local[3];
     for (int k = 0; k < 3; k++) local[k] = s->size[k] * m[k];
-    length = norm3(local);
+    double length = norm3(local);
     for (int k = 0; k < 3; k++) local[k] *= s->size[k] / length;
-    for (int i = 0; i < 2; i++) {
-      for (int j = 0; j < 2; j++) {
-        for (int k = 0; k < 3; k++) H[i][j] += u[i][k] * s->size[k] * s->size[k] * u[j][k] / length;
-        H[i][j] -= dot3(local, u[i]) * dot3(local, u[j]) / length;
-      }
-    }
     transform(x, s->pos, s->rotation, local);
     return;
   }
-  length = sqrt(m[0] * m[0] + m[1] * m[1]);
-  double c = length > 0 ? m[0] / length : 1, d = length > 0 ? m[1] / length : 0, axis[3];
-  set3(w, -d, c, 0);
-  for (int i = 0; i < 2; i++) {
-    for (int j = 0; j < 2; j++) H[i][j] += s->size[0] / fmax(length, 1e-300) * dot3(w, u[i]) * dot3(w, u[j]);
-  }
+  double length = sqrt(m[0] * m[0] + m[1] * m[1]);
+  double c = length > 0 ? m[0] / length : 1, d = length > 0 ? m[1] / length : 0;
   // of a rim the end known, whichever way n turns
   column3(axis, s->rotation, 2);
-  set3(w, s->size[0] * c, s->size[0] * d, dot3(axis, f->axis) < 0 ? -s->size[1] : s->size[1]);
-  transform(x, s->pos, s->rotation, w);
+  set3(local, s->size[0] * c, s->size[0] * d, dot3(axis, f->axis) < 0 ? -s->size[1] : s->size[1]);
+  transform(x, s->pos, s->rotation, local);
 }
 
 static void tangents(const double n[3], const double *square, double t[2][3]) {
@@ -376,6 +388,19 @@ static void cross_lines(const feature *fa, const feature *fb, const double y[3],
   if (sine2 > SQUARE * SQUARE) axpy3(x, x, dot3(e, c) / sine2, fa->axis);
 }
 
+// what of both bodies meets, for derivatives: of a polyhedron points that span its feature
+static void note_features(const search *g, const feature *fa, const feature *fb, const double n[3],
+                          cav_separation *out) {
+  double t[2][3];
+  out->straight = fa->straight;
+  out->corners = is_curved(g->b) ? 0 : fb->corners;
+  for (int k = 0; k < out->corners && k < 2; k++) copy3(out->corner_b[k], fb->x[k]);
+  if (out->corners < 3) return;
+  tangents(n, NULL, t);
+  copy3(out->corner_b[0], out->y);
+  for (int k = 0; k < 2; k++) axpy3(out->corner_b[k + 1], out->y, g->size, t[k]);
+}
+
 // keeps a direction of two features if its gap is larger than the best; among equal ones the points say which is
 // solved, as near its top a gap does not depend on the direction
 static void keep(search *g, const feature *fa, const feature *fb, const double n[3]) {
@@ -408,6 +433,7 @@ static void keep(search *g, const feature *fa, const feature *fb, const double n
   copy3(c.separation.n, n);
   copy3(c.separation.x, x);
   copy3(c.separation.y, y);
+  note_features(g, fa, fb, n, &c.separation);
   g->best = c;
 }
 
@@ -539,10 +565,14 @@ int cav_separation_solve(const cav_shape *a, const cav_shape *b, double margin, 
     polish(&g, out->n, -INFINITY);
     if (g.best.separation.gap < 0 && g.best.separation.gap > out->gap + LOOSE * g.size) polish_elsewhere(&g);
     // what the search found stays where the polish does not improve on it
-    if (g.best.separation.gap < out->gap - 1e-9 * g.size) g.best.separation = *out;
+    if (g.best.separation.gap < out->gap - 1e-9 * g.size) {
+      g.best.separation = *out;
+      g.best.separation.corners = 0;
+    }
   }
   *out = g.best.separation;
   if (swap) {
+    out->corners = 0;
     scale3(out->n, -1, out->n);
     copy3(out->x, g.best.separation.y);
     copy3(out->y, g.best.separation.x);

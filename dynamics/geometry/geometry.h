@@ -47,12 +47,14 @@ typedef struct cav_face_point {
   double place[3];         ///< of the other body, without its round edge
   double side[3], over[3]; ///< its side's direction and normal of the plane over the face's side; or 0 0 0
   double face[3];          ///< normal of its face, where the point is over a corner; or 0 0 0
+  double roll[3],
+      turning[3]; ///< of a cylinder: the place moves by roll (turning . rotation) beside as the cylinder does
 } cav_face_point;
 
 enum { CAV_FACE_POINTS = 64 };
 
-/// Points over a face as cav_collide_convex makes them, before they are thinned out. 0: there is
-/// no face, or something round is in it. polytope.c.
+/// Points over a face as cav_collide_convex makes them, before they are thinned out. 0: there is no face, or a cylinder
+/// stands upright on it. polytope.c.
 int cav_face_points(const cav_shape *a, const cav_shape *b, double margin, cav_face_point point[CAV_FACE_POINTS]);
 
 /// Contact points of one pair as it is and displaced, for differences. pair is -1 at the start.

@@ -12,10 +12,12 @@ typedef struct cav_core {
 
 /// Direction of least overlap or of separation, unit, from a to b; points of both that meet along it; signed distance
 /// of the cores along n. Of polyhedra also the corners that meet: the points of a and of b whose differences span the
-/// part of b - a that is nearest, 1 to 3, each as often as it has a part in it; 0 if not known.
+/// part of b - a that is nearest, 1 to 3, each as often as it has a part in it; 0 if not known. Of a curved a and a
+/// polyhedron b points that span what of b meets, and straight: 0 if what of a meets is round or a rim, 1 along its axis,
+/// 2 flat.
 typedef struct cav_separation {
   double n[3], x[3], y[3], gap;
-  int corners;
+  int corners, straight;
   double corner_a[3][3], corner_b[3][3];
 } cav_separation;
 
@@ -41,6 +43,10 @@ double cav_shape_size(const cav_shape *shape);
 
 cav_core cav_core_of(const cav_shape *shape);
 void cav_core_support(const cav_core *core, const double direction[3], double point[3]);
+
+/// Of an ellipsoid or a cylinder the point furthest along n moves with n: adds t_i' (its derivative by n) t_j to H.
+/// convex.c.
+void cav_shape_bend(const cav_shape *shape, const double n[3], double t[2][3], double H[2][2]);
 
 /// Finds it to rounding for polyhedra, with an ellipsoid or a cylinder to about 1e-5; 0 if the cores are further
 /// apart than most (out is unchanged). gjk.c.

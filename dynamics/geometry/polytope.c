@@ -16,6 +16,9 @@ static const double ON_NORMAL = 1 - 1e-10;
 // tangent of the angle by which a mesh on a plane leans to find what else could touch: a smaller one misses the far end
 // of a limb that lies down, a larger one finds the outer edges of a rounded sole instead of the sole
 static const double LEAN = 0.5;
+// cosine to a face's normal beyond which a cylinder stands on its cap; corners of a regular triangle in a circle
+static const double UPRIGHT = 0.9,
+                    TRIANGLE[3][2] = {{1, 0}, {-0.5, 0.86602540378443864676}, {-0.5, -0.86602540378443864676}};
 
 // --- polyhedra: meshes, boxes, and the segments and points that are cores ---
 
@@ -163,6 +166,15 @@ static double face_along(const cav_shape *s, const double n[3], cav_outline *o, 
   return most;
 }
 
+// of a capsule or a cylinder the axis u and the direction across it that looks most along back; returns how far that turns
+// back, and how far back looks along the axis
+static double lowest_across(const cav_shape *s, const double back[3], double u[3], double out[3], double *along) {
+  column3(u, s->rotation, 2);
+  *along = dot3(u, back);
+  axpy3(out, back, -*along, u);
+  return normalise3(out);
+}
+
 // what of a body could lie on a face whose normal is m: a face, a segment, three points of a rim, or nothing
 static void lying_on(const cav_shape *s, const double m[3], cav_outline *o) {
   double back[3], normal[3], u[3], x[3];
@@ -177,20 +189,16 @@ static void lying_on(const cav_shape *s, const double m[3], cav_outline *o) {
     return;
   }
   if (s->type != CAV_GEOM_CAPSULE && s->type != CAV_GEOM_CYLINDER) return;
-  column3(u, s->rotation, 2);
-  double along = dot3(u, back), radius = s->size[0], half = s->size[1], out[3];
-  // the direction across the axis that is lowest
-  axpy3(out, back, -along, u);
-  double derivative = normalise3(out);
-  if (derivative < 1e-9) column3(out, s->rotation, 0);
-  if (s->type == CAV_GEOM_CYLINDER && fabs(along) > 0.9) {
+  double radius = s->size[0], half = s->size[1], out[3], along;
+  if (lowest_across(s, back, u, out, &along) < 1e-9) column3(out, s->rotation, 0);
+  if (s->type == CAV_GEOM_CYLINDER && fabs(along) > UPRIGHT) {
     // as on a plane: a regular triangle with one corner at the lowest point
-    double w[3], cap[3], turn = sqrt(0.75);
+    double w[3], cap[3];
     cross3(w, u, out);
     axpy3(cap, s->pos, along < 0 ? -half : half, u);
     for (int k = 0; k < 3; k++) {
-      axpy3(x, cap, k ? -radius / 2 : radius, out);
-      axpy3(x, x, k == 1 ? turn * radius : k ? -turn * radius : 0, w);
+      axpy3(x, cap, TRIANGLE[k][0] * radius, out);
+      axpy3(x, x, TRIANGLE[k][1] * radius, w);
       push_corner(o, x);
     }
     return;
@@ -253,7 +261,9 @@ static void cut_to_face(cav_outline *o, const cav_outline *face, const double no
     double d[3];
     sub3(d, o->x[k], ground->pos);
     double along = dot3(d, normal), radius2 = dot3(d, d) - along * along;
-    if (radius2 <= ground->size[0] * ground->size[0]) copy3(o->x[kept++], o->x[k]);
+    if (radius2 > ground->size[0] * ground->size[0]) continue;
+    memmove(o->line[kept], o->line[k], sizeof *o->line);
+    copy3(o->x[kept++], o->x[k]);
   }
   o->n = kept;
 }
@@ -392,25 +402,59 @@ static void normal_of(const cav_outline *o, double n[3]) {
 
 _Static_assert((int)CAV_FACE_POINTS == (int)CAV_OUTLINE_MAX, "a point for each corner of an outline");
 
+// how the corners of what of a cylinder lies on a face whose normal is m roll on it; 0: it stands upright on it
+static int rolling(const cav_shape *s, const double m[3], double roll[3][3], double turning[3]) {
+  double back[3], u[3], out[3], w[3], along;
+  scale3(back, -1, m);
+  double across = lowest_across(s, back, u, out, &along);
+  if (across < 1e-9) return 0;
+  cross3(w, u, out);
+  cross3(turning, w, back);
+  scale3(turning, 1 / across, turning);
+  for (int k = 0; k < 3; k++) {
+    const double *c = TRIANGLE[fabs(along) > UPRIGHT ? k : 0];
+    scale3(roll[k], s->size[0] * c[0], w);
+    axpy3(roll[k], roll[k], -s->size[0] * c[1], out);
+  }
+  return 1;
+}
+
+// how far x is between two points
+static double fraction_of(const double x[3], const double from[3], const double to[3]) {
+  double d[3], e[3];
+  sub3(d, x, from);
+  sub3(e, to, from);
+  double length2 = dot3(e, e);
+  return length2 > 0 ? dot3(d, e) / length2 : 0;
+}
+
 int cav_face_points(const cav_shape *a, const cav_shape *b, double margin, cav_face_point point[CAV_FACE_POINTS]) {
   contact_pair g = {.a = a, .b = b, .size = fmax(cav_shape_size(a), cav_shape_size(b)), .margin = margin};
   standing s;
   cav_outline whole;
   if (!cav_separation_solve(a, b, margin, &g.separation) || !stand(&g, &s)) return 0;
-  if (s.ground->type == CAV_GEOM_CYLINDER || s.other->type == CAV_GEOM_CYLINDER) return 0;
+  double roll[3][3] = {{0}}, turning[3] = {0};
+  if (s.other->type == CAV_GEOM_CYLINDER && !rolling(s.other, s.m, roll, turning)) return 0;
   lying_on(s.other, s.m, &whole);
   for (int k = 0; k < s.lying.n; k++) {
     cav_face_point *p = &point[k];
     const int *line = s.lying.line[k], cuts = (line[0] >= CAV_OUTLINE_CUT) + (line[1] >= CAV_OUTLINE_CUT);
     *p = (cav_face_point){.feature = 1 + k, .on_b = s.on_b};
     copy3(p->normal, s.m);
+    copy3(p->turning, turning);
     axpy3(p->place, s.lying.x[k], cav_core_of(s.other).radius, s.m);
+    if (cuts == 0 && s.other->type == CAV_GEOM_CYLINDER) copy3(p->roll, roll[line[1]]);
     if (cuts == 2) normal_of(&whole, p->face);
     if (cuts != 1) continue;
     int cut_by = line[line[1] >= CAV_OUTLINE_CUT], own = line[line[0] >= CAV_OUTLINE_CUT];
+    int to = (own + 1) % whole.n;
     over_side(&s.face, cut_by - CAV_OUTLINE_CUT, s.m, p->over);
-    sub3(p->side, whole.x[(own + 1) % whole.n], whole.x[own]);
+    sub3(p->side, whole.x[to], whole.x[own]);
     normalise3(p->side);
+    if (s.other->type != CAV_GEOM_CYLINDER) continue;
+    double part = fraction_of(s.lying.x[k], whole.x[own], whole.x[to]);
+    scale3(p->roll, 1 - part, roll[own]);
+    axpy3(p->roll, p->roll, part, roll[to]);
   }
   return s.lying.n;
 }
