@@ -89,7 +89,6 @@ static const struct {
     {"friction", 5, "expected a number >= 0"},
     {"plane_moves", 6, "a plane cannot move"},
     {"solref", 5, "expected both > 0"},
-    {"solimp", 5, "expected impedances"},
     {"armature", 4, "expected a number >= 0"},
     {"timestep", 2, "time step > 0"},
     {"impratio", 2, "ratio > 0"},

@@ -47,6 +47,13 @@ typedef struct feature {
 } feature;
 
 static const feature features[] = {
+    // Aloha's fingers; seen: MuJoCo mixes the two as they stand and cuts what comes out to [0.0001, 0.9999]
+    {"impedances beyond 1, mixed and then cut",
+     "<worldbody><geom type='plane' size='9 9 1' solimp='.2 .3 .5'/><body pos='0 0 .3'><freejoint/><geom size='.6' "
+     "solimp='2 1 .01 3 .2'/></body></worldbody>",
+     {{"warnings", 0, 1}},
+     20,
+     0},
     {"springdamper", ARM_ONLY("springdamper='.5 .7'"), {{"stiffness", 0, 3 / .1225}, {"damping", 0, 12}}, 20, 0},
     {"effort limit of a joint",
      ARM_ONLY("actuatorfrcrange='-20 30'") "<actuator><motor joint='j' gear='2' ctrlrange='-99 99'/></actuator>",

@@ -64,6 +64,17 @@ static void read_flags(cav_mjcf_reader *r, const cav_xml_node *node) {
     cav_spec_lack(r->spec, node, "ipc", "contacts by barriers are not supported; remove the flag");
 }
 
+// solimp may be out of its bounds, as in shipped robots: it is mixed as it stands, and cut where it acts
+static void read_softness(cav_spec *spec, const cav_xml_node *node, const char *solref, const char *solimp,
+                          cav_softness *out) {
+  const double *d = out->solimp;
+  cav_xml_reals(node, solref, out->solref, 2);
+  if (cav_xml_reals(node, solimp, out->solimp, 5) &&
+      (d[0] < 0 || d[0] > 1 || d[1] < 0 || d[1] > 1 || d[2] < 0 || d[3] < 0 || d[3] > 1 || d[4] < 1))
+    cav_spec_leave(spec, node, solimp,
+                   "cut where it acts: impedances and midpoint to 0.0001..0.9999, the power to >= 1");
+}
+
 void cav_mjcf_read_option(cav_mjcf_reader *r, const cav_xml_node *node) {
   cav_spec *spec = r->spec;
   cav_spec_option *o = &spec->option;
@@ -80,7 +91,7 @@ void cav_mjcf_read_option(cav_mjcf_reader *r, const cav_xml_node *node) {
   cav_check_not_negative(spec, node, "density", o->density);
   cav_check_not_negative(spec, node, "viscosity", o->viscosity);
   read_real(node, "o_margin", &o->o_margin);
-  read_softness(node, "o_solref", "o_solimp", &o->o_softness);
+  read_softness(spec, node, "o_solref", "o_solimp", &o->o_softness);
   cav_xml_reals(node, "o_friction", o->o_friction, 5);
   const cav_xml_value *groups = cav_xml_get(node, "actuatorgroupdisable");
   for (int i = 0; groups && i < groups->count; i++) {
@@ -121,8 +132,8 @@ void cav_mjcf_joint_values(cav_spec *spec, const cav_xml_node *node, cav_spec_jo
   if (cav_xml_reals(node, "twistrange", j->twist, 2)) j->has_twist = 1;
   if (cav_xml_get(node, "swingrange")) j->has_swing = 1;
   read_real(node, "swingrange", &j->swing);
-  read_softness(node, "solreflimit", "solimplimit", &j->limit);
-  read_softness(node, "solreffriction", "solimpfriction", &j->friction);
+  read_softness(spec, node, "solreflimit", "solimplimit", &j->limit);
+  read_softness(spec, node, "solreffriction", "solimpfriction", &j->friction);
   read_constant(spec, node, "stiffness", &j->stiffness);
   read_real(node, "margin", &j->margin);
   read_real(node, "ref", &j->ref);
@@ -151,7 +162,7 @@ void cav_mjcf_geom_values(cav_spec *spec, const cav_xml_node *node, cav_spec_geo
   read_real(node, "gap", &g->gap);
   read_real(node, "solmix", &g->solmix);
   read_real(node, "density", &g->density);
-  read_softness(node, "solref", "solimp", &g->softness);
+  read_softness(spec, node, "solref", "solimp", &g->softness);
   g->fluid = cav_xml_word(node, "fluidshape", g->fluid);
   cav_xml_reals(node, "fluidcoef", g->fluidcoef, 5);
   if (cav_xml_get(node, "mass")) g->has_mass = 1;
@@ -186,15 +197,14 @@ void cav_mjcf_pair_values(cav_spec *spec, const cav_xml_node *node, cav_spec_pai
     cav_spec_lack(spec, node, "adhesion", "geoms that stick are not supported; give them friction instead");
   read_int(node, "condim", &p->condim);
   cav_xml_reals(node, "friction", p->friction, 5);
-  read_softness(node, "solref", "solimp", &p->softness);
+  read_softness(spec, node, "solref", "solimp", &p->softness);
   read_real(node, "margin", &p->margin);
   read_real(node, "gap", &p->gap);
 }
 
 void cav_mjcf_equality_values(cav_spec *spec, const cav_xml_node *node, cav_spec_equality *e) {
-  (void)spec;
   e->active = cav_xml_bool(node, "active", e->active);
-  read_softness(node, "solref", "solimp", &e->softness);
+  read_softness(spec, node, "solref", "solimp", &e->softness);
 }
 
 void cav_mjcf_tendon_values(cav_spec *spec, const cav_xml_node *node, cav_spec_tendon *t) {
@@ -204,8 +214,8 @@ void cav_mjcf_tendon_values(cav_spec *spec, const cav_xml_node *node, cav_spec_t
   cav_xml_reals(node, "actuatorfrcrange", t->effort_range, 2);
   read_limited(node, "limited", &t->limited);
   cav_xml_reals(node, "range", t->range, 2);
-  read_softness(node, "solreflimit", "solimplimit", &t->limit);
-  read_softness(node, "solreffriction", "solimpfriction", &t->friction);
+  read_softness(spec, node, "solreflimit", "solimplimit", &t->limit);
+  read_softness(spec, node, "solreffriction", "solimpfriction", &t->friction);
   read_real(node, "margin", &t->margin);
   read_constant(spec, node, "stiffness", &t->stiffness);
   read_constant(spec, node, "damping", &t->damping);

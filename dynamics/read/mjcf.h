@@ -51,11 +51,6 @@ static inline void read_limited(const cav_xml_node *node, const char *name, cav_
   *out = (cav_limited)cav_xml_word(node, name, (int)*out);
 }
 
-static inline void read_softness(const cav_xml_node *node, const char *solref, const char *solimp, cav_softness *out) {
-  cav_xml_reals(node, solref, out->solref, 2);
-  cav_xml_reals(node, solimp, out->solimp, 5);
-}
-
 // every section of that name
 static inline void read_sections(cav_mjcf_reader *r, const cav_xml_node *root, const char *name,
                                  void (*read)(cav_mjcf_reader *, const cav_xml_node *)) {

@@ -168,17 +168,12 @@ void cav_check_not_negative(cav_spec *spec, const cav_xml_node *node, const char
   if (value < 0) cav_spec_fail(spec, node, name, "expected a number >= 0, got %g", value);
 }
 
-// solref: a time constant and a damping ratio, or both negative; solimp: within [0, 1], width and power in order
+// solref: a time constant and a damping ratio, or both negative
 void cav_check_softness(cav_spec *spec, const cav_xml_node *node, const char *where, const cav_softness *s) {
   if ((s->solref[0] > 0) != (s->solref[1] > 0))
     cav_spec_fail(spec, node, NULL,
                   "solref%s %g %g: expected both > 0 (time constant, damping ratio) or both <= 0 (direct)", where,
                   s->solref[0], s->solref[1]);
-  const double *d = s->solimp;
-  if (d[0] < 0 || d[0] > 1 || d[1] < 0 || d[1] > 1 || d[2] < 0 || d[3] < 0 || d[3] > 1 || d[4] < 1)
-    cav_spec_fail(spec, node, NULL,
-                  "solimp%s %g %g %g %g %g: expected impedances in [0, 1], width >= 0, midpoint in [0, 1], power >= 1",
-                  where, d[0], d[1], d[2], d[3], d[4]);
 }
 
 void cav_check_condim(cav_spec *spec, const cav_xml_node *node, int condim) {

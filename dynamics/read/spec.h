@@ -315,7 +315,7 @@ void cav_spec_warn_of_prose(cav_spec *spec);
 void cav_spec_unknown(cav_spec *spec, const cav_xml_node *node, const char *attribute, const char *kind,
                       const char *name, const void *first, int n, size_t stride);
 
-/// Checks that fail with the element's line: a number >= 0; solref and solimp (where: limit, friction or nothing);
+/// Checks that fail with the element's line: a number >= 0; solref (where: limit, friction or nothing);
 /// condim.
 void cav_check_not_negative(cav_spec *spec, const cav_xml_node *node, const char *attribute, double value);
 void cav_check_softness(cav_spec *spec, const cav_xml_node *node, const char *where, const cav_softness *softness);
