@@ -29,6 +29,10 @@ static double now(void) {
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
+/// Steps in a row that gain less than the tolerance, each shorter than the one before, that end a run: they come nearer and
+/// nearer to a jump of the merit (features of meshes that change), half the way each time, and the next stage may do without it.
+enum { WANING = 4 };
+
 /// Directions of one iteration and the model's numbers along them.
 typedef struct dogleg {
   const cav_normal *normal;
@@ -200,6 +204,8 @@ cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_trans
   dogleg d;
   dogleg_set(&d, normal);
   int calm = 0, fresh = 0; // consecutive small decreases; whether the transcription holds values at *at
+  int waning = 0;
+  double length = 0; // of the step before
   region->stalled = region->settled = 0;
   cav_status status = CAV_OK;
   for (int i = 0; i < region->iterations && calm < 2; i++) {
@@ -234,6 +240,9 @@ cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_trans
     // a good step that only the radius held back says nothing about the end
     int held = t.grown && t.length < 0.99 * d.newton_norm;
     calm = t.decrease < region->tolerance * merit && !held ? calm + 1 : 0;
+    waning = t.decrease < region->tolerance * merit && t.length < length ? waning + 1 : 0;
+    length = t.length;
+    if (waning == WANING) calm = 2;
     region->settled = (calm == 2 || !fresh) && !region->stalled;
     if (!fresh) break;
     if (region->report && region->report(region->context, t.length, region->radius)) {
