@@ -214,6 +214,32 @@ static void test_srdf(void) {
   rmdir(folder);
 }
 
+// joints that were made fixed and keep their <mimic>, as in Talos without fingers; who follows such a one; joints without an effort
+static void test_reduced(void) {
+  static const char text[] =
+      "<robot name='r'><link name='a'>" MASS("1") "</link><link name='b'>" MASS("1") "</link><link name='c'>" MASS("1")
+      "</link><link name='d'>" MASS("1") "</link><link name='e'>" MASS("1") "</link>\n"
+      "<joint name='j' type='revolute'><parent link='a'/><child link='b'/><limit lower='-1' upper='1' effort='3' velocity='1'/></joint>\n"
+      "<joint name='k' type='fixed'><parent link='b'/><child link='c'/><mimic joint='j' multiplier='-1'/></joint>\n"
+      "<joint name='l' type='revolute'><parent link='b'/><child link='d'/><limit lower='-1' upper='1' effort='3' velocity='1'/>"
+      "<mimic joint='k' multiplier='-1' offset='.1'/></joint>\n"
+      "<joint name='m' type='continuous'><parent link='d'/><child link='e'/></joint></robot>";
+  cav_error error = {0};
+  cav_model *m = load(text, &error);
+  if (!CHECK(m != NULL)) {
+    fprintf(stderr, "    %s\n", error.text);
+    return;
+  }
+  CHECK(m->nv == 3 && m->nactuator == 2 && m->nequality == 1);
+  CHECK(m->equality[0].object[1] < 0);
+  CHECK_NEAR(m->equality[0].coef[0], .1, 1e-15);
+  int told = 0;
+  for (int i = 0; i < m->nwarning; i++)
+    told += strstr(m->warning[i], "not driven") != NULL && strstr(m->warning[i], ":5: ");
+  CHECK(told == 1);
+  cav_model_free(m);
+}
+
 // faults: line and words
 static void test_faults(void) {
   static const struct {
@@ -390,6 +416,7 @@ int main(void) {
   test_options();
   test_inertias();
   test_srdf();
+  test_reduced();
   test_faults();
   test_damage();
   test_chain();

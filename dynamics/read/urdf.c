@@ -423,6 +423,9 @@ static void read_motion(reader *r, const cav_xml_node *node, int type, cav_spec_
   j->limited = CAV_LIMITED_NO;
   if (d) j->damping = cav_xml_real(d, "damping", 0);
   if (d) j->frictionloss = cav_xml_real(d, "friction", 0);
+  if (!(l && cav_xml_real(l, "effort", 0) > 0) && !cav_xml_child(node, &mimic))
+    cav_spec_leave(spec, node, NULL,
+                   "no effort limit above 0: the joint is not driven; give <limit effort> to drive it");
   if (!l) return;
   j->range[0] = cav_xml_real(l, "lower", 0);
   j->range[1] = cav_xml_real(l, "upper", 0);
@@ -434,8 +437,22 @@ static void read_motion(reader *r, const cav_xml_node *node, int type, cav_spec_
   push_motor(spec, node, j->name, cav_xml_real(l, "effort", 0));
 }
 
-// a joint that follows another: q = multiplier q_other + offset, as a joint equality with MJCF's softness
+// the joint of that name; NULL: there is none
+static const cav_xml_node *named_joint(const cav_xml_node *robot, const char *name) {
+  const cav_xml_node *c = cav_xml_child(robot, &joint);
+  while (c && strcmp(cav_xml_text(c, "name", ""), name)) c = cav_xml_next(c);
+  return c;
+}
+
+// a joint that follows another: q = multiplier q_other + offset, as a joint equality with MJCF's softness. Where robots are reduced
+// joints become fixed and their <mimic> stays: a fixed joint follows nothing, and who follows it is held at its offset
 static void read_mimic(cav_spec *spec, const cav_xml_node *node, const char *name) {
+  const cav_xml_node *other = named_joint(node->parent->parent, cav_xml_text(node, "joint", ""));
+  if (!other) {
+    cav_spec_fail(spec, node, "joint", "no joint is named '%.60s'; correct the name", cav_xml_text(node, "joint", ""));
+    return;
+  }
+  int held = cav_xml_word(other, "type", FIXED) == FIXED;
   cav_spec_joint soft;
   cav_mjcf_default_joint(&soft);
   cav_spec_equality *e = CAV_SPEC_PUSH(spec, &spec->equality);
@@ -443,9 +460,9 @@ static void read_mimic(cav_spec *spec, const cav_xml_node *node, const char *nam
   *e = (cav_spec_equality){
       .name = "", .node = node, .type = CAV_EQUALITY_JOINT, .active = 1, .torquescale = 1, .softness = soft.limit};
   e->object[0] = name;
-  e->object[1] = cav_xml_text(node, "joint", "");
+  e->object[1] = held ? NULL : cav_xml_text(node, "joint", "");
   e->polycoef[0] = cav_xml_real(node, "offset", 0);
-  e->polycoef[1] = cav_xml_real(node, "multiplier", 1);
+  e->polycoef[1] = held ? 0 : cav_xml_real(node, "multiplier", 1);
 }
 
 static void read_joint(reader *r, const cav_xml_node *node, int body) {
@@ -454,7 +471,7 @@ static void read_joint(reader *r, const cav_xml_node *node, int body) {
   const cav_xml_node *a = cav_xml_child(node, &axis), *m = cav_xml_child(node, &mimic);
   double direction[3] = {1, 0, 0};
   if (a) cav_xml_reals(a, "xyz", direction, 3);
-  if (m) read_mimic(r->spec, m, name);
+  if (m && type != FIXED) read_mimic(r->spec, m, name);
   const cav_xml_node *s = cav_xml_child(node, &safety);
   if (s) cav_spec_leave(r->spec, s, NULL, "left aside: soft limits of a controller are not part of the dynamics");
   if (type == FIXED) return;
