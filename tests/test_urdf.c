@@ -156,6 +156,14 @@ static void test_inertias(void) {
   m = load(BAR("2", "2", "-1"), &error);
   CHECK(!m && strstr(error.text, "expected numbers >= 0"));
   cav_model_free(m);
+  // a point mass, as iCub's ankles, whose zeros were turned by a program
+  m = load("<robot><link name='a'/><link name='b'><inertial><mass value='.27'/><inertia ixx='0' iyy='0' izz='0' "
+           "ixz='1.35525e-20'/></inertial></link><link name='c'>" MASS("1")
+           "</link><joint name='j' type='revolute'><parent link='a'/><child link='b'/></joint>"
+           "<joint name='k' type='fixed'><parent link='b'/><child link='c'/></joint></robot>",
+           &error);
+  if (CHECK(m != NULL)) CHECK(m->body[2].inertia[0] == 0 && m->body[2].inertia[1] == 0 && m->body[2].inertia[2] == 0);
+  cav_model_free(m);
   // a link without mass may carry one that has it
   m = load("<robot><link name='a'/><link name='b'/><link name='c'>" MASS("1")
            "</link><joint name='j' type='revolute'><parent link='a'/><child link='b'/></joint>"

@@ -201,10 +201,14 @@ static void weigh_by_geoms(cav_spec *spec, cav_spec_body *b) {
 }
 
 // moments that miss what a solid has by rounding: those below 0 are set to 0, and a largest one above the sum of the
-// others moves to the nearest that is not. What misses it by more is told and stays
+// others moves to the nearest that is not. What misses it by more is told and stays. What is left of a point mass's zeros when a program
+// moved its axes is zero
 static void repair_inertia(cav_spec *spec, cav_spec_body *b) {
   static const double rounding = 0.01; // of the largest moment
-  double *I = b->inertia.moment, most = fmax(I[0], fmax(I[1], I[2])), least = fmin(I[0], fmin(I[1], I[2]));
+  static const double nothing = 1e-15; // m^2, of a mass: a radius of 3e-8 m
+  double *I = b->inertia.moment;
+  for (int k = 0; k < 3; k++) I[k] = fabs(I[k]) <= nothing * b->inertia.mass ? 0 : I[k];
+  double most = fmax(I[0], fmax(I[1], I[2])), least = fmin(I[0], fmin(I[1], I[2]));
   if (least < 0 && least >= -rounding * most) {
     for (int k = 0; k < 3; k++) I[k] = fmax(I[k], 0);
     cav_spec_leave(spec, b->node, NULL, "a moment of inertia is below 0 by rounding: set to 0");
