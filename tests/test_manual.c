@@ -47,6 +47,8 @@ static const char *const base[] = {
     // a step, an arc
     "<problem @problem@ model='model.xml'><horizon @horizon@ duration='0.5'/><start @start@/><guess @guess@ "
     "apex='.1'/></problem>",
+    // a motion on file to follow
+    "<problem @problem@ model='model.xml'><horizon duration='.5'/><start/><guess @guess@ file='motion.csv'/></problem>",
     // a gait
     "<problem @problem@ model='model.xml'><horizon duration='.5'/><cycle @cycle@ translation='1 0 "
     "0'/><start/></problem>",

@@ -35,6 +35,8 @@ typedef struct cav_command_line {
   int force;           ///< --force: solve what is proven impossible
   const char *methods; ///< --methods, NULL: own
   const char *markers; ///< --markers
+  const char *format;  ///< --to, NULL: none
+  double rate;         ///< --rate, 0: as the knots are
   int nipopt;          ///< --ipopt, any number of times
   cav_ipopt_option ipopt[CAV_COMMAND_IPOPT];
 } cav_command_line;
@@ -59,6 +61,7 @@ cav_status cav_command_expect(const char *command, const char *wanted, const cha
 int cav_command_inspect(const cav_command_line *line);
 int cav_command_explain(const cav_command_line *line);
 int cav_command_ik(const cav_command_line *line);
+int cav_command_export(const cav_command_line *line);
 int cav_command_report(const cav_command_line *line);
 int cav_command_solve(const cav_command_line *line);
 int cav_command_stress(const cav_command_line *line);
@@ -68,6 +71,9 @@ int cav_command_view(const cav_command_line *line);
 
 /// cavort view of a problem file. preview.c.
 int cav_command_preview(const cav_command_line *line);
+
+/// Prints the formats of cavort export, after the text of --to. command_export.c.
+void cav_command_print_formats(FILE *out);
 
 /// Prints version, commit, compiler and features.
 void cav_command_version(void);

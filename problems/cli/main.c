@@ -24,7 +24,9 @@ enum option {
   OPTION_ALL = 2048,
   OPTION_FLOATING = 4096,
   OPTION_QUICK = 8192,
-  OPTION_MARKERS = 16384
+  OPTION_MARKERS = 16384,
+  OPTION_TO = 32768,
+  OPTION_RATE = 65536
 };
 
 #define SOLVER_NAME(solver, name, ...) "|" #name
@@ -58,6 +60,8 @@ static const cav_manual_option options[] = {
     {OPTION_FORCE, "--force", NULL, NULL, "solve what is proven impossible all the same"},
     {OPTION_ALL, "--all", NULL, NULL, "all that is missed, and all that pulls, with what usually helps"},
     {OPTION_JSON, "--json", NULL, NULL, "print as JSON what would be a table"},
+    {OPTION_TO, "--to", NULL, "FORMAT", "what to write"},
+    {OPTION_RATE, "--rate", NULL, "N", "samples a second (default: the knots of the motion)"},
 };
 enum { NOPTION = sizeof options / sizeof *options };
 
@@ -84,6 +88,9 @@ static const cav_manual_command commands[] = {
      "forces;\n"
      "  writes trajectory.csv, residuals of markers, the marker set with the places that were found, and a page",
      cav_command_ik, OPTION_MODEL | OPTION_MARKERS | OPTION_OUTPUT | OPTION_QUIET},
+    {"export", "DIR",
+     "write the motion of a result folder in a format of other tools, into the folder or where -o says",
+     cav_command_export, OPTION_MODEL | OPTION_OUTPUT | OPTION_TO | OPTION_RATE | OPTION_QUIET},
     {"report", "MODEL|PROBLEM",
      "measure error against run time of a scene on this machine: forward solvers, time steps and orders, derivatives, "
      "the\n"
@@ -123,6 +130,7 @@ static void print_command(const cav_manual_command *c) {
              options[i].name, options[i].value ? " " : "", options[i].value ? options[i].value : "");
     printf("  %-18s %s", text, options[i].text);
     if (options[i].bit == OPTION_SOLVER) print_solvers();
+    if (options[i].bit == OPTION_TO) cav_command_print_formats(stdout);
     printf("\n");
   }
 }
@@ -250,6 +258,14 @@ static int take_value(cav_command_line *line, enum option option, const char *na
       line->threads = (int)n;
       if (end != value && !*end && n >= 1 && n <= 1024) return 1;
       fprintf(stderr, "cavort: %s: expected a number from 1 to 1024, got '%s'\n", name, value);
+      return 0;
+    case OPTION_TO:
+      line->format = value;
+      return 1;
+    case OPTION_RATE:
+      line->rate = strtod(value, &end);
+      if (end != value && !*end && line->rate > 0 && line->rate <= 1e6) return 1;
+      fprintf(stderr, "cavort: %s: expected samples a second, above 0, up to 1e6, got '%s'\n", name, value);
       return 0;
     case OPTION_RESUME:
       return line->resume = 1;
