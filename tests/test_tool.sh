@@ -64,7 +64,19 @@ silent out
 run 2 solve
 says err "expected PROBLEM"
 run 2 solve a.xml b.xml
-says err "'a.xml' and 'b.xml'"
+says err "a.xml: cannot be opened: No such file or directory; nothing was solved"
+run 2 verify a b
+says err "'a' and 'b'"
+run 2 solve a.xml b.xml --jsn
+says err "did you mean '--json'?"
+run 2 solve "$root/tests/batch.xml" -j 1 --json
+says err "--json is of one problem"
+run 2 solve a.xml --set cost
+says err "expected PATH=VALUE"
+run 2 table
+says err "expected DIR..."
+run 2 export nowhere
+says err "there is no such folder"
 run 2 solve nowhere.xml
 says err "nowhere.xml"
 run 2 solve a.xml --solver magic

@@ -15,7 +15,7 @@ enum {
   CAV_EXIT_INTERRUPTED = 130
 };
 
-enum { CAV_COMMAND_IPOPT = 32 };
+enum { CAV_COMMAND_IPOPT = 32, CAV_COMMAND_SETTINGS = 32 };
 
 /// A command line as read by main.c.
 typedef struct cav_command_line {
@@ -37,7 +37,12 @@ typedef struct cav_command_line {
   const char *markers; ///< --markers
   const char *format;  ///< --to, NULL: none
   double rate;         ///< --rate, 0: as the knots are
-  int nipopt;          ///< --ipopt, any number of times
+  int threads_given;   ///< 1: threads are asked for
+  int jobs;            ///< -j: problems at once, 0: as many as processors
+  int csv;             ///< --csv
+  int nset;            ///< --set, any number of times
+  char *set[CAV_COMMAND_SETTINGS];
+  int nipopt; ///< --ipopt, any number of times
   cav_ipopt_option ipopt[CAV_COMMAND_IPOPT];
 } cav_command_line;
 
@@ -66,8 +71,12 @@ int cav_command_report(const cav_command_line *line);
 int cav_command_solve(const cav_command_line *line);
 int cav_command_stress(const cav_command_line *line);
 int cav_command_study(const cav_command_line *line);
+int cav_command_table(const cav_command_line *line);
 int cav_command_verify(const cav_command_line *line);
 int cav_command_view(const cav_command_line *line);
+
+/// cavort solve of several problems or values. command_batch.c.
+int cav_command_batch(const cav_command_line *line);
 
 /// cavort view of a problem file. preview.c.
 int cav_command_preview(const cav_command_line *line);

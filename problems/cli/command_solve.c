@@ -10,6 +10,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "batch.h"
 #include "certificate.h"
 #include "command.h"
 #include "file.h"
@@ -343,7 +344,7 @@ static int solve_into(const cav_command_line *line, const cav_problem *problem, 
   return status ? cav_command_fail(&error) : done;
 }
 
-int cav_command_solve(const cav_command_line *line) {
+static int solve_one(const cav_command_line *line) {
   cav_error error = {0};
   if (line->nipopt && !*cav_solver_rule_of(line->solver)->library) {
     cav_file_fail(&error, CAV_BAD_INPUT, 0, "--ipopt needs --solver ipopt or both: the own solver has no such options");
@@ -371,4 +372,32 @@ int cav_command_solve(const cav_command_line *line) {
   free(folder);
   cav_problem_free(problem);
   return done;
+}
+
+// the problem with its settings as a file of its own: FOLDER.xml, or NAME.set.xml after the file
+static int solve_set(const cav_command_line *line) {
+  cav_error error = {0};
+  cav_command_line set = *line;
+  const char *slash = strrchr(line->operand, '/'), *name = line->output ? line->output
+                                                           : slash      ? slash + 1
+                                                                        : line->operand;
+  size_t length = strlen(name);
+  if (!line->output && length > 4 && !strcmp(name + length - 4, ".xml")) length -= 4;
+  char *path = malloc(length + 9);
+  cav_batch one = {0};
+  cav_status status = path ? cav_batch_open(&one, 1, line->operands, line->nset, line->set, &error) : CAV_NO_MEMORY;
+  if (!status) {
+    sprintf(path, "%.*s%s", (int)length, name, line->output ? ".xml" : ".set.xml");
+    status = cav_setting_write(line->operand, line->nset, one.item->setting, path, &error);
+  }
+  set.operand = path;
+  int done = status ? cav_command_fail(&error) : solve_one(&set);
+  cav_batch_close(&one);
+  free(path);
+  return done;
+}
+
+int cav_command_solve(const cav_command_line *line) {
+  if (line->noperand > 1 || line->jobs || cav_batch_sweeps(line->nset, line->set)) return cav_command_batch(line);
+  return line->nset ? solve_set(line) : solve_one(line);
 }

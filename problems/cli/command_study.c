@@ -6,12 +6,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include "command.h"
 #include "csv.h"
 #include "file.h"
+#include "pool.h"
 #include "result.h"
 #include "study.h"
 
@@ -20,7 +20,7 @@ static const char all_motions[] = "problems/motions";
 typedef struct study {
   const cav_command_line *line;
   const char *folder;
-  int nmotion, nrun;
+  int nmotion, nrun, done;
   char **motion, **path; ///< [nmotion]
   cav_study_run *run;    ///< [nrun]
 } study;
@@ -179,8 +179,10 @@ static void read_record(const study *s, cav_study_run *run) {
 
 // ---------------------------------------------------------------- processes
 
-// in the child: never returns
-static void work(const study *s, cav_study_run run) {
+// in the process of a run
+static int work(void *context, int k) {
+  study *s = context;
+  cav_study_run run = s->run[k];
   char reason[480] = "";
   cav_error error = {0};
   cav_status status = cav_study_solve(s->path[run.motion], s->line->model, &run, reason, &error);
@@ -189,7 +191,7 @@ static void work(const study *s, cav_study_run run) {
     run.end_error = -1;
     snprintf(reason, sizeof reason, "%.399s", error.text[0] ? error.text : cav_status_name(status));
   }
-  _exit(write_record(s, &run, reason, &error) ? 1 : 0);
+  return write_record(s, &run, reason, &error) ? 1 : 0;
 }
 
 static void tell(const study *s, const cav_study_run *run, int done, int all) {
@@ -203,40 +205,25 @@ static void tell(const study *s, const cav_study_run *run, int done, int all) {
     fprintf(stderr, "no result\n");
 }
 
+static int wanted(void *context, int k) { return !((const study *)context)->run[k].known; }
+
+static void ended(void *context, int k, int status) {
+  study *s = context;
+  (void)status;
+  read_record(s, &s->run[k]);
+  tell(s, &s->run[k], ++s->done, s->nrun);
+}
+
 // runs all that have no record, at most so many at a time
 static cav_status run_all(study *s, cav_error *error) {
-  pid_t *child = calloc((size_t)s->nrun + 1, sizeof *child);
-  if (!child) return cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for the study");
-  int next = 0, running = 0, done = 0;
   for (int i = 0; i < s->nrun; i++) {
     read_record(s, &s->run[i]);
-    done += s->run[i].known;
+    s->done += s->run[i].known;
   }
-  if (done && !s->line->quiet) fprintf(stderr, "%d of %d runs are there already\n", done, s->nrun);
-  cav_status status = CAV_OK;
-  while (running > 0 || next < s->nrun) {
-    for (; next < s->nrun && running < s->line->threads && !status; next++) {
-      if (s->run[next].known) continue;
-      fflush(NULL);
-      child[next] = fork();
-      if (child[next] == 0) work(s, s->run[next]);
-      if (child[next] < 0) status = cav_file_fail(error, CAV_NO_MEMORY, 0, "no process for another run");
-      running += child[next] > 0;
-    }
-    if (running == 0) break;
-    int how;
-    pid_t ended = waitpid(-1, &how, 0);
-    for (int i = 0; i < next; i++) {
-      if (child[i] != ended || ended <= 0) continue;
-      child[i] = 0;
-      running--;
-      read_record(s, &s->run[i]);
-      tell(s, &s->run[i], ++done, s->nrun);
-    }
-    if (ended < 0) break;
-  }
-  free(child);
-  return status;
+  if (s->done && !s->line->quiet) fprintf(stderr, "%d of %d runs are there already\n", s->done, s->nrun);
+  const cav_pool pool = {
+      .n = s->nrun, .processes = s->line->threads, .wanted = wanted, .work = work, .ended = ended, .context = s};
+  return cav_pool_run(&pool, error);
 }
 
 // the table as it stands in study.txt

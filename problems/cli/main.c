@@ -1,11 +1,13 @@
 /// The cavort command: reads the command line and calls one command. Commands are a table; each says which options it
 /// takes.
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "command.h"
+#include "exchange.h"
 #include "manual.h"
 #include "xml.h"
 
@@ -26,10 +28,14 @@ enum option {
   OPTION_QUICK = 8192,
   OPTION_MARKERS = 16384,
   OPTION_TO = 32768,
-  OPTION_RATE = 65536
+  OPTION_RATE = 65536,
+  OPTION_JOBS = 131072,
+  OPTION_SET = 262144,
+  OPTION_CSV = 524288
 };
 
 #define SOLVER_NAME(solver, name, ...) "|" #name
+#define FORMAT_NAME(id, word, ...) "|" #word
 
 // options: bit, spelling, short spelling or NULL, value's name or NULL, what it does
 static const cav_manual_option options[] = {
@@ -60,7 +66,13 @@ static const cav_manual_option options[] = {
     {OPTION_FORCE, "--force", NULL, NULL, "solve what is proven impossible all the same"},
     {OPTION_ALL, "--all", NULL, NULL, "all that is missed, and all that pulls, with what usually helps"},
     {OPTION_JSON, "--json", NULL, NULL, "print as JSON what would be a table"},
-    {OPTION_TO, "--to", NULL, "FORMAT", "what to write"},
+    {OPTION_JOBS, "--jobs", "-j", "N",
+     "several problems: so many at once, each with one thread (default: as many as processors)"},
+    {OPTION_SET, "--set", NULL, "PATH=VALUE",
+     "an attribute of the problem, as cost/apex/@target=0.4: elements by their name or tag; with several values "
+     "(=0.2,0.3,0.4) each is solved, of several --set all combinations"},
+    {OPTION_CSV, "--csv", NULL, NULL, "print as CSV"},
+    {OPTION_TO, "--to", NULL, &(CAV_EXCHANGES(FORMAT_NAME))[1], "what to write"},
     {OPTION_RATE, "--rate", NULL, "N", "samples a second (default: the knots of the motion)"},
 };
 enum { NOPTION = sizeof options / sizeof *options };
@@ -70,10 +82,16 @@ static int help(const cav_command_line *line);
 static const cav_manual_command commands[] = {
     {"inspect", "MODEL|PROBLEM", "say what a model or a problem holds, what it runs and what it leaves out",
      cav_command_inspect, OPTION_MODEL | OPTION_FLOATING},
-    {"solve", "PROBLEM", "find the motion that a problem file asks for, certify it and write a result folder",
+    {"solve", "PROBLEM...",
+     "find the motion that a problem file asks for, certify it and write a result folder; of several problems or "
+     "values\n"
+     "  one each into DIR (default batch), what is there already not again",
      cav_command_solve,
-     OPTION_MODEL | OPTION_OUTPUT | OPTION_SOLVER | OPTION_IPOPT | OPTION_THREADS | OPTION_STRATEGIES | OPTION_RESUME |
-         OPTION_FORCE | OPTION_QUIET | OPTION_JSON},
+     OPTION_JOBS | OPTION_SET | OPTION_MODEL | OPTION_OUTPUT | OPTION_SOLVER | OPTION_IPOPT | OPTION_THREADS |
+         OPTION_STRATEGIES | OPTION_RESUME | OPTION_FORCE | OPTION_QUIET | OPTION_JSON},
+    {"table", "DIR...",
+     "a line for each result folder, or each problem of a batch: what became of it, and the first cause",
+     cav_command_table, OPTION_CSV},
     {"verify", "DIR", "certify the motion of a result folder again, from its files alone", cav_command_verify,
      OPTION_MODEL | OPTION_QUIET | OPTION_JSON},
     {"explain", "DIR", "say why the motion of a result folder is as it is: what it misses, and which constraints pull",
@@ -256,9 +274,26 @@ static int take_value(cav_command_line *line, enum option option, const char *na
     case OPTION_THREADS:
       n = strtol(value, &end, 10);
       line->threads = (int)n;
+      line->threads_given = 1;
       if (end != value && !*end && n >= 1 && n <= 1024) return 1;
       fprintf(stderr, "cavort: %s: expected a number from 1 to 1024, got '%s'\n", name, value);
       return 0;
+    case OPTION_JOBS:
+      n = strtol(value, &end, 10);
+      line->jobs = (int)n;
+      if (end != value && !*end && n >= 1 && n <= 1024) return 1;
+      fprintf(stderr, "cavort: %s: expected a number from 1 to 1024, got '%s'\n", name, value);
+      return 0;
+    case OPTION_SET:
+      if (line->nset < CAV_COMMAND_SETTINGS) {
+        line->set[line->nset++] = value;
+        return 1;
+      }
+      fprintf(stderr, "cavort: --set: expected at most %d of them; write them into the problem\n",
+              CAV_COMMAND_SETTINGS);
+      return 0;
+    case OPTION_CSV:
+      return line->csv = 1;
     case OPTION_TO:
       line->format = value;
       return 1;
@@ -317,6 +352,7 @@ static int read_line(const cav_manual_command *c, int argc, char **argv, cav_com
       if (strstr(c->operand, "...")) {
         // operands gather at the front, where they have been read already
         line->operands = argv;
+        if (line->noperand == 0) line->operand = argv[i];
         argv[line->noperand++] = argv[i];
         continue;
       }
@@ -376,6 +412,8 @@ static int run(int argc, char **argv, const char *arguments) {
     help(&line);
     return CAV_EXIT_BAD_INPUT;
   }
+  // a file that may not grow further is told, like a full disk
+  signal(SIGXFSZ, SIG_IGN);
   const char *name = argv[1];
   if (!strcmp(name, "--help") || !strcmp(name, "-h")) name = "help";
   if (!strcmp(name, "--version")) {
@@ -396,7 +434,9 @@ static int run(int argc, char **argv, const char *arguments) {
   }
   if (!read_line(c, argc - 2, argv + 2, &line)) return CAV_EXIT_BAD_INPUT;
   cav_error error = {0};
-  int one = c->run != help && c->run != cav_command_study && c->run != cav_command_ik;
+  // these say themselves what is wrong with what they are given
+  int one = c->run != help && c->run != cav_command_study && c->run != cav_command_ik && c->run != cav_command_table &&
+            line.noperand < 2;
   int status =
       one && cav_command_expect(c->name, c->operand, line.operand, &error) ? cav_command_fail(&error) : c->run(&line);
   // a full disk or a closed pipe must not pass for success
