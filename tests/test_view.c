@@ -158,22 +158,26 @@ static cav_model *load_hostile(void) {
 }
 
 // three knots of a fall, with one force, a chart with a gap and a verdict
-static cav_view_input hostile_input(void) {
+static cav_view_input hostile_input(const cav_model *model) {
   static const double q[3 * 7] = {0, 0, 1, 1, 0, 0, 0, 0, 0, 0.9, 0.8, 0.6, 0, 0, 0.125, 0, 0.5, 0, 1, 0, 0};
   static const int nforce[3] = {0, 0, 1};
-  static const cav_view_force force[1] = {{{0.125, 0, 0}, {0, 3, 400}}};
+  static const cav_view_force force[1] = {{{0.125, 0, 0}, {0, 3, 400}, {0, 0, 1}, 0.75, 0, 1}};
+  static const cav_view_target target[1] = {{"</script>", 1, 2, {NAN, NAN, 0.5}, {0, 0, 0.9}}};
   static const double value[3] = {1, -2.5, NAN}, wanted[3] = {NAN, 7, NAN}, goal[7] = {0, 0, 2, 1, 0, 0, 0};
   static cav_view_series series[1];
   static const cav_view_line line[2] = {{"</script><script>alert(1)</script>", "1 < 2 \"quoted\" \xE2\x9C\x93", 1},
                                         {"bad bytes \xFF\xC0\x80", "\xED\xA0\x80 \x01", 0}};
-  series[0] = (cav_view_series){"<i>", "a\tb", NULL, value, -INFINITY, 2, wanted};
-  return (cav_view_input){.title = "</title><img src=x onerror=alert(1)>",
+  series[0] = (cav_view_series){"<i>", "a\tb", NULL, value, -INFINITY, 2, 1, wanted};
+  return (cav_view_input){.model = model,
+                          .title = "</title><img src=x onerror=alert(1)>",
                           .nknot = 3,
                           .timestep = 0.025,
                           .q = q,
                           .goal = goal,
                           .nforce = nforce,
                           .force = force,
+                          .ntarget = 1,
+                          .target = target,
                           .nseries = 1,
                           .series = series,
                           .nline = 2,
@@ -218,9 +222,11 @@ static void check_data(const char *data) {
   CHECK(strstr(data, "1 \\u003c 2 \\u0022quoted\\u0022 \xE2\x9C\x93") != NULL);
   CHECK(strstr(data, "bad bytes \\ufffd\\ufffd\\ufffd") != NULL);
   CHECK(strstr(data, "\\ufffd\\ufffd\\ufffd \\u0001") != NULL);
-  CHECK(strstr(data, "\"lower\":null,\"upper\":2,\"value\":[1,-2.5,null],\"wanted\":[null,7,null]") != NULL);
+  CHECK(strstr(data, "\"lower\":null,\"upper\":2,\"share\":1,\"value\":[1,-2.5,null],\"wanted\":[null,7,null]") !=
+        NULL);
+  CHECK(strstr(data, "\"from\":1,\"to\":2,\"pos\":[null,null,0.5],\"got\":[0,0,0.9]") != NULL);
   CHECK(strstr(data, "\"goal\":[0,0,2,1,0,0,0]") != NULL);
-  CHECK(strstr(data, "[0.125,0,0,0,3,400]") != NULL);
+  CHECK(strstr(data, "[0.125,0,0,0,3,400,0,0,1,0.75,0,1]") != NULL);
   CHECK(strstr(data, "\"rgba\":[1,0,0,0.5]") != NULL);
   // the ball's poses: where q puts it, the quaternion too
   CHECK(strstr(data, "\"poses\":[\n[0,0,1,1,0,0,0],\n[0,0,0.9,0.8,0.6,0,0],\n[0.125,0,0.5,0,1,0,0]\n]") != NULL);
@@ -228,9 +234,9 @@ static void check_data(const char *data) {
 
 static void test_page(const cav_model *model) {
   const char *path = in_folder("view.html");
-  cav_view_input input = hostile_input();
+  cav_view_input input = hostile_input(model);
   cav_error error = {0};
-  if (!CHECK(cav_view_write(path, model, &input, &error) == CAV_OK)) fprintf(stderr, "    %s\n", error.text);
+  if (!CHECK(cav_view_write(path, 1, &input, &error) == CAV_OK)) fprintf(stderr, "    %s\n", error.text);
   char *page = read_file(path);
   if (CHECK(page != NULL)) {
     check_page(page);
@@ -241,8 +247,8 @@ static void test_page(const cav_model *model) {
   free(page);
 
   // the least there can be: one knot and nothing else
-  cav_view_input least = {.nknot = 1, .timestep = 0.01, .q = input.q};
-  CHECK(cav_view_write(path, model, &least, &error) == CAV_OK);
+  cav_view_input least = {.model = model, .nknot = 1, .timestep = 0.01, .q = input.q};
+  CHECK(cav_view_write(path, 1, &least, &error) == CAV_OK);
   page = read_file(path);
   char *data = page ? between(page, "<script type=\"application/json\" id=\"motion\">", "</script>") : NULL;
   if (CHECK(data != NULL)) {
@@ -268,8 +274,8 @@ static void test_fine_mesh(void) {
   fclose(file);
   cav_model *m = cav_model_load(in_folder("model.xml"), NULL);
   if (!CHECK(m && m->mesh[0].nvertex > 7000)) return;
-  cav_view_input input = {.nknot = 1, .timestep = 0.01, .q = m->q0};
-  CHECK(cav_view_write(in_folder("view.html"), m, &input, NULL) == CAV_OK);
+  cav_view_input input = {.model = m, .nknot = 1, .timestep = 0.01, .q = m->q0};
+  CHECK(cav_view_write(in_folder("view.html"), 1, &input, NULL) == CAV_OK);
   char *page = read_file(in_folder("view.html"));
   const char *at = page ? strstr(page, "\"corners\":[") : NULL;
   int corners = 0, triangles = 0, wrong = 0;
@@ -299,35 +305,35 @@ static void test_fine_mesh(void) {
 
 // what goes wrong says why and leaves no page
 static void test_errors(const cav_model *model) {
-  cav_view_input input = hostile_input();
+  cav_view_input input = hostile_input(model);
   cav_error error = {0};
   const char *path = in_folder("none.html");
   double q[7] = {0, 0, NAN, 1, 0, 0, 0};
 
   cav_view_input broken = input;
   broken.nknot = 0;
-  CHECK(cav_view_write(path, model, &broken, &error) == CAV_BAD_INPUT);
+  CHECK(cav_view_write(path, 1, &broken, &error) == CAV_BAD_INPUT);
   broken = input;
   broken.timestep = 0;
-  CHECK(cav_view_write(path, model, &broken, &error) == CAV_BAD_INPUT);
-  broken = (cav_view_input){.nknot = 1, .timestep = 0.01, .q = q};
-  CHECK(cav_view_write(path, model, &broken, &error) == CAV_NOT_FINITE);
+  CHECK(cav_view_write(path, 1, &broken, &error) == CAV_BAD_INPUT);
+  broken = (cav_view_input){.model = model, .nknot = 1, .timestep = 0.01, .q = q};
+  CHECK(cav_view_write(path, 1, &broken, &error) == CAV_NOT_FINITE);
   CHECK(strstr(error.text, "q[2] at knot 0") != NULL);
-  CHECK(cav_view_write(path, model, &broken, NULL) == CAV_NOT_FINITE);
+  CHECK(cav_view_write(path, 1, &broken, NULL) == CAV_NOT_FINITE);
 
-  CHECK(cav_view_write(in_folder("no/such/folder.html"), model, &input, &error) == CAV_BAD_INPUT);
+  CHECK(cav_view_write(in_folder("no/such/folder.html"), 1, &input, &error) == CAV_BAD_INPUT);
   CHECK(strstr(error.text, "no/such/folder.html") != NULL);
 
   // three.js absent, and a file that would break out of its element
   setenv("CAVORT_THREE_JS", in_folder("absent.js"), 1);
-  CHECK(cav_view_write(path, model, &input, &error) == CAV_BAD_INPUT);
+  CHECK(cav_view_write(path, 1, &input, &error) == CAV_BAD_INPUT);
   CHECK(strstr(error.text, "absent.js") != NULL && strstr(error.text, "libjs-three") != NULL);
   write_file(in_folder("bad.js"), "var s='</ScRiPt>';");
   setenv("CAVORT_THREE_JS", in_folder("bad.js"), 1);
-  CHECK(cav_view_write(path, model, &input, &error) == CAV_BAD_INPUT);
+  CHECK(cav_view_write(path, 1, &input, &error) == CAV_BAD_INPUT);
   write_file(in_folder("empty.js"), "");
   setenv("CAVORT_THREE_JS", in_folder("empty.js"), 1);
-  CHECK(cav_view_write(path, model, &input, &error) == CAV_BAD_INPUT);
+  CHECK(cav_view_write(path, 1, &input, &error) == CAV_BAD_INPUT);
   CHECK(access(path, F_OK) != 0);
 }
 
@@ -335,9 +341,9 @@ static void test_errors(const cav_model *model) {
 static void test_installed(const cav_model *model) {
   unsetenv("CAVORT_THREE_JS");
   const char *path = in_folder("full.html");
-  cav_view_input input = hostile_input();
+  cav_view_input input = hostile_input(model);
   cav_error error = {0};
-  cav_status status = cav_view_write(path, model, &input, &error);
+  cav_status status = cav_view_write(path, 1, &input, &error);
   if (status == CAV_BAD_INPUT && strstr(error.text, "cannot read three.js")) {
     printf("three.js is not installed: the page with it is not checked\n");
     return;

@@ -185,13 +185,13 @@ static int has_checkpoint(const cav_batch *b, const cav_batch_item *item) {
 
 // a complaint that is known before a process is begun
 static void fail_item(cav_batch *b, cav_batch_item *item, const cav_error *error) {
-  cav_record r = {.status = 2 << 8};
+  cav_batch_record r = {.status = 2 << 8};
   cav_error ignored;
   memcpy(r.key, item->key, sizeof r.key);
   snprintf(r.cause, sizeof r.cause, "%.*s", CAV_SUMMARY_TEXT - 1, error->text);
   r.cause[strcspn(r.cause, "\n")] = 0;
   memcpy(item->cause, r.cause, sizeof r.cause);
-  cav_record_write(b->folder, item->name, &r, &ignored);
+  cav_batch_record_write(b->folder, item->name, &r, &ignored);
   if (b->tell) fprintf(stderr, "%s: %s\n", item->name, r.cause);
 }
 
@@ -199,7 +199,7 @@ static void fail_item(cav_batch *b, cav_batch_item *item, const cav_error *error
 static int prepare(void *context, int k) {
   cav_batch *b = context;
   cav_batch_item *item = &b->item[k];
-  cav_record r;
+  cav_batch_record r;
   cav_error error = {0};
   item->problem = b->nsetting ? beside(b, item, ".xml") : strdup(item->source);
   if (!item->problem) return 0;
@@ -208,13 +208,13 @@ static int prepare(void *context, int k) {
     return 0;
   }
   make_key(b, item);
-  int same = cav_record_read(b->folder, item->name, &r) && !strcmp(r.key, item->key);
-  item->done = same && cav_record_done(&r);
+  int same = cav_batch_record_read(b->folder, item->name, &r) && !strcmp(r.key, item->key);
+  item->done = same && cav_batch_record_done(&r);
   if (item->done) return 0;
   item->resume = same && has_checkpoint(b, item);
-  r = (cav_record){.begun = 1};
+  r = (cav_batch_record){.begun = 1};
   memcpy(r.key, item->key, sizeof r.key);
-  if (cav_record_write(b->folder, item->name, &r, &error) && b->tell) fprintf(stderr, "cavort: %s\n", error.text);
+  if (cav_batch_record_write(b->folder, item->name, &r, &error) && b->tell) fprintf(stderr, "cavort: %s\n", error.text);
   return 1;
 }
 
@@ -252,14 +252,14 @@ static void tell(const cav_batch *b, const cav_batch_item *item, const char *cau
 static void end(void *context, int k, int how) {
   cav_batch *b = context;
   cav_batch_item *item = &b->item[k];
-  cav_record r = {.status = how};
+  cav_batch_record r = {.status = how};
   cav_error error = {0};
   char *log = beside(b, item, ".log");
   memcpy(r.key, item->key, sizeof r.key);
-  cav_record_explain(log, how, r.cause);
+  cav_batch_record_explain(log, how, r.cause);
   memcpy(item->cause, r.cause, sizeof r.cause);
-  item->done = cav_record_done(&r);
-  if (cav_record_write(b->folder, item->name, &r, &error)) fprintf(stderr, "cavort: %s\n", error.text);
+  item->done = cav_batch_record_done(&r);
+  if (cav_batch_record_write(b->folder, item->name, &r, &error)) fprintf(stderr, "cavort: %s\n", error.text);
   if (b->tell) tell(b, item, r.cause);
   free(log);
 }

@@ -105,11 +105,11 @@ static void take_line(const char *text, const char *word, char *out, size_t room
   }
 }
 
-int cav_record_read(const char *folder, const char *name, cav_record *r) {
+int cav_batch_record_read(const char *folder, const char *name, cav_batch_record *r) {
   char file[300], number_text[32];
   record_name(name, file);
   char *text = read_text(folder, file);
-  *r = (cav_record){0};
+  *r = (cav_batch_record){0};
   if (!text) return 0;
   take_line(text, "key", r->key, sizeof r->key);
   take_line(text, "status", number_text, sizeof number_text);
@@ -120,7 +120,7 @@ int cav_record_read(const char *folder, const char *name, cav_record *r) {
   return *r->key != 0;
 }
 
-cav_status cav_record_write(const char *folder, const char *name, const cav_record *r, cav_error *error) {
+cav_status cav_batch_record_write(const char *folder, const char *name, const cav_batch_record *r, cav_error *error) {
   char file_name[300];
   cav_file file;
   record_name(name, file_name);
@@ -138,9 +138,11 @@ cav_status cav_record_write(const char *folder, const char *name, const cav_reco
   return status;
 }
 
-int cav_record_done(const cav_record *r) { return !r->begun && WIFEXITED(r->status) && WEXITSTATUS(r->status) <= 1; }
+int cav_batch_record_done(const cav_batch_record *r) {
+  return !r->begun && WIFEXITED(r->status) && WEXITSTATUS(r->status) <= 1;
+}
 
-void cav_record_explain(const char *log, int status, char cause[CAV_SUMMARY_TEXT]) {
+void cav_batch_record_explain(const char *log, int status, char cause[CAV_SUMMARY_TEXT]) {
   char line[2 * CAV_SUMMARY_TEXT];
   static const char head[] = "cavort: ";
   cause[0] = 0;
@@ -165,16 +167,16 @@ void cav_record_explain(const char *log, int status, char cause[CAV_SUMMARY_TEXT
 }
 
 void cav_summary_read_item(const char *folder, const char *name, cav_summary *s) {
-  cav_record r;
+  cav_batch_record r;
   char *path = cav_result_path(folder, name);
   const cav_summary none = {.cost = NAN, .optimality = NAN, .iterations = NAN, .seconds = NAN};
   *s = none;
   if (path) cav_summary_read(path, s);
   free(path);
   snprintf(s->name, sizeof s->name, "%.255s", name);
-  if (!cav_record_read(folder, name, &r)) return;
+  if (!cav_batch_record_read(folder, name, &r)) return;
   // one that did not come to its end has left no verdict of its own; one that was proven impossible neither
-  if (cav_record_done(&r) && s->known) return;
+  if (cav_batch_record_done(&r) && s->known) return;
   *s = none;
   snprintf(s->name, sizeof s->name, "%.255s", name);
   snprintf(s->cause, sizeof s->cause, "%s", r.begun ? "not ended: it runs, or all was ended from outside" : r.cause);

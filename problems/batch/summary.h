@@ -35,21 +35,22 @@ void cav_summary_print(FILE *out, int n, const cav_summary *summary, int csv);
 
 enum { CAV_RECORD_KEY = 400 };
 
-typedef struct cav_record {
+typedef struct cav_batch_record {
   char key[CAV_RECORD_KEY]; ///< what was solved, and how: of another one nothing is known
   int begun;                ///< 1: it has begun and nobody has seen its end
   int status;               ///< of waitpid
   char cause[CAV_SUMMARY_TEXT];
-} cav_record;
+} cav_batch_record;
 
 /// 0: there is none that can be read.
-int cav_record_read(const char *folder, const char *name, cav_record *record);
-cav_status cav_record_write(const char *folder, const char *name, const cav_record *record, cav_error *error);
+int cav_batch_record_read(const char *folder, const char *name, cav_batch_record *record);
+cav_status cav_batch_record_write(const char *folder, const char *name, const cav_batch_record *record,
+                                  cav_error *error);
 
 /// In words why a solve ended so, cause from what it said: "" after exit status 0.
-void cav_record_explain(const char *log, int status, char cause[CAV_SUMMARY_TEXT]);
+void cav_batch_record_explain(const char *log, int status, char cause[CAV_SUMMARY_TEXT]);
 
 /// Whether a solve came to its end: certified or not, there is nothing more to do.
-int cav_record_done(const cav_record *record);
+int cav_batch_record_done(const cav_batch_record *record);
 
 #endif

@@ -86,8 +86,10 @@ static cav_status write_page(const fit *f, cav_error *error) {
                                 {"markers", markers, -1},
                                 {"distance of markers, rms", rms, -1},
                                 {"forces", "none: a fit of kinematics alone", -1}};
-  const cav_view_series series = {"markers", "distance, rms", "mm", millimetres, NAN, NAN, NULL};
-  cav_view_input input = {.title = title,
+  const cav_view_series series = {
+      .group = "markers", .name = "distance, rms", .unit = "mm", .value = millimetres, .lower = NAN, .upper = NAN};
+  cav_view_input input = {.model = f->model,
+                          .title = title,
                           .nknot = f->motion->nknot,
                           .timestep = f->motion->timestep,
                           .q = f->motion->q,
@@ -95,7 +97,7 @@ static cav_status write_page(const fit *f, cav_error *error) {
                           .series = &series,
                           .nline = 4,
                           .line = line};
-  cav_status status = cav_view_write(path, f->model, &input, error);
+  cav_status status = cav_view_write(path, 1, &input, error);
   free(millimetres);
   free(path);
   return status;

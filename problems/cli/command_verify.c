@@ -1,5 +1,5 @@
 /// cavort verify and cavort view: what a result folder holds, certified again or shown. verify writes nothing; view
-/// writes forces.csv and view.html.
+/// writes forces.csv, controls.csv and view.html, or one page of two folders.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -39,9 +39,51 @@ int cav_command_verify(const cav_command_line *line) {
   return verdict.certified && verdict.achieved ? CAV_EXIT_CERTIFIED : CAV_EXIT_NOT_CERTIFIED;
 }
 
+// the last name of a folder's path, whatever it ends in
+static void name_of(const char *folder, char name[128]) {
+  char *full = realpath(folder, NULL);
+  const char *slash = full ? strrchr(full, '/') : NULL;
+  snprintf(name, 128, "%.100s", slash && slash[1] ? slash + 1 : folder);
+  free(full);
+}
+
+static void tell_page(const cav_command_line *line, const char *page) {
+  char *full = realpath(page, NULL);
+  if (!line->quiet) printf("open in a browser: %s%s\n", full ? "file://" : "", full ? full : page);
+  free(full);
+}
+
+// cavort view DIR DIR: one page of both, in the folder of the command
+static int compare(const cav_command_line *line) {
+  cav_error error = {0};
+  cav_result *result[2] = {NULL, NULL};
+  cav_verdict verdict[2];
+  char name[2][128], page[300];
+  cav_status status = CAV_OK;
+  for (int i = 0; i < 2 && !status; i++) {
+    status = cav_command_expect("view", "DIR", line->operands[i], &error);
+    if (!status && !(result[i] = cav_result_read(line->operands[i], line->model, &error))) status = error.status;
+    if (!status) status = certify(result[i], &verdict[i], &error);
+    name_of(line->operands[i], name[i]);
+  }
+  snprintf(page, sizeof page, "%s-beside-%s.view.html", name[0], name[1]);
+  if (!status)
+    status = cav_result_compare(page, (const char *const[]){name[0], name[1]}, (const cav_result *const *)result,
+                                verdict, &error);
+  for (int i = 0; i < 2; i++) cav_result_free(result[i]);
+  if (status) return cav_command_fail(&error);
+  tell_page(line, page);
+  return 0;
+}
+
 int cav_command_view(const cav_command_line *line) {
   cav_error error = {0};
   struct stat info;
+  if (line->noperand > 2) {
+    fprintf(stderr, "cavort view: expected one folder, or two to compare, got %d\n", line->noperand);
+    return CAV_EXIT_BAD_INPUT;
+  }
+  if (line->noperand == 2) return compare(line);
   // a file is a problem
   if (!stat(line->operand, &info) && S_ISREG(info.st_mode)) return cav_command_preview(line);
   cav_verdict verdict;
@@ -54,10 +96,8 @@ int cav_command_view(const cav_command_line *line) {
   }
   cav_result_free(result);
   if (status) return cav_command_fail(&error);
-  char *page = cav_result_path(line->operand, "view.html"), *full = page ? realpath(page, NULL) : NULL;
-  if (!line->quiet)
-    printf("open in a browser: %s%s\n", full ? "file://" : "", full ? full : page ? page : line->operand);
+  char *page = cav_result_path(line->operand, "view.html");
+  tell_page(line, page ? page : line->operand);
   free(page);
-  free(full);
   return 0;
 }

@@ -96,10 +96,12 @@ static const cav_manual_command commands[] = {
      OPTION_MODEL | OPTION_QUIET | OPTION_JSON},
     {"explain", "DIR", "say why the motion of a result folder is as it is: what it misses, and which constraints pull",
      cav_command_explain, OPTION_MODEL | OPTION_ALL | OPTION_JSON},
-    {"view", "DIR|PROBLEM",
-     "write the page of a result folder anew and say where it is; of a problem file, before anything is solved: a page "
-     "of\n"
-     "  the guess from start to goal, and how deep start, guess and goal are in what",
+    {"view", "DIR|PROBLEM [DIR...]",
+     "write the page of a result folder anew and say where it is; of two folders one page, A-beside-B.view.html, with "
+     "both\n"
+     "  motions, their charts over each other; of a problem file, before anything is solved: a page of the guess from "
+     "start\n"
+     "  to goal, and how deep start, guess and goal are in what",
      cav_command_view, OPTION_MODEL | OPTION_QUIET},
     {"ik", "CLIP",
      "fit a model to a recorded clip (.trc, .c3d, .bvh, .csv, .xml): the motion nearest to its markers, without "
@@ -354,6 +356,7 @@ static int read_line(const cav_manual_command *c, int argc, char **argv, cav_com
         line->operands = argv;
         if (line->noperand == 0) line->operand = argv[i];
         argv[line->noperand++] = argv[i];
+        line->operand = argv[0];
         continue;
       }
       if (line->operand) {

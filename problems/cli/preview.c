@@ -63,13 +63,15 @@ static cav_status write_page(const char *path, const cav_problem *p, const cav_t
                                 {"impossible", cause ? cause->what : "", 0}};
   char title[340];
   snprintf(title, sizeof title, "%.140s on %.140s, before solving", p->name, m->name);
-  cav_view_input input = {.title = title,
+  cav_view_input input = {.model = m,
+                          .title = title,
+                          .label = p->name,
                           .nknot = guess->nknot + 1,
                           .timestep = guess->timestep,
                           .q = q,
                           .nline = cause ? 5 : 4,
                           .line = line};
-  cav_status status = cav_view_write(path, m, &input, error);
+  cav_status status = cav_view_write(path, 1, &input, error);
   free(q);
   return status;
 }

@@ -59,6 +59,8 @@ static int note_contacts(cav_forces *f, const cav_model *model, const cav_state 
     *at = (cav_contact_force){
         .knot = knot, .geom1 = model->pair[c->pair].geom1, .geom2 = model->pair[c->pair].geom2, .gap = c->dist};
     memcpy(at->pos, c->pos, sizeof at->pos);
+    memcpy(at->normal, c->frame, sizeof at->normal);
+    at->friction = c->dim >= 3 ? c->friction[0] : 0;
     for (int k = 0; k < 3; k++) {
       for (int r = 0; r < (c->dim < 3 ? c->dim : 3); r++) at->force[k] += c->frame[3 * r + k] * c->impulse[r] / h;
     }

@@ -8,9 +8,11 @@
 typedef struct cav_contact_force {
   int knot;
   int geom1, geom2;
-  double pos[3];   ///< m, world
-  double force[3]; ///< N, world
-  double gap;      ///< m, negative: penetration
+  double pos[3];    ///< m, world
+  double force[3];  ///< N, world
+  double normal[3]; ///< from geom1 to geom2, world
+  double friction;  ///< coefficient of sliding; 0: the contact has none
+  double gap;       ///< m, negative: penetration
 } cav_contact_force;
 
 /// What a motion does at its knots.

@@ -1,7 +1,8 @@
-/// Charts and verdict lines of a result's page; view.c draws them. Efforts are fractions of an actuator's own limit,
-/// contact forces and unactuated forces fractions of the weight.
+/// Charts, targets and verdict lines of a result's page; view.c draws them. Efforts are N m or N at their joint with their
+/// fraction of the actuator's own limit, contact forces and unactuated forces fractions of the weight.
 #include "page.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,7 +22,7 @@ typedef struct charts {
 // a new chart; returns where its values go
 static double *add(charts *c, const char *group, const char *name, const char *unit, double lower, double upper) {
   double *value = c->value + (size_t)c->n * (size_t)c->nknot;
-  c->series[c->n++] = (cav_view_series){group, name, unit, value, lower, upper, NULL};
+  c->series[c->n++] = (cav_view_series){group, name, unit, value, lower, upper, 0, NULL};
   return value;
 }
 
@@ -118,8 +119,48 @@ static cav_status add_asked(charts *c, const cav_problem *p, const double *q) {
   return status;
 }
 
-static void add_whole(charts *c, const cav_model *model, const cav_trajectory *trajectory, const cav_forces *forces,
-                      double weight) {
+// --- targets in space ---
+
+// targets on their way
+typedef struct targets {
+  int n;
+  cav_view_target *target; ///< two a term at most
+} targets;
+
+// a term's target at a knot, if it is a place in the world
+static cav_status add_target(targets *list, const cav_problem *p, const cav_term *term, int first, int last,
+                             cav_state *state, const double *q, double timestep) {
+  cav_view_target at = {.name = *term->name ? term->name : "unnamed", .from = first, .to = last};
+  cav_status status = cav_position(p->model, state, q + (size_t)first * (size_t)p->model->nq);
+  if (status) return status;
+  cav_sensor_read(p->model, state, &term->sensor, at.got);
+  for (int k = 0; k < 3; k++)
+    at.pos[k] = term->component < 0 || term->component == k ? wanted_at(term, first * timestep, 3, k) : NAN;
+  list->target[list->n++] = at;
+  return CAV_OK;
+}
+
+// one marker a term; two where its target moves, at both ends
+static cav_status add_targets(targets *list, const cav_problem *p, const cav_trajectory *trajectory) {
+  cav_state *state = cav_state_new(p->model);
+  cav_status status = state ? CAV_OK : CAV_NO_MEMORY;
+  charts knots = {.nknot = trajectory->nknot};
+  for (int i = 0; i < p->nterm && !status; i++) {
+    const cav_term *term = &p->term[i];
+    int place = term->sensor.type == CAV_SENSOR_FRAMEPOS || term->sensor.type == CAV_SENSOR_SUBTREECOM, first, last;
+    if (!asks(term) || term->quantity != CAV_QUANTITY_SENSOR || !place || term->sensor.referred) continue;
+    find_knots(&knots, p, term, &first, &last);
+    int moves = term->nwaypoint > 1;
+    status = add_target(list, p, term, first, moves ? first : last, state, trajectory->q, trajectory->timestep);
+    if (!status && moves) status = add_target(list, p, term, last, last, state, trajectory->q, trajectory->timestep);
+  }
+  cav_state_free(state);
+  return status;
+}
+
+// --- what every motion has ---
+
+static void add_whole(charts *c, const cav_model *model, const cav_forces *forces, double weight) {
   double *height = add(c, "Motion", "height of the centre of mass", "m", NAN, NAN);
   double *press = add(c, "Motion", "contact forces, vertical", "weight", NAN, NAN);
   double *effort = add(c, "Motion", "largest effort", "of its limit", -INFINITY, 1);
@@ -144,7 +185,16 @@ static void add_whole(charts *c, const cav_model *model, const cav_trajectory *t
     helper[t] = forces->unactuated[t] / weight;
     depth[t] = 1e3 * forces->depth[t];
   }
-  (void)trajectory;
+}
+
+// what one unit of effort does to a hinge or slide; for all else the actuator's own force
+static double force_of_effort(const cav_model *model, const cav_actuator *a, const char **unit) {
+  *unit = "";
+  if (a->transmission != CAV_TRANSMISSION_JOINT) return a->unit;
+  cav_joint_type type = model->joint[a->target].type;
+  if (type != CAV_JOINT_HINGE && type != CAV_JOINT_SLIDE) return a->unit;
+  *unit = type == CAV_JOINT_HINGE ? "N m" : "N";
+  return a->unit * a->gear[0];
 }
 
 static void add_each(charts *c, const cav_problem *problem, const cav_trajectory *trajectory,
@@ -152,9 +202,13 @@ static void add_each(charts *c, const cav_problem *problem, const cav_trajectory
   const cav_model *model = problem->model;
   for (int a = 0; a < model->nu; a++) {
     double range[2];
+    const char *unit;
+    double scale = force_of_effort(model, &model->actuator[a], &unit);
     cav_actuator_effort_range(model, a, range);
-    double *value = add(c, "Controls", model->actuator[a].name, "", range[0], range[1]);
-    for (int t = 0; t < c->nknot; t++) value[t] = forces->control[t * model->nu + a];
+    int back = scale < 0; // a negative gear turns the range over
+    double *value = add(c, "Efforts", model->actuator[a].name, unit, scale * range[back], scale * range[!back]);
+    c->series[c->n - 1].share = 1;
+    for (int t = 0; t < c->nknot; t++) value[t] = scale * forces->control[t * model->nu + a];
   }
   for (int j = 0; j < model->njoint; j++) {
     const cav_joint *joint = &model->joint[j];
@@ -187,47 +241,98 @@ static int verdict_lines(const cav_verdict *verdict, cav_certificate_line *told,
   return n;
 }
 
-cav_status cav_page_write(const char *path, const cav_problem *problem, const cav_trajectory *trajectory,
-                          const cav_forces *forces, const cav_verdict *verdict, cav_error *error) {
-  const cav_model *model = problem->model;
-  const double *g = model->gravity;
-  double weight = model->mass * sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
-  size_t most = (size_t)(5 + model->nu + model->njoint + 3 * problem->nterm), nknot = (size_t)trajectory->nknot;
-  charts c = {0, trajectory->nknot, calloc(most, sizeof *c.series), calloc(2 * most * nknot, sizeof *c.value), NULL};
-  cav_view_force *force = calloc((size_t)forces->nforce + 1, sizeof *force);
-  if (!c.series || !c.value || !force) {
-    free(c.series);
-    free(c.value);
-    free(force);
-    return cav_file_fail(error, CAV_NO_MEMORY, 0, "%s: no memory for the page", path);
-  }
-  c.wanted = c.value + most * nknot;
-  add_whole(&c, model, trajectory, forces, weight > 0 ? weight : 1);
-  cav_status status = add_asked(&c, problem, trajectory->q);
-  add_each(&c, problem, trajectory, forces);
-  for (int i = 0; i < forces->nforce; i++) {
-    memcpy(force[i].pos, forces->force[i].pos, sizeof force[i].pos);
-    memcpy(force[i].force, forces->force[i].force, sizeof force[i].force);
-  }
+// --- the page ---
+
+// what a motion's page points at
+typedef struct parts {
+  charts charts;
+  targets targets;
+  int *nforce;
+  cav_view_force *force;
   cav_certificate_line told[CAV_CERTIFICATE_LINES];
   cav_view_line line[CAV_CERTIFICATE_LINES + 3];
   char seconds[64], title[300];
-  snprintf(title, sizeof title, "%.140s on %.140s", problem->name, model->name);
-  cav_view_input input = {.title = title,
-                          .nknot = trajectory->nknot,
-                          .timestep = trajectory->timestep,
-                          .q = trajectory->q,
-                          .goal = has_goal(problem) ? problem->q_goal : NULL,
-                          .nforce = forces->count,
-                          .force = force,
-                          .nseries = c.n,
-                          .series = c.series,
-                          .nline = verdict ? verdict_lines(verdict, told, line, seconds) : 0,
-                          .line = line};
-  if (status) cav_file_fail(error, status, 0, "%s: no charts of what was asked", path);
-  if (!status) status = cav_view_write(path, model, &input, error);
-  free(c.series);
-  free(c.value);
-  free(force);
+} parts;
+
+static void free_page(parts *page) {
+  free(page->charts.series);
+  free(page->charts.value);
+  free(page->targets.target);
+  free(page->nforce);
+  free(page->force);
+}
+
+static cav_status make_page(parts *page, const cav_page_motion *m) {
+  const cav_problem *p = m->problem;
+  size_t most = (size_t)(5 + p->model->nu + p->model->njoint + 3 * p->nterm), nknot = (size_t)m->trajectory->nknot;
+  page->charts.nknot = m->trajectory->nknot;
+  page->charts.series = calloc(most, sizeof *page->charts.series);
+  page->charts.value = calloc(2 * most * nknot, sizeof *page->charts.value);
+  page->targets.target = calloc((size_t)(2 * p->nterm) + 1, sizeof *page->targets.target);
+  page->nforce = calloc(nknot, sizeof *page->nforce);
+  page->force = calloc((size_t)m->forces->nforce + 1, sizeof *page->force);
+  if (!page->charts.series || !page->charts.value || !page->targets.target || !page->nforce || !page->force)
+    return CAV_NO_MEMORY;
+  page->charts.wanted = page->charts.value + most * nknot;
+  return CAV_OK;
+}
+
+// contacts that can be seen: a ten thousandth of the weight or more
+static void take_forces(parts *page, const cav_model *model, const cav_forces *forces, double weight) {
+  cav_view_force *to = page->force;
+  for (int i = 0; i < forces->nforce; i++) {
+    const cav_contact_force *from = &forces->force[i];
+    const double *f = from->force;
+    if (!(sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]) > 1e-4 * weight)) continue;
+    *to = (cav_view_force){
+        .friction = from->friction, .link1 = model->geom[from->geom1].link, .link2 = model->geom[from->geom2].link};
+    memcpy(to->pos, from->pos, sizeof to->pos);
+    memcpy(to->force, from->force, sizeof to->force);
+    memcpy(to->normal, from->normal, sizeof to->normal);
+    page->nforce[from->knot]++;
+    to++;
+  }
+}
+
+static cav_status fill_page(parts *page, const cav_page_motion *m, cav_view_input *input) {
+  const cav_problem *p = m->problem;
+  const double *g = p->model->gravity;
+  double weight = p->model->mass * sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+  add_whole(&page->charts, p->model, m->forces, weight > 0 ? weight : 1);
+  cav_status status = add_asked(&page->charts, p, m->trajectory->q);
+  if (!status) status = add_targets(&page->targets, p, m->trajectory);
+  add_each(&page->charts, p, m->trajectory, m->forces);
+  take_forces(page, p->model, m->forces, weight);
+  snprintf(page->title, sizeof page->title, "%.140s on %.140s", p->name, p->model->name);
+  *input = (cav_view_input){.model = p->model,
+                            .title = page->title,
+                            .label = m->label,
+                            .nknot = m->trajectory->nknot,
+                            .timestep = m->trajectory->timestep,
+                            .q = m->trajectory->q,
+                            .goal = has_goal(p) ? p->q_goal : NULL,
+                            .nforce = page->nforce,
+                            .force = page->force,
+                            .ntarget = page->targets.n,
+                            .target = page->targets.target,
+                            .nseries = page->charts.n,
+                            .series = page->charts.series,
+                            .nline = m->verdict ? verdict_lines(m->verdict, page->told, page->line, page->seconds) : 0,
+                            .line = page->line};
+  return status;
+}
+
+cav_status cav_page_write(const char *path, int n, const cav_page_motion *motion, cav_error *error) {
+  parts page[2] = {0};
+  cav_view_input input[2];
+  assert(n == 1 || n == 2);
+  cav_status status = CAV_OK;
+  for (int i = 0; i < n && !status; i++) {
+    status = make_page(&page[i], &motion[i]);
+    if (!status) status = fill_page(&page[i], &motion[i], &input[i]);
+    if (status) cav_file_fail(error, status, 0, "%s: no charts of the motion (%s)", path, cav_status_name(status));
+  }
+  if (!status) status = cav_view_write(path, n, input, error);
+  for (int i = 0; i < n; i++) free_page(&page[i]);
   return status;
 }

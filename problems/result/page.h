@@ -5,9 +5,17 @@
 #include "cavort/solve.h"
 #include "forces.h"
 
-/// Writes view.html: the motion, contact forces, charts of forces, heights, efforts and joints with their limits, and
-/// the verdict (NULL: none). Errors as cav_view_write's.
-cav_status cav_page_write(const char *path, const cav_problem *problem, const cav_trajectory *trajectory,
-                          const cav_forces *forces, const cav_verdict *verdict, cav_error *error);
+/// A motion on a page.
+typedef struct cav_page_motion {
+  const char *label; ///< tells it from the other one
+  const cav_problem *problem;
+  const cav_trajectory *trajectory;
+  const cav_forces *forces;
+  const cav_verdict *verdict; ///< NULL: none
+} cav_page_motion;
+
+/// Writes the page of n motions, 1 or 2: the motions, contact forces, targets, charts of forces, heights, efforts and joints
+/// with their limits, and the verdicts. Errors as cav_view_write's.
+cav_status cav_page_write(const char *path, int n, const cav_page_motion *motion, cav_error *error);
 
 #endif

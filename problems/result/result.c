@@ -215,42 +215,78 @@ cav_status cav_result_write_verdict(const char *folder, const cav_problem *probl
   return status;
 }
 
-// the page of a cycle shows two strides
-static cav_status write_strides(const char *page, const cav_problem *problem, const cav_trajectory *period,
-                                const cav_options *contact, const cav_verdict *verdict, cav_error *error) {
+// a motion as its page shows it: two strides of a cycle
+typedef struct drawn {
+  cav_trajectory *strides; ///< NULL: the motion itself
+  cav_forces *forces;
+} drawn;
+
+static void free_shown(drawn *shown) {
+  cav_forces_free(shown->forces);
+  cav_trajectory_free(shown->strides);
+}
+
+static cav_status make_shown(drawn *shown, const cav_problem *problem, const cav_trajectory *trajectory,
+                             const cav_options *contact, cav_error *error) {
+  if (!problem->cycle.on) {
+    shown->forces = cav_forces_new(problem->model, trajectory, contact, problem->close_at_rest, error);
+    return shown->forces ? CAV_OK : error->status;
+  }
   cav_periodicity *periodicity = cav_periodicity_new(problem, error);
   if (!periodicity) return error->status;
   int periods = problem->cycle.mirror == CAV_MIRROR_NONE ? 2 : 4;
-  cav_trajectory *all = cav_periodicity_unroll(periodicity, period, periods);
-  cav_forces *forces = all ? cav_forces_new(problem->model, all, contact, 0, error) : NULL;
-  cav_status status = all ? CAV_OK : no_memory(error);
-  if (all && !forces) status = error->status;
-  if (!status) status = cav_page_write(page, problem, all, forces, verdict, error);
-  cav_forces_free(forces);
-  cav_trajectory_free(all);
+  shown->strides = cav_periodicity_unroll(periodicity, trajectory, periods);
   cav_periodicity_free(periodicity);
+  if (!shown->strides) return no_memory(error);
+  shown->forces = cav_forces_new(problem->model, shown->strides, contact, 0, error);
+  return shown->forces ? CAV_OK : error->status;
+}
+
+// the tables of a motion's forces
+static cav_status write_forces(const char *folder, const cav_problem *problem, const cav_trajectory *trajectory,
+                               const cav_options *contact, cav_error *error) {
+  int at_rest = problem->close_at_rest && !problem->cycle.on;
+  cav_forces *forces = cav_forces_new(problem->model, trajectory, contact, at_rest, error);
+  if (!forces) return error->status;
+  char *table = cav_result_path(folder, "forces.csv"), *controls = cav_result_path(folder, "controls.csv");
+  cav_status status = table && controls ? CAV_OK : no_memory(error);
+  if (!status) status = cav_controls_write(controls, problem->model, trajectory, forces, error);
+  if (!status) status = cav_forces_write(table, problem->model, trajectory, forces, error);
+  free(table);
+  free(controls);
+  cav_forces_free(forces);
   return status;
 }
 
 cav_status cav_result_write_page(const char *folder, const cav_problem *problem, const cav_trajectory *trajectory,
                                  const cav_options *contact, const cav_verdict *verdict, cav_error *error) {
-  int at_rest = problem->close_at_rest && !problem->cycle.on;
-  cav_forces *forces = cav_forces_new(problem->model, trajectory, contact, at_rest, error);
-  if (!forces) return error->status;
-  char *table = cav_result_path(folder, "forces.csv"), *page = cav_result_path(folder, "view.html");
-  char *controls = cav_result_path(folder, "controls.csv");
-  cav_status status = table && page && controls ? CAV_OK : no_memory(error);
-  if (!status) status = cav_controls_write(controls, problem->model, trajectory, forces, error);
-  if (!status) status = cav_forces_write(table, problem->model, trajectory, forces, error);
-  if (!status && problem->cycle.on) {
-    status = write_strides(page, problem, trajectory, contact, verdict, error);
-  } else if (!status) {
-    status = cav_page_write(page, problem, trajectory, forces, verdict, error);
+  drawn shown = {0};
+  char *page = cav_result_path(folder, "view.html");
+  cav_status status = page ? write_forces(folder, problem, trajectory, contact, error) : no_memory(error);
+  if (!status) status = make_shown(&shown, problem, trajectory, contact, error);
+  if (!status) {
+    cav_page_motion motion = {problem->name, problem, shown.strides ? shown.strides : trajectory, shown.forces,
+                              verdict};
+    status = cav_page_write(page, 1, &motion, error);
   }
-  free(table);
+  free_shown(&shown);
   free(page);
-  free(controls);
-  cav_forces_free(forces);
+  return status;
+}
+
+cav_status cav_result_compare(const char *page, const char *const label[2], const cav_result *const result[2],
+                              const cav_verdict verdict[2], cav_error *error) {
+  drawn shown[2] = {0};
+  cav_page_motion motion[2];
+  cav_status status = CAV_OK;
+  for (int i = 0; i < 2 && !status; i++) {
+    const cav_problem *problem = result[i]->problem;
+    status = make_shown(&shown[i], problem, result[i]->trajectory, &problem->contact, error);
+    motion[i] = (cav_page_motion){label[i], problem, shown[i].strides ? shown[i].strides : result[i]->trajectory,
+                                  shown[i].forces, &verdict[i]};
+  }
+  if (!status) status = cav_page_write(page, 2, motion, error);
+  for (int i = 0; i < 2; i++) free_shown(&shown[i]);
   return status;
 }
 

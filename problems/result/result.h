@@ -42,6 +42,10 @@ cav_status cav_result_write_verdict(const char *folder, const cav_problem *probl
 cav_status cav_result_write_page(const char *folder, const cav_problem *problem, const cav_trajectory *trajectory,
                                  const cav_options *contact, const cav_verdict *verdict, cav_error *error);
 
+/// Writes one page of two motions, their labels and verdicts beside each other.
+cav_status cav_result_compare(const char *page, const char *const label[2], const cav_result *const result[2],
+                              const cav_verdict verdict[2], cav_error *error);
+
 /// Reads a folder; model_path replaces the model that problem.xml names, NULL: as it says. NULL on failure with the
 /// reason in error. Freed with cav_result_free.
 cav_result *cav_result_read(const char *folder, const char *model_path, cav_error *error);

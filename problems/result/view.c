@@ -1,9 +1,10 @@
-/// Writes a motion as one self-contained page: the template viewer.html with three.js and a block of JSON in its
+/// Writes motions as one self-contained page: the template viewer/page.html with three.js and a block of JSON in its
 /// places. Poses of the links at every knot come from the dynamics library; the page interpolates between them. Numbers
 /// carry six digits (positions) or five, enough for the eye; the exact motion is in trajectory.csv. The page's own
-/// script is in viewer.html. Nothing here reads results from disk or computes forces: the caller hands them over.
+/// scripts are in viewer/. Nothing here reads results from disk or computes forces: the caller hands them over.
 #include "view.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -147,6 +148,8 @@ static void write_geoms(FILE *out, const cav_model *model) {
     const double rgba[4] = {(double)geom->rgba[0], (double)geom->rgba[1], (double)geom->rgba[2], (double)geom->rgba[3]};
     fprintf(out, "%s{\"name\":", i > 0 ? ",\n" : "\n");
     write_string(out, geom->name);
+    fputs(",\"body\":", out);
+    write_string(out, model->body[geom->body].name);
     fprintf(out, ",\"type\":\"%s\",\"link\":%d,\"group\":%d,\"size\":", kind[geom->type], geom->link, geom->group);
     write_numbers(out, geom->size, 3, 6);
     fputs(",\"pos\":", out);
@@ -162,7 +165,8 @@ static void write_geoms(FILE *out, const cav_model *model) {
   fputs("\n]", out);
 }
 
-// mass and centre of mass of every link, for the camera and the path of the centre of mass
+// of every link mass and centre of mass, for the camera and the path of the centre of mass; the link before it, and where
+// the joint that turns it is (null: none does)
 static void write_links(FILE *out, const cav_model *model) {
   fputs("\"links\":[", out);
   for (int i = 0; i < model->nlink; i++) {
@@ -173,6 +177,15 @@ static void write_links(FILE *out, const cav_model *model) {
     write_number(out, i > 0 ? link->mass : 0, 6);
     fputs(",\"com\":", out);
     write_numbers(out, link->com, 3, 6);
+    fprintf(out, ",\"parent\":%d,\"joint\":", link->parent);
+    int turns = 0;
+    while (turns < link->njoint && model->joint[link->joint + turns].type != CAV_JOINT_HINGE &&
+           model->joint[link->joint + turns].type != CAV_JOINT_BALL)
+      turns++;
+    if (turns < link->njoint)
+      write_numbers(out, model->joint[link->joint + turns].pos, 3, 6);
+    else
+      fputs("null", out);
     putc('}', out);
   }
   putc(']', out);
@@ -224,7 +237,7 @@ static cav_status write_poses(FILE *out, const cav_model *model, const cav_view_
   return status;
 }
 
-// one row per knot: position and force of each contact, one after the other
+// one row per knot: of each contact position, force, normal, friction and both links, one after the other
 static void write_forces(FILE *out, const cav_view_input *input) {
   if (!input->nforce) {
     fputs("\"forces\":null", out);
@@ -235,17 +248,31 @@ static void write_forces(FILE *out, const cav_view_input *input) {
   for (int t = 0; t < input->nknot; t++) {
     fprintf(out, "%s[", t > 0 ? ",\n" : "\n");
     for (int i = 0; i < input->nforce[t]; i++, force++) {
-      if (i > 0) putc(',', out);
-      for (int k = 0; k < 3; k++) {
-        write_number(out, force->pos[k], 5);
-        putc(',', out);
+      const double number[10] = {force->pos[0],    force->pos[1],   force->pos[2],    force->force[0],
+                                 force->force[1],  force->force[2], force->normal[0], force->normal[1],
+                                 force->normal[2], force->friction};
+      for (int k = 0; k < 10; k++) {
+        if (i > 0 || k > 0) putc(',', out);
+        write_number(out, number[k], k < 3 ? 5 : 4);
       }
-      for (int k = 0; k < 3; k++) {
-        if (k > 0) putc(',', out);
-        write_number(out, force->force[k], 4);
-      }
+      fprintf(out, ",%d,%d", force->link1, force->link2);
     }
     putc(']', out);
+  }
+  fputs("\n]", out);
+}
+
+static void write_targets(FILE *out, const cav_view_input *input) {
+  fputs("\"targets\":[", out);
+  for (int i = 0; i < input->ntarget; i++) {
+    const cav_view_target *target = &input->target[i];
+    fprintf(out, "%s{\"name\":", i > 0 ? ",\n" : "\n");
+    write_string(out, target->name);
+    fprintf(out, ",\"from\":%d,\"to\":%d,\"pos\":", target->from, target->to);
+    write_numbers(out, target->pos, 3, 5);
+    fputs(",\"got\":", out);
+    write_numbers(out, target->got, 3, 5);
+    putc('}', out);
   }
   fputs("\n]", out);
 }
@@ -264,7 +291,7 @@ static void write_series(FILE *out, const cav_view_input *input) {
     write_number(out, series->lower, 5);
     fputs(",\"upper\":", out);
     write_number(out, series->upper, 5);
-    fputs(",\"value\":", out);
+    fprintf(out, ",\"share\":%d,\"value\":", series->share);
     write_numbers(out, series->value, input->nknot, 5);
     fputs(",\"wanted\":", out);
     if (series->wanted)
@@ -288,18 +315,19 @@ static void write_verdict(FILE *out, const cav_view_input *input) {
   fputs("\n]", out);
 }
 
-static cav_status write_data(FILE *out, const cav_model *model, const cav_view_input *input, cav_error *error) {
+static cav_status write_motion(FILE *out, const cav_view_input *input, cav_error *error) {
+  const cav_model *model = input->model;
+  const double *g = model->gravity;
   fputs("{\"title\":", out);
   write_string(out, input->title);
+  fputs(",\"label\":", out);
+  write_string(out, input->label);
   fputs(",\"model\":", out);
   write_string(out, model->name);
   fprintf(out, ",\"nknot\":%d,\"timestep\":", input->nknot);
   write_number(out, input->timestep, 12);
   fputs(",\"weight\":", out);
-  write_number(out,
-               model->mass * sqrt(model->gravity[0] * model->gravity[0] + model->gravity[1] * model->gravity[1] +
-                                  model->gravity[2] * model->gravity[2]),
-               6);
+  write_number(out, model->mass * sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]), 6);
   fputs(",\n", out);
   write_geoms(out, model);
   fputs(",\n", out);
@@ -310,11 +338,23 @@ static cav_status write_data(FILE *out, const cav_model *model, const cav_view_i
   fputs(",\n", out);
   write_forces(out, input);
   fputs(",\n", out);
+  write_targets(out, input);
+  fputs(",\n", out);
   write_series(out, input);
   fputs(",\n", out);
   write_verdict(out, input);
-  fputs("}\n", out);
+  putc('}', out);
   return CAV_OK;
+}
+
+static cav_status write_data(FILE *out, int n, const cav_view_input *input, cav_error *error) {
+  cav_status status = CAV_OK;
+  for (int i = 0; i < n && !status; i++) {
+    fputs(i ? ",\n" : "[", out);
+    status = write_motion(out, &input[i], error);
+  }
+  fputs("]\n", out);
+  return status;
 }
 
 // --- the page ---
@@ -383,15 +423,14 @@ static char *read_three(cav_error *error) {
 }
 
 // the template with both places filled
-static cav_status write_page(FILE *out, const char *three, const cav_model *model, const cav_view_input *input,
-                             cav_error *error) {
+static cav_status write_page(FILE *out, const char *three, int n, const cav_view_input *input, cav_error *error) {
   static const char place_three[] = "/*CAVORT_THREE*/", place_data[] = "{\"CAVORT_DATA\":0}";
   const char *page = (const char *)viewer_page;
   const char *at_three = strstr(page, place_three), *at_data = strstr(page, place_data);
   if (!at_three || !at_data || at_data > at_three)
     return cav_file_fail(error, CAV_INTERNAL, 0, "view: the template has lost its places");
   fwrite(page, 1, (size_t)(at_data - page), out);
-  cav_status status = write_data(out, model, input, error);
+  cav_status status = write_data(out, n, input, error);
   if (status != CAV_OK) return status;
   at_data += sizeof place_data - 1;
   fwrite(at_data, 1, (size_t)(at_three - at_data), out);
@@ -400,24 +439,27 @@ static cav_status write_page(FILE *out, const char *three, const cav_model *mode
   return CAV_OK;
 }
 
-static cav_status check_input(const cav_model *model, const cav_view_input *input, cav_error *error) {
+static cav_status check_input(const cav_view_input *input, cav_error *error) {
+  int nq = input->model->nq;
   if (input->nknot < 1 || !input->q) return cav_file_fail(error, CAV_BAD_INPUT, 0, "view: there is no knot to show");
   if (!(isfinite(input->timestep) && input->timestep > 0))
     return cav_file_fail(error, CAV_BAD_INPUT, 0, "view: the time step is %g s; it has to be positive",
                          input->timestep);
   for (int t = 0; t < input->nknot; t++) {
-    for (int i = 0; i < model->nq; i++) {
-      if (!isfinite(input->q[(size_t)t * (size_t)model->nq + (size_t)i]))
+    for (int i = 0; i < nq; i++) {
+      if (!isfinite(input->q[(size_t)t * (size_t)nq + (size_t)i]))
         return cav_file_fail(error, CAV_NOT_FINITE, 0, "view: q[%d] at knot %d is not a finite number", i, t);
     }
   }
   return CAV_OK;
 }
 
-cav_status cav_view_write(const char *path, const cav_model *model, const cav_view_input *input, cav_error *error) {
+cav_status cav_view_write(const char *path, int n, const cav_view_input *input, cav_error *error) {
   cav_error unasked;
   if (!error) error = &unasked;
-  cav_status status = check_input(model, input, error);
+  assert(n == 1 || n == 2);
+  cav_status status = CAV_OK;
+  for (int i = 0; i < n && !status; i++) status = check_input(&input[i], error);
   if (status != CAV_OK) return status;
   char *three = read_three(error);
   if (!three) return error->status;
@@ -425,7 +467,7 @@ cav_status cav_view_write(const char *path, const cav_model *model, const cav_vi
   cav_file file;
   status = cav_file_begin(&file, path, error);
   if (status == CAV_OK) {
-    status = write_page(file.stream, three, model, input, error);
+    status = write_page(file.stream, three, n, input, error);
     if (status == CAV_OK) {
       status = cav_file_end(&file, error);
     } else {
