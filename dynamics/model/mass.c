@@ -201,8 +201,8 @@ static void weigh_by_geoms(cav_spec *spec, cav_spec_body *b) {
 }
 
 // moments that miss what a solid has by rounding: those below 0 are set to 0, and a largest one above the sum of the
-// others moves to the nearest that is not. What misses it by more is told and stays. What is left of a point mass's zeros when a program
-// moved its axes is zero
+// others moves to the nearest that is not. What misses it by more is told and stays. What is left of a point mass's
+// zeros when a program moved its axes is zero
 static void repair_inertia(cav_spec *spec, cav_spec_body *b) {
   static const double rounding = 0.01; // of the largest moment
   static const double nothing = 1e-15; // m^2, of a mass: a radius of 3e-8 m

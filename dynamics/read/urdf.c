@@ -425,7 +425,7 @@ static void read_motion(reader *r, const cav_xml_node *node, int type, cav_spec_
   if (d) j->frictionloss = cav_xml_real(d, "friction", 0);
   if (!(l && cav_xml_real(l, "effort", 0) > 0) && !cav_xml_child(node, &mimic))
     cav_spec_leave(spec, node, NULL,
-                   "no effort limit above 0: the joint is not driven; give <limit effort> to drive it");
+                   "no effort limit above 0: the joint has no actuator; give <limit effort> for one");
   if (!l) return;
   j->range[0] = cav_xml_real(l, "lower", 0);
   j->range[1] = cav_xml_real(l, "upper", 0);
@@ -444,8 +444,9 @@ static const cav_xml_node *named_joint(const cav_xml_node *robot, const char *na
   return c;
 }
 
-// a joint that follows another: q = multiplier q_other + offset, as a joint equality with MJCF's softness. Where robots are reduced
-// joints become fixed and their <mimic> stays: a fixed joint follows nothing, and who follows it is held at its offset
+// a joint that follows another: q = multiplier q_other + offset, as a joint equality with MJCF's softness. Where
+// robots are reduced joints become fixed and their <mimic> stays: a fixed joint follows nothing, and who follows it is
+// held at its offset
 static void read_mimic(cav_spec *spec, const cav_xml_node *node, const char *name) {
   const cav_xml_node *other = named_joint(node->parent->parent, cav_xml_text(node, "joint", ""));
   if (!other) {
