@@ -13,10 +13,12 @@
 
 cav_load_options cav_load_options_default(void) { return (cav_load_options){0}; }
 
-static cav_model *load(const char *path, const cav_load_options *options, const cav_xml_node *scene, cav_error *error) {
+// text: in the place of the file, NULL: none
+static cav_model *load(const char *path, const char *text, const cav_load_options *options, const cav_xml_node *scene,
+                       cav_error *error) {
   static const cav_xml_element *const roots[] = {&cav_mjcf_root, &cav_urdf_root, NULL};
   if (error) *error = (cav_error){.status = CAV_OK};
-  cav_xml *xml = cav_xml_read(path, roots, NULL, error);
+  cav_xml *xml = cav_xml_parse(path, text, roots, NULL, error);
   if (!xml) return NULL;
   if (scene && cav_xml_remove(xml, scene, error) != CAV_OK) {
     cav_xml_free(xml);
@@ -39,16 +41,31 @@ static cav_model *load(const char *path, const cav_load_options *options, const 
 
 cav_model *cav_model_load(const char *path, cav_error *error) {
   cav_load_options options = cav_load_options_default();
-  return load(path, &options, NULL, error);
+  return load(path, NULL, &options, NULL, error);
 }
 
 cav_model *cav_model_load_with(const char *path, const cav_load_options *options, cav_error *error) {
-  return load(path, options, NULL, error);
+  return load(path, NULL, options, NULL, error);
+}
+
+cav_model *cav_model_parse(const char *text, const char *folder, const cav_load_options *options, cav_error *error) {
+  static const char name[] = "text";
+  cav_load_options usual = cav_load_options_default();
+  size_t length = folder ? strlen(folder) : 0, room = length + sizeof name + 1;
+  char *path = malloc(room);
+  if (!path) {
+    if (error) *error = (cav_error){.status = CAV_NO_MEMORY, .text = "no memory to read a model from a text"};
+    return NULL;
+  }
+  snprintf(path, room, "%s%s%s", length ? folder : "", length && folder[length - 1] != '/' ? "/" : "", name);
+  cav_model *model = load(path, text, options ? options : &usual, NULL, error);
+  free(path);
+  return model;
 }
 
 cav_model *cav_model_load_scene(const char *path, const cav_load_options *options, const cav_xml_node *scene,
                                 cav_error *error) {
-  return load(path, options, scene, error);
+  return load(path, NULL, options, scene, error);
 }
 
 void cav_model_free(cav_model *model) { free(model); }

@@ -300,8 +300,13 @@ static void read_file(cav_xml_reader *r, const char *path, cav_xml_source *from,
 
 cav_xml *cav_xml_read(const char *path, const cav_xml_element *const *roots, const cav_xml_former *former,
                       cav_error *error) {
+  return cav_xml_parse(path, NULL, roots, former, error);
+}
+
+cav_xml *cav_xml_parse(const char *path, const char *text, const cav_xml_element *const *roots,
+                       const cav_xml_former *former, cav_error *error) {
   cav_xml *xml = calloc(1, sizeof *xml);
-  cav_xml_reader r = {.xml = xml, .roots = roots, .former = former, .error = error};
+  cav_xml_reader r = {.xml = xml, .roots = roots, .former = former, .error = error, .text = text};
   cav_xml_source none = {.reader = &r, .path = path};
   if (xml) xml->path = cav_xml_carve_text(xml, path, strlen(path));
   locale_t plain = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0);

@@ -96,6 +96,11 @@ typedef struct cav_xml cav_xml;
 cav_xml *cav_xml_read(const char *path, const cav_xml_element *const *roots, const cav_xml_former *former,
                       cav_error *error);
 
+/// The same of a text in the place of the main file, which path stands for: in complaints, and its folder where other
+/// files are sought. text NULL: the file is read.
+cav_xml *cav_xml_parse(const char *path, const char *text, const cav_xml_element *const *roots,
+                       const cav_xml_former *former, cav_error *error);
+
 /// Frees a tree; NULL is fine.
 void cav_xml_free(cav_xml *xml);
 

@@ -41,6 +41,7 @@ typedef struct cav_xml_reader {
   const cav_xml_element *const *roots;
   const cav_xml_former *former;
   cav_error *error;
+  const char *text;  ///< in the place of the main file; NULL: that is read
   cav_status status; ///< of the first failure
   cav_xml_node *at;  ///< innermost open element that is kept
   int unread;        ///< open elements from the outermost CAV_XML_ANYTHING inwards

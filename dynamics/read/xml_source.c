@@ -58,9 +58,27 @@ void cav_xml_fail_open(cav_xml_source *s, const cav_xml_node *asked, cav_status 
     cav_xml_source_fail(s, status, 0, NULL, NULL, "%s", text);
 }
 
+// a text of the caller's in the place of the main file; 0 on failure
+static int take_text(cav_xml_source *s) {
+  s->size = strlen(s->reader->text);
+  if (s->size == 0 || s->size > FILE_LIMIT) {
+    cav_xml_source_fail(s, CAV_BAD_INPUT, 0, NULL, NULL, "expected XML of 1 to %d bytes, got %zu", FILE_LIMIT, s->size);
+    return 0;
+  }
+  s->text = malloc(s->size);
+  if (!s->text) {
+    cav_xml_source_fail(s, CAV_NO_MEMORY, 0, NULL, NULL, "no memory for %zu bytes", s->size);
+    return 0;
+  }
+  memcpy(s->text, s->reader->text, s->size);
+  s->reader->total += s->size;
+  return 1;
+}
+
 // the file into memory; 0 on failure
 static int load(cav_xml_source *s, const cav_xml_node *asked) {
   struct stat info;
+  if (!s->from && s->reader->text) return take_text(s);
   if (stat(s->path, &info)) {
     cav_xml_fail_open(s, asked, CAV_BAD_INPUT, "cannot be opened (%s); check the path", strerror(errno));
     return 0;

@@ -568,6 +568,40 @@ CAV_API cav_model *cav_model_load_with(const char *path, const cav_load_options 
 /// cav_model_free.
 CAV_API cav_model *cav_model_load(const char *path, cav_error *error);
 
+/// The same of a text, MJCF or URDF, in the place of a file: meshes and other files that it names are sought from folder
+/// (NULL: the current one), complaints are of "FOLDER/text" with its lines. options NULL: the default ones.
+CAV_API cav_model *cav_model_parse(const char *text, const char *folder, const cav_load_options *options,
+                                   cav_error *error);
+
+/// A model in the making: MJCF's elements, made in code. What a draft may hold is what a file may hold; cavort checks it
+/// when it is compiled, and the model has the bits of the same MJCF in a file. One thread.
+typedef struct cav_draft cav_draft;
+
+/// Elements that every draft has: <mujoco>, which holds the sections (actuator, tendon, sensor, keyframe, option, ...), and
+/// <worldbody>, which holds bodies.
+enum { CAV_DRAFT_ROOT, CAV_DRAFT_WORLD };
+
+/// An empty model of that name (NULL: "model"), angles in radians; NULL if memory runs out.
+CAV_API cav_draft *cav_draft_new(const char *name);
+CAV_API void cav_draft_free(cav_draft *draft);
+
+/// Puts an element into another (body, joint, freejoint, geom, site, motor, ... as in MJCF) after those that it has.
+/// Returns its number, with which it is given attributes and elements of its own. -1 after any failure, which
+/// cav_draft_compile tells, so results need no check.
+CAV_API int cav_draft_add(cav_draft *draft, int parent, const char *element);
+
+/// Gives an element an attribute, in the place of one of that name: a text (names, words, "true"), or n numbers, written with
+/// 17 digits. Units as in MJCF: m, kg, rad, N.
+CAV_API void cav_draft_text(cav_draft *draft, int element, const char *attribute, const char *value);
+CAV_API void cav_draft_numbers(cav_draft *draft, int element, const char *attribute, const double *value, int n);
+
+/// The draft as MJCF, which a file may hold, until it is written or compiled again or freed; NULL after a failure.
+CAV_API const char *cav_draft_mjcf(cav_draft *draft);
+
+/// The model, as cav_model_parse of that text, in which lines of complaints are. The draft stays, and may grow further.
+CAV_API cav_model *cav_draft_compile(cav_draft *draft, const char *folder, const cav_load_options *options,
+                                     cav_error *error);
+
 /// Frees a model; NULL is fine. No state of it may be used afterwards.
 CAV_API void cav_model_free(cav_model *model);
 

@@ -288,6 +288,38 @@ typedef struct cav_problem {
   void *owner;            ///< memory of a problem read from a file
 } cav_problem;
 
+/// A term with what files give one that says no more: its element's name, over the whole horizon, of all joints but free
+/// ones, of all components, scale 1, the norm a square, no target (zeros, or the goal posture). Set what else there is to say:
+/// sensor or user, window, target, dofs, within. quantity < CAV_QUANTITY_TYPES; a constraint's has hard in its rule.
+CAV_API cav_term cav_term_cost(cav_quantity quantity, double weight);
+CAV_API cav_term cav_term_equal(cav_quantity quantity, const double *target);
+CAV_API cav_term cav_term_range(cav_quantity quantity, double lower, double upper);
+
+/// The first object of the model that has one of the names, separated by |, as files have it: of bodies also by role ("right
+/// foot"), whose kind *type then may become CAV_OBJECT_GEOM. -1 with the reason in error. Uses the state.
+CAV_API int cav_object_named(const cav_model *model, cav_state *state, const char *names, cav_object_type *type,
+                             cav_error *error);
+
+/// A sensor of an object of the model, in the world's frame, for a term's sensor. CAV_BAD_INPUT with the reason in error:
+/// sensors of that type do not look at such an object.
+CAV_API cav_status cav_sensor_of(const cav_model *model, cav_sensor_type type, cav_object_type object_type, int object,
+                                 cav_sensor *sensor, cav_error *error);
+
+/// What key="stand" is in files: q [nq] of a posture that stands, of any model with feet: its keyframe "stand" or "home", or
+/// one found. CAV_BAD_INPUT: there is none, and why; CAV_NOT_FINITE, CAV_NO_MEMORY. Uses the state.
+CAV_API cav_status cav_configuration_stand(const cav_model *model, cav_state *state, double *q, cav_error *error);
+
+/// What height="floor" of a posture in files does to q [nq]: moves each tree that is free or slides along the vertical until
+/// its lowest geom touches a plane of the world, or going down something else that stands there first. rise: planes alone,
+/// and so many metres higher; NULL: no such. The state is left at q. CAV_BAD_INPUT: nothing can be moved so;
+/// CAV_NOT_FINITE, CAV_NO_MEMORY: q is undefined.
+CAV_API cav_status cav_configuration_to_floor(const cav_model *model, cav_state *state, const double *rise, double *q,
+                                              cav_error *error);
+
+/// What ranges="clip" does: hinges and slides of q [nq] into their ranges, where they have any. Returns how many were
+/// outside.
+CAV_API int cav_configuration_clip(const cav_model *model, double *q);
+
 /// Weights, schedule and options that serve all motions; the caller sets duration, start, goal and terms. Owns nothing.
 CAV_API cav_problem cav_problem_default(const cav_model *model);
 

@@ -134,26 +134,65 @@ static void refuse_name(const cav_problem_reader *reader, const cav_xml_node *no
                near ? "'?" : "", known);
 }
 
-int cav_problem_find_frame(const cav_problem_reader *reader, const cav_xml_node *node, const char *attribute,
-                           cav_object_type *type) {
-  char *copy = strdup(cav_xml_text(node, attribute, "")), *rest = copy, *name = NULL, *first = NULL;
-  int found = -1, may = *type == CAV_OBJECT_BODY || *type == CAV_OBJECT_XBODY, known = 0;
+/// A search among the objects of a model by a list of names, separated by |, which it cuts.
+typedef struct search {
+  const cav_model *model;
+  cav_state *state;
+  cav_object_type type; ///< of bodies by their roles it may become a geom
+  const char *first;    ///< of the names
+  int known;            ///< whether roles are filled
   cav_roles roles;
-  cav_status status = copy ? CAV_OK : CAV_NO_MEMORY;
-  while (found < 0 && !status && (name = strsep(&rest, "|"))) {
+  cav_status status;
+} search;
+
+// the first object that there is, -1: none
+static int find_listed(search *s, char *names) {
+  int found = -1, may = s->type == CAV_OBJECT_BODY || s->type == CAV_OBJECT_XBODY;
+  char *name = NULL;
+  while (found < 0 && !s->status && (name = strsep(&names, "|"))) {
     name += strspn(name, " ");
     for (size_t n = strlen(name); n && name[n - 1] == ' '; n--) name[n - 1] = 0;
-    if (!first) first = name;
-    if (*name) found = cav_object_find(reader->model, *type, name);
+    if (!s->first) s->first = name;
+    if (*name) found = cav_object_find(s->model, s->type, name);
     if (found >= 0 || !may) continue;
-    if (!known++) status = cav_roles_find(reader->model, reader->state, &roles);
-    if (!status) found = find_role(name, &roles, type);
+    if (!s->known++) s->status = cav_roles_find(s->model, s->state, &s->roles);
+    if (!s->status) found = find_role(name, &s->roles, &s->type);
   }
-  if (status)
-    cav_xml_fail_as(reader->error, status, node, attribute, "the roles of bodies cannot be found: %s",
-                    cav_status_name(status));
+  return found;
+}
+
+int cav_problem_find_frame(const cav_problem_reader *reader, const cav_xml_node *node, const char *attribute,
+                           cav_object_type *type) {
+  char *copy = strdup(cav_xml_text(node, attribute, ""));
+  search s = {.model = reader->model, .state = reader->state, .type = *type, .status = copy ? CAV_OK : CAV_NO_MEMORY};
+  int found = copy ? find_listed(&s, copy) : -1;
+  if (s.status)
+    cav_xml_fail_as(reader->error, s.status, node, attribute, "the roles of bodies cannot be found: %s",
+                    cav_status_name(s.status));
   else if (found < 0)
-    refuse_name(reader, node, attribute, *type, first, known ? &roles : NULL);
+    refuse_name(reader, node, attribute, *type, s.first, s.known ? &s.roles : NULL);
+  *type = s.type;
+  free(copy);
+  return found;
+}
+
+int cav_object_named(const cav_model *model, cav_state *state, const char *names, cav_object_type *type,
+                     cav_error *error) {
+  char *copy = names && (unsigned)*type < CAV_OBJECT_TYPES ? strdup(names) : NULL;
+  search s = {.model = model, .state = state, .type = *type, .status = copy ? CAV_OK : CAV_NO_MEMORY};
+  int found = copy ? find_listed(&s, copy) : -1;
+  if (s.status) {
+    cav_file_fail(error, s.status, 0, "no object can be sought by name: %s", cav_status_name(s.status));
+  } else if (found < 0) {
+    int n = 0;
+    size_t stride = 0;
+    const void *known = cav_object_names(model, *type, &n, &stride);
+    const char *near = n ? cav_xml_nearest(s.first, known, n, stride) : NULL;
+    cav_file_fail(error, CAV_BAD_INPUT, 0, "the model '%.100s' has no %s of that name, got '%.100s'%s%.100s%s",
+                  model->name, cav_object_kind_of(*type)->text, names, near ? "; did you mean '" : "", near ? near : "",
+                  near ? "'?" : "");
+  }
+  *type = s.type;
   free(copy);
   return found;
 }

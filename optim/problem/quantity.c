@@ -26,6 +26,33 @@ int cav_term_has_dofs(const cav_term *term) {
   return of == CAV_OF_POSTURE || of == CAV_OF_RATE;
 }
 
+cav_term cav_term_cost(cav_quantity quantity, double weight) {
+  cav_term term = {.name = cav_quantity_rule_of(quantity)->name, .quantity = quantity, .use = CAV_USE_COST};
+  term.weight = weight;
+  term.component = term.joint = -1;
+  term.to = -1;
+  term.scale = 1;
+  term.lower = -INFINITY;
+  term.upper = INFINITY;
+  if (cav_term_has_dofs(&term)) term.dofs = CAV_DOFS_JOINTS;
+  return term;
+}
+
+cav_term cav_term_equal(cav_quantity quantity, const double *target) {
+  cav_term term = cav_term_cost(quantity, 0);
+  term.use = CAV_USE_EQUAL;
+  term.target = target;
+  return term;
+}
+
+cav_term cav_term_range(cav_quantity quantity, double lower, double upper) {
+  cav_term term = cav_term_cost(quantity, 0);
+  term.use = CAV_USE_RANGE;
+  term.lower = lower;
+  term.upper = upper;
+  return term;
+}
+
 static const cav_term default_term[] = {
     {.name = "effort", .quantity = CAV_QUANTITY_EFFORT, .weight = 1},
     {.name = "joint velocity", .quantity = CAV_QUANTITY_VELOCITY, .dofs = CAV_DOFS_JOINTS, .weight = 0.05},
@@ -44,14 +71,9 @@ _Static_assert(sizeof default_term / sizeof *default_term == CAV_DEFAULT_TERMS, 
 int cav_problem_default_terms(cav_term *term, int most) {
   int n = CAV_DEFAULT_TERMS;
   for (int i = 0; i < n && i < most; i++) {
-    term[i] = default_term[i];
-    term[i].use = CAV_USE_COST;
-    term[i].component = -1;
-    term[i].joint = -1;
-    term[i].to = -1;
-    term[i].scale = 1;
-    term[i].lower = -INFINITY;
-    term[i].upper = INFINITY;
+    term[i] = cav_term_cost(default_term[i].quantity, default_term[i].weight);
+    term[i].name = default_term[i].name;
+    term[i].dofs = default_term[i].dofs;
   }
   return n;
 }

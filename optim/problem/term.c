@@ -59,7 +59,7 @@ cav_status cav_problem_window(const cav_problem_reader *reader, const cav_xml_no
 
 // an attribute that picks dofs
 static cav_status read_dofs(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
-  term->dofs = (cav_dof_set)cav_xml_word(node, "dofs", CAV_DOFS_JOINTS);
+  term->dofs = (cav_dof_set)cav_xml_word(node, "dofs", term->dofs);
   if (!cav_xml_get(node, "joint")) return CAV_OK;
   if (cav_xml_get(node, "dofs")) {
     return cav_xml_fail(reader->error, node, "joint", "contradicts attribute 'dofs'; give one of the two");
@@ -279,20 +279,58 @@ static const struct {
                  [CAV_TARGET_LIMITED_TENDON] = {"tendon", CAV_OBJECT_TENDON},
                  [CAV_TARGET_ACTUATOR] = {"actuator", CAV_OBJECT_ACTUATOR}};
 
-// a joint or tendon of the kind that the sensor needs
-static cav_status check_object(const cav_problem_reader *reader, const cav_xml_node *node, const char *given,
-                               const cav_sensor *sensor) {
-  const cav_model *m = reader->model;
-  const char *needs = NULL, *name = cav_xml_text(node, given, "");
+static int has_frame(cav_object_type type) {
+  return type == CAV_OBJECT_BODY || type == CAV_OBJECT_XBODY || type == CAV_OBJECT_GEOM || type == CAV_OBJECT_SITE;
+}
+
+// whether a sensor looks at objects of that kind
+static int looks_at(const cav_sensor *sensor) {
+  cav_sensor_target target = cav_sensor_rule_of(sensor->type)->target;
+  return target == CAV_TARGET_FRAME ? has_frame(sensor->object_type) : sensor->object_type == wanted_of[target].type;
+}
+
+// the kind of joint or tendon that a sensor needs where its own is none, NULL: it is
+static const char *lacks(const cav_model *m, const cav_sensor *sensor) {
+  const char *needs = NULL;
   cav_sensor_target target = cav_sensor_rule_of(sensor->type)->target;
   if (target == CAV_TARGET_SCALAR_JOINT && m->joint[sensor->object].type < CAV_JOINT_SLIDE)
     needs = "a hinge or a slide";
   if (target == CAV_TARGET_BALL_JOINT && m->joint[sensor->object].type != CAV_JOINT_BALL) needs = "a ball joint";
   if (target == CAV_TARGET_LIMITED_JOINT && !m->joint[sensor->object].limited) needs = "a joint with a limit";
   if (target == CAV_TARGET_LIMITED_TENDON && !m->tendon[sensor->object].limited) needs = "a tendon with a limit";
+  return needs;
+}
+
+// a joint or tendon of the kind that the sensor needs
+static cav_status check_object(const cav_problem_reader *reader, const cav_xml_node *node, const char *given,
+                               const cav_sensor *sensor) {
+  const char *needs = lacks(reader->model, sensor);
   if (!needs) return CAV_OK;
   return cav_xml_fail(reader->error, node, given, "a %s needs %s; '%.60s' is none",
-                      cav_sensor_rule_of(sensor->type)->name, needs, name);
+                      cav_sensor_rule_of(sensor->type)->name, needs, cav_xml_text(node, given, ""));
+}
+
+cav_status cav_sensor_of(const cav_model *m, cav_sensor_type type, cav_object_type object_type, int object,
+                         cav_sensor *sensor, cav_error *error) {
+  int n = 0;
+  size_t stride;
+  if ((unsigned)type >= CAV_SENSOR_TYPES) return cav_file_fail(error, CAV_BAD_INPUT, 0, "there is no such sensor");
+  const cav_sensor_rule *rule = cav_sensor_rule_of(type);
+  *sensor = (cav_sensor){.name = "", .type = type, .object_type = object_type, .object = object, .adr = -1};
+  sensor->dim = rule->dim;
+  if (rule->target == CAV_TARGET_NONE)
+    return cav_file_fail(error, CAV_BAD_INPUT, 0, "a %s reads nothing of the motion; windows tell the time",
+                         rule->name);
+  if (!looks_at(sensor))
+    return cav_file_fail(error, CAV_BAD_INPUT, 0, "a %s looks at a %s", rule->name, wanted_of[rule->target].name);
+  cav_object_names(m, object_type, &n, &stride);
+  if (object < 0 || object >= n)
+    return cav_file_fail(error, CAV_BAD_INPUT, 0, "a %s of object %d, of which the model '%.100s' has %d", rule->name,
+                         object, m->name, n);
+  const char *needs = lacks(m, sensor);
+  if (!needs) return CAV_OK;
+  return cav_file_fail(error, CAV_BAD_INPUT, 0, "a %s needs %s; '%.60s' is none", rule->name, needs,
+                       cav_object_name(m, object_type, object));
 }
 
 // the frame in which a frame sensor declared in the file reads
@@ -309,10 +347,6 @@ static cav_status read_reference(const cav_problem_reader *reader, const cav_xml
   sensor->reference_type = types[cav_xml_word(node, "reftype", 0)];
   sensor->reference = cav_problem_find_frame(reader, node, "refname", &sensor->reference_type);
   return sensor->reference < 0 ? CAV_BAD_INPUT : CAV_OK;
-}
-
-static int has_frame(cav_object_type type) {
-  return type == CAV_OBJECT_BODY || type == CAV_OBJECT_XBODY || type == CAV_OBJECT_GEOM || type == CAV_OBJECT_SITE;
 }
 
 // the object that a sensor declared in the file looks at
@@ -334,8 +368,7 @@ static cav_status read_object(const cav_problem_reader *reader, const cav_xml_no
   if (!given)
     return cav_xml_fail(reader->error, node, framed ? "body" : wanted, "is missing; a %s needs one of: %s", rule->name,
                         wanted);
-  if (framed ? !has_frame(sensor->object_type) : sensor->object_type != wanted_of[rule->target].type)
-    return cav_xml_fail(reader->error, node, given, "a %s looks at a %s", rule->name, wanted);
+  if (!looks_at(sensor)) return cav_xml_fail(reader->error, node, given, "a %s looks at a %s", rule->name, wanted);
   sensor->object = cav_problem_find_frame(reader, node, given, &sensor->object_type);
   if (sensor->object < 0) return CAV_BAD_INPUT;
   cav_status status = check_object(reader, node, given, sensor);
@@ -488,12 +521,12 @@ static cav_status read_within(const cav_problem_reader *reader, const cav_xml_no
 
 // bounds of a constraint, or the weight of a cost
 static cav_status read_use(const cav_problem_reader *reader, const cav_xml_node *node, int hard, cav_term *term) {
-  term->lower = cav_xml_real(node, "lower", -INFINITY);
-  term->upper = cav_xml_real(node, "upper", INFINITY);
-  term->weight = cav_xml_real(node, "weight", 0);
-  term->scale = cav_xml_real(node, "scale", 1);
-  term->norm = hard ? CAV_NORM_SQUARE : (cav_norm)cav_xml_word(node, "norm", CAV_NORM_SQUARE);
   if (hard) term->use = cav_xml_get(node, "lower") || cav_xml_get(node, "upper") ? CAV_USE_RANGE : CAV_USE_EQUAL;
+  term->lower = cav_xml_real(node, "lower", term->lower);
+  term->upper = cav_xml_real(node, "upper", term->upper);
+  term->weight = cav_xml_real(node, "weight", term->weight);
+  term->scale = cav_xml_real(node, "scale", term->scale);
+  term->norm = hard ? CAV_NORM_SQUARE : (cav_norm)cav_xml_word(node, "norm", term->norm);
   if (term->lower > term->upper)
     return cav_xml_fail(reader->error, node, "lower", "%g lies above 'upper', %g", term->lower, term->upper);
   if (term->weight < 0)
@@ -504,14 +537,13 @@ static cav_status read_use(const cav_problem_reader *reader, const cav_xml_node 
 }
 
 static cav_status read_term(const cav_problem_reader *reader, const cav_xml_node *node, int hard, cav_term *term) {
-  memset(term, 0, sizeof *term);
-  term->component = term->joint = -1;
-  term->to = -1;
+  cav_quantity quantity = 0;
+  while (strcmp(cav_quantity_rule_of(quantity)->name, node->rule->name)) quantity++;
+  *term = cav_term_cost(quantity, 0);
   term->name = cav_problem_text(reader->owner, cav_xml_text(node, "name", node->rule->name));
   if (!term->name) return cav_problem_no_memory(reader);
   cav_status status = read_use(reader, node, hard, term);
   if (!status) status = cav_problem_window(reader, node, &term->from, &term->to);
-  while (strcmp(cav_quantity_rule_of(term->quantity)->name, node->rule->name)) term->quantity++;
   return status ? status : read_values(reader, node, term);
 }
 

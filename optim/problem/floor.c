@@ -1,0 +1,175 @@
+/// A posture down to the floor: each tree of a model along its root until its lowest geom touches a plane of the world, or,
+/// going down, something else that stands in the world: a box on a table stays on the table. With a rise the planes alone
+/// count. The distance of a geom from a plane is by its support point, exact for every type here. And a posture within the
+/// ranges of its joints. Postures of files go the same way (pose.c).
+#include <math.h>
+#include <stdio.h>
+
+#include "problem_file.h"
+#include "stand.h"
+
+double cav_geom_reach(const cav_geom *geom, const cav_pose *pose, const double n[3]) {
+  const double *r = pose->rotation, *s = geom->size;
+  double x = n[0] * r[0] + n[1] * r[3] + n[2] * r[6];
+  double y = n[0] * r[1] + n[1] * r[4] + n[2] * r[7];
+  double z = n[0] * r[2] + n[1] * r[5] + n[2] * r[8];
+  switch (geom->type) {
+    case CAV_GEOM_SPHERE:
+      return s[0];
+    case CAV_GEOM_CAPSULE:
+      return s[0] + s[1] * fabs(z);
+    case CAV_GEOM_ELLIPSOID:
+      return sqrt(s[0] * s[0] * x * x + s[1] * s[1] * y * y + s[2] * s[2] * z * z);
+    case CAV_GEOM_CYLINDER:
+      return s[0] * sqrt(x * x + y * y) + s[1] * fabs(z);
+    case CAV_GEOM_BOX:
+    case CAV_GEOM_MESH: // its box
+      return s[0] * fabs(x) + s[1] * fabs(y) + s[2] * fabs(z);
+    case CAV_GEOM_PLANE:
+    case CAV_GEOM_HFIELD:
+    case CAV_GEOM_TYPES:
+      break;
+  }
+  return 0;
+}
+
+// first joint that raises a tree: free, or a slide along the vertical. Its coordinate of height and how much that
+// raises
+static int lifting(const cav_model *m, const cav_state *state, int root, double *gain) {
+  const cav_link *link = &m->link[root];
+  for (int j = link->joint; j < link->joint + link->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    *gain = 1;
+    if (joint->type == CAV_JOINT_FREE) return joint->q + 2;
+    if (joint->type != CAV_JOINT_SLIDE) continue;
+    const double *axis = state->axis + 6 * joint->dof;
+    *gain = axis[5];
+    if (fabs(axis[5]) > 0.999) return joint->q;
+  }
+  return -1;
+}
+
+// way up that brings a tree to where the lowest of its geoms that can touch a plane of the world touches it; infinite:
+// there is no such geom
+static double way_to_plane(const cav_model *m, const cav_state *state, int root) {
+  double up = -INFINITY;
+  for (int p = 0; p < m->npair; p++) {
+    const cav_geom *plane = &m->geom[m->pair[p].geom1], *geom = &m->geom[m->pair[p].geom2];
+    if (plane->type != CAV_GEOM_PLANE || plane->link != 0 || m->link[geom->link].root != root) continue;
+    cav_pose floor, at;
+    cav_object_pose(m, state, CAV_OBJECT_GEOM, m->pair[p].geom1, &floor);
+    cav_object_pose(m, state, CAV_OBJECT_GEOM, m->pair[p].geom2, &at);
+    double n[3] = {floor.rotation[2], floor.rotation[5], floor.rotation[8]}, distance = -cav_geom_reach(geom, &at, n);
+    if (n[2] < 0.1) continue;
+    for (int i = 0; i < 3; i++) distance += n[i] * (at.pos[i] - floor.pos[i]);
+    up = fmax(up, -distance / n[2]);
+  }
+  return up;
+}
+
+// whether a tree is inside something that stands in the world and is no plane
+static cav_status is_inside(const cav_model *m, cav_state *state, int root, const double *q, int *inside) {
+  cav_status status = cav_position(m, state, q);
+  *inside = 0;
+  for (int i = 0; i < state->ncontact && !status; i++) {
+    const cav_geom *a = &m->geom[m->pair[state->contact[i].pair].geom1],
+                   *b = &m->geom[m->pair[state->contact[i].pair].geom2];
+    const cav_geom *stands = a->link == 0 ? a : b, *moves = a->link == 0 ? b : a;
+    if (stands->link != 0 || stands->type == CAV_GEOM_PLANE || m->link[moves->link].root != root) continue;
+    *inside |= state->contact[i].dist < 0;
+  }
+  return status;
+}
+
+// how far a tree can go down, at most that far, before it touches something: step by step, then by bisection
+static cav_status way_down(const cav_model *m, cav_state *state, int root, int height, double gain, double most,
+                           double *q, double *way) {
+  static const double step = 0.005; // m: thinner things are passed
+  double from = q[height], free = 0, blocked = 0;
+  int inside;
+  cav_status status = is_inside(m, state, root, q, &inside);
+  *way = most;
+  // what starts inside of something is not stopped by it
+  if (status || inside) return status;
+  while (!status && !inside && blocked < most) {
+    free = blocked;
+    blocked = fmin(blocked + fmax(step, most / 4000), most);
+    q[height] = from - blocked / gain;
+    status = is_inside(m, state, root, q, &inside);
+  }
+  for (int i = 0; i < 40 && inside && !status; i++) {
+    double middle = (free + blocked) / 2;
+    int deep;
+    q[height] = from - middle / gain;
+    status = is_inside(m, state, root, q, &deep);
+    *(deep ? &blocked : &free) = middle;
+  }
+  q[height] = from;
+  if (inside) *way = free;
+  return status;
+}
+
+// moves one tree along its root to what it stands on, and higher by rise; *moved 0 where there is nothing
+static cav_status drop_tree(const cav_model *m, cav_state *state, int root, int planes_alone, double rise, double *q,
+                            int *moved) {
+  double gain = 1, up = way_to_plane(m, state, root), down;
+  int height = lifting(m, state, root, &gain);
+  *moved = height >= 0 && !isinf(up);
+  if (!*moved) return CAV_OK;
+  if (up < 0 && !planes_alone) {
+    cav_status status = way_down(m, state, root, height, gain, -up, q, &down);
+    if (status) return status;
+    up = -down;
+  }
+  q[height] += (up + rise) / gain;
+  return CAV_OK;
+}
+
+static cav_status refuse(cav_error *error, cav_status status, const char *format, const char *word) {
+  if (error) {
+    *error = (cav_error){.status = status};
+    snprintf(error->text, sizeof error->text, format, word);
+  }
+  return status;
+}
+
+cav_status cav_configuration_to_floor(const cav_model *m, cav_state *state, const double *rise, double *q,
+                                      cav_error *error) {
+  cav_status status = cav_position(m, state, q);
+  int dropped = 0, moved;
+  for (int i = 1; i < m->nlink && !status; i++) {
+    if (m->link[i].parent != 0) continue;
+    status = drop_tree(m, state, i, rise != NULL, rise ? *rise : 0, q, &moved);
+    dropped += moved;
+    // where the others are is read off the posture as it stands
+    if (!status) status = cav_position(m, state, q);
+  }
+  if (status) return refuse(error, status, "the posture cannot be evaluated: %s", cav_status_name(status));
+  if (dropped) return CAV_OK;
+  return refuse(
+      error, CAV_BAD_INPUT,
+      "nothing of the model '%.200s' can be lowered to a plane: it needs a plane in the world, a geom that may "
+      "touch it, and a root that is free or slides along the vertical",
+      m->name);
+}
+
+cav_status cav_configuration_stand(const cav_model *m, cav_state *state, double *q, cav_error *error) {
+  cav_stand stand = {0};
+  cav_status status = cav_stand_find(m, state, q, &stand);
+  if (!status) return CAV_OK;
+  const char *why = status == CAV_BAD_INPUT ? stand.why : cav_status_name(status);
+  return refuse(error, status, "a posture that stands cannot be found: %s", why);
+}
+
+int cav_configuration_clip(const cav_model *m, double *q) {
+  int n = 0;
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    int scalar = joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE;
+    if (!joint->limited || !scalar) continue;
+    double *x = &q[joint->q], within = fmin(fmax(*x, joint->range[0]), joint->range[1]);
+    n += within != *x;
+    *x = within;
+  }
+  return n;
+}
