@@ -117,7 +117,9 @@ TEXT
   run="env LD_LIBRARY_PATH=$(dirname "$folder")"
   gcc -std=c17 -Wall -Werror "$out/user.c" -o "$out/user" $flags && $run "$out/user" && "$prefix/bin/cavort" help || return 1
   gcc -std=c17 -Wall -Wextra -Werror problems/example.c -o "$out/example" $flags && $run "$out/example" || return 1
-  gcc -std=c17 -Wall -Wextra -Werror problems/example_replan.c -o "$out/replan" $flags && $run "$out/replan"
+  gcc -std=c17 -Wall -Wextra -Werror problems/example_replan.c -o "$out/replan" $flags && $run "$out/replan" || return 1
+  # as it was installed
+  gcc -std=c17 -Wall -Wextra -Werror "$prefix/share/cavort/examples/example_term.c" -o "$out/term" $flags && $run "$out/term"
 }
 
 # the Python package installed beside a shared library, then a wheel of its own around that library, and a line that uses it
