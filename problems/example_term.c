@@ -4,7 +4,7 @@
 #include <stdlib.h>
 
 // terms of one's own: an arm reaches past a lamp that its hand has to stay away from (distance of two bodies, hard), once
-// as it likes and once at a price on what its motors give and take (mechanical power). Both have Jacobians, checked first
+// as it likes and once at a cost of what its motors give and take (mechanical power). Both have Jacobians, checked first
 
 static const char arm[] =
     "<mujoco model='arm'><worldbody><geom type='plane' size='3 3 1'/>"
@@ -99,8 +99,8 @@ int main(void) {
 
   int certified = 1;
   double work[2] = {0};
-  for (int priced = 0; priced < 2; priced++) {
-    problem.nterm = n + 2 + priced;
+  for (int sparing = 0; sparing < 2; sparing++) {
+    problem.nterm = n + 2 + sparing;
     cav_solution *solution = NULL;
     cav_verdict verdict = {0};
     cav_status status = cav_solve(&problem, NULL, NULL, &solution, &error);
@@ -117,11 +117,11 @@ int main(void) {
       if (distance(place, &view, values)) return EXIT_FAILURE;
       nearest = fmin(nearest, values[0]);
       if (power(NULL, &view, values)) return EXIT_FAILURE;
-      work[priced] += at->timestep * (fabs(values[0]) + fabs(values[1]));
+      work[sparing] += at->timestep * (fabs(values[0]) + fabs(values[1]));
     }
-    printf("%s: %s, %s, the hand %.3f m from the lamp, %.2f J given and taken\n", priced ? "priced" : "free",
+    printf("%s: %s, %s, the hand %.3f m from the lamp, %.2f J given and taken\n", sparing ? "sparing" : "as it likes",
            verdict.certified ? "certified" : verdict.reason, verdict.achieved ? "achieved" : verdict.missed, nearest,
-           work[priced]);
+           work[sparing]);
     certified = certified && verdict.certified && verdict.achieved && nearest > 0.2 - 1e-6;
     cav_solution_free(solution);
   }

@@ -1,4 +1,4 @@
-/// problems/result/result.c, forces.c, certificate.c: a folder written from a made-up solution and read back bit for
+/// optim/result and problems/result: a folder written from a made-up solution and read back bit for
 /// bit, forces that carry the weight of what rests, a verdict as JSON and as a table, and folders that are broken.
 #include "result.h"
 
@@ -7,6 +7,8 @@
 #include "certificate.h"
 #include "check.h"
 #include "csv.h"
+#include "digest.h"
+#include "forces.h"
 
 static char top[] = "/tmp/cavort-result-XXXXXX";
 static char folder[128], model_path[128], problem_path[128];

@@ -408,6 +408,29 @@ static void test_hard(void) {
   char path[] = "/tmp/cavort-user-term.xml";
   CHECK(cav_problem_write(path, &t.problem, "arm.xml", &error) == CAV_BAD_INPUT && strstr(error.text, "'keep off'") &&
         strstr(error.text, "'distance'") && access(path, F_OK));
+  // nor can a result folder, which then holds nothing; nor one of a model without a file
+  char folder[] = "/tmp/cavort-user-term-XXXXXX", deep[64], within[96];
+  if (!CHECK(mkdtemp(folder) != NULL)) return;
+  snprintf(deep, sizeof deep, "%s/a/b", folder);
+  CHECK(cav_result_write(deep, &t.problem, one, &error) == CAV_BAD_INPUT && strstr(error.text, "cav_draft_mjcf"));
+  t.problem.model_path = CAVORT_SOURCE_ROOT "/tests/rise_model.xml";
+  CHECK(cav_result_write(deep, &t.problem, one, &error) == CAV_BAD_INPUT && strstr(error.text, "'keep off'"));
+  CHECK(cav_result_write(deep, &t.problem, one, NULL) == CAV_BAD_INPUT);
+  static const char *const files[] = {"trajectory.csv", "problem.xml", "log.csv", "rows.csv"};
+  for (int i = 0; i < 4; i++) {
+    snprintf(within, sizeof within, "%s/%s", deep, files[i]);
+    CHECK(access(within, F_OK));
+  }
+  // what needs no problem file can
+  CHECK(cav_result_write_forces(deep, &t.problem, one->trajectory, &one->contact, &error) == CAV_OK);
+  CHECK(cav_result_write_verdict(deep, &t.problem, &verdict, report, "{\"by\": 1}", &error) == CAV_OK);
+  static const char *const others[] = {"forces.csv", "controls.csv", "verdict.json", "terms.csv"};
+  for (int i = 0; i < 4; i++) {
+    snprintf(within, sizeof within, "%s/%s", deep, others[i]);
+    CHECK(!unlink(within));
+  }
+  rmdir(deep), snprintf(deep, sizeof deep, "%s/a", folder), rmdir(deep);
+  CHECK(!rmdir(folder));
   cav_solution_free(one), cav_solution_free(three), cav_solution_free(free_one);
   task_free(&t);
 }

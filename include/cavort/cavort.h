@@ -6,6 +6,7 @@
 #include "cavort/mocap.h"
 #include "cavort/model.h"
 #include "cavort/problem.h"
+#include "cavort/result.h"
 #include "cavort/solve.h"
 #include "cavort/status.h"
 #include "cavort/trajectory.h"

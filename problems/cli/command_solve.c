@@ -14,6 +14,7 @@
 #include "certificate.h"
 #include "command.h"
 #include "file.h"
+#include "provenance.h"
 #include "race.h"
 #include "result.h"
 #include "store.h"
@@ -213,12 +214,13 @@ static int save(void *context, const cav_problem *problem, const cav_solution *s
   cav_provenance provenance = *to->provenance;
   if (*report->changed) provenance.repaired = report->changed;
   cav_term_report *terms = calloc((size_t)problem->nterm + 1, sizeof *terms);
-  cav_status status = terms ? cav_result_write(to->folder, problem, solution, &error) : CAV_NO_MEMORY;
+  char *origin = cav_provenance_json(&provenance);
+  cav_status status = terms && origin ? cav_result_write(to->folder, problem, solution, &error) : CAV_NO_MEMORY;
   if (!status) status = cav_terms_report(problem, solution->trajectory, &solution->contact, terms, NULL, &error);
-  if (!status) status = cav_result_write_verdict(to->folder, problem, verdict, terms, &provenance, &error);
-  if (!status && line->json) cav_certificate_json(stdout, problem, verdict, terms, &provenance);
+  if (!status) status = cav_result_write_verdict(to->folder, problem, verdict, terms, origin, &error);
+  if (!status && line->json) cav_certificate_json(stdout, problem, verdict, terms, origin);
   if (!status && !line->quiet && !line->json && !stopped) cav_certificate_print(stdout, problem, verdict, terms);
-  free(terms);
+  free(terms), free(origin);
   if (status) return cav_command_fail(&error);
   // the page is a convenience: without three.js everything else stands
   if (!stopped &&

@@ -2,7 +2,7 @@
 #ifndef CAVORT_EXCHANGE_H
 #define CAVORT_EXCHANGE_H
 
-#include "forces.h"
+#include "cavort/result.h"
 #include "result.h"
 
 /// A motion as samples at equal times. Velocities lead to a sample from the one before; controls, efforts and contacts

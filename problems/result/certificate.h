@@ -5,7 +5,7 @@
 #include <stdio.h>
 
 #include "cavort/solve.h"
-#include "provenance.h"
+#include "verdict_file.h"
 
 enum { CAV_CERTIFICATE_LINES = 22 };
 
@@ -23,16 +23,5 @@ int cav_certificate_lines(const cav_verdict *verdict, cav_certificate_line line[
 /// in words.
 void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verdict *verdict,
                            const cav_term_report *report);
-
-/// Writes the verdict as one JSON object with a line end; numbers that are not known are null. report and provenance
-/// may be NULL: left out.
-void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdict *verdict,
-                          const cav_term_report *report, const cav_provenance *provenance);
-
-/// terms.csv: one line a term.
-void cav_certificate_terms(FILE *out, const cav_problem *problem, const cav_term_report *report);
-
-/// Writes text as a JSON string.
-void cav_certificate_json_text(FILE *out, const char *text);
 
 #endif

@@ -2,6 +2,7 @@
 /// when it was built.
 #include "provenance.h"
 
+#include <stdlib.h>
 #include <string.h>
 #include <sys/utsname.h>
 #include <time.h>
@@ -62,7 +63,7 @@ void cav_provenance_print_build(FILE *out) {
           *CAVORT_FEATURES ? CAVORT_FEATURES : "none");
 }
 
-void cav_provenance_json(FILE *out, const cav_provenance *p) {
+static void write_json(FILE *out, const cav_provenance *p) {
   const struct {
     const char *name, *text;
   } field[] = {{"version", cav_version()},    {"commit", CAVORT_COMMIT},      {"compiler", COMPILER},
@@ -74,4 +75,16 @@ void cav_provenance_json(FILE *out, const cav_provenance *p) {
   }
   if (p->repaired) fputs(", \"repaired\": ", out), cav_certificate_json_text(out, p->repaired);
   fputc('}', out);
+}
+
+char *cav_provenance_json(const cav_provenance *provenance) {
+  char *text = NULL;
+  size_t size;
+  FILE *out = open_memstream(&text, &size);
+  if (!out) return NULL;
+  write_json(out, provenance);
+  int whole = !ferror(out);
+  if (fclose(out) == 0 && whole) return text;
+  free(text);
+  return NULL;
 }

@@ -21,7 +21,7 @@ void cav_provenance_take(cav_provenance *provenance, const char *arguments, cons
 /// Version, commit, compiler and features of this build, as cavort --version prints them.
 void cav_provenance_print_build(FILE *out);
 
-/// Writes one JSON object, without a line end.
-void cav_provenance_json(FILE *out, const cav_provenance *provenance);
+/// One JSON object without a line end, in fresh memory; NULL if there is none.
+char *cav_provenance_json(const cav_provenance *provenance);
 
 #endif
