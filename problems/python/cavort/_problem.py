@@ -53,7 +53,7 @@ class Frozen:
     """A problem as it was when it was taken: what C sees, with all that it points at."""
 
     def __init__(self, c: Any, model: Model, terms: Sequence[Term], keep: Any) -> None:
-        self.c, self.model, self.keep = c, model, keep
+        self.c, self.model, self.keep, self.terms = c, model, keep, list(terms)
         self.names = [term.name or text(lib.cav_quantity_rule_of(term._c.quantity).name) for term in terms]
         self.quantities = [term._user for term in terms if term._user]
 

@@ -27,12 +27,14 @@ class Solution:
     """
 
     problem: Problem
+    strategy: str  #: that led to it; "" where none but the problem's own was asked for
 
-    def __init__(self, problem: Problem, frozen: Frozen, pointer: Any, status: int) -> None:
+    def __init__(self, problem: Problem, frozen: Frozen, pointer: Any, status: int, strategy: str = "") -> None:
         self.problem = problem
         self._frozen = frozen
         self._c = pointer
         self._status = status
+        self.strategy = strategy
         self._verdict: Record | None = None
 
     def __repr__(self) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Callable
+from functools import partial
+from typing import Any, Callable, Sequence
 
 from . import _library
 from ._library import Record, failure, ffi, lib, new_error
@@ -58,6 +59,53 @@ def _start_warm(frozen: Frozen, options: Any, warm: Solution) -> Any:
     return motion
 
 
+def _strategies(frozen: Frozen, most: int) -> list[Any]:
+    # the problem's own guess first; what is worth trying after it
+    array, count = ffi.new("cav_strategy[]", lib.CAV_STRATEGIES), ffi.new("int *")
+    frozen.check(lib.cav_strategy_list(frozen.c, array, count), "the strategies")
+    frozen.keep = (frozen.keep, array)
+    listed = [array[i] for i in range(count[0])]
+    return [strategy for strategy in listed if strategy.use == lib.CAV_STRATEGY_TRY][:most]
+
+
+def _run(problem: Problem, frozen: Frozen, strategy: Any, options: Any, start: Any, watch: _Watch) -> Solution:
+    # one solve, by a strategy or (None) as the problem says
+    error, out = new_error(), ffi.new("cav_solution **")
+    taken, name = frozen, ""
+    if strategy is None:
+        status = lib.cav_solve(frozen.c, options, start, out, error)
+    else:
+        status = lib.cav_strategy_solve(frozen.c, ffi.addressof(strategy), options, start, out, error)
+        struct, name = ffi.new("cav_problem *"), _library.text(strategy.name)
+        lib.cav_strategy_apply(frozen.c, ffi.addressof(strategy), struct)
+        taken = Frozen(struct, frozen.model, frozen.terms, frozen)
+    found = None
+    if out[0]:
+        found = Solution(problem, taken, ffi.gc(out[0], lib.cav_solution_free), status, name)
+    if watch.raised is not None:
+        raised = watch.raised
+        if isinstance(raised, KeyboardInterrupt):
+            raised.solution = found  # type: ignore[attr-defined]
+        raise raised
+    if found is None or status not in (lib.CAV_OK, lib.CAV_NOT_CONVERGED, lib.CAV_INTERRUPTED):
+        frozen.check(status, "the solve", error)
+        raise failure(status, "the solve", error)
+    return found
+
+
+def _try_all(runs: Sequence[Callable[[], Solution]]) -> Solution:
+    # the first that is certified and achieves; else the first that is certified; else the problem's own
+    best: Solution | None = None
+    for run in runs:
+        found = run()
+        if found.status == "interrupted" or (found.verdict.certified and found.verdict.achieved):
+            return best if best is not None and found.status == "interrupted" else found
+        if best is None or (found.verdict.certified and not best.verdict.certified):
+            best = found
+    assert best is not None
+    return best
+
+
 def solve(
     problem: Problem,
     callback: Callable[[Record], Any] | None = None,
@@ -68,6 +116,7 @@ def solve(
     max_iterations: int = 0,
     solver: str = "gn",
     gains: bool = True,
+    strategies: int = 1,
 ) -> Solution:
     """Solves a problem from its guess, or from a solution that is near (warm).
 
@@ -75,33 +124,24 @@ def solve(
     violation, seconds, ...); a true answer ends the solve. Ctrl-C ends it, too: the KeyboardInterrupt has the best iterate
     as its attribute solution (None: there is none). warm: a solution of the same model and duration; one of as many knots
     and constraints goes straight to the optimum. max_seconds, max_iterations: 0, or a limit. gains: chooses feedback, which
-    a certificate needs. The result does not depend on threads; the GIL is released, except in callbacks.
+    a certificate needs. strategies: at most so many guesses and schedules are tried, one after the other, the problem's own
+    first, until a motion is certified and achieves what is asked; Solution.strategy names the one kept. The result does not depend on threads; the GIL is released, except in callbacks.
 
     Raises Error where the problem cannot be solved at all, with the text of the library; a motion that misses something
     is told in Solution.status and Solution.verdict.
     """
-    frozen, error, watch = problem._freeze(), new_error(), _Watch(callback)
+    frozen, watch = problem._freeze(), _Watch(callback)
     options = ffi.new("cav_solve_options *", lib.cav_solve_options_default())
     known = [_library.text(lib.cav_solver_rule_of(i).name) for i in range(lib.CAV_SOLVER_TYPES)]
     if solver not in known:
         raise ValueError(f"solver: expected one of {', '.join(known)}, got {solver!r}")
-    if threads < 1:
-        raise ValueError(f"threads: expected 1 or more, got {threads}")
+    if threads < 1 or strategies < 1:
+        raise ValueError(f"threads and strategies: expected 1 or more, got {threads} and {strategies}")
     options.solver, options.threads, options.gains = known.index(solver), threads, int(gains)
     options.max_seconds, options.max_iterations = max_seconds, max_iterations
     options.observer, options.stop = watch.observer, watch.stop
     start = _start_warm(frozen, options, warm) if warm is not None else ffi.NULL
-    out = ffi.new("cav_solution **")
-    status = lib.cav_solve(frozen.c, options, start, out, error)
-    found = None
-    if out[0]:
-        found = Solution(problem, frozen, ffi.gc(out[0], lib.cav_solution_free), status)
-    if watch.raised is not None:
-        raised = watch.raised
-        if isinstance(raised, KeyboardInterrupt):
-            raised.solution = found  # type: ignore[attr-defined]
-        raise raised
-    if found is None or status not in (lib.CAV_OK, lib.CAV_NOT_CONVERGED, lib.CAV_INTERRUPTED):
-        frozen.check(status, "the solve", error)
-        raise failure(status, "the solve", error)
-    return found
+    if strategies == 1 or warm is not None:
+        return _run(problem, frozen, None, options, start, watch)
+    tried = _strategies(frozen, strategies)
+    return _try_all([partial(_run, problem, frozen, strategy, options, start, watch) for strategy in tried])

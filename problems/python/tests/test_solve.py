@@ -113,6 +113,15 @@ def test_warm_and_threads(swing):
         cavort.solve(problem, warm=cold)
 
 
+def test_strategies():
+    """A pendulum too weak to rise without a swing: its own guess fails, another leads up."""
+    problem = cavort.Problem.load(os.path.join(SOURCE, "tests", "rise.xml"))
+    solution = cavort.solve(problem, strategies=4)
+    assert solution.strategy not in ("", "stated") and solution.status == "success"
+    assert solution.verdict.certified and solution.verdict.achieved
+    assert abs(solution.q[-1, 0]) == pytest.approx(3, abs=1e-5)
+
+
 def test_refused(arm, swing):
     problem = built(arm)
     with pytest.raises(ValueError, match="no quantity 'posturee'"):
