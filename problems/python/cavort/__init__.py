@@ -8,6 +8,7 @@ Units are m, kg, s, rad, N; q and v are laid out as MJCF does (quaternions w x y
 where it stays in its place, without copies, and keep it alive.
 """
 
+from ._draft import Draft, Element
 from ._library import Error, Options, Record, lib, text
 from ._model import Derivatives, Model
 from ._problem import Problem
@@ -20,6 +21,8 @@ __version__ = text(lib.cav_version())
 __all__ = [
     "Actuation",
     "Derivatives",
+    "Draft",
+    "Element",
     "Error",
     "Jacobian",
     "Knot",

@@ -61,13 +61,16 @@ class Model:
     def __init__(self, path: str, *, floating: bool = False, overlaps: bool = False) -> None:
         """Reads a file. floating: the root link of a URDF floats. overlaps: geoms that overlap at rest do not push, as in plans."""
         error = new_error()
-        options = ffi.new("cav_load_options *", lib.cav_load_options_default())
-        options.floating, options.overlaps = int(floating), int(overlaps)
-        pointer = lib.cav_model_load_with(str(path).encode(), options, error)
-        if not pointer:
-            raise failure(error.status, str(path), error)
-        self._take(ffi.gc(pointer, lib.cav_model_free), None)
+        self._take(_read(lib.cav_model_load_with(str(path).encode(), load_options(floating, overlaps), error), error), None)
         self.path, self.floating = os.path.abspath(path), floating
+
+    @classmethod
+    def parse(cls, text: str, folder: str = ".", *, floating: bool = False, overlaps: bool = False) -> "Model":
+        """Reads MJCF or URDF from a text; files that it names are sought from folder."""
+        error, model = new_error(), cls.__new__(cls)
+        options = load_options(floating, overlaps)
+        model._take(_read(lib.cav_model_parse(text.encode(), str(folder).encode(), options, error), error), None)
+        return model
 
     @classmethod
     def _of(cls, pointer: Any, owner: Any) -> "Model":
@@ -131,6 +134,43 @@ class Model:
     @staticmethod
     def _kind(kind: str) -> int:
         return _library.choose("cav_object_type", kind, "kind of object")
+
+    def named(self, kind: str, names: str) -> tuple[int, int]:
+        """Kind (cav_object_type) and number of the first object that has one of the names, as problem files have them.
+
+        Several names are separated by |; of bodies also roles, such as "right foot". KeyError with what is near.
+        """
+        error, found = new_error(), ffi.new("cav_object_type *", self._kind(kind))
+        number = int(lib.cav_object_named(self._c, self._scratch(), names.encode(), found, error))
+        if number < 0:
+            raise KeyError(text(error.text))
+        return int(found[0]), number
+
+    def _scratch(self) -> Any:
+        state = lib.cav_state_new(self._c)
+        if not state:
+            raise MemoryError("no memory for a state")
+        return ffi.gc(state, lib.cav_state_free)
+
+    def stand(self) -> Array:
+        """A configuration that stands [nq], of any model with feet: its keyframe "stand" or "home", or one found."""
+        q, error = np.empty(self.nq), new_error()
+        check(lib.cav_configuration_stand(self._c, self._scratch(), pointer_to(q), error), "a posture that stands", error)
+        return q
+
+    def to_floor(self, q: ArrayLike, rise: float | None = None) -> Array:
+        """q [nq] with every tree that can be raised or lowered on what it stands on; rise: so many m above planes."""
+        moved, error = _library.as_array(q, (self.nq,), "q").copy(), new_error()
+        height = ffi.NULL if rise is None else ffi.new("double *", rise)
+        status = lib.cav_configuration_to_floor(self._c, self._scratch(), height, pointer_to(moved), error)
+        check(status, "the way to the floor", error)
+        return moved
+
+    def clip(self, q: ArrayLike) -> Array:
+        """q [nq] with hinges and slides within their ranges."""
+        moved = _library.as_array(q, (self.nq,), "q").copy()
+        lib.cav_configuration_clip(self._c, pointer_to(moved))
+        return moved
 
     def key(self, name: str) -> Array:
         """Configuration of a keyframe [nq]."""
@@ -207,6 +247,20 @@ class Model:
         out = tuple(pointer_to(d.reshape(-1)) for d in found)
         points.run(lib.cav_inverse_jacobian_batch, options, (chosen, threads), out, "derivatives")
         return Derivatives(*(points.shaped(d) for d in found))
+
+
+def load_options(floating: bool, overlaps: bool) -> Any:
+    """A cav_load_options."""
+    options = ffi.new("cav_load_options *", lib.cav_load_options_default())
+    options.floating, options.overlaps = int(floating), int(overlaps)
+    return options
+
+
+def _read(pointer: Any, error: Any) -> Any:
+    # a model of the library, which goes with what Python makes of it
+    if not pointer:
+        raise failure(error.status, "the model", error)
+    return ffi.gc(pointer, lib.cav_model_free)
 
 
 class _Points:

@@ -207,10 +207,8 @@ class Problem:
         and one of body, xbody, site, geom, joint, tendon, actuator, or sensor (one of the model's), component ("x", "y", "z"),
         relative ("start" or "goal": the target counts from the reading there); body, of contacts.
         """
-        term = self._term(quantity, **attributes)
-        term._c.use = lib.CAV_USE_COST
+        term = self._term(lib.cav_term_cost(_term.quantity_of(quantity), weight), quantity, **attributes)
         term._c.norm = _library.choose("cav_norm", norm, "norm")
-        term._c.weight = weight
         self.terms.append(term)
         return term
 
@@ -218,19 +216,21 @@ class Problem:
         self, quantity: str | Quantity, *, lower: float | None = None, upper: float | None = None, **attributes: Any
     ) -> Term:
         """Adds what must hold: value equal to the target, or within lower and upper. Attributes as those of cost()."""
-        term = self._term(quantity, **attributes)
-        rule = lib.cav_quantity_rule_of(term._c.quantity)
+        of = _term.quantity_of(quantity)
+        rule = lib.cav_quantity_rule_of(of)
         if not rule.hard:
             raise ValueError(f"{text(rule.name)} can be a cost alone, no constraint")
-        ranged = lower is not None or upper is not None
-        term._c.use = lib.CAV_USE_RANGE if ranged else lib.CAV_USE_EQUAL
-        term._c.lower = -np.inf if lower is None else lower
-        term._c.upper = np.inf if upper is None else upper
+        if lower is None and upper is None:
+            struct = lib.cav_term_equal(of, ffi.NULL)
+        else:
+            struct = lib.cav_term_range(of, -np.inf if lower is None else lower, np.inf if upper is None else upper)
+        term = self._term(struct, quantity, **attributes)
         self.terms.append(term)
         return term
 
     def _term(
         self,
+        struct: Any,
         quantity: str | Quantity,
         *,
         name: str = "",
@@ -244,12 +244,10 @@ class Problem:
         **attributes: Any,
     ) -> Term:
         user = quantity if isinstance(quantity, Quantity) else None
-        made = ffi.new("cav_term *")
-        made.quantity = lib.CAV_QUANTITY_USER if user else _term.quantity_named(str(quantity))
+        made = ffi.new("cav_term *", struct)
         made.scale, made.within = scale, _term.tolerance(within)
-        made.component = -1 if component is None else "xyz".index(component) if isinstance(component, str) else component
-        setattr(made, "from", 0)
-        made.to = -1
+        if component is not None:
+            made.component = "xyz".index(component) if isinstance(component, str) else component
         if at is not None or window is not None:
             if at is not None and window is not None:
                 raise ValueError("give at or window, not both")
@@ -258,7 +256,8 @@ class Problem:
         relative = attributes.pop("relative", None)
         self._describe(made, user, attributes)
         term = Term(self.model, made[0], user)
-        term.name = name
+        if name:
+            term.name = name
         if waypoints is not None:
             if target is not None:
                 raise ValueError("give target or waypoints, not both")
@@ -286,12 +285,17 @@ class Problem:
         elif of == lib.CAV_OF_CONTACTS:
             known = ("body",)
             if "body" in attributes:
-                made.body = self.model.index("body", attributes["body"])
+                made.body = self._body(attributes["body"])
         for name in attributes:
             if name not in known:
                 near = difflib.get_close_matches(name, known, 1)
                 hint = f"; did you mean {near[0]!r}?" if near else ""
                 raise TypeError(f"{text(lib.cav_quantity_rule_of(made.quantity).name)} has no attribute {name!r}{hint}")
+
+    def _body(self, names: str) -> int:
+        # of contacts: the body of a role may be told by a geom of it
+        kind, number = self.model.named("body", names)
+        return int(self.model._c.geom[number].body) if kind == lib.CAV_OBJECT_GEOM else number
 
     def _target(self, term: Term, target: ArrayLike, relative: str | None) -> Array:
         # laid out as C has it

@@ -209,9 +209,11 @@ class Term:
         return self._keep, self._target, self._times, self._name, self._user
 
 
-def quantity_named(name: str) -> int:
-    """The built-in quantity of a name, as problem files have it."""
-    known = [text(lib.cav_quantity_rule_of(i).name) for i in range(lib.CAV_QUANTITY_TYPES)]
+def quantity_of(name: str | Quantity) -> int:
+    """The number of a quantity: of the built-in one of a name, as problem files have it, or of one's own."""
+    if isinstance(name, Quantity):
+        return int(lib.CAV_QUANTITY_USER)
+    known = [text(lib.cav_quantity_rule_of(i).name) for i in range(lib.CAV_QUANTITY_USER)]
     if name not in known:
         raise ValueError(f"no quantity {name!r}; there are {', '.join(n for n in known if n)}")
     return known.index(name)
@@ -226,31 +228,15 @@ def sensor_of(model: Model, sensor: str | None, kind: str | None, objects: dict[
     known = [text(lib.cav_sensor_rule_of(i).name) for i in range(lib.CAV_SENSOR_TYPES)]
     if kind not in known:
         raise ValueError(f"type: expected a type of sensor ({', '.join(known)}), got {kind!r}")
-    made = ffi.new("cav_sensor *")
-    made.type = known.index(kind)
-    rule = lib.cav_sensor_rule_of(made.type)
-    fitting = _fitting(rule.target)
-    if len(objects) != (1 if fitting else 0) or not set(objects) <= set(fitting):
-        expected = f"one of {', '.join(fitting)}" if fitting else "no object"
-        raise ValueError(f"a sensor {kind!r} looks at {expected}, got {', '.join(objects) or 'none'}")
+    if len(objects) > 1:
+        raise ValueError(f"a sensor looks at one object, got {', '.join(objects)}")
+    of, number = lib.CAV_OBJECT_BODY, 0
     for what, name in objects.items():
-        made.object_type = _library.choose("cav_object_type", what, "kind of object")
-        made.object = model.index(what, name)
-    made.name, made.dim = rule.name, rule.dim
+        of, number = model.named(what, name)
+    made, error = ffi.new("cav_sensor *"), _library.new_error()
+    if lib.cav_sensor_of(model._c, known.index(kind), of, number, made, error):
+        raise ValueError(text(error.text))
     return made[0]
-
-
-def _fitting(target: int) -> tuple[str, ...]:
-    # what a sensor may look at
-    if target == lib.CAV_TARGET_NONE:
-        return ()
-    if target == lib.CAV_TARGET_FRAME:
-        return ("body", "xbody", "geom", "site")
-    for kind in ("BODY", "SITE", "ACTUATOR"):
-        if target == getattr(lib, "CAV_TARGET_" + kind):
-            return (kind.lower(),)
-    tendons = (lib.CAV_TARGET_TENDON, lib.CAV_TARGET_LIMITED_TENDON)
-    return ("tendon",) if target in tendons else ("joint",)
 
 
 def select_dofs(model: Model, dofs: int, joint: int) -> NDArray[np.bool_]:
