@@ -158,6 +158,15 @@ class Problem:
     def guess(self, guess: str) -> None:
         self._c.guess = _library.choose("cav_guess", guess, "guess")
 
+    def guessed(self) -> Array:
+        """The configurations that a solve starts from [nknot, nq]."""
+        frozen, error = self._freeze(), new_error()
+        pointer = lib.cav_problem_guess(frozen.c, error)
+        if not pointer:
+            raise failure(error.status, "the guess", error)
+        motion = ffi.gc(pointer, lib.cav_trajectory_free)
+        return _library.view(motion, motion.q, (motion.nknot, motion.nq))
+
     def guess_poses(self, poses: Sequence[tuple[float, ArrayLike]]) -> None:
         """Postures (time in s, q [nq]) that the guess passes."""
         array = ffi.new("cav_guess_pose[]", len(poses))
@@ -199,7 +208,7 @@ class Problem:
     def cost(self, quantity: str | Quantity, weight: float = 1.0, *, norm: str = "square", **attributes: Any) -> Term:
         """Adds weight/2 times the squared difference from the target, integrated over the window, at one knot as it is.
 
-        quantity: as in problem files ("sensor", "posture", "velocity", "effort", "slip", ...: `cavort help terms`), or one's
+        The usual costs stay: take from problem.terms what it stands in the place of. quantity: as in problem files ("sensor", "posture", "velocity", "effort", "slip", ...: `cavort help terms`), or one's
         own. norm: "square", or "absolute" (linear far beyond the scale). Attributes are those of problem files:
 
         target (numbers; of a posture q [nq]) or waypoints [(time, target), ...]; at (s) or window (from, to); scale; within

@@ -141,7 +141,9 @@ def solve(
     options.max_seconds, options.max_iterations = max_seconds, max_iterations
     options.observer, options.stop = watch.observer, watch.stop
     start = _start_warm(frozen, options, warm) if warm is not None else ffi.NULL
-    if strategies == 1 or warm is not None:
+    if strategies > 1 and warm is not None:
+        raise ValueError("give warm, the one start, or strategies, not both")
+    if strategies == 1:
         return _run(problem, frozen, None, options, start, watch)
     tried = _strategies(frozen, strategies)
     return _try_all([partial(_run, problem, frozen, strategy, options, start, watch) for strategy in tried])

@@ -1,5 +1,6 @@
 """Solves: from files and built in code, watched, interrupted, warm; what a solution says."""
 
+import gc
 import os
 import signal
 import subprocess
@@ -111,6 +112,61 @@ def test_warm_and_threads(swing):
     problem.duration = 2.0
     with pytest.raises(ValueError, match="lasts 1 s, the problem 2 s"):
         cavort.solve(problem, warm=cold)
+
+
+def test_guess(arm):
+    problem = built(arm)
+    time = np.linspace(0, 1, 21)
+    smooth = time**2 * (3 - 2 * time)
+    assert np.allclose(problem.guessed()[:, 0], smooth)
+    problem.guess_poses([(0.5, [3.0])])
+    assert problem.guessed()[10, 0] == pytest.approx(3)
+    problem.guess_poses([])
+    problem.guess_swings([("pivot", 0.2, 2.0, 0.0)])
+    swung = problem.guessed()[:, 0] - smooth
+    assert 0.15 < np.abs(swung).max() <= 0.2 and swung[0] == 0
+    problem.guess_swings([])
+    problem.guess = "hold"
+    assert not problem.guessed().any()
+
+
+def test_cycle_and_duration():
+    """A gait and a free duration, as files have them."""
+    loaded = cavort.Problem.load(os.path.join(SOURCE, "problems", "motions", "walker-walk", "problem.xml"))
+    made = cavort.Problem(loaded.model, loaded.duration, loaded.timestep)
+    of = loaded._c.cycle
+    mirror = {value: name for name, value in cavort._library.words("cav_mirror").items()}[of.mirror]
+    made.cycle(list(of.translation), rotation=of.rotation, mirror=mirror)
+    for name in ("on", "rotation", "mirror"):
+        assert getattr(made._c.cycle, name) == getattr(of, name)
+    assert list(made._c.cycle.translation) == list(of.translation) and of.on == 1
+
+
+def test_least_time(arm):
+    """A free duration: the pendulum's way in the least time that its limit of effort allows is shorter with more of it."""
+    took = []
+    for effort in (0.4, 0.8):
+        problem = built(arm)
+        problem.constraint("posture", dofs="all", at=1.0, target=[1.0])
+        problem.constraint("velocity", dofs="all", at=1.0)
+        problem.duration_least, problem.duration_most, problem.duration_weight = 0.2, 3.0, 100.0
+        problem.effort_limit = effort
+        solution = cavort.solve(problem, gains=False)
+        took.append(solution.time[-1])
+        assert solution.status == "success" and solution.timestep != pytest.approx(0.05)
+    assert took[1] < 0.9 * took[0]
+
+
+def test_lifetime(swing):
+    """Arrays of a solution live as long as one is looked at, and no longer than needed is nothing kept."""
+    solution = cavort.solve(cavort.Problem.load(swing))
+    q, copy, model = solution.q, solution.q.copy(), solution.problem.model
+    joints = model.joint["range"]
+    del solution, model
+    gc.collect()
+    for _ in range(3):
+        cavort.solve(cavort.Problem.load(swing))
+    assert np.array_equal(q, copy) and joints.shape == (1, 2)
 
 
 def test_strategies():
