@@ -87,8 +87,15 @@ class Problem:
     model: Model
     terms: list[Term]
 
-    def __init__(self, model: Model, duration: float = 1.0, timestep: float = 0.025, *, name: str = "") -> None:
-        """At rest in the model's own configuration, with the usual running costs and nothing asked."""
+    def __init__(
+        self, model: Model | str, duration: float = 1.0, timestep: float = 0.025, *, name: str = ""
+    ) -> None:
+        """At rest in the model's own configuration, with the usual running costs and nothing asked.
+
+        model: a file is read as problem files read theirs, where geoms that overlap at rest do not push.
+        """
+        if not isinstance(model, Model):
+            model = Model(model, overlaps=True)
         self._take(model, lib.cav_problem_default(model._c), None)
         self.duration, self.timestep, self.guess_to, self.name = duration, timestep, duration, name
         self.q_start, self.q_goal, self.v_start = model.q0, model.q0, np.zeros(model.nv)
@@ -112,7 +119,8 @@ class Problem:
         # a problem of the library, which pointer keeps
         problem = cls.__new__(cls)
         model = Model._of(pointer.model, pointer)
-        model.path, model.floating = text(pointer.model_path) or None, bool(pointer.floating)
+        model.path = os.path.abspath(text(pointer.model_path)) if pointer.model_path else None
+        model.floating = bool(pointer.floating)
         problem._take(model, pointer[0], pointer)
         nq, nv = model.nq, model.nv
         problem.q_start = _library.view(problem, pointer.q_start, (nq,))

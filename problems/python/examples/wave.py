@@ -35,12 +35,12 @@ folder = sys.argv[1] if len(sys.argv) > 1 else "."
 path = os.path.join(folder, "waver.xml")
 with open(path, "w", encoding="utf-8") as file:
     file.write(MODEL)
-model = cavort.Model(path)
+problem = cavort.Problem(path, duration=2.0, timestep=0.05, name="wave")
+model = problem.model
 print(model)
 
 # %% a wish: from hanging to a raised arm, the hand high and to the right on the way, to the left a little later, then at rest
 raised = np.radians([-160.0, -20.0])
-problem = cavort.Problem(model, duration=2.0, timestep=0.05, name="wave")
 problem.q_start = [0.0, 0.0]
 problem.q_goal = raised
 problem.cost("sensor", 400, type="framepos", site="hand", component="x", target=0.3, at=1.0, within=0.05, name="right")

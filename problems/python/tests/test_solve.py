@@ -17,7 +17,7 @@ SOURCE = os.environ["CAVORT_SOURCE"]
 
 def built(arm):
     """The problem of swing.xml, in code."""
-    problem = cavort.Problem(cavort.Model(arm, overlaps=True), 1.0, 0.05, name="swing")
+    problem = cavort.Problem(arm, 1.0, 0.05, name="swing")
     problem.q_goal = [1.0]
     problem.cost("posture", 900, dofs="all", at=1.0, name="there")
     return problem
