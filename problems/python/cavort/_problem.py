@@ -112,22 +112,22 @@ class Problem:
         pointer = lib.cav_problem_load(str(path).encode(), other, error)
         if not pointer:
             raise failure(error.status, str(path), error)
-        return cls._of(ffi.gc(pointer, lib.cav_problem_free))
+        return cls._of(pointer, ffi.gc(pointer, lib.cav_problem_free))
 
     @classmethod
-    def _of(cls, pointer: Any) -> "Problem":
-        # a problem of the library, which pointer keeps
+    def _of(cls, pointer: Any, owner: Any) -> "Problem":
+        # a problem of the library, which owner keeps
         problem = cls.__new__(cls)
-        model = Model._of(pointer.model, pointer)
+        model = Model._of(pointer.model, owner)
         model.path = os.path.abspath(text(pointer.model_path)) if pointer.model_path else None
         model.floating = bool(pointer.floating)
-        problem._take(model, pointer[0], pointer)
+        problem._take(model, pointer[0], owner)
         nq, nv = model.nq, model.nv
         problem.q_start = _library.view(problem, pointer.q_start, (nq,))
         problem.q_goal = _library.view(problem, pointer.q_goal, (nq,))
         problem.v_start = _library.view(problem, pointer.v_start, (nv,))
         problem.name = text(pointer.name)
-        problem.terms = [Term(model, pointer.term[i], keep=pointer) for i in range(pointer.nterm)]
+        problem.terms = [Term(model, pointer.term[i], keep=owner) for i in range(pointer.nterm)]
         return problem
 
     def _take(self, model: Model, struct: Any, owner: Any) -> None:

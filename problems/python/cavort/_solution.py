@@ -8,14 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _library
-from ._library import Array, Options, Record, check, ffi, lib, new_error, pointer_to, text
+from ._library import Array, Options, Record, check, failure, ffi, lib, new_error, text
 from ._problem import Frozen, Problem
-from ._state import State
-
-CONTACT = np.dtype(
-    [("knot", "i4"), ("geom1", "i4"), ("geom2", "i4"), ("pos", "f8", (3,)), ("force", "f8", (3,)), ("gap", "f8")]
-)
-LOADED = 1e-6  # fraction of the weight from which on a contact is listed, as in forces.csv
 
 
 class Solution:
@@ -23,26 +17,29 @@ class Solution:
 
     q [nknot, nq], v, u [nknot, nv] look at the solution's memory; time [nknot] in s. status: "success", or
     "not converged" or "interrupted" with the best iterate. What verdict and the reports say is of the problem as it was
-    when it was solved.
+    when it was solved. Solution.load reads one from a result folder.
     """
 
     problem: Problem
     strategy: str  #: that led to it; "" where none but the problem's own was asked for
 
-    def __init__(self, problem: Problem, frozen: Frozen, pointer: Any, status: int, strategy: str = "") -> None:
+    def __init__(self, problem: Problem, frozen: Frozen, pointer: Any, status: int | None, strategy: str = "") -> None:
         self.problem = problem
         self._frozen = frozen
         self._c = pointer
         self._status = status
         self.strategy = strategy
         self._verdict: Record | None = None
+        self._along: Any = None
 
     def __repr__(self) -> str:
         return f"<cavort.Solution of {self.problem.name!r}: {self.status}, {len(self.q)} knots, cost {self.cost:.6g}>"
 
     @property
     def status(self) -> str:
-        """How the solve ended, in a word or two."""
+        """How the solve ended, in a word or two; "read" of a result folder, which does not say."""
+        if self._status is None:
+            return "read"
         return "success" if self._status == lib.CAV_OK else text(lib.cav_status_name(self._status))
 
     @property
@@ -107,42 +104,43 @@ class Solution:
         """One record an iteration: phase, stage, cost, unactuated, violation, seconds and more."""
         return [_library.record(self._c.progress[i]) for i in range(self._c.nprogress)]
 
-    def _evaluated(self) -> Any:
-        # a state at every knot that has forces: knot, state, u
-        model, motion = self._frozen.model, self._c.trajectory
-        state = State(model)
-        state._c.options = self._c.contact
-        q, v = self.q, self.v
-        for t in range(motion.nknot):
-            if t + 1 < motion.nknot:
-                v_next = v[t + 1]
-            elif self._frozen.c.close_at_rest and not self._frozen.c.cycle.on:
-                v_next = np.zeros(model.nv)
-            else:
-                return
-            yield t, state, state.inverse(q[t], v[t], v_next)
+    @property
+    def _forces(self) -> Any:
+        # what contacts and actuators do along the motion, found once
+        if self._along is None:
+            error, problem = new_error(), self._frozen.c
+            at_rest = int(problem.close_at_rest and not problem.cycle.on)
+            motion = self._c.trajectory, ffi.addressof(self._c, "contact")
+            pointer = lib.cav_forces_new(self._frozen.model._c, *motion, at_rest, error)
+            if not pointer:
+                raise failure(error.status, "the forces of the motion", error)
+            self._along = ffi.gc(pointer, lib.cav_forces_free)
+        return self._along
+
+    def _at_knots(self, name: str, *shape: int) -> Array:
+        forces = self._forces
+        return _library.view(forces, getattr(forces, name), (forces.nknot, *shape))
 
     @property
     def effort(self) -> Array:
         """Efforts of the actuators [nknot, nu]: controls of motors, else forces; NaN at a last knot without forces."""
-        out = np.full((self._c.trajectory.nknot, self._frozen.model.nu), np.nan)
-        for t, state, u in self._evaluated():
-            out[t] = state.actuation(u).effort
-        return out
+        return self._at_knots("control", self._frozen.model.nu)
+
+    @property
+    def control(self) -> Array:
+        """Inputs of the actuators [nknot, nu]: controls, or activations, that give these efforts; NaN likewise."""
+        return self._at_knots("input", self._frozen.model.nu)
+
+    @property
+    def com(self) -> Array:
+        """Centre of mass of all that moves [nknot, 3], m."""
+        return self._at_knots("com", 3)
 
     @property
     def contacts(self) -> NDArray[Any]:
         """All loaded contacts: knot, geom1, geom2, pos (m, world), force (N, world, on geom2), gap (m)."""
-        model, rows = self._frozen.model, []
-        least = LOADED * model.mass * float(np.linalg.norm(model.gravity))
-        for t, state, _ in self._evaluated():
-            touching, pairs = state.contacts, model.pair
-            for contact in touching[touching["impulse"][:, 0] > least * self.timestep]:
-                axes, n = contact["frame"].reshape(3, 3), min(int(contact["dim"]), 3)
-                force = contact["impulse"][:n] @ axes[:n] / self.timestep
-                pair = pairs[contact["pair"]]
-                rows.append((t, pair["geom1"], pair["geom2"], contact["pos"], force, contact["dist"]))
-        return np.array(rows, dtype=CONTACT)
+        forces = self._forces
+        return _library.view(forces, forces.force, (forces.nforce,))
 
     def _motion(self) -> tuple[Any, Any, Any]:
         return self._frozen.c, self._c.trajectory, ffi.addressof(self._c, "contact")
@@ -169,11 +167,7 @@ class Solution:
     @property
     def terms(self) -> list[Record]:
         """What each term of the problem asked and got: name, wanted, got, off, within, met, cost and more."""
-        count, error = self._frozen.c.nterm, new_error()
-        report = ffi.new("cav_term_report[]", max(1, count))
-        self._frozen.check(
-            lib.cav_terms_report(*self._motion(), report, ffi.NULL, error), "the report of terms", error
-        )
+        count, report = self._frozen.c.nterm, self._report()
         records = [_library.record(report[i], ("has_target", "met")) for i in range(count)]
         return [Record({"name": name, **record}) for name, record in zip(self._frozen.names, records)]
 
@@ -200,6 +194,47 @@ class Solution:
         widths = (("q", model.nq), ("v", model.nv), ("u", model.nv))
         q, v, u = (_library.view(motion, getattr(motion, name), (n, width)).copy() for name, width in widths)
         return q, v, u
+
+    @classmethod
+    def load(cls, folder: str, model: str | None = None) -> "Solution":
+        """Reads a result folder, of solves by the tool too; model: a file in the place of the one that it names."""
+        error = new_error()
+        other = ffi.NULL if model is None else str(model).encode()
+        pointer = lib.cav_result_read(str(folder).encode(), other, error)
+        if not pointer:
+            raise failure(error.status, str(folder), error)
+        result = ffi.gc(pointer, lib.cav_result_free)
+        problem = Problem._of(result.problem, result)
+        c = ffi.new("cav_solution *")
+        for name in ("trajectory", "gain_q", "gain_v", "nrow", "row", "iterations"):
+            setattr(c, name, getattr(result, name))
+        c.contact, c.seconds = result.problem.contact, result.solve_seconds
+        solution = cls(problem, problem._freeze(), c, None)
+        report = solution._report()
+        c.cost = sum(report[i].cost for i in range(solution._frozen.c.nterm))
+        return solution
+
+    def save(self, folder: str) -> None:
+        """Writes a result folder, made where it is missing, as the tool does but for its page (`cavort view FOLDER`).
+
+        Verifies the motion if that is still to be done. A problem with a quantity of one's own, or whose model was not read
+        from a file, cannot be written.
+        """
+        error, where, problem = new_error(), str(folder).encode(), self._frozen.c
+        verdict = ffi.new("cav_verdict *")
+        for name, value in self.verdict.items():
+            setattr(verdict, name, value.encode() if isinstance(value, str) else value)
+        report = self._report()
+        check(lib.cav_result_write(where, problem, self._c, error), folder, error)
+        check(lib.cav_result_write_forces(where, *self._motion(), error), folder, error)
+        check(lib.cav_result_write_verdict(where, problem, verdict, report, ffi.NULL, error), folder, error)
+
+    def _report(self) -> Any:
+        # of every term
+        report, error = ffi.new("cav_term_report[]", max(1, self._frozen.c.nterm)), new_error()
+        status = lib.cav_terms_report(*self._motion(), report, ffi.NULL, error)
+        self._frozen.check(status, "the report of terms", error)
+        return report
 
     def save_trajectory(self, path: str) -> None:
         """Writes trajectory.csv: time, q in MuJoCo's layout, v, u; one row a knot."""

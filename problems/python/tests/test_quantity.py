@@ -180,3 +180,11 @@ def test_knot(model):
     assert report.cost < 1e-15
     with pytest.raises(cavort.Error, match="function"):
         made.save("/tmp/none.xml")
+
+
+def test_folder(model, tmp_path):
+    """A function cannot be written into a result folder."""
+    made = problem(model)
+    made.cost(QUANTITIES["distance"](), 1.0, name="distance")
+    with pytest.raises(cavort.Error, match="function"):
+        cavort.solve(made, gains=False).save(str(tmp_path / "folder"))

@@ -1,6 +1,7 @@
 """Solves: from files and built in code, watched, interrupted, warm; what a solution says."""
 
 import gc
+import json
 import os
 import signal
 import subprocess
@@ -71,6 +72,30 @@ def test_solution(swing):
     assert again.verdict.certified
 
 
+def test_folder(swing, tmp_path):
+    """A result folder reads back to the same bits, and says what the solution says."""
+    solution = cavort.solve(cavort.Problem.load(swing))
+    folder = str(tmp_path / "made" / "swing.result")
+    solution.save(folder)
+    with open(os.path.join(folder, "verdict.json")) as file:
+        told = json.load(file)
+    assert told["certified"] is True and told["cost"] == solution.verdict.cost and told["targets"]
+    again = cavort.Solution.load(folder)
+    assert again.status == "read" and again.iterations == solution.iterations
+    for name in ("q", "v", "u", "effort"):
+        assert np.array_equal(getattr(again, name), getattr(solution, name))
+    assert again.cost == pytest.approx(solution.cost, rel=1e-12)
+    assert np.array_equal(again.gains[0], solution.gains[0]) and again.verdict.cost == solution.verdict.cost
+    assert again.verdict.certified and again.verdict.optimality == solution.verdict.optimality
+    warm = cavort.solve(again.problem, warm=again)
+    assert warm.status == "success" and np.allclose(warm.q, solution.q, atol=1e-4)
+    again.save(str(tmp_path / "twice"))
+    with open(os.path.join(folder, "trajectory.csv"), "rb") as a, open(str(tmp_path / "twice" / "trajectory.csv"), "rb") as b:
+        assert a.read() == b.read()
+    with pytest.raises(cavort.Error, match="problem.xml"):
+        cavort.Solution.load(str(tmp_path))
+
+
 def test_contacts():
     problem = cavort.Problem.load(os.path.join(SOURCE, "problems", "motions", "squat-jump", "problem.xml"))
     stopped = cavort.solve(problem, max_iterations=2, gains=False)
@@ -81,6 +106,8 @@ def test_contacts():
     assert len(first) and first["force"][:, 2].sum() > 0.1 * weight
     floor = problem.model.index("geom", "floor")
     assert set(np.unique(touching["geom1"])) >= {floor}
+    # what bears is the inverse's: force over the whole motion against the momentum of the centre of mass
+    assert stopped.com.shape == (81, 3) and stopped.control.shape == (81, 21)
 
 
 def test_observed(swing):
