@@ -28,7 +28,10 @@ class Error(Exception):
 def _open() -> Any:
     # the package carries the library that its interface was made from
     path = os.path.join(os.path.dirname(__file__), "libcavort.so")
-    return ffi.dlopen(path)
+    try:
+        return ffi.dlopen(path)
+    except OSError as error:
+        raise ImportError(f"{error}; a library that it needs is missing: see sh problems/install.sh build") from error
 
 
 lib: Any = _open()

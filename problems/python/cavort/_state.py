@@ -46,7 +46,8 @@ class State:
         pointer = lib.cav_state_new(model._c)
         if not pointer:
             raise MemoryError("no memory for a state")
-        self._take(model, ffi.gc(pointer, lib.cav_state_free))
+        # the model outlives the state, in whichever order Python lets them go
+        self._take(model, ffi.gc(pointer, lambda state, model=model: lib.cav_state_free(state)))
 
     @classmethod
     def _of(cls, model: Model, pointer: Any) -> "State":
@@ -58,7 +59,7 @@ class State:
     def _take(self, model: Model, pointer: Any) -> None:
         self.model = model
         self._c = pointer
-        self.options: Options = _library.contact_options(ffi.addressof(pointer, "options"), self)
+        self.options: Options = _library.contact_options(ffi.addressof(pointer, "options"), pointer)
 
     @property
     def time(self) -> float:

@@ -1,6 +1,7 @@
 """Models and points: views without copies, batches against single calls and C, errors with the library's text."""
 
 import gc
+import weakref
 
 import cavort
 import numpy as np
@@ -143,3 +144,19 @@ def test_sensors(arm):
     state.derivatives()
     by_q, by_v = state.sensor_derivatives("where")
     assert np.allclose(by_q[:, 0], [-0.5 * np.cos(0.3), 0, 0.5 * np.sin(0.3)]) and not by_v.any()
+
+
+def test_order_of_release(humanoid):
+    """A state may go after its model, and goes at once, without a collector of cycles."""
+    freed = []
+    model = cavort.Model(humanoid)
+    state = cavort.State(model)
+    weakref.finalize(state, freed.append, 1)
+    gc.disable()
+    try:
+        del model
+        state.position(state.model.q0)
+        del state
+        assert freed == [1]
+    finally:
+        gc.enable()
