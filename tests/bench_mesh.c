@@ -1,12 +1,13 @@
 /// What meshes cost: the inverse and its derivatives of Unitree G1 at the smoothings of a schedule's stages, (1) as its maker
 /// ships it, with a mesh on most links, (2) with a capsule fitted to each of these in its place and the same pairs, (3) with
 /// its primitives alone, which touch with the feet. As in a plan, pairs that overlap at rest are left out. By turns in one
-/// run; shown are means over states of plans, standing, squatting, stepping and falling: microseconds of processor time, and
+/// run; shown are means over knots of motions, standing, squatting, stepping and falling: microseconds of processor time, and
 /// those of the meshes over those of the others.
 /// Usage: bench_mesh MESHES FITTED, as by sh tests/results.sh mesh, which makes the second file.
 #include "bench.h"
 
-enum { REPEATS = 15, KINDS = 4, MODELS = 3, STAGES = 6, ROUNDS = 4 };
+enum { KNOTS = 15, KINDS = 4, MODELS = 3, STAGES = 6, ROUNDS = 4 };
+static const double STEP = 0.02;
 static const double contact_delta[STAGES] = {0.05, 0.02, 0.008, 0.003, 0.0005, 0};
 static const double self_delta[STAGES] = {0.002, 0.0017, 0.0014, 0.0012, 0.001, 0};
 
@@ -59,8 +60,8 @@ static double processor_seconds(void) {
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-// a state of a kind: posture, on the floor or above it, and velocity; 0 if the model has no such joint
-static int draw(const cav_model *m, cav_state *state, const kind *k, double *q, double *v, double *next) {
+// the posture that a kind starts from; 0 if the model has no such joint
+static int take_posture(const cav_model *m, const kind *k, double *q, double *v) {
   cav_configuration_reset(m, q);
   for (size_t i = 0; i < sizeof k->set / sizeof *k->set && k->set[i].joint; i++) {
     int j = cav_object_find(m, CAV_OBJECT_JOINT, k->set[i].joint);
@@ -70,19 +71,35 @@ static int draw(const cav_model *m, cav_state *state, const kind *k, double *q, 
   scene_normals(v, m->nv, 0.05);
   v[4] += k->lean;
   cav_integrate(m, q, v, 1, q);
+  return 1;
+}
+
+// lifts or lowers it until what is lowest is at a height; 0 if there is no floor
+static int put_at(const cav_model *m, cav_state *state, double height, double *q) {
   state->options.smoothing = state->options.smoothing_self = 0.2;
   if (cav_position(m, state, q) != CAV_OK) return 0;
   double lowest = INFINITY;
   for (int i = 0; i < state->ncontact; i++)
     if (m->pair[state->contact[i].pair].external) lowest = fmin(lowest, state->contact[i].dist);
-  if (!isfinite(lowest)) return 0;
-  q[2] += k->height - lowest;
-  scene_normals(v, m->nv, k->spread);
+  q[2] += height - lowest;
+  return isfinite(lowest);
+}
+
+// the knots of a motion of a kind: q (+) h v is the next one's, but for its height
+static int draw(const cav_model *m, cav_state *state, const kind *k, double *q, double *v, double *next) {
+  int nq = m->nq, nv = m->nv, ok = take_posture(m, k, q, v);
+  scene_normals(v, nv, k->spread);
   for (int i = 0; i < 6; i++) v[i] *= 0.3;
   v[2] -= k->sink;
   v[4] += k->lean;
-  for (int i = 0; i < m->nv; i++) next[i] = v[i] + 0.05 * scene_normal();
-  return 1;
+  for (int n = 0; n < KNOTS && ok; n++, q += nq, v += nv, next += nv) {
+    ok = put_at(m, state, fmax(0, k->height - STEP * k->sink * n), q);
+    for (int i = 0; i < nv; i++) next[i] = v[i] + 0.05 * scene_normal();
+    if (n + 1 == KNOTS) break;
+    cav_integrate(m, q, v, STEP, q + nq);
+    memcpy(v + nv, next, sizeof *v * (size_t)nv);
+  }
+  return ok;
 }
 
 typedef struct motion {
@@ -93,19 +110,20 @@ static int measure(const cav_model *m, cav_state *state, const motion *s, int st
   int nv = m->nv, ok = 1;
   double *u = scene_vector(nv), *J = scene_vector(3 * nv * nv);
   cost now = {0};
-  state->options.timestep = 0.02;
+  state->options.timestep = STEP;
   state->options.stabilisation = CAV_STABILISATION_DISCRETE;
+  state->options.sliding = CAV_SLIDING_COULOMB;
   state->options.smoothing = contact_delta[stage];
   state->options.smoothing_self = self_delta[stage];
-  for (int k = 0; k < KINDS * REPEATS && ok; k++) {
+  for (int k = 0; k < KINDS * KNOTS && ok; k++) {
     const double *q = s->q + k * m->nq, *v = s->v + k * nv, *next = s->next + k * nv;
     double start = processor_seconds();
     ok = cav_inverse(m, state, q, v, next, u) == CAV_OK;
     double middle = processor_seconds();
     ok = ok && cav_derivatives(m, state, J, J + nv * nv, J + 2 * nv * nv) == CAV_OK;
-    now.inverse += 1e6 * (middle - start) / (KINDS * REPEATS);
-    now.derivatives += 1e6 * (processor_seconds() - middle) / (KINDS * REPEATS);
-    now.contacts += (double)state->ncontact / (KINDS * REPEATS);
+    now.inverse += 1e6 * (middle - start) / (KINDS * KNOTS);
+    now.derivatives += 1e6 * (processor_seconds() - middle) / (KINDS * KNOTS);
+    now.contacts += (double)state->ncontact / (KINDS * KNOTS);
   }
   // the least of the rounds, as what else runs only adds
   out->contacts = now.contacts;
@@ -144,11 +162,11 @@ static int open_models(const char *meshes, const char *fitted, cav_model *model[
     }
   }
   const cav_model *m = model[0];
-  int n = KINDS * REPEATS;
+  int n = KINDS * KNOTS;
   *s = (motion){scene_vector(n * m->nq), scene_vector(n * m->nv), scene_vector(n * m->nv)};
   scene_seed = 0x9E3779B97F4A7C15u;
-  for (int k = 0; k < n; k++) {
-    if (draw(m, state[0], &kinds[k % KINDS], s->q + k * m->nq, s->v + k * m->nv, s->next + k * m->nv)) continue;
+  for (int k = 0; k < n; k += KNOTS) {
+    if (draw(m, state[0], &kinds[k / KNOTS], s->q + k * m->nq, s->v + k * m->nv, s->next + k * m->nv)) continue;
     fprintf(stderr, "%s: not a robot with G1's joints and a floor\n", meshes);
     return 0;
   }

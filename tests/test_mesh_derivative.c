@@ -1,6 +1,6 @@
 /// Derivatives of contacts of meshes in closed form: nearest corners, edges and faces of two meshes, of a mesh and a
 /// ball, a capsule, a box, a cylinder or an ellipsoid, and corners on a plane, within one tree and between two, against
-/// centred differences of the whole inverse. And that derivatives do not fail where points of a pair come and go.
+/// centred differences of the whole inverse. And that contacts do not depend on what was evaluated before.
 #include "scene.h"
 
 // a chain that folds onto itself, and a free body beside it
@@ -78,6 +78,43 @@ static void test_shape(const char *points, const char *type, const char *attribu
   cav_model_free(m);
 }
 
+// contacts do not depend, to the bit, on what was evaluated before: along a walk whose searches begin where the last ones
+// ended, and by a new state at each pose
+static void test_history(const char *points, const char *type, const char *attributes) {
+  char model_text[TEXT];
+  snprintf(model_text, sizeof model_text, text, points, type, attributes);
+  cav_model *m = scene_load(model_text);
+  cav_state *state = m ? cav_state_new(m) : NULL;
+  if (!CHECK(state != NULL)) return;
+  double *q = scene_vector(m->nq), *v = scene_vector(m->nv);
+  int unlike = 0, contacts = 0;
+  for (int k = 0; k < 4 * POSES; k++) {
+    // steps from none to what moves the nearest parts on, and now and then elsewhere
+    if (k % 50 == 0) scene_posture(m, q, v, 0.4);
+    scene_normals(v, m->nv, k % 5 == 0 ? 0 : k % 5 == 1 ? 1e-6 : 0.03);
+    cav_integrate(m, q, v, 1, q);
+    cav_state *fresh = cav_state_new(m);
+    if (!CHECK(fresh != NULL)) break;
+    state->options.smoothing = fresh->options.smoothing = 0.02;
+    state->options.smoothing_self = fresh->options.smoothing_self = 0.01;
+    CHECK(cav_position(m, state, q) == CAV_OK && cav_position(m, fresh, q) == CAV_OK);
+    contacts += state->ncontact;
+    unlike += state->ncontact != fresh->ncontact;
+    for (int i = 0; i < state->ncontact && i < fresh->ncontact; i++) {
+      const cav_contact *a = &state->contact[i], *b = &fresh->contact[i];
+      unlike += memcmp(a->pos, b->pos, sizeof a->pos) || memcmp(a->frame, b->frame, sizeof a->frame) ||
+                a->dist != b->dist || a->feature != b->feature;
+    }
+    cav_state_free(fresh);
+  }
+  printf("%-8s %5d contacts along a walk, %d unlike those of a new state\n", type, contacts, unlike);
+  CHECK(contacts > 1000);
+  CHECK(unlike == 0);
+  free(q), free(v);
+  cav_state_free(state);
+  cav_model_free(m);
+}
+
 // the inverse at (q, v, v_next) with the contacts that bear something there, and with all of them
 static void compare_sought(const cav_model *m, cav_state *state, const double *q, const double *v, const double *next,
                            double *J, int contacts[2], double *worst) {
@@ -140,14 +177,15 @@ static void test_narrowed(void) {
 
 int main(void) {
   test_narrowed();
-  test_shape(rock, "sphere", "size='.08'");
-  test_shape(rock, "capsule", "size='.05 .08'");
-  test_shape(rock, "box", "size='.09 .06 .07'");
-  test_shape(rock, "cylinder", "size='.06 .08'");
-  test_shape(rock, "ellipsoid", "size='.06 .09 .12'");
-  test_shape(rock, "mesh", "mesh='rock'");
-  test_shape(round_rock(), "cylinder", "size='.06 .08'");
-  test_shape(round_rock(), "ellipsoid", "size='.06 .09 .12'");
-  test_shape(round_rock(), "mesh", "mesh='rock'");
+  static const char *const shapes[][2] = {
+      {"sphere", "size='.08'"},       {"capsule", "size='.05 .08'"},       {"box", "size='.09 .06 .07'"},
+      {"cylinder", "size='.06 .08'"}, {"ellipsoid", "size='.06 .09 .12'"}, {"mesh", "mesh='rock'"},
+  };
+  for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
+    test_shape(rock, shapes[i][0], shapes[i][1]);
+    test_shape(round_rock(), shapes[i][0], shapes[i][1]);
+    test_history(rock, shapes[i][0], shapes[i][1]);
+    test_history(round_rock(), shapes[i][0], shapes[i][1]);
+  }
   return check_result();
 }

@@ -46,8 +46,9 @@ struct cav_geom_cache {
   cav_fixed *fixed;     ///< NULL: there is little to leave out
   cav_sweep *sweep;     ///< NULL: all pairs that are left are looked at
   int sweep_from;
-  double margin; ///< largest of all pairs
-  int expensive; ///< some pair is
+  cav_hint *hint; ///< [npair] where the last searches ended; NULL: no pair is expensive
+  double margin;  ///< largest of all pairs
+  int expensive;  ///< some pair is
 };
 
 // places a geom fixed to the world, or prepares one that moves
@@ -200,13 +201,15 @@ struct cav_geom_cache *cav_geom_cache_new(const cav_model *model, int sweep_from
   }
   open_slots(model, cache, slot_of);
   free(slot_of);
-  if (!open_pruning(model, cache, sweep_from)) {
+  if (cache->expensive) cache->hint = calloc((size_t)model->npair, sizeof *cache->hint);
+  if ((cache->expensive && !cache->hint) || !open_pruning(model, cache, sweep_from)) {
     cav_geom_cache_free(cache);
     return NULL;
   }
   cache->bytes = cav_sweep_bytes(cache->sweep) + cav_fixed_bytes(cache->fixed) + sizeof *cache +
                  ((size_t)model->ngeom + 1) * (sizeof *cache->slot + sizeof *cache->moving + sizeof *cache->centre);
   cache->bytes += (2 * (size_t)model->npair + 1) * sizeof *cache->candidate;
+  if (cache->hint) cache->bytes += (size_t)model->npair * sizeof *cache->hint;
   cache->bytes += (size_t)model->nlink * (sizeof *cache->tree + sizeof *cache->root);
   return cache;
 }
@@ -221,6 +224,7 @@ void cav_geom_cache_free(struct cav_geom_cache *cache) {
   free(cache->moving);
   free(cache->centre);
   free(cache->candidate);
+  free(cache->hint);
   free(cache->tree);
   free(cache->root);
   free(cache);
@@ -289,11 +293,14 @@ static double reach(const cav_model *model, const cav_state *state, int p, doubl
   const candidate *c = cache->candidate + p;
   const cav_pair *pair = model->pair + p;
   const slot *a = cache->slot + c->first, *b = cache->slot + c->second;
-  double radius = b->geom->bound + margin, turn[2], mu = 0, roll = 0;
+  // the point lies midway between the surfaces
+  double radius = b->geom->bound + 0.5 * fmax(margin, 0), turn[2], mu = 0, roll = 0;
   const double *place = cache->centre[c->second];
   double now = speed_between(state, w->velocity_now, a->geom->link, b->geom->link, place, radius, &turn[0]);
   double next = speed_between(state, state->velocity_next, a->geom->link, b->geom->link, place, radius, &turn[1]);
-  for (int k = 0; k + 1 < pair->dim; k++) *(k < 2 ? &mu : &roll) = fmax(k < 2 ? mu : roll, pair->friction[k]);
+  // under Coulomb's law the normal row is alone, and where it bears nothing neither does friction
+  for (int k = 0; k + 1 < pair->dim && state->options.sliding == CAV_SLIDING_CONVEX; k++)
+    *(k < 2 ? &mu : &roll) = fmax(k < 2 ? mu : roll, pair->friction[k]);
   double kept = fabs(1 - w->discrete_damping), most = (1 + mu) * (kept * now + next + SLACK);
   most += roll * (kept * turn[0] + turn[1]);
   double delta =
@@ -358,7 +365,8 @@ static inline cav_status collide_pair(const cav_model *model, cav_state *state, 
   if (c->expensive && !near(cache, c, margin)) return CAV_OK;
   cav_touch touch[CAV_TOUCH_MAX];
   const cav_shape *a = shape_of(state, cache, c->first), *b = shape_of(state, cache, c->second);
-  int count = cav_collide_shapes(a, b, margin, touch);
+  int count = c->expensive ? cav_collide_again(a, b, margin, &cache->hint[c->pair], touch)
+                           : cav_collide_shapes(a, b, margin, touch);
   assert(count <= CAV_TOUCH_MAX);
   cav_status status = CAV_OK;
   for (int k = 0; k < count && status == CAV_OK; k++) status = push(model, state, c->pair, touch + k);

@@ -132,7 +132,7 @@ static int find_parts(const cav_contact *c, const cav_shape *a, const cav_shape 
     return cav_separation_find(&ca, &cb, fmax(cav_shape_size(a), cav_shape_size(b)), most, s) && s->corners &&
            add_part(p, s->corner_a, s->corners, 0, size) && add_part(p, s->corner_b, s->corners, 1, size);
   }
-  if (!cav_separation_solve(a, b, c->dist + size, s) || !s->corners || s->straight == 2) return 0;
+  if (!cav_separation_solve(a, b, c->dist + size, NULL, s) || !s->corners || s->straight == 2) return 0;
   if (s->straight) column3(p->along[p->n++], a->rotation, 2);
   return add_part(p, s->corner_b, s->corners, 1, size);
 }

@@ -539,22 +539,26 @@ static int ask_libccd(const cav_core *a, const cav_core *b, double size, double 
 }
 #endif
 
-int cav_separation_solve(const cav_shape *a, const cav_shape *b, double margin, cav_separation *out) {
+int cav_separation_solve(const cav_shape *a, const cav_shape *b, double margin, cav_hint *hint, cav_separation *out) {
   int swap = !is_curved(a) && is_curved(b);
   search g = {.a = swap ? b : a, .b = swap ? a : b, .size = fmax(cav_shape_size(a), cav_shape_size(b))};
   cav_core ca = cav_core_of(g.a), cb = cav_core_of(g.b);
   g.core = &cb;
   g.meets = MEETS;
   double most = margin + ca.radius + cb.radius;
-  if (!is_curved(g.a)) return cav_separation_find(&ca, &cb, g.size, most, out);
+  if (!is_curved(g.a) && !hint) return cav_separation_find(&ca, &cb, g.size, most, out);
   // of many corners those near a rough direction are too many to try: first the exact one, then the few about it
-  int many = cav_shape_corners(g.b) > NEAR_MAX, proven = 0;
+  int many = cav_shape_corners(g.b) > NEAR_MAX, proven = 0, again = hint && (!is_curved(g.a) || (many && !swap));
+  if (again) {
+    int found = cav_separation_again(&ca, &cb, g.size, most, hint, out);
+    if (!found || hint->na || !is_curved(g.a)) return found;
+  }
 #ifdef CAVORT_HAVE_CCD
   double n[3];
   proven = !many && ask_libccd(&ca, &cb, g.size, most, n) && polish(&g, n, 0);
 #endif
   if (!proven) {
-    if (!cav_separation_find(&ca, &cb, g.size, most, out)) return 0;
+    if (!again && !cav_separation_find(&ca, &cb, g.size, most, out)) return 0;
     if (many && out->gap > 0) {
       g.meets = FEW;
       proven = polish(&g, out->n, 0);

@@ -39,6 +39,18 @@ static inline cav_shape cav_shape_of(const cav_model *model, const cav_geom *geo
 /// rest.
 int cav_collide_shapes(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
+/// Where the last search of a pair of polyhedra ended: the corners of both that met, up to three of each, none: 0; or a
+/// direction along which they were further apart than was asked for, in the axes of a. It saves the next search and
+/// changes no answer.
+typedef struct cav_hint {
+  int na, nb, a[3], b[3];
+  int apart;
+  double direction[3];
+} cav_hint;
+
+/// The same from where the last search of these two ended; of a pair without a mesh nothing is noted.
+int cav_collide_again(const cav_shape *a, const cav_shape *b, double margin, cav_hint *hint, cav_touch *touch);
+
 /// A contact point over a face of one of two bodies: a corner of the other body, or a point of one of its sides over a
 /// side of the face, or of its face over a corner of the face.
 typedef struct cav_face_point {

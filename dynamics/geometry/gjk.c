@@ -13,11 +13,12 @@
 #include "pairs.h"
 
 enum { STEPS_MAX = 100, VERTEX_MAX = 160, SHEET_MAX = 2 * VERTEX_MAX };
-static const double CLOSE = 1e-14, CURVED_CLOSE = 1e-9, INSIDE = 1e-9, SEES = 1e-13;
+static const double CLOSE = 1e-14, CURVED_CLOSE = 1e-9, INSIDE = 1e-9, SEES = 1e-13, SLACK = 1e-9, ROUGH = 1e-5;
 
 /// A point of W and what it is made of.
 typedef struct vertex {
   double w[3], x[3], y[3];
+  int a, b; ///< corners, of curved bodies 0
 } vertex;
 
 /// Up to four points and the weights of the point nearest to the origin.
@@ -30,6 +31,7 @@ typedef struct simplex {
 typedef struct bodies {
   const cav_core *a, *b;
   double size, close;
+  double slack; ///< how much further apart than asked for a direction must show the bodies to end a search
 } bodies;
 
 cav_core cav_core_of(const cav_shape *shape) {
@@ -37,28 +39,58 @@ cav_core cav_core_of(const cav_shape *shape) {
   return (cav_core){shape, round ? shape->size[0] : 0};
 }
 
-void cav_core_support(const cav_core *core, const double direction[3], double point[3]) {
+// the same and its corner, of curved bodies 0; a corner near it is where a mesh is climbed from, -1: not known
+static int support_corner(const cav_core *core, const double direction[3], int near, double point[3]) {
   const cav_shape *s = core->shape;
-  if (core->radius == 0) {
-    cav_shape_support(s, direction, point);
-    return;
+  double local[3];
+  int corner = 0;
+  switch (s->type) {
+    case CAV_GEOM_MESH:
+      rotate_back(local, s->rotation, direction);
+      corner = cav_mesh_summit_from(s->mesh, local, near);
+      transform(point, s->pos, s->rotation, s->mesh->vertex + 3 * corner);
+      return corner;
+    case CAV_GEOM_CAPSULE:
+      column3(local, s->rotation, 2);
+      corner = !(dot3(local, direction) < 0);
+      axpy3(point, s->pos, corner ? s->size[1] : -s->size[1], local);
+      return corner;
+    case CAV_GEOM_SPHERE:
+      copy3(point, s->pos);
+      return 0;
+    case CAV_GEOM_BOX:
+      rotate_back(local, s->rotation, direction);
+      for (int k = 0; k < 3; k++) {
+        corner |= !(local[k] < 0) << k;
+        local[k] = local[k] < 0 ? -s->size[k] : s->size[k];
+      }
+      transform(point, s->pos, s->rotation, local);
+      return corner;
+    default:
+      cav_shape_support(s, direction, point);
+      return 0;
   }
-  copy3(point, s->pos);
-  if (s->type != CAV_GEOM_CAPSULE) return;
-  double u[3];
-  column3(u, s->rotation, 2);
-  axpy3(point, point, dot3(u, direction) < 0 ? -s->size[1] : s->size[1], u);
 }
 
-// point of W furthest along a direction
-static vertex support(const bodies *g, const double d[3]) {
+void cav_core_support(const cav_core *core, const double direction[3], double point[3]) {
+  support_corner(core, direction, -1, point);
+}
+
+// point of W furthest along a direction, near another
+static vertex support_near(const bodies *g, const double d[3], int near_a, int near_b) {
   vertex p;
   double back[3];
   scale3(back, -1, d);
-  cav_core_support(g->b, d, p.y);
-  cav_core_support(g->a, back, p.x);
+  p.b = support_corner(g->b, d, near_b, p.y);
+  p.a = support_corner(g->a, back, near_a, p.x);
   sub3(p.w, p.y, p.x);
   return p;
+}
+
+static vertex support(const bodies *g, const double d[3]) { return support_near(g, d, -1, -1); }
+
+static int is_curved(const cav_core *c) {
+  return c->shape->type == CAV_GEOM_ELLIPSOID || c->shape->type == CAV_GEOM_CYLINDER;
 }
 
 // --- nearest point of a simplex ---
@@ -110,7 +142,9 @@ static void reduce(simplex *s, double nearest[3]) {
   }
   int kept[4], n = 0;
   double keep[4];
-  for (int set = 0; set < 1 << others; set++) {
+  // all of them first: where each has a part nothing is nearer
+  for (int k = 0; k < 1 << others && n < s->n; k++) {
+    const int set = k ? k - 1 : (1 << others) - 1;
     int other[3], m = 0;
     double weight[4], w[3];
     for (int i = 0; i < others; i++) {
@@ -176,23 +210,58 @@ static void direction_of(const simplex *s, const double v[3], double n[3]) {
 
 typedef enum outcome { FAR, SEPARATE, OVERLAP } outcome;
 
-static outcome walk(const bodies *g, double most, simplex *s, cav_separation *out) {
-  double v[3], d[3];
-  sub3(v, g->b->shape->pos, g->a->shape->pos);
-  if (!(dot3(v, v) > 0)) set3(v, 1, 0, 0);
-  scale3(d, -1, v);
+// the point of W of two corners
+static vertex corners_of(const bodies *g, int a, int b) {
+  vertex p = {.a = a, .b = b};
+  cav_shape_corner(g->a->shape, a, p.x);
+  cav_shape_corner(g->b->shape, b, p.y);
+  sub3(p.w, p.y, p.x);
+  return p;
+}
+
+// where a walk begins: at what met last, or else at what is furthest along a direction
+static void begin(const bodies *g, const cav_hint *from, simplex *s, double v[3]) {
+  double d[3];
+  int corners = from && !from->apart && !is_curved(g->a) ? (from->na > from->nb ? from->na : from->nb) : 0;
   s->n = 1;
-  s->p[0] = support(g, d);
   s->weight[0] = 1;
+  if (corners) {
+    s->p[0] = corners_of(g, from->a[0], from->b[0]);
+  } else if (from) {
+    rotate(d, g->a->shape->rotation, from->direction);
+    s->p[0] = support_near(g, d, from->a[0], from->b[0]);
+  } else {
+    sub3(v, g->b->shape->pos, g->a->shape->pos);
+    if (!(dot3(v, v) > 0)) set3(v, 1, 0, 0);
+    scale3(d, -1, v);
+    s->p[0] = support(g, d);
+  }
   copy3(v, s->p[0].w);
+  for (int i = 1; i < corners; i++) {
+    simplex next = *s;
+    double w[3];
+    next.p[next.n++] =
+        corners_of(g, from->a[i < from->na ? i : from->na - 1], from->b[i < from->nb ? i : from->nb - 1]);
+    reduce(&next, w);
+    if (!(dot3(w, w) < dot3(v, v))) continue;
+    *s = next;
+    copy3(v, w);
+  }
+}
+
+// from where the last search ended, NULL: from the line between the centres. Of bodies that are further apart than most d
+// is a direction that shows it
+static outcome walk(const bodies *g, double most, const cav_hint *from, simplex *s, double d[3], cav_separation *out) {
+  double v[3];
+  begin(g, from, s, v);
   for (int step = 0; step < STEPS_MAX; step++) {
     double length = norm3(v);
     if (length < INSIDE * g->size) return OVERLAP;
     scale3(d, -1 / length, v);
-    vertex p = support(g, d);
+    vertex p = support_near(g, d, s->p[s->n - 1].a, s->p[s->n - 1].b);
     // the plane through p square to v bounds the distance from below
     double bound = -dot3(d, p.w);
-    if (bound > most) return FAR;
+    if (bound > most + g->slack) return FAR;
     if (length - bound < g->close * g->size) break;
     int known = 0;
     for (int i = 0; i < s->n; i++) known |= !memcmp(s->p[i].w, p.w, sizeof p.w);
@@ -405,10 +474,6 @@ static double gap_along(const bodies *g, const double n[3]) {
   return dot3(n, p.w);
 }
 
-static int is_curved(const cav_core *c) {
-  return c->shape->type == CAV_GEOM_ELLIPSOID || c->shape->type == CAV_GEOM_CYLINDER;
-}
-
 // normals of the faces of a flat or thin body, for what nothing else solves
 static void try_planes(const bodies *g, cav_separation *out) {
   const cav_core *cores[2] = {g->a, g->b};
@@ -437,15 +502,93 @@ static void try_planes(const bodies *g, cav_separation *out) {
   }
 }
 
+// what a walk that did not end far apart found, or of an overlap the polytope
+static int conclude(const bodies *g, double most, outcome end, const simplex *s, cav_separation *found,
+                    cav_separation *out) {
+  if (end == OVERLAP && !expand(g, s, found)) try_planes(g, found);
+  found->gap = gap_along(g, found->n);
+  if (found->gap > most) return 0;
+  *out = *found;
+  return 1;
+}
+
 int cav_separation_find(const cav_core *a, const cav_core *b, double size, double most, cav_separation *out) {
-  bodies g = {a, b, size, is_curved(a) || is_curved(b) ? CURVED_CLOSE : CLOSE};
+  bodies g = {a, b, size, is_curved(a) || is_curved(b) ? CURVED_CLOSE : CLOSE, 0};
   simplex s;
   cav_separation found;
-  outcome end = walk(&g, most, &s, &found);
-  if (end == FAR) return 0;
-  if (end == OVERLAP && !expand(&g, &s, &found)) try_planes(&g, &found);
-  found.gap = gap_along(&g, found.n);
-  if (found.gap > most) return 0;
-  *out = found;
-  return 1;
+  double d[3];
+  outcome end = walk(&g, most, NULL, &s, d, &found);
+  return end != FAR && conclude(&g, most, end, &s, &found, out);
+}
+
+// --- from where the last search ended ---
+
+static void add_corner(int corner, int *count, int list[3]) {
+  int at = 0;
+  while (at < *count && list[at] < corner) at++;
+  if (at < *count && list[at] == corner) return;
+  for (int i = *count; i > at; i--) list[i] = list[i - 1];
+  list[at] = corner;
+  ++*count;
+}
+
+// the corners of a simplex, in order, and the direction that they meet along
+static void note_corners(const bodies *g, const simplex *s, const double n[3], cav_hint *hint) {
+  double back[3];
+  scale3(back, -1, n);
+  rotate_back(hint->direction, g->a->shape->rotation, back);
+  hint->na = hint->nb = 0;
+  for (int i = 0; i < s->n && s->n <= 3; i++) {
+    add_corner(s->p[i].a, &hint->na, hint->a);
+    add_corner(s->p[i].b, &hint->nb, hint->b);
+  }
+}
+
+static void note_direction(const bodies *g, const simplex *s, const double d[3], cav_hint *hint) {
+  hint->na = hint->nb = 1;
+  hint->a[0] = s->p[0].a;
+  hint->b[0] = s->p[0].b;
+  hint->apart = 1;
+  rotate_back(hint->direction, g->a->shape->rotation, d);
+}
+
+// whether the bodies are still further apart along a direction of the hint
+static int still_apart(const bodies *g, double most, const cav_hint *hint) {
+  double d[3];
+  rotate(d, g->a->shape->rotation, hint->direction);
+  vertex p = support_near(g, d, hint->a[0], hint->b[0]);
+  return -dot3(d, p.w) > (most + g->slack) * norm3(d);
+}
+
+// whether a walk ended with an answer that does not depend on where it began: further apart than most, or proven
+static int is_settled(const bodies *g, outcome end, const simplex *s, const double d[3], const cav_separation *found,
+                      cav_hint *hint, cav_separation *proven) {
+  hint->na = hint->apart = 0;
+  if (end == FAR) note_direction(g, s, d, hint);
+  if (end == SEPARATE) note_corners(g, s, found->n, hint);
+  if (end != SEPARATE) return end == FAR;
+  if (cav_nearest_prove(g->a, g->b, g->size, hint, proven)) return 1;
+  hint->na = 0;
+  return 0;
+}
+
+int cav_separation_again(const cav_core *a, const cav_core *b, double size, double most, cav_hint *hint,
+                         cav_separation *out) {
+  const int curved = is_curved(a);
+  bodies g = {a, b, size, curved ? ROUGH : CLOSE, SLACK * size};
+  simplex s;
+  cav_separation found;
+  double d[3];
+  if (hint->apart && still_apart(&g, most, hint)) return 0;
+  if (!hint->apart && cav_nearest_prove(a, b, size, hint, out)) return out->gap <= most;
+  if (hint->na || curved) {
+    const cav_hint from = *hint;
+    outcome end = walk(&g, most, hint->na ? &from : NULL, &s, d, &found);
+    if (is_settled(&g, end, &s, d, &found, hint, out)) return end == SEPARATE && out->gap <= most;
+  }
+  // what that did not settle must not depend on it
+  g.close = curved ? CURVED_CLOSE : CLOSE;
+  outcome end = walk(&g, most, NULL, &s, d, &found);
+  if (is_settled(&g, end, &s, d, &found, hint, out)) return end == SEPARATE && out->gap <= most;
+  return conclude(&g, most, end, &s, &found, out);
 }

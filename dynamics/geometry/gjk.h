@@ -52,7 +52,16 @@ void cav_shape_bend(const cav_shape *shape, const double n[3], double t[2][3], d
 /// apart than most (out is unchanged). gjk.c.
 int cav_separation_find(const cav_core *a, const cav_core *b, double size, double most, cav_separation *out);
 
-/// The same, exact for all; 0 if the shapes are further apart than margin. convex.c.
-int cav_separation_solve(const cav_shape *a, const cav_shape *b, double margin, cav_separation *out);
+/// The same from where the last search ended, and notes where this one does. Where a corner, an edge or a face is proven
+/// to be nearest the answer is the one of cav_nearest_prove to the bit, elsewhere that of the search from nothing.
+int cav_separation_again(const cav_core *a, const cav_core *b, double size, double most, cav_hint *hint,
+                         cav_separation *out);
+
+/// The separation of two polyhedra if the corners of the hint are what is nearest, and they are apart; else 0. nearest.c.
+int cav_nearest_prove(const cav_core *a, const cav_core *b, double size, const cav_hint *hint, cav_separation *out);
+
+/// The same, exact for all; 0 if the shapes are further apart than margin. hint: where the last search ended, NULL: from
+/// nothing. convex.c.
+int cav_separation_solve(const cav_shape *a, const cav_shape *b, double margin, cav_hint *hint, cav_separation *out);
 
 #endif

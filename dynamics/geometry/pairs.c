@@ -241,12 +241,17 @@ static void sort(cav_touch *touch, int count) {
   }
 }
 
-// the last two columns of every row
-#define MESH cav_collide_mesh, cav_collide_hfield
+// the last two columns of every row: meshes are taken up below
+#define MESH NULL, cav_collide_hfield
 
 typedef int routine(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
 int cav_collide_shapes(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
+  cav_hint none = {.na = 0};
+  return cav_collide_again(a, b, margin, &none, touch);
+}
+
+int cav_collide_again(const cav_shape *a, const cav_shape *b, double margin, cav_hint *hint, cav_touch *touch) {
   // upper triangle over types; planes do not meet planes
   static routine *const table[CAV_GEOM_TYPES][CAV_GEOM_TYPES] = {
       {NULL, plane_sphere, plane_capsule, plane_ellipsoid, plane_cylinder, plane_box, cav_collide_plane_mesh, NULL},
@@ -258,7 +263,8 @@ int cav_collide_shapes(const cav_shape *a, const cav_shape *b, double margin, ca
       {NULL, NULL, NULL, NULL, NULL, NULL, MESH},
       {NULL}};
   routine *collide = table[a->type][b->type];
-  int count = collide ? collide(a, b, margin, touch) : 0;
+  int meshes = b->type == CAV_GEOM_MESH && a->type != CAV_GEOM_PLANE;
+  int count = meshes ? cav_collide_mesh(a, b, margin, hint, touch) : collide ? collide(a, b, margin, touch) : 0;
   sort(touch, count);
   return count;
 }

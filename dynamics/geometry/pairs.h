@@ -19,6 +19,8 @@ void cav_shape_support(const cav_shape *shape, const double direction[3], double
 /// Vertex of a mesh furthest along a direction [3] in its axes: of few the furthest of all; else from a vertex known for
 /// directions about this one uphill from neighbour to neighbour, which on a convex body ends at the top. surface.c.
 int cav_mesh_summit(const cav_mesh *mesh, const double direction[3]);
+/// The same, from a vertex near it if that is higher than the one known; -1: no such vertex.
+int cav_mesh_summit_from(const cav_mesh *mesh, const double direction[3], int near);
 
 /// Segment swept by a sphere (the capsule a) against a solid b with a surface: up to 2 points. segment.c.
 int cav_collide_segment(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
@@ -29,8 +31,8 @@ int cav_collide_plane_mesh(const cav_shape *a, const cav_shape *b, double margin
 /// Convex pairs without a routine of their own: ellipsoid, cylinder, box (not two) and mesh; sphere or capsule against
 /// mesh; a capsule whose segment cuts an ellipsoid, cylinder or box: up to 8 points. polytope.c.
 int cav_collide_convex(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
-/// The same where b is a mesh: first by the boxes about both.
-int cav_collide_mesh(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
+/// The same where b is a mesh: first by the boxes about both, then from where the last search of the pair ended.
+int cav_collide_mesh(const cav_shape *a, const cav_shape *b, double margin, cav_hint *hint, cav_touch *touch);
 
 /// Keeps the deepest of n contacts and those furthest from the ones kept, most at most; returns how many. polytope.c.
 int cav_thin_out(cav_touch *touch, int n, int most);

@@ -432,7 +432,7 @@ int cav_face_points(const cav_shape *a, const cav_shape *b, double margin, cav_f
   contact_pair g = {.a = a, .b = b, .size = fmax(cav_shape_size(a), cav_shape_size(b)), .margin = margin};
   standing s;
   cav_outline whole;
-  if (!cav_separation_solve(a, b, margin, &g.separation) || !stand(&g, &s)) return 0;
+  if (!cav_separation_solve(a, b, margin, NULL, &g.separation) || !stand(&g, &s)) return 0;
   double roll[3][3] = {{0}}, turning[3] = {0};
   if (s.other->type == CAV_GEOM_CYLINDER && !rolling(s.other, s.m, roll, turning)) return 0;
   lying_on(s.other, s.m, &whole);
@@ -504,11 +504,16 @@ int cav_points_over(const cav_shape *s, double corner[3][3], const double normal
   return count;
 }
 
-int cav_collide_convex(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
+// the same from where the last search of the pair ended
+static int collide_again(const cav_shape *a, const cav_shape *b, double margin, cav_hint *hint, cav_touch *touch) {
   contact_pair g = {.a = a, .b = b, .size = fmax(cav_shape_size(a), cav_shape_size(b)), .margin = margin};
   g.radius_a = cav_core_of(a).radius;
   g.radius_b = cav_core_of(b).radius;
-  return cav_separation_solve(a, b, margin, &g.separation) ? meet(&g, touch) : 0;
+  return cav_separation_solve(a, b, margin, hint, &g.separation) ? meet(&g, touch) : 0;
+}
+
+int cav_collide_convex(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
+  return collide_again(a, b, margin, NULL, touch);
 }
 
 // half lengths of a box about a shape's centre, in its axes
@@ -539,8 +544,8 @@ static int boxes_apart(const cav_shape *a, const cav_shape *b, double margin) {
   return 0;
 }
 
-int cav_collide_mesh(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
-  return boxes_apart(a, b, margin) ? 0 : cav_collide_convex(a, b, margin, touch);
+int cav_collide_mesh(const cav_shape *a, const cav_shape *b, double margin, cav_hint *hint, cav_touch *touch) {
+  return boxes_apart(a, b, margin) ? 0 : collide_again(a, b, margin, hint, touch);
 }
 
 int cav_collide_plane_mesh(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {

@@ -127,10 +127,16 @@ static void support_local(cav_geom_type type, const double *size, const double d
   zero3(x);
 }
 
-int cav_mesh_summit(const cav_mesh *m, const double d[3]) {
+int cav_mesh_summit(const cav_mesh *m, const double d[3]) { return cav_mesh_summit_from(m, d, -1); }
+
+int cav_mesh_summit_from(const cav_mesh *m, const double d[3], int near) {
   enum { FEW = 32 };
   int best = m->summit && m->nvertex > FEW ? m->summit[direction_cell(d)] : 0;
   double most = dot3(m->vertex + 3 * best, d);
+  if (near >= 0 && m->nvertex > FEW) {
+    double h = dot3(m->vertex + 3 * near, d);
+    if (h > most) most = h, best = near;
+  }
   for (int v = 1; v < m->nvertex && m->nvertex <= FEW; v++) {
     double h = dot3(m->vertex + 3 * v, d);
     if (h > most) most = h, best = v;

@@ -1,0 +1,236 @@
+/// What of two polyhedra is nearest, proven from a hint: a corner and a corner, an edge or a face, or two edges.
+///
+/// The direction between two such parts is known in closed form. Points of both that lie inside their parts, one behind
+/// the other along that direction, with every neighbour of a part's corners lower than these by a margin, are the nearest of
+/// the bodies: on a convex body what is higher than all about it is the highest. So the answer depends on the poses
+/// alone, to the bit, whoever guessed. Parts that only just meet, faces with more than three corners in one plane and
+/// bodies that overlap are not proven here; gjk.c searches for these.
+#include "gjk.h"
+#include "math3.h"
+#include "pairs.h"
+
+// fractions of the size: how far neighbours must be lower, how far apart the bodies; of a part: how far inside its ends points
+// lie; sines of what is not parallel
+static const double LOWER = 1e-9, APART = 1e-6, INSIDE = 1e-9, SQUARE = 1e-3;
+// sine below which a cylinder lies flush on a face or stands on it; fraction of the size to which the points of a round
+// part lie one behind the other; largest turn of a step, rad
+static const double FLUSH = 1e-6, EXACT = 1e-14, TURN = 0.3;
+
+// whether all neighbours of some corners of a core are lower than these along a direction, by a margin
+static int is_top(const cav_core *core, const double n[3], const int *corner, int count, double margin) {
+  const cav_shape *s = core->shape;
+  double local[3];
+  rotate_back(local, s->rotation, n);
+  if (s->type == CAV_GEOM_MESH) {
+    const cav_mesh *m = s->mesh;
+    double most = dot3(m->vertex + 3 * corner[0], local) - margin;
+    for (int i = 0; i < count; i++) {
+      for (int k = m->neighbour_start[corner[i]]; k < m->neighbour_start[corner[i] + 1]; k++) {
+        int v = m->neighbour[k];
+        if (dot3(m->vertex + 3 * v, local) < most) continue;
+        if (v != corner[0] && (count < 2 || v != corner[1]) && (count < 3 || v != corner[2])) return 0;
+      }
+    }
+    return 1;
+  }
+  if (s->type == CAV_GEOM_SPHERE) return 1;
+  int dimensions = s->type == CAV_GEOM_BOX ? 3 : 1;
+  for (int i = 0; i < count; i++) {
+    for (int k = 0; k < dimensions; k++) {
+      int v = corner[i] ^ 1 << k, known = 0;
+      double side = corner[i] >> k & 1 ? 1 : -1;
+      double height = dimensions == 3 ? side * s->size[k] * local[k] : side * s->size[1] * local[2];
+      for (int j = 0; j < count; j++) known |= corner[j] == v;
+      if (!known && 2 * height < margin) return 0;
+    }
+  }
+  return 1;
+}
+
+static int is_inside(double t) { return t > INSIDE && t < 1 - INSIDE; }
+
+// a corner p and the edge q of another body, or its corner
+static int from_corner(const double p[3], double q[3][3], int corners, double on[3], double n[3]) {
+  double e[3], d[3];
+  copy3(on, q[0]);
+  if (corners == 2) {
+    sub3(e, q[1], q[0]);
+    sub3(d, p, q[0]);
+    double t = dot3(d, e) / dot3(e, e);
+    if (!is_inside(t)) return 0;
+    axpy3(on, q[0], t, e);
+  }
+  sub3(n, on, p);
+  return 1;
+}
+
+// a corner p and the triangle q of another body
+static int from_triangle(const double p[3], double q[3][3], double on[3], double n[3]) {
+  double e[2][3], d[3], c[3];
+  for (int k = 0; k < 2; k++) sub3(e[k], q[k + 1], q[0]);
+  sub3(d, p, q[0]);
+  cross3(n, e[0], e[1]);
+  double area2 = dot3(n, n);
+  if (!(area2 > SQUARE * SQUARE * dot3(e[0], e[0]) * dot3(e[1], e[1]))) return 0;
+  cross3(c, d, e[1]);
+  double s = dot3(c, n) / area2;
+  cross3(c, e[0], d);
+  double t = dot3(c, n) / area2;
+  if (!is_inside(s) || !is_inside(t) || !is_inside(s + t)) return 0;
+  double height = dot3(d, n);
+  axpy3(on, p, -height / area2, n);
+  if (height > 0) scale3(n, -1, n);
+  return 1;
+}
+
+// two edges
+static int from_edges(double p[3][3], double q[3][3], double x[3], double y[3], double n[3]) {
+  double e[3], f[3], d[3], c[3];
+  sub3(e, p[1], p[0]);
+  sub3(f, q[1], q[0]);
+  sub3(d, q[0], p[0]);
+  cross3(n, e, f);
+  double area2 = dot3(n, n);
+  if (!(area2 > SQUARE * SQUARE * dot3(e, e) * dot3(f, f))) return 0;
+  cross3(c, d, f);
+  double s = dot3(c, n) / area2;
+  cross3(c, d, e);
+  double t = dot3(c, n) / area2;
+  if (!is_inside(s) || !is_inside(t)) return 0;
+  axpy3(x, p[0], s, e);
+  axpy3(y, q[0], t, f);
+  if (dot3(d, n) < 0) scale3(n, -1, n);
+  return 1;
+}
+
+static int is_curved(const cav_shape *s) { return s->type == CAV_GEOM_ELLIPSOID || s->type == CAV_GEOM_CYLINDER; }
+
+// a curved body and a corner q
+static int curved_corner(const cav_shape *a, const double q[3], double x[3], double n[3], int *straight) {
+  double d[3], local[3], normal[3];
+  sub3(d, q, a->pos);
+  rotate_back(local, a->rotation, d);
+  double dist = a->type == CAV_GEOM_CYLINDER ? cav_surface_cylinder(a->size, local, normal)
+                                             : cav_surface_ellipsoid(a->size, local, normal);
+  if (!(dist > 0)) return 0;
+  if (a->type == CAV_GEOM_CYLINDER) *straight = normal[2] == 0 ? 1 : fabs(normal[2]) == 1 ? 2 : 0;
+  rotate(n, a->rotation, normal);
+  axpy3(x, q, -dist, n);
+  return 1;
+}
+
+// a curved body, not flat on it, and a triangle q
+static int curved_triangle(const cav_shape *a, double q[3][3], double x[3], double y[3], double n[3]) {
+  double e[2][3], d[3], local[3], on[3];
+  for (int k = 0; k < 2; k++) sub3(e[k], q[k + 1], q[0]);
+  cross3(n, e[0], e[1]);
+  sub3(d, q[0], a->pos);
+  if (dot3(n, d) < 0) scale3(n, -1, n);
+  if (!(normalise3(n) > 0)) return 0;
+  rotate_back(local, a->rotation, n);
+  if (a->type == CAV_GEOM_CYLINDER && (fabs(local[2]) < FLUSH || fabs(local[2]) > 1 - FLUSH)) return 0;
+  cav_shape_support(a, n, x);
+  // the triangle as seen from x: its normal is n or -n
+  if (!from_triangle(x, q, y, on)) return 0;
+  sub3(d, y, x);
+  return dot3(d, n) > 0;
+}
+
+// the side of a cylinder and an edge q
+static int side_edge(const cav_shape *a, double q[3][3], double x[3], double y[3], double n[3]) {
+  double axis[3], ends[2][3], e[3];
+  column3(axis, a->rotation, 2);
+  double line[3][3];
+  for (int k = 0; k < 2; k++) axpy3(line[k], a->pos, k ? a->size[1] : -a->size[1], axis);
+  if (!from_edges(line, q, ends[0], y, n) || !(normalise3(n) > 0)) return 0;
+  axpy3(x, ends[0], a->size[0], n);
+  sub3(e, y, x);
+  return dot3(e, n) > 0;
+}
+
+// a rim or an ellipsoid and an edge q: Newton for the turn of n about the edge at which the gap is largest
+static int round_edge(const cav_shape *a, double q[3][3], double size, double x[3], double y[3], double n[3]) {
+  enum { STEPS_MAX = 20 };
+  double e[3], d[3], t[2][3];
+  int straight = 0;
+  sub3(e, q[1], q[0]);
+  double length = normalise3(e);
+  sub3(d, a->pos, q[0]);
+  double along = dot3(d, e);
+  axpy3(y, q[0], along < 0 ? 0 : along > length ? length : along, e);
+  if (!(length > 0) || !curved_corner(a, y, x, n, &straight)) return 0;
+  for (int k = 0; k < STEPS_MAX; k++) {
+    double H[2][2] = {{0}};
+    axpy3(n, n, -dot3(n, e), e);
+    if (!(normalise3(n) > 0)) return 0;
+    copy3(t[0], e);
+    cross3(t[1], e, n);
+    cav_shape_support(a, n, x);
+    sub3(d, q[0], x);
+    double rate = dot3(d, t[1]), gap = dot3(d, n);
+    if (fabs(rate) < EXACT * size) {
+      along = -dot3(d, e);
+      axpy3(y, q[0], along, e);
+      return is_inside(along / length);
+    }
+    cav_shape_bend(a, n, t, H);
+    double turn = rate / (gap + H[1][1]);
+    if (!(gap > 0) || !isfinite(turn)) return 0;
+    axpy3(n, n, fmax(-TURN, fmin(TURN, turn)), t[1]);
+  }
+  return 0;
+}
+
+// the direction in which a curved body and corners of a polyhedron meet
+static int from_curved(const cav_shape *a, double q[3][3], int corners, double size, double x[3], double y[3],
+                       double n[3], int *straight) {
+  *straight = 0;
+  if (corners == 1) return curved_corner(a, q[0], x, n, straight);
+  if (corners == 3) return curved_triangle(a, q, x, y, n);
+  if (a->type == CAV_GEOM_CYLINDER && side_edge(a, q, x, y, n)) {
+    *straight = 1;
+    return 1;
+  }
+  return round_edge(a, q, size, x, y, n);
+}
+
+// the direction in which corners of two polyhedra meet
+static int from_corners(double p[3][3], int na, double q[3][3], int nb, double x[3], double y[3], double n[3]) {
+  int ok = na == 2 && nb == 2 ? from_edges(p, q, x, y, n)
+           : nb == 3          ? from_triangle(p[0], q, y, n)
+           : na == 3          ? from_triangle(q[0], p, x, n)
+           : na == 2          ? from_corner(q[0], p, na, x, n)
+                              : from_corner(p[0], q, nb, y, n);
+  // from a corner of b to what a has the direction came the other way
+  if (na > nb) scale3(n, -1, n);
+  return ok;
+}
+
+int cav_nearest_prove(const cav_core *a, const cav_core *b, double size, const cav_hint *hint, cav_separation *out) {
+  double p[3][3], q[3][3], n[3], x[3], y[3], d[3], back[3];
+  const int na = hint->na, nb = hint->nb, curved = is_curved(a->shape);
+  int straight = 0;
+  if (na < 1 || nb < 1 || (na > 1 && nb > 1 && na + nb > 4)) return 0;
+  for (int i = 0; i < na && !curved; i++) cav_shape_corner(a->shape, hint->a[i], p[i]);
+  for (int i = 0; i < nb; i++) cav_shape_corner(b->shape, hint->b[i], q[i]);
+  if (!curved) copy3(x, p[0]);
+  copy3(y, q[0]);
+  if (curved ? !from_curved(a->shape, q, nb, size, x, y, n, &straight) : !from_corners(p, na, q, nb, x, y, n)) return 0;
+  if (!(normalise3(n) > 0)) return 0;
+  sub3(d, y, x);
+  double gap = dot3(d, n);
+  scale3(back, -1, n);
+  if (!(gap > APART * size) || !is_top(b, back, hint->b, nb, LOWER * size)) return 0;
+  if (!curved && !is_top(a, n, hint->a, na, LOWER * size)) return 0;
+  copy3(out->n, n);
+  copy3(out->x, x);
+  copy3(out->y, y);
+  out->gap = gap;
+  out->straight = straight;
+  out->corners = na > nb ? na : nb;
+  for (int i = 0; i < out->corners; i++) {
+    if (!curved) copy3(out->corner_a[i], p[i < na ? i : na - 1]);
+    copy3(out->corner_b[i], q[i < nb ? i : nb - 1]);
+  }
+  return 1;
+}
