@@ -76,6 +76,17 @@ static char folder[] = "/tmp/cavort-feasibility-XXXXXX";
   "<geom type='box' pos='.8 0 -.2' size='.3 .3 .02'/></worldbody><actuator><motor joint='x' gear='300'/><motor "       \
   "joint='y' gear='300'/><motor joint='z' gear='300'/></actuator></mujoco>"
 
+// a trunk of 4 kg that a leg pushes from the ground, and the foot it takes with it: upright
+#define HOPPER                                                                                                    \
+  "<mujoco><worldbody><geom type='plane' size='9 9 1' friction='0 0 0'/><body name='trunk' pos='0 0 .45'><joint " \
+  "name='z' type='slide' axis='0 0 1'/><inertial pos='0 0 0' mass='4' diaginertia='.1 .1 .1'/><body name='foot' " \
+  "pos='0 0 -.4'><joint name='leg' type='slide' axis='0 0 -1' limited='true' range='0 .4'/><geom type='sphere' "  \
+  "size='.05' mass='.1' friction='0 0 0'/></body></body></worldbody><actuator><motor joint='leg' gear='400' "     \
+  "ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>"
+#define RISE(HEIGHT, TIME)                                                                                        \
+  "<guess apex='1.5' from='.3' to='1.3'/><cost><sensor name='apex' type='subtreecom' body='trunk' component='z' " \
+  "target='" HEIGHT "' at='" TIME "' weight='900' within='.05'/></cost>"
+
 typedef struct pair {
   const char *name, *model, *twin_model;            ///< twin_model NULL: the same
   const char *horizon, *start, *terms, *twin_terms; ///< twin_terms NULL: the same
@@ -142,6 +153,34 @@ static const pair pairs[] = {
      "pos='-.8'/></waypoint></guess>" CONSTRAINT(
          "<sensor name='in' type='framepos' geom='ball' target='.8 0 .1' at='end'/>"),
      NULL, CAV_CONDITION_SOLID, "enclose it"},
+    {"too high to jump", HOPPER, NULL, "duration='1.6' timestep='.02' close='open'", "", RISE("7", ".8"),
+     RISE("2", ".8"), CAV_CONDITION_ENERGY, "too high to jump"},
+    {"too heavy to hold within a tolerance", TABLE("30"), TABLE("25"), "duration='3' timestep='.05'",
+     "<joint name='lift' pos='.5'/>",
+     "<cost><posture name='lifted' joint='lift' qpos='.51' from='.5' to='2.5' weight='900'/></cost>", NULL,
+     CAV_CONDITION_STRENGTH, "'lift' needs at least 3"},
+    {"too far for a limit of speed", SLIDE("1 0 0", "2", "9"), NULL, SECOND, "",
+     CONSTRAINT("<velocity name='slow' joint='slide' lower='-.5' upper='.5'/>"
+                "<posture name='far' joint='slide' qpos='.6' at='end'/>"),
+     CONSTRAINT("<velocity name='slow' joint='slide' lower='-.5' upper='.5'/>"
+                "<posture name='far' joint='slide' qpos='.4' at='end'/>"),
+     CAV_CONDITION_ENERGY, "too far for its speed: limits of speed leave -0.5 to 0.5 m"},
+    {"too far for the speeds of joints", ARM("60", "-150 150"), NULL, SECOND, "",
+     CONSTRAINT("<velocity name='slow' dofs='joints' lower='-.5' upper='.5'/><sensor name='grasp' type='framepos' "
+                "site='tip' target='.3 0 2.6' at='.8'/>"),
+     CONSTRAINT("<velocity name='slow' dofs='joints' lower='-5' upper='5'/><sensor name='grasp' type='framepos' "
+                "site='tip' target='.3 0 2.6' at='.8'/>"),
+     CAV_CONDITION_ENERGY, "too far for its speed: 0.922 m away"},
+    {"more than a range in a step", ARM("60", "-150 150"), NULL, SECOND, "",
+     CONSTRAINT("<velocity name='whip' joint='elbow' target='2000' at='.5'/>"),
+     CONSTRAINT("<velocity name='whip' joint='elbow' target='4' at='.5'/>"), CAV_CONDITION_RANGE,
+     "in one step of 0.05 s its range of 5.24 allows 105 rad/s"},
+    {"a speed beyond its limit", SLIDE("1 0 0", "2", "9"), NULL, SECOND, "",
+     CONSTRAINT("<velocity name='slow' joint='slide' lower='-.5' upper='.5'/>"
+                "<velocity name='dash' joint='slide' target='.6' at='.5'/>"),
+     CONSTRAINT("<velocity name='slow' joint='slide' lower='-.5' upper='.5'/>"
+                "<velocity name='dash' joint='slide' target='.4' at='.5'/>"),
+     CAV_CONDITION_CONTRADICTION, "'slow' bounds it by 0.5 m/s"},
     {"a start inside a solid", ARM("60", "-150 150"), NULL, SECOND, "<joint name='shoulder' degrees='30'/>",
      TIP("0 0 2.9"), NULL, CAV_CONDITION_SOLID, "the start: geom"},
 };
@@ -401,6 +440,47 @@ static void check_shortest(void) {
   }
 }
 
+// the problem is proven impossible at a value, and not at the other
+static void check_threshold(const char *name, const char *model, const char *horizon, const char *start,
+                            const char *terms, int wanted) {
+  cav_impossibility found[4];
+  cav_problem *p = load(model, horizon, start, terms);
+  if (p) CHECK((proofs(name, p, found, 4, wanted) > 0) == wanted);
+  cav_problem_free(p);
+}
+
+// 1.25 F s = m g H: H above the highest that the centre of mass can be at a take-off, a foot's radius and the leg's length
+// above the ground. And a time that is too short to get there: m v²/2 with v = H/t + g t/2
+static void check_takeoff(void) {
+  double g = 9.81, mass = 4.1, work = 1.25 * 400 * .4, top = .05 + 4 / 4.1 * .8, high = work / (mass * g), t = .4;
+  double v = sqrt(2 * work / mass), soon = (v - g * t / 2) * t;
+  for (int beyond = 0; beyond < 2; beyond++) {
+    char terms[600];
+    for (int hasty = 0; hasty < 2; hasty++) {
+      // a step is allowed more than is asked; bounds are told apart to a hundredth
+      double z = top + (hasty ? soon : high) * (beyond ? 1.01 : 0.99) + 0.05;
+      snprintf(terms, sizeof terms,
+               CONSTRAINT("<sensor name='apex' type='subtreecom' body='trunk' component='z' lower='%.6f' at='%g'/>"),
+               z - 0.05, hasty ? t - .002 : 2.);
+      check_threshold(
+          hasty ? "takeoff in a hurry" : "takeoff", HOPPER,
+          hasty ? "duration='.398' timestep='.002' close='open'" : "duration='2' timestep='.01' close='open'", "",
+          terms, beyond);
+    }
+  }
+}
+
+// M (g - 16 w/T²) = 1.02 F: a window of T within w of a slide
+static void check_held(void) {
+  double w = 0.03, t = 2, mass = 1.02 * 300 / (9.81 - 16 * w / (t * t)) - 5;
+  for (int beyond = 0; beyond < 2; beyond++) {
+    char model[2000];
+    snprintf(model, sizeof model, TABLE("%.6f"), mass * (beyond ? 1.001 : 0.999));
+    check_threshold("held", model, "duration='3' timestep='.05'", "<joint name='lift' pos='.5'/>",
+                    "<cost><posture joint='lift' qpos='.5' from='.5' to='2.5' weight='900'/></cost>", beyond);
+  }
+}
+
 // a rod with damping d that is pumped by a torque F: I v' = 1.1 (F - d v) up to the speed of the largest power, F/2d,
 // from there on 1.1 F²/4d of power. The horizon from which on there is no proof is that time, less a step
 static void check_damped(void) {
@@ -434,6 +514,8 @@ int main(void) {
   check_motions();
   check_damped();
   check_shortest();
+  check_takeoff();
+  check_held();
   check_histories();
   static const char *const file[] = {"model.xml", "problem.xml"};
   for (int i = 0; i < 2; i++) {

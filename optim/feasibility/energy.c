@@ -111,22 +111,13 @@ static int is_covered(const cav_model *m) {
 /// c of the model; negative where an actuator has no limit, or a joint of its no least inertia.
 static cav_status supply_rate(cav_examination *e, double *force, double *rate) {
   const cav_model *m = e->model;
-  double sum = 0, *moment = malloc((size_t)(m->nv + 1) * sizeof *moment);
-  if (!moment) return CAV_NO_MEMORY;
-  for (int i = 0; i < m->nu; i++) {
-    double range[2];
-    cav_actuator_effort_range(m, i, range);
-    double most = fmax(fabs(range[0]), fabs(range[1])) * fabs(m->actuator[i].unit);
-    if (!m->actuator[i].constant) sum = INFINITY;
-    cav_actuator_length(m, e->start, i, moment);
-    for (int d = 0; d < m->nv; d++)
-      if (moment[d] != 0) force[d] += most * fabs(moment[d]);
-  }
-  for (int d = 0; d < m->nv; d++)
+  int bounded = 0;
+  cav_status status = cav_effort_of_dofs(e, force, &bounded);
+  double sum = bounded ? 0 : INFINITY;
+  for (int d = 0; d < m->nv && !status; d++)
     if (force[d] > 0) sum += force[d] / sqrt(2 * least_inertia(m, d));
-  free(moment);
   *rate = isfinite(sum) ? sum : -1;
-  return CAV_OK;
+  return status;
 }
 
 /// Lowest and highest of what can be the height of a point above the world, -INFINITY: not known.

@@ -53,6 +53,10 @@ double cav_requirement_time(const cav_examination *e, int knot);
 /// What is required, in words: "'grasp' wants site 'tip' at x 1.5 at 0.8 s". requirement.c.
 void cav_requirement_words(const cav_examination *e, const cav_requirement *r, char *out, size_t size);
 
+/// How far from its target a value of a term may be, usual: where it gives none; infinite: nothing is required.
+/// requirement.c.
+double cav_requirement_tolerance(const cav_term *term, double usual);
+
 /// The interval of each component that a term on a sensor requires at a knot, infinite where open; zero: it requires none.
 /// usual: its tolerance where it gives none. requirement.c.
 int cav_requirement_interval(const cav_examination *e, const cav_term *term, int knot, double usual, double low[3],
@@ -84,6 +88,16 @@ void cav_body_centre(const cav_body *body, double centre[3]);
 /// Whether a body is a descendant of another, or it. distance.c.
 int cav_body_within(const cav_model *model, int body, int ancestor);
 
+/// Fraction of the limits of actuators that a certified motion can use. effort.c.
+double cav_effort_part(const cav_examination *e);
+
+/// Largest force of actuators on each dof, force [nv]; *bounded 0: an actuator has no limit, or a moment that changes.
+/// effort.c.
+cav_status cav_effort_of_dofs(cav_examination *e, double *force, int *bounded);
+
+/// Centre of mass of a tree and its velocity at the start; leaves the start's velocities in scratch. momentum.c.
+cav_status cav_centre_of_tree(cav_examination *e, int root, double centre[3], double velocity[3]);
+
 /// The conditions, each with its proofs.
 cav_status cav_examine_contradictions(cav_examination *e); // contradiction.c
 cav_status cav_examine_distances(cav_examination *e);      // distance.c
@@ -94,5 +108,8 @@ cav_status cav_examine_momentum(cav_examination *e);       // momentum.c
 cav_status cav_examine_strength(cav_examination *e);       // strength.c
 cav_status cav_examine_hinge(cav_examination *e);          // hinge.c
 cav_status cav_examine_energy(cav_examination *e);         // energy.c
+cav_status cav_examine_takeoff(cav_examination *e);        // takeoff.c
+cav_status cav_examine_holds(cav_examination *e);          // hold.c
+cav_status cav_examine_speeds(cav_examination *e);         // speed.c
 
 #endif

@@ -78,27 +78,33 @@ static int survey(cav_examination *e, surroundings *s) {
   return s->open[0] || s->open[1];
 }
 
-/// Centre of mass of a tree and its velocity at the start.
-static void centre_of(cav_examination *e, int root, double centre[3], double velocity[3]) {
+cav_status cav_centre_of_tree(cav_examination *e, int root, double centre[3], double velocity[3]) {
   const cav_model *m = e->model;
   cav_sensor s = {.name = "", .object_type = CAV_OBJECT_BODY, .object = m->link[root].body, .dim = 3};
+  // velocities of the start, without forces
+  e->scratch->options.constraint = e->scratch->options.contact = 0;
+  cav_status status =
+      cav_inverse(m, e->scratch, e->problem->q_start, e->problem->v_start, e->problem->v_start, e->scratch->u);
+  if (status) return status;
   s.type = CAV_SENSOR_SUBTREECOM;
   cav_sensor_read(m, e->scratch, &s, centre);
   s.type = CAV_SENSOR_SUBTREELINVEL;
   cav_sensor_read(m, e->scratch, &s, velocity);
+  return CAV_OK;
 }
 
-static void examine_one(cav_examination *e, const cav_requirement *r) {
+static cav_status examine_one(cav_examination *e, const cav_requirement *r) {
   static const char *const axis[] = {"x", "y"};
   const cav_model *m = e->model;
   int link = r->kind == CAV_REQUIRE_CENTRE ? m->body[r->object].link : r->object;
   surroundings s = {.root = m->link[link].root};
   double centre[3], velocity[3], t = cav_requirement_time(e, r->knot), wide = 0;
-  if (link == 0 || !survey(e, &s)) return;
-  centre_of(e, s.root, centre, velocity);
+  if (link == 0 || !survey(e, &s)) return CAV_OK;
   if (r->kind == CAV_REQUIRE_POINT) wide = cav_distance_to_centre(m, 0, r->object, r->point);
   // of a whole tree alone the centre is the one that is moved
-  if (r->kind == CAV_REQUIRE_CENTRE && m->link[s.root].body != r->object) return;
+  if (r->kind == CAV_REQUIRE_CENTRE && m->link[s.root].body != r->object) return CAV_OK;
+  cav_status status = cav_centre_of_tree(e, s.root, centre, velocity);
+  if (status) return status;
   double rise = fmin(r->high[2] + wide - centre[2], highest);
   double fall = -m->gravity[2] * t * t / 2 + rise - velocity[2] * t;
   double push = s.friction > 0 ? s.friction * fmax(fall, 0) : 0,
@@ -116,21 +122,16 @@ static void examine_one(cav_examination *e, const cav_requirement *r) {
                        ? "%s, but friction (%.3g) cannot push it there in time: %.3g m short along %s"
                        : "%s, but nothing can push it there: there is no friction (%.3g), %.3g m short along %s",
                    what, s.friction, off, axis[k]);
-    return;
+    return CAV_OK;
   }
+  return CAV_OK;
 }
 
 cav_status cav_examine_momentum(cav_examination *e) {
-  const cav_model *m = e->model;
   if (e->problem->cycle.on) return CAV_OK;
-  // velocities of the start, without forces
-  e->scratch->options.constraint = e->scratch->options.contact = 0;
-  cav_status status =
-      cav_inverse(m, e->scratch, e->problem->q_start, e->problem->v_start, e->problem->v_start, e->scratch->u);
-  for (int i = 0; i < e->n && !status; i++) {
-    int before = e->nfound;
-    if (e->requirement[i].kind != CAV_REQUIRE_COORDINATE) examine_one(e, &e->requirement[i]);
-    if (e->nfound > before) break;
-  }
+  cav_status status = CAV_OK;
+  int before = e->nfound;
+  for (int i = 0; i < e->n && !status && e->nfound == before; i++)
+    if (e->requirement[i].kind != CAV_REQUIRE_COORDINATE) status = examine_one(e, &e->requirement[i]);
   return status;
 }

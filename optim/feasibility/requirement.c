@@ -29,8 +29,7 @@ double cav_requirement_time(const cav_examination *e, int knot) {
   return knot * e->problem->timestep * fmax(e->longest, 1);
 }
 
-/// How far from its target a value may be; infinite: nothing is required.
-static double tolerance_of(const cav_term *term, double usual) {
+double cav_requirement_tolerance(const cav_term *term, double usual) {
   if (term->within > 0) return term->within;
   if (term->use != CAV_USE_COST) return 1e-6 * term->scale;
   // costs that are goals: at one time, or a value held over a window of its own
@@ -60,7 +59,7 @@ static void bound(const cav_term *term, double target, double tolerance, double 
 
 int cav_requirement_interval(const cav_examination *e, const cav_term *term, int knot, double usual, double low[3],
                              double high[3]) {
-  double target[CAV_SENSOR_DIM_MAX], tolerance = tolerance_of(term, usual);
+  double target[CAV_SENSOR_DIM_MAX], tolerance = cav_requirement_tolerance(term, usual);
   int dim = term->sensor.dim;
   if (isinf(tolerance) || dim > 3 || term->sensor.cutoff > 0 || term->sensor.referred) return 0;
   cav_term_target(term, knot * e->problem->timestep, dim, target);
@@ -97,7 +96,7 @@ static cav_status sensor_requirement(cav_examination *e, const cav_term *term, c
   double target[CAV_SENSOR_DIM_MAX];
   if (!is_position(e->model, &term->sensor, &r)) return CAV_OK;
   int hinge = r.kind == CAV_REQUIRE_COORDINATE && e->model->joint[r.object].type == CAV_JOINT_HINGE;
-  double tolerance = tolerance_of(term, hinge ? CAV_WITHIN_ANGLE : CAV_WITHIN_LENGTH);
+  double tolerance = cav_requirement_tolerance(term, hinge ? CAV_WITHIN_ANGLE : CAV_WITHIN_LENGTH);
   if (isinf(tolerance)) return CAV_OK;
   cav_term_target(term, r.knot * e->problem->timestep, term->sensor.dim, target);
   for (int k = 0; k < 3; k++) {
@@ -118,7 +117,8 @@ static cav_status posture_requirement(cav_examination *e, const cav_term *term, 
   if (term->use == CAV_USE_RANGE && term->lower > term->upper) return CAV_OK;
   for (int j = 0; j < m->njoint; j++) {
     const cav_joint *joint = &m->joint[j];
-    double tolerance = tolerance_of(term, joint->type == CAV_JOINT_HINGE ? CAV_WITHIN_ANGLE : CAV_WITHIN_LENGTH);
+    double tolerance =
+        cav_requirement_tolerance(term, joint->type == CAV_JOINT_HINGE ? CAV_WITHIN_ANGLE : CAV_WITHIN_LENGTH);
     int line = joint->type == CAV_JOINT_FREE, scalar = joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE;
     if ((!line && !scalar) || !cav_problem_selects(m, term, joint->dof) || isinf(tolerance)) continue;
     r.kind = line ? CAV_REQUIRE_POINT : CAV_REQUIRE_COORDINATE;

@@ -97,6 +97,7 @@ static int add_actuators(cav_examination *e, double load, bearing *b) {
   for (int i = 0; i < m->nu; i++) {
     double range[2], unit = m->actuator[i].unit;
     cav_actuator_effort_range(m, i, range);
+    for (int k = 0; k < 2; k++) range[k] *= cav_effort_part(e);
     double *u = bearing_add(b, fmax(range[0], -load), fmin(range[1], load));
     if (!u) return 0;
     cav_actuator_length(m, e->scratch, i, u);
