@@ -626,6 +626,7 @@ static void check_broken_scenes(void) {
 
 static void check_broken_starts(void) {
   refuse_start("<start key='bend'/>", "did you mean 'bent'");
+  refuse_start("<start key='satnd'/>", "did you mean 'stand'");
   refuse_start("<start qpos='1 2 3'/>", "expected 4 numbers");
   refuse_start("<start qpos='0 0 0 0' key='bent'/>", "contradicts");
   refuse_start("<start qvel='1'/>", "expected 4 numbers");

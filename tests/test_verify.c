@@ -53,6 +53,25 @@ static void test_flight(void) {
   sample_free(&s);
 }
 
+// a ball and a weight on one free link hang in the air, each carried by what the file compensates of gravity; a tenth less of
+// either is a force of a tenth of its weight that nothing gives, and for the balance of momentum, too
+#define BUOYED(BALL, WEIGHT)                                                                                  \
+  HEAD "<body name='ball' pos='0 0 1' gravcomp='" BALL                                                        \
+       "'><freejoint name='root'/><geom type='sphere' size='0.1' mass='2'/><body name='weight' pos='.3 0 0' " \
+       "gravcomp='" WEIGHT "'><geom type='sphere' size='0.05' mass='1'/></body></body></worldbody></mujoco>"
+static void test_buoyancy(void) {
+  static const char *const model[] = {BUOYED("1", "1"), BUOYED(".9", "1"), BUOYED("1", ".9")};
+  for (int i = 0; i < 3; i++) {
+    sample s = sample_new(model[i], 25, 0.02, CAV_ORDER_MIDPOINT);
+    CHECK(verify(&s, NULL, NULL) == CAV_OK);
+    // 0.1 of 2 or 1 of 3 kg, one of six components, and the moment about the common centre 0.1 m and 0.2 m away in arms of 0.3 m
+    double part = 0.1 * (i ? 3. - i : 0) / 3, arm = i == 1 ? 0.1 / 0.3 : 0.2 / 0.3;
+    CHECK_NEAR(s.verdict.momentum_defect_rms, part * sqrt((1 + arm * arm) / 6), 1e-10);
+    CHECK((s.verdict.unactuated_force_max < 1e-10) == (i == 0));
+    sample_free(&s);
+  }
+}
+
 // sunk to where the contact carries the weight
 static void sink(sample *s, double depth) {
   cav_state *state = cav_state_new(s->model);
@@ -482,6 +501,7 @@ static void test_refusals(void) {
 
 int main(void) {
   test_flight();
+  test_buoyancy();
   test_penetration();
   test_own_contacts();
   test_loop_steps();

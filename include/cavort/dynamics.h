@@ -25,7 +25,7 @@ typedef struct cav_contact {
   double stiffness;      ///< h K of the normal row, 1/s
   double sigma;          ///< smoothing of the law in impulse scale (dynamics/METHOD.md, 3), 0: exact
   double friction[5];
-  double velocity[6];      ///< J v, m/s (rad/s for the last three)
+  double velocity[6];      ///< J v, m/s (rad/s for the last three); of all these the first dim count
   double velocity_next[6]; ///< J v_next
   double impulse[6];       ///< f, N s
 } cav_contact;

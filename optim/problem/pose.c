@@ -24,7 +24,7 @@ static const cav_xml_node *pose_named(const cav_problem_reader *reader, const ch
   return pose;
 }
 
-// name nearest to word among the model's keyframes and the file's poses
+// name nearest to word among the model's keyframes, the file's poses, and the posture that is found
 static const char *nearest_key(const cav_problem_reader *reader, const char *word) {
   const cav_model *m = reader->model;
   const char *near = m->nkey ? cav_xml_nearest(word, &m->key->name, m->nkey, sizeof *m->key) : NULL;
@@ -32,7 +32,8 @@ static const char *nearest_key(const cav_problem_reader *reader, const char *wor
     const char *name = cav_xml_text(pose, "name", "");
     near = cav_xml_nearest(word, &name, 1, sizeof name);
   }
-  return near;
+  const char *const found = "stand"; // of any model that has feet
+  return near ? near : cav_xml_nearest(word, &found, 1, sizeof found);
 }
 
 static int names_stand(const char *list) {

@@ -3,7 +3,7 @@
 /// about the point c_t, both taken half way between knots (configuration q_t (+) h v_{t+1}/2, velocity v_{t+1}):
 ///   F = (P_{t+1/2} - P_{t-1/2})/h - m g - sum f
 ///   N = (L_{t+1/2} - L_{t-1/2})/h - sum ((p - c_t) x f + torque)
-/// over contacts with what is not of the tree. What is lost at one knot is lost for good: the momenta after a knot are
+/// over contacts with what is not of the tree, and what the model compensates of gravity. What is lost at one knot is lost for good: the momenta after a knot are
 /// those before the next. Of order h^2 for a motion sampled from the continuous one; zero to rounding for one that
 /// obeys the step of order momentum.
 /// A tree that joints hold to the world gets forces from there which no one measures: only what its root link can do
@@ -220,6 +220,23 @@ static void moment_about(const double *momentum, const double *point, double *ou
   for (int k = 0; k < 3; k++) out[k] += momentum[6 + k];
 }
 
+// takes out what the model compensates of gravity, at the bodies' centres of mass
+static void apply_buoyancy(cav_balance *balance, const cav_verification *verification, const double *com) {
+  const cav_model *model = verification->model;
+  static const double none[3] = {0};
+  if (!verification->law.gravity || !verification->law.passive) return;
+  for (int b = 1; b < model->nbody; b++) {
+    const cav_body *body = model->body + b;
+    int tree = balance->tree[body->link];
+    if (body->buoyancy == 0 || tree < 0) continue;
+    cav_pose pose;
+    double force[3];
+    cav_object_pose(model, verification->state, CAV_OBJECT_BODY, b, &pose);
+    for (int k = 0; k < 3; k++) force[k] = -body->buoyancy * body->mass * model->gravity[k];
+    apply(balance, tree, com + 3 * tree, pose.pos, force, none, 1);
+  }
+}
+
 // balance of every tree at knot t: linear, angular about the centre of mass, N and N m
 static void wrenches(cav_balance *balance, const cav_verification *verification, int t) {
   const cav_model *model = verification->model;
@@ -237,6 +254,7 @@ static void wrenches(cav_balance *balance, const cav_verification *verification,
       w[3 + k] = (w[3 + k] - change[k]) / h;
     }
   }
+  apply_buoyancy(balance, verification, now);
   for (int j = 0; j < verification->state->ncontact; j++) {
     const cav_contact *contact = verification->state->contact + j;
     int tree1 = balance->tree[contact->link1], tree2 = balance->tree[contact->link2];

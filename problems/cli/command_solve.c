@@ -303,7 +303,6 @@ static int solve_from(const cav_command_line *line, const cav_problem *problem, 
     race.options.nmultiplier = b->motion->nmultiplier;
     race.options.multiplier = b->motion->final_multiplier;
   }
-  catch_interrupts();
   // a start that is given is the only one
   int most = b->start ? 1 : line->strategies ? line->strategies : CAV_STRATEGIES;
   cav_status status = cav_race_open(&race, most, &error);
@@ -352,6 +351,8 @@ static int solve_one(const cav_command_line *line) {
     cav_file_fail(&error, CAV_BAD_INPUT, 0, "--ipopt needs --solver ipopt or both: the own solver has no such options");
     return cav_command_fail(&error);
   }
+  // from here on: proofs and the first stage of a long horizon take a while, too
+  catch_interrupts();
   cav_problem *problem = cav_problem_load(line->operand, line->model, &error);
   if (!problem) return cav_command_fail(&error);
   int refused = cav_command_refuse(line, problem);
