@@ -311,6 +311,16 @@ static void test_bounds(void) {
        0.5},
       {"control of a servo",
        SWUNG("", "", "<position joint='x' kp='3' gear='2' ctrllimited='true' ctrlrange='-1.74 1.74'/>"), 0, 0.9},
+      {"force of a servo with limits of both",
+       SWUNG("", "",
+             "<position joint='x' kp='3' ctrllimited='true' ctrlrange='-9 7' forcelimited='true' forcerange='-4.4 "
+             "4.4'/>"),
+       0, 0.5},
+      {"control of a servo with limits of both, not about 0",
+       SWUNG("", "",
+             "<position joint='x' kp='3' gear='2' ctrllimited='true' ctrlrange='-1.9 1.6' forcelimited='true' "
+             "forcerange='-50 50'/>"),
+       0, 0.9},
   };
   for (size_t i = 0; i < sizeof kind / sizeof *kind; i++) {
     bench b;

@@ -60,6 +60,12 @@ cav_status cav_verification_actuators(const cav_model *model, cav_error *error) 
   return CAV_OK;
 }
 
+// the part of a servo's control that is planned with: margins at both ends, of an angle as of any other
+static void plan_input(const cav_verification *verification, double range[2]) {
+  double middle = (range[0] + range[1]) / 2;
+  for (int k = 0; k < 2; k++) range[k] = middle + (range[k] - middle) * verification->problem->effort_limit;
+}
+
 // the input of a servo that an effort takes at the state and a velocity
 static double servo_input(const cav_verification *verification, int actuator, double effort, const double *v,
                           double *moment) {
@@ -83,7 +89,7 @@ void cav_verification_effort(const cav_verification *verification, int t, int ac
                   suffix);
   if (a->bias == CAV_BIAS_NONE || !input_range(a, range)) return;
   double input = servo_input(verification, actuator, effort, v, moment), most = fmax(fabs(range[0]), fabs(range[1]));
-  range[0] *= planned, range[1] *= planned;
+  plan_input(verification, range);
   cav_metric_note(metric, fmax(range[0] - input, input - range[1]) / (most > 0 ? most : 1), t,
                   "servo %.60s (%d), control at %.4g of %.4g .. %.4g%s", a->name, actuator, input, range[0], range[1],
                   suffix);
@@ -93,21 +99,29 @@ double cav_verification_effort_scale(const cav_model *model, int actuator) {
   const cav_actuator *a = model->actuator + actuator;
   double range[2], scale;
   cav_verification_actuator_range(model, actuator, range, &scale);
-  if (a->bias == CAV_BIAS_NONE || !input_range(a, range)) return scale;
+  if (a->bias == CAV_BIAS_NONE || a->forcelimited || !input_range(a, range)) return scale;
   double most = fmax(fabs(range[0]), fabs(range[1]));
   return most > 0 ? fabs(a->gain_parameter[0]) * most / a->unit : 1;
 }
 
-double cav_verification_effort_row(const cav_verification *verification, int actuator, double effort, const double *v,
-                                   double *moment, double range[2]) {
+int cav_verification_effort_rows(const cav_model *model, int actuator) {
+  const cav_actuator *a = model->actuator + actuator;
+  double range[2];
+  return 1 + (a->bias != CAV_BIAS_NONE && a->forcelimited && input_range(a, range));
+}
+
+double cav_verification_effort_row(const cav_verification *verification, int actuator, int component, double effort,
+                                   const double *v, double *moment, double range[2]) {
   const cav_actuator *a = verification->model->actuator + actuator;
-  double scale, value = effort;
+  double scale, value = effort, part = verification->problem->effort_limit;
   cav_verification_actuator_range(verification->model, actuator, range, &scale);
-  if (a->bias != CAV_BIAS_NONE && input_range(a, range)) {
+  if (a->bias != CAV_BIAS_NONE && (component > 0 || !a->forcelimited) && input_range(a, range)) {
     value = servo_input(verification, actuator, effort, v, moment);
     double most = fmax(fabs(range[0]), fabs(range[1]));
     scale = most > 0 ? most : 1;
+    plan_input(verification, range);
+    part = 1;
   }
-  for (int k = 0; k < 2; k++) range[k] *= verification->problem->effort_limit / scale;
+  for (int k = 0; k < 2; k++) range[k] *= part / scale;
   return value / scale;
 }

@@ -90,12 +90,14 @@ static cav_status list_forces(const cav_verification *verification, int t, cav_k
   cav_status status = find_unactuated(verification, rows);
   for (int d = 0; d < model->nv && status == CAV_OK; d++)
     if (rows->unactuated[d]) status = add(rows, (cav_knot_row){.kind = CAV_BINDING_UNACTUATED, .object = d});
-  for (int a = 0; a < model->nu && status == CAV_OK; a++) {
-    cav_knot_row row = {.kind = CAV_BINDING_EFFORT, .object = a};
-    double range[2], effort = verification->control[t * model->nu + a];
-    cav_verification_effort_row(verification, a, effort, v, rows->work, range);
-    row.lower = range[0], row.upper = range[1];
-    status = add(rows, row);
+  for (int a = 0; a < model->nu; a++) {
+    for (int k = 0; k < cav_verification_effort_rows(model, a) && status == CAV_OK; k++) {
+      cav_knot_row row = {.kind = CAV_BINDING_EFFORT, .object = a, .component = k};
+      double range[2], effort = verification->control[t * model->nu + a];
+      cav_verification_effort_row(verification, a, k, effort, v, rows->work, range);
+      row.lower = range[0], row.upper = range[1];
+      status = add(rows, row);
+    }
   }
   return status;
 }
@@ -185,7 +187,8 @@ static void take_multipliers(cav_knot_rows *rows, int t, int nrow, const cav_bin
     if (row[i].knot != t || row[i].kind == CAV_BINDING_UNACTUATED) continue;
     for (int k = 0; k < rows->n; k++) {
       cav_knot_row *to = rows->row + k;
-      int component = row[i].kind == CAV_BINDING_TERM ? row[i].component : 0;
+      int parts = row[i].kind == CAV_BINDING_TERM || row[i].kind == CAV_BINDING_EFFORT;
+      int component = parts ? row[i].component : 0;
       if (to->term || to->kind != row[i].kind || to->object != row[i].object || to->component != component) continue;
       to->multiplier = row[i].multiplier;
     }
@@ -270,7 +273,8 @@ static double read_limit(const cav_verification *verification, int t, const cav_
   const cav_model *model = verification->model;
   double range[2];
   if (row->kind == CAV_BINDING_EFFORT)
-    return cav_verification_effort_row(verification, row->object, verification->control[t * model->nu + row->object],
+    return cav_verification_effort_row(verification, row->object, row->component,
+                                       verification->control[t * model->nu + row->object],
                                        verification->v + (size_t)t * (size_t)model->nv, moment, range);
   if (row->kind == CAV_BINDING_JOINT) return joint_value(verification, t, row->object);
   if (row->kind == CAV_BINDING_TENDON) return verification->state->tendon_length[row->object];

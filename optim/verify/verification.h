@@ -60,14 +60,18 @@ cav_status cav_verification_actuators(const cav_model *model, cav_error *error);
 void cav_verification_effort(const cav_verification *verification, int t, int actuator, double effort, const double *v,
                              double *moment, const char *suffix, cav_metric *metric);
 
-/// Effort that costs count as one: the limit, of a servo whose control is limited what that gives, 1 where there is
+/// Effort that costs count as one: the limit, of a servo whose control alone is limited what that gives, 1 where there is
 /// none. actuator_check.c.
 double cav_verification_effort_scale(const cav_model *model, int actuator);
 
 /// What is bounded of an actuator in planning, over the size of its limits, and these with the problem's headroom: its
-/// effort, or the control of a servo whose control is limited. actuator_check.c.
-double cav_verification_effort_row(const cav_verification *verification, int actuator, double effort, const double *v,
-                                   double *moment, double range[2]);
+/// effort, or the control of a servo whose control alone is limited; component 1, of one that is limited in both: its
+/// control. actuator_check.c.
+double cav_verification_effort_row(const cav_verification *verification, int actuator, int component, double effort,
+                                   const double *v, double *moment, double range[2]);
+
+/// How many of these an actuator has, 1 or 2. actuator_check.c.
+int cav_verification_effort_rows(const cav_model *model, int actuator);
 
 /// Balance of momentum of every tree over all knots against gravity and contacts with what is not of the tree:
 /// root mean square and worst knot, fraction of weight. momentum_balance.c.
