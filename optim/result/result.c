@@ -94,8 +94,8 @@ static cav_status write_log(const char *path, const cav_solution *solution, cav_
 }
 
 // path of a file as seen from a folder, both absolute, the folder ending in a slash: through the folders that they
-// share, or absolute if that is the root alone
-static char *seen_from(const char *folder, const char *file) {
+// share; absolute if that is the root alone, unless a relative path is wanted there, too
+static char *seen_from(const char *folder, const char *file, int relative) {
   size_t shared = 0, up = 0;
   for (size_t i = 0; folder[i] && folder[i] == file[i]; i++) {
     if (file[i] == '/') shared = i + 1;
@@ -104,23 +104,28 @@ static char *seen_from(const char *folder, const char *file) {
   char *path = malloc(3 * up + strlen(file) + 1);
   if (!path) return NULL;
   *path = 0;
-  for (size_t i = 0; i < up && shared > 1; i++) strcat(path, "../");
-  return strcat(path, file + (shared > 1 ? shared : 0));
+  for (size_t i = 0; i < up && (shared > 1 || relative); i++) strcat(path, "../");
+  return strcat(path, file + (shared > 1 || relative ? shared : 0));
 }
 
-// the model's file as problem.xml in the folder names it; NULL on failure
-static char *model_from(const char *folder, const char *model_path, cav_error *error) {
-  char *resolved = realpath(folder, NULL), *file = realpath(model_path, NULL);
+char *cav_result_seen_from(const char *folder, const char *path_of_file, int relative, cav_error *error) {
+  char *resolved = realpath(folder, NULL), *file = realpath(path_of_file, NULL);
   char *from = resolved && file ? cav_result_path(resolved, "") : NULL, *path = NULL;
   if (!resolved || !file) {
-    cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: cannot be found: %s", resolved ? model_path : folder, strerror(errno));
-  } else if (!from || !(path = seen_from(from, file))) {
+    cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: cannot be found: %s", resolved ? path_of_file : folder,
+                  strerror(errno));
+  } else if (!from || !(path = seen_from(from, file, relative))) {
     no_memory(error);
   }
   free(resolved);
   free(file);
   free(from);
   return path;
+}
+
+char *cav_result_folder_of(const char *path) {
+  const char *slash = strrchr(path, '/');
+  return slash ? strndup(path, slash > path ? (size_t)(slash - path) : 1) : strdup(".");
 }
 
 cav_status cav_result_write_problem(const char *folder, const cav_problem *problem, const cav_options *contact,
@@ -131,7 +136,8 @@ cav_status cav_result_write_problem(const char *folder, const cav_problem *probl
                          "%s: not written: the model has no file, since it was made in code; write it into one "
                          "(cav_draft_mjcf) and set the problem's model_path",
                          folder);
-  char *path = cav_result_path(folder, "problem.xml"), *model = model_from(folder, problem->model_path, &inner);
+  char *path = cav_result_path(folder, "problem.xml"),
+       *model = cav_result_seen_from(folder, problem->model_path, 0, &inner);
   if (!model || !path) {
     cav_status status = model ? CAV_NO_MEMORY : inner.status;
     if (error) *error = inner;

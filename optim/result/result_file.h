@@ -7,6 +7,13 @@
 /// "folder/name" in fresh memory; NULL if there is none.
 char *cav_result_path(const char *folder, const char *name);
 
+/// Path of a file as seen from a folder, in fresh memory; where they share the root alone absolute, unless relative is 1.
+/// NULL with the reason in error: one of them is not there.
+char *cav_result_seen_from(const char *folder, const char *file, int relative, cav_error *error);
+
+/// The folder of a path, in fresh memory: "." where it names none.
+char *cav_result_folder_of(const char *path);
+
 /// Makes a folder and those above it that are missing.
 cav_status cav_result_folder(const char *folder, cav_error *error);
 

@@ -10,6 +10,7 @@
 
 #include "file.h"
 #include "problem_file.h"
+#include "result.h"
 
 enum { TAGS = 4096, SEGMENTS = 16, NAME = 128 };
 
@@ -352,8 +353,7 @@ static int make_absolute(sheet *s, int k, const char *attribute, const char *fol
 }
 
 static int make_all_absolute(sheet *s) {
-  const char *slash = strrchr(s->source, '/');
-  char *folder = slash ? strndup(s->source, slash > s->source ? (size_t)(slash - s->source) : 1) : strdup(".");
+  char *folder = cav_result_folder_of(s->source);
   char *full = folder ? realpath(folder, NULL) : NULL;
   int good = full && make_absolute(s, 0, "model", full);
   for (int k = 0; k < s->n && good; k++) good = make_absolute(s, k, "file", full);

@@ -35,6 +35,7 @@ typedef struct cav_command_line {
   int force;           ///< --force: solve what is proven impossible
   const char *methods; ///< --methods, NULL: own
   const char *markers; ///< --markers
+  const char *like;    ///< --like, NULL: as the model is built
   const char *format;  ///< --to, NULL: none
   double rate;         ///< --rate, 0: as the knots are
   int threads_given;   ///< 1: threads are asked for
@@ -67,6 +68,7 @@ int cav_command_inspect(const cav_command_line *line);
 int cav_command_explain(const cav_command_line *line);
 int cav_command_ik(const cav_command_line *line);
 int cav_command_export(const cav_command_line *line);
+int cav_command_new(const cav_command_line *line);
 int cav_command_report(const cav_command_line *line);
 int cav_command_solve(const cav_command_line *line);
 int cav_command_stress(const cav_command_line *line);

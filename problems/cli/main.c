@@ -31,7 +31,8 @@ enum option {
   OPTION_RATE = 65536,
   OPTION_JOBS = 131072,
   OPTION_SET = 262144,
-  OPTION_CSV = 524288
+  OPTION_CSV = 524288,
+  OPTION_LIKE = 1048576
 };
 
 #define SOLVER_NAME(solver, name, ...) "|" #name
@@ -72,6 +73,8 @@ static const cav_manual_option options[] = {
      "an attribute of the problem, as cost/apex/@target=0.4: elements by their name or tag; with several values "
      "(=0.2,0.3,0.4) each is solved, of several --set all combinations"},
     {OPTION_CSV, "--csv", NULL, NULL, "print as CSV"},
+    {OPTION_LIKE, "--like", NULL, "MOTION",
+     "as this motion of the project asks, or this problem file, where the model has what it names"},
     {OPTION_TO, "--to", NULL, &(CAV_EXCHANGES(FORMAT_NAME))[1], "what to write"},
     {OPTION_RATE, "--rate", NULL, "N", "samples a second (default: the knots of the motion)"},
 };
@@ -82,6 +85,11 @@ static int help(const cav_command_line *line);
 static const cav_manual_command commands[] = {
     {"inspect", "MODEL|PROBLEM", "say what a model or a problem holds, what it runs and what it leaves out",
      cav_command_inspect, OPTION_MODEL | OPTION_FLOATING},
+    {"new", "MODEL",
+     "write a problem file to begin with, for a model (-o, default MODEL-first.xml): a wish that suits it, and its "
+     "joints,\n"
+     "  bodies and postures in a comment",
+     cav_command_new, OPTION_LIKE | OPTION_FLOATING | OPTION_OUTPUT | OPTION_QUIET},
     {"solve", "PROBLEM...",
      "find the motion that a problem file asks for, certify it and write a result folder; of several problems or "
      "values\n"
@@ -296,6 +304,9 @@ static int take_value(cav_command_line *line, enum option option, const char *na
       return 0;
     case OPTION_CSV:
       return line->csv = 1;
+    case OPTION_LIKE:
+      line->like = value;
+      return 1;
     case OPTION_TO:
       line->format = value;
       return 1;

@@ -74,52 +74,30 @@ static int has_text(const char *path, const char *text) {
   return found;
 }
 
-// the folder of a path
-static char *folder_of(const char *path) {
-  const char *slash = strrchr(path, '/');
-  return slash ? strndup(path, slash > path ? (size_t)(slash - path) : 1) : strdup(".");
-}
-
-// a file as seen from a folder, both absolute: MuJoCo takes every path for a relative one
-static char *seen_from(const char *folder, const char *file) {
-  size_t shared = 0, n = strlen(folder), up = 0;
-  // slashes that both have, the end of the folder counted as one
-  for (size_t i = 0; i <= n && (i == n ? '/' : folder[i]) == file[i]; i++)
-    if (file[i] == '/') shared = i + 1;
-  for (size_t i = shared; i < n; i++) up += folder[i] == '/';
-  up += shared < n;
-  char *path = malloc(3 * up + strlen(file) + 1);
-  if (!path) return NULL;
-  *path = 0;
-  for (size_t i = 0; i < up; i++) strcat(path, "../");
-  return strcat(path, file + shared);
-}
-
 // the model's path as the file names it; NULL with the reason in error
 static char *find_model(const cav_problem *p, const char *path, cav_error *error) {
   if (!p->model_path) {
     cav_file_fail(error, CAV_BAD_INPUT, 0, "the model has no file that keyframes could stand beside");
     return NULL;
   }
-  if (!has_text(p->model_path, "mujoco")) {
+  if (has_text(p->model_path, "<robot")) {
     cav_file_fail(error, CAV_BAD_INPUT, 0,
                   "%s: is not MJCF, and MuJoCo includes nothing else; --to npz or csv hold the same numbers",
                   p->model_path);
     return NULL;
   }
-  char *folder = folder_of(path), *own = folder_of(p->model_path), *seen = NULL;
+  char *folder = cav_result_folder_of(path), *own = cav_result_folder_of(p->model_path), *seen = NULL;
   char *here = folder ? realpath(folder, NULL) : NULL, *there = own ? realpath(own, NULL) : NULL;
-  char *model = realpath(p->model_path, NULL);
-  if (!here || !there || !model)
+  if (!here || !there)
     cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: %s", here ? p->model_path : path, strerror(errno));
   else if (strcmp(here, there) && has_text(p->model_path, "file="))
     cav_file_fail(error, CAV_BAD_INPUT, 0,
                   "%s names files of its own, which MuJoCo seeks beside the file that it is given: write the keyframes "
                   "there, -o %s/NAME.xml",
                   p->model_path, own);
-  else if (!(seen = seen_from(here, model)))
-    cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for the motion");
-  free(folder), free(own), free(here), free(there), free(model);
+  else // MuJoCo takes every path for a relative one
+    seen = cav_result_seen_from(here, p->model_path, 1, error);
+  free(folder), free(own), free(here), free(there);
   return seen;
 }
 

@@ -1,0 +1,75 @@
+#!/bin/sh
+# Problem files that cavort new writes: each can be read for every model that there is, names the model's own joints, and a few
+# are solved. Usage: test_new.sh CAVORT SOURCE_ROOT; models of others from $CAVORT_SHARED_MODELS or ../shared/models, if there.
+set -u
+cavort=$(cd "$(dirname "$1")" && pwd)/$(basename "$1")
+root=$(cd "$2" && pwd)
+shared=${CAVORT_SHARED_MODELS:-$root/../shared/models}
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+failed=0
+fail() { failed=$((failed + 1)); echo "failed: $*"; }
+cd "$root" || exit 1
+
+# tried MODEL OPTION...: a problem for a model, read back
+number=0
+tried() {
+  model=$1
+  shift
+  number=$((number + 1))
+  written=$work/$number.xml
+  "$cavort" new "$model" "$@" -o "$written" >"$work/out" 2>"$work/err" || { fail "new $model $*"; cat "$work/err"; return; }
+  "$cavort" inspect "$written" >"$work/read" 2>&1 && return
+  # models whose actuators cannot be planned with are told
+  grep -q "cannot be planned with" "$work/err" && grep -q "cannot be planned with" "$work/read" && return
+  fail "$model: what was written cannot be read"
+  cat "$work/read"
+}
+for model in problems/models/*.xml; do
+  tried "$model"
+  [ ! -s "$work/err" ] || fail "$model: complains"
+  grep -q "^impossible" "$work/read" && fail "$model: what was written is impossible"
+done
+tried problems/models/humanoid.xml
+for name in abdomen_z "at 1.136 degrees" "Bodies: torso, head" "right hand (hand_right)" "Keyframes: stand, squat, prone, supine"; do
+  grep -q -- "$name" "$written" || fail "the comment lists $name"
+done
+n=$(find "$shared" \( -name '*.xml' -o -name '*.urdf' \) 2>/dev/null | wc -l)
+[ "$n" -gt 0 ] || echo "left out: models of others are not here"
+find "$shared" \( -name '*.xml' -o -name '*.urdf' \) 2>/dev/null | sort >"$work/models"
+while IFS= read -r model; do
+  grep -qE '<mujoco|<robot' "$model" || continue
+  case $model in
+    # no posture that this file knows is within the range of its tendon: told
+    */robotiq_2f85/scene.xml)
+      "$cavort" new "$model" -o "$work/none.xml" 2>"$work/err" && fail "$model: passes"
+      grep -q "outside its range" "$work/err" || fail "$model: is not told"
+      [ ! -e "$work/none.xml" ] || fail "$model: leaves a file" ;;
+    *) tried "$model" ;;
+  esac
+done <"$work/models"
+[ "$n" -eq 0 ] || tried "$shared/urdf/solo12.urdf" --floating
+[ "$n" -eq 0 ] || grep -q 'floating="true"' "$written" || fail "a floating root is not said"
+
+# as another motion
+"$cavort" new problems/models/humanoid.xml --like squat-jump -o "$work/like.xml" >"$work/out" || fail "like squat-jump"
+grep -q 'problem name="humanoid-squat-jump" model=' "$work/like.xml" || fail "like squat-jump: its name"
+"$cavort" inspect "$work/like.xml" >/dev/null 2>&1 || fail "like squat-jump cannot be read"
+"$cavort" new problems/models/robot.xml --like squat-jump -o "$work/no.xml" 2>"$work/err" && fail "like what does not fit"
+grep -q "robot-jump, robot-reach, robot-squat" "$work/err" || fail "what fits is not told"
+[ ! -e "$work/no.xml" ] || fail "what does not fit leaves a file"
+"$cavort" new problems/models/robot.xml --like robot-sqat -o "$work/no.xml" 2>"$work/err" && fail "like nothing"
+grep -q "did you mean 'robot-squat'" "$work/err" || fail "what was meant is not told"
+"$cavort" new problems/models/arm.xml --like problems/motions/arm-reach/problem.xml -o "$work/file.xml" >/dev/null || fail "like a file"
+"$cavort" new problems/models/robot.xml -o "$work/like.xml" 2>"$work/err" && fail "a file that is there is overwritten"
+grep -q "is there already" "$work/err" || fail "a file that is there is not told"
+"$cavort" new problems/motions/jump/problem.xml 2>"$work/err" && fail "a problem passes for a model"
+
+# solved as they were written
+for model in joint arm walker; do
+  "$cavort" new problems/models/$model.xml -o "$work/$model.xml" -q || fail "new $model"
+  CAVORT_THREE_JS=/nowhere "$cavort" solve "$work/$model.xml" -o "$work/$model.result" --threads 2 -q 2>/dev/null ||
+    fail "$model is not certified as it was written"
+done
+[ "$failed" -eq 0 ] && echo "$number problems are read"
+exit "$failed"
