@@ -6,7 +6,7 @@
 #   CAVORT_MUJOCO_JS       node_modules/@mujoco/mujoco/mujoco.js (npm install @mujoco/mujoco@3.14)
 set -u
 cavort=$(cd "$(dirname "$1")" && pwd)/$(basename "$1")
-root=$2
+root=$(cd "$2" && pwd)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1

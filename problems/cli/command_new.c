@@ -193,6 +193,9 @@ static void warn_actuators(const cav_model *m) {
 static cav_status write_new(const cav_command_line *line, const cav_model *model, const char *name, const char *path,
                             cav_error *error) {
   cav_scaffold s;
+  if (model->nv == 0)
+    return cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: has no joint: nothing of it can move%s", line->operand,
+                         line->floating ? "" : " (a URDF may float: --floating)");
   cav_status status = cav_scaffold_open(&s, model, error);
   char *folder = cav_result_folder_of(path), *seen = NULL;
   if (!status && !(folder && (seen = cav_result_seen_from(folder, line->operand, 0, error))))
