@@ -303,6 +303,61 @@ static void test_fine_mesh(void) {
 #endif
 }
 
+// numbers after a name in a text, n of them at most; how many there are
+static int numbers_after(const char *text, const char *name, double *x, int n) {
+  const char *at = text ? strstr(text, name) : NULL;
+  int i = 0;
+  for (at = at ? at + strlen(name) : NULL; at && *at != ']' && i < n; i++) x[i] = strtod(at + (i > 0), (char **)&at);
+  return i;
+}
+
+// a mesh that can only be seen, an L with an inner corner that no hull has: the model is without it, the page draws its own
+// surface where the file puts it, in the place of what collides
+static void test_seen_mesh(void) {
+#ifdef CAVORT_HAVE_QHULL
+  static const double corner[12][3] = {{0, 0, 0}, {2, 0, 0}, {2, 1, 0}, {1, 1, 0}, {1, 2, 0}, {0, 2, 0},
+                                       {0, 0, 1}, {2, 0, 1}, {2, 1, 1}, {1, 1, 1}, {1, 2, 1}, {0, 2, 1}};
+  write_file(in_folder("model.xml"),
+             "<mujoco><compiler inertiafromgeom='true'/><asset><mesh name='L' scale='0.1 0.1 0.1' "
+             "vertex='0 0 0 2 0 0 2 1 0 1 1 0 1 2 0 0 2 0 0 0 1 2 0 1 2 1 1 1 1 1 1 2 1 0 2 1' "
+             "face='0 3 1 1 3 2 0 5 3 3 5 4 6 7 9 7 8 9 6 9 11 9 10 11 0 1 7 0 7 6 1 2 8 1 8 7 2 3 9 2 9 8 "
+             "3 4 10 3 10 9 4 5 11 4 11 10 5 0 6 5 6 11'/></asset><worldbody><body name='b'><freejoint/>"
+             "<geom type='sphere' size='0.1'/><geom type='mesh' mesh='L' pos='1 2 3' quat='1 1 0 0' mass='0' "
+             "contype='0' conaffinity='0'/></body></worldbody></mujoco>");
+  cav_load_options options = cav_load_options_default();
+  options.visual = 1;
+  cav_error error = {0};
+  cav_model *m = cav_model_load(in_folder("model.xml"), &error);
+  cav_model *drawn = cav_model_load_with(in_folder("model.xml"), &options, &error);
+  if (!CHECK(m && drawn)) {
+    fprintf(stderr, "    %s\n", error.text);
+    return;
+  }
+  CHECK(m->ngeom == 1 && m->nmesh == 0 && drawn->ngeom == 2 && drawn->mesh[0].ntriangle == 20);
+  cav_view_input input = {.model = m, .drawn = drawn, .nknot = 1, .timestep = 0.01, .q = m->q0};
+  CHECK(cav_view_write(in_folder("view.html"), 1, &input, NULL) == CAV_OK);
+  char *page = read_file(in_folder("view.html"));
+  CHECK(page && count(page, "\"hidden\":1") == 1 && count(page, "\"type\":\"mesh\"") == 1);
+  const char *geom = page ? strstr(page, "\"type\":\"mesh\"") : NULL;
+  double pos[3], quat[4], x[36], triangle[60], far = 0;
+  CHECK(numbers_after(geom, "\"pos\":[", pos, 3) == 3 && numbers_after(geom, "\"quat\":[", quat, 4) == 4);
+  CHECK(numbers_after(geom, "\"corners\":[", x, 36) == 36);
+  CHECK(numbers_after(geom, "\"triangles\":[", triangle, 60) == 60);
+  for (int i = 0; i < 12; i++) {
+    // v + 2 w (u x v) + 2 u x (u x v) of the page against the file's quarter turn about x
+    const double *u = quat + 1, *v = x + 3 * i;
+    double c[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+    double d[3] = {u[1] * c[2] - u[2] * c[1], u[2] * c[0] - u[0] * c[2], u[0] * c[1] - u[1] * c[0]};
+    double file[3] = {1 + 0.1 * corner[i][0], 2 - 0.1 * corner[i][2], 3 + 0.1 * corner[i][1]};
+    for (int k = 0; k < 3; k++) far = fmax(far, fabs(pos[k] + v[k] + 2 * quat[0] * c[k] + 2 * d[k] - file[k]));
+  }
+  CHECK(far < 2e-4);
+  free(page);
+  cav_model_free(drawn);
+  cav_model_free(m);
+#endif
+}
+
 // what goes wrong says why and leaves no page
 static void test_errors(const cav_model *model) {
   cav_view_input input = hostile_input(model);
@@ -372,6 +427,7 @@ int main(void) {
   }
   cav_model_free(model);
   test_fine_mesh();
+  test_seen_mesh();
   static const char *const left[] = {"model.xml", "three.js", "bad.js", "empty.js", "view.html", "full.html"};
   for (size_t i = 0; i < sizeof left / sizeof *left; i++) remove(in_folder(left[i]));
   CHECK(rmdir(folder) == 0);

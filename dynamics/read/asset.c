@@ -244,7 +244,10 @@ static void load_mesh(cav_spec *spec, cav_spec_mesh *m) {
   if (spec->status == CAV_OK && (!t.ntriangle || m->inertia == CAV_MESH_CONVEX)) take_hull(spec, m, &t);
   if (spec->status == CAV_OK) weigh_mesh(spec, m, &t);
   if (spec->status == CAV_OK && m->index >= 0) build_hull(spec, m, &t);
-  cav_triangles_clear(&t);
+  if (spec->status == CAV_OK && spec->load.visual)
+    m->surface = t;
+  else
+    cav_triangles_clear(&t);
 }
 
 // --- height fields ---
@@ -425,6 +428,11 @@ static void put_mesh(carver *c, const cav_spec_mesh *m, cav_mesh *out) {
   mesh.meeting_start = put(c, h->meeting_start, sizeof *h->meeting_start * ((size_t)h->nvertex + 1));
   mesh.meeting = put(c, h->meeting, sizeof *h->meeting * (size_t)h->nmeeting);
   mesh.summit = put(c, h->summit, sizeof *h->summit * CAV_DIRECTION_CELLS);
+  const cav_triangles *t = &m->surface;
+  mesh.npoint = t->nvertex;
+  mesh.ntriangle = t->ntriangle;
+  mesh.point = put(c, t->vertex, sizeof *t->vertex * 3 * (size_t)t->nvertex);
+  mesh.triangle = put(c, t->triangle, sizeof *t->triangle * 3 * (size_t)t->ntriangle);
   if (out) *out = mesh;
 }
 
@@ -461,7 +469,10 @@ size_t cav_put_assets(const cav_spec *spec, void *base, cav_model *model) {
 }
 
 void cav_clear_assets(cav_spec *spec) {
-  for (int i = 0; i < spec->mesh.n; i++) cav_hull_clear(&spec->mesh.at[i].hull);
+  for (int i = 0; i < spec->mesh.n; i++) {
+    cav_hull_clear(&spec->mesh.at[i].hull);
+    cav_triangles_clear(&spec->mesh.at[i].surface);
+  }
   for (int i = 0; i < spec->hfield.n; i++) free(spec->hfield.at[i].height);
   free(spec->mesh.at);
   free(spec->hfield.at);

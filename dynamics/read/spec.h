@@ -85,6 +85,7 @@ typedef struct cav_spec_mesh {
   double pos[3], quat[4], half[3], bound; ///< centre of mass and principal axes; its box and sphere about these
   double low[3], high[3];                 ///< its box, not about the centre
   cav_hull hull;
+  cav_triangles surface; ///< as the file gives it, about its own frame, for a viewer; empty where that is not asked for
 } cav_spec_mesh;
 
 typedef struct cav_spec_hfield {

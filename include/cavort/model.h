@@ -235,6 +235,9 @@ typedef struct cav_mesh {
   const int *neighbour_start, *neighbour; ///< [nvertex+1], vertices across an edge from each
   const int *meeting_start, *meeting;     ///< [nvertex+1], faces that meet at each
   const int *summit;                      ///< vertex furthest along the middle of each cell of directions (direction.h)
+  int npoint, ntriangle;                  ///< the file's own surface, of a model that is loaded for a viewer; 0: not kept
+  const double *point;                    ///< [npoint*3] m
+  const int *triangle;                    ///< [ntriangle*3] points, counterclockwise from outside
 } cav_mesh;
 
 /// Heights over a grid in the x-y plane, solid down to -base; x grows along columns, y along rows, both about 0.
@@ -553,7 +556,7 @@ typedef struct cav_model {
 
 /// What to read of a file beyond what its dynamics need.
 typedef struct cav_load_options {
-  int visual; ///< 1: geometry that can neither touch nor weigh too, for a viewer
+  int visual; ///< 1: geometry that can neither touch nor weigh too, and the surfaces of meshes, for a viewer
   int floating; ///< 1: the root link of a URDF floats (joint "root"); 0: it stands in the world unless the file says otherwise
   int overlaps; ///< 1: pairs of geoms of one robot that overlap at rest are left out, and told in a warning
 } cav_load_options;

@@ -7,6 +7,7 @@
 
 #include "command.h"
 #include "file.h"
+#include "page.h"
 #include "view.h"
 
 /// The deepest contact of some postures.
@@ -54,24 +55,30 @@ static cav_status write_page(const char *path, const cav_problem *p, const cav_t
   size_t size = (size_t)guess->nknot * (size_t)m->nq, nq = (size_t)m->nq;
   double *q = malloc((size + nq) * sizeof *q);
   if (!q) return cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for the page");
+  char undrawn[CAV_PAGE_UNDRAWN];
+  cav_model *drawn = cav_page_drawn(p, undrawn);
   memcpy(q, guess->q, size * sizeof *q);
   memcpy(q + size, p->q_goal, nq * sizeof *q);
-  const cav_view_line line[] = {{"before solving", "the guess; the last picture is the goal", -1},
-                                {"start", text[0], -1},
-                                {"guess", text[1], -1},
-                                {"goal", text[2], -1},
-                                {"impossible", cause ? cause->what : "", 0}};
+  int nline = 4;
+  cav_view_line line[6] = {{"before solving", "the guess; the last picture is the goal", -1},
+                           {"start", text[0], -1},
+                           {"guess", text[1], -1},
+                           {"goal", text[2], -1}};
+  if (cause) line[nline++] = (cav_view_line){"impossible", cause->what, 0};
+  if (*undrawn) line[nline++] = (cav_view_line){"drawn", undrawn, -1};
   char title[340];
   snprintf(title, sizeof title, "%.140s on %.140s, before solving", p->name, m->name);
   cav_view_input input = {.model = m,
+                          .drawn = drawn,
                           .title = title,
                           .label = p->name,
                           .nknot = guess->nknot + 1,
                           .timestep = guess->timestep,
                           .q = q,
-                          .nline = cause ? 5 : 4,
+                          .nline = nline,
                           .line = line};
   cav_status status = cav_view_write(path, 1, &input, error);
+  cav_model_free(drawn);
   free(q);
   return status;
 }

@@ -243,18 +243,38 @@ static int verdict_lines(const cav_verdict *verdict, cav_certificate_line *told,
 
 // --- the page ---
 
+cav_model *cav_page_drawn(const cav_problem *p, char undrawn[CAV_PAGE_UNDRAWN]) {
+  *undrawn = 0;
+  if (!p->model_path) return NULL;
+  cav_error error = {0};
+  cav_load_options options = cav_load_options_default();
+  options.visual = options.overlaps = 1;
+  options.floating = p->floating;
+  cav_model *drawn = cav_model_load_with(p->model_path, &options, &error);
+  int same = drawn && drawn->nbody <= p->model->nbody;
+  for (int i = 0; same && i < drawn->nbody; i++) same = !strcmp(drawn->body[i].name, p->model->body[i].name);
+  if (same) return drawn;
+  snprintf(undrawn, CAV_PAGE_UNDRAWN, "by what collides alone: %.400s",
+           drawn ? "the problem's scene changes the order of bodies" : error.text);
+  cav_model_free(drawn);
+  return NULL;
+}
+
 // what a motion's page points at
 typedef struct parts {
+  cav_model *drawn;
+  char undrawn[CAV_PAGE_UNDRAWN];
   charts charts;
   targets targets;
   int *nforce;
   cav_view_force *force;
   cav_certificate_line told[CAV_CERTIFICATE_LINES];
-  cav_view_line line[CAV_CERTIFICATE_LINES + 3];
+  cav_view_line line[CAV_CERTIFICATE_LINES + 4];
   char seconds[64], title[300];
 } parts;
 
 static void free_page(parts *page) {
+  cav_model_free(page->drawn);
   free(page->charts.series);
   free(page->charts.value);
   free(page->targets.target);
@@ -274,6 +294,7 @@ static cav_status make_page(parts *page, const cav_page_motion *m) {
   if (!page->charts.series || !page->charts.value || !page->targets.target || !page->nforce || !page->force)
     return CAV_NO_MEMORY;
   page->charts.wanted = page->charts.value + most * nknot;
+  page->drawn = cav_page_drawn(p, page->undrawn);
   return CAV_OK;
 }
 
@@ -304,7 +325,10 @@ static cav_status fill_page(parts *page, const cav_page_motion *m, cav_view_inpu
   add_each(&page->charts, p, m->trajectory, m->forces);
   take_forces(page, p->model, m->forces, weight);
   snprintf(page->title, sizeof page->title, "%.140s on %.140s", p->name, p->model->name);
+  int nline = m->verdict ? verdict_lines(m->verdict, page->told, page->line, page->seconds) : 0;
+  if (*page->undrawn) page->line[nline++] = (cav_view_line){"drawn", page->undrawn, -1};
   *input = (cav_view_input){.model = p->model,
+                            .drawn = page->drawn,
                             .title = page->title,
                             .label = m->label,
                             .nknot = m->trajectory->nknot,
@@ -317,7 +341,7 @@ static cav_status fill_page(parts *page, const cav_page_motion *m, cav_view_inpu
                             .target = page->targets.target,
                             .nseries = page->charts.n,
                             .series = page->charts.series,
-                            .nline = m->verdict ? verdict_lines(m->verdict, page->told, page->line, page->seconds) : 0,
+                            .nline = nline,
                             .line = page->line};
   return status;
 }

@@ -14,6 +14,13 @@ typedef struct cav_page_motion {
   const cav_verdict *verdict; ///< NULL: none
 } cav_page_motion;
 
+enum { CAV_PAGE_UNDRAWN = 500 };
+
+/// The problem's model once more with what is only seen of it, for cav_view_input; its bodies are the model's first ones, the
+/// problem's scene comes after them. NULL: there is none, and where there may be more to see why. Freed with
+/// cav_model_free.
+cav_model *cav_page_drawn(const cav_problem *problem, char undrawn[CAV_PAGE_UNDRAWN]);
+
 /// Writes the page of n motions, 1 or 2: the motions, contact forces, targets, charts of forces, heights, efforts and joints
 /// with their limits, and the verdicts. Errors as cav_view_write's.
 cav_status cav_page_write(const char *path, int n, const cav_page_motion *motion, cav_error *error);

@@ -55,61 +55,83 @@ static void write_numbers(FILE *out, const double *x, int n, int digits) {
 
 // --- parts of the motion ---
 
-// meshes of more corners are drawn by those of a grid of so many cells along their largest side: what is finer no page
-// shows, and a robot's sixty meshes would make it tens of megabytes
-enum { CORNERS_SHOWN = 200, GRID = 20 };
+// meshes of more corners are drawn by those of a grid of cells along their largest side, the coarser the more meshes there
+// are: what is finer no page shows, and a robot's sixty meshes would make it tens of megabytes
+enum { CORNERS_SHOWN = 200, GRID_MOST = 20, GRID_LEAST = 8, CORNERS_IN_ALL = 45000 };
 
-// the corner that stands for each, of those in one cell the first; the identity where there are few
-static void thin_corners(const cav_mesh *m, int *stand_in) {
+// a surface to draw
+typedef struct surface {
+  int npoint, ntriangle;
+  const double *point;
+  const int *triangle; ///< NULL: that of the hull's polygons
+  const cav_mesh *mesh;
+} surface;
+
+static surface surface_of(const cav_mesh *m) {
+  if (m->ntriangle) return (surface){m->npoint, m->ntriangle, m->point, m->triangle, m};
+  return (surface){m->nvertex, 0, m->vertex, NULL, m};
+}
+
+// the corner that stands for each, of those in one cell the first; the identity where there are few. first: room for a cell
+// each
+static void thin_corners(const surface *s, int grid, int *first, int *stand_in) {
   double low[3] = {INFINITY, INFINITY, INFINITY}, side = 0;
   for (int k = 0; k < 3; k++) {
     double high = -INFINITY;
-    for (int v = 0; v < m->nvertex; v++) {
-      low[k] = fmin(low[k], m->vertex[3 * v + k]);
-      high = fmax(high, m->vertex[3 * v + k]);
+    for (int v = 0; v < s->npoint; v++) {
+      low[k] = fmin(low[k], s->point[3 * v + k]);
+      high = fmax(high, s->point[3 * v + k]);
     }
     side = fmax(side, high - low[k]);
   }
-  int first[(GRID + 1) * (GRID + 1) * (GRID + 1)];
-  for (size_t i = 0; i < sizeof first / sizeof *first; i++) first[i] = -1;
-  for (int v = 0; v < m->nvertex; v++) {
+  for (int i = 0; i < (grid + 1) * (grid + 1) * (grid + 1); i++) first[i] = -1;
+  for (int v = 0; v < s->npoint; v++) {
     stand_in[v] = v;
-    if (m->nvertex <= CORNERS_SHOWN || !(side > 0)) continue;
+    if (s->npoint <= CORNERS_SHOWN || !(side > 0)) continue;
     int cell = 0;
-    for (int k = 0; k < 3; k++) cell = cell * (GRID + 1) + (int)(GRID * (m->vertex[3 * v + k] - low[k]) / side);
+    for (int k = 0; k < 3; k++) cell = cell * (grid + 1) + (int)(grid * (s->point[3 * v + k] - low[k]) / side);
     if (first[cell] < 0) first[cell] = v;
     stand_in[v] = first[cell];
   }
 }
 
-// the hull of a mesh as corners and triangles
-static void write_mesh(FILE *out, const cav_mesh *m) {
-  int *stand_in = malloc(2 * ((size_t)m->nvertex + 1) * sizeof *stand_in), n = 0;
+static void write_triangle(FILE *out, const int *stand_in, const int *number, int a, int b, int c, const char **comma) {
+  a = stand_in[a], b = stand_in[b], c = stand_in[c];
+  if (a == b || b == c || c == a) return;
+  fprintf(out, "%s%d,%d,%d", *comma, number[a], number[b], number[c]);
+  *comma = ",";
+}
+
+// a mesh as corners and triangles: its surface, or else its hull
+static void write_mesh(FILE *out, const cav_mesh *m, int grid) {
+  static const int cells = (GRID_MOST + 1) * (GRID_MOST + 1) * (GRID_MOST + 1);
+  surface s = surface_of(m);
+  int *stand_in = malloc((2 * (size_t)s.npoint + (size_t)cells) * sizeof *stand_in), n = 0;
   if (!stand_in) {
     fputs(",\"corners\":[],\"triangles\":[]", out);
     return;
   }
-  int *number = stand_in + m->nvertex;
-  thin_corners(m, stand_in);
+  int *number = stand_in + s.npoint;
+  thin_corners(&s, grid, number + s.npoint, stand_in);
   fputs(",\"corners\":[", out);
-  for (int v = 0; v < m->nvertex; v++) {
+  for (int v = 0; v < s.npoint; v++) {
     if (stand_in[v] != v) continue;
     number[v] = n;
     for (int k = 0; k < 3; k++) {
       if (n > 0 || k > 0) putc(',', out);
-      write_number(out, m->vertex[3 * v + k], 5);
+      write_number(out, s.point[3 * v + k], 4);
     }
     n++;
   }
   fputs("],\"triangles\":[", out);
   const char *comma = "";
-  for (int f = 0; f < m->nface; f++) {
-    for (int k = m->face[f] + 2; k < m->face[f + 1]; k++) {
-      int a = stand_in[m->corner[m->face[f]]], b = stand_in[m->corner[k - 1]], c = stand_in[m->corner[k]];
-      if (a == b || b == c || c == a) continue;
-      fprintf(out, "%s%d,%d,%d", comma, number[a], number[b], number[c]);
-      comma = ",";
-    }
+  for (int i = 0; i < s.ntriangle; i++) {
+    const int *v = s.triangle + 3 * i;
+    write_triangle(out, stand_in, number, v[0], v[1], v[2], &comma);
+  }
+  for (int f = 0; f < m->nface && !s.ntriangle; f++) {
+    for (int k = m->face[f] + 2; k < m->face[f + 1]; k++)
+      write_triangle(out, stand_in, number, m->corner[m->face[f]], m->corner[k - 1], m->corner[k], &comma);
   }
   putc(']', out);
   free(stand_in);
@@ -139,28 +161,72 @@ static void write_hfield(FILE *out, const cav_hfield *h) {
   putc(']', out);
 }
 
-static void write_geoms(FILE *out, const cav_model *model) {
+static void write_geom(FILE *out, const cav_model *model, const cav_geom *geom, int link, int hidden, int grid) {
   static const char *const kind[CAV_GEOM_TYPES] = {"plane",    "sphere", "capsule", "ellipsoid",
                                                    "cylinder", "box",    "mesh",    "hfield"};
+  const double rgba[4] = {(double)geom->rgba[0], (double)geom->rgba[1], (double)geom->rgba[2], (double)geom->rgba[3]};
+  fputs("{\"name\":", out);
+  write_string(out, geom->name);
+  fputs(",\"body\":", out);
+  write_string(out, model->body[geom->body].name);
+  fprintf(out, ",\"type\":\"%s\",\"link\":%d,\"group\":%d,\"hidden\":%d,\"size\":", kind[geom->type], link, geom->group,
+          hidden);
+  write_numbers(out, geom->size, 3, 6);
+  fputs(",\"pos\":", out);
+  write_numbers(out, geom->pos, 3, 6);
+  fputs(",\"quat\":", out);
+  write_numbers(out, geom->quat, 4, 6);
+  fputs(",\"rgba\":", out);
+  write_numbers(out, rgba, 4, 4);
+  // what is not drawn is there for its place and size alone
+  if (geom->type == CAV_GEOM_MESH && !hidden) write_mesh(out, &model->mesh[geom->asset], grid);
+  if (geom->type == CAV_GEOM_HFIELD) write_hfield(out, &model->hfield[geom->asset]);
+  putc('}', out);
+}
+
+// whether a geom is there to be seen alone
+static int only_seen(const cav_geom *geom) {
+  return geom->type == CAV_GEOM_MESH && !geom->contype && !geom->conaffinity;
+}
+
+static int has_seen(const cav_model *drawn, int body) {
+  if (body >= drawn->nbody) return 0;
+  const cav_geom *geom = drawn->geom + drawn->body[body].geom;
+  for (int i = 0; i < drawn->body[body].ngeom; i++)
+    if (only_seen(&geom[i])) return 1;
+  return 0;
+}
+
+static double corners_of(const cav_model *model, const cav_geom *geom) {
+  if (geom->type != CAV_GEOM_MESH) return 0;
+  return fmin(surface_of(&model->mesh[geom->asset]).npoint, 3 * GRID_MOST * GRID_MOST);
+}
+
+// cells along the largest side of a mesh: corners of a surface grow with their square
+static int grid_of(const cav_model *model, const cav_model *drawn) {
+  double corners = 1;
+  for (int i = 0; i < model->ngeom; i++) corners += corners_of(model, &model->geom[i]);
+  for (int i = 0; drawn && i < drawn->ngeom; i++)
+    if (only_seen(&drawn->geom[i])) corners += corners_of(drawn, &drawn->geom[i]);
+  return (int)fmin(GRID_MOST, fmax(GRID_LEAST, GRID_MOST * sqrt(CORNERS_IN_ALL / corners)));
+}
+
+// the model's geoms, in the order of their numbers; those of a body that has meshes to be seen are not drawn, the meshes
+// follow all of them
+static void write_geoms(FILE *out, const cav_model *model, const cav_model *drawn) {
+  int grid = grid_of(model, drawn);
   fputs("\"geoms\":[", out);
   for (int i = 0; i < model->ngeom; i++) {
     const cav_geom *geom = &model->geom[i];
-    const double rgba[4] = {(double)geom->rgba[0], (double)geom->rgba[1], (double)geom->rgba[2], (double)geom->rgba[3]};
-    fprintf(out, "%s{\"name\":", i > 0 ? ",\n" : "\n");
-    write_string(out, geom->name);
-    fputs(",\"body\":", out);
-    write_string(out, model->body[geom->body].name);
-    fprintf(out, ",\"type\":\"%s\",\"link\":%d,\"group\":%d,\"size\":", kind[geom->type], geom->link, geom->group);
-    write_numbers(out, geom->size, 3, 6);
-    fputs(",\"pos\":", out);
-    write_numbers(out, geom->pos, 3, 6);
-    fputs(",\"quat\":", out);
-    write_numbers(out, geom->quat, 4, 6);
-    fputs(",\"rgba\":", out);
-    write_numbers(out, rgba, 4, 4);
-    if (geom->type == CAV_GEOM_MESH) write_mesh(out, &model->mesh[geom->asset]);
-    if (geom->type == CAV_GEOM_HFIELD) write_hfield(out, &model->hfield[geom->asset]);
-    putc('}', out);
+    fputs(i > 0 ? ",\n" : "\n", out);
+    write_geom(out, model, geom, geom->link, drawn && geom->type != CAV_GEOM_PLANE && has_seen(drawn, geom->body),
+               grid);
+  }
+  for (int i = 0; drawn && i < drawn->ngeom; i++) {
+    const cav_geom *geom = &drawn->geom[i];
+    if (!only_seen(geom)) continue;
+    fputs(model->ngeom ? ",\n" : "\n", out);
+    write_geom(out, drawn, geom, model->body[geom->body].link, 0, grid);
   }
   fputs("\n]", out);
 }
@@ -329,7 +395,7 @@ static cav_status write_motion(FILE *out, const cav_view_input *input, cav_error
   fputs(",\"weight\":", out);
   write_number(out, model->mass * sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]), 6);
   fputs(",\n", out);
-  write_geoms(out, model);
+  write_geoms(out, model, input->drawn);
   fputs(",\n", out);
   write_links(out, model);
   fputs(",\n", out);

@@ -42,6 +42,8 @@ typedef struct cav_view_line {
 /// What to show. Everything but the model and the motion may be absent: zero counts, NULL.
 typedef struct cav_view_input {
   const cav_model *model;
+  const cav_model
+      *drawn; ///< the model's file with what is only seen of it: its meshes are drawn; NULL: the model's own geoms
   const char *title;
   const char *label;           ///< tells it from another motion on the page
   int nknot;                   ///< >= 1

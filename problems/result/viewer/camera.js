@@ -54,8 +54,9 @@ function aim() {
   if (pressed('follow')) anchor();
   target.copy(orbit.anchor).add(orbit.aside);
   look.set(Math.cos(az) * Math.cos(el), Math.sin(az) * Math.cos(el), Math.sin(el));
-  // a tall window sees less to the sides: stand back
-  const distance = orbit.distance / Math.min(1, camera.aspect * (both ? 0.9 : 1.25));
+  // a tall window sees less to the sides: stand back until they fit
+  const wide = 1.05 * (extent.radius + Math.abs(actors[0].root.position.y)) / (Math.tan(camera.fov * Math.PI / 360) * camera.aspect);
+  const distance = orbit.distance * Math.max(1, (wide + 0.6 * extent.radius) / fit);
   camera.position.copy(target).addScaledVector(look, distance);
   camera.lookAt(target);
   camera.near = distance / 200;

@@ -52,7 +52,13 @@ const place = (object, pos, quat) => {
   object.quaternion.set(quat[1], quat[2], quat[3], quat[0]);
 };
 
-const is_drawn = geom => geom.type !== 'plane' && geom.rgba[3] > 0 && geom.group < 3 && Math.max(...geom.size) > 0;
+// groups from 3 on are what collides beside what is seen; a body that has nothing else is drawn by them
+const has_shape = geom => geom.type !== 'plane' && !geom.hidden && geom.rgba[3] > 0 && Math.max(...geom.size) > 0;
+for (const shown of motions) {
+  const seen = new Set(shown.geoms.filter(geom => has_shape(geom) && geom.group < 3).map(geom => geom.body));
+  for (const geom of shown.geoms) geom.drawn = has_shape(geom) && (geom.group < 3 || (geom.link > 0 && !seen.has(geom.body)));
+}
+const is_drawn = geom => geom.drawn;
 
 // a body's own paint, and that of one that stands beside or within another motion
 function dye([r, g, b, a], tinted) {
