@@ -1,13 +1,12 @@
 #!/bin/sh
-# Records what a motion's folder says to expect: solves it, and writes expected.json and picture.png beside problem.xml.
-# Usage: sh problems/record.sh MOTION TIME [--model FILE]
-# TIME is the moment of the picture, s. The tool is build/problems/cavort, or $CAVORT; the picture needs chromium.
+# Records what a motion's folder says to expect: solves it, and writes expected.json and picture.webp beside problem.xml.
+# Usage: sh problems/record.sh MOTION [--model FILE]
+# The tool is build/problems/cavort, or $CAVORT; the picture, which moves, needs node and chromium.
 set -eu
 cd "$(dirname "$0")/.."
-[ $# -ge 2 ] || { sed -n 's/^# Usage: /usage: /p' problems/record.sh >&2; exit 2; }
+[ $# -ge 1 ] || { sed -n 's/^# Usage: /usage: /p' problems/record.sh >&2; exit 2; }
 motion=$1
-time=$2
-shift 2
+shift
 folder=problems/motions/$motion
 result=$(mktemp -d)
 trap 'rm -rf "$result"' EXIT
@@ -16,8 +15,5 @@ trap 'rm -rf "$result"' EXIT
 "${CAVORT:-build/problems/cavort}" solve --quiet "$folder/problem.xml" -o "$result" --threads 1 "$@"
 sed '/"solve_seconds"/d; /^  "targets": \[/,$d' "$result/verdict.json" | sed '$s/,$//' >"$folder/expected.json"
 echo "}" >>"$folder/expected.json"
-
-chromium --headless --no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader \
-  --ignore-gpu-blocklist --window-size=800,380 --virtual-time-budget=8000 --screenshot="$folder/picture.png" \
-  "file://$result/view.html#t=$time" >"$result/chromium.log" 2>&1 || { cat "$result/chromium.log" >&2; exit 1; }
-echo "$folder: expected.json and picture.png"
+node problems/picture.mjs "$folder/picture.webp" "$result/view.html" --size 400x300 --rate 15
+echo "$folder: expected.json and picture.webp"

@@ -239,7 +239,34 @@ async function check_humanoid() {
   await page.close();
 }
 
-for (const part of [check_one, check_two, check_humanoid])
+// --- moving pictures, and the page of many ---
+
+async function check_pictures() {
+  const page = await browser.open(url('all/index.html'));
+  check(await page.value(`document.querySelectorAll('a.certified[href="near.html"] img[src="near.webp"]').length`) === 1, 'no card of the motion');
+  check(await until(page, `document.querySelector('img').complete && document.querySelector('img').naturalWidth === 360`), 'its picture');
+  check(page.problems.length === 0, page.problems.join('; '));
+  // the stride of 1 s at 10 pictures a second, both ends; two motions beside each other; no two pictures alike
+  const bytes = readFileSync(join(folder, 'moving.webp')).toString('base64');
+  const got = await page.value(`(async () => {
+    const data = Uint8Array.from(atob('${bytes}'), c => c.charCodeAt(0)), decoder = new ImageDecoder({data, type: 'image/webp'});
+    await decoder.tracks.ready;
+    const {frameCount, animated} = decoder.tracks.selectedTrack, seen = new Set(), canvas = document.createElement('canvas');
+    let size = '';
+    for (let i = 0; i < frameCount; i++) {
+      const {image} = await decoder.decode({frameIndex: i});
+      size = image.codedWidth + 'x' + image.codedHeight;
+      [canvas.width, canvas.height] = [image.codedWidth, image.codedHeight];
+      canvas.getContext('2d').drawImage(image, 0, 0);
+      seen.add(canvas.toDataURL());
+    }
+    return {frameCount, animated, size, different: seen.size};
+  })()`);
+  check(got.frameCount === 11 && got.animated && got.size === '320x120' && got.different >= 10, `moving picture: ${JSON.stringify(got)}`);
+  await page.close();
+}
+
+for (const part of [check_one, check_two, check_humanoid, check_pictures])
   await part().catch(error => check(false, `${part.name}: ${error.message}`));
 await browser.close();
 console.log(`${checks} checks, ${failed} failed`);

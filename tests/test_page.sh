@@ -25,4 +25,6 @@ sed "s#\.\./\.\./models#$root/problems/models#; s/translation=\"[0-9.]*/translat
   "$root/problems/motions/quadruped-trot/problem.xml" >near.xml
 "$cavort" solve --quiet --threads 1 near.xml -o near || exit 1
 "$cavort" view --quiet far near || exit 1
+node "$root/problems/picture.mjs" moving.webp far/view.html near/view.html --size 160x120 --rate 10 >out || { cat out; exit 1; }
+CAVORT=$cavort sh "$root/problems/gallery.sh" all near >out || { cat out; exit 1; }
 timeout 250 node "$root/tests/test_page.mjs" "$work" "$root"

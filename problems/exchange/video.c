@@ -1,4 +1,4 @@
-/// A motion as a video: the result's page, its stage filling the window, is stepped through by a headless Chromium, which
+/// A motion as a video: the result's page, its scene alone, is stepped through by a headless Chromium, which
 /// leaves its pictures as text in the page; ffmpeg makes the file of them. Neither is a part of the build: where one is
 /// missing the error names its package.
 #define _XOPEN_SOURCE 700 // nftw
@@ -21,19 +21,20 @@ extern char **environ;
 enum { PATH_ROOM = 4200 };
 
 static const char before[] =
-    "<style>#stage{position:fixed!important;inset:0;z-index:9999;width:100vw!important;height:100vh!important;"
-    "max-height:none!important;border-radius:0!important}</style><script>"
+    "<script>"
     // a page whose text is asked for is shown no frames; and a picture is read after it was drawn
     "window.requestAnimationFrame=draw=>setTimeout(()=>draw(performance.now()),16);{const "
     "own=HTMLCanvasElement.prototype.getContext;HTMLCanvasElement.prototype.getContext=function(kind,asked){"
     "return own.call(this,kind,/webgl/.test(kind)?{...asked,preserveDrawingBuffer:true}:asked);};}</script>";
 static const char after[] =
-    "<script>(async()=>{const next=()=>new Promise(requestAnimationFrame);await next();await next();"
+    "<script>(async()=>{const next=()=>new Promise(requestAnimationFrame);"
+    "const see=time=>{history.replaceState(null,'','#bare&t='+time);dispatchEvent(new Event('hashchange'));};"
+    "see(0);await next();await next();"
     "const stage=document.querySelector('#stage canvas'),paper=document.createElement('canvas'),lines=[];"
-    "if(stage){paper.width=stage.width&~1;paper.height=stage.height&~1;const pen=paper.getContext('2d');"
-    "for(let i=0;i<COUNT;i++){history.replaceState(null,'','#t='+i*STEP);dispatchEvent(new Event('hashchange'));"
-    "await next();await next();pen.fillStyle=getComputedStyle(document.body).backgroundColor;"
-    "pen.fillRect(0,0,paper.width,paper.height);pen.drawImage(stage,0,0);"
+    "if(stage){paper.width=stage.clientWidth&~1;paper.height=stage.clientHeight&~1;const pen=paper.getContext('2d');"
+    "for(let i=0;i<COUNT;i++){see(i*STEP);await next();await "
+    "next();pen.fillStyle=getComputedStyle(document.body).backgroundColor;"
+    "pen.fillRect(0,0,paper.width,paper.height);pen.drawImage(stage,0,0,paper.width,paper.height);"
     "lines.push(paper.toDataURL('image/jpeg',0.92));}}"
     "const all=document.createElement('pre');all.textContent=lines.join('\\n');document.body.replaceChildren(all);"
     "})();</script>";

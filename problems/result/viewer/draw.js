@@ -9,7 +9,8 @@ const quality = {
   slow: 0,  // frames in a row that came late
   still: 0,  // s that nothing moved; -1: drawn finely since
   frugal: false,
-  ratio: () => Math.min(devicePixelRatio || 1, [2, 1, 0.7][quality.level]),
+  // a scene alone is for pictures: twice as fine as the window
+  ratio: () => document.body.classList.contains('picture') ? 2 : Math.min(devicePixelRatio || 1, [2, 1, 0.7][quality.level]),
   apply() {
     renderer.setPixelRatio(this.ratio());
     const size = [2048, 1024, 512][this.level], type = this.level ? THREE.PCFShadowMap : THREE.PCFSoftShadowMap;
@@ -24,7 +25,7 @@ const quality = {
   // a frame after so many seconds while playing; only worse, never back: a change is seen
   note(seconds) {
     this.slow = seconds > 0.045 ? this.slow + 1 : Math.max(this.slow - 1, 0);
-    if (this.slow < 8 || this.level === 2) return;
+    if (this.slow < 8 || this.level === 2 || document.body.classList.contains('picture')) return;
     this.slow = 0;
     this.level++;
     this.apply();
@@ -103,7 +104,7 @@ function frame(now) {
     if (quality.still < 0) renderer.setPixelRatio(quality.ratio());
     quality.still = 0;
     draw();
-  } else if (renderer && quality.frugal && quality.still >= 0 && (quality.still += seconds) > 0.25) {
+  } else if (renderer && quality.frugal && quality.ratio() < 2 && quality.still >= 0 && (quality.still += seconds) > 0.25) {
     draw_still();
   }
   requestAnimationFrame(frame);

@@ -191,7 +191,11 @@ function read_address() {
     mark_preset();
     stale = true;
   }
-  document.body.classList.toggle('picture', asked.has('bare'));
+  const bare = asked.has('bare');
+  if (bare !== document.body.classList.contains('picture')) {
+    document.body.classList.toggle('picture', bare);
+    if (renderer) quality.apply();
+  }
   if (Number.isFinite(time)) {
     clock.play(false);
     clock.set(time);
