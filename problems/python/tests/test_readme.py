@@ -12,7 +12,7 @@ HERE = os.path.join(SOURCE, "problems", "python")
 TEXT = open(os.path.join(HERE, "README.md"), encoding="utf-8").read()
 BLOCKS = re.findall(r"```python\n(.*?)```", TEXT, re.S)
 FIRST = open(os.path.join(SOURCE, "README.md"), encoding="utf-8").read()
-LINES = re.findall(r"^    python3 -c '(.*)'$", TEXT + FIRST, re.M)
+LINES = re.findall(r"^python3 -c '(.*)'$", TEXT + FIRST, re.M)
 EXAMPLES = sorted(name for name in os.listdir(os.path.join(HERE, "examples")) if name.endswith(".py"))
 
 
