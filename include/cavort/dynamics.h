@@ -12,19 +12,19 @@ extern "C" {
 
 /// One contact point at (q, v, v_next). Impulses act on geom2 (and reversed on geom1) along the axes of frame.
 typedef struct cav_contact {
-  int pair;    ///< index into model->pair
-  int feature; ///< which point of the pair's manifold: stable between nearby configurations
-  int dim;     ///< rows: 1, 3, 4 or 6
-  int link1, link2;
-  double pos[3];         ///< m, world, midway between the surfaces
-  double frame[9];       ///< rows are axes in world coordinates; the first is the normal, from geom1 to geom2
-  double dist;           ///< m, gap between the surfaces; negative: penetration
-  double margin;         ///< m, margin - gap: the constraint pushes below this distance
-  double regulariser[6]; ///< R, 1/kg
-  double damping[6];     ///< h B, dimensionless: v* = (1 - hB) x' - h K x
-  double stiffness;      ///< h K of the normal row, 1/s
-  double sigma;          ///< smoothing of the law in impulse scale (dynamics/METHOD.md, 3), 0: exact
-  double friction[5];
+  int pair;                ///< index into model->pair
+  int feature;             ///< which point of the pair's manifold: stable between nearby configurations
+  int dim;                 ///< rows: 1, 3, 4 or 6
+  int link1, link2;        ///< links that touch, of geom1 and geom2
+  double pos[3];           ///< m, world, midway between the surfaces
+  double frame[9];         ///< rows are axes in world coordinates; the first is the normal, from geom1 to geom2
+  double dist;             ///< m, gap between the surfaces; negative: penetration
+  double margin;           ///< m, margin - gap: the constraint pushes below this distance
+  double regulariser[6];   ///< R, 1/kg
+  double damping[6];       ///< h B, dimensionless: v* = (1 - hB) x' - h K x
+  double stiffness;        ///< h K of the normal row, 1/s
+  double sigma;            ///< smoothing of the law in impulse scale (dynamics/METHOD.md, 3), 0: exact
+  double friction[5];      ///< two tangential, one torsional, two rolling coefficients
   double velocity[6];      ///< J v, m/s (rad/s for the last three); of all these the first dim count
   double velocity_next[6]; ///< J v_next
   double impulse[6];       ///< f, N s
@@ -32,22 +32,23 @@ typedef struct cav_contact {
 
 /// One scalar constraint at (q, v, v_next): a limit or a friction loss, of a joint (dof) or of a tendon.
 typedef enum cav_row_type {
-  CAV_ROW_LIMIT_JOINT,
-  CAV_ROW_LIMIT_TENDON,
-  CAV_ROW_FRICTION_DOF,
-  CAV_ROW_FRICTION_TENDON
+  CAV_ROW_LIMIT_JOINT,    ///< range of a joint
+  CAV_ROW_LIMIT_TENDON,   ///< range of a tendon
+  CAV_ROW_FRICTION_DOF,   ///< dry friction of a dof
+  CAV_ROW_FRICTION_TENDON ///< dry friction of a tendon
 } cav_row_type;
+/// A scalar constraint of a state: a limit, or a friction loss.
 typedef struct cav_row {
-  cav_row_type type;
-  int object;  ///< joint, tendon or dof
-  int side;    ///< limits: 0 lower, 1 upper; of a ball's cylinder 2 lower and 3 upper twist, 4 swing
-  double dist; ///< limits: distance to the limit, negative: violated
-  double margin;
-  double axis[3]; ///< gradient of dist: 1 value for scalar objects (+1 or -1), 3 for a ball joint
-  double bound;   ///< friction loss: h eta, N s
-  double regulariser, damping, stiffness, sigma;
-  double velocity, velocity_next; ///< J v and J v_next
-  double impulse;                 ///< f, N s or N m s
+  cav_row_type type; ///< what it limits
+  int object;        ///< joint, tendon or dof
+  int side;          ///< limits: 0 lower, 1 upper; of a ball's cylinder 2 lower and 3 upper twist, 4 swing
+  double dist;       ///< limits: distance to the limit, negative: violated
+  double margin;     ///< m or rad: distance at which it becomes active
+  double axis[3];    ///< gradient of dist: 1 value for scalar objects (+1 or -1), 3 for a ball joint
+  double bound;      ///< friction loss: h eta, N s
+  double regulariser, damping, stiffness, sigma; ///< R, B, K and the smoothing of its law (dynamics/METHOD.md, 4)
+  double velocity, velocity_next;                ///< J v and J v_next
+  double impulse;                                ///< f, N s or N m s
 } cav_row;
 
 /// One equality constraint at (q, v, v_next). Impulses act on the first object and, reversed, on the second.
@@ -59,24 +60,24 @@ typedef struct cav_equality_rows {
   double rotation[9]; ///< weld: rate of error[3..5] = rotation (w1 - w2), angular velocities in world axes
   double normal[3];   ///< distance: from the second geom to the first
   double derivative;  ///< joint, tendon: rate of error = v1 - derivative v2
-  double regulariser[6];
-  double damping, stiffness; ///< h B and h K of all rows: v* = (1 - hB) x' - hK x
-  double velocity[6], velocity_next[6], impulse[6];
+  double regulariser[6];                            ///< R of each dimension
+  double damping, stiffness;                        ///< h B and h K of all rows: v* = (1 - hB) x' - hK x
+  double velocity[6], velocity_next[6], impulse[6]; ///< J v, J v_next and impulse of each dimension
 } cav_equality_rows;
 
 /// World pose of a link. Row-major rotation: world = rotation * local + pos.
 typedef struct cav_pose {
-  double pos[3];
-  double rotation[9];
-  double quat[4];
+  double pos[3];      ///< m, world
+  double rotation[9]; ///< its axes in the world, row-major
+  double quat[4];     ///< the same as a unit quaternion w x y z
 } cav_pose;
 
 /// What one thread computes at one (q, v, v_next). Readable after the call that fills it, written by the library only
 /// (except options). Spatial vectors are (angular, linear) in world axes at the tree's reference point.
 typedef struct cav_state {
-  const cav_model *model;
-  cav_options options;
-  double time; ///< s, the caller's: what a clock reads
+  const cav_model *model; ///< that it was made for
+  cav_options options;    ///< starts as the model's; may be changed before an evaluation
+  double time;            ///< s, the caller's: what a clock reads
 
   // position: filled from q
   cav_pose *link;        ///< [nlink] world poses
@@ -86,10 +87,10 @@ typedef struct cav_state {
   double *axis;          ///< [nv*6] motion subspace of each dof: what a unit velocity does
   double *tendon_length; ///< [ntendon]
   double *tendon_arm;    ///< [ntendon_dof] gradient of the length along each dof of model->tendon_dof
-  int ncontact, nrow, nequality;
-  cav_contact *contact;        ///< [ncontact]; geometry only depends on q, velocities and impulses on all
-  cav_row *row;                ///< [nrow]
-  cav_equality_rows *equality; ///< [nequality] one for each equality constraint, in their order
+  int ncontact, nrow, nequality; ///< what is active
+  cav_contact *contact;          ///< [ncontact]; geometry only depends on q, velocities and impulses on all
+  cav_row *row;                  ///< [nrow]
+  cav_equality_rows *equality;   ///< [nequality] one for each equality constraint, in their order
 
   // velocity: filled from q and v (euler) or the mean of v and v_next (midpoint, momentum)
   double *velocity;      ///< [nlink*6] spatial velocity of each link at the velocity the bias is taken
@@ -139,7 +140,7 @@ CAV_API cav_status cav_forward(const cav_model *model, cav_state *state, const d
 
 /// What a forward solve did.
 typedef struct cav_forward_report {
-  int iterations;
+  int iterations; ///< of Newton's method, or sweeps
   /// 1: past a fold, where steps that are not convex come in pairs; with CAV_NOT_CONVERGED: there is no step, the curve of
   /// those of shorter ones turns before it (Newton only).
   int folded;

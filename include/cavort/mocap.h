@@ -12,15 +12,19 @@ extern "C" {
 /// Places of markers, frame by frame, in the world of the models: m, z up. A marker that was not seen is NaN in all
 /// three.
 typedef struct cav_record {
-  int nframe, nmarker;
-  double *time;     ///< [nframe] s, increasing
-  char **name;      ///< [nmarker] unique
-  double *position; ///< [nframe*nmarker*3] m
-  int assumed;      ///< which of the options below the file did not say and nobody gave: CAV_ASSUMED_...
+  int nframe, nmarker; ///< sizes of the clip
+  double *time;        ///< [nframe] s, increasing
+  char **name;         ///< [nmarker] unique
+  double *position;    ///< [nframe*nmarker*3] m
+  int assumed;         ///< which of the options below the file did not say and nobody gave: CAV_ASSUMED_...
 } cav_record;
 
 /// Bits of cav_record.assumed.
-enum { CAV_ASSUMED_UNIT = 1, CAV_ASSUMED_UP = 2, CAV_ASSUMED_RATE = 4 };
+enum {
+  CAV_ASSUMED_UNIT = 1, ///< unit of length
+  CAV_ASSUMED_UP = 2,   ///< axis that is up
+  CAV_ASSUMED_RATE = 4  ///< frames a second
+};
 
 /// What a file of recorded motion may leave out. Zeros: as the file says, or as its format has it.
 typedef struct cav_record_options {
@@ -47,7 +51,7 @@ CAV_API cav_status cav_record_write(const char *path, const cav_record *record, 
 
 /// One marker on a body.
 typedef struct cav_marker {
-  char *name;
+  char *name;      ///< as the clip has it
   int body;        ///< of the model
   double place[3]; ///< m, in the body's frame
   int placed;      ///< 1: place is known; 0: it is where a search for it starts
@@ -56,7 +60,7 @@ typedef struct cav_marker {
 
 /// Which markers a subject or a robot wears, and how their clips are to be read.
 typedef struct cav_marker_set {
-  int nmarker;
+  int nmarker;             ///< how many
   cav_marker *marker;      ///< [nmarker] names are unique
   double adjust;           ///< m: how far off places that are known may be; they are fitted, too. 0: they are exact
   cav_record_options clip; ///< for cav_record_read; names is memory of the set
@@ -84,6 +88,7 @@ typedef struct cav_ik_options {
   int iterations; ///< at most, a frame
 } cav_ik_options;
 
+/// The usual options.
 CAV_API cav_ik_options cav_ik_options_default(void);
 
 /// What a fit found. Errors are distances of markers, m.
@@ -98,6 +103,7 @@ typedef struct cav_ik_report {
   int iterations;      ///< in all
 } cav_ik_report;
 
+/// Frees what a report holds; NULL is fine.
 CAV_API void cav_ik_report_free(cav_ik_report *report);
 
 /// Fits a model to a clip: first the places of markers that are not known, together with configurations of frames

@@ -12,8 +12,15 @@
 extern "C" {
 #endif
 
-typedef enum cav_joint_type { CAV_JOINT_FREE, CAV_JOINT_BALL, CAV_JOINT_SLIDE, CAV_JOINT_HINGE } cav_joint_type;
+/// How a joint lets its body move: six dofs, three, one along or one about its axis.
+typedef enum cav_joint_type {
+  CAV_JOINT_FREE,  ///< a position and a quaternion: six dofs
+  CAV_JOINT_BALL,  ///< a quaternion: three dofs
+  CAV_JOINT_SLIDE, ///< a distance along its axis
+  CAV_JOINT_HINGE  ///< an angle about its axis
+} cav_joint_type;
 
+/// Shapes, in the order in which pairs are sorted.
 typedef enum cav_geom_type {
   CAV_GEOM_PLANE,     ///< z = 0, solid below; size unused
   CAV_GEOM_SPHERE,    ///< size[0] radius
@@ -30,21 +37,31 @@ typedef enum cav_geom_type {
 typedef enum cav_transmission {
   CAV_TRANSMISSION_JOINT,           ///< gear along the joint's own dofs
   CAV_TRANSMISSION_JOINT_IN_PARENT, ///< ball and free: turning gear in the axes of the parent (free: of the world)
-  CAV_TRANSMISSION_TENDON,
-  CAV_TRANSMISSION_SITE, ///< force and torque in the site's axes, or in those of a reference site
-  CAV_TRANSMISSION_CRANK ///< slider-crank
+  CAV_TRANSMISSION_TENDON,          ///< along a tendon
+  CAV_TRANSMISSION_SITE,            ///< force and torque in the site's axes, or in those of a reference site
+  CAV_TRANSMISSION_CRANK            ///< slider-crank
 } cav_transmission;
 
 /// What the input of an actuator is: its control, or an activation that follows the control (a state MuJoCo
 /// integrates).
 typedef enum cav_activation {
-  CAV_ACTIVATION_NONE,
-  CAV_ACTIVATION_INTEGRATOR,
-  CAV_ACTIVATION_FILTER,
-  CAV_ACTIVATION_MUSCLE
+  CAV_ACTIVATION_NONE,       ///< none: the control acts at once
+  CAV_ACTIVATION_INTEGRATOR, ///< rate of the activation: the control
+  CAV_ACTIVATION_FILTER,     ///< first-order filter of the control
+  CAV_ACTIVATION_MUSCLE      ///< a muscle's
 } cav_activation;
-typedef enum cav_gain { CAV_GAIN_FIXED, CAV_GAIN_AFFINE, CAV_GAIN_MUSCLE } cav_gain;
-typedef enum cav_bias { CAV_BIAS_NONE, CAV_BIAS_AFFINE, CAV_BIAS_MUSCLE } cav_bias;
+/// How the gain of an actuator is computed.
+typedef enum cav_gain {
+  CAV_GAIN_FIXED,  ///< a constant
+  CAV_GAIN_AFFINE, ///< affine in length and velocity
+  CAV_GAIN_MUSCLE  ///< a muscle's, by length and velocity
+} cav_gain;
+/// How the bias of an actuator is computed.
+typedef enum cav_bias {
+  CAV_BIAS_NONE,   ///< none
+  CAV_BIAS_AFFINE, ///< affine in length and velocity
+  CAV_BIAS_MUSCLE  ///< a muscle's passive force
+} cav_bias;
 
 /// What sensors measure, X(type, MJCF's name, length of a reading, what it looks at, last stage it needs, text): MJCF's
 /// names, shapes and conventions. Velocities are those at v_next; accelerations and forces are those of the step from v
@@ -90,6 +107,7 @@ typedef enum cav_bias { CAV_BIAS_NONE, CAV_BIAS_AFFINE, CAV_BIAS_MUSCLE } cav_bi
   X(CLOCK, "clock", 1, NONE, POSITION, "s, state->time")
 // clang-format on
 
+/// Types of sensors: CAV_SENSORS.
 typedef enum cav_sensor_type {
 #define CAV_SENSOR_MEMBER(type, ...) CAV_SENSOR_##type,
   CAV_SENSORS(CAV_SENSOR_MEMBER)
@@ -114,6 +132,7 @@ enum { CAV_SENSOR_DIM_MAX = 4 }; ///< most numbers of a reading
   X(SENSOR, sensor, "sensor", "sensor")         \
   X(EQUALITY, equality, "equality", "equality constraint")
 
+/// Kinds of objects: CAV_OBJECTS.
 typedef enum cav_object_type {
 #define CAV_OBJECT_MEMBER(type, ...) CAV_OBJECT_##type,
   CAV_OBJECTS(CAV_OBJECT_MEMBER)
@@ -123,16 +142,16 @@ typedef enum cav_object_type {
 
 /// What a sensor may look at.
 typedef enum cav_sensor_target {
-  CAV_TARGET_NONE,  ///< nothing: a clock
-  CAV_TARGET_FRAME, ///< body, xbody, geom or site
-  CAV_TARGET_BODY,  ///< subtree of a body
-  CAV_TARGET_SITE,
-  CAV_TARGET_SCALAR_JOINT, ///< hinge or slide
-  CAV_TARGET_BALL_JOINT,
-  CAV_TARGET_LIMITED_JOINT,
-  CAV_TARGET_TENDON,
-  CAV_TARGET_LIMITED_TENDON,
-  CAV_TARGET_ACTUATOR
+  CAV_TARGET_NONE,           ///< nothing: a clock
+  CAV_TARGET_FRAME,          ///< body, xbody, geom or site
+  CAV_TARGET_BODY,           ///< subtree of a body
+  CAV_TARGET_SITE,           ///< a site
+  CAV_TARGET_SCALAR_JOINT,   ///< hinge or slide
+  CAV_TARGET_BALL_JOINT,     ///< a ball joint
+  CAV_TARGET_LIMITED_JOINT,  ///< a joint with a range
+  CAV_TARGET_TENDON,         ///< a tendon
+  CAV_TARGET_LIMITED_TENDON, ///< a tendon with a range
+  CAV_TARGET_ACTUATOR        ///< an actuator
 } cav_sensor_target;
 
 /// The last stage of an evaluation that a sensor needs.
@@ -144,11 +163,11 @@ typedef enum cav_sensor_stage {
 
 /// What holds for all sensors of a type.
 typedef struct cav_sensor_rule {
-  const char *name; ///< MJCF's element
-  int dim;          ///< length of a reading; 4: a unit quaternion
-  cav_sensor_target target;
-  cav_sensor_stage stage;
-  const char *text; ///< unit and meaning
+  const char *name;         ///< MJCF's element
+  int dim;                  ///< length of a reading; 4: a unit quaternion
+  cav_sensor_target target; ///< what it looks at
+  cav_sensor_stage stage;   ///< last stage of an evaluation that it reads
+  const char *text;         ///< unit and meaning
 } cav_sensor_rule;
 
 /// Softness of one constraint as MJCF writes it; dynamics/METHOD.md, 4.
@@ -159,12 +178,12 @@ typedef struct cav_softness {
 
 /// A body as the file names it. Body 0 is the world.
 typedef struct cav_body {
-  const char *name; ///< never NULL; "" if the file gives none
-  int parent;       ///< body; 0 for children of the world; -1 for the world
-  int link;         ///< link it is part of
-  int geom, ngeom;  ///< its geoms: first, count
-  double pos[3];    ///< frame in its link's frame
-  double quat[4];
+  const char *name;         ///< never NULL; "" if the file gives none
+  int parent;               ///< body; 0 for children of the world; -1 for the world
+  int link;                 ///< link it is part of
+  int geom, ngeom;          ///< its geoms: first, count
+  double pos[3];            ///< frame in its link's frame
+  double quat[4];           ///< unit quaternion w x y z of its frame in the frame of its link
   double mass;              ///< kg
   double com[3];            ///< centre of mass in the body frame
   double iquat[4];          ///< principal axes in the body frame
@@ -180,42 +199,43 @@ typedef struct cav_link {
   int parent;        ///< link; -1 for the world
   int root;          ///< link at the top of its tree (child of the world); 0 for the world
   int joint, njoint; ///< joints in the order in which they act
-  int dof, ndof;
-  double pos[3]; ///< frame in the parent link's frame at zero joint displacement
-  double quat[4];
+  int dof, ndof;     ///< dofs: first, count
+  double pos[3];     ///< frame in the parent link's frame at zero joint displacement
+  double quat[4];    ///< unit quaternion w x y z at q0, in the frame of its parent
   double mass;       ///< kg, of all its bodies
   double com[3];     ///< centre of mass in the link frame
   double inertia[6]; ///< about the centre of mass, link axes: xx yy zz xy xz yz, kg m^2
 } cav_link;
 
+/// A joint; its coordinates follow each other in q and v.
 typedef struct cav_joint {
-  const char *name;
-  cav_joint_type type;
-  int body, link;
-  int q, dof;      ///< first index into q and into v
-  double pos[3];   ///< anchor in the link frame
-  double axis[3];  ///< unit, link frame (hinge, slide, twist of a ball)
-  double ref;      ///< q of a hinge or slide in the posture of the file
-  int limited;     ///< 1 if range holds
-  double range[2]; ///< rad or m; ball: range[1] is the largest rotation angle
+  const char *name;    ///< as in the file
+  cav_joint_type type; ///< kind of joint
+  int body, link;      ///< body and link that it moves
+  int q, dof;          ///< first index into q and into v
+  double pos[3];       ///< anchor in the link frame
+  double axis[3];      ///< unit, link frame (hinge, slide, twist of a ball)
+  double ref;          ///< q of a hinge or slide in the posture of the file
+  int limited;         ///< 1 if range holds
+  double range[2];     ///< rad or m; ball: range[1] is the largest rotation angle
   /// Ball: the cylinder of Todorov 2014 in the rotation vector of its quaternion, rad: twist is its component along
   /// axis, within a range, swing the length of the rest, at most a radius. Each holds where its flag is 1.
-  int twist_limited, swing_limited;
-  double twist[2], swing;
-  double margin; ///< limit acts from this distance on
-  cav_softness limit;
-  double stiffness; ///< N m/rad or N/m
-  double springref; ///< hinge and slide: q at rest of the spring
+  int twist_limited, swing_limited; ///< ball: whether the angle is limited
+  double twist[2], swing;           ///< rad, ball: range of the twist, largest swing
+  double margin;                    ///< limit acts from this distance on
+  cav_softness limit;               ///< softness of the limit
+  double stiffness;                 ///< N m/rad or N/m
+  double springref;                 ///< hinge and slide: q at rest of the spring
   /// Limit on what all actuators together do to a hinge or slide, N m or N (actuatorfrcrange of MJCF); the force ranges
   /// of those actuators are within it.
   int effort_limited;
-  double effort_range[2];
+  double effort_range[2]; ///< N or N m: what actuators on it may give together
   double speed; ///< hinge and slide: limit in the file, rad/s or m/s, told in certificates, obeyed by nothing; 0: none
 } cav_joint;
 
 /// One degree of freedom, index into v.
 typedef struct cav_dof {
-  int link, joint;
+  int link, joint;       ///< that it belongs to
   int parent;            ///< previous dof towards the root, -1 if none
   double damping;        ///< N m s/rad or N s/m
   double armature;       ///< kg m^2 or kg
@@ -226,8 +246,8 @@ typedef struct cav_dof {
 
 /// Convex hull of a mesh, about its centre of mass and principal axes: the frame of its geoms.
 typedef struct cav_mesh {
-  const char *name;
-  int nvertex, nface;
+  const char *name;     ///< as in the file
+  int nvertex, nface;   ///< vertices and polygons
   const double *vertex; ///< [nvertex*3] m
   const double *plane;  ///< [nface*4] of each polygon: outward unit normal n and offset d, n x <= d inside
   const int *face;      ///< [nface+1] first entry of each polygon in corner
@@ -242,94 +262,98 @@ typedef struct cav_mesh {
 
 /// Heights over a grid in the x-y plane, solid down to -base; x grows along columns, y along rows, both about 0.
 typedef struct cav_hfield {
-  const char *name;
-  int nrow, ncol;
+  const char *name;     ///< as in the file
+  int nrow, ncol;       ///< grid
   double size[2];       ///< half lengths along x and y, m
   double top, base;     ///< m: largest height that elevation 1 stands for; depth below 0
   const double *height; ///< [nrow*ncol] m
 } cav_hfield;
 
+/// A shape that collides, or weighs, or is only seen.
 typedef struct cav_geom {
-  const char *name;
-  cav_geom_type type;
-  int body, link;
-  int number;    ///< in its body, from 1, in the order of the file and with those that are left out
-  double pos[3]; ///< in the link frame
-  double quat[4];
-  double rotation[9]; ///< of quat, row-major
-  double size[3];
-  int asset;    ///< of a mesh or height field: index of its kind
-  double bound; ///< radius of the bounding sphere about pos; infinite for a plane
-  int contype, conaffinity;
-  int condim, priority;
-  double friction[3]; ///< sliding, torsional (m), rolling (m)
-  double margin, gap; ///< m
-  double solmix;
-  cav_softness softness;
-  int fluid;           ///< 1: in a medium this geom is an ellipsoid, and its body no box
-  double fluidcoef[5]; ///< drag blunt, slender, angular; lift of Kutta, of Magnus
-  float rgba[4];
-  int group;
+  const char *name;         ///< as in the file; "" if it has no name
+  cav_geom_type type;       ///< kind of shape
+  int body, link;           ///< that it is fixed to
+  int number;               ///< in its body, from 1, in the order of the file and with those that are left out
+  double pos[3];            ///< in the link frame
+  double quat[4];           ///< unit quaternion w x y z in the frame of its link
+  double rotation[9];       ///< of quat, row-major
+  double size[3];           ///< m, by type as in MJCF
+  int asset;                ///< of a mesh or height field: index of its kind
+  double bound;             ///< radius of the bounding sphere about pos; infinite for a plane
+  int contype, conaffinity; ///< bits: a pair is tested if either one's contype meets the other's conaffinity
+  int condim, priority;     ///< dimensions of its contacts; the pair takes the parameters of the higher priority
+  double friction[3];       ///< sliding, torsional (m), rolling (m)
+  double margin, gap;       ///< m
+  double solmix;            ///< weight of its softness in a pair
+  cav_softness softness;    ///< of its contacts
+  int fluid;                ///< 1: in a medium this geom is an ellipsoid, and its body no box
+  double fluidcoef[5];      ///< drag blunt, slender, angular; lift of Kutta, of Magnus
+  float rgba[4];            ///< colour, for pages
+  int group;                ///< as in the file
 } cav_geom;
 
+/// A place on a body.
 typedef struct cav_site {
-  const char *name;
-  int body, link;
-  double pos[3]; ///< in the link frame
-  double quat[4];
+  const char *name;   ///< as in the file
+  int body, link;     ///< that it is fixed to
+  double pos[3];      ///< in the link frame
+  double quat[4];     ///< unit quaternion w x y z in the frame of its link
   cav_geom_type type; ///< shape of the zone of a touch sensor: sphere, capsule, ellipsoid, cylinder or box
-  double size[3];
+  double size[3];     ///< m, by type as in MJCF
 } cav_site;
 
 /// Two geoms that may touch; everything mixed at compile time. Only pairs that can touch are listed.
 typedef struct cav_pair {
-  int geom1, geom2;   ///< geom1's type <= geom2's type
-  int dim;            ///< 1, 3, 4 or 6 rows
-  int listed;         ///< 1: the file lists this pair, whatever masks say
-  int external;       ///< 1 if one of the two stands in the world, or they hang from the world by different roots
-  double friction[5]; ///< two tangential, torsional (m), two rolling (m)
-  double margin, gap; ///< m
-  cav_softness softness;
-  double weight[2]; ///< reference diagonal of A: translation, rotation (sum of both bodies' inverse_weight)
+  int geom1, geom2;      ///< geom1's type <= geom2's type
+  int dim;               ///< 1, 3, 4 or 6 rows
+  int listed;            ///< 1: the file lists this pair, whatever masks say
+  int external;          ///< 1 if one of the two stands in the world, or they hang from the world by different roots
+  double friction[5];    ///< two tangential, torsional (m), two rolling (m)
+  double margin, gap;    ///< m
+  cav_softness softness; ///< of its contacts
+  double weight[2];      ///< reference diagonal of A: translation, rotation (sum of both bodies' inverse_weight)
 } cav_pair;
 
 /// One joint of a fixed tendon.
 typedef struct cav_tendon_part {
-  int joint;
-  double coef;
+  int joint;   ///< that it moves with
+  double coef; ///< length of the tendon per rad or m of the joint
 } cav_tendon_part;
 
 /// What the path of a spatial tendon meets next.
 typedef enum cav_tendon_path_type {
-  CAV_TENDON_PATH_SITE,
-  CAV_TENDON_PATH_SPHERE,
-  CAV_TENDON_PATH_CYLINDER,
-  CAV_TENDON_PATH_PULLEY
+  CAV_TENDON_PATH_SITE,     ///< passes a site
+  CAV_TENDON_PATH_SPHERE,   ///< around or through a sphere
+  CAV_TENDON_PATH_CYLINDER, ///< around or through a cylinder
+  CAV_TENDON_PATH_PULLEY    ///< a pulley divides it
 } cav_tendon_path_type;
+/// A point of the path of a spatial tendon.
 typedef struct cav_tendon_path_point {
-  cav_tendon_path_type type;
-  int object;     ///< site to pass through, or geom to wrap around
-  int side;       ///< geoms: site on the side to pass, or inside to come through; -1: the shorter way
-  double divisor; ///< pulleys: of the length of the branch that starts here
+  cav_tendon_path_type type; ///< what the path meets there
+  int object;                ///< site to pass through, or geom to wrap around
+  int side;                  ///< geoms: site on the side to pass, or inside to come through; -1: the shorter way
+  double divisor;            ///< pulleys: of the length of the branch that starts here
 } cav_tendon_path_point;
 
 /// Tendon. Fixed: length = sum coef q_joint. Spatial: length of the string along its path.
 typedef struct cav_tendon {
-  const char *name;
-  int part, npart; ///< fixed: range in model->tendon_part
-  int path, npath; ///< spatial: range in model->tendon_path; npath is 0 for a fixed one
-  int dof, ndof;   ///< range in model->tendon_dof: what can change its length
-  int limited;
-  double range[2];
-  double margin;
-  cav_softness limit;
-  double stiffness, damping;
-  double springlength[2]; ///< the spring is slack between these lengths, m or rad
-  double frictionloss;
-  cav_softness friction;
-  double inverse_weight; ///< J M^-1 J' at q0
+  const char *name;          ///< as in the file
+  int part, npart;           ///< fixed: range in model->tendon_part
+  int path, npath;           ///< spatial: range in model->tendon_path; npath is 0 for a fixed one
+  int dof, ndof;             ///< range in model->tendon_dof: what can change its length
+  int limited;               ///< whether its length is limited
+  double range[2];           ///< m or rad: of its length
+  double margin;             ///< m or rad: distance from the range at which the limit becomes active
+  cav_softness limit;        ///< softness of the limit
+  double stiffness, damping; ///< N/m and N s/m, of a fixed one per unit of its length
+  double springlength[2];    ///< the spring is slack between these lengths, m or rad
+  double frictionloss;       ///< N: dry friction
+  cav_softness friction;     ///< softness of the dry friction
+  double inverse_weight;     ///< J M^-1 J' at q0
 } cav_tendon;
 
+/// Kinds of equality constraints.
 typedef enum cav_equality_type {
   CAV_EQUALITY_CONNECT, ///< two points of two bodies are one
   CAV_EQUALITY_WELD,    ///< two frames of two bodies are one
@@ -340,23 +364,23 @@ typedef enum cav_equality_type {
 
 /// Constraint that holds always, softly: error x -> 0. Todorov 2014, eqs. (5)-(7).
 typedef struct cav_equality {
-  const char *name;
-  cav_equality_type type;
-  int dim;             ///< rows: connect 3, weld 6, others 1
-  int object[2];       ///< bodies, joints, tendons or geoms; the second joint or tendon may be -1: none
-  int placed;          ///< connect, weld: both points and frames are the file's own (sites), not those of q0
-  int link[2];         ///< of bodies and geoms
-  double pos[2][3];    ///< connect, weld: the points that are one, each in its link's frame, m
-  double quat[2][4];   ///< weld: the frames that are one, each in its link's frame
-  double torquescale;  ///< weld: length per sine of half the angle between the frames, m
-  double reference[2]; ///< joint, tendon: r, the values at q0
-  double coef[5];      ///< joint, tendon: of the polynomial, constant first
-  double distance;     ///< m
-  cav_softness softness;
-  double weight; ///< reference diagonal of A, the same for all rows
+  const char *name;       ///< as in the file; "" if it has no name
+  cav_equality_type type; ///< kind of constraint
+  int dim;                ///< rows: connect 3, weld 6, others 1
+  int object[2];          ///< bodies, joints, tendons or geoms; the second joint or tendon may be -1: none
+  int placed;             ///< connect, weld: both points and frames are the file's own (sites), not those of q0
+  int link[2];            ///< of bodies and geoms
+  double pos[2][3];       ///< connect, weld: the points that are one, each in its link's frame, m
+  double quat[2][4];      ///< weld: the frames that are one, each in its link's frame
+  double torquescale;     ///< weld: length per sine of half the angle between the frames, m
+  double reference[2];    ///< joint, tendon: r, the values at q0
+  double coef[5];         ///< joint, tendon: of the polynomial, constant first
+  double distance;        ///< m
+  cav_softness softness;  ///< of the constraint
+  double weight;          ///< reference diagonal of A, the same for all rows
 } cav_equality;
 
-enum { CAV_ACTUATOR_PARAMETERS = 10 };
+enum { CAV_ACTUATOR_PARAMETERS = 10 }; ///< most parameters of a law
 
 /// Actuator: force = gain(length, velocity) input + bias(length, velocity), clamped; its fraction of u is force times
 /// the moments of its transmission. What is planned with is its effort: u = sum unit effort moment. A motor (fixed
@@ -364,59 +388,67 @@ enum { CAV_ACTUATOR_PARAMETERS = 10 };
 /// force, of which bias is a part, as the servo's pull towards its target: a law of control, not a passive force of the
 /// model.
 typedef struct cav_actuator {
-  const char *name;
-  cav_transmission transmission;
-  int target;     ///< joint, tendon, site, or site of the crank
-  int reference;  ///< site of reference, or of the slider; -1 for none
-  int constant;   ///< 1 if the moments do not depend on q
+  const char *name;              ///< as in the file
+  cav_transmission transmission; ///< what it acts on
+  int target;                    ///< joint, tendon, site, or site of the crank
+  int reference;                 ///< site of reference, or of the slider; -1 for none
+  int constant;                  ///< 1 if the moments do not depend on q
   double gear[6]; ///< gear[0] for scalar joints, tendons and cranks; ball (3); free joint and site (6): force, torque
-  double cranklength; ///< m
-  cav_activation activation;
-  cav_gain gain;
-  cav_bias bias;
-  double activation_parameter[3];
+  double cranklength;             ///< m
+  cav_activation activation;      ///< law of its activation
+  cav_gain gain;                  ///< law of its gain
+  cav_bias bias;                  ///< law of its bias
+  double activation_parameter[3]; ///< of the law of the activation
   double gain_parameter
       [CAV_ACTUATOR_PARAMETERS]; ///< fixed: [0]; affine: constant, per length, per velocity; muscle: MJCF's
-  double bias_parameter[CAV_ACTUATOR_PARAMETERS];
-  double unit; ///< force of one unit of effort
-  int ctrllimited, forcelimited, actlimited;
-  double ctrlrange[2];
-  double forcerange[2];  ///< in units of effort
-  double actrange[2];    ///< of an integrated activation
-  double lengthrange[2]; ///< muscles: shortest and longest transmission
-  double acceleration;   ///< |M^-1 moments| at q0, what a unit force causes
+  double bias_parameter[CAV_ACTUATOR_PARAMETERS]; ///< of the law of the bias
+  double unit;                                    ///< force of one unit of effort
+  int ctrllimited, forcelimited, actlimited;      ///< whether control, force and activation are limited
+  double ctrlrange[2];                            ///< range of the control
+  double forcerange[2];                           ///< in units of effort
+  double actrange[2];                             ///< of an integrated activation
+  double lengthrange[2];                          ///< muscles: shortest and longest transmission
+  double acceleration;                            ///< |M^-1 moments| at q0, what a unit force causes
 } cav_actuator;
 
+/// A sensor of the model, or one that a problem declares.
 typedef struct cav_sensor {
-  const char *name;
-  cav_sensor_type type;
-  cav_object_type object_type;
+  const char *name;               ///< as in the file; "" of a declared one
+  cav_sensor_type type;           ///< what it reads
+  cav_object_type object_type;    ///< kind of the object that it looks at
   int object;                     ///< index of that kind
   int dim;                        ///< length of its reading
   int adr;                        ///< first index in the vector of all readings
   int referred;                   ///< frame sensors: 1 if readings are in the frame of the following object
   cav_object_type reference_type; ///< a kind with a frame
-  int reference;
+  int reference;                  ///< number of the object of reference_type in whose frame it reads
   double cutoff; ///< values beyond are cut to it, both ways; 0: not cut. Never cuts axes and quaternions
 } cav_sensor;
 
+/// A keyframe.
 typedef struct cav_key {
-  const char *name;
-  double time;
-  const double *q; ///< [nq]
-  const double *v; ///< [nv]
+  const char *name; ///< as in the file
+  double time;      ///< s, as in the file
+  const double *q;  ///< [nq]
+  const double *v;  ///< [nv]
 } cav_key;
 
 /// A member of a struct of options, as the table of that struct declares it: what may stand there.
-typedef enum cav_field_type { CAV_FIELD_REAL, CAV_FIELD_WHOLE, CAV_FIELD_FLAG, CAV_FIELD_WORD } cav_field_type;
+typedef enum cav_field_type {
+  CAV_FIELD_REAL,  ///< a double
+  CAV_FIELD_WHOLE, ///< an int
+  CAV_FIELD_FLAG,  ///< an int, 0 or 1
+  CAV_FIELD_WORD   ///< an enumeration
+} cav_field_type;
 
+/// A member of a struct with a table: its type, place, range and meaning.
 typedef struct cav_field {
-  const char *name; ///< of the member, and of its attribute in problem files
-  cav_field_type type;
+  const char *name;         ///< of the member, and of its attribute in problem files
+  cav_field_type type;      ///< its type
   size_t offset;            ///< of a double; of an int or an enumeration
   double least, most;       ///< of numbers and words; least DBL_MIN: above 0
   const char *const *words; ///< of a word, by enumerator; NULL at the end
-  const char *unit, *text;
+  const char *unit, *text;  ///< of its value, "" if it has none; what it means
 } cav_field;
 
 /// Which velocity the bias force c and the passive force p are evaluated at, or what takes their place;
@@ -480,11 +512,17 @@ typedef struct cav_field {
 // clang-format on
 
 #define CAV_WORD_MEMBER(enumerator, word, text) enumerator,
+/// Order of the step: CAV_ORDERS.
 typedef enum cav_order { CAV_ORDERS(CAV_WORD_MEMBER) } cav_order;
+/// Where springs act: CAV_SPRINGS.
 typedef enum cav_spring { CAV_SPRINGS(CAV_WORD_MEMBER) } cav_spring;
+/// How position errors are undone: CAV_STABILISATIONS.
 typedef enum cav_stabilisation { CAV_STABILISATIONS(CAV_WORD_MEMBER) } cav_stabilisation;
+/// Scale of the regulariser: CAV_REGULARISERS.
 typedef enum cav_regulariser { CAV_REGULARISERS(CAV_WORD_MEMBER) } cav_regulariser;
+/// Law of contacts that slide: CAV_SLIDINGS.
 typedef enum cav_sliding { CAV_SLIDINGS(CAV_WORD_MEMBER) } cav_sliding;
+/// Gap after the step: CAV_NEXT_GAPS.
 typedef enum cav_next_gap { CAV_NEXT_GAPS(CAV_WORD_MEMBER) } cav_next_gap;
 #undef CAV_WORD_MEMBER
 
@@ -531,24 +569,25 @@ CAV_API cav_status cav_fields_check(const cav_field *field, int n, const void *v
 
 /// A compiled model. Built by cav_model_load; nothing but cav_model_perturb changes it, before any state of it exists.
 typedef struct cav_model {
-  const char *name;
-  int nq, nv, nu;  ///< sizes of q, v and of the control vector (one per actuator)
-  double timestep; ///< s, of the file: where options.timestep starts, which evaluations use
-  double gravity[3];
+  const char *name;                   ///< as in the file
+  int nq, nv, nu;                     ///< sizes of q, v and of the control vector (one per actuator)
+  double timestep;                    ///< s, of the file: where options.timestep starts, which evaluations use
+  double gravity[3];                  ///< m/s^2
   double density, viscosity, wind[3]; ///< of the medium: kg/m^3, kg/(m s), m/s; both 0: none
   double magnetic[3];                 ///< field that magnetometers read, world
   cav_options options;                ///< defaults for new states
 
-  int nbody, nlink, njoint, ngeom, nsite, npair, ntendon, ntendon_part, ntendon_path, ntendon_dof, nequality, nactuator,
-      nsensor, nkey, nwarning;
-  int nmesh, nhfield;
+  int nbody, nlink, njoint, ngeom, nsite, npair;        ///< sizes of the arrays below
+  int ntendon, ntendon_part, ntendon_path, ntendon_dof; ///< sizes of the arrays below
+  int nequality, nactuator, nsensor, nkey, nwarning;    ///< sizes of the arrays below
+  int nmesh, nhfield;                                   ///< sizes of the arrays below
   int fused;       ///< 1: bodies without joints take the reference weights of the link they are part of
   int nsensordata; ///< length of the vector of all readings
 #define CAV_ARRAY_MEMBER(type, name, count) const type *name;
   CAV_MODEL_ARRAYS(CAV_ARRAY_MEMBER)
 #undef CAV_ARRAY_MEMBER
-  const cav_mesh *mesh;
-  const cav_hfield *hfield;
+  const cav_mesh *mesh;       ///< [nmesh]
+  const cav_hfield *hfield;   ///< [nhfield]
   const char *const *warning; ///< what the file asks for and this version leaves aside, with file and line
   double mass;                ///< kg, of all that moves
   size_t bytes;               ///< memory of the model
@@ -561,6 +600,7 @@ typedef struct cav_load_options {
   int overlaps; ///< 1: pairs of geoms of one robot that overlap at rest are left out, and told in a warning
 } cav_load_options;
 
+/// What cav_model_load takes.
 CAV_API cav_load_options cav_load_options_default(void);
 
 /// cav_model_load with options.
@@ -614,11 +654,12 @@ CAV_API void cav_model_free(cav_model *model);
 /// model.
 CAV_API cav_status cav_model_perturb(cav_model *model, const double *mass_scale, double friction);
 
-/// Index of the object of that kind and name, -1 if there is none. CAV_OBJECT_BODY and _XBODY both look up bodies.
+enum { CAV_GEOM_LABEL = 96 }; ///< room for a label
+
 /// Name of a geom, or where it has none "geom 2 of BODY", by its number in its body, written into label.
-enum { CAV_GEOM_LABEL = 96 };
 CAV_API const char *cav_geom_label(const cav_model *model, int geom, char label[CAV_GEOM_LABEL]);
 
+/// Index of the object of that kind and name, -1 if there is none. CAV_OBJECT_BODY and _XBODY both look up bodies.
 CAV_API int cav_object_find(const cav_model *model, cav_object_type type, const char *name);
 
 /// Name, length and needs of a type of sensor; type < CAV_SENSOR_TYPES.

@@ -28,6 +28,7 @@ extern "C" {
   X(FORCE, force, CONTACTS, ACCELERATION, 0, "of weight", "force of contacts", "normal force of every contact between trees or with the world")
 // clang-format on
 
+/// Quantities: CAV_QUANTITIES, and one of the caller's own.
 typedef enum cav_quantity {
 #define CAV_QUANTITY_MEMBER(quantity, ...) CAV_QUANTITY_##quantity,
   CAV_QUANTITIES(CAV_QUANTITY_MEMBER)
@@ -48,11 +49,11 @@ typedef enum cav_values_of {
 
 /// What holds for all terms of a quantity.
 typedef struct cav_quantity_rule {
-  const char *name; ///< its element in problem files
-  cav_values_of of;
-  cav_sensor_stage reads; ///< of sensors: what cav_sensor_rule_of tells; of one's own: what it says itself
-  int hard;               ///< 1: a constraint can be of it, too
-  const char *unit, *words, *text;
+  const char *name;                ///< its element in problem files
+  cav_values_of of;                ///< what it has values of
+  cav_sensor_stage reads;          ///< of sensors: what cav_sensor_rule_of tells; of one's own: what it says itself
+  int hard;                        ///< 1: a constraint can be of it, too
+  const char *unit, *words, *text; ///< of its values; name in sentences; what it measures
 } cav_quantity_rule;
 
 /// quantity < CAV_QUANTITY_TYPES.
@@ -64,10 +65,10 @@ CAV_API const cav_quantity_rule *cav_quantity_rule_of(cav_quantity quantity);
 /// cav_actuator_length), no evaluation. At a knot without forces, the last of a motion that does not close at rest, v_next
 /// is v, and a quantity that reads CAV_READS_ACCELERATION is not asked.
 typedef struct cav_knot_view {
-  const cav_model *model;
-  cav_state *state;
-  double time;     ///< s: that of windows and targets, a fraction of the problem's duration where that is free
-  double timestep; ///< s
+  const cav_model *model; ///< of the problem
+  cav_state *state;       ///< at the knot: poses, contacts, impulses
+  double time;            ///< s: that of windows and targets, a fraction of the problem's duration where that is free
+  double timestep;        ///< s
   const double *q, *v, *v_next; ///< [nq], [nv], [nv]: accelerations are (v_next - v)/timestep
   const double *u;              ///< [nv] N or N m
 } cav_knot_view;
@@ -101,7 +102,7 @@ typedef struct cav_user_quantity {
   const char *unit;       ///< of its values; NULL: none
   int dim;                ///< number of values, 1 .. CAV_USER_DIM_MAX
   cav_sensor_stage reads; ///< the last stage that it looks at: of q alone, of q and v_next, or of anything
-  cav_user_value value;
+  cav_user_value value;   ///< reads its values
   /// NULL: by differences of value, as of all that has no closed form: 3 nv evaluations of the dynamics a knot, one-sided
   /// with a relative step of 1e-7 (positions) and 1e-6 (velocities), for Ipopt centred with 1e-5 and 1e-4
   /// (cav_readout_differentiate). Right to some 1e-6 or 1e-9 where value is smooth; at a kink the derivative of one of
@@ -131,6 +132,7 @@ typedef enum cav_norm {
 #define CAV_WITHIN_LENGTH 0.03 ///< m
 #define CAV_WITHIN_ANGLE 0.1   ///< rad
 
+/// What becomes of a term.
 typedef enum cav_term_use {
   CAV_USE_COST, ///< weight times norm of every component, integrated over the window; at a single knot not multiplied by time
   CAV_USE_EQUAL, ///< x = target, hard
@@ -139,27 +141,28 @@ typedef enum cav_term_use {
 
 /// Which dofs a term over velocities, accelerations or configurations selects.
 typedef enum cav_dof_set {
-  CAV_DOFS_ALL,
+  CAV_DOFS_ALL,          ///< all dofs
   CAV_DOFS_ROOT_LINEAR,  ///< the three translations of free joints
   CAV_DOFS_ROOT_ANGULAR, ///< the three rotations of free joints
   CAV_DOFS_JOINTS,       ///< all but free joints
   CAV_DOFS_ONE           ///< the dofs of one joint: term->object
 } cav_dof_set;
 
+/// A cost or a constraint.
 typedef struct cav_term {
-  const char *name; ///< for logs and explanations; "" is fine
-  cav_quantity quantity;
-  cav_term_use use;
+  const char *name;              ///< for logs and explanations; "" is fine
+  cav_quantity quantity;         ///< what it measures
+  cav_term_use use;              ///< cost, equality or range
   cav_sensor sensor;             ///< CAV_QUANTITY_SENSOR: from the model or declared by the problem
   const cav_user_quantity *user; ///< CAV_QUANTITY_USER: borrowed; NULL for others
   int component;                 ///< component of a sensor or of user, -1: all
-  cav_dof_set dofs;
-  int joint;            ///< CAV_DOFS_ONE
-  double from, to;      ///< window, s; equal: one knot (the nearest). to < 0: the end
-  double weight;        ///< cost
-  cav_norm norm;        ///< cost
-  int body;             ///< over contacts: those of this body's link alone; 0: all
-  double scale;         ///< values are divided by it, > 0, unit of the quantity
+  cav_dof_set dofs;              ///< dofs that count, of velocities, accelerations and configurations
+  int joint;                     ///< CAV_DOFS_ONE
+  double from, to;               ///< window, s; equal: one knot (the nearest). to < 0: the end
+  double weight;                 ///< cost
+  cav_norm norm;                 ///< cost
+  int body;                      ///< over contacts: those of this body's link alone; 0: all
+  double scale;                  ///< values are divided by it, > 0, unit of the quantity
   const double *target; ///< constant: sensors [sensor.dim], user [user->dim], all of them even if one component counts;
       ///< configurations a q [nq]; rates [nv]. NULL: zeros (quaternion: identity; configuration: the goal)
   int nwaypoint;               ///< 0, or target is [nwaypoint*dim], linear between times, constant before and after
@@ -174,14 +177,18 @@ typedef struct cav_term {
 
 /// A sine laid over a scalar joint of the guess; it fades in and out over the first and last fifth of the motion.
 typedef struct cav_swing {
-  int joint;
+  int joint;        ///< it is laid over
   double amplitude; ///< rad or m
   double frequency; ///< Hz
   double phase;     ///< rad
 } cav_swing;
 
 /// Axis that a cycle reflects.
-typedef enum cav_mirror { CAV_MIRROR_NONE, CAV_MIRROR_X, CAV_MIRROR_Y } cav_mirror;
+typedef enum cav_mirror {
+  CAV_MIRROR_NONE, ///< no mirror
+  CAV_MIRROR_X,    ///< x is reflected
+  CAV_MIRROR_Y     ///< y is reflected
+} cav_mirror;
 
 /// A motion without start and end: the last knot is the first one moved, and so are their velocities. With a mirror the
 /// horizon is half a stride, and the second half is the first one reflected, left for right.
@@ -194,10 +201,11 @@ typedef struct cav_cycle {
   const int (*pair)[2];  ///< [npair] joints
 } cav_cycle;
 
+/// What the guess is made from.
 typedef enum cav_guess {
-  CAV_GUESS_HOLD,
-  CAV_GUESS_INTERPOLATE,
-  CAV_GUESS_PUMP ///< simulated under laws that pump energy, contacts left out: a swing-up (optim/METHOD.md, 7)
+  CAV_GUESS_HOLD,        ///< the start, held
+  CAV_GUESS_INTERPOLATE, ///< from start to goal, by its postures on the way
+  CAV_GUESS_PUMP         ///< simulated under laws that pump energy, contacts left out: a swing-up (optim/METHOD.md, 7)
 } cav_guess;
 
 /// A posture that the guess passes.
@@ -224,6 +232,7 @@ typedef struct cav_guess_pose {
   REAL(tolerance, 1e-3, 1e-4, DBL_MIN, 1, KEEP, NONE, "", "relative decrease below which, twice in a row, the stage ends")
 // clang-format on
 
+/// Options of a stage: CAV_STAGE_OPTIONS.
 typedef struct cav_stage_options {
 #define CAV_REAL_MEMBER(name, ...) double name;
 #define CAV_WHOLE_MEMBER(name, ...) int name;
@@ -237,25 +246,26 @@ CAV_API const cav_field *cav_stage_fields(int *n);
 
 /// The schedule: stages go geometrically from first to last; the penalty reaches its end at half way.
 typedef struct cav_schedule {
-  int stages;
+  int stages;            ///< from 1
   cav_sliding sliding;   ///< law of contacts that slide from three quarters of the way on; before it is the convex one
   cav_next_gap next_gap; ///< gap after the step that contacts see from half way on; before it is the linear one
-  cav_stage_options first, last;
+  cav_stage_options first, last; ///< options of the first and of the last stage
 } cav_schedule;
 
 /// One option of Ipopt by its own name, its value as text.
 typedef struct cav_ipopt_option {
-  const char *name, *value;
+  const char *name, *value; ///< as Ipopt has them, both as text
 } cav_ipopt_option;
 
+/// A motion that is wanted.
 typedef struct cav_problem {
-  const char *name;
-  const cav_model *model;
+  const char *name;       ///< for result folders and pages; "" is fine
+  const cav_model *model; ///< what moves; borrowed unless the problem was read from a file
   const char *
       scene; ///< what the problem file added to the world of the model's file, as MJCF; the model has it. NULL: nothing
   double duration, timestep; ///< s; knots are round(duration/timestep) + 1
-  cav_order order;
-  int close_at_rest; ///< 1: v after the last knot is zero, with rows there; 0: no rows at the last knot
+  cav_order order;           ///< of the step
+  int close_at_rest;         ///< 1: v after the last knot is zero, with rows there; 0: no rows at the last knot
   /// Free duration: the step is an unknown, the same for all knots, between these; both 0: duration is what it is.
   /// Times of windows and waypoints stay fractions of duration.
   double duration_least, duration_most;
@@ -264,28 +274,28 @@ typedef struct cav_problem {
   double *q_start;        ///< [nq]
   double *v_start;        ///< [nv]
   double *q_goal;         ///< [nq] goal posture of the guess and of configuration terms without a target
-  cav_guess guess;
-  double guess_height;         ///< m: ballistic arc added to the guess over guess_from .. guess_to
+  cav_guess guess;        ///< what the guess is made from
+  double guess_height;    ///< m: ballistic arc added to the guess over guess_from .. guess_to
   double guess_from, guess_to; ///< s
   double
       guess_rotation[3]; ///< rotation vector that the first free joint's guess makes over guess_from .. guess_to, rad
-  int nguess_pose;
+  int nguess_pose;       ///< postures on the way
   const cav_guess_pose
-      *guess_pose; ///< [nguess_pose], times increasing within the horizon: postures on the way to the goal
-  int nswing;
-  cav_swing *swing; ///< [nswing]
-  int nterm;
-  cav_term *term;
-  double effort_limit; ///< fraction of the actuator limits planned with, 0 .. 1
-  double limit_margin; ///< rad or m kept from joint and tendon limits in planning
-  cav_schedule schedule;
-  int nipopt; ///< options for Ipopt, where it is the solver
-  const cav_ipopt_option *ipopt;
-  int solved;             ///< 1: read from a result folder, contact holds
-  cav_options contact;    ///< the law that the recorded motion obeys, for verification; solving does not use it
-  const char *model_path; ///< file the model was read from; NULL: made in C
-  int floating;           ///< 1: the root link of that file, a URDF, floats
-  void *owner;            ///< memory of a problem read from a file
+      *guess_pose;       ///< [nguess_pose], times increasing within the horizon: postures on the way to the goal
+  int nswing;            ///< sines over joints
+  cav_swing *swing;      ///< [nswing]
+  int nterm;             ///< costs and constraints
+  cav_term *term;        ///< [nterm]
+  double effort_limit;   ///< fraction of the actuator limits planned with, 0 .. 1
+  double limit_margin;   ///< rad or m kept from joint and tendon limits in planning
+  cav_schedule schedule; ///< of the continuation
+  int nipopt;            ///< options for Ipopt, where it is the solver
+  const cav_ipopt_option *ipopt; ///< [nipopt]
+  int solved;                    ///< 1: read from a result folder, contact holds
+  cav_options contact;           ///< the law that the recorded motion obeys, for verification; solving does not use it
+  const char *model_path;        ///< file the model was read from; NULL: made in C
+  int floating;                  ///< 1: the root link of that file, a URDF, floats
+  void *owner;                   ///< memory of a problem read from a file
 } cav_problem;
 
 /// A term with what files give one that says no more: its element's name, over the whole horizon, of all joints but free
@@ -358,6 +368,7 @@ CAV_API cav_status cav_problem_write(const char *path, const cav_problem *proble
   X(ENERGY, "energy", "more energy, or a faster motion, than actuators can give in the time")
 // clang-format on
 
+/// Necessary conditions: CAV_CONDITIONS.
 typedef enum cav_condition {
 #define CAV_CONDITION_MEMBER(condition, ...) CAV_CONDITION_##condition,
   CAV_CONDITIONS(CAV_CONDITION_MEMBER)
@@ -367,11 +378,11 @@ typedef enum cav_condition {
 
 /// A proof that a problem has no solution.
 typedef struct cav_impossibility {
-  cav_condition condition;
-  int term;       ///< that asks for it, -1: none
-  int knot;       ///< at which
-  char what[400]; ///< the cause, in words
-  char cure[160]; ///< what helps
+  cav_condition condition; ///< that is broken
+  int term;                ///< that asks for it, -1: none
+  int knot;                ///< at which
+  char what[400];          ///< the cause, in words
+  char cure[160];          ///< what helps
 } cav_impossibility;
 
 /// Proofs that no motion can be certified and achieve what a problem asks, most at most, *n found; the first is the

@@ -17,6 +17,7 @@ extern "C" {
   X(BOTH, both, IPOPT, "own, then Ipopt from its result")
 // clang-format on
 
+/// Solvers: CAV_SOLVERS.
 typedef enum cav_solver {
 #define CAV_SOLVER_MEMBER(solver, ...) CAV_SOLVER_##solver,
   CAV_SOLVERS(CAV_SOLVER_MEMBER)
@@ -29,7 +30,7 @@ typedef struct cav_solver_rule {
   const char *name;    ///< on the command line
   const char *library; ///< whose options it takes, "" if it needs none
   const char *missing; ///< NULL, or what this build lacks and what to do
-  const char *text;
+  const char *text;    ///< what it does
 } cav_solver_rule;
 
 /// solver < CAV_SOLVER_TYPES.
@@ -37,17 +38,17 @@ CAV_API const cav_solver_rule *cav_solver_rule_of(cav_solver solver);
 
 /// One line of progress, and of the log.
 typedef struct cav_progress {
-  const char *phase; ///< "continuation", "sqp", "multipliers", "restoration", "ipopt", "diagnosis", "recovery",
-                     ///< "feedback"
-  int stage, stages;
-  double fraction;   ///< of the whole solve that is done, by the stages that are behind it: an estimate
-  int iteration;     ///< over the whole solve
-  double cost;       ///< of the cost terms alone
-  double unactuated; ///< largest unactuated force, fraction of weight (moments: per 0.3 m)
-  double violation;  ///< largest scaled violation of limits and other constraints
-  double step, radius;
-  double seconds;
-  int knot; ///< knot of the largest unactuated force
+  const char *phase;   ///< "continuation", "sqp", "multipliers", "restoration", "ipopt", "diagnosis", "recovery",
+                       ///< "feedback"
+  int stage, stages;   ///< where the phase is, from 1
+  double fraction;     ///< of the whole solve that is done, by the stages that are behind it: an estimate
+  int iteration;       ///< over the whole solve
+  double cost;         ///< of the cost terms alone
+  double unactuated;   ///< largest unactuated force, fraction of weight (moments: per 0.3 m)
+  double violation;    ///< largest scaled violation of limits and other constraints
+  double step, radius; ///< of the last step: fraction of the wanted one that was taken; of the trust region
+  double seconds;      ///< since the beginning, wall clock
+  int knot;            ///< knot of the largest unactuated force
 } cav_progress;
 
 /// Called after every iteration, and before each trial of feedback; a nonzero return ends the solve with
@@ -72,6 +73,7 @@ typedef int (*cav_stop)(void *context);
   X(FEEDBACK, feedback, "the choice of gains")
 // clang-format on
 
+/// Parts of a solve between which it may be stopped: CAV_PLACES.
 typedef enum cav_place {
 #define CAV_PLACE_MEMBER(place, ...) CAV_PLACE_##place,
   CAV_PLACES(CAV_PLACE_MEMBER)
@@ -94,9 +96,9 @@ typedef struct cav_checkpoint {
   cav_status status;              ///< of the solve, at CAV_PLACE_FEEDBACK
   double optimality;              ///< as in cav_solution, NaN: not measured
   cav_trajectory *trajectory;     ///< of the trees that are planned: the dofs of others are not in it
-  int nmultiplier;
-  double *multiplier;       ///< [nmultiplier] of the augmented Lagrangian, row by row as in cav_solution
-  double *final_multiplier; ///< [nmultiplier] of the programme
+  int nmultiplier;                ///< number of rows
+  double *multiplier;             ///< [nmultiplier] of the augmented Lagrangian, row by row as in cav_solution
+  double *final_multiplier;       ///< [nmultiplier] of the programme
 } cav_checkpoint;
 
 /// Called at every place; the checkpoint and what it holds last as long as the call. Nonzero ends the solve.
@@ -109,15 +111,16 @@ CAV_API cav_status cav_checkpoint_write(const char *path, const cav_checkpoint *
 CAV_API cav_checkpoint *cav_checkpoint_read(const char *path, const cav_model *model, cav_error *error);
 CAV_API void cav_checkpoint_free(cav_checkpoint *checkpoint);
 
+/// How to solve.
 typedef struct cav_solve_options {
-  cav_solver solver;
-  int threads;           ///< over knots, >= 1; the result does not depend on it
-  cav_observer observer; ///< may be NULL
-  void *observer_context;
-  cav_stop stop; ///< may be NULL
-  void *stop_context;
-  cav_keeper keeper; ///< may be NULL
-  void *keeper_context;
+  cav_solver solver;            ///< which solver
+  int threads;                  ///< over knots, >= 1; the result does not depend on it
+  cav_observer observer;        ///< may be NULL
+  void *observer_context;       ///< handed to the observer
+  cav_stop stop;                ///< may be NULL
+  void *stop_context;           ///< handed to stop
+  cav_keeper keeper;            ///< may be NULL
+  void *keeper_context;         ///< handed to the keeper
   const cav_checkpoint *resume; ///< where to go on, of the same problem, by the same solver; NULL: from the beginning
   int first_stage; ///< of the schedule, from 1 (0 is 1); more than it has stages: straight to the optimum, from a start
                    ///< that is near it. Of the own solver
@@ -133,11 +136,12 @@ typedef struct cav_solve_options {
   cav_derivative derivative;
   int ipopt_derivative_test; ///< 1: Ipopt's first-order checker runs before its first iteration, at the start; its text goes to
                              ///< ipopt_output. Its time grows with the cube of the number of knots
-  const char *ipopt_output; ///< file of Ipopt's own log, NULL: none
-  int nipopt;               ///< options for Ipopt, laid over the problem's
-  const cav_ipopt_option *ipopt;
+  const char *ipopt_output;      ///< file of Ipopt's own log, NULL: none
+  int nipopt;                    ///< options for Ipopt, laid over the problem's
+  const cav_ipopt_option *ipopt; ///< [nipopt]
 } cav_solve_options;
 
+/// The own solver, one thread, no limits, gains.
 CAV_API cav_solve_options cav_solve_options_default(void);
 
 /// How a stage of a solve ended.
@@ -151,12 +155,12 @@ typedef enum cav_outcome {
 
 /// One stage of a solve, and what it left.
 typedef struct cav_stage_record {
-  const char *phase; ///< as in cav_progress
-  int stage, stages;
-  double fraction; ///< of the way from the schedule's first to its last stage
-  int iterations;
+  const char *phase;                  ///< as in cav_progress
+  int stage, stages;                  ///< number of the stage, and how many there are
+  double fraction;                    ///< of the way from the schedule's first to its last stage
+  int iterations;                     ///< that it took
   double cost, unactuated, violation; ///< as in cav_progress
-  cav_outcome outcome;
+  cav_outcome outcome;                ///< how it ended
 } cav_stage_record;
 
 /// Where a constraint row comes from.
@@ -172,11 +176,11 @@ typedef enum cav_binding_kind {
 
 /// A constraint row lower <= value <= upper of a solved problem, scaled as the solver sees it.
 typedef struct cav_binding {
-  int knot;
-  cav_binding_kind kind;
-  int object, component;
-  double value, lower, upper;
-  double allowed; ///< violation that planning leaves room for
+  int knot;                   ///< at which it stands
+  cav_binding_kind kind;      ///< what it comes from
+  int object, component;      ///< which object of that kind, and which of its values
+  double value, lower, upper; ///< scaled, of the row and its bounds
+  double allowed;             ///< violation that planning leaves room for
   double
       multiplier; ///< penalty: what the cost would fall by if the bound gave way by one. Where constraints do not hold: the
                   ///< weighted violation, which balances that of the rows it is in conflict with
@@ -186,24 +190,24 @@ typedef struct cav_binding {
 
 /// A solved motion.
 typedef struct cav_solution {
-  cav_trajectory *trajectory;
-  cav_options contact;     ///< contact law the motion obeys
-  double *gain_q, *gain_v; ///< [(nknot-1)*nv*nv] du_t = gain_q dq_t + gain_v dv_t, row-major; NULL: none were asked
-                           ///< for, or none help: it was interrupted, or misses what a certificate requires
-  double cost;
+  cav_trajectory *trajectory; ///< the motion
+  cav_options contact;        ///< contact law the motion obeys
+  double *gain_q, *gain_v;    ///< [(nknot-1)*nv*nv] du_t = gain_q dq_t + gain_v dv_t, row-major; NULL: none were asked
+                              ///< for, or none help: it was interrupted, or misses what a certificate requires
+  double cost;                ///< of the cost terms
   double
       optimality; ///< the solver's own: decrease of the cost along the constraints that its last model predicts, over
                   ///< the cost; NaN where the constraints do not hold. A verdict's is the verifier's
-  double unactuated; ///< largest, fraction of weight
-  int iterations;
+  double unactuated;                                                  ///< largest, fraction of weight
+  int iterations;                                                     ///< of all phases
   double seconds, seconds_dynamics, seconds_assembly, seconds_linear; ///< wall clock
-  int nprogress;
-  cav_progress *progress; ///< log
-  int nstage;
-  cav_stage_record *stage; ///< its stages in order
-  int nrow;
+  int nprogress;                                                      ///< lines of the log
+  cav_progress *progress;                                             ///< log
+  int nstage;                                                         ///< stages that were run
+  cav_stage_record *stage;                                            ///< its stages in order
+  int nrow;         ///< rows at the end that are violated or hold something back
   cav_binding *row; ///< constraint rows that are violated or have a multiplier, by knot
-  int nmultiplier;
+  int nmultiplier;  ///< number of constraint rows
   double
       *multiplier; ///< [nmultiplier] of every constraint row, scaled as the solver sees it, positive at upper bounds.
                    ///< Rows by knot; of a knot: unactuated forces, efforts, ranges of joints and of tendons, hard terms
@@ -212,7 +216,7 @@ typedef struct cav_solution {
 /// What a plan is made of, and how the own solver factors its normal equations, at the problem's guess, first stage: a
 /// band with a border for each group of trees that nothing joins there; a free step beside several of them as an arrow.
 typedef struct cav_equations {
-  int unknowns;
+  int unknowns;                ///< numbers that are solved for
   int left_out, left_out_dofs; ///< trees that the plan leaves out, and their dofs (optim/METHOD.md, 1)
   int rows, constraints;       ///< of costs and constraints over all knots; the latter
   int blocks;                  ///< of unknowns, one a knot
@@ -232,6 +236,7 @@ CAV_API cav_status cav_problem_equations(const cav_problem *problem, cav_equatio
 /// another number of rows or knots, besides what is wrong in the problem.
 CAV_API cav_status cav_solve(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
                              cav_solution **solution, cav_error *error);
+/// Frees a solution; NULL is fine.
 CAV_API void cav_solution_free(cav_solution *solution);
 
 /// The trajectory that a solve starts from: the problem's guess, without forces. NULL with the reason in error.
@@ -248,6 +253,7 @@ typedef struct cav_optimiser cav_optimiser;
 /// no meaning here. NULL with the reason in error, as cav_solve.
 CAV_API cav_optimiser *cav_optimiser_new(const cav_problem *problem, const cav_solve_options *options,
                                          const cav_trajectory *start, cav_error *error);
+/// Frees an optimiser; NULL is fine.
 CAV_API void cav_optimiser_free(cav_optimiser *optimiser);
 
 /// Solves from where it is, as cav_solve does from first_stage of the schedule on (1: all; more than it has: straight
@@ -274,7 +280,11 @@ CAV_API const cav_problem *cav_optimiser_problem(const cav_optimiser *optimiser)
 CAV_API const cav_options *cav_optimiser_contact(const cav_optimiser *optimiser);
 CAV_API const double *cav_optimiser_multipliers(cav_optimiser *optimiser, int *n);
 
-enum { CAV_STRATEGIES = 16, CAV_STRATEGY_SWINGS = 4, CAV_STRATEGY_CHANGES = 160 };
+enum {
+  CAV_STRATEGIES = 16,       ///< most strategies of a problem
+  CAV_STRATEGY_SWINGS = 4,   ///< most sines of one
+  CAV_STRATEGY_CHANGES = 160 ///< room for what a repair changed, in words
+};
 
 /// When a strategy is worth trying.
 typedef enum cav_strategy_use {
@@ -288,18 +298,18 @@ typedef enum cav_strategy_use {
 
 /// A way to a motion: the guess and the schedule that a solve starts from.
 typedef struct cav_strategy {
-  const char *name, *text; ///< in a word, and in words
-  int stated;              ///< 1: the problem's own guess, 0: guess and swing
-  cav_order order;         ///< that the motion obeys
-  int first_midpoint;      ///< 1: solved under CAV_ORDER_MIDPOINT, then from there under order
-  cav_strategy_use use;    ///< when
-  cav_guess guess;
-  int nswing;
-  cav_swing swing[CAV_STRATEGY_SWINGS];
-  double height, from, to; ///< not stated: of a ballistic arc, m, and when, s
-  cav_schedule schedule;
-  double effort_limit, timestep; ///< those of the problem where 0
-  int nterm;
+  const char *name, *text;              ///< in a word, and in words
+  int stated;                           ///< 1: the problem's own guess, 0: guess and swing
+  cav_order order;                      ///< that the motion obeys
+  int first_midpoint;                   ///< 1: solved under CAV_ORDER_MIDPOINT, then from there under order
+  cav_strategy_use use;                 ///< when
+  cav_guess guess;                      ///< what its guess is made from
+  int nswing;                           ///< sines over joints of the guess
+  cav_swing swing[CAV_STRATEGY_SWINGS]; ///< [nswing]
+  double height, from, to;              ///< not stated: of a ballistic arc, m, and when, s
+  cav_schedule schedule;                ///< schedule that it takes
+  double effort_limit, timestep;        ///< those of the problem where 0
+  int nterm;                            ///< number of the changed terms
   cav_term *term; ///< [nterm] in the place of the problem's, whose names and targets they borrow; NULL
   char changed[CAV_STRATEGY_CHANGES]; ///< what a repair changes in the problem, in words
 } cav_strategy;
@@ -361,16 +371,16 @@ typedef struct cav_term_report {
   double off;         ///< distance: of a sensor's vector its length, of dofs the largest
   double within;      ///< tolerance: the term's, or for goals at one time a usual one; infinite: told only
   int met;            ///< off <= within
-  char unit[16], what[64];
+  char unit[16], what[64]; ///< unit of its numbers; name of what is measured
 } cav_term_report;
 
 /// What verification found; from the knots alone, with code apart from the optimiser's. optim/METHOD.md, 6.
 /// optimality is filled by cav_verify_optimality; solve_seconds and iterations are the solver's. cav_verify leaves these
 /// as they are.
 typedef struct cav_verdict {
-  int certified;
-  double unactuated_force_max; ///< fraction of weight
-  int unactuated_force_knot;
+  int certified;                                   ///< 1: all that a certificate requires holds
+  double unactuated_force_max;                     ///< fraction of weight
+  int unactuated_force_knot;                       ///< knot of the largest one
   double momentum_defect_rms;                      ///< fraction of weight
   double limit_violation_max;                      ///< relative to the limit (effort), rad or m (range)
   double constraint_violation_max;                 ///< of the problem's hard terms, scaled
@@ -399,12 +409,12 @@ typedef struct cav_verdict {
       periodicity_error; ///< cycles: how far the last knot is from the first one moved, m, rad, or their rates; else 0
   int periods;           ///< that the closed loop ran for: 1, of cycles more
   double duration, solve_seconds; ///< duration: of one period
-  int iterations;
-  double cost;          ///< of the cost terms, summed anew from the knots
-  int achieved;         ///< every target with a tolerance is met
-  int ntarget, nmissed; ///< such targets, and those missed
-  char missed[240];     ///< the one missed most: name, by how much, wanted and got; "" if achieved
-  char reason[480];     ///< why not certified: the first condition missed; "" if certified
+  int iterations;                 ///< as the solver left them
+  double cost;                    ///< of the cost terms, summed anew from the knots
+  int achieved;                   ///< every target with a tolerance is met
+  int ntarget, nmissed;           ///< such targets, and those missed
+  char missed[240];               ///< the one missed most: name, by how much, wanted and got; "" if achieved
+  char reason[480];               ///< why not certified: the first condition missed; "" if certified
 } cav_verdict;
 
 /// A strategy with one change more: number k of the usual cures of what a motion found by it misses first. *found 0: there
@@ -455,13 +465,13 @@ typedef struct cav_reason {
   char cure[400]; ///< what usually helps
 } cav_reason;
 
-enum { CAV_REASONS = 10 };
+enum { CAV_REASONS = 10 }; ///< most reasons of a kind
 
 /// Reasons in order of their size, twice: by violation, and by fraction of the conflict.
 typedef struct cav_explanation {
   int met; ///< 1: every constraint holds, and what pulls is what the motion's cost hangs on: rows at their bounds
-  int nviolation, nconflict;
-  cav_reason violation[CAV_REASONS], conflict[CAV_REASONS];
+  int nviolation, nconflict;                                ///< how many of each there are
+  cav_reason violation[CAV_REASONS], conflict[CAV_REASONS]; ///< largest first
   char contradiction
       [400]; ///< equalities of which, near this motion, each follows from the others but for its value, and
              ///< how far they are apart; "": none, or built without SPQR (optim/METHOD.md, 9)

@@ -15,7 +15,7 @@ extern "C" {
 
 /// Outcome of a call that a user can make fail. Zero is success.
 typedef enum cav_status {
-  CAV_OK = 0,
+  CAV_OK = 0,        ///< nothing failed
   CAV_BAD_INPUT,     ///< a file, name, size or option is wrong; the error text says which and what to do
   CAV_NOT_FINITE,    ///< a number that is not finite went in or came out; outputs are untouched
   CAV_NOT_CONVERGED, ///< an iteration stopped above its tolerance; outputs hold its best iterate
@@ -27,9 +27,9 @@ typedef enum cav_status {
 
 /// What went wrong: file, line, element, what was expected and what to do, in one text.
 typedef struct cav_error {
-  cav_status status;
-  int line;        ///< line in the file, 0 where there is none
-  char text[1000]; ///< always terminated
+  cav_status status; ///< CAV_OK where nothing failed
+  int line;          ///< line in the file, 0 where there is none
+  char text[1000];   ///< always terminated
 } cav_error;
 
 /// One word or two for a status, never NULL.

@@ -11,11 +11,11 @@ extern "C" {
 /// Knots 0 .. nknot-1 at times t*timestep. Rows are knots. v[t] = (q[t] (-) q[t-1])/timestep, v[0] is given;
 /// u[t] = inverse(q[t], v[t], v[t+1]); the last row of u uses the velocity that closes the motion (optim/METHOD.md, 1).
 typedef struct cav_trajectory {
-  int nq, nv, nknot;
-  double timestep; ///< s; the law that a motion obeys is at the same step
-  double *q;       ///< [nknot*nq]
-  double *v;       ///< [nknot*nv]
-  double *u;       ///< [nknot*nv], N or N m
+  int nq, nv, nknot; ///< sizes of q and v, number of knots
+  double timestep;   ///< s; the law that a motion obeys is at the same step
+  double *q;         ///< [nknot*nq]
+  double *v;         ///< [nknot*nv]
+  double *u;         ///< [nknot*nv], N or N m
 } cav_trajectory;
 
 /// nknot copies of model->q0 at rest; NULL if memory runs out or nknot < 2.
