@@ -41,7 +41,7 @@ for f in scope:
                 failures.append(f"{f}:{number}: '{found.group(0)}': {instead}")
 
 # what comments and documents name
-names = {os.path.basename(f) for f in files}
+names = {os.path.basename(f) for f in files} | {f for f in os.listdir('.') if f.endswith('.md')}
 declared = set(re.findall(r'\b(cav_\w+)', ' '.join(re.sub(r'//[^\n]*', '', texts[f]) for f in sources)))
 sections = {l: set(re.findall(r'^## (\d+)\.', texts[l + '/METHOD.md'], re.M)) for l in ('dynamics', 'optim')}
 made = {'viewer_page.h', 'cavort.pc', 'meson-private'}
