@@ -5,21 +5,31 @@
 
 #include "cavort/mocap.h"
 #include "file.h"
+#include "marker_set.h"
 #include "problem_file.h"
 
-static const cav_xml_attribute attributes[] = {{"name", CAV_XML_TEXT, 1, 0, NULL, 1, NULL},
-                                               {"body", CAV_XML_TEXT, 1, 0, NULL, 1, NULL},
-                                               {"pos", CAV_XML_REAL, 3, 3, NULL, 0, NULL},
-                                               {"weight", CAV_XML_REAL, 1, 1, NULL, 0, NULL},
-                                               {0}};
-static const cav_xml_element marker = {"marker", 1, 0, attributes, NULL, 0, NULL};
+// name, type, least and most values, words, required; unit, what holds where it is left out, meaning
+// clang-format off
+#define NOTE(unit, fallback, text) &(const cav_xml_note) { unit, fallback, text }
+static const cav_xml_attribute attributes[] = {
+    {"name", CAV_XML_TEXT, 1, 0, NULL, 1, NOTE("", NULL, "name of the marker in the clip")},
+    {"body", CAV_XML_TEXT, 1, 0, NULL, 1, NOTE("", NULL, "body that it sits on: of the model, or a role such as \"right foot\"")},
+    {"pos", CAV_XML_REAL, 3, 3, NULL, 0, NOTE("m", "(unknown: estimated)", "position on the body, in its frame")},
+    {"weight", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("", "(1)", "weight of its residual")},
+    {0}};
+static const cav_xml_element marker = {"marker", 1, 0, attributes, NULL, 0, "a marker and the place that it has on a body"};
 static const char *const axes[] = {"x", "y", "z", NULL};
 static const cav_xml_attribute set_attributes[] = {
-    {"adjust", CAV_XML_REAL, 1, 1, NULL, 0, NULL}, {"unit", CAV_XML_REAL, 1, 1, NULL, 0, NULL},
-    {"up", CAV_XML_WORD, 0, 0, axes, 0, NULL},     {"rate", CAV_XML_REAL, 1, 1, NULL, 0, NULL},
-    {"names", CAV_XML_TEXT, 1, 0, NULL, 0, NULL},  {0}};
-static const cav_xml_element markers = {
-    "markers", 1, 1, set_attributes, (const cav_xml_element *const[]){&marker, NULL}, 0, NULL};
+    {"adjust", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("m", "(0: given positions are exact)", "how far off given positions may be; they are estimated too")},
+    {"unit", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("m", "(as the clip says, or what its size suggests)", "unit of length of the clip")},
+    {"up", CAV_XML_WORD, 0, 0, axes, 0, NOTE("", "(as the clip says, or what it suggests)", "axis of the clip that points up")},
+    {"rate", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("1/s", "(as the clip says)", "frames a second")},
+    {"names", CAV_XML_TEXT, 1, 0, NULL, 0, NOTE("", "(those of the clip)", "names of the markers of keyframes without bodies, separated by spaces")},
+    {0}};
+const cav_xml_element cav_markers_element = {
+    "markers", 1, 1, set_attributes, (const cav_xml_element *const[]){&marker, NULL}, 0,
+    "root of a marker set (cavort ik --markers): which marker sits where"};
+// clang-format on
 
 void cav_marker_set_free(cav_marker_set *set) {
   if (!set) return;
@@ -61,7 +71,7 @@ static cav_status read_set(const cav_problem_reader *reader, const cav_xml_node 
 }
 
 cav_marker_set *cav_marker_set_read(const char *path, const cav_model *model, cav_error *error) {
-  static const cav_xml_element *const roots[] = {&markers, NULL};
+  static const cav_xml_element *const roots[] = {&cav_markers_element, NULL};
   cav_error own = {0};
   cav_problem_reader reader = {.model = model, .path = path, .error = error ? error : &own};
   cav_xml *xml = cav_xml_read(path, roots, NULL, reader.error);

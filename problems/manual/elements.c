@@ -1,10 +1,11 @@
-/// Elements and attributes of problem files as help tells them, by the grammar that reads them. What a <scene> holds is MJCF
-/// and has no texts here.
+/// Elements and attributes of problem files and marker sets as help tells them, by the grammars that read them. What a
+/// <scene> holds is MJCF and has no texts here.
 #include <assert.h>
 #include <string.h>
 
 #include "cavort/model.h"
 #include "manual.h"
+#include "marker_set.h"
 #include "problem_file.h"
 
 // adds an element below a parent, and what stands in it
@@ -22,7 +23,7 @@ static int add_place(cav_manual_place *place, int n, const cav_xml_element *elem
 }
 
 int cav_manual_places(cav_manual_place place[CAV_MANUAL_ELEMENTS]) {
-  return add_place(place, 0, &cav_problem_element, NULL);
+  return add_place(place, add_place(place, 0, &cav_problem_element, NULL), &cav_markers_element, NULL);
 }
 
 const cav_xml_attribute *cav_manual_attribute(const cav_xml_element *element, const char *name) {

@@ -57,7 +57,7 @@ typedef struct cav_manual_place {
   int nparent;
 } cav_manual_place;
 
-/// All elements of problem files with a text, each once, parents before children; how many. elements.c.
+/// All elements of problem files and marker sets with a text, each once, parents before children; how many. elements.c.
 int cav_manual_places(cav_manual_place place[CAV_MANUAL_ELEMENTS]);
 
 /// What an attribute takes, in words: "3 numbers, m". elements.c.

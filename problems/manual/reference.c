@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "cavort/solve.h"
+#include "exchange.h"
 #include "ipopt_options.h"
 #include "manual.h"
 #include "problem_file.h"
@@ -124,7 +125,8 @@ static void print_elements(FILE *out) {
   cav_manual_place place[CAV_MANUAL_ELEMENTS];
   int n = cav_manual_places(place);
   fprintf(out,
-          "\n## Elements of problem files\n\nValues in parentheses say in words what holds where the attribute is left "
+          "\n## Elements of problem files and marker sets\n\nValues in parentheses say in words what holds where the "
+          "attribute is left "
           "out.\n");
   for (int i = 0; i < n; i++) {
     const cav_manual_place *twin = cav_manual_twin(place, i);
@@ -216,6 +218,16 @@ static void print_solvers(FILE *out) {
     fprintf(out, "| `%s` | %s |\n", cav_solver_rule_of(i)->name, cav_solver_rule_of(i)->text);
 }
 
+static void print_formats(FILE *out) {
+  fprintf(out, "\n## Formats of cavort export\n\n| `--to` | file | what it holds |\n|---|---|---|\n");
+  for (cav_exchange k = 0; k < CAV_EXCHANGE_FORMATS; k++) {
+    const cav_exchange_rule *rule = cav_exchange_rule_of(k);
+    fprintf(out, "| `%s` | `%s` | ", rule->name, rule->file);
+    print_cell(out, rule->text);
+    fprintf(out, " |\n");
+  }
+}
+
 static void print_roles(FILE *out) {
   fprintf(out,
           "\n## Roles\n\nNames that stand for a body of any humanoid, quadruped or arm where the model has no body of "
@@ -230,6 +242,7 @@ void cav_manual_reference(FILE *out, const cav_manual *manual) {
           "reference` from the tables by\nwhich the tool reads; `cavort help NAME` tells of one of them.\n\n");
   print_commands(out, manual);
   print_solvers(out);
+  print_formats(out);
   print_elements(out);
   print_terms(out);
   print_sensors(out);
