@@ -3,9 +3,9 @@
 /// about the point c_t, both taken half way between knots (configuration q_t (+) h v_{t+1}/2, velocity v_{t+1}):
 ///   F = (P_{t+1/2} - P_{t-1/2})/h - m g - sum f
 ///   N = (L_{t+1/2} - L_{t-1/2})/h - sum ((p - c_t) x f + torque)
-/// over contacts with what is not of the tree, and what the model compensates of gravity. What is lost at one knot is lost for good: the momenta after a knot are
-/// those before the next. Of order h^2 for a motion sampled from the continuous one; zero to rounding for one that
-/// obeys the step of order momentum.
+/// over contacts with what is not of the tree, and what the model compensates of gravity. What is lost at one knot is lost
+/// for good: the momenta after a knot are those before the next. Of order h^2 for a motion sampled from the continuous
+/// one; zero to rounding for one that obeys the step of order momentum.
 /// A tree that joints hold to the world gets forces from there which no one measures: only what its root link can do
 /// freely is balanced. F and N/0.3 m are projected on the span of the motions of the root link's dofs that no actuator
 /// and no tendon acts on, seen at c; what those joints themselves exert (damping, springs, armature, limits, friction
