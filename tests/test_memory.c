@@ -491,6 +491,92 @@ static void test_problems(void) {
   remove(problem_path), remove(model_path), remove(folder);
 }
 
+// --- what is made in code ---
+
+/// Power of the knee, with its derivatives by what it is made of, and without.
+static int power_value(void *context, const cav_knot_view *view, double *value) {
+  (void)context;
+  value[0] = view->u[3] * view->v_next[3];
+  return 0;
+}
+
+static int power_jacobian(void *context, const cav_knot_view *view, const cav_view_jacobian *jacobian) {
+  (void)context;
+  jacobian->du[3] = view->v_next[3];
+  jacobian->dv_next[3] = view->u[3];
+  return 0;
+}
+
+static cav_status try_draft(void *context, double *result) {
+  cav_error error = {0};
+  cav_draft *draft = cav_draft_new("made");
+  if (!draft) return CAV_NO_MEMORY;
+  int body = cav_draft_add(draft, CAV_DRAFT_WORLD, "body"), geom = cav_draft_add(draft, body, "geom");
+  cav_draft_add(draft, body, "freejoint");
+  cav_draft_numbers(draft, geom, "size", context, 1);
+  cav_draft_text(draft, geom, "name", "ball");
+  cav_model *model = cav_draft_compile(draft, NULL, NULL, &error);
+  if (model) result[0] = model->mass, result[1] = model->nv;
+  if (!model) CHECK(error.text[0]);
+  cav_model_free(model);
+  cav_draft_free(draft);
+  return model ? CAV_OK : error.status;
+}
+
+static cav_status try_check(void *context, double *result) {
+  const cav_problem *p = context;
+  cav_error error = {0};
+  cav_state *state = cav_state_new(p->model);
+  if (!state) return CAV_NO_MEMORY;
+  cav_status status = cav_user_quantity_check(p->term[p->nterm - 1].user, state, p->q_start, p->v_start, p->v_start,
+                                              result, NULL, &error);
+  if (status != CAV_OK) CHECK(error.status == status && error.text[0]);
+  cav_state_free(state);
+  return status;
+}
+
+static cav_status try_verdict(void *context, double *result) {
+  const cav_problem *p = context;
+  cav_error error = {0};
+  cav_verdict verdict = {0};
+  cav_options law = p->model->options;
+  long kept = left;
+  left = -1;
+  cav_trajectory *at = cav_trajectory_new(p->model, 6, p->timestep);
+  left = kept;
+  law.timestep = p->timestep;
+  cav_status status = cav_verify(p, at, &law, NULL, NULL, &verdict, &error);
+  result[0] = verdict.cost;
+  cav_trajectory_free(at);
+  return status;
+}
+
+static void test_made(void) {
+  double size = 0.1;
+  fail_each("draft", try_draft, &size, 20000, 0);
+  cav_error error = {0};
+  cav_model *model = cav_model_parse(leg_text, NULL, NULL, &error);
+  if (!CHECK(model != NULL)) return;
+  double rest[4] = {0, 0.1, 0, 0}, still[4] = {0};
+  cav_user_quantity power = {"power", "W", 1, CAV_READS_ACCELERATION, power_value, power_jacobian, NULL, 0};
+  cav_term term[16];
+  int n = cav_problem_default_terms(term, 15);
+  term[n] = cav_term_range(CAV_QUANTITY_USER, -500, 500);
+  term[n].user = &power;
+  cav_problem problem = cav_problem_default(model);
+  problem.name = "made", problem.duration = 0.2, problem.timestep = 0.04;
+  problem.q_start = problem.q_goal = rest, problem.v_start = still;
+  problem.schedule.stages = 2, problem.schedule.first.iterations = problem.schedule.last.iterations = 2;
+  problem.term = term, problem.nterm = n + 1;
+  fail_each("check", try_check, &problem, 20000, 0);
+  for (int way = 0; way < 2; way++) {
+    power.jacobian = way ? NULL : power_jacobian;
+    fail_each(way ? "own term" : "own term, Jacobian", try_solve, &problem, 20000, 0);
+  }
+  fail_each("verdict", try_verdict, &problem, 20000, 0);
+  cav_model_free(model);
+}
+
 // iterations and shifts of a solver that has its memory allocate nothing
 static void test_optimiser(void) {
   cav_error error = {0};
@@ -528,6 +614,7 @@ int main(void) {
   fail_each("load", try_load, (void *)humanoid, 100000, 1);
   test_states();
   test_problems();
+  test_made();
   test_optimiser();
   return check_result();
 }

@@ -186,7 +186,8 @@ const char *cav_draft_mjcf(cav_draft *draft) {
   }
   int whole = out && !ferror(out);
   if (out && fclose(out)) whole = 0;
-  if (!whole) {
+  // what closes the stream may be left without memory and say nothing
+  if (!whole || !text) {
     free(text);
     fail(draft, CAV_NO_MEMORY, "no memory for the draft of a model");
     return NULL;
