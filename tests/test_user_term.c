@@ -193,6 +193,34 @@ static cav_sensor tip_sensor(const cav_model *m, cav_sensor_type type) {
   return sensor;
 }
 
+/// The values of every term, with what they cost, against its report: the sum of the costs, and the value missed most.
+static void check_values(const cav_problem *p, const cav_solution *s, const cav_term_report *report) {
+  enum { MOST = 400 };
+  static cav_term_value value[MOST];
+  for (int i = 0; i < p->nterm; i++) {
+    int n = 0, all = 0, seen = 0;
+    double cost = 0, h = s->trajectory->timestep;
+    CHECK(cav_term_values(p, s->trajectory, &s->contact, i, MOST, value, &n, NULL) == CAV_OK && n > 0 && n <= MOST);
+    CHECK(cav_term_values(p, s->trajectory, &s->contact, i, 0, NULL, &all, NULL) == CAV_OK && all == n);
+    for (int k = 0; k < n; k++) {
+      cost += value[k].cost;
+      CHECK(k == 0 || value[k].knot > value[k - 1].knot ||
+            (value[k].knot == value[k - 1].knot && value[k].component == value[k - 1].component + 1));
+      seen |= fabs(value[k].knot * h - report[i].time) < 1e-9 && value[k].value == report[i].got &&
+              (value[k].target == report[i].wanted || p->term[i].use == CAV_USE_RANGE);
+    }
+    CHECK_NEAR(cost, report[i].cost, 1e-12 * (1 + cost));
+    // postures tell coordinates, not differences
+    CHECK(seen || !report[i].has_target || p->term[i].quantity == CAV_QUANTITY_CONFIGURATION);
+    // a single knot has the values of one
+    if (p->term[i].quantity == CAV_QUANTITY_USER) CHECK(n == (p->term[i].component < 0 ? p->term[i].user->dim : 1));
+  }
+  cav_error error = {0};
+  int n;
+  CHECK(cav_term_values(p, s->trajectory, &s->contact, p->nterm, 0, NULL, &n, &error) == CAV_BAD_INPUT && n == 0 &&
+        strstr(error.text, "none of number"));
+}
+
 // ---------------------------------------------------------------- against what is built in
 
 /// Place of the tip, hard at the end, and its speed, priced half way: by sensors (0), by functions (1), without a
@@ -224,6 +252,7 @@ static void test_sensors(cav_solver solver, int free_duration) {
     if (found[way])
       CHECK(cav_terms_report(&t.problem, found[way]->trajectory, &found[way]->contact, report[way], &cost, NULL) == 0);
     if (found[way]) CHECK_NEAR(cost, found[way]->cost, 1e-9 * cost);
+    if (found[way]) check_values(&t.problem, found[way], report[way]);
     task_free(&t);
   }
   for (int way = 1; way < 3 && found[0] && found[1] && found[2]; way++) {
@@ -462,6 +491,9 @@ static void test_faults(cav_solver solver) {
       CHECK(cav_verify(&t.problem, rest, &law, NULL, NULL, &verdict, &error) == wanted);
       if (!jacobian) CHECK(!verdict.certified && strstr(error.text, "'mine'") && strstr(error.text, "knot 5"));
       CHECK(cav_terms_report(&t.problem, rest, &law, report, NULL, &error) == wanted);
+      if (!jacobian) CHECK(strstr(error.text, "'mine'") && strstr(error.text, "knot 5"));
+      int n;
+      CHECK(cav_term_values(&t.problem, rest, &law, 3, 0, NULL, &n, &error) == wanted);
       if (!jacobian) CHECK(strstr(error.text, "'mine'") && strstr(error.text, "knot 5"));
       cav_trajectory_free(rest);
       task_free(&t);

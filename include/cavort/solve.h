@@ -450,6 +450,22 @@ CAV_API cav_status cav_terms_report(const cav_problem *problem, const cav_trajec
                                     const cav_options *contact, cav_term_report *report, double *cost,
                                     cav_error *error);
 
+/// One value of a term at one knot of a motion.
+typedef struct cav_term_value {
+  int knot;
+  int component; ///< number of the value among those of the term at that knot: of a sensor, of selected dofs, of actuators or
+                 ///< of contacts in their order
+  double value,
+      target;  ///< in the unit of the quantity; of postures and orientations the difference from the target, and 0
+  double cost; ///< that it adds to the motion's; 0 of a constraint
+} cav_term_value;
+
+/// The values of term number term of the problem at the knots of its window, knot by knot: the first most of them into value
+/// (NULL if most is 0), all counted in *n. Evaluated anew like a certificate, and fails as cav_verify does.
+CAV_API cav_status cav_term_values(const cav_problem *problem, const cav_trajectory *trajectory,
+                                   const cav_options *contact, int term, int most, cav_term_value *value, int *n,
+                                   cav_error *error);
+
 /// Why a motion is as it is: one thing that is missed, or that pulls.
 typedef struct cav_reason {
   cav_binding row;  ///< the worst of its knots

@@ -220,6 +220,16 @@ static double norm_of(const cav_term *term, double x) {
   return term->norm == CAV_NORM_ABSOLUTE ? sqrt(1 + x * x) - 1 : 0.5 * x * x;
 }
 
+// cost of one value at knot t, where the norm has that weight
+static double cost_of(const cav_verification *verification, const cav_term *term, int t, double weight, double x,
+                      double target) {
+  // velocities and accelerations at the start are given: no cost is taken for what no unknown moves
+  int fixed = t == 0 && !verification->problem->cycle.on;
+  fixed = fixed && (term->quantity == CAV_QUANTITY_VELOCITY || term->quantity == CAV_QUANTITY_CONFIGURATION);
+  if (term->use != CAV_USE_COST || fixed) return 0;
+  return weight * term->weight * norm_of(term, (x - target) / term->scale);
+}
+
 double cav_verification_weight(const cav_verification *verification, const cav_term *term, int t) {
   int single, whole;
   if (!cav_verification_holds(verification, term, t, &single, &whole)) return 0;
@@ -240,12 +250,20 @@ void cav_targets_note(const cav_verification *verification, int t, double *work,
     if (weight == 0) continue;
     int n = cav_verification_measure(verification, term, t, q, x, target);
     if (n > 0 && states_target(term)) note_target(verification, term, t, n, x, target, &report[i]);
-    if (term->use != CAV_USE_COST) continue;
-    // velocities and accelerations at the start are given: no cost is taken for what no unknown moves
-    int fixed = t == 0 && !verification->problem->cycle.on;
-    if (fixed && (term->quantity == CAV_QUANTITY_VELOCITY || term->quantity == CAV_QUANTITY_CONFIGURATION)) continue;
-    for (int k = 0; k < n; k++)
-      report[i].cost += weight * term->weight * norm_of(term, (x[k] - target[k]) / term->scale);
+    for (int k = 0; k < n; k++) report[i].cost += cost_of(verification, term, t, weight, x[k], target[k]);
+  }
+}
+
+void cav_targets_list(const cav_verification *verification, const cav_term *term, int t, double *work, int most,
+                      cav_term_value *value, int *n) {
+  int room = (cav_constraint_check_room(verification) - verification->model->nq) / 2, single, whole;
+  double *q = work, *x = q + verification->model->nq, *target = x + room;
+  if (!cav_verification_holds(verification, term, t, &single, &whole)) return;
+  double weight = cav_verification_weight(verification, term, t);
+  int here = cav_verification_measure(verification, term, t, q, x, target);
+  for (int k = 0; k < here; k++, ++*n) {
+    double cost = cost_of(verification, term, t, weight, x[k], target[k]);
+    if (*n < most) value[*n] = (cav_term_value){t, k, x[k], target[k], cost};
   }
 }
 

@@ -132,6 +132,10 @@ double cav_verification_weight(const cav_verification *verification, const cav_t
 void cav_targets_note(const cav_verification *verification, int t, double *work, cav_term_report *report);
 void cav_targets_verdict(const cav_verification *verification, cav_term_report *report, cav_verdict *verdict);
 
+/// Adds the values of one term at knot t to a list of which the first most are kept. targets.c.
+void cav_targets_list(const cav_verification *verification, const cav_term *term, int t, double *work, int most,
+                      cav_term_value *value, int *n);
+
 /// A value of a term at knot t in words: name, what it is of, wanted and got. targets.c.
 void cav_target_words(const cav_verification *verification, const cav_term *term, int t, int k, double x, double target,
                       char *out, size_t size);

@@ -628,6 +628,43 @@ cav_status cav_terms_report(const cav_problem *problem, const cav_trajectory *tr
   return status;
 }
 
+// inverse dynamics and efforts at knot t, with room for the values of terms in *work, which has *room numbers
+static cav_status stand_at(cav_verification *verification, int t, double **work, int *room) {
+  const cav_model *model = verification->model;
+  size_t nv = (size_t)model->nv, knot = (size_t)t;
+  const double *v = verification->v + knot * nv;
+  double *u = verification->u + knot * nv;
+  cav_status status = cav_inverse(model, verification->state, verification->q + knot * (size_t)model->nq, v, v + nv, u);
+  if (status != CAV_OK) return status;
+  cav_actuation(model, verification->state, u, NULL, verification->control + knot * (size_t)model->nu);
+  if (cav_constraint_check_room(verification) <= *room) return CAV_OK;
+  free(*work);
+  *room = cav_constraint_check_room(verification);
+  *work = malloc(sizeof(double) * (size_t)*room);
+  return *work ? CAV_OK : CAV_NO_MEMORY;
+}
+
+cav_status cav_term_values(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
+                           int term, int most, cav_term_value *value, int *n, cav_error *error) {
+  cav_verification verification;
+  double *work = NULL;
+  int room = 0;
+  *n = 0;
+  cav_status status = cav_verification_begin(&verification, problem, trajectory, contact, NULL, NULL, error);
+  if (status == CAV_OK && (term < 0 || term >= problem->nterm))
+    status =
+        verification_fail(error, CAV_BAD_INPUT, "the problem has %d terms, none of number %d", problem->nterm, term);
+  for (int t = 0; status == CAV_OK && t <= verification.last; t++) {
+    status = stand_at(&verification, t, &work, &room);
+    if (status != CAV_OK) verification_fail(error, status, "knot %d: %s", t, cav_status_name(status));
+    if (status == CAV_OK) cav_targets_list(&verification, &problem->term[term], t, work, most, value, n);
+    if (status == CAV_OK && (status = verification.failure->status) != CAV_OK && error) *error = *verification.failure;
+  }
+  free(work);
+  cav_verification_end(&verification);
+  return status;
+}
+
 cav_status cav_closed_loops_begin(cav_verification *verification, const cav_problem *problem,
                                   const cav_trajectory *trajectory, const cav_options *contact, cav_error *error) {
   cav_status status = cav_verification_begin(verification, problem, trajectory, contact, NULL, NULL, error);
