@@ -131,10 +131,38 @@ static void check_jumps(cav_transcription *tr, cav_trajectory *at, cav_trajector
   free(x);
 }
 
+/// Work of the last dof and weight on the floor, of which u and the impulses are pulled.
+static int own_value(void *context, const cav_knot_view *view, double *value) {
+  int d = view->model->nv - 1;
+  (void)context;
+  value[0] = view->u[d] * (view->v[d] + view->v_next[d]) / 40;
+  for (int i = 0; i < view->state->ncontact; i++) value[1] += view->state->contact[i].impulse[0] / view->timestep / 50;
+  return 0;
+}
+
+static int own_jacobian(void *context, const cav_knot_view *view, const cav_view_jacobian *jacobian) {
+  int d = view->model->nv - 1;
+  (void)context;
+  jacobian->du[d] = (view->v[d] + view->v_next[d]) / 40;
+  jacobian->dv[d] = jacobian->dv_next[d] = view->u[d] / 40;
+  for (int i = 0; i < view->state->ncontact; i++)
+    jacobian->dimpulse[6 * view->state->ncontact + 6 * i] = 1 / view->timestep / 50;
+  return 0;
+}
+
 // spread: how far knots lie from the start, at random; up: dof that lifts; bound of what the Hessian is off by
 static void check_model(const char *model, double spread, int up, double bound) {
   cav_problem *problem = load(model);
   if (!CHECK(problem != NULL)) return;
+  // and two terms of one's own, one of them hard
+  cav_user_quantity own = {"own", "", 2, CAV_READS_ACCELERATION, own_value, own_jacobian, NULL, 0};
+  cav_term *given = problem->term, terms[40];
+  int ngiven = problem->nterm;
+  memcpy(terms, given, (size_t)ngiven * sizeof *terms);
+  terms[ngiven] = cav_term_cost(CAV_QUANTITY_USER, 20);
+  terms[ngiven + 1] = cav_term_range(CAV_QUANTITY_USER, -1, 1);
+  terms[ngiven].user = terms[ngiven + 1].user = &own;
+  problem->term = terms, problem->nterm = ngiven + 2;
   cav_transcription *tr = cav_transcription_new(problem, 2, NULL);
   cav_normal *normal = cav_normal_new(tr);
   cav_trajectory *at = cav_trajectory_new(problem->model, tr->nknot, problem->timestep);

@@ -225,14 +225,17 @@ static void check_values(const cav_problem *p, const cav_solution *s, const cav_
 
 /// Place of the tip, hard at the end, and its speed, priced half way: by sensors (0), by functions (1), without a
 /// Jacobian (2).
-static void test_sensors(cav_solver solver, int free_duration) {
+enum { STATED, FREE_DURATION, CYCLE };
+static void test_sensors(cav_solver solver, int horizon) {
   cav_solution *found[3] = {NULL};
   cav_term_report report[3][TERMS];
   const double at[3] = {-0.5, 0, 0.7};
   for (int way = 0; way < 3; way++) {
     task t;
     if (!task_new(&t)) return;
-    if (free_duration) t.problem.duration_least = 0.5, t.problem.duration_most = 1.2, t.problem.duration_weight = 5;
+    t.problem.cycle.on = horizon == CYCLE;
+    if (horizon == FREE_DURATION)
+      t.problem.duration_least = 0.5, t.problem.duration_most = 1.2, t.problem.duration_weight = 5;
     cav_sensor place = tip_sensor(t.model, CAV_SENSOR_FRAMEPOS), speed = tip_sensor(t.model, CAV_SENSOR_FRAMELINVEL);
     cav_user_quantity own[2] = {{.name = "place", .unit = "m", .dim = 3, .reads = CAV_READS_POSITION},
                                 {.name = "speed", .unit = "m/s", .dim = 3, .reads = CAV_READS_VELOCITY}};
@@ -258,8 +261,8 @@ static void test_sensors(cav_solver solver, int free_duration) {
   for (int way = 1; way < 3 && found[0] && found[1] && found[2]; way++) {
     // the same rows in the same order, so the same bits; by differences, and for Ipopt's linear solver, to their error
     double bound = way == 1 && solver == CAV_SOLVER_GAUSS_NEWTON ? 0 : 2e-4;
-    printf("sensors, solver %d, way %d: %d and %d iterations, %.1e apart\n", solver, way, found[0]->iterations,
-           found[way]->iterations, distance(found[0], found[way]));
+    printf("sensors, solver %d, horizon %d, way %d: %d and %d iterations, %.1e apart\n", solver, horizon, way,
+           found[0]->iterations, found[way]->iterations, distance(found[0], found[way]));
     CHECK(distance(found[0], found[way]) <= bound);
     CHECK_NEAR(found[way]->cost, found[0]->cost, 1e-6 * found[0]->cost);
     for (int i = 3; i < 5; i++) {
@@ -551,15 +554,16 @@ static void test_refused(void) {
 int main(void) {
   int ipopt = !cav_solver_rule_of(CAV_SOLVER_IPOPT)->missing;
   test_jacobians();
-  test_sensors(CAV_SOLVER_GAUSS_NEWTON, 0);
-  test_sensors(CAV_SOLVER_GAUSS_NEWTON, 1);
+  test_sensors(CAV_SOLVER_GAUSS_NEWTON, STATED);
+  test_sensors(CAV_SOLVER_GAUSS_NEWTON, FREE_DURATION);
+  test_sensors(CAV_SOLVER_GAUSS_NEWTON, CYCLE);
   test_power(CAV_NORM_SQUARE);
   test_power(CAV_NORM_ABSOLUTE);
   test_hard();
   test_faults(CAV_SOLVER_GAUSS_NEWTON);
   test_domain();
   test_refused();
-  if (ipopt) test_sensors(CAV_SOLVER_IPOPT, 0);
+  if (ipopt) test_sensors(CAV_SOLVER_IPOPT, STATED);
   if (ipopt) test_faults(CAV_SOLVER_IPOPT);
   return check_result();
 }
