@@ -20,11 +20,8 @@ number() { sed -n "s/^ *\"$1\": \([^,]*\),*$/\1/p" "$work/out/verdict.json" | aw
 # word NAME: a field that is true or false, as yes or no
 word() { sed -n "s/^ *\"$1\": \(true\|false\),*$/\1/p" "$work/out/verdict.json" | sed 's/true/yes/; s/false/no/'; }
 
-# seconds of processor that children of this shell have taken
-taken() {
-  times >"$work/times"
-  sed -n 2p "$work/times" | tr 'ms' '  ' | awk '{ print 60 * $1 + $2 + 60 * $3 + $4 }'
-}
+# seconds of processor that children of this shell have taken, from what times has written
+taken() { sed -n 2p "$1" | tr 'ms' '  ' | awk '{ print 60 * $1 + $2 + 60 * $3 + $4 }'; }
 
 # row ROBOT MODEL MOTION [FILE]
 row() {
@@ -32,13 +29,14 @@ row() {
     "  " | *" $3 "*) ;;
     *) grep -F "| $1 | $3 |" tests/results/robots.md && return 0 ;;
   esac
-  before=$(taken)
+  rm -rf "$work/out"
+  times >"$work/before"
   "$build/problems/cavort" solve "problems/motions/$3/${4:-problem}.xml" --model "$shared/$2" -o "$work/out" --threads 1 --quiet || true
-  spent=$(taken)
+  times >"$work/after"
   printf '| %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s |\n' "$1" "$3" "$(word certified)" "$(word achieved)" \
     "$(number cost 1 %.4g)" "$(number optimality 1 %.0e)" "$(number hover_fraction 100 %.2f)" "$(number slip_mean_m_s 1000 %.0f)" \
     "$(number momentum_defect_rms 100 %.2f)" "$(number closed_loop_end_error_m 1000 %.0f)" "$(number iterations 1 %d)" \
-    "$(echo "$before $spent" | awk '{ printf "%.1f", $2 - $1 }')" "$(git rev-parse --short HEAD)"
+    "$(echo "$(taken "$work/before") $(taken "$work/after")" | awk '{ printf "%.1f", $2 - $1 }')" "$(git rev-parse --short HEAD)"
 }
 
 {
@@ -51,15 +49,15 @@ row() {
   echo
   echo "| robot | motion | certified | achieved | cost | optimal to | hover, % | slip, mm/s | momentum defect, % | closed loop, end, mm | iterations | s of one processor | commit |"
   echo "|---|---|---|---|---|---|---|---|---|---|---|---|---|"
-  g1=unitree/g1/scene_29dof.xml
-  row "Unitree G1" $g1 robot-squat
-  row "Unitree G1" $g1 robot-reach
+  g1=unitree/g1/scene_29dof.xml go1=menagerie/unitree_go1/scene.xml arm=menagerie/ufactory_xarm7/xarm7.xml
+  row xArm7 $arm arm-reach
+  row xArm7 $arm arm-gate
+  row "Unitree Go1" $go1 quadruped-jump
+  row "Unitree Go1" $go1 quadruped-trot stride
   row "Unitree G1" $g1 robot-step
   row "Unitree G1" $g1 robot-jump
-  row "Unitree Go1" menagerie/unitree_go1/scene.xml quadruped-jump
-  row "Unitree Go1" menagerie/unitree_go1/scene.xml quadruped-trot stride
-  row "xArm7" menagerie/ufactory_xarm7/xarm7.xml arm-reach
-  row "xArm7" menagerie/ufactory_xarm7/xarm7.xml arm-gate
+  row "Unitree G1" $g1 robot-reach
+  row "Unitree G1" $g1 robot-squat
 } >"$work/robots.md"
 mv "$work/robots.md" tests/results/robots.md
 cat tests/results/robots.md
