@@ -6,9 +6,35 @@
 #include "cavort/cavort.h"
 #include "scene.h"
 
+/// What no member of a model's structs holds: four bytes before these members, and at the end of a geom (clang -Wpadded). It is
+/// whatever stood there before.
+#define GAPS(X)                                                                                                \
+  X(link, nlink, pos)                                                                                          \
+  X(joint, njoint, pos)                                                                                        \
+  X(joint, njoint, range) X(joint, njoint, effort_range) X(dof, nv, damping) X(geom, ngeom, bound)             \
+      X(geom, ngeom, fluidcoef) X(site, nsite, size) X(pair, npair, friction) X(tendon, ntendon, range)        \
+          X(tendon_part, ntendon_part, coef) X(tendon_path, ntendon_path, divisor) X(equality, nequality, pos) \
+              X(actuator, nactuator, activation_parameter) X(actuator, nactuator, ctrlrange)
+
+// the four bytes before a place in a model
+static void clear(const cav_model *m, const void *place) {
+  char *at = (char *)m + ((const char *)place - (const char *)m);
+  memset(at - 4, 0, 4);
+}
+
+static void clear_gaps(const cav_model *m) {
+#define CLEAR(array, count, member) \
+  for (int i = 0; i < m->count; i++) clear(m, &m->array[i].member);
+  GAPS(CLEAR)
+#undef CLEAR
+  for (int i = 0; i < m->ngeom; i++) clear(m, &m->geom[i + 1]);
+  clear(m, &m->timestep), clear(m, &m->body);
+}
+
 /// Words of two models that differ. A model is one block; addresses within it count from its start.
 static long differing(const cav_model *a, const cav_model *b) {
   if (!a || !b || a->bytes != b->bytes) return -1;
+  clear_gaps(a), clear_gaps(b);
   long n = 0;
   for (size_t i = 0; i + sizeof(size_t) <= a->bytes; i += sizeof(size_t)) {
     size_t x, y;
