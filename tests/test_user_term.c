@@ -352,6 +352,13 @@ static void test_jacobians(void) {
   power.jacobian = NULL;
   CHECK(cav_user_quantity_check(&power, state, q, v, v, &off, NULL, &error) == CAV_BAD_INPUT &&
         strstr(error.text, "'power'"));
+  // one that says less than it reads
+  power.jacobian = power_jacobian, power.context = NULL, power.reads = CAV_READS_VELOCITY;
+  double speed[3] = {1, 2, 0.5}, later[3] = {1.5, 1, 0.7};
+  CHECK(cav_user_quantity_check(&power, state, q, speed, later, &off, NULL, &error) == CAV_BAD_INPUT &&
+        strstr(error.text, "later stage"));
+  power.reads = CAV_READS_ACCELERATION;
+  CHECK(cav_user_quantity_check(&power, state, q, speed, later, &off, NULL, &error) == CAV_OK && off < 1e-6);
   const double *at_q, *at_v, *at_next;
   v[0] = 0.1;
   double *u = scene_vector(arm->nv), *next = scene_vector(arm->nv);

@@ -103,10 +103,10 @@ typedef struct cav_user_quantity {
   int dim;                ///< number of values, 1 .. CAV_USER_DIM_MAX
   cav_sensor_stage reads; ///< the last stage that it looks at: of q alone, of q and v_next, or of anything
   cav_user_value value;   ///< reads its values
-  /// NULL: by differences of value, as of all that has no closed form: 3 nv evaluations of the dynamics a knot, one-sided
-  /// with a relative step of 1e-7 (positions) and 1e-6 (velocities), for Ipopt centred with 1e-5 and 1e-4
-  /// (cav_readout_differentiate). Right to some 1e-6 or 1e-9 where value is smooth; at a kink the derivative of one of
-  /// its sides, or of Ipopt's their mean.
+  /// NULL: by differences of value, as of all that has no closed form: nv evaluations of the dynamics a knot for each of
+  /// q, v_next and v that it reads, one-sided with a relative step of 1e-7 (positions) and 1e-6 (velocities), for Ipopt
+  /// centred with 1e-5 and 1e-4 (cav_readout_differentiate). Right to some 1e-6 or 1e-9 where value is smooth; at a kink
+  /// the derivative of one of its sides, or of Ipopt's their mean.
   cav_user_jacobian jacobian;
   void *context; ///< the functions' first argument
   double within; ///< usual tolerance of a goal that states none, in its unit; 0: there is none
@@ -115,7 +115,8 @@ typedef struct cav_user_quantity {
 /// Largest relative difference of a quantity's Jacobian from centred differences of its values at a point q [nq], v and
 /// v_next [nv] under the state's options, over the largest entry of its row (1e-3 of the largest of all rows at least);
 /// where: number of the value and the dof of the worst entry, and whether that is by q (0), v (1) or v_next (2); may be
-/// NULL. The state is left at the point. CAV_BAD_INPUT: the quantity has no Jacobian, or is refused as a term;
+/// NULL. The state is left at the point. CAV_BAD_INPUT: the quantity has no Jacobian, is refused as a term, or changes
+/// with what it says it does not read;
 /// CAV_NOT_SUPPORTED: the model has no analytic derivatives (cav_derivatives_missing), so the Jacobian is not used;
 /// CAV_NOT_FINITE, CAV_NO_MEMORY.
 CAV_API cav_status cav_user_quantity_check(const cav_user_quantity *quantity, cav_state *state, const double *q,

@@ -3,6 +3,7 @@
 /// of one's own without Jacobian) is
 /// differenced instead, only that, and counted; nothing else is mixed.
 #include "readings.h"
+#include "quantity.h"
 #include "rotation.h"
 
 #include <assert.h>
@@ -248,8 +249,10 @@ static cav_status user_rows(const cav_transcription *tr, cav_scratch *s, const c
   cav_status status = cav_user_differentiate(term->user, s->state, cav_knot_time(tr, t), du, &s->user, by, refusal);
   if (refusal->refused && !before) tr->knot[t].refused_term = (int)(term - tr->problem->term);
   if (status != CAV_OK) return status;
+  // of what it says it reads, which is what rows are laid for
+  int read[3] = {1, term->user->reads == CAV_READS_ACCELERATION, term->user->reads != CAV_READS_POSITION};
   for (int k = 0; k < 3; k++)
-    for (int i = 0; i < cav_term_dim(term) * nv; i++) to[k][i] = by[k][first * nv + i] / term->scale;
+    for (int i = 0; i < cav_term_dim(term) * nv; i++) to[k][i] = read[k] ? by[k][first * nv + i] / term->scale : 0;
   return CAV_OK;
 }
 
@@ -289,9 +292,14 @@ static cav_status terms(const cav_transcription *tr, cav_scratch *s, int t, cons
         missing += s->missing[i];
         if (s->missing[i]) status = CAV_OK;
       } else if (s->missing[i]) {
+        // what it does not look at needs no evaluations
+        cav_sensor_stage stage = cav_term_stage(term);
         single_term single = {tr, term, t};
+        memset(out.dv, 0, (size_t)(n * tr->nv) * sizeof(double));
+        memset(out.dn, 0, (size_t)(n * tr->nv) * sizeof(double));
         status = cav_readout_differentiate(tr->model, s->state, tr->difference, 0, q, v, v_next, read_term, &single, n,
-                                           NULL, out.dq, out.dv, out.dn);
+                                           NULL, out.dq, stage == CAV_READS_ACCELERATION ? out.dv : NULL,
+                                           stage == CAV_READS_POSITION ? NULL : out.dn);
         s->differenced++;
       }
       if (status != CAV_OK) return status;

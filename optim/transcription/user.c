@@ -154,6 +154,18 @@ static double compare(int n, int nv, double *const is[3], const double *should, 
   return worst;
 }
 
+/// Whether values change with velocities that they are said not to read: derivatives [3*block] by q, v and v_next.
+static int reads_more(const cav_user_quantity *user, const double *derivative, size_t block) {
+  double all = 0, more = 0;
+  for (size_t i = 0; i < 3 * block; i++) {
+    int unread =
+        i >= block && (user->reads == CAV_READS_POSITION || (user->reads == CAV_READS_VELOCITY && i < 2 * block));
+    all = fmax(all, fabs(derivative[i]));
+    if (unread) more = fmax(more, fabs(derivative[i]));
+  }
+  return more > 1e-6 * all;
+}
+
 /// All of the check but memory; x [(3*nv + 3*dim)*nv + nv].
 static cav_status check(reading *r, cav_state *state, const double *q, const double *v, const double *v_next, double *x,
                         cav_user_room *room, double *error_relative, int where[3]) {
@@ -164,6 +176,7 @@ static cav_status check(reading *r, cav_state *state, const double *q, const dou
   const double *du[3] = {x, x + square, x + 2 * square};
   cav_status status = cav_readout_differentiate(model, state, CAV_DERIVATIVE_CENTRED, 0, q, v, v_next, read_value, r,
                                                 dim, NULL, should, should + block, should + 2 * block);
+  if (status == CAV_OK && !r->refusal.refused && reads_more(r->user, should, block)) return CAV_BAD_INPUT;
   if (status == CAV_OK) status = cav_inverse(model, state, q, v, v_next, u);
   if (status == CAV_OK) status = cav_derivatives(model, state, x, x + square, x + 2 * square);
   if (status == CAV_OK && !r->refusal.refused)
@@ -192,6 +205,14 @@ cav_status cav_user_quantity_check(const cav_user_quantity *user, cav_state *sta
       status = reason.status;
     }
     free(x), free(room.x);
+  }
+  if (status == CAV_BAD_INPUT && reason.status == CAV_OK) {
+    reason.status = status;
+    snprintf(reason.text, sizeof reason.text,
+             "the quantity '%.80s' changes with velocities that it says it does not read: set reads to a later stage, "
+             "or the "
+             "state's options are not valid",
+             user->name);
   }
   if (status != CAV_OK && reason.status == CAV_OK) {
     const char *missing = status == CAV_NOT_SUPPORTED ? cav_derivatives_missing(state->model) : NULL;
