@@ -11,6 +11,7 @@
 #include "continuation.h"
 #include "file.h"
 #include "math3.h"
+#include "problem_check.h"
 #include "problem_file.h"
 #include "pump.h"
 
@@ -151,6 +152,7 @@ cav_status cav_guess_fill(const cav_problem *problem, const double *end, cav_tra
 }
 
 cav_trajectory *cav_problem_guess(const cav_problem *problem, cav_error *error) {
+  if (cav_problem_check(problem, error)) return NULL;
   int nknot = (int)lround(problem->duration / problem->timestep) + 1, cycle = problem->cycle.on;
   cav_periodicity *periodicity = cycle ? cav_periodicity_new(problem, error) : NULL;
   if (cycle && !periodicity) return NULL;

@@ -10,6 +10,7 @@
 #include "continuation.h"
 #include "idle.h"
 #include "lqr.h"
+#include "problem_check.h"
 #include "solvers.h"
 #include "sqp.h"
 
@@ -64,42 +65,17 @@ static cav_status fail(cav_error *error, cav_status status, const char *text) {
 /// What a caller can get wrong in structs filled by hand.
 static cav_status check(const cav_problem *p, const cav_solve_options *o, const cav_trajectory *start,
                         cav_error *error) {
-  if (!p->model || !p->q_start || !p->v_start || !p->q_goal)
-    return fail(error, CAV_BAD_INPUT, "the problem lacks a model, a start or a goal");
-  if (p->duration_most != 0 && !(p->duration_least > 0 && p->duration_most >= p->duration_least &&
-                                 p->duration >= p->duration_least && p->duration <= p->duration_most))
-    return fail(error, CAV_BAD_INPUT,
-                "a free duration needs duration between duration_least, above 0, and duration_most");
-  if (!(p->duration_weight >= 0)) return fail(error, CAV_BAD_INPUT, "duration_weight must not be negative");
-  if (p->cycle.on && !(p->duration >= 2.5 * p->timestep))
-    return fail(error, CAV_BAD_INPUT, "a cycle needs at least three steps");
-  if (!(p->timestep > 0) || !(p->duration >= 2 * p->timestep))
-    return fail(error, CAV_BAD_INPUT, "the horizon needs a positive timestep and at least two steps");
-  if (!(p->effort_limit > 0) || p->effort_limit > 1)
-    return fail(error, CAV_BAD_INPUT, "effort_limit must be in (0, 1]");
+  cav_status status = cav_problem_check(p, error);
+  if (status) return status;
   if (o->threads < 1) return fail(error, CAV_BAD_INPUT, "threads must be at least 1");
   if (!(o->tolerance > 0)) return fail(error, CAV_BAD_INPUT, "tolerance must be positive");
   if (o->first_stage < 0 || o->max_iterations < 0 || !(o->max_seconds >= 0) || o->nmultiplier < 0 ||
       (o->nmultiplier > 0 && !o->multiplier))
     return fail(error, CAV_BAD_INPUT,
                 "first_stage, max_iterations, max_seconds and nmultiplier must not be negative, and multipliers there");
-  if (p->schedule.stages < 1) return fail(error, CAV_BAD_INPUT, "the schedule needs at least one stage");
-  int nfield;
-  const cav_field *field = cav_stage_fields(&nfield);
-  cav_status status = cav_fields_check(field, nfield, &p->schedule.first, "first stage of the schedule", error);
-  if (!status) status = cav_fields_check(field, nfield, &p->schedule.last, "last stage of the schedule", error);
-  if (status) return status;
   int nknot = (int)lround(p->duration / p->timestep) + 1;
   for (int i = 0; i < p->nterm; i++) {
-    const cav_term *term = &p->term[i];
-    if (term->quantity >= CAV_QUANTITY_TYPES) return fail(error, CAV_BAD_INPUT, "a term is of no quantity");
-    if (term->use != CAV_USE_COST && !cav_quantity_rule_of(term->quantity)->hard)
-      return fail(
-          error, CAV_BAD_INPUT,
-          "a constraint must be over a sensor, a posture, a velocity, an acceleration or a quantity of one's own");
-    if (cav_user_term_check(term, error) != CAV_OK) return CAV_BAD_INPUT;
-    if (!(term->scale > 0) || !(term->weight >= 0))
-      return fail(error, CAV_BAD_INPUT, "a term needs a positive scale and a weight that is not negative");
+    if (cav_user_term_check(&p->term[i], error) != CAV_OK) return CAV_BAD_INPUT;
   }
   for (int k = 0; k < 2; k++) {
     const cav_ipopt_option *option = k ? o->ipopt : p->ipopt;

@@ -264,6 +264,10 @@ class Problem:
         made = ffi.new("cav_term *", struct)
         made.scale, made.within = scale, _term.tolerance(within)
         if component is not None:
+            if not user and made.quantity != lib.CAV_QUANTITY_SENSOR:
+                raise TypeError("component is of sensors and of quantities of one's own")
+            if component not in ("x", "y", "z") and not (isinstance(component, int) and component >= 0):
+                raise ValueError(f"component: expected 'x', 'y', 'z' or a number from 0, got {component!r}")
             made.component = "xyz".index(component) if isinstance(component, str) else component
         if at is not None or window is not None:
             if at is not None and window is not None:
@@ -356,18 +360,18 @@ class Problem:
         self._c.cycle.mirror = _library.choose("cav_mirror", mirror, "mirror")
 
     def _check_times(self) -> None:
-        # what a file is told by its reader
-        end = self.duration * (1 + 1e-6)
-        for i, term in enumerate(self.terms):
-            start, stop = getattr(term._c, "from"), term._c.to
-            if not (0 <= start <= end and (stop < 0 or start <= stop <= end)):
-                raise ValueError(
-                    f"term {i} ({term.name or text(lib.cav_quantity_rule_of(term._c.quantity).name)}): its window, {start:g} "
-                    f"to {stop:g} s, is not within the horizon, 0 to {self.duration:g} s"
-                )
-        steps = self.duration / self.timestep if self.timestep > 0 else 0
-        if not steps >= 1 or abs(steps - round(steps)) > 1e-6 * max(1.0, steps):
+        # what a file is told by its reader and C by nobody; the library checks all else
+        steps = self.duration / self.timestep if self.timestep > 0 else np.nan
+        if not np.isfinite(steps) or steps < 0.5 or abs(steps - round(steps)) > 1e-6 * max(1.0, steps):
             raise ValueError(f"the duration, {self.duration:g} s, is not a whole number of steps of {self.timestep:g} s")
+        for i, term in enumerate(self.terms):
+            if term._model._c != self.model._c:
+                raise ValueError(f"term {i} is of another model, {term._model.name!r}")
+            if term._c.to > self.duration * (1 + 1e-6):
+                name = term.name or text(lib.cav_quantity_rule_of(term._c.quantity).name)
+                raise ValueError(
+                    f"term {i} ({name}): its window ends at {term._c.to:g} s, after the horizon of {self.duration:g} s"
+                )
 
     def _freeze(self) -> Frozen:
         self._check_times()

@@ -220,10 +220,30 @@ def test_refused(arm, swing):
     with pytest.raises(ValueError, match="target has the shape"):
         problem.cost("sensor", type="framepos", body="rod", target=[1, 2])
     problem.cost("velocity", at=3.0)
-    with pytest.raises(ValueError, match="not within the horizon"):
+    with pytest.raises(ValueError, match="ends at 3 s, after the horizon of 1 s"):
         cavort.solve(problem)
     with pytest.raises(ValueError, match="solver: expected one of gn"):
         cavort.solve(cavort.Problem.load(swing), solver="magic")
+    for attributes, words in (
+        ({"component": 3}, "component that its sensor does not have"),
+        ({"scale": 0.0}, "positive scale"),
+        ({"within": -1.0}, "within"),
+        ({"waypoints": [(0.5, [0, 0, 0]), (0.2, [1, 0, 0])]}, "do not increase"),
+        ({"target": [0, np.nan, 0], "name": "mine"}, r"not finite: term\[10\], 'mine'"),
+    ):
+        wrong = built(arm)
+        wrong.terms.pop()
+        wrong.cost("sensor", type="framepos", site="tip", **attributes)
+        with pytest.raises(cavort.Error, match=words):
+            cavort.solve(wrong)
+    with pytest.raises(ValueError, match="expected 'x', 'y', 'z' or a number"):
+        problem.cost("sensor", type="framepos", site="tip", component="w")
+    with pytest.raises(TypeError, match="of sensors"):
+        problem.cost("posture", component=0)
+    with pytest.raises(ValueError, match="of another model"):
+        other = built(arm)
+        other.terms.append(problem.terms[0])
+        cavort.solve(other)
     odd = built(arm)
     odd.timestep = 0.03
     with pytest.raises(ValueError, match="whole number of steps"):
