@@ -171,6 +171,16 @@ class Solution:
         records = [_library.record(report[i], ("has_target", "met")) for i in range(count)]
         return [Record({"name": name, **record}) for name, record in zip(self._frozen.names, records)]
 
+    def values(self, term: int | str) -> NDArray[Any]:
+        """A term along the motion, one row a knot and value: knot, component, value, target, cost. term: number or name."""
+        number = self._frozen.names.index(term) if isinstance(term, str) else range(self._frozen.c.nterm)[term]
+        count, error = ffi.new("int *"), new_error()
+        what = *self._motion(), number
+        self._frozen.check(lib.cav_term_values(*what, 0, ffi.NULL, count, error), "the values of a term", error)
+        array = ffi.new("cav_term_value[]", max(1, count[0]))
+        self._frozen.check(lib.cav_term_values(*what, count[0], array, count, error), "the values of a term", error)
+        return _library.view(array, array, (count[0],))
+
     def explain(self) -> Record:
         """Why the motion is as it is: violation and conflict, lists of reasons (what, cure, time, ...) by size; met."""
         found, error = ffi.new("cav_explanation *"), new_error()

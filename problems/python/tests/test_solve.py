@@ -52,6 +52,11 @@ def test_solution(swing):
     assert verdict.certified is True and verdict["achieved"] is True and verdict.reason == ""
     term = next(term for term in solution.terms if term.name == "there")
     assert term.met and term.wanted == pytest.approx(1) and abs(term.got - 1) < 0.03
+    along = solution.values("there")
+    assert along["knot"].tolist() == [20] and along["value"][0] == pytest.approx(term.got - term.wanted)
+    assert along["cost"].sum() == pytest.approx(term.cost) and np.array_equal(along, solution.values(-1))
+    speeds = solution.values("joint velocity")
+    assert np.allclose(speeds["value"], solution.v[speeds["knot"], 0]) and len(speeds) >= 20
     # efforts are u over the gear, and u is the inverse under the motion's law
     assert np.allclose(20 * solution.effort, solution.u)
     law = solution.contact
