@@ -11,7 +11,7 @@
 
 // fractions of the size: how far neighbours must be lower, how far apart the bodies; of a part: how far inside its ends points
 // lie; sines of what is not parallel
-static const double LOWER = 1e-9, APART = 1e-6, INSIDE = 1e-9, SQUARE = 1e-3;
+static const double LOWER = 1e-12, APART = 1e-6, INSIDE = 1e-9, SQUARE = 1e-3;
 // sine below which a cylinder lies flush on a face or stands on it; fraction of the size to which the points of a round
 // part lie one behind the other; largest turn of a step, rad
 static const double FLUSH = 1e-6, EXACT = 1e-14, TURN = 0.3;

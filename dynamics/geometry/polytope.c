@@ -92,6 +92,7 @@ void cav_outline_push(const cav_shape *s, int face, cav_outline *o) {
 
 typedef struct contact_pair {
   const cav_shape *a, *b;
+  int near_a, near_b; ///< corners of meshes about which they meet, -1: not known
   double radius_a, radius_b, size, margin;
   cav_separation separation;
 } contact_pair;
@@ -118,11 +119,11 @@ static int mesh_face_along(const cav_mesh *m, int corner, const double local[3])
   return best;
 }
 
-// that face, or where there is none the corner alone
-static void lowest_face(const cav_shape *s, const double n[3], cav_outline *o) {
+// that face, or where there is none the corner alone; near: a corner about there, -1: not known
+static void lowest_face(const cav_shape *s, const double n[3], int near, cav_outline *o) {
   double local[3];
   rotate_back(local, s->rotation, n);
-  int corner = cav_mesh_summit(s->mesh, local), face = mesh_face_along(s->mesh, corner, local);
+  int corner = cav_mesh_summit_from(s->mesh, local, near), face = mesh_face_along(s->mesh, corner, local);
   o->n = 0;
   if (face >= 0) {
     cav_outline_push(s, face, o);
@@ -144,7 +145,7 @@ static int box_face_along(const cav_shape *s, const double n[3]) {
 
 // the face of a body that looks most along n: outline, normal out of it; returns the cosine, -1 where there is none.
 // A cylinder's cap has a normal but no outline
-static double face_along(const cav_shape *s, const double n[3], cav_outline *o, double normal[3]) {
+static double face_along(const cav_shape *s, const double n[3], int near, cav_outline *o, double normal[3]) {
   int best = -1;
   o->n = 0;
   if (s->type == CAV_GEOM_CYLINDER) {
@@ -156,7 +157,7 @@ static double face_along(const cav_shape *s, const double n[3], cav_outline *o, 
   if (s->type == CAV_GEOM_MESH) {
     double local[3];
     rotate_back(local, s->rotation, n);
-    best = mesh_face_along(s->mesh, cav_mesh_summit(s->mesh, local), local);
+    best = mesh_face_along(s->mesh, cav_mesh_summit_from(s->mesh, local, near), local);
   }
   if (best < 0) return -1;
   cav_shape_normal(s, best, normal);
@@ -176,16 +177,16 @@ static double lowest_across(const cav_shape *s, const double back[3], double u[3
 }
 
 // what of a body could lie on a face whose normal is m: a face, a segment, three points of a rim, or nothing
-static void lying_on(const cav_shape *s, const double m[3], cav_outline *o) {
+static void lying_on(const cav_shape *s, const double m[3], int near, cav_outline *o) {
   double back[3], normal[3], u[3], x[3];
   scale3(back, -1, m);
   o->n = 0;
   if (s->type == CAV_GEOM_MESH) {
-    lowest_face(s, back, o);
+    lowest_face(s, back, near, o);
     return;
   }
   if (s->type == CAV_GEOM_BOX) {
-    face_along(s, back, o, normal);
+    face_along(s, back, near, o, normal);
     return;
   }
   if (s->type != CAV_GEOM_CAPSULE && s->type != CAV_GEOM_CYLINDER) return;
@@ -349,7 +350,8 @@ static int stand(const contact_pair *g, standing *s) {
   cav_outline face_b;
   double normal_a[3], normal_b[3], back[3], x[3];
   scale3(back, -1, g->separation.n);
-  double ca = face_along(g->a, g->separation.n, &s->face, normal_a), cb = face_along(g->b, back, &face_b, normal_b);
+  double ca = face_along(g->a, g->separation.n, g->near_a, &s->face, normal_a),
+         cb = face_along(g->b, back, g->near_b, &face_b, normal_b);
   s->on_b = cb >= ca - 1e-9;
   if (fmax(ca, cb) < ON_NORMAL) return 0;
   // face on face: whatever is narrower than a cap stands on it
@@ -361,7 +363,7 @@ static int stand(const contact_pair *g, standing *s) {
   if (s->on_b) s->face = face_b;
   cav_shape_support(s->ground, s->m, x);
   s->top = dot3(s->m, x);
-  lying_on(s->other, s->m, &s->lying);
+  lying_on(s->other, s->m, s->on_b ? g->near_a : g->near_b, &s->lying);
   cut_to_face(&s->lying, &s->face, s->m, s->ground);
   return 1;
 }
@@ -429,13 +431,13 @@ static double fraction_of(const double x[3], const double from[3], const double 
 }
 
 int cav_face_points(const cav_shape *a, const cav_shape *b, double margin, cav_face_point point[CAV_FACE_POINTS]) {
-  contact_pair g = {.a = a, .b = b, .size = fmax(cav_shape_size(a), cav_shape_size(b)), .margin = margin};
+  contact_pair g = {a, b, -1, -1, .size = fmax(cav_shape_size(a), cav_shape_size(b)), .margin = margin};
   standing s;
   cav_outline whole;
   if (!cav_separation_solve(a, b, margin, NULL, &g.separation) || !stand(&g, &s)) return 0;
   double roll[3][3] = {{0}}, turning[3] = {0};
   if (s.other->type == CAV_GEOM_CYLINDER && !rolling(s.other, s.m, roll, turning)) return 0;
-  lying_on(s.other, s.m, &whole);
+  lying_on(s.other, s.m, -1, &whole);
   for (int k = 0; k < s.lying.n; k++) {
     cav_face_point *p = &point[k];
     const int *line = s.lying.line[k], cuts = (line[0] >= CAV_OUTLINE_CUT) + (line[1] >= CAV_OUTLINE_CUT);
@@ -491,7 +493,7 @@ int cav_points_over(const cav_shape *s, double corner[3][3], const double normal
   cav_outline face = {.n = 3}, lying;
   double back[3];
   for (int k = 0; k < 3; k++) copy3(face.x[k], corner[k]);
-  lying_on(s, normal, &lying);
+  lying_on(s, normal, -1, &lying);
   if (!lying.n) {
     // a sphere or an ellipsoid: its lowest point
     scale3(back, -1, normal);
@@ -506,10 +508,13 @@ int cav_points_over(const cav_shape *s, double corner[3][3], const double normal
 
 // the same from where the last search of the pair ended
 static int collide_again(const cav_shape *a, const cav_shape *b, double margin, cav_hint *hint, cav_touch *touch) {
-  contact_pair g = {.a = a, .b = b, .size = fmax(cav_shape_size(a), cav_shape_size(b)), .margin = margin};
+  contact_pair g = {a, b, -1, -1, .size = fmax(cav_shape_size(a), cav_shape_size(b)), .margin = margin};
   g.radius_a = cav_core_of(a).radius;
   g.radius_b = cav_core_of(b).radius;
-  return cav_separation_solve(a, b, margin, hint, &g.separation) ? meet(&g, touch) : 0;
+  if (!cav_separation_solve(a, b, margin, hint, &g.separation)) return 0;
+  if (hint && hint->na && a->type == CAV_GEOM_MESH) g.near_a = hint->a[0];
+  if (hint && hint->na) g.near_b = hint->b[0];
+  return meet(&g, touch);
 }
 
 int cav_collide_convex(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
@@ -570,6 +575,7 @@ int cav_collide_plane_mesh(const cav_shape *a, const cav_shape *b, double margin
     if (k) axpy3(down, down, k % 2 ? LEAN : -LEAN, side[(k - 1) / 2]);
     int v = cav_mesh_summit(m, down), known = 0;
     double height = base + dot3(local, m->vertex + 3 * v), x[3];
+    if (!k && !(height < margin)) return 0;
     for (int i = 0; i < count; i++) known |= touch[i].feature == v;
     if (known || !(height < margin)) continue;
     cav_touch *t = &touch[count++];
