@@ -259,15 +259,26 @@ static int by_area(const void *a, const void *b) {
   return x->face - y->face;
 }
 
-// numbers the vertices in use in the order of the points
-static int number_vertices(const builder *b, int *index) {
-  int n = 0;
+// numbers the vertices in use from one triangle on, neighbour by neighbour: those next to each other are so in memory too;
+// queue has room for all triangles
+static int number_vertices(builder *b, int *index, int *queue) {
+  int n = 0, head = 0, tail = 0;
   for (int i = 0; i < b->n; i++) index[i] = -1;
-  for (int f = 0; f < b->nface; f++) {
-    for (int k = 0; k < 3 && b->face[f].alive; k++) index[b->face[f].v[k]] = 0;
-  }
-  for (int i = 0; i < b->n; i++) {
-    if (index[i] >= 0) index[i] = n++;
+  b->mark++;
+  for (int first = 0; first < b->nface; first++) {
+    if (!b->face[first].alive || b->face[first].mark == b->mark) continue;
+    b->face[first].mark = b->mark;
+    queue[tail++] = first;
+    while (head < tail) {
+      const triangle *t = &b->face[queue[head++]];
+      for (int k = 0; k < 3; k++) {
+        triangle *next = &b->face[t->next[k]];
+        if (index[t->v[k]] < 0) index[t->v[k]] = n++;
+        if (!next->alive || next->mark == b->mark) continue;
+        next->mark = b->mark;
+        queue[tail++] = t->next[k];
+      }
+    }
   }
   return n;
 }
@@ -343,7 +354,7 @@ static cav_status finish(builder *b, cav_hull *h) {
   ranked *order = malloc(sizeof *order * ((size_t)count + 1));
   cav_status status = CAV_NO_MEMORY;
   if (index && after && region && order) {
-    h->nvertex = number_vertices(b, index);
+    h->nvertex = number_vertices(b, index, region);
     h->nneighbour = 3 * count;
     if (allocate(h, h->nvertex, count, 3 * count, 3 * count)) {
       for (int i = 0; i < b->n; i++) {
