@@ -144,8 +144,11 @@ int cav_mesh_summit_from(const cav_mesh *m, const double d[3], int near) {
   for (int last = -1; last != best && m->nvertex > FEW;) {
     last = best;
     for (int k = m->neighbour_start[last]; k < m->neighbour_start[last + 1]; k++) {
-      double h = dot3(m->vertex + 3 * m->neighbour[k], d);
-      if (h > most) most = h, best = m->neighbour[k];
+      // by masks, as which one is higher no processor foresees
+      int v = m->neighbour[k];
+      double h = dot3(m->vertex + 3 * v, d);
+      best ^= (best ^ v) & -(h > most);
+      most = h > most ? h : most;
     }
   }
   return best;
