@@ -215,13 +215,19 @@ static void lying_on(const cav_shape *s, const double m[3], int near, cav_outlin
   }
 }
 
-// of an outline what is not cut away, where direction . x > bound, by the plane over side of a face
-static void cut(const cav_outline *o, const double direction[3], double bound, int side, cav_outline *kept) {
+// of an outline what is not cut away, where direction . x > bound, by the plane over side of a face; 0: all of it is left
+static int cut(const cav_outline *o, const double direction[3], double bound, int side, cav_outline *kept) {
+  double h[CAV_OUTLINE_MAX], most = -INFINITY;
   int closed = o->n > 2;
+  for (int k = 0; k < o->n; k++) {
+    h[k] = dot3(direction, o->x[k]) - bound;
+    most = h[k] > most ? h[k] : most;
+  }
+  if (most <= 0) return 0;
   kept->n = 0;
   for (int k = 0; k < o->n; k++) {
     const double *x = o->x[k], *y = o->x[(k + 1) % o->n];
-    double hx = dot3(direction, x) - bound, hy = dot3(direction, y) - bound;
+    double hx = h[k], hy = h[(k + 1) % o->n];
     int line = o->line[k][1];
     if (hx <= 0) push_point(kept, x, o->line[k][0], line);
     if ((hx <= 0) == (hy <= 0) || (!closed && k == o->n - 1)) continue;
@@ -230,6 +236,7 @@ static void cut(const cav_outline *o, const double direction[3], double bound, i
     axpy3(p, x, hx / (hx - hy), d);
     push_point(kept, p, hx <= 0 ? line : CAV_OUTLINE_CUT + side, hx <= 0 ? CAV_OUTLINE_CUT + side : line);
   }
+  return 1;
 }
 
 // outward normal of the plane over a side of a face; its length, 0: none
@@ -246,7 +253,7 @@ static void cut_to_face(cav_outline *o, const cav_outline *face, const double no
   for (int k = 0; k < face->n && from->n; k++) {
     double out[3], length = over_side(face, k, normal, out);
     if (!(length > 0)) continue;
-    cut(from, out, dot3(out, face->x[k]) + 1e-12 * length, k, to);
+    if (!cut(from, out, dot3(out, face->x[k]) + 1e-12 * length, k, to)) continue;
     cav_outline *swap = from;
     from = to;
     to = swap;
