@@ -177,6 +177,15 @@ static void reduce(simplex *s, double nearest[3]) {
   s->n = n;
 }
 
+// the points in use only
+static void copy_simplex(simplex *to, const simplex *from) {
+  to->n = from->n;
+  for (int i = 0; i < from->n; i++) {
+    to->p[i] = from->p[i];
+    to->weight[i] = from->weight[i];
+  }
+}
+
 static void points_of(const simplex *s, cav_separation *out) {
   zero3(out->x);
   zero3(out->y);
@@ -266,7 +275,8 @@ static outcome walk(const bodies *g, double most, const cav_hint *from, simplex 
     int known = 0;
     for (int i = 0; i < s->n; i++) known |= !memcmp(s->p[i].w, p.w, sizeof p.w);
     if (known) break;
-    simplex next = *s;
+    simplex next;
+    copy_simplex(&next, s);
     double w[3];
     next.p[next.n++] = p;
     reduce(&next, w);
@@ -276,7 +286,7 @@ static outcome walk(const bodies *g, double most, const cav_hint *from, simplex 
     }
     // no progress: as near as rounding lets it
     if (!(norm3(w) < length)) break;
-    *s = next;
+    copy_simplex(s, &next);
     copy3(v, w);
   }
   if (norm3(v) < INSIDE * g->size) return OVERLAP;
