@@ -220,6 +220,7 @@ static void check_verdict(const cav_problem *problem) {
   for (int lost = 0; lost < 2; lost++) {
     char table[8000];
     verdict.periods = 2, verdict.duration = 1.5, verdict.model_contacts_seconds = lost ? 2.25 : 3;
+    verdict.optimality = lost ? 0.2 : 0.9e-4;
     FILE *out = fopen(problem_path, "w+");
     CHECK(out != NULL);
     if (!out) return;
@@ -228,6 +229,8 @@ static void check_verdict(const cav_problem *problem) {
     table[fread(table, 1, sizeof table - 1, out)] = 0;
     fclose(out);
     CHECK((strstr(table, "is lost at 2.25 of 3 s") != NULL) == lost);
+    // and one that is not optimal says what to do
+    CHECK((strstr(table, "--solver both") != NULL) == lost);
   }
   write_file(problem_path, problem_text);
   verdict.limit_violation_max = 1e-3;

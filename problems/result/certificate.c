@@ -108,6 +108,10 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
   else
     fprintf(out, "%s to %.1g (the word needs %g)\n", cav_verdict_optimal(v) ? "locally optimal" : "NOT optimal, but",
             v->optimality, CAV_TOLERANCE_OPTIMAL);
+  if (cav_verdict_feasible(v) && !cav_verdict_optimal(v) && !isnan(v->optimality))
+    fprintf(out,
+            "  a cheaper motion is near: --solver both or more <last iterations> in <schedule> look for it; a "
+            "certificate does not ask for it\n");
   fprintf(out, "%s: %s on %s\n", v->certified ? "certified" : "NOT certified", problem->name, problem->model->name);
   if (!v->certified) fprintf(out, "  %s\n", v->reason);
   // told, not required: the motion is planned under its own law of contacts
