@@ -470,14 +470,22 @@ static void check_takeoff(void) {
   }
 }
 
-// M (g - 16 w/T²) = 1.02 F: a window of T within w of a slide
+// M (g - 16 w/T²) - 16 a w/T² = 1.02 F: a window of T within w of a slide, with an armature a
 static void check_held(void) {
-  double w = 0.03, t = 2, mass = 1.02 * 300 / (9.81 - 16 * w / (t * t)) - 5;
-  for (int beyond = 0; beyond < 2; beyond++) {
-    char model[2000];
-    snprintf(model, sizeof model, TABLE("%.6f"), mass * (beyond ? 1.001 : 0.999));
-    check_threshold("held", model, "duration='3' timestep='.05'", "<joint name='lift' pos='.5'/>",
-                    "<cost><posture joint='lift' qpos='.5' from='.5' to='2.5' weight='900'/></cost>", beyond);
+  for (int geared = 0; geared < 2; geared++) {
+    double left = 16 * 0.03 / (2 * 2), armature = geared ? 40 : 0;
+    double mass = (1.02 * 300 + armature * left) / (9.81 - left) - 5;
+    for (int beyond = 0; beyond < 2; beyond++) {
+      char model[2000];
+      snprintf(model, sizeof model,
+               "<mujoco><worldbody><body name='table'><joint name='lift' type='slide' axis='0 0 1' armature='%g'/>"
+               "<geom type='box' size='.4 .4 .02' mass='5'/><body name='box' pos='0 0 .3'><geom type='box' "
+               "size='.2 .2 .2' mass='%.6f'/></body></body></worldbody><actuator><motor joint='lift' gear='300' "
+               "ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>",
+               armature, mass * (beyond ? 1.001 : 0.999));
+      check_threshold("held", model, "duration='3' timestep='.05'", "<joint name='lift' pos='.5'/>",
+                      "<cost><posture joint='lift' qpos='.5' from='.5' to='2.5' weight='900'/></cost>", beyond);
+    }
   }
 }
 

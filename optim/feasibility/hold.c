@@ -133,7 +133,8 @@ static double left_by(const cav_model *m, const cav_state *state, const held *h,
 static double least_need(const cav_model *m, const cav_state *state, const held *h, double sign, double *change) {
   const double *spin = state->axis + 6 * (size_t)h->dof, *line = spin + 3;
   int hinge = m->joint[h->joint].type == CAV_JOINT_HINGE;
-  double pivot[3], pull[3], r[3], need = 0, bend = 0, inner = 0;
+  // what turns with the joint's motor has momentum, too
+  double pivot[3], pull[3], r[3], need = 0, bend = 0, inner = 8 / h->time * m->dof[h->dof].armature * h->width[h->dof];
   transform(pivot, state->link[h->root].pos, state->link[h->root].rotation, m->joint[h->joint].pos);
   // the moment of gravity is m r.(g x a), its force m g.a
   cross3(pull, m->gravity, spin);
