@@ -6,10 +6,11 @@
 /// collision: visual geometry only on request, since it can neither touch nor weigh. Links joined by fixed joints move
 /// as one and keep their names; their reference weights are those of the whole, as if they were merged, unless the
 /// file's <mujoco><compiler fusestatic="false"/></mujoco> says otherwise. A joint with an effort limit gets a motor of
-/// that range; one that mimics another is tied to it by a joint equality. Moments of inertia that no solid has are
-/// mended where rounding explains them, and let pass where not, as by other readers of URDF; both are told. What the
-/// file asks for and is left aside is a warning, once with a count: safety controllers, elements that no table knows,
-/// and velocity limits, which are kept for certificates to tell. Not done: soft limits, transmissions, xacro.
+/// that range; one that mimics another is tied to it by a joint equality and has no motor of its own. Moments of inertia
+/// that no solid has are mended where rounding explains them, and let pass where not, as by other readers of URDF; both
+/// are told. What the file asks for and is left aside is a warning, once with a count: safety controllers, elements that
+/// no table knows, and velocity limits, which are kept for certificates to tell. Not done: soft limits, transmissions,
+/// xacro.
 
 #include <math.h>
 #include <stdio.h>
@@ -424,8 +425,7 @@ static void read_motion(reader *r, const cav_xml_node *node, int type, cav_spec_
   if (d) j->damping = cav_xml_real(d, "damping", 0);
   if (d) j->frictionloss = cav_xml_real(d, "friction", 0);
   if (!(l && cav_xml_real(l, "effort", 0) > 0) && !cav_xml_child(node, &mimic))
-    cav_spec_leave(spec, node, NULL,
-                   "no effort limit above 0: the joint has no actuator; give <limit effort> for one");
+    cav_spec_leave(spec, node, NULL, "no effort limit above 0: the joint has no actuator; give <limit effort> for one");
   if (!l) return;
   j->range[0] = cav_xml_real(l, "lower", 0);
   j->range[1] = cav_xml_real(l, "upper", 0);
@@ -434,7 +434,7 @@ static void read_motion(reader *r, const cav_xml_node *node, int type, cav_spec_
     cav_spec_fail(spec, l, "upper", "expected lower < upper, got %g %g", j->range[0], j->range[1]);
   j->speed = fmax(cav_xml_real(l, "velocity", 0), 0);
   r->velocities += j->speed > 0;
-  push_motor(spec, node, j->name, cav_xml_real(l, "effort", 0));
+  if (!cav_xml_child(node, &mimic)) push_motor(spec, node, j->name, cav_xml_real(l, "effort", 0));
 }
 
 // the joint of that name; NULL: there is none
