@@ -106,6 +106,10 @@ static void refuse(const char *scene, int line, const char *says) {
   "<keyframe>"                                                                                                   \
   "<key qpos='0 .1 0 0 .05 0 .2 1 0 0 0'/>" KEYS "</keyframe></mujoco>"
 
+#define BEARING(HEIGHT)                                                                           \
+  "<mujoco><worldbody><body name='base'><geom type='box' size='.1 .1 .1'/><body pos='0 0 " HEIGHT \
+  "'><joint axis='0 0 1'/><geom type='cylinder' size='.05 .05'/></body></body></worldbody></mujoco>"
+
 static void test_overlaps(void) {
   static const struct {
     const char *text, *says;
@@ -118,6 +122,9 @@ static void test_overlaps(void) {
       {ROBOT("-.05", "<key qpos='0 0 3.1416 0 .05 0 .2 1 0 0 0'/>", ""), "1 pair of geoms", 1},
       {ROBOT("-.05", "", ""), "3 pairs of geoms", 3},
       {ROBOT(".0395", "", ""), "1 pair of geoms", 1},
+      // the two sides of a bearing, as xArm7's, 0.2 mm apart; 2 mm apart
+      {BEARING(".1502"), "1 pair of geoms that overlap at rest or meet in the bearing of a base", 1},
+      {BEARING(".152"), NULL, 0},
       {"<mujoco><worldbody><geom type='plane' size='1 1 1'/><body pos='0 0 .05'><freejoint/><geom size='.1'/></body>"
        "</worldbody></mujoco>",
        NULL, 0}};

@@ -1,7 +1,10 @@
 /// Pairs of geoms of one robot that are inside each other at rest: covers around a joint, a base and what turns on it.
 /// Their makers do not mean them to push, and an engine that lets them does so for good. Left out on demand: pairs of
 /// two links of one tree, or of a link and a body that carries it and stands in the world, that overlap by more than a
-/// millimetre in the model's own configuration and in every keyframe. Pairs that the file lists are kept.
+/// millimetre in the model's own configuration and in every keyframe. So are the two sides of the bearing of a base that
+/// stands in the world, where they are within a millimetre of each other: MJCF's filter of parents keeps such pairs of the
+/// world alone, and a plan's smoothed law would press them together and brake the joint. Pairs that the file lists are
+/// kept.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,6 +27,12 @@ static int of_one_robot(const cav_model *m, const cav_pair *pair) {
   return g1->link ? carries(m, g2->body, g1->link) : carries(m, g1->body, g2->link);
 }
 
+// a base that stands in the world and what its own joint carries
+static int of_bearing(const cav_model *m, const cav_pair *pair) {
+  int a = m->geom[pair->geom1].link, b = m->geom[pair->geom2].link;
+  return !a != !b && m->link[a + b].parent == 0 && of_one_robot(m, pair);
+}
+
 // counts for each pair the configurations in which it overlaps, and how deep at most
 static cav_status note(const cav_model *m, cav_state *state, const double *q, int *times, double *depth, char *seen) {
   cav_status status = cav_position(m, state, q);
@@ -31,7 +40,8 @@ static cav_status note(const cav_model *m, cav_state *state, const double *q, in
   for (int i = 0; i < state->ncontact && status == CAV_OK; i++) {
     const cav_contact *c = &state->contact[i];
     if (-c->dist > depth[c->pair]) depth[c->pair] = -c->dist;
-    if (-c->dist > least && !seen[c->pair]) seen[c->pair] = 1, times[c->pair]++;
+    double beyond = of_bearing(m, &m->pair[c->pair]) ? -least : least;
+    if (-c->dist > beyond && !seen[c->pair]) seen[c->pair] = 1, times[c->pair]++;
   }
   return status;
 }
@@ -49,9 +59,10 @@ static int take_out(cav_model *m, int configurations, const int *times, const do
   if (taken) {
     snprintf(
         text, room,
-        "left out: %d %s of geoms that overlap at rest, '%.60s' and '%.60s' by %.3g mm%s; list a <pair> to keep one",
-        taken, taken == 1 ? "pair" : "pairs", cav_geom_label(m, pair[deepest].geom1, one),
-        cav_geom_label(m, pair[deepest].geom2, other), 1e3 * depth[deepest], taken == 1 ? "" : " the most");
+        "left out: %d %s of geoms that overlap at rest%s, '%.60s' and '%.60s' by %.3g mm%s; list a <pair> to keep one",
+        taken, taken == 1 ? "pair" : "pairs", depth[deepest] > least ? "" : " or meet in the bearing of a base",
+        cav_geom_label(m, pair[deepest].geom1, one), cav_geom_label(m, pair[deepest].geom2, other),
+        1e3 * depth[deepest], taken == 1 ? "" : " the most");
   }
   for (int i = 0; i < m->npair; i++) {
     int out = times[i] == configurations && !pair[i].listed && of_one_robot(m, &pair[i]);
@@ -67,6 +78,8 @@ int cav_overlaps_leave(cav_model *model, char *text, size_t room) {
   double *depth = calloc((size_t)model->npair + 1, sizeof *depth);
   char *seen = calloc((size_t)model->npair + 1, 1);
   cav_status status = state && times && depth && seen ? CAV_OK : CAV_NO_MEMORY;
+  // contacts are listed as far as the smoothed law acts
+  if (state) state->options.smoothing = state->options.smoothing_self = least;
   if (!status) status = note(model, state, model->q0, times, depth, seen);
   for (int k = 0; k < model->nkey && !status; k++) status = note(model, state, model->key[k].q, times, depth, seen);
   // where there are no poses nothing is said of them here
