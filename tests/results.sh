@@ -6,7 +6,8 @@
 # momentum), orders (error of the forces of the orders of the step, and what an evaluation costs), absent (what features cost where a scene has none of
 # them), warm (a changed weight solved again, an iteration by itself), optimum (optimal control against known optima), methods (own solver and Ipopt on the same),
 # stiff (forward steps at softness 1e-2 to 1e-14 against quadruple precision), sensors, tendons, actuation, fluid (readings, strings, drives and
-# drag against MuJoCo's), interruption (solves killed and interrupted at random moments, half an hour).
+# drag against MuJoCo's), interruption (solves killed and interrupted at random moments, half an hour), batch (200 problems, four of which go
+# wrong).
 # CAVORT_BUILD names a build folder, by default build.
 set -eu
 cd "$(dirname "$0")/.."
@@ -159,6 +160,16 @@ interruption() {
   mv "$out/interruption.tmp" "$out/interruption.txt"
 }
 
+# many problems, and among them a killed process, a broken file, a full disk
+batch() {
+  ninja -C "$build" problems/cavort >/dev/null
+  {
+    provenance "sh tests/results.sh batch"
+    sh tests/batch.sh "$build/problems/cavort" . 200
+  } >"$out/batch.tmp"
+  mv "$out/batch.tmp" "$out/batch.txt"
+}
+
 for name in ${*:-inverse heap update normal unused sweep mesh conservation orders sensors tendons actuation fluid optimum methods absent stiff}; do
   case $name in
     inverse) run inverse bench_inverse ;;
@@ -180,6 +191,7 @@ for name in ${*:-inverse heap update normal unused sweep mesh conservation order
     absent) absent ;;
     warm) run warm bench_warm ;;
     interruption) interruption ;;
-    *) echo "usage: sh tests/results.sh [inverse|heap|update|normal|unused|sweep|mesh|conservation|orders|sensors|tendons|actuation|fluid|optimum|methods|absent|stiff|warm|interruption]..." >&2 && exit 2 ;;
+    batch) batch ;;
+    *) echo "usage: sh tests/results.sh [inverse|heap|update|normal|unused|sweep|mesh|conservation|orders|sensors|tendons|actuation|fluid|optimum|methods|absent|stiff|warm|interruption|batch]..." >&2 && exit 2 ;;
   esac
 done
