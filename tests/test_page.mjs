@@ -66,6 +66,8 @@ async function check_forces(page) {
     return [...motion.bearing[0].values()].find(pair => pair.key === geom.link + '|0');
   })()`);
   check(got && near(got.force[2], sum, 1e-3) && near(got.centre[0], centre, 1e-4), `force of ${foot}: ${JSON.stringify(got)}, ${sum} N at ${centre}`);
+  const target = await page.value(`motion.targets.find(target => target.name === 'front left foot')`);
+  check(target && target.from === 10 && target.to === 10 && target.pos[2] > 0.05, `a target in space: ${JSON.stringify(target)}`);
   // the whole force carries the weight, over a stride that goes on for ever
   const mean = await page.value(`motion.bearing.reduce((sum, pairs) => sum + [...pairs.values()].reduce((all, pair) => all + pair.force[2], 0), 0) / motion.bearing.length / motion.weight`);
   check(near(mean, 1, 0.05), `mean vertical force is ${mean} of the weight`);
@@ -124,6 +126,9 @@ async function check_charts(page) {
   check(near(told.value, force, 1e-3) && told.unit === 'N m', `effort ${told.value} ${told.unit}, ${force} N m`);
   check(told.head.includes('N m') && told.head.includes(share), `head of the chart: ${told.head}, ${share}`);
   check(told.said.startsWith('0.04 s') && /least .* greatest .* limits .* N m/.test(told.words), `in words: ${told.said}; ${told.words}`);
+  // what the file asks at 0.125 s of a quarter of what is shown is marked there, and no more
+  const asked = await page.value(`motion.series.find(series => series.name === 'front left foot').wanted.flatMap((x, i) => x === null ? [] : [i])`);
+  check(asked.length === 1 && asked[0] === 10, `a target at knots ${asked}`);
   await page.key('ArrowRight');
   const later = await page.value(`document.activeElement.getAttribute('aria-valuetext')`);
   check(later && later.startsWith('0.05 s'), `a key on a chart: ${later}`);

@@ -15,6 +15,7 @@
 // charts on their way: series, and the numbers that they point at
 typedef struct charts {
   int n, nknot;
+  int steps; ///< of the problem's own duration: of one period of a cycle
   cav_view_series *series;
   double *value, *wanted; ///< [nknot] of each
 } charts;
@@ -38,7 +39,7 @@ static int asks(const cav_term *term) {
 
 // knots of a term's window, one at least
 static void find_knots(const charts *c, const cav_problem *p, const cav_term *term, int *first, int *last) {
-  double h = p->duration / (c->nknot - 1), to = term->to < 0 ? p->duration : fmin(term->to, p->duration);
+  double h = p->duration / c->steps, to = term->to < 0 ? p->duration : fmin(term->to, p->duration);
   double from = term->from < 0 ? p->duration : fmin(term->from, p->duration);
   *first = (int)ceil(from / h - 1e-6), *last = (int)floor(to / h + 1e-6);
   if (from == to || *first > *last) *first = *last = (int)lround((from + to) / (2 * h));
@@ -75,7 +76,7 @@ static void mark_joint(charts *c, int chart, const cav_problem *p, int j, double
     if (!posture && (term->sensor.type != CAV_SENSOR_JOINTPOS || term->sensor.object != j)) continue;
     find_knots(c, p, term, &first, &last);
     for (int t = first; t <= last; t++) {
-      double time = t * p->duration / (c->nknot - 1);
+      double time = t * p->duration / c->steps;
       double goal = posture ? wanted_at(term, time, p->model->nq, joint->q) : wanted_at(term, time, 1, 0);
       mark(c, chart, t, scale * (posture && !term->target ? p->q_goal[joint->q] : goal));
     }
@@ -99,7 +100,7 @@ static cav_status add_sensor(charts *c, const cav_problem *p, const cav_term *te
   }
   find_knots(c, p, term, &first, &last);
   for (int t = first; t <= last; t++)
-    mark(c, c->n - 1, t, wanted_at(term, t * p->duration / (c->nknot - 1), term->sensor.dim, k));
+    mark(c, c->n - 1, t, wanted_at(term, t * p->duration / c->steps, term->sensor.dim, k));
   return CAV_OK;
 }
 
@@ -141,18 +142,18 @@ static cav_status add_target(targets *list, const cav_problem *p, const cav_term
 }
 
 // one marker a term; two where its target moves, at both ends
-static cav_status add_targets(targets *list, const cav_problem *p, const cav_trajectory *trajectory) {
+static cav_status add_targets(targets *list, const cav_problem *p, const charts *c, const double *q) {
   cav_state *state = cav_state_new(p->model);
   cav_status status = state ? CAV_OK : CAV_NO_MEMORY;
-  charts knots = {.nknot = trajectory->nknot};
+  double h = p->duration / c->steps;
   for (int i = 0; i < p->nterm && !status; i++) {
     const cav_term *term = &p->term[i];
     int place = term->sensor.type == CAV_SENSOR_FRAMEPOS || term->sensor.type == CAV_SENSOR_SUBTREECOM, first, last;
     if (!asks(term) || term->quantity != CAV_QUANTITY_SENSOR || !place || term->sensor.referred) continue;
-    find_knots(&knots, p, term, &first, &last);
+    find_knots(c, p, term, &first, &last);
     int moves = term->nwaypoint > 1;
-    status = add_target(list, p, term, first, moves ? first : last, state, trajectory->q, trajectory->timestep);
-    if (!status && moves) status = add_target(list, p, term, last, last, state, trajectory->q, trajectory->timestep);
+    status = add_target(list, p, term, first, moves ? first : last, state, q, h);
+    if (!status && moves) status = add_target(list, p, term, last, last, state, q, h);
   }
   cav_state_free(state);
   return status;
@@ -286,6 +287,7 @@ static cav_status make_page(parts *page, const cav_page_motion *m) {
   const cav_problem *p = m->problem;
   size_t most = (size_t)(5 + p->model->nu + p->model->njoint + 3 * p->nterm), nknot = (size_t)m->trajectory->nknot;
   page->charts.nknot = m->trajectory->nknot;
+  page->charts.steps = (m->trajectory->nknot - 1) / m->periods;
   page->charts.series = calloc(most, sizeof *page->charts.series);
   page->charts.value = calloc(2 * most * nknot, sizeof *page->charts.value);
   page->targets.target = calloc((size_t)(2 * p->nterm) + 1, sizeof *page->targets.target);
@@ -321,7 +323,7 @@ static cav_status fill_page(parts *page, const cav_page_motion *m, cav_view_inpu
   double weight = p->model->mass * sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
   add_whole(&page->charts, p->model, m->forces, weight > 0 ? weight : 1);
   cav_status status = add_asked(&page->charts, p, m->trajectory->q);
-  if (!status) status = add_targets(&page->targets, p, m->trajectory);
+  if (!status) status = add_targets(&page->targets, p, &page->charts, m->trajectory->q);
   add_each(&page->charts, p, m->trajectory, m->forces);
   take_forces(page, p->model, m->forces, weight);
   snprintf(page->title, sizeof page->title, "%.140s on %.140s", p->name, p->model->name);

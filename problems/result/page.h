@@ -11,6 +11,7 @@ typedef struct cav_page_motion {
   const cav_problem *problem;
   const cav_trajectory *trajectory;
   const cav_forces *forces;
+  int periods; ///< that the trajectory has: more than 1 of a cycle; what was asked is marked in the first
   const cav_verdict *verdict; ///< NULL: none
 } cav_page_motion;
 

@@ -35,6 +35,7 @@ cav_status cav_result_write_unfinished(const char *folder, const cav_problem *pr
 typedef struct drawn {
   cav_trajectory *strides; ///< NULL: the motion itself
   cav_forces *forces;
+  int periods;
 } drawn;
 
 static void free_shown(drawn *shown) {
@@ -44,14 +45,14 @@ static void free_shown(drawn *shown) {
 
 static cav_status make_shown(drawn *shown, const cav_problem *problem, const cav_trajectory *trajectory,
                              const cav_options *contact, cav_error *error) {
+  shown->periods = !problem->cycle.on ? 1 : problem->cycle.mirror == CAV_MIRROR_NONE ? 2 : 4;
   if (!problem->cycle.on) {
     shown->forces = cav_forces_new(problem->model, trajectory, contact, problem->close_at_rest, error);
     return shown->forces ? CAV_OK : error->status;
   }
   cav_periodicity *periodicity = cav_periodicity_new(problem, error);
   if (!periodicity) return error->status;
-  int periods = problem->cycle.mirror == CAV_MIRROR_NONE ? 2 : 4;
-  shown->strides = cav_periodicity_unroll(periodicity, trajectory, periods);
+  shown->strides = cav_periodicity_unroll(periodicity, trajectory, shown->periods);
   cav_periodicity_free(periodicity);
   if (!shown->strides) return no_memory(error);
   shown->forces = cav_forces_new(problem->model, shown->strides, contact, 0, error);
@@ -65,8 +66,8 @@ cav_status cav_result_write_page(const char *folder, const cav_problem *problem,
   cav_status status = page ? cav_result_write_forces(folder, problem, trajectory, contact, error) : no_memory(error);
   if (!status) status = make_shown(&shown, problem, trajectory, contact, error);
   if (!status) {
-    cav_page_motion motion = {problem->name, problem, shown.strides ? shown.strides : trajectory, shown.forces,
-                              verdict};
+    cav_page_motion motion = {problem->name, problem,       shown.strides ? shown.strides : trajectory,
+                              shown.forces,  shown.periods, verdict};
     status = cav_page_write(page, 1, &motion, error);
   }
   free_shown(&shown);
@@ -82,8 +83,9 @@ cav_status cav_result_compare(const char *page, const char *const label[2], cons
   for (int i = 0; i < 2 && !status; i++) {
     const cav_problem *problem = result[i]->problem;
     status = make_shown(&shown[i], problem, result[i]->trajectory, &problem->contact, error);
-    motion[i] = (cav_page_motion){label[i], problem, shown[i].strides ? shown[i].strides : result[i]->trajectory,
-                                  shown[i].forces, &verdict[i]};
+    motion[i] = (cav_page_motion){
+        label[i],        problem,          shown[i].strides ? shown[i].strides : result[i]->trajectory,
+        shown[i].forces, shown[i].periods, &verdict[i]};
   }
   if (!status) status = cav_page_write(page, 2, motion, error);
   for (int i = 0; i < 2; i++) free_shown(&shown[i]);
