@@ -255,9 +255,9 @@ typedef struct cav_mesh {
   const int *neighbour_start, *neighbour; ///< [nvertex+1], vertices across an edge from each
   const int *meeting_start, *meeting;     ///< [nvertex+1], faces that meet at each
   const int *summit;                      ///< vertex furthest along the middle of each cell of directions (direction.h)
-  int npoint, ntriangle;                  ///< the file's own surface, of a model that is loaded for a viewer; 0: not kept
-  const double *point;                    ///< [npoint*3] m
-  const int *triangle;                    ///< [ntriangle*3] points, counterclockwise from outside
+  int npoint, ntriangle; ///< the file's own surface, of a model that is loaded for a viewer; 0: not kept
+  const double *point;   ///< [npoint*3] m
+  const int *triangle;   ///< [ntriangle*3] points, counterclockwise from outside
 } cav_mesh;
 
 /// Heights over a grid in the x-y plane, solid down to -base; x grows along columns, y along rows, both about 0.
@@ -622,7 +622,10 @@ typedef struct cav_draft cav_draft;
 
 /// Elements that every draft has: <mujoco>, which holds the sections (actuator, tendon, sensor, keyframe, option, ...), and
 /// <worldbody>, which holds bodies.
-enum { CAV_DRAFT_ROOT, CAV_DRAFT_WORLD };
+enum {
+  CAV_DRAFT_ROOT, ///< <mujoco>
+  CAV_DRAFT_WORLD ///< <worldbody>
+};
 
 /// An empty model of that name (NULL: "model"), angles in radians; NULL if memory runs out.
 CAV_API cav_draft *cav_draft_new(const char *name);

@@ -11,8 +11,8 @@ extern "C" {
 
 /// One loaded contact. The force acts on geom2, and reversed on geom1.
 typedef struct cav_contact_force {
-  int knot;
-  int geom1, geom2;
+  int knot;         ///< at which it presses
+  int geom1, geom2; ///< geoms that touch
   double pos[3];    ///< m, world
   double force[3];  ///< N, world
   double normal[3]; ///< from geom1 to geom2, world
@@ -22,7 +22,7 @@ typedef struct cav_contact_force {
 
 /// What a motion does at its knots.
 typedef struct cav_forces {
-  int nknot, nforce, nu;
+  int nknot, nforce, nu;    ///< knots, contact forces, actuators
   int *count;               ///< [nknot] loaded contacts at each knot
   cav_contact_force *force; ///< [nforce] in the order of the knots
   double *u;                ///< [nknot*nv]; rows without a force are NaN
@@ -41,13 +41,13 @@ CAV_API void cav_forces_free(cav_forces *forces);
 
 /// A result folder as read: enough to certify and to show the motion again.
 typedef struct cav_result {
-  cav_problem *problem; ///< with the contact law of the motion
-  cav_trajectory *trajectory;
-  double *gain_q, *gain_v; ///< [(nknot-1)*nv*nv]; NULL: there is no gains.csv
-  int nrow;
-  cav_binding *row;     ///< [nrow] constraint rows of rows.csv, with their multipliers
-  double solve_seconds; ///< as the solver left it in verdict.json; NaN: not recorded
-  int iterations;
+  cav_problem *problem;       ///< with the contact law of the motion
+  cav_trajectory *trajectory; ///< the motion
+  double *gain_q, *gain_v;    ///< [(nknot-1)*nv*nv]; NULL: there is no gains.csv
+  int nrow;                   ///< rows of rows.csv
+  cav_binding *row;           ///< [nrow] constraint rows of rows.csv, with their multipliers
+  double solve_seconds;       ///< as the solver left it in verdict.json; NaN: not recorded
+  int iterations;             ///< likewise; 0: not recorded
 } cav_result;
 
 /// Writes problem.xml, trajectory.csv, gains.csv (where there are gains), log.csv, stages.csv and rows.csv into a folder,

@@ -452,7 +452,7 @@ CAV_API cav_status cav_terms_report(const cav_problem *problem, const cav_trajec
 
 /// One value of a term at one knot of a motion.
 typedef struct cav_term_value {
-  int knot;
+  int knot; ///< at which it is
   int component; ///< number of the value among those of the term at that knot: of a sensor, of selected dofs, of actuators or
                  ///< of contacts in their order
   double value,
