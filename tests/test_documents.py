@@ -87,7 +87,10 @@ class Exceptions:
             if len(part) != 3 or not re.match(r'(not )?run: .', part[2]):
                 fail('tests/documents.txt', number, 'expected DOCUMENT | COMMAND | run: ... or not run: ...')
                 continue
-            self.rule[part[0], re.sub(r'\s+', ' ', part[1])] = part[2]
+            key = part[0], re.sub(r'\s+', ' ', part[1])
+            if key in self.rule:
+                fail('tests/documents.txt', number, 'a second rule for ' + part[1])
+            self.rule[key] = part[2]
 
     def find(self, document, command):
         """The rule of a command of a document, or that of all its commands, *."""
