@@ -7,11 +7,12 @@ set -eu
 cd "$(dirname "$0")/.."
 
 build=${CAVORT_BUILD:-build-coverage}
+commit=$(git rev-parse --short HEAD)$(git diff --quiet HEAD -- dynamics optim problems || echo ' and changes')
 [ -d "$build" ] || CC="${CC:-gcc}" meson setup "$build" . --buildtype=release -Db_coverage=true
 meson compile -C "$build"
 find "$build" -name '*.gcda' -delete
 
-long="solve explain checker mesh analytic memory strategies stress report matrix resume ipopt optimum_ipopt interruption contact_suite python"
+long="solve explain checker mesh analytic memory strategies stress report matrix resume ipopt optimum_ipopt interruption contact_suite python replay"
 # and those that run no code of the library
 other="documents text doxygen rooms const symbols page"
 told=$*
@@ -21,9 +22,9 @@ if [ "$told" = quick ]; then
 fi
 meson test -C "$build" --no-rebuild --timeout-multiplier 4 "$@" || echo "some tests failed: their lines count all the same"
 
-python3 - "$build" "$told" <<'TEXT'
+python3 - "$build" "$told" "$commit" <<'TEXT'
 import collections, json, os, subprocess, sys
-build, chosen = sys.argv[1:]
+build, chosen, commit = sys.argv[1:]
 source = os.getcwd()
 ran = collections.defaultdict(dict)
 counters = [os.path.join(folder, name) for folder, _, names in os.walk(build) for name in names if name.endswith('.gcda')]
@@ -50,9 +51,8 @@ def told(command):
 
 
 with open('tests/results/coverage.md', 'w') as out:
-    out.write('# Lines that the tests run\n\n`sh tests/coverage.sh%s`, %s, commit %s%s.\n\n' %
-              (' ' + chosen if chosen else '', told('gcc --version | head -n 1'), told('git rev-parse --short HEAD'),
-               told("git diff --quiet HEAD -- dynamics optim problems || echo ' and changes'")))
+    out.write('# Lines that the tests run\n\n`sh tests/coverage.sh%s`, %s, commit %s.\n\n' %
+              (' ' + chosen if chosen else '', told('gcc --version | head -n 1'), commit))
     out.write('| room | lines run | lines | fraction |\n|---|---|---|---|\n')
     for name in sorted(rooms, key=lambda n: (n == 'all', n)):
         run, lines = rooms[name]
