@@ -141,6 +141,9 @@ class Model:
         Several names are separated by |; of bodies also roles, such as "right foot". KeyError with what is near.
         """
         error, found = new_error(), ffi.new("cav_object_type *", self._kind(kind))
+        own = int(lib.cav_object_find(self._c, found[0], names.encode()))
+        if own >= 0:
+            return int(found[0]), own
         number = int(lib.cav_object_named(self._c, self._scratch(), names.encode(), found, error))
         if number < 0:
             raise KeyError(text(error.text))

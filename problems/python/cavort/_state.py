@@ -130,10 +130,9 @@ class State:
         return _library.view(self, self._c.com, (self.model._c.nlink, 3))
 
     def pose(self, kind: str, name: str) -> Pose:
-        """World pose of a body (at its centre of mass), xbody (as the file has it), geom or site, of that name."""
-        chosen = _library.choose("cav_object_type", kind, "kind of object")
+        """World pose of a body (at its centre of mass), xbody (as the file has it), geom or site, of that name or role."""
         pose = ffi.new("cav_pose *")
-        lib.cav_object_pose(self.model._c, self._c, chosen, self.model.index(kind, name), pose)
+        lib.cav_object_pose(self.model._c, self._c, *self.model.named(kind, name), pose)
         held = _library.view(pose, pose, (1,))[0]
         return Pose(held["pos"].copy(), held["rotation"].reshape(3, 3).copy(), held["quat"].copy())
 

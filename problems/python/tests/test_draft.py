@@ -84,5 +84,8 @@ def test_roles(humanoid):
     named = problem.cost("sensor", type="framepos", body="foot_right", component="z", relative="start", target=0.1, at=1)
     assert np.array_equal(term.target, named.target) and term.target[2] > 0.1
     assert problem.cost("force", body="left foot")._c.body == model.index("body", "foot_left")
+    state = cavort.State(model)
+    state.position(model.q0)
+    assert np.array_equal(state.pose("body", "left foot").pos, state.pose("body", "foot_left").pos)
     with pytest.raises(KeyError, match="has no body of that name"):
         problem.cost("sensor", type="framepos", body="rigth foot")
