@@ -118,6 +118,17 @@ for p in p001 p002 p007; do
   check "$p has the same bits" cmp -s "stopped/$p/trajectory.csv" "batch/$p/trajectory.csv"
 done
 
+# nohup: a terminal that closes ends nothing
+(trap '' HUP; exec "$cavort" solve p002.xml p007.xml -j 2 -o kept -q) &
+batch=$!
+until [ -s kept/p002/checkpoint.csv ]; do sleep 0.05; done
+kill -HUP $batch
+for process in /proc/[0-9]*; do
+  [ "$(readlink "$process/fd/1" 2>/dev/null)" != "$work/kept/p002.log" ] || kill -HUP "${process#/proc/}"
+done
+wait $batch
+check "nohup: all are solved" [ $? -eq 0 ]
+
 # values of settings
 "$cavort" solve p001.xml --set goal/pivot/@pos=0.2,0.3 --set cost/there/@weight=400 --set limits/@effort=0.5,0.7 -o sweep >out 2>err
 check "a sweep of four" [ $? -eq 0 ]

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "file.h"
@@ -13,6 +14,10 @@ static pid_t start(const cav_pool *pool, int task) {
   fflush(NULL);
   pid_t child = fork();
   if (child) return child;
+  // until the task has its own, signals end it
+  signal(SIGINT, SIG_DFL), signal(SIGTERM, SIG_DFL);
+  // what nohup has asked for stays
+  if (signal(SIGHUP, SIG_DFL) == SIG_IGN) signal(SIGHUP, SIG_IGN);
   int status = pool->work(pool->context, task);
   fflush(NULL);
   _exit(status);
@@ -32,13 +37,16 @@ cav_status cav_pool_run(const cav_pool *pool, cav_error *error) {
       if (child[next] < 0) status = cav_file_fail(error, CAV_NO_MEMORY, 0, "no process for another task");
       running += child[next] > 0;
     }
-    for (int i = 0; i < next && ends(pool) && !asked; i++)
+    int end = ends(pool);
+    for (int i = 0; i < next && end && !asked; i++)
       if (child[i] > 0) kill(child[i], SIGTERM);
-    asked = ends(pool);
+    asked = end;
     if (running == 0) continue;
     int how;
-    pid_t ended = waitpid(-1, &how, 0);
+    // an interrupt just before a call that waits would be seen too late
+    pid_t ended = waitpid(-1, &how, pool->interrupted ? WNOHANG : 0);
     if (ended < 0 && errno != EINTR) break;
+    if (ended == 0) nanosleep(&(struct timespec){0, 20000000}, NULL);
     for (int i = 0; i < next && ended > 0; i++) {
       if (child[i] != ended) continue;
       child[i] = 0;
