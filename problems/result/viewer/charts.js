@@ -84,7 +84,13 @@ function draw_chart(chart) {
   // ends of the scale
   pen.font = '10.5px system-ui, sans-serif';
   pen.fillStyle = colour('--muted');
-  range.ends.forEach((value, i) => pen.fillText(show_number(value), 4, chart.y_of(value) + (i === 0 ? 11 : -4)));
+  pen.strokeStyle = colour('--soft');
+  pen.lineWidth = 3;
+  range.ends.forEach((value, i) => {
+    const place = [show_number(value), 4, chart.y_of(value) + (i === 0 ? 11 : -4)];
+    pen.strokeText(...place);
+    pen.fillText(...place);
+  });
   move_cursor(chart, clock.time);
 }
 

@@ -220,7 +220,16 @@ function measure(actor) {
       radius = Math.max(radius, Math.hypot(point.x - middle.x, point.y - middle.y) + far);
     }
   }
-  return radius > 0 ? {low, high, radius} : {low: 0, high: 1, radius: 1};
+  if (!(radius > 0)) return {low: 0, high: 1, radius: 1};
+  // what stands where it moves is seen from its foot to its top: the base of an arm, a box to step on
+  for (const geom of shown.geoms) {
+    const [x, y, z] = geom.pos, far = reach(geom);
+    if (geom.link > 0 || !has_shape(geom) || Math.hypot(x - middle.x, y - middle.y) > radius || far > 2 * radius) continue;
+    const tall = geom.type === 'box' ? geom.size[2] : far;  // as if it stood upright
+    low = Math.min(low, z - tall);
+    high = Math.max(high, z + tall);
+  }
+  return {low, high, radius};
 }
 
 const actors = motions.map(make_actor);
