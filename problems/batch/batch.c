@@ -246,7 +246,9 @@ static void tell(const cav_batch *b, const cav_batch_item *item, const char *cau
           : s.certified               ? "certified, not achieved"
                                       : "not certified");
   if (s.known) fprintf(stderr, "  %.1f s  %.0f iterations", s.seconds, s.iterations);
-  fprintf(stderr, "%s%s\n", *cause ? ": " : "", cause);
+  // a verdict knows better than the last complaint
+  const char *why = s.known ? s.cause : cause;
+  fprintf(stderr, "%s%s\n", *why ? ": " : "", why);
 }
 
 static void end(void *context, int k, int how) {
