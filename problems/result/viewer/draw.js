@@ -104,7 +104,7 @@ function frame(now) {
     if (quality.still < 0) renderer.setPixelRatio(quality.ratio());
     quality.still = 0;
     draw();
-  } else if (renderer && quality.frugal && quality.ratio() < 2 && quality.still >= 0 && (quality.still += seconds) > 0.25) {
+  } else if (renderer && quality.frugal && !clock.playing && quality.ratio() < 2 && quality.still >= 0 && (quality.still += seconds) > 0.25) {
     draw_still();
   }
   requestAnimationFrame(frame);
