@@ -4,7 +4,7 @@
 # Prints nothing when nothing is missing. Fails with the list of packages when it may not install them.
 set -u
 
-build="gcc libc6-dev meson ninja-build pkg-config libxml2-dev libopenblas-serial-dev libsuitesparse-dev coinor-libipopt-dev libccd-dev libqhull-dev libpng-dev libjs-three"
+build="gcc libc6-dev meson ninja-build pkg-config libxml2-dev libopenblas-serial-dev libsuitesparse-dev coinor-libipopt-dev libccd-dev libqhull-dev libpng-dev libassimp-dev libjs-three"
 test="g++ clang libclang-rt-14-dev clang-format libmujoco-dev gnuplot-nox python3-numpy python3-cffi python3-pytest python3-pip python3-setuptools python3-wheel mypy libxml2-utils doxygen"
 
 case "${1:-}" in

@@ -476,6 +476,41 @@ static const char plain_obj[] =
     "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n"
     "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
+#ifdef CAVORT_HAVE_ASSIMP
+// a tetrahedron in centimetres, moved by a node; y is up in the file, which turns nothing
+static void test_collada(void) {
+  static const char text[] =
+      "<?xml version='1.0'?><COLLADA xmlns='http://www.collada.org/2005/11/COLLADASchema' version='1.4.1'>"
+      "<asset><unit name='cm' meter='0.01'/><up_axis>Y_UP</up_axis></asset><library_geometries><geometry id='g'><mesh>"
+      "<source id='p'><float_array id='a' count='12'>0 0 0 100 0 0 0 200 0 0 0 300</float_array><technique_common>"
+      "<accessor source='#a' count='4' stride='3'><param name='X' type='float'/><param name='Y' type='float'/>"
+      "<param name='Z' type='float'/></accessor></technique_common></source><vertices id='v'>"
+      "<input semantic='POSITION' source='#p'/></vertices><triangles count='4'>"
+      "<input semantic='VERTEX' source='#v' offset='0'/><p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles></mesh></geometry>"
+      "</library_geometries><library_visual_scenes><visual_scene id='s'><node id='n'><translate>10 20 30</translate>"
+      "<instance_geometry url='#g'/></node></visual_scene></library_visual_scenes><scene>"
+      "<instance_visual_scene url='#s'/></scene></COLLADA>";
+  char path[] = "/tmp/cavort-collada-XXXXXX.dae", reason[400] = "";
+  int file = mkstemps(path, 4);
+  cav_triangles m;
+  if (!CHECK(file >= 0 && write(file, text, sizeof text - 1) == (ssize_t)sizeof text - 1)) return;
+  close(file);
+  if (CHECK(cav_mesh_read(path, &m, reason, sizeof reason) == CAV_OK)) {
+    cav_bulk bulk = cav_mesh_bulk(&m, CAV_MESH_EXACT);
+    CHECK(m.ntriangle == 4);
+    CHECK_NEAR(bulk.volume, 1, 1e-6);
+    CHECK_NEAR_ALL(bulk.centre, ((double[3]){0.1 + 0.25, 0.2 + 0.5, 0.3 + 0.75}), 3, 1e-6);
+  } else {
+    fprintf(stderr, "    %s\n", reason);
+  }
+  cav_triangles_clear(&m);
+  write_file(path, "<COLLADA>", 9);
+  CHECK(cav_mesh_read(path, &m, reason, sizeof reason) == CAV_BAD_INPUT && strstr(reason, "assimp reads"));
+  unlink(path);
+  CHECK(cav_mesh_read(path, &m, reason, sizeof reason) == CAV_BAD_INPUT && strstr(reason, "expected a file"));
+}
+#endif
+
 static void make_folder(folder *f, double hills[12]) {
   strcpy(f->path, "/tmp/cavort-mesh-XXXXXX");
   CHECK(mkdtemp(f->path) != NULL);
@@ -628,6 +663,9 @@ int main(void) {
   test_degenerate();
   test_level();
   test_hills();
+#ifdef CAVORT_HAVE_ASSIMP
+  test_collada();
+#endif
   test_files();
   test_damage();
   test_model();

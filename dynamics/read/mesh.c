@@ -248,8 +248,9 @@ cav_status cav_mesh_read(const char *path, cav_triangles *m, char *reason, size_
   *m = (cav_triangles){0};
   const char *dot = strrchr(path, '.');
   int stl = dot && !strcasecmp(dot, ".stl"), obj = dot && !strcasecmp(dot, ".obj");
+  if (dot && !strcasecmp(dot, ".dae")) return cav_mesh_read_dae(path, m, reason, room);
   if (!stl && !obj) {
-    fail(&t, CAV_BAD_INPUT, "expected a file that ends in .stl or .obj; convert it");
+    fail(&t, CAV_BAD_INPUT, "expected a file that ends in .stl, .obj or .dae; convert it");
     return t.status;
   }
   size_t size = 0;

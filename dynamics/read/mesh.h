@@ -18,13 +18,15 @@ typedef struct cav_bulk {
   double volume, centre[3], inertia[6];
 } cav_bulk;
 
-/// Reads a file of triangles by its ending: .stl (binary or text) or .obj. On failure a reason, without the path, and
+/// Reads a file of triangles by its ending: .stl (binary or text), .obj, or .dae where the build has assimp. On failure a reason, without the path, and
 /// CAV_BAD_INPUT or CAV_NO_MEMORY. mesh.c.
 cav_status cav_mesh_read(const char *path, cav_triangles *mesh, char *reason, size_t room);
 
 /// The same of bytes in memory: STL, OBJ. line: of the fault in a text, 0 otherwise. mesh.c.
 cav_status cav_mesh_read_stl(const char *bytes, size_t size, cav_triangles *mesh, char *reason, size_t room);
 cav_status cav_mesh_read_obj(const char *bytes, size_t size, cav_triangles *mesh, char *reason, size_t room);
+/// COLLADA; CAV_NOT_SUPPORTED in a build without assimp, or where it is gone since. collada.c.
+cav_status cav_mesh_read_dae(const char *path, cav_triangles *mesh, char *reason, size_t room);
 void cav_triangles_clear(cav_triangles *mesh);
 
 /// What of a mesh weighs. MJCF's words.

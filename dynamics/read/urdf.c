@@ -269,6 +269,9 @@ static const char *find_file(cav_spec *spec, const char *name) {
 // whether a file is of a kind that mesh.c reads
 static int is_readable(const char *path) {
   const char *dot = strrchr(path, '.');
+#ifdef CAVORT_LOADS_ASSIMP
+  if (dot && !strcasecmp(dot, ".dae")) return 1;
+#endif
   return dot && (!strcasecmp(dot, ".stl") || !strcasecmp(dot, ".obj"));
 }
 
@@ -278,11 +281,12 @@ static int read_mesh(cav_spec *spec, const cav_xml_node *node, const double scal
   const char *name = cav_xml_text(node, "filename", ""), *path = find_file(spec, name);
   if (spec->status != CAV_OK) return 0;
   if (!path || !is_readable(path)) {
-    static const char *const text[2][2] = {
-        {"the file is not found: the shape is left out, nothing touches it",
-         "the file is not found: the shape is left out, nothing shows it"},
-        {"neither .stl nor .obj: the shape is left out, nothing touches it; convert the file",
-         "neither .stl nor .obj: the shape is left out, nothing shows it; convert the file"}};
+    static const char *const text[2][2] = {{"the file is not found: the shape is left out, nothing touches it",
+                                            "the file is not found: the shape is left out, nothing shows it"},
+                                           {"of a format that this build does not read: the shape is left out, nothing "
+                                            "touches it; convert it to .stl or .obj",
+                                            "of a format that this build does not read: the shape is left out, nothing "
+                                            "shows it; convert it to .stl or .obj"}};
     cav_spec_leave(spec, node, "filename", text[path != NULL][seen_only]);
     return 0;
   }
