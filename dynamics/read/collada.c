@@ -1,5 +1,6 @@
-/// Meshes of COLLADA files (.dae), by assimp: all triangles of the scene, moved to where its nodes place them, lengths in metres by the
-/// file's unit. The axis that the file says is up does not turn it, as ROS takes such files. Lines and points are passed over.
+/// Meshes of COLLADA files (.dae), by assimp: all triangles of the scene, moved to where its nodes place them, lengths in
+/// metres by the file's unit. The axis that the file says is up does not turn it, as ROS takes such files. Lines and
+/// points are passed over.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

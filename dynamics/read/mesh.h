@@ -18,8 +18,8 @@ typedef struct cav_bulk {
   double volume, centre[3], inertia[6];
 } cav_bulk;
 
-/// Reads a file of triangles by its ending: .stl (binary or text), .obj, or .dae where the build has assimp. On failure a reason, without the path, and
-/// CAV_BAD_INPUT or CAV_NO_MEMORY. mesh.c.
+/// Reads a file of triangles by its ending: .stl (binary or text), .obj, or .dae where the build has assimp. On failure
+/// a reason, without the path, and CAV_BAD_INPUT, CAV_NO_MEMORY or CAV_NOT_SUPPORTED. mesh.c.
 cav_status cav_mesh_read(const char *path, cav_triangles *mesh, char *reason, size_t room);
 
 /// The same of bytes in memory: STL, OBJ. line: of the fault in a text, 0 otherwise. mesh.c.
