@@ -10,8 +10,9 @@
 ///
 /// Errors, weights and the impedance (by the length of x over all rows) are MuJoCo 2.2.2's, but for two things: it
 /// scales only the rate of a weld's rotation by torquescale and not the error, where both agree at 1; and it has no
-/// distance. Where the nearest points of a distance are not unique, the deepest point that the pair's routine gives
-/// first counts.
+/// distance. MuJoCo 3 takes J'v from the reference of connects and welds, which is not done here
+/// (tests/results/models.md). Where the nearest points of a distance are not unique, the deepest point that the pair's
+/// routine gives first counts.
 #include "constraint.h"
 #include "math3.h"
 
