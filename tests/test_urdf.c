@@ -250,6 +250,37 @@ static void test_reduced(void) {
   cav_model_free(m);
 }
 
+// joints on which nothing weighs, frames of a camera and a drawn wheel, are held and told; one that carries weight further
+// out moves
+static void test_weightless(void) {
+  static const char text[] =
+      "<robot name='r'><link name='a'>" MASS("1") "</link><link name='pan'/><link name='tilt'/><link name='lens'/>"
+      "<link name='wheel'><visual><geometry><sphere radius='.1'/></geometry></visual></link>"
+      "<link name='cross'/><link name='tip'>" MASS("1") "</link>\n"
+      "<joint name='p' type='revolute'><origin xyz='1 0 0'/><parent link='a'/><child link='pan'/>"
+      "<limit lower='-1' upper='1' effort='3' velocity='1'/></joint>\n"
+      "<joint name='t' type='continuous'><origin xyz='0 1 0'/><parent link='pan'/><child link='tilt'/></joint>\n"
+      "<joint name='f' type='fixed'><origin xyz='0 0 1'/><parent link='tilt'/><child link='lens'/></joint>\n"
+      "<joint name='w' type='continuous'><parent link='a'/><child link='wheel'/><mimic joint='c'/></joint>\n"
+      "<joint name='c' type='continuous'><parent link='a'/><child link='cross'/><axis xyz='0 0 1'/></joint>\n"
+      "<joint name='d' type='continuous'><parent link='cross'/><child link='tip'/><mimic joint='p' offset='.2'/></joint>"
+      "</robot>";
+  cav_load_options options = {.floating = 1, .visual = 1};
+  cav_error error = {0};
+  cav_model *m = load_with(text, &options, &error);
+  if (!CHECK(m != NULL)) {
+    fprintf(stderr, "    %s\n", error.text);
+    return;
+  }
+  CHECK(m->nv == 8 && m->njoint == 3 && m->nactuator == 0 && m->nlink == 4);
+  CHECK(m->nequality == 1 && m->equality[0].object[1] < 0);
+  CHECK(warns(m, "nothing on it weighs: the joint is held; give its link an inertial element (and 2 more)") == 1);
+  const double lens[3] = {1, 1, 1};
+  int body = cav_object_find(m, CAV_OBJECT_BODY, "lens");
+  if (CHECK(body >= 0)) CHECK_NEAR_ALL(m->body[body].pos, lens, 3, 1e-15);
+  cav_model_free(m);
+}
+
 // faults: line and words
 static void test_faults(void) {
   static const struct {
@@ -288,8 +319,9 @@ static void test_faults(void) {
        "izz='1'/></inertial>"
        "</link><joint name='j' type='fixed'><parent link='a'/><child link='b'/></joint></robot>",
        ":2: <mass>: attribute 'value': expected a mass >= 0"},
-      {"<robot><link name='a'/><link name='b'/>\n<joint name='j' type='revolute'><parent link='a'/><child link='b'/>"
-       "</joint></robot>",
+      {"<robot><link name='a'/><link name='b'><inertial><mass value='0'/><inertia ixx='0' iyy='0' izz='0'/></inertial>"
+       "<collision><geometry><sphere radius='1'/></geometry></collision></link>\n"
+       "<joint name='j' type='revolute'><parent link='a'/><child link='b'/></joint></robot>",
        "moves but has no mass"},
   };
   for (size_t i = 0; i < sizeof faults / sizeof *faults; i++) {
@@ -427,6 +459,7 @@ int main(void) {
   test_inertias();
   test_srdf();
   test_reduced();
+  test_weightless();
   test_faults();
   test_damage();
   test_chain();

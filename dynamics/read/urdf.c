@@ -6,11 +6,11 @@
 /// collision: visual geometry only on request, since it can neither touch nor weigh. Links joined by fixed joints move
 /// as one and keep their names; their reference weights are those of the whole, as if they were merged, unless the
 /// file's <mujoco><compiler fusestatic="false"/></mujoco> says otherwise. A joint with an effort limit gets a motor of
-/// that range; one that mimics another is tied to it by a joint equality and has no motor of its own. Moments of inertia
-/// that no solid has are mended where rounding explains them, and let pass where not, as by other readers of URDF; both
-/// are told. What the file asks for and is left aside is a warning, once with a count: safety controllers, elements that
-/// no table knows, and velocity limits, which are kept for certificates to tell. Not done: soft limits, transmissions,
-/// xacro.
+/// that range; one that mimics another is tied to it by a joint equality and has no motor of its own. A joint on which
+/// nothing weighs, that of a camera's frame or of a wheel that is only drawn, is held. Moments of inertia that no solid
+/// has are mended where rounding explains them, and let pass where not, as by other readers of URDF; both are told. What
+/// the file asks for and is left aside is a warning, once with a count: safety controllers, elements that no table knows,
+/// and velocity limits, which are kept for certificates to tell. Not done: soft limits, transmissions, xacro.
 
 #include <math.h>
 #include <stdio.h>
@@ -99,6 +99,7 @@ typedef struct part {
   const char *name;
   const cav_xml_node *node, *joint; // joint NULL: the root
   int first, last, next;            // children in the order of their joints; -1: none
+  int held;                         // the joint is held, since nothing on it weighs
 } part;
 
 typedef struct reader {
@@ -195,6 +196,23 @@ static int find_root(reader *r, const cav_xml_node *root) {
   }
   if (found < 0) cav_spec_fail(r->spec, root, NULL, "every link is carried by a joint: they form a circle; open it");
   return found;
+}
+
+// whether something on a link can weigh: mass, or a shape that it may come from. Joints that carry nothing of the kind,
+// frames of cameras and wheels that were only drawn, are marked as held
+static int mark_held(reader *r, int index, int depth) {
+  part *p = &r->parts.at[index];
+  const cav_xml_node *i = cav_xml_child(p->node, &inertial);
+  int weighs = depth > DEPTH_MAX || cav_xml_child(p->node, &collision) ||
+               (i && cav_xml_real(cav_xml_child(i, &mass), "value", 0) != 0);
+  for (int k = p->first; k >= 0 && depth <= DEPTH_MAX; k = r->parts.at[k].next)
+    weighs = mark_held(r, k, depth + 1) || weighs;
+  int type = p->joint ? cav_xml_word(p->joint, "type", FIXED) : FIXED;
+  p->held = !weighs && type != FIXED && type != FLOATING;
+  if (p->held)
+    cav_spec_leave(r->spec, p->joint, NULL,
+                   "nothing on it weighs: the joint is held; give its link an inertial element");
+  return weighs;
 }
 
 // --- poses and inertia ---
@@ -448,16 +466,19 @@ static const cav_xml_node *named_joint(const cav_xml_node *robot, const char *na
   return c;
 }
 
+static int motion_of(const part *p) { return p->held ? FIXED : cav_xml_word(p->joint, "type", FIXED); }
+
 // a joint that follows another: q = multiplier q_other + offset, as a joint equality with MJCF's softness. Where
-// robots are reduced joints become fixed and their <mimic> stays: a fixed joint follows nothing, and who follows it is
-// held at its offset
-static void read_mimic(cav_spec *spec, const cav_xml_node *node, const char *name) {
+// robots are reduced joints become fixed and their <mimic> stays: a joint that is fixed or held follows nothing, and who
+// follows it is held at its offset
+static void read_mimic(reader *r, const cav_xml_node *node, const char *name) {
+  cav_spec *spec = r->spec;
   const cav_xml_node *other = named_joint(node->parent->parent, cav_xml_text(node, "joint", ""));
   if (!other) {
     cav_spec_fail(spec, node, "joint", "no joint is named '%.60s'; correct the name", cav_xml_text(node, "joint", ""));
     return;
   }
-  int held = cav_xml_word(other, "type", FIXED) == FIXED;
+  int held = motion_of(&r->parts.at[named_link(r, other, &child)]) == FIXED;
   cav_spec_joint soft;
   cav_mjcf_default_joint(&soft);
   cav_spec_equality *e = CAV_SPEC_PUSH(spec, &spec->equality);
@@ -470,13 +491,14 @@ static void read_mimic(cav_spec *spec, const cav_xml_node *node, const char *nam
   e->polycoef[1] = held ? 0 : cav_xml_real(node, "multiplier", 1);
 }
 
-static void read_joint(reader *r, const cav_xml_node *node, int body) {
-  int type = cav_xml_word(node, "type", FIXED);
+static void read_joint(reader *r, const part *p, int body) {
+  const cav_xml_node *node = p->joint;
+  int type = motion_of(p);
   const char *name = cav_xml_text(node, "name", "");
   const cav_xml_node *a = cav_xml_child(node, &axis), *m = cav_xml_child(node, &mimic);
   double direction[3] = {1, 0, 0};
   if (a) cav_xml_reals(a, "xyz", direction, 3);
-  if (m && type != FIXED) read_mimic(r->spec, m, name);
+  if (m && type != FIXED) read_mimic(r, m, name);
   const cav_xml_node *s = cav_xml_child(node, &safety);
   if (s) cav_spec_leave(r->spec, s, NULL, "left aside: soft limits of a controller are not part of the dynamics");
   if (type == FIXED) return;
@@ -530,7 +552,7 @@ static int push_body(reader *r, const part *p, int up) {
     b->parent = 0;
   }
   if (p->joint) {
-    read_joint(r, p->joint, body);
+    read_joint(r, p, body);
   } else if (spec->load.floating) {
     cav_spec_joint *j = push_joint(r, p->node, "root", body);
     if (j) j->type = CAV_JOINT_FREE, j->limited = CAV_LIMITED_NO;
@@ -636,6 +658,7 @@ void cav_urdf_read(cav_spec *spec, const cav_xml *xml) {
   if (is_small(spec, root)) collect_links(&r, root);
   if (spec->status == CAV_OK) collect_joints(&r, root);
   int first = spec->status == CAV_OK ? find_root(&r, root) : -1;
+  if (first >= 0) mark_held(&r, first, 0);
   if (first >= 0) read_link(&r, first, 0, 0);
   if (first >= 0 && spec->status == CAV_OK && spec->body.n - (strcmp(r.parts.at[first].name, "world") != 0) < r.parts.n)
     cav_spec_fail(spec, root, NULL, "some links carry each other in a circle, apart from the root; connect them to it");
