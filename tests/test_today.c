@@ -129,6 +129,18 @@ static const feature features[] = {
      {{"armature", 0, 1.7}, {"damping", 0, .65}},
      20,
      0},
+    {"armature of tendons of one joint",
+     ARM_ONLY("armature='.5' frictionloss='2'") "<tendon><fixed armature='.3'><joint joint='j' coef='2'/></fixed>"
+                                                "<fixed armature='.1'><joint joint='j' coef='-3'/></fixed></tendon>",
+     {{"armature", 0, .5 + .3 * 4 + .1 * 9}},
+     20,
+     0},
+    {"lists of one number",
+     ARM_ONLY("stiffness='3 0 0' damping='2 0'") "<tendon><fixed stiffness='4 0' damping='1 0 0'><joint joint='j' "
+                                                 "coef='2'/></fixed></tendon>",
+     {{"stiffness", 0, 3}, {"damping", 0, 2}},
+     20,
+     0},
     {"a group of actuators switched off",
      "<option actuatorgroupdisable='2 5'/>" ARM_ONLY("") "<actuator><motor joint='j' group='2' name='a'/>"
                                                          "<motor joint='j' name='b'/></actuator>"
@@ -568,7 +580,7 @@ static void test_turning_connect(void) {
       "0'",
       "<inertial mass='2' pos='0 0 0' diaginertia='1 1 1'/></body></worldbody><equality><connect body1='b' anchor='-1 "
       "0 0'"};
-  static const double expected[] = {-18, -18 - 9 * 18};
+  static const double by_hand[] = {-18, -18 - 9 * 18};
   for (int i = 0; i < 2; i++) {
     char all[600];
     snprintf(all, sizeof all,
@@ -579,7 +591,7 @@ static void test_turning_connect(void) {
     double v[6] = {0, 3.0 * i, 0, 0, 0, 3}, v_next[6] = {-9 * i * m->timestep, 3.0 * i, 0, 0, 0, 3}, u[6];
     CHECK(cav_inverse(m, state, m->q0, v, v_next, u) == CAV_OK);
     // bound: rounding; seen 1e-13
-    CHECK_NEAR(u[0], expected[i], 1e-10);
+    CHECK_NEAR(u[0], by_hand[i], 1e-10);
     cav_state_free(state);
     cav_model_free(m);
   }
@@ -590,13 +602,18 @@ static void test_lacking(void) {
   const char *path = write_file(
       "lacking.xml",
       "\n<worldbody>\n<flexcomp type='grid' name='f'/>\n<flexcomp type='grid' name='g'/>" ARM("stiffness='1 2'")
-      "</body></worldbody>\n<actuator><plugin plugin='a'/><adhesion body='arm' ctrlrange='0 1'/></actuator>");
+      "</body></worldbody>\n<actuator><plugin plugin='a'/><adhesion body='arm' ctrlrange='0 1'/></actuator>"
+      "<tendon><spatial armature='1'/><fixed armature='1'><joint joint='j' coef='1'/><joint joint='k' coef='1'/></fixed>"
+      "</tendon>");
   cav_error error = {0};
   cav_model *m = cav_model_load(path, &error);
   CHECK(!m && error.line == 3);
   CHECK(strstr(error.text, "flexible bodies are not supported; remove them (2 times)") != NULL);
   CHECK(strstr(error.text, "Also <joint> in line 4: stiffness and damping that vary") != NULL);
   CHECK(strstr(error.text, "Also <plugin> in line 5: actuators that are plugins") != NULL);
+  CHECK(strstr(error.text,
+               "inertia of a tendon is supported along a fixed one of one joint; give its joints armature "
+               "instead (2 times)") != NULL);
   if (m) fprintf(stderr, "    loaded\n");
   cav_model_free(m);
   // hints: a name of two letters is near to every other

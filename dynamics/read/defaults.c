@@ -208,8 +208,7 @@ void cav_mjcf_equality_values(cav_spec *spec, const cav_xml_node *node, cav_spec
 }
 
 void cav_mjcf_tendon_values(cav_spec *spec, const cav_xml_node *node, cav_spec_tendon *t) {
-  if (cav_xml_real(node, "armature", 0) != 0)
-    cav_spec_lack(spec, node, "armature", "inertia of a tendon is not supported; give its joints armature instead");
+  read_real(node, "armature", &t->armature);
   read_limited(node, "actuatorfrclimited", &t->effort);
   cav_xml_reals(node, "actuatorfrcrange", t->effort_range, 2);
   read_limited(node, "limited", &t->limited);

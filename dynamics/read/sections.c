@@ -84,6 +84,22 @@ static void read_path(cav_spec *spec, const cav_xml_node *node, cav_spec_tendon 
   }
 }
 
+// inertia of a tendon: armature J'J, constant along a fixed one. Of one joint it is that joint's; of several it couples
+// them across the tree, which inertias here have no place for
+static void move_armature(cav_spec *spec, const cav_spec_tendon *t) {
+  if (t->armature < 0) cav_spec_fail(spec, t->node, "armature", "expected a number >= 0, got %g", t->armature);
+  if (t->armature == 0) return;
+  if (t->npart != 1) {
+    cav_spec_lack(spec, t->node, "armature",
+                  "inertia of a tendon is supported along a fixed one of one joint; give its joints armature instead");
+    return;
+  }
+  const cav_spec_part *part = &spec->part.at[t->part];
+  int i = cav_name_find(spec->joint.at, spec->joint.n, sizeof *spec->joint.at, part->joint);
+  // a joint that is not there is told where the tendon is compiled
+  if (i >= 0) spec->joint.at[i].armature += part->coef * part->coef * t->armature;
+}
+
 static void read_tendon(cav_mjcf_reader *r, const cav_xml_node *node) {
   cav_spec *spec = r->spec;
   for (const cav_xml_node *c = node->child; c; c = c->next) {
@@ -101,6 +117,7 @@ static void read_tendon(cav_mjcf_reader *r, const cav_xml_node *node) {
       *p = (cav_spec_part){i, cav_xml_text(i, "joint", ""), cav_xml_real(i, "coef", 0)};
       t.npart++;
     }
+    move_armature(spec, &t);
     cav_spec_tendon *place_of = CAV_SPEC_PUSH(spec, &spec->tendon);
     if (place_of) *place_of = t;
   }

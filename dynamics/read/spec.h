@@ -140,7 +140,7 @@ typedef struct cav_spec_tendon {
   const cav_xml_node *node;
   int spatial, part, npart, path, npath;
   cav_limited limited;
-  double range[2], margin, stiffness, damping, frictionloss, springlength[2];
+  double range[2], margin, stiffness, damping, armature, frictionloss, springlength[2];
   int has_springlength;
   cav_softness limit, friction;
   cav_limited effort; ///< whether effort_range holds, of the sum of what actuators do to it
