@@ -625,6 +625,40 @@ static void test_lacking(void) {
   cav_model_free(m);
 }
 
+// whether MuJoCo 3 reads a file; -1: it is not here
+static int peer_reads(const char *path) {
+  if (!peer()) return -1;
+  char command[700];
+  snprintf(command, sizeof command, "node '%s/tests/peer_mujoco3.mjs' '%s' >/dev/null 2>&1", CAVORT_SOURCE_ROOT, path);
+  return system(command) == 0;
+}
+
+// what moves weighs: armature does not stand in for it, bounds do, and what is fixed to it counts as its own
+static void test_massless(void) {
+  static const struct {
+    const char *body;
+    int loads;
+  } sets[] = {{"<joint/>", 0},
+              {"<joint armature='1'/><site/>", 0},
+              {"<joint armature='1'/><geom size='.1' mass='0'/>", 0},
+              {"<joint armature='1'/><inertial mass='1' pos='0 0 0' diaginertia='0 0 0'/>", 0},
+              {"<joint/><body><body>" MASS "</body></body>", 1},
+              {"<joint/><body/>" MASS, 1},
+              {"<joint/></body></worldbody><compiler boundmass='.1' boundinertia='.1'/><worldbody><body>", 1}};
+  for (size_t i = 0; i < sizeof sets / sizeof *sets; i++) {
+    char text[400];
+    snprintf(text, sizeof text, "<worldbody><body>%s</body></worldbody>", sets[i].body);
+    const char *path = write_file("massless.xml", text);
+    cav_error error = {0};
+    cav_model *m = cav_model_load(path, &error);
+    int theirs = peer_reads(path);
+    if (!CHECK((m != NULL) == sets[i].loads && (theirs < 0 || theirs == sets[i].loads)))
+      fprintf(stderr, "    %s: %d %d %s\n", sets[i].body, m != NULL, theirs, error.text);
+    CHECK(m != NULL || strstr(error.text, "moves but has no") != NULL);
+    cav_model_free(m);
+  }
+}
+
 // a scene in which nothing moves can be evaluated
 static void test_static(void) {
   cav_model *m = cav_model_load(write_file("static.xml", "<worldbody><geom size='1'/></worldbody>"), NULL);
@@ -658,9 +692,11 @@ int main(int argc, char **argv) {
   for (size_t i = 0; i < sizeof features / sizeof *features; i++) test_feature(&features[i]);
   test_attach();
   test_lacking();
+  test_massless();
   test_static();
   test_turning_connect();
-  static const char *const left[] = {"feature.xml", "kid.xml", "lacking.xml", "hint.xml", "static.xml", "turning.xml"};
+  static const char *const left[] = {"feature.xml", "kid.xml",     "lacking.xml", "hint.xml",
+                                     "static.xml",  "turning.xml", "massless.xml"};
   for (size_t i = 0; i < sizeof left / sizeof *left; i++) unlink(write_file(left[i], ""));
   rmdir(folder);
   return check_result();
