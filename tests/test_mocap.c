@@ -329,7 +329,6 @@ static double off(const truth *c, const cav_trajectory *motion) {
 static cav_ik_options bare(void) {
   cav_ik_options options = cav_ik_options_default();
   options.posture = options.roughness = 1e-7;
-  options.floor = 0;
   return options;
 }
 
@@ -467,7 +466,8 @@ static void test_floor(const truth *c) {
   }
   for (int with = 0; with < 2; with++) {
     cav_trajectory *motion;
-    options.floor = with ? 1e4 : 0;
+    options.floor = 1e4;
+    c->set->floor = with;
     CHECK(!cav_ik(m, r, c->set, &options, &motion, NULL, &error));
     double worst = 0;
     for (int t = 0; motion && t < 40; t++) worst = fmax(worst, fabs(lowest(m, state, motion->q + t * m->nq)));
@@ -475,6 +475,7 @@ static void test_floor(const truth *c) {
     CHECK(with ? worst < 3e-4 : fabs(worst - 0.0155) < 1e-3);
     cav_trajectory_free(motion);
   }
+  c->set->floor = 0;
   free(q);
   cav_state_free(state);
   cav_record_free(r);

@@ -63,13 +63,14 @@ typedef struct cav_marker_set {
   int nmarker;             ///< how many
   cav_marker *marker;      ///< [nmarker] names are unique
   double adjust;           ///< m: how far off places that are known may be; they are fitted, too. 0: they are exact
+  int floor;               ///< 1: feet that stand do so on the plane z = 0
   cav_record_options clip; ///< for cav_record_read; names is memory of the set
 } cav_marker_set;
 
 /// Reads a marker set: an XML file <markers> of elements <marker name= body= pos= weight=>. body is one of the model
 /// or a part that any body has ("right foot"); without pos the place is unknown and starts at the middle of the
 /// body's mass.
-/// <markers> has, where needed, adjust= (m), and what clips leave out: unit= (m), up= (x, y or z), rate= (1/s) and
+/// <markers> has, where needed, adjust= (m), floor=, and what clips leave out: unit= (m), up= (x, y or z), rate= (1/s) and
 /// names= (by blanks).
 /// NULL on failure with the reason in error (may be NULL): CAV_BAD_INPUT, CAV_NO_MEMORY. Freed by cav_marker_set_free.
 CAV_API cav_marker_set *cav_marker_set_read(const char *path, const cav_model *model, cav_error *error);
@@ -84,8 +85,8 @@ CAV_API cav_status cav_marker_set_write(const char *path, const cav_model *model
 typedef struct cav_ik_options {
   double posture;   ///< weight of the way from the model's own configuration, m/rad: settles what no marker tells
   double roughness; ///< weight of the change from the frame before, m/rad: bridges gaps
-  double floor;   ///< 1/m^2 relative to markers: feet that stand are on the plane z = 0, others not below; 0: wherever
-  int iterations; ///< at most, a frame
+  double floor;     ///< 1/m^2 relative to markers, of the height of feet that stand, where the set says floor
+  int iterations;   ///< at most, a frame
 } cav_ik_options;
 
 /// The usual options.

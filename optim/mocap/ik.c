@@ -8,7 +8,7 @@
 #include "math3.h"
 
 cav_ik_options cav_ik_options_default(void) {
-  return (cav_ik_options){.posture = 1e-3, .roughness = 1e-3, .floor = 10, .iterations = 100};
+  return (cav_ik_options){.posture = 1e-5, .roughness = 1e-3, .floor = 10, .iterations = 100};
 }
 
 void cav_ik_report_free(cav_ik_report *report) {
@@ -126,6 +126,34 @@ static cav_status follow(cav_fit *fit, const double *q, cav_trajectory *trajecto
   return CAV_OK;
 }
 
+// The first frame from several postures, its own among them: the nearest in the end is where the clip starts. The others
+// have joints up to a quarter of their ranges, or half a radian, off, by a fixed sequence.
+static cav_status begin(cav_fit *fit, int frame, double *q, int *iterations) {
+  enum { STARTS = 12 };
+  const cav_model *m = fit->model;
+  size_t nq = (size_t)m->nq;
+  double *start = malloc(2 * nq * sizeof *start), *best = start ? start + nq : NULL, least = INFINITY, cost;
+  cav_status status = start ? CAV_OK : CAV_NO_MEMORY;
+  for (int s = 0; s < STARTS && !status; s++) {
+    memcpy(start, m->q0, nq * sizeof *start);
+    for (int j = 0; j < m->njoint && s > 0; j++) {
+      const cav_joint *joint = &m->joint[j];
+      double way = fmod((j + 1) * 0.6180339887498949 + s * 0.7548776662466927, 1) - 0.5;
+      if (joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE)
+        start[joint->q] += way * (joint->limited ? (joint->range[1] - joint->range[0]) / 2 : 1);
+    }
+    cav_fit_clip(m, start);
+    status = cav_fit_align(fit, frame, start);
+    if (!status) status = cav_fit_frame(fit, frame, NULL, start, iterations);
+    if (!status) status = cav_fit_cost(fit, frame, start, NULL, &cost);
+    // another posture has to be better than by rounding
+    if (!status && cost < 0.99 * least) least = cost, memcpy(best, start, nq * sizeof *best);
+  }
+  if (!status) memcpy(q, best, nq * sizeof *q);
+  free(start);
+  return status;
+}
+
 static cav_status run(cav_fit *fit, cav_marker_set *set, cav_trajectory **trajectory, cav_ik_report *report,
                       cav_error *error) {
   int first = first_frame(fit);
@@ -133,13 +161,8 @@ static cav_status run(cav_fit *fit, cav_marker_set *set, cav_trajectory **trajec
   double *q = malloc((size_t)fit->model->nq * sizeof *q);
   *trajectory = cav_trajectory_new(fit->model, fit->nframe, fit->step);
   cav_status status = q && *trajectory ? CAV_OK : CAV_NO_MEMORY;
-  if (!status) {
-    memcpy(q, fit->model->q0, (size_t)fit->model->nq * sizeof *q);
-    cav_fit_clip(fit->model, q);
-    if (fit->options->floor > 0) status = cav_fit_floor(fit);
-    if (!status) status = cav_fit_align(fit, first, q);
-  }
-  if (!status) status = cav_fit_frame(fit, first, NULL, q, &report->iterations);
+  if (!status && set->floor) status = cav_fit_floor(fit);
+  if (!status) status = begin(fit, first, q, &report->iterations);
   if (!status) status = cav_fit_places(fit, set, q, &report->iterations);
   if (!status) status = follow(fit, q, *trajectory, report);
   free(q);

@@ -21,8 +21,9 @@ static const cav_xml_element marker = {"marker", 1, 0, attributes, NULL, 0, "a m
 static const char *const axes[] = {"x", "y", "z", NULL};
 static const cav_xml_attribute set_attributes[] = {
     {"adjust", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("m", "(0: given positions are exact)", "how far off given positions may be; they are estimated too")},
-    {"unit", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("m", "(as the clip says, or what its size suggests)", "unit of length of the clip")},
-    {"up", CAV_XML_WORD, 0, 0, axes, 0, NOTE("", "(as the clip says, or what it suggests)", "axis of the clip that points up")},
+    {"floor", CAV_XML_BOOL, 0, 0, NULL, 0, NOTE("", "(false)", "feet stand on the plane z = 0 of the clip where a marker of theirs stands still, low")},
+    {"unit", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("m", "(as the clip says, or as its format has it)", "unit of length of the clip")},
+    {"up", CAV_XML_WORD, 0, 0, axes, 0, NOTE("", "(as the format of the clip has it)", "axis of the clip that points up")},
     {"rate", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("1/s", "(as the clip says)", "frames a second")},
     {"names", CAV_XML_TEXT, 1, 0, NULL, 0, NOTE("", "(those of the clip)", "names of the markers of keyframes without bodies, separated by spaces")},
     {0}};
@@ -64,6 +65,7 @@ static cav_status read_set(const cav_problem_reader *reader, const cav_xml_node 
   cav_status status = cav_problem_real(reader, root, "adjust", 0, DBL_MAX, &set->adjust);
   if (!status) status = cav_problem_real(reader, root, "unit", DBL_MIN, DBL_MAX, &set->clip.unit);
   if (!status) status = cav_problem_real(reader, root, "rate", DBL_MIN, DBL_MAX, &set->clip.rate);
+  set->floor = cav_xml_bool(root, "floor", 0);
   if (cav_xml_get(root, "up")) set->clip.up = axes[cav_xml_word(root, "up", 2)][0];
   if (!status && names && !(set->clip.names = strdup(names))) status = cav_problem_no_memory(reader);
   for (const cav_xml_node *c = root->child; c && !status; c = c->next) status = read_marker(reader, c, set);
@@ -101,6 +103,7 @@ static void write_text(FILE *out, const char *text) {
 // what clips leave out
 static void write_head(FILE *out, const cav_marker_set *set) {
   fputs("<markers", out);
+  if (set->floor) fputs(" floor=\"true\"", out);
   if (set->clip.unit > 0) fprintf(out, " unit=\"%.17g\"", set->clip.unit);
   if (set->clip.up) fprintf(out, " up=\"%c\"", set->clip.up);
   if (set->clip.rate > 0) fprintf(out, " rate=\"%.17g\"", set->clip.rate);
