@@ -119,7 +119,7 @@ TEXT
   gcc -std=c17 -Wall -Wextra -Werror problems/example.c -o "$out/example" $flags && $run "$out/example" || return 1
   gcc -std=c17 -Wall -Wextra -Werror problems/example_replan.c -o "$out/replan" $flags && $run "$out/replan" || return 1
   # as it was installed
-  gcc -std=c17 -Wall -Wextra -Werror "$prefix/share/cavort/examples/example_term.c" -o "$out/term" $flags && $run "$out/term"
+  gcc -std=c17 -Wall -Wextra -Werror "$prefix/share/cavort/examples/example_term.c" -o "$out/term" $flags -lm && $run "$out/term"
 }
 
 # the Python package installed beside a shared library, then a wheel of its own around that library, and a line that uses it

@@ -8,13 +8,16 @@
 
 /// What no member of a model's structs holds: four bytes before these members, and at the end of a geom (clang -Wpadded). It is
 /// whatever stood there before.
-#define GAPS(X)                                                                                                \
-  X(link, nlink, pos)                                                                                          \
-  X(joint, njoint, pos)                                                                                        \
-  X(joint, njoint, range) X(joint, njoint, effort_range) X(dof, nv, damping) X(geom, ngeom, bound)             \
-      X(geom, ngeom, fluidcoef) X(site, nsite, size) X(pair, npair, friction) X(tendon, ntendon, range)        \
-          X(tendon_part, ntendon_part, coef) X(tendon_path, ntendon_path, divisor) X(equality, nequality, pos) \
+// clang-format off
+#define GAPS(X)                                                                                                  \
+  X(link, nlink, pos)                                                                                            \
+  X(joint, njoint, pos)                                                                                          \
+  X(joint, njoint, range)                                                                                        \
+  X(joint, njoint, effort_range) X(dof, nv, damping) X(geom, ngeom, bound) X(geom, ngeom, fluidcoef)             \
+      X(site, nsite, size) X(pair, npair, friction) X(tendon, ntendon, range) X(tendon_part, ntendon_part, coef) \
+          X(tendon_path, ntendon_path, divisor) X(equality, nequality, pos)                                      \
               X(actuator, nactuator, activation_parameter) X(actuator, nactuator, ctrlrange)
+// clang-format on
 
 // the four bytes before a place in a model
 static void clear(const cav_model *m, const void *place) {

@@ -86,6 +86,13 @@ class Problem:
     q_goal = _Posture("nq", "posture that the guess ends at and costs of posture are about [nq]")
     model: Model
     terms: list[Term]
+    name: str
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name[:1] != "_" and not hasattr(type(self), name) and name not in Problem.__annotations__:
+            near = difflib.get_close_matches(name, [*vars(Problem), *Problem.__annotations__], 1)
+            raise AttributeError(f"a problem has no '{name}'" + (f"; did you mean '{near[0]}'?" if near else ""))
+        super().__setattr__(name, value)
 
     def __init__(
         self, model: Model | str, duration: float = 1.0, timestep: float = 0.025, *, name: str = ""
@@ -253,7 +260,7 @@ class Problem:
         name: str = "",
         target: ArrayLike | None = None,
         waypoints: Sequence[tuple[float, ArrayLike]] | None = None,
-        at: float | None = None,
+        at: float | str | None = None,
         window: tuple[float, float] | None = None,
         scale: float = 1.0,
         within: float | str = 0.0,
@@ -272,6 +279,9 @@ class Problem:
         if at is not None or window is not None:
             if at is not None and window is not None:
                 raise ValueError("give at or window, not both")
+            if isinstance(at, str) and at != "end":
+                raise ValueError(f"at: expected a time in s or 'end', got {at!r}")
+            at = self.duration if isinstance(at, str) else at
             start, made.to = (at, at) if at is not None else window  # type: ignore
             setattr(made, "from", start)
         relative = attributes.pop("relative", None)

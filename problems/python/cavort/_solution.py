@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from . import _library
 from ._library import Array, Options, Record, check, failure, ffi, lib, new_error, text
 from ._problem import Frozen, Problem
+from ._term import Term
 
 
 class Solution:
@@ -171,8 +172,13 @@ class Solution:
         records = [_library.record(report[i], ("has_target", "met")) for i in range(count)]
         return [Record({"name": name, **record}) for name, record in zip(self._frozen.names, records)]
 
-    def values(self, term: int | str) -> NDArray[Any]:
-        """A term along the motion, one row a knot and value: knot, component, value, target, cost. term: number or name."""
+    def values(self, term: int | str | Term) -> NDArray[Any]:
+        """A term along the motion: a record for every knot and value, with the fields knot, component, value, target and
+        cost, as in values("apex")["value"]. term: its number, its name, or the term itself."""
+        if isinstance(term, Term):
+            term = next((i for i, known in enumerate(self._frozen.terms) if known is term), -1)
+            if term < 0:
+                raise ValueError("the term is not one of the problem that was solved")
         number = self._frozen.names.index(term) if isinstance(term, str) else range(self._frozen.c.nterm)[term]
         count, error = ffi.new("int *"), new_error()
         what = *self._motion(), number

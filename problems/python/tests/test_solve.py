@@ -309,3 +309,18 @@ def test_interrupt():
     told = process.communicate(timeout=60)[0]
     assert told == "interrupted interrupted (81, 28)\n" and process.returncode == 0
     assert time.monotonic() - sent < 10
+
+
+def test_end_and_names(arm):
+    """The end in words, settings that are none, a term in the place of its number."""
+    problem = cavort.Problem(arm, 1.0, 0.05)
+    term = problem.cost("posture", 900, dofs="all", at="end", target=[1.0])
+    with pytest.raises(ValueError, match="'end', got 'start'"):
+        problem.cost("posture", 900, dofs="all", at="start")
+    with pytest.raises(AttributeError, match="did you mean 'duration'"):
+        problem.duratoin = 3
+    solution = cavort.solve(problem)
+    values = solution.values(term)["value"]
+    assert len(values) == 1 and abs(values[0]) < 0.1 or abs(values[0] - 1) < 0.1
+    with pytest.raises(ValueError, match="not one of the problem"):
+        solution.values(cavort.Problem(arm).terms[0])
