@@ -3,6 +3,7 @@
 # how near it ends, beside what the certificate says; at other steps and from other starts than gains are chosen by; then with gains of
 # half and of none, which have to be told apart.
 # Usage: sh tests/replay.sh [FOLDER...]   (result folders; without any, all motions are solved first: an hour)
+# CAVORT_MUJOCO_JS names npm's @mujoco/mujoco/mujoco.js, for models with servos, which Debian's MuJoCo does not read.
 # CAVORT_BUILD names a release build with MuJoCo, by default build. FOLDERs are named after their motions, or r-MOTION.
 set -eu
 cd "$(dirname "$0")/.."
@@ -17,6 +18,16 @@ if [ $# -eq 0 ]; then
     set -- "$@" "$work/$motion"
   done
 fi
+
+# servos with kv are for MuJoCo 3 alone: their controls are played there, open loop
+servos=""
+for folder in "$@"; do
+  shift
+  case "$(basename "$folder")" in
+    arm-* | r-arm-*) servos="$servos $folder" ;;
+    *) set -- "$@" "$folder" ;;
+  esac
+done
 
 # table FACTOR FOLDER...
 table() {
@@ -41,6 +52,12 @@ table() {
   echo "| motion | lasts, s | 0.5 ms until, s | end, mm | 4 ms until, s | end, mm | starts followed to the end | the worst of these, mm |"
   echo "|---|---|---|---|---|---|---|---|"
   "$build/tests/bench_replay" apart "$@"
+  if [ -n "$servos" ] && [ -n "${CAVORT_MUJOCO_JS:-}" ]; then
+    echo
+    echo "Servos of the arm in MuJoCo 3.14: their controls alone, open loop (\`node tests/replay_servo.mjs\`), the farthest centre of mass:"
+    echo
+    node tests/replay_servo.mjs problems/models/arm.xml $servos | sed 's/^/- /'
+  fi
   for factor in 0.5 0.2 0; do
     echo
     echo "Gains times $factor:"
