@@ -372,6 +372,29 @@ static void test_gaps(const truth *c) {
   cav_trajectory_free(motion);
 }
 
+// a forearm that no frame shows for a while stays as it was last seen, and is found again
+static void test_hidden_limb(const truth *c) {
+  enum { FROM = 20, TO = 30 };
+  cav_ik_options options = cav_ik_options_default();
+  cav_trajectory *motion;
+  cav_error error = {0};
+  int elbow = c->model->joint[cav_object_find(c->model, CAV_OBJECT_JOINT, "elbow_right")].q;
+  size_t n = 3 * (size_t)c->set->nmarker * FRAMES;
+  double *kept = malloc(n * sizeof *kept);
+  memcpy(kept, c->record->position, n * sizeof *kept);
+  for (int i = 0; i < c->set->nmarker; i++)
+    for (int t = FROM; t < TO; t++)
+      if (!strncmp(c->set->marker[i].name, "lower_arm_right", 15) || !strncmp(c->set->marker[i].name, "hand_right", 10))
+        c->record->position[3 * ((size_t)t * (size_t)c->set->nmarker + (size_t)i)] = NAN;
+  CHECK(!cav_ik(c->model, c->record, c->set, &options, &motion, NULL, &error));
+  for (int t = FROM - 1; motion && t < TO; t++)
+    CHECK_NEAR(motion->q[t * c->model->nq + elbow], motion->q[(FROM - 1) * c->model->nq + elbow], 5e-3);
+  CHECK(motion && fabs(motion->q[TO * c->model->nq + elbow] - c->q[TO * c->model->nq + elbow]) < 1e-3);
+  memcpy(c->record->position, kept, n * sizeof *kept);
+  free(kept);
+  cav_trajectory_free(motion);
+}
+
 // every third marker without a place: found where it is
 static void test_places(const truth *c) {
   cav_ik_options options = bare();
@@ -512,6 +535,7 @@ int main(void) {
   make(&c);
   test_exact(&c);
   test_gaps(&c);
+  test_hidden_limb(&c);
   test_places(&c);
   test_noise(&c);
   test_floor(&c);
