@@ -13,6 +13,17 @@ from ._problem import Frozen, Problem
 from ._term import Term
 
 
+class Explanation(Record):
+    """Why a motion is as it is, Solution.explain; in print() a line for each reason."""
+
+    def __str__(self) -> str:
+        lines = ["nothing is missed" if self.met else "missed:"]
+        lines += [f"  {reason.what}\n    {reason.cure}" for reason in self.violation]
+        lines += ["pulls against each other:"] if self.conflict else []
+        lines += [f"  {reason.what}\n    {reason.cure}" for reason in self.conflict]
+        return "\n".join(lines + ([self.contradiction] if self.contradiction else []))
+
+
 class Solution:
     """A motion over knots, as a solve left it.
 
@@ -187,8 +198,9 @@ class Solution:
         self._frozen.check(lib.cav_term_values(*what, count[0], array, count, error), "the values of a term", error)
         return _library.view(array, array, (count[0],))
 
-    def explain(self) -> Record:
-        """Why the motion is as it is: violation and conflict, lists of reasons (what, cure, time, ...) by size; met."""
+    def explain(self) -> Explanation:
+        """Why the motion is as it is: violation and conflict, lists of reasons (what, cure, time, ...) by size; met.
+        print() shows them a line each."""
         found, error = ffi.new("cav_explanation *"), new_error()
         self._frozen.check(
             lib.cav_explain(*self._motion(), self._c.nrow, self._c.row, found, error), "the explanation", error
@@ -197,7 +209,7 @@ class Solution:
         told: dict[str, Any] = {
             name: [_library.record(getattr(found, name)[i]) for i in range(count)] for name, count in lists.items()
         }
-        return Record(met=bool(found.met), contradiction=text(found.contradiction), **told)
+        return Explanation(met=bool(found.met), contradiction=text(found.contradiction), **told)
 
     def sample(self, timestep: float) -> tuple[Array, Array, Array]:
         """q, v, u of the motion at another step, by cubics through the knots (u linear): copies."""

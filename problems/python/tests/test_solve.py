@@ -324,3 +324,5 @@ def test_end_and_names(arm):
     assert len(values) == 1 and abs(values[0]) < 0.1 or abs(values[0] - 1) < 0.1
     with pytest.raises(ValueError, match="not one of the problem"):
         solution.values(cavort.Problem(arm).terms[0])
+    told = str(solution.explain())
+    assert told.startswith(("nothing is missed", "missed:")) and "Record(" not in told
