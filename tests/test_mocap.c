@@ -243,6 +243,7 @@ static void test_errors(void) {
       {"w.bvh", "HIERARCHY\nROOT a\n{\nCHANNELS 1 Wrotation\n",
        ":4: expected a channel such as 'Zrotation', got 'Wrotation'"},
       {"w.bvh", "HIERARCHY\nMOTION\n", "expected a skeleton"},
+      {"w.bvh", "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\n}\nMOTION\nFrames: 9e15\nFrame Time: 1\n", "no joint has any"},
       {"w.xml", "<mujoco><keyframe><key mpos=\"1 2 3\"/></keyframe></mujoco>", "list their names in order"},
       {"w.c3d", "no", "expected a C3D file"},
   };

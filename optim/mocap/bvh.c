@@ -154,6 +154,7 @@ static cav_status read_motion(skeleton *s, const cav_record_options *options, ca
   if (!status && options->rate > 0) step = 1 / options->rate;
   if (!status && !(frames >= 1 && frames == floor(frames) && step > 0))
     return cav_clip_fail(s->text, "expected a number of frames and a time above 0, got %g and %g", frames, step);
+  if (!status && s->nchannel == 0) return cav_clip_fail(s->text, "expected CHANNELS of a joint, no joint has any");
   if (status) return status;
   if (!cav_clip_new(clip, s->n)) return cav_clip_no_memory(s->text);
   for (int i = 0; i < s->n; i++)

@@ -65,7 +65,7 @@ static void take_parameter(c3d *c, int group, const unsigned char *name, int n, 
     c->width[c->nlabels] = dim[0];
     c->count[c->nlabels++] = dim[1];
   }
-  if (same_word(name, n, "UNITS") && type == -1 && ndim >= 1 && dim[0] > 0)
+  if (same_word(name, n, "UNITS") && type == -1 && ndim == 1 && dim[0] > 0)
     c->unit = value[0] == 'm' && (dim[0] < 2 || value[1] != 'm') ? 1
               : value[0] == 'c'                                  ? 0.01
               : value[0] == 'm'                                  ? 1e-3

@@ -2,6 +2,7 @@
 #include "clip.h"
 
 #include <errno.h>
+#include <limits.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -121,6 +122,7 @@ double *cav_clip_frame(cav_clip *clip, double time) {
   cav_record *r = clip->record;
   size_t numbers = 3 * (size_t)r->nmarker;
   if (r->nframe == clip->room) {
+    if (clip->room > INT_MAX / 2) return NULL;
     int room = clip->room ? 2 * clip->room : 256;
     double *at = realloc(r->time, (size_t)room * sizeof *at);
     if (at) r->time = at;
