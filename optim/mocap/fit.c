@@ -27,8 +27,7 @@ void cav_fit_column(const cav_fit *fit, int d, const double point[3], double col
   velocity_at(column, axis, fit->state->reference + 3 * fit->model->dof[d].link, point);
 }
 
-// last dof that moves a body, -1: none does
-static int last_dof(const cav_model *m, int body) {
+int cav_fit_last_dof(const cav_model *m, int body) {
   int link = m->body[body].link;
   while (link > 0 && m->link[link].ndof == 0) link = m->link[link].parent;
   return link > 0 ? m->link[link].dof + m->link[link].ndof - 1 : -1;
@@ -73,7 +72,7 @@ static void add_marker(const cav_fit *fit, int frame, int i) {
   if (!seen) return;
   cav_fit_place(fit, i, x);
   sub3(off, x, seen);
-  for (int d = last_dof(m, marker->body); d >= 0; d = m->dof[d].parent) {
+  for (int d = cav_fit_last_dof(m, marker->body); d >= 0; d = m->dof[d].parent) {
     cav_fit_column(fit, d, x, a);
     fit->g[d] += marker->weight * dot3(a, off);
     for (int e = d; e >= 0; e = m->dof[e].parent) {
@@ -88,7 +87,7 @@ static void add_foot(const cav_fit *fit, int frame, int f) {
   const cav_model *m = fit->model;
   double x[3], a[3], b[3], w = fit->options->floor;
   if (!cav_fit_floor_row(fit, frame, f, x)) return;
-  for (int d = last_dof(m, fit->foot[f]); d >= 0; d = m->dof[d].parent) {
+  for (int d = cav_fit_last_dof(m, fit->foot[f]); d >= 0; d = m->dof[d].parent) {
     cav_fit_column(fit, d, x, a);
     fit->g[d] += w * a[2] * x[2];
     for (int e = d; e >= 0; e = m->dof[e].parent) {

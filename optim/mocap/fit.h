@@ -28,6 +28,9 @@ const double *cav_fit_seen(const cav_fit *fit, int frame, int i);
 /// World place of marker i of the fit at the state's position.
 void cav_fit_place(const cav_fit *fit, int i, double world[3]);
 
+/// Last dof that moves a body, -1: none does.
+int cav_fit_last_dof(const cav_model *model, int body);
+
 /// Jacobian column of a point of a link by dof d, which is of the link or of one before it.
 void cav_fit_column(const cav_fit *fit, int d, const double point[3], double column[3]);
 

@@ -93,13 +93,6 @@ cav_marker_set *cav_marker_set_read(const char *path, const cav_model *model, ca
   return NULL;
 }
 
-static void write_text(FILE *out, const char *text) {
-  for (; *text; text++) {
-    const char *code = *text == '&' ? "&amp;" : *text == '<' ? "&lt;" : *text == '"' ? "&quot;" : NULL;
-    code ? fputs(code, out) : fputc(*text, out);
-  }
-}
-
 // what clips leave out
 static void write_head(FILE *out, const cav_marker_set *set) {
   fputs("<markers", out);
@@ -109,7 +102,7 @@ static void write_head(FILE *out, const cav_marker_set *set) {
   if (set->clip.rate > 0) fprintf(out, " rate=\"%.17g\"", set->clip.rate);
   if (set->clip.names) {
     fputs(" names=\"", out);
-    write_text(out, set->clip.names);
+    cav_file_write_xml(out, set->clip.names);
     fputc('"', out);
   }
   fputs(">\n", out);
@@ -127,9 +120,9 @@ cav_status cav_marker_set_write(const char *path, const cav_model *model, const 
   for (int i = 0; i < set->nmarker; i++) {
     const cav_marker *m = &set->marker[i];
     fputs("  <marker name=\"", file.stream);
-    write_text(file.stream, m->name);
+    cav_file_write_xml(file.stream, m->name);
     fputs("\" body=\"", file.stream);
-    write_text(file.stream, model->body[m->body].name);
+    cav_file_write_xml(file.stream, model->body[m->body].name);
     fprintf(file.stream, "\" pos=\"%.17g %.17g %.17g\"", m->place[0], m->place[1], m->place[2]);
     if (m->weight != 1) fprintf(file.stream, " weight=\"%.17g\"", m->weight);
     fputs("/>\n", file.stream);

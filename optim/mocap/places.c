@@ -70,9 +70,7 @@ static void couple(const search *s, int f, double *B) {
       s->S[(size_t)(3 * k + c) * (size_t)n + (size_t)(3 * k + c)] += marker->weight;
       s->r[3 * k + c] += marker->weight * local[c];
     }
-    int link = m->body[marker->body].link;
-    while (link > 0 && m->link[link].ndof == 0) link = m->link[link].parent;
-    for (int d = link > 0 ? m->link[link].dof + m->link[link].ndof - 1 : -1; d >= 0; d = m->dof[d].parent) {
+    for (int d = cav_fit_last_dof(m, marker->body); d >= 0; d = m->dof[d].parent) {
       cav_fit_column(fit, d, x, column);
       rotate_back(local, pose.rotation, column);
       for (int c = 0; c < 3; c++) B[(size_t)(3 * k + c) * (size_t)nv + (size_t)d] = marker->weight * local[c];

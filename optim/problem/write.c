@@ -15,27 +15,7 @@
 // text inside an attribute
 static void write_text(FILE *out, const char *name, const char *text) {
   fprintf(out, " %s=\"", name);
-  for (; *text; text++) {
-    switch (*text) {
-      case '<':
-        fputs("&lt;", out);
-        break;
-      case '>':
-        fputs("&gt;", out);
-        break;
-      case '&':
-        fputs("&amp;", out);
-        break;
-      case '"':
-        fputs("&quot;", out);
-        break;
-      default:
-        if ((unsigned char)*text < ' ')
-          fprintf(out, "&#%d;", *text);
-        else
-          fputc(*text, out);
-    }
-  }
+  cav_file_write_xml(out, text);
   fputc('"', out);
 }
 

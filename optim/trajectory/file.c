@@ -114,3 +114,27 @@ void cav_file_abandon(cav_file *file) {
   unlink(file->temporary);
   release(file);
 }
+
+void cav_file_write_xml(FILE *out, const char *text) {
+  for (; *text; text++) {
+    switch (*text) {
+      case '<':
+        fputs("&lt;", out);
+        break;
+      case '>':
+        fputs("&gt;", out);
+        break;
+      case '&':
+        fputs("&amp;", out);
+        break;
+      case '"':
+        fputs("&quot;", out);
+        break;
+      default:
+        if ((unsigned char)*text < ' ')
+          fprintf(out, "&#%d;", *text);
+        else
+          fputc(*text, out);
+    }
+  }
+}

@@ -31,6 +31,9 @@ cav_status cav_file_fail(cav_error *error, cav_status status, int line, const ch
 /// strtod with a point, whatever the locale; 0 and *end = text if memory runs out.
 double cav_file_number(const char *text, char **end);
 
+/// Writes a text such that it stands as it is between the quotes of an XML attribute.
+void cav_file_write_xml(FILE *out, const char *text);
+
 /// base's folder joined with path, or path alone if it is absolute or base has no folder; NULL if memory runs out.
 char *cav_file_beside(const char *base, const char *path);
 

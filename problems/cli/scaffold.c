@@ -138,19 +138,6 @@ void cav_scaffold_list(FILE *out, const cav_scaffold *s) {
 
 // ---------------------------------------------------------------- the wish
 
-static void put_text(FILE *out, const char *text) {
-  for (; *text; text++) {
-    if (*text == '&')
-      fputs("&amp;", out);
-    else if (*text == '<')
-      fputs("&lt;", out);
-    else if (*text == '"')
-      fputs("&quot;", out);
-    else
-      fputc(*text, out);
-  }
-}
-
 static void begin(FILE *out, cav_scaffold *s, const char *task) {
   s->task = task;
   fprintf(out, "<!-- %s, for ", task);
@@ -162,9 +149,9 @@ static void begin(FILE *out, cav_scaffold *s, const char *task) {
       out);
   cav_scaffold_list(out, s);
   fputs("-->\n<problem name=\"", out);
-  put_text(out, s->name);
+  cav_file_write_xml(out, s->name);
   fputs("\" model=\"", out);
-  put_text(out, s->path);
+  cav_file_write_xml(out, s->path);
   fprintf(out, "\"%s>\n", s->floating ? " floating=\"true\"" : "");
 }
 
@@ -186,7 +173,7 @@ static void write_start(FILE *out, const cav_scaffold *s) {
   if (s->stands)
     fputs(" key=\"stand\"", out);
   else if (key)
-    fputs(" key=\"", out), put_text(out, s->model->key[0].name), fputc('"', out);
+    fputs(" key=\"", out), cav_file_write_xml(out, s->model->key[0].name), fputc('"', out);
   else if (s->start != CAV_SCAFFOLD_PLAIN)
     fputs(" ranges=\"clip\"", out);
   fputs(lowered ? " height=\"floor\"/>\n" : "/>\n", out);
@@ -273,13 +260,13 @@ static int write_turn(FILE *out, cav_scaffold *s) {
   write_start(out, s);
   fprintf(out, "  <goal%s>\n", s->start == CAV_SCAFFOLD_PLAIN ? "" : " ranges=\"clip\"");
   fputs("    <joint name=\"", out);
-  put_text(out, joint->name);
+  cav_file_write_xml(out, joint->name);
   fprintf(out, "\" %s=\"%.4g\"/>\n  </goal>\n\n  <cost>\n", turns ? "degrees" : "pos",
           (turns ? degrees : 1) * (q + by));
   fputs("    <!-- at the end that joint is at the goal, and at rest -->\n    <posture name=\"goal\" joint=\"", out);
-  put_text(out, joint->name);
+  cav_file_write_xml(out, joint->name);
   fputs("\" at=\"end\" weight=\"900\"/>\n    <velocity name=\"final rest\" joint=\"", out);
-  put_text(out, joint->name);
+  cav_file_write_xml(out, joint->name);
   fputs("\" at=\"end\" weight=\"100\"/>\n  </cost>\n</problem>\n", out);
   return 1;
 }

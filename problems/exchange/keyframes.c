@@ -101,19 +101,6 @@ static char *find_model(const cav_problem *p, const char *path, cav_error *error
   return seen;
 }
 
-static void write_path(FILE *out, const char *path) {
-  for (; *path; path++) {
-    if (*path == '&')
-      fputs("&amp;", out);
-    else if (*path == '"')
-      fputs("&quot;", out);
-    else if (*path == '<')
-      fputs("&lt;", out);
-    else
-      fputc(*path, out);
-  }
-}
-
 // an attribute of numbers, written once it has one
 typedef struct list {
   FILE *out;
@@ -193,7 +180,7 @@ cav_status cav_exchange_write_keyframes(const cav_recording *r, const char *path
         "<!-- A motion of cavort as keyframes 'motion 0' to 'motion %d', %.6g s apart. qvel leads to a keyframe from\n"
         "     the one before; ctrl holds until the next one. -->\n<mujoco>\n  <include file=\"",
         r->n - 1, r->timestep);
-    write_path(file.stream, model);
+    cav_file_write_xml(file.stream, model);
     fputs("\"/>\n  <keyframe>\n", file.stream);
     for (int i = 0; i < r->n; i++) write_key(file.stream, r, &o, i);
     fputs("  </keyframe>\n</mujoco>\n", file.stream);

@@ -4,6 +4,7 @@
 #include <assert.h>
 #include <string.h>
 
+#include "file.h"
 #include "manual.h"
 #include "problem_file.h"
 
@@ -28,27 +29,14 @@ static void collect(element_list *list, const cav_xml_element *element) {
   for (int i = 0; element->child && element->child[i]; i++) collect(list, element->child[i]);
 }
 
-static void print_escaped(FILE *out, const char *text) {
-  for (; *text; text++) {
-    if (*text == '<')
-      fputs("&lt;", out);
-    else if (*text == '&')
-      fputs("&amp;", out);
-    else if (*text == '"')
-      fputs("&quot;", out);
-    else
-      fputc(*text, out);
-  }
-}
-
 static void print_text(FILE *out, const char *indent, const char *text, const cav_xml_note *note) {
   if (!text) return;
   fprintf(out, "%s<xs:annotation><xs:documentation>", indent);
-  print_escaped(out, text);
+  cav_file_write_xml(out, text);
   if (note && *note->unit) fprintf(out, " [%s]", note->unit);
   if (note && note->fallback) {
     fprintf(out, "; without it: ");
-    print_escaped(out, note->fallback);
+    cav_file_write_xml(out, note->fallback);
   }
   fprintf(out, "</xs:documentation></xs:annotation>\n");
 }
