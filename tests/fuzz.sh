@@ -1,11 +1,11 @@
 #!/bin/sh
-# Runs the five fuzzers of the readers, two at a time, and writes tests/results/fuzz.txt. Needs clang. Usage:
+# Runs the six fuzzers of the readers, two at a time, and writes tests/results/fuzz.txt. Needs clang. Usage:
 #   sh tests/fuzz.sh SECONDS          each for that long; what they find and their logs stay in build-fuzz/found
 #   sh tests/fuzz.sh table FOLDER     the table alone, from the logs in a folder (NAME.log, and NAME.*.log of further runs)
 set -eu
 cd "$(dirname "$0")/.."
 
-names="mjcf urdf stl obj problem"
+names="mjcf urdf stl obj clip problem"
 found=build-fuzz/found
 
 # what a fuzzer starts from beside its corpus: for problems those of the motions, and broken models
@@ -58,7 +58,7 @@ case "${1:-}" in
     for name in $names; do ninja -C build-fuzz "tests/fuzz_$name" >/dev/null; done
     rm -rf "$found"
     { fuzz mjcf "$1" && fuzz stl "$1" && fuzz problem "$1"; } &
-    fuzz urdf "$1" && fuzz obj "$1"
+    fuzz urdf "$1" && fuzz obj "$1" && fuzz clip "$1"
     wait
     table "$found" >tests/results/fuzz.txt
     ;;

@@ -199,6 +199,29 @@ static size_t make_c3d(unsigned char *file, int kind, int real) {
   return (size_t)(b - file);
 }
 
+// points without labels are called by their numbers; what a table cannot hold is left out of names
+static void test_names(void) {
+  cav_error error = {0};
+  unsigned char file[4096];
+  size_t size = make_c3d(file, INTEL, 1);
+  for (size_t i = 0; i + 6 < size; i++) {
+    if (!memcmp(file + i, "LHEE  ", 6)) memcpy(file + i, "\0x    ", 6);
+    if (!memcmp(file + i, "RHEE  ", 6)) memcpy(file + i, "a,\"\nb ", 6);
+  }
+  cav_record *r = cav_record_read(put("a.c3d", (const char *)file, size), NULL, &error);
+  CHECK(r && r->nmarker == 2 && !strcmp(r->name[0], "#1") && !strcmp(r->name[1], "a___b"));
+  CHECK(r && !cav_record_write(path_of("a.csv"), r, &error));
+  cav_record *again = cav_record_read(path_of("a.csv"), NULL, &error);
+  CHECK(again && again->nmarker == 2 && !strcmp(again->name[1], "a___b"));
+  cav_record_free(again);
+  if (r) r->name[0][0] = ',';
+  CHECK(r && cav_record_write(path_of("a.csv"), r, &error) == CAV_BAD_INPUT && strstr(error.text, "marker 1"));
+  cav_record_free(r);
+  // a marker of which no frame shows all three coordinates is not seen
+  r = cav_record_read(put_text("a.csv", "time,a_x,a_y,a_z\n0,1,,2\n"), NULL, &error);
+  CHECK(!r && strstr(error.text, "no frame shows a marker"));
+}
+
 static void test_c3d(void) {
   unsigned char file[4096];
   for (int kind = INTEL; kind <= MIPS; kind++)
@@ -531,6 +554,7 @@ int main(void) {
   test_bvh();
   test_keys();
   test_c3d();
+  test_names();
   test_errors();
   truth c = {0};
   make(&c);

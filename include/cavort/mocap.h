@@ -46,7 +46,8 @@ CAV_API cav_record *cav_record_read(const char *path, const cav_record_options *
 CAV_API cav_record *cav_record_new(int nframe, int nmarker, double rate);
 CAV_API void cav_record_free(cav_record *record);
 
-/// Writes a clip as CSV, as cav_record_read reads it. Replaces the file atomically.
+/// Writes a clip as CSV, as cav_record_read reads it. Replaces the file atomically. CAV_BAD_INPUT: a name has a comma,
+/// a quote or a line end (of clips that were read none has: there they are '_').
 CAV_API cav_status cav_record_write(const char *path, const cav_record *record, cav_error *error);
 
 /// One marker on a body.

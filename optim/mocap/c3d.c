@@ -123,6 +123,7 @@ static cav_status read_header(c3d *c) {
   return status ? status : read_parameters(c, at, end, 0);
 }
 
+// a new text; "" of points without a label
 static char *label(const c3d *c, int point) {
   for (int i = 0; i < c->nlabels; i++) {
     if (point >= c->count[i]) {
@@ -130,28 +131,16 @@ static char *label(const c3d *c, int point) {
       continue;
     }
     const unsigned char *from = c->labels[i] + (size_t)point * (size_t)c->width[i];
-    int n = c->width[i];
-    while (n && (from[n - 1] == ' ' || !from[n - 1])) n--;
-    return n ? strndup((const char *)from, (size_t)n) : NULL;
+    size_t n = strnlen((const char *)from, (size_t)c->width[i]);
+    while (n && from[n - 1] == ' ') n--;
+    return strndup((const char *)from, n);
   }
-  return NULL;
+  return strdup("");
 }
 
 static cav_status name_points(const c3d *c, cav_record *r) {
-  for (int i = 0; i < c->npoint; i++) {
-    char *name = label(c, i);
-    // points without a label have a number
-    if (!name && (name = malloc(16))) {
-      int digits = i + 1, n = 0;
-      char text[12];
-      do text[n++] = (char)('0' + digits % 10);
-      while (digits /= 10);
-      name[0] = '#';
-      for (int k = 0; k < n; k++) name[1 + k] = text[n - 1 - k];
-      name[1 + n] = 0;
-    }
-    if (!(r->name[i] = name)) return cav_clip_no_memory(c->text);
-  }
+  for (int i = 0; i < c->npoint; i++)
+    if (!(r->name[i] = label(c, i))) return cav_clip_no_memory(c->text);
   return CAV_OK;
 }
 

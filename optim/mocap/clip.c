@@ -152,9 +152,22 @@ static void turn(cav_record *r, double unit, char up) {
   }
 }
 
-// times increase, names differ, something is seen
+// what a table cannot hold becomes '_', as do blanks at the ends; a marker without a name is called by its number, #1 ...
+static cav_status clean_names(const cav_clip_text *text, cav_record *r) {
+  for (int i = 0; i < r->nmarker; i++) {
+    char *name = r->name[i], number[16];
+    for (char *c = name; c && *c; c++)
+      if ((unsigned char)*c < ' ' || *c == ',' || *c == '"' || (*c == ' ' && (c == name || !c[1]))) *c = '_';
+    if (name && *name) continue;
+    snprintf(number, sizeof number, "#%d", i + 1);
+    free(name);
+    if (!(r->name[i] = strdup(number))) return cav_clip_no_memory(text);
+  }
+  return CAV_OK;
+}
+
+// times increase, names differ
 static cav_status check(const cav_clip_text *text, const cav_record *r) {
-  int seen = 0;
   for (int t = 1; t < r->nframe; t++)
     if (!(r->time[t] > r->time[t - 1]))
       return cav_file_fail(text->error, CAV_BAD_INPUT, 0,
@@ -165,9 +178,14 @@ static cav_status check(const cav_clip_text *text, const cav_record *r) {
       if (!strcmp(r->name[i], r->name[j]))
         return cav_file_fail(text->error, CAV_BAD_INPUT, 0, "%s: marker '%s' is there twice; rename one of them",
                              text->path, r->name[i]);
-  for (size_t i = 0; i < (size_t)r->nframe * (size_t)r->nmarker; i++) seen |= isfinite(r->position[3 * i]);
-  if (!seen) return cav_file_fail(text->error, CAV_BAD_INPUT, 0, "%s: no frame shows a marker", text->path);
   return CAV_OK;
+}
+
+// some marker in some frame, once what is seen in part counts as not seen
+static int is_seen(const cav_record *r) {
+  int seen = 0;
+  for (size_t i = 0; i < (size_t)r->nframe * (size_t)r->nmarker; i++) seen |= isfinite(r->position[3 * i]);
+  return seen;
 }
 
 // frames outside of the window go
@@ -217,12 +235,16 @@ cav_record *cav_record_read(const char *path, const cav_record_options *options,
   cav_status status = cav_clip_open(&text, path, error);
   if (!status) status = formats[kind].read(&text, o, &clip, &unit);
   cav_record *r = clip.record;
+  if (!status) status = clean_names(&text, r);
   if (!status) status = check(&text, r);
   cav_clip_close(&text);
   if (!status) {
     if (unit == 0 && o->unit == 0) r->assumed |= CAV_ASSUMED_UNIT;
     if (!o->up && !formats[kind].says_up) r->assumed |= CAV_ASSUMED_UP;
     turn(r, o->unit > 0 ? o->unit : unit > 0 ? unit : formats[kind].unit, o->up ? o->up : formats[kind].up);
+    if (!is_seen(r)) status = cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: no frame shows a marker", path);
+  }
+  if (!status) {
     cut(r, o->from, o->to);
     if (r->nframe == 0)
       status = cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: no frame lies between %g and %g s", path, o->from, o->to);
@@ -235,14 +257,17 @@ cav_record *cav_record_read(const char *path, const cav_record_options *options,
 cav_status cav_record_write(const char *path, const cav_record *record, cav_error *error) {
   static const char axis[] = "xyz";
   cav_file file;
+  for (int i = 0; i < record->nmarker; i++)
+    for (const char *c = record->name[i]; *c; c++)
+      if ((unsigned char)*c < ' ' || *c == ',' || *c == '"')
+        return cav_file_fail(error, CAV_BAD_INPUT, 0, "marker %d: a name in a table has no comma, quote or line end",
+                             i + 1);
   cav_status status = cav_file_begin(&file, path, error);
   if (status) return status;
   fputs("time", file.stream);
   for (int i = 0; i < 3 * record->nmarker; i++) {
-    char name[256];
-    snprintf(name, sizeof name, "%s_%c", record->name[i / 3], axis[i % 3]);
     fputc(',', file.stream);
-    cav_table_write_text(file.stream, name);
+    fprintf(file.stream, "%s_%c", record->name[i / 3], axis[i % 3]);
   }
   for (int t = 0; t < record->nframe; t++) {
     fputc('\n', file.stream);
