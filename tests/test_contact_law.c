@@ -35,7 +35,7 @@ static sample random_sample(int dim) {
 }
 
 static void law(const sample *s, double sigma, double *f, double *hessian, double *potential) {
-  cav_law_cone(s->dim, s->R, s->friction, sigma, s->g, f, hessian, potential);
+  cav_law_cone(s->dim, s->R, s->friction, sigma, 0, s->g, f, hessian, potential);
 }
 
 // f_n - |f_j/mu_j|: positive inside the cone
@@ -138,8 +138,8 @@ static void test_dimension_one(void) {
   for (double g = -2.0; g <= 2.0; g += 0.25)
     for (double sigma = 0.0; sigma < 1.0; sigma += 0.4) {
       double f, k, p, F, K, P;
-      cav_law_cone(1, &R, friction, sigma, &g, &f, &k, &p);
-      cav_law_unilateral(R, sigma, g, &F, &K, &P);
+      cav_law_cone(1, &R, friction, sigma, 0, &g, &f, &k, &p);
+      cav_law_unilateral(R, sigma, 0, g, &F, &K, &P);
       CHECK(f == F && k == K && p == P);
       if (sigma == 0.0) CHECK(f == fmax(0.0, g));
       // two roundings
@@ -314,9 +314,9 @@ static void test_scalars(void) {
     for (double bound = 1e-3; bound < 20.0; bound *= 3.0) {
       double f, whole, a, b;
       cav_law_bilateral(1.0, 0.5, bound, g, &f, NULL, NULL);
-      cav_law_unilateral(1.0, 0.5, g + bound, &a, NULL, NULL);
-      cav_law_unilateral(1.0, 0.5, g - bound, &b, NULL, NULL);
-      cav_law_unilateral(1.0, 0.5, g, &whole, NULL, NULL);
+      cav_law_unilateral(1.0, 0.5, 0, g + bound, &a, NULL, NULL);
+      cav_law_unilateral(1.0, 0.5, 0, g - bound, &b, NULL, NULL);
+      cav_law_unilateral(1.0, 0.5, 0, g, &whole, NULL, NULL);
       // rounding of numbers up to 20: seen 4e-15
       CHECK_NEAR(f, a - b - bound, 2e-14);
       CHECK_NEAR(whole, 0.5 * log(1.0 + exp(2.0 * g)), 1e-15);
@@ -340,13 +340,13 @@ static void test_extremes(void) {
             double f[3], H[9], psi, scalar, curvature;
             // with R mu^2 fixed the normal impulse is of the size of g_t/mu, which must be a number
             if (mu > 0.0 && fabs(g[1]) > 1e300 * (mu < 1.0 ? mu : 1.0)) continue;
-            cav_law_cone(3, R, friction, sigmas[k], g, f, H, &psi);
+            cav_law_cone(3, R, friction, sigmas[k], 0, g, f, H, &psi);
             for (int n = 0; n < 3; n++) CHECK(isfinite(f[n]));
             for (int n = 0; n < 9; n++) CHECK(isfinite(H[n]));
             CHECK(!isnan(psi) && psi >= 0.0);
             CHECK(fabs(f[1]) <= mu * f[0] * (1.0 + 1e-14) + 1e-322);
             if (mu == 0.0) CHECK(f[1] == 0.0 && f[2] == 0.0);
-            cav_law_unilateral(R[0], sigmas[k], g[0], &scalar, &curvature, &psi);
+            cav_law_unilateral(R[0], sigmas[k], 0, g[0], &scalar, &curvature, &psi);
             CHECK(isfinite(scalar) && isfinite(curvature) && !isnan(psi));
             cav_law_bilateral(R[0], sigmas[k], fabs(g[1]), g[0], &scalar, &curvature, &psi);
             CHECK(isfinite(scalar) && isfinite(curvature) && !isnan(psi) && fabs(scalar) <= fabs(g[1]) * (1.0 + 1e-15));
@@ -357,13 +357,96 @@ static void test_extremes(void) {
     for (int row = 0; row < 3; row++) {
       double g[3] = {1.0, 0.5, 0.5}, f[3], scalar;
       g[row] = NAN;
-      cav_law_cone(3, R, friction, k, g, f, NULL, NULL);
+      cav_law_cone(3, R, friction, k, 0, g, f, NULL, NULL);
       CHECK(isnan(f[0]) || isnan(f[1]) || isnan(f[2]));
-      cav_law_unilateral(1.0, k, NAN, &scalar, NULL, NULL);
+      cav_law_unilateral(1.0, k, 0, NAN, &scalar, NULL, NULL);
       CHECK(isnan(scalar));
       cav_law_bilateral(1.0, k, 1.0, NAN, &scalar, NULL, NULL);
       CHECK(isnan(scalar));
     }
+}
+
+// z of the law that ends, in units of sigma, and its derivative
+static double ending(double x, double *derivative, double *area) {
+  double f, H, psi;
+  cav_law_unilateral(1.0, 1.0, 1, x, &f, &H, &psi);
+  if (derivative) *derivative = H;
+  if (area) *area = psi;
+  return f;
+}
+
+// the law that ends: nothing below -12 sigma, the other one from -9 sigma up, convex and with two derivatives between
+static void test_end(void) {
+  double worst = 0.0, before = 0.0;
+  for (double x = -14.0; x < 3.0; x += 1e-3) {
+    double f, H, psi, F, K, P, up[2], down[2];
+    f = ending(x, &H, &psi);
+    cav_law_unilateral(1.0, 1.0, 0, x, &F, &K, &P);
+    if (x < -12.0) CHECK(f == 0.0 && H == 0.0 && psi == 0.0);
+    if (x > -9.0) CHECK(f == F && H == K && psi < P);
+    CHECK(fabs(f - F) < 2.0 * exp(-12.0) && H >= before);
+    before = H;
+    // centred differences: truncation 1e-8 of what z is there, rounding 1e-16/1e-4 of a potential that may be 7
+    for (int side = 0; side < 2; side++) up[side] = ending(x + (side ? 1e-4 : -1e-4), &down[side], &P);
+    CHECK_NEAR((up[1] - up[0]) / 2e-4, H, 1e-8);
+    // one derivative more, which does not jump at the ends either: a jump would be of the size of exp(-9)
+    if (x < -8.0) worst = fmax(worst, fabs((down[1] - down[0]) / 1e-4 - (ending(x + 2e-4, &F, NULL), F - H) / 1e-4));
+  }
+  CHECK(worst < 1e-7);
+  // its potential has it for a gradient
+  for (double x = -12.5; x < -8.0; x += 1e-2) {
+    double high, low, f = ending(x, NULL, NULL);
+    ending(x + 1e-4, NULL, &high);
+    ending(x - 1e-4, NULL, &low);
+    CHECK_NEAR((high - low) / 2e-4, f, 1e-11);
+  }
+}
+
+// the cone of the law that ends from its two eigenvalues, straight from the definition; and its derivatives, where they are near
+// each other too
+static void test_end_of_the_cone(void) {
+  double worst = 0.0, worst_H = 0.0;
+  int tails = 0;
+  for (int trial = 0; trial < 4000; trial++) {
+    sample s = random_sample(trial % 2 ? 3 : 6);
+    const double rho = s.R[1] * s.friction[0] * s.friction[0], tangent = sqrt(rho / s.R[0]), root = sqrt(s.R[0]);
+    const double sigma = 0.1 * root, near = trial % 3 ? 1.0 : 1e-4;
+    // the normal's argument from -16 to -6, friction of a few sigma or hardly any
+    s.g[0] = -sigma / root * (6.0 + 10.0 * uniform());
+    for (int j = 1; j < s.dim; j++) s.g[j] *= near * sigma / root / tangent;
+    double square = 0.0, f[DIM_MAX], H[DIM_MAX * DIM_MAX], side[2][DIM_MAX];
+    for (int j = 1; j < s.dim; j++) square += pow(s.g[j] / s.friction[j - 1], 2);
+    const double length = sqrt(rho * square), cos2 = 1.0 / (1.0 + tangent * tangent);
+    const double low = ending((root * s.g[0] - length / tangent) / sigma, NULL, NULL),
+                 high = ending((root * s.g[0] + length * tangent) / sigma, NULL, NULL);
+    cav_law_cone(s.dim, s.R, s.friction, sigma, 1, s.g, f, H, NULL);
+    CHECK_NEAR(f[0], sigma / root * ((1.0 - cos2) * low + cos2 * high), 1e-15 * sigma / root);
+    // without the cancellation that this has where they are near
+    for (int j = 1; j < s.dim; j++) {
+      const double expected = sigma * tangent * cos2 * (high - low) / length * s.g[j];
+      worst = fmax(worst, fabs(f[j] - expected) * sqrt(s.R[j]) / sigma);
+    }
+    CHECK(inner(&s, f) >= -1e-14 * (f[0] + 1e-6 * sigma / root));
+    tails += high > 0.0 && low == 0.0;
+    for (int j = 0; j < s.dim; j++) {
+      const double step = 1e-6 * sigma / sqrt(s.R[j]);
+      for (int up = 0; up < 2; up++) {
+        sample moved = s;
+        moved.g[j] += up ? step : -step;
+        cav_law_cone(s.dim, s.R, s.friction, sigma, 1, moved.g, side[up], NULL, NULL);
+      }
+      for (int i = 0; i < s.dim; i++) {
+        const double derivative = (side[1][i] - side[0][i]) / (2.0 * step * s.R[j]);
+        worst_H = fmax(worst_H, fabs(derivative - H[i * s.dim + j]) * sqrt(s.R[i] * s.R[j]));
+      }
+    }
+  }
+  printf("cone of the law that ends: against its eigenvalues %.1e, derivatives against differences %.1e\n", worst,
+         worst_H);
+  CHECK(tails > 100);
+  // rounding; the law has a bend of its curvature at zero slip, thus 1e-6 of that
+  CHECK(worst < 1e-15);
+  CHECK(worst_H < 1e-8);
 }
 
 // a turret on a floor: its hinge cannot move it along the contact's normal, so its inverse weight there is rounding. Across
@@ -394,6 +477,8 @@ static void test_turret(void) {
 }
 
 int main(void) {
+  test_end();
+  test_end_of_the_cone();
   test_turret();
   test_exact_is_the_projection();
   test_dimension_one();

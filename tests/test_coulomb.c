@@ -50,7 +50,7 @@ static void test_conditions(void) {
   for (int k = 0; k < CASES; k++) {
     const sample s = draw(k);
     double f[DIM_MAX], again[DIM_MAX], lowered[DIM_MAX];
-    cav_law_coulomb(s.dim, s.R, s.friction, 0, NULL, s.g, f, NULL, NULL);
+    cav_law_coulomb(s.dim, s.R, s.friction, 0, 0, NULL, s.g, f, NULL, NULL);
     const double w = s.R[0] * (f[0] - s.g[0]), size = fabs(s.g[0]) + fabs(f[0]);
     const tangent t = measure(&s, f);
     CHECK(f[0] >= 0 && w >= 0 && f[0] * w <= 1e-15 * s.R[0] * size * size);
@@ -60,7 +60,7 @@ static void test_conditions(void) {
     // de Saxce: the convex law with v*_n lowered by |mu w_t|
     memcpy(lowered, s.g, sizeof lowered);
     lowered[0] -= t.slip / s.R[0];
-    cav_law_cone(s.dim, s.R, s.friction, 0, lowered, again, NULL, NULL);
+    cav_law_cone(s.dim, s.R, s.friction, 0, 0, lowered, again, NULL, NULL);
     CHECK_NEAR_ALL(again, f, s.dim, 1e-12 * (size + t.slip / s.R[0]));
   }
   printf("conditions: %d open, %d sliding, %d sticking\n", kind[0], kind[1], kind[2]);
@@ -76,13 +76,13 @@ static void test_derivatives(void) {
     for (int held = 0; held < 2; held++) {
       double f[DIM_MAX], H[DIM_MAX * DIM_MAX], psi, side[2][DIM_MAX], level[2];
       const double *given = held ? &bound : NULL;
-      cav_law_coulomb(s.dim, s.R, s.friction, sigma, given, s.g, f, H, held ? &psi : NULL);
+      cav_law_coulomb(s.dim, s.R, s.friction, sigma, 0, given, s.g, f, H, held ? &psi : NULL);
       for (int j = 0; j < s.dim; j++) {
         const double step = 1e-5 * fmax(fabs(s.g[j]), sigma / sqrt(s.R[j]));
         for (int up = 0; up < 2; up++) {
           sample moved = s;
           moved.g[j] += up ? step : -step;
-          cav_law_coulomb(s.dim, s.R, s.friction, sigma, given, moved.g, side[up], NULL, held ? &level[up] : NULL);
+          cav_law_coulomb(s.dim, s.R, s.friction, sigma, 0, given, moved.g, side[up], NULL, held ? &level[up] : NULL);
         }
         // g falls by dv_next/R
         for (int i = 0; i < s.dim; i++) {
@@ -110,9 +110,9 @@ static void test_limits(void) {
     const sample s = draw(k);
     double exact[DIM_MAX], f[DIM_MAX], H[DIM_MAX * DIM_MAX], size = 0;
     for (int i = 0; i < s.dim; i++) size = fmax(size, fabs(s.g[i]) * sqrt(s.R[i]));
-    cav_law_coulomb(s.dim, s.R, s.friction, 0, NULL, s.g, exact, NULL, NULL);
+    cav_law_coulomb(s.dim, s.R, s.friction, 0, 0, NULL, s.g, exact, NULL, NULL);
     for (double sigma = 1; sigma > 1e-300; sigma *= 1e-3) {
-      cav_law_coulomb(s.dim, s.R, s.friction, sigma, NULL, s.g, f, H, NULL);
+      cav_law_coulomb(s.dim, s.R, s.friction, sigma, 0, NULL, s.g, f, H, NULL);
       const tangent t = measure(&s, f);
       // squares below that vanish
       CHECK(t.force <= f[0] * (1 + 1e-13) || f[0] < 1e-100);
@@ -127,16 +127,16 @@ static void test_limits(void) {
   // far below contact and slow: both laws have friction f_n w R_n/(rho K-scale), equal to first order in the slip
   const double R[3] = {0.5, 0.5, 0.5}, mu[2] = {0.7, 0.7}, g[3] = {-20, 1e-4, 0};
   double convex[3], coulomb[3];
-  cav_law_cone(3, R, mu, 1.0, g, convex, NULL, NULL);
-  cav_law_coulomb(3, R, mu, 1.0, NULL, g, coulomb, NULL, NULL);
+  cav_law_cone(3, R, mu, 1.0, 0, g, convex, NULL, NULL);
+  cav_law_coulomb(3, R, mu, 1.0, 0, NULL, g, coulomb, NULL, NULL);
   CHECK_NEAR(coulomb[0] / convex[0], 1, 1e-4);
   CHECK_NEAR(coulomb[1] / convex[1], 1, 1e-4);
   const double nothing[3] = {1, NAN, 0}, still[3] = {2, 0, 0}, huge[3] = {1e200, 1e200, -3e200};
-  cav_law_coulomb(3, R, mu, 0, NULL, nothing, coulomb, NULL, NULL);
+  cav_law_coulomb(3, R, mu, 0, 0, NULL, nothing, coulomb, NULL, NULL);
   CHECK(isnan(coulomb[1]));
-  cav_law_coulomb(3, R, mu, 0.1, NULL, still, coulomb, NULL, NULL);
+  cav_law_coulomb(3, R, mu, 0.1, 0, NULL, still, coulomb, NULL, NULL);
   CHECK(coulomb[1] == 0 && coulomb[2] == 0 && coulomb[0] > 2);
-  cav_law_coulomb(3, R, mu, 0, NULL, huge, coulomb, NULL, NULL);
+  cav_law_coulomb(3, R, mu, 0, 0, NULL, huge, coulomb, NULL, NULL);
   CHECK_NEAR(hypot(coulomb[1], coulomb[2]) / (0.7 * coulomb[0]), 1, 1e-14);
 }
 

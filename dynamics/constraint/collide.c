@@ -3,7 +3,7 @@
 /// for it, once per call, and that of a geom fixed to the world once for all. Pairs with
 /// what stands in the world out of reach are left out by trees and blocks (fixed.c); where CAV_SWEEP_FROM pairs and more are left
 /// they are pruned along an axis (sweep.c); bench_sweep measures where that begins to pay. Where v and v_next are known
-/// pairs with a mesh are sought only as far as something may push at them.
+/// pairs with a mesh are sought only as far as something pushes at them.
 #include <assert.h>
 #include <stdlib.h>
 
@@ -284,10 +284,10 @@ static double speed_between(const cav_state *state, const double *velocity, int 
 }
 
 // the distance below which a contact bears anything at v and v_next, or what the margin is: under the discrete law
-// v* - v_next, friction included, is what both velocities make up, less h K times the gap; the smoothed law trails off
-// below that by exp(-gap/delta)
+// v* - v_next, friction included, is what both velocities make up, less h K times the gap; the smoothed law of such pairs ends
+// CAV_LAW_END delta below that
 static double reach(const cav_model *model, const cav_state *state, int p, double margin) {
-  static const double TAIL = 25, SLACK = 0.05; // exp(-25) = 1e-11; m/s, for velocities a little off those
+  static const double SLACK = 0.05; // m/s, for velocities a little off those
   const struct cav_geom_cache *cache = state->work->geom;
   const cav_workspace *w = state->work;
   const candidate *c = cache->candidate + p;
@@ -305,7 +305,7 @@ static double reach(const cav_model *model, const cav_state *state, int p, doubl
   most += roll * (kept * turn[0] + turn[1]);
   double delta =
       state->options.smoothing > 0 ? c->external ? state->options.smoothing : state->options.smoothing_self : 0;
-  double far = c->margin + most / w->discrete_stiffness + TAIL * delta;
+  double far = c->margin + most / w->discrete_stiffness + CAV_LAW_END * delta;
   return far < margin ? far : margin;
 }
 

@@ -73,16 +73,26 @@ double cav_limit_activation(const cav_state *state, double margin);
 double cav_row_velocity(const cav_state *state, const cav_row *row, const double *v);
 void cav_row_push_force(const cav_state *state, const cav_row *row, double force, double *u);
 
-/// Impulse of an elliptic contact from g = R^-1 (v* - v_next) [dim]; R [dim], sigma 0: exact law, else smoothed.
-/// Writes f [dim]. Eqs. (19)-(22) and METHOD.md, 3. hessian, if not NULL, gets -df/dv_next [dim*dim], symmetric, psd.
-/// potential, if not NULL, gets Psi, the convex function of v_next whose gradient is -f. contact_law.c.
-void cav_law_cone(int dim, const double *R, const double *friction, double sigma, const double *g, double *f,
+/// Scales of smoothing below contact from which on a smoothed law that ends bears nothing at all. Whether a contact's ends:
+/// with a mesh it does, as those are expensive to find; others trail off.
+#define CAV_LAW_END 12.0
+static inline int cav_contact_ends(const cav_state *state, const cav_contact *contact) {
+  const cav_pair *pair = &state->model->pair[contact->pair];
+  const cav_geom *geom = state->model->geom;
+  return geom[pair->geom1].type == CAV_GEOM_MESH || geom[pair->geom2].type == CAV_GEOM_MESH;
+}
+
+/// Impulse of an elliptic contact from g = R^-1 (v* - v_next) [dim]; R [dim], sigma 0: exact law, else smoothed; ends: the
+/// smoothed law is zero from CAV_LAW_END sigma on. Writes f [dim]. Eqs. (19)-(22) and METHOD.md, 3. hessian, if not NULL,
+/// gets -df/dv_next [dim*dim], symmetric, psd. potential, if not NULL, gets Psi, the convex function of v_next whose
+/// gradient is -f. contact_law.c.
+void cav_law_cone(int dim, const double *R, const double *friction, double sigma, int ends, const double *g, double *f,
                   double *hessian, double *potential);
 
 /// Impulse of a contact by Coulomb's law, in the same words. hessian is not symmetric. With held, not NULL, the bound
 /// of friction is mu times that normal impulse instead of the contact's own: hessian is symmetric, psd, and there is a
 /// potential (without held: NULL). coulomb.c.
-void cav_law_coulomb(int dim, const double *R, const double *friction, double sigma, const double *held,
+void cav_law_coulomb(int dim, const double *R, const double *friction, double sigma, int ends, const double *held,
                      const double *g, double *f, double *hessian, double *potential);
 
 /// By the law that the state's options choose; hessian may be NULL. coulomb.c.
@@ -131,7 +141,7 @@ static inline double cav_contact_excess(const cav_state *state, const cav_contac
 }
 
 /// The same for one-sided rows (limits) and two-sided ones (friction loss, |f| <= bound).
-void cav_law_unilateral(double R, double sigma, double g, double *f, double *hessian, double *potential);
+void cav_law_unilateral(double R, double sigma, int ends, double g, double *f, double *hessian, double *potential);
 void cav_law_bilateral(double R, double sigma, double bound, double g, double *f, double *hessian, double *potential);
 
 /// Rates by the distance to the constraint (dist - margin) of ln R and of ln hK of a row or contact's normal whose

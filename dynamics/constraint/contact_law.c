@@ -7,15 +7,22 @@
 ///   F_t = s G_t,  s = (z(l2) - z(l1))/(l2 - l1),  potential = sin^2 Z(l1) + cos^2 Z(l2),  Z' = z.
 ///
 /// z = max(0, x) gives the exact law, z = sigma log(1 + exp(x/sigma)) the smoothed one. Everything smoothed is the
-/// exact law plus a bounded correction in exp(-|x|/sigma), so nothing overflows and sigma -> 0 loses no digit. Rows
-/// with zero friction carry no impulse. sigma is in units of G for every kind of constraint. Computes no v* and no R:
-/// limits.c.
+/// exact law plus a bounded correction in exp(-|x|/sigma), so nothing overflows and sigma -> 0 loses no digit. Where it
+/// shall end, so that what is far need not be sought, z is zero below -12 sigma: from -9 sigma down it is a polynomial of
+/// fifth degree that meets both ends with two derivatives, convex as all of z is. Rows with zero friction carry no
+/// impulse. sigma is in units of G for every kind of constraint. Computes no v* and no R: limits.c.
 #include <float.h>
 #include <math.h>
 
 #include "constraint.h"
 
 enum { DIM_MAX = CAV_IMPULSE_DIM };
+// the tail of a law that ends: from END up over WIDTH, both in units of sigma
+static const double END = -CAV_LAW_END, WIDTH = 3;
+// of t = (x - END)/WIDTH: coefficients of t^3, t^4, t^5, so that at t = 1 it is log(1 + exp(-9)) with two derivatives; derivative
+// of that; what the tail of exp lacks in area
+static const double TAIL[3] = {3.0849405933962749e-4, -3.7016089802165609e-4, 1.8506902840528742e-4};
+static const double TAIL_DERIVATIVE = 1.2339457598623173e-4, AREA_LOST = 2.1597476906194739e-5;
 
 /// Smoothed positive part at x = lambda/sigma, in pieces.
 typedef struct smooth {
@@ -44,13 +51,39 @@ static double dilogarithm(double y) {
   return u + u2 * (0.25 + u * series);
 }
 
+static double clamp_fraction(double t) { return t > 0.0 ? (t < 1.0 ? t : 1.0) : 0.0; }
+
+// the tail of a law that ends
+static smooth ending(double x) {
+  const double t = clamp_fraction((x - END) / WIDTH), t2 = t * t, t3 = t2 * t, *a = TAIL;
+  return (smooth){t3 * (a[0] + t * (a[1] + t * a[2])), t2 * (3.0 * a[0] + t * (4.0 * a[1] + t * 5.0 * a[2])) / WIDTH,
+                  WIDTH * t2 * t2 * (a[0] / 4.0 + t * (a[1] / 5.0 + t * a[2] / 6.0))};
+}
+
+// mean of its derivative from x over a width, without cancellation: beyond the tail that of the logistic function
+static double ending_derivative(double x, double width) {
+  const double t = clamp_fraction((x - END) / WIDTH), top = clamp_fraction((x + width - END) / WIDTH);
+  double difference = 0.0, powers = top * top + top * t + t * t, power = t * t * t;
+  // (top^k - t^k)/(top - t)
+  for (int k = 0; k < 3; k++) {
+    difference += TAIL[k] * powers;
+    powers = powers * top + power;
+    power *= t;
+  }
+  const double beyond = x + width - END - WIDTH;
+  if (t == top && !(beyond > 0.0)) return difference / WIDTH;
+  difference *= top - t;
+  return (difference + (beyond > 0.0 ? log1p(TAIL_DERIVATIVE * expm1(beyond)) : 0.0)) / width;
+}
+
 // area is filled on request only: it is the costly piece.
-static smooth smooth_positive(double x, int area) {
+static smooth smooth_positive(double x, int ends, int area) {
+  if (ends && x < END + WIDTH) return ending(x);
   const double tail = exp(-fabs(x));
   smooth s = {log1p(tail), (x > 0.0 ? 1.0 : tail) / (1.0 + tail), 0.0};
   if (area) {
     const double integral = dilogarithm(tail);
-    s.area = x > 0.0 ? M_PI * M_PI / 6.0 - integral : integral;
+    s.area = (x > 0.0 ? M_PI * M_PI / 6.0 - integral : integral) - (ends ? AREA_LOST : 0.0);
   }
   return s;
 }
@@ -75,14 +108,18 @@ static spectrum exact_cone(double normal, double length, double tangent) {
 }
 
 // adds what smoothing by sigma changes.
-static void soften_cone(spectrum *s, double normal, double length, double tangent, double sigma, int potential) {
+static void soften_cone(spectrum *s, double normal, double length, double tangent, double sigma, int ends,
+                        int potential) {
   const double cos2 = 1.0 / (1.0 + tangent * tangent), sin2 = tangent * tangent * cos2;
   const double width = length / sigma * (tangent + 1.0 / tangent);
-  const smooth low = smooth_positive((normal - length / tangent) / sigma, potential);
-  const smooth high = smooth_positive((normal + length * tangent) / sigma, potential);
+  const double lower = (normal - length / tangent) / sigma;
+  const smooth low = smooth_positive(lower, ends, potential);
+  const smooth high = smooth_positive((normal + length * tangent) / sigma, ends, potential);
   s->normal += sigma * (sin2 * low.excess + cos2 * high.excess);
   // mean of the logistic derivative between the two eigenvalues; the first form has no cancellation when they are near
-  if (width < 1.0)
+  if (width < 1.0 && ends && lower < END + WIDTH)
+    s->ratio = ending_derivative(lower, width);
+  else if (width < 1.0)
     s->ratio = width > 0.0 ? log1p(low.derivative * expm1(width)) / width : low.derivative;
   else
     s->ratio += (high.excess - low.excess) / width;
@@ -114,8 +151,8 @@ static double friction_regulariser(int dim, const double *R, const double *frict
 }
 
 // the law for g of ordinary size.
-static void ordinary_cone(int dim, const double *R, const double *friction, double sigma, const double *g, double *f,
-                          double *hessian, double *potential) {
+static void ordinary_cone(int dim, const double *R, const double *friction, double sigma, int ends, const double *g,
+                          double *f, double *hessian, double *potential) {
   // friction coordinates g_j/mu_j, their length and direction
   double direction[DIM_MAX - 1], square = 0.0;
   for (int j = 1; j < dim; j++) {
@@ -127,7 +164,7 @@ static void ordinary_cone(int dim, const double *R, const double *friction, doub
   // without friction the cone is a ray and only the normal matters
   if (!(tangent > 0.0)) {
     double curvature = 0.0;
-    cav_law_unilateral(R[0], sigma, g[0], f, hessian ? &curvature : NULL, potential);
+    cav_law_unilateral(R[0], sigma, ends, g[0], f, hessian ? &curvature : NULL, potential);
     for (int j = 1; j < dim; j++) f[j] = 0.0;
     if (hessian) {
       for (int i = 0; i < dim * dim; i++) hessian[i] = 0.0;
@@ -137,7 +174,7 @@ static void ordinary_cone(int dim, const double *R, const double *friction, doub
   }
   spectrum s = exact_cone(root * g[0], length, tangent);
   const int inside = s.nn == 1.0 && s.tt == 1.0;
-  if (sigma > 0.0) soften_cone(&s, root * g[0], length, tangent, sigma, potential != NULL);
+  if (sigma > 0.0) soften_cone(&s, root * g[0], length, tangent, sigma, ends, potential != NULL);
   // inside, the exact law returns g to the last bit
   f[0] = inside && !(sigma > 0.0) ? g[0] : s.normal / root;
   for (int j = 1; j < dim; j++) f[j] = friction[j - 1] > 0.0 ? s.ratio * g[j] : 0.0;
@@ -147,10 +184,10 @@ static void ordinary_cone(int dim, const double *R, const double *friction, doub
   fill_hessian(dim, R[0], rho, friction, direction, &s, hessian);
 }
 
-void cav_law_cone(int dim, const double *R, const double *friction, double sigma, const double *g, double *f,
+void cav_law_cone(int dim, const double *R, const double *friction, double sigma, int ends, const double *g, double *f,
                   double *hessian, double *potential) {
   if (dim == 1) {
-    cav_law_unilateral(R[0], sigma, g[0], f, hessian, potential);
+    cav_law_unilateral(R[0], sigma, ends, g[0], f, hessian, potential);
     return;
   }
   // the law is homogeneous in (g, sigma): numbers whose squares would overflow or vanish are brought near one
@@ -158,23 +195,23 @@ void cav_law_cone(int dim, const double *R, const double *friction, double sigma
   for (int i = 0; i < dim; i++) size = size > fabs(g[i]) ? size : fabs(g[i]);
   const double scale = sigma / sqrt(R[0]), with_sigma = size > scale ? size : scale;
   if ((size <= 1e100 && with_sigma >= 1e-100) || with_sigma == 0.0 || !(with_sigma <= DBL_MAX)) {
-    ordinary_cone(dim, R, friction, sigma, g, f, hessian, potential);
+    ordinary_cone(dim, R, friction, sigma, ends, g, f, hessian, potential);
     return;
   }
   const int exponent = ilogb(with_sigma);
   for (int i = 0; i < dim; i++) scaled[i] = scalbn(g[i], -exponent);
-  ordinary_cone(dim, R, friction, scalbn(sigma, -exponent), scaled, f, hessian, potential);
+  ordinary_cone(dim, R, friction, scalbn(sigma, -exponent), ends, scaled, f, hessian, potential);
   for (int i = 0; i < dim; i++) f[i] = scalbn(f[i], exponent);
   if (potential) *potential = scalbn(*potential, 2 * exponent);
 }
 
-void cav_law_unilateral(double R, double sigma, double g, double *f, double *hessian, double *potential) {
+void cav_law_unilateral(double R, double sigma, int ends, double g, double *f, double *hessian, double *potential) {
   const double root = sqrt(R), positive = g <= 0.0 ? 0.0 : g, G = root * positive;
   *f = positive;
   if (hessian) *hessian = g >= 0.0 ? 1.0 / R : 0.0;
   if (potential) *potential = 0.5 * G * G;
   if (!(sigma > 0.0)) return;
-  const smooth s = smooth_positive(root * g / sigma, potential != NULL);
+  const smooth s = smooth_positive(root * g / sigma, ends, potential != NULL);
   *f += sigma / root * s.excess;
   if (hessian) *hessian = s.derivative / R;
   if (potential) *potential += sigma * sigma * s.area;
@@ -186,8 +223,8 @@ void cav_law_bilateral(double R, double sigma, double bound, double g, double *f
   if (hessian) *hessian = size <= B ? 1.0 / R : 0.0;
   if (potential) *potential = size <= B ? 0.5 * G * G : B * (size - 0.5 * B);
   if (!(sigma > 0.0)) return;
-  const smooth low = smooth_positive((G + B) / sigma, potential != NULL);
-  const smooth high = smooth_positive((G - B) / sigma, potential != NULL);
+  const smooth low = smooth_positive((G + B) / sigma, 0, potential != NULL);
+  const smooth high = smooth_positive((G - B) / sigma, 0, potential != NULL);
   const double width = 2.0 * B / sigma;
   // log of a ratio of two hyperbolic cosines; the first form has no cancellation when they are near
   if (width < 1.0)

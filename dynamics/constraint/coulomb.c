@@ -69,15 +69,17 @@ static double friction_regulariser(int dim, const double *R, const double *frict
   return 0.0;
 }
 
-void cav_law_coulomb(int dim, const double *R, const double *friction, double sigma, const double *held,
+void cav_law_coulomb(int dim, const double *R, const double *friction, double sigma, int ends, const double *held,
                      const double *g, double *f, double *hessian, double *potential) {
   double h[DIM_MAX - 1] = {0.0}, curvature;
-  cav_law_unilateral(R[0], sigma, g[0], f, &curvature, potential);
+  cav_law_unilateral(R[0], sigma, ends, g[0], f, &curvature, potential);
   for (int i = 1; hessian && i < dim * dim; i++) hessian[i] = 0.0;
   for (int j = 1; j < dim; j++) f[j] = 0.0;
   if (hessian) hessian[0] = curvature;
   const double rho = friction_regulariser(dim, R, friction);
   if (!(rho > 0.0)) return;
+  // where the law has ended there is no friction to find
+  if (ends && !held && f[0] == 0.0) return;
 
   // friction coordinates
   for (int j = 1; j < dim; j++) h[j - 1] = friction[j - 1] > 0.0 ? g[j] / friction[j - 1] : 0.0;
@@ -99,8 +101,9 @@ void cav_law_coulomb(int dim, const double *R, const double *friction, double si
 }
 
 void cav_law_contact(const cav_state *state, const cav_contact *c, const double *g, double *f, double *hessian) {
+  const int ends = cav_contact_ends(state, c);
   if (state->options.sliding == CAV_SLIDING_COULOMB)
-    cav_law_coulomb(c->dim, c->regulariser, c->friction, c->sigma, NULL, g, f, hessian, NULL);
+    cav_law_coulomb(c->dim, c->regulariser, c->friction, c->sigma, ends, NULL, g, f, hessian, NULL);
   else
-    cav_law_cone(c->dim, c->regulariser, c->friction, c->sigma, g, f, hessian, NULL);
+    cav_law_cone(c->dim, c->regulariser, c->friction, c->sigma, ends, g, f, hessian, NULL);
 }

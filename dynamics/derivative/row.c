@@ -18,7 +18,7 @@ static row_derivative differentiate_row(const cav_derivative_task *t, const cav_
   }
   double gap = row->dist - row->margin;
   z -= row->stiffness * gap;
-  cav_law_unilateral(row->regulariser, row->sigma, z / row->regulariser, &f, &H, NULL);
+  cav_law_unilateral(row->regulariser, row->sigma, 0, z / row->regulariser, &f, &H, NULL);
   cav_law_rates(t->state, softness, gap, row->regulariser, &regulariser, &stiffness);
   double by_dist = -H * row->stiffness * (1 + stiffness * gap) - regulariser * f + stiffness * (f - H * z);
   return (row_derivative){by_dist, (1 - row->damping) * H, H};

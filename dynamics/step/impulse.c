@@ -202,11 +202,12 @@ void cav_impulse_law(const cav_impulse *p, const cav_block *block, const double 
   f += block->first;
   if (block->contact >= 0) {
     const cav_contact *contact = &p->state->contact[block->contact];
+    const int ends = cav_contact_ends(p->state, contact);
     if (p->convex || p->state->options.sliding == CAV_SLIDING_CONVEX)
-      cav_law_cone(block->dim, R, contact->friction, contact->sigma, g, f, hessian, potential);
+      cav_law_cone(block->dim, R, contact->friction, contact->sigma, ends, g, f, hessian, potential);
     else
-      cav_law_coulomb(block->dim, R, contact->friction, contact->sigma, p->held ? p->held + (block - p->block) : NULL,
-                      g, f, hessian, potential);
+      cav_law_coulomb(block->dim, R, contact->friction, contact->sigma, ends,
+                      p->held ? p->held + (block - p->block) : NULL, g, f, hessian, potential);
     return;
   }
   if (block->equality >= 0) {
@@ -222,7 +223,7 @@ void cav_impulse_law(const cav_impulse *p, const cav_block *block, const double 
   if (row->type == CAV_ROW_FRICTION_DOF || row->type == CAV_ROW_FRICTION_TENDON)
     cav_law_bilateral(R[0], row->sigma, row->bound, g[0], f, hessian, potential);
   else
-    cav_law_unilateral(R[0], row->sigma, g[0], f, hessian, potential);
+    cav_law_unilateral(R[0], row->sigma, 0, g[0], f, hessian, potential);
 }
 
 // what an implicit spring pulls with at the state's velocities

@@ -150,7 +150,7 @@ static void rows(cav_state *state, const double *v, const double *v_next, double
     if (coupled) { target = coupled[i]; }
     if (limit) {
       double g = (target - row->velocity_next) / row->regulariser;
-      cav_law_unilateral(row->regulariser, row->sigma, g, &row->impulse, NULL, NULL);
+      cav_law_unilateral(row->regulariser, row->sigma, 0, g, &row->impulse, NULL, NULL);
     } else {
       double g = (target - row->velocity_next) / row->regulariser;
       cav_law_bilateral(row->regulariser, row->sigma, row->bound, g, &row->impulse, NULL, NULL);
