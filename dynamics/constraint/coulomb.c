@@ -32,15 +32,18 @@ static lesser exact_lesser(double a, double b) {
   return a <= b ? (lesser){1.0, 1.0, 0.0} : (lesser){b / a, 0.0, 1.0};
 }
 
-// sinh(y)/(cosh(x) + cosh(y)) at x = a/tau, y = b/tau
-static double derivative_of(double a, double b, double tau) {
-  const double most = a > b ? a : b, up = exp((b - most) / tau);
-  const double all = up + exp((a - most) / tau) + exp(-(a + most) / tau) + exp(-(b + most) / tau);
-  return -up * expm1(-2.0 * b / tau) / all;
+// sinh(y)/(cosh(x) + cosh(y)) at x = a/tau, y = b/tau, and with x and y the other way round
+static void fill_derivatives(double a, double b, double tau, lesser *m) {
+  const double most = a > b ? a : b, up_a = exp((a - most) / tau), up_b = exp((b - most) / tau);
+  const double down_a = exp(-(a + most) / tau), down_b = exp(-(b + most) / tau);
+  m->a = -up_b * expm1(-2.0 * b / tau) / (up_b + up_a + down_a + down_b);
+  m->b = -up_a * expm1(-2.0 * a / tau) / (up_a + up_b + down_b + down_a);
 }
 
-static lesser smooth_lesser(double a, double b, double tau) {
-  lesser m = {.a = derivative_of(a, b, tau), .b = derivative_of(b, a, tau)};
+// the derivatives on request only: they are the costly piece
+static lesser smooth_lesser(double a, double b, double tau, int derivatives) {
+  lesser m = {0.0, 0.0, 0.0};
+  if (derivatives) fill_derivatives(a, b, tau, &m);
   const double low = a < b ? a : b;
   if (!(a > 0.0))
     m.ratio = tanh(0.5 * b / tau);
@@ -85,7 +88,8 @@ void cav_law_coulomb(int dim, const double *R, const double *friction, double si
   for (int j = 1; j < dim; j++) h[j - 1] = friction[j - 1] > 0.0 ? g[j] / friction[j - 1] : 0.0;
   const double length = normalise(dim - 1, h), bound = held ? *held : f[0], root = sqrt(rho);
   const double tau = 0.5 * sigma * sqrt(rho / R[0]);
-  const lesser m = tau > 0.0 ? smooth_lesser(root * length, root * bound, tau) : exact_lesser(length, bound);
+  const lesser m =
+      tau > 0.0 ? smooth_lesser(root * length, root * bound, tau, hessian != NULL) : exact_lesser(length, bound);
   for (int j = 1; j < dim; j++) f[j] = friction[j - 1] * (m.ratio * length) * h[j - 1];
   if (potential && held) {
     double along, friction_potential;
