@@ -1,12 +1,18 @@
-/// Time of one Gauss-Newton iteration of our humanoid at 40 knots on one thread, split into dynamics with derivatives,
-/// assembly and factorisation, by method of derivatives. The motion is a stance from which every joint is moved a
-/// little, under the contact law of the schedule's first, middle and last stage. Times are the shortest of several
-/// runs. Usage: bench_iteration [PROBLEM]; default problems/motions/squat-jump.
+/// Time of one Gauss-Newton iteration of our humanoid at 40 knots on one thread: whole iterations of the trust region
+/// (linearisation, factor and trials), ten each in the schedule's first, middle and last stage, one after the other; and
+/// of a stance from which every joint is moved a little, split into dynamics with derivatives, assembly and
+/// factorisation, by method of derivatives. Times are the shortest of several runs.
+/// Instructions are the processor's own count, where the system gives it. Usage: bench_iteration [PROBLEM [count]];
+/// default problems/motions/squat-jump; count: whole iterations alone, once, for a profiler.
+#include <linux/perf_event.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
 #include "bench.h"
 #include "continuation.h"
 #include "transcription.h"
 
-enum { KNOTS = 40, RUNS = 15 };
+enum { KNOTS = 40, RUNS = 15, ITERATIONS = 10 };
 
 static void shake(cav_trajectory *at, const cav_model *m, double size) {
   double *step = scene_vector(m->nv), *moved = scene_vector(m->nq);
@@ -38,6 +44,50 @@ static void measure(cav_transcription *tr, cav_normal *normal, cav_trajectory *a
          best[2], best[3]);
 }
 
+// instructions of this process from now on: a counter that is read, or -1
+static int counter(void) {
+  struct perf_event_attr what = {.type = PERF_TYPE_HARDWARE, .size = sizeof what};
+  what.config = PERF_COUNT_HW_INSTRUCTIONS;
+  what.exclude_kernel = what.exclude_hv = 1;
+  return (int)syscall(SYS_perf_event_open, &what, 0, -1, -1, 0);
+}
+
+static double instructions(int events) {
+  long long n = 0;
+  return events >= 0 && read(events, &n, sizeof n) == (ssize_t)sizeof n ? 1e-6 * (double)n : NAN;
+}
+
+// ten iterations each of three stages from a motion on
+static void whole(const cav_problem *p, cav_transcription *tr, cav_normal *normal, const cav_trajectory *from,
+                  int runs) {
+  double best[3] = {INFINITY, INFINITY, INFINITY};
+  double merit = 0, count[3] = {0};
+  int done[3] = {0}, events = counter();
+  for (int r = 0; r < runs; r++) {
+    cav_trajectory *at = cav_trajectory_copy(from), *spare = cav_trajectory_copy(from);
+    cav_region region = {.radius = 0};
+    if (!CHECK(at && spare)) return;
+    for (int s = 0; s < 3; s++) {
+      int before = region.done;
+      cav_stage_set(p, 0.5 * s, tr);
+      region.iterations = ITERATIONS;
+      double begun = instructions(events), start = bench_seconds();
+      CHECK(cav_region_minimise(&region, normal, tr, &at, &spare) == CAV_OK);
+      done[s] = region.done - before;
+      best[s] = fmin(best[s], 1e3 * (bench_seconds() - start) / done[s]);
+      count[s] = (instructions(events) - begun) / done[s];
+    }
+    merit = cav_transcription_merit(tr);
+    cav_trajectory_free(at), cav_trajectory_free(spare);
+  }
+  static const char *const names[] = {"first", "middle", "last"};
+  for (int s = 0; s < 3; s++)
+    printf("%s stage, %d whole iterations: %.3f ms, %.2f million instructions each\n", names[s], done[s], best[s],
+           count[s]);
+  printf("to merit %.17g\n", merit);
+  if (events >= 0) close(events);
+}
+
 int main(int argc, char **argv) {
   static const char *const names[] = {"one-sided", "centred", "analytic"};
   cav_error error = {0};
@@ -54,8 +104,10 @@ int main(int argc, char **argv) {
   if (!CHECK(normal && at)) return check_result();
   cav_guess_fill(p, p->q_goal, at);
   shake(at, p->model, 0.02);
+  int count = argc > 2 && !strcmp(argv[2], "count");
   printf("%s: %d dofs, %d knots, step %g s\n", p->name, tr->nv, tr->nknot, p->timestep);
-  for (int s = 0; s < 3; s++) {
+  whole(p, tr, normal, at, count ? 1 : RUNS);
+  for (int s = 0; s < 3 && !count; s++) {
     cav_stage_set(p, 0.5 * s, tr);
     printf("%s stage\n", s == 0 ? "first" : s == 1 ? "middle" : "last");
     for (int k = 0; k < 3; k++) {

@@ -67,20 +67,20 @@ static void check_products(int m, int n, int k) {
   free(A), free(B), free(C0), free(C), free(kept);
 }
 
-/// A band is factored and solved with; its entries out of the band hold what must not be read.
-static void check_band(int n, int below, int dense, int m) {
+/// A band whose columns end by blocks is factored and solved with; its entries out of the band hold what must not be read.
+static void check_band(int n, int below, int step, int dense, int m) {
   int lda = dense ? n : below;
   size_t entries = (size_t)(below + 1) * (size_t)n + (size_t)n * (size_t)lda;
   double *A = malloc((entries + 1) * sizeof *A), *L = malloc((entries + 1) * sizeof *L);
   double *x = numbers((size_t)n * (size_t)m), *b = calloc((size_t)n * (size_t)m + 1, sizeof *b),
          *first = numbers((size_t)n * (size_t)m);
-  for (size_t i = 0; i < entries; i++) A[i] = dense ? NAN : 0;
+  for (size_t i = 0; i < entries; i++) A[i] = NAN;
   for (int j = 0; j < n; j++)
-    for (int i = j; i < n && i <= j + below; i++)
+    for (int i = j; i < n && i <= j / step * step + below; i++)
       A[(size_t)i + (size_t)j * (size_t)lda] = i == j ? 1 + below : number();
   for (int r = 0; r < m; r++)
     for (int j = 0; j < n; j++)
-      for (int i = j; i < n && i <= j + below; i++) {
+      for (int i = j; i < n && i <= j / step * step + below; i++) {
         double a = A[(size_t)i + (size_t)j * (size_t)lda];
         b[i + r * n] += a * x[j + r * n];
         if (i != j) b[j + r * n] += a * x[i + r * n];
@@ -90,9 +90,9 @@ static void check_band(int n, int below, int dense, int m) {
     memcpy(L, A, entries * sizeof *A);
     double *y = malloc(((size_t)n * (size_t)m + 1) * sizeof *y), worst = 0;
     memcpy(y, b, (size_t)n * (size_t)m * sizeof *y);
-    CHECK(cav_dense_factor(n, below, L, lda));
-    cav_dense_solve_lower(n, below, L, lda, m, y, n);
-    cav_dense_solve_upper(n, below, L, lda, m, y, n);
+    CHECK(cav_dense_factor_blocks(n, below, step, L, lda));
+    cav_dense_solve_lower_blocks(n, below, step, L, lda, m, y, n);
+    cav_dense_solve_upper_blocks(n, below, step, L, lda, m, y, n);
     for (int i = 0; i < n * m; i++) worst = fmax(worst, fabs(y[i] - x[i]));
     CHECK(worst < 1e-13);
     if (lanes == 8) memcpy(first, y, (size_t)n * (size_t)m * sizeof *y);
@@ -102,7 +102,7 @@ static void check_band(int n, int below, int dense, int m) {
   // not positive definite
   memcpy(L, A, entries * sizeof *A);
   L[(size_t)(n - 1) * (size_t)(lda + 1)] = -1;
-  CHECK(!cav_dense_factor(n, below, L, lda));
+  CHECK(!cav_dense_factor_blocks(n, below, step, L, lda));
   free(A), free(L), free(x), free(b), free(first);
 }
 
@@ -130,10 +130,13 @@ int main(void) {
   check_products(9, 5, 0);
   for (int a = 0; a < SIZES; a++)
     for (int b = 0; b < SIZES; b++) {
-      if (size[b] <= size[a]) check_band(size[a], size[b] - 1, 0, 1 + 3 * (b % 3));
-      check_band(size[a], size[a] - 1, 1, 1 + b);
+      if (size[b] <= size[a]) check_band(size[a], size[b] - 1, 1, 0, 1 + 3 * (b % 3));
+      check_band(size[a], size[a] - 1, 1, 1, 1 + b);
     }
-  check_band(500, 80, 0, 9);
+  check_band(500, 80, 1, 0, 9);
+  check_band(500, 80, 27, 0, 9);
+  check_band(135, 80, 27, 0, 1);
+  check_band(90, 8, 3, 0, 5);
   for (int a = 0; a < SIZES; a++) check_general(size[a], 1 + a);
   return check_result();
 }

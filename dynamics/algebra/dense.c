@@ -5,18 +5,26 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
 enum {
-  PANEL = 24,    ///< columns of a factor's panel
+  PANEL = 24,    ///< columns of a factor's panel: a multiple of every tile's columns
   SLICE = 128,   ///< longest sum of a tile
   WIDE = 48,     ///< columns of B packed at a time: a multiple of every tile's columns
   TILE_MOST = 16 ///< rows of the tallest tile
 };
 
-/// One processor's way: T [rows*columns] := packed A [k][rows] times packed B [k][columns]; x -= s a; a dot b.
+/// The triangle on a panel's diagonal: entry (c, d) at [d * PANEL + c], and 1 over its diagonal.
+typedef struct triangle {
+  double entry[PANEL * PANEL], inverse[PANEL];
+} triangle;
+
+/// One processor's way: C -= s packed A [k][rows] times packed B [k][columns]; X := X L'^-1 for rows of a panel packed
+/// [PANEL][rows]; x -= s a; a dot b.
 typedef struct lanes {
   int rows, columns;
-  void (*tile)(int k, const double *A, const double *B, double *T);
+  void (*tile)(int k, const double *A, const double *B, double s, double *C, size_t ldc);
+  void (*panel)(const triangle *L, double *X);
   void (*subtract)(int n, double s, const double *a, double *x);
   double (*dot)(int n, const double *a, const double *b);
 } lanes;
@@ -26,34 +34,56 @@ static inline double add_eight(const double *s) {
   return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
 }
 
-#define WAY(name, attribute, LANES, VECTORS, COLUMNS)                                                        \
-  typedef double name##_vector __attribute__((vector_size((LANES)*8), aligned(8), may_alias));               \
-  attribute static void name##_tile(int k, const double *A, const double *B, double *T) {                    \
-    name##_vector sum[COLUMNS][VECTORS] = {0};                                                               \
-    for (int p = 0; p < k; p++, A += (LANES) * (VECTORS), B += (COLUMNS)) {                                  \
-      name##_vector a[VECTORS];                                                                              \
-      for (int i = 0; i < (VECTORS); i++) a[i] = *(const name##_vector *)(A + (LANES)*i);                    \
-      for (int j = 0; j < (COLUMNS); j++)                                                                    \
-        for (int i = 0; i < (VECTORS); i++) sum[j][i] += a[i] * B[j];                                        \
-    }                                                                                                        \
-    for (int j = 0; j < (COLUMNS); j++)                                                                      \
-      for (int i = 0; i < (VECTORS); i++) *(name##_vector *)(T + (LANES) * ((VECTORS)*j + i)) = sum[j][i];   \
-  }                                                                                                          \
-  attribute static void name##_subtract(int n, double s, const double *a, double *x) {                       \
-    int i = 0;                                                                                               \
-    for (; i + (LANES) <= n; i += (LANES)) *(name##_vector *)(x + i) -= s * *(const name##_vector *)(a + i); \
-    for (; i < n; i++) x[i] -= s * a[i];                                                                     \
-  }                                                                                                          \
-  attribute static double name##_dot(int n, const double *a, const double *b) {                              \
-    name##_vector sum[8 / (LANES)] = {0};                                                                    \
-    double eight[8];                                                                                         \
-    int i = 0;                                                                                               \
-    for (; i + 8 <= n; i += 8)                                                                               \
-      for (int l = 0; l < 8 / (LANES); l++)                                                                  \
-        sum[l] += *(const name##_vector *)(a + i + (LANES)*l) * *(const name##_vector *)(b + i + (LANES)*l); \
-    for (int l = 0; l < 8 / (LANES); l++) *(name##_vector *)(eight + (LANES)*l) = sum[l];                    \
-    for (int l = 0; i < n; i++, l++) eight[l] += a[i] * b[i];                                                \
-    return add_eight(eight);                                                                                 \
+#define WAY(name, attribute, LANES, VECTORS, COLUMNS)                                                           \
+  typedef double name##_vector __attribute__((vector_size((LANES)*8), aligned(8), may_alias));                  \
+  attribute static void name##_tile(int k, const double *A, const double *B, double s, double *C, size_t ldc) { \
+    name##_vector sum[COLUMNS][VECTORS] = {0};                                                                  \
+    for (int p = 0; p < k; p++, A += (LANES) * (VECTORS), B += (COLUMNS)) {                                     \
+      name##_vector a[VECTORS];                                                                                 \
+      for (int i = 0; i < (VECTORS); i++) a[i] = *(const name##_vector *)(A + (LANES)*i);                       \
+      for (int j = 0; j < (COLUMNS); j++)                                                                       \
+        for (int i = 0; i < (VECTORS); i++) sum[j][i] += a[i] * B[j];                                           \
+    }                                                                                                           \
+    for (int j = 0; j < (COLUMNS); j++, C += ldc)                                                               \
+      for (int i = 0; i < (VECTORS); i++) *(name##_vector *)(C + (LANES)*i) -= s * sum[j][i];                   \
+  }                                                                                                             \
+  attribute static void name##_panel(const triangle *L, double *X) {                                            \
+    for (int c = 0; c < PANEL; c += (COLUMNS)) {                                                                \
+      double *at = X + (size_t)(c * (LANES) * (VECTORS));                                                       \
+      name##_vector x[COLUMNS][VECTORS];                                                                        \
+      for (int j = 0; j < (COLUMNS); j++)                                                                       \
+        for (int i = 0; i < (VECTORS); i++) x[j][i] = *(name##_vector *)(at + (LANES) * ((VECTORS)*j + i));     \
+      const double *before = X, *l = L->entry + c;                                                              \
+      for (int d = 0; d < c; d++, before += (LANES) * (VECTORS), l += PANEL) {                                  \
+        name##_vector a[VECTORS];                                                                               \
+        for (int i = 0; i < (VECTORS); i++) a[i] = *(const name##_vector *)(before + (LANES)*i);                \
+        for (int j = 0; j < (COLUMNS); j++)                                                                     \
+          for (int i = 0; i < (VECTORS); i++) x[j][i] -= l[j] * a[i];                                           \
+      }                                                                                                         \
+      for (int j = 0; j < (COLUMNS); j++, l += PANEL) {                                                         \
+        for (int i = 0; i < (VECTORS); i++) x[j][i] *= L->inverse[c + j];                                       \
+        for (int k = 0; k < (COLUMNS); k++)                                                                     \
+          for (int i = 0; i < (VECTORS) && k > j; i++) x[k][i] -= l[k] * x[j][i];                               \
+      }                                                                                                         \
+      for (int j = 0; j < (COLUMNS); j++)                                                                       \
+        for (int i = 0; i < (VECTORS); i++) *(name##_vector *)(at + (LANES) * ((VECTORS)*j + i)) = x[j][i];     \
+    }                                                                                                           \
+  }                                                                                                             \
+  attribute static void name##_subtract(int n, double s, const double *a, double *x) {                          \
+    int i = 0;                                                                                                  \
+    for (; i + (LANES) <= n; i += (LANES)) *(name##_vector *)(x + i) -= s * *(const name##_vector *)(a + i);    \
+    for (; i < n; i++) x[i] -= s * a[i];                                                                        \
+  }                                                                                                             \
+  attribute static double name##_dot(int n, const double *a, const double *b) {                                 \
+    name##_vector sum[8 / (LANES)] = {0};                                                                       \
+    double eight[8];                                                                                            \
+    int i = 0;                                                                                                  \
+    for (; i + 8 <= n; i += 8)                                                                                  \
+      for (int l = 0; l < 8 / (LANES); l++)                                                                     \
+        sum[l] += *(const name##_vector *)(a + i + (LANES)*l) * *(const name##_vector *)(b + i + (LANES)*l);    \
+    for (int l = 0; l < 8 / (LANES); l++) *(name##_vector *)(eight + (LANES)*l) = sum[l];                       \
+    for (int l = 0; i < n; i++, l++) eight[l] += a[i] * b[i];                                                   \
+    return add_eight(eight);                                                                                    \
   }
 
 #if defined(__x86_64__)
@@ -63,10 +93,10 @@ WAY(four, __attribute__((target("avx2"))), 4, 2, 6)
 WAY(two, , 2, 2, 4)
 
 static const lanes *way(void) {
-  static const lanes two = {4, 4, two_tile, two_subtract, two_dot};
+  static const lanes two = {4, 4, two_tile, two_panel, two_subtract, two_dot};
 #if defined(__x86_64__)
-  static const lanes eight = {16, 8, eight_tile, eight_subtract, eight_dot};
-  static const lanes four = {8, 6, four_tile, four_subtract, four_dot};
+  static const lanes eight = {16, 8, eight_tile, eight_panel, eight_subtract, eight_dot};
+  static const lanes four = {8, 6, four_tile, four_panel, four_subtract, four_dot};
   const int most = cav_dense_lanes();
   if (most == 8) return &eight;
   if (most == 4) return &four;
@@ -74,36 +104,58 @@ static const lanes *way(void) {
   return &two;
 }
 
-/// A factor of a product: entry (i, p) at at[i * by_row + p * by_column], zero further than `below` under the diagonal, which
-/// is where i = p + offset.
+/// A factor of a product: entry (i, p) at at[i * by_row + p * by_column].
 typedef struct operand {
   const double *at;
   size_t by_row, by_column;
-  int below, offset;
+  const int *end; ///< column p of a band has no rows from end[p] on; NULL: all are there
 } operand;
+
+/// So many numbers, by a copy of known size where a strip has as many.
+static inline void copy(double *to, const double *from, int n) {
+  switch (n) {
+    case 16:
+      memcpy(to, from, 16 * sizeof *to);
+      break;
+    case 8:
+      memcpy(to, from, 8 * sizeof *to);
+      break;
+    default:
+      for (int i = 0; i < n; i++) to[i] = from[i];
+  }
+}
 
 /// Packs `count` rows from `first` of slice [k]: [k][height], zeros after the rows that there are.
 static void pack(const operand *o, int first, int count, int slice, int k, int height, double *out) {
   const double *from = o->at + (size_t)first * o->by_row + (size_t)slice * o->by_column;
   for (int p = 0; p < k; p++, from += o->by_column, out += height) {
-    int last = o->below - o->offset + slice + p - first + 1, some = last < count ? (last < 0 ? 0 : last) : count;
-    for (int i = 0; i < some; i++) out[i] = from[(size_t)i * o->by_row];
+    int some = count;
+    if (o->end) some = o->end[slice + p] - first < count ? o->end[slice + p] - first : count;
+    if (o->by_row == 1 && some == height)
+      copy(out, from, height);
+    else
+      for (int i = 0; i < some; i++) out[i] = from[(size_t)i * o->by_row];
+    some = some > 0 ? some : 0;
     for (int i = some; i < height; i++) out[i] = 0;
   }
 }
 
-/// C += sign * T for a tile at (row, column) of [m*n], within the part.
-static void add_tile(cav_part part, int m, int n, int row, int column, const lanes *w, double sign, const double *T,
-                     double *C, size_t ldc) {
+/// C += sign * A B for a tile at (row, column) of [m*n], within the part.
+static void add_tile(cav_part part, int m, int n, int row, int column, const lanes *w, int k, double sign,
+                     const double *A, const double *B, double *C, size_t ldc) {
   int rows = m - row < w->rows ? m - row : w->rows, columns = n - column < w->columns ? n - column : w->columns;
-  for (int j = 0; j < columns; j++, T += w->rows) {
-    double *c = C + (size_t)(column + j) * ldc + row;
+  double *at = C + (size_t)column * ldc + row, T[TILE_MOST * 8] = {0};
+  int whole = part == CAV_PART_ALL || (part == CAV_PART_LOWER ? column + columns <= row + 1 : row + rows <= column + 1);
+  if (whole && rows == w->rows && columns == w->columns) {
+    w->tile(k, A, B, -sign, at, ldc);
+    return;
+  }
+  w->tile(k, A, B, -1, T, (size_t)w->rows);
+  for (int j = 0; j < columns; j++, at += ldc) {
+    const double *t = T + j * w->rows;
     int first = part == CAV_PART_LOWER && column + j > row ? column + j - row : 0;
     int end = part == CAV_PART_UPPER && column + j + 1 - row < rows ? column + j + 1 - row : rows;
-    if (first == 0 && end > 0)
-      w->subtract(end, -sign, T, c);
-    else
-      for (int i = first; i < end; i++) c[i] -= -sign * T[i];
+    for (int i = first; i < end; i++) at[i] -= -sign * t[i];
   }
 }
 
@@ -111,7 +163,7 @@ static void add_tile(cav_part part, int m, int n, int row, int column, const lan
 static void product(cav_part part, int m, int n, int k, double sign, const operand *A, const operand *B, double *C,
                     size_t ldc) {
   const lanes *w = way();
-  double packed_a[SLICE * TILE_MOST], packed_b[SLICE * WIDE], T[TILE_MOST * 8];
+  double packed_a[SLICE * TILE_MOST], packed_b[SLICE * WIDE];
   for (int wide = 0; wide < n; wide += WIDE) {
     int end = n - wide < WIDE ? n : wide + WIDE;
     for (int slice = 0; slice < k; slice += SLICE) {
@@ -128,91 +180,156 @@ static void product(cav_part part, int m, int n, int k, double sign, const opera
         for (int j = wide; j < end; j += w->columns) {
           if (part == CAV_PART_LOWER && i + height <= j) break;
           if (part == CAV_PART_UPPER && i >= j + w->columns) continue;
-          w->tile(length, packed_a, packed_b + (size_t)(j - wide) * (size_t)length, T);
-          add_tile(part, m, end, i, j, w, sign, T, C, ldc);
+          add_tile(part, m, end, i, j, w, length, sign, packed_a, packed_b + (size_t)(j - wide) * (size_t)length, C,
+                   ldc);
         }
       }
     }
   }
 }
 
-// an operand without zeros to leave out
-enum { FULL = 1 << 29 };
-
 void cav_dense_product(int m, int n, int k, double sign, const double *A, int lda, const double *B, int ldb, double *C,
                        int ldc) {
-  operand a = {A, 1, (size_t)lda, FULL, 0}, b = {B, (size_t)ldb, 1, FULL, 0};
+  operand a = {.at = A, .by_row = 1, .by_column = (size_t)lda}, b = {.at = B, .by_row = (size_t)ldb, .by_column = 1};
   product(CAV_PART_ALL, m, n, k, sign, &a, &b, C, (size_t)ldc);
 }
 
 void cav_dense_product_transposed(cav_part part, int m, int n, int k, double sign, const double *A, int lda,
                                   const double *B, int ldb, double *C, int ldc) {
-  operand a = {A, (size_t)lda, 1, FULL, 0}, b = {B, (size_t)ldb, 1, FULL, 0};
+  operand a = {.at = A, .by_row = (size_t)lda, .by_column = 1}, b = {.at = B, .by_row = (size_t)ldb, .by_column = 1};
   product(part, m, n, k, sign, &a, &b, C, (size_t)ldc);
 }
 
 void cav_dense_square(int n, int k, const double *A, int lda, double *C, int ldc) {
-  operand a = {A, 1, (size_t)lda, FULL, 0};
+  operand a = {.at = A, .by_row = 1, .by_column = (size_t)lda};
   product(CAV_PART_UPPER, n, n, k, 1, &a, &a, C, (size_t)ldc);
 }
 
 static int least(int a, int b) { return a < b ? a : b; }
 
-int cav_dense_factor(int n, int below, double *A, int lda) {
-  const lanes *w = way();
-  size_t ld = (size_t)lda;
-  for (int start = 0; start < n; start += PANEL) {
-    int end = least(n, start + PANEL);
-    for (int c = start; c < end; c++) {
-      double *column = A + (size_t)c * ld;
-      // what the panel's columns before take from this one
-      for (int d = start > c - below ? start : c - below; d < c; d++) {
-        const double *before = A + (size_t)d * ld;
-        w->subtract(least(n, d + below + 1) - c, before[c], before + c, column + c);
-      }
-      if (!(column[c] > 0) || !isfinite(column[c])) return 0;
-      double root = sqrt(column[c]), inverse = 1 / root;
-      column[c] = root;
-      for (int i = c + 1, last = least(n, c + below + 1); i < last; i++) column[i] *= inverse;
+/// Columns start to end of a band, and where each ends.
+typedef struct panel {
+  int start, end, last[PANEL];
+} panel;
+
+static panel panel_at(int start, int n, int below, int step) {
+  panel p = {.start = start, .end = least(n, start + PANEL)};
+  for (int c = start; c < p.end; c++) p.last[c - start] = least(n, c / step * step + below + 1);
+  return p;
+}
+
+/// What the columns of a panel take from each other in the rows from `first` on.
+static void reduce_rows(const lanes *w, const panel *p, int first, double *A, size_t ld) {
+  for (int c = p->start; c < p->end; c++) {
+    double *column = A + (size_t)c * ld, inverse = 1 / column[c];
+    for (int d = p->start; d < c; d++) {
+      const double *before = A + (size_t)d * ld;
+      int count = p->last[d - p->start] - first;
+      if (count > 0) w->subtract(count, before[c], before + first, column + first);
     }
-    // and the panel from all columns after it
-    int rest = least(n, end + below) - end;
-    operand panel = {A + (size_t)start * ld + end, 1, ld, below, end - start};
-    product(CAV_PART_LOWER, rest, rest, end - start, -1, &panel, &panel, A + (size_t)end * ld + end, ld);
+    for (int i = first; i < p->last[c - p->start]; i++) column[i] *= inverse;
+  }
+}
+
+/// The same in the rows from the panel's end on that all its columns have, by strips; returns the first row after them.
+static int reduce_strips(const lanes *w, const panel *p, double *A, size_t ld) {
+  int last = p->last[0];
+  if (last - p->end < w->rows / 2) return p->end;
+  triangle L;
+  double X[PANEL * TILE_MOST];
+  for (int d = 0; d < PANEL; d++) {
+    const double *column = A + (size_t)(p->start + d) * ld + p->start;
+    memcpy(L.entry + d * PANEL, column, PANEL * sizeof *column);
+    L.inverse[d] = 1 / column[d];
+  }
+  for (int row = p->end; row < last; row += w->rows) {
+    int some = least(last - row, w->rows);
+    operand rows = {.at = A + (size_t)p->start * ld + row, .by_row = 1, .by_column = ld};
+    pack(&rows, 0, some, 0, PANEL, w->rows, X);
+    w->panel(&L, X);
+    for (int c = 0; c < PANEL; c++)
+      memcpy(A + (size_t)(p->start + c) * ld + row, X + c * w->rows, (size_t)some * sizeof *X);
+  }
+  return last;
+}
+
+/// The triangle on the panel's diagonal; zero if a pivot is not positive.
+static int factor_triangle(const lanes *w, const panel *p, double *A, size_t ld) {
+  for (int c = p->start; c < p->end; c++) {
+    double *column = A + (size_t)c * ld;
+    for (int d = p->start; d < c; d++) {
+      const double *before = A + (size_t)d * ld;
+      int count = least(p->end, p->last[d - p->start]) - c;
+      if (count > 0) w->subtract(count, before[c], before + c, column + c);
+    }
+    if (!(column[c] > 0) || !isfinite(column[c])) return 0;
+    double root = sqrt(column[c]), inverse = 1 / root;
+    column[c] = root;
+    for (int i = c + 1, last = least(p->end, p->last[c - p->start]); i < last; i++) column[i] *= inverse;
   }
   return 1;
 }
 
-void cav_dense_solve_lower(int n, int below, const double *L, int lda, int m, double *X, int ldx) {
+int cav_dense_factor_blocks(int n, int below, int step, double *A, int lda) {
+  const lanes *w = way();
+  size_t ld = (size_t)lda;
+  for (int start = 0; start < n; start += PANEL) {
+    panel p = panel_at(start, n, below, step);
+    if (!factor_triangle(w, &p, A, ld)) return 0;
+    reduce_rows(w, &p, reduce_strips(w, &p, A, ld), A, ld);
+    // and the panel from all columns after it
+    int columns = p.end - start, rest = p.last[columns - 1] - p.end;
+    for (int c = 0; c < columns; c++) p.last[c] -= p.end;
+    operand rows = {.at = A + (size_t)start * ld + p.end, .by_row = 1, .by_column = ld, .end = p.last};
+    if (rest > 0) product(CAV_PART_LOWER, rest, rest, columns, -1, &rows, &rows, A + (size_t)p.end * (ld + 1), ld);
+  }
+  return 1;
+}
+
+int cav_dense_factor(int n, int below, double *A, int lda) { return cav_dense_factor_blocks(n, below, 1, A, lda); }
+
+void cav_dense_solve_lower_blocks(int n, int below, int step, const double *L, int lda, int m, double *X, int ldx) {
   const lanes *w = way();
   size_t ld = (size_t)lda, apart = (size_t)ldx;
-  // many right-hand sides by panels, few by columns
-  int panel = m < 4 ? n : PANEL;
-  for (int start = 0; start < n; start += panel) {
-    int end = least(n, start + panel);
+  for (int start = 0; start < n; start += PANEL) {
+    panel p = panel_at(start, n, below, step);
+    // many right-hand sides by panels, few by columns
     for (int r = 0; r < m; r++) {
       double *x = X + (size_t)r * apart;
-      for (int c = start; c < end; c++) {
+      for (int c = start; c < p.end; c++) {
         const double *column = L + (size_t)c * ld;
+        int last = m < 4 ? p.last[c - start] : least(p.end, p.last[c - start]);
         x[c] /= column[c];
-        w->subtract(least(end, c + below + 1) - c - 1, x[c], column + c + 1, x + c + 1);
+        w->subtract(last - c - 1, x[c], column + c + 1, x + c + 1);
       }
     }
-    int rest = least(n, end + below) - end;
-    operand a = {L + (size_t)start * ld + end, 1, ld, below, end - start}, b = {X + start, apart, 1, FULL, 0};
-    if (rest > 0) product(CAV_PART_ALL, rest, m, end - start, -1, &a, &b, X + end, apart);
+    int columns = p.end - start, rest = p.last[columns - 1] - p.end;
+    if (m < 4 || rest <= 0) continue;
+    for (int c = 0; c < columns; c++) p.last[c] -= p.end;
+    operand a = {.at = L + (size_t)start * ld + p.end, .by_row = 1, .by_column = ld, .end = p.last};
+    operand b = {.at = X + start, .by_row = apart, .by_column = 1};
+    product(CAV_PART_ALL, rest, m, columns, -1, &a, &b, X + p.end, apart);
   }
 }
 
-void cav_dense_solve_upper(int n, int below, const double *L, int lda, int m, double *X, int ldx) {
+void cav_dense_solve_lower(int n, int below, const double *L, int lda, int m, double *X, int ldx) {
+  cav_dense_solve_lower_blocks(n, below, 1, L, lda, m, X, ldx);
+}
+
+void cav_dense_solve_upper_blocks(int n, int below, int step, const double *L, int lda, int m, double *X, int ldx) {
   const lanes *w = way();
   for (int r = 0; r < m; r++) {
     double *x = X + (size_t)r * (size_t)ldx;
     for (int c = n - 1; c >= 0; c--) {
       const double *column = L + (size_t)c * (size_t)lda;
-      x[c] = (x[c] - w->dot(least(n, c + below + 1) - c - 1, column + c + 1, x + c + 1)) / column[c];
+      int last = least(n, c / step * step + below + 1);
+      x[c] = (x[c] - w->dot(last - c - 1, column + c + 1, x + c + 1)) / column[c];
     }
   }
+}
+
+void cav_dense_solve_upper(int n, int below, const double *L, int lda, int m, double *X, int ldx) {
+  cav_dense_solve_upper_blocks(n, below, 1, L, lda, m, X, ldx);
 }
 
 static void exchange(double *a, double *b) {

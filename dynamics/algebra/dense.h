@@ -28,6 +28,12 @@ void cav_dense_solve_lower(int n, int below, const double *L, int lda, int m, do
 /// X := L'^-1 X.
 void cav_dense_solve_upper(int n, int below, const double *L, int lda, int m, double *X, int ldx);
 
+/// The same of a band whose columns end by blocks of `step`: column j's last row is the (j / step) * step + below of it,
+/// so those after it within `below` of the diagonal stay untouched too.
+int cav_dense_factor_blocks(int n, int below, int step, double *A, int lda);
+void cav_dense_solve_lower_blocks(int n, int below, int step, const double *L, int lda, int m, double *X, int ldx);
+void cav_dense_solve_upper_blocks(int n, int below, int step, const double *L, int lda, int m, double *X, int ldx);
+
 /// X := A^-1 X for X [n*m] by rows exchanged; A becomes its factors. Zero if A is singular.
 int cav_dense_solve_general(int n, double *A, int lda, int m, double *X, int ldx);
 

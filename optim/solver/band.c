@@ -5,23 +5,23 @@
 #include "dense.h"
 
 cav_status cav_band_factor(cav_band *band) {
-  int core = band->core, border = band->border, below = band->width - 1;
-  if (!cav_dense_factor(core, below, band->A, below)) return CAV_NOT_CONVERGED;
+  int core = band->core, border = band->border, below = band->width - 1, step = band->step;
+  if (!cav_dense_factor_blocks(core, below, step, band->A, below)) return CAV_NOT_CONVERGED;
   if (border == 0) return CAV_OK;
-  cav_dense_solve_lower(core, below, band->A, below, border, band->Y, core);
+  cav_dense_solve_lower_blocks(core, below, step, band->A, below, border, band->Y, core);
   cav_dense_product_transposed(CAV_PART_LOWER, border, border, core, -1, band->Y, core, band->Y, core, band->S, border);
   return cav_dense_factor(border, border - 1, band->S, border) ? CAV_OK : CAV_NOT_CONVERGED;
 }
 
 void cav_band_solve(const cav_band *band, double *x) {
-  int core = band->core, border = band->border, below = band->width - 1;
+  int core = band->core, border = band->border, below = band->width - 1, step = band->step;
   // down the band, across the border, up the band
-  cav_dense_solve_lower(core, below, band->A, below, 1, x, core);
+  cav_dense_solve_lower_blocks(core, below, step, band->A, below, 1, x, core);
   if (border > 0) {
     cav_dense_product_transposed(CAV_PART_ALL, border, 1, core, -1, band->Y, core, x, core, x + core, border);
     cav_dense_solve_lower(border, border - 1, band->S, border, 1, x + core, border);
     cav_dense_solve_upper(border, border - 1, band->S, border, 1, x + core, border);
     cav_dense_product(core, 1, border, -1, band->Y, core, x + core, border, x, core);
   }
-  cav_dense_solve_upper(core, below, band->A, below, 1, x, core);
+  cav_dense_solve_upper_blocks(core, below, step, band->A, below, 1, x, core);
 }

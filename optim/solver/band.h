@@ -8,6 +8,7 @@
 typedef struct cav_band {
   int core, border; ///< rows in the band, and after it
   int width;        ///< entries kept of a column of the band, itself and those below
+  int step;         ///< columns of a block, which end in one row: that where the block's first column ends
   double *A;        ///< [core*width] lower triangle: A[j*width + i - j] is entry (i, j)
   double *Y;        ///< [core*border] rows of the border: Y[i*core + j] is entry (core + i, j)
   double *S;        ///< [border*border] lower triangle

@@ -306,7 +306,7 @@ cav_status cav_normal_factor(cav_normal *normal, double shift) {
   for (int g = 0; g < normal->ngroup && status == CAV_OK; g++) {
     cav_band *band = &normal->group[g];
     int n = normal->first[g + 1] - normal->first[g];
-    *band = (cav_band){.core = normal->core / normal->n * n, .width = 3 * n, .A = at};
+    *band = (cav_band){.core = normal->core / normal->n * n, .width = 3 * n, .step = n, .A = at};
     band->border = normal->blocks * n - band->core + (normal->free_step && !has_arrow(normal));
     band->Y = band->A + (size_t)band->core * band->width;
     band->S = band->Y + (size_t)band->core * band->border;
