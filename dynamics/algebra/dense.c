@@ -108,35 +108,32 @@ static const lanes *way(void) {
 typedef struct operand {
   const double *at;
   size_t by_row, by_column;
-  const int *end; ///< column p of a band has no rows from end[p] on; NULL: all are there
+  const int *end; ///< column p of a band has no rows from end[p] on, and none has fewer after it; NULL: all are there
 } operand;
 
-/// So many numbers, by a copy of known size where a strip has as many.
-static inline void copy(double *to, const double *from, int n) {
-  switch (n) {
-    case 16:
-      memcpy(to, from, 16 * sizeof *to);
-      break;
-    case 8:
-      memcpy(to, from, 8 * sizeof *to);
-      break;
-    default:
-      for (int i = 0; i < n; i++) to[i] = from[i];
-  }
+/// Packs whole rows [k][height] that lie beside each other; height is known where this is inlined.
+static inline __attribute__((always_inline)) void pack_whole(const double *from, size_t by_column, int k, int height,
+                                                             double *out) {
+  for (int p = 0; p < k; p++, from += by_column, out += height) memcpy(out, from, (size_t)height * sizeof *out);
 }
 
 /// Packs `count` rows from `first` of slice [k]: [k][height], zeros after the rows that there are.
 static void pack(const operand *o, int first, int count, int slice, int k, int height, double *out) {
   const double *from = o->at + (size_t)first * o->by_row + (size_t)slice * o->by_column;
+  int whole = o->by_row == 1 && count == height && (!o->end || o->end[slice] - first >= count);
+  if (whole && height == 16) {
+    pack_whole(from, o->by_column, k, 16, out);
+    return;
+  }
+  if (whole && height == 8) {
+    pack_whole(from, o->by_column, k, 8, out);
+    return;
+  }
   for (int p = 0; p < k; p++, from += o->by_column, out += height) {
     int some = count;
     if (o->end) some = o->end[slice + p] - first < count ? o->end[slice + p] - first : count;
-    if (o->by_row == 1 && some == height)
-      copy(out, from, height);
-    else
-      for (int i = 0; i < some; i++) out[i] = from[(size_t)i * o->by_row];
-    some = some > 0 ? some : 0;
-    for (int i = some; i < height; i++) out[i] = 0;
+    for (int i = 0; i < some; i++) out[i] = from[(size_t)i * o->by_row];
+    for (int i = some > 0 ? some : 0; i < height; i++) out[i] = 0;
   }
 }
 

@@ -5,6 +5,7 @@
 /// Derivatives of u, contacts and sensors come from readings.c; those of v, accelerations, postures and ranges are
 /// exact. Constraint rows enter the merit by an augmented Lagrangian of two-sided rows: with z~ = z + multiplier/rho
 /// and e = z~ - clamp(z~), the row costs rho/2 e^2 and its next multiplier is rho e (Powell, Hestenes, Rockafellar).
+#include "dense.h"
 #include "knot.h"
 #include "rotation.h"
 
@@ -301,42 +302,80 @@ const double *cav_velocity_after(const cav_transcription *tr, const cav_trajecto
   return t + 1 < tr->nknot ? at->v + (size_t)(t + 1) * tr->nv : tr->after;
 }
 
-/// out += scale * row * (Jacobian of a step): side 0 by its end (Jr^-1), side 1 by its start (Jl^-1).
-static void times_rotation(const cav_transcription *tr, const double *row, const double *rotation, int side,
-                           double scale, double *out) {
-  for (int d = 0; d < tr->nv; d++)
-    if (tr->rotation_of[d] < 0) out[d] += scale * row[d];
-  for (int k = 0; k < tr->nrotation; k++) {
-    const double *J = rotation + CAV_ROTATION_SIZE * k + 9 * side, *x = row + tr->rotation_dof[k];
-    double *y = out + tr->rotation_dof[k];
-    for (int c = 0; c < 3; c++) y[c] += scale * (x[0] * J[c] + x[1] * J[3 + c] + x[2] * J[6 + c]);
+/// How rows over (q_t, v_t, v_{t+1}) are chained to the knots before, here and next: a factor of each in each, and the
+/// rotation Jacobians that go with it, Jl^-1 at the start of a step and Jr^-1 at its end.
+typedef struct links {
+  double v_before, n_before, q_here, v_here, n_here, n_next;
+  const double *before, *here, *then, *next; ///< of what is before; of v and of v_{t+1} here; of what is next
+} links;
+
+static links links_of(const cav_transcription *tr, int t) {
+  int last = tr->nknot - 1, here = cav_knot_moves(tr, t), before = cav_knot_moves(tr, t - 1);
+  int next = cav_knot_moves(tr, t + 1), held = !next && !tr->problem->close_at_rest; // v_{t+1} is v_t
+  const double *now = tr->knot[t].rotation, *after = t < last ? tr->knot[t + 1].rotation : tr->rotation_after;
+  double inverse = 1 / tr->options.timestep;
+  links l = {.before = now + 9, .here = now, .then = next ? after + 9 : now, .next = next ? after : now};
+  l.q_here = here;
+  l.v_here = here ? inverse : 0;
+  l.v_before = here && before ? -inverse : 0;
+  l.n_next = next ? inverse : 0;
+  l.n_here = held ? inverse : next && here ? -inverse : 0;
+  l.n_before = held && before ? -inverse : 0;
+  return l;
+}
+
+// a component of a row times a rotation Jacobian
+static inline double times_column(const double *row, const double *J, int c) {
+  return row[0] * J[c] + row[1] * J[3 + c] + row[2] * J[6 + c];
+}
+
+/// Chains n rows; dofs of rotations are done again.
+static inline __attribute__((always_inline)) void chain_rows(const cav_transcription *tr, const links *l, int n,
+                                                             const double *dq, const double *dv, const double *dn,
+                                                             double *restrict out) {
+  int nv = tr->nv;
+  for (int i = 0; i < n; i++, dq += nv, dv += nv, dn += nv, out += 3 * nv) {
+    for (int d = 0; d < nv; d++) out[d] = l->v_before * dv[d] + l->n_before * dn[d];
+    for (int d = 0; d < nv; d++) out[nv + d] = l->q_here * dq[d] + l->v_here * dv[d] + l->n_here * dn[d];
+    for (int d = 0; d < nv; d++) out[2 * nv + d] = l->n_next * dn[d];
+    for (int k = 0; k < tr->nrotation; k++) {
+      int at = tr->rotation_dof[k], J = CAV_ROTATION_SIZE * k;
+      const double *v = dv + at, *next = dn + at;
+      for (int c = 0; c < 3; c++) {
+        double before = l->v_before * times_column(v, l->before + J, c);
+        double here = l->q_here * dq[at + c] + l->v_here * times_column(v, l->here + J, c);
+        out[at + c] = before + l->n_before * times_column(next, l->before + J, c);
+        out[nv + at + c] = here + l->n_here * times_column(next, l->then + J, c);
+        out[2 * nv + at + c] = l->n_next * times_column(next, l->next + J, c);
+      }
+    }
   }
+}
+
+// by vectors of four numbers and of two: the same operations
+#if defined(__x86_64__)
+__attribute__((target("avx2"))) static void chain_four(const cav_transcription *tr, const links *l, int n,
+                                                       const double *dq, const double *dv, const double *dn,
+                                                       double *out) {
+  chain_rows(tr, l, n, dq, dv, dn, out);
+}
+#endif
+static void chain_two(const cav_transcription *tr, const links *l, int n, const double *dq, const double *dv,
+                      const double *dn, double *out) {
+  chain_rows(tr, l, n, dq, dv, dn, out);
 }
 
 /// Chains derivatives with respect to (q_t, v_t, v_{t+1}) to the three neighbouring knots.
 static void chain(const cav_transcription *tr, int t, int n, const double *dq, const double *dv, const double *dn,
                   double *out) {
-  int nv = tr->nv, last = tr->nknot - 1;
-  const double *now_rotation = tr->knot[t].rotation,
-               *next_rotation = t < last ? tr->knot[t + 1].rotation : tr->rotation_after;
-  int here = cav_knot_moves(tr, t), before = cav_knot_moves(tr, t - 1), next = cav_knot_moves(tr, t + 1);
-  double inverse = 1 / tr->options.timestep;
-  if (n == 0) return;
-  memset(out, 0, (size_t)n * 3 * nv * sizeof(double));
-  for (int i = 0; i < n; i++, dq += nv, dv += nv, dn += nv, out += 3 * nv) {
-    if (here) {
-      for (int d = 0; d < nv; d++) out[nv + d] = dq[d];
-      times_rotation(tr, dv, now_rotation, 0, inverse, out + nv);
-      if (before) times_rotation(tr, dv, now_rotation, 1, -inverse, out);
-    }
-    if (next) {
-      times_rotation(tr, dn, next_rotation, 0, inverse, out + 2 * nv);
-      if (here) times_rotation(tr, dn, next_rotation, 1, -inverse, out + nv);
-    } else if (!tr->problem->close_at_rest) {
-      times_rotation(tr, dn, now_rotation, 0, inverse, out + nv);
-      if (before) times_rotation(tr, dn, now_rotation, 1, -inverse, out);
-    }
+  links l = links_of(tr, t);
+#if defined(__x86_64__)
+  if (cav_dense_lanes() >= 4) {
+    chain_four(tr, &l, n, dq, dv, dn, out);
+    return;
   }
+#endif
+  chain_two(tr, &l, n, dq, dv, dn, out);
 }
 
 void cav_transcription_chain(const cav_transcription *tr, int t, int n, const double *row, double *out) {
