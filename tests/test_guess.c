@@ -137,6 +137,7 @@ static void check_file(void) {
   cav_trajectory *at = guess(HEAD TAIL, &p), *motion = at && p ? cav_trajectory_new(p->model, 4, .2) : NULL;
   for (int t = 0; motion && t < 4; t++)
     motion->q[t * 8] = t * t, motion->q[t * 8 + 2] = 3, motion->q[t * 8 + 7] = -.1 * t;
+  if (motion) cav_trajectory_velocities(p->model, motion);
   CHECK(motion && !cav_trajectory_write(motion_path, p->model, motion, &error));
   cav_trajectory_free(motion);
   cav_trajectory_free(at);
@@ -151,6 +152,27 @@ static void check_file(void) {
   }
   cav_trajectory_free(at);
   cav_problem_free(p);
+  // a free start begins where the motion is then, and without a goal the guess ends where it is: between knots, and as a
+  // result folder has it; velocities in the file are those of its knots, backwards
+  at = guess(
+      "<problem model='m.xml'><horizon duration='.4' timestep='.1'/><start free='true'/>"
+      "<guess file='motion.csv' offset='.1'/></problem>",
+      &p);
+  if (at) {
+    CHECK(p->nguess_pose == 3 && p->guess_pose[2].time == .4);
+    check_knot(at, 0, (double[]){.5, 0, 3}, -.05);
+    check_knot(at, 1, (double[]){1, 0, 3}, -.1);
+    CHECK_NEAR(p->v_start[0], 5, 1e-12);
+    cav_trajectory *end = cav_problem_guess(p, &error);
+    CHECK(end && fabs(end->q[4 * 8] - 6.5) < 1e-12 && fabs(end->v[0] - 5) < 1e-12);
+    CHECK(cav_problem_write(path, p, NULL, &error) == CAV_OK);
+    cav_problem *again = cav_problem_load(path, NULL, &error);
+    CHECK(again && again->nguess_pose == 3 && again->guess_pose[2].time == .4);
+    cav_problem_free(again);
+    cav_trajectory_free(end);
+  }
+  cav_trajectory_free(at);
+  cav_problem_free(p);
   refuse(HEAD "<guess offset='1'/>" TAIL, 5, "attribute 'file', which is missing");
   refuse(HEAD "<guess type='hold' file='motion.csv'/>" TAIL, 5, "contradicts attribute 'type'");
   refuse(HEAD "<guess file='motion.csv' offset='.7'/>" TAIL, 5, "it lasts 0.6 s, got 0.7");
@@ -162,7 +184,7 @@ static void check_broken(void) {
   refuse(HEAD "<guess>\n<waypoint key='bent'/></guess>" TAIL, 6, "'time': is missing");
   refuse(HEAD "<guess>\n<waypoint time='.5' key='bent'/></guess>" TAIL, 6, "has a keyframe or pose");
   refuse(HEAD "<guess>\n<waypoint time='0'/></guess>" TAIL, 6, "after the posture before");
-  refuse(HEAD "<guess>\n<waypoint time='1'/></guess>" TAIL, 6, "before the goal");
+  refuse(HEAD "<guess>\n<waypoint time='1.1'/></guess>" TAIL, 6, "at the end, 1 s, at the latest");
   refuse(HEAD "<guess>\n<waypoint time='.5'/>\n<waypoint time='.5'/></guess>" TAIL, 7, "after the posture before");
   refuse(HEAD "<guess type='hold'>\n<waypoint time='.5'/></guess>" TAIL, 6, "contradicts type='hold'");
 }

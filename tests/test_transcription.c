@@ -1,10 +1,10 @@
 /// Derivatives of whole problems: the gradient of the merit at every unknown, first and last knots included, the rows
 /// of the constraints and their sparsity, against centred differences of the values; the same bits with one and two
-/// threads. The same of cycles, whose ends meet, moved, turned or mirrored, and with the step as an unknown; products
-/// and solutions of their bordered normal equations against dense ones. Seen: gradients to 2e-8 of their norm (bound
-/// 1e-6); rows to 3e-6 (bound 1e-4: the difference that they are compared with); analytic derivatives and centred
-/// differences give the same Hessians to 2e-8 (bound 1e-6); no nonzero outside the pattern, and none of the pattern of
-/// forces and ranges that stays zero.
+/// threads. The same of a free start, of cycles, whose ends meet, moved, turned or mirrored, and with the step as an
+/// unknown; products and solutions of their bordered normal equations against dense ones. Seen: gradients to 2e-8 of
+/// their norm (bound 1e-6); rows to 3e-6 (bound 1e-4: the difference that they are compared with); analytic derivatives
+/// and centred differences give the same Hessians to 2e-8 (bound 1e-6); no nonzero outside the pattern, and none of the
+/// pattern of forces and ranges that stays zero.
 #include "gauss_newton.h"
 #include "readings.h"
 
@@ -114,8 +114,11 @@ static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) 
   return n;
 }
 
-static void shake(cav_trajectory *at, const cav_model *m, double size) {
+/// A way at random from the start, which is moved too where it is free.
+static void shake(cav_trajectory *at, const cav_model *m, double size, int free_start) {
   double step[64];
+  for (int d = 0; d < m->nv && free_start; d++) step[d] = size * scene_uniform();
+  if (free_start) cav_integrate(m, m->q0, step, 1, at->q);
   for (int t = 1; t < at->nknot; t++) {
     for (int d = 0; d < m->nv; d++) step[d] = size * scene_uniform();
     cav_integrate(m, at->q + (t - 1) * at->nq, step, 1, at->q + t * at->nq);
@@ -162,7 +165,8 @@ static void test_gradient(cav_transcription *tr, cav_trajectory *at) {
            derivative = (merit_at(tr, at, moved, x, i, step) - merit_at(tr, at, moved, x, i, -step)) / (2 * step);
     double error = fabs(derivative - gradient[i]) / norm;
     if (error > worst) worst = error;
-    if (error > 1e-6) printf("knot %d dof %d: %.9g against %.9g\n", i / m->nv + 1, i % m->nv, gradient[i], derivative);
+    if (error > 1e-6)
+      printf("knot %d dof %d: %.9g against %.9g\n", i / m->nv + tr->first, i % m->nv, gradient[i], derivative);
   }
   printf("gradient: largest %.3g, worst error %.3g of it\n", norm, worst);
   CHECK(worst < 1e-6);
@@ -185,7 +189,7 @@ static void test_rows(cav_transcription *tr, cav_trajectory *at, int tries) {
   cav_trajectory *moved = cav_trajectory_copy(at);
   CHECK(cav_transcription_keep_rows(tr));
   for (int k = 0; k < tries; k++) {
-    shake(at, m, k + 1 < tries ? 0.4 : 0.05);
+    shake(at, m, k + 1 < tries ? 0.4 : 0.05, tr->first < 0);
     close_cycle(tr, at);
     CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
     rows = 0;
@@ -195,11 +199,11 @@ static void test_rows(cav_transcription *tr, cav_trajectory *at, int tries) {
           used[rows * (size_t)width + (size_t)c] |= tr->knot[t].slot_row[i * width + c] != 0;
   }
   // differences at the last point, for the first, a middle and the last knot, and for the step
-  for (int t = 1; t < tr->nknot + tr->free_step; t++) {
-    if (t != 1 && t != tr->nknot / 2 && t < tr->nknot - 1) continue;
+  for (int t = tr->first; t < tr->nknot + tr->free_step; t++) {
+    if (t > 1 && t != tr->nknot / 2 && t < tr->nknot - 1) continue;
     for (int d = 0; d < (t < tr->nknot ? m->nv : 1); d++) {
       double step = 1e-6;
-      int i = (t - 1) * m->nv + d;
+      int i = (t - tr->first) * m->nv + d;
       merit_at(tr, at, moved, x, i, step);
       size_t at_row = 0;
       for (int s = 0; s < tr->nknot; s++)
@@ -211,7 +215,8 @@ static void test_rows(cav_transcription *tr, cav_trajectory *at, int tries) {
           double derivative = (plus[at_row] - tr->knot[s].slot[r].value) / (2 * step);
           double row = t < tr->nknot ? 0 : tr->knot[s].slot_step[r];
           for (int c = 0; c < 3; c++)
-            if (cav_transcription_block(tr, s, c) == t - 1) row = tr->knot[s].slot_row[r * width + c * m->nv + d];
+            if (cav_transcription_block(tr, s, c) == t - tr->first)
+              row = tr->knot[s].slot_row[r * width + c * m->nv + d];
           worst = fmax(worst, fabs(derivative - row) / fmax(1, fabs(row)));
         }
     }
@@ -364,7 +369,7 @@ static void test_normal(cav_transcription *tr, cav_trajectory *at) {
 
 /// How a scene is to be closed.
 typedef struct closing {
-  int at_rest, free_step;
+  int at_rest, free_step, free_start;
   cav_cycle cycle;
 } closing;
 
@@ -377,6 +382,7 @@ static void test_scene(const char *scene, closing close, cav_order order) {
   p.order = order;
   p.close_at_rest = close.at_rest;
   p.cycle = close.cycle;
+  p.free_start = close.free_start;
   p.duration = 0.15;
   if (close.free_step) p.duration_least = 0.1, p.duration_most = 0.3, p.duration_weight = 700;
   memcpy(q_start, m->q0, (size_t)m->nq * sizeof(double));
@@ -394,7 +400,7 @@ static void test_scene(const char *scene, closing close, cav_order order) {
   }
   cav_trajectory *at = cav_trajectory_new(m, tr->nknot, p.timestep);
   memcpy(at->v, v_start, (size_t)m->nv * sizeof(double));
-  shake(at, m, 0.05);
+  shake(at, m, 0.05, p.free_start);
   close_cycle(tr, at);
   tr->options.stabilisation = CAV_STABILISATION_DISCRETE;
   tr->options.softness = 0.5;
@@ -440,7 +446,7 @@ static void test_apart(int cyclic, int touching, int free_step) {
   if (!CHECK(tr != NULL)) fprintf(stderr, "    %s\n", error.text);
   if (tr) {
     cav_trajectory *at = cav_trajectory_new(m, tr->nknot, p.timestep);
-    shake(at, m, 0.005);
+    shake(at, m, 0.005, 0);
     close_cycle(tr, at);
     tr->options.stabilisation = CAV_STABILISATION_DISCRETE;
     tr->options.smoothing = 0.03;
@@ -591,6 +597,7 @@ int main(void) {
   const closing moved = {.cycle = {.on = 1, .translation = {0.2, 0.1, 0}}};
   const closing turned = {.free_step = 1, .cycle = {.on = 1, .translation = {0.2, 0, 0}, .rotation = 0.4}};
   const closing mirrored = {.free_step = 1, .cycle = {.on = 1, .translation = {0.2, 0, 0}, .mirror = CAV_MIRROR_Y}};
+  const closing begun = {.at_rest = 1, .free_start = 1}, loose = {.free_start = 1, .free_step = 1};
   test_scene(walker, rest, CAV_ORDER_MIDPOINT);
   test_scene(walker, open, CAV_ORDER_MIDPOINT);
   test_scene(walker, rest, CAV_ORDER_EULER);
@@ -608,5 +615,9 @@ int main(void) {
   test_scene(served, timed, CAV_ORDER_MOMENTUM);
   test_scene(roped, turned, CAV_ORDER_MOMENTUM);
   for (int k = 0; k < 4; k++) test_apart(k & 1, k >> 1, 1);
+  test_scene(served, loose, CAV_ORDER_MIDPOINT);
+  test_scene(walker, begun, CAV_ORDER_MIDPOINT);
+  test_scene(served, begun, CAV_ORDER_EULER);
+  test_scene(roped, loose, CAV_ORDER_MOMENTUM);
   return check_result();
 }

@@ -272,11 +272,12 @@ typedef struct cav_problem {
   double duration_least, duration_most;
   double duration_weight; ///< cost weight/2 * (duration in s)^2 where the duration is free
   cav_cycle cycle;        ///< where on: close_at_rest and v_start do not count, and q_start is where the guess starts
-  double *q_start;        ///< [nq]
-  double *v_start;        ///< [nv]
-  double *q_goal;         ///< [nq] goal posture of the guess and of configuration terms without a target
-  cav_guess guess;        ///< what the guess is made from
-  double guess_height;    ///< m: ballistic arc added to the guess over guess_from .. guess_to
+  int free_start;      ///< 1: q_0 and v_0 are unknowns, and q_start and v_start where the guess starts; not of a cycle
+  double *q_start;     ///< [nq]
+  double *v_start;     ///< [nv]
+  double *q_goal;      ///< [nq] goal posture of the guess and of configuration terms without a target
+  cav_guess guess;     ///< what the guess is made from
+  double guess_height; ///< m: ballistic arc added to the guess over guess_from .. guess_to
   double guess_from, guess_to; ///< s
   double
       guess_rotation[3]; ///< rotation vector that the first free joint's guess makes over guess_from .. guess_to, rad

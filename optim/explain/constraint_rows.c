@@ -105,14 +105,14 @@ static double net_force(const list *all, const cav_binding *b, int k) {
   int nv = tr->nv;
   double sum = 0;
   if (tr->periodicity) k = (k + tr->nknot - 2) % (tr->nknot - 1) + 1;
-  if (k < 1 || k >= tr->nknot) return 0;
+  if (k < tr->first || k >= tr->nknot) return 0;
   memset(all->force, 0, (size_t)nv * sizeof(double));
   // knots that see it: beside it, and across the seam of a cycle
   for (int i = 0; i < 9; i++) {
     int t = k - 1 + i % 3 + (i / 3 - 1) * (tr->nknot - 1);
     const listed *at = same_at(all, b, t);
     for (int c = 0; at && c < 3; c++) {
-      if (cav_transcription_block(tr, t, c) != k - 1) continue;
+      if (cav_transcription_block(tr, t, c) != k - tr->first) continue;
       const double *row = tr->knot[t].slot_row + ((size_t)at->slot * 3 + (size_t)c) * (size_t)nv;
       for (int d = 0; d < nv; d++) all->force[d] += at->binding.multiplier * row[d];
     }

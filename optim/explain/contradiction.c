@@ -225,7 +225,7 @@ static int lay_row(const cav_transcription *tr, int t, int i, int *column, doubl
       if (row[c * nv + d] != 0) put_entry(column, value, &n, block * nv + d, row[c * nv + d]);
   }
   if (tr->free_step && tr->knot[t].slot_step[i] != 0)
-    put_entry(column, value, &n, (tr->nknot - 1) * nv, tr->knot[t].slot_step[i]);
+    put_entry(column, value, &n, cav_transcription_blocks(tr) * nv, tr->knot[t].slot_step[i]);
   return n;
 }
 

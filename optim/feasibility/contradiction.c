@@ -46,7 +46,7 @@ static void read_start(const cav_examination *e, const cav_requirement *r, doubl
 static void examine_start(cav_examination *e, const cav_requirement *r) {
   cav_requirement has = *r;
   char what[160];
-  if (r->knot > 0 || e->problem->cycle.on) return;
+  if (r->knot > 0 || !cav_start_is_given(e->problem)) return;
   read_start(e, r, has.low);
   copy3(has.high, has.low);
   if (!is_disjoint(r, &has)) return;

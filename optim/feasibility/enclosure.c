@@ -170,7 +170,7 @@ static cav_status examine_geom(cav_examination *e, const cav_requirement *r, int
 cav_status cav_examine_enclosures(cav_examination *e) {
   cav_status status = CAV_OK;
   int before = e->nfound, known = -1;
-  if (e->problem->cycle.on) return CAV_OK;
+  if (!cav_start_is_given(e->problem)) return CAV_OK;
   for (int i = 0; i < e->n && !status; i++) {
     const cav_requirement *r = &e->requirement[i];
     // one knot of each term

@@ -402,7 +402,7 @@ static cav_status examine_height(cav_examination *e, const supply *s, int first,
 
 cav_status cav_examine_energy(cav_examination *e) {
   supply s = {0};
-  if (e->problem->cycle.on) return CAV_OK;
+  if (!cav_start_is_given(e->problem)) return CAV_OK;
   cav_status status = survey(e, &s);
   int before = e->nfound;
   for (int i = 0; i < e->problem->nterm && !status && s.rate >= 0 && e->nfound == before; i++) examine_rate(e, &s, i);

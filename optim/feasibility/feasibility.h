@@ -36,6 +36,9 @@ typedef struct cav_examination {
   cav_impossibility *found; ///< [most]
 } cav_examination;
 
+/// Whether a motion has to begin at q_start with v_start; conditions that reckon from there on hold of no other.
+static inline int cav_start_is_given(const cav_problem *problem) { return !problem->cycle.on && !problem->free_start; }
+
 /// Least and largest distance of two points over all postures within the ranges of joints.
 typedef struct cav_distance_range {
   double least, largest;

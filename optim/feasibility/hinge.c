@@ -214,7 +214,7 @@ static void examine_time(cav_examination *e, const cav_hinge *hinge, const cav_r
 cav_status cav_examine_hinge(cav_examination *e) {
   cav_hinge hinge;
   int known = 0, last = -1, before = e->nfound;
-  if (e->problem->cycle.on || e->n == 0) return CAV_OK;
+  if (!cav_start_is_given(e->problem) || e->n == 0) return CAV_OK;
   cav_options options = e->scratch->options;
   cav_status status = cav_hinge_of(e->model, e->scratch, &hinge, &known);
   e->scratch->options = options;

@@ -286,7 +286,7 @@ cav_status cav_examine_holds(cav_examination *e) {
   const cav_model *m = e->model;
   const cav_problem *p = e->problem;
   int before = e->nfound;
-  if (p->cycle.on || !is_covered(m)) return CAV_OK;
+  if (!cav_start_is_given(p) || !is_covered(m)) return CAV_OK;
   double *q = malloc(sizeof(double) * (size_t)(m->nq + 2 * m->nv)),
          least = p->duration_most > 0 ? p->duration_least : 0;
   cav_status status = q ? CAV_OK : CAV_NO_MEMORY;

@@ -128,7 +128,7 @@ static cav_status examine_one(cav_examination *e, const cav_requirement *r) {
 }
 
 cav_status cav_examine_momentum(cav_examination *e) {
-  if (e->problem->cycle.on) return CAV_OK;
+  if (!cav_start_is_given(e->problem)) return CAV_OK;
   cav_status status = CAV_OK;
   int before = e->nfound;
   for (int i = 0; i < e->n && !status && e->nfound == before; i++)

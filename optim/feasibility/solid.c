@@ -112,7 +112,7 @@ static void examine_posture(cav_examination *e, const cav_state *state, const ch
 }
 
 cav_status cav_examine_solids(cav_examination *e) {
-  if (!e->problem->cycle.on) examine_posture(e, e->start, "the start");
+  if (cav_start_is_given(e->problem)) examine_posture(e, e->start, "the start");
   for (int i = 0; i < e->n && e->nfound < e->most; i++) {
     int before = e->nfound;
     if (e->requirement[i].kind == CAV_REQUIRE_POINT && e->requirement[i].object > 0)

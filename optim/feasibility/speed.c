@@ -212,7 +212,7 @@ static void examine_centre(cav_examination *e, const rates *r, const cav_require
 
 cav_status cav_examine_speeds(cav_examination *e) {
   const cav_problem *p = e->problem;
-  if (p->cycle.on) return CAV_OK;
+  if (!cav_start_is_given(p)) return CAV_OK;
   double least = p->duration_most > 0 ? p->duration_least / p->duration : 1;
   rates r = {.longest = p->timestep * fmax(e->longest, 1), .shortest = p->timestep * fmin(least, 1)};
   int before = e->nfound;

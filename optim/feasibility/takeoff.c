@@ -175,7 +175,7 @@ static cav_status examine_one(cav_examination *e, const double *force, const cav
 
 cav_status cav_examine_takeoff(cav_examination *e) {
   const cav_model *m = e->model;
-  if (e->problem->cycle.on || !is_covered(m)) return CAV_OK;
+  if (!cav_start_is_given(e->problem) || !is_covered(m)) return CAV_OK;
   int bounded = 0, before = e->nfound;
   double *force = malloc((size_t)(m->nv + 1) * sizeof *force);
   cav_status status = force ? cav_effort_of_dofs(e, force, &bounded) : CAV_NO_MEMORY;

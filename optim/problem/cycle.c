@@ -42,6 +42,9 @@ cav_status cav_problem_cycle(const cav_problem_reader *reader) {
   if (!node) return CAV_OK;
   if (cav_xml_get(horizon, "close"))
     return cav_xml_fail(reader->error, horizon, "close", "contradicts <cycle>, which closes the motion on its start");
+  if (p->free_start)
+    return cav_xml_fail(reader->error, cav_problem_child(reader->root, "start"), "free",
+                        "is for a motion with a start; that of a <cycle> is free as it is: leave it out");
   if (lround(p->duration / p->timestep) < 3)
     return cav_xml_fail(reader->error, horizon, "duration", "a cycle needs at least three steps");
   p->cycle.on = 1;

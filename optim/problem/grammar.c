@@ -83,7 +83,10 @@ static const cav_xml_element pose_joint = {
   REAL("rise", 0, "m", "(0; what stands in the way down stops it)", "with height=\"floor\": so far above the plane, whatever lies between"), \
   WORD("ranges", clippings, "keep", "clip: joints are brought into their ranges first")
 static const cav_xml_element start = {
-    "start", 1, 1, ATTRIBUTES(POSE_SOURCE, REALS("qvel", 1, 0, "rad/s or m/s", "(zeros)", "velocity at the start, nv numbers")),
+    "start", 1, 1,
+    ATTRIBUTES(
+        POSE_SOURCE, REALS("qvel", 1, 0, "rad/s or m/s", "(zeros)", "velocity at the start, nv numbers"),
+        FLAG("free", "false", "posture and velocity at the start are found too: what stands here is where the guess starts")),
     CHILDREN(&pose_root, &pose_joint), 0, "posture and velocity that the motion begins with"};
 static const cav_xml_element goal = {
     "goal", 0, 1, ATTRIBUTES(POSE_SOURCE), CHILDREN(&pose_root, &pose_joint), 0,
@@ -196,7 +199,7 @@ static const cav_xml_element swing = {
         REAL("frequency", 1, "Hz", NULL, "swings in a second"), REAL("phase", 0, "degrees", "0", "phase at the start")),
     NULL, 0, "sine laid over one joint of the guess, within its range, fading in and out"};
 static const cav_xml_element guess_waypoint = {
-    "waypoint", 0, 0, ATTRIBUTES(REAL("time", 1, "s", NULL, "when, after 0 and before the end"), POSE_SOURCE),
+    "waypoint", 0, 0, ATTRIBUTES(REAL("time", 1, "s", NULL, "when, after 0; at the end it stands in the place of the goal"), POSE_SOURCE),
     CHILDREN(&pose_root, &pose_joint), 0, "posture that the guess passes, linear in time between such postures"};
 static const cav_xml_element guess = {
     "guess", 0, 1,
@@ -205,7 +208,7 @@ static const cav_xml_element guess = {
         REAL("apex", 0, "m", "0", "height of a ballistic arc that is added between from and to"),
         REALS("rotation", 3, 3, "degrees", "0 0 0", "rotation of the first free joint between from and to, as a rotation vector"),
         TEXT("from", "0", "begin of the arc and the rotation, s or \"end\""), TEXT("to", "end", "end of them, s or \"end\""),
-        TEXT("file", "(none)", "motion to follow: a trajectory.csv of the same model, such as ik and solve write"),
+        TEXT("file", "(none)", "motion to follow: a trajectory.csv of the same model, such as ik and solve write; its first posture where the start is free, its last where there is no <goal>"),
         REAL("offset", 0, "s", "0", "time of that motion at which the guess begins")),
     CHILDREN(&guess_waypoint, &swing), 0, "motion that the solver starts from; it obeys nothing yet"};
 static const cav_xml_element limits = {

@@ -301,7 +301,9 @@ static cav_status read_ends(const cav_problem_reader *reader) {
   p->v_start = p->q_goal + m->nq;
   const cav_xml_node *start = cav_problem_child(reader->root, "start"), *goal = cav_problem_child(reader->root, "goal");
   cav_status status = cav_problem_pose(reader, start, p->q_start);
-  if (!status) status = check_ranges(reader, start, p->q_start);
+  p->free_start = cav_xml_bool(start, "free", 0);
+  // one that is free is brought into ranges by the solver
+  if (!status && !p->free_start) status = check_ranges(reader, start, p->q_start);
   if (status) return status;
   const cav_xml_value *qvel = cav_xml_get(start, "qvel");
   if (qvel && qvel->count != m->nv) {
@@ -360,10 +362,10 @@ static cav_status read_guess_poses(const cav_problem_reader *reader, const cav_x
   p->guess_pose = list;
   for (const cav_xml_node *w = first; w; w = cav_xml_next(w), q += m->nq) {
     double time = cav_xml_real(w, "time", 0);
-    if (!(time > before && time < p->duration)) {
+    if (!(time > before && time <= p->duration)) {
       return cav_xml_fail(reader->error, w, "time",
-                          "expected a time after the posture before, %g s, and before the goal, %g s, got %g", before,
-                          p->duration, time);
+                          "expected a time after the posture before, %g s, and at the end, %g s, at the latest, got %g",
+                          before, p->duration, time);
     }
     cav_status status = cav_problem_pose(reader, w, q);
     if (status) return status;
@@ -373,7 +375,19 @@ static cav_status read_guess_poses(const cav_problem_reader *reader, const cav_x
   return CAV_OK;
 }
 
-// a motion on file as postures on the way, from `offset` of its time on
+// configuration and velocity of a motion at a time that it has: between knots along the step
+static void sample(const cav_model *m, const cav_trajectory *motion, double time, double *q, double *v) {
+  double at = fmax(time / motion->timestep, 0);
+  size_t nq = (size_t)m->nq, nv = (size_t)m->nv, knot = (size_t)fmin(floor(at + whole_step), motion->nknot - 1);
+  double rest = at - (double)knot;
+  int within = rest > whole_step && (int)knot + 1 < motion->nknot;
+  const double *step = motion->v + (knot + (size_t)within) * nv;
+  memcpy(q, motion->q + knot * nq, nq * sizeof *q);
+  if (within) cav_integrate(m, motion->q + knot * nq, step, rest * motion->timestep, q);
+  if (v) memcpy(v, step, nv * sizeof *v);
+}
+
+// a motion on file as postures on the way, from `offset` of its time on; at the ends too where no one gives them
 static cav_status read_guess_file(const cav_problem_reader *reader, const cav_xml_node *node) {
   cav_problem *p = reader->problem;
   if (!cav_xml_get(node, "file"))
@@ -391,8 +405,8 @@ static cav_status read_guess_file(const cav_problem_reader *reader, const cav_xm
   if (!motion) return cav_problem_no_memory(reader);
   double offset = cav_xml_real(node, "offset", 0), length = (motion->nknot - 1) * motion->timestep;
   size_t nq = (size_t)motion->nq, size = (size_t)motion->nknot * nq;
-  cav_guess_pose *list = cav_problem_alloc(reader->owner, (size_t)motion->nknot * sizeof *list);
-  double *q = cav_problem_alloc(reader->owner, size * sizeof *q);
+  cav_guess_pose *list = cav_problem_alloc(reader->owner, ((size_t)motion->nknot + 1) * sizeof *list);
+  double *q = cav_problem_alloc(reader->owner, (size + nq) * sizeof *q);
   cav_status status = list && q ? CAV_OK : cav_problem_no_memory(reader);
   if (!status && !(offset > -p->duration && offset < length))
     status = cav_xml_fail(reader->error, node, "offset",
@@ -404,6 +418,11 @@ static cav_status read_guess_file(const cav_problem_reader *reader, const cav_xm
     for (int t = 0; t < motion->nknot; t++) {
       double time = t * motion->timestep - offset;
       if (time > 0 && time < p->duration) list[p->nguess_pose++] = (cav_guess_pose){time, q + (size_t)t * nq};
+    }
+    if (p->free_start && offset >= 0) sample(reader->model, motion, offset, p->q_start, p->v_start);
+    if (!cav_problem_child(reader->root, "goal") && offset + p->duration <= length * (1 + whole_step)) {
+      sample(reader->model, motion, offset + p->duration, q + size, NULL);
+      list[p->nguess_pose++] = (cav_guess_pose){p->duration, q + size};
     }
   }
   cav_trajectory_free(motion);

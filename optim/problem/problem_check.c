@@ -32,6 +32,8 @@ static cav_status check_horizon(const cav_problem *p, cav_error *error) {
     wrong = "duration_weight must not be negative";
   else if (p->cycle.on && !(p->duration >= 2.5 * p->timestep))
     wrong = "a cycle needs at least three steps";
+  else if (p->cycle.on && p->free_start)
+    wrong = "free_start is for a motion with a start; that of a cycle is free as it is";
   else if (!(p->timestep > 0) || !(p->duration >= 2 * p->timestep) || !isfinite(p->duration))
     wrong = "the horizon needs a positive timestep and at least two steps";
   else if (!(p->effort_limit > 0) || p->effort_limit > 1)

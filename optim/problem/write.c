@@ -282,6 +282,7 @@ static void write_head(FILE *out, const cav_problem *p, const char *model_path) 
   fputs("  <start", out);
   write_numbers(out, "qpos", p->q_start, m->nq);
   write_numbers(out, "qvel", p->v_start, m->nv);
+  if (p->free_start) write_text(out, "free", "true");
   fputs("/>\n  <goal", out);
   write_numbers(out, "qpos", p->q_goal, m->nq);
   fputs("/>\n", out);

@@ -82,7 +82,7 @@ static void follow(const cav_problem *problem, const double *end, double time, d
   int i = 1;
   while (i <= problem->nguess_pose && problem->guess_pose[i - 1].time <= time) i++;
   cav_guess_pose a = passed(problem, end, i - 1), b = passed(problem, end, i);
-  double s = b.time > a.time ? fmin((time - a.time) / (b.time - a.time), 1) : 1;
+  double s = b.time > a.time ? fmin((time - a.time) / (b.time - a.time), 1) : 0;
   // a cycle goes on at constant speed
   if (problem->nguess_pose == 0 && !problem->cycle.on) s = smoothstep(s);
   if (problem->guess == CAV_GUESS_HOLD && !problem->cycle.on) s = 0;

@@ -410,7 +410,7 @@ cav_status cav_idle_find(const cav_problem *p, cav_idle *idle) {
   int trees = 0;
   *idle = (cav_idle){.whole = p};
   for (int l = 1; l < m->nlink; l++) trees += m->link[l].root == l;
-  if (trees < 2 || p->cycle.on) return CAV_OK;
+  if (trees < 2 || p->cycle.on || p->free_start) return CAV_OK;
   char *mark = calloc(2, n);
   box *room = malloc(2 * n * sizeof *room);
   double *size = malloc(n * sizeof *size);

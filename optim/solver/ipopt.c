@@ -158,7 +158,8 @@ static Bool objective_gradient(int n, double *x, Bool fresh, double *gradient, U
   (void)fresh;
   if (!evaluate(p, x, 1)) return 0;
   memcpy(gradient, cav_normal_gradient(p->run->normal), (size_t)n * sizeof *gradient);
-  for (int b = 0; b < p->run->tr->nknot - 1; b++) rotation_row(p, b, gradient + (size_t)b * p->run->tr->nv);
+  for (int b = 0; b < cav_transcription_blocks(p->run->tr); b++)
+    rotation_row(p, b, gradient + (size_t)b * p->run->tr->nv);
   return 1;
 }
 
@@ -240,7 +241,7 @@ static int lagrangian_gradient(program *p, const double *x, double factor, const
     }
     if (tr->free_step) g[p->n - 1] += multiplier[i] * tr->knot[t].slot_step[p->row_slot[i]];
   }
-  for (int b = 0; b < tr->nknot - 1; b++) rotation_row(p, b, g + (size_t)b * tr->nv);
+  for (int b = 0; b < cav_transcription_blocks(tr); b++) rotation_row(p, b, g + (size_t)b * tr->nv);
   return 1;
 }
 
@@ -458,12 +459,12 @@ static void set_bounds(const program *p, double *x_lower, double *x_upper, doubl
     x_lower[p->n - 1] = log(tr->problem->duration_least / (steps * p->anchor->timestep));
     x_upper[p->n - 1] = log(tr->problem->duration_most / (steps * p->anchor->timestep));
   }
-  for (int t = 1; t < tr->nknot && !p->passing; t++) {
+  for (int t = 0; t < tr->nknot && !p->passing; t++) {
     for (int i = tr->knot[t].layout.joint; i < tr->knot[t].layout.tendon; i++) {
       if (!is_bound(tr, t, i, &dof)) continue;
       const cav_slot *slot = &tr->knot[t].slot[i];
-      x_lower[(t - 1) * tr->nv + dof] = slot->lower - slot->value;
-      x_upper[(t - 1) * tr->nv + dof] = slot->upper - slot->value;
+      x_lower[(t - tr->first) * tr->nv + dof] = slot->lower - slot->value;
+      x_upper[(t - tr->first) * tr->nv + dof] = slot->upper - slot->value;
     }
   }
   for (int i = 0; i < p->m; i++) {
@@ -484,10 +485,10 @@ static void multipliers_of(const program *p, double *multiplier, int back) {
     if (back) slot->multiplier = multiplier[i];
     multiplier[i] = slot->final_multiplier;
   }
-  for (int t = 1; t < tr->nknot && !p->passing; t++) {
+  for (int t = 0; t < tr->nknot && !p->passing; t++) {
     for (int i = tr->knot[t].layout.joint; i < tr->knot[t].layout.tendon; i++) {
       if (!is_bound(tr, t, i, &dof)) continue;
-      int k = (t - 1) * tr->nv + dof;
+      int k = (t - tr->first) * tr->nv + dof;
       cav_slot *slot = &tr->knot[t].slot[i];
       if (back) slot->multiplier = upper[k] - lower[k];
       lower[k] = fmax(-slot->final_multiplier, 0);

@@ -42,7 +42,7 @@ static int set_trees(cav_normal *normal, const cav_model *model) {
 cav_normal *cav_normal_new(const cav_transcription *tr) {
   cav_normal *normal = calloc(1, sizeof *normal);
   if (!normal) return NULL;
-  normal->blocks = tr->nknot - 1;
+  normal->blocks = cav_transcription_blocks(tr);
   normal->n = tr->nv;
   normal->size = cav_transcription_unknowns(tr);
   normal->cyclic = tr->periodicity != NULL;

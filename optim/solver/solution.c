@@ -214,8 +214,10 @@ cav_status cav_run_open(cav_solve_run *run, const cav_problem *problem, const ca
   run->region = (cav_region){.report = cav_run_report, .context = run};
   if (!run->normal || !run->at || !run->spare || !run->solution)
     return fail(error, CAV_NO_MEMORY, "not enough memory for this problem");
-  memcpy(run->at->q, problem->q_start, (size_t)problem->model->nq * sizeof(double));
-  memcpy(run->at->v, problem->v_start, (size_t)problem->model->nv * sizeof(double));
+  if (!start || !problem->free_start) {
+    memcpy(run->at->q, problem->q_start, (size_t)problem->model->nq * sizeof(double));
+    memcpy(run->at->v, problem->v_start, (size_t)problem->model->nv * sizeof(double));
+  }
   status = start ? take_start(run) : cav_guess_take(run);
   if (status == CAV_NO_MEMORY) fail(error, status, "not enough memory for this problem");
   return status == CAV_OK ? cav_run_resume(run, error) : status;

@@ -133,9 +133,9 @@ typedef struct descent {
   cav_quadratic *qp;
   cav_curvature *curvature;
   double *x, *offset, *multiplier; ///< [unknowns], [rows], [rows]
-  double *radius;                  ///< [nknot] box about the blocks of unknowns, then about the step's logarithm
+  double *radius;                  ///< [blocks+1] box about the blocks of unknowns, then about the step's logarithm
   double *before, *after, *tried; ///< [nknot] the knots' parts of the merit: here, at the step to take, at the last one
-  double *forecast, *next;        ///< [nknot] of the decrease; boxes to come
+  double *forecast, *next;        ///< [nknot] of the decrease; [blocks+1] boxes to come
   double merit;
   double predicted; ///< decrease, by the last programme
   double ratio;     ///< of the decrease to it
@@ -149,27 +149,27 @@ typedef struct descent {
 } descent;
 
 static void set_radius(const cav_transcription *tr, double *radius, double value) {
-  for (int b = 0; b < tr->nknot; b++) radius[b] = value;
+  for (int b = 0; b <= cav_transcription_blocks(tr); b++) radius[b] = value;
 }
 
 static int descent_new(descent *d, cav_solve_run *run) {
   *d = (descent){.qp = cav_quadratic_new(run->tr, run->normal), .ratio = 1, .age = -1};
   size_t n = (size_t)cav_transcription_unknowns(run->tr), rows = d->qp ? (size_t)cav_quadratic_rows(d->qp) : 0;
   d->curvature = cav_curvature_new(run->tr);
-  size_t knots = (size_t)run->tr->nknot;
-  d->x = calloc(n + 2 * rows + 7 * knots, sizeof(double));
+  size_t knots = (size_t)run->tr->nknot, boxes = (size_t)cav_transcription_blocks(run->tr) + 1;
+  d->x = calloc(n + 2 * rows + 5 * knots + 2 * boxes, sizeof(double));
   d->second = cav_trajectory_copy(run->at);
   d->best = cav_trajectory_copy(run->at);
   if (!d->qp || !d->curvature || !d->x || !d->second || !d->best || !cav_transcription_keep_rows(run->tr)) return 0;
   d->offset = d->x + n;
   d->multiplier = d->offset + rows;
   d->radius = d->multiplier + rows;
-  d->before = d->radius + knots;
+  d->before = d->radius + boxes;
   d->after = d->before + knots;
   d->tried = d->after + knots;
   d->forecast = d->tried + knots;
   d->next = d->forecast + knots;
-  d->need = d->next + knots;
+  d->need = d->next + boxes;
   set_radius(run->tr, d->radius, first_radius);
   return 1;
 }
@@ -186,7 +186,7 @@ static void descent_free(descent *d) {
 static void shift_all(const cav_transcription *tr, descent *d, double next) {
   size_t nv = (size_t)tr->nv, width = 3 * nv;
   for (int t = 0; t < tr->nknot; t++)
-    for (size_t i = nv; i < 2 * nv; i++) tr->knot[t].hessian[i * width + i] += next - d->shift;
+    for (size_t i = t + tr->first < 0 ? 0 : nv; i < 2 * nv; i++) tr->knot[t].hessian[i * width + i] += next - d->shift;
   d->shift = next;
 }
 
@@ -349,7 +349,7 @@ static cav_status renew(cav_solve_run *run, descent *d, int *taken) {
 /// Largest step within a block of unknowns.
 static double block_length(const cav_transcription *tr, const double *x, int block) {
   double most = 0;
-  if (block == tr->nknot - 1) return tr->free_step ? fabs(x[block * tr->nv]) : 0;
+  if (block == cav_transcription_blocks(tr)) return tr->free_step ? fabs(x[block * tr->nv]) : 0;
   for (int i = 0; i < tr->nv; i++) most = fmax(most, fabs(x[block * tr->nv + i]));
   return most;
 }
@@ -371,7 +371,7 @@ static void set_boxes(const cav_solve_run *run, descent *d) {
   double most = 0;
   for (int t = 0; t < tr->nknot; t++) most = fmax(most, missed(d, t));
   double bad = d->ratio < 0.25 ? fmin(0.1 * d->predicted, 0.5 * most) : 0.25 * d->predicted;
-  for (int b = 0; b < tr->nknot; b++)
+  for (int b = 0; b <= cav_transcription_blocks(tr); b++)
     d->next[b] = block_length(tr, x, b) > 0.9 * d->radius[b] && d->ratio > 0.25 ? fmin(2 * d->radius[b], most_radius)
                                                                                 : d->radius[b];
   for (int t = 0; t < tr->nknot; t++) {
@@ -381,12 +381,12 @@ static void set_boxes(const cav_solve_run *run, descent *d) {
     else if (off > 0.1 * d->predicted && d->ratio < 0.75)
       shrink(run, d, t, 1);
   }
-  memcpy(d->radius, d->next, (size_t)tr->nknot * sizeof(double));
+  memcpy(d->radius, d->next, ((size_t)cav_transcription_blocks(tr) + 1) * sizeof(double));
 }
 
 static double largest_radius(const cav_transcription *tr, const double *radius) {
   double most = 0;
-  for (int b = 0; b < tr->nknot - (tr->free_step == 0); b++) most = fmax(most, radius[b]);
+  for (int b = 0; b < cav_transcription_blocks(tr) + tr->free_step; b++) most = fmax(most, radius[b]);
   return most;
 }
 

@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-int cav_knot_moves(const cav_transcription *tr, int t) { return tr->periodicity || (t >= 1 && t < tr->nknot); }
+int cav_knot_moves(const cav_transcription *tr, int t) { return tr->periodicity || (t >= tr->first && t < tr->nknot); }
 
 // ---------------------------------------------------------------- counting
 
@@ -574,7 +574,7 @@ static void add_ranges(cav_sum *a, const double *q, double rho) {
   const cav_model *m = tr->model;
   double keep = tr->problem->limit_margin;
   int i = a->knot->layout.joint, active;
-  if (a->t == 0) return;
+  if (a->t < tr->first) return;
   for (int j = 0; j < m->njoint; j++) {
     const cav_joint *joint = &m->joint[j];
     if (!joint->limited) continue;

@@ -190,7 +190,7 @@ static cav_status adjoint_beside(const curve *c, cav_scratch *s, int t, int j, d
 /// Whether coordinate kind (q_t, v_t, v_{t+1}) of a knot moves with an unknown.
 static int kind_moves(const cav_transcription *tr, int t, int kind) {
   int closed = t == tr->nknot - 1 && !tr->periodicity;
-  return kind == 2 ? !closed || !tr->problem->close_at_rest : tr->periodicity || t > 0;
+  return kind == 2 ? !closed || !tr->problem->close_at_rest : cav_knot_moves(tr, t);
 }
 
 /// Adds the curvature of the rates about a knot, that readings pull by pull [2nv], which is added to.

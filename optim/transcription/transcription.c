@@ -150,10 +150,10 @@ static cav_slot_layout layout_of(const cav_transcription *tr, int t) {
   at.effort = has_force ? tr->nresidual : 0;
   at.joint = at.effort + (has_force ? tr->nlimit : 0);
   at.tendon = at.joint;
-  if (t > 0)
+  if (t >= tr->first)
     for (int j = 0; j < m->njoint; j++) at.tendon += m->joint[j].limited;
   at.term = at.tendon;
-  if (t > 0)
+  if (t >= tr->first)
     for (int k = 0; k < m->ntendon; k++) at.term += m->tendon[k].limited;
   at.count = at.term;
   for (int i = 0; i < tr->problem->nterm; i++) at.count += term_slots(tr, &tr->problem->term[i], t);
@@ -217,6 +217,7 @@ cav_transcription *cav_transcription_new(const cav_problem *problem, int threads
   tr->model = problem->model;
   tr->nv = problem->model->nv;
   tr->nknot = (int)lround(problem->duration / problem->timestep) + 1;
+  tr->first = problem->free_start ? -1 : 1;
   // unknowns and entries of their rows are counted in int
   if ((double)tr->nknot * tr->nv > INT_MAX / 4) goto memory;
   const double *g = problem->model->gravity;
@@ -234,9 +235,10 @@ cav_transcription *cav_transcription_new(const cav_problem *problem, int threads
   tr->free_step = problem->duration_most > 0;
   if (!tr->pool || !list_rotations(tr)) goto memory;
   tr->before = calloc(2 * (size_t)tr->nv + 1, sizeof(double));
+  tr->start = calloc(2 * (size_t)tr->model->nq + 1, sizeof(double));
   tr->rotation_after = calloc(CAV_ROTATION_SIZE * (size_t)tr->nrotation + 1, sizeof(double));
   tr->window = calloc((size_t)problem->nterm + 1, sizeof *tr->window);
-  if (!tr->before || !tr->rotation_after || !tr->window) goto memory;
+  if (!tr->before || !tr->start || !tr->rotation_after || !tr->window) goto memory;
   cav_term_windows(tr);
   tr->after = tr->before + tr->nv;
   tr->scratch = calloc((size_t)cav_parallel_size(tr->pool), sizeof *tr->scratch);
@@ -278,7 +280,8 @@ void cav_transcription_free(cav_transcription *tr) {
   free(tr->servo), free(tr->limited);
   free(tr->unactuated), free(tr->effort), free(tr->effort_range), free(tr->effort_unit), free(tr->rotation_dof),
       free(tr->rotation_of);
-  free(tr->knot), free(tr->status), free(tr->scratch), free(tr->before), free(tr->rotation_after), free(tr->window);
+  free(tr->knot), free(tr->status), free(tr->scratch), free(tr->before), free(tr->start), free(tr->rotation_after),
+      free(tr->window);
   cav_periodicity_free(tr->periodicity);
   cav_parallel_free(tr->pool);
   free(tr);
@@ -286,10 +289,14 @@ void cav_transcription_free(cav_transcription *tr) {
 
 // ---------------------------------------------------------------- chaining to knots
 
-int cav_transcription_unknowns(const cav_transcription *tr) { return (tr->nknot - 1) * tr->nv + tr->free_step; }
+int cav_transcription_blocks(const cav_transcription *tr) { return tr->nknot - tr->first; }
+
+int cav_transcription_unknowns(const cav_transcription *tr) {
+  return cav_transcription_blocks(tr) * tr->nv + tr->free_step;
+}
 
 int cav_transcription_block(const cav_transcription *tr, int t, int c) {
-  int blocks = tr->nknot - 1, block = t - 2 + c;
+  int blocks = cav_transcription_blocks(tr), block = t - 1 + c - tr->first;
   if (tr->periodicity) return (block + blocks) % blocks;
   return block >= 0 && block < blocks ? block : -1;
 }
@@ -400,7 +407,7 @@ static cav_status shift_step(const cav_transcription *tr, cav_scratch *s, int t,
   double fraction = exp(shifted == 1 ? -CAV_STEP_FRACTION : CAV_STEP_FRACTION), *v_here = s->rate,
          *v_then = s->rate + tr->nv;
   for (int d = 0; d < tr->nv; d++) {
-    v_here[d] = v[d] / (t > 0 || tr->periodicity ? fraction : 1); // that of a given start stays
+    v_here[d] = v[d] / (cav_knot_moves(tr, t) ? fraction : 1); // that of a given start stays
     v_then[d] = v_next[d] / fraction;
   }
   near.options.timestep *= fraction;
@@ -510,7 +517,7 @@ static void prepare_rotation(const cav_transcription *tr, const double *v, doubl
 }
 
 static void prepare_rotations(cav_transcription *tr, const cav_trajectory *at) {
-  for (int t = tr->periodicity ? 0 : 1; t < tr->nknot; t++)
+  for (int t = cav_knot_moves(tr, 0) ? 0 : 1; t < tr->nknot; t++)
     prepare_rotation(tr, cav_velocity_at(tr, at, t), tr->knot[t].rotation);
   if (tr->periodicity) prepare_rotation(tr, tr->after, tr->rotation_after);
 }
@@ -649,24 +656,38 @@ void cav_transcription_estimate_multipliers(cav_transcription *tr, const double 
         int block = cav_transcription_block(tr, t, c);
         for (int d = 0; block >= 0 && d < nv; d++) value += row[c * nv + d] * x[block * nv + d];
       }
-      if (x && tr->free_step) value += tr->knot[t].slot_step[i] * x[(tr->nknot - 1) * nv];
+      if (x && tr->free_step) value += tr->knot[t].slot_step[i] * x[cav_transcription_blocks(tr) * nv];
       double shifted = rho * value + (x ? slot->multiplier : 0);
       slot->final_multiplier = shifted - fmin(fmax(shifted, rho * slot->lower), rho * slot->upper);
     }
   }
 }
 
+/// q_0 and v_0 of a free start, by the knot before it: x [2nv] of both.
+static void move_start(const cav_transcription *tr, const cav_trajectory *from, const double *x, cav_trajectory *to) {
+  const cav_model *m = tr->model;
+  double *before = tr->start, *moved = before + m->nq;
+  cav_integrate(m, from->q, from->v, -from->timestep, before);
+  cav_integrate(m, before, x, 1, moved);
+  cav_integrate(m, from->q, x + tr->nv, 1, to->q);
+  cav_difference(m, moved, to->q, to->timestep, to->v);
+}
+
 void cav_transcription_move(const cav_transcription *tr, const cav_trajectory *from, const double *x,
                             cav_trajectory *to) {
   size_t nq = (size_t)from->nq, last = (size_t)tr->nknot - 1, nv = (size_t)tr->nv;
+  const double *after_start = x + (size_t)(1 - tr->first) * nv;
   to->timestep = from->timestep;
   if (tr->free_step) {
     double least = tr->problem->duration_least / (double)last, most = tr->problem->duration_most / (double)last;
-    to->timestep = fmin(fmax(from->timestep * exp(x[last * nv]), least), most);
+    to->timestep = fmin(fmax(from->timestep * exp(after_start[last * nv]), least), most);
   }
-  for (size_t t = 1; t <= last; t++) cav_integrate(tr->model, from->q + t * nq, x + (t - 1) * nv, 1, to->q + t * nq);
+  for (size_t t = 1; t <= last; t++)
+    cav_integrate(tr->model, from->q + t * nq, after_start + (t - 1) * nv, 1, to->q + t * nq);
   if (tr->periodicity) {
     cav_periodicity_configuration(tr->periodicity, -1, to->q + last * nq, to->q);
+  } else if (tr->problem->free_start) {
+    move_start(tr, from, x, to);
   } else {
     memcpy(to->q, from->q, nq * sizeof(double));
     memcpy(to->v, from->v, nv * sizeof(double));

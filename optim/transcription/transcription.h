@@ -22,8 +22,8 @@ typedef struct cav_slot {
 typedef struct cav_slot_layout {
   int unactuated; ///< first row of the forces that no actuator can give
   int effort;     ///< of the actuator forces
-  int joint;      ///< of the joint ranges (empty at knot 0)
-  int tendon;     ///< of the tendon ranges (empty at knot 0)
+  int joint;      ///< of the joint ranges (empty at a knot 0 that is given)
+  int tendon;     ///< of the tendon ranges (likewise)
   int term;       ///< of the problem's hard terms
   int count;
 } cav_slot_layout;
@@ -106,10 +106,12 @@ typedef struct cav_window {
 typedef struct cav_transcription {
   const cav_problem *problem;
   const cav_model *model;
-  int nv, nknot; ///< unknown blocks are knots 1 .. nknot-1
+  int nv, nknot; ///< unknown blocks are knots first .. nknot-1
+  int first;     ///< 1; with a free start -1: v_0 = (q_0 (-) q_{-1})/h is an unknown by a knot -1, which has no rows
   int free_step; ///< 1: one more unknown after them, the logarithm of the step over that of the trajectory
   cav_periodicity *periodicity; ///< cycles: from one period to the next; else NULL
   double *before, *after;       ///< [nv] velocity at knot 0 (cycles), and after the last one
+  double *start;                ///< [2*nq] room: the knot before a free start, as it is and as it is moved
   double *rotation_after;       ///< [nturn*CAV_ROTATION_SIZE] of the step after the last knot, in cycles
   double weight;                ///< N: model mass times gravity
   int nresidual;                ///< rows of unactuated
@@ -157,9 +159,10 @@ void cav_transcription_free(cav_transcription *transcription);
 /// From now on linearisations keep the derivative of every constraint row; 0 if memory runs out.
 int cav_transcription_keep_rows(cav_transcription *transcription);
 
-/// Number of unknowns, and the block 0 .. nknot-2 of them that columns c*nv .. (c+1)*nv-1 of knot t belong to; -1:
-/// none.
+/// Number of unknowns, of their blocks of nv, one a knot from the first on, and the block that columns c*nv ..
+/// (c+1)*nv-1 of knot t belong to; -1: none.
 int cav_transcription_unknowns(const cav_transcription *transcription);
+int cav_transcription_blocks(const cav_transcription *transcription);
 int cav_transcription_block(const cav_transcription *transcription, int t, int c);
 
 /// Columns (of 3nv) in which constraint row i of knot t may be nonzero: pattern [3nv] is 1 there; the nv after them are
@@ -222,8 +225,8 @@ cav_status cav_transcription_rows(const cav_transcription *transcription, const 
 /// Where row i of knot t comes from, and its value and bounds. constraint_rows.c.
 void cav_transcription_origin(const cav_transcription *transcription, int t, int i, cav_binding *binding);
 
-/// q_t := q_t (+) x_t for every unknown knot, the step by its unknown within its bounds; v follows, and in cycles q_0
-/// and v_0. x [unknowns].
+/// q_t := q_t (+) x_t for every unknown knot, the step by its unknown within its bounds; v follows, in cycles q_0 and v_0
+/// too, and with a free start v_0. x [unknowns].
 void cav_transcription_move(const cav_transcription *transcription, const cav_trajectory *from, const double *x,
                             cav_trajectory *to);
 

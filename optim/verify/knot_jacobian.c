@@ -1,5 +1,6 @@
 /// Centred differences of a knot's rows: an unknown acts on its own knot and the two beside it, through the velocities
-/// between them; in cycles the first knot is an unknown and the last one its image. What an evaluation shares with the
+/// between them; in cycles the first knot is an unknown and the last one its image. A free start has the step times v_0
+/// as its first block, in the place of a knot before it. What an evaluation shares with the
 /// one before it (the position, and the velocity that reaches the knot) is not done again.
 #include "knot_jacobian.h"
 
@@ -10,14 +11,14 @@
 /// Differences: of a velocity (rad/s or m/s), of the step's logarithm.
 static const double rate_difference = 5e-5, step_difference = 1e-6;
 
-// knot that a block stands for; the first is given, of a cycle the last one
-static int knot_of(const cav_knot_jacobian *s, int block) { return s->at.image ? block : block + 1; }
+// first block's knot: the one before is given; -1: the velocity of a free start
+static int first_of(const cav_knot_jacobian *s) { return s->at.image ? 0 : s->at.problem->free_start ? -1 : 1; }
 
 // block that knot t sees as its c-th: before it, its own, after it; -1: none
 static int block_of(const cav_knot_jacobian *s, int t, int c) {
   int k = t - 1 + c;
   if (s->at.image) return (k + s->blocks) % s->blocks;
-  return k >= 1 && k <= s->at.last ? k - 1 : -1;
+  return k >= first_of(s) && k <= s->at.last ? k - first_of(s) : -1;
 }
 
 // the unknown that column c of knot t is, -1: none
@@ -45,6 +46,8 @@ static void velocities(cav_knot_jacobian *s, int t) {
   int last = s->at.last;
   double *v = s->at.v, *reach = v + (size_t)last * nv, *leave = reach + nv;
   if (t > 0) velocity(s, t);
+  for (size_t d = 0; t == 0 && s->at.problem->free_start && d < nv; d++)
+    v[d] = (s->base->h * s->base->v[d] + s->push[d]) / s->at.h;
   if (t < last) velocity(s, t + 1);
   if (s->at.image && t == 0) {
     velocity(s, last);
@@ -77,7 +80,12 @@ static void move(cav_knot_jacobian *s, int t, int column, double delta) {
   for (int c = 0; c < 3; c++) {
     int block = block_of(s, t, c);
     if (block < 0) continue;
-    size_t k = (size_t)knot_of(s, block);
+    if (first_of(s) < 0 && block == 0) {
+      memset(s->push, 0, (size_t)nv * sizeof *s->push);
+      if (column >= 0 && column / nv == c) s->push[column % nv] = delta;
+      continue;
+    }
+    size_t k = (size_t)(block + first_of(s));
     memcpy(s->q + k * nq, s->base->q + k * nq, nq * sizeof *s->q);
     if (column >= 0 && column / nv == c) {
       memset(s->tangent, 0, (size_t)nv * sizeof *s->tangent);
@@ -176,16 +184,18 @@ cav_status cav_knot_jacobian_find(cav_knot_jacobian *s, int t, int nbinding, con
 
 cav_status cav_knot_jacobian_start(cav_knot_jacobian *s, const cav_verification *base) {
   size_t nq = (size_t)base->model->nq, nv = (size_t)base->model->nv, n = (size_t)base->last + 1;
-  *s = (cav_knot_jacobian){.base = base, .at = *base, .blocks = base->last, .evaluated = -1};
+  *s = (cav_knot_jacobian){.base = base, .at = *base, .evaluated = -1};
+  s->blocks = base->image ? base->last : base->last + 1 - first_of(s);
   s->free_step = base->problem->duration_most > 0;
   s->width = 3 * base->model->nv + s->free_step;
   s->unknowns = s->blocks * base->model->nv + s->free_step;
   s->q = malloc((n * nq + 1) * sizeof(double));
   s->at.q = s->q;
   s->at.v = malloc(((n + 1) * nv + 1) * sizeof(double));
-  s->tangent = malloc((nv + 1) * sizeof(double));
+  s->tangent = calloc(2 * nv + 1, sizeof(double));
   s->point = malloc((nq + nv + 1) * sizeof(double));
   if (!s->q || !s->at.v || !s->tangent || !s->point) return CAV_NO_MEMORY;
+  s->push = s->tangent + nv;
   memcpy(s->q, base->q, n * nq * sizeof(double));
   memcpy(s->at.v, base->v, (n + 1) * nv * sizeof(double));
   return CAV_OK;

@@ -1,5 +1,5 @@
-/// Derivatives of a knot's rows by the unknowns of a motion: tangents of the knots that are not given, and the
-/// logarithm of the step where that is free. Private to optim/verify.
+/// Derivatives of a knot's rows by the unknowns of a motion: tangents of the knots that are not given, before them the
+/// step times v_0 where the start is free, and the logarithm of the step where that is free. Private to optim/verify.
 #ifndef CAVORT_KNOT_JACOBIAN_H
 #define CAVORT_KNOT_JACOBIAN_H
 
@@ -15,6 +15,7 @@ typedef struct cav_knot_jacobian {
   const cav_verification *base;
   cav_verification at; ///< the motion, its knots being moved
   double *q, *tangent; ///< at.q; [nv]
+  double *push;        ///< [nv] what is added to the step times v_0
   int evaluated;       ///< knot that the state is at, -1: none; at this step, and [nq+nv] q and v:
   double step, *point;
   int room;

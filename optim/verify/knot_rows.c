@@ -28,11 +28,10 @@ static cav_status add(cav_knot_rows *rows, cav_knot_row row) {
   return CAV_OK;
 }
 
-// whether a cost counts knot t: for given velocities and postures of a start none is taken
+// whether a cost counts knot t
 static int costs_at(const cav_verification *verification, const cav_term *term, int t) {
-  int fixed = t == 0 && !verification->problem->cycle.on;
   if (term->use != CAV_USE_COST || cav_verification_weight(verification, term, t) == 0) return 0;
-  return !(fixed && (term->quantity == CAV_QUANTITY_VELOCITY || term->quantity == CAV_QUANTITY_CONFIGURATION));
+  return !cav_verification_is_given(verification, term, t);
 }
 
 static int of_contacts(const cav_term *term) { return cav_quantity_rule_of(term->quantity)->of == CAV_OF_CONTACTS; }
@@ -134,7 +133,7 @@ static cav_status list_ranges(const cav_verification *verification, int t, cav_k
   const cav_model *model = verification->model;
   double keep = verification->problem->limit_margin;
   cav_status status = CAV_OK;
-  if (t == 0) return CAV_OK;
+  if (t == 0 && !verification->problem->free_start) return CAV_OK;
   for (int j = 0; j < model->njoint && status == CAV_OK; j++) {
     if (!model->joint[j].limited || model->joint[j].type == CAV_JOINT_FREE) continue;
     double range[2];

@@ -223,11 +223,14 @@ static double norm_of(const cav_term *term, double x) {
 // cost of one value at knot t, where the norm has that weight
 static double cost_of(const cav_verification *verification, const cav_term *term, int t, double weight, double x,
                       double target) {
-  // velocities and accelerations at the start are given: no cost is taken for what no unknown moves
-  int fixed = t == 0 && !verification->problem->cycle.on;
-  fixed = fixed && (term->quantity == CAV_QUANTITY_VELOCITY || term->quantity == CAV_QUANTITY_CONFIGURATION);
-  if (term->use != CAV_USE_COST || fixed) return 0;
+  if (term->use != CAV_USE_COST || cav_verification_is_given(verification, term, t)) return 0;
   return weight * term->weight * norm_of(term, (x - target) / term->scale);
+}
+
+int cav_verification_is_given(const cav_verification *verification, const cav_term *term, int t) {
+  const cav_problem *p = verification->problem;
+  int of_start = term->quantity == CAV_QUANTITY_VELOCITY || term->quantity == CAV_QUANTITY_CONFIGURATION;
+  return t == 0 && !p->cycle.on && !p->free_start && of_start;
 }
 
 double cav_verification_weight(const cav_verification *verification, const cav_term *term, int t) {

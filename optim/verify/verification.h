@@ -124,6 +124,10 @@ int cav_verification_contact(const cav_verification *verification, const cav_ter
 int cav_verification_measure(const cav_verification *verification, const cav_term *term, int t, double *q, double *x,
                              double *target);
 
+/// Whether a term asks for what knot t is given with: the posture or velocity of a start that is not free, of which no cost is
+/// taken. targets.c.
+int cav_verification_is_given(const cav_verification *verification, const cav_term *term, int t);
+
 /// Weight of a term's norm at knot t in the sum that a cost is: the step over a window, 1 at one knot; both ends of a
 /// cycle are one knot. targets.c.
 double cav_verification_weight(const cav_verification *verification, const cav_term *term, int t);

@@ -106,9 +106,10 @@ static cav_status admit(const cav_problem *problem, const cav_trajectory *trajec
                              trajectory->nknot, knots);
   }
   size_t n = (size_t)trajectory->nknot, gains = (n - 1) * (size_t)model->nv * (size_t)model->nv;
-  int finite = all_finite(trajectory->q, n * (size_t)model->nq) && all_finite(problem->q_start, (size_t)model->nq) &&
-               all_finite(problem->v_start, (size_t)model->nv) && (!gain_q || all_finite(gain_q, gains)) &&
-               (!gain_v || all_finite(gain_v, gains));
+  int finite = all_finite(trajectory->q, n * (size_t)model->nq) &&
+               (!problem->free_start || all_finite(trajectory->v, (size_t)model->nv)) &&
+               all_finite(problem->q_start, (size_t)model->nq) && all_finite(problem->v_start, (size_t)model->nv) &&
+               (!gain_q || all_finite(gain_q, gains)) && (!gain_v || all_finite(gain_v, gains));
   return finite ? CAV_OK
                 : verification_fail(error, CAV_NOT_FINITE,
                                     "the trajectory, the start or the gains hold numbers that are not finite");
@@ -124,11 +125,10 @@ void cav_verification_end(cav_verification *verification) {
   free(verification->control);
 }
 
-// velocities from the knots; one more closes the motion
+// velocities from the knots and that of the start; one more closes the motion
 static void knot_velocities(cav_verification *verification) {
   const cav_model *model = verification->model;
   int nq = model->nq, nv = model->nv;
-  memcpy(verification->v, verification->problem->v_start, sizeof(double) * nv);
   for (int t = 1; t <= verification->last; t++) {
     cav_difference(model, verification->q + (t - 1) * nq, verification->q + t * nq, verification->h,
                    verification->v + t * nv);
@@ -177,6 +177,7 @@ static cav_status verification_start(cav_verification *verification, const cav_p
     return CAV_NO_MEMORY;
   verification->state->options = verification->law;
   verification->bare->options.contact = verification->bare->options.constraint = 0;
+  memcpy(verification->v, problem->free_start ? trajectory->v : problem->v_start, sizeof(double) * nv);
   knot_velocities(verification);
   return CAV_OK;
 }
@@ -385,7 +386,7 @@ static cav_status examine(cav_verification *verification, cav_balance *balance, 
   cav_status status = work && hover ? CAV_OK : CAV_NO_MEMORY;
   if (status == CAV_OK && verification->image) {
     status = note_periodicity(verification, &found->periodicity);
-  } else if (status == CAV_OK) {
+  } else if (status == CAV_OK && !verification->problem->free_start) {
     note_start(verification, &found->term);
   }
   note_duration(verification, &found->term);

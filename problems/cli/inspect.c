@@ -429,7 +429,9 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
   cav_status status = print_posture(p, "start", p->q_start, error);
   if (!status) status = print_posture(p, "goal", p->q_goal, error);
   if (status) return status;
-  printf("  %d unknowns; the guess %s", (knots - 1) * p->model->nv + (p->duration_most > 0),
+  printf("  %d unknowns%s; the guess %s",
+         (knots - 1 + 2 * (p->free_start != 0)) * p->model->nv + (p->duration_most > 0),
+         p->free_start ? ", with posture and velocity at the start" : "",
          p->guess == CAV_GUESS_HOLD   ? "holds the start"
          : p->guess == CAV_GUESS_PUMP ? "is simulated, pumping energy"
                                       : "goes from start to goal");

@@ -156,6 +156,15 @@ class Problem:
         self._c.close_at_rest = int(close)
 
     @property
+    def free_start(self) -> bool:
+        """Configuration and velocity at the start are found too; q_start and v_start are where the guess starts."""
+        return bool(self._c.free_start)
+
+    @free_start.setter
+    def free_start(self, free: bool) -> None:
+        self._c.free_start = int(free)
+
+    @property
     def order(self) -> str:
         """Of the step: "euler", "midpoint" or "momentum"."""
         return _library.word("cav_order", self._c.order)
