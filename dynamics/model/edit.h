@@ -16,6 +16,14 @@ void cav_model_return(cav_model *model, const void *kept);
 /// a positive finite factor; CAV_NO_MEMORY, CAV_BAD_INPUT as cav_model_perturb.
 cav_status cav_model_scale(cav_model *model, double factor);
 
+/// Links of a size of their own: lengths of link i times factor[i] ([nlink], > 0, of the world 1) about the anchor of its
+/// first joint, masses by its cube. Before any state of the model exists, but for states that evaluate positions alone.
+/// CAV_BAD_INPUT: a factor that is none, nothing changed; CAV_NO_MEMORY. resize.c.
+cav_status cav_model_resize(cav_model *model, const double *factor);
+
+/// Whether all that a model has is scaled by that; CAV_NOT_SUPPORTED with the reason. resize.c.
+cav_status cav_model_resizable(const cav_model *model, cav_error *error);
+
 /// The whole scene, what stands in the world included, moved by a vector, m.
 void cav_model_move(cav_model *model, const double by[3]);
 

@@ -65,14 +65,16 @@ typedef struct cav_marker_set {
   cav_marker *marker;      ///< [nmarker] names are unique
   double adjust;           ///< m: how far off places that are known may be; they are fitted, too. 0: they are exact
   int floor;               ///< 1: feet that stand do so on the plane z = 0
+  double scale;            ///< how far off sizes of segments may be, of the body's: for cav_ik_sizes; 0: they are right
+  int symmetric;           ///< 1: segments of both sides are of one size
   cav_record_options clip; ///< for cav_record_read; names is memory of the set
 } cav_marker_set;
 
 /// Reads a marker set: an XML file <markers> of elements <marker name= body= pos= weight=>. body is one of the model
 /// or a part that any body has ("right foot"); without pos the place is unknown and starts at the middle of the
 /// body's mass.
-/// <markers> has, where needed, adjust= (m), floor=, and what clips leave out: unit= (m), up= (x, y or z), rate= (1/s) and
-/// names= (by blanks).
+/// <markers> has, where needed, adjust= (m), floor=, scale=, symmetric=, and what clips leave out: unit= (m), up= (x, y
+/// or z), rate= (1/s) and names= (by blanks).
 /// NULL on failure with the reason in error (may be NULL): CAV_BAD_INPUT, CAV_NO_MEMORY. Freed by cav_marker_set_free.
 CAV_API cav_marker_set *cav_marker_set_read(const char *path, const cav_model *model, cav_error *error);
 CAV_API void cav_marker_set_free(cav_marker_set *set);
@@ -118,6 +120,17 @@ CAV_API void cav_ik_report_free(cav_ik_report *report);
 CAV_API cav_status cav_ik(const cav_model *model, const cav_record *record, cav_marker_set *set,
                           const cav_ik_options *options, cav_trajectory **trajectory, cav_ik_report **report,
                           cav_error *error);
+
+/// Fits a model's sizes to a clip: a factor for the lengths of every link (segments of both sides together where the set
+/// says symmetric), with the places of markers that are not known and configurations of frames spread over the clip. A
+/// factor is within about set->scale (> 0) of that of all. The model gets those sizes: what is fixed to a link goes away from
+/// the anchor of its first joint by its factor, masses by its cube, keyframes stand as high as before; gears, ranges,
+/// springs stay. set: places on the model of its new size. factor [nlink], its standard errors in deviation [nlink] (may
+/// be NULL). No state of the model may be used afterwards.
+/// CAV_BAD_INPUT as cav_ik, CAV_NOT_SUPPORTED: the model has meshes that move, tendons along paths or equality
+/// constraints of bodies; CAV_NO_MEMORY, CAV_NOT_FINITE: do not use the model. optim/METHOD.md, 11.
+CAV_API cav_status cav_ik_sizes(cav_model *model, const cav_record *record, cav_marker_set *set,
+                                const cav_ik_options *options, double *factor, double *deviation, cav_error *error);
 
 #ifdef __cplusplus
 }

@@ -648,6 +648,11 @@ CAV_API const char *cav_draft_mjcf(cav_draft *draft);
 CAV_API cav_model *cav_draft_compile(cav_draft *draft, const char *folder, const cav_load_options *options,
                                      cav_error *error);
 
+/// The model as the text of an MJCF file: bodies, joints, geoms, sites, masses and keyframes as the model has them now,
+/// all else as the MJCF file says that it was loaded from, path. Of memory from malloc; NULL on failure with the reason in
+/// error (may be NULL): CAV_NOT_SUPPORTED (not MJCF, meshes, height fields, copied bodies), CAV_BAD_INPUT, CAV_NO_MEMORY.
+CAV_API char *cav_model_mjcf(const cav_model *model, const char *path, cav_error *error);
+
 /// Frees a model; NULL is fine. No state of it may be used afterwards.
 CAV_API void cav_model_free(cav_model *model);
 

@@ -22,6 +22,15 @@ typedef struct cav_fit {
   double *H, *g, *try, *move;    ///< [nv*nv] lower, by columns; [nv]; [nq]; [nv]
 } cav_fit;
 
+/// Sizes of links as unknowns: one factor a group of links, by its logarithm.
+typedef struct cav_fit_sizes {
+  cav_model *model; ///< that has them: the fit's
+  void *kept;       ///< the model as it was given
+  int ngroup;
+  int *group;             ///< [nlink] of each link, -1 of the world
+  double *factor, *error; ///< [nlink] as the model has them; their standard errors
+} cav_fit_sizes;
+
 /// Where marker i of the fit was seen at a frame; NULL: it was not.
 const double *cav_fit_seen(const cav_fit *fit, int frame, int i);
 
@@ -59,7 +68,23 @@ cav_status cav_fit_frame(cav_fit *fit, int frame, const double *before, double *
 /// where there is no free root or fewer than three markers.
 cav_status cav_fit_align(const cav_fit *fit, int frame, double *q);
 
-/// Places of markers that are to be found, with the configurations of frames spread over the clip.
-cav_status cav_fit_places(cav_fit *fit, cav_marker_set *set, const double *q, int *iterations);
+/// Places of markers that are to be found, with the configurations of frames spread over the clip, and with sizes (NULL:
+/// they are known).
+cav_status cav_fit_places(cav_fit *fit, cav_marker_set *set, cav_fit_sizes *sizes, const double *q, int *iterations);
+
+/// Groups of links: each its own, or with its counterpart on the other side. CAV_NOT_SUPPORTED with the reason: the model
+/// has parts that are not scaled; CAV_NO_MEMORY. sizes.c.
+cav_status cav_fit_sizes_new(cav_fit_sizes *sizes, cav_model *model, int symmetric, cav_error *error);
+void cav_fit_sizes_free(cav_fit_sizes *sizes);
+
+/// The model at these logarithms of factors [ngroup]. sizes.c.
+cav_status cav_fit_sizes_set(cav_fit_sizes *sizes, const double *logarithm);
+
+/// How a point of a link moves with the logarithms at the state's position: column [ngroup*3]. sizes.c.
+void cav_fit_sizes_move(const cav_fit_sizes *sizes, const cav_state *state, const double *q, int link,
+                        const double point[3], double *column);
+
+/// Postures of the file, moved up or down with what they stand on. sizes.c.
+cav_status cav_fit_sizes_stand(const cav_fit_sizes *sizes, cav_state *state);
 
 #endif

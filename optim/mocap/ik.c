@@ -163,36 +163,46 @@ static cav_status run(cav_fit *fit, cav_marker_set *set, cav_trajectory **trajec
   cav_status status = q && *trajectory ? CAV_OK : CAV_NO_MEMORY;
   if (!status && set->floor) status = cav_fit_floor(fit);
   if (!status) status = begin(fit, first, q, &report->iterations);
-  if (!status) status = cav_fit_places(fit, set, q, &report->iterations);
+  if (!status) status = cav_fit_places(fit, set, NULL, q, &report->iterations);
   if (!status) status = follow(fit, q, *trajectory, report);
   free(q);
   if (status) cav_file_fail(error, status, 0, "the fit of the clip: %s", cav_status_name(status));
   return status;
 }
 
+// what every fit begins with; made, which is freed after it, holds frames at equal steps
+static cav_status open_fit(cav_fit *fit, const cav_record *record, double **made, cav_error *error) {
+  const cav_ik_options *o = fit->options;
+  const cav_model *m = fit->model;
+  size_t nv = (size_t)m->nv;
+  if (!(o->posture >= 0 && o->roughness >= 0 && o->floor >= 0 && o->iterations > 0))
+    return cav_file_fail(error, CAV_BAD_INPUT, 0, "expected weights of at least 0 and one iteration or more");
+  cav_status status = match(fit, record, error);
+  if (!status) status = equal_steps(fit, record, made, error);
+  if (status) return status;
+  fit->state = cav_state_new(m);
+  fit->H = malloc((nv * nv + 2 * nv + (size_t)m->nq) * sizeof *fit->H);
+  if (!fit->state || !fit->H) return cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for a fit");
+  fit->g = fit->H + nv * nv, fit->move = fit->g + nv, fit->try = fit->move + nv;
+  fit->state->options.contact = 0;
+  return CAV_OK;
+}
+
+static void close_fit(cav_fit *fit, double *made) {
+  cav_state_free(fit->state);
+  free(fit->H), free(made), free(fit->marker), free(fit->column), free(fit->stands);
+}
+
 cav_status cav_ik(const cav_model *model, const cav_record *record, cav_marker_set *set, const cav_ik_options *options,
                   cav_trajectory **trajectory, cav_ik_report **report, cav_error *error) {
   cav_fit fit = {.model = model, .options = options, .set = set};
-  double *made = NULL, *work = NULL;
+  double *made = NULL;
   cav_ik_report *told = NULL;
-  size_t nv = (size_t)model->nv;
   *trajectory = NULL;
   if (report) *report = NULL;
-  if (!(options->posture >= 0 && options->roughness >= 0 && options->floor >= 0 && options->iterations > 0))
-    return cav_file_fail(error, CAV_BAD_INPUT, 0, "expected weights of at least 0 and one iteration or more");
-  cav_status status = match(&fit, record, error);
-  if (!status) status = equal_steps(&fit, record, &made, error);
-  if (!status) {
-    fit.state = cav_state_new(model);
-    fit.H = work = malloc((nv * nv + 2 * nv + (size_t)model->nq) * sizeof *work);
-    told = report_new(&fit);
-    if (!fit.state || !work || !told) status = cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for a fit");
-  }
-  if (!status) {
-    fit.g = work + nv * nv, fit.move = fit.g + nv, fit.try = fit.move + nv;
-    fit.state->options.contact = 0;
-    status = run(&fit, set, trajectory, told, error);
-  }
+  cav_status status = open_fit(&fit, record, &made, error);
+  if (!status && !(told = report_new(&fit))) status = cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for a fit");
+  if (!status) status = run(&fit, set, trajectory, told, error);
   if (status) {
     cav_trajectory_free(*trajectory);
     *trajectory = NULL;
@@ -201,7 +211,36 @@ cav_status cav_ik(const cav_model *model, const cav_record *record, cav_marker_s
     *report = told;
   else
     cav_ik_report_free(told);
-  cav_state_free(fit.state);
-  free(work), free(made), free(fit.marker), free(fit.column), free(fit.stands);
+  close_fit(&fit, made);
+  return status;
+}
+
+cav_status cav_ik_sizes(cav_model *model, const cav_record *record, cav_marker_set *set, const cav_ik_options *options,
+                        double *factor, double *deviation, cav_error *error) {
+  cav_fit fit = {.model = model, .options = options, .set = set};
+  cav_fit_sizes sizes = {0};
+  double *made = NULL, *q = malloc((size_t)model->nq * sizeof *q);
+  int iterations = 0, first = -1;
+  cav_error own = {0}, *why = error ? error : &own;
+  *why = (cav_error){0};
+  cav_status status = q ? CAV_OK : CAV_NO_MEMORY;
+  if (!status && !(set->scale > 0))
+    status = cav_file_fail(why, CAV_BAD_INPUT, 0, "expected scale > 0 of the marker set, got %g", set->scale);
+  if (!status) status = open_fit(&fit, record, &made, why);
+  if (!status && (first = first_frame(&fit)) < 0)
+    status = cav_file_fail(why, CAV_BAD_INPUT, 0, "no frame shows a marker of the set");
+  if (!status) status = cav_fit_sizes_new(&sizes, model, set->symmetric, why);
+  if (!status && set->floor) status = cav_fit_floor(&fit);
+  if (!status) status = begin(&fit, first, q, &iterations);
+  if (!status) status = cav_fit_places(&fit, set, &sizes, q, &iterations);
+  if (!status) status = cav_fit_sizes_stand(&sizes, fit.state);
+  if (!status) {
+    memcpy(factor, sizes.factor, (size_t)model->nlink * sizeof *factor);
+    if (deviation) memcpy(deviation, sizes.error, (size_t)model->nlink * sizeof *deviation);
+  }
+  if (status && !*why->text) cav_file_fail(why, status, 0, "the fit of sizes: %s", cav_status_name(status));
+  cav_fit_sizes_free(&sizes);
+  close_fit(&fit, made);
+  free(q);
   return status;
 }

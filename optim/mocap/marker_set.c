@@ -22,6 +22,8 @@ static const char *const axes[] = {"x", "y", "z", NULL};
 static const cav_xml_attribute set_attributes[] = {
     {"adjust", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("m", "(0: given positions are exact)", "how far off given positions may be; they are estimated too")},
     {"floor", CAV_XML_BOOL, 0, 0, NULL, 0, NOTE("", "(false)", "feet stand on the plane z = 0 of the clip where a marker of theirs stands still, low")},
+    {"scale", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("", "(0: sizes are right)", "how far off sizes of segments may be, as a fraction, against that of the whole body; they are estimated too, by which the model is scaled")},
+    {"symmetric", CAV_XML_BOOL, 0, 0, NULL, 0, NOTE("", "(true)", "segments of both sides have one size")},
     {"unit", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("m", "(as the clip says, or as its format has it)", "unit of length of the clip")},
     {"up", CAV_XML_WORD, 0, 0, axes, 0, NOTE("", "(as the format of the clip has it)", "axis of the clip that points up")},
     {"rate", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("1/s", "(as the clip says)", "frames a second")},
@@ -65,7 +67,9 @@ static cav_status read_set(const cav_problem_reader *reader, const cav_xml_node 
   cav_status status = cav_problem_real(reader, root, "adjust", 0, DBL_MAX, &set->adjust);
   if (!status) status = cav_problem_real(reader, root, "unit", DBL_MIN, DBL_MAX, &set->clip.unit);
   if (!status) status = cav_problem_real(reader, root, "rate", DBL_MIN, DBL_MAX, &set->clip.rate);
+  if (!status) status = cav_problem_real(reader, root, "scale", 0, DBL_MAX, &set->scale);
   set->floor = cav_xml_bool(root, "floor", 0);
+  set->symmetric = cav_xml_bool(root, "symmetric", 1);
   if (cav_xml_get(root, "up")) set->clip.up = axes[cav_xml_word(root, "up", 2)][0];
   if (!status && names && !(set->clip.names = strdup(names))) status = cav_problem_no_memory(reader);
   for (const cav_xml_node *c = root->child; c && !status; c = c->next) status = read_marker(reader, c, set);

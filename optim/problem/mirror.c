@@ -49,8 +49,7 @@ static int is_side(const char *token, size_t n) {
   return n == 2 && isupper((unsigned char)token[0]) && (last == 'L' || last == 'R');
 }
 
-/// The joint whose name is that of joint j for the other side; -1: the name has no side, -2: there is no such joint.
-static int other_side(const cav_model *m, int j) {
+int cav_joint_other_side(const cav_model *m, int j) {
   const char *name = m->joint[j].name;
   char other[256];
   if (strlen(name) > 240) return -1;
@@ -91,7 +90,7 @@ static cav_status pair_joints(const cav_problem *problem, cav_image *image, cav_
   }
   for (int j = 0; j < m->njoint; j++) {
     if (image[j].joint >= 0) continue;
-    int other = other_side(m, j);
+    int other = cav_joint_other_side(m, j);
     if (other == -2)
       return cav_file_fail(error, CAV_BAD_INPUT, 0,
                            "joint '%.80s' has a side in its name but the model has no joint of that name for the other "

@@ -40,6 +40,10 @@ void cav_periodicity_range(const cav_periodicity *periodicity, int joint, double
 /// knots but the last. NULL if memory runs out.
 cav_trajectory *cav_periodicity_unroll(const cav_periodicity *periodicity, const cav_trajectory *period, int periods);
 
+/// The joint whose name is that of joint j for the other side; -1: the name has no side, -2: there is no such joint.
+/// mirror.c.
+int cav_joint_other_side(const cav_model *model, int j);
+
 // mirror.c: images of joints and links under the reflection of a world axis
 
 /// Image of a joint: its counterpart, and how values carry over. Scalars: value' - q0' = sign (value - q0).

@@ -35,6 +35,8 @@ typedef struct cav_command_line {
   int force;           ///< --force: solve what is proven impossible
   const char *methods; ///< --methods, NULL: own
   const char *markers; ///< --markers
+  int scale;           ///< --scale
+  double mass;         ///< --mass, kg; 0: as it is
   const char *like;    ///< --like, NULL: as the model is built
   const char *format;  ///< --to, NULL: none
   double rate;         ///< --rate, 0: as the knots are

@@ -1,5 +1,6 @@
 /// cavort ik: a model fitted to a recorded clip. Writes a folder with trajectory.csv, markers.csv (residuals),
-/// markers.xml (the set with the places that were found) and view.html. Exit status 0 if the fit was made.
+/// markers.xml (the set with the places that were found), view.html and, where sizes or a mass are asked for, model.xml,
+/// the model as it was scaled. Exit status 0 if the fit was made.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -20,6 +21,7 @@ typedef struct fit {
   cav_record *record;
   cav_trajectory *motion;
   cav_ik_report *report;
+  double *factor, *deviation; ///< [nlink] sizes that were found; NULL: not sought
   char *folder;
   double seconds;
 } fit;
@@ -44,6 +46,59 @@ static char *default_folder(const char *clip) {
   char *folder = malloc((size_t)n + 4);
   if (folder) sprintf(folder, "%.*s.ik", n, name);
   return folder;
+}
+
+static cav_status write_model(const fit *f, const char *path, cav_error *error) {
+  char *text = cav_model_mjcf(f->model, f->line->model, error);
+  if (!text) return error->status;
+  cav_file file;
+  cav_status status = cav_file_begin(&file, path, error);
+  if (!status) {
+    fputs(text, file.stream);
+    status = cav_file_end(&file, error);
+  }
+  free(text);
+  return status;
+}
+
+static cav_status find_sizes(fit *f, const cav_ik_options *options, cav_error *error) {
+  size_t n = (size_t)f->model->nlink;
+  f->factor = malloc(n * sizeof *f->factor), f->deviation = malloc(n * sizeof *f->deviation);
+  if (!f->factor || !f->deviation) return cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for sizes");
+  return cav_ik_sizes(f->model, f->record, f->set, options, f->factor, f->deviation, error);
+}
+
+static cav_status set_mass(fit *f, cav_error *error) {
+  size_t n = (size_t)f->model->nlink;
+  double *scale = malloc(n * sizeof *scale), ratio = f->line->mass / f->model->mass;
+  for (size_t i = 0; i < n && scale; i++) scale[i] = ratio;
+  cav_status status = scale ? cav_model_perturb(f->model, scale, 0) : CAV_NO_MEMORY;
+  free(scale);
+  return status ? cav_file_fail(error, status, 0, "the mass of the subject: %s", cav_status_name(status)) : CAV_OK;
+}
+
+// sizes and masses first; the model of which all else is told is that of the file that has them
+static cav_status scale(fit *f, const cav_ik_options *options, cav_error *error) {
+  static const double usual = 0.1;
+  cav_marker_set *set = f->set;
+  if (f->line->scale && set->scale <= 0) set->scale = usual;
+  if (set->scale <= 0 && f->line->mass <= 0) return CAV_OK;
+  char *path = f->folder ? cav_result_path(f->folder, "model.xml") : NULL;
+  cav_status status =
+      path ? cav_result_folder(f->folder, error) : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for the model");
+  if (!status && set->scale > 0) status = find_sizes(f, options, error);
+  if (!status && f->line->mass > 0) status = set_mass(f, error);
+  if (!status) status = write_model(f, path, error);
+  if (!status) {
+    // places were found with the sizes
+    for (int i = 0; i < set->nmarker && f->factor; i++) set->marker[i].placed = 1;
+    if (f->factor) set->adjust = set->scale = 0;
+    cav_model_free(f->model);
+    f->model = cav_model_load(path, error);
+    if (!f->model) status = error->status;
+  }
+  free(path);
+  return status;
 }
 
 static cav_status write_residuals(const fit *f, cav_error *error) {
@@ -117,12 +172,25 @@ static cav_status write_all(const fit *f, cav_error *error) {
   return status;
 }
 
+// a line for each link, of two sides one
+static void print_sizes(const fit *f) {
+  const cav_model *m = f->model;
+  if (f->factor) printf("%-20s %9s %9s\n", "segment", "size", "+-");
+  for (int i = 1; i < m->nlink && f->factor; i++) {
+    int seen = 0;
+    for (int k = 1; k < i; k++) seen |= f->factor[k] == f->factor[i];
+    if (!seen) printf("%-20.20s %9.4f %9.4f\n", m->body[m->link[i].body].name, f->factor[i], f->deviation[i]);
+  }
+  if (f->factor || f->line->mass > 0) printf("model.xml: %.1f kg\n", m->mass);
+}
+
 static void print(const fit *f) {
   static const char *const assumed[] = {"lengths in the format's usual unit (unit= of the marker set)",
                                         "the format's usual axis up (up=)", "30 frames a second (rate=)"};
   const cav_ik_report *r = f->report;
   for (int k = 0; k < 3; k++)
     if (f->record->assumed >> k & 1) printf("assumed: %s\n", assumed[k]);
+  print_sizes(f);
   printf("%-20s %-20s %7s %9s %9s\n", "marker", "body", "frames", "rms mm", "worst mm");
   for (int i = 0; i < r->nmarker; i++) {
     const cav_marker *marker = &f->set->marker[r->marker[i]];
@@ -134,7 +202,8 @@ static void print(const fit *f) {
   if (absent) printf("%d markers of the set are not in the clip\n", absent);
   printf("%d frames, %d markers, rms %.2f mm, %.2f s (%.2f s a thousand frames)\n", r->nframe, r->nmarker,
          1e3 * r->total_rms, f->seconds, 1e3 * f->seconds / r->nframe);
-  printf("wrote %s: trajectory.csv, markers.csv, markers.xml, view.html\n", f->folder);
+  printf("wrote %s: trajectory.csv, markers.csv, markers.xml, view.html%s\n", f->folder,
+         f->factor || f->line->mass > 0 ? ", model.xml" : "");
 }
 
 static double now(void) {
@@ -148,10 +217,11 @@ int cav_command_ik(const cav_command_line *line) {
   fit f = {.line = line};
   cav_ik_options options = cav_ik_options_default();
   cav_status status = read_all(&f, &error);
+  f.folder = line->output ? strdup(line->output) : default_folder(line->operand);
   f.seconds = now();
+  if (!status) status = scale(&f, &options, &error);
   if (!status) status = cav_ik(f.model, f.record, f.set, &options, &f.motion, &f.report, &error);
   f.seconds = now() - f.seconds;
-  f.folder = line->output ? strdup(line->output) : default_folder(line->operand);
   if (!status) status = write_all(&f, &error);
   if (!status && !line->quiet) print(&f);
   cav_ik_report_free(f.report);
@@ -159,6 +229,6 @@ int cav_command_ik(const cav_command_line *line) {
   cav_record_free(f.record);
   cav_marker_set_free(f.set);
   cav_model_free(f.model);
-  free(f.folder);
+  free(f.folder), free(f.factor), free(f.deviation);
   return status ? cav_command_fail(&error) : 0;
 }

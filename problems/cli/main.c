@@ -1,5 +1,6 @@
 /// The cavort command: reads the command line and calls one command. Commands are a table; each says which options it
 /// takes.
+#include <math.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -32,7 +33,9 @@ enum option {
   OPTION_JOBS = 131072,
   OPTION_SET = 262144,
   OPTION_CSV = 524288,
-  OPTION_LIKE = 1048576
+  OPTION_LIKE = 1048576,
+  OPTION_SCALE = 134217728,
+  OPTION_MASS = 268435456
 };
 
 #define SOLVER_NAME(solver, name, ...) "|" #name
@@ -58,6 +61,10 @@ static const cav_manual_option options[] = {
      "(Ipopt with "
      "limited memory), both"},
     {OPTION_MARKERS, "--markers", NULL, "FILE", "marker set: which marker of the clip sits where on which body"},
+    {OPTION_SCALE, "--scale", NULL, NULL,
+     "fit the sizes of segments too, within about a tenth of the whole body's (scale of the marker set says how far), "
+     "and write the scaled model, model.xml"},
+    {OPTION_MASS, "--mass", NULL, "KG", "mass of the subject, of all that moves, for the scaled model"},
     {OPTION_THREADS, "--threads", NULL, "N",
      "threads to use (default: all processors); the result does not depend on it"},
     {OPTION_RESUME, "--resume", NULL, NULL,
@@ -115,7 +122,7 @@ static const cav_manual_command commands[] = {
      "fit a model to a recorded clip (.trc, .c3d, .bvh, .csv, .xml): the motion nearest to its markers, without "
      "forces;\n"
      "  writes trajectory.csv, residuals of markers, the marker set with the places that were found, and a page",
-     cav_command_ik, OPTION_MODEL | OPTION_MARKERS | OPTION_OUTPUT | OPTION_QUIET},
+     cav_command_ik, OPTION_MODEL | OPTION_MARKERS | OPTION_SCALE | OPTION_MASS | OPTION_OUTPUT | OPTION_QUIET},
     {"export", "DIR",
      "write the motion of a result folder in a format of other tools, into the folder or where -o says",
      cav_command_export, OPTION_MODEL | OPTION_OUTPUT | OPTION_TO | OPTION_RATE | OPTION_QUIET},
@@ -281,6 +288,13 @@ static int take_value(cav_command_line *line, enum option option, const char *na
     case OPTION_MARKERS:
       line->markers = value;
       return 1;
+    case OPTION_SCALE:
+      return line->scale = 1;
+    case OPTION_MASS:
+      line->mass = strtod(value, &end);
+      if (end != value && !*end && line->mass > 0 && isfinite(line->mass)) return 1;
+      fprintf(stderr, "cavort: %s: expected a mass in kg, above 0, got '%s'\n", name, value);
+      return 0;
     case OPTION_THREADS:
       n = strtol(value, &end, 10);
       line->threads = (int)n;
