@@ -1,8 +1,9 @@
-/// MuJoCo's enumerators of what both libraries have.
+/// MuJoCo 2.2.2 beside ours: its enumerators of what both libraries have, and what later versions do otherwise.
 #ifndef CAVORT_TESTS_PEER_H
 #define CAVORT_TESTS_PEER_H
 
 #include <mujoco/mujoco.h>
+#include <stdlib.h>
 
 #include "cavort/model.h"
 
@@ -45,5 +46,47 @@ static const int peer_sensor[CAV_SENSOR_TYPES] = {
     [CAV_SENSOR_FRAMEANGACC] = mjSENS_FRAMEANGACC,
     [CAV_SENSOR_CLOCK] = mjSENS_CLOCK,
 };
+
+// J'v of all rows, J' by differences of the fourth order along v
+static inline void peer_row_biases(const mjModel *m, const mjData *d, double *out) {
+  static const double step = 1e-3, at[4] = {-2, -1, 1, 2}, weight[4] = {1, -8, 8, -1};
+  mjData *beside = mj_makeData(m);
+  double *rate = calloc((size_t)d->nefc + 1, sizeof *rate);
+  for (int i = 0; i < d->ne; i++) out[i] = 0;
+  for (int k = 0; k < 4; k++) {
+    mju_copy(beside->qpos, d->qpos, m->nq);
+    mj_integratePos(m, beside->qpos, d->qvel, at[k] * step);
+    mj_fwdPosition(m, beside);
+    rate = realloc(rate, ((size_t)beside->nefc + 1) * sizeof *rate);
+    mj_mulJacVec(m, beside, rate, d->qvel);
+    for (int i = 0; i < d->ne; i++) out[i] += weight[k] * rate[i] / (12 * step);
+  }
+  free(rate);
+  mj_deleteData(beside);
+}
+
+/// After mj_inverse: connects and welds by the law that version 3 and ours have. J'v is taken from their reference, and
+/// rotations have the weight of rotations. Forces, qfrc_inverse and readings of accelerations follow.
+static inline void peer_hold(const mjModel *m, mjData *d) {
+  size_t n = (size_t)d->nefc + 1;
+  double *bias = calloc(n, sizeof *bias), *Ja = calloc(n, sizeof *Ja), *change = calloc(n, sizeof *change);
+  double *push = calloc((size_t)m->nv + 1, sizeof *push);
+  peer_row_biases(m, d, bias);
+  mj_mulJacVec(m, d, Ja, d->qacc);
+  for (int i = 0, k = 0; i < d->ne; i++) {
+    int id = d->efc_id[i];
+    k = i > 0 && d->efc_id[i - 1] == id ? k + 1 : 0;
+    if (m->eq_type[id] > mjEQ_WELD) continue;
+    const double *a = m->body_invweight0 + 2 * m->eq_obj1id[id], *b = m->body_invweight0 + 2 * m->eq_obj2id[id];
+    double D = d->efc_D[i] * (k < 3 ? 1 : (a[0] + b[0]) / (a[1] + b[1]));
+    change[i] = D * (d->efc_aref[i] - bias[i] - Ja[i]) - d->efc_force[i];
+    d->efc_force[i] += change[i];
+  }
+  mj_mulJacTVec(m, d, push, change);
+  mju_subFrom(d->qfrc_inverse, push, m->nv);
+  mj_rnePostConstraint(m, d);
+  mj_sensorAcc(m, d);
+  free(bias), free(Ja), free(change), free(push);
+}
 
 #endif

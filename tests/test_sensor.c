@@ -213,6 +213,7 @@ static int compare_state(peers *p, double *v_next, double *u, double *expected) 
   const mjModel *m = p->theirs;
   mjData *d = p->data;
   mj_inverse(m, d);
+  peer_hold(m, d);
   for (int i = 0; i < m->nv; i++) {
     v_next[i] = d->qvel[i] + m->opt.timestep * d->qacc[i];
     double a = (v_next[i] - d->qvel[i]) / m->opt.timestep;

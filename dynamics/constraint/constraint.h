@@ -38,6 +38,28 @@ void cav_equality_evaluate(const cav_model *model, cav_state *state);
 void cav_equality_velocity(const cav_model *model, const cav_state *state, const cav_equality_rows *eq, const double *v,
                            const double *velocity, double *out);
 
+/// Whether its rows accelerate at v without any acceleration of dofs: connects and welds.
+static inline int cav_equality_turns(const cav_equality *e) {
+  return e->type == CAV_EQUALITY_CONNECT || e->type == CAV_EQUALITY_WELD;
+}
+
+/// That acceleration of all of them, J'v, from v and the links' velocities [nlink*6]. equality.c.
+void cav_equality_biases(const cav_model *model, cav_state *state, const double *v, const double *velocity);
+
+/// Motion of a link's point: its angular velocity w and acceleration, and its own, from spatial ones about the reference.
+/// equality.c.
+void cav_point_motion(const double V[6], const double A[6], const double reference[3], const double point[3],
+                      double velocity[6], double acceleration[6]);
+
+/// v* of dimension k of an equality constraint, coupled rows apart.
+static inline double cav_equality_target(const cav_state *state, const cav_equality_rows *eq, int k) {
+  return (1 - eq->damping) * eq->velocity[k] - eq->stiffness * eq->error[k] - state->options.timestep * eq->bias[k];
+}
+
+/// r = s/2 Im(q2 y q1): what the rotation rows of a weld make of y, for frames of which the second is conjugated.
+/// equality.c.
+void cav_weld_turn(double s, const double q2[4], const double y[4], const double q1[4], double r[3]);
+
 /// Impulses of all equality constraints, v* taken at velocity_now (NULL: as it was); wrenches, times scale, into
 /// state->force. Then, once forces are projected: u [nv] += scale J' f of those between joints or tendons. equality.c.
 void cav_equality_impulses(const cav_model *model, cav_state *state, const double *v, const double *velocity_now,

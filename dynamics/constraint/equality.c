@@ -8,11 +8,14 @@
 ///   tendon    the same of lengths
 ///   distance  the gap between two geoms, less the distance asked for
 ///
-/// Errors, weights and the impedance (by the length of x over all rows) are MuJoCo 2.2.2's, but for two things: it
-/// scales only the rate of a weld's rotation by torquescale and not the error, where both agree at 1; and it has no
-/// distance. MuJoCo 3 takes J'v from the reference of connects and welds, which is not done here
-/// (tests/results/models.md). Where the nearest points of a distance are not unique, the deepest point that the pair's
-/// routine gives first counts.
+/// Points and frames that turn accelerate without any force: v* of connects and welds has -h J'v besides, so that they
+/// are held alike in any coordinates. J' and J are at v and q whatever the order of the step, so v* hangs on these
+/// alone and the forward step stays convex.
+///
+/// Errors, weights and the impedance (by the length of x over all rows) are MuJoCo 3's; 2.2.2 has neither J'v nor the
+/// weight of rotations, and both scale only the rate of a weld's rotation by torquescale and not the error, where all
+/// agree at 1. It has no distance. Where the nearest points of a distance are not unique, the deepest point that the
+/// pair's routine gives first counts; its J'v, which the shapes' curvatures are in, is left out.
 #include "constraint.h"
 #include "math3.h"
 
@@ -31,6 +34,13 @@ static void points(const cav_state *state, const cav_equality *e, cav_equality_r
   sub3(eq->error, eq->point[0], eq->point[1]);
 }
 
+void cav_weld_turn(double s, const double q2[4], const double y[4], const double q1[4], double r[3]) {
+  double product[4];
+  quat_mul(product, y, q1);
+  quat_mul(product, q2, product);
+  scale3(r, 0.5 * s, product + 1);
+}
+
 // x = s Im(conj(q2) q1), its rate s/2 Im(conj(q2) w q1) with w = w1 - w2 in world axes
 static void weld_rotation(const cav_state *state, const cav_equality *e, cav_equality_rows *eq) {
   double frame[2][4], between[4];
@@ -39,10 +49,9 @@ static void weld_rotation(const cav_state *state, const cav_equality *e, cav_equ
   quat_mul(between, frame[1], frame[0]);
   scale3(eq->error + 3, e->torquescale, between + 1);
   for (int k = 0; k < 3; k++) {
-    double spin[4] = {0, k == 0, k == 1, k == 2};
-    quat_mul(spin, spin, frame[0]);
-    quat_mul(spin, frame[1], spin);
-    for (int i = 0; i < 3; i++) eq->rotation[3 * i + k] = 0.5 * e->torquescale * spin[1 + i];
+    double spin[4] = {0, k == 0, k == 1, k == 2}, column[3];
+    cav_weld_turn(e->torquescale, frame[1], spin, frame[0], column);
+    for (int i = 0; i < 3; i++) eq->rotation[3 * i + k] = column[i];
   }
 }
 
@@ -117,8 +126,9 @@ void cav_equality_evaluate(const cav_model *model, cav_state *state) {
     }
     double square = 0;
     for (int k = 0; k < e->dim; k++) square += eq->error[k] * eq->error[k];
-    cav_law law = cav_law_at(state, &e->softness, sqrt(square), e->weight);
-    for (int k = 0; k < e->dim; k++) eq->regulariser[k] = law.regulariser;
+    cav_law law = cav_law_at(state, &e->softness, sqrt(square), e->weight[0]);
+    double turned = e->dim == 6 ? cav_law_at(state, &e->softness, sqrt(square), e->weight[1]).regulariser : 0;
+    for (int k = 0; k < e->dim; k++) eq->regulariser[k] = k < 3 ? law.regulariser : turned;
     eq->damping = law.damping;
     eq->stiffness = law.stiffness;
   }
@@ -157,6 +167,49 @@ void cav_equality_velocity(const cav_model *model, const cav_state *state, const
   if (eq->dim == 6) { rotate(out + 3, eq->rotation, angular); }
 }
 
+void cav_point_motion(const double V[6], const double A[6], const double reference[3], const double point[3],
+                      double velocity[6], double acceleration[6]) {
+  copy3(velocity, V);
+  velocity_at(velocity + 3, V, reference, point);
+  copy3(acceleration, A);
+  velocity_at(acceleration + 3, A, reference, point);
+  cross_add3(acceleration + 3, velocity, velocity + 3);
+}
+
+// d/dt s/2 Im(conj(q2) w q1), w = w1 - w2: the frames turn too
+static void weld_bias(const cav_state *state, const cav_equality *e, const double velocity[2][6],
+                      const double acceleration[2][6], cav_equality_rows *eq) {
+  double frame[2][4], w[3], sum[3], y[4];
+  for (int k = 0; k < 2; k++) quat_mul(frame[k], state->link[e->link[k]].quat, e->quat[k]);
+  quat_conjugate(frame[1], frame[1]);
+  sub3(w, velocity[0], velocity[1]);
+  add3(sum, velocity[0], velocity[1]);
+  y[0] = -0.5 * dot3(w, w);
+  cross3(y + 1, w, sum);
+  scale3(y + 1, 0.5, y + 1);
+  add3(y + 1, y + 1, acceleration[0]);
+  sub3(y + 1, y + 1, acceleration[1]);
+  cav_weld_turn(e->torquescale, frame[1], y, frame[0], eq->bias + 3);
+}
+
+void cav_equality_biases(const cav_model *model, cav_state *state, const double *v, const double *velocity) {
+  double *bias = state->work->bias;
+  if (!bias) return;
+  cav_link_biases(model, state, v, velocity, bias);
+  for (int i = 0; i < state->nequality; i++) {
+    cav_equality_rows *eq = &state->equality[i];
+    const cav_equality *e = &model->equality[eq->equality];
+    if (!cav_equality_turns(e)) continue;
+    double V[2][6], A[2][6];
+    for (int k = 0; k < 2; k++) {
+      int link = e->link[k];
+      cav_point_motion(velocity + 6 * link, bias + 6 * link, state->reference + 3 * link, eq->point[k], V[k], A[k]);
+    }
+    sub3(eq->bias, A[0] + 3, A[1] + 3);
+    if (eq->dim == 6) weld_bias(state, e, (const double(*)[6])V, (const double(*)[6])A, eq);
+  }
+}
+
 // wrenches of an impulse on both links
 static void push(cav_state *state, const cav_equality *e, const cav_equality_rows *eq, double scale) {
   double force[3], moment[3] = {0, 0, 0};
@@ -184,8 +237,7 @@ void cav_equality_impulses(const cav_model *model, cav_state *state, const doubl
     if (velocity_now) { cav_equality_velocity(model, state, eq, v, velocity_now, eq->velocity); }
     cav_equality_velocity(model, state, eq, v_next, state->velocity_next, eq->velocity_next);
     for (int k = 0; k < eq->dim; k++) {
-      double target = (1 - eq->damping) * eq->velocity[k] - eq->stiffness * eq->error[k];
-      if (coupled) { target = *coupled++; }
+      double target = coupled ? *coupled++ : cav_equality_target(state, eq, k);
       eq->impulse[k] = (target - eq->velocity_next[k]) / eq->regulariser[k];
     }
     if (between_links(e)) { push(state, e, eq, scale); }
@@ -227,26 +279,26 @@ static void align(const cav_state *state, cav_equality *e) {
   quat_mul(e->quat[0], back, world);
 }
 
-// reference diagonal of A: translations for all rows of bodies, as MuJoCo has it
-static double weigh(const cav_model *model, const cav_equality *e) {
-  double weight = 0;
+// reference diagonals of A, translations first; of a weld's rotation the second
+static void weigh(const cav_model *model, cav_equality *e) {
+  e->weight[0] = e->weight[1] = 0;
   for (int side = 0; side < 2 && e->object[side] >= 0; side++) {
     int object = e->object[side];
     switch (e->type) {
       case CAV_EQUALITY_JOINT:
-        weight += model->dof[model->joint[object].dof].inverse_weight;
+        e->weight[0] += model->dof[model->joint[object].dof].inverse_weight;
         break;
       case CAV_EQUALITY_TENDON:
-        weight += model->tendon[object].inverse_weight;
+        e->weight[0] += model->tendon[object].inverse_weight;
         break;
       case CAV_EQUALITY_DISTANCE:
-        weight += model->body[model->geom[object].body].inverse_weight[0];
+        e->weight[0] += model->body[model->geom[object].body].inverse_weight[0];
         break;
       default:
-        weight += model->body[object].inverse_weight[0];
+        e->weight[0] += model->body[object].inverse_weight[0];
+        e->weight[1] += model->body[object].inverse_weight[1];
     }
   }
-  return weight;
 }
 
 void cav_equality_settle(const cav_model *model, const cav_state *state, cav_equality *e) {
@@ -263,5 +315,5 @@ void cav_equality_settle(const cav_model *model, const cav_state *state, cav_equ
     if (e->type == CAV_EQUALITY_JOINT) e->reference[side] = model->q0[model->joint[object].q];
     if (e->type == CAV_EQUALITY_TENDON) e->reference[side] = state->tendon_length[object];
   }
-  e->weight = weigh(model, e);
+  weigh(model, e);
 }

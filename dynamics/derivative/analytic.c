@@ -27,11 +27,12 @@
 
 enum { ALIGN = 8 };
 
-static cav_derivative_store *derivatives_new(const cav_model *model) {
+static cav_derivative_store *derivatives_new(const cav_model *model, int bias) {
   cav_derivative_store *s = calloc(1, sizeof *s);
   if (!s) return NULL;
   size_t nv = (size_t)model->nv, n = (size_t)model->nlink;
-  size_t doubles = 5 * 6 * nv + (12 + 3 * CAV_TWIST_BLOCK) * n + 12 * nv + nv * nv;
+  size_t biases = bias ? 12 * nv : 0;
+  size_t doubles = 5 * 6 * nv + (12 + 3 * CAV_TWIST_BLOCK) * n + 12 * nv + nv * nv + biases;
   s->drift = calloc(doubles + ALIGN, sizeof(double));
   s->touched = calloc(n + nv + 1, sizeof(int));
   if (!s->drift || !s->touched) {
@@ -49,14 +50,16 @@ static cav_derivative_store *derivatives_new(const cav_model *model) {
   s->by_next = s->by_now + CAV_TWIST_BLOCK * n;
   s->across = s->by_next + CAV_TWIST_BLOCK * n;
   s->spare = s->across + 12 * nv;
-  assert(s->spare + nv * nv == s->drift + doubles);
+  s->bias_second = bias ? s->spare + nv * nv : NULL;
+  s->bias_rate = bias ? s->bias_second + 6 * nv : NULL;
+  assert(s->spare + nv * nv + biases == s->drift + doubles);
   s->bytes = sizeof *s + (doubles + ALIGN) * sizeof(double) + (n + nv + 1) * sizeof(int);
   return s;
 }
 
 static cav_derivative_store *store_ready(const cav_model *model, cav_state *state) {
   cav_workspace *w = state->work;
-  if (!w->derivatives) w->derivatives = derivatives_new(model);
+  if (!w->derivatives) w->derivatives = derivatives_new(model, w->bias != NULL);
   cav_derivative_store *s = w->derivatives;
   if (s && state->ncontact > s->room) {
     cav_contact_jacobian *larger = realloc(s->contact, (size_t)w->contact_room * sizeof *larger);

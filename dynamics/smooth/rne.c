@@ -15,6 +15,26 @@ void cav_link_velocities(const cav_model *model, const cav_state *state, const d
   }
 }
 
+void cav_link_biases(const cav_model *model, const cav_state *state, const double *v, const double *velocity,
+                     double *bias) {
+  memset(bias, 0, 6 * sizeof *bias);
+  for (int i = 1; i < model->nlink; i++) {
+    const cav_link *link = &model->link[i];
+    double V[6], A[6], before[6];
+    copy6(V, velocity + 6 * link->parent);
+    copy6(A, bias + 6 * link->parent);
+    copy6(before, V);
+    for (int k = link->dof; k < link->dof + link->ndof; k++) {
+      double motion[6];
+      if (state->work->group[k]) copy6(before, V);
+      scale6(motion, v[k], state->axis + 6 * k);
+      accumulate6(V, motion);
+      motion_cross_add(A, before, motion);
+    }
+    copy6(bias + 6 * i, A);
+  }
+}
+
 // wrench at the reference that moves a link's mass with velocity V and acceleration A
 static inline void link_force(double F[6], double mass, const double *inertia, const double *com,
                               const double *reference, const double *V, const double *A) {

@@ -30,6 +30,11 @@ void cav_kinematics(const cav_model *model, cav_state *state, const double *q);
 /// Spatial velocities of all links at v [nv] into velocity [nlink*6]; entry 0 is read: the world's, zero. rne.c.
 void cav_link_velocities(const cav_model *model, const cav_state *state, const double *v, double *velocity);
 
+/// Spatial accelerations of all links that v alone makes, J'v, into bias [nlink*6], from their velocities; the world's
+/// are zero. rne.c.
+void cav_link_biases(const cav_model *model, const cav_state *state, const double *v, const double *velocity,
+                     double *bias);
+
 /// Down the tree: velocities at v and v_next, accelerations at (v, a), wrench of each link's own inertia into
 /// state->force. Up the tree: state->force becomes that of subtrees, u [nv] its component along each dof. rne.c.
 void cav_newton_euler(const cav_model *model, cav_state *state, const double *v, const double *v_next, const double *a);

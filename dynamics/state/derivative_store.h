@@ -24,6 +24,9 @@ typedef struct cav_derivative_store {
   double *drift_next; ///< the same at v_next
   double *second;     ///< (acceleration before) x axis + (motion before) x drift
   double *rate;       ///< drift + (motion after) x axis
+  // the same where v alone accelerates, for connects and welds; none without
+  double *bias_second; ///< (what v makes of the acceleration before) x axis + (motion before at v) x drift_now
+  double *bias_rate;   ///< drift_now + (motion after at v) x axis
   // links: sums over subtrees
   double *gyration;  ///< [nlink*12] moment by angular velocity, 3 x 3, and linear momentum
   int *touched;      ///< [nlink] contacts push in the subtree

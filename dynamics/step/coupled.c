@@ -79,11 +79,11 @@ static const double *row_of(rows *r, int i) {
   return r->row;
 }
 
-// reference weight that an object's R was made with
-static double reference(const cav_state *state, const cav_block *block) {
+// reference weight that the R of an object's row k was made with
+static double reference(const cav_state *state, const cav_block *block, int k) {
   const cav_model *model = state->model;
   if (block->contact >= 0) return model->pair[state->contact[block->contact].pair].weight[0];
-  if (block->equality >= 0) return model->equality[state->equality[block->equality].equality].weight;
+  if (block->equality >= 0) return model->equality[state->equality[block->equality].equality].weight[k > 2];
   const cav_row *row = &state->row[block->row];
   switch (row->type) {
     case CAV_ROW_LIMIT_JOINT:
@@ -109,8 +109,8 @@ static void scale_bounded(cav_state *state, const cav_block *block, double facto
   }
 }
 
-static double factor_of(const cav_state *state, const cav_block *block, double diagonal) {
-  return fmax(LEAST, diagonal / reference(state, block));
+static double factor_of(const cav_state *state, const cav_block *block, int k, double diagonal) {
+  return fmax(LEAST, diagonal / reference(state, block, k));
 }
 
 static void take_diagonal(rows *r) {
@@ -122,7 +122,7 @@ static void take_diagonal(rows *r) {
     for (int k = 0; k < block->dim; k++) {
       const double *A = row_of(r, block->first + k);
       memcpy(r->S + (block->first + k - r->n) * r->m, A + r->n, (size_t)r->m * sizeof *A);
-      eq->regulariser[k] *= factor_of(state, block, A[block->first + k]);
+      eq->regulariser[k] *= factor_of(state, block, k, A[block->first + k]);
       r->S[(block->first + k - r->n) * (r->m + 1)] += eq->regulariser[k];
     }
   }
@@ -132,7 +132,7 @@ static void take_diagonal(rows *r) {
     const double *A = row_of(r, block->first), *E = A + r->n;
     double diagonal = A[block->first];
     for (int i = 0; i < r->m; i++) diagonal -= E[i] * dot(r->S + i * r->m, E, r->m);
-    scale_bounded(state, block, factor_of(state, block, diagonal));
+    scale_bounded(state, block, factor_of(state, block, 0, diagonal));
   }
 }
 
@@ -179,7 +179,8 @@ static cav_status fill_coupling(rows *r, int exact) {
     const cav_block *block = &r->p.block[b];
     for (int k = 0; k < block->dim; k++) {
       const int i = block->first + (block->equality >= 0 ? k : 0);
-      const double R = regulariser_of(state, block, i - block->first), constant = reference(state, block);
+      const double R = regulariser_of(state, block, i - block->first);
+      const double constant = reference(state, block, i - block->first);
       const double weight = eased(state, block) * (exact ? fmax(LEAST * constant, G[i * (n + 1)]) : constant);
       damped[block->first + k] = weight / (weight + R);
     }
@@ -222,8 +223,8 @@ void cav_coupled_targets(cav_state *state) {
   for (int t = 0; t < state->nequality; t++) {
     const cav_equality_rows *eq = &state->equality[t];
     for (int k = 0; k < eq->dim; k++, i++) {
-      out[i] = eq->velocity[k];
-      rate[i] = eq->damping * out[i] + eq->stiffness * eq->error[k];
+      rate[i] = eq->damping * eq->velocity[k] + eq->stiffness * eq->error[k];
+      out[i] = eq->velocity[k] - state->options.timestep * eq->bias[k];
     }
   }
   for (int k = 0; k < n; k++) out[k] -= dot(w->coupling + k * n, rate, n);

@@ -82,7 +82,7 @@ static void fill_targets(cav_impulse *p) {
     } else if (block->equality >= 0) {
       const cav_equality_rows *eq = &p->state->equality[block->equality];
       for (int k = 0; k < eq->dim; k++) {
-        target[k] = (1.0 - eq->damping) * eq->velocity[k] - eq->stiffness * eq->error[k];
+        target[k] = cav_equality_target(p->state, eq, k);
         R[k] = eq->regulariser[k];
       }
     } else {

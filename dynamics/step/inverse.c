@@ -205,6 +205,7 @@ static void evaluate(const cav_model *model, cav_state *state, int with_constrai
       now = state->velocity;
     }
   }
+  if (now && state->nequality > 0) { cav_equality_biases(model, state, w->v, now); }
   if (with_constraints && new_velocity && state->options.coupled) { couple(model, state, now); }
   if (links) {
     contacts(model, state, now, scale);

@@ -43,7 +43,7 @@ static size_t count_buoys(const cav_model *model, int *out) {
 
 // how many joints, dofs and actuators need a list of their own
 typedef struct census {
-  size_t springs, limits, frictions, gears;
+  size_t springs, limits, frictions, gears, turning;
 } census;
 
 static int is_limited(const cav_joint *joint) {
@@ -57,6 +57,7 @@ static census count(const cav_model *model) {
     c.limits += is_limited(&model->joint[i]);
   }
   for (int i = 0; i < model->nv; i++) { c.frictions += model->dof[i].frictionloss > 0; }
+  for (int i = 0; i < model->nequality; i++) { c.turning += cav_equality_turns(&model->equality[i]); }
   for (int k = 0; k < model->nactuator; k++) { c.gears += (size_t)cav_transmission_dofs(model, k, NULL); }
   return c;
 }
@@ -118,6 +119,7 @@ static size_t layout(const cav_model *model, char *base, cav_state *s, cav_works
   note(w, CAV_PART_TENDONS, used);
 
   s->equality = carve(base, &used, (size_t)model->nequality, sizeof(cav_equality_rows));
+  w->bias = c.turning > 0 ? carve(base, &used, 6 * n, d) : NULL;
   note(w, CAV_PART_EQUALITY, used);
 
   w->limit = carve(base, &used, c.limits, i);

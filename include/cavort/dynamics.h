@@ -60,8 +60,9 @@ typedef struct cav_equality_rows {
   double rotation[9]; ///< weld: rate of error[3..5] = rotation (w1 - w2), angular velocities in world axes
   double normal[3];   ///< distance: from the second geom to the first
   double derivative;  ///< joint, tendon: rate of error = v1 - derivative v2
-  double regulariser[6];                            ///< R of each dimension
-  double damping, stiffness;                        ///< h B and h K of all rows: v* = (1 - hB) x' - hK x
+  double regulariser[6];     ///< R of each dimension
+  double damping, stiffness; ///< h B and h K of all rows: v* = (1 - hB) x' - hK x - h J'v
+  double bias[6];            ///< connect, weld: J'v, the acceleration at v without any of the dofs', m/s^2; others 0
   double velocity[6], velocity_next[6], impulse[6]; ///< J v, J v_next and impulse of each dimension
 } cav_equality_rows;
 

@@ -377,7 +377,7 @@ typedef struct cav_equality {
   double coef[5];         ///< joint, tendon: of the polynomial, constant first
   double distance;        ///< m
   cav_softness softness;  ///< of the constraint
-  double weight;          ///< reference diagonal of A, the same for all rows
+  double weight[2];       ///< reference diagonals of A: of all rows, but of a weld's rotation
 } cav_equality;
 
 enum { CAV_ACTUATOR_PARAMETERS = 10 }; ///< most parameters of a law
