@@ -256,7 +256,13 @@ static void test_weightless(void) {
   static const char text[] =
       "<robot name='r'><link name='a'>" MASS("1") "</link><link name='pan'/><link name='tilt'/><link name='lens'/>"
       "<link name='wheel'><visual><geometry><sphere radius='.1'/></geometry></visual></link>"
-      "<link name='cross'/><link name='tip'>" MASS("1") "</link>\n"
+      "<link name='cross'/><link name='tip'>" MASS("1") "</link>"
+      "<link name='skid'><inertial><mass value='0'/><inertia ixx='0' iyy='0' izz='0'/></inertial><collision><geometry>"
+      "<sphere radius='.1'/></geometry></collision></link><link name='cap'><collision><geometry><mesh "
+      "filename='nowhere.stl'/></geometry></collision></link>\n"
+      "<joint name='s' type='prismatic'><origin xyz='0 0 -1'/><parent link='tip'/><child link='skid'/><limit lower='-1' "
+      "upper='1' effort='3' velocity='1'/></joint>\n"
+      "<joint name='l' type='continuous'><parent link='tip'/><child link='cap'/></joint>\n"
       "<joint name='p' type='revolute'><origin xyz='1 0 0'/><parent link='a'/><child link='pan'/>"
       "<limit lower='-1' upper='1' effort='3' velocity='1'/></joint>\n"
       "<joint name='t' type='continuous'><origin xyz='0 1 0'/><parent link='pan'/><child link='tilt'/></joint>\n"
@@ -274,7 +280,9 @@ static void test_weightless(void) {
   }
   CHECK(m->nv == 8 && m->njoint == 3 && m->nactuator == 0 && m->nlink == 4);
   CHECK(m->nequality == 1 && m->equality[0].object[1] < 0);
-  CHECK(warns(m, "nothing on it weighs: the joint is held; give its link an inertial element (and 2 more)") == 1);
+  CHECK(warns(m, "nothing on it weighs: the joint is held; give its link an inertial element (and 4 more)") == 1);
+  // what touches on a held joint touches
+  CHECK(m->ngeom == 2 && m->geom[1].link == 3 && m->geom[1].contype == 1 && m->geom[1].pos[2] == -1);
   const double lens[3] = {1, 1, 1};
   int body = cav_object_find(m, CAV_OBJECT_BODY, "lens");
   if (CHECK(body >= 0)) CHECK_NEAR_ALL(m->body[body].pos, lens, 3, 1e-15);
@@ -321,7 +329,7 @@ static void test_faults(void) {
        ":2: <mass>: attribute 'value': expected a mass >= 0"},
       {"<robot><link name='a'/><link name='b'><inertial><mass value='0'/><inertia ixx='0' iyy='0' izz='0'/></inertial>"
        "<collision><geometry><sphere radius='1'/></geometry></collision></link>\n"
-       "<joint name='j' type='revolute'><parent link='a'/><child link='b'/></joint></robot>",
+       "<joint name='j' type='floating'><parent link='a'/><child link='b'/></joint></robot>",
        "moves but has no mass"},
   };
   for (size_t i = 0; i < sizeof faults / sizeof *faults; i++) {

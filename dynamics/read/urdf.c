@@ -198,23 +198,6 @@ static int find_root(reader *r, const cav_xml_node *root) {
   return found;
 }
 
-// whether something on a link can weigh: mass, or a shape that it may come from. Joints that carry nothing of the kind,
-// frames of cameras and wheels that were only drawn, are marked as held
-static int mark_held(reader *r, int index, int depth) {
-  part *p = &r->parts.at[index];
-  const cav_xml_node *i = cav_xml_child(p->node, &inertial);
-  int weighs = depth > DEPTH_MAX || cav_xml_child(p->node, &collision) ||
-               (i && cav_xml_real(cav_xml_child(i, &mass), "value", 0) != 0);
-  for (int k = p->first; k >= 0 && depth <= DEPTH_MAX; k = r->parts.at[k].next)
-    weighs = mark_held(r, k, depth + 1) || weighs;
-  int type = p->joint ? cav_xml_word(p->joint, "type", FIXED) : FIXED;
-  p->held = !weighs && type != FIXED && type != FLOATING;
-  if (p->held)
-    cav_spec_leave(r->spec, p->joint, NULL,
-                   "nothing on it weighs: the joint is held; give its link an inertial element");
-  return weighs;
-}
-
 // --- poses and inertia ---
 
 // angles about the fixed axes x, y, z, in this order
@@ -291,6 +274,33 @@ static int is_readable(const char *path) {
   if (dot && !strcasecmp(dot, ".dae")) return 1;
 #endif
   return dot && (!strcasecmp(dot, ".stl") || !strcasecmp(dot, ".obj"));
+}
+
+// whether a shape of collision gives a link mass: it has a volume here
+static int has_volume(cav_spec *spec, const cav_xml_node *node) {
+  const cav_xml_node *shape = cav_xml_child(node, &geometry)->child;
+  while (shape && (shape->rule->flags & CAV_XML_STRANGE)) shape = shape->next;
+  if (!shape || shape->rule != &mesh) return shape != NULL;
+  const char *path = find_file(spec, cav_xml_text(shape, "filename", ""));
+  return path && is_readable(path);
+}
+
+// whether something on a link weighs: its inertial element, or without one its shapes. Joints that carry nothing of the
+// kind, frames of cameras, wheels that were only drawn, skids that only touch, are marked as held
+static int mark_held(reader *r, int index, int depth) {
+  part *p = &r->parts.at[index];
+  const cav_xml_node *i = cav_xml_child(p->node, &inertial);
+  int weighs = depth > DEPTH_MAX || (i && cav_xml_real(cav_xml_child(i, &mass), "value", 0) != 0);
+  for (const cav_xml_node *c = i ? NULL : cav_xml_child(p->node, &collision); c && !weighs; c = cav_xml_next(c))
+    weighs = has_volume(r->spec, c);
+  for (int k = p->first; k >= 0 && depth <= DEPTH_MAX; k = r->parts.at[k].next)
+    weighs = mark_held(r, k, depth + 1) || weighs;
+  int type = p->joint ? cav_xml_word(p->joint, "type", FIXED) : FIXED;
+  p->held = !weighs && type != FIXED && type != FLOATING;
+  if (p->held)
+    cav_spec_leave(r->spec, p->joint, NULL,
+                   "nothing on it weighs: the joint is held; give its link an inertial element");
+  return weighs;
 }
 
 // a mesh that is absent, or of a format that is not read, cannot be touched; said, not fatal, for robots travel without
