@@ -43,7 +43,8 @@ static const char *const base[] = {
     "at='end'/>"
     "<velocity @constraint/velocity@ at='end'/><acceleration @constraint/acceleration@ from='.2' "
     "upper='3'/></constraint>"
-    "<limits @limits@/><schedule @schedule@><first @first@/><last @last@/></schedule><ipopt @ipopt@/></problem>",
+    "<limits @limits@/><residual @residual@ force='20' torque='5'/><schedule @schedule@><first @first@/><last "
+    "@last@/></schedule><ipopt @ipopt@/></problem>",
     // a step, an arc
     "<problem @problem@ model='model.xml'><horizon @horizon@ duration='0.5'/><start @start@/><guess @guess@ "
     "apex='.1'/></problem>",

@@ -1,10 +1,10 @@
 /// Derivatives of whole problems: the gradient of the merit at every unknown, first and last knots included, the rows
 /// of the constraints and their sparsity, against centred differences of the values; the same bits with one and two
-/// threads. The same of a free start, of cycles, whose ends meet, moved, turned or mirrored, and with the step as an
-/// unknown; products and solutions of their bordered normal equations against dense ones. Seen: gradients to 2e-8 of
-/// their norm (bound 1e-6); rows to 3e-6 (bound 1e-4: the difference that they are compared with); analytic derivatives
-/// and centred differences give the same Hessians to 2e-8 (bound 1e-6); no nonzero outside the pattern, and none of the
-/// pattern of forces and ranges that stays zero.
+/// threads. The same of a free start, of penalised forces on a root, of cycles, whose ends meet, moved, turned or
+/// mirrored, and with the step as an unknown; products and solutions of their bordered normal equations against dense
+/// ones. Seen: gradients to 2e-8 of their norm (bound 1e-6); rows to 3e-6 (bound 1e-4: the difference that they are
+/// compared with); analytic derivatives and centred differences give the same Hessians to 2e-8 (bound 1e-6); no nonzero
+/// outside the pattern, and none of the pattern of forces and ranges that stays zero.
 #include "gauss_newton.h"
 #include "readings.h"
 
@@ -369,7 +369,7 @@ static void test_normal(cav_transcription *tr, cav_trajectory *at) {
 
 /// How a scene is to be closed.
 typedef struct closing {
-  int at_rest, free_step, free_start;
+  int at_rest, free_step, free_start, penalised;
   cav_cycle cycle;
 } closing;
 
@@ -383,6 +383,7 @@ static void test_scene(const char *scene, closing close, cav_order order) {
   p.close_at_rest = close.at_rest;
   p.cycle = close.cycle;
   p.free_start = close.free_start;
+  if (close.penalised) p.residual = (cav_residual){.force = 7, .torque = 0.5};
   p.duration = 0.15;
   if (close.free_step) p.duration_least = 0.1, p.duration_most = 0.3, p.duration_weight = 700;
   memcpy(q_start, m->q0, (size_t)m->nq * sizeof(double));
@@ -597,7 +598,8 @@ int main(void) {
   const closing moved = {.cycle = {.on = 1, .translation = {0.2, 0.1, 0}}};
   const closing turned = {.free_step = 1, .cycle = {.on = 1, .translation = {0.2, 0, 0}, .rotation = 0.4}};
   const closing mirrored = {.free_step = 1, .cycle = {.on = 1, .translation = {0.2, 0, 0}, .mirror = CAV_MIRROR_Y}};
-  const closing begun = {.at_rest = 1, .free_start = 1}, loose = {.free_start = 1, .free_step = 1};
+  const closing begun = {.at_rest = 1, .free_start = 1, .penalised = 1};
+  const closing loose = {.free_start = 1, .free_step = 1, .penalised = 1};
   test_scene(walker, rest, CAV_ORDER_MIDPOINT);
   test_scene(walker, open, CAV_ORDER_MIDPOINT);
   test_scene(walker, rest, CAV_ORDER_EULER);

@@ -258,6 +258,17 @@ typedef struct cav_ipopt_option {
   const char *name, *value; ///< as Ipopt has them, both as text
 } cav_ipopt_option;
 
+/// Forces on roots that nothing in the model gives: zero, or at a cost. Of dofs of joints between the world and a root
+/// link that no actuator moves; all others have to be zero in any case. For records that the model cannot follow exactly; a
+/// certificate tells how large they are.
+typedef struct cav_residual {
+  double force,
+      torque; ///< N, N m: deviations: the cost is half of the integral of their squares over these, 0: they are zero
+  double
+      within; ///< the largest that a certificate allows at any knot, fraction of the weight (torques: over weight times
+              ///< CAV_MOMENT_ARM)
+} cav_residual;
+
 /// A motion that is wanted.
 typedef struct cav_problem {
   const char *name;       ///< for result folders and pages; "" is fine
@@ -288,6 +299,7 @@ typedef struct cav_problem {
   cav_swing *swing;      ///< [nswing]
   int nterm;             ///< costs and constraints
   cav_term *term;        ///< [nterm]
+  cav_residual residual; ///< forces on roots that are penalised
   double effort_limit;   ///< fraction of the actuator limits planned with, 0 .. 1
   double limit_margin;   ///< rad or m kept from joint and tendon limits in planning
   cav_schedule schedule; ///< of the continuation

@@ -217,6 +217,13 @@ static const cav_xml_element limits = {
         REAL("effort", 0, "", "0.8", "fraction of the actuators' limits to plan with, the rest is for feedback"),
         REAL("margin", 0, "rad or m", "0.001", "distance kept from the limits of joints and tendons")),
     NULL, 0, "reserve that a plan keeps from limits"};
+static const cav_xml_element residual = {
+    "residual", 0, 1,
+    ATTRIBUTES(
+        REAL("force", 0, "N", "(zero force)", "deviation: half of the integral of (force/deviation)^2 over time, in s, is a cost"),
+        REAL("torque", 0, "N m", "(zero torque)", "deviation of torques, likewise"),
+        REAL("within", 0, "of weight", "0.05", "largest residual that a certificate allows at any knot; torques count over 0.3 m times the weight")),
+    NULL, 0, "forces and torques on roots that nothing in the model gives, at a cost instead of zero: for records that the model cannot follow"};
 #define STAGE_REAL_first(name, first, last, least, most, course, law, unit, text) REAL(#name, 0, unit, #first, text),
 #define STAGE_WHOLE_first(name, first, last, least, most, text) WHOLE(#name, #first, text),
 #define STAGE_REAL_last(name, first, last, least, most, course, law, unit, text) REAL(#name, 0, unit, #last, text),
@@ -250,8 +257,8 @@ const cav_xml_element cav_problem_element = {
         TEXT("name", "(the file's name)", "names the result folder and the page"),
         TEXT("model", "(given by --model)", "model file, MJCF or URDF, relative to this file"),
         FLAG("floating", "false", "the root link of a URDF floats")),
-    CHILDREN(&cav_scene_element, &horizon, &cycle, &start, &goal, &pose, &guess, &cost, &constraint, &limits, &schedule, &ipopt,
-             &contact),
+    CHILDREN(&cav_scene_element, &horizon, &cycle, &start, &goal, &pose, &guess, &cost, &constraint, &limits, &residual,
+             &schedule, &ipopt, &contact),
     0, "root of a problem file: one motion that is wanted of a model"};
 
 // names of earlier versions

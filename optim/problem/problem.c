@@ -42,6 +42,7 @@ cav_problem cav_problem_default(const cav_model *model) {
       .guess_to = 1,
       .effort_limit = 0.8,
       .limit_margin = 1e-3,
+      .residual = {.within = 0.05},
       .schedule = {.stages = 16, .sliding = CAV_SLIDING_COULOMB, .first = first_stage, .last = last_stage},
   };
 }
@@ -461,6 +462,17 @@ static cav_status read_limits(const cav_problem_reader *reader) {
   return status ? status : cav_problem_real(reader, node, "margin", 0, DBL_MAX, &reader->problem->limit_margin);
 }
 
+static cav_status read_residual(const cav_problem_reader *reader) {
+  const cav_xml_node *node = cav_problem_child(reader->root, "residual");
+  cav_residual *r = &reader->problem->residual;
+  if (!node) return CAV_OK;
+  if (!cav_xml_get(node, "force") && !cav_xml_get(node, "torque"))
+    return cav_xml_fail(reader->error, node, NULL, "expected 'force' in N, 'torque' in N m, or both");
+  cav_status status = cav_problem_real(reader, node, "force", DBL_MIN, DBL_MAX, &r->force);
+  if (!status) status = cav_problem_real(reader, node, "torque", DBL_MIN, DBL_MAX, &r->torque);
+  return status ? status : cav_problem_real(reader, node, "within", 0, DBL_MAX, &r->within);
+}
+
 static cav_status read_schedule(const cav_problem_reader *reader) {
   const cav_xml_node *node = cav_problem_child(reader->root, "schedule");
   if (!node) return CAV_OK;
@@ -570,6 +582,7 @@ static cav_status read_problem(cav_problem_reader *reader, const char *model_pat
   if (!status) status = cav_problem_cycle(reader);
   if (!status) status = read_guess(reader);
   if (!status) status = read_limits(reader);
+  if (!status) status = read_residual(reader);
   if (!status) status = read_schedule(reader);
   if (!status) status = read_ipopt(reader);
   if (!status) status = read_contact(reader);

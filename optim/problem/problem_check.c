@@ -40,6 +40,9 @@ static cav_status check_horizon(const cav_problem *p, cav_error *error) {
     wrong = "effort_limit must be in (0, 1]";
   else if (!(p->limit_margin >= 0) || !isfinite(p->limit_margin))
     wrong = "limit_margin must not be negative";
+  else if (!(p->residual.force >= 0) || !(p->residual.torque >= 0) || !(p->residual.within >= 0) ||
+           !isfinite(p->residual.force + p->residual.torque))
+    wrong = "deviations of the residual and what it is allowed must not be negative";
   else if (p->schedule.stages < 1)
     wrong = "the schedule needs at least one stage";
   if (wrong) return cav_file_fail(error, CAV_BAD_INPUT, 0, "%s", wrong);

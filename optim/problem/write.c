@@ -293,7 +293,15 @@ static void write_tail(FILE *out, const cav_problem *p) {
   fputs("  <limits", out);
   write_number(out, "effort", p->effort_limit);
   write_number(out, "margin", p->limit_margin);
-  fprintf(out, "/>\n  <schedule stages=\"%d\"", p->schedule.stages);
+  fputs("/>\n", out);
+  if (p->residual.force > 0 || p->residual.torque > 0) {
+    fputs("  <residual", out);
+    if (p->residual.force > 0) write_number(out, "force", p->residual.force);
+    if (p->residual.torque > 0) write_number(out, "torque", p->residual.torque);
+    write_number(out, "within", p->residual.within);
+    fputs("/>\n", out);
+  }
+  fprintf(out, "  <schedule stages=\"%d\"", p->schedule.stages);
   write_text(out, "sliding", cav_problem_slidings[p->schedule.sliding]);
   write_text(out, "next_gap", cav_problem_next_gaps[p->schedule.next_gap]);
   fputs(">\n", out);

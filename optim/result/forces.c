@@ -185,3 +185,60 @@ cav_status cav_controls_write(const char *path, const cav_model *model, const ca
   }
   return cav_file_end(&file, error);
 }
+
+// the dofs of roots that the problem penalises forces on: no actuator moves them; dof [nv]. Returns their number, -1 if memory
+// runs out
+static int penalised_dofs(const cav_problem *problem, int *dof) {
+  const cav_model *m = problem->model;
+  cav_state *state = cav_state_new(m);
+  double *unit = calloc(2 * (size_t)m->nv + 1, sizeof *unit), *left = unit ? unit + m->nv : NULL;
+  int n = state && unit && cav_position(m, state, problem->q_start) == CAV_OK ? 0 : -1;
+  for (int d = 0; n >= 0 && d < m->nv; d++) {
+    const cav_joint *joint = &m->joint[m->dof[d].joint];
+    int line = joint->type == CAV_JOINT_SLIDE || (joint->type == CAV_JOINT_FREE && d - joint->dof < 3);
+    if (m->link[joint->link].parent != 0 || (line ? problem->residual.force : problem->residual.torque) == 0) continue;
+    unit[d] = 1;
+    cav_actuation(m, state, unit, left, NULL);
+    unit[d] = 0;
+    if (left[d] > 1 - 1e-9) dof[n++] = d;
+  }
+  free(unit);
+  cav_state_free(state);
+  return n;
+}
+
+static void write_residual_name(FILE *out, const cav_model *model, int d) {
+  const cav_joint *joint = &model->joint[model->dof[d].joint];
+  char name[300];
+  int n = *joint->name ? snprintf(name, sizeof name, "residual_%.256s", joint->name)
+                       : snprintf(name, sizeof name, "residual_#%d", model->dof[d].joint);
+  int several = joint->type == CAV_JOINT_FREE || joint->type == CAV_JOINT_BALL;
+  if (several) snprintf(name + n, sizeof name - (size_t)n, "_%d", d - joint->dof);
+  fputc(',', out);
+  cav_table_write_text(out, name);
+}
+
+cav_status cav_residual_write(const char *path, const cav_problem *problem, const cav_trajectory *trajectory,
+                              const cav_forces *forces, cav_error *error) {
+  const cav_model *model = problem->model;
+  cav_file file;
+  int *dof = malloc(((size_t)model->nv + 1) * sizeof *dof), n = dof ? penalised_dofs(problem, dof) : -1;
+  cav_status status = n < 0 ? cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for the residual forces")
+                            : cav_file_begin(&file, path, error);
+  if (!status) {
+    fputs("time", file.stream);
+    for (int k = 0; k < n; k++) write_residual_name(file.stream, model, dof[k]);
+    fputc('\n', file.stream);
+    for (int t = 0; t < forces->nknot && isfinite(forces->u[t * model->nv]); t++) {
+      cav_table_write_number(file.stream, t * trajectory->timestep);
+      for (int k = 0; k < n; k++) {
+        fputc(',', file.stream);
+        cav_table_write_number(file.stream, forces->u[t * model->nv + dof[k]]);
+      }
+      fputc('\n', file.stream);
+    }
+    status = cav_file_end(&file, error);
+  }
+  free(dof);
+  return status;
+}

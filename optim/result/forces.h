@@ -14,4 +14,9 @@ cav_status cav_forces_write(const char *path, const cav_model *model, const cav_
 cav_status cav_controls_write(const char *path, const cav_model *model, const cav_trajectory *trajectory,
                               const cav_forces *forces, cav_error *error);
 
+/// Writes residual.csv: time, then the force on every dof of a root that the problem penalises (residual_JOINT, residual_JOINT_i
+/// as in trajectory.csv; N, N m), at the knots that have forces. Replaces atomically.
+cav_status cav_residual_write(const char *path, const cav_problem *problem, const cav_trajectory *trajectory,
+                              const cav_forces *forces, cav_error *error);
+
 #endif

@@ -221,9 +221,13 @@ cav_status cav_result_write_forces(const char *folder, const cav_problem *proble
   cav_forces *forces = cav_forces_new(problem->model, trajectory, contact, at_rest, error);
   if (!forces) return error ? error->status : CAV_NOT_FINITE;
   char *table = cav_result_path(folder, "forces.csv"), *controls = cav_result_path(folder, "controls.csv");
-  cav_status status = table && controls ? cav_result_folder(folder, error) : no_memory(error);
+  char *residual = cav_result_path(folder, "residual.csv");
+  cav_status status = table && controls && residual ? cav_result_folder(folder, error) : no_memory(error);
   if (!status) status = cav_controls_write(controls, problem->model, trajectory, forces, error);
   if (!status) status = cav_forces_write(table, problem->model, trajectory, forces, error);
+  int penalised = problem->residual.force > 0 || problem->residual.torque > 0;
+  if (!status && penalised) status = cav_residual_write(residual, problem, trajectory, forces, error);
+  free(residual);
   free(table);
   free(controls);
   cav_forces_free(forces);

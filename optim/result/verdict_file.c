@@ -85,6 +85,12 @@ void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdi
   write_number(out, "unactuated_force_max", v->unactuated_force_max);
   write_number(out, "unactuated_force_knot", v->unactuated_force_knot);
   write_number(out, "momentum_defect_rms", v->momentum_defect_rms);
+  write_number(out, "residual_force_rms_n", v->residual_force_rms_n);
+  write_number(out, "residual_force_max_n", v->residual_force_max_n);
+  write_number(out, "residual_torque_rms_n_m", v->residual_torque_rms_n_m);
+  write_number(out, "residual_torque_max_n_m", v->residual_torque_max_n_m);
+  write_number(out, "residual_fraction_max", v->residual_fraction_max);
+  write_number(out, "residual_within", v->residual_within);
   write_number(out, "limit_violation_max", v->limit_violation_max);
   write_number(out, "constraint_violation_max", v->constraint_violation_max);
   write_number(out, "penetration_max_m", v->penetration_max_m);

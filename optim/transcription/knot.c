@@ -118,6 +118,8 @@ static row_count knot_rows(const cav_transcription *tr, const int *key, int t) {
   n.dense += (size_t)tr->nv;
   if (tr->constraints_only) return n;
   n.rows += (size_t)has_duration(tr, t);
+  for (int k = 0; k < tr->npenalised && tr->knot[t].has_force; k++)
+    n.rows++, n.dense += stands_alone(&tr->penalised[k]);
   for (int i = 0; i < tr->problem->nterm; i++) {
     if (tr->problem->term[i].use != CAV_USE_COST) continue;
     row_count cost = cost_rows(tr, key, &tr->problem->term[i], t);
@@ -552,6 +554,11 @@ static void add_costs(cav_sum *a, const double *q, const double *v, const double
     reading += cav_term_dim(term);
   }
   assert(reading == a->knot->nread);
+  for (int k = 0; k < tr->npenalised && a->knot->has_force; k++) {
+    double weight = tr->options.timestep, r = form_value(&tr->penalised[k], a->knot->u);
+    begin_row(a, weight, r);
+    add_force(a, weight, r, &tr->penalised[k]);
+  }
   // the duration's own penalty
   if (!has_duration(tr, a->t)) return;
   double duration = (tr->nknot - 1) * tr->options.timestep;

@@ -67,6 +67,8 @@ static void pull_costs(const cav_transcription *tr, const int *key, int t, doubl
     }
     sensor += dim;
   }
+  for (int k = 0; k < tr->npenalised && knot->has_force; k++)
+    pull_force(&tr->penalised[k], factor * tr->options.timestep * force_of(&tr->penalised[k], knot->u), pull);
 }
 
 /// What multipliers of a knot's rows pull its readings by.

@@ -80,6 +80,15 @@ static int limit_row_set(cav_transcription *tr, int k, const double *effort) {
   return force_row_set(&tr->effort[k], m->nv, effort, per_effort * scale);
 }
 
+/// Deviation that a force on a dof is penalised by, 0: it has to be zero. direction [nv]: a form of what actuators cannot give,
+/// which is that dof alone where it is one.
+static double deviation_of(const cav_transcription *tr, int d, const double *direction) {
+  const cav_model *m = tr->model;
+  const cav_residual *residual = &tr->problem->residual;
+  if (m->link[m->dof[d].link].parent != 0 || fabs(direction[d]) < 1 - 1e-9) return 0;
+  return dof_is_linear(m, d) ? residual->force : residual->torque;
+}
+
 /// Linear forms of u: an orthonormal basis of what actuators cannot give, and the least-norm actuator efforts.
 static int list_force_rows(cav_transcription *tr) {
   const cav_model *m = tr->model;
@@ -88,13 +97,14 @@ static int list_force_rows(cav_transcription *tr) {
   double *residual = malloc((size_t)nv * sizeof(double)), *control = calloc((size_t)nv * (nu + 1), sizeof(double));
   double *effort = malloc((size_t)nv * sizeof(double));
   tr->unactuated = calloc((size_t)nv, sizeof *tr->unactuated);
+  tr->penalised = calloc((size_t)nv + 1, sizeof *tr->penalised);
   tr->effort = calloc(2 * (size_t)nu + 1, sizeof *tr->effort);
   tr->limited = malloc((size_t)(2 * nu + 1) * sizeof *tr->limited);
   tr->effort_range = malloc((size_t)(2 * nu + 1) * sizeof *tr->effort_range);
   tr->effort_unit = malloc((size_t)(2 * nu + 1) * sizeof *tr->effort_unit);
   tr->servo = calloc(2 * (size_t)nu + 1, sizeof *tr->servo);
-  if (!unit || !basis || !residual || !control || !effort || !tr->unactuated || !tr->effort || !tr->effort_range ||
-      !tr->effort_unit || !tr->servo || !tr->limited)
+  if (!unit || !basis || !residual || !control || !effort || !tr->unactuated || !tr->penalised || !tr->effort ||
+      !tr->effort_range || !tr->effort_unit || !tr->servo || !tr->limited)
     goto end;
 
   // project unit forces; orthonormalise what is left, twice for rounding
@@ -103,7 +113,7 @@ static int list_force_rows(cav_transcription *tr) {
     cav_actuation(m, tr->scratch[0].state, unit, residual, control + (size_t)d * nu);
     unit[d] = 0;
     for (int pass = 0; pass < 2; pass++) {
-      for (int k = 0; k < tr->nresidual; k++) {
+      for (int k = 0; k < tr->nresidual + tr->npenalised; k++) {
         double dot = 0;
         for (int i = 0; i < nv; i++) dot += basis[k * nv + i] * residual[i];
         for (int i = 0; i < nv; i++) residual[i] -= dot * basis[k * nv + i];
@@ -112,10 +122,15 @@ static int list_force_rows(cav_transcription *tr) {
     double norm = 0;
     for (int i = 0; i < nv; i++) norm += residual[i] * residual[i];
     if ((norm = sqrt(norm)) < 1e-7) continue;
-    assert(tr->nresidual < nv);
-    double unit_force = tr->weight * (dof_is_linear(m, d) ? 1 : CAV_MOMENT_ARM),
-           *direction = basis + tr->nresidual * nv;
+    int rank = tr->nresidual + tr->npenalised;
+    assert(rank < nv);
+    double unit_force = tr->weight * (dof_is_linear(m, d) ? 1 : CAV_MOMENT_ARM), *direction = basis + rank * nv,
+           deviation;
     for (int i = 0; i < nv; i++) direction[i] = residual[i] / norm;
+    if ((deviation = deviation_of(tr, d, direction)) > 0) {
+      if (!force_row_set(&tr->penalised[tr->npenalised++], nv, direction, 1 / deviation)) goto end;
+      continue;
+    }
     if (!force_row_set(&tr->unactuated[tr->nresidual++], nv, direction, 1 / unit_force)) goto end;
   }
 
@@ -275,11 +290,12 @@ void cav_transcription_free(cav_transcription *tr) {
         free(s->slot[0]), free(s->slot[1]);
   }
   for (int k = 0; k < tr->nresidual; k++) free(tr->unactuated[k].dof), free(tr->unactuated[k].coef);
+  for (int k = 0; k < tr->npenalised; k++) free(tr->penalised[k].dof), free(tr->penalised[k].coef);
   for (int a = 0; tr->effort && a < tr->nlimit; a++) free(tr->effort[a].dof), free(tr->effort[a].coef);
   for (int a = 0; tr->servo && a < tr->nlimit; a++) cav_servo_free(&tr->servo[a]);
   free(tr->servo), free(tr->limited);
-  free(tr->unactuated), free(tr->effort), free(tr->effort_range), free(tr->effort_unit), free(tr->rotation_dof),
-      free(tr->rotation_of);
+  free(tr->unactuated), free(tr->penalised), free(tr->effort), free(tr->effort_range), free(tr->effort_unit),
+      free(tr->rotation_dof), free(tr->rotation_of);
   free(tr->knot), free(tr->status), free(tr->scratch), free(tr->before), free(tr->start), free(tr->rotation_after),
       free(tr->window);
   cav_periodicity_free(tr->periodicity);

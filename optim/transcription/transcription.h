@@ -116,6 +116,8 @@ typedef struct cav_transcription {
   double weight;                ///< N: model mass times gravity
   int nresidual;                ///< rows of unactuated
   cav_force_row *unactuated;    ///< orthonormal complement of the actuators' range, scaled to fractions of weight
+  int npenalised;               ///< dofs of roots whose unactuated forces are a cost
+  cav_force_row *penalised;     ///< [npenalised] over their deviations
   int nlimit;                   ///< rows of effort: one an actuator; then of control, of servos limited in both
   int *limited;                 ///< [nlimit] the actuator of each
   cav_force_row *effort;        ///< [nlimit] actuator force over its limit

@@ -9,6 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+// what makes the row of a residual force a cost
+static const cav_term residual_cost = {.name = "residual", .use = CAV_USE_COST, .norm = CAV_NORM_SQUARE, .scale = 1};
+
 void cav_knot_rows_clear(cav_knot_rows *rows) {
   free(rows->row), free(rows->contact), free(rows->work), free(rows->unactuated);
   *rows = (cav_knot_rows){0};
@@ -88,7 +91,14 @@ static cav_status list_forces(const cav_verification *verification, int t, cav_k
   if (t >= verification->rows) return CAV_OK;
   cav_status status = find_unactuated(verification, rows);
   for (int d = 0; d < model->nv && status == CAV_OK; d++)
-    if (rows->unactuated[d]) status = add(rows, (cav_knot_row){.kind = CAV_BINDING_UNACTUATED, .object = d});
+    if (verification->deviation[d] > 0)
+      status = add(rows, (cav_knot_row){.kind = CAV_BINDING_UNACTUATED,
+                                        .object = d,
+                                        .term = &residual_cost,
+                                        .weight = verification->h,
+                                        .windowed = 1});
+    else if (rows->unactuated[d])
+      status = add(rows, (cav_knot_row){.kind = CAV_BINDING_UNACTUATED, .object = d});
   for (int a = 0; a < model->nu; a++) {
     for (int k = 0; k < cav_verification_effort_rows(model, a) && status == CAV_OK; k++) {
       cav_knot_row row = {.kind = CAV_BINDING_EFFORT, .object = a, .component = k};
@@ -277,6 +287,7 @@ static double read_limit(const cav_verification *verification, int t, const cav_
                                        verification->v + (size_t)t * (size_t)model->nv, moment, range);
   if (row->kind == CAV_BINDING_JOINT) return joint_value(verification, t, row->object);
   if (row->kind == CAV_BINDING_TENDON) return verification->state->tendon_length[row->object];
+  if (row->term) return residual[row->object] / verification->deviation[row->object];
   const cav_joint *joint = model->joint + model->dof[row->object].joint;
   int line = joint->type == CAV_JOINT_SLIDE || (joint->type == CAV_JOINT_FREE && row->object - joint->dof < 3);
   return residual[row->object] / (verification->weight * (line ? 1 : verification->arm));

@@ -9,8 +9,8 @@
 /// A tree that joints hold to the world gets forces from there which no one measures: only what its root link can do
 /// freely is balanced. F and N/0.3 m are projected on the span of the motions of the root link's dofs that no actuator
 /// and no tendon acts on, seen at c; what those joints themselves exert (damping, springs, armature, limits, friction
-/// loss) is accounted for. A free root gives all six components, a planar one (two slides and a hinge) three, a cart
-/// driven along its rail none: its defect is 0 by definition.
+/// loss), and a residual force that the problem penalises, is accounted for. A free root gives all six components, a
+/// planar one (two slides and a hinge) three, a cart driven along its rail none: its defect is 0 by definition.
 /// Written for verification alone: momenta come from link poses and the motion subspaces, not from the inverse.
 #include <math.h>
 #include <stdlib.h>
@@ -29,9 +29,11 @@ struct cav_balance {
   int *count;       // [ntree]
   double *worst;    // [ntree] largest component
   int *worst_knot;  // [ntree]
-  double *mass;     // [ntree]
-  double *twist;    // [nlink*6] scratch
-  double *wrench;   // [ntree*6] scratch: linear, angular about c
+  const double
+      *residual;  // [nv] of the knot at hand: what actuators leave of its forces, accounted for where it is penalised
+  double *mass;   // [ntree]
+  double *twist;  // [nlink*6] scratch
+  double *wrench; // [ntree*6] scratch: linear, angular about c
 };
 
 static double vector_dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -312,7 +314,8 @@ static int project(const cav_balance *balance, const cav_verification *verificat
     if (balance->held[d] || opaque(model, d)) continue;
     // motion of this dof seen at c, angles in arms
     const double *axis = state->axis + 6 * d;
-    double *e = basis[n], own = joint_force(verification, d, t);
+    double *e = basis[n],
+           own = joint_force(verification, d, t) + (verification->deviation[d] > 0 ? balance->residual[d] : 0);
     point_velocity(axis, state->reference + 3 * balance->root[i], c, e);
     for (int k = 0; k < 3; k++) e[3 + k] = axis[k] * verification->arm;
     double size = 0;
@@ -333,8 +336,9 @@ static int project(const cav_balance *balance, const cav_verification *verificat
   return n;
 }
 
-void cav_balance_add(cav_balance *balance, const cav_verification *verification, int t) {
+void cav_balance_add(cav_balance *balance, const cav_verification *verification, int t, const double *residual) {
   double part[6];
+  balance->residual = residual;
   wrenches(balance, verification, t);
   for (int i = 0; i < balance->ntree; i++) {
     int n = project(balance, verification, i, t, part);

@@ -130,10 +130,10 @@ cav_status cav_replay_open(const cav_verification *verification, cav_replay *rep
   replay->open_error = replay->open_seconds = 0;
   cav_status status = CAV_OK;
   for (int t = 0; t + 1 < motion->nknot; t++) {
-    // only what actuators give
+    // only what actuators give, and what is penalised of the rest
     const double *all = motion->u + t * nv;
     cav_actuation(model, verification->state, all, work, NULL);
-    for (int d = 0; d < nv; d++) u[d] = all[d] - work[d];
+    for (int d = 0; d < nv; d++) u[d] = verification->deviation[d] > 0 ? all[d] : all[d] - work[d];
     status = step(verification, verification->state, exact_tolerance, q, v, u, next);
     if (status != CAV_OK) break;
     cav_integrate(model, q, next, verification->h, q);
@@ -174,7 +174,8 @@ static void move(const cav_verification *verification, int periods, double *x, d
   }
 }
 
-// u := forces of the motion and feedback of knot t at (q, v), through the actuators. dq and dv may be changed
+// u := forces of the motion and feedback of knot t at (q, v), through the actuators; residual ones as planned. dq and dv
+// may be changed
 static cav_status command(const cav_verification *verification, int t, const double *planned, const double *gain_q,
                           const double *gain_v, const double *q, const double *v, double *dq, double *dv,
                           double *effort, double *work, double *u) {
@@ -192,7 +193,11 @@ static cav_status command(const cav_verification *verification, int t, const dou
   move(verification, periods, u, work);
   for (int i = 0; i < nv; i++) u[i] += planned[i];
   cav_actuation(verification->model, verification->bare, u, NULL, effort);
-  return run_loop(verification, q, v, effort, work, u);
+  cav_status status = run_loop(verification, q, v, effort, work, u);
+  // residual forces act as planned, with their penalty
+  for (int i = 0; i < nv; i++)
+    if (verification->deviation[i] > 0) u[i] += planned[i];
+  return status;
 }
 
 // angle between two unit quaternions

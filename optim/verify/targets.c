@@ -270,10 +270,11 @@ void cav_targets_list(const cav_verification *verification, const cav_term *term
   }
 }
 
-void cav_targets_verdict(const cav_verification *verification, cav_term_report *report, cav_verdict *verdict) {
+void cav_targets_verdict(const cav_verification *verification, cav_term_report *report, double residual_cost,
+                         cav_verdict *verdict) {
   const cav_problem *p = verification->problem;
   double worst = 0, duration = verification->last * verification->h;
-  verdict->cost = p->duration_most > 0 ? 0.5 * p->duration_weight * duration * duration : 0;
+  verdict->cost = residual_cost + (p->duration_most > 0 ? 0.5 * p->duration_weight * duration * duration : 0);
   verdict->ntarget = verdict->nmissed = 0;
   verdict->missed[0] = 0;
   for (int i = 0; i < p->nterm; i++) verdict->cost += report[i].cost;

@@ -17,12 +17,13 @@ typedef struct cav_metric {
 typedef struct cav_verification {
   const cav_problem *problem;
   const cav_model *model;
-  cav_options law;        ///< claimed contact law, at the step of the knots
-  int last;               ///< last knot, T
-  int rows;               ///< knots 0 .. rows-1 have a force: T, or T+1 where the motion closes at rest
-  double h;               ///< s
-  double weight;          ///< N, unit of forces
-  double arm;             ///< m, unit of moments is weight*arm
+  cav_options law;   ///< claimed contact law, at the step of the knots
+  int last;          ///< last knot, T
+  int rows;          ///< knots 0 .. rows-1 have a force: T, or T+1 where the motion closes at rest
+  double h;          ///< s
+  double weight;     ///< N, unit of forces
+  double arm;        ///< m, unit of moments is weight*arm
+  double *deviation; ///< [nv] of what no actuator gives on dofs of roots, where that is penalised; 0: it has to be zero
   cav_cycle_image *image; ///< cycles: from one period to the next; else NULL
   int periods;            ///< that replays run for
   const double *q;        ///< [(T+1)*nq] knots
@@ -78,8 +79,8 @@ int cav_verification_effort_rows(const cav_model *model, int actuator);
 typedef struct cav_balance cav_balance;
 cav_balance *cav_balance_new(const cav_verification *verification);
 void cav_balance_free(cav_balance *balance);
-/// Adds knot t; verification->state holds the inverse there.
-void cav_balance_add(cav_balance *balance, const cav_verification *verification, int t);
+/// Adds knot t; verification->state holds the inverse there. residual [nv]: what actuators leave of its forces.
+void cav_balance_add(cav_balance *balance, const cav_verification *verification, int t, const double *residual);
 /// Root mean square of the worst tree, and its worst knot.
 void cav_balance_result(const cav_balance *balance, const cav_verification *verification, cav_metric *metric);
 
@@ -104,6 +105,21 @@ typedef struct cav_rates {
 
 /// Adds knot t, whose forces, where it has them, are in verification->control; moment [nv] is scratch.
 void cav_rates_add(const cav_verification *verification, int t, double *moment, cav_rates *rates);
+
+/// Forces on roots that are penalised: sums over the knots that have been added, and their part of the cost.
+typedef struct cav_residual_sum {
+  int knots;
+  double force, torque;         ///< sums of squares, of the tree that has most at a knot
+  double force_max, torque_max; ///< N, N m
+  double cost;
+  cav_metric worst; ///< fraction of the weight
+} cav_residual_sum;
+
+/// Fills verification->deviation; unit and residual [nv] are scratch. Adds knot t by what actuators leave of its forces,
+/// residual [nv]. Tells the verdict. residual.c.
+void cav_residual_find(cav_verification *verification, double *unit, double *residual);
+void cav_residual_add(const cav_verification *verification, int t, const double *residual, cav_residual_sum *sum);
+void cav_residual_tell(const cav_verification *verification, const cav_residual_sum *sum, cav_verdict *verdict);
 
 /// 1 if the term's window holds knot t; whether it is one knot, whether it is the whole horizon. constraint_check.c.
 int cav_verification_holds(const cav_verification *verification, const cav_term *term, int t, int *single, int *whole);
@@ -132,9 +148,11 @@ int cav_verification_is_given(const cav_verification *verification, const cav_te
 /// cycle are one knot. targets.c.
 double cav_verification_weight(const cav_verification *verification, const cav_term *term, int t);
 
-/// Adds knot t to the report of every term [nterm], zeroed at first; then what the verdict says of them. targets.c.
+/// Adds knot t to the report of every term [nterm], zeroed at first; then what the verdict says of them, with what residual
+/// forces cost. targets.c.
 void cav_targets_note(const cav_verification *verification, int t, double *work, cav_term_report *report);
-void cav_targets_verdict(const cav_verification *verification, cav_term_report *report, cav_verdict *verdict);
+void cav_targets_verdict(const cav_verification *verification, cav_term_report *report, double residual_cost,
+                         cav_verdict *verdict);
 
 /// Adds the values of one term at knot t to a list of which the first most are kept. targets.c.
 void cav_targets_list(const cav_verification *verification, const cav_term *term, int t, double *work, int most,

@@ -18,6 +18,7 @@ typedef struct metrics {
   cav_metric unactuated, limit, term, penetration, between, defect, periodicity, hover;
   double slip, load;
   cav_rates rates;
+  cav_residual_sum residual;
 } metrics;
 
 // writes the reason of a failed call
@@ -120,6 +121,7 @@ void cav_verification_end(cav_verification *verification) {
   cav_state_free(verification->state);
   cav_state_free(verification->bare);
   free(verification->failure);
+  free(verification->deviation);
   free(verification->v);
   free(verification->u);
   free(verification->control);
@@ -172,11 +174,13 @@ static cav_status verification_start(cav_verification *verification, const cav_p
   verification->u = calloc(n * (nv + 1), sizeof(double));
   verification->control = calloc(n * ((size_t)model->nu + 1), sizeof(double));
   verification->failure = calloc(1, sizeof *verification->failure);
-  if (!verification->failure) return CAV_NO_MEMORY;
+  verification->deviation = calloc(nv + 1, sizeof(double));
+  if (!verification->failure || !verification->deviation) return CAV_NO_MEMORY;
   if (!verification->state || !verification->bare || !verification->v || !verification->u || !verification->control)
     return CAV_NO_MEMORY;
   verification->state->options = verification->law;
   verification->bare->options.contact = verification->bare->options.constraint = 0;
+  cav_residual_find(verification, verification->v, verification->u);
   memcpy(verification->v, problem->free_start ? trajectory->v : problem->v_start, sizeof(double) * nv);
   knot_velocities(verification);
   return CAV_OK;
@@ -258,6 +262,7 @@ static void note_forces(const cav_verification *verification, int t, const doubl
   cav_actuation(model, verification->state, u, work, control);
   for (int d = 0; d < model->nv; d++) {
     const cav_joint *joint = model->joint + model->dof[d].joint;
+    if (verification->deviation[d] > 0) continue;
     int line = joint->type == CAV_JOINT_SLIDE || (joint->type == CAV_JOINT_FREE && d - joint->dof < 3);
     double fraction = fabs(work[d]) / (verification->weight * (line ? 1 : verification->arm));
     cav_metric_note(&found->unactuated, fraction, t, "%.60s of %.60s, dof %d: %.4g %s%s",
@@ -371,8 +376,9 @@ static cav_status examine_knot(cav_verification *verification, int t, cav_balanc
   memcpy(verification->u + knot * nv, work, sizeof(double) * nv);
   add_slip(verification, t, found);
   note_forces(verification, t, v, work, verification->control + knot * model->nu, work + nv, "", found);
+  cav_residual_add(verification, t, work + nv, &found->residual);
+  cav_balance_add(balance, verification, t, work + nv);
   cav_rates_add(verification, t, work + nv, &found->rates);
-  cav_balance_add(balance, verification, t);
   return CAV_OK;
 }
 
@@ -499,6 +505,9 @@ static void decide(const cav_verification *verification, const metrics *found, c
   }
   require(verdict, &found->unactuated, CAV_TOLERANCE_UNACTUATED, "unactuated force, fraction of weight,",
           "More iterations, a longer motion or a start nearer to balance usually help.");
+  if (!isnan(verdict->residual_within))
+    require(verdict, &found->residual.worst, verdict->residual_within, "residual force on a root, fraction of weight,",
+            "A lower 'force' or 'torque' of <residual> makes it more expensive; 'within' says how much is allowed.");
   require(verdict, &found->limit, CAV_TOLERANCE_LIMIT, "limit exceeded by",
           "A longer motion, or less to do in it, usually helps.");
   require(verdict, &found->term, CAV_TOLERANCE_CONSTRAINT, "constraint missed by",
@@ -552,6 +561,7 @@ static void fill(const cav_verification *verification, const metrics *found, con
   verdict->unactuated_force_max = found->unactuated.value;
   verdict->unactuated_force_knot = found->unactuated.knot;
   verdict->momentum_defect_rms = found->defect.value;
+  cav_residual_tell(verification, &found->residual, verdict);
   verdict->limit_violation_max = found->limit.value;
   verdict->constraint_violation_max = found->term.value;
   verdict->penetration_max_m = found->penetration.value;
@@ -602,7 +612,7 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
     *verdict->reason = 0;
     fill(&verification, &found, &replay, verdict);
     decide(&verification, &found, &replay, verdict);
-    cav_targets_verdict(&verification, report, verdict);
+    cav_targets_verdict(&verification, report, found.residual.cost, verdict);
   }
   free(report);
   cav_balance_free(balance);
@@ -622,7 +632,7 @@ cav_status cav_terms_report(const cav_problem *problem, const cav_trajectory *tr
   if (status == CAV_OK && !balance) status = CAV_NO_MEMORY;
   if (status == CAV_OK) memset(report, 0, (size_t)problem->nterm * sizeof *report);
   if (status == CAV_OK) status = examine(&verification, balance, &found, report, error);
-  if (status == CAV_OK) cav_targets_verdict(&verification, report, &verdict);
+  if (status == CAV_OK) cav_targets_verdict(&verification, report, found.residual.cost, &verdict);
   if (cost) *cost = verdict.cost;
   cav_balance_free(balance);
   cav_verification_end(&verification);

@@ -110,6 +110,12 @@ static void say_where(const cav_solution *solution, char *text, size_t room) {
 static void leave_unverified(const cav_solution *solution, cav_verdict *v) {
   *v = (cav_verdict){.unactuated_force_max = solution->unactuated, .unactuated_force_knot = -1};
   double *const unknown[] = {&v->momentum_defect_rms,
+                             &v->residual_force_rms_n,
+                             &v->residual_force_max_n,
+                             &v->residual_torque_rms_n_m,
+                             &v->residual_torque_max_n_m,
+                             &v->residual_fraction_max,
+                             &v->residual_within,
                              &v->limit_violation_max,
                              &v->constraint_violation_max,
                              &v->penetration_max_m,
@@ -323,6 +329,7 @@ static int better(const cav_race_report *a, const cav_race_report *b, int cheape
   const double missed[][3] = {{v->unactuated_force_max, w->unactuated_force_max, CAV_TOLERANCE_UNACTUATED},
                               {v->limit_violation_max, w->limit_violation_max, CAV_TOLERANCE_LIMIT},
                               {v->constraint_violation_max, w->constraint_violation_max, CAV_TOLERANCE_CONSTRAINT},
+                              {v->residual_fraction_max, w->residual_fraction_max, v->residual_within},
                               {v->penetration_max_m, w->penetration_max_m, CAV_TOLERANCE_PENETRATION},
                               {v->penetration_between_m, w->penetration_between_m, CAV_TOLERANCE_PENETRATION},
                               {v->momentum_defect_rms, w->momentum_defect_rms, CAV_TOLERANCE_MOMENTUM},

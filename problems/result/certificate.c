@@ -31,6 +31,14 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
   char value[64], limit[64];
   add_number(line, &n, "unactuated force, fraction of weight", v->unactuated_force_max, CAV_TOLERANCE_UNACTUATED, 1,
              "");
+  if (!isnan(v->residual_fraction_max)) {
+    add_number(line, &n, "residual force on a root, of weight", v->residual_fraction_max, v->residual_within, 100,
+               " %");
+    add_number(line, &n, "residual force, rms", v->residual_force_rms_n, NAN, 1, " N");
+    add_number(line, &n, "residual force, largest", v->residual_force_max_n, NAN, 1, " N");
+    add_number(line, &n, "residual torque, rms", v->residual_torque_rms_n_m, NAN, 1, " N m");
+    add_number(line, &n, "residual torque, largest", v->residual_torque_max_n_m, NAN, 1, " N m");
+  }
   add_number(line, &n, "limits of actuators, joints, tendons", v->limit_violation_max, CAV_TOLERANCE_LIMIT, 1, "");
   add_number(line, &n, "constraints of the problem", v->constraint_violation_max, CAV_TOLERANCE_CONSTRAINT, 1, "");
   if (v->periods > 1)
@@ -112,7 +120,10 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
     fprintf(out,
             "  a cheaper motion is near: --solver both or more <last iterations> in <schedule> look for it; a "
             "certificate does not ask for it\n");
-  fprintf(out, "%s: %s on %s\n", v->certified ? "certified" : "NOT certified", problem->name, problem->model->name);
+  fprintf(out, "%s: %s on %s", v->certified ? "certified" : "NOT certified", problem->name, problem->model->name);
+  if (!isnan(v->residual_fraction_max))
+    fprintf(out, ", with residual forces on its root of up to %.3g %% of the weight", 100 * v->residual_fraction_max);
+  fputc('\n', out);
   if (!v->certified) fprintf(out, "  %s\n", v->reason);
   // told, not required: the motion is planned under its own law of contacts
   double whole = v->periods * v->duration;
