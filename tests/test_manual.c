@@ -47,7 +47,7 @@ static const char *const base[] = {
     "@last@/></schedule><ipopt @ipopt@/></problem>",
     // a step, an arc
     "<problem @problem@ model='model.xml'><horizon @horizon@ duration='0.5'/><start @start@/><guess @guess@ "
-    "apex='.1'/></problem>",
+    "apex='.1'/><cost><track @cost/track@ file='motion.csv' joints='all'/></cost></problem>",
     // a motion on file to follow
     "<problem @problem@ model='model.xml'><horizon duration='.5'/><start/><guess @guess@ file='motion.csv'/></problem>",
     // a gait

@@ -136,7 +136,10 @@ static void check_quantities(void) {
   CHECK(!cav_problem_load(path, NULL, &own) && own.status == CAV_BAD_INPUT && strstr(own.text, "<user>"));
   for (cav_quantity k = 0; k < CAV_QUANTITY_USER; k++) {
     const cav_quantity_rule *rule = cav_quantity_rule_of(k);
-    const char *what = k == CAV_QUANTITY_SENSOR ? " type='framepos' site='eye'" : "";
+    const char *what = k == CAV_QUANTITY_SENSOR  ? " type='framepos' site='eye'"
+                       : k == CAV_QUANTITY_TRACK ? " file='record.csv' joints='knee'"
+                                                 : "";
+    write_in("record.csv", "time,knee\n0,0\n.5,.1\n1,\n");
     char text[600];
     snprintf(text, sizeof text,
              HEAD "<cost><%s name='it' weight='2' scale='3' norm='absolute' from='.2' to='.4'%s/></cost>" TAIL,
@@ -771,7 +774,8 @@ int main(void) {
   check_broken_terms();
   check_other_model();
   check_motions();
-  const char *made[] = {"problem.xml", "copy.xml", "motion.csv", "leg.xml", "flyer.xml", "cart.xml", "robot.urdf"};
+  const char *made[] = {"problem.xml", "copy.xml", "motion.csv", "leg.xml",
+                        "flyer.xml",   "cart.xml", "robot.urdf", "record.csv"};
   for (size_t i = 0; i < sizeof made / sizeof *made; i++) {
     char full[160];
     snprintf(full, sizeof full, "%s/%s", folder, made[i]);

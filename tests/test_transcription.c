@@ -6,6 +6,7 @@
 /// compared with); analytic derivatives and centred differences give the same Hessians to 2e-8 (bound 1e-6); no nonzero
 /// outside the pattern, and none of the pattern of forces and ranges that stays zero.
 #include "gauss_newton.h"
+#include "quantity.h"
 #include "readings.h"
 
 #include "rotation.h"
@@ -64,6 +65,51 @@ static const char sided[] =
     "<actuator><motor joint='left hip' gear='20' ctrllimited='true' ctrlrange='-1 .5'/>"
     "<motor joint='right hip' gear='20' ctrllimited='true' ctrlrange='-.5 1'/></actuator></mujoco>";
 
+/// Records of positions, velocities and accelerations with channels of every kind and gaps, as three terms.
+static int fill_tracks(const cav_model *m, cav_term *term) {
+  enum { FRAMES = 9, MOST = 12, COLUMNS = 32 };
+  static cav_track track[3];
+  static cav_channel channel[3][MOST];
+  static double time[FRAMES], value[FRAMES * COLUMNS];
+  int last = m->nbody - 1, eye = cav_object_find(m, CAV_OBJECT_SITE, "eye");
+  for (int f = 0; f < FRAMES; f++) {
+    time[f] = 0.48 + 0.022 * f;
+    for (int c = 0; c < COLUMNS; c++) value[f * COLUMNS + c] = f == 3 && c % 5 == 0 ? NAN : 0.3 * scene_uniform();
+  }
+  memset(channel, 0, sizeof channel);
+  for (int k = 0; k < 3; k++)
+    track[k] = (cav_track){0, channel[k], FRAMES, COLUMNS, time, value, 0.022, 0.49, 0.01, 0, 0};
+  for (int k = 0; k < 2; k++)
+    channel[0][track[0].nchannel++] =
+        (cav_channel){.kind = CAV_CHANNEL_MARKER, .object = k ? last : 1, .place = {.1, -.2, .05 * k}, .ncolumn = 3};
+  for (int j = 0; j < m->njoint && j < 5; j++) {
+    int free = m->joint[j].type == CAV_JOINT_FREE, ball = m->joint[j].type == CAV_JOINT_BALL;
+    if (free)
+      channel[0][track[0].nchannel++] = (cav_channel){.kind = CAV_CHANNEL_TRANSLATION, .object = j, .ncolumn = 3};
+    channel[0][track[0].nchannel++] =
+        (cav_channel){.kind = free || ball ? CAV_CHANNEL_ROTATION : CAV_CHANNEL_COORDINATE,
+                      .object = j,
+                      .ncolumn = free || ball ? 4 : 1};
+  }
+  static const cav_sensor_type type[] = {CAV_SENSOR_FRAMEQUAT, CAV_SENSOR_GYRO, CAV_SENSOR_ACCELEROMETER,
+                                         CAV_SENSOR_FRAMEPOS};
+  for (int k = 0; k < 4; k++) {
+    cav_channel *c = &channel[k % 3][track[k % 3].nchannel++];
+    *c = (cav_channel){.kind = CAV_CHANNEL_SENSOR, .component = k == 3 ? 1 : -1};
+    CHECK(cav_sensor_of(m, type[k], CAV_OBJECT_SITE, eye, &c->sensor, NULL) == CAV_OK);
+    c->ncolumn = k == 3 ? 1 : c->sensor.dim;
+  }
+  for (int k = 0; k < 3; k++) {
+    for (int i = 0, at = 0; i < track[k].nchannel; at += channel[k][i++].ncolumn)
+      channel[k][i].name = "", channel[k][i].column = at, channel[k][i].sd = k == 2 ? 30 : 0.5 + 0.1 * i;
+    term[k] = cav_term_cost(CAV_QUANTITY_TRACK, 3 + k);
+    term[k].track = &track[k];
+    term[k].scale = 0.8;
+    term[k].norm = k == 1 ? CAV_NORM_ABSOLUTE : CAV_NORM_SQUARE;
+  }
+  return 3;
+}
+
 /// Costs of every quantity, hard terms of every kind, windows of both kinds.
 static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) {
   static double eye_target[3] = {0.2, 0.1, 0.5}, quat_target[4] = {0.9, 0.1, 0.3, 0.3},
@@ -111,7 +157,7 @@ static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) 
       t->sensor = (cav_sensor){
           .name = "", .type = CAV_SENSOR_ACTUATORFRC, .object_type = CAV_OBJECT_ACTUATOR, .object = 1, .dim = 1};
   }
-  return n;
+  return n + fill_tracks(m, term + n);
 }
 
 /// A way at random from the start, which is moved too where it is free.
@@ -251,8 +297,8 @@ static void test_methods(cav_transcription *tr, cav_trajectory *at) {
     memcpy(hessian + (size_t)t * n, tr->knot[t].hessian, n * sizeof *hessian);
     for (int i = 0; i < tr->problem->nterm; i++) {
       const cav_term *term = &tr->problem->term[i];
-      if (term->quantity != CAV_QUANTITY_SENSOR || cav_term_weight(tr, term, t) == 0) continue;
-      accelerations += cav_sensor_rule_of(term->sensor.type)->stage == CAV_READS_ACCELERATION;
+      if (!cav_term_is_reading(term) || cav_term_weight(tr, term, t) == 0) continue;
+      accelerations += cav_term_stage(term) == CAV_READS_ACCELERATION;
     }
   }
   CHECK(tr->scratch->differenced == accelerations);

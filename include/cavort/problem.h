@@ -11,8 +11,8 @@ extern "C" {
 
 /// What a term measures at a knot, X(quantity, element of problem files, what it has values of, what it reads, hard,
 /// unit, in words, text). Values are of a SENSOR, of a POSTURE (a tangent, by dofs), of RATEs of dofs, of ACTUATORS or
-/// of CONTACTS; hard 1: a constraint can be of it, too. The enumeration, reading, writing, grammar and help of <cost>
-/// and <constraint> follow from it.
+/// of CONTACTS, or what a TRACK records; hard 1: a constraint can be of it, too. The enumeration, reading, writing,
+/// grammar and help of <cost> and <constraint> follow from it.
 // clang-format off
 #define CAV_QUANTITIES(X)                                                                                          \
   X(SENSOR, sensor, SENSOR, POSITION, 1, "its own", "sensor", "reading of a sensor; quaternions as the rotation vector to the target") \
@@ -25,7 +25,8 @@ extern "C" {
   X(SLIP, slip, CONTACTS, ACCELERATION, 0, "m/s", "slip of loaded contacts", "sqrt(f_n/weight) * tangential velocity of every contact") \
   X(IMPACT, impact, CONTACTS, ACCELERATION, 0, "m/s", "impact of loaded contacts", "sqrt(f_n/weight) * normal velocity of every contact") \
   X(SELF_PENETRATION, self_penetration, CONTACTS, ACCELERATION, 0, "m", "self-penetration", "depth of every contact between two links of one tree") \
-  X(FORCE, force, CONTACTS, ACCELERATION, 0, "of weight", "force of contacts", "normal force of every contact between trees or with the world")
+  X(FORCE, force, CONTACTS, ACCELERATION, 0, "of weight", "force of contacts", "normal force of every contact between trees or with the world") \
+  X(TRACK, track, TRACK, POSITION, 0, "of the noise", "recorded motion", "difference from a record (markers, joints, sensors) over the standard deviation of its noise; what was not recorded is not compared")
 // clang-format on
 
 /// Quantities: CAV_QUANTITIES, and one of the caller's own.
@@ -44,6 +45,7 @@ typedef enum cav_values_of {
   CAV_OF_RATE,      ///< the dofs that a term selects
   CAV_OF_ACTUATORS, ///< all actuators
   CAV_OF_CONTACTS,  ///< the contacts of a knot, or those of term->body
+  CAV_OF_TRACK,     ///< the channels of term->track
   CAV_OF_USER       ///< term->user, or one component of it
 } cav_values_of;
 
@@ -123,6 +125,59 @@ CAV_API cav_status cav_user_quantity_check(const cav_user_quantity *quantity, ca
                                            const double *v, const double *v_next, double *error_relative, int where[3],
                                            cav_error *error);
 
+/// What a channel of a record is of, X(kind, element of problem files, text).
+// clang-format off
+#define CAV_CHANNELS(X)                                                                                            \
+  X(MARKER, marker, "place of a point of a body, m: 3 numbers")                                                    \
+  X(COORDINATE, joint, "coordinate of a hinge or slide, rad or m")                                                 \
+  X(TRANSLATION, joint, "place of a free joint, m: 3 numbers")                                                     \
+  X(ROTATION, joint, "orientation of a ball or free joint: quaternion w x y z, compared as a rotation vector, rad") \
+  X(SENSOR, sensor, "reading of a sensor, or one component of it; quaternions as a rotation vector, rad")
+// clang-format on
+
+/// Kinds of channels: CAV_CHANNELS.
+typedef enum cav_channel_kind {
+#define CAV_CHANNEL_MEMBER(kind, ...) CAV_CHANNEL_##kind,
+  CAV_CHANNELS(CAV_CHANNEL_MEMBER)
+#undef CAV_CHANNEL_MEMBER
+      CAV_CHANNEL_KINDS
+} cav_channel_kind;
+
+/// What one group of columns of a record is compared with.
+typedef struct cav_channel {
+  const char *name;      ///< of the marker, joint or sensor
+  cav_channel_kind kind; ///< what it is of
+  int object;            ///< body of a marker, joint; not of a sensor
+  double place[3];       ///< of a marker in its body's frame, m
+  cav_sensor sensor;     ///< CAV_CHANNEL_SENSOR
+  int component;         ///< of the sensor, -1: all
+  int column, ncolumn;   ///< its numbers in a frame, at most CAV_SENSOR_DIM_MAX
+  double sd;             ///< standard deviation of the record's noise, > 0, in the unit of the channel
+} cav_channel;
+
+/// A record that a motion is compared with (CAV_QUANTITY_TRACK): frames over a time of their own. Sensors that read
+/// accelerations or forces, those that read velocities, and all else are of different tracks.
+typedef struct cav_track {
+  int nchannel;               ///< from 1
+  const cav_channel *channel; ///< [nchannel]
+  int nframe, ncolumn;        ///< nframe >= 2
+  const double *time;         ///< [nframe] s, increasing
+  const double *value;        ///< [nframe*ncolumn], NaN: not recorded; quaternions continuous
+  double interval;            ///< s from frame to frame, in the mean
+  double offset;              ///< s: time of the record at which the motion begins
+  double gap;                 ///< s: longest time between frames of a column that is bridged
+  int unused,
+      absent; ///< told only: columns of the file that nothing asks for, markers of the set that it does not have
+} cav_track;
+
+/// What a channel of a record says at a time of the motion, for knots timestep apart: value [ncolumn], NaN where it says
+/// nothing; an orientation of unit length. Returns whether it says anything. Linear between frames; where knots are
+/// farther apart than frames the mean of the frames by weights that fall linearly to zero a timestep away. All frames
+/// that count have to be there, or be bridged. Channels that read velocities are read half a step later, since the velocity
+/// that leaves a knot is the mean over a step. optim/METHOD.md, 12.
+CAV_API int cav_track_sample(const cav_track *track, const cav_channel *channel, double time, double timestep,
+                             double value[CAV_SENSOR_DIM_MAX]);
+
 /// What a cost makes of a residual x, value minus target over scale.
 typedef enum cav_norm {
   CAV_NORM_SQUARE,  ///< x^2/2
@@ -156,6 +211,7 @@ typedef struct cav_term {
   cav_term_use use;              ///< cost, equality or range
   cav_sensor sensor;             ///< CAV_QUANTITY_SENSOR: from the model or declared by the problem
   const cav_user_quantity *user; ///< CAV_QUANTITY_USER: borrowed; NULL for others
+  const cav_track *track;        ///< CAV_QUANTITY_TRACK: borrowed; NULL for others
   int component;                 ///< component of a sensor or of user, -1: all
   cav_dof_set dofs;              ///< dofs that count, of velocities, accelerations and configurations
   int joint;                     ///< CAV_DOFS_ONE

@@ -115,7 +115,7 @@ static const cav_xml_element pose = {
 #define POSTURE_ATTRIBUTES                                                                                             \
   DOFS, TABLE, TEXT("key", "(the goal)", "wanted posture: keyframe of the model or <pose> of this file"),              \
   REALS("qpos", 1, 0, "rad or m", "(the goal)", "wanted posture: all nq coordinates, or of one hinge or slide its number")
-#define SENSOR_ATTRIBUTES                                                                                              \
+#define SENSOR_SOURCE                                                                                              \
   WORD("type", sensors, "(the sensor of the model by that name)", "what is read, by MJCF's names"),                    \
   TEXT("body", "(another object)", "object: frame at the centre of mass of a body, with its principal axes; roles such as \"right foot\" stand for bodies"), \
   TEXT("xbody", "(another object)", "object: frame of a body as the model's file writes it"),                          \
@@ -124,7 +124,9 @@ static const cav_xml_element pose = {
   TEXT("actuator", "(another object)", "object: an actuator"),                                                         \
   WORD("reftype", frames, "(the world)", "kind of the frame that a position, velocity or orientation is read in"),     \
   TEXT("refname", "(the world)", "name of that frame"),                                                                \
-  TEXT("component", "(all)", "x, y or z: the one value that counts"), TABLE,                                           \
+  TEXT("component", "(all)", "x, y or z: the one value that counts")
+#define SENSOR_ATTRIBUTES                                                                                              \
+  SENSOR_SOURCE, TABLE,                                                                                                \
   REALS("target", 1, 0, "of the sensor", "(0; the unit quaternion)", "wanted reading: all values, or that of the component"), \
   WORD("relative", relations, "none", "the target is counted from the reading at the start or the goal posture")
 static const cav_xml_element posture_waypoint = {
@@ -140,7 +142,51 @@ static const cav_xml_element value_waypoint = {
         {"target", CAV_XML_REAL, 1, 0, NULL, 1, NOTE("of the term", NULL, "value wanted then")}),
     NULL, 0, "target of a term at a time, linear between such times"};
 
+// records
+#define CHANNEL_COLUMNS TEXT("columns", "(those of its name)", "columns of the table that it has, separated by |")
+static const cav_xml_element track_marker = {
+    "marker", 0, 0,
+    ATTRIBUTES(
+        NEEDED("name", "name of the marker in the record"),
+        TEXT("body", "(as the marker set has it)", "body that it sits on: of the model, or a role such as \"right foot\""),
+        REALS("pos", 3, 3, "m", "(as the marker set has it)", "position on the body, in its frame"),
+        REALS("sd", 1, 1, "m", "(that of the track)", "standard deviation of its noise")),
+    NULL, 0, "a marker of its own, or the noise of one of the marker set"};
+static const cav_xml_element track_joint = {
+    "joint", 0, 0,
+    ATTRIBUTES(
+        NEEDED("name", "joint of the model"), CHANNEL_COLUMNS,
+        REALS("sd", 1, 2, "rad or m", "(that of the track)", "standard deviation of its noise; of a free joint of its place, m, and of its orientation, rad")),
+    NULL, 0, "a joint whose coordinates are recorded; orientations as quaternions w x y z"};
+static const cav_xml_element track_sensor = {
+    "sensor", 0, 0,
+    ATTRIBUTES(
+        TEXT("name", "(none)", "name of its columns; without type= a sensor of the model"), SENSOR_SOURCE, CHANNEL_COLUMNS,
+        REALS("sd", 1, 1, "of the sensor", "(that of the track)", "standard deviation of its noise")),
+    NULL, 0, "a sensor whose readings are recorded"};
+static const cav_xml_element track_frame = {
+    "frame", 0, 0,
+    ATTRIBUTES(
+        REAL("time", 1, "s", NULL, "when, in the time of the record"),
+        {"value", CAV_XML_REAL, 1, 0, NULL, 1, NOTE("of the channels", NULL, "numbers of all markers, then joints, then sensors of the <track>")},
+        {"unseen", CAV_XML_INT, 1, 0, NULL, 0, NOTE("", "(none)", "which of these numbers, counted from 0, were not recorded")}),
+    NULL, 0, "one frame of a record that stands in the problem file"};
+#define TRACK_ATTRIBUTES                                                                                               \
+  TEXT("file", "(<frame>)", "the record: a clip of markers (.trc, .c3d, .bvh, .csv, .xml) or a CSV table with a column time; empty cells were not recorded"), \
+  TEXT("markers", "(none)", "marker set: which marker of the record sits where, as for cavort ik"),                    \
+  TEXT("joints", "(none)", "joints separated by |, or \"all\" that the table has: columns NAME or qpos_NAME, with _0, _1 ... where there are several"), \
+  TEXT("sensors", "(none)", "sensors of the model separated by |, or \"all\" that the table has: columns NAME, or NAME_x, NAME_y, NAME_z"), \
+  REALS("sd", 1, 2, "of the channel", "(0.01 m, 0.05 rad)", "standard deviation of the noise; two numbers: of lengths in m and of angles in rad"), \
+  REAL("offset", 0, "s", "0", "time of the record at which the motion begins"),                                        \
+  REAL("gap", 0, "s", "(a step, or 1.5 intervals)", "longest time between frames of a column that is bridged; longer ones are compared with nothing"), \
+  REAL("interval", 0, "s", "(as the record has it)", "mean time from frame to frame")
+#define TRACK_COST                                                                                                     \
+  REAL("weight", 0, "1/s", "(frames a second of the record, so that each counts once; 1 with at=)", "the cost is weight/2 times the squares of differences over their sd, integrated over the window in s"), \
+  WORD("norm", cav_problem_norms, "square", "square: x^2/2 of each residual x; absolute: sqrt(1 + x^2) - 1, linear far beyond the noise")
+
 // attributes and children of a term by what it has values of
+#define TERM_TRACK(use)                                                                                                \
+  ATTRIBUTES(TRACK_ATTRIBUTES, WINDOW, TRACK_COST), CHILDREN(&track_marker, &track_joint, &track_sensor, &track_frame)
 #define TERM_SENSOR(use) ATTRIBUTES(SENSOR_ATTRIBUTES, WINDOW, use), CHILDREN(&value_waypoint)
 #define TERM_POSTURE(use) ATTRIBUTES(POSTURE_ATTRIBUTES, WINDOW, use), CHILDREN(&posture_waypoint)
 #define TERM_RATE(use) ATTRIBUTES(RATE_ATTRIBUTES, WINDOW, use), CHILDREN(&value_waypoint)

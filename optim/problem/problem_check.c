@@ -7,6 +7,7 @@
 
 #include "file.h"
 #include "objects.h"
+#include "quantity.h"
 
 static const double near_step = 1e-6; // of a step, and of the horizon
 
@@ -109,6 +110,7 @@ static int target_length(const cav_problem *p, const cav_term *term) {
       return term->user && term->user->dim > 0 && term->user->dim <= CAV_USER_DIM_MAX ? term->user->dim : 0;
     case CAV_OF_ACTUATORS:
     case CAV_OF_CONTACTS:
+    case CAV_OF_TRACK:
       break;
   }
   return 0;
@@ -122,6 +124,22 @@ static int has_object(const cav_model *m, cav_object_type type, int object) {
   return object >= 0 && object < n;
 }
 
+// a sensor of a term; NULL: all is there
+static const char *wrong_sensor(const cav_model *m, const cav_sensor *s) {
+  if (s->type >= CAV_SENSOR_TYPES || s->dim != cav_sensor_rule_of(s->type)->dim)
+    return "is of a sensor of no known type, or of another length than its type's: cav_sensor_of fills one";
+  if (cav_sensor_rule_of(s->type)->target != CAV_TARGET_NONE && !has_object(m, s->object_type, s->object))
+    return "is of a sensor that looks at nothing in the model: cav_sensor_of fills one";
+  if (s->referred && !has_object(m, s->reference_type, s->reference))
+    return "is of a sensor in the frame of nothing in the model";
+  return NULL;
+}
+
+static const char *wrong_component(const cav_sensor *s, int component) {
+  int components = s->dim == 4 ? 3 : s->dim;
+  return component < -1 || component >= components ? "is of a component that its sensor does not have; -1: all" : NULL;
+}
+
 // what a term looks at; NULL: all is there
 static const char *wrong_object(const cav_model *m, const cav_term *term) {
   const cav_sensor *s = &term->sensor;
@@ -133,16 +151,8 @@ static const char *wrong_object(const cav_model *m, const cav_term *term) {
   if (of == CAV_OF_CONTACTS && !(term->body >= 0 && term->body < m->nbody))
     return "is of a body that the model does not have; 0: all contacts";
   if (of != CAV_OF_SENSOR) return NULL;
-  if (s->type >= CAV_SENSOR_TYPES || s->dim != cav_sensor_rule_of(s->type)->dim)
-    return "is of a sensor of no known type, or of another length than its type's: cav_sensor_of fills one";
-  if (cav_sensor_rule_of(s->type)->target != CAV_TARGET_NONE && !has_object(m, s->object_type, s->object))
-    return "is of a sensor that looks at nothing in the model: cav_sensor_of fills one";
-  if (s->referred && !has_object(m, s->reference_type, s->reference))
-    return "is of a sensor in the frame of nothing in the model";
-  int components = s->dim == 4 ? 3 : s->dim;
-  if (term->component < -1 || term->component >= components)
-    return "is of a component that its sensor does not have; -1: all";
-  return NULL;
+  const char *wrong = wrong_sensor(m, s);
+  return wrong ? wrong : wrong_component(s, term->component);
 }
 
 static const char *wrong_target(const cav_problem *p, const cav_term *term) {
@@ -159,6 +169,71 @@ static const char *wrong_target(const cav_problem *p, const cav_term *term) {
     if (!(t[0] * t[0] + t[1] * t[1] + t[2] * t[2] + t[3] * t[3] > 1e-18))
       return "has an orientation of length zero as target";
   }
+  return NULL;
+}
+
+// numbers of a channel for what it is of, 0: any
+static int columns_of(const cav_channel *channel) {
+  switch (channel->kind) {
+    case CAV_CHANNEL_MARKER:
+    case CAV_CHANNEL_TRANSLATION:
+      return 3;
+    case CAV_CHANNEL_COORDINATE:
+      return 1;
+    case CAV_CHANNEL_ROTATION:
+      return 4;
+    case CAV_CHANNEL_SENSOR:
+      return channel->component >= 0 && channel->sensor.dim != 4 ? 1 : channel->sensor.dim;
+    case CAV_CHANNEL_KINDS:
+      break;
+  }
+  return 0;
+}
+
+static const char *wrong_channel(const cav_model *m, const cav_track *track, const cav_channel *channel) {
+  if (channel->kind >= CAV_CHANNEL_KINDS || !(channel->sd > 0) || !isfinite(channel->sd) || !channel->name)
+    return "has a channel of no kind, or without a name or a noise above 0";
+  if (channel->kind == CAV_CHANNEL_SENSOR) {
+    const char *wrong = wrong_sensor(m, &channel->sensor);
+    if (!wrong) wrong = wrong_component(&channel->sensor, channel->component);
+    if (!wrong && channel->sensor.dim == 4 && channel->component >= 0)
+      wrong = "has a channel of one component of an orientation; record all of it";
+    if (wrong) return wrong;
+  } else if (channel->kind == CAV_CHANNEL_MARKER) {
+    if (!has_object(m, CAV_OBJECT_BODY, channel->object) || infinite_entry(channel->place, 3) >= 0)
+      return "has a marker on a body that the model does not have, or at no place";
+  } else {
+    int exists = channel->object >= 0 && channel->object < m->njoint;
+    cav_joint_type type = exists ? m->joint[channel->object].type : CAV_JOINT_FREE;
+    int free = type == CAV_JOINT_FREE, round = free || type == CAV_JOINT_BALL;
+    int fits = channel->kind == CAV_CHANNEL_COORDINATE    ? !round
+               : channel->kind == CAV_CHANNEL_TRANSLATION ? free
+                                                          : round;
+    if (!exists || !fits) return "has a channel of a joint that the model does not have, or of another type";
+  }
+  if (channel->ncolumn != columns_of(channel) || channel->column < 0 ||
+      channel->column + channel->ncolumn > track->ncolumn)
+    return "has a channel whose columns its record does not have";
+  return NULL;
+}
+
+static const char *wrong_track(const cav_problem *p, const cav_term *term) {
+  const cav_track *track = term->track;
+  if (term->quantity != CAV_QUANTITY_TRACK) return track ? "has a record that its quantity does not read" : NULL;
+  if (!track || track->nchannel < 1 || !track->channel || track->nframe < 2 || !track->time || !track->value)
+    return "of a record has none, or one without channels or with less than two frames: fill term.track";
+  if (!(track->interval > 0) || !isfinite(track->offset) || !(track->gap >= 0))
+    return "has a record without an interval above 0, an offset or a gap";
+  for (int i = 0; i < track->nframe; i++)
+    if (!isfinite(track->time[i]) || (i && !(track->time[i] > track->time[i - 1])))
+      return "has a record whose times do not increase";
+  for (int i = 0; i < track->nchannel; i++) {
+    const char *wrong = wrong_channel(p->model, track, &track->channel[i]);
+    if (wrong) return wrong;
+    if (cav_channel_stage(&track->channel[i]) != cav_channel_stage(track->channel))
+      return "has a record of several stages; positions, velocities, accelerations and forces are tracks of their own";
+  }
+  if (p->duration_most > 0) return "has a record, which has its own time, and the duration is free; fix it";
   return NULL;
 }
 
@@ -189,6 +264,7 @@ static cav_status check_term(const cav_problem *p, int i, cav_error *error) {
   const char *wrong = wrong_number(p, term);
   if (!wrong) wrong = wrong_object(p->model, term);
   if (!wrong) wrong = wrong_target(p, term);
+  if (!wrong) wrong = wrong_track(p, term);
   if (!wrong) return CAV_OK;
   return cav_file_fail(error, CAV_BAD_INPUT, 0, "a term %s: term[%d], '%.80s'", wrong, i, term->name ? term->name : "");
 }

@@ -99,6 +99,14 @@ cav_status cav_problem_terms(const cav_problem_reader *reader);
 /// Whether a term has a say: a cost with a weight, a constraint, or how fast contacts may slide. term.c.
 int cav_term_counts(const cav_term *term);
 
+/// Sensor of an element, declared there or by the model's name for it, into term->sensor and component. term.c.
+cav_status cav_problem_sensor(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term);
+
+/// Terms of a <track>, copies of base with a record each: *n of them, CAV_TRACK_TERMS at most. track.c.
+enum { CAV_TRACK_TERMS = 3 };
+cav_status cav_problem_track(const cav_problem_reader *reader, const cav_xml_node *node, const cav_term *base,
+                             cav_term *term, int *n);
+
 /// Targets of a term as a table gives them.
 typedef struct cav_problem_targets {
   int count;            ///< numbers of a target, given

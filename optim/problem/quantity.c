@@ -18,8 +18,19 @@ const cav_quantity_rule *cav_quantity_rule_of(cav_quantity quantity) {
 cav_sensor_stage cav_term_stage(const cav_term *term) {
   int sensor = term->quantity == CAV_QUANTITY_SENSOR;
   if (term->quantity == CAV_QUANTITY_USER) return term->user->reads;
+  if (term->quantity == CAV_QUANTITY_TRACK && term->track) return cav_channel_stage(term->track->channel);
   return sensor ? cav_sensor_rule_of(term->sensor.type)->stage : cav_quantity_rule_of(term->quantity)->reads;
 }
+
+cav_sensor_stage cav_channel_stage(const cav_channel *channel) {
+  return channel->kind == CAV_CHANNEL_SENSOR ? cav_sensor_rule_of(channel->sensor.type)->stage : CAV_READS_POSITION;
+}
+
+int cav_channel_rotates(const cav_channel *channel) {
+  return channel->kind == CAV_CHANNEL_ROTATION || (channel->kind == CAV_CHANNEL_SENSOR && channel->sensor.dim == 4);
+}
+
+int cav_channel_dim(const cav_channel *channel) { return cav_channel_rotates(channel) ? 3 : channel->ncolumn; }
 
 int cav_term_has_dofs(const cav_term *term) {
   cav_values_of of = cav_quantity_rule_of(term->quantity)->of;

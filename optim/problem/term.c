@@ -454,7 +454,7 @@ static cav_status make_absolute(const cav_problem_reader *reader, const cav_xml_
   return CAV_OK;
 }
 
-static cav_status read_sensor(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+cav_status cav_problem_sensor(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
   cav_status status = CAV_OK;
   if (cav_xml_get(node, "type")) {
     term->sensor = (cav_sensor){.name = "", .type = (cav_sensor_type)cav_xml_word(node, "type", 0), .adr = -1};
@@ -470,7 +470,11 @@ static cav_status read_sensor(const cav_problem_reader *reader, const cav_xml_no
     status = cav_xml_fail(reader->error, node, "type",
                           "is missing; give the type of a sensor, or in 'name' one of the model's");
   }
-  if (!status) status = read_component(reader, node, term);
+  return status ? status : read_component(reader, node, term);
+}
+
+static cav_status read_sensor(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
+  cav_status status = cav_problem_sensor(reader, node, term);
   if (!status) status = read_targets(reader, node, term, term->sensor.dim, sensor_target);
   if (!status && term->use == CAV_USE_RANGE && term->target && term->sensor.dim != 4) {
     status = cav_xml_fail(reader->error, node, "target", "contradicts 'lower' and 'upper'; give one or the others");
@@ -502,6 +506,7 @@ static cav_status read_values(const cav_problem_reader *reader, const cav_xml_no
     case CAV_OF_CONTACTS:
       return read_touch(reader, node, term);
     case CAV_OF_ACTUATORS:
+    case CAV_OF_TRACK:
     case CAV_OF_USER:
       break;
   }
@@ -536,7 +541,10 @@ static cav_status read_use(const cav_problem_reader *reader, const cav_xml_node 
   return read_within(reader, node, term);
 }
 
-static cav_status read_term(const cav_problem_reader *reader, const cav_xml_node *node, int hard, cav_term *term) {
+// the term of an element, or the terms of a record: *n of them
+static cav_status read_term(const cav_problem_reader *reader, const cav_xml_node *node, int hard, cav_term *term,
+                            int *n) {
+  *n = 1;
   cav_quantity quantity = 0;
   while (strcmp(cav_quantity_rule_of(quantity)->name, node->rule->name)) quantity++;
   *term = cav_term_cost(quantity, 0);
@@ -544,7 +552,9 @@ static cav_status read_term(const cav_problem_reader *reader, const cav_xml_node
   if (!term->name) return cav_problem_no_memory(reader);
   cav_status status = read_use(reader, node, hard, term);
   if (!status) status = cav_problem_window(reader, node, &term->from, &term->to);
-  return status ? status : read_values(reader, node, term);
+  if (status || quantity != CAV_QUANTITY_TRACK) return status ? status : read_values(reader, node, term);
+  cav_term base = *term;
+  return cav_problem_track(reader, node, &base, term, n);
 }
 
 static int has_window(const cav_xml_node *node) {
@@ -596,7 +606,7 @@ cav_status cav_problem_terms(const cav_problem_reader *reader) {
   const cav_xml_node *cost = cav_problem_child(reader->root, "cost"),
                      *constraint = cav_problem_child(reader->root, "constraint");
   int ndefault = cav_problem_default_terms(NULL, 0), most = ndefault;
-  for (const cav_xml_node *node = cost ? cost->child : NULL; node; node = node->next) most++;
+  for (const cav_xml_node *node = cost ? cost->child : NULL; node; node = node->next) most += CAV_TRACK_TERMS;
   for (const cav_xml_node *node = constraint ? constraint->child : NULL; node; node = node->next) most++;
   cav_problem *p = reader->problem;
   cav_term defaults[CAV_DEFAULT_TERMS];
@@ -608,11 +618,14 @@ cav_status cav_problem_terms(const cav_problem_reader *reader) {
     if (!replaced(cost, defaults[i].quantity)) add_default(p, &defaults[i]);
   cav_status status = CAV_OK;
   for (const cav_xml_node *node = cost ? cost->child : NULL; node && !status; node = node->next) {
-    status = read_term(reader, node, 0, &p->term[p->nterm]);
-    p->nterm += cav_term_counts(&p->term[p->nterm]);
+    int n;
+    status = read_term(reader, node, 0, &p->term[p->nterm], &n);
+    p->nterm += cav_term_counts(&p->term[p->nterm]) ? n : 0;
   }
   for (const cav_xml_node *node = constraint ? constraint->child : NULL; node && !status; node = node->next) {
-    status = read_term(reader, node, 1, &p->term[p->nterm++]);
+    int n;
+    status = read_term(reader, node, 1, &p->term[p->nterm], &n);
+    p->nterm += n;
   }
   return status;
 }

@@ -59,6 +59,11 @@ static int write_sensor(FILE *out, const cav_problem *p, const cav_term *term) {
   return 1;
 }
 
+// the element of a channel, in the order of their elements: marker, joint, sensor
+static int written_as(const cav_channel *channel) {
+  return channel->kind == CAV_CHANNEL_MARKER ? 0 : channel->kind == CAV_CHANNEL_SENSOR ? 2 : 1;
+}
+
 // selection of dofs; 0 if it is of a joint without a name
 static int write_dofs(FILE *out, const cav_problem *p, const cav_term *term) {
   int one = term->dofs == CAV_DOFS_ONE;
@@ -103,6 +108,77 @@ static int is_running(const cav_problem *p, const cav_term *term) {
   return term->from == 0 && term->to < 0 && p->duration > 1e-9 && term->body <= 0;
 }
 
+// noise and columns of the frames of one channel after the other, as reading takes them
+static void write_frames(FILE *out, const cav_track *track) {
+  for (int f = 0; f < track->nframe; f++) {
+    const double *row = track->value + (size_t)f * (size_t)track->ncolumn;
+    fputs("      <frame", out);
+    write_number(out, "time", track->time[f]);
+    for (int gaps = 0; gaps < 2; gaps++) {
+      int n = 0, written = 0;
+      for (int kind = 0; kind < 3; kind++)
+        for (int i = 0; i < track->nchannel; i++) {
+          const cav_channel *channel = &track->channel[i];
+          if (written_as(channel) != kind) continue;
+          for (int c = channel->column; c < channel->column + channel->ncolumn; c++, n++) {
+            if (gaps && !isnan(row[c])) continue;
+            if (!written++)
+              fputs(gaps ? " unseen=\"" : " value=\"", out);
+            else
+              fputc(' ', out);
+            if (gaps)
+              fprintf(out, "%d", n);
+            else
+              fprintf(out, "%.17g", isnan(row[c]) ? 0 : row[c]);
+          }
+        }
+      if (written) fputc('"', out);
+    }
+    fputs("/>\n", out);
+  }
+}
+
+// 0 if it cannot be: something without a name, or half of a free joint
+static int write_channel(FILE *out, const cav_problem *p, const cav_track *track, int i) {
+  const cav_channel *channel = &track->channel[i], *next = i + 1 < track->nchannel ? channel + 1 : NULL;
+  int translation = channel->kind == CAV_CHANNEL_TRANSLATION;
+  int ok = 1;
+  if (channel->kind == CAV_CHANNEL_ROTATION && p->model->joint[channel->object].type == CAV_JOINT_FREE)
+    return i > 0 && channel[-1].kind == CAV_CHANNEL_TRANSLATION && channel[-1].object == channel->object;
+  if (translation && !(next && next->kind == CAV_CHANNEL_ROTATION && next->object == channel->object)) return 0;
+  fprintf(out, "      <%s", (const char *const[]){"marker", "joint", "sensor"}[written_as(channel)]);
+  if (channel->kind == CAV_CHANNEL_SENSOR) {
+    cav_term term = {.name = channel->name, .sensor = channel->sensor, .component = channel->component};
+    ok = write_sensor(out, p, &term);
+  } else if (channel->kind == CAV_CHANNEL_MARKER) {
+    write_text(out, "name", channel->name);
+    ok = *p->model->body[channel->object].name != 0;
+    write_text(out, "body", p->model->body[channel->object].name);
+    write_numbers(out, "pos", channel->place, 3);
+  } else {
+    ok = *p->model->joint[channel->object].name != 0;
+    write_text(out, "name", p->model->joint[channel->object].name);
+  }
+  write_numbers(out, "sd", (double[]){channel->sd, translation ? next->sd : 0}, translation ? 2 : 1);
+  fputs("/>\n", out);
+  return ok;
+}
+
+static int write_track(FILE *out, const cav_problem *p, const cav_term *term) {
+  const cav_track *track = term->track;
+  int ok = 1;
+  write_number(out, "offset", track->offset);
+  write_number(out, "gap", track->gap);
+  write_number(out, "interval", track->interval);
+  fputs(">\n", out);
+  for (int kind = 0; kind < 3; kind++)
+    for (int i = 0; i < track->nchannel; i++)
+      if (written_as(&track->channel[i]) == kind) ok = ok && write_channel(out, p, track, i);
+  write_frames(out, track);
+  fputs("    </track>\n", out);
+  return ok;
+}
+
 static int write_term(FILE *out, const cav_problem *p, const cav_term *term) {
   if (term->quantity == CAV_QUANTITY_USER) return 0;
   const char *element = cav_quantity_rule_of(term->quantity)->name;
@@ -125,6 +201,7 @@ static int write_term(FILE *out, const cav_problem *p, const cav_term *term) {
   if (term->scale != 1) write_number(out, "scale", term->scale);
   if (term->within > 0 && isfinite(term->within)) write_number(out, "within", term->within);
   if (term->within > 0 && !isfinite(term->within)) write_text(out, "within", "any");
+  if (term->quantity == CAV_QUANTITY_TRACK) return write_track(out, p, term);
   if (!term->target || !term->nwaypoint) {
     fputs("/>\n", out);
     return 1;

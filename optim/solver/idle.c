@@ -119,10 +119,20 @@ static int wants_rate(const cav_problem *p, const cav_term *term, int dof) {
   return 0;
 }
 
+static void keep_recorded(const marks *a, const cav_channel *channel) {
+  if (channel->kind == CAV_CHANNEL_SENSOR)
+    keep_sensed(a, &channel->sensor);
+  else if (channel->kind == CAV_CHANNEL_MARKER)
+    keep_object(a, CAV_OBJECT_XBODY, channel->object);
+  else
+    keep_link(a, a->problem->model->joint[channel->object].link);
+}
+
 static void keep_asked(const marks *a, const cav_term *term) {
   const cav_model *m = a->problem->model;
   cav_values_of of = cav_quantity_rule_of(term->quantity)->of;
   if (of == CAV_OF_SENSOR) keep_sensed(a, &term->sensor);
+  for (int i = 0; of == CAV_OF_TRACK && i < term->track->nchannel; i++) keep_recorded(a, &term->track->channel[i]);
   if (of == CAV_OF_USER) keep_all(a); // what it looks at it alone knows, by the numbers of this model
   if (of == CAV_OF_CONTACTS && term->body > 0) keep_object(a, CAV_OBJECT_BODY, term->body);
   for (int d = 0; (of == CAV_OF_POSTURE || of == CAV_OF_RATE) && d < m->nv; d++) {
@@ -263,6 +273,22 @@ static void *take(char **at, size_t n, size_t size) {
 /// Vectors of target of a term: waypoints, or one.
 static size_t targets_of(const cav_term *term) { return term->nwaypoint ? (size_t)term->nwaypoint : 1; }
 
+/// A record over the part's indices; columns stay where they are.
+static const cav_track *reduce_track(const cav_track *whole, const cav_part *part, char **at) {
+  cav_track *track = take(at, 1, sizeof *track);
+  cav_channel *channel = take(at, (size_t)whole->nchannel, sizeof *channel);
+  *track = *whole;
+  track->channel = channel;
+  for (int i = 0; i < whole->nchannel; i++) {
+    channel[i] = whole->channel[i];
+    if (channel[i].kind == CAV_CHANNEL_SENSOR)
+      cav_part_sensor(part, &channel[i].sensor);
+    else
+      channel[i].object = (channel[i].kind == CAV_CHANNEL_MARKER ? part->body : part->joint)[channel[i].object];
+  }
+  return track;
+}
+
 /// The whole problem over the part's indices.
 static cav_status reduce_problem(const cav_problem *whole, const cav_part *part, cav_problem *problem, void **owner) {
   const cav_model *m = whole->model;
@@ -270,6 +296,9 @@ static cav_status reduce_problem(const cav_problem *whole, const cav_part *part,
   bytes += (size_t)whole->nguess_pose * (sizeof(cav_guess_pose) + nq * sizeof(double) + 16) + 16;
   bytes += (size_t)whole->nswing * sizeof(cav_swing) + (size_t)whole->nterm * sizeof(cav_term) + 32;
   for (int i = 0; i < whole->nterm; i++) bytes += targets_of(&whole->term[i]) * nq * sizeof(double) + 16;
+  for (int i = 0; i < whole->nterm; i++)
+    if (whole->term[i].track)
+      bytes += sizeof(cav_track) + (size_t)whole->term[i].track->nchannel * sizeof(cav_channel) + 32;
   char *at = *owner = calloc(1, bytes);
   if (!at) return CAV_NO_MEMORY;
   *problem = *whole;
@@ -299,6 +328,7 @@ static cav_status reduce_problem(const cav_problem *whole, const cav_part *part,
     *term = whole->term[i];
     cav_values_of of = cav_quantity_rule_of(term->quantity)->of;
     if (of == CAV_OF_SENSOR) cav_part_sensor(part, &term->sensor);
+    if (of == CAV_OF_TRACK) term->track = reduce_track(term->track, part, &at);
     if (of == CAV_OF_CONTACTS && term->body > 0) term->body = part->body[term->body];
     if (term->dofs == CAV_DOFS_ONE) term->joint = part->joint[term->joint];
     if (!term->target || (of != CAV_OF_POSTURE && of != CAV_OF_RATE)) continue;

@@ -8,6 +8,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 
 #include "file.h"
@@ -99,6 +100,8 @@ static double number_of(const char *field) {
   return *end ? HUGE_VAL : value;
 }
 
+static int is_gap(const char *field) { return !field[strspn(field, " \t")] || !strcasecmp(field, "nan"); }
+
 static cav_status read_row(cav_table *table, char *text, int line, int *room, cav_error *error) {
   cav_status status = table_grow(table, room, line, error);
   if (status) return status;
@@ -107,7 +110,8 @@ static cav_status read_row(cav_table *table, char *text, int line, int *room, ca
   for (char *rest = text; rest; column++) {
     char *field = take_field(&rest);
     if (column >= table->ncol) continue;
-    row[column] = number_of(field);
+    row[column] = table->gaps && is_gap(field) ? NAN : number_of(field);
+    if (table->gaps && isnan(row[column])) continue;
     if (!isfinite(row[column])) {
       return cav_file_fail(error, CAV_BAD_INPUT, line, "%s:%d: column '%s': expected a finite number, got '%.40s'",
                            table->path, line, table->name[column], field);
@@ -150,7 +154,7 @@ static cav_status read_lines(cav_table *table, FILE *stream, cav_error *error) {
   return status;
 }
 
-cav_table *cav_table_read(const char *path, cav_error *error) {
+static cav_table *read_table(const char *path, int gaps, cav_error *error) {
   struct stat about;
   // before it is opened: that of a pipe would wait for a writer
   int there = stat(path, &about) == 0, regular = there && S_ISREG(about.st_mode);
@@ -163,7 +167,7 @@ cav_table *cav_table_read(const char *path, cav_error *error) {
   // numbers are read with a point, whatever the locale
   locale_t locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
   cav_table *table = calloc(1, sizeof *table);
-  if (table) table->path = strdup(path);
+  if (table) table->path = strdup(path), table->gaps = gaps;
   if (!locale || !table || !table->path) {
     cav_file_fail(error, CAV_NO_MEMORY, 0, "%s: no memory", path);
     if (locale) freelocale(locale);
@@ -180,3 +184,7 @@ cav_table *cav_table_read(const char *path, cav_error *error) {
   cav_table_free(table);
   return NULL;
 }
+
+cav_table *cav_table_read(const char *path, cav_error *error) { return read_table(path, 0, error); }
+
+cav_table *cav_table_read_gaps(const char *path, cav_error *error) { return read_table(path, 1, error); }

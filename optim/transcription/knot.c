@@ -63,6 +63,7 @@ static row_count cost_rows(const cav_transcription *tr, const int *key, const ca
   int rate = term->quantity == CAV_QUANTITY_ACCELERATION, first;
   switch (term->quantity) {
     case CAV_QUANTITY_SENSOR:
+    case CAV_QUANTITY_TRACK:
     case CAV_QUANTITY_USER:
       n.rows = n.dense = (size_t)cav_term_dim(term);
       break;
@@ -508,6 +509,7 @@ static void add_cost(cav_sum *a, const cav_term *term, double weight, int readin
   size_t width = 3 * (size_t)a->tr->nv;
   switch (term->quantity) {
     case CAV_QUANTITY_SENSOR:
+    case CAV_QUANTITY_TRACK:
     case CAV_QUANTITY_USER:
       for (int k = 0; k < cav_term_dim(term); k++) {
         double r = a->knot->y[reading + k], w = weight;

@@ -4,6 +4,7 @@
 /// differenced instead, only that, and counted; nothing else is mixed.
 #include "readings.h"
 #include "quantity.h"
+#include "recorded.h"
 #include "rotation.h"
 
 #include <assert.h>
@@ -197,8 +198,7 @@ static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s
   return CAV_OK;
 }
 
-/// Derivative of the rotation vector from a target to a quaternion by that of the quaternion [4*nv]; out [3*nv].
-static void rotation_rows(int nv, const double target[4], const double quat[4], const double *d_quat, double *out) {
+void cav_rotation_rows(int nv, const double target[4], const double quat[4], const double *d_quat, double *out) {
   double phi[3], J[9];
   cav_rotation_between(target, quat, phi);
   cav_rotation_jacobian_inverse(phi, J);
@@ -228,7 +228,7 @@ static cav_status sensor_rows(const cav_transcription *tr, const cav_scratch *s,
     if (!term->target) target[0] = 1;
     cav_sensor_read(tr->model, s->state, sensor, reading);
     // a quaternion depends on q alone
-    rotation_rows(nv, target, reading, dq, rotation);
+    cav_rotation_rows(nv, target, reading, dq, rotation);
     dq = rotation;
   }
   int first = term->component < 0 ? 0 : term->component, n = cav_term_dim(term) * nv;
@@ -257,6 +257,10 @@ static cav_status user_rows(const cav_transcription *tr, cav_scratch *s, const c
 }
 
 static cav_status term_rows(const cav_transcription *tr, cav_scratch *s, const cav_term *term, int t, rows out) {
+  if (term->quantity == CAV_QUANTITY_TRACK) {
+    memset(out.dv, 0, (size_t)(cav_term_dim(term) * tr->nv) * sizeof(double));
+    return cav_recorded_derivatives(tr, s, term, t, out.dq, out.dn);
+  }
   return term->quantity == CAV_QUANTITY_USER ? user_rows(tr, s, term, t, out) : sensor_rows(tr, s, term, t, out);
 }
 

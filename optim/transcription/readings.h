@@ -51,6 +51,9 @@ cav_status cav_readings_derivatives(const cav_transcription *transcription, cav_
 /// transcription.c.
 void cav_transcription_wrap(const cav_transcription *transcription, cav_scratch *scratch, int t, int n, double *row);
 
+/// Derivative of the rotation vector from a target to a quaternion by that of the quaternion [4*nv]; out [3*nv].
+void cav_rotation_rows(int nv, const double target[4], const double quat[4], const double *d_quat, double *out);
+
 /// g [3nv] := sum of weight[i] times the derivative of reading i by (q, v, v_next), at the state's last evaluation;
 /// weight [nv + nread]. A contact that has gone and a sensor without analytic derivatives add nothing.
 cav_status cav_readings_adjoint(const cav_transcription *transcription, cav_scratch *scratch, int t,

@@ -6,14 +6,18 @@
 #include <string.h>
 
 #include "quantity.h"
+#include "recorded.h"
 #include "rotation.h"
 #include "transcription.h"
 
 /// Fraction of a step by which a window may miss a knot and still hold it.
 static const double near_knot = 1e-6;
 
-/// Whether what a term measures needs the forces of a knot.
-static int reads_force(const cav_term *term) { return cav_term_stage(term) == CAV_READS_ACCELERATION; }
+/// Whether what a term measures needs the forces of a knot; of a record also velocities, which it has half a step later.
+static int reads_force(const cav_term *term) {
+  int recorded = term->quantity == CAV_QUANTITY_TRACK && cav_term_stage(term) == CAV_READS_VELOCITY;
+  return cav_term_stage(term) == CAV_READS_ACCELERATION || recorded;
+}
 
 double cav_knot_time(const cav_transcription *tr, int t) { return t * tr->problem->timestep; }
 
@@ -46,12 +50,14 @@ double cav_term_weight(const cav_transcription *tr, const cav_term *term, int t)
 }
 
 int cav_term_is_reading(const cav_term *term) {
-  return term->quantity == CAV_QUANTITY_SENSOR || term->quantity == CAV_QUANTITY_USER;
+  return term->quantity == CAV_QUANTITY_SENSOR || term->quantity == CAV_QUANTITY_USER ||
+         term->quantity == CAV_QUANTITY_TRACK;
 }
 
-/// Readings of a term: none but for sensors and quantities of one's own.
+/// Readings of a term: none but for sensors, records and quantities of one's own.
 int cav_term_dim(const cav_term *term) {
   if (!cav_term_is_reading(term)) return 0;
+  if (term->quantity == CAV_QUANTITY_TRACK) return cav_recorded_dim(term->track);
   if (term->component >= 0) return 1;
   if (term->quantity == CAV_QUANTITY_USER) return term->user->dim;
   return term->sensor.dim == 4 ? 3 : term->sensor.dim;
@@ -136,6 +142,10 @@ void cav_term_read(const cav_transcription *tr, cav_state *state, const cav_term
   double reading[CAV_SENSOR_DIM_MAX], target[CAV_SENSOR_DIM_MAX];
   if (term->quantity == CAV_QUANTITY_USER) {
     read_user(tr, state, term, t, y);
+    return;
+  }
+  if (term->quantity == CAV_QUANTITY_TRACK) {
+    cav_recorded_read(tr, state, term, t, y);
     return;
   }
   assert(term->sensor.dim <= CAV_SENSOR_DIM_MAX);

@@ -240,6 +240,54 @@ static int contact_values(const cav_verification *verification, const cav_term *
   return n;
 }
 
+// what the motion has where a channel of a record has its numbers
+static void channel_values(const cav_verification *verification, const cav_channel *channel, int t, double *x) {
+  const cav_model *model = verification->model;
+  const double *q = verification->q + (size_t)t * (size_t)model->nq;
+  cav_pose pose;
+  double reading[CAV_SENSOR_DIM_MAX];
+  if (channel->kind == CAV_CHANNEL_SENSOR) {
+    cav_sensor_read(model, verification->state, &channel->sensor, reading);
+    for (int c = 0; c < channel->ncolumn; c++) x[c] = reading[channel->component < 0 ? c : channel->component];
+  } else if (channel->kind == CAV_CHANNEL_MARKER) {
+    cav_object_pose(model, verification->state, CAV_OBJECT_XBODY, channel->object, &pose);
+    for (int c = 0; c < 3; c++) {
+      x[c] = pose.pos[c];
+      for (int k = 0; k < 3; k++) x[c] += pose.rotation[3 * c + k] * channel->place[k];
+    }
+  } else {
+    const cav_joint *joint = &model->joint[channel->object];
+    int behind = channel->kind == CAV_CHANNEL_ROTATION && joint->type == CAV_JOINT_FREE ? 3 : 0;
+    memcpy(x, q + joint->q + behind, (size_t)channel->ncolumn * sizeof *x);
+  }
+}
+
+// of all channels, over the noise; what was not recorded is zero, and so is its target
+static int record_values(const cav_verification *verification, const cav_term *term, int t, double *x, double *target) {
+  int n = 0;
+  for (int i = 0; i < term->track->nchannel; i++) {
+    const cav_channel *channel = &term->track->channel[i];
+    double record[CAV_SENSOR_DIM_MAX], value[CAV_SENSOR_DIM_MAX], phi[3] = {0};
+    int turned = channel->ncolumn == 4, dim = turned ? 3 : channel->ncolumn;
+    int seen =
+        cav_track_sample(term->track, channel, when(verification, t), verification->problem->timestep, record) != 0;
+    channel_values(verification, channel, t, value);
+    if (turned && seen) rotation(record, value, phi);
+    for (int c = 0; c < dim; c++, n++) {
+      int gap = !seen || isnan(record[turned ? 0 : c]);
+      x[n] = gap ? 0 : (turned ? phi[c] : value[c]) / channel->sd;
+      target[n] = gap || turned ? 0 : record[c] / channel->sd;
+    }
+  }
+  return n;
+}
+
+// what a record compares velocities and forces with, at a knot that nothing leaves
+static int is_late(const cav_track *track) {
+  return track->channel->kind == CAV_CHANNEL_SENSOR &&
+         cav_sensor_rule_of(track->channel->sensor.type)->stage != CAV_READS_POSITION;
+}
+
 int cav_verification_measure(const cav_verification *verification, const cav_term *term, int t, double *q, double *x,
                              double *target) {
   int forced = t < verification->rows;
@@ -263,6 +311,8 @@ int cav_verification_measure(const cav_verification *verification, const cav_ter
     case CAV_QUANTITY_SELF_PENETRATION:
     case CAV_QUANTITY_FORCE:
       return forced ? contact_values(verification, term, x, target) : 0;
+    case CAV_QUANTITY_TRACK:
+      return forced || !is_late(term->track) ? record_values(verification, term, t, x, target) : 0;
     case CAV_QUANTITY_USER:
       return forced || term->user->reads != CAV_READS_ACCELERATION ? user_values(verification, term, t, x, target) : 0;
     case CAV_QUANTITY_TYPES:
@@ -275,6 +325,10 @@ int cav_constraint_check_room(const cav_verification *verification) {
   const cav_model *model = verification->model;
   int most = model->nv > model->nu ? model->nv : model->nu;
   if (2 * verification->state->ncontact > most) most = 2 * verification->state->ncontact;
+  for (int i = 0; i < verification->problem->nterm; i++) {
+    const cav_term *term = &verification->problem->term[i];
+    if (term->quantity == CAV_QUANTITY_TRACK && term->track->ncolumn > most) most = term->track->ncolumn;
+  }
   return model->nq + 2 * (most > CAV_USER_DIM_MAX ? most : CAV_USER_DIM_MAX);
 }
 

@@ -99,6 +99,7 @@ static int is_goal(const cav_term *term) {
 // whether a term names a value to be reached: at one time, by a target of its own, or as a constraint
 static int states_target(const cav_term *term) {
   if (cav_quantity_rule_of(term->quantity)->of == CAV_OF_CONTACTS) return 0;
+  if (term->quantity == CAV_QUANTITY_TRACK) return 0;
   return term->use != CAV_USE_COST || is_goal(term) || term->target != NULL || term->within > 0;
 }
 
@@ -239,6 +240,9 @@ double cav_verification_weight(const cav_verification *verification, const cav_t
   int forced = term->quantity != CAV_QUANTITY_CONFIGURATION && term->quantity != CAV_QUANTITY_VELOCITY;
   if (term->quantity == CAV_QUANTITY_SENSOR)
     forced = cav_sensor_rule_of(term->sensor.type)->stage == CAV_READS_ACCELERATION;
+  if (term->quantity == CAV_QUANTITY_TRACK)
+    forced = term->track->channel->kind == CAV_CHANNEL_SENSOR &&
+             cav_sensor_rule_of(term->track->channel->sensor.type)->stage != CAV_READS_POSITION;
   if (term->quantity == CAV_QUANTITY_USER) forced = term->user->reads == CAV_READS_ACCELERATION;
   if (verification->problem->cycle.on && whole && t == 0 && !forced) return 0;
   return single ? 1 : verification->h;

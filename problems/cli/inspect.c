@@ -308,6 +308,11 @@ static void print_target(const cav_problem *p, const cav_term *term) {
   }
   if (term->nwaypoint) {
     printf(" along %d waypoints", term->nwaypoint);
+  } else if (term->track) {
+    const cav_track *track = term->track;
+    printf(": %d channels, %d frames", track->nchannel, track->nframe);
+    if (track->unused) printf(", %d columns of the file not asked for", track->unused);
+    if (track->absent) printf(", %d markers of the set not in the file", track->absent);
   } else if (term->quantity == CAV_QUANTITY_CONFIGURATION) {
     printf(" to %s", term->target ? "its own posture" : "the goal");
   } else if (term->quantity == CAV_QUANTITY_SENSOR && term->target) {
