@@ -17,7 +17,8 @@ void cav_model_return(cav_model *model, const void *kept);
 cav_status cav_model_scale(cav_model *model, double factor);
 
 /// Links of a size of their own: lengths of link i times factor[i] ([nlink], > 0, of the world 1) about the anchor of its
-/// first joint, masses by its cube. Before any state of the model exists, but for states that evaluate positions alone.
+/// first joint; the mass of all by its volume, fractions of it kept. Before any state of the model exists, but for states
+/// that evaluate positions alone.
 /// CAV_BAD_INPUT: a factor that is none, nothing changed; CAV_NO_MEMORY. resize.c.
 cav_status cav_model_resize(cav_model *model, const double *factor);
 

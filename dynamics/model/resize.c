@@ -1,8 +1,8 @@
 /// Models of another size: every link scaled by a factor of its own, as a subject's segments are. What is fixed to a
 /// link (joints, geoms, sites, centres of mass) goes away from the anchor of its first joint by that factor; that
-/// anchor is a point of the parent, and goes with the parent's. Masses go with volume, hence by the cube, moments of
-/// inertia by the fifth power. What is not of a size stays: ranges, gears, springs, dampers, armature, contact
-/// parameters.
+/// anchor is a point of the parent, and goes with the parent's. The mass of all goes with its volume; that of a link stays
+/// the same fraction of it, as tables of segments have it, since a longer segment is seldom thicker. What is not of a size
+/// stays: ranges, gears, springs, dampers, armature, contact parameters.
 #include <math.h>
 #include <stdio.h>
 
@@ -39,31 +39,38 @@ static void place_link(const cav_model *m, cav_link *link, double parent, double
   for (int k = 0; k < 3; k++) link->pos[k] = parent * (link->pos[k] + anchor[k]) - own * anchor[k];
 }
 
-static void resize_links(cav_model *model, const double *factor) {
+// by how much the mass of all grows
+static double growth(const cav_model *m, const double *factor) {
+  double mass = 0;
+  for (int i = 1; i < m->nlink; i++) mass += m->link[i].mass * pow(factor[i], 3);
+  return mass / m->mass;
+}
+
+static void resize_links(cav_model *model, const double *factor, double heavier) {
   cav_link *link = (cav_link *)model->link;
   cav_joint *joint = (cav_joint *)model->joint;
-  model->mass = 0;
   for (int i = 1; i < model->nlink; i++) {
-    double s = factor[i], cube = s * s * s;
+    double s = factor[i];
     place_link(model, &link[i], factor[link[i].parent], s);
     stretch(link[i].com, 3, s);
-    link[i].mass *= cube;
-    stretch(link[i].inertia, 6, cube * s * s);
-    model->mass += link[i].mass;
+    link[i].mass *= heavier;
+    stretch(link[i].inertia, 6, heavier * s * s);
   }
+  model->mass *= heavier;
   for (int j = 0; j < model->njoint; j++) stretch(joint[j].pos, 3, factor[joint[j].link]);
 }
 
-static void resize_objects(cav_model *model, const double *factor) {
+static void resize_objects(cav_model *model, const double *factor, double heavier) {
   cav_body *body = (cav_body *)model->body;
   cav_geom *geom = (cav_geom *)model->geom;
   cav_site *site = (cav_site *)model->site;
   for (int i = 1; i < model->nbody; i++) {
-    double s = factor[body[i].link], cube = s * s * s;
+    double s = factor[body[i].link];
     stretch(body[i].pos, 3, s);
+    if (!body[i].link) continue;
     stretch(body[i].com, 3, s);
-    body[i].mass *= cube;
-    stretch(body[i].inertia, 3, cube * s * s);
+    body[i].mass *= heavier;
+    stretch(body[i].inertia, 3, heavier * s * s);
   }
   for (int i = 0; i < model->ngeom; i++) {
     double s = factor[geom[i].link];
@@ -82,7 +89,8 @@ cav_status cav_model_resize(cav_model *model, const double *factor) {
   if (factor[0] != 1) return CAV_BAD_INPUT;
   for (int i = 1; i < model->nlink; i++)
     if (!(factor[i] > 0) || !isfinite(factor[i])) return CAV_BAD_INPUT;
-  resize_links(model, factor);
-  resize_objects(model, factor);
+  double heavier = growth(model, factor);
+  resize_links(model, factor, heavier);
+  resize_objects(model, factor, heavier);
   return cav_reference_weights(model);
 }

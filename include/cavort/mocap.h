@@ -124,9 +124,9 @@ CAV_API cav_status cav_ik(const cav_model *model, const cav_record *record, cav_
 /// Fits a model's sizes to a clip: a factor for the lengths of every link (segments of both sides together where the set
 /// says symmetric), with the places of markers that are not known and configurations of frames spread over the clip. A
 /// factor is within about set->scale (> 0) of that of all. The model gets those sizes: what is fixed to a link goes away from
-/// the anchor of its first joint by its factor, masses by its cube, keyframes stand as high as before; gears, ranges,
-/// springs stay. set: places on the model of its new size. factor [nlink], its standard errors in deviation [nlink] (may
-/// be NULL). No state of the model may be used afterwards.
+/// the anchor of its first joint by its factor, the mass of all grows with its volume and links keep their fractions of
+/// it, keyframes stand as high as before; gears, ranges, springs stay. set: places on the model of its new size. factor
+/// [nlink], its standard errors in deviation [nlink] (may be NULL). No state of the model may be used afterwards.
 /// CAV_BAD_INPUT as cav_ik, CAV_NOT_SUPPORTED: the model has meshes that move, tendons along paths or equality
 /// constraints of bodies; CAV_NO_MEMORY, CAV_NOT_FINITE: do not use the model. optim/METHOD.md, 11.
 CAV_API cav_status cav_ik_sizes(cav_model *model, const cav_record *record, cav_marker_set *set,

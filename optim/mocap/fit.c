@@ -52,8 +52,9 @@ cav_status cav_fit_cost(const cav_fit *fit, int frame, const double *q, const do
     *cost += fit->set->marker[fit->marker[i]].weight * dot3(x, x) / 2;
   }
   for (int f = 0; f < fit->nfoot; f++) {
-    double x[3];
-    if (cav_fit_floor_row(fit, frame, f, x)) *cost += fit->options->floor * x[2] * x[2] / 2;
+    double x[CAV_FIT_CORNERS][3];
+    for (int k = 0, n = cav_fit_floor_rows(fit, frame, f, x); k < n; k++)
+      *cost += fit->options->floor * x[k][2] * x[k][2] / 2;
   }
   cav_difference(m, m->q0, q, 1, fit->move);
   for (int d = 0; d < m->nv; d++) *cost += pow(holds(fit, d) * fit->move[d], 2) / 2;
@@ -82,11 +83,10 @@ static void add_marker(const cav_fit *fit, int frame, int i) {
   }
 }
 
-// the height of a foot's lowest point
-static void add_foot(const cav_fit *fit, int frame, int f) {
+// the height of a point of a foot
+static void add_foot(const cav_fit *fit, int f, const double x[3]) {
   const cav_model *m = fit->model;
-  double x[3], a[3], b[3], w = fit->options->floor;
-  if (!cav_fit_floor_row(fit, frame, f, x)) return;
+  double a[3], b[3], w = fit->options->floor;
   for (int d = cav_fit_last_dof(m, fit->foot[f]); d >= 0; d = m->dof[d].parent) {
     cav_fit_column(fit, d, x, a);
     fit->g[d] += w * a[2] * x[2];
@@ -103,7 +103,10 @@ void cav_fit_normal(const cav_fit *fit, int frame, const double *q, const double
   memset(fit->H, 0, nv * nv * sizeof *fit->H);
   memset(fit->g, 0, nv * sizeof *fit->g);
   for (int i = 0; i < fit->n; i++) add_marker(fit, frame, i);
-  for (int f = 0; f < fit->nfoot; f++) add_foot(fit, frame, f);
+  for (int f = 0; f < fit->nfoot; f++) {
+    double x[CAV_FIT_CORNERS][3];
+    for (int k = 0, rows = cav_fit_floor_rows(fit, frame, f, x); k < rows; k++) add_foot(fit, f, x[k]);
+  }
   cav_difference(m, m->q0, q, 1, fit->move);
   for (size_t d = 0; d < nv; d++) {
     double w = pow(holds(fit, (int)d), 2);

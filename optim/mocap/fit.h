@@ -4,7 +4,7 @@
 
 #include "cavort/mocap.h"
 
-enum { CAV_FIT_FEET = 6 };
+enum { CAV_FIT_FEET = 6, CAV_FIT_CORNERS = 4 };
 
 /// A model, the markers that a clip and a set share, and the work of one fit.
 typedef struct cav_fit {
@@ -18,7 +18,7 @@ typedef struct cav_fit {
   double step;                   ///< s
   const double *position;        ///< [nframe*nmarker*3]
   int nfoot, foot[CAV_FIT_FEET]; ///< bodies
-  char *stands;                  ///< [nframe*CAV_FIT_FEET] 1: that foot stands
+  char *stands;                  ///< [nframe*CAV_FIT_FEET] 1: that foot stands, 2: on all of its sole
   double *H, *g, *try, *move;    ///< [nv*nv] lower, by columns; [nv]; [nq]; [nv]
 } cav_fit;
 
@@ -46,8 +46,8 @@ void cav_fit_column(const cav_fit *fit, int d, const double point[3], double col
 /// Finds feet and when they stand. floor.c.
 cav_status cav_fit_floor(cav_fit *fit);
 
-/// Whether foot f has a row at a frame, and its lowest point, whose height is that row. floor.c.
-int cav_fit_floor_row(const cav_fit *fit, int frame, int f, double point[3]);
+/// Rows of foot f at a frame: points of it whose heights they are. Returns how many. floor.c.
+int cav_fit_floor_rows(const cav_fit *fit, int frame, int f, double point[CAV_FIT_CORNERS][3]);
 
 /// Half the squares of all rows at q: markers seen, feet, posture, and the change from before (NULL: none). Leaves the
 /// state at q.

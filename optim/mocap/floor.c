@@ -1,5 +1,6 @@
 /// Feet and the floor: where a marker of a foot stands still, near the lowest that it comes, the foot's lowest point is on
-/// the floor; elsewhere it is not below. The floor is the plane z = 0 of the clip.
+/// the floor; where all of its markers do, two or more, its sole is, four corners of it; elsewhere it is not below. The
+/// floor is the plane z = 0 of the clip.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,30 +12,40 @@
 static const double still = 0.25; // m/s
 static const double low = 0.06;   // m above the lowest place of a marker in the clip
 static const double bend = 1e-6;  // of a direction, for the point of a geom that is farthest along it
+static const double tilt = 0.1;   // of a floor along x and y that a corner of a sole would touch first
+enum { FLAT = 2 };
 
-// lowest point of a body's geoms at the state's position; zero: it has none
-static int lowest_point(const cav_fit *fit, int body, double point[3]) {
+// how far a geom reaches along a direction of any length, times that
+static double reach_along(const cav_geom *geom, const cav_pose *pose, const double n[3]) {
+  double unit[3], length = norm3(n);
+  scale3(unit, 1 / length, n);
+  return length * cav_geom_reach(geom, pose, unit);
+}
+
+// the point of a body's geoms that is farthest along a direction n, not of unit length, at the state's position; zero: it
+// has none. By the reach of its farthest geom, whose derivative by n that point is
+static int farthest_point(const cav_fit *fit, int body, const double n[3], double point[3]) {
   const cav_model *m = fit->model;
-  double least = INFINITY, centre[3] = {0};
+  double most = -INFINITY;
   cav_pose pose;
-  int lowest = -1;
+  int farthest = -1;
   for (int g = m->body[body].geom; g < m->body[body].geom + m->body[body].ngeom; g++) {
     cav_object_pose(m, fit->state, CAV_OBJECT_GEOM, g, &pose);
-    double height = pose.pos[2] - cav_geom_reach(&m->geom[g], &pose, (const double[3]){0, 0, 1});
-    if (height < least) least = height, lowest = g, copy3(centre, pose.pos);
+    double reach = dot3(pose.pos, n) + reach_along(&m->geom[g], &pose, n);
+    if (reach > most) most = reach, farthest = g;
   }
-  if (lowest < 0) return 0;
-  cav_object_pose(m, fit->state, CAV_OBJECT_GEOM, lowest, &pose);
-  for (int k = 0; k < 2; k++) {
+  if (farthest < 0) return 0;
+  cav_object_pose(m, fit->state, CAV_OBJECT_GEOM, farthest, &pose);
+  for (int k = 0; k < 3; k++) {
     double reach[2];
     for (int side = 0; side < 2; side++) {
-      double n[3] = {0, 0, 1};
-      n[k] = side ? bend : -bend;
-      reach[side] = cav_geom_reach(&m->geom[lowest], &pose, n);
+      double bent[3];
+      copy3(bent, n);
+      bent[k] += side ? bend : -bend;
+      reach[side] = reach_along(&m->geom[farthest], &pose, bent);
     }
-    point[k] = centre[k] - (reach[1] - reach[0]) / (2 * bend);
+    point[k] = pose.pos[k] + (reach[1] - reach[0]) / (2 * bend);
   }
-  point[2] = least;
   return 1;
 }
 
@@ -58,6 +69,18 @@ static double bottom(const cav_fit *fit, int i) {
   return least;
 }
 
+// how a foot stands at a frame, by its markers
+static int stand_of(const cav_fit *fit, int frame, int foot, const double *least) {
+  int seen = 0, standing = 0;
+  for (int i = 0; i < fit->n; i++) {
+    if (fit->set->marker[fit->marker[i]].body != fit->foot[foot]) continue;
+    const double *at = cav_fit_seen(fit, frame, i);
+    seen++;
+    standing += at && speed(fit, frame, i) < still && at[2] < least[i] + low;
+  }
+  return standing > 1 && standing == seen ? FLAT : standing > 0;
+}
+
 cav_status cav_fit_floor(cav_fit *fit) {
   static const cav_role feet[] = {CAV_ROLE_RIGHT_FOOT,      CAV_ROLE_LEFT_FOOT,       CAV_ROLE_FRONT_RIGHT_FOOT,
                                   CAV_ROLE_FRONT_LEFT_FOOT, CAV_ROLE_BACK_RIGHT_FOOT, CAV_ROLE_BACK_LEFT_FOOT};
@@ -67,18 +90,24 @@ cav_status cav_fit_floor(cav_fit *fit) {
   for (size_t k = 0; k < sizeof feet / sizeof *feet; k++)
     if (roles.body[feet[k]] >= 0) fit->foot[fit->nfoot++] = roles.body[feet[k]];
   fit->stands = calloc((size_t)fit->nframe * CAV_FIT_FEET, 1);
-  if (!fit->stands) return CAV_NO_MEMORY;
-  for (int f = 0; f < fit->nfoot; f++)
-    for (int i = 0; i < fit->n; i++) {
-      if (fit->set->marker[fit->marker[i]].body != fit->foot[f]) continue;
-      double least = bottom(fit, i);
-      for (int t = 0; t < fit->nframe; t++)
-        if (speed(fit, t, i) < still && cav_fit_seen(fit, t, i) && cav_fit_seen(fit, t, i)[2] < least + low)
-          fit->stands[t * CAV_FIT_FEET + f] = 1;
-    }
-  return CAV_OK;
+  double *least = malloc((size_t)fit->n * sizeof *least);
+  for (int i = 0; i < fit->n && least; i++) least[i] = bottom(fit, i);
+  for (int t = 0; t < fit->nframe && fit->stands && least; t++)
+    for (int f = 0; f < fit->nfoot; f++) fit->stands[t * CAV_FIT_FEET + f] = (char)stand_of(fit, t, f, least);
+  status = fit->stands && least ? CAV_OK : CAV_NO_MEMORY;
+  free(least);
+  return status;
 }
 
-int cav_fit_floor_row(const cav_fit *fit, int frame, int f, double point[3]) {
-  return lowest_point(fit, fit->foot[f], point) && (point[2] < 0 || fit->stands[frame * CAV_FIT_FEET + f]);
+int cav_fit_floor_rows(const cav_fit *fit, int frame, int f, double point[CAV_FIT_CORNERS][3]) {
+  int stands = fit->stands[frame * CAV_FIT_FEET + f], n = 0;
+  if (stands == FLAT) {
+    for (int k = 0; k < CAV_FIT_CORNERS; k++) {
+      const double down[3] = {k & 1 ? tilt : -tilt, k & 2 ? tilt : -tilt, -1};
+      n += farthest_point(fit, fit->foot[f], down, point[n]);
+    }
+    return n;
+  }
+  if (!farthest_point(fit, fit->foot[f], (const double[3]){0, 0, -1}, point[0])) return 0;
+  return point[0][2] < 0 || stands;
 }

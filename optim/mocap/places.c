@@ -132,9 +132,9 @@ static void couple(const search *s, int f, const double *q, double *B) {
     }
   }
   for (int foot = 0; s->sizes && foot < fit->nfoot; foot++) {
-    double x[3];
-    if (cav_fit_floor_row(fit, s->frame[f], foot, x))
-      couple_sizes(s, q, m->body[fit->foot[foot]].link, x, x, fit->options->floor, 2, B);
+    double x[CAV_FIT_CORNERS][3];
+    for (int c = 0, rows = cav_fit_floor_rows(fit, s->frame[f], foot, x); c < rows; c++)
+      couple_sizes(s, q, m->body[fit->foot[foot]].link, x[c], x[c], fit->options->floor, 2, B);
   }
 }
 

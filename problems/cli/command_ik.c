@@ -79,7 +79,7 @@ static cav_status set_mass(fit *f, cav_error *error) {
 
 // sizes and masses first; the model of which all else is told is that of the file that has them
 static cav_status scale(fit *f, const cav_ik_options *options, cav_error *error) {
-  static const double usual = 0.1;
+  static const double usual = 0.03;
   cav_marker_set *set = f->set;
   if (f->line->scale && set->scale <= 0) set->scale = usual;
   if (set->scale <= 0 && f->line->mass <= 0) return CAV_OK;

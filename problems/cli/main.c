@@ -62,7 +62,7 @@ static const cav_manual_option options[] = {
      "limited memory), both"},
     {OPTION_MARKERS, "--markers", NULL, "FILE", "marker set: which marker of the clip sits where on which body"},
     {OPTION_SCALE, "--scale", NULL, NULL,
-     "fit the sizes of segments too, within about a tenth of the whole body's (scale of the marker set says how far), "
+     "fit the sizes of segments too, each within a few percent of the whole body's (scale of the marker set: 0.03), "
      "and write the scaled model, model.xml"},
     {OPTION_MASS, "--mass", NULL, "KG", "mass of the subject, of all that moves, for the scaled model"},
     {OPTION_THREADS, "--threads", NULL, "N",
