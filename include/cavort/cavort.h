@@ -5,6 +5,7 @@
 #include "cavort/dynamics.h"
 #include "cavort/mocap.h"
 #include "cavort/model.h"
+#include "cavort/mpc.h"
 #include "cavort/problem.h"
 #include "cavort/result.h"
 #include "cavort/solve.h"

@@ -129,6 +129,7 @@ typedef struct cav_solve_options {
   int gains;                ///< 1: feedback gains are chosen, where the motion may be certified with them
   int nmultiplier;          ///< 0, or number of rows: cav_solution's of a solve of the same knots and rows
   const double *multiplier; ///< [nmultiplier] to start with, NULL: zeros
+  int fixed_multipliers;    ///< 1: cav_optimiser_iterate leaves them as they are, rows are held by penalties
   double tolerance;         ///< unactuated force at the end, fraction of weight
   int diagnose; ///< 1: where constraints cannot all hold, end at their least violation, which cav_explain needs
   /// Of the dynamics: analytic, and what has none (cav_derivatives_missing, sensors) by one-sided differences, or all
@@ -261,17 +262,18 @@ CAV_API void cav_optimiser_free(cav_optimiser *optimiser);
 CAV_API cav_status cav_optimiser_solve(cav_optimiser *optimiser, int first_stage, cav_progress *last, cav_error *error);
 
 /// At most so many Gauss-Newton iterations at the last stage's law, then an update of the multipliers (augmented
-/// Lagrangian). From the second call on allocates nothing unless more touches than ever before. Each costs a
-/// linearisation, a factor and an evaluation. It ends before where no step decreases the merit. CAV_OK, CAV_INTERRUPTED,
-/// CAV_NOT_FINITE, CAV_NO_MEMORY; CAV_BAD_INPUT for iterations < 1, or where a quantity of one's own refuses. last, of
-/// the last iteration, may be NULL.
+/// Lagrangian) unless they are fixed. From the second call on allocates nothing unless more touches than ever before.
+/// Each costs a linearisation, a factor and an evaluation. It ends before where no step decreases the merit. CAV_OK,
+/// CAV_INTERRUPTED, CAV_NOT_FINITE, CAV_NO_MEMORY; CAV_BAD_INPUT for iterations < 1, or where a quantity of one's own
+/// refuses. last, of the last iteration, may be NULL.
 CAV_API cav_status cav_optimiser_iterate(cav_optimiser *optimiser, int iterations, cav_progress *last);
 
-/// Takes so many knots off the front and starts the rest at q [nq], v [nv], both NULL: as planned there. The knots
-/// that are new at the end hold the last configuration. Multipliers move along where rows of two knots are alike.
-/// Windows and targets of terms stay at their times after the new start. CAV_BAD_INPUT: not 0 to all knots but two, or
-/// q or v not finite; CAV_NOT_SUPPORTED: a cycle. Allocates nothing.
-CAV_API cav_status cav_optimiser_shift(cav_optimiser *optimiser, int knots, const double *q, const double *v);
+/// Takes so many knots off the front and starts the rest at q [nq], v [nv], both NULL: as planned there. A part of a
+/// knot moves every knot by that part of the step to the next. Knots that are new at the end hold the last
+/// configuration. Multipliers move along where rows of two knots are alike. Windows and targets of terms stay at their
+/// times after the new start. CAV_BAD_INPUT: not 0 to all knots but two, or q or v not finite; CAV_NOT_SUPPORTED: a
+/// cycle. Allocates nothing.
+CAV_API cav_status cav_optimiser_shift(cav_optimiser *optimiser, double knots, const double *q, const double *v);
 
 /// The motion, the problem with the present start, and the contact law of the motion, as cav_verify takes them; the
 /// multipliers of all rows [n]. All until the next call.

@@ -117,7 +117,7 @@ cav_status cav_optimiser_iterate(cav_optimiser *o, int iterations, cav_progress 
     if (run->region.settled) break;
   }
   run->region.single = 0;
-  if (status == CAV_OK) cav_transcription_multipliers(run->tr);
+  if (status == CAV_OK && !o->options.fixed_multipliers) cav_transcription_multipliers(run->tr);
   if (last) *last = run->last;
   return cav_run_refused(run, status, NULL);
 }
@@ -128,40 +128,55 @@ static int all_finite(const double *x, int n) {
   return 1;
 }
 
-/// Multipliers of rows from one to another of a knot, if these are as many as in the other knot; else none.
-static void take_rows(cav_knot *knot, int from, int to, const cav_knot *other, int other_from, int other_to) {
-  int alike = other && other_to - other_from == to - from;
-  for (int i = from; i < to; i++) knot->slot[i].multiplier = alike ? other->slot[other_from + i - from].multiplier : 0;
+/// Adds part of the multipliers of another knot's rows to a knot's, if these are as many.
+static void add_rows(cav_slot *slot, int n, const cav_slot *other, int m, double part) {
+  for (int i = 0; i < n && n == m; i++) slot[i].multiplier += part * other[i].multiplier;
 }
 
-static void shift_multipliers(cav_transcription *tr, int knots) {
+/// Adds part of the multipliers of another knot to those of a knot whose rows are alike.
+static void add_multipliers(cav_knot *knot, const cav_knot *other, double part) {
+  const cav_slot_layout *at = &knot->layout, *of = &other->layout;
+  const int start[] = {at->unactuated, at->effort, at->joint, at->tendon, at->term, at->count};
+  const int there[] = {of->unactuated, of->effort, of->joint, of->tendon, of->term, of->count};
+  for (int k = 0; k < 5; k++)
+    add_rows(knot->slot + start[k], start[k + 1] - start[k], other->slot + there[k], there[k + 1] - there[k], part);
+}
+
+static void shift_multipliers(cav_transcription *tr, int knots, double part) {
   for (int t = 0; t < tr->nknot; t++) {
     cav_knot *knot = &tr->knot[t];
-    const cav_knot *other = t + knots < tr->nknot ? &tr->knot[t + knots] : NULL;
-    const cav_slot_layout *at = &knot->layout, *of = other ? &other->layout : at;
-    take_rows(knot, at->unactuated, at->effort, other, of->unactuated, of->effort);
-    take_rows(knot, at->effort, at->joint, other, of->effort, of->joint);
-    take_rows(knot, at->joint, at->tendon, other, of->joint, of->tendon);
-    take_rows(knot, at->tendon, at->term, other, of->tendon, of->term);
-    take_rows(knot, at->term, at->count, other, of->term, of->count);
+    // a knot is its own source if nothing moves
+    if (knots > 0 || part > 0) {
+      const double own = knots == 0 ? 1 - part : 0;
+      for (int i = 0; i < knot->layout.count; i++) knot->slot[i].multiplier *= own;
+    }
+    if (knots > 0 && t + knots < tr->nknot) add_multipliers(knot, &tr->knot[t + knots], 1 - part);
+    if (part > 0 && t + knots + 1 < tr->nknot) add_multipliers(knot, &tr->knot[t + knots + 1], part);
   }
 }
 
-cav_status cav_optimiser_shift(cav_optimiser *o, int knots, const double *q, const double *v) {
+cav_status cav_optimiser_shift(cav_optimiser *o, double knots, const double *q, const double *v) {
   cav_trajectory *at = o->run.at;
   const cav_model *m = o->problem.model;
   size_t nq = (size_t)m->nq, nv = (size_t)m->nv, last = (size_t)at->nknot - 1;
   if (o->problem.cycle.on) return CAV_NOT_SUPPORTED;
-  if (knots < 0 || knots > at->nknot - 2 || !all_finite(q, m->nq) || !all_finite(v, m->nv)) return CAV_BAD_INPUT;
-  size_t k = (size_t)knots;
-  memcpy(o->v, v ? v : at->v + k * nv, nv * sizeof(double));
+  if (!(knots >= 0 && knots <= at->nknot - 2) || !all_finite(q, m->nq) || !all_finite(v, m->nv)) return CAV_BAD_INPUT;
+  const size_t k = (size_t)knots;
+  const double part = knots - (double)k;
+  const double *before = at->v + k * nv, *after = before + nv;
+  for (size_t d = 0; d < nv; d++) o->v[d] = v ? v[d] : part > 0 ? (1 - part) * before[d] + part * after[d] : before[d];
   memmove(at->q, at->q + k * nq, (last + 1 - k) * nq * sizeof(double));
   for (size_t t = last + 1 - k; t <= last; t++) memcpy(at->q + t * nq, at->q + (last - k) * nq, nq * sizeof(double));
+  if (part > 0) {
+    cav_trajectory_velocities(m, at);
+    for (size_t t = 0; t < last; t++)
+      cav_integrate(m, at->q + t * nq, at->v + (t + 1) * nv, part * at->timestep, at->q + t * nq);
+  }
   if (q) memcpy(at->q, q, nq * sizeof(double));
   memcpy(o->q, at->q, nq * sizeof(double));
   memcpy(at->v, o->v, nv * sizeof(double));
   cav_trajectory_velocities(m, at);
-  shift_multipliers(o->run.tr, knots);
+  shift_multipliers(o->run.tr, (int)k, part);
   return CAV_OK;
 }
 

@@ -15,7 +15,7 @@ enum {
   CAV_EXIT_INTERRUPTED = 130
 };
 
-enum { CAV_COMMAND_IPOPT = 32, CAV_COMMAND_SETTINGS = 32 };
+enum { CAV_COMMAND_IPOPT = 32, CAV_COMMAND_SETTINGS = 32, CAV_COMMAND_PUSHES = 16 };
 
 /// A command line as read by main.c.
 typedef struct cav_command_line {
@@ -45,6 +45,11 @@ typedef struct cav_command_line {
   int csv;             ///< --csv
   int nset;            ///< --set, any number of times
   char *set[CAV_COMMAND_SETTINGS];
+  double duration;            ///< --duration, s; 0: by the pushes
+  double deadline, stiffness; ///< --deadline, s, --stiffness, rad/s; -1: not given
+  int knots, iterations;      ///< --knots, --iterations; 0: not given
+  int npush;                  ///< --push, any number of times
+  const char *push[CAV_COMMAND_PUSHES];
   int nipopt; ///< --ipopt, any number of times
   cav_ipopt_option ipopt[CAV_COMMAND_IPOPT];
 } cav_command_line;
@@ -70,6 +75,7 @@ int cav_command_inspect(const cav_command_line *line);
 int cav_command_explain(const cav_command_line *line);
 int cav_command_ik(const cav_command_line *line);
 int cav_command_export(const cav_command_line *line);
+int cav_command_mpc(const cav_command_line *line);
 int cav_command_new(const cav_command_line *line);
 int cav_command_report(const cav_command_line *line);
 int cav_command_solve(const cav_command_line *line);

@@ -35,6 +35,8 @@ enum option {
   OPTION_CSV = 524288,
   OPTION_LIKE = 1048576,
   OPTION_SCALE = 134217728,
+  OPTION_CONTROL = 33554432,
+  OPTION_SCALE = 134217728,
   OPTION_MASS = 268435456
 };
 
@@ -46,7 +48,8 @@ static const cav_manual_option options[] = {
     {OPTION_MODEL, "--model", NULL, "FILE", "use this model instead of the one that the problem names"},
     {OPTION_FLOATING, "--floating", NULL, NULL, "the root link of a URDF floats (a problem says floating=\"true\")"},
     {OPTION_OUTPUT, "--output", "-o", "DIR",
-     "folder of the result (default: NAME.result, of a report NAME.report, of stress NAME.stress, of ik NAME.ik; NAME "
+     "folder of the result (default: NAME.result, of a report NAME.report, of stress NAME.stress, of ik NAME.ik, of "
+     "mpc NAME.mpc; NAME "
      "of the problem "
      "or "
      "else of its file)"},
@@ -83,7 +86,19 @@ static const cav_manual_option options[] = {
     {OPTION_LIKE, "--like", NULL, "MOTION",
      "as this motion of the project asks, or this problem file, where the model has what it names"},
     {OPTION_TO, "--to", NULL, &(CAV_EXCHANGES(FORMAT_NAME))[1], "what to write"},
-    {OPTION_RATE, "--rate", NULL, "N", "samples a second (default: the knots of the motion)"},
+    {OPTION_RATE, "--rate", NULL, "N",
+     "samples a second (default: the knots of the motion); of mpc plans (default 100)"},
+    {OPTION_CONTROL, "--duration", NULL, "S", "simulated time (default: 2.5 s after the last push has begun)"},
+    {OPTION_CONTROL, "--push", NULL, "TEXT",
+     "\"N_S BODY DIRECTION TIME [LENGTH]\": an impulse (N s) at a body's centre of mass; x, -x, y, -y, z, -z, degrees "
+     "from x towards y, or around, ten runs in ten directions and instants; over LENGTH (default 0.1 s). May be given "
+     "several times: a run each"},
+    {OPTION_CONTROL, "--knots", NULL, "N", "knots that a plan looks ahead (default: those of the problem)"},
+    {OPTION_CONTROL, "--iterations", NULL, "N", "Gauss-Newton steps for a plan (default 2)"},
+    {OPTION_CONTROL, "--deadline", NULL, "S",
+     "from a state to the plan that is made from it (default: 1/rate); later ones are counted"},
+    {OPTION_CONTROL, "--stiffness", NULL, "W",
+     "rad/s: springs back to the plan, on the inertia of each dof (default 40; 0: the plan's forces alone)"},
 };
 enum { NOPTION = sizeof options / sizeof *options };
 
@@ -123,6 +138,12 @@ static const cav_manual_command commands[] = {
      "forces;\n"
      "  writes trajectory.csv, residuals of markers, the marker set with the places that were found, and a page",
      cav_command_ik, OPTION_MODEL | OPTION_MARKERS | OPTION_SCALE | OPTION_MASS | OPTION_OUTPUT | OPTION_QUIET},
+    {"mpc", "PROBLEM",
+     "simulate a body that is controlled by plans made anew while it moves, and pushed; tell pushes survived and how "
+     "long "
+     "plans\n"
+     "  took; writes runs.csv, and of the worst run plans.csv, trajectory.csv and a page",
+     cav_command_mpc, OPTION_MODEL | OPTION_RATE | OPTION_CONTROL | OPTION_OUTPUT | OPTION_QUIET},
     {"export", "DIR",
      "write the motion of a result folder in a format of other tools, into the folder or where -o says",
      cav_command_export, OPTION_MODEL | OPTION_OUTPUT | OPTION_TO | OPTION_RATE | OPTION_QUIET},
@@ -252,6 +273,40 @@ static int take_ipopt(cav_command_line *line, char *text) {
   return 0;
 }
 
+// a number above 0, or from 0 on, up to a million; returns 0 after telling what is wrong with it
+static int take_number(const char *name, const char *value, int zero, double *number) {
+  char *end;
+  *number = strtod(value, &end);
+  if (end != value && !*end && (zero ? *number >= 0 : *number > 0) && *number <= 1e6) return 1;
+  fprintf(stderr, "cavort: %s: expected a number %s 0, up to 1e6, got '%s'\n", name, zero ? "from" : "above", value);
+  return 0;
+}
+
+// a whole number from 1 on
+static int take_count(const char *name, const char *value, int *number) {
+  char *end;
+  const long n = strtol(value, &end, 10);
+  *number = (int)n;
+  if (end != value && !*end && n >= 1 && n <= 100000) return 1;
+  fprintf(stderr, "cavort: %s: expected a number from 1 to 100000, got '%s'\n", name, value);
+  return 0;
+}
+
+// options of mpc
+static int take_control(cav_command_line *line, const char *name, char *value) {
+  if (!strcmp(name, "--duration")) return take_number(name, value, 0, &line->duration);
+  if (!strcmp(name, "--deadline")) return take_number(name, value, 1, &line->deadline);
+  if (!strcmp(name, "--stiffness")) return take_number(name, value, 1, &line->stiffness);
+  if (!strcmp(name, "--knots")) return take_count(name, value, &line->knots);
+  if (!strcmp(name, "--iterations")) return take_count(name, value, &line->iterations);
+  if (line->npush < CAV_COMMAND_PUSHES) {
+    line->push[line->npush++] = value;
+    return 1;
+  }
+  fprintf(stderr, "cavort: --push: expected at most %d of them\n", CAV_COMMAND_PUSHES);
+  return 0;
+}
+
 // takes the value of an option; returns 0 after telling what is wrong with it
 static int take_value(cav_command_line *line, enum option option, const char *name, char *value) {
   char *end;
@@ -329,6 +384,8 @@ static int take_value(cav_command_line *line, enum option option, const char *na
       if (end != value && !*end && line->rate > 0 && line->rate <= 1e6) return 1;
       fprintf(stderr, "cavort: %s: expected samples a second, above 0, up to 1e6, got '%s'\n", name, value);
       return 0;
+    case OPTION_CONTROL:
+      return take_control(line, name, value);
     case OPTION_RESUME:
       return line->resume = 1;
     case OPTION_QUIET:
@@ -433,6 +490,8 @@ static int run(int argc, char **argv, const char *arguments) {
   long processors = sysconf(_SC_NPROCESSORS_ONLN);
   cav_command_line line = {.arguments = arguments,
                            .solver = CAV_SOLVER_GAUSS_NEWTON,
+                           .deadline = -1,
+                           .stiffness = -1,
                            .threads = processors < 1      ? 1
                                       : processors > 1024 ? 1024
                                                           : (int)processors};
