@@ -3,6 +3,8 @@
 #ifndef CAVORT_DENSE_H
 #define CAVORT_DENSE_H
 
+#include "vectors.h"
+
 /// Which entries of a product are added; the others of C stay.
 typedef enum cav_part { CAV_PART_ALL, CAV_PART_LOWER, CAV_PART_UPPER } cav_part;
 
@@ -36,8 +38,5 @@ void cav_dense_solve_upper_blocks(int n, int below, int step, const double *L, i
 
 /// X := A^-1 X for X [n*m] by rows exchanged; A becomes its factors. Zero if A is singular.
 int cav_dense_solve_general(int n, double *A, int lda, int m, double *X, int ldx);
-
-/// How many numbers a vector of this processor has: 8, 4 or 2. The results are the same. lanes.c.
-int cav_dense_lanes(void);
 
 #endif

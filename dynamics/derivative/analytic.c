@@ -31,15 +31,20 @@ static cav_derivative_store *derivatives_new(const cav_model *model, int bias) {
   cav_derivative_store *s = calloc(1, sizeof *s);
   if (!s) return NULL;
   size_t nv = (size_t)model->nv, n = (size_t)model->nlink;
-  size_t biases = bias ? 12 * nv : 0;
-  size_t doubles = 5 * 6 * nv + (12 + 3 * CAV_TWIST_BLOCK) * n + 12 * nv + nv * nv + biases;
+  size_t stride = (nv + 3) / 4 * 4, biases = bias ? 12 * nv : 0;
+  size_t doubles = 5 * 6 * nv + (12 + 3 * CAV_TWIST_BLOCK) * n + 12 * nv + nv * nv;
+  doubles += (CAV_DOF_COMPONENTS + 6) * stride + biases;
   s->drift = calloc(doubles + ALIGN, sizeof(double));
-  s->touched = calloc(n + nv + 1, sizeof(int));
+  s->touched = calloc(n + 2 * nv + stride + 1, sizeof(int));
   if (!s->drift || !s->touched) {
     cav_derivative_store_free(s);
     return NULL;
   }
   s->dof = s->touched + n + 1;
+  s->depth = s->dof + nv;
+  for (int i = 0; i < model->nv; i++) s->depth[i] = model->dof[i].parent < 0 ? 0 : s->depth[model->dof[i].parent] + 1;
+  s->path.dof = s->depth + nv;
+  s->path.stride = (int)stride;
   s->drift_now = s->drift + 6 * nv;
   s->drift_next = s->drift_now + 6 * nv;
   s->second = s->drift_next + 6 * nv;
@@ -50,10 +55,12 @@ static cav_derivative_store *derivatives_new(const cav_model *model, int bias) {
   s->by_next = s->by_now + CAV_TWIST_BLOCK * n;
   s->across = s->by_next + CAV_TWIST_BLOCK * n;
   s->spare = s->across + 12 * nv;
-  s->bias_second = bias ? s->spare + nv * nv : NULL;
+  s->path.at = s->spare + nv * nv;
+  s->entry = s->path.at + CAV_DOF_COMPONENTS * stride;
+  s->bias_second = bias ? s->entry + 6 * stride : NULL;
   s->bias_rate = bias ? s->bias_second + 6 * nv : NULL;
-  assert(s->spare + nv * nv + biases == s->drift + doubles);
-  s->bytes = sizeof *s + (doubles + ALIGN) * sizeof(double) + (n + nv + 1) * sizeof(int);
+  assert(s->entry + 6 * stride + biases == s->drift + doubles);
+  s->bytes = sizeof *s + (doubles + ALIGN) * sizeof(double) + (n + 2 * nv + stride + 1) * sizeof(int);
   return s;
 }
 

@@ -3,6 +3,7 @@
 /// enter the same products. Not here: what acts on single dofs (passive.c, row.c).
 #include "analytic.h"
 #include "half_step.h"
+#include "vectors.h"
 
 // ---------------------------------------------------------------- down the tree
 
@@ -64,6 +65,7 @@ void cav_derivative_drifts(const cav_derivative_task *t) {
       }
     }
   }
+  memset(t->s->path.dof, -1, (size_t)t->s->path.stride * sizeof *t->s->path.dof);
 }
 
 // ---------------------------------------------------------------- up the tree
@@ -177,40 +179,109 @@ static void deepen(const cav_derivative_task *t, int j, deep *d) {
   add_push(d, next, s->drift_next + 6 * j, -scale);
 }
 
+// puts a dof on the path
+static void put(const cav_derivative_task *t, int place, int dof) {
+  const cav_derivative_store *s = t->s;
+  const double *from[] = {t->state->axis, s->drift, s->drift_now, s->drift_next, s->second, s->rate};
+  double *at = s->path.at + place;
+  s->path.dof[place] = dof;
+  for (int k = 0; k < CAV_DOF_COMPONENTS / 6; k++) {
+    for (int i = 0; i < 6; i++, at += s->path.stride) *at = from[k][6 * dof + i];
+  }
+}
+
+// makes the path that ends with a dof; what it shares with the one before stays. Returns its length
+static int make_path(const cav_derivative_task *t, int dof) {
+  int length = t->s->depth[dof] + 1;
+  for (int place = length - 1; dof >= 0; place--, dof = t->state->work->parent[dof]) {
+    if (t->s->path.dof[place] != dof) put(t, place, dof);
+  }
+  return length;
+}
+
+// component i of four dofs of a path from the k-th on, and dots of a vector with their components from i on
+#define AT(i) (*(const cav_four *)(at + (size_t)(i)*n + k))
+#define DOT3(x, i) ((x)[0] * AT(i) + (x)[1] * AT((i) + 1) + (x)[2] * AT((i) + 2))
+#define DOT6(x, i) (DOT3(x, i) + DOT3((x) + 3, (i) + 3))
+
+/// Entries of the dofs of a path with a deeper one, [path.stride] each: the row of that in the three results, and the
+/// column.
+typedef struct entries {
+  double *row_q, *row_v, *row_n, *column_q, *column_v, *column_n;
+} entries;
+
+// what is smooth
+CAV_VECTOR_BODY void smooth_pairs_body(const cav_derivative_task *t, const deep *deeper, const entries *to, int count) {
+  const double inverse_h = t->inverse_h, part = t->mean ? 0.5 : 1, half = t->mean ? 0.5 : 0, *at = t->s->path.at;
+  const size_t n = (size_t)t->s->path.stride;
+  const deep d = *deeper;
+  const entries out = *to;
+  for (int k = 0; k < count; k += 4) {
+    cav_four a = DOT6(d.a, CAV_OF_AXIS), w = DOT6(d.a, CAV_OF_RATE) + DOT3(d.gyration, CAV_OF_AXIS);
+    cav_four by = DOT6(d.w, CAV_OF_AXIS);
+    *(cav_four *)(out.row_q + k) = DOT6(d.a, CAV_OF_SECOND) + DOT3(d.gyration, CAV_OF_DRIFT);
+    *(cav_four *)(out.row_v + k) = part * w - a * inverse_h;
+    *(cav_four *)(out.row_n + k) = half * w + a * inverse_h;
+    *(cav_four *)(out.column_q + k) = DOT6(d.q, CAV_OF_AXIS);
+    *(cav_four *)(out.column_v + k) = part * by - a * inverse_h;
+    *(cav_four *)(out.column_n + k) = half * by + a * inverse_h;
+  }
+}
+CAV_BY_VECTORS(smooth_pairs, (const cav_derivative_task *t, const deep *d, const entries *out, int count),
+               (t, d, out, count))
+
+// what contacts give
+CAV_VECTOR_BODY void contact_pairs_body(const cav_derivative_task *t, const deep *deeper, const entries *to,
+                                        int count) {
+  const double *at = t->s->path.at;
+  const size_t n = (size_t)t->s->path.stride;
+  const deep d = *deeper;
+  const entries out = *to;
+  for (int k = 0; k < count; k += 4) {
+    *(cav_four *)(out.row_q + k) +=
+        DOT6(d.motion, CAV_OF_AXIS) + DOT6(d.row_now, CAV_OF_NOW) + DOT6(d.row_next, CAV_OF_NEXT);
+    *(cav_four *)(out.row_v + k) += DOT6(d.row_now, CAV_OF_AXIS);
+    *(cav_four *)(out.row_n + k) += DOT6(d.row_next, CAV_OF_AXIS);
+    *(cav_four *)(out.column_v + k) += DOT6(d.now, CAV_OF_AXIS);
+    *(cav_four *)(out.column_n + k) += DOT6(d.next, CAV_OF_AXIS);
+  }
+}
+CAV_BY_VECTORS(contact_pairs, (const cav_derivative_task *t, const deep *d, const entries *out, int count),
+               (t, d, out, count))
+
+// rows of root links, to which momentum brings all but the contacts: what is smooth is taken out, of the deeper dof's row
+// where that is one of theirs
+static void leave_roots(const cav_derivative_task *t, const deep *d, const entries *out, int length, int own) {
+  for (int k = 0; k < length && own; k++) out->row_q[k] = out->row_v[k] = out->row_n[k] = 0;
+  for (int k = 0; k < length && cav_moves_root(t->model, t->s->path.dof[k]); k++) {
+    out->column_q[k] = dot6(d->push, t->state->axis + 6 * t->s->path.dof[k]);
+    out->column_v[k] = out->column_n[k] = 0;
+  }
+}
+
 void cav_derivative_pairs(const cav_derivative_task *t, int j) {
   const cav_derivative_store *s = t->s;
-  const cav_workspace *w = t->state->work;
-  // of the rows of root links momentum brings all but the contacts
-  int nv = t->nv, own = 1, given = t->momentum && cav_moves_root(t->model, j);
+  const int *group = t->state->work->group;
+  int nv = t->nv, n = s->path.stride, length = make_path(t, j), count = (length + 3) / 4 * 4, own = length - 1;
+  double *e = s->entry;
+  const entries out = {e, e + n, e + 2 * n, e + 3 * n, e + 4 * n, e + 5 * n};
   deep d = {0};
   deepen(t, j, &d);
-  for (int k = j; k >= 0; k = w->parent[k]) {
-    const double *S = t->state->axis + 6 * k;
-    double a = dot6(d.a, S);
-    // row j: column k moves j
-    int at = j * nv + k;
-    if (!given) {
-      double q = dot6(d.a, s->second + 6 * k) + dot3(d.gyration, s->drift + 6 * k);
-      add_entry(t, at, q, dot6(d.a, s->rate + 6 * k) + dot3(d.gyration, S), a);
-    }
-    if (d.touched) {
-      t->dq[at] += dot6(d.motion, S) + dot6(d.row_now, s->drift_now + 6 * k) + dot6(d.row_next, s->drift_next + 6 * k);
-      t->dv[at] += dot6(d.row_now, S);
-      t->dn[at] += dot6(d.row_next, S);
-    }
-    // row k: j moves k only within its group
-    if (k != j) {
-      at = k * nv + j;
-      if (t->momentum && cav_moves_root(t->model, k)) {
-        t->dq[at] += dot6(d.push, S);
-      } else {
-        add_entry(t, at, dot6(d.q, S) + (own ? 0 : dot6(d.carried, S)), dot6(d.w, S), a);
-      }
-      if (d.touched) {
-        t->dv[at] += dot6(d.now, S);
-        t->dn[at] += dot6(d.next, S);
-      }
-    }
-    if (w->group[k]) own = 0;
+  while (!group[s->path.dof[own]]) own--;
+  smooth_pairs(t, &d, &out, count);
+  // dofs before its group carry its wrench
+  for (int k = 0; k < own; k++) out.column_q[k] += dot6(d.carried, t->state->axis + 6 * s->path.dof[k]);
+  if (t->momentum) leave_roots(t, &d, &out, length, cav_moves_root(t->model, j));
+  if (d.touched) contact_pairs(t, &d, &out, count);
+  for (int k = 0; k < length; k++) {
+    int dof = s->path.dof[k], row = j * nv + dof, column = dof * nv + j;
+    t->dq[row] += out.row_q[k];
+    t->dv[row] += out.row_v[k];
+    t->dn[row] += out.row_n[k];
+    // j moves those of its own group only
+    if (dof == j) continue;
+    t->dq[column] += out.column_q[k];
+    t->dv[column] += out.column_v[k];
+    t->dn[column] += out.column_n[k];
   }
 }

@@ -17,6 +17,24 @@ typedef struct cav_contact_jacobian {
   double by_velocity[6][6]; ///< frame' hessian frame, 6 x 6 in world axes about the position
 } cav_contact_jacobian;
 
+/// Components of a dof on a path: those of its axis, then of the vectors of the store in their order.
+enum {
+  CAV_OF_AXIS = 0,
+  CAV_OF_DRIFT = 6,
+  CAV_OF_NOW = 12,
+  CAV_OF_NEXT = 18,
+  CAV_OF_SECOND = 24,
+  CAV_OF_RATE = 30,
+  CAV_DOF_COMPONENTS = 36
+};
+
+/// Dofs from a root on, each of which moves the next, with their components: component c of the i-th at at[c * stride + i].
+typedef struct cav_dof_path {
+  int stride; ///< a multiple of four
+  int *dof;   ///< [stride], -1: none yet
+  double *at; ///< [CAV_DOF_COMPONENTS*stride]
+} cav_dof_path;
+
 typedef struct cav_derivative_store {
   // dofs: rates of their axes, [nv*6]
   double *drift;      ///< (motion before the joint at the velocity of the bias) x axis
@@ -35,8 +53,11 @@ typedef struct cav_derivative_store {
   double *by_next;   ///< [nlink*36] and by -v_next
   int *dof;          ///< [nv] of one contact
   double *across;    ///< [12*nv] axes of the dofs of two links about a contact
-  double *spare;     ///< [nv*nv] for outputs that are not asked for
-  size_t bytes;      ///< of all but contact
+  cav_dof_path path;
+  double *entry; ///< [6*path.stride] of a row and a column of the three results
+  int *depth;    ///< [nv] dofs that move a dof, itself left out
+  double *spare; ///< [nv*nv] for outputs that are not asked for
+  size_t bytes;  ///< of all but contact
   int room;
   cav_contact_jacobian *contact; ///< [room]
 } cav_derivative_store;

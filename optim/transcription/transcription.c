@@ -5,9 +5,9 @@
 /// Derivatives of u, contacts and sensors come from readings.c; those of v, accelerations, postures and ranges are
 /// exact. Constraint rows enter the merit by an augmented Lagrangian of two-sided rows: with z~ = z + multiplier/rho
 /// and e = z~ - clamp(z~), the row costs rho/2 e^2 and its next multiplier is rho e (Powell, Hestenes, Rockafellar).
-#include "dense.h"
 #include "knot.h"
 #include "rotation.h"
+#include "vectors.h"
 
 #include <assert.h>
 #include <float.h>
@@ -353,9 +353,8 @@ static inline double times_column(const double *row, const double *J, int c) {
 }
 
 /// Chains n rows; dofs of rotations are done again.
-static inline __attribute__((always_inline)) void chain_rows(const cav_transcription *tr, const links *l, int n,
-                                                             const double *dq, const double *dv, const double *dn,
-                                                             double *restrict out) {
+CAV_VECTOR_BODY void chain_rows_body(const cav_transcription *tr, const links *l, int n, const double *dq,
+                                     const double *dv, const double *dn, double *restrict out) {
   int nv = tr->nv;
   for (int i = 0; i < n; i++, dq += nv, dv += nv, dn += nv, out += 3 * nv) {
     for (int d = 0; d < nv; d++) out[d] = l->v_before * dv[d] + l->n_before * dn[d];
@@ -375,30 +374,16 @@ static inline __attribute__((always_inline)) void chain_rows(const cav_transcrip
   }
 }
 
-// by vectors of four numbers and of two: the same operations
-#if defined(__x86_64__)
-__attribute__((target("avx2"))) static void chain_four(const cav_transcription *tr, const links *l, int n,
-                                                       const double *dq, const double *dv, const double *dn,
-                                                       double *out) {
-  chain_rows(tr, l, n, dq, dv, dn, out);
-}
-#endif
-static void chain_two(const cav_transcription *tr, const links *l, int n, const double *dq, const double *dv,
-                      const double *dn, double *out) {
-  chain_rows(tr, l, n, dq, dv, dn, out);
-}
+CAV_BY_VECTORS(chain_rows,
+               (const cav_transcription *tr, const links *l, int n, const double *dq, const double *dv,
+                const double *dn, double *out),
+               (tr, l, n, dq, dv, dn, out))
 
 /// Chains derivatives with respect to (q_t, v_t, v_{t+1}) to the three neighbouring knots.
 static void chain(const cav_transcription *tr, int t, int n, const double *dq, const double *dv, const double *dn,
                   double *out) {
   links l = links_of(tr, t);
-#if defined(__x86_64__)
-  if (cav_dense_lanes() >= 4) {
-    chain_four(tr, &l, n, dq, dv, dn, out);
-    return;
-  }
-#endif
-  chain_two(tr, &l, n, dq, dv, dn, out);
+  chain_rows(tr, &l, n, dq, dv, dn, out);
 }
 
 void cav_transcription_chain(const cav_transcription *tr, int t, int n, const double *row, double *out) {
