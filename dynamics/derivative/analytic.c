@@ -33,7 +33,7 @@ static cav_derivative_store *derivatives_new(const cav_model *model, int bias) {
   size_t nv = (size_t)model->nv, n = (size_t)model->nlink;
   size_t stride = (nv + 3) / 4 * 4, biases = bias ? 12 * nv : 0;
   size_t doubles = 5 * 6 * nv + (12 + 3 * CAV_TWIST_BLOCK) * n + 12 * nv + nv * nv;
-  doubles += (CAV_DOF_COMPONENTS + 6) * stride + biases;
+  doubles += (CAV_DOF_COMPONENTS + CAV_PATH_ROWS) * stride + biases;
   s->drift = calloc(doubles + ALIGN, sizeof(double));
   s->touched = calloc(n + 2 * nv + stride + 1, sizeof(int));
   if (!s->drift || !s->touched) {
@@ -57,9 +57,9 @@ static cav_derivative_store *derivatives_new(const cav_model *model, int bias) {
   s->spare = s->across + 12 * nv;
   s->path.at = s->spare + nv * nv;
   s->entry = s->path.at + CAV_DOF_COMPONENTS * stride;
-  s->bias_second = bias ? s->entry + 6 * stride : NULL;
+  s->bias_second = bias ? s->entry + CAV_PATH_ROWS * stride : NULL;
   s->bias_rate = bias ? s->bias_second + 6 * nv : NULL;
-  assert(s->entry + 6 * stride + biases == s->drift + doubles);
+  assert(s->entry + CAV_PATH_ROWS * stride + biases == s->drift + doubles);
   s->bytes = sizeof *s + (doubles + ALIGN) * sizeof(double) + (n + 2 * nv + stride + 1) * sizeof(int);
   return s;
 }

@@ -68,6 +68,10 @@ static inline void add_along_tendon(const cav_derivative_task *t, int index, dou
 void cav_derivative_drifts(const cav_derivative_task *t);
 void cav_derivative_gyrations(const cav_derivative_task *t);
 
+/// Makes the path that ends with a dof, of what cav_derivative_drifts has left; what it shares with the one before stays.
+/// Returns its length. smooth.c.
+int cav_derivative_path(const cav_derivative_task *t, int dof);
+
 /// Adds the smooth part, and what contacts summed over subtrees give, for all pairs of dof j and one that moves it.
 /// smooth.c.
 void cav_derivative_pairs(const cav_derivative_task *t, int j);

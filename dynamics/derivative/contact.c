@@ -43,6 +43,23 @@ static void unit(double twist[6], int k) {
   for (int i = 0; i < 6; i++) twist[i] = i == k;
 }
 
+// r = axis k of the world x v
+static inline void turn(double r[3], int k, const double v[3]) {
+  const int next = (k + 1) % 3, last = (k + 2) % 3;
+  r[k] = 0;
+  r[next] = -v[last];
+  r[last] = v[next];
+}
+
+// velocity at an arm from the centre of unit twist k
+static inline void unit_velocity(double r[3], int k, const double arm[3]) {
+  if (k < 3) {
+    turn(r, k, arm);
+  } else {
+    for (int i = 0; i < 3; i++) r[i] = i == k - 3;
+  }
+}
+
 // whether points of a shape on a plane are balls about points that move with the shape: ends, or corners of no radius
 static int has_fixed_points(const cav_shape *s) {
   return s->type == CAV_GEOM_SPHERE || s->type == CAV_GEOM_CAPSULE || s->type == CAV_GEOM_BOX ||
@@ -63,14 +80,14 @@ static void ball_on_plane(const cav_contact *c, double radius, const double axis
   scale3(arm, reach, n);
   copy3(g->align, axis);
   for (int k = 0; k < 6; k++) {
-    double twist[6];
-    unit(twist, k);
-    copy3(g->pos[k], twist + 3);
-    cross_add3(g->pos[k], twist, arm);
+    unit_velocity(g->pos[k], k, arm);
     g->dist[k] = dot3(n, g->pos[k]);
     axpy3(g->pos[k], g->pos[k], -0.5 * g->dist[k], n);
     zero3(g->normal[k]);
-    cross3(g->tangent[k], twist, axis);
+    if (k < 3)
+      turn(g->tangent[k], k, axis);
+    else
+      zero3(g->tangent[k]);
   }
 }
 
@@ -323,51 +340,50 @@ typedef struct placement {
   double dist, pos[3], rotation[3];
 } placement;
 
-static void displace(const cav_contact *c, const geometry *g, int side, int k, placement *p) {
+// along, across: parts of the direction that the second axis is aligned with
+static void displace(const cav_contact *c, const geometry *g, int side, int k, double along, double across,
+                     placement *p) {
   const double *n = c->frame, *t = c->frame + 6;
-  double twist[6], normal[3], tangent[3];
-  unit(twist, k);
+  double normal[3], tangent[3];
   p->dist = g->dist[k];
   copy3(p->pos, g->pos[k]);
   copy3(normal, g->normal[k]);
   copy3(tangent, g->tangent[k]);
   if (side == 0) {
     // both links move by the twist, then the second moves back
+    double turned[3] = {0, 0, 0}, moved[3] = {0, 0, 0};
     p->dist = -p->dist;
-    sub3(p->pos, twist + 3, p->pos);
-    scale3(normal, -1, normal);
-    cross_add3(normal, twist, n);
-    scale3(tangent, -1, tangent);
-    if (g->carried) cross_add3(tangent, twist, g->align);
+    if (k >= 3) moved[k - 3] = 1;
+    sub3(p->pos, moved, p->pos);
+    if (k < 3) turn(turned, k, n);
+    sub3(normal, turned, normal);
+    zero3(turned);
+    if (g->carried && k < 3) turn(turned, k, g->align);
+    sub3(tangent, turned, tangent);
   }
   // frame: its normal, and about it its second axis, the part of align across the normal
-  double along = dot3(n, g->align), across = sqrt(fmax(dot3(g->align, g->align) - along * along, 1e-12));
   cross3(p->rotation, n, normal);
   axpy3(p->rotation, p->rotation, (dot3(t, tangent) - dot3(t, normal) * along) / across, n);
 }
 
 // rate of the relative velocity along the axes of the frame, out [dim]
 static void velocity_rate(const cav_contact *c, const motion *m, const placement *p, int side, int k, double *out) {
-  double twist[6], linear[3] = {0, 0, 0}, angular[3] = {0, 0, 0};
-  unit(twist, k);
   const double *own = m->own[side];
+  double linear[3], angular[3] = {0, 0, 0};
 
   // the link's motion does not turn with it; the point of the body does
-  cross_add3(angular, twist, own);
-  cross_add3(linear, twist + 3, own);
-  cross_add3(linear, twist, own + 3);
-  if (side == 0) {
-    scale3(angular, -1, angular);
-    scale3(linear, -1, linear);
-  }
+  turn(linear, k % 3, k < 3 ? own + 3 : own);
+  if (side == 0) scale3(linear, -1, linear);
   cross_add3(linear, m->relative, p->pos);
 
   // and the axes turn
   cross_add3(linear, m->relative + 3, p->rotation);
+  for (int i = 0; i < c->dim && i < 3; i++) out[i] = dot3(c->frame + 3 * i, linear);
+  if (c->dim <= 3) return;
+  if (k < 3) turn(angular, k, own);
+  if (side == 0) scale3(angular, -1, angular);
   cross_add3(angular, m->relative, p->rotation);
-  for (int i = 0; i < c->dim; i++) {
-    out[i] = i < 3 ? dot3(c->frame + 3 * i, linear) : dot3(c->frame + 3 * (i - 3), angular);
-  }
+  for (int i = 3; i < c->dim; i++) out[i] = dot3(c->frame + 3 * (i - 3), angular);
 }
 
 /// The law of a contact at its state.
@@ -406,18 +422,20 @@ static void add_wrench(const cav_contact *c, const double *impulse, double wrenc
 
 static void fill_side(const cav_contact *c, const geometry *g, const motion *now, const motion *next,
                       const law_derivative *law, const double *H, int side, cav_contact_jacobian *derivative) {
-  double whole[6] = {0};
+  double whole[6] = {0}, along = dot3(c->frame, g->align);
+  double across = sqrt(fmax(dot3(g->align, g->align) - along * along, 1e-12));
   add_wrench(c, c->impulse, whole);
   for (int k = 0; k < 6; k++) {
     placement p;
-    double before[6], after[6], rate[6];
-    displace(c, g, side, k, &p);
+    double before[6], after[6], rate[6], kept[6];
+    displace(c, g, side, k, along, across, &p);
     velocity_rate(c, now, &p, side, k, before);
     velocity_rate(c, next, &p, side, k, after);
     derivative->dist[side][k] = p.dist;
+    for (int j = 0; j < c->dim; j++) kept[j] = (1 - c->damping[j]) * before[j] - after[j];
     for (int i = 0; i < c->dim; i++) {
       rate[i] = law->by_dist[i] * p.dist;
-      for (int j = 0; j < c->dim; j++) rate[i] += H[i * c->dim + j] * ((1 - c->damping[j]) * before[j] - after[j]);
+      for (int j = 0; j < c->dim; j++) rate[i] += H[i * c->dim + j] * kept[j];
       derivative->velocity[side][i][k] = after[i];
       derivative->impulse[side][i][k] = rate[i];
     }

@@ -2,23 +2,24 @@
 /// subtrees; those between two moving links; derivatives of one contact by the dofs. Those of a contact by its
 /// links' twists are contact.c's; the products of the sums with axes of dofs are smooth.c's.
 #include "analytic.h"
+#include "vectors.h"
 
-// X with X b = b about the reference carried to a point d away: adds scale X' M X, M about the point
-static void shift_add(double *sum, const double *M, const double d[3], double scale) {
-  double right[6][6], skew[3][3] = {{0, d[2], -d[1]}, {-d[2], 0, d[0]}, {d[1], -d[0], 0}};
+// X with X b = b about the reference carried to a point d away: shifted = X' M X, M about the point
+static void shift(double shifted[36], const double *M, const double d[3]) {
+  double right[6][6];
   // linear at the point = linear + angular x d
   for (int r = 0; r < 6; r++) {
-    for (int c = 0; c < 6; c++) {
-      right[r][c] = M[6 * r + c];
-      for (int k = 0; c < 3 && k < 3; k++) right[r][c] += M[6 * r + 3 + k] * skew[k][c];
-    }
+    const double *row = M + 6 * r;
+    right[r][0] = row[0] - row[4] * d[2] + row[5] * d[1];
+    right[r][1] = row[1] + row[3] * d[2] - row[5] * d[0];
+    right[r][2] = row[2] - row[3] * d[1] + row[4] * d[0];
+    for (int c = 3; c < 6; c++) right[r][c] = row[c];
   }
   for (int c = 0; c < 6; c++) {
-    for (int r = 0; r < 6; r++) {
-      double x = right[r][c];
-      for (int k = 0; r < 3 && k < 3; k++) x += right[3 + k][c] * skew[k][r];
-      sum[6 * r + c] += scale * x;
-    }
+    shifted[c] = right[0][c] - right[4][c] * d[2] + right[5][c] * d[1];
+    shifted[6 + c] = right[1][c] + right[3][c] * d[2] - right[5][c] * d[0];
+    shifted[12 + c] = right[2][c] - right[3][c] * d[1] + right[4][c] * d[0];
+    for (int r = 3; r < 6; r++) shifted[6 * r + c] = right[r][c];
   }
 }
 
@@ -46,9 +47,13 @@ static void contact_at_link(const cav_derivative_task *t, const cav_contact *c, 
     for (int r = 0; r < 6; r++) own[6 * r + k] = sign * (derivative->wrench[side][k][r] - carried[r]);
   }
   t->s->touched[link] = 1;
-  shift_add(t->s->by_motion + CAV_TWIST_BLOCK * link, own, d, 1);
-  shift_add(t->s->by_now + CAV_TWIST_BLOCK * link, &derivative->by_velocity[0][0], d, 1 - c->damping[0]);
-  shift_add(t->s->by_next + CAV_TWIST_BLOCK * link, &derivative->by_velocity[0][0], d, 1);
+  double motion[36], velocity[36], keep = 1 - c->damping[0], *to = t->s->by_motion + CAV_TWIST_BLOCK * link;
+  double *now = t->s->by_now + CAV_TWIST_BLOCK * link, *next = t->s->by_next + CAV_TWIST_BLOCK * link;
+  shift(motion, own, d);
+  shift(velocity, &derivative->by_velocity[0][0], d);
+  for (int i = 0; i < 36; i++) to[i] += motion[i];
+  for (int i = 0; i < 36; i++) now[i] += keep * velocity[i];
+  for (int i = 0; i < 36; i++) next[i] += velocity[i];
 }
 
 // last dof that moves both of two links, -1 if there is none
@@ -188,37 +193,81 @@ void cav_derivative_across(const cav_derivative_task *t) {
   }
 }
 
-static double dot_n(const double *a, const double *b, int n) {
-  double sum = 0;
-  for (int i = 0; i < n; i++) sum += a[i] * b[i];
-  return sum;
-}
+/// Rows of a contact's derivatives, [path.stride] each: of the distance, then of each of five kinds CAV_IMPULSE_DIM.
+enum { OF_VELOCITY = 1, OF_NEXT = 7, OF_IMPULSE = 13, OF_IMPULSE_NOW = 19, OF_IMPULSE_NEXT = 25 };
+_Static_assert(OF_IMPULSE_NEXT + CAV_IMPULSE_DIM == CAV_PATH_ROWS, "the last of these rows is the last that is kept");
 
-// rows of a contact's derivatives in one dof
-static void contact_column(const cav_derivative_task *t, const cav_contact *c, const cav_contact_jacobian *derivative,
-                           int side, int j, cav_contact_derivative *out) {
-  int nv = t->nv;
-  double sign = side ? 1 : -1, keep = 1 - c->damping[0], x[6], now[6], next[6];
-  column col;
-  column_at(t, c, j, &col);
+// a point's velocity by four dofs of a path from the k-th on, and by their drifts, along the axes of a contact
+#define AT(i) (*(const cav_four *)(path + (size_t)(i)*n + k))
+#define ALONG(e, x) ((e)[0] * (x)[0] + (e)[1] * (x)[1] + (e)[2] * (x)[2])
+static inline __attribute__((always_inline)) void motion_along(const cav_contact *c, const double *path, size_t n,
+                                                               int k, const double d[3], double sign,
+                                                               cav_four motion[6], cav_four *along) {
+  for (int i = 0; i < 3; i++) motion[i] = AT(i);
+  motion[3] = AT(3) + motion[1] * d[2] - motion[2] * d[1];
+  motion[4] = AT(4) + motion[2] * d[0] - motion[0] * d[2];
+  motion[5] = AT(5) + motion[0] * d[1] - motion[1] * d[0];
   for (int i = 0; i < c->dim; i++) {
     const double *e = c->frame + 3 * (i % 3);
-    int at = i < 3 ? 3 : 0;
-    x[i] = sign * dot3(e, col.axis + at);
-    now[i] = sign * dot3(e, col.now + at);
-    next[i] = sign * dot3(e, col.next + at);
+    along[i] = sign * ALONG(e, motion + (i < 3 ? 3 : 0));
   }
-  if (out->dist_dq) out->dist_dq[j] += dot6(derivative->dist[side], col.axis);
-  for (int i = 0; i < c->dim; i++) {
-    int at = i * nv + j;
-    const double *H = derivative->hessian[i];
-    double by_drift = keep * dot_n(H, now, c->dim) - dot_n(H, next, c->dim), by_axis = dot_n(H, x, c->dim);
-    if (out->velocity_dq) out->velocity_dq[at] += dot6(derivative->velocity[side][i], col.axis) + next[i];
-    if (out->velocity_dv_next) out->velocity_dv_next[at] += x[i];
-    if (out->impulse_dq) out->impulse_dq[at] += dot6(derivative->impulse[side][i], col.axis) + by_drift;
-    if (out->impulse_dv) out->impulse_dv[at] += keep * by_axis;
-    if (out->impulse_dv_next) out->impulse_dv_next[at] -= by_axis;
+}
+
+// rows of a contact's derivatives in the dofs of the path
+CAV_VECTOR_BODY void path_rows_body(const cav_derivative_task *t, const cav_contact *c,
+                                    const cav_contact_jacobian *derivative, int side, int count, const double d[3],
+                                    double *to) {
+  const size_t n = (size_t)t->s->path.stride;
+  const double *path = t->s->path.at, sign = side ? 1 : -1, keep = 1 - c->damping[0];
+  for (int k = 0; k < count; k += 4, to += 4) {
+    cav_four axis[6], drift[6], x[6], now[6], next[6];
+    motion_along(c, path + CAV_OF_NOW * n, n, k, d, sign, drift, now);
+    motion_along(c, path + CAV_OF_NEXT * n, n, k, d, sign, drift, next);
+    motion_along(c, path + CAV_OF_AXIS * n, n, k, d, sign, axis, x);
+    *(cav_four *)to = ALONG(derivative->dist[side], axis) + ALONG(derivative->dist[side] + 3, axis + 3);
+    for (int i = 0; i < c->dim; i++) {
+      const double *H = derivative->hessian[i], *v = derivative->velocity[side][i], *f = derivative->impulse[side][i];
+      cav_four by_now = H[0] * now[0], by_next = H[0] * next[0], by_axis = H[0] * x[0];
+      for (int j = 1; j < c->dim; j++) {
+        by_now += H[j] * now[j];
+        by_next += H[j] * next[j];
+        by_axis += H[j] * x[j];
+      }
+      *(cav_four *)(to + (OF_VELOCITY + i) * n) = ALONG(v, axis) + ALONG(v + 3, axis + 3) + next[i];
+      *(cav_four *)(to + (OF_NEXT + i) * n) = x[i];
+      *(cav_four *)(to + (OF_IMPULSE + i) * n) = ALONG(f, axis) + ALONG(f + 3, axis + 3) + (keep * by_now - by_next);
+      *(cav_four *)(to + (OF_IMPULSE_NOW + i) * n) = keep * by_axis;
+      *(cav_four *)(to + (OF_IMPULSE_NEXT + i) * n) = -by_axis;
+    }
   }
+}
+CAV_BY_VECTORS(path_rows,
+               (const cav_derivative_task *t, const cav_contact *c, const cav_contact_jacobian *derivative, int side,
+                int count, const double *d, double *to),
+               (t, c, derivative, side, count, d, to))
+
+// adds rows over the dofs of the path to those over all dofs
+static void add_path_rows(const cav_derivative_task *t, int rows, int length, const double *from, double *to) {
+  for (int i = 0; to && i < rows; i++, from += t->s->path.stride, to += t->nv) {
+    for (int k = 0; k < length; k++) to[t->s->path.dof[k]] += from[k];
+  }
+}
+
+// what the dofs that move one link of a contact do
+static void add_side(const cav_derivative_task *t, const cav_contact *c, const cav_contact_jacobian *derivative,
+                     int side, cav_contact_derivative *out) {
+  int link = side ? c->link2 : c->link1, last = last_dof(t->model, link), n = t->s->path.stride;
+  double *row = t->s->entry, d[3];
+  if (last < 0) return;
+  int length = cav_derivative_path(t, last);
+  sub3(d, c->pos, t->state->reference + 3 * link);
+  path_rows(t, c, derivative, side, (length + 3) / 4 * 4, d, row);
+  add_path_rows(t, 1, length, row, out->dist_dq);
+  add_path_rows(t, c->dim, length, row + OF_VELOCITY * n, out->velocity_dq);
+  add_path_rows(t, c->dim, length, row + OF_NEXT * n, out->velocity_dv_next);
+  add_path_rows(t, c->dim, length, row + OF_IMPULSE * n, out->impulse_dq);
+  add_path_rows(t, c->dim, length, row + OF_IMPULSE_NOW * n, out->impulse_dv);
+  add_path_rows(t, c->dim, length, row + OF_IMPULSE_NEXT * n, out->impulse_dv_next);
 }
 
 cav_status cav_contact_derivatives(const cav_model *model, cav_state *state, int contact, cav_contact_derivative *out) {
@@ -238,11 +287,7 @@ cav_status cav_contact_derivatives(const cav_model *model, cav_state *state, int
     if (all[k]) memset(all[k], 0, rows);
   }
   cav_derivative_task t = {.model = model, .state = state, .s = s, .nv = model->nv};
-  for (int side = 0; side < 2; side++) {
-    for (int j = last_dof(model, side ? c->link2 : c->link1); j >= 0; j = model->dof[j].parent) {
-      contact_column(&t, c, &s->contact[contact], side, j, out);
-    }
-  }
+  for (int side = 0; side < 2; side++) add_side(&t, c, &s->contact[contact], side, out);
   if (state->options.next_gap == CAV_NEXT_GAP_EXACT) cav_contact_next_gap(&t, contact, out);
   return CAV_OK;
 }

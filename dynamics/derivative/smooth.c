@@ -190,8 +190,7 @@ static void put(const cav_derivative_task *t, int place, int dof) {
   }
 }
 
-// makes the path that ends with a dof; what it shares with the one before stays. Returns its length
-static int make_path(const cav_derivative_task *t, int dof) {
+int cav_derivative_path(const cav_derivative_task *t, int dof) {
   int length = t->s->depth[dof] + 1;
   for (int place = length - 1; dof >= 0; place--, dof = t->state->work->parent[dof]) {
     if (t->s->path.dof[place] != dof) put(t, place, dof);
@@ -262,7 +261,8 @@ static void leave_roots(const cav_derivative_task *t, const deep *d, const entri
 void cav_derivative_pairs(const cav_derivative_task *t, int j) {
   const cav_derivative_store *s = t->s;
   const int *group = t->state->work->group;
-  int nv = t->nv, n = s->path.stride, length = make_path(t, j), count = (length + 3) / 4 * 4, own = length - 1;
+  int nv = t->nv, n = s->path.stride, length = cav_derivative_path(t, j), count = (length + 3) / 4 * 4,
+      own = length - 1;
   double *e = s->entry;
   const entries out = {e, e + n, e + 2 * n, e + 3 * n, e + 4 * n, e + 5 * n};
   deep d = {0};

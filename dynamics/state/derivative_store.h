@@ -25,7 +25,8 @@ enum {
   CAV_OF_NEXT = 18,
   CAV_OF_SECOND = 24,
   CAV_OF_RATE = 30,
-  CAV_DOF_COMPONENTS = 36
+  CAV_DOF_COMPONENTS = 36,
+  CAV_PATH_ROWS = 31 ///< rows over a path that are kept at a time
 };
 
 /// Dofs from a root on, each of which moves the next, with their components: component c of the i-th at at[c * stride + i].
@@ -54,7 +55,7 @@ typedef struct cav_derivative_store {
   int *dof;          ///< [nv] of one contact
   double *across;    ///< [12*nv] axes of the dofs of two links about a contact
   cav_dof_path path;
-  double *entry; ///< [6*path.stride] of a row and a column of the three results
+  double *entry; ///< [CAV_PATH_ROWS*path.stride] of a row and a column of the three results, or of a contact
   int *depth;    ///< [nv] dofs that move a dof, itself left out
   double *spare; ///< [nv*nv] for outputs that are not asked for
   size_t bytes;  ///< of all but contact
