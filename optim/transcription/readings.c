@@ -162,10 +162,15 @@ static cav_status self_penetration_rows(const cav_transcription *tr, const cav_s
   return status;
 }
 
+/// out := a x + b (c y), y NULL: none.
+static void blend(size_t n, double a, const double *x, double b, double c, const double *y, double *restrict out) {
+  for (size_t j = 0; j < n && !y; j++) out[j] = a * x[j];
+  for (size_t j = 0; j < n && y; j++) out[j] = a * x[j] + b * (c * y[j]);
+}
+
 /// The readings of a contact: sqrt(f_n) times gap, slip and normal velocity; f_n.
 static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s, const cav_contact *c, rows out) {
-  int nv = tr->nv;
-  size_t n = (size_t)nv;
+  size_t n = (size_t)tr->nv, nv = n;
   double *at = s->derivative;
   _Static_assert(25 + 6 == CAV_DERIVATIVE_ROWS, "the last of these arrays ends where the scratch does");
   cav_contact_derivative d = {.dist_dq = at,
@@ -176,25 +181,24 @@ static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s
                               .impulse_dv_next = at + 25 * n};
   cav_status status = cav_contact_derivatives(tr->model, s->state, (int)(c - s->state->contact), &d);
   if (status != CAV_OK) return status;
-  double derivative, fraction = contact_weight(tr, c, &derivative);
-  for (int k = 0; k < 4; k++) {
-    int row = k == 3 ? 0 : k, gap = k == 0, given = gap || row < c->dim;
-    double value = gap ? fmax(c->dist, 0) : given ? c->velocity_next[row] : 0, open = c->dist > 0;
-    for (int j = 0; j < nv; j++) {
-      int i = row * nv + j;
-      double by_q = gap ? open * d.dist_dq[j] : given ? d.velocity_dq[i] : 0;
-      double by_next = gap || !given ? 0 : d.velocity_dv_next[i];
-      out.dq[k * nv + j] = derivative * value * d.impulse_dq[j] + fraction * by_q;
-      out.dv[k * nv + j] = derivative * value * d.impulse_dv[j];
-      out.dn[k * nv + j] = derivative * value * d.impulse_dv_next[j] + fraction * by_next;
-    }
+  double derivative, fraction = contact_weight(tr, c, &derivative), open = c->dist > 0;
+  int slip = c->dim > 1;
+  double value[4] = {fmax(c->dist, 0), slip ? c->velocity_next[1] : 0, slip ? c->velocity_next[2] : 0,
+                     c->velocity_next[0]};
+  const double *by_q[4] = {d.dist_dq, slip ? d.velocity_dq + nv : NULL, slip ? d.velocity_dq + 2 * nv : NULL,
+                           d.velocity_dq};
+  const double *by_next[4] = {NULL, slip ? d.velocity_dv_next + nv : NULL, slip ? d.velocity_dv_next + 2 * nv : NULL,
+                              d.velocity_dv_next};
+  for (int k = 0; k < 4; k++, out.dq += n, out.dv += n, out.dn += n) {
+    double by_impulse = derivative * value[k];
+    blend(n, by_impulse, d.impulse_dq, fraction, k == 0 ? open : 1, by_q[k], out.dq);
+    blend(n, by_impulse, d.impulse_dv, 0, 0, NULL, out.dv);
+    blend(n, by_impulse, d.impulse_dv_next, fraction, 1, by_next[k], out.dn);
   }
   double unit = c->impulse[0] > 0 ? 1 / (tr->options.timestep * tr->weight) : 0;
-  for (int j = 0; j < nv; j++) {
-    out.dq[4 * nv + j] = unit * d.impulse_dq[j];
-    out.dv[4 * nv + j] = unit * d.impulse_dv[j];
-    out.dn[4 * nv + j] = unit * d.impulse_dv_next[j];
-  }
+  blend(n, unit, d.impulse_dq, 0, 0, NULL, out.dq);
+  blend(n, unit, d.impulse_dv, 0, 0, NULL, out.dv);
+  blend(n, unit, d.impulse_dv_next, 0, 0, NULL, out.dn);
   return CAV_OK;
 }
 
