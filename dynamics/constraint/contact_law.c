@@ -80,6 +80,8 @@ static double ending_derivative(double x, double width) {
 static smooth smooth_positive(double x, int ends, int area) {
   if (ends && x < END + WIDTH) return ending(x);
   const double tail = exp(-fabs(x));
+  // so far off that one more than the tail is one, exactly
+  if (tail < 0x1p-54 && !area) return (smooth){tail, x > 0.0 ? 1.0 : tail, 0.0};
   smooth s = {log1p(tail), (x > 0.0 ? 1.0 : tail) / (1.0 + tail), 0.0};
   if (area) {
     const double integral = dilogarithm(tail);

@@ -91,7 +91,16 @@ static double *entry_of(const cav_normal *normal, int i, int j) {
 
 /// Adds the part of a knot's Hessian [3n*3n] between two of its blocks, the column's not after the row's.
 static void gather_blocks(cav_normal *normal, const double *hessian, int row_block, int column_block, int r, int c) {
-  int n = normal->n, width = 3 * n;
+  int n = normal->n, width = 3 * n, core = normal->core / n;
+  if (row_block < core && column_block <= row_block) {
+    // within the band rows of the one are diagonals of the other
+    ptrdiff_t apart = normal->band - 1;
+    double *out = entry_of(normal, row_block * n, column_block * n);
+    const double *in = hessian + (size_t)(r * n) * width + c * n;
+    for (int i = 0; i < n; i++, out++, in += width)
+      for (int j = 0, end = r == c ? i + 1 : n; j < end; j++) out[j * apart] += in[j];
+    return;
+  }
   for (int j = 0; j < n; j++) {
     // entries of a column lie evenly
     int first = r == c ? j : 0, row = row_block * n + first, column = column_block * n + j;

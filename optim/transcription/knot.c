@@ -5,6 +5,7 @@
 /// difference of two passes that begin the same rows.
 #include "knot.h"
 #include "rotation.h"
+#include "vectors.h"
 
 #include <assert.h>
 #include <float.h>
@@ -232,13 +233,19 @@ static double *new_dense(cav_sum *a, double rest) {
   return knot->dense + (size_t)knot->ndense++ * 3 * (size_t)a->tr->nv;
 }
 
+// out := a row
+CAV_VECTOR_BODY void scale_row_body(int n, double a, const double *row, double *restrict out) {
+  for (int k = 0; k < n; k++) out[k] = a * row[k];
+}
+CAV_BY_VECTORS(scale_row, (int n, double a, const double *row, double *out), (n, a, row, out))
+
 /// Adds weight/2 (r + row dx)^2 for a full row, begun.
 static void add_dense(cav_sum *a, double weight, double r, const double *row) {
   a->knot->merit += 0.5 * weight * r * r;
   if (!a->jacobian || weight == 0) return;
   int width = 3 * a->tr->nv;
   double root = sqrt(weight), *out = new_dense(a, root * r);
-  for (int k = 0; k < width; k++) out[k] = root * row[k];
+  scale_row(width, root, row, out);
   for (int k = 0; k < width && a->tr->free_step; k++) a->knot->step_row[k] += a->derivative * out[k];
   if (a->bend != 0) add_square(a, a->bend, width, NULL, row);
 }
@@ -712,6 +719,21 @@ static void add_hard_terms(cav_sum *a, const double *q, const double *v, const d
   assert(i == a->knot->layout.count && reading == a->knot->nread);
 }
 
+// gradient += sum of rest times rows, four rows at a time in their order
+CAV_VECTOR_BODY void add_gradient_body(int width, int n, const double *rest, const double *row,
+                                       double *restrict gradient) {
+  int i = 0;
+  for (; i + 4 <= n; i += 4, row += 4 * (size_t)width) {
+    const double *b = row + width, *c = b + width, *d = c + width;
+    for (int k = 0; k < width; k++)
+      gradient[k] = gradient[k] + rest[i] * row[k] + rest[i + 1] * b[k] + rest[i + 2] * c[k] + rest[i + 3] * d[k];
+  }
+  for (; i < n; i++, row += width)
+    for (int k = 0; k < width; k++) gradient[k] += rest[i] * row[k];
+}
+CAV_BY_VECTORS(add_gradient, (int width, int n, const double *rest, const double *row, double *gradient),
+               (width, n, rest, row, gradient))
+
 /// Lays the rows along single dofs beside the dense ones.
 static void lay_force_rows(cav_sum *a) {
   const cav_transcription *tr = a->tr;
@@ -721,14 +743,10 @@ static void lay_force_rows(cav_sum *a) {
     if (weight == 0) continue;
     double root = sqrt(weight), *out = new_dense(a, a->s->force_derivative[d] / root);
     const double *du = a->knot->du + (size_t)d * width;
-    for (int k = 0; k < width; k++) out[k] = root * du[k];
+    scale_row(width, root, du, out);
     for (int k = 0; k < width && tr->free_step; k++) a->knot->step_row[k] += a->s->force_step[d] * du[k];
   }
-  for (int i = 0; i < a->knot->ndense; i++) {
-    double r = a->knot->rest[i];
-    const double *row = a->knot->dense + (size_t)i * width;
-    for (int k = 0; k < width; k++) a->knot->gradient[k] += r * row[k];
-  }
+  add_gradient(width, a->knot->ndense, a->knot->rest, a->knot->dense, a->knot->gradient);
 }
 
 void cav_knot_sum(cav_sum *a, const double *q, const double *v, const double *v_next) {
