@@ -14,17 +14,18 @@ enum {
   TILE_MOST = 16 ///< rows of the tallest tile
 };
 
-/// The triangle on a panel's diagonal: entry (c, d) at [d * PANEL + c], and 1 over its diagonal.
+/// The triangle on a panel's diagonal: entry (c, d) at [d * PANEL + c], and 1 over the diagonal of its factor.
 typedef struct triangle {
   double entry[PANEL * PANEL], inverse[PANEL];
 } triangle;
 
 /// One processor's way: C -= s packed A [k][rows] times packed B [k][columns]; X := X L'^-1 for rows of a panel packed
-/// [PANEL][rows]; x -= s a; a dot b.
+/// [PANEL][rows]; factor of n columns of a triangle in its place, zero if a pivot is not positive; x -= s a; a dot b.
 typedef struct lanes {
   int rows, columns;
   void (*tile)(int k, const double *A, const double *B, double s, double *C, size_t ldc);
   void (*panel)(const triangle *L, double *X);
+  int (*triangle)(int n, triangle *L);
   void (*subtract)(int n, double s, const double *a, double *x);
   double (*dot)(int n, const double *a, const double *b);
 } lanes;
@@ -34,56 +35,74 @@ static inline double add_eight(const double *s) {
   return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
 }
 
-#define WAY(name, attribute, LANES, VECTORS, COLUMNS)                                                           \
-  typedef double name##_vector __attribute__((vector_size((LANES)*8), aligned(8), may_alias));                  \
-  attribute static void name##_tile(int k, const double *A, const double *B, double s, double *C, size_t ldc) { \
-    name##_vector sum[COLUMNS][VECTORS] = {0};                                                                  \
-    for (int p = 0; p < k; p++, A += (LANES) * (VECTORS), B += (COLUMNS)) {                                     \
-      name##_vector a[VECTORS];                                                                                 \
-      for (int i = 0; i < (VECTORS); i++) a[i] = *(const name##_vector *)(A + (LANES)*i);                       \
-      for (int j = 0; j < (COLUMNS); j++)                                                                       \
-        for (int i = 0; i < (VECTORS); i++) sum[j][i] += a[i] * B[j];                                           \
-    }                                                                                                           \
-    for (int j = 0; j < (COLUMNS); j++, C += ldc)                                                               \
-      for (int i = 0; i < (VECTORS); i++) *(name##_vector *)(C + (LANES)*i) -= s * sum[j][i];                   \
-  }                                                                                                             \
-  attribute static void name##_panel(const triangle *L, double *X) {                                            \
-    for (int c = 0; c < PANEL; c += (COLUMNS)) {                                                                \
-      double *at = X + (size_t)(c * (LANES) * (VECTORS));                                                       \
-      name##_vector x[COLUMNS][VECTORS];                                                                        \
-      for (int j = 0; j < (COLUMNS); j++)                                                                       \
-        for (int i = 0; i < (VECTORS); i++) x[j][i] = *(name##_vector *)(at + (LANES) * ((VECTORS)*j + i));     \
-      const double *before = X, *l = L->entry + c;                                                              \
-      for (int d = 0; d < c; d++, before += (LANES) * (VECTORS), l += PANEL) {                                  \
-        name##_vector a[VECTORS];                                                                               \
-        for (int i = 0; i < (VECTORS); i++) a[i] = *(const name##_vector *)(before + (LANES)*i);                \
-        for (int j = 0; j < (COLUMNS); j++)                                                                     \
-          for (int i = 0; i < (VECTORS); i++) x[j][i] -= l[j] * a[i];                                           \
-      }                                                                                                         \
-      for (int j = 0; j < (COLUMNS); j++, l += PANEL) {                                                         \
-        for (int i = 0; i < (VECTORS); i++) x[j][i] *= L->inverse[c + j];                                       \
-        for (int k = 0; k < (COLUMNS); k++)                                                                     \
-          for (int i = 0; i < (VECTORS) && k > j; i++) x[k][i] -= l[k] * x[j][i];                               \
-      }                                                                                                         \
-      for (int j = 0; j < (COLUMNS); j++)                                                                       \
-        for (int i = 0; i < (VECTORS); i++) *(name##_vector *)(at + (LANES) * ((VECTORS)*j + i)) = x[j][i];     \
-    }                                                                                                           \
-  }                                                                                                             \
-  attribute static void name##_subtract(int n, double s, const double *a, double *x) {                          \
-    int i = 0;                                                                                                  \
-    for (; i + (LANES) <= n; i += (LANES)) *(name##_vector *)(x + i) -= s * *(const name##_vector *)(a + i);    \
-    for (; i < n; i++) x[i] -= s * a[i];                                                                        \
-  }                                                                                                             \
-  attribute static double name##_dot(int n, const double *a, const double *b) {                                 \
-    name##_vector sum[8 / (LANES)] = {0};                                                                       \
-    double eight[8];                                                                                            \
-    int i = 0;                                                                                                  \
-    for (; i + 8 <= n; i += 8)                                                                                  \
-      for (int l = 0; l < 8 / (LANES); l++)                                                                     \
-        sum[l] += *(const name##_vector *)(a + i + (LANES)*l) * *(const name##_vector *)(b + i + (LANES)*l);    \
-    for (int l = 0; l < 8 / (LANES); l++) *(name##_vector *)(eight + (LANES)*l) = sum[l];                       \
-    for (int l = 0; i < n; i++, l++) eight[l] += a[i] * b[i];                                                   \
-    return add_eight(eight);                                                                                    \
+#define WAY(name, attribute, LANES, VECTORS, COLUMNS)                                                              \
+  typedef double name##_vector __attribute__((vector_size((LANES)*8), aligned(8), may_alias));                     \
+  attribute static void name##_tile(int k, const double *A, const double *B, double s, double *C, size_t ldc) {    \
+    name##_vector sum[COLUMNS][VECTORS] = {0};                                                                     \
+    for (int p = 0; p < k; p++, A += (LANES) * (VECTORS), B += (COLUMNS)) {                                        \
+      name##_vector a[VECTORS];                                                                                    \
+      for (int i = 0; i < (VECTORS); i++) a[i] = *(const name##_vector *)(A + (LANES)*i);                          \
+      for (int j = 0; j < (COLUMNS); j++)                                                                          \
+        for (int i = 0; i < (VECTORS); i++) sum[j][i] += a[i] * B[j];                                              \
+    }                                                                                                              \
+    for (int j = 0; j < (COLUMNS); j++, C += ldc)                                                                  \
+      for (int i = 0; i < (VECTORS); i++) *(name##_vector *)(C + (LANES)*i) -= s * sum[j][i];                      \
+  }                                                                                                                \
+  attribute static void name##_panel(const triangle *L, double *X) {                                               \
+    for (int c = 0; c < PANEL; c += (COLUMNS)) {                                                                   \
+      double *at = X + (size_t)(c * (LANES) * (VECTORS));                                                          \
+      name##_vector x[COLUMNS][VECTORS];                                                                           \
+      for (int j = 0; j < (COLUMNS); j++)                                                                          \
+        for (int i = 0; i < (VECTORS); i++) x[j][i] = *(name##_vector *)(at + (LANES) * ((VECTORS)*j + i));        \
+      const double *before = X, *l = L->entry + c;                                                                 \
+      for (int d = 0; d < c; d++, before += (LANES) * (VECTORS), l += PANEL) {                                     \
+        name##_vector a[VECTORS];                                                                                  \
+        for (int i = 0; i < (VECTORS); i++) a[i] = *(const name##_vector *)(before + (LANES)*i);                   \
+        for (int j = 0; j < (COLUMNS); j++)                                                                        \
+          for (int i = 0; i < (VECTORS); i++) x[j][i] -= l[j] * a[i];                                              \
+      }                                                                                                            \
+      for (int j = 0; j < (COLUMNS); j++, l += PANEL) {                                                            \
+        for (int i = 0; i < (VECTORS); i++) x[j][i] *= L->inverse[c + j];                                          \
+        for (int k = 0; k < (COLUMNS); k++)                                                                        \
+          for (int i = 0; i < (VECTORS) && k > j; i++) x[k][i] -= l[k] * x[j][i];                                  \
+      }                                                                                                            \
+      for (int j = 0; j < (COLUMNS); j++)                                                                          \
+        for (int i = 0; i < (VECTORS); i++) *(name##_vector *)(at + (LANES) * ((VECTORS)*j + i)) = x[j][i];        \
+    }                                                                                                              \
+  }                                                                                                                \
+  attribute static int name##_triangle(int n, triangle *L) {                                                       \
+    for (int c = 0; c < n; c++) {                                                                                  \
+      double *column = L->entry + c * PANEL;                                                                       \
+      name##_vector x[PANEL / (LANES)];                                                                            \
+      for (int i = 0; i < PANEL / (LANES); i++) x[i] = *(name##_vector *)(column + (LANES)*i);                     \
+      for (int d = 0; d < c; d++)                                                                                  \
+        for (int i = 0; i < PANEL / (LANES); i++)                                                                  \
+          x[i] -= L->entry[d * PANEL + c] * *(const name##_vector *)(L->entry + d * PANEL + (LANES)*i);            \
+      for (int i = 0; i < PANEL / (LANES); i++) *(name##_vector *)(column + (LANES)*i) = x[i];                     \
+      double pivot = column[c];                                                                                    \
+      if (!(pivot > 0) || !isfinite(pivot)) return 0;                                                              \
+      double root = sqrt(pivot);                                                                                   \
+      L->inverse[c] = 1 / root;                                                                                    \
+      for (int i = c / (LANES); i < PANEL / (LANES); i++) *(name##_vector *)(column + (LANES)*i) *= L->inverse[c]; \
+      column[c] = root;                                                                                            \
+    }                                                                                                              \
+    return 1;                                                                                                      \
+  }                                                                                                                \
+  attribute static void name##_subtract(int n, double s, const double *a, double *x) {                             \
+    int i = 0;                                                                                                     \
+    for (; i + (LANES) <= n; i += (LANES)) *(name##_vector *)(x + i) -= s * *(const name##_vector *)(a + i);       \
+    for (; i < n; i++) x[i] -= s * a[i];                                                                           \
+  }                                                                                                                \
+  attribute static double name##_dot(int n, const double *a, const double *b) {                                    \
+    name##_vector sum[8 / (LANES)] = {0};                                                                          \
+    double eight[8];                                                                                               \
+    int i = 0;                                                                                                     \
+    for (; i + 8 <= n; i += 8)                                                                                     \
+      for (int l = 0; l < 8 / (LANES); l++)                                                                        \
+        sum[l] += *(const name##_vector *)(a + i + (LANES)*l) * *(const name##_vector *)(b + i + (LANES)*l);       \
+    for (int l = 0; l < 8 / (LANES); l++) *(name##_vector *)(eight + (LANES)*l) = sum[l];                          \
+    for (int l = 0; i < n; i++, l++) eight[l] += a[i] * b[i];                                                      \
+    return add_eight(eight);                                                                                       \
   }
 
 #if defined(__x86_64__)
@@ -93,10 +112,10 @@ WAY(four, __attribute__((target("avx2"))), 4, 2, 6)
 WAY(two, , 2, 2, 4)
 
 static const lanes *way(void) {
-  static const lanes two = {4, 4, two_tile, two_panel, two_subtract, two_dot};
+  static const lanes two = {4, 4, two_tile, two_panel, two_triangle, two_subtract, two_dot};
 #if defined(__x86_64__)
-  static const lanes eight = {16, 8, eight_tile, eight_panel, eight_subtract, eight_dot};
-  static const lanes four = {8, 6, four_tile, four_panel, four_subtract, four_dot};
+  static const lanes eight = {16, 8, eight_tile, eight_panel, eight_triangle, eight_subtract, eight_dot};
+  static const lanes four = {8, 6, four_tile, four_panel, four_triangle, four_subtract, four_dot};
   const int most = cav_dense_lanes();
   if (most == 8) return &eight;
   if (most == 4) return &four;
@@ -141,18 +160,19 @@ static void pack(const operand *o, int first, int count, int slice, int k, int h
 static void add_tile(cav_part part, int m, int n, int row, int column, const lanes *w, int k, double sign,
                      const double *A, const double *B, double *C, size_t ldc) {
   int rows = m - row < w->rows ? m - row : w->rows, columns = n - column < w->columns ? n - column : w->columns;
-  double *at = C + (size_t)column * ldc + row, T[TILE_MOST * 8] = {0};
+  double *at = C + (size_t)column * ldc + row, T[TILE_MOST * 8];
   int whole = part == CAV_PART_ALL || (part == CAV_PART_LOWER ? column + columns <= row + 1 : row + rows <= column + 1);
   if (whole && rows == w->rows && columns == w->columns) {
     w->tile(k, A, B, -sign, at, ldc);
     return;
   }
+  memset(T, 0, (size_t)(w->rows * w->columns) * sizeof *T);
   w->tile(k, A, B, -1, T, (size_t)w->rows);
   for (int j = 0; j < columns; j++, at += ldc) {
     const double *t = T + j * w->rows;
     int first = part == CAV_PART_LOWER && column + j > row ? column + j - row : 0;
     int end = part == CAV_PART_UPPER && column + j + 1 - row < rows ? column + j + 1 - row : rows;
-    for (int i = first; i < end; i++) at[i] -= -sign * t[i];
+    if (end > first) w->subtract(end - first, -sign, t + first, at + first);
   }
 }
 
@@ -229,21 +249,15 @@ static void reduce_rows(const lanes *w, const panel *p, int first, double *A, si
 }
 
 /// The same in the rows from the panel's end on that all its columns have, by strips; returns the first row after them.
-static int reduce_strips(const lanes *w, const panel *p, double *A, size_t ld) {
+static int reduce_strips(const lanes *w, const panel *p, const triangle *L, double *A, size_t ld) {
   int last = p->last[0];
   if (last - p->end < w->rows / 2) return p->end;
-  triangle L;
   double X[PANEL * TILE_MOST];
-  for (int d = 0; d < PANEL; d++) {
-    const double *column = A + (size_t)(p->start + d) * ld + p->start;
-    memcpy(L.entry + d * PANEL, column, PANEL * sizeof *column);
-    L.inverse[d] = 1 / column[d];
-  }
   for (int row = p->end; row < last; row += w->rows) {
     int some = least(last - row, w->rows);
     operand rows = {.at = A + (size_t)p->start * ld + row, .by_row = 1, .by_column = ld};
     pack(&rows, 0, some, 0, PANEL, w->rows, X);
-    w->panel(&L, X);
+    w->panel(L, X);
     for (int c = 0; c < PANEL; c++)
       memcpy(A + (size_t)(p->start + c) * ld + row, X + c * w->rows, (size_t)some * sizeof *X);
   }
@@ -251,18 +265,19 @@ static int reduce_strips(const lanes *w, const panel *p, double *A, size_t ld) {
 }
 
 /// The triangle on the panel's diagonal; zero if a pivot is not positive.
-static int factor_triangle(const lanes *w, const panel *p, double *A, size_t ld) {
-  for (int c = p->start; c < p->end; c++) {
-    double *column = A + (size_t)c * ld;
-    for (int d = p->start; d < c; d++) {
-      const double *before = A + (size_t)d * ld;
-      int count = least(p->end, p->last[d - p->start]) - c;
-      if (count > 0) w->subtract(count, before[c], before + c, column + c);
-    }
-    if (!(column[c] > 0) || !isfinite(column[c])) return 0;
-    double root = sqrt(column[c]), inverse = 1 / root;
-    column[c] = root;
-    for (int i = c + 1, last = least(p->end, p->last[c - p->start]); i < last; i++) column[i] *= inverse;
+static int factor_triangle(const lanes *w, const panel *p, triangle *L, double *A, size_t ld) {
+  int n = p->end - p->start;
+  for (int c = 0; c < n; c++) {
+    const double *column = A + (size_t)(p->start + c) * (ld + 1);
+    double *to = L->entry + c * PANEL;
+    int count = least(p->end, p->last[c]) - p->start - c;
+    memset(to, 0, PANEL * sizeof *to);
+    memcpy(to + c, column, (size_t)count * sizeof *to);
+  }
+  if (!w->triangle(n, L)) return 0;
+  for (int c = 0; c < n; c++) {
+    int count = least(p->end, p->last[c]) - p->start - c;
+    memcpy(A + (size_t)(p->start + c) * (ld + 1), L->entry + c * (PANEL + 1), (size_t)count * sizeof(double));
   }
   return 1;
 }
@@ -270,10 +285,11 @@ static int factor_triangle(const lanes *w, const panel *p, double *A, size_t ld)
 int cav_dense_factor_blocks(int n, int below, int step, double *A, int lda) {
   const lanes *w = way();
   size_t ld = (size_t)lda;
+  triangle L;
   for (int start = 0; start < n; start += PANEL) {
     panel p = panel_at(start, n, below, step);
-    if (!factor_triangle(w, &p, A, ld)) return 0;
-    reduce_rows(w, &p, reduce_strips(w, &p, A, ld), A, ld);
+    if (!factor_triangle(w, &p, &L, A, ld)) return 0;
+    reduce_rows(w, &p, reduce_strips(w, &p, &L, A, ld), A, ld);
     // and the panel from all columns after it
     int columns = p.end - start, rest = p.last[columns - 1] - p.end;
     for (int c = 0; c < columns; c++) p.last[c] -= p.end;
