@@ -232,6 +232,38 @@ static void test_degenerate(void) {
   }
 }
 
+// over a face of many corners in one plane, or bent by a thousandth of a millionth of its size, the nearest is proven
+// from a hint, with the same bits whichever three of its corners the hint has
+static void test_wide_face(void) {
+  enum { SIDES = 12 };
+  for (int bent = 0; bent < 2; bent++) {
+    double point[2 * SIDES * 3], radius = 0.02;
+    for (int k = 0; k < 2 * SIDES; k++) {
+      double turn = 2 * M_PI * (k % SIDES) / SIDES;
+      set3(point + 3 * k, 0.1 * cos(turn), 0.1 * sin(turn), k < SIDES ? -0.05 : 0.05 - (bent && k % 2 ? 1e-9 : 0));
+    }
+    solid a = {.size = {radius}, .shape = {.type = CAV_GEOM_SPHERE, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}}};
+    solid b = {.shape = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}}};
+    make_mesh(&b, point, 2 * SIDES);
+    a.shape.size = a.size, b.shape.size = b.size;
+    cav_hint hint = {.na = 0};
+    int proven = 0;
+    for (int k = 0; k < 200; k++) {
+      // now and then far enough for other corners to be the nearest three
+      set3(a.shape.pos, uniform(-0.06, 0.06), uniform(-0.06, 0.06), 0.08);
+      cav_touch touch[CAV_TOUCH_MAX], anew[CAV_TOUCH_MAX];
+      int n = cav_collide_again(&a.shape, &b.shape, MARGIN, &hint, touch);
+      proven += hint.na == 1 && hint.nb == 3;
+      CHECK(n == 1 && cav_collide_shapes(&a.shape, &b.shape, MARGIN, anew) == 1);
+      CHECK(touch->dist == anew->dist && !memcmp(touch->pos, anew->pos, sizeof anew->pos));
+      CHECK_NEAR(touch->dist, 0.01, bent ? 2e-9 : 1e-16);
+    }
+    printf("over a face of %d corners%s: %d of 200 proven\n", SIDES, bent ? ", bent" : "", proven);
+    CHECK(proven == 200);
+    let_go(&b);
+  }
+}
+
 // --- height fields ---
 
 static cav_shape level_field(const cav_hfield *h) {
@@ -661,6 +693,7 @@ int main(void) {
   test_box_as_mesh();
   test_derivatives();
   test_degenerate();
+  test_wide_face();
   test_level();
   test_hills();
 #ifdef CAVORT_HAVE_ASSIMP

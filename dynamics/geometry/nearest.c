@@ -3,12 +3,14 @@
 /// The direction between two such parts is known in closed form. Points of both that lie inside their parts, one behind
 /// the other along that direction, with every neighbour of a part's corners lower than these by a margin, are the nearest of
 /// the bodies: on a convex body what is higher than all about it is the highest. So the answer depends on the poses
-/// alone, to the bit, whoever guessed. Parts that only just meet, faces with more than three corners in one plane and
-/// bodies that overlap are not proven here; gjk.c searches for these.
+/// alone, to the bit, whoever guessed. Where a face of a mesh has more corners in one plane than a guess, three of them all
+/// say where it is, always the same. Parts that only just meet, faces of boxes and bodies that overlap are not proven here;
+/// gjk.c searches for these.
 #include "gjk.h"
 #include "math3.h"
 #include "pairs.h"
 
+enum { LEVEL_MAX = 128 };
 // fractions of the size: how far neighbours must be lower, how far apart the bodies; of a part: how far inside its ends points
 // lie; sines of what is not parallel
 static const double LOWER = 1e-12, APART = 1e-6, INSIDE = 1e-9, SQUARE = 1e-3;
@@ -64,8 +66,8 @@ static int from_corner(const double p[3], double q[3][3], int corners, double on
   return 1;
 }
 
-// a corner p and the triangle q of another body
-static int from_triangle(const double p[3], double q[3][3], double on[3], double n[3]) {
+// a corner p and the triangle q of another body; within: only what lies over the triangle itself
+static int from_triangle(const double p[3], double q[3][3], int within, double on[3], double n[3]) {
   double e[2][3], d[3], c[3];
   for (int k = 0; k < 2; k++) sub3(e[k], q[k + 1], q[0]);
   sub3(d, p, q[0]);
@@ -76,7 +78,7 @@ static int from_triangle(const double p[3], double q[3][3], double on[3], double
   double s = dot3(c, n) / area2;
   cross3(c, e[0], d);
   double t = dot3(c, n) / area2;
-  if (!is_inside(s) || !is_inside(t) || !is_inside(s + t)) return 0;
+  if (within && (!is_inside(s) || !is_inside(t) || !is_inside(s + t))) return 0;
   double height = dot3(d, n);
   axpy3(on, p, -height / area2, n);
   if (height > 0) scale3(n, -1, n);
@@ -131,7 +133,7 @@ static int curved_triangle(const cav_shape *a, double q[3][3], double x[3], doub
   if (a->type == CAV_GEOM_CYLINDER && (fabs(local[2]) < FLUSH || fabs(local[2]) > 1 - FLUSH)) return 0;
   cav_shape_support(a, n, x);
   // the triangle as seen from x: its normal is n or -n
-  if (!from_triangle(x, q, y, on)) return 0;
+  if (!from_triangle(x, q, 1, y, on)) return 0;
   sub3(d, y, x);
   return dot3(d, n) > 0;
 }
@@ -197,13 +199,71 @@ static int from_curved(const cav_shape *a, double q[3][3], int corners, double s
 // the direction in which corners of two polyhedra meet
 static int from_corners(double p[3][3], int na, double q[3][3], int nb, double x[3], double y[3], double n[3]) {
   int ok = na == 2 && nb == 2 ? from_edges(p, q, x, y, n)
-           : nb == 3          ? from_triangle(p[0], q, y, n)
-           : na == 3          ? from_triangle(q[0], p, x, n)
+           : nb == 3          ? from_triangle(p[0], q, 1, y, n)
+           : na == 3          ? from_triangle(q[0], p, 1, x, n)
            : na == 2          ? from_corner(q[0], p, na, x, n)
                               : from_corner(p[0], q, nb, y, n);
   // from a corner of b to what a has the direction came the other way
   if (na > nb) scale3(n, -1, n);
   return ok;
+}
+
+// the corners of a mesh that are level with three along a direction in its axes and joined to them, in order; 0: one is
+// higher, or they are too many
+static int level_with(const cav_mesh *m, const double local[3], const int corner[3], double margin, int *level) {
+  double height = dot3(m->vertex + 3 * corner[0], local);
+  int n = 3;
+  memcpy(level, corner, 3 * sizeof *level);
+  for (int i = 0; i < n; i++) {
+    for (int k = m->neighbour_start[level[i]]; k < m->neighbour_start[level[i] + 1]; k++) {
+      int v = m->neighbour[k], known = 0;
+      double h = dot3(m->vertex + 3 * v, local);
+      if (h < height - margin) continue;
+      for (int j = 0; j < n; j++) known |= level[j] == v;
+      if (known) continue;
+      if (h > height + margin || n == LEVEL_MAX) return 0;
+      level[n++] = v;
+    }
+  }
+  for (int i = 1; i < n; i++) {
+    for (int k = i; k > 0 && level[k] < level[k - 1]; k--) {
+      int later = level[k - 1];
+      level[k - 1] = level[k];
+      level[k] = later;
+    }
+  }
+  return n;
+}
+
+// three corners of a mesh that say best where the plane of some lies: the first, the one furthest from it, the one
+// furthest from their line
+static void span_of(const cav_mesh *m, const int *level, int n, int best[3]) {
+  const double *first = m->vertex + 3 * level[0];
+  double e[3] = {0, 0, 0}, d[3], c[3];
+  best[0] = level[0];
+  for (int part = 1; part < 3; part++) {
+    double most = -1;
+    for (int i = 1; i < n; i++) {
+      sub3(d, m->vertex + 3 * level[i], first);
+      cross3(c, e, d);
+      double far = part == 1 ? dot3(d, d) : dot3(c, c);
+      if (far > most) most = far, best[part] = level[i];
+    }
+    sub3(e, m->vertex + 3 * best[part], first);
+  }
+}
+
+// a corner p of one body and three corners of a mesh, the highest along a direction, but for more in their plane: on that plane
+static int on_level(const double p[3], const cav_shape *s, const double towards[3], const int corner[3], double margin,
+                    double on[3], double n[3]) {
+  double local[3], q[3][3];
+  int level[LEVEL_MAX], best[3];
+  rotate_back(local, s->rotation, towards);
+  int count = level_with(s->mesh, local, corner, margin, level);
+  if (!count) return 0;
+  span_of(s->mesh, level, count, best);
+  for (int k = 0; k < 3; k++) cav_shape_corner(s, best[k], q[k]);
+  return from_triangle(p, q, 0, on, n) && normalise3(n) > 0;
 }
 
 int cav_nearest_prove(const cav_core *a, const cav_core *b, double size, const cav_hint *hint, cav_separation *out) {
@@ -220,8 +280,17 @@ int cav_nearest_prove(const cav_core *a, const cav_core *b, double size, const c
   sub3(d, y, x);
   double gap = dot3(d, n);
   scale3(back, -1, n);
-  if (!(gap > APART * size) || !is_top(b, back, hint->b, nb, LOWER * size)) return 0;
-  if (!curved && !is_top(a, n, hint->a, na, LOWER * size)) return 0;
+  if (!(gap > APART * size)) return 0;
+  int top_a = curved || is_top(a, n, hint->a, na, LOWER * size), top_b = is_top(b, back, hint->b, nb, LOWER * size);
+  if (!top_b && (!top_a || curved || nb < 3 || b->shape->type != CAV_GEOM_MESH ||
+                 !on_level(x, b->shape, back, hint->b, LOWER * size, y, n)))
+    return 0;
+  if (!top_a) {
+    if (na < 3 || a->shape->type != CAV_GEOM_MESH || !on_level(y, a->shape, n, hint->a, LOWER * size, x, n)) return 0;
+    scale3(n, -1, n);
+  }
+  sub3(d, y, x);
+  gap = dot3(d, n);
   copy3(out->n, n);
   copy3(out->x, x);
   copy3(out->y, y);
