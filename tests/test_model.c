@@ -152,7 +152,6 @@ static void compare_geoms(const cav_model *m, const mjModel *p) {
     all_near(g->size, p->geom_size + 3 * i, sizes, "size", g->name);
     all_near(g->friction, p->geom_friction + 3 * i, 3, "friction", g->name);
     near(g->margin, p->geom_margin[i], "margin", g->name);
-    near(g->gap, p->geom_gap[i], "gap", g->name);
     near(g->solmix, p->geom_solmix[i], "solmix", g->name);
     compare_softness(&g->softness, p->geom_solref + 2 * i, p->geom_solimp + 5 * i, g->name);
     if (g->type != CAV_GEOM_PLANE) near(g->bound, p->geom_rbound[i], "bounding radius", g->name);
@@ -328,7 +327,6 @@ static void compare_pairs(const cav_model *m, mjModel *p) {
     same(pair->dim, c->dim, "pair dim", name);
     all_near(pair->friction, c->friction, 5, "pair friction", name);
     compare_softness(&pair->softness, c->solref, c->solimp, name);
-    near(pair->gap, 50 - c->includemargin, "pair gap", name);
     near_slack(pair->weight[0],
                p->body_invweight0[2 * p->geom_bodyid[c->geom1]] + p->body_invweight0[2 * p->geom_bodyid[c->geom2]],
                "pair weight", name);

@@ -182,7 +182,7 @@ static void decide(const pair_of_models *p, int pair, contacts *ours, contacts *
     flip(ours), flip(theirs);
   }
   double best = a.type == CAV_GEOM_PLANE ? proof_height_of(&b, &a) : proof_distance(&a, &b);
-  double margin = of->margin - of->gap, we = residual_of(&a, &b, ours, margin, best);
+  double margin = of->margin, we = residual_of(&a, &b, ours, margin, best);
   double they = residual_of(&a, &b, theirs, margin, best);
   // all other points of ours are of both bodies
   for (int i = 0; i < ours->n; i++) {

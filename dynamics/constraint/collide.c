@@ -354,7 +354,7 @@ static cav_status push(const cav_model *model, cav_state *state, int p, const ca
   copy3(contact->pos, touch->pos);
   make_frame(touch, contact->frame);
   contact->dist = touch->dist;
-  contact->margin = pair->margin - pair->gap;
+  contact->margin = pair->margin;
   memcpy(contact->friction, pair->friction, sizeof contact->friction);
   return CAV_OK;
 }

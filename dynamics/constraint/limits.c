@@ -75,6 +75,7 @@ static cav_law solref_law(const cav_state *state, const cav_softness *softness, 
   double h = state->options.timestep, d = impedance(softness->solimp, x);
   double dw = clamp_between(softness->solimp[1], IMPEDANCE_MIN, IMPEDANCE_MAX);
   double kappa = softness->solref[0], zeta = softness->solref[1];
+  if ((kappa > 0) != (zeta > 0)) kappa = 0.02, zeta = 1;
   cav_law l = {larger(R_MIN, (1 - d) / d * weight), 0, 0};
   if (kappa > 0) {
     if (state->options.refsafe) { kappa = larger(kappa, 2 * h); }

@@ -143,9 +143,7 @@ static void check_tied(cav_builder *b, const cav_spec_equality *s, const cav_equ
     plane |= g1 == CAV_GEOM_HFIELD || g2 == CAV_GEOM_HFIELD;
     if (plane) cav_spec_fail(spec, s->node, NULL, "the distance between geoms of these two types is not computed");
   }
-  if (coupled ? e->object[0] == e->object[1] : e->link[0] == e->link[1])
-    cav_spec_fail(spec, s->node, NULL,
-                  coupled ? "constrains one to itself; name two" : "the two move as one; remove it");
+  if (coupled && e->object[0] == e->object[1]) cav_spec_fail(spec, s->node, NULL, "constrains one to itself; name two");
   cav_check_softness(spec, s->node, "", &s->softness);
   cav_check_not_negative(spec, s->node, "torquescale", s->torquescale);
 }
@@ -168,9 +166,10 @@ static void fill_equalities(cav_builder *b) {
                             [CAV_EQUALITY_TENDON] = 1,
                             [CAV_EQUALITY_DISTANCE] = 1};
   const double none[4] = {1, 0, 0, 0};
+  int n = 0;
   for (int i = 0; i < b->spec->equality.n && cav_builder_running(b); i++) {
     const cav_spec_equality *s = &b->spec->equality.at[i];
-    cav_equality *e = &b->equality[i];
+    cav_equality *e = &b->equality[n];
     *e = (cav_equality){.name = cav_builder_text(b, s->name),
                         .type = s->type,
                         .dim = dim[s->type],
@@ -185,6 +184,11 @@ static void fill_equalities(cav_builder *b) {
     for (int k = 0; k < 2 && (bodies || s->type == CAV_EQUALITY_DISTANCE); k++)
       e->link[k] = b->link_of[bodies ? e->object[k] : b->geom[e->object[k]].body];
     check_tied(b, s, e);
+    if ((bodies || s->type == CAV_EQUALITY_DISTANCE) && e->link[0] == e->link[1]) {
+      cav_spec_leave(b->spec, s->node, NULL, "left out: the two move as one");
+      continue;
+    }
+    n++;
     if (!bodies || s->sites) continue;
     if (!s->object[0]) cav_spec_fail(b->spec, s->node, "body1", "is missing; name a body, or two sites");
     if (s->type == CAV_EQUALITY_CONNECT && !cav_xml_get(s->node, "anchor"))
@@ -204,6 +208,7 @@ static void fill_equalities(cav_builder *b) {
       }
     }
   }
+  b->model->nequality = n;
 }
 
 static void fill_actuators(cav_builder *b) {
@@ -289,6 +294,14 @@ static void fill_sensors(cav_builder *b) {
   }
 }
 
+// as many numbers as there are, or fewer: the rest is 0, as in MuJoCo, which for a posture is seldom meant
+static void check_key(cav_spec *spec, const cav_spec_key *s, const char *name, const char *what, int n, int given) {
+  if (given > n) cav_spec_fail(spec, s->node, name, "expected %d numbers, one per %s, got %d", n, what, given);
+  if (given && given < n)
+    cav_spec_warn(spec, s->node, name, "%d numbers, but there are %d, one per %s: the rest is taken for 0", given, n,
+                  what);
+}
+
 // keyframes are of the model's own coordinates; those of a scene come after them and stay where they stand
 static void fill_keys(cav_builder *b) {
   cav_spec *spec = b->spec;
@@ -299,16 +312,14 @@ static void fill_keys(cav_builder *b) {
     nq = b->joint[k].q, nv = b->joint[k].dof;
   for (int i = 0; i < m->nkey; i++) {
     const cav_spec_key *s = &spec->key.at[i];
-    if (s->nq && s->nq != nq)
-      cav_spec_fail(spec, s->node, "qpos", "expected %d numbers, one per coordinate, got %d", nq, s->nq);
-    if (s->nv && s->nv != nv)
-      cav_spec_fail(spec, s->node, "qvel", "expected %d numbers, one per degree of freedom, got %d", nv, s->nv);
+    check_key(spec, s, "qpos", "coordinate", nq, s->nq);
+    check_key(spec, s, "qvel", "degree of freedom", nv, s->nv);
     if (!cav_builder_running(b)) return;
     double *q = at, *v = at + m->nq;
     at += m->nq + m->nv;
     memcpy(q, b->q0, (size_t)m->nq * sizeof *q);
-    if (s->nq) memcpy(q, s->q, (size_t)nq * sizeof *q);
-    if (s->nv) memcpy(v, s->v, (size_t)nv * sizeof *v);
+    for (int k = 0; s->nq && k < nq; k++) q[k] = k < s->nq ? s->q[k] : 0;
+    for (int k = 0; k < s->nv; k++) v[k] = s->v[k];
     for (int k = 0; k < m->njoint; k++) {
       const cav_joint *j = &b->joint[k];
       if (j->type == CAV_JOINT_FREE) quat_normalise(q + j->q + 3);

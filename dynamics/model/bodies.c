@@ -360,7 +360,6 @@ static void fill_geoms(cav_builder *b) {
                     .condim = s->condim,
                     .priority = s->priority,
                     .margin = s->margin,
-                    .gap = s->gap,
                     .solmix = s->solmix,
                     .softness = s->softness,
                     .fluid = s->fluid,

@@ -82,7 +82,7 @@ static void scale_shapes(cav_model *model, double s) {
     stretch(geom[i].pos, 3, s);
     stretch(geom[i].size, 3, s);
     stretch(geom[i].friction + 1, 2, s);
-    geom[i].bound *= s, geom[i].margin *= s, geom[i].gap *= s;
+    geom[i].bound *= s, geom[i].margin *= s;
     stretch_softness(&geom[i].softness, s);
   }
   for (int i = 0; i < model->nsite; i++) {
@@ -91,7 +91,7 @@ static void scale_shapes(cav_model *model, double s) {
   }
   for (int i = 0; i < model->npair; i++) {
     stretch(pair[i].friction + 2, 3, s);
-    pair[i].margin *= s, pair[i].gap *= s;
+    pair[i].margin *= s;
     stretch_softness(&pair[i].softness, s);
   }
   for (int i = 0; i < model->nmesh; i++) {

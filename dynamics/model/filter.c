@@ -2,8 +2,9 @@
 ///
 /// MJCF's rules: contype and conaffinity masks; never two geoms that move as one, nor parent and child unless one of
 /// them is fixed to the world or the flag filterparent is off; excluded bodies; explicit pairs come before all of these
-/// and replace the same two geoms. Mixing: the geom of higher priority decides; at equal priority condim, friction,
-/// margin and gap take the larger value, solref and solimp are averaged by solmix (direct solref: the smaller). Not
+/// and replace the same two geoms. Mixing: the geom of higher priority decides; at equal priority condim and friction
+/// take the larger value, solref and solimp are averaged by solmix (direct solref: the smaller). Margins add, and a
+/// contact pushes below their sum, as since MuJoCo 3.9; gap, by which it only lists contacts sooner, is not read. Not
 /// done: two planes.
 
 #include <stdlib.h>
@@ -82,8 +83,7 @@ static void mix(const cav_geom *a, const cav_geom *b, cav_pair *pair) {
   }
   const double five[5] = {friction[0], friction[0], friction[1], friction[2], friction[2]};
   memcpy(pair->friction, five, sizeof five);
-  pair->margin = larger(a->margin, b->margin);
-  pair->gap = larger(a->gap, b->gap);
+  pair->margin = a->margin + b->margin;
   pair->softness = mix_softness(a, b);
 }
 
@@ -121,7 +121,6 @@ static void bound_friction(const cav_spec *spec, cav_pair *pair) {
     memcpy(pair->friction, o->o_friction, sizeof pair->friction);
     pair->softness = o->o_softness;
     pair->margin = o->o_margin;
-    pair->gap = 0;
   }
   for (int i = 0; i < 5; i++) pair->friction[i] = larger(pair->friction[i], 1e-5);
 }
@@ -194,7 +193,6 @@ static void replace(const cav_spec_pair *p, cav_pair *pair) {
   memcpy(pair->friction, p->friction, sizeof pair->friction);
   pair->softness = p->softness;
   pair->margin = p->margin;
-  pair->gap = p->gap;
 }
 
 static void add_explicit(cav_spec *spec, list *l, const cav_geom *geom, const int *weld, keys *explicit_pairs) {
@@ -267,7 +265,6 @@ static cav_geom *mixed_geoms(const cav_spec *spec, const int *link_of) {
                          .condim = s->condim,
                          .priority = s->priority,
                          .margin = s->margin,
-                         .gap = s->gap,
                          .solmix = s->solmix,
                          .softness = s->softness};
     copy3(geom[i].friction, s->friction);

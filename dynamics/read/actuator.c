@@ -323,12 +323,27 @@ static void compile_gain(cav_spec *spec, const cav_spec_actuator *s, cav_actuato
   memcpy(a->activation_parameter, s->dynprm, sizeof a->activation_parameter);
   memcpy(a->gain_parameter, s->gainprm, sizeof a->gain_parameter);
   memcpy(a->bias_parameter, s->biasprm, sizeof a->bias_parameter);
-  if (a->gain == CAV_GAIN_FIXED && s->gainprm[0] == 0)
-    cav_spec_fail(spec, s->node, NULL, "a gain of 0 gives no force; write another or remove the actuator");
   if (s->lengthrange[0] > s->lengthrange[1])
     cav_spec_fail(spec, s->node, "lengthrange", "expected lower <= upper, got %g %g", s->lengthrange[0],
                   s->lengthrange[1]);
   memcpy(a->lengthrange, s->lengthrange, sizeof a->lengthrange);
+}
+
+// an actuator that gives no force keeps its place among the controls: a motor with a gear of 0
+static void compile_idle(cav_spec *spec, const cav_spec_actuator *s, cav_actuator *a) {
+  double sum = 0;
+  for (int k = 0; k < gears(spec, a); k++) sum += fabs(s->gear[k]);
+  int gains = a->gain != CAV_GAIN_FIXED || s->gainprm[0] != 0, biased = a->bias == CAV_BIAS_MUSCLE;
+  for (int k = 0; k < 3; k++) biased |= a->bias == CAV_BIAS_AFFINE && s->biasprm[k] != 0;
+  if (!gains && biased && sum != 0)
+    cav_spec_fail(spec, s->node, NULL,
+                  "a gain of 0 leaves a force that no control moves; give the joint a spring or damping");
+  if (gains && sum != 0) return;
+  cav_spec_leave(spec, s->node, NULL, "gives no force: its gain or gear is 0");
+  memset(a->gear, 0, sizeof a->gear);
+  a->gain = CAV_GAIN_FIXED;
+  a->bias = CAV_BIAS_NONE;
+  a->gain_parameter[0] = 1;
 }
 
 void cav_actuator_compile(cav_spec *spec, const cav_spec_actuator *s, cav_actuator *a) {
@@ -344,11 +359,9 @@ void cav_actuator_compile(cav_spec *spec, const cav_spec_actuator *s, cav_actuat
   if (a->transmission == CAV_TRANSMISSION_CRANK && !(s->cranklength > 0))
     cav_spec_fail(spec, s->node, "cranklength", "expected a length > 0, got %g", s->cranklength);
   memcpy(a->gear, s->gear, sizeof a->gear);
-  double sum = 0;
-  for (int k = 0; k < gears(spec, a); k++) sum += fabs(a->gear[k]);
-  if (sum == 0) cav_spec_fail(spec, s->node, "gear", "expected a gear that is not 0; this actuator gives no force");
+  compile_idle(spec, s, a);
   // effort of a motor counts in controls, and so do the limits of its force
-  a->unit = a->gain == CAV_GAIN_FIXED && a->bias == CAV_BIAS_NONE ? s->gainprm[0] : 1;
+  a->unit = a->gain == CAV_GAIN_FIXED && a->bias == CAV_BIAS_NONE ? a->gain_parameter[0] : 1;
   a->forcerange[a->unit < 0] = s->forcerange[0] / a->unit;
   a->forcerange[a->unit > 0] = s->forcerange[1] / a->unit;
 }

@@ -55,8 +55,8 @@ void cav_read_mesh(cav_spec *spec, const cav_xml_node *node, const double scale[
   const char *file = cav_xml_text(node, "file", NULL);
   m->vertex = cav_xml_get(node, "vertex");
   m->face = cav_xml_get(node, "face");
-  m->name = cav_xml_text(node, "name", NULL);
-  if (!m->name) m->name = file ? name_of(spec, node, file) : "";
+  m->name = cav_xml_text(node, "name", "");
+  if (!*m->name && file) m->name = name_of(spec, node, file);
   m->inertia = (cav_mesh_inertia)cav_xml_word(node, "inertia", (int)inertia);
   m->hull_vertices = cav_xml_int(node, "maxhullvert", hull_vertices);
   if (m->hull_vertices < 4 && m->hull_vertices != -1)
@@ -97,8 +97,8 @@ void cav_read_hfield(cav_spec *spec, const cav_xml_node *node) {
   if (!h) return;
   const char *file = cav_xml_text(node, "file", NULL);
   *h = (cav_spec_hfield){.node = node, .index = -1};
-  h->name = cav_xml_text(node, "name", NULL);
-  if (!h->name) h->name = file ? name_of(spec, node, file) : "";
+  h->name = cav_xml_text(node, "name", "");
+  if (!*h->name && file) h->name = name_of(spec, node, file);
   h->path = file ? asset_path(spec, node, file) : NULL;
   h->elevation = cav_xml_get(node, "elevation");
   h->nrow = cav_xml_int(node, "nrow", 0);

@@ -159,7 +159,6 @@ void cav_mjcf_geom_values(cav_spec *spec, const cav_xml_node *node, cav_spec_geo
   read_int(node, "group", &g->group);
   cav_xml_reals(node, "friction", g->friction, 3);
   read_real(node, "margin", &g->margin);
-  read_real(node, "gap", &g->gap);
   read_real(node, "solmix", &g->solmix);
   read_real(node, "density", &g->density);
   read_softness(spec, node, "solref", "solimp", &g->softness);
@@ -199,7 +198,6 @@ void cav_mjcf_pair_values(cav_spec *spec, const cav_xml_node *node, cav_spec_pai
   cav_xml_reals(node, "friction", p->friction, 5);
   read_softness(spec, node, "solref", "solimp", &p->softness);
   read_real(node, "margin", &p->margin);
-  read_real(node, "gap", &p->gap);
 }
 
 void cav_mjcf_equality_values(cav_spec *spec, const cav_xml_node *node, cav_spec_equality *e) {

@@ -64,7 +64,7 @@ static void read_joint(cav_mjcf_reader *r, const cav_xml_node *node, const place
 
 // colour: of the geom if it is not the default one, else of its material
 static void read_colour(cav_mjcf_reader *r, cav_spec_geom *g) {
-  if (!g->material) return;
+  if (!g->material || !*g->material) return;
   int i = cav_name_find(r->materials.at, r->materials.n, sizeof(cav_mjcf_material), g->material);
   if (i < 0) {
     cav_spec_fail(r->spec, g->node, "material", "no material '%.60s'; define it or correct the name", g->material);
@@ -167,7 +167,8 @@ static void read_site(cav_mjcf_reader *r, const cav_xml_node *node, const place 
   move_to(at, s->pos, s->quat);
 }
 
-static void read_inertial(cav_mjcf_reader *r, const cav_xml_node *node, int body) {
+// frame: the pose of the frame elements around it, NULL without
+static void read_inertial(cav_mjcf_reader *r, const cav_xml_node *node, int body, const place *frame) {
   cav_spec *spec = r->spec;
   cav_spec_body *b = &spec->body.at[body];
   b->has_inertial = 1;
@@ -185,6 +186,12 @@ static void read_inertial(cav_mjcf_reader *r, const cav_xml_node *node, int body
     if (cav_xml_get(node, ways[i]))
       cav_spec_fail(spec, node, ways[i], "fullinertia gives the orientation already; remove one of them");
   }
+  if (!frame) return;
+  move_to(frame, b->inertia.com, b->has_full ? NULL : b->inertia.quat);
+  if (!b->has_full) return;
+  double R[9];
+  quat_matrix(R, frame->quat);
+  symmetric_rotate(b->full, R, b->full);
 }
 
 // frame element: its pose in the body, on top of the frames around it
@@ -212,6 +219,9 @@ static void read_objects(cav_mjcf_reader *r, const cav_xml_node *node, const pla
     if (node_is(c, "plugin")) cav_spec_lack(r->spec, c, NULL, "plugins that act on bodies are not supported");
     if (node_is(c, "frame")) {
       place inner = inner_place(r, c, at);
+      for (const cav_xml_node *i = c->child; i && at->body > 0; i = i->next) {
+        if (node_is(i, "inertial")) read_inertial(r, i, at->body, &inner);
+      }
       read_objects(r, c, &inner);
     }
   }
@@ -240,7 +250,7 @@ static void read_bodies(cav_mjcf_reader *r, const cav_xml_node *node, const plac
     place in = {.body = spec->body.n - 1, .part = c->part, .quat = {1, 0, 0, 0}};
     in.childclass = cav_xml_text(c, "childclass", at->childclass);
     for (const cav_xml_node *i = c->child; i; i = i->next) {
-      if (node_is(i, "inertial")) read_inertial(r, i, in.body);
+      if (node_is(i, "inertial")) read_inertial(r, i, in.body, NULL);
     }
     read_objects(r, c, &in);
     read_bodies(r, c, &in);

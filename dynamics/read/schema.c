@@ -80,9 +80,9 @@ static const char *const biastypes[] = {"none", "affine", "muscle", "user", "dcm
 
 #define GEOM                                                                                                        \
   WORD("type", geoms), REALS("pos", 3, 3), ORIENTATION, INT("contype"), INT("conaffinity"), INT("condim"),          \
-      INT("group"), INT("priority"), REALS("size", 1, 3), NAMED("material"), REALS("friction", 1, 3), REAL("mass"), \
+      INT("group"), INT("priority"), REALS("size", 1, 3), TEXT("material"), REALS("friction", 1, 3), REAL("mass"), \
       REAL("density"), BOOL("shellinertia"), REAL("solmix"), REALS("solref", 1, 2), REALS("solimp", 1, 5),          \
-      REAL("margin"), REAL("gap"), REALS("fromto", 6, 6), NAMED("hfield"), NAMED("mesh"), REAL("fitscale"),         \
+      REAL("margin"), SKIP("gap"), REALS("fromto", 6, 6), NAMED("hfield"), NAMED("mesh"), REAL("fitscale"),         \
       REALS("rgba", 4, 4), WORD("fluidshape", shapes), REALS("fluidcoef", 1, 5), SKIP("user"), REAL("adhesion"),    \
       REALS("surfacevel", 1, 6)
 
@@ -91,7 +91,7 @@ static const char *const biastypes[] = {"none", "affine", "muscle", "user", "dcm
       REALS("fromto", 6, 6), SKIP("rgba"), SKIP("user"), SKIP("mesh")
 
 #define PAIR                                                                                                         \
-  INT("condim"), REALS("friction", 1, 5), REALS("solref", 1, 2), REALS("solimp", 1, 5), REAL("gap"), REAL("margin"), \
+  INT("condim"), REALS("friction", 1, 5), REALS("solref", 1, 2), REALS("solimp", 1, 5), SKIP("gap"), REAL("margin"), \
       REALS("solreffriction", 1, 2), REAL("adhesion")
 
 #define EQUALITY BOOL("active"), REALS("solref", 1, 2), REALS("solimp", 1, 5)
@@ -119,11 +119,11 @@ static const char *const biastypes[] = {"none", "affine", "muscle", "user", "dcm
 #define CYLINDER REAL("timeconst"), REAL("area"), REAL("diameter"), REALS("bias", 3, 3)
 
 #define MUSCLE                                                                                              \
-  REALS("timeconst", 2, 2), REALS("range", 2, 2), REAL("force"), REAL("scale"), REAL("lmin"), REAL("lmax"), \
+  REALS("timeconst", 2, 2), REAL("tausmooth"), REALS("range", 2, 2), REAL("force"), REAL("scale"), REAL("lmin"), REAL("lmax"), \
       REAL("vmax"), REAL("fpmax"), REAL("fvmax")
 
 #define TRANSMISSION                                                                                                  \
-  NAMED("name"), NAMED("class"), REALS("lengthrange", 2, 2), NAMED("joint"), NAMED("jointinparent"), NAMED("tendon"), \
+  TEXT("name"), NAMED("class"), REALS("lengthrange", 2, 2), NAMED("joint"), NAMED("jointinparent"), NAMED("tendon"), \
       NAMED("slidersite"), NAMED("cranksite"), NAMED("site"), NAMED("refsite"), NAMED("body")
 
 // --- elements without children, or with children of no interest ---
@@ -284,7 +284,7 @@ static const cav_xml_element defaults = {"default", 0, 0, default_attributes, de
 
 static const cav_xml_attribute material_attributes[] = {NEEDED("name"), NAMED("class"), MATERIAL, END};
 static const cav_xml_element material = {"material", 0, 0, material_attributes, material_children, 0, NULL};
-static const cav_xml_attribute mesh_attributes[] = {NAMED("name"),
+static const cav_xml_attribute mesh_attributes[] = {TEXT("name"),
                                                     NAMED("class"),
                                                     NAMED("file"),
                                                     SKIP("content_type"),
@@ -305,9 +305,9 @@ static const cav_xml_attribute mesh_attributes[] = {NAMED("name"),
                                                     END};
 static const cav_xml_element *const mesh_children[] = {&plugin, &include, NULL};
 static const cav_xml_element mesh = {"mesh", 0, 0, mesh_attributes, mesh_children, 0, NULL};
-LEAF(hfield, "hfield", NAMED("name"), NAMED("file"), SKIP("content_type"), INT("nrow"), INT("ncol"),
+LEAF(hfield, "hfield", TEXT("name"), NAMED("file"), SKIP("content_type"), INT("nrow"), INT("ncol"),
      REALS("elevation", 0, 0), {"size", CAV_XML_REAL, 4, 4, NULL, 1, NULL});
-LEAF(model_asset, "model", NAMED("name"), NEEDED("file"), SKIP("content_type"));
+LEAF(model_asset, "model", TEXT("name"), NEEDED("file"), SKIP("content_type"));
 static const cav_xml_element *const asset_children[] = {&texture,  &hfield,      &mesh,    &skin,
                                                         &material, &model_asset, &include, NULL};
 static const cav_xml_element asset = {"asset", 0, 0, NULL, asset_children, 0, NULL};
@@ -321,16 +321,16 @@ static const cav_xml_attribute inertial_attributes[] = {{"pos", CAV_XML_REAL, 3,
                                                         REALS("fullinertia", 6, 6),
                                                         END};
 static const cav_xml_element inertial = {"inertial", 0, 1, inertial_attributes, NULL, 0, NULL};
-LEAF(joint, "joint", NAMED("name"), NAMED("class"), JOINT);
-LEAF(freejoint, "freejoint", NAMED("name"), SKIP("group"), WORD("align", aligns));
-static const cav_xml_attribute geom_attributes[] = {NAMED("name"), NAMED("class"), GEOM, END};
+LEAF(joint, "joint", TEXT("name"), NAMED("class"), JOINT);
+LEAF(freejoint, "freejoint", TEXT("name"), SKIP("group"), WORD("align", aligns));
+static const cav_xml_attribute geom_attributes[] = {TEXT("name"), NAMED("class"), GEOM, END};
 static const cav_xml_element *const geom_children[] = {&plugin, &include, NULL};
 static const cav_xml_element geom = {"geom", 0, 0, geom_attributes, geom_children, 0, NULL};
 LEAF(attach, "attach", NEEDED("model"), NAMED("body"), TEXT("prefix"), NAMED("frame"));
-LEAF(site, "site", NAMED("name"), NAMED("class"), SITE);
-static const cav_xml_attribute frame_attributes[] = {NAMED("name"), NAMED("childclass"), REALS("pos", 3, 3),
+LEAF(site, "site", TEXT("name"), NAMED("class"), SITE);
+static const cav_xml_attribute frame_attributes[] = {TEXT("name"), NAMED("childclass"), REALS("pos", 3, 3),
                                                      ORIENTATION, END};
-static const cav_xml_attribute body_attributes[] = {NAMED("name"), NAMED("childclass"), REALS("pos", 3, 3),
+static const cav_xml_attribute body_attributes[] = {TEXT("name"), NAMED("childclass"), REALS("pos", 3, 3),
                                                     ORIENTATION,   BOOL("mocap"),       REAL("gravcomp"),
                                                     SKIP("user"),  SKIP("sleep"),       END};
 static const cav_xml_element body, frame;
@@ -338,7 +338,7 @@ static const cav_xml_element body, frame;
   &geom, &site, &camera, &light, &composite, &flexcomp, &plugin, &frame, &cav_replicate_element, &attach, &body, \
       &include
 static const cav_xml_element *const body_children[] = {&inertial, &joint, &freejoint, WORLD_CHILDREN, NULL};
-static const cav_xml_element *const frame_children[] = {&joint, &freejoint, WORLD_CHILDREN, NULL};
+static const cav_xml_element *const frame_children[] = {&inertial, &joint, &freejoint, WORLD_CHILDREN, NULL};
 static const cav_xml_attribute replicate_attributes[] = {{"count", CAV_XML_INT, 1, 1, NULL, 1, NULL},
                                                          REALS("offset", 3, 3),
                                                          REALS("euler", 3, 3),
@@ -350,7 +350,7 @@ static const cav_xml_element *const world_children[] = {WORLD_CHILDREN, NULL};
 static const cav_xml_element frame = {"frame", 0, 0, frame_attributes, frame_children, 0, NULL};
 const cav_xml_element *const cav_frame_element = &frame;
 static const cav_xml_element body = {"body", 0, 0, body_attributes, body_children, 0, NULL};
-static const cav_xml_attribute world_attributes[] = {NAMED("name"),    NAMED("childclass"), SKIP("pos"), SKIP("quat"),
+static const cav_xml_attribute world_attributes[] = {TEXT("name"),    NAMED("childclass"), SKIP("pos"), SKIP("quat"),
                                                      SKIP("gravcomp"), SKIP("user"),        END};
 static const cav_xml_element worldbody = {"worldbody", 0, 0, world_attributes, world_children, 0, NULL};
 static const cav_xml_element *const scene_children[] = {WORLD_CHILDREN, &cav_remove_element, NULL};
@@ -365,23 +365,23 @@ const cav_xml_element cav_scene_element = {
 
 // --- contact, equality, tendon ---
 
-LEAF(pair, "pair", NAMED("name"), NAMED("class"), NEEDED("geom1"), NEEDED("geom2"), PAIR);
-LEAF(exclude, "exclude", NAMED("name"), NEEDED("body1"), NEEDED("body2"));
+LEAF(pair, "pair", TEXT("name"), NAMED("class"), NEEDED("geom1"), NEEDED("geom2"), PAIR);
+LEAF(exclude, "exclude", TEXT("name"), NEEDED("body1"), NEEDED("body2"));
 static const cav_xml_element *const contact_children[] = {&pair, &exclude, &include, NULL};
 static const cav_xml_element contact = {"contact", 0, 0, NULL, contact_children, 0, NULL};
 
-LEAF(connect, "connect", NAMED("name"), NAMED("class"), EQUALITY, NAMED("body1"), NAMED("body2"), NAMED("site1"),
+LEAF(connect, "connect", TEXT("name"), NAMED("class"), EQUALITY, NAMED("body1"), NAMED("body2"), NAMED("site1"),
      NAMED("site2"), REALS("anchor", 3, 3));
-LEAF(weld, "weld", NAMED("name"), NAMED("class"), EQUALITY, NAMED("body1"), NAMED("body2"), NAMED("site1"),
+LEAF(weld, "weld", TEXT("name"), NAMED("class"), EQUALITY, NAMED("body1"), NAMED("body2"), NAMED("site1"),
      NAMED("site2"), REALS("relpose", 7, 7), REALS("anchor", 3, 3), REAL("torquescale"));
 UNREAD(flex_equality, "flex");
 UNREAD(flexvert_equality, "flexvert");
 UNREAD(flexstrain_equality, "flexstrain");
-LEAF(equality_joint, "joint", NAMED("name"), NAMED("class"), EQUALITY, NEEDED("joint1"), NAMED("joint2"),
+LEAF(equality_joint, "joint", TEXT("name"), NAMED("class"), EQUALITY, NEEDED("joint1"), NAMED("joint2"),
      REALS("polycoef", 1, 5));
-LEAF(equality_tendon, "tendon", NAMED("name"), NAMED("class"), EQUALITY, NEEDED("tendon1"), NAMED("tendon2"),
+LEAF(equality_tendon, "tendon", TEXT("name"), NAMED("class"), EQUALITY, NEEDED("tendon1"), NAMED("tendon2"),
      REALS("polycoef", 1, 5));
-LEAF(equality_distance, "distance", NAMED("name"), NAMED("class"), EQUALITY, NEEDED("geom1"), NEEDED("geom2"),
+LEAF(equality_distance, "distance", TEXT("name"), NAMED("class"), EQUALITY, NEEDED("geom1"), NEEDED("geom2"),
      REAL("distance"));
 static const cav_xml_element *const equality_children[] = {&connect,           &weld,
                                                            &equality_joint,    &equality_tendon,
@@ -394,7 +394,7 @@ static const cav_xml_element equality = {"equality", 0, 0, NULL, equality_childr
 
 static const cav_xml_attribute part_attributes[] = {NEEDED("joint"), {"coef", CAV_XML_REAL, 1, 1, NULL, 1, NULL}, END};
 static const cav_xml_element part = {"joint", 1, 0, part_attributes, NULL, 0, NULL};
-static const cav_xml_attribute tendon_attributes[] = {NAMED("name"), NAMED("class"), TENDON, END};
+static const cav_xml_attribute tendon_attributes[] = {TEXT("name"), NAMED("class"), TENDON, END};
 static const cav_xml_element *const fixed_children[] = {&part, &include, NULL};
 static const cav_xml_element fixed = {"fixed", 0, 0, tendon_attributes, fixed_children, 0, NULL};
 LEAF(via_site, "site", NEEDED("site"));
@@ -424,15 +424,15 @@ static const cav_xml_element actuator = {"actuator", 0, 0, NULL, actuator_childr
 
 #define READING \
   REAL("cutoff"), SKIP("noise"), SKIP("user"), SKIP("delay"), SKIP("nsample"), SKIP("interp"), SKIP("interval")
-static const cav_xml_attribute of_joint[] = {NAMED("name"), NEEDED("joint"), READING, END};
-static const cav_xml_attribute of_body[] = {NAMED("name"), NEEDED("body"), READING, END};
-static const cav_xml_attribute of_site[] = {NAMED("name"), NAMED("site"), SKIP("camera"), SKIP("data"), READING, END};
-static const cav_xml_attribute of_tendon[] = {NAMED("name"), NEEDED("tendon"), READING, END};
-static const cav_xml_attribute of_actuator[] = {NAMED("name"), NEEDED("actuator"), READING, END};
-static const cav_xml_attribute of_nothing[] = {NAMED("name"), READING, END};
+static const cav_xml_attribute of_joint[] = {TEXT("name"), NEEDED("joint"), READING, END};
+static const cav_xml_attribute of_body[] = {TEXT("name"), NEEDED("body"), READING, END};
+static const cav_xml_attribute of_site[] = {TEXT("name"), NAMED("site"), SKIP("camera"), SKIP("data"), READING, END};
+static const cav_xml_attribute of_tendon[] = {TEXT("name"), NEEDED("tendon"), READING, END};
+static const cav_xml_attribute of_actuator[] = {TEXT("name"), NEEDED("actuator"), READING, END};
+static const cav_xml_attribute of_nothing[] = {TEXT("name"), READING, END};
 static const cav_xml_attribute place_attributes[] = {
-    NAMED("name"), {"objtype", CAV_XML_WORD, 0, 0, objects, 1, NULL}, NEEDED("objname"), READING, END};
-static const cav_xml_attribute referred_attributes[] = {NAMED("name"),
+    TEXT("name"), {"objtype", CAV_XML_WORD, 0, 0, objects, 1, NULL}, NEEDED("objname"), READING, END};
+static const cav_xml_attribute referred_attributes[] = {TEXT("name"),
                                                         {"objtype", CAV_XML_WORD, 0, 0, objects, 1, NULL},
                                                         NEEDED("objname"),
                                                         WORD("reftype", objects),
@@ -442,7 +442,7 @@ static const cav_xml_attribute referred_attributes[] = {NAMED("name"),
 #define UNREAD_SENSORS(X) \
   X(user)                 \
   X(plugin)               \
-  X(camprojection) X(insidesite) X(distance) X(normal) X(fromto) X(contact) X(tactile) X(e_potential) X(e_kinetic)
+  X(camprojection) X(insidesite) X(distance) X(normal) X(fromto) X(contact) X(tactile) X(tendonactuatorfrc) X(e_potential) X(e_kinetic)
 #define UNREAD_SENSOR(name) UNREAD(sensor_##name, #name);
 UNREAD_SENSORS(UNREAD_SENSOR)
 
@@ -472,7 +472,7 @@ static const cav_xml_element sensor = {"sensor", 0, 0, NULL, sensor_children, 0,
 
 // --- keyframes ---
 
-LEAF(key, "key", NAMED("name"), REAL("time"), REALS("qpos", 0, 0), REALS("qvel", 0, 0), SKIP("act"), SKIP("mpos"),
+LEAF(key, "key", TEXT("name"), REAL("time"), REALS("qpos", 0, 0), REALS("qvel", 0, 0), SKIP("act"), SKIP("mpos"),
      SKIP("mquat"), SKIP("ctrl"));
 static const cav_xml_element *const keyframe_children[] = {&key, &include, NULL};
 static const cav_xml_element keyframe = {"keyframe", 0, 0, NULL, keyframe_children, 0, NULL};

@@ -168,12 +168,13 @@ void cav_check_not_negative(cav_spec *spec, const cav_xml_node *node, const char
   if (value < 0) cav_spec_fail(spec, node, name, "expected a number >= 0, got %g", value);
 }
 
-// solref: a time constant and a damping ratio, or both negative
+// solref: a time constant and a damping ratio, or both negative; what is neither is taken for the default by the law
 void cav_check_softness(cav_spec *spec, const cav_xml_node *node, const char *where, const cav_softness *s) {
   if ((s->solref[0] > 0) != (s->solref[1] > 0))
-    cav_spec_fail(spec, node, NULL,
-                  "solref%s %g %g: expected both > 0 (time constant, damping ratio) or both <= 0 (direct)", where,
-                  s->solref[0], s->solref[1]);
+    cav_spec_warn(spec, node, NULL,
+                  "solref%s %g %g: expected both > 0 (time constant, damping ratio) or both <= 0 (direct); taken for "
+                  "0.02 1, as in MuJoCo",
+                  where, s->solref[0], s->solref[1]);
 }
 
 void cav_check_condim(cav_spec *spec, const cav_xml_node *node, int condim) {

@@ -56,7 +56,7 @@ typedef struct cav_spec_geom {
   double pos[3], quat[4], size[3], fromto[6];
   int has_fromto;
   int contype, conaffinity, condim, priority, group;
-  double friction[3], margin, gap, solmix, mass, density;
+  double friction[3], margin, solmix, mass, density;
   int has_mass, shell;
   double fitscale;
   cav_softness softness;
@@ -111,7 +111,7 @@ typedef struct cav_spec_pair {
   const cav_xml_node *node;
   const char *geom1, *geom2;
   int condim;
-  double friction[5], margin, gap;
+  double friction[5], margin;
   cav_softness softness;
 } cav_spec_pair;
 

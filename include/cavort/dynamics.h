@@ -19,7 +19,7 @@ typedef struct cav_contact {
   double pos[3];           ///< m, world, midway between the surfaces
   double frame[9];         ///< rows are axes in world coordinates; the first is the normal, from geom1 to geom2
   double dist;             ///< m, gap between the surfaces; negative: penetration
-  double margin;           ///< m, margin - gap: the constraint pushes below this distance
+  double margin;           ///< m, the constraint pushes below this distance
   double regulariser[6];   ///< R, 1/kg
   double damping[6];       ///< h B, dimensionless: v* = (1 - hB) x' - h K x
   double stiffness;        ///< h K of the normal row, 1/s

@@ -284,7 +284,7 @@ typedef struct cav_geom {
   int contype, conaffinity; ///< bits: a pair is tested if either one's contype meets the other's conaffinity
   int condim, priority;     ///< dimensions of its contacts; the pair takes the parameters of the higher priority
   double friction[3];       ///< sliding, torsional (m), rolling (m)
-  double margin, gap;       ///< m
+  double margin;            ///< m, adds to that of the other geom
   double solmix;            ///< weight of its softness in a pair
   cav_softness softness;    ///< of its contacts
   int fluid;                ///< 1: in a medium this geom is an ellipsoid, and its body no box
@@ -310,7 +310,7 @@ typedef struct cav_pair {
   int listed;            ///< 1: the file lists this pair, whatever masks say
   int external;          ///< 1 if one of the two stands in the world, or they hang from the world by different roots
   double friction[5];    ///< two tangential, torsional (m), two rolling (m)
-  double margin, gap;    ///< m
+  double margin;         ///< m, distance below which the contact pushes
   cav_softness softness; ///< of its contacts
   double weight[2];      ///< reference diagonal of A: translation, rotation (sum of both bodies' inverse_weight)
 } cav_pair;
