@@ -78,12 +78,12 @@ static const char *const biastypes[] = {"none", "affine", "muscle", "user", "dcm
       REALS("stiffness", 1, 3), REALS("range", 2, 2), REAL("margin"), REAL("ref"), REAL("springref"),        \
       REAL("armature"), REALS("damping", 1, 3), REAL("frictionloss"), SKIP("user"), EFFORT, BOOL("actuatorgravcomp")
 
-#define GEOM                                                                                                        \
-  WORD("type", geoms), REALS("pos", 3, 3), ORIENTATION, INT("contype"), INT("conaffinity"), INT("condim"),          \
+#define GEOM                                                                                                       \
+  WORD("type", geoms), REALS("pos", 3, 3), ORIENTATION, INT("contype"), INT("conaffinity"), INT("condim"),         \
       INT("group"), INT("priority"), REALS("size", 1, 3), TEXT("material"), REALS("friction", 1, 3), REAL("mass"), \
-      REAL("density"), BOOL("shellinertia"), REAL("solmix"), REALS("solref", 1, 2), REALS("solimp", 1, 5),          \
-      REAL("margin"), SKIP("gap"), REALS("fromto", 6, 6), NAMED("hfield"), NAMED("mesh"), REAL("fitscale"),         \
-      REALS("rgba", 4, 4), WORD("fluidshape", shapes), REALS("fluidcoef", 1, 5), SKIP("user"), REAL("adhesion"),    \
+      REAL("density"), BOOL("shellinertia"), REAL("solmix"), REALS("solref", 1, 2), REALS("solimp", 1, 5),         \
+      REAL("margin"), SKIP("gap"), REALS("fromto", 6, 6), NAMED("hfield"), NAMED("mesh"), REAL("fitscale"),        \
+      REALS("rgba", 4, 4), WORD("fluidshape", shapes), REALS("fluidcoef", 1, 5), SKIP("user"), REAL("adhesion"),   \
       REALS("surfacevel", 1, 6)
 
 #define SITE                                                                                                  \
@@ -118,11 +118,11 @@ static const char *const biastypes[] = {"none", "affine", "muscle", "user", "dcm
 
 #define CYLINDER REAL("timeconst"), REAL("area"), REAL("diameter"), REALS("bias", 3, 3)
 
-#define MUSCLE                                                                                              \
-  REALS("timeconst", 2, 2), REAL("tausmooth"), REALS("range", 2, 2), REAL("force"), REAL("scale"), REAL("lmin"), REAL("lmax"), \
-      REAL("vmax"), REAL("fpmax"), REAL("fvmax")
+#define MUSCLE                                                                                                   \
+  REALS("timeconst", 2, 2), REAL("tausmooth"), REALS("range", 2, 2), REAL("force"), REAL("scale"), REAL("lmin"), \
+      REAL("lmax"), REAL("vmax"), REAL("fpmax"), REAL("fvmax")
 
-#define TRANSMISSION                                                                                                  \
+#define TRANSMISSION                                                                                                 \
   TEXT("name"), NAMED("class"), REALS("lengthrange", 2, 2), NAMED("joint"), NAMED("jointinparent"), NAMED("tendon"), \
       NAMED("slidersite"), NAMED("cranksite"), NAMED("site"), NAMED("refsite"), NAMED("body")
 
@@ -328,11 +328,11 @@ static const cav_xml_element *const geom_children[] = {&plugin, &include, NULL};
 static const cav_xml_element geom = {"geom", 0, 0, geom_attributes, geom_children, 0, NULL};
 LEAF(attach, "attach", NEEDED("model"), NAMED("body"), TEXT("prefix"), NAMED("frame"));
 LEAF(site, "site", TEXT("name"), NAMED("class"), SITE);
-static const cav_xml_attribute frame_attributes[] = {TEXT("name"), NAMED("childclass"), REALS("pos", 3, 3),
-                                                     ORIENTATION, END};
+static const cav_xml_attribute frame_attributes[] = {TEXT("name"), NAMED("childclass"), REALS("pos", 3, 3), ORIENTATION,
+                                                     END};
 static const cav_xml_attribute body_attributes[] = {TEXT("name"), NAMED("childclass"), REALS("pos", 3, 3),
-                                                    ORIENTATION,   BOOL("mocap"),       REAL("gravcomp"),
-                                                    SKIP("user"),  SKIP("sleep"),       END};
+                                                    ORIENTATION,  BOOL("mocap"),       REAL("gravcomp"),
+                                                    SKIP("user"), SKIP("sleep"),       END};
 static const cav_xml_element body, frame;
 #define WORLD_CHILDREN                                                                                           \
   &geom, &site, &camera, &light, &composite, &flexcomp, &plugin, &frame, &cav_replicate_element, &attach, &body, \
@@ -350,7 +350,7 @@ static const cav_xml_element *const world_children[] = {WORLD_CHILDREN, NULL};
 static const cav_xml_element frame = {"frame", 0, 0, frame_attributes, frame_children, 0, NULL};
 const cav_xml_element *const cav_frame_element = &frame;
 static const cav_xml_element body = {"body", 0, 0, body_attributes, body_children, 0, NULL};
-static const cav_xml_attribute world_attributes[] = {TEXT("name"),    NAMED("childclass"), SKIP("pos"), SKIP("quat"),
+static const cav_xml_attribute world_attributes[] = {TEXT("name"),     NAMED("childclass"), SKIP("pos"), SKIP("quat"),
                                                      SKIP("gravcomp"), SKIP("user"),        END};
 static const cav_xml_element worldbody = {"worldbody", 0, 0, world_attributes, world_children, 0, NULL};
 static const cav_xml_element *const scene_children[] = {WORLD_CHILDREN, &cav_remove_element, NULL};
@@ -442,7 +442,8 @@ static const cav_xml_attribute referred_attributes[] = {TEXT("name"),
 #define UNREAD_SENSORS(X) \
   X(user)                 \
   X(plugin)               \
-  X(camprojection) X(insidesite) X(distance) X(normal) X(fromto) X(contact) X(tactile) X(tendonactuatorfrc) X(e_potential) X(e_kinetic)
+  X(camprojection)        \
+  X(insidesite) X(distance) X(normal) X(fromto) X(contact) X(tactile) X(tendonactuatorfrc) X(e_potential) X(e_kinetic)
 #define UNREAD_SENSOR(name) UNREAD(sensor_##name, #name);
 UNREAD_SENSORS(UNREAD_SENSOR)
 
