@@ -143,8 +143,8 @@ static int box_face_along(const cav_shape *s, const double n[3]) {
   return 2 * axis + (local[axis] < 0);
 }
 
-// the face of a body that looks most along n: outline, normal out of it; returns the cosine, -1 where there is none.
-// A cylinder's cap has a normal but no outline
+// the face of a body that looks most along n: outline, normal out of it; returns the cosine, -1 where there is none. near:
+// a corner furthest along n, -1: not known. A cylinder's cap has a normal but no outline
 static double face_along(const cav_shape *s, const double n[3], int near, cav_outline *o, double normal[3]) {
   int best = -1;
   o->n = 0;
@@ -157,7 +157,7 @@ static double face_along(const cav_shape *s, const double n[3], int near, cav_ou
   if (s->type == CAV_GEOM_MESH) {
     double local[3];
     rotate_back(local, s->rotation, n);
-    best = mesh_face_along(s->mesh, cav_mesh_summit_from(s->mesh, local, near), local);
+    best = mesh_face_along(s->mesh, near >= 0 ? near : cav_mesh_summit(s->mesh, local), local);
   }
   if (best < 0) return -1;
   cav_shape_normal(s, best, normal);
