@@ -225,14 +225,13 @@ void cav_law_bilateral(double R, double sigma, double bound, double g, double *f
   if (hessian) *hessian = size <= B ? 1.0 / R : 0.0;
   if (potential) *potential = size <= B ? 0.5 * G * G : B * (size - 0.5 * B);
   if (!(sigma > 0.0)) return;
+  const double width = 2.0 * B / sigma;
+  // log of a ratio of two hyperbolic cosines, without cancellation where they are near
+  if (width < 1.0) *f = 2.0 * sigma / root * atanh(tanh(0.5 * G / sigma) * tanh(0.25 * width));
+  if (width < 1.0 && !hessian && !potential) return;
   const smooth low = smooth_positive((G + B) / sigma, 0, potential != NULL);
   const smooth high = smooth_positive((G - B) / sigma, 0, potential != NULL);
-  const double width = 2.0 * B / sigma;
-  // log of a ratio of two hyperbolic cosines; the first form has no cancellation when they are near
-  if (width < 1.0)
-    *f = 2.0 * sigma / root * atanh(tanh(0.5 * G / sigma) * tanh(0.25 * width));
-  else
-    *f += sigma / root * (low.excess - high.excess);
+  if (!(width < 1.0)) *f += sigma / root * (low.excess - high.excess);
   if (hessian) *hessian = -low.derivative * (1.0 - high.derivative) * expm1(-width) / R;
   if (potential) *potential += sigma * sigma * (low.area - high.area);
 }
