@@ -100,18 +100,6 @@ void cav_derivative_contacts(const cav_derivative_task *t) {
   }
 }
 
-// a dof's axis and the drifts of it about a contact
-typedef struct column {
-  double axis[6], now[6], next[6];
-} column;
-
-static void column_at(const cav_derivative_task *t, const cav_contact *c, int dof, column *out) {
-  const double *reference = t->state->reference + 3 * t->model->dof[dof].link;
-  motion_at(out->axis, t->state->axis + 6 * dof, reference, c->pos);
-  motion_at(out->now, t->s->drift_now + 6 * dof, reference, c->pos);
-  motion_at(out->next, t->s->drift_next + 6 * dof, reference, c->pos);
-}
-
 // axes about a contact of the dofs from one to another that is left out, towards the root; their number
 static int axes_about(const cav_derivative_task *t, const cav_contact *c, int from, int to, double *S) {
   int n = 0;
@@ -121,68 +109,103 @@ static int axes_about(const cav_derivative_task *t, const cav_contact *c, int fr
   return n;
 }
 
-/// A contact between two moving links: dofs that move the one, the other, and both, and their axes about it.
+/// A contact between two moving links: dofs that move the one, the other, and both.
 typedef struct between {
   int link[2], common;
   double *axes[2], *shared;
+  double whole[6];
 } between;
 
-// one column: the wrenches on both links by one dof that moves the one of side
-static void between_column(const cav_derivative_task *t, const cav_contact *c, const cav_contact_jacobian *derivative,
-                           const between *b, const double whole[6], int side, int j) {
-  const double *K = &derivative->by_velocity[0][0], keep = 1 - c->damping[0];
-  const double sign = side ? 1 : -1, on = sign * t->inverse_h;
-  int nv = t->nv;
-  column col;
-  double dq[6], now[6], next[6], drift[6], carried[6], own[6];
-  column_at(t, c, j, &col);
-  multiply6_transposed(dq, &derivative->wrench[side][0][0], col.axis);
-  for (int i = 0; i < 6; i++) drift[i] = sign * (keep * col.now[i] - col.next[i]);
-  multiply6(now, K, drift);
-  accumulate6(dq, now);
-  multiply6(next, K, col.axis);
-  scale6(next, sign, next);
-  const double *S = b->axes[!side];
-  for (int k = last_dof(t->model, b->link[!side]); k != b->common; k = t->model->dof[k].parent, S += 6) {
-    double push = dot6(S, next) * on;
-    t->dq[k * nv + j] += on * dot6(S, dq);
-    t->dv[k * nv + j] += keep * push;
-    t->dn[k * nv + j] -= push;
-  }
-  if (b->common < 0) return;
-  // rows of the same link: there smooth.c carries the wrench along with it; the dofs that move both links feel nothing
-  cross3(carried, col.axis, whole);
-  cross_add3(carried, col.axis + 3, whole + 3);
-  cross3(carried + 3, col.axis, whole + 3);
-  for (int i = 0; i < 6; i++) own[i] = dq[i] - carried[i];
-  S = b->axes[side];
-  for (int k = last_dof(t->model, b->link[side]); k != b->common; k = t->model->dof[k].parent, S += 6) {
-    double push = dot6(S, next) * on;
-    t->dq[k * nv + j] -= on * dot6(S, own);
-    t->dv[k * nv + j] -= keep * push;
-    t->dn[k * nv + j] += push;
-  }
-  S = b->shared;
-  for (int k = b->common; k >= 0; k = t->model->dof[k].parent, S += 6) t->dq[k * nv + j] += on * dot6(S, carried);
+// dots of a vector with numbers of four dofs each
+#define DOT3(e, x) ((e)[0] * (x)[0] + (e)[1] * (x)[1] + (e)[2] * (x)[2])
+#define DOT6(e, x) (DOT3(e, x) + DOT3((e) + 3, (x) + 3))
+
+// axes of four dofs of a path from the k-th on, or their drifts, at an arm from the reference
+static inline __attribute__((always_inline)) void motion_of_four(const double *path, size_t n, int k, const double d[3],
+                                                                 cav_four motion[6]) {
+  cav_four S[6];
+  for (int i = 0; i < 6; i++) S[i] = *(const cav_four *)(path + (size_t)i * n + k);
+  for (int i = 0; i < 3; i++) motion[i] = S[i];
+  motion[3] = S[3] + S[1] * d[2] - S[2] * d[1];
+  motion[4] = S[4] + S[2] * d[0] - S[0] * d[2];
+  motion[5] = S[5] + S[0] * d[1] - S[1] * d[0];
 }
+
+// adds four columns of a row of the results, of the dofs of a path from the k-th on, as far as there are any
+static inline __attribute__((always_inline)) void add_columns(const cav_derivative_task *t, int row, int k, int end,
+                                                              cav_four q, cav_four push, double keep) {
+  for (int i = 0; i < 4 && k + i < end; i++) {
+    int at = row * t->nv + t->s->path.dof[k + i];
+    t->dq[at] += q[i];
+    t->dv[at] += keep * push[i];
+    t->dn[at] -= push[i];
+  }
+}
+
+// columns: the wrenches on both links by the dofs of a path from `first` on, which move the one of side
+CAV_VECTOR_BODY void between_columns_body(const cav_derivative_task *t, const cav_contact *c,
+                                          const cav_contact_jacobian *derivative, const between *b, int side, int first,
+                                          int end, const double d[3]) {
+  const double *K = &derivative->by_velocity[0][0], *M = &derivative->wrench[side][0][0], *path = t->s->path.at;
+  const double keep = 1 - c->damping[0], sign = side ? 1 : -1, on = sign * t->inverse_h, *w = b->whole, *S;
+  const size_t n = (size_t)t->s->path.stride;
+  for (int k = first; k < end; k += 4) {
+    cav_four axis[6], now[6], next[6], dq[6], carried[6], own[6];
+    motion_of_four(path + CAV_OF_AXIS * n, n, k, d, axis);
+    motion_of_four(path + CAV_OF_NOW * n, n, k, d, now);
+    motion_of_four(path + CAV_OF_NEXT * n, n, k, d, next);
+    for (int i = 0; i < 6; i++) now[i] = sign * (keep * now[i] - next[i]);
+    for (int i = 0; i < 6; i++) {
+      dq[i] = axis[0] * M[i];
+      for (int j = 1; j < 6; j++) dq[i] = dq[i] + axis[j] * M[6 * j + i];
+      dq[i] = dq[i] + DOT6(K + 6 * i, now);
+      next[i] = sign * DOT6(K + 6 * i, axis);
+    }
+    S = b->axes[!side];
+    for (int row = last_dof(t->model, b->link[!side]); row != b->common; row = t->model->dof[row].parent, S += 6)
+      add_columns(t, row, k, end, on * DOT6(S, dq), DOT6(S, next) * on, keep);
+    if (b->common < 0) continue;
+    // rows of the same link: there smooth.c carries the wrench along with it; the dofs that move both links feel nothing
+    for (int i = 0, j = 1, l = 2; i < 3; i++, j = (j + 1) % 3, l = (l + 1) % 3) {
+      carried[i] = axis[j] * w[l] - axis[l] * w[j];
+      carried[i] = carried[i] + axis[3 + j] * w[3 + l] - axis[3 + l] * w[3 + j];
+      carried[3 + i] = axis[j] * w[3 + l] - axis[l] * w[3 + j];
+    }
+    for (int i = 0; i < 6; i++) own[i] = dq[i] - carried[i];
+    S = b->axes[side];
+    for (int row = last_dof(t->model, b->link[side]); row != b->common; row = t->model->dof[row].parent, S += 6)
+      add_columns(t, row, k, end, -(on * DOT6(S, own)), -(DOT6(S, next) * on), keep);
+    S = b->shared;
+    for (int row = b->common; row >= 0; row = t->model->dof[row].parent, S += 6) {
+      cav_four q = on * DOT6(S, carried);
+      for (int i = 0; i < 4 && k + i < end; i++) t->dq[row * t->nv + t->s->path.dof[k + i]] += q[i];
+    }
+  }
+}
+CAV_BY_VECTORS(between_columns,
+               (const cav_derivative_task *t, const cav_contact *c, const cav_contact_jacobian *derivative,
+                const between *b, int side, int first, int end, const double *d),
+               (t, c, derivative, b, side, first, end, d))
 
 // what a contact between two moving links gives: of two trees the wrench on the one by the motion of the other, of one
 // tree all, by the dofs between the links only: the others move both, and nothing changes
 static void contact_between(const cav_derivative_task *t, const cav_contact *c,
                             const cav_contact_jacobian *derivative) {
   between b = {.link = {c->link1, c->link2}};
-  double whole[6] = {0};
   b.common = common_dof(t->model, b.link);
   b.axes[0] = t->s->across;
   b.axes[1] = b.axes[0] + 6 * axes_about(t, c, last_dof(t->model, c->link1), b.common, b.axes[0]);
   b.shared = b.axes[1] + 6 * axes_about(t, c, last_dof(t->model, c->link2), b.common, b.axes[1]);
   if (b.common >= 0) {
     axes_about(t, c, b.common, -1, b.shared);
-    add_impulse(c, whole);
+    add_impulse(c, b.whole);
   }
   for (int side = 0; side < 2; side++) {
-    for (int j = last_dof(t->model, b.link[side]); j != b.common; j = t->model->dof[j].parent)
-      between_column(t, c, derivative, &b, whole, side, j);
+    int last = last_dof(t->model, b.link[side]), first = b.common < 0 ? 0 : t->s->depth[b.common] + 1;
+    double d[3];
+    if (last == b.common) continue;
+    sub3(d, c->pos, t->state->reference + 3 * b.link[side]);
+    between_columns(t, c, derivative, &b, side, first, cav_derivative_path(t, last), d);
   }
 }
 
@@ -197,19 +220,14 @@ void cav_derivative_across(const cav_derivative_task *t) {
 enum { OF_VELOCITY = 1, OF_NEXT = 7, OF_IMPULSE = 13, OF_IMPULSE_NOW = 19, OF_IMPULSE_NEXT = 25 };
 _Static_assert(OF_IMPULSE_NEXT + CAV_IMPULSE_DIM == CAV_PATH_ROWS, "the last of these rows is the last that is kept");
 
-// a point's velocity by four dofs of a path from the k-th on, and by their drifts, along the axes of a contact
-#define AT(i) (*(const cav_four *)(path + (size_t)(i)*n + k))
-#define ALONG(e, x) ((e)[0] * (x)[0] + (e)[1] * (x)[1] + (e)[2] * (x)[2])
+// velocities of the point along the axes of the contact
 static inline __attribute__((always_inline)) void motion_along(const cav_contact *c, const double *path, size_t n,
                                                                int k, const double d[3], double sign,
                                                                cav_four motion[6], cav_four *along) {
-  for (int i = 0; i < 3; i++) motion[i] = AT(i);
-  motion[3] = AT(3) + motion[1] * d[2] - motion[2] * d[1];
-  motion[4] = AT(4) + motion[2] * d[0] - motion[0] * d[2];
-  motion[5] = AT(5) + motion[0] * d[1] - motion[1] * d[0];
+  motion_of_four(path, n, k, d, motion);
   for (int i = 0; i < c->dim; i++) {
     const double *e = c->frame + 3 * (i % 3);
-    along[i] = sign * ALONG(e, motion + (i < 3 ? 3 : 0));
+    along[i] = sign * DOT3(e, motion + (i < 3 ? 3 : 0));
   }
 }
 
@@ -224,7 +242,7 @@ CAV_VECTOR_BODY void path_rows_body(const cav_derivative_task *t, const cav_cont
     motion_along(c, path + CAV_OF_NOW * n, n, k, d, sign, drift, now);
     motion_along(c, path + CAV_OF_NEXT * n, n, k, d, sign, drift, next);
     motion_along(c, path + CAV_OF_AXIS * n, n, k, d, sign, axis, x);
-    *(cav_four *)to = ALONG(derivative->dist[side], axis) + ALONG(derivative->dist[side] + 3, axis + 3);
+    *(cav_four *)to = DOT6(derivative->dist[side], axis);
     for (int i = 0; i < c->dim; i++) {
       const double *H = derivative->hessian[i], *v = derivative->velocity[side][i], *f = derivative->impulse[side][i];
       cav_four by_now = H[0] * now[0], by_next = H[0] * next[0], by_axis = H[0] * x[0];
@@ -233,9 +251,9 @@ CAV_VECTOR_BODY void path_rows_body(const cav_derivative_task *t, const cav_cont
         by_next += H[j] * next[j];
         by_axis += H[j] * x[j];
       }
-      *(cav_four *)(to + (OF_VELOCITY + i) * n) = ALONG(v, axis) + ALONG(v + 3, axis + 3) + next[i];
+      *(cav_four *)(to + (OF_VELOCITY + i) * n) = DOT6(v, axis) + next[i];
       *(cav_four *)(to + (OF_NEXT + i) * n) = x[i];
-      *(cav_four *)(to + (OF_IMPULSE + i) * n) = ALONG(f, axis) + ALONG(f + 3, axis + 3) + (keep * by_now - by_next);
+      *(cav_four *)(to + (OF_IMPULSE + i) * n) = DOT6(f, axis) + (keep * by_now - by_next);
       *(cav_four *)(to + (OF_IMPULSE_NOW + i) * n) = keep * by_axis;
       *(cav_four *)(to + (OF_IMPULSE_NEXT + i) * n) = -by_axis;
     }
