@@ -36,6 +36,8 @@ typedef struct cav_command_line {
   const char *methods; ///< --methods, NULL: own
   const char *markers; ///< --markers
   int scale;           ///< --scale
+  int from_given;      ///< 1: --from is given
+  double from, until;  ///< --from, --until, s; until 0: to the end
   double mass;         ///< --mass, kg; 0: as it is
   const char *like;    ///< --like, NULL: as the model is built
   const char *format;  ///< --to, NULL: none
@@ -82,6 +84,7 @@ int cav_command_solve(const cav_command_line *line);
 int cav_command_stress(const cav_command_line *line);
 int cav_command_study(const cav_command_line *line);
 int cav_command_table(const cav_command_line *line);
+int cav_command_track(const cav_command_line *line);
 int cav_command_verify(const cav_command_line *line);
 int cav_command_view(const cav_command_line *line);
 

@@ -35,6 +35,8 @@ enum option {
   OPTION_CSV = 524288,
   OPTION_LIKE = 1048576,
   OPTION_CONTROL = 33554432,
+  OPTION_FROM = 2097152,
+  OPTION_UNTIL = 4194304,
   OPTION_SCALE = 134217728,
   OPTION_MASS = 268435456
 };
@@ -67,6 +69,8 @@ static const cav_manual_option options[] = {
      "fit the sizes of segments too, each within a few percent of the whole body's (scale of the marker set: 0.03), "
      "and write the scaled model, model.xml"},
     {OPTION_MASS, "--mass", NULL, "KG", "mass of the subject, of all that moves, for the scaled model"},
+    {OPTION_FROM, "--from", NULL, "S", "time of the clip at which the motion begins, s (default: its first frame)"},
+    {OPTION_UNTIL, "--until", NULL, "S", "time of the clip at which it ends, s (default: its last frame)"},
     {OPTION_THREADS, "--threads", NULL, "N",
      "threads to use (default: all processors); the result does not depend on it"},
     {OPTION_RESUME, "--resume", NULL, NULL,
@@ -143,6 +147,16 @@ static const cav_manual_command commands[] = {
      "plans\n"
      "  took; writes runs.csv, and of the worst run plans.csv, trajectory.csv and a page",
      cav_command_mpc, OPTION_MODEL | OPTION_RATE | OPTION_CONTROL | OPTION_OUTPUT | OPTION_QUIET},
+    {"track", "CLIP",
+     "find the motion nearest to a recorded clip that obeys physics, with the forces and torques that make it: "
+     "contacts "
+     "are\n"
+     "  found, no force plates are needed. Fits the model (as ik), writes a problem to be edited and solved again "
+     "(problem.xml),\n"
+     "  solves and certifies it into DIR/result, and writes centres of pressure (cop.csv) and distances of markers",
+     cav_command_track,
+     OPTION_MODEL | OPTION_MARKERS | OPTION_SCALE | OPTION_MASS | OPTION_FROM | OPTION_UNTIL | OPTION_OUTPUT |
+         OPTION_SOLVER | OPTION_THREADS | OPTION_STRATEGIES | OPTION_FORCE | OPTION_SET | OPTION_QUIET},
     {"export", "DIR",
      "write the motion of a result folder in a format of other tools, into the folder or where -o says",
      cav_command_export, OPTION_MODEL | OPTION_OUTPUT | OPTION_TO | OPTION_RATE | OPTION_QUIET},
@@ -342,6 +356,15 @@ static int take_value(cav_command_line *line, enum option option, const char *na
     case OPTION_MARKERS:
       line->markers = value;
       return 1;
+    case OPTION_FROM:
+    case OPTION_UNTIL: {
+      double time = strtod(value, &end);
+      line->from_given |= option == OPTION_FROM;
+      *(option == OPTION_FROM ? &line->from : &line->until) = time;
+      if (end != value && !*end && time >= 0 && isfinite(time)) return 1;
+      fprintf(stderr, "cavort: %s: expected a time in s, 0 or more, got '%s'\n", name, value);
+      return 0;
+    }
     case OPTION_SCALE:
       return line->scale = 1;
     case OPTION_MASS:

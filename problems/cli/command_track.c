@@ -1,0 +1,278 @@
+/// cavort track: a recorded clip to a motion that obeys physics, with its forces. The kinematic fit (cavort ik) gives places of
+/// markers and the guess; the problem that is nearest to the markers is written, problem.xml, and solved (cavort solve) into
+/// result/; cop.csv and markers.csv tell centres of pressure and how far markers are. Exit status as of solve.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "cavort/mocap.h"
+#include "command.h"
+#include "csv.h"
+#include "file.h"
+#include "pressure.h"
+#include "result.h"
+
+/// Noise of a frame of one marker, m: errors of a centimetre, which skin and fit keep for about ten frames.
+static const double usual_sd = 0.03;
+
+/// A foot that slides so far over a step of half a second is one that the record does not tell from one that stands, s.
+static const double stance = 0.5;
+
+static const double step = 0.02; // s
+
+typedef struct tracked {
+  const cav_command_line *line;
+  char *folder, *fit, *problem, *result, *model; // folder/ik, folder/problem.xml, folder/result, of the fit
+  double first, from, to;                        // s: of the first frame, of the motion
+  double fit_rms;                                // m, over the motion
+} tracked;
+
+// NAME.track of dir/NAME.trc
+static char *default_folder(const char *clip) {
+  const char *slash = strrchr(clip, '/'), *name = slash ? slash + 1 : clip, *dot = strrchr(name, '.');
+  int n = dot ? (int)(dot - name) : (int)strlen(name);
+  char *folder = malloc((size_t)n + 7);
+  if (folder) sprintf(folder, "%.*s.track", n, name);
+  return folder;
+}
+
+static cav_status make_paths(tracked *t, cav_error *error) {
+  const cav_command_line *line = t->line;
+  t->folder = line->output ? strdup(line->output) : default_folder(line->operand);
+  if (t->folder) t->fit = cav_result_path(t->folder, "ik");
+  if (t->folder) t->problem = cav_result_path(t->folder, "problem.xml");
+  if (t->folder) t->result = cav_result_path(t->folder, "result");
+  if (t->fit) t->model = cav_result_path(t->fit, "model.xml");
+  if (t->model && access(t->model, F_OK) == 0) unlink(t->model);
+  if (!t->model || !t->problem || !t->result) return cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
+  return cav_result_folder(t->folder, error);
+}
+
+// the kinematic fit, and the model that it is of
+static int fit(tracked *t, cav_error *error) {
+  cav_command_line line = *t->line;
+  line.output = t->fit;
+  int done = cav_command_ik(&line);
+  if (done) return done;
+  if (access(t->model, F_OK) == 0) return 0;
+  free(t->model);
+  t->model = strdup(t->line->model);
+  if (t->model) return 0;
+  cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
+  return cav_command_fail(error);
+}
+
+// the time that is asked for, whole steps of it that the clip has
+static cav_status take_time(tracked *t, cav_error *error) {
+  cav_model *model = cav_model_load(t->model, error);
+  cav_marker_set *set = model ? cav_marker_set_read(t->line->markers, model, error) : NULL;
+  cav_record *record = set ? cav_record_read(t->line->operand, &set->clip, error) : NULL;
+  if (record) {
+    double last = record->time[record->nframe - 1];
+    t->first = record->time[0];
+    t->from = fmax(t->line->from_given ? t->line->from : t->first, t->first);
+    t->to = t->line->until > 0 ? fmin(t->line->until, last) : last;
+    t->to = t->from + floor((t->to - t->from) / step + 1e-6) * step;
+  }
+  cav_status status = record ? CAV_OK : error->status;
+  if (record && !(t->to - t->from > 2.5 * step))
+    status = cav_file_fail(error, CAV_BAD_INPUT, 0,
+                           "track: expected three steps of %g s at least between --from and --until; the clip lasts "
+                           "from %g to %g s",
+                           step, record->time[0], record->time[record->nframe - 1]);
+  cav_record_free(record);
+  cav_marker_set_free(set);
+  cav_model_free(model);
+  return status;
+}
+
+static void write_path(FILE *out, const char *name, const char *path) {
+  fprintf(out, " %s=\"", name);
+  cav_file_write_xml(out, path);
+  fputc('"', out);
+}
+
+static void write_text(FILE *out, const tracked *t, const char *model, const char *clip) {
+  fputs(
+      "<!-- The motion nearest to a record: written by cavort track; edit it and solve it again:\n"
+      "     cavort solve problem.xml -o result -->\n<problem name=\"track\"",
+      out);
+  write_path(out, "model", model);
+  fprintf(out, ">\n  <horizon duration=\"%.10g\" timestep=\"%g\" order=\"momentum\" close=\"open\"/>\n",
+          t->to - t->from, step);
+  fputs("  <start free=\"true\"/>\n", out);
+  fprintf(out, "  <guess file=\"ik/trajectory.csv\" offset=\"%.10g\"/>\n  <cost>\n    <track", t->from - t->first);
+  write_path(out, "file", clip);
+  fprintf(out, " markers=\"ik/markers.xml\" sd=\"%g\" offset=\"%.10g\"/>\n", usual_sd, t->from);
+  fputs(
+      "    <!-- nothing else is wanted of postures and velocities -->\n"
+      "    <posture weight=\"0\"/>\n    <velocity weight=\"0\"/>\n",
+      out);
+  fprintf(out,
+          "    <!-- contacts may slide as fast as the markers' noise hides over a step of %g s -->\n"
+          "    <slip weight=\"200\" within=\"%g\"/>\n  </cost>\n",
+          stance, usual_sd / stance);
+  fputs(
+      "  <!-- all of the actuators' strength: nothing is kept for feedback -->\n  <limits effort=\"1\"/>\n"
+      "  <!-- soles and floor yield by a millimetre or two, as a shoe does -->\n"
+      "  <schedule next_gap=\"exact\"><last softness=\"0.01\"/></schedule>\n</problem>\n",
+      out);
+}
+
+static cav_status write_problem(const tracked *t, cav_error *error) {
+  char *model = cav_result_seen_from(t->folder, t->model, 0, error);
+  char *clip = model ? cav_result_seen_from(t->folder, t->line->operand, 0, error) : NULL;
+  cav_file file;
+  cav_status status = clip ? cav_file_begin(&file, t->problem, error) : error->status;
+  if (!status) {
+    write_text(file.stream, t, model, clip);
+    status = cav_file_end(&file, error);
+  }
+  free(model), free(clip);
+  return status;
+}
+
+// ---------------------------------------------------------------- what became of it
+
+typedef struct residual {
+  int seen;
+  double square, worst; // m^2, m
+} residual;
+
+// distances of markers at the knots that see them
+static cav_status measure(const cav_problem *p, const cav_trajectory *motion, const cav_track *track, residual *r) {
+  const cav_model *m = p->model;
+  cav_state *state = cav_state_new(m);
+  cav_status status = state ? CAV_OK : CAV_NO_MEMORY;
+  for (int k = 0; k < motion->nknot && !status; k++) {
+    status = cav_position(m, state, motion->q + (size_t)k * (size_t)m->nq);
+    for (int i = 0; i < track->nchannel && !status; i++) {
+      const cav_channel *channel = &track->channel[i];
+      double seen[CAV_SENSOR_DIM_MAX], square = 0;
+      if (channel->kind != CAV_CHANNEL_MARKER ||
+          !cav_track_sample(track, channel, k * motion->timestep, motion->timestep, seen))
+        continue;
+      cav_pose pose;
+      cav_object_pose(m, state, CAV_OBJECT_XBODY, channel->object, &pose);
+      for (int a = 0; a < 3; a++) {
+        double x = pose.pos[a] - seen[a];
+        for (int b = 0; b < 3; b++) x += pose.rotation[3 * a + b] * channel->place[b];
+        square += x * x;
+      }
+      if (isnan(square)) continue;
+      r[i].seen++;
+      r[i].square += square;
+      r[i].worst = fmax(r[i].worst, sqrt(square));
+    }
+  }
+  cav_state_free(state);
+  return status;
+}
+
+static void write_residuals(FILE *out, const cav_model *m, const cav_track *track, const residual *r) {
+  fputs("marker,body,knots,rms_m,worst_m\n", out);
+  for (int i = 0; i < track->nchannel; i++) {
+    if (track->channel[i].kind != CAV_CHANNEL_MARKER) continue;
+    cav_table_write_text(out, track->channel[i].name);
+    fputc(',', out);
+    cav_table_write_text(out, m->body[track->channel[i].object].name);
+    fprintf(out, ",%d,", r[i].seen);
+    cav_table_write_number(out, sqrt(r[i].square / r[i].seen));
+    fputc(',', out);
+    cav_table_write_number(out, r[i].worst);
+    fputc('\n', out);
+  }
+}
+
+static double rms_of(const cav_track *track, const residual *r) {
+  double square = 0, n = 0;
+  for (int i = 0; i < track->nchannel; i++) square += r[i].square, n += r[i].seen;
+  return sqrt(square / n);
+}
+
+// the record of markers among the terms, NULL: there is none
+static const cav_track *record_of(const cav_problem *p) {
+  for (int i = 0; i < p->nterm; i++)
+    if (p->term[i].quantity == CAV_QUANTITY_TRACK && p->term[i].track->channel->kind == CAV_CHANNEL_MARKER)
+      return p->term[i].track;
+  return NULL;
+}
+
+// rms of the kinematic fit over the same knots, m; NaN: it cannot be told
+static double fit_rms(const tracked *t, const cav_problem *p, const cav_track *track, residual *r) {
+  cav_error ignored = {0};
+  char *path = cav_result_path(t->fit, "trajectory.csv");
+  cav_trajectory *fit = path ? cav_trajectory_read(path, p->model, &ignored) : NULL, *even = NULL, *same = NULL;
+  if (fit) even = cav_trajectory_resample(p->model, fit, p->timestep / 2);
+  int first = (int)lround((t->from - t->first) / (p->timestep / 2));
+  int knots = (int)lround(p->duration / p->timestep) + 1, fits = even && first + 2 * (knots - 1) < even->nknot;
+  if (fits) same = cav_trajectory_new(p->model, knots, p->timestep);
+  for (int k = 0; k < knots && same; k++)
+    memcpy(same->q + (size_t)k * (size_t)same->nq, even->q + (size_t)(first + 2 * k) * (size_t)same->nq,
+           (size_t)same->nq * sizeof *same->q);
+  memset(r, 0, (size_t)track->nchannel * sizeof *r);
+  double rms = same && !measure(p, same, track, r) ? rms_of(track, r) : NAN;
+  cav_trajectory_free(fit), cav_trajectory_free(even), cav_trajectory_free(same);
+  free(path);
+  return rms;
+}
+
+// markers.csv and cop.csv of the result
+static cav_status tell(const tracked *t, cav_error *error) {
+  cav_result *result = cav_result_read(t->result, NULL, error);
+  if (!result) return error->status;
+  const cav_problem *p = result->problem;
+  const cav_track *track = record_of(p);
+  residual *r = calloc(track ? (size_t)track->nchannel : 1, sizeof *r);
+  char *markers = cav_result_path(t->folder, "markers.csv"), *pressure = cav_result_path(t->folder, "cop.csv");
+  cav_forces *forces = cav_forces_new(p->model, result->trajectory, &p->contact, p->close_at_rest, error);
+  cav_status status = !forces ? error->status : r && markers && pressure ? CAV_OK : CAV_NO_MEMORY;
+  cav_file file;
+  if (!status) status = cav_pressure_write(pressure, p->model, result->trajectory, forces, error);
+  if (!status && track) {
+    status = measure(p, result->trajectory, track, r);
+    if (!status) status = cav_file_begin(&file, markers, error);
+    if (!status) {
+      write_residuals(file.stream, p->model, track, r);
+      status = cav_file_end(&file, error);
+    }
+    double rms = rms_of(track, r);
+    if (!status && !t->line->quiet)
+      printf("markers %.2f mm rms from the record, by kinematics alone %.2f mm\n", 1e3 * rms,
+             1e3 * fit_rms(t, p, track, r));
+  }
+  if (!status && !t->line->quiet) printf("wrote %s: problem.xml, result, cop.csv, markers.csv, ik\n", t->folder);
+  cav_forces_free(forces);
+  free(r), free(markers), free(pressure);
+  cav_result_free(result);
+  return status;
+}
+
+int cav_command_track(const cav_command_line *line) {
+  cav_error error = {0};
+  tracked t = {.line = line};
+  cav_status status = make_paths(&t, &error);
+  int done = status ? cav_command_fail(&error) : fit(&t, &error);
+  if (!done) {
+    status = take_time(&t, &error);
+    if (!status) status = write_problem(&t, &error);
+    if (status) done = cav_command_fail(&error);
+  }
+  if (!done) {
+    cav_command_line solve = *line;
+    solve.operand = t.problem;
+    solve.operands = (char *[]){t.problem};
+    solve.noperand = 1;
+    solve.model = NULL;
+    solve.output = t.result;
+    // the guess is the record: no other way is sought
+    if (!solve.strategies) solve.strategies = 1;
+    done = cav_command_solve(&solve);
+    if (done == CAV_EXIT_CERTIFIED || done == CAV_EXIT_NOT_CERTIFIED) status = tell(&t, &error);
+    if (status) done = cav_command_fail(&error);
+  }
+  free(t.folder), free(t.fit), free(t.problem), free(t.result), free(t.model);
+  return done;
+}
