@@ -379,7 +379,7 @@ static void test_refusals(const char *path) {
 }
 
 int main(void) {
-  static const char *const models[] = {"humanoid", "arm", "cheetah", "hopper", "quadruped", "robot", "walker"};
+  static const char *const models[] = {"humanoid", "gait", "arm", "cheetah", "hopper", "quadruped", "robot", "walker"};
   char path[300];
   CHECK(mkdtemp(folder) != NULL);
   for (size_t i = 0; i < sizeof models / sizeof *models; i++) {

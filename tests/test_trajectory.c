@@ -252,6 +252,29 @@ static void check_locale(const cav_model *model) {
   setlocale(LC_ALL, "C");
 }
 
+// waves of one frequency each: what is differenced, times the gain of both passes, 1/(1 + (tan(pi f h)/K)^4) with K =
+// tan of the corner's angle; at the cutoff of slow frames a half of the power
+static void check_accelerations(const cav_model *model) {
+  enum { KNOTS = 2000 };
+  static const double h = 0.005, cutoff = 6, frequency[] = {0.5, 2, 6, 15};
+  cav_trajectory *t = cav_trajectory_new(model, KNOTS, h);
+  double *a = malloc(KNOTS * (size_t)model->nv * sizeof *a), K = tan(M_PI * h * cutoff / pow(sqrt(2) - 1, 0.25));
+  for (int k = 0; k < KNOTS; k++)
+    for (int d = 0; d < model->nv; d++) t->v[k * model->nv + d] = sin(2 * M_PI * frequency[d % 4] * k * h + d);
+  CHECK(cav_trajectory_accelerations(t, cutoff, a) == CAV_OK);
+  for (int d = 0; d < 4; d++) {
+    double w = M_PI * frequency[d] * h, gain = 1 / (1 + pow(tan(w) / K, 4)), worst = 0;
+    for (int k = KNOTS / 4; k < 3 * KNOTS / 4; k++)
+      worst = fmax(worst, fabs(a[k * model->nv + d] - gain * 2 / h * sin(w) * cos(w * (2 * k + 1) + d)));
+    CHECK(worst < 1e-3 * gain * 2 / h * sin(w));
+    if (d == 2) CHECK_NEAR(gain, sqrt(0.5), 0.01);
+  }
+  CHECK(cav_trajectory_accelerations(t, 0, a) == CAV_BAD_INPUT &&
+        cav_trajectory_accelerations(t, 81, a) == CAV_BAD_INPUT);
+  free(a);
+  cav_trajectory_free(t);
+}
+
 int main(void) {
   CHECK(mkdtemp(folder) != NULL);
   snprintf(model_path, sizeof model_path, "%s/model.xml", folder);
@@ -263,6 +286,7 @@ int main(void) {
   if (model) {
     check_new(model);
     check_velocities(model);
+    check_accelerations(model);
     check_resample(model);
     check_smooth(model);
     check_round_trip(model);

@@ -73,8 +73,8 @@ typedef struct cav_marker_set {
 /// Reads a marker set: an XML file <markers> of elements <marker name= body= pos= weight=>. body is one of the model
 /// or a part that any body has ("right foot"); without pos the place is unknown and starts at the middle of the
 /// body's mass.
-/// <markers> has, where needed, adjust= (m), floor=, scale=, symmetric=, and what clips leave out: unit= (m), up= (x, y
-/// or z), rate= (1/s) and names= (by blanks).
+/// <markers> has, where needed, adjust= (m), floor=, scale=, symmetric=, and what clips leave out: unit= (m),
+/// up= (x, y or z), rate= (1/s) and names= (by blanks).
 /// NULL on failure with the reason in error (may be NULL): CAV_BAD_INPUT, CAV_NO_MEMORY. Freed by cav_marker_set_free.
 CAV_API cav_marker_set *cav_marker_set_read(const char *path, const cav_model *model, cav_error *error);
 CAV_API void cav_marker_set_free(cav_marker_set *set);

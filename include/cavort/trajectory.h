@@ -28,6 +28,11 @@ CAV_API void cav_trajectory_free(cav_trajectory *trajectory);
 /// v of knots 1 .. nknot-1 from q by differences; v of knot 0 stays.
 CAV_API void cav_trajectory_velocities(const cav_model *model, cav_trajectory *trajectory);
 
+/// Accelerations of a motion that was recorded, [nknot*nv], at its knots (the last as the one before): differences of its
+/// velocities without what is above cutoff, Hz, as markers shake. CAV_BAD_INPUT: cutoff not above 0, or not below 0.4 of the
+/// rate; CAV_NO_MEMORY.
+CAV_API cav_status cav_trajectory_accelerations(const cav_trajectory *trajectory, double cutoff, double *acceleration);
+
 /// The motion resampled at another step over the same duration. Through the knots, by cubics along the geodesics
 /// between them whose velocity at a knot is the mean of the steps before and after it; u is linear between knots.
 CAV_API cav_trajectory *cav_trajectory_resample(const cav_model *model, const cav_trajectory *trajectory,

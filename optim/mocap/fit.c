@@ -54,7 +54,7 @@ cav_status cav_fit_cost(const cav_fit *fit, int frame, const double *q, const do
   for (int f = 0; f < fit->nfoot; f++) {
     double x[CAV_FIT_CORNERS][3];
     for (int k = 0, n = cav_fit_floor_rows(fit, frame, f, x); k < n; k++)
-      *cost += fit->options->floor * x[k][2] * x[k][2] / 2;
+      *cost += fit->options->floor * pow(x[k][2], 2) / 2;
   }
   cav_difference(m, m->q0, q, 1, fit->move);
   for (int d = 0; d < m->nv; d++) *cost += pow(holds(fit, d) * fit->move[d], 2) / 2;

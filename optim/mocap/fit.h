@@ -4,7 +4,7 @@
 
 #include "cavort/mocap.h"
 
-enum { CAV_FIT_FEET = 6, CAV_FIT_CORNERS = 4 };
+enum { CAV_FIT_FEET = 12, CAV_FIT_CORNERS = 4 };
 
 /// A model, the markers that a clip and a set share, and the work of one fit.
 typedef struct cav_fit {

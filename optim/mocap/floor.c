@@ -13,6 +13,7 @@ static const double still = 0.25; // m/s
 static const double low = 0.06;   // m above the lowest place of a marker in the clip
 static const double bend = 1e-6;  // of a direction, for the point of a geom that is farthest along it
 static const double tilt = 0.1;   // of a floor along x and y that a corner of a sole would touch first
+static const double same = 0.03;  // of a body's height: parts of one foot are as low within it
 enum { FLAT = 2 };
 
 // how far a geom reaches along a direction of any length, times that
@@ -81,14 +82,42 @@ static int stand_of(const cav_fit *fit, int frame, int foot, const double *least
   return standing > 1 && standing == seen ? FLAT : standing > 0;
 }
 
-cav_status cav_fit_floor(cav_fit *fit) {
+// height of the lowest point of a body's shapes at the state's position; infinite: it has none
+static double height_of(const cav_fit *fit, int body) {
+  double point[3];
+  return farthest_point(fit, body, (const double[3]){0, 0, -1}, point) ? point[2] : INFINITY;
+}
+
+// a foot and, where it is the toes of one, what else of it is as low in the posture of the file
+static void add_foot(cav_fit *fit, int body, double tall) {
+  double toes = height_of(fit, body);
+  for (int b = body; b > 0 && fit->nfoot < CAV_FIT_FEET; b = fit->model->body[b].parent) {
+    if (b != body && !(fabs(height_of(fit, b) - toes) < same * tall)) return;
+    fit->foot[fit->nfoot++] = b;
+  }
+}
+
+// feet of a model, in the posture of the file
+static cav_status find_feet(cav_fit *fit) {
   static const cav_role feet[] = {CAV_ROLE_RIGHT_FOOT,      CAV_ROLE_LEFT_FOOT,       CAV_ROLE_FRONT_RIGHT_FOOT,
                                   CAV_ROLE_FRONT_LEFT_FOOT, CAV_ROLE_BACK_RIGHT_FOOT, CAV_ROLE_BACK_LEFT_FOOT};
+  const cav_model *m = fit->model;
   cav_roles roles;
-  cav_status status = cav_roles_find(fit->model, fit->state, &roles);
+  cav_status status = cav_roles_find(m, fit->state, &roles);
+  if (!status) status = cav_position(m, fit->state, m->q0);
+  double least = INFINITY, most = -INFINITY;
+  for (int b = 1; b < m->nbody && !status; b++) {
+    if (!m->body[b].link || !m->body[b].ngeom) continue;
+    least = fmin(least, height_of(fit, b)), most = fmax(most, height_of(fit, b));
+  }
+  for (size_t k = 0; k < sizeof feet / sizeof *feet && !status; k++)
+    if (roles.body[feet[k]] >= 0) add_foot(fit, roles.body[feet[k]], most - least);
+  return status;
+}
+
+cav_status cav_fit_floor(cav_fit *fit) {
+  cav_status status = find_feet(fit);
   if (status) return status;
-  for (size_t k = 0; k < sizeof feet / sizeof *feet; k++)
-    if (roles.body[feet[k]] >= 0) fit->foot[fit->nfoot++] = roles.body[feet[k]];
   fit->stands = calloc((size_t)fit->nframe * CAV_FIT_FEET, 1);
   double *least = malloc((size_t)fit->n * sizeof *least);
   for (int i = 0; i < fit->n && least; i++) least[i] = bottom(fit, i);

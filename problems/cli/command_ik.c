@@ -1,4 +1,4 @@
-/// cavort ik: a model fitted to a recorded clip. Writes a folder with trajectory.csv, markers.csv (residuals),
+/// cavort ik: a model fitted to a recorded clip. Writes a folder with trajectory.csv, acceleration.csv, markers.csv (residuals),
 /// markers.xml (the set with the places that were found), view.html and, where sizes or a mass are asked for, model.xml,
 /// the model as it was scaled. Exit status 0 if the fit was made.
 #include <math.h>
@@ -124,6 +124,43 @@ static cav_status write_residuals(const fit *f, cav_error *error) {
   return status;
 }
 
+// what a slower motion than markers shake accelerates by: a target for a solve
+static cav_status write_accelerations(const fit *f, cav_error *error) {
+  static const double cutoff = 6; // Hz, as force plates of gait are filtered
+  static const int nv[] = {[CAV_JOINT_FREE] = 6, [CAV_JOINT_BALL] = 3, [CAV_JOINT_SLIDE] = 1, [CAV_JOINT_HINGE] = 1};
+  const cav_model *m = f->model;
+  double rate = 1 / f->motion->timestep;
+  double *a = malloc((size_t)f->motion->nknot * (size_t)m->nv * sizeof *a + 1);
+  char *path = cav_result_path(f->folder, "acceleration.csv");
+  cav_file file;
+  cav_status status = a && path ? cav_trajectory_accelerations(f->motion, fmin(cutoff, rate / 5), a) : CAV_NO_MEMORY;
+  if (status) cav_file_fail(error, status, 0, "accelerations of the fit: %s", cav_status_name(status));
+  if (!status) status = cav_file_begin(&file, path, error);
+  if (!status) {
+    fputs("time", file.stream);
+    for (int j = 0; j < m->njoint; j++)
+      for (int k = 0; k < nv[m->joint[j].type]; k++) {
+        char name[300], part[16] = "";
+        if (nv[m->joint[j].type] > 1) snprintf(part, sizeof part, "_%d", k);
+        snprintf(name, sizeof name, "qacc_%.250s%s", m->joint[j].name, part);
+        fputc(',', file.stream);
+        cav_table_write_text(file.stream, name);
+      }
+    for (int t = 0; t < f->motion->nknot; t++) {
+      fputc('\n', file.stream);
+      cav_table_write_number(file.stream, t * f->motion->timestep);
+      for (int d = 0; d < m->nv; d++) {
+        fputc(',', file.stream);
+        cav_table_write_number(file.stream, a[(size_t)t * (size_t)m->nv + (size_t)d]);
+      }
+    }
+    fputc('\n', file.stream);
+    status = cav_file_end(&file, error);
+  }
+  free(a), free(path);
+  return status;
+}
+
 static cav_status write_page(const fit *f, cav_error *error) {
   char title[340], markers[80], rms[80], clip[200];
   double *millimetres = malloc((size_t)f->motion->nknot * sizeof *millimetres);
@@ -166,6 +203,7 @@ static cav_status write_all(const fit *f, cav_error *error) {
   if (!status) status = cav_trajectory_write(motion, f->model, f->motion, error);
   if (!status) status = cav_marker_set_write(set, f->model, f->set, error);
   if (!status) status = write_residuals(f, error);
+  if (!status) status = write_accelerations(f, error);
   if (!status) status = write_page(f, error);
   free(motion);
   free(set);
@@ -202,7 +240,7 @@ static void print(const fit *f) {
   if (absent) printf("%d markers of the set are not in the clip\n", absent);
   printf("%d frames, %d markers, rms %.2f mm, %.2f s (%.2f s a thousand frames)\n", r->nframe, r->nmarker,
          1e3 * r->total_rms, f->seconds, 1e3 * f->seconds / r->nframe);
-  printf("wrote %s: trajectory.csv, markers.csv, markers.xml, view.html%s\n", f->folder,
+  printf("wrote %s: trajectory.csv, acceleration.csv, markers.csv, markers.xml, view.html%s\n", f->folder,
          f->factor || f->line->mass > 0 ? ", model.xml" : "");
 }
 

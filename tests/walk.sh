@@ -1,0 +1,47 @@
+#!/bin/sh
+# A recorded walk (OpenSim's example, markers at 100 Hz) to forces, beside what force plates measured of it, and beside what
+# kinematics alone give with the plates' event times. Usage: sh tests/walk.sh BUILD [DATA]
+# DATA (default ../shared/data) has walk/: markers_walk.trc, grf_walk.mot. Weights were tuned on the first window of time; the
+# second checks them, the third is all that plates saw. Curves for gnuplot are left in BUILD/walk. Plates are read by
+# this script alone: the solves see markers and the subject's mass.
+set -eu
+build=${1:?usage: sh tests/walk.sh BUILD [DATA]}
+data=${2:-../shared/data}/walk
+mass=85.3 # kg, of the subject
+[ -d "$data" ] || { echo "walk: $data is not here"; exit 77; }
+data=$(cd "$data" && pwd)
+mkdir -p "$build/walk"
+work=$(cd "$build/walk" && pwd)
+tool=$build/problems/cavort
+
+"$tool" ik "$data/markers_walk.trc" --model problems/models/gait.xml --markers problems/markers/gait.xml --scale --mass $mass \
+  -o "$work/fit" | sed -n '/^segment/,/^model/p; /^[0-9]* frames/p'
+
+# columns FIRST to LAST of the fit's accelerations, over a motion
+columns() {
+  awk -F, -v first="$1" -v last="$2" -v offset="$offset" -v duration="$duration" '
+    NR == 1 || ($1 >= offset - 1e-6 && $1 <= offset + duration + 1e-6) {
+      printf "%s", NR == 1 ? $1 : $1 - offset
+      for (i = first; i <= (last ? last : NF); i++) printf ",%s", $i
+      print ""
+    }' "$work/fit/acceleration.csv"
+}
+
+stride() {
+  offset=$2 duration=$3
+  columns 2 4 >"$work/root_linear.csv"
+  columns 5 7 >"$work/root_angular.csv"
+  columns 8 0 >"$work/joints.csv"
+  sed "s|FIT|$work/fit|; s|WORK|$work|; s|CLIP|$data/markers_walk.trc|; s|OFFSET|$offset|; s|DURATION|$3|" tests/walk/problem.xml \
+    >"$work/$1.xml"
+  "$tool" solve "$work/$1.xml" -o "$work/$1" --threads 1 --strategies 1 -q || true
+  printf '\n%s: %s s from %s s on\n' "$1" "$3" "$offset"
+  sed -n 's/^  "certified": \(.*\),$/certified: \1/p; s/^  "reason": "\(..*\)",$/  \1/p; s/^  "solve_seconds": \([0-9]*\.[0-9]\).*/solved in \1 s/p' \
+    "$work/$1/verdict.json"
+  "$build/tests/walk_compare" "$work/fit/model.xml" "$work/fit/markers.xml" "$data/markers_walk.trc" "$work/fit/trajectory.csv" "$work/$1" \
+    "$data/grf_walk.mot" "$offset" "$work/$1.dat"
+}
+
+stride tuned 0.5 0.9
+stride checked 1.05 0.95
+stride whole 0.15 2.1
