@@ -67,6 +67,11 @@ CAV_API cav_status cav_result_write_forces(const char *folder, const cav_problem
                                            const cav_trajectory *trajectory, const cav_options *contact,
                                            cav_error *error);
 
+/// Writes stderr.csv: time, then standard errors of the tangent at q (q_JOINT, with _0, _1, ... where a joint has several dofs),
+/// of velocities (qvel_), generalised forces (u_) and actuators (force_NAME); empty where there are no forces. Errors as above.
+CAV_API cav_status cav_result_write_errors(const char *folder, const cav_model *model, const cav_trajectory *trajectory,
+                                           const cav_standard_errors *errors, cav_error *error);
+
 /// Reads a folder; model_path replaces the model that problem.xml names, NULL: as it says. NULL on failure with the
 /// reason in error: CAV_BAD_INPUT with file and line, CAV_NO_MEMORY. Freed with cav_result_free.
 CAV_API cav_result *cav_result_read(const char *folder, const char *model_path, cav_error *error);

@@ -243,6 +243,29 @@ CAV_API void cav_solution_free(cav_solution *solution);
 /// The trajectory that a solve starts from: the problem's guess, without forces. NULL with the reason in error.
 CAV_API cav_trajectory *cav_problem_guess(const cav_problem *problem, cav_error *error);
 
+/// Standard errors of a motion that is estimated: roots of the diagonal of the covariance that the cost has as the
+/// negative logarithm of a likelihood, to second order (Gauss and Newton's) about the motion. A weight w over a window
+/// is then a measurement of variance scale^2/(w timestep) at each knot, one at a time of variance scale^2/w.
+/// Constraints and forces that no actuator can give hold exactly, bounds that hold something back too. Rows are knots;
+/// NaN: no forces there.
+typedef struct cav_standard_errors {
+  int nknot, nq, nv, nu; ///< sizes of the motion
+  double *q;             ///< [nknot*nv] of the tangent at q, rad or m; 0 at a start that is given
+  double *v;             ///< [nknot*nv] rad/s or m/s
+  double *u;             ///< [nknot*nv] N m or N; of dofs of roots: of their residual forces
+  double *force;         ///< [nknot*nu] of actuators, before the gear, as in controls.csv
+  double *covariance;    ///< [nknot*nv*nv] of the tangent at each q, row-major
+} cav_standard_errors;
+
+/// At a motion under the law contact, with the bindings of its solution (or of a result folder). Takes the time of a
+/// few iterations. CAV_NOT_SUPPORTED: a free duration; CAV_NOT_CONVERGED: an unknown of which neither costs nor
+/// dynamics tell anything; else as cav_solve. NULL in *errors on failure. optim/solver/standard_errors.c.
+CAV_API cav_status cav_standard_errors_find(const cav_problem *problem, const cav_trajectory *motion,
+                                            const cav_options *contact, int nrow, const cav_binding *row,
+                                            cav_standard_errors **errors, cav_error *error);
+/// Frees them; NULL is fine.
+CAV_API void cav_standard_errors_free(cav_standard_errors *errors);
+
 /// A solver that is made once, for one problem, and keeps its memory, motion and multipliers between solves: for
 /// problems whose weights and targets change a little, and for planning while moving (shift, iterate). It reads the
 /// problem's terms anew at every call: their weights, targets and scales may be changed in place, not their number,

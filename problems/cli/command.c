@@ -1,5 +1,6 @@
 /// What several commands do: read a model or a problem, warn, tell an error and the exit status that goes with it.
 #include "command.h"
+#include "cavort/result.h"
 #include "periodicity.h"
 
 #include <math.h>
@@ -105,4 +106,14 @@ int cav_command_fail(const cav_error *error) {
     default:
       return CAV_EXIT_INTERNAL;
   }
+}
+
+void cav_command_write_errors(const char *folder, const cav_problem *problem, const cav_trajectory *trajectory,
+                              const cav_options *contact, int nrow, const cav_binding *row) {
+  cav_error error = {0};
+  cav_standard_errors *errors = NULL;
+  cav_status status = cav_standard_errors_find(problem, trajectory, contact, nrow, row, &errors, &error);
+  if (!status) status = cav_result_write_errors(folder, problem->model, trajectory, errors, &error);
+  if (status) fprintf(stderr, "cavort: no stderr.csv: %s\n", error.text);
+  cav_standard_errors_free(errors);
 }

@@ -45,6 +45,7 @@ typedef struct cav_command_line {
   int threads_given;   ///< 1: threads are asked for
   int jobs;            ///< -j: problems at once, 0: as many as processors
   int csv;             ///< --csv
+  int errors;          ///< --errors
   int nset;            ///< --set, any number of times
   char *set[CAV_COMMAND_SETTINGS];
   double duration;            ///< --duration, s; 0: by the pushes
@@ -65,6 +66,10 @@ typedef struct cav_command_scene {
 /// Reads the operand, a model or a problem, told apart by the first element, with --model and --floating. command.c.
 cav_status cav_command_load(const cav_command_line *line, cav_command_scene *scene, cav_error *error);
 void cav_command_free(cav_command_scene *scene);
+
+/// Writes stderr.csv of a motion into its folder; says why where it cannot. command.c.
+void cav_command_write_errors(const char *folder, const cav_problem *problem, const cav_trajectory *trajectory,
+                              const cav_options *contact, int nrow, const cav_binding *row);
 
 /// Name of the first element of a file, "" if there is none in its first part. command.c.
 void cav_command_first_element(const char *path, char name[32]);

@@ -220,6 +220,9 @@ static int save(void *context, const cav_problem *problem, const cav_solution *s
   cav_status status = terms && origin ? cav_result_write(to->folder, problem, solution, &error) : CAV_NO_MEMORY;
   if (!status) status = cav_terms_report(problem, solution->trajectory, &solution->contact, terms, NULL, &error);
   if (!status) status = cav_result_write_verdict(to->folder, problem, verdict, terms, origin, &error);
+  if (!status && line->errors && !stopped)
+    cav_command_write_errors(to->folder, problem, solution->trajectory, &solution->contact, solution->nrow,
+                             solution->row);
   if (!status && line->json) cav_certificate_json(stdout, problem, verdict, terms, origin);
   if (!status && !line->quiet && !line->json && !stopped) cav_certificate_print(stdout, problem, verdict, terms);
   free(terms), free(origin);

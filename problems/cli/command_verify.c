@@ -1,5 +1,5 @@
-/// cavort verify and cavort view: what a result folder holds, certified again or shown. verify writes nothing; view
-/// writes forces.csv, controls.csv and view.html, or one page of two folders.
+/// cavort verify and cavort view: what a result folder holds, certified again or shown. verify writes nothing but
+/// stderr.csv where that is asked for; view writes forces.csv, controls.csv and view.html, or one page of two folders.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -31,6 +31,9 @@ int cav_command_verify(const cav_command_line *line) {
   cav_term_report *terms = status ? NULL : calloc((size_t)result->problem->nterm + 1, sizeof *terms);
   if (terms)
     status = cav_terms_report(result->problem, result->trajectory, &result->problem->contact, terms, NULL, &error);
+  if (!status && line->errors)
+    cav_command_write_errors(line->operand, result->problem, result->trajectory, &result->problem->contact,
+                             result->nrow, result->row);
   if (!status && line->json) cav_certificate_json(stdout, result->problem, &verdict, terms, NULL);
   if (!status && !line->json && !line->quiet) cav_certificate_print(stdout, result->problem, &verdict, terms);
   free(terms);

@@ -34,9 +34,10 @@ enum option {
   OPTION_SET = 262144,
   OPTION_CSV = 524288,
   OPTION_LIKE = 1048576,
-  OPTION_CONTROL = 33554432,
   OPTION_FROM = 2097152,
   OPTION_UNTIL = 4194304,
+  OPTION_CONTROL = 33554432,
+  OPTION_ERRORS = 67108864,
   OPTION_SCALE = 134217728,
   OPTION_MASS = 268435456
 };
@@ -85,6 +86,8 @@ static const cav_manual_option options[] = {
     {OPTION_SET, "--set", NULL, "PATH=VALUE",
      "an attribute of the problem, as cost/apex/@target=0.4: elements by their name or tag; with several values "
      "(=0.2,0.3,0.4) each is solved, of several --set all combinations"},
+    {OPTION_ERRORS, "--errors", NULL, NULL,
+     "write stderr.csv: standard errors of what was estimated, with costs as likelihoods"},
     {OPTION_CSV, "--csv", NULL, NULL, "print as CSV"},
     {OPTION_LIKE, "--like", NULL, "MOTION",
      "as this motion of the project asks, or this problem file, where the model has what it names"},
@@ -121,12 +124,12 @@ static const cav_manual_command commands[] = {
      "  one each into DIR (default batch), what is there already not again",
      cav_command_solve,
      OPTION_JOBS | OPTION_SET | OPTION_MODEL | OPTION_OUTPUT | OPTION_SOLVER | OPTION_IPOPT | OPTION_THREADS |
-         OPTION_STRATEGIES | OPTION_RESUME | OPTION_FORCE | OPTION_QUIET | OPTION_JSON},
+         OPTION_STRATEGIES | OPTION_RESUME | OPTION_FORCE | OPTION_ERRORS | OPTION_QUIET | OPTION_JSON},
     {"table", "DIR...",
      "a line for each result folder, or each problem of a batch: what became of it, and the first cause",
      cav_command_table, OPTION_CSV},
     {"verify", "DIR", "certify the motion of a result folder again, from its files alone", cav_command_verify,
-     OPTION_MODEL | OPTION_QUIET | OPTION_JSON},
+     OPTION_MODEL | OPTION_ERRORS | OPTION_QUIET | OPTION_JSON},
     {"explain", "DIR", "say why the motion of a result folder is as it is: what it misses, and which constraints pull",
      cav_command_explain, OPTION_MODEL | OPTION_ALL | OPTION_JSON},
     {"view", "DIR|PROBLEM [DIR...]",
@@ -393,6 +396,8 @@ static int take_value(cav_command_line *line, enum option option, const char *na
       fprintf(stderr, "cavort: --set: expected at most %d of them; write them into the problem\n",
               CAV_COMMAND_SETTINGS);
       return 0;
+    case OPTION_ERRORS:
+      return line->errors = 1;
     case OPTION_CSV:
       return line->csv = 1;
     case OPTION_LIKE:
