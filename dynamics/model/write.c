@@ -124,7 +124,6 @@ static void write_geom(const writer *w, const cav_geom *g) {
   put_one(w, at, "priority", g->priority, 0);
   put_one(w, at, "solmix", g->solmix, 1);
   put_one(w, at, "margin", g->margin, 0);
-  put_one(w, at, "gap", g->gap, 0);
   put_one(w, at, "group", g->group, 0);
   put(w, at, "rgba", rgba, grey, 4);
   if (!g->fluid) return;

@@ -408,9 +408,10 @@ typedef struct cav_verdict {
   int unactuated_force_knot;   ///< knot of the largest one
   double momentum_defect_rms;  ///< fraction of weight
   /// Of forces on roots that the problem penalises (cav_residual), of the tree that has most at a knot: root mean square and
-  /// largest; largest of all as a fraction of the weight, and what the problem allows. NaN: there are none.
+  /// largest. NaN: there are none.
   double residual_force_rms_n, residual_force_max_n, residual_torque_rms_n_m, residual_torque_max_n_m;
-  double residual_fraction_max, residual_within;
+  double residual_fraction_max;                    ///< largest of all of these, fraction of the weight
+  double residual_within;                          ///< what the problem allows of that
   double limit_violation_max;                      ///< relative to the limit (effort), rad or m (range)
   double constraint_violation_max;                 ///< of the problem's hard terms, scaled
   double penetration_max_m, penetration_between_m; ///< at the knots; along the steps between them
