@@ -56,7 +56,8 @@ typedef struct cav_marker {
   int body;        ///< of the model
   double place[3]; ///< m, in the body's frame
   int placed;      ///< 1: place is known; 0: it is where a search for it starts
-  double weight;   ///< 1/m^2 relative to other markers, >= 0
+  char *from;    ///< where the clip is scaled: names of markers, by blanks, from whose mean it is measured; NULL: none
+  double weight; ///< 1/m^2 relative to other markers, >= 0
 } cav_marker;
 
 /// Which markers a subject or a robot wears, and how their clips are to be read.
@@ -67,6 +68,8 @@ typedef struct cav_marker_set {
   int floor;               ///< 1: feet that stand do so on the plane z = 0
   double scale;            ///< how far off sizes of segments may be, of the body's: for cav_ik_sizes; 0: they are right
   int symmetric;           ///< 1: segments of both sides are of one size
+  int retarget;            ///< 1: clips are of a body of other size and scaled to the model's
+  int left_out;            ///< markers of the file on parts that the model does not have
   cav_record_options clip; ///< for cav_record_read; names is memory of the set
 } cav_marker_set;
 
@@ -104,6 +107,7 @@ typedef struct cav_ik_report {
   int *seen;           ///< [nmarker] frames that have it
   double *frame_rms;   ///< [nframe] over the markers seen; NaN: none was
   double total_rms;    ///< over all
+  double scale;        ///< of ways in the world, where the clip was scaled; 0: it was not
   int iterations;      ///< in all
 } cav_ik_report;
 
@@ -131,6 +135,42 @@ CAV_API cav_status cav_ik(const cav_model *model, const cav_record *record, cav_
 /// constraints of bodies; CAV_NO_MEMORY, CAV_NOT_FINITE: do not use the model. optim/METHOD.md, 11.
 CAV_API cav_status cav_ik_sizes(cav_model *model, const cav_record *record, cav_marker_set *set,
                                 const cav_ik_options *options, double *factor, double *deviation, cav_error *error);
+/// Measures of a motion's quality, X(name, unit, bar, text): what is good at most, NaN: none.
+#define CAV_QUALITIES(X)                                                                                    \
+  X(penetration, "mm", 10, "deepest of a body in what it is not jointed to the model with (the floor)")     \
+  X(penetration_fraction, "%", 0, "knots with more than 10 mm of it")                                       \
+  X(self_penetration, "mm", NAN, "deepest of two bodies of one tree in each other")                         \
+  X(skating, "cm/s", NAN, "fastest slide of a contact, within 5 mm at both ends of a step")                 \
+  X(skating_fraction, "%", 0, "steps in contact with a slide of more than 1 cm/s")                          \
+  X(floating, "mm", 20, "highest above all, while the centre of mass moves as if more than g/2 were borne") \
+  X(floating_fraction, "%", 0, "knots more than 20 mm above all meanwhile")                                 \
+  X(jerk, "m/s^3", NAN, "of the centres of mass of links, rms")                                             \
+  X(torque_excess, "%", 0, "most that an actuator is asked for beyond its limit, over that limit")          \
+  X(torque_excess_fraction, "%", 0, "knots that ask for more than a limit")                                 \
+  X(residual, "%", NAN, "force that neither contacts nor actuators can give, rms, over the weight")         \
+  X(residual_worst, "%", NAN, "the same, at most")
+
+/// How good a motion is, whatever made it. Lengths of knots with data at both sides only; see CAV_QUALITIES.
+typedef struct cav_quality {
+#define CAV_QUALITY_MEMBER(name, ...) double name;
+  CAV_QUALITIES(CAV_QUALITY_MEMBER)
+#undef CAV_QUALITY_MEMBER
+} cav_quality;
+
+/// Table of cav_quality: names, units, bars and texts follow from CAV_QUALITIES.
+typedef struct cav_quality_rule {
+  const char *name, *unit; ///< as in CAV_QUALITIES
+  double bar;              ///< NaN: none
+  const char *text;        ///< what it measures
+  size_t offset;           ///< of the member in cav_quality
+} cav_quality_rule;
+CAV_API const cav_quality_rule *cav_quality_rules(int *n);
+
+/// Measures a motion of at least four knots from its configurations alone. law: of the step (order, gravity, passive
+/// forces), NULL: the model's. Contact forces are those within 5 mm that leave the least residual, and of these the least
+/// efforts. optim/METHOD.md, 13. CAV_BAD_INPUT, CAV_NO_MEMORY, CAV_NOT_FINITE with the reason in error.
+CAV_API cav_status cav_quality_measure(const cav_model *model, const cav_trajectory *motion, const cav_options *law,
+                                       cav_quality *quality, cav_error *error);
 
 #ifdef __cplusplus
 }

@@ -27,6 +27,11 @@ void cav_fit_column(const cav_fit *fit, int d, const double point[3], double col
   velocity_at(column, axis, fit->state->reference + 3 * fit->model->dof[d].link, point);
 }
 
+double cav_fit_weight(const cav_fit *fit, int frame, int i) {
+  double weight = fit->set->marker[fit->marker[i]].weight;
+  return fit->planted && fit->planted[(size_t)frame * (size_t)fit->n + (size_t)i] ? fit->firm * weight : weight;
+}
+
 int cav_fit_last_dof(const cav_model *m, int body) {
   int link = m->body[body].link;
   while (link > 0 && m->link[link].ndof == 0) link = m->link[link].parent;
@@ -49,12 +54,11 @@ cav_status cav_fit_cost(const cav_fit *fit, int frame, const double *q, const do
     if (!seen) continue;
     cav_fit_place(fit, i, x);
     sub3(x, x, seen);
-    *cost += fit->set->marker[fit->marker[i]].weight * dot3(x, x) / 2;
+    *cost += cav_fit_weight(fit, frame, i) * dot3(x, x) / 2;
   }
   for (int f = 0; f < fit->nfoot; f++) {
-    double x[CAV_FIT_CORNERS][3];
-    for (int k = 0, n = cav_fit_floor_rows(fit, frame, f, x); k < n; k++)
-      *cost += fit->options->floor * pow(x[k][2], 2) / 2;
+    int rows = cav_fit_floor_rows(fit, frame, f);
+    for (int k = 0; k < rows; k++) *cost += fit->firm * fit->options->floor * pow(fit->point[3 * k + 2], 2) / 2;
   }
   cav_difference(m, m->q0, q, 1, fit->move);
   for (int d = 0; d < m->nv; d++) *cost += pow(holds(fit, d) * fit->move[d], 2) / 2;
@@ -69,24 +73,24 @@ static void add_marker(const cav_fit *fit, int frame, int i) {
   const cav_model *m = fit->model;
   const cav_marker *marker = &fit->set->marker[fit->marker[i]];
   const double *seen = cav_fit_seen(fit, frame, i);
-  double x[3], off[3], a[3], b[3];
+  double x[3], off[3], a[3], b[3], w = cav_fit_weight(fit, frame, i);
   if (!seen) return;
   cav_fit_place(fit, i, x);
   sub3(off, x, seen);
   for (int d = cav_fit_last_dof(m, marker->body); d >= 0; d = m->dof[d].parent) {
     cav_fit_column(fit, d, x, a);
-    fit->g[d] += marker->weight * dot3(a, off);
+    fit->g[d] += w * dot3(a, off);
     for (int e = d; e >= 0; e = m->dof[e].parent) {
       cav_fit_column(fit, e, x, b);
-      fit->H[(size_t)e * (size_t)m->nv + (size_t)d] += marker->weight * dot3(a, b);
+      fit->H[(size_t)e * (size_t)m->nv + (size_t)d] += w * dot3(a, b);
     }
   }
 }
 
 // the height of a point of a foot
-static void add_foot(const cav_fit *fit, int f, const double x[3]) {
+static void add_height(const cav_fit *fit, int f, const double x[3]) {
   const cav_model *m = fit->model;
-  double a[3], b[3], w = fit->options->floor;
+  double a[3], b[3], w = fit->firm * fit->options->floor;
   for (int d = cav_fit_last_dof(m, fit->foot[f]); d >= 0; d = m->dof[d].parent) {
     cav_fit_column(fit, d, x, a);
     fit->g[d] += w * a[2] * x[2];
@@ -104,8 +108,8 @@ void cav_fit_normal(const cav_fit *fit, int frame, const double *q, const double
   memset(fit->g, 0, nv * sizeof *fit->g);
   for (int i = 0; i < fit->n; i++) add_marker(fit, frame, i);
   for (int f = 0; f < fit->nfoot; f++) {
-    double x[CAV_FIT_CORNERS][3];
-    for (int k = 0, rows = cav_fit_floor_rows(fit, frame, f, x); k < rows; k++) add_foot(fit, f, x[k]);
+    int rows = cav_fit_floor_rows(fit, frame, f);
+    for (int k = 0; k < rows; k++) add_height(fit, f, fit->point + 3 * k);
   }
   cav_difference(m, m->q0, q, 1, fit->move);
   for (size_t d = 0; d < nv; d++) {

@@ -4,7 +4,7 @@
 
 #include "cavort/mocap.h"
 
-enum { CAV_FIT_FEET = 12, CAV_FIT_CORNERS = 4 };
+enum { CAV_FIT_FEET = 12, CAV_FIT_POINTS = 8, CAV_FIT_CORNERS = 4 };
 
 /// A model, the markers that a clip and a set share, and the work of one fit.
 typedef struct cav_fit {
@@ -19,6 +19,9 @@ typedef struct cav_fit {
   const double *position;        ///< [nframe*nmarker*3]
   int nfoot, foot[CAV_FIT_FEET]; ///< bodies
   char *stands;                  ///< [nframe*CAV_FIT_FEET] 1: that foot stands, 2: on all of its sole
+  double *point;                 ///< [CAV_FIT_POINTS * geoms of a foot + CAV_FIT_CORNERS][3] of its rows
+  char *planted;                 ///< [nframe*n] 1: that marker of a foot is held where it is; NULL: none is
+  double firm;                   ///< times the weight of markers that are planted, and of feet on the floor
   double *H, *g, *try, *move;    ///< [nv*nv] lower, by columns; [nv]; [nq]; [nv]
 } cav_fit;
 
@@ -43,11 +46,32 @@ int cav_fit_last_dof(const cav_model *model, int body);
 /// Jacobian column of a point of a link by dof d, which is of the link or of one before it.
 void cav_fit_column(const cav_fit *fit, int d, const double point[3], double column[3]);
 
-/// Finds feet and when they stand. floor.c.
+/// Weight of marker i of the fit at a frame.
+double cav_fit_weight(const cav_fit *fit, int frame, int i);
+
+/// Finds the feet of the model, once. floor.c.
+cav_status cav_fit_feet(cav_fit *fit);
+
+/// Whether a marker of a foot stands at a frame: seen, so many times slower than what is still, and near least, the
+/// lowest that it comes. floor.c.
+int cav_fit_stands(const cav_fit *fit, int frame, int i, double least, double times);
+
+/// Lowest height that marker i of the fit comes to. floor.c.
+double cav_fit_bottom(const cav_fit *fit, int i);
+
+/// Finds when the feet stand. floor.c.
 cav_status cav_fit_floor(cav_fit *fit);
 
-/// Rows of foot f at a frame: points of it whose heights they are. Returns how many. floor.c.
-int cav_fit_floor_rows(const cav_fit *fit, int frame, int f, double point[CAV_FIT_CORNERS][3]);
+/// Lowest point of a body's geoms at the state's position; zero: it has none. floor.c.
+int cav_fit_lowest(const cav_fit *fit, int body, double point[3]);
+
+/// The clip of another body, scaled to the model's: made [nframe*nmarker*3] takes the place of fit->position. scale: of
+/// ways in the world. retarget.c.
+cav_status cav_fit_retarget(cav_fit *fit, double **made, double *scale, cav_error *error);
+
+/// Rows of foot f at a frame, each the height of a point, into fit->point: four corners of a sole that stands; else every end
+/// or corner that is below the floor, or the lowest point of a foot that stands above it. Returns how many. floor.c.
+int cav_fit_floor_rows(const cav_fit *fit, int frame, int f);
 
 /// Half the squares of all rows at q: markers seen, feet, posture, and the change from before (NULL: none). Leaves the
 /// state at q.

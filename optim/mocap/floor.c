@@ -23,8 +23,8 @@ static double reach_along(const cav_geom *geom, const cav_pose *pose, const doub
   return length * cav_geom_reach(geom, pose, unit);
 }
 
-// the point of a body's geoms that is farthest along a direction n, not of unit length, at the state's position; zero: it
-// has none. By the reach of its farthest geom, whose derivative by n that point is
+// where the floor is touched by the part of a body's geoms that is farthest along a direction n, not of unit length, at the
+// state's position; zero: it has none. By the reach of its farthest geom, whose derivative by n is a point of that
 static int farthest_point(const cav_fit *fit, int body, const double n[3], double point[3]) {
   const cav_model *m = fit->model;
   double most = -INFINITY;
@@ -47,7 +47,17 @@ static int farthest_point(const cav_fit *fit, int body, const double n[3], doubl
     }
     point[k] = pose.pos[k] + (reach[1] - reach[0]) / (2 * bend);
   }
+  // a ball at the end of a capsule or alone touches the floor straight below its middle
+  const cav_geom *geom = &m->geom[farthest];
+  if (geom->type == CAV_GEOM_SPHERE || geom->type == CAV_GEOM_CAPSULE) {
+    axpy3(point, point, -geom->size[0] / norm3(n), n);
+    point[2] -= geom->size[0];
+  }
   return 1;
+}
+
+int cav_fit_lowest(const cav_fit *fit, int body, double point[3]) {
+  return farthest_point(fit, body, (const double[3]){0, 0, -1}, point);
 }
 
 // m/s of a marker of the fit at a frame; infinite where it is not seen on both sides
@@ -60,8 +70,7 @@ static double speed(const cav_fit *fit, int frame, int i) {
   return norm3(way) / ((b - a) * fit->step);
 }
 
-// lowest that a marker comes
-static double bottom(const cav_fit *fit, int i) {
+double cav_fit_bottom(const cav_fit *fit, int i) {
   double least = INFINITY;
   for (int t = 0; t < fit->nframe; t++) {
     const double *seen = cav_fit_seen(fit, t, i);
@@ -70,14 +79,18 @@ static double bottom(const cav_fit *fit, int i) {
   return least;
 }
 
+int cav_fit_stands(const cav_fit *fit, int frame, int i, double least, double times) {
+  const double *seen = cav_fit_seen(fit, frame, i);
+  return seen && speed(fit, frame, i) < times * still && seen[2] < least + low;
+}
+
 // how a foot stands at a frame, by its markers
 static int stand_of(const cav_fit *fit, int frame, int foot, const double *least) {
   int seen = 0, standing = 0;
   for (int i = 0; i < fit->n; i++) {
     if (fit->set->marker[fit->marker[i]].body != fit->foot[foot]) continue;
-    const double *at = cav_fit_seen(fit, frame, i);
     seen++;
-    standing += at && speed(fit, frame, i) < still && at[2] < least[i] + low;
+    standing += cav_fit_stands(fit, frame, i, least[i], 1);
   }
   return standing > 1 && standing == seen ? FLAT : standing > 0;
 }
@@ -85,7 +98,7 @@ static int stand_of(const cav_fit *fit, int frame, int foot, const double *least
 // height of the lowest point of a body's shapes at the state's position; infinite: it has none
 static double height_of(const cav_fit *fit, int body) {
   double point[3];
-  return farthest_point(fit, body, (const double[3]){0, 0, -1}, point) ? point[2] : INFINITY;
+  return cav_fit_lowest(fit, body, point) ? point[2] : INFINITY;
 }
 
 // a foot and, where it is the toes of one, what else of it is as low in the posture of the file
@@ -115,12 +128,23 @@ static cav_status find_feet(cav_fit *fit) {
   return status;
 }
 
-cav_status cav_fit_floor(cav_fit *fit) {
+cav_status cav_fit_feet(cav_fit *fit) {
+  if (fit->point) return CAV_OK;
   cav_status status = find_feet(fit);
+  if (status) return status;
+  int most = 0;
+  for (int f = 0; f < fit->nfoot; f++)
+    if (fit->model->body[fit->foot[f]].ngeom > most) most = fit->model->body[fit->foot[f]].ngeom;
+  fit->point = malloc(3 * ((size_t)most * CAV_FIT_POINTS + CAV_FIT_CORNERS) * sizeof *fit->point);
+  return fit->point ? CAV_OK : CAV_NO_MEMORY;
+}
+
+cav_status cav_fit_floor(cav_fit *fit) {
+  cav_status status = cav_fit_feet(fit);
   if (status) return status;
   fit->stands = calloc((size_t)fit->nframe * CAV_FIT_FEET, 1);
   double *least = malloc((size_t)fit->n * sizeof *least);
-  for (int i = 0; i < fit->n && least; i++) least[i] = bottom(fit, i);
+  for (int i = 0; i < fit->n && least; i++) least[i] = cav_fit_bottom(fit, i);
   for (int t = 0; t < fit->nframe && fit->stands && least; t++)
     for (int f = 0; f < fit->nfoot; f++) fit->stands[t * CAV_FIT_FEET + f] = (char)stand_of(fit, t, f, least);
   status = fit->stands && least ? CAV_OK : CAV_NO_MEMORY;
@@ -128,15 +152,39 @@ cav_status cav_fit_floor(cav_fit *fit) {
   return status;
 }
 
-int cav_fit_floor_rows(const cav_fit *fit, int frame, int f, double point[CAV_FIT_CORNERS][3]) {
-  int stands = fit->stands[frame * CAV_FIT_FEET + f], n = 0;
-  if (stands == FLAT) {
-    for (int k = 0; k < CAV_FIT_CORNERS; k++) {
-      const double down[3] = {k & 1 ? tilt : -tilt, k & 2 ? tilt : -tilt, -1};
-      n += farthest_point(fit, fit->foot[f], down, point[n]);
-    }
-    return n;
+// points of a geom that may be its lowest: ends of a capsule, corners of a box; 0: it has none that is known
+static int candidates(const cav_geom *geom, const cav_pose *pose, double point[CAV_FIT_POINTS][3]) {
+  const double *s = geom->size;
+  int ends = geom->type == CAV_GEOM_CAPSULE, box = geom->type == CAV_GEOM_BOX || geom->type == CAV_GEOM_MESH,
+      n = ends  ? 2
+          : box ? 8
+                : geom->type == CAV_GEOM_SPHERE;
+  for (int k = 0; k < n; k++) {
+    const double corner[3] = {(k & 2 ? 1 : -1) * s[0], (k & 4 ? 1 : -1) * s[1], (k & 1 ? 1 : -1) * s[box ? 2 : 1]},
+                 end[3] = {0, 0, ends ? corner[2] : 0};
+    transform(point[k], pose->pos, pose->rotation, box ? corner : end);
+    if (!box) point[k][2] -= s[0];
   }
-  if (!farthest_point(fit, fit->foot[f], (const double[3]){0, 0, -1}, point[0])) return 0;
-  return point[0][2] < 0 || stands;
+  return n;
+}
+
+int cav_fit_floor_rows(const cav_fit *fit, int frame, int f) {
+  int stands = fit->stands[frame * CAV_FIT_FEET + f], rows = 0;
+  for (int k = 0; k < CAV_FIT_CORNERS && stands == FLAT; k++) {
+    const double down[3] = {k & 1 ? tilt : -tilt, k & 2 ? tilt : -tilt, -1};
+    rows += farthest_point(fit, fit->foot[f], down, fit->point + 3 * rows);
+  }
+  if (stands == FLAT) return rows;
+  const cav_body *body = &fit->model->body[fit->foot[f]];
+  double point[CAV_FIT_POINTS][3];
+  for (int g = body->geom; g < body->geom + body->ngeom; g++) {
+    cav_pose pose;
+    cav_object_pose(fit->model, fit->state, CAV_OBJECT_GEOM, g, &pose);
+    int n = candidates(&fit->model->geom[g], &pose, point);
+    for (int k = 0; k < n; k++)
+      if (point[k][2] < 0) copy3(fit->point + 3 * rows++, point[k]);
+  }
+  if (rows == 0 && cav_fit_lowest(fit, fit->foot[f], point[0]) && (point[0][2] < 0 || stands))
+    copy3(fit->point + 3 * rows++, point[0]);
+  return rows;
 }

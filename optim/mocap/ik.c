@@ -161,7 +161,6 @@ static cav_status run(cav_fit *fit, cav_marker_set *set, cav_trajectory **trajec
   double *q = malloc((size_t)fit->model->nq * sizeof *q);
   *trajectory = cav_trajectory_new(fit->model, fit->nframe, fit->step);
   cav_status status = q && *trajectory ? CAV_OK : CAV_NO_MEMORY;
-  if (!status && set->floor) status = cav_fit_floor(fit);
   if (!status) status = begin(fit, first, q, &report->iterations);
   if (!status) status = cav_fit_places(fit, set, NULL, q, &report->iterations);
   if (!status) status = follow(fit, q, *trajectory, report);
@@ -190,18 +189,28 @@ static cav_status open_fit(cav_fit *fit, const cav_record *record, double **made
 
 static void close_fit(cav_fit *fit, double *made) {
   cav_state_free(fit->state);
-  free(fit->H), free(made), free(fit->marker), free(fit->column), free(fit->stands);
+  free(fit->H), free(made), free(fit->marker), free(fit->column), free(fit->stands), free(fit->planted),
+      free(fit->point);
 }
 
 cav_status cav_ik(const cav_model *model, const cav_record *record, cav_marker_set *set, const cav_ik_options *options,
                   cav_trajectory **trajectory, cav_ik_report **report, cav_error *error) {
-  cav_fit fit = {.model = model, .options = options, .set = set};
-  double *made = NULL;
+  cav_fit fit = {.model = model, .options = options, .set = set, .firm = 1};
+  double *made = NULL, *scaled = NULL;
+  cav_ik_options rough = *options;
   cav_ik_report *told = NULL;
   *trajectory = NULL;
   if (report) *report = NULL;
   cav_status status = open_fit(&fit, record, &made, error);
   if (!status && !(told = report_new(&fit))) status = cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for a fit");
+  if (!status && set->retarget) {
+    // centimetres off a posture of another body are worth less than limbs that turn about themselves for them
+    rough.posture *= 100, rough.roughness *= 10;
+    fit.options = &rough;
+    status = cav_fit_retarget(&fit, &scaled, &told->scale, error);
+    if (!status) fit.position = scaled;
+  }
+  if (!status && set->floor) status = cav_fit_floor(&fit);
   if (!status) status = run(&fit, set, trajectory, told, error);
   if (status) {
     cav_trajectory_free(*trajectory);
@@ -212,12 +221,13 @@ cav_status cav_ik(const cav_model *model, const cav_record *record, cav_marker_s
   else
     cav_ik_report_free(told);
   close_fit(&fit, made);
+  free(scaled);
   return status;
 }
 
 cav_status cav_ik_sizes(cav_model *model, const cav_record *record, cav_marker_set *set, const cav_ik_options *options,
                         double *factor, double *deviation, cav_error *error) {
-  cav_fit fit = {.model = model, .options = options, .set = set};
+  cav_fit fit = {.model = model, .options = options, .set = set, .firm = 1};
   cav_fit_sizes sizes = {0};
   double *made = NULL, *q = malloc((size_t)model->nq * sizeof *q);
   int iterations = 0, first = -1;

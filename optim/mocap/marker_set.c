@@ -5,16 +5,20 @@
 
 #include "cavort/mocap.h"
 #include "file.h"
+#include "landmark.h"
 #include "marker_set.h"
 #include "problem_file.h"
 
 // name, type, least and most values, words, required; unit, what holds where it is left out, meaning
 // clang-format off
 #define NOTE(unit, fallback, text) &(const cav_xml_note) { unit, fallback, text }
+static const char *const landmarks[] = {"first", "middle", "last", "heel", "toe", NULL};
 static const cav_xml_attribute attributes[] = {
     {"name", CAV_XML_TEXT, 1, 0, NULL, 1, NOTE("", NULL, "name of the marker in the clip")},
     {"body", CAV_XML_TEXT, 1, 0, NULL, 1, NOTE("", NULL, "body that it sits on: of the model, or a role such as \"right foot\"")},
     {"pos", CAV_XML_REAL, 3, 3, NULL, 0, NOTE("m", "(unknown: estimated)", "position on the body, in its frame")},
+    {"at", CAV_XML_WORD, 0, 0, landmarks, 0, NOTE("", "(pos)", "instead of pos, where body is a foot or hand by its role: its limb's first joint (hip, shoulder), middle one (knee, elbow) or last one (ankle, wrist), or the heel or toe of its sole")},
+    {"from", CAV_XML_TEXT, 1, 0, NULL, 0, NOTE("", "(the world, scaled as the legs are)", "with retarget: markers, separated by spaces, from whose mean it lies in the recorded direction, as far as on the model; one that names itself is of a group that moves through the world, scaled as the legs are, and keeps the model's size")},
     {"weight", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("", "(1)", "weight of its residual")},
     {0}};
 static const cav_xml_element marker = {"marker", 1, 0, attributes, NULL, 0, "a marker and the place that it has on a body"};
@@ -24,6 +28,7 @@ static const cav_xml_attribute set_attributes[] = {
     {"floor", CAV_XML_BOOL, 0, 0, NULL, 0, NOTE("", "(false)", "feet stand on the plane z = 0 of the clip where a marker of theirs stands still, low")},
     {"scale", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("", "(0: sizes are right)", "how far off sizes of segments may be, as a fraction, against that of the whole body; they are estimated too, by which the model is scaled")},
     {"symmetric", CAV_XML_BOOL, 0, 0, NULL, 0, NOTE("", "(true)", "segments of both sides have one size")},
+    {"retarget", CAV_XML_BOOL, 0, 0, NULL, 0, NOTE("", "(false)", "the clip is of a body of another size: it is scaled to the model's, markers on parts that the model does not have are left out; with floor feet that stand are held where they are")},
     {"unit", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("m", "(as the clip says, or as its format has it)", "unit of length of the clip")},
     {"up", CAV_XML_WORD, 0, 0, axes, 0, NOTE("", "(as the format of the clip has it)", "axis of the clip that points up")},
     {"rate", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("1/s", "(as the clip says)", "frames a second")},
@@ -36,16 +41,48 @@ const cav_xml_element cav_markers_element = {
 
 void cav_marker_set_free(cav_marker_set *set) {
   if (!set) return;
-  for (int i = 0; i < set->nmarker && set->marker; i++) free(set->marker[i].name);
+  for (int i = 0; i < set->nmarker && set->marker; i++) free(set->marker[i].name), free(set->marker[i].from);
   free(set->marker);
   free((char *)set->clip.names);
   free(set);
 }
 
+// where a marker sits: pos, or a point of the limb that body names by its role
+static cav_status read_place(const cav_problem_reader *reader, const cav_xml_node *node, cav_marker *m) {
+  m->placed = cav_xml_reals(node, "pos", m->place, 3) == 3;
+  if (!m->placed) memcpy(m->place, reader->model->body[m->body].com, sizeof m->place);
+  if (!cav_xml_get(node, "at")) return CAV_OK;
+  cav_role role = cav_role_named(cav_xml_text(node, "body", ""));
+  cav_roles roles;
+  if (m->placed) return cav_xml_fail(reader->error, node, "at", "expected pos or at, got both");
+  cav_status status = cav_roles_find(reader->model, reader->state, &roles);
+  if (status) return cav_problem_no_memory(reader);
+  m->placed = role < CAV_ROLE_TYPES && cav_landmark_find(reader->model, reader->state, &roles, role,
+                                                         (cav_landmark)cav_xml_word(node, "at", 0), &m->body, m->place);
+  if (m->placed) return CAV_OK;
+  return cav_xml_fail(reader->error, node, "at",
+                      "expected the body to be a foot or a hand by its role ('right foot') whose limb has that point, "
+                      "got '%.100s'; give pos instead",
+                      cav_xml_text(node, "body", ""));
+}
+
+// whether a set that is scaled to the model leaves a marker out: it is on a part that the model does not have
+static int is_left_out(const cav_problem_reader *reader, const cav_xml_node *node) {
+  cav_role role = cav_role_named(cav_xml_text(node, "body", ""));
+  cav_roles roles;
+  return role < CAV_ROLE_TYPES && !cav_roles_find(reader->model, reader->state, &roles) && roles.body[role] < 0;
+}
+
 static cav_status read_marker(const cav_problem_reader *reader, const cav_xml_node *node, cav_marker_set *set) {
   cav_marker *m = &set->marker[set->nmarker];
-  const char *name = cav_xml_text(node, "name", "");
+  const char *name = cav_xml_text(node, "name", ""), *from = cav_xml_text(node, "from", NULL);
   cav_object_type type = CAV_OBJECT_XBODY;
+  if (from && !set->retarget)
+    return cav_xml_fail(reader->error, node, "from", "expected retarget=\"true\" of <markers>, which scales the clip");
+  if (set->retarget && is_left_out(reader, node)) {
+    set->left_out++;
+    return CAV_OK;
+  }
   int object = cav_problem_find_frame(reader, node, "body", &type);
   if (object < 0) return reader->error ? reader->error->status : CAV_BAD_INPUT;
   *m = (cav_marker){.body = type == CAV_OBJECT_GEOM ? reader->model->geom[object].body : object, .weight = 1};
@@ -54,12 +91,15 @@ static cav_status read_marker(const cav_problem_reader *reader, const cav_xml_no
       return cav_xml_fail(reader->error, node, "name", "expected one marker of that name, '%.100s' is there twice",
                           name);
   cav_status status = cav_problem_real(reader, node, "weight", 0, DBL_MAX, &m->weight);
+  if (!status) status = read_place(reader, node, m);
+  if (!status && set->retarget && !m->placed)
+    status = cav_xml_fail(reader->error, node, NULL,
+                          "expected pos or at: places are not estimated while the clip is "
+                          "scaled");
   if (status) return status;
-  m->placed = cav_xml_reals(node, "pos", m->place, 3) == 3;
-  if (!m->placed) memcpy(m->place, reader->model->body[m->body].com, sizeof m->place);
-  if (!(m->name = strdup(name))) return cav_problem_no_memory(reader);
+  m->name = strdup(name), m->from = from ? strdup(from) : NULL;
   set->nmarker++;
-  return CAV_OK;
+  return m->name && (m->from || !from) ? CAV_OK : cav_problem_no_memory(reader);
 }
 
 static cav_status read_set(const cav_problem_reader *reader, const cav_xml_node *root, cav_marker_set *set) {
@@ -70,6 +110,11 @@ static cav_status read_set(const cav_problem_reader *reader, const cav_xml_node 
   if (!status) status = cav_problem_real(reader, root, "scale", 0, DBL_MAX, &set->scale);
   set->floor = cav_xml_bool(root, "floor", 0);
   set->symmetric = cav_xml_bool(root, "symmetric", 1);
+  set->retarget = cav_xml_bool(root, "retarget", 0);
+  if (!status && set->retarget && (set->adjust > 0 || set->scale > 0))
+    status = cav_xml_fail(reader->error, root, set->adjust > 0 ? "adjust" : "scale",
+                          "expected none with retarget=\"true\": either the clip is "
+                          "scaled to the model, or places and sizes are fitted to the clip");
   if (cav_xml_get(root, "up")) set->clip.up = axes[cav_xml_word(root, "up", 2)][0];
   if (!status && names && !(set->clip.names = strdup(names))) status = cav_problem_no_memory(reader);
   for (const cav_xml_node *c = root->child; c && !status; c = c->next) status = read_marker(reader, c, set);
@@ -101,6 +146,7 @@ cav_marker_set *cav_marker_set_read(const char *path, const cav_model *model, ca
 static void write_head(FILE *out, const cav_marker_set *set) {
   fputs("<markers", out);
   if (set->floor) fputs(" floor=\"true\"", out);
+  if (set->retarget) fputs(" retarget=\"true\"", out);
   if (set->clip.unit > 0) fprintf(out, " unit=\"%.17g\"", set->clip.unit);
   if (set->clip.up) fprintf(out, " up=\"%c\"", set->clip.up);
   if (set->clip.rate > 0) fprintf(out, " rate=\"%.17g\"", set->clip.rate);
@@ -128,6 +174,11 @@ cav_status cav_marker_set_write(const char *path, const cav_model *model, const 
     fputs("\" body=\"", file.stream);
     cav_file_write_xml(file.stream, model->body[m->body].name);
     fprintf(file.stream, "\" pos=\"%.17g %.17g %.17g\"", m->place[0], m->place[1], m->place[2]);
+    if (m->from) {
+      fputs(" from=\"", file.stream);
+      cav_file_write_xml(file.stream, m->from);
+      fputc('"', file.stream);
+    }
     if (m->weight != 1) fprintf(file.stream, " weight=\"%.17g\"", m->weight);
     fputs("/>\n", file.stream);
   }

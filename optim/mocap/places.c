@@ -132,9 +132,11 @@ static void couple(const search *s, int f, const double *q, double *B) {
     }
   }
   for (int foot = 0; s->sizes && foot < fit->nfoot; foot++) {
-    double x[CAV_FIT_CORNERS][3];
-    for (int c = 0, rows = cav_fit_floor_rows(fit, s->frame[f], foot, x); c < rows; c++)
-      couple_sizes(s, q, m->body[fit->foot[foot]].link, x[c], x[c], fit->options->floor, 2, B);
+    int rows = cav_fit_floor_rows(fit, s->frame[f], foot);
+    for (int k = 0; k < rows; k++) {
+      const double *x = fit->point + 3 * k;
+      couple_sizes(s, q, m->body[fit->foot[foot]].link, x, x, fit->firm * fit->options->floor, 2, B);
+    }
   }
 }
 

@@ -4,6 +4,7 @@
 
 #include <stdio.h>
 
+#include "cavort/mocap.h"
 #include "cavort/solve.h"
 
 /// Exit status of the tool.
@@ -84,6 +85,7 @@ int cav_command_ik(const cav_command_line *line);
 int cav_command_export(const cav_command_line *line);
 int cav_command_mpc(const cav_command_line *line);
 int cav_command_new(const cav_command_line *line);
+int cav_command_quality(const cav_command_line *line);
 int cav_command_report(const cav_command_line *line);
 int cav_command_solve(const cav_command_line *line);
 int cav_command_stress(const cav_command_line *line);
@@ -92,6 +94,14 @@ int cav_command_table(const cav_command_line *line);
 int cav_command_track(const cav_command_line *line);
 int cav_command_verify(const cav_command_line *line);
 int cav_command_view(const cav_command_line *line);
+
+/// Table of the measures of n motions: aligned, or as CSV. command_quality.c.
+void cav_command_print_quality(FILE *out, int n, char *const *name, const cav_quality *quality, int csv);
+
+/// Writes repair.xml beside a fit's trajectory.csv: the problem whose solution is the motion nearest to it that obeys
+/// physics. repair_problem.c.
+cav_status cav_command_write_repair(const char *folder, const char *model_path, const cav_trajectory *motion,
+                                    cav_error *error);
 
 /// cavort solve of several problems or values. command_batch.c.
 int cav_command_batch(const cav_command_line *line);

@@ -22,6 +22,7 @@ typedef struct fit {
   cav_trajectory *motion;
   cav_ik_report *report;
   double *factor, *deviation; ///< [nlink] sizes that were found; NULL: not sought
+  cav_quality quality;
   char *folder;
   double seconds;
 } fit;
@@ -195,6 +196,28 @@ static cav_status write_page(const fit *f, cav_error *error) {
   return status;
 }
 
+static cav_status write_quality(const fit *f, cav_error *error) {
+  cav_file file;
+  char *path = cav_result_path(f->folder, "quality.csv"), *name = f->folder;
+  cav_status status = path ? cav_file_begin(&file, path, error) : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
+  if (!status) {
+    cav_command_print_quality(file.stream, 1, &name, &f->quality, 1);
+    status = cav_file_end(&file, error);
+  }
+  free(path);
+  return status;
+}
+
+// of the model of the command line, or as it was scaled
+static cav_status write_repair(const fit *f, cav_error *error) {
+  int scaled = f->factor || f->line->mass > 0;
+  char *model = scaled ? cav_result_path(f->folder, "model.xml") : strdup(f->line->model);
+  cav_status status = model ? cav_command_write_repair(f->folder, model, f->motion, error)
+                            : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
+  free(model);
+  return status;
+}
+
 static cav_status write_all(const fit *f, cav_error *error) {
   cav_status status =
       f->folder ? cav_result_folder(f->folder, error) : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
@@ -204,6 +227,8 @@ static cav_status write_all(const fit *f, cav_error *error) {
   if (!status) status = cav_marker_set_write(set, f->model, f->set, error);
   if (!status) status = write_residuals(f, error);
   if (!status) status = write_accelerations(f, error);
+  if (!status && f->motion->nknot >= 4) status = write_quality(f, error);
+  if (!status && f->motion->nknot >= 4) status = write_repair(f, error);
   if (!status) status = write_page(f, error);
   free(motion);
   free(set);
@@ -238,10 +263,13 @@ static void print(const fit *f) {
   if (r->missing) printf("%d markers of the clip are not in the marker set\n", r->missing);
   int absent = f->set->nmarker - r->nmarker;
   if (absent) printf("%d markers of the set are not in the clip\n", absent);
+  if (f->set->left_out) printf("%d markers of the set are on parts that the model does not have\n", f->set->left_out);
+  if (r->scale > 0) printf("clip scaled to the model: ways in the world by %.3f\n", r->scale);
   printf("%d frames, %d markers, rms %.2f mm, %.2f s (%.2f s a thousand frames)\n", r->nframe, r->nmarker,
          1e3 * r->total_rms, f->seconds, 1e3 * f->seconds / r->nframe);
-  printf("wrote %s: trajectory.csv, acceleration.csv, markers.csv, markers.xml, view.html%s\n", f->folder,
-         f->factor || f->line->mass > 0 ? ", model.xml" : "");
+  if (f->motion->nknot >= 4) cav_command_print_quality(stdout, 1, (char *const *)&f->folder, &f->quality, 0);
+  printf("wrote %s: trajectory.csv, acceleration.csv, markers.csv, markers.xml, quality.csv, repair.xml, view.html%s\n",
+         f->folder, f->factor || f->line->mass > 0 ? ", model.xml" : "");
 }
 
 static double now(void) {
@@ -260,6 +288,7 @@ int cav_command_ik(const cav_command_line *line) {
   if (!status) status = scale(&f, &options, &error);
   if (!status) status = cav_ik(f.model, f.record, f.set, &options, &f.motion, &f.report, &error);
   f.seconds = now() - f.seconds;
+  if (!status && f.motion->nknot >= 4) status = cav_quality_measure(f.model, f.motion, NULL, &f.quality, &error);
   if (!status) status = write_all(&f, &error);
   if (!status && !line->quiet) print(&f);
   cav_ik_report_free(f.report);

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "certificate.h"
 #include "command.h"
@@ -56,23 +57,51 @@ static void tell_page(const cav_command_line *line, const char *page) {
   free(full);
 }
 
-// cavort view DIR DIR: one page of both, in the folder of the command
+// whether a folder holds a motion alone, as cavort ik writes it
+static int is_fit(const char *folder) {
+  char *problem = cav_result_path(folder, "problem.xml"), *motion = cav_result_path(folder, "trajectory.csv");
+  int fit = problem && motion && access(problem, F_OK) && !access(motion, F_OK);
+  free(problem), free(motion);
+  return fit;
+}
+
+// a fit beside a result: its motion, of the result's problem, with no verdict
+static cav_result *read_fit(const char *folder, const char *other, const char *model, cav_error *error) {
+  cav_result *result = cav_result_read(other, model, error);
+  char *path = cav_result_path(folder, "trajectory.csv");
+  if (result) cav_trajectory_free(result->trajectory);
+  if (result) result->trajectory = path ? cav_trajectory_read(path, result->problem->model, error) : NULL;
+  free(path);
+  if (!result || result->trajectory) return result;
+  cav_result_free(result);
+  return NULL;
+}
+
+// cavort view DIR DIR: one page of both, in the folder of the command; the first may be of a fit
 static int compare(const cav_command_line *line) {
   cav_error error = {0};
   cav_result *result[2] = {NULL, NULL};
   cav_verdict verdict[2];
+  const cav_verdict *told[2] = {NULL, NULL};
   char name[2][128], page[300];
   cav_status status = CAV_OK;
   for (int i = 0; i < 2 && !status; i++) {
-    status = cav_command_expect("view", "DIR", line->operands[i], &error);
-    if (!status && !(result[i] = cav_result_read(line->operands[i], line->model, &error))) status = error.status;
-    if (!status) status = certify(result[i], &verdict[i], &error);
-    name_of(line->operands[i], name[i]);
+    const char *folder = line->operands[i];
+    int fit = i == 0 && is_fit(folder);
+    name_of(folder, name[i]);
+    if (!fit) status = cav_command_expect("view", "DIR", folder, &error);
+    if (!status)
+      result[i] =
+          fit ? read_fit(folder, line->operands[1], line->model, &error) : cav_result_read(folder, line->model, &error);
+    if (!status && !result[i]) status = error.status;
+    if (status || fit) continue;
+    status = certify(result[i], &verdict[i], &error);
+    told[i] = &verdict[i];
   }
   snprintf(page, sizeof page, "%s-beside-%s.view.html", name[0], name[1]);
   if (!status)
-    status = cav_result_compare(page, (const char *const[]){name[0], name[1]}, (const cav_result *const *)result,
-                                verdict, &error);
+    status = cav_result_compare(page, (const char *const[]){name[0], name[1]}, (const cav_result *const *)result, told,
+                                &error);
   for (int i = 0; i < 2; i++) cav_result_free(result[i]);
   if (status) return cav_command_fail(&error);
   tell_page(line, page);

@@ -135,7 +135,8 @@ static const cav_manual_command commands[] = {
     {"view", "DIR|PROBLEM [DIR...]",
      "write the page of a result folder anew and say where it is; of two folders one page, A-beside-B.view.html, with "
      "both\n"
-     "  motions, their charts over each other; of a problem file, before anything is solved: a page of the guess from "
+     "  motions, their charts over each other, their qualities beside each other; A may be a fit of cavort ik; of a "
+     "problem file, before anything is solved: a page of the guess from "
      "start\n"
      "  to goal, and how deep start, guess and goal are in what",
      cav_command_view, OPTION_MODEL | OPTION_QUIET},
@@ -160,6 +161,11 @@ static const cav_manual_command commands[] = {
      cav_command_track,
      OPTION_MODEL | OPTION_MARKERS | OPTION_SCALE | OPTION_MASS | OPTION_FROM | OPTION_UNTIL | OPTION_OUTPUT |
          OPTION_SOLVER | OPTION_THREADS | OPTION_STRATEGIES | OPTION_FORCE | OPTION_SET | OPTION_QUIET},
+    {"quality", "DIR|CSV...",
+     "measure how good motions are, whatever made them, a column each: penetration, skating, floating, jerk, efforts "
+     "beyond\n"
+     "  limits, and force that neither contacts nor actuators can give",
+     cav_command_quality, OPTION_MODEL | OPTION_CSV},
     {"export", "DIR",
      "write the motion of a result folder in a format of other tools, into the folder or where -o says",
      cav_command_export, OPTION_MODEL | OPTION_OUTPUT | OPTION_TO | OPTION_RATE | OPTION_QUIET},
@@ -550,7 +556,7 @@ static int run(int argc, char **argv, const char *arguments) {
   cav_error error = {0};
   // these say themselves what is wrong with what they are given
   int one = c->run != help && c->run != cav_command_study && c->run != cav_command_ik && c->run != cav_command_table &&
-            line.noperand < 2;
+            c->run != cav_command_quality && line.noperand < 2;
   int status =
       one && cav_command_expect(c->name, c->operand, line.operand, &error) ? cav_command_fail(&error) : c->run(&line);
   // a full disk or a closed pipe must not pass for success

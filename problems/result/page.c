@@ -12,6 +12,10 @@
 #include "problem_file.h"
 #include "view.h"
 
+#define COUNT(...) +1
+enum { QUALITIES = 0 CAV_QUALITIES(COUNT) };
+#undef COUNT
+
 // charts on their way: series, and the numbers that they point at
 typedef struct charts {
   int n, nknot;
@@ -242,6 +246,19 @@ static int verdict_lines(const cav_verdict *verdict, cav_certificate_line *told,
   return n;
 }
 
+// a line for each measure of quality
+static int quality_lines(const cav_quality *quality, char value[][32], cav_view_line *line) {
+  int n;
+  const cav_quality_rule *rule = cav_quality_rules(&n);
+  assert(n == QUALITIES);
+  for (int i = 0; i < n; i++) {
+    double x = *(const double *)((const char *)quality + rule[i].offset);
+    snprintf(value[i], 32, "%.3g %s", x, rule[i].unit);
+    line[i] = (cav_view_line){rule[i].name, value[i], isfinite(rule[i].bar) ? x <= rule[i].bar : -1};
+  }
+  return n;
+}
+
 // --- the page ---
 
 cav_model *cav_page_drawn(const cav_problem *p, char undrawn[CAV_PAGE_UNDRAWN]) {
@@ -270,8 +287,8 @@ typedef struct parts {
   int *nforce;
   cav_view_force *force;
   cav_certificate_line told[CAV_CERTIFICATE_LINES];
-  cav_view_line line[CAV_CERTIFICATE_LINES + 4];
-  char seconds[64], title[300];
+  cav_view_line line[CAV_CERTIFICATE_LINES + 4 + QUALITIES];
+  char seconds[64], title[300], quality[QUALITIES][32];
 } parts;
 
 static void free_page(parts *page) {
@@ -328,6 +345,7 @@ static cav_status fill_page(parts *page, const cav_page_motion *m, cav_view_inpu
   take_forces(page, p->model, m->forces, weight);
   snprintf(page->title, sizeof page->title, "%.140s on %.140s", p->name, p->model->name);
   int nline = m->verdict ? verdict_lines(m->verdict, page->told, page->line, page->seconds) : 0;
+  if (m->quality) nline += quality_lines(m->quality, page->quality, page->line + nline);
   if (*page->undrawn) page->line[nline++] = (cav_view_line){"drawn", page->undrawn, -1};
   *input = (cav_view_input){.model = p->model,
                             .drawn = page->drawn,

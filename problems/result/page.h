@@ -2,6 +2,7 @@
 #ifndef CAVORT_PAGE_H
 #define CAVORT_PAGE_H
 
+#include "cavort/mocap.h"
 #include "cavort/solve.h"
 #include "forces.h"
 
@@ -13,6 +14,7 @@ typedef struct cav_page_motion {
   const cav_forces *forces;
   int periods; ///< that the trajectory has: more than 1 of a cycle; what was asked is marked in the first
   const cav_verdict *verdict; ///< NULL: none
+  const cav_quality *quality; ///< NULL: not told
 } cav_page_motion;
 
 enum { CAV_PAGE_UNDRAWN = 500 };

@@ -2,7 +2,9 @@
 /// are the library's (cavort/result.h).
 #include "result.h"
 
+#include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "constraint_table.h"
 #include "file.h"
@@ -66,8 +68,8 @@ cav_status cav_result_write_page(const char *folder, const cav_problem *problem,
   cav_status status = page ? cav_result_write_forces(folder, problem, trajectory, contact, error) : no_memory(error);
   if (!status) status = make_shown(&shown, problem, trajectory, contact, error);
   if (!status) {
-    cav_page_motion motion = {problem->name, problem,       shown.strides ? shown.strides : trajectory,
-                              shown.forces,  shown.periods, verdict};
+    cav_page_motion motion = {
+        problem->name, problem, shown.strides ? shown.strides : trajectory, shown.forces, shown.periods, verdict, NULL};
     status = cav_page_write(page, 1, &motion, error);
   }
   free_shown(&shown);
@@ -75,17 +77,36 @@ cav_status cav_result_write_page(const char *folder, const cav_problem *problem,
   return status;
 }
 
+// a fit has no forces
+static void take_forces_away(cav_forces *forces, const cav_model *model) {
+  size_t n = (size_t)forces->nknot;
+  memset(forces->count, 0, n * sizeof *forces->count);
+  forces->nforce = 0;
+  for (size_t i = 0; i < n * (size_t)model->nu; i++) forces->control[i] = NAN;
+  for (size_t i = 0; i < n; i++) forces->unactuated[i] = NAN;
+}
+
 cav_status cav_result_compare(const char *page, const char *const label[2], const cav_result *const result[2],
-                              const cav_verdict verdict[2], cav_error *error) {
+                              const cav_verdict *const verdict[2], cav_error *error) {
   drawn shown[2] = {0};
   cav_page_motion motion[2];
+  cav_quality quality[2];
   cav_status status = CAV_OK;
   for (int i = 0; i < 2 && !status; i++) {
     const cav_problem *problem = result[i]->problem;
     status = make_shown(&shown[i], problem, result[i]->trajectory, &problem->contact, error);
-    motion[i] = (cav_page_motion){
-        label[i],        problem,          shown[i].strides ? shown[i].strides : result[i]->trajectory,
-        shown[i].forces, shown[i].periods, &verdict[i]};
+    if (status) break;
+    if (!verdict[i]) take_forces_away(shown[i].forces, problem->model);
+    motion[i] = (cav_page_motion){label[i],
+                                  problem,
+                                  shown[i].strides ? shown[i].strides : result[i]->trajectory,
+                                  shown[i].forces,
+                                  shown[i].periods,
+                                  verdict[i],
+                                  NULL};
+    if (motion[i].trajectory->nknot < 4) continue;
+    status = cav_quality_measure(problem->model, motion[i].trajectory, &problem->contact, &quality[i], error);
+    motion[i].quality = &quality[i];
   }
   if (!status) status = cav_page_write(page, 2, motion, error);
   for (int i = 0; i < 2; i++) free_shown(&shown[i]);

@@ -13,8 +13,9 @@ cav_status cav_result_write_unfinished(const char *folder, const cav_problem *pr
 cav_status cav_result_write_page(const char *folder, const cav_problem *problem, const cav_trajectory *trajectory,
                                  const cav_options *contact, const cav_verdict *verdict, cav_error *error);
 
-/// Writes one page of two motions, their labels and verdicts beside each other.
+/// Writes one page of two motions, their labels, verdicts and qualities (cavort/mocap.h) beside each other. verdict[i]
+/// NULL: a fit, which has no forces.
 cav_status cav_result_compare(const char *page, const char *const label[2], const cav_result *const result[2],
-                              const cav_verdict verdict[2], cav_error *error);
+                              const cav_verdict *const verdict[2], cav_error *error);
 
 #endif

@@ -1,0 +1,53 @@
+/// The problem that cavort ik leaves beside a fit: the motion nearest to it that obeys physics.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "command.h"
+#include "file.h"
+#include "result_file.h"
+
+static const double coarse = 0.0125; // s, longest step: contacts slide by what a step turns, which grows with it
+
+// the longest step that fits the frames evenly, or frames that fit it
+static double step_of(const cav_trajectory *motion) {
+  double h = motion->timestep;
+  return h > coarse ? h / ceil(h / coarse - 1e-9) : h * floor(coarse / h + 1e-9);
+}
+
+cav_status cav_command_write_repair(const char *folder, const char *model_path, const cav_trajectory *motion,
+                                    cav_error *error) {
+  cav_file file;
+  char *path = cav_result_path(folder, "repair.xml"),
+       *model = path ? cav_result_seen_from(folder, model_path, 0, error) : NULL;
+  if (!path) return cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
+  double h = step_of(motion), steps = floor((motion->nknot - 1) * motion->timestep / h + 1e-6);
+  cav_status status = model ? cav_file_begin(&file, path, error) : error->status;
+  if (!status) {
+    fputs(
+        "<!-- The motion nearest to the fit beside this file that obeys physics: cavort solve. Parts of a long one:\n"
+        "     --set horizon/@duration=2 --set guess/@offset=1 --set cost/track/@offset=1 -->\n<problem name=\"repair\" "
+        "model=\"",
+        file.stream);
+    cav_file_write_xml(file.stream, model);
+    fprintf(file.stream, "\">\n  <horizon duration=\"%.17g\" timestep=\"%.17g\" close=\"open\"/>\n", steps * h, h);
+    fputs(
+        "  <start free=\"true\"/>\n  <guess file=\"trajectory.csv\"/>\n"
+        "  <cost>\n"
+        "    <track file=\"trajectory.csv\" joints=\"all\" sd=\"0.15 0.5\"/>\n"
+        "    <slip weight=\"2000\"/>\n"
+        "    <velocity dofs=\"joints\" weight=\"0\"/>\n"
+        "    <velocity dofs=\"root_angular\" weight=\"0\"/>\n"
+        "    <posture dofs=\"joints\" weight=\"0\"/>\n"
+        "  </cost>\n"
+        "  <schedule stages=\"8\" next_gap=\"exact\">\n"
+        "    <first softness=\"0.5\" smoothing=\"0.01\"/>\n"
+        "  </schedule>\n"
+        "</problem>\n",
+        file.stream);
+    status = cav_file_end(&file, error);
+  }
+  free(path), free(model);
+  return status;
+}
