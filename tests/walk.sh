@@ -32,7 +32,7 @@ stride() {
   columns 2 4 >"$work/root_linear.csv"
   columns 5 7 >"$work/root_angular.csv"
   columns 8 0 >"$work/joints.csv"
-  sed "s|FIT|$work/fit|; s|WORK|$work|; s|CLIP|$data/markers_walk.trc|; s|OFFSET|$offset|; s|DURATION|$3|" tests/walk/problem.xml \
+  sed "s|FIT|$work/fit|; s|WORK|$work|; s|CLIP|$data/markers_walk.trc|; s|OFFSET|$offset|; s|DURATION|$3|" tests/walk/problem.in \
     >"$work/$1.xml"
   "$tool" solve "$work/$1.xml" -o "$work/$1" --threads 1 --strategies 1 -q || true
   printf '\n%s: %s s from %s s on\n' "$1" "$3" "$offset"
