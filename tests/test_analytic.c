@@ -21,6 +21,15 @@ static const char shapes[] =
     "</worldbody><contact><pair geom1='floor' geom2='arm' condim='6' friction='.9 .3 .05 .02 .04'/>"
     "<pair geom1='ball' geom2='egg' condim='6' friction='.3 .9 .05 .02 .04'/></contact></mujoco>";
 
+// gravity compensation by springs of nothing and by actuators, along one chain
+static const char lifted[] =
+    "<mujoco><default><geom type='capsule' size='.05' fromto='0 0 0 .2 .1 .3' contype='0' conaffinity='0'/><default "
+    "class='lifts'><joint actuatorgravcomp='true'/></default></default><worldbody><body "
+    "gravcomp='.3'><freejoint/><geom/>"
+    "<body gravcomp='1' pos='0 0 .5' childclass='lifts'><joint axis='0 1 0' pos='.1 0 0'/><joint axis='1 1 0'/><geom/>"
+    "<body gravcomp='.5' pos='.3 0 .5'><joint type='ball'/><geom/><body gravcomp='2' pos='0 .3 0'><joint type='slide' "
+    "axis='1 0 1' actuatorgravcomp='false'/><geom/></body></body></body></body></worldbody></mujoco>";
+
 enum { STATES = 16, POINTS = 6, SENSORS = 48, LAWS = 3 };
 
 /// What is compared, of one state: u, then 13 numbers a contact (gap, velocities, impulses), then sensors.
@@ -325,6 +334,8 @@ int main(void) {
   check_model("our humanoid", 8);
   model = scene_load(shapes);
   check_model("shapes", STATES);
+  model = scene_load(lifted);
+  check_model("gravity compensation", STATES);
   model = cav_model_load(CAVORT_SOURCE_ROOT "/tests/features.xml", NULL);
   check_model("features", STATES);
   model = cav_model_load(CAVORT_SOURCE_ROOT "/tests/equality.xml", NULL);

@@ -158,6 +158,16 @@ static const feature features[] = {
      {{"hold", 0, -19.62}},
      20,
      0},
+    {"gravity compensation, of some joints by actuators",
+     "<default><default class='lifts'><joint actuatorgravcomp='true'/></default></default><worldbody><body "
+     "gravcomp='.3'>"
+     "<freejoint/>" MASS "<body gravcomp='1' pos='0 0 .5' childclass='lifts'><joint axis='0 1 0' pos='.1 0 0'/>" MASS
+     "<body gravcomp='.5' pos='.3 0 .5'><joint type='ball' actuatorgravcomp='true'/>" MASS
+     "<body gravcomp='2' pos='0 1 0'>"
+     "<joint type='slide' axis='1 0 1' actuatorgravcomp='false'/>" MASS "</body></body></body></body></worldbody>",
+     {{"bodies", 0, 5}},
+     20,
+     0},
     {"a spring that is slack between two lengths",
      "<option gravity='0 0 0'/><worldbody><body><joint name='j' type='slide'/>" MASS "</body></worldbody>"
      "<tendon><fixed springlength='0 1' stiffness='5'><joint joint='j' coef='2'/></fixed></tendon>",

@@ -54,6 +54,12 @@ static void add_springs(const cav_derivative_task *t) {
   }
 }
 
+// first dof of the group that a dof is in
+static int group_of(const cav_workspace *w, int dof) {
+  while (!w->group[dof]) dof--;
+  return dof;
+}
+
 // gravity compensation: a force at a body's centre of mass that keeps its direction, where subtrees carry it along
 // turning
 static void add_buoyancy(const cav_derivative_task *t) {
@@ -77,6 +83,29 @@ static void add_buoyancy(const cav_derivative_task *t) {
   }
 }
 
+// less the part of it that actuators give: of their dofs S_k . force, by whatever moves the point or turns the axis
+static void leave_to_actuators(const cav_derivative_task *t) {
+  const cav_workspace *w = t->state->work;
+  if (!t->state->options.passive || !t->state->options.gravity) return;
+  for (int i = 0; i < w->nbuoy; i++) {
+    int link = t->model->body[w->buoy[i]].link, last = last_dof(t->model, link);
+    const double *reference = t->state->reference + 3 * link;
+    double point[3], force[3], S[2][6], rate[3];
+    cav_buoyancy(t->model, t->state, w->buoy[i], point, force);
+    for (int k = last; k >= 0; k = w->parent[k]) {
+      if (!t->model->joint[t->model->dof[k].joint].lifts) continue;
+      motion_at(S[0], t->state->axis + 6 * k, reference, point);
+      for (int j = last; j >= 0; j = w->parent[j]) {
+        motion_at(S[1], t->state->axis + 6 * j, reference, point);
+        // axes of one group turn with each other, those further out with none within
+        int turns = j <= k || group_of(w, j) == group_of(w, k);
+        cross3(rate, S[turns], S[!turns] + 3);
+        t->dq[k * t->nv + j] -= dot3(rate, force);
+      }
+    }
+  }
+}
+
 static void add_tendon_forces(const cav_derivative_task *t) {
   const cav_workspace *w = t->state->work;
   const cav_springs_ahead ahead = cav_look_along_springs(t->state);
@@ -95,5 +124,6 @@ void cav_derivative_passive(const cav_derivative_task *t) {
   add_diagonals(t);
   add_springs(t);
   add_buoyancy(t);
+  leave_to_actuators(t);
   add_tendon_forces(t);
 }

@@ -85,16 +85,17 @@ static void place_body(const cav_spec *spec, cav_body *body, int i) {
 static double buoyancy(cav_builder *b, int body) {
   const cav_spec *spec = b->spec;
   const cav_spec_body *s = &spec->body.at[body];
-  int passive = 0, active = 0;
+  int passive = 0, first = 0;
   for (int i = body; i > 0 && s->gravcomp != 0; i = spec->body.at[i].parent) {
     const cav_spec_body *up = &spec->body.at[i];
-    for (int k = up->joint; k < up->joint + up->njoint; k++) *(spec->joint.at[k].gravcomp ? &active : &passive) += 1;
+    for (int k = up->joint; k < up->joint + up->njoint; k++) passive |= !spec->joint.at[k].gravcomp;
+    if (up->njoint > 0) first = spec->joint.at[up->joint].gravcomp;
   }
-  if (active && passive)
+  if (passive && first)
     cav_spec_fail(b->spec, s->node, "gravcomp",
-                  "some of the joints that carry this body have actuatorgravcomp and some have not, which is not "
+                  "the first joint that carries this body has actuatorgravcomp and a later one has not, which is not "
                   "supported; give it to all or to none");
-  return active ? 0 : s->gravcomp;
+  return passive ? s->gravcomp : 0;
 }
 
 static void fill_bodies(cav_builder *b) {
@@ -237,6 +238,7 @@ static void fill_joint(cav_builder *b, int i, int q, int dof) {
                    .dof = dof,
                    .margin = s->margin,
                    .limit = s->limit,
+                   .lifts = s->gravcomp,
                    .stiffness = spec->option.spring ? s->stiffness : 0};
   int given = s->effort_range[0] != 0 || s->effort_range[1] != 0;
   j->effort_limited =
@@ -339,7 +341,7 @@ static void check_geom(cav_builder *b, const cav_spec_geom *s) {
   cav_check_softness(spec, s->node, "", &s->softness);
   if (s->type == CAV_GEOM_PLANE && b->link_of[s->body] != 0)
     cav_spec_fail(spec, s->node, "type", "a plane cannot move; put it into the world or use a box");
-  if (s->fluid && s->type >= CAV_GEOM_MESH)
+  if (s->fluid && s->type >= CAV_GEOM_MESH && (spec->option.density > 0 || spec->option.viscosity > 0))
     cav_spec_fail(spec, s->node, "fluidshape",
                   "a mesh has no ellipsoid here; give the body a geom of another type for it");
 }

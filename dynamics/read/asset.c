@@ -165,15 +165,15 @@ static int triangles_of_hull(const cav_hull *h, cav_triangles *t) {
   return 1;
 }
 
-// scaled and moved by the reference pose
+// moved by the reference pose, then scaled
 static void transform_mesh(const cav_spec_mesh *m, cav_triangles *t) {
   double back[4];
   quat_conjugate(back, m->refquat);
   for (int i = 0; i < t->nvertex; i++) {
     double *x = t->vertex + 3 * i;
-    for (int k = 0; k < 3; k++) x[k] *= m->scale[k];
     sub3(x, x, m->refpos);
     quat_rotate(x, back, x);
+    for (int k = 0; k < 3; k++) x[k] *= m->scale[k];
   }
 }
 

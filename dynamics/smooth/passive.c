@@ -33,19 +33,40 @@ static void joint_spring(const cav_model *model, const cav_joint *joint, const d
   }
 }
 
+void cav_buoyancy(const cav_model *model, const cav_state *state, int body, double point[3], double force[3]) {
+  const cav_body *b = &model->body[body];
+  const cav_pose *link = &state->link[b->link];
+  quat_rotate(point, b->quat, b->com);
+  add3(point, point, b->pos);
+  transform(point, link->pos, link->rotation, point);
+  // the force is against gravity; what is left to the inverse is less by it
+  scale3(force, b->buoyancy * b->mass, model->gravity);
+}
+
 void cav_add_buoyancy(const cav_model *model, cav_state *state) {
   const cav_workspace *w = state->work;
   if (!state->options.passive || !state->options.gravity) { return; }
   for (int i = 0; i < w->nbuoy; i++) {
-    const cav_body *body = &model->body[w->buoy[i]];
-    const cav_pose *link = &state->link[body->link];
+    int link = model->body[w->buoy[i]].link;
     double point[3], force[3];
-    quat_rotate(point, body->quat, body->com);
-    add3(point, point, body->pos);
-    transform(point, link->pos, link->rotation, point);
-    // the force is against gravity; what is left to the inverse is less by it
-    scale3(force, body->buoyancy * body->mass, model->gravity);
-    push_at(state->force + 6 * body->link, state->reference + 3 * body->link, point, force);
+    cav_buoyancy(model, state, w->buoy[i], point, force);
+    push_at(state->force + 6 * link, state->reference + 3 * link, point, force);
+  }
+}
+
+// where actuators give the compensation it is left to the inverse
+static void leave_to_actuators(const cav_model *model, const cav_state *state, double *u) {
+  const cav_workspace *w = state->work;
+  if (!state->options.passive || !state->options.gravity) { return; }
+  for (int i = 0; i < w->nbuoy; i++) {
+    int link = model->body[w->buoy[i]].link;
+    double point[3], force[3], linear[3];
+    cav_buoyancy(model, state, w->buoy[i], point, force);
+    for (int k = cav_last_dof(model, link); k >= 0; k = w->parent[k]) {
+      if (!model->joint[model->dof[k].joint].lifts) continue;
+      velocity_at(linear, state->axis + 6 * k, state->reference + 3 * link, point);
+      u[k] -= dot3(linear, force);
+    }
   }
 }
 
@@ -70,6 +91,7 @@ void cav_add_joint_forces(const cav_model *model, const cav_state *state, const 
   }
   for (int i = 0; i < w->nspring; i++) { joint_spring(model, &model->joint[w->spring[i]], w->q, u); }
   if (state->options.spring == CAV_SPRING_IMPLICIT) { look_along_springs(model, state, u); }
+  if (w->nbuoy > 0) { leave_to_actuators(model, state, u); }
 }
 
 double cav_tendon_spring_length(const cav_state *state, int k) {

@@ -52,6 +52,9 @@ static inline double cav_tendon_stretch(const cav_tendon *tendon, double length)
 }
 
 void cav_add_buoyancy(const cav_model *model, cav_state *state);
+
+/// Force on a body by its gravity compensation, against the inverse, and where it acts, world. passive.c.
+void cav_buoyancy(const cav_model *model, const cav_state *state, int body, double point[3], double force[3]);
 void cav_add_fluid_forces(const cav_model *model, cav_state *state);
 
 /// u += armature a + damping v - springs of joints; tendons' springs and dampers likewise. passive.c.

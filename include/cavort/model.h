@@ -230,6 +230,7 @@ typedef struct cav_joint {
   /// of those actuators are within it.
   int effort_limited;
   double effort_range[2]; ///< N or N m: what actuators on it may give together
+  int lifts;              ///< its actuators give the gravity compensation of what it carries (actuatorgravcomp of MJCF)
   double speed; ///< hinge and slide: limit in the file, rad/s or m/s, told in certificates, obeyed by nothing; 0: none
 } cav_joint;
 
