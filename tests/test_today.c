@@ -459,22 +459,22 @@ static double difference(const cav_model *m, const double *u, const double *a, c
   return error / size;
 }
 
-// the script's lines
-static void follow_peer(const cav_model *m, const feature *f, FILE *from, verdict *seen) {
+// the script's lines of one model; whether it was loaded there
+static int follow_peer(const cav_model *m, cav_state *state, const feature *f, FILE *from, verdict *seen) {
   enum { ROOM = 64 };
   static char line[20000];
   double q[ROOM], v[ROOM], a[ROOM], x[ROOM], v_next[ROOM], u[ROOM];
-  cav_state *state = cav_state_new(m);
-  if (!CHECK(state && m->nq <= ROOM)) return;
+  int fits = state && m->nq <= ROOM;
   while (fgets(line, sizeof line, from)) {
     int n = read_numbers(line, x, ROOM);
     line[strcspn(line, " \n")] = 0;
-    if (!CHECK(strcmp(line, "error"))) fprintf(stderr, "    MuJoCo does not read %s\n", f->name);
+    if (!strcmp(line, "error")) return 0;
+    if (!strcmp(line, "end")) return 1;
     if (!strcmp(line, "state_q")) memcpy(q, x, sizeof q);
     if (!strcmp(line, "state_v")) memcpy(v, x, sizeof v);
     if (!strcmp(line, "state_a")) memcpy(a, x, sizeof a);
-    if (!f->differs) compare(m, f->name, line, x, n);
-    if (strcmp(line, "state_u") == 0) {
+    if (m && !f->differs) compare(m, f->name, line, x, n);
+    if (strcmp(line, "state_u") == 0 && fits) {
       for (int i = 0; i < m->nv; i++) v_next[i] = v[i] + m->timestep * a[i];
       CHECK(cav_inverse(m, state, q, v, v_next, u) == CAV_OK);
       double error = difference(m, u, a, x);
@@ -483,7 +483,7 @@ static void follow_peer(const cav_model *m, const feature *f, FILE *from, verdic
       seen->worst = fmax(seen->worst, error);
     }
   }
-  cav_state_free(state);
+  return 0;
 }
 
 static void compare_with_peer(const cav_model *m, const feature *f, const char *path) {
@@ -494,7 +494,9 @@ static void compare_with_peer(const cav_model *m, const feature *f, const char *
            f->states);
   FILE *from = popen(command, "r");
   if (!CHECK(from != NULL)) return;
-  follow_peer(m, f, from, &seen);
+  cav_state *state = cav_state_new(m);
+  if (!CHECK(state && follow_peer(m, state, f, from, &seen))) fprintf(stderr, "    MuJoCo does not read %s\n", f->name);
+  cav_state_free(state);
   CHECK(seen.states == f->states);
   if (f->states)
     printf("%-45s %d of %d inverses as MuJoCo's, the rest up to %.1e off\n", f->name, seen.agree, seen.states,
@@ -683,8 +685,37 @@ static void test_file(const char *path) {
   cav_model_free(m);
 }
 
-// test_today [FILE...]: those files are compared with MuJoCo 3, and nothing else done
+// a table of all models in a folder, each as long as no file is needed beside it: whether we and MuJoCo 3 load it, and of
+// how many states the inverses agree; sweep.py judges it
+static void table_of(const char *models) {
+  enum { STATES = 10 };
+  char command[700], line[20000], at[21000];
+  snprintf(command, sizeof command, "node '%s/tests/peer_mujoco3.mjs' '%s' %d 2>/dev/null", CAVORT_SOURCE_ROOT, models,
+           STATES);
+  FILE *from = popen(command, "r");
+  if (!CHECK(from != NULL)) return;
+  while (fgets(line, sizeof line, from)) {
+    if (strncmp(line, "file", 4)) continue;
+    line[strcspn(line, "\n")] = 0;
+    const char *name = line + 5;
+    snprintf(at, sizeof at, "%s/%s", models, name);
+    cav_model *m = cav_model_load(at, NULL);
+    cav_state *state = m ? cav_state_new(m) : NULL;
+    verdict seen = {0};
+    int theirs = follow_peer(m, state, &(feature){.differs = 1}, from, &seen);
+    printf("%s %d %d %d %d %.1e\n", name, m != NULL, theirs, seen.states, seen.agree, seen.worst);
+    cav_state_free(state);
+    cav_model_free(m);
+  }
+  pclose(from);
+}
+
+// test_today [FILE...]: those files are compared with MuJoCo 3, and nothing else done; --table FOLDER: table_of
 int main(int argc, char **argv) {
+  if (argc == 3 && !strcmp(argv[1], "--table")) {
+    table_of(argv[2]);
+    return 0;
+  }
   for (int i = 1; i < argc; i++) test_file(argv[i]);
   if (argc > 1) return check_result();
   if (!CHECK(mkdtemp(folder) != NULL)) return check_result();

@@ -89,11 +89,12 @@ static double buoyancy(cav_builder *b, int body) {
   for (int i = body; i > 0 && s->gravcomp != 0; i = spec->body.at[i].parent) {
     const cav_spec_body *up = &spec->body.at[i];
     for (int k = up->joint; k < up->joint + up->njoint; k++) passive |= !spec->joint.at[k].gravcomp;
-    if (up->njoint > 0) first = spec->joint.at[up->joint].gravcomp;
+    const cav_spec_joint *j = &spec->joint.at[up->joint];
+    if (up->njoint > 0) first = j->gravcomp && j->type == CAV_JOINT_FREE;
   }
   if (passive && first)
     cav_spec_fail(b->spec, s->node, "gravcomp",
-                  "the first joint that carries this body has actuatorgravcomp and a later one has not, which is not "
+                  "the free joint that carries this body has actuatorgravcomp and a later one has not, which is not "
                   "supported; give it to all or to none");
   return passive ? s->gravcomp : 0;
 }

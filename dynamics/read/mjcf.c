@@ -42,6 +42,9 @@ static void read_joint(cav_mjcf_reader *r, const cav_xml_node *node, const place
     *j = cav_mjcf_first_class().joint;
     j->type = CAV_JOINT_FREE;
     j->limited = CAV_LIMITED_NO;
+    int align = cav_xml_word(node, "align", CAV_LIMITED_AUTO);
+    if (align == CAV_LIMITED_YES || (align == CAV_LIMITED_AUTO && cav_compiler_of(spec, node)->align_free))
+      cav_spec_leave(spec, node, "align", "left aside: positions are those of the body's frame, not of its inertia");
   } else {
     *j = cav_mjcf_class_of(r, node, at->childclass)->joint;
     cav_mjcf_joint_values(spec, node, j);
