@@ -14,6 +14,7 @@
 #include "gjk.h"
 
 #include "math3.h"
+#include "vectors.h"
 
 /// Geometry of a contact by unit twists of the second geom against the first, about the contact's position.
 typedef struct geometry {
@@ -335,55 +336,87 @@ static void move(const cav_state *state, const cav_contact *c, const double *vel
   axpy6(m->relative, m->own[1], -1, m->own[0]);
 }
 
-/// How a contact is placed after a unit twist of one of its links: gap, position and rotation of the frame.
+/// How a contact is placed after three unit twists of one of its links, turns or shifts about the axes of the world (the
+/// fourth number is none): gap, position and rotation of the frame.
 typedef struct placement {
-  double dist, pos[3], rotation[3];
+  cav_four dist, pos[3], rotation[3];
 } placement;
 
+#define FOUR_DOT3(a, b) ((a)[0] * (b)[0] + (a)[1] * (b)[1] + (a)[2] * (b)[2])
+
+// r += a x b
+#define FOUR_CROSS_ADD3(r, a, b)                         \
+  do {                                                   \
+    (r)[0] = (r)[0] + (a)[1] * (b)[2] - (a)[2] * (b)[1]; \
+    (r)[1] = (r)[1] + (a)[2] * (b)[0] - (a)[0] * (b)[2]; \
+    (r)[2] = (r)[2] + (a)[0] * (b)[1] - (a)[1] * (b)[0]; \
+  } while (0)
+
+// e_k x v for the axes k of the world
+static inline __attribute__((always_inline)) void turns(cav_four r[3], const double v[3]) {
+  r[0] = (cav_four){0, v[2], -v[1], 0};
+  r[1] = (cav_four){-v[2], 0, v[0], 0};
+  r[2] = (cav_four){v[1], -v[0], 0, 0};
+}
+
+static inline __attribute__((always_inline)) void take_three(cav_four r[3], const double v[][3]) {
+  for (int i = 0; i < 3; i++) {
+    const double of[4] = {v[0][i], v[1][i], v[2][i], 0};
+    r[i] = *(const cav_four *)of;
+  }
+}
+
 // along, across: parts of the direction that the second axis is aligned with
-static void displace(const cav_contact *c, const geometry *g, int side, int k, double along, double across,
-                     placement *p) {
+static inline __attribute__((always_inline)) void displace(const cav_contact *c, const geometry *g, int side, int shift,
+                                                           double along, double across, placement *p) {
   const double *n = c->frame, *t = c->frame + 6;
-  double normal[3], tangent[3];
-  p->dist = g->dist[k];
-  copy3(p->pos, g->pos[k]);
-  copy3(normal, g->normal[k]);
-  copy3(tangent, g->tangent[k]);
+  const int k = 3 * shift;
+  cav_four normal[3], tangent[3], none = {0};
+  const double dist[4] = {g->dist[k], g->dist[k + 1], g->dist[k + 2], 0};
+  p->dist = *(const cav_four *)dist;
+  take_three(p->pos, g->pos + k);
+  take_three(normal, g->normal + k);
+  take_three(tangent, g->tangent + k);
   if (side == 0) {
     // both links move by the twist, then the second moves back
-    double turned[3] = {0, 0, 0}, moved[3] = {0, 0, 0};
+    cav_four turned[3] = {none, none, none};
     p->dist = -p->dist;
-    if (k >= 3) moved[k - 3] = 1;
-    sub3(p->pos, moved, p->pos);
-    if (k < 3) turn(turned, k, n);
-    sub3(normal, turned, normal);
-    zero3(turned);
-    if (g->carried && k < 3) turn(turned, k, g->align);
-    sub3(tangent, turned, tangent);
+    for (int i = 0; i < 3; i++)
+      p->pos[i] = (cav_four){i == 0 && shift, i == 1 && shift, i == 2 && shift, 0} - p->pos[i];
+    if (!shift) turns(turned, n);
+    for (int i = 0; i < 3; i++) normal[i] = turned[i] - normal[i];
+    for (int i = 0; i < 3; i++) turned[i] = none;
+    if (g->carried && !shift) turns(turned, g->align);
+    for (int i = 0; i < 3; i++) tangent[i] = turned[i] - tangent[i];
   }
   // frame: its normal, and about it its second axis, the part of align across the normal
-  cross3(p->rotation, n, normal);
-  axpy3(p->rotation, p->rotation, (dot3(t, tangent) - dot3(t, normal) * along) / across, n);
+  cav_four about = (FOUR_DOT3(t, tangent) - FOUR_DOT3(t, normal) * along) / across;
+  p->rotation[0] = n[1] * normal[2] - n[2] * normal[1];
+  p->rotation[1] = n[2] * normal[0] - n[0] * normal[2];
+  p->rotation[2] = n[0] * normal[1] - n[1] * normal[0];
+  for (int i = 0; i < 3; i++) p->rotation[i] = p->rotation[i] + about * n[i];
 }
 
 // rate of the relative velocity along the axes of the frame, out [dim]
-static void velocity_rate(const cav_contact *c, const motion *m, const placement *p, int side, int k, double *out) {
-  const double *own = m->own[side];
-  double linear[3], angular[3] = {0, 0, 0};
+static inline __attribute__((always_inline)) void velocity_rate(const cav_contact *c, const motion *m,
+                                                                const placement *p, int side, int shift,
+                                                                cav_four *out) {
+  const double *own = m->own[side], *relative = m->relative;
+  cav_four linear[3], angular[3] = {{0}};
 
   // the link's motion does not turn with it; the point of the body does
-  turn(linear, k % 3, k < 3 ? own + 3 : own);
-  if (side == 0) scale3(linear, -1, linear);
-  cross_add3(linear, m->relative, p->pos);
+  turns(linear, shift ? own : own + 3);
+  for (int i = 0; i < 3 && side == 0; i++) linear[i] = -linear[i];
+  FOUR_CROSS_ADD3(linear, relative, p->pos);
 
   // and the axes turn
-  cross_add3(linear, m->relative + 3, p->rotation);
-  for (int i = 0; i < c->dim && i < 3; i++) out[i] = dot3(c->frame + 3 * i, linear);
+  FOUR_CROSS_ADD3(linear, relative + 3, p->rotation);
+  for (int i = 0; i < c->dim && i < 3; i++) out[i] = FOUR_DOT3(c->frame + 3 * i, linear);
   if (c->dim <= 3) return;
-  if (k < 3) turn(angular, k, own);
-  if (side == 0) scale3(angular, -1, angular);
-  cross_add3(angular, m->relative, p->rotation);
-  for (int i = 3; i < c->dim; i++) out[i] = dot3(c->frame + 3 * (i - 3), angular);
+  if (!shift) turns(angular, own);
+  for (int i = 0; i < 3 && side == 0; i++) angular[i] = -angular[i];
+  FOUR_CROSS_ADD3(angular, relative, p->rotation);
+  for (int i = 3; i < c->dim; i++) out[i] = FOUR_DOT3(c->frame + 3 * (i - 3), angular);
 }
 
 /// The law of a contact at its state.
@@ -420,33 +453,46 @@ static void add_wrench(const cav_contact *c, const double *impulse, double wrenc
   }
 }
 
-static void fill_side(const cav_contact *c, const geometry *g, const motion *now, const motion *next,
-                      const law_derivative *law, const double *H, int side, cav_contact_jacobian *derivative) {
+// three of six numbers
+static inline __attribute__((always_inline)) void put_three(double *to, const cav_four *from) {
+  for (int k = 0; k < 3; k++) to[k] = (*from)[k];
+}
+
+CAV_VECTOR_BODY void fill_side_body(const cav_contact *c, const geometry *g, const motion *now, const motion *next,
+                                    const law_derivative *law, const double *H, int side,
+                                    cav_contact_jacobian *derivative) {
   double whole[6] = {0}, along = dot3(c->frame, g->align);
   double across = sqrt(fmax(dot3(g->align, g->align) - along * along, 1e-12));
   add_wrench(c, c->impulse, whole);
-  for (int k = 0; k < 6; k++) {
+  for (int shift = 0; shift < 2; shift++) {
     placement p;
-    double before[6], after[6], rate[6], kept[6];
-    displace(c, g, side, k, along, across, &p);
-    velocity_rate(c, now, &p, side, k, before);
-    velocity_rate(c, next, &p, side, k, after);
-    derivative->dist[side][k] = p.dist;
+    cav_four before[6], after[6], kept[6], wrench[6];
+    displace(c, g, side, shift, along, across, &p);
+    velocity_rate(c, now, &p, side, shift, before);
+    velocity_rate(c, next, &p, side, shift, after);
+    put_three(derivative->dist[side] + 3 * shift, &p.dist);
     for (int j = 0; j < c->dim; j++) kept[j] = (1 - c->damping[j]) * before[j] - after[j];
-    for (int i = 0; i < c->dim; i++) {
-      rate[i] = law->by_dist[i] * p.dist;
-      for (int j = 0; j < c->dim; j++) rate[i] += H[i * c->dim + j] * kept[j];
-      derivative->velocity[side][i][k] = after[i];
-      derivative->impulse[side][i][k] = rate[i];
-    }
     // the impulse turns with the frame and acts at the displaced position
-    double *wrench = derivative->wrench[side][k];
-    cross3(wrench, p.rotation, whole);
-    cross_add3(wrench, p.pos, whole + 3);
-    cross3(wrench + 3, p.rotation, whole + 3);
-    add_wrench(c, rate, wrench);
+    for (int i = 0; i < 3; i++) wrench[i] = wrench[3 + i] = (cav_four){0};
+    FOUR_CROSS_ADD3(wrench, p.rotation, whole);
+    FOUR_CROSS_ADD3(wrench, p.pos, whole + 3);
+    FOUR_CROSS_ADD3(wrench + 3, p.rotation, whole + 3);
+    for (int i = 0; i < c->dim; i++) {
+      const double *e = c->frame + 3 * (i % 3);
+      cav_four rate = law->by_dist[i] * p.dist, *part = i < 3 ? wrench + 3 : wrench;
+      for (int j = 0; j < c->dim; j++) rate += H[i * c->dim + j] * kept[j];
+      put_three(derivative->velocity[side][i] + 3 * shift, &after[i]);
+      put_three(derivative->impulse[side][i] + 3 * shift, &rate);
+      for (int r = 0; r < 3; r++) part[r] = part[r] + rate * e[r];
+    }
+    for (int r = 0; r < 6; r++)
+      for (int k = 0; k < 3; k++) derivative->wrench[side][3 * shift + k][r] = wrench[r][k];
   }
 }
+CAV_BY_VECTORS(fill_side,
+               (const cav_contact *c, const geometry *g, const motion *now, const motion *next,
+                const law_derivative *law, const double *H, int side, cav_contact_jacobian *derivative),
+               (c, g, now, next, law, H, side, derivative))
 
 // whether the law is flat: no curvature beside that of a contact that pushes, which is 1/R
 static int is_flat(const cav_contact *c, const double *H) {

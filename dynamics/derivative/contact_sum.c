@@ -133,12 +133,12 @@ static inline __attribute__((always_inline)) void motion_of_four(const double *p
 
 // adds four columns of a row of the results, of the dofs of a path from the k-th on, as far as there are any
 static inline __attribute__((always_inline)) void add_columns(const cav_derivative_task *t, int row, int k, int end,
-                                                              cav_four q, cav_four push, double keep) {
+                                                              const cav_four *q, const cav_four *push, double keep) {
   for (int i = 0; i < 4 && k + i < end; i++) {
     int at = row * t->nv + t->s->path.dof[k + i];
-    t->dq[at] += q[i];
-    t->dv[at] += keep * push[i];
-    t->dn[at] -= push[i];
+    t->dq[at] += (*q)[i];
+    t->dv[at] += keep * (*push)[i];
+    t->dn[at] -= (*push)[i];
   }
 }
 
@@ -162,8 +162,10 @@ CAV_VECTOR_BODY void between_columns_body(const cav_derivative_task *t, const ca
       next[i] = sign * DOT6(K + 6 * i, axis);
     }
     S = b->axes[!side];
-    for (int row = last_dof(t->model, b->link[!side]); row != b->common; row = t->model->dof[row].parent, S += 6)
-      add_columns(t, row, k, end, on * DOT6(S, dq), DOT6(S, next) * on, keep);
+    for (int row = last_dof(t->model, b->link[!side]); row != b->common; row = t->model->dof[row].parent, S += 6) {
+      cav_four q = on * DOT6(S, dq), push = DOT6(S, next) * on;
+      add_columns(t, row, k, end, &q, &push, keep);
+    }
     if (b->common < 0) continue;
     // rows of the same link: there smooth.c carries the wrench along with it; the dofs that move both links feel nothing
     for (int i = 0, j = 1, l = 2; i < 3; i++, j = (j + 1) % 3, l = (l + 1) % 3) {
@@ -173,8 +175,10 @@ CAV_VECTOR_BODY void between_columns_body(const cav_derivative_task *t, const ca
     }
     for (int i = 0; i < 6; i++) own[i] = dq[i] - carried[i];
     S = b->axes[side];
-    for (int row = last_dof(t->model, b->link[side]); row != b->common; row = t->model->dof[row].parent, S += 6)
-      add_columns(t, row, k, end, -(on * DOT6(S, own)), -(DOT6(S, next) * on), keep);
+    for (int row = last_dof(t->model, b->link[side]); row != b->common; row = t->model->dof[row].parent, S += 6) {
+      cav_four q = -(on * DOT6(S, own)), push = -(DOT6(S, next) * on);
+      add_columns(t, row, k, end, &q, &push, keep);
+    }
     S = b->shared;
     for (int row = b->common; row >= 0; row = t->model->dof[row].parent, S += 6) {
       cav_four q = on * DOT6(S, carried);
