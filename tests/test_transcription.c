@@ -222,6 +222,40 @@ static void test_gradient(cav_transcription *tr, cav_trajectory *at) {
   cav_trajectory_free(moved);
 }
 
+/// What an evaluation leaves at a knot, as one number: merit, cost, forces, readings, rows.
+static double print_of(const cav_transcription *tr) {
+  double sum = tr->options.timestep, weight = 1;
+  for (int t = 0; t < tr->nknot; t++) {
+    const cav_knot *knot = &tr->knot[t];
+    sum += (weight *= 1.0009) * (knot->merit + 3 * knot->cost + 5 * knot->nread + 7 * knot->ncontact + 11 * knot->nrow);
+    for (int d = 0; d < tr->nv; d++) sum += (weight *= 1.0009) * knot->u[d];
+    for (int i = 0; i < knot->nread; i++) sum += (weight *= 1.0009) * knot->y[i];
+    for (int i = 0; i < knot->ncontact; i++) sum += (weight *= 1.0009) * knot->moving[i];
+    for (int i = 0; i < knot->layout.count; i++)
+      sum += (weight *= 1.0009) * (knot->slot[i].value + fmax(-9, knot->slot[i].lower) + fmin(9, knot->slot[i].upper));
+  }
+  return sum;
+}
+
+/// Values that were put by and taken back after others are those of an evaluation, to the bit.
+static void test_return(cav_transcription *tr, cav_trajectory *at) {
+  int n = cav_transcription_unknowns(tr);
+  double *x = calloc((size_t)n, sizeof(double));
+  cav_trajectory *moved = cav_trajectory_copy(at), *back = cav_trajectory_copy(at);
+  for (int i = 0; i < n; i++) x[i] = 0.05 * sin(3 * i);
+  cav_transcription_move(tr, at, x, moved);
+  memset(back->u, 0, (size_t)tr->nknot * (size_t)tr->nv * sizeof(double));
+  CHECK(cav_transcription_values(tr, at) == CAV_OK && cav_values_keep(tr));
+  double here = print_of(tr);
+  CHECK(cav_transcription_values(tr, moved) == CAV_OK);
+  CHECK(print_of(tr) != here);
+  CHECK(cav_transcription_return(tr, back) == CAV_OK);
+  CHECK(print_of(tr) == here);
+  CHECK(!memcmp(back->u, at->u, (size_t)tr->nknot * (size_t)tr->nv * sizeof(double)));
+  free(x);
+  cav_trajectory_free(moved), cav_trajectory_free(back);
+}
+
 /// Rows of the constraints against differences of their values, and their pattern: all that is nonzero is in it, and
 /// all that is in it is nonzero somewhere (but for hard sensor terms, whose pattern is that of the whole reading).
 static void test_rows(cav_transcription *tr, cav_trajectory *at, int tries) {
@@ -458,6 +492,7 @@ static void test_scene(const char *scene, closing close, cav_order order) {
     for (int i = 0; i < tr->knot[t].layout.count; i++) tr->knot[t].slot[i].multiplier = scene_uniform();
   test_gradient(tr, at);
   if (!cav_derivatives_missing(m)) test_methods(tr, at);
+  test_return(tr, at);
   test_controls(tr, at);
   test_threads(&p, tr, at);
   test_normal(tr, at);

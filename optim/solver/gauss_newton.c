@@ -143,13 +143,14 @@ typedef struct trial {
   int grown; ///< only the radius held it back
 } trial;
 
-/// Step of the present radius to a trajectory. The transcription ends at it.
+/// Step of the present radius to a trajectory, whose values are known where they have been put by. The transcription ends at
+/// it.
 static cav_status try_radius(const cav_region *region, dogleg *d, cav_transcription *tr, const cav_trajectory *at,
-                             cav_trajectory *to, double merit, trial *t) {
+                             cav_trajectory *to, double merit, int known, trial *t) {
   t->predicted = bend(d, region->radius);
   t->length = scaled_norm(d, d->step);
   cav_transcription_move(tr, at, d->step, to);
-  cav_status status = cav_transcription_values(tr, to);
+  cav_status status = known ? cav_transcription_return(tr, to) : cav_transcription_values(tr, to);
   t->decrease = status == CAV_OK ? merit - cav_transcription_merit(tr) : -INFINITY;
   return status == CAV_NO_MEMORY || status == CAV_INTERRUPTED ? status : CAV_OK;
 }
@@ -166,7 +167,8 @@ static cav_status grow(cav_region *region, dogleg *d, cav_transcription *tr, con
     trial longer = {0};
     double radius = region->radius;
     region->radius *= 2;
-    cav_status status = try_radius(region, d, tr, at, to, merit, &longer);
+    if (!cav_values_keep(tr)) return CAV_NO_MEMORY;
+    cav_status status = try_radius(region, d, tr, at, to, merit, 0, &longer);
     if (status != CAV_OK) return status;
     if (longer.decrease > 1.01 * t->decrease) {
       *t = longer;
@@ -175,7 +177,7 @@ static cav_status grow(cav_region *region, dogleg *d, cav_transcription *tr, con
     }
     // back to the shorter one; the radius stays for the next linearisation
     region->radius = radius;
-    status = try_radius(region, d, tr, at, to, merit, t);
+    status = try_radius(region, d, tr, at, to, merit, 1, t);
     region->radius = 2 * radius;
     return status;
   }
@@ -187,7 +189,7 @@ static cav_status grow(cav_region *region, dogleg *d, cav_transcription *tr, con
 static cav_status search(cav_region *region, dogleg *d, cav_transcription *tr, const cav_trajectory *at,
                          cav_trajectory *to, double merit, trial *t) {
   for (int attempt = 0;; attempt++) {
-    cav_status status = try_radius(region, d, tr, at, to, merit, t);
+    cav_status status = try_radius(region, d, tr, at, to, merit, 0, t);
     if (status != CAV_OK) return status;
     double ratio = t->predicted > 0 ? t->decrease / t->predicted : -1;
     if (t->predicted <= noise * merit) return CAV_OK;

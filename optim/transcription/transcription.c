@@ -280,6 +280,7 @@ void cav_transcription_free(cav_transcription *tr) {
     free(k->slot), free(k->u), free(k->du), free(k->hessian), free(k->gradient), free(k->rotation), free(k->y),
         free(k->dy), free(k->slot_row), free(k->slot_step), free(k->step_row);
     free(k->dense), free(k->rest), free(k->moving);
+    cav_kept_free(k->kept);
   }
   for (int i = 0; tr->scratch && i < cav_parallel_size(tr->pool); i++) {
     cav_scratch *s = &tr->scratch[i];
@@ -583,6 +584,15 @@ int cav_transcription_stopped(const cav_transcription *tr) {
 
 cav_status cav_transcription_values(cav_transcription *tr, cav_trajectory *at) {
   return cav_transcription_stopped(tr) ? CAV_INTERRUPTED : evaluate(tr, at, 0);
+}
+
+cav_status cav_transcription_return(cav_transcription *tr, cav_trajectory *at) {
+  if (cav_transcription_stopped(tr)) return CAV_INTERRUPTED;
+  prepare_ends(tr, at);
+  cav_term_windows(tr);
+  cav_values_take(tr, at);
+  memset(tr->status, 0, (size_t)tr->nknot * sizeof *tr->status);
+  return cav_transcription_conclude(tr, tr->status);
 }
 
 cav_status cav_transcription_linearise(cav_transcription *tr, cav_trajectory *at) {

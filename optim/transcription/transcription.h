@@ -82,6 +82,7 @@ typedef struct cav_knot {
   cav_absolute
       *absolute; ///< [nabsolute] of the rows with an absolute norm that are not of contacts, in their order; where
                  ///< nabsolute is 0 their Hessian is that of the squares that stand for them
+  struct cav_kept *kept; ///< values put by; NULL: none yet
 } cav_knot;
 
 /// Weights of the augmented Lagrangian, per kind of row.
@@ -177,6 +178,13 @@ int cav_transcription_stopped(const cav_transcription *transcription);
 /// Values at a trajectory: u, constraint rows, cost and merit of every knot. Fills trajectory->u. CAV_INTERRUPTED, as
 /// the next: stopped asks for the end, and nothing was evaluated.
 cav_status cav_transcription_values(cav_transcription *transcription, cav_trajectory *trajectory);
+
+/// Puts the values of the last evaluation by, 0 if memory runs out; then, after others, takes them back in the place of an
+/// evaluation at the trajectory that they are of, as cav_transcription_values. keep.c.
+int cav_values_keep(cav_transcription *transcription);
+void cav_values_take(cav_transcription *transcription, cav_trajectory *trajectory);
+cav_status cav_transcription_return(cav_transcription *transcription, cav_trajectory *trajectory);
+void cav_kept_free(struct cav_kept *kept);
 
 /// Values and derivatives: du, dy, hessian and gradient of the merit of every knot.
 cav_status cav_transcription_linearise(cav_transcription *transcription, cav_trajectory *trajectory);
