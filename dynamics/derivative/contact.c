@@ -359,11 +359,15 @@ static inline __attribute__((always_inline)) void turns(cav_four r[3], const dou
   r[2] = (cav_four){v[1], -v[0], 0, 0};
 }
 
-static inline __attribute__((always_inline)) void take_three(cav_four r[3], const double v[][3]) {
-  for (int i = 0; i < 3; i++) {
-    const double of[4] = {v[0][i], v[1][i], v[2][i], 0};
-    r[i] = *(const cav_four *)of;
-  }
+// numbers of three twists
+static inline __attribute__((always_inline)) void take_three(cav_four *r, double x, double y, double z) {
+  const cav_four none = {0};
+  *r = none;
+  (*r)[0] = x, (*r)[1] = y, (*r)[2] = z;
+}
+
+static inline __attribute__((always_inline)) void take_vectors(cav_four r[3], const double v[][3]) {
+  for (int i = 0; i < 3; i++) take_three(&r[i], v[0][i], v[1][i], v[2][i]);
 }
 
 // along, across: parts of the direction that the second axis is aligned with
@@ -372,11 +376,10 @@ static inline __attribute__((always_inline)) void displace(const cav_contact *c,
   const double *n = c->frame, *t = c->frame + 6;
   const int k = 3 * shift;
   cav_four normal[3], tangent[3], none = {0};
-  const double dist[4] = {g->dist[k], g->dist[k + 1], g->dist[k + 2], 0};
-  p->dist = *(const cav_four *)dist;
-  take_three(p->pos, g->pos + k);
-  take_three(normal, g->normal + k);
-  take_three(tangent, g->tangent + k);
+  take_three(&p->dist, g->dist[k], g->dist[k + 1], g->dist[k + 2]);
+  take_vectors(p->pos, g->pos + k);
+  take_vectors(normal, g->normal + k);
+  take_vectors(tangent, g->tangent + k);
   if (side == 0) {
     // both links move by the twist, then the second moves back
     cav_four turned[3] = {none, none, none};
