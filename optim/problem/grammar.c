@@ -226,6 +226,8 @@ static const cav_xml_element horizon = {
         WORD("order", cav_problem_orders, "midpoint", "where in a step bias forces are taken; momentum: exact in flight"),
         WORD("close", cav_problem_closings, "rest", "rest: at rest after the last knot, with forces there; open: no forces at the last knot"),
         REALS("range", 2, 2, "s", "(fixed duration)", "shortest and longest duration: the solver finds it, times of windows scale with it"),
+        REAL("window", 0, "s", "(all at once)", "a long motion is solved by windows of that length, one after the other: linear in time, with the memory of one"),
+        REAL("overlap", 0, "s", "(a third of the window)", "how far a window looks ahead; the next one solves that part again"),
         REAL("weight", 0, "", "0", "cost of a free duration: weight/2 times its square in s^2")),
     NULL, 0, "duration, time step and the order of the integrator"};
 static const cav_xml_element cycle_pair = {

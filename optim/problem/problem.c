@@ -248,6 +248,15 @@ static cav_status read_horizon(const cav_problem_reader *reader) {
   } else if (cav_xml_get(node, "weight")) {
     return cav_xml_fail(reader->error, node, "weight", "multipliers a free duration: give its range too");
   }
+  status = cav_problem_real(reader, node, "window", DBL_MIN, DBL_MAX, &p->window);
+  p->overlap = p->window / 3;
+  if (!status) status = cav_problem_real(reader, node, "overlap", DBL_MIN, DBL_MAX, &p->overlap);
+  if (status) return status;
+  if (p->window > 0 && (p->duration_most > 0 || p->overlap > p->window - 2 * p->timestep))
+    return cav_xml_fail(reader->error, node, p->duration_most > 0 ? "window" : "overlap",
+                        p->duration_most > 0 ? "contradicts 'range': windows are of a duration that is given"
+                                             : "expected less than the window of %g s by two steps, got %g",
+                        p->window, p->overlap);
   p->order = (cav_order)cav_xml_word(node, "order", p->order);
   p->close_at_rest = cav_xml_word(node, "close", p->close_at_rest);
   return CAV_OK;

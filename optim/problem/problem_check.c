@@ -31,6 +31,11 @@ static cav_status check_horizon(const cav_problem *p, cav_error *error) {
     wrong = "a free duration needs duration between duration_least, above 0, and duration_most";
   else if (!(p->duration_weight >= 0))
     wrong = "duration_weight must not be negative";
+  else if (!(p->window >= 0) || !(p->overlap >= 0) ||
+           (p->window > 0 && !(p->overlap <= p->window - 2 * p->timestep * (1 - near_step))))
+    wrong = "windows need an overlap that is shorter than they are by two steps";
+  else if (p->window > 0 && (p->cycle.on || p->duration_most > 0))
+    wrong = "windows are of a motion with a start, an end and a given duration";
   else if (p->cycle.on && !(p->duration >= 2.5 * p->timestep))
     wrong = "a cycle needs at least three steps";
   else if (p->cycle.on && p->free_start)

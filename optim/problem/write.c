@@ -350,6 +350,10 @@ static void write_head(FILE *out, const cav_problem *p, const char *model_path) 
   write_number(out, "timestep", p->timestep);
   write_text(out, "order", cav_problem_orders[p->order]);
   if (!p->cycle.on) write_text(out, "close", cav_problem_closings[p->close_at_rest != 0]);
+  if (p->window > 0) {
+    write_number(out, "window", p->window);
+    write_number(out, "overlap", p->overlap);
+  }
   if (p->duration_most > 0) {
     write_numbers(out, "range", (double[]){p->duration_least, p->duration_most}, 2);
     write_number(out, "weight", p->duration_weight);

@@ -13,6 +13,7 @@
 #include "problem_check.h"
 #include "solvers.h"
 #include "sqp.h"
+#include "windows.h"
 
 cav_solve_options cav_solve_options_default(void) {
   return (cav_solve_options){.solver = CAV_SOLVER_GAUSS_NEWTON,
@@ -288,6 +289,7 @@ cav_status cav_solve_after(const cav_problem *problem, const cav_solve_options *
   *solution = NULL;
   cav_status status = check(problem, &options, start, error);
   if (status != CAV_OK) return status;
+  if (cav_windows_apply(problem)) return cav_windows_solve(problem, &options, start, solution, error);
   cav_idle idle;
   int alone = 0;
   // a checkpoint of all trees is one of a solve that found them not to be alone

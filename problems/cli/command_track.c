@@ -22,6 +22,9 @@ static const double stance = 0.5;
 
 static const double step = 0.02; // s
 
+/// Longer clips are solved by windows, s: a step of a walk ahead is what a posture depends on.
+static const double window = 2, overlap = 0.6;
+
 typedef struct tracked {
   const cav_command_line *line;
   char *folder, *fit, *problem, *result, *model; // folder/ik, folder/problem.xml, folder/result, of the fit
@@ -100,8 +103,10 @@ static void write_text(FILE *out, const tracked *t, const char *model, const cha
       "     cavort solve problem.xml -o result -->\n<problem name=\"track\"",
       out);
   write_path(out, "model", model);
-  fprintf(out, ">\n  <horizon duration=\"%.10g\" timestep=\"%g\" order=\"momentum\" close=\"open\"/>\n",
-          t->to - t->from, step);
+  fprintf(out, ">\n  <horizon duration=\"%.10g\" timestep=\"%g\" order=\"momentum\" close=\"open\"", t->to - t->from,
+          step);
+  if (t->to - t->from > 1.5 * window) fprintf(out, " window=\"%g\" overlap=\"%g\"", window, overlap);
+  fputs("/>\n", out);
   fputs("  <start free=\"true\"/>\n", out);
   fprintf(out, "  <guess file=\"ik/trajectory.csv\" offset=\"%.10g\"/>\n  <cost>\n    <track", t->from - t->first);
   write_path(out, "file", clip);
