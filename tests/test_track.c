@@ -272,6 +272,20 @@ static void test_smoother(void) {
   CHECK(worst < 1e-8);
   // the verifier's cost, and that of the problem as a folder holds it
   check_cost(p, s);
+  // other ways from start to goal are no ways to a record; a free duration is none at all
+  cav_strategy strategy[CAV_STRATEGIES];
+  int nstrategy;
+  for (int posed = 0; posed < 2; posed++) {
+    double middle[3] = {.1, 0, 0};
+    const cav_guess_pose pose = {.45, middle};
+    p->nguess_pose = posed, p->guess_pose = &pose;
+    CHECK(cav_strategy_list(p, strategy, &nstrategy) == CAV_OK);
+    for (int i = 1; i < nstrategy; i++) {
+      CHECK(strategy[i].use != CAV_STRATEGY_DIAGNOSIS);
+      if (posed) CHECK(strategy[i].use == CAV_STRATEGY_REPAIR);
+    }
+  }
+  p->nguess_pose = 0;
   char path[300];
   snprintf(path, sizeof path, "%s/again.xml", folder);
   cav_problem *again = NULL;

@@ -153,11 +153,30 @@ static void add(cav_strategy *strategy, int *n, const cav_strategy *from, const 
   ++*n;
 }
 
+static void add_repairs(cav_strategy *strategy, int *n, const cav_strategy *stated) {
+  static const char *const repair[] = {"repair-1", "repair-2", "repair-3", "repair-4"};
+  cav_strategy repaired = *stated;
+  repaired.use = CAV_STRATEGY_REPAIR;
+  for (int k = 0; k < REPAIRS; k++)
+    add(strategy, n, &repaired, repair[k], "the best one so far, with the usual cure of what it misses first");
+}
+
+/// Whether a motion is wanted near a record, which is its guess.
+static int is_recorded(const cav_problem *problem) {
+  for (int i = 0; i < problem->nterm; i++)
+    if (problem->term[i].quantity == CAV_QUANTITY_TRACK) return problem->nguess_pose > 0;
+  return 0;
+}
+
 cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[CAV_STRATEGIES], int *n) {
   const cav_strategy stated = {
       .guess = problem->guess, .stated = 1, .order = problem->order, .schedule = problem->schedule};
   *n = 0;
   add(strategy, n, &stated, "stated", "the problem's guess and schedule");
+  if (is_recorded(problem)) {
+    add_repairs(strategy, n, &stated);
+    return CAV_OK;
+  }
 
   if (problem->order == CAV_ORDER_MOMENTUM) {
     cav_strategy twice = stated;
@@ -206,15 +225,13 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
     exact.order = CAV_ORDER_MOMENTUM, exact.first_midpoint = 1, exact.use = CAV_STRATEGY_MOMENTUM;
     add(strategy, n, &exact, "momentum", "under the order of momentum, from a motion of the midpoint order");
   }
-  static const char *const repair[] = {"repair-1", "repair-2", "repair-3", "repair-4"};
-  cav_strategy repaired = stated;
-  repaired.use = CAV_STRATEGY_REPAIR;
-  for (int k = 0; k < REPAIRS && !problem->cycle.on; k++)
-    add(strategy, n, &repaired, repair[k], "the best one so far, with the usual cure of what it misses first");
+  if (!problem->cycle.on) add_repairs(strategy, n, &stated);
   // what a swing-up takes is told by cav_problem_pumping
   cav_strategy longer = stated;
   longer.use = CAV_STRATEGY_DIAGNOSIS;
-  if (!problem->cycle.on && problem->duration_most == 0 && !swings_up)
+  int timed = problem->window > 0;
+  for (int i = 0; i < problem->nterm; i++) timed |= problem->term[i].quantity == CAV_QUANTITY_TRACK;
+  if (!problem->cycle.on && problem->duration_most == 0 && !swings_up && !timed)
     add(strategy, n, &longer, "longer", "with a duration free up to twice the stated one");
   return CAV_OK;
 }

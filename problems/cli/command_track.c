@@ -272,8 +272,6 @@ int cav_command_track(const cav_command_line *line) {
     solve.noperand = 1;
     solve.model = NULL;
     solve.output = t.result;
-    // the guess is the record: no other way is sought
-    if (!solve.strategies) solve.strategies = 1;
     done = cav_command_solve(&solve);
     if (done == CAV_EXIT_CERTIFIED || done == CAV_EXIT_NOT_CERTIFIED) status = tell(&t, &error);
     if (status) done = cav_command_fail(&error);
