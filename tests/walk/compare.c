@@ -56,6 +56,13 @@ static void pass(double *x, int n, int back) {
   }
 }
 
+static void release(forces *f) {
+  for (int s = 0; s < SIDES; s++) {
+    for (int k = 0; k < AXES; k++) free(f->f[s][k]);
+    free(f->cop[s]);
+  }
+}
+
 static void smooth(double *x, int n) {
   pass(x, n, 0);
   pass(x, n, 1);
@@ -150,9 +157,9 @@ static void read_contacts(scene *s, const char *path, int nknot, double h) {
 // fraction of the load that the left foot has, by the plates: a ramp between events in double support
 static void divide(const scene *s, double *left) {
   for (int i = 0; i < s->n; i++) {
-    double up[SIDES];
+    int up[SIDES];
     for (int side = 0; side < SIDES; side++) up[side] = s->plates.f[side][2][i] > present * s->weight;
-    left[i] = up[0] && up[1] ? NAN : up[1] > 0;
+    left[i] = up[0] && up[1] ? (double)NAN : up[1] ? 1 : 0;
   }
   for (int i = 0, j; i < s->n; i = j) {
     for (j = i + 1; j < s->n && isnan(left[i]) && isnan(left[j]); j++) continue;
@@ -354,5 +361,10 @@ int main(int argc, char **argv) {
   double got = marker_rms(&s, set, record, motion, s.offset, s.offset, s.offset + duration);
   printf("markers %.2f mm rms, of the fit alone %.2f: %.2f times\n", 1e3 * got, 1e3 * own, got / own);
   if (argc > 8) write_curves(&s, argv[8]);
+  release(&s.ours), release(&s.plates), release(&s.naive);
+  cav_trajectory_free(fit), cav_trajectory_free(motion);
+  cav_record_free(record);
+  cav_marker_set_free(set);
+  cav_model_free(s.model);
   return 0;
 }
