@@ -101,6 +101,13 @@ int main(void) {
        "time,qpos_a,qpos_b,qvel_a,qvel_b\n0,1,2,7,7\n1,3,4,7,7\n", 1, 2, (double[]){3, 4});
   take("<constraint><sensor type='jointpos' joint='a' file='t.csv'/></constraint>", "time,q\n0,0\n1,1\n", .75, 1,
        (double[]){.75});
+  // of a table that is longer than the motion of 1 s
+  take(COST("velocity joint='b' file='t.csv' offset='2' weight='1'"), "time,b\n0,9\n2,1\n3,5\n3.1,9\n", .5, 2,
+       (double[]){0, 3});
+  take(COST("velocity joint='b' file='t.csv' offset='2.5' weight='1'"), "time,b\n0,9\n2,1\n3,5\n3.1,9\n", .25, 2,
+       (double[]){0, 5});
+  refuse(COST("velocity joint='b' file='t.csv' offset='4' weight='1'"), "time,b\n0,9\n3,5\n", 3, "within the motion");
+  refuse(COST("velocity joint='b' offset='4' weight='1'"), "time,b\n0,9\n", 3, "'file'");
   refuse(COST("sensor type='framepos' site='tip' file='none.csv' weight='1'"), "time\n0\n", 3, "none.csv");
   refuse(TIP, "t,x,y,z\n0,1,2,3\n", 3, "t.csv:1: expected a column 'time'");
   refuse(TIP, "time,x,y\n0,1,2\n", 3, "t.csv:1: expected time and 3 columns");

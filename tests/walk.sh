@@ -17,22 +17,9 @@ tool=$build/problems/cavort
 "$tool" ik "$data/markers_walk.trc" --model problems/models/gait.xml --markers problems/markers/gait.xml --scale --mass $mass \
   -o "$work/fit" | sed -n '/^segment/,/^model/p; /^[0-9]* frames/p'
 
-# columns FIRST to LAST of the fit's accelerations, over a motion
-columns() {
-  awk -F, -v first="$1" -v last="$2" -v offset="$offset" -v duration="$duration" '
-    NR == 1 || ($1 >= offset - 1e-6 && $1 <= offset + duration + 1e-6) {
-      printf "%s", NR == 1 ? $1 : $1 - offset
-      for (i = first; i <= (last ? last : NF); i++) printf ",%s", $i
-      print ""
-    }' "$work/fit/acceleration.csv"
-}
-
 stride() {
-  offset=$2 duration=$3
-  columns 2 4 >"$work/root_linear.csv"
-  columns 5 7 >"$work/root_angular.csv"
-  columns 8 0 >"$work/joints.csv"
-  sed "s|FIT|$work/fit|; s|WORK|$work|; s|CLIP|$data/markers_walk.trc|; s|OFFSET|$offset|; s|DURATION|$3|" tests/walk/problem.in \
+  offset=$2
+  sed "s|FIT|$work/fit|; s|CLIP|$data/markers_walk.trc|; s|OFFSET|$offset|; s|DURATION|$3|" tests/walk/problem.in \
     >"$work/$1.xml"
   "$tool" solve "$work/$1.xml" -o "$work/$1" --threads 1 --strategies 1 -q || true
   printf '\n%s: %s s from %s s on\n' "$1" "$3" "$offset"

@@ -98,7 +98,8 @@ static const cav_xml_element pose = {
 // terms: what is measured; when; and as a cost or as a constraint
 #define TABLE                                                                                                          \
   TEXT("file", "(no table)", "CSV table of targets, linear between its times: column time in s, then one for each number of a target"), \
-  TEXT("columns", "(all, in the order of the target)", "columns of that table to take, separated by |")
+  TEXT("columns", "(all, in the order of the target)", "columns of that table to take, separated by |"), \
+  REAL("offset", 0, "s", "(0: all rows are of the motion)", "time of that table at which the motion begins; rows before it and after the motion's end are passed over")
 #define WINDOW                                                                                                         \
   TEXT("name", "(the element's name)", "name in logs and tables; of a <sensor> without type= the name of a sensor of the model"), \
   TEXT("from", "(0)", "begin of the window, s or \"end\""),                                                            \

@@ -57,39 +57,52 @@ static cav_status ordered_columns(const cav_problem_reader *reader, const cav_xm
   return CAV_OK;
 }
 
-// times increase and lie within the horizon
+// whether a time is one of the motion
+static int is_within(const cav_problem_reader *reader, double t) {
+  return t >= -near_knot * reader->problem->timestep && t <= reader->problem->duration * (1 + near_knot);
+}
+
+// times increase and, where the table is not said to be longer than the motion, lie within the horizon; *first and *n
+// rows are the motion's
 static cav_status check_times(const cav_problem_reader *reader, const cav_xml_node *node, const cav_table *table,
-                              int time) {
-  double before = -INFINITY, most = reader->problem->duration * (1 + near_knot);
+                              int time, int *first, int *n) {
+  double before = -INFINITY, offset = cav_xml_real(node, "offset", 0);
+  int cut = cav_xml_get(node, "offset") != NULL;
+  *first = *n = 0;
   for (int i = 0; i < table->nrow; i++) {
     double t = table->value[(size_t)i * (size_t)table->ncol + (size_t)time];
-    if (t < 0 || t > most)
-      return cav_xml_fail(reader->error, node, "file", "%s:%d: expected a time within the horizon, 0 .. %g s, got %g",
+    if (!cut && !is_within(reader, t))
+      return cav_xml_fail(reader->error, node, "file",
+                          "%s:%d: expected a time within the horizon, 0 .. %g s, got %g; of a longer table say 'offset'",
                           table->path, table->line[i], reader->problem->duration, t);
     if (t <= before)
       return cav_xml_fail(reader->error, node, "file", "%s:%d: expected a time after the one before, %g s, got %g",
                           table->path, table->line[i], before, t);
     before = t;
+    if (!is_within(reader, t - offset)) continue;
+    if (!*n) *first = i;
+    ++*n;
   }
-  if (table->nrow > 0) return CAV_OK;
-  return cav_xml_fail(reader->error, node, "file", "%s: expected at least one row of targets", table->path);
+  if (*n > 0) return CAV_OK;
+  return cav_xml_fail(reader->error, node, "file", "%s: expected at least one row of targets%s", table->path,
+                      cut ? " within the motion" : "");
 }
 
 static cav_status target_columns(const cav_problem_reader *reader, const cav_xml_node *node, const cav_table *table,
                                  int *column, cav_problem_targets *targets) {
-  int time = column_of(table, "time"), count = targets->count;
+  int time = column_of(table, "time"), count = targets->count, first, n;
   if (time < 0) return cav_xml_fail(reader->error, node, "file", "%s:1: expected a column 'time', s", table->path);
   cav_status status = cav_xml_get(node, "columns") ? named_columns(reader, node, table, count, column)
                                                    : ordered_columns(reader, node, table, time, count, column);
-  if (!status) status = check_times(reader, node, table, time);
+  if (!status) status = check_times(reader, node, table, time, &first, &n);
   if (status) return status;
-  targets->n = table->nrow;
-  targets->time = cav_problem_alloc(reader->owner, sizeof(double) * (size_t)table->nrow * (size_t)(count + 1));
+  targets->n = n;
+  targets->time = cav_problem_alloc(reader->owner, sizeof(double) * (size_t)n * (size_t)(count + 1));
   if (!targets->time) return cav_problem_no_memory(reader);
-  targets->value = targets->time + table->nrow;
-  for (int i = 0; i < table->nrow; i++) {
-    const double *row = table->value + (size_t)i * (size_t)table->ncol;
-    targets->time[i] = row[time];
+  targets->value = targets->time + n;
+  for (int i = 0; i < n; i++) {
+    const double *row = table->value + (size_t)(first + i) * (size_t)table->ncol;
+    targets->time[i] = fmax(row[time] - cav_xml_real(node, "offset", 0), 0);
     for (int k = 0; k < count; k++) targets->value[(size_t)i * (size_t)count + (size_t)k] = row[column[k]];
   }
   return CAV_OK;

@@ -146,6 +146,8 @@ static cav_status read_table(const cav_problem_reader *reader, const cav_xml_nod
 static cav_status check_sources(const cav_problem_reader *reader, const cav_xml_node *node, const char *own) {
   if (!cav_xml_get(node, "file") && cav_xml_get(node, "columns"))
     return cav_xml_fail(reader->error, node, "columns", "says which columns of attribute 'file', which is missing");
+  if (!cav_xml_get(node, "file") && cav_xml_get(node, "offset"))
+    return cav_xml_fail(reader->error, node, "offset", "is a time of attribute 'file', which is missing");
   if (cav_xml_get(node, "file") && own)
     return cav_xml_fail(reader->error, node, "file", "contradicts %s; give one of the two", own);
   return CAV_OK;
