@@ -38,7 +38,8 @@ clip() {
 
 clip rest .5 -.3 .1 0 0 0
 clip flight 0 0 1 .7 2 9.81
-"$cavort" track rest.csv --model box.xml --markers set.xml --threads 1 >out 2>err || fail "a box at rest: $(tail -n 3 err out)"
+# harder than what carries a body on the pads of its feet: a light box would hover
+"$cavort" track rest.csv --model box.xml --markers set.xml --set schedule/last/@smoothing=0.0004 --threads 1 >out 2>err || fail "a box at rest: $(tail -n 3 err out)"
 # soft contacts carry it two millimetres above the floor
 grep -q '^markers [01].[0-9]* mm rms' out || fail "markers of a box at rest: $(grep '^markers' out)"
 # weight 19.62 N, under the middle, once what the start has is settled

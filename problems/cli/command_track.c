@@ -14,13 +14,13 @@
 #include "pressure.h"
 #include "result.h"
 
-/// Noise of a frame of one marker, m: errors of a centimetre, which skin and fit keep for about ten frames.
-static const double usual_sd = 0.03;
+/// Noise of a frame of one marker, m: errors of one to two centimetres, which skin and fit keep for some ten frames.
+static const double usual_sd = 0.05;
 
 /// A foot that slides so far over a step of half a second is one that the record does not tell from one that stands, s.
 static const double stance = 0.5;
 
-static const double step = 0.02; // s
+static const double step = 0.01; // s
 
 /// Longer clips are solved by windows, s: a step of a walk ahead is what a posture depends on.
 static const double window = 2, overlap = 0.6;
@@ -28,8 +28,8 @@ static const double window = 2, overlap = 0.6;
 typedef struct tracked {
   const cav_command_line *line;
   char *folder, *fit, *problem, *result, *model; // folder/ik, folder/problem.xml, folder/result, of the fit
-  double first, from, to;                        // s: of the first frame, of the motion
-  double fit_rms;                                // m, over the motion
+  cav_model *compiled;
+  double first, from, to; // s: of the first frame, of the motion
 } tracked;
 
 // NAME.track of dir/NAME.trc
@@ -69,8 +69,8 @@ static int fit(tracked *t, cav_error *error) {
 
 // the time that is asked for, whole steps of it that the clip has
 static cav_status take_time(tracked *t, cav_error *error) {
-  cav_model *model = cav_model_load(t->model, error);
-  cav_marker_set *set = model ? cav_marker_set_read(t->line->markers, model, error) : NULL;
+  t->compiled = cav_model_load(t->model, error);
+  cav_marker_set *set = t->compiled ? cav_marker_set_read(t->line->markers, t->compiled, error) : NULL;
   cav_record *record = set ? cav_record_read(t->line->operand, &set->clip, error) : NULL;
   if (record) {
     double last = record->time[record->nframe - 1];
@@ -87,7 +87,6 @@ static cav_status take_time(tracked *t, cav_error *error) {
                            step, record->time[0], record->time[record->nframe - 1]);
   cav_record_free(record);
   cav_marker_set_free(set);
-  cav_model_free(model);
   return status;
 }
 
@@ -97,33 +96,62 @@ static void write_path(FILE *out, const char *name, const char *path) {
   fputc('"', out);
 }
 
+// dofs of a joint, and which of them a set of dofs selects: root_linear 0, root_angular 1, joints 2
+static int dofs_of(const cav_joint *joint) {
+  return joint->type == CAV_JOINT_FREE ? 6 : joint->type == CAV_JOINT_BALL ? 3 : 1;
+}
+
+static int selects(const cav_joint *joint, int set, int k) {
+  return joint->type == CAV_JOINT_FREE ? set == k / 3 : set == 2;
+}
+
+// a cost on how the accelerations of the fit are missed; nothing where the model has no such dofs
+static void write_accelerations(FILE *out, const tracked *t, int set, const char *dofs, double weight) {
+  const cav_model *m = t->compiled;
+  int n = 0;
+  for (int j = 0; j < m->njoint; j++)
+    for (int k = 0; k < dofs_of(&m->joint[j]); k++) {
+      if (!selects(&m->joint[j], set, k)) continue;
+      if (!n++)
+        fprintf(out,
+                "    <acceleration name=\"%s\" dofs=\"%s\" file=\"ik/acceleration.csv\" offset=\"%.10g\" "
+                "weight=\"%g\" within=\"any\"\n      columns=\"",
+                dofs, dofs, t->from - t->first, weight);
+      fputs(n > 1 ? "|qacc_" : "qacc_", out);
+      cav_file_write_xml(out, m->joint[j].name);
+      if (dofs_of(&m->joint[j]) > 1) fprintf(out, "_%d", k);
+    }
+  if (n) fputs("\"/>\n", out);
+}
+
 static void write_text(FILE *out, const tracked *t, const char *model, const char *clip) {
   fputs(
       "<!-- The motion nearest to a record: written by cavort track; edit it and solve it again:\n"
       "     cavort solve problem.xml -o result -->\n<problem name=\"track\"",
       out);
   write_path(out, "model", model);
-  fprintf(out, ">\n  <horizon duration=\"%.10g\" timestep=\"%g\" order=\"momentum\" close=\"open\"", t->to - t->from,
-          step);
+  fprintf(out, ">\n  <horizon duration=\"%.10g\" timestep=\"%g\" close=\"open\"", t->to - t->from, step);
   if (t->to - t->from > 1.5 * window) fprintf(out, " window=\"%g\" overlap=\"%g\"", window, overlap);
-  fputs("/>\n", out);
-  fputs("  <start free=\"true\"/>\n", out);
-  fprintf(out, "  <guess file=\"ik/trajectory.csv\" offset=\"%.10g\"/>\n  <cost>\n    <track", t->from - t->first);
-  write_path(out, "file", clip);
-  fprintf(out, " markers=\"ik/markers.xml\" sd=\"%g\" offset=\"%.10g\"/>\n", usual_sd, t->from);
-  fputs(
-      "    <!-- nothing else is wanted of postures and velocities -->\n"
-      "    <posture weight=\"0\"/>\n    <velocity weight=\"0\"/>\n",
-      out);
-  fprintf(out,
-          "    <!-- contacts may slide as fast as the markers' noise hides over a step of %g s -->\n"
-          "    <slip weight=\"200\" within=\"%g\"/>\n  </cost>\n",
-          stance, usual_sd / stance);
+  fputs("/>\n  <start free=\"true\"/>\n", out);
+  fprintf(out, "  <guess file=\"ik/trajectory.csv\" offset=\"%.10g\"/>\n", t->from - t->first);
   fputs(
       "  <!-- all of the actuators' strength: nothing is kept for feedback -->\n  <limits effort=\"1\"/>\n"
-      "  <!-- soles and floor yield by a millimetre or two, as a shoe does -->\n"
-      "  <schedule next_gap=\"exact\"><last softness=\"0.01\"/></schedule>\n</problem>\n",
+      "  <!-- soles and floor give way by millimetres under the body's weight -->\n"
+      "  <schedule><last softness=\"0.08\" smoothing=\"0.0015\"/></schedule>\n"
+      "  <cost>\n    <!-- markers say where: skin and model err by centimetres, and by the same for many frames -->\n"
+      "    <track",
       out);
+  write_path(out, "file", clip);
+  fprintf(out, " markers=\"ik/markers.xml\" sd=\"%g\" offset=\"%.10g\"/>\n", usual_sd, t->from);
+  fputs("    <!-- accelerations of the fit, below 6 Hz, say how fast that changes -->\n", out);
+  write_accelerations(out, t, 0, "root_linear", 100);
+  write_accelerations(out, t, 1, "root_angular", 3);
+  write_accelerations(out, t, 2, "joints", 0.1);
+  fputs("    <!-- settles what feet do against each other -->\n    <effort weight=\"4\"/>\n", out);
+  fprintf(out, "    <!-- contacts may slide as fast as the noise of markers hides over %g s -->\n", stance);
+  fprintf(out, "    <slip weight=\"10\" within=\"%g\"/>\n", usual_sd / stance);
+  fputs("    <gap weight=\"0\"/>\n    <impact weight=\"0\"/>\n    <velocity weight=\"0\"/>\n  </cost>\n</problem>\n",
+        out);
 }
 
 static cav_status write_problem(const tracked *t, cav_error *error) {
@@ -276,6 +304,7 @@ int cav_command_track(const cav_command_line *line) {
     if (done == CAV_EXIT_CERTIFIED || done == CAV_EXIT_NOT_CERTIFIED) status = tell(&t, &error);
     if (status) done = cav_command_fail(&error);
   }
+  cav_model_free(t.compiled);
   free(t.folder), free(t.fit), free(t.problem), free(t.result), free(t.model);
   return done;
 }
