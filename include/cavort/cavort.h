@@ -3,6 +3,7 @@
 #define CAVORT_CAVORT_H
 
 #include "cavort/dynamics.h"
+#include "cavort/estimate.h"
 #include "cavort/mocap.h"
 #include "cavort/model.h"
 #include "cavort/mpc.h"

@@ -663,6 +663,39 @@ CAV_API void cav_model_free(cav_model *model);
 /// model.
 CAV_API cav_status cav_model_perturb(cav_model *model, const double *mass_scale, double friction);
 
+/// Single numbers of a model that may be unknown (cavort/estimate.h), X(kind, word, of, unit, text).
+// clang-format off
+#define CAV_PARAMETERS(X)                                                                                          \
+  X(MASS, "mass", BODY, "kg", "mass of a body; its moments of inertia go with it, its shape stays")                \
+  X(COM, "com", BODY, "m", "a coordinate of a body's centre of mass in its own frame: component 0, 1 or 2")        \
+  X(INERTIA, "inertia", BODY, "kg m^2", "largest principal moment of inertia of a body; the others go with it")    \
+  X(FRICTION, "friction", GEOM, "", "coefficient of sliding friction in all contacts of a geom")                   \
+  X(STIFFNESS, "stiffness", JOINT, "N m/rad or N/m", "stiffness of a joint's spring")                              \
+  X(DAMPING, "damping", JOINT, "N m s/rad or N s/m", "damping of a joint, in all its dofs")
+// clang-format on
+
+/// Kinds of parameters: CAV_PARAMETERS.
+typedef enum cav_parameter_kind {
+#define CAV_PARAMETER_MEMBER(kind, ...) CAV_PARAMETER_##kind,
+  CAV_PARAMETERS(CAV_PARAMETER_MEMBER)
+#undef CAV_PARAMETER_MEMBER
+      CAV_PARAMETER_KINDS
+} cav_parameter_kind;
+
+/// A number that is not known. What the model has is where the search begins and the mean of its prior.
+typedef struct cav_parameter {
+  cav_parameter_kind kind; ///< what it is
+  int object;              ///< body, geom or joint that it is of
+  int component;           ///< of COM: 0 x, 1 y, 2 z
+  double deviation;        ///< of its prior, in its unit; infinite: nothing is known beforehand
+} cav_parameter;
+
+/// A parameter as the model has it, and another value in its place before any state of the model exists; what the model
+/// derives from it follows. CAV_BAD_INPUT: there is no such object, or no such value (a mass that is not positive, a
+/// negative friction, stiffness or damping), nothing changed; CAV_NO_MEMORY: do not use the model.
+CAV_API double cav_model_parameter(const cav_model *model, const cav_parameter *parameter);
+CAV_API cav_status cav_model_set_parameter(cav_model *model, const cav_parameter *parameter, double value);
+
 enum { CAV_GEOM_LABEL = 96 }; ///< room for a label
 
 /// Name of a geom, or where it has none "geom 2 of BODY", by its number in its body, written into label.

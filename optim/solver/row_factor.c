@@ -98,11 +98,11 @@ void cav_row_factor_advance(cav_row_factor *f) {
   f->next++;
 }
 
-double cav_row_factor_least(const cav_row_factor *f) {
+double cav_row_factor_least(const cav_row_factor *f, int skip) {
   size_t width = columns(f), n = (size_t)f->n, p = (size_t)f->border;
   double least = INFINITY;
   for (size_t j = 0; j < (size_t)f->blocks * n; j++) least = fmin(least, fabs(f->R[j * width + j % n]));
-  for (size_t j = 0; j < p; j++) least = fmin(least, fabs(f->corner[j * p + j]));
+  for (size_t j = 0; j + (size_t)skip < p; j++) least = fmin(least, fabs(f->corner[j * p + j]));
   return least;
 }
 

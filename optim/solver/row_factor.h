@@ -31,8 +31,9 @@ double *cav_row_factor_add(cav_row_factor *factor, int count);
 /// Goes on to the next block; after the last one finishes the border.
 void cav_row_factor_advance(cav_row_factor *factor);
 
-/// Least size of a diagonal entry of R, 0: an unknown that no row tells of. After the border is finished.
-double cav_row_factor_least(const cav_row_factor *factor);
+/// Least size of a diagonal entry of R but for the last columns of the border, skip; 0: an unknown that no row tells of.
+/// After the border is finished.
+double cav_row_factor_least(const cav_row_factor *factor, int skip);
 
 /// Goes back to a block: the last one first, then one by one.
 void cav_row_factor_back(cav_row_factor *factor, int block);

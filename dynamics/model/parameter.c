@@ -1,0 +1,138 @@
+/// Single numbers of a compiled model: masses, centres of mass, inertia, friction, springs and dampers, read and replaced,
+/// with what the model derives from them. Bodies of one link weigh together, as the compiler has it (bodies.c).
+#include <math.h>
+#include <string.h>
+
+#include "compile.h"
+#include "math3.h"
+
+static int width_of(const cav_joint *joint) {
+  return joint->type == CAV_JOINT_FREE ? 6 : joint->type == CAV_JOINT_BALL ? 3 : 1;
+}
+
+// a pair of geoms that may touch, of which one is this; -1: there is none
+static int pair_of(const cav_model *m, int geom) {
+  for (int i = 0; i < m->npair; i++)
+    if (m->pair[i].geom1 == geom || m->pair[i].geom2 == geom) return i;
+  return -1;
+}
+
+// whether a parameter stands for something in the model
+static int exists(const cav_model *m, const cav_parameter *p) {
+  switch (p->kind) {
+    case CAV_PARAMETER_MASS:
+    case CAV_PARAMETER_COM:
+    case CAV_PARAMETER_INERTIA:
+      return p->object > 0 && p->object < m->nbody && m->body[p->object].link > 0 && m->body[p->object].mass > 0 &&
+             p->component >= 0 && p->component < (p->kind == CAV_PARAMETER_COM ? 3 : 1);
+    case CAV_PARAMETER_FRICTION:
+      return p->object >= 0 && p->object < m->ngeom && pair_of(m, p->object) >= 0;
+    case CAV_PARAMETER_STIFFNESS:
+    case CAV_PARAMETER_DAMPING:
+      return p->object >= 0 && p->object < m->njoint;
+    case CAV_PARAMETER_KINDS:
+      return 0;
+  }
+  return 0;
+}
+
+static double largest(const double x[3]) { return fmax(x[0], fmax(x[1], x[2])); }
+
+double cav_model_parameter(const cav_model *m, const cav_parameter *p) {
+  if (!exists(m, p)) return NAN;
+  switch (p->kind) {
+    case CAV_PARAMETER_MASS:
+      return m->body[p->object].mass;
+    case CAV_PARAMETER_COM:
+      return m->body[p->object].com[p->component];
+    case CAV_PARAMETER_INERTIA:
+      return largest(m->body[p->object].inertia);
+    case CAV_PARAMETER_FRICTION:
+      return m->pair[pair_of(m, p->object)].friction[0];
+    case CAV_PARAMETER_STIFFNESS:
+      return m->joint[p->object].stiffness;
+    case CAV_PARAMETER_DAMPING:
+      return m->dof[m->joint[p->object].dof].damping;
+    case CAV_PARAMETER_KINDS:
+      break;
+  }
+  return NAN;
+}
+
+// mass, centre and inertia of a link from those of its bodies
+static void weigh_link(cav_model *m, int l) {
+  cav_link *link = (cav_link *)m->link + l;
+  link->mass = 0;
+  zero3(link->com);
+  memset(link->inertia, 0, sizeof link->inertia);
+  for (int pass = 0; pass < 2; pass++) {
+    for (int b = 0; b < m->nbody; b++) {
+      const cav_body *x = &m->body[b];
+      double pos[3], quat[4], R[9], W[6], S[6] = {x->inertia[0], x->inertia[1], x->inertia[2], 0, 0, 0};
+      if (x->link != l) continue;
+      quat_rotate(pos, x->quat, x->com);
+      add3(pos, pos, x->pos);
+      if (pass == 0) {
+        link->mass += x->mass;
+        axpy3(link->com, link->com, x->mass, pos);
+        continue;
+      }
+      quat_mul(quat, x->quat, x->iquat);
+      quat_matrix(R, quat);
+      symmetric_rotate(W, R, S);
+      sub3(pos, pos, link->com);
+      for (int k = 0; k < 3; k++) link->inertia[k] += W[k] + x->mass * (dot3(pos, pos) - pos[k] * pos[k]);
+      link->inertia[3] += W[3] - x->mass * pos[0] * pos[1];
+      link->inertia[4] += W[4] - x->mass * pos[0] * pos[2];
+      link->inertia[5] += W[5] - x->mass * pos[1] * pos[2];
+    }
+    if (pass == 0) scale3(link->com, 1 / link->mass, link->com);
+  }
+  m->mass = 0;
+  for (int i = 1; i < m->nlink; i++) m->mass += m->link[i].mass;
+}
+
+static void set_body(cav_model *m, const cav_parameter *p, double value) {
+  cav_body *body = (cav_body *)m->body + p->object;
+  if (p->kind == CAV_PARAMETER_COM) {
+    body->com[p->component] = value;
+  } else {
+    double scale = value / cav_model_parameter(m, p);
+    if (p->kind == CAV_PARAMETER_MASS) body->mass = value;
+    for (int k = 0; k < 3; k++) body->inertia[k] *= scale;
+  }
+  weigh_link(m, body->link);
+}
+
+static void set_friction(cav_model *m, int geom, double value) {
+  cav_pair *pair = (cav_pair *)m->pair;
+  ((cav_geom *)m->geom)[geom].friction[0] = value;
+  for (int i = 0; i < m->npair; i++)
+    if (pair[i].geom1 == geom || pair[i].geom2 == geom) pair[i].friction[0] = pair[i].friction[1] = value;
+}
+
+cav_status cav_model_set_parameter(cav_model *m, const cav_parameter *p, double value) {
+  int positive = p->kind == CAV_PARAMETER_MASS || p->kind == CAV_PARAMETER_INERTIA, any = p->kind == CAV_PARAMETER_COM;
+  if (!exists(m, p) || !isfinite(value) || (positive && !(value > 0)) || (!any && value < 0)) return CAV_BAD_INPUT;
+  if (p->kind == CAV_PARAMETER_INERTIA && !(cav_model_parameter(m, p) > 0)) return CAV_BAD_INPUT;
+  switch (p->kind) {
+    case CAV_PARAMETER_MASS:
+    case CAV_PARAMETER_COM:
+    case CAV_PARAMETER_INERTIA:
+      set_body(m, p, value);
+      break;
+    case CAV_PARAMETER_FRICTION:
+      set_friction(m, p->object, value);
+      break;
+    case CAV_PARAMETER_STIFFNESS:
+      ((cav_joint *)m->joint)[p->object].stiffness = value;
+      break;
+    case CAV_PARAMETER_DAMPING:
+      for (int k = 0; k < width_of(&m->joint[p->object]); k++)
+        ((cav_dof *)m->dof)[m->joint[p->object].dof + k].damping = value;
+      break;
+    case CAV_PARAMETER_KINDS:
+      return CAV_BAD_INPUT;
+  }
+  return cav_reference_weights(m);
+}

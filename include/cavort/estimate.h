@@ -1,0 +1,42 @@
+/// Numbers of a model that are not known, estimated with a recorded motion.
+#ifndef CAVORT_ESTIMATE_H
+#define CAVORT_ESTIMATE_H
+
+#include "cavort/solve.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/// A motion and parameters that were found together.
+typedef struct cav_estimate {
+  int nparameter;     ///< number of parameters
+  double *value;      ///< [nparameter] in their units
+  double *error;      ///< [nparameter] standard errors, the motion being as unknown as it is
+  double *covariance; ///< [nparameter*nparameter]
+  double *seen;       ///< [nparameter] what the record alone tells, in units of the priors (of the values where there
+                      ///< is none), of combinations of parameters, the best seen first: 1/deviation^2. Far below 1: the
+                      ///< record does not see that combination, and its value is the prior's
+  double *combination;    ///< [nparameter*nparameter] these combinations, by rows, in the same units, of length 1
+  int iterations;         ///< changes of the parameters
+  const cav_model *model; ///< with these values; its names are those of the problem's model, which has to outlive it
+  cav_solution *solution; ///< the motion of that model
+  void *owner;
+} cav_estimate;
+
+/// The parameters and the motion that together cost least, priors included: for given parameters the motion is solved, what
+/// that costs falls by Gauss and Newton's steps in the parameters alone, from the problem's border (the Schur complement of the
+/// motion). start: of the first solve, NULL: the problem's guess. options: of the solves, NULL: the default ones. As
+/// cav_solve; CAV_NOT_CONVERGED too where parameters still move after the last iteration, CAV_NOT_SUPPORTED: a free
+/// duration. Terms' quantities of one's own must not look at the model by themselves. NULL in
+/// *estimate on failure but CAV_NOT_CONVERGED. optim/solver/parameters.c; optim/METHOD.md, 1.
+CAV_API cav_status cav_estimate_solve(const cav_problem *problem, int nparameter, const cav_parameter *parameter,
+                                      const cav_solve_options *options, const cav_trajectory *start,
+                                      cav_estimate **estimate, cav_error *error);
+/// Frees an estimate, its model and its motion; NULL is fine.
+CAV_API void cav_estimate_free(cav_estimate *estimate);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
