@@ -191,6 +191,36 @@ static void test_parts(const cav_model *m) {
   cav_optimiser_free(o);
 }
 
+/// Targets that move: after a shift of five knots the optimum is that of a problem whose waypoints come five knots sooner.
+static void test_targets(const cav_model *m) {
+  enum { SHIFT = 5, POINTS = 3 };
+  cav_term term[3];
+  cav_problem p = problem_of(m, term, 1);
+  cav_error error = {0};
+  cav_solve_options options = cav_solve_options_default();
+  double way[POINTS] = {0.1, 0.5, 0.9}, sooner[POINTS], place[POINTS * N] = {0, 0, 1, -1, -0.5, 2}, most[2] = {0};
+  for (int i = 0; i < POINTS; i++) sooner[i] = way[i] - SHIFT * step;
+  term[0].target = place, term[0].nwaypoint = POINTS, term[0].waypoint_time = way;
+  for (int moving = 0; moving < 2; moving++) {
+    options.moving_targets = moving;
+    term[0].waypoint_time = way;
+    cav_optimiser *o = cav_optimiser_new(&p, &options, NULL, &error);
+    if (!CHECK(o != NULL)) return;
+    CHECK(cav_optimiser_shift(o, SHIFT, begin, begin + N) == CAV_OK);
+    CHECK(cav_optimiser_solve(o, 1, NULL, &error) == CAV_OK);
+    term[0].waypoint_time = sooner;
+    cav_optimiser *other = cav_optimiser_new(&p, &options, NULL, &error);
+    if (!CHECK(other != NULL)) return;
+    CHECK(cav_optimiser_solve(other, 1, NULL, &error) == CAV_OK);
+    const cav_trajectory *a = cav_optimiser_trajectory(o), *b = cav_optimiser_trajectory(other);
+    for (int i = 0; i < a->nknot * N; i++) most[moving] = fmax(most[moving], fabs(a->q[i] - b->q[i]));
+    cav_optimiser_free(o);
+    cav_optimiser_free(other);
+  }
+  printf("targets: %.1e apart where they move, %.2g where they do not\n", most[1], most[0]);
+  CHECK(most[1] < 1e-6 && most[0] > 0.05);
+}
+
 static void test_refusals(const cav_model *m) {
   cav_term term[3];
   cav_problem p = problem_of(m, term, 1);
@@ -232,6 +262,7 @@ int main(void) {
     test_regulator(m, CAV_ORDER_MIDPOINT);
     test_delay(m);
     test_parts(m);
+    test_targets(m);
     test_refusals(m);
   }
   cav_model_free(m);

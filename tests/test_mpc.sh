@@ -50,6 +50,7 @@ refused "there is something left over" --push "20 torso y 0.5 0.1 7"
 refused "no body of that name" --push "20 nothing y 0.5"
 refused "expected at most the time between plans" --deadline 1
 refused "whole milliseconds apart" --rate 300
-refused "expected at least 2" --knots 1
+refused "knots of a plan from 2" --knots 1
+refused "knots of a plan from 2" --knots 41
 echo "$checks checks, $failed failed"
 [ "$failed" = 0 ]

@@ -11,6 +11,7 @@ extern "C" {
 /// How to control.
 typedef struct cav_mpc_options {
   int threads;     ///< over knots, >= 1; plans do not depend on it
+  int knots;       ///< that a plan looks ahead, from 2 on; 0: all of the problem's
   int iterations;  ///< Gauss-Newton steps for a plan, >= 1
   double delay;    ///< s from a state to the plan that is made from it: what making one takes at most; 0: at once
   double timestep; ///< s, > 0: step at which the delay is looked ahead over
@@ -22,14 +23,15 @@ typedef struct cav_mpc_options {
 /// One thread, two iterations, no delay, 1 ms, 40 rad/s.
 CAV_API cav_mpc_options cav_mpc_options_default(void);
 
-/// A controller for one problem: its start is where the first plan begins, its duration how far plans look ahead. Plans
+/// A controller for one problem: its start is where the first plan begins, from which on waypoints are timed. Plans
 /// obey the law of the schedule's last stage, so that is a soft one (optim/METHOD.md, 12). Weights, targets and scales of
-/// terms may be changed in place between calls; their windows move along with the plan. One thread at a time.
+/// terms may be changed in place between calls. Windows of terms move along with the plan, waypoints of their targets
+/// do not: they keep to the clock, so that what is to be followed may move. One thread at a time.
 typedef struct cav_mpc cav_mpc;
 
-/// At a plan for the problem's start: start if not NULL, else the problem is solved. The problem is borrowed. NULL with
-/// the reason in error: as cav_solve, and CAV_BAD_INPUT for options out of range, CAV_NOT_SUPPORTED for a cycle or a free
-/// duration. That the first plan did not converge is no error.
+/// At a plan for the problem's start: start if not NULL, else one that is solved for from the first knots of the problem's
+/// guess; that it did not converge is no error. The problem is borrowed. NULL with the reason in error: as cav_solve, and
+/// CAV_BAD_INPUT for options out of range, CAV_NOT_SUPPORTED for a cycle or a free duration.
 CAV_API cav_mpc *cav_mpc_new(const cav_problem *problem, const cav_mpc_options *options, const cav_trajectory *start,
                              cav_error *error);
 /// Frees a controller; NULL is fine.

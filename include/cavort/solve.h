@@ -130,8 +130,9 @@ typedef struct cav_solve_options {
   int nmultiplier;          ///< 0, or number of rows: cav_solution's of a solve of the same knots and rows
   const double *multiplier; ///< [nmultiplier] to start with, NULL: zeros
   int fixed_multipliers;    ///< 1: cav_optimiser_iterate leaves them as they are, rows are held by penalties
-  double tolerance;         ///< unactuated force at the end, fraction of weight
-  int diagnose; ///< 1: where constraints cannot all hold, end at their least violation, which cav_explain needs
+  int moving_targets; ///< 1: waypoints of targets keep to the first start's clock, whatever cav_optimiser_shift takes off
+  double tolerance;   ///< unactuated force at the end, fraction of weight
+  int diagnose;       ///< 1: where constraints cannot all hold, end at their least violation, which cav_explain needs
   /// Of the dynamics: analytic, and what has none (cav_derivatives_missing, sensors) by one-sided differences, or all
   /// by differences. Ipopt always takes centred ones.
   cav_derivative derivative;
@@ -294,8 +295,8 @@ CAV_API cav_status cav_optimiser_iterate(cav_optimiser *optimiser, int iteration
 /// Takes so many knots off the front and starts the rest at q [nq], v [nv], both NULL: as planned there. A part of a
 /// knot moves every knot by that part of the step to the next. Knots that are new at the end hold the last
 /// configuration. Multipliers move along where rows of two knots are alike. Windows and targets of terms stay at their
-/// times after the new start. CAV_BAD_INPUT: not 0 to all knots but two, or q or v not finite; CAV_NOT_SUPPORTED: a
-/// cycle. Allocates nothing.
+/// times after the new start, but for moving_targets. CAV_BAD_INPUT: not 0 to all knots but two, or q or v not finite;
+/// CAV_NOT_SUPPORTED: a cycle. Allocates nothing.
 CAV_API cav_status cav_optimiser_shift(cav_optimiser *optimiser, double knots, const double *q, const double *v);
 
 /// The motion, the problem with the present start, and the contact law of the motion, as cav_verify takes them; the

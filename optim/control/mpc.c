@@ -40,14 +40,17 @@ static cav_status refuse(cav_error *error, cav_status status, const char *text) 
 }
 
 static cav_status check(const cav_problem *problem, const cav_mpc_options *o, cav_error *error) {
+  const double ahead = o->knots ? (o->knots - 1) * problem->timestep : problem->duration;
   if (problem->cycle.on || problem->duration_most > 0)
     return refuse(error, CAV_NOT_SUPPORTED, "mpc: plans ahead of a moving body: no cycle and no free duration");
   if (o->threads < 1 || o->iterations < 1)
     return refuse(error, CAV_BAD_INPUT, "mpc: expected at least one thread and one iteration a plan");
+  if (o->knots != 0 && (o->knots < 2 || ahead > problem->duration * (1 + rounding)))
+    return refuse(error, CAV_BAD_INPUT, "mpc: expected knots of a plan from 2 to those of the problem, or 0: all");
   if (!(o->delay >= 0 && isfinite(o->delay)) || !(o->timestep > 0 && isfinite(o->timestep)) ||
       !(o->stiffness >= 0 && isfinite(o->stiffness)))
     return refuse(error, CAV_BAD_INPUT, "mpc: expected a delay and a stiffness from 0 on and a timestep above 0");
-  if (!(o->delay + problem->timestep < problem->duration))
+  if (!(o->delay + problem->timestep < ahead))
     return refuse(error, CAV_BAD_INPUT, "mpc: the delay is as long as plans look ahead; expected a longer duration");
   return CAV_OK;
 }
@@ -76,27 +79,38 @@ static cav_status make_room(cav_mpc *mpc, const cav_trajectory *first) {
   return CAV_OK;
 }
 
+/// The first knots of a problem's guess; NULL with the reason in error.
+static cav_trajectory *begin_of_guess(const cav_problem *problem, int knots, cav_error *error) {
+  cav_trajectory *guess = cav_problem_guess(problem, error);
+  if (guess && knots < guess->nknot) guess->nknot = knots;
+  return guess;
+}
+
 /// An optimiser at a plan for the problem's start: the given one, or one that is solved for. What did not converge is a
 /// plan all the same.
-static cav_optimiser *open_optimiser(const cav_problem *problem, int threads, const cav_trajectory *start,
-                                     cav_error *error) {
+static cav_optimiser *open_optimiser(const cav_mpc *mpc, const cav_trajectory *start, cav_error *error) {
   cav_solve_options options = cav_solve_options_default();
   cav_solution *solution = NULL;
-  options.threads = threads;
+  cav_problem plan = *mpc->problem;
+  const int knots = mpc->options.knots;
+  if (knots) plan.duration = (knots - 1) * plan.timestep, plan.nguess_pose = 0;
+  options.threads = mpc->options.threads;
   options.gains = options.diagnose = 0;
-  options.fixed_multipliers = 1;
+  options.fixed_multipliers = options.moving_targets = 1;
   if (!start) {
-    cav_solve(problem, &options, NULL, &solution, error);
+    cav_trajectory *guess = begin_of_guess(mpc->problem, (int)lround(plan.duration / plan.timestep) + 1, error);
+    if (guess) cav_solve(&plan, &options, guess, &solution, error);
+    cav_trajectory_free(guess);
     if (!solution) return NULL;
   }
-  cav_optimiser *optimiser = cav_optimiser_new(problem, &options, start ? start : solution->trajectory, error);
+  cav_optimiser *optimiser = cav_optimiser_new(&plan, &options, start ? start : solution->trajectory, error);
   cav_solution_free(solution);
   return optimiser;
 }
 
 /// Opens all that a controller has. Its forces are there after an iteration.
 static cav_status open_all(cav_mpc *mpc, const cav_trajectory *start, cav_error *error) {
-  mpc->optimiser = open_optimiser(mpc->problem, mpc->options.threads, start, error);
+  mpc->optimiser = open_optimiser(mpc, start, error);
   if (!mpc->optimiser) return error->status;
   cav_status status = cav_optimiser_iterate(mpc->optimiser, mpc->options.iterations, NULL);
   if (status != CAV_OK) return refuse(error, status, "mpc: the first plan cannot be evaluated");

@@ -2,6 +2,7 @@
 /// reads without looking. Does not tell whether a motion is possible.
 #include "problem_check.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 
@@ -63,12 +64,12 @@ static int is_scalar_joint(const cav_model *m, int joint) {
          (m->joint[joint].type == CAV_JOINT_HINGE || m->joint[joint].type == CAV_JOINT_SLIDE);
 }
 
-// times that increase within the horizon; the first that does not, -1: none
-static int time_out_of_order(const cav_problem *p, int n, const double *time, size_t stride) {
+// times that increase from 0 to the last; the first that does not, -1: none
+static int time_out_of_order(double last, int n, const double *time, size_t stride) {
   double before = -1;
   for (int i = 0; i < n; i++) {
     double at = *(const double *)(const void *)((const char *)time + (size_t)i * stride);
-    if (!(at >= 0 && at > before && at <= p->duration * (1 + near_step))) return i;
+    if (!(at >= 0 && at > before && at <= last * (1 + near_step))) return i;
     before = at;
   }
   return -1;
@@ -82,7 +83,8 @@ static cav_status check_guess(const cav_problem *p, cav_error *error) {
                          "guess_height, guess_from, guess_to and guess_rotation must be finite");
   if ((p->nguess_pose && !p->guess_pose) || (p->nswing && !p->swing))
     return cav_file_fail(error, CAV_BAD_INPUT, 0, "guess_pose or swing is NULL, and counted");
-  int late = time_out_of_order(p, p->nguess_pose, p->nguess_pose ? &p->guess_pose->time : NULL, sizeof *p->guess_pose);
+  int late = time_out_of_order(p->duration, p->nguess_pose, p->nguess_pose ? &p->guess_pose->time : NULL,
+                               sizeof *p->guess_pose);
   if (late >= 0)
     return cav_file_fail(
         error, CAV_BAD_INPUT, 0,
@@ -160,11 +162,12 @@ static const char *wrong_object(const cav_model *m, const cav_term *term) {
   return wrong ? wrong : wrong_component(s, term->component);
 }
 
-static const char *wrong_target(const cav_problem *p, const cav_term *term) {
+static const char *wrong_target(const cav_problem *p, int moving, const cav_term *term) {
   int n = target_length(p, term), rows = term->nwaypoint ? term->nwaypoint : 1;
   if (term->nwaypoint < 0 || (term->nwaypoint && (!term->target || !term->waypoint_time)))
     return "counts waypoints that have no targets or no times";
-  if (term->nwaypoint && time_out_of_order(p, term->nwaypoint, term->waypoint_time, sizeof(double)) >= 0)
+  const double last = moving ? DBL_MAX / 2 : p->duration;
+  if (term->nwaypoint && time_out_of_order(last, term->nwaypoint, term->waypoint_time, sizeof(double)) >= 0)
     return "has waypoints whose times do not increase within the horizon";
   if (!n || !term->target) return NULL;
   if (infinite_entry(term->target, n * rows) >= 0) return "has a target that is not finite";
@@ -257,7 +260,7 @@ static const char *wrong_number(const cav_problem *p, const cav_term *term) {
   return NULL;
 }
 
-static cav_status check_term(const cav_problem *p, int i, cav_error *error) {
+static cav_status check_term(const cav_problem *p, int moving, int i, cav_error *error) {
   const cav_term *term = &p->term[i];
   if (term->quantity >= CAV_QUANTITY_TYPES || term->use > CAV_USE_RANGE)
     return cav_file_fail(error, CAV_BAD_INPUT, 0, "a term is of no quantity: term[%d]", i);
@@ -268,13 +271,13 @@ static cav_status check_term(const cav_problem *p, int i, cav_error *error) {
                          i);
   const char *wrong = wrong_number(p, term);
   if (!wrong) wrong = wrong_object(p->model, term);
-  if (!wrong) wrong = wrong_target(p, term);
+  if (!wrong) wrong = wrong_target(p, moving, term);
   if (!wrong) wrong = wrong_track(p, term);
   if (!wrong) return CAV_OK;
   return cav_file_fail(error, CAV_BAD_INPUT, 0, "a term %s: term[%d], '%.80s'", wrong, i, term->name ? term->name : "");
 }
 
-cav_status cav_problem_check(const cav_problem *p, cav_error *error) {
+cav_status cav_problem_check(const cav_problem *p, int moving, cav_error *error) {
   if (!p->model || !p->q_start || !p->v_start || !p->q_goal)
     return cav_file_fail(error, CAV_BAD_INPUT, 0, "the problem lacks a model, a start or a goal");
   if (p->nterm < 0 || (p->nterm && !p->term))
@@ -284,6 +287,6 @@ cav_status cav_problem_check(const cav_problem *p, cav_error *error) {
   if (!status && !p->cycle.on) status = check_vector("v_start", p->v_start, p->model->nv, error);
   if (!status) status = check_vector("q_goal", p->q_goal, p->model->nq, error);
   if (!status) status = check_guess(p, error);
-  for (int i = 0; i < p->nterm && !status; i++) status = check_term(p, i, error);
+  for (int i = 0; i < p->nterm && !status; i++) status = check_term(p, moving, i, error);
   return status;
 }

@@ -5,7 +5,8 @@
 #include "cavort/problem.h"
 
 /// What a reader of files refuses line by line, of structs: CAV_BAD_INPUT, or CAV_NOT_FINITE for an entry of an array, with
-/// the member or the term at fault in error. Quantities of one's own: cav_user_term_check.
-cav_status cav_problem_check(const cav_problem *problem, cav_error *error);
+/// the member or the term at fault in error. Quantities of one's own: cav_user_term_check. moving 1: the start moves on
+/// along waypoints of targets, so they may lie beyond the horizon.
+cav_status cav_problem_check(const cav_problem *problem, int moving, cav_error *error);
 
 #endif

@@ -152,7 +152,7 @@ cav_status cav_guess_fill(const cav_problem *problem, const double *end, cav_tra
 }
 
 cav_trajectory *cav_problem_guess(const cav_problem *problem, cav_error *error) {
-  if (cav_problem_check(problem, error)) return NULL;
+  if (cav_problem_check(problem, 0, error)) return NULL;
   int nknot = (int)lround(problem->duration / problem->timestep) + 1, cycle = problem->cycle.on;
   cav_periodicity *periodicity = cycle ? cav_periodicity_new(problem, error) : NULL;
   if (cycle && !periodicity) return NULL;

@@ -177,6 +177,7 @@ cav_status cav_optimiser_shift(cav_optimiser *o, double knots, const double *q, 
   memcpy(at->v, o->v, nv * sizeof(double));
   cav_trajectory_velocities(m, at);
   shift_multipliers(o->run.tr, (int)k, part);
+  if (o->options.moving_targets) cav_transcription_elapse(o->run.tr, knots * at->timestep);
   return CAV_OK;
 }
 

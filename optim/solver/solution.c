@@ -66,7 +66,7 @@ static cav_status fail(cav_error *error, cav_status status, const char *text) {
 /// What a caller can get wrong in structs filled by hand.
 static cav_status check(const cav_problem *p, const cav_solve_options *o, const cav_trajectory *start,
                         cav_error *error) {
-  cav_status status = cav_problem_check(p, error);
+  cav_status status = cav_problem_check(p, o->moving_targets, error);
   if (status) return status;
   if (o->threads < 1) return fail(error, CAV_BAD_INPUT, "threads must be at least 1");
   if (!(o->tolerance > 0)) return fail(error, CAV_BAD_INPUT, "tolerance must be positive");

@@ -19,7 +19,12 @@ static int reads_force(const cav_term *term) {
   return cav_term_stage(term) == CAV_READS_ACCELERATION || recorded;
 }
 
-double cav_knot_time(const cav_transcription *tr, int t) { return t * tr->problem->timestep; }
+double cav_knot_time(const cav_transcription *tr, int t) { return t * tr->problem->timestep + tr->elapsed; }
+
+void cav_transcription_elapse(cav_transcription *tr, double seconds) {
+  tr->elapsed += seconds;
+  for (int t = 0; t < tr->nknot; t++) tr->knot[t].time += seconds;
+}
 
 /// Knots at which a term speaks.
 static cav_window window_of(const cav_transcription *tr, const cav_term *term) {

@@ -133,6 +133,7 @@ typedef struct cav_transcription {
   cav_derivative derivative;        ///< of u, contacts and sensors
   cav_derivative difference;        ///< what stands in where there is no analytic one
   int constraints_only;             ///< costs and multipliers are left out: the merit is the violation alone
+  double elapsed;                   ///< s since the start that waypoints of targets are timed from
   double slack_effort, slack_range; ///< how far constraints_only lets these rows pass their planned bounds
   int gradient_only;                ///< linearisations leave the Hessians unfinished
   int keep_rows;                    ///< slot_row of the knots is filled by linearisations
@@ -201,6 +202,9 @@ int cav_absolute_advance(cav_transcription *transcription, double fraction);
 
 /// What an absolute norm bends by at argument x, with its dual. absolute.c.
 double cav_absolute_curvature(const cav_absolute *row);
+
+/// Moves the start on: waypoints of targets come so much sooner, windows stay as they are. terms.c.
+void cav_transcription_elapse(cav_transcription *transcription, double seconds);
 
 /// Adds the product of a knot's dense rows to its Hessian, by this thread's room. join.c. CAV_NO_MEMORY.
 cav_status cav_rows_join(const cav_transcription *transcription, struct cav_scratch *scratch, cav_knot *knot);
