@@ -5,7 +5,7 @@
 #include <errno.h>
 #include <malloc.h>
 
-#include "cavort/solve.h"
+#include "cavort/mpc.h"
 #include "scene.h"
 #include "step.h"
 
@@ -598,6 +598,34 @@ static void test_optimiser(void) {
   cav_problem_free(problem);
 }
 
+// plans and commands of a controller that has its memory allocate nothing
+static void test_mpc(void) {
+  enum { KNOTS = 12 };
+  cav_error error = {0};
+  cav_problem *problem = cav_problem_load(CAVORT_SOURCE_ROOT "/problems/mpc/stand.xml", NULL, &error);
+  cav_trajectory *guess = problem ? cav_problem_guess(problem, &error) : NULL;
+  cav_mpc_options options = cav_mpc_options_default();
+  options.knots = KNOTS;
+  options.delay = 0.01;
+  if (guess) guess->nknot = KNOTS;
+  cav_mpc *mpc = guess ? cav_mpc_new(problem, &options, guess, &error) : NULL;
+  if (!CHECK(mpc != NULL)) return;
+  double u[64], input[64];
+  const double *q = problem->q_start, *v = problem->v_start;
+  CHECK(problem->model->nv <= 64 && problem->model->nu <= 64);
+  long before = 0;
+  for (int i = 0; i < 12; i++) {
+    if (i == 6) before = calls;
+    CHECK(cav_mpc_plan(mpc, 0.01 * i, q, v, NULL) == CAV_OK);
+    for (int k = 0; k < 10; k++) CHECK(cav_mpc_command(mpc, 0.01 * i + 0.001 * k, q, v, input, u) == CAV_OK);
+  }
+  printf("controller: %ld allocations while it runs\n", calls - before);
+  CHECK(calls == before);
+  cav_mpc_free(mpc);
+  cav_trajectory_free(guess);
+  cav_problem_free(problem);
+}
+
 int main(void) {
   // what printf and the XML library keep for themselves
   printf("allocations are counted\n");
@@ -616,6 +644,7 @@ int main(void) {
   test_problems();
   test_made();
   test_optimiser();
+  test_mpc();
   return check_result();
 }
 #endif

@@ -24,7 +24,7 @@ refused() {
   check "text of $*" "$(grep -c -- "$text" "$work/out")" 1
 }
 
-stand="$cavort mpc $source/problems/mpc/stand.xml"
+stand="$cavort mpc $source/problems/mpc/stand.xml --knots 20"
 $stand --push "20 torso y 0.5" --push "20 torso -x 0.5" -o "$work/a" >"$work/out" 2>&1
 check 'two pushes: status' $? 0
 check 'two pushes: stands' "$(grep -c ' stands, ' "$work/out")" 2
@@ -40,7 +40,7 @@ check 'the motion is the same twice' $? 0
 $stand --push "150 torso y 0.2" --duration 1.5 -o "$work/c" >"$work/out" 2>&1
 check 'too strong: status' $? 1
 check 'too strong: told' "$(grep -c 'does not stand' "$work/out")" 1
-$stand --push "20 torso 90 0.1 0.05" --rate 50 --knots 20 --iterations 1 --deadline 0.01 --stiffness 20 --duration 0.3 \
+$stand --push "20 torso 90 0.1 0.05" --rate 50 --iterations 1 --deadline 0.01 --stiffness 20 --duration 0.3 \
   -o "$work/d" >"$work/out" 2>&1
 check 'options' "$(grep -c '27 dofs, 20 knots of 25 ms, 50 plans a second, 1 iteration each, in force after 10 ms, springs of 20' "$work/out")" 1
 
