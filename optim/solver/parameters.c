@@ -358,7 +358,7 @@ cav_status cav_estimate_solve(const cav_problem *problem, int nparameter, const 
                               cav_error *error) {
   search s = {0};
   *estimate = NULL;
-  cav_status status = cav_problem_check(problem, error);
+  cav_status status = cav_problem_check(problem, 0, error);
   if (status != CAV_OK) return status;
   if (nparameter < 1) return fail(error, CAV_BAD_INPUT, "there have to be some");
   if (problem->duration_most > 0) return fail(error, CAV_NOT_SUPPORTED, "not with a free duration");

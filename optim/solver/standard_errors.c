@@ -157,7 +157,7 @@ cav_status cav_standard_errors_find(const cav_problem *problem, const cav_trajec
                                     cav_standard_errors **errors, cav_error *error) {
   estimate f = {0};
   *errors = NULL;
-  cav_status status = cav_problem_check(problem, error);
+  cav_status status = cav_problem_check(problem, 0, error);
   if (status != CAV_OK) return status;
   if (problem->duration_most > 0)
     return fail(error, CAV_NOT_SUPPORTED, "not of a motion with a free duration; fix it with <horizon duration>");
