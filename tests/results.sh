@@ -4,7 +4,7 @@
 # of their factors against new ones), normal (normal
 # equations by bands, by groups of trees and by CHOLMOD), unused (what a plan pays for things out of its reach), sweep (broad phase), mesh (collision meshes of a robot at each stage), conservation (drift of energy and
 # momentum), orders (error of the forces of the orders of the step, and what an evaluation costs), absent (what features cost where a scene has none of
-# them), warm (a changed weight solved again, an iteration by itself), optimum (optimal control against known optima), methods (own solver and Ipopt on the same),
+# them), iteration (an iteration of the solver by this build and by one before its loops went by vectors), warm (a changed weight solved again, an iteration by itself), optimum (optimal control against known optima), methods (own solver and Ipopt on the same),
 # stiff (forward steps at softness 1e-2 to 1e-14 against quadruple precision), sensors, tendons, actuation, fluid (readings, strings, drives and
 # drag against MuJoCo's), interruption (solves killed and interrupted at random moments, half an hour), batch (200 problems, four of which go
 # wrong).
@@ -102,6 +102,45 @@ absent() {
   } >"$out/absent.txt"
 }
 
+# a build before factors left out what blocks end before and dofs, contacts and rows went four at a time
+before_vectors=dbd3df8
+
+# least of three runs by turns of each build: ms and million instructions of a whole iteration, ms of a linearisation with its factor
+iteration() {
+  old=$(mktemp -d)
+  trap 'git worktree remove --force "$old/tree"; rm -rf "$old"' EXIT
+  git worktree add --quiet --detach "$old/tree" "$before_vectors"
+  cp tests/bench_iteration.c "$old/tree/tests"
+  meson setup "$old/build" "$old/tree" >/dev/null
+  ninja -C "$old/build" tests/bench_iteration >/dev/null
+  ninja -C "$build" tests/bench_iteration >/dev/null
+  for turn in 1 2 3; do
+    for motion in squat-jump walk; do
+      for when in before now; do
+        tool=$build
+        [ $when = before ] && tool=$old/build
+        "$tool/tests/bench_iteration" "problems/motions/$motion/problem.xml" |
+          awk -v of="$motion $when" '/whole iterations/ { print of, $1, "whole", $6; print of, $1, "count", $8 }
+            / stage$/ { stage = $1 } / analytic / { print of, stage, "linear", $(NF - 1) }'
+      done
+    done
+  done >"$old/times"
+  {
+    provenance "sh tests/results.sh iteration"
+    echo "Our humanoid at 40 knots, one thread, before ($before_vectors) and now: least of three runs by turns. Whole iterations of the trust"
+    echo "region with their trials, ten each in three stages; a linearisation with its factor at a motion shaken by 0.02 rad."
+    echo
+    echo "motion      stage   iteration, ms: before    now  ratio  millions of instructions: before    now  ratio  linearised, ms: before    now  ratio"
+    awk '{ key = $1 " " $3 " " $4 " " $2; if (!(key in least) || $5 < least[key]) least[key] = $5 }
+      END { for (m = 1; m <= 2; m++) for (s = 1; s <= 3; s++) {
+        motion = m == 1 ? "squat-jump" : "walk"; stage = s == 1 ? "first" : s == 2 ? "middle" : "last"; line = sprintf("%-10s  %-6s", motion, stage)
+        for (w = 1; w <= 3; w++) { what = w == 1 ? "whole" : w == 2 ? "count" : "linear"
+          b = least[motion " " stage " " what " before"]; n = least[motion " " stage " " what " now"]
+          line = line sprintf(w == 1 ? "  %21.2f %6.2f %6.3f" : w == 2 ? "  %33.1f %6.1f %6.3f" : "  %22.2f %6.2f %6.3f", b, n, n / b) }
+        print line } }' "$old/times"
+  } >"$out/iteration.txt"
+}
+
 # errors of the own solver on problems whose optima are known, on four grids each
 optimum() {
   ninja -C "$build" tests/test_optimum >/dev/null
@@ -189,9 +228,10 @@ for name in ${*:-inverse heap update normal unused sweep mesh conservation order
     methods) methods ;;
     stiff) stiff ;;
     absent) absent ;;
+    iteration) iteration ;;
     warm) run warm bench_warm ;;
     interruption) interruption ;;
     batch) batch ;;
-    *) echo "usage: sh tests/results.sh [inverse|heap|update|normal|unused|sweep|mesh|conservation|orders|sensors|tendons|actuation|fluid|optimum|methods|absent|stiff|warm|interruption|batch]..." >&2 && exit 2 ;;
+    *) echo "usage: sh tests/results.sh [inverse|heap|update|normal|unused|sweep|mesh|conservation|orders|sensors|tendons|actuation|fluid|optimum|methods|absent|stiff|iteration|warm|interruption|batch]..." >&2 && exit 2 ;;
   esac
 done
