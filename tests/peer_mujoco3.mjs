@@ -81,4 +81,4 @@ if (fs.statSync(given).isDirectory()) {
     console.log('file ' + name);
     tell(path.join(given, name));
   }
-} else process.exit(tell(given, beside(path.dirname(given))) ? 0 : 1);
+} else process.exitCode = tell(given, beside(path.dirname(given))) ? 0 : 1;
