@@ -289,6 +289,38 @@ static void test_weightless(void) {
   cav_model_free(m);
 }
 
+// limits that are none: infinite, turned round, of one side; a mimic of nobody; a ball
+static void test_limits(void) {
+  static const struct {
+    const char *joint;
+    int limited, driven, bounded;
+    double low;
+  } sets[] = {{"revolute'><limit lower='-1' upper=' 1 ' effort='3' velocity='1'/>", 1, 1, 1, -1},
+              {"revolute'><limit lower='-inf' upper='inf' effort='inf' velocity='inf'/>", 0, 1, 0, 0},
+              {"prismatic'><limit lower='1' upper='-1' effort='3'/>", 0, 1, 1, 1},
+              {"revolute'><limit lower='-INF' upper='1' effort='3'/>", 0, 1, 1, 0},
+              {"revolute'><limit lower='-1' upper='1' effort='3'/><mimic joint='nobody'/>", 1, 1, 1, -1},
+              {"spherical'>", 0, 0, 0, 0}};
+  for (size_t i = 0; i < sizeof sets / sizeof *sets; i++) {
+    char text[1000];
+    cav_error error = {0};
+    snprintf(text, sizeof text,
+             "<robot name='r'><link name='a'/><link name='b'>" MASS("1") "</link><joint name='j' type='%s<parent "
+                                                                          "link='a'/><child link='b'/></joint></robot>",
+             sets[i].joint);
+    cav_model *m = load(text, &error);
+    if (!CHECK(m != NULL)) {
+      fprintf(stderr, "    %s\n", error.text);
+      continue;
+    }
+    CHECK(m->joint[0].limited == sets[i].limited && m->nactuator == sets[i].driven);
+    CHECK(m->nv == (i == 5 ? 3 : 1) && (m->joint[0].type == CAV_JOINT_BALL) == (i == 5));
+    if (sets[i].driven) CHECK(m->actuator[0].ctrllimited == sets[i].bounded && m->joint[0].speed == (i == 0));
+    if (sets[i].limited) CHECK_NEAR(m->joint[0].range[0], sets[i].low, 0);
+    cav_model_free(m);
+  }
+}
+
 // faults: line and words
 static void test_faults(void) {
   static const struct {
@@ -321,8 +353,8 @@ static void test_faults(void) {
        ":2: <axis>: attribute 'xyz': expected a direction"},
       {"<robot><link name='a'/><link name='b'>" MASS(
            "1") "</link><joint name='j' type='revolute'><parent link='a'/>"
-                "<child link='b'/>\n<limit lower='1' upper='0'/></joint></robot>",
-       ":2: <limit>: attribute 'upper': expected lower < upper"},
+                "<child link='b'/>\n<limit lower='1' upper='?'/></joint></robot>",
+       ":2: <limit>: attribute 'upper': expected a number"},
       {"<robot><link name='a'/><link name='b'>\n<inertial><mass value='-1'/><inertia ixx='1' iyy='1' "
        "izz='1'/></inertial>"
        "</link><joint name='j' type='fixed'><parent link='a'/><child link='b'/></joint></robot>",
@@ -468,6 +500,7 @@ int main(void) {
   test_srdf();
   test_reduced();
   test_weightless();
+  test_limits();
   test_faults();
   test_damage();
   test_chain();

@@ -39,8 +39,9 @@
   static const cav_xml_element id = {name, least, most, id##_attributes, children, CAV_XML_OPEN, NULL}
 #define UNREAD(id, name) static const cav_xml_element id = {name, 0, 0, NULL, NULL, CAV_XML_ANYTHING, NULL}
 
-static const char *const joint_types[] = {"revolute", "continuous", "prismatic", "fixed", "floating", "planar", NULL};
-enum { REVOLUTE, CONTINUOUS, PRISMATIC, FIXED, FLOATING, PLANAR };
+static const char *const joint_types[] = {"revolute", "continuous", "prismatic", "fixed",
+                                          "floating", "planar",     "spherical", NULL};
+enum { REVOLUTE, CONTINUOUS, PRISMATIC, FIXED, FLOATING, PLANAR, SPHERICAL };
 
 // what robot programs write and no dynamics here needs
 UNREAD(gazebo, "gazebo");
@@ -64,7 +65,8 @@ ELEMENT(box, "box", 0, 1, NUMBERS("size", 3, 1));
 ELEMENT(sphere, "sphere", 0, 1, NUMBERS("radius", 1, 1));
 ELEMENT(cylinder, "cylinder", 0, 1, NUMBERS("radius", 1, 1), NUMBERS("length", 1, 1));
 ELEMENT(capsule, "capsule", 0, 1, NUMBERS("radius", 1, 1), NUMBERS("length", 1, 1));
-ELEMENT(mesh, "mesh", 0, 1, TEXT("filename", 1), {"scale", CAV_XML_REAL, 1, 3, NULL, 0, NULL});
+ELEMENT(mesh, "mesh", 0, 1, {"filename", CAV_XML_TEXT, 0, 0, NULL, 1, NULL},
+        {"scale", CAV_XML_REAL, 1, 3, NULL, 0, NULL});
 static const cav_xml_element *const geometry_children[] = {&box, &sphere, &cylinder, &capsule, &mesh, NULL};
 PARENT(geometry, "geometry", 1, 1, geometry_children, SKIP("name"));
 static const cav_xml_element *const shape_children[] = {&origin, &geometry, &material, &verbose, NULL};
@@ -76,8 +78,8 @@ PARENT(robot_link, "link", 0, 0, link_children, TEXT("name", 1), SKIP("type"));
 ELEMENT(parent, "parent", 1, 1, TEXT("link", 1));
 ELEMENT(child, "child", 1, 1, TEXT("link", 1));
 ELEMENT(axis, "axis", 0, 1, NUMBERS("xyz", 3, 1));
-ELEMENT(limit, "limit", 0, 1, NUMBERS("lower", 1, 0), NUMBERS("upper", 1, 0), NUMBERS("effort", 1, 0),
-        NUMBERS("velocity", 1, 0));
+// as texts: they may be infinite
+ELEMENT(limit, "limit", 0, 1, TEXT("lower", 0), TEXT("upper", 0), TEXT("effort", 0), TEXT("velocity", 0));
 ELEMENT(dynamics, "dynamics", 0, 1, NUMBERS("damping", 1, 0), NUMBERS("friction", 1, 0));
 ELEMENT(mimic, "mimic", 0, 1, TEXT("joint", 1), NUMBERS("multiplier", 1, 0), NUMBERS("offset", 1, 0));
 ELEMENT(safety, "safety_controller", 0, 1, SKIP("soft_lower_limit"), SKIP("soft_upper_limit"), SKIP("k_position"),
@@ -243,6 +245,7 @@ static const char *find_file(cav_spec *spec, const char *name) {
   // without a package's name the path starts at one of the folders above
   while (package && *rest == '/') rest++;
   if (!strncmp(name, "file://", 7)) rest = name + 7;
+  if (!*rest) return NULL;
   // the folder that a package was cloned into may have another name
   const char *inside = package && strchr(rest, '/') ? strchr(rest, '/') + 1 : rest;
   size_t room = strlen(file) + strlen(name) + strlen(spec->compiler.mesh_folder) + 4;
@@ -433,6 +436,17 @@ static void read_planar(reader *r, const cav_xml_node *node, const char *name, c
   }
 }
 
+// a number of a limit, which may be infinite; 0 where there is none
+static double limit_of(cav_spec *spec, const cav_xml_node *node, const char *name) {
+  const char *text = node ? cav_xml_text(node, name, "0") : "0";
+  char *end;
+  double value = strtod(text, &end);
+  while (*end == ' ' || *end == '\t' || *end == '\n' || *end == '\r') end++;
+  if (end == text || *end || isnan(value))
+    cav_spec_fail(spec, node, name, "expected a number, or inf for none, got '%.40s'", text);
+  return value;
+}
+
 // a motor as strong as the limit says
 static void push_motor(cav_spec *spec, const cav_xml_node *node, const char *name, double effort) {
   if (!(effort > 0)) return;
@@ -442,11 +456,24 @@ static void push_motor(cav_spec *spec, const cav_xml_node *node, const char *nam
                            .node = node,
                            .target_kind = "joint",
                            .target = name,
-                           .ctrllimited = CAV_LIMITED_YES,
+                           .ctrllimited = isinf(effort) ? CAV_LIMITED_NO : CAV_LIMITED_YES,
                            .forcelimited = CAV_LIMITED_NO,
-                           .ctrlrange = {-effort, effort},
+                           .ctrlrange = {isinf(effort) ? 0 : -effort, isinf(effort) ? 0 : effort},
                            .gear = {1},
                            .gainprm = {1}};
+}
+
+// the joint of that name; NULL: there is none
+static const cav_xml_node *named_joint(const cav_xml_node *robot, const char *name) {
+  const cav_xml_node *c = cav_xml_child(robot, &joint);
+  while (c && strcmp(cav_xml_text(c, "name", ""), name)) c = cav_xml_next(c);
+  return c;
+}
+
+// whether a joint follows another one of the file
+static int follows(const cav_xml_node *node) {
+  const cav_xml_node *m = cav_xml_child(node, &mimic);
+  return m && named_joint(node->parent, cav_xml_text(m, "joint", "")) != NULL;
 }
 
 // limits, damping and friction of a hinge or slide; an effort limit becomes a motor
@@ -456,24 +483,21 @@ static void read_motion(reader *r, const cav_xml_node *node, int type, cav_spec_
   j->limited = CAV_LIMITED_NO;
   if (d) j->damping = cav_xml_real(d, "damping", 0);
   if (d) j->frictionloss = cav_xml_real(d, "friction", 0);
-  if (!(l && cav_xml_real(l, "effort", 0) > 0) && !cav_xml_child(node, &mimic))
+  double effort = limit_of(spec, l, "effort"), speed = limit_of(spec, l, "velocity");
+  if (!(effort > 0) && !follows(node))
     cav_spec_leave(spec, node, NULL, "no effort limit above 0: the joint has no actuator; give <limit effort> for one");
-  if (!l) return;
-  j->range[0] = cav_xml_real(l, "lower", 0);
-  j->range[1] = cav_xml_real(l, "upper", 0);
-  if (type != CONTINUOUS && j->range[0] < j->range[1]) j->limited = CAV_LIMITED_YES;
-  if (type != CONTINUOUS && j->range[0] > j->range[1])
-    cav_spec_fail(spec, l, "upper", "expected lower < upper, got %g %g", j->range[0], j->range[1]);
-  j->speed = fmax(cav_xml_real(l, "velocity", 0), 0);
+  if (!l || spec->status != CAV_OK) return;
+  double low = limit_of(spec, l, "lower"), high = limit_of(spec, l, "upper");
+  int bounded = !isinf(low) && !isinf(high);
+  j->range[0] = bounded ? low : 0;
+  j->range[1] = bounded ? high : 0;
+  if (type != CONTINUOUS && bounded && low < high) j->limited = CAV_LIMITED_YES;
+  if (type != CONTINUOUS && low > high) cav_spec_leave(spec, l, "upper", "below the lower limit: no limit holds");
+  if (type != CONTINUOUS && isinf(low) != isinf(high))
+    cav_spec_leave(spec, l, NULL, "a limit on one side alone is left aside; give both");
+  j->speed = isinf(speed) ? 0 : fmax(speed, 0);
   r->velocities += j->speed > 0;
-  if (!cav_xml_child(node, &mimic)) push_motor(spec, node, j->name, cav_xml_real(l, "effort", 0));
-}
-
-// the joint of that name; NULL: there is none
-static const cav_xml_node *named_joint(const cav_xml_node *robot, const char *name) {
-  const cav_xml_node *c = cav_xml_child(robot, &joint);
-  while (c && strcmp(cav_xml_text(c, "name", ""), name)) c = cav_xml_next(c);
-  return c;
+  if (!follows(node)) push_motor(spec, node, j->name, effort);
 }
 
 static int motion_of(const part *p) { return p->held ? FIXED : cav_xml_word(p->joint, "type", FIXED); }
@@ -485,7 +509,7 @@ static void read_mimic(reader *r, const cav_xml_node *node, const char *name) {
   cav_spec *spec = r->spec;
   const cav_xml_node *other = named_joint(node->parent->parent, cav_xml_text(node, "joint", ""));
   if (!other) {
-    cav_spec_fail(spec, node, "joint", "no joint is named '%.60s'; correct the name", cav_xml_text(node, "joint", ""));
+    cav_spec_warn(spec, node, "joint", "no joint is named '%.60s': follows nothing", cav_xml_text(node, "joint", ""));
     return;
   }
   int held = motion_of(&r->parts.at[named_link(r, other, &child)]) == FIXED;
@@ -520,9 +544,12 @@ static void read_joint(reader *r, const part *p, int body) {
   }
   cav_spec_joint *j = push_joint(r, node, name, body);
   if (!j) return;
-  j->type = type == FLOATING ? CAV_JOINT_FREE : type == PRISMATIC ? CAV_JOINT_SLIDE : CAV_JOINT_HINGE;
+  j->type = type == FLOATING    ? CAV_JOINT_FREE
+            : type == SPHERICAL ? CAV_JOINT_BALL
+            : type == PRISMATIC ? CAV_JOINT_SLIDE
+                                : CAV_JOINT_HINGE;
   copy3(j->axis, direction);
-  if (type == FLOATING)
+  if (type == FLOATING || type == SPHERICAL)
     j->limited = CAV_LIMITED_NO;
   else
     read_motion(r, node, type, j);
