@@ -269,6 +269,11 @@ static void check_accelerations(const cav_model *model) {
     CHECK(worst < 1e-3 * gain * 2 / h * sin(w));
     if (d == 2) CHECK_NEAR(gain, sqrt(0.5), 0.01);
   }
+  // a steady one is what it is, to the ends
+  for (int k = 0; k < KNOTS; k++)
+    for (int d = 0; d < model->nv; d++) t->v[k * model->nv + d] = d - 3 + 0.1 * (d - 2) * k * h;
+  CHECK(cav_trajectory_accelerations(t, cutoff, a) == CAV_OK);
+  for (int k = 0; k < KNOTS; k++) CHECK_NEAR(a[k * model->nv + 4], 0.2, 1e-9);
   CHECK(cav_trajectory_accelerations(t, 0, a) == CAV_BAD_INPUT &&
         cav_trajectory_accelerations(t, 81, a) == CAV_BAD_INPUT);
   free(a);

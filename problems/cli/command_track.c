@@ -14,7 +14,7 @@
 #include "pressure.h"
 #include "result.h"
 
-/// Noise of a frame of one marker, m: errors of one to two centimetres, which skin and fit keep for some ten frames.
+/// Noise of a frame of one marker, m: errors of a centimetre, which skin and rigid segments keep for some 25 frames.
 static const double usual_sd = 0.05;
 
 /// A foot that slides so far over a step of half a second is one that the record does not tell from one that stands, s.
@@ -22,14 +22,23 @@ static const double stance = 0.5;
 
 static const double step = 0.01; // s
 
+/// How much contacts yield, and the distance over which their force rises, m.
+static const double softness = 0.08, sharpest = 0.0005, softest = 0.0015;
+
+/// Weights over the record's information: what feet do against each other, and how fast they slide.
+static const double effort = 2.4e-6, slip = 6e-6;
+
 /// Longer clips are solved by windows, s: a step of a walk ahead is what a posture depends on.
 static const double window = 2, overlap = 0.6;
 
 typedef struct tracked {
   const cav_command_line *line;
   char *folder, *fit, *problem, *result, *model; // folder/ik, folder/problem.xml, folder/result, of the fit
-  cav_model *compiled;
-  double first, from, to; // s: of the first frame, of the motion
+  double first, from, to;                        // s: of the first frame, of the motion
+  double information; // of the record on where the body is: markers, times rate, over noise, 1/(m^2 s)
+  double smoothing;   // m, of the contacts
+  char *columns[3];   // of ik/acceleration.csv: of free roots, linear, angular; joints; NULL: none
+  double fit_rms;     // m, over the motion
 } tracked;
 
 // NAME.track of dir/NAME.trc
@@ -67,10 +76,43 @@ static int fit(tracked *t, cav_error *error) {
   return cav_command_fail(error);
 }
 
+// names of columns, separated by |: linear (0) or angular (1) ones of free joints, or those of all others (2); NULL: there are
+// none
+static char *columns_of(const cav_model *m, int group) {
+  static const int nv[] = {[CAV_JOINT_FREE] = 6, [CAV_JOINT_BALL] = 3, [CAV_JOINT_SLIDE] = 1, [CAV_JOINT_HINGE] = 1};
+  char *text = NULL;
+  size_t size;
+  int n = 0;
+  FILE *out = open_memstream(&text, &size);
+  for (int j = 0; j < m->njoint && out; j++) {
+    if ((m->joint[j].type == CAV_JOINT_FREE) != (group < 2)) continue;
+    int count = group < 2 ? 3 : nv[m->joint[j].type];
+    for (int k = 0; k < count; k++) {
+      fprintf(out, "%sqacc_%s", n++ ? "|" : "", m->joint[j].name);
+      if (nv[m->joint[j].type] > 1) fprintf(out, "_%d", group < 2 ? 3 * group + k : k);
+    }
+  }
+  if (out) fclose(out);
+  if (n) return text;
+  free(text);
+  return NULL;
+}
+
+// how far a body's weight on four points presses its lightest part that meets the ground into it, m: the distance over
+// which a contact's force may rise without holding what is light off the ground
+static double sink_of(const cav_model *m) {
+  double most = 0;
+  for (int i = 0; i < m->npair; i++)
+    if (m->pair[i].external) most = fmax(most, m->pair[i].weight[0]);
+  double weight =
+      m->mass * sqrt(m->gravity[0] * m->gravity[0] + m->gravity[1] * m->gravity[1] + m->gravity[2] * m->gravity[2]);
+  return weight / 4 * step * step * softness / (1 + softness) * most;
+}
+
 // the time that is asked for, whole steps of it that the clip has
 static cav_status take_time(tracked *t, cav_error *error) {
-  t->compiled = cav_model_load(t->model, error);
-  cav_marker_set *set = t->compiled ? cav_marker_set_read(t->line->markers, t->compiled, error) : NULL;
+  cav_model *model = cav_model_load(t->model, error);
+  cav_marker_set *set = model ? cav_marker_set_read(t->line->markers, model, error) : NULL;
   cav_record *record = set ? cav_record_read(t->line->operand, &set->clip, error) : NULL;
   if (record) {
     double last = record->time[record->nframe - 1];
@@ -78,6 +120,9 @@ static cav_status take_time(tracked *t, cav_error *error) {
     t->from = fmax(t->line->from_given ? t->line->from : t->first, t->first);
     t->to = t->line->until > 0 ? fmin(t->line->until, last) : last;
     t->to = t->from + floor((t->to - t->from) / step + 1e-6) * step;
+    t->information = record->nmarker * (record->nframe - 1) / (last - t->first) / (usual_sd * usual_sd);
+    t->smoothing = fmin(fmax(sink_of(model), sharpest), softest);
+    for (int group = 0; group < 3; group++) t->columns[group] = columns_of(model, group);
   }
   cav_status status = record ? CAV_OK : error->status;
   if (record && !(t->to - t->from > 2.5 * step))
@@ -87,6 +132,7 @@ static cav_status take_time(tracked *t, cav_error *error) {
                            step, record->time[0], record->time[record->nframe - 1]);
   cav_record_free(record);
   cav_marker_set_free(set);
+  cav_model_free(model);
   return status;
 }
 
@@ -96,32 +142,21 @@ static void write_path(FILE *out, const char *name, const char *path) {
   fputc('"', out);
 }
 
-// dofs of a joint, and which of them a set of dofs selects: root_linear 0, root_angular 1, joints 2
-static int dofs_of(const cav_joint *joint) {
-  return joint->type == CAV_JOINT_FREE ? 6 : joint->type == CAV_JOINT_BALL ? 3 : 1;
-}
-
-static int selects(const cav_joint *joint, int set, int k) {
-  return joint->type == CAV_JOINT_FREE ? set == k / 3 : set == 2;
-}
-
-// a cost on how the accelerations of the fit are missed; nothing where the model has no such dofs
-static void write_accelerations(FILE *out, const tracked *t, int set, const char *dofs, double weight) {
-  const cav_model *m = t->compiled;
-  int n = 0;
-  for (int j = 0; j < m->njoint; j++)
-    for (int k = 0; k < dofs_of(&m->joint[j]); k++) {
-      if (!selects(&m->joint[j], set, k)) continue;
-      if (!n++)
-        fprintf(out,
-                "    <acceleration name=\"%s\" dofs=\"%s\" file=\"ik/acceleration.csv\" offset=\"%.10g\" "
-                "weight=\"%g\" within=\"any\"\n      columns=\"",
-                dofs, dofs, t->from - t->first, weight);
-      fputs(n > 1 ? "|qacc_" : "qacc_", out);
-      cav_file_write_xml(out, m->joint[j].name);
-      if (dofs_of(&m->joint[j]) > 1) fprintf(out, "_%d", k);
-    }
-  if (n) fputs("\"/>\n", out);
+// markers tell where a body is; forces are accelerations, which a millimetre at 6 Hz would drown: they are held to those
+// of the fit below that
+static void write_accelerations(FILE *out, const tracked *t) {
+  static const struct {
+    const char *name, *dofs;
+    double weight; // of the record's information, s^4; by the squared lever of a body of a person's size, m^2
+  } group[3] = {{"root", "root_linear", 6e-5}, {"rotation", "root_angular", 2e-6}, {"joints", "joints", 6e-8}};
+  fputs("    <!-- and accelerations of its fit, below 6 Hz: what decides forces -->\n", out);
+  for (int k = 0; k < 3; k++) {
+    if (!t->columns[k]) continue;
+    fprintf(out, "    <acceleration name=\"%s\" dofs=\"%s\" file=\"ik/acceleration.csv\" offset=\"%.10g\"",
+            group[k].name, group[k].dofs, t->from - t->first);
+    write_path(out, "columns", t->columns[k]);
+    fprintf(out, "\n      weight=\"%.3g\" within=\"any\"/>\n", group[k].weight * t->information);
+  }
 }
 
 static void write_text(FILE *out, const tracked *t, const char *model, const char *clip) {
@@ -130,28 +165,30 @@ static void write_text(FILE *out, const tracked *t, const char *model, const cha
       "     cavort solve problem.xml -o result -->\n<problem name=\"track\"",
       out);
   write_path(out, "model", model);
-  fprintf(out, ">\n  <horizon duration=\"%.10g\" timestep=\"%g\" close=\"open\"", t->to - t->from, step);
+  fprintf(out, ">\n  <horizon duration=\"%.10g\" timestep=\"%g\" order=\"momentum\" close=\"open\"", t->to - t->from,
+          step);
   if (t->to - t->from > 1.5 * window) fprintf(out, " window=\"%g\" overlap=\"%g\"", window, overlap);
-  fputs("/>\n  <start free=\"true\"/>\n", out);
-  fprintf(out, "  <guess file=\"ik/trajectory.csv\" offset=\"%.10g\"/>\n", t->from - t->first);
-  fputs(
-      "  <!-- all of the actuators' strength: nothing is kept for feedback -->\n  <limits effort=\"1\"/>\n"
-      "  <!-- soles and floor give way by millimetres under the body's weight -->\n"
-      "  <schedule><last softness=\"0.08\" smoothing=\"0.0015\"/></schedule>\n"
-      "  <cost>\n    <!-- markers say where: skin and model err by centimetres, and by the same for many frames -->\n"
-      "    <track",
-      out);
+  fputs("/>\n", out);
+  fputs("  <start free=\"true\"/>\n", out);
+  fprintf(out, "  <guess file=\"ik/trajectory.csv\" offset=\"%.10g\"/>\n  <cost>\n    <track", t->from - t->first);
   write_path(out, "file", clip);
   fprintf(out, " markers=\"ik/markers.xml\" sd=\"%g\" offset=\"%.10g\"/>\n", usual_sd, t->from);
-  fputs("    <!-- accelerations of the fit, below 6 Hz, say how fast that changes -->\n", out);
-  write_accelerations(out, t, 0, "root_linear", 100);
-  write_accelerations(out, t, 1, "root_angular", 3);
-  write_accelerations(out, t, 2, "joints", 0.1);
-  fputs("    <!-- settles what feet do against each other -->\n    <effort weight=\"4\"/>\n", out);
-  fprintf(out, "    <!-- contacts may slide as fast as the noise of markers hides over %g s -->\n", stance);
-  fprintf(out, "    <slip weight=\"10\" within=\"%g\"/>\n", usual_sd / stance);
-  fputs("    <gap weight=\"0\"/>\n    <impact weight=\"0\"/>\n    <velocity weight=\"0\"/>\n  </cost>\n</problem>\n",
-        out);
+  write_accelerations(out, t);
+  fputs(
+      "    <!-- nothing else is wanted of postures and velocities, nor of contacts but that they do not slide -->\n"
+      "    <posture weight=\"0\"/>\n    <velocity weight=\"0\"/>\n    <gap weight=\"0\"/>\n    <impact "
+      "weight=\"0\"/>\n",
+      out);
+  fprintf(out, "    <effort weight=\"%.3g\"/>\n", effort * t->information);
+  fprintf(out,
+          "    <!-- contacts may slide as fast as the markers' noise hides over a step of %g s -->\n"
+          "    <slip weight=\"%.3g\" within=\"%g\"/>\n  </cost>\n",
+          stance, slip * t->information, usual_sd / stance);
+  fputs("  <!-- all of the actuators' strength: nothing is kept for feedback -->\n  <limits effort=\"1\"/>\n", out);
+  fprintf(out,
+          "  <!-- soles and floor yield by some millimetres, as a shoe does -->\n"
+          "  <schedule><last softness=\"%g\" smoothing=\"%.3g\"/></schedule>\n</problem>\n",
+          softness, t->smoothing);
 }
 
 static cav_status write_problem(const tracked *t, cav_error *error) {
@@ -304,7 +341,7 @@ int cav_command_track(const cav_command_line *line) {
     if (done == CAV_EXIT_CERTIFIED || done == CAV_EXIT_NOT_CERTIFIED) status = tell(&t, &error);
     if (status) done = cav_command_fail(&error);
   }
-  cav_model_free(t.compiled);
+  for (int k = 0; k < 3; k++) free(t.columns[k]);
   free(t.folder), free(t.fit), free(t.problem), free(t.result), free(t.model);
   return done;
 }

@@ -555,8 +555,8 @@ static int run(int argc, char **argv, const char *arguments) {
   if (!read_line(c, argc - 2, argv + 2, &line)) return CAV_EXIT_BAD_INPUT;
   cav_error error = {0};
   // these say themselves what is wrong with what they are given
-  int one = c->run != help && c->run != cav_command_study && c->run != cav_command_ik && c->run != cav_command_table &&
-            c->run != cav_command_quality && line.noperand < 2;
+  int one = c->run != help && c->run != cav_command_study && c->run != cav_command_ik && c->run != cav_command_track &&
+            c->run != cav_command_table && c->run != cav_command_quality && line.noperand < 2;
   int status =
       one && cav_command_expect(c->name, c->operand, line.operand, &error) ? cav_command_fail(&error) : c->run(&line);
   // a full disk or a closed pipe must not pass for success
