@@ -178,6 +178,7 @@ static void test_write(const char *path) {
     random_factors(m, 5, 0, factor);
     double before = m->mass;
     if (sized) CHECK(!cav_model_resize(m, factor));
+    if (sized) cav_model_strengthen(m, 1.5);
     CHECK(sized == (fabs(m->mass - before) > 1e-3));
     char *text = cav_model_mjcf(m, path, &error);
     if (!CHECK(text != NULL)) printf("%s: %s\n", path, error.text);

@@ -22,6 +22,10 @@ cav_status cav_model_scale(cav_model *model, double factor);
 /// CAV_BAD_INPUT: a factor that is none, nothing changed; CAV_NO_MEMORY. resize.c.
 cav_status cav_model_resize(cav_model *model, const double *factor);
 
+/// Gears of motors, and limits of what actuators do to joints, times factor, of a model that is written next and not used
+/// otherwise: servos keep theirs. resize.c.
+void cav_model_strengthen(cav_model *model, double factor);
+
 /// Whether all that a model has is scaled by that; CAV_NOT_SUPPORTED with the reason. resize.c.
 cav_status cav_model_resizable(const cav_model *model, cav_error *error);
 

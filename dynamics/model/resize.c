@@ -2,7 +2,8 @@
 /// link (joints, geoms, sites, centres of mass) goes away from the anchor of its first joint by that factor; that
 /// anchor is a point of the parent, and goes with the parent's. The mass of all goes with its volume; that of a link stays
 /// the same fraction of it, as tables of segments have it, since a longer segment is seldom thicker. What is not of a size
-/// stays: ranges, gears, springs, dampers, armature, contact parameters.
+/// stays: ranges, springs, dampers, armature, contact
+/// parameters. Strength is another matter.
 #include <math.h>
 #include <stdio.h>
 
@@ -83,6 +84,16 @@ static void resize_objects(cav_model *model, const double *factor, double heavie
     stretch(site[i].pos, 3, factor[site[i].link]);
     stretch(site[i].size, 3, factor[site[i].link]);
   }
+}
+
+void cav_model_strengthen(cav_model *model, double factor) {
+  cav_actuator *actuator = (cav_actuator *)model->actuator;
+  cav_joint *joint = (cav_joint *)model->joint;
+  for (int i = 0; i < model->nactuator; i++) {
+    int motor = actuator[i].gain == CAV_GAIN_FIXED && actuator[i].bias == CAV_BIAS_NONE;
+    if (motor) stretch(actuator[i].gear, 6, factor);
+  }
+  for (int j = 0; j < model->njoint; j++) stretch(joint[j].effort_range, 2, factor);
 }
 
 cav_status cav_model_resize(cav_model *model, const double *factor) {

@@ -147,11 +147,11 @@ static int is_left_out(const cav_xml_node *node, const char *name, int actuators
 }
 
 // an element and all that it holds, as the file has it; classes of what is written in full are not needed
-static void copy_node(const writer *w, const cav_xml_node *node, int parent, int actuators) {
+static int copy_node(const writer *w, const cav_xml_node *node, int parent, int actuators) {
   static const char *const full[] = {"geom", "joint", "site", "mesh", "material", "camera", "light"};
   if (node->parent && is(node->parent, "default")) {
     for (size_t i = 0; i < sizeof full / sizeof *full; i++)
-      if (is(node, full[i])) return;
+      if (is(node, full[i])) return -1;
   }
   int at = cav_draft_add(w->draft, parent, node->rule->name);
   for (int i = 0; i < node->nvalue; i++) {
@@ -159,13 +159,26 @@ static void copy_node(const writer *w, const cav_xml_node *node, int parent, int
     if (!is_left_out(node, name, actuators)) cav_draft_text(w->draft, at, name, node->value[i].text);
   }
   for (const cav_xml_node *c = node->child; c; c = c->next) copy_node(w, c, at, actuators);
+  return at;
+}
+
+// actuators, with the gears that the model has
+static void copy_actuators(const writer *w, const cav_xml_node *section, int *count) {
+  int parent = cav_draft_add(w->draft, CAV_DRAFT_ROOT, "actuator");
+  for (const cav_xml_node *c = section->child; c; c = c->next) {
+    int at = copy_node(w, c, parent, 1);
+    if (*count < w->model->nactuator) put(w, at, "gear", w->model->actuator[*count].gear, NULL, 6);
+    ++*count;
+  }
 }
 
 static void copy_sections(const writer *w, const cav_xml_node *root) {
-  static const char *const sections[] = {"option", "default", "contact", "tendon", "equality", "actuator", "sensor"};
+  static const char *const sections[] = {"option", "default", "contact", "tendon", "equality", "sensor"};
+  int count = 0;
   for (const cav_xml_node *c = root->child; c; c = c->next) {
     for (size_t i = 0; i < sizeof sections / sizeof *sections; i++)
-      if (is(c, sections[i])) copy_node(w, c, CAV_DRAFT_ROOT, is(c, "default") || is(c, "actuator"));
+      if (is(c, sections[i])) copy_node(w, c, CAV_DRAFT_ROOT, is(c, "default"));
+    if (is(c, "actuator")) copy_actuators(w, c, &count);
     const cav_xml_value *limits = is(c, "compiler") ? cav_xml_get(c, "autolimits") : NULL;
     if (limits)
       cav_draft_text(w->draft, cav_draft_add(w->draft, CAV_DRAFT_ROOT, "compiler"), "autolimits", limits->text);

@@ -10,6 +10,7 @@
 #include "cavort/mocap.h"
 #include "command.h"
 #include "csv.h"
+#include "edit.h"
 #include "file.h"
 #include "result.h"
 #include "view.h"
@@ -84,11 +85,14 @@ static cav_status scale(fit *f, const cav_ik_options *options, cav_error *error)
   cav_marker_set *set = f->set;
   if (f->line->scale && set->scale <= 0) set->scale = usual;
   if (set->scale <= 0 && f->line->mass <= 0) return CAV_OK;
+  double mass = f->model->mass;
   char *path = f->folder ? cav_result_path(f->folder, "model.xml") : NULL;
   cav_status status =
       path ? cav_result_folder(f->folder, error) : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for the model");
   if (!status && set->scale > 0) status = find_sizes(f, options, error);
   if (!status && f->line->mass > 0) status = set_mass(f, error);
+  // torques go with mass and length, which goes with the cube root of mass
+  if (!status) cav_model_strengthen(f->model, pow(f->model->mass / mass, 4.0 / 3));
   if (!status) status = write_model(f, path, error);
   if (!status) {
     // places were found with the sizes
