@@ -73,6 +73,13 @@ static void test_smoother(int with_prior, cav_solver solver, double most) {
   check_states(s, dense, most);
   if (s) refine(&b.problem, s->trajectory);
   check_states(s, dense, 1e-11);
+  // the solver that keeps its memory, from elsewhere
+  cav_optimiser *o = cav_optimiser_new(&b.problem, NULL, NULL, NULL);
+  if (CHECK(o && cav_optimiser_iterate(o, 10, NULL) == CAV_OK)) {
+    const cav_trajectory *at = cav_optimiser_trajectory(o);
+    CHECK(fabs(at->q[0] - dense[0]) < 1e-5 && fabs(at->v[0] - dense[1]) < 1e-4);
+  }
+  cav_optimiser_free(o);
   // a control: with the start given it is another motion
   cav_solution_free(s);
   b.problem.free_start = 0;

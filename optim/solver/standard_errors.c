@@ -58,7 +58,8 @@ static void multiply(estimate *f, int t, int n) {
   for (int i = 0; i < n; i++)
     for (int c = 0; c < width; c++) {
       int k = cav_information_unknown(&f->of, t, c);
-      double x = k < 0 ? 0 : f->row[i * width + c] / f->of.scale[k];
+      if (k < 0) continue;
+      double x = f->row[i * width + c] / f->of.scale[k];
       const double *G = f->of.factor.spread + (size_t)(k < core ? k - first : width + k - core) * across;
       for (size_t j = 0; j < across && x != 0; j++) f->image[(size_t)i * across + j] += x * G[j];
     }
