@@ -109,7 +109,7 @@ static void push_name(expansion *e, names *list, const char *kind, const char *n
 
 static void collect_names(expansion *e, names *list, const cav_xml_node *node) {
   const cav_xml_value *name = cav_xml_get(node, "name");
-  if (name) push_name(e, list, kind_of(node), name->text);
+  if (name && *name->text) push_name(e, list, kind_of(node), name->text);
   for (const cav_xml_node *c = node->child; c; c = c->next) collect_names(e, list, c);
 }
 
@@ -127,7 +127,9 @@ static int refers(const cav_xml_node *node, const change *c, int all) {
 
 // --- copies ---
 
+// an empty text names nothing, in copies too
 static const char *changed_text(expansion *e, const change *c, const char *text) {
+  if (!*text) return text;
   size_t room = strlen(c->prefix) + strlen(text) + strlen(c->suffix) + 1;
   char *copy = cav_xml_carve(e->xml, room);
   if (!copy) {
