@@ -168,7 +168,7 @@ CAV_API const cav_quality_rule *cav_quality_rules(int *n);
 
 /// Measures a motion of at least four knots from its configurations alone. law: of the step (order, gravity, passive
 /// forces), NULL: the model's. Contact forces are those within 5 mm that leave the least residual, and of these the least
-/// efforts. optim/METHOD.md, 13. CAV_BAD_INPUT, CAV_NO_MEMORY, CAV_NOT_FINITE with the reason in error.
+/// efforts. optim/METHOD.md, 14. CAV_BAD_INPUT, CAV_NO_MEMORY, CAV_NOT_FINITE with the reason in error.
 CAV_API cav_status cav_quality_measure(const cav_model *model, const cav_trajectory *motion, const cav_options *law,
                                        cav_quality *quality, cav_error *error);
 
