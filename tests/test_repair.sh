@@ -47,5 +47,5 @@ for bar in "penetration 5" "skating 1" "floating 20" "torque_excess 0" "residual
   under "$(measure "$1" table.csv 5)" "$2" || fail "repaired, and $1 is $(measure "$1" table.csv 5)"
 done
 "$cavort" view fit repaired >out 2>err || grep -q "cannot read three.js" err || fail "no page of both"
-[ ! -e fit-beside-repaired.view.html ] || grep -q '"label":"skating"' fit-beside-repaired.view.html || fail "no table on the page"
+[ ! -e fit-beside-repaired.view.html ] || grep -q '"label":"skating, quality"' fit-beside-repaired.view.html || fail "no table on the page"
 exit $failed

@@ -16,6 +16,10 @@
 enum { QUALITIES = 0 CAV_QUALITIES(COUNT) };
 #undef COUNT
 
+typedef struct quality_text {
+  char label[48], value[32];
+} quality_text;
+
 // charts on their way: series, and the numbers that they point at
 typedef struct charts {
   int n, nknot;
@@ -246,15 +250,18 @@ static int verdict_lines(const cav_verdict *verdict, cav_certificate_line *told,
   return n;
 }
 
-// a line for each measure of quality
-static int quality_lines(const cav_quality *quality, char value[][32], cav_view_line *line) {
+// a line for each measure of quality, in words apart from those of the certificate
+static int quality_lines(const cav_quality *quality, quality_text text[QUALITIES], cav_view_line *line) {
   int n;
   const cav_quality_rule *rule = cav_quality_rules(&n);
   assert(n == QUALITIES);
   for (int i = 0; i < n; i++) {
     double x = *(const double *)((const char *)quality + rule[i].offset);
-    snprintf(value[i], 32, "%.3g %s", x, rule[i].unit);
-    line[i] = (cav_view_line){rule[i].name, value[i], isfinite(rule[i].bar) ? x <= rule[i].bar : -1};
+    snprintf(text[i].label, sizeof text[i].label, "%s, quality", rule[i].name);
+    for (char *c = text[i].label; *c; c++)
+      if (*c == '_') *c = ' ';
+    snprintf(text[i].value, sizeof text[i].value, "%.3g %s", x, rule[i].unit);
+    line[i] = (cav_view_line){text[i].label, text[i].value, isfinite(rule[i].bar) ? x <= rule[i].bar : -1};
   }
   return n;
 }
@@ -288,7 +295,8 @@ typedef struct parts {
   cav_view_force *force;
   cav_certificate_line told[CAV_CERTIFICATE_LINES];
   cav_view_line line[CAV_CERTIFICATE_LINES + 4 + QUALITIES];
-  char seconds[64], title[300], quality[QUALITIES][32];
+  char seconds[64], title[300];
+  quality_text quality[QUALITIES];
 } parts;
 
 static void free_page(parts *page) {
