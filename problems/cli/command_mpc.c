@@ -169,13 +169,13 @@ static cav_status write_runs(const control *c, cav_error *error) {
   char *path = cav_result_path(c->folder, "runs.csv");
   cav_status status = path ? cav_file_begin(&file, path, error) : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
   if (!status) {
-    fputs("push,stands,strayed_m,lowered,speed_m_s,plans,stopped\n", file.stream);
+    fputs("push,stands,cost,strayed_m,lowered,speed_m_s,plans,stopped\n", file.stream);
     for (int i = 0; i < c->ntrial; i++) {
       const cav_run *run = &c->run[i];
       cav_table_write_text(file.stream, c->trial[i].what);
       fprintf(file.stream, ",%d", run->stands);
-      const double value[] = {run->strayed, run->lowered, run->speed};
-      for (int k = 0; k < 3; k++) fputc(',', file.stream), cav_table_write_number(file.stream, value[k]);
+      const double value[] = {run->cost, run->strayed, run->lowered, run->speed};
+      for (int k = 0; k < 4; k++) fputc(',', file.stream), cav_table_write_number(file.stream, value[k]);
       fprintf(file.stream, ",%d,", run->nplan);
       cav_table_write_text(file.stream, run->stopped);
       fputc('\n', file.stream);
@@ -299,8 +299,8 @@ static void print_head(const control *c) {
 
 static void print_run(const control *c, int i) {
   const cav_run *run = &c->run[i];
-  printf("%-46s %s, strayed %.3f m%s%s\n", c->trial[i].what, run->stands ? "stands" : "does not stand", run->strayed,
-         *run->stopped ? ", " : "", run->stopped);
+  printf("%-46s %s, strayed %.3f m, plans cost %.3g%s%s\n", c->trial[i].what, run->stands ? "stands" : "does not stand",
+         run->strayed, run->cost, *run->stopped ? ", " : "", run->stopped);
   fflush(stdout);
 }
 

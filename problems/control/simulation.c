@@ -175,6 +175,7 @@ cav_status cav_simulate(const cav_simulation *simulation, const cav_push *push, 
              cav_status_name(status));
     status = CAV_OK;
   }
+  for (int i = 0; i < run->nplan; i++) run->cost += run->plan[i].cost / run->nplan;
   if (status == CAV_OK && find_end(&p, run) != CAV_OK) run->stands = 0;
   if (run->motion) run->motion->nknot = run->nplan > 2 ? run->nplan : 2;
   close_plant(&p);

@@ -32,6 +32,7 @@ typedef struct cav_run {
   cav_trajectory *motion; ///< at the states that plans were made from, forces that actuators gave there
   int nplan;
   cav_plan_record *plan; ///< [nplan]
+  double cost;           ///< mean of its plans'
   double strayed;        ///< m, farthest that the centre of mass was from where it began, level
   double lowered;    ///< by how much a link ended below its place in the goal posture at most, over the posture's size
   double speed;      ///< m/s of the centre of mass at the end
