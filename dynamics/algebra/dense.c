@@ -10,7 +10,7 @@
 enum {
   PANEL = 24,    ///< columns of a factor's panel: a multiple of every tile's columns
   SLICE = 128,   ///< longest sum of a tile
-  WIDE = 48,     ///< columns of B packed at a time: a multiple of every tile's columns
+  WIDE = 96,     ///< columns of B packed at a time: a multiple of every tile's columns
   TILE_MOST = 16 ///< rows of the tallest tile
 };
 
@@ -180,7 +180,7 @@ static void add_tile(cav_part part, int m, int n, int row, int column, const lan
 static void product(cav_part part, int m, int n, int k, double sign, const operand *A, const operand *B, double *C,
                     size_t ldc) {
   const lanes *w = way();
-  double packed_a[SLICE * TILE_MOST], packed_b[SLICE * WIDE];
+  _Alignas(64) double packed_a[SLICE * TILE_MOST], packed_b[SLICE * WIDE];
   for (int wide = 0; wide < n; wide += WIDE) {
     int end = n - wide < WIDE ? n : wide + WIDE;
     for (int slice = 0; slice < k; slice += SLICE) {
@@ -252,7 +252,7 @@ static void reduce_rows(const lanes *w, const panel *p, int first, double *A, si
 static int reduce_strips(const lanes *w, const panel *p, const triangle *L, double *A, size_t ld) {
   int last = p->last[0];
   if (last - p->end < w->rows / 2) return p->end;
-  double X[PANEL * TILE_MOST];
+  _Alignas(64) double X[PANEL * TILE_MOST];
   for (int row = p->end; row < last; row += w->rows) {
     int some = least(last - row, w->rows);
     operand rows = {.at = A + (size_t)p->start * ld + row, .by_row = 1, .by_column = ld};
@@ -285,7 +285,7 @@ static int factor_triangle(const lanes *w, const panel *p, triangle *L, double *
 int cav_dense_factor_blocks(int n, int below, int step, double *A, int lda) {
   const lanes *w = way();
   size_t ld = (size_t)lda;
-  triangle L;
+  _Alignas(64) triangle L;
   for (int start = 0; start < n; start += PANEL) {
     panel p = panel_at(start, n, below, step);
     if (!factor_triangle(w, &p, &L, A, ld)) return 0;
