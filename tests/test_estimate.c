@@ -1,6 +1,6 @@
 /// Estimation of a motion whose truth is known: an arm of two joints, pushed about by torques of known variance, seen by an
 /// accelerometer, a gyro and a marker with noise, 30 % of the readings of each missing. The error of postures and of torques, rms
-/// over knots and records, against the Cramer-Rao bound: the inverse of the information at the truth, the torques' prior with
+/// over knots and records, and what standard errors make of it, against the Cramer-Rao bound: the inverse of the information at the truth, the torques' prior with
 /// it, by differences of simulations that share nothing with the solver but a forward step.
 #include "cavort/cavort.h"
 #include "scene.h"
@@ -129,7 +129,20 @@ static void write_record(const simulation *s, char seen[STEPS + 1][3]) {
   scene_write(folder, "gyro.csv", text[1]);
 }
 
-static cav_solution *estimate(const double *x) {
+/// Mean variances of postures and torques as standard errors tell them, at an estimate.
+static void told(const cav_problem *p, const cav_solution *s, double *postures, double *torques) {
+  cav_standard_errors *e = NULL;
+  cav_error error = {0};
+  if (!CHECK(s && cav_standard_errors_find(p, s->trajectory, &s->contact, s->nrow, s->row, &e, &error) == CAV_OK)) {
+    fprintf(stderr, "    %s\n", error.text);
+    return;
+  }
+  for (int i = 0; i < DOFS * (STEPS + 1); i++) *postures += e->q[i] * e->q[i] / (DOFS * (STEPS + 1));
+  for (int i = 0; i < DOFS * STEPS; i++) *torques += e->u[i] * e->u[i] / (DOFS * STEPS);
+  cav_standard_errors_free(e);
+}
+
+static cav_solution *estimate(const double *x, double variance[2]) {
   char path[300], text[2000];
   cav_error error = {0};
   snprintf(
@@ -149,6 +162,7 @@ static cav_solution *estimate(const double *x) {
   cav_solution *s = NULL;
   options.gains = 0;
   if (!CHECK(p && cav_solve(p, &options, NULL, &s, &error) == CAV_OK)) fprintf(stderr, "    %s\n", error.text);
+  told(p, s, &variance[0], &variance[1]);
   cav_problem_free(p);
   return s;
 }
@@ -160,7 +174,7 @@ int main(void) {
   if (!CHECK(s.state != NULL)) return check_result();
   s.state->options.timestep = step;
   s.state->options.order = CAV_ORDER_MIDPOINT;
-  double square[2] = {0}, least[2] = {0};
+  double square[2] = {0}, least[2] = {0}, variance[2] = {0};
   int hidden = 0;
   for (int r = 0; r < RECORDS; r++) {
     double x[PARAMETERS] = {.6, -.3, 1, -2}, postures, torques;
@@ -174,7 +188,7 @@ int main(void) {
     bound(&s, x, seen, &postures, &torques);
     simulate(&s, x);
     write_record(&s, seen);
-    cav_solution *e = estimate(x);
+    cav_solution *e = estimate(x, variance);
     for (int t = 0; t <= STEPS && e; t++)
       for (int d = 0; d < DOFS; d++) {
         square[0] += pow(e->trajectory->q[DOFS * t + d] - s.q[t][d], 2) / (DOFS * (STEPS + 1));
@@ -184,10 +198,13 @@ int main(void) {
     cav_solution_free(e);
   }
   for (int k = 0; k < 2; k++)
-    printf("%s: rms error %.4g %s, Cramer-Rao bound %.4g, ratio %.3f\n", k ? "torques" : "postures",
-           sqrt(square[k] / RECORDS), k ? "N m" : "rad", sqrt(least[k] / RECORDS), sqrt(square[k] / least[k]));
+    printf("%s: rms error %.4g %s, standard errors %.4g, Cramer-Rao bound %.4g, ratio %.3f\n",
+           k ? "torques" : "postures", sqrt(square[k] / RECORDS), k ? "N m" : "rad", sqrt(variance[k] / RECORDS),
+           sqrt(least[k] / RECORDS), sqrt(square[k] / least[k]));
   // twelve records: the rms of that many errors is within a fifth or so of its mean; nothing can be far below the bound
   for (int k = 0; k < 2; k++) CHECK(square[k] < 1.25 * 1.25 * least[k] && square[k] > .75 * .75 * least[k]);
+  // seen 3 % apart: standard errors are of the information at the estimate instead of the truth
+  for (int k = 0; k < 2; k++) CHECK_NEAR(sqrt(variance[k] / least[k]), 1, .05);
   CHECK(fabs(hidden / (3. * RECORDS * (STEPS + 1)) - missing) < .03);
   // the bound is of the noise, not of what the marker alone or the prior alone would say
   CHECK(sqrt(least[1] / RECORDS) < .9 * torque_sd && sqrt(least[0] / RECORDS) < sd[6] / .3);

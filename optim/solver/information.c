@@ -17,6 +17,14 @@ static const double stiffness = 1e14;
 /// of D.
 static const double nothing = 1e-13, least_pivot = 1e-9;
 
+/// So near its bound a row with a multiplier is held by it, scaled: farther inside the multiplier is what rounding left.
+static const double at_bound = 1e-4;
+
+static int is_held(const cav_binding *row) {
+  double inside = row->multiplier > 0 ? row->upper - row->value : row->value - row->lower;
+  return row->multiplier != 0 && inside <= at_bound;
+}
+
 /// Notes which rows hold: equalities, and bounds that a binding with a multiplier names.
 static void find_holding(cav_information *f, int nrow, const cav_binding *row) {
   const cav_transcription *tr = f->tr;
@@ -28,7 +36,7 @@ static void find_holding(cav_information *f, int nrow, const cav_binding *row) {
   }
   for (int n = 0; n < nrow; n++) {
     int t = row[n].knot;
-    if (row[n].multiplier == 0 || t < 0 || t >= tr->nknot) continue;
+    if (!is_held(&row[n]) || t < 0 || t >= tr->nknot) continue;
     for (int i = 0; i < tr->knot[t].layout.count; i++) {
       cav_transcription_origin(tr, t, i, &own);
       if (own.kind == row[n].kind && own.object == row[n].object && own.component == row[n].component)
