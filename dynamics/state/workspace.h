@@ -45,7 +45,7 @@ typedef struct cav_workspace {
   double *acceleration;   ///< [nlink*6] spatial, base acceleration -gravity
   double *velocity_now;   ///< [nlink*6] scratch: at v, where that is not where the bias is taken
 
-  double *bias;           ///< [nlink*6] spatial accelerations that v alone makes; none without connects and welds
+  double *bias; ///< [nlink*6] spatial accelerations that v alone makes; none without connects and welds
 
   // contacts of the last position are those that can bear something at these velocities, or near them
   int narrowed;

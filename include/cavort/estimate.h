@@ -21,7 +21,7 @@ typedef struct cav_estimate {
   int iterations;         ///< changes of the parameters
   const cav_model *model; ///< with these values; its names are those of the problem's model, which has to outlive it
   cav_solution *solution; ///< the motion of that model
-  void *owner;
+  void *owner;            ///< memory of the estimate
 } cav_estimate;
 
 /// The parameters and the motion that together cost least, priors included: for given parameters the motion is solved, what

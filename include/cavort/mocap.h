@@ -164,6 +164,7 @@ typedef struct cav_quality_rule {
   const char *text;        ///< what it measures
   size_t offset;           ///< of the member in cav_quality
 } cav_quality_rule;
+/// The measures in the order of CAV_QUALITIES, n of them.
 CAV_API const cav_quality_rule *cav_quality_rules(int *n);
 
 /// Measures a motion of at least four knots from its configurations alone. law: of the step (order, gravity, passive

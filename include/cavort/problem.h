@@ -341,7 +341,7 @@ typedef struct cav_problem {
   /// Solved by windows of time, s, each looking ahead over the overlap that the next one solves again; window 0, or as long
   /// as the motion: all at once.
   double window, overlap;
-  cav_cycle cycle;        ///< where on: close_at_rest and v_start do not count, and q_start is where the guess starts
+  cav_cycle cycle;     ///< where on: close_at_rest and v_start do not count, and q_start is where the guess starts
   int free_start;      ///< 1: q_0 and v_0 are unknowns, and q_start and v_start where the guess starts; not of a cycle
   double *q_start;     ///< [nq]
   double *v_start;     ///< [nv]

@@ -72,9 +72,10 @@ static cav_status check_times(const cav_problem_reader *reader, const cav_xml_no
   for (int i = 0; i < table->nrow; i++) {
     double t = table->value[(size_t)i * (size_t)table->ncol + (size_t)time];
     if (!cut && !is_within(reader, t))
-      return cav_xml_fail(reader->error, node, "file",
-                          "%s:%d: expected a time within the horizon, 0 .. %g s, got %g; of a longer table say 'offset'",
-                          table->path, table->line[i], reader->problem->duration, t);
+      return cav_xml_fail(
+          reader->error, node, "file",
+          "%s:%d: expected a time within the horizon, 0 .. %g s, got %g; of a longer table say 'offset'", table->path,
+          table->line[i], reader->problem->duration, t);
     if (t <= before)
       return cav_xml_fail(reader->error, node, "file", "%s:%d: expected a time after the one before, %g s, got %g",
                           table->path, table->line[i], before, t);
