@@ -1,7 +1,8 @@
 /// Estimation of a motion whose truth is known: an arm of two joints, pushed about by torques of known variance, seen by an
-/// accelerometer, a gyro and a marker with noise, 30 % of the readings of each missing. The error of postures and of torques, rms
-/// over knots and records, and what standard errors make of it, against the Cramer-Rao bound: the inverse of the information at the truth, the torques' prior with
-/// it, by differences of simulations that share nothing with the solver but a forward step.
+/// accelerometer, a gyro and a marker with noise, 30 % of the readings of each missing. The error of postures and of
+/// torques, rms over knots and records, and what standard errors make of it, against the Cramer-Rao bound: the inverse
+/// of the information at the truth, the torques' prior with it, by differences of simulations that share nothing with the
+/// solver but a forward step.
 #include "cavort/cavort.h"
 #include "scene.h"
 
