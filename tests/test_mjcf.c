@@ -428,6 +428,26 @@ static void test_locale(void) {
   setlocale(LC_NUMERIC, "C");
 }
 
+// an included file's own includes: beside the main file, else beside itself, as in MuJoCo 3
+static void test_include_folders(void) {
+  static const char main_file[] = "<mujoco><include file='sub/outer.xml'/><worldbody/></mujoco>";
+  static const char outer[] = "<mujoco><include file='inner.xml'/></mujoco>";
+  static const char near[] = "<mujoco><option timestep='0.003'/></mujoco>";
+  static const char far[] = "<mujoco><option timestep='0.005'/></mujoco>";
+  if (!CHECK(!mkdir(in_folder("sub"), 0700))) return;
+  write_bytes("sub/outer.xml", outer, sizeof outer - 1);
+  write_bytes("sub/inner.xml", near, sizeof near - 1);
+  for (int both = 0; both < 2; both++) {
+    if (both) write_bytes("inner.xml", far, sizeof far - 1);
+    cav_model *m = cav_model_load(write_bytes("main.xml", main_file, sizeof main_file - 1), NULL);
+    if (CHECK(m != NULL)) CHECK_NEAR(m->timestep, both ? 0.005 : 0.003, 0);
+    cav_model_free(m);
+  }
+  static const char *const made[] = {"main.xml", "inner.xml", "sub/outer.xml", "sub/inner.xml"};
+  for (size_t i = 0; i < sizeof made / sizeof *made; i++) remove(in_folder(made[i]));
+  rmdir(in_folder("sub"));
+}
+
 int main(void) {
   const char *named = getenv("TMPDIR");
   snprintf(folder, sizeof folder, "%.150s/cavort-mjcf-XXXXXX", named ? named : "/tmp");
@@ -440,6 +460,7 @@ int main(void) {
   test_damage();
   test_memory();
   test_locale();
+  test_include_folders();
   static const char *const made[] = {"empty.xml", "blank.xml", "junk.xml", "wide.xml",    "latin.xml",
                                      "big.xml",   "cut.xml",   "good.xml", "changed.xml", "deep.xml"};
   for (size_t i = 0; i < sizeof made / sizeof *made; i++) remove(in_folder(made[i]));

@@ -15,6 +15,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "xml_parts.h"
 
@@ -58,21 +59,28 @@ static const cav_xml_element *rule_of_stranger(cav_xml_source *s, int line, cons
 
 static void read_file(cav_xml_reader *r, const char *path, cav_xml_source *from, const cav_xml_node *asked);
 
-// opens the file that an include element names, in the place of that element
+// path of a file as named in the folder of another; NULL without memory
+static char *path_beside(cav_xml *xml, const char *other, const char *name) {
+  const char *slash = strrchr(other, '/');
+  size_t folder = name[0] == '/' || !slash ? 0 : (size_t)(slash - other) + 1, length = strlen(name);
+  char *path = cav_xml_carve(xml, folder + length + 1);
+  if (!path) return NULL;
+  memcpy(path, other, folder);
+  memcpy(path + folder, name, length);
+  return path;
+}
+
+// opens the file that an include element names, beside the main file or else beside this one, in place of the element
 static void read_include(cav_xml_source *s, const cav_xml_node *node) {
   cav_xml_reader *r = s->reader;
   const char *name = cav_xml_text(node, "file", "");
-  const char *slash = strrchr(r->xml->path, '/');
-  size_t folder = name[0] == '/' || !slash ? 0 : (size_t)(slash - r->xml->path) + 1, length = strlen(name);
-  char *path = cav_xml_carve(r->xml, folder + length + 1);
-  if (!path) {
+  char *path = path_beside(r->xml, r->xml->path, name), *near = path ? path_beside(r->xml, s->path, name) : NULL;
+  if (!near) {
     cav_xml_source_fail(s, CAV_NO_MEMORY, node->line, node->rule->name, "file", "no memory for its path");
     return;
   }
-  memcpy(path, r->xml->path, folder);
-  memcpy(path + folder, name, length);
   s->include = s->depth;
-  read_file(r, path, s, node);
+  read_file(r, access(path, F_OK) && !access(near, F_OK) ? near : path, s, node);
 }
 
 // root of a file: of the main one it starts the tree, of an included one it is left out
