@@ -24,7 +24,7 @@ typedef struct cav_mpc_options {
 CAV_API cav_mpc_options cav_mpc_options_default(void);
 
 /// A controller for one problem: its start is where the first plan begins, from which on waypoints are timed. Plans
-/// obey the law of the schedule's last stage, so that is a soft one (optim/METHOD.md, 12). Weights, targets and scales of
+/// obey the law of the schedule's last stage, so that is a soft one (optim/METHOD.md, 13). Weights, targets and scales of
 /// terms may be changed in place between calls. Windows of terms move along with the plan, waypoints of their targets
 /// do not: they keep to the clock, so that what is to be followed may move. One thread at a time.
 typedef struct cav_mpc cav_mpc;

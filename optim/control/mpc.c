@@ -1,6 +1,6 @@
 /// Model-predictive control on a solver that keeps its memory (optimiser.c). A plan is the last one, read from where the
 /// body will be when it comes into force, and a few Gauss-Newton steps under one law with rows held by fixed penalties:
-/// multipliers that are updated once a plan lag behind a body that is pushed (optim/METHOD.md, 12). Two plans are kept,
+/// multipliers that are updated once a plan lag behind a body that is pushed (optim/METHOD.md, 13). Two plans are kept,
 /// since one is made while the other is followed.
 #include "cavort/mpc.h"
 

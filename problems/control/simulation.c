@@ -1,6 +1,6 @@
 /// A body under model-predictive control. One step of the simulation is the model's own: its file's contacts, the
 /// first-order step. What the controller takes to compute is not waited for: plans come into force when their delay is
-/// over, whatever clock runs beside (optim/METHOD.md, 12); how long they took is noted.
+/// over, whatever clock runs beside (optim/METHOD.md, 13); how long they took is noted.
 #include "simulation.h"
 
 #include <math.h>
