@@ -46,6 +46,8 @@ check 'options' "$(grep -c '27 dofs, 20 knots of 25 ms, 50 plans a second, 1 ite
 
 refused "DIRECTION is no axis" --push "20 torso sideways 0.5"
 refused "there is something missing" --push "20 torso y"
+refused "when the last push ends" --push "20 torso x 5" --duration 1
+refused "when the last push ends" --push "20 torso x 0.95" --duration 1
 refused "there is something left over" --push "20 torso y 0.5 0.1 7"
 refused "no body of that name" --push "20 nothing y 0.5"
 refused "expected at most the time between plans" --deadline 1

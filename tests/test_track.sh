@@ -56,6 +56,17 @@ grep -q '^markers 0.0[0-9]* mm rms' out || fail "markers in flight: $(grep '^mar
 cmp -s again/trajectory.csv thrown/result/trajectory.csv || fail "the problem again gives another motion"
 "$cavort" track flight.csv --model box.xml --markers set.xml --from 3.59 2>err && fail "no time"
 grep -q 'expected three steps' err || fail "no time: $(cat err)"
+[ ! -e flight.track ] || fail "no time leaves a folder"
+"$cavort" track flight.csv --model box.xml --markers set.xml --from 3.4 --until 3.2 >out 2>err && fail "an end before the start"
+[ ! -s out ] || fail "an end before the start is fitted first: $(cat out)"
+sed 's/<markers>/<markers retarget="true">/' set.xml >other.xml
+"$cavort" track flight.csv --model box.xml --markers other.xml 2>err && fail "a clip of another body"
+grep -q 'repair.xml' err || fail "a clip of another body: $(cat err)"
+sed 's|ik/markers.xml|../other.xml|' thrown/problem.xml >thrown/other.xml
+"$cavort" inspect thrown/other.xml >out 2>err && fail "a record of another body"
+grep -q 'thrown/other.xml:.*markers.*repair.xml' err || fail "a record of another body: $(cat err)"
+"$cavort" track flight.csv --model box.xml --markers set.xml --from 3.1 --until 3.5 --threads 1 -o unweighed >out 2>err
+grep -q 'forces are those of 2.0 kg, the model' out || fail "mass: $(tail -n 3 out)"
 "$cavort" track flight.csv --model box.xml --markers set.xml --from x 2>err && fail "a time that is none"
 grep -q 'expected a time' err || fail "a time that is none: $(cat err)"
 echo "$failed failed"

@@ -581,6 +581,10 @@ cav_status cav_problem_track(const cav_problem_reader *reader, const cav_xml_nod
     if (!set)
       status = cav_xml_fail_as(reader->error, inner.status ? inner.status : CAV_NO_MEMORY, node, "markers", "%s",
                                inner.text);
+    if (set && set->retarget)
+      status = cav_xml_fail(reader->error, node, "markers",
+                            "a set with retarget=\"true\" scales the clip: fit it by cavort ik and track the joints of "
+                            "that, as its repair.xml does");
   }
   if (!status) status = take_record(&made, set);
   if (!status) status = set_markers(&made, set);

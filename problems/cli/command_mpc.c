@@ -127,10 +127,15 @@ static cav_status set_simulation(control *c, cav_error *error) {
   if (line->stiffness >= 0) s->mpc.stiffness = line->stiffness;
   s->mpc.knots = line->knots;
   if (line->iterations) s->mpc.iterations = line->iterations;
-  double last = 0;
-  for (int i = 0; i < c->ntrial; i++) last = fmax(last, c->trial[i].push.time);
+  double last = 0, end = h;
+  for (int i = 0; i < c->ntrial; i++) {
+    const cav_push *push = &c->trial[i].push;
+    last = fmax(last, push->time), end = fmax(end, push->time + push->length);
+  }
   s->steps = (int)lround((line->duration > 0 ? line->duration : last + usual_after) / h);
-  return s->steps > 0 ? CAV_OK : cav_file_fail(error, CAV_BAD_INPUT, 0, "--duration: expected at least %g s", h);
+  if (end <= s->steps * h + 1e-9) return CAV_OK;
+  return cav_file_fail(error, CAV_BAD_INPUT, 0, "--duration %g: expected at least %g s, when the last push ends",
+                       s->steps * h, end);
 }
 
 // the plan that all runs begin with

@@ -37,6 +37,7 @@ typedef struct tracked {
   double first, from, to;                        // s: of the first frame, of the motion
   double information; // of the record on where the body is: markers, times rate, over noise, 1/(m^2 s)
   double smoothing;   // m, of the contacts
+  double mass;        // kg
   char *columns[3];   // of ik/acceleration.csv: of free roots, linear, angular; joints; NULL: none
   double fit_rms;     // m, over the motion
 } tracked;
@@ -109,9 +110,9 @@ static double sink_of(const cav_model *m) {
   return weight / 4 * step * step * softness / (1 + softness) * most;
 }
 
-// the time that is asked for, whole steps of it that the clip has
-static cav_status take_time(tracked *t, cav_error *error) {
-  cav_model *model = cav_model_load(t->model, error);
+// the time that is asked for, whole steps of it that the clip has; the model is a file's
+static cav_status take_time(tracked *t, const char *file, cav_error *error) {
+  cav_model *model = cav_model_load(file, error);
   cav_marker_set *set = model ? cav_marker_set_read(t->line->markers, model, error) : NULL;
   cav_record *record = set ? cav_record_read(t->line->operand, &set->clip, error) : NULL;
   if (record) {
@@ -122,10 +123,20 @@ static cav_status take_time(tracked *t, cav_error *error) {
     t->to = t->from + floor((t->to - t->from) / step + 1e-6) * step;
     t->information = record->nmarker * (record->nframe - 1) / (last - t->first) / (usual_sd * usual_sd);
     t->smoothing = fmin(fmax(sink_of(model), sharpest), softest);
-    for (int group = 0; group < 3; group++) t->columns[group] = columns_of(model, group);
+    t->mass = model->mass;
+    for (int group = 0; group < 3; group++) {
+      free(t->columns[group]);
+      t->columns[group] = columns_of(model, group);
+    }
   }
   cav_status status = record ? CAV_OK : error->status;
-  if (record && !(t->to - t->from > 2.5 * step))
+  if (record && set->retarget)
+    status =
+        cav_file_fail(error, CAV_BAD_INPUT, 0,
+                      "%s: a set with retarget=\"true\" scales the clip, and markers of another body say nothing of "
+                      "forces here; fit it by cavort ik, then cavort solve DIR/repair.xml",
+                      t->line->markers);
+  else if (record && !(t->to - t->from > 2.5 * step))
     status = cav_file_fail(error, CAV_BAD_INPUT, 0,
                            "track: expected three steps of %g s at least between --from and --until; the clip lasts "
                            "from %g to %g s",
@@ -313,6 +324,9 @@ static cav_status tell(const tracked *t, cav_error *error) {
       printf("markers %.2f mm rms from the record, by kinematics alone %.2f mm\n", 1e3 * rms,
              1e3 * fit_rms(t, p, track, r));
   }
+  if (!status && !t->line->quiet)
+    printf("forces are those of %.1f kg%s\n", t->mass,
+           t->line->mass > 0 ? "" : ", the model's mass: --mass gives the subject's, which no marker shows");
   if (!status && !t->line->quiet) printf("wrote %s: problem.xml, result, cop.csv, markers.csv, ik\n", t->folder);
   cav_forces_free(forces);
   free(r), free(markers), free(pressure);
@@ -323,10 +337,12 @@ static cav_status tell(const tracked *t, cav_error *error) {
 int cav_command_track(const cav_command_line *line) {
   cav_error error = {0};
   tracked t = {.line = line};
-  cav_status status = make_paths(&t, &error);
+  // before anything is fitted or written; what is left out is cav_command_ik's to tell
+  cav_status status = line->model && line->markers && line->operand ? take_time(&t, line->model, &error) : CAV_OK;
+  if (!status) status = make_paths(&t, &error);
   int done = status ? cav_command_fail(&error) : fit(&t, &error);
   if (!done) {
-    status = take_time(&t, &error);
+    status = take_time(&t, t.model, &error);
     if (!status) status = write_problem(&t, &error);
     if (status) done = cav_command_fail(&error);
   }
