@@ -205,6 +205,14 @@ static void test_repair(void) {
   CHECK(taken.nterm == 3 && taken.timestep == p.timestep / 2 && strstr(twice.changed, "<force") &&
         strstr(twice.changed, "timestep"));
   cav_strategy_clear(&once), cav_strategy_clear(&twice);
+  // near a record contact forces are what is looked for, and cost nothing; a residual beyond its bound has no cure
+  terms[1].quantity = CAV_QUANTITY_TRACK;
+  CHECK(cav_strategy_repair(&p, &strategy[0], &lost, 0, &once, &found) == CAV_OK && found);
+  CHECK(once.nterm == 0 && once.timestep == p.timestep / 2);
+  cav_strategy_clear(&once);
+  terms[1].quantity = CAV_QUANTITY_SLIP;
+  lost.residual_fraction_max = 0.11, lost.residual_within = 0.1;
+  CHECK(cav_strategy_repair(&p, &strategy[0], &lost, 0, &once, &found) == CAV_OK && !found);
   // slip weighs ten times as much; a goal that is missed gets effort, then weight; what is good needs nothing
   CHECK(cav_strategy_repair(&p, &strategy[0], &slips, 0, &once, &found) == CAV_OK && found);
   CHECK(once.nterm == 3 && once.term[1].weight + once.term[2].weight == 2000);

@@ -27,12 +27,19 @@ typedef enum cure {
 enum { CURES = 3 };
 static const double force_weight = 1, heavier = 10, harder = 4, slack = 0.75;
 
-/// What a motion misses first, in the order of a certificate (METHOD.md, 6), and its cures.
-static const cure *cures_of(const cav_verdict *v) {
+static int has_record(const cav_problem *p) {
+  int found = 0;
+  for (int i = 0; i < p->nterm; i++) found |= p->term[i].quantity == CAV_QUANTITY_TRACK;
+  return found;
+}
+
+/// What a motion misses first, in the order of a certificate (METHOD.md, 6), and its cures. Forces near a record are what
+/// is looked for: none of them costs anything. A residual beyond its bound is what the model cannot do.
+static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
   static const cure forces[] = {EFFORT, STEP, NONE}, deep[] = {SOFTNESS, STEP, NONE}, between[] = {STEP, NONE},
                     turned[] = {ORDER, STEP, NONE}, slip[] = {SLIP, SOFTNESS, NONE}, hover[] = {GAP, STEP, NONE},
                     fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK}, target[] = {EFFORT, GOALS, NONE},
-                    none[] = {NONE};
+                    near[] = {STEP, NONE}, none[] = {NONE};
   if (v->certified) return v->achieved ? none : target;
   if (!cav_verdict_feasible(v)) return forces;
   if (v->penetration_max_m > CAV_TOLERANCE_PENETRATION) return deep;
@@ -41,7 +48,8 @@ static const cure *cures_of(const cav_verdict *v) {
   if (v->slip_mean_m_s > CAV_TOLERANCE_SLIP) return slip;
   if (v->hover_fraction > CAV_TOLERANCE_HOVER) return hover;
   if (v->replay_step_max_error > CAV_TOLERANCE_STEP) return fold;
-  return lost;
+  if (v->residual_fraction_max > v->residual_within) return none;
+  return has_record(p) ? near : lost;
 }
 
 // ---------------------------------------------------------------- changes
@@ -166,7 +174,7 @@ static void describe(const cav_problem *p, cav_strategy *s) {
 
 cav_status cav_strategy_repair(const cav_problem *problem, const cav_strategy *from, const cav_verdict *verdict, int k,
                                cav_strategy *repaired, int *found) {
-  const cure *cures = cures_of(verdict);
+  const cure *cures = cures_of(problem, verdict);
   int n = 0;
   *found = 0;
   while (n < CURES && cures[n] != NONE) n++;
