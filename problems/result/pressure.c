@@ -76,12 +76,11 @@ cav_status cav_pressure_write(const char *path, const cav_model *m, const cav_tr
       if (body >= 0) pushed[body] = 1;
     }
     write_names(file.stream, m, pushed);
-    const cav_contact_force *first = forces->force;
-    for (int t = 0; t < forces->nknot; first += forces->count[t++]) {
+    for (int t = 0, first = 0; t < forces->nknot; first += forces->count[t++]) {
       cav_table_write_number(file.stream, t * trajectory->timestep);
       for (int b = 1; b < m->nbody; b++) {
         if (!pushed[b]) continue;
-        sum(m, forces, first, t, b, F, M);
+        sum(m, forces, forces->force + first, t, b, F, M);
         // the last knot of an open motion has no forces
         if (isnan(forces->unactuated[t])) F[0] = F[1] = F[2] = NAN;
         write_row(file.stream, m, F, M);
