@@ -6,6 +6,7 @@
 
 #include "cavort/cavort.h"
 #include "scene.h"
+#include "storage.h"
 
 enum { STEPS = 40, STATES = 2 };
 static const double mass = 1.7, step = 0.025, of_force = 0.3, of_place = 400;
@@ -150,20 +151,6 @@ static inline void smooth_by_recursion(const record *r, double *state, double *c
 }
 
 // ---------------------------------------------------------------- the same as a problem
-
-/// A problem with its storage.
-typedef struct bench {
-  cav_model *model;
-  cav_problem problem;
-  cav_term term[8];
-  double q_start[8], v_start[8];
-} bench;
-
-static inline cav_term *add(bench *b, cav_term term) {
-  term.dofs = CAV_DOFS_ALL;
-  b->term[b->problem.nterm] = term;
-  return &b->term[b->problem.nterm++];
-}
 
 static inline int bench_make(bench *b, const char *text, double duration) {
   *b = (bench){.model = scene_load(text)};

@@ -5,6 +5,7 @@
 #include "cavort/cavort.h"
 #include "scene.h"
 #include "schedule.h"
+#include "storage.h"
 
 // ---------------------------------------------------------------- a sled with an arm
 
@@ -64,20 +65,6 @@ static void simulate(record *r, int own) {
   }
   cav_state_free(state);
   cav_model_free(m);
-}
-
-/// A problem with its storage: costs are the record's likelihood.
-typedef struct bench {
-  cav_model *model;
-  cav_problem problem;
-  cav_term term[8];
-  double q_start[8], v_start[8];
-} bench;
-
-static cav_term *add(bench *b, cav_term term) {
-  term.dofs = CAV_DOFS_ALL;
-  b->term[b->problem.nterm] = term;
-  return &b->term[b->problem.nterm++];
 }
 
 static void follow(bench *b, const record *r) {

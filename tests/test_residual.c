@@ -6,22 +6,9 @@
 #include "cavort/cavort.h"
 #include "cavort/result.h"
 #include "scene.h"
+#include "storage.h"
 
 static const double gravity = 9.81;
-
-/// A problem with its storage.
-typedef struct bench {
-  cav_model *model;
-  cav_problem problem;
-  cav_term term[8];
-  double q_start[8], v_start[8];
-} bench;
-
-static cav_term *add(bench *b, cav_term term) {
-  term.dofs = CAV_DOFS_ALL;
-  b->term[b->problem.nterm] = term;
-  return &b->term[b->problem.nterm++];
-}
 
 static int make(bench *b, const char *text, double duration) {
   *b = (bench){.model = scene_load(text)};

@@ -68,6 +68,6 @@ grep -q 'thrown/other.xml:.*markers.*repair.xml' err || fail "a record of anothe
 "$cavort" track flight.csv --model box.xml --markers set.xml --from 3.1 --until 3.5 --threads 1 -o unweighed >out 2>err
 grep -q 'forces are those of 2.0 kg, the model' out || fail "mass: $(tail -n 3 out)"
 "$cavort" track flight.csv --model box.xml --markers set.xml --from x 2>err && fail "a time that is none"
-grep -q 'expected a time' err || fail "a time that is none: $(cat err)"
+grep -q 'expected a number from 0' err || fail "a time that is none: $(cat err)"
 echo "$failed failed"
 [ $failed -eq 0 ]

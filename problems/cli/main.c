@@ -1,6 +1,5 @@
 /// The cavort command: reads the command line and calls one command. Commands are a table; each says which options it
 /// takes.
-#include <math.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -305,12 +304,12 @@ static int take_number(const char *name, const char *value, int zero, double *nu
 }
 
 // a whole number from 1 on
-static int take_count(const char *name, const char *value, int *number) {
+static int take_count(const char *name, const char *value, int most, int *number) {
   char *end;
   const long n = strtol(value, &end, 10);
   *number = (int)n;
-  if (end != value && !*end && n >= 1 && n <= 100000) return 1;
-  fprintf(stderr, "cavort: %s: expected a number from 1 to 100000, got '%s'\n", name, value);
+  if (end != value && !*end && n >= 1 && n <= most) return 1;
+  fprintf(stderr, "cavort: %s: expected a number from 1 to %d, got '%s'\n", name, most, value);
   return 0;
 }
 
@@ -319,8 +318,8 @@ static int take_control(cav_command_line *line, const char *name, char *value) {
   if (!strcmp(name, "--duration")) return take_number(name, value, 0, &line->duration);
   if (!strcmp(name, "--deadline")) return take_number(name, value, 1, &line->deadline);
   if (!strcmp(name, "--stiffness")) return take_number(name, value, 1, &line->stiffness);
-  if (!strcmp(name, "--knots")) return take_count(name, value, &line->knots);
-  if (!strcmp(name, "--iterations")) return take_count(name, value, &line->iterations);
+  if (!strcmp(name, "--knots")) return take_count(name, value, 100000, &line->knots);
+  if (!strcmp(name, "--iterations")) return take_count(name, value, 100000, &line->iterations);
   if (line->npush < CAV_COMMAND_PUSHES) {
     line->push[line->npush++] = value;
     return 1;
@@ -366,34 +365,19 @@ static int take_value(cav_command_line *line, enum option option, const char *na
       line->markers = value;
       return 1;
     case OPTION_FROM:
-    case OPTION_UNTIL: {
-      double time = strtod(value, &end);
-      line->from_given |= option == OPTION_FROM;
-      *(option == OPTION_FROM ? &line->from : &line->until) = time;
-      if (end != value && !*end && time >= 0 && isfinite(time)) return 1;
-      fprintf(stderr, "cavort: %s: expected a time in s, 0 or more, got '%s'\n", name, value);
-      return 0;
-    }
+      line->from_given = 1;
+      return take_number(name, value, 1, &line->from);
+    case OPTION_UNTIL:
+      return take_number(name, value, 1, &line->until);
     case OPTION_SCALE:
       return line->scale = 1;
     case OPTION_MASS:
-      line->mass = strtod(value, &end);
-      if (end != value && !*end && line->mass > 0 && isfinite(line->mass)) return 1;
-      fprintf(stderr, "cavort: %s: expected a mass in kg, above 0, got '%s'\n", name, value);
-      return 0;
+      return take_number(name, value, 0, &line->mass);
     case OPTION_THREADS:
-      n = strtol(value, &end, 10);
-      line->threads = (int)n;
       line->threads_given = 1;
-      if (end != value && !*end && n >= 1 && n <= 1024) return 1;
-      fprintf(stderr, "cavort: %s: expected a number from 1 to 1024, got '%s'\n", name, value);
-      return 0;
+      return take_count(name, value, 1024, &line->threads);
     case OPTION_JOBS:
-      n = strtol(value, &end, 10);
-      line->jobs = (int)n;
-      if (end != value && !*end && n >= 1 && n <= 1024) return 1;
-      fprintf(stderr, "cavort: %s: expected a number from 1 to 1024, got '%s'\n", name, value);
-      return 0;
+      return take_count(name, value, 1024, &line->jobs);
     case OPTION_SET:
       if (line->nset < CAV_COMMAND_SETTINGS) {
         line->set[line->nset++] = value;
@@ -413,10 +397,7 @@ static int take_value(cav_command_line *line, enum option option, const char *na
       line->format = value;
       return 1;
     case OPTION_RATE:
-      line->rate = strtod(value, &end);
-      if (end != value && !*end && line->rate > 0 && line->rate <= 1e6) return 1;
-      fprintf(stderr, "cavort: %s: expected samples a second, above 0, up to 1e6, got '%s'\n", name, value);
-      return 0;
+      return take_number(name, value, 0, &line->rate);
     case OPTION_CONTROL:
       return take_control(line, name, value);
     case OPTION_RESUME:
