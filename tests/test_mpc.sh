@@ -54,5 +54,10 @@ refused "expected at most the time between plans" --deadline 1
 refused "whole milliseconds apart" --rate 300
 refused "knots of a plan from 2" --knots 1
 refused "knots of a plan from 2" --knots 41
+
+# a planar model is not pushed out of its plane, and stands no such push
+"$cavort" mpc "$source/problems/motions/walker-jump/problem.xml" -o "$work/none" --push "20 torso y 0.5" >"$work/out" 2>&1
+check 'planar, sideways: status' $? 2
+check 'planar, sideways: text' "$(grep -c 'no joint of the model lets BODY move in that DIRECTION' "$work/out")" 1
 echo "$checks checks, $failed failed"
 [ "$failed" = 0 ]

@@ -76,8 +76,20 @@ static void add_trial(control *c, int link, const char *body, double impulse, co
              degrees < -0.5 ? degrees + 360 : fabs(degrees), time);
 }
 
-// a text of --push: one run, or ten
-static cav_status read_push(control *c, cav_state *state, const char *text, cav_error *error) {
+/// Whether a push of link moves the start posture at all: a planar model is not pushed sideways.
+static int moves(const control *c, const cav_state *state, int link, const double direction[3], double *u) {
+  const int nv = c->problem->model->nv;
+  cav_push push = {.link = link, .length = 1};
+  memcpy(push.impulse, direction, sizeof push.impulse);
+  memset(u, 0, (size_t)nv * sizeof *u);
+  cav_push_add(c->problem->model, state, &push, u);
+  double most = 0;
+  for (int d = 0; d < nv; d++) most = fmax(most, fabs(u[d]));
+  return most > 1e-9;
+}
+
+// a text of --push: one run, or as many of the ten around as move the body
+static cav_status read_push(control *c, cav_state *state, double *u, const char *text, cav_error *error) {
   char body[100], direction[40], rest[2];
   double impulse, time, length = usual_length, way[3];
   const int n = sscanf(text, "%lf %99s %39s %lf %lf %1s", &impulse, body, direction, &time, &length, rest);
@@ -92,17 +104,22 @@ static cav_status read_push(control *c, cav_state *state, const char *text, cav_
   if (object < 0) return CAV_BAD_INPUT;
   const int link = cav_object_link(c->problem->model, type, object);
   if (link == 0) return bad_push(text, "BODY is fixed to the world", error);
+  if (cav_position(c->problem->model, state, c->problem->q_start) != CAV_OK)
+    return bad_push(text, "the start posture is no posture", error);
+  const int before = c->ntrial;
   for (int k = 0; k < (one < 0 ? AROUND : 1); k++) {
     if (one < 0) way[0] = cos(2 * M_PI * k / AROUND), way[1] = sin(2 * M_PI * k / AROUND);
-    add_trial(c, link, body, impulse, way, time + k * instants, length);
+    if (moves(c, state, link, way, u)) add_trial(c, link, body, impulse, way, time + k * instants, length);
   }
-  return CAV_OK;
+  return c->ntrial > before ? CAV_OK : bad_push(text, "no joint of the model lets BODY move in that DIRECTION", error);
 }
 
 static cav_status read_pushes(control *c, cav_error *error) {
   cav_state *state = cav_state_new(c->problem->model);
-  cav_status status = state ? CAV_OK : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
-  for (int i = 0; i < c->line->npush && !status; i++) status = read_push(c, state, c->line->push[i], error);
+  double *u = calloc((size_t)c->problem->model->nv + 1, sizeof *u);
+  cav_status status = state && u ? CAV_OK : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
+  for (int i = 0; i < c->line->npush && !status; i++) status = read_push(c, state, u, c->line->push[i], error);
+  free(u);
   cav_state_free(state);
   if (c->ntrial == 0) snprintf(c->trial[c->ntrial++].what, sizeof c->trial[0].what, "no push");
   return status;

@@ -64,10 +64,7 @@ static void close_plant(plant *p) {
   free(p->q);
 }
 
-/// u += what the push does at bare's position.
-static void add_push(const plant *p, const cav_push *push) {
-  const cav_model *m = p->model;
-  const cav_state *at = p->bare;
+void cav_push_add(const cav_model *m, const cav_state *at, const cav_push *push, double *u) {
   double force[3], r[3];
   for (int k = 0; k < 3; k++) {
     force[k] = push->impulse[k] / push->length;
@@ -77,7 +74,7 @@ static void add_push(const plant *p, const cav_push *push) {
                             r[0] * force[1] - r[1] * force[0]};
   for (int link = push->link; link > 0; link = m->link[link].parent)
     for (int d = m->link[link].dof; d < m->link[link].dof + m->link[link].ndof; d++)
-      for (int k = 0; k < 3; k++) p->u[d] += at->axis[6 * d + k] * moment[k] + at->axis[6 * d + 3 + k] * force[k];
+      for (int k = 0; k < 3; k++) u[d] += at->axis[6 * d + k] * moment[k] + at->axis[6 * d + 3 + k] * force[k];
 }
 
 /// One step of the body. CAV_NOT_CONVERGED: there is no such step.
@@ -120,7 +117,8 @@ static cav_status advance(plant *p, int i, const cav_push *push, cav_run *run) {
   if (plans)
     memcpy(run->motion->u + (size_t)(run->nplan - 1) * p->model->nv, p->u, (size_t)p->model->nv * sizeof *p->u);
   const double half = 0.5 * p->simulation->mpc.timestep;
-  if (push && time > push->time - half && time < push->time + push->length - half) add_push(p, push);
+  if (push && time > push->time - half && time < push->time + push->length - half)
+    cav_push_add(p->model, p->bare, push, p->u);
   return step(p);
 }
 

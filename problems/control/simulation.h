@@ -11,6 +11,9 @@ typedef struct cav_push {
   double time, length; ///< s
 } cav_push;
 
+/// u [nv] += the generalised force of a push at the last cav_position of a state.
+void cav_push_add(const cav_model *model, const cav_state *state, const cav_push *push, double *u);
+
 /// What to simulate. Results depend on nothing else: time is that of the simulation.
 typedef struct cav_simulation {
   const cav_problem *problem;
