@@ -1,6 +1,7 @@
 /// Result folders played in MuJoCo. Usage: bench_replay FACTOR FOLDER...: a row of a table for each, at 1 ms and 2 ms,
 /// beside what the certificate says of the same motion, with gains times the factor; bench_replay apart FOLDER...: at
-/// steps and from starts that no gains were chosen by.
+/// steps and from starts that no gains were chosen by; bench_replay anew FOLDER...: the same with gains that are chosen
+/// anew.
 #include "check.h"
 
 #ifndef CAVORT_HAVE_MUJOCO
@@ -11,6 +12,7 @@ int main(void) {
 #else
 #include <libgen.h>
 
+#include "lqr.h"
 #include "replay.h"
 #include "result.h"
 
@@ -53,12 +55,31 @@ static void report(replay *s, const char *motion) {
   printf(" %.1f |\n", v.push_survived_n_s);
 }
 
-static void run(const char *folder, int apart, double factor) {
+static int go_on(void *context, int set, int most) {
+  (void)context, (void)set, (void)most;
+  return 0;
+}
+
+// gains of a result by the rule as it is now
+static void choose(cav_result *result) {
+  cav_error error = {0};
+  cav_transcription *tr = cav_transcription_new(result->problem, 1, &error);
+  cav_solution solution = {.contact = result->problem->contact};
+  if (!CHECK(tr != NULL)) return;
+  tr->options = result->problem->contact;
+  CHECK(cav_choose_gains(result->problem, tr, result->trajectory, 0, go_on, NULL, &solution, &error) == CAV_OK);
+  free(result->gain_q), free(result->gain_v);
+  result->gain_q = solution.gain_q, result->gain_v = solution.gain_v;
+  cav_transcription_free(tr);
+}
+
+static void run(const char *folder, int apart, int anew, double factor) {
   cav_error error = {0};
   cav_result *result = cav_result_read(folder, NULL, &error);
   CHECK(result != NULL);
   if (!result) fprintf(stderr, "    %s\n", error.text);
   if (!result) return;
+  if (anew) choose(result);
   const cav_model *model = result->problem->model;
   size_t gains = (size_t)(result->trajectory->nknot - 1) * (size_t)(model->nv * model->nv);
   for (size_t k = 0; k < gains && result->gain_q; k++) result->gain_q[k] *= factor, result->gain_v[k] *= factor;
@@ -76,8 +97,8 @@ static void run(const char *folder, int apart, double factor) {
 
 int main(int argc, char **argv) {
   for (int i = 2; i < argc; i++) {
-    const int apart = !strcmp(argv[1], "apart");
-    run(argv[i], apart, apart ? 1 : strtod(argv[1], NULL));
+    const int anew = !strcmp(argv[1], "anew"), apart = anew || !strcmp(argv[1], "apart");
+    run(argv[i], apart, anew, apart ? 1 : strtod(argv[1], NULL));
     fflush(stdout);
   }
   return check_failed > 0;

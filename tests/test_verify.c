@@ -151,6 +151,7 @@ static void test_balance(void) {
     CHECK(verify(&s, gain_q, gain_v) == CAV_OK);
     CHECK(s.verdict.certified == held && s.verdict.closed_loop_seconds > 1.999);
     CHECK(held || strstr(s.verdict.reason, "from a start"));
+    CHECK(held == !isnan(s.verdict.push_survived_n_s));
     free(gain_q), free(gain_v);
     sample_free(&s);
   }

@@ -434,7 +434,7 @@ typedef struct cav_verdict {
   double
       feedback_effort_max; ///< largest effort that either closed loop asks of an actuator, over its limit, before clipping
   /// Impulse on the root link a third of the way, along x and y either way, with which the motion follows under the model's
-  /// contacts, to a factor of 2; 0: less than the smallest tried, NaN: not known.
+  /// contacts, to a factor of 2; 0: less than the smallest tried, NaN: the motion is not certified, or not known.
   double push_survived_n_s;
   double
       periodicity_error; ///< cycles: how far the last knot is from the first one moved, m, rad, or their rates; else 0

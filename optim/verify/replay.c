@@ -359,6 +359,20 @@ static void move_start(const cav_model *model, int start, double *q, double *v) 
   }
 }
 
+// the first step: that of the push where it is known how q, v [n] stand there, else 0
+static int go_on(const cav_disturbance *push, int at, size_t n, double *q) {
+  if (!push || !push->before || !push->before->known) return 0;
+  memcpy(q, push->before->x, n * sizeof *q);
+  return at;
+}
+
+// keeps how they stand there
+static void keep(const cav_disturbance *push, size_t n, const double *q) {
+  if (!push->before || push->before->known) return;
+  memcpy(push->before->x, q, n * sizeof *q);
+  push->before->known = 1;
+}
+
 // a simulation to its end; disturbance NULL: none
 static cav_status closed(const cav_verification *verification, const cav_options *law, double h, const double *gain_q,
                          const double *gain_v, const cav_disturbance *disturbance, struct cav_follow *follow) {
@@ -379,9 +393,11 @@ static cav_status closed(const cav_verification *verification, const cav_options
     memcpy(s.q, verification->q, sizeof(double) * nq);
     memcpy(s.v, verification->v, sizeof(double) * nv);
     if (disturbance && disturbance->start) move_start(model, disturbance->start, s.q, s.v);
+    const int hit = push ? (int)(push->fraction * (motion->nknot - 1)) : 0;
     int on = 1;
-    for (int i = 0; i + 1 < motion->nknot && on && status == CAV_OK; i++) {
-      s.push = push && i == (int)(push->fraction * (motion->nknot - 1)) ? push : NULL;
+    for (int i = go_on(push, hit, nq + nv, s.q); i + 1 < motion->nknot && on && status == CAV_OK; i++) {
+      s.push = push && i == hit ? push : NULL;
+      if (s.push) keep(push, nq + nv, s.q);
       status = advance(verification, &s, i, follow, &on);
     }
   }

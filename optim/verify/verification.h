@@ -195,7 +195,14 @@ typedef struct cav_disturbance {
   int link;                    ///< 0: no impulse
   double fraction, impulse[3]; ///< N s, world
   int start;                   ///< 1 .. CAV_STARTS: one of these; 0: the motion's own
+  struct cav_before *before;   ///< NULL, or what is kept for all impulses of one fraction under the same gains
 } cav_disturbance;
+
+/// Where a replay stands when an impulse comes: the first finds it, the others go on from there.
+typedef struct cav_before {
+  int known;
+  double *x; ///< [nq+nv] q, v
+} cav_before;
 enum { CAV_STARTS = 4 };
 
 /// Under the contacts of the model's file at the longest of the steps that simulators take, or at the next finer one;

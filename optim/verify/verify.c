@@ -443,23 +443,26 @@ static int pushed_link(const cav_verification *verification) {
   return found;
 }
 
-// the largest push along x and y, either way, with which the motion still follows; of one that follows without
+// the largest push along x and y, either way, with which a certified motion still follows
 static cav_status find_push(const cav_verification *verification, const double *gain_q, const double *gain_v,
                             double *survived) {
   static const double way[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
-  cav_disturbance push = {.link = pushed_link(verification), .fraction = 1.0 / 3};
+  const size_t numbers = (size_t)verification->model->nq + (size_t)verification->model->nv;
+  cav_before before = {.x = malloc(numbers * sizeof *before.x)};
+  cav_disturbance push = {.link = pushed_link(verification), .fraction = 1.0 / 3, .before = &before};
+  cav_status status = before.x ? CAV_OK : CAV_NO_MEMORY;
+  struct cav_follow follow = {0};
   *survived = push.link > 0 ? 0 : NAN;
-  for (int rung = 0; rung < PUSHES && push.link > 0; rung++) {
+  for (int rung = 0; rung < PUSHES && push.link > 0 && status == CAV_OK && !*follow.lost; rung++) {
     double size = ldexp(small_push * verification->weight, rung);
-    for (int i = 0; i < 4; i++) {
-      struct cav_follow follow;
+    for (int i = 0; i < 4 && status == CAV_OK && !*follow.lost; i++) {
       push.impulse[0] = size * way[i][0], push.impulse[1] = size * way[i][1];
-      cav_status status = cav_replay_own(verification, 0, gain_q, gain_v, &push, &follow);
-      if (status != CAV_OK || *follow.lost) return status;
+      status = cav_replay_own(verification, 0, gain_q, gain_v, &push, &follow);
     }
-    *survived = size;
+    if (status == CAV_OK && !*follow.lost) *survived = size;
   }
-  return CAV_OK;
+  free(before.x);
+  return status;
 }
 
 // what the model has and the claimed law leaves out, NULL if nothing
@@ -605,15 +608,15 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
   if (status == CAV_OK) status = cav_replay_open(&verification, &replay);
   if (status == CAV_OK) status = cav_replay_closed(&verification, contact, gain_q, gain_v, &replay.closed);
   if (status == CAV_OK) status = cav_replay_own_worst(&verification, gain_q, gain_v, &replay.own);
-  verdict->push_survived_n_s = NAN;
-  if (status == CAV_OK && !*replay.own.lost)
-    status = find_push(&verification, gain_q, gain_v, &verdict->push_survived_n_s);
   if (status == CAV_OK) {
     *verdict->reason = 0;
     fill(&verification, &found, &replay, verdict);
     decide(&verification, &found, &replay, verdict);
     cav_targets_verdict(&verification, report, found.residual.cost, verdict);
   }
+  verdict->push_survived_n_s = NAN;
+  if (status == CAV_OK && verdict->certified)
+    status = find_push(&verification, gain_q, gain_v, &verdict->push_survived_n_s);
   free(report);
   cav_balance_free(balance);
   cav_verification_end(&verification);
@@ -699,7 +702,8 @@ cav_status cav_closed_loop(const cav_verification *verification, int loop, const
   } else {
     // along a diagonal, so that planar motions feel it too
     double along = (loop == CAV_LOOP_PUSHED ? 1 : -1) * small_push * verification->weight * sqrt(0.5);
-    disturbance = (cav_disturbance){pushed_link(verification), 1.0 / 3, {along, along, 0}, 0};
+    disturbance =
+        (cav_disturbance){.link = pushed_link(verification), .fraction = 1.0 / 3, .impulse = {along, along, 0}};
   }
   return cav_replay_own(verification, 0, gain_q, gain_v, &disturbance, follow);
 }

@@ -1,0 +1,126 @@
+/// The choice of gains against its rule, on closed loops whose outcomes are drawn: what is kept is what a look at every loop
+/// of every trial would keep, the search ends where the rule says, and few loops are run for it.
+#include "lqr.h"
+#include "scene.h"
+#include "verification.h"
+
+enum { TRIALS = 40, FEW = 4, SEEDS = 8 };
+
+static const char cart[] =
+    "<mujoco><option gravity='0 0 0'/><worldbody>"
+    "<body><joint name='x' type='slide' axis='1 0 0'/><geom type='sphere' size='.1' mass='2'/></body></worldbody>"
+    "<actuator><motor joint='x' gear='5' ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>";
+
+/// What each loop of each trial does, of which trial it is the turn, and loops run.
+static struct cav_follow drawn[TRIALS][CAV_LOOPS];
+static int trial, run;
+
+cav_status __wrap_cav_closed_loop(const cav_verification *verification, int loop, const double *gain_q,
+                                  const double *gain_v, struct cav_follow *follow);
+cav_status __wrap_cav_closed_loop(const cav_verification *verification, int loop, const double *gain_q,
+                                  const double *gain_v, struct cav_follow *follow) {
+  (void)verification, (void)gain_v;
+  // what is kept tells its trial
+  *(double *)gain_q = trial;
+  run++;
+  *follow = drawn[trial][loop];
+  return CAV_OK;
+}
+
+static int next(void *context, int set, int most) {
+  (void)context;
+  CHECK(most == TRIALS);
+  trial = set - 1;
+  return 0;
+}
+
+static double chance(void) { return 0.5 + 0.5 * scene_uniform(); }
+
+static void draw(double lost, double far) {
+  for (int i = 0; i < TRIALS; i++)
+    for (int k = 0; k < CAV_LOOPS; k++) {
+      struct cav_follow *f = &drawn[i][k];
+      *f = (struct cav_follow){.seconds = 1, .error = far * chance()};
+      // a few values, so that some are equal
+      if (chance() < lost) f->seconds = 0.1 * floor(10 * chance()), snprintf(f->lost, sizeof f->lost, "lost");
+    }
+}
+
+/// Follows, seconds of the next loop, worst end: of all loops in their order.
+static void outcome(int i, int *follows, double *seconds, double *error) {
+  *error = 0;
+  *seconds = 0;
+  for (*follows = 0; *follows < CAV_LOOPS; ++*follows) {
+    const struct cav_follow *f = &drawn[i][*follows];
+    *seconds = f->seconds;
+    if (*f->lost) return;
+    *error = fmax(*error, f->error * (*follows < CAV_LOOP_START ? 1 : 0.25));
+  }
+}
+
+/// The trial that the rule keeps, and how many it takes.
+static int expected(int *trials) {
+  int best = -1, follows = 0;
+  double seconds = 0, error = 0;
+  for (*trials = 1; *trials <= TRIALS; ++*trials) {
+    int f;
+    double s, e;
+    outcome(*trials - 1, &f, &s, &e);
+    if (best < 0 || f > follows || (f == follows && (f < CAV_LOOPS ? s > seconds : e < error)))
+      best = *trials - 1, follows = f, seconds = s, error = e;
+    const double near = *trials <= FEW ? 0.1 : *trials <= SEEDS ? 0.2 : INFINITY;
+    if (follows >= (*trials <= FEW ? CAV_LOOPS : CAV_LOOP_PUSHED) && error <= near) return best;
+  }
+  *trials = TRIALS;
+  return best;
+}
+
+int main(void) {
+  cav_model *model = scene_load(cart);
+  cav_problem problem = cav_problem_default(model);
+  double still = 0;
+  problem.timestep = 0.02;
+  problem.duration = 0.2;
+  problem.q_start = problem.q_goal = (double *)model->q0;
+  problem.v_start = &still;
+  cav_transcription *tr = cav_transcription_new(&problem, 1, NULL);
+  cav_trajectory *motion = cav_trajectory_new(model, tr->nknot, problem.timestep);
+  for (int k = 0; k < 300; k++) {
+    int trials, whole = 0;
+    if (k == 0)
+      draw(0, 0.1);
+    else
+      draw(0.02 * (k % 20), k % 3 ? 0.5 : 2);
+    const int best = expected(&trials);
+    for (int i = 0; i < trials; i++) {
+      int follows;
+      double seconds, error;
+      outcome(i, &follows, &seconds, &error);
+      whole += follows < CAV_LOOPS ? follows + 1 : CAV_LOOPS;
+    }
+    cav_solution solution = {.contact = tr->options};
+    cav_error error = {0};
+    run = 0;
+    CHECK(cav_choose_gains(&problem, tr, motion, 0, next, NULL, &solution, &error) == CAV_OK);
+    CHECK(trial == trials - 1);
+    if (CHECK(solution.gain_q)) CHECK((int)*solution.gain_q == best);
+    // a loop out of its order is one more at most
+    CHECK(run <= whole + trials);
+    // where the first set serves, each loop once
+    if (k == 0) CHECK(trials == 1 && run == CAV_LOOPS);
+    free(solution.gain_q), free(solution.gain_v);
+  }
+  // where the last loop alone is lost, the next sets begin there
+  draw(0, 0.3);
+  for (int i = 0; i < TRIALS; i++) drawn[i][CAV_LOOP_PUSHED_BACK] = (struct cav_follow){.lost = "lost"};
+  for (int k = 0; k < CAV_LOOP_START; k++) drawn[0][k].error = 0.15;
+  cav_solution solution = {.contact = tr->options};
+  run = 0;
+  CHECK(cav_choose_gains(&problem, tr, motion, 0, next, NULL, &solution, NULL) == CAV_OK);
+  CHECK(trial == FEW && run == CAV_LOOPS + FEW);
+  free(solution.gain_q), free(solution.gain_v);
+  cav_trajectory_free(motion);
+  cav_transcription_free(tr);
+  cav_model_free(model);
+  return check_result();
+}
