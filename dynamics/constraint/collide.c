@@ -283,9 +283,38 @@ static double speed_between(const cav_state *state, const double *velocity, int 
   return norm3(linear) + *turn * radius;
 }
 
+// a geom's place as another link sees it: origin, then the three axes of its link
+static void seen_from(const cav_pose *other, const cav_pose *link, const cav_geom *geom, double out[4][3]) {
+  double d[3];
+  transform(d, link->pos, link->rotation, geom->pos);
+  sub3(d, d, other->pos);
+  rotate_back(out[0], other->rotation, d);
+  for (int k = 0; k < 3; k++) {
+    column3(d, link->rotation, k);
+    rotate_back(out[k + 1], other->rotation, d);
+  }
+}
+
+// how far a point of the smaller of two geoms can come against the other in the step to the next knot: the way of its
+// middle, and of what is a radius away from that at most 2 sin(angle/2) of the radius, the norm of the change of its rotation
+static double way_between(const cav_state *state, const cav_geom *first, const cav_geom *second) {
+  const cav_pose *next = state->work->next->link;
+  const cav_geom *small = first->bound < second->bound ? first : second, *large = small == first ? second : first;
+  double now[4][3], then[4][3], d[3], square = 0;
+  seen_from(&state->link[large->link], &state->link[small->link], small, now);
+  seen_from(&next[large->link], &next[small->link], small, then);
+  for (int k = 1; k < 4; k++) {
+    sub3(d, then[k], now[k]);
+    square += dot3(d, d);
+  }
+  sub3(d, then[0], now[0]);
+  return norm3(d) + sqrt(square / 2) * small->bound;
+}
+
 // the distance below which a contact bears anything at v and v_next, or what the margin is: under the discrete law
 // v* - v_next, friction included, is what both velocities make up, less h K times the gap; the smoothed law of such pairs ends
-// CAV_LAW_END delta below that
+// CAV_LAW_END delta below that. Where the normal row sees (x' - x)/h in place of the second, x' is at least the distance of the two
+// less their way, which point of theirs it may be of, and h K x takes up x/h, or all but what is left of it at the margin
 static double reach(const cav_model *model, const cav_state *state, int p, double margin) {
   static const double SLACK = 0.05; // m/s, for velocities a little off those
   const struct cav_geom_cache *cache = state->work->geom;
@@ -298,6 +327,9 @@ static double reach(const cav_model *model, const cav_state *state, int p, doubl
   const double *place = cache->centre[c->second];
   double now = speed_between(state, w->velocity_now, a->geom->link, b->geom->link, place, radius, &turn[0]);
   double next = speed_between(state, state->velocity_next, a->geom->link, b->geom->link, place, radius, &turn[1]);
+  int after = state->options.next_gap == CAV_NEXT_GAP_EXACT;
+  double h = state->options.timestep, stiff = w->discrete_stiffness, kept_gap = after ? fmax(0, 1 / h - stiff) : 0;
+  if (after) next = fmax(next, way_between(state, a->geom, b->geom) / h);
   // under Coulomb's law the normal row is alone, and where it bears nothing neither does friction
   for (int k = 0; k + 1 < pair->dim && state->options.sliding == CAV_SLIDING_CONVEX; k++)
     *(k < 2 ? &mu : &roll) = fmax(k < 2 ? mu : roll, pair->friction[k]);
@@ -305,7 +337,7 @@ static double reach(const cav_model *model, const cav_state *state, int p, doubl
   most += roll * (kept * turn[0] + turn[1]);
   double delta =
       state->options.smoothing > 0 ? c->external ? state->options.smoothing : state->options.smoothing_self : 0;
-  double far = c->margin + most / w->discrete_stiffness + CAV_LAW_END * delta;
+  double far = c->margin + fmax(most / stiff, (most + kept_gap * margin) / fmax(stiff, 1 / h)) + CAV_LAW_END * delta;
   return far < margin ? far : margin;
 }
 
@@ -313,7 +345,7 @@ int cav_contacts_narrow(const cav_state *state) {
   const cav_options *o = &state->options;
   const struct cav_geom_cache *cache = state->work->geom;
   return cache && cache->expensive && o->contact && o->constraint && o->stabilisation == CAV_STABILISATION_DISCRETE &&
-         o->next_gap == CAV_NEXT_GAP_LINEAR && !o->coupled;
+         !o->coupled;
 }
 
 // the geom as a shape, its rotation formed at the first request

@@ -139,12 +139,16 @@ typedef struct cav_next_knot {
   size_t bytes;
   int room;
   cav_next_contact *contact; ///< [room]
+  cav_hint *hint;            ///< [npair] where its searches of meshes ended; NULL: no pair has one
 } cav_next_knot;
 
 /// Room for the state's contacts after the step. CAV_NO_MEMORY. next_gap.c.
 cav_status cav_next_knot_new(const cav_model *model, cav_state *state);
 void cav_next_knot_free(cav_next_knot *next);
 size_t cav_next_knot_bytes(const cav_next_knot *next);
+
+/// Links at q (+) h v_next of the workspace's q. next_gap.c.
+void cav_next_links_place(const cav_model *model, cav_state *state, const double *v_next);
 
 /// All contacts after the step, from their velocity_next and v_next of the workspace. next_gap.c.
 void cav_next_gaps_find(const cav_model *model, cav_state *state);

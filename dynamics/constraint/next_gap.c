@@ -18,6 +18,10 @@
 // fractions of the thickness between which the linear gap takes over
 static const double SHELL = 0.1, CORE = 0.35;
 
+static int has_mesh(const cav_geom *first, const cav_geom *second) {
+  return first->type == CAV_GEOM_MESH || second->type == CAV_GEOM_MESH;
+}
+
 static cav_next_knot *knot_new(const cav_model *model, const cav_state *state) {
   size_t n = (size_t)model->nlink, nv = (size_t)model->nv, nq = (size_t)model->nq;
   size_t bytes = sizeof(cav_next_knot) + n * sizeof(cav_pose) + (nq + 9 * n + 18 * nv) * sizeof(double);
@@ -31,6 +35,17 @@ static cav_next_knot *knot_new(const cav_model *model, const cav_state *state) {
   next->axis = next->inertia + 6 * n;
   next->by_q = next->axis + 6 * nv;
   next->by_v = next->by_q + 6 * nv;
+  int meshes = 0;
+  for (int p = 0; p < model->npair; p++)
+    meshes |= has_mesh(&model->geom[model->pair[p].geom1], &model->geom[model->pair[p].geom2]);
+  if (meshes) {
+    next->hint = calloc((size_t)model->npair, sizeof *next->hint);
+    next->bytes += (size_t)model->npair * sizeof *next->hint;
+  }
+  if (meshes && !next->hint) {
+    free(next);
+    return NULL;
+  }
   // the world stays where it is
   next->link[0] = state->link[0];
   return next;
@@ -52,6 +67,7 @@ cav_status cav_next_knot_new(const cav_model *model, cav_state *state) {
 void cav_next_knot_free(cav_next_knot *next) {
   if (!next) return;
   free(next->contact);
+  free(next->hint);
   free(next);
 }
 
@@ -114,38 +130,73 @@ static double travel(const cav_state *state, const cav_geom *geom, const double 
   return norm3(moved) + sqrt(square) * bound;
 }
 
-static void look(const cav_model *model, const cav_state *state, const cav_contact *c, cav_next_contact *out) {
+// Points of a pair after the step, within a margin; of a pair with a mesh those of all its contacts are sought once.
+typedef struct sought {
+  int pair, count;
+  double margin;
+  cav_touch touch[CAV_TOUCH_MAX];
+} sought;
+
+// no point of the pair of contact c can be further away then
+static double margin_of(const cav_model *model, const cav_state *state, const cav_contact *c) {
+  const cav_pair *pair = &model->pair[c->pair];
+  return fabs(c->dist) + travel(state, &model->geom[pair->geom1], c->pos) +
+         travel(state, &model->geom[pair->geom2], c->pos) + 1e-3;
+}
+
+// Where the search of a mesh found so many points that it may have left some out, and for all others, each contact has
+// a search within its own margin
+static void seek(const cav_model *model, const cav_state *state, const cav_contact *c, double margin, sought *s) {
+  cav_next_knot *next = state->work->next;
+  const cav_pair *pair = &model->pair[c->pair];
+  const cav_geom *first = &model->geom[pair->geom1], *second = &model->geom[pair->geom2];
+  int mesh = next->hint && has_mesh(first, second);
+  if (mesh && s->pair == c->pair && s->margin >= margin && s->count < CAV_TOUCH_MAX) return;
+  s->margin = margin;
+  for (int i = 1; mesh && s->pair != c->pair && c + i < state->contact + state->ncontact && c[i].pair == c->pair; i++)
+    s->margin = fmax(s->margin, margin_of(model, state, c + i));
+  s->pair = c->pair;
+  cav_shape a, b;
+  place(model, next->link, first, &a);
+  place(model, next->link, second, &b);
+  s->count = mesh ? cav_collide_again(&a, &b, s->margin, &next->hint[c->pair], s->touch)
+                  : cav_collide_shapes(&a, &b, s->margin, s->touch);
+}
+
+static void look(const cav_model *model, const cav_state *state, const cav_contact *c, sought *s,
+                 cav_next_contact *out) {
   const cav_pair *pair = &model->pair[c->pair];
   const cav_geom *first = &model->geom[pair->geom1], *second = &model->geom[pair->geom2];
   const double h = state->options.timestep, linear = c->dist + h * c->velocity_next[0];
   double derivative, weight = trust(linear, inner_radius(first) + inner_radius(second), &derivative);
   *out = (cav_next_contact){0};
   if (weight == 0) return;
-  cav_shape a, b;
-  cav_touch touch[CAV_TOUCH_MAX];
-  place(model, state->work->next->link, first, &a);
-  place(model, state->work->next->link, second, &b);
-  // no point of the pair can be further away then
-  double margin = fabs(c->dist) + travel(state, first, c->pos) + travel(state, second, c->pos) + 1e-3;
-  int count = cav_collide_shapes(&a, &b, margin, touch), k = 0;
-  while (k < count && touch[k].feature != c->feature) k++;
-  if (k == count) return;
-  double beyond = touch[k].dist - linear;
+  double margin = margin_of(model, state, c);
+  seek(model, state, c, margin, s);
+  int k = 0;
+  while (k < s->count && s->touch[k].feature != c->feature) k++;
+  if (k == s->count || !(s->touch[k].dist < margin)) return;
+  double beyond = s->touch[k].dist - linear;
   out->excess = weight * beyond / h;
   out->by_next = weight;
   out->by_linear = derivative * beyond - weight;
   out->margin = margin;
-  copy3(out->pos, touch[k].pos);
-  copy3(out->normal, touch[k].normal);
+  copy3(out->pos, s->touch[k].pos);
+  copy3(out->normal, s->touch[k].normal);
+}
+
+void cav_next_links_place(const cav_model *model, cav_state *state, const double *v_next) {
+  cav_next_knot *next = state->work->next;
+  cav_integrate(model, state->work->q, v_next, state->options.timestep, next->q);
+  const cav_posture at = {next->q, next->link, next->com, next->inertia, state->reference, next->axis, 1};
+  cav_posture_place(model, state->work, &at);
 }
 
 void cav_next_gaps_find(const cav_model *model, cav_state *state) {
-  cav_next_knot *next = state->work->next;
+  sought s = {.pair = -1};
   if (state->ncontact == 0) return;
-  cav_integrate(model, state->work->q, state->work->v_next, state->options.timestep, next->q);
-  const cav_posture at = {next->q, next->link, next->com, next->inertia, state->reference, next->axis, 1};
-  cav_posture_place(model, state->work, &at);
-  for (int i = 0; i < state->ncontact; i++) look(model, state, &state->contact[i], &next->contact[i]);
+  cav_next_links_place(model, state, state->work->v_next);
+  for (int i = 0; i < state->ncontact; i++) look(model, state, &state->contact[i], &s, &state->work->next->contact[i]);
 }
 
 // whether the gap of a point is a distance: then its rate is the velocity along the normal. It is not where points are

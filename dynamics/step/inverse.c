@@ -35,6 +35,11 @@ static cav_status find_position(const cav_model *model, cav_state *state, const 
     copy(w->narrow_v + model->nv, v_next, model->nv);
     cav_link_velocities(model, state, w->narrow_v, w->velocity_now);
     cav_link_velocities(model, state, w->narrow_v + model->nv, state->velocity_next);
+    if (state->options.next_gap == CAV_NEXT_GAP_EXACT) {
+      status = cav_next_knot_new(model, state);
+      if (status) { return status; }
+      cav_next_links_place(model, state, v_next);
+    }
   }
   status = cav_contacts_find(model, state);
   if (status) { return status; }
