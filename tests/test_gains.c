@@ -68,7 +68,7 @@ static int expected(int *trials) {
     outcome(*trials - 1, &f, &s, &e);
     if (best < 0 || f > follows || (f == follows && (f < CAV_LOOPS ? s > seconds : e < error)))
       best = *trials - 1, follows = f, seconds = s, error = e;
-    const double near = *trials <= FEW ? 0.1 : *trials <= SEEDS ? 0.2 : INFINITY;
+    const double near = *trials <= FEW ? 0.05 : *trials <= SEEDS ? 0.1 : INFINITY;
     if (follows >= (*trials <= FEW ? CAV_LOOPS : CAV_LOOP_PUSHED) && error <= near) return best;
   }
   *trials = TRIALS;
@@ -88,7 +88,7 @@ int main(void) {
   for (int k = 0; k < 300; k++) {
     int trials, whole = 0;
     if (k == 0)
-      draw(0, 0.1);
+      draw(0, 0.05);
     else
       draw(0.02 * (k % 20), k % 3 ? 0.5 : 2);
     const int best = expected(&trials);
@@ -111,9 +111,9 @@ int main(void) {
     free(solution.gain_q), free(solution.gain_v);
   }
   // where the last loop alone is lost, the next sets begin there
-  draw(0, 0.3);
+  draw(0, 0.15);
   for (int i = 0; i < TRIALS; i++) drawn[i][CAV_LOOP_PUSHED_BACK] = (struct cav_follow){.lost = "lost"};
-  for (int k = 0; k < CAV_LOOP_START; k++) drawn[0][k].error = 0.15;
+  for (int k = 0; k < CAV_LOOP_START; k++) drawn[0][k].error = 0.075;
   cav_solution solution = {.contact = tr->options};
   run = 0;
   CHECK(cav_choose_gains(&problem, tr, motion, 0, next, NULL, &solution, NULL) == CAV_OK);

@@ -313,8 +313,9 @@ static double way_between(const cav_state *state, const cav_geom *first, const c
 
 // the distance below which a contact bears anything at v and v_next, or what the margin is: under the discrete law
 // v* - v_next, friction included, is what both velocities make up, less h K times the gap; the smoothed law of such pairs ends
-// CAV_LAW_END delta below that. Where the normal row sees (x' - x)/h in place of the second, x' is at least the distance of the two
-// less their way, which point of theirs it may be of, and h K x takes up x/h, or all but what is left of it at the margin
+// CAV_LAW_END delta below that. Where the normal row sees (x' - x)/h in place of the second, x' is at least the distance of
+// the two less their way, which point of theirs it may be of, and h K x takes up x/h, or all but what is left of it at the
+// margin
 static double reach(const cav_model *model, const cav_state *state, int p, double margin) {
   static const double SLACK = 0.05; // m/s, for velocities a little off those
   const struct cav_geom_cache *cache = state->work->geom;

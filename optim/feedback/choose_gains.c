@@ -31,7 +31,7 @@ enum { SEEDS = sizeof seed / sizeof *seed };
 
 /// End error that ends the search after so many trials, m: a fifth of the distance at which a loop is lost, two of them,
 /// and at last any that is not lost.
-static double near_enough(int trials) { return trials <= FEW ? 0.1 : trials <= SEEDS ? 0.2 : INFINITY; }
+static double near_enough(int trials) { return trials <= FEW ? 0.05 : trials <= SEEDS ? 0.1 : INFINITY; }
 
 /// Loops that have to be followed: at first the pushed ones too.
 static int enough(int trials) { return trials <= FEW ? CAV_LOOPS : CAV_LOOP_PUSHED; }
