@@ -4,7 +4,7 @@
 #include "scene.h"
 #include "verification.h"
 
-enum { TRIALS = 40, FEW = 4, SEEDS = 8 };
+enum { TRIALS = 40, FEW = 3, SEEDS = 8 };
 
 static const char cart[] =
     "<mujoco><option gravity='0 0 0'/><worldbody>"

@@ -14,7 +14,7 @@
 #include "schedule.h"
 #include "verification.h"
 
-enum { LAWS = 2, TRIALS = 40, FEW = 4 };
+enum { LAWS = 2, TRIALS = 40, FEW = 3 };
 
 /// What a regulator is made of: penalties on straying, and the fractions of the schedule whose contact laws it reckons
 /// with.

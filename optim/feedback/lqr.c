@@ -38,7 +38,7 @@ typedef struct regulator {
   double *W, *Wu;           ///< [nv*n] Q D + L, [nv*nu] Q Du
   double *S;                ///< [n*n] mean of the penalty of the state before over the laws
   double *H;                ///< [nu*nu] of the inputs', and the penalty on inputs
-  double *G, *K;            ///< [nu*n] G of both; K = H^-1 G: input -K x
+  double *G, *K, *sum;      ///< [nu*n] G of both; K = H^-1 G: input -K x; sum of K over the finer steps of a knot
   double *D;                ///< [nv*(n+nu)] derivatives of v' by dq, dv and inputs
   double *right;            ///< [nv*(n+nu)] of the inverse by dq and dv, and forces of inputs
   double *system;           ///< [nv*nv] of the inverse by v'
@@ -54,7 +54,7 @@ static int regulator_make(regulator *r, const cav_transcription *tr) {
   int nv = tr->model->nv, nu = tr->model->nu, n = 2 * nv;
   size_t v = (size_t)nv, u = (size_t)nu, s = (size_t)n;
   *r = (regulator){.nv = nv, .nu = nu, .n = n};
-  double *m = calloc(v * u + 2 * s * s + 3 * v * s + 2 * u * u + 2 * u * s + 2 * v * (s + u) + 7 * v * v + v +
+  double *m = calloc(v * u + 2 * s * s + 3 * v * s + 2 * u * u + 3 * u * s + 2 * v * (s + u) + 7 * v * v + v +
                          18 * (size_t)tr->nrotation + 1,
                      sizeof *m);
   r->memory = m;
@@ -69,6 +69,7 @@ static int regulator_make(regulator *r, const cav_transcription *tr) {
   r->H = m, m += u * u;
   r->G = m, m += u * s;
   r->K = m, m += u * s;
+  r->sum = m, m += u * s;
   r->D = m, m += v * (s + u);
   r->right = m, m += v * (s + u);
   r->inverse = m, m += v * v;
@@ -100,6 +101,19 @@ static cav_status find_forces(regulator *r, const cav_model *model, cav_state *s
   return status;
 }
 
+/// Adds the inputs' part of D, each of which drives few dofs.
+static void add_inputs(regulator *r) {
+  const int nv = r->nv;
+  const double *force = force_of(r);
+  double *D = r->D + (size_t)r->n * nv;
+  for (int a = 0; a < r->nu; a++, force += nv, D += nv)
+    for (int d = 0; d < nv; d++) {
+      const double *column = r->inverse + (size_t)d * nv;
+      if (force[d] == 0) continue;
+      for (int i = 0; i < nv; i++) D[i] += column[i] * force[d];
+    }
+}
+
 /// D := derivatives of v' by (q, v) and the inputs, from those of the inverse.
 static cav_status find_derivative(regulator *r, const cav_model *model, cav_state *state, const double *q,
                                   const double *v) {
@@ -120,7 +134,8 @@ static cav_status find_derivative(regulator *r, const cav_model *model, cav_stat
   // a product takes less time than a solution of so many columns
   if (!cav_dense_solve_general(nv, r->system, nv, nv, r->inverse, nv)) return CAV_NOT_CONVERGED;
   memset(r->D, 0, (size_t)nv * columns * sizeof *r->D);
-  cav_dense_product(nv, columns, nv, 1, r->inverse, nv, r->right, nv, r->D, nv);
+  cav_dense_product(nv, r->n, nv, 1, r->inverse, nv, r->right, nv, r->D, nv);
+  add_inputs(r);
   return CAV_OK;
 }
 
@@ -215,7 +230,8 @@ static cav_status riccati(regulator *r) {
   if (nu > 0) {
     for (int i = 0; i < nu; i++) r->H[i * nu + i] += r->h;
     if (!cav_dense_factor(nu, nu - 1, r->H, nu)) return CAV_NOT_CONVERGED;
-    for (int i = 0; i < nu * nu; i++) r->unit[i] = i % (nu + 1) == 0;
+    memset(r->unit, 0, (size_t)nu * (size_t)nu * sizeof *r->unit);
+    for (int i = 0; i < nu; i++) r->unit[i * (nu + 1)] = 1;
     cav_dense_solve_lower(nu, nu - 1, r->H, nu, nu, r->unit, nu);
     cav_dense_solve_upper(nu, nu - 1, r->H, nu, nu, r->unit, nu);
     memset(r->K, 0, (size_t)nu * n * sizeof *r->K);
@@ -227,17 +243,21 @@ static cav_status riccati(regulator *r) {
   return CAV_OK;
 }
 
-/// Adds the gains of this step, as generalised forces, to those of the knot.
-static void add_gains(const regulator *r, double *gain_q, double *gain_v) {
-  int nv = r->nv;
+/// Adds the gains of the finer step k to those of its knot; at the knot their mean, as generalised forces.
+static void add_gains(regulator *r, int k, double *gain_q, double *gain_v) {
+  const int nv = r->nv, nu = r->nu, inputs = nu * r->n;
+  for (int i = 0; i < inputs; i++) r->sum[i] += r->K[i];
+  if (k % r->finer > 0) return;
   for (int j = 0; j < nv; j++)
-    for (int a = 0; a < r->nu; a++) {
-      double q = r->K[(size_t)j * r->nu + a] / r->finer, v = r->K[(size_t)(nv + j) * r->nu + a] / r->finer;
+    for (int a = 0; a < nu; a++) {
+      const double q = r->sum[j * nu + a] / r->finer, v = r->sum[(nv + j) * nu + a] / r->finer;
+      const double *force = force_of(r) + (size_t)a * nv;
       for (int i = 0; i < nv; i++) {
-        gain_q[i * nv + j] -= force_of(r)[(size_t)a * nv + i] * q;
-        gain_v[i * nv + j] -= force_of(r)[(size_t)a * nv + i] * v;
+        gain_q[i * nv + j] -= force[i] * q;
+        gain_v[i * nv + j] -= force[i] * v;
       }
     }
+  memset(r->sum, 0, (size_t)inputs * sizeof *r->sum);
 }
 
 /// S, below its diagonal, G and H at (q, v) under all laws, from P.
@@ -274,7 +294,7 @@ static cav_status sweep(regulator *r, const cav_transcription *tr, const cav_tra
     if (status != CAV_OK) break;
     add_penalty(r, r->h);
     int t = k / r->finer;
-    if (t < knots) add_gains(r, gain_q + (size_t)t * square, gain_v + (size_t)t * square);
+    if (t < knots) add_gains(r, k, gain_q + (size_t)t * square, gain_v + (size_t)t * square);
   }
   return status;
 }
