@@ -101,7 +101,7 @@ static cav_status find_forces(regulator *r, const cav_model *model, cav_state *s
   return status;
 }
 
-/// Adds the inputs' part of D, each of which drives few dofs.
+/// Adds the inputs' part of D; each acts on few dofs.
 static void add_inputs(regulator *r) {
   const int nv = r->nv;
   const double *force = force_of(r);
