@@ -30,7 +30,7 @@ static const char lifted[] =
     "<body gravcomp='.5' pos='.3 0 .5'><joint type='ball'/><geom/><body gravcomp='2' pos='0 .3 0'><joint type='slide' "
     "axis='1 0 1' actuatorgravcomp='false'/><geom/></body></body></body></body></worldbody></mujoco>";
 
-enum { STATES = 16, POINTS = 6, SENSORS = 48, LAWS = 3 };
+enum { STATES = 16, POINTS = 6, SENSORS = 48, LAWS = 5 };
 
 /// What is compared, of one state: u, then 13 numbers a contact (gap, velocities, impulses), then sensors.
 typedef struct readings {
@@ -44,6 +44,7 @@ static cav_state *state, *other;
 static double *q, *v, *v_next, *moved, *scratch;
 static cav_sliding sliding;
 static cav_next_gap next_gap;
+static cav_next_slip next_slip;
 static int compared, left_out;
 static double worst[3];
 
@@ -207,8 +208,9 @@ static int one_state(readings *r, int k, double lift) {
   o->smoothing = o->smoothing_self = k & 4 ? 0.01 : 0;
   o->sliding = sliding;
   o->next_gap = next_gap;
+  o->next_slip = next_slip;
   // a step over which links turn
-  o->timestep = next_gap == CAV_NEXT_GAP_EXACT ? 0.02 : model->timestep;
+  o->timestep = next_gap == CAV_NEXT_GAP_EXACT || next_slip == CAV_NEXT_SLIP_EXACT ? 0.02 : model->timestep;
   o->spring = (cav_spring)(k / 3 % 2);
   o->gravity = k % 5 > 0;
   o->passive = k % 7 > 0;
@@ -274,11 +276,13 @@ static void check_model(const char *name, int states) {
     compared = left_out = 0;
     memset(worst, 0, sizeof worst);
     list_sensors(&r);
-    // each law in the same states, and with the gap after the step
+    // each law in the same states, and with what is after the step: the gap, both, the slip alone under the convex law
     for (int k = 0; k < LAWS * states; k++) {
       uint64_t before = scene_seed;
-      sliding = k % LAWS ? CAV_SLIDING_COULOMB : CAV_SLIDING_CONVEX;
-      next_gap = k % LAWS > 1 ? CAV_NEXT_GAP_EXACT : CAV_NEXT_GAP_LINEAR;
+      const int law = k % LAWS;
+      sliding = law && law < 4 ? CAV_SLIDING_COULOMB : CAV_SLIDING_CONVEX;
+      next_gap = law == 2 || law == 3 ? CAV_NEXT_GAP_EXACT : CAV_NEXT_GAP_LINEAR;
+      next_slip = law > 2 ? CAV_NEXT_SLIP_EXACT : CAV_NEXT_SLIP_LINEAR;
       given += one_state(&r, k / LAWS, 0);
       if (k % LAWS < LAWS - 1) scene_seed = before;
     }

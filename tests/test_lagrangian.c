@@ -176,15 +176,16 @@ static void check_model(const char *model, double spread, int up, double bound) 
   cav_transcription_move(tr, held, x, at);
   for (int t = 0; t < tr->nknot; t++)
     for (int i = 0; i < tr->knot[t].layout.count; i++) tr->knot[t].slot[i].final_multiplier = uniform();
-  // at half way with either gap after the step
-  static const double fraction[] = {0, 0.5, 0.5};
-  static const cav_next_gap gap[] = {CAV_NEXT_GAP_LINEAR, CAV_NEXT_GAP_LINEAR, CAV_NEXT_GAP_EXACT};
-  for (int i = 0; i < 3; i++) {
+  // at half way with either gap after the step, and with the slip over it
+  static const double fraction[] = {0, 0.5, 0.5, 0.5};
+  static const cav_next_gap gap[] = {CAV_NEXT_GAP_LINEAR, CAV_NEXT_GAP_LINEAR, CAV_NEXT_GAP_EXACT, CAV_NEXT_GAP_EXACT};
+  for (int i = 0; i < 4; i++) {
     problem->schedule.next_gap = gap[i];
+    problem->schedule.next_slip = i == 3 ? CAV_NEXT_SLIP_EXACT : CAV_NEXT_SLIP_LINEAR;
     cav_stage_law(problem, fraction[i], tr->options.timestep, &tr->options);
     for (int factor = 0; factor < 2; factor++) {
       double with = mismatch(tr, normal, at, beside, factor, 1), without = mismatch(tr, normal, at, beside, factor, 0);
-      CHECK(tr->options.next_gap == gap[i]);
+      CHECK(tr->options.next_gap == gap[i] && (tr->options.next_slip == CAV_NEXT_SLIP_EXACT) == (i == 3));
       printf("%g of the way, costs times %d: %.1e off, without curvature %.1e\n", fraction[i], factor, with, without);
       CHECK(with < bound);
       CHECK(without > 100 * with);

@@ -142,7 +142,7 @@ static void compare_sought(const cav_model *m, cav_state *state, const double *q
 }
 
 // what contacts of meshes are not sought, since they bear nothing at both velocities, changes no force
-static void test_narrowed(cav_next_gap next_gap) {
+static void test_narrowed(cav_next_gap next_gap, cav_next_slip next_slip) {
   char model_text[TEXT];
   snprintf(model_text, sizeof model_text, text, rock, "mesh", "mesh='rock' condim='6'");
   cav_model *m = scene_load(model_text);
@@ -153,6 +153,7 @@ static void test_narrowed(cav_next_gap next_gap) {
   double *J = scene_vector(6 * nv * nv + 2 * nv);
   state->options.stabilisation = CAV_STABILISATION_DISCRETE;
   state->options.next_gap = next_gap;
+  state->options.next_slip = next_slip;
   for (int k = 0; k < 300; k++) {
     // smoothings, laws, orders, time constants, and speeds up to 5 m/s by turns
     state->options.smoothing = k % 3 ? 0.004 * (k % 3) : 0;
@@ -167,8 +168,8 @@ static void test_narrowed(cav_next_gap next_gap) {
     scene_normals(next, nv, speed);
     compare_sought(m, state, q, v, next, J, contacts, &worst);
   }
-  printf("gap after the step %d: %d of %d contacts sought, forces and derivatives within %.1e\n", (int)next_gap,
-         contacts[0], contacts[1], worst);
+  printf("gap after the step %d, slip %d: %d of %d contacts sought, forces and derivatives within %.1e\n",
+         (int)next_gap, (int)next_slip, contacts[0], contacts[1], worst);
   CHECK(contacts[0] < contacts[1]);
   // what is not sought is beyond where the law ends
   CHECK(worst == 0);
@@ -206,8 +207,7 @@ static void test_folding(void) {
 
 int main(void) {
   test_folding();
-  test_narrowed(CAV_NEXT_GAP_LINEAR);
-  test_narrowed(CAV_NEXT_GAP_EXACT);
+  for (int k = 0; k < 4; k++) test_narrowed((cav_next_gap)(k % 2), (cav_next_slip)(k / 2));
   static const char *const shapes[][2] = {
       {"sphere", "size='.08'"},       {"capsule", "size='.05 .08'"},       {"box", "size='.09 .06 .07'"},
       {"cylinder", "size='.06 .08'"}, {"ellipsoid", "size='.06 .09 .12'"}, {"mesh", "mesh='rock'"},

@@ -98,7 +98,7 @@ static void test_refused(void) {
 
 /// A change of any one option is told from none.
 static void test_same(void) {
-  static const char *const velocity_options[] = {"order", "sliding", "next_gap", "gravity", "passive"};
+  static const char *const velocity_options[] = {"order", "sliding", "next_gap", "next_slip", "gravity", "passive"};
   enum { LATE = sizeof velocity_options / sizeof *velocity_options };
   int n;
   const cav_field *field = cav_option_fields(&n);

@@ -295,9 +295,10 @@ static void seen_from(const cav_pose *other, const cav_pose *link, const cav_geo
   }
 }
 
-// how far a point of the smaller of two geoms can come against the other in the step to the next knot: the way of its
-// middle, and of what is a radius away from that at most 2 sin(angle/2) of the radius, the norm of the change of its rotation
-static double way_between(const cav_state *state, const cav_geom *first, const cav_geom *second) {
+// how far a point of the smaller of two geoms, or one so far beyond it, can come against the other in the step to the next
+// knot: the way of its middle, and of what is a radius away from that at most 2 sin(angle/2) of the radius, the norm of the
+// change of its rotation
+static double way_between(const cav_state *state, const cav_geom *first, const cav_geom *second, double beyond) {
   const cav_pose *next = state->work->next->link;
   const cav_geom *small = first->bound < second->bound ? first : second, *large = small == first ? second : first;
   double now[4][3], then[4][3], d[3], square = 0;
@@ -308,7 +309,7 @@ static double way_between(const cav_state *state, const cav_geom *first, const c
     square += dot3(d, d);
   }
   sub3(d, then[0], now[0]);
-  return norm3(d) + sqrt(square / 2) * small->bound;
+  return norm3(d) + sqrt(square / 2) * (small->bound + beyond);
 }
 
 // the distance below which a contact bears anything at v and v_next, or what the margin is: under the discrete law
@@ -328,9 +329,9 @@ static double reach(const cav_model *model, const cav_state *state, int p, doubl
   const double *place = cache->centre[c->second];
   double now = speed_between(state, w->velocity_now, a->geom->link, b->geom->link, place, radius, &turn[0]);
   double next = speed_between(state, state->velocity_next, a->geom->link, b->geom->link, place, radius, &turn[1]);
-  int after = state->options.next_gap == CAV_NEXT_GAP_EXACT;
+  int after = state->options.next_gap == CAV_NEXT_GAP_EXACT, slips = state->options.next_slip == CAV_NEXT_SLIP_EXACT;
   double h = state->options.timestep, stiff = w->discrete_stiffness, kept_gap = after ? fmax(0, 1 / h - stiff) : 0;
-  if (after) next = fmax(next, way_between(state, a->geom, b->geom) / h);
+  if (after || slips) next = fmax(next, way_between(state, a->geom, b->geom, slips ? 0.5 * fmax(margin, 0) : 0) / h);
   // under Coulomb's law the normal row is alone, and where it bears nothing neither does friction
   for (int k = 0; k + 1 < pair->dim && state->options.sliding == CAV_SLIDING_CONVEX; k++)
     *(k < 2 ? &mu : &roll) = fmax(k < 2 ? mu : roll, pair->friction[k]);

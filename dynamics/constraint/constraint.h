@@ -21,6 +21,11 @@ size_t cav_geom_cache_bytes(const struct cav_geom_cache *cache);
 int cav_contacts_narrow(const cav_state *state);
 cav_status cav_contacts_find(const cav_model *model, cav_state *state);
 
+/// Whether one of the two is a mesh.
+static inline int cav_pair_has_mesh(const cav_model *model, const cav_pair *pair) {
+  return model->geom[pair->geom1].type == CAV_GEOM_MESH || model->geom[pair->geom2].type == CAV_GEOM_MESH;
+}
+
 /// Distance from which a pair's force is not negligible under the state's options.
 double cav_contact_activation(const cav_state *state, const cav_pair *pair);
 
@@ -99,9 +104,7 @@ void cav_row_push_force(const cav_state *state, const cav_row *row, double force
 /// with a mesh it does, as those are expensive to find; others trail off.
 #define CAV_LAW_END 12.0
 static inline int cav_contact_ends(const cav_state *state, const cav_contact *contact) {
-  const cav_pair *pair = &state->model->pair[contact->pair];
-  const cav_geom *geom = state->model->geom;
-  return geom[pair->geom1].type == CAV_GEOM_MESH || geom[pair->geom2].type == CAV_GEOM_MESH;
+  return cav_pair_has_mesh(state->model, &state->model->pair[contact->pair]);
 }
 
 /// Impulse of an elliptic contact from g = R^-1 (v* - v_next) [dim]; R [dim], sigma 0: exact law, else smoothed; ends: the
@@ -120,17 +123,22 @@ void cav_law_coulomb(int dim, const double *R, const double *friction, double si
 /// By the law that the state's options choose; hessian may be NULL. coulomb.c.
 void cav_law_contact(const cav_state *state, const cav_contact *contact, const double *g, double *f, double *hessian);
 
-/// A contact after the step, at q (+) h v_next, and what its normal row sees of it: the velocity (gap there - gap)/h in
-/// place of n.v_next, where excess is what the first has over the second.
+/// A contact after the step, at q (+) h v_next, and what its rows see of it beyond J v_next: the normal one the velocity
+/// (gap there - gap)/h, the tangential ones the way of its point over h.
 typedef struct cav_next_contact {
-  double excess;             ///< m/s
-  double by_next, by_linear; ///< h times its rate by the gap there, and by the linear one, gap + h n.v_next
-  double pos[3], normal[3];  ///< there, world
-  double margin;             ///< within which it was found
-  double gradient[6];        ///< of the gap there by twists about pos of the second geom against the first
+  double excess[3]; ///< m/s
+  double by_next,
+      by_linear;            ///< h times the rate of the first by the gap there, and by the linear one, gap + h n.v_next
+  double pos[3], normal[3]; ///< of the gap there, world
+  double margin;            ///< within which it was found
+  double gradient[6];       ///< of the gap there by twists about pos of the second geom against the first
+  double after[3];          ///< where the point of the second link is
+  double way[3];            ///< from that of the first link to it, turned back with the first link
+  double tangent[2][3];     ///< the tangents, turned on with the first link
+  double turn[9];           ///< rotation of the second link as the first sees it
 } cav_next_contact;
 
-/// Links and contacts after the step; made by the first evaluation with CAV_NEXT_GAP_EXACT.
+/// Links and contacts after the step; made by the first evaluation that looks there.
 typedef struct cav_next_knot {
   double *q; ///< [nq]
   cav_pose *link;
@@ -142,28 +150,53 @@ typedef struct cav_next_knot {
   cav_hint *hint;            ///< [npair] where its searches of meshes ended; NULL: no pair has one
 } cav_next_knot;
 
-/// Room for the state's contacts after the step. CAV_NO_MEMORY. next_gap.c.
+/// Whether rows of contacts see what is there after the step, or J v_next alone.
+static inline int cav_looks_ahead(const cav_options *options) {
+  return options->next_gap == CAV_NEXT_GAP_EXACT || options->next_slip == CAV_NEXT_SLIP_EXACT;
+}
+
+/// Room for the state's contacts after the step. CAV_NO_MEMORY. next_knot.c.
 cav_status cav_next_knot_new(const cav_model *model, cav_state *state);
 void cav_next_knot_free(cav_next_knot *next);
 size_t cav_next_knot_bytes(const cav_next_knot *next);
 
-/// Links at q (+) h v_next of the workspace's q. next_gap.c.
+/// Links at q (+) h v_next of the workspace's q. next_knot.c.
 void cav_next_links_place(const cav_model *model, cav_state *state, const double *v_next);
 
-/// All contacts after the step, from their velocity_next and v_next of the workspace. next_gap.c.
-void cav_next_gaps_find(const cav_model *model, cav_state *state);
+/// All contacts after the step, from J v_next in their velocity_next, whose tangential part becomes what is seen, and
+/// v_next of the workspace. next_knot.c.
+void cav_next_contacts_find(const cav_model *model, cav_state *state);
 
-/// Then what their derivatives are made of. next_gap.c.
+/// Then what their derivatives are made of. next_knot.c.
+void cav_next_contacts_differentiate(const cav_model *model, cav_state *state);
+
+/// Rates of a contact after the step by a dof that moves its second link, negative by one that moves its first: of its gap
+/// [0] and of h times what its tangential rows see [1, 2], links held at q; by q [0] and by v_next [1]. After
+/// cav_next_contacts_differentiate. next_knot.c.
+void cav_next_contact_rates(const cav_model *model, const cav_state *state, int contact, int dof, double rate[3][2]);
+
+/// Gaps of all contacts there, links placed; then their gradients. next_gap.c.
+void cav_next_gaps_find(const cav_model *model, cav_state *state);
 void cav_next_gaps_differentiate(const cav_model *model, cav_state *state);
 
-/// Rate of the gap of a contact after the step by a dof that moves its second link, negative by one that moves its
-/// first: by q [0] and by v_next [1]. After cav_next_gaps_differentiate. next_gap.c.
-void cav_next_gap_rates(const cav_model *model, const cav_state *state, int contact, int dof, double rate[2]);
+/// The way of one contact's point, links placed. next_slip.c.
+void cav_next_slip_find(const cav_state *state, const cav_contact *contact, cav_next_contact *out);
 
-/// What the normal row of a contact of the state's sees beyond n.v_next.
+/// What a contact of the state's is after the step; NULL: its rows do not look there.
+static inline const cav_next_contact *cav_contact_next(const cav_state *state, const cav_contact *contact) {
+  return cav_looks_ahead(&state->options) ? state->work->next->contact + (contact - state->contact) : NULL;
+}
+
+/// Whether a row of a contact looks there.
+static inline int cav_row_looks_ahead(const cav_options *options, const cav_contact *contact, int row) {
+  if (row == 0) return options->next_gap == CAV_NEXT_GAP_EXACT;
+  return row < 3 && row < contact->dim && options->next_slip == CAV_NEXT_SLIP_EXACT;
+}
+
+/// What the normal row of a contact of the state's sees beyond n.v_next, which its velocity_next keeps.
 static inline double cav_contact_excess(const cav_state *state, const cav_contact *contact) {
-  if (state->options.next_gap == CAV_NEXT_GAP_LINEAR) return 0;
-  return state->work->next->contact[contact - state->contact].excess;
+  const cav_next_contact *next = cav_contact_next(state, contact);
+  return next ? next->excess[0] : 0;
 }
 
 /// The same for one-sided rows (limits) and two-sided ones (friction loss, |f| <= bound).

@@ -10,70 +10,12 @@
 /// height fields have no other side; a mesh is given no thickness of its own. Where the point is gone after the step
 /// (edges, faces and manifolds have points that come and go), the linear gap stands too.
 #include <math.h>
-#include <stdlib.h>
 
 #include "constraint.h"
 #include "math3.h"
 
 // fractions of the thickness between which the linear gap takes over
 static const double SHELL = 0.1, CORE = 0.35;
-
-static int has_mesh(const cav_geom *first, const cav_geom *second) {
-  return first->type == CAV_GEOM_MESH || second->type == CAV_GEOM_MESH;
-}
-
-static cav_next_knot *knot_new(const cav_model *model, const cav_state *state) {
-  size_t n = (size_t)model->nlink, nv = (size_t)model->nv, nq = (size_t)model->nq;
-  size_t bytes = sizeof(cav_next_knot) + n * sizeof(cav_pose) + (nq + 9 * n + 18 * nv) * sizeof(double);
-  cav_next_knot *next = calloc(1, bytes);
-  if (!next) return NULL;
-  next->bytes = bytes;
-  next->link = (cav_pose *)(next + 1);
-  next->q = (double *)(next->link + n);
-  next->com = next->q + nq;
-  next->inertia = next->com + 3 * n;
-  next->axis = next->inertia + 6 * n;
-  next->by_q = next->axis + 6 * nv;
-  next->by_v = next->by_q + 6 * nv;
-  int meshes = 0;
-  for (int p = 0; p < model->npair; p++)
-    meshes |= has_mesh(&model->geom[model->pair[p].geom1], &model->geom[model->pair[p].geom2]);
-  if (meshes) {
-    next->hint = calloc((size_t)model->npair, sizeof *next->hint);
-    next->bytes += (size_t)model->npair * sizeof *next->hint;
-  }
-  if (meshes && !next->hint) {
-    free(next);
-    return NULL;
-  }
-  // the world stays where it is
-  next->link[0] = state->link[0];
-  return next;
-}
-
-cav_status cav_next_knot_new(const cav_model *model, cav_state *state) {
-  cav_workspace *w = state->work;
-  if (!w->next) w->next = knot_new(model, state);
-  cav_next_knot *next = w->next;
-  if (!next) return CAV_NO_MEMORY;
-  if (state->ncontact <= next->room) return CAV_OK;
-  cav_next_contact *larger = realloc(next->contact, (size_t)w->contact_room * sizeof *larger);
-  if (!larger) return CAV_NO_MEMORY;
-  next->contact = larger;
-  next->room = w->contact_room;
-  return CAV_OK;
-}
-
-void cav_next_knot_free(cav_next_knot *next) {
-  if (!next) return;
-  free(next->contact);
-  free(next->hint);
-  free(next);
-}
-
-size_t cav_next_knot_bytes(const cav_next_knot *next) {
-  return next ? next->bytes + (size_t)next->room * sizeof *next->contact : 0;
-}
 
 // least half width, infinite where there is no other side
 static double inner_radius(const cav_geom *geom) {
@@ -146,11 +88,11 @@ static double margin_of(const cav_model *model, const cav_state *state, const ca
 
 // Where the search of a mesh found so many points that it may have left some out, and for all others, each contact has
 // a search within its own margin
-static void seek(const cav_model *model, const cav_state *state, const cav_contact *c, double margin, sought *s) {
+static void seek(const cav_model *model, cav_state *state, const cav_contact *c, double margin, sought *s) {
   cav_next_knot *next = state->work->next;
   const cav_pair *pair = &model->pair[c->pair];
   const cav_geom *first = &model->geom[pair->geom1], *second = &model->geom[pair->geom2];
-  int mesh = next->hint && has_mesh(first, second);
+  int mesh = next->hint && cav_pair_has_mesh(model, pair);
   if (mesh && s->pair == c->pair && s->margin >= margin && s->count < CAV_TOUCH_MAX) return;
   s->margin = margin;
   for (int i = 1; mesh && s->pair != c->pair && c + i < state->contact + state->ncontact && c[i].pair == c->pair; i++)
@@ -163,13 +105,12 @@ static void seek(const cav_model *model, const cav_state *state, const cav_conta
                   : cav_collide_shapes(&a, &b, s->margin, s->touch);
 }
 
-static void look(const cav_model *model, const cav_state *state, const cav_contact *c, sought *s,
+static void look(const cav_model *model, cav_state *state, const cav_contact *c, sought *s,
                  cav_next_contact *out) {
   const cav_pair *pair = &model->pair[c->pair];
   const cav_geom *first = &model->geom[pair->geom1], *second = &model->geom[pair->geom2];
   const double h = state->options.timestep, linear = c->dist + h * c->velocity_next[0];
   double derivative, weight = trust(linear, inner_radius(first) + inner_radius(second), &derivative);
-  *out = (cav_next_contact){0};
   if (weight == 0) return;
   double margin = margin_of(model, state, c);
   seek(model, state, c, margin, s);
@@ -177,7 +118,7 @@ static void look(const cav_model *model, const cav_state *state, const cav_conta
   while (k < s->count && s->touch[k].feature != c->feature) k++;
   if (k == s->count || !(s->touch[k].dist < margin)) return;
   double beyond = s->touch[k].dist - linear;
-  out->excess = weight * beyond / h;
+  out->excess[0] = weight * beyond / h;
   out->by_next = weight;
   out->by_linear = derivative * beyond - weight;
   out->margin = margin;
@@ -185,17 +126,8 @@ static void look(const cav_model *model, const cav_state *state, const cav_conta
   copy3(out->normal, s->touch[k].normal);
 }
 
-void cav_next_links_place(const cav_model *model, cav_state *state, const double *v_next) {
-  cav_next_knot *next = state->work->next;
-  cav_integrate(model, state->work->q, v_next, state->options.timestep, next->q);
-  const cav_posture at = {next->q, next->link, next->com, next->inertia, state->reference, next->axis, 1};
-  cav_posture_place(model, state->work, &at);
-}
-
 void cav_next_gaps_find(const cav_model *model, cav_state *state) {
   sought s = {.pair = -1};
-  if (state->ncontact == 0) return;
-  cav_next_links_place(model, state, state->work->v_next);
   for (int i = 0; i < state->ncontact; i++) look(model, state, &state->contact[i], &s, &state->work->next->contact[i]);
 }
 
@@ -236,23 +168,8 @@ static void fill_gradient(const cav_model *model, const cav_state *state, const 
 }
 
 void cav_next_gaps_differentiate(const cav_model *model, cav_state *state) {
-  cav_next_knot *next = state->work->next;
   cav_pair_manifolds manifolds;
   manifolds.pair = -1;
-  if (state->ncontact == 0) return;
-  cav_displaced_twists(model, state->options.timestep, state->work->v_next, next->axis, next->by_q, next->by_v);
   for (int i = 0; i < state->ncontact; i++)
-    fill_gradient(model, state, &state->contact[i], &manifolds, &next->contact[i]);
-}
-
-void cav_next_gap_rates(const cav_model *model, const cav_state *state, int contact, int dof, double rate[2]) {
-  const cav_next_knot *next = state->work->next;
-  const cav_next_contact *c = &next->contact[contact];
-  const double *reference = state->reference + 3 * model->dof[dof].link;
-  const double *twist[2] = {next->by_q + 6 * dof, next->by_v + 6 * dof};
-  for (int k = 0; k < 2; k++) {
-    double velocity[3];
-    velocity_at(velocity, twist[k], reference, c->pos);
-    rate[k] = dot3(c->gradient, twist[k]) + dot3(c->gradient + 3, velocity);
-  }
+    fill_gradient(model, state, &state->contact[i], &manifolds, &state->work->next->contact[i]);
 }

@@ -116,7 +116,7 @@ cav_status cav_derivatives(const cav_model *model, cav_state *state, double *du_
   state->work->derived = 0;
   cav_derivative_drifts(&t);
   cav_derivative_contacts(&t);
-  if (state->options.next_gap == CAV_NEXT_GAP_EXACT) cav_next_gaps_differentiate(model, state);
+  if (cav_looks_ahead(&state->options)) cav_next_contacts_differentiate(model, state);
   state->work->derived = 1;
   if (!du_dq && !du_dv && !du_dv_next) return CAV_OK;
 
@@ -134,7 +134,7 @@ cav_status cav_derivatives(const cav_model *model, cav_state *state, double *du_
     if (t.momentum) cav_half_steps_column(model, state, j, t.dq, t.dv, t.dn);
   }
   cav_derivative_across(&t);
-  if (state->options.next_gap == CAV_NEXT_GAP_EXACT) cav_derivative_next_gaps(&t);
+  if (cav_looks_ahead(&state->options)) cav_derivative_next_contacts(&t);
 
   // what acts on dofs
   cav_derivative_passive(&t);

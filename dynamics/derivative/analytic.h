@@ -24,6 +24,18 @@ static inline int last_dof(const cav_model *model, int link) {
   return link > 0 ? model->link[link].dof + model->link[link].ndof - 1 : -1;
 }
 
+// last dof that moves both of two links, -1 if there is none
+static inline int common_dof(const cav_model *model, const int link[2]) {
+  int a = last_dof(model, link[0]), b = last_dof(model, link[1]);
+  while (a != b) {
+    if (a > b)
+      a = model->dof[a].parent;
+    else
+      b = model->dof[b].parent;
+  }
+  return a;
+}
+
 // r = M x
 static inline void multiply6(double r[6], const double *M, const double x[6]) {
   for (int i = 0; i < 6; i++) r[i] = dot6(M + 6 * i, x);
@@ -82,9 +94,9 @@ void cav_derivative_contacts(const cav_derivative_task *t);
 /// Adds the blocks across of contacts between two moving links. contact_sum.c.
 void cav_derivative_across(const cav_derivative_task *t);
 
-/// Adds what the normal rows of contacts see after the step; the same for the derivatives of one contact. next_gap.c.
-void cav_derivative_next_gaps(const cav_derivative_task *t);
-void cav_contact_next_gap(const cav_derivative_task *t, int contact, cav_contact_derivative *out);
+/// Adds what the rows of contacts see after the step; the same for the derivatives of one contact. next_knot.c.
+void cav_derivative_next_contacts(const cav_derivative_task *t);
+void cav_contact_next_derivatives(const cav_derivative_task *t, int contact, cav_contact_derivative *out);
 
 /// Adds armature, dampers, springs, buoyancy and those of tendons. passive.c.
 void cav_derivative_passive(const cav_derivative_task *t);

@@ -422,6 +422,26 @@ static inline __attribute__((always_inline)) void velocity_rate(const cav_contac
   for (int i = 3; i < c->dim; i++) out[i] = FOUR_DOT3(c->frame + 3 * (i - 3), angular);
 }
 
+// rate of the way of the point over the step along the tangents, out [2], links held after the step
+static inline __attribute__((always_inline)) void way_rate(const cav_contact *c, const cav_next_contact *next,
+                                                           const placement *p, int side, int shift, cav_four *out) {
+  const cav_four none = {0};
+  cav_four own[3] = {none, none, none}, from[3], way[3];
+  if (shift)
+    for (int i = 0; i < 3; i++) own[i] = (cav_four){i == 0, i == 1, i == 2, 0};
+  // the point is another one of the second link where that link moves and it does not
+  for (int i = 0; i < 3; i++) {
+    from[i] = p->pos[i];
+    if (side) from[i] = from[i] - own[i];
+  }
+  for (int i = 0; i < 3; i++) way[i] = FOUR_DOT3(next->turn + 3 * i, from) - p->pos[i];
+  // the first link takes along what it sees
+  if (side == 0 && !shift) turns(own, next->way);
+  for (int i = 0; i < 3 && side == 0; i++) way[i] = way[i] + own[i];
+  FOUR_CROSS_ADD3(way, next->way, p->rotation);
+  for (int i = 0; i < 2; i++) out[i] = FOUR_DOT3(c->frame + 3 * (1 + i), way);
+}
+
 /// The law of a contact at its state.
 typedef struct law_derivative {
   double by_dist[6]; ///< df by the distance, velocities fixed
@@ -462,7 +482,7 @@ static inline __attribute__((always_inline)) void put_three(double *to, const ca
 }
 
 CAV_VECTOR_BODY void fill_side_body(const cav_contact *c, const geometry *g, const motion *now, const motion *next,
-                                    const law_derivative *law, const double *H, int side,
+                                    const law_derivative *law, const cav_next_contact *ahead, const double *H, int side,
                                     cav_contact_jacobian *derivative) {
   double whole[6] = {0}, along = dot3(c->frame, g->align);
   double across = sqrt(fmax(dot3(g->align, g->align) - along * along, 1e-12));
@@ -474,6 +494,11 @@ CAV_VECTOR_BODY void fill_side_body(const cav_contact *c, const geometry *g, con
     velocity_rate(c, now, &p, side, shift, before);
     velocity_rate(c, next, &p, side, shift, after);
     put_three(derivative->dist[side] + 3 * shift, &p.dist);
+    if (ahead) {
+      cav_four way[2];
+      way_rate(c, ahead, &p, side, shift, way);
+      for (int i = 0; i < 2; i++) put_three(derivative->way[side][i] + 3 * shift, &way[i]);
+    }
     for (int j = 0; j < c->dim; j++) kept[j] = (1 - c->damping[j]) * before[j] - after[j];
     // the impulse turns with the frame and acts at the displaced position
     for (int i = 0; i < 3; i++) wrench[i] = wrench[3 + i] = (cav_four){0};
@@ -494,8 +519,9 @@ CAV_VECTOR_BODY void fill_side_body(const cav_contact *c, const geometry *g, con
 }
 CAV_BY_VECTORS(fill_side,
                (const cav_contact *c, const geometry *g, const motion *now, const motion *next,
-                const law_derivative *law, const double *H, int side, cav_contact_jacobian *derivative),
-               (c, g, now, next, law, H, side, derivative))
+                const law_derivative *law, const cav_next_contact *ahead, const double *H, int side,
+                cav_contact_jacobian *derivative),
+               (c, g, now, next, law, ahead, H, side, derivative))
 
 // whether the law is flat: no curvature beside that of a contact that pushes, which is 1/R
 static int is_flat(const cav_contact *c, const double *H) {
@@ -516,8 +542,10 @@ void cav_contact_differentiate(const cav_model *model, const cav_state *state, c
   motion now, next;
   move(state, c, state->velocity, cav_takes_mean(state) ? state->velocity_next : NULL, &now);
   move(state, c, state->velocity_next, NULL, &next);
+  const int slip = c->dim > 1 && state->options.next_slip == CAV_NEXT_SLIP_EXACT;
+  const cav_next_contact *ahead = slip ? cav_contact_next(state, c) : NULL;
   for (int side = 0; side < 2; side++) {
-    if ((side ? c->link2 : c->link1) > 0) fill_side(c, &g, &now, &next, &law, H, side, derivative);
+    if ((side ? c->link2 : c->link1) > 0) fill_side(c, &g, &now, &next, &law, ahead, H, side, derivative);
   }
 
   // the curvature in the frame and in world axes

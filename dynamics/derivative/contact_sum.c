@@ -56,18 +56,6 @@ static void contact_at_link(const cav_derivative_task *t, const cav_contact *c, 
   for (int i = 0; i < 36; i++) next[i] += velocity[i];
 }
 
-// last dof that moves both of two links, -1 if there is none
-static int common_dof(const cav_model *model, const int link[2]) {
-  int a = last_dof(model, link[0]), b = last_dof(model, link[1]);
-  while (a != b) {
-    if (a > b)
-      a = model->dof[a].parent;
-    else
-      b = model->dof[b].parent;
-  }
-  return a;
-}
-
 // whether some dof moves both links of a contact: then contact_between does all of it
 static int is_within_tree(const cav_model *model, const cav_contact *c) {
   return c->link1 > 0 && c->link2 > 0 && common_dof(model, (int[]){c->link1, c->link2}) >= 0;
@@ -310,6 +298,6 @@ cav_status cav_contact_derivatives(const cav_model *model, cav_state *state, int
   }
   cav_derivative_task t = {.model = model, .state = state, .s = s, .nv = model->nv};
   for (int side = 0; side < 2; side++) add_side(&t, c, &s->contact[contact], side, out);
-  if (state->options.next_gap == CAV_NEXT_GAP_EXACT) cav_contact_next_gap(&t, contact, out);
+  if (cav_looks_ahead(&state->options)) cav_contact_next_derivatives(&t, contact, out);
   return CAV_OK;
 }

@@ -14,6 +14,7 @@ typedef struct cav_contact_jacobian {
   double impulse[2][6][6];  ///< [row][twist] of the impulse
   double wrench[2][6][6];   ///< [twist][6] of the wrench on link2 about the position
   double hessian[6][6];     ///< -df/dv_next
+  double way[2][2][6];      ///< [row][twist] of h times what tangential rows see, links held after the step (next_slip)
   double by_velocity[6][6]; ///< frame' hessian frame, 6 x 6 in world axes about the position
 } cav_contact_jacobian;
 

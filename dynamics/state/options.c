@@ -13,6 +13,7 @@ static const char *const stabilisation_words[] = {CAV_STABILISATIONS(WORD_TEXT) 
 static const char *const regulariser_words[] = {CAV_REGULARISERS(WORD_TEXT) NULL};
 static const char *const sliding_words[] = {CAV_SLIDINGS(WORD_TEXT) NULL};
 static const char *const next_gap_words[] = {CAV_NEXT_GAPS(WORD_TEXT) NULL};
+static const char *const next_slip_words[] = {CAV_NEXT_SLIPS(WORD_TEXT) NULL};
 
 #define REAL_FIELD(stage, name, least, most, required, unit, text) \
   {#name, CAV_FIELD_REAL, offsetof(cav_options, name), least, most, NULL, unit, text},

@@ -14,8 +14,8 @@
 ///
 /// Coulomb's law (coulomb.c) has no potential either: Newton from the convex law's solution, and where it does not
 /// descend, convex problems with the bounds of friction held. A solution need not exist nor be the only one (Painleve).
-/// Nor have gaps after the step (next_gap.c), whose derivative Newton takes along, or which are followed: frozen for a
-/// solution, taken anew where it ends.
+/// Nor have gaps and ways after the step (next_knot.c), whose derivatives Newton takes along, or which are followed: frozen
+/// for a solution, taken anew where it ends.
 ///
 /// Stiff rows of the exact law are come to from softer ones by the proximal point method (proximal.c), which all of the
 /// above is the inner solver of.
@@ -39,11 +39,11 @@ static const double ROUGH = 1e-9, NEAR = 1e-2;
 // at which it ends and the most that counts as an end
 static const double STIFF = 1e-5, LEVEL_STEP = 1e-2, LEAST_LEVEL = 1e-10, AT_REST = 1e-15, CLOSE = 1e-10;
 
-// where Newton finds no way with gaps after the step that move: solutions with their excess frozen, each where the one
+// where Newton finds no way with gaps or ways after the step that move: solutions with their excess frozen, each where the one
 // before ends, the first with none. Their fixed point is the law; the excess is small against the velocities that it
 // hangs on, so it mostly attracts
-static cav_status follow_gaps(cav_newton *s, double tolerance) {
-  for (int b = 0; b < s->problem.nblock; b++) s->excess[b] = 0.0;
+static cav_status follow_ahead(cav_newton *s, double tolerance) {
+  memset(s->excess, 0, (size_t)s->problem.nrow * sizeof *s->excess);
   for (int k = 0; s->iterations < s->limit; k++) {
     s->frozen = 1;
     cav_status status = cav_newton_iterate(s, k > 0, fmax(ROUGH, tolerance));
@@ -120,8 +120,7 @@ static cav_status turn_back(cav_newton *s, double tolerance) {
 
 // whether a step of the mean velocity is convex but for what is quadratic in it
 static int has_path(const cav_state *state) {
-  return cav_takes_mean(state) && state->options.sliding == CAV_SLIDING_CONVEX &&
-         state->options.next_gap == CAV_NEXT_GAP_LINEAR;
+  return cav_takes_mean(state) && state->options.sliding == CAV_SLIDING_CONVEX && !cav_looks_ahead(&state->options);
 }
 
 // whether rows are so stiff that nothing is lost by coming from softer ones
@@ -145,7 +144,7 @@ cav_status cav_forward_newton(const cav_model *model, cav_state *state, const do
   if (status != CAV_OK) return status;
   const int stiff = is_stiff(state) && s.problem.nrow > 0;
   status = stiff ? approach(&s, tolerance) : cav_newton_iterate(&s, 0, tolerance);
-  if (status == CAV_NOT_CONVERGED && s.problem.excess) status = follow_gaps(&s, tolerance);
+  if (status == CAV_NOT_CONVERGED && s.problem.excess) status = follow_ahead(&s, tolerance);
   if (status == CAV_NOT_CONVERGED && cav_takes_mean(state)) status = turn_back(&s, tolerance);
   if (has_path(state) && (status == CAV_NOT_CONVERGED || (status == CAV_OK && s.sign < 0)))
     status = cav_newton_follow(&s, tolerance, status);
@@ -163,8 +162,8 @@ int cav_forward_limit(const cav_state *state) {
   if (has_path(state)) return PATH_ITERATIONS;
   // friction by Coulomb's law is solved for all piles of a heap at once, and some of them need another round each
   if (o->sliding == CAV_SLIDING_COULOMB) return COULOMB_ITERATIONS;
-  // followed gaps take as many again
-  return (o->next_gap == CAV_NEXT_GAP_EXACT ? 2 : 1) * DEFAULT_ITERATIONS;
+  // what is followed takes as many again
+  return (cav_looks_ahead(o) ? 2 : 1) * DEFAULT_ITERATIONS;
 }
 
 cav_status cav_forward(const cav_model *model, cav_state *state, const double *q, const double *v, const double *u,

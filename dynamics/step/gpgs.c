@@ -446,7 +446,7 @@ static cav_status fill_hard_report(gpgs *s, const double *v, const double *u, ca
 
 static cav_status prepare(gpgs *s, const cav_model *model, cav_state *state, const double *q, const double *v) {
   cav_impulse *p = &s->problem;
-  if (state->options.next_gap != CAV_NEXT_GAP_LINEAR) return CAV_NOT_SUPPORTED;
+  if (cav_looks_ahead(&state->options)) return CAV_NOT_SUPPORTED;
   // S and its scratch are as large as A where all rows are of equality constraints
   const size_t squares = model->nequality ? 3 : 1;
   const cav_impulse_room room = {.per_row = 7, .per_row_squared = squares, .per_row_and_dof = 1, .per_dof = 5};

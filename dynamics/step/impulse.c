@@ -198,7 +198,7 @@ void cav_impulse_law(const cav_impulse *p, const cav_block *block, const double 
   double g[DIM_MAX];
   const double *R = p->R + block->first;
   for (int i = 0; i < block->dim; i++) g[i] = (p->target[block->first + i] - y[block->first + i]) / R[i];
-  if (p->excess) g[0] -= p->excess[block - p->block] / R[0];
+  for (int i = 0; i < block->dim && p->excess; i++) g[i] -= p->excess[block->first + i] / R[i];
   f += block->first;
   if (block->contact >= 0) {
     const cav_contact *contact = &p->state->contact[block->contact];

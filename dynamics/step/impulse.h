@@ -16,7 +16,7 @@ typedef struct cav_impulse {
   cav_block *block; ///< [nblock] contacts in their order, then scalar rows, equality constraints, springs in theirs
   const double
       *held; ///< [nblock] normal impulses that bound friction under Coulomb's law; NULL: those of the law itself
-  const double *excess; ///< [nblock] of normal rows beyond J v_next (cav_next_contact); NULL: none
+  const double *excess; ///< [nrow] what rows see beyond J v_next (cav_next_contact); NULL: nothing
   int convex;           ///< 1: contacts by the convex law, whatever the options say
   double *target;       ///< v* [nrow], m/s or rad/s
   double *R;            ///< regulariser [nrow], 1/kg

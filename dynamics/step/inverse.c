@@ -35,7 +35,7 @@ static cav_status find_position(const cav_model *model, cav_state *state, const 
     copy(w->narrow_v + model->nv, v_next, model->nv);
     cav_link_velocities(model, state, w->narrow_v, w->velocity_now);
     cav_link_velocities(model, state, w->narrow_v + model->nv, state->velocity_next);
-    if (state->options.next_gap == CAV_NEXT_GAP_EXACT) {
+    if (cav_looks_ahead(&state->options)) {
       status = cav_next_knot_new(model, state);
       if (status) { return status; }
       cav_next_links_place(model, state, v_next);
@@ -132,7 +132,7 @@ static void contacts(const cav_model *model, cav_state *state, const double *vel
     if (velocity_now) { cav_contact_velocity(state, c, velocity_now, c->velocity); }
     cav_contact_velocity(state, c, state->velocity_next, c->velocity_next);
   }
-  if (state->options.next_gap == CAV_NEXT_GAP_EXACT) { cav_next_gaps_find(model, state); }
+  if (cav_looks_ahead(&state->options)) { cav_next_contacts_find(model, state); }
   for (int i = 0; i < state->ncontact; i++) {
     cav_contact *c = &state->contact[i];
     contact_impulse(state, c, coupled);
@@ -265,7 +265,7 @@ cav_status cav_inverse_from(const cav_model *model, cav_state *state, cav_stage 
     cav_status status = cav_half_steps_new(model, state);
     if (status) { return status; }
   }
-  if (state->options.next_gap == CAV_NEXT_GAP_EXACT) {
+  if (cav_looks_ahead(&state->options)) {
     cav_status status = cav_next_knot_new(model, state);
     if (status) { return status; }
   }

@@ -13,15 +13,14 @@ enum { BLOCK = CAV_CURVATURE, STALLS = 4, CHANGES = 30, POLISH = 2, FEW = 2 };
 static const double SHORTEST_STEP = 0.02, RUNAWAY = 1e3;
 
 int cav_newton_is_convex(const cav_state *state) {
-  return !cav_takes_mean(state) && state->options.sliding == CAV_SLIDING_CONVEX &&
-         state->options.next_gap == CAV_NEXT_GAP_LINEAR;
+  return !cav_takes_mean(state) && state->options.sliding == CAV_SLIDING_CONVEX && !cav_looks_ahead(&state->options);
 }
 
 cav_status cav_newton_prepare(cav_newton *s, const cav_model *model, cav_state *state) {
-  const size_t matrices = cav_newton_is_convex(state) ? 0 : 2, looks = state->options.next_gap == CAV_NEXT_GAP_EXACT,
+  const size_t matrices = cav_newton_is_convex(state) ? 0 : 2, looks = cav_looks_ahead(&state->options) != 0,
                mean = cav_takes_mean(state) != 0;
-  const cav_impulse_room room = {.per_block = BLOCK + 2 + CAV_PROXIMAL_PER_BLOCK + CAV_ISLAND_PER_BLOCK,
-                                 .per_row = 5 + CAV_PROXIMAL_PER_ROW,
+  const cav_impulse_room room = {.per_block = BLOCK + 1 + CAV_PROXIMAL_PER_BLOCK + CAV_ISLAND_PER_BLOCK,
+                                 .per_row = 6 + CAV_PROXIMAL_PER_ROW,
                                  .per_row_and_dof = looks,
                                  .per_dof = 9 + CAV_ISLAND_PER_DOF + mean * CAV_PATH_PER_DOF,
                                  .per_dof_squared = matrices + mean * CAV_PATH_PER_DOF_SQUARED};
@@ -42,7 +41,7 @@ cav_status cav_newton_prepare(cav_newton *s, const cav_model *model, cav_state *
   s->held = s->curvature + BLOCK * nblock;
   s->excess = s->held + nblock;
   s->problem.excess = looks ? s->excess : NULL;
-  s->ahead = s->excess + nblock;
+  s->ahead = s->excess + nrow;
   s->matrix = s->ahead + looks * nrow * nv;
   s->smooth = s->matrix + nv * nv;
   s->path = s->matrix + matrices * nv * nv;
@@ -54,28 +53,32 @@ cav_status cav_newton_prepare(cav_newton *s, const cav_model *model, cav_state *
   return CAV_OK;
 }
 
-// rates of the excess of each contact by the dofs of its block, at the state's last evaluation
-static void fill_ahead(cav_newton *s) {
+// rates of the excess of a contact's rows by the dofs of its block, at the state's last evaluation
+static void fill_block_ahead(cav_newton *s, const cav_block *block) {
   const cav_impulse *p = &s->problem;
   const double rate = 1.0 / p->state->options.timestep;
-  cav_next_gaps_differentiate(p->model, p->state);
-  for (int b = 0; b < p->nblock; b++) {
-    const cav_block *block = &p->block[b];
-    if (block->contact < 0) continue;
-    const cav_contact *contact = &p->state->contact[block->contact];
-    const cav_next_contact *next = &p->state->work->next->contact[block->contact];
-    double *to = s->ahead + (size_t)block->contact * (size_t)p->nv;
-    int second = cav_last_dof(p->model, contact->link2);
-    for (int k = 0; k < block->ndof; k++) {
-      // dofs from the leaves: of the second link, or of the first
-      const int dof = block->dof[k];
-      const double sign = dof == second ? 1.0 : -1.0;
-      double there[2];
-      cav_next_gap_rates(p->model, p->state, block->contact, dof, there);
-      to[k] = rate * sign * next->by_next * there[1] + next->by_linear * block->J[k];
-      if (dof == second) second = p->model->dof[dof].parent;
-    }
+  const cav_contact *contact = &p->state->contact[block->contact];
+  const cav_next_contact *next = cav_contact_next(p->state, contact);
+  double *to = s->ahead + (size_t)block->first * (size_t)p->nv;
+  const int slip = cav_row_looks_ahead(&p->state->options, contact, 1);
+  int second = cav_last_dof(p->model, contact->link2);
+  memset(to, 0, (size_t)block->dim * (size_t)p->nv * sizeof *to);
+  for (int k = 0; k < block->ndof; k++) {
+    // dofs from the leaves: of the second link, or of the first
+    const int dof = block->dof[k];
+    const double sign = dof == second ? 1.0 : -1.0;
+    double there[3][2];
+    cav_next_contact_rates(p->model, p->state, block->contact, dof, there);
+    to[k] = rate * sign * next->by_next * there[0][1] + next->by_linear * block->J[k];
+    for (int i = 1; i < 3 && slip; i++) to[i * p->nv + k] = rate * sign * there[i][1] - block->J[i * block->ndof + k];
+    if (dof == second) second = p->model->dof[dof].parent;
   }
+}
+
+static void fill_ahead(cav_newton *s) {
+  cav_next_contacts_differentiate(s->problem.model, s->problem.state);
+  for (int b = 0; b < s->problem.nblock; b++)
+    if (s->problem.block[b].contact >= 0) fill_block_ahead(s, &s->problem.block[b]);
 }
 
 void cav_newton_add_constraints(cav_newton *s) {
@@ -84,7 +87,7 @@ void cav_newton_add_constraints(cav_newton *s) {
     const cav_block *block = &s->problem.block[b];
     const double *H = s->curvature + BLOCK * b, *J = block->J;
     const double *ahead =
-        s->problem.excess && !s->frozen && block->contact >= 0 ? s->ahead + block->contact * nv : NULL;
+        s->problem.excess && !s->frozen && block->contact >= 0 ? s->ahead + (size_t)block->first * (size_t)nv : NULL;
     const int n = block->ndof, dim = block->dim;
     if (largest(H, dim * dim) == 0.0) continue;
     for (int i = 0; i < n; i++) {
@@ -94,7 +97,7 @@ void cav_newton_add_constraints(cav_newton *s) {
       for (int j = 0; j < n; j++) {
         double sum = 0.0;
         for (int k = 0; k < dim; k++) sum += bent[k] * J[k * n + j];
-        if (ahead) sum += bent[0] * ahead[j];
+        for (int k = 0; k < dim && k < 3 && ahead; k++) sum += bent[k] * ahead[k * nv + j];
         to[block->dof[j]] += sum;
       }
     }
@@ -207,9 +210,12 @@ cav_status cav_newton_measure(cav_newton *s) {
   if (s->raised && !p->excess) return measure_raised(s);
   const cav_status status = cav_impulse_check(p, s->q, s->v, s->u, s->x, s->found, s->f, &s->error, &s->scale);
   if (!p->excess || status != CAV_OK) return status;
+  memset(s->excess, 0, s->frozen ? 0 : (size_t)p->nrow * sizeof *s->excess);
   for (int b = 0; b < p->nblock && !s->frozen; b++) {
-    const int contact = p->block[b].contact;
-    s->excess[b] = contact >= 0 ? cav_contact_excess(p->state, &p->state->contact[contact]) : 0.0;
+    const cav_block *block = &p->block[b];
+    if (block->contact < 0) continue;
+    const cav_next_contact *next = cav_contact_next(p->state, &p->state->contact[block->contact]);
+    for (int i = 0; i < block->dim && i < 3; i++) s->excess[block->first + i] = next->excess[i];
   }
   if (s->raised) return measure_raised(s);
   if (!s->frozen) return CAV_OK;

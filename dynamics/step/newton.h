@@ -24,8 +24,8 @@ typedef struct cav_newton {
   double *derivative;      ///< [nrow] J d
   double *try_y, *try_f;   ///< [nrow] the same along the line
   double *curvature;       ///< [nblock*36] -df/dy
-  double *excess;          ///< [nblock] of normal rows beyond J x, as last measured
-  double *ahead;           ///< [ncontact*nv] its rate by the dofs of each contact's block
+  double *excess;          ///< [nrow] what rows see beyond J x, as last measured
+  double *ahead;           ///< [nrow*nv] its rate by the dofs of each contact's block
   double *held;            ///< [nblock] normal impulses held under Coulomb's law
   double *x, *anchor;      ///< [nv] iterate; where base was taken
   double *base;            ///< [nv] h (smooth inverse - u) at anchor

@@ -27,7 +27,6 @@ static void enter_island(cav_newton *s, int island) {
   s->part.block = s->problem.block + all->first_block[island];
   s->part.nblock = all->first_block[island + 1] - all->first_block[island];
   if (s->problem.held) s->part.held = s->problem.held + all->first_block[island];
-  if (s->problem.excess) s->part.excess = s->problem.excess + all->first_block[island];
   s->dof = all->dof + all->first_dof[island];
   s->ndof = all->first_dof[island + 1] - all->first_dof[island];
 }
@@ -125,8 +124,9 @@ static void add_row_rounding(const cav_newton *s, int b, double *error) {
     const double *J = block->J + i * block->ndof;
     double size = fabs(p->target[block->first + i]) + DBL_MIN;
     // of positions after the step, which come about by several roundings
-    if (p->excess && block->contact >= 0 && i == 0)
-      size += 8.0 * norm3(p->state->contact[block->contact].pos) / p->state->options.timestep;
+    const cav_contact *contact = p->excess && block->contact >= 0 ? &p->state->contact[block->contact] : NULL;
+    if (contact && cav_row_looks_ahead(&p->state->options, contact, i))
+      size += 8.0 * norm3(contact->pos) / p->state->options.timestep;
     for (int k = 0; k < block->ndof; k++) size += fabs(J[k] * s->x[block->dof[k]]);
     for (int j = 0; j < block->dim; j++)
       for (int k = 0; k < block->ndof; k++)

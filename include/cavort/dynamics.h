@@ -26,7 +26,7 @@ typedef struct cav_contact {
   double sigma;            ///< smoothing of the law in impulse scale (dynamics/METHOD.md, 3), 0: exact
   double friction[5];      ///< two tangential, one torsional, two rolling coefficients
   double velocity[6];      ///< J v, m/s (rad/s for the last three); of all these the first dim count
-  double velocity_next[6]; ///< J v_next
+  double velocity_next[6]; ///< J v_next; tangential ones as the option next_slip has them
   double impulse[6];       ///< f, N s
 } cav_contact;
 

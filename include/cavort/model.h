@@ -486,6 +486,11 @@ typedef struct cav_field {
   X(CAV_NEXT_GAP_LINEAR, "linear", "the paper's: gap + h n.v_next, off by h^2 where links turn")                   \
   X(CAV_NEXT_GAP_EXACT, "exact", "that of the same point at q (+) h v_next: one more placement of links and contacts")
 
+/// The slip of a contact that its tangential rows see; dynamics/METHOD.md, 13.
+#define CAV_NEXT_SLIPS(X)                                                                                        \
+  X(CAV_NEXT_SLIP_LINEAR, "linear", "the paper's: J v_next at q, off by h/2 of the point's acceleration where links turn") \
+  X(CAV_NEXT_SLIP_EXACT, "exact", "the way of the point to q (+) h v_next over h: one more placement of links")
+
 /// How constraints are evaluated: REAL(stage, name, least, most, required, unit, text), WORD(stage, name, type, words,
 /// text) and FLAG(stage, name, text), which is 0 or 1. stage: the first stage of an evaluation that depends on it,
 /// which is not reused after a change. required: of a recorded law (<contact> of a problem file). The struct, the
@@ -498,6 +503,7 @@ typedef struct cav_field {
   WORD(POSITION, regulariser, cav_regulariser, CAV_REGULARISERS, "diagonal of A that scales R")                    \
   WORD(VELOCITY, sliding, cav_sliding, CAV_SLIDINGS, "law of contacts that slide")                                 \
   WORD(VELOCITY, next_gap, cav_next_gap, CAV_NEXT_GAPS, "gap after the step that contacts see")                    \
+  WORD(VELOCITY, next_slip, cav_next_slip, CAV_NEXT_SLIPS, "slip over the step that contacts see")                 \
   REAL(POSITION, softness, DBL_MIN, DBL_MAX, 1, "", "epsilon of the discrete stabilisation")                       \
   REAL(POSITION, time_constant, 0, DBL_MAX, 1, "s", "kappa of the discrete stabilisation; 0: deadbeat")            \
   REAL(POSITION, smoothing, 0, DBL_MAX, 1, "m", "delta: distance at which the smoothed law is active; 0: the exact law (dynamics/METHOD.md, 3)") \
@@ -525,6 +531,8 @@ typedef enum cav_regulariser { CAV_REGULARISERS(CAV_WORD_MEMBER) } cav_regularis
 typedef enum cav_sliding { CAV_SLIDINGS(CAV_WORD_MEMBER) } cav_sliding;
 /// Gap after the step: CAV_NEXT_GAPS.
 typedef enum cav_next_gap { CAV_NEXT_GAPS(CAV_WORD_MEMBER) } cav_next_gap;
+/// Slip over the step: CAV_NEXT_SLIPS.
+typedef enum cav_next_slip { CAV_NEXT_SLIPS(CAV_WORD_MEMBER) } cav_next_slip;
 #undef CAV_WORD_MEMBER
 
 /// A state starts with the model's; change state->options between calls at will.

@@ -306,6 +306,7 @@ typedef struct cav_schedule {
   int stages;            ///< from 1
   cav_sliding sliding;   ///< law of contacts that slide from three quarters of the way on; before it is the convex one
   cav_next_gap next_gap; ///< gap after the step that contacts see from half way on; before it is the linear one
+  cav_next_slip next_slip;       ///< slip over the step, the same way
   cav_stage_options first, last; ///< options of the first and of the last stage
 } cav_schedule;
 

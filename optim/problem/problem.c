@@ -492,6 +492,7 @@ static cav_status read_schedule(const cav_problem_reader *reader) {
   }
   schedule->sliding = (cav_sliding)cav_xml_word(node, "sliding", schedule->sliding);
   schedule->next_gap = (cav_next_gap)cav_xml_word(node, "next_gap", schedule->next_gap);
+  schedule->next_slip = (cav_next_slip)cav_xml_word(node, "next_slip", schedule->next_slip);
   int n;
   const cav_field *field = cav_stage_fields(&n);
   cav_status status = cav_problem_read_fields(reader, cav_problem_child(node, "first"), field, n, &schedule->first);

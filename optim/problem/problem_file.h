@@ -45,6 +45,7 @@ extern const char *const cav_problem_springs[];
 extern const char *const cav_problem_stabilisations[];
 extern const char *const cav_problem_slidings[];
 extern const char *const cav_problem_next_gaps[];
+extern const char *const cav_problem_next_slips[];
 extern const char *const cav_problem_regularisers[];
 extern const char *const cav_problem_mirrors[];
 extern const char *const cav_problem_norms[];

@@ -23,7 +23,7 @@ static double between(double from, double to, double s) {
 // fraction of the way from which on contacts slide by the schedule's law: before, forces that are active at a distance
 // make up for what is missing, and a convex law leads better (step-up ends in a corner without)
 static const double SLIDES_FROM = 0.75;
-// fraction of the way from which on contacts see the gap where the step ends; from three quarters on walker-jump and
+// fraction of the way from which on contacts see gap and slip where the step ends; from three quarters on walker-jump and
 // cheetah-jump are not certified
 static const double LOOKS_FROM = 0.5;
 
@@ -44,6 +44,7 @@ void cav_stage_law(const cav_problem *problem, double x, double step, cav_option
   law->stabilisation = CAV_STABILISATION_DISCRETE;
   law->sliding = x >= SLIDES_FROM ? problem->schedule.sliding : CAV_SLIDING_CONVEX;
   law->next_gap = x >= LOOKS_FROM ? problem->schedule.next_gap : CAV_NEXT_GAP_LINEAR;
+  law->next_slip = x >= LOOKS_FROM ? problem->schedule.next_slip : CAV_NEXT_SLIP_LINEAR;
 #define LAW_SAME(name) law->name = stage.name;
 #define LAW_STEPS(name) law->name = stage.name * step;
 #define LAW_NONE(name)

@@ -450,9 +450,10 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
   print_terms(p, 0);
   print_terms(p, 1);
   const cav_stage_options *a = &p->schedule.first, *b = &p->schedule.last;
-  printf("schedule: %d stages, geometric; contacts that slide by %s law, %s gap after the step\n", p->schedule.stages,
-         p->schedule.sliding == CAV_SLIDING_CONVEX ? "the convex" : "Coulomb's",
-         p->schedule.next_gap == CAV_NEXT_GAP_EXACT ? "exact" : "linear");
+  printf("schedule: %d stages, geometric; contacts that slide by %s law, %s gap and %s slip after the step\n",
+         p->schedule.stages, p->schedule.sliding == CAV_SLIDING_CONVEX ? "the convex" : "Coulomb's",
+         p->schedule.next_gap == CAV_NEXT_GAP_EXACT ? "exact" : "linear",
+         p->schedule.next_slip == CAV_NEXT_SLIP_EXACT ? "exact" : "linear");
   print_stage_ends(a, b);
   return CAV_OK;
 }

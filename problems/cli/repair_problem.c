@@ -41,7 +41,7 @@ cav_status cav_command_write_repair(const char *folder, const char *model_path, 
         "    <velocity dofs=\"root_angular\" weight=\"0\"/>\n"
         "    <posture dofs=\"joints\" weight=\"0\"/>\n"
         "  </cost>\n"
-        "  <schedule stages=\"8\" next_gap=\"exact\">\n"
+        "  <schedule stages=\"8\" next_gap=\"exact\" next_slip=\"exact\">\n"
         "    <first softness=\"0.5\" smoothing=\"0.01\"/>\n"
         "  </schedule>\n"
         "</problem>\n",

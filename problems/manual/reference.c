@@ -203,6 +203,9 @@ static void print_words(FILE *out) {
 #define WORD_OF "next_gap"
                           CAV_NEXT_GAPS(WORD_ROW)
 #undef WORD_OF
+#define WORD_OF "next_slip"
+                              CAV_NEXT_SLIPS(WORD_ROW)
+#undef WORD_OF
   };
   fprintf(out, "\n## Words of options\n\n| option | word | meaning |\n|---|---|---|\n");
   for (size_t i = 0; i < sizeof words / sizeof *words; i++) {

@@ -156,8 +156,8 @@ cav_status cav_measure_forwards(cav_measure *m, cav_measure_forward *out) {
   method list[METHODS];
   if (m->options.smoothing > 0)
     out->sweeps_missing = "Gauss-Seidel knows the exact law alone, and this scene's is smoothed";
-  else if (m->options.next_gap == CAV_NEXT_GAP_EXACT)
-    out->sweeps_missing = "Gauss-Seidel does not follow gaps to the end of the step, as this scene's law does";
+  else if (m->options.next_gap == CAV_NEXT_GAP_EXACT || m->options.next_slip == CAV_NEXT_SLIP_EXACT)
+    out->sweeps_missing = "Gauss-Seidel does not follow contacts to the end of the step, as this scene's law does";
   int nmethod = list_methods(m, !out->sweeps_missing, list), repeats = m->quick ? 3 : REPEATS;
   size_t ns = (size_t)m->nsample;
   outcome *found = calloc(ns * (size_t)nmethod + 1, sizeof *found);

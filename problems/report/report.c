@@ -347,10 +347,12 @@ static void write_scene(const report *r, cav_html *page) {
                  "%d degrees of freedom in %d moving links, %d geoms, %d equality constraints; step %g s, order %s.",
                  model->nv, model->nlink - 1, model->ngeom, model->nequality, o->timestep, order_names[o->order]);
   if (o->stabilisation == CAV_STABILISATION_DISCRETE)
-    cav_html_entry(page, "Contact law", "%s: softness %g, time constant %g s, smoothing %g m, %s sliding, %s gap.",
+    cav_html_entry(page, "Contact law",
+                   "%s: softness %g, time constant %g s, smoothing %g m, %s sliding, %s gap, %s slip.",
                    r->request->problem ? "that of the end of the problem's schedule" : "discrete", o->softness,
                    o->time_constant, o->smoothing, o->sliding == CAV_SLIDING_CONVEX ? "convex" : "Coulomb",
-                   o->next_gap == CAV_NEXT_GAP_EXACT ? "exact" : "linear");
+                   o->next_gap == CAV_NEXT_GAP_EXACT ? "exact" : "linear",
+                   o->next_slip == CAV_NEXT_SLIP_EXACT ? "exact" : "linear");
   else
     cav_html_entry(page, "Contact law", "solref and solimp of the model's file, smoothing %g m.", o->smoothing);
   cav_html_entry(page, "States", "%d states of random motions, %d with constraint rows, up to %d rows%s.", r->m.nsample,

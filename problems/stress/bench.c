@@ -72,6 +72,7 @@ static cav_options options_of(const cav_bench *b) {
   o.smoothing_self = last->smoothing_self;
   o.sliding = b->problem->schedule.sliding;
   o.next_gap = b->problem->schedule.next_gap;
+  o.next_slip = b->problem->schedule.next_slip;
   return o;
 }
 
