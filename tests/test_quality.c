@@ -91,6 +91,76 @@ static void test_box(void) {
   cav_model_free(model);
 }
 
+// a ball that moves at a speed and turns at another about y
+static cav_quality ball(const cav_model *model, double speed, double turn) {
+  cav_trajectory *motion = cav_trajectory_new(model, KNOTS, h);
+  for (int t = 0; t < KNOTS; t++) {
+    double *q = motion->q + t * model->nq, angle = turn * t * h;
+    q[0] = speed * t * h, q[2] = 0.1;
+    q[3] = cos(angle / 2), q[5] = sin(angle / 2);
+  }
+  cav_quality quality = measure(model, motion);
+  cav_trajectory_free(motion);
+  return quality;
+}
+
+// what rolls does not slide, at 0.6 rad a step or 1.2 a frame; what slides does so at its speed, what spins on its place at
+// that of its surface
+static void test_rolling(void) {
+  cav_model *model = parse(
+      "<mujoco><option timestep='0.02'/><worldbody><geom type='plane' size='0 0 1'/><body pos='0 0 0.1'>"
+      "<freejoint/><geom type='sphere' size='0.1' mass='2'/></body></worldbody></mujoco>");
+  cav_quality q = ball(model, 3, 30);
+  CHECK_NEAR(q.skating, 0, 1e-9);
+  CHECK_NEAR(q.skating_step, 0, 1e-9);
+  CHECK_NEAR(q.skating_fraction, 0, 0);
+  q = ball(model, 3, 0);
+  CHECK_NEAR(q.skating, 300, 1e-9);
+  CHECK_NEAR(q.skating_step, 300, 1e-9);
+  CHECK_NEAR(q.skating_fraction, 100, 0);
+  q = ball(model, 0, 10);
+  CHECK_NEAR(q.skating, 100, 1e-9);
+  q = ball(model, 1, 11);
+  CHECK_NEAR(q.skating, 10, 1e-9);
+  CHECK_NEAR(q.skating_step_fraction, 100, 0);
+  cav_model_free(model);
+}
+
+// a box that turns up about its lower edge, 5 rad/s, while that moves at a speed: its far corners, off the floor but within
+// 5 mm of it for a while, slide back faster than that
+static void test_edge(void) {
+  cav_model *model = parse(box_text);
+  for (int k = 0; k < 2; k++) {
+    cav_trajectory *motion = cav_trajectory_new(model, KNOTS, h);
+    for (int t = 0; t < KNOTS; t++) {
+      double angle = 0.005 + 5 * h * t / 4, *q = motion->q + t * model->nq;
+      q[0] = 0.1 + 0.1 * (sin(angle) - cos(angle)) + 0.02 * k * t * h, q[2] = 0.1 * (cos(angle) + sin(angle));
+      q[3] = cos(angle / 2), q[5] = sin(angle / 2);
+    }
+    cav_quality q = measure(model, motion);
+    CHECK_NEAR(q.skating, 2 * k, 1e-9);
+    CHECK_NEAR(q.skating_step, 2 * k, 1e-9);
+    CHECK_NEAR(q.skating_fraction, 100 * k, 0);
+    cav_trajectory_free(motion);
+  }
+  cav_model_free(model);
+}
+
+// a box that goes 2.5 mm to and fro, a step each way and a step of rest between, slides by that over frames of two steps
+static void test_frame(void) {
+  cav_model *model = parse(box_text);
+  cav_trajectory *motion = cav_trajectory_new(model, KNOTS, h);
+  for (int t = 0; t < KNOTS; t++)
+    motion->q[t * model->nq] = 0.0025 * (t % 4 == 1 || t % 4 == 2), motion->q[t * model->nq + 2] = 0.1;
+  cav_quality q = measure(model, motion);
+  CHECK_NEAR(q.skating_step, 12.5, 1e-9);
+  CHECK_NEAR(q.skating, 6.25, 1e-9);
+  CHECK_NEAR(q.skating_step_fraction, 100.0 * 10 / 19, 1e-9);
+  CHECK_NEAR(q.skating_fraction, 100, 1e-9);
+  cav_trajectory_free(motion);
+  cav_model_free(model);
+}
+
 // what friction cannot brake is the distance of the force from its cone: (a/g - mu)/sqrt(1 + mu^2)
 static void test_friction(void) {
   cav_model *model = parse(box_text);
@@ -149,6 +219,9 @@ static void test_refusals(void) {
 
 int main(void) {
   test_box();
+  test_rolling();
+  test_edge();
+  test_frame();
   test_friction();
   test_effort();
   test_folded();

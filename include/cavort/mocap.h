@@ -140,8 +140,10 @@ CAV_API cav_status cav_ik_sizes(cav_model *model, const cav_record *record, cav_
   X(penetration, "mm", 10, "deepest of a body in what it is not jointed to the model with (the floor)")     \
   X(penetration_fraction, "%", 0, "knots with more than 10 mm of it")                                       \
   X(self_penetration, "mm", NAN, "deepest of two bodies of one tree in each other")                         \
-  X(skating, "cm/s", NAN, "fastest slide of a contact, within 5 mm at both ends of a step")                 \
-  X(skating_fraction, "%", 0, "steps in contact with a slide of more than 1 cm/s")                          \
+  X(skating, "cm/s", NAN, "fastest slide of what touches, within 5 mm, over a frame of 1/30 s; rolling is none") \
+  X(skating_fraction, "%", 0, "frames in contact with a slide of more than 1 cm/s")                         \
+  X(skating_step, "cm/s", NAN, "the same over a single step")                                                    \
+  X(skating_step_fraction, "%", NAN, "steps in contact with one of more than 1 cm/s")                            \
   X(floating, "mm", 20, "highest above all, while the centre of mass moves as if more than g/2 were borne") \
   X(floating_fraction, "%", 0, "knots more than 20 mm above all meanwhile")                                 \
   X(jerk, "m/s^3", NAN, "of the centres of mass of links, rms")                                             \

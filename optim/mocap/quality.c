@@ -7,11 +7,13 @@
 
 #include "file.h"
 #include "math3.h"
+#include "slide.h"
 #include "support.h"
 
 static const double deep = 0.01, touching = 0.005, afloat = 0.02; // m
 static const double look = 0.05;                                  // m: contacts are listed up to this gap
 static const double sliding = 0.01;                               // m/s
+static const double frame = 1.0 / 30;                             // s: over which motions are seen to skate
 static const double borne = 0.5;                                  // of gravity
 
 static const cav_quality_rule rules[] = {
@@ -30,57 +32,17 @@ typedef struct measure {
   const cav_trajectory *motion;
   cav_quality *quality;
   cav_support *support;
-  cav_state *state;    // lists contacts up to the look
-  cav_contact *before; // contacts of the knot before
-  cav_pose *pose;      // [nlink] links at it
-  int nbefore, room;
+  cav_state *state; // lists contacts up to the look
+  cav_slide *slide;
   double *com, *links; // [nknot*3] of all; [nknot*nlink*3]
   double *lowest;      // [nknot] least gap to what is external, at most the look
-  int steps_in_contact;
 } measure;
 
 static const double *row(const double *rows, int t, int n) { return rows + (size_t)t * (size_t)n; }
 
-// fastest slide of the contacts of the knot before that are still there; *any: there is one
-static double slide(const measure *m, int *any) {
-  double most = 0;
-  for (int i = 0; i < m->nbefore; i++) {
-    const cav_contact *c = &m->before[i];
-    double at[2][3], way[3], local[3];
-    if (c->dist > touching || !m->model->pair[c->pair].external) continue;
-    for (int k = 0; k < 2; k++) {
-      int link = k ? c->link2 : c->link1;
-      sub3(way, c->pos, m->pose[link].pos);
-      rotate_back(local, m->pose[link].rotation, way);
-      transform(at[k], m->state->link[link].pos, m->state->link[link].rotation, local);
-    }
-    sub3(way, at[1], at[0]);
-    // the normal of the knot before: what it moves along that opens or closes
-    double normal = dot3(c->frame, way);
-    if (c->dist + normal > touching) continue;
-    *any = 1;
-    axpy3(way, way, -normal, c->frame);
-    most = fmax(most, norm3(way) / m->motion->timestep);
-  }
-  return most;
-}
-
-static cav_status keep_contacts(measure *m) {
-  if (m->state->ncontact > m->room) {
-    cav_contact *larger = realloc(m->before, 2 * (size_t)m->state->ncontact * sizeof *larger);
-    if (!larger) return CAV_NO_MEMORY;
-    m->before = larger, m->room = 2 * m->state->ncontact;
-  }
-  m->nbefore = m->state->ncontact;
-  if (m->nbefore) memcpy(m->before, m->state->contact, (size_t)m->nbefore * sizeof *m->before);
-  memcpy(m->pose, m->state->link, (size_t)m->model->nlink * sizeof *m->pose);
-  return CAV_OK;
-}
-
 static cav_status measure_knot(measure *m, int t) {
   cav_quality *q = m->quality;
   double depth = 0, least = look;
-  int any = 0;
   cav_status status = cav_position(m->model, m->state, row(m->motion->q, t, m->motion->nq));
   if (status) return status;
   for (int i = 0; i < m->state->ncontact; i++) {
@@ -93,16 +55,25 @@ static cav_status measure_knot(measure *m, int t) {
   m->lowest[t] = least;
   q->penetration = fmax(q->penetration, 1e3 * depth);
   q->penetration_fraction += depth > deep;
-  if (t > 0) {
-    double speed = slide(m, &any);
-    m->steps_in_contact += any;
-    q->skating = fmax(q->skating, 100 * speed), q->skating_fraction += speed > sliding;
-  }
   double *com = m->com + 3 * t;
   cav_momentum(m->model, m->state, row(m->motion->v, t, m->motion->nv), com, NULL, NULL);
   memcpy(m->links + 3 * (size_t)t * (size_t)m->model->nlink, m->state->com,
          3 * (size_t)m->model->nlink * sizeof *m->links);
-  return keep_contacts(m);
+  return cav_slide_add(m->slide, m->state);
+}
+
+// fastest slide over so many steps, cm/s, and how many of them, of those that something touches through, slide, %
+static void measure_skating(const measure *m, int steps, double *fastest, double *fraction) {
+  double time = steps * m->motion->timestep;
+  int touched = 0, slid = 0;
+  for (int t = 0; t + steps < m->motion->nknot; t++) {
+    double way;
+    if (!cav_slide_over(m->slide, t, steps, &way)) continue;
+    touched++;
+    slid += way > sliding * time;
+    *fastest = fmax(*fastest, 100 * way / time);
+  }
+  *fraction = touched ? 100.0 * slid / touched : 0;
 }
 
 // third differences of places
@@ -157,7 +128,10 @@ static cav_status run(measure *m) {
   if (status) return status;
   cav_quality *q = m->quality;
   q->penetration_fraction *= 100.0 / n;
-  q->skating_fraction *= m->steps_in_contact ? 100.0 / m->steps_in_contact : 0;
+  // of as many steps as make a frame, and of one
+  measure_skating(m, (int)fmax(1, fmin(n - 1, ceil(frame / m->motion->timestep - 1e-6))), &q->skating,
+                  &q->skating_fraction);
+  measure_skating(m, 1, &q->skating_step, &q->skating_step_fraction);
   q->jerk = jerk(m);
   measure_floating(m);
   q->floating_fraction *= 100.0 / (n - 2);
@@ -176,9 +150,9 @@ cav_status cav_quality_measure(const cav_model *model, const cav_trajectory *mot
   size_t n = (size_t)motion->nknot;
   m.state = cav_state_new(model);
   m.support = cav_support_new(model, law, motion->timestep);
-  m.pose = malloc((size_t)model->nlink * sizeof *m.pose);
+  m.slide = cav_slide_new(model, motion->nknot);
   m.com = malloc(n * (4 + 3 * (size_t)model->nlink) * sizeof *m.com);
-  cav_status status = copy && m.state && m.support && m.pose && m.com ? CAV_OK : CAV_NO_MEMORY;
+  cav_status status = copy && m.state && m.support && m.slide && m.com ? CAV_OK : CAV_NO_MEMORY;
   if (!status) {
     m.lowest = m.com + 3 * n, m.links = m.lowest + n;
     cav_trajectory_velocities(model, copy);
@@ -189,6 +163,7 @@ cav_status cav_quality_measure(const cav_model *model, const cav_trajectory *mot
   cav_trajectory_free(copy);
   cav_state_free(m.state);
   cav_support_free(m.support);
-  free(m.pose), free(m.before), free(m.com);
+  cav_slide_free(m.slide);
+  free(m.com);
   return status;
 }
