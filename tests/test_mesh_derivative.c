@@ -33,7 +33,7 @@ static const char *round_rock(void) {
   return points;
 }
 
-static void test_shape(const char *points, const char *type, const char *attributes) {
+static void test_shape(cav_next_gap next_gap, const char *points, const char *type, const char *attributes) {
   char model_text[TEXT];
   snprintf(model_text, sizeof model_text, text, points, type, attributes);
   cav_model *m = scene_load(model_text);
@@ -42,6 +42,7 @@ static void test_shape(const char *points, const char *type, const char *attribu
   state->options.stabilisation = CAV_STABILISATION_DISCRETE;
   state->options.smoothing = 0.02;
   state->options.smoothing_self = 0.01;
+  state->options.next_gap = next_gap;
   int nv = m->nv, contacts = 0, kinks = 0, columns = 0;
   size_t block = (size_t)nv * (size_t)nv;
   double *q = scene_vector(m->nq), *v = scene_vector(nv), *next = scene_vector(nv), *J = scene_vector(6 * (int)block);
@@ -213,8 +214,9 @@ int main(void) {
       {"cylinder", "size='.06 .08'"}, {"ellipsoid", "size='.06 .09 .12'"}, {"mesh", "mesh='rock'"},
   };
   for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
-    test_shape(rock, shapes[i][0], shapes[i][1]);
-    test_shape(round_rock(), shapes[i][0], shapes[i][1]);
+    test_shape(CAV_NEXT_GAP_LINEAR, rock, shapes[i][0], shapes[i][1]);
+    test_shape(CAV_NEXT_GAP_LINEAR, round_rock(), shapes[i][0], shapes[i][1]);
+    test_shape(CAV_NEXT_GAP_EXACT, rock, shapes[i][0], shapes[i][1]);
     test_history(rock, shapes[i][0], shapes[i][1]);
     test_history(round_rock(), shapes[i][0], shapes[i][1]);
   }

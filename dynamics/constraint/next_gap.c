@@ -143,10 +143,37 @@ static int is_distance(const cav_geom *first, const cav_geom *second, int featur
       return (second->type == CAV_GEOM_CAPSULE || second->type == CAV_GEOM_MESH) && feature == 0;
     case CAV_GEOM_BOX:
     case CAV_GEOM_MESH:
+    case CAV_GEOM_CYLINDER:
+    case CAV_GEOM_ELLIPSOID:
       return second->type == CAV_GEOM_MESH && feature == 0;
     default:
       return 0;
   }
+}
+
+// the same of a point over a face of one of two bodies; 0: it is none
+static int over_face(const cav_contact *c, cav_pair_manifolds *m, cav_next_contact *out) {
+  if (m->faces < 0) m->faces = cav_face_points(&m->a, &m->b, out->margin, m->face);
+  int i = 0;
+  while (i < m->faces && m->face[i].feature != c->feature) i++;
+  if (i == m->faces) return 0;
+  const cav_face_point *p = &m->face[i];
+  double arm[3];
+  sub3(arm, p->place, out->pos);
+  for (int k = 0; k < 6; k++) {
+    double twist[6] = {0}, move[3];
+    twist[k] = p->on_b ? -1 : 1;
+    cav_face_point_move(p, twist, arm, move);
+    out->gradient[k] = dot3(p->normal, move);
+  }
+  return 1;
+}
+
+// whether a contact bears nothing, and nothing near where it is either: beyond where the law of meshes ends
+static int is_idle(const cav_state *state, const cav_contact *c) {
+  int idle = state->options.smoothing > 0 && c->impulse[0] == 0;
+  for (int k = 1; k < c->dim; k++) idle &= c->impulse[k] == 0;
+  return idle;
 }
 
 // the gradient of the gap there. Where points come and go that of one that moves with the second geom
@@ -157,11 +184,13 @@ static void fill_gradient(const cav_model *model, const cav_state *state, const 
   zero3(out->gradient);
   copy3(out->gradient + 3, out->normal);
   if (out->by_next == 0 || is_distance(first, second, c->feature)) return;
+  if (has_mesh(first, second) && is_idle(state, c)) return;
   if (m->pair != c->pair || m->margin < out->margin) {
     cav_manifolds_start(m, c->pair, fmin(1, fmin(first->bound, second->bound)), out->margin);
     place(model, state->work->next->link, first, &m->a);
     place(model, state->work->next->link, second, &m->b);
   }
+  if (has_mesh(first, second) && first->type != CAV_GEOM_PLANE && over_face(c, m, out)) return;
   cav_touch here, rate[6];
   if (!cav_touch_rates(m, out->pos, c->feature, &here, rate)) return;
   for (int k = 0; k < 6; k++) out->gradient[k] = rate[k].dist;

@@ -236,17 +236,6 @@ static int nearest_points(const cav_contact *c, const cav_shape *a, const cav_sh
   return 1;
 }
 
-// a point over a face, from the body that has the face: how it moves with a unit twist of the other one
-static void over_face(const cav_face_point *p, const double twist[6], const double arm[3], double move[3]) {
-  copy3(move, twist + 3);
-  cross_add3(move, twist, arm);
-  axpy3(move, move, dot3(p->turning, twist), p->roll);
-  // over a side of the face it slides along the other body's side, over a corner it only rises
-  double along = dot3(p->side, p->over), square = dot3(p->face, p->normal);
-  if (along != 0) axpy3(move, move, -dot3(p->over, move) / along, p->side);
-  if (square != 0) scale3(move, dot3(p->face, move) / square, p->normal);
-}
-
 // points over a face of one of two polyhedra: those of the other move against it, the direction with it
 static int face_point(const cav_contact *c, const cav_pair_manifolds *m, geometry *g) {
   const cav_face_point *p = NULL;
@@ -260,7 +249,7 @@ static int face_point(const cav_contact *c, const cav_pair_manifolds *m, geometr
     double twist[6], other[6], move[3];
     unit(twist, k);
     scale6(other, back, twist);
-    over_face(p, other, arm, move);
+    cav_face_point_move(p, other, arm, move);
     g->dist[k] = dot3(p->normal, move);
     axpy3(g->pos[k], move, -g->dist[k] / 2, p->normal);
     if (!p->on_b) continue;

@@ -65,6 +65,9 @@ typedef struct cav_face_point {
 
 enum { CAV_FACE_POINTS = 64 };
 
+/// How one moves, seen from the body that has the face, with a twist of the other one about a point that is arm before its place.
+void cav_face_point_move(const cav_face_point *p, const double twist[6], const double arm[3], double move[3]);
+
 /// Points over a face as cav_collide_convex makes them, before they are thinned out. 0: there is no face, or a cylinder
 /// stands upright on it. polytope.c.
 int cav_face_points(const cav_shape *a, const cav_shape *b, double margin, cav_face_point point[CAV_FACE_POINTS]);

@@ -468,6 +468,16 @@ int cav_face_points(const cav_shape *a, const cav_shape *b, double margin, cav_f
   return s.lying.n;
 }
 
+void cav_face_point_move(const cav_face_point *p, const double twist[6], const double arm[3], double move[3]) {
+  copy3(move, twist + 3);
+  cross_add3(move, twist, arm);
+  axpy3(move, move, dot3(p->turning, twist), p->roll);
+  // over a side of the face it slides along the other body's side, over a corner it only rises
+  double along = dot3(p->side, p->over), square = dot3(p->face, p->normal);
+  if (along != 0) axpy3(move, move, -dot3(p->over, move) / along, p->side);
+  if (square != 0) scale3(move, dot3(p->face, move) / square, p->normal);
+}
+
 static int touch_single(const contact_pair *g, double dist, cav_touch *touch) {
   double x[3], y[3];
   axpy3(x, g->separation.x, g->radius_a, g->separation.n);
