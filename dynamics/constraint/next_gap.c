@@ -184,13 +184,13 @@ static void fill_gradient(const cav_model *model, const cav_state *state, const 
   zero3(out->gradient);
   copy3(out->gradient + 3, out->normal);
   if (out->by_next == 0 || is_distance(first, second, c->feature)) return;
-  if (has_mesh(first, second) && is_idle(state, c)) return;
+  if (cav_pair_has_mesh(model, pair) && is_idle(state, c)) return;
   if (m->pair != c->pair || m->margin < out->margin) {
     cav_manifolds_start(m, c->pair, fmin(1, fmin(first->bound, second->bound)), out->margin);
     place(model, state->work->next->link, first, &m->a);
     place(model, state->work->next->link, second, &m->b);
   }
-  if (has_mesh(first, second) && first->type != CAV_GEOM_PLANE && over_face(c, m, out)) return;
+  if (cav_pair_has_mesh(model, pair) && first->type != CAV_GEOM_PLANE && over_face(c, m, out)) return;
   cav_touch here, rate[6];
   if (!cav_touch_rates(m, out->pos, c->feature, &here, rate)) return;
   for (int k = 0; k < 6; k++) out->gradient[k] = rate[k].dist;
