@@ -67,7 +67,8 @@ static int fill(cav_solution *solution, const cav_problem *problem) {
                                           .iterations = 7,
                                           .cost = 2,
                                           .unactuated = NAN,
-                                          .outcome = CAV_OUTCOME_AGAIN};
+                                          .outcome = CAV_OUTCOME_AGAIN,
+                                          .seconds = 1.5};
   solution->nrow = 2;
   solution->row = calloc(2, sizeof *solution->row);
   if (!solution->row) return 0;
@@ -326,7 +327,7 @@ int main(void) {
     // the model is two folders up: the folder and the model may move together
     CHECK(strstr(read_file("problem.xml"), "model=\"../../box.xml\"") != NULL);
     CHECK(strstr(read_file("log.csv"), "2,multipliers,1,,0,") != NULL);
-    CHECK(strstr(read_file("stages.csv"), "multipliers,1,0.5,7,2,,0,again\n") != NULL);
+    CHECK(strstr(read_file("stages.csv"), "multipliers,1,0.5,7,2,,0,again,1.5\n") != NULL);
     check_read_back(&solution);
     check_forces(problem, &solution);
     check_verdict(problem);

@@ -163,6 +163,7 @@ typedef struct cav_stage_record {
   int iterations;                     ///< that it took
   double cost, unactuated, violation; ///< as in cav_progress
   cav_outcome outcome;                ///< how it ended
+  double seconds;                     ///< since the one before it ended, wall clock
 } cav_stage_record;
 
 /// Where a constraint row comes from.

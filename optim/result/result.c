@@ -162,13 +162,13 @@ static cav_status write_stages(const char *path, const cav_solution *solution, c
   cav_file file;
   cav_status status = cav_file_begin(&file, path, error);
   if (status) return status;
-  fputs("phase,stage,fraction,iterations,cost,unactuated,violation,outcome\n", file.stream);
+  fputs("phase,stage,fraction,iterations,cost,unactuated,violation,outcome,seconds\n", file.stream);
   for (int i = 0; i < solution->nstage; i++) {
     const cav_stage_record *s = &solution->stage[i];
     const double value[3] = {s->cost, s->unactuated, s->violation};
     fprintf(file.stream, "%s,%d,%.6g,%d", s->phase, s->stage, s->fraction, s->iterations);
     for (int k = 0; k < 3; k++) fputc(',', file.stream), cav_table_write_number(file.stream, value[k]);
-    fprintf(file.stream, ",%s\n", outcome[s->outcome]);
+    fprintf(file.stream, ",%s,%.3g\n", outcome[s->outcome], s->seconds);
   }
   return cav_file_end(&file, error);
 }

@@ -111,6 +111,8 @@ int cav_run_note(cav_solve_run *run, double fraction, int begin, cav_outcome out
   line.unactuated = cav_transcription_unactuated(run->tr, NULL);
   line.violation = cav_transcription_violation(run->tr);
   line.outcome = outcome;
+  line.seconds = cav_clock() - run->noted;
+  run->noted += line.seconds;
   if (!run->quiet && !cav_solution_note(run->solution, &line)) run->failed = CAV_NO_MEMORY;
   return run->failed == CAV_OK;
 }

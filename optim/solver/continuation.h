@@ -23,6 +23,7 @@ typedef struct cav_solve_run {
   cav_status failed;            ///< what went wrong in the report, CAV_OK: nothing
   cav_error refusal;            ///< of a quantity of one's own, which ended the solve
   double start;                 ///< s
+  double noted;                 ///< s, when the last stage ended
   double deadline;              ///< s, infinite: none
   int begin;                    ///< iterations before this call
   const cav_checkpoint *resume; ///< where it goes on, until it has come there; NULL: it has

@@ -63,7 +63,7 @@ void cav_optimiser_free(cav_optimiser *o) {
 /// Counts and clock of a call.
 static void begin(cav_optimiser *o) {
   cav_solve_run *run = &o->run;
-  run->start = cav_clock();
+  run->start = run->noted = cav_clock();
   run->deadline = o->options.max_seconds > 0 ? run->start + o->options.max_seconds : INFINITY;
   run->begin = run->solution->iterations;
   run->failed = CAV_OK;

@@ -194,7 +194,7 @@ static cav_status take_start(cav_solve_run *run) {
 
 cav_status cav_run_open(cav_solve_run *run, const cav_problem *problem, const cav_solve_options *options,
                         const cav_trajectory *start, cav_error *error) {
-  *run = (cav_solve_run){.problem = problem, .options = options, .start = cav_clock()};
+  *run = (cav_solve_run){.problem = problem, .options = options, .start = cav_clock(), .noted = cav_clock()};
   run->deadline = options->max_seconds > 0 ? run->start + options->max_seconds : INFINITY;
   cav_status status = check(problem, options, start, error);
   if (status != CAV_OK) return status;
