@@ -329,7 +329,8 @@ static double reach(const cav_model *model, const cav_state *state, int p, doubl
   const double *place = cache->centre[c->second];
   double now = speed_between(state, w->velocity_now, a->geom->link, b->geom->link, place, radius, &turn[0]);
   double next = speed_between(state, state->velocity_next, a->geom->link, b->geom->link, place, radius, &turn[1]);
-  int after = state->options.next_gap == CAV_NEXT_GAP_EXACT, slips = state->options.next_slip == CAV_NEXT_SLIP_EXACT;
+  int after = state->options.next_gap == CAV_NEXT_GAP_EXACT && cav_sees_next_gap(model, pair);
+  int slips = state->options.next_slip == CAV_NEXT_SLIP_EXACT;
   double h = state->options.timestep, stiff = w->discrete_stiffness, kept_gap = after ? fmax(0, 1 / h - stiff) : 0;
   if (after || slips) next = fmax(next, way_between(state, a->geom, b->geom, slips ? 0.5 * fmax(margin, 0) : 0) / h);
   // under Coulomb's law the normal row is alone, and where it bears nothing neither does friction

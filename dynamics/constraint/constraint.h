@@ -160,6 +160,9 @@ cav_status cav_next_knot_new(const cav_model *model, cav_state *state);
 void cav_next_knot_free(cav_next_knot *next);
 size_t cav_next_knot_bytes(const cav_next_knot *next);
 
+/// Whether contacts of a pair see the gap after the step, where the options ask for it. next_gap.c.
+int cav_sees_next_gap(const cav_model *model, const cav_pair *pair);
+
 /// Links at q (+) h v_next of the workspace's q. next_knot.c.
 void cav_next_links_place(const cav_model *model, cav_state *state, const double *v_next);
 

@@ -8,7 +8,8 @@
 /// A distance tells no side once a geom is through the other, nor through its edge: from a tenth of the geoms' thickness
 /// deep on, by the linear gap, which does, the linear gap takes over, all of it at 0.35 of the thickness. Planes and
 /// height fields have no other side; a mesh is given no thickness of its own. Where the point is gone after the step
-/// (edges, faces and manifolds have points that come and go), the linear gap stands too.
+/// (edges, faces and manifolds have points that come and go), the linear gap stands too. Between links of one tree, which nothing
+/// stands on, a mesh has the linear gap alone: points that come and go within a step gave steps several solutions, or none.
 #include <math.h>
 
 #include "constraint.h"
@@ -37,6 +38,10 @@ static double inner_radius(const cav_geom *geom) {
       break;
   }
   return 0;
+}
+
+int cav_sees_next_gap(const cav_model *model, const cav_pair *pair) {
+  return pair->external || !cav_pair_has_mesh(model, pair);
 }
 
 // how far the linear gap leaves the other one its say, 0 to 1, and the derivative
@@ -111,7 +116,7 @@ static void look(const cav_model *model, cav_state *state, const cav_contact *c,
   const cav_geom *first = &model->geom[pair->geom1], *second = &model->geom[pair->geom2];
   const double h = state->options.timestep, linear = c->dist + h * c->velocity_next[0];
   double derivative, weight = trust(linear, inner_radius(first) + inner_radius(second), &derivative);
-  if (weight == 0) return;
+  if (weight == 0 || !cav_sees_next_gap(model, pair)) return;
   double margin = margin_of(model, state, c);
   seek(model, state, c, margin, s);
   int k = 0;

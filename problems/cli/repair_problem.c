@@ -43,6 +43,7 @@ cav_status cav_command_write_repair(const char *folder, const char *model_path, 
         "  </cost>\n"
         "  <schedule stages=\"8\" next_gap=\"exact\" next_slip=\"exact\">\n"
         "    <first softness=\"0.5\" smoothing=\"0.01\"/>\n"
+        "    <last smoothing_self=\"0.0003\"/>\n"
         "  </schedule>\n"
         "</problem>\n",
         file.stream);
