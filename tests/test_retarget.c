@@ -158,6 +158,45 @@ static void test_feet(void) {
   cav_model_free(m);
 }
 
+// arms that swing through the body, one of which is elsewhere for a frame: they go round it, and do not follow the jump
+static void test_smooth(void) {
+  cav_model *m = load("humanoid");
+  cav_marker_set *set = read_set(m);
+  cav_ik_options options = cav_ik_options_default();
+  cav_quality quality[2];
+  double *q = still(m), most[2] = {0};
+  for (int t = 0; t < FRAMES; t++)
+    for (int j = 0; j < m->njoint; j++) {
+      const cav_joint *joint = &m->joint[j];
+      double *at = q + (size_t)t * (size_t)m->nq + joint->q;
+      if (strstr(joint->name, "shoulder") || strstr(joint->name, "elbow"))
+        *at = (joint->range[0] + joint->range[1]) / 2 + 0.3 * (joint->range[1] - joint->range[0]) * sin(0.1 * t + j);
+      if (t == FRAMES / 2 && !strcmp(joint->name, "elbow_right")) *at += *at > -0.8 ? -0.7 : 0.7;
+    }
+  cav_record *r = record_of(m, set, q, 1);
+  cav_trajectory *motion[2] = {cav_trajectory_new(m, FRAMES, 1 / rate), NULL};
+  memcpy(motion[0]->q, q, FRAMES * (size_t)m->nq * sizeof *q);
+  cav_trajectory_velocities(m, motion[0]);
+  CHECK(!cav_ik(m, r, set, &options, &motion[1], NULL, NULL));
+  for (int k = 0; k < 2 && motion[1]; k++) {
+    CHECK(!cav_quality_measure(m, motion[k], NULL, &quality[k], NULL));
+    for (int t = 2; t + 2 < FRAMES; t++)
+      for (int d = 6; d < m->nv; d++) {
+        const double *v = motion[k]->v + (size_t)t * (size_t)m->nv + (size_t)d;
+        most[k] = fmax(most[k], rate * fabs(v[m->nv] - v[0]));
+      }
+  }
+  printf("arms through the body: %.1f mm deep and %.0f rad/s^2, fitted %.3f mm and %.0f rad/s^2\n",
+         quality[0].self_penetration, most[0], quality[1].self_penetration, most[1]);
+  CHECK(quality[0].self_penetration > 20 && quality[1].self_penetration < 0.1);
+  CHECK(most[1] < 0.6 * most[0]);
+  cav_trajectory_free(motion[0]), cav_trajectory_free(motion[1]);
+  cav_record_free(r);
+  cav_marker_set_free(set);
+  free(q);
+  cav_model_free(m);
+}
+
 static void test_refusals(void) {
   static const struct {
     const char *text, *expected;
@@ -224,6 +263,7 @@ int main(void) {
   test_similar();
   test_scale();
   test_feet();
+  test_smooth();
   test_refusals();
   test_written();
   char command[80];

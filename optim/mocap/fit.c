@@ -58,8 +58,10 @@ cav_status cav_fit_cost(const cav_fit *fit, int frame, const double *q, const do
   }
   for (int f = 0; f < fit->nfoot; f++) {
     int rows = cav_fit_floor_rows(fit, frame, f);
-    for (int k = 0; k < rows; k++) *cost += fit->firm * fit->options->floor * pow(fit->point[3 * k + 2], 2) / 2;
+    double clear = cav_fit_clear(fit, frame, f);
+    for (int k = 0; k < rows; k++) *cost += fit->firm * fit->options->floor * pow(fit->point[3 * k + 2] - clear, 2) / 2;
   }
+  *cost += cav_fit_apart_cost(fit);
   cav_difference(m, m->q0, q, 1, fit->move);
   for (int d = 0; d < m->nv; d++) *cost += pow(holds(fit, d) * fit->move[d], 2) / 2;
   if (!before) return CAV_OK;
@@ -87,13 +89,13 @@ static void add_marker(const cav_fit *fit, int frame, int i) {
   }
 }
 
-// the height of a point of a foot
-static void add_height(const cav_fit *fit, int f, const double x[3]) {
+// the height of a point of a foot over what it keeps from the floor
+static void add_height(const cav_fit *fit, int f, const double x[3], double clear) {
   const cav_model *m = fit->model;
   double a[3], b[3], w = fit->firm * fit->options->floor;
   for (int d = cav_fit_last_dof(m, fit->foot[f]); d >= 0; d = m->dof[d].parent) {
     cav_fit_column(fit, d, x, a);
-    fit->g[d] += w * a[2] * x[2];
+    fit->g[d] += w * a[2] * (x[2] - clear);
     for (int e = d; e >= 0; e = m->dof[e].parent) {
       cav_fit_column(fit, e, x, b);
       fit->H[(size_t)e * (size_t)m->nv + (size_t)d] += w * a[2] * b[2];
@@ -109,8 +111,9 @@ void cav_fit_normal(const cav_fit *fit, int frame, const double *q, const double
   for (int i = 0; i < fit->n; i++) add_marker(fit, frame, i);
   for (int f = 0; f < fit->nfoot; f++) {
     int rows = cav_fit_floor_rows(fit, frame, f);
-    for (int k = 0; k < rows; k++) add_height(fit, f, fit->point + 3 * k);
+    for (int k = 0; k < rows; k++) add_height(fit, f, fit->point + 3 * k, cav_fit_clear(fit, frame, f));
   }
+  cav_fit_apart_normal(fit);
   cav_difference(m, m->q0, q, 1, fit->move);
   for (size_t d = 0; d < nv; d++) {
     double w = pow(holds(fit, (int)d), 2);

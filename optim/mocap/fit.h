@@ -20,7 +20,11 @@ typedef struct cav_fit {
   int nfoot, foot[CAV_FIT_FEET]; ///< bodies
   char *stands;                  ///< [nframe*CAV_FIT_FEET] 1: that foot stands, 2: on all of its sole
   double *point;                 ///< [CAV_FIT_POINTS * geoms of a foot + CAV_FIT_CORNERS][3] of its rows
+  int ncorner[CAV_FIT_FEET];     ///< of its sole, fixed in the body; 0: found anew in every posture
+  double corner[CAV_FIT_FEET][CAV_FIT_CORNERS][3];
   char *planted;                 ///< [nframe*n] 1: that marker of a foot is held where it is; NULL: none is
+  double *apart;                 ///< [npair] m that links of a pair within a tree are held apart; NULL: they are not
+  double *clear;                 ///< [nframe*CAV_FIT_FEET] m that a foot keeps from the floor; NULL: 0
   double firm;                   ///< times the weight of markers that are planted, and of feet on the floor
   double *H, *g, *try, *move;    ///< [nv*nv] lower, by columns; [nv]; [nq]; [nv]
 } cav_fit;
@@ -72,6 +76,18 @@ cav_status cav_fit_retarget(cav_fit *fit, double **made, double *scale, cav_erro
 /// Rows of foot f at a frame, each the height of a point, into fit->point: four corners of a sole that stands; else every end
 /// or corner that is below the floor, or the lowest point of a foot that stands above it. Returns how many. floor.c.
 int cav_fit_floor_rows(const cav_fit *fit, int frame, int f);
+
+/// How far a foot keeps from the floor at a frame.
+static inline double cav_fit_clear(const cav_fit *fit, int frame, int f) {
+  return fit->clear ? fit->clear[frame * CAV_FIT_FEET + f] : 0;
+}
+
+/// Half the squares of what links are too near to each other at the state's position, and H and g of it. smooth.c.
+double cav_fit_apart_cost(const cav_fit *fit);
+void cav_fit_apart_normal(const cav_fit *fit);
+
+/// Configurations q [nframe*nq] of all frames to the least cost of all rows and of accelerations, links apart. smooth.c.
+cav_status cav_fit_smooth(cav_fit *fit, double *q, int *iterations);
 
 /// Half the squares of all rows at q: markers seen, feet, posture, and the change from before (NULL: none). Leaves the
 /// state at q.

@@ -9,11 +9,12 @@
 #include "math3.h"
 #include "role.h"
 
-static const double still = 0.25; // m/s
-static const double low = 0.06;   // m above the lowest place of a marker in the clip
-static const double bend = 1e-6;  // of a direction, for the point of a geom that is farthest along it
-static const double tilt = 0.1;   // of a floor along x and y that a corner of a sole would touch first
-static const double same = 0.03;  // of a body's height: parts of one foot are as low within it
+static const double still = 0.25;      // m/s
+static const double low = 0.06;        // m above the lowest place of a marker in the clip
+static const double bend = 1e-6;       // of a direction, for the point of a geom that is farthest along it
+static const double tilt = 0.1;        // of a floor along x and y that a corner of a sole would touch first
+static const double same = 0.03;       // of a body's height: parts of one foot are as low within it
+static const double clear_most = 0.02; // m
 enum { FLAT = 2 };
 
 // how far a geom reaches along a direction of any length, times that
@@ -84,6 +85,14 @@ int cav_fit_stands(const cav_fit *fit, int frame, int i, double least, double ti
   return seen && speed(fit, frame, i) < times * still && seen[2] < least + low;
 }
 
+// how far a foot keeps from the floor: not at all while one of its markers is nearly still, clear_most where all are fast
+static double clear_of(const cav_fit *fit, int frame, int foot) {
+  double least = INFINITY;
+  for (int i = 0; i < fit->n; i++)
+    if (fit->set->marker[fit->marker[i]].body == fit->foot[foot]) least = fmin(least, speed(fit, frame, i));
+  return isfinite(least) ? clear_most * fmin(fmax(least / still - 2, 0) / 2, 1) : 0;
+}
+
 // how a foot stands at a frame, by its markers
 static int stand_of(const cav_fit *fit, int frame, int foot, const double *least) {
   int seen = 0, standing = 0;
@@ -139,6 +148,24 @@ cav_status cav_fit_feet(cav_fit *fit) {
   return fit->point ? CAV_OK : CAV_NO_MEMORY;
 }
 
+// Corners of soles as the posture of the file has them. Another body's foot may not come flat on the floor, and which of its
+// points a tilted floor would touch first then jumps
+static cav_status find_corners(cav_fit *fit) {
+  cav_status status = cav_position(fit->model, fit->state, fit->model->q0);
+  for (int f = 0; f < fit->nfoot && !status; f++) {
+    cav_pose pose;
+    cav_object_pose(fit->model, fit->state, CAV_OBJECT_XBODY, fit->foot[f], &pose);
+    for (int k = 0; k < CAV_FIT_CORNERS; k++) {
+      const double down[3] = {k & 1 ? tilt : -tilt, k & 2 ? tilt : -tilt, -1};
+      double point[3];
+      if (!farthest_point(fit, fit->foot[f], down, point)) continue;
+      sub3(point, point, pose.pos);
+      rotate_back(fit->corner[f][fit->ncorner[f]++], pose.rotation, point);
+    }
+  }
+  return status;
+}
+
 cav_status cav_fit_floor(cav_fit *fit) {
   cav_status status = cav_fit_feet(fit);
   if (status) return status;
@@ -149,7 +176,14 @@ cav_status cav_fit_floor(cav_fit *fit) {
     for (int f = 0; f < fit->nfoot; f++) fit->stands[t * CAV_FIT_FEET + f] = (char)stand_of(fit, t, f, least);
   status = fit->stands && least ? CAV_OK : CAV_NO_MEMORY;
   free(least);
-  return status;
+  // of another body a foot that swings low would be put onto the floor, and skate
+  if (status || !fit->planted) return status;
+  status = find_corners(fit);
+  if (status) return status;
+  fit->clear = malloc((size_t)fit->nframe * CAV_FIT_FEET * sizeof *fit->clear);
+  for (int t = 0; t < fit->nframe && fit->clear; t++)
+    for (int f = 0; f < fit->nfoot; f++) fit->clear[t * CAV_FIT_FEET + f] = clear_of(fit, t, f);
+  return fit->clear ? CAV_OK : CAV_NO_MEMORY;
 }
 
 // points of a geom that may be its lowest: ends of a capsule, corners of a box; 0: it has none that is known
@@ -170,7 +204,13 @@ static int candidates(const cav_geom *geom, const cav_pose *pose, double point[C
 
 int cav_fit_floor_rows(const cav_fit *fit, int frame, int f) {
   int stands = fit->stands[frame * CAV_FIT_FEET + f], rows = 0;
-  for (int k = 0; k < CAV_FIT_CORNERS && stands == FLAT; k++) {
+  double clear = cav_fit_clear(fit, frame, f);
+  for (int k = 0; k < fit->ncorner[f] && stands == FLAT; k++) {
+    cav_pose pose;
+    cav_object_pose(fit->model, fit->state, CAV_OBJECT_XBODY, fit->foot[f], &pose);
+    transform(fit->point + 3 * rows++, pose.pos, pose.rotation, fit->corner[f][k]);
+  }
+  for (int k = 0; k < CAV_FIT_CORNERS && stands == FLAT && !fit->ncorner[f]; k++) {
     const double down[3] = {k & 1 ? tilt : -tilt, k & 2 ? tilt : -tilt, -1};
     rows += farthest_point(fit, fit->foot[f], down, fit->point + 3 * rows);
   }
@@ -182,9 +222,9 @@ int cav_fit_floor_rows(const cav_fit *fit, int frame, int f) {
     cav_object_pose(fit->model, fit->state, CAV_OBJECT_GEOM, g, &pose);
     int n = candidates(&fit->model->geom[g], &pose, point);
     for (int k = 0; k < n; k++)
-      if (point[k][2] < 0) copy3(fit->point + 3 * rows++, point[k]);
+      if (point[k][2] < clear) copy3(fit->point + 3 * rows++, point[k]);
   }
-  if (rows == 0 && cav_fit_lowest(fit, fit->foot[f], point[0]) && (point[0][2] < 0 || stands))
+  if (rows == 0 && cav_fit_lowest(fit, fit->foot[f], point[0]) && (point[0][2] < clear || stands))
     copy3(fit->point + 3 * rows++, point[0]);
   return rows;
 }

@@ -116,7 +116,10 @@ static cav_status follow(cav_fit *fit, const double *q, cav_trajectory *trajecto
     const double *before = t ? at - nq : NULL;
     memcpy(at, t ? before : q, nq * sizeof *at);
     status = cav_fit_frame(fit, t, before, at, &report->iterations);
-    if (!status) status = cav_position(fit->model, fit->state, at);
+  }
+  if (!status && fit->planted) status = cav_fit_smooth(fit, trajectory->q, &report->iterations);
+  for (int t = 0; t < fit->nframe && !status; t++) {
+    status = cav_position(fit->model, fit->state, trajectory->q + (size_t)t * nq);
     if (!status) note(fit, t, report);
   }
   if (status) return status;
@@ -190,7 +193,7 @@ static cav_status open_fit(cav_fit *fit, const cav_record *record, double **made
 static void close_fit(cav_fit *fit, double *made) {
   cav_state_free(fit->state);
   free(fit->H), free(made), free(fit->marker), free(fit->column), free(fit->stands), free(fit->planted),
-      free(fit->point);
+      free(fit->point), free(fit->apart), free(fit->clear);
 }
 
 cav_status cav_ik(const cav_model *model, const cav_record *record, cav_marker_set *set, const cav_ik_options *options,
