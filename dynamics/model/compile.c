@@ -9,6 +9,7 @@
 #include <stdlib.h>
 
 #include "builder.h"
+#include "driven.h"
 #include "math3.h"
 #include "step.h"
 
@@ -310,7 +311,8 @@ static cav_model *build(cav_builder *b) {
   publish_arrays(b);
   assert(!cav_builder_running(b) || b->text == b->text_end);
   if (cav_builder_running(b)) {
-    cav_status status = cav_reference_weights(b->model);
+    cav_status status = cav_links_drive(b->model);
+    if (status == CAV_OK) status = cav_reference_weights(b->model);
     if (status == CAV_NO_MEMORY)
       cav_spec_no_memory(spec);
     else if (status != CAV_OK)

@@ -200,6 +200,7 @@ typedef struct cav_link {
   int root;          ///< link at the top of its tree (child of the world); 0 for the world
   int joint, njoint; ///< joints in the order in which they act
   int dof, ndof;     ///< dofs: first, count
+  int driven;        ///< 1: an actuator moves its tree, or one that equality constraints or tendons join to it
   double pos[3];     ///< frame in the parent link's frame at zero joint displacement
   double quat[4];    ///< unit quaternion w x y z at q0, in the frame of its parent
   double mass;       ///< kg, of all its bodies

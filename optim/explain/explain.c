@@ -363,7 +363,7 @@ static void tell(const inquiry *in, const cav_binding *row, char *out, size_t si
                                          : 0;
   switch (row->kind) {
     case CAV_BINDING_UNACTUATED:
-      snprintf(out, size, "%s: %.3g of the weight%s", subject, row->value,
+      snprintf(out, size, "%s: %.3g of the weight%s", subject, row->value * cav_force_fraction(in->model, row->object),
                is_line(in->model, row->object) ? "" : " times 0.3 m");
       break;
     case CAV_BINDING_EFFORT:

@@ -16,6 +16,19 @@ const cav_field *cav_stage_fields(int *n) {
   return fields;
 }
 
+// whether something that no actuator moves may slide: a box that is pushed hovers under the convex law, and would have to come
+// down where Coulomb's begins
+static int slides(const cav_problem *problem) {
+  const cav_model *m = problem->model;
+  for (int i = 0; i < problem->nterm; i++) {
+    const cav_term *term = &problem->term[i];
+    if (term->quantity == CAV_QUANTITY_SLIP && term->body > 0 && term->within > 0 &&
+        !m->link[m->body[term->body].link].driven)
+      return 1;
+  }
+  return 0;
+}
+
 static double between(double from, double to, double s) {
   return from > 0 && to > 0 ? from * pow(to / from, s) : (1 - s) * from + s * to;
 }
@@ -42,7 +55,7 @@ cav_stage_options cav_schedule_at(const cav_schedule *schedule, double x) {
 void cav_stage_law(const cav_problem *problem, double x, double step, cav_options *law) {
   cav_stage_options stage = cav_schedule_at(&problem->schedule, x);
   law->stabilisation = CAV_STABILISATION_DISCRETE;
-  law->sliding = x >= SLIDES_FROM ? problem->schedule.sliding : CAV_SLIDING_CONVEX;
+  law->sliding = x >= SLIDES_FROM || slides(problem) ? problem->schedule.sliding : CAV_SLIDING_CONVEX;
   law->next_gap = x >= LOOKS_FROM ? problem->schedule.next_gap : CAV_NEXT_GAP_LINEAR;
   law->next_slip = x >= LOOKS_FROM ? problem->schedule.next_slip : CAV_NEXT_SLIP_LINEAR;
 #define LAW_SAME(name) law->name = stage.name;

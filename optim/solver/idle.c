@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "continuation.h"
+#include "driven.h"
 #include "transcription.h"
 
 // ---------------------------------------------------------------- what is asked for
@@ -33,27 +34,6 @@ static void keep_dof(const marks *a, int dof) { keep_link(a, a->problem->model->
 static void keep_tendon(const marks *a, int tendon) {
   const cav_model *m = a->problem->model;
   for (int k = 0; k < m->tendon[tendon].ndof; k++) keep_dof(a, m->tendon_dof[m->tendon[tendon].dof + k]);
-}
-
-static void keep_actuated(const marks *a) {
-  const cav_model *m = a->problem->model;
-  for (int i = 0; i < m->nactuator; i++) {
-    const cav_actuator *actuator = &m->actuator[i];
-    switch (actuator->transmission) {
-      case CAV_TRANSMISSION_JOINT:
-      case CAV_TRANSMISSION_JOINT_IN_PARENT:
-        keep_link(a, m->joint[actuator->target].link);
-        break;
-      case CAV_TRANSMISSION_TENDON:
-        keep_tendon(a, actuator->target);
-        break;
-      case CAV_TRANSMISSION_SITE:
-      case CAV_TRANSMISSION_CRANK:
-        keep_link(a, m->site[actuator->target].link);
-        if (actuator->reference >= 0) keep_link(a, m->site[actuator->reference].link);
-        break;
-    }
-  }
 }
 
 static void keep_object(const marks *a, cav_object_type type, int object) {
@@ -142,44 +122,6 @@ static void keep_asked(const marks *a, const cav_term *term) {
     if (of == CAV_OF_RATE) asked |= wants_rate(a->problem, term, d);
     if (asked) keep_dof(a, d);
   }
-}
-
-/// Two links of an equality constraint, or a tendon's dofs: if one is planned all are. Returns whether this changed
-/// anything.
-static int keep_together(const marks *a, const int *link, int n) {
-  const cav_model *m = a->problem->model;
-  int any = 0, all = 1;
-  for (int k = 0; k < n; k++) {
-    if (link[k] == 0) continue;
-    int kept = a->kept[m->link[link[k]].root];
-    any |= kept, all &= kept;
-  }
-  for (int k = 0; any && k < n; k++) keep_link(a, link[k]);
-  return any && !all;
-}
-
-static int keep_joined(const marks *a) {
-  const cav_model *m = a->problem->model;
-  int changed = 0;
-  for (int i = 0; i < m->ntendon; i++) {
-    const int *dof = m->tendon_dof + m->tendon[i].dof;
-    for (int k = 1; k < m->tendon[i].ndof; k++) {
-      int link[2] = {m->dof[dof[0]].link, m->dof[dof[k]].link};
-      changed |= keep_together(a, link, 2);
-    }
-  }
-  for (int i = 0; i < m->nequality; i++) {
-    const cav_equality *e = &m->equality[i];
-    int tendon = e->type == CAV_EQUALITY_TENDON, link[2] = {e->link[0], e->link[1]};
-    for (int k = 0; k < 2 && (tendon || e->type == CAV_EQUALITY_JOINT); k++) {
-      int dof = e->object[k] < 0 ? -1
-                : tendon         ? m->tendon_dof[m->tendon[e->object[k]].dof]
-                                 : m->joint[e->object[k]].dof;
-      link[k] = dof < 0 ? 0 : m->dof[dof].link;
-    }
-    changed |= keep_together(a, link, 2);
-  }
-  return changed;
 }
 
 // ---------------------------------------------------------------- what comes near
@@ -408,7 +350,7 @@ static cav_status split_apart(marks *a, char *here, box *room, extent *space, ca
   int nknot = (int)lround(a->problem->duration / a->problem->timestep) + 1;
   cav_options law = last_law(a->problem);
   for (;;) {
-    while (keep_joined(a)) continue;
+    while (cav_roots_join(a->problem->model, a->kept)) continue;
     cav_trajectory_free(idle->alone);
     free(idle->owner);
     idle->alone = NULL, idle->owner = NULL;
@@ -448,7 +390,7 @@ cav_status cav_idle_find(const cav_problem *p, cav_idle *idle) {
   extent space = {room ? room + n : NULL, size};
   cav_status status = mark && room && size ? CAV_OK : CAV_NO_MEMORY;
   if (status == CAV_OK) {
-    keep_actuated(&a);
+    cav_roots_actuated(m, a.kept);
     for (int i = 0; i < p->nterm; i++) keep_asked(&a, &p->term[i]);
     for (int i = 0; i < p->nswing; i++) keep_link(&a, m->joint[p->swing[i].joint].link);
     status = split_apart(&a, mark + n, room, &space, idle);

@@ -42,18 +42,30 @@ typedef struct row_count {
 /// Whether a force row is a row of its own, or joins that of its only dof.
 static int stands_alone(const cav_force_row *form) { return form->n != 1; }
 
-/// Whether a term counts the knot's k-th contact, key [2*contacts].
-static int counts(const cav_transcription *tr, const int *key, const cav_term *term, int k) {
+/// Whether a term of slip lets a contact of two links slide at knot t that no actuator moves: the floor under a box.
+static int frees(const cav_transcription *tr, const cav_term *term, int t, int link1, int link2) {
+  if (term->quantity != CAV_QUANTITY_SLIP || term->body <= 0 || !(term->within > 0)) return 0;
+  int link = tr->model->body[term->body].link;
+  return (link == link1 || link == link2) && cav_term_weight(tr, term, t) > 0;
+}
+
+/// Whether a term counts the k-th contact of knot t, key [2*contacts]. One of slip over all contacts leaves those that another
+/// term frees.
+static int counts(const cav_transcription *tr, const int *key, const cav_term *term, int t, int k) {
   const cav_model *m = tr->model;
   const cav_pair *pair = &m->pair[key[2 * k]];
-  int link = m->body[term->body].link;
-  return term->body <= 0 || m->geom[pair->geom1].link == link || m->geom[pair->geom2].link == link;
+  int link = m->body[term->body].link, link1 = m->geom[pair->geom1].link, link2 = m->geom[pair->geom2].link;
+  if (term->body > 0) return link1 == link || link2 == link;
+  if (term->quantity != CAV_QUANTITY_SLIP || m->link[link1].driven || m->link[link2].driven) return 1;
+  for (int i = 0; i < tr->problem->nterm; i++)
+    if (frees(tr, &tr->problem->term[i], t, link1, link2)) return 0;
+  return 1;
 }
 
 int cav_knot_contact(const cav_transcription *tr, const int *key, const cav_term *term, int t, int k, int *first) {
   contact_part part = contact_part_of(term->quantity);
   *first = part.first;
-  return part.n > 0 && tr->knot[t].moving[k] == part.self && counts(tr, key, term, k) ? part.n : 0;
+  return part.n > 0 && tr->knot[t].moving[k] == part.self && counts(tr, key, term, t, k) ? part.n : 0;
 }
 
 /// Rows of a cost at knot t, whose contacts are listed.
@@ -500,7 +512,7 @@ static void add_contact(cav_sum *a, const cav_term *term, double weight) {
   contact_part part = contact_part_of(term->quantity);
   weight /= term->scale * term->scale;
   for (int k = 0; k < a->knot->ncontact; k++) {
-    if (a->knot->moving[k] != part.self || !counts(a->tr, a->s->key, term, k)) continue;
+    if (a->knot->moving[k] != part.self || !counts(a->tr, a->s->key, term, a->t, k)) continue;
     for (int i = part.first; i < part.first + part.n; i++) {
       int row = CAV_CONTACT_READINGS * k + i;
       double r = a->knot->y[row], w = weight;

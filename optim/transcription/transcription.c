@@ -80,6 +80,9 @@ static int limit_row_set(cav_transcription *tr, int k, const double *effort) {
   return force_row_set(&tr->effort[k], m->nv, effort, per_effort * scale);
 }
 
+/// Fraction of the scene's mass below which a body is light.
+static const double LIGHT = 1. / 16;
+
 /// Deviation that a force on a dof is penalised by, 0: it has to be zero. direction [nv]: a form of what actuators cannot give,
 /// which is that dof alone where it is one.
 static double deviation_of(const cav_transcription *tr, int d, const double *direction) {
@@ -87,6 +90,15 @@ static double deviation_of(const cav_transcription *tr, int d, const double *dir
   const cav_residual *residual = &tr->problem->residual;
   if (m->link[m->dof[d].link].parent != 0 || fabs(direction[d]) < 1 - 1e-9) return 0;
   return dof_is_linear(m, d) ? residual->force : residual->torque;
+}
+
+double cav_force_fraction(const cav_model *m, int dof) {
+  int link = m->dof[dof].link;
+  double mass = 0;
+  if (m->link[link].driven) return 1;
+  for (int l = 1; l < m->nlink; l++)
+    if (m->link[l].root == m->link[link].root) mass += m->link[l].mass;
+  return mass > 0 && mass < LIGHT * m->mass ? mass / m->mass : 1;
 }
 
 /// Linear forms of u: an orthonormal basis of what actuators cannot give, and the least-norm actuator efforts.
@@ -124,8 +136,8 @@ static int list_force_rows(cav_transcription *tr) {
     if ((norm = sqrt(norm)) < 1e-7) continue;
     int rank = tr->nresidual + tr->npenalised;
     assert(rank < nv);
-    double unit_force = tr->weight * (dof_is_linear(m, d) ? 1 : CAV_MOMENT_ARM), *direction = basis + rank * nv,
-           deviation;
+    double unit_force = tr->weight * cav_force_fraction(m, d) * (dof_is_linear(m, d) ? 1 : CAV_MOMENT_ARM),
+           *direction = basis + rank * nv, deviation;
     for (int i = 0; i < nv; i++) direction[i] = residual[i] / norm;
     if ((deviation = deviation_of(tr, d, direction)) > 0) {
       if (!force_row_set(&tr->penalised[tr->npenalised++], nv, direction, 1 / deviation)) goto end;

@@ -220,7 +220,12 @@ const double *cav_velocity_after(const cav_transcription *transcription, const c
 double cav_transcription_cost(const cav_transcription *transcription);
 double cav_transcription_merit(const cav_transcription *transcription);
 
-/// Largest unactuated force (fraction of weight) and its knot; largest violation of the other constraint rows.
+/// Unit of the forces on a dof that no actuator gives, over the scene's weight: of what is light and no actuator moves its
+/// own weight's. In units of a person's weight a force from nowhere that throws a ball is a rounding error.
+double cav_force_fraction(const cav_model *model, int dof);
+
+/// Largest unactuated force (fraction of weight, of light bodies of their own) and its knot; largest violation of the other
+/// constraint rows.
 double cav_transcription_unactuated(const cav_transcription *transcription, int *knot);
 double cav_transcription_violation(const cav_transcription *transcription);
 

@@ -206,11 +206,37 @@ static int power_values(const cav_verification *verification, const cav_term *te
   return model->nu;
 }
 
-int cav_verification_looks_at(const cav_model *model, const cav_term *term, const cav_contact *contact) {
+// what no actuator moves on either side
+static int is_idle(const cav_model *model, const cav_contact *contact) {
+  return !model->link[contact->link1].driven && !model->link[contact->link2].driven;
+}
+
+double cav_verification_may_slide(const cav_verification *verification, int t, const cav_contact *contact, int named) {
+  const cav_problem *problem = verification->problem;
+  const cav_model *model = verification->model;
+  double speed = 0;
+  int single, whole;
+  for (int i = 0; i < problem->nterm; i++) {
+    const cav_term *term = problem->term + i;
+    int link = model->body[term->body].link;
+    if (term->quantity != CAV_QUANTITY_SLIP || !(term->within > speed) || (named && term->body <= 0)) continue;
+    if (!cav_verification_holds(verification, term, t, &single, &whole)) continue;
+    if (term->body > 0 && contact->link1 != link && contact->link2 != link) continue;
+    // a box may slide over the floor: the hands on it hold
+    if (term->body <= 0 || model->link[link].driven || is_idle(model, contact)) speed = term->within;
+  }
+  return speed;
+}
+
+int cav_verification_looks_at(const cav_verification *verification, const cav_term *term, int t,
+                              const cav_contact *contact) {
+  const cav_model *model = verification->model;
   const cav_pair *pair = model->pair + contact->pair;
   if (pair->external == (term->quantity == CAV_QUANTITY_SELF_PENETRATION)) return 0;
   int link = model->body[term->body].link;
-  return term->body <= 0 || contact->link1 == link || contact->link2 == link;
+  if (term->body > 0) return contact->link1 == link || contact->link2 == link;
+  return term->quantity != CAV_QUANTITY_SLIP || !is_idle(model, contact) ||
+         !(cav_verification_may_slide(verification, t, contact, 1) > 0);
 }
 
 int cav_verification_contact(const cav_verification *verification, const cav_term *term, const cav_contact *contact,
@@ -229,11 +255,12 @@ int cav_verification_contact(const cav_verification *verification, const cav_ter
 }
 
 // those of every contact
-static int contact_values(const cav_verification *verification, const cav_term *term, double *x, double *target) {
+static int contact_values(const cav_verification *verification, const cav_term *term, int t, double *x,
+                          double *target) {
   const cav_state *state = verification->state;
   int n = 0;
   for (int i = 0; i < state->ncontact; i++) {
-    if (!cav_verification_looks_at(verification->model, term, state->contact + i)) continue;
+    if (!cav_verification_looks_at(verification, term, t, state->contact + i)) continue;
     n += cav_verification_contact(verification, term, state->contact + i, x + n);
   }
   memset(target, 0, sizeof(double) * n);
@@ -310,7 +337,7 @@ int cav_verification_measure(const cav_verification *verification, const cav_ter
     case CAV_QUANTITY_IMPACT:
     case CAV_QUANTITY_SELF_PENETRATION:
     case CAV_QUANTITY_FORCE:
-      return forced ? contact_values(verification, term, x, target) : 0;
+      return forced ? contact_values(verification, term, t, x, target) : 0;
     case CAV_QUANTITY_TRACK:
       return forced || !is_late(term->track) ? record_values(verification, term, t, x, target) : 0;
     case CAV_QUANTITY_USER:

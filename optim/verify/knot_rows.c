@@ -47,7 +47,7 @@ static int count(const cav_verification *verification, const cav_term *term, int
     return cav_verification_measure(verification, term, t, rows->work, rows->work + nq, rows->work + nq + room);
   for (int i = 0; t < verification->rows && i < rows->ncontact; i++) {
     const cav_contact *contact = verification->state->contact + i;
-    if (cav_verification_looks_at(verification->model, term, contact))
+    if (cav_verification_looks_at(verification, term, t, contact))
       n += cav_verification_contact(verification, term, contact, value);
   }
   return n;
@@ -260,7 +260,7 @@ static int read_term(const cav_verification *verification, const cav_term *term,
     cav_contact gone = {.pair = rows->contact[i][0], .dim = 3};
     gone.link1 = model->geom[pair->geom1].link, gone.link2 = model->geom[pair->geom2].link;
     const cav_contact *contact = find(verification->state, rows->contact[i], i);
-    if (!cav_verification_looks_at(model, term, contact ? contact : &gone)) continue;
+    if (!cav_verification_looks_at(verification, term, t, contact ? contact : &gone)) continue;
     int k = cav_verification_contact(verification, term, contact ? contact : &gone, out + n);
     for (int c = 0; c < k; c++) out[n + c] = contact ? out[n + c] / term->scale : NAN;
     n += k;

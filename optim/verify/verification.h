@@ -127,9 +127,15 @@ int cav_verification_holds(const cav_verification *verification, const cav_term 
 /// 1 if a term over dofs selects this one. constraint_check.c.
 int cav_verification_selects(const cav_model *model, const cav_term *term, int dof);
 
-/// 1 if a term over contacts looks at this one: those between trees or with the world, of one body alone if it names
-/// one; self-penetration at those between two links of one tree. constraint_check.c.
-int cav_verification_looks_at(const cav_model *model, const cav_term *term, const cav_contact *contact);
+/// 1 if a term over contacts looks at this one at knot t: those between trees or with the world, of one body alone if it names
+/// one, slip of all contacts not at those that no actuator moves and another term lets slide; self-penetration at those
+/// between two links of one tree. constraint_check.c.
+int cav_verification_looks_at(const cav_verification *verification, const cav_term *term, int t,
+                              const cav_contact *contact);
+
+/// m/s up to which terms of slip, those that name a body alone where named is 1, let a contact slide at knot t. One that
+/// names a body which no actuator moves lets it slide over what none moves either. constraint_check.c.
+double cav_verification_may_slide(const cav_verification *verification, int t, const cav_contact *contact, int named);
 
 /// What a term over contacts measures of one: one value, of slip two. constraint_check.c.
 int cav_verification_contact(const cav_verification *verification, const cav_term *term, const cav_contact *contact,

@@ -312,20 +312,6 @@ static void note_ranges(const cav_verification *verification, int t, const doubl
   }
 }
 
-// m/s, up to which the problem lets a contact slide at knot t
-static double may_slide(const cav_verification *verification, int t, const cav_contact *contact) {
-  const cav_problem *problem = verification->problem;
-  double speed = 0;
-  int single, whole;
-  for (int i = 0; i < problem->nterm; i++) {
-    const cav_term *term = problem->term + i;
-    if (term->quantity != CAV_QUANTITY_SLIP || !(term->within > speed)) continue;
-    if (!cav_verification_holds(verification, term, t, &single, &whole)) continue;
-    if (cav_verification_looks_at(verification->model, term, contact)) speed = term->within;
-  }
-  return speed;
-}
-
 // how fast under load, beyond what is asked
 static void add_slip(const cav_verification *verification, int t, metrics *found) {
   for (int i = 0; i < verification->state->ncontact; i++) {
@@ -334,7 +320,7 @@ static void add_slip(const cav_verification *verification, int t, metrics *found
     if (contact->dim < 3 || !(load > loaded * verification->weight * verification->h)) continue;
     found->load += load;
     double speed = hypot(contact->velocity_next[1], contact->velocity_next[2]);
-    found->slip += load * fmax(speed - may_slide(verification, t, contact), 0);
+    found->slip += load * fmax(speed - cav_verification_may_slide(verification, t, contact, 0), 0);
   }
 }
 

@@ -1,0 +1,16 @@
+/// Trees that actuators move, and trees that something joins. Private to the toolkit.
+#ifndef CAVORT_DRIVEN_H
+#define CAVORT_DRIVEN_H
+
+#include "cavort/model.h"
+
+/// Marks the roots of links that an actuator moves; mark [nlink].
+void cav_roots_actuated(const cav_model *model, char *mark);
+
+/// Marks the roots that tendons and equality constraints join to marked ones. Returns whether any came in.
+int cav_roots_join(const cav_model *model, char *mark);
+
+/// Fills driven of all links. CAV_NO_MEMORY.
+cav_status cav_links_drive(cav_model *model);
+
+#endif
