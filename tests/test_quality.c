@@ -60,6 +60,8 @@ static void test_box(void) {
   CHECK_NEAR(q.floating, 0, 1e-9);
   CHECK_NEAR(q.residual_worst, 0, 1e-4);
   CHECK_NEAR(q.jerk, 0, 1e-6);
+  CHECK_NEAR(q.landing, 1, 1e-9);
+  CHECK(isnan(q.flailing) && isnan(q.asymmetry));
   // 12 mm deep; 8 mm are below the bar
   q = box(model, still, (const double[4]){0.088});
   CHECK_NEAR(q.penetration, 12, 1e-9);
@@ -86,6 +88,10 @@ static void test_box(void) {
   q = box(model, (const double[4]){0, 1, 0, 0}, (const double[4]){1.1, 1, -g / 2, 0});
   CHECK_NEAR(q.floating, 0, 0);
   CHECK_NEAR(q.residual_worst, 0, 1e-6);
+  CHECK_NEAR(q.landing, 0, 1e-9);
+  // pushed up by half as much as it weighs beyond that
+  q = box(model, still, (const double[4]){0.1, 0, g / 4, 0});
+  CHECK_NEAR(q.landing, 1.5, 1e-9);
   q = box(model, (const double[4]){0, 0, 0, 7.0 / 6}, (const double[4]){0.1});
   CHECK_NEAR(q.jerk, 7, 1e-6);
   cav_model_free(model);
@@ -178,11 +184,33 @@ static void test_effort(void) {
   cav_quality q = measure(model, motion);
   CHECK_NEAR(q.torque_excess, 100 * (g / 2 - 3) / 3, 1e-6);
   CHECK_NEAR(q.torque_excess_fraction, 100, 1e-9);
+  CHECK_NEAR(q.effort, 100 * g / 2 / 3, 1e-6);
   CHECK_NEAR(q.residual_worst, 0, 1e-9);
   // hanging, there is nothing to hold
   for (int t = 0; t < KNOTS; t++) motion->q[t] = M_PI / 2;
   q = measure(model, motion);
   CHECK_NEAR(q.torque_excess, 0, 1e-9);
+  cav_trajectory_free(motion);
+  cav_model_free(model);
+}
+
+// one arm, then both, raised forwards at 2 rad/s: hands are 0.5901 m from the shoulders' axes
+static void test_arms(void) {
+  cav_error error = {0};
+  cav_model *model = cav_model_load(CAVORT_SOURCE_ROOT "/problems/models/humanoid.xml", &error);
+  if (!CHECK(model != NULL)) return;
+  cav_trajectory *motion = cav_trajectory_new(model, KNOTS, h);
+  for (int arms = 1; arms <= 2; arms++) {
+    for (int t = 0; t < KNOTS; t++) {
+      double *q = motion->q + t * model->nq;
+      memcpy(q, model->q0, (size_t)model->nq * sizeof *q);
+      for (int j = 0, moved = 0; j < model->njoint; j++)
+        if (!strncmp(model->joint[j].name, "shoulder2", 9) && moved++ < arms) q[model->joint[j].q] = 2 * t * h;
+    }
+    cav_quality q = measure(model, motion);
+    CHECK_NEAR(q.flailing, 2 * 0.5901 * sin(h) / h * sqrt(arms / 2.), 1e-9);
+    CHECK_NEAR(q.asymmetry, arms == 1 ? 100 : 0, 1e-9);
+  }
   cav_trajectory_free(motion);
   cav_model_free(model);
 }
@@ -224,6 +252,7 @@ int main(void) {
   test_frame();
   test_friction();
   test_effort();
+  test_arms();
   test_folded();
   test_refusals();
   return check_result();

@@ -147,6 +147,10 @@ CAV_API cav_status cav_ik_sizes(cav_model *model, const cav_record *record, cav_
   X(floating, "mm", 20, "highest above all, while the centre of mass moves as if more than g/2 were borne") \
   X(floating_fraction, "%", 0, "knots more than 20 mm above all meanwhile")                                 \
   X(jerk, "m/s^3", NAN, "of the centres of mass of links, rms")                                             \
+  X(effort, "%", NAN, "of actuators over their limits, rms")                                                \
+  X(landing, "weight", NAN, "largest vertical force from outside, as the centre of mass moves")             \
+  X(flailing, "m/s", NAN, "speed of the hands against the trunk, rms; none: no hands")                      \
+  X(asymmetry, "%", NAN, "difference of what left and right joints go through, over their sum")             \
   X(torque_excess, "%", 0, "most that an actuator is asked for beyond its limit, over that limit")          \
   X(torque_excess_fraction, "%", 0, "knots that ask for more than a limit")                                 \
   X(residual, "%", NAN, "force that neither contacts nor actuators can give, rms, over the weight")         \

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "file.h"
+#include "manner.h"
 #include "math3.h"
 #include "slide.h"
 #include "support.h"
@@ -108,16 +109,17 @@ static cav_status measure_forces(const measure *m) {
   const cav_trajectory *motion = m->motion;
   int n = motion->nknot - 2;
   for (int t = 1; t <= n; t++) {
-    double residual, excess;
+    double residual, excess, effort;
     cav_status status =
         cav_support_find(m->support, m->state, touching, row(motion->q, t, motion->nq), row(motion->v, t, motion->nv),
-                         row(motion->v, t + 1, motion->nv), &residual, &excess);
+                         row(motion->v, t + 1, motion->nv), &residual, &excess, &effort);
     if (status) return status;
     q->residual += residual * residual / n;
+    q->effort += effort / n;
     q->residual_worst = fmax(q->residual_worst, 100 * residual);
     q->torque_excess = fmax(q->torque_excess, 100 * excess), q->torque_excess_fraction += 100.0 * (excess > 1e-3) / n;
   }
-  q->residual = 100 * sqrt(q->residual);
+  q->residual = 100 * sqrt(q->residual), q->effort = 100 * sqrt(q->effort);
   return CAV_OK;
 }
 
@@ -134,6 +136,8 @@ static cav_status run(measure *m) {
   measure_skating(m, 1, &q->skating_step, &q->skating_step_fraction);
   q->jerk = jerk(m);
   measure_floating(m);
+  status = cav_manner_measure(m->model, m->motion, m->com, m->state, q);
+  if (status) return status;
   q->floating_fraction *= 100.0 / (n - 2);
   return measure_forces(m);
 }

@@ -194,7 +194,7 @@ static void fit(const cav_support *s, int n) {
 }
 
 cav_status cav_support_find(cav_support *s, cav_state *look, double gap, const double *q, const double *v,
-                            const double *v_next, double *residual, double *excess) {
+                            const double *v_next, double *residual, double *excess, double *effort) {
   const cav_model *m = s->model;
   int n = 0;
   cav_status status = cav_inverse(m, s->state, q, v, v_next, s->u);
@@ -217,14 +217,16 @@ cav_status cav_support_find(cav_support *s, cav_state *look, double gap, const d
   fit(s, n);
   for (int j = 0; j < n; j++)
     for (int i = 0; i < s->rows && s->x[j] > 0; i++) s->b[i] -= s->x[j] * s->A[(size_t)j * (size_t)s->rows + (size_t)i];
-  *residual = *excess = 0;
+  *residual = *excess = *effort = 0;
   for (int d = 0; d < m->nv; d++) *residual += s->b[d] * s->b[d];
   *residual = sqrt(*residual);
   for (int a = 0; a < m->nu; a++) {
-    double range[2], effort = s->b[m->nv + a] * s->scale[m->nv + a];
+    double range[2], force = s->b[m->nv + a] * s->scale[m->nv + a];
     cav_actuator_effort_range(m, a, range);
     double limit = fmax(fabs(range[0]), fabs(range[1]));
-    if (limit > 0 && isfinite(limit)) *excess = fmax(*excess, fmax(effort - range[1], range[0] - effort) / limit);
+    if (!(limit > 0) || !isfinite(limit)) continue;
+    *excess = fmax(*excess, fmax(force - range[1], range[0] - force) / limit);
+    *effort += force * force / (limit * limit) / m->nu;
   }
   return CAV_OK;
 }

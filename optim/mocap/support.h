@@ -16,8 +16,8 @@ void cav_state_look(cav_state *state, double gap);
 /// Forces of the contacts within a gap, now or after the step, that leave least of what no actuator can give at (q, v,
 /// v_next), and of these the least efforts. look lists contacts (cav_state_look), and is left at q. residual: what is
 /// left, root of squares, lines over the weight, turns over that times 0.3 m. excess: most that an actuator is asked for
-/// beyond its limit, over that limit.
+/// beyond its limit, over that limit; effort: what actuators are asked for over their limits, mean of squares.
 cav_status cav_support_find(cav_support *support, cav_state *look, double gap, const double *q, const double *v,
-                            const double *v_next, double *residual, double *excess);
+                            const double *v_next, double *residual, double *excess, double *effort);
 
 #endif

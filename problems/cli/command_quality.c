@@ -9,6 +9,7 @@
 #include "command.h"
 #include "csv.h"
 #include "file.h"
+#include "periodicity.h"
 #include "result.h"
 
 void cav_command_print_quality(FILE *out, int n, char *const *name, const cav_quality *quality, int csv) {
@@ -45,6 +46,22 @@ void cav_command_print_quality(FILE *out, int n, char *const *name, const cav_qu
   }
 }
 
+// of a cycle two strides, since half of one says nothing of left and right
+static cav_status measure_result(const cav_result *result, cav_quality *quality, cav_error *error) {
+  const cav_problem *problem = result->problem;
+  cav_periodicity *periodicity = problem->cycle.on ? cav_periodicity_new(problem, error) : NULL;
+  if (problem->cycle.on && !periodicity) return error->status;
+  int periods = problem->cycle.mirror == CAV_MIRROR_NONE ? 2 : 4;
+  cav_trajectory *strides = periodicity ? cav_periodicity_unroll(periodicity, result->trajectory, periods) : NULL;
+  cav_status status = periodicity && !strides
+                          ? cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory")
+                          : cav_quality_measure(problem->model, strides ? strides : result->trajectory,
+                                                &problem->contact, quality, error);
+  cav_periodicity_free(periodicity);
+  cav_trajectory_free(strides);
+  return status;
+}
+
 // a folder's motion with its problem's model and law, or --model; a file's with --model
 static cav_status measure(const cav_command_line *line, const char *path, cav_quality *quality, cav_error *error) {
   struct stat info;
@@ -53,9 +70,7 @@ static cav_status measure(const cav_command_line *line, const char *path, cav_qu
   cav_status status = problem && file ? CAV_OK : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
   if (!status && folder && !access(problem, F_OK)) {
     cav_result *result = cav_result_read(path, line->model, error);
-    status = result ? cav_quality_measure(result->problem->model, result->trajectory, &result->problem->contact,
-                                          quality, error)
-                    : error->status;
+    status = result ? measure_result(result, quality, error) : error->status;
     cav_result_free(result);
   } else if (!status && !line->model) {
     status = cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: says no model; give --model FILE", path);

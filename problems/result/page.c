@@ -4,6 +4,7 @@
 
 #include <assert.h>
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -250,20 +251,26 @@ static int verdict_lines(const cav_verdict *verdict, cav_certificate_line *told,
   return n;
 }
 
-// a line for each measure of quality, in words apart from those of the certificate
-static int quality_lines(const cav_quality *quality, quality_text text[QUALITIES], cav_view_line *line) {
-  int n;
+// whether a measure says how natural a motion looks: from jerk to asymmetry
+static int is_manner(const cav_quality_rule *rule) {
+  return rule->offset >= offsetof(cav_quality, jerk) && rule->offset <= offsetof(cav_quality, asymmetry);
+}
+
+// a line for each measure of quality, in words apart from those of the certificate; alone: those that it does not have
+static int quality_lines(const cav_quality *quality, int alone, quality_text text[QUALITIES], cav_view_line *line) {
+  int n, told = 0;
   const cav_quality_rule *rule = cav_quality_rules(&n);
   assert(n == QUALITIES);
   for (int i = 0; i < n; i++) {
+    if (alone && (!is_manner(&rule[i]) || isnan(*(const double *)((const char *)quality + rule[i].offset)))) continue;
     double x = *(const double *)((const char *)quality + rule[i].offset);
     snprintf(text[i].label, sizeof text[i].label, "%s, quality", rule[i].name);
     for (char *c = text[i].label; *c; c++)
       if (*c == '_') *c = ' ';
     snprintf(text[i].value, sizeof text[i].value, "%.3g %s", x, rule[i].unit);
-    line[i] = (cav_view_line){text[i].label, text[i].value, isfinite(rule[i].bar) ? x <= rule[i].bar : -1};
+    line[told++] = (cav_view_line){text[i].label, text[i].value, isfinite(rule[i].bar) ? x <= rule[i].bar : -1};
   }
-  return n;
+  return told;
 }
 
 // --- the page ---
@@ -342,7 +349,7 @@ static void take_forces(parts *page, const cav_model *model, const cav_forces *f
   }
 }
 
-static cav_status fill_page(parts *page, const cav_page_motion *m, cav_view_input *input) {
+static cav_status fill_page(parts *page, const cav_page_motion *m, int alone, cav_view_input *input) {
   const cav_problem *p = m->problem;
   const double *g = p->model->gravity;
   double weight = p->model->mass * sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
@@ -353,7 +360,7 @@ static cav_status fill_page(parts *page, const cav_page_motion *m, cav_view_inpu
   take_forces(page, p->model, m->forces, weight);
   snprintf(page->title, sizeof page->title, "%.140s on %.140s", p->name, p->model->name);
   int nline = m->verdict ? verdict_lines(m->verdict, page->told, page->line, page->seconds) : 0;
-  if (m->quality) nline += quality_lines(m->quality, page->quality, page->line + nline);
+  if (m->quality) nline += quality_lines(m->quality, alone, page->quality, page->line + nline);
   if (*page->undrawn) page->line[nline++] = (cav_view_line){"drawn", page->undrawn, -1};
   *input = (cav_view_input){.model = p->model,
                             .drawn = page->drawn,
@@ -381,7 +388,7 @@ cav_status cav_page_write(const char *path, int n, const cav_page_motion *motion
   cav_status status = CAV_OK;
   for (int i = 0; i < n && !status; i++) {
     status = make_page(&page[i], &motion[i]);
-    if (!status) status = fill_page(&page[i], &motion[i], &input[i]);
+    if (!status) status = fill_page(&page[i], &motion[i], n == 1, &input[i]);
     if (status) cav_file_fail(error, status, 0, "%s: no charts of the motion (%s)", path, cav_status_name(status));
   }
   if (!status) status = cav_view_write(path, n, input, error);

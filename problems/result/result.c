@@ -68,8 +68,13 @@ cav_status cav_result_write_page(const char *folder, const cav_problem *problem,
   cav_status status = page ? cav_result_write_forces(folder, problem, trajectory, contact, error) : no_memory(error);
   if (!status) status = make_shown(&shown, problem, trajectory, contact, error);
   if (!status) {
-    cav_page_motion motion = {
-        problem->name, problem, shown.strides ? shown.strides : trajectory, shown.forces, shown.periods, verdict, NULL};
+    const cav_trajectory *seen = shown.strides ? shown.strides : trajectory;
+    cav_page_motion motion = {problem->name, problem, seen, shown.forces, shown.periods, verdict, NULL};
+    // a motion that cannot be measured has its page all the same
+    cav_quality quality;
+    cav_error unmeasured = {0};
+    if (seen->nknot >= 4 && !cav_quality_measure(problem->model, seen, contact, &quality, &unmeasured))
+      motion.quality = &quality;
     status = cav_page_write(page, 1, &motion, error);
   }
   free_shown(&shown);
