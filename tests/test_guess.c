@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include "check.h"
+#include "clear.h"
 #include "continuation.h"
 #include "scene.h"
 
@@ -130,6 +131,49 @@ static void refuse(const char *text, int line, const char *part) {
   cav_problem_free(p);
 }
 
+/// How deep a configuration is in the world.
+static double depth_of(const cav_model *m, const double *q) {
+  cav_state *state = cav_state_new(m);
+  double depth = 0;
+  CHECK(state && cav_position(m, state, q) == CAV_OK);
+  for (int i = 0; state && i < state->ncontact; i++) depth = fmax(depth, -state->contact[i].dist);
+  cav_state_free(state);
+  return depth;
+}
+
+// through a wall of a scene, and lifted over it: clear at every knot, up and down without haste, and the same far away
+static void check_solids(void) {
+  cav_problem *p;
+  double before[21], deepest = 0;
+  for (int grow = 0; grow < 2; grow++) {
+    char text[512];
+    snprintf(text, sizeof text,
+             "<problem model='m.xml'><scene><geom type='box' size='.1 1 .4' pos='1 0 1'/></scene>"
+             "<horizon duration='2' timestep='.1'/><start><root pos='0 0 1'/></start><goal><root pos='2 0 1'/></goal>"
+             "<schedule solids='%s'/></problem>",
+             grow ? "grow" : "hard");
+    scene_write(folder, "p.xml", text);
+    p = cav_problem_load(path, NULL, NULL);
+    cav_trajectory *at = p ? cav_problem_guess(p, NULL) : NULL;
+    int collides = 0;
+    CHECK(at && at->nknot == 21);
+    // the strategy of that name is for the guess that runs into it
+    CHECK(p && cav_guess_collides(p, &collides) == CAV_OK && collides);
+    for (int t = 0; at && t < 21; t++) {
+      const double *q = at->q + t * at->nq;
+      double depth = depth_of(p->model, q);
+      if (!grow) before[t] = q[2], deepest = fmax(deepest, depth);
+      if (!grow) continue;
+      CHECK(depth < 1.1e-3 && q[2] >= before[t] && q[2] < 2);
+      if (t < 2 || t > 18) CHECK_NEAR(q[2], before[t], 1e-14);
+      if (t > 0) CHECK(fabs(q[2] - q[2 - at->nq]) < 0.3);
+    }
+    cav_trajectory_free(at);
+    cav_problem_free(p);
+  }
+  CHECK(deepest > 0.1);
+}
+
 // a motion on file, from a time of it on: between its knots, and up to the goal after its end
 static void check_file(void) {
   cav_problem *p;
@@ -199,6 +243,7 @@ int main(void) {
   check_postures();
   check_broken();
   check_file();
+  check_solids();
   unlink(path);
   unlink(model_path);
   rmdir(folder);

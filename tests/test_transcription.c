@@ -451,6 +451,7 @@ static void test_normal(cav_transcription *tr, cav_trajectory *at) {
 typedef struct closing {
   int at_rest, free_step, free_start, penalised;
   cav_cycle cycle;
+  double depth; ///< what depth costs
 } closing;
 
 static void test_scene(const char *scene, closing close, cav_order order) {
@@ -487,7 +488,8 @@ static void test_scene(const char *scene, closing close, cav_order order) {
   tr->options.softness = 0.5;
   tr->options.smoothing = 0.03;
   tr->options.smoothing_self = 0.02;
-  tr->penalty = (cav_penalties){1e3, 100, 1000, 200};
+  tr->penalty = (cav_penalties){1e3, 100, 1000, 200, close.depth};
+  tr->options.saturation = close.depth > 0 ? 0.02 : 0;
   for (int t = 0; t < tr->nknot; t++)
     for (int i = 0; i < tr->knot[t].layout.count; i++) tr->knot[t].slot[i].multiplier = scene_uniform();
   test_gradient(tr, at);
@@ -532,7 +534,7 @@ static void test_apart(int cyclic, int touching, int free_step) {
     close_cycle(tr, at);
     tr->options.stabilisation = CAV_STABILISATION_DISCRETE;
     tr->options.smoothing = 0.03;
-    tr->penalty = (cav_penalties){1e3, 100, 1000, 200};
+    tr->penalty = (cav_penalties){1e3, 100, 1000, 200, 0};
     CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
     int width = 3 * tr->nv, most = 0;
     double worst = 0, largest = 0;
@@ -702,5 +704,7 @@ int main(void) {
   test_scene(walker, begun, CAV_ORDER_MIDPOINT);
   test_scene(served, begun, CAV_ORDER_EULER);
   test_scene(roped, loose, CAV_ORDER_MOMENTUM);
+  test_scene(walker, (closing){.at_rest = 1, .depth = 1e5}, CAV_ORDER_MIDPOINT);
+  test_scene(served, (closing){.at_rest = 1, .free_step = 1, .depth = 1e5}, CAV_ORDER_MOMENTUM);
   return check_result();
 }

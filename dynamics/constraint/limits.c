@@ -272,14 +272,40 @@ static double round_thickness(const cav_model *model, const cav_pair *pair) {
   return sum;
 }
 
+// radius of a round geom that stands against a solid, of which the least way out is not the same all over; 0: none
+static double radius_in_solid(const cav_model *model, const cav_pair *pair) {
+  const cav_geom *geom[2] = {&model->geom[pair->geom1], &model->geom[pair->geom2]};
+  int round = -1;
+  for (int k = 0; k < 2; k++) {
+    cav_geom_type type = geom[k]->type;
+    if (type == CAV_GEOM_PLANE || type == CAV_GEOM_HFIELD) return 0;
+    if (type == CAV_GEOM_SPHERE || type == CAV_GEOM_CAPSULE) round = round < 0 ? k : 2;
+  }
+  return round == 0 || round == 1 ? geom[round]->size[0] : 0;
+}
+
+// 1 at the surface, and less the deeper, so that force approaches what it is at the depth of saturation; round geoms fade
+// out where their axes get into a solid, as the way out of it flips there
+static double saturate(const cav_state *state, const cav_contact *c, double *rate) {
+  double x = fmin(c->dist, 0) / state->options.saturation, fraction = 1 / sqrt(1 + x * x), derivative;
+  *rate = -x / (1 + x * x) / state->options.saturation;
+  double radius = radius_in_solid(state->model, &state->model->pair[c->pair]), core = CORE * radius;
+  if (!(radius > 0)) return fraction;
+  fraction *= larger(STIFFNESS_RATIO_MIN, rise((c->dist + radius) / core, &derivative));
+  *rate += derivative / core;
+  return fraction;
+}
+
 double cav_contact_stiffness_ratio(const cav_state *state, const cav_contact *c, double *rate) {
   const cav_pair *pair = &state->model->pair[c->pair];
-  double fraction = pair->external ? 1 : state->options.self_stiffness, derivative;
+  double fraction = pair->external ? 1 : state->options.self_stiffness, derivative, more = 0;
   *rate = 0;
   if (!(state->options.smoothing > 0)) return fraction;
+  if (state->options.saturation > 0 && pair->external) { fraction = saturate(state, c, &more); }
   double activation = cav_contact_activation(state, pair), width = FADING * activation;
   fraction *= larger(STIFFNESS_RATIO_MIN, rise((activation - c->dist) / width, &derivative));
   *rate = -derivative / width;
+  if (more != 0) *rate += more;
   double thickness = round_thickness(state->model, pair), core = CORE * thickness;
   if (!(thickness > 0)) return fraction;
   fraction *= larger(STIFFNESS_RATIO_MIN, rise((c->dist + thickness) / core, &derivative));

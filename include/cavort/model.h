@@ -510,6 +510,7 @@ typedef struct cav_field {
   REAL(POSITION, smoothing, 0, DBL_MAX, 1, "m", "delta: distance at which the smoothed law is active; 0: the exact law (dynamics/METHOD.md, 3)") \
   REAL(POSITION, smoothing_self, 0, DBL_MAX, 1, "m", "delta between two links of one tree, used where smoothing > 0") \
   REAL(POSITION, self_stiffness, DBL_MIN, 1, 0, "", "fraction of their stiffness that contacts between two links of one tree get; 1: the law") \
+  REAL(POSITION, saturation, 0, DBL_MAX, 0, "m", "depth beyond which the smoothed law's contacts with the world grow no stiffer, and fade out where round geoms are in solids; 0: never") \
   REAL(POSITION, impratio, DBL_MIN, DBL_MAX, 1, "", "R_normal / R_friction")                                       \
   FLAG(POSITION, coupled, "1: B and K dense, so that all rows together are critically damped; costs a factorisation") \
   FLAG(POSITION, refsafe, "1: keep solref time constants >= 2 h")                                                  \

@@ -301,10 +301,23 @@ typedef struct cav_stage_options {
 /// The table of cav_stage_options; its length in *n.
 CAV_API const cav_field *cav_stage_fields(int *n);
 
+/// How solids of the world begin in a schedule (optim/METHOD.md, 5).
+#define CAV_SOLIDS(X)                                                                                              \
+  X(CAV_SOLIDS_HARD, "hard", "as they are")                                                                        \
+  X(CAV_SOLIDS_GROW, "grow", "the guess is lifted out of them; depth costs, and forces saturate with it")
+
+/// How solids begin: CAV_SOLIDS.
+typedef enum cav_solids {
+#define CAV_WORD_MEMBER(enumerator, word, text) enumerator,
+  CAV_SOLIDS(CAV_WORD_MEMBER)
+#undef CAV_WORD_MEMBER
+} cav_solids;
+
 /// The schedule: stages go geometrically from first to last; the penalty reaches its end at half way.
 typedef struct cav_schedule {
   int stages;            ///< from 1
   cav_sliding sliding;   ///< law of contacts that slide from three quarters of the way on; before it is the convex one
+  cav_solids solids;     ///< how solids of the world begin
   cav_next_gap next_gap; ///< gap after the step that contacts see from half way on; before it is the linear one
   cav_next_slip next_slip;       ///< slip over the step, the same way
   cav_stage_options first, last; ///< options of the first and of the last stage

@@ -23,6 +23,7 @@ const char *const cav_problem_regularisers[] = {CAV_REGULARISERS(WORD_TEXT) NULL
 const char *const cav_problem_slidings[] = {CAV_SLIDINGS(WORD_TEXT) NULL};
 const char *const cav_problem_next_gaps[] = {CAV_NEXT_GAPS(WORD_TEXT) NULL};
 const char *const cav_problem_next_slips[] = {CAV_NEXT_SLIPS(WORD_TEXT) NULL};
+const char *const cav_problem_solids[] = {CAV_SOLIDS(WORD_TEXT) NULL};
 const char *const cav_problem_norms[] = {[CAV_NORM_SQUARE] = "square", [CAV_NORM_ABSOLUTE] = "absolute", NULL};
 const char *const cav_problem_mirrors[] = {
     [CAV_MIRROR_NONE] = "none", [CAV_MIRROR_X] = "x", [CAV_MIRROR_Y] = "y", NULL};
@@ -287,7 +288,8 @@ static const cav_xml_element schedule = {
         WHOLE("stages", "16", "number of stages, geometric from first to last"),
         WORD("sliding", cav_problem_slidings, "coulomb", "law of contacts that slide, from three quarters of the stages on"),
         WORD("next_gap", cav_problem_next_gaps, "linear", "gap after a step that contacts see, from half of the stages on"),
-        WORD("next_slip", cav_problem_next_slips, "linear", "slip over a step that contacts see, from half of the stages on")),
+        WORD("next_slip", cav_problem_next_slips, "linear", "slip over a step that contacts see, from half of the stages on"),
+        WORD("solids", cav_problem_solids, "hard", "how the world begins: grow where the guess runs into solids")),
     CHILDREN(&schedule_first, &schedule_last), 0, "continuation from soft, blurred contacts to hard, sharp ones"};
 #define IPOPT(name, type, least, most, strict, words, text) TEXT(#name, "(Ipopt's own, or what the stages set)", text),
 static const cav_xml_element ipopt = {

@@ -491,6 +491,7 @@ static cav_status read_schedule(const cav_problem_reader *reader) {
     return cav_xml_fail(reader->error, node, "stages", "expected 1 to 1000, got %d", schedule->stages);
   }
   schedule->sliding = (cav_sliding)cav_xml_word(node, "sliding", schedule->sliding);
+  schedule->solids = (cav_solids)cav_xml_word(node, "solids", schedule->solids);
   schedule->next_gap = (cav_next_gap)cav_xml_word(node, "next_gap", schedule->next_gap);
   schedule->next_slip = (cav_next_slip)cav_xml_word(node, "next_slip", schedule->next_slip);
   int n;

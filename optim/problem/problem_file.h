@@ -46,6 +46,7 @@ extern const char *const cav_problem_stabilisations[];
 extern const char *const cav_problem_slidings[];
 extern const char *const cav_problem_next_gaps[];
 extern const char *const cav_problem_next_slips[];
+extern const char *const cav_problem_solids[];
 extern const char *const cav_problem_regularisers[];
 extern const char *const cav_problem_mirrors[];
 extern const char *const cav_problem_norms[];

@@ -40,6 +40,9 @@ static const double SLIDES_FROM = 0.75;
 // cheetah-jump are not certified
 static const double LOOKS_FROM = 0.5;
 
+// depth in m from which contacts grow no stiffer at first and from GROWN_FROM of the way on, where solids grow
+static const double SATURATION = 0.02, SATURATION_END = 2, GROWN_FROM = 0.7;
+
 cav_stage_options cav_schedule_at(const cav_schedule *schedule, double x) {
   const cav_stage_options *a = &schedule->first, *b = &schedule->last;
   cav_stage_options stage = x < 1 ? *a : *b;
@@ -58,6 +61,9 @@ void cav_stage_law(const cav_problem *problem, double x, double step, cav_option
   law->sliding = x >= SLIDES_FROM || slides(problem) ? problem->schedule.sliding : CAV_SLIDING_CONVEX;
   law->next_gap = x >= LOOKS_FROM ? problem->schedule.next_gap : CAV_NEXT_GAP_LINEAR;
   law->next_slip = x >= LOOKS_FROM ? problem->schedule.next_slip : CAV_NEXT_SLIP_LINEAR;
+  law->saturation = problem->schedule.solids == CAV_SOLIDS_GROW && x < 1
+                        ? between(SATURATION, SATURATION_END, fmin(x / GROWN_FROM, 1))
+                        : 0;
 #define LAW_SAME(name) law->name = stage.name;
 #define LAW_STEPS(name) law->name = stage.name * step;
 #define LAW_NONE(name)

@@ -13,7 +13,7 @@
 /// so these serve all models. Ranges are expensive from the start: a motion that leans on a limit, whose force is free,
 /// would have to be found anew where the limit takes it away, and rows of ranges are all but linear, so a high penalty
 /// costs nothing.
-static const cav_penalties penalised = {.effort = 100, .range = 1e4, .term = 100};
+static const cav_penalties penalised = {.effort = 100, .range = 1e4, .term = 100, .depth = 1e5};
 enum { PENALTY_RISE = 100 };
 
 /// Augmented Lagrangian: rounds, iterations a round, tolerance of a round, and the unactuated force from which
@@ -47,6 +47,7 @@ void cav_stage_set(const cav_problem *problem, double x, cav_transcription *tr) 
   tr->penalty.effort = between(penalised.effort, PENALTY_RISE * penalised.effort, x);
   tr->penalty.range = between(penalised.range, PENALTY_RISE * penalised.range, x);
   tr->penalty.unactuated = cav_schedule_at(&problem->schedule, x).penalty;
+  tr->penalty.depth = problem->schedule.solids == CAV_SOLIDS_GROW && x < 1 ? penalised.depth : 0;
   tr->penalty.term = between(penalised.term, PENALTY_RISE * penalised.term, fmin(2 * x, 1));
 }
 

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "clear.h"
 #include "continuation.h"
 #include "file.h"
 #include "math3.h"
@@ -25,17 +26,6 @@ static const double near_ground = 0.01;
 static double smoothstep(double s) {
   s = fmin(fmax(s, 0), 1);
   return s * s * (3 - 2 * s);
-}
-
-/// Raises the roots that can rise.
-static void lift(const cav_model *m, double height, double *q) {
-  for (int j = 0; j < m->njoint; j++) {
-    const cav_joint *joint = &m->joint[j];
-    int root = m->link[joint->link].parent == 0;
-    int vertical = joint->type == CAV_JOINT_SLIDE && fabs(joint->axis[2]) > 0.9;
-    if (root && joint->type == CAV_JOINT_FREE) q[joint->q + 2] += height;
-    if (root && vertical) q[joint->q] += copysign(height, joint->axis[2]);
-  }
 }
 
 /// Turns the first free joint by a fraction of the guess's rotation.
@@ -143,9 +133,10 @@ cav_status cav_guess_fill(const cav_problem *problem, const double *end, cav_tra
     if (problem->guess != CAV_GUESS_PUMP) follow(problem, end, time, tangent, q);
     swing(problem, time, q);
     rotation(problem, smoothstep(x), q);
-    if (x > 0 && x < 1) lift(m, 4 * problem->guess_height * x * (1 - x), q);
+    if (x > 0 && x < 1) cav_lift(m, 4 * problem->guess_height * x * (1 - x), q);
   }
   if (!problem->cycle.on && problem->guess != CAV_GUESS_PUMP) status = roll(problem, at);
+  if (!status && problem->schedule.solids == CAV_SOLIDS_GROW && !problem->cycle.on) status = cav_clear(m, at);
   memcpy(at->v, problem->v_start, (size_t)m->nv * sizeof(double));
   cav_trajectory_velocities(m, at);
   return status;

@@ -166,9 +166,10 @@ static void describe(const cav_problem *p, cav_strategy *s) {
     if (number[i].differs) snprintf(out + n, room - n, number[i].format, number[i].value);
   }
   size_t n = strlen(out);
-  snprintf(out + n, room - n, "%s%s%s", s->order != p->order ? ", order=\"momentum\"" : "",
+  snprintf(out + n, room - n, "%s%s%s%s", s->order != p->order ? ", order=\"momentum\"" : "",
            s->schedule.sliding != p->schedule.sliding ? ", sliding=\"convex\"" : "",
-           s->schedule.next_gap != p->schedule.next_gap ? ", next_gap=\"exact\"" : "");
+           s->schedule.next_gap != p->schedule.next_gap ? ", next_gap=\"exact\"" : "",
+           s->schedule.solids != p->schedule.solids ? ", solids=\"grow\"" : "");
   if (*out) memmove(out, out + 2, strlen(out + 2) + 1);
 }
 

@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "clear.h"
 #include "continuation.h"
 #include "leap.h"
 #include "periodicity.h"
@@ -169,8 +170,7 @@ static int is_recorded(const cav_problem *problem) {
 }
 
 cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[CAV_STRATEGIES], int *n) {
-  const cav_strategy stated = {
-      .guess = problem->guess, .stated = 1, .order = problem->order, .schedule = problem->schedule};
+  cav_strategy stated = {.guess = problem->guess, .stated = 1, .order = problem->order, .schedule = problem->schedule};
   *n = 0;
   add(strategy, n, &stated, "stated", "the problem's guess and schedule");
   if (is_recorded(problem)) {
@@ -190,6 +190,17 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   if (status != CAV_OK) return status;
   if (swings_up)
     add(strategy, n, &pump, "pump", "energy pumped in, too little at a time for the way from start to goal");
+
+  int collides = 0;
+  status = problem->schedule.solids == CAV_SOLIDS_GROW ? CAV_OK : cav_guess_collides(problem, &collides);
+  if (status != CAV_OK) return status;
+  if (collides) {
+    // all others would run into them, too; what this one misses is mended first
+    stated.schedule.solids = CAV_SOLIDS_GROW;
+    add(strategy, n, &stated, "solids",
+        "lifted out of the solids that the guess runs into, which grow from soft to hard");
+    add_repairs(strategy, n, &stated);
+  }
 
   cav_strategy soft = stated;
   soft.schedule.first.smoothing *= SOFTER;
@@ -225,7 +236,7 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
     exact.order = CAV_ORDER_MOMENTUM, exact.first_midpoint = 1, exact.use = CAV_STRATEGY_MOMENTUM;
     add(strategy, n, &exact, "momentum", "under the order of momentum, from a motion of the midpoint order");
   }
-  if (!problem->cycle.on) add_repairs(strategy, n, &stated);
+  if (!problem->cycle.on && !collides) add_repairs(strategy, n, &stated);
   // what a swing-up takes is told by cav_problem_pumping
   cav_strategy longer = stated;
   longer.use = CAV_STRATEGY_DIAGNOSIS;

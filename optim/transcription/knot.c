@@ -132,6 +132,8 @@ static row_count knot_rows(const cav_transcription *tr, const int *key, int t) {
   n.dense += (size_t)tr->nv;
   if (tr->constraints_only) return n;
   n.rows += (size_t)has_duration(tr, t);
+  for (int k = 0; k < tr->knot[t].ncontact && tr->penalty.depth > 0; k++)
+    n.rows += !tr->knot[t].moving[k], n.dense += !tr->knot[t].moving[k];
   for (int k = 0; k < tr->npenalised && tr->knot[t].has_force; k++)
     n.rows++, n.dense += stands_alone(&tr->penalised[k]);
   for (int i = 0; i < tr->problem->nterm; i++) {
@@ -516,9 +518,22 @@ static void add_contact(cav_sum *a, const cav_term *term, double weight) {
     for (int i = part.first; i < part.first + part.n; i++) {
       int row = CAV_CONTACT_READINGS * k + i;
       double r = a->knot->y[row], w = weight;
+      if (term->quantity == CAV_QUANTITY_GAP && r < 0) r = w = 0; // it is deep: add_depths
       begin_cost(a, term, term->scale, &w, &r);
       add_dense(a, w, r, a->knot->dy + (size_t)row * 3 * a->tr->nv);
     }
+  }
+}
+
+/// What depth in the world costs on the way.
+static void add_depths(cav_sum *a) {
+  double weight = a->tr->penalty.depth * a->tr->options.timestep;
+  for (int k = 0; k < a->knot->ncontact && weight > 0; k++) {
+    int row = CAV_CONTACT_READINGS * k;
+    if (a->knot->moving[k]) continue;
+    double r = fmin(a->knot->y[row], 0), w = r < 0 ? weight : 0;
+    begin_row(a, w, r);
+    add_dense(a, w, r, a->knot->dy + (size_t)row * 3 * a->tr->nv);
   }
 }
 
@@ -580,6 +595,7 @@ static void add_costs(cav_sum *a, const double *q, const double *v, const double
     begin_row(a, weight, r);
     add_force(a, weight, r, &tr->penalised[k]);
   }
+  add_depths(a);
   // the duration's own penalty
   if (!has_duration(tr, a->t)) return;
   double duration = (tr->nknot - 1) * tr->options.timestep;

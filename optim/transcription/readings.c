@@ -32,6 +32,11 @@ static double contact_weight(const cav_transcription *tr, const cav_contact *c, 
   return root - contact_floor / root;
 }
 
+/// Whether a contact with the world is so deep that it costs: its first reading is then the depth, negative.
+static int is_deep(const cav_transcription *tr, const cav_contact *c) {
+  return tr->penalty.depth > 0 && c->dist < -CAV_DEPTH_FREE;
+}
+
 static void read_contact(const cav_transcription *tr, const cav_contact *c, double *y) {
   memset(y, 0, CAV_CONTACT_READINGS * sizeof *y);
   if (!tr->model->pair[c->pair].external) {
@@ -39,7 +44,7 @@ static void read_contact(const cav_transcription *tr, const cav_contact *c, doub
     return;
   }
   double fraction = contact_weight(tr, c, NULL);
-  y[0] = fraction * fmax(c->dist, 0);
+  y[0] = is_deep(tr, c) ? c->dist + CAV_DEPTH_FREE : fraction * fmax(c->dist, 0);
   y[1] = c->dim > 1 ? fraction * c->velocity_next[1] : 0;
   y[2] = c->dim > 1 ? fraction * c->velocity_next[2] : 0;
   y[3] = fraction * c->velocity_next[0];
@@ -100,7 +105,8 @@ int cav_readings_list(cav_transcription *tr, cav_scratch *s, int t) {
     for (int k = 0; k < s->state->ncontact; k++) {
       const cav_contact *c = &s->state->contact[k];
       int self = !tr->model->pair[c->pair].external;
-      if (self ? c->dist > 0 : c->impulse[0] < contact_floor * tr->options.timestep * tr->weight) continue;
+      int idle = c->impulse[0] < contact_floor * tr->options.timestep * tr->weight && !is_deep(tr, c);
+      if (self ? c->dist > 0 : idle) continue;
       moving[ncontact] = (char)self;
       s->key[2 * ncontact] = c->pair;
       s->key[2 * ncontact++ + 1] = c->feature;
@@ -194,6 +200,11 @@ static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s
     blend(n, by_impulse, d.impulse_dq, fraction, k == 0 ? open : 1, by_q[k], out.dq);
     blend(n, by_impulse, d.impulse_dv, 0, 0, NULL, out.dv);
     blend(n, by_impulse, d.impulse_dv_next, fraction, 1, by_next[k], out.dn);
+  }
+  if (is_deep(tr, c)) {
+    memcpy(out.dq - 4 * n, d.dist_dq, n * sizeof(double));
+    memset(out.dv - 4 * n, 0, n * sizeof(double));
+    memset(out.dn - 4 * n, 0, n * sizeof(double));
   }
   double unit = c->impulse[0] > 0 ? 1 / (tr->options.timestep * tr->weight) : 0;
   blend(n, unit, d.impulse_dq, 0, 0, NULL, out.dq);

@@ -46,6 +46,9 @@ enum { CAV_ROTATION_SIZE = 21 };
 /// Readings of a contact: gap or depth, slip (2), impact, force.
 enum { CAV_CONTACT_READINGS = 5 };
 
+/// Depth of a contact with the world that costs nothing where depth costs, m.
+#define CAV_DEPTH_FREE 0.002
+
 /// One knot. Columns of its derivatives: tangent increments of q_{t-1}, q_t, q_{t+1}; those of knots that are not
 /// unknowns are zero. In cycles q_{-1}, q_0 and q_{T+1} are the unknowns of q_{T-1}, q_T and q_1 moved: columns of
 /// hessian, gradient, step_row and slot_row are of the unknowns themselves, those of du and dy of the knots beside.
@@ -88,6 +91,7 @@ typedef struct cav_knot {
 /// Weights of the augmented Lagrangian, per kind of row.
 typedef struct cav_penalties {
   double unactuated, effort, range, term;
+  double depth; ///< 1/m^2, of contacts with the world beyond CAV_DEPTH_FREE; 0: none
 } cav_penalties;
 
 /// What a servo's bias adds to its row: control = effort over gain - constant - sum of weights times q and v of dofs,

@@ -1,0 +1,107 @@
+/// Guesses lifted out of what stands in the world: where the line from start to goal goes through a solid there is no way
+/// to the outside that a solver could follow. At each knot the least lift straight up that frees the model; then so smooth a
+/// course above these that no step is taken in less than half a second.
+#include "clear.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "continuation.h"
+
+/// Depth that is free, m; least step upwards of the search, and how many of them.
+static const double touching = 1e-3, step = 0.01;
+enum { STEPS = 500 };
+
+/// Depth in a solid from which a guess runs into it, m.
+static const double deep = 0.01;
+
+/// Time over which the course looks ahead and back, s.
+static const double ahead = 0.25;
+
+void cav_lift(const cav_model *m, double height, double *q) {
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    int root = m->link[joint->link].parent == 0;
+    int vertical = joint->type == CAV_JOINT_SLIDE && fabs(joint->axis[2]) > 0.9;
+    if (root && joint->type == CAV_JOINT_FREE) q[joint->q + 2] += height;
+    if (root && vertical) q[joint->q] += copysign(height, joint->axis[2]);
+  }
+}
+
+/// How deep the model is in the world at a configuration: in all of it, or in solids alone, of which grounds are none.
+static cav_status depth_at(const cav_model *m, cav_state *state, const double *q, int solids, double *depth) {
+  cav_status status = cav_position(m, state, q);
+  *depth = 0;
+  for (int i = 0; i < state->ncontact && !status; i++) {
+    const cav_contact *c = &state->contact[i];
+    const cav_pair *pair = &m->pair[c->pair];
+    if (c->link1 > 0 && c->link2 > 0) continue;
+    cav_geom_type type = m->geom[c->link1 == 0 ? pair->geom1 : pair->geom2].type;
+    if (!solids || (type != CAV_GEOM_PLANE && type != CAV_GEOM_HFIELD)) *depth = fmax(*depth, -c->dist);
+  }
+  return status;
+}
+
+cav_status cav_clear(const cav_model *m, cav_trajectory *at) {
+  int n = at->nknot, w = (int)ceil(ahead / at->timestep);
+  cav_state *state = cav_state_new(m);
+  double *room = calloc(3 * (size_t)n, sizeof *room), *lift = room, *wide = room + n, *course = room + 2 * n;
+  cav_status status = state && room ? CAV_OK : CAV_NO_MEMORY;
+  for (int t = 1; t < n && !status; t++) {
+    double *q = at->q + (size_t)t * at->nq, depth = 1;
+    for (int k = 0; k < STEPS && !status; k++) {
+      status = depth_at(m, state, q, 0, &depth);
+      if (depth <= touching) break;
+      double up = fmax(depth, step);
+      cav_lift(m, up, q);
+      lift[t] += up;
+    }
+  }
+  for (int t = 0; t < n && !status; t++)
+    for (int k = -w; k <= w; k++)
+      if (t + k >= 0 && t + k < n) wide[t] = fmax(wide[t], lift[t + k]);
+  for (int t = 1; t < n && !status; t++) {
+    double sum = 0, weights = 0;
+    for (int k = -w; k <= w; k++) {
+      double weight = 1 + cos(M_PI * k / (w + 1));
+      weights += weight;
+      if (t + k >= 0) sum += weight * wide[t + k < n ? t + k : n - 1];
+    }
+    course[t] = sum / weights;
+    double rest = t < n - 1 ? fmax(course[t] - lift[t], 0) : 0;
+    cav_lift(m, rest, at->q + (size_t)t * at->nq);
+  }
+  cav_state_free(state);
+  free(room);
+  return status;
+}
+
+/// Whether a model may touch a solid of the world at all.
+static int has_solid(const cav_model *m) {
+  for (int i = 0; i < m->npair; i++)
+    for (int k = 0; k < 2; k++) {
+      const cav_geom *geom = &m->geom[k ? m->pair[i].geom2 : m->pair[i].geom1];
+      if (geom->link == 0 && geom->type != CAV_GEOM_PLANE && geom->type != CAV_GEOM_HFIELD) return 1;
+    }
+  return 0;
+}
+
+cav_status cav_guess_collides(const cav_problem *problem, int *collides) {
+  const cav_model *m = problem->model;
+  *collides = 0;
+  if (problem->cycle.on || !has_solid(m)) return CAV_OK;
+  int n = (int)lround(problem->duration / problem->timestep) + 1;
+  cav_problem stated = *problem;
+  stated.schedule.solids = CAV_SOLIDS_HARD;
+  cav_trajectory *at = cav_trajectory_new(m, n, problem->timestep);
+  cav_state *state = cav_state_new(m);
+  cav_status status = at && state ? cav_guess_fill(&stated, problem->q_goal, at) : CAV_NO_MEMORY;
+  for (int t = 0; t < n && !status && !*collides; t++) {
+    double depth = 0;
+    status = depth_at(m, state, at->q + (size_t)t * at->nq, 1, &depth);
+    *collides = depth > deep;
+  }
+  cav_state_free(state);
+  cav_trajectory_free(at);
+  return status;
+}

@@ -1,0 +1,16 @@
+/// Guesses lifted out of solids. Private to optim/solver.
+#ifndef CAVORT_CLEAR_H
+#define CAVORT_CLEAR_H
+
+#include "cavort/problem.h"
+
+/// Raises the roots that can rise.
+void cav_lift(const cav_model *m, double height, double *q);
+
+/// Lifts the knots of a guess out of the world, but the first.
+cav_status cav_clear(const cav_model *model, cav_trajectory *guess);
+
+/// Whether the problem's guess runs into a solid of the world, by a centimetre or more.
+cav_status cav_guess_collides(const cav_problem *problem, int *collides);
+
+#endif
