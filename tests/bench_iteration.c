@@ -2,8 +2,9 @@
 /// (linearisation, factor and trials), ten each in the schedule's first, middle and last stage, one after the other; and
 /// of a stance from which every joint is moved a little, split into dynamics with derivatives, assembly and
 /// factorisation, by method of derivatives. Times are the shortest of several runs, those of whole iterations the processor's.
-/// Instructions are the processor's own count, where the system gives it. Usage: bench_iteration [PROBLEM [count]];
-/// default problems/motions/squat-jump; count: whole iterations alone, once, for a profiler.
+/// Instructions are the processor's own count, where the system gives it. Usage: bench_iteration [PROBLEM [count|threads]];
+/// default problems/motions/squat-jump; count: whole iterations alone, once, for a profiler; threads: one iteration of each
+/// stage by one and by two threads in turns, the least of many by the clock on the wall.
 #include <linux/perf_event.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -95,6 +96,39 @@ static void whole(const cav_problem *p, cav_transcription *tr, cav_normal *norma
   if (events >= 0) close(events);
 }
 
+// one iteration of a stage from a motion; seconds
+static double once(const cav_problem *p, cav_transcription *tr, cav_normal *normal, const cav_trajectory *from,
+                   int stage, double *merit) {
+  cav_trajectory *at = cav_trajectory_copy(from), *spare = cav_trajectory_copy(from);
+  cav_region region = {.iterations = 1};
+  double seconds = NAN;
+  if (CHECK(at && spare)) {
+    cav_stage_set(p, 0.5 * stage, tr);
+    const double start = bench_seconds();
+    CHECK(cav_region_minimise(&region, normal, tr, &at, &spare) == CAV_OK);
+    seconds = bench_seconds() - start;
+    *merit = cav_transcription_merit(tr);
+  }
+  cav_trajectory_free(at), cav_trajectory_free(spare);
+  return seconds;
+}
+
+// both numbers of threads by turns
+static void compare_threads(const cav_problem *p, const cav_trajectory *from) {
+  static const char *const names[] = {"first", "middle", "last"};
+  for (int s = 0; s < 3; s++) {
+    double best[2] = {INFINITY, INFINITY}, merit[2] = {0};
+    cav_transcription *tr[2] = {cav_transcription_new(p, 1, NULL), cav_transcription_new(p, 2, NULL)};
+    cav_normal *normal[2] = {tr[0] ? cav_normal_new(tr[0]) : NULL, tr[1] ? cav_normal_new(tr[1]) : NULL};
+    for (int r = 0; r < 40 * RUNS && CHECK(normal[0] && normal[1]); r++)
+      for (int k = 0; k < 2; k++) best[k] = fmin(best[k], 1e3 * once(p, tr[k], normal[k], from, s, &merit[k]));
+    CHECK(!memcmp(&merit[0], &merit[1], sizeof *merit));
+    printf("%-6s stage, one iteration: one thread %6.3f ms, two threads %6.3f ms, ratio %.2f\n", names[s], best[0],
+           best[1], best[0] / best[1]);
+    for (int k = 0; k < 2; k++) cav_normal_free(normal[k]), cav_transcription_free(tr[k]);
+  }
+}
+
 int main(int argc, char **argv) {
   static const char *const names[] = {"one-sided", "centred", "analytic"};
   cav_error error = {0};
@@ -113,8 +147,12 @@ int main(int argc, char **argv) {
   shake(at, p->model, 0.02);
   int count = argc > 2 && !strcmp(argv[2], "count");
   printf("%s: %d dofs, %d knots, step %g s\n", p->name, tr->nv, tr->nknot, p->timestep);
-  whole(p, tr, normal, at, count ? 1 : RUNS);
-  for (int s = 0; s < 3 && !count; s++) {
+  const int threads = argc > 2 && !strcmp(argv[2], "threads");
+  if (threads)
+    compare_threads(p, at);
+  else
+    whole(p, tr, normal, at, count ? 1 : RUNS);
+  for (int s = 0; s < 3 && !count && !threads; s++) {
     cav_stage_set(p, 0.5 * s, tr);
     printf("%s stage\n", s == 0 ? "first" : s == 1 ? "middle" : "last");
     for (int k = 0; k < 3; k++) {

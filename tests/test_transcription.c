@@ -392,6 +392,45 @@ static void test_threads(const cav_problem *p, cav_transcription *one, cav_traje
   cav_transcription_free(two);
 }
 
+/// Knots that are gathered and factored on the way by 1 to 4 threads, against one after the other: the same bits.
+static void test_stream(const cav_problem *p, cav_transcription *one, cav_trajectory *at) {
+  size_t n = (size_t)cav_transcription_unknowns(one), bytes = n * sizeof(double);
+  cav_normal *normal = cav_normal_new(one);
+  double *x = malloc(bytes), *y = malloc(bytes);
+  int entries = cav_normal_entries(normal, NULL, NULL, NULL);
+  double *value = malloc((size_t)entries * sizeof *value), *other = malloc((size_t)entries * sizeof *other);
+  CHECK(cav_transcription_linearise(one, at) == CAV_OK);
+  cav_normal_gather(normal, one);
+  CHECK(cav_normal_factor(normal, 1e-6) == CAV_OK);
+  cav_normal_entries(normal, NULL, NULL, value);
+  cav_normal_solve(normal, normal->gradient, x);
+  for (int threads = 1; threads <= 4; threads++) {
+    cav_transcription *tr = cav_transcription_new(p, threads, NULL);
+    cav_normal *way = tr ? cav_normal_new(tr) : NULL;
+    if (!CHECK(way != NULL)) return;
+    tr->options = one->options;
+    tr->penalty = one->penalty;
+    for (int t = 0; t < one->nknot; t++)
+      memcpy(tr->knot[t].slot, one->knot[t].slot, (size_t)one->knot[t].layout.count * sizeof(cav_slot));
+    for (int turn = 0; turn < 4; turn++) {
+      cav_status factored = CAV_NOT_CONVERGED;
+      CHECK(cav_normal_linearise(way, tr, at, 1e-6, &factored) == CAV_OK && factored == CAV_OK);
+      cav_normal_entries(way, NULL, NULL, other);
+      cav_normal_solve(way, way->gradient, y);
+      CHECK(!memcmp(normal->gradient, way->gradient, bytes) && !memcmp(normal->diagonal, way->diagonal, bytes));
+      CHECK(!memcmp(value, other, (size_t)entries * sizeof *value) && !memcmp(x, y, bytes));
+      // nothing later than a knot that fails is taken
+      tr->knot[one->nknot / 2].slot->multiplier = NAN;
+      CHECK(cav_normal_linearise(way, tr, at, 1e-6, &factored) == CAV_NOT_FINITE);
+      tr->knot[one->nknot / 2].slot->multiplier = one->knot[one->nknot / 2].slot->multiplier;
+    }
+    cav_normal_free(way);
+    cav_transcription_free(tr);
+  }
+  cav_normal_free(normal);
+  free(x), free(y), free(value), free(other);
+}
+
 /// Solutions and products of normal equations against those of the dense matrix that their entries make.
 static void test_normal(cav_transcription *tr, cav_trajectory *at) {
   cav_normal *normal = cav_normal_new(tr);
@@ -497,6 +536,7 @@ static void test_scene(const char *scene, closing close, cav_order order) {
   test_return(tr, at);
   test_controls(tr, at);
   test_threads(&p, tr, at);
+  test_stream(&p, tr, at);
   test_normal(tr, at);
   test_rows(tr, at, 60);
   cav_trajectory_free(at);
@@ -552,6 +592,7 @@ static void test_apart(int cyclic, int touching, int free_step) {
     cav_normal_gather(normal, tr);
     CHECK(cav_normal_groups(normal, &most) == (touching ? 3 : 4) && most == (touching ? 12 : 6));
     cav_normal_free(normal);
+    test_stream(&p, tr, at);
     test_normal(tr, at);
     cav_trajectory_free(at);
   }

@@ -282,21 +282,26 @@ static int factor_triangle(const lanes *w, const panel *p, triangle *L, double *
   return 1;
 }
 
-int cav_dense_factor_blocks(int n, int below, int step, double *A, int lda) {
+int cav_dense_factor_part(int n, int below, int step, int from, int ready, double *A, int lda) {
   const lanes *w = way();
   size_t ld = (size_t)lda;
   _Alignas(64) triangle L;
-  for (int start = 0; start < n; start += PANEL) {
+  for (int start = from; start < n; start += PANEL) {
     panel p = panel_at(start, n, below, step);
-    if (!factor_triangle(w, &p, &L, A, ld)) return 0;
+    int columns = p.end - start, last = p.last[columns - 1], rest = last - p.end;
+    if (last > ready) return start;
+    if (!factor_triangle(w, &p, &L, A, ld)) return -1;
     reduce_rows(w, &p, reduce_strips(w, &p, &L, A, ld), A, ld);
     // and the panel from all columns after it
-    int columns = p.end - start, rest = p.last[columns - 1] - p.end;
     for (int c = 0; c < columns; c++) p.last[c] -= p.end;
     operand rows = {.at = A + (size_t)start * ld + p.end, .by_row = 1, .by_column = ld, .end = p.last};
     if (rest > 0) product(CAV_PART_LOWER, rest, rest, columns, -1, &rows, &rows, A + (size_t)p.end * (ld + 1), ld);
   }
-  return 1;
+  return n;
+}
+
+int cav_dense_factor_blocks(int n, int below, int step, double *A, int lda) {
+  return cav_dense_factor_part(n, below, step, 0, n, A, lda) == n;
 }
 
 int cav_dense_factor(int n, int below, double *A, int lda) { return cav_dense_factor_blocks(n, below, 1, A, lda); }

@@ -33,6 +33,10 @@ void cav_dense_solve_upper(int n, int below, const double *L, int lda, int m, do
 /// The same of a band whose columns end by blocks of `step`: column j's last row is the (j / step) * step + below of it,
 /// so those after it within `below` of the diagonal stay untouched too.
 int cav_dense_factor_blocks(int n, int below, int step, double *A, int lda);
+
+/// The same from column `from` on, which an earlier call returned, 0 at first, as far as what is changed lies in the first
+/// `ready` columns; -1 if a pivot is not positive. Parts make the factor of the whole, to its bits.
+int cav_dense_factor_part(int n, int below, int step, int from, int ready, double *A, int lda);
 void cav_dense_solve_lower_blocks(int n, int below, int step, const double *L, int lda, int m, double *X, int ldx);
 void cav_dense_solve_upper_blocks(int n, int below, int step, const double *L, int lda, int m, double *X, int ldx);
 

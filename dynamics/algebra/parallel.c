@@ -99,3 +99,41 @@ void cav_parallel_for(cav_parallel *team, int n, void (*body)(void *context, int
   while (team->busy > 0) pthread_cond_wait(&team->done, &team->mutex);
   pthread_mutex_unlock(&team->mutex);
 }
+
+/// A loop whose items are followed in their order.
+typedef struct order {
+  void (*body)(void *, int, int);
+  void (*then)(void *, int);
+  void *context;
+  cav_parallel_flag *ready;
+  int n;
+  atomic_int next; ///< the first that was not followed
+  atomic_flag busy;
+} order;
+
+static int is_ready(order *o) {
+  const int next = atomic_load(&o->next);
+  return next < o->n && atomic_load(&o->ready[next]);
+}
+
+static void follow(void *context, int item, int member) {
+  order *o = context;
+  o->body(o->context, item, member);
+  atomic_store(&o->ready[item], 1);
+  // an item that gets ready while another member is busy is found by that one, or by this one after it
+  while (is_ready(o) && !atomic_flag_test_and_set(&o->busy)) {
+    while (is_ready(o)) {
+      o->then(o->context, atomic_load(&o->next));
+      atomic_fetch_add(&o->next, 1);
+    }
+    atomic_flag_clear(&o->busy);
+  }
+}
+
+void cav_parallel_then(cav_parallel *team, int n, void (*body)(void *context, int item, int member),
+                       void (*then)(void *context, int item), void *context, cav_parallel_flag *ready) {
+  order o = {.body = body, .then = then, .context = context, .ready = ready, .n = n, .busy = ATOMIC_FLAG_INIT};
+  atomic_init(&o.next, 0);
+  for (int i = 0; i < n; i++) atomic_store(&ready[i], 0);
+  cav_parallel_for(team, n, follow, &o);
+}

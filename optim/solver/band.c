@@ -4,9 +4,16 @@
 
 #include "dense.h"
 
+cav_status cav_band_factor_part(cav_band *band, int ready) {
+  int below = band->width - 1;
+  if (band->done >= 0)
+    band->done = cav_dense_factor_part(band->core, below, band->step, band->done, ready, band->A, below);
+  return band->done >= 0 ? CAV_OK : CAV_NOT_CONVERGED;
+}
+
 cav_status cav_band_factor(cav_band *band) {
   int core = band->core, border = band->border, below = band->width - 1, step = band->step;
-  if (!cav_dense_factor_blocks(core, below, step, band->A, below)) return CAV_NOT_CONVERGED;
+  if (cav_band_factor_part(band, core) != CAV_OK) return CAV_NOT_CONVERGED;
   if (border == 0) return CAV_OK;
   cav_dense_solve_lower_blocks(core, below, step, band->A, below, border, band->Y, core);
   cav_dense_product_transposed(CAV_PART_LOWER, border, border, core, -1, band->Y, core, band->Y, core, band->S, border);

@@ -65,11 +65,10 @@ static void find_cauchy(dogleg *d) {
   d->cauchy_norm = scaled_norm(d, d->cauchy);
 }
 
-/// Newton point of the gathered equations; the shift grows until the factor exists.
-static cav_status prepare(dogleg *d, cav_normal *normal) {
+/// Newton point of the gathered equations, which have been factored with the jitter; the shift grows until the factor exists.
+static cav_status prepare(dogleg *d, cav_normal *normal, cav_status status) {
   const double *gradient = normal->gradient;
-  cav_status status = CAV_NOT_CONVERGED;
-  for (double shift = jitter; status == CAV_NOT_CONVERGED && shift < 1; shift *= 100)
+  for (double shift = 100 * jitter; status == CAV_NOT_CONVERGED && shift < 1; shift *= 100)
     status = cav_normal_factor(normal, shift);
   if (status != CAV_OK) return status;
   for (int i = 0; i < d->size; i++) {
@@ -129,12 +128,13 @@ static int step_is_held(const cav_transcription *tr, const cav_trajectory *at, d
          (at->timestep >= most * (1 - DBL_EPSILON) && change > 0);
 }
 
-/// Newton point at a trajectory whose normal equations are gathered.
-static cav_status prepare_at(dogleg *d, cav_normal *normal, const cav_transcription *tr, const cav_trajectory *at) {
-  cav_status status = prepare(d, normal);
+/// Newton point at a trajectory whose normal equations are gathered and factored.
+static cav_status prepare_at(dogleg *d, cav_normal *normal, const cav_transcription *tr, const cav_trajectory *at,
+                             cav_status factored) {
+  cav_status status = prepare(d, normal, factored);
   if (status != CAV_OK || !tr->free_step || !step_is_held(tr, at, d->newton[d->size - 1])) return status;
   cav_normal_hold(normal);
-  return prepare(d, normal);
+  return prepare(d, normal, cav_normal_factor(normal, jitter));
 }
 
 /// A step tried, and what came of it.
@@ -211,10 +211,10 @@ cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_trans
   region->stalled = region->settled = 0;
   cav_status status = CAV_OK;
   for (int i = 0; i < region->iterations && calm < 2; i++) {
-    if ((status = cav_transcription_linearise(tr, *at)) != CAV_OK) break;
+    cav_status factored = CAV_OK;
+    if ((status = cav_normal_linearise(normal, tr, *at, jitter, &factored)) != CAV_OK) break;
     double merit = cav_transcription_merit(tr), start = now();
-    cav_normal_gather(normal, tr);
-    if ((status = prepare_at(&d, normal, tr, *at)) != CAV_OK) break;
+    if ((status = prepare_at(&d, normal, tr, *at, factored)) != CAV_OK) break;
     region->seconds_linear += now() - start;
     if (!(region->radius > 0)) {
       find_cauchy(&d);

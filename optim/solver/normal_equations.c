@@ -204,20 +204,28 @@ void cav_normal_add_diagonal(cav_normal *normal, const double *diagonal) {
   find_groups(normal);
 }
 
-void cav_normal_gather(cav_normal *normal, const cav_transcription *tr) {
-  int n = normal->n;
-  cav_normal_clear(normal);
-  for (int t = 0; t < tr->nknot; t++) {
-    const cav_knot *knot = &tr->knot[t];
-    cav_normal_add_block(normal, tr, t, knot->hessian, knot->step_row, knot->step_square);
-    for (int c = 0; c < 3; c++) {
-      int column = cav_transcription_block(tr, t, c);
-      for (int j = 0; column >= 0 && j < n; j++) normal->gradient[column * n + j] += knot->gradient[c * n + j];
-    }
-    if (normal->free_step) normal->gradient[normal->size - 1] += knot->step_derivative;
+/// Adds a knot's Hessian and gradient.
+static void gather_knot(cav_normal *normal, const cav_transcription *tr, int t) {
+  const cav_knot *knot = &tr->knot[t];
+  const int n = normal->n;
+  cav_normal_add_block(normal, tr, t, knot->hessian, knot->step_row, knot->step_square);
+  for (int c = 0; c < 3; c++) {
+    int column = cav_transcription_block(tr, t, c);
+    for (int j = 0; column >= 0 && j < n; j++) normal->gradient[column * n + j] += knot->gradient[c * n + j];
   }
+  if (normal->free_step) normal->gradient[normal->size - 1] += knot->step_derivative;
+}
+
+/// The diagonal, and groups of what is joined, once all is gathered.
+static void find_diagonal(cav_normal *normal) {
   for (int j = 0; j < normal->size; j++) normal->diagonal[j] = *entry_of(normal, j, j);
   find_groups(normal);
+}
+
+void cav_normal_gather(cav_normal *normal, const cav_transcription *tr) {
+  cav_normal_clear(normal);
+  for (int t = 0; t < tr->nknot; t++) gather_knot(normal, tr, t);
+  find_diagonal(normal);
 }
 
 const double *cav_normal_gradient(const cav_normal *normal) { return normal->gradient; }
@@ -262,12 +270,10 @@ static void fill_column(const cav_normal *normal, const int *unknown, int n, int
   for (; i < end; i++) A[i - j] = 0;
 }
 
-/// Copies the part of H that is a group's into its band, the diagonal shifted.
-static void fill_group(cav_normal *normal, int g, double shift) {
-  cav_band *band = &normal->group[g];
-  const int *unknown = unknowns_of(normal, g);
-  int n = normal->first[g + 1] - normal->first[g];
-  for (int j = 0; j < band->core; j++) {
+/// Copies columns of the part of H that is a group's into its band, the diagonal shifted.
+static void fill_columns(cav_normal *normal, cav_band *band, const int *unknown, int n, int from, int to,
+                         double shift) {
+  for (int j = from; j < to; j++) {
     if (normal->ngroup == 1) {
       memcpy(band->A + (size_t)j * band->width, normal->H + (size_t)j * band->width,
              (size_t)band->width * sizeof(double));
@@ -275,9 +281,14 @@ static void fill_group(cav_normal *normal, int g, double shift) {
       fill_column(normal, unknown, n, j, band);
     }
     band->A[(size_t)j * band->width] = lifted(normal, unknown[j], shift);
+  }
+}
+
+/// Copies what its border has.
+static void fill_border(const cav_normal *normal, cav_band *band, const int *unknown, double shift) {
+  for (int j = 0; j < band->core; j++)
     for (int i = 0; i < band->border; i++)
       band->Y[(size_t)i * band->core + j] = *entry_of(normal, unknown[band->core + i], unknown[j]);
-  }
   for (int j = 0; j < band->border; j++) {
     int column = unknown[band->core + j];
     double *S = band->S + (size_t)j * band->border;
@@ -309,21 +320,70 @@ static cav_status factor_arrow(cav_normal *normal, double shift) {
   return pivot > 0 ? CAV_OK : CAV_NOT_CONVERGED;
 }
 
+/// The band of a group at a place, which is moved behind it.
+static cav_band *place_band(cav_normal *normal, int g, double **at) {
+  cav_band *band = &normal->group[g];
+  int n = normal->first[g + 1] - normal->first[g];
+  *band = (cav_band){.core = normal->core / normal->n * n, .width = 3 * n, .step = n, .A = *at};
+  band->border = normal->blocks * n - band->core + (normal->free_step && !has_arrow(normal));
+  band->Y = band->A + (size_t)band->core * band->width;
+  band->S = band->Y + (size_t)band->core * band->border;
+  *at = band->S + (size_t)band->border * band->border;
+  return band;
+}
+
 cav_status cav_normal_factor(cav_normal *normal, double shift) {
   double *at = normal->factor;
   cav_status status = CAV_OK;
   for (int g = 0; g < normal->ngroup && status == CAV_OK; g++) {
-    cav_band *band = &normal->group[g];
-    int n = normal->first[g + 1] - normal->first[g];
-    *band = (cav_band){.core = normal->core / normal->n * n, .width = 3 * n, .step = n, .A = at};
-    band->border = normal->blocks * n - band->core + (normal->free_step && !has_arrow(normal));
-    band->Y = band->A + (size_t)band->core * band->width;
-    band->S = band->Y + (size_t)band->core * band->border;
-    at = band->S + (size_t)band->border * band->border;
-    fill_group(normal, g, shift);
+    cav_band *band = place_band(normal, g, &at);
+    const int *unknown = unknowns_of(normal, g);
+    fill_columns(normal, band, unknown, band->step, 0, band->core, shift);
+    fill_border(normal, band, unknown, shift);
     status = cav_band_factor(band);
   }
   return status == CAV_OK && has_arrow(normal) ? factor_arrow(normal, shift) : status;
+}
+
+/// Knots that are taken one after the other.
+typedef struct stream {
+  cav_normal *normal;
+  const cav_transcription *tr;
+  double shift;
+  int whole; ///< one group whatever is gathered, and no later knot comes back to the first: factored on the way
+} stream;
+
+static void take_knot(void *context, int t) {
+  const stream *s = context;
+  cav_normal *normal = s->normal;
+  cav_band *band = normal->group;
+  gather_knot(normal, s->tr, t);
+  // the next two knots add to all blocks but these
+  int last = t + 1 < s->tr->nknot ? (t - s->tr->first) * normal->n : band->core;
+  if (!s->whole || last <= normal->filled) return;
+  for (int j = normal->filled; j < last; j++) normal->diagonal[j] = *entry_of(normal, j, j);
+  fill_columns(normal, band, normal->unknown, normal->n, normal->filled, last, s->shift);
+  normal->filled = last;
+  cav_band_factor_part(band, last);
+}
+
+cav_status cav_normal_linearise(cav_normal *normal, cav_transcription *tr, cav_trajectory *at, double shift,
+                                cav_status *factored) {
+  stream s = {.normal = normal, .tr = tr, .shift = shift, .whole = normal->ntree == 1 && !normal->cyclic};
+  double *place = normal->factor;
+  cav_normal_clear(normal);
+  normal->filled = 0;
+  if (s.whole) find_groups(normal), place_band(normal, 0, &place);
+  cav_status status = cav_transcription_linearise_then(tr, at, take_knot, &s);
+  if (status != CAV_OK) return status;
+  find_diagonal(normal);
+  if (s.whole) {
+    fill_border(normal, normal->group, normal->unknown, shift);
+    *factored = cav_band_factor(normal->group);
+  } else {
+    *factored = cav_normal_factor(normal, shift);
+  }
+  return CAV_OK;
 }
 
 void cav_normal_solve(const cav_normal *normal, const double *b, double *x) {

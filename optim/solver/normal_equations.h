@@ -27,6 +27,7 @@ typedef struct cav_normal {
   double *factor, *x; ///< room of all factors; [size] right-hand side of one group
   double *arrow; ///< [2*size] row of a free step beside several groups, and their inverse times it with its pivot last
   double *room;  ///< [5*size] of a method's iteration
+  int filled;    ///< columns of the only group's band that are in its factor's place
 } cav_normal;
 
 /// Of the unknowns of a transcription; NULL if memory runs out.
@@ -35,6 +36,11 @@ void cav_normal_free(cav_normal *normal);
 
 /// Sums the knots' Hessians and gradients. gradient and diagonal stay readable until the next call, [unknowns].
 void cav_normal_gather(cav_normal *normal, const cav_transcription *transcription);
+
+/// The knots linearised at a trajectory, gathered, and factored with a shift; knot by knot where there is one tree and no
+/// cycle, while other threads linearise later ones, with the bits of one after the other. *factored: as cav_normal_factor.
+cav_status cav_normal_linearise(cav_normal *normal, cav_transcription *transcription, cav_trajectory *trajectory,
+                                double shift, cav_status *factored);
 const double *cav_normal_gradient(const cav_normal *normal);
 const double *cav_normal_diagonal(const cav_normal *normal);
 

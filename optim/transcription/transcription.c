@@ -275,7 +275,8 @@ cav_transcription *cav_transcription_new(const cav_problem *problem, int threads
   if (!list_force_rows(tr)) goto memory;
   tr->knot = calloc((size_t)tr->nknot, sizeof *tr->knot);
   tr->status = calloc((size_t)tr->nknot, sizeof *tr->status);
-  if (!tr->knot || !tr->status) goto memory;
+  tr->ready = calloc((size_t)tr->nknot, sizeof *tr->ready);
+  if (!tr->knot || !tr->status || !tr->ready) goto memory;
   for (int t = 0; t < tr->nknot; t++)
     if (!knot_new(tr, t)) goto memory;
   return tr;
@@ -309,8 +310,8 @@ void cav_transcription_free(cav_transcription *tr) {
   free(tr->servo), free(tr->limited);
   free(tr->unactuated), free(tr->penalised), free(tr->effort), free(tr->effort_range), free(tr->effort_unit),
       free(tr->rotation_dof), free(tr->rotation_of);
-  free(tr->knot), free(tr->status), free(tr->scratch), free(tr->before), free(tr->start), free(tr->rotation_after),
-      free(tr->window);
+  free(tr->knot), free(tr->status), free(tr->ready), free(tr->scratch), free(tr->before), free(tr->start),
+      free(tr->rotation_after), free(tr->window);
   cav_periodicity_free(tr->periodicity);
   cav_parallel_free(tr->pool);
   free(tr);
@@ -410,7 +411,10 @@ typedef struct pass {
   cav_transcription *tr;
   cav_trajectory *at;
   int jacobian;
-  cav_status *status; ///< [nknot]
+  cav_status *status;                 ///< [nknot]
+  void (*take)(void *context, int t); ///< NULL: nothing follows
+  void *context;
+  int failed; ///< a knot before those that follow
 } pass;
 
 /// Residuals of all rows at a step shorter (1) or longer (2) by a small fraction, with the knots where they are.
@@ -519,6 +523,12 @@ static void evaluate_item(void *context, int t, int member) {
   p->status[t] = evaluate_knot(p, &p->tr->scratch[member], t);
 }
 
+static void follow_item(void *context, int t) {
+  pass *p = context;
+  p->failed = p->failed || p->status[t] != CAV_OK;
+  if (!p->failed) p->take(p->context, t);
+}
+
 /// Rotation Jacobians of one step with velocity v.
 static void prepare_rotation(const cav_transcription *tr, const double *v, double *rotation) {
   for (int k = 0; k < tr->nrotation; k++) {
@@ -561,7 +571,8 @@ cav_status cav_transcription_conclude(cav_transcription *tr, const cav_status *s
   return status[t];
 }
 
-static cav_status evaluate(cav_transcription *tr, cav_trajectory *at, int jacobian) {
+static cav_status evaluate(cav_transcription *tr, cav_trajectory *at, int jacobian, void (*take)(void *context, int t),
+                           void *context) {
   double start = now(), dynamics = 0;
   int members = cav_parallel_size(tr->pool);
   cav_status *status = tr->status;
@@ -570,8 +581,11 @@ static cav_status evaluate(cav_transcription *tr, cav_trajectory *at, int jacobi
   cav_term_windows(tr);
   if (jacobian) prepare_rotations(tr, at);
   for (int i = 0; i < members; i++) tr->scratch[i].seconds = 0;
-  pass p = {tr, at, jacobian, status};
-  cav_parallel_for(tr->pool, tr->nknot, evaluate_item, &p);
+  pass p = {.tr = tr, .at = at, .jacobian = jacobian, .status = status, .take = take, .context = context};
+  if (take)
+    cav_parallel_then(tr->pool, tr->nknot, evaluate_item, follow_item, &p, tr->ready);
+  else
+    cav_parallel_for(tr->pool, tr->nknot, evaluate_item, &p);
   for (int i = 0; i < members; i++) dynamics += tr->scratch[i].seconds / members;
   // values alone are dynamics: a clock at every knot would take a twentieth of their time
   if (!jacobian) dynamics = now() - start;
@@ -595,7 +609,7 @@ int cav_transcription_stopped(const cav_transcription *tr) {
 }
 
 cav_status cav_transcription_values(cav_transcription *tr, cav_trajectory *at) {
-  return cav_transcription_stopped(tr) ? CAV_INTERRUPTED : evaluate(tr, at, 0);
+  return cav_transcription_stopped(tr) ? CAV_INTERRUPTED : evaluate(tr, at, 0, NULL, NULL);
 }
 
 cav_status cav_transcription_return(cav_transcription *tr, cav_trajectory *at) {
@@ -608,7 +622,12 @@ cav_status cav_transcription_return(cav_transcription *tr, cav_trajectory *at) {
 }
 
 cav_status cav_transcription_linearise(cav_transcription *tr, cav_trajectory *at) {
-  return cav_transcription_stopped(tr) ? CAV_INTERRUPTED : evaluate(tr, at, 1);
+  return cav_transcription_linearise_then(tr, at, NULL, NULL);
+}
+
+cav_status cav_transcription_linearise_then(cav_transcription *tr, cav_trajectory *at,
+                                            void (*take)(void *context, int t), void *context) {
+  return cav_transcription_stopped(tr) ? CAV_INTERRUPTED : evaluate(tr, at, 1, take, context);
 }
 
 // ---------------------------------------------------------------- sums over knots

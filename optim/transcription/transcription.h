@@ -147,8 +147,9 @@ typedef struct cav_transcription {
   cav_knot *knot;              ///< [nknot]
   struct cav_scratch *scratch; ///< one a thread
   cav_parallel *pool;
-  cav_status *status; ///< [nknot] of an evaluation
-  cav_error failure;  ///< what a quantity of one's own refused in the last one; CAV_BAD_INPUT: from then on, all end
+  cav_status *status;       ///< [nknot] of an evaluation
+  cav_parallel_flag *ready; ///< [nknot]
+  cav_error failure; ///< what a quantity of one's own refused in the last one; CAV_BAD_INPUT: from then on, all end
   double seconds_dynamics, seconds_assembly;
 } cav_transcription;
 
@@ -193,6 +194,11 @@ void cav_kept_free(struct cav_kept *kept);
 
 /// Values and derivatives: du, dy, hessian and gradient of the merit of every knot.
 cav_status cav_transcription_linearise(cav_transcription *transcription, cav_trajectory *trajectory);
+
+/// The same, and take(context, t) for each knot once its derivatives are there, one call at a time and in ascending order,
+/// while other threads do those of later knots; none from a knot that failed on.
+cav_status cav_transcription_linearise_then(cav_transcription *transcription, cav_trajectory *trajectory,
+                                            void (*take)(void *context, int t), void *context);
 
 /// Gives rows with an absolute norm duals, all 0, from which their Hessians are taken until they are dropped; 0 if memory
 /// runs out. absolute.c.
