@@ -1,6 +1,7 @@
 /// Time of the inverse against MuJoCo's mj_inverse: the same states of the same model in one run, the two by turns, by
 /// number of constraint rows. A time is the shortest of several short runs of one state; shown are the median over
-/// states and the middle half. Prints the work done beside the time, and the fraction of the stages of ours.
+/// states and the middle half. Then by the same bins batches of 1000 states, of the drawn ones and of knots of paths that
+/// begin there: means over a batch. Prints the work done beside the time, and the fraction of the stages of ours.
 /// Usage: bench_inverse [MODEL]; default mujoco/humanoid.xml among the shared models.
 #include "bench.h"
 #include "step.h"
@@ -97,6 +98,89 @@ static void report(sample bin[BINS][PER_BIN], const int *count) {
            quantile(s, n, 0.5, from_position), quantile(s, n, 0.5, ratio), quantile(s, n, 0.25, ratio),
            quantile(s, n, 0.75, ratio));
   }
+}
+
+enum { PATH = 25, ROWS = PATH * PER_BIN, CHUNK = 10 };
+
+/// Rows of a batch, one after the other; of MuJoCo's accelerations.
+typedef struct rows {
+  double *q, *v, *v_next, *a, *u;
+} rows;
+
+static rows new_rows(void) {
+  return (rows){scene_vector(ROWS * m->nq), scene_vector(ROWS * m->nv), scene_vector(ROWS * m->nv),
+                scene_vector(ROWS * m->nv), scene_vector(ROWS * m->nv)};
+}
+
+static void free_rows(rows *r) { free(r->q), free(r->v), free(r->v_next), free(r->a), free(r->u); }
+
+// the states of a bin in turn, or from each of them a path of knots on which accelerations fade away
+static void fill_rows(const sample *bin, int n, int paths, rows *r) {
+  const double h = model->timestep;
+  const size_t nq = (size_t)m->nq, nv = (size_t)m->nv;
+  for (size_t i = 0; i < ROWS; i++) {
+    const sample *s = bin + (paths ? (int)i / PATH : (int)i) % n;
+    double *q = r->q + i * nq, *v = r->v + i * nv, *a = r->a + i * nv;
+    if (paths && i % PATH) {
+      cav_integrate(model, q - nq, v - nv, h, q);
+      for (size_t k = 0; k < nv; k++) v[k] = 0.98 * v[k - nv] + h * a[k - nv], a[k] = 0.9 * a[k - nv];
+    } else {
+      memcpy(q, s->q, nq * sizeof *q), memcpy(v, s->v, nv * sizeof *v), memcpy(a, s->a, nv * sizeof *a);
+    }
+    for (size_t k = 0; k < nv; k++) r->v_next[i * nv + k] = v[k] + h * a[k];
+  }
+}
+
+// one chunk of MuJoCo's, s; the farthest that ours is from it
+static double time_chunk(const rows *r, size_t from, double *far) {
+  const size_t nq = (size_t)m->nq, nv = (size_t)m->nv;
+  double took = 0;
+  for (size_t i = from; i < from + CHUNK; i++) {
+    mju_copy(d->qpos, r->q + i * nq, m->nq);
+    mju_copy(d->qvel, r->v + i * nv, m->nv);
+    mju_copy(d->qacc, r->a + i * nv, m->nv);
+    double t = bench_seconds();
+    mj_inverse(m, d);
+    took += bench_seconds() - t;
+    for (size_t j = 0; j < nv; j++) {
+      double expected = d->qfrc_inverse[j] + m->dof_damping[j] * m->opt.timestep * d->qacc[j];
+      *far = fmax(*far, fabs(expected - r->u[i * nv + j]) / (1 + mju_norm(d->qfrc_inverse, m->nv)));
+    }
+  }
+  return took;
+}
+
+// microseconds a row, by turns: ours least of several batches, theirs of several runs of each chunk; whether both see the same
+static int time_rows(rows *r, double *theirs_us, double *ours_us) {
+  double far = 0, least[ROWS / CHUNK];
+  *theirs_us = 0, *ours_us = INFINITY;
+  for (int c = 0; c < ROWS / CHUNK; c++) least[c] = INFINITY;
+  for (int k = 0; k < RUNS; k++) {
+    double t = bench_seconds();
+    cav_inverse_batch(model, NULL, 1, ROWS, r->q, r->v, r->v_next, r->u, NULL);
+    *ours_us = fmin(*ours_us, (bench_seconds() - t) * 1e6 / ROWS);
+    for (int c = 0; c < ROWS / CHUNK; c++) least[c] = fmin(least[c], time_chunk(r, (size_t)(c * CHUNK), &far));
+  }
+  for (int c = 0; c < ROWS / CHUNK; c++) *theirs_us += least[c] * 1e6 / ROWS;
+  return far < 1e-9;
+}
+
+static void batches(sample bin[BINS][PER_BIN], const int *count) {
+  printf("batches of %d, means: %-10s %10s %8s %7s | %s\n", ROWS, "states", "mj_inverse", "ours", "ratio",
+         "knots of paths, the same");
+  rows r = new_rows();
+  for (int b = 0; b < BINS; b++) {
+    printf("rows at the start %3d - %-3d %10s", b == 0 ? 0 : (b - 1) * WIDTH + 1, b * WIDTH, "");
+    for (int paths = 0; paths < 2 && count[b] > 0; paths++) {
+      double theirs_us, ours_us;
+      fill_rows(bin[b], count[b], paths, &r);
+      int same = time_rows(&r, &theirs_us, &ours_us);
+      printf("%s %7.2f us %5.2f us %7.3f%s", paths ? " |" : "", theirs_us, ours_us, ours_us / theirs_us,
+             same ? "" : ", u differs");
+    }
+    printf("\n");
+  }
+  free_rows(&r);
 }
 
 // stages of one call, over all samples
@@ -256,6 +340,7 @@ int main(int argc, char **argv) {
   printf("%s: nv %d, %d pairs, h %g s, %d states left out because u differs\n", path, model->nv, model->npair,
          model->timestep, refused);
   report(bin, count);
+  batches(bin, count);
   stages(bin, count);
   jacobians(bin, count);
   for (int b = 0; b < BINS; b++) {

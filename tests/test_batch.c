@@ -1,5 +1,7 @@
 /// Batches of points against the single calls, bit by bit, at one to five threads: a humanoid that stands, falls and lies,
-/// and a scene with every kind of joint. A row that fails is told, and takes no other with it.
+/// and a scene with every kind of joint. A row that fails is told, and takes no other with it. Inverses of many more
+/// scenes, by options that change what is evaluated, in random states and along paths: four at once give the bits of one.
+#include "four_states.h"
 #include "scene.h"
 
 enum { ROWS = 203, THREADS = 5 };
@@ -116,6 +118,123 @@ static void test_failures(points *p) {
   CHECK(cav_inverse_batch(p->model, NULL, 4, 0, p->q, p->v, p->next, p->found, NULL) == CAV_OK);
 }
 
+// how often four states were taken at once
+static int fours;
+void __real_cav_lanes_kinematics(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES],
+                                 cav_extent extent);
+void __wrap_cav_lanes_kinematics(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES],
+                                 cav_extent extent);
+void __wrap_cav_lanes_kinematics(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES],
+                                 cav_extent extent) {
+  fours++;
+  __real_cav_lanes_kinematics(model, lanes, state, extent);
+}
+
+enum { MANY = 1000, PATH = 25 };
+
+// states in blocks: of every other block the rows follow one another in small steps; some with angles beyond any table of sines
+static void draw_many(const cav_model *model, double *q, double *v, double *next) {
+  const int nq = model->nq, nv = model->nv;
+  double *scratch = scene_vector(nv);
+  for (int i = 0; i < MANY; i++) {
+    double *at = row(q, i, nq);
+    if (i / PATH % 2 && i % PATH) {
+      cav_integrate(model, at - nq, row(v, i - 1, nv), 0.01, at);
+      memcpy(row(v, i, nv), row(next, i - 1, nv), (size_t)nv * sizeof *v);
+    } else {
+      scene_posture(model, at, scratch, 0.4);
+      if (model->joint[0].type == CAV_JOINT_FREE) at[2] -= 0.3 * (i % 10) / 10;
+      scene_normals(row(v, i, nv), nv, 0.5);
+    }
+    const cav_joint *last = &model->joint[model->njoint - 1];
+    if (i % 97 == 13 && last->type == CAV_JOINT_HINGE) at[last->q] += 3e5;
+    for (int j = 0; j < nv; j++) row(next, i, nv)[j] = row(v, i, nv)[j] + 0.05 * scene_normal();
+  }
+  free(scratch);
+}
+
+// rows of a batch that have not the bits of their own evaluation
+static int count_different(const cav_model *model, const cav_options *options, const double *q, const double *v,
+                           const double *next, int n) {
+  const size_t nq = (size_t)model->nq, nv = (size_t)model->nv;
+  double *found = scene_vector(MANY * model->nv), *u = scene_vector(model->nv);
+  cav_status status[MANY];
+  cav_state *state = cav_state_new(model);
+  state->options = *options;
+  cav_inverse_batch(model, options, 1, n, q, v, next, found, status);
+  int different = 0;
+  for (size_t i = 0; i < (size_t)n; i++) {
+    memset(u, 0, nv * sizeof *u);
+    different += cav_inverse(model, state, q + i * nq, v + i * nv, next + i * nv, u) != status[i];
+    different += !same(u, found + i * nv, model->nv);
+  }
+  cav_state_free(state);
+  free(found), free(u);
+  return different;
+}
+
+// one scene by its own options, and in fewer rows by others
+static void test_scene(cav_model *model, const char *name) {
+  if (!CHECK(model != NULL)) return;
+  double *q = scene_vector(MANY * model->nq), *v = scene_vector(MANY * model->nv),
+         *next = scene_vector(MANY * model->nv);
+  draw_many(model, q, v, next);
+  cav_options options[8];
+  for (int k = 0; k < 8; k++) options[k] = model->options;
+  options[1].order = CAV_ORDER_MIDPOINT, options[1].gravity = 0;
+  options[2].order = CAV_ORDER_MOMENTUM;
+  options[3].stabilisation = CAV_STABILISATION_DISCRETE, options[3].smoothing = 0.01, options[3].smoothing_self = 0.002;
+  options[4] = options[3], options[4].next_gap = CAV_NEXT_GAP_EXACT, options[4].next_slip = CAV_NEXT_SLIP_EXACT;
+  options[5].regulariser = CAV_REGULARISER_EXACT;
+  options[6].coupled = 1, options[6].stabilisation = CAV_STABILISATION_DISCRETE;
+  options[7].constraint = 0, options[7].passive = 0;
+  for (int k = 0; k < 8; k++) {
+    int n = !k ? MANY : options[k].coupled ? 8 : 40, before = fours;
+    int different = count_different(model, &options[k], q, v, next, n);
+    if (!CHECK(different == 0)) printf("%s, options %d: %d of %d rows differ\n", name, k, different, n);
+    CHECK(!cav_lanes_pay() || fours - before == n / 32 * 8 + n % 32 / 4);
+  }
+  free(q), free(v), free(next);
+  cav_model_free(model);
+}
+
+// everything that a single state alone does after its poses: gravity compensation, a medium, spatial tendons, connects and welds,
+// and a ball with limits
+static const char scene_rest[] =
+    "<mujoco><compiler angle='radian'/><option density='1.2' viscosity='0.01' wind='1 0 0'/><worldbody>"
+    "<geom type='plane' size='1 1 1'/><site name='over' pos='0 0 2'/>"
+    "<body name='a' pos='0 0 0.6' gravcomp='0.5'><freejoint/><geom type='capsule' size='.05 .2' mass='2'/>"
+    "<site name='on' pos='0 0 .2'/>"
+    "<body name='b' pos='0 0 .2'><joint type='ball' pos='.02 0 0' range='0 1' limited='true' stiffness='3' "
+    "damping='.1'/>"
+    "<geom type='box' size='.05 .1 .2' pos='0 0 .3' mass='1'/>"
+    "<body name='c' pos='0 0 .5' quat='.8 .6 0 0'><joint type='hinge' axis='1 2 3' pos='0 0 .03' range='-1 1' "
+    "limited='true'/>"
+    "<geom type='sphere' size='.06' mass='1'/></body></body></body>"
+    "<body name='d' pos='.5 0 .3'><joint type='slide' axis='0 0 1' frictionloss='1'/><joint type='hinge' axis='0 1 0'/>"
+    "<geom type='ellipsoid' size='.1 .2 .05' mass='1'/></body>"
+    "<body name='e' pos='-.5 0 .3'><freejoint/><geom type='cylinder' size='.1 .1' mass='1'/></body></worldbody>"
+    "<tendon><spatial stiffness='20' springlength='.3'><site site='over'/><site site='on'/></spatial></tendon>"
+    "<equality><connect body1='e' anchor='0 0 .3'/><weld body1='a' body2='d'/></equality></mujoco>";
+
+static void test_scenes(void) {
+  static const char *const ours[] = {"humanoid", "robot", "quadruped", "arm", "hopper"};
+  const char *shared = check_shared_models();
+  char path[4200];
+  cav_error error = {0};
+  for (size_t i = 0; i < sizeof ours / sizeof *ours; i++) {
+    snprintf(path, sizeof path, "%s/problems/models/%s.xml", CAVORT_SOURCE_ROOT, ours[i]);
+    test_scene(cav_model_load(path, &error), ours[i]);
+  }
+  test_scene(scene_load(scene_joints), "every joint");
+  test_scene(scene_load(scene_rest), "the rest");
+  if (!shared) return;
+  snprintf(path, sizeof path, "%s/unitree/g1/scene_29dof.xml", shared);
+  test_scene(cav_model_load(path, &error), "G1 with meshes");
+  snprintf(path, sizeof path, "%s/mujoco/humanoid.xml", shared);
+  test_scene(cav_model_load(path, &error), "MuJoCo's humanoid");
+}
+
 int main(void) {
   cav_error error = {0};
   points p = draw(cav_model_load(CAVORT_SOURCE_ROOT "/problems/models/humanoid.xml", &error));
@@ -129,6 +248,7 @@ int main(void) {
   test_inverse(&p);
   test_jacobian(&p, CAV_DERIVATIVE_FORWARD);
   release(&p);
+  test_scenes();
   printf("%d of %d postures touch\n", touching, ROWS);
   return check_result();
 }

@@ -7,49 +7,13 @@
 #include <assert.h>
 #include <stdlib.h>
 
+#include "broad.h"
 #include "cavort/dynamics.h"
-#include "constraint.h"
-#include "fixed.h"
+#include "four_states.h"
 #include "math3.h"
-#include "sweep.h"
 
 // fastest approach that the discrete law meets without a jump, m/s (a fall from 1.3 m)
 static const double APPROACH_SPEED = 5;
-
-/// A pair as the broad phase wants it: all it reads, in order.
-typedef struct candidate {
-  int first, second;               ///< slots
-  int pair;                        ///< its number
-  short int plane;                 ///< 1 if the first geom is a plane
-  signed char external, expensive; ///< as in the pair; 1 if one of the two is a mesh, whose search is worth saving
-  double margin;                   ///< of the pair
-  double bound;                    ///< sum of bounding radii; of the second geom alone if the first is a plane
-} candidate;
-
-/// A geom in some pair.
-typedef struct slot {
-  const cav_geom *geom;
-  int turned; ///< shape.rotation is valid; of planes always
-  int fixed;  ///< moves with the world: placed once
-  cav_shape shape;
-} slot;
-
-struct cav_geom_cache {
-  size_t bytes;
-  int nslot;
-  slot *slot;
-  int nmoving, *moving; ///< slots that are not fixed
-  double (*centre)[3];  ///< [nslot] world
-  candidate *candidate; ///< [npair], and behind them once more those that fixed never leaves out
-  int ntree, *tree;     ///< [ntree] root links of the trees with slots that move
-  double (*root)[3];    ///< [ntree] where these are
-  cav_fixed *fixed;     ///< NULL: there is little to leave out
-  cav_sweep *sweep;     ///< NULL: all pairs that are left are looked at
-  int sweep_from;
-  cav_hint *hint; ///< [npair] where the last searches ended; NULL: no pair is expensive
-  double margin;  ///< largest of all pairs
-  int expensive;  ///< some pair is
-};
 
 // places a geom fixed to the world, or prepares one that moves
 static void open_slot(const cav_model *model, const cav_geom *geom, slot *s, double centre[3]) {
@@ -250,7 +214,7 @@ static void place(const cav_state *state, struct cav_geom_cache *cache) {
     int i = cache->moving[k];
     slot *s = cache->slot + i;
     const cav_pose *link = state->link + s->geom->link;
-    transform(cache->centre[i], link->pos, link->rotation, s->geom->pos);
+    find_centre(s->geom, link->pos, link->rotation, cache->centre[i]);
     s->turned = 0;
     if (s->geom->type == CAV_GEOM_PLANE) refresh_rotation(state, cache, i);
   }
@@ -258,13 +222,9 @@ static void place(const cav_state *state, struct cav_geom_cache *cache) {
 
 // bounding spheres, or a plane and a sphere, closer than margin; inline: most of the search is this
 static inline int near(const struct cav_geom_cache *cache, const candidate *c, double margin) {
-  double d[3], activation = c->bound + margin;
-  sub3(d, cache->centre[c->second], cache->centre[c->first]);
-  if (c->plane) {
-    const double *R = cache->slot[c->first].shape.rotation;
-    return d[0] * R[2] + d[1] * R[5] + d[2] * R[8] < activation;
-  }
-  return activation > 0 && dot3(d, d) < activation * activation;
+  double normal[3];
+  if (c->plane) column3(normal, cache->slot[c->first].shape.rotation, 2);
+  return separation(c, cache->centre[c->first], cache->centre[c->second], normal) < limit_between(c, margin);
 }
 
 // how fast a point within radius of a place can move between two links, m/s; turn: the same of their rotation, rad/s
@@ -447,14 +407,23 @@ static int leave_out(const cav_state *state, struct cav_geom_cache *cache, doubl
                         nrun);
 }
 
+// reach is the margin plus one of two distances: found once, not per pair
+static void find_activations(const cav_state *state, double activation[2]) {
+  const cav_pair alone[2] = {{.external = 0}, {.external = 1}};
+  for (int k = 0; k < 2; k++) activation[k] = cav_contact_activation(state, alone + k);
+}
+
+static int seeks_contacts(const cav_model *model, const cav_state *state) {
+  return model->npair && state->options.contact && state->options.constraint;
+}
+
 cav_status cav_contacts_find(const cav_model *model, cav_state *state) {
   state->ncontact = 0;
-  if (!model->npair || !state->options.contact || !state->options.constraint) return CAV_OK;
+  if (!seeks_contacts(model, state)) return CAV_OK;
   struct cav_geom_cache *cache = state->work->geom;
   place(state, cache);
-  // reach is the margin plus one of two distances: found once, not per pair
-  const cav_pair alone[2] = {{.external = 0}, {.external = 1}};
-  double activation[2] = {cav_contact_activation(state, alone), cav_contact_activation(state, alone + 1)};
+  double activation[2];
+  find_activations(state, activation);
   double most = cache->margin + fmax(activation[0], activation[1]);
   cav_run all = {0, model->npair};
   const cav_run *run = &all;
@@ -463,6 +432,32 @@ cav_status cav_contacts_find(const cav_model *model, cav_state *state) {
   if (cache->sweep && count >= cache->sweep_from) return collide_swept(model, state, activation, most);
   for (int r = 0; r < nrun; r++) {
     cav_status status = collide_run(model, state, run[r], activation);
+    if (status) return status;
+  }
+  return CAV_OK;
+}
+
+int cav_contacts_near(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES]) {
+  const struct cav_geom_cache *cache = state[0]->work->geom;
+  if (!seeks_contacts(model, state[0]) || cache->expensive || cache->fixed || cache->sweep) return 0;
+  double activation[2];
+  find_activations(state[0], activation);
+  for (int k = 0; k < cache->nmoving; k++) {
+    if (cache->slot[cache->moving[k]].geom->type == CAV_GEOM_PLANE) return 0;
+    for (int lane = 0; lane < CAV_LANES; lane++) state[lane]->work->geom->slot[cache->moving[k]].turned = 0;
+  }
+  cav_lanes_near(model, lanes, state, activation);
+  return 1;
+}
+
+cav_status cav_contacts_of_near(const cav_model *model, cav_state *state, const cav_lanes *lanes, int lane) {
+  double activation[2];
+  state->ncontact = 0;
+  find_activations(state, activation);
+  for (int i = 0; i < lanes->nnear; i++) {
+    if (!(lanes->near[i] >> lane & 1)) continue;
+    const candidate *c = state->work->geom->candidate + lanes->near[i] / CAV_LANE_BITS;
+    cav_status status = collide_pair(model, state, c, c->margin + activation[c->external]);
     if (status) return status;
   }
   return CAV_OK;

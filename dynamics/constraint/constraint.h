@@ -3,6 +3,7 @@
 #ifndef CAVORT_CONSTRAINT_H
 #define CAVORT_CONSTRAINT_H
 
+#include "four_states.h"
 #include "geometry.h"
 #include "smooth.h"
 
@@ -25,6 +26,15 @@ cav_status cav_contacts_find(const cav_model *model, cav_state *state);
 static inline int cav_pair_has_mesh(const cav_model *model, const cav_pair *pair) {
   return model->geom[pair->geom1].type == CAV_GEOM_MESH || model->geom[pair->geom2].type == CAV_GEOM_MESH;
 }
+
+/// Pairs of four states whose bounds are near, into lanes, from their poses there; 0 without: the scene has what only a
+/// single state looks for. Then cav_contacts_find of one of them among those. collide.c.
+int cav_contacts_near(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES]);
+cav_status cav_contacts_of_near(const cav_model *model, cav_state *state, const cav_lanes *lanes, int lane);
+
+/// The pairs alone, by the margins that are added to those of pairs between links and with the world. broad_four.c.
+void cav_lanes_near(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES],
+                    const double activation[2]);
 
 /// Distance from which a pair's force is not negligible under the state's options.
 double cav_contact_activation(const cav_state *state, const cav_pair *pair);

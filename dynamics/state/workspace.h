@@ -60,6 +60,7 @@ typedef struct cav_workspace {
   // dofs, compact
   double *armature, *damping; ///< [nv]
   int *group;                 ///< [nv] 1 where a joint's dofs start (a free joint's rotation starts a second group)
+  int *turns;                 ///< [nv] 1 of a rotation, 0 of a translation
   int *parent;                ///< [nv] previous dof towards the root, -1
   int damped;                 ///< some dof has damping
 

@@ -8,6 +8,7 @@
 /// with J v_next at q.
 ///
 /// What a stage may reuse depends on the options too: after a change of those that positions depend on, all is new.
+#include "four_states.h"
 #include "half_step.h"
 #include "math3.h"
 #include "options.h"
@@ -17,18 +18,22 @@ static void copy(double *to, const double *from, int n) {
   if (n > 0 && to != from) { memcpy(to, from, (size_t)n * sizeof *to); }
 }
 
-// v NULL: all contacts; else those that bear something at v and v_next or may do so near them
-static cav_status find_position(const cav_model *model, cav_state *state, const double *q, const double *v,
-                                const double *v_next) {
-  cav_workspace *w = state->work;
+// whether a position can be evaluated at q; nothing of the last one holds
+static cav_status open_position(const cav_model *model, cav_state *state, const double *q) {
   state->work->valid = CAV_STAGE_NONE;
   state->ncontact = state->nrow = state->nequality = 0;
   if (!cav_options_valid(&state->options)) { return CAV_BAD_INPUT; }
-  if (!all_finite(q, model->nq)) { return CAV_NOT_FINITE; }
-  cav_kinematics(model, state, q);
-  cav_stabilisation_prepare(state);
-  cav_status status = cav_limits_find(model, state);
-  if (status) { return status; }
+  return all_finite(q, model->nq) ? CAV_OK : CAV_NOT_FINITE;
+}
+
+/// Contacts among pairs that are known to be near: those of one of four states.
+typedef struct nearby {
+  const cav_lanes *lanes;
+  int lane;
+} nearby;
+
+static cav_status find_contacts(const cav_model *model, cav_state *state, const double *v, const double *v_next) {
+  cav_workspace *w = state->work;
   w->narrowed = v && cav_contacts_narrow(state);
   if (w->narrowed) {
     copy(w->narrow_v, v, model->nv);
@@ -36,12 +41,23 @@ static cav_status find_position(const cav_model *model, cav_state *state, const 
     cav_link_velocities(model, state, w->narrow_v, w->velocity_now);
     cav_link_velocities(model, state, w->narrow_v + model->nv, state->velocity_next);
     if (cav_looks_ahead(&state->options)) {
-      status = cav_next_knot_new(model, state);
+      cav_status status = cav_next_knot_new(model, state);
       if (status) { return status; }
       cav_next_links_place(model, state, v_next);
     }
   }
-  status = cav_contacts_find(model, state);
+  return cav_contacts_find(model, state);
+}
+
+// all that is not smooth, at the state's poses. v NULL: all contacts; else those that bear something at v and v_next or may do so
+// near them. near, if not NULL, is where they are looked for
+static cav_status find_constraints(const cav_model *model, cav_state *state, const double *v, const double *v_next,
+                                   const nearby *near) {
+  cav_stabilisation_prepare(state);
+  cav_status status = cav_limits_find(model, state);
+  if (status) { return status; }
+  state->work->narrowed = 0;
+  status = near ? cav_contacts_of_near(model, state, near->lanes, near->lane) : find_contacts(model, state, v, v_next);
   if (status) { return status; }
   if (model->nequality) { cav_equality_evaluate(model, state); }
   cav_contacts_soften(state);
@@ -52,6 +68,14 @@ static cav_status find_position(const cav_model *model, cav_state *state, const 
   state->work->valid = CAV_STAGE_POSITION;
   state->work->options = state->options;
   return CAV_OK;
+}
+
+static cav_status find_position(const cav_model *model, cav_state *state, const double *q, const double *v,
+                                const double *v_next) {
+  cav_status status = open_position(model, state, q);
+  if (status) { return status; }
+  cav_kinematics(model, state, q);
+  return find_constraints(model, state, v, v_next, NULL);
 }
 
 cav_status cav_position(const cav_model *model, cav_state *state, const double *q) {
@@ -164,16 +188,23 @@ static void rows(cav_state *state, const double *v, const double *v_next, double
   }
 }
 
-// velocity of bias and passive forces, and acceleration; returns the velocity at which joint damping acts
-static const double *step_velocities(const cav_model *model, cav_state *state, double *bias, double *a) {
+/// Velocities [nv] of bias and passive forces, and at which joint damping acts; acceleration.
+typedef struct step_motion {
+  double *bias, *a;
+  const double *damped;
+} step_motion;
+
+static step_motion find_motion(const cav_model *model, cav_state *state) {
   const cav_workspace *w = state->work;
+  step_motion m = {.bias = w->scratch, .a = w->scratch + model->nv};
   int mean = cav_takes_mean(state);
   double inverse_h = 1 / state->options.timestep;
   for (int i = 0; i < model->nv; i++) {
-    a[i] = (w->v_next[i] - w->v[i]) * inverse_h;
-    bias[i] = mean ? 0.5 * (w->v[i] + w->v_next[i]) : w->v[i];
+    m.a[i] = (w->v_next[i] - w->v[i]) * inverse_h;
+    m.bias[i] = mean ? 0.5 * (w->v[i] + w->v_next[i]) : w->v[i];
   }
-  return mean ? bias : w->v_next;
+  m.damped = mean ? m.bias : w->v_next;
+  return m;
 }
 
 // v* of coupled rows: from the velocities of all at v, those of links at velocity_now
@@ -189,14 +220,10 @@ static void couple(const cav_model *model, cav_state *state, const double *veloc
   cav_coupled_targets(state);
 }
 
-static void evaluate(const cav_model *model, cav_state *state, int with_constraints, int new_velocity, double *u) {
+// on links, beside their inertia: what a medium and gravity compensation do, contacts and equality constraints
+static void push_links(const cav_model *model, cav_state *state, int with_constraints, int new_velocity) {
   cav_workspace *w = state->work;
-  w->derived = 0;
-  double *bias = w->scratch, *a = w->scratch + model->nv, scale = -1 / state->options.timestep;
-  const double *damped = step_velocities(model, state, bias, a);
-
-  // inertial forces of links, then contacts and equality constraints on them
-  cav_newton_euler(model, state, bias, w->v_next, a);
+  const double scale = -1 / state->options.timestep;
   if (state->options.order == CAV_ORDER_MOMENTUM) { cav_half_steps_forces(model, state); }
   if (w->nbuoy > 0) { cav_add_buoyancy(model, state); }
   if (w->nfloat > 0) { cav_add_fluid_forces(model, state); }
@@ -216,15 +243,26 @@ static void evaluate(const cav_model *model, cav_state *state, int with_constrai
     contacts(model, state, now, scale);
     if (state->nequality > 0) { cav_equality_impulses(model, state, w->v, now, w->v_next, scale); }
   }
+}
 
-  // up the tree, then what acts on dofs
+// what acts on dofs
+static void push_dofs(const cav_model *model, cav_state *state, int with_constraints, const step_motion *m, double *u) {
+  const cav_workspace *w = state->work;
+  const double scale = -1 / state->options.timestep;
+  cav_add_joint_forces(model, state, m->damped, m->a, u);
+  cav_add_tendon_forces(model, state, m->bias, u);
+  if (!with_constraints) { return; }
+  rows(state, w->v, w->v_next, scale, u);
+  if (state->nequality > 0) { cav_equality_apply(model, state, scale, u); }
+}
+
+static void evaluate(const cav_model *model, cav_state *state, int with_constraints, int new_velocity, double *u) {
+  state->work->derived = 0;
+  const step_motion m = find_motion(model, state);
+  cav_newton_euler(model, state, m.bias, state->work->v_next, m.a);
+  push_links(model, state, with_constraints, new_velocity);
   cav_force_project(model, state, u);
-  cav_add_joint_forces(model, state, damped, a, u);
-  cav_add_tendon_forces(model, state, bias, u);
-  if (with_constraints) {
-    rows(state, w->v, w->v_next, scale, u);
-    if (state->nequality > 0) { cav_equality_apply(model, state, scale, u); }
-  }
+  push_dofs(model, state, with_constraints, &m, u);
 }
 
 void cav_smooth_inverse(const cav_model *model, cav_state *state, const double *v, const double *v_next, double *u) {
@@ -246,6 +284,24 @@ void cav_state_point(const cav_state *state, const double **q, const double **v,
   if (v_next) *v_next = state->work->v_next;
 }
 
+// what only some options need
+static cav_status make_rooms(const cav_model *model, cav_state *state) {
+  cav_status status = CAV_OK;
+  if (state->options.order == CAV_ORDER_MOMENTUM) { status = cav_half_steps_new(model, state); }
+  if (!status && cav_looks_ahead(&state->options)) { status = cav_next_knot_new(model, state); }
+  return status;
+}
+
+// one number that is not finite anywhere before reaches the state's u
+static cav_status close_inverse(const cav_model *model, cav_state *state, double *u) {
+  cav_workspace *w = state->work;
+  if (!all_finite(state->u, model->nv)) { return CAV_NOT_FINITE; }
+  w->valid = CAV_STAGE_VELOCITY;
+  w->options = state->options;
+  copy(u, state->u, model->nv);
+  return CAV_OK;
+}
+
 cav_status cav_inverse_from(const cav_model *model, cav_state *state, cav_stage unchanged, const double *q,
                             const double *v, const double *v_next, double *u) {
   cav_workspace *w = state->work;
@@ -256,33 +312,93 @@ cav_status cav_inverse_from(const cav_model *model, cav_state *state, cav_stage 
     unchanged = CAV_STAGE_POSITION;
   // velocities move on from the same q: once all contacts, for any velocity
   int moved = unchanged != CAV_STAGE_NONE && w->narrowed && !is_within_reach(w, v, v_next, model->nv);
+  cav_status status = CAV_OK;
   if (moved || unchanged == CAV_STAGE_NONE) {
-    cav_status status = find_position(model, state, q, moved ? NULL : v, v_next);
+    status = find_position(model, state, q, moved ? NULL : v, v_next);
     if (status) { return status; }
     unchanged = CAV_STAGE_NONE;
   }
-  if (state->options.order == CAV_ORDER_MOMENTUM) {
-    cav_status status = cav_half_steps_new(model, state);
-    if (status) { return status; }
-  }
-  if (cav_looks_ahead(&state->options)) {
-    cav_status status = cav_next_knot_new(model, state);
-    if (status) { return status; }
-  }
+  status = make_rooms(model, state);
+  if (status) { return status; }
   copy(w->v, v, model->nv);
   copy(w->v_next, v_next, model->nv);
   w->valid = CAV_STAGE_POSITION;
   evaluate(model, state, 1, unchanged < CAV_STAGE_VELOCITY, state->u);
-
-  // one number that is not finite anywhere above reaches u
-  if (!all_finite(state->u, model->nv)) { return CAV_NOT_FINITE; }
-  w->valid = CAV_STAGE_VELOCITY;
-  w->options = state->options;
-  copy(u, state->u, model->nv);
-  return CAV_OK;
+  return close_inverse(model, state, u);
 }
 
 cav_status cav_inverse(const cav_model *model, cav_state *state, const double *q, const double *v, const double *v_next,
                        double *u) {
   return cav_inverse_from(model, state, CAV_STAGE_NONE, q, v, v_next, u);
+}
+
+// whether contacts and limits read nothing of a position but poses of links
+static int is_plain(const cav_model *model, const cav_state *state) {
+  const cav_workspace *w = state->work;
+  const cav_options *o = &state->options;
+  return !model->nequality && !w->nstring && !w->nbuoy && !w->nfloat && o->order != CAV_ORDER_MOMENTUM && !o->coupled &&
+         o->regulariser != CAV_REGULARISER_EXACT && !cav_looks_ahead(o) && !cav_contacts_narrow(state);
+}
+
+// motion of four states side by side
+static void gather_motions(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES],
+                           const step_motion m[CAV_LANES]) {
+  double *bias[CAV_LANES], *a[CAV_LANES], *v_next[CAV_LANES];
+  for (int l = 0; l < CAV_LANES; l++) bias[l] = m[l].bias, a[l] = m[l].a, v_next[l] = state[l]->work->v_next;
+  cav_lanes_gather(lanes->v, bias, model->nv);
+  cav_lanes_gather(lanes->a, a, model->nv);
+  cav_lanes_gather(lanes->v_next, v_next, model->nv);
+}
+
+// positions of four states; status [4]
+static void find_positions(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES],
+                           cav_extent extent, cav_status *status) {
+  cav_lanes_kinematics(model, lanes, state, extent);
+  const int listed = cav_contacts_near(model, lanes, state);
+  for (int l = 0; l < CAV_LANES; l++) {
+    cav_workspace *w = state[l]->work;
+    const nearby near = {lanes, l};
+    status[l] = find_constraints(model, state[l], w->v, w->v_next, listed ? &near : NULL);
+    if (!status[l]) status[l] = make_rooms(model, state[l]);
+  }
+}
+
+void cav_inverse_four(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES],
+                      const double *const q[CAV_LANES], const double *const v[CAV_LANES],
+                      const double *const v_next[CAV_LANES], double *const u[CAV_LANES], cav_status status[CAV_LANES]) {
+  int open = 1;
+  for (int l = 0; l < CAV_LANES && open; l++) open = !open_position(model, state[l], q[l]);
+  if (!open || !cav_lanes_pay()) {
+    for (int l = 0; l < CAV_LANES; l++) status[l] = cav_inverse(model, state[l], q[l], v[l], v_next[l], u[l]);
+    return;
+  }
+  for (int l = 0; l < CAV_LANES; l++) {
+    cav_workspace *w = state[l]->work;
+    copy(w->q, q[l], model->nq);
+    copy(w->v, v[l], model->nv);
+    copy(w->v_next, v_next[l], model->nv);
+    w->derived = 0;
+  }
+  const cav_extent extent = is_plain(model, state[0]) ? CAV_EXTENT_CONTACTS : CAV_EXTENT_ALL;
+  find_positions(model, lanes, state, extent, status);
+  step_motion m[CAV_LANES];
+  for (int l = 0; l < CAV_LANES; l++) m[l] = find_motion(model, state[l]);
+  gather_motions(model, lanes, state, m);
+
+  // links of states without contacts are left in the lanes
+  int pushed = extent == CAV_EXTENT_ALL;
+  for (int l = 0; l < CAV_LANES; l++) pushed |= state[l]->ncontact > 0;
+  cav_lanes_newton_euler(model, lanes, state, pushed);
+  for (int l = 0; l < CAV_LANES && pushed; l++) {
+    if (!status[l]) push_links(model, state[l], 1, 1);
+  }
+  double *found[CAV_LANES];
+  for (int l = 0; l < CAV_LANES; l++) found[l] = state[l]->u;
+  cav_lanes_project(model, lanes, state, pushed, found);
+  for (int l = 0; l < CAV_LANES; l++) {
+    if (status[l]) continue;
+    push_dofs(model, state[l], 1, &m[l], state[l]->u);
+    status[l] = close_inverse(model, state[l], u[l]);
+    state[l]->work->valid = CAV_STAGE_NONE;
+  }
 }

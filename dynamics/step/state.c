@@ -104,6 +104,7 @@ static size_t layout(const cav_model *model, char *base, cav_state *s, cav_works
   w->narrow_v = carve(base, &used, 2 * nv, d);
   w->scratch = carve(base, &used, 4 * nv, d);
   w->group = carve(base, &used, nv, i);
+  w->turns = carve(base, &used, nv, i);
   w->armature = carve(base, &used, nv, d);
   w->damping = carve(base, &used, nv, d);
   w->spring = carve(base, &used, c.springs, i);
@@ -153,6 +154,7 @@ static void compile_dofs(const cav_model *model, cav_workspace *w) {
     w->armature[i] = dof->armature;
     w->damping[i] = dof->damping;
     w->group[i] = k == 0 || (joint->type == CAV_JOINT_FREE && k == 3);
+    w->turns[i] = joint->type != CAV_JOINT_SLIDE && (joint->type != CAV_JOINT_FREE || k >= 3);
     w->parent[i] = dof->parent;
     w->row[i] = entries;
     for (int j = i; j >= 0; j = model->dof[j].parent) { entries++; }

@@ -22,6 +22,13 @@ int cav_state_evaluated(const cav_state *state);
 /// order that the state has evaluated before. inverse.c.
 void cav_smooth_inverse(const cav_model *model, cav_state *state, const double *v, const double *v_next, double *u);
 
+/// cav_inverse at four points under the same options, with the bits of each alone, in the time of less than four: smooth
+/// parts and the broad phase go for all at once. The states are scratch: none of their evaluations may be reused.
+/// inverse.c.
+void cav_inverse_four(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES],
+                      const double *const q[CAV_LANES], const double *const v[CAV_LANES],
+                      const double *const v_next[CAV_LANES], double *const u[CAV_LANES], cav_status status[CAV_LANES]);
+
 /// What cav_forward passes to cav_forward_newton: its tolerance, and the most iterations under the state's options. forward.c.
 #define CAV_FORWARD_TOLERANCE 1e-13
 int cav_forward_limit(const cav_state *state);

@@ -1,0 +1,68 @@
+/// The broad phase over numbers CAV_REAL (spatial.h): what it keeps, where centres are and which bounds are near. collide.c takes
+/// it one state at a time, broad_four.c four at once.
+#ifndef CAVORT_BROAD_H
+#define CAVORT_BROAD_H
+
+#include "constraint.h"
+#include "fixed.h"
+#include "spatial.h"
+#include "sweep.h"
+
+/// A pair as the broad phase wants it: all it reads, in order.
+typedef struct candidate {
+  int first, second;               ///< slots
+  int pair;                        ///< its number
+  short int plane;                 ///< 1 if the first geom is a plane
+  signed char external, expensive; ///< as in the pair; 1 if one of the two is a mesh, whose search is worth saving
+  double margin;                   ///< of the pair
+  double bound;                    ///< sum of bounding radii; of the second geom alone if the first is a plane
+} candidate;
+
+/// A geom in some pair.
+typedef struct slot {
+  const cav_geom *geom;
+  int turned; ///< shape.rotation is valid; of planes always
+  int fixed;  ///< moves with the world: placed once
+  cav_shape shape;
+} slot;
+
+struct cav_geom_cache {
+  size_t bytes;
+  int nslot;
+  slot *slot;
+  int nmoving, *moving; ///< slots that are not fixed
+  double (*centre)[3];  ///< [nslot] world
+  candidate *candidate; ///< [npair], and behind them once more those that fixed never leaves out
+  int ntree, *tree;     ///< [ntree] root links of the trees with slots that move
+  double (*root)[3];    ///< [ntree] where these are
+  cav_fixed *fixed;     ///< NULL: there is little to leave out
+  cav_sweep *sweep;     ///< NULL: all pairs that are left are looked at
+  int sweep_from;
+  cav_hint *hint; ///< [npair] where the last searches ended; NULL: no pair is expensive
+  double margin;  ///< largest of all pairs
+  int expensive;  ///< some pair is
+};
+
+// centre of a geom that moves
+CAV_INLINE void find_centre(const cav_geom *geom, const CAV_REAL pos[3], const CAV_REAL rotation[9],
+                            CAV_REAL centre[3]) {
+  CAV_REAL local[3];
+  take_numbers(local, geom->pos, 3);
+  transform(centre, pos, rotation, local);
+}
+
+// two bounds are near if this is less than limit_between: the square of the distance of their centres, or the height above a
+// plane of that normal
+CAV_INLINE CAV_REAL separation(const candidate *c, const CAV_REAL *first, const CAV_REAL *second,
+                               const CAV_REAL normal[3]) {
+  CAV_REAL d[3];
+  sub3(d, second, first);
+  return c->plane ? dot3(d, normal) : dot3(d, d);
+}
+
+static inline double limit_between(const candidate *c, double margin) {
+  double activation = c->bound + margin;
+  return c->plane ? activation : activation > 0 ? activation * activation : 0;
+}
+
+#endif

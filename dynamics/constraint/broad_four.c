@@ -1,0 +1,43 @@
+/// The broad phase of four states at once (broad.h), of scenes whose planes are fixed to the world.
+
+// first of all: what is below takes four numbers where it would take one
+#include "by_four.h"
+
+#include "broad.h"
+#include "four_states.h"
+
+typedef long long four_masks __attribute__((vector_size(sizeof(cav_four))));
+
+CAV_BY_FOUR static void find(const cav_model *model, const struct cav_geom_cache *cache, cav_lanes *l,
+                             const double activation[2]) {
+  static const four_masks bits = {1, 2, 4, 8};
+  for (int i = 0; i < cache->nslot; i++) {
+    const slot *s = cache->slot + i;
+    const cav_lane_pose *link = l->link + s->geom->link;
+    if (s->fixed)
+      take_numbers(l->centre + 3 * i, cache->centre[i], 3);
+    else
+      find_centre(s->geom, link->pos, link->rotation, l->centre + 3 * i);
+  }
+  int n = 0;
+  for (int p = 0; p < model->npair; p++) {
+    const candidate *c = cache->candidate + p;
+    cav_four normal[3] = {{0}}, limit = CAV_ALL(limit_between(c, c->margin + activation[c->external]));
+    const double *R = cache->slot[c->first].shape.rotation;
+    for (int k = 0; k < 3 && c->plane; k++) normal[k] = CAV_ALL(R[3 * k + 2]);
+    four_masks m = (separation(c, l->centre + 3 * c->first, l->centre + 3 * c->second, normal) < limit) & bits;
+    int near = (int)(m[0] | m[1] | m[2] | m[3]);
+    l->near[n] = CAV_LANE_BITS * p + near;
+    n += near != 0;
+  }
+  l->nnear = n;
+}
+
+void cav_lanes_near(const cav_model *model, cav_lanes *l, cav_state *const state[CAV_LANES],
+                    const double activation[2]) {
+  struct cav_geom_cache *cache = state[0]->work->geom;
+  find(model, cache, l, activation);
+  double *centre[CAV_LANES];
+  for (int lane = 0; lane < CAV_LANES; lane++) centre[lane] = state[lane]->work->geom->centre[0];
+  cav_lanes_scatter(centre, l->centre, 3 * cache->nslot);
+}

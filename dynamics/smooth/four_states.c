@@ -1,0 +1,180 @@
+/// The passes of tree.h over four states at once. An entry of a vector sees what a double would, so each state gets the bits
+/// of its own single evaluation, whatever stands beside it.
+#include "four_states.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdlib.h>
+
+#include "by_four.h"
+#define CAV_POSE cav_lane_pose
+#include "tree.h"
+
+enum { ALIGNMENT = 64 };
+
+// next array of a block, or only its size while base is NULL
+static cav_four *carve(char *base, size_t *used, int n) {
+  cav_four *piece = base ? (cav_four *)(base + *used) : NULL;
+  *used += ((size_t)n * sizeof(cav_four) + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+  return piece;
+}
+
+static size_t layout(const cav_model *m, char *base, cav_lanes *l) {
+  size_t used = ALIGNMENT * ((sizeof *l + ALIGNMENT - 1) / ALIGNMENT);
+  int n = m->nlink;
+  l->q = carve(base, &used, m->nq);
+  l->half = carve(base, &used, m->njoint);
+  l->sine = carve(base, &used, m->njoint);
+  l->cosine = carve(base, &used, m->njoint);
+  l->link = (cav_lane_pose *)carve(base, &used, n * (int)(sizeof(cav_pose) / sizeof(double)));
+  l->com = carve(base, &used, 3 * n);
+  l->inertia = carve(base, &used, 6 * n);
+  l->reference = carve(base, &used, 3 * n);
+  l->axis = carve(base, &used, 6 * m->nv);
+  l->v = carve(base, &used, m->nv);
+  l->v_next = carve(base, &used, m->nv);
+  l->a = carve(base, &used, m->nv);
+  l->velocity = carve(base, &used, 6 * n);
+  l->velocity_next = carve(base, &used, 6 * n);
+  l->acceleration = carve(base, &used, 6 * n);
+  l->force = carve(base, &used, 6 * n);
+  l->u = carve(base, &used, m->nv);
+  l->centre = carve(base, &used, 3 * m->ngeom);
+  l->near = (int *)carve(base, &used, m->npair / (int)(sizeof(cav_four) / sizeof(int)) + 1);
+  return used;
+}
+
+cav_lanes *cav_lanes_new(const cav_model *model) {
+  cav_lanes probe;
+  size_t bytes = layout(model, NULL, &probe);
+  char *block = aligned_alloc(ALIGNMENT, bytes);
+  if (!block) return NULL;
+  memset(block, 0, bytes);
+  cav_lanes *lanes = (cav_lanes *)block;
+  layout(model, block, lanes);
+  // the world's frame; written as doubles, on whatever processor
+  cav_lane_pose *world = lanes->link;
+  for (int lane = 0; lane < CAV_LANES; lane++) {
+    world->quat[0][lane] = 1;
+    for (int k = 0; k < 3; k++) world->rotation[4 * k][lane] = 1;
+  }
+  return lanes;
+}
+
+void cav_lanes_free(cav_lanes *lanes) { free(lanes); }
+
+// entries of two vectors by their numbers, those of the second from 4 on
+#ifdef __clang__
+#define SHUFFLED(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
+#else
+typedef long long order __attribute__((vector_size(sizeof(cav_four))));
+#define SHUFFLED(a, b, ...) __builtin_shuffle(a, b, (order){__VA_ARGS__})
+#endif
+
+// four rows of four turned into columns
+CAV_INLINE void turn_square(const cav_four from[4], cav_four to[4]) {
+  cav_four low = SHUFFLED(from[0], from[1], 0, 4, 2, 6), high = SHUFFLED(from[0], from[1], 1, 5, 3, 7);
+  cav_four low_after = SHUFFLED(from[2], from[3], 0, 4, 2, 6), high_after = SHUFFLED(from[2], from[3], 1, 5, 3, 7);
+  to[0] = SHUFFLED(low, low_after, 0, 1, 4, 5);
+  to[1] = SHUFFLED(high, high_after, 0, 1, 4, 5);
+  to[2] = SHUFFLED(low, low_after, 2, 3, 6, 7);
+  to[3] = SHUFFLED(high, high_after, 2, 3, 6, 7);
+}
+
+CAV_BY_FOUR void cav_lanes_gather(cav_four *to, double *const from[CAV_LANES], int n) {
+  const double *a = from[0], *b = from[1], *c = from[2], *d = from[3];
+  int i = 0;
+  for (; i + 4 <= n; i += 4) {
+    cav_four rows[4] = {*(const cav_four *)(a + i), *(const cav_four *)(b + i), *(const cav_four *)(c + i),
+                        *(const cav_four *)(d + i)};
+    turn_square(rows, to + i);
+  }
+  for (; i < n; i++) to[i] = (cav_four){a[i], b[i], c[i], d[i]};
+}
+
+CAV_BY_FOUR void cav_lanes_scatter(double *const to[CAV_LANES], const cav_four *from, int n) {
+  double *a = to[0], *b = to[1], *c = to[2], *d = to[3];
+  int i = 0;
+  for (; i + 4 <= n; i += 4) {
+    cav_four columns[4];
+    turn_square(from + i, columns);
+    *(cav_four *)(a + i) = columns[0];
+    *(cav_four *)(b + i) = columns[1];
+    *(cav_four *)(c + i) = columns[2];
+    *(cav_four *)(d + i) = columns[3];
+  }
+  for (; i < n; i++) a[i] = from[i][0], b[i] = from[i][1], c[i] = from[i][2], d[i] = from[i][3];
+}
+
+// sines and cosines of half the turns of all hinges
+CAV_BY_FOUR static void turn_hinges(const cav_workspace *w, cav_lanes *l) {
+  for (int i = 0; i < w->nhinge; i++) l->half[i] = 0.5 * (l->q[w->hinge[i]] - w->hinge_ref[i]);
+  sines((const double *)l->half, (double *)l->sine, (double *)l->cosine, CAV_LANES * w->nhinge);
+}
+
+// a state with an angle too large for those sums has all its sines from the library, as it has alone
+static void turn_far(const cav_workspace *w, cav_lanes *l) {
+  for (int lane = 0; lane < CAV_LANES; lane++) {
+    double largest = 0;
+    for (int i = 0; i < w->nhinge; i++) largest = fmax(largest, fabs(l->half[i][lane]));
+    for (int i = 0; i < w->nhinge && !(largest < SINES_MOST); i++) {
+      l->sine[i][lane] = sin(l->half[i][lane]);
+      l->cosine[i][lane] = cos(l->half[i][lane]);
+    }
+  }
+}
+
+CAV_BY_FOUR static void place(const cav_model *model, const cav_workspace *w, cav_lanes *l) {
+  const tree_poses at = {l->q, l->sine, l->cosine, l->link, l->com, l->inertia, l->reference, l->axis, 0};
+  for (int i = 1; i < model->nlink; i++) place_link(model, w, &at, i);
+}
+
+// an array of each of four states
+#define OF_EACH(array) \
+  { (state[0]->array), (state[1]->array), (state[2]->array), (state[3]->array) }
+
+void cav_lanes_kinematics(const cav_model *model, cav_lanes *l, cav_state *const state[CAV_LANES], cav_extent extent) {
+  cav_workspace *w = state[0]->work;
+  const int n = model->nlink;
+  for (int lane = 0; lane < CAV_LANES; lane++) cav_kinematics_open(state[lane]);
+  cav_lanes_gather(l->q, (double *const[])OF_EACH(work->q), model->nq);
+  turn_hinges(w, l);
+  turn_far(w, l);
+  place(model, w, l);
+  cav_lanes_scatter((double *const[])OF_EACH(link[0].pos), (const cav_four *)l->link,
+                    n * (int)(sizeof(cav_pose) / sizeof(double)));
+  cav_lanes_scatter((double *const[])OF_EACH(reference), l->reference, 3 * n);
+  if (extent == CAV_EXTENT_ALL) {
+    cav_lanes_scatter((double *const[])OF_EACH(com), l->com, 3 * n);
+    cav_lanes_scatter((double *const[])OF_EACH(inertia), l->inertia, 6 * n);
+  }
+  // velocities that contacts begin with are not those of the bias
+  if (extent == CAV_EXTENT_ALL || cav_takes_mean(state[0]))
+    cav_lanes_scatter((double *const[])OF_EACH(axis), l->axis, 6 * model->nv);
+  for (int lane = 0; lane < CAV_LANES; lane++) cav_kinematics_close(model, state[lane]);
+}
+
+CAV_BY_FOUR static void move(const cav_model *model, const cav_state *state, cav_lanes *l) {
+  const tree_motion m = {l->com, l->inertia,  l->reference,     l->axis,         l->v,    l->v_next,
+                         l->a,   l->velocity, l->velocity_next, l->acceleration, l->force};
+  move_tree(model, state->work, state->options.gravity ? -1 : 0, &m);
+}
+
+void cav_lanes_newton_euler(const cav_model *model, cav_lanes *l, cav_state *const state[CAV_LANES], int pushed) {
+  const int n = 6 * model->nlink;
+  move(model, state[0], l);
+  if (!pushed) return;
+  cav_lanes_scatter((double *const[])OF_EACH(velocity), l->velocity, n);
+  cav_lanes_scatter((double *const[])OF_EACH(velocity_next), l->velocity_next, n);
+  cav_lanes_scatter((double *const[])OF_EACH(work->acceleration), l->acceleration, n);
+  cav_lanes_scatter((double *const[])OF_EACH(force), l->force, n);
+}
+
+CAV_BY_FOUR static void project(const cav_model *model, cav_lanes *l) { project_tree(model, l->axis, l->force, l->u); }
+
+void cav_lanes_project(const cav_model *model, cav_lanes *l, cav_state *const state[CAV_LANES], int pushed,
+                       double *const u[CAV_LANES]) {
+  if (pushed) cav_lanes_gather(l->force, (double *const[])OF_EACH(force), 6 * model->nlink);
+  project(model, l);
+  cav_lanes_scatter(u, l->u, model->nv);
+}

@@ -1,0 +1,56 @@
+/// Four states at once: numbers of four states of one model side by side, so that the passes over the tree and the broad
+/// phase take all four in one go, with the operations and the order of a single state (tree.h). Private to dynamics/.
+#ifndef CAVORT_FOUR_STATES_H
+#define CAVORT_FOUR_STATES_H
+
+#include "smooth.h"
+#include "vectors.h"
+
+enum { CAV_LANES = 4, CAV_LANE_BITS = 16 };
+
+/// cav_pose of four states.
+typedef struct cav_lane_pose {
+  cav_four pos[3], rotation[9], quat[4];
+} cav_lane_pose;
+
+/// Arrays as in cav_state and its workspace, each number four times.
+typedef struct cav_lanes {
+  cav_four *q, *half, *sine, *cosine; ///< [nq], [nhinge]
+  cav_lane_pose *link;
+  cav_four *com, *inertia, *reference, *axis;
+  cav_four *v, *v_next, *a; ///< [nv] where the bias is taken, after the step, acceleration
+  cav_four *velocity, *velocity_next, *acceleration, *force, *u;
+  cav_four *centre; ///< [3*ngeom] of geoms in pairs, by their slots in the broad phase
+  int nnear, *near; ///< [npair] pairs that are near in some state: 16 times the pair, and a bit for each state
+} cav_lanes;
+
+/// How much of the poses goes back to the states: what contacts of primitive geoms need, or all.
+typedef enum cav_extent { CAV_EXTENT_CONTACTS, CAV_EXTENT_ALL } cav_extent;
+
+/// Whether the processor gains by them: by two numbers at once a state alone is faster. What is below is for those that do.
+static inline int cav_lanes_pay(void) { return cav_dense_lanes() >= CAV_LANES; }
+
+/// NULL if memory runs out.
+cav_lanes *cav_lanes_new(const cav_model *model);
+void cav_lanes_free(cav_lanes *lanes);
+
+/// Numbers of four arrays [n] side by side, and back.
+void cav_lanes_gather(cav_four *to, double *const from[CAV_LANES], int n);
+void cav_lanes_scatter(double *const to[CAV_LANES], const cav_four *from, int n);
+
+/// cav_kinematics of four states at the q in their workspaces.
+void cav_lanes_kinematics(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES],
+                          cav_extent extent);
+
+/// What cav_kinematics does of a single state before and after its poses. kinematics.c.
+void cav_kinematics_open(cav_state *state);
+void cav_kinematics_close(const cav_model *model, cav_state *state);
+
+/// cav_newton_euler of four states after that, at v, v_next and a of the lanes; the states get the results if pushed.
+void cav_lanes_newton_euler(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES], int pushed);
+
+/// cav_force_project of the forces of the states if pushed, else of those of the lanes; into u [nv] of each.
+void cav_lanes_project(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES], int pushed,
+                       double *const u[CAV_LANES]);
+
+#endif
