@@ -230,6 +230,9 @@ static cav_status add_limits(const cav_model *model, cav_state *state) {
     int k = w->limit[i];
     const cav_joint *joint = &model->joint[k];
     double weight = model->dof[joint->dof].inverse_weight, activation = cav_limit_activation(state, joint->margin);
+    // most are far from both ends of a range
+    const double *at = w->q + joint->q, *range = joint->range;
+    if (joint->type != CAV_JOINT_BALL && !(at[0] - range[0] < activation) && !(range[1] - at[0] < activation)) continue;
     cav_row row = {.type = CAV_ROW_LIMIT_JOINT, .object = k, .margin = joint->margin};
     if (joint->type == CAV_JOINT_BALL) {
       if (joint->limited) { status = limit_ball(state, row, joint, weight, activation); }

@@ -33,6 +33,7 @@ static size_t layout(const cav_model *m, char *base, cav_lanes *l) {
   l->axis = carve(base, &used, 6 * m->nv);
   l->v = carve(base, &used, m->nv);
   l->v_next = carve(base, &used, m->nv);
+  l->bias = carve(base, &used, m->nv);
   l->a = carve(base, &used, m->nv);
   l->velocity = carve(base, &used, 6 * n);
   l->velocity_next = carve(base, &used, 6 * n);
@@ -81,7 +82,7 @@ CAV_INLINE void turn_square(const cav_four from[4], cav_four to[4]) {
   to[3] = SHUFFLED(high, high_after, 2, 3, 6, 7);
 }
 
-CAV_BY_FOUR void cav_lanes_gather(cav_four *to, double *const from[CAV_LANES], int n) {
+CAV_BY_FOUR void cav_lanes_gather(cav_four *to, const double *const from[CAV_LANES], int n) {
   const double *a = from[0], *b = from[1], *c = from[2], *d = from[3];
   int i = 0;
   for (; i + 4 <= n; i += 4) {
@@ -106,13 +107,19 @@ CAV_BY_FOUR void cav_lanes_scatter(double *const to[CAV_LANES], const cav_four *
   for (; i < n; i++) a[i] = from[i][0], b[i] = from[i][1], c[i] = from[i][2], d[i] = from[i][3];
 }
 
-// sines and cosines of half the turns of all hinges
-CAV_BY_FOUR static void turn_hinges(const cav_workspace *w, cav_lanes *l) {
-  for (int i = 0; i < w->nhinge; i++) l->half[i] = 0.5 * (l->q[w->hinge[i]] - w->hinge_ref[i]);
+// sines and cosines of half the turns of all hinges; whether an angle is too large for those sums
+CAV_BY_FOUR static int turn_hinges(const cav_workspace *w, cav_lanes *l) {
+  typedef long long masks __attribute__((vector_size(sizeof(cav_four))));
+  masks far = {0};
+  for (int i = 0; i < w->nhinge; i++) {
+    l->half[i] = 0.5 * (l->q[w->hinge[i]] - w->hinge_ref[i]);
+    far |= (l->half[i] >= SINES_MOST) | (l->half[i] <= -SINES_MOST);
+  }
   sines((const double *)l->half, (double *)l->sine, (double *)l->cosine, CAV_LANES * w->nhinge);
+  return (far[0] | far[1] | far[2] | far[3]) != 0;
 }
 
-// a state with an angle too large for those sums has all its sines from the library, as it has alone
+// a state with such an angle has all its sines from the library, as it has alone
 static void turn_far(const cav_workspace *w, cav_lanes *l) {
   for (int lane = 0; lane < CAV_LANES; lane++) {
     double largest = 0;
@@ -137,9 +144,8 @@ void cav_lanes_kinematics(const cav_model *model, cav_lanes *l, cav_state *const
   cav_workspace *w = state[0]->work;
   const int n = model->nlink;
   for (int lane = 0; lane < CAV_LANES; lane++) cav_kinematics_open(state[lane]);
-  cav_lanes_gather(l->q, (double *const[])OF_EACH(work->q), model->nq);
-  turn_hinges(w, l);
-  turn_far(w, l);
+  cav_lanes_gather(l->q, (const double *const[])OF_EACH(work->q), model->nq);
+  if (turn_hinges(w, l)) turn_far(w, l);
   place(model, w, l);
   cav_lanes_scatter((double *const[])OF_EACH(link[0].pos), (const cav_four *)l->link,
                     n * (int)(sizeof(cav_pose) / sizeof(double)));
@@ -155,8 +161,9 @@ void cav_lanes_kinematics(const cav_model *model, cav_lanes *l, cav_state *const
 }
 
 CAV_BY_FOUR static void move(const cav_model *model, const cav_state *state, cav_lanes *l) {
-  const tree_motion m = {l->com, l->inertia,  l->reference,     l->axis,         l->v,    l->v_next,
+  const tree_motion m = {l->com, l->inertia,  l->reference,     l->axis,         l->bias, l->v_next,
                          l->a,   l->velocity, l->velocity_next, l->acceleration, l->force};
+  find_motion(model->nv, cav_takes_mean(state), 1 / state->options.timestep, l->v, l->v_next, l->bias, l->a);
   move_tree(model, state->work, state->options.gravity ? -1 : 0, &m);
 }
 
@@ -170,11 +177,14 @@ void cav_lanes_newton_euler(const cav_model *model, cav_lanes *l, cav_state *con
   cav_lanes_scatter((double *const[])OF_EACH(force), l->force, n);
 }
 
-CAV_BY_FOUR static void project(const cav_model *model, cav_lanes *l) { project_tree(model, l->axis, l->force, l->u); }
+CAV_BY_FOUR static void project(const cav_model *model, const cav_state *state, cav_lanes *l) {
+  project_tree(model, l->axis, l->force, l->u);
+  resist(state->work, model->nv, state->options.passive, cav_takes_mean(state) ? l->bias : l->v_next, l->a, l->u);
+}
 
 void cav_lanes_project(const cav_model *model, cav_lanes *l, cav_state *const state[CAV_LANES], int pushed,
                        double *const u[CAV_LANES]) {
-  if (pushed) cav_lanes_gather(l->force, (double *const[])OF_EACH(force), 6 * model->nlink);
-  project(model, l);
+  if (pushed) cav_lanes_gather(l->force, (const double *const[])OF_EACH(force), 6 * model->nlink);
+  project(model, state[0], l);
   cav_lanes_scatter(u, l->u, model->nv);
 }

@@ -18,7 +18,7 @@ typedef struct cav_lanes {
   cav_four *q, *half, *sine, *cosine; ///< [nq], [nhinge]
   cav_lane_pose *link;
   cav_four *com, *inertia, *reference, *axis;
-  cav_four *v, *v_next, *a; ///< [nv] where the bias is taken, after the step, acceleration
+  cav_four *v, *v_next, *bias, *a; ///< [nv] before and after the step, where the bias is taken, acceleration
   cav_four *velocity, *velocity_next, *acceleration, *force, *u;
   cav_four *centre; ///< [3*ngeom] of geoms in pairs, by their slots in the broad phase
   int nnear, *near; ///< [npair] pairs that are near in some state: 16 times the pair, and a bit for each state
@@ -35,7 +35,7 @@ cav_lanes *cav_lanes_new(const cav_model *model);
 void cav_lanes_free(cav_lanes *lanes);
 
 /// Numbers of four arrays [n] side by side, and back.
-void cav_lanes_gather(cav_four *to, double *const from[CAV_LANES], int n);
+void cav_lanes_gather(cav_four *to, const double *const from[CAV_LANES], int n);
 void cav_lanes_scatter(double *const to[CAV_LANES], const cav_four *from, int n);
 
 /// cav_kinematics of four states at the q in their workspaces.
@@ -46,10 +46,11 @@ void cav_lanes_kinematics(const cav_model *model, cav_lanes *lanes, cav_state *c
 void cav_kinematics_open(cav_state *state);
 void cav_kinematics_close(const cav_model *model, cav_state *state);
 
-/// cav_newton_euler of four states after that, at v, v_next and a of the lanes; the states get the results if pushed.
+/// cav_newton_euler of four states after that, at v and v_next of the lanes; the states get the results if pushed.
 void cav_lanes_newton_euler(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES], int pushed);
 
-/// cav_force_project of the forces of the states if pushed, else of those of the lanes; into u [nv] of each.
+/// cav_force_project of the forces of the states if pushed, else of those of the lanes, then cav_add_resistance; into u [nv]
+/// of each.
 void cav_lanes_project(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES], int pushed,
                        double *const u[CAV_LANES]);
 

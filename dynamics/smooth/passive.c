@@ -4,7 +4,7 @@
 /// joints and tendons is linear in one velocity, which the order of the step chooses. Also gravity compensation, a
 /// force at the centre of mass of a body. Fluids: fluid.c.
 #include "math3.h"
-#include "smooth.h"
+#include "tree.h"
 
 // u += k log(rest^-1 q)
 static void turning_spring(double stiffness, const double *q, const double *rest, double *u) {
@@ -82,13 +82,13 @@ static void look_along_springs(const cav_model *model, const cav_state *state, d
   }
 }
 
-void cav_add_joint_forces(const cav_model *model, const cav_state *state, const double *v, const double *a, double *u) {
+void cav_add_resistance(const cav_model *model, const cav_state *state, const double *v, const double *a, double *u) {
+  resist(state->work, model->nv, state->options.passive, v, a, u);
+}
+
+void cav_add_spring_forces(const cav_model *model, const cav_state *state, double *u) {
   const cav_workspace *w = state->work;
-  for (int i = 0; i < model->nv; i++) { u[i] += w->armature[i] * a[i]; }
   if (!state->options.passive) { return; }
-  if (w->damped) {
-    for (int i = 0; i < model->nv; i++) { u[i] += w->damping[i] * v[i]; }
-  }
   for (int i = 0; i < w->nspring; i++) { joint_spring(model, &model->joint[w->spring[i]], w->q, u); }
   if (state->options.spring == CAV_SPRING_IMPLICIT) { look_along_springs(model, state, u); }
   if (w->nbuoy > 0) { leave_to_actuators(model, state, u); }

@@ -57,8 +57,10 @@ void cav_add_buoyancy(const cav_model *model, cav_state *state);
 void cav_buoyancy(const cav_model *model, const cav_state *state, int body, double point[3], double force[3]);
 void cav_add_fluid_forces(const cav_model *model, cav_state *state);
 
-/// u += armature a + damping v - springs of joints; tendons' springs and dampers likewise. passive.c.
-void cav_add_joint_forces(const cav_model *model, const cav_state *state, const double *v, const double *a, double *u);
+/// u += armature a + damping v of joints; then less their springs and what actuators give of gravity compensation; tendons'
+/// springs and dampers likewise. passive.c.
+void cav_add_resistance(const cav_model *model, const cav_state *state, const double *v, const double *a, double *u);
+void cav_add_spring_forces(const cav_model *model, const cav_state *state, double *u);
 void cav_add_tendon_forces(const cav_model *model, const cav_state *state, const double *v, double *u);
 
 /// Last dof that moves a link, -1 for the world. kinematics.c.

@@ -218,6 +218,16 @@ CAV_INLINE void place_link(const cav_model *model, const cav_workspace *w, const
   at->link[i] = local;
 }
 
+// acceleration of a step, and the velocity at which bias and passive forces are taken
+CAV_INLINE void find_motion(int nv, int mean, double inverse_h, const CAV_REAL *v, const CAV_REAL *v_next,
+                            CAV_REAL *bias, CAV_REAL *a) {
+  for (int i = 0; i < nv; i++) {
+    a[i] = (v_next[i] - v[i]) * inverse_h;
+    bias[i] = v[i];
+    if (mean) bias[i] = 0.5 * (v[i] + v_next[i]);
+  }
+}
+
 // wrench at the reference that moves a link's mass with velocity V and acceleration A
 CAV_INLINE void link_force(CAV_REAL F[6], double mass, const CAV_REAL *inertia, const CAV_REAL *com,
                            const CAV_REAL *reference, const CAV_REAL *V, const CAV_REAL *A) {
@@ -281,6 +291,13 @@ CAV_INLINE void project_tree(const cav_model *model, const CAV_REAL *axis, CAV_R
     for (int k = link->dof; k < link->dof + link->ndof; k++) u[k] = dot6(axis + 6 * k, F);
     if (link->parent > 0) accumulate6(force + 6 * link->parent, F);
   }
+}
+
+// u += armature a + damping v of joints
+CAV_INLINE void resist(const cav_workspace *w, int nv, int passive, const CAV_REAL *v, const CAV_REAL *a, CAV_REAL *u) {
+  for (int i = 0; i < nv; i++) u[i] += w->armature[i] * a[i];
+  if (!passive || !w->damped) return;
+  for (int i = 0; i < nv; i++) u[i] += w->damping[i] * v[i];
 }
 
 #endif

@@ -13,6 +13,7 @@
 #include "math3.h"
 #include "options.h"
 #include "step.h"
+#include "tree.h"
 
 static void copy(double *to, const double *from, int n) {
   if (n > 0 && to != from) { memcpy(to, from, (size_t)n * sizeof *to); }
@@ -194,15 +195,11 @@ typedef struct step_motion {
   const double *damped;
 } step_motion;
 
-static step_motion find_motion(const cav_model *model, cav_state *state) {
+static step_motion motion_of(const cav_model *model, cav_state *state) {
   const cav_workspace *w = state->work;
+  const int mean = cav_takes_mean(state);
   step_motion m = {.bias = w->scratch, .a = w->scratch + model->nv};
-  int mean = cav_takes_mean(state);
-  double inverse_h = 1 / state->options.timestep;
-  for (int i = 0; i < model->nv; i++) {
-    m.a[i] = (w->v_next[i] - w->v[i]) * inverse_h;
-    m.bias[i] = mean ? 0.5 * (w->v[i] + w->v_next[i]) : w->v[i];
-  }
+  find_motion(model->nv, mean, 1 / state->options.timestep, w->v, w->v_next, m.bias, m.a);
   m.damped = mean ? m.bias : w->v_next;
   return m;
 }
@@ -245,12 +242,12 @@ static void push_links(const cav_model *model, cav_state *state, int with_constr
   }
 }
 
-// what acts on dofs
-static void push_dofs(const cav_model *model, cav_state *state, int with_constraints, const step_motion *m, double *u) {
+// what acts on dofs but their own inertia and damping; bias [nv] is read where tendons have springs
+static void push_dofs(const cav_model *model, cav_state *state, int with_constraints, const double *bias, double *u) {
   const cav_workspace *w = state->work;
   const double scale = -1 / state->options.timestep;
-  cav_add_joint_forces(model, state, m->damped, m->a, u);
-  cav_add_tendon_forces(model, state, m->bias, u);
+  cav_add_spring_forces(model, state, u);
+  cav_add_tendon_forces(model, state, bias, u);
   if (!with_constraints) { return; }
   rows(state, w->v, w->v_next, scale, u);
   if (state->nequality > 0) { cav_equality_apply(model, state, scale, u); }
@@ -258,11 +255,12 @@ static void push_dofs(const cav_model *model, cav_state *state, int with_constra
 
 static void evaluate(const cav_model *model, cav_state *state, int with_constraints, int new_velocity, double *u) {
   state->work->derived = 0;
-  const step_motion m = find_motion(model, state);
+  const step_motion m = motion_of(model, state);
   cav_newton_euler(model, state, m.bias, state->work->v_next, m.a);
   push_links(model, state, with_constraints, new_velocity);
   cav_force_project(model, state, u);
-  push_dofs(model, state, with_constraints, &m, u);
+  cav_add_resistance(model, state, m.damped, m.a, u);
+  push_dofs(model, state, with_constraints, m.bias, u);
 }
 
 void cav_smooth_inverse(const cav_model *model, cav_state *state, const double *v, const double *v_next, double *u) {
@@ -340,16 +338,6 @@ static int is_plain(const cav_model *model, const cav_state *state) {
          o->regulariser != CAV_REGULARISER_EXACT && !cav_looks_ahead(o) && !cav_contacts_narrow(state);
 }
 
-// motion of four states side by side
-static void gather_motions(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES],
-                           const step_motion m[CAV_LANES]) {
-  double *bias[CAV_LANES], *a[CAV_LANES], *v_next[CAV_LANES];
-  for (int l = 0; l < CAV_LANES; l++) bias[l] = m[l].bias, a[l] = m[l].a, v_next[l] = state[l]->work->v_next;
-  cav_lanes_gather(lanes->v, bias, model->nv);
-  cav_lanes_gather(lanes->a, a, model->nv);
-  cav_lanes_gather(lanes->v_next, v_next, model->nv);
-}
-
 // positions of four states; status [4]
 static void find_positions(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES],
                            cav_extent extent, cav_status *status) {
@@ -381,9 +369,8 @@ void cav_inverse_four(const cav_model *model, cav_lanes *lanes, cav_state *const
   }
   const cav_extent extent = is_plain(model, state[0]) ? CAV_EXTENT_CONTACTS : CAV_EXTENT_ALL;
   find_positions(model, lanes, state, extent, status);
-  step_motion m[CAV_LANES];
-  for (int l = 0; l < CAV_LANES; l++) m[l] = find_motion(model, state[l]);
-  gather_motions(model, lanes, state, m);
+  cav_lanes_gather(lanes->v, v, model->nv);
+  cav_lanes_gather(lanes->v_next, v_next, model->nv);
 
   // links of states without contacts are left in the lanes
   int pushed = extent == CAV_EXTENT_ALL;
@@ -397,7 +384,8 @@ void cav_inverse_four(const cav_model *model, cav_lanes *lanes, cav_state *const
   cav_lanes_project(model, lanes, state, pushed, found);
   for (int l = 0; l < CAV_LANES; l++) {
     if (status[l]) continue;
-    push_dofs(model, state[l], 1, &m[l], state[l]->u);
+    const double *bias = state[l]->work->ntendon_spring ? motion_of(model, state[l]).bias : NULL;
+    push_dofs(model, state[l], 1, bias, state[l]->u);
     status[l] = close_inverse(model, state[l], u[l]);
     state[l]->work->valid = CAV_STAGE_NONE;
   }
