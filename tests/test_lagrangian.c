@@ -75,7 +75,7 @@ static double mismatch(cav_transcription *tr, cav_normal *normal, cav_trajectory
     CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
     for (int t = 0; t < tr->nknot; t++)
       for (int i = 0; i < 9 * tr->nv * tr->nv; i++) tr->knot[t].hessian[i] *= factor;
-    if (curved) CHECK(cav_lagrangian_curvature(tr, at, factor) == CAV_OK);
+    if (curved) CHECK(cav_lagrangian_curvature(tr, at, factor, NULL) == CAV_OK);
     cav_normal_gather(normal, tr);
     for (int i = 0; i < n; i++) d[i] = uniform();
     cav_normal_multiply(normal, d, product);

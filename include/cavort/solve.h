@@ -132,7 +132,10 @@ typedef struct cav_solve_options {
   int fixed_multipliers;    ///< 1: cav_optimiser_iterate leaves them as they are, rows are held by penalties
   int moving_targets; ///< 1: waypoints of targets keep to the first start's clock, whatever cav_optimiser_shift takes off
   double tolerance;   ///< unactuated force at the end, fraction of weight
-  int diagnose;       ///< 1: where constraints cannot all hold, end at their least violation, which cav_explain needs
+  double
+      optimality; ///< of the own solver: its last phase ends where steps gain slowly and a step may save no more than this
+                  ///< fraction of the cost, by the model of cav_verify_optimality; 0: where none gains
+  int diagnose; ///< 1: where constraints cannot all hold, end at their least violation, which cav_explain needs
   /// Of the dynamics: analytic, and what has none (cav_derivatives_missing, sensors) by one-sided differences, or all
   /// by differences. Ipopt always takes centred ones.
   cav_derivative derivative;

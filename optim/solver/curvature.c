@@ -102,16 +102,17 @@ static void exchange(cav_curvature *c, cav_transcription *tr) {
 }
 
 cav_status cav_curvature_find(cav_curvature *c, cav_transcription *tr, cav_trajectory *at, cav_trajectory *spare,
-                              const double *multiplier) {
+                              const double *multiplier, const char *chosen) {
   size_t width = (size_t)c->width;
   for (int t = 0; t < tr->nknot; t++)
     for (int i = 0; i < tr->knot[t].layout.count; i++) tr->knot[t].slot[i].final_multiplier = *multiplier++;
   cav_status status = c->free_step ? find_step(c, tr, at, spare) : CAV_OK;
   if (status == CAV_OK) status = cav_transcription_linearise(tr, at);
   if (status != CAV_OK) return status;
-  for (int t = 0; t < c->nknot; t++) memset(c->block[t], 0, width * width * sizeof(double));
+  for (int t = 0; t < c->nknot; t++)
+    if (!chosen || chosen[t]) memset(c->block[t], 0, width * width * sizeof(double));
   exchange(c, tr);
-  status = cav_lagrangian_curvature(tr, at, 1);
+  status = cav_lagrangian_curvature(tr, at, 1, chosen);
   exchange(c, tr);
   return status;
 }

@@ -291,7 +291,7 @@ static int gather_hessian(program *p, double factor, const double *multiplier) {
   for (int t = 0; t < tr->nknot; t++)
     for (int i = 0; i < width * width; i++) p->hessian[t][i] = factor * tr->knot[t].hessian[i];
   exchange_hessians(p);
-  if (p->exact) status = cav_lagrangian_curvature(tr, p->run->at, factor);
+  if (p->exact) status = cav_lagrangian_curvature(tr, p->run->at, factor, NULL);
   for (int t = 0; t < tr->nknot; t++) rotate_hessian(p, t);
   cav_normal_gather(p->run->normal, tr);
   exchange_hessians(p);

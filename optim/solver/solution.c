@@ -21,7 +21,8 @@ cav_solve_options cav_solve_options_default(void) {
                              .threads = 1,
                              .diagnose = 1,
                              .gains = 1,
-                             .tolerance = 2e-7};
+                             .tolerance = 2e-7,
+                             .optimality = 1e-4};
 }
 
 int cav_solution_log(cav_solution *solution, const cav_progress *line) {
@@ -70,6 +71,7 @@ static cav_status check(const cav_problem *p, const cav_solve_options *o, const 
   if (status) return status;
   if (o->threads < 1) return fail(error, CAV_BAD_INPUT, "threads must be at least 1");
   if (!(o->tolerance > 0)) return fail(error, CAV_BAD_INPUT, "tolerance must be positive");
+  if (!(o->optimality >= 0)) return fail(error, CAV_BAD_INPUT, "optimality must not be negative");
   if (o->first_stage < 0 || o->max_iterations < 0 || !(o->max_seconds >= 0) || o->nmultiplier < 0 ||
       (o->nmultiplier > 0 && !o->multiplier))
     return fail(error, CAV_BAD_INPUT,

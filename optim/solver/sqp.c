@@ -5,9 +5,10 @@
 /// S-l1-QP), and takes its step where cost plus penalties fall by a fraction of what the programme predicted; a step
 /// that misses the rows by their curvature is corrected in the same metric (Maratos). Penalties are above every
 /// multiplier, row by row. Every knot has a box of its own: merit and prediction are sums over knots, so what a step
-/// misses is known by knot, and one at which a contact comes or goes does not hold the others back. The end is where
-/// the programme of a Hessian found there predicts next to nothing: its prediction over the cost is how optimal the
-/// motion is, in the full box.
+/// misses is known by knot, and one at which a contact comes or goes does not hold the others back. The Hessian is
+/// Gauss-Newton's at first, then the Lagrangian's, found anew at knots that miss. The end is where the programme of a
+/// Hessian found there predicts next to nothing: its prediction over the cost is how optimal the motion is, in the full
+/// box; or where little is left to be saved and that comes slowly.
 #include "sqp.h"
 
 #include <math.h>
@@ -31,6 +32,15 @@ static const double stationary = 1e-9, predicted_enough = 1e-6, gap_fraction = 1
 static const double slow = 1e-6, old_gain = 1e-5;
 enum { PATIENCE = 8 };
 
+/// So many steps in a row by Gauss-Newton's model that gain less than this fraction of the cost end its part.
+static const double gauss_newton = 1e-4;
+enum { FEW = 3 };
+
+/// Iterations between two looks at what there is to be saved, and looks in a row that end a run; part of it that a step
+/// gains where progress is not slow.
+enum { LOOK = 5, LOOKS = 2 };
+static const double brisk = 0.5;
+
 /// What is optimal, as a fraction of the cost. Where it is not: steps across jumps of the merit, the boxes they are
 /// tried in, and what they may lose.
 static const double optimal = 1e-6, leap_box[] = {1e-2, 3e-3, 1e-3, 3e-4, 1e-4}, leap_loss = 1e-3;
@@ -38,7 +48,10 @@ enum { LEAPS = 4, LEAP_BOXES = sizeof leap_box / sizeof *leap_box };
 
 /// How far the ratio of a decrease to what was predicted may be from 1 before the Hessian is found anew; how much of
 /// the decrease a knot has to miss for its box to be at fault instead.
-static const double poor_ratio = 0.2, far = 2;
+static const double poor_ratio = 0.4, far = 2;
+
+/// Part of what all knots' forecasts were off by that the knots whose curvature is kept may be off by.
+static const double unmarked = 0.3;
 
 /// Squares of the step, rad or m, that make a programme convex, of the cost: of all knots, and of single ones.
 /// A wave of these takes what is within this fraction of the largest.
@@ -140,6 +153,9 @@ typedef struct descent {
   double predicted; ///< decrease, by the last programme
   double ratio;     ///< of the decrease to it
   int age;          ///< iterations since the curvature was found; -1: it was not
+  int whole;        ///< 1: at all knots
+  int few;          ///< Gauss-Newton's steps in a row that gained little
+  char *stale;      ///< [nknot] those that it is found at anew
   double shift;     ///< what the squares of the unknowns cost besides
   double *need;     ///< [nknot] what those of one knot would have to cost; 0: nothing, or they do
   int needs_known;
@@ -156,11 +172,13 @@ static int descent_new(descent *d, cav_solve_run *run) {
   *d = (descent){.qp = cav_quadratic_new(run->tr, run->normal), .ratio = 1, .age = -1};
   size_t n = (size_t)cav_transcription_unknowns(run->tr), rows = d->qp ? (size_t)cav_quadratic_rows(d->qp) : 0;
   d->curvature = cav_curvature_new(run->tr);
+  d->stale = malloc((size_t)run->tr->nknot);
   size_t knots = (size_t)run->tr->nknot, boxes = (size_t)cav_transcription_blocks(run->tr) + 1;
   d->x = calloc(n + 2 * rows + 5 * knots + 2 * boxes, sizeof(double));
   d->second = cav_trajectory_copy(run->at);
   d->best = cav_trajectory_copy(run->at);
-  if (!d->qp || !d->curvature || !d->x || !d->second || !d->best || !cav_transcription_keep_rows(run->tr)) return 0;
+  if (!d->qp || !d->curvature || !d->stale || !d->x || !d->second || !d->best || !cav_transcription_keep_rows(run->tr))
+    return 0;
   d->offset = d->x + n;
   d->multiplier = d->offset + rows;
   d->radius = d->multiplier + rows;
@@ -179,7 +197,7 @@ static void descent_free(descent *d) {
   cav_curvature_free(d->curvature);
   cav_trajectory_free(d->second);
   cav_trajectory_free(d->best);
-  free(d->x);
+  free(d->x), free(d->stale);
 }
 
 /// Changes what all unknowns' own squares cost besides.
@@ -253,17 +271,39 @@ static double missed(const descent *d, int t) {
   return isfinite(d->after[t]) ? d->forecast[t] - (d->before[t] - d->after[t]) : INFINITY;
 }
 
-/// Costs, rows and their model at run->at: Gauss-Newton's while its predictions come true, then with the Lagrangian's
-/// curvature, which is found anew where the last one's have not.
-static cav_status model(cav_solve_run *run, descent *d) {
-  int poor = fabs(d->ratio - 1) > poor_ratio, little = d->age > 0 && d->gain < old_gain * cost_scale(run->tr);
+/// Marks the knots whose forecasts were off most: all but those that together are off by a small part of what all are.
+static void mark_stale(const cav_transcription *tr, descent *d) {
+  double all = 0, left = 0, next = 0;
+  for (int t = 0; t < tr->nknot; t++) all += fmin(fabs(missed(d, t)), fabs(d->predicted));
+  memset(d->stale, 1, (size_t)tr->nknot);
+  // the least of the marked ones is next to go
+  for (;;) {
+    double least = INFINITY;
+    for (int t = 0; t < tr->nknot; t++)
+      if (d->stale[t]) least = fmin(least, fabs(missed(d, t)));
+    next = left + least;
+    if (!(next <= unmarked * all)) break;
+    for (int t = 0; t < tr->nknot; t++)
+      if (d->stale[t] && fabs(missed(d, t)) <= least) d->stale[t] = 0, left += least;
+  }
+}
+
+/// Costs, rows and their model at run->at: Gauss-Newton's while its steps gain, then with the Lagrangian's curvature,
+/// which is found anew where the last one's predictions have not come true. all: at all knots.
+static cav_status model(cav_solve_run *run, descent *d, int all) {
+  int poor = d->age >= 0 && fabs(d->ratio - 1) > poor_ratio;
+  int little = d->age > 0 && d->gain < old_gain * cost_scale(run->tr);
   cav_status status = CAV_OK;
-  if (poor || little) {
-    status = cav_curvature_find(d->curvature, run->tr, run->at, run->spare, d->multiplier);
+  if (poor || little || all || (d->age < 0 && d->few >= FEW)) {
+    int whole = !poor || little || all;
+    if (!whole) mark_stale(run->tr, d);
+    status = cav_curvature_find(d->curvature, run->tr, run->at, run->spare, d->multiplier, whole ? NULL : d->stale);
     d->age = 0;
+    d->whole = whole;
   } else {
     status = cav_transcription_linearise(run->tr, run->at);
     if (d->age >= 0) d->age++;
+    d->whole = 0;
   }
   d->shift = 0;
   d->needs_known = 0;
@@ -339,10 +379,10 @@ static cav_status extrapolate(cav_solve_run *run, descent *d, double *merit) {
 
 static cav_status iterate(cav_solve_run *run, descent *d, int *taken);
 
-/// The iteration over again, with the curvature of where it stands.
-static cav_status renew(cav_solve_run *run, descent *d, int *taken) {
+/// The iteration over again, with the curvature of where it stands; all: of all knots.
+static cav_status renew(cav_solve_run *run, descent *d, int all, int *taken) {
   d->ratio = 0;
-  cav_status status = model(run, d);
+  cav_status status = model(run, d, all);
   return status == CAV_OK ? iterate(run, d, taken) : status;
 }
 
@@ -403,7 +443,7 @@ static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
     d->predicted = cav_quadratic_decrease(d->qp);
     for (int t = 0; t < run->tr->nknot; t++) d->forecast[t] = cav_quadratic_knot_decrease(d->qp, t);
     memcpy(d->multiplier, cav_quadratic_multiplier(d->qp), (size_t)cav_quadratic_rows(d->qp) * sizeof(double));
-    if (d->predicted <= stationary * scale) return d->age == 0 ? CAV_OK : renew(run, d, taken);
+    if (d->predicted <= stationary * scale) return d->whole ? CAV_OK : renew(run, d, 1, taken);
     status = try_step(run, d, 1, 0.9 * d->predicted, &trial);
     if (status != CAV_OK) return status;
     d->ratio = (d->merit - trial) / d->predicted;
@@ -411,6 +451,7 @@ static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
       set_boxes(run, d);
       if (d->ratio > 1.3 && (status = extrapolate(run, d, &trial)) != CAV_OK) return status;
       d->gain = d->merit - trial;
+      d->few = d->gain < gauss_newton * scale ? d->few + 1 : 0;
       exchange(&run->at, &run->spare);
       *taken = 1;
       return d->last == run->at ? CAV_OK : cav_transcription_values(run->tr, run->at);
@@ -418,14 +459,15 @@ static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
     // values of the linearisation, which the trial has overwritten
     status = cav_transcription_values(run->tr, run->at);
     if (status != CAV_OK) return status;
-    if (d->age == 0 && d->predicted <= predicted_enough * scale && cav_run_met(run)) return CAV_OK;
+    int enough = d->predicted <= predicted_enough * scale && cav_run_met(run);
+    if (enough) return d->whole ? CAV_OK : renew(run, d, 1, taken);
     double miss = 0;
     for (int t = 0; t < run->tr->nknot; t++) miss = fmax(miss, missed(d, t));
-    if (d->age != 0 && (d->age < 0 || miss < far * d->predicted)) return renew(run, d, taken);
+    if (d->age > 0 && miss < far * d->predicted) return renew(run, d, 0, taken);
     set_boxes(run, d);
     if (largest_radius(run->tr, d->radius) < least_radius) break;
   }
-  return CAV_OK;
+  return d->age < 0 ? renew(run, d, 1, taken) : CAV_OK;
 }
 
 /// Brings rows in that are still off by what is not linear in them, along the last programme's metric.
@@ -465,7 +507,7 @@ static void begin(cav_solve_run *run, descent *d) {
 /// How optimal run->at is, by the Lagrangian's Hessian of the last multipliers, or by the costs' alone; and the rows'
 /// multipliers.
 static cav_status measure(cav_solve_run *run, descent *d, int curved) {
-  cav_status status = curved ? cav_curvature_find(d->curvature, run->tr, run->at, run->spare, d->multiplier)
+  cav_status status = curved ? cav_curvature_find(d->curvature, run->tr, run->at, run->spare, d->multiplier, NULL)
                              : cav_transcription_linearise(run->tr, run->at);
   if (status != CAV_OK) return status;
   d->shift = 0;
@@ -486,18 +528,55 @@ static cav_status measure(cav_solve_run *run, descent *d, int curved) {
   return CAV_OK;
 }
 
-/// Iterations to where no step gains; *settled: whether that is so.
+/// What a step may still save, by Gauss-Newton's model of here in the full box: that of the verifier. A fraction of the
+/// cost. Boxes and penalties stay as they are.
+static cav_status foresee(cav_solve_run *run, descent *d, double *saving) {
+  size_t bytes = (size_t)cav_quadratic_rows(d->qp) * sizeof(double);
+  int solved = 0;
+  cav_status status = cav_transcription_linearise(run->tr, run->at);
+  if (status != CAV_OK) return status;
+  read_values(run->tr, cav_quadratic_value(d->qp));
+  set_radius(run->tr, d->next, most_radius);
+  memcpy(d->offset, cav_quadratic_penalty(d->qp), bytes);
+  status = solve_programme(run, d->qp, d->next, &solved);
+  memcpy(cav_quadratic_penalty(d->qp), d->offset, bytes);
+  *saving = INFINITY;
+  if (solved) *saving = (fmax(cav_quadratic_decrease(d->qp), 0) + cav_quadratic_gap(d->qp)) / cost_scale(run->tr);
+  return status;
+}
+
+/// Slow progress where there is little to be saved: how often in a row that was so.
+typedef struct tail {
+  int iterations, met; ///< since the last look; looks in a row that saw the end
+  double gain;         ///< of these iterations, of the cost
+} tail;
+
+/// Looks, every few iterations that gain little.
+static cav_status look(cav_solve_run *run, descent *d, tail *end) {
+  double asked = run->options->optimality, saving = INFINITY;
+  end->gain += d->gain / cost_scale(run->tr);
+  if (++end->iterations < LOOK) return CAV_OK;
+  double gain = end->gain / end->iterations;
+  end->iterations = 0, end->gain = 0;
+  cav_status status = gain < asked ? foresee(run, d, &saving) : CAV_OK;
+  end->met = saving <= asked && gain < brisk * saving ? end->met + 1 : 0;
+  return status;
+}
+
+/// Iterations to where no step gains, *settled 1, or what one may gain is little and is slow to come, 2; or 0.
 static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled) {
   int calm = 0, taken = 1;
+  tail end = {0};
   cav_status status = CAV_OK;
-  for (; *left > 0 && calm < PATIENCE; --*left) {
-    status = model(run, d);
+  for (; *left > 0 && calm < PATIENCE && end.met < LOOKS; --*left) {
+    status = model(run, d, 0);
     if (status == CAV_OK) status = iterate(run, d, &taken);
     if (status != CAV_OK || !taken) break;
     calm = d->gain < slow * cost_scale(run->tr) ? calm + 1 : 0;
     if (cav_run_report(run, cav_quadratic_length(d->qp), largest_radius(run->tr, d->radius))) status = CAV_INTERRUPTED;
+    if (status == CAV_OK) status = look(run, d, &end);
   }
-  *settled = !taken || calm >= PATIENCE;
+  *settled = end.met >= LOOKS ? 2 : !taken || calm >= PATIENCE;
   return status == CAV_OK ? settle_rows(run, d) : status;
 }
 
@@ -540,11 +619,11 @@ static cav_status descend(cav_solve_run *run, descent *d, int *settled) {
       break;
     }
     cost = reached;
-    *settled = ended;
+    *settled = ended != 0;
     cav_trajectory_free(best);
     best = cav_trajectory_copy(run->at);
-    status = best ? measure(run, d, 1) : CAV_NO_MEMORY;
-    if (status != CAV_OK || run->optimality < optimal || i == LEAPS || left <= 0) break;
+    status = best ? measure(run, d, ended != 2) : CAV_NO_MEMORY;
+    if (status != CAV_OK || ended == 2 || run->optimality < optimal || i == LEAPS || left <= 0) break;
     status = leap(run, d, &taken);
   }
   cav_trajectory_free(best);

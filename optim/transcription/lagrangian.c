@@ -23,6 +23,7 @@ typedef struct curve {
   cav_transcription *tr;
   const cav_trajectory *at;
   double factor;      ///< of the costs
+  const char *chosen; ///< [nknot] whether a knot's is asked for; NULL: all are
   cav_status *status; ///< [nknot]
   double *room;       ///< [members * room_of]
 } curve;
@@ -263,12 +264,14 @@ static cav_status curve_knot(const curve *c, cav_scratch *s, int t, double *room
 
 static void curve_item(void *context, int t, int member) {
   const curve *c = context;
+  if (c->chosen && !c->chosen[t]) return;
   c->status[t] = curve_knot(c, &c->tr->scratch[member], t, c->room + (size_t)member * room_of(c->tr));
 }
 
-cav_status cav_lagrangian_curvature(cav_transcription *tr, const cav_trajectory *at, double factor) {
+cav_status cav_lagrangian_curvature(cav_transcription *tr, const cav_trajectory *at, double factor,
+                                    const char *chosen) {
   int members = cav_parallel_size(tr->pool);
-  curve c = {tr, at, factor, calloc((size_t)tr->nknot, sizeof(cav_status)), NULL};
+  curve c = {tr, at, factor, chosen, calloc((size_t)tr->nknot, sizeof(cav_status)), NULL};
   c.room = malloc((size_t)members * room_of(tr) * sizeof(double));
   cav_status status = c.status && c.room ? CAV_OK : CAV_NO_MEMORY;
   if (status == CAV_OK) cav_parallel_for(tr->pool, tr->nknot, curve_item, &c);
