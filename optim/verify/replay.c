@@ -206,7 +206,21 @@ static double angle(const double *a, const double *b) {
   return 2 * acos(fmin(w, 1));
 }
 
-// distances between two configurations: of links' centres of mass, and turn of root links; -> bodies of the largest
+// whether a link is a ball that no actuator moves: which way round it lies means nothing
+static int is_ball(const cav_model *model, int link) {
+  int round = !model->link[link].driven;
+  for (int l = link + 1; l < model->nlink; l++) round &= model->link[l].parent != link;
+  for (int g = 0; g < model->ngeom; g++) {
+    const cav_geom *geom = &model->geom[g];
+    if (geom->link != link || (!geom->contype && !geom->conaffinity)) continue;
+    double off = 0;
+    for (int k = 0; k < 3; k++) off = fmax(off, fabs(geom->pos[k] - model->link[link].com[k]));
+    round &= geom->type == CAV_GEOM_SPHERE && off < 1e-6;
+  }
+  return round;
+}
+
+// distances between two configurations: of links' centres of mass, and turn of root links but balls; -> bodies of the largest
 typedef struct gap {
   double distance, rotation;
   int link, root;
@@ -228,7 +242,7 @@ static cav_status compare(const cav_verification *verification, const double *q0
     double distance =
         sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
     if (distance > found->distance) found->distance = distance, found->link = l;
-    if (model->link[l].root != l) continue;
+    if (model->link[l].root != l || is_ball(model, l)) continue;
     double rotation = angle(a + 3, verification->bare->link[l].quat);
     if (rotation > found->rotation) found->rotation = rotation, found->root = l;
   }
