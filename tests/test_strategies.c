@@ -262,6 +262,35 @@ static void test_leap(void) {
   cav_model_free(m);
 }
 
+// a wall in the way: over it with wide steps, then as stated, both with solids that grow, and what they miss is mended first
+static void test_solids(void) {
+  static const char head[] = "<mujoco><compiler angle='degree'/>",
+                    wall[] = "<geom type='box' pos='.5 0 .2' size='.1 1 .2'/>";
+  const char *biped = BIPED("1"), *world = strstr(biped, "<body");
+  char text[4000];
+  CHECK(!strncmp(biped, head, sizeof head - 1));
+  snprintf(text, sizeof text, "%.*s%s%s", (int)(world - biped), biped, wall, world);
+  cav_model *m = scene_load(text);
+  if (!CHECK(m != NULL)) return;
+  double q[20], goal[20], v[20] = {0};
+  cav_configuration_reset(m, q);
+  memcpy(goal, q, sizeof goal);
+  goal[0] += 1;
+  cav_problem p = cav_problem_default(m), taken;
+  p.q_start = q, p.v_start = v, p.q_goal = goal;
+  CHECK(offers(&p, "stated step solids repair-1 repair-2 repair-3 repair-4 soft hold slow momentum longer"));
+  cav_strategy strategy[CAV_STRATEGIES];
+  int n;
+  CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK && strategy[0].schedule.solids == CAV_SOLIDS_HARD);
+  for (int i = 1; i < n; i++) CHECK(strategy[i].schedule.solids == CAV_SOLIDS_GROW);
+  cav_strategy_apply(&p, find(strategy, n, "step"), &taken);
+  CHECK(taken.nswing == 4 && taken.swing[0].amplitude * taken.swing[0].amplitude > 0.1);
+  // where it stops before the wall nothing is in the way
+  goal[0] -= 0.8;
+  CHECK(offers(&p, "stated soft hold slow momentum repair-1 repair-2 repair-3 repair-4 longer"));
+  cav_model_free(m);
+}
+
 int main(void) {
   test_gait(BIPED("1"), 1, 2);
   test_gait(BIPED("1"), 1, -2);
@@ -269,5 +298,6 @@ int main(void) {
   test_stalls();
   test_repair();
   test_leap();
+  test_solids();
   return check_result();
 }

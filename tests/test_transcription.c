@@ -527,7 +527,8 @@ static void test_scene(const char *scene, closing close, cav_order order) {
   tr->options.softness = 0.5;
   tr->options.smoothing = 0.03;
   tr->options.smoothing_self = 0.02;
-  tr->penalty = (cav_penalties){1e3, 100, 1000, 200, close.depth};
+  tr->penalty = (cav_penalties){1e3, 100, 1000, 200};
+  tr->depth_weight = close.depth;
   tr->options.saturation = close.depth > 0 ? 0.02 : 0;
   for (int t = 0; t < tr->nknot; t++)
     for (int i = 0; i < tr->knot[t].layout.count; i++) tr->knot[t].slot[i].multiplier = scene_uniform();
@@ -574,7 +575,7 @@ static void test_apart(int cyclic, int touching, int free_step) {
     close_cycle(tr, at);
     tr->options.stabilisation = CAV_STABILISATION_DISCRETE;
     tr->options.smoothing = 0.03;
-    tr->penalty = (cav_penalties){1e3, 100, 1000, 200, 0};
+    tr->penalty = (cav_penalties){1e3, 100, 1000, 200};
     CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
     int width = 3 * tr->nv, most = 0;
     double worst = 0, largest = 0;

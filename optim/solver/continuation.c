@@ -13,13 +13,19 @@
 /// so these serve all models. Ranges are expensive from the start: a motion that leans on a limit, whose force is free,
 /// would have to be found anew where the limit takes it away, and rows of ranges are all but linear, so a high penalty
 /// costs nothing.
-static const cav_penalties penalised = {.effort = 100, .range = 1e4, .term = 100, .depth = 1e5};
+static const cav_penalties penalised = {.effort = 100, .range = 1e4, .term = 100};
 enum { PENALTY_RISE = 100 };
+
+/// Weight of depth in the world where solids grow, 1/(m^2 s).
+static const double depth_weight = 1e5;
 
 /// Augmented Lagrangian: rounds, iterations a round, tolerance of a round, and the unactuated force from which
 /// restoration is safe.
 enum { ROUNDS = 6, ROUND_ITERATIONS = 15 };
 static const double round_tolerance = 1e-5, near = 1e-3;
+
+/// Unactuated force, fraction of the weight, at which a stage that stalls is the last.
+static const double hopeless = 2;
 
 /// Continuation: how often a stage that stalls is taken back.
 enum { RETRIES = 3 };
@@ -47,7 +53,7 @@ void cav_stage_set(const cav_problem *problem, double x, cav_transcription *tr) 
   tr->penalty.effort = between(penalised.effort, PENALTY_RISE * penalised.effort, x);
   tr->penalty.range = between(penalised.range, PENALTY_RISE * penalised.range, x);
   tr->penalty.unactuated = cav_schedule_at(&problem->schedule, x).penalty;
-  tr->penalty.depth = problem->schedule.solids == CAV_SOLIDS_GROW && x < 1 ? penalised.depth : 0;
+  tr->depth_weight = problem->schedule.solids == CAV_SOLIDS_GROW ? depth_weight : 0;
   tr->penalty.term = between(penalised.term, PENALTY_RISE * penalised.term, fmin(2 * x, 1));
 }
 
@@ -137,6 +143,13 @@ static int keep(cav_trajectory **kept, const cav_trajectory *at) {
   return *kept != NULL;
 }
 
+/// Whether the motion cannot be saved: from half way on, where the penalty of the unactuated force has reached its end,
+/// the present stage stands still at such forces. Of 29 motions none that was found had more than 0.6 there.
+static int is_hopeless(const cav_solve_run *run, double fraction, cav_outcome outcome) {
+  return outcome == CAV_OUTCOME_STALLED && fraction >= 0.5 && fraction < 1 &&
+         cav_transcription_unactuated(run->tr, NULL) > hopeless;
+}
+
 /// One stage, at a fraction of the way.
 static cav_status run_stage(cav_solve_run *run, double fraction, cav_outcome *outcome) {
   cav_stage_options stage = cav_schedule_at(&run->problem->schedule, fraction);
@@ -186,6 +199,12 @@ cav_status cav_continuation_run(cav_solve_run *run) {
     if (!cav_run_note(run, fraction, begin, outcome)) status = CAV_NO_MEMORY;
     if (outcome == CAV_OUTCOME_AGAIN || outcome == CAV_OUTCOME_STALLED) run->region.radius = 0;
     if (status != CAV_OK || (!again && run->stage == stages && fraction >= 1)) break;
+    if (!again && is_hopeless(run, fraction, outcome)) {
+      cav_stage_set(run->problem, 1, run->tr);
+      status = cav_transcription_values(run->tr, run->at);
+      if (status == CAV_OK) status = CAV_NOT_CONVERGED;
+      break;
+    }
     if (again) {
       exchange(&run->at, &before);
       retries++;

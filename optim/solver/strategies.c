@@ -24,6 +24,9 @@ static const double touching = 0.02, least_travel = 0.3, across = 0.7;
 /// The gait: how far the first and the second hinge go, rad, and its frequency where the hip is a metre up, Hz.
 static const double swing_angle = 0.25, bend_angle = 0.4, pace = 1.2;
 
+/// Over obstacles limbs swing as much wider and slower.
+static const double wide = 1.6, leisure = 0.6;
+
 /// How much softer and how much slower than stated, and how much longer a diagnosis may last.
 enum { SOFTER = 2, CHEAPER = 10, SLOWER = 2, LONGER = 2, REPAIRS = 4 };
 
@@ -169,6 +172,18 @@ static int is_recorded(const cav_problem *problem) {
   return 0;
 }
 
+/// Where the guess runs into solids: over them with wide and slow swings, then as it is; what they miss is mended before
+/// anything else is tried.
+static void add_grown(cav_strategy *strategy, int *n, const cav_strategy *grown, const cav_strategy *walk) {
+  cav_strategy step = *walk;
+  for (int i = 0; i < step.nswing; i++) step.swing[i].amplitude *= wide, step.swing[i].frequency *= leisure;
+  if (step.nswing)
+    add(strategy, n, &step, "step",
+        "over solids, which grow from soft to hard, with the limbs that carry swinging in turn");
+  add(strategy, n, grown, "solids", "lifted out of the solids that the guess runs into, which grow from soft to hard");
+  add_repairs(strategy, n, grown);
+}
+
 cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[CAV_STRATEGIES], int *n) {
   cav_strategy stated = {.guess = problem->guess, .stated = 1, .order = problem->order, .schedule = problem->schedule};
   *n = 0;
@@ -193,26 +208,22 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
 
   int collides = 0;
   status = problem->schedule.solids == CAV_SOLIDS_GROW ? CAV_OK : cav_guess_collides(problem, &collides);
+  // all others would run into them, too
+  if (collides) stated.schedule.solids = CAV_SOLIDS_GROW;
+  cav_strategy plain = stated;
+  plain.guess = CAV_GUESS_INTERPOLATE, plain.stated = 0;
+  cav_strategy walk = plain;
+  if (status == CAV_OK && !problem->nswing) status = gait(problem, &walk);
   if (status != CAV_OK) return status;
-  if (collides) {
-    // all others would run into them, too; what this one misses is mended first
-    stated.schedule.solids = CAV_SOLIDS_GROW;
-    add(strategy, n, &stated, "solids",
-        "lifted out of the solids that the guess runs into, which grow from soft to hard");
-    add_repairs(strategy, n, &stated);
-  }
+  if (collides) add_grown(strategy, n, &stated, &walk);
 
   cav_strategy soft = stated;
   soft.schedule.first.smoothing *= SOFTER;
   soft.schedule.first.penalty /= CHEAPER;
   add(strategy, n, &soft, "soft", "contacts active from twice as far, unactuated force ten times cheaper at first");
 
-  cav_strategy plain = stated;
-  plain.guess = CAV_GUESS_INTERPOLATE, plain.stated = 0;
-  cav_strategy walk = plain;
-  status = problem->nswing ? CAV_OK : gait(problem, &walk);
-  if (status != CAV_OK) return status;
-  if (walk.nswing) add(strategy, n, &walk, "swing", "from start to goal with the limbs that carry swinging in turn");
+  if (walk.nswing && !collides)
+    add(strategy, n, &walk, "swing", "from start to goal with the limbs that carry swinging in turn");
 
   cav_strategy leap = plain;
   status = problem->guess_height != 0 ? CAV_OK : cav_leap_find(problem, &leap.height, &leap.from, &leap.to);

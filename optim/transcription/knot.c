@@ -132,7 +132,7 @@ static row_count knot_rows(const cav_transcription *tr, const int *key, int t) {
   n.dense += (size_t)tr->nv;
   if (tr->constraints_only) return n;
   n.rows += (size_t)has_duration(tr, t);
-  for (int k = 0; k < tr->knot[t].ncontact && tr->penalty.depth > 0; k++)
+  for (int k = 0; k < tr->knot[t].ncontact && tr->depth_weight > 0; k++)
     n.rows += !tr->knot[t].moving[k], n.dense += !tr->knot[t].moving[k];
   for (int k = 0; k < tr->npenalised && tr->knot[t].has_force; k++)
     n.rows++, n.dense += stands_alone(&tr->penalised[k]);
@@ -527,7 +527,7 @@ static void add_contact(cav_sum *a, const cav_term *term, double weight) {
 
 /// What depth in the world costs on the way.
 static void add_depths(cav_sum *a) {
-  double weight = a->tr->penalty.depth * a->tr->options.timestep;
+  double weight = a->tr->depth_weight * a->tr->options.timestep;
   for (int k = 0; k < a->knot->ncontact && weight > 0; k++) {
     int row = CAV_CONTACT_READINGS * k;
     if (a->knot->moving[k]) continue;

@@ -64,9 +64,15 @@ static void pull_costs(const cav_transcription *tr, const int *key, int t, doubl
       pull_force(&tr->effort[k], derivative_of(term, weight, force_of(&tr->effort[k], knot->u), term->scale), pull);
     for (int k = 0; k < knot->ncontact && term->use == CAV_USE_COST; k++) {
       int first, n = cav_knot_contact(tr, key, term, t, k, &first), at = CAV_CONTACT_READINGS * k + first;
+      if (term->quantity == CAV_QUANTITY_GAP && knot->y[at] < 0) continue;
       for (int r = at; r < at + n; r++) pull[tr->nv + r] += derivative_of(term, weight, knot->y[r], term->scale);
     }
     sensor += dim;
+  }
+  double depth = factor * tr->depth_weight * tr->options.timestep;
+  for (int k = 0; k < knot->ncontact && depth > 0; k++) {
+    int r = CAV_CONTACT_READINGS * k;
+    if (!knot->moving[k]) pull[tr->nv + r] += depth * fmin(knot->y[r], 0);
   }
   for (int k = 0; k < tr->npenalised && knot->has_force; k++)
     pull_force(&tr->penalised[k], factor * tr->options.timestep * force_of(&tr->penalised[k], knot->u), pull);

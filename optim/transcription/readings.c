@@ -34,7 +34,7 @@ static double contact_weight(const cav_transcription *tr, const cav_contact *c, 
 
 /// Whether a contact with the world is so deep that it costs: its first reading is then the depth, negative.
 static int is_deep(const cav_transcription *tr, const cav_contact *c) {
-  return tr->penalty.depth > 0 && c->dist < -CAV_DEPTH_FREE;
+  return tr->depth_weight > 0 && c->dist < -CAV_DEPTH_FREE;
 }
 
 static void read_contact(const cav_transcription *tr, const cav_contact *c, double *y) {

@@ -47,7 +47,7 @@ enum { CAV_ROTATION_SIZE = 21 };
 enum { CAV_CONTACT_READINGS = 5 };
 
 /// Depth of a contact with the world that costs nothing where depth costs, m.
-#define CAV_DEPTH_FREE 0.002
+#define CAV_DEPTH_FREE 0.004
 
 /// One knot. Columns of its derivatives: tangent increments of q_{t-1}, q_t, q_{t+1}; those of knots that are not
 /// unknowns are zero. In cycles q_{-1}, q_0 and q_{T+1} are the unknowns of q_{T-1}, q_T and q_1 moved: columns of
@@ -91,7 +91,6 @@ typedef struct cav_knot {
 /// Weights of the augmented Lagrangian, per kind of row.
 typedef struct cav_penalties {
   double unactuated, effort, range, term;
-  double depth; ///< 1/m^2, of contacts with the world beyond CAV_DEPTH_FREE; 0: none
 } cav_penalties;
 
 /// What a servo's bias adds to its row: control = effort over gain - constant - sum of weights times q and v of dofs,
@@ -134,6 +133,7 @@ typedef struct cav_transcription {
   int *rotation_of;   ///< [nv] index into turn_dof or -1
   cav_window *window; ///< [nterm]
   cav_penalties penalty;
+  double depth_weight;              ///< 1/(m^2 s), of depth in the world beyond CAV_DEPTH_FREE; 0: none
   cav_derivative derivative;        ///< of u, contacts and sensors
   cav_derivative difference;        ///< what stands in where there is no analytic one
   int constraints_only;             ///< costs and multipliers are left out: the merit is the violation alone
