@@ -131,38 +131,48 @@ static void fill_rows(const sample *bin, int n, int paths, rows *r) {
   }
 }
 
-// one chunk of MuJoCo's, s; the farthest that ours is from it
-static double time_chunk(const rows *r, size_t from, double *far) {
-  const size_t nq = (size_t)m->nq, nv = (size_t)m->nv;
-  double took = 0;
-  for (size_t i = from; i < from + CHUNK; i++) {
-    mju_copy(d->qpos, r->q + i * nq, m->nq);
-    mju_copy(d->qvel, r->v + i * nv, m->nv);
-    mju_copy(d->qacc, r->a + i * nv, m->nv);
-    double t = bench_seconds();
-    mj_inverse(m, d);
-    took += bench_seconds() - t;
+// a row into d, as MuJoCo wants it
+static void put_row(const rows *r, size_t i) {
+  mju_copy(d->qpos, r->q + i * (size_t)m->nq, m->nq);
+  mju_copy(d->qvel, r->v + i * (size_t)m->nv, m->nv);
+  mju_copy(d->qacc, r->a + i * (size_t)m->nv, m->nv);
+  mj_inverse(m, d);
+}
+
+// s that MuJoCo takes for a chunk of rows
+static double time_chunk(const rows *r, size_t from) {
+  double t = bench_seconds();
+  for (size_t i = from; i < from + CHUNK; i++) put_row(r, i);
+  return bench_seconds() - t;
+}
+
+// the farthest that ours is from theirs, of the norm of u
+static double farthest(const rows *r) {
+  const size_t nv = (size_t)m->nv;
+  double far = 0;
+  for (size_t i = 0; i < ROWS; i++) {
+    put_row(r, i);
     for (size_t j = 0; j < nv; j++) {
       double expected = d->qfrc_inverse[j] + m->dof_damping[j] * m->opt.timestep * d->qacc[j];
-      *far = fmax(*far, fabs(expected - r->u[i * nv + j]) / (1 + mju_norm(d->qfrc_inverse, m->nv)));
+      far = fmax(far, fabs(expected - r->u[i * nv + j]) / (1 + mju_norm(d->qfrc_inverse, m->nv)));
     }
   }
-  return took;
+  return far;
 }
 
 // microseconds a row, by turns: ours least of several batches, theirs of several runs of each chunk; whether both see the same
 static int time_rows(rows *r, double *theirs_us, double *ours_us) {
-  double far = 0, least[ROWS / CHUNK];
+  double least[ROWS / CHUNK];
   *theirs_us = 0, *ours_us = INFINITY;
   for (int c = 0; c < ROWS / CHUNK; c++) least[c] = INFINITY;
   for (int k = 0; k < RUNS; k++) {
     double t = bench_seconds();
     cav_inverse_batch(model, NULL, 1, ROWS, r->q, r->v, r->v_next, r->u, NULL);
     *ours_us = fmin(*ours_us, (bench_seconds() - t) * 1e6 / ROWS);
-    for (int c = 0; c < ROWS / CHUNK; c++) least[c] = fmin(least[c], time_chunk(r, (size_t)(c * CHUNK), &far));
+    for (int c = 0; c < ROWS / CHUNK; c++) least[c] = fmin(least[c], time_chunk(r, (size_t)(c * CHUNK)));
   }
   for (int c = 0; c < ROWS / CHUNK; c++) *theirs_us += least[c] * 1e6 / ROWS;
-  return far < 1e-9;
+  return farthest(r) < 1e-9;
 }
 
 static void batches(sample bin[BINS][PER_BIN], const int *count) {
