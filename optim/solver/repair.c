@@ -20,12 +20,13 @@ typedef enum cure {
   GAP,      ///< contacts see the gap where a step ends
   STEP,     ///< half the step
   SOFTNESS, ///< harder contacts at the end
+  SOFTER,   ///< softer ones, that bend over a longer way
   EFFORT,   ///< half of the usual reserve of the actuators is given; less than that was asked for, and stays
   SLACK     ///< more of it is kept, for feedback
 } cure;
 
 enum { CURES = 3 };
-static const double force_weight = 1, heavier = 10, harder = 4, slack = 0.75;
+static const double force_weight = 1, heavier = 10, harder = 4, softer = 6, longer = 2, soft = 0.03, slack = 0.75;
 
 static int has_record(const cav_problem *p) {
   int found = 0;
@@ -34,14 +35,15 @@ static int has_record(const cav_problem *p) {
 }
 
 /// What a motion misses first, in the order of a certificate (METHOD.md, 6), and its cures. Forces near a record are what
-/// is looked for: none of them costs anything. A residual beyond its bound is what the model cannot do.
+/// is looked for: none of them costs anything. A residual beyond its bound is what the model cannot do. What people do on the
+/// edges of their feet is nearer on softer ground.
 static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
   static const cure forces[] = {EFFORT, STEP, NONE}, deep[] = {SOFTNESS, STEP, NONE}, between[] = {STEP, NONE},
                     turned[] = {ORDER, STEP, NONE}, slip[] = {SLIP, SOFTNESS, NONE}, hover[] = {GAP, STEP, NONE},
                     fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK}, target[] = {EFFORT, GOALS, NONE},
-                    near[] = {STEP, NONE}, none[] = {NONE};
+                    near[] = {STEP, SLACK, NONE}, ground[] = {SOFTER, EFFORT, STEP}, none[] = {NONE};
   if (v->certified) return v->achieved ? none : target;
-  if (!cav_verdict_feasible(v)) return forces;
+  if (!cav_verdict_feasible(v)) return has_record(p) ? ground : forces;
   if (v->penetration_max_m > CAV_TOLERANCE_PENETRATION) return deep;
   if (v->penetration_between_m > CAV_TOLERANCE_PENETRATION) return between;
   if (v->momentum_defect_rms > CAV_TOLERANCE_MOMENTUM) return turned;
@@ -127,6 +129,11 @@ static cav_status change(const cav_problem *p, cure c, cav_strategy *s) {
     case SOFTNESS:
       s->schedule.last.softness /= harder;
       break;
+    case SOFTER:
+      if (s->schedule.last.softness >= soft) break;
+      s->schedule.last.softness *= softer;
+      s->schedule.last.smoothing *= longer;
+      break;
     case EFFORT:
       if (effort >= cav_problem_default(p->model).effort_limit && effort < 0.99) s->effort_limit = (1 + effort) / 2;
       break;
@@ -160,7 +167,9 @@ static void describe(const cav_problem *p, cav_strategy *s) {
   } number[] = {{s->effort_limit > 0, ", <limits effort=\"%.3g\"/>", s->effort_limit},
                 {s->timestep > 0, ", timestep=\"%.4g\"", s->timestep},
                 {s->schedule.last.softness != p->schedule.last.softness, ", <last softness=\"%.3g\"/>",
-                 s->schedule.last.softness}};
+                 s->schedule.last.softness},
+                {s->schedule.last.smoothing != p->schedule.last.smoothing, ", <last smoothing=\"%.3g\"/>",
+                 s->schedule.last.smoothing}};
   for (size_t i = 0; i < sizeof number / sizeof *number; i++) {
     size_t n = strlen(out);
     if (number[i].differs) snprintf(out + n, room - n, number[i].format, number[i].value);
