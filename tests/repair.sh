@@ -22,8 +22,8 @@ for name in "$@"; do
     "$build/problems/cavort" ik "$clip" -q --model "$model" --markers problems/markers/robot.xml -o "$folder/fit"
     for from in 0 1.8; do
       status=0
-      sh -c '"$@"; s=$?; times >"$0"; exit $s' "$folder/times" timeout 600 "$build/problems/cavort" solve "$folder/fit/repair.xml" -q \
-        --threads 1 --strategies 1 --set horizon/@duration=2 --set horizon/@timestep=0.0125 --set "guess/@offset=$from" \
+      sh -c '"$@"; s=$?; times >"$0"; exit $s' "$folder/times" timeout 900 "$build/problems/cavort" solve "$folder/fit/repair.xml" -q \
+        --threads 1 --strategies 3 --set horizon/@duration=2 --set "guess/@offset=$from" \
         --set "cost/track/@offset=$from" -o "$folder/part" 2>/dev/null || status=$?
       # the part of the fit
       awk -F, -v from="$from" 'NR == 1 || ($1 > from - 1e-6 && $1 < from + 2 + 1e-6)' "$folder/fit/trajectory.csv" |

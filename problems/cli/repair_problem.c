@@ -8,7 +8,7 @@
 #include "file.h"
 #include "result_file.h"
 
-static const double coarse = 0.0125; // s, longest step: contacts slide by what a step turns, which grows with it
+static const double coarse = 1 / 60.0; // s, longest step: two to a frame of most clips
 
 // the longest step that fits the frames evenly, or frames that fit it
 static double step_of(const cav_trajectory *motion) {
