@@ -146,6 +146,27 @@ static void check_inside_the_floor(void) {
   done(&o);
 }
 
+// a ball that slides freely through a box without an actuator: what is inside is the cause, and not what else pulls
+static void check_inside_a_box(void) {
+  static const char slider[] =
+      "<mujoco><worldbody><geom name='box' type='box' size='.3 .3 .3'/><body name='a' pos='-1 0 0'>"
+      "<joint name='x' type='slide' axis='1 0 0'/><geom name='ball' type='sphere' size='.1' mass='1'/>"
+      "<body name='b'><joint name='arm' type='hinge' axis='0 1 0'/><geom type='sphere' size='.05' pos='0 0 1' "
+      "mass='1'/>"
+      "</body></body></worldbody><actuator><motor name='arm' joint='arm' ctrllimited='true' ctrlrange='-9 "
+      "9'/></actuator>"
+      "</mujoco>";
+  outcome o = solve(slider,
+                    "<goal><joint name='x' pos='2'/></goal><cost><posture dofs='joints' at='end' weight='1e4'/></cost>"
+                    "<schedule><first iterations='1'/><last iterations='1'/></schedule>");
+  if (o.solution) {
+    const cav_reason *r = &o.explanation.conflict[0];
+    CHECK(o.status == CAV_NOT_CONVERGED && o.explanation.nconflict > 0);
+    CHECK(names(r->cure, "Geom 'ball' is") && names(r->cure, "inside 'box'") && !strstr(r->cure, "Pulls"));
+  }
+  done(&o);
+}
+
 // two heights at once: each names the other, and the blame is shared
 static void check_contradiction(void) {
   outcome o = solve(arm_of("60"),
@@ -396,6 +417,7 @@ int main(void) {
   check_out_of_reach();
   check_too_weak();
   check_inside_the_floor();
+  check_inside_a_box();
   check_contradiction();
   check_three();
   check_penalty();

@@ -27,6 +27,9 @@
 /// A contact counts as deep where planning would not have left it.
 static const double deep = CAV_TOLERANCE_PENETRATION;
 
+/// Depth in a solid of the world at which that is the cause, m.
+static const double far_inside = 0.03;
+
 /// Scaled distance from a bound within which a row is at it.
 static const double at_bound = 1e-4;
 
@@ -448,6 +451,37 @@ static void cure_term(const inquiry *in, const cav_binding *row, const cav_bindi
   }
 }
 
+/// The geom of the world that a penetration is in, where that is a solid and no ground: from inside of those there is no
+/// one way out. NULL: another.
+static const cav_geom *solid_of(const cav_model *m, const cav_binding *row, const cav_geom **other) {
+  const cav_geom *a = &m->geom[m->pair[row->object].geom1], *b = &m->geom[m->pair[row->object].geom2];
+  const cav_geom *solid = a->link == 0 ? a : b;
+  *other = a->link == 0 ? b : a;
+  int ground = solid->type == CAV_GEOM_PLANE || solid->type == CAV_GEOM_HFIELD;
+  return solid->link == 0 && !ground ? solid : NULL;
+}
+
+/// What is far inside a solid of the world about a knot; NULL: nothing.
+static const cav_binding *stuck(const inquiry *in, int knot) {
+  const cav_binding *best = NULL;
+  const cav_geom *other;
+  for (int i = 0; i < in->nrow; i++) {
+    const cav_binding *r = &in->row[i];
+    if (r->kind != CAV_BINDING_PENETRATION || abs(r->knot - knot) > near_knots || r->value < far_inside) continue;
+    if (solid_of(in->model, r, &other) && (!best || r->value > best->value)) best = r;
+  }
+  return best;
+}
+
+static void cure_stuck(const inquiry *in, const cav_binding *row, char *out, size_t size) {
+  const cav_geom *other, *solid = solid_of(in->model, row, &other);
+  snprintf(
+      out, size,
+      "Geom '%.60s' is %.3g mm inside '%.60s' there, and no force leads out: <schedule solids=\"grow\"/>, or a guess "
+      "that stays clear of it.",
+      other->name, 1e3 * row->value, solid->name);
+}
+
 static void tell_cure(const inquiry *in, const group *g, const cav_binding *row, double saving, char *out,
                       size_t size) {
   static const char *const usual[] = {
@@ -474,6 +508,11 @@ static void tell_cure(const inquiry *in, const group *g, const cav_binding *row,
                saving > 0 ? "grows" : "shrinks");
     else
       snprintf(out, size, "The cost falls by about %.3g for each 0.01%s that it gives way.", 0.01 * saving, unit);
+    return;
+  }
+  const cav_binding *inside = row->kind == CAV_BINDING_UNACTUATED ? stuck(in, row->knot) : NULL;
+  if (inside) {
+    cure_stuck(in, inside, out, size);
     return;
   }
   if (row->kind == CAV_BINDING_TERM) {
