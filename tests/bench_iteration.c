@@ -4,7 +4,8 @@
 /// factorisation, by method of derivatives. Times are the shortest of several runs, those of whole iterations the processor's.
 /// Instructions are the processor's own count, where the system gives it. Usage: bench_iteration [PROBLEM [count|threads]];
 /// default problems/motions/squat-jump; count: whole iterations alone, once, for a profiler; threads: one iteration of each
-/// stage by one and by two threads in turns, the least of many by the clock on the wall.
+/// stage by one and by two threads in turns, the least of many by the clock on the wall; and what of it is neither
+/// linearisation on the way to the factor nor values of the step tried, hence one thread's.
 #include <linux/perf_event.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -100,7 +101,7 @@ static void whole(const cav_problem *p, cav_transcription *tr, cav_normal *norma
 static double once(const cav_problem *p, cav_transcription *tr, cav_normal *normal, const cav_trajectory *from,
                    int stage, double *merit) {
   cav_trajectory *at = cav_trajectory_copy(from), *spare = cav_trajectory_copy(from);
-  cav_region region = {.iterations = 1};
+  cav_region region = {.iterations = 1, .single = 1};
   double seconds = NAN;
   if (CHECK(at && spare)) {
     cav_stage_set(p, 0.5 * stage, tr);
@@ -113,6 +114,27 @@ static double once(const cav_problem *p, cav_transcription *tr, cav_normal *norm
   return seconds;
 }
 
+// what an iteration has to do on knots, by one thread: linearisation up to the factor, of this gathering and the factor
+// alone, values; ms
+static void time_parts(cav_transcription *tr, cav_normal *normal, const cav_trajectory *from, double part[3]) {
+  cav_trajectory *at = cav_trajectory_copy(from);
+  cav_status factored = CAV_OK;
+  part[0] = part[1] = part[2] = INFINITY;
+  for (int r = 0; r < 10 * RUNS && CHECK(at != NULL); r++) {
+    double clock[4];
+    clock[0] = bench_seconds();
+    CHECK(cav_normal_linearise(normal, tr, at, 1e-10, &factored) == CAV_OK);
+    clock[1] = bench_seconds();
+    cav_normal_gather(normal, tr);
+    CHECK(cav_normal_factor(normal, 1e-10) == factored);
+    clock[2] = bench_seconds();
+    CHECK(cav_transcription_values(tr, at) == CAV_OK);
+    clock[3] = bench_seconds();
+    for (int k = 0; k < 3; k++) part[k] = fmin(part[k], 1e3 * (clock[k + 1] - clock[k]));
+  }
+  cav_trajectory_free(at);
+}
+
 // both numbers of threads by turns
 static void compare_threads(const cav_problem *p, const cav_trajectory *from) {
   static const char *const names[] = {"first", "middle", "last"};
@@ -123,8 +145,13 @@ static void compare_threads(const cav_problem *p, const cav_trajectory *from) {
     for (int r = 0; r < 40 * RUNS && CHECK(normal[0] && normal[1]); r++)
       for (int k = 0; k < 2; k++) best[k] = fmin(best[k], 1e3 * once(p, tr[k], normal[k], from, s, &merit[k]));
     CHECK(!memcmp(&merit[0], &merit[1], sizeof *merit));
-    printf("%-6s stage, one iteration: one thread %6.3f ms, two threads %6.3f ms, ratio %.2f\n", names[s], best[0],
-           best[1], best[0] / best[1]);
+    double part[3] = {0};
+    if (normal[0]) time_parts(tr[0], normal[0], from, part);
+    const double left = best[0] - part[0] - part[2];
+    printf(
+        "%-6s stage, one iteration: one thread %6.3f ms, two threads %6.3f ms, ratio %.2f; left to one thread %.1f %%, "
+        "%.1f with gathering and factor\n",
+        names[s], best[0], best[1], best[0] / best[1], 100 * left / best[0], 100 * (left + part[1]) / best[0]);
     for (int k = 0; k < 2; k++) cav_normal_free(normal[k]), cav_transcription_free(tr[k]);
   }
 }
