@@ -29,8 +29,8 @@ static const set seed[] = {{{36, 1.5}, 1, {0.85}}, {{12, 3}, 1, {1}},       {{70
                            {{0.1, 1.5}, 1, {1}},   {{4, 3}, 2, {0.85, 0.6}}};
 enum { SEEDS = sizeof seed / sizeof *seed };
 
-/// End error that ends the search after so many trials, m: a fifth of the distance at which a loop is lost, two of them,
-/// and at last any that is not lost.
+/// End error that ends the search after so many trials, m: a tenth of the distance at which a loop is lost, a fifth, and at
+/// last any that is not lost.
 static double near_enough(int trials) { return trials <= FEW ? 0.05 : trials <= SEEDS ? 0.1 : INFINITY; }
 
 /// Loops that have to be followed: at first the pushed ones too.
