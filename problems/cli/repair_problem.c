@@ -36,7 +36,7 @@ cav_status cav_command_write_repair(const char *folder, const char *model_path, 
         "  <start free=\"true\"/>\n  <guess file=\"trajectory.csv\"/>\n"
         "  <cost>\n"
         "    <track file=\"trajectory.csv\" joints=\"all\" sd=\"0.15 0.5\"/>\n"
-        "    <slip weight=\"200000\"/>\n"
+        "    <slip weight=\"50000\"/>\n"
         "    <velocity dofs=\"joints\" weight=\"0\"/>\n"
         "    <velocity dofs=\"root_angular\" weight=\"0\"/>\n"
         "    <posture dofs=\"joints\" weight=\"0\"/>\n"
