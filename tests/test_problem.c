@@ -406,6 +406,29 @@ static void check_costs(void) {
   cav_problem_free(p);
 }
 
+// a style changes weights of defaults and adds costs; what the file says comes before it, and what is written holds all of it
+static void check_styles(void) {
+  cav_problem *p = load(HEAD "<cost>\n<style name='careful'/>\n<impact weight='7'/>\n</cost>\n" TAIL), *again;
+  cav_error error = {0};
+  if (!p) return;
+  CHECK(find(p, "acceleration")->weight == 4e-4 && find(p, "root acceleration")->weight == 0.08);
+  CHECK(find(p, "impact")->weight == 7 && count(p, CAV_QUANTITY_IMPACT) == 1);
+  CHECK(find(p, "force") && find(p, "force")->weight == 0.3 && find(p, "effort")->weight == 1);
+  CHECK(cav_problem_write(path, p, NULL, &error) == CAV_OK);
+  again = cav_problem_load(path, NULL, &error);
+  CHECK(again && again->nterm == p->nterm);
+  for (int i = 0; again && i < p->nterm; i++) CHECK(again->term[i].weight == p->term[i].weight);
+  cav_problem_free(again);
+  cav_problem_free(p);
+  p = load(HEAD "<cost>\n<posture weight='3'/>\n<style name='athletic'/>\n</cost>\n" TAIL);
+  if (!p) return;
+  CHECK(find(p, "joint velocity")->weight == 0.0125 && find(p, "posture")->weight == 3);
+  CHECK(find(p, "acceleration")->weight == 1e-4 && count(p, CAV_QUANTITY_FORCE) == 0);
+  cav_problem_free(p);
+  refuse_cost("<style name='brave'/>", "careful");
+  refuse_cost("<style/>", "name");
+}
+
 static void check_constraints(void) {
   cav_problem *p =
       load(HEAD
@@ -765,6 +788,7 @@ int main(void) {
               "no body 'floor', but a geom of that name: give it as attribute 'geom'");
   check_trajectory_ends();
   check_costs();
+  check_styles();
   check_constraints();
   check_round_trip();
   check_broken_files();

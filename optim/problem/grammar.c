@@ -2,6 +2,7 @@
 /// problem.c, pose.c and term.c; a table for people is in problems/README.md.
 #include "ipopt_options.h"
 #include "problem_file.h"
+#include "quantity.h"
 #include "scene.h"
 
 // by the enumerations of problem.h and model.h, NULL behind the last
@@ -25,6 +26,8 @@ const char *const cav_problem_next_gaps[] = {CAV_NEXT_GAPS(WORD_TEXT) NULL};
 const char *const cav_problem_next_slips[] = {CAV_NEXT_SLIPS(WORD_TEXT) NULL};
 const char *const cav_problem_solids[] = {CAV_SOLIDS(WORD_TEXT) NULL};
 const char *const cav_problem_norms[] = {[CAV_NORM_SQUARE] = "square", [CAV_NORM_ABSOLUTE] = "absolute", NULL};
+#define STYLE_WORD(style, word, text) [CAV_STYLE_##style] = word,
+const char *const cav_problem_styles[] = {CAV_STYLES(STYLE_WORD) NULL};
 const char *const cav_problem_mirrors[] = {
     [CAV_MIRROR_NONE] = "none", [CAV_MIRROR_X] = "x", [CAV_MIRROR_Y] = "y", NULL};
 static const char *const heights[] = {"keep", "floor", NULL};
@@ -203,8 +206,11 @@ static const cav_xml_element track_frame = {
   static const cav_xml_element cost_##element = {#element, 0, 0, TERM_##of(COST), 0, text};
 #define COST_CHILD(quantity, element, ...) &cost_##element,
 CAV_QUANTITIES(COST_ELEMENT)
+static const cav_xml_element cost_style = {
+    "style", 0, 1, ATTRIBUTES({"name", CAV_XML_WORD, 0, 0, cav_problem_styles, 1, NOTE("", NULL, "careful: slow changes of speed, soft landings, little force; athletic: free limbs and speed, less effort")}),
+    NULL, 0, "a ready set of running costs in the place of defaults; what the file says of a cost comes before it"};
 static const cav_xml_element cost = {
-    "cost", 0, 1, NULL, (const cav_xml_element *const[]){CAV_QUANTITIES(COST_CHILD) NULL}, 0, "terms that are minimised"};
+    "cost", 0, 1, NULL, (const cav_xml_element *const[]){&cost_style, CAV_QUANTITIES(COST_CHILD) NULL}, 0, "terms that are minimised"};
 
 #define BOUNDS                                                                                                         \
   REAL("lower", 0, "of the term", "(open)", "least value; without either bound the value equals its target"),          \

@@ -50,6 +50,7 @@ extern const char *const cav_problem_solids[];
 extern const char *const cav_problem_regularisers[];
 extern const char *const cav_problem_mirrors[];
 extern const char *const cav_problem_norms[];
+extern const char *const cav_problem_styles[];
 
 /// Zeroed memory of the problem; NULL if there is none left. problem.c.
 void *cav_problem_alloc(cav_problem_owner *owner, size_t size);

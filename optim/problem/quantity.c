@@ -1,6 +1,7 @@
 /// Quantities, as CAV_QUANTITIES declares them, and the costs of them that serve all motions.
 #include <assert.h>
 #include <math.h>
+#include <string.h>
 
 #include "quantity.h"
 
@@ -86,5 +87,29 @@ int cav_problem_default_terms(cav_term *term, int most) {
     term[i].name = default_term[i].name;
     term[i].dofs = default_term[i].dofs;
   }
+  return n;
+}
+
+/// Weight of a cost by its name: of a default, or of one that the style adds.
+typedef struct style_weight {
+  const char *name;
+  double weight;
+} style_weight;
+
+// chosen by an ablation over seven motions (optim/METHOD.md, 4)
+static const style_weight style_weights[CAV_STYLE_TYPES][4] = {
+    [CAV_STYLE_CAREFUL] = {{"acceleration", 4e-4}, {"root acceleration", 0.08}, {"impact", 40}, {"force", 0.3}},
+    [CAV_STYLE_ATHLETIC] = {{"joint velocity", 0.0125}, {"root turning", 0.0125}, {"posture", 0.02}},
+};
+
+int cav_style_terms(cav_style style, cav_term *term, int n) {
+  int before = n;
+  for (const style_weight *w = style_weights[style]; w < style_weights[style] + 4 && w->name; w++) {
+    int i = 0;
+    while (i < before && strcmp(term[i].name, w->name)) i++;
+    if (i < before) term[i].weight = w->weight;
+    if (i == before) term[n++] = cav_term_cost(CAV_QUANTITY_FORCE, w->weight);
+  }
+  assert(n - before <= CAV_STYLE_TERMS);
   return n;
 }

@@ -6,6 +6,25 @@
 
 enum { CAV_DEFAULT_TERMS = 10 }; ///< default costs
 
+/// Ready sets of running costs, X(style, word, text): weights in the place of some defaults, and costs beside them.
+#define CAV_STYLES(X)                                                         \
+  X(CAREFUL, "careful", "slow changes of speed, soft landings, little force") \
+  X(ATHLETIC, "athletic", "free limbs and speed, less effort")
+
+/// Styles: CAV_STYLES.
+typedef enum cav_style {
+#define CAV_STYLE_MEMBER(style, ...) CAV_STYLE_##style,
+  CAV_STYLES(CAV_STYLE_MEMBER)
+#undef CAV_STYLE_MEMBER
+      CAV_STYLE_TYPES
+} cav_style;
+
+enum { CAV_STYLE_TERMS = 1 }; ///< most costs that a style adds
+
+/// Gives n default costs the weights of a style and adds its own behind them, CAV_STYLE_TERMS at most; returns how many
+/// there are.
+int cav_style_terms(cav_style style, cav_term *term, int n);
+
 /// Last stage of an evaluation that a term reads.
 cav_sensor_stage cav_term_stage(const cav_term *term);
 

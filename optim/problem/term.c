@@ -607,20 +607,23 @@ static void add_default(cav_problem *p, const cav_term *term) {
 cav_status cav_problem_terms(const cav_problem_reader *reader) {
   const cav_xml_node *cost = cav_problem_child(reader->root, "cost"),
                      *constraint = cav_problem_child(reader->root, "constraint");
-  int ndefault = cav_problem_default_terms(NULL, 0), most = ndefault;
+  const cav_xml_node *style = cost ? cav_problem_child(cost, "style") : NULL;
+  int ndefault = CAV_DEFAULT_TERMS, most = CAV_DEFAULT_TERMS + CAV_STYLE_TERMS;
   for (const cav_xml_node *node = cost ? cost->child : NULL; node; node = node->next) most += CAV_TRACK_TERMS;
   for (const cav_xml_node *node = constraint ? constraint->child : NULL; node; node = node->next) most++;
   cav_problem *p = reader->problem;
-  cav_term defaults[CAV_DEFAULT_TERMS];
+  cav_term defaults[CAV_DEFAULT_TERMS + CAV_STYLE_TERMS];
   p->term = cav_problem_alloc(reader->owner, (size_t)(most + p->model->njoint) * sizeof *p->term);
   if (!p->term) return cav_problem_no_memory(reader);
   // defaults that the file leaves in place, then its own
   cav_problem_default_terms(defaults, CAV_DEFAULT_TERMS);
+  if (style) ndefault = cav_style_terms((cav_style)cav_xml_word(style, "name", 0), defaults, ndefault);
   for (int i = 0; i < ndefault; i++)
     if (!replaced(cost, defaults[i].quantity)) add_default(p, &defaults[i]);
   cav_status status = CAV_OK;
   for (const cav_xml_node *node = cost ? cost->child : NULL; node && !status; node = node->next) {
     int n;
+    if (node == style) continue;
     status = read_term(reader, node, 0, &p->term[p->nterm], &n);
     p->nterm += cav_term_counts(&p->term[p->nterm]) ? n : 0;
   }
