@@ -251,19 +251,20 @@ static void check_same(const cav_problem *a, const cav_problem *b);
 #define SCENE_HEAD \
   "<problem name='p' model='leg.xml'>\n" SCENE "<horizon duration='1' timestep='.05'/>\n<start key='bent'/>\n"
 
-// height='floor' leaves a box on a table, lets one fall that stands on nothing, and by rise counts from the plane alone
+// height='floor' leaves a box on a table, one too that lies in it by rounding, lets one fall that stands on nothing, and by rise
+// counts from the plane alone
 static void check_table(void) {
-  static const double place[3][2] = {{.5, .9}, {3, 1.1}, {.5, 0.25}};
-  static const char *const rise[3] = {"", "", " rise='.15'"};
-  static const double wanted[3] = {.5, .1, .25};
-  for (int i = 0; i < 3; i++) {
+  static const double place[4][2] = {{.5, .9}, {3, 1.1}, {.5, 0.25}, {.5, .4999999995}};
+  static const char *const rise[4] = {"", "", " rise='.15'", ""};
+  static const double wanted[4] = {.5, .1, .25, .5};
+  for (int i = 0; i < 4; i++) {
     char text[2000];
     snprintf(
         text, sizeof text,
         "<problem name='p' model='leg.xml'>\n<scene><geom name='table' type='box' pos='.5 0 .2' size='.4 .4 .2'/>"
         "<body name='crate' pos='0 0 5'><freejoint name='crate'/><geom type='box' size='.1 .1 .1' mass='1'/></body>"
         "</scene><horizon duration='1' timestep='.05'/>\n<start key='bent' height='floor'%s><joint name='x' pos='-3'/>"
-        "<root joint='crate' pos='%g 0 %g'/></start>\n" TAIL,
+        "<root joint='crate' pos='%g 0 %.12g'/></start>\n" TAIL,
         rise[i], place[i][0], place[i][1]);
     cav_problem *p = load(text);
     if (!p) continue;

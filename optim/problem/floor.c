@@ -67,8 +67,9 @@ static double way_to_plane(const cav_model *m, const cav_state *state, int root)
   return up;
 }
 
-// whether a tree is inside something that stands in the world and is no plane
-static cav_status is_inside(const cav_model *m, cav_state *state, int root, const double *q, int *inside) {
+// whether a tree is deeper than that inside something that stands in the world and is no plane
+static cav_status is_inside(const cav_model *m, cav_state *state, int root, const double *q, double depth,
+                            int *inside) {
   cav_status status = cav_position(m, state, q);
   *inside = 0;
   for (int i = 0; i < state->ncontact && !status; i++) {
@@ -76,7 +77,7 @@ static cav_status is_inside(const cav_model *m, cav_state *state, int root, cons
                    *b = &m->geom[m->pair[state->contact[i].pair].geom2];
     const cav_geom *stands = a->link == 0 ? a : b, *moves = a->link == 0 ? b : a;
     if (stands->link != 0 || stands->type == CAV_GEOM_PLANE || m->link[moves->link].root != root) continue;
-    *inside |= state->contact[i].dist < 0;
+    *inside |= state->contact[i].dist < -depth;
   }
   return status;
 }
@@ -84,10 +85,11 @@ static cav_status is_inside(const cav_model *m, cav_state *state, int root, cons
 // how far a tree can go down, at most that far, before it touches something: step by step, then by bisection
 static cav_status way_down(const cav_model *m, cav_state *state, int root, int height, double gain, double most,
                            double *q, double *way) {
-  static const double step = 0.005; // m: thinner things are passed
+  static const double step = 0.005;    // m: thinner things are passed
+  static const double rounding = 1e-6; // m: what lies on something may be so deep in it
   double from = q[height], free = 0, blocked = 0;
   int inside;
-  cav_status status = is_inside(m, state, root, q, &inside);
+  cav_status status = is_inside(m, state, root, q, rounding, &inside);
   *way = most;
   // what starts inside of something is not stopped by it
   if (status || inside) return status;
@@ -95,13 +97,13 @@ static cav_status way_down(const cav_model *m, cav_state *state, int root, int h
     free = blocked;
     blocked = fmin(blocked + fmax(step, most / 4000), most);
     q[height] = from - blocked / gain;
-    status = is_inside(m, state, root, q, &inside);
+    status = is_inside(m, state, root, q, 0, &inside);
   }
   for (int i = 0; i < 40 && inside && !status; i++) {
     double middle = (free + blocked) / 2;
     int deep;
     q[height] = from - middle / gain;
-    status = is_inside(m, state, root, q, &deep);
+    status = is_inside(m, state, root, q, 0, &deep);
     *(deep ? &blocked : &free) = middle;
   }
   q[height] = from;
