@@ -95,10 +95,11 @@ static void test_sled(int own) {
   simulate(&r, own);
   follow(&b, &r);
   const cav_parameter parameter[3] = {
-      {CAV_PARAMETER_MASS, cav_object_find(b.model, CAV_OBJECT_BODY, "upper"), 0, INFINITY},
-      {CAV_PARAMETER_MASS, cav_object_find(b.model, CAV_OBJECT_BODY, "lower"), 0, INFINITY},
-      {CAV_PARAMETER_FRICTION, cav_object_find(b.model, CAV_OBJECT_GEOM, "runner"), 0, INFINITY}};
-  cav_status status = cav_estimate_solve(&b.problem, 3, parameter, NULL, NULL, &e, &error);
+      {.kind = CAV_PARAMETER_MASS, .object = cav_object_find(b.model, CAV_OBJECT_BODY, "upper")},
+      {.kind = CAV_PARAMETER_MASS, .object = cav_object_find(b.model, CAV_OBJECT_BODY, "lower")},
+      {.kind = CAV_PARAMETER_FRICTION, .object = cav_object_find(b.model, CAV_OBJECT_GEOM, "runner")}};
+  b.problem.nparameter = 3, b.problem.parameter = parameter;
+  cav_status status = cav_estimate_solve(&b.problem, NULL, NULL, &e, &error);
   if (!CHECK(status == CAV_OK)) fprintf(stderr, "    %s\n", error.text);
   for (int k = 0; e && k < 3; k++) {
     printf("sled: %.4f +- %.4f, is %.4f (%.2f %%)\n", e->value[k], e->error[k], truth[k],
@@ -147,10 +148,11 @@ static void test_unseen(void) {
   term = add(&b, cav_term_cost(CAV_QUANTITY_SENSOR, 1e8));
   term->sensor = (cav_sensor){.name = "", .type = CAV_SENSOR_ACTUATORFRC, .object_type = CAV_OBJECT_ACTUATOR, .dim = 1};
   term->target = &push;
-  cav_parameter parameter[2] = {{CAV_PARAMETER_MASS, cav_object_find(b.model, CAV_OBJECT_BODY, "one"), 0, 0.5},
-                                {CAV_PARAMETER_MASS, cav_object_find(b.model, CAV_OBJECT_BODY, "two"), 0, 0.5}};
-  if (!CHECK(cav_estimate_solve(&b.problem, 2, parameter, NULL, NULL, &e, &error) == CAV_OK))
-    fprintf(stderr, "    %s\n", error.text);
+  cav_parameter parameter[2] = {
+      {.kind = CAV_PARAMETER_MASS, .object = cav_object_find(b.model, CAV_OBJECT_BODY, "one"), .prior = {2, 0.5}},
+      {.kind = CAV_PARAMETER_MASS, .object = cav_object_find(b.model, CAV_OBJECT_BODY, "two"), .prior = {1, 0.5}}};
+  b.problem.nparameter = 2, b.problem.parameter = parameter;
+  if (!CHECK(cav_estimate_solve(&b.problem, NULL, NULL, &e, &error) == CAV_OK)) fprintf(stderr, "    %s\n", error.text);
   if (e) {
     printf("pair: %.6f + %.6f, seen %.3g and %.3g\n", e->value[0], e->value[1], e->seen[0], e->seen[1]);
     CHECK_NEAR(e->value[0] + e->value[1], sum, 1e-3);
@@ -163,11 +165,21 @@ static void test_unseen(void) {
     CHECK(C[0] + C[2] + 2 * C[1] < 1e-3);
   }
   cav_estimate_free(e);
-  parameter[0].deviation = parameter[1].deviation = INFINITY;
-  CHECK(cav_estimate_solve(&b.problem, 2, parameter, NULL, NULL, &e, &error) == CAV_BAD_INPUT && !e);
-  CHECK(strstr(error.text, "prior"));
+  // without a prior no number is given, and both are named
+  parameter[0].prior[1] = parameter[1].prior[1] = 0;
+  CHECK(cav_estimate_solve(&b.problem, NULL, NULL, &e, &error) == CAV_BAD_INPUT && !e);
+  CHECK(strstr(error.text, "mass of one, mass of two") && strstr(error.text, "apart"));
+  // nor is one that only other costs decide: of a force that was not recorded
+  b.problem.nparameter = 1, b.problem.nterm = 1;
+  add(&b, cav_term_cost(CAV_QUANTITY_EFFORT, 1));
+  CHECK(cav_estimate_solve(&b.problem, NULL, NULL, &e, &error) == CAV_BAD_INPUT && !e);
+  CHECK(strstr(error.text, "does not tell mass of one"));
+  // nor is there a record in a wish
+  b.term[0].weight = 0;
+  CHECK(cav_estimate_solve(&b.problem, NULL, NULL, &e, &error) == CAV_BAD_INPUT && strstr(error.text, "<track"));
+  b.term[0].weight = 1e12;
   parameter[0].object = 0;
-  CHECK(cav_estimate_solve(&b.problem, 2, parameter, NULL, NULL, &e, &error) == CAV_BAD_INPUT && !e);
+  CHECK(cav_estimate_solve(&b.problem, NULL, NULL, &e, &error) == CAV_BAD_INPUT && !e);
   cav_model_free(b.model);
 }
 
@@ -189,7 +201,7 @@ static void test_number(const char *text, cav_parameter_kind kind, cav_object_ty
                         int component, double value) {
   cav_model *m = scene_load(BOTTLE("1.5", ".01 .02 .03", ".03 .02 .04", ".2", ".6", SPRING)), *file = scene_load(text);
   if (!CHECK(m && file)) return;
-  const cav_parameter p = {kind, cav_object_find(m, type, name), component, 1};
+  const cav_parameter p = {.kind = kind, .object = cav_object_find(m, type, name), .component = component};
   CHECK(fabs(cav_model_parameter(m, &p) - value) > 1e-3);
   CHECK(cav_model_set_parameter(m, &p, value) == CAV_OK);
   CHECK_NEAR(cav_model_parameter(m, &p), value, 1e-15);

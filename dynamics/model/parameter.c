@@ -1,10 +1,37 @@
-/// Single numbers of a compiled model: masses, centres of mass, inertia, friction, springs and dampers, read and replaced,
-/// with what the model derives from them. Bodies of one link weigh together, as the compiler has it (bodies.c).
+/// Single numbers of a compiled model: masses, centres of mass, inertia, friction, springs, dampers and armature, read and
+/// replaced, with what the model derives from them. Bodies of one link weigh together, as the compiler has it (bodies.c).
+#include <assert.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "compile.h"
 #include "math3.h"
+#include "objects.h"
+
+#define RULE(kind, name, of, unit, text) [CAV_PARAMETER_##kind] = {name, CAV_OBJECT_##of, unit, text},
+static const cav_parameter_rule rules[CAV_PARAMETER_KINDS] = {CAV_PARAMETERS(RULE)};
+
+const cav_parameter_rule *cav_parameter_rule_of(cav_parameter_kind kind) {
+  assert(kind < CAV_PARAMETER_KINDS);
+  return &rules[kind];
+}
+
+const char *cav_parameter_label(const cav_model *m, const cav_parameter *p, char label[CAV_PARAMETER_LABEL]) {
+  static const char *const axis[] = {" x", " y", " z"};
+  char of[CAV_GEOM_LABEL], number[64];
+  const cav_parameter_rule *rule = cav_parameter_rule_of(p->kind);
+  if (p->name && *p->name) {
+    snprintf(label, CAV_PARAMETER_LABEL, "%s", p->name);
+    return label;
+  }
+  const char *name =
+      rule->of == CAV_OBJECT_GEOM ? cav_geom_label(m, p->object, of) : cav_object_name(m, rule->of, p->object);
+  snprintf(number, sizeof number, "%s %d", cav_object_kind_of(rule->of)->text, p->object);
+  snprintf(label, CAV_PARAMETER_LABEL, "%s%s of %.120s", rule->name,
+           p->kind == CAV_PARAMETER_COM ? axis[p->component] : "", *name ? name : number);
+  return label;
+}
 
 static int width_of(const cav_joint *joint) {
   return joint->type == CAV_JOINT_FREE ? 6 : joint->type == CAV_JOINT_BALL ? 3 : 1;
@@ -29,6 +56,7 @@ static int exists(const cav_model *m, const cav_parameter *p) {
       return p->object >= 0 && p->object < m->ngeom && pair_of(m, p->object) >= 0;
     case CAV_PARAMETER_STIFFNESS:
     case CAV_PARAMETER_DAMPING:
+    case CAV_PARAMETER_ARMATURE:
       return p->object >= 0 && p->object < m->njoint;
     case CAV_PARAMETER_KINDS:
       return 0;
@@ -53,6 +81,8 @@ double cav_model_parameter(const cav_model *m, const cav_parameter *p) {
       return m->joint[p->object].stiffness;
     case CAV_PARAMETER_DAMPING:
       return m->dof[m->joint[p->object].dof].damping;
+    case CAV_PARAMETER_ARMATURE:
+      return m->dof[m->joint[p->object].dof].armature;
     case CAV_PARAMETER_KINDS:
       break;
   }
@@ -131,8 +161,22 @@ cav_status cav_model_set_parameter(cav_model *m, const cav_parameter *p, double 
       for (int k = 0; k < width_of(&m->joint[p->object]); k++)
         ((cav_dof *)m->dof)[m->joint[p->object].dof + k].damping = value;
       break;
+    case CAV_PARAMETER_ARMATURE:
+      for (int k = 0; k < width_of(&m->joint[p->object]); k++)
+        ((cav_dof *)m->dof)[m->joint[p->object].dof + k].armature = value;
+      break;
     case CAV_PARAMETER_KINDS:
       return CAV_BAD_INPUT;
   }
   return cav_reference_weights(m);
+}
+
+cav_status cav_model_set_parameters(cav_model *m, int n, const cav_parameter *p, const double *value) {
+  cav_status status = CAV_OK;
+  for (cav_parameter_kind kind = 0; kind < CAV_PARAMETER_KINDS; kind++)
+    for (int i = 0; i < n && !status; i++)
+      // what the model has stays to the bit
+      if (p[i].kind == kind && cav_model_parameter(m, &p[i]) != value[i])
+        status = cav_model_set_parameter(m, &p[i], value[i]);
+  return status;
 }

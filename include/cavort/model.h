@@ -681,7 +681,8 @@ CAV_API cav_status cav_model_perturb(cav_model *model, const double *mass_scale,
   X(INERTIA, "inertia", BODY, "kg m^2", "largest principal moment of inertia of a body; the others go with it")    \
   X(FRICTION, "friction", GEOM, "", "coefficient of sliding friction in all contacts of a geom")                   \
   X(STIFFNESS, "stiffness", JOINT, "N m/rad or N/m", "stiffness of a joint's spring")                              \
-  X(DAMPING, "damping", JOINT, "N m s/rad or N s/m", "damping of a joint, in all its dofs")
+  X(DAMPING, "damping", JOINT, "N m s/rad or N s/m", "damping of a joint, in all its dofs")                         \
+  X(ARMATURE, "armature", JOINT, "kg m^2 or kg", "inertia that a joint adds to what it moves, in all its dofs")
 // clang-format on
 
 /// Kinds of parameters: CAV_PARAMETERS.
@@ -692,19 +693,42 @@ typedef enum cav_parameter_kind {
       CAV_PARAMETER_KINDS
 } cav_parameter_kind;
 
-/// A number that is not known. What the model has is where the search begins and the mean of its prior.
+/// What holds for all parameters of a kind.
+typedef struct cav_parameter_rule {
+  const char *name;   ///< its type in problem files
+  cav_object_type of; ///< what it is a number of: BODY, GEOM or JOINT
+  const char *unit;   ///< of its value; "" has none
+  const char *text;   ///< what it is
+} cav_parameter_rule;
+
+/// kind < CAV_PARAMETER_KINDS.
+CAV_API const cav_parameter_rule *cav_parameter_rule_of(cav_parameter_kind kind);
+
+/// A number that is not known. What the model has is where the search begins.
 typedef struct cav_parameter {
+  const char *name;        ///< for tables; NULL or "": what cav_parameter_label makes of kind and object
   cav_parameter_kind kind; ///< what it is
   int object;              ///< body, geom or joint that it is of
   int component;           ///< of COM: 0 x, 1 y, 2 z
-  double deviation;        ///< of its prior, in its unit; infinite: nothing is known beforehand
+  double prior[2];         ///< mean and standard deviation of what is known beforehand; deviation 0: nothing
+  double range[2];         ///< within which it is sought, infinite where open; both 0: open
 } cav_parameter;
+
+enum { CAV_PARAMETER_LABEL = 160 }; ///< room for a label
+
+/// Name of a parameter, or where it has none "mass of BODY", written into label.
+CAV_API const char *cav_parameter_label(const cav_model *model, const cav_parameter *parameter,
+                                        char label[CAV_PARAMETER_LABEL]);
 
 /// A parameter as the model has it, and another value in its place before any state of the model exists; what the model
 /// derives from it follows. CAV_BAD_INPUT: there is no such object, or no such value (a mass that is not positive, a
 /// negative friction, stiffness or damping), nothing changed; CAV_NO_MEMORY: do not use the model.
 CAV_API double cav_model_parameter(const cav_model *model, const cav_parameter *parameter);
 CAV_API cav_status cav_model_set_parameter(cav_model *model, const cav_parameter *parameter, double value);
+
+/// n of them, value [n], in the order of their kinds, since some follow others (moments of inertia the mass).
+CAV_API cav_status cav_model_set_parameters(cav_model *model, int n, const cav_parameter *parameter,
+                                            const double *value);
 
 enum { CAV_GEOM_LABEL = 96 }; ///< room for a label
 

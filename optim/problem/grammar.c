@@ -35,6 +35,8 @@ static const char *const clippings[] = {"keep", "clip", NULL};
 static const char *const ends[] = {"first", "last", NULL};
 static const char *const frames[] = {"body", "xbody", "geom", "site", NULL};
 static const char *const relations[] = {"none", "start", "goal", NULL};
+#define PARAMETER_NAME(kind, name, ...) [CAV_PARAMETER_##kind] = name,
+static const char *const parameters[CAV_PARAMETER_KINDS + 1] = {CAV_PARAMETERS(PARAMETER_NAME)};
 
 // the tables below read as rows
 // clang-format off
@@ -281,6 +283,21 @@ static const cav_xml_element residual = {
         REAL("torque", 0, "N m", "(zero torque)", "deviation of torques, likewise"),
         REAL("within", 0, "of weight", "0.05", "largest residual that a certificate allows at any knot; torques count over 0.3 m times the weight")),
     NULL, 0, "forces and torques on roots that nothing in the model gives, at a cost instead of zero: for records that the model cannot follow"};
+static const cav_xml_element parameter = {
+    "parameter", 0, 0,
+    ATTRIBUTES(
+        {"type", CAV_XML_WORD, 0, 0, parameters, 1, NOTE("", NULL, "what is not known: of a body its mass, a coordinate of its centre of mass (com), its inertia; friction of a geom; stiffness, damping, armature of a joint")},
+        TEXT("name", "(\"mass of BODY\" and the like)", "name in tables"),
+        TEXT("body", "(another object)", "body of a mass, com or inertia; roles such as \"right foot\" stand for bodies"),
+        TEXT("geom", "(another object)", "geom of a friction, of all its contacts"),
+        TEXT("joint", "(another object)", "joint of a stiffness, damping or armature"),
+        TEXT("component", "(of a com alone)", "x, y or z: which coordinate of the centre of mass, in the frame of its body"),
+        REAL("value", 0, "of the parameter", "(the model's)", "where the search begins; in result folders what was found, which the model then has"),
+        REAL("sd", 0, "of the parameter", "(nothing is known)", "standard deviation of what is known beforehand: a cost of half the squared difference from 'prior' over it"),
+        REAL("prior", 0, "of the parameter", "(value)", "mean of what is known beforehand, with 'sd'"),
+        REAL("lower", 0, "of the parameter", "(open)", "least value that it may have"),
+        REAL("upper", 0, "of the parameter", "(open)", "greatest value that it may have")),
+    NULL, 0, "a number of the model that is found with the motion, from its records"};
 #define STAGE_REAL_first(name, first, last, least, most, course, law, unit, text) REAL(#name, 0, unit, #first, text),
 #define STAGE_WHOLE_first(name, first, last, least, most, text) WHOLE(#name, #first, text),
 #define STAGE_REAL_last(name, first, last, least, most, course, law, unit, text) REAL(#name, 0, unit, #last, text),
@@ -317,7 +334,7 @@ const cav_xml_element cav_problem_element = {
         TEXT("model", "(given by --model)", "model file, MJCF or URDF, relative to this file"),
         FLAG("floating", "false", "the root link of a URDF floats")),
     CHILDREN(&cav_scene_element, &horizon, &cycle, &start, &goal, &pose, &guess, &cost, &constraint, &limits, &residual,
-             &schedule, &ipopt, &contact),
+             &parameter, &schedule, &ipopt, &contact),
     0, "root of a problem file: one motion that is wanted of a model"};
 
 // names of earlier versions

@@ -574,6 +574,13 @@ static cav_status load_model(cav_problem_reader *reader, const char *model_path)
   return reader->state && reader->problem->model_path ? CAV_OK : cav_problem_no_memory(reader);
 }
 
+// the one there was knows the model before its numbers were set
+static cav_status renew_state(cav_problem_reader *reader) {
+  cav_state_free(reader->state);
+  reader->state = cav_state_new(reader->model);
+  return reader->state ? CAV_OK : cav_problem_no_memory(reader);
+}
+
 // all parts, in the order in which they need each other
 static cav_status read_problem(cav_problem_reader *reader, const char *model_path) {
   cav_status status = load_model(reader, model_path);
@@ -588,7 +595,9 @@ static cav_status read_problem(cav_problem_reader *reader, const char *model_pat
   reader->problem->floating = cav_xml_bool(reader->root, "floating", 0);
   reader->problem->name = cav_problem_text(reader->owner, cav_xml_text(reader->root, "name", ""));
   if (!reader->problem->name) return cav_problem_no_memory(reader);
-  status = read_horizon(reader);
+  status = cav_problem_parameters(reader);
+  if (!status && reader->problem->nparameter) status = renew_state(reader);
+  if (!status) status = read_horizon(reader);
   if (!status) status = read_ends(reader);
   if (!status) status = cav_problem_cycle(reader);
   if (!status) status = read_guess(reader);

@@ -8,6 +8,7 @@
 
 #include "file.h"
 #include "objects.h"
+#include "problem_file.h"
 #include "quantity.h"
 
 static const double near_step = 1e-6; // of a step, and of the horizon
@@ -277,6 +278,16 @@ static cav_status check_term(const cav_problem *p, int moving, int i, cav_error 
   return cav_file_fail(error, CAV_BAD_INPUT, 0, "a term %s: term[%d], '%.80s'", wrong, i, term->name ? term->name : "");
 }
 
+static cav_status check_parameter(const cav_problem *p, int i, cav_error *error) {
+  const cav_parameter *x = &p->parameter[i];
+  const char *wrong = cav_problem_wrong_parameter(p->model, x);
+  for (int k = 0; k < i && !wrong; k++)
+    if (p->parameter[k].kind == x->kind && p->parameter[k].object == x->object &&
+        p->parameter[k].component == x->component)
+      wrong = "is the same as one before it";
+  return wrong ? cav_file_fail(error, CAV_BAD_INPUT, 0, "a parameter %s: parameter[%d]", wrong, i) : CAV_OK;
+}
+
 cav_status cav_problem_check(const cav_problem *p, int moving, cav_error *error) {
   if (!p->model || !p->q_start || !p->v_start || !p->q_goal)
     return cav_file_fail(error, CAV_BAD_INPUT, 0, "the problem lacks a model, a start or a goal");
@@ -288,5 +299,8 @@ cav_status cav_problem_check(const cav_problem *p, int moving, cav_error *error)
   if (!status) status = check_vector("q_goal", p->q_goal, p->model->nq, error);
   if (!status) status = check_guess(p, error);
   for (int i = 0; i < p->nterm && !status; i++) status = check_term(p, moving, i, error);
+  if (!status && (p->nparameter < 0 || (p->nparameter && !p->parameter)))
+    status = cav_file_fail(error, CAV_BAD_INPUT, 0, "parameter is NULL, and counted");
+  for (int i = 0; i < p->nparameter && !status; i++) status = check_parameter(p, i, error);
   return status;
 }

@@ -93,6 +93,12 @@ char *cav_problem_scene(cav_problem_owner *owner, const cav_xml_node *scene);
 /// holds a knot. term.c.
 cav_status cav_problem_window(const cav_problem_reader *reader, const cav_xml_node *node, double *from, double *to);
 
+/// All <parameter>, and the values that they give the model, of which no state may be left. parameter_list.c.
+cav_status cav_problem_parameters(const cav_problem_reader *reader);
+
+/// Why a parameter cannot be one of a model; NULL: it can. parameter_list.c.
+const char *cav_problem_wrong_parameter(const cav_model *model, const cav_parameter *parameter);
+
 /// <cycle>, once the start is known. cycle.c.
 cav_status cav_problem_cycle(const cav_problem_reader *reader);
 

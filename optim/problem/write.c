@@ -370,6 +370,36 @@ static void write_head(FILE *out, const cav_problem *p, const char *model_path) 
   write_guess(out, p);
 }
 
+// 0 if it is of something without a name
+static int write_parameter(FILE *out, const cav_problem *p, const cav_parameter *x) {
+  static const char *const component[] = {"x", "y", "z"};
+  const cav_parameter_rule *rule = cav_parameter_rule_of(x->kind);
+  const char *kind = NULL, *name = object_name(p->model, rule->of, x->object, &kind);
+  double value = cav_model_parameter(p->model, x);
+  fputs("  <parameter", out);
+  write_text(out, "type", rule->name);
+  if (x->name && *x->name) write_text(out, "name", x->name);
+  write_text(out, kind, name ? name : "");
+  if (x->kind == CAV_PARAMETER_COM) write_text(out, "component", component[x->component]);
+  write_number(out, "value", value);
+  if (x->prior[1] > 0) {
+    write_number(out, "sd", x->prior[1]);
+    write_number(out, "prior", x->prior[0]);
+  }
+  int bounded = x->range[0] != 0 || x->range[1] != 0;
+  if (bounded && isfinite(x->range[0])) write_number(out, "lower", x->range[0]);
+  if (bounded && isfinite(x->range[1])) write_number(out, "upper", x->range[1]);
+  fputs("/>\n", out);
+  return name != NULL;
+}
+
+// number of the parameter that cannot be written, or -1
+static int write_parameters(FILE *out, const cav_problem *p) {
+  for (int i = 0; i < p->nparameter; i++)
+    if (!write_parameter(out, p, &p->parameter[i])) return i;
+  return -1;
+}
+
 static void write_tail(FILE *out, const cav_problem *p) {
   fputs("  <limits", out);
   write_number(out, "effort", p->effort_limit);
@@ -409,10 +439,14 @@ cav_status cav_problem_write(const char *path, const cav_problem *problem, const
   cav_status status = cav_file_begin(&file, path, error);
   if (status) return status;
   write_head(file.stream, problem, model_path);
-  int bad = write_terms(file.stream, problem);
+  int bad = write_terms(file.stream, problem), nameless = write_parameters(file.stream, problem);
   write_tail(file.stream, problem);
-  if (bad < 0) return cav_file_end(&file, error);
+  if (bad < 0 && nameless < 0) return cav_file_end(&file, error);
   cav_file_abandon(&file);
+  if (bad < 0)
+    return cav_file_fail(error, CAV_BAD_INPUT, 0,
+                         "%s: not written: parameter %d is of something without a name; name it in the model", path,
+                         nameless);
   const char *name = problem->term[bad].name ? problem->term[bad].name : "";
   if (problem->term[bad].quantity == CAV_QUANTITY_USER)
     return cav_file_fail(error, CAV_BAD_INPUT, 0,

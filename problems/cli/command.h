@@ -118,6 +118,12 @@ void cav_command_version(void);
 /// Prints "cavort: text" on standard error; returns the exit status that goes with the error's status.
 int cav_command_fail(const cav_error *error);
 
+struct cav_race;
+
+/// A problem with <parameter>: finds them with the motion, saves both, writes parameters.csv and model.xml; race: its
+/// problem, folder, options and how to save. The exit status. estimate.c.
+int cav_command_estimate(const cav_command_line *line, const struct cav_race *race);
+
 /// Prints why a problem cannot have a solution, most proofs at most, each after a text; how many, -1 with an error.
 /// impossible.c.
 int cav_command_impossible(FILE *out, const char *before, const cav_problem *problem, int most, cav_error *error);

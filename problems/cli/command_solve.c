@@ -308,6 +308,7 @@ static int solve_from(const cav_command_line *line, const cav_problem *problem, 
     race.options.nmultiplier = b->motion->nmultiplier;
     race.options.multiplier = b->motion->final_multiplier;
   }
+  if (problem->nparameter) return cav_command_estimate(line, &race);
   // a start that is given is the only one
   int most = b->start ? 1 : line->strategies ? line->strategies : CAV_STRATEGIES;
   cav_status status = cav_race_open(&race, most, &error);
@@ -361,6 +362,13 @@ static int solve_one(const cav_command_line *line) {
   cav_problem *problem = cav_problem_load(line->operand, line->model, &error);
   if (!problem) return cav_command_fail(&error);
   int refused = cav_command_refuse(line, problem);
+  if (!refused && line->resume && problem->nparameter) {
+    cav_file_fail(
+        &error, CAV_BAD_INPUT, 0,
+        "--resume goes on with a motion, and <parameter> are found with it; the folder's problem.xml has those "
+        "that were found so far, and is solved like any other: cavort solve DIR/problem.xml -o OTHER");
+    refused = cav_command_fail(&error);
+  }
   if (refused) {
     cav_problem_free(problem);
     return refused;

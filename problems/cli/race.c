@@ -149,6 +149,20 @@ static void tell_verification(const cav_solve_options *options, const cav_soluti
   if (options->observer) options->observer(options->observer_context, &line);
 }
 
+cav_status cav_race_verify(const cav_problem *problem, const cav_solution *solution, cav_race_report *report,
+                           cav_error *error) {
+  cav_status status = cav_verify(problem, solution->trajectory, &solution->contact, solution->gain_q, solution->gain_v,
+                                 &report->verdict, error);
+  if (status == CAV_OK)
+    status = cav_verify_optimality(problem, solution->trajectory, &solution->contact, solution->nrow, solution->row,
+                                   &report->verdict, error);
+  report->verdict.solve_seconds = solution->seconds;
+  report->verdict.iterations = solution->iterations;
+  report->cost = solution->cost;
+  report->solution = status == CAV_OK;
+  return status;
+}
+
 // solves and certifies, in whichever process
 static cav_solution *run(const cav_race *race, int i, const cav_solve_options *options, cav_problem *taken,
                          cav_race_report *report) {
@@ -164,15 +178,7 @@ static cav_solution *run(const cav_race *race, int i, const cav_solve_options *o
     report->solution = 1;
   } else if (solution && counts(status)) {
     tell_verification(options, solution);
-    cav_status verified = cav_verify(taken, solution->trajectory, &solution->contact, solution->gain_q,
-                                     solution->gain_v, &report->verdict, &verification);
-    if (verified == CAV_OK)
-      verified = cav_verify_optimality(taken, solution->trajectory, &solution->contact, solution->nrow, solution->row,
-                                       &report->verdict, &verification);
-    report->verdict.solve_seconds = solution->seconds;
-    report->verdict.iterations = solution->iterations;
-    report->cost = solution->cost;
-    report->solution = verified == CAV_OK;
+    cav_status verified = cav_race_verify(taken, solution, report, &verification);
     if (verified != CAV_OK) status = verified, error = verification;
   }
   report->status = (int)status;

@@ -72,6 +72,10 @@ cav_status cav_race_finish(cav_race *race, int cheapest, cav_error *error);
 /// certificate requires. -1: none has a solution. The same whichever ended first.
 int cav_race_best(const cav_race *race, int cheapest);
 
+/// Certifies a solution of a problem, into the report.
+cav_status cav_race_verify(const cav_problem *problem, const cav_solution *solution, cav_race_report *report,
+                           cav_error *error);
+
 /// Has the entry saved by the process that solved it; its exit status.
 int cav_race_save(cav_race *race, int best);
 
