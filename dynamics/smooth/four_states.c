@@ -2,7 +2,6 @@
 /// of its own single evaluation, whatever stands beside it.
 #include "four_states.h"
 
-#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
