@@ -12,7 +12,7 @@ shift
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 measure() { awk -F, -v name="$1" -v column="$2" '$1 == name { printf "%.3g", $column }' "$folder/table.csv"; }
-echo "| model, clip | from, s | certified | processor, s/s | iterations | skating, % of steps, worst cm/s | floating, % | penetration, mm | residual, % | torque excess, % |"
+echo "| model, clip | from, s | certified | processor, s/s | iterations | skating, % of frames, worst cm/s | floating, % | penetration, mm | residual, % | torque excess, % |"
 echo "|---|---|---|---|---|---|---|---|---|---|"
 for name in "$@"; do
   model=problems/models/$name.xml
