@@ -21,12 +21,14 @@ typedef enum cure {
   STEP,     ///< half the step
   SOFTNESS, ///< harder contacts at the end
   SOFTER,   ///< softer ones, that bend over a longer way
+  LOOSE,    ///< a lighter weight of slip
   EFFORT,   ///< half of the usual reserve of the actuators is given; less than that was asked for, and stays
   SLACK     ///< more of it is kept, for feedback
 } cure;
 
 enum { CURES = 3 };
-static const double force_weight = 1, heavier = 10, harder = 4, softer = 6, longer = 2, soft = 0.03, slack = 0.75;
+static const double force_weight = 1, heavier = 10, harder = 4, lighter = 0.04, softer = 6, longer = 2, soft = 0.03,
+                    slack = 0.75;
 
 static int has_record(const cav_problem *p) {
   int found = 0;
@@ -36,12 +38,12 @@ static int has_record(const cav_problem *p) {
 
 /// What a motion misses first, in the order of a certificate (METHOD.md, 6), and its cures. Forces near a record are what
 /// is looked for: none of them costs anything. A residual beyond its bound is what the model cannot do. What people do on the
-/// edges of their feet is nearer on softer ground.
+/// edges of their feet is nearer where these may slide, and on softer ground.
 static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
   static const cure forces[] = {EFFORT, STEP, NONE}, deep[] = {SOFTNESS, STEP, NONE}, between[] = {STEP, NONE},
                     turned[] = {ORDER, STEP, NONE}, slip[] = {SLIP, SOFTNESS, NONE}, hover[] = {GAP, STEP, NONE},
                     fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK}, target[] = {EFFORT, GOALS, NONE},
-                    near[] = {STEP, SLACK, NONE}, ground[] = {SOFTER, EFFORT, STEP}, none[] = {NONE};
+                    near[] = {STEP, SLACK, NONE}, ground[] = {LOOSE, SOFTER, STEP}, none[] = {NONE};
   if (v->certified) return v->achieved ? none : target;
   if (!cav_verdict_feasible(v)) return has_record(p) ? ground : forces;
   if (v->penetration_max_m > CAV_TOLERANCE_PENETRATION) return deep;
@@ -105,6 +107,13 @@ static cav_status weigh_slip(const cav_problem *p, cav_strategy *s) {
   return CAV_OK;
 }
 
+static cav_status loosen_slip(const cav_problem *p, cav_strategy *s) {
+  cav_status status = own_terms(p, s);
+  for (int i = 0; i < s->nterm && !status; i++)
+    if (s->term[i].quantity == CAV_QUANTITY_SLIP) s->term[i].weight *= lighter;
+  return status;
+}
+
 static cav_status change(const cav_problem *p, cure c, cav_strategy *s) {
   double effort = s->effort_limit > 0 ? s->effort_limit : p->effort_limit;
   switch (c) {
@@ -129,6 +138,8 @@ static cav_status change(const cav_problem *p, cure c, cav_strategy *s) {
     case SOFTNESS:
       s->schedule.last.softness /= harder;
       break;
+    case LOOSE:
+      return loosen_slip(p, s);
     case SOFTER:
       if (s->schedule.last.softness >= soft) break;
       s->schedule.last.softness *= softer;
@@ -155,6 +166,11 @@ static void describe(const cav_problem *p, cav_strategy *s) {
     if (is_goal(&p->term[i]) && p->term[i].weight > 0)
       snprintf(out, room, ", weights of goals %g times", s->term[i].weight / p->term[i].weight);
   if (!strcmp(out, ", weights of goals 1 times")) *out = 0;
+  for (int i = 0; i < p->nterm && s->term; i++) {
+    size_t n = strlen(out);
+    if (p->term[i].quantity == CAV_QUANTITY_SLIP && s->term[i].weight != p->term[i].weight)
+      snprintf(out + n, room - n, ", <slip weight=\"%g\"/>", s->term[i].weight);
+  }
   for (int i = p->nterm; i < s->nterm; i++) {
     size_t n = strlen(out);
     snprintf(out + n, room - n, ", %s<%s weight=\"%g\"/>", s->term[i].quantity == CAV_QUANTITY_SLIP ? "one more " : "",
