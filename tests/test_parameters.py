@@ -148,6 +148,11 @@ def test_spring():
             near(found('spring%d' % value)['stiffness of x'], mass * (2 * math.pi / period) ** 2, 0.002, 'spring, N/m')
         else:
             check(0, 'spring: ' + text[-400:])
+    write('spring.xml', PROBLEM % ('spring_model.xml', '<parameter type="stiffness" joint="x" value="120" upper="150"/>',
+                                   'spring.csv', '0.001', ''))
+    status, text = run('solve', 'spring.xml', '--threads', '1', '-o', 'bounded')
+    check('at its upper bound' in text and 'its bound holds stiffness of x -1' in text, 'bound: ' + text[-400:])
+    check(float(found('bounded')['stiffness of x']['value']) == 150, 'a bound is passed')
 
 
 PAIR = """<mujoco model="pair"><option gravity="0 0 0"/><worldbody><body name="one"><joint name="x" type="slide" axis="1 0 0"/>

@@ -15,8 +15,8 @@ typedef struct cav_estimate {
   double *error;      ///< [nparameter] standard errors, the motion being as unknown as it is
   double *covariance; ///< [nparameter*nparameter]
   double *alone;      ///< [nparameter] standard errors by records and priors alone, other costs at a ten-thousandth
-  double *pull;       ///< [nparameter] how far other costs hold it off where records and priors alone would have it, to
-                      ///< first order
+  double *pull; ///< [nparameter] how far other costs, or its bound, hold it off where records and priors alone would
+                ///< have it, to first order
   int *
       told; ///< [nparameter] 1: records tell it: alone is at most half of the prior's deviation (of the value where there is
             ///< no prior), and at most three times error; 0: its value is that of priors or of other costs

@@ -124,8 +124,10 @@ static void print_table(const cav_problem *p, const cav_estimate *e) {
   print_unseen(p, e);
   for (int i = 0; i < p->nparameter; i++)
     if (fabs(e->pull[i]) > e->error[i])
-      printf("other costs than records hold %s %.2g off, %.1f standard errors: lower their weights\n",
-             cav_parameter_label(p->model, &p->parameter[i], label), e->pull[i], fabs(e->pull[i]) / e->error[i]);
+      printf("%s %s %.2g off where records have it, %.1f standard errors%s\n",
+             e->bound[i] ? "its bound holds" : "other costs than records hold",
+             cav_parameter_label(p->model, &p->parameter[i], label), e->pull[i], fabs(e->pull[i]) / e->error[i],
+             e->bound[i] ? "" : ": lower their weights");
 }
 
 static cav_status tell(const cav_command_line *line, const char *folder, const cav_problem *p, const cav_estimate *e,
