@@ -129,6 +129,14 @@ static inline void replay_control(const replay *s, int i) {
   }
 }
 
+// a ball that no actuator moves: which way round it lies means nothing
+static inline int replay_is_ball(const cav_model *m, int link) {
+  int round = !m->link[link].driven;
+  for (int g = 0; g < m->ngeom; g++)
+    if (m->geom[g].link == link) round &= m->geom[g].type == CAV_GEOM_SPHERE;
+  return round;
+}
+
 // distances from the motion at step i; 0 once it is lost, by the certificate's measures
 static inline int replay_follows(const replay *s, int i, replay_end *p) {
   const cav_model *model = s->model;
@@ -147,6 +155,7 @@ static inline int replay_follows(const replay *s, int i, replay_end *p) {
     p->body = fmax(p->body, distance);
     if (model->link[l].root != l) continue;
     p->root = fmax(p->root, distance);
+    if (replay_is_ball(model, l)) continue;
     turn = fmax(turn, 2 * acos(fmin(fabs(a[3] * r[0] + a[4] * r[1] + a[5] * r[2] + a[6] * r[3]), 1)));
   }
   return p->body <= 0.5 && turn <= 1;
