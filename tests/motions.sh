@@ -74,7 +74,7 @@ row() {
       row "${pair%:*}" "dm_control/${pair#*:}.xml"
     done
   fi
-  for motion in jump kick reach get-up-back get-up-front lie-down walk walk-cycle run step-up roll handstand cartwheel backflip lift; do
+  for motion in jump kick reach get-up-back get-up-front lie-down walk walk-cycle run step-up stairs roll handstand cartwheel backflip lift; do
     row $motion
     [ "${CAVORT_OTHERS:-own}" = all ] || continue
     row $motion mujoco/humanoid.xml
