@@ -110,8 +110,7 @@ static void seek(const cav_model *model, cav_state *state, const cav_contact *c,
                   : cav_collide_shapes(&a, &b, s->margin, s->touch);
 }
 
-static void look(const cav_model *model, cav_state *state, const cav_contact *c, sought *s,
-                 cav_next_contact *out) {
+static void look(const cav_model *model, cav_state *state, const cav_contact *c, sought *s, cav_next_contact *out) {
   const cav_pair *pair = &model->pair[c->pair];
   const cav_geom *first = &model->geom[pair->geom1], *second = &model->geom[pair->geom2];
   const double h = state->options.timestep, linear = c->dist + h * c->velocity_next[0];

@@ -136,24 +136,24 @@ CAV_API cav_status cav_ik(const cav_model *model, const cav_record *record, cav_
 CAV_API cav_status cav_ik_sizes(cav_model *model, const cav_record *record, cav_marker_set *set,
                                 const cav_ik_options *options, double *factor, double *deviation, cav_error *error);
 /// Measures of a motion's quality, X(name, unit, bar, text): what is good at most, NaN: none.
-#define CAV_QUALITIES(X)                                                                                    \
-  X(penetration, "mm", 10, "deepest of a body in what it is not jointed to the model with (the floor)")     \
-  X(penetration_fraction, "%", 0, "knots with more than 10 mm of it")                                       \
-  X(self_penetration, "mm", NAN, "deepest of two bodies of one tree in each other")                         \
+#define CAV_QUALITIES(X)                                                                                         \
+  X(penetration, "mm", 10, "deepest of a body in what it is not jointed to the model with (the floor)")          \
+  X(penetration_fraction, "%", 0, "knots with more than 10 mm of it")                                            \
+  X(self_penetration, "mm", NAN, "deepest of two bodies of one tree in each other")                              \
   X(skating, "cm/s", NAN, "fastest slide of what touches, within 5 mm, over a frame of 1/30 s; rolling is none") \
-  X(skating_fraction, "%", 0, "frames in contact with a slide of more than 1 cm/s")                         \
+  X(skating_fraction, "%", 0, "frames in contact with a slide of more than 1 cm/s")                              \
   X(skating_step, "cm/s", NAN, "the same over a single step")                                                    \
   X(skating_step_fraction, "%", NAN, "steps in contact with one of more than 1 cm/s")                            \
-  X(floating, "mm", 20, "highest above all, while the centre of mass moves as if more than g/2 were borne") \
-  X(floating_fraction, "%", 0, "knots more than 20 mm above all meanwhile")                                 \
-  X(jerk, "m/s^3", NAN, "of the centres of mass of links, rms")                                             \
-  X(effort, "%", NAN, "of actuators over their limits, rms")                                                \
-  X(landing, "weight", NAN, "largest vertical force from outside, as the centre of mass moves")             \
-  X(flailing, "m/s", NAN, "speed of the hands against the trunk, rms; none: no hands")                      \
-  X(asymmetry, "%", NAN, "difference of what left and right joints go through, over their sum")             \
-  X(torque_excess, "%", 0, "most that an actuator is asked for beyond its limit, over that limit")          \
-  X(torque_excess_fraction, "%", 0, "knots that ask for more than a limit")                                 \
-  X(residual, "%", NAN, "force that neither contacts nor actuators can give, rms, over the weight")         \
+  X(floating, "mm", 20, "highest above all, while the centre of mass moves as if more than g/2 were borne")      \
+  X(floating_fraction, "%", 0, "knots more than 20 mm above all meanwhile")                                      \
+  X(jerk, "m/s^3", NAN, "of the centres of mass of links, rms")                                                  \
+  X(effort, "%", NAN, "of actuators over their limits, rms")                                                     \
+  X(landing, "weight", NAN, "largest vertical force from outside, as the centre of mass moves")                  \
+  X(flailing, "m/s", NAN, "speed of the hands against the trunk, rms; none: no hands")                           \
+  X(asymmetry, "%", NAN, "difference of what left and right joints go through, over their sum")                  \
+  X(torque_excess, "%", 0, "most that an actuator is asked for beyond its limit, over that limit")               \
+  X(torque_excess_fraction, "%", 0, "knots that ask for more than a limit")                                      \
+  X(residual, "%", NAN, "force that neither contacts nor actuators can give, rms, over the weight")              \
   X(residual_worst, "%", NAN, "the same, at most")
 
 /// How good a motion is, whatever made it. Lengths of knots with data at both sides only; see CAV_QUALITIES.

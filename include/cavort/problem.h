@@ -302,8 +302,8 @@ typedef struct cav_stage_options {
 CAV_API const cav_field *cav_stage_fields(int *n);
 
 /// How solids of the world begin in a schedule (optim/METHOD.md, 5).
-#define CAV_SOLIDS(X)                                                                                              \
-  X(CAV_SOLIDS_HARD, "hard", "as they are")                                                                        \
+#define CAV_SOLIDS(X)                       \
+  X(CAV_SOLIDS_HARD, "hard", "as they are") \
   X(CAV_SOLIDS_GROW, "grow", "the guess is lifted out of them; depth costs, and forces saturate with it")
 
 /// How solids begin: CAV_SOLIDS.

@@ -29,9 +29,8 @@ static const set seed[] = {{{36, 1.5}, 1, {0.85}}, {{12, 3}, 1, {1}},       {{70
                            {{0.1, 1.5}, 1, {1}},   {{4, 3}, 2, {0.85, 0.6}}};
 enum { SEEDS = sizeof seed / sizeof *seed };
 
-/// End error that ends the search after so many trials, m: a tenth of the distance at which a loop is lost, a fifth, and at
-/// last any that is not lost.
-static double near_enough(int trials) { return trials <= FEW ? 0.05 : trials <= SEEDS ? 0.1 : INFINITY; }
+/// End error that ends the search, m: a tenth of the distance at which a loop is lost.
+static const double near_enough = 0.05;
 
 /// Loops that have to be followed: at first the pushed ones too.
 static int enough(int trials) { return trials <= FEW ? CAV_LOOPS : CAV_LOOP_PUSHED; }
@@ -152,7 +151,7 @@ cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription 
   for (int i = 0; i < trials && status == CAV_OK; i++) {
     const set one = sample(&s, i);
     status = report(context, i + 1, trials) ? CAV_INTERRUPTED : try(&s, &one);
-    if (s.found && s.reached.follows >= enough(i + 1) && s.reached.error <= near_enough(i + 1)) break;
+    if (s.found && s.reached.follows >= enough(i + 1) && s.reached.error <= near_enough) break;
   }
   cav_verification_end(&s.verification);
   free(s.gain);

@@ -22,11 +22,11 @@ typedef struct cav_fit {
   double *point;                 ///< [CAV_FIT_POINTS * geoms of a foot + CAV_FIT_CORNERS][3] of its rows
   int ncorner[CAV_FIT_FEET];     ///< of its sole, fixed in the body; 0: found anew in every posture
   double corner[CAV_FIT_FEET][CAV_FIT_CORNERS][3];
-  char *planted;                 ///< [nframe*n] 1: that marker of a foot is held where it is; NULL: none is
-  double *apart;                 ///< [npair] m that links of a pair within a tree are held apart; NULL: they are not
-  double *clear;                 ///< [nframe*CAV_FIT_FEET] m that a foot keeps from the floor; NULL: 0
-  double firm;                   ///< times the weight of markers that are planted, and of feet on the floor
-  double *H, *g, *try, *move;    ///< [nv*nv] lower, by columns; [nv]; [nq]; [nv]
+  char *planted;              ///< [nframe*n] 1: that marker of a foot is held where it is; NULL: none is
+  double *apart;              ///< [npair] m that links of a pair within a tree are held apart; NULL: they are not
+  double *clear;              ///< [nframe*CAV_FIT_FEET] m that a foot keeps from the floor; NULL: 0
+  double firm;                ///< times the weight of markers that are planted, and of feet on the floor
+  double *H, *g, *try, *move; ///< [nv*nv] lower, by columns; [nv]; [nq]; [nv]
 } cav_fit;
 
 /// Sizes of links as unknowns: one factor a group of links, by its logarithm.
