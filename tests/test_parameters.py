@@ -22,6 +22,7 @@ def check(ok, text):
     if not ok:
         failures.append(text)
         print('failed:', text)
+    return ok
 
 
 # ---------------------------------------------------------------- the truth
@@ -153,6 +154,19 @@ def test_spring():
     status, text = run('solve', 'spring.xml', '--threads', '1', '-o', 'bounded')
     check('at its upper bound' in text and 'its bound holds stiffness of x -1' in text, 'bound: ' + text[-400:])
     check(float(found('bounded')['stiffness of x']['value']) == 150, 'a bound is passed')
+    # what is not there: a spring of a mass that moves on, a shade faster than it would without
+    write('free_model.xml', open('spring_model.xml').read().replace('stiffness="100"', 'stiffness="20"'))
+    for name, bend in ('free', 0), ('repelled', 1e-3):
+        write(name + '.csv', 'time,x\n' + ''.join('%.3f,%.8f\n' % (k * 0.01, k * 0.01 + bend * (k * 0.01) ** 3)
+                                                  for k in range(101)))
+        write('free.xml', PROBLEM % ('free_model.xml', '<parameter type="stiffness" joint="x" value="20"/>',
+                                     name + '.csv', '0.001', ''))
+        status, text = run('solve', 'free.xml', '--threads', '1', '-o', name)
+        if check(os.path.exists(name + '/parameters.csv'), name + ': ' + text[-400:]):
+            row = found(name)['stiffness of x']
+            check(0 <= float(row['value']) <= 4 * float(row['standard_error']) and row['identifiable'] == 'yes',
+                  name + ': ' + str(row))
+            check(bend == 0 or (float(row['value']) == 0 and row['at_bound'] == 'lower'), name + ': ' + str(row))
 
 
 PAIR = """<mujoco model="pair"><option gravity="0 0 0"/><worldbody><body name="one"><joint name="x" type="slide" axis="1 0 0"/>

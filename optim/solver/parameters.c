@@ -85,9 +85,17 @@ static cav_status fail(cav_error *error, cav_status status, const char *text) {
 
 static int has_prior(const cav_parameter *p) { return p->prior[1] > 0; }
 
+/// Whether a number may vanish, and not be negative.
+static int may_vanish(const cav_parameter *p) {
+  return p->kind == CAV_PARAMETER_FRICTION || p->kind == CAV_PARAMETER_STIFFNESS || p->kind == CAV_PARAMETER_DAMPING ||
+         p->kind == CAV_PARAMETER_ARMATURE;
+}
+
+/// An end of the range of a number, that of its kind included.
 static double bound_of(const cav_parameter *p, int upper) {
-  if (p->range[0] == 0 && p->range[1] == 0) return upper ? INFINITY : -INFINITY;
-  return p->range[upper];
+  const double least = may_vanish(p) ? 0 : -INFINITY;
+  if (p->range[0] == 0 && p->range[1] == 0) return upper ? INFINITY : least;
+  return upper ? p->range[1] : fmax(p->range[0], least);
 }
 
 /// Whether a cost compares with something that was measured.
@@ -273,12 +281,14 @@ static double prior_cost(const search *s, const double *value) {
   return sum / s->scale;
 }
 
-/// Longest part of the step that keeps positive numbers within a ratio of what they are.
+/// Longest part of the step that keeps positive numbers within a ratio of what they are; to 0 where they may vanish and
+/// the step leads beyond.
 static double longest(const search *s) {
   double part = 1;
   for (int k = 0; k < s->n; k++) {
     double way = s->step[k] * s->unit[k], room = fabs(s->value[k]) * (way > 0 ? most_ratio - 1 : 1 - 1 / most_ratio);
     if (s->parameter[k].kind == CAV_PARAMETER_COM || way == 0) continue;
+    if (may_vanish(&s->parameter[k]) && way <= -s->value[k]) continue;
     if (s->value[k] > 0) part = fmin(part, room / fabs(way));
     if (s->value[k] == 0 && way < 0) part = 0;
   }
@@ -490,7 +500,7 @@ static cav_status tell_alone(search *s, cav_estimate *e) {
   invert(s, S, S + size, inverse);
   int moves = solve_free(s, fixed, inverse + size);
   for (int k = 0; k < n; k++) {
-    double unit = has_prior(&s->parameter[k]) ? s->parameter[k].prior[1] : fabs(s->value[k]);
+    const double begun = s->unit[k], unit = has_prior(&s->parameter[k]) ? begun : fmax(begun, fabs(s->value[k]));
     e->alone[k] = sqrt(inverse[k * n + k]);
     e->pull[k] = moves ? -inverse[size + (size_t)k] * s->unit[k] : NAN;
     e->told[k] = e->alone[k] <= 0.5 * unit && e->alone[k] <= 3 * e->error[k];
