@@ -17,10 +17,10 @@ typedef struct cav_estimate {
   double *alone;      ///< [nparameter] standard errors by records and priors alone, other costs at a ten-thousandth
   double *pull; ///< [nparameter] how far other costs, or its bound, hold it off where records and priors alone would
                 ///< have it, to first order
-  int *
-      told; ///< [nparameter] 1: records tell it: alone is at most half of the prior's deviation (where there is no prior,
-      ///< of the value or of the one that the search began with, the larger), and at most three times error; 0: its
-      ///< value is that of priors or of other costs
+  /// [nparameter] 1: records tell it: alone is at most half of the prior's deviation (where there is no prior, of the value
+  /// or of the one that the search began with, the larger), and at most three times error; 0: its value is that of priors
+  /// or of other costs
+  int *told;
   int *bound;   ///< [nparameter] -1, 1: at the lower, upper end of its range; 0: within
   double *seen; ///< [nparameter] what the records alone tell, in units of the priors (of the values where there
                 ///< is none), of combinations of parameters, the best seen first: 1/deviation^2. Far below 1: the
