@@ -3,41 +3,11 @@
 /// fail. Balls that would be through each other push as hard as under the linear gap. Then steps: a rod comes down on the floor,
 /// and forward and inverse undo each other on a humanoid that lands.
 #include "constraint.h"
-#include "scene.h"
-
-enum { ROOM = 64 };
-
-static cav_model *model;
-static cav_state *state;
-static double q[ROOM], v[ROOM], u[ROOM], next[ROOM], found[ROOM], other[ROOM];
+#include "step_bench.h"
 
 static void choose(cav_next_gap next_gap, double timestep, double smoothing) {
-  cav_options *o = &state->options;
-  o->next_gap = next_gap;
-  o->timestep = timestep;
-  o->sliding = CAV_SLIDING_COULOMB;
-  o->stabilisation = CAV_STABILISATION_DISCRETE;
-  o->softness = 0.005;
-  o->time_constant = 0;
-  o->smoothing = o->smoothing_self = smoothing;
-}
-
-static int open_model(cav_model *loaded) {
-  model = loaded;
-  CHECK(model != NULL);
-  if (!model) return 0;
-  state = cav_state_new(model);
-  CHECK(state != NULL && model->nq <= ROOM && model->nv <= ROOM);
-  cav_configuration_reset(model, q);
-  memset(v, 0, sizeof v);
-  memset(u, 0, sizeof u);
-  memset(next, 0, sizeof next);
-  return 1;
-}
-
-static void close_model(void) {
-  cav_state_free(state);
-  cav_model_free(model);
+  choose_linear(timestep, 0.005, smoothing);
+  state->options.next_gap = next_gap;
 }
 
 // the gap after the step that a contact's impulse tells of, where it pushes

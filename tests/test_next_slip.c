@@ -2,43 +2,12 @@
 /// about the point it stands on, two bodies that turn as one, a ball that rolls, a block that slides. The velocity at the
 /// beginning of the step must err there, so that the check could fail. Then steps: the foot of a leg that stretches stays,
 /// and forward and inverse undo each other on a humanoid that lands.
-#include "scene.h"
 #include "step.h"
-
-enum { ROOM = 64 };
-
-static cav_model *model;
-static cav_state *state;
-static double q[ROOM], v[ROOM], u[ROOM], next[ROOM], found[ROOM], other[ROOM];
+#include "step_bench.h"
 
 static void choose(cav_next_slip next_slip, double timestep, double smoothing) {
-  cav_options *o = &state->options;
-  o->next_slip = next_slip;
-  o->next_gap = CAV_NEXT_GAP_LINEAR;
-  o->timestep = timestep;
-  o->sliding = CAV_SLIDING_COULOMB;
-  o->stabilisation = CAV_STABILISATION_DISCRETE;
-  o->softness = 1e-4;
-  o->time_constant = 0;
-  o->smoothing = o->smoothing_self = smoothing;
-}
-
-static int open_model(cav_model *loaded) {
-  model = loaded;
-  CHECK(model != NULL);
-  if (!model) return 0;
-  state = cav_state_new(model);
-  CHECK(state != NULL && model->nq <= ROOM && model->nv <= ROOM);
-  cav_configuration_reset(model, q);
-  memset(v, 0, sizeof v);
-  memset(u, 0, sizeof u);
-  memset(next, 0, sizeof next);
-  return 1;
-}
-
-static void close_model(void) {
-  cav_state_free(state);
-  cav_model_free(model);
+  choose_linear(timestep, 1e-4, smoothing);
+  state->options.next_slip = next_slip;
 }
 
 // the slip over the step in world axes that a contact says it sees
