@@ -7,7 +7,7 @@
 # them), iteration (an iteration of the solver by this build and by one before its loops went by vectors), warm (a changed weight solved again, an iteration by itself), optimum (optimal control against known optima), methods (own solver and Ipopt on the same),
 # stiff (forward steps at softness 1e-2 to 1e-14 against quadruple precision), sensors, tendons, actuation, fluid (readings, strings, drives and
 # drag against MuJoCo's), interruption (solves killed and interrupted at random moments, half an hour), batch (200 problems, four of which go
-# wrong).
+# wrong), walk (forces of a recorded walk against force plates, needs the shared data).
 # CAVORT_BUILD names a build folder, by default build.
 set -eu
 cd "$(dirname "$0")/.."
@@ -209,6 +209,13 @@ batch() {
   mv "$out/batch.tmp" "$out/batch.txt"
 }
 
+# a recorded walk to forces, beside force plates
+walk() {
+  ninja -C "$build" problems/cavort tests/walk_compare >/dev/null
+  { provenance "sh tests/results.sh walk" && sh tests/walk.sh "$build"; } >"$out/walk.tmp"
+  mv "$out/walk.tmp" "$out/walk.txt"
+}
+
 for name in ${*:-inverse heap update normal unused sweep mesh conservation orders sensors tendons actuation fluid optimum methods absent stiff}; do
   case $name in
     inverse) run inverse bench_inverse ;;
@@ -232,6 +239,7 @@ for name in ${*:-inverse heap update normal unused sweep mesh conservation order
     warm) run warm bench_warm ;;
     interruption) interruption ;;
     batch) batch ;;
-    *) echo "usage: sh tests/results.sh [inverse|heap|update|normal|unused|sweep|mesh|conservation|orders|sensors|tendons|actuation|fluid|optimum|methods|absent|stiff|iteration|warm|interruption|batch]..." >&2 && exit 2 ;;
+    walk) walk ;;
+    *) echo "usage: sh tests/results.sh [inverse|heap|update|normal|unused|sweep|mesh|conservation|orders|sensors|tendons|actuation|fluid|optimum|methods|absent|stiff|iteration|warm|interruption|batch|walk]..." >&2 && exit 2 ;;
   esac
 done
