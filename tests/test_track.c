@@ -240,6 +240,34 @@ static void check_cost(const cav_problem *p, const cav_solution *s) {
   if (s) CHECK_NEAR(verdict.cost, s->cost, 1e-9 * s->cost);
 }
 
+// distances of the marker at the knots that frames see, from the record's own numbers
+static void check_residual(const cav_problem *p, const cav_solution *s, const double place[3]) {
+  cav_channel_residual r, none = {0};
+  cav_error error = {0};
+  double square = 0, worst = 0;
+  int seen = 0;
+  for (int t = 0; t <= STEPS; t++) {
+    double at = (.05 + t * .02) * 37, off = 0;
+    int f = (int)floor(at + 1e-9), axes = 0;
+    for (int a = 0; a < 3; a++) {
+      if (f + 1 >= FRAMES || is_gap(f, a) || is_gap(f + 1, a)) continue;
+      double record = (1 - (at - f)) * record_at(a, f / 37.0) + (at - f) * record_at(a, (f + 1) / 37.0);
+      off += pow(s->trajectory->q[3 * t + a] + place[a] - record, 2), axes++;
+    }
+    seen += axes > 0, square += off, worst = fmax(worst, sqrt(off));
+  }
+  CHECK(cav_track_residuals(p, s->trajectory, &s->contact, p->nterm - 1, &r, &error) == CAV_OK);
+  CHECK(r.seen == seen && seen > 30);
+  CHECK_NEAR(r.rms, sqrt(square / seen), 1e-12);
+  CHECK_NEAR(r.worst, worst, 1e-12);
+  CHECK(r.worst_time >= 0 && r.worst_time <= STEPS * .02);
+  // a term without a record, and none at all
+  for (int i = 0; i < 2; i++) {
+    int wrong = i ? p->nterm : 0;
+    CHECK(cav_track_residuals(p, s->trajectory, &s->contact, wrong, &none, &error) == CAV_BAD_INPUT);
+  }
+}
+
 static void test_smoother(void) {
   static long double A[STEPS][STEPS], b[STEPS];
   const double h = .02, sd = .02, place[3] = {.1, .2, .3}, start[3] = {.3, -.2, .1};
@@ -272,6 +300,7 @@ static void test_smoother(void) {
   CHECK(worst < 1e-8);
   // the verifier's cost, and that of the problem as a folder holds it
   check_cost(p, s);
+  if (s) check_residual(p, s, place);
   // other ways from start to goal are no ways to a record; a free duration is none at all
   cav_strategy strategy[CAV_STRATEGIES];
   int nstrategy;
@@ -300,6 +329,10 @@ static void test_smoother(void) {
                                 HORIZON);
   cav_solution *blind = solve(lost);
   for (int i = 0; blind && s && i < 3 * STEPS; i++) CHECK_NEAR(blind->trajectory->q[i], s->trajectory->q[i], 1e-12);
+  cav_channel_residual both[2];
+  if (CHECK(blind &&
+            cav_track_residuals(lost, blind->trajectory, &blind->contact, lost->nterm - 1, both, NULL) == CAV_OK))
+    CHECK(both[0].seen > 30 && both[1].seen == 0 && isnan(both[1].rms) && isnan(both[1].worst));
   cav_solution_free(blind), cav_problem_free(lost);
   cav_solution_free(same), cav_problem_free(again);
   unlink(path);

@@ -501,6 +501,20 @@ CAV_API cav_status cav_term_values(const cav_problem *problem, const cav_traject
                                    const cav_options *contact, int term, int most, cav_term_value *value, int *n,
                                    cav_error *error);
 
+/// How far a motion is from what a channel of a record says, over the knots that see it. Of several numbers the length counts, of
+/// orientations the angle between the two.
+typedef struct cav_channel_residual {
+  int seen;          ///< knots
+  double rms, worst; ///< in the unit of the channel; NaN: no knot sees it
+  double worst_time; ///< s, of the motion; NaN: likewise
+} cav_channel_residual;
+
+/// Residuals of the record of term number term, of which term[term].track is not NULL: residual [track->nchannel]. Evaluated
+/// anew like a certificate, and fails as cav_verify does; CAV_BAD_INPUT, too: that term has no record.
+CAV_API cav_status cav_track_residuals(const cav_problem *problem, const cav_trajectory *trajectory,
+                                       const cav_options *contact, int term, cav_channel_residual *residual,
+                                       cav_error *error);
+
 /// Why a motion is as it is: one thing that is missed, or that pulls.
 typedef struct cav_reason {
   cav_binding row;  ///< the worst of its knots

@@ -289,28 +289,39 @@ static void channel_values(const cav_verification *verification, const cav_chann
   }
 }
 
+int cav_verification_channel(const cav_verification *verification, const cav_track *track, int channel, int t,
+                             double *value, double *recorded) {
+  const cav_channel *c = &track->channel[channel];
+  double record[CAV_SENSOR_DIM_MAX], has[CAV_SENSOR_DIM_MAX], phi[3] = {0};
+  int turned = c->ncolumn == 4, dim = turned ? 3 : c->ncolumn;
+  int seen = cav_track_sample(track, c, when(verification, t), verification->problem->timestep, record) != 0;
+  channel_values(verification, c, t, has);
+  if (turned && seen) rotation(record, has, phi);
+  for (int k = 0; k < dim; k++) {
+    int gap = !seen || isnan(record[turned ? 0 : k]);
+    value[k] = turned ? phi[k] : has[k];
+    recorded[k] = gap ? NAN : turned ? 0 : record[k];
+  }
+  return dim;
+}
+
 // of all channels, over the noise; what was not recorded is zero, and so is its target
 static int record_values(const cav_verification *verification, const cav_term *term, int t, double *x, double *target) {
   int n = 0;
   for (int i = 0; i < term->track->nchannel; i++) {
-    const cav_channel *channel = &term->track->channel[i];
-    double record[CAV_SENSOR_DIM_MAX], value[CAV_SENSOR_DIM_MAX], phi[3] = {0};
-    int turned = channel->ncolumn == 4, dim = turned ? 3 : channel->ncolumn;
-    int seen =
-        cav_track_sample(term->track, channel, when(verification, t), verification->problem->timestep, record) != 0;
-    channel_values(verification, channel, t, value);
-    if (turned && seen) rotation(record, value, phi);
-    for (int c = 0; c < dim; c++, n++) {
-      int gap = !seen || isnan(record[turned ? 0 : c]);
-      x[n] = gap ? 0 : (turned ? phi[c] : value[c]) / channel->sd;
-      target[n] = gap || turned ? 0 : record[c] / channel->sd;
+    double sd = term->track->channel[i].sd;
+    int dim = cav_verification_channel(verification, term->track, i, t, x + n, target + n);
+    for (int k = n; k < n + dim; k++) {
+      int gap = isnan(target[k]);
+      x[k] = gap ? 0 : x[k] / sd;
+      target[k] = gap ? 0 : target[k] / sd;
     }
+    n += dim;
   }
   return n;
 }
 
-// what a record compares velocities and forces with, at a knot that nothing leaves
-static int is_late(const cav_track *track) {
+int cav_verification_is_late(const cav_track *track) {
   return track->channel->kind == CAV_CHANNEL_SENSOR &&
          cav_sensor_rule_of(track->channel->sensor.type)->stage != CAV_READS_POSITION;
 }
@@ -339,7 +350,7 @@ int cav_verification_measure(const cav_verification *verification, const cav_ter
     case CAV_QUANTITY_FORCE:
       return forced ? contact_values(verification, term, t, x, target) : 0;
     case CAV_QUANTITY_TRACK:
-      return forced || !is_late(term->track) ? record_values(verification, term, t, x, target) : 0;
+      return forced || !cav_verification_is_late(term->track) ? record_values(verification, term, t, x, target) : 0;
     case CAV_QUANTITY_USER:
       return forced || term->user->reads != CAV_READS_ACCELERATION ? user_values(verification, term, t, x, target) : 0;
     case CAV_QUANTITY_TYPES:

@@ -261,6 +261,28 @@ void cav_targets_note(const cav_verification *verification, int t, double *work,
   }
 }
 
+void cav_records_note(const cav_verification *verification, const cav_term *term, int t,
+                      cav_channel_residual *residual) {
+  int single, whole;
+  if (!cav_verification_holds(verification, term, t, &single, &whole)) return;
+  if (t >= verification->rows && cav_verification_is_late(term->track)) return;
+  for (int i = 0; i < term->track->nchannel; i++) {
+    double value[CAV_SENSOR_DIM_MAX], recorded[CAV_SENSOR_DIM_MAX], square = 0;
+    int dim = cav_verification_channel(verification, term->track, i, t, value, recorded), seen = 0;
+    for (int k = 0; k < dim; k++) {
+      if (isnan(recorded[k])) continue;
+      square += (value[k] - recorded[k]) * (value[k] - recorded[k]);
+      seen = 1;
+    }
+    if (!seen) continue;
+    residual[i].seen++;
+    residual[i].rms += square;
+    if (!(sqrt(square) > residual[i].worst) && residual[i].seen > 1) continue;
+    residual[i].worst = sqrt(square);
+    residual[i].worst_time = t * verification->h;
+  }
+}
+
 void cav_targets_list(const cav_verification *verification, const cav_term *term, int t, double *work, int most,
                       cav_term_value *value, int *n) {
   int room = (cav_constraint_check_room(verification) - verification->model->nq) / 2, single, whole;

@@ -146,6 +146,15 @@ int cav_verification_contact(const cav_verification *verification, const cav_ter
 int cav_verification_measure(const cav_verification *verification, const cav_term *term, int t, double *q, double *x,
                              double *target);
 
+/// One channel of a record at knot t, as verification->state has it: what the motion has and what was recorded, in the
+/// channel's unit, NaN where nothing was; of orientations the rotation between the two, and zeros. Their number.
+/// constraint_check.c.
+int cav_verification_channel(const cav_verification *verification, const cav_track *track, int channel, int t,
+                             double *value, double *recorded);
+
+/// Whether a record compares velocities or forces, which a knot that nothing leaves has none of. constraint_check.c.
+int cav_verification_is_late(const cav_track *track);
+
 /// Whether a term asks for what knot t is given with: the posture or velocity of a start that is not free, of which no cost is
 /// taken. targets.c.
 int cav_verification_is_given(const cav_verification *verification, const cav_term *term, int t);
@@ -159,6 +168,10 @@ double cav_verification_weight(const cav_verification *verification, const cav_t
 void cav_targets_note(const cav_verification *verification, int t, double *work, cav_term_report *report);
 void cav_targets_verdict(const cav_verification *verification, cav_term_report *report, double residual_cost,
                          cav_verdict *verdict);
+
+/// Adds knot t to the residuals of a record's channels: rms sums squares until all knots are in. targets.c.
+void cav_records_note(const cav_verification *verification, const cav_term *term, int t,
+                      cav_channel_residual *residual);
 
 /// Adds the values of one term at knot t to a list of which the first most are kept. targets.c.
 void cav_targets_list(const cav_verification *verification, const cav_term *term, int t, double *work, int most,

@@ -665,6 +665,34 @@ cav_status cav_term_values(const cav_problem *problem, const cav_trajectory *tra
   return status;
 }
 
+cav_status cav_track_residuals(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
+                               int term, cav_channel_residual *residual, cav_error *error) {
+  cav_verification verification;
+  double *work = NULL;
+  int room = 0;
+  cav_status status = cav_verification_begin(&verification, problem, trajectory, contact, NULL, NULL, error);
+  if (status == CAV_OK && (term < 0 || term >= problem->nterm || !problem->term[term].track))
+    status = verification_fail(error, CAV_BAD_INPUT, "the problem has %d terms, no record of number %d", problem->nterm,
+                               term);
+  const cav_track *track = status == CAV_OK ? problem->term[term].track : NULL;
+  for (int i = 0; track && i < track->nchannel; i++) residual[i] = (cav_channel_residual){.worst_time = NAN};
+  for (int t = 0; status == CAV_OK && t <= verification.last; t++) {
+    status = stand_at(&verification, t, &work, &room);
+    if (status == CAV_OK)
+      cav_records_note(&verification, &problem->term[term], t, residual);
+    else
+      verification_fail(error, status, "knot %d: %s", t, cav_status_name(status));
+  }
+  for (int i = 0; track && i < track->nchannel; i++) {
+    cav_channel_residual *r = &residual[i];
+    r->rms = r->seen ? sqrt(r->rms / r->seen) : NAN;
+    if (!r->seen) r->worst = NAN;
+  }
+  free(work);
+  cav_verification_end(&verification);
+  return status;
+}
+
 cav_status cav_closed_loops_begin(cav_verification *verification, const cav_problem *problem,
                                   const cav_trajectory *trajectory, const cav_options *contact, cav_error *error) {
   cav_status status = cav_verification_begin(verification, problem, trajectory, contact, NULL, NULL, error);

@@ -4,10 +4,13 @@
 #include "periodicity.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "file.h"
 #include "provenance.h"
+#include "records.h"
+#include "result.h"
 
 void cav_command_first_element(const char *path, char name[32]) {
   static char text[65536];
@@ -116,4 +119,19 @@ void cav_command_write_errors(const char *folder, const cav_problem *problem, co
   if (!status) status = cav_result_write_errors(folder, problem->model, trajectory, errors, &error);
   if (status) fprintf(stderr, "cavort: no stderr.csv: %s\n", error.text);
   cav_standard_errors_free(errors);
+}
+
+cav_status cav_command_tell_records(const char *folder, int print, const cav_problem *problem,
+                                    const cav_trajectory *trajectory, const cav_options *contact, cav_error *error) {
+  cav_records *records = cav_records_measure(problem, trajectory, contact, error);
+  if (!records) return error->status;
+  char *path = folder && records->nrecord > 0 ? cav_result_path(folder, "records.csv") : NULL;
+  cav_status status = CAV_OK;
+  if (folder && records->nrecord > 0)
+    status = path ? cav_records_write(path, records, error)
+                  : cav_file_fail(error, CAV_NO_MEMORY, 0, "%s: no memory", folder);
+  if (!status && print) cav_records_print(stdout, records);
+  free(path);
+  cav_records_free(records);
+  return status;
 }

@@ -72,6 +72,11 @@ void cav_command_free(cav_command_scene *scene);
 void cav_command_write_errors(const char *folder, const cav_problem *problem, const cav_trajectory *trajectory,
                               const cav_options *contact, int nrow, const cav_binding *row);
 
+/// Writes records.csv of a motion into its folder and prints how far it is from its records; folder NULL: prints alone. Does
+/// nothing where there are none. command.c.
+cav_status cav_command_tell_records(const char *folder, int print, const cav_problem *problem,
+                                    const cav_trajectory *trajectory, const cav_options *contact, cav_error *error);
+
 /// Name of the first element of a file, "" if there is none in its first part. command.c.
 void cav_command_first_element(const char *path, char name[32]);
 

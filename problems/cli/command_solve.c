@@ -224,7 +224,10 @@ static int save(void *context, const cav_problem *problem, const cav_solution *s
     cav_command_write_errors(to->folder, problem, solution->trajectory, &solution->contact, solution->nrow,
                              solution->row);
   if (!status && line->json) cav_certificate_json(stdout, problem, verdict, terms, origin);
-  if (!status && !line->quiet && !line->json && !stopped) cav_certificate_print(stdout, problem, verdict, terms);
+  int told = !line->quiet && !line->json && !stopped;
+  if (!status)
+    status = cav_command_tell_records(to->folder, told, problem, solution->trajectory, &solution->contact, &error);
+  if (!status && told) cav_certificate_print(stdout, problem, verdict, terms);
   free(terms), free(origin);
   if (status) return cav_command_fail(&error);
   // the page is a convenience: without three.js everything else stands

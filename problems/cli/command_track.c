@@ -1,6 +1,6 @@
 /// cavort track: a recorded clip to a motion that obeys physics, with its forces. The kinematic fit (cavort ik) gives places of
 /// markers and the guess; the problem that is nearest to the markers is written, problem.xml, and solved (cavort solve) into
-/// result/; cop.csv and markers.csv tell centres of pressure and how far markers are. Exit status as of solve.
+/// result/; cop.csv tells centres of pressure, records.csv of the result how far markers are. Exit status as of solve.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,6 +12,7 @@
 #include "csv.h"
 #include "file.h"
 #include "pressure.h"
+#include "records.h"
 #include "result.h"
 
 /// Noise of a frame of one marker, m: errors of a centimetre, which skin and rigid segments keep for some 25 frames.
@@ -217,72 +218,8 @@ static cav_status write_problem(const tracked *t, cav_error *error) {
 
 // ---------------------------------------------------------------- what became of it
 
-typedef struct residual {
-  int seen;
-  double square, worst; // m^2, m
-} residual;
-
-// distances of markers at the knots that see them
-static cav_status measure(const cav_problem *p, const cav_trajectory *motion, const cav_track *track, residual *r) {
-  const cav_model *m = p->model;
-  cav_state *state = cav_state_new(m);
-  cav_status status = state ? CAV_OK : CAV_NO_MEMORY;
-  for (int k = 0; k < motion->nknot && !status; k++) {
-    status = cav_position(m, state, motion->q + (size_t)k * (size_t)m->nq);
-    for (int i = 0; i < track->nchannel && !status; i++) {
-      const cav_channel *channel = &track->channel[i];
-      double seen[CAV_SENSOR_DIM_MAX], square = 0;
-      if (channel->kind != CAV_CHANNEL_MARKER ||
-          !cav_track_sample(track, channel, k * motion->timestep, motion->timestep, seen))
-        continue;
-      cav_pose pose;
-      cav_object_pose(m, state, CAV_OBJECT_XBODY, channel->object, &pose);
-      for (int a = 0; a < 3; a++) {
-        double x = pose.pos[a] - seen[a];
-        for (int b = 0; b < 3; b++) x += pose.rotation[3 * a + b] * channel->place[b];
-        square += x * x;
-      }
-      if (isnan(square)) continue;
-      r[i].seen++;
-      r[i].square += square;
-      r[i].worst = fmax(r[i].worst, sqrt(square));
-    }
-  }
-  cav_state_free(state);
-  return status;
-}
-
-static void write_residuals(FILE *out, const cav_model *m, const cav_track *track, const residual *r) {
-  fputs("marker,body,knots,rms_m,worst_m\n", out);
-  for (int i = 0; i < track->nchannel; i++) {
-    if (track->channel[i].kind != CAV_CHANNEL_MARKER) continue;
-    cav_table_write_text(out, track->channel[i].name);
-    fputc(',', out);
-    cav_table_write_text(out, m->body[track->channel[i].object].name);
-    fprintf(out, ",%d,", r[i].seen);
-    cav_table_write_number(out, sqrt(r[i].square / r[i].seen));
-    fputc(',', out);
-    cav_table_write_number(out, r[i].worst);
-    fputc('\n', out);
-  }
-}
-
-static double rms_of(const cav_track *track, const residual *r) {
-  double square = 0, n = 0;
-  for (int i = 0; i < track->nchannel; i++) square += r[i].square, n += r[i].seen;
-  return sqrt(square / n);
-}
-
-// the record of markers among the terms, NULL: there is none
-static const cav_track *record_of(const cav_problem *p) {
-  for (int i = 0; i < p->nterm; i++)
-    if (p->term[i].quantity == CAV_QUANTITY_TRACK && p->term[i].track->channel->kind == CAV_CHANNEL_MARKER)
-      return p->term[i].track;
-  return NULL;
-}
-
 // rms of the kinematic fit over the same knots, m; NaN: it cannot be told
-static double fit_rms(const tracked *t, const cav_problem *p, const cav_track *track, residual *r) {
+static double fit_rms(const tracked *t, const cav_problem *p) {
   cav_error ignored = {0};
   char *path = cav_result_path(t->fit, "trajectory.csv");
   cav_trajectory *fit = path ? cav_trajectory_read(path, p->model, &ignored) : NULL, *even = NULL, *same = NULL;
@@ -293,43 +230,36 @@ static double fit_rms(const tracked *t, const cav_problem *p, const cav_track *t
   for (int k = 0; k < knots && same; k++)
     memcpy(same->q + (size_t)k * (size_t)same->nq, even->q + (size_t)(first + 2 * k) * (size_t)same->nq,
            (size_t)same->nq * sizeof *same->q);
-  memset(r, 0, (size_t)track->nchannel * sizeof *r);
-  double rms = same && !measure(p, same, track, r) ? rms_of(track, r) : NAN;
+  cav_records *records = same ? cav_records_measure(p, same, &p->contact, &ignored) : NULL;
+  double rms = records ? cav_records_markers(records) : NAN;
+  cav_records_free(records);
   cav_trajectory_free(fit), cav_trajectory_free(even), cav_trajectory_free(same);
   free(path);
   return rms;
 }
 
-// markers.csv and cop.csv of the result
+// cop.csv, and what is told of the result
 static cav_status tell(const tracked *t, cav_error *error) {
   cav_result *result = cav_result_read(t->result, NULL, error);
   if (!result) return error->status;
   const cav_problem *p = result->problem;
-  const cav_track *track = record_of(p);
-  residual *r = calloc(track ? (size_t)track->nchannel : 1, sizeof *r);
-  char *markers = cav_result_path(t->folder, "markers.csv"), *pressure = cav_result_path(t->folder, "cop.csv");
+  char *pressure = cav_result_path(t->folder, "cop.csv");
   cav_forces *forces = cav_forces_new(p->model, result->trajectory, &p->contact, p->close_at_rest, error);
-  cav_status status = !forces ? error->status : r && markers && pressure ? CAV_OK : CAV_NO_MEMORY;
-  cav_file file;
+  cav_status status = !forces ? error->status : pressure ? CAV_OK : CAV_NO_MEMORY;
   if (!status) status = cav_pressure_write(pressure, p->model, result->trajectory, forces, error);
-  if (!status && track) {
-    status = measure(p, result->trajectory, track, r);
-    if (!status) status = cav_file_begin(&file, markers, error);
-    if (!status) {
-      write_residuals(file.stream, p->model, track, r);
-      status = cav_file_end(&file, error);
-    }
-    double rms = rms_of(track, r);
-    if (!status && !t->line->quiet)
-      printf("markers %.2f mm rms from the record, by kinematics alone %.2f mm\n", 1e3 * rms,
-             1e3 * fit_rms(t, p, track, r));
-  }
+  cav_records *records = status ? NULL : cav_records_measure(p, result->trajectory, &p->contact, error);
+  if (!status && !records) status = error->status;
+  if (!status && !t->line->quiet && !isnan(cav_records_markers(records)))
+    printf("markers %.2f mm rms from the record, by kinematics alone %.2f mm\n", 1e3 * cav_records_markers(records),
+           1e3 * fit_rms(t, p));
   if (!status && !t->line->quiet)
     printf("forces are those of %.1f kg%s\n", t->mass,
            t->line->mass > 0 ? "" : ", the model's mass: --mass gives the subject's, which no marker shows");
-  if (!status && !t->line->quiet) printf("wrote %s: problem.xml, result, cop.csv, markers.csv, ik\n", t->folder);
+  if (!status && !t->line->quiet)
+    printf("wrote %s: problem.xml, result (records.csv: every marker), cop.csv, ik\n", t->folder);
   cav_forces_free(forces);
-  free(r), free(markers), free(pressure);
+  cav_records_free(records);
+  free(pressure);
   cav_result_free(result);
   return status;
 }

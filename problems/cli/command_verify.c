@@ -36,6 +36,8 @@ int cav_command_verify(const cav_command_line *line) {
     cav_command_write_errors(line->operand, result->problem, result->trajectory, &result->problem->contact,
                              result->nrow, result->row);
   if (!status && line->json) cav_certificate_json(stdout, result->problem, &verdict, terms, NULL);
+  if (!status && !line->json && !line->quiet)
+    status = cav_command_tell_records(NULL, 1, result->problem, result->trajectory, &result->problem->contact, &error);
   if (!status && !line->json && !line->quiet) cav_certificate_print(stdout, result->problem, &verdict, terms);
   free(terms);
   cav_result_free(result);

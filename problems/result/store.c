@@ -18,10 +18,10 @@
 static const struct {
   const char *name;
   int after;
-} files[] = {{"verdict.json", 1},   {"gains.csv", 1},      {"forces.csv", 1},     {"controls.csv", 1},
-             {"residual.csv", 1},   {"stderr.csv", 1},     {"terms.csv", 1},      {"view.html", 1},
-             {"strategies.csv", 1}, {"parameters.csv", 1}, {"model.xml", 1},      {"rows.csv", 0},
-             {"log.csv", 0},        {"stages.csv", 0},     {"trajectory.csv", 0}, {"problem.xml", 0}};
+} files[] = {{"verdict.json", 1},   {"gains.csv", 1},  {"forces.csv", 1},  {"controls.csv", 1}, {"residual.csv", 1},
+             {"stderr.csv", 1},     {"terms.csv", 1},  {"records.csv", 1}, {"view.html", 1},    {"strategies.csv", 1},
+             {"parameters.csv", 1}, {"model.xml", 1},  {"rows.csv", 0},    {"log.csv", 0},      {"stages.csv", 0},
+             {"trajectory.csv", 0}, {"problem.xml", 0}};
 enum { NFILE = sizeof files / sizeof *files, MOST_ASIDE = 100000 };
 
 static int ends_with(const char *name, const char *end) {
