@@ -256,6 +256,35 @@ static void test_return(cav_transcription *tr, cav_trajectory *at) {
   cav_trajectory_free(moved), cav_trajectory_free(back);
 }
 
+/// Values within a bound: all and to the bit where the merit is within; where it is not, that, and
+/// not all knots: the values of some are still those of another motion.
+static void test_within(cav_transcription *tr, cav_trajectory *at) {
+  cav_trajectory *moved = cav_trajectory_copy(at);
+  double *x = calloc((size_t)cav_transcription_unknowns(tr), sizeof(double));
+  for (int i = 0; i < cav_transcription_unknowns(tr); i++) x[i] = 0.05 * sin(3 * i);
+  cav_transcription_move(tr, at, x, moved);
+  CHECK(cav_transcription_values(tr, at) == CAV_OK);
+  const double merit = cav_transcription_merit(tr), print = print_of(tr), bounds[] = {INFINITY, 2 * merit, merit};
+  for (int k = 0; k < 3; k++) {
+    int beyond = 1;
+    CHECK(cav_transcription_values(tr, moved) == CAV_OK && print_of(tr) != print);
+    CHECK(cav_transcription_values_within(tr, at, bounds[k], &beyond) == CAV_OK && !beyond);
+    CHECK(print_of(tr) == print && cav_transcription_merit(tr) == merit);
+  }
+  const double short_of[] = {merit * (1 - 1e-9), 0.5 * merit, 0, -1};
+  for (int k = 0; k < 4; k++) {
+    int beyond = 0, left = 0;
+    CHECK(cav_transcription_values(tr, moved) == CAV_OK);
+    for (int t = 0; t < tr->nknot; t++) tr->knot[t].cost = -1;
+    CHECK(cav_transcription_values_within(tr, at, short_of[k], &beyond) == CAV_OK && beyond);
+    for (int t = 0; t < tr->nknot; t++) left += tr->knot[t].cost == -1;
+    CHECK(k < 2 || left == tr->nknot || (k == 2 && left >= tr->nknot - cav_parallel_size(tr->pool)));
+  }
+  CHECK(cav_transcription_values(tr, at) == CAV_OK && print_of(tr) == print);
+  free(x);
+  cav_trajectory_free(moved);
+}
+
 /// Rows of the constraints against differences of their values, and their pattern: all that is nonzero is in it, and
 /// all that is in it is nonzero somewhere (but for hard sensor terms, whose pattern is that of the whole reading).
 static void test_rows(cav_transcription *tr, cav_trajectory *at, int tries) {
@@ -535,6 +564,7 @@ static void test_scene(const char *scene, closing close, cav_order order) {
   test_gradient(tr, at);
   if (!cav_derivatives_missing(m)) test_methods(tr, at);
   test_return(tr, at);
+  test_within(tr, at);
   test_controls(tr, at);
   test_threads(&p, tr, at);
   test_stream(&p, tr, at);

@@ -20,6 +20,9 @@ static const double noise = 1e-10;
 /// Doublings of the radius on one linearisation, at most.
 enum { GROWTH = 12 };
 
+/// Decrease over that of a shorter step from which a longer one is taken.
+static const double gain = 1.01;
+
 /// Fraction of the Newton step below which a radius that still shrinks is one that a jump of the merit holds.
 static const double collapse = 1e-6;
 
@@ -143,15 +146,17 @@ typedef struct trial {
   int grown; ///< only the radius held it back
 } trial;
 
-/// Step of the present radius to a trajectory, whose values are known where they have been put by. The transcription ends at
-/// it.
+/// Step of the present radius to a trajectory, of use with a merit up to a bound; its values are known where they have been put
+/// by. The transcription ends at it if it is of use.
 static cav_status try_radius(const cav_region *region, dogleg *d, cav_transcription *tr, const cav_trajectory *at,
-                             cav_trajectory *to, double merit, int known, trial *t) {
+                             cav_trajectory *to, double merit, double bound, int known, trial *t) {
+  int beyond = 0;
   t->predicted = bend(d, region->radius);
   t->length = scaled_norm(d, d->step);
   cav_transcription_move(tr, at, d->step, to);
-  cav_status status = known ? cav_transcription_return(tr, to) : cav_transcription_values(tr, to);
-  t->decrease = status == CAV_OK ? merit - cav_transcription_merit(tr) : -INFINITY;
+  cav_status status =
+      known ? cav_transcription_return(tr, to) : cav_transcription_values_within(tr, to, bound, &beyond);
+  t->decrease = status == CAV_OK && !beyond ? merit - cav_transcription_merit(tr) : -INFINITY;
   return status == CAV_NO_MEMORY || status == CAV_INTERRUPTED ? status : CAV_OK;
 }
 
@@ -168,16 +173,18 @@ static cav_status grow(cav_region *region, dogleg *d, cav_transcription *tr, con
     double radius = region->radius;
     region->radius *= 2;
     if (!cav_values_keep(tr)) return CAV_NO_MEMORY;
-    cav_status status = try_radius(region, d, tr, at, to, merit, 0, &longer);
+    // what is above has no decrease that is larger, however it is rounded
+    const double bound = merit - gain * t->decrease + 8 * DBL_EPSILON * merit;
+    cav_status status = try_radius(region, d, tr, at, to, merit, bound, 0, &longer);
     if (status != CAV_OK) return status;
-    if (longer.decrease > 1.01 * t->decrease) {
+    if (longer.decrease > gain * t->decrease) {
       *t = longer;
       t->grown = is_held_back(region, d, t);
       continue;
     }
     // back to the shorter one; the radius stays for the next linearisation
     region->radius = radius;
-    status = try_radius(region, d, tr, at, to, merit, 1, t);
+    status = try_radius(region, d, tr, at, to, merit, INFINITY, 1, t);
     region->radius = 2 * radius;
     return status;
   }
@@ -189,7 +196,7 @@ static cav_status grow(cav_region *region, dogleg *d, cav_transcription *tr, con
 static cav_status search(cav_region *region, dogleg *d, cav_transcription *tr, const cav_trajectory *at,
                          cav_trajectory *to, double merit, trial *t) {
   for (int attempt = 0;; attempt++) {
-    cav_status status = try_radius(region, d, tr, at, to, merit, 0, t);
+    cav_status status = try_radius(region, d, tr, at, to, merit, merit, 0, t);
     if (status != CAV_OK) return status;
     double ratio = t->predicted > 0 ? t->decrease / t->predicted : -1;
     if (t->predicted <= noise * merit) return CAV_OK;

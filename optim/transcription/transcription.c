@@ -276,9 +276,12 @@ cav_transcription *cav_transcription_new(const cav_problem *problem, int threads
   tr->knot = calloc((size_t)tr->nknot, sizeof *tr->knot);
   tr->status = calloc((size_t)tr->nknot, sizeof *tr->status);
   tr->ready = calloc((size_t)tr->nknot, sizeof *tr->ready);
-  if (!tr->knot || !tr->status || !tr->ready) goto memory;
-  for (int t = 0; t < tr->nknot; t++)
+  tr->order = calloc((size_t)tr->nknot, sizeof *tr->order);
+  if (!tr->knot || !tr->status || !tr->ready || !tr->order) goto memory;
+  for (int t = 0; t < tr->nknot; t++) {
+    tr->order[t] = t;
     if (!knot_new(tr, t)) goto memory;
+  }
   return tr;
 memory:
   if (error) *error = (cav_error){CAV_NO_MEMORY, 0, "not enough memory for this problem"};
@@ -310,8 +313,8 @@ void cav_transcription_free(cav_transcription *tr) {
   free(tr->servo), free(tr->limited);
   free(tr->unactuated), free(tr->penalised), free(tr->effort), free(tr->effort_range), free(tr->effort_unit),
       free(tr->rotation_dof), free(tr->rotation_of);
-  free(tr->knot), free(tr->status), free(tr->ready), free(tr->scratch), free(tr->before), free(tr->start),
-      free(tr->rotation_after), free(tr->window);
+  free(tr->knot), free(tr->status), free(tr->ready), free(tr->order), free(tr->scratch), free(tr->before),
+      free(tr->start), free(tr->rotation_after), free(tr->window);
   cav_periodicity_free(tr->periodicity);
   cav_parallel_free(tr->pool);
   free(tr);
@@ -414,7 +417,9 @@ typedef struct pass {
   cav_status *status;                 ///< [nknot]
   void (*take)(void *context, int t); ///< NULL: nothing follows
   void *context;
-  int failed; ///< a knot before those that follow
+  int failed;   ///< a knot before those that follow
+  double bound; ///< merit that all knots together may reach; what is left once some are above it is skipped
+  _Atomic double merit;
 } pass;
 
 /// Residuals of all rows at a step shorter (1) or longer (2) by a small fraction, with the knots where they are.
@@ -523,6 +528,16 @@ static void evaluate_item(void *context, int t, int member) {
   p->status[t] = evaluate_knot(p, &p->tr->scratch[member], t);
 }
 
+static void evaluate_within(void *context, int item, int member) {
+  pass *p = context;
+  const int t = p->tr->order[item];
+  double sum = atomic_load(&p->merit);
+  if (sum > p->bound) return;
+  evaluate_item(context, t, member);
+  if (p->status[t] != CAV_OK) return;
+  while (!atomic_compare_exchange_weak(&p->merit, &sum, sum + p->tr->knot[t].merit)) {}
+}
+
 static void follow_item(void *context, int t) {
   pass *p = context;
   p->failed = p->failed || p->status[t] != CAV_OK;
@@ -571,27 +586,27 @@ cav_status cav_transcription_conclude(cav_transcription *tr, const cav_status *s
   return status[t];
 }
 
-static cav_status evaluate(cav_transcription *tr, cav_trajectory *at, int jacobian, void (*take)(void *context, int t),
-                           void *context) {
+/// A pass over all knots.
+static cav_status evaluate(pass *p) {
+  cav_transcription *tr = p->tr;
   double start = now(), dynamics = 0;
   int members = cav_parallel_size(tr->pool);
-  cav_status *status = tr->status;
-  memset(status, 0, (size_t)tr->nknot * sizeof *status);
-  prepare_ends(tr, at);
+  p->status = tr->status;
+  memset(p->status, 0, (size_t)tr->nknot * sizeof *p->status);
+  prepare_ends(tr, p->at);
   cav_term_windows(tr);
-  if (jacobian) prepare_rotations(tr, at);
+  if (p->jacobian) prepare_rotations(tr, p->at);
   for (int i = 0; i < members; i++) tr->scratch[i].seconds = 0;
-  pass p = {.tr = tr, .at = at, .jacobian = jacobian, .status = status, .take = take, .context = context};
-  if (take)
-    cav_parallel_then(tr->pool, tr->nknot, evaluate_item, follow_item, &p, tr->ready);
+  if (p->take)
+    cav_parallel_then(tr->pool, tr->nknot, evaluate_item, follow_item, p, tr->ready);
   else
-    cav_parallel_for(tr->pool, tr->nknot, evaluate_item, &p);
+    cav_parallel_for(tr->pool, tr->nknot, p->bound < INFINITY ? evaluate_within : evaluate_item, p);
   for (int i = 0; i < members; i++) dynamics += tr->scratch[i].seconds / members;
   // values alone are dynamics: a clock at every knot would take a twentieth of their time
-  if (!jacobian) dynamics = now() - start;
+  if (!p->jacobian) dynamics = now() - start;
   tr->seconds_dynamics += dynamics;
   tr->seconds_assembly += now() - start - dynamics;
-  return cav_transcription_conclude(tr, status);
+  return cav_transcription_conclude(tr, p->status);
 }
 
 int cav_transcription_keep_rows(cav_transcription *tr) {
@@ -609,7 +624,36 @@ int cav_transcription_stopped(const cav_transcription *tr) {
 }
 
 cav_status cav_transcription_values(cav_transcription *tr, cav_trajectory *at) {
-  return cav_transcription_stopped(tr) ? CAV_INTERRUPTED : evaluate(tr, at, 0, NULL, NULL);
+  pass p = {.tr = tr, .at = at, .bound = INFINITY};
+  return cav_transcription_stopped(tr) ? CAV_INTERRUPTED : evaluate(&p);
+}
+
+/// Puts those first whose last merits are the largest; after a step few change their places.
+static void sort_knots(cav_transcription *tr) {
+  for (int i = 1; i < tr->nknot; i++) {
+    const int t = tr->order[i];
+    int k = i;
+    for (; k > 0 && tr->knot[tr->order[k - 1]].merit < tr->knot[t].merit; k--) tr->order[k] = tr->order[k - 1];
+    tr->order[k] = t;
+  }
+}
+
+/// Whether quantities of one's own may refuse: then the end must not hang on which thread meets which knot.
+static int may_refuse(const cav_transcription *tr) {
+  for (int i = 0; i < tr->problem->nterm; i++)
+    if (tr->problem->term[i].quantity == CAV_QUANTITY_USER) return 1;
+  return 0;
+}
+
+cav_status cav_transcription_values_within(cav_transcription *tr, cav_trajectory *at, double bound, int *beyond) {
+  // sums of the same merits in another order differ by rounding
+  pass p = {.tr = tr, .at = at, .bound = may_refuse(tr) ? INFINITY : bound * (1 + 4 * tr->nknot * DBL_EPSILON)};
+  *beyond = 0;
+  if (cav_transcription_stopped(tr)) return CAV_INTERRUPTED;
+  sort_knots(tr);
+  cav_status status = evaluate(&p);
+  *beyond = p.merit > p.bound;
+  return status;
 }
 
 cav_status cav_transcription_return(cav_transcription *tr, cav_trajectory *at) {
@@ -627,7 +671,8 @@ cav_status cav_transcription_linearise(cav_transcription *tr, cav_trajectory *at
 
 cav_status cav_transcription_linearise_then(cav_transcription *tr, cav_trajectory *at,
                                             void (*take)(void *context, int t), void *context) {
-  return cav_transcription_stopped(tr) ? CAV_INTERRUPTED : evaluate(tr, at, 1, take, context);
+  pass p = {.tr = tr, .at = at, .jacobian = 1, .take = take, .context = context, .bound = INFINITY};
+  return cav_transcription_stopped(tr) ? CAV_INTERRUPTED : evaluate(&p);
 }
 
 // ---------------------------------------------------------------- sums over knots

@@ -149,6 +149,7 @@ typedef struct cav_transcription {
   cav_parallel *pool;
   cav_status *status;       ///< [nknot] of an evaluation
   cav_parallel_flag *ready; ///< [nknot]
+  int *order;               ///< [nknot] in which values within a bound are evaluated: by their last merits
   cav_error failure; ///< what a quantity of one's own refused in the last one; CAV_BAD_INPUT: from then on, all end
   double seconds_dynamics, seconds_assembly;
 } cav_transcription;
@@ -184,6 +185,11 @@ int cav_transcription_stopped(const cav_transcription *transcription);
 /// Values at a trajectory: u, constraint rows, cost and merit of every knot. Fills trajectory->u. CAV_INTERRUPTED, as
 /// the next: stopped asks for the end, and nothing was evaluated.
 cav_status cav_transcription_values(cav_transcription *transcription, cav_trajectory *trajectory);
+
+/// The same as long as they may be of use: once the merits of some knots are above a bound together, that of all is, as none is
+/// negative; then *beyond is 1, and what is left undone keeps what it had. Which knots these are threads decide.
+cav_status cav_transcription_values_within(cav_transcription *transcription, cav_trajectory *trajectory, double bound,
+                                           int *beyond);
 
 /// Puts the values of the last evaluation by, 0 if memory runs out; then, after others, takes them back in the place of an
 /// evaluation at the trajectory that they are of, as cav_transcription_values. keep.c.
