@@ -123,6 +123,13 @@ E2
 asks trolley.xml "duration='2' timestep='.02' close='open'" "too far for the time: 9.97 m away" <<'E2'
 <start/><cost><posture name="far" joint="rail" qpos="10" at="end" weight="900"/></cost>
 E2
+# eight metres in half a second, and forty in three, of a body that only its feet push
+asks "$models/humanoid.xml" "duration='0.5' timestep='.025'" "friction (0.8) cannot push it there in time" <<'E2'
+<start key="stand" height="floor"/><cost><sensor name="there" type="subtreecom" body="torso" component="x" relative="start" target="8" at="end" weight="900"/></cost>
+E2
+asks "$models/humanoid.xml" "duration='3' timestep='.025'" "friction (0.8) cannot push it there in time" <<'E2'
+<start key="stand" height="floor"/><goal key="stand" height="floor"><root pos="40 0 1"/></goal><cost><posture dofs="all" at="end" weight="900"/></cost>
+E2
 
 echo "$n problems, $failed failed"
 [ "$failed" = 0 ] && [ "$n" -ge 12 ]

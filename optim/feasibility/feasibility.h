@@ -101,6 +101,9 @@ cav_status cav_effort_of_dofs(cav_examination *e, double *force, int *bounded);
 /// Centre of mass of a tree and its velocity at the start; leaves the start's velocities in scratch. momentum.c.
 cav_status cav_centre_of_tree(cav_examination *e, int root, double centre[3], double velocity[3]);
 
+/// Highest that the centre of mass of a tree can be at times, m; infinite where nothing bounds it. takeoff.c.
+cav_status cav_takeoff_heights(cav_examination *e, int root, int n, const double *time, double *highest);
+
 /// The conditions, each with its proofs.
 cav_status cav_examine_contradictions(cav_examination *e); // contradiction.c
 cav_status cav_examine_distances(cav_examination *e);      // distance.c

@@ -91,7 +91,7 @@ static int survey_ground(const cav_examination *e, jumper *s) {
     double reach = g->bound + m->pair[p].margin + cav_distance_to_centre(m, 0, g->link, g->pos);
     s->support = fmax(s->support, pose.pos[2] + reach);
     if (m->pair[p].dim >= 3 && can_run(e, s->root))
-      s->friction = fmax(s->friction, hypot(m->pair[p].friction[0], m->pair[p].friction[1]));
+      s->friction = fmax(s->friction, fmax(m->pair[p].friction[0], m->pair[p].friction[1]));
   }
   return s->support < INFINITY;
 }
@@ -144,6 +144,19 @@ static cav_status survey(cav_examination *e, const double *force, jumper *s) {
   return status;
 }
 
+/// Greatest height above the support that can be had at a time, from below one that cannot.
+static double greatest(const cav_model *m, const jumper *s, double time, double beyond) {
+  double low = 0, high = beyond, needs, has;
+  while (high - low > 1e-3 * beyond) {
+    double middle = (low + high) / 2;
+    if (is_in_reach(m, s, middle, time, &needs, &has))
+      low = middle;
+    else
+      high = middle;
+  }
+  return high;
+}
+
 static cav_status examine_one(cav_examination *e, const double *force, const cav_requirement *r) {
   const cav_model *m = e->model;
   int link = r->kind == CAV_REQUIRE_CENTRE ? m->body[r->object].link : r->object;
@@ -156,14 +169,7 @@ static cav_status examine_one(cav_examination *e, const double *force, const cav
   cav_status status = survey(e, force, &s);
   double height = r->low[2] - below - s.support, needs = 0, has = 0;
   if (status || s.work < 0 || !(height > 1e-3) || is_in_reach(m, &s, height, t, &needs, &has)) return status;
-  double low = 0, high = height, what_needs, what_has;
-  while (high - low > 1e-3 * height) {
-    double middle = (low + high) / 2;
-    if (is_in_reach(m, &s, middle, t, &what_needs, &what_has))
-      low = middle;
-    else
-      high = middle;
-  }
+  double high = greatest(m, &s, t, height);
   char what[160];
   cav_requirement_words(e, r, what, sizeof what);
   cav_impossible(e, CAV_CONDITION_ENERGY, r, "A lower target, stronger actuators, or something to climb on.",
@@ -181,6 +187,25 @@ cav_status cav_examine_takeoff(cav_examination *e) {
   cav_status status = force ? cav_effort_of_dofs(e, force, &bounded) : CAV_NO_MEMORY;
   for (int i = 0; i < e->n && !status && bounded && e->nfound == before; i++)
     if (e->requirement[i].kind != CAV_REQUIRE_COORDINATE) status = examine_one(e, force, &e->requirement[i]);
+  free(force);
+  return status;
+}
+
+cav_status cav_takeoff_heights(cav_examination *e, int root, int n, const double *time, double *highest) {
+  const cav_model *m = e->model;
+  int bounded = 0, known = is_covered(m);
+  jumper s = {.root = root};
+  double *force = malloc((size_t)(m->nv + 1) * sizeof *force);
+  cav_status status = force ? cav_effort_of_dofs(e, force, &bounded) : CAV_NO_MEMORY;
+  known = known && bounded && !status && is_floating(e, root, force) && survey_ground(e, &s);
+  if (known) status = survey(e, force, &s);
+  for (int i = 0; i < n; i++) {
+    highest[i] = INFINITY;
+    if (!known || status || s.work < 0) continue;
+    double t = time[i] + e->problem->timestep * fmax(e->longest, 1);
+    double beyond = most_energy(m, &s, t, 0) / (s.mass * -m->gravity[2]) + 1e-3;
+    highest[i] = s.support + greatest(m, &s, t, beyond);
+  }
   free(force);
   return status;
 }
