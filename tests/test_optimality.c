@@ -432,7 +432,29 @@ static void test_edges(void) {
   cav_model_free(b.model);
 }
 
+// pushed about by a force over its scale that is nothing to a residual, or something, where rest costs nothing
+static void test_near_nothing(void) {
+  for (int k = 0; k < 2; k++) {
+    bench b;
+    double cost = NAN, scale = 1, push = k ? 1e-3 : 5e-6, h = 0.1;
+    if (!make(&b, point, 1, 10)) return;
+    b.term[0].weight = 1000, b.term[0].scale = scale;
+    cav_solution *s = solve(&b);
+    for (int t = 1; s && t <= 10; t++) {
+      double *q = s->trajectory->q, *v = s->trajectory->v;
+      v[t] = v[t - 1] + (t & 1 ? push : -push) * h;
+      q[t] = q[t - 1] + h * v[t];
+    }
+    double is = s ? measure(&b.problem, s->trajectory, &s->contact, 0, NULL, &cost) : NAN;
+    printf("nearly no cost: %.2e, of which a step may save %.2e\n", cost, is);
+    CHECK(k ? is > 0.5 : cost > 1e-9 && is < CAV_TOLERANCE_OPTIMAL);
+    cav_solution_free(s);
+    cav_model_free(b.model);
+  }
+}
+
 int main(void) {
+  test_near_nothing();
   test_moved();
   test_other_cost();
   test_other_duration();

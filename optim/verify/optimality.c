@@ -26,6 +26,9 @@ static const double stiffness = 1e4, least_part = 1e-9;
 /// Costs below this count as this. A duration is at the end of its range within this fraction.
 static const double least_cost = 1e-6, at_end = 1e-9;
 
+/// Residuals up to this part of their scale are nothing: what they cost is not counted as what may be saved.
+static const double nothing = 1e-5;
+
 enum { ITERATIONS = 40, SERIES = 60 };
 
 /// An equality over the unknowns, sparse.
@@ -40,6 +43,7 @@ typedef struct model {
   cav_envelope *hessian;
   double *local; ///< [width*width] of one knot
   double slack;  ///< sum of multipliers times ways to their bounds
+  double little; ///< cost of residuals that are nothing
   int nequality, equality_room, nentry, entry_room;
   equality *equality;
   int *column;
@@ -61,6 +65,7 @@ static void add_cost(model *s, int t, const cav_knot_row *row, double x, const d
   // of a norm other than a square, y^2/2 is the norm: the derivative of y, squared
   double second = row->weight * (1 + root) / (2 * root * root), step = free_step ? J[last] : 0;
   add_gradient(s, t, row->weight * x / root, J);
+  if (fabs(x) <= nothing) s->little += 0.5 * row->weight * x * x;
   if (free_step && row->windowed) {
     s->gradient[s->knot.unknowns - 1] += row->weight * (row->term->norm == CAV_NORM_ABSOLUTE ? root - 1 : 0.5 * x * x);
     step += x / 2;
@@ -262,7 +267,7 @@ static cav_status measure(const cav_verification *verification, const int *first
       is = bound(&s, scale);
     }
     // costs are sums of squares: no more than all of it can be saved
-    *optimality = fmin(is, cost) / scale;
+    *optimality = fmax(fmin(is, cost) - s.little, 0) / scale;
   }
   model_clear(&s);
   return status;
