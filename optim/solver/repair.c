@@ -12,18 +12,19 @@
 /// What can be changed.
 typedef enum cure {
   NONE,
-  FORCE,    ///< contact forces cost something: loads are spread, and nothing stands on an edge
-  GOALS,    ///< heavier weights of goals
-  SLIP,     ///< a heavier weight of slip
-  SLIDING,  ///< the convex law of contacts that slide: it has one solution
-  ORDER,    ///< the order of momentum
-  GAP,      ///< contacts see the gap where a step ends
-  STEP,     ///< half the step
-  SOFTNESS, ///< harder contacts at the end
-  SOFTER,   ///< softer ones, that bend over a longer way
-  LOOSE,    ///< a lighter weight of slip
-  EFFORT,   ///< half of the usual reserve of the actuators is given; less than that was asked for, and stays
-  SLACK     ///< more of it is kept, for feedback
+  FORCE,     ///< contact forces cost something: loads are spread, and nothing stands on an edge
+  GOALS,     ///< heavier weights of goals
+  SLIP,      ///< a heavier weight of slip
+  SLIDING,   ///< the convex law of contacts that slide: it has one solution
+  ORDER,     ///< the order of momentum
+  GAP,       ///< contacts see the gap where a step ends
+  STEP,      ///< half the step
+  SOFTNESS,  ///< harder contacts at the end
+  SMOOTHING, ///< contact forces that fade over a shorter way
+  SOFTER,    ///< softer ones, that bend over a longer way
+  LOOSE,     ///< a lighter weight of slip
+  EFFORT,    ///< half of the usual reserve of the actuators is given; less than that was asked for, and stays
+  SLACK      ///< more of it is kept, for feedback
 } cure;
 
 enum { CURES = 3 };
@@ -41,16 +42,20 @@ static int has_record(const cav_problem *p) {
 /// edges of their feet is nearer where these may slide, and on softer ground.
 static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
   static const cure forces[] = {EFFORT, STEP, NONE}, deep[] = {SOFTNESS, STEP, NONE}, between[] = {STEP, NONE},
-                    turned[] = {ORDER, STEP, NONE}, slip[] = {SLIP, SOFTNESS, NONE}, hover[] = {GAP, STEP, NONE},
-                    fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK}, target[] = {EFFORT, GOALS, NONE},
-                    near[] = {STEP, SLACK, NONE}, ground[] = {LOOSE, SOFTER, STEP}, none[] = {NONE};
+                    turned[] = {ORDER, STEP, NONE}, slip[] = {SLIP, SOFTNESS, SMOOTHING},
+                    hover[] = {GAP, SMOOTHING, STEP}, fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK},
+                    target[] = {EFFORT, GOALS, NONE}, fade[] = {SMOOTHING, SLIP, SOFTNESS},
+                    fades[] = {SMOOTHING, GAP, STEP}, near[] = {STEP, SLACK, NONE}, ground[] = {LOOSE, SOFTER, STEP},
+                    none[] = {NONE};
   if (v->certified) return v->achieved ? none : target;
   if (!cav_verdict_feasible(v)) return has_record(p) ? ground : forces;
   if (v->penetration_max_m > CAV_TOLERANCE_PENETRATION) return deep;
   if (v->penetration_between_m > CAV_TOLERANCE_PENETRATION) return between;
   if (v->momentum_defect_rms > CAV_TOLERANCE_MOMENTUM) return turned;
-  if (v->slip_mean_m_s > CAV_TOLERANCE_SLIP) return slip;
-  if (v->hover_fraction > CAV_TOLERANCE_HOVER) return hover;
+  // a stated smoothing beyond the usual one is what holds things off the ground, where they slide
+  int blurred = p->schedule.last.smoothing > cav_problem_default(p->model).schedule.last.smoothing;
+  if (v->slip_mean_m_s > CAV_TOLERANCE_SLIP) return blurred ? fade : slip;
+  if (v->hover_fraction > CAV_TOLERANCE_HOVER) return blurred ? fades : hover;
   if (v->replay_step_max_error > CAV_TOLERANCE_STEP) return fold;
   if (v->residual_fraction_max > v->residual_within) return none;
   return has_record(p) ? near : lost;
@@ -137,6 +142,9 @@ static cav_status change(const cav_problem *p, cure c, cav_strategy *s) {
       break;
     case SOFTNESS:
       s->schedule.last.softness /= harder;
+      break;
+    case SMOOTHING:
+      s->schedule.last.smoothing /= harder;
       break;
     case LOOSE:
       return loosen_slip(p, s);

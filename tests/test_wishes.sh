@@ -1,0 +1,43 @@
+#!/bin/sh
+# What users asked for and how it has to be answered: files of a minute's work, each with what its answer must say.
+# Usage: test_wishes.sh CAVORT SOURCE_ROOT
+set -u
+cavort=$(cd "$(dirname "$1")" && pwd)/$(basename "$1")
+models=$(cd "$2" && pwd)/problems/models
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+n=0
+failed=0
+
+# says FILE WORDS: the file has these words
+says() {
+  n=$((n + 1))
+  grep -qF -- "$2" "$1" && return
+  failed=$((failed + 1))
+  echo "failed: no '$2' in $1:"
+  head -n 12 "$1"
+}
+
+# ends STATUS WANTED WHAT
+ends() {
+  n=$((n + 1))
+  [ "$1" -eq "$2" ] && return
+  failed=$((failed + 1))
+  echo "failed: $3 ended with $1, expected $2"
+}
+
+# contacts that fade over two millimetres hold a leg in the air: a smaller smoothing is found by itself, and told
+cat >hover.xml <<E2
+<problem name="hover" model="$models/hopper.xml"><horizon duration="0.6" timestep=".02" order="momentum"/><schedule><last
+smoothing="0.002"/></schedule><start height="floor"><joint name="knee" degrees="60"/></start><goal height="floor"><joint name="knee"
+degrees="60"/></goal><cost/></problem>
+E2
+"$cavort" solve hover.xml -o hover --threads 1 >hover.out 2>hover.err
+ends $? 0 "a leg that hovers"
+says hover/strategies.csv "stated,0,not certified"
+says hover/strategies.csv "<last smoothing='0.0005'/>"
+says hover.out "strategy repaired: not as the problem states it, but with <last smoothing="
+
+echo "$n answers, $failed failed"
+[ "$failed" = 0 ] && [ "$n" -ge 4 ]
