@@ -14,8 +14,8 @@
 
 #include "verification.h"
 
-// iterations of a forward step: friction by Coulomb's law may take hundreds
-enum { SUBSTEPS = 10, ITERATIONS = 1000 };
+// iterations of a forward step: friction by Coulomb's law may take hundreds; how often a step that is not found is halved
+enum { SUBSTEPS = 10, ITERATIONS = 1000, HALVINGS = 4 };
 
 static const double same = 1e-6;             // rad or m: a replay that is the knots
 static const double far = 0.5, turned = 1;   // m, rad: a replay that has lost the motion
@@ -312,9 +312,30 @@ typedef struct simulation {
   const cav_trajectory *motion; ///< at the finer step
   const double *gain_q, *gain_v;
   const cav_disturbance *push; ///< within the next step, or NULL
+  const cav_options *law;      ///< claimed, or NULL: the model's own
   cav_state *state;
   double *q, *v, *dq, *dv, *u, *next, *control, *place;
 } simulation;
+
+// what a simulation obeys at a step
+static cav_options options_at(const cav_verification *verification, const cav_options *law, double h) {
+  return law ? claimed_options(verification, law, h) : own_options(verification, h);
+}
+
+// a step of h under the forces s->u. One that is not found is taken in two halves: with Coulomb's friction it need not exist
+static cav_status go(const cav_verification *verification, simulation *s, double h, int halvings) {
+  const cav_model *model = verification->model;
+  s->state->options = options_at(verification, s->law, h);
+  cav_status status = step(verification, s->state, 1e-9, s->q, s->v, s->u, s->next);
+  if (status == CAV_NOT_CONVERGED && halvings > 0) {
+    status = go(verification, s, h / 2, halvings - 1);
+    return status == CAV_OK ? go(verification, s, h / 2, halvings - 1) : status;
+  }
+  if (status != CAV_OK) return status;
+  cav_integrate(model, s->q, s->next, h, s->q);
+  memcpy(s->v, s->next, sizeof(double) * model->nv);
+  return CAV_OK;
+}
 
 // u += what a force on the centre of mass of a root link does
 static void add_force(const cav_model *model, const cav_state *state, int link, const double force[3], double *u) {
@@ -344,15 +365,13 @@ static cav_status advance(const cav_verification *verification, simulation *s, i
     for (int k = 0; k < 3; k++) force[k] = s->push->impulse[k] / s->motion->timestep;
     add_force(model, verification->bare, s->push->link, force, s->u);
   }
-  if (status == CAV_OK) status = step(verification, s->state, 1e-9, s->q, s->v, s->u, s->next);
+  if (status == CAV_OK) status = go(verification, s, s->motion->timestep, HALVINGS);
   if (status == CAV_NO_MEMORY) return status;
   if (status != CAV_OK) {
     snprintf(follow->lost, sizeof follow->lost, "simulation stopped at %.3f s: %s", time, cav_status_name(status));
     *on = 0;
     return CAV_OK;
   }
-  cav_integrate(model, s->q, s->next, s->motion->timestep, s->q);
-  memcpy(s->v, s->next, sizeof(double) * model->nv);
   gap now;
   status = compare(verification, q_ref + model->nq, s->q, s->place, &now);
   if (status == CAV_OK) *on = following(verification, &now, time, follow);
@@ -400,11 +419,10 @@ static cav_status closed(const cav_verification *verification, const cav_options
   cav_status status = q && state && motion ? CAV_OK : CAV_NO_MEMORY;
   *follow = (struct cav_follow){0};
   if (status == CAV_OK) {
-    simulation s = {.motion = motion, .gain_q = gain_q, .gain_v = gain_v, .state = state, .q = q, .v = q + nq};
+    simulation s = {.motion = motion, .gain_q = gain_q, .gain_v = gain_v, .law = law, .state = state};
+    s.q = q, s.v = q + nq;
     s.dq = s.v + nv, s.dv = s.dq + nv, s.u = s.dv + nv, s.next = s.u + nv, s.control = s.next + 2 * nv;
     s.place = s.control + model->nu;
-    h = motion->timestep;
-    state->options = law ? claimed_options(verification, law, h) : own_options(verification, h);
     memcpy(s.q, verification->q, sizeof(double) * nq);
     memcpy(s.v, verification->v, sizeof(double) * nv);
     if (disturbance && disturbance->start) move_start(model, disturbance->start, s.q, s.v);
