@@ -317,12 +317,11 @@ static const cav_shape *shape_of(const cav_state *state, struct cav_geom_cache *
   return &cache->slot[i].shape;
 }
 
-// contact axes: the normal, then the tangent or, where none is given, the world's y or z, made square to it. No choice
-// is smooth over all normals: this one jumps where the normal's y crosses 1/2, with no effect on isotropic friction
-static void make_frame(const cav_touch *touch, double frame[9]) {
+// contact axes: the normal, then the tangent that follows it or, where none is given, the world's y or z, made square to it. No
+// choice is smooth over all normals: this one jumps where the normal's y crosses 1/2, with no effect on isotropic friction
+static void make_frame(double frame[9]) {
   double *n = frame, *s = frame + 3;
-  copy3(n, touch->normal);
-  axpy3(s, touch->tangent, -dot3(n, touch->tangent), n);
+  axpy3(s, s, -dot3(n, s), n);
   if (dot3(s, s) < 1e-12) {
     int y = fabs(n[1]) < 0.5;
     set3(s, 0, y, !y);
@@ -332,7 +331,14 @@ static void make_frame(const cav_touch *touch, double frame[9]) {
   cross3(frame + 6, n, s);
 }
 
-// one contact of the state
+// axes of all contacts, from normal and tangent in their place
+static void make_frames(cav_state *state) {
+  int i = 0;
+  for (; cav_lanes_pay() && i + CAV_LANES <= state->ncontact; i += CAV_LANES) cav_frames_four(state->contact + i);
+  for (; i < state->ncontact; i++) make_frame(state->contact[i].frame);
+}
+
+// one contact of the state, without its axes
 static cav_status push(const cav_model *model, cav_state *state, int p, const cav_touch *touch) {
   const cav_pair *pair = model->pair + p;
   cav_contact *contact = cav_contact_push(state);
@@ -347,7 +353,8 @@ static cav_status push(const cav_model *model, cav_state *state, int p, const ca
   contact->link1 = model->geom[pair->geom1].link;
   contact->link2 = model->geom[pair->geom2].link;
   copy3(contact->pos, touch->pos);
-  make_frame(touch, contact->frame);
+  copy3(contact->frame, touch->normal);
+  copy3(contact->frame + 3, touch->tangent);
   contact->dist = touch->dist;
   contact->margin = pair->margin;
   memcpy(contact->friction, pair->friction, sizeof contact->friction);
@@ -417,9 +424,7 @@ static int seeks_contacts(const cav_model *model, const cav_state *state) {
   return model->npair && state->options.contact && state->options.constraint;
 }
 
-cav_status cav_contacts_find(const cav_model *model, cav_state *state) {
-  state->ncontact = 0;
-  if (!seeks_contacts(model, state)) return CAV_OK;
+static cav_status collide_all(const cav_model *model, cav_state *state) {
   struct cav_geom_cache *cache = state->work->geom;
   place(state, cache);
   double activation[2];
@@ -435,6 +440,13 @@ cav_status cav_contacts_find(const cav_model *model, cav_state *state) {
     if (status) return status;
   }
   return CAV_OK;
+}
+
+cav_status cav_contacts_find(const cav_model *model, cav_state *state) {
+  state->ncontact = 0;
+  cav_status status = seeks_contacts(model, state) ? collide_all(model, state) : CAV_OK;
+  make_frames(state);
+  return status;
 }
 
 int cav_contacts_near(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES]) {
@@ -460,5 +472,6 @@ cav_status cav_contacts_of_near(const cav_model *model, cav_state *state, const 
     cav_status status = collide_pair(model, state, c, c->margin + activation[c->external]);
     if (status) return status;
   }
+  make_frames(state);
   return CAV_OK;
 }

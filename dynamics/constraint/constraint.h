@@ -27,6 +27,12 @@ static inline int cav_pair_has_mesh(const cav_model *model, const cav_pair *pair
   return model->geom[pair->geom1].type == CAV_GEOM_MESH || model->geom[pair->geom2].type == CAV_GEOM_MESH;
 }
 
+/// Of four contacts that follow each other, where vectors have four numbers: axes, from a normal and a tangent in their first two
+/// places; and impulses from velocities by the exact law of friction cones of three rows that see no gap after the step, 0
+/// where one of them is another. contacts_four.c.
+void cav_frames_four(cav_contact *contact);
+int cav_law_four(cav_contact *contact);
+
 /// Pairs of four states whose bounds are near, into lanes, from their poses there; 0 without: the scene has what only a
 /// single state looks for. Then cav_contacts_find of one of them among those. collide.c.
 int cav_contacts_near(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES]);

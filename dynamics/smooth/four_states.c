@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "by_four.h"
+#include "four_turn.h"
 #define CAV_POSE cav_lane_pose
 #include "tree.h"
 
@@ -63,46 +63,17 @@ cav_lanes *cav_lanes_new(const cav_model *model) {
 
 void cav_lanes_free(cav_lanes *lanes) { free(lanes); }
 
-// entries of two vectors by their numbers, those of the second from 4 on
-#ifdef __clang__
-#define SHUFFLED(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
-#else
-typedef long long order __attribute__((vector_size(sizeof(cav_four))));
-#define SHUFFLED(a, b, ...) __builtin_shuffle(a, b, (order){__VA_ARGS__})
-#endif
-
-// four rows of four turned into columns
-CAV_INLINE void turn_square(const cav_four from[4], cav_four to[4]) {
-  cav_four low = SHUFFLED(from[0], from[1], 0, 4, 2, 6), high = SHUFFLED(from[0], from[1], 1, 5, 3, 7);
-  cav_four low_after = SHUFFLED(from[2], from[3], 0, 4, 2, 6), high_after = SHUFFLED(from[2], from[3], 1, 5, 3, 7);
-  to[0] = SHUFFLED(low, low_after, 0, 1, 4, 5);
-  to[1] = SHUFFLED(high, high_after, 0, 1, 4, 5);
-  to[2] = SHUFFLED(low, low_after, 2, 3, 6, 7);
-  to[3] = SHUFFLED(high, high_after, 2, 3, 6, 7);
-}
-
 CAV_BY_FOUR void cav_lanes_gather(cav_four *to, const double *const from[CAV_LANES], int n) {
   const double *a = from[0], *b = from[1], *c = from[2], *d = from[3];
   int i = 0;
-  for (; i + 4 <= n; i += 4) {
-    cav_four rows[4] = {*(const cav_four *)(a + i), *(const cav_four *)(b + i), *(const cav_four *)(c + i),
-                        *(const cav_four *)(d + i)};
-    turn_square(rows, to + i);
-  }
+  for (; i + 4 <= n; i += 4) turn_in((const double *const[]){a + i, b + i, c + i, d + i}, to + i);
   for (; i < n; i++) to[i] = (cav_four){a[i], b[i], c[i], d[i]};
 }
 
 CAV_BY_FOUR void cav_lanes_scatter(double *const to[CAV_LANES], const cav_four *from, int n) {
   double *a = to[0], *b = to[1], *c = to[2], *d = to[3];
   int i = 0;
-  for (; i + 4 <= n; i += 4) {
-    cav_four columns[4];
-    turn_square(from + i, columns);
-    *(cav_four *)(a + i) = columns[0];
-    *(cav_four *)(b + i) = columns[1];
-    *(cav_four *)(c + i) = columns[2];
-    *(cav_four *)(d + i) = columns[3];
-  }
+  for (; i + 4 <= n; i += 4) turn_out(from + i, (double *const[]){a + i, b + i, c + i, d + i});
   for (; i < n; i++) a[i] = from[i][0], b[i] = from[i][1], c[i] = from[i][2], d[i] = from[i][3];
 }
 

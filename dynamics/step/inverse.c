@@ -158,9 +158,12 @@ static void contacts(const cav_model *model, cav_state *state, const double *vel
     cav_contact_velocity(state, c, state->velocity_next, c->velocity_next);
   }
   if (cav_looks_ahead(&state->options)) { cav_next_contacts_find(model, state); }
-  for (int i = 0; i < state->ncontact; i++) {
+  const int by_four =
+      cav_lanes_pay() && !coupled && !cav_looks_ahead(&state->options) && state->options.sliding == CAV_SLIDING_CONVEX;
+  for (int i = 0, known = 0; i < state->ncontact; i++) {
     cav_contact *c = &state->contact[i];
-    contact_impulse(state, c, coupled);
+    if (i >= known && by_four && i + CAV_LANES <= state->ncontact && cav_law_four(c)) known = i + CAV_LANES;
+    if (i >= known) contact_impulse(state, c, coupled);
     if (coupled) { coupled += c->dim; }
     contact_push(state, c, scale);
   }
