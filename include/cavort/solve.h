@@ -339,6 +339,7 @@ typedef struct cav_strategy {
   double height, from, to;              ///< not stated: of a ballistic arc, m, and when, s
   cav_schedule schedule;                ///< schedule that it takes
   double effort_limit, timestep;        ///< those of the problem where 0
+  int open;                             ///< 1: a diagnosis that need not end at rest; 0: one that may last longer
   int nterm;                            ///< number of the changed terms
   cav_term *term; ///< [nterm] in the place of the problem's, whose names and targets they borrow; NULL
   char changed[CAV_STRATEGY_CHANGES]; ///< what a repair changes in the problem, in words

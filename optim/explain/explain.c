@@ -33,6 +33,9 @@ static const double far_inside = 0.03;
 /// Scaled distance from a bound within which a row is at it.
 static const double at_bound = 1e-4;
 
+/// Part of the motion from which on a knot belongs to its end.
+static const double end_part = 0.75;
+
 /// Same thing over all its knots.
 typedef struct group {
   cav_binding_kind kind;
@@ -482,6 +485,13 @@ static void cure_stuck(const inquiry *in, const cav_binding *row, char *out, siz
       other->name, 1e3 * row->value, solid->name);
 }
 
+/// Whether a force without an actuator is missed up to the end, which has to be at rest.
+static int ends_moving(const inquiry *in, const group *g, const cav_binding *row) {
+  int last = (int)lround(in->problem->duration / in->timestep);
+  int until = row->kind == CAV_BINDING_UNACTUATED && g->missed && g->missed_last >= last - near_knots;
+  return until && in->problem->close_at_rest && !in->problem->cycle.on && row->knot >= end_part * last;
+}
+
 static void tell_cure(const inquiry *in, const group *g, const cav_binding *row, double saving, char *out,
                       size_t size) {
   static const char *const usual[] = {
@@ -517,6 +527,11 @@ static void tell_cure(const inquiry *in, const group *g, const cav_binding *row,
   }
   if (row->kind == CAV_BINDING_TERM) {
     cure_term(in, row, against, out, size);
+  } else if (ends_moving(in, g, row)) {
+    snprintf(
+        out, size,
+        "All has to be at rest at the end, and nothing brakes it there: <horizon close=\"open\"/> where it may still "
+        "move, or more time.");
   } else if (row->kind == CAV_BINDING_UNACTUATED && in->model->npair == 0) {
     snprintf(out, size, "Nothing can push there: more time, a guess that swings, or more stages.");
   } else if (row->kind == CAV_BINDING_EFFORT && in->problem->effort_limit < 1 &&

@@ -248,6 +248,10 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
     add(strategy, n, &exact, "momentum", "under the order of momentum, from a motion of the midpoint order");
   }
   if (!problem->cycle.on && !collides) add_repairs(strategy, n, &stated);
+  cav_strategy open = stated;
+  open.use = CAV_STRATEGY_DIAGNOSIS, open.open = 1;
+  if (!problem->cycle.on && problem->close_at_rest)
+    add(strategy, n, &open, "open", "with an end that need not be at rest");
   // what a swing-up takes is told by cav_problem_pumping
   cav_strategy longer = stated;
   longer.use = CAV_STRATEGY_DIAGNOSIS;
@@ -266,7 +270,9 @@ void cav_strategy_apply(const cav_problem *problem, const cav_strategy *strategy
   if (strategy->timestep > 0) taken->timestep = strategy->timestep;
   if (strategy->effort_limit > 0) taken->effort_limit = strategy->effort_limit;
   if (strategy->term) taken->term = strategy->term, taken->nterm = strategy->nterm;
-  if (strategy->use == CAV_STRATEGY_DIAGNOSIS) {
+  if (strategy->open) {
+    taken->close_at_rest = 0;
+  } else if (strategy->use == CAV_STRATEGY_DIAGNOSIS) {
     taken->duration_least = problem->duration;
     taken->duration_most = LONGER * problem->duration;
     taken->duration_weight = haste;

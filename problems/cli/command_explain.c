@@ -3,6 +3,7 @@
 /// against each other. Exit status as that of verify: 0 certified and achieved, 1 if not.
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "certificate.h"
 #include "command.h"
@@ -23,13 +24,14 @@ static void print_cause(const cav_reason *r, const char *before) {
 
 // what is missed, and why, in a few lines
 static void print_brief(const cav_explanation *e, const cav_verdict *verdict, const cav_impossibility *impossible,
-                        const char *pumping, const char *missed) {
+                        const char *pumping, const char *missed, const char *repair) {
   int n = 0, good = verdict->certified && verdict->achieved;
   if (impossible) n += printf("impossible: %s. %s\n", impossible->what, impossible->cure) > 0;
   if (!impossible && *pumping) n += printf("cause: %s\n", pumping) > 0;
   int apart = !impossible && !*pumping && *e->contradiction;
-  if (apart) n += printf("cause: %s\n", e->contradiction) > 0;
-  if (!verdict->certified) n += printf("not certified: %s\n", verdict->reason) > 0;
+  if (apart) n += printf("cause: %s. %s\n", e->contradiction, e->nconflict ? e->conflict[0].cure : "") > 0;
+  const char *whose = repair ? " (of a repair, --all tells)" : "";
+  if (!verdict->certified) n += printf("not certified%s: %s\n", whose, verdict->reason) > 0;
   if (!verdict->achieved && n < LINES) n += printf("not achieved: misses %s\n", verdict->missed) > 0;
   if (good)
     n += printf("nothing is missed; %s\n",
@@ -39,10 +41,11 @@ static void print_brief(const cav_explanation *e, const cav_verdict *verdict, co
   if (e->met || known) {
     for (int i = 0; i < e->nconflict && n < LINES && !known; i++, n++) print_cause(&e->conflict[i], "  ");
   } else if (n < LINES && e->nconflict) {
-    print_cause(&e->conflict[0], "cause: ");
+    print_cause(&e->conflict[0], "cause: "), n++;
   } else if (n < LINES && e->nviolation) {
-    print_cause(&e->violation[0], "cause: ");
+    print_cause(&e->violation[0], "cause: "), n++;
   }
+  if (repair && n < LINES) puts(repair);
 }
 
 static void print_table(const cav_explanation *e, const cav_verdict *verdict) {
@@ -80,6 +83,35 @@ static void print_reasons(const char *name, int n, const cav_reason *reason) {
   printf("]");
 }
 
+// the two quoted texts that end a line of strategies.csv: what was changed, and what was missed
+static int texts_of(char *line, char **changed, char **reason) {
+  char *at[4], *c = line;
+  for (int k = 0; k < 4; k++, c = at[k - 1] + 1)
+    if (!(at[k] = strchr(c, '"'))) return 0;
+  *at[1] = *at[3] = 0;
+  *changed = at[0] + 1, *reason = at[2] + 1;
+  return 1;
+}
+
+// whether the motion of a folder is one that a repair found: with what, and what the problem as it was stated misses; to be freed
+static char *told_of_repair(const char *folder) {
+  char *path = cav_result_path(folder, "strategies.csv"), *line = NULL, *stated = NULL, *told = NULL;
+  FILE *in = path ? fopen(path, "r") : NULL;
+  size_t room = 0;
+  while (in && !told && getline(&line, &room, in) > 0) {
+    char *changed, *reason;
+    int kept = strstr(line, ",1,") == strchr(line, ',') && strchr(line, ',');
+    if (!texts_of(line, &changed, &reason)) continue;
+    if (!stated) stated = strdup(reason);
+    if (!kept || !*changed || !stated || !(told = malloc(strlen(changed) + strlen(stated) + 120))) continue;
+    sprintf(told, "this motion is not of the problem as it was stated, but with %s; as stated it misses: %s", changed,
+            *stated ? stated : "a target");
+  }
+  if (in) fclose(in);
+  free(path), free(line), free(stated);
+  return told;
+}
+
 int cav_command_explain(const cav_command_line *line) {
   cav_error error = {0};
   cav_result *result = cav_result_read(line->operand, line->model, &error);
@@ -97,7 +129,7 @@ int cav_command_explain(const cav_command_line *line) {
   if (!status && !(verdict.certified && verdict.achieved) && cav_command_pumping(result->problem, pumping))
     *pumping = 0;
   if (!status) status = cav_problem_impossible(result->problem, &impossible, 1, &proofs, &error);
-  char missed[CAV_MISSED_TEXT] = "";
+  char missed[CAV_MISSED_TEXT] = "", *repair = told_of_repair(line->operand);
   if (!status && verdict.certified && !verdict.achieved)
     cav_command_missed(result->problem, result->trajectory, &explanation, missed);
   if (!status && line->json) {
@@ -115,19 +147,23 @@ int cav_command_explain(const cav_command_line *line) {
     cav_certificate_json_text(stdout, explanation.contradiction);
     printf(",\n  \"short\": ");
     cav_certificate_json_text(stdout, missed);
+    printf(",\n  \"repair\": ");
+    cav_certificate_json_text(stdout, repair ? repair : "");
     print_reasons("violation", explanation.nviolation, explanation.violation);
     print_reasons("conflict", explanation.nconflict, explanation.conflict);
     printf("\n}\n");
   } else if (!status && line->all) {
+    if (repair) puts(repair);
     if (proofs) printf("impossible: %s\n  %s\n", impossible.what, impossible.cure);
     if (!proofs && *pumping) printf("cause: %s\n", pumping);
     if (*explanation.contradiction) printf("cause: %s\n", explanation.contradiction);
     if (!proofs && !*pumping && *missed) printf("cause: %s\n", missed);
     print_table(&explanation, &verdict);
   } else if (!status) {
-    print_brief(&explanation, &verdict, proofs ? &impossible : NULL, pumping, missed);
+    print_brief(&explanation, &verdict, proofs ? &impossible : NULL, pumping, missed, repair);
   }
   cav_result_free(result);
+  free(repair);
   if (status) return cav_command_fail(&error);
   return verdict.certified && verdict.achieved ? CAV_EXIT_CERTIFIED : CAV_EXIT_NOT_CERTIFIED;
 }

@@ -275,6 +275,12 @@ static void tell_cause(const cav_race *race) {
     const cav_race_entry *e = &race->entry[i];
     if (e->strategy.use != CAV_STRATEGY_DIAGNOSIS || e->state != CAV_RACE_DONE || !cav_race_success(&e->report))
       continue;
+    if (e->strategy.open) {
+      fprintf(stderr,
+              "cavort: not with an end at rest, but certified and achieved where the end may still move: <horizon "
+              "close=\"open\"/>\n");
+      continue;
+    }
     fprintf(stderr,
             "cavort: not in %.4g s, but in %.4g s, certified and achieved, times of windows in proportion; if it may "
             "last so "

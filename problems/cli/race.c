@@ -24,6 +24,9 @@ static const double dearer = 2;
 // force without an actuator, fraction of the weight, and violation of limits and constraints up to which it nearly keeps them
 static const double nearly = 1e-3;
 
+// part of the duration from which on a knot is near the end
+static const double near_end = 0.75;
+
 cav_status cav_race_open(cav_race *race, int most, cav_error *error) {
   cav_strategy strategy[CAV_STRATEGIES];
   int n = 0;
@@ -388,6 +391,15 @@ static int find_repair(const cav_race *race, int i, cav_strategy *repaired) {
   return found;
 }
 
+// whether forces are missing most near the end, where all is to come to rest
+static int misses_rest(const cav_race *race) {
+  const cav_race_report *r = &race->entry[0].report;
+  int last = (int)lround(race->problem->duration / race->problem->timestep);
+  return r->solution && r->status != CAV_INTERRUPTED && !cav_verdict_feasible(&r->verdict) &&
+         r->verdict.unactuated_force_max > CAV_TOLERANCE_UNACTUATED &&
+         r->verdict.unactuated_force_knot >= near_end * last;
+}
+
 // whether a strategy that waits may start: those for a case only after all before them
 static int may_start(const cav_race *race, int i) {
   cav_strategy_use use = race->entry[i].strategy.use;
@@ -400,6 +412,7 @@ static int may_start(const cav_race *race, int i) {
     momentum |= e->state == CAV_RACE_DONE && misses_momentum(&e->report);
     success |= e->state == CAV_RACE_DONE && cav_race_success(&e->report);
   }
+  if (race->entry[i].strategy.open && !misses_rest(race)) return 0;
   cav_strategy repaired;
   int repairs = use == CAV_STRATEGY_REPAIR && !success && find_repair(race, i, &repaired);
   if (repairs) cav_strategy_clear(&repaired);
