@@ -444,6 +444,9 @@ typedef struct cav_verdict {
   double
       periodicity_error; ///< cycles: how far the last knot is from the first one moved, m, rad, or their rates; else 0
   int periods;           ///< that the closed loop ran for: 1, of cycles more
+  double end_speed_m_s,
+      end_rate_rad_s; ///< of end_body's tree, of its centre of mass and of itself; NaN where nothing moves
+  char end_body[64]; ///< what still moves at an end that need not be at rest, what no actuator moves first; "": nothing
   double duration, solve_seconds; ///< duration: of one period
   int iterations;                 ///< as the solver left them
   double cost;                    ///< of the cost terms, summed anew from the knots

@@ -109,6 +109,8 @@ void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdi
   write_number(out, "feedback_effort_max", v->feedback_effort_max);
   write_number(out, "model_contacts_seconds", v->model_contacts_seconds);
   write_number(out, "model_contacts_end_error_m", v->model_contacts_end_error_m);
+  write_number(out, "end_speed_m_s", v->end_speed_m_s);
+  write_number(out, "end_rate_rad_s", v->end_rate_rad_s);
   write_number(out, "push_survived_n_s", v->push_survived_n_s);
   write_number(out, "periodicity_error", v->periodicity_error);
   write_number(out, "periods", v->periods);

@@ -104,6 +104,9 @@ typedef struct cav_rates {
 } cav_rates;
 
 /// Adds knot t, whose forces, where it has them, are in verification->control; moment [nv] is scratch.
+/// What still moves at an end that need not be at rest, into end_speed_m_s, end_rate_rad_s and end_body. ending.c.
+cav_status cav_verification_ending(const cav_verification *verification, cav_verdict *verdict);
+
 void cav_rates_add(const cav_verification *verification, int t, double *moment, cav_rates *rates);
 
 /// Forces on roots that are penalised: sums over the knots that have been added, and their part of the cost.

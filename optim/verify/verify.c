@@ -599,6 +599,7 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
     fill(&verification, &found, &replay, verdict);
     decide(&verification, &found, &replay, verdict);
     cav_targets_verdict(&verification, report, found.residual.cost, verdict);
+    status = cav_verification_ending(&verification, verdict);
   }
   verdict->push_survived_n_s = NAN;
   if (status == CAV_OK && verdict->certified)

@@ -132,7 +132,9 @@ static void leave_unverified(const cav_solution *solution, cav_verdict *v) {
                              &v->model_contacts_seconds,
                              &v->periodicity_error,
                              &v->push_survived_n_s,
-                             &v->model_contacts_end_error_m};
+                             &v->model_contacts_end_error_m,
+                             &v->end_speed_m_s,
+                             &v->end_rate_rad_s};
   for (size_t i = 0; i < sizeof unknown / sizeof *unknown; i++) *unknown[i] = NAN;
   const cav_trajectory *at = solution->trajectory;
   v->duration = (at->nknot - 1) * at->timestep;

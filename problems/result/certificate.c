@@ -130,6 +130,12 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
   if (v->model_contacts_seconds < whole * (1 - 1e-9))
     fprintf(out, "  note: under the contact parameters of the model's file its closed loop is lost at %.3g of %.3g s\n",
             v->model_contacts_seconds, whole);
+  if (v->end_body[0])
+    fprintf(out,
+            "  note: it ends in motion: '%s' at %.2g m/s, turning at %.2g rad/s; whether that comes to rest, or falls, "
+            "is not "
+            "looked at\n",
+            v->end_body, v->end_speed_m_s, v->end_rate_rad_s);
   if (v->achieved) return;
   fprintf(out, "NOT achieved: %s misses %s", v->certified ? "it obeys physics, but" : "it also", v->missed);
   if (v->nmissed > 1) fprintf(out, ", and %d more of %d targets", v->nmissed - 1, v->ntarget);
