@@ -4,7 +4,7 @@
 A cart that slides under a pole: equations of motion with Coulomb's friction, by Runge and Kutta's rule, noise on places and forces. Two
 masses and the friction are found within 1 %, from values a third off; so are they from problems/estimate, whose record is this one
 (test_parameters.py --record writes it). A mass on a spring: the stiffness that its period says. What a record cannot tell is refused by
-name, or marked; wrong files are refused with line and cure."""
+name, or marked, wherever the search begins; wrong files are refused with line and cure."""
 import csv
 import math
 import os
@@ -202,6 +202,32 @@ def test_untold():
               'what the prior alone says is not told so')
 
 
+def test_passive():
+    """A pendulum without any force that was recorded: its period goes with the inertia over the mass, the decay of its swing with the
+    damping over both, so neither is told alone, from whatever value the search begins."""
+    angle, rate, rows, arm, inertia, h = 1.0, 0.0, [], 1.0, 1.1, 1e-4
+    for damping in 0.0, 0.05:
+        for k in range(10001):
+            if k % 100 == 0:
+                rows.append('%.2f,%.8f' % (k * h, angle))
+            rate += h * (-G * arm * math.sin(angle) - damping * rate) / inertia
+            angle += h * rate
+        write('swing.csv', 'time,pivot\n' + '\n'.join(rows) + '\n')
+        write('swing_guess.csv', 'time,qpos_pivot\n' + '\n'.join(rows) + '\n')
+        rows, angle, rate = [], 1.0, 0.0
+        others = ('', '<parameter type="inertia" body="rod"/>') if damping == 0 else ('<parameter type="damping" joint="pivot"/>',)
+        for other in others:
+            for mass in (0.5, 1, 3):
+                write('swing_model.xml', '<mujoco model="swing"><worldbody><body name="rod" pos="0 0 2"><joint name="pivot" axis="0 1 0" '
+                      'damping="%g"/><inertial pos="0 0 -1" mass="%g" diaginertia=".1 .1 .1"/></body></worldbody></mujoco>'
+                      % (2 * damping, mass))
+                write('swing.xml', (PROBLEM % ('swing_model.xml', '<parameter type="mass" body="rod"/>' + other, 'swing.csv', '0.001',
+                                               '')).replace('<start', '<guess file="swing_guess.csv"/><start'))
+                status, text = run('solve', 'swing.xml', '--threads', '1', '-o', 'swing')
+                want = 'does not tell apart mass of rod, ' if other else 'does not tell mass of rod'
+                check(status == 2 and want in text, 'passive %s from %g: %d %s' % (other, mass, status, text[-300:]))
+
+
 def test_bad():
     for attributes, texts in (
             ('body="one"', ("'type'",)),
@@ -236,6 +262,7 @@ def main():
     os.chdir(work)
     example = os.path.join(source, 'problems', 'estimate')
     test_untold()
+    test_passive()
     test_bad()
     test_spring()
     test_cart(os.path.join(example, 'cart.xml'), 'example')

@@ -30,6 +30,9 @@ static const double difference = 1e-4, settled = 1e-6, most_ratio = 2, stuck = 1
 /// hundredth of all, or less than the rounding of squares leaves of the best known, is not told.
 static const double aside = 1e-4, least_part = 1e-2, rounding = 1e-12;
 
+/// Nor is one that it knows to no better than ten thousand times the values: that is the rounding of differences.
+static const double least_known = 1e-8;
+
 /// A pivot of the motion below it: nothing tells of an unknown (information.c).
 static const double least_pivot = 1e-9;
 
@@ -388,7 +391,7 @@ static void diagonalise(int n, double *A, double *rows) {
 
 /// Whether the record tells of a combination (row of axes) of which it knows so much, of the best known and of all.
 static int is_told(double known, double best, double all) {
-  return known > rounding * best && known > least_part * all;
+  return known > rounding * best && known > least_part * all && known > least_known;
 }
 
 /// The parameters of a combination by name.
