@@ -119,6 +119,7 @@ TEXT
   gcc -std=c17 -Wall -Wextra -Werror problems/example.c -o "$out/example" $flags && $run "$out/example" || return 1
   gcc -std=c17 -Wall -Wextra -Werror problems/example_replan.c -o "$out/replan" $flags && $run "$out/replan" || return 1
   gcc -std=c17 -Wall -Wextra -Werror problems/example_mpc.c -o "$out/mpc" $flags && $run "$out/mpc" | grep -q 'it stands' || return 1
+  gcc -std=c17 -Wall -Wextra -Werror problems/example_mhe.c -o "$out/mhe" $flags && $run "$out/mhe" | grep -q 'followed to the end' || return 1
   # as it was installed
   gcc -std=c17 -Wall -Wextra -Werror "$prefix/share/cavort/examples/example_term.c" -o "$out/term" $flags -lm && $run "$out/term"
 }

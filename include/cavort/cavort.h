@@ -6,6 +6,7 @@
 #include "cavort/estimate.h"
 #include "cavort/mocap.h"
 #include "cavort/model.h"
+#include "cavort/mhe.h"
 #include "cavort/mpc.h"
 #include "cavort/problem.h"
 #include "cavort/result.h"

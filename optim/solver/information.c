@@ -32,7 +32,7 @@ static void find_holding(cav_information *f, int nrow, const cav_binding *row) {
   for (int t = 0, k = 0; t < tr->nknot; t++) {
     f->first[t] = k;
     for (int i = 0; i < tr->knot[t].layout.count; i++, k++)
-      f->holds[k] = tr->knot[t].slot[i].lower == tr->knot[t].slot[i].upper;
+      f->holds[k] = !f->merit && tr->knot[t].slot[i].lower == tr->knot[t].slot[i].upper;
   }
   for (int n = 0; n < nrow; n++) {
     int t = row[n].knot;
@@ -148,7 +148,7 @@ static void lay(const cav_information *f, int t, const double *row, double root,
 static void lay_rest(const cav_information *f, const double *by, double rest, double root, double *to) {
   double *out = to + 3 * f->tr->nv + f->factor.border - f->nparameter - 1;
   for (int k = 0; k < f->nparameter && by; k++) out[k] += root * by[k];
-  if (f->nparameter) out[f->nparameter] += root * rest;
+  if (f->residuals) out[f->nparameter] += root * rest;
 }
 
 /// Adds the row of a constraint that holds, if an unknown moves it.
@@ -176,7 +176,7 @@ static cav_status add_knot(cav_information *f, int t) {
   const cav_knot *knot = &tr->knot[t];
   int width = 3 * tr->nv, across = width + f->factor.border;
   int n = factor_costs(f, t, f->square, f->square + width * width, f->row);
-  double *to = cav_row_factor_add(&f->factor, n + knot->ndense + knot->layout.count);
+  double *to = cav_row_factor_add(&f->factor, n + knot->ndense + (f->merit ? 0 : knot->layout.count));
   if (!to) return CAV_NO_MEMORY;
   for (int i = 0; i < n; i++, to += across) {
     const double *row = f->row + (size_t)i * (size_t)(width + 1);
@@ -214,11 +214,9 @@ int cav_information_block(const cav_information *f, int t) {
   return first;
 }
 
-int cav_information_unknown(const cav_information *f, int t, int c) { return unknown_of(f->tr, t, c); }
-
-cav_status cav_information_begin(cav_information *f, cav_transcription *tr, int nparameter) {
+static cav_status begin(cav_information *f, cav_transcription *tr) {
   size_t nv = (size_t)tr->nv, rows = 0;
-  *f = (cav_information){.tr = tr, .nparameter = nparameter, .blocks = cav_transcription_blocks(tr)};
+  f->tr = tr, f->blocks = cav_transcription_blocks(tr);
   // of a cycle the last two blocks meet the first two
   f->core = f->blocks - (tr->periodicity ? 2 : 0);
   for (int t = 0; t < tr->nknot; t++) rows += (size_t)tr->knot[t].layout.count;
@@ -227,10 +225,20 @@ cav_status cav_information_begin(cav_information *f, cav_transcription *tr, int 
   f->holds = calloc(rows + 1, 1);
   f->square = malloc((9 * nv * nv + 3 * nv + (3 * nv + 1) * 3 * nv + 1) * sizeof(double));
   cav_status status =
-      cav_row_factor_begin(&f->factor, tr->nv, f->core, (f->blocks - f->core) * tr->nv + nparameter + (nparameter > 0));
+      cav_row_factor_begin(&f->factor, tr->nv, f->core, (f->blocks - f->core) * tr->nv + f->nparameter + f->residuals);
   if (!f->scale || !f->first || !f->holds || !f->square) return CAV_NO_MEMORY;
   f->row = f->square + 9 * nv * nv + 3 * nv;
   return status;
+}
+
+cav_status cav_information_begin(cav_information *f, cav_transcription *tr, int nparameter) {
+  *f = (cav_information){.nparameter = nparameter, .residuals = nparameter > 0};
+  return begin(f, tr);
+}
+
+cav_status cav_information_begin_merit(cav_information *f, cav_transcription *tr) {
+  *f = (cav_information){.merit = 1, .residuals = 1};
+  return begin(f, tr);
 }
 
 void cav_information_clear(cav_information *f) {
@@ -239,16 +247,52 @@ void cav_information_clear(cav_information *f) {
   *f = (cav_information){0};
 }
 
-cav_status cav_information_factor(cav_information *f, int nrow, const cav_binding *row) {
-  cav_status status = CAV_OK;
+void cav_information_start(cav_information *f, int nrow, const cav_binding *row) {
+  memset(f->scale, 0, (size_t)f->blocks * (size_t)f->tr->nv * sizeof *f->scale);
+  cav_row_factor_restart(&f->factor);
   find_holding(f, nrow, row);
   find_scale(f);
-  for (int b = 0; b <= f->core && status == CAV_OK; b++) {
-    for (int t = 0; t < f->tr->nknot && status == CAV_OK; t++)
-      if (cav_information_block(f, t) == b) status = add_knot(f, t);
-    if (status == CAV_OK && b == f->core) status = add_priors(f);
-    if (status == CAV_OK) cav_row_factor_advance(&f->factor);
-  }
+}
+
+cav_status cav_information_advance(cav_information *f) {
+  const int b = f->factor.next;
+  cav_status status = CAV_OK;
+  for (int t = 0; t < f->tr->nknot && status == CAV_OK; t++)
+    if (cav_information_block(f, t) == b) status = add_knot(f, t);
+  if (status == CAV_OK && b == f->core) status = add_priors(f);
+  if (status == CAV_OK) cav_row_factor_advance(&f->factor);
+  return status;
+}
+
+cav_status cav_information_finish(cav_information *f) {
+  cav_status status = CAV_OK;
+  while (f->factor.next < f->core && status == CAV_OK) status = cav_information_advance(f);
+  // the border
+  if (status == CAV_OK) status = cav_information_advance(f);
   if (status != CAV_OK) return status;
-  return cav_row_factor_least(&f->factor, f->nparameter > 0) < least_pivot ? CAV_NOT_CONVERGED : CAV_OK;
+  return cav_row_factor_least(&f->factor, f->residuals) < least_pivot ? CAV_NOT_CONVERGED : CAV_OK;
+}
+
+cav_status cav_information_factor(cav_information *f, int nrow, const cav_binding *row) {
+  cav_information_start(f, nrow, row);
+  return cav_information_finish(f);
+}
+
+void cav_information_step(const cav_information *f, double *x) {
+  cav_row_factor_solve(&f->factor, x);
+  for (int k = 0; k < f->blocks * f->tr->nv; k++) x[k] /= f->scale[k];
+}
+
+void cav_information_spread(const cav_information *f, int t, int n, const double *row, double *image) {
+  int nv = f->tr->nv, width = 3 * nv, first = cav_information_block(f, t) * nv, core = f->core * nv;
+  size_t across = (size_t)(width + f->factor.border);
+  memset(image, 0, (size_t)n * across * sizeof(double));
+  for (int i = 0; i < n; i++)
+    for (int c = 0; c < width; c++) {
+      int k = unknown_of(f->tr, t, c);
+      if (k < 0) continue;
+      double x = row[i * width + c] / f->scale[k];
+      const double *G = f->factor.spread + (size_t)(k < core ? k - first : width + k - core) * across;
+      for (size_t j = 0; j < across && x != 0; j++) image[(size_t)i * across + j] += x * G[j];
+    }
 }

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "continuation.h"
+#include "optimiser.h"
 
 struct cav_optimiser {
   cav_problem problem; ///< the given one, but for the start
@@ -181,6 +182,7 @@ cav_status cav_optimiser_shift(cav_optimiser *o, double knots, const double *q, 
   return CAV_OK;
 }
 
+cav_solve_run *cav_optimiser_run(cav_optimiser *o) { return &o->run; }
 const cav_trajectory *cav_optimiser_trajectory(const cav_optimiser *o) { return o->run.at; }
 const cav_problem *cav_optimiser_problem(const cav_optimiser *o) { return &o->problem; }
 const cav_options *cav_optimiser_contact(const cav_optimiser *o) { return &o->run.tr->options; }

@@ -32,6 +32,12 @@ void cav_row_factor_clear(cav_row_factor *f) {
   *f = (cav_row_factor){0};
 }
 
+void cav_row_factor_restart(cav_row_factor *f) {
+  memset(f->R, 0, (size_t)f->blocks * (size_t)f->n * columns(f) * sizeof *f->R);
+  memset(f->corner, 0, (size_t)f->border * (size_t)f->border * sizeof *f->corner);
+  f->next = f->rows = 0;
+}
+
 double *cav_row_factor_add(cav_row_factor *f, int count) {
   size_t width = columns(f);
   if (f->rows + count > f->room) {
@@ -113,6 +119,21 @@ static void solve_upper(size_t n, const double *U, size_t stride, size_t m, doub
       for (size_t c = 0; c < m; c++) X[i * row + c] -= U[i * stride + k] * X[k * row + c];
     for (size_t c = 0; c < m; c++) X[i * row + c] /= U[i * stride + i];
   }
+}
+
+void cav_row_factor_solve(const cav_row_factor *f, double *x) {
+  size_t width = columns(f), n = (size_t)f->n;
+  for (size_t b = (size_t)f->blocks; b-- > 0;)
+    for (size_t i = n; i-- > 0;) {
+      const double *row = f->R + (b * n + i) * width;
+      double sum = -row[3 * n];
+      for (size_t c = i + 1; c < 3 * n && b * n + c < (size_t)f->blocks * n; c++) sum -= row[c] * x[b * n + c];
+      x[b * n + i] = sum / row[i];
+    }
+}
+
+void cav_row_factor_ignore_border(cav_row_factor *f) {
+  for (int i = 0; i < f->border; i++) f->corner[i * f->border + i] = INFINITY;
 }
 
 /// Factor of what is later than the last block: the border alone.

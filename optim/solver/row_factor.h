@@ -24,6 +24,9 @@ typedef struct cav_row_factor {
 cav_status cav_row_factor_begin(cav_row_factor *factor, int n, int blocks, int border);
 void cav_row_factor_clear(cav_row_factor *factor);
 
+/// Back to the beginning, without rows.
+void cav_row_factor_restart(cav_row_factor *factor);
+
 /// Room for so many rows [count*(3n+border)], zeros, whose first block is the next one (after the last block: of the border
 /// alone); NULL if memory runs out. Until the next call.
 double *cav_row_factor_add(cav_row_factor *factor, int count);
@@ -34,6 +37,12 @@ void cav_row_factor_advance(cav_row_factor *factor);
 /// Least size of a diagonal entry of R but for the last columns of the border, skip; 0: an unknown that no row tells of.
 /// After the border is finished.
 double cav_row_factor_least(const cav_row_factor *factor, int skip);
+
+/// x [blocks*n] at which the rows are least, where the border is their residuals alone, one column.
+void cav_row_factor_solve(const cav_row_factor *factor, double *x);
+
+/// From now on going back takes the border for known: it adds nothing to covariances.
+void cav_row_factor_ignore_border(cav_row_factor *factor);
 
 /// Goes back to a block: the last one first, then one by one.
 void cav_row_factor_back(cav_row_factor *factor, int block);

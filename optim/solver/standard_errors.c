@@ -51,18 +51,8 @@ static void wrap(estimate *f, int t, int n) {
 
 /// n rows over the unknowns about knot t times G, of the block that the factor has gone back to.
 static void multiply(estimate *f, int t, int n) {
-  int nv = f->tr->nv, width = 3 * nv, first = cav_information_block(&f->of, t) * nv, core = f->of.core * nv;
-  size_t across = (size_t)(width + f->of.factor.border);
   wrap(f, t, n);
-  memset(f->image, 0, (size_t)n * across * sizeof(double));
-  for (int i = 0; i < n; i++)
-    for (int c = 0; c < width; c++) {
-      int k = cav_information_unknown(&f->of, t, c);
-      if (k < 0) continue;
-      double x = f->row[i * width + c] / f->of.scale[k];
-      const double *G = f->of.factor.spread + (size_t)(k < core ? k - first : width + k - core) * across;
-      for (size_t j = 0; j < across && x != 0; j++) f->image[(size_t)i * across + j] += x * G[j];
-    }
+  cav_information_spread(&f->of, t, n, f->row, f->image);
 }
 
 /// Covariance of rows i and j that were multiplied.

@@ -88,6 +88,7 @@ int cav_command_inspect(const cav_command_line *line);
 int cav_command_explain(const cav_command_line *line);
 int cav_command_ik(const cav_command_line *line);
 int cav_command_export(const cav_command_line *line);
+int cav_command_mhe(const cav_command_line *line);
 int cav_command_mpc(const cav_command_line *line);
 int cav_command_new(const cav_command_line *line);
 int cav_command_quality(const cav_command_line *line);

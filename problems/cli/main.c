@@ -35,6 +35,7 @@ enum option {
   OPTION_LIKE = 1048576,
   OPTION_FROM = 2097152,
   OPTION_UNTIL = 4194304,
+  OPTION_WINDOW = 8388608,
   OPTION_CONTROL = 33554432,
   OPTION_ERRORS = 67108864,
   OPTION_SCALE = 134217728,
@@ -50,7 +51,7 @@ static const cav_manual_option options[] = {
     {OPTION_FLOATING, "--floating", NULL, NULL, "the root link of a URDF floats (a problem says floating=\"true\")"},
     {OPTION_OUTPUT, "--output", "-o", "DIR",
      "folder of the result (default: NAME.result, of a report NAME.report, of stress NAME.stress, of ik NAME.ik, of "
-     "mpc NAME.mpc; NAME "
+     "mpc NAME.mpc, of mhe NAME.mhe; NAME "
      "of the problem "
      "or "
      "else of its file)"},
@@ -98,10 +99,12 @@ static const cav_manual_option options[] = {
      "\"N_S BODY DIRECTION TIME [LENGTH]\": an impulse (N s) at a body's centre of mass; x, -x, y, -y, z, -z, degrees "
      "from x towards y, or around, ten runs in ten directions and instants; over LENGTH (default 0.1 s). May be given "
      "several times: a run each"},
-    {OPTION_CONTROL, "--knots", NULL, "N", "knots that a plan looks ahead (default: those of the problem)"},
-    {OPTION_CONTROL, "--iterations", NULL, "N", "Gauss-Newton steps for a plan (default 2)"},
-    {OPTION_CONTROL, "--deadline", NULL, "S",
-     "from a state to the plan that is made from it (default: 1/rate); later ones are counted"},
+    {OPTION_WINDOW, "--knots", NULL, "N",
+     "knots that a plan looks ahead (default: those of the problem), or of mhe's window (default 10)"},
+    {OPTION_WINDOW, "--iterations", NULL, "N", "Gauss-Newton steps for a plan (default 2), or an update (default 1)"},
+    {OPTION_WINDOW, "--deadline", NULL, "S",
+     "from a state to the plan that is made from it (default: 1/rate), or for an update (default: a timestep); later "
+     "ones are counted"},
     {OPTION_CONTROL, "--stiffness", NULL, "W",
      "rad/s: springs back to the plan, on the inertia of each dof (default 40; 0: the plan's forces alone)"},
 };
@@ -149,7 +152,15 @@ static const cav_manual_command commands[] = {
      "long "
      "plans\n"
      "  took; writes runs.csv, and of the worst run plans.csv, trajectory.csv and a page",
-     cav_command_mpc, OPTION_MODEL | OPTION_RATE | OPTION_CONTROL | OPTION_OUTPUT | OPTION_QUIET},
+     cav_command_mpc, OPTION_MODEL | OPTION_RATE | OPTION_CONTROL | OPTION_WINDOW | OPTION_OUTPUT | OPTION_QUIET},
+    {"mhe", "PROBLEM",
+     "estimate a motion from its records as they came in, sample by sample, from a window of knots and what is known "
+     "before "
+     "it:\n"
+     "  state with standard errors, forces and disturbances, nothing later used; writes trajectory.csv, stderr.csv, "
+     "touch.csv (contact\n"
+     "  forces on bodies), updates.csv and a page. Solved as a whole by cavort solve",
+     cav_command_mhe, OPTION_MODEL | OPTION_WINDOW | OPTION_THREADS | OPTION_OUTPUT | OPTION_QUIET},
     {"track", "CLIP",
      "find the motion nearest to a recorded clip that obeys physics, with the forces and torques that make it: "
      "contacts "
@@ -313,7 +324,7 @@ static int take_count(const char *name, const char *value, int most, int *number
   return 0;
 }
 
-// options of mpc
+// options of mpc and mhe
 static int take_control(cav_command_line *line, const char *name, char *value) {
   if (!strcmp(name, "--duration")) return take_number(name, value, 0, &line->duration);
   if (!strcmp(name, "--deadline")) return take_number(name, value, 1, &line->deadline);
@@ -399,6 +410,7 @@ static int take_value(cav_command_line *line, enum option option, const char *na
     case OPTION_RATE:
       return take_number(name, value, 0, &line->rate);
     case OPTION_CONTROL:
+    case OPTION_WINDOW:
       return take_control(line, name, value);
     case OPTION_RESUME:
       return line->resume = 1;
