@@ -82,8 +82,8 @@ static void find_scale(cav_information *f) {
   for (int k = 0; k < n; k++) f->scale[k] = f->scale[k] > nothing * most ? f->scale[k] : 0;
   for (int t = 0; t < tr->nknot; t++)
     for (int i = 0; i < tr->knot[t].layout.count; i++) {
-      const double *r = tr->knot[t].slot_row + (size_t)i * (size_t)width;
-      double weight = f->holds[f->first[t] + i] ? weight_of(f, t, r, most) : 0;
+      if (!f->holds[f->first[t] + i]) continue;
+      const double *r = tr->knot[t].slot_row + (size_t)i * (size_t)width, weight = weight_of(f, t, r, most);
       for (int c = 0; c < width && weight > 0; c++) {
         int k = unknown_of(tr, t, c);
         // those without a cost are negative meanwhile
