@@ -1,5 +1,6 @@
-/// Single numbers of a compiled model: masses, centres of mass, inertia, friction, springs, dampers and armature, read and
-/// replaced, with what the model derives from them. Bodies of one link weigh together, as the compiler has it (bodies.c).
+/// Single numbers of a compiled model: masses, centres of mass, inertia, friction, springs, dampers, armature and places of
+/// sites, read and replaced, with what the model derives from them. Bodies of one link weigh together, as the compiler has
+/// it (bodies.c).
 #include <assert.h>
 #include <math.h>
 #include <stdio.h>
@@ -9,7 +10,8 @@
 #include "math3.h"
 #include "objects.h"
 
-#define RULE(kind, name, of, unit, text) [CAV_PARAMETER_##kind] = {name, CAV_OBJECT_##of, unit, text},
+#define RULE(kind, name, of, components, unit, text) \
+  [CAV_PARAMETER_##kind] = {name, CAV_OBJECT_##of, components, unit, text},
 static const cav_parameter_rule rules[CAV_PARAMETER_KINDS] = {CAV_PARAMETERS(RULE)};
 
 const cav_parameter_rule *cav_parameter_rule_of(cav_parameter_kind kind) {
@@ -28,8 +30,8 @@ const char *cav_parameter_label(const cav_model *m, const cav_parameter *p, char
   const char *name =
       rule->of == CAV_OBJECT_GEOM ? cav_geom_label(m, p->object, of) : cav_object_name(m, rule->of, p->object);
   snprintf(number, sizeof number, "%s %d", cav_object_kind_of(rule->of)->text, p->object);
-  snprintf(label, CAV_PARAMETER_LABEL, "%s%s of %.120s", rule->name,
-           p->kind == CAV_PARAMETER_COM ? axis[p->component] : "", *name ? name : number);
+  snprintf(label, CAV_PARAMETER_LABEL, "%s%s of %.120s", rule->name, rule->components > 1 ? axis[p->component] : "",
+           *name ? name : number);
   return label;
 }
 
@@ -46,27 +48,39 @@ static int pair_of(const cav_model *m, int geom) {
 
 // whether a parameter stands for something in the model
 static int exists(const cav_model *m, const cav_parameter *p) {
+  if (p->kind >= CAV_PARAMETER_KINDS || p->component < 0 || p->component >= rules[p->kind].components) return 0;
   switch (p->kind) {
     case CAV_PARAMETER_MASS:
     case CAV_PARAMETER_COM:
     case CAV_PARAMETER_INERTIA:
-      return p->object > 0 && p->object < m->nbody && m->body[p->object].link > 0 && m->body[p->object].mass > 0 &&
-             p->component >= 0 && p->component < (p->kind == CAV_PARAMETER_COM ? 3 : 1);
+      return p->object > 0 && p->object < m->nbody && m->body[p->object].link > 0 && m->body[p->object].mass > 0;
     case CAV_PARAMETER_FRICTION:
       return p->object >= 0 && p->object < m->ngeom && pair_of(m, p->object) >= 0;
     case CAV_PARAMETER_STIFFNESS:
     case CAV_PARAMETER_DAMPING:
     case CAV_PARAMETER_ARMATURE:
       return p->object >= 0 && p->object < m->njoint;
+    case CAV_PARAMETER_PLACE:
+      return p->object >= 0 && p->object < m->nsite && m->site[p->object].link > 0;
     case CAV_PARAMETER_KINDS:
       return 0;
   }
   return 0;
 }
 
+// place of a site in its body's frame
+static void place_of(const cav_model *m, const cav_site *site, double place[3]) {
+  const cav_body *body = &m->body[site->body];
+  const double back[4] = {body->quat[0], -body->quat[1], -body->quat[2], -body->quat[3]};
+  double off[3];
+  sub3(off, site->pos, body->pos);
+  quat_rotate(place, back, off);
+}
+
 static double largest(const double x[3]) { return fmax(x[0], fmax(x[1], x[2])); }
 
 double cav_model_parameter(const cav_model *m, const cav_parameter *p) {
+  double place[3];
   if (!exists(m, p)) return NAN;
   switch (p->kind) {
     case CAV_PARAMETER_MASS:
@@ -83,6 +97,9 @@ double cav_model_parameter(const cav_model *m, const cav_parameter *p) {
       return m->dof[m->joint[p->object].dof].damping;
     case CAV_PARAMETER_ARMATURE:
       return m->dof[m->joint[p->object].dof].armature;
+    case CAV_PARAMETER_PLACE:
+      place_of(m, &m->site[p->object], place);
+      return place[p->component];
     case CAV_PARAMETER_KINDS:
       break;
   }
@@ -134,6 +151,16 @@ static void set_body(cav_model *m, const cav_parameter *p, double value) {
   weigh_link(m, body->link);
 }
 
+static void set_place(cav_model *m, const cav_parameter *p, double value) {
+  cav_site *site = (cav_site *)m->site + p->object;
+  const cav_body *body = &m->body[site->body];
+  double place[3];
+  place_of(m, site, place);
+  place[p->component] = value;
+  quat_rotate(site->pos, body->quat, place);
+  add3(site->pos, site->pos, body->pos);
+}
+
 static void set_friction(cav_model *m, int geom, double value) {
   cav_pair *pair = (cav_pair *)m->pair;
   ((cav_geom *)m->geom)[geom].friction[0] = value;
@@ -142,8 +169,9 @@ static void set_friction(cav_model *m, int geom, double value) {
 }
 
 cav_status cav_model_set_parameter(cav_model *m, const cav_parameter *p, double value) {
-  int positive = p->kind == CAV_PARAMETER_MASS || p->kind == CAV_PARAMETER_INERTIA, any = p->kind == CAV_PARAMETER_COM;
-  if (!exists(m, p) || !isfinite(value) || (positive && !(value > 0)) || (!any && value < 0)) return CAV_BAD_INPUT;
+  int positive = p->kind == CAV_PARAMETER_MASS || p->kind == CAV_PARAMETER_INERTIA;
+  if (!exists(m, p) || !isfinite(value) || (positive && !(value > 0))) return CAV_BAD_INPUT;
+  if (rules[p->kind].components == 1 && value < 0) return CAV_BAD_INPUT;
   if (p->kind == CAV_PARAMETER_INERTIA && !(cav_model_parameter(m, p) > 0)) return CAV_BAD_INPUT;
   switch (p->kind) {
     case CAV_PARAMETER_MASS:
@@ -164,6 +192,9 @@ cav_status cav_model_set_parameter(cav_model *m, const cav_parameter *p, double 
     case CAV_PARAMETER_ARMATURE:
       for (int k = 0; k < width_of(&m->joint[p->object]); k++)
         ((cav_dof *)m->dof)[m->joint[p->object].dof + k].armature = value;
+      break;
+    case CAV_PARAMETER_PLACE:
+      set_place(m, p, value);
       break;
     case CAV_PARAMETER_KINDS:
       return CAV_BAD_INPUT;

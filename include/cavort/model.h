@@ -673,16 +673,18 @@ CAV_API void cav_model_free(cav_model *model);
 /// model.
 CAV_API cav_status cav_model_perturb(cav_model *model, const double *mass_scale, double friction);
 
-/// Single numbers of a model that may be unknown (cavort/estimate.h), X(kind, word, of, unit, text).
+/// Single numbers of a model that may be unknown (cavort/estimate.h), X(kind, word, of, components, unit, text): of three
+/// components each coordinate is a parameter, of any sign.
 // clang-format off
 #define CAV_PARAMETERS(X)                                                                                          \
-  X(MASS, "mass", BODY, "kg", "mass of a body; its moments of inertia go with it, its shape stays")                \
-  X(COM, "com", BODY, "m", "a coordinate of a body's centre of mass in its own frame: component 0, 1 or 2")        \
-  X(INERTIA, "inertia", BODY, "kg m^2", "largest principal moment of inertia of a body; the others go with it")    \
-  X(FRICTION, "friction", GEOM, "", "coefficient of sliding friction in all contacts of a geom")                   \
-  X(STIFFNESS, "stiffness", JOINT, "N m/rad or N/m", "stiffness of a joint's spring")                              \
-  X(DAMPING, "damping", JOINT, "N m s/rad or N s/m", "damping of a joint, in all its dofs")                         \
-  X(ARMATURE, "armature", JOINT, "kg m^2 or kg", "inertia that a joint adds to what it moves, in all its dofs")
+  X(MASS, "mass", BODY, 1, "kg", "mass of a body; its moments of inertia go with it, its shape stays")             \
+  X(COM, "com", BODY, 3, "m", "a coordinate of a body's centre of mass in its own frame: component 0, 1 or 2")     \
+  X(INERTIA, "inertia", BODY, 1, "kg m^2", "largest principal moment of inertia of a body; the others go with it") \
+  X(FRICTION, "friction", GEOM, 1, "", "coefficient of sliding friction in all contacts of a geom")                \
+  X(STIFFNESS, "stiffness", JOINT, 1, "N m/rad or N/m", "stiffness of a joint's spring")                           \
+  X(DAMPING, "damping", JOINT, 1, "N m s/rad or N s/m", "damping of a joint, in all its dofs")                      \
+  X(ARMATURE, "armature", JOINT, 1, "kg m^2 or kg", "inertia that a joint adds to what it moves, in all its dofs") \
+  X(PLACE, "place", SITE, 3, "m", "a coordinate of a site in its body's frame, of a marker or an IMU: component 0, 1 or 2")
 // clang-format on
 
 /// Kinds of parameters: CAV_PARAMETERS.
@@ -696,7 +698,8 @@ typedef enum cav_parameter_kind {
 /// What holds for all parameters of a kind.
 typedef struct cav_parameter_rule {
   const char *name;   ///< its type in problem files
-  cav_object_type of; ///< what it is a number of: BODY, GEOM or JOINT
+  cav_object_type of; ///< what it is a number of: BODY, GEOM, JOINT or SITE
+  int components;     ///< 1, or 3: x, y and z
   const char *unit;   ///< of its value; "" has none
   const char *text;   ///< what it is
 } cav_parameter_rule;
@@ -708,8 +711,8 @@ CAV_API const cav_parameter_rule *cav_parameter_rule_of(cav_parameter_kind kind)
 typedef struct cav_parameter {
   const char *name;        ///< for tables; NULL or "": what cav_parameter_label makes of kind and object
   cav_parameter_kind kind; ///< what it is
-  int object;              ///< body, geom or joint that it is of
-  int component;           ///< of COM: 0 x, 1 y, 2 z
+  int object;              ///< body, geom, joint or site that it is of
+  int component;           ///< of COM and PLACE: 0 x, 1 y, 2 z
   double prior[2];         ///< mean and standard deviation of what is known beforehand; deviation 0: nothing
   double range[2];         ///< within which it is sought, infinite where open; both 0: open
 } cav_parameter;

@@ -286,12 +286,13 @@ static const cav_xml_element residual = {
 static const cav_xml_element parameter = {
     "parameter", 0, 0,
     ATTRIBUTES(
-        {"type", CAV_XML_WORD, 0, 0, parameters, 1, NOTE("", NULL, "what is not known: of a body its mass, a coordinate of its centre of mass (com), its inertia; friction of a geom; stiffness, damping, armature of a joint")},
+        {"type", CAV_XML_WORD, 0, 0, parameters, 1, NOTE("", NULL, "what is not known: of a body its mass, a coordinate of its centre of mass (com), its inertia; friction of a geom; stiffness, damping, armature of a joint; a coordinate of the place of a site")},
         TEXT("name", "(\"mass of BODY\" and the like)", "name in tables"),
         TEXT("body", "(another object)", "body of a mass, com or inertia; roles such as \"right foot\" stand for bodies"),
         TEXT("geom", "(another object)", "geom of a friction, of all its contacts"),
         TEXT("joint", "(another object)", "joint of a stiffness, damping or armature"),
-        TEXT("component", "(of a com alone)", "x, y or z: which coordinate of the centre of mass, in the frame of its body"),
+        TEXT("site", "(another object)", "site of a place: a marker, recorded as <sensor type=\"framepos\" site=>, an IMU"),
+        TEXT("component", "(of com and place alone)", "x, y or z: which coordinate, in the frame of the body"),
         REAL("value", 0, "of the parameter", "(the model's)", "where the search begins; in result folders what was found, which the model then has"),
         REAL("sd", 0, "of the parameter", "(nothing is known)", "standard deviation of what is known beforehand: a cost of half the squared difference from 'prior' over it"),
         REAL("prior", 0, "of the parameter", "(value)", "mean of what is known beforehand, with 'sd'"),

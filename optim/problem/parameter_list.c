@@ -7,6 +7,9 @@
 
 static const char *const components[] = {"x", "y", "z"};
 
+// coordinates: one of three, of any sign
+static int has_components(const cav_parameter *x) { return cav_parameter_rule_of(x->kind)->components > 1; }
+
 static int is_of_joint(cav_parameter_kind kind) { return cav_parameter_rule_of(kind)->of == CAV_OBJECT_JOINT; }
 
 // why the model has no such number; NULL: it has
@@ -19,6 +22,10 @@ static const char *wrong_object(const cav_model *m, const cav_parameter *x) {
     return x->object >= 0 && x->object < m->ngeom ? "is the friction of a geom that may touch nothing (contype, "
                                                     "conaffinity, <exclude>), so no motion tells it"
                                                   : "is of a geom that the model does not have";
+  if (of == CAV_OBJECT_SITE)
+    return x->object >= 0 && x->object < m->nsite ? "is of a site that never moves, so no motion tells it, or of no "
+                                                    "coordinate: the component is 0, 1 or 2"
+                                                  : "is of a site that the model does not have";
   if (!(x->object > 0 && x->object < m->nbody)) return "is of a body that the model does not have";
   if (m->body[x->object].link == 0)
     return "is of a body that never moves, being fixed to the world, so no motion tells it";
@@ -34,16 +41,16 @@ const char *cav_problem_wrong_parameter(const cav_model *m, const cav_parameter 
     return "needs a prior of finite mean and of a deviation that is not negative";
   if (low == 0 && high == 0) return NULL;
   if (!(low < high)) return "has a lower bound that is not below the upper one";
-  if (x->kind != CAV_PARAMETER_COM && !(high > 0)) return "has no value above 0 within its bounds";
+  if (!has_components(x) && !(high > 0)) return "has no value above 0 within its bounds";
   return value >= low && value <= high ? NULL : "begins outside its bounds; give a value within them";
 }
 
 // the object of the kind that the type wants, and no other
 static cav_status read_object(const cav_problem_reader *reader, const cav_xml_node *node, cav_parameter *x) {
-  static const cav_object_type kinds[] = {CAV_OBJECT_BODY, CAV_OBJECT_GEOM, CAV_OBJECT_JOINT};
+  static const cav_object_type kinds[] = {CAV_OBJECT_BODY, CAV_OBJECT_GEOM, CAV_OBJECT_JOINT, CAV_OBJECT_SITE};
   const cav_parameter_rule *rule = cav_parameter_rule_of(x->kind);
   const char *wanted = cav_object_kind_of(rule->of)->attribute;
-  for (int k = 0; k < 3; k++) {
+  for (int k = 0; k < 4; k++) {
     const char *other = cav_object_kind_of(kinds[k])->attribute;
     if (kinds[k] != rule->of && cav_xml_get(node, other))
       return cav_xml_fail(reader->error, node, other, "type=\"%s\" is of a %s: give it as attribute '%s'", rule->name,
@@ -58,8 +65,9 @@ static cav_status read_object(const cav_problem_reader *reader, const cav_xml_no
 
 static cav_status read_component(const cav_problem_reader *reader, const cav_xml_node *node, cav_parameter *x) {
   const char *text = cav_xml_text(node, "component", NULL);
-  if (x->kind != CAV_PARAMETER_COM)
-    return text ? cav_xml_fail(reader->error, node, "component", "is of type=\"com\" alone; remove it") : CAV_OK;
+  if (!has_components(x))
+    return text ? cav_xml_fail(reader->error, node, "component", "is of type=\"com\" and \"place\" alone; remove it")
+                : CAV_OK;
   for (x->component = 0; text && x->component < 3; x->component++)
     if (!strcmp(text, components[x->component])) return CAV_OK;
   return text ? cav_xml_fail(reader->error, node, "component", "expected x, y or z, got '%.40s'", text)
@@ -70,7 +78,7 @@ static cav_status read_component(const cav_problem_reader *reader, const cav_xml
 static cav_status read_numbers(const cav_problem_reader *reader, const cav_xml_node *node, cav_parameter *x,
                                double *value) {
   const char *of = cav_parameter_rule_of(x->kind)->name;
-  int signless = x->kind == CAV_PARAMETER_COM, positive = !is_of_joint(x->kind) && x->kind != CAV_PARAMETER_FRICTION;
+  int signless = has_components(x), positive = !is_of_joint(x->kind) && x->kind != CAV_PARAMETER_FRICTION;
   *value = cav_xml_real(node, "value", cav_model_parameter(reader->model, x));
   if (!signless && (positive ? !(*value > 0) : !(*value >= 0)))
     return cav_xml_fail(reader->error, node, "value", "expected a %s %s, got %g", of,

@@ -380,7 +380,7 @@ static int write_parameter(FILE *out, const cav_problem *p, const cav_parameter 
   write_text(out, "type", rule->name);
   if (x->name && *x->name) write_text(out, "name", x->name);
   write_text(out, kind, name ? name : "");
-  if (x->kind == CAV_PARAMETER_COM) write_text(out, "component", component[x->component]);
+  if (rule->components > 1) write_text(out, "component", component[x->component]);
   write_number(out, "value", value);
   if (x->prior[1] > 0) {
     write_number(out, "sd", x->prior[1]);

@@ -88,6 +88,9 @@ static cav_status fail(cav_error *error, cav_status status, const char *text) {
 
 static int has_prior(const cav_parameter *p) { return p->prior[1] > 0; }
 
+/// Whether a number may be negative: a coordinate.
+static int has_sign(const cav_parameter *p) { return cav_parameter_rule_of(p->kind)->components > 1; }
+
 /// Whether a number may vanish, and not be negative.
 static int may_vanish(const cav_parameter *p) {
   return p->kind == CAV_PARAMETER_FRICTION || p->kind == CAV_PARAMETER_STIFFNESS || p->kind == CAV_PARAMETER_DAMPING ||
@@ -165,7 +168,7 @@ static cav_status differentiate(search *s, const cav_problem *problem, const cav
   cav_transcription *side[2] = {NULL, NULL};
   cav_status status = CAV_OK;
   // at the end of what may be: this side alone
-  int low = s->parameter[k].kind == CAV_PARAMETER_COM || kept - distance > 0;
+  int low = has_sign(&s->parameter[k]) || kept - distance > 0;
   for (int i = 0; i < 2 && status == CAV_OK; i++) {
     s->value[k] = i ? kept + distance : low ? kept - distance : kept;
     status = set_model(s, s->value);
@@ -290,7 +293,7 @@ static double longest(const search *s) {
   double part = 1;
   for (int k = 0; k < s->n; k++) {
     double way = s->step[k] * s->unit[k], room = fabs(s->value[k]) * (way > 0 ? most_ratio - 1 : 1 - 1 / most_ratio);
-    if (s->parameter[k].kind == CAV_PARAMETER_COM || way == 0) continue;
+    if (has_sign(&s->parameter[k]) || way == 0) continue;
     if (may_vanish(&s->parameter[k]) && way <= -s->value[k]) continue;
     if (s->value[k] > 0) part = fmin(part, room / fabs(way));
     if (s->value[k] == 0 && way < 0) part = 0;
