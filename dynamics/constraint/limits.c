@@ -225,11 +225,12 @@ static cav_status limit_ball(cav_state *state, cav_row row, const cav_joint *joi
 
 static cav_status add_limits(const cav_model *model, cav_state *state) {
   const cav_workspace *w = state->work;
+  const double beyond = cav_law_activation(state, self_smoothing(state), LIMIT_SPEED);
   cav_status status = CAV_OK;
   for (int i = 0; i < w->nlimit && !status; i++) {
     int k = w->limit[i];
     const cav_joint *joint = &model->joint[k];
-    double weight = model->dof[joint->dof].inverse_weight, activation = cav_limit_activation(state, joint->margin);
+    double weight = model->dof[joint->dof].inverse_weight, activation = joint->margin + beyond;
     // most are far from both ends of a range
     const double *at = w->q + joint->q, *range = joint->range;
     if (joint->type != CAV_JOINT_BALL && !(at[0] - range[0] < activation) && !(range[1] - at[0] < activation)) continue;
