@@ -142,7 +142,7 @@ int cav_command_pumping(const cav_problem *problem, char text[CAV_PUMPING_TEXT])
 
 /// Why a certified motion misses what was asked: how much of the way it goes, and what would lead elsewhere. Zero: nothing is
 /// missed, or nothing is known. missed.c.
-enum { CAV_MISSED_TEXT = 700 };
+enum { CAV_MISSED_TEXT = 1000 };
 int cav_command_missed(const cav_problem *problem, const cav_trajectory *motion, const cav_explanation *explanation,
                        char text[CAV_MISSED_TEXT]);
 

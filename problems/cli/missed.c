@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cavort/result.h"
 #include "command.h"
 
 static const double still = 0.2; // part of the way up to which a motion stays where it starts
@@ -33,13 +34,43 @@ static void suggest(const cav_problem *p, char *text, size_t size) {
                strategy[i].from, strategy[i].to);
 }
 
-static void tell(const cav_problem *p, const cav_term_report *got, const cav_term_report *held, int i,
-                 const cav_explanation *e, char *text, size_t size) {
+/// How far a motion is from the ends of what actuators and joints can do, where no multiplier speaks of a limit.
+static void tell_room(const cav_problem *p, const cav_trajectory *motion, char *text, size_t size) {
+  const cav_model *m = p->model;
+  cav_error ignored = {0};
+  cav_forces *forces = cav_forces_new(m, motion, &p->contact, p->close_at_rest, &ignored);
+  double most = 0, near = INFINITY;
+  int at = 0, of = -1, joint = -1;
+  for (int i = 0; forces && i < forces->nknot * m->nu; i++) {
+    double range[2], effort = forces->control[i];
+    cav_actuator_effort_range(m, i % m->nu, range);
+    double part = effort > 0 ? effort / range[1] : effort / range[0];
+    if (isfinite(part) && part > most) most = part, of = i % m->nu, at = i / m->nu;
+  }
+  for (int i = 0; i < motion->nknot * m->njoint; i++) {
+    const cav_joint *j = &m->joint[i % m->njoint];
+    double q = motion->q[(i / m->njoint) * m->nq + j->q];
+    int scalar = j->type == CAV_JOINT_HINGE || j->type == CAV_JOINT_SLIDE;
+    if (!scalar || !j->limited || fmin(q - j->range[0], j->range[1] - q) >= near) continue;
+    near = fmin(q - j->range[0], j->range[1] - q), joint = i % m->njoint;
+  }
+  cav_forces_free(forces);
+  int n = snprintf(text, size, "no limit is at its end");
+  if (of >= 0)
+    n += snprintf(text + n, size - (size_t)n, ": actuators give at most %.2g %% of their limits ('%.40s' at %.3g s)",
+                  100 * most, m->actuator[of].name, at * motion->timestep);
+  if (joint >= 0 && (size_t)n < size)
+    snprintf(text + n, size - (size_t)n, ", the nearest end of a range is %.2g %s off ('%.40s')", fmax(near, 0),
+             m->joint[joint].type == CAV_JOINT_HINGE ? "rad" : "m", m->joint[joint].name);
+}
+
+static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_term_report *got,
+                 const cav_term_report *held, int i, const cav_explanation *e, char *text, size_t size) {
   const cav_term *term = &p->term[i];
   int named = *term->name && strcmp(term->name, cav_quantity_rule_of(term->quantity)->name);
   const char *name = named ? term->name : got[i].what, *unit = got[i].unit, *gap = *unit ? " " : "";
   double way = held[i].off, done = way - got[i].off;
-  char hint[160];
+  char hint[160], room[300];
   if (way <= got[i].within) {
     snprintf(text, size,
              "the start has '%.60s' to %.3g%s%s, and the motion leaves it by %.3g%s%s at %.3g s%s%.160s. It is traded "
@@ -49,13 +80,23 @@ static void tell(const cav_problem *p, const cav_term_report *got, const cav_ter
              e->nconflict ? e->conflict[0].what : "", 2 * got[i].off / got[i].within);
   } else if (done < still * way) {
     suggest(p, hint, sizeof hint);
-    snprintf(
-        text, size,
-        "'%.60s' is %.3g%s%s from where the start has it, and the motion goes %.2g%s%s of that by %.3g s%s%.160s. It "
-        "stays at the optimum next to its guess: %s, or a higher weight does.",
-        name, way, gap, unit, fmax(done, 0), gap, unit, got[i].time,
-        e->nconflict ? "; what holds it back: " : ", though no limit or constraint holds it back",
-        e->nconflict ? e->conflict[0].what : "", hint);
+    if (!e->nconflict) tell_room(p, motion, room, sizeof room);
+    if (!e->nconflict)
+      snprintf(
+          text, size,
+          "'%.60s' is %.3g%s%s from where the start has it, %.3g%s%s a second, and the motion goes %.2g%s%s of that by "
+          "%.3g s, though %s. The search ended at the optimum next to its guess, with %.3g %% of the cost in this "
+          "term; "
+          "nothing proves that it cannot be had, nor that it can. Next: half of the way, or more time, to see what can "
+          "be; %s, or a higher weight does.",
+          name, way, gap, unit, way / fmax(got[i].time, p->timestep), gap, unit, fmax(done, 0), gap, unit, got[i].time,
+          room, 100 * got[i].fraction, hint);
+    else
+      snprintf(text, size,
+               "'%.60s' is %.3g%s%s from where the start has it, and the motion goes %.2g%s%s of that by %.3g s; what "
+               "holds it back: "
+               "%.160s. It stays at the optimum next to its guess: %s, or a higher weight does.",
+               name, way, gap, unit, fmax(done, 0), gap, unit, got[i].time, e->conflict[0].what, hint);
   } else {
     snprintf(text, size,
              "'%.60s' is %.3g%s%s from where the start has it, and the motion goes %.0f %% of that by %.3g s%s%.160s. "
@@ -79,7 +120,7 @@ int cav_command_missed(const cav_problem *p, const cav_trajectory *motion, const
   if (got && start && !p->cycle.on && !cav_terms_report(p, motion, &p->contact, got, NULL, &error) &&
       !cav_terms_report(p, start, &p->contact, held, NULL, &error))
     worst = worst_of(p, got);
-  if (worst >= 0) tell(p, got, held, worst, e, text, CAV_MISSED_TEXT);
+  if (worst >= 0) tell(p, motion, got, held, worst, e, text, CAV_MISSED_TEXT);
   cav_trajectory_free(start);
   free(got);
   return *text != 0;
