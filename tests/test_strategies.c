@@ -85,16 +85,18 @@ static void test_gait(const char *text, double axis, double travel) {
   }
   // no gait where it stands, nor where the guess swings already; a guess that is held is not held twice
   goal[0] = q[0];
-  CHECK(offers(&p, "stated soft hold slow momentum repair-1 repair-2 repair-3 repair-4 open longer"));
+  CHECK(offers(&p, "stated near-1 near-2 soft hold slow momentum repair-1 repair-2 repair-3 repair-4 open longer"));
   p.guess = CAV_GUESS_HOLD;
-  CHECK(offers(&p, "stated soft line slow momentum repair-1 repair-2 repair-3 repair-4 open longer"));
+  CHECK(offers(&p, "stated near-1 near-2 soft line slow momentum repair-1 repair-2 repair-3 repair-4 open longer"));
   p.guess = CAV_GUESS_INTERPOLATE;
   p.guess_height = 0.3;
-  CHECK(offers(&p, "stated soft line hold slow momentum repair-1 repair-2 repair-3 repair-4 open longer"));
+  CHECK(
+      offers(&p, "stated near-1 near-2 soft line hold slow momentum repair-1 repair-2 repair-3 repair-4 open longer"));
   goal[0] += travel;
   p.nswing = 1;
   p.swing = &(cav_swing){.joint = 1, .amplitude = 0.1, .frequency = 1};
-  CHECK(offers(&p, "stated soft line hold slow momentum repair-1 repair-2 repair-3 repair-4 open longer"));
+  CHECK(
+      offers(&p, "stated near-1 near-2 soft line hold slow momentum repair-1 repair-2 repair-3 repair-4 open longer"));
   // taking one leaves the problem as it was
   CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK);
   cav_strategy_apply(&p, &strategy[0], &taken);
@@ -116,7 +118,7 @@ static void check_order(cav_problem *p) {
   cav_strategy strategy[CAV_STRATEGIES];
   int n;
   p->order = CAV_ORDER_MOMENTUM;
-  CHECK(offers(p, "stated midpoint soft hold slow repair-1 repair-2 repair-3 repair-4 open longer"));
+  CHECK(offers(p, "stated near-1 near-2 midpoint soft hold slow repair-1 repair-2 repair-3 repair-4 open longer"));
   CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
   cav_solution *straight = NULL, *round = NULL;
   runs = first_stall = last_stall = 0;
@@ -309,16 +311,18 @@ static void test_solids(void) {
   goal[0] += 1;
   cav_problem p = cav_problem_default(m), taken;
   p.q_start = q, p.v_start = v, p.q_goal = goal;
-  CHECK(offers(&p, "stated step solids repair-1 repair-2 repair-3 repair-4 soft hold slow momentum open longer"));
+  CHECK(offers(
+      &p, "stated near-1 near-2 step solids repair-1 repair-2 repair-3 repair-4 soft hold slow momentum open longer"));
   cav_strategy strategy[CAV_STRATEGIES];
   int n;
   CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK && strategy[0].schedule.solids == CAV_SOLIDS_HARD);
-  for (int i = 1; i < n; i++) CHECK(strategy[i].schedule.solids == CAV_SOLIDS_GROW);
+  for (int i = 1; i < n; i++)
+    CHECK(strategy[i].use == CAV_STRATEGY_NEAR || strategy[i].schedule.solids == CAV_SOLIDS_GROW);
   cav_strategy_apply(&p, find(strategy, n, "step"), &taken);
   CHECK(taken.nswing == 4 && taken.swing[0].amplitude * taken.swing[0].amplitude > 0.1);
   // where it stops before the wall nothing is in the way
   goal[0] -= 0.8;
-  CHECK(offers(&p, "stated soft hold slow momentum repair-1 repair-2 repair-3 repair-4 open longer"));
+  CHECK(offers(&p, "stated near-1 near-2 soft hold slow momentum repair-1 repair-2 repair-3 repair-4 open longer"));
   cav_model_free(m);
 }
 

@@ -157,6 +157,14 @@ static void add(cav_strategy *strategy, int *n, const cav_strategy *from, const 
   ++*n;
 }
 
+// what is nearly there is mended before anything else is tried
+static void add_near(cav_strategy *strategy, int *n, const cav_strategy *stated) {
+  cav_strategy repaired = *stated;
+  repaired.use = CAV_STRATEGY_NEAR;
+  add(strategy, n, &repaired, "near-1", "where it is nearly there, with the usual cure of what it misses");
+  add(strategy, n, &repaired, "near-2", "where it is nearly there, with the usual cure of what it misses");
+}
+
 static void add_repairs(cav_strategy *strategy, int *n, const cav_strategy *stated) {
   static const char *const repair[] = {"repair-1", "repair-2", "repair-3", "repair-4"};
   cav_strategy repaired = *stated;
@@ -192,6 +200,7 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
     add_repairs(strategy, n, &stated);
     return CAV_OK;
   }
+  if (!problem->cycle.on) add_near(strategy, n, &stated);
 
   if (problem->order == CAV_ORDER_MOMENTUM) {
     cav_strategy twice = stated;

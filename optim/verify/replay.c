@@ -322,7 +322,7 @@ static cav_options options_at(const cav_verification *verification, const cav_op
   return law ? claimed_options(verification, law, h) : own_options(verification, h);
 }
 
-// a step of h under the forces s->u. One that is not found is taken in two halves: with Coulomb's friction it need not exist
+// a step of h under the forces s->u. One that is not found is taken as two of h/2: with Coulomb's friction it need not exist
 static cav_status go(const cav_verification *verification, simulation *s, double h, int halvings) {
   const cav_model *model = verification->model;
   s->state->options = options_at(verification, s->law, h);

@@ -34,7 +34,9 @@ cav_status cav_race_open(cav_race *race, int most, cav_error *error) {
   if (status) return cav_file_fail(error, status, 0, "strategies cannot be listed: %s", cav_status_name(status));
   race->n = 0;
   for (int i = 0; i < n && race->n < most; i++)
-    race->entry[race->n++] = (cav_race_entry){.strategy = strategy[i], .answer = -1, .order = -1};
+    // of those that are solved at once none waits for another
+    if (most >= CAV_STRATEGIES || strategy[i].use != CAV_STRATEGY_NEAR)
+      race->entry[race->n++] = (cav_race_entry){.strategy = strategy[i], .answer = -1, .order = -1};
   return CAV_OK;
 }
 
@@ -377,9 +379,31 @@ static int find_broken(const cav_race *race) {
   return best >= 0 ? best : cav_race_best(race, 0);
 }
 
+// whether a motion is nearly what was asked
+static int is_near(const cav_race *race, const cav_race_report *report) {
+  const cav_verdict *v = &report->verdict;
+  if (!report->solution || report->status == CAV_INTERRUPTED) return 0;
+  if (v->certified) return !v->achieved && 2 * v->nmissed < v->ntarget;
+  return v->unactuated_force_max <= CAV_TOLERANCE_UNACTUATED &&
+         v->constraint_violation_max <= CAV_TOLERANCE_CONSTRAINT && v->limit_violation_max > CAV_TOLERANCE_LIMIT &&
+         v->limit_violation_max < (1 - race->problem->effort_limit) / 2;
+}
+
+// the best of those before entry i that are. -1: none
+static int find_near(const cav_race *race, int i) {
+  int best = -1;
+  for (int k = 0; k < i; k++) {
+    const cav_race_entry *e = &race->entry[k];
+    if (e->state != CAV_RACE_DONE || !is_near(race, &e->report)) continue;
+    if (best < 0 || better(&e->report, &race->entry[best].report, 0)) best = k;
+  }
+  return best;
+}
+
 // the strategy that repairs it by a cure that was not tried; to be cleared where there is one
 static int find_repair(const cav_race *race, int i, cav_strategy *repaired) {
-  int best = find_broken(race), found = best >= 0;
+  int best = race->entry[i].strategy.use == CAV_STRATEGY_NEAR ? find_near(race, i) : find_broken(race);
+  int found = best >= 0;
   for (int k = 0; found; k++) {
     const cav_race_entry *from = &race->entry[best];
     if (cav_strategy_repair(race->problem, &from->strategy, &from->report.verdict, k, repaired, &found) || !found)
@@ -416,16 +440,18 @@ static int may_start(const cav_race *race, int i) {
   }
   if (race->entry[i].strategy.open && !misses_rest(race)) return 0;
   cav_strategy repaired;
-  int repairs = use == CAV_STRATEGY_REPAIR && !success && find_repair(race, i, &repaired);
+  const int mends = use == CAV_STRATEGY_REPAIR || use == CAV_STRATEGY_NEAR;
+  int repairs = mends && !success && find_repair(race, i, &repaired);
   if (repairs) cav_strategy_clear(&repaired);
-  return use == CAV_STRATEGY_MOMENTUM ? momentum : use == CAV_STRATEGY_REPAIR ? repairs : !success;
+  return use == CAV_STRATEGY_MOMENTUM ? momentum : mends ? repairs : !success;
 }
 
 // takes up what a repair does, once it is known
 static void settle(cav_race *race, int i) {
   cav_race_entry *e = &race->entry[i];
   cav_strategy repaired;
-  if (e->strategy.use != CAV_STRATEGY_REPAIR || *e->strategy.changed || !find_repair(race, i, &repaired)) return;
+  const int mends = e->strategy.use == CAV_STRATEGY_REPAIR || e->strategy.use == CAV_STRATEGY_NEAR;
+  if (!mends || *e->strategy.changed || !find_repair(race, i, &repaired)) return;
   e->strategy = repaired;
   if (race->tell) fprintf(stderr, "strategy %-8s with %s\n", e->strategy.name, e->strategy.changed);
 }
