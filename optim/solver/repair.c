@@ -42,19 +42,19 @@ static int has_record(const cav_problem *p) {
 /// edges of their feet is nearer where these may slide, and on softer ground.
 static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
   static const cure forces[] = {EFFORT, STEP, NONE}, deep[] = {SOFTNESS, STEP, NONE}, between[] = {STEP, NONE},
-                    turned[] = {ORDER, STEP, NONE}, slip[] = {SLIP, SOFTNESS, SMOOTHING},
+                    turned[] = {ORDER, STEP, NONE}, slip[] = {SMOOTHING, SLIP, SOFTNESS},
                     hover[] = {GAP, SMOOTHING, STEP}, fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK},
-                    target[] = {EFFORT, GOALS, NONE}, fade[] = {SMOOTHING, SLIP, SOFTNESS},
-                    fades[] = {SMOOTHING, GAP, STEP}, near[] = {STEP, SLACK, NONE}, ground[] = {LOOSE, SOFTER, STEP},
-                    none[] = {NONE};
+                    target[] = {EFFORT, GOALS, NONE}, fades[] = {SMOOTHING, GAP, STEP}, near[] = {STEP, SLACK, NONE},
+                    ground[] = {LOOSE, SOFTER, STEP}, none[] = {NONE};
   if (v->certified) return v->achieved ? none : target;
   if (!cav_verdict_feasible(v)) return has_record(p) ? ground : forces;
   if (v->penetration_max_m > CAV_TOLERANCE_PENETRATION) return deep;
   if (v->penetration_between_m > CAV_TOLERANCE_PENETRATION) return between;
   if (v->momentum_defect_rms > CAV_TOLERANCE_MOMENTUM) return turned;
-  // a stated smoothing beyond the usual one is what holds things off the ground, where they slide
+  // what is smoothed slides by a part of the smoothing in every step
+  if (v->slip_mean_m_s > CAV_TOLERANCE_SLIP) return slip;
+  // a stated smoothing beyond the usual one is what holds things off the ground
   int blurred = p->schedule.last.smoothing > cav_problem_default(p->model).schedule.last.smoothing;
-  if (v->slip_mean_m_s > CAV_TOLERANCE_SLIP) return blurred ? fade : slip;
   if (v->hover_fraction > CAV_TOLERANCE_HOVER) return blurred ? fades : hover;
   if (v->replay_step_max_error > CAV_TOLERANCE_STEP) return fold;
   if (v->residual_fraction_max > v->residual_within) return none;
