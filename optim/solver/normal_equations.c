@@ -171,13 +171,18 @@ static void find_groups(cav_normal *normal) {
   list_unknowns(normal);
 }
 
-void cav_normal_clear(cav_normal *normal) {
+/// All but the band.
+static void clear_rest(cav_normal *normal) {
   size_t core = (size_t)normal->core, border = (size_t)normal->border;
-  memset(normal->H, 0, core * (size_t)normal->band * sizeof(double));
   memset(normal->B, 0, core * border * sizeof(double));
   memset(normal->C, 0, border * border * sizeof(double));
   memset(normal->diagonal, 0, (size_t)normal->size * sizeof(double));
   memset(normal->gradient, 0, (size_t)normal->size * sizeof(double));
+}
+
+void cav_normal_clear(cav_normal *normal) {
+  memset(normal->H, 0, (size_t)normal->core * (size_t)normal->band * sizeof(double));
+  clear_rest(normal);
 }
 
 void cav_normal_add_block(cav_normal *normal, const cav_transcription *tr, int t, const double *hessian,
@@ -357,6 +362,13 @@ static void take_knot(void *context, int t) {
   const stream *s = context;
   cav_normal *normal = s->normal;
   cav_band *band = normal->group;
+  if (s->whole) {
+    // columns of the band that this knot is the first to add to
+    int end = (t + 2 - s->tr->first) * normal->n, from = t == 0 ? 0 : end - normal->n;
+    end = end < normal->core ? end : normal->core;
+    if (from < end)
+      memset(normal->H + (size_t)from * normal->band, 0, (size_t)(end - from) * normal->band * sizeof(double));
+  }
   gather_knot(normal, s->tr, t);
   // the next two knots add to all blocks but these
   int last = t + 1 < s->tr->nknot ? (t - s->tr->first) * normal->n : band->core;
@@ -371,9 +383,11 @@ cav_status cav_normal_linearise(cav_normal *normal, cav_transcription *tr, cav_t
                                 cav_status *factored) {
   stream s = {.normal = normal, .tr = tr, .shift = shift, .whole = normal->ntree == 1 && !normal->cyclic};
   double *place = normal->factor;
-  cav_normal_clear(normal);
   normal->filled = 0;
-  if (s.whole) find_groups(normal), place_band(normal, 0, &place);
+  if (s.whole)
+    clear_rest(normal), find_groups(normal), place_band(normal, 0, &place);
+  else
+    cav_normal_clear(normal);
   cav_status status = cav_transcription_linearise_then(tr, at, take_knot, &s);
   if (status != CAV_OK) return status;
   find_diagonal(normal);

@@ -788,7 +788,9 @@ void cav_knot_sum(cav_sum *a, const double *q, const double *v, const double *v_
   memset(a->s->force_derivative, 0, (size_t)nv * sizeof(double));
   memset(a->s->force_step, 0, (size_t)nv * sizeof(double));
   if (a->jacobian) {
-    memset(knot->hessian, 0, 9 * (size_t)nv * nv * sizeof(double));
+    // its lower triangle alone is read
+    for (size_t i = 0, width = 3 * (size_t)nv; i < width; i++)
+      memset(knot->hessian + i * width, 0, (i + 1) * sizeof(double));
     memset(knot->gradient, 0, 3 * (size_t)nv * sizeof(double));
     memset(knot->step_row, 0, 3 * (size_t)nv * sizeof(double));
     knot->step_square = knot->step_derivative = 0;
