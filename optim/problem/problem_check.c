@@ -53,6 +53,8 @@ static cav_status check_horizon(const cav_problem *p, cav_error *error) {
     wrong = "deviations of the residual and what it is allowed must not be negative";
   else if (p->schedule.stages < 1)
     wrong = "the schedule needs at least one stage";
+  else if (!(p->schedule.optimality >= 0 && p->schedule.optimality <= 1))
+    wrong = "the schedule's optimality is a fraction of the cost";
   if (wrong) return cav_file_fail(error, CAV_BAD_INPUT, 0, "%s", wrong);
   int n;
   const cav_field *field = cav_stage_fields(&n);

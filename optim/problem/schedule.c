@@ -16,6 +16,12 @@ const cav_field *cav_stage_fields(int *n) {
   return fields;
 }
 
+int cav_problem_has_record(const cav_problem *problem) {
+  int found = 0;
+  for (int i = 0; i < problem->nterm; i++) found |= problem->term[i].quantity == CAV_QUANTITY_TRACK;
+  return found;
+}
+
 // whether something that no actuator moves may slide: a box that is pushed hovers under the convex law, and would have to come
 // down where Coulomb's begins
 static int slides(const cav_problem *problem) {

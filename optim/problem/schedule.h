@@ -10,4 +10,7 @@ void cav_stage_law(const cav_problem *problem, double fraction, double step, cav
 /// The stage at a fraction of the way from first to last.
 cav_stage_options cav_schedule_at(const cav_schedule *schedule, double fraction);
 
+/// Whether a term compares the motion with a record.
+int cav_problem_has_record(const cav_problem *problem);
+
 #endif

@@ -16,8 +16,8 @@
 static const cav_penalties penalised = {.effort = 100, .range = 1e4, .term = 100};
 enum { PENALTY_RISE = 100 };
 
-/// Weight of depth in the world where solids grow, 1/(m^2 s).
-static const double depth_weight = 1e5;
+/// Weight of depth in the world where solids grow, 1/(m^2 s); and where a record has a start that is free, at the end.
+static const double depth_weight = 1e5, free_depth_weight = 1e7;
 
 /// Augmented Lagrangian: rounds, iterations a round, tolerance of a round, and the unactuated force from which
 /// restoration is safe.
@@ -54,6 +54,9 @@ void cav_stage_set(const cav_problem *problem, double x, cav_transcription *tr) 
   tr->penalty.range = between(penalised.range, PENALTY_RISE * penalised.range, x);
   tr->penalty.unactuated = cav_schedule_at(&problem->schedule, x).penalty;
   tr->depth_weight = problem->schedule.solids == CAV_SOLIDS_GROW ? depth_weight : 0;
+  // nothing has pushed a body out of the floor before its first knot
+  if (problem->free_start && cav_problem_has_record(problem))
+    tr->depth_weight = between(depth_weight, free_depth_weight, x);
   tr->penalty.term = between(penalised.term, PENALTY_RISE * penalised.term, fmin(2 * x, 1));
 }
 

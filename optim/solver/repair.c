@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "cavort/solve.h"
+#include "schedule.h"
 
 /// What can be changed.
 typedef enum cure {
@@ -31,12 +32,6 @@ enum { CURES = 3 };
 static const double force_weight = 1, heavier = 10, harder = 4, lighter = 0.04, softer = 6, longer = 2, soft = 0.03,
                     slack = 0.75;
 
-static int has_record(const cav_problem *p) {
-  int found = 0;
-  for (int i = 0; i < p->nterm; i++) found |= p->term[i].quantity == CAV_QUANTITY_TRACK;
-  return found;
-}
-
 /// What a motion misses first, in the order of a certificate (METHOD.md, 6), and its cures. Forces near a record are what
 /// is looked for: none of them costs anything. A residual beyond its bound is what the model cannot do. What people do on the
 /// edges of their feet is nearer where these may slide, and on softer ground.
@@ -45,9 +40,9 @@ static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
                     turned[] = {ORDER, STEP, NONE}, slip[] = {SMOOTHING, SLIP, SOFTNESS},
                     hover[] = {GAP, SMOOTHING, STEP}, fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK},
                     target[] = {EFFORT, GOALS, NONE}, fades[] = {SMOOTHING, GAP, STEP}, near[] = {STEP, SLACK, NONE},
-                    ground[] = {LOOSE, SOFTER, STEP}, none[] = {NONE};
+                    again[] = {STEP, SLIDING, NONE}, ground[] = {LOOSE, SOFTER, STEP}, none[] = {NONE};
   if (v->certified) return v->achieved ? none : target;
-  if (!cav_verdict_feasible(v)) return has_record(p) ? ground : forces;
+  if (!cav_verdict_feasible(v)) return cav_problem_has_record(p) ? ground : forces;
   if (v->penetration_max_m > CAV_TOLERANCE_PENETRATION) return deep;
   if (v->penetration_between_m > CAV_TOLERANCE_PENETRATION) return between;
   if (v->momentum_defect_rms > CAV_TOLERANCE_MOMENTUM) return turned;
@@ -56,9 +51,9 @@ static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
   // a stated smoothing beyond the usual one is what holds things off the ground
   int blurred = p->schedule.last.smoothing > cav_problem_default(p->model).schedule.last.smoothing;
   if (v->hover_fraction > CAV_TOLERANCE_HOVER) return blurred ? fades : hover;
-  if (v->replay_step_max_error > CAV_TOLERANCE_STEP) return fold;
+  if (v->replay_step_max_error > CAV_TOLERANCE_STEP) return cav_problem_has_record(p) ? again : fold;
   if (v->residual_fraction_max > v->residual_within) return none;
-  return has_record(p) ? near : lost;
+  return cav_problem_has_record(p) ? near : lost;
 }
 
 // ---------------------------------------------------------------- changes

@@ -21,6 +21,11 @@
 /// Iterations; raises of the penalties for a programme; programmes for a linearisation; corrections of a step.
 enum { ITERATIONS = 250, RAISES = 5, ATTEMPTS = 20, CORRECTIONS = 4, SETTLING = 20 };
 
+/// Near a record: what the linearised rows miss together, below which a raise is never in vain; part of it that one has
+/// to bring in; part of the largest penalty that none is below then; programmes until a raise is tried again.
+static const double missed_little = 1e-6, brought_in = 0.1, even = 0.1;
+enum { RESTS = 8 };
+
 /// Boxes at the start and at most (rad, m, log of the step), and where they are too small to go on.
 static const double first_radius = 0.1, most_radius = 0.7, least_radius = 1e-7;
 
@@ -91,16 +96,18 @@ static void set_penalties(const cav_transcription *tr, double *penalty) {
                           of_kind * most[kind_of(&tr->knot[t].layout, i)]);
 }
 
-/// Raises penalties that the multipliers press against; how many.
-static int raise_penalties(cav_quadratic *qp) {
+/// Raises penalties that the multipliers press against; how many. part: of the largest, which none is below then.
+static int raise_penalties(cav_quadratic *qp, double part) {
   int raised = 0;
   const double *y = cav_quadratic_multiplier(qp);
-  double *penalty = cav_quadratic_penalty(qp);
+  double *penalty = cav_quadratic_penalty(qp), most = 0;
   for (int k = 0; k < cav_quadratic_rows(qp); k++) {
     if (fabs(y[k]) < 0.9 * penalty[k]) continue;
     penalty[k] *= 10;
+    most = fmax(most, penalty[k]);
     raised++;
   }
+  for (int k = 0; k < cav_quadratic_rows(qp); k++) penalty[k] = fmax(penalty[k], part * most);
   return raised;
 }
 
@@ -126,15 +133,42 @@ static void step_bounds(const cav_transcription *tr, const cav_trajectory *at, d
   change[1] = log(tr->problem->duration_most / (tr->nknot - 1) / at->timestep);
 }
 
-/// Solves the programme, raising penalties until they are exact or there is no more to be had by it. *solved: whether
-/// it could be.
-static cav_status solve_programme(cav_solve_run *run, cav_quadratic *qp, const double *radius, int *solved) {
-  double change[2], begin = cav_clock(), gap = gap_fraction * cost_scale(run->tr);
+/// What the linearised rows miss after the programme's step, all together.
+static double linear_violation(const cav_transcription *tr, cav_quadratic *qp) {
+  const double *linear = cav_quadratic_prediction(qp);
+  double sum = 0;
+  for (int t = 0, k = 0; t < tr->nknot; t++)
+    for (int i = 0; i < tr->knot[t].layout.count; i++, k++)
+      sum += fmax(fmax(tr->knot[t].slot[i].lower - linear[k], linear[k] - tr->knot[t].slot[i].upper), 0);
+  return sum;
+}
+
+/// Solves the programme, raising penalties until they are exact or there is no more to be had by it. Where rows cannot
+/// all hold in the boxes, as near a record that asks for more than a body has, the multiplier of one is at its penalty
+/// whatever that is; what raises it is taken from others, and penalties that grow for nothing leave no steps in the end.
+/// Such a raise is taken back, and none is tried in the next programmes: *rest counts them. kept [rows]. *solved:
+/// whether it could be.
+static cav_status solve_programme(cav_solve_run *run, cav_quadratic *qp, const double *radius, double *kept, int *rest,
+                                  int *solved) {
+  double change[2], begin = cav_clock(), gap = gap_fraction * cost_scale(run->tr), before = INFINITY;
+  size_t bytes = (size_t)cav_quadratic_rows(qp) * sizeof *kept;
   step_bounds(run->tr, run->at, change);
   cav_status status = CAV_OK;
+  *rest = *rest > 0 ? *rest - 1 : 0;
   for (int i = 0; i < RAISES; i++) {
     status = cav_quadratic_solve(qp, radius, change, gap);
-    if (status != CAV_OK || !raise_penalties(qp)) break;
+    if (status != CAV_OK) break;
+    double missing = cav_problem_has_record(run->problem) ? linear_violation(run->tr, qp) : 0;
+    if (missing > fmax((1 - brought_in) * before, missed_little)) {
+      memcpy(cav_quadratic_penalty(qp), kept, bytes);
+      status = cav_quadratic_solve(qp, radius, change, gap);
+      *rest = RESTS;
+      break;
+    }
+    memcpy(kept, cav_quadratic_penalty(qp), bytes);
+    before = missing;
+    int much = missing > missed_little, last = much && (*rest > 0 || i == RAISES - 1);
+    if (last || !raise_penalties(qp, much ? even : 0)) break;
   }
   run->region.seconds_linear += cav_clock() - begin;
   *solved = status == CAV_OK;
@@ -146,6 +180,8 @@ typedef struct descent {
   cav_quadratic *qp;
   cav_curvature *curvature;
   double *x, *offset, *multiplier; ///< [unknowns], [rows], [rows]
+  double *kept;                    ///< [rows] penalties before a raise
+  int rest;                        ///< programmes in which no raise is tried
   double *radius;                  ///< [blocks+1] box about the blocks of unknowns, then about the step's logarithm
   double *before, *after, *tried; ///< [nknot] the knots' parts of the merit: here, at the step to take, at the last one
   double *forecast, *next;        ///< [nknot] of the decrease; [blocks+1] boxes to come
@@ -174,14 +210,15 @@ static int descent_new(descent *d, cav_solve_run *run) {
   d->curvature = cav_curvature_new(run->tr);
   d->stale = malloc((size_t)run->tr->nknot);
   size_t knots = (size_t)run->tr->nknot, boxes = (size_t)cav_transcription_blocks(run->tr) + 1;
-  d->x = calloc(n + 2 * rows + 5 * knots + 2 * boxes, sizeof(double));
+  d->x = calloc(n + 3 * rows + 5 * knots + 2 * boxes, sizeof(double));
   d->second = cav_trajectory_copy(run->at);
   d->best = cav_trajectory_copy(run->at);
   if (!d->qp || !d->curvature || !d->stale || !d->x || !d->second || !d->best || !cav_transcription_keep_rows(run->tr))
     return 0;
   d->offset = d->x + n;
   d->multiplier = d->offset + rows;
-  d->radius = d->multiplier + rows;
+  d->kept = d->multiplier + rows;
+  d->radius = d->kept + rows;
   d->before = d->radius + boxes;
   d->after = d->before + knots;
   d->tried = d->after + knots;
@@ -261,7 +298,7 @@ static void add_curvature(cav_solve_run *run, descent *d) {
 static cav_status solve_model(cav_solve_run *run, descent *d) {
   for (;;) {
     int solved = 0;
-    cav_status status = solve_programme(run, d->qp, d->radius, &solved);
+    cav_status status = solve_programme(run, d->qp, d->radius, d->kept, &d->rest, &solved);
     if (status != CAV_OK || solved || !raise_shift(run->tr, d)) return status;
   }
 }
@@ -538,7 +575,7 @@ static cav_status foresee(cav_solve_run *run, descent *d, double *saving) {
   read_values(run->tr, cav_quadratic_value(d->qp));
   set_radius(run->tr, d->next, most_radius);
   memcpy(d->offset, cav_quadratic_penalty(d->qp), bytes);
-  status = solve_programme(run, d->qp, d->next, &solved);
+  status = solve_programme(run, d->qp, d->next, d->kept, &d->rest, &solved);
   memcpy(cav_quadratic_penalty(d->qp), d->offset, bytes);
   *saving = INFINITY;
   if (solved) *saving = (fmax(cav_quadratic_decrease(d->qp), 0) + cav_quadratic_gap(d->qp)) / cost_scale(run->tr);
@@ -553,7 +590,7 @@ typedef struct tail {
 
 /// Looks, every few iterations that gain little.
 static cav_status look(cav_solve_run *run, descent *d, tail *end) {
-  double asked = run->options->optimality, saving = INFINITY;
+  double asked = fmax(run->options->optimality, run->problem->schedule.optimality), saving = INFINITY;
   end->gain += d->gain / cost_scale(run->tr);
   if (++end->iterations < LOOK) return CAV_OK;
   double gain = end->gain / end->iterations;

@@ -31,19 +31,22 @@ cav_status cav_command_write_repair(const char *folder, const char *model_path, 
         "model=\"",
         file.stream);
     cav_file_write_xml(file.stream, model);
-    fprintf(file.stream, "\">\n  <horizon duration=\"%.17g\" timestep=\"%.17g\" close=\"open\"/>\n", steps * h, h);
+    fprintf(file.stream, "\">\n  <horizon duration=\"%.17g\" timestep=\"%.17g\" close=\"open\" order=\"momentum\"/>\n",
+            steps * h, h);
     fputs(
         "  <start free=\"true\"/>\n  <guess file=\"trajectory.csv\"/>\n"
         "  <cost>\n"
-        "    <track file=\"trajectory.csv\" joints=\"all\" sd=\"0.15 0.5\"/>\n"
+        "    <track file=\"trajectory.csv\" joints=\"all\" sd=\"0.6 2\"/>\n"
         "    <slip weight=\"50000\"/>\n"
+        "    <force weight=\"1\"/>\n"
+        "    <effort weight=\"3\"/>\n"
         "    <velocity dofs=\"joints\" weight=\"0\"/>\n"
         "    <velocity dofs=\"root_angular\" weight=\"0\"/>\n"
         "    <posture dofs=\"joints\" weight=\"0\"/>\n"
         "  </cost>\n"
-        "  <schedule stages=\"8\" next_gap=\"exact\" next_slip=\"exact\">\n"
-        "    <first softness=\"0.5\" smoothing=\"0.01\"/>\n"
-        "    <last smoothing_self=\"0.0003\"/>\n"
+        "  <schedule stages=\"8\" next_gap=\"exact\" next_slip=\"exact\" optimality=\"0.01\">\n"
+        "    <first softness=\"0.5\" smoothing=\"0.01\" iterations=\"60\"/>\n"
+        "    <last smoothing_self=\"0.001\" iterations=\"100\"/>\n"
         "  </schedule>\n"
         "</problem>\n",
         file.stream);
