@@ -33,6 +33,10 @@ awk 'BEGIN {
 
 "$cavort" ik clip.csv --model "$root/problems/models/robot.xml" --markers "$root/problems/markers/robot.xml" -o fit >out 2>err || fail "ik"
 grep -q "clip scaled to the model: ways in the world by 0\.[0-9]" out || fail "no word of the scale"
+sed 's/floor="true"/floor="true" pace="similar"/' "$root/problems/markers/robot.xml" >similar.xml
+"$cavort" ik clip.csv --model "$root/problems/models/robot.xml" --markers similar.xml -o similar >out 2>err || fail "ik, similar"
+grep -q ", times by 0\.[0-9]" out || fail "no word of the pace"
+grep -q 'timestep="0.0166' similar/repair.xml || fail "steps of parts: $(grep timestep similar/repair.xml)"
 under "$(measure skating fit/quality.csv 4)" 1 || fail "the fit slides"
 under "$(measure penetration fit/quality.csv 4)" 1 || fail "the fit sinks"
 "$cavort" quality fit >out 2>err && fail "a fit does not know its model"

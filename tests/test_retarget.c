@@ -158,6 +158,47 @@ static void test_feet(void) {
   cav_model_free(m);
 }
 
+// One leg is off the ground, and the foot of the other, which alone bears the body, slides on at 0.7 m/s for a fifth of a second:
+// it is held, and stays on the floor. With the other foot beside it, which stands, it goes where it went
+static void test_bearing(void) {
+  cav_model *m = load("humanoid");
+  cav_marker_set *set = read_set(m);
+  cav_state *state = cav_state_new(m);
+  int foot = cav_object_find(m, CAV_OBJECT_XBODY, "foot_left");
+  for (int other = 0; other < 2; other++) {
+    double *q = still(m), least = INFINITY, most = -INFINITY, highest = 0;
+    for (int t = 0; t < FRAMES; t++) {
+      double *at = q + (size_t)t * (size_t)m->nq;
+      for (int j = 0; j < m->njoint && !other; j++) {
+        if (strstr(m->joint[j].name, "hip_y_right")) at[m->joint[j].q] -= 0.6;
+        if (strstr(m->joint[j].name, "knee_right")) at[m->joint[j].q] -= 1.2;
+      }
+      if (!other) at[0] += 0.7 * fmin(fmax(t - 30, 0), 6) / rate;
+    }
+    cav_record *r = record_of(m, set, q, 1);
+    for (int i = 0; i < set->nmarker && other; i++)
+      for (int t = 0; t < FRAMES && strstr(set->marker[i].name, "[l"); t++)
+        if (set->marker[i].body == foot)
+          r->position[3 * (t * set->nmarker + i)] += 0.7 * fmin(fmax(t - 30, 0), 6) / rate;
+    cav_trajectory *motion = fit(m, set, r, NULL);
+    for (int t = 0; t < FRAMES; t++) {
+      cav_pose pose;
+      CHECK(!cav_position(m, state, motion->q + (size_t)t * (size_t)m->nq));
+      cav_object_pose(m, state, CAV_OBJECT_XBODY, foot, &pose);
+      least = fmin(least, pose.pos[0]), most = fmax(most, pose.pos[0]), highest = fmax(highest, pose.pos[2]);
+    }
+    printf("a foot slides on, %s: its way is %.3g mm\n", other ? "beside another" : "alone", 1e3 * (most - least));
+    CHECK(other ? most - least > 0.1 : most - least < 2e-3);
+    CHECK(highest < 0.2);
+    cav_trajectory_free(motion);
+    cav_record_free(r);
+    free(q);
+  }
+  cav_state_free(state);
+  cav_marker_set_free(set);
+  cav_model_free(m);
+}
+
 // arms that swing through the body, one of which is elsewhere for a frame: they go round it, and do not follow the jump
 static void test_smooth(void) {
   cav_model *m = load("humanoid");
@@ -197,6 +238,67 @@ static void test_smooth(void) {
   cav_model_free(m);
 }
 
+// An arm that turns past the end of its first joint's range. Bent over backwards, half a turn off, it goes all the way; who
+// follows it from its first frame on finds out too late
+static void test_range(void) {
+  cav_model *m = load("arm");
+  const char *path = put_text("arm.xml",
+                              "<markers retarget=\"true\">"
+                              "<marker name=\"elbow\" body=\"forearm\" pos=\"0 0 0\"/>"
+                              "<marker name=\"hand\" body=\"hand\" pos=\"0 0 0\"/></markers>");
+  cav_error error = {0};
+  cav_marker_set *set = cav_marker_set_read(path, m, &error);
+  if (!CHECK(set != NULL)) printf("%s\n", error.text);
+  double *q = calloc(FRAMES * (size_t)m->nq, sizeof *q);
+  for (int t = 0; t < FRAMES; t++)
+    q[t * m->nq] = (70 + 165.0 * t / (FRAMES - 1)) * M_PI / 180, q[t * m->nq + 1] = M_PI / 3;
+  cav_record *r = record_of(m, set, q, 1);
+  cav_ik_report *report = NULL;
+  cav_trajectory *motion = fit(m, set, r, &report);
+  printf("an arm 65 degrees past its range: %.3g mm off\n", 1e3 * report->total_rms);
+  CHECK(report->total_rms < 0.002);
+  cav_ik_report_free(report);
+  cav_trajectory_free(motion);
+  cav_record_free(r);
+  cav_marker_set_free(set);
+  free(q);
+  cav_model_free(m);
+}
+
+// A body 1.4 times as large that leaps: what is scaled in time, too, falls as gravity has it, and takes no force from nowhere;
+// in the recorded time it falls 1.4 times as slow
+static void test_pace(void) {
+  static const double size = 1.4, speed = 3;
+  cav_model *m = load("humanoid");
+  cav_marker_set *set = read_set(m);
+  double *q = still(m), step = 1 / (rate * sqrt(size));
+  for (int t = 0; t < FRAMES; t++) {
+    double s = t * step, flight = 2 * speed / 9.81;
+    q[t * m->nq + 2] += s < flight ? s * (speed - 4.905 * s) : 0;
+  }
+  cav_record *r = record_of(m, set, q, size);
+  for (int similar = 0; similar < 2; similar++) {
+    cav_ik_report *report = NULL;
+    set->similar = similar;
+    cav_trajectory *motion = fit(m, set, r, &report);
+    const double *z = motion->q + 2, h = motion->timestep;
+    int mid = 10;
+    double fall = (z[(mid + 1) * m->nq] - 2 * z[mid * m->nq] + z[(mid - 1) * m->nq]) / (h * h);
+    printf("a leap, %s pace: %.4f s a frame, falls with %.4f m/s^2\n", similar ? "similar" : "recorded", h, -fall);
+    CHECK_NEAR(h, similar ? step : 1 / rate, 1e-12);
+    CHECK_NEAR(report->pace, similar ? 1 / sqrt(size) : 0, 1e-12);
+    CHECK_NEAR(-fall, similar ? 9.81 : 9.81 / size, 0.02);
+    double up = motion->v[(size_t)mid * (size_t)m->nv + 2];
+    CHECK_NEAR(up, (z[mid * m->nq] - z[(mid - 1) * m->nq]) / h, 1e-9);
+    cav_ik_report_free(report);
+    cav_trajectory_free(motion);
+  }
+  cav_record_free(r);
+  cav_marker_set_free(set);
+  free(q);
+  cav_model_free(m);
+}
+
 static void test_refusals(void) {
   static const struct {
     const char *text, *expected;
@@ -204,6 +306,7 @@ static void test_refusals(void) {
       {"<markers><marker name='a' body='head' pos='0 0 0' from='a'/></markers>", "retarget=\"true\""},
       {"<markers retarget='true' adjust='0.1'><marker name='a' body='head' pos='0 0 0'/></markers>", "expected none"},
       {"<markers retarget='true'><marker name='a' body='head'/></markers>", "expected pos or at"},
+      {"<markers pace='similar'><marker name='a' body='head' pos='0 0 0'/></markers>", "retarget=\"true\""},
       {"<markers retarget='true'><marker name='a' body='torso' at='heel'/></markers>", "a foot or a hand by its role"},
       {"<markers><marker name='a' body='foot_left' at='toe'/></markers>", "a foot or a hand by its role"},
       {"<markers><marker name='a' body='left foot' at='toe' pos='0 0 0'/></markers>", "got both"},
@@ -263,7 +366,10 @@ int main(void) {
   test_similar();
   test_scale();
   test_feet();
+  test_bearing();
   test_smooth();
+  test_range();
+  test_pace();
   test_refusals();
   test_written();
   char command[80];

@@ -62,14 +62,15 @@ typedef struct cav_marker {
 
 /// Which markers a subject or a robot wears, and how their clips are to be read.
 typedef struct cav_marker_set {
-  int nmarker;             ///< how many
-  cav_marker *marker;      ///< [nmarker] names are unique
-  double adjust;           ///< m: how far off places that are known may be; they are fitted, too. 0: they are exact
-  int floor;               ///< 1: feet that stand do so on the plane z = 0
-  double scale;            ///< how far off sizes of segments may be, of the body's: for cav_ik_sizes; 0: they are right
-  int symmetric;           ///< 1: segments of both sides are of one size
-  int retarget;            ///< 1: clips are of a body of other size and scaled to the model's
-  int left_out;            ///< markers of the file on parts that the model does not have
+  int nmarker;        ///< how many
+  cav_marker *marker; ///< [nmarker] names are unique
+  double adjust;      ///< m: how far off places that are known may be; they are fitted, too. 0: they are exact
+  int floor;          ///< 1: feet that stand do so on the plane z = 0
+  double scale;       ///< how far off sizes of segments may be, of the body's: for cav_ik_sizes; 0: they are right
+  int symmetric;      ///< 1: segments of both sides are of one size
+  int retarget;       ///< 1: clips are of a body of other size and scaled to the model's
+  int similar;        ///< 1: times of such a clip go with the square root of its ways, so that gravity stays what it is
+  int left_out;       ///< markers of the file on parts that the model does not have
   cav_record_options clip; ///< for cav_record_read; names is memory of the set
 } cav_marker_set;
 
@@ -77,7 +78,7 @@ typedef struct cav_marker_set {
 /// or a part that any body has ("right foot"); without pos the place is unknown and starts at the middle of the
 /// body's mass.
 /// <markers> has, where needed, adjust= (m), floor=, scale=, symmetric=, and what clips leave out: unit= (m),
-/// up= (x, y or z), rate= (1/s) and names= (by blanks).
+/// up= (x, y or z), rate= (1/s) and names= (by blanks). For clips of other bodies retarget= and pace=.
 /// NULL on failure with the reason in error (may be NULL): CAV_BAD_INPUT, CAV_NO_MEMORY. Freed by cav_marker_set_free.
 CAV_API cav_marker_set *cav_marker_set_read(const char *path, const cav_model *model, cav_error *error);
 CAV_API void cav_marker_set_free(cav_marker_set *set);
@@ -108,6 +109,7 @@ typedef struct cav_ik_report {
   double *frame_rms;   ///< [nframe] over the markers seen; NaN: none was
   double total_rms;    ///< over all
   double scale;        ///< of ways in the world, where the clip was scaled; 0: it was not
+  double pace;         ///< of times, where these were scaled, too; 0: they were not
   int iterations;      ///< in all
 } cav_ik_report;
 

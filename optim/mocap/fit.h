@@ -60,6 +60,9 @@ cav_status cav_fit_feet(cav_fit *fit);
 /// lowest that it comes. floor.c.
 int cav_fit_stands(const cav_fit *fit, int frame, int i, double least, double times);
 
+/// m/s of marker i of the fit at a frame; infinite where it is not seen on both sides. floor.c.
+double cav_fit_speed(const cav_fit *fit, int frame, int i);
+
 /// Lowest height that marker i of the fit comes to. floor.c.
 double cav_fit_bottom(const cav_fit *fit, int i);
 
@@ -74,7 +77,8 @@ int cav_fit_lowest(const cav_fit *fit, int body, double point[3]);
 cav_status cav_fit_retarget(cav_fit *fit, double **made, double *scale, cav_error *error);
 
 /// Rows of foot f at a frame, each the height of a point, into fit->point: four corners of a sole that stands; else every end
-/// or corner that is below the floor, or the lowest point of a foot that stands above it. Returns how many. floor.c.
+/// or corner that is below the floor, or the lowest point of a foot that stands above it and of which
+/// no marker is held. Returns how many. floor.c.
 int cav_fit_floor_rows(const cav_fit *fit, int frame, int f);
 
 /// How far a foot keeps from the floor at a frame.
@@ -107,6 +111,22 @@ cav_status cav_fit_frame(cav_fit *fit, int frame, const double *before, double *
 /// Turns and moves q's free root so that markers lie as near as can be to where they were seen at a frame; nothing
 /// where there is no free root or fewer than three markers.
 cav_status cav_fit_align(const cav_fit *fit, int frame, double *q);
+
+/// The first configuration of a frame, from several postures, the model's own among them: the nearest in the end,
+/// the first of those that cost as much but for this part. The others have joints up to a quarter of their ranges, or half
+/// a radian, off, by a fixed sequence. paths.c.
+cav_status cav_fit_begin(cav_fit *fit, int frame, double part, double *q, int *iterations);
+
+/// Frames of q [nframe*nq] one after the other up to a last one, or down to it, each from the one before; the first
+/// from where it is. paths.c.
+cav_status cav_fit_follow(cav_fit *fit, int from, int to, double *q, int *iterations);
+
+/// Of q [nframe*nq] and of what frames lead to that are begun anew, the cheapest way from the first frame to the last.
+/// paths.c.
+cav_status cav_fit_choose_paths(cav_fit *fit, double *q, int *iterations);
+
+/// Weight of the difference of two ways, from the frame before and to the next one, of a dof. smooth.c.
+double cav_fit_bend_weight(const cav_fit *fit, int dof);
 
 /// Places of markers that are to be found, with the configurations of frames spread over the clip, and with sizes (NULL:
 /// they are known).

@@ -61,8 +61,7 @@ int cav_fit_lowest(const cav_fit *fit, int body, double point[3]) {
   return farthest_point(fit, body, (const double[3]){0, 0, -1}, point);
 }
 
-// m/s of a marker of the fit at a frame; infinite where it is not seen on both sides
-static double speed(const cav_fit *fit, int frame, int i) {
+double cav_fit_speed(const cav_fit *fit, int frame, int i) {
   int a = frame > 0 ? frame - 1 : frame, b = frame < fit->nframe - 1 ? frame + 1 : frame;
   const double *from = cav_fit_seen(fit, a, i), *to = cav_fit_seen(fit, b, i);
   double way[3];
@@ -82,14 +81,20 @@ double cav_fit_bottom(const cav_fit *fit, int i) {
 
 int cav_fit_stands(const cav_fit *fit, int frame, int i, double least, double times) {
   const double *seen = cav_fit_seen(fit, frame, i);
-  return seen && speed(fit, frame, i) < times * still && seen[2] < least + low;
+  return seen && cav_fit_speed(fit, frame, i) < times * still && seen[2] < least + low;
 }
 
-// how far a foot keeps from the floor: not at all while one of its markers is nearly still, clear_most where all are fast
+static int is_planted(const cav_fit *fit, int frame, int i) {
+  return fit->planted && fit->planted[(size_t)frame * (size_t)fit->n + (size_t)i];
+}
+
+// how far a foot keeps from the floor: not at all while one of its markers stands or is nearly still, clear_most where
+// all are fast
 static double clear_of(const cav_fit *fit, int frame, int foot) {
   double least = INFINITY;
   for (int i = 0; i < fit->n; i++)
-    if (fit->set->marker[fit->marker[i]].body == fit->foot[foot]) least = fmin(least, speed(fit, frame, i));
+    if (fit->set->marker[fit->marker[i]].body == fit->foot[foot])
+      least = is_planted(fit, frame, i) ? 0 : fmin(least, cav_fit_speed(fit, frame, i));
   return isfinite(least) ? clear_most * fmin(fmax(least / still - 2, 0) / 2, 1) : 0;
 }
 
@@ -99,7 +104,7 @@ static int stand_of(const cav_fit *fit, int frame, int foot, const double *least
   for (int i = 0; i < fit->n; i++) {
     if (fit->set->marker[fit->marker[i]].body != fit->foot[foot]) continue;
     seen++;
-    standing += cav_fit_stands(fit, frame, i, least[i], 1);
+    standing += is_planted(fit, frame, i) || cav_fit_stands(fit, frame, i, least[i], 1);
   }
   return standing > 1 && standing == seen ? FLAT : standing > 0;
 }
@@ -202,6 +207,15 @@ static int candidates(const cav_geom *geom, const cav_pose *pose, double point[C
   return n;
 }
 
+// whether a marker of a foot is held where it stands, as high as it is on the sole: a lowest point that was pulled down, too,
+// jumps from one end of a foot that turns on its ball to the other
+static int is_held(const cav_fit *fit, int frame, int foot) {
+  int held = 0;
+  for (int i = 0; i < fit->n; i++)
+    held |= fit->set->marker[fit->marker[i]].body == fit->foot[foot] && is_planted(fit, frame, i);
+  return held;
+}
+
 int cav_fit_floor_rows(const cav_fit *fit, int frame, int f) {
   int stands = fit->stands[frame * CAV_FIT_FEET + f], rows = 0;
   double clear = cav_fit_clear(fit, frame, f);
@@ -224,7 +238,8 @@ int cav_fit_floor_rows(const cav_fit *fit, int frame, int f) {
     for (int k = 0; k < n; k++)
       if (point[k][2] < clear) copy3(fit->point + 3 * rows++, point[k]);
   }
-  if (rows == 0 && cav_fit_lowest(fit, fit->foot[f], point[0]) && (point[0][2] < clear || stands))
+  if (rows == 0 && cav_fit_lowest(fit, fit->foot[f], point[0]) &&
+      (point[0][2] < clear || (stands && !is_held(fit, frame, f))))
     copy3(fit->point + 3 * rows++, point[0]);
   return rows;
 }

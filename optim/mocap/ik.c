@@ -110,13 +110,9 @@ static void conclude(cav_ik_report *r) {
 // all frames, each from the one before
 static cav_status follow(cav_fit *fit, const double *q, cav_trajectory *trajectory, cav_ik_report *report) {
   size_t nq = (size_t)fit->model->nq;
-  cav_status status = CAV_OK;
-  for (int t = 0; t < fit->nframe && !status; t++) {
-    double *at = trajectory->q + (size_t)t * nq;
-    const double *before = t ? at - nq : NULL;
-    memcpy(at, t ? before : q, nq * sizeof *at);
-    status = cav_fit_frame(fit, t, before, at, &report->iterations);
-  }
+  memcpy(trajectory->q, q, nq * sizeof *q);
+  cav_status status = cav_fit_follow(fit, 0, fit->nframe - 1, trajectory->q, &report->iterations);
+  if (!status && fit->planted) status = cav_fit_choose_paths(fit, trajectory->q, &report->iterations);
   if (!status && fit->planted) status = cav_fit_smooth(fit, trajectory->q, &report->iterations);
   for (int t = 0; t < fit->nframe && !status; t++) {
     status = cav_position(fit->model, fit->state, trajectory->q + (size_t)t * nq);
@@ -129,34 +125,6 @@ static cav_status follow(cav_fit *fit, const double *q, cav_trajectory *trajecto
   return CAV_OK;
 }
 
-// The first frame from several postures, its own among them: the nearest in the end is where the clip starts. The others
-// have joints up to a quarter of their ranges, or half a radian, off, by a fixed sequence.
-static cav_status begin(cav_fit *fit, int frame, double *q, int *iterations) {
-  enum { STARTS = 12 };
-  const cav_model *m = fit->model;
-  size_t nq = (size_t)m->nq;
-  double *start = malloc(2 * nq * sizeof *start), *best = start ? start + nq : NULL, least = INFINITY, cost;
-  cav_status status = start ? CAV_OK : CAV_NO_MEMORY;
-  for (int s = 0; s < STARTS && !status; s++) {
-    memcpy(start, m->q0, nq * sizeof *start);
-    for (int j = 0; j < m->njoint && s > 0; j++) {
-      const cav_joint *joint = &m->joint[j];
-      double way = fmod((j + 1) * 0.6180339887498949 + s * 0.7548776662466927, 1) - 0.5;
-      if (joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE)
-        start[joint->q] += way * (joint->limited ? (joint->range[1] - joint->range[0]) / 2 : 1);
-    }
-    cav_fit_clip(m, start);
-    status = cav_fit_align(fit, frame, start);
-    if (!status) status = cav_fit_frame(fit, frame, NULL, start, iterations);
-    if (!status) status = cav_fit_cost(fit, frame, start, NULL, &cost);
-    // another posture has to be better than by rounding
-    if (!status && cost < 0.99 * least) least = cost, memcpy(best, start, nq * sizeof *best);
-  }
-  if (!status) memcpy(q, best, nq * sizeof *q);
-  free(start);
-  return status;
-}
-
 static cav_status run(cav_fit *fit, cav_marker_set *set, cav_trajectory **trajectory, cav_ik_report *report,
                       cav_error *error) {
   int first = first_frame(fit);
@@ -164,7 +132,7 @@ static cav_status run(cav_fit *fit, cav_marker_set *set, cav_trajectory **trajec
   double *q = malloc((size_t)fit->model->nq * sizeof *q);
   *trajectory = cav_trajectory_new(fit->model, fit->nframe, fit->step);
   cav_status status = q && *trajectory ? CAV_OK : CAV_NO_MEMORY;
-  if (!status) status = begin(fit, first, q, &report->iterations);
+  if (!status) status = cav_fit_begin(fit, first, 0.99, q, &report->iterations);
   if (!status) status = cav_fit_places(fit, set, NULL, q, &report->iterations);
   if (!status) status = follow(fit, q, *trajectory, report);
   free(q);
@@ -215,6 +183,12 @@ cav_status cav_ik(const cav_model *model, const cav_record *record, cav_marker_s
   }
   if (!status && set->floor) status = cav_fit_floor(&fit);
   if (!status) status = run(&fit, set, trajectory, told, error);
+  // as many frames, in the time that falls take over such ways
+  if (!status && set->similar && told->scale > 0) {
+    told->pace = sqrt(told->scale);
+    (*trajectory)->timestep *= told->pace;
+    for (int k = 0; k < (*trajectory)->nknot * model->nv; k++) (*trajectory)->v[k] /= told->pace;
+  }
   if (status) {
     cav_trajectory_free(*trajectory);
     *trajectory = NULL;
@@ -244,7 +218,7 @@ cav_status cav_ik_sizes(cav_model *model, const cav_record *record, cav_marker_s
     status = cav_file_fail(why, CAV_BAD_INPUT, 0, "no frame shows a marker of the set");
   if (!status) status = cav_fit_sizes_new(&sizes, model, set->symmetric, why);
   if (!status && set->floor) status = cav_fit_floor(&fit);
-  if (!status) status = begin(&fit, first, q, &iterations);
+  if (!status) status = cav_fit_begin(&fit, first, 0.99, q, &iterations);
   if (!status) status = cav_fit_places(&fit, set, &sizes, q, &iterations);
   if (!status) status = cav_fit_sizes_stand(&sizes, fit.state);
   if (!status) {

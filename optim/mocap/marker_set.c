@@ -23,12 +23,14 @@ static const cav_xml_attribute attributes[] = {
     {0}};
 static const cav_xml_element marker = {"marker", 1, 0, attributes, NULL, 0, "a marker and the place that it has on a body"};
 static const char *const axes[] = {"x", "y", "z", NULL};
+static const char *const paces[] = {"recorded", "similar", NULL};
 static const cav_xml_attribute set_attributes[] = {
     {"adjust", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("m", "(0: given positions are exact)", "how far off given positions may be; they are estimated too")},
     {"floor", CAV_XML_BOOL, 0, 0, NULL, 0, NOTE("", "(false)", "feet stand on the plane z = 0 of the clip where a marker of theirs stands still, low")},
     {"scale", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("", "(0: sizes are right)", "how far off sizes of segments may be, as a fraction, against that of the whole body; they are estimated too, by which the model is scaled")},
     {"symmetric", CAV_XML_BOOL, 0, 0, NULL, 0, NOTE("", "(true)", "segments of both sides have one size")},
     {"retarget", CAV_XML_BOOL, 0, 0, NULL, 0, NOTE("", "(false)", "the clip is of a body of another size: it is scaled to the model's, markers on parts that the model does not have are left out; with floor feet that stand are held where they are")},
+    {"pace", CAV_XML_WORD, 0, 0, paces, 0, NOTE("", "(recorded)", "with retarget: similar scales times by the square root of what ways in the world are scaled by, so that leaps and swings take as long as gravity has them on a body of that size")},
     {"unit", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("m", "(as the clip says, or as its format has it)", "unit of length of the clip")},
     {"up", CAV_XML_WORD, 0, 0, axes, 0, NOTE("", "(as the format of the clip has it)", "axis of the clip that points up")},
     {"rate", CAV_XML_REAL, 1, 1, NULL, 0, NOTE("1/s", "(as the clip says)", "frames a second")},
@@ -115,6 +117,9 @@ static cav_status read_set(const cav_problem_reader *reader, const cav_xml_node 
     status = cav_xml_fail(reader->error, root, set->adjust > 0 ? "adjust" : "scale",
                           "expected none with retarget=\"true\": either the clip is "
                           "scaled to the model, or places and sizes are fitted to the clip");
+  set->similar = cav_xml_word(root, "pace", 0) == 1;
+  if (!status && cav_xml_get(root, "pace") && !set->retarget)
+    status = cav_xml_fail(reader->error, root, "pace", "expected retarget=\"true\", which scales the clip");
   if (cav_xml_get(root, "up")) set->clip.up = axes[cav_xml_word(root, "up", 2)][0];
   if (!status && names && !(set->clip.names = strdup(names))) status = cav_problem_no_memory(reader);
   for (const cav_xml_node *c = root->child; c && !status; c = c->next) status = read_marker(reader, c, set);
@@ -147,6 +152,7 @@ static void write_head(FILE *out, const cav_marker_set *set) {
   fputs("<markers", out);
   if (set->floor) fputs(" floor=\"true\"", out);
   if (set->retarget) fputs(" retarget=\"true\"", out);
+  if (set->similar) fputs(" pace=\"similar\"", out);
   if (set->clip.unit > 0) fprintf(out, " unit=\"%.17g\"", set->clip.unit);
   if (set->clip.up) fprintf(out, " up=\"%c\"", set->clip.up);
   if (set->clip.rate > 0) fprintf(out, " rate=\"%.17g\"", set->clip.rate);

@@ -11,10 +11,13 @@
 #include "math3.h"
 #include "role.h"
 
-static const double firm = 1e4;       // times a marker's weight, while its foot stands
-static const double touching = 0.1;   // s: standing is at least as long, and a break in it that is shorter is none
-static const double kept = 2;         // times the speed of what is still: what stands goes on to
-static const double least_way = 1e-6; // m between markers, below which no direction is told
+static const double firm = 1e4;     // times a marker's weight, while its foot stands
+static const double touching = 0.1; // s: standing is at least as long, and a break in it that is shorter is none
+static const double kept = 2;       // times the speed of what is still: what stands goes on to
+static const double lasting = 1, rising = 0.02; // m/s, m above where it stood: what alone bears, still stands
+static const double least_way = 1e-6;           // m between markers, below which no direction is told
+
+enum { STANDS = 1, BEARS };
 
 typedef struct scaling {
   cav_fit *fit;
@@ -221,25 +224,57 @@ static void mark(const cav_fit *fit, int i, double bottom) {
     planted[(size_t)t * n] |= planted[(size_t)(t + 1) * n] && cav_fit_stands(fit, t, i, bottom, kept);
 }
 
+// whether any marker stands at a frame
+static int bears(const cav_fit *fit, int frame) {
+  int any = 0;
+  for (int i = 0; i < fit->n; i++) any |= fit->planted[(size_t)frame * (size_t)fit->n + (size_t)i];
+  return any;
+}
+
+// What stood last (way 1), or next (-1), bears the body while nothing else stands: a foot that turns on its ball, or slides,
+// as long as it is hardly higher. height: work [n]
+static void bear(const cav_fit *fit, int way, double *height) {
+  int n = fit->n, last = fit->nframe - 1;
+  for (int i = 0; i < n; i++) height[i] = NAN;
+  for (int t = way > 0 ? 1 : last - 1; t >= 0 && t <= last; t += way) {
+    char *at = fit->planted + (size_t)t * (size_t)n, *before = at - way * n;
+    for (int i = 0; i < n; i++) {
+      const double *seen = cav_fit_seen(fit, t - way, i);
+      if (before[i] == STANDS && seen) height[i] = seen[2];
+      if (!before[i]) height[i] = NAN;
+    }
+    if (bears(fit, t)) continue;
+    for (int i = 0; i < n; i++)
+      if (before[i] && cav_fit_speed(fit, t, i) < lasting && cav_fit_seen(fit, t, i)[2] < height[i] + rising)
+        at[i] = BEARS;
+  }
+}
+
 // which markers are of feet, when they stand, how high they then are
 static void find_standing(scaling *s) {
   cav_fit *fit = s->fit;
   int n = fit->n, least = (int)ceil(touching / fit->step), standing = 0;
+  double point[3];
   for (int i = 0; i < n; i++) {
-    int body = fit->set->marker[fit->marker[i]].body, seen = 0;
-    double point[3], bottom = cav_fit_bottom(fit, i);
+    int body = fit->set->marker[fit->marker[i]].body;
     s->foot[i] = -1;
     for (int f = 0; f < fit->nfoot; f++)
       if (fit->foot[f] == body && cav_fit_lowest(fit, body, point)) s->foot[i] = f;
     if (s->foot[i] < 0) continue;
     s->sole[i] = s->home[3 * i + 2] - point[2];
-    mark(fit, i, bottom);
+    mark(fit, i, cav_fit_bottom(fit, i));
+  }
+  for (int way = 1; way >= -1; way -= 2) bear(fit, way, s->low);
+  for (size_t k = 0; k < (size_t)fit->nframe * (size_t)n; k++) fit->planted[k] = fit->planted[k] != 0;
+  for (int i = 0; i < n; i++) {
+    int seen = 0;
+    if (s->foot[i] < 0) continue;
     settle(fit->planted + i, fit->nframe, n, least);
     s->low[i] = 0;
     for (int t = 0; t < fit->nframe; t++)
       if (fit->planted[(size_t)t * (size_t)n + (size_t)i] && cav_fit_seen(fit, t, i))
         s->low[i] += cav_fit_seen(fit, t, i)[2], seen++;
-    s->low[i] = seen ? s->low[i] / seen : bottom;
+    s->low[i] = seen ? s->low[i] / seen : cav_fit_bottom(fit, i);
     s->ground += s->low[i], s->rise += s->sole[i], standing++;
   }
   if (standing) s->ground /= standing, s->rise /= standing;

@@ -230,6 +230,13 @@ static cav_status descend(const band *b, double *q, int *iterations) {
   return status;
 }
 
+double cav_fit_bend_weight(const cav_fit *fit, int dof) {
+  const cav_joint *joint = &fit->model->joint[fit->model->dof[dof].joint];
+  int linear = joint->type == CAV_JOINT_SLIDE || (joint->type == CAV_JOINT_FREE && dof - joint->dof < 3);
+  double size = (linear ? moving : turning) * fit->step * fit->step;
+  return pow(fit->options->roughness / usual_roughness * off / size, 2);
+}
+
 cav_status cav_fit_smooth(cav_fit *fit, double *q, int *iterations) {
   const cav_model *m = fit->model;
   size_t nv = (size_t)m->nv, n = nv * (size_t)fit->nframe, width = 3 * nv;
@@ -244,12 +251,7 @@ cav_status cav_fit_smooth(cav_fit *fit, double *q, int *iterations) {
   b.g = b.A + n * width, b.x = b.g + n, b.try = b.x + n, b.weight = b.try + (size_t)fit->nframe * (size_t)m->nq;
   b.ahead = b.weight + nv, b.behind = b.ahead + nv;
   b.cost = b.behind + nv, b.after = b.cost + fit->nframe, b.damping = b.after + fit->nframe;
-  for (int d = 0; d < m->nv; d++) {
-    const cav_joint *joint = &m->joint[m->dof[d].joint];
-    int linear = joint->type == CAV_JOINT_SLIDE || (joint->type == CAV_JOINT_FREE && d - joint->dof < 3);
-    double size = (linear ? moving : turning) * fit->step * fit->step;
-    b.weight[d] = pow(fit->options->roughness / usual_roughness * off / size, 2);
-  }
+  for (int d = 0; d < m->nv; d++) b.weight[d] = cav_fit_bend_weight(fit, d);
   status = descend(&b, q, iterations);
   free(b.A);
   return status;

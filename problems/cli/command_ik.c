@@ -268,7 +268,9 @@ static void print(const fit *f) {
   int absent = f->set->nmarker - r->nmarker;
   if (absent) printf("%d markers of the set are not in the clip\n", absent);
   if (f->set->left_out) printf("%d markers of the set are on parts that the model does not have\n", f->set->left_out);
-  if (r->scale > 0) printf("clip scaled to the model: ways in the world by %.3f\n", r->scale);
+  if (r->scale > 0) printf("clip scaled to the model: ways in the world by %.3f", r->scale);
+  if (r->pace > 0) printf(", times by %.3f", r->pace);
+  if (r->scale > 0) putchar('\n');
   printf("%d frames, %d markers, rms %.2f mm, %.2f s (%.2f s a thousand frames)\n", r->nframe, r->nmarker,
          1e3 * r->total_rms, f->seconds, 1e3 * f->seconds / r->nframe);
   if (f->motion->nknot >= 4) cav_command_print_quality(stdout, 1, (char *const *)&f->folder, &f->quality, 0);

@@ -10,10 +10,11 @@
 
 static const double coarse = 1 / 60.0; // s, longest step: two to a frame of most clips
 
-// the longest step that fits the frames evenly, or frames that fit it
+// The longest step that fits the frames evenly, or frames that fit it. Where a second is no whole number of these (a clip
+// whose times were scaled), the coarse one: parts of so many seconds are whole numbers of steps
 static double step_of(const cav_trajectory *motion) {
-  double h = motion->timestep;
-  return h > coarse ? h / ceil(h / coarse - 1e-9) : h * floor(coarse / h + 1e-9);
+  double h = motion->timestep, step = h > coarse ? h / ceil(h / coarse - 1e-9) : h * floor(coarse / h + 1e-9);
+  return fabs(1 / step - round(1 / step)) < 1e-6 / step ? step : coarse;
 }
 
 cav_status cav_command_write_repair(const char *folder, const char *model_path, const cav_trajectory *motion,
