@@ -264,6 +264,40 @@ static void test_pole(void) {
   cav_model_free(m);
 }
 
+/// A light hub that turns freely and drives a heavy arm: springs on what the joint carries, a hundred times what moves when it
+/// pushes, would turn its velocity around every millisecond. Torques die out.
+static void test_hub(void) {
+  static const char text[] =
+      "<mujoco model='hub'><option gravity='0 0 0' timestep='.001'/><worldbody><body><joint name='hub' axis='0 1 0'/>"
+      "<inertial pos='0 0 0' mass='1' diaginertia='.01 .01 .01'/><body><joint name='arm' axis='0 1 0'/>"
+      "<inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/></body></body></worldbody>"
+      "<actuator><motor joint='arm' ctrllimited='true' ctrlrange='-50 50'/></actuator></mujoco>";
+  cav_error error = {0};
+  cav_model *m = scene_load(text);
+  if (!CHECK(m != NULL)) return;
+  double zero[S] = {0}, q[N] = {0}, v[N] = {0, 0.1}, u[N], next[N], before = 0, change = 0, most = 0;
+  cav_term term[3];
+  cav_problem p = problem_of(m, term, 1);
+  p.q_start = p.q_goal = zero, p.v_start = zero + N;
+  cav_mpc *mpc = cav_mpc_new(&p, NULL, NULL, &error);
+  cav_state *s = cav_state_new(m);
+  s->options.timestep = 0.001;
+  for (int i = 0; CHECK(s && mpc) && i < 500; i++) {
+    CHECK(cav_mpc_command(mpc, i * 0.001, q, v, NULL, u) == CAV_OK);
+    most = fmax(most, fabs(u[1]));
+    if (i >= 400) change = fmax(change, fabs(u[1] - before));
+    before = u[1];
+    CHECK(cav_forward(m, s, q, v, u, next) == CAV_OK);
+    memcpy(v, next, sizeof v);
+    cav_integrate(m, q, v, 0.001, q);
+  }
+  printf("hub: torques of %.2g N m at most, changing by %.1e at the end\n", most, change);
+  CHECK(change < 1e-3 * most);
+  cav_mpc_free(mpc);
+  cav_state_free(s);
+  cav_model_free(m);
+}
+
 static void test_refusals(const cav_model *m) {
   cav_term term[3];
   cav_problem p = problem_of(m, term, 1);
@@ -307,6 +341,7 @@ int main(void) {
     test_parts(m);
     test_targets(m);
     test_pole();
+    test_hub();
     test_refusals(m);
   }
   cav_model_free(m);

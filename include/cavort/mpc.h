@@ -16,7 +16,7 @@ typedef struct cav_mpc_options {
   double delay;    ///< s from a state to the plan that is made from it: what making one takes at most; 0: at once
   double timestep; ///< s, > 0: step at which the delay is looked ahead over
   /// rad/s: actuators pull every dof back to the plan as a spring of this natural frequency on that dof's inertia would,
-  /// with critical damping; 0: the plan's forces alone
+  /// with critical damping, as far as steps of timestep can hold it; 0: the plan's forces alone
   double stiffness;
 } cav_mpc_options;
 

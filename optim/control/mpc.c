@@ -11,6 +11,10 @@
 /// A time that is reached but for rounding, s.
 static const double rounding = 1e-9;
 
+/// Most that damping of springs may take of a dof's velocity within a step of the simulation, half of it. Where all of it was
+/// taken, from one dof alone, torques of joints of long arms went from limit to limit every millisecond.
+static const double held = 0.25;
+
 struct cav_mpc {
   const cav_problem *problem;
   const cav_model *model;
@@ -24,7 +28,8 @@ struct cav_mpc {
   double *q_plan, *u;          ///< [nq], [nv]
   double *difference, *moment; ///< [nv], [nv]
   double *effort, *input;      ///< [nu], [nu]
-  double *inertia;             ///< [nv*nv]
+  double *inertia, *factor;    ///< [nv*nv] M, and its triangular factor
+  double *give;                ///< [nv] diagonal of M^-1
 };
 
 cav_mpc_options cav_mpc_options_default(void) {
@@ -59,11 +64,11 @@ static cav_status check(const cav_problem *problem, const cav_mpc_options *o, ca
 static cav_status make_room(cav_mpc *mpc, const cav_trajectory *first) {
   const cav_model *m = mpc->model;
   const size_t nq = (size_t)m->nq, nv = (size_t)m->nv, nu = (size_t)m->nu;
-  double **const part[] = {&mpc->q,          &mpc->q_plan, &mpc->v,      &mpc->next,  &mpc->u,
-                           &mpc->difference, &mpc->moment, &mpc->effort, &mpc->input, &mpc->inertia};
-  const size_t size[] = {nq, nq, nv, nv, nv, nv, nv, nu, nu, nv * nv};
-  double *room = calloc(2 * nq + 5 * nv + 2 * nu + nv * nv, sizeof *room);
-  for (int i = 0; room && i < 10; i++) *part[i] = room, room += size[i];
+  double **const part[] = {&mpc->q,      &mpc->q_plan, &mpc->v,     &mpc->next,    &mpc->u,      &mpc->difference,
+                           &mpc->moment, &mpc->effort, &mpc->input, &mpc->inertia, &mpc->factor, &mpc->give};
+  const size_t size[] = {nq, nq, nv, nv, nv, nv, nv, nu, nu, nv * nv, nv * nv, nv};
+  double *room = calloc(2 * nq + 6 * nv + 2 * nu + 2 * nv * nv, sizeof *room);
+  for (int i = 0; room && i < 12; i++) *part[i] = room, room += size[i];
   mpc->state = cav_state_new(m);
   mpc->bare = cav_state_new(m);
   mpc->plan[0] = cav_trajectory_copy(first);
@@ -157,6 +162,37 @@ static double velocity_at(const cav_trajectory *plan, double x, int d) {
   return (t < plan->nknot ? (1 - part) * v[0] : 0) + (t + 1 < plan->nknot ? part * v[plan->nv] : 0);
 }
 
+/// The diagonal of M^-1: squares of the columns of L^-1, M = L L'.
+static void find_give(cav_mpc *mpc) {
+  const int n = mpc->model->nv;
+  double *L = mpc->factor;
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j <= i; j++) {
+      double sum = mpc->inertia[i * n + j];
+      for (int k = 0; k < j; k++) sum -= L[i * n + k] * L[j * n + k];
+      L[i * n + j] = i == j ? sqrt(sum) : sum / L[j * n + j];
+    }
+  for (int d = 0; d < n; d++) {
+    double *x = mpc->moment;
+    mpc->give[d] = 0;
+    for (int i = d; i < n; i++) {
+      double sum = i == d;
+      for (int k = d; k < i; k++) sum -= L[i * n + k] * x[k];
+      x[i] = sum / L[i * n + i];
+      mpc->give[d] += x[i] * x[i];
+    }
+  }
+}
+
+/// What springs count as the inertia of dof d: its diagonal entry of M, of all that the joint carries, but at most what damping
+/// 2 w times that can hold: where other joints give way it moves 1/(M^-1)_dd alone, of whose velocity a step h of the simulation
+/// then takes 2 w h M_dd (M^-1)_dd, and at 2 turns it around for ever.
+static double inertia_of(const cav_mpc *mpc, int d) {
+  const double rate = mpc->options.stiffness * mpc->options.timestep;
+  const double own = mpc->inertia[d * mpc->model->nv + d];
+  return rate > 0 ? fmin(own, held / (rate * mpc->give[d])) : own;
+}
+
 /// u := the plan's forces at a time less critically damped springs back to it. Forces are those of the step.
 static void follow(cav_mpc *mpc, double time, const double *q, const double *v) {
   const cav_model *m = mpc->model;
@@ -169,7 +205,7 @@ static void follow(cav_mpc *mpc, double time, const double *q, const double *v) 
   if (!ends) cav_integrate(m, mpc->q_plan, plan->v + (size_t)(t + 1) * nv, (x - t) * plan->timestep, mpc->q_plan);
   cav_difference(m, mpc->q_plan, q, 1, mpc->difference);
   for (int d = 0; d < nv; d++) {
-    const double inertia = mpc->inertia[d * nv + d], straying = v[d] - velocity_at(plan, x, d);
+    const double inertia = inertia_of(mpc, d), straying = v[d] - velocity_at(plan, x, d);
     mpc->u[d] = plan->u[(size_t)t * nv + d] - inertia * rate * (rate * mpc->difference[d] + 2 * straying);
   }
 }
@@ -191,6 +227,7 @@ cav_status cav_mpc_command(cav_mpc *mpc, double time, const double *q, const dou
   cav_status status = cav_inertia(m, mpc->bare, q, mpc->inertia);
   if (status == CAV_OK) status = cav_position(m, mpc->bare, q);
   if (status != CAV_OK) return status;
+  find_give(mpc);
   follow(mpc, time, q, v);
   cav_actuation(m, mpc->bare, mpc->u, NULL, mpc->effort);
   cav_actuation_inputs(m, mpc->bare, v, mpc->effort, mpc->input);
