@@ -410,7 +410,7 @@ END
 run 1 solve stay.xml --threads 1 --strategies 1
 run 1 explain stay.result
 says out "not achieved: misses 'apex'"
-says out "cause: 'apex' is 0.3 m from where the start has it, and the motion goes"
+says out "cause: 'apex' is 0.3 m from where the start has it, 0.6 m a second, and the motion goes"
 says out '<guess apex="0.3" from="0.253" to="0.747"/> leads elsewhere'
 
 # rest to rest with 4 N on 2 kg, 0.8 of it planned with: 2 sqrt(0.6/1.6) s, of which the step that closes is one of 41
