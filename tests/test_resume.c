@@ -215,7 +215,7 @@ static void test_stops(const cav_problem *p) {
 #endif
 }
 
-static void test_limits(const cav_problem *p) {
+static void test_limits(const cav_problem *p, const char *folder) {
   cav_solve_options options = cav_solve_options_default();
   cav_error error = {0};
   cav_solution *s = NULL;
@@ -230,6 +230,25 @@ static void test_limits(const cav_problem *p) {
   cav_solution_free(s);
   options.max_seconds = -1;
   CHECK(cav_solve(p, &options, NULL, &s, &error) == CAV_BAD_INPUT && !s);
+  // a limit is of the call, not of what was done before a checkpoint
+  options.max_seconds = 0;
+  shelf kept = {.folder = folder, .stop_at = 5};
+  options.keeper = keep, options.keeper_context = &kept;
+  options.max_iterations = 0;
+  CHECK(cav_solve(p, &options, NULL, &s, &error) == CAV_INTERRUPTED);
+  int before = s ? s->iterations : 0;
+  cav_solution_free(s);
+  options.keeper = NULL, options.max_iterations = 3;
+  char path[300];
+  shelf_path(&kept, 5, path);
+  cav_checkpoint *c = cav_checkpoint_read(path, p->model, &error);
+  if (!CHECK(c && before >= 3)) return;
+  options.resume = c;
+  CHECK(cav_solve(p, &options, NULL, &s, &error) == CAV_INTERRUPTED);
+  CHECK(s && s->iterations == before + 3);
+  if (s) printf("stopped after %d iterations, resumed for %d more\n", before, s->iterations - before);
+  cav_solution_free(s);
+  cav_checkpoint_free(c);
 }
 
 // --- from near the optimum ---
@@ -321,7 +340,7 @@ int main(void) {
   for (int i = 0; i < CAV_PLACE_TYPES; i++) printf("place %d: %d checkpoints\n", i, reached[i]);
   cav_problem *p = load_pendulum(folder, "10", "1", "", "1");
   if (p) {
-    test_limits(p);
+    test_limits(p, folder);
     test_warm(p);
     test_refusals(p, folder);
     cav_problem_free(p);

@@ -78,5 +78,11 @@ says explain.out "8 m a second"
 says explain.out "no limit is at its end: actuators give at most"
 says explain.out "nothing proves that it cannot be had, nor that it can"
 
+# a record of a joint given as a guess: how its column has to be called there
+printf 'time,rail\n0,0\n1,0.5\n' >record.csv
+echo '<problem name="g" model="rail.xml"><horizon duration="1" close="open"/><start/><guess file="record.csv"/><cost/></problem>' >guess.xml
+"$cavort" solve guess.xml -o guess -q 2>err
+says err "column 'rail': the model has no such value; did you mean 'qpos_rail'?"
+
 echo "$n answers, $failed failed"
-[ "$failed" = 0 ] && [ "$n" -ge 14 ]
+[ "$failed" = 0 ] && [ "$n" -ge 15 ]

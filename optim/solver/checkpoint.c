@@ -120,7 +120,7 @@ cav_status cav_run_resume(cav_solve_run *run, cav_error *error) {
   give_multipliers(run->tr, c->multiplier, c->final_multiplier);
   run->resume = c;
   run->region.radius = c->radius;
-  run->solution->iterations = c->iterations;
+  run->solution->iterations = run->begin = c->iterations;
   run->start -= c->seconds;
   run->measured = !isnan(c->optimality);
   run->optimality = c->optimality;

@@ -207,7 +207,11 @@ static cav_status match(const cav_table *table, const columns *c, const cav_mode
   for (int i = 0; i < table->ncol; i++) {
     int place = place_of(c, table->name[i], i);
     if (place < 0) {
-      const char *near = cav_xml_nearest(table->name[i], c->name, c->n, sizeof *c->name);
+      // a table of joints, as records have them: what their positions are called here
+      char joint[200];
+      snprintf(joint, sizeof joint, "qpos_%.190s", table->name[i]);
+      int at = place_of(c, joint, 0);
+      const char *near = at >= 0 ? c->name[at] : cav_xml_nearest(table->name[i], c->name, c->n, sizeof *c->name);
       return cav_file_fail(error, CAV_BAD_INPUT, 1, "%s:1: column '%.80s': the model has no such value%s%.80s%s",
                            table->path, table->name[i], near ? "; did you mean '" : "", near ? near : "",
                            near ? "'?" : "");
