@@ -39,8 +39,11 @@ grep -q ", times by 0\.[0-9]" out || fail "no word of the pace"
 grep -q 'timestep="0.0166' similar/repair.xml || fail "steps of parts: $(grep timestep similar/repair.xml)"
 under "$(measure skating fit/quality.csv 4)" 1 || fail "the fit slides"
 under "$(measure penetration fit/quality.csv 4)" 1 || fail "the fit sinks"
-"$cavort" quality fit >out 2>err && fail "a fit does not know its model"
+"$cavort" quality --csv fit >own.csv 2>err || fail "a fit does not know its model"
+cp fit/trajectory.csv alone.csv
+"$cavort" quality alone.csv >out 2>err && fail "a table knows a model"
 grep -q "give --model FILE" err || fail "no word of --model"
+sed '1d' own.csv | cut -d, -f4 >own && sed '1d' fit/quality.csv | cut -d, -f4 | cmp -s - own || fail "quality of a fit by its own model differs"
 "$cavort" solve -q --threads 1 fit/repair.xml -o repaired >out 2>err || fail "repair.xml is not solved"
 "$cavort" quality --csv --model "$root/problems/models/robot.xml" fit repaired >table.csv 2>err || fail "no quality"
 cut -d, -f1-4 table.csv | sed '1d' >before.csv

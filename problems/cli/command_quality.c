@@ -62,26 +62,37 @@ static cav_status measure_result(const cav_result *result, cav_quality *quality,
   return status;
 }
 
-// a folder's motion with its problem's model and law, or --model; a file's with --model
+// a motion without a law of its own, of a model
+static cav_status measure_file(const cav_model *model, const char *file, cav_quality *quality, cav_error *error) {
+  cav_trajectory *motion = cav_trajectory_read(file, model, error);
+  cav_status status = motion ? cav_quality_measure(model, motion, NULL, quality, error) : error->status;
+  cav_trajectory_free(motion);
+  return status;
+}
+
+// a folder's motion with its problem's model and law, that of a fit with the model of its repair.xml, or --model; a file's with --model
 static cav_status measure(const cav_command_line *line, const char *path, cav_quality *quality, cav_error *error) {
   struct stat info;
   int folder = !stat(path, &info) && S_ISDIR(info.st_mode);
-  char *problem = cav_result_path(path, "problem.xml"), *file = cav_result_path(path, "trajectory.csv");
-  cav_status status = problem && file ? CAV_OK : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
+  char *problem = cav_result_path(path, "problem.xml"), *file = cav_result_path(path, "trajectory.csv"),
+       *repair = cav_result_path(path, "repair.xml");
+  cav_status status = problem && file && repair ? CAV_OK : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
   if (!status && folder && !access(problem, F_OK)) {
     cav_result *result = cav_result_read(path, line->model, error);
     status = result ? measure_result(result, quality, error) : error->status;
     cav_result_free(result);
+  } else if (!status && !line->model && folder && !access(repair, F_OK)) {
+    cav_problem *fit = cav_problem_load(repair, NULL, error);
+    status = fit ? measure_file(fit->model, file, quality, error) : error->status;
+    cav_problem_free(fit);
   } else if (!status && !line->model) {
     status = cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: says no model; give --model FILE", path);
   } else if (!status) {
     cav_model *model = cav_model_load(line->model, error);
-    cav_trajectory *motion = model ? cav_trajectory_read(folder ? file : path, model, error) : NULL;
-    status = motion ? cav_quality_measure(model, motion, NULL, quality, error) : error->status;
-    cav_trajectory_free(motion);
+    status = model ? measure_file(model, folder ? file : path, quality, error) : error->status;
     cav_model_free(model);
   }
-  free(problem), free(file);
+  free(problem), free(file), free(repair);
   return status;
 }
 
