@@ -11,7 +11,15 @@
 
 // tolerances of goals, where the term gives none
 static const double within_length = CAV_WITHIN_LENGTH, within_angle = CAV_WITHIN_ANGLE, within_speed = 0.3,
-                    within_ratio = 0.1;
+                    within_ratio = 0.1, within_effort = 0.05;
+
+// of a force or torque of an actuator: a part of its limit; 0: it has none
+static double within_limit(const cav_model *model, int actuator) {
+  double range[2];
+  cav_actuator_effort_range(model, actuator, range);
+  double most = fmax(fabs(range[0]), fabs(range[1])) * fabs(model->actuator[actuator].unit);
+  return isfinite(most) ? within_effort * most : 0;
+}
 
 // unit of a sensor's reading and the tolerance it has by default; 0: none, the quantity has no usual one
 static const char *sensor_unit(const cav_model *model, const cav_sensor *sensor, double *within) {
@@ -61,8 +69,10 @@ static const char *sensor_unit(const cav_model *model, const cav_sensor *sensor,
       return "N";
     case CAV_SENSOR_TORQUE:
       return "N m";
-    case CAV_SENSOR_JOINTLIMITFRC:
     case CAV_SENSOR_ACTUATORFRC:
+      *within = within_limit(model, sensor->object);
+      return "N or N m";
+    case CAV_SENSOR_JOINTLIMITFRC:
     case CAV_SENSOR_JOINTACTUATORFRC:
       return "N or N m";
     case CAV_SENSOR_ACCELEROMETER:
