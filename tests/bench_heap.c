@@ -4,7 +4,10 @@
 /// end, relative to the largest entry: the two libraries find contacts of their own, so answers differ a little. For
 /// each number of iterations a time and an error; shown is the least time that reaches an error. A heap is dropped into
 /// a tray and followed by MuJoCo to the middle of its fall and to its rest. Beside it scenes that come apart: the same
-/// bodies spread over the floor in piles, and lying alone. Usage: bench_heap [BODIES...]; default 30 100 300.
+/// bodies spread over the floor in piles, and lying alone. Usage: bench_heap [BODIES...]; default 30 100 300. With files of
+/// models instead: states of each as it falls to the floor and is shaken there, medians over them; and the error that ours has
+/// when MuJoCo's better Jacobian has reached one. With joints' springs and dampers, which ours takes at the end of the step as
+/// part of it and MuJoCo after its solver, and without, where both libraries solve the same.
 #include "bench.h"
 #include "hessian.h"
 
@@ -15,7 +18,7 @@ int main(void) {
 }
 #else
 
-enum { LEVELS = 3, LIMIT = 60, RUNS = 7 };
+enum { LEVELS = 3, LIMIT = 60, RUNS = 7, STATES = 40, APART = 25 };
 static const double level[LEVELS] = {1e-3, 1e-6, 1e-9};
 
 /// A scene, by both libraries.
@@ -27,10 +30,10 @@ typedef struct heap {
   double *q, *v, *u, *found, *truth;
 } heap;
 
-/// Times, s, by error; iterations and error of the last answer.
+/// Times, s, by error and by iterations asked for, and errors by these; iterations and error of the last answer.
 typedef struct curve {
-  double time[LEVELS], error;
-  int iterations, contacts;
+  double time[LEVELS], error, time_of[LIMIT], error_of[LIMIT];
+  int iterations, contacts, tried;
 } curve;
 
 /// What is measured: MuJoCo by the kind of its Jacobian, ours with the contacts of the step before or with others.
@@ -143,6 +146,7 @@ static void theirs(const heap *h, int iterations, double *v_next) {
   m->opt.iterations = iterations;
   mju_copy(h->d->qpos, h->q, m->nq);
   mju_copy(h->d->qvel, h->v, m->nv);
+  mju_copy(h->d->qfrc_applied, h->u, m->nv);
   mj_forward(m, h->d);
   for (int i = 0; i < m->nv; i++) v_next[i] = h->v[i] + m->opt.timestep * h->d->qacc[i];
 }
@@ -187,6 +191,7 @@ static curve measure(const heap *h, method by) {
       best = fmin(best, time);
     }
     c.error = apart(h->found, h->truth, h->m->nv);
+    c.time_of[k - 1] = best, c.error_of[k - 1] = c.error, c.tried = k;
     for (int l = 0; l < LEVELS; l++)
       if (c.error <= level[l]) c.time[l] = fmin(c.time[l], best);
     c.iterations = done;
@@ -222,12 +227,102 @@ static void compare(const char *shape, const char *layout, int n) {
   unload(&h);
 }
 
+// both libraries' models of a file; without: no springs and dampers of joints
+static int load_file(heap *h, const char *path, int without) {
+  char why[1000] = "";
+  cav_error error = {0};
+  *h = (heap){.m = mj_loadXML(path, NULL, why, sizeof why), .model = cav_model_load(path, &error)};
+  if (!h->m || !h->model) {
+    fprintf(stderr, "%s: %s%s\n", path, why, error.text);
+    return 0;
+  }
+  if (without) h->m->opt.disableflags |= mjDSBL_PASSIVE;
+  h->m->opt.cone = mjCONE_ELLIPTIC;
+  h->m->opt.disableflags |= mjDSBL_ACTUATION;
+  h->d = mj_makeData(h->m);
+  h->state = cav_state_new(h->model);
+  double **const all[] = {&h->v, &h->u, &h->found, &h->truth};
+  for (int k = 0; k < 4; k++) *all[k] = scene_vector(h->model->nv);
+  h->q = scene_vector(h->model->nq);
+  if (h->state) h->state->options.passive = !without;
+  return h->state && h->d;
+}
+
+// on to the next state in which something touches, by moments that change now and then
+static void shake(heap *h) {
+  const int nv = h->m->nv;
+  for (int i = 6; i < nv; i++) h->u[i] = 5 * scene_normal();
+  for (int i = 0; i < 6; i++) h->u[i] = 0;
+  h->m->opt.solver = mjSOL_NEWTON;
+  h->m->opt.tolerance = 1e-10, h->m->opt.iterations = 100;
+  for (int t = 0; t < APART || (h->d->ncon == 0 && t < 100 * APART); t++) {
+    mju_copy(h->d->qfrc_applied, h->u, nv);
+    mj_step(h->m, h->d);
+  }
+  mju_copy(h->q, h->d->qpos, h->m->nq);
+  mju_copy(h->v, h->d->qvel, nv);
+}
+
+static double median(double *x, int n) {
+  qsort(x, (size_t)n, sizeof *x, bench_ascending);
+  return x[n / 2];
+}
+
+// least error that is reached within a time; 1: none
+static double error_within(const curve *c, double time) {
+  double least = 1;
+  for (int k = 0; k < c->tried; k++)
+    if (c->time_of[k] <= time) least = fmin(least, c->error_of[k]);
+  return least;
+}
+
+// medians over states of a model's fall
+static void follow(const char *path, int without) {
+  heap h;
+  if (!CHECK(load_file(&h, path, without))) return;
+  double time[2][LEVELS][STATES], ratio[LEVELS][STATES], error[LEVELS][STATES], differ[STATES], contacts[2] = {0};
+  double *answer = scene_vector(h.m->nv);
+  for (int i = 0; i < STATES; i++) {
+    shake(&h);
+    // the state stays; theirs moves MuJoCo's data
+    mjData *kept = mj_copyData(NULL, h.m, h.d);
+    const curve dense = measure(&h, DENSE), sparse = measure(&h, SPARSE);
+    mju_copy(answer, h.truth, h.m->nv);
+    const curve own = measure(&h, SAME);
+    differ[i] = apart(h.truth, answer, h.m->nv);
+    contacts[0] += (double)dense.contacts / STATES, contacts[1] += (double)own.contacts / STATES;
+    for (int l = 0; l < LEVELS; l++) {
+      time[0][l][i] = fmin(dense.time[l], sparse.time[l]), time[1][l][i] = own.time[l];
+      ratio[l][i] = own.time[l] / time[0][l][i];
+      error[l][i] = error_within(&own, time[0][l][i]);
+    }
+    mj_deleteData(h.d);
+    h.d = kept;
+  }
+  printf("%s, %s, nv %d, %d states, %.1f contacts of MuJoCo's, %.1f of cavort's; answers apart by %.0e (median)\n",
+         path, without ? "no springs and dampers" : "with those of the file", h.m->nv, STATES, contacts[0], contacts[1],
+         median(differ, STATES));
+  for (int l = 0; l < LEVELS; l++) {
+    printf("    to %.0e: MuJoCo %6.1f us, cavort %6.1f us, ratio %.2f; error of cavort in MuJoCo's time %.0e\n",
+           level[l], 1e6 * median(time[0][l], STATES), 1e6 * median(time[1][l], STATES), median(ratio[l], STATES),
+           median(error[l], STATES));
+  }
+  fflush(stdout);
+  free(answer);
+  unload(&h);
+}
+
 int main(int argc, char **argv) {
   static const int usual[] = {30, 100, 300};
   printf("least time of a step whose v_next errs by %.0e, %.0e, %.0e at most (over the better of MuJoCo's)\n", level[0],
          level[1], level[2]);
   for (int i = 0; i < (argc > 1 ? argc - 1 : 3); i++) {
     const int n = argc > 1 ? atoi(argv[i + 1]) : usual[i];
+    if (n == 0) {
+      follow(argv[i + 1], 0);
+      follow(argv[i + 1], 1);
+      continue;
+    }
     compare("box", "heap", n);
     compare("capsule", "heap", n);
     if (n == 100) compare("box", "fall", n);

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Writes the tables of tests/results anew, each with machine, compiler and commit. Usage: sh tests/results.sh [NAME...], default
-# all of: inverse (time against MuJoCo, needs it and the shared models), heap (forward steps of heaps against MuJoCo), update (updates
+# all of: inverse (time against MuJoCo, needs it and the shared models), heap (forward steps of heaps against MuJoCo), newton (those of robots), update (updates
 # of their factors against new ones), normal (normal
 # equations by bands, by groups of trees and by CHOLMOD), unused (what a plan pays for things out of its reach), sweep (broad phase), mesh (collision meshes of a robot at each stage), conservation (drift of energy and
 # momentum), orders (error of the forces of the orders of the step, and what an evaluation costs), absent (what features cost where a scene has none of
@@ -100,6 +100,20 @@ absent() {
       "$build/problems/cavort" inspect "$model" | sed -n '/memory of a state/,/the whole/p' | sed 1d
     done
   } >"$out/absent.txt"
+}
+
+# forward steps of robots against MuJoCo's, which before its third version does not know limits of force in joints, which neither
+# solver needs, and takes a range for a limit when told
+newton() {
+  robot=${CAVORT_SHARED_MODELS:-$PWD/../shared/models}/unitree/g1
+  plain=$(mktemp -d)
+  for file in scene_29dof g1_29dof; do
+    sed 's/ actuatorfrc[a-z]*="[^"]*"//g; s/<jointactuatorfrc [^>]*>//g; s/<compiler /<compiler autolimits="true" /' "$robot/$file.xml" >"$plain/$file.xml"
+  done
+  ln -s "$robot/meshes" "$plain/meshes"
+  run newton bench_heap problems/models/robot.xml problems/models/humanoid.xml "$plain/scene_29dof.xml"
+  sed -i "s|$plain|unitree/g1|" "$out/newton.txt"
+  rm -r "$plain"
 }
 
 # a build before factors left out what blocks end before and dofs, contacts and rows went four at a time
@@ -220,6 +234,7 @@ for name in ${*:-inverse heap update normal unused sweep mesh conservation order
   case $name in
     inverse) run inverse bench_inverse ;;
     heap) run heap bench_heap ;;
+    newton) newton ;;
     update) run update bench_update ;;
     normal) normal ;;
     unused) run unused bench_unused ;;
@@ -240,6 +255,6 @@ for name in ${*:-inverse heap update normal unused sweep mesh conservation order
     interruption) interruption ;;
     batch) batch ;;
     walk) walk ;;
-    *) echo "usage: sh tests/results.sh [inverse|heap|update|normal|unused|sweep|mesh|conservation|orders|sensors|tendons|actuation|fluid|optimum|methods|absent|stiff|iteration|warm|interruption|batch|walk]..." >&2 && exit 2 ;;
+    *) echo "usage: sh tests/results.sh [inverse|heap|newton|update|normal|unused|sweep|mesh|conservation|orders|sensors|tendons|actuation|fluid|optimum|methods|absent|stiff|iteration|warm|interruption|batch|walk]..." >&2 && exit 2 ;;
   esac
 done
