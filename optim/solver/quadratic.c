@@ -543,6 +543,12 @@ cav_status cav_quadratic_solve(cav_quadratic *p, const double *radius, const dou
   return status;
 }
 
+double cav_quadratic_unfinished(cav_quadratic *p) {
+  double decrease = cav_quadratic_decrease(p);
+  dual_residual(p);
+  return decrease > 0 ? -dot(p->n, p->rhs, p->x) / decrease : 0;
+}
+
 void cav_quadratic_correct(cav_quadratic *p, const double *offset, double *x) {
   for (int r = 0; r < p->rows; r++) p->ray[r] = -p->weight[r] * offset[r];
   memset(p->work, 0, (size_t)p->n * sizeof(double));

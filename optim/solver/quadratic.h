@@ -45,7 +45,12 @@ const double *cav_quadratic_prediction(cav_quadratic *quadratic);
 /// Decrease of the objective from x = 0 to the solution.
 double cav_quadratic_decrease(cav_quadratic *quadratic);
 
-/// A knot's part of that, which was asked for before.
+/// Derivative of the objective at the solution, downwards along it, over the decrease: 0 where it is stationary, 1 where
+/// it goes on down as steeply. Where the Hessian is not convex, what its factors need on their diagonals besides holds
+/// steps back until nothing is left of the gap, with all of the gradient.
+double cav_quadratic_unfinished(cav_quadratic *quadratic);
+
+/// A knot's part of that decrease, which was asked for before.
 double cav_quadratic_knot_decrease(cav_quadratic *quadratic, int t);
 
 /// Duality gap of the solution, in units of the cost: no step decreases a convex objective by more than this beyond it.

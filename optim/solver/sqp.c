@@ -33,9 +33,10 @@ static const double first_radius = 0.1, most_radius = 0.7, least_radius = 1e-7;
 /// programme. Smallest cost that counts as a scale.
 static const double stationary = 1e-9, predicted_enough = 1e-6, gap_fraction = 1e-11, least_cost = 1e-6;
 
-/// Decreases of the cost below this fraction, so many in a row, end a run; below that the Hessian is found anew.
+/// Decreases of the cost below this fraction, so many in a row, end a run; below that a Hessian that served so many
+/// iterations is found anew.
 static const double slow = 1e-6, old_gain = 1e-5;
-enum { PATIENCE = 8 };
+enum { PATIENCE = 8, SERVED = 5 };
 
 /// So many steps in a row by Gauss-Newton's model that gain less than this fraction of the cost end its part.
 static const double gauss_newton = 1e-4;
@@ -54,6 +55,10 @@ enum { LEAPS = 4, LEAP_BOXES = sizeof leap_box / sizeof *leap_box };
 /// How far the ratio of a decrease to what was predicted may be from 1 before the Hessian is found anew; how much of
 /// the decrease a knot has to miss for its box to be at fault instead.
 static const double poor_ratio = 0.4, far = 2;
+
+/// Ratios to a forecast from which a step is lengthened: whatever it is; where the model itself goes on down along it,
+/// by this part of the decrease.
+static const double exceeded = 1.3, fair = 0.5, unfinished = 0.1;
 
 /// Part of what all knots' forecasts were off by that the knots whose curvature is kept may be off by.
 static const double unmarked = 0.3;
@@ -329,7 +334,7 @@ static void mark_stale(const cav_transcription *tr, descent *d) {
 /// which is found anew where the last one's predictions have not come true. all: at all knots.
 static cav_status model(cav_solve_run *run, descent *d, int all) {
   int poor = d->age >= 0 && fabs(d->ratio - 1) > poor_ratio;
-  int little = d->age > 0 && d->gain < old_gain * cost_scale(run->tr);
+  int little = d->age >= SERVED && d->gain < old_gain * cost_scale(run->tr);
   cav_status status = CAV_OK;
   if (poor || little || all || (d->age < 0 && d->few >= FEW)) {
     int whole = !poor || little || all;
@@ -396,7 +401,12 @@ static cav_status try_step(cav_solve_run *run, descent *d, double multiple, doub
   return status;
 }
 
-/// Longer and longer steps while they gain: where the curvature was made convex, the programme's step is too short.
+/// Whether the programme's step is too short: the curvature was made convex, or what held its factors held the step.
+static int is_short(const descent *d) {
+  return d->ratio > exceeded || (d->ratio > fair && cav_quadratic_unfinished(d->qp) > unfinished);
+}
+
+/// Longer and longer steps while they gain.
 static cav_status extrapolate(cav_solve_run *run, descent *d, double *merit) {
   double multiple = 2, limit = most_radius / cav_quadratic_length(d->qp);
   for (; multiple <= limit; multiple *= 2) {
@@ -467,6 +477,10 @@ static double largest_radius(const cav_transcription *tr, const double *radius) 
   return most;
 }
 
+/// Whether rows are off that Gauss-Newton's programmes, which are convex, do not bring nearer: curvature does not either,
+/// the augmented Lagrangian may.
+static int is_lost(const cav_solve_run *run, const descent *d) { return d->age < 0 && !cav_run_met(run); }
+
 /// One iteration from a linearisation: programmes in smaller and smaller boxes until a step is accepted, or until the
 /// model has to be a better one. *taken: whether one was.
 static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
@@ -480,13 +494,13 @@ static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
     d->predicted = cav_quadratic_decrease(d->qp);
     for (int t = 0; t < run->tr->nknot; t++) d->forecast[t] = cav_quadratic_knot_decrease(d->qp, t);
     memcpy(d->multiplier, cav_quadratic_multiplier(d->qp), (size_t)cav_quadratic_rows(d->qp) * sizeof(double));
-    if (d->predicted <= stationary * scale) return d->whole ? CAV_OK : renew(run, d, 1, taken);
+    if (d->predicted <= stationary * scale) return is_lost(run, d) || d->whole ? CAV_OK : renew(run, d, 1, taken);
     status = try_step(run, d, 1, 0.9 * d->predicted, &trial);
     if (status != CAV_OK) return status;
     d->ratio = (d->merit - trial) / d->predicted;
     if (d->ratio > 1e-4) {
       set_boxes(run, d);
-      if (d->ratio > 1.3 && (status = extrapolate(run, d, &trial)) != CAV_OK) return status;
+      if (is_short(d) && (status = extrapolate(run, d, &trial)) != CAV_OK) return status;
       d->gain = d->merit - trial;
       d->few = d->gain < gauss_newton * scale ? d->few + 1 : 0;
       exchange(&run->at, &run->spare);
@@ -504,7 +518,7 @@ static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
     set_boxes(run, d);
     if (largest_radius(run->tr, d->radius) < least_radius) break;
   }
-  return d->age < 0 ? renew(run, d, 1, taken) : CAV_OK;
+  return d->age < 0 && !is_lost(run, d) ? renew(run, d, 1, taken) : CAV_OK;
 }
 
 /// Brings rows in that are still off by what is not linear in them, along the last programme's metric.
