@@ -69,5 +69,22 @@ grep -q 'thrown/other.xml:.*markers.*repair.xml' err || fail "a record of anothe
 grep -q 'forces are those of 2.0 kg, the model' out || fail "mass: $(tail -n 3 out)"
 "$cavort" track flight.csv --model box.xml --markers set.xml --from x 2>err && fail "a time that is none"
 grep -q 'expected a number from 0' err || fail "a time that is none: $(cat err)"
+# A ball that flies up out of the floor, its record 30 mm in it at first: no contact has to act, so dynamics allows it, and nothing else
+# than the price of depth beyond 4 mm holds the free start out. There the pull of a record of 0.6 m is 2 N at most, 0.02 mm of it.
+cat >ball.xml <<'X'
+<mujoco><worldbody><geom type="plane" size="5 5 1"/><body pos="0 0 .1"><joint name="z" type="slide" axis="0 0 1"/>
+<geom type="sphere" size=".1" mass="2"/></body></worldbody></mujoco>
+X
+awk 'BEGIN { print "time,qpos_z"; for (f = 0; f <= 30; f++) { t = f / 100; printf "%.17g,%.17g\n", t, -.03 + 2 * t - 4.905 * t * t } }' >ball.csv
+cat >ball-problem.xml <<'X'
+<problem name="ball" model="ball.xml"><horizon duration="0.3" timestep="0.01" close="open"/><start free="true"/><guess file="ball.csv"/>
+<cost><track file="ball.csv" joints="all" sd="0.6 2"/></cost></problem>
+X
+"$cavort" solve ball-problem.xml -q --threads 1 --strategies 1 -o ball >ball.log 2>&1 || fail "a ball that flies out of the floor: $(cat ball.log)"
+awk -F, 'NR == 1 { for (i = 1; i <= NF; i++) if ($i == "qpos_z") c = i } NR == 2 { exit !($c > -.0041 && $c < -.003) }' ball/trajectory.csv ||
+  fail "a free start in the floor: $(sed -n 2p ball/trajectory.csv)"
+"$cavort" solve ball-problem.xml -q --set schedule/@optimality=2 -o refused >ball.log 2>&1 && fail "an optimality of 2"
+grep -q optimality ball.log || fail "a refusal that does not name optimality: $(cat ball.log)"
+
 echo "$failed failed"
 [ $failed -eq 0 ]
