@@ -485,10 +485,11 @@ static void cure_stuck(const inquiry *in, const cav_binding *row, char *out, siz
       other->name, 1e3 * row->value, solid->name);
 }
 
-/// Whether a force without an actuator is missed up to the end, which has to be at rest.
+/// Whether a force without an actuator is missed up to the end, which has to be at rest, of what no actuator moves.
 static int ends_moving(const inquiry *in, const group *g, const cav_binding *row) {
   int last = (int)lround(in->problem->duration / in->timestep);
-  int until = row->kind == CAV_BINDING_UNACTUATED && g->missed && g->missed_last >= last - near_knots;
+  int until = row->kind == CAV_BINDING_UNACTUATED && !in->model->link[in->model->dof[row->object].link].driven &&
+              g->missed && g->missed_last >= last - near_knots;
   return until && in->problem->close_at_rest && !in->problem->cycle.on && row->knot >= end_part * last;
 }
 
