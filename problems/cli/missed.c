@@ -9,6 +9,7 @@
 #include "cavort/result.h"
 #include "command.h"
 
+static const double idle = 1e-4; // part of its limit below which an actuator does nothing
 static const double still = 0.2; // part of the way up to which a motion stays where it starts
 
 /// The term that is missed by the most tolerances; -1: none.
@@ -56,7 +57,11 @@ static void tell_room(const cav_problem *p, const cav_trajectory *motion, char *
   }
   cav_forces_free(forces);
   int n = snprintf(text, size, "no limit is at its end");
-  if (of >= 0)
+  if (most < idle && m->nu > 0)
+    n +=
+        snprintf(text + n, size - (size_t)n,
+                 " and actuators do nothing: where all stands still nothing leads on, which <swing> in <guess> breaks");
+  else if (of >= 0)
     n += snprintf(text + n, size - (size_t)n, ": actuators give at most %.2g %% of their limits ('%.40s' at %.3g s)",
                   100 * most, m->actuator[of].name, at * motion->timestep);
   if (joint >= 0 && (size_t)n < size)
