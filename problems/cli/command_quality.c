@@ -70,7 +70,7 @@ static cav_status measure_file(const cav_model *model, const char *file, cav_qua
   return status;
 }
 
-// a folder's motion with its problem's model and law, that of a fit with its repair.xml's model, or --model; a file's with --model
+// a folder's motion with its problem's model and law, a fit's with its repair.xml's model; a file's with --model
 static cav_status measure(const cav_command_line *line, const char *path, cav_quality *quality, cav_error *error) {
   struct stat info;
   int folder = !stat(path, &info) && S_ISDIR(info.st_mode);
