@@ -4,9 +4,9 @@
 
 #include "cavort/dynamics.h"
 #include "cavort/estimate.h"
+#include "cavort/mhe.h"
 #include "cavort/mocap.h"
 #include "cavort/model.h"
-#include "cavort/mhe.h"
 #include "cavort/mpc.h"
 #include "cavort/problem.h"
 #include "cavort/result.h"

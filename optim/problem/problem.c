@@ -497,8 +497,7 @@ static cav_status read_schedule(const cav_problem_reader *reader) {
   int n;
   const cav_field *field = cav_stage_fields(&n);
   cav_status status = cav_problem_real(reader, node, "optimality", 0, 1, &schedule->optimality);
-  if (!status)
-    status = cav_problem_read_fields(reader, cav_problem_child(node, "first"), field, n, &schedule->first);
+  if (!status) status = cav_problem_read_fields(reader, cav_problem_child(node, "first"), field, n, &schedule->first);
   return status ? status : cav_problem_read_fields(reader, cav_problem_child(node, "last"), field, n, &schedule->last);
 }
 
