@@ -24,10 +24,10 @@ static const char beast[] =
     "<actuator><motor joint='hip' gear='20' ctrllimited='true' ctrlrange='-1 1'/>"
     "<motor tendon='string' gear='5' ctrllimited='true' ctrlrange='-.5 1'/></actuator></mujoco>";
 
-enum { COPIES = 40, KINDS = 6, TERMS = KINDS * COPIES };
+enum { COPIES = 40, KINDS = 7, TERMS = KINDS * COPIES };
 static const cav_quantity kinds[KINDS] = {
-    CAV_QUANTITY_GAP,   CAV_QUANTITY_SLIP, CAV_QUANTITY_IMPACT, CAV_QUANTITY_FORCE, CAV_QUANTITY_SELF_PENETRATION,
-    CAV_QUANTITY_EFFORT};
+    CAV_QUANTITY_GAP,    CAV_QUANTITY_SLIP,      CAV_QUANTITY_IMPACT, CAV_QUANTITY_FORCE, CAV_QUANTITY_SELF_PENETRATION,
+    CAV_QUANTITY_EFFORT, CAV_QUANTITY_SELF_FORCE};
 
 /// Which windows, bodies and norms the costs have, and how the motion is closed.
 typedef struct scene_case {
@@ -142,6 +142,68 @@ static void test_copies(const scene_case *c) {
   cav_model_free(m);
 }
 
+/// Forces between links of one tree as a knot reads them, y, at a motion with one coordinate moved; NULL: none is told.
+static int self_force(cav_transcription *tr, const cav_trajectory *at, int t, int knot, int dof, double by, double *y) {
+  cav_trajectory *moved = cav_trajectory_copy(at);
+  double step[64] = {0};
+  step[dof] = by;
+  cav_integrate(tr->model, at->q + knot * at->nq, step, 1, moved->q + knot * at->nq);
+  cav_trajectory_velocities(tr->model, moved);
+  CHECK(cav_transcription_values(tr, moved) == CAV_OK);
+  const cav_knot *k = &tr->knot[t];
+  int n = 0;
+  for (int c = 0; c < k->ncontact; c++)
+    if (k->moving[c]) y[n++] = k->y[CAV_CONTACT_READINGS * c + 4];
+  cav_trajectory_free(moved);
+  return n;
+}
+
+/// What it costs to lean on one's own links: derivatives against differences, where some bear and some only come near.
+static void test_self_force(void) {
+  enum { T = 2, MOST = 64 };
+  cav_model *m = scene_load(beast);
+  if (!CHECK(m != NULL)) return;
+  double q0[64], zero[64] = {0}, up[MOST], down[MOST];
+  memcpy(q0, m->q0, (size_t)m->nq * sizeof(double));
+  cav_problem p = cav_problem_default(m);
+  cav_term term = cav_term_cost(CAV_QUANTITY_SELF_FORCE, 3);
+  p.duration = 0.1;
+  p.q_start = p.q_goal = q0, p.v_start = zero;
+  p.term = &term, p.nterm = 1;
+  cav_transcription *tr = transcribe(&p);
+  if (!tr) return;
+  cav_trajectory *at = wander(m, tr);
+  CHECK(cav_transcription_linearise(tr, at) == CAV_OK);
+  cav_knot *knot = &tr->knot[T];
+  size_t nv = (size_t)m->nv, width = 3 * nv;
+  double *dy = scene_vector((int)(MOST * width)), worst = 0, largest = 0, bears = 0;
+  int n = 0, open = 0;
+  for (int c = 0; c < knot->ncontact && n < MOST; c++) {
+    if (!knot->moving[c]) continue;
+    bears += knot->y[CAV_CONTACT_READINGS * c + 4];
+    open += knot->y[CAV_CONTACT_READINGS * c] == 0;
+    memcpy(dy + width * (size_t)n++, knot->dy + (size_t)(CAV_CONTACT_READINGS * c + 4) * width, width * sizeof *dy);
+  }
+  // of those that touch and those whose force is there before
+  CHECK(n > 1 && open > 0 && open < n && bears > 0.01);
+  for (int b = 0; b < 3; b++)
+    for (int d = 0; d < m->nv; d++) {
+      const double e = 1e-6;
+      if (!CHECK(self_force(tr, at, T, T - 1 + b, d, e, up) == n)) continue;
+      if (!CHECK(self_force(tr, at, T, T - 1 + b, d, -e, down) == n)) continue;
+      for (int i = 0; i < n; i++) {
+        double analytic = dy[width * (size_t)i + (size_t)b * nv + (size_t)d];
+        largest = fmax(largest, fabs(analytic));
+        worst = fmax(worst, fabs(analytic - (up[i] - down[i]) / (2 * e)));
+      }
+    }
+  printf("%d contacts between links bear %.3g of the weight, derivatives off by %.1e of the largest\n", n, bears,
+         worst / largest);
+  CHECK(largest > 0 && worst < 1e-6 * largest);
+  free(dy);
+  cav_trajectory_free(at), cav_transcription_free(tr), cav_model_free(m);
+}
+
 /// The squat-jump's file with more costs: read, and linearised at its start.
 static void test_file(const char *costs) {
   char path[4200], model[4200], at_path[] = "/tmp/cavort-test-XXXXXX";
@@ -223,6 +285,7 @@ static void test_every_point_is_read(void) {
 }
 
 int main(void) {
+  test_self_force();
   test_every_point_is_read();
   test_file("<slip from='0' to='end' weight='1'/><slip from='0' to='end' weight='1'/>");
   test_file("<force from='0.1' to='0.5' weight='1'/><slip from='0.1' to='0.7' weight='1'/>");

@@ -38,7 +38,7 @@ static const char *const base[] = {
     "<power @cost/power@ weight='1' from='.1'/><gap @cost/gap@ weight='1' from='.1'/><slip @cost/slip@ weight='1' "
     "from='.1'/>"
     "<impact @cost/impact@ weight='1' from='.1'/><self_penetration @cost/self_penetration@ weight='1' from='.1'/>"
-    "<force @cost/force@ weight='1' from='.1'/></cost>"
+    "<force @cost/force@ weight='1' from='.1'/><self_force @cost/self_force@ weight='1' from='.1'/></cost>"
     "<constraint><sensor @constraint/sensor@ type='framepos' body='box' at='end'/><posture @constraint/posture@ "
     "at='end'/>"
     "<velocity @constraint/velocity@ at='end'/><acceleration @constraint/acceleration@ from='.2' "

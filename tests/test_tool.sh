@@ -45,7 +45,7 @@ run 0 help solve
 says out "--resume"
 run 0 solve --help
 run 0 help terms
-for word in sensor posture velocity acceleration effort power gap slip impact self_penetration force; do says out "  $word "; done
+for word in sensor posture velocity acceleration effort power gap slip impact self_penetration force self_force; do says out "  $word "; done
 run 0 help schedule
 says out "self_stiffness"
 run 0 help contact

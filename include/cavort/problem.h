@@ -26,6 +26,7 @@ extern "C" {
   X(IMPACT, impact, CONTACTS, ACCELERATION, 0, "m/s", "impact of loaded contacts", "sqrt(f_n/weight) * normal velocity of every contact") \
   X(SELF_PENETRATION, self_penetration, CONTACTS, ACCELERATION, 0, "m", "self-penetration", "depth of every contact between two links of one tree") \
   X(FORCE, force, CONTACTS, ACCELERATION, 0, "of weight", "force of contacts", "normal force of every contact between trees or with the world") \
+  X(SELF_FORCE, self_force, CONTACTS, ACCELERATION, 0, "of weight", "force between links", "normal force of every contact between two links of one tree") \
   X(TRACK, track, TRACK, POSITION, 0, "of the noise", "recorded motion", "difference from a record (markers, joints, sensors) over the standard deviation of its noise; what was not recorded is not compared")
 // clang-format on
 

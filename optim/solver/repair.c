@@ -40,7 +40,7 @@ static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
                     turned[] = {ORDER, STEP, NONE}, slip[] = {SMOOTHING, SLIP, SOFTNESS},
                     hover[] = {GAP, SMOOTHING, STEP}, fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK},
                     target[] = {EFFORT, GOALS, NONE}, fades[] = {SMOOTHING, GAP, STEP}, near[] = {STEP, SLACK, NONE},
-                    again[] = {STEP, SLIDING, NONE}, ground[] = {LOOSE, SOFTER, STEP}, none[] = {NONE};
+                    again[] = {STEP, SLIDING, NONE}, ground[] = {STEP, LOOSE, SOFTER}, none[] = {NONE};
   if (v->certified) return v->achieved ? none : target;
   if (!cav_verdict_feasible(v)) return cav_problem_has_record(p) ? ground : forces;
   if (v->penetration_max_m > CAV_TOLERANCE_PENETRATION) return deep;

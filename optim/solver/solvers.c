@@ -79,10 +79,32 @@ cav_status cav_solver_ipopt(cav_solve_run *run, cav_error *error) {
   return cav_run_reaches(run, CAV_PLACE_IPOPT, &status) ? ipopt_from_here(run, error) : status;
 }
 
+/// Ipopt from a motion whose rows hold: what is dearer at its end, or holds less, is not taken.
+static cav_status improve(cav_solve_run *run, cav_error *error) {
+  cav_trajectory *kept = cav_trajectory_copy(run->at);
+  if (!kept) return CAV_NO_MEMORY;
+  double cost = cav_transcription_cost(run->tr);
+  cav_error mine = {0};
+  cav_status status = ipopt_from_here(run, &mine);
+  int ended = status == CAV_OK || status == CAV_NOT_CONVERGED;
+  if (ended && !(cav_run_met(run) && cav_transcription_cost(run->tr) <= cost)) {
+    cav_trajectory *dearer = run->at;
+    run->at = kept, kept = dearer;
+    run->measured = 0;
+    status = cav_transcription_values(run->tr, run->at);
+  } else if (error) {
+    *error = mine;
+  }
+  cav_trajectory_free(kept);
+  return status;
+}
+
 cav_status cav_solver_both(cav_solve_run *run, cav_error *error) {
   cav_status status = cav_solver_gn(run, error);
   if (status == CAV_OK && !cav_run_reaches(run, CAV_PLACE_IPOPT, &status)) return status;
   if (status == CAV_OK) status = warm_start(run);
+  if (status == CAV_OK) status = cav_transcription_values(run->tr, run->at);
+  if (status == CAV_OK && cav_run_met(run)) return improve(run, error);
   return status == CAV_OK || status == CAV_NOT_CONVERGED ? ipopt_from_here(run, error) : status;
 }
 #endif

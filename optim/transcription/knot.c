@@ -28,7 +28,7 @@ static contact_part contact_part_of(cav_quantity quantity) {
   static const contact_part part[CAV_QUANTITY_TYPES] = {
       [CAV_QUANTITY_GAP] = {0, 1, 0},    [CAV_QUANTITY_SLIP] = {1, 2, 0},
       [CAV_QUANTITY_IMPACT] = {3, 1, 0}, [CAV_QUANTITY_SELF_PENETRATION] = {0, 1, 1},
-      [CAV_QUANTITY_FORCE] = {4, 1, 0},
+      [CAV_QUANTITY_FORCE] = {4, 1, 0},  [CAV_QUANTITY_SELF_FORCE] = {4, 1, 1},
   };
   assert(part[quantity].first + part[quantity].n <= CAV_CONTACT_READINGS);
   return part[quantity];
@@ -99,6 +99,7 @@ static row_count cost_rows(const cav_transcription *tr, const int *key, const ca
     case CAV_QUANTITY_IMPACT:
     case CAV_QUANTITY_SELF_PENETRATION:
     case CAV_QUANTITY_FORCE:
+    case CAV_QUANTITY_SELF_FORCE:
       for (int k = 0; k < knot->ncontact; k++) n.rows += (size_t)cav_knot_contact(tr, key, term, t, k, &first);
       n.dense = n.rows;
       break;
@@ -571,6 +572,7 @@ static void add_cost(cav_sum *a, const cav_term *term, double weight, int readin
     case CAV_QUANTITY_IMPACT:
     case CAV_QUANTITY_SELF_PENETRATION:
     case CAV_QUANTITY_FORCE:
+    case CAV_QUANTITY_SELF_FORCE:
       add_contact(a, term, weight);
       break;
     case CAV_QUANTITY_TYPES:

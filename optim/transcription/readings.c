@@ -41,6 +41,7 @@ static void read_contact(const cav_transcription *tr, const cav_contact *c, doub
   memset(y, 0, CAV_CONTACT_READINGS * sizeof *y);
   if (!tr->model->pair[c->pair].external) {
     y[0] = fmax(-c->dist, 0);
+    if (tr->self_force) y[4] = fmax(c->impulse[0], 0) / (tr->options.timestep * tr->weight);
     return;
   }
   double fraction = contact_weight(tr, c, NULL);
@@ -106,7 +107,7 @@ int cav_readings_list(cav_transcription *tr, cav_scratch *s, int t) {
       const cav_contact *c = &s->state->contact[k];
       int self = !tr->model->pair[c->pair].external;
       int idle = c->impulse[0] < contact_floor * tr->options.timestep * tr->weight && !is_deep(tr, c);
-      if (self ? c->dist > 0 : idle) continue;
+      if (self ? c->dist > 0 && (idle || !tr->self_force) : idle) continue;
       moving[ncontact] = (char)self;
       s->key[2 * ncontact] = c->pair;
       s->key[2 * ncontact++ + 1] = c->feature;
@@ -211,6 +212,19 @@ static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s
   blend(n, unit, d.impulse_dv, 0, 0, NULL, out.dv);
   blend(n, unit, d.impulse_dv_next, 0, 0, NULL, out.dn);
   return CAV_OK;
+}
+
+/// Derivatives of the overlap of two links of one tree, and of the force between them where a term asks for it.
+static cav_status self_rows(const cav_transcription *tr, const cav_scratch *s, const cav_contact *c, rows out) {
+  if (!tr->self_force) return self_penetration_rows(tr, s, c, out);
+  size_t n = (size_t)tr->nv;
+  cav_status status = contact_rows(tr, s, c, out);
+  memset(out.dq, 0, 4 * n * sizeof(double));
+  memset(out.dv, 0, 4 * n * sizeof(double));
+  memset(out.dn, 0, 4 * n * sizeof(double));
+  // contact_rows leaves the distance's derivative first in the scratch
+  for (size_t j = 0; j < n && c->dist < 0; j++) out.dq[j] = -s->derivative[j];
+  return status;
 }
 
 void cav_rotation_rows(int nv, const double target[4], const double quat[4], const double *d_quat, double *out) {
@@ -345,7 +359,7 @@ cav_status cav_readings_derivatives(const cav_transcription *tr, cav_scratch *s,
     const cav_contact *c = find_contact(s->state, s->key + 2 * k);
     rows out = rows_at(tr, s, tr->nv + CAV_CONTACT_READINGS * k);
     if (!c) return CAV_INTERNAL;
-    status = tr->knot[t].moving[k] ? self_penetration_rows(tr, s, c, out) : contact_rows(tr, s, c, out);
+    status = tr->knot[t].moving[k] ? self_rows(tr, s, c, out) : contact_rows(tr, s, c, out);
   }
   if (status == CAV_NOT_SUPPORTED) return difference(tr, s, t, q, v, v_next);
   return status == CAV_OK ? terms(tr, s, t, q, v, v_next) : status;
@@ -382,7 +396,7 @@ cav_status cav_readings_adjoint(const cav_transcription *tr, cav_scratch *s, int
     const cav_contact *c = weighs(weight + at, CAV_CONTACT_READINGS) ? find_contact(s->state, s->key + 2 * k) : NULL;
     if (!c) continue;
     rows out = rows_at(tr, s, at);
-    status = knot->moving[k] ? self_penetration_rows(tr, s, c, out) : contact_rows(tr, s, c, out);
+    status = knot->moving[k] ? self_rows(tr, s, c, out) : contact_rows(tr, s, c, out);
     if (status != CAV_OK) return status;
     fold(tr, s, at, CAV_CONTACT_READINGS, weight, g);
   }

@@ -241,6 +241,7 @@ cav_transcription *cav_transcription_new(const cav_problem *problem, int threads
   cav_transcription *tr = calloc(1, sizeof *tr);
   if (!tr) goto memory;
   tr->problem = problem;
+  for (int i = 0; i < problem->nterm; i++) tr->self_force |= problem->term[i].quantity == CAV_QUANTITY_SELF_FORCE;
   tr->model = problem->model;
   tr->nv = problem->model->nv;
   tr->nknot = (int)lround(problem->duration / problem->timestep) + 1;

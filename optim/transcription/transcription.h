@@ -133,6 +133,7 @@ typedef struct cav_transcription {
   int *rotation_of;   ///< [nv] index into turn_dof or -1
   cav_window *window; ///< [nterm]
   cav_penalties penalty;
+  int self_force;                   ///< 1: a term asks for forces between links of one tree
   double depth_weight;              ///< 1/(m^2 s), of depth in the world beyond CAV_DEPTH_FREE; 0: none
   cav_derivative derivative;        ///< of u, contacts and sensors
   cav_derivative difference;        ///< what stands in where there is no analytic one

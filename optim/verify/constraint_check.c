@@ -232,7 +232,8 @@ int cav_verification_looks_at(const cav_verification *verification, const cav_te
                               const cav_contact *contact) {
   const cav_model *model = verification->model;
   const cav_pair *pair = model->pair + contact->pair;
-  if (pair->external == (term->quantity == CAV_QUANTITY_SELF_PENETRATION)) return 0;
+  int self = term->quantity == CAV_QUANTITY_SELF_PENETRATION || term->quantity == CAV_QUANTITY_SELF_FORCE;
+  if (pair->external == self) return 0;
   int link = model->body[term->body].link;
   if (term->body > 0) return contact->link1 == link || contact->link2 == link;
   return term->quantity != CAV_QUANTITY_SLIP || !is_idle(model, contact) ||
@@ -250,7 +251,7 @@ int cav_verification_contact(const cav_verification *verification, const cav_ter
   }
   if (term->quantity == CAV_QUANTITY_IMPACT) value[0] = load * rate[0];
   if (term->quantity == CAV_QUANTITY_SELF_PENETRATION) value[0] = fmax(-contact->dist, 0);
-  if (term->quantity == CAV_QUANTITY_FORCE) value[0] = part;
+  if (term->quantity == CAV_QUANTITY_FORCE || term->quantity == CAV_QUANTITY_SELF_FORCE) value[0] = part;
   return 1;
 }
 
@@ -348,6 +349,7 @@ int cav_verification_measure(const cav_verification *verification, const cav_ter
     case CAV_QUANTITY_IMPACT:
     case CAV_QUANTITY_SELF_PENETRATION:
     case CAV_QUANTITY_FORCE:
+    case CAV_QUANTITY_SELF_FORCE:
       return forced ? contact_values(verification, term, t, x, target) : 0;
     case CAV_QUANTITY_TRACK:
       return forced || !cav_verification_is_late(term->track) ? record_values(verification, term, t, x, target) : 0;

@@ -40,6 +40,7 @@ cav_status cav_command_write_repair(const char *folder, const char *model_path, 
         "    <track file=\"trajectory.csv\" joints=\"all\" sd=\"0.6 2\"/>\n"
         "    <slip weight=\"50000\"/>\n"
         "    <force weight=\"1\"/>\n"
+        "    <self_force weight=\"1000\"/>\n"
         "    <effort weight=\"3\"/>\n"
         "    <velocity dofs=\"joints\" weight=\"0\"/>\n"
         "    <velocity dofs=\"root_angular\" weight=\"0\"/>\n"
