@@ -2,6 +2,7 @@
 /// Kalman filter's at every sample, however short the window; readings that are missing say nothing; of a body that falls on its
 /// leg and tumbles errors are at the Cramer-Rao bound, by differences of simulations, and told; what is refused.
 #include "cavort/cavort.h"
+#include "linear_step.h"
 #include "scene.h"
 
 /// Two masses on slides, one on the other, with springs and dampers: linear, and no limits anywhere.
@@ -16,25 +17,6 @@ static const char model_text[] =
 enum { N = 2, S = 2 * N, SAMPLES = 200 };
 static const double step = 0.02, force_sd = 3, place_sd = 0.01, start_q = 0.3, start_v = 0.7;
 static double begin[S] = {0.4, -0.7, 1.1, 0.3};
-
-/// One step of the problem's order: v' and q' of a state [S] under forces.
-static void step_of(const cav_model *m, cav_state *s, const double *x, const double *u, double *next) {
-  CHECK(cav_forward(m, s, x, x + N, u, next + N) == CAV_OK);
-  cav_integrate(m, x, next + N, step, next);
-}
-
-/// A [S*S] and B [S*N] of the step, by its images of unit vectors: it is linear.
-static void linear_map(const cav_model *m, cav_state *s, double A[S][S], double B[S][N]) {
-  for (int k = 0; k < S + N; k++) {
-    double x[S] = {0}, u[N] = {0}, next[S];
-    if (k < S)
-      x[k] = 1;
-    else
-      u[k - S] = 1;
-    step_of(m, s, x, u, next);
-    for (int i = 0; i < S; i++) *(k < S ? &A[i][k] : &B[i][k - S]) = next[i];
-  }
-}
 
 /// x, P one step on.
 static void predict(double A[S][S], double B[S][N], double x[S], double P[S][S]) {
@@ -99,7 +81,7 @@ static void run(const cav_model *m, cav_order order, int knots, double missing) 
   p.order = order;
   s->options.timestep = step, s->options.order = order;
   double A[S][S], B[S][N], x[S], truth[S], P[S][S] = {{0}}, most = 0, wide = 0;
-  linear_map(m, s, A, B);
+  linear_map(m, s, step, &A[0][0], &B[0][0]);
   memcpy(x, begin, sizeof x);
   for (int i = 0; i < S; i++) {
     const double sd = i < N ? start_q : start_v;
@@ -125,7 +107,7 @@ static void run(const cav_model *m, cav_order order, int knots, double missing) 
       for (int j = 0; j < S; j++) wide = fmax(wide, fabs(C[i * S + j] - P[i][j]) / sqrt(P[i][i] * P[j][j]));
     }
     for (int i = 0; i < N; i++) u[i] = force_sd * scene_normal();
-    step_of(m, s, truth, u, next);
+    linear_step(m, s, step, truth, u, next);
     memcpy(truth, next, sizeof next);
   }
   printf("order %d, %d knots, %.0f %% missing: states %.1e standard errors, covariances %.1e off the Kalman filter's\n",

@@ -2,6 +2,7 @@
 /// force is the linear-quadratic regulator's, whose gains are found here from the step itself by iterating Riccati's
 /// equation; parts of a knot and delays move plans as their motion says; and what is refused.
 #include "cavort/cavort.h"
+#include "linear_step.h"
 #include "scene.h"
 
 /// Two masses on slides, one on the other, with springs and dampers: linear, and no limits anywhere.
@@ -30,25 +31,6 @@ static cav_problem problem_of(const cav_model *m, cav_term term[3], double durat
   p.q_start = begin, p.v_start = begin + N, p.q_goal = goal;
   p.term = term, p.nterm = 3;
   return p;
-}
-
-/// One step of the problem's order: v' and q' of a state [S] under forces.
-static void step_of(const cav_model *m, cav_state *s, const double *x, const double *u, double *next) {
-  CHECK(cav_forward(m, s, x, x + N, u, next + N) == CAV_OK);
-  cav_integrate(m, x, next + N, step, next);
-}
-
-/// A [S*S] and B [S*N] of the step, by its images of unit vectors: it is linear.
-static void linear_map(const cav_model *m, cav_state *s, double A[S][S], double B[S][N]) {
-  for (int k = 0; k < S + N; k++) {
-    double x[S] = {0}, u[N] = {0}, next[S];
-    if (k < S)
-      x[k] = 1;
-    else
-      u[k - S] = 1;
-    step_of(m, s, x, u, next);
-    for (int i = 0; i < S; i++) *(k < S ? &A[i][k] : &B[i][k - S]) = next[i];
-  }
 }
 
 /// Gains K [N*S] and cost matrix P [S*S] of the regulator: cost h/2 (wq q'q + wv v'v + wu u'u) a step, for ever.
@@ -93,7 +75,7 @@ static void test_regulator(const cav_model *m, cav_order order) {
   s->options.timestep = step;
   s->options.order = order;
   double A[S][S], B[S][N], K[N][S], P[S][S];
-  linear_map(m, s, A, B);
+  linear_map(m, s, step, &A[0][0], &B[0][0]);
   regulate(A, B, K, P);
   cav_mpc_options o = cav_mpc_options_default();
   o.iterations = 1;
@@ -115,7 +97,7 @@ static void test_regulator(const cav_model *m, cav_order order) {
       most = fmax(most, fabs(wanted));
       cost += 0.5 * step * (weight_q * x[i] * x[i] + weight_v * x[N + i] * x[N + i] + weight_u * u[i] * u[i]);
     }
-    step_of(m, s, x, u, next);
+    linear_step(m, s, step, x, u, next);
     memcpy(x, next, sizeof x);
   }
   printf("order %d: largest difference from the regulator's force %.1e of %.3g N, cost %.9g, the regulator's %.9g\n",
