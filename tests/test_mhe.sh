@@ -63,6 +63,15 @@ check 'quiet' "$(wc -c <"$work/quiet" | tr -d ' ')" 0
 cmp -s "$work/a/trajectory.csv" "$work/b/trajectory.csv" && cmp -s "$work/a/stderr.csv" "$work/b/stderr.csv"
 check 'the same twice' $? 0
 
+# limits that hold nothing back change nothing: the spring takes 5 N, of which a motor of 2 N is never asked
+sed 's|<motor joint="x"/>|<motor joint="x" ctrllimited="true" ctrlrange="-2 2"/>|' "$work/spring.xml" >"$work/limited.xml"
+sed 's|spring.xml|limited.xml|; s|<effort weight="[0-9.]*"/>|<effort weight="88.888888888888889"/>|; s|</cost>|</cost><limits effort="1"/>|' "$work/problem.xml" >"$work/limited_problem.xml"
+"$cavort" mhe "$work/limited_problem.xml" --knots 4 -q -o "$work/d" >"$work/out" 2>&1
+check 'limits: status' $? 0
+paste -d, "$work/a/trajectory.csv" "$work/d/trajectory.csv" | awk -F, 'NR > 1 { for (i = 2; i <= 4; i++) { d = $i - $(i + 4); if (d < 0) d = -d; if (d > 1e-7) bad++ } if ($4 > 2 || $4 < -2) bad++; n++ }
+  END { print n, bad + 0 }' >"$work/compared"
+check 'limits that hold nothing' "$(cat "$work/compared")" '81 0'
+
 # 0.6 s of the humanoid's record, before and in a push of 200 N
 "$cavort" mhe "$source/problems/mhe/stand.xml" --knots 5 --threads 2 -o "$work/c" >"$work/out" 2>&1
 check 'stand: status' $? 0

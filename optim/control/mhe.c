@@ -171,11 +171,18 @@ cav_status cav_mhe_measure(cav_mhe *mhe, int term, double time, const double *va
 
 // ---------------------------------------------------------------- the window
 
-/// The last knot goes on as the one before it did.
-static void go_on(const cav_model *m, cav_trajectory *at) {
+/// The last knot is where the forces of the step before would lead, so that no limit is overstepped where the first linearisation
+/// is made: a row that holds something back there would hold it through the step. Where that cannot be told, at the velocity.
+static void go_on(cav_mhe *mhe, cav_trajectory *at) {
+  const cav_model *m = mhe->problem.model;
   const size_t nq = (size_t)at->nq, nv = (size_t)at->nv, last = (size_t)at->nknot - 1;
-  cav_integrate(m, at->q + (last - 1) * nq, at->v + (last - 1) * nv, at->timestep, at->q + last * nq);
-  memcpy(at->v + last * nv, at->v + (last - 1) * nv, nv * sizeof(double));
+  const double *q = at->q + (last - 1) * nq, *v = at->v + (last - 1) * nv;
+  double *next = at->v + last * nv;
+  mhe->state->options = cav_optimiser_run(mhe->optimiser)->tr->options;
+  cav_status status = cav_inverse(m, mhe->state, q - nq, v - nv, v, mhe->unit);
+  if (status == CAV_OK) status = cav_forward(m, mhe->state, q, v, mhe->unit, next);
+  if (status != CAV_OK) memcpy(next, v, nv * sizeof(double));
+  cav_integrate(m, q, next, at->timestep, at->q + last * nq);
 }
 
 /// A window that is longer by a knot.
@@ -186,7 +193,7 @@ static cav_status lengthen(cav_mhe *mhe) {
   cav_error error = {0};
   if (!longer) return CAV_NO_MEMORY;
   memcpy(longer->q, at->q, n * nq * sizeof(double)), memcpy(longer->v, at->v, n * nv * sizeof(double));
-  go_on(mhe->problem.model, longer);
+  go_on(mhe, longer);
   cav_status status = open_window(mhe, longer->nknot, longer, &error);
   cav_trajectory_free(longer);
   return status;
@@ -196,7 +203,7 @@ static cav_status lengthen(cav_mhe *mhe) {
 static cav_status slide(cav_mhe *mhe) {
   cav_status status = cav_optimiser_shift(mhe->optimiser, 1, NULL, NULL);
   if (status != CAV_OK) return status;
-  go_on(mhe->problem.model, cav_optimiser_run(mhe->optimiser)->at);
+  go_on(mhe, cav_optimiser_run(mhe->optimiser)->at);
   cav_arrival_copy(&mhe->arrival, &mhe->next);
   // what was known of the start has gone into the arrival cost
   for (int i = 0; i < mhe->problem.nterm - CAV_ARRIVAL_TERMS; i++)
