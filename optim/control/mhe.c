@@ -171,17 +171,31 @@ cav_status cav_mhe_measure(cav_mhe *mhe, int term, double time, const double *va
 
 // ---------------------------------------------------------------- the window
 
-/// The last knot is where the forces of the step before would lead, so that no limit is overstepped where the first linearisation
-/// is made: a row that holds something back there would hold it through the step. Where that cannot be told, at the velocity.
+/// Whether forces u are beyond a limit of the problem.
+static int oversteps(const cav_transcription *tr, const double *u) {
+  for (int i = 0; i < tr->nlimit; i++) {
+    const cav_force_row *row = &tr->effort[i];
+    double effort = 0;
+    for (int k = 0; k < row->n; k++) effort += row->coef[k] * u[row->dof[k]];
+    if (tr->servo[i].n == 0 && (effort < tr->effort_range[i][0] || effort > tr->effort_range[i][1])) return 1;
+  }
+  return 0;
+}
+
+/// The last knot goes on at the velocity of the one before it; where that asks for more than a limit allows, by the forces of the
+/// step before: a row that holds something back where it is linearised first would hold it through the step.
 static void go_on(cav_mhe *mhe, cav_trajectory *at) {
   const cav_model *m = mhe->problem.model;
+  const cav_transcription *tr = cav_optimiser_run(mhe->optimiser)->tr;
   const size_t nq = (size_t)at->nq, nv = (size_t)at->nv, last = (size_t)at->nknot - 1;
   const double *q = at->q + (last - 1) * nq, *v = at->v + (last - 1) * nv;
   double *next = at->v + last * nv;
-  mhe->state->options = cav_optimiser_run(mhe->optimiser)->tr->options;
-  cav_status status = cav_inverse(m, mhe->state, q - nq, v - nv, v, mhe->unit);
-  if (status == CAV_OK) status = cav_forward(m, mhe->state, q, v, mhe->unit, next);
-  if (status != CAV_OK) memcpy(next, v, nv * sizeof(double));
+  mhe->state->options = tr->options;
+  cav_status status = cav_inverse(m, mhe->state, q, v, v, mhe->unit);
+  int forced = status == CAV_OK && oversteps(tr, mhe->unit);
+  if (forced) status = cav_inverse(m, mhe->state, q - nq, v - nv, v, mhe->unit);
+  if (forced && status == CAV_OK) status = cav_forward(m, mhe->state, q, v, mhe->unit, next);
+  if (!forced || status != CAV_OK) memcpy(next, v, nv * sizeof(double));
   cav_integrate(m, q, next, at->timestep, at->q + last * nq);
 }
 
