@@ -26,7 +26,7 @@ static const double stiffness = 1e4, least_part = 1e-9;
 /// Costs below this count as this. A duration is at the end of its range within this fraction.
 static const double least_cost = 1e-6, at_end = 1e-9;
 
-/// Residuals up to this part of their scale are nothing: what they cost is not counted as what may be saved.
+/// Where the whole cost is below the least one, what residuals up to this part of their scale cost is nothing that may be saved.
 static const double nothing = 1e-5;
 
 enum { ITERATIONS = 40, SERIES = 60 };
@@ -267,7 +267,7 @@ static cav_status measure(const cav_verification *verification, const int *first
       is = bound(&s, scale);
     }
     // costs are sums of squares: no more than all of it can be saved
-    *optimality = fmax(fmin(is, cost) - s.little, 0) / scale;
+    *optimality = fmax(fmin(is, cost) - (cost < least_cost ? s.little : 0), 0) / scale;
   }
   model_clear(&s);
   return status;
