@@ -4,6 +4,15 @@
 
 #include "scene.h"
 
+/// Two masses on slides, one on the other, with springs and dampers: linear, and no limits anywhere.
+static const char two_masses[] =
+    "<mujoco model='masses'><option gravity='0 0 0' timestep='.001'/><worldbody>"
+    "<body><joint name='a' type='slide' axis='1 0 0' damping='.4' stiffness='3'/><geom size='.1' mass='2' contype='0' "
+    "conaffinity='0'/>"
+    "<body pos='0 0 1'><joint name='b' type='slide' axis='1 0 0' damping='.1' stiffness='1'/><geom size='.1' mass='1' "
+    "contype='0' conaffinity='0'/></body></body></worldbody>"
+    "<actuator><motor joint='a' gear='1'/><motor joint='b' gear='1'/></actuator></mujoco>";
+
 /// One step of h: v' and q' of a state x [2nv] under forces u [nv] into next [2nv].
 static inline void linear_step(const cav_model *m, cav_state *s, double h, const double *x, const double *u,
                                double *next) {

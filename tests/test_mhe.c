@@ -5,15 +5,6 @@
 #include "linear_step.h"
 #include "scene.h"
 
-/// Two masses on slides, one on the other, with springs and dampers: linear, and no limits anywhere.
-static const char model_text[] =
-    "<mujoco model='masses'><option gravity='0 0 0' timestep='.001'/><worldbody>"
-    "<body><joint name='a' type='slide' axis='1 0 0' damping='.4' stiffness='3'/><geom size='.1' mass='2' contype='0' "
-    "conaffinity='0'/>"
-    "<body pos='0 0 1'><joint name='b' type='slide' axis='1 0 0' damping='.1' stiffness='1'/><geom size='.1' mass='1' "
-    "contype='0' conaffinity='0'/></body></body></worldbody>"
-    "<actuator><motor joint='a' gear='1'/><motor joint='b' gear='1'/></actuator></mujoco>";
-
 enum { N = 2, S = 2 * N, SAMPLES = 200 };
 static const double step = 0.02, force_sd = 3, place_sd = 0.01, start_q = 0.3, start_v = 0.7;
 static double begin[S] = {0.4, -0.7, 1.1, 0.3};
@@ -343,7 +334,7 @@ static void test_leg(int knots) {
 }
 
 int main(void) {
-  cav_model *m = scene_load(model_text);
+  cav_model *m = scene_load(two_masses);
   if (CHECK(m != NULL)) {
     run(m, CAV_ORDER_EULER, 3, 0);
     run(m, CAV_ORDER_EULER, 8, 0);

@@ -5,15 +5,6 @@
 #include "linear_step.h"
 #include "scene.h"
 
-/// Two masses on slides, one on the other, with springs and dampers: linear, and no limits anywhere.
-static const char model_text[] =
-    "<mujoco model='masses'><option gravity='0 0 0' timestep='.001'/><worldbody>"
-    "<body><joint name='a' type='slide' axis='1 0 0' damping='.4' stiffness='3'/><geom size='.1' mass='2' contype='0' "
-    "conaffinity='0'/>"
-    "<body pos='0 0 1'><joint name='b' type='slide' axis='1 0 0' damping='.1' stiffness='1'/><geom size='.1' mass='1' "
-    "contype='0' conaffinity='0'/></body></body></worldbody>"
-    "<actuator><motor joint='a' gear='1'/><motor joint='b' gear='1'/></actuator></mujoco>";
-
 enum { N = 2, S = 2 * N };
 static double begin[S] = {0.4, -0.7, 1.1, 0.3};
 static const double step = 0.02, weight_q = 40, weight_v = 1.5, weight_u = 0.2;
@@ -313,7 +304,7 @@ int main(void) {
   char folder[] = "/tmp/cavort-mpc-XXXXXX", path[300], command[300];
   cav_error error = {0};
   if (!CHECK(mkdtemp(folder) != NULL)) return check_result();
-  scene_write(folder, "model.xml", model_text);
+  scene_write(folder, "model.xml", two_masses);
   snprintf(path, sizeof path, "%.250s/model.xml", folder);
   cav_model *m = cav_model_load(path, &error);
   if (CHECK(m != NULL)) {

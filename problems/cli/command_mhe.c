@@ -106,18 +106,13 @@ static cav_status feed(run *r, int k, cav_error *error) {
   return CAV_OK;
 }
 
-static int root_of(const cav_model *m, int link) {
-  while (link > 0 && m->link[link].parent > 0) link = m->link[link].parent;
-  return link;
-}
-
 // force of what is not of its tree on each link
 static void add_forces(const cav_knot_view *view, double *force) {
   const cav_model *m = view->model;
   for (int i = 0; i < view->state->ncontact; i++) {
     const cav_contact *c = &view->state->contact[i];
     const int link[2] = {c->link1, c->link2};
-    if (root_of(m, link[0]) == root_of(m, link[1])) continue;
+    if (m->link[link[0]].root == m->link[link[1]].root) continue;
     for (int side = 0; side < 2; side++)
       for (int k = 0; k < 3; k++) {
         double sum = 0;
@@ -206,13 +201,6 @@ static int is_touched(const run *r, int link) {
   return 0;
 }
 
-// name of the first body of a link
-static const char *name_of(const cav_model *m, int link) {
-  for (int b = 0; b < m->nbody; b++)
-    if (m->body[b].link == link && *m->body[b].name) return m->body[b].name;
-  return "";
-}
-
 static cav_status write_touch(const run *r, cav_error *error) {
   const cav_model *m = r->problem->model;
   cav_file file;
@@ -222,7 +210,11 @@ static cav_status write_touch(const run *r, cav_error *error) {
   for (int link = 1; link < m->nlink; link++)
     for (int c = 0; c < 3 && is_touched(r, link); c++) {
       char name[300];
-      snprintf(name, sizeof name, "%.256s_f%c", name_of(m, link), "xyz"[c]);
+      const int body = m->link[link].body;
+      if (*m->body[body].name)
+        snprintf(name, sizeof name, "%.256s_f%c", m->body[body].name, "xyz"[c]);
+      else
+        snprintf(name, sizeof name, "#%d_f%c", body, "xyz"[c]);
       fputc(',', file.stream);
       cav_table_write_text(file.stream, name);
     }
