@@ -428,6 +428,11 @@ CAV_API cav_problem cav_problem_default(const cav_model *model);
 /// Writes the first most of them to term (may be NULL if most is 0) and returns how many there are.
 CAV_API int cav_problem_default_terms(cav_term *term, int most);
 
+/// By how much a term of a problem may be off its target: what it states (within), of a constraint CAV_TOLERANCE_CONSTRAINT of
+/// its scale, of a goal (a cost at one time, or held over a window of its own at one value) the usual one, if there is one
+/// (> 0); infinite: any, as of running costs, and of what is known of a free start beside a record.
+CAV_API double cav_term_tolerance(const cav_problem *problem, const cav_term *term, double usual);
+
 /// Reads a problem file and its model (model_path overrides the file's; NULL: as written). NULL on failure.
 /// The result and its model are freed by cav_problem_free.
 CAV_API cav_problem *cav_problem_load(const char *path, const char *model_path, cav_error *error);

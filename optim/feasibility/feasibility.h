@@ -56,10 +56,6 @@ double cav_requirement_time(const cav_examination *e, int knot);
 /// What is required, in words: "'grasp' wants site 'tip' at x 1.5 at 0.8 s". requirement.c.
 void cav_requirement_words(const cav_examination *e, const cav_requirement *r, char *out, size_t size);
 
-/// How far from its target a value of a term may be, usual: where it gives none; infinite: nothing is required.
-/// requirement.c.
-double cav_requirement_tolerance(const cav_term *term, double usual);
-
 /// The interval of each component that a term on a sensor requires at a knot, infinite where open; zero: it requires none.
 /// usual: its tolerance where it gives none. requirement.c.
 int cav_requirement_interval(const cav_examination *e, const cav_term *term, int knot, double usual, double low[3],

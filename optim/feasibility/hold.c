@@ -17,6 +17,7 @@
 #include "cavort/solve.h"
 #include "feasibility.h"
 #include "math3.h"
+#include "quantity.h"
 
 static const double near_contact = 0.02, near_limit = 0.05; // m, and m or rad: what may bear
 static const double spare = 1.02;                           // of what bears
@@ -295,7 +296,7 @@ cav_status cav_examine_holds(cav_examination *e) {
     const cav_term *term = &p->term[i];
     cav_requirement_window(e, term, &h.first, &h.last);
     h.time = (h.last - h.first) * h.step;
-    if (h.last < h.first + 4 || isinf(cav_requirement_tolerance(term, 1))) continue;
+    if (h.last < h.first + 4 || isinf(cav_term_tolerance(e->problem, term, 1))) continue;
     for (h.root = 1; h.root < m->nlink && !status && e->nfound == before; h.root++) {
       if (m->link[h.root].root != h.root) continue;
       for (int k = 0; k < m->nq; k++) q[k] = p->q_start[k];

@@ -11,6 +11,7 @@
 #include "math3.h"
 #include "objects.h"
 #include "problem_file.h"
+#include "quantity.h"
 #include "transcription.h"
 
 static const double near_knot = 1e-6; // of a step
@@ -27,15 +28,6 @@ void cav_requirement_window(const cav_examination *e, const cav_term *term, int 
 
 double cav_requirement_time(const cav_examination *e, int knot) {
   return knot * e->problem->timestep * fmax(e->longest, 1);
-}
-
-double cav_requirement_tolerance(const cav_term *term, double usual) {
-  if (term->within > 0) return term->within;
-  if (term->use != CAV_USE_COST) return 1e-6 * term->scale;
-  // costs that are goals: at one time, or a value held over a window of its own
-  int whole = term->from == 0 && term->to < 0, posture = term->quantity == CAV_QUANTITY_CONFIGURATION;
-  int held = !whole && term->nwaypoint == 0 && (term->target || posture);
-  return term->from == term->to || held ? usual : INFINITY;
 }
 
 static cav_status add(cav_examination *e, const cav_requirement *r) {
@@ -59,7 +51,7 @@ static void bound(const cav_term *term, double target, double tolerance, double 
 
 int cav_requirement_interval(const cav_examination *e, const cav_term *term, int knot, double usual, double low[3],
                              double high[3]) {
-  double target[CAV_SENSOR_DIM_MAX], tolerance = cav_requirement_tolerance(term, usual);
+  double target[CAV_SENSOR_DIM_MAX], tolerance = cav_term_tolerance(e->problem, term, usual);
   int dim = term->sensor.dim;
   if (isinf(tolerance) || dim > 3 || term->sensor.cutoff > 0 || term->sensor.referred) return 0;
   cav_term_target(term, knot * e->problem->timestep, dim, target);
@@ -96,7 +88,7 @@ static cav_status sensor_requirement(cav_examination *e, const cav_term *term, c
   double target[CAV_SENSOR_DIM_MAX];
   if (!is_position(e->model, &term->sensor, &r)) return CAV_OK;
   int hinge = r.kind == CAV_REQUIRE_COORDINATE && e->model->joint[r.object].type == CAV_JOINT_HINGE;
-  double tolerance = cav_requirement_tolerance(term, hinge ? CAV_WITHIN_ANGLE : CAV_WITHIN_LENGTH);
+  double tolerance = cav_term_tolerance(e->problem, term, hinge ? CAV_WITHIN_ANGLE : CAV_WITHIN_LENGTH);
   if (isinf(tolerance)) return CAV_OK;
   cav_term_target(term, r.knot * e->problem->timestep, term->sensor.dim, target);
   for (int k = 0; k < 3; k++) {
@@ -118,7 +110,7 @@ static cav_status posture_requirement(cav_examination *e, const cav_term *term, 
   for (int j = 0; j < m->njoint; j++) {
     const cav_joint *joint = &m->joint[j];
     double tolerance =
-        cav_requirement_tolerance(term, joint->type == CAV_JOINT_HINGE ? CAV_WITHIN_ANGLE : CAV_WITHIN_LENGTH);
+        cav_term_tolerance(e->problem, term, joint->type == CAV_JOINT_HINGE ? CAV_WITHIN_ANGLE : CAV_WITHIN_LENGTH);
     int line = joint->type == CAV_JOINT_FREE, scalar = joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE;
     if ((!line && !scalar) || !cav_problem_selects(m, term, joint->dof) || isinf(tolerance)) continue;
     r.kind = line ? CAV_REQUIRE_POINT : CAV_REQUIRE_COORDINATE;

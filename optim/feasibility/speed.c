@@ -12,6 +12,7 @@
 #include "feasibility.h"
 #include "math3.h"
 #include "problem_file.h"
+#include "quantity.h"
 #include "transcription.h"
 
 static const double usual_rate = 0.3; // tolerance of a rate, m/s or rad/s
@@ -74,7 +75,7 @@ static void bound_by_term(cav_examination *e, rates *r, int i) {
   int first, last, rate = term->quantity == CAV_QUANTITY_VELOCITY;
   int joint = term->quantity == CAV_QUANTITY_SENSOR && term->sensor.type == CAV_SENSOR_JOINTVEL;
   if (!rate && !joint) return;
-  double tolerance = cav_requirement_tolerance(term, usual_rate), low[3], high[3];
+  double tolerance = cav_term_tolerance(e->problem, term, usual_rate), low[3], high[3];
   cav_requirement_window(e, term, &first, &last);
   for (int t = first; t <= last && t < e->nknot && isfinite(tolerance); t++) {
     // a sensor reads the rate of the step before a knot or after it: what a window has on both sides is kept

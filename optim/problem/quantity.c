@@ -5,6 +5,9 @@
 
 #include "quantity.h"
 
+#include "cavort/solve.h"
+#include "schedule.h"
+
 #define RULE(quantity, element, of, reads, hard, unit, words, text) \
   [CAV_QUANTITY_##quantity] = {#element, CAV_OF_##of, CAV_READS_##reads, hard, unit, words, text},
 static const cav_quantity_rule rules[CAV_QUANTITY_TYPES] = {
@@ -112,4 +115,18 @@ int cav_style_terms(cav_style style, cav_term *term, int n) {
   }
   assert(n - before <= CAV_STYLE_TERMS);
   return n;
+}
+
+/// Whether a cost is a goal: at one time, or held over a window of its own at one value. What is tracked, costs over the whole
+/// motion, and what is known of a free start beside a record are none.
+static int is_goal(const cav_problem *problem, const cav_term *term) {
+  int whole = term->from == 0 && term->to < 0, posture = term->quantity == CAV_QUANTITY_CONFIGURATION;
+  if (problem->free_start && term->from == 0 && term->to == 0 && cav_problem_has_record(problem)) return 0;
+  return term->from == term->to || (!whole && term->nwaypoint == 0 && (term->target || posture));
+}
+
+double cav_term_tolerance(const cav_problem *problem, const cav_term *term, double usual) {
+  if (term->within > 0) return term->within;
+  if (term->use != CAV_USE_COST) return CAV_TOLERANCE_CONSTRAINT * term->scale;
+  return usual > 0 && is_goal(problem, term) ? usual : INFINITY;
 }

@@ -99,25 +99,11 @@ static const char *sensor_unit(const cav_model *model, const cav_sensor *sensor,
   return "";
 }
 
-// whether a cost is a goal: at one time, or held over a window of its own at one value; what is tracked, or costs over the
-// whole motion, is none
-static int is_goal(const cav_term *term) {
-  int whole = term->from == 0 && term->to < 0, posture = term->quantity == CAV_QUANTITY_CONFIGURATION;
-  return term->from == term->to || (!whole && term->nwaypoint == 0 && (term->target || posture));
-}
-
 // whether a term names a value to be reached: at one time, by a target of its own, or as a constraint
-static int states_target(const cav_term *term) {
+static int states_target(const cav_problem *problem, const cav_term *term) {
   if (cav_quantity_rule_of(term->quantity)->of == CAV_OF_CONTACTS) return 0;
   if (term->quantity == CAV_QUANTITY_TRACK) return 0;
-  return term->use != CAV_USE_COST || is_goal(term) || term->target != NULL || term->within > 0;
-}
-
-// tolerance that decides whether the term is met; infinite: told only
-static double tolerance_of(const cav_term *term, double usual) {
-  if (term->within > 0) return term->within;
-  if (term->use != CAV_USE_COST) return CAV_TOLERANCE_CONSTRAINT * term->scale;
-  return is_goal(term) && usual > 0 ? usual : INFINITY;
+  return term->target != NULL || !isinf(cav_term_tolerance(problem, term, 1));
 }
 
 // number of the dof that the k-th selected value of a term belongs to
@@ -211,7 +197,7 @@ static void note_target(const cav_verification *verification, const cav_term *te
   make_coordinate(verification, term, t, worst, r);
   r->time = t * verification->h;
   describe(verification->model, term, worst, r, &usual);
-  r->within = tolerance_of(term, usual);
+  r->within = cav_term_tolerance(verification->problem, term, usual);
 }
 
 void cav_target_words(const cav_verification *verification, const cav_term *term, int t, int k, double x, double target,
@@ -266,7 +252,8 @@ void cav_targets_note(const cav_verification *verification, int t, double *work,
     double weight = cav_verification_weight(verification, term, t);
     if (weight == 0) continue;
     int n = cav_verification_measure(verification, term, t, q, x, target);
-    if (n > 0 && states_target(term)) note_target(verification, term, t, n, x, target, &report[i]);
+    if (n > 0 && states_target(verification->problem, term))
+      note_target(verification, term, t, n, x, target, &report[i]);
     for (int k = 0; k < n; k++) report[i].cost += cost_of(verification, term, t, weight, x[k], target[k]);
   }
 }
