@@ -14,7 +14,7 @@
 
 #include "feasibility.h"
 
-enum { EXTREMALS = 1024, ANGLES = 90, BISECTIONS = 12 };
+enum { EXTREMALS = 1024, FEW = 128, ANGLES = 90, BISECTIONS = 12, LAST_BISECTIONS = 3 };
 static const double step = 0.03;      // of the time in which full torque and gravity together turn it by half a radian
 static const double free_gap = 0.005; // m: nearer than this something may touch
 static const double most_efforts = 100;
@@ -147,25 +147,40 @@ static double acceleration(const cav_hinge *hinge) {
   return (torque + hypot(hinge->gravity[0], hinge->gravity[1])) / hinge->inertia;
 }
 
-double cav_hinge_time(const cav_hinge *hinge, double efforts, const double start[2], const double low[2],
-                      const double high[2], double most) {
+/// By so many extremals.
+static double least_time(const cav_hinge *hinge, double efforts, const double start[2], const double low[2],
+                         const double high[2], double most, int extremals) {
   double part = step / sqrt(acceleration(hinge));
   double now[EXTREMALS][4], before[EXTREMALS][4];
   box b = {{low[0], low[1]}, {high[0], high[1]}};
   if (edge_meets(&b, start, start)) return 0;
-  for (int i = 0; i < EXTREMALS; i++) {
-    double angle = 2 * M_PI * i / EXTREMALS;
+  for (int i = 0; i < extremals; i++) {
+    double angle = 2 * M_PI * i / extremals;
     now[i][0] = start[0], now[i][1] = start[1], now[i][2] = cos(angle), now[i][3] = sin(angle);
   }
   for (double time = 0; time <= most; time += part) {
-    memcpy(before, now, sizeof now);
-    for (int i = 0; i < EXTREMALS; i++) cav_hinge_step(hinge, efforts, part, now[i]);
-    for (int i = 0; i < EXTREMALS; i++) {
-      int next = (i + 1) % EXTREMALS;
+    memcpy(before, now, (size_t)extremals * sizeof *now);
+    for (int i = 0; i < extremals; i++) cav_hinge_step(hinge, efforts, part, now[i]);
+    for (int i = 0; i < extremals; i++) {
+      int next = (i + 1) % extremals;
       if (cell_meets(&b, before[i], now[i], before[next], now[next])) return time;
     }
   }
   return INFINITY;
+}
+
+double cav_hinge_time(const cav_hinge *hinge, double efforts, const double start[2], const double low[2],
+                      const double high[2], double most) {
+  return least_time(hinge, efforts, start, low, high, most, EXTREMALS);
+}
+
+/// Halves what lies between efforts that do not suffice and those that do.
+static void bisect(const cav_hinge *hinge, const double start[2], const double low[2], const double high[2],
+                   double time, int extremals, int times, double *less, double *more) {
+  for (int i = 0; i < times; i++) {
+    double middle = (*less + *more) / 2;
+    *(isinf(least_time(hinge, middle, start, low, high, time, extremals)) ? less : more) = middle;
+  }
 }
 
 double cav_hinge_efforts(const cav_hinge *hinge, const double start[2], const double low[2], const double high[2],
@@ -173,13 +188,15 @@ double cav_hinge_efforts(const cav_hinge *hinge, const double start[2], const do
   double less = 1, more = 2;
   while (more < most_efforts && isinf(cav_hinge_time(hinge, more, start, low, high, time))) less = more, more *= 2;
   if (more >= most_efforts) return INFINITY;
-  for (int i = 0; i < BISECTIONS; i++) {
-    double middle = (less + more) / 2;
-    if (isinf(cav_hinge_time(hinge, middle, start, low, high, time)))
-      less = middle;
-    else
-      more = middle;
-  }
+  // a few extremals find the place, where all of them look whether it is right
+  double a = less, b = more;
+  bisect(hinge, start, low, high, time, FEW, BISECTIONS, &a, &b);
+  double room = 4 * (b - a);
+  a = fmax(a - room, less), b = fmin(b + room, more);
+  int right = (a == less || isinf(cav_hinge_time(hinge, a, start, low, high, time))) &&
+              (b == more || !isinf(cav_hinge_time(hinge, b, start, low, high, time)));
+  if (right) less = a, more = b;
+  bisect(hinge, start, low, high, time, EXTREMALS, right ? LAST_BISECTIONS : BISECTIONS, &less, &more);
   return more;
 }
 
