@@ -174,7 +174,7 @@ double cav_hinge_time(const cav_hinge *hinge, double efforts, const double start
   return least_time(hinge, efforts, start, low, high, most, EXTREMALS);
 }
 
-/// Halves what lies between efforts that do not suffice and those that do.
+/// Bisects what lies between efforts that do not suffice and those that do.
 static void bisect(const cav_hinge *hinge, const double start[2], const double low[2], const double high[2],
                    double time, int extremals, int times, double *less, double *more) {
   for (int i = 0; i < times; i++) {

@@ -38,7 +38,7 @@ cav_status cav_command_write_repair(const char *folder, const char *model_path, 
         "  <start free=\"true\"/>\n  <guess file=\"trajectory.csv\"/>\n"
         "  <cost>\n"
         "    <track file=\"trajectory.csv\" joints=\"all\" sd=\"0.6 2\"/>\n"
-        "    <slip weight=\"50000\"/>\n"
+        "    <slip weight=\"200000\"/>\n"
         "    <force weight=\"1\"/>\n"
         "    <self_force weight=\"1000\"/>\n"
         "    <effort weight=\"3\"/>\n"
