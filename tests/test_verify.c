@@ -460,6 +460,31 @@ static void test_closed_loop(void) {
   sample_free(&s);
 }
 
+// a wheel that feedback throws so fast that no number holds where it goes: lost, with its time. And a motion that stirs
+// the wheel so fast at a knot that Newton's steps from there leave all numbers: no certificate, and no error either
+static void test_thrown(void) {
+  static const char *const wheel = HEAD
+      "<body name='ball' pos='0 0 1'><freejoint name='root'/><geom type='sphere' size='0.1' mass='2' contype='0' "
+      "conaffinity='0'/><body name='wheel'><joint name='axle' axis='0.6 0 0.8'/><geom type='sphere' size='0.05' "
+      "pos='0.1 0 0' contype='0' conaffinity='0'/></body></body></worldbody>"
+      "<actuator><motor joint='axle'/></actuator></mujoco>";
+  int last = 10;
+  double *gain = calloc((size_t)last * 49, sizeof *gain);
+  for (double size = 1e4; size < 1e300; size *= 1e48) {
+    sample s = sample_new(wheel, last, 0.02, CAV_ORDER_MIDPOINT);
+    for (int t = 0; t <= last; t++) knot(&s, t)[2] = 1 - 9.81 * 0.02 * 0.02 * t * (t + 1) / 2;
+    for (int t = 0; t < last; t++) gain[t * 49 + 6 * 7 + 2] = gain[t * 49 + 6 * 7 + 6] = size;
+    CHECK(verify(&s, gain, gain) == CAV_OK);
+    CHECK(!s.verdict.certified && strstr(s.verdict.reason, "closed loop"));
+    CHECK(s.verdict.closed_loop_seconds < 0.2 && s.verdict.model_contacts_seconds < 0.2);
+    knot(&s, 5)[7] = 1e52;
+    CHECK(verify(&s, NULL, NULL) == CAV_OK);
+    CHECK(!s.verdict.certified && isinf(s.verdict.replay_step_max_error));
+    sample_free(&s);
+  }
+  free(gain);
+}
+
 static void test_refusals(void) {
   sample s = sample_new(flying, 25, 0.02, CAV_ORDER_MIDPOINT);
   cav_error error = {0};
@@ -514,6 +539,7 @@ int main(void) {
   test_slip();
   test_terms();
   test_closed_loop();
+  test_thrown();
   test_refusals();
   return check_result();
 }

@@ -425,11 +425,12 @@ typedef struct cav_verdict {
   double penetration_max_m, penetration_between_m; ///< at the knots; along the steps between them
   double slip_mean_m_s;                            ///< of loaded contacts, weighted by force
   double hover_fraction;                           ///< of contact force, by impulse, across gaps that stay open
-  double power_max_w;                ///< of an actuator: mechanical, at the mean velocity of a step, either way
-  double joint_speed_max_rad_s;      ///< of hinges and ball joints
-  double joint_speed_over_limit;     ///< of joints whose file states a limit, the largest ratio; NaN where none does
-  double optimality;                 ///< fraction of the cost that a step may still save at most; cav_verify_optimality
-  double replay_step_max_error;      ///< largest |v' - v_{t+1}| h of single forward steps from each knot, rad or m
+  double power_max_w;            ///< of an actuator: mechanical, at the mean velocity of a step, either way
+  double joint_speed_max_rad_s;  ///< of hinges and ball joints
+  double joint_speed_over_limit; ///< of joints whose file states a limit, the largest ratio; NaN where none does
+  double optimality;             ///< fraction of the cost that a step may still save at most; cav_verify_optimality
+  /// largest |v' - v_{t+1}| h of single forward steps from each knot, rad or m; INFINITY where one leaves all numbers
+  double replay_step_max_error;
   double replay_same_step_max_error; ///< largest |q - knot|, rad or m, open loop at the same step
   double replay_same_step_seconds;   ///< how long it stays within 1e-6
   double

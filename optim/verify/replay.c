@@ -70,10 +70,12 @@ cav_status cav_replay_steps(const cav_verification *verification, cav_replay *re
     const double *v = verification->v + t * nv;
     status = step(verification, verification->state, exact_tolerance, verification->q + t * model->nq, v,
                   verification->u + t * nv, next);
-    // a step that stopped far from its solution shows as a large error, not as a failure
-    if (status == CAV_NOT_CONVERGED) status = CAV_OK;
+    // a step that stopped far from its solution shows as a large error, one that has none in numbers as one without end
+    const int nowhere = status == CAV_NOT_FINITE;
+    if (nowhere && isfinite(replay->step_error)) replay->step_error = INFINITY, replay->step_knot = t;
+    if (status == CAV_NOT_CONVERGED || nowhere) status = CAV_OK;
     if (status != CAV_OK) break;
-    for (int d = 0; d < nv; d++) {
+    for (int d = 0; d < nv && !nowhere; d++) {
       double error = fabs(next[d] - v[nv + d]) * verification->h;
       if (error <= replay->step_error) continue;
       replay->step_error = error;
@@ -266,6 +268,12 @@ static int following(const cav_verification *verification, const gap *now, doubl
   return 0;
 }
 
+// notes that there is no step to go on by; 0
+static int stopped(cav_status status, double time, struct cav_follow *follow) {
+  snprintf(follow->lost, sizeof follow->lost, "simulation stopped at %.3f s: %s", time, cav_status_name(status));
+  return 0;
+}
+
 // the model as its file says, at a finer step
 static cav_options own_options(const cav_verification *verification, double h) {
   cav_options options = verification->model->options;
@@ -368,14 +376,17 @@ static cav_status advance(const cav_verification *verification, simulation *s, i
   if (status == CAV_OK) status = go(verification, s, s->motion->timestep, HALVINGS);
   if (status == CAV_NO_MEMORY) return status;
   if (status != CAV_OK) {
-    snprintf(follow->lost, sizeof follow->lost, "simulation stopped at %.3f s: %s", time, cav_status_name(status));
-    *on = 0;
+    *on = stopped(status, time, follow);
     return CAV_OK;
   }
   gap now;
   status = compare(verification, q_ref + model->nq, s->q, s->place, &now);
-  if (status == CAV_OK) *on = following(verification, &now, time, follow);
-  return status;
+  if (status == CAV_NO_MEMORY) return status;
+  if (status == CAV_OK)
+    *on = following(verification, &now, time, follow);
+  else
+    *on = stopped(status, time, follow);
+  return CAV_OK;
 }
 
 // number k of an even sequence over (-1, 1), of which each start has its own
