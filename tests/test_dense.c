@@ -57,8 +57,9 @@ static void check_products(int m, int n, int k) {
         cav_dense_product_transposed(CAV_PART_LOWER, m, n, k, 1, A, ld, B, ldb, C, ldc);
         worst = product_error(CAV_PART_LOWER, m, n, k, 1, A, ld, 1, B, 1, ldb, C0, C, ldc);
       } else {
-        cav_dense_square(m, k, A, ld, C, ldc);
-        worst = product_error(CAV_PART_UPPER, m, m, k, 1, A, 1, ld, A, ld, 1, C0, C, ldc);
+        cav_part part = k % 2 ? CAV_PART_UPPER : CAV_PART_LOWER;
+        cav_dense_square(part, m, k, A, ld, C, ldc);
+        worst = product_error(part, m, m, k, 1, A, 1, ld, A, ld, 1, C0, C, ldc);
       }
       CHECK(worst < 1e-15 * (k + 4));
       if (lanes == 8) memcpy(kept, C, bytes);

@@ -217,9 +217,9 @@ void cav_dense_product_transposed(cav_part part, int m, int n, int k, double sig
   product(part, m, n, k, sign, &a, &b, C, (size_t)ldc);
 }
 
-void cav_dense_square(int n, int k, const double *A, int lda, double *C, int ldc) {
+void cav_dense_square(cav_part part, int n, int k, const double *A, int lda, double *C, int ldc) {
   operand a = {.at = A, .by_row = 1, .by_column = (size_t)lda};
-  product(CAV_PART_UPPER, n, n, k, 1, &a, &a, C, (size_t)ldc);
+  product(part, n, n, k, 1, &a, &a, C, (size_t)ldc);
 }
 
 static int least(int a, int b) { return a < b ? a : b; }

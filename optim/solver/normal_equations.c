@@ -10,6 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "vectors.h"
+
 /// Last row of the core's H(:, j) that is not zero by structure.
 static int end_of(const cav_normal *normal, int j) {
   int end = (j / normal->n + 3) * normal->n;
@@ -183,6 +185,34 @@ static void clear_rest(cav_normal *normal) {
 void cav_normal_clear(cav_normal *normal) {
   memset(normal->H, 0, (size_t)normal->core * (size_t)normal->band * sizeof(double));
   clear_rest(normal);
+}
+
+static size_t entries_of(const cav_normal *normal) { return (size_t)normal->core * (size_t)normal->band; }
+
+size_t cav_normal_room(const cav_normal *normal) {
+  return entries_of(normal) + (size_t)normal->size * (size_t)normal->border;
+}
+
+void cav_normal_save(const cav_normal *normal, double *to) {
+  size_t entries = entries_of(normal), sides = (size_t)normal->core * (size_t)normal->border;
+  memcpy(to, normal->H, entries * sizeof *to);
+  memcpy(to + entries, normal->B, sides * sizeof *to);
+  memcpy(to + entries + sides, normal->C, (size_t)normal->border * (size_t)normal->border * sizeof *to);
+}
+
+void cav_normal_load(cav_normal *normal, const double *from) {
+  size_t entries = entries_of(normal), sides = (size_t)normal->core * (size_t)normal->border;
+  memcpy(normal->H, from, entries * sizeof *from);
+  memcpy(normal->B, from + entries, sides * sizeof *from);
+  memcpy(normal->C, from + entries + sides, (size_t)normal->border * (size_t)normal->border * sizeof *from);
+}
+
+double *cav_normal_place(const cav_normal *normal, const cav_transcription *tr, int t) {
+  int block = cav_transcription_block(tr, t, 0);
+  if (normal->free_step || block < 0) return NULL;
+  for (int c = 1; c < 3; c++)
+    if (cav_transcription_block(tr, t, c) != block + c) return NULL;
+  return (block + 3) * normal->n <= normal->core ? entry_of(normal, block * normal->n, block * normal->n) : NULL;
 }
 
 void cav_normal_add_block(cav_normal *normal, const cav_transcription *tr, int t, const double *hessian,
@@ -416,19 +446,31 @@ void cav_normal_solve(const cav_normal *normal, const double *b, double *x) {
   x[last] = step;
 }
 
+/// product += H(j.., j) x, with what it has below the diagonal on its other side too.
+CAV_VECTOR_BODY void multiply_band_body(const cav_normal *normal, const double *x, double *product) {
+  for (int j = 0; j < normal->core; j++) {
+    const double *H = normal->H + (size_t)j * normal->band - j;
+    int end = end_of(normal, j), i = j + 1;
+    cav_four part = {0};
+    double here = x[j], sum = H[j] * here;
+    for (; i + 4 <= end; i += 4) {
+      const cav_four h = *(const cav_four *)(H + i);
+      *(cav_four *)(product + i) += h * here;
+      part += h * *(const cav_four *)(x + i);
+    }
+    for (; i < end; i++) {
+      product[i] += H[i] * here;
+      sum += H[i] * x[i];
+    }
+    product[j] += sum + ((part[0] + part[1]) + (part[2] + part[3]));
+  }
+}
+CAV_BY_VECTORS(multiply_band, (const cav_normal *normal, const double *x, double *product), (normal, x, product))
+
 void cav_normal_multiply(const cav_normal *normal, const double *x, double *product) {
   int core = normal->core, border = normal->border;
   memset(product, 0, (size_t)normal->size * sizeof(double));
-  for (int j = 0; j < core; j++) {
-    const double *H = normal->H + (size_t)j * normal->band - j;
-    int end = end_of(normal, j);
-    double sum = H[j] * x[j];
-    for (int i = j + 1; i < end; i++) {
-      product[i] += H[i] * x[j];
-      sum += H[i] * x[i];
-    }
-    product[j] += sum;
-  }
+  multiply_band(normal, x, product);
   for (int i = 0; i < border; i++) {
     const double *B = normal->B + (size_t)i * core;
     double sum = 0;

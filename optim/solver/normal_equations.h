@@ -54,6 +54,15 @@ void cav_normal_add_block(cav_normal *normal, const cav_transcription *transcrip
                           const double *step_row, double step_square);
 void cav_normal_add_diagonal(cav_normal *normal, const double *diagonal);
 
+/// What has been gathered, kept [cav_normal_room] and taken back, without the diagonal.
+size_t cav_normal_room(const cav_normal *normal);
+void cav_normal_save(const cav_normal *normal, double *to);
+void cav_normal_load(cav_normal *normal, const double *from);
+
+/// Lower triangle of a knot's part [3nv*3nv] by columns, 3nv - 1 apart, to add to in place; NULL where it does not lie in
+/// one piece.
+double *cav_normal_place(const cav_normal *normal, const cav_transcription *transcription, int t);
+
 /// Factors H + shift diag(H); CAV_NOT_CONVERGED if that is not positive definite.
 cav_status cav_normal_factor(cav_normal *normal, double shift);
 

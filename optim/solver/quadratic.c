@@ -18,17 +18,19 @@
 /// starts with, and with what it starts again.
 enum { ITERATIONS = 60, WINDOW = 10 };
 static const double boundary = 0.995, first_gap[] = {0.1, 1e3, 1e6};
+/// Fraction of its diagonal that is added to a matrix that has no factor, at first.
+static const double first_lift = 1e-14;
+
 enum { STARTS = sizeof first_gap / sizeof *first_gap };
 
 /// Entries up to which a row is added by itself.
 enum { SPARSE = 12 };
 
-/// One side of a row, or of the box.
+/// One side of a row, or of the box. The box has neither e nor z: its sides are hard.
 typedef struct side {
-  int on;
-  double s, e, y, z; ///< z: penalty less y. The box has neither e nor z: its sides are hard
+  double s, e, y, z; ///< z: penalty less y. y 0: there is no such side
   double ds, de, dy; ///< step
-  double a, b;       ///< right-hand sides of the two complementarities
+  double w;          ///< 1 / (s/y + e/z)
 } side;
 
 struct cav_quadratic {
@@ -39,8 +41,10 @@ struct cav_quadratic {
   side *box;                              ///< [2*n]
   double *penalty, *value, *multiplier;   ///< [rows]
   double *change, *weight, *ray;          ///< [rows] J dx; w of both sides; right-hand side
+  int *entries;                           ///< [rows*(SPARSE+1)] of a row: how many are not zero and their columns; or 0
   double *x, *dx, *rhs, *gradient, *work; ///< [n]
   double *local, *image, *block, *dense;  ///< [3nv+1] of one knot, [9nv^2], [most rows * 3nv]
+  double *costs;                          ///< normal equations of the costs alone, as they are kept
   double lifted;                          ///< fraction of its diagonal that the last factor needed besides
   double gap;                             ///< complementarities of the last solution
   double *bound;                          ///< [2*n] of the box
@@ -63,7 +67,9 @@ cav_quadratic *cav_quadratic_new(const cav_transcription *tr, cav_normal *normal
   p->row = calloc(2 * rows + 1, sizeof *p->row);
   p->box = calloc(2 * n, sizeof *p->box);
   p->penalty = calloc(6 * rows + 7 * n + 2 * local + 9 * nv * nv + most * 3 * nv, sizeof(double));
-  if (!p->first || !p->row || !p->box || !p->penalty) {
+  p->entries = malloc((rows + 1) * (SPARSE + 1) * sizeof(int));
+  p->costs = malloc(cav_normal_room(normal) * sizeof(double));
+  if (!p->first || !p->row || !p->box || !p->penalty || !p->entries || !p->costs) {
     cav_quadratic_free(p);
     return NULL;
   }
@@ -82,7 +88,7 @@ cav_quadratic *cav_quadratic_new(const cav_transcription *tr, cav_normal *normal
 
 void cav_quadratic_free(cav_quadratic *p) {
   if (!p) return;
-  free(p->first), free(p->row), free(p->box), free(p->penalty);
+  free(p->first), free(p->row), free(p->box), free(p->penalty), free(p->entries), free(p->costs);
   free(p);
 }
 
@@ -102,13 +108,17 @@ double cav_quadratic_length(const cav_quadratic *p) {
 // ---------------------------------------------------------------- products
 
 /// By eight sums side by side: one after another they would wait for each other.
-static double dot(int n, const double *a, const double *b) {
-  double part[8] = {0}, sum = 0;
+static inline double dot(int n, const double *a, const double *b) {
+  cav_four low = {0}, high = {0};
+  double sum = 0;
   int i = 0;
-  for (; i + 8 <= n; i += 8)
-    for (int k = 0; k < 8; k++) part[k] += a[i + k] * b[i + k];
+  for (; i + 8 <= n; i += 8) {
+    low += *(const cav_four *)(a + i) * *(const cav_four *)(b + i);
+    high += *(const cav_four *)(a + i + 4) * *(const cav_four *)(b + i + 4);
+  }
   for (; i < n; i++) sum += a[i] * b[i];
-  return sum + (((part[0] + part[4]) + (part[1] + part[5])) + ((part[2] + part[6]) + (part[3] + part[7])));
+  low += high;
+  return sum + ((low[0] + low[1]) + (low[2] + low[3]));
 }
 
 /// Unknowns of a knot's columns, and the step's logarithm after them.
@@ -132,38 +142,46 @@ static void give(const cav_quadratic *p, int t, const double *local, double *x) 
 }
 
 /// product := J x. [rows]
-static void rows_times(const cav_quadratic *p, const double *x, double *product) {
+CAV_VECTOR_BODY void rows_times_body(const cav_quadratic *p, const double *x, double *product) {
   int width = 3 * p->tr->nv;
   for (int t = 0; t < p->tr->nknot; t++) {
     const cav_knot *knot = &p->tr->knot[t];
     take(p, t, x, p->local);
     for (int i = 0; i < knot->layout.count; i++) {
       const double *row = knot->slot_row + (size_t)i * (size_t)width;
-      double step = p->tr->free_step ? knot->slot_step[i] * p->local[width] : 0;
-      product[p->first[t] + i] = step + dot(width, row, p->local);
+      const int *entry = p->entries + (SPARSE + 1) * (p->first[t] + i);
+      double sum = p->tr->free_step ? knot->slot_step[i] * p->local[width] : 0;
+      for (int k = 1; k <= entry[0]; k++) sum += row[entry[k]] * p->local[entry[k]];
+      if (entry[0] == 0) sum += dot(width, row, p->local);
+      product[p->first[t] + i] = sum;
     }
   }
 }
+CAV_BY_VECTORS(rows_times, (const cav_quadratic *p, const double *x, double *product), (p, x, product))
 
 /// out += J' y. [unknowns]
-static void add_rows(const cav_quadratic *p, const double *y, double *out) {
+CAV_VECTOR_BODY void add_rows_body(const cav_quadratic *p, const double *y, double *out) {
   int width = 3 * p->tr->nv;
   for (int t = 0; t < p->tr->nknot; t++) {
     const cav_knot *knot = &p->tr->knot[t];
-    memset(p->local, 0, (size_t)(width + 1) * sizeof(double));
+    double *local = p->local;
+    memset(local, 0, (size_t)(width + 1) * sizeof(double));
     for (int i = 0; i < knot->layout.count; i++) {
       const double *row = knot->slot_row + (size_t)i * (size_t)width;
-      double yi = y[p->first[t] + i], *local = p->local;
+      const int *entry = p->entries + (SPARSE + 1) * (p->first[t] + i);
+      double yi = y[p->first[t] + i];
       if (yi == 0) continue;
-      for (int k = 0; k < width; k++) local[k] += yi * row[k];
+      for (int k = 1; k <= entry[0]; k++) local[entry[k]] += yi * row[entry[k]];
+      for (int k = 0; k < width && entry[0] == 0; k++) local[k] += yi * row[k];
       if (p->tr->free_step) local[width] += yi * knot->slot_step[i];
     }
-    give(p, t, p->local, out);
+    give(p, t, local, out);
   }
 }
+CAV_BY_VECTORS(add_rows, (const cav_quadratic *p, const double *y, double *out), (p, y, out))
 
 /// image := H x of a knot's costs alone; local [3nv+1] holds x.
-static void knot_times(const cav_quadratic *p, int t) {
+CAV_VECTOR_BODY void knot_times_body(const cav_quadratic *p, int t) {
   int width = 3 * p->tr->nv;
   const cav_knot *knot = &p->tr->knot[t];
   memset(p->image, 0, (size_t)(width + 1) * sizeof(double));
@@ -180,15 +198,27 @@ static void knot_times(const cav_quadratic *p, int t) {
     p->image[k] += knot->step_row[k] * p->local[width];
   }
 }
+CAV_BY_VECTORS(knot_times, (const cav_quadratic *p, int t), (p, t))
 
-/// product := H x, of the costs alone.
-static void costs_times(const cav_quadratic *p, const double *x, double *product) {
-  memset(product, 0, (size_t)p->n * sizeof(double));
-  for (int t = 0; t < p->tr->nknot; t++) {
-    take(p, t, x, p->local);
-    knot_times(p, t);
-    give(p, t, p->image, product);
+/// Lists the entries of rows that have few, and gathers the costs' Hessian, as both are at this linearisation.
+static void prepare(cav_quadratic *p) {
+  const cav_transcription *tr = p->tr;
+  int width = 3 * tr->nv;
+  cav_normal_clear(p->normal);
+  for (int t = 0; t < tr->nknot; t++) {
+    const cav_knot *knot = &tr->knot[t];
+    cav_normal_add_block(p->normal, tr, t, knot->hessian, knot->step_row, knot->step_square);
+    for (int i = 0; i < knot->layout.count; i++) {
+      const double *row = knot->slot_row + (size_t)i * (size_t)width;
+      int *entry = p->entries + (SPARSE + 1) * (p->first[t] + i), n = 0;
+      for (int k = 0; k < width && n <= SPARSE; k++) {
+        if (row[k] == 0) continue;
+        if (n++ < SPARSE) entry[n] = k;
+      }
+      entry[0] = n <= SPARSE ? n : 0;
+    }
   }
+  cav_normal_save(p->normal, p->costs);
 }
 
 static double slack(const cav_slot *slot, double value, int upper) {
@@ -239,7 +269,7 @@ static side centred(double d, double penalty, double mu) {
     e = 0.5 * (sum - d);
     s = mu / (penalty - mu / e);
   }
-  return (side){.on = 1, .s = s, .e = e, .y = mu / s, .z = mu / e};
+  return (side){.s = s, .e = e, .y = mu / s, .z = mu / e};
 }
 
 static void start(cav_quadratic *p, const double *radius, const double change[2], double gap) {
@@ -258,11 +288,12 @@ static void start(cav_quadratic *p, const double *radius, const double change[2]
       for (int k = 0; k < 2; k++)
         p->sides += 2 * (isfinite(k ? p->tr->knot[t].slot[i].upper : p->tr->knot[t].slot[i].lower) != 0);
   double mu = gap / p->sides;
+  memset(p->dx, 0, (size_t)p->n * sizeof(double));
   rows_times(p, p->x, p->change);
   for (int j = 0; j < p->n; j++) {
     double below = p->x[j] - p->bound[2 * j], above = p->bound[2 * j + 1] - p->x[j];
-    p->box[2 * j] = (side){.on = 1, .s = below, .y = mu / below};
-    p->box[2 * j + 1] = (side){.on = 1, .s = above, .y = mu / above};
+    p->box[2 * j] = (side){.s = below, .y = mu / below};
+    p->box[2 * j + 1] = (side){.s = above, .y = mu / above};
   }
   for (int t = 0; t < p->tr->nknot; t++) {
     for (int i = 0; i < p->tr->knot[t].layout.count; i++) {
@@ -278,44 +309,49 @@ static void start(cav_quadratic *p, const double *radius, const double change[2]
 
 // ---------------------------------------------------------------- one iteration
 
-static double weight_of(const side *z) { return 1 / (z->s / z->y + z->e / z->z); }
-
-/// Sum of the complementarities.
-static double gap_of(const cav_quadratic *p) {
-  double gap = 0;
-  for (int r = 0; r < 2 * p->rows; r++) {
-    const side *z = &p->row[r];
-    if (z->on) gap += z->s * z->y + z->e * z->z;
+/// Moves all by a part of the step; weights of sides, multipliers and the gap there.
+static void advance(cav_quadratic *p, double length) {
+  p->gap = 0;
+  for (int j = 0; j < p->n; j++) p->x[j] += length * p->dx[j];
+  for (int r = 0; r < p->rows; r++) {
+    p->multiplier[r] = 0;
+    for (int k = 0; k < 2; k++) {
+      side *z = &p->row[2 * r + k];
+      if (z->y == 0) continue;
+      z->s += length * z->ds, z->e += length * z->de, z->y += length * z->dy, z->z -= length * z->dy;
+      z->w = z->y * z->z / (z->s * z->z + z->e * z->y);
+      p->multiplier[r] += k ? z->y : -z->y;
+      p->gap += z->s * z->y + z->e * z->z;
+    }
   }
-  for (int j = 0; j < 2 * p->n; j++) gap += p->box[j].s * p->box[j].y;
-  return gap;
+  for (int j = 0; j < 2 * p->n; j++) {
+    side *z = &p->box[j];
+    z->s += length * z->ds, z->y += length * z->dy;
+    z->w = z->y / z->s;
+    p->gap += z->s * z->y;
+  }
 }
 
-/// Lagrangian's gradient at x and the multipliers, into rhs.
+/// Lagrangian's gradient at x and the multipliers, into rhs; the normal equations become the costs' alone.
 static void dual_residual(cav_quadratic *p) {
-  costs_times(p, p->x, p->rhs);
-  for (int r = 0; r < p->rows; r++) p->multiplier[r] = p->row[2 * r + 1].y - p->row[2 * r].y;
+  cav_normal_load(p->normal, p->costs);
+  cav_normal_multiply(p->normal, p->x, p->rhs);
   add_rows(p, p->multiplier, p->rhs);
   for (int j = 0; j < p->n; j++) p->rhs[j] += p->gradient[j] + p->box[2 * j + 1].y - p->box[2 * j].y;
 }
 
-/// Adds the weighted rows of a knot to its block, and to what the step's logarithm meets.
-static void weigh_rows(cav_quadratic *p, int t, double *step_row, double *step_square) {
+/// Adds the weighted rows of a knot to the lower triangle of its block, by columns, and to what the step's logarithm
+/// meets.
+static void weigh_rows(cav_quadratic *p, int t, double *block, int ld, double *step_row, double *step_square) {
   const cav_knot *knot = &p->tr->knot[t];
-  int width = 3 * p->tr->nv, ndense = 0, column[SPARSE];
+  int width = 3 * p->tr->nv, ndense = 0;
   for (int i = 0; i < knot->layout.count; i++) {
     const double *row = knot->slot_row + (size_t)i * (size_t)width;
+    const int *entry = p->entries + (SPARSE + 1) * (p->first[t] + i), *column = entry + 1;
     double w = p->weight[p->first[t] + i], root = sqrt(w);
-    int n = 0;
-    for (int k = 0; k < width && n <= SPARSE; k++) {
-      if (row[k] == 0) continue;
-      if (n < SPARSE) column[n] = k;
-      n++;
-    }
-    if (n <= SPARSE) {
-      for (int a = 0; a < n; a++)
-        for (int b = 0; b <= a; b++) p->block[column[a] * width + column[b]] += w * row[column[a]] * row[column[b]];
-    } else {
+    for (int b = 0; b < entry[0]; b++)
+      for (int a = b; a < entry[0]; a++) block[column[b] * ld + column[a]] += w * row[column[a]] * row[column[b]];
+    if (entry[0] == 0) {
       double *out = p->dense + (size_t)ndense++ * (size_t)width;
       for (int k = 0; k < width; k++) out[k] = root * row[k];
     }
@@ -323,32 +359,31 @@ static void weigh_rows(cav_quadratic *p, int t, double *step_row, double *step_s
     for (int k = 0; k < width; k++) step_row[k] += w * knot->slot_step[i] * row[k];
     *step_square += w * knot->slot_step[i] * knot->slot_step[i];
   }
-  cav_dense_square(width, ndense, p->dense, width, p->block, width);
+  cav_dense_square(CAV_PART_LOWER, width, ndense, p->dense, width, block, ld);
 }
 
-/// Copies the lower triangle of a knot's Hessian to the block.
-static void take_hessian(cav_quadratic *p, const cav_knot *knot) {
-  size_t width = 3 * (size_t)p->tr->nv;
-  for (size_t i = 0; i < width; i++) memcpy(p->block + i * width, knot->hessian + i * width, (i + 1) * sizeof(double));
-}
-
-/// Gathers the costs' Hessian with weighted rows.
+/// Adds the weighted rows to the costs' Hessian, which the normal equations are.
 static void gather(cav_quadratic *p) {
   const cav_transcription *tr = p->tr;
   int width = 3 * tr->nv;
-  cav_normal_clear(p->normal);
   for (int t = 0; t < tr->nknot; t++) {
-    const cav_knot *knot = &tr->knot[t];
-    double square = knot->step_square;
-    take_hessian(p, knot);
-    memcpy(p->local, knot->step_row, (size_t)width * sizeof(double));
-    weigh_rows(p, t, p->local, &square);
+    double square = 0, *place = cav_normal_place(p->normal, tr, t);
+    if (place) {
+      weigh_rows(p, t, place, 3 * tr->nv - 1, NULL, NULL);
+      continue;
+    }
+    memset(p->block, 0, (size_t)width * (size_t)width * sizeof(double));
+    memset(p->local, 0, (size_t)width * sizeof(double));
+    weigh_rows(p, t, p->block, width, p->local, &square);
+    for (int i = 0; i < width; i++)
+      for (int j = 0; j < i; j++) p->block[i * width + j] = p->block[j * width + i];
     cav_normal_add_block(p->normal, tr, t, p->block, p->local, square);
   }
 }
 
 int cav_quadratic_convex(cav_quadratic *p) {
   memset(p->work, 0, (size_t)p->n * sizeof(double));
+  prepare(p);
   gather(p);
   cav_normal_add_diagonal(p->normal, p->work);
   return cav_normal_factor(p->normal, 1e-10) == CAV_OK;
@@ -357,72 +392,81 @@ int cav_quadratic_convex(cav_quadratic *p) {
 int cav_quadratic_knot_convex(cav_quadratic *p, int t, double shift) {
   int width = 3 * p->tr->nv;
   double square = 0;
-  take_hessian(p, &p->tr->knot[t]);
-  weigh_rows(p, t, p->local, &square);
+  for (int i = 0; i < width; i++)
+    for (int j = 0; j <= i; j++) p->block[j * width + i] = p->tr->knot[t].hessian[i * width + j];
+  weigh_rows(p, t, p->block, width, p->local, &square);
   for (int i = 0; i < width; i++) {
     double *d = &p->block[i * width + i];
     // columns of knots that are no unknowns are empty
     *d = *d == 0 ? 1 : *d + 1e-10 * fabs(*d) + shift;
-    for (int j = 0; j < i; j++) p->block[j * width + i] = p->block[i * width + j];
   }
   return cav_dense_factor(width, width - 1, p->block, width);
 }
 
-/// Factors the costs' Hessian with all sides.
+/// Factors the costs' Hessian, which the normal equations are, with all sides. A factor that needed its diagonal lifted
+/// is followed by others that do.
 static cav_status factor(cav_quadratic *p) {
-  for (int r = 0; r < p->rows; r++) {
-    p->weight[r] = 0;
-    for (int k = 0; k < 2; k++)
-      if (p->row[2 * r + k].on) p->weight[r] += weight_of(&p->row[2 * r + k]);
-  }
+  for (int r = 0; r < p->rows; r++) p->weight[r] = p->row[2 * r].w + p->row[2 * r + 1].w;
   gather(p);
-  for (int j = 0; j < p->n; j++)
-    p->work[j] = p->box[2 * j].y / p->box[2 * j].s + p->box[2 * j + 1].y / p->box[2 * j + 1].s;
+  for (int j = 0; j < p->n; j++) p->work[j] = p->box[2 * j].w + p->box[2 * j + 1].w;
   cav_normal_add_diagonal(p->normal, p->work);
-  cav_status status = cav_normal_factor(p->normal, 0);
-  p->lifted = 0;
-  for (double shift = 1e-14; status == CAV_NOT_CONVERGED && shift < 10; shift *= 100) {
+  double shift = p->lifted > 0 ? first_lift : 0;
+  cav_status status = cav_normal_factor(p->normal, shift);
+  for (p->lifted = shift; status == CAV_NOT_CONVERGED && shift < 10; p->lifted = shift) {
+    shift = shift > 0 ? 100 * shift : first_lift;
     status = cav_normal_factor(p->normal, shift);
-    p->lifted = shift;
   }
   return status;
 }
 
-/// Newton's step for the sides' right-hand sides a and b; rhs holds the dual residual.
-static void step(cav_quadratic *p) {
+/// What a side's complementarities, aimed at mu, push its row by, over its weight. second: with the products of the
+/// predictor's step, which itself is aimed at 0.
+static inline double push_of(const side *z, double mu, int second) {
+  if (!second) return z->e - z->s;
+  double product[2] = {z->ds * z->dy, z->de * z->dy};
+  return z->e - z->s + (mu - product[0]) / z->y - (mu + product[1]) / z->z;
+}
+
+/// Newton's step of the rows' sides, once J dx is known.
+static inline void step_side(side *z, double dd, double mu, int second) {
+  double product = second ? z->de * z->dy : 0;
+  z->dy = z->w * (push_of(z, mu, second) - dd);
+  z->de = (mu + product + z->e * z->dy) / z->z - z->e;
+  z->ds = dd + z->de;
+}
+
+/// Newton's step to where all complementarities are 0, or where second is 1, with the products of that step, mu; rhs
+/// holds the dual residual.
+static void step(cav_quadratic *p, double mu, int second) {
   for (int r = 0; r < p->rows; r++) {
+    const side *z = &p->row[2 * r];
     p->ray[r] = 0;
-    for (int k = 0; k < 2; k++) {
-      const side *z = &p->row[2 * r + k];
-      if (!z->on) continue;
-      double push = weight_of(z) * (z->a / z->y - z->b / z->z);
-      p->ray[r] += k ? -push : push;
-    }
+    if (z[0].y != 0) p->ray[r] += z[0].w * push_of(&z[0], mu, second);
+    if (z[1].y != 0) p->ray[r] -= z[1].w * push_of(&z[1], mu, second);
   }
-  for (int j = 0; j < p->n; j++)
-    p->work[j] = -p->rhs[j] + p->box[2 * j].a / p->box[2 * j].s - p->box[2 * j + 1].a / p->box[2 * j + 1].s;
+  for (int j = 0; j < p->n; j++) {
+    const side *z = &p->box[2 * j];
+    double pull = second ? (mu - z[0].ds * z[0].dy) / z[0].s - (mu - z[1].ds * z[1].dy) / z[1].s : 0;
+    p->work[j] = pull - z[0].y + z[1].y - p->rhs[j];
+  }
   add_rows(p, p->ray, p->work);
   cav_normal_solve(p->normal, p->work, p->dx);
   rows_times(p, p->dx, p->change);
   for (int r = 0; r < p->rows; r++) {
-    for (int k = 0; k < 2; k++) {
-      side *z = &p->row[2 * r + k];
-      if (!z->on) continue;
-      double dd = k ? -p->change[r] : p->change[r];
-      z->dy = weight_of(z) * (z->a / z->y - z->b / z->z - dd);
-      z->de = (z->b + z->e * z->dy) / z->z;
-      z->ds = dd + z->de;
-    }
+    side *z = &p->row[2 * r];
+    if (z[0].y != 0) step_side(&z[0], p->change[r], mu, second);
+    if (z[1].y != 0) step_side(&z[1], -p->change[r], mu, second);
   }
   for (int j = 0; j < 2 * p->n; j++) {
     side *z = &p->box[j];
-    z->ds = j % 2 ? -p->dx[j / 2] : p->dx[j / 2];
-    z->dy = (z->a - z->y * z->ds) / z->s;
+    double ds = j % 2 ? -p->dx[j / 2] : p->dx[j / 2];
+    z->dy = (second ? (mu - z->ds * z->dy) / z->s : 0) - z->w * ds - z->y;
+    z->ds = ds;
   }
 }
 
-static double shorten(double length, double value, double change) {
-  return change < 0 ? fmin(length, -value / change) : length;
+static inline double shorten(double length, double value, double change) {
+  return value + length * change < 0 ? -value / change : length;
 }
 
 /// Longest step that keeps every side inside, at most 1/boundary.
@@ -430,7 +474,7 @@ static double longest(const cav_quadratic *p) {
   double length = 1 / boundary;
   for (int r = 0; r < 2 * p->rows; r++) {
     const side *z = &p->row[r];
-    if (!z->on) continue;
+    if (z->y == 0) continue;
     length = shorten(length, z->s, z->ds);
     length = shorten(length, z->e, z->de);
     length = shorten(length, z->y, z->dy);
@@ -443,40 +487,17 @@ static double longest(const cav_quadratic *p) {
   return length;
 }
 
-/// Right-hand sides of the complementarities for a target mu, with the products of the predictor's step where second is
-/// 1.
-static void aim(cav_quadratic *p, double mu, int second) {
-  for (int r = 0; r < 2 * p->rows; r++) {
-    side *z = &p->row[r];
-    z->a = mu - z->s * z->y - second * z->ds * z->dy;
-    z->b = mu - z->e * z->z + second * z->de * z->dy;
-  }
-  for (int j = 0; j < 2 * p->n; j++) {
-    side *z = &p->box[j];
-    z->a = mu - z->s * z->y - second * z->ds * z->dy;
-  }
-}
-
 /// Gap after a step of a length.
 static double gap_after(const cav_quadratic *p, double length) {
   double gap = 0;
   for (int r = 0; r < 2 * p->rows; r++) {
     const side *z = &p->row[r];
     double y = z->y + length * z->dy;
-    if (z->on) gap += (z->s + length * z->ds) * y + (z->e + length * z->de) * (z->z - length * z->dy);
+    if (z->y != 0) gap += (z->s + length * z->ds) * y + (z->e + length * z->de) * (z->z - length * z->dy);
   }
   for (int j = 0; j < 2 * p->n; j++)
     gap += (p->box[j].s + length * p->box[j].ds) * (p->box[j].y + length * p->box[j].dy);
   return gap;
-}
-
-static void advance(cav_quadratic *p, double length) {
-  for (int j = 0; j < p->n; j++) p->x[j] += length * p->dx[j];
-  for (int r = 0; r < 2 * p->rows; r++) {
-    side *z = &p->row[r];
-    z->s += length * z->ds, z->e += length * z->de, z->y += length * z->dy, z->z -= length * z->dy;
-  }
-  for (int j = 0; j < 2 * p->n; j++) p->box[j].s += length * p->box[j].ds, p->box[j].y += length * p->box[j].dy;
 }
 
 /// Iterations from the start with a gap; *left: what is left of the first dual residual. Ends early where steps come to
@@ -485,24 +506,22 @@ static cav_status approach(cav_quadratic *p, double tolerance, double *left) {
   int held = 0;
   double past = INFINITY;
   *left = 1;
-  p->gap = gap_of(p);
+  p->lifted = 0;
+  advance(p, 0);
   for (int i = 0; i < ITERATIONS && held < 3; i++) {
     if (p->gap <= tolerance && *left <= 1e-8) break;
     if (cav_transcription_stopped(p->tr)) return CAV_INTERRUPTED;
+    dual_residual(p);
     cav_status status = factor(p);
     if (status != CAV_OK) return status;
     // predictor, then the corrector towards what it shows to be within reach
-    dual_residual(p);
-    aim(p, 0, 0);
-    step(p);
+    step(p, 0, 0);
     double length = fmin(boundary * longest(p), 1), ratio = gap_after(p, length) / p->gap;
-    aim(p, ratio * ratio * ratio * p->gap / p->sides, 1);
-    step(p);
+    step(p, ratio * ratio * ratio * p->gap / p->sides, 1);
     length = fmin(boundary * longest(p), 1);
     advance(p, length);
     held = length < 1e-3 ? held + 1 : 0;
     *left *= 1 - length;
-    p->gap = gap_of(p);
     // as from a model that is far from convex: no step then
     if (!isfinite(p->gap)) {
       memset(p->x, 0, (size_t)p->n * sizeof(double));
@@ -527,6 +546,7 @@ cav_status cav_quadratic_solve(cav_quadratic *p, const double *radius, const dou
     p->local[3 * p->tr->nv] = knot->step_derivative;
     give(p, t, p->local, p->gradient);
   }
+  prepare(p);
   cav_status status = CAV_NOT_CONVERGED;
   for (int i = 0; i < STARTS && status == CAV_NOT_CONVERGED; i++) {
     start(p, radius, change, first_gap[i] * fmax(scale, tolerance));
@@ -539,7 +559,6 @@ cav_status cav_quadratic_solve(cav_quadratic *p, const double *radius, const dou
   // where the Hessian is not convex the conditions hold at what may be no minimum, or one above the start
   if (status == CAV_OK && (p->lifted > 1e-10 || cav_quadratic_decrease(p) < -10 * fmax(p->gap, tolerance)))
     status = CAV_NOT_CONVERGED;
-  for (int r = 0; r < p->rows; r++) p->multiplier[r] = p->row[2 * r + 1].y - p->row[2 * r].y;
   return status;
 }
 
