@@ -568,9 +568,42 @@ double cav_quadratic_unfinished(cav_quadratic *p) {
   return decrease > 0 ? -dot(p->n, p->rhs, p->x) / decrease : 0;
 }
 
-void cav_quadratic_correct(cav_quadratic *p, const double *offset, double *x) {
+/// push [nv] := what the costs of efforts at a knot press with against forces that are off [nv].
+static void push_of_efforts(const cav_transcription *tr, int t, const double *off, double *push) {
+  memset(push, 0, (size_t)tr->nv * sizeof(double));
+  for (int i = 0; i < tr->problem->nterm; i++) {
+    const cav_term *term = &tr->problem->term[i];
+    if (term->use != CAV_USE_COST || term->quantity != CAV_QUANTITY_EFFORT) continue;
+    double weight = cav_term_weight(tr, term, t) * term->weight / (term->scale * term->scale);
+    for (int k = 0; weight > 0 && k < tr->model->nu; k++) {
+      const cav_force_row *form = &tr->effort[k];
+      double effort = 0;
+      for (int c = 0; c < form->n; c++) effort += form->coef[c] * off[form->dof[c]];
+      for (int c = 0; c < form->n; c++) push[form->dof[c]] += weight * effort * form->coef[c];
+    }
+  }
+}
+
+/// out -= what costs of efforts give the unknowns where forces are off. [unknowns]
+static void subtract_efforts(cav_quadratic *p, const double *force, double *out) {
+  int nv = p->tr->nv, width = 3 * nv;
+  for (int t = 0; t < p->tr->nknot; t++, force += nv) {
+    const cav_knot *knot = &p->tr->knot[t];
+    if (!knot->has_force) continue;
+    push_of_efforts(p->tr, t, force, p->image);
+    memset(p->local, 0, (size_t)(width + 1) * sizeof(double));
+    for (int d = 0; d < nv; d++) {
+      const double *du = knot->du + (size_t)d * (size_t)width;
+      for (int k = 0; p->image[d] != 0 && k < width; k++) p->local[k] -= p->image[d] * du[k];
+    }
+    give(p, t, p->local, out);
+  }
+}
+
+void cav_quadratic_correct(cav_quadratic *p, const double *offset, const double *force, double *x) {
   for (int r = 0; r < p->rows; r++) p->ray[r] = -p->weight[r] * offset[r];
   memset(p->work, 0, (size_t)p->n * sizeof(double));
   add_rows(p, p->ray, p->work);
+  if (force) subtract_efforts(p, force, p->work);
   cav_normal_solve(p->normal, p->work, x);
 }

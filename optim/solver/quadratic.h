@@ -20,9 +20,9 @@ void cav_quadratic_free(cav_quadratic *quadratic);
 /// change[0] .. change[1], too. CAV_NOT_CONVERGED: the gap was not reached; the best iterate stands. CAV_INTERRUPTED.
 cav_status cav_quadratic_solve(cav_quadratic *quadratic, const double *radius, const double change[2], double gap);
 
-/// Further step from the solution x, in the metric that it was found in, towards rows that are off by offset [rows].
-/// Writes x [unknowns].
-void cav_quadratic_correct(cav_quadratic *quadratic, const double *offset, double *x);
+/// Further step from the solution x, in the metric that it was found in, towards rows that are off by offset [rows], and
+/// forces that are off by force [nknot*nv] as the costs of efforts weigh them (NULL: rows alone). Writes x [unknowns].
+void cav_quadratic_correct(cav_quadratic *quadratic, const double *offset, const double *force, double *x);
 
 /// Whether the costs' Hessian of the knots is convex along the rows that hold the last solution. 1 before the first one
 /// where it is positive definite by itself.

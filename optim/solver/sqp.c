@@ -15,11 +15,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "course.h"
 #include "curvature.h"
-#include "quadratic.h"
 
 /// Iterations; raises of the penalties for a programme; programmes for a linearisation; corrections of a step.
-enum { ITERATIONS = 250, RAISES = 5, ATTEMPTS = 20, CORRECTIONS = 4, SETTLING = 20 };
+enum { ITERATIONS = 250, RAISES = 5, ATTEMPTS = 20, CORRECTIONS = 16, SETTLING = 20 };
 
 /// Near a record: what the linearised rows miss together, below which a raise is never in vain; part of it that one has
 /// to bring in; part of the largest penalty that none is below then; programmes until a raise is tried again.
@@ -55,6 +55,9 @@ enum { LEAPS = 4, LEAP_BOXES = sizeof leap_box / sizeof *leap_box };
 /// How far the ratio of a decrease to what was predicted may be from 1 before the Hessian is found anew; how much of
 /// the decrease a knot has to miss for its box to be at fault instead.
 static const double poor_ratio = 0.4, far = 2;
+
+/// Part of what a step misses that a correction has to bring for another one to follow.
+static const double worth = 0.1;
 
 /// Ratios to a forecast from which a step is lengthened: whatever it is; where the model itself goes on down along it,
 /// by this part of the decrease.
@@ -184,6 +187,7 @@ static cav_status solve_programme(cav_solve_run *run, cav_quadratic *qp, const d
 typedef struct descent {
   cav_quadratic *qp;
   cav_curvature *curvature;
+  cav_course course;
   double *x, *offset, *multiplier; ///< [unknowns], [rows], [rows]
   double *kept;                    ///< [rows] penalties before a raise
   int rest;                        ///< programmes in which no raise is tried
@@ -214,11 +218,12 @@ static int descent_new(descent *d, cav_solve_run *run) {
   size_t n = (size_t)cav_transcription_unknowns(run->tr), rows = d->qp ? (size_t)cav_quadratic_rows(d->qp) : 0;
   d->curvature = cav_curvature_new(run->tr);
   d->stale = malloc((size_t)run->tr->nknot);
+  int whole = d->qp && cav_course_make(&d->course, run->tr, (int)rows);
   size_t knots = (size_t)run->tr->nknot, boxes = (size_t)cav_transcription_blocks(run->tr) + 1;
   d->x = calloc(n + 3 * rows + 5 * knots + 2 * boxes, sizeof(double));
   d->second = cav_trajectory_copy(run->at);
   d->best = cav_trajectory_copy(run->at);
-  if (!d->qp || !d->curvature || !d->stale || !d->x || !d->second || !d->best || !cav_transcription_keep_rows(run->tr))
+  if (!whole || !d->curvature || !d->stale || !d->x || !d->second || !d->best || !cav_transcription_keep_rows(run->tr))
     return 0;
   d->offset = d->x + n;
   d->multiplier = d->offset + rows;
@@ -237,6 +242,7 @@ static int descent_new(descent *d, cav_solve_run *run) {
 static void descent_free(descent *d) {
   cav_quadratic_free(d->qp);
   cav_curvature_free(d->curvature);
+  cav_course_clear(&d->course);
   cav_trajectory_free(d->second);
   cav_trajectory_free(d->best);
   free(d->x), free(d->stale);
@@ -373,30 +379,44 @@ static void keep_parts(descent *d) {
   d->tried = kept;
 }
 
-/// Takes a multiple of the programme's step to run->spare, corrected where it gains less than enough and that is
-/// better. Returns the merit there.
+/// Evaluates a trajectory moved by x and takes it to run->spare where it is better than what is there. *better:
+/// whether it is.
+static cav_status try_better(cav_solve_run *run, descent *d, const cav_trajectory *from, const double *x, double *merit,
+                             int *better) {
+  double there;
+  cav_transcription_move(run->tr, from, x, d->second);
+  cav_status status = try_at(run, d, d->second, &there);
+  *better = there < *merit;
+  if (!*better) return status;
+  *merit = there;
+  exchange(&run->spare, &d->second);
+  keep_parts(d);
+  return status;
+}
+
+/// Takes a multiple of the programme's step to run->spare; where that gains less than enough, with its bend, then corrected
+/// again and again, as long as that is better. Returns the merit there.
 static cav_status try_step(cav_solve_run *run, descent *d, double multiple, double enough, double *merit) {
-  int n = cav_transcription_unknowns(run->tr), rows = cav_quadratic_rows(d->qp);
+  int n = cav_transcription_unknowns(run->tr), better;
   const double *step = cav_quadratic_step(d->qp);
   for (int i = 0; i < n; i++) d->x[i] = multiple * step[i];
   cav_transcription_move(run->tr, run->at, d->x, run->spare);
   cav_status status = try_at(run, d, run->spare, merit);
   keep_parts(d);
   if (status != CAV_OK || !isfinite(*merit) || d->merit - *merit > enough) return status;
-  const double *linear = cav_quadratic_prediction(d->qp);
-  for (int round = 0; round < CORRECTIONS; round++) {
-    // what the rows are off by, of what they were to be
-    read_values(run->tr, d->offset);
-    for (int k = 0; k < rows; k++) d->offset[k] -= linear[k];
-    cav_quadratic_correct(d->qp, d->offset, d->x);
-    cav_transcription_move(run->tr, run->spare, d->x, d->second);
-    double corrected;
-    status = try_at(run, d, d->second, &corrected);
-    if (status != CAV_OK || !(corrected < *merit)) return status;
-    *merit = corrected;
-    exchange(&run->spare, &d->second);
-    keep_parts(d);
-    if (d->merit - *merit > enough) break;
+  if (!d->course.known) {
+    status = cav_course_find(&d->course, run->tr, d->qp, run->at, d->second);
+    d->last = NULL;
+  }
+  for (int i = 0; i < n; i++) d->x[i] = multiple * (step[i] + multiple * d->course.bend[i]);
+  if (status == CAV_OK && d->course.known) status = try_better(run, d, run->at, d->x, merit, &better);
+  // corrections start from the values of what they correct
+  if (status == CAV_OK && d->last != run->spare) status = cav_transcription_values(run->tr, run->spare);
+  for (int round = 0; round < CORRECTIONS && status == CAV_OK && d->merit - *merit <= enough; round++) {
+    double before = *merit;
+    cav_course_correct(&d->course, run->tr, d->qp, multiple, d->x);
+    status = try_better(run, d, run->spare, d->x, merit, &better);
+    if (!better || before - *merit < worth * fabs(d->predicted - d->merit + before)) break;
   }
   return status;
 }
@@ -486,10 +506,12 @@ static int is_lost(const cav_solve_run *run, const descent *d) { return d->age <
 static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
   *taken = 0;
   read_values(run->tr, cav_quadratic_value(d->qp));
+  cav_course_begin(&d->course, run->tr);
   for (int i = 0; i < ATTEMPTS; i++) {
     cav_status status = solve_model(run, d);
     if (status != CAV_OK) return status;
     double scale = cost_scale(run->tr), trial;
+    d->course.known = 0;
     d->merit = merit_of(run->tr, cav_quadratic_penalty(d->qp), d->before);
     d->predicted = cav_quadratic_decrease(d->qp);
     for (int t = 0; t < run->tr->nknot; t++) d->forecast[t] = cav_quadratic_knot_decrease(d->qp, t);
@@ -535,7 +557,7 @@ static cav_status settle_rows(cav_solve_run *run, descent *d) {
         const cav_slot *slot = &tr->knot[t].slot[j];
         d->offset[k++] = slot->value - fmin(fmax(slot->value, slot->lower), slot->upper);
       }
-    cav_quadratic_correct(d->qp, d->offset, d->x);
+    cav_quadratic_correct(d->qp, d->offset, NULL, d->x);
     cav_transcription_move(tr, run->at, d->x, run->spare);
     double merit;
     status = try_at(run, d, run->spare, &merit);
@@ -641,7 +663,9 @@ static cav_status leap(cav_solve_run *run, descent *d, int *taken) {
     status = solve_model(run, d);
     if (status != CAV_OK) return status;
     d->merit = merit_of(run->tr, cav_quadratic_penalty(d->qp), d->before);
-    status = try_step(run, d, 1, cav_quadratic_decrease(d->qp), &trial);
+    d->predicted = cav_quadratic_decrease(d->qp);
+    cav_course_begin(&d->course, run->tr);
+    status = try_step(run, d, 1, d->predicted, &trial);
     if (status != CAV_OK) return status;
     *taken = trial - d->merit < leap_loss * scale;
     if (!*taken) status = cav_transcription_values(run->tr, run->at);
