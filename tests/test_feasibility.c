@@ -36,14 +36,16 @@ static char folder[] = "/tmp/cavort-feasibility-XXXXXX";
   "ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>"
 
 // a crawler on a floor with friction: a trunk and a mass that slides in it
-#define CRAWLER(FRICTION)                                                                                            \
-  "<mujoco><worldbody><geom name='floor' type='plane' size='9 9 1' friction='" FRICTION                              \
-  " 0 0'/><body name='trunk' "                                                                                       \
+#define FLOOR(FRICTION) "<geom name='floor' type='plane' size='9 9 1' friction='" FRICTION " 0 0'/>"
+#define CRAWLER_ON(FLOOR, FRICTION)                                                                                  \
+  "<mujoco><worldbody>" FLOOR                                                                                        \
+  "<body name='trunk' "                                                                                              \
   "pos='0 0 .1'><freejoint/><geom name='belly' type='box' size='.2 .2 .1' mass='4' friction='" FRICTION              \
   " 0 0'/>"                                                                                                          \
   "<body name='weight' pos='0 0 .2'><joint name='along' type='slide' axis='1 0 0' limited='true' range='-.2 .2'/>"   \
   "<geom type='sphere' size='.05' mass='2' contype='0' conaffinity='0'/></body></body></worldbody><actuator><motor " \
   "joint='along' gear='200' ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>"
+#define CRAWLER(FRICTION) CRAWLER_ON(FLOOR(FRICTION), FRICTION)
 
 // a table that is lifted by a motor, with a box fixed on it
 #define TABLE(MASS)                                                                                                 \
@@ -124,6 +126,7 @@ static const pair pairs[] = {
      "<cost><sensor name='forth' type='subtreecom' body='trunk' component='x' target='.065' at='end' weight='900' "
      "within='.01'/></cost>",
      NULL, CAV_CONDITION_MOMENTUM, "there is no friction"},
+    {"no floor", CRAWLER_ON("", "1"), CRAWLER("1"), SECOND, "", "", NULL, CAV_CONDITION_MOMENTUM, "falls at 9.81 m/s"},
     {"a range that ends before", ARM("60", "-90 90"), NULL, SECOND, "",
      CONSTRAINT("<sensor name='bend' type='jointpos' joint='elbow' target='1.6' at='end'/>"),
      CONSTRAINT("<sensor name='bend' type='jointpos' joint='elbow' target='1.57' at='end'/>"), CAV_CONDITION_RANGE,

@@ -53,6 +53,17 @@ while IFS= read -r model; do
 done <"$work/models"
 [ "$n" -eq 0 ] || tried "$shared/urdf/solo12.urdf" --floating
 [ "$n" -eq 0 ] || grep -q 'floating="true"' "$written" || fail "a floating root is not said"
+# who stands and whose file has no floor gets one
+if [ "$n" -gt 0 ]; then
+  "$cavort" new "$shared/menagerie/unitree_go1/go1.xml" -o "$work/go1.xml" -q || fail "new go1"
+  grep -q 'name="floor" type="plane"' "$work/go1.xml" && grep -q 'key="stand" height="floor"' "$work/go1.xml" || fail "no floor"
+  sed '/<scene>/,/<\/scene>/d' "$work/go1.xml" >"$work/bare.xml"
+  "$cavort" inspect "$work/bare.xml" 2>"$work/err" >/dev/null && fail "height=floor without a floor passes"
+  grep -q "has no floor: add one, <scene>" "$work/err" || fail "what to do without a floor is not told"
+  sed -i 's/ height="floor"//' "$work/bare.xml"
+  "$cavort" solve "$work/bare.xml" -o "$work/bare" -q 2>"$work/err" && fail "it stands on nothing"
+  grep -q "impossible: nothing can hold 'trunk' up: there is no floor" "$work/err" || fail "a fall is not told"
+fi
 
 # as another motion
 "$cavort" new problems/models/humanoid.xml --like squat-jump -o "$work/like.xml" >"$work/out" || fail "like squat-jump"

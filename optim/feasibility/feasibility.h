@@ -94,6 +94,9 @@ double cav_effort_part(const cav_examination *e);
 /// effort.c.
 cav_status cav_effort_of_dofs(cav_examination *e, double *force, int *bounded);
 
+/// Whether the first joints of a tree let it go along a world axis, held by nothing. momentum.c.
+int cav_tree_is_open(cav_examination *e, int root, int axis);
+
 /// Centre of mass of a tree and its velocity at the start; leaves the start's velocities in scratch. momentum.c.
 cav_status cav_centre_of_tree(cav_examination *e, int root, double centre[3], double velocity[3]);
 
@@ -106,6 +109,7 @@ cav_status cav_examine_distances(cav_examination *e);      // distance.c
 cav_status cav_examine_directions(cav_examination *e);     // direction.c
 cav_status cav_examine_solids(cav_examination *e);         // solid.c
 cav_status cav_examine_enclosures(cav_examination *e);     // enclosure.c
+cav_status cav_examine_falls(cav_examination *e);          // fall.c
 cav_status cav_examine_momentum(cav_examination *e);       // momentum.c
 cav_status cav_examine_strength(cav_examination *e);       // strength.c
 cav_status cav_examine_hinge(cav_examination *e);          // hinge.c

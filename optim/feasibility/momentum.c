@@ -45,8 +45,7 @@ static int is_actuated(cav_examination *e, int d) {
   return 0;
 }
 
-/// Whether the first joints of a tree let it go along a world axis, held by nothing.
-static int is_open(cav_examination *e, int root, int axis) {
+int cav_tree_is_open(cav_examination *e, int root, int axis) {
   const cav_model *m = e->model;
   const cav_link *link = &m->link[root];
   for (int j = link->joint; j < link->joint + link->njoint; j++) {
@@ -77,9 +76,9 @@ static int survey(cav_examination *e, surroundings *s) {
     if (fabs(pose.rotation[2]) > 1e-9 || fabs(pose.rotation[5]) > 1e-9 || pose.rotation[8] < 0) return 0;
     if (m->pair[p].dim >= 3) s->friction = fmax(s->friction, fmax(m->pair[p].friction[0], m->pair[p].friction[1]));
   }
-  for (int axis = 0; axis < 2; axis++) s->open[axis] = is_open(e, s->root, axis);
+  for (int axis = 0; axis < 2; axis++) s->open[axis] = cav_tree_is_open(e, s->root, axis);
   // what presses on the floor is known only of a tree that is free to rise
-  if (s->friction > 0 && !is_open(e, s->root, 2)) return 0;
+  if (s->friction > 0 && !cav_tree_is_open(e, s->root, 2)) return 0;
   return s->open[0] || s->open[1];
 }
 

@@ -148,10 +148,17 @@ cav_status cav_configuration_to_floor(const cav_model *m, cav_state *state, cons
   }
   if (status) return refuse(error, status, "the posture cannot be evaluated: %s", cav_status_name(status));
   if (dropped) return CAV_OK;
+  int planes = 0;
+  for (int g = 0; g < m->ngeom; g++) planes += m->geom[g].type == CAV_GEOM_PLANE && m->geom[g].link == 0;
+  if (!planes)
+    return refuse(error, CAV_BAD_INPUT,
+                  "the model '%.200s' has no floor: add one, <scene><geom type=\"plane\" size=\"0 0 1\"/></scene>, or "
+                  "name the file of the model that has one (often scene.xml)",
+                  m->name);
   return refuse(
       error, CAV_BAD_INPUT,
-      "nothing of the model '%.200s' can be lowered to a plane: it needs a plane in the world, a geom that may "
-      "touch it, and a root that is free or slides along the vertical",
+      "nothing of the model '%.200s' can be lowered to a plane: it needs a geom that may touch the plane, and a "
+      "root that is free or slides along the vertical",
       m->name);
 }
 
