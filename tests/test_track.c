@@ -371,6 +371,14 @@ static void test_mix(void) {
   cav_solution *s = NULL;
   CHECK(cav_solve(p, &options, NULL, &s, &error) == CAV_OK);
   check_cost(p, s);
+  // what each compares, in which unit
+  static const char *const what[] = {"position", "coordinate", "coordinate", "coordinate", "framepos"};
+  cav_channel_residual r[5];
+  if (CHECK(s && t[0].track->nchannel == 5 &&
+            cav_track_residuals(p, s->trajectory, &s->contact, p->nterm - 3, r, &error) == CAV_OK))
+    for (int i = 0; i < 5; i++) CHECK(!strcmp(r[i].what, what[i]) && !strcmp(r[i].unit, "m"));
+  if (CHECK(s && cav_track_residuals(p, s->trajectory, &s->contact, p->nterm - 1, r, &error) == CAV_OK))
+    CHECK(!strcmp(r->what, "accelerometer") && !strcmp(r->unit, "m/s2"));
   cav_solution_free(s);
   cav_problem_free(p);
 }

@@ -511,6 +511,8 @@ CAV_API cav_status cav_term_values(const cav_problem *problem, const cav_traject
 /// How far a motion is from what a channel of a record says, over the knots that see it. Of several numbers the length counts, of
 /// orientations the angle between the two.
 typedef struct cav_channel_residual {
+  const char *what;  ///< that is compared: "position", "orientation", "coordinate", or the type of the sensor; static
+  const char *unit;  ///< of rms, worst and the channel's sd; "": a number; static
   int seen;          ///< knots
   double rms, worst; ///< in the unit of the channel; NaN: no knot sees it
   double worst_time; ///< s, of the motion; NaN: likewise

@@ -258,6 +258,37 @@ void cav_targets_note(const cav_verification *verification, int t, double *work,
   }
 }
 
+// what a channel compares and in which unit
+static void name_channel(const cav_model *model, const cav_channel *channel, cav_channel_residual *residual) {
+  double within;
+  residual->what = "position", residual->unit = "m";
+  switch (channel->kind) {
+    case CAV_CHANNEL_MARKER:
+    case CAV_CHANNEL_TRANSLATION:
+      break;
+    case CAV_CHANNEL_COORDINATE:
+      residual->what = "coordinate";
+      residual->unit = model->joint[channel->object].type == CAV_JOINT_SLIDE ? "m" : "rad";
+      break;
+    case CAV_CHANNEL_ROTATION:
+      residual->what = "orientation", residual->unit = "rad";
+      break;
+    case CAV_CHANNEL_SENSOR:
+      residual->what = cav_sensor_rule_of(channel->sensor.type)->name;
+      residual->unit = sensor_unit(model, &channel->sensor, &within);
+      break;
+    case CAV_CHANNEL_KINDS:
+      break;
+  }
+}
+
+void cav_records_begin(const cav_model *model, const cav_track *track, cav_channel_residual *residual) {
+  for (int i = 0; i < track->nchannel; i++) {
+    residual[i] = (cav_channel_residual){.worst_time = NAN};
+    name_channel(model, &track->channel[i], &residual[i]);
+  }
+}
+
 void cav_records_note(const cav_verification *verification, const cav_term *term, int t,
                       cav_channel_residual *residual) {
   int single, whole;

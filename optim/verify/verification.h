@@ -172,6 +172,9 @@ void cav_targets_note(const cav_verification *verification, int t, double *work,
 void cav_targets_verdict(const cav_verification *verification, cav_term_report *report, double residual_cost,
                          cav_verdict *verdict);
 
+/// Residuals of a record's channels before any knot: what each compares and its unit. targets.c.
+void cav_records_begin(const cav_model *model, const cav_track *track, cav_channel_residual *residual);
+
 /// Adds knot t to the residuals of a record's channels: rms sums squares until all knots are in. targets.c.
 void cav_records_note(const cav_verification *verification, const cav_term *term, int t,
                       cav_channel_residual *residual);

@@ -676,7 +676,7 @@ cav_status cav_track_residuals(const cav_problem *problem, const cav_trajectory 
     status = verification_fail(error, CAV_BAD_INPUT, "the problem has %d terms, no record of number %d", problem->nterm,
                                term);
   const cav_track *track = status == CAV_OK ? problem->term[term].track : NULL;
-  for (int i = 0; track && i < track->nchannel; i++) residual[i] = (cav_channel_residual){.worst_time = NAN};
+  if (track) cav_records_begin(problem->model, track, residual);
   for (int t = 0; status == CAV_OK && t <= verification.last; t++) {
     status = stand_at(&verification, t, &work, &room);
     if (status == CAV_OK)

@@ -61,7 +61,7 @@ static void write_channels(FILE *out, const cav_term *term, const cav_channel_re
     cav_table_write_text(out, term->name ? term->name : "");
     fputc(',', out);
     cav_table_write_text(out, channel->name);
-    fprintf(out, ",%s,%d", kind_name[channel->kind], r->seen);
+    fprintf(out, ",%s,%s,%s,%d", kind_name[channel->kind], r->what, r->unit, r->seen);
     const double value[] = {r->rms, channel->sd, r->worst, r->worst_time};
     for (int k = 0; k < 4; k++) {
       fputc(',', out);
@@ -75,7 +75,7 @@ cav_status cav_records_write(const char *path, const cav_records *records, cav_e
   cav_file file;
   cav_status status = cav_file_begin(&file, path, error);
   if (status) return status;
-  fputs("record,channel,of,knots,rms,sd,worst,worst_time\n", file.stream);
+  fputs("record,channel,of,what,unit,knots,rms,sd,worst,worst_time\n", file.stream);
   for (int i = 0; i < records->problem->nterm; i++)
     if (records->residual[i]) write_channels(file.stream, &records->problem->term[i], records->residual[i]);
   return cav_file_end(&file, error);

@@ -21,8 +21,8 @@ void cav_records_free(cav_records *records);
 /// Root mean square of the distances of all markers, m; NaN: no marker is seen.
 double cav_records_markers(const cav_records *records);
 
-/// Writes records.csv: of each channel its record, name and kind, the knots that see it, rms, noise (sd) and largest
-/// distance in its unit, and the time of that, s; empty where no knot sees it.
+/// Writes records.csv: of each channel its record, name and kind, what is compared and its unit, the knots that see it,
+/// rms, noise (sd) and largest distance in that unit, and the time of that, s; empty where no knot sees it.
 cav_status cav_records_write(const char *path, const cav_records *records, cav_error *error);
 
 /// A line for each record and kind of channel in it.
