@@ -10,8 +10,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "vectors.h"
-
 /// Last row of the core's H(:, j) that is not zero by structure.
 static int end_of(const cav_normal *normal, int j) {
   int end = (j / normal->n + 3) * normal->n;
@@ -446,31 +444,19 @@ void cav_normal_solve(const cav_normal *normal, const double *b, double *x) {
   x[last] = step;
 }
 
-/// product += H(j.., j) x, with what it has below the diagonal on its other side too.
-CAV_VECTOR_BODY void multiply_band_body(const cav_normal *normal, const double *x, double *product) {
-  for (int j = 0; j < normal->core; j++) {
-    const double *H = normal->H + (size_t)j * normal->band - j;
-    int end = end_of(normal, j), i = j + 1;
-    cav_four part = {0};
-    double here = x[j], sum = H[j] * here;
-    for (; i + 4 <= end; i += 4) {
-      const cav_four h = *(const cav_four *)(H + i);
-      *(cav_four *)(product + i) += h * here;
-      part += h * *(const cav_four *)(x + i);
-    }
-    for (; i < end; i++) {
-      product[i] += H[i] * here;
-      sum += H[i] * x[i];
-    }
-    product[j] += sum + ((part[0] + part[1]) + (part[2] + part[3]));
-  }
-}
-CAV_BY_VECTORS(multiply_band, (const cav_normal *normal, const double *x, double *product), (normal, x, product))
-
 void cav_normal_multiply(const cav_normal *normal, const double *x, double *product) {
   int core = normal->core, border = normal->border;
   memset(product, 0, (size_t)normal->size * sizeof(double));
-  multiply_band(normal, x, product);
+  for (int j = 0; j < core; j++) {
+    const double *H = normal->H + (size_t)j * normal->band - j;
+    int end = end_of(normal, j);
+    double sum = H[j] * x[j];
+    for (int i = j + 1; i < end; i++) {
+      product[i] += H[i] * x[j];
+      sum += H[i] * x[i];
+    }
+    product[j] += sum;
+  }
   for (int i = 0; i < border; i++) {
     const double *B = normal->B + (size_t)i * core;
     double sum = 0;
