@@ -14,10 +14,13 @@
 
 #include "dense.h"
 
-/// Iterations at most; part of the way to the boundary that a step goes; fraction of the cost that the gap
+/// Iterations at most; a window of them, in which the gap has to become a tenth; how many may meet a Hessian that is not convex; part of the way to the boundary that a step goes; fraction of the cost that the gap
 /// starts with, and with what it starts again.
-enum { ITERATIONS = 60, WINDOW = 10 };
+enum { ITERATIONS = 60, WINDOW = 10, BENT = 9 };
 static const double boundary = 0.995, first_gap[] = {0.1, 1e3, 1e6};
+/// Of a solution to go on from: the gap, of what it decreases; slack, in units of a row, of a row that is at its bound or beyond and was not.
+static const double resumed_gap = 1e-2, nearby = 1e-2;
+
 /// Fraction of its diagonal that is added to a matrix that has no factor, at first.
 static const double first_lift = 1e-14;
 
@@ -30,6 +33,7 @@ enum { SPARSE = 12 };
 typedef struct side {
   double s, e, y, z; ///< z: penalty less y. y 0: there is no such side
   double ds, de, dy; ///< step
+  double off;        ///< s less e, over d: of a start that does not hold them to it
   double w;          ///< 1 / (s/y + e/z)
 } side;
 
@@ -46,6 +50,8 @@ struct cav_quadratic {
   double *local, *image, *block, *dense;  ///< [3nv+1] of one knot, [9nv^2], [most rows * 3nv]
   double *costs;                          ///< normal equations of the costs alone, as they are kept
   double lifted;                          ///< fraction of its diagonal that the last factor needed besides
+  int bent;                               ///< iterations whose matrix was far from positive definite
+  double predicted;                       ///< decrease of the last solution
   double gap;                             ///< complementarities of the last solution
   double *bound;                          ///< [2*n] of the box
 };
@@ -272,22 +278,29 @@ static side centred(double d, double penalty, double mu) {
   return (side){.s = s, .e = e, .y = mu / s, .z = mu / e};
 }
 
-static void start(cav_quadratic *p, const double *radius, const double change[2], double gap) {
+/// Bounds of the step, and how many complementarities there are.
+static void set_bounds(cav_quadratic *p, const double *radius, const double change[2]) {
   p->sides = 0;
   for (int j = 0; j < p->n; j++) {
     int step = p->tr->free_step && j == p->n - 1;
     double r = radius[j / p->tr->nv];
     p->bound[2 * j] = step ? fmax(-r, change[0]) : -r;
     p->bound[2 * j + 1] = step ? fmin(r, change[1]) : r;
-    double width = p->bound[2 * j + 1] - p->bound[2 * j];
-    p->x[j] = fmin(fmax(0, p->bound[2 * j] + 0.05 * width), p->bound[2 * j + 1] - 0.05 * width);
     p->sides += 2;
   }
   for (int t = 0; t < p->tr->nknot; t++)
     for (int i = 0; i < p->tr->knot[t].layout.count; i++)
       for (int k = 0; k < 2; k++)
         p->sides += 2 * (isfinite(k ? p->tr->knot[t].slot[i].upper : p->tr->knot[t].slot[i].lower) != 0);
+}
+
+/// The point of the central path with a gap at a step of nothing.
+static void start(cav_quadratic *p, double gap) {
   double mu = gap / p->sides;
+  for (int j = 0; j < p->n; j++) {
+    double width = p->bound[2 * j + 1] - p->bound[2 * j];
+    p->x[j] = fmin(fmax(0, p->bound[2 * j] + 0.05 * width), p->bound[2 * j + 1] - 0.05 * width);
+  }
   memset(p->dx, 0, (size_t)p->n * sizeof(double));
   rows_times(p, p->x, p->change);
   for (int j = 0; j < p->n; j++) {
@@ -307,6 +320,37 @@ static void start(cav_quadratic *p, const double *radius, const double change[2]
   }
 }
 
+/// A side at signed slack d and about the multiplier that it had, with complementarities of mu: off its slack, unless
+/// it is far inside.
+static side resumed(double d, double penalty, double y, double mu) {
+  double least = mu / fmax(d, nearby), most = penalty - mu / fmax(-d, nearby);
+  y = fmax(fmin(y, fmax(most, 0.5 * penalty)), fmin(least, 0.5 * penalty));
+  side z = {.s = mu / y, .e = mu / (penalty - y), .y = y, .z = penalty - y};
+  z.off = z.s - z.e - d;
+  return z;
+}
+
+/// A start with a gap from the last solution, where that was of the same programme under other penalties.
+static void start_again(cav_quadratic *p, double gap) {
+  double mu = gap / p->sides;
+  memset(p->dx, 0, (size_t)p->n * sizeof(double));
+  rows_times(p, p->x, p->change);
+  for (int j = 0; j < 2 * p->n; j++) {
+    double d = j % 2 ? p->bound[j] - p->x[j / 2] : p->x[j / 2] - p->bound[j];
+    double y = fmax(p->box[j].y, mu / fmax(d, nearby * (p->bound[j | 1] - p->bound[j & ~1])));
+    p->box[j] = (side){.s = mu / y, .y = y, .off = mu / y - d};
+  }
+  for (int t = 0; t < p->tr->nknot; t++) {
+    for (int i = 0; i < p->tr->knot[t].layout.count; i++) {
+      int r = p->first[t] + i;
+      for (int k = 0; k < 2; k++) {
+        double d = slack(&p->tr->knot[t].slot[i], p->value[r] + p->change[r], k);
+        p->row[2 * r + k] = isfinite(d) ? resumed(d, p->penalty[r], p->row[2 * r + k].y, mu) : (side){0};
+      }
+    }
+  }
+}
+
 // ---------------------------------------------------------------- one iteration
 
 /// Moves all by a part of the step; weights of sides, multipliers and the gap there.
@@ -319,6 +363,7 @@ static void advance(cav_quadratic *p, double length) {
       side *z = &p->row[2 * r + k];
       if (z->y == 0) continue;
       z->s += length * z->ds, z->e += length * z->de, z->y += length * z->dy, z->z -= length * z->dy;
+      z->off *= 1 - length;
       z->w = z->y * z->z / (z->s * z->z + z->e * z->y);
       p->multiplier[r] += k ? z->y : -z->y;
       p->gap += z->s * z->y + z->e * z->z;
@@ -327,16 +372,16 @@ static void advance(cav_quadratic *p, double length) {
   for (int j = 0; j < 2 * p->n; j++) {
     side *z = &p->box[j];
     z->s += length * z->ds, z->y += length * z->dy;
+    z->off *= 1 - length;
     z->w = z->y / z->s;
     p->gap += z->s * z->y;
   }
 }
 
-/// Lagrangian's gradient at x and the multipliers, into rhs; the normal equations become the costs' alone.
+/// Lagrangian's gradient at x but for the rows' part, into rhs; the normal equations become the costs' alone.
 static void dual_residual(cav_quadratic *p) {
   cav_normal_load(p->normal, p->costs);
   cav_normal_multiply(p->normal, p->x, p->rhs);
-  add_rows(p, p->multiplier, p->rhs);
   for (int j = 0; j < p->n; j++) p->rhs[j] += p->gradient[j] + p->box[2 * j + 1].y - p->box[2 * j].y;
 }
 
@@ -403,28 +448,29 @@ int cav_quadratic_knot_convex(cav_quadratic *p, int t, double shift) {
   return cav_dense_factor(width, width - 1, p->block, width);
 }
 
-/// Factors the costs' Hessian, which the normal equations are, with all sides. A factor that needed its diagonal lifted
-/// is followed by others that do.
+/// Factors the costs' Hessian, which the normal equations are, with all sides. What the last factor needed on its
+/// diagonal the next one needs nearly, as weights grow.
 static cav_status factor(cav_quadratic *p) {
   for (int r = 0; r < p->rows; r++) p->weight[r] = p->row[2 * r].w + p->row[2 * r + 1].w;
   gather(p);
   for (int j = 0; j < p->n; j++) p->work[j] = p->box[2 * j].w + p->box[2 * j + 1].w;
   cav_normal_add_diagonal(p->normal, p->work);
-  double shift = p->lifted > 0 ? first_lift : 0;
+  double shift = p->lifted > 0 ? fmax(p->lifted / 100, first_lift) : 0;
   cav_status status = cav_normal_factor(p->normal, shift);
   for (p->lifted = shift; status == CAV_NOT_CONVERGED && shift < 10; p->lifted = shift) {
     shift = shift > 0 ? 100 * shift : first_lift;
     status = cav_normal_factor(p->normal, shift);
   }
+  p->bent += p->lifted > 10 * first_lift;
   return status;
 }
 
 /// What a side's complementarities, aimed at mu, push its row by, over its weight. second: with the products of the
 /// predictor's step, which itself is aimed at 0.
 static inline double push_of(const side *z, double mu, int second) {
-  if (!second) return z->e - z->s;
+  if (!second) return z->e - z->s + z->off;
   double product[2] = {z->ds * z->dy, z->de * z->dy};
-  return z->e - z->s + (mu - product[0]) / z->y - (mu + product[1]) / z->z;
+  return z->e - z->s + z->off + (mu - product[0]) / z->y - (mu + product[1]) / z->z;
 }
 
 /// Newton's step of the rows' sides, once J dx is known.
@@ -432,7 +478,7 @@ static inline void step_side(side *z, double dd, double mu, int second) {
   double product = second ? z->de * z->dy : 0;
   z->dy = z->w * (push_of(z, mu, second) - dd);
   z->de = (mu + product + z->e * z->dy) / z->z - z->e;
-  z->ds = dd + z->de;
+  z->ds = dd + z->de - z->off;
 }
 
 /// Newton's step to where all complementarities are 0, or where second is 1, with the products of that step, mu; rhs
@@ -440,14 +486,14 @@ static inline void step_side(side *z, double dd, double mu, int second) {
 static void step(cav_quadratic *p, double mu, int second) {
   for (int r = 0; r < p->rows; r++) {
     const side *z = &p->row[2 * r];
-    p->ray[r] = 0;
+    p->ray[r] = -p->multiplier[r];
     if (z[0].y != 0) p->ray[r] += z[0].w * push_of(&z[0], mu, second);
     if (z[1].y != 0) p->ray[r] -= z[1].w * push_of(&z[1], mu, second);
   }
   for (int j = 0; j < p->n; j++) {
     const side *z = &p->box[2 * j];
     double pull = second ? (mu - z[0].ds * z[0].dy) / z[0].s - (mu - z[1].ds * z[1].dy) / z[1].s : 0;
-    p->work[j] = pull - z[0].y + z[1].y - p->rhs[j];
+    p->work[j] = pull - z[0].y + z[1].y + z[0].w * z[0].off - z[1].w * z[1].off - p->rhs[j];
   }
   add_rows(p, p->ray, p->work);
   cav_normal_solve(p->normal, p->work, p->dx);
@@ -459,7 +505,7 @@ static void step(cav_quadratic *p, double mu, int second) {
   }
   for (int j = 0; j < 2 * p->n; j++) {
     side *z = &p->box[j];
-    double ds = j % 2 ? -p->dx[j / 2] : p->dx[j / 2];
+    double ds = (j % 2 ? -p->dx[j / 2] : p->dx[j / 2]) - z->off;
     z->dy = (second ? (mu - z->ds * z->dy) / z->s : 0) - z->w * ds - z->y;
     z->ds = ds;
   }
@@ -506,17 +552,17 @@ static cav_status approach(cav_quadratic *p, double tolerance, double *left) {
   int held = 0;
   double past = INFINITY;
   *left = 1;
-  p->lifted = 0;
+  p->lifted = p->bent = 0;
   advance(p, 0);
   for (int i = 0; i < ITERATIONS && held < 3; i++) {
-    if (p->gap <= tolerance && *left <= 1e-8) break;
+    if ((p->gap <= tolerance && *left <= 1e-8) || p->bent > BENT) break;
     if (cav_transcription_stopped(p->tr)) return CAV_INTERRUPTED;
     dual_residual(p);
     cav_status status = factor(p);
     if (status != CAV_OK) return status;
     // predictor, then the corrector towards what it shows to be within reach
     step(p, 0, 0);
-    double length = fmin(boundary * longest(p), 1), ratio = gap_after(p, length) / p->gap;
+    double length = fmin(boundary * longest(p), 1), ratio = fmin(gap_after(p, length) / p->gap, 1);
     step(p, ratio * ratio * ratio * p->gap / p->sides, 1);
     length = fmin(boundary * longest(p), 1);
     advance(p, length);
@@ -536,9 +582,29 @@ static cav_status approach(cav_quadratic *p, double tolerance, double *left) {
   return CAV_OK;
 }
 
+/// Solves it from the last solution, where again is 1 and that leads there, or from one start after another.
+static cav_status solve_from(cav_quadratic *p, int again, double tolerance) {
+  double scale = fmax(cav_transcription_cost(p->tr), tolerance), left = 1;
+  cav_status status = CAV_NOT_CONVERGED;
+  for (int i = again ? -1 : 0; i < STARTS && status == CAV_NOT_CONVERGED; i++) {
+    if (i < 0)
+      start_again(p, fmax(resumed_gap * p->predicted, 1e2 * tolerance));
+    else
+      start(p, first_gap[i] * scale);
+    status = approach(p, tolerance, &left);
+    // a little more is what rounding leaves
+    if (status == CAV_OK && (p->gap > 1e4 * tolerance || left > 1e-4)) status = CAV_NOT_CONVERGED;
+    // another start helps where this one was held at its bounds, not where the gap stands still
+    if (i >= 0 && (left <= 1e-4 || p->bent > BENT)) break;
+  }
+  // where the Hessian is not convex the conditions hold at what may be no minimum, or one above the start
+  p->predicted = cav_quadratic_decrease(p);
+  if (status == CAV_OK && (p->lifted > 1e-10 || p->predicted < -10 * fmax(p->gap, tolerance)))
+    status = CAV_NOT_CONVERGED;
+  return status;
+}
+
 cav_status cav_quadratic_solve(cav_quadratic *p, const double *radius, const double change[2], double tolerance) {
-  double scale = 0, left = 1;
-  for (int t = 0; t < p->tr->nknot; t++) scale += p->tr->knot[t].cost;
   memset(p->gradient, 0, (size_t)p->n * sizeof(double));
   for (int t = 0; t < p->tr->nknot; t++) {
     const cav_knot *knot = &p->tr->knot[t];
@@ -547,24 +613,16 @@ cav_status cav_quadratic_solve(cav_quadratic *p, const double *radius, const dou
     give(p, t, p->local, p->gradient);
   }
   prepare(p);
-  cav_status status = CAV_NOT_CONVERGED;
-  for (int i = 0; i < STARTS && status == CAV_NOT_CONVERGED; i++) {
-    start(p, radius, change, first_gap[i] * fmax(scale, tolerance));
-    status = approach(p, tolerance, &left);
-    // a little more is what rounding leaves
-    if (status == CAV_OK && (p->gap > 1e4 * tolerance || left > 1e-4)) status = CAV_NOT_CONVERGED;
-    // another start helps where this one was held at its bounds, not where the gap stands still
-    if (left <= 1e-4) break;
-  }
-  // where the Hessian is not convex the conditions hold at what may be no minimum, or one above the start
-  if (status == CAV_OK && (p->lifted > 1e-10 || cav_quadratic_decrease(p) < -10 * fmax(p->gap, tolerance)))
-    status = CAV_NOT_CONVERGED;
-  return status;
+  set_bounds(p, radius, change);
+  return solve_from(p, 0, tolerance);
 }
+
+cav_status cav_quadratic_solve_again(cav_quadratic *p, double tolerance) { return solve_from(p, 1, tolerance); }
 
 double cav_quadratic_unfinished(cav_quadratic *p) {
   double decrease = cav_quadratic_decrease(p);
   dual_residual(p);
+  add_rows(p, p->multiplier, p->rhs);
   return decrease > 0 ? -dot(p->n, p->rhs, p->x) / decrease : 0;
 }
 

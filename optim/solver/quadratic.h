@@ -20,6 +20,9 @@ void cav_quadratic_free(cav_quadratic *quadratic);
 /// change[0] .. change[1], too. CAV_NOT_CONVERGED: the gap was not reached; the best iterate stands. CAV_INTERRUPTED.
 cav_status cav_quadratic_solve(cav_quadratic *quadratic, const double *radius, const double change[2], double gap);
 
+/// The last programme again, whose penalties have changed since: from its solution, in a third of the iterations.
+cav_status cav_quadratic_solve_again(cav_quadratic *quadratic, double gap);
+
 /// Further step from the solution x, in the metric that it was found in, towards rows that are off by offset [rows], and
 /// forces that are off by force [nknot*nv] as the costs of efforts weigh them (NULL: rows alone). Writes x [unknowns].
 void cav_quadratic_correct(cav_quadratic *quadratic, const double *offset, const double *force, double *x);

@@ -164,12 +164,12 @@ static cav_status solve_programme(cav_solve_run *run, cav_quadratic *qp, const d
   cav_status status = CAV_OK;
   *rest = *rest > 0 ? *rest - 1 : 0;
   for (int i = 0; i < RAISES; i++) {
-    status = cav_quadratic_solve(qp, radius, change, gap);
+    status = i == 0 ? cav_quadratic_solve(qp, radius, change, gap) : cav_quadratic_solve_again(qp, gap);
     if (status != CAV_OK) break;
     double missing = cav_problem_has_record(run->problem) ? linear_violation(run->tr, qp) : 0;
     if (missing > fmax((1 - brought_in) * before, missed_little)) {
       memcpy(cav_quadratic_penalty(qp), kept, bytes);
-      status = cav_quadratic_solve(qp, radius, change, gap);
+      status = cav_quadratic_solve_again(qp, gap);
       *rest = RESTS;
       break;
     }
