@@ -1,5 +1,6 @@
 #include "course.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -60,10 +61,10 @@ cav_status cav_course_find(cav_course *c, cav_transcription *tr, cav_quadratic *
 }
 
 void cav_course_correct(cav_course *c, const cav_transcription *tr, cav_quadratic *qp, double multiple, double *x) {
-  const double *linear = cav_quadratic_prediction(qp), *here = c->here + c->rows;
+  const double *linear = cav_quadratic_prediction(qp), *here = c->here + c->rows, part_way = fmin(multiple, 1);
   double *force = c->miss + c->rows;
   read_all(tr, c->miss);
-  for (int k = 0; k < c->rows; k++) c->miss[k] -= linear[k];
+  for (int k = 0; k < c->rows; k++) c->miss[k] -= c->here[k] + part_way * (linear[k] - c->here[k]);
   for (int i = 0; i < c->forces; i++) force[i] -= here[i] + multiple * c->derivative[i];
   cav_quadratic_correct(qp, c->miss, c->known ? force : NULL, x);
 }

@@ -56,6 +56,9 @@ enum { LEAPS = 4, LEAP_BOXES = sizeof leap_box / sizeof *leap_box };
 /// the decrease a knot has to miss for its box to be at fault instead.
 static const double poor_ratio = 0.4, far = 2;
 
+/// Parts of a step that are tried where it falls short, from which ratios of it on; from where it does not.
+static const double shorter[2][2] = {{0.5, -3}, {0.25, -20}}, enough_of_it = 0.25;
+
 /// Part of what a step misses that a correction has to bring for another one to follow.
 static const double worth = 0.1;
 
@@ -193,6 +196,7 @@ typedef struct descent {
   int rest;                        ///< programmes in which no raise is tried
   double *radius;                  ///< [blocks+1] box about the blocks of unknowns, then about the step's logarithm
   double *before, *after, *tried; ///< [nknot] the knots' parts of the merit: here, at the step to take, at the last one
+  double *parts;                  ///< [nknot] of the whole step, while a part of it is tried
   double *forecast, *next;        ///< [nknot] of the decrease; [blocks+1] boxes to come
   double merit;
   double predicted; ///< decrease, by the last programme
@@ -220,7 +224,7 @@ static int descent_new(descent *d, cav_solve_run *run) {
   d->stale = malloc((size_t)run->tr->nknot);
   int whole = d->qp && cav_course_make(&d->course, run->tr, (int)rows);
   size_t knots = (size_t)run->tr->nknot, boxes = (size_t)cav_transcription_blocks(run->tr) + 1;
-  d->x = calloc(n + 3 * rows + 5 * knots + 2 * boxes, sizeof(double));
+  d->x = calloc(n + 3 * rows + 6 * knots + 2 * boxes, sizeof(double));
   d->second = cav_trajectory_copy(run->at);
   d->best = cav_trajectory_copy(run->at);
   if (!whole || !d->curvature || !d->stale || !d->x || !d->second || !d->best || !cav_transcription_keep_rows(run->tr))
@@ -235,6 +239,7 @@ static int descent_new(descent *d, cav_solve_run *run) {
   d->forecast = d->tried + knots;
   d->next = d->forecast + knots;
   d->need = d->next + boxes;
+  d->parts = d->need + knots;
   set_radius(run->tr, d->radius, first_radius);
   return 1;
 }
@@ -421,6 +426,30 @@ static cav_status try_step(cav_solve_run *run, descent *d, double multiple, doub
   return status;
 }
 
+/// A part of a step that falls short, in the place of a programme in smaller boxes: what its course misses goes with the
+/// cube of it. run->spare stays what it is where the part gains less.
+static cav_status shorten(cav_solve_run *run, descent *d, double *merit) {
+  for (int i = 0; i < 2; i++) {
+    double part = shorter[i][0], fraction = part * (2 - part), there;
+    if (d->ratio < shorter[i][1]) continue;
+    memcpy(d->parts, d->after, (size_t)run->tr->nknot * sizeof(double));
+    exchange(&run->spare, &d->best);
+    cav_status status = try_step(run, d, part, fraction * d->predicted, &there);
+    if (status != CAV_OK) return status;
+    if (there < *merit && d->merit - there > 0.1 * fraction * d->predicted) {
+      *merit = there;
+      d->predicted *= fraction;
+      for (int t = 0; t < run->tr->nknot; t++) d->forecast[t] *= fraction;
+      d->ratio = (d->merit - there) / d->predicted;
+      return CAV_OK;
+    }
+    exchange(&run->spare, &d->best);
+    memcpy(d->after, d->parts, (size_t)run->tr->nknot * sizeof(double));
+    d->last = NULL;
+  }
+  return CAV_OK;
+}
+
 /// Whether the programme's step is too short: the curvature was made convex, or what held its factors held the step.
 static int is_short(const descent *d) {
   return d->ratio > exceeded || (d->ratio > fair && cav_quadratic_unfinished(d->qp) > unfinished);
@@ -472,7 +501,7 @@ static void shrink(const cav_solve_run *run, descent *d, int t, double factor) {
 
 /// Boxes for the next programme: smaller about knots that keep a step from what it should gain, larger about those that
 /// do as forecast, where they held the step.
-static void set_boxes(const cav_solve_run *run, descent *d) {
+static void find_boxes(const cav_solve_run *run, descent *d) {
   const cav_transcription *tr = run->tr;
   const double *x = cav_quadratic_step(d->qp);
   double most = 0;
@@ -488,7 +517,10 @@ static void set_boxes(const cav_solve_run *run, descent *d) {
     else if (off > 0.1 * d->predicted && d->ratio < 0.75)
       shrink(run, d, t, 1);
   }
-  memcpy(d->radius, d->next, ((size_t)cav_transcription_blocks(tr) + 1) * sizeof(double));
+}
+
+static void take_boxes(const cav_solve_run *run, descent *d) {
+  memcpy(d->radius, d->next, ((size_t)cav_transcription_blocks(run->tr) + 1) * sizeof(double));
 }
 
 static double largest_radius(const cav_transcription *tr, const double *radius) {
@@ -520,9 +552,11 @@ static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
     status = try_step(run, d, 1, 0.9 * d->predicted, &trial);
     if (status != CAV_OK) return status;
     d->ratio = (d->merit - trial) / d->predicted;
+    find_boxes(run, d);
+    status = d->ratio < enough_of_it ? shorten(run, d, &trial) : is_short(d) ? extrapolate(run, d, &trial) : CAV_OK;
+    if (status != CAV_OK) return status;
     if (d->ratio > 1e-4) {
-      set_boxes(run, d);
-      if (is_short(d) && (status = extrapolate(run, d, &trial)) != CAV_OK) return status;
+      take_boxes(run, d);
       d->gain = d->merit - trial;
       d->few = d->gain < gauss_newton * scale ? d->few + 1 : 0;
       exchange(&run->at, &run->spare);
@@ -537,7 +571,7 @@ static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
     double miss = 0;
     for (int t = 0; t < run->tr->nknot; t++) miss = fmax(miss, missed(d, t));
     if (d->age > 0 && miss < far * d->predicted) return renew(run, d, 0, taken);
-    set_boxes(run, d);
+    take_boxes(run, d);
     if (largest_radius(run->tr, d->radius) < least_radius) break;
   }
   return d->age < 0 && !is_lost(run, d) ? renew(run, d, 1, taken) : CAV_OK;
