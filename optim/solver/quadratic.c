@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "dense.h"
+#include "readings.h"
 
 /// Iterations at most; a window of them, in which the gap has to become a tenth; how many may meet a Hessian that is not convex; part of the way to the boundary that a step goes; fraction of the cost that the gap
 /// starts with, and with what it starts again.
@@ -654,6 +655,8 @@ static void subtract_efforts(cav_quadratic *p, const double *force, double *out)
       const double *du = knot->du + (size_t)d * (size_t)width;
       for (int k = 0; p->image[d] != 0 && k < width; k++) p->local[k] -= p->image[d] * du[k];
     }
+    if (p->tr->periodicity && (t < 2 || t == p->tr->nknot - 1))
+      cav_transcription_wrap(p->tr, p->tr->scratch, t, 1, p->local);
     give(p, t, p->local, out);
   }
 }
