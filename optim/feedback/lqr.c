@@ -27,34 +27,35 @@ static const double longest = 0.00125;
 /// The regulator at one step: state (dq, dv), input fractions of the actuators' limits. Matrices are column-major. The
 /// step is dv' = D (dq, dv) + Du w, dq' = E dq + h J dv', where E and J are 1 but for the blocks of rotations.
 typedef struct regulator {
-  int nv, nu, n;            ///< n = 2 nv
-  int finer;                ///< finer steps in a step of the motion
-  double h;                 ///< finer step, s
-  double q, v;              ///< penalties on dq' M dq and dv' M dv a second
-  double *P;                ///< [n*n] penalty of what is left
-  double *T;                ///< [n*nv] P (h J; 1)
-  double *Q;                ///< [nv*nv] penalty of dv': (h J; 1)' T
-  double *L;                ///< [nv*n] of dv' against the dq of before: (E' T above)', 0
-  double *W, *Wu;           ///< [nv*n] Q D + L, [nv*nu] Q Du
-  double *S;                ///< [n*n] mean of the penalty of the state before over the laws
-  double *H;                ///< [nu*nu] of the inputs', and the penalty on inputs
-  double *G, *K, *sum;      ///< [nu*n] G of both; K = H^-1 G: input -K x; sum of K over the finer steps of a knot
-  double *D;                ///< [nv*(n+nu)] derivatives of v' by dq, dv and inputs
-  double *right;            ///< [nv*(n+nu)] of the inverse by dq and dv, and forces of inputs
-  double *system;           ///< [nv*nv] of the inverse by v'
-  double *inverse, *unit;   ///< [nv*nv] of the system, [nu*nu] of H
-  double *dq, *dv, *dn;     ///< [nv*nv] of the inverse, row-major
-  double *M;                ///< [nv*nv]
-  double *u;                ///< [nv]
+  int nv, nu, n, all;    ///< n = 2 nv, all = n + nu
+  int finer;             ///< finer steps in a step of the motion
+  double h;              ///< finer step, s
+  double q, v;           ///< penalties on dq' M dq and dv' M dv a second
+  double *P;             ///< [n*n] penalty of what is left
+  double *T;             ///< [n*nv] P (h J; 1)
+  double *Q;             ///< [nv*nv] penalty of dv': (h J; 1)' T
+  double *L;             ///< [nv*n] of dv' against the dq of before: (E' T above)', 0
+  double *W;             ///< [nv*(n+nu)] Q D + (L, 0)
+  double *S;             ///< [all*all] mean over the laws of the penalty on the state before and on inputs: S, G and H
+  double *G, *H;         ///< of inputs against states and inputs, within S
+  double *K, *sum;       ///< [nu*n] K = H^-1 G: input -K x; sum of K over the finer steps of a knot
+  double *D;             ///< [nv*(n+nu)] derivatives of v' by dq, dv and inputs
+  double *right;         ///< [nv*(n+nu)] of the inverse by dq and dv, and forces of inputs
+  double *system;        ///< [nv*nv] of the inverse by v'
+  double *inverse;       ///< [nv*nv] of the system
+  double *unit, *factor; ///< [nu*nu] inverses of H and of its factor
+  double *dq, *dv, *dn;  ///< [nv*nv] of the inverse, row-major
+  double *M;             ///< [nv*nv]
+  double *u;             ///< [nv]
   double (*rotation)[2][9]; ///< [nrotation] blocks of E and J, row-major
   void *memory;
 } regulator;
 
 static int regulator_make(regulator *r, const cav_transcription *tr) {
   int nv = tr->model->nv, nu = tr->model->nu, n = 2 * nv;
-  size_t v = (size_t)nv, u = (size_t)nu, s = (size_t)n;
-  *r = (regulator){.nv = nv, .nu = nu, .n = n};
-  double *m = calloc(v * u + 2 * s * s + 3 * v * s + 2 * u * u + 3 * u * s + 2 * v * (s + u) + 7 * v * v + v +
+  size_t v = (size_t)nv, u = (size_t)nu, s = (size_t)n, all = s + u;
+  *r = (regulator){.nv = nv, .nu = nu, .n = n, .all = n + nu};
+  double *m = calloc(s * s + all * all + 2 * v * s + 2 * u * u + 2 * u * s + 3 * v * all + 7 * v * v + v +
                          18 * (size_t)tr->nrotation + 1,
                      sizeof *m);
   r->memory = m;
@@ -63,17 +64,17 @@ static int regulator_make(regulator *r, const cav_transcription *tr) {
   r->T = m, m += s * v;
   r->Q = m, m += v * v;
   r->L = m, m += v * s;
-  r->W = m, m += v * s;
-  r->Wu = m, m += v * u;
-  r->S = m, m += s * s;
-  r->H = m, m += u * u;
-  r->G = m, m += u * s;
+  r->W = m, m += v * all;
+  r->S = m, m += all * all;
+  r->G = r->S + s;
+  r->H = r->G + s * all;
   r->K = m, m += u * s;
   r->sum = m, m += u * s;
-  r->D = m, m += v * (s + u);
-  r->right = m, m += v * (s + u);
+  r->D = m, m += v * all;
+  r->right = m, m += v * all;
   r->inverse = m, m += v * v;
   r->unit = m, m += u * u;
+  r->factor = m, m += u * u;
   r->system = m, m += v * v;
   r->dq = m, m += v * v;
   r->dv = m, m += v * v;
@@ -117,7 +118,7 @@ static void add_inputs(regulator *r) {
 /// D := derivatives of v' by (q, v) and the inputs, from those of the inverse.
 static cav_status find_derivative(regulator *r, const cav_model *model, cav_state *state, const double *q,
                                   const double *v) {
-  int nv = r->nv, columns = r->n + r->nu;
+  int nv = r->nv;
   const double *next = v + nv;
   cav_status status = cav_inverse(model, state, q, v, next, r->u);
   if (status == CAV_OK) status = cav_derivatives(model, state, r->dq, r->dv, r->dn);
@@ -133,7 +134,7 @@ static cav_status find_derivative(regulator *r, const cav_model *model, cav_stat
     }
   // a product takes less time than a solution of so many columns
   if (!cav_dense_solve_general(nv, r->system, nv, nv, r->inverse, nv)) return CAV_NOT_CONVERGED;
-  memset(r->D, 0, (size_t)nv * columns * sizeof *r->D);
+  memset(r->D, 0, (size_t)nv * (size_t)r->all * sizeof *r->D);
   cav_dense_product(nv, r->n, nv, 1, r->inverse, nv, r->right, nv, r->D, nv);
   add_inputs(r);
   return CAV_OK;
@@ -167,7 +168,7 @@ static void turn_columns(const regulator *r, const cav_transcription *tr, int wh
 
 /// From P what no law has a part in: T, Q, L, and S of a step that keeps its velocity.
 static void carry_back(regulator *r, const cav_transcription *tr) {
-  int nv = r->nv, n = r->n;
+  int nv = r->nv, n = r->n, all = r->all;
   for (int j = 0; j < nv; j++) memcpy(r->T + (size_t)j * n, r->P + (size_t)j * n, (size_t)n * sizeof(double));
   turn_columns(r, tr, 1, n, r->T, n);
   for (int j = 0; j < nv; j++)
@@ -181,15 +182,15 @@ static void carry_back(regulator *r, const cav_transcription *tr) {
   for (int j = 0; j < nv; j++)
     for (int i = 0; i < nv; i++) r->Q[i * nv + j] = r->h * r->Q[i * nv + j] + r->T[j * n + nv + i];
   // E' P11 E: P11 E, transposed, and E once more
-  memset(r->S, 0, (size_t)n * n * sizeof(double));
-  for (int j = 0; j < nv; j++) memcpy(r->S + (size_t)j * n, r->P + (size_t)j * n, (size_t)nv * sizeof(double));
-  turn_columns(r, tr, 0, nv, r->S, n);
+  memset(r->S, 0, (size_t)all * (size_t)all * sizeof(double));
+  for (int j = 0; j < nv; j++) memcpy(r->S + (size_t)j * all, r->P + (size_t)j * n, (size_t)nv * sizeof(double));
+  turn_columns(r, tr, 0, nv, r->S, all);
   for (int j = 0; j < nv; j++)
     for (int i = 0; i < j; i++) {
-      const double a = r->S[j * n + i];
-      r->S[j * n + i] = r->S[i * n + j], r->S[i * n + j] = a;
+      const double a = r->S[j * all + i];
+      r->S[j * all + i] = r->S[i * all + j], r->S[i * all + j] = a;
     }
-  turn_columns(r, tr, 0, nv, r->S, n);
+  turn_columns(r, tr, 0, nv, r->S, all);
 }
 
 /// P += scale * penalty of straying.
@@ -202,41 +203,36 @@ static void add_penalty(regulator *r, double scale) {
     }
 }
 
-/// Adds D of one law, of which there are so many: S += part (D'QD + L'D + D'L), G += part Du'(QD + L), H += part
-/// Du'QDu. Of the lower triangle of S.
+/// Adds D of one law, of which there are so many: S += part (D'QD + L'D + D'L), L with zeros for inputs. Of the lower
+/// triangle.
 static void add_law(regulator *r, int laws) {
-  int nv = r->nv, n = r->n, nu = r->nu;
-  const size_t all = (size_t)nv * n, inputs = (size_t)nv * nu;
-  const double part = 1.0 / laws, *Du = r->D + all;
-  memset(r->W, 0, all * sizeof *r->W);
-  cav_dense_product(nv, n, nv, part, r->Q, nv, r->D, nv, r->W, nv);
-  for (size_t i = 0; i < all; i++) r->W[i] += part * r->L[i];
-  if (nu > 0) {
-    memset(r->Wu, 0, inputs * sizeof *r->Wu);
-    cav_dense_product(nv, nu, nv, part, r->Q, nv, Du, nv, r->Wu, nv);
-    cav_dense_product_transposed(CAV_PART_ALL, nu, n, nv, 1, Du, nv, r->W, nv, r->G, nu);
-    cav_dense_product_transposed(CAV_PART_ALL, nu, nu, nv, 1, Du, nv, r->Wu, nv, r->H, nu);
-  }
-  cav_dense_product_transposed(CAV_PART_LOWER, n, n, nv, 1, r->D, nv, r->W, nv, r->S, n);
+  int nv = r->nv, all = r->all;
+  const size_t states = (size_t)nv * (size_t)r->n;
+  const double part = 1.0 / laws;
+  memset(r->W, 0, (size_t)nv * (size_t)all * sizeof *r->W);
+  cav_dense_product(nv, all, nv, part, r->Q, nv, r->D, nv, r->W, nv);
+  for (size_t i = 0; i < states; i++) r->W[i] += part * r->L[i];
+  cav_dense_product_transposed(CAV_PART_LOWER, all, all, nv, 1, r->D, nv, r->W, nv, r->S, all);
   // L'D, whose rows below are zero: of the lower triangle what is on the left
-  cav_dense_product_transposed(CAV_PART_LOWER, nv, nv, nv, part, r->L, nv, r->D, nv, r->S, n);
+  cav_dense_product_transposed(CAV_PART_LOWER, nv, nv, nv, part, r->L, nv, r->D, nv, r->S, all);
 }
 
-/// One step back, from S, G and H: K, and P of the step before without the penalty on its state. The penalty on inputs
-/// is one a second.
+/// One step back, from S: K, and P of the step before without the penalty on its state. The penalty on inputs is one a
+/// second.
 static cav_status riccati(regulator *r) {
-  int n = r->n, nu = r->nu;
-  memcpy(r->P, r->S, (size_t)n * (size_t)n * sizeof(double));
+  int n = r->n, nu = r->nu, all = r->all;
+  for (int j = 0; j < n; j++) memcpy(r->P + j * n + j, r->S + j * all + j, (size_t)(n - j) * sizeof(double));
   if (nu > 0) {
-    for (int i = 0; i < nu; i++) r->H[i * nu + i] += r->h;
-    if (!cav_dense_factor(nu, nu - 1, r->H, nu)) return CAV_NOT_CONVERGED;
+    for (int i = 0; i < nu; i++) r->H[i * all + i] += r->h;
+    if (!cav_dense_factor(nu, nu - 1, r->H, all)) return CAV_NOT_CONVERGED;
+    memset(r->factor, 0, (size_t)nu * (size_t)nu * sizeof *r->factor);
+    for (int i = 0; i < nu; i++) r->factor[i * (nu + 1)] = 1;
+    cav_dense_solve_lower(nu, nu - 1, r->H, all, nu, r->factor, nu);
     memset(r->unit, 0, (size_t)nu * (size_t)nu * sizeof *r->unit);
-    for (int i = 0; i < nu; i++) r->unit[i * (nu + 1)] = 1;
-    cav_dense_solve_lower(nu, nu - 1, r->H, nu, nu, r->unit, nu);
-    cav_dense_solve_upper(nu, nu - 1, r->H, nu, nu, r->unit, nu);
+    cav_dense_product_transposed(CAV_PART_ALL, nu, nu, nu, 1, r->factor, nu, r->factor, nu, r->unit, nu);
     memset(r->K, 0, (size_t)nu * n * sizeof *r->K);
-    cav_dense_product(nu, n, nu, 1, r->unit, nu, r->G, nu, r->K, nu);
-    cav_dense_product_transposed(CAV_PART_LOWER, n, n, nu, -1, r->G, nu, r->K, nu, r->P, n);
+    cav_dense_product(nu, n, nu, 1, r->unit, nu, r->G, all, r->K, nu);
+    cav_dense_product_transposed(CAV_PART_LOWER, n, n, nu, -1, r->G, all, r->K, nu, r->P, n);
   }
   for (int j = 0; j < n; j++)
     for (int i = j + 1; i < n; i++) r->P[(size_t)i * n + j] = r->P[(size_t)j * n + i];
@@ -260,14 +256,11 @@ static void add_gains(regulator *r, int k, double *gain_q, double *gain_v) {
   memset(r->sum, 0, (size_t)inputs * sizeof *r->sum);
 }
 
-/// S, below its diagonal, G and H at (q, v) under all laws, from P.
+/// S, below its diagonal, at (q, v) under all laws, from P.
 static cav_status add_laws(regulator *r, const cav_transcription *tr, const cav_options *law, int laws,
                            cav_state *state, const double *q, const double *v) {
-  size_t n = (size_t)r->n, nu = (size_t)r->nu;
   find_rotations(r, tr, v + r->nv);
   carry_back(r, tr);
-  memset(r->G, 0, nu * n * sizeof(double));
-  memset(r->H, 0, nu * nu * sizeof(double));
   for (int i = 0; i < laws; i++) {
     state->options = cav_options_at_step(&law[i], r->h);
     state->options.order = CAV_ORDER_EULER;
