@@ -3,7 +3,8 @@
 /// verification, some of which start a little off, and two with a small push: gains that fit one course of the
 /// simulation may lose the next. A few that serve different motions come first, then points that fill the range of all.
 /// The first that follows in all loops and ends near enough is taken; what is asked beyond the certificate, that it ends
-/// near and withstands the pushes, is asked of the first few alone. Kept is what follows in most loops, in their order,
+/// near and withstands the pushes, is asked of the first few alone. Where a set does what the certificate asks, so many in
+/// a row that are no better end it too. Kept is what follows in most loops, in their order,
 /// then what ends nearest in the worst of them. A trial begins with the loop that decided about the best so far, and
 /// ends with the first one that is lost or shows that it is no better.
 #include <math.h>
@@ -14,7 +15,7 @@
 #include "schedule.h"
 #include "verification.h"
 
-enum { LAWS = 2, TRIALS = 40, FEW = 3 };
+enum { LAWS = 2, TRIALS = 40, FEW = 3, IN_VAIN = 12 };
 
 /// What a regulator is made of: penalties on straying, and the fractions of the schedule whose contact laws it reckons
 /// with.
@@ -63,6 +64,7 @@ typedef struct search {
   set best;
   outcome reached;
   int found; ///< 1: there is a best
+  int vain;  ///< sets since that were no better
 } search;
 
 /// The regulator of a set, into gain.
@@ -95,6 +97,7 @@ static cav_status try(search *s, const set *one) {
   outcome now = {.follows = CAV_LOOPS};
   cav_status status = regulate(s, one);
   const int first = s->reached.decided;
+  s->vain++;
   for (int k = 0; k < CAV_LOOPS && status == CAV_OK; k++) {
     const int loop = k == 0 ? first : k <= first ? k - 1 : k;
     struct cav_follow follow;
@@ -110,6 +113,7 @@ static cav_status try(search *s, const set *one) {
   s->best = *one;
   s->reached = now;
   s->found = 1;
+  s->vain = 0;
   return CAV_OK;
 }
 
@@ -137,6 +141,12 @@ static set sample(const search *s, int trial) {
   return to;
 }
 
+/// Whether the best is good enough, or no better one is to be expected.
+static int done(const search *s, int trials) {
+  if (!s->found || s->reached.follows < enough(trials)) return 0;
+  return s->reached.error <= near_enough || s->vain >= IN_VAIN;
+}
+
 cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription *tr, const cav_trajectory *at, int sets,
                             int (*report)(void *context, int set, int most), void *context, cav_solution *solution,
                             cav_error *error) {
@@ -151,7 +161,7 @@ cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription 
   for (int i = 0; i < trials && status == CAV_OK; i++) {
     const set one = sample(&s, i);
     status = report(context, i + 1, trials) ? CAV_INTERRUPTED : try(&s, &one);
-    if (s.found && s.reached.follows >= enough(i + 1) && s.reached.error <= near_enough) break;
+    if (done(&s, i + 1)) break;
   }
   cav_verification_end(&s.verification);
   free(s.gain);

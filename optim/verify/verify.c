@@ -429,6 +429,15 @@ static int pushed_link(const cav_verification *verification) {
   return found;
 }
 
+// the way that ends farthest off comes first: of the next push, twice as large, it is most likely to be lost
+static void put_worst_first(int order[4], const double error[4]) {
+  for (int i = 1; i < 4; i++)
+    for (int k = i; k > 0 && error[order[k]] > error[order[k - 1]]; k--) {
+      const int held = order[k];
+      order[k] = order[k - 1], order[k - 1] = held;
+    }
+}
+
 // the largest push along x and y, either way, with which a certified motion still follows
 static cav_status find_push(const cav_verification *verification, const double *gain_q, const double *gain_v,
                             double *survived) {
@@ -438,13 +447,18 @@ static cav_status find_push(const cav_verification *verification, const double *
   cav_disturbance push = {.link = pushed_link(verification), .fraction = 1.0 / 3, .before = &before};
   cav_status status = before.x ? CAV_OK : CAV_NO_MEMORY;
   struct cav_follow follow = {0};
+  int order[4] = {0, 1, 2, 3};
+  double error[4];
   *survived = push.link > 0 ? 0 : NAN;
   for (int rung = 0; rung < PUSHES && push.link > 0 && status == CAV_OK && !*follow.lost; rung++) {
     double size = ldexp(small_push * verification->weight, rung);
     for (int i = 0; i < 4 && status == CAV_OK && !*follow.lost; i++) {
-      push.impulse[0] = size * way[i][0], push.impulse[1] = size * way[i][1];
+      const int k = order[i];
+      push.impulse[0] = size * way[k][0], push.impulse[1] = size * way[k][1];
       status = cav_replay_own(verification, 0, gain_q, gain_v, &push, &follow);
+      error[k] = follow.error;
     }
+    if (status == CAV_OK && !*follow.lost) put_worst_first(order, error);
     if (status == CAV_OK && !*follow.lost) *survived = size;
   }
   free(before.x);
