@@ -11,6 +11,7 @@ enum {
   PANEL = 24,    ///< columns of a factor's panel: a multiple of every tile's columns
   SLICE = 128,   ///< longest sum of a tile
   WIDE = 96,     ///< columns of B packed at a time: a multiple of every tile's columns
+  SQUARE = 128,  ///< columns of a square whose rows' zeros are left out, at most
   TILE_MOST = 16 ///< rows of the tallest tile
 };
 
@@ -19,11 +20,18 @@ typedef struct triangle {
   double entry[PANEL * PANEL], inverse[PANEL];
 } triangle;
 
-/// One processor's way: C -= s packed A [k][rows] times packed B [k][columns]; X := X L'^-1 for rows of a panel packed
-/// [PANEL][rows]; factor of n columns of a triangle in its place, zero if a pivot is not positive; x -= s a; a dot b.
+/// Rows of a slice, by bits.
+typedef struct row_set {
+  unsigned long long bits[SLICE / 64];
+} row_set;
+
+/// One processor's way: C -= s packed A [k][rows] times packed B [k][columns]; the product of rows in a set, all
+/// `apart` one after the other; X := X L'^-1 for rows of a panel packed [PANEL][rows]; factor of n columns of a
+/// triangle in its place, zero if a pivot is not positive; x -= s a; a dot b.
 typedef struct lanes {
   int rows, columns;
   void (*tile)(int k, const double *A, const double *B, double s, double *C, size_t ldc);
+  void (*some)(const row_set *set, size_t apart, const double *A, const double *B, double *C);
   void (*panel)(const triangle *L, double *X);
   int (*triangle)(int n, triangle *L);
   void (*subtract)(int n, double s, const double *a, double *x);
@@ -35,74 +43,87 @@ static inline double add_eight(const double *s) {
   return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
 }
 
-#define WAY(name, attribute, LANES, VECTORS, COLUMNS)                                                              \
-  typedef double name##_vector __attribute__((vector_size((LANES)*8), aligned(8), may_alias));                     \
-  attribute static void name##_tile(int k, const double *A, const double *B, double s, double *C, size_t ldc) {    \
-    name##_vector sum[COLUMNS][VECTORS] = {0};                                                                     \
-    for (int p = 0; p < k; p++, A += (LANES) * (VECTORS), B += (COLUMNS)) {                                        \
-      name##_vector a[VECTORS];                                                                                    \
-      for (int i = 0; i < (VECTORS); i++) a[i] = *(const name##_vector *)(A + (LANES)*i);                          \
-      for (int j = 0; j < (COLUMNS); j++)                                                                          \
-        for (int i = 0; i < (VECTORS); i++) sum[j][i] += a[i] * B[j];                                              \
-    }                                                                                                              \
-    for (int j = 0; j < (COLUMNS); j++, C += ldc)                                                                  \
-      for (int i = 0; i < (VECTORS); i++) *(name##_vector *)(C + (LANES)*i) -= s * sum[j][i];                      \
-  }                                                                                                                \
-  attribute static void name##_panel(const triangle *L, double *X) {                                               \
-    for (int c = 0; c < PANEL; c += (COLUMNS)) {                                                                   \
-      double *at = X + (size_t)(c * (LANES) * (VECTORS));                                                          \
-      name##_vector x[COLUMNS][VECTORS];                                                                           \
-      for (int j = 0; j < (COLUMNS); j++)                                                                          \
-        for (int i = 0; i < (VECTORS); i++) x[j][i] = *(name##_vector *)(at + (LANES) * ((VECTORS)*j + i));        \
-      const double *before = X, *l = L->entry + c;                                                                 \
-      for (int d = 0; d < c; d++, before += (LANES) * (VECTORS), l += PANEL) {                                     \
-        name##_vector a[VECTORS];                                                                                  \
-        for (int i = 0; i < (VECTORS); i++) a[i] = *(const name##_vector *)(before + (LANES)*i);                   \
-        for (int j = 0; j < (COLUMNS); j++)                                                                        \
-          for (int i = 0; i < (VECTORS); i++) x[j][i] -= l[j] * a[i];                                              \
-      }                                                                                                            \
-      for (int j = 0; j < (COLUMNS); j++, l += PANEL) {                                                            \
-        for (int i = 0; i < (VECTORS); i++) x[j][i] *= L->inverse[c + j];                                          \
-        for (int k = 0; k < (COLUMNS); k++)                                                                        \
-          for (int i = 0; i < (VECTORS) && k > j; i++) x[k][i] -= l[k] * x[j][i];                                  \
-      }                                                                                                            \
-      for (int j = 0; j < (COLUMNS); j++)                                                                          \
-        for (int i = 0; i < (VECTORS); i++) *(name##_vector *)(at + (LANES) * ((VECTORS)*j + i)) = x[j][i];        \
-    }                                                                                                              \
-  }                                                                                                                \
-  attribute static int name##_triangle(int n, triangle *L) {                                                       \
-    for (int c = 0; c < n; c++) {                                                                                  \
-      double *column = L->entry + c * PANEL;                                                                       \
-      name##_vector x[PANEL / (LANES)];                                                                            \
-      for (int i = 0; i < PANEL / (LANES); i++) x[i] = *(name##_vector *)(column + (LANES)*i);                     \
-      for (int d = 0; d < c; d++)                                                                                  \
-        for (int i = 0; i < PANEL / (LANES); i++)                                                                  \
-          x[i] -= L->entry[d * PANEL + c] * *(const name##_vector *)(L->entry + d * PANEL + (LANES)*i);            \
-      for (int i = 0; i < PANEL / (LANES); i++) *(name##_vector *)(column + (LANES)*i) = x[i];                     \
-      double pivot = column[c];                                                                                    \
-      if (!(pivot > 0) || !isfinite(pivot)) return 0;                                                              \
-      double root = sqrt(pivot);                                                                                   \
-      L->inverse[c] = 1 / root;                                                                                    \
-      for (int i = c / (LANES); i < PANEL / (LANES); i++) *(name##_vector *)(column + (LANES)*i) *= L->inverse[c]; \
-      column[c] = root;                                                                                            \
-    }                                                                                                              \
-    return 1;                                                                                                      \
-  }                                                                                                                \
-  attribute static void name##_subtract(int n, double s, const double *a, double *x) {                             \
-    int i = 0;                                                                                                     \
-    for (; i + (LANES) <= n; i += (LANES)) *(name##_vector *)(x + i) -= s * *(const name##_vector *)(a + i);       \
-    for (; i < n; i++) x[i] -= s * a[i];                                                                           \
-  }                                                                                                                \
-  attribute static double name##_dot(int n, const double *a, const double *b) {                                    \
-    name##_vector sum[8 / (LANES)] = {0};                                                                          \
-    double eight[8];                                                                                               \
-    int i = 0;                                                                                                     \
-    for (; i + 8 <= n; i += 8)                                                                                     \
-      for (int l = 0; l < 8 / (LANES); l++)                                                                        \
-        sum[l] += *(const name##_vector *)(a + i + (LANES)*l) * *(const name##_vector *)(b + i + (LANES)*l);       \
-    for (int l = 0; l < 8 / (LANES); l++) *(name##_vector *)(eight + (LANES)*l) = sum[l];                          \
-    for (int l = 0; i < n; i++, l++) eight[l] += a[i] * b[i];                                                      \
-    return add_eight(eight);                                                                                       \
+#define WAY(name, attribute, LANES, VECTORS, COLUMNS)                                                                \
+  typedef double name##_vector __attribute__((vector_size((LANES)*8), aligned(8), may_alias));                       \
+  attribute static void name##_tile(int k, const double *A, const double *B, double s, double *C, size_t ldc) {      \
+    name##_vector sum[COLUMNS][VECTORS] = {0};                                                                       \
+    for (int p = 0; p < k; p++, A += (LANES) * (VECTORS), B += (COLUMNS)) {                                          \
+      name##_vector a[VECTORS];                                                                                      \
+      for (int i = 0; i < (VECTORS); i++) a[i] = *(const name##_vector *)(A + (LANES)*i);                            \
+      for (int j = 0; j < (COLUMNS); j++)                                                                            \
+        for (int i = 0; i < (VECTORS); i++) sum[j][i] += a[i] * B[j];                                                \
+    }                                                                                                                \
+    for (int j = 0; j < (COLUMNS); j++, C += ldc)                                                                    \
+      for (int i = 0; i < (VECTORS); i++) *(name##_vector *)(C + (LANES)*i) -= s * sum[j][i];                        \
+  }                                                                                                                  \
+  attribute static void name##_some(const row_set *set, size_t apart, const double *A, const double *B, double *C) { \
+    name##_vector sum[COLUMNS][VECTORS] = {0};                                                                       \
+    for (int w = 0; w < SLICE / 64; w++, A += 64 * apart, B += 64 * apart)                                           \
+      for (unsigned long long left = set->bits[w]; left; left &= left - 1) {                                         \
+        const size_t p = (size_t)__builtin_ctzll(left) * apart;                                                      \
+        name##_vector a[VECTORS];                                                                                    \
+        for (int i = 0; i < (VECTORS); i++) a[i] = *(const name##_vector *)(A + p + (LANES)*i);                      \
+        for (int j = 0; j < (COLUMNS); j++)                                                                          \
+          for (int i = 0; i < (VECTORS); i++) sum[j][i] += a[i] * B[p + j];                                          \
+      }                                                                                                              \
+    for (int j = 0; j < (COLUMNS); j++, C += apart)                                                                  \
+      for (int i = 0; i < (VECTORS); i++) *(name##_vector *)(C + (LANES)*i) = sum[j][i];                             \
+  }                                                                                                                  \
+  attribute static void name##_panel(const triangle *L, double *X) {                                                 \
+    for (int c = 0; c < PANEL; c += (COLUMNS)) {                                                                     \
+      double *at = X + (size_t)(c * (LANES) * (VECTORS));                                                            \
+      name##_vector x[COLUMNS][VECTORS];                                                                             \
+      for (int j = 0; j < (COLUMNS); j++)                                                                            \
+        for (int i = 0; i < (VECTORS); i++) x[j][i] = *(name##_vector *)(at + (LANES) * ((VECTORS)*j + i));          \
+      const double *before = X, *l = L->entry + c;                                                                   \
+      for (int d = 0; d < c; d++, before += (LANES) * (VECTORS), l += PANEL) {                                       \
+        name##_vector a[VECTORS];                                                                                    \
+        for (int i = 0; i < (VECTORS); i++) a[i] = *(const name##_vector *)(before + (LANES)*i);                     \
+        for (int j = 0; j < (COLUMNS); j++)                                                                          \
+          for (int i = 0; i < (VECTORS); i++) x[j][i] -= l[j] * a[i];                                                \
+      }                                                                                                              \
+      for (int j = 0; j < (COLUMNS); j++, l += PANEL) {                                                              \
+        for (int i = 0; i < (VECTORS); i++) x[j][i] *= L->inverse[c + j];                                            \
+        for (int k = 0; k < (COLUMNS); k++)                                                                          \
+          for (int i = 0; i < (VECTORS) && k > j; i++) x[k][i] -= l[k] * x[j][i];                                    \
+      }                                                                                                              \
+      for (int j = 0; j < (COLUMNS); j++)                                                                            \
+        for (int i = 0; i < (VECTORS); i++) *(name##_vector *)(at + (LANES) * ((VECTORS)*j + i)) = x[j][i];          \
+    }                                                                                                                \
+  }                                                                                                                  \
+  attribute static int name##_triangle(int n, triangle *L) {                                                         \
+    for (int c = 0; c < n; c++) {                                                                                    \
+      double *column = L->entry + c * PANEL;                                                                         \
+      name##_vector x[PANEL / (LANES)];                                                                              \
+      for (int i = 0; i < PANEL / (LANES); i++) x[i] = *(name##_vector *)(column + (LANES)*i);                       \
+      for (int d = 0; d < c; d++)                                                                                    \
+        for (int i = 0; i < PANEL / (LANES); i++)                                                                    \
+          x[i] -= L->entry[d * PANEL + c] * *(const name##_vector *)(L->entry + d * PANEL + (LANES)*i);              \
+      for (int i = 0; i < PANEL / (LANES); i++) *(name##_vector *)(column + (LANES)*i) = x[i];                       \
+      double pivot = column[c];                                                                                      \
+      if (!(pivot > 0) || !isfinite(pivot)) return 0;                                                                \
+      double root = sqrt(pivot);                                                                                     \
+      L->inverse[c] = 1 / root;                                                                                      \
+      for (int i = c / (LANES); i < PANEL / (LANES); i++) *(name##_vector *)(column + (LANES)*i) *= L->inverse[c];   \
+      column[c] = root;                                                                                              \
+    }                                                                                                                \
+    return 1;                                                                                                        \
+  }                                                                                                                  \
+  attribute static void name##_subtract(int n, double s, const double *a, double *x) {                               \
+    int i = 0;                                                                                                       \
+    for (; i + (LANES) <= n; i += (LANES)) *(name##_vector *)(x + i) -= s * *(const name##_vector *)(a + i);         \
+    for (; i < n; i++) x[i] -= s * a[i];                                                                             \
+  }                                                                                                                  \
+  attribute static double name##_dot(int n, const double *a, const double *b) {                                      \
+    name##_vector sum[8 / (LANES)] = {0};                                                                            \
+    double eight[8];                                                                                                 \
+    int i = 0;                                                                                                       \
+    for (; i + 8 <= n; i += 8)                                                                                       \
+      for (int l = 0; l < 8 / (LANES); l++)                                                                          \
+        sum[l] += *(const name##_vector *)(a + i + (LANES)*l) * *(const name##_vector *)(b + i + (LANES)*l);         \
+    for (int l = 0; l < 8 / (LANES); l++) *(name##_vector *)(eight + (LANES)*l) = sum[l];                            \
+    for (int l = 0; i < n; i++, l++) eight[l] += a[i] * b[i];                                                        \
+    return add_eight(eight);                                                                                         \
   }
 
 #if defined(__x86_64__)
@@ -112,16 +133,18 @@ WAY(four, __attribute__((target("avx2"))), 4, 2, 6)
 WAY(two, , 2, 2, 4)
 
 static const lanes *way(void) {
-  static const lanes two = {4, 4, two_tile, two_panel, two_triangle, two_subtract, two_dot};
+  static const lanes two = {4, 4, two_tile, two_some, two_panel, two_triangle, two_subtract, two_dot};
 #if defined(__x86_64__)
-  static const lanes eight = {16, 8, eight_tile, eight_panel, eight_triangle, eight_subtract, eight_dot};
-  static const lanes four = {8, 6, four_tile, four_panel, four_triangle, four_subtract, four_dot};
+  static const lanes eight = {16, 8, eight_tile, eight_some, eight_panel, eight_triangle, eight_subtract, eight_dot};
+  static const lanes four = {8, 6, four_tile, four_some, four_panel, four_triangle, four_subtract, four_dot};
   const int most = cav_dense_lanes();
   if (most == 8) return &eight;
   if (most == 4) return &four;
 #endif
   return &two;
 }
+
+static int least(int a, int b) { return a < b ? a : b; }
 
 /// A factor of a product: entry (i, p) at at[i * by_row + p * by_column].
 typedef struct operand {
@@ -217,12 +240,104 @@ void cav_dense_product_transposed(cav_part part, int m, int n, int k, double sig
   product(part, m, n, k, sign, &a, &b, C, (size_t)ldc);
 }
 
-void cav_dense_square(cav_part part, int n, int k, const double *A, int lda, double *C, int ldc) {
-  operand a = {.at = A, .by_row = 1, .by_column = (size_t)lda};
-  product(part, n, n, k, 1, &a, &a, C, (size_t)ldc);
+/// Rows of A' [k*n] with the like columns of all parts side by side, which rows have anything but zeros in each strip of columns,
+/// and the upper triangle of their square, by columns.
+typedef struct slice {
+  _Alignas(64) double entry[SLICE * (SQUARE + TILE_MOST)], sum[SQUARE * (SQUARE + TILE_MOST)];
+  size_t apart; ///< of rows, and of columns of the sum
+  row_set tall[SQUARE / 4], wide[SQUARE / 4];
+} slice;
+
+/// The number's bits.
+typedef unsigned long long number_bits __attribute__((may_alias));
+
+// one row, and into which sets it goes: of each column that is not zero, but for its sign, in all parts
+CAV_VECTOR_BODY void pack_row_body(int n, int parts, const double *A, unsigned long long here, double *restrict row,
+                                   unsigned long long *restrict set) {
+  const int part = n / parts;
+  const number_bits *a = (const number_bits *)A;
+  if (parts == 3) {
+    for (int d = 0; d < part; d++) set[d] |= (a[d] | a[part + d] | a[2 * part + d]) << 1 ? here : 0;
+    for (int d = 0; d < part; d++, row += 3) row[0] = A[d], row[1] = A[part + d], row[2] = A[2 * part + d];
+    return;
+  }
+  for (int c = 0; c < parts; c++)
+    for (int d = 0; d < part; d++) set[d] |= a[c * part + d] << 1 ? here : 0;
+  for (int d = 0; d < part; d++)
+    for (int c = 0; c < parts; c++) *row++ = A[c * part + d];
+}
+CAV_BY_VECTORS(pack_row,
+               (int n, int parts, const double *A, unsigned long long here, double *row, unsigned long long *set),
+               (n, parts, A, here, row, set))
+
+// sets of strips of columns from those of their columns in all parts
+static void join_strips(int n, int parts, int height, unsigned long long set[SLICE / 64][SQUARE], row_set *strip) {
+  for (int first = 0; first < n; first += height, strip++) {
+    *strip = (row_set){0};
+    for (int d = first / parts, end = (least(n, first + height) - 1) / parts; d <= end; d++)
+      for (int l = 0; l < SLICE / 64; l++) strip->bits[l] |= set[l][d];
+  }
 }
 
-static int least(int a, int b) { return a < b ? a : b; }
+static void pack_slice(const lanes *w, int n, int parts, int k, const double *A, size_t lda, slice *s) {
+  unsigned long long set[SLICE / 64][SQUARE];
+  for (int l = 0; l < SLICE / 64; l++) memset(set[l], 0, (size_t)(n / parts) * sizeof **set);
+  for (int p = 0; p < k; p++, A += lda) {
+    double *row = s->entry + (size_t)p * s->apart;
+    pack_row(n, parts, A, 1ull << p % 64, row, set[p / 64]);
+    for (size_t i = (size_t)n; i < s->apart; i++) row[i] = 0;
+  }
+  join_strips(n, parts, w->rows, set, s->tall);
+  join_strips(n, parts, w->columns, set, s->wide);
+}
+
+/// The square of a slice's rows.
+static void square_slice(const lanes *w, int n, slice *s) {
+  for (int j = 0; j < n; j += w->columns) {
+    const row_set *b = &s->wide[j / w->columns];
+    for (int i = 0; i < least(n, j + w->columns); i += w->rows) {
+      const row_set *a = &s->tall[i / w->rows];
+      row_set both;
+      for (int l = 0; l < SLICE / 64; l++) both.bits[l] = a->bits[l] & b->bits[l];
+      w->some(&both, s->apart, s->entry + i, s->entry + j, s->sum + (size_t)j * s->apart + i);
+    }
+  }
+}
+
+/// Upper triangle of C += the square, back in the order of the columns: C's rows are `next` apart, its columns ldc.
+static void add_square(int n, int parts, const slice *s, double *C, size_t next, size_t ldc) {
+  const int part = n / parts;
+  const size_t down = (size_t)parts, across = (size_t)parts * s->apart;
+  for (int at = 0; at < n; at++, C += ldc) {
+    const int d = at % part, c = at / part;
+    const size_t j = (size_t)(d * parts + c);
+    for (int b = 0; b <= c; b++) {
+      // those before column j of the sum stand in it, the others in theirs
+      const int end = b == c ? d + 1 : part, before = least(end, d + (b <= c));
+      const double *in = s->sum + j * s->apart + b, *there = s->sum + (size_t)b * s->apart + j;
+      double *out = C + (size_t)(b * part) * next;
+      for (int e = 0; e < before; e++) out[(size_t)e * next] += in[(size_t)e * down];
+      for (int e = before; e < end; e++) out[(size_t)e * next] += there[(size_t)e * across];
+    }
+  }
+}
+
+void cav_dense_square(cav_part part, int n, int parts, int k, const double *A, int lda, double *C, int ldc) {
+  const lanes *w = way();
+  if (n > SQUARE) {
+    operand a = {.at = A, .by_row = 1, .by_column = (size_t)lda};
+    product(part, n, n, k, 1, &a, &a, C, (size_t)ldc);
+    return;
+  }
+  const int lower = part == CAV_PART_LOWER;
+  slice s;
+  s.apart = (size_t)(n + TILE_MOST - 1) / 8 * 8;
+  for (int first = 0; first < k; first += SLICE, A += SLICE * (size_t)lda) {
+    pack_slice(w, n, parts, least(k - first, SLICE), A, (size_t)lda, &s);
+    square_slice(w, n, &s);
+    add_square(n, parts, &s, C, lower ? (size_t)ldc : 1, lower ? 1 : (size_t)ldc);
+  }
+}
 
 /// Columns start to end of a band, and where each ends.
 typedef struct panel {
