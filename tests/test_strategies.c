@@ -258,6 +258,20 @@ static void test_repair(void) {
   CHECK(cav_strategy_repair(&p, &once, &hangs, 1, &twice, &found) == CAV_OK && found && twice.term[0].weight == 9000);
   CHECK(twice.term[1].weight == 200 && !strcmp(twice.changed, "weights of goals 10 times, <limits effort=\"0.9\"/>"));
   cav_strategy_clear(&once), cav_strategy_clear(&twice);
+  // effort is given once; of goals those grow that are missed, by name
+  once = strategy[0];
+  once.effort_limit = 0.9;
+  CHECK(cav_strategy_repair(&p, &once, &hangs, 0, &twice, &found) == CAV_OK && found && twice.effort_limit == 0.9);
+  cav_strategy_clear(&twice);
+  cav_term two[] = {terms[0], terms[0], terms[1]};
+  two[1].name = "other";
+  p.term = two, p.nterm = 3;
+  hangs.missed_terms = 2;
+  CHECK(cav_strategy_repair(&p, &strategy[0], &hangs, 1, &once, &found) == CAV_OK && found && once.nterm == 3);
+  CHECK(once.term[0].weight == 900 && once.term[1].weight == 9000 && once.term[2].weight == 200);
+  CHECK(!strcmp(once.changed, "weight of 'other' 10 times"));
+  cav_strategy_clear(&once);
+  p.term = terms, p.nterm = 2, hangs.missed_terms = 0;
   // less effort than usual was asked for
   p.effort_limit = 0.3;
   CHECK(cav_strategy_repair(&p, &strategy[0], &hangs, 0, &once, &found) == CAV_OK && !strstr(once.changed, "effort"));
@@ -330,7 +344,50 @@ static void test_solids(void) {
   cav_model_free(m);
 }
 
+// waypoints of another body: joints that it would have beyond its ranges are left as at the start, in all of them, and the
+// rest stays as asked; on a body that has the room there is no such guess
+static void test_left(void) {
+  static const char *const range[] = {"-30 50", "-30 95"};
+  char folder[] = "/tmp/cavort-strategies-XXXXXX", path[100], model[100], text[1000];
+  if (!CHECK(mkdtemp(folder) != NULL)) return;
+  snprintf(path, sizeof path, "%s/p.xml", folder);
+  snprintf(model, sizeof model, "%s/m.xml", folder);
+  scene_write(
+      folder, "p.xml",
+      "<problem model='m.xml'><horizon duration='1' timestep='.05'/><start><joint name='a' degrees='10'/></start>"
+      "<guess><waypoint time='.3' ranges='clip'><joint name='a' degrees='40'/><joint name='b' degrees='60'/></waypoint>"
+      "<waypoint time='.6' ranges='clip'><joint name='a' degrees='90'/></waypoint></guess></problem>");
+  for (int roomy = 0; roomy < 2; roomy++) {
+    snprintf(text, sizeof text,
+             "<mujoco><compiler angle='degree'/><worldbody><body pos='0 0 1'>"
+             "<joint name='a' axis='0 1 0' limited='true' range='%s'/>"
+             "<geom type='capsule' size='.05' fromto='0 0 0 0 0 -.4'/><body pos='0 0 -.4'>"
+             "<joint name='b' axis='0 1 0' limited='true' range='0 120'/>"
+             "<geom type='capsule' size='.05' fromto='0 0 0 0 0 -.4'/></body></body></worldbody></mujoco>",
+             range[roomy]);
+    scene_write(folder, "m.xml", text);
+    cav_error error = {0};
+    cav_problem *p = cav_problem_load(path, NULL, &error), taken;
+    if (!CHECK(p != NULL && p->nguess_pose == 2)) fprintf(stderr, "    %s\n", error.text);
+    if (!p) continue;
+    cav_strategy strategy[CAV_STRATEGIES];
+    int n;
+    CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && (find(strategy, n, "left") == NULL) == roomy);
+    CHECK((p->guess_left == NULL) == roomy && (roomy || !strcmp(strategy[3].name, "left")));
+    if (!roomy) {
+      cav_strategy_apply(p, find(strategy, n, "left"), &taken);
+      CHECK(taken.nguess_pose == 2 && taken.guess_pose[0].time == 0.3 && taken.guess_pose[1].time == 0.6);
+      for (int i = 0; i < 2; i++) CHECK_NEAR(taken.guess_pose[i].q[0], 10 * M_PI / 180, 1e-15);
+      CHECK_NEAR(taken.guess_pose[0].q[1], 60 * M_PI / 180, 1e-15);
+      CHECK_NEAR(p->guess_pose[1].q[0], 50 * M_PI / 180, 1e-15);
+    }
+    cav_problem_free(p);
+  }
+  unlink(path), unlink(model), rmdir(folder);
+}
+
 int main(void) {
+  test_left();
   test_gait(BIPED("1"), 1, 2);
   test_gait(BIPED("1"), 1, -2);
   test_gait(BIPED("-1"), -1, 2);

@@ -369,13 +369,16 @@ typedef struct cav_problem {
       guess_rotation[3]; ///< rotation vector that the first free joint's guess makes over guess_from .. guess_to, rad
   int nguess_pose;       ///< postures on the way
   const cav_guess_pose
-      *guess_pose;       ///< [nguess_pose], times increasing within the horizon: postures on the way to the goal
-  int nswing;            ///< sines over joints
-  cav_swing *swing;      ///< [nswing]
-  int nterm;             ///< costs and constraints
-  cav_term *term;        ///< [nterm]
-  cav_residual residual; ///< forces on roots that are penalised
-  int nparameter;        ///< numbers of the model that are not known
+      *guess_pose; ///< [nguess_pose], times increasing within the horizon: postures on the way to the goal
+  const cav_guess_pose
+      *guess_left;  ///< [nguess_pose] the same, joints that ranges="clip" moved in any of them left as at the start;
+                    ///< NULL: it moved none. For strategies
+  int nswing;       ///< sines over joints
+  cav_swing *swing; ///< [nswing]
+  int nterm;        ///< costs and constraints
+  cav_term *term;   ///< [nterm]
+  cav_residual residual;          ///< forces on roots that are penalised
+  int nparameter;                 ///< numbers of the model that are not known
   const cav_parameter *parameter; ///< [nparameter] found by cav_estimate_solve; all else takes the model as it is
   double effort_limit;            ///< fraction of the actuator limits planned with, 0 .. 1
   double limit_margin;            ///< rad or m kept from joint and tendon limits in planning

@@ -332,6 +332,7 @@ typedef enum cav_strategy_use {
 typedef struct cav_strategy {
   const char *name, *text;              ///< in a word, and in words
   int stated;                           ///< 1: the problem's own guess, 0: guess and swing
+  int left;                             ///< 1: with the postures of cav_problem.guess_left
   cav_order order;                      ///< that the motion obeys
   int first_midpoint;                   ///< 1: solved under CAV_ORDER_MIDPOINT, then from there under order
   cav_strategy_use use;                 ///< when
@@ -450,13 +451,14 @@ typedef struct cav_verdict {
   double end_speed_m_s,
       end_rate_rad_s; ///< of end_body's tree, of its centre of mass and of itself; NaN where nothing moves
   char end_body[64]; ///< what still moves at an end that need not be at rest, what no actuator moves first; "": nothing
-  double duration, solve_seconds; ///< duration: of one period
-  int iterations;                 ///< as the solver left them
-  double cost;                    ///< of the cost terms, summed anew from the knots
-  int achieved;                   ///< every target with a tolerance is met
-  int ntarget, nmissed;           ///< such targets, and those missed
-  char missed[240];               ///< the one missed most: name, by how much, wanted and got; "" if achieved
-  char reason[480];               ///< why not certified: the first condition missed; "" if certified
+  double duration, solve_seconds;  ///< duration: of one period
+  int iterations;                  ///< as the solver left them
+  double cost;                     ///< of the cost terms, summed anew from the knots
+  int achieved;                    ///< every target with a tolerance is met
+  int ntarget, nmissed;            ///< such targets, and those missed
+  unsigned long long missed_terms; ///< bit i: term i is one of those missed; of the first 64 terms
+  char missed[240];                ///< the one missed most: name, by how much, wanted and got; "" if achieved
+  char reason[480];                ///< why not certified: the first condition missed; "" if certified
 } cav_verdict;
 
 /// A strategy with one change more: number k of the usual cures of what a motion found by it misses first. *found 0: there

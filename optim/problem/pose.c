@@ -15,6 +15,21 @@
 
 enum { DEEPEST = 16 }; // poses that name each other
 
+// brings joints into their ranges; those that this moves are noted, or stay as at the start
+static void clip(const cav_problem_reader *reader, double *q) {
+  const cav_model *m = reader->model;
+  for (int j = 0; j < m->njoint && reader->moved; j++) {
+    const cav_joint *joint = &m->joint[j];
+    double *x = &q[joint->q];
+    int scalar = joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE;
+    if (!reader->leave)
+      reader->moved[j] |= scalar && joint->limited && (*x < joint->range[0] || *x > joint->range[1]);
+    else if (reader->moved[j])
+      *x = reader->problem->q_start[joint->q];
+  }
+  cav_configuration_clip(m, q);
+}
+
 static cav_status read_pose(const cav_problem_reader *reader, const cav_xml_node *node, int depth, double *q);
 
 // <pose> of that name
@@ -232,7 +247,7 @@ static cav_status read_pose(const cav_problem_reader *reader, const cav_xml_node
   for (; root && !status; root = cav_xml_next(root)) status = lay_root(reader, root, q);
   const cav_xml_node *joint = cav_problem_child(node, "joint");
   for (; joint && !status; joint = cav_xml_next(joint)) status = lay_joint(reader, joint, q);
-  if (!status && cav_xml_word(node, "ranges", 0)) cav_configuration_clip(reader->model, q);
+  if (!status && cav_xml_word(node, "ranges", 0)) clip(reader, q);
   if (!status && cav_xml_word(node, "height", 0)) status = drop(reader, node, q);
   if (!status && cav_xml_get(node, "rise") && !cav_xml_word(node, "height", 0))
     status = cav_xml_fail(reader->error, node, "rise", "is counted from the floor; add height='floor'");

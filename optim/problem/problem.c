@@ -355,6 +355,25 @@ static cav_status read_swings(const cav_problem_reader *reader, const cav_xml_no
   return CAV_OK;
 }
 
+// the same postures with joints that clipping moved in any of them as at the start; nothing where it moved none
+static cav_status read_guess_left(const cav_problem_reader *reader, const cav_xml_node *waypoint) {
+  cav_problem *p = reader->problem;
+  size_t n = (size_t)p->nguess_pose, nq = (size_t)reader->model->nq;
+  if (!memchr(reader->moved, 1, (size_t)reader->model->njoint)) return CAV_OK;
+  cav_guess_pose *list = cav_problem_alloc(reader->owner, n * sizeof *list);
+  double *q = cav_problem_alloc(reader->owner, n * nq * sizeof *q);
+  if (!list || !q) return cav_problem_no_memory(reader);
+  cav_problem_reader again = *reader;
+  again.leave = 1;
+  cav_status status = CAV_OK;
+  for (size_t i = 0; i < n && !status; i++, waypoint = cav_xml_next(waypoint), q += nq) {
+    list[i] = (cav_guess_pose){p->guess_pose[i].time, q};
+    status = cav_problem_pose(&again, waypoint, q);
+  }
+  p->guess_left = list;
+  return status;
+}
+
 // <waypoint> of a guess
 static cav_status read_guess_poses(const cav_problem_reader *reader, const cav_xml_node *node) {
   cav_problem *p = reader->problem;
@@ -368,7 +387,9 @@ static cav_status read_guess_poses(const cav_problem_reader *reader, const cav_x
                         cav_problem_guesses[p->guess]);
   cav_guess_pose *list = cav_problem_alloc(reader->owner, (size_t)n * sizeof *list);
   double *q = cav_problem_alloc(reader->owner, (size_t)n * (size_t)m->nq * sizeof *q), before = 0;
-  if (!list || !q) return cav_problem_no_memory(reader);
+  cav_problem_reader noting = *reader;
+  noting.moved = cav_problem_alloc(reader->owner, (size_t)m->njoint + 1);
+  if (!list || !q || !noting.moved) return cav_problem_no_memory(reader);
   p->guess_pose = list;
   for (const cav_xml_node *w = first; w; w = cav_xml_next(w), q += m->nq) {
     double time = cav_xml_real(w, "time", 0);
@@ -377,12 +398,12 @@ static cav_status read_guess_poses(const cav_problem_reader *reader, const cav_x
                           "expected a time after the posture before, %g s, and at the end, %g s, at the latest, got %g",
                           before, p->duration, time);
     }
-    cav_status status = cav_problem_pose(reader, w, q);
+    cav_status status = cav_problem_pose(&noting, w, q);
     if (status) return status;
     list[p->nguess_pose++] = (cav_guess_pose){time, q};
     before = time;
   }
-  return CAV_OK;
+  return read_guess_left(&noting, first);
 }
 
 // configuration and velocity of a motion at a time that it has: between knots along the step

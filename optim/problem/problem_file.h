@@ -26,6 +26,8 @@ typedef struct cav_problem_reader {
   const cav_model *model;
   const cav_xml_node *root;
   cav_state *state; ///< for readings and heights of poses
+  char *moved;      ///< [njoint] set where ranges="clip" moves a joint; NULL: not noted
+  int leave;        ///< 1: joints that are noted stay as at the start
   const char *path;
   cav_error *error;
 } cav_problem_reader;

@@ -259,6 +259,7 @@ static cav_status reduce_problem(const cav_problem *whole, const cav_part *part,
     pose[i] = (cav_guess_pose){whole->guess_pose[i].time, q};
   }
   problem->guess_pose = pose;
+  problem->guess_left = NULL;
   problem->swing = take(&at, (size_t)whole->nswing, sizeof *problem->swing);
   for (int i = 0; i < whole->nswing; i++) {
     problem->swing[i] = whole->swing[i];

@@ -83,10 +83,13 @@ static int is_goal(const cav_term *term) {
          (term->from == term->to || term->within > 0);
 }
 
-static cav_status weigh_goals(const cav_problem *p, cav_strategy *s) {
+/// Those that are missed, or all where none is known to be.
+static cav_status weigh_goals(const cav_problem *p, const cav_verdict *v, cav_strategy *s) {
   cav_status status = own_terms(p, s);
-  for (int i = 0; i < s->nterm && !status; i++)
-    if (is_goal(&s->term[i])) s->term[i].weight *= heavier;
+  for (int i = 0; i < s->nterm && !status; i++) {
+    int missed = v->missed_terms == 0 || (i < 64 && (v->missed_terms >> i & 1));
+    if (missed && is_goal(&s->term[i])) s->term[i].weight *= heavier;
+  }
   return status;
 }
 
@@ -114,13 +117,13 @@ static cav_status loosen_slip(const cav_problem *p, cav_strategy *s) {
   return status;
 }
 
-static cav_status change(const cav_problem *p, cure c, cav_strategy *s) {
+static cav_status change(const cav_problem *p, const cav_verdict *v, cure c, cav_strategy *s) {
   double effort = s->effort_limit > 0 ? s->effort_limit : p->effort_limit;
   switch (c) {
     case FORCE:
       return weigh_forces(p, s);
     case GOALS:
-      return weigh_goals(p, s);
+      return weigh_goals(p, v, s);
     case SLIP:
       return weigh_slip(p, s);
     case SLIDING:
@@ -148,8 +151,9 @@ static cav_status change(const cav_problem *p, cure c, cav_strategy *s) {
       s->schedule.last.softness *= softer;
       s->schedule.last.smoothing *= longer;
       break;
-    case EFFORT:
-      if (effort >= cav_problem_default(p->model).effort_limit && effort < 0.99) s->effort_limit = (1 + effort) / 2;
+    case EFFORT: // once: what is missed with half of the reserve has another cause
+      if (effort >= cav_problem_default(p->model).effort_limit && effort < 0.99 && s->effort_limit <= p->effort_limit)
+        s->effort_limit = (1 + effort) / 2;
       break;
     case SLACK:
       s->effort_limit = slack * effort;
@@ -165,10 +169,21 @@ static void describe(const cav_problem *p, cav_strategy *s) {
   char *out = s->changed;
   size_t room = sizeof s->changed;
   *out = 0;
-  for (int i = 0; i < p->nterm && s->term && !*out; i++)
-    if (is_goal(&p->term[i]) && p->term[i].weight > 0)
-      snprintf(out, room, ", weights of goals %g times", s->term[i].weight / p->term[i].weight);
-  if (!strcmp(out, ", weights of goals 1 times")) *out = 0;
+  int goals = 0, heavy = 0;
+  for (int i = 0; i < p->nterm && s->term; i++) {
+    if (!is_goal(&p->term[i]) || !(p->term[i].weight > 0)) continue;
+    goals++, heavy += s->term[i].weight != p->term[i].weight;
+  }
+  for (int i = 0; i < p->nterm && heavy; i++) {
+    size_t n = strlen(out);
+    double times = p->term[i].weight > 0 ? s->term[i].weight / p->term[i].weight : 1;
+    if (!is_goal(&p->term[i]) || times == 1) continue;
+    if (heavy == goals) {
+      snprintf(out, room, ", weights of goals %g times", times);
+      break;
+    }
+    snprintf(out + n, room - n, ", weight of '%.40s' %g times", p->term[i].name ? p->term[i].name : "", times);
+  }
   for (int i = 0; i < p->nterm && s->term; i++) {
     size_t n = strlen(out);
     if (p->term[i].quantity == CAV_QUANTITY_SLIP && s->term[i].weight != p->term[i].weight)
@@ -218,7 +233,7 @@ cav_status cav_strategy_repair(const cav_problem *problem, const cav_strategy *f
     with.term = from->term, with.nterm = from->nterm;
     status = own_terms(&with, repaired);
   }
-  if (!status) status = change(problem, cures[k], repaired);
+  if (!status) status = change(problem, verdict, cures[k], repaired);
   if (status) {
     cav_strategy_clear(repaired);
     return status;

@@ -158,11 +158,11 @@ static void add(cav_strategy *strategy, int *n, const cav_strategy *from, const 
 }
 
 // what is nearly there is mended before anything else is tried
-static void add_near(cav_strategy *strategy, int *n, const cav_strategy *stated) {
+static void add_near(cav_strategy *strategy, int *n, const cav_strategy *stated, const char *one, const char *other) {
   cav_strategy repaired = *stated;
   repaired.use = CAV_STRATEGY_NEAR;
-  add(strategy, n, &repaired, "near-1", "where it is nearly there, with the usual cure of what it misses");
-  add(strategy, n, &repaired, "near-2", "where it is nearly there, with the usual cure of what it misses");
+  add(strategy, n, &repaired, one, "where it is nearly there, with the usual cure of what it misses");
+  add(strategy, n, &repaired, other, "where it is nearly there, with the usual cure of what it misses");
 }
 
 static void add_repairs(cav_strategy *strategy, int *n, const cav_strategy *stated) {
@@ -200,7 +200,13 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
     add_repairs(strategy, n, &stated);
     return CAV_OK;
   }
-  if (!problem->cycle.on) add_near(strategy, n, &stated);
+  if (!problem->cycle.on) add_near(strategy, n, &stated, "near-1", "near-2");
+  if (problem->guess_left && !problem->cycle.on) {
+    cav_strategy left = stated;
+    left.left = 1;
+    add(strategy, n, &left, "left", "postures without the joints that they would have beyond the model's ranges");
+    add_near(strategy, n, &stated, "near-3", "near-4");
+  }
 
   if (problem->order == CAV_ORDER_MOMENTUM) {
     cav_strategy twice = stated;
@@ -286,6 +292,7 @@ void cav_strategy_apply(const cav_problem *problem, const cav_strategy *strategy
     taken->duration_most = LONGER * problem->duration;
     taken->duration_weight = haste;
   }
+  if (strategy->left) taken->guess_pose = problem->guess_left;
   if (strategy->stated) return;
   taken->guess_height = strategy->height;
   if (strategy->height > 0) taken->guess_from = strategy->from, taken->guess_to = strategy->to;

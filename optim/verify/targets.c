@@ -330,6 +330,7 @@ void cav_targets_verdict(const cav_verification *verification, cav_term_report *
   double worst = 0, duration = verification->last * verification->h;
   verdict->cost = residual_cost + (p->duration_most > 0 ? 0.5 * p->duration_weight * duration * duration : 0);
   verdict->ntarget = verdict->nmissed = 0;
+  verdict->missed_terms = 0;
   verdict->missed[0] = 0;
   for (int i = 0; i < p->nterm; i++) verdict->cost += report[i].cost;
   for (int i = 0; i < p->nterm; i++) {
@@ -341,6 +342,7 @@ void cav_targets_verdict(const cav_verification *verification, cav_term_report *
     verdict->ntarget += isfinite(r->within);
     if (r->met) continue;
     verdict->nmissed++;
+    if (i < 64) verdict->missed_terms |= 1ull << i;
     if (isnan(r->off) || r->off / r->within > worst) {
       worst = isnan(r->off) ? INFINITY : r->off / r->within;
       const cav_term *term = &p->term[i];

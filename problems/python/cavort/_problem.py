@@ -199,6 +199,7 @@ class Problem:
         for i, (time, _) in enumerate(poses):
             array[i].time, array[i].q = time, buffers[i]
         self._c.nguess_pose, self._c.guess_pose = len(poses), array
+        self._c.guess_left = ffi.NULL
         self._held["poses"] = array, held, buffers
 
     def guess_swings(self, swings: Sequence[tuple[str, float, float, float]]) -> None:
