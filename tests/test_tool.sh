@@ -366,6 +366,7 @@ END
 run 0 solve push.xml --threads 1
 says push.result/strategies.csv 'stated,0,not achieved'
 says push.result/strategies.csv 'near-1,1,certified'
+check "it goes on from the motion that misses" awk -F , '$1 == "near-1" && $5 < 5 { found = 1 } END { exit !found }' push.result/strategies.csv
 says push.result/strategies.csv 'soft,0,not tried'
 says push.result/verdict.json '"repaired": "<limits effort=\"0.9\"/>"'
 

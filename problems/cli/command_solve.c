@@ -144,17 +144,6 @@ static void mark(const cav_command_line *line, const cav_provenance *p, char key
   snprintf(key, 96, "%.24s-%.24s-%s", p->problem, p->model, cav_solver_rule_of(line->solver)->name);
 }
 
-// whether a checkpoint's multipliers are of as many rows as the problem has, at the same knots
-static int fits(const cav_problem *problem, const cav_checkpoint *c) {
-  cav_equations equations;
-  cav_error ignored = {0};
-  int knots = (int)lround(problem->duration / problem->timestep) + 1;
-  return c->place > CAV_PLACE_CONTINUATION && c->trajectory->nknot == knots &&
-         c->trajectory->nv == problem->model->nv && c->order == problem->order &&
-         (problem->duration_most > 0 || fabs(c->trajectory->timestep - problem->timestep) < 1e-9 * problem->timestep) &&
-         !cav_problem_equations(problem, &equations, &ignored) && equations.constraints == c->nmultiplier;
-}
-
 // reads what --resume goes on from
 static cav_status find_beginning(const char *folder, const cav_problem *problem, const char *key, beginning *b,
                                  cav_error *error) {
@@ -167,7 +156,7 @@ static cav_status find_beginning(const char *folder, const cav_problem *problem,
   }
   free(path);
   b->resume = c && !strcmp(c->key, key);
-  if (!b->resume && c && fits(problem, c)) {
+  if (!b->resume && c && cav_race_fits(problem, c)) {
     b->motion = c;
     b->start = cav_trajectory_copy(c->trajectory);
     return b->start ? CAV_OK : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");

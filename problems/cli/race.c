@@ -36,7 +36,7 @@ cav_status cav_race_open(cav_race *race, int most, cav_error *error) {
   for (int i = 0; i < n && race->n < most; i++)
     // of those that are solved at once none waits for another
     if (most >= CAV_STRATEGIES || strategy[i].use != CAV_STRATEGY_NEAR)
-      race->entry[race->n++] = (cav_race_entry){.strategy = strategy[i], .answer = -1, .order = -1};
+      race->entry[race->n++] = (cav_race_entry){.strategy = strategy[i], .from = -1, .answer = -1, .order = -1};
   return CAV_OK;
 }
 
@@ -73,6 +73,30 @@ static int keep(void *context, const cav_checkpoint *checkpoint) {
   return 0;
 }
 
+int cav_race_fits(const cav_problem *problem, const cav_checkpoint *c) {
+  cav_equations equations;
+  cav_error ignored = {0};
+  int knots = (int)lround(problem->duration / problem->timestep) + 1;
+  return c->place > CAV_PLACE_CONTINUATION && c->trajectory->nknot == knots &&
+         c->trajectory->nv == problem->model->nv && c->order == problem->order &&
+         (problem->duration_most > 0 || fabs(c->trajectory->timestep - problem->timestep) < 1e-9 * problem->timestep) &&
+         !cav_problem_equations(problem, &equations, &ignored) && equations.constraints == c->nmultiplier;
+}
+
+// what is nearly there goes on to the changed problem's optimum from where it is: where limits alone were missed, and more of them
+// is given, it obeys all. Else, or where no such motion is on file, NULL
+static cav_checkpoint *find_motion(const cav_race *race, int i, const cav_problem *taken) {
+  int from = race->entry[i].from;
+  if (from < 0 || !race->folder || race->options.solver != CAV_SOLVER_GAUSS_NEWTON) return NULL;
+  cav_error ignored = {0};
+  char *path = cav_store_checkpoint(race->folder, race->entry[from].strategy.name);
+  cav_checkpoint *c = path ? cav_checkpoint_read(path, race->problem->model, &ignored) : NULL;
+  free(path);
+  if (c && cav_race_fits(taken, c)) return c;
+  cav_checkpoint_free(c);
+  return NULL;
+}
+
 // solves, from a checkpoint if there is one; it stays there
 static cav_status solve(const cav_race *race, int i, const cav_solve_options *given, const cav_problem *taken,
                         cav_solution **solution, cav_error *error) {
@@ -91,9 +115,16 @@ static cav_status solve(const cav_race *race, int i, const cav_solve_options *gi
     if (!before) status = error->status;
   }
   options.resume = before;
-  if (!status)
-    status = cav_strategy_solve(race->problem, strategy, &options, i == 0 ? race->start : NULL, solution, error);
+  cav_checkpoint *motion = before ? NULL : find_motion(race, i, taken);
+  if (motion) {
+    options.first_stage = taken->schedule.stages + 1;
+    options.nmultiplier = motion->nmultiplier;
+    options.multiplier = motion->final_multiplier;
+  }
+  const cav_trajectory *start = motion ? motion->trajectory : i == 0 ? race->start : NULL;
+  if (!status) status = cav_strategy_solve(race->problem, strategy, &options, start, solution, error);
   cav_checkpoint_free(before);
+  cav_checkpoint_free(motion);
   free(s.path);
   return status;
 }
@@ -401,15 +432,19 @@ static int find_near(const cav_race *race, int i) {
 }
 
 // the strategy that repairs it by a cure that was not tried; to be cleared where there is one
-static int find_repair(const cav_race *race, int i, cav_strategy *repaired) {
+static int find_repair(const cav_race *race, int i, cav_strategy *repaired, int *of) {
   int best = race->entry[i].strategy.use == CAV_STRATEGY_NEAR ? find_near(race, i) : find_broken(race);
+  *of = best;
   int found = best >= 0;
   for (int k = 0; found; k++) {
     const cav_race_entry *from = &race->entry[best];
     if (cav_strategy_repair(race->problem, &from->strategy, &from->report.verdict, k, repaired, &found) || !found)
       return 0;
     int known = 0;
-    for (int j = 0; j < i; j++) known |= !strcmp(repaired->changed, race->entry[j].strategy.changed);
+    for (int j = 0; j < i; j++) {
+      const cav_strategy *tried = &race->entry[j].strategy;
+      known |= repaired->left == tried->left && !strcmp(repaired->changed, tried->changed);
+    }
     if (!known) break;
     cav_strategy_clear(repaired);
   }
@@ -440,8 +475,9 @@ static int may_start(const cav_race *race, int i) {
   }
   if (race->entry[i].strategy.open && !misses_rest(race)) return 0;
   cav_strategy repaired;
+  int of;
   const int mends = use == CAV_STRATEGY_REPAIR || use == CAV_STRATEGY_NEAR;
-  int repairs = mends && !success && find_repair(race, i, &repaired);
+  int repairs = mends && !success && find_repair(race, i, &repaired, &of);
   if (repairs) cav_strategy_clear(&repaired);
   return use == CAV_STRATEGY_MOMENTUM ? momentum : mends ? repairs : !success;
 }
@@ -450,8 +486,10 @@ static int may_start(const cav_race *race, int i) {
 static void settle(cav_race *race, int i) {
   cav_race_entry *e = &race->entry[i];
   cav_strategy repaired;
+  int of;
   const int mends = e->strategy.use == CAV_STRATEGY_REPAIR || e->strategy.use == CAV_STRATEGY_NEAR;
-  if (!mends || *e->strategy.changed || !find_repair(race, i, &repaired)) return;
+  if (!mends || *e->strategy.changed || !find_repair(race, i, &repaired, &of)) return;
+  if (e->strategy.use == CAV_STRATEGY_NEAR) e->from = of;
   e->strategy = repaired;
   if (race->tell) fprintf(stderr, "strategy %-8s with %s\n", e->strategy.name, e->strategy.changed);
 }

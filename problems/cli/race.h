@@ -30,6 +30,7 @@ typedef struct cav_race_entry {
   cav_race_state state;
   cav_race_report report;
   cav_solution *solution; ///< if solved in this process
+  int from;               ///< what is nearly there: entry whose motion it begins with; -1: with its guess
   pid_t child;
   int answer, order; ///< pipes: from the child, to the child
 } cav_race_entry;
@@ -57,6 +58,9 @@ typedef struct cav_race {
 
 /// Whether a strategy ended with what is wanted: certified, and every target with a tolerance met.
 int cav_race_success(const cav_race_report *report);
+
+/// Whether a checkpoint's multipliers are of as many rows as the problem has, at the same knots.
+int cav_race_fits(const cav_problem *problem, const cav_checkpoint *checkpoint);
 
 /// The strategies of the problem, at most as many.
 cav_status cav_race_open(cav_race *race, int most, cav_error *error);
