@@ -93,6 +93,25 @@ static void centre(const cav_model *m, const cav_state *state, int root, double 
   for (int k = 0; k < 3; k++) com[k] /= mass;
 }
 
+// straight legs of a quadruped are lowered by their knees: soles are where they were seen from the hips, none splays or leans
+static void check_under(const cav_model *m, cav_state *state, const cav_roles *roles, const double *q) {
+  double way[CAV_ROLE_TYPES][2];
+  cav_pose hip, foot;
+  for (int pass = 0; pass < 2; pass++) {
+    CHECK(cav_position(m, state, pass ? q : m->q0) == CAV_OK);
+    for (int r = CAV_ROLE_FRONT_RIGHT_FOOT; r <= CAV_ROLE_BACK_LEFT_FOOT; r++) {
+      if (roles->body[r] < 0) continue;
+      cav_object_pose(m, state, CAV_OBJECT_XBODY, roles->limb[r], &hip);
+      cav_object_pose(m, state, CAV_OBJECT_XBODY, roles->body[r], &foot);
+      for (int k = 0; k < 2; k++) {
+        double now = foot.pos[k] - hip.pos[k];
+        if (pass) CHECK_NEAR(now, way[r][k], 0.02);
+        way[r][k] = now;
+      }
+    }
+  }
+}
+
 // the posture stands: the sole's vertical is that of the model's own configuration, feet are level, the centre of mass lies
 // within their box, joints lie in their ranges, links of two legs are not inside each other
 static void check_stand(const cav_model *m, cav_state *state, const char *name) {
@@ -143,6 +162,7 @@ static void check_stand(const cav_model *m, cav_state *state, const char *name) 
       if (!joint->limited || (joint->type != CAV_JOINT_HINGE && joint->type != CAV_JOINT_SLIDE)) continue;
       CHECK(q[joint->q] >= joint->range[0] && q[joint->q] <= joint->range[1]);
     }
+    if (strstr(name, "solo12")) check_under(m, state, &roles, q);
     if (!stand.key) printf("%-32s stands, centre of mass %.2g m from the middle of its feet\n", name, stand.aside);
   } else {
     fprintf(stderr, "    %s: %s\n", name, stand.why);

@@ -2,8 +2,8 @@
 /// configurations, derivatives by differences. Rows: the tilt of the soles of bipeds (a sole is flat where it was flat in the
 /// model's own configuration), heights of all feet, the centre of mass over their middle, the height of the trunk, and, with
 /// small weights, the way from the model's own configuration. Legs that are straight there, whose length can only fall, are bent:
-/// the trunk comes down by a fixed fraction, and hinges start off towards the middle of their ranges. Joints stay in
-/// their ranges. Where links are inside each other so the feet of a biped go farther apart.
+/// the trunk comes down by a fixed fraction, and hinges start off towards the middle of their ranges; soles of a quadruped stay
+/// where they are seen from the hips, or it would splay or lean. Joints stay in their ranges. Where links are inside each other so the feet of a biped go farther apart.
 #include "stand.h"
 
 #include <assert.h>
@@ -20,7 +20,7 @@ static const double quadruped_bent = 0.75;
 static const double start_bend = 0.3;    // rad
 static const double inside = 0.02;       // rad from a limit
 static const double length_weight = 100; // 1/m
-static const double joint_weight = 0.03, root_weight = 0.3;
+static const double joint_weight = 0.03, root_weight = 0.3, under_weight = 10;
 static const double tilt_weight = 30;
 static const double touching = 1e-3, clearance = 0.01; // m: links this deep in each other go apart, by so much more
 static const double level = 1e-3;                      // m and rad: what a posture that stands may be off by
@@ -34,6 +34,8 @@ typedef struct stander {
   double point[FEET][3], up[FEET][3]; // of the sole, and the vertical, in the frame of the foot's body
   int root;                           // body at the top of the tree
   double rise;                        // of the trunk over the feet that is wanted
+  int stretched;                      // legs are straight in the model's own configuration
+  double under[FEET][2];              // from where a leg begins to its sole there, m
   double apart, width;                // feet of a biped, sideways: as wanted, 0 for wherever; as they are
   int nrow;
   double *q0, *q, *trial, *step;
@@ -153,6 +155,13 @@ static double holding(const cav_model *m, int d) {
   return joint->type == CAV_JOINT_SLIDE ? 1e-3 : root_weight;
 }
 
+// horizontally from where a leg begins to its sole
+static void reach_of(const stander *s, int k, const double sole[3], double reach[2]) {
+  cav_pose at;
+  cav_object_pose(s->model, s->state, CAV_OBJECT_XBODY, s->first[k], &at);
+  for (int i = 0; i < 2; i++) reach[i] = sole[i] - at.pos[i];
+}
+
 // rows at q; what the posture is off by in stand
 static cav_status rows(stander *s, const double *q, double *row, cav_stand *stand) {
   const cav_model *m = s->model;
@@ -186,6 +195,12 @@ static cav_status rows(stander *s, const double *q, double *row, cav_stand *stan
   row[n++] = length_weight * (at.pos[2] - middle[2] - s->rise);
   s->width = 0;
   for (int i = 0; i < 2; i++) s->width += s->roles->left[i] * (x[1][i] - x[0][i]);
+  // straight legs of quadrupeds are lowered by their knees, not by leaning or splaying
+  for (int k = 0; k < s->nfoot && s->nfoot == 4 && s->stretched; k++) {
+    double reach[2];
+    reach_of(s, k, x[k], reach);
+    for (int i = 0; i < 2; i++) row[n++] = under_weight * (reach[i] - s->under[k][i]);
+  }
   if (s->apart > 0) row[n++] = length_weight * (s->width - s->apart);
   cav_difference(m, s->q0, q, 1, s->step);
   for (int d = 0; d < m->nv; d++) row[n++] = holding(m, d) * s->step[d];
@@ -309,6 +324,7 @@ static cav_status prepare(stander *s) {
     cav_object_pose(m, s->state, CAV_OBJECT_XBODY, s->foot[k], &at);
     place(&at, s->point[k], x);
     ground += x[2] / s->nfoot;
+    reach_of(s, k, x, s->under[k]);
   }
   s->root = s->foot[0];
   while (m->body[s->root].parent > 0) s->root = m->body[s->root].parent;
@@ -323,6 +339,7 @@ static cav_status prepare(stander *s) {
     s->rise -= leg * (1 - (s->nfoot == 4 ? quadruped_bent : biped_bent));
     for (int k = 0; k < s->nfoot; k++) bend(s, k);
   }
+  s->stretched = stretched;
   clip(m, s->q);
   return CAV_OK;
 }
