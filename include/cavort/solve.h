@@ -372,7 +372,8 @@ CAV_API void cav_strategy_clear(cav_strategy *strategy);
 CAV_API void cav_strategy_apply(const cav_problem *problem, const cav_strategy *strategy, cav_problem *taken);
 
 /// Solves by a strategy: cav_solve of what cav_strategy_apply gives, after one under the midpoint order where the
-/// strategy says so, whose iterations and seconds are counted but whose log is not kept.
+/// strategy says so, whose iterations and seconds are counted but whose log is not kept. A repair that has a start goes
+/// on from there, with the last stages of its schedule alone.
 CAV_API cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *strategy,
                                       const cav_solve_options *options, const cav_trajectory *start,
                                       cav_solution **solution, cav_error *error);

@@ -3,7 +3,8 @@
 /// model's own configuration), heights of all feet, the centre of mass over their middle, the height of the trunk, and, with
 /// small weights, the way from the model's own configuration. Legs that are straight there, whose length can only fall, are bent:
 /// the trunk comes down by a fixed fraction, and hinges start off towards the middle of their ranges; soles of a quadruped stay
-/// where they are seen from the hips, or it would splay or lean. Joints stay in their ranges. Where links are inside each other so the feet of a biped go farther apart.
+/// where they are seen from the hips, or it would splay or lean. Joints stay in their ranges. Where links are inside each
+/// other so the feet of a biped go farther apart.
 #include "stand.h"
 
 #include <assert.h>

@@ -318,7 +318,9 @@ cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *st
   const cav_checkpoint *resume = options ? options->resume : NULL;
   int second = resume && resume->order == strategy->order;
   if (!strategy->first_midpoint || start || second) {
-    if (strategy->first_midpoint && second) taken.schedule = resumed(&taken.schedule);
+    int staged = !options || options->first_stage <= taken.schedule.stages;
+    int mended = start && strategy->use == CAV_STRATEGY_REPAIR && staged;
+    if (mended || (strategy->first_midpoint && second)) taken.schedule = resumed(&taken.schedule);
     return cav_solve(&taken, options, start, solution, error);
   }
   cav_solve_options first = options ? *options : cav_solve_options_default(), rest = first;

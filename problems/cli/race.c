@@ -24,6 +24,9 @@ static const double dearer = 2;
 // force without an actuator, fraction of the weight, and violation of limits and constraints up to which it nearly keeps them
 static const double nearly = 1e-3;
 
+// times its tolerance up to which what a feasible motion misses of a certificate is little
+static const double few = 4;
+
 // part of the duration from which on a knot is near the end
 static const double near_end = 0.75;
 
@@ -97,6 +100,20 @@ static cav_checkpoint *find_motion(const cav_race *race, int i, const cav_proble
   return NULL;
 }
 
+// where a solve with stages begins: the first one from what was given, one that goes on from the first one's motion, at its own
+// step; NULL: from its guess, or no memory
+static cav_trajectory *beginning(const cav_race *race, int i, const cav_problem *taken, cav_status *status) {
+  const cav_trajectory *from = i == 0 ? race->start : NULL;
+  if (race->entry[i].goes_on) from = race->entry[0].solution->trajectory;
+  *status = CAV_OK;
+  if (!from) return NULL;
+  int other = race->entry[i].goes_on && taken->timestep != race->problem->timestep;
+  cav_trajectory *start =
+      other ? cav_trajectory_resample(race->problem->model, from, taken->timestep) : cav_trajectory_copy(from);
+  if (!start) *status = CAV_NO_MEMORY;
+  return start;
+}
+
 // solves, from a checkpoint if there is one; it stays there
 static cav_status solve(const cav_race *race, int i, const cav_solve_options *given, const cav_problem *taken,
                         cav_solution **solution, cav_error *error) {
@@ -115,14 +132,17 @@ static cav_status solve(const cav_race *race, int i, const cav_solve_options *gi
     if (!before) status = error->status;
   }
   options.resume = before;
-  cav_checkpoint *motion = before ? NULL : find_motion(race, i, taken);
+  cav_checkpoint *motion = before || race->entry[i].goes_on ? NULL : find_motion(race, i, taken);
   if (motion) {
     options.first_stage = taken->schedule.stages + 1;
     options.nmultiplier = motion->nmultiplier;
     options.multiplier = motion->final_multiplier;
   }
-  const cav_trajectory *start = motion ? motion->trajectory : i == 0 ? race->start : NULL;
-  if (!status) status = cav_strategy_solve(race->problem, strategy, &options, start, solution, error);
+  cav_trajectory *start = status || motion ? NULL : beginning(race, i, taken, &status);
+  if (!status)
+    status =
+        cav_strategy_solve(race->problem, strategy, &options, motion ? motion->trajectory : start, solution, error);
+  cav_trajectory_free(start);
   cav_checkpoint_free(before);
   cav_checkpoint_free(motion);
   free(s.path);
@@ -410,11 +430,20 @@ static int find_broken(const cav_race *race) {
   return best >= 0 ? best : cav_race_best(race, 0);
 }
 
+// whether a motion that is possible misses little else of a certificate: it is what is looked for, but for how it was planned
+static int is_rough(const cav_verdict *v) {
+  return !v->certified && cav_verdict_feasible(v) && v->penetration_max_m <= CAV_TOLERANCE_PENETRATION &&
+         v->penetration_between_m <= CAV_TOLERANCE_PENETRATION &&
+         v->momentum_defect_rms <= few * CAV_TOLERANCE_MOMENTUM && v->slip_mean_m_s <= few * CAV_TOLERANCE_SLIP &&
+         v->hover_fraction <= few * CAV_TOLERANCE_HOVER && v->replay_step_max_error <= CAV_TOLERANCE_STEP;
+}
+
 // whether a motion is nearly what was asked
 static int is_near(const cav_race *race, const cav_race_report *report) {
   const cav_verdict *v = &report->verdict;
   if (!report->solution || report->status == CAV_INTERRUPTED) return 0;
   if (v->certified) return !v->achieved && 2 * v->nmissed < v->ntarget;
+  if (is_rough(v)) return 2 * v->nmissed <= v->ntarget;
   return v->unactuated_force_max <= CAV_TOLERANCE_UNACTUATED &&
          v->constraint_violation_max <= CAV_TOLERANCE_CONSTRAINT && v->limit_violation_max > CAV_TOLERANCE_LIMIT &&
          v->limit_violation_max < (1 - race->problem->effort_limit) / 2;
@@ -431,10 +460,9 @@ static int find_near(const cav_race *race, int i) {
   return best;
 }
 
-// the strategy that repairs it by a cure that was not tried; to be cleared where there is one
+// the strategy that repairs it by a cure that was not tried; to be cleared where there is one. *of: the entry
 static int find_repair(const cav_race *race, int i, cav_strategy *repaired, int *of) {
-  int best = race->entry[i].strategy.use == CAV_STRATEGY_NEAR ? find_near(race, i) : find_broken(race);
-  *of = best;
+  int best = *of = race->entry[i].strategy.use == CAV_STRATEGY_NEAR ? find_near(race, i) : find_broken(race);
   int found = best >= 0;
   for (int k = 0; found; k++) {
     const cav_race_entry *from = &race->entry[best];
@@ -488,9 +516,12 @@ static void settle(cav_race *race, int i) {
   cav_strategy repaired;
   int of;
   const int mends = e->strategy.use == CAV_STRATEGY_REPAIR || e->strategy.use == CAV_STRATEGY_NEAR;
+  const int near = e->strategy.use == CAV_STRATEGY_NEAR;
   if (!mends || *e->strategy.changed || !find_repair(race, i, &repaired, &of)) return;
-  if (e->strategy.use == CAV_STRATEGY_NEAR) e->from = of;
+  if (near) e->from = of;
   e->strategy = repaired;
+  // what is all but certified is not sought anew
+  e->goes_on = near && of == 0 && race->entry[0].solution && is_rough(&race->entry[0].report.verdict);
   if (race->tell) fprintf(stderr, "strategy %-8s with %s\n", e->strategy.name, e->strategy.changed);
 }
 
