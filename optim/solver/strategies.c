@@ -180,14 +180,32 @@ static int is_recorded(const cav_problem *problem) {
   return 0;
 }
 
-/// Where the guess runs into solids: over them with wide and slow swings, then as it is; what they miss is mended before
-/// anything else is tried.
-static void add_grown(cav_strategy *strategy, int *n, const cav_strategy *grown, const cav_strategy *walk) {
+/// Whether a problem has postures, an arc, a turn or swings on the way of its guess.
+static int is_decorated(const cav_problem *problem) {
+  int decorated = problem->guess_height != 0 || problem->nguess_pose || problem->nswing;
+  for (int k = 0; k < 3; k++) decorated |= problem->guess_rotation[k] != 0;
+  return decorated;
+}
+
+/// Over solids by a gait with wide and slow swings; none where the model has no gait.
+static cav_strategy over_solids(const cav_strategy *walk) {
   cav_strategy step = *walk;
   for (int i = 0; i < step.nswing; i++) step.swing[i].amplitude *= wide, step.swing[i].frequency *= leisure;
-  if (step.nswing)
-    add(strategy, n, &step, "step",
-        "over solids, which grow from soft to hard, with the limbs that carry swinging in turn");
+  step.text = "over solids, which grow from soft to hard, with the limbs that carry swinging in turn";
+  return step;
+}
+
+/// Where the guess runs into solids: over them, then as it is; what they miss is mended before anything else is tried. A file
+/// without a guess is begun over them: the straight way through a solid is nobody's.
+static void add_grown(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *grown,
+                      const cav_strategy *walk) {
+  cav_strategy step = over_solids(walk);
+  if (step.nswing && !is_decorated(problem) && problem->guess == CAV_GUESS_INTERPOLATE) {
+    step.name = strategy[0].name;
+    strategy[0] = step;
+  } else if (step.nswing) {
+    add(strategy, n, &step, "step", step.text);
+  }
   add(strategy, n, grown, "solids", "lifted out of the solids that the guess runs into, which grow from soft to hard");
   add_repairs(strategy, n, grown);
 }
@@ -230,7 +248,7 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   cav_strategy walk = plain;
   if (status == CAV_OK && !problem->nswing) status = gait(problem, &walk);
   if (status != CAV_OK) return status;
-  if (collides) add_grown(strategy, n, &stated, &walk);
+  if (collides) add_grown(problem, strategy, n, &stated, &walk);
 
   cav_strategy soft = stated;
   soft.schedule.first.smoothing *= SOFTER;
@@ -246,8 +264,7 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   if (leap.height > 0)
     add(strategy, n, &leap, "leap", "straight from start to goal with an arc as high as is asked for");
 
-  int decorated = problem->guess_height != 0 || problem->nguess_pose || problem->nswing;
-  for (int k = 0; k < 3; k++) decorated |= problem->guess_rotation[k] != 0;
+  int decorated = is_decorated(problem);
   if (decorated || problem->guess == CAV_GUESS_HOLD) add(strategy, n, &plain, "line", "straight from start to goal");
   plain.guess = CAV_GUESS_HOLD;
   if (!problem->cycle.on && (decorated || problem->guess != CAV_GUESS_HOLD))

@@ -36,6 +36,9 @@ cav_status cav_race_open(cav_race *race, int most, cav_error *error) {
   cav_status status = cav_strategy_list(race->problem, strategy, &n);
   if (status) return cav_file_fail(error, status, 0, "strategies cannot be listed: %s", cav_status_name(status));
   race->n = 0;
+  // a motion that is given has no guess
+  if (race->start)
+    strategy[0].stated = 1, strategy[0].guess = race->problem->guess, strategy[0].schedule = race->problem->schedule;
   for (int i = 0; i < n && race->n < most; i++)
     // of those that are solved at once none waits for another
     if (most >= CAV_STRATEGIES || strategy[i].use != CAV_STRATEGY_NEAR)
@@ -107,9 +110,11 @@ static cav_trajectory *beginning(const cav_race *race, int i, const cav_problem 
   if (race->entry[i].goes_on) from = race->entry[0].solution->trajectory;
   *status = CAV_OK;
   if (!from) return NULL;
-  int other = race->entry[i].goes_on && taken->timestep != race->problem->timestep;
+  // a duration that is free is the motion's own
+  long n = race->entry[i].goes_on ? lround(taken->duration / taken->timestep) : from->nknot - 1;
+  double step = from->timestep * (from->nknot - 1) / (double)n;
   cav_trajectory *start =
-      other ? cav_trajectory_resample(race->problem->model, from, taken->timestep) : cav_trajectory_copy(from);
+      n != from->nknot - 1 ? cav_trajectory_resample(race->problem->model, from, step) : cav_trajectory_copy(from);
   if (!start) *status = CAV_NO_MEMORY;
   return start;
 }
