@@ -438,7 +438,7 @@ cat >fast.xml <<'END'
 END
 run 0 solve fast.xml --threads 1
 says err "not certified: momentum defect"
-says err "kept: strategy momentum"
+says err "kept: strategy near-1"
 says fast.result/problem.xml 'order="momentum"'
 
 # --- what Ipopt says is told, where it is there ---
