@@ -32,6 +32,7 @@ awk 'BEGIN {
 }' >clip.csv
 
 "$cavort" ik clip.csv --model "$root/problems/models/robot.xml" --markers "$root/problems/markers/robot.xml" -o fit >out 2>err || fail "ik"
+grep -q '^next: cavort view fit.*cavort solve fit/repair.xml' out || fail "ik says what is next"
 grep -q "clip scaled to the model: ways in the world by 0\.[0-9]" out || fail "no word of the scale"
 sed 's/floor="true"/floor="true" pace="similar"/' "$root/problems/markers/robot.xml" >similar.xml
 "$cavort" ik clip.csv --model "$root/problems/models/robot.xml" --markers similar.xml -o similar >out 2>err || fail "ik, similar"

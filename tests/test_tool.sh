@@ -178,6 +178,16 @@ run 0 view problem.xml
 says out "start: inside nothing"
 says out "goal:  inside nothing"
 has problem.view.html
+# settings where a problem is read, and nothing left of them; what a command has no use for, and which have
+TMPDIR=$work run 0 inspect problem.xml --set horizon/@duration=0.5
+says out "0.5 s"
+check "no file is left of --set" sh -c '! ls | grep -q cavort-set'
+run 2 inspect problem.xml --set horizon/@duration=0.4,0.5
+says err "cavort solve takes several"
+run 2 inspect model.xml --set horizon/@duration=0.4
+says err "is not a problem file"
+run 2 inspect problem.xml --threads 2
+says err "it runs in one thread; solve, mhe, track, study and stress have it"
 sed 's/ name="swing"//' problem.xml >nameless.xml
 run 0 solve nameless.xml --quiet
 has nameless.result/verdict.json

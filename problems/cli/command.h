@@ -80,6 +80,13 @@ cav_status cav_command_tell_records(const char *folder, int print, const cav_pro
 /// Name of the first element of a file, "" if there is none in its first part. command.c.
 void cav_command_first_element(const char *path, char name[32]);
 
+/// Writes the problem of the command line with one value of each --set to a file. CAV_BAD_INPUT: several values, the file is no
+/// problem, or a path that it has not. command_set.c.
+cav_status cav_command_write_set(const cav_command_line *line, const char *path, cav_error *error);
+
+/// Runs a command on the problem with its settings, a file that is there for as long as it runs. Its exit status. command_set.c.
+int cav_command_set(const cav_command_line *line, int (*run)(const cav_command_line *line));
+
 /// Whether an operand can be what a command wants, in the words of its usage (DIR, PROBLEM, MODEL); if not, what it is and
 /// what was meant. operand.c.
 cav_status cav_command_expect(const char *command, const char *wanted, const char *path, cav_error *error);

@@ -276,6 +276,10 @@ static void print(const fit *f) {
   if (f->motion->nknot >= 4) cav_command_print_quality(stdout, 1, (char *const *)&f->folder, &f->quality, 0);
   printf("wrote %s: trajectory.csv, acceleration.csv, markers.csv, markers.xml, quality.csv, repair.xml, view.html%s\n",
          f->folder, f->factor || f->line->mass > 0 ? ", model.xml" : "");
+  printf("next: cavort view %s, to see it", f->folder);
+  if (f->motion->nknot >= 4)
+    printf("; cavort solve %s/repair.xml, for the motion nearest to it that obeys physics, with its forces", f->folder);
+  putchar('\n');
 }
 
 static double now(void) {

@@ -401,15 +401,10 @@ static int solve_set(const cav_command_line *line) {
   size_t length = strlen(name);
   if (!line->output && length > 4 && !strcmp(name + length - 4, ".xml")) length -= 4;
   char *path = malloc(length + 9);
-  cav_batch one = {0};
-  cav_status status = path ? cav_batch_open(&one, 1, line->operands, line->nset, line->set, &error) : CAV_NO_MEMORY;
-  if (!status) {
-    sprintf(path, "%.*s%s", (int)length, name, line->output ? ".xml" : ".set.xml");
-    status = cav_setting_write(line->operand, line->nset, one.item->setting, path, &error);
-  }
+  if (path) sprintf(path, "%.*s%s", (int)length, name, line->output ? ".xml" : ".set.xml");
+  cav_status status = path ? cav_command_write_set(line, path, &error) : CAV_NO_MEMORY;
   set.operand = path;
   int done = status ? cav_command_fail(&error) : solve_one(&set);
-  cav_batch_close(&one);
   free(path);
   return done;
 }

@@ -84,8 +84,8 @@ static const cav_manual_option options[] = {
     {OPTION_JOBS, "--jobs", "-j", "N",
      "several problems: so many at once, each with one thread (default: as many as processors)"},
     {OPTION_SET, "--set", NULL, "PATH=VALUE",
-     "an attribute of the problem, as cost/apex/@target=0.4: elements by their name or tag; with several values "
-     "(=0.2,0.3,0.4) each is solved, of several --set all combinations"},
+     "an attribute of the problem, as cost/apex/@target=0.4: elements by their name or tag; of solve also several "
+     "values (=0.2,0.3,0.4), each is solved, of several --set all combinations"},
     {OPTION_ERRORS, "--errors", NULL, NULL,
      "write stderr.csv: standard errors of what was estimated, with costs as likelihoods"},
     {OPTION_CSV, "--csv", NULL, NULL, "print as CSV"},
@@ -114,7 +114,7 @@ static int help(const cav_command_line *line);
 
 static const cav_manual_command commands[] = {
     {"inspect", "MODEL|PROBLEM", "say what a model or a problem holds, what it runs and what it leaves out",
-     cav_command_inspect, OPTION_MODEL | OPTION_FLOATING},
+     cav_command_inspect, OPTION_MODEL | OPTION_FLOATING | OPTION_SET},
     {"new", "MODEL",
      "write a problem file to begin with, for a model (-o, default MODEL-first.xml): a wish that suits it, and its "
      "joints,\n"
@@ -152,7 +152,8 @@ static const cav_manual_command commands[] = {
      "long "
      "plans\n"
      "  took; writes runs.csv, and of the worst run plans.csv, trajectory.csv and a page",
-     cav_command_mpc, OPTION_MODEL | OPTION_RATE | OPTION_CONTROL | OPTION_WINDOW | OPTION_OUTPUT | OPTION_QUIET},
+     cav_command_mpc,
+     OPTION_MODEL | OPTION_RATE | OPTION_CONTROL | OPTION_WINDOW | OPTION_SET | OPTION_OUTPUT | OPTION_QUIET},
     {"mhe", "PROBLEM",
      "estimate a motion from its records as they came in, sample by sample, from a window of knots and what is known "
      "before "
@@ -160,7 +161,7 @@ static const cav_manual_command commands[] = {
      "  state with standard errors, forces and disturbances, nothing later used; writes trajectory.csv, stderr.csv, "
      "touch.csv (contact\n"
      "  forces on bodies), updates.csv and a page. Solved as a whole by cavort solve",
-     cav_command_mhe, OPTION_MODEL | OPTION_WINDOW | OPTION_THREADS | OPTION_OUTPUT | OPTION_QUIET},
+     cav_command_mhe, OPTION_MODEL | OPTION_WINDOW | OPTION_THREADS | OPTION_SET | OPTION_OUTPUT | OPTION_QUIET},
     {"track", "CLIP",
      "find the motion nearest to a recorded clip that obeys physics, with the forces and torques that make it: "
      "contacts "
@@ -454,6 +455,19 @@ static const char *option_renamed(const char *argument) {
   return NULL;
 }
 
+// "; solve and track have it", of an option that others take; why these do not
+static void tell_owners(enum option option) {
+  int n = 0, told = 0;
+  for (int i = 0; i < NCOMMAND; i++) n += (commands[i].options & option) != 0;
+  fprintf(stderr, "%s; ", option == OPTION_THREADS ? ": it runs in one thread" : "");
+  for (int i = 0; i < NCOMMAND; i++) {
+    if (!(commands[i].options & option)) continue;
+    fprintf(stderr, "%s%s", !told ? "" : told + 1 < n ? ", " : " and ", commands[i].name);
+    told++;
+  }
+  fprintf(stderr, " ha%s it", n > 1 ? "ve" : "s");
+}
+
 // reads what follows the command's name; returns 0 after telling what is wrong
 static int read_line(const cav_manual_command *c, int argc, char **argv, cav_command_line *line) {
   for (int i = 0; i < argc; i++) {
@@ -485,6 +499,7 @@ static int read_line(const cav_manual_command *c, int argc, char **argv, cav_com
         fprintf(stderr, "cavort %s: %s is not an option of this command", c->name, argv[i]);
         // one of another command is spelt right
         if (k < 0) suggest(cav_xml_nearest(name, &options->name, NOPTION, sizeof *options));
+        if (k >= 0) tell_owners((enum option)options[k].bit);
         fprintf(stderr, "; see cavort help %s\n", c->name);
       }
       return 0;
@@ -550,8 +565,11 @@ static int run(int argc, char **argv, const char *arguments) {
   // these say themselves what is wrong with what they are given
   int one = c->run != help && c->run != cav_command_study && c->run != cav_command_ik && c->run != cav_command_track &&
             c->run != cav_command_table && c->run != cav_command_quality && line.noperand < 2;
-  int status =
-      one && cav_command_expect(c->name, c->operand, line.operand, &error) ? cav_command_fail(&error) : c->run(&line);
+  // solve and track keep what they set; for the others it is a file of the moment
+  const int moment = line.nset && c->run != cav_command_solve && c->run != cav_command_track;
+  int status = one && cav_command_expect(c->name, c->operand, line.operand, &error) ? cav_command_fail(&error)
+               : moment                                                             ? cav_command_set(&line, c->run)
+                                                                                    : c->run(&line);
   // a full disk or a closed pipe must not pass for success
   if (fflush(stdout) != 0 && status == 0) {
     fprintf(stderr, "cavort: standard output cannot be written\n");
