@@ -147,7 +147,7 @@ static void estimate(const truth *w, int knots, int iterations, double gone) {
     exit(check_result());
   }
   const int nv = p->model->nv;
-  double took[SAMPLES], square[6] = {0}, told[4] = {0};
+  double took[SAMPLES], square[6] = {0}, told[4] = {0}, chi = 0, most = 0;
   int late = 0, wrong = 0, n = 0, counted = 0;
   for (int k = 0; k < SAMPLES; k++) {
     for (int i = 0; i < p->nterm; i++)
@@ -160,6 +160,9 @@ static void estimate(const truth *w, int knots, int iterations, double gone) {
     cav_knot_view view;
     double foot[FEET], off[MOST_V];
     const double *C = cav_mhe_covariance(mhe);
+    int readings;
+    const double ratio = cav_mhe_chi_square(mhe, &readings) / readings;
+    if (readings > 0) chi += ratio / SAMPLES, most = fmax(most, ratio);
     if (k < 2) continue;
     CHECK(cav_mhe_view(mhe, 1, &view) == CAV_OK);
     feet(view.state, foot);
@@ -179,11 +182,12 @@ static void estimate(const truth *w, int knots, int iterations, double gone) {
   }
   qsort(took, (size_t)counted, sizeof *took, bench_ascending);
   printf(
-      "| %.0f | %d | %d | %.0f | %.1f (%.1f) | %.2f (%.2f) | %.0f (%.0f) | %.0f | %.1f | %.0f | %.1f | %.1f | %.0f | "
+      "| %.0f | %d | %d | %.0f | %.1f (%.1f) | %.2f (%.2f) | %.0f (%.0f) | %.0f | %.1f | %.0f | %.2g (%.2g) | %.1f | "
+      "%.1f | %.0f | "
       "%d |\n",
       w->impulse, knots, iterations, 100 * gone, 100 * sqrt(square[0] / n), 100 * sqrt(told[0] / n),
       sqrt(square[1] / n) * 180 / M_PI, sqrt(told[1] / n) * 180 / M_PI, 1e3 * sqrt(square[2] / n),
-      1e3 * sqrt(told[2] / n), sqrt(square[3] / n), 100. * wrong / (FEET * n), sqrt(square[4] / n),
+      1e3 * sqrt(told[2] / n), sqrt(square[3] / n), 100. * wrong / (FEET * n), sqrt(square[4] / n), chi, most,
       1e3 * took[counted / 2], 1e3 * took[counted * 99 / 100], 1 / took[counted / 2], late);
   cav_mhe_free(mhe);
   cav_problem_free(p);

@@ -25,8 +25,8 @@ static void predict(double A[S][S], double B[S][N], double x[S], double P[S][S])
   memcpy(x, y, sizeof y), memcpy(P, Q, sizeof Q);
 }
 
-/// x, P with a reading of the first place.
-static void correct(double z, double x[S], double P[S][S]) {
+/// x, P with a reading of the first place; the square of its innovation in its own deviations.
+static double correct(double z, double x[S], double P[S][S]) {
   double gain[S], over = P[0][0] + place_sd * place_sd, off = z - x[0], row[S];
   memcpy(row, P[0], sizeof row);
   for (int i = 0; i < S; i++) gain[i] = P[i][0] / over;
@@ -34,6 +34,7 @@ static void correct(double z, double x[S], double P[S][S]) {
     x[i] += gain[i] * off;
     for (int j = 0; j < S; j++) P[i][j] -= gain[i] * row[j];
   }
+  return off * off / over;
 }
 
 /// A problem of that model: forces of known variance, a start that is known so well, and a record of the first place.
@@ -71,7 +72,8 @@ static void run(const cav_model *m, cav_order order, int knots, double missing) 
   cav_state *s = cav_state_new(m);
   p.order = order;
   s->options.timestep = step, s->options.order = order;
-  double A[S][S], B[S][N], x[S], truth[S], P[S][S] = {{0}}, most = 0, wide = 0;
+  double A[S][S], B[S][N], x[S], truth[S], P[S][S] = {{0}}, most = 0, wide = 0, innovation[SAMPLES] = {0}, odd = 0;
+  int read[SAMPLES] = {0}, readings;
   linear_map(m, s, step, &A[0][0], &B[0][0]);
   memcpy(x, begin, sizeof x);
   for (int i = 0; i < S; i++) {
@@ -86,12 +88,17 @@ static void run(const cav_model *m, cav_order order, int knots, double missing) 
     double u[N], next[S], z = truth[0] + place_sd * scene_normal();
     if (scene_uniform() < 2 * missing - 1) z = NAN;
     if (t > 0) predict(A, B, x, P);
-    if (!isnan(z)) correct(z, x, P);
+    if (!isnan(z)) innovation[t] = correct(z, x, P), read[t] = 1;
     CHECK(cav_mhe_measure(mhe, 1, t * step, &z) == CAV_OK);
     CHECK(cav_mhe_update(mhe, NULL) == CAV_OK);
     cav_knot_view view;
     if (!CHECK(cav_mhe_view(mhe, 0, &view) == CAV_OK)) break;
     CHECK_NEAR(view.time, t * step, 1e-9);
+    // twice the costs of a window are the innovations of its readings, given all before it
+    double chi = cav_mhe_chi_square(mhe, &readings);
+    for (int i = t; i >= 0 && i > t - knots; i--) chi -= innovation[i], readings -= read[i];
+    CHECK(readings == 0);
+    odd = fmax(odd, fabs(chi));
     const double *C = cav_mhe_covariance(mhe);
     for (int i = 0; i < S; i++) {
       most = fmax(most, fabs((i < N ? view.q[i] : view.v[i - N]) - x[i]) / sqrt(P[i][i]));
@@ -104,6 +111,8 @@ static void run(const cav_model *m, cav_order order, int knots, double missing) 
   printf("order %d, %d knots, %.0f %% missing: states %.1e standard errors, covariances %.1e off the Kalman filter's\n",
          (int)order, knots, 100 * missing, most, wide);
   CHECK(most < 1e-8 && wide < 1e-9);
+  printf("    chi-square of a window off the innovations' by %.1e\n", odd);
+  CHECK(odd < 1e-8);
   cav_mhe_free(mhe);
   cav_state_free(s);
 }

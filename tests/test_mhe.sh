@@ -57,6 +57,7 @@ cut -d, -f2,3 "$work/a/trajectory.csv" >"$work/state"
 cut -d, -f2,3 "$work/a/stderr.csv" | paste -d, "$work/state" - | tail -n +2 | paste -d' ' - "$work/filter" | tr ',' ' ' | awk '
   { if (NF != 8) bad++; for (i = 1; i <= 4; i++) { d = $i - $(i + 4); if (d < 0) d = -d; if (d > 1e-7) bad++; if (d > most) most = d } n++ }
   END { print n, bad + 0; printf "largest difference from the filter %.1e\n", most >"/dev/stderr" }' >"$work/compared"
+check 'residuals: not lost' "$(grep -c '^chi-square of a window' "$work/out") $(grep -c LOST "$work/out")" '1 0'
 check 'the Kalman filter' "$(cat "$work/compared")" '81 0'
 "$cavort" mhe "$work/problem.xml" --knots 4 -q -o "$work/b" >"$work/quiet" 2>&1
 check 'quiet' "$(wc -c <"$work/quiet" | tr -d ' ')" 0
@@ -75,6 +76,13 @@ paste -d, "$work/a/trajectory.csv" "$work/d/trajectory.csv" | awk -F, 'NR > 1 { 
   END { print n, bad + 0 }' >"$work/compared"
 check 'limits that hold nothing' "$(cat "$work/compared")" '81 0'
 
+# readings that are fifty times as far off as they are said to be: states and standard errors alike, but the residuals tell
+awk -F, 'NR == 1 { print; next } { if ($2 != "") $2 += (NR % 2 ? .5 : -.5); print $1 "," $2 }' "$work/place.csv" >"$work/off.csv"
+sed 's/place.csv/off.csv/' "$work/problem.xml" >"$work/off.xml"
+"$cavort" mhe "$work/off.xml" --knots 4 -o "$work/e" >"$work/out" 2>&1
+check 'readings that are off: told' "$(grep -c '^LOST' "$work/out")" 1
+check 'readings that are off: in the table' "$(awk -F, 'NR > 20 && $4 > 100 * $5 { n++ } END { print (n > 40) }' "$work/e/updates.csv")" 1
+
 # 0.6 s of the humanoid's record, before and in a push of 200 N
 "$cavort" mhe "$source/problems/mhe/stand.xml" --knots 5 --threads 2 -o "$work/c" >"$work/out" 2>&1
 check 'stand: status' $? 0
@@ -92,8 +100,8 @@ refused() {
   check "status of $*" $? 2
   check "text of $*" "$(grep -c -- "$text" "$work/out")" 1
 }
-refused 'knots of a window from 3' "$work/problem.xml" --knots 2
-refused 'knots of a window from 3' "$work/problem.xml" --knots 82
+refused 'a window of 3 to 81 knots, as many as the problem has, got 2' "$work/problem.xml" --knots 2
+refused 'a window of 3 to 81 knots, as many as the problem has, got 82' "$work/problem.xml" --knots 82
 refused 'start free="true"' "$source/problems/mpc/stand.xml"
 sed 's/<track[^>]*>//' "$work/problem.xml" >"$work/none.xml"
 refused 'expected a record' "$work/none.xml"

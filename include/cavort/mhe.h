@@ -51,6 +51,11 @@ CAV_API cav_status cav_mhe_view(cav_mhe *mhe, int lag, cav_knot_view *view);
 /// Newton's); NULL before the first update.
 CAV_API const double *cav_mhe_covariance(const cav_mhe *mhe);
 
+/// Whether the last update's window contradicts itself: twice the least of its costs, a chi-square of as many degrees of freedom
+/// as readings, where costs are the negative logarithm of what is known, records with their noise, and the model is the body's.
+/// Far above readings the covariance is too small, and the body may be lost. NaN and 0 readings before the first update.
+CAV_API double cav_mhe_chi_square(const cav_mhe *mhe, int *readings);
+
 #ifdef __cplusplus
 }
 #endif

@@ -10,6 +10,7 @@
 
 #include "arrival.h"
 #include "optimiser.h"
+#include "quantity.h"
 #include "stream.h"
 
 /// Largest change of one unknown in a step that is taken whole, rad or m; fraction of the merit that rounding makes.
@@ -57,8 +58,12 @@ static cav_status check(const cav_problem *p, const cav_mhe_options *o, cav_erro
   if (p->model->nv > CAV_USER_DIM_MAX) return refuse(error, CAV_NOT_SUPPORTED, "a model with more than 64 dofs");
   if (o->threads < 1 || o->iterations < 1 || !(o->deadline >= 0))
     return refuse(error, CAV_BAD_INPUT, "expected at least one thread and one iteration, and a deadline from 0 on");
-  if (o->knots != 0 && (o->knots < LEAST_KNOTS || length > p->duration + 0.5 * p->timestep))
-    return refuse(error, CAV_BAD_INPUT, "expected knots of a window from 3 to those of the problem, or 0: all");
+  if (o->knots != 0 && (o->knots < LEAST_KNOTS || length > p->duration + 0.5 * p->timestep)) {
+    char text[120];
+    snprintf(text, sizeof text, "expected a window of %d to %d knots, as many as the problem has, got %d", LEAST_KNOTS,
+             (int)lround(p->duration / p->timestep) + 1, o->knots);
+    return refuse(error, CAV_BAD_INPUT, text);
+  }
   int records = 0;
   for (int i = 0; i < p->nterm; i++) {
     records += p->term[i].quantity == CAV_QUANTITY_TRACK;
@@ -345,3 +350,30 @@ cav_status cav_mhe_view(cav_mhe *mhe, int lag, cav_knot_view *view) {
 }
 
 const double *cav_mhe_covariance(const cav_mhe *mhe) { return mhe->now < 0 ? NULL : mhe->covariance; }
+
+/// Numbers that a record says at knot t of the window.
+static int count(const cav_transcription *tr, const cav_track *track, int t) {
+  double value[CAV_SENSOR_DIM_MAX];
+  int n = 0;
+  for (int i = 0; i < track->nchannel; i++) {
+    const cav_channel *c = &track->channel[i];
+    if (!cav_track_sample(track, c, cav_knot_time(tr, t), tr->problem->timestep, value)) continue;
+    if (cav_channel_rotates(c)) n += 3;
+    for (int k = 0; k < c->ncolumn && !cav_channel_rotates(c); k++) n += !isnan(value[k]);
+  }
+  return n;
+}
+
+double cav_mhe_chi_square(const cav_mhe *mhe, int *readings) {
+  *readings = 0;
+  if (mhe->now < 0) return NAN;
+  const cav_transcription *tr = cav_optimiser_run(mhe->optimiser)->tr;
+  for (int i = 0; i < mhe->problem.nterm - CAV_ARRIVAL_TERMS; i++) {
+    const cav_term *term = &mhe->term[i];
+    if (!term->track || !(term->weight > 0)) continue;
+    // forces after the newest knot are not known yet, and velocities are read with them
+    const int knots = tr->nknot - (cav_term_stage(term) > CAV_READS_POSITION);
+    for (int t = 0; t < knots; t++) *readings += count(tr, term->track, t);
+  }
+  return 2 * cav_transcription_cost(tr);
+}

@@ -22,10 +22,15 @@ static const double near_knot = 1e-6;
 /// N: contacts act at a distance, too, where they are smoothed.
 static const double trace = 0.01;
 
+/// Chi-square of a window over its readings: from where a body counts as lost, and from where in the mean errors are too small.
+static const double lost = 100, strained = 2;
+
 /// What one update said.
 typedef struct update {
   cav_progress last;
   double clock, processor; ///< s that it took
+  double chi_square;       ///< of its window
+  int readings;            ///< in it
 } update;
 
 typedef struct run {
@@ -152,6 +157,7 @@ static cav_status sample(run *r, int k, cav_error *error) {
   const double begin = now(CLOCK_MONOTONIC), work = now(CLOCK_PROCESS_CPUTIME_ID);
   status = cav_mhe_update(r->mhe, &u->last);
   u->clock = now(CLOCK_MONOTONIC) - begin, u->processor = now(CLOCK_PROCESS_CPUTIME_ID) - work;
+  u->chi_square = cav_mhe_chi_square(r->mhe, &u->readings);
   if (!status) status = take(r, k);
   if (status == CAV_NOT_CONVERGED)
     return cav_file_fail(
@@ -183,11 +189,12 @@ static cav_status write_updates(const run *r, cav_error *error) {
   cav_file file;
   cav_status status = begin_table(r, "updates.csv", &file, error);
   if (status) return status;
-  fputs("time_s,cost,unactuated,clock_s,processor_s\n", file.stream);
+  fputs("time_s,cost,unactuated,chi_square,readings,clock_s,processor_s\n", file.stream);
   for (int k = 0; k < r->done; k++) {
     const update *u = &r->update[k];
-    const double value[] = {k * r->problem->timestep, u->last.cost, u->last.unactuated, u->clock, u->processor};
-    write_row(file.stream, 5, value);
+    const double value[] = {
+        k * r->problem->timestep, u->last.cost, u->last.unactuated, u->chi_square, u->readings, u->clock, u->processor};
+    write_row(file.stream, 7, value);
     fputc('\n', file.stream);
   }
   return cav_file_end(&file, error);
@@ -322,6 +329,36 @@ static void print_errors(const run *r) {
   }
 }
 
+// whether residuals are what standard errors promise: of a window that is right the chi-square is about its readings
+static void print_residuals(const run *r) {
+  double sum = 0, most = 0;
+  int n = 0, at = 0, first = -1, over = 0;
+  for (int k = 0; k < r->done; k++) {
+    const update *u = &r->update[k];
+    if (u->readings < 1) continue;
+    const double ratio = u->chi_square / u->readings;
+    n++, sum += ratio;
+    if (ratio > most) most = ratio, at = k;
+    if (ratio <= lost) continue;
+    if (first < 0) first = k;
+    over++;
+  }
+  if (n < 1) return;
+  const double h = r->problem->timestep;
+  printf(
+      "chi-square of a window over its readings, 1 where model and noise are right: mean %.2g, largest %.2g at %.4g "
+      "s\n",
+      sum / n, most, at * h);
+  if (over)
+    printf(
+        "LOST: residuals contradict the standard errors in %d of %d samples, first at %.4g s: do not rely on states "
+        "from "
+        "there on. A noise (sd) that is larger, likelier forces (<residual>, <effort>) or more readings help\n",
+        over, n, first * h);
+  else if (sum / n > strained)
+    printf("standard errors are too small: by residuals about %.2g times as large\n", sqrt(sum / n));
+}
+
 int cav_command_mhe(const cav_command_line *line) {
   cav_error error = {0};
   run r = {.line = line};
@@ -334,6 +371,7 @@ int cav_command_mhe(const cav_command_line *line) {
   if (!status && !line->quiet) {
     print_times(&r);
     print_errors(&r);
+    print_residuals(&r);
     printf(
         "states are those of their samples, velocities means over the step before, forces of a step known a sample "
         "later\nwrote %s: trajectory.csv, stderr.csv, touch.csv, updates.csv, view.html\n",

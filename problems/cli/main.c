@@ -100,7 +100,7 @@ static const cav_manual_option options[] = {
      "from x towards y, or around, ten runs in ten directions and instants; over LENGTH (default 0.1 s). May be given "
      "several times: a run each"},
     {OPTION_WINDOW, "--knots", NULL, "N",
-     "knots that a plan looks ahead (default: those of the problem), or of mhe's window (default 10)"},
+     "knots that a plan looks ahead (default: those of the problem), or of mhe's window (from 3, default 10)"},
     {OPTION_WINDOW, "--iterations", NULL, "N", "Gauss-Newton steps for a plan (default 2), or an update (default 1)"},
     {OPTION_WINDOW, "--deadline", NULL, "S",
      "from a state to the plan that is made from it (default: 1/rate), or for an update (default: a timestep); later "
