@@ -5,7 +5,8 @@
 /// penalty e times its penalty p; its multiplier y is in [0, p], and on the central path s y = e (p - y) = mu. Newton's
 /// step with both eliminated adds to the Hessian w J'J with 1/w = s/y + e/(p - y), so one banded factor of the own
 /// solver serves, whatever rows are active. Predictor and corrector as in Mehrotra (1992); the start is the point of
-/// the central path at x = 0.
+/// the central path at x = 0. Under other penalties a programme goes on from its last solution, with slacks that are off
+/// what they are of: steps bring those in as they do the dual residual.
 #include "quadratic.h"
 
 #include <math.h>
@@ -15,11 +16,13 @@
 #include "dense.h"
 #include "readings.h"
 
-/// Iterations at most; a window of them, in which the gap has to become a tenth; how many may meet a Hessian that is not convex; part of the way to the boundary that a step goes; fraction of the cost that the gap
-/// starts with, and with what it starts again.
+/// Iterations at most; a window of them, in which the gap has to become a tenth; how many may meet a Hessian that is not
+/// convex; part of the way to the boundary that a step goes; fraction of the cost that the gap starts with, and with
+/// what it starts again.
 enum { ITERATIONS = 60, WINDOW = 10, BENT = 9 };
 static const double boundary = 0.995, first_gap[] = {0.1, 1e3, 1e6};
-/// Of a solution to go on from: the gap, of what it decreases; slack, in units of a row, of a row that is at its bound or beyond and was not.
+/// Of a solution to go on from: the gap, of what it decreases; slack, in units of a row, of a row that is at its bound
+/// or beyond and was not.
 static const double resumed_gap = 1e-2, nearby = 1e-2;
 
 /// Fraction of its diagonal that is added to a matrix that has no factor, at first.

@@ -21,6 +21,7 @@ void cav_quadratic_free(cav_quadratic *quadratic);
 cav_status cav_quadratic_solve(cav_quadratic *quadratic, const double *radius, const double change[2], double gap);
 
 /// The last programme again, whose penalties have changed since: from its solution, in a third of the iterations.
+/// Same results as cav_quadratic_solve.
 cav_status cav_quadratic_solve_again(cav_quadratic *quadratic, double gap);
 
 /// Further step from the solution x, in the metric that it was found in, towards rows that are off by offset [rows], and
