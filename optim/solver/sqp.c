@@ -57,7 +57,7 @@ enum { LEAPS = 4, LEAP_BOXES = sizeof leap_box / sizeof *leap_box };
 static const double poor_ratio = 0.4, far = 2;
 
 /// Parts of a step that are tried where it falls short, from which ratios of it on; from where it does not.
-static const double shorter[2][2] = {{0.5, -3}, {0.25, -20}}, enough_of_it = 0.25;
+static const double shorter[2][2] = {{0.5, -3}, {0.25, -20}}, enough_of_it = 0.5;
 
 /// Part of what a step misses that a correction has to bring for another one to follow.
 static const double worth = 0.1;
