@@ -27,7 +27,7 @@ static void run(const char *folder) {
   if (!result) return;
   cav_problem *problem = result->problem;
   cav_transcription *tr = cav_transcription_new(problem, 1, &error);
-  cav_solution solution = {.contact = problem->contact};
+  cav_solution solution = {.trajectory = result->trajectory, .contact = problem->contact};
   cav_verdict v = {0};
   int sets = 0;
   if (!CHECK(tr != NULL)) fprintf(stderr, "    %s\n", error.text);
@@ -36,8 +36,7 @@ static void run(const char *folder) {
     const double begin = seconds();
     CHECK(cav_choose_gains(problem, tr, result->trajectory, 0, note_set, &sets, &solution, &error) == CAV_OK);
     const double chosen = seconds();
-    CHECK(cav_verify(problem, result->trajectory, &problem->contact, solution.gain_q, solution.gain_v, &v, &error) ==
-          CAV_OK);
+    CHECK(cav_verify_solution(problem, &solution, &v, &error) == CAV_OK);
     const double end = seconds();
     char *copy = strdup(folder);
     printf("%-16s %4d %8.3f %8.3f %9.3f %10s %9.1f %9.1f %8.2f %8.2f\n", basename(copy), sets,
@@ -47,7 +46,7 @@ static void run(const char *folder) {
     fflush(stdout);
     free(copy);
   }
-  free(solution.gain_q), free(solution.gain_v);
+  cav_gains_free(&solution);
   cav_transcription_free(tr);
   cav_result_free(result);
 }

@@ -70,6 +70,8 @@ static void choose(cav_result *result) {
   CHECK(cav_choose_gains(result->problem, tr, result->trajectory, 0, go_on, NULL, &solution, &error) == CAV_OK);
   free(result->gain_q), free(result->gain_v);
   result->gain_q = solution.gain_q, result->gain_v = solution.gain_v;
+  solution.gain_q = solution.gain_v = NULL;
+  cav_gains_free(&solution);
   cav_transcription_free(tr);
 }
 

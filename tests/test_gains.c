@@ -108,7 +108,7 @@ int main(void) {
     CHECK(run <= whole + trials);
     // where the first set serves, each loop once
     if (k == 0) CHECK(trials == 1 && run == CAV_LOOPS);
-    free(solution.gain_q), free(solution.gain_v);
+    cav_gains_free(&solution);
   }
   // where the last loop alone is lost, the next sets begin there
   draw(0, 0.15);
@@ -118,7 +118,7 @@ int main(void) {
   run = 0;
   CHECK(cav_choose_gains(&problem, tr, motion, 0, next, NULL, &solution, NULL) == CAV_OK);
   CHECK(trial == FEW && run == CAV_LOOPS + FEW);
-  free(solution.gain_q), free(solution.gain_v);
+  cav_gains_free(&solution);
   cav_trajectory_free(motion);
   cav_transcription_free(tr);
   cav_model_free(model);

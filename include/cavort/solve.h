@@ -195,6 +195,8 @@ typedef struct cav_binding {
 } cav_binding;
 
 /// A solved motion.
+typedef struct cav_followed cav_followed; ///< closed loops of the verifier
+
 typedef struct cav_solution {
   cav_trajectory *trajectory; ///< the motion
   cav_options contact;        ///< contact law the motion obeys
@@ -217,6 +219,7 @@ typedef struct cav_solution {
   double
       *multiplier; ///< [nmultiplier] of every constraint row, scaled as the solver sees it, positive at upper bounds.
                    ///< Rows by knot; of a knot: unactuated forces, efforts, ranges of joints and of tendons, hard terms
+  cav_followed *followed; ///< those that were run for the choice of gains, for cav_verify_solution; NULL: none
 } cav_solution;
 
 /// What a plan is made of, and how the own solver factors its normal equations, at the problem's guess, first stage: a
@@ -481,6 +484,11 @@ CAV_API int cav_verdict_optimal(const cav_verdict *verdict);
 /// claims.
 CAV_API cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
                               const double *gain_q, const double *gain_v, cav_verdict *verdict, cav_error *error);
+
+/// The same of a solution, sooner: closed loops that verification has run for the choice of its gains are not run again where
+/// motion, law and gains are those of then, to the bit. The model has to be unchanged since the solve.
+CAV_API cav_status cav_verify_solution(const cav_problem *problem, const cav_solution *solution, cav_verdict *verdict,
+                                       cav_error *error);
 
 /// How optimal a verified motion is, into verdict->optimality: no step of 0.5 rad or m (root mean square over knots)
 /// along the linearised constraints decreases the cost by a larger fraction, to second order in the cost's residuals.

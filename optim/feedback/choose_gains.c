@@ -59,7 +59,9 @@ typedef struct search {
   cav_verification verification;
   const cav_trajectory *at;
   cav_solution *solution;
-  double *gain; ///< [2*n]
+  double *gain;                        ///< [2*n]
+  struct cav_follow follow[CAV_LOOPS]; ///< loops of a set, and of the best
+  struct cav_follow best_follow[CAV_LOOPS];
   size_t n;
   set best;
   outcome reached;
@@ -100,16 +102,16 @@ static cav_status try(search *s, const set *one) {
   s->vain++;
   for (int k = 0; k < CAV_LOOPS && status == CAV_OK; k++) {
     const int loop = k == 0 ? first : k <= first ? k - 1 : k;
-    struct cav_follow follow;
     if (k > 0 && loop >= now.follows) break;
-    status = cav_closed_loop(&s->verification, loop, s->gain, s->gain + s->n, &follow);
+    status = cav_closed_loop(&s->verification, loop, s->gain, s->gain + s->n, &s->follow[loop]);
     if (status != CAV_OK) break;
-    note(&now, loop, &follow);
+    note(&now, loop, &s->follow[loop]);
     if (s->found && !better(&now, &s->reached)) return CAV_OK;
   }
   if (status != CAV_OK) return status;
   memcpy(s->solution->gain_q, s->gain, s->n * sizeof *s->gain);
   memcpy(s->solution->gain_v, s->gain + s->n, s->n * sizeof *s->gain);
+  memcpy(s->best_follow, s->follow, sizeof s->follow);
   s->best = *one;
   s->reached = now;
   s->found = 1;
@@ -163,9 +165,20 @@ cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription 
     status = report(context, i + 1, trials) ? CAV_INTERRUPTED : try(&s, &one);
     if (done(&s, i + 1)) break;
   }
+  if (s.found && s.reached.follows >= CAV_LOOP_PUSHED && !problem->cycle.on) {
+    solution->followed = cav_followed_new(&s.verification, solution->gain_q, solution->gain_v, s.best_follow);
+    if (!solution->followed && status == CAV_OK) status = CAV_NO_MEMORY;
+  }
   cav_verification_end(&s.verification);
   free(s.gain);
   // zeros are no gains
-  if (!s.found) free(solution->gain_q), free(solution->gain_v), solution->gain_q = solution->gain_v = NULL;
+  if (!s.found) cav_gains_free(solution);
   return status;
+}
+
+void cav_gains_free(cav_solution *solution) {
+  free(solution->gain_q), free(solution->gain_v);
+  cav_followed_free(solution->followed);
+  solution->gain_q = solution->gain_v = NULL;
+  solution->followed = NULL;
 }

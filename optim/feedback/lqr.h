@@ -23,4 +23,7 @@ cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription 
                             const cav_trajectory *at, int sets, int (*report)(void *context, int set, int most),
                             void *context, cav_solution *solution, cav_error *error);
 
+/// Frees a solution's gains and what is known of their closed loops: it has none then.
+void cav_gains_free(cav_solution *solution);
+
 #endif

@@ -12,6 +12,7 @@
 
 #include "continuation.h"
 #include "driven.h"
+#include "lqr.h"
 #include "transcription.h"
 
 // ---------------------------------------------------------------- what is asked for
@@ -543,7 +544,7 @@ cav_status cav_idle_expand(const cav_idle *idle, double tolerance, cav_solution 
     return status == CAV_NO_MEMORY ? status : CAV_OK;
   }
   cav_trajectory_free(solution->trajectory);
-  free(solution->gain_q), free(solution->gain_v);
+  cav_gains_free(solution);
   solution->trajectory = at;
   solution->gain_q = gain_q, solution->gain_v = gain_v;
   for (int i = 0; i < solution->nrow; i++) renumber_row(idle, &solution->row[i]);

@@ -51,7 +51,8 @@ int cav_solution_note(cav_solution *solution, const cav_stage_record *stage) {
 void cav_solution_free(cav_solution *solution) {
   if (!solution) return;
   cav_trajectory_free(solution->trajectory);
-  free(solution->gain_q), free(solution->gain_v), free(solution->progress), free(solution->stage);
+  cav_gains_free(solution);
+  free(solution->progress), free(solution->stage);
   free(solution->row), free(solution->multiplier);
   free(solution);
 }

@@ -22,11 +22,7 @@ static const double far = 0.5, turned = 1;   // m, rad: a replay that has lost t
 static const double exact_tolerance = 1e-12; // relative residual asked of forward steps
 static const double poor = 1e-6;             // fraction of weight that a forward step may leave unexplained
 // s: steps that simulators take. A motion on the edge follows at one and falls at another
-enum { OWN_STEPS = 2 };
-static const double own_step[OWN_STEPS] = {0.002, 0.001};
-
-// by how much at most a start is off: m or rad, m/s or rad/s. What two simulators make of a touch differs by more
-static const double off_position = 0.001, off_velocity = 0.01;
+static const double own_step[] = {0.002, 0.001};
 
 // largest tangent component from q0 to q1
 static double apart(const cav_model *model, const double *q0, const double *q1, double *work) {
@@ -396,11 +392,11 @@ static double spread(int start, int k) {
 
 // moves a start off: joints, and velocities of all
 static void move_start(const cav_model *model, int start, double *q, double *v) {
-  for (int d = 0; d < model->nv; d++) v[d] += off_velocity * spread(start, d);
+  for (int d = 0; d < model->nv; d++) v[d] += CAV_START_VELOCITY * spread(start, d);
   for (int j = 0; j < model->njoint; j++) {
     const cav_joint *joint = model->joint + j;
     if (joint->type == CAV_JOINT_SLIDE || joint->type == CAV_JOINT_HINGE)
-      q[joint->q] += off_position * spread(start, model->nv + j);
+      q[joint->q] += CAV_START_POSITION * spread(start, model->nv + j);
   }
 }
 
@@ -459,24 +455,4 @@ cav_status cav_replay_closed(const cav_verification *verification, const cav_opt
 cav_status cav_replay_own(const cav_verification *verification, int finer, const double *gain_q, const double *gain_v,
                           const cav_disturbance *disturbance, struct cav_follow *follow) {
   return closed(verification, NULL, own_step[finer], gain_q, gain_v, disturbance, follow);
-}
-
-cav_status cav_replay_own_worst(const cav_verification *verification, const double *gain_q, const double *gain_v,
-                                struct cav_follow *follow) {
-  *follow = (struct cav_follow){0};
-  for (int i = 0; i < OWN_STEPS + CAV_STARTS && !*follow->lost; i++) {
-    struct cav_follow now;
-    const cav_disturbance off = {.start = i - OWN_STEPS + 1};
-    cav_status status = i < OWN_STEPS ? cav_replay_own(verification, i, gain_q, gain_v, NULL, &now)
-                                      : cav_replay_own(verification, 0, gain_q, gain_v, &off, &now);
-    if (status != CAV_OK) return status;
-    double asked = fmax(now.asked, follow->asked);
-    if (i == 0 || *now.lost || now.error > follow->error) *follow = now;
-    follow->asked = asked;
-    const size_t said = strlen(follow->lost);
-    if (*now.lost && off.start > 0)
-      snprintf(follow->lost + said, sizeof follow->lost - said, ", from a start that is %g rad and rad/s off",
-               off_velocity);
-  }
-  return CAV_OK;
 }

@@ -230,15 +230,14 @@ typedef struct cav_before {
 } cav_before;
 enum { CAV_STARTS = 4 };
 
+/// By how much at most a start is off: m or rad, m/s or rad/s. What two simulators make of a touch differs by more.
+#define CAV_START_POSITION 0.001
+#define CAV_START_VELOCITY 0.01
+
 /// Under the contacts of the model's file at the longest of the steps that simulators take, or at the next finer one;
 /// disturbance NULL: none.
 cav_status cav_replay_own(const cav_verification *verification, int finer, const double *gain_q, const double *gain_v,
                           const cav_disturbance *disturbance, struct cav_follow *follow);
-
-/// The same at each of these steps, and at the longest from each of the starts that are off: the worst; where it is
-/// lost in one, the first of these.
-cav_status cav_replay_own_worst(const cav_verification *verification, const double *gain_q, const double *gain_v,
-                                struct cav_follow *follow);
 
 /// The closed loops of a motion with its gains, for their choice: those of a verification, the last of which start off,
 /// and then two small pushes.
@@ -257,5 +256,18 @@ cav_status cav_closed_loops_begin(cav_verification *verification, const cav_prob
                                   const cav_trajectory *trajectory, const cav_options *contact, cav_error *error);
 cav_status cav_closed_loop(const cav_verification *verification, int loop, const double *gain_q, const double *gain_v,
                            struct cav_follow *follow);
+
+/// The worst of those under the contacts of the model's file at each of the steps and from each of the starts that are off;
+/// where it is lost in one, the first of these. known: those of all loops before the pushes, or NULL: they are run.
+cav_status cav_closed_loops_own(const cav_verification *verification, const struct cav_follow *known,
+                                const double *gain_q, const double *gain_v, struct cav_follow *follow);
+
+/// What loops before the pushes have done with a motion that is no cycle, its law and gains, copied; NULL: no memory. Then
+/// theirs where all that a loop reads is the same to the bit, else NULL. followed.c.
+cav_followed *cav_followed_new(const cav_verification *verification, const double *gain_q, const double *gain_v,
+                               const struct cav_follow follow[CAV_LOOP_PUSHED]);
+void cav_followed_free(cav_followed *followed);
+const struct cav_follow *cav_followed_find(const cav_followed *followed, const cav_verification *verification,
+                                           const double *gain_q, const double *gain_v);
 
 #endif

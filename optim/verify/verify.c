@@ -587,8 +587,22 @@ static void fill(const cav_verification *verification, const metrics *found, con
   verdict->duration = verification->last * verification->h;
 }
 
-cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
-                      const double *gain_q, const double *gain_v, cav_verdict *verdict, cav_error *error) {
+// the closed loops that a certificate asks for; followed, or NULL: what is known of them
+static cav_status close_loops(const cav_verification *verification, const cav_followed *followed, const double *gain_q,
+                              const double *gain_v, cav_replay *replay) {
+  const struct cav_follow *known = cav_followed_find(followed, verification, gain_q, gain_v);
+  cav_status status = CAV_OK;
+  if (known)
+    replay->closed = known[CAV_LOOP_CLAIMED];
+  else
+    status = cav_closed_loop(verification, CAV_LOOP_CLAIMED, gain_q, gain_v, &replay->closed);
+  if (status != CAV_OK) return status;
+  return cav_closed_loops_own(verification, known, gain_q, gain_v, &replay->own);
+}
+
+static cav_status verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
+                         const double *gain_q, const double *gain_v, const cav_followed *followed, cav_verdict *verdict,
+                         cav_error *error) {
   if (!verdict) return verification_fail(error, CAV_BAD_INPUT, "verification needs a place for its verdict");
   verdict->certified = verdict->achieved = 0;
   snprintf(verdict->reason, sizeof verdict->reason, "not verified");
@@ -606,8 +620,7 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
   if (status == CAV_OK) status = cav_verification_between(&verification, &found.between);
   if (status == CAV_OK) status = cav_replay_steps(&verification, &replay);
   if (status == CAV_OK) status = cav_replay_open(&verification, &replay);
-  if (status == CAV_OK) status = cav_replay_closed(&verification, contact, gain_q, gain_v, &replay.closed);
-  if (status == CAV_OK) status = cav_replay_own_worst(&verification, gain_q, gain_v, &replay.own);
+  if (status == CAV_OK) status = close_loops(&verification, followed, gain_q, gain_v, &replay);
   if (status == CAV_OK) {
     *verdict->reason = 0;
     fill(&verification, &found, &replay, verdict);
@@ -624,6 +637,18 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
   if (status != CAV_OK && error && !*error->text)
     verification_fail(error, status, "verification: %s", cav_status_name(status));
   return status;
+}
+
+cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
+                      const double *gain_q, const double *gain_v, cav_verdict *verdict, cav_error *error) {
+  return verify(problem, trajectory, contact, gain_q, gain_v, NULL, verdict, error);
+}
+
+cav_status cav_verify_solution(const cav_problem *problem, const cav_solution *solution, cav_verdict *verdict,
+                               cav_error *error) {
+  if (!solution) return verification_fail(error, CAV_BAD_INPUT, "there is no solution to verify");
+  return verify(problem, solution->trajectory, &solution->contact, solution->gain_q, solution->gain_v,
+                solution->followed, verdict, error);
 }
 
 cav_status cav_terms_report(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
@@ -735,4 +760,27 @@ cav_status cav_closed_loop(const cav_verification *verification, int loop, const
         (cav_disturbance){.link = pushed_link(verification), .fraction = 1.0 / 3, .impulse = {along, along, 0}};
   }
   return cav_replay_own(verification, 0, gain_q, gain_v, &disturbance, follow);
+}
+
+cav_status cav_closed_loops_own(const cav_verification *verification, const struct cav_follow *known,
+                                const double *gain_q, const double *gain_v, struct cav_follow *follow) {
+  *follow = (struct cav_follow){0};
+  for (int loop = CAV_LOOP_OWN; loop < CAV_LOOP_PUSHED && !*follow->lost; loop++) {
+    if (loop == CAV_LOOP_CLAIMED) continue;
+    struct cav_follow now;
+    cav_status status = CAV_OK;
+    if (known)
+      now = known[loop];
+    else
+      status = cav_closed_loop(verification, loop, gain_q, gain_v, &now);
+    if (status != CAV_OK) return status;
+    double asked = fmax(now.asked, follow->asked);
+    if (loop == CAV_LOOP_OWN || *now.lost || now.error > follow->error) *follow = now;
+    follow->asked = asked;
+    const size_t said = strlen(follow->lost);
+    if (*now.lost && loop >= CAV_LOOP_START)
+      snprintf(follow->lost + said, sizeof follow->lost - said, ", from a start that is %g rad and rad/s off",
+               CAV_START_VELOCITY);
+  }
+  return CAV_OK;
 }

@@ -214,8 +214,7 @@ static void tell_verification(const cav_solve_options *options, const cav_soluti
 
 cav_status cav_race_verify(const cav_problem *problem, const cav_solution *solution, cav_race_report *report,
                            cav_error *error) {
-  cav_status status = cav_verify(problem, solution->trajectory, &solution->contact, solution->gain_q, solution->gain_v,
-                                 &report->verdict, error);
+  cav_status status = cav_verify_solution(problem, solution, &report->verdict, error);
   if (status == CAV_OK)
     status = cav_verify_optimality(problem, solution->trajectory, &solution->contact, solution->nrow, solution->row,
                                    &report->verdict, error);

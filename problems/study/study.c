@@ -105,9 +105,7 @@ static cav_status solve_by(const cav_problem *problem, const cav_strategy *strat
   cav_solve_options options = options_of(run->method, begin);
   cav_solution *solution = NULL;
   cav_status status = cav_strategy_solve(problem, strategy, &options, NULL, &solution, error);
-  if (solution)
-    status = cav_verify(problem, solution->trajectory, &solution->contact, solution->gain_q, solution->gain_v, verdict,
-                        error);
+  if (solution) status = cav_verify_solution(problem, solution, verdict, error);
   if (solution && !status) {
     run->known = 1;
     run->certified = verdict->certified;
