@@ -89,8 +89,8 @@ int cav_race_fits(const cav_problem *problem, const cav_checkpoint *c) {
          !cav_problem_equations(problem, &equations, &ignored) && equations.constraints == c->nmultiplier;
 }
 
-// what is nearly there goes on to the changed problem's optimum from where it is: where limits alone were missed, and more of them
-// is given, it obeys all. Else, or where no such motion is on file, NULL
+// what is nearly there goes on to the changed problem's optimum from where it is: where limits alone were missed, and
+// more of them is given, it obeys all. Else, or where no such motion is on file, NULL
 static cav_checkpoint *find_motion(const cav_race *race, int i, const cav_problem *taken) {
   int from = race->entry[i].from;
   if (from < 0 || !race->folder || race->options.solver != CAV_SOLVER_GAUSS_NEWTON) return NULL;
