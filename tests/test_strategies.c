@@ -258,10 +258,15 @@ static void test_repair(void) {
   CHECK(cav_strategy_repair(&p, &once, &hangs, 1, &twice, &found) == CAV_OK && found && twice.term[0].weight == 9000);
   CHECK(twice.term[1].weight == 200 && !strcmp(twice.changed, "weights of goals 10 times, <limits effort=\"0.9\"/>"));
   cav_strategy_clear(&once), cav_strategy_clear(&twice);
-  // effort is given once; of goals those grow that are missed, by name
+  // effort is given once, unless limits are what is missed; of goals those grow that are missed, by name
   once = strategy[0];
   once.effort_limit = 0.9;
   CHECK(cav_strategy_repair(&p, &once, &hangs, 0, &twice, &found) == CAV_OK && found && twice.effort_limit == 0.9);
+  cav_strategy_clear(&twice);
+  cav_verdict strained = good;
+  strained.limit_violation_max = 0.03;
+  CHECK(cav_strategy_repair(&p, &once, &strained, 0, &twice, &found) == CAV_OK && found);
+  CHECK_NEAR(twice.effort_limit, 0.95, 1e-15);
   cav_strategy_clear(&twice);
   cav_term two[] = {terms[0], terms[0], terms[1]};
   two[1].name = "other";

@@ -151,9 +151,9 @@ static cav_status change(const cav_problem *p, const cav_verdict *v, cure c, cav
       s->schedule.last.softness *= softer;
       s->schedule.last.smoothing *= longer;
       break;
-    case EFFORT: // once: what is missed with half of the reserve has another cause
-      if (effort >= cav_problem_default(p->model).effort_limit && effort < 0.99 && s->effort_limit <= p->effort_limit)
-        s->effort_limit = (1 + effort) / 2;
+    case EFFORT: // what is missed within the limits with half of the reserve has another cause
+      if (s->effort_limit > p->effort_limit && v->limit_violation_max <= CAV_TOLERANCE_LIMIT) break;
+      if (effort >= cav_problem_default(p->model).effort_limit && effort < 0.99) s->effort_limit = (1 + effort) / 2;
       break;
     case SLACK:
       s->effort_limit = slack * effort;
