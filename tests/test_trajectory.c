@@ -217,10 +217,21 @@ static void check_refusals(void) {
   refuse(model, "time,qpos_x\n0,0\n.1\n", 3, "expected 2 values");
   refuse(model, "time,qpos_x\n0,zero\n.1,0\n", 2, "'zero'");
   refuse(model, "time,qpos_x\n0,0\n.1,nan\n", 3, "finite");
+  refuse(model, "time,qpos_x,u_x\n0,0,\n.1,0,1\n", 2, "finite");
   refuse(model, "time,qpos_x\n0,0\n.1,1e999\n", 3, "finite");
   refuse(model, "time,qpos_x\n0,0\n.1,\n", 3, "finite");
   refuse(model, "time,qpos_x\n0,0\n.1,0\n.25,0\n", 3, "equal");
   refuse(model, "time,qpos_x\n0,0\n-.1,0\n", 2, "increasing");
+  // of an open end no force is told: empty, read as 0
+  cav_trajectory *open = cav_trajectory_new(model, 3, 0.1);
+  open->u[0] = open->u[1] = 7;
+  open->u[2] = NAN;
+  CHECK(cav_trajectory_write(csv_path, model, open, &error) == CAV_OK && strstr(read_file(csv_path), ",0,\n"));
+  cav_trajectory *back = cav_trajectory_read(csv_path, model, &error);
+  CHECK(back && back->u[1] == 7 && back->u[2] == 0);
+  open->u[1] = NAN;
+  CHECK(cav_trajectory_write(csv_path, model, open, &error) == CAV_NOT_FINITE);
+  cav_trajectory_free(open), cav_trajectory_free(back);
   cav_trajectory *none = cav_trajectory_read("/nowhere/at/all.csv", model, &error);
   CHECK(!none && error.status == CAV_BAD_INPUT && strstr(error.text, "/nowhere/at/all.csv"));
   none = cav_trajectory_read(folder, model, &error);

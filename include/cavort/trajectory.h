@@ -9,7 +9,7 @@ extern "C" {
 #endif
 
 /// Knots 0 .. nknot-1 at times t*timestep. Rows are knots. v[t] = (q[t] (-) q[t-1])/timestep, v[0] is given;
-/// u[t] = inverse(q[t], v[t], v[t+1]); the last row of u uses the velocity that closes the motion (optim/METHOD.md, 1).
+/// u[t] = inverse(q[t], v[t], v[t+1]); the last row of u uses the velocity that closes the motion (optim/METHOD.md, 1), and means nothing where none does.
 typedef struct cav_trajectory {
   int nq, nv, nknot; ///< sizes of q and v, number of knots
   double timestep;   ///< s; the law that a motion obeys is at the same step
@@ -39,7 +39,8 @@ CAV_API cav_trajectory *cav_trajectory_resample(const cav_model *model, const ca
                                                 double timestep);
 
 /// Reads and writes trajectory.csv: a header of named columns, then one row per knot: time, q in MuJoCo's layout, v, u.
-/// Writing replaces the file atomically.
+/// Writing replaces the file atomically. Where a motion ends open no force stands at its last knot: NaN in all of that row of
+/// u is written as empty fields, which are read as 0.
 CAV_API cav_status cav_trajectory_write(const char *path, const cav_model *model, const cav_trajectory *trajectory,
                                         cav_error *error);
 CAV_API cav_trajectory *cav_trajectory_read(const char *path, const cav_model *model, cav_error *error);

@@ -173,6 +173,18 @@ static cav_status write_stages(const char *path, const cav_solution *solution, c
   return cav_file_end(&file, error);
 }
 
+cav_status cav_result_write_motion(const char *path, const cav_problem *problem, const cav_trajectory *trajectory,
+                                   cav_error *error) {
+  if (problem->close_at_rest || problem->cycle.on) return cav_trajectory_write(path, problem->model, trajectory, error);
+  const int nv = trajectory->nv;
+  cav_trajectory *open = cav_trajectory_copy(trajectory);
+  if (!open) return no_memory(error);
+  for (int d = 0; d < nv; d++) open->u[(size_t)(open->nknot - 1) * (size_t)nv + (size_t)d] = NAN;
+  cav_status status = cav_trajectory_write(path, problem->model, open, error);
+  cav_trajectory_free(open);
+  return status;
+}
+
 cav_status cav_result_write(const char *folder, const cav_problem *problem, const cav_solution *solution,
                             cav_error *error) {
   char *trajectory = cav_result_path(folder, "trajectory.csv"), *gains = cav_result_path(folder, "gains.csv");
@@ -182,7 +194,7 @@ cav_status cav_result_write(const char *folder, const cav_problem *problem, cons
       trajectory && gains && log && rows && stages ? cav_result_folder(folder, error) : no_memory(error);
   // what cannot be written as a problem is no result
   if (!status) status = cav_result_write_problem(folder, problem, &solution->contact, error);
-  if (!status) status = cav_trajectory_write(trajectory, problem->model, solution->trajectory, error);
+  if (!status) status = cav_result_write_motion(trajectory, problem, solution->trajectory, error);
   if (!status) status = write_log(log, solution, error);
   if (!status) status = write_stages(stages, solution, error);
   if (!status) status = cav_rows_write(rows, solution->trajectory->timestep, solution->nrow, solution->row, error);

@@ -17,6 +17,10 @@ char *cav_result_folder_of(const char *path);
 /// Makes a folder and those above it that are missing.
 cav_status cav_result_folder(const char *folder, cav_error *error);
 
+/// trajectory.csv of a motion of the problem: of one that ends open without u in the last row.
+cav_status cav_result_write_motion(const char *path, const cav_problem *problem, const cav_trajectory *trajectory,
+                                   cav_error *error);
+
 /// problem.xml with the law contact. The model's path is written relative to the folder where the two share a folder other
 /// than the root, absolute otherwise.
 cav_status cav_result_write_problem(const char *folder, const cav_problem *problem, const cav_options *contact,

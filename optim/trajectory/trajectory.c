@@ -155,6 +155,14 @@ static int all_finite(const double *value, size_t n) {
   return 1;
 }
 
+// whether no force is told: all NaN
+static int none(const double *value, size_t n) {
+  for (size_t i = 0; i < n; i++) {
+    if (!isnan(value[i])) return 0;
+  }
+  return 1;
+}
+
 cav_status cav_trajectory_write(const char *path, const cav_model *model, const cav_trajectory *trajectory,
                                 cav_error *error) {
   size_t n = (size_t)trajectory->nknot;
@@ -163,8 +171,9 @@ cav_status cav_trajectory_write(const char *path, const cav_model *model, const 
                          "%s: the trajectory has %d positions and %d velocities, the model %d and %d", path,
                          trajectory->nq, trajectory->nv, model->nq, model->nv);
   }
-  if (!all_finite(trajectory->q, n * (size_t)model->nq) || !all_finite(trajectory->v, n * (size_t)model->nv) ||
-      !all_finite(trajectory->u, n * (size_t)model->nv)) {
+  const size_t nv = (size_t)model->nv, last = n > 0 ? (n - 1) * nv : 0;
+  if (!all_finite(trajectory->q, n * (size_t)model->nq) || !all_finite(trajectory->v, n * nv) ||
+      !all_finite(trajectory->u, last) || (!none(trajectory->u + last, nv) && !all_finite(trajectory->u + last, nv))) {
     return cav_file_fail(error, CAV_NOT_FINITE, 0, "%s: not written: the trajectory holds a number that is not finite",
                          path);
   }
@@ -280,8 +289,25 @@ static void row_values(const cav_table *table, const int *source, int row, int n
     out[i] = table->value[(size_t)row * (size_t)table->ncol + (size_t)source[i]];
 }
 
+// only of the last row may u be empty, and as a whole: the motion ends open
+static cav_status check_gaps(const cav_table *table, const cav_model *model, const int *source, cav_error *error) {
+  const int u = 1 + model->nq + model->nv;
+  for (int t = 0; t < table->nrow; t++) {
+    const double *row = table->value + (size_t)t * (size_t)table->ncol;
+    int gaps = 0, last = t + 1 == table->nrow;
+    for (int i = u; i < u + model->nv && last; i++) gaps += source[i] >= 0 && isnan(row[source[i]]);
+    for (int i = 0; i < u + model->nv; i++) {
+      if (source[i] < 0 || !isnan(row[source[i]]) || (i >= u && gaps == model->nv)) continue;
+      return cav_file_fail(error, CAV_BAD_INPUT, table->line[t], "%s:%d: column '%s': expected a finite number%s",
+                           table->path, table->line[t], table->name[source[i]],
+                           last && i >= u ? ", or no u at all in the last row" : "");
+    }
+  }
+  return CAV_OK;
+}
+
 static cav_trajectory *from_table(const cav_table *table, const cav_model *model, const int *source, cav_error *error) {
-  double h = step_of(table, source[0], error);
+  double h = check_gaps(table, model, source, error) ? 0 : step_of(table, source[0], error);
   if (h == 0) return NULL;
   cav_trajectory *trajectory = cav_trajectory_new(model, table->nrow, h);
   if (!trajectory) {
@@ -300,12 +326,15 @@ static cav_trajectory *from_table(const cav_table *table, const cav_model *model
       return NULL;
     }
   }
+  // no force stands there
+  double *end = trajectory->u + (size_t)(table->nrow - 1) * (size_t)model->nv;
+  if (model->nv && isnan(end[0])) memset(end, 0, (size_t)model->nv * sizeof *end);
   if (model->nv && source_v[0] < 0) cav_trajectory_velocities(model, trajectory);
   return trajectory;
 }
 
 cav_trajectory *cav_trajectory_read(const char *path, const cav_model *model, cav_error *error) {
-  cav_table *table = cav_table_read(path, error);
+  cav_table *table = cav_table_read_gaps(path, error);
   if (!table) return NULL;
   cav_trajectory *trajectory = NULL;
   columns c;

@@ -276,7 +276,7 @@ static cav_status write_all(run *r, cav_error *error) {
   cav_status status = r->folder ? cav_result_folder(r->folder, error) : no_memory(error);
   char *path = status ? NULL : cav_result_path(r->folder, "trajectory.csv");
   if (!status && !path) status = no_memory(error);
-  if (!status) status = cav_trajectory_write(path, r->problem->model, r->motion, error);
+  if (!status) status = cav_result_write_motion(path, r->problem, r->motion, error);
   if (!status) status = cav_result_write_errors(r->folder, r->problem->model, r->motion, r->errors, error);
   if (!status) status = write_updates(r, error);
   if (!status) status = write_touch(r, error);

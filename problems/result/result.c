@@ -25,7 +25,7 @@ cav_status cav_result_write_unfinished(const char *folder, const cav_problem *pr
   contact.order = problem->order;
   cav_stage_law(problem, 1, contact.timestep, &contact);
   cav_status status = path && rows ? CAV_OK : no_memory(error);
-  if (!status) status = cav_trajectory_write(path, problem->model, trajectory, error);
+  if (!status) status = cav_result_write_motion(path, problem, trajectory, error);
   if (!status && first) status = cav_rows_write(rows, trajectory->timestep, 0, NULL, error);
   if (!status && first) status = cav_result_write_problem(folder, problem, &contact, error);
   free(path);
