@@ -91,35 +91,51 @@ static int is_within_reach(const cav_workspace *w, const double *v, const double
   return 1;
 }
 
-// velocity of the contact point and angular velocity of a link, added with a sign; the world has none
-static inline void add_link_velocity(const cav_state *state, int link, const double point[3], const double *velocity,
-                                     double sign, double linear[3], double angular[3]) {
+// velocity of the contact's point of a link, added with a sign; the world has none
+static inline void add_point_velocity(int link, const double arm[3], const double *velocity, double sign,
+                                      double linear[3]) {
   if (link == 0) return;
   const double *V = velocity + 6 * link;
   double at[3];
-  velocity_at(at, V, state->reference + 3 * link, point);
+  copy3(at, V + 3);
+  cross_add3(at, V, arm);
   axpy3(linear, linear, sign, at);
-  axpy3(angular, angular, sign, V);
 }
 
-void cav_contact_velocity(const cav_state *state, const cav_contact *c, const double *velocity, double *out) {
+// in the frame, from where the contact is on both links
+static inline void velocity_by_arms(const cav_contact *c, const double arm[2][3], const double *velocity, double *out) {
   double linear[3] = {0, 0, 0}, angular[3] = {0, 0, 0};
-  add_link_velocity(state, c->link1, c->pos, velocity, -1, linear, angular);
-  add_link_velocity(state, c->link2, c->pos, velocity, 1, linear, angular);
+  add_point_velocity(c->link1, arm[0], velocity, -1, linear);
+  add_point_velocity(c->link2, arm[1], velocity, 1, linear);
   out[0] = dot3(c->frame, linear);
   if (c->dim == 1) return;
   out[1] = dot3(c->frame + 3, linear);
   out[2] = dot3(c->frame + 6, linear);
+  if (c->dim == 3) return;
+  if (c->link1) axpy3(angular, angular, -1, velocity + 6 * c->link1);
+  if (c->link2) axpy3(angular, angular, 1, velocity + 6 * c->link2);
   for (int k = 3; k < c->dim; k++) out[k] = dot3(c->frame + 3 * (k - 3), angular);
 }
 
-// wrench of a contact on one of its links, at the link's reference
+// from the references of both links
+static inline void contact_arms(const cav_state *state, const cav_contact *c, double arm[2][3]) {
+  if (c->link1) sub3(arm[0], c->pos, state->reference + 3 * c->link1);
+  if (c->link2) sub3(arm[1], c->pos, state->reference + 3 * c->link2);
+}
+
+void cav_contact_velocity(const cav_state *state, const cav_contact *c, const double *velocity, double *out) {
+  double arm[2][3];
+  contact_arms(state, c, arm);
+  velocity_by_arms(c, arm, velocity, out);
+}
+
+// wrench of a contact on one of its links, at the link's reference; moment NULL: none
 static inline void push_link(cav_state *state, int link, const double point[3], const double force[3],
-                             const double moment[3]) {
+                             const double *moment) {
   if (link == 0) return;
   double *F = state->force + 6 * link;
   push_at(F, state->reference + 3 * link, point, force);
-  add3(F, F, moment);
+  if (moment) add3(F, F, moment);
 }
 
 static void contact_push(cav_state *state, const cav_contact *c, double scale) {
@@ -130,10 +146,12 @@ static void contact_push(cav_state *state, const cav_contact *c, double scale) {
     axpy3(force, force, scale * c->impulse[2], c->frame + 6);
   }
   for (int k = 3; k < c->dim; k++) axpy3(moment, moment, scale * c->impulse[k], c->frame + 3 * (k - 3));
-  push_link(state, c->link2, c->pos, force, moment);
+  const double *turn = c->dim > 3 ? moment : NULL;
+  push_link(state, c->link2, c->pos, force, turn);
+  if (c->link1 == 0) return;
   scale3(force, -1, force);
   scale3(moment, -1, moment);
-  push_link(state, c->link1, c->pos, force, moment);
+  push_link(state, c->link1, c->pos, force, turn);
 }
 
 // f of one contact: its law at g = R^-1 (v* - v_next), v* = (1 - hB) x' - hK x in the normal row or as
@@ -154,8 +172,10 @@ static void contacts(const cav_model *model, cav_state *state, const double *vel
   const double *coupled = state->options.coupled ? state->work->target : NULL;
   for (int i = 0; i < state->ncontact; i++) {
     cav_contact *c = &state->contact[i];
-    if (velocity_now) { cav_contact_velocity(state, c, velocity_now, c->velocity); }
-    cav_contact_velocity(state, c, state->velocity_next, c->velocity_next);
+    double arm[2][3];
+    contact_arms(state, c, arm);
+    if (velocity_now) { velocity_by_arms(c, arm, velocity_now, c->velocity); }
+    velocity_by_arms(c, arm, state->velocity_next, c->velocity_next);
   }
   if (cav_looks_ahead(&state->options)) { cav_next_contacts_find(model, state); }
   const int by_four =
