@@ -365,9 +365,11 @@ static links links_of(const cav_transcription *tr, int t) {
   return l;
 }
 
-// a component of a row times a rotation Jacobian
-static inline double times_column(const double *row, const double *J, int c) {
-  return row[0] * J[c] + row[1] * J[3 + c] + row[2] * J[6 + c];
+_Static_assert(CAV_ROTATION_SIZE >= 19, "four numbers can be read from any row of either Jacobian");
+
+// three components of a row times a rotation Jacobian; the fourth number says nothing
+CAV_VECTOR_BODY void times_rotation(const double *row, const double *J, cav_four *out) {
+  *out = row[0] * *(const cav_four *)J + row[1] * *(const cav_four *)(J + 3) + row[2] * *(const cav_four *)(J + 6);
 }
 
 /// Chains n rows; dofs of rotations are done again.
@@ -380,14 +382,18 @@ CAV_VECTOR_BODY void chain_rows_body(const cav_transcription *tr, const links *l
     for (int d = 0; d < nv; d++) out[2 * nv + d] = l->n_next * dn[d];
     for (int k = 0; k < tr->nrotation; k++) {
       int at = tr->rotation_dof[k], J = CAV_ROTATION_SIZE * k;
-      const double *v = dv + at, *next = dn + at;
-      for (int c = 0; c < 3; c++) {
-        double before = l->v_before * times_column(v, l->before + J, c);
-        double here = l->q_here * dq[at + c] + l->v_here * times_column(v, l->here + J, c);
-        out[at + c] = before + l->n_before * times_column(next, l->before + J, c);
-        out[nv + at + c] = here + l->n_here * times_column(next, l->then + J, c);
-        out[2 * nv + at + c] = l->n_next * times_column(next, l->next + J, c);
-      }
+      const cav_four q = {dq[at], dq[at + 1], dq[at + 2], 0};
+      cav_four v_before, n_before, v_here, n_here, n_next;
+      times_rotation(dv + at, l->before + J, &v_before);
+      times_rotation(dn + at, l->before + J, &n_before);
+      times_rotation(dv + at, l->here + J, &v_here);
+      times_rotation(dn + at, l->then + J, &n_here);
+      times_rotation(dn + at, l->next + J, &n_next);
+      v_before = l->v_before * v_before + l->n_before * n_before;
+      v_here = l->q_here * q + l->v_here * v_here + l->n_here * n_here;
+      n_next = l->n_next * n_next;
+      for (int c = 0; c < 3; c++)
+        out[at + c] = v_before[c], out[nv + at + c] = v_here[c], out[2 * nv + at + c] = n_next[c];
     }
   }
 }
