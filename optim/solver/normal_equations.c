@@ -89,16 +89,20 @@ static double *entry_of(const cav_normal *normal, int i, int j) {
   return &normal->C[(size_t)(j - core) * normal->border + (i - core)];
 }
 
-/// Adds the part of a knot's Hessian [3n*3n] between two of its blocks, the column's not after the row's.
-static void gather_blocks(cav_normal *normal, const double *hessian, int row_block, int column_block, int r, int c) {
+/// Adds the part of a knot's Hessian [3n*3n] between two of its blocks, the column's not after the row's. fresh: it is the first
+/// there, in the band, where it takes the place of what is.
+static void gather_blocks(cav_normal *normal, const double *hessian, int row_block, int column_block, int r, int c,
+                          int fresh) {
   int n = normal->n, width = 3 * n, core = normal->core / n;
   if (row_block < core && column_block <= row_block) {
     // within the band rows of the one are diagonals of the other
     ptrdiff_t apart = normal->band - 1;
     double *out = entry_of(normal, row_block * n, column_block * n);
     const double *in = hessian + (size_t)(r * n) * width + c * n;
-    for (int i = 0; i < n; i++, out++, in += width)
+    for (int i = 0; i < n && !fresh; i++, out++, in += width)
       for (int j = 0, end = r == c ? i + 1 : n; j < end; j++) out[j * apart] += in[j];
+    for (int i = 0; i < n && fresh; i++, out++, in += width)
+      for (int j = 0, end = r == c ? i + 1 : n; j < end; j++) out[j * apart] = in[j];
     return;
   }
   for (int j = 0; j < n; j++) {
@@ -213,19 +217,26 @@ double *cav_normal_place(const cav_normal *normal, const cav_transcription *tr, 
   return (block + 3) * normal->n <= normal->core ? entry_of(normal, block * normal->n, block * normal->n) : NULL;
 }
 
-void cav_normal_add_block(cav_normal *normal, const cav_transcription *tr, int t, const double *hessian,
-                          const double *step_row, double step_square) {
+/// The band cleared before, or, fresh, where knots come in their order: the last block of each is new in the band, and all of the
+/// first.
+static void add_block(cav_normal *normal, const cav_transcription *tr, int t, const double *hessian,
+                      const double *step_row, double step_square, int fresh) {
   int n = normal->n, last = normal->size - 1;
   for (int c = 0; c < 3; c++) {
     int column = cav_transcription_block(tr, t, c);
     for (int r = c; column >= 0 && r < 3; r++) {
       int row = cav_transcription_block(tr, t, r);
-      if (row >= 0) gather_blocks(normal, hessian, row, column, r, c);
+      if (row >= 0) gather_blocks(normal, hessian, row, column, r, c, fresh && (r == 2 || t == 0));
     }
     for (int j = 0; normal->free_step && column >= 0 && j < n; j++)
       *entry_of(normal, last, column * n + j) += step_row[c * n + j];
   }
   if (normal->free_step) *entry_of(normal, last, last) += step_square;
+}
+
+void cav_normal_add_block(cav_normal *normal, const cav_transcription *tr, int t, const double *hessian,
+                          const double *step_row, double step_square) {
+  add_block(normal, tr, t, hessian, step_row, step_square, 0);
 }
 
 void cav_normal_add_diagonal(cav_normal *normal, const double *diagonal) {
@@ -238,10 +249,10 @@ void cav_normal_add_diagonal(cav_normal *normal, const double *diagonal) {
 }
 
 /// Adds a knot's Hessian and gradient.
-static void gather_knot(cav_normal *normal, const cav_transcription *tr, int t) {
+static void gather_knot(cav_normal *normal, const cav_transcription *tr, int t, int fresh) {
   const cav_knot *knot = &tr->knot[t];
   const int n = normal->n;
-  cav_normal_add_block(normal, tr, t, knot->hessian, knot->step_row, knot->step_square);
+  add_block(normal, tr, t, knot->hessian, knot->step_row, knot->step_square, fresh);
   for (int c = 0; c < 3; c++) {
     int column = cav_transcription_block(tr, t, c);
     for (int j = 0; column >= 0 && j < n; j++) normal->gradient[column * n + j] += knot->gradient[c * n + j];
@@ -257,7 +268,7 @@ static void find_diagonal(cav_normal *normal) {
 
 void cav_normal_gather(cav_normal *normal, const cav_transcription *tr) {
   cav_normal_clear(normal);
-  for (int t = 0; t < tr->nknot; t++) gather_knot(normal, tr, t);
+  for (int t = 0; t < tr->nknot; t++) gather_knot(normal, tr, t, 0);
   find_diagonal(normal);
 }
 
@@ -390,14 +401,7 @@ static void take_knot(void *context, int t) {
   const stream *s = context;
   cav_normal *normal = s->normal;
   cav_band *band = normal->group;
-  if (s->whole) {
-    // columns of the band that this knot is the first to add to
-    int end = (t + 2 - s->tr->first) * normal->n, from = t == 0 ? 0 : end - normal->n;
-    end = end < normal->core ? end : normal->core;
-    if (from < end)
-      memset(normal->H + (size_t)from * normal->band, 0, (size_t)(end - from) * normal->band * sizeof(double));
-  }
-  gather_knot(normal, s->tr, t);
+  gather_knot(normal, s->tr, t, s->whole);
   // the next two knots add to all blocks but these
   int last = t + 1 < s->tr->nknot ? (t - s->tr->first) * normal->n : band->core;
   if (!s->whole || last <= normal->filled) return;
