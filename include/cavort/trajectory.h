@@ -9,7 +9,8 @@ extern "C" {
 #endif
 
 /// Knots 0 .. nknot-1 at times t*timestep. Rows are knots. v[t] = (q[t] (-) q[t-1])/timestep, v[0] is given;
-/// u[t] = inverse(q[t], v[t], v[t+1]); the last row of u uses the velocity that closes the motion (optim/METHOD.md, 1), and means nothing where none does.
+/// u[t] = inverse(q[t], v[t], v[t+1]); the last row of u uses the velocity that closes the motion (optim/METHOD.md, 1), and
+/// means nothing where none does.
 typedef struct cav_trajectory {
   int nq, nv, nknot; ///< sizes of q and v, number of knots
   double timestep;   ///< s; the law that a motion obeys is at the same step

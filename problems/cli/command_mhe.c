@@ -329,7 +329,7 @@ static void print_errors(const run *r) {
   }
 }
 
-// whether residuals are what standard errors promise: of a window that is right the chi-square is about its readings
+// whether residuals agree with standard errors: of a window that is right the chi-square is about its readings
 static void print_residuals(const run *r) {
   double sum = 0, most = 0;
   int n = 0, at = 0, first = -1, over = 0;
