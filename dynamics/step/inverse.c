@@ -103,7 +103,7 @@ static inline void add_point_velocity(int link, const double arm[3], const doubl
 }
 
 // in the frame, from where the contact is on both links
-static inline void velocity_by_arms(const cav_contact *c, const double arm[2][3], const double *velocity, double *out) {
+static inline void velocity_by_arms(const cav_contact *c, double arm[2][3], const double *velocity, double *out) {
   double linear[3] = {0, 0, 0}, angular[3] = {0, 0, 0};
   add_point_velocity(c->link1, arm[0], velocity, -1, linear);
   add_point_velocity(c->link2, arm[1], velocity, 1, linear);
@@ -124,7 +124,7 @@ static inline void contact_arms(const cav_state *state, const cav_contact *c, do
 }
 
 void cav_contact_velocity(const cav_state *state, const cav_contact *c, const double *velocity, double *out) {
-  double arm[2][3];
+  double arm[2][3] = {{0}};
   contact_arms(state, c, arm);
   velocity_by_arms(c, arm, velocity, out);
 }
@@ -172,7 +172,7 @@ static void contacts(const cav_model *model, cav_state *state, const double *vel
   const double *coupled = state->options.coupled ? state->work->target : NULL;
   for (int i = 0; i < state->ncontact; i++) {
     cav_contact *c = &state->contact[i];
-    double arm[2][3];
+    double arm[2][3] = {{0}};
     contact_arms(state, c, arm);
     if (velocity_now) { velocity_by_arms(c, arm, velocity_now, c->velocity); }
     velocity_by_arms(c, arm, state->velocity_next, c->velocity_next);

@@ -113,6 +113,7 @@ cav_status cav_examine_falls(cav_examination *e);          // fall.c
 cav_status cav_examine_momentum(cav_examination *e);       // momentum.c
 cav_status cav_examine_strength(cav_examination *e);       // strength.c
 cav_status cav_examine_hinge(cav_examination *e);          // hinge.c
+cav_status cav_examine_slides(cav_examination *e);         // slide.c
 cav_status cav_examine_energy(cav_examination *e);         // energy.c
 cav_status cav_examine_takeoff(cav_examination *e);        // takeoff.c
 cav_status cav_examine_holds(cav_examination *e);          // hold.c

@@ -1,0 +1,121 @@
+/// A model of nothing but slides that do not weigh on each other: how far each comes in a time, exact.
+///
+/// Its inertia is constant and diagonal, so each slide is a mass under a constant force and one between limits. The farthest
+/// place with at most a speed at the end is that of full force one way and then the other (bang-bang): of a mass m from rest to
+/// rest F T²/4m, F T²/2m where it may still move. A step more than the time is counted, which is what implicit steps gain.
+#include <math.h>
+#include <stdlib.h>
+
+#include "feasibility.h"
+#include "problem_file.h"
+
+static const double slack = 1e-5; // of ways and speeds, relative and in their unit
+
+/// Whether two things can touch: more than one link, the world with them, has geoms that collide.
+static int can_touch(const cav_model *m) {
+  int link = -1;
+  for (int i = 0; i < m->ngeom; i++) {
+    const cav_geom *geom = &m->geom[i];
+    if (!geom->contype && !geom->conaffinity) continue;
+    if (link >= 0 && geom->link != link) return 1;
+    link = geom->link;
+  }
+  return m->npair > 0;
+}
+
+/// Whether slides, constant forces and actuators are all there is.
+static int is_covered(const cav_model *m) {
+  if (m->ntendon > 0 || m->nequality > 0 || m->density > 0 || m->viscosity > 0 || !m->options.passive) return 0;
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    if (joint->type != CAV_JOINT_SLIDE || joint->limited || joint->stiffness != 0) return 0;
+    if (m->dof[joint->dof].damping > 0 || m->dof[joint->dof].frictionloss > 0) return 0;
+  }
+  return m->njoint > 0 && !can_touch(m);
+}
+
+/// Masses and what holds them at rest, [2nv]; *known 0: they weigh on each other.
+static cav_status find_masses(cav_examination *e, double *mass, int *known) {
+  const cav_model *m = e->model;
+  const size_t n = (size_t)m->nv;
+  double *M = malloc(n * n * sizeof *M + 1), *zero = calloc(n + 1, sizeof *zero);
+  cav_status status = M && zero ? cav_inverse(m, e->scratch, e->problem->q_start, zero, zero, mass + n) : CAV_NO_MEMORY;
+  if (!status) status = cav_inertia(m, e->scratch, e->problem->q_start, M);
+  *known = !status;
+  for (size_t i = 0; i < n && !status; i++) {
+    mass[i] = M[i * n + i];
+    for (size_t k = 0; k < n; k++) *known &= k == i || fabs(M[i * n + k]) <= 1e-12 * mass[i];
+  }
+  free(M), free(zero);
+  return status;
+}
+
+/// Farthest way in a time from a speed to at most another, accelerations from -brake to push; infinite where that speed is
+/// not reached.
+static double farthest(double push, double brake, double speed, double last, double time) {
+  double turn = time;
+  if (speed + push * time > last) turn = (last - speed + brake * time) / (push + brake);
+  if (!(turn >= 0)) return INFINITY;
+  double fast = speed + push * turn, rest = time - turn;
+  return speed * turn + push * turn * turn / 2 + fast * rest - brake * rest * rest / 2;
+}
+
+/// Speeds at which a slide may be a step after a knot, to both sides: rest where the motion closes, rates that are required.
+static void speeds_at(const cav_examination *e, int knot, int dof, double most[2]) {
+  const cav_problem *p = e->problem;
+  most[0] = most[1] = knot == e->nknot - 1 && p->close_at_rest ? 0 : INFINITY;
+  for (int i = 0; i < p->nterm; i++) {
+    const cav_term *term = &p->term[i];
+    int first, last;
+    if (term->quantity != CAV_QUANTITY_VELOCITY || term->use != CAV_USE_EQUAL || term->nwaypoint) continue;
+    cav_requirement_window(e, term, &first, &last);
+    if (knot < first || knot > last || !cav_problem_selects(e->model, term, dof)) continue;
+    const double rate = term->target ? term->target[dof] : 0;
+    most[1] = fmin(most[1], rate + slack), most[0] = fmin(most[0], slack - rate);
+  }
+}
+
+static void tell(cav_examination *e, const cav_requirement *r, double way, double can, double time) {
+  char what[160];
+  cav_requirement_words(e, r, what, sizeof what);
+  cav_impossible(e, CAV_CONDITION_ENERGY, r, "More time, or a stronger actuator.",
+                 "%s, %.3g m from the start, but at full effort it comes %.3g m far in %.3g s (exact for slides)", what,
+                 way, can, time);
+}
+
+static void examine(cav_examination *e, const cav_requirement *r, const double *mass, const double *force) {
+  const int d = e->model->joint[r->object].dof;
+  const double h = e->problem->timestep * e->longest, time = cav_requirement_time(e, r->knot),
+               *hold = mass + e->model->nv;
+  const double start = e->problem->q_start[e->model->joint[r->object].q], speed = e->problem->v_start[d];
+  // greatest accelerations to either side, and speeds
+  const double gain[2] = {(force[d] + hold[d]) / mass[d], (force[d] - hold[d]) / mass[d]};
+  double most[2];
+  speeds_at(e, r->knot, d, most);
+  for (int way = 0; way < 2; way++) {
+    const double sign = way ? 1 : -1, wanted = way ? r->low[0] - start : start - r->high[0];
+    if (!(wanted > 0)) continue;
+    // sums over steps are off an integral by a half of what speeds at its ends make of one
+    const double ends = fabs(speed) + (isfinite(most[way]) ? fabs(most[way]) : 0);
+    const double can = farthest(gain[way], gain[!way], sign * speed, most[way], time + h) + h * ends;
+    if (wanted > can + slack * (1 + can)) tell(e, r, wanted, can, time);
+  }
+}
+
+cav_status cav_examine_slides(cav_examination *e) {
+  const cav_model *m = e->model;
+  int known = 0, bounded = 0;
+  if (!cav_start_is_given(e->problem) || e->n == 0 || !is_covered(m)) return CAV_OK;
+  double *mass = malloc(3 * (size_t)m->nv * sizeof *mass);
+  if (!mass) return CAV_NO_MEMORY;
+  cav_options options = e->scratch->options;
+  cav_status status = find_masses(e, mass, &known);
+  e->scratch->options = options;
+  if (!status) status = cav_effort_of_dofs(e, mass + 2 * m->nv, &bounded);
+  for (int i = 0; i < e->n && known && bounded && !status && e->nfound == 0; i++) {
+    const cav_requirement *r = &e->requirement[i];
+    if (r->kind == CAV_REQUIRE_COORDINATE && r->knot > 0) examine(e, r, mass, mass + 2 * m->nv);
+  }
+  free(mass);
+  return status;
+}
