@@ -16,8 +16,8 @@ void cav_dense_product(int m, int n, int k, double sign, const double *A, int ld
 void cav_dense_product_transposed(cav_part part, int m, int n, int k, double sign, const double *A, int lda,
                                   const double *B, int ldb, double *C, int ldc);
 
-/// C += A A', one triangle of it: A [n*k], C [n*n]. Rows of A in equal parts, of which the like are often zero in the same columns:
-/// zeros that stand together then cost nothing, to the same bits for any number of parts.
+/// C += A A', one triangle of it: A [n*k], C [n*n]. Rows of A in equal parts, of which the like are often zero in the same
+/// columns: zeros that stand together then cost nothing, to the same bits for any number of parts.
 void cav_dense_square(cav_part part, int n, int parts, int k, const double *A, int lda, double *C, int ldc);
 
 /// Cholesky factor L of the lower triangle of A [n*n] in its place. Entries further than `below` under the diagonal are zero and
