@@ -24,13 +24,13 @@ static double *numbers(size_t n) {
 }
 
 /// The largest difference of C - C0 from sign * sum over k of A(i, k) B(k, j), within the part; elsewhere C is C0.
-static double product_error(cav_part part, int m, int n, int k, double sign, const double *A, int ai, int ak,
+static double product_error(cav_triangle part, int m, int n, int k, double sign, const double *A, int ai, int ak,
                             const double *B, int bk, int bj, const double *C0, const double *C, int ldc) {
   double worst = 0;
   for (int j = 0; j < n; j++)
     for (int i = 0; i < m; i++) {
       long double sum = C0[i + j * ldc];
-      if (part == CAV_PART_ALL || (part == CAV_PART_LOWER ? i >= j : i <= j))
+      if (part == CAV_TRIANGLE_BOTH || (part == CAV_TRIANGLE_LOWER ? i >= j : i <= j))
         for (int p = 0; p < k; p++)
           sum += (long double)sign * (long double)A[i * ai + p * ak] * (long double)B[p * bk + j * bj];
       worst = fmax(worst, fabs((double)(sum - C[i + j * ldc])));
@@ -52,12 +52,12 @@ static void check_products(int m, int n, int k) {
       memcpy(C, C0, bytes);
       if (what == 0) {
         cav_dense_product(m, n, k, -1, A, ld, B, ldb, C, ldc);
-        worst = product_error(CAV_PART_ALL, m, n, k, -1, A, 1, ld, B, 1, ldb, C0, C, ldc);
+        worst = product_error(CAV_TRIANGLE_BOTH, m, n, k, -1, A, 1, ld, B, 1, ldb, C0, C, ldc);
       } else if (what == 1) {
-        cav_dense_product_transposed(CAV_PART_LOWER, m, n, k, 1, A, ld, B, ldb, C, ldc);
-        worst = product_error(CAV_PART_LOWER, m, n, k, 1, A, ld, 1, B, 1, ldb, C0, C, ldc);
+        cav_dense_product_transposed(CAV_TRIANGLE_LOWER, m, n, k, 1, A, ld, B, ldb, C, ldc);
+        worst = product_error(CAV_TRIANGLE_LOWER, m, n, k, 1, A, ld, 1, B, 1, ldb, C0, C, ldc);
       } else {
-        cav_part part = k % 2 ? CAV_PART_UPPER : CAV_PART_LOWER;
+        cav_triangle part = k % 2 ? CAV_TRIANGLE_UPPER : CAV_TRIANGLE_LOWER;
         cav_dense_square(part, m, 1, k, A, ld, C, ldc);
         worst = product_error(part, m, m, k, 1, A, 1, ld, A, ld, 1, C0, C, ldc);
       }
@@ -90,7 +90,7 @@ static void check_square(int n, int k) {
     for (int lanes = 8; lanes >= 2 && n % parts == 0; lanes /= 2) {
       lanes_most = lanes;
       memcpy(C, C0, bytes);
-      cav_dense_square(CAV_PART_UPPER, n, parts, k, A, ld, C, ldc);
+      cav_dense_square(CAV_TRIANGLE_UPPER, n, parts, k, A, ld, C, ldc);
       CHECK(memcmp(plain, C, bytes) == 0);
     }
   free(A), free(C0), free(C), free(plain);

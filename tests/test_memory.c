@@ -213,9 +213,9 @@ static void test_hot(const char *path) {
 // --- a state tells of all its memory ---
 
 static size_t told_bytes(const cav_state *state) {
-  size_t bytes[CAV_PARTS], sum = 0;
+  size_t bytes[CAV_MEMORY_USES], sum = 0;
   cav_state_bytes(state, bytes);
-  for (int k = 0; k < CAV_PARTS; k++) sum += bytes[k];
+  for (int k = 0; k < CAV_MEMORY_USES; k++) sum += bytes[k];
   return sum;
 }
 
@@ -282,16 +282,16 @@ static void test_absent(void) {
   cav_error error = {0};
   cav_model *bare = scene_load(bare_text), *full = cav_model_load(sensors, &error);
   if (!CHECK(bare && full)) return;
-  size_t none[CAV_PARTS], some[CAV_PARTS];
+  size_t none[CAV_MEMORY_USES], some[CAV_MEMORY_USES];
   cav_state *a = cav_state_new(bare), *b = cav_state_new(full);
   cav_state_bytes(a, none);
   cav_state_bytes(b, some);
-  static const cav_part parts[] = {CAV_PART_TENDONS,  CAV_PART_EQUALITY,  CAV_PART_ROWS,
-                                   CAV_PART_CONTACTS, CAV_PART_ACTUATION, CAV_PART_SOLVERS};
+  static const cav_memory_use parts[] = {CAV_MEMORY_TENDONS,  CAV_MEMORY_EQUALITY,  CAV_MEMORY_ROWS,
+                                         CAV_MEMORY_CONTACTS, CAV_MEMORY_ACTUATION, CAV_MEMORY_SOLVERS};
   for (int i = 0; i < 6; i++) {
     CHECK(none[parts[i]] == 0);
     // the control: where there are some they are counted
-    CHECK(some[parts[i]] > 0 || parts[i] == CAV_PART_SOLVERS);
+    CHECK(some[parts[i]] > 0 || parts[i] == CAV_MEMORY_SOLVERS);
   }
   cav_state_free(a), cav_state_free(b);
   cav_model_free(bare), cav_model_free(full);

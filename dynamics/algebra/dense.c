@@ -180,11 +180,12 @@ static void pack(const operand *o, int first, int count, int slice, int k, int h
 }
 
 /// C += sign * A B for a tile at (row, column) of [m*n], within the part.
-static void add_tile(cav_part part, int m, int n, int row, int column, const lanes *w, int k, double sign,
+static void add_tile(cav_triangle part, int m, int n, int row, int column, const lanes *w, int k, double sign,
                      const double *A, const double *B, double *C, size_t ldc) {
   int rows = m - row < w->rows ? m - row : w->rows, columns = n - column < w->columns ? n - column : w->columns;
   double *at = C + (size_t)column * ldc + row, T[TILE_MOST * 8];
-  int whole = part == CAV_PART_ALL || (part == CAV_PART_LOWER ? column + columns <= row + 1 : row + rows <= column + 1);
+  int whole = part == CAV_TRIANGLE_BOTH ||
+              (part == CAV_TRIANGLE_LOWER ? column + columns <= row + 1 : row + rows <= column + 1);
   if (whole && rows == w->rows && columns == w->columns) {
     w->tile(k, A, B, -sign, at, ldc);
     return;
@@ -193,14 +194,14 @@ static void add_tile(cav_part part, int m, int n, int row, int column, const lan
   w->tile(k, A, B, -1, T, (size_t)w->rows);
   for (int j = 0; j < columns; j++, at += ldc) {
     const double *t = T + j * w->rows;
-    int first = part == CAV_PART_LOWER && column + j > row ? column + j - row : 0;
-    int end = part == CAV_PART_UPPER && column + j + 1 - row < rows ? column + j + 1 - row : rows;
+    int first = part == CAV_TRIANGLE_LOWER && column + j > row ? column + j - row : 0;
+    int end = part == CAV_TRIANGLE_UPPER && column + j + 1 - row < rows ? column + j + 1 - row : rows;
     if (end > first) w->subtract(end - first, -sign, t + first, at + first);
   }
 }
 
 /// C += sign * A B', A [m*k] and B [n*k] as operands.
-static void product(cav_part part, int m, int n, int k, double sign, const operand *A, const operand *B, double *C,
+static void product(cav_triangle part, int m, int n, int k, double sign, const operand *A, const operand *B, double *C,
                     size_t ldc) {
   const lanes *w = way();
   _Alignas(64) double packed_a[SLICE * TILE_MOST], packed_b[SLICE * WIDE];
@@ -214,12 +215,12 @@ static void product(cav_part part, int m, int n, int k, double sign, const opera
       for (int i = 0; i < m; i += w->rows) {
         int height = m - i < w->rows ? m - i : w->rows;
         // nothing of this strip is in the part
-        if (part == CAV_PART_LOWER && i + height <= wide) continue;
-        if (part == CAV_PART_UPPER && i >= end) break;
+        if (part == CAV_TRIANGLE_LOWER && i + height <= wide) continue;
+        if (part == CAV_TRIANGLE_UPPER && i >= end) break;
         pack(A, i, height, slice, length, w->rows, packed_a);
         for (int j = wide; j < end; j += w->columns) {
-          if (part == CAV_PART_LOWER && i + height <= j) break;
-          if (part == CAV_PART_UPPER && i >= j + w->columns) continue;
+          if (part == CAV_TRIANGLE_LOWER && i + height <= j) break;
+          if (part == CAV_TRIANGLE_UPPER && i >= j + w->columns) continue;
           add_tile(part, m, end, i, j, w, length, sign, packed_a, packed_b + (size_t)(j - wide) * (size_t)length, C,
                    ldc);
         }
@@ -231,10 +232,10 @@ static void product(cav_part part, int m, int n, int k, double sign, const opera
 void cav_dense_product(int m, int n, int k, double sign, const double *A, int lda, const double *B, int ldb, double *C,
                        int ldc) {
   operand a = {.at = A, .by_row = 1, .by_column = (size_t)lda}, b = {.at = B, .by_row = (size_t)ldb, .by_column = 1};
-  product(CAV_PART_ALL, m, n, k, sign, &a, &b, C, (size_t)ldc);
+  product(CAV_TRIANGLE_BOTH, m, n, k, sign, &a, &b, C, (size_t)ldc);
 }
 
-void cav_dense_product_transposed(cav_part part, int m, int n, int k, double sign, const double *A, int lda,
+void cav_dense_product_transposed(cav_triangle part, int m, int n, int k, double sign, const double *A, int lda,
                                   const double *B, int ldb, double *C, int ldc) {
   operand a = {.at = A, .by_row = (size_t)lda, .by_column = 1}, b = {.at = B, .by_row = (size_t)ldb, .by_column = 1};
   product(part, m, n, k, sign, &a, &b, C, (size_t)ldc);
@@ -322,14 +323,14 @@ static void add_square(int n, int parts, const slice *s, double *C, size_t next,
   }
 }
 
-void cav_dense_square(cav_part part, int n, int parts, int k, const double *A, int lda, double *C, int ldc) {
+void cav_dense_square(cav_triangle part, int n, int parts, int k, const double *A, int lda, double *C, int ldc) {
   const lanes *w = way();
   if (n > SQUARE) {
     operand a = {.at = A, .by_row = 1, .by_column = (size_t)lda};
     product(part, n, n, k, 1, &a, &a, C, (size_t)ldc);
     return;
   }
-  const int lower = part == CAV_PART_LOWER;
+  const int lower = part == CAV_TRIANGLE_LOWER;
   slice s;
   s.apart = (size_t)(n + TILE_MOST - 1) / 8 * 8;
   for (int first = 0; first < k; first += SLICE, A += SLICE * (size_t)lda) {
@@ -410,7 +411,7 @@ int cav_dense_factor_part(int n, int below, int step, int from, int ready, doubl
     // and the panel from all columns after it
     for (int c = 0; c < columns; c++) p.last[c] -= p.end;
     operand rows = {.at = A + (size_t)start * ld + p.end, .by_row = 1, .by_column = ld, .end = p.last};
-    if (rest > 0) product(CAV_PART_LOWER, rest, rest, columns, -1, &rows, &rows, A + (size_t)p.end * (ld + 1), ld);
+    if (rest > 0) product(CAV_TRIANGLE_LOWER, rest, rest, columns, -1, &rows, &rows, A + (size_t)p.end * (ld + 1), ld);
   }
   return n;
 }
@@ -441,7 +442,7 @@ void cav_dense_solve_lower_blocks(int n, int below, int step, const double *L, i
     for (int c = 0; c < columns; c++) p.last[c] -= p.end;
     operand a = {.at = L + (size_t)start * ld + p.end, .by_row = 1, .by_column = ld, .end = p.last};
     operand b = {.at = X + start, .by_row = apart, .by_column = 1};
-    product(CAV_PART_ALL, rest, m, columns, -1, &a, &b, X + p.end, apart);
+    product(CAV_TRIANGLE_BOTH, rest, m, columns, -1, &a, &b, X + p.end, apart);
   }
 }
 

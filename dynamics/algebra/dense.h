@@ -6,19 +6,19 @@
 #include "vectors.h"
 
 /// Which entries of a product are added; the others of C stay.
-typedef enum cav_part { CAV_PART_ALL, CAV_PART_LOWER, CAV_PART_UPPER } cav_part;
+typedef enum cav_triangle { CAV_TRIANGLE_BOTH, CAV_TRIANGLE_LOWER, CAV_TRIANGLE_UPPER } cav_triangle;
 
 /// C += sign * A B: A [m*k], B [k*n], C [m*n].
 void cav_dense_product(int m, int n, int k, double sign, const double *A, int lda, const double *B, int ldb, double *C,
                        int ldc);
 
 /// C += sign * A' B, or the part of it: A [k*m], B [k*n], C [m*n].
-void cav_dense_product_transposed(cav_part part, int m, int n, int k, double sign, const double *A, int lda,
+void cav_dense_product_transposed(cav_triangle part, int m, int n, int k, double sign, const double *A, int lda,
                                   const double *B, int ldb, double *C, int ldc);
 
 /// C += A A', one triangle of it: A [n*k], C [n*n]. Rows of A in equal parts, of which the like are often zero in the same
 /// columns: zeros that stand together then cost nothing, to the same bits for any number of parts.
-void cav_dense_square(cav_part part, int n, int parts, int k, const double *A, int lda, double *C, int ldc);
+void cav_dense_square(cav_triangle part, int n, int parts, int k, const double *A, int lda, double *C, int ldc);
 
 /// Cholesky factor L of the lower triangle of A [n*n] in its place. Entries further than `below` under the diagonal are zero and
 /// are not touched: a band keeps its columns at a distance of `below` + 1, which is lda = below. Zero if a pivot is not

@@ -6,19 +6,19 @@
 #include "cavort/dynamics.h"
 
 /// What the memory of a state serves. profile.c tells of it.
-typedef enum cav_part {
-  CAV_PART_HEAD,      ///< the two structs themselves
-  CAV_PART_POSES,     ///< positions of links
-  CAV_PART_MOTION,    ///< velocities, forces, joints' own forces
-  CAV_PART_TENDONS,   ///< lengths and moment arms
-  CAV_PART_EQUALITY,  ///< equality constraints
-  CAV_PART_ROWS,      ///< limits and friction losses
-  CAV_PART_CONTACTS,  ///< contacts, and geoms that may touch
-  CAV_PART_ACTUATION, ///< transmissions
-  CAV_PART_INERTIA,   ///< inertia matrix and its factors: forward steps only
-  CAV_PART_SOLVERS,   ///< solvers and derivatives that have been called
-  CAV_PARTS
-} cav_part;
+typedef enum cav_memory_use {
+  CAV_MEMORY_HEAD,      ///< the two structs themselves
+  CAV_MEMORY_POSES,     ///< positions of links
+  CAV_MEMORY_MOTION,    ///< velocities, forces, joints' own forces
+  CAV_MEMORY_TENDONS,   ///< lengths and moment arms
+  CAV_MEMORY_EQUALITY,  ///< equality constraints
+  CAV_MEMORY_ROWS,      ///< limits and friction losses
+  CAV_MEMORY_CONTACTS,  ///< contacts, and geoms that may touch
+  CAV_MEMORY_ACTUATION, ///< transmissions
+  CAV_MEMORY_INERTIA,   ///< inertia matrix and its factors: forward steps only
+  CAV_MEMORY_SOLVERS,   ///< solvers and derivatives that have been called
+  CAV_MEMORY_USES
+} cav_memory_use;
 
 enum { CAV_IMPULSE_DIM = 6 }; ///< most impulses of one object
 
@@ -36,7 +36,7 @@ struct cav_next_knot;
 struct cav_derivative_store;
 
 typedef struct cav_workspace {
-  size_t bytes[CAV_PARTS], noted; ///< of the block, by part
+  size_t bytes[CAV_MEMORY_USES], noted; ///< of the block, by part
 
   // the last evaluation
   cav_stage valid;        ///< what cav_inverse_from may reuse

@@ -63,7 +63,7 @@ static census count(const cav_model *model) {
 }
 
 // notes what was laid out since the last note as belonging to a part
-static void note(cav_workspace *w, cav_part part, size_t used) {
+static void note(cav_workspace *w, cav_memory_use part, size_t used) {
   w->bytes[part] += used - w->noted;
   w->noted = used;
 }
@@ -91,7 +91,7 @@ static size_t layout(const cav_model *model, char *base, cav_state *s, cav_works
   w->aligned = carve(base, &used, nj, i);
   w->centred = carve(base, &used, nj, i);
   w->straight = carve(base, &used, n, i);
-  note(w, CAV_PART_POSES, used);
+  note(w, CAV_MEMORY_POSES, used);
 
   s->velocity = carve(base, &used, 6 * n, d);
   s->velocity_next = carve(base, &used, 6 * n, d);
@@ -109,7 +109,7 @@ static size_t layout(const cav_model *model, char *base, cav_state *s, cav_works
   w->damping = carve(base, &used, nv, d);
   w->spring = carve(base, &used, c.springs, i);
   w->buoy = carve(base, &used, count_buoys(model, NULL), i);
-  note(w, CAV_PART_MOTION, used);
+  note(w, CAV_MEMORY_MOTION, used);
 
   s->tendon_length = carve(base, &used, nt, d);
   s->tendon_arm = carve(base, &used, model->ntendon_dof, d);
@@ -117,15 +117,15 @@ static size_t layout(const cav_model *model, char *base, cav_state *s, cav_works
   w->tendon_spring = carve(base, &used, nt, i);
   w->tendon_limit = carve(base, &used, nt, i);
   w->tendon_friction = carve(base, &used, nt, i);
-  note(w, CAV_PART_TENDONS, used);
+  note(w, CAV_MEMORY_TENDONS, used);
 
   s->equality = carve(base, &used, (size_t)model->nequality, sizeof(cav_equality_rows));
   w->bias = c.turning > 0 ? carve(base, &used, 6 * n, d) : NULL;
-  note(w, CAV_PART_EQUALITY, used);
+  note(w, CAV_MEMORY_EQUALITY, used);
 
   w->limit = carve(base, &used, c.limits, i);
   w->friction = carve(base, &used, c.frictions, i);
-  note(w, CAV_PART_ROWS, used);
+  note(w, CAV_MEMORY_ROWS, used);
 
   w->gear_start = carve(base, &used, nu > 0 ? nu + 1 : 0, i);
   w->gear_dof = carve(base, &used, c.gears, i);
@@ -133,14 +133,14 @@ static size_t layout(const cav_model *model, char *base, cav_state *s, cav_works
   w->gear_room = (int)c.gears;
   w->gram_inverse = carve(base, &used, nu, d);
   w->control = carve(base, &used, 2 * nu, d);
-  note(w, CAV_PART_ACTUATION, used);
+  note(w, CAV_MEMORY_ACTUATION, used);
 
   w->parent = carve(base, &used, nv, i);
   w->row = carve(base, &used, nv + 1, i);
   w->M = carve(base, &used, entries, d);
   w->L = carve(base, &used, entries, d);
   w->composite = carve(base, &used, 10 * n, d);
-  note(w, CAV_PART_INERTIA, used);
+  note(w, CAV_MEMORY_INERTIA, used);
   return used;
 }
 
@@ -243,7 +243,7 @@ cav_state *cav_state_new(const cav_model *model) {
   size_t laid = layout(model, block + head, state, work);
   assert(used == head && head + laid == bytes);
   (void)laid;
-  work->bytes[CAV_PART_HEAD] = head;
+  work->bytes[CAV_MEMORY_HEAD] = head;
 
   // what this model needs
   state->model = model;
@@ -289,17 +289,17 @@ void cav_state_free(cav_state *state) {
   free(state);
 }
 
-void cav_state_bytes(const cav_state *state, size_t bytes[CAV_PARTS]) {
+void cav_state_bytes(const cav_state *state, size_t bytes[CAV_MEMORY_USES]) {
   const cav_workspace *w = state->work;
   memcpy(bytes, w->bytes, sizeof w->bytes);
-  bytes[CAV_PART_ROWS] += (size_t)w->row_room * sizeof *state->row;
-  bytes[CAV_PART_MOTION] += cav_fluid_bytes(w) + (w->half_steps ? w->half_steps->bytes : 0);
-  bytes[CAV_PART_CONTACTS] += cav_next_knot_bytes(w->next);
-  bytes[CAV_PART_CONTACTS] += (size_t)w->contact_room * sizeof *state->contact + cav_geom_cache_bytes(w->geom);
+  bytes[CAV_MEMORY_ROWS] += (size_t)w->row_room * sizeof *state->row;
+  bytes[CAV_MEMORY_MOTION] += cav_fluid_bytes(w) + (w->half_steps ? w->half_steps->bytes : 0);
+  bytes[CAV_MEMORY_CONTACTS] += cav_next_knot_bytes(w->next);
+  bytes[CAV_MEMORY_CONTACTS] += (size_t)w->contact_room * sizeof *state->contact + cav_geom_cache_bytes(w->geom);
   size_t nu = (size_t)state->model->nactuator;
-  bytes[CAV_PART_ACTUATION] += w->gram ? 3 * nu * nu * sizeof(double) : 0;
-  bytes[CAV_PART_SOLVERS] += w->solver_bytes + w->readout_room * sizeof(double);
-  bytes[CAV_PART_SOLVERS] += (size_t)w->memory_room * sizeof *w->memory + w->coupling_room * sizeof *w->coupling;
-  bytes[CAV_PART_SOLVERS] += cav_derivative_store_bytes(w->derivatives);
-  bytes[CAV_PART_SOLVERS] += cav_hessian_bytes(w->hessian);
+  bytes[CAV_MEMORY_ACTUATION] += w->gram ? 3 * nu * nu * sizeof(double) : 0;
+  bytes[CAV_MEMORY_SOLVERS] += w->solver_bytes + w->readout_room * sizeof(double);
+  bytes[CAV_MEMORY_SOLVERS] += (size_t)w->memory_room * sizeof *w->memory + w->coupling_room * sizeof *w->coupling;
+  bytes[CAV_MEMORY_SOLVERS] += cav_derivative_store_bytes(w->derivatives);
+  bytes[CAV_MEMORY_SOLVERS] += cav_hessian_bytes(w->hessian);
 }

@@ -34,7 +34,7 @@ void cav_inverse_four(const cav_model *model, cav_lanes *lanes, cav_state *const
 int cav_forward_limit(const cav_state *state);
 
 /// Bytes of each part of a state as it is now. state.c.
-void cav_state_bytes(const cav_state *state, size_t bytes[CAV_PARTS]);
+void cav_state_bytes(const cav_state *state, size_t bytes[CAV_MEMORY_USES]);
 
 /// Times of the stages of one evaluation of the inverse, s: each run alone often enough to be measured, shortest of
 /// several.

@@ -212,9 +212,9 @@ static void add_law(regulator *r, int laws) {
   memset(r->W, 0, (size_t)nv * (size_t)all * sizeof *r->W);
   cav_dense_product(nv, all, nv, part, r->Q, nv, r->D, nv, r->W, nv);
   for (size_t i = 0; i < states; i++) r->W[i] += part * r->L[i];
-  cav_dense_product_transposed(CAV_PART_LOWER, all, all, nv, 1, r->D, nv, r->W, nv, r->S, all);
+  cav_dense_product_transposed(CAV_TRIANGLE_LOWER, all, all, nv, 1, r->D, nv, r->W, nv, r->S, all);
   // L'D, whose rows below are zero: of the lower triangle what is on the left
-  cav_dense_product_transposed(CAV_PART_LOWER, nv, nv, nv, part, r->L, nv, r->D, nv, r->S, all);
+  cav_dense_product_transposed(CAV_TRIANGLE_LOWER, nv, nv, nv, part, r->L, nv, r->D, nv, r->S, all);
 }
 
 /// One step back, from S: K, and P of the step before without the penalty on its state. The penalty on inputs is one a
@@ -229,10 +229,10 @@ static cav_status riccati(regulator *r) {
     for (int i = 0; i < nu; i++) r->factor[i * (nu + 1)] = 1;
     cav_dense_solve_lower(nu, nu - 1, r->H, all, nu, r->factor, nu);
     memset(r->unit, 0, (size_t)nu * (size_t)nu * sizeof *r->unit);
-    cav_dense_product_transposed(CAV_PART_ALL, nu, nu, nu, 1, r->factor, nu, r->factor, nu, r->unit, nu);
+    cav_dense_product_transposed(CAV_TRIANGLE_BOTH, nu, nu, nu, 1, r->factor, nu, r->factor, nu, r->unit, nu);
     memset(r->K, 0, (size_t)nu * n * sizeof *r->K);
     cav_dense_product(nu, n, nu, 1, r->unit, nu, r->G, all, r->K, nu);
-    cav_dense_product_transposed(CAV_PART_LOWER, n, n, nu, -1, r->G, all, r->K, nu, r->P, n);
+    cav_dense_product_transposed(CAV_TRIANGLE_LOWER, n, n, nu, -1, r->G, all, r->K, nu, r->P, n);
   }
   for (int j = 0; j < n; j++)
     for (int i = j + 1; i < n; i++) r->P[(size_t)i * n + j] = r->P[(size_t)j * n + i];

@@ -166,8 +166,8 @@ static cav_status assemble(const search *s, double damping, int *definite) {
     // S -= B' H^-1 B by the half B := L^-1 B
     cav_dense_solve_lower(nv, nv - 1, H, nv, n, B, nv);
     cav_dense_solve_lower(nv, nv - 1, H, nv, 1, g, nv);
-    cav_dense_product_transposed(CAV_PART_LOWER, n, n, nv, -1, B, nv, B, nv, s->S, n);
-    cav_dense_product_transposed(CAV_PART_ALL, n, 1, nv, -1, B, nv, g, nv, s->r, n);
+    cav_dense_product_transposed(CAV_TRIANGLE_LOWER, n, n, nv, -1, B, nv, B, nv, s->S, n);
+    cav_dense_product_transposed(CAV_TRIANGLE_BOTH, n, 1, nv, -1, B, nv, g, nv, s->r, n);
   }
   for (int k = 0; k < 3 * s->nfree; k++) {
     double w = held(s, k / 3);

@@ -168,8 +168,8 @@ static void fit(const cav_support *s, int n) {
   if (n == 0) return;
   memset(s->G, 0, (size_t)n * (size_t)n * sizeof *s->G);
   memset(s->d, 0, (size_t)n * sizeof *s->d), memset(s->x, 0, (size_t)n * sizeof *s->x);
-  cav_dense_product_transposed(CAV_PART_ALL, n, n, s->rows, 1, s->A, s->rows, s->A, s->rows, s->G, n);
-  cav_dense_product_transposed(CAV_PART_ALL, n, 1, s->rows, 1, s->A, s->rows, s->b, s->rows, s->d, n);
+  cav_dense_product_transposed(CAV_TRIANGLE_BOTH, n, n, s->rows, 1, s->A, s->rows, s->A, s->rows, s->G, n);
+  cav_dense_product_transposed(CAV_TRIANGLE_BOTH, n, 1, s->rows, 1, s->A, s->rows, s->b, s->rows, s->d, n);
   for (int turn = 0; turn < 3 * n && k < n; turn++) {
     int best = -1;
     double most = done;

@@ -16,7 +16,8 @@ cav_status cav_band_factor(cav_band *band) {
   if (cav_band_factor_part(band, core) != CAV_OK) return CAV_NOT_CONVERGED;
   if (border == 0) return CAV_OK;
   cav_dense_solve_lower_blocks(core, below, step, band->A, below, border, band->Y, core);
-  cav_dense_product_transposed(CAV_PART_LOWER, border, border, core, -1, band->Y, core, band->Y, core, band->S, border);
+  cav_dense_product_transposed(CAV_TRIANGLE_LOWER, border, border, core, -1, band->Y, core, band->Y, core, band->S,
+                               border);
   return cav_dense_factor(border, border - 1, band->S, border) ? CAV_OK : CAV_NOT_CONVERGED;
 }
 
@@ -25,7 +26,7 @@ void cav_band_solve(const cav_band *band, double *x) {
   // down the band, across the border, up the band
   cav_dense_solve_lower_blocks(core, below, step, band->A, below, 1, x, core);
   if (border > 0) {
-    cav_dense_product_transposed(CAV_PART_ALL, border, 1, core, -1, band->Y, core, x, core, x + core, border);
+    cav_dense_product_transposed(CAV_TRIANGLE_BOTH, border, 1, core, -1, band->Y, core, x, core, x + core, border);
     cav_dense_solve_lower(border, border - 1, band->S, border, 1, x + core, border);
     cav_dense_solve_upper(border, border - 1, band->S, border, 1, x + core, border);
     cav_dense_product(core, 1, border, -1, band->Y, core, x + core, border, x, core);

@@ -408,7 +408,7 @@ static void weigh_rows(cav_quadratic *p, int t, double *block, int ld, double *s
     for (int k = 0; k < width; k++) step_row[k] += w * knot->slot_step[i] * row[k];
     *step_square += w * knot->slot_step[i] * knot->slot_step[i];
   }
-  cav_dense_square(CAV_PART_LOWER, width, 3, ndense, p->dense, width, block, ld);
+  cav_dense_square(CAV_TRIANGLE_LOWER, width, 3, ndense, p->dense, width, block, ld);
 }
 
 /// Adds the weighted rows to the costs' Hessian, which the normal equations are.

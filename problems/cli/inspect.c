@@ -224,22 +224,22 @@ static void print_costs(const cav_model *m) {
   cav_state *state = cav_state_new(m);
   double *v = calloc((size_t)m->nv, sizeof *v);
   cav_profile time = {0};
-  size_t bytes[CAV_PARTS], all = 0;
+  size_t bytes[CAV_MEMORY_USES], all = 0;
   cav_status status = state && v ? cav_profile_inverse(m, state, m->q0, v, v, &time) : CAV_NO_MEMORY;
   if (status == CAV_OK) {
     cav_state_bytes(state, bytes);
-    for (int i = 0; i < CAV_PARTS; i++) all += bytes[i];
+    for (int i = 0; i < CAV_MEMORY_USES; i++) all += bytes[i];
     printf("\nits time, at the posture of the file with %d contacts, and the memory of a state\n", state->ncontact);
-    print_cost("poses and tendon lengths", time.poses, bytes[CAV_PART_POSES] + bytes[CAV_PART_TENDONS]);
-    print_cost("limits and friction losses", time.rows, bytes[CAV_PART_ROWS]);
-    print_cost("search of contacts", time.contacts, bytes[CAV_PART_CONTACTS]);
-    print_cost("equality constraints", time.equalities, bytes[CAV_PART_EQUALITY]);
+    print_cost("poses and tendon lengths", time.poses, bytes[CAV_MEMORY_POSES] + bytes[CAV_MEMORY_TENDONS]);
+    print_cost("limits and friction losses", time.rows, bytes[CAV_MEMORY_ROWS]);
+    print_cost("search of contacts", time.contacts, bytes[CAV_MEMORY_CONTACTS]);
+    print_cost("equality constraints", time.equalities, bytes[CAV_MEMORY_EQUALITY]);
     print_cost("laws of contacts", time.laws, 0);
-    print_cost("Newton-Euler, forces of joints and tendons", time.motion, bytes[CAV_PART_MOTION]);
+    print_cost("Newton-Euler, forces of joints and tendons", time.motion, bytes[CAV_MEMORY_MOTION]);
     print_cost("impulses of all constraints", time.impulses, 0);
-    print_cost("actuators, where they are asked for", -1, bytes[CAV_PART_ACTUATION]);
-    print_cost("inertia matrix, forward steps only", -1, bytes[CAV_PART_INERTIA]);
-    print_cost("solvers, once they are called", -1, bytes[CAV_PART_SOLVERS]);
+    print_cost("actuators, where they are asked for", -1, bytes[CAV_MEMORY_ACTUATION]);
+    print_cost("inertia matrix, forward steps only", -1, bytes[CAV_MEMORY_INERTIA]);
+    print_cost("solvers, once they are called", -1, bytes[CAV_MEMORY_SOLVERS]);
     print_cost("the whole", time.whole, all);
   } else {
     printf("\nno evaluation at the posture of the file: %s\n", cav_status_name(status));
