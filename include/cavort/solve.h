@@ -194,9 +194,10 @@ typedef struct cav_binding {
       pull; ///< force on the motion that the multipliers of it and its like at neighbouring knots leave, per rad or m
 } cav_binding;
 
-/// A solved motion.
-typedef struct cav_followed cav_followed; ///< closed loops of the verifier
+/// Closed loops that the verifier ran while gains were chosen.
+typedef struct cav_followed cav_followed;
 
+/// A solved motion.
 typedef struct cav_solution {
   cav_trajectory *trajectory; ///< the motion
   cav_options contact;        ///< contact law the motion obeys

@@ -69,6 +69,9 @@ static const double exceeded = 1.3, fair = 0.5, unfinished = 0.1;
 /// Part of what all knots' forecasts were off by that the knots whose curvature is kept may be off by.
 static const double unmarked = 0.3;
 
+/// What a motion whose rows hold may be dearer than where a run ends without that.
+static const double held_loss = 1e-2;
+
 /// Squares of the step, rad or m, that make a programme convex, of the cost: of all knots, and of single ones.
 /// A wave of these takes what is within this fraction of the largest.
 static const double least_shift = 1, most_shift[2] = {10, 1e6}, most_knot_shift = 1e14, wave = 0.05;
@@ -210,7 +213,9 @@ typedef struct descent {
   int needs_known;
   double gain;                   ///< decrease of the step that was taken
   cav_trajectory *second, *best; ///< corrected trial; best of those tried
-  const cav_trajectory *last;    ///< what was evaluated last
+  cav_trajectory *held;          ///< last motion whose rows held; NULL: none did
+  double held_cost;
+  const cav_trajectory *last; ///< what was evaluated last
 } descent;
 
 static void set_radius(const cav_transcription *tr, double *radius, double value) {
@@ -250,6 +255,7 @@ static void descent_free(descent *d) {
   cav_course_clear(&d->course);
   cav_trajectory_free(d->second);
   cav_trajectory_free(d->best);
+  cav_trajectory_free(d->held);
   free(d->x), free(d->stale);
 }
 
@@ -670,6 +676,25 @@ static cav_status look(cav_solve_run *run, descent *d, tail *end) {
   return status;
 }
 
+/// Keeps the motion where its rows hold.
+static cav_status hold(const cav_solve_run *run, descent *d) {
+  if (!cav_run_met(run)) return CAV_OK;
+  cav_trajectory_free(d->held);
+  d->held = cav_trajectory_copy(run->at);
+  d->held_cost = cav_transcription_cost(run->tr);
+  return d->held ? CAV_OK : CAV_NO_MEMORY;
+}
+
+/// Where a run ends beside its rows: back to where they held, if that costs little.
+static cav_status go_back(cav_solve_run *run, descent *d) {
+  double most = (1 + held_loss) * cav_transcription_cost(run->tr);
+  if (cav_run_met(run) || !d->held || d->held_cost > most) return CAV_OK;
+  exchange(&run->at, &d->held);
+  cav_trajectory_free(d->held);
+  d->held = NULL;
+  return cav_transcription_values(run->tr, run->at);
+}
+
 /// Iterations to where no step gains, *settled 1, or what one may gain is little and is slow to come, 2; or 0.
 static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled) {
   int calm = 0, taken = 1;
@@ -681,10 +706,12 @@ static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled
     if (status != CAV_OK || !taken) break;
     calm = d->gain < slow * cost_scale(run->tr) ? calm + 1 : 0;
     if (cav_run_report(run, cav_quadratic_length(d->qp), largest_radius(run->tr, d->radius))) status = CAV_INTERRUPTED;
+    if (status == CAV_OK) status = hold(run, d);
     if (status == CAV_OK) status = look(run, d, &end);
   }
   *settled = end.met >= LOOKS ? 2 : !taken || calm >= PATIENCE;
-  return status == CAV_OK ? settle_rows(run, d) : status;
+  if (status == CAV_OK) status = settle_rows(run, d);
+  return status == CAV_OK ? go_back(run, d) : status;
 }
 
 /// A step across a jump of the merit, in the largest box in which it loses little. *taken: whether there is one.
