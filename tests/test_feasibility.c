@@ -213,8 +213,8 @@ static int proofs(const char *name, const cav_problem *p, cav_impossibility *fou
   double from = processor_seconds();
   CHECK(cav_problem_impossible(p, found, most, &n, &error) == CAV_OK);
   double seconds = processor_seconds() - from;
-  CHECK(seconds < 1); // seen up to 0.4, of a pendulum to be pumped
-  if (seconds >= 1 || (n > 0) != wanted)
+  CHECK(seconds < 2); // seen up to 0.4, of a pendulum to be pumped, and 1.02 with sanitizers beside other work
+  if (seconds >= 2 || (n > 0) != wanted)
     fprintf(stderr, "    %s: %d proofs in %.3f s: %s\n", name, n, seconds, n > 0 ? found[0].what : "");
   return n;
 }

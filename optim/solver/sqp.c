@@ -676,9 +676,9 @@ static cav_status look(cav_solve_run *run, descent *d, tail *end) {
   return status;
 }
 
-/// Keeps the motion where its rows hold.
+/// Keeps the motion where its rows hold, or are as near as a certificate asks.
 static cav_status hold(const cav_solve_run *run, descent *d) {
-  if (!cav_run_met(run)) return CAV_OK;
+  if (!cav_run_certifiable(run)) return CAV_OK;
   cav_trajectory_free(d->held);
   d->held = cav_trajectory_copy(run->at);
   d->held_cost = cav_transcription_cost(run->tr);
@@ -692,7 +692,8 @@ static cav_status go_back(cav_solve_run *run, descent *d) {
   exchange(&run->at, &d->held);
   cav_trajectory_free(d->held);
   d->held = NULL;
-  return cav_transcription_values(run->tr, run->at);
+  cav_status status = cav_transcription_values(run->tr, run->at);
+  return status == CAV_OK ? settle_rows(run, d) : status;
 }
 
 /// Iterations to where no step gains, *settled 1, or what one may gain is little and is slow to come, 2; or 0.
