@@ -1,4 +1,4 @@
-/// A model of nothing but slides that do not weigh on each other: how far each comes in a time, exact.
+/// A model of nothing but slides that do not weigh on each other: how far each comes in a time, at most.
 ///
 /// Its inertia is constant and diagonal, so each slide is a mass under a constant force and one between limits. The farthest
 /// place with at most a speed at the end is that of full force one way and then the other (bang-bang): of a mass m from rest to
@@ -79,8 +79,8 @@ static void tell(cav_examination *e, const cav_requirement *r, double way, doubl
   char what[160];
   cav_requirement_words(e, r, what, sizeof what);
   cav_impossible(e, CAV_CONDITION_ENERGY, r, "More time, or a stronger actuator.",
-                 "%s, %.3g m from the start, but at full effort it comes %.3g m far in %.3g s (exact for slides)", what,
-                 way, can, time);
+                 "%s, %.3g m from the start, but at full effort it comes %.3g m far in %.3g s at most", what, way, can,
+                 time);
 }
 
 static void examine(cav_examination *e, const cav_requirement *r, const double *mass, const double *force) {
