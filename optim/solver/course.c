@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "programme.h"
+
 /// Part of the step, to both sides, from which its course is found.
 static const double part = 0.03;
 
@@ -23,14 +25,14 @@ int cav_course_make(cav_course *c, const cav_transcription *tr, int rows) {
 void cav_course_clear(cav_course *c) { free(c->here); }
 
 /// Values of rows and forces [rows+forces].
-static void read_all(const cav_transcription *tr, double *value) {
-  for (int t = 0; t < tr->nknot; t++)
-    for (int i = 0; i < tr->knot[t].layout.count; i++) *value++ = tr->knot[t].slot[i].value;
+static void read_all(const cav_transcription *tr, int rows, double *value) {
+  cav_programme_values(tr, value);
+  value += rows;
   for (int t = 0; t < tr->nknot; t++, value += tr->nv) memcpy(value, tr->knot[t].u, (size_t)tr->nv * sizeof(double));
 }
 
 void cav_course_begin(cav_course *c, const cav_transcription *tr) {
-  read_all(tr, c->here);
+  read_all(tr, c->rows, c->here);
   c->known = 0;
 }
 
@@ -42,7 +44,7 @@ static cav_status change_by(cav_course *c, cav_transcription *tr, const cav_quad
   cav_transcription_move(tr, at, c->x, spare);
   cav_status status = cav_transcription_values(tr, spare);
   if (status != CAV_OK) return status;
-  read_all(tr, change);
+  read_all(tr, c->rows, change);
   for (int k = 0; k < c->rows + c->forces; k++) change[k] -= c->here[k];
   return CAV_OK;
 }
@@ -63,7 +65,7 @@ cav_status cav_course_find(cav_course *c, cav_transcription *tr, cav_quadratic *
 void cav_course_correct(cav_course *c, const cav_transcription *tr, cav_quadratic *qp, double multiple, double *x) {
   const double *linear = cav_quadratic_prediction(qp), *here = c->here + c->rows, part_way = fmin(multiple, 1);
   double *force = c->miss + c->rows;
-  read_all(tr, c->miss);
+  read_all(tr, c->rows, c->miss);
   for (int k = 0; k < c->rows; k++) c->miss[k] -= c->here[k] + part_way * (linear[k] - c->here[k]);
   for (int i = 0; i < c->forces; i++) force[i] -= here[i] + multiple * c->derivative[i];
   cav_quadratic_correct(qp, c->miss, c->known ? force : NULL, x);

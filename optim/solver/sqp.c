@@ -17,21 +17,16 @@
 
 #include "course.h"
 #include "curvature.h"
+#include "programme.h"
 
-/// Iterations; raises of the penalties for a programme; programmes for a linearisation; corrections of a step.
-enum { ITERATIONS = 250, RAISES = 5, ATTEMPTS = 20, CORRECTIONS = 16, SETTLING = 20 };
-
-/// Near a record: what the linearised rows miss together, below which a raise is never in vain; part of it that one has
-/// to bring in; part of the largest penalty that none is below then; programmes until a raise is tried again.
-static const double missed_little = 1e-6, brought_in = 0.1, even = 0.1;
-enum { RESTS = 8 };
+/// Iterations; programmes for a linearisation; corrections of a step.
+enum { ITERATIONS = 250, ATTEMPTS = 20, CORRECTIONS = 16, SETTLING = 20 };
 
 /// Boxes at the start and at most (rad, m, log of the step), and where they are too small to go on.
 static const double first_radius = 0.1, most_radius = 0.7, least_radius = 1e-7;
 
-/// Fractions of the cost: predicted decrease that ends a run; one that ends it if it does not come true; gap of a
-/// programme. Smallest cost that counts as a scale.
-static const double stationary = 1e-9, predicted_enough = 1e-6, gap_fraction = 1e-11, least_cost = 1e-6;
+/// Fractions of the cost: predicted decrease that ends a run; one that ends it if it does not come true.
+static const double stationary = 1e-9, predicted_enough = 1e-6;
 
 /// Decreases of the cost below this fraction, so many in a row, end a run; below that a Hessian that served so many
 /// iterations is found anew.
@@ -76,117 +71,12 @@ static const double held_loss = 1e-2;
 /// A wave of these takes what is within this fraction of the largest.
 static const double least_shift = 1, most_shift[2] = {10, 1e6}, most_knot_shift = 1e14, wave = 0.05;
 
-/// Penalties: over the multiplier; of its kind's largest multiplier; of the cost, a unit of the row.
-static const double over = 2, of_kind = 0.1, of_cost = 0.01;
-
-static double cost_scale(const cav_transcription *tr) { return fmax(cav_transcription_cost(tr), least_cost); }
-
 /// Sets aside the augmented Lagrangian, but for squares of the unactuated force: these leave the solution where it is,
 /// and make the Lagrangian convex across these rows.
 static void take_penalties(cav_transcription *tr) {
   tr->penalty = (cav_penalties){.unactuated = tr->problem->schedule.last.penalty};
   for (int t = 0; t < tr->nknot; t++)
     for (int i = 0; i < tr->knot[t].layout.count; i++) tr->knot[t].slot[i].multiplier = 0;
-}
-
-static int kind_of(const cav_slot_layout *at, int i) { return (i >= at->effort) + (i >= at->joint) + (i >= at->term); }
-
-static void read_values(const cav_transcription *tr, double *value) {
-  for (int t = 0, k = 0; t < tr->nknot; t++)
-    for (int i = 0; i < tr->knot[t].layout.count; i++) value[k++] = tr->knot[t].slot[i].value;
-}
-
-/// Penalties from the slots' multipliers.
-static void set_penalties(const cav_transcription *tr, double *penalty) {
-  double most[4] = {0}, floor = of_cost * cost_scale(tr);
-  for (int t = 0; t < tr->nknot; t++)
-    for (int i = 0; i < tr->knot[t].layout.count; i++) {
-      double *kind = &most[kind_of(&tr->knot[t].layout, i)];
-      *kind = fmax(*kind, fabs(tr->knot[t].slot[i].multiplier));
-    }
-  for (int t = 0, k = 0; t < tr->nknot; t++)
-    for (int i = 0; i < tr->knot[t].layout.count; i++)
-      penalty[k++] = fmax(fmax(over * fabs(tr->knot[t].slot[i].multiplier), floor),
-                          of_kind * most[kind_of(&tr->knot[t].layout, i)]);
-}
-
-/// Raises penalties that the multipliers press against; how many. part: of the largest, which none is below then.
-static int raise_penalties(cav_quadratic *qp, double part) {
-  int raised = 0;
-  const double *y = cav_quadratic_multiplier(qp);
-  double *penalty = cav_quadratic_penalty(qp), most = 0;
-  for (int k = 0; k < cav_quadratic_rows(qp); k++) {
-    if (fabs(y[k]) < 0.9 * penalty[k]) continue;
-    penalty[k] *= 10;
-    most = fmax(most, penalty[k]);
-    raised++;
-  }
-  for (int k = 0; k < cav_quadratic_rows(qp); k++) penalty[k] = fmax(penalty[k], part * most);
-  return raised;
-}
-
-/// Cost and penalties at the last values; part [nknot]: of the knots.
-static double merit_of(const cav_transcription *tr, const double *penalty, double *part) {
-  double sum = 0;
-  for (int t = 0, k = 0; t < tr->nknot; t++) {
-    part[t] = tr->knot[t].merit;
-    for (int i = 0; i < tr->knot[t].layout.count; i++, k++) {
-      const cav_slot *slot = &tr->knot[t].slot[i];
-      part[t] += penalty[k] * fmax(fmax(slot->lower - slot->value, slot->value - slot->upper), 0);
-    }
-    sum += part[t];
-  }
-  return sum;
-}
-
-/// Bounds of the step's logarithm about where it is.
-static void step_bounds(const cav_transcription *tr, const cav_trajectory *at, double change[2]) {
-  change[0] = -INFINITY, change[1] = INFINITY;
-  if (!tr->free_step) return;
-  change[0] = log(tr->problem->duration_least / (tr->nknot - 1) / at->timestep);
-  change[1] = log(tr->problem->duration_most / (tr->nknot - 1) / at->timestep);
-}
-
-/// What the linearised rows miss after the programme's step, all together.
-static double linear_violation(const cav_transcription *tr, cav_quadratic *qp) {
-  const double *linear = cav_quadratic_prediction(qp);
-  double sum = 0;
-  for (int t = 0, k = 0; t < tr->nknot; t++)
-    for (int i = 0; i < tr->knot[t].layout.count; i++, k++)
-      sum += fmax(fmax(tr->knot[t].slot[i].lower - linear[k], linear[k] - tr->knot[t].slot[i].upper), 0);
-  return sum;
-}
-
-/// Solves the programme, raising penalties until they are exact or there is no more to be had by it. Where rows cannot
-/// all hold in the boxes, as near a record that asks for more than a body has, the multiplier of one is at its penalty
-/// whatever that is; what raises it is taken from others, and penalties that grow for nothing leave no steps in the end.
-/// Such a raise is taken back, and none is tried in the next programmes: *rest counts them. kept [rows]. *solved:
-/// whether it could be.
-static cav_status solve_programme(cav_solve_run *run, cav_quadratic *qp, const double *radius, double *kept, int *rest,
-                                  int *solved) {
-  double change[2], begin = cav_clock(), gap = gap_fraction * cost_scale(run->tr), before = INFINITY;
-  size_t bytes = (size_t)cav_quadratic_rows(qp) * sizeof *kept;
-  step_bounds(run->tr, run->at, change);
-  cav_status status = CAV_OK;
-  *rest = *rest > 0 ? *rest - 1 : 0;
-  for (int i = 0; i < RAISES; i++) {
-    status = i == 0 ? cav_quadratic_solve(qp, radius, change, gap) : cav_quadratic_solve_again(qp, gap);
-    if (status != CAV_OK) break;
-    double missing = cav_problem_has_record(run->problem) ? linear_violation(run->tr, qp) : 0;
-    if (missing > fmax((1 - brought_in) * before, missed_little)) {
-      memcpy(cav_quadratic_penalty(qp), kept, bytes);
-      status = cav_quadratic_solve_again(qp, gap);
-      *rest = RESTS;
-      break;
-    }
-    memcpy(kept, cav_quadratic_penalty(qp), bytes);
-    before = missing;
-    int much = missing > missed_little, last = much && (*rest > 0 || i == RAISES - 1);
-    if (last || !raise_penalties(qp, much ? even : 0)) break;
-  }
-  run->region.seconds_linear += cav_clock() - begin;
-  *solved = status == CAV_OK;
-  return status == CAV_NOT_CONVERGED ? CAV_OK : status;
 }
 
 /// A run of iterations: memory and the present state.
@@ -269,7 +159,7 @@ static void shift_all(const cav_transcription *tr, descent *d, double next) {
 
 /// What each knot's part needs to be convex by itself.
 static void find_needs(const cav_transcription *tr, descent *d) {
-  double least = least_shift * cost_scale(tr);
+  double least = least_shift * cav_programme_scale(tr);
   for (int t = 0; t < tr->nknot; t++) {
     d->need[t] = 0;
     while (d->need[t] < most_knot_shift * least && !cav_quadratic_knot_convex(d->qp, t, d->need[t]))
@@ -282,7 +172,7 @@ static void find_needs(const cav_transcription *tr, descent *d) {
 /// where a contact comes or goes, and of more and more knots; then by those of all beside. 0: there is no more to be
 /// had.
 static int raise_shift(const cav_transcription *tr, descent *d) {
-  double least = least_shift * cost_scale(tr);
+  double least = least_shift * cav_programme_scale(tr);
   if (!d->needs_known && d->shift < most_shift[0] * least) {
     shift_all(tr, d, d->shift > 0 ? 10 * d->shift : least);
     return 1;
@@ -320,7 +210,7 @@ static void add_curvature(cav_solve_run *run, descent *d) {
 static cav_status solve_model(cav_solve_run *run, descent *d) {
   for (;;) {
     int solved = 0;
-    cav_status status = solve_programme(run, d->qp, d->radius, d->kept, &d->rest, &solved);
+    cav_status status = cav_programme_solve(run, d->qp, d->radius, d->kept, &d->rest, &solved);
     if (status != CAV_OK || solved || !raise_shift(run->tr, d)) return status;
   }
 }
@@ -351,7 +241,7 @@ static void mark_stale(const cav_transcription *tr, descent *d) {
 /// which is found anew where the last one's predictions have not come true. all: at all knots.
 static cav_status model(cav_solve_run *run, descent *d, int all) {
   int poor = d->age >= 0 && fabs(d->ratio - 1) > poor_ratio;
-  int little = d->age >= SERVED && d->gain < old_gain * cost_scale(run->tr);
+  int little = d->age >= SERVED && d->gain < old_gain * cav_programme_scale(run->tr);
   cav_status status = CAV_OK;
   if (poor || little || all || (d->age < 0 && d->few >= FEW)) {
     int whole = !poor || little || all;
@@ -380,7 +270,7 @@ static void exchange(cav_trajectory **a, cav_trajectory **b) {
 static cav_status try_at(cav_solve_run *run, descent *d, cav_trajectory *at, double *merit) {
   cav_status status = cav_transcription_values(run->tr, at);
   d->last = at;
-  *merit = status == CAV_OK ? merit_of(run->tr, cav_quadratic_penalty(d->qp), d->tried) : INFINITY;
+  *merit = status == CAV_OK ? cav_programme_merit(run->tr, cav_quadratic_penalty(d->qp), d->tried) : INFINITY;
   return status == CAV_NO_MEMORY || status == CAV_INTERRUPTED ? status : CAV_OK;
 }
 
@@ -543,14 +433,14 @@ static int is_lost(const cav_solve_run *run, const descent *d) { return d->age <
 /// model has to be a better one. *taken: whether one was.
 static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
   *taken = 0;
-  read_values(run->tr, cav_quadratic_value(d->qp));
+  cav_programme_values(run->tr, cav_quadratic_value(d->qp));
   cav_course_begin(&d->course, run->tr);
   for (int i = 0; i < ATTEMPTS; i++) {
     cav_status status = solve_model(run, d);
     if (status != CAV_OK) return status;
-    double scale = cost_scale(run->tr), trial;
+    double scale = cav_programme_scale(run->tr), trial;
     d->course.known = 0;
-    d->merit = merit_of(run->tr, cav_quadratic_penalty(d->qp), d->before);
+    d->merit = cav_programme_merit(run->tr, cav_quadratic_penalty(d->qp), d->before);
     d->predicted = cav_quadratic_decrease(d->qp);
     for (int t = 0; t < run->tr->nknot; t++) d->forecast[t] = cav_quadratic_knot_decrease(d->qp, t);
     memcpy(d->multiplier, cav_quadratic_multiplier(d->qp), (size_t)cav_quadratic_rows(d->qp) * sizeof(double));
@@ -611,7 +501,7 @@ static cav_status settle_rows(cav_solve_run *run, descent *d) {
 /// Multipliers of the augmented Lagrangian at the last values, with which the penalties and the curvature begin.
 static void begin(cav_solve_run *run, descent *d) {
   cav_transcription_multipliers(run->tr);
-  set_penalties(run->tr, cav_quadratic_penalty(d->qp));
+  cav_programme_penalties(run->tr, cav_quadratic_penalty(d->qp));
   for (int t = 0, k = 0; t < run->tr->nknot; t++)
     for (int i = 0; i < run->tr->knot[t].layout.count; i++) d->multiplier[k++] = run->tr->knot[t].slot[i].multiplier;
   take_penalties(run->tr);
@@ -627,12 +517,12 @@ static cav_status measure(cav_solve_run *run, descent *d, int curved) {
   d->needs_known = 0;
   d->ratio = 0;
   if (curved) add_curvature(run, d);
-  read_values(run->tr, cav_quadratic_value(d->qp));
+  cav_programme_values(run->tr, cav_quadratic_value(d->qp));
   set_radius(run->tr, d->radius, most_radius);
   status = solve_model(run, d);
   if (status != CAV_OK) return status;
   // a bound: what the programme decreases, and what its gap leaves open
-  run->optimality = (fmax(cav_quadratic_decrease(d->qp), 0) + cav_quadratic_gap(d->qp)) / cost_scale(run->tr);
+  run->optimality = (fmax(cav_quadratic_decrease(d->qp), 0) + cav_quadratic_gap(d->qp)) / cav_programme_scale(run->tr);
   run->measured = 1;
   memcpy(d->multiplier, cav_quadratic_multiplier(d->qp), (size_t)cav_quadratic_rows(d->qp) * sizeof(double));
   for (int t = 0, k = 0; t < run->tr->nknot; t++)
@@ -648,13 +538,14 @@ static cav_status foresee(cav_solve_run *run, descent *d, double *saving) {
   int solved = 0;
   cav_status status = cav_transcription_linearise(run->tr, run->at);
   if (status != CAV_OK) return status;
-  read_values(run->tr, cav_quadratic_value(d->qp));
+  cav_programme_values(run->tr, cav_quadratic_value(d->qp));
   set_radius(run->tr, d->next, most_radius);
   memcpy(d->offset, cav_quadratic_penalty(d->qp), bytes);
-  status = solve_programme(run, d->qp, d->next, d->kept, &d->rest, &solved);
+  status = cav_programme_solve(run, d->qp, d->next, d->kept, &d->rest, &solved);
   memcpy(cav_quadratic_penalty(d->qp), d->offset, bytes);
   *saving = INFINITY;
-  if (solved) *saving = (fmax(cav_quadratic_decrease(d->qp), 0) + cav_quadratic_gap(d->qp)) / cost_scale(run->tr);
+  if (solved)
+    *saving = (fmax(cav_quadratic_decrease(d->qp), 0) + cav_quadratic_gap(d->qp)) / cav_programme_scale(run->tr);
   return status;
 }
 
@@ -667,7 +558,7 @@ typedef struct tail {
 /// Looks, every few iterations that gain little.
 static cav_status look(cav_solve_run *run, descent *d, tail *end) {
   double asked = fmax(run->options->optimality, run->problem->schedule.optimality), saving = INFINITY;
-  end->gain += d->gain / cost_scale(run->tr);
+  end->gain += d->gain / cav_programme_scale(run->tr);
   if (++end->iterations < LOOK) return CAV_OK;
   double gain = end->gain / end->iterations;
   end->iterations = 0, end->gain = 0;
@@ -705,7 +596,7 @@ static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled
     status = model(run, d, 0);
     if (status == CAV_OK) status = iterate(run, d, &taken);
     if (status != CAV_OK || !taken) break;
-    calm = d->gain < slow * cost_scale(run->tr) ? calm + 1 : 0;
+    calm = d->gain < slow * cav_programme_scale(run->tr) ? calm + 1 : 0;
     if (cav_run_report(run, cav_quadratic_length(d->qp), largest_radius(run->tr, d->radius))) status = CAV_INTERRUPTED;
     if (status == CAV_OK) status = hold(run, d);
     if (status == CAV_OK) status = look(run, d, &end);
@@ -718,13 +609,13 @@ static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled
 /// A step across a jump of the merit, in the largest box in which it loses little. *taken: whether there is one.
 static cav_status leap(cav_solve_run *run, descent *d, int *taken) {
   *taken = 0;
-  double scale = cost_scale(run->tr), trial;
+  double scale = cav_programme_scale(run->tr), trial;
   cav_status status = CAV_OK;
   for (int i = 0; i < LEAP_BOXES && !*taken; i++) {
     set_radius(run->tr, d->radius, leap_box[i]);
     status = solve_model(run, d);
     if (status != CAV_OK) return status;
-    d->merit = merit_of(run->tr, cav_quadratic_penalty(d->qp), d->before);
+    d->merit = cav_programme_merit(run->tr, cav_quadratic_penalty(d->qp), d->before);
     d->predicted = cav_quadratic_decrease(d->qp);
     cav_course_begin(&d->course, run->tr);
     status = try_step(run, d, 1, d->predicted, &trial);
