@@ -85,6 +85,15 @@ static void check_starts(const char *problem) {
   CHECK(cav_study_solve("/nowhere.xml", NULL, &run[0], reason, &error) == CAV_BAD_INPUT);
 }
 
+// a cycle that mirrors needs a model that is its own image, masses and all
+static void check_mirrored(const char *problem) {
+  cav_study_run run = {.start = 1};
+  char reason[480];
+  cav_error error = {0};
+  CHECK(cav_study_solve(problem, NULL, &run, reason, &error) == CAV_OK && run.known);
+  CHECK(run.certified);
+}
+
 static const char *read_file(const char *folder, const char *name) {
   static char text[20000];
   char *path = cav_result_path(folder, name);
@@ -130,6 +139,7 @@ int main(void) {
   scene_write(top, "swing.xml", swing);
   snprintf(problem, sizeof problem, "%s/swing.xml", top);
   check_starts(problem);
+  check_mirrored(CAVORT_SOURCE_ROOT "/problems/motions/walker-walk/problem.xml");
   check_command(problem);
   snprintf(command, sizeof command, "rm -r '%s'", top);
   CHECK(system(command) == 0);

@@ -76,6 +76,8 @@ static cav_status perturb(cav_problem *p, int start) {
   double *scale = malloc((size_t)m->nlink * sizeof *scale);
   if (!scale) return CAV_NO_MEMORY;
   for (int i = 0; i < m->nlink; i++) scale[i] = 1 + mass_noise * cav_random_uniform(&seed);
+  // a cycle that mirrors needs a model that is its own image: all masses by one factor
+  for (int i = 1; i < m->nlink && p->cycle.mirror != CAV_MIRROR_NONE; i++) scale[i] = scale[0];
   double fraction = 0.5 * (1 + cav_random_uniform(&seed));
   cav_status status = cav_model_perturb(m, scale, least_friction + fraction * (most_friction - least_friction));
   free(scale);
