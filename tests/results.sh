@@ -152,7 +152,8 @@ iteration() {
         for (w = 1; w <= 3; w++) { what = w == 1 ? "whole" : w == 2 ? "count" : "linear"
           b = least[motion " " stage " " what " before"]; n = least[motion " " stage " " what " now"]
           line = line sprintf(w == 1 ? "  %21.2f %6.2f %6.3f" : w == 2 ? "  %33.1f %6.1f %6.3f" : "  %22.2f %6.2f %6.3f", b, n, n / b) }
-        print line } }' "$old/times"
+        gsub("nan", "  -", line); print line } }' "$old/times"
+    ! grep -q nan "$old/times" || printf '\n-: no instructions are counted on this machine\n'
   } >"$out/iteration.txt"
 }
 
