@@ -332,20 +332,18 @@ static void test_slip(void) {
   }
 }
 
-// hard terms, each met and each missed by a known amount
-static void test_terms(void) {
-  sample s = sample_new(flying, 25, 0.02, CAV_ORDER_MIDPOINT);
-  fly(&s);
-  int last = 25;
-  const double *end = knot(&s, last), *middle = knot(&s, 13);
-  double place[3] = {end[0], end[1], end[2]}, quat[4] = {-middle[3], -middle[4], -middle[5], -middle[6]};
-  double way[9] = {0, 0, 0, 0, -0.1, 0, 0, -0.2, 0}, times[3] = {0, 0.5, 1};
-  int ball = cav_object_find(s.model, CAV_OBJECT_BODY, "ball");
+// numbers of five hard terms
+typedef struct asked {
+  double place[3], quat[4], way[9], times[3];
+} asked;
+
+// at the end, at an instant between knots 12 and 13 but nearer to 13, along a line, speeds, posture
+static void ask(const sample *s, asked *to, const double *middle, cav_term term[5]) {
+  int ball = cav_object_find(s->model, CAV_OBJECT_BODY, "ball");
   cav_sensor pos = {.name = "", .type = CAV_SENSOR_FRAMEPOS, .object_type = CAV_OBJECT_XBODY, .object = ball, .dim = 3};
   cav_sensor axes = {
       .name = "", .type = CAV_SENSOR_FRAMEQUAT, .object_type = CAV_OBJECT_XBODY, .object = ball, .dim = 4};
-  cav_term term[5] = {
-      // at the end, at an instant between knots 12 and 13 but nearer to 13, along a line, speeds, posture
+  const cav_term all[5] = {
       {.name = "end",
        .use = CAV_USE_EQUAL,
        .sensor = pos,
@@ -353,7 +351,7 @@ static void test_terms(void) {
        .from = 0.5,
        .to = -1,
        .scale = 0.5,
-       .target = place},
+       .target = to->place},
       {.name = "turn",
        .use = CAV_USE_EQUAL,
        .sensor = axes,
@@ -361,7 +359,7 @@ static void test_terms(void) {
        .from = 0.255,
        .to = 0.255,
        .scale = 1,
-       .target = quat},
+       .target = to->quat},
       {.name = "line",
        .use = CAV_USE_EQUAL,
        .sensor = pos,
@@ -369,9 +367,9 @@ static void test_terms(void) {
        .from = 0,
        .to = -1,
        .scale = 1,
-       .target = way,
+       .target = to->way,
        .nwaypoint = 3,
-       .waypoint_time = times},
+       .waypoint_time = to->times},
       {.name = "speed",
        .quantity = CAV_QUANTITY_VELOCITY,
        .use = CAV_USE_RANGE,
@@ -392,28 +390,43 @@ static void test_terms(void) {
        .lower = -0.2,
        .upper = 0.2},
   };
+  memcpy(term, all, sizeof all);
+}
+
+// hard terms, each met and each missed by a known amount
+static void test_terms(void) {
+  sample s = sample_new(flying, 25, 0.02, CAV_ORDER_MIDPOINT);
+  fly(&s);
+  int last = 25;
+  const double *end = knot(&s, last), *middle = knot(&s, 13);
+  asked to = {{end[0], end[1], end[2]},
+              {-middle[3], -middle[4], -middle[5], -middle[6]},
+              {0, 0, 0, 0, -0.1, 0, 0, -0.2, 0},
+              {0, 0.5, 1}};
+  cav_term term[5];
+  ask(&s, &to, middle, term);
   s.problem.term = term;
   s.problem.nterm = 5;
   CHECK(verify(&s, NULL, NULL) == CAV_OK);
   CHECK_NEAR(s.verdict.constraint_violation_max, 0, 1e-12);
   CHECK(s.verdict.certified);
   // each missed
-  place[0] += 0.01;
+  to.place[0] += 0.01;
   CHECK(verify(&s, NULL, NULL) == CAV_OK);
   CHECK_NEAR(s.verdict.constraint_violation_max, 0.02, 1e-11);
   CHECK(!s.verdict.certified && strstr(s.verdict.reason, "end") && strstr(s.verdict.reason, "knot 25"));
-  place[0] -= 0.01;
-  memcpy(quat, knot(&s, 12) + 3, sizeof quat);
+  to.place[0] -= 0.01;
+  memcpy(to.quat, knot(&s, 12) + 3, sizeof to.quat);
   CHECK(verify(&s, NULL, NULL) == CAV_OK);
   // one step of a spin whose largest component is 2 rad/s
   CHECK_NEAR(s.verdict.constraint_violation_max, 2 * 0.02, 1e-11);
   CHECK(strstr(s.verdict.reason, "turn") && strstr(s.verdict.reason, "knot 13"));
-  memcpy(quat, knot(&s, 13) + 3, sizeof quat);
-  way[4] -= 0.03;
+  memcpy(to.quat, knot(&s, 13) + 3, sizeof to.quat);
+  to.way[4] -= 0.03;
   CHECK(verify(&s, NULL, NULL) == CAV_OK);
   CHECK_NEAR(s.verdict.constraint_violation_max, 0.03, 1e-11);
   CHECK(strstr(s.verdict.reason, "line") && strstr(s.verdict.reason, "knot 25"));
-  way[4] += 0.03;
+  to.way[4] += 0.03;
   term[3].upper = 1.5;
   CHECK(verify(&s, NULL, NULL) == CAV_OK);
   CHECK_NEAR(s.verdict.constraint_violation_max, 0.5, 1e-11);
