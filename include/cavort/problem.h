@@ -320,8 +320,8 @@ typedef struct cav_schedule {
   cav_sliding sliding;   ///< law of contacts that slide from three quarters of the way on; before it is the convex one
   cav_solids solids;     ///< how solids of the world begin
   cav_next_gap next_gap; ///< gap after the step that contacts see from half way on; before it is the linear one
-  cav_next_slip next_slip; ///< slip over the step, the same way
-  double optimality;       ///< the last phase may end here: as cav_solve_options.optimality, of which the larger counts
+  cav_next_slip next_slip;       ///< slip over the step, the same way
+  double optimality;             ///< what the last phase may leave to be saved; 0: cav_solve_options.optimality
   cav_stage_options first, last; ///< options of the first and of the last stage
 } cav_schedule;
 

@@ -38,8 +38,8 @@ CAV_API const cav_solver_rule *cav_solver_rule_of(cav_solver solver);
 
 /// One line of progress, and of the log.
 typedef struct cav_progress {
-  const char *phase;   ///< "continuation", "sqp", "multipliers", "restoration", "ipopt", "diagnosis", "recovery",
-                       ///< "feedback"
+  const char *phase;   ///< "continuation", "sqp", "softened", "multipliers", "restoration", "ipopt", "diagnosis",
+                       ///< "recovery", "feedback"
   int stage, stages;   ///< where the phase is, from 1
   double fraction;     ///< of the whole solve that is done, by the stages that are behind it: an estimate
   int iteration;       ///< over the whole solve

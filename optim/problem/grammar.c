@@ -313,7 +313,7 @@ static const cav_xml_element schedule = {
         WORD("sliding", cav_problem_slidings, "coulomb", "law of contacts that slide, from three quarters of the stages on"),
         WORD("next_gap", cav_problem_next_gaps, "linear", "gap after a step that contacts see, from half of the stages on"),
         WORD("next_slip", cav_problem_next_slips, "linear", "slip over a step that contacts see, from half of the stages on"),
-        REAL("optimality", 0, "", "0", "the solve ends where steps gain slowly and one may save no more than this fraction of the cost; below 1e-4: there"),
+        REAL("optimality", 0, "", "0", "the solve ends where steps gain slowly and one may save no more than this fraction of the cost; 0: 5e-4"),
         WORD("solids", cav_problem_solids, "hard", "how the world begins: grow where the guess runs into solids")),
     CHILDREN(&schedule_first, &schedule_last), 0, "continuation from soft, blurred contacts to hard, sharp ones"};
 #define IPOPT(name, type, least, most, strict, words, text) TEXT(#name, "(Ipopt's own, or what the stages set)", text),

@@ -7,8 +7,6 @@
 #include <string.h>
 #include <time.h>
 
-#include "sqp.h"
-
 /// Weights of rows while they are only penalised, at the first stage; they end a hundred times higher. Rows are scaled,
 /// so these serve all models. Ranges are expensive from the start: a motion that leans on a limit, whose force is free,
 /// would have to be found anew where the limit takes it away, and rows of ranges are all but linear, so a high penalty
@@ -153,8 +151,7 @@ static int is_hopeless(const cav_solve_run *run, double fraction, cav_outcome ou
          cav_transcription_unactuated(run->tr, NULL) > hopeless;
 }
 
-/// One stage, at a fraction of the way.
-static cav_status run_stage(cav_solve_run *run, double fraction, cav_outcome *outcome) {
+cav_status cav_stage_run(cav_solve_run *run, double fraction, cav_outcome *outcome) {
   cav_stage_options stage = cav_schedule_at(&run->problem->schedule, fraction);
   cav_stage_set(run->problem, fraction, run->tr);
   run->region.iterations = stage.iterations;
@@ -195,7 +192,7 @@ cav_status cav_continuation_run(cav_solve_run *run) {
     run->checkpoint.retries = retries;
     if (!cav_run_reaches(run, CAV_PLACE_CONTINUATION, &status)) break;
     begin = run->solution->iterations;
-    status = keep(&before, run->at) ? run_stage(run, fraction, &outcome) : CAV_NO_MEMORY;
+    status = keep(&before, run->at) ? cav_stage_run(run, fraction, &outcome) : CAV_NO_MEMORY;
     if (!before) break;
     int again = outcome == CAV_OUTCOME_STALLED && retries < RETRIES && fraction > settled && fraction < 1;
     if (again) outcome = CAV_OUTCOME_AGAIN;
@@ -412,7 +409,7 @@ cav_status cav_recover_feasible(cav_solve_run *run) {
   run->stage = run->stages = 1;
   run->region.radius = 0;
   run->nested = 1;
-  cav_status status = run_stage(run, 1, &outcome);
+  cav_status status = cav_stage_run(run, 1, &outcome);
   if (!cav_run_note(run, 1, begin, outcome)) status = CAV_NO_MEMORY;
   if (status == CAV_OK) status = cav_to_optimum(run);
   run->nested = 0;

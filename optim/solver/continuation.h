@@ -83,9 +83,15 @@ cav_status cav_guess_take(cav_solve_run *run);
 /// Contact law and weights at a fraction of the way from the first to the last stage.
 void cav_stage_set(const cav_problem *problem, double fraction, cav_transcription *transcription);
 
+/// One stage, at a fraction of the way; how it ended.
+cav_status cav_stage_run(cav_solve_run *run, double fraction, cav_outcome *outcome);
+
 /// Stages first to last: softness, activation distance and the penalty on unactuated force go geometrically to their
 /// ends. One that stalls is taken back and reached by a stage half way there.
 cav_status cav_continuation_run(cav_solve_run *run);
+
+/// To an optimum at the last stage's law at which every row holds, from the end of the last stage. optimum.c.
+cav_status cav_to_optimum(cav_solve_run *run);
 
 /// Augmented Lagrangian on all constraint rows, at the last stage's law, until they nearly hold.
 cav_status cav_augmented_lagrangian(cav_solve_run *run);

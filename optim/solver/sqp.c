@@ -19,8 +19,8 @@
 #include "curvature.h"
 #include "programme.h"
 
-/// Iterations; programmes for a linearisation; corrections of a step.
-enum { ITERATIONS = 250, ATTEMPTS = 20, CORRECTIONS = 16, SETTLING = 20 };
+/// Iterations at a softer law on the way; programmes for a linearisation; corrections of a step.
+enum { SOFT_ITERATIONS = 40, ATTEMPTS = 20, CORRECTIONS = 16, SETTLING = 20 };
 
 /// Boxes at the start and at most (rad, m, log of the step), and where they are too small to go on.
 static const double first_radius = 0.1, most_radius = 0.7, least_radius = 1e-7;
@@ -38,9 +38,13 @@ static const double gauss_newton = 1e-4;
 enum { FEW = 3 };
 
 /// Iterations between two looks at what there is to be saved, and looks in a row that end a run; part of it that a step
-/// gains where progress is not slow.
+/// gains where progress is not slow, and where it is so slow that a run is stuck: that is its end too, where what is left
+/// is no more than so many times what is asked for.
 enum { LOOK = 5, LOOKS = 2 };
-static const double brisk = 0.5;
+static const double brisk = 0.5, sluggish = 0.03, left_alone = 2;
+
+/// What may be left to be saved on the way, a fraction of the cost.
+static const double soft_optimality = 2e-3;
 
 /// What is optimal, as a fraction of the cost. Where it is not: steps across jumps of the merit, the boxes they are
 /// tried in, and what they may lose.
@@ -102,6 +106,7 @@ typedef struct descent {
   double *need;     ///< [nknot] what those of one knot would have to cost; 0: nothing, or they do
   int needs_known;
   double gain;                   ///< decrease of the step that was taken
+  double asked;                  ///< what may be left to be saved, of the cost
   cav_trajectory *second, *best; ///< corrected trial; best of those tried
   cav_trajectory *held;          ///< last motion whose rows held; NULL: none did
   double held_cost;
@@ -551,19 +556,20 @@ static cav_status foresee(cav_solve_run *run, descent *d, double *saving) {
 
 /// Slow progress where there is little to be saved: how often in a row that was so.
 typedef struct tail {
-  int iterations, met; ///< since the last look; looks in a row that saw the end
-  double gain;         ///< of these iterations, of the cost
+  int iterations, met, stuck; ///< since the last look; looks in a row that saw the end, or next to no progress
+  double gain, saving;        ///< of these iterations, of the cost; what the last look found
 } tail;
 
 /// Looks, every few iterations that gain little.
 static cav_status look(cav_solve_run *run, descent *d, tail *end) {
-  double asked = fmax(run->options->optimality, run->problem->schedule.optimality), saving = INFINITY;
+  end->saving = INFINITY;
   end->gain += d->gain / cav_programme_scale(run->tr);
   if (++end->iterations < LOOK) return CAV_OK;
   double gain = end->gain / end->iterations;
   end->iterations = 0, end->gain = 0;
-  cav_status status = gain < asked ? foresee(run, d, &saving) : CAV_OK;
-  end->met = saving <= asked && gain < brisk * saving ? end->met + 1 : 0;
+  cav_status status = gain < d->asked ? foresee(run, d, &end->saving) : CAV_OK;
+  end->met = end->saving <= d->asked && gain < brisk * end->saving ? end->met + 1 : 0;
+  end->stuck = isfinite(end->saving) && gain < sluggish * end->saving ? end->stuck + 1 : 0;
   return status;
 }
 
@@ -587,12 +593,13 @@ static cav_status go_back(cav_solve_run *run, descent *d) {
   return status == CAV_OK ? settle_rows(run, d) : status;
 }
 
-/// Iterations to where no step gains, *settled 1, or what one may gain is little and is slow to come, 2; or 0.
+/// Iterations to where no step gains, 1, what one may gain is little and is slow to come, 2, or is more and hardly
+/// comes, 3; or 0.
 static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled) {
   int calm = 0, taken = 1;
   tail end = {0};
   cav_status status = CAV_OK;
-  for (; *left > 0 && calm < PATIENCE && end.met < LOOKS; --*left) {
+  for (; *left > 0 && calm < PATIENCE && end.met < LOOKS && end.stuck < LOOKS; --*left) {
     status = model(run, d, 0);
     if (status == CAV_OK) status = iterate(run, d, &taken);
     if (status != CAV_OK || !taken) break;
@@ -601,7 +608,8 @@ static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled
     if (status == CAV_OK) status = hold(run, d);
     if (status == CAV_OK) status = look(run, d, &end);
   }
-  *settled = end.met >= LOOKS ? 2 : !taken || calm >= PATIENCE;
+  int stuck = end.stuck >= LOOKS, little = end.met >= LOOKS || (stuck && end.saving <= left_alone * d->asked);
+  *settled = little ? 2 : stuck ? 3 : !taken || calm >= PATIENCE;
   if (status == CAV_OK) status = settle_rows(run, d);
   return status == CAV_OK ? go_back(run, d) : status;
 }
@@ -628,15 +636,16 @@ static cav_status leap(cav_solve_run *run, descent *d, int *taken) {
   return CAV_OK;
 }
 
-/// Iterations to the end. Where they end before the motion is optimal a jump of the merit holds them: a contact comes
-/// or goes there. Steps across are tried, and the best of the ends is kept. *settled: whether that is one.
-static cav_status descend(cav_solve_run *run, descent *d, int *settled) {
-  int left = ITERATIONS, taken = 1, ended;
+/// Iterations to the end, so many at most. Where they end before the motion is optimal a jump of the merit holds them: a
+/// contact comes or goes there. Steps across are tried, and the best of the ends is kept. *settled: how the last of them
+/// ended, as in settle.
+static cav_status descend(cav_solve_run *run, descent *d, int *left, int *settled) {
+  int taken = 1, ended;
   cav_trajectory *best = NULL;
   double cost = INFINITY;
   cav_status status = CAV_OK;
   for (int i = 0; taken && status == CAV_OK; i++) {
-    status = settle(run, d, &left, &ended);
+    status = settle(run, d, left, &ended);
     if (status != CAV_OK) break;
     double reached = cav_run_met(run) ? cav_transcription_cost(run->tr) : INFINITY;
     if (i == 0 && !cav_run_met(run)) break;
@@ -647,29 +656,30 @@ static cav_status descend(cav_solve_run *run, descent *d, int *settled) {
       break;
     }
     cost = reached;
-    *settled = ended != 0;
+    *settled = ended;
     cav_trajectory_free(best);
     best = cav_trajectory_copy(run->at);
-    status = best ? measure(run, d, ended != 2) : CAV_NO_MEMORY;
-    if (status != CAV_OK || ended == 2 || run->optimality < optimal || i == LEAPS || left <= 0) break;
+    status = best ? measure(run, d, ended < 2) : CAV_NO_MEMORY;
+    if (status != CAV_OK || ended >= 2 || run->optimality < optimal || i == LEAPS || *left <= 0) break;
     status = leap(run, d, &taken);
   }
   cav_trajectory_free(best);
   return status;
 }
 
-cav_status cav_sqp(cav_solve_run *run) {
+/// A run of so many iterations at most, to what may be left to be saved; noted at a fraction of the way. soft: on the way,
+/// where rows need not come in.
+static cav_status run_of(cav_solve_run *run, int *left, double asked, double fraction, int soft, int *stuck) {
   descent d;
   int first = run->solution->iterations, settled = 0;
   cav_penalties kept = run->tr->penalty;
-  run->phase = "sqp";
-  run->stage = run->stages = 1;
   cav_trajectory *entry = cav_trajectory_copy(run->at);
   if (!entry) return CAV_NO_MEMORY;
   cav_status status = descent_new(&d, run) ? cav_transcription_values(run->tr, run->at) : CAV_NO_MEMORY;
+  d.asked = asked;
   if (status == CAV_OK) begin(run, &d);
   run->measured = 0;
-  if (status == CAV_OK) status = descend(run, &d, &settled);
+  if (status == CAV_OK) status = descend(run, &d, left, &settled);
   run->tr->penalty = kept;
   if (status == CAV_OK) status = cav_transcription_values(run->tr, run->at);
   int met = status == CAV_OK && cav_run_met(run);
@@ -677,14 +687,34 @@ cav_status cav_sqp(cav_solve_run *run) {
                         : !met           ? CAV_OUTCOME_STALLED
                         : settled        ? CAV_OUTCOME_SETTLED
                                          : CAV_OUTCOME_LIMIT;
-  if (!cav_run_note(run, 1, first, outcome)) status = CAV_NO_MEMORY;
-  if (status == CAV_OK && !met) {
+  *stuck = met && settled == 3;
+  if (!cav_run_note(run, fraction, first, outcome)) status = CAV_NO_MEMORY;
+  if (status == CAV_OK && !met && !soft) {
     exchange(&run->at, &entry);
     status = cav_transcription_values(run->tr, run->at);
     if (status == CAV_OK) status = CAV_NOT_CONVERGED;
   }
   cav_trajectory_free(entry);
   descent_free(&d);
+  return status;
+}
+
+/// What may be left to be saved at the end: the problem says so, or the options, unless these go on to the last.
+static double asked_for(const cav_solve_run *run) {
+  double stated = run->problem->schedule.optimality;
+  return stated > 0 && run->options->optimality > 0 ? stated : run->options->optimality;
+}
+
+cav_status cav_sqp(cav_solve_run *run, int *left, int *stuck) {
+  run->phase = "sqp";
+  run->stage = run->stages = 1;
+  return run_of(run, left, asked_for(run), 1, 0, stuck);
+}
+
+cav_status cav_sqp_on_the_way(cav_solve_run *run, double fraction, int *left) {
+  int stuck, most = *left < SOFT_ITERATIONS ? *left : SOFT_ITERATIONS, rest = most;
+  cav_status status = run_of(run, &rest, soft_optimality, fraction, 1, &stuck);
+  *left -= most - rest;
   return status;
 }
 
@@ -699,20 +729,4 @@ cav_status cav_sqp_measure(cav_solve_run *run) {
   run->tr->penalty = kept;
   descent_free(&d);
   return status;
-}
-
-cav_status cav_to_optimum(cav_solve_run *run) {
-  // of a checkpoint the law is what it was
-  if (!run->resume || run->resume->place == CAV_PLACE_CONTINUATION) cav_stage_set(run->problem, 1, run->tr);
-  cav_status status = CAV_NOT_CONVERGED;
-  if (cav_run_reaches(run, CAV_PLACE_SQP, &status)) status = cav_sqp(run);
-  if (status != CAV_NOT_CONVERGED) return status;
-  // the augmented Lagrangian brings rows in from further away
-  status = cav_augmented_lagrangian(run);
-  if (status == CAV_OK && cav_run_reaches(run, CAV_PLACE_RESTORATION, &status)) status = cav_restore(run);
-  if (status == CAV_OK && cav_run_reaches(run, CAV_PLACE_SQP_AGAIN, &status))
-    status = cav_sqp(run);
-  else
-    return status;
-  return status == CAV_NOT_CONVERGED ? CAV_OK : status;
 }

@@ -1,0 +1,83 @@
+/// The end of a solve: from the last stage of the continuation to an optimum at its law, by way of the augmented Lagrangian
+/// and restoration where rows do not come in, and by way of softer laws where steps are stuck.
+#include "continuation.h"
+#include "sqp.h"
+
+/// Iterations of the last phase in all.
+enum { ITERATIONS = 250 };
+
+/// Fractions of the way that a motion which is stuck goes back to, one after the other.
+static const double softer[] = {0.6, 0.8};
+enum { SOFTENINGS = sizeof softer / sizeof *softer };
+
+static void exchange(cav_trajectory **a, cav_trajectory **b) {
+  cav_trajectory *kept = *a;
+  *a = *b;
+  *b = kept;
+}
+
+/// Through the law at a fraction of the way, to its optimum nearly, and all stages after it.
+static cav_status soften(cav_solve_run *run, double law, int *left) {
+  int stages = run->problem->schedule.stages, first = 0;
+  cav_status status = CAV_OK;
+  cav_outcome outcome;
+  while (first < stages - 1 && first < law * (stages - 1) - 1e-9) first++;
+  run->phase = "softened";
+  run->stages = stages;
+  run->region.radius = 0;
+  for (int i = first; i < stages && status == CAV_OK; i++) {
+    double fraction = (double)i / (stages - 1);
+    int begin = run->solution->iterations;
+    run->stage = i + 1;
+    status = cav_stage_run(run, fraction, &outcome);
+    if (!cav_run_note(run, fraction, begin, outcome)) status = CAV_NO_MEMORY;
+    if (status == CAV_OK && outcome == CAV_OUTCOME_STALLED) run->region.radius = 0;
+    if (status == CAV_OK && i == first) status = cav_sqp_on_the_way(run, fraction, left);
+  }
+  cav_stage_set(run->problem, 1, run->tr);
+  return status;
+}
+
+/// The last phase again by way of a softer law. Where that ends dearer, back to where it was, still stuck.
+static cav_status try_softer(cav_solve_run *run, double law, int *left, int *stuck) {
+  double cost = cav_transcription_cost(run->tr);
+  cav_trajectory *before = cav_trajectory_copy(run->at);
+  if (!before) return CAV_NO_MEMORY;
+  cav_status status = soften(run, law, left);
+  if (status == CAV_OK) status = cav_sqp(run, left, stuck);
+  int dearer = status == CAV_OK && cav_transcription_cost(run->tr) >= cost;
+  if (dearer || status == CAV_NOT_CONVERGED) {
+    exchange(&run->at, &before);
+    *stuck = 1;
+    status = cav_transcription_values(run->tr, run->at);
+    if (status == CAV_OK) status = cav_sqp_measure(run);
+  }
+  cav_trajectory_free(before);
+  return status;
+}
+
+/// The last phase, and where its steps are stuck once more by way of softer laws, unless it is all that there is.
+static cav_status descend(cav_solve_run *run) {
+  int left = ITERATIONS, stuck, stages = run->problem->schedule.stages,
+      alone = stages < 2 || run->options->first_stage > stages;
+  cav_status status = cav_sqp(run, &left, &stuck);
+  for (int i = 0; i < SOFTENINGS && status == CAV_OK && stuck && left > 0 && !alone; i++)
+    status = try_softer(run, softer[i], &left, &stuck);
+  return status;
+}
+
+cav_status cav_to_optimum(cav_solve_run *run) {
+  // of a checkpoint the law is what it was
+  if (!run->resume || run->resume->place == CAV_PLACE_CONTINUATION) cav_stage_set(run->problem, 1, run->tr);
+  cav_status status = CAV_NOT_CONVERGED;
+  if (cav_run_reaches(run, CAV_PLACE_SQP, &status)) status = descend(run);
+  if (status != CAV_NOT_CONVERGED) return status;
+  // the augmented Lagrangian brings rows in from further away
+  status = cav_augmented_lagrangian(run);
+  if (status == CAV_OK && cav_run_reaches(run, CAV_PLACE_RESTORATION, &status)) status = cav_restore(run);
+  if (status == CAV_OK && cav_run_reaches(run, CAV_PLACE_SQP_AGAIN, &status))
+    status = descend(run);
+  else
+    return status;
+  return status == CAV_NOT_CONVERGED ? CAV_OK : status;
+}
