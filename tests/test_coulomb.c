@@ -431,6 +431,59 @@ static void test_piles(void) {
   cav_model_free(m);
 }
 
+// steps in a row of boxes that slide and come to rest, from v and from what the last step did, under both laws: the same
+// motion, in fewer iterations
+static void test_guess(void) {
+  enum { HIGH = 3, STEPS = 200 };
+  cav_model *m = scene_load(
+      "<mujoco><option timestep='.002'/><worldbody><geom type='plane' size='9 9 1'/>"
+      "<body pos='0 0 .1'><freejoint/><geom type='box' size='.1 .1 .1' mass='1'/></body>"
+      "<body pos='0 0 .2999'><freejoint/><geom type='box' size='.1 .1 .1' mass='1'/></body>"
+      "<body pos='0 0 .4998'><freejoint/><geom type='box' size='.1 .1 .1' mass='1'/></body>"
+      "</worldbody></mujoco>");
+  cav_state *s = m ? cav_state_new(m) : NULL;
+  if (!CHECK(s != NULL)) return;
+  const int nv = m->nv;
+  double *at = scene_vector(m->nq), *speed = scene_vector(nv), *found = scene_vector(nv), *a = scene_vector(nv),
+         *alone = scene_vector(nv), *none = scene_vector(nv);
+  s->options.stabilisation = CAV_STABILISATION_DISCRETE;
+  s->options.softness = 1e-2;
+  for (int coulomb = 0; coulomb < 2; coulomb++) {
+    s->options.sliding = coulomb ? CAV_SLIDING_COULOMB : CAV_SLIDING_CONVEX;
+    double worst = 0;
+    int guessed = 0, cold = 0;
+    memcpy(at, m->q0, (size_t)m->nq * sizeof *at);
+    for (int d = 0; d < nv; d++) speed[d] = a[d] = none[d] = 0;
+    for (int box = 0; box < HIGH; box++) speed[6 * box] = 0.3 * (box + 1), speed[6 * box + 1] = 0.1;
+    for (int k = 0; k < STEPS; k++) {
+      cav_forward_report report = {0};
+      CHECK(cav_forward_newton(m, s, at, speed, none, 500, 1e-11, alone, &report) == CAV_OK);
+      cold += report.iterations;
+      for (int d = 0; d < nv; d++) found[d] = speed[d] + a[d];
+      CHECK(cav_forward_newton_from(m, s, at, speed, none, found, 500, 1e-11, found, &report) == CAV_OK);
+      guessed += report.iterations;
+      for (int d = 0; d < nv; d++) worst = fmax(worst, fabs(found[d] - alone[d])), a[d] = found[d] - speed[d];
+      // no guess is the same call
+      CHECK(cav_forward_newton_from(m, s, at, speed, none, NULL, 500, 1e-11, found, NULL) == CAV_OK);
+      CHECK(!memcmp(found, alone, (size_t)nv * sizeof *found));
+      // one that is far off leads to the same step
+      if (k % 50 == 0) {
+        for (int d = 0; d < nv; d++) found[d] = 20 * scene_uniform();
+        CHECK(cav_forward_newton_from(m, s, at, speed, none, found, 500, 1e-11, found, NULL) == CAV_OK);
+        for (int d = 0; d < nv; d++) worst = fmax(worst, fabs(found[d] - alone[d]));
+      }
+      cav_integrate(m, at, alone, m->timestep, at);
+      memcpy(speed, alone, (size_t)nv * sizeof *speed);
+    }
+    printf("%s boxes, step after step: %d iterations from v, %d from the last step's change, %.1e m/s apart\n",
+           coulomb ? "Coulomb's" : "convex", cold, guessed, worst);
+    CHECK(worst <= 1e-10 && 3 * guessed < 2 * cold);
+  }
+  free(at), free(speed), free(found), free(a), free(alone), free(none);
+  cav_state_free(s);
+  cav_model_free(m);
+}
+
 int main(void) {
   test_conditions();
   test_derivatives();
@@ -441,5 +494,6 @@ int main(void) {
   test_swing();
   test_controls();
   test_piles();
+  test_guess();
   return check_result();
 }

@@ -17,17 +17,17 @@ static const char problem_text[] =
 
 static int steps;
 
-cav_status __real_cav_forward_newton(const cav_model *model, cav_state *state, const double *q, const double *v,
-                                     const double *u, int iterations, double tolerance, double *v_next,
-                                     cav_forward_report *report);
-cav_status __wrap_cav_forward_newton(const cav_model *model, cav_state *state, const double *q, const double *v,
-                                     const double *u, int iterations, double tolerance, double *v_next,
-                                     cav_forward_report *report);
-cav_status __wrap_cav_forward_newton(const cav_model *model, cav_state *state, const double *q, const double *v,
-                                     const double *u, int iterations, double tolerance, double *v_next,
-                                     cav_forward_report *report) {
+cav_status __real_cav_forward_newton_from(const cav_model *model, cav_state *state, const double *q, const double *v,
+                                          const double *u, const double *guess, int iterations, double tolerance,
+                                          double *v_next, cav_forward_report *report);
+cav_status __wrap_cav_forward_newton_from(const cav_model *model, cav_state *state, const double *q, const double *v,
+                                          const double *u, const double *guess, int iterations, double tolerance,
+                                          double *v_next, cav_forward_report *report);
+cav_status __wrap_cav_forward_newton_from(const cav_model *model, cav_state *state, const double *q, const double *v,
+                                          const double *u, const double *guess, int iterations, double tolerance,
+                                          double *v_next, cav_forward_report *report) {
   steps++;
-  return __real_cav_forward_newton(model, state, q, v, u, iterations, tolerance, v_next, report);
+  return __real_cav_forward_newton_from(model, state, q, v, u, guess, iterations, tolerance, v_next, report);
 }
 
 /// Verifies both ways; whether loops were taken as known.

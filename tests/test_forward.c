@@ -668,6 +668,9 @@ static void test_inputs(void) {
   b.q[0] = NAN;
   CHECK(cav_forward(b.model, b.state, b.q, b.v, b.u, b.v_next) == CAV_NOT_FINITE && b.v_next[0] == 42.0);
   b.q[0] = 0.0;
+  b.other[0] = NAN;
+  CHECK(cav_forward_newton_from(b.model, b.state, b.q, b.v, b.u, b.other, 9, 1e-9, b.v_next, NULL) == CAV_NOT_FINITE &&
+        b.v_next[0] == 42.0);
   CHECK(cav_forward_newton(b.model, b.state, b.q, b.v, b.u, -1, 0.0, b.v_next, NULL) == CAV_BAD_INPUT);
   CHECK(cav_forward_newton(b.model, b.state, b.q, b.v, b.u, 10, NAN, b.v_next, NULL) == CAV_BAD_INPUT);
   CHECK(cav_forward_gpgs(b.model, b.state, b.q, b.v, b.u, 10, -1.0, b.v_next, NULL) == CAV_BAD_INPUT);

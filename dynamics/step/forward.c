@@ -129,11 +129,29 @@ static int is_stiff(const cav_state *state) {
   return o->stabilisation == CAV_STABILISATION_DISCRETE && o->softness < STIFF && !(o->smoothing > 0.0);
 }
 
-cav_status cav_forward_newton(const cav_model *model, cav_state *state, const double *q, const double *v,
-                              const double *u, int iterations, double tolerance, double *v_next,
-                              cav_forward_report *report) {
+// from a guess, or from v. Where the problem is not convex, Newton on the inverse begins at the guess itself
+static cav_status begin(cav_newton *s, const double *guess, double tolerance) {
+  const cav_state *state = s->problem.state;
+  const int stiff = is_stiff(state) && s->problem.nrow > 0;
+  if (stiff) return approach(s, tolerance);
+  if (guess && !cav_takes_mean(state)) {
+    if (cav_newton_is_convex(state) || s->problem.nrow == 0) {
+      s->begin = guess;
+    } else {
+      copy(s->x, guess, s->problem.nv);
+      const cav_status status = cav_newton_iterate(s, 1, tolerance);
+      if (status == CAV_OK || status == CAV_NO_MEMORY) return status;
+    }
+  }
+  return cav_newton_iterate(s, 0, tolerance);
+}
+
+cav_status cav_forward_newton_from(const cav_model *model, cav_state *state, const double *q, const double *v,
+                                   const double *u, const double *guess, int iterations, double tolerance,
+                                   double *v_next, cav_forward_report *report) {
   if (iterations < 0 || !(tolerance >= 0.0)) return CAV_BAD_INPUT;
   if (!all_finite(u, model->nv) || !all_finite(v, model->nv)) return CAV_NOT_FINITE;
+  if (guess && !all_finite(guess, model->nv)) return CAV_NOT_FINITE;
   // where nothing moves there is no step to look for
   if (model->nv == 0) {
     if (report) *report = (cav_forward_report){0};
@@ -142,8 +160,7 @@ cav_status cav_forward_newton(const cav_model *model, cav_state *state, const do
   cav_newton s = {.q = q, .v = v, .u = u, .limit = iterations, .most = INFINITY};
   cav_status status = cav_newton_prepare(&s, model, state);
   if (status != CAV_OK) return status;
-  const int stiff = is_stiff(state) && s.problem.nrow > 0;
-  status = stiff ? approach(&s, tolerance) : cav_newton_iterate(&s, 0, tolerance);
+  status = begin(&s, guess, tolerance);
   if (status == CAV_NOT_CONVERGED && s.problem.excess) status = follow_ahead(&s, tolerance);
   if (status == CAV_NOT_CONVERGED && cav_takes_mean(state)) status = turn_back(&s, tolerance);
   if (has_path(state) && (status == CAV_NOT_CONVERGED || (status == CAV_OK && s.sign < 0)))
@@ -155,6 +172,12 @@ cav_status cav_forward_newton(const cav_model *model, cav_state *state, const do
                                    .residual = cav_newton_residual(&s),
                                    .folded = s.sign < 0 && (status == CAV_OK || has_path(state))};
   return status;
+}
+
+cav_status cav_forward_newton(const cav_model *model, cav_state *state, const double *q, const double *v,
+                              const double *u, int iterations, double tolerance, double *v_next,
+                              cav_forward_report *report) {
+  return cav_forward_newton_from(model, state, q, v, u, NULL, iterations, tolerance, v_next, report);
 }
 
 int cav_forward_limit(const cav_state *state) {

@@ -325,8 +325,8 @@ cav_status cav_newton_iterate(cav_newton *s, int go_on, double tolerance) {
   // bounds of friction or gaps that change need not lower the error at once
   const int patience = changes ? CHANGES : STALLS;
   double least = INFINITY, least_error = INFINITY;
-  int stalls = 0, accepted = 0, polished = 0, held = 1;
-  if (!go_on) copy(s->x, s->v, nv);
+  int stalls = 0, accepted = 0, polished = 0, held = 1, at_best = 0;
+  if (!go_on) copy(s->x, s->begin ? s->begin : s->v, nv);
   for (int pass = go_on;; pass++) {
     if (!accepted) {
       const cav_status status = cav_newton_measure(s);
@@ -334,7 +334,8 @@ cav_status cav_newton_iterate(cav_newton *s, int go_on, double tolerance) {
     }
     if (pass == 1 && !go_on && cav_takes_mean(s->problem.state)) cav_newton_bound_forces(s);
     stalls = cav_newton_residual(s) < 0.99 * least ? 0 : stalls + 1;
-    if (cav_newton_residual(s) < least) {
+    at_best = cav_newton_residual(s) < least;
+    if (at_best) {
       least = cav_newton_residual(s);
       least_error = s->error;
       copy(s->best, s->x, nv);
@@ -343,7 +344,10 @@ cav_status cav_newton_iterate(cav_newton *s, int go_on, double tolerance) {
     // one solve of a system as badly conditioned as a long chain is not at rounding yet
     if (pass > (s->problem.nblock == 0) && s->error <= rounding(s)) {
       // where no force is larger than the error, the least residual is not the least error
-      if (s->error < least_error) copy(s->best, s->x, nv);
+      if (s->error < least_error) {
+        copy(s->best, s->x, nv);
+        at_best = 1;
+      }
       break;
     }
     if (stalls >= patience || s->iterations >= s->limit) break;
@@ -361,12 +365,15 @@ cav_status cav_newton_iterate(cav_newton *s, int go_on, double tolerance) {
       if (pass > 0 && held < CHANGES) held *= 2;
     }
     // held problems may run away where their fixed point repels
+    at_best = 0;
     if (status == CAV_NOT_FINITE && pass > 0) break;
     if (status != CAV_OK) return status;
   }
-  copy(s->x, s->best, nv);
-  const cav_status status = cav_newton_measure(s);
-  if (status != CAV_OK) return status;
+  if (!at_best) {
+    copy(s->x, s->best, nv);
+    const cav_status status = cav_newton_measure(s);
+    if (status != CAV_OK) return status;
+  }
   if (s->scale > s->most) return CAV_NOT_CONVERGED;
   return cav_newton_residual(s) <= tolerance || s->error <= 4.0 * rounding(s) ? CAV_OK : CAV_NOT_CONVERGED;
 }

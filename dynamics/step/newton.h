@@ -20,6 +20,7 @@ typedef struct cav_newton {
   const int *dof;   ///< [ndof]
   cav_hessian *hessian;
   const double *q, *v, *u;
+  const double *begin;     ///< [nv] where the first pass begins, or NULL: at v
   double *y, *f;           ///< [nrow] J x and impulses there
   double *derivative;      ///< [nrow] J d
   double *try_y, *try_f;   ///< [nrow] the same along the line
@@ -113,8 +114,8 @@ void cav_newton_bound_forces(cav_newton *newton);
 /// slides. newton.c.
 cav_status cav_newton_first(cav_newton *newton, int friction, double tolerance);
 
-/// Passes from v, or with go_on from x, until the inverse agrees with u; x is then the best iterate and the state
-/// evaluated there. newton.c.
+/// Passes from where they are to begin, or v, or with go_on from x, until the inverse agrees with u; x is then the best
+/// iterate and the state evaluated there. newton.c.
 cav_status cav_newton_iterate(cav_newton *newton, int go_on, double tolerance);
 
 /// From the convex problem along the curve of solutions to one of the mean velocity, where there is one on it. Of a step that

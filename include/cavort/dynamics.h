@@ -171,6 +171,13 @@ CAV_API cav_status cav_forward_newton(const cav_model *model, cav_state *state, 
                                       const double *u, int iterations, double tolerance, double *v_next,
                                       cav_forward_report *report);
 
+/// cav_forward_newton from a guess of v_next [nv], such as v and the last step's change of it, in the place of v; where Newton
+/// does not come from it to a solution, from v after all. guess NULL, or a step of the mean velocity or with stiff rows: from
+/// v. Where Coulomb's law has more than one solution, guesses may lead to others. v_next may be guess.
+CAV_API cav_status cav_forward_newton_from(const cav_model *model, cav_state *state, const double *q, const double *v,
+                                           const double *u, const double *guess, int iterations, double tolerance,
+                                           double *v_next, cav_forward_report *report);
+
 /// How derivatives are computed.
 typedef enum cav_derivative {
   CAV_DERIVATIVE_FORWARD, ///< staged one-sided differences

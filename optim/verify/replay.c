@@ -43,13 +43,13 @@ static double missed(const cav_verification *verification, cav_state *state, con
   return most / (verification->weight * verification->arm);
 }
 
-// one forward step to next [2*nv], of which the second half is scratch. A step that stopped above the tolerance is
-// checked by the force that it leaves unexplained
+// one forward step to next [2*nv], of which the second half is scratch, from a guess or NULL. A step that stopped above
+// the tolerance is checked by the force that it leaves unexplained
 static cav_status step(const cav_verification *verification, cav_state *state, double tolerance, const double *q,
-                       const double *v, const double *u, double *next) {
+                       const double *v, const double *u, const double *guess, double *next) {
   int nv = verification->model->nv;
-  memcpy(next, v, sizeof(double) * nv);
-  cav_status status = cav_forward_newton(verification->model, state, q, v, u, ITERATIONS, tolerance, next, NULL);
+  cav_status status =
+      cav_forward_newton_from(verification->model, state, q, v, u, guess, ITERATIONS, tolerance, next, NULL);
   if (status == CAV_NOT_CONVERGED && missed(verification, state, q, v, u, next, next + nv) <= poor) return CAV_OK;
   return status;
 }
@@ -65,7 +65,7 @@ cav_status cav_replay_steps(const cav_verification *verification, cav_replay *re
   for (int t = 0; t < verification->rows && status == CAV_OK; t++) {
     const double *v = verification->v + t * nv;
     status = step(verification, verification->state, exact_tolerance, verification->q + t * model->nq, v,
-                  verification->u + t * nv, next);
+                  verification->u + t * nv, NULL, next);
     // a step that stopped far from its solution shows as a large error, one that has none in numbers as one without end
     const int nowhere = status == CAV_NOT_FINITE;
     if (nowhere && isfinite(replay->step_error)) replay->step_error = INFINITY, replay->step_knot = t;
@@ -133,7 +133,7 @@ cav_status cav_replay_open(const cav_verification *verification, cav_replay *rep
     const double *all = motion->u + t * nv;
     cav_actuation(model, verification->state, all, work, NULL);
     for (int d = 0; d < nv; d++) u[d] = verification->deviation[d] > 0 ? all[d] : all[d] - work[d];
-    status = step(verification, verification->state, exact_tolerance, q, v, u, next);
+    status = step(verification, verification->state, exact_tolerance, q, v, u, NULL, next);
     if (status != CAV_OK) break;
     cav_integrate(model, q, next, verification->h, q);
     memcpy(v, next, sizeof(double) * nv);
@@ -318,7 +318,9 @@ typedef struct simulation {
   const cav_disturbance *push; ///< within the next step, or NULL
   const cav_options *law;      ///< claimed, or NULL: the model's own
   cav_state *state;
-  double *q, *v, *dq, *dv, *u, *next, *control, *place;
+  double *q, *v;
+  double *a; ///< mean acceleration of the last step, from which the next is guessed; 0 before the first
+  double *dq, *dv, *u, *next, *control, *place;
 } simulation;
 
 // what a simulation obeys at a step
@@ -330,13 +332,15 @@ static cav_options options_at(const cav_verification *verification, const cav_op
 static cav_status go(const cav_verification *verification, simulation *s, double h, int halvings) {
   const cav_model *model = verification->model;
   s->state->options = options_at(verification, s->law, h);
-  cav_status status = step(verification, s->state, 1e-9, s->q, s->v, s->u, s->next);
+  for (int d = 0; d < model->nv; d++) s->next[d] = s->v[d] + h * s->a[d];
+  cav_status status = step(verification, s->state, 1e-9, s->q, s->v, s->u, s->next, s->next);
   if (status == CAV_NOT_CONVERGED && halvings > 0) {
     status = go(verification, s, h / 2, halvings - 1);
     return status == CAV_OK ? go(verification, s, h / 2, halvings - 1) : status;
   }
   if (status != CAV_OK) return status;
   cav_integrate(model, s->q, s->next, h, s->q);
+  for (int d = 0; d < model->nv; d++) s->a[d] = (s->next[d] - s->v[d]) / h;
   memcpy(s->v, s->next, sizeof(double) * model->nv);
   return CAV_OK;
 }
@@ -400,7 +404,7 @@ static void move_start(const cav_model *model, int start, double *q, double *v) 
   }
 }
 
-// the first step: that of the push where it is known how q, v [n] stand there, else 0
+// the first step: that of the push where it is known how q, v, a [n] stand there, else 0
 static int go_on(const cav_disturbance *push, int at, size_t n, double *q) {
   if (!push || !push->before || !push->before->known) return 0;
   memcpy(q, push->before->x, n * sizeof *q);
@@ -420,24 +424,25 @@ static cav_status closed(const cav_verification *verification, const cav_options
   const cav_disturbance *push = disturbance && disturbance->link ? disturbance : NULL;
   const cav_model *model = verification->model;
   size_t nq = (size_t)model->nq, nv = (size_t)model->nv;
-  double *q = malloc(sizeof(double) * (nq + 6 * nv + (size_t)model->nu + 7 * (size_t)model->nlink));
+  double *q = malloc(sizeof(double) * (nq + 7 * nv + (size_t)model->nu + 7 * (size_t)model->nlink));
   cav_state *state = cav_state_new(model);
   cav_trajectory *motion = finer(verification, h);
   cav_status status = q && state && motion ? CAV_OK : CAV_NO_MEMORY;
   *follow = (struct cav_follow){0};
   if (status == CAV_OK) {
     simulation s = {.motion = motion, .gain_q = gain_q, .gain_v = gain_v, .law = law, .state = state};
-    s.q = q, s.v = q + nq;
-    s.dq = s.v + nv, s.dv = s.dq + nv, s.u = s.dv + nv, s.next = s.u + nv, s.control = s.next + 2 * nv;
+    s.q = q, s.v = q + nq, s.a = s.v + nv;
+    s.dq = s.a + nv, s.dv = s.dq + nv, s.u = s.dv + nv, s.next = s.u + nv, s.control = s.next + 2 * nv;
     s.place = s.control + model->nu;
     memcpy(s.q, verification->q, sizeof(double) * nq);
     memcpy(s.v, verification->v, sizeof(double) * nv);
+    memset(s.a, 0, sizeof(double) * nv);
     if (disturbance && disturbance->start) move_start(model, disturbance->start, s.q, s.v);
     const int hit = push ? (int)(push->fraction * (motion->nknot - 1)) : 0;
     int on = 1;
-    for (int i = go_on(push, hit, nq + nv, s.q); i + 1 < motion->nknot && on && status == CAV_OK; i++) {
+    for (int i = go_on(push, hit, nq + 2 * nv, s.q); i + 1 < motion->nknot && on && status == CAV_OK; i++) {
       s.push = push && i == hit ? push : NULL;
-      if (s.push) keep(push, nq + nv, s.q);
+      if (s.push) keep(push, nq + 2 * nv, s.q);
       status = advance(verification, &s, i, follow, &on);
     }
   }

@@ -226,7 +226,7 @@ typedef struct cav_disturbance {
 /// Where a replay stands when an impulse comes: the first finds it, the others go on from there.
 typedef struct cav_before {
   int known;
-  double *x; ///< [nq+nv] q, v
+  double *x; ///< [nq+2*nv] q, v, mean acceleration of the step before
 } cav_before;
 enum { CAV_STARTS = 4 };
 

@@ -442,7 +442,7 @@ static void put_worst_first(int order[4], const double error[4]) {
 static cav_status find_push(const cav_verification *verification, const double *gain_q, const double *gain_v,
                             double *survived) {
   static const double way[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
-  const size_t numbers = (size_t)verification->model->nq + (size_t)verification->model->nv;
+  const size_t numbers = (size_t)verification->model->nq + 2 * (size_t)verification->model->nv;
   cav_before before = {.x = malloc(numbers * sizeof *before.x)};
   cav_disturbance push = {.link = pushed_link(verification), .fraction = 1.0 / 3, .before = &before};
   cav_status status = before.x ? CAV_OK : CAV_NO_MEMORY;
