@@ -1,6 +1,7 @@
 /// Strategies: which are offered to which problem, that a gait is found with the right signs, that taking one changes
 /// guess and schedule alone; and stages of the continuation that stall: taken back, reached half way, noted. Stalls are
 /// made by the linker, which puts a region that claims one in the place of the true one.
+#include "clear.h"
 #include "continuation.h"
 #include "scene.h"
 
@@ -366,6 +367,19 @@ static void test_leap(void) {
   cav_model_free(m);
 }
 
+// clear of the wall, all of the way within the arc, about that time
+static void check_flight(const cav_problem *p, const cav_strategy *flight, double least, double middle) {
+  cav_problem taken;
+  int collides = 1;
+  if (!CHECK(flight && flight->flies)) return;
+  cav_strategy_apply(p, flight, &taken);
+  CHECK(taken.nguess_pose == 2 && taken.guess_pose[0].q == p->q_start && taken.guess_pose[1].q == p->q_goal);
+  CHECK(taken.guess_pose[0].time == taken.guess_from && taken.guess_pose[1].time == taken.guess_to);
+  CHECK(taken.guess_height > least && taken.schedule.solids == CAV_SOLIDS_HARD);
+  CHECK_NEAR((taken.guess_from + taken.guess_to) / 2, middle, 1e-12);
+  CHECK(cav_guess_collides(&taken, &collides) == CAV_OK && !collides);
+}
+
 // a wall in the way: over it with wide steps, then as stated, both with solids that grow, and what they miss is mended first;
 // where the file has no guess the first is the one over it
 static void test_solids(void) {
@@ -384,12 +398,14 @@ static void test_solids(void) {
   cav_problem p = cav_problem_default(m), taken;
   p.q_start = q, p.v_start = v, p.q_goal = goal;
   CHECK(offers(&p,
-               "stated near-1 near-2 solids repair-1 repair-2 repair-3 repair-4 soft hold slow momentum open longer"));
+               "stated near-1 near-2 solids flight repair-1 repair-2 repair-3 repair-4 soft hold slow momentum open "
+               "longer"));
   cav_strategy strategy[CAV_STRATEGIES];
   int n;
   CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK && !strategy[0].stated);
   for (int i = 0; i < n; i++)
-    CHECK(strategy[i].use == CAV_STRATEGY_NEAR || strategy[i].schedule.solids == CAV_SOLIDS_GROW);
+    CHECK(strategy[i].use == CAV_STRATEGY_NEAR || strategy[i].flies || strategy[i].schedule.solids == CAV_SOLIDS_GROW);
+  check_flight(&p, find(strategy, n, "flight"), 0.3, p.duration / 2);
   cav_strategy_apply(&p, &strategy[0], &taken);
   CHECK(taken.nswing == 4 && taken.swing[0].amplitude * taken.swing[0].amplitude > 0.1);
   p.guess_rotation[2] = 0.1;
@@ -400,6 +416,11 @@ static void test_solids(void) {
   cav_strategy_apply(&p, find(strategy, n, "step"), &taken);
   CHECK(taken.nswing == 4 && taken.schedule.solids == CAV_SOLIDS_GROW);
   p.guess_rotation[2] = 0;
+  // an arc that is stated says that it flies, at its time, as high as it takes
+  p.guess_height = 0.1, p.guess_from = 0.5, p.guess_to = 0.9;
+  CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK && !strcmp(strategy[3].name, "flight"));
+  check_flight(&p, &strategy[3], 0.3, 0.7);
+  p.guess_height = 0;
   // where it stops before the wall nothing is in the way
   goal[0] -= 0.8;
   CHECK(offers(&p, "stated near-1 near-2 soft hold slow momentum repair-1 repair-2 repair-3 repair-4 open longer"));

@@ -315,7 +315,7 @@ CAV_API const cav_options *cav_optimiser_contact(const cav_optimiser *optimiser)
 CAV_API const double *cav_optimiser_multipliers(cav_optimiser *optimiser, int *n);
 
 enum {
-  CAV_STRATEGIES = 20,       ///< most strategies of a problem
+  CAV_STRATEGIES = 22,       ///< most strategies of a problem
   CAV_STRATEGY_SWINGS = 4,   ///< most sines of one
   CAV_STRATEGY_CHANGES = 160 ///< room for what a repair changed, in words
 };
@@ -344,6 +344,8 @@ typedef struct cav_strategy {
   int nswing;                           ///< sines over joints of the guess
   cav_swing swing[CAV_STRATEGY_SWINGS]; ///< [nswing]
   double height, from, to;              ///< not stated: of a ballistic arc, m, and when, s
+  int flies;                            ///< 1: start and goal are held before and after that arc
+  cav_guess_pose pose[2];               ///< where it flies
   cav_schedule schedule;                ///< schedule that it takes
   double effort_limit, timestep;        ///< those of the problem where 0
   int open;                             ///< 1: a diagnosis that need not end at rest; 0: one that may last longer

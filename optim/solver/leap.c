@@ -7,11 +7,16 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "clear.h"
 #include "continuation.h"
 #include "math3.h"
 #include "transcription.h"
 
 static const double least_rise = 0.05; // m: less is done by stretching
+
+// Flights: travel and step in height from which there is one, the lowest arc, how much higher the next one is, and how
+// much higher than the first the last, m
+static const double least_travel = 0.3, least_step = 0.1, low = 0.1, higher = 0.05, most = 1;
 
 /// Whether a root can rise by itself: nothing holds it down.
 static int can_rise(const cav_model *m) {
@@ -63,5 +68,52 @@ cav_status cav_leap_find(const cav_problem *problem, double *height, double *fro
   if (*to - time < half / 2) *height = 0;
   cav_state_free(state);
   cav_trajectory_free(way);
+  return status;
+}
+
+/// Whether the first root that can rise is elsewhere at the goal.
+static int is_elsewhere(const cav_problem *p) {
+  const cav_model *m = p->model;
+  double way[3] = {0};
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    int free = joint->type == CAV_JOINT_FREE;
+    if (m->link[joint->link].parent != 0 || (!free && joint->type != CAV_JOINT_SLIDE)) continue;
+    for (int k = 0; k < 3; k++) {
+      if (free) way[k] = p->q_goal[joint->q + k] - p->q_start[joint->q + k];
+      if (!free) way[k] += (p->q_goal[joint->q] - p->q_start[joint->q]) * joint->axis[k];
+    }
+    if (free) break;
+  }
+  return hypot(way[0], way[1]) >= least_travel || fabs(way[2]) >= least_step;
+}
+
+void cav_flight_apply(double height, double from, double to, cav_guess_pose pose[2], cav_problem *taken) {
+  pose[0] = (cav_guess_pose){from, taken->q_start};
+  pose[1] = (cav_guess_pose){to, taken->q_goal};
+  taken->guess = CAV_GUESS_INTERPOLATE;
+  taken->guess_height = height, taken->guess_from = from, taken->guess_to = to;
+  zero3(taken->guess_rotation);
+  taken->nguess_pose = 2, taken->guess_pose = pose;
+  taken->nswing = 0;
+}
+
+cav_status cav_flight_find(const cav_problem *problem, double *height, double *from, double *to) {
+  double g = norm3(problem->model->gravity), middle = problem->duration / 2;
+  int stated = problem->guess_height > 0 && problem->guess_to > problem->guess_from, collides = 1;
+  *height = *from = *to = 0;
+  if (problem->cycle.on || g == 0 || !can_rise(problem->model) || !is_elsewhere(problem)) return CAV_OK;
+  cav_status status = CAV_OK;
+  double first = stated ? problem->guess_height : low, begin = problem->guess_from, end = problem->guess_to, at = first;
+  for (; at <= first + most && !status; at += higher) {
+    if (!stated) begin = middle - sqrt(2 * at / g), end = middle + sqrt(2 * at / g);
+    if (begin <= 0 || end >= problem->duration) return CAV_OK;
+    cav_problem flight = *problem;
+    cav_guess_pose pose[2];
+    cav_flight_apply(at, begin, end, pose, &flight);
+    status = cav_guess_collides(&flight, &collides);
+    if (!collides) break;
+  }
+  if (!status && !collides) *height = at, *from = begin, *to = end;
   return status;
 }

@@ -195,11 +195,24 @@ static cav_strategy over_solids(const cav_strategy *walk) {
   return step;
 }
 
-/// Where the guess runs into solids: over them, then as it is; what they miss is mended before anything else is tried. A file
-/// without a guess is begun over them: the straight way through a solid is nobody's.
+/// Start held, an arc over what stands in between, goal held; none where height is 0.
+static cav_status flight(const cav_problem *problem, cav_strategy *strategy) {
+  for (int k = 0; k < 3; k++)
+    if (problem->guess_rotation[k] != 0) return CAV_OK;
+  cav_status status = cav_flight_find(problem, &strategy->height, &strategy->from, &strategy->to);
+  cav_problem taken = *problem;
+  if (!status && strategy->height > 0)
+    cav_flight_apply(strategy->height, strategy->from, strategy->to, strategy->pose, &taken), strategy->flies = 1;
+  return status;
+}
+
+/// Where the guess runs into solids: by a flight where an arc is stated; over them, then as it is, then by a flight of its
+/// own; what they miss is mended before anything else is tried. A file without a guess is begun over them: the straight
+/// way through a solid is nobody's.
 static void add_grown(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *grown,
-                      const cav_strategy *walk) {
+                      const cav_strategy *walk, const cav_strategy *fly) {
   cav_strategy step = over_solids(walk);
+  if (fly->height > 0 && problem->guess_height > 0) add(strategy, n, fly, "flight", fly->text);
   if (step.nswing && !is_decorated(problem) && problem->guess == CAV_GUESS_INTERPOLATE) {
     step.name = strategy[0].name;
     strategy[0] = step;
@@ -207,6 +220,7 @@ static void add_grown(const cav_problem *problem, cav_strategy *strategy, int *n
     add(strategy, n, &step, "step", step.text);
   }
   add(strategy, n, grown, "solids", "lifted out of the solids that the guess runs into, which grow from soft to hard");
+  if (fly->height > 0 && problem->guess_height <= 0) add(strategy, n, fly, "flight", fly->text);
   add_repairs(strategy, n, grown);
 }
 
@@ -248,8 +262,14 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   cav_strategy walk = plain;
   if (status == CAV_OK && !problem->nswing) status = gait(problem, &walk);
   if (status != CAV_OK) return status;
-  if (collides) add_grown(problem, strategy, n, &stated, &walk);
+  cav_strategy fly = plain;
+  fly.text = "all of the way by an arc clear of solids, start and goal held before and after it";
+  fly.schedule.solids = problem->schedule.solids;
+  status = flight(problem, &fly);
+  if (status != CAV_OK) return status;
+  if (collides) add_grown(problem, strategy, n, &stated, &walk, &fly);
 
+  if (!collides && fly.height > 0 && problem->guess_height > 0) add(strategy, n, &fly, "flight", fly.text);
   cav_strategy soft = stated;
   soft.schedule.first.smoothing *= SOFTER;
   soft.schedule.first.penalty /= CHEAPER;
@@ -317,6 +337,7 @@ void cav_strategy_apply(const cav_problem *problem, const cav_strategy *strategy
   taken->nguess_pose = 0;
   taken->nswing = strategy->nswing;
   taken->swing = (cav_swing *)strategy->swing;
+  if (strategy->flies) taken->nguess_pose = 2, taken->guess_pose = (cav_guess_pose *)strategy->pose;
 }
 
 /// The schedule from where contacts are half hard.
