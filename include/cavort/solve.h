@@ -315,7 +315,7 @@ CAV_API const cav_options *cav_optimiser_contact(const cav_optimiser *optimiser)
 CAV_API const double *cav_optimiser_multipliers(cav_optimiser *optimiser, int *n);
 
 enum {
-  CAV_STRATEGIES = 22,       ///< most strategies of a problem
+  CAV_STRATEGIES = 40,       ///< most strategies of a problem
   CAV_STRATEGY_SWINGS = 4,   ///< most sines of one
   CAV_STRATEGY_CHANGES = 160 ///< room for what a repair changed, in words
 };
@@ -326,8 +326,9 @@ typedef enum cav_strategy_use {
   CAV_STRATEGY_MOMENTUM, ///< where, besides, the balance of momentum is the first condition that one of them misses
   CAV_STRATEGY_REPAIR, ///< where, besides, the best motion of those before misses something that has a usual cure: what
                        ///< to do is known then alone (cav_strategy_repair)
-  CAV_STRATEGY_NEAR, ///< such a repair at once: where one before misses limits alone, by less than half of what planning
-                     ///< keeps, or is certified and misses fewer than half of its targets
+  CAV_STRATEGY_NEAR, ///< such a repair at once, from the motion itself: where one before misses limits alone, by less than
+                     ///< half of what planning keeps, is certified and misses fewer than half of its targets, or obeys
+                     ///< physics and misses little else of a certificate
   CAV_STRATEGY_DIAGNOSIS ///< where none of all succeeds: what it finds is told and not kept, since more was given than
                          ///< asked: a duration free up to twice the stated one, times of windows in proportion
 } cav_strategy_use;

@@ -63,7 +63,8 @@ static cav_status find_stand(const cav_problem_reader *reader, const cav_xml_nod
   cav_status status = cav_stand_find(reader->model, reader->state, q, &stand);
   if (status == CAV_BAD_INPUT)
     return cav_xml_fail(reader->error, node, "key",
-                        "neither the model '%s' nor this file has a keyframe or pose 'stand', and %s",
+                        "neither the model '%s' nor this file has a keyframe or pose 'stand', and %s; without 'key' a "
+                        "posture is that of the model's file, with <joint name= degrees=> inside for single joints",
                         reader->model->name, stand.why);
   if (status)
     cav_xml_fail_as(reader->error, status, node, "key", "a posture that stands cannot be evaluated: %s",

@@ -1,7 +1,7 @@
 /// Arcs that a problem asks for: where a term wants a point or a centre of mass higher at one time than it is on the
-/// straight way from start to goal, what floats has to be thrown there, and a guess that stays on the ground is drawn to
-/// the optimum next to it, which stands still. The arc is ballistic: of the largest rise r that is asked for, it lasts
-/// 2 sqrt(2 r/g) about that time, cut to the horizon.
+/// straight way from start to goal, what floats has to be thrown there, and a guess that stays on the ground is
+/// drawn to the optimum next to it, which stands still. The arc is ballistic: of the largest rise r that is asked
+/// for, it lasts 2 sqrt(2 r/g) about that time, cut to the horizon.
 #include "leap.h"
 
 #include <math.h>
@@ -14,8 +14,8 @@
 
 static const double least_rise = 0.05; // m: less is done by stretching
 
-// Flights: travel and step in height from which there is one, the lowest arc, how much higher the next one is, and how
-// much higher than the first the last, m
+// Flights: travel and step in height from which there is one, the lowest arc (else a quarter of the travel: 45
+// degrees), how much higher the next one is, and how much higher than the first the last, m
 static const double least_travel = 0.3, least_step = 0.1, low = 0.1, higher = 0.05, most = 1;
 
 /// Whether a root can rise by itself: nothing holds it down.
@@ -71,8 +71,8 @@ cav_status cav_leap_find(const cav_problem *problem, double *height, double *fro
   return status;
 }
 
-/// Whether the first root that can rise is elsewhere at the goal.
-static int is_elsewhere(const cav_problem *p) {
+/// How far the first root is from where it starts at the goal, along the ground and in height, m.
+static void find_way(const cav_problem *p, double *along, double *up) {
   const cav_model *m = p->model;
   double way[3] = {0};
   for (int j = 0; j < m->njoint; j++) {
@@ -85,7 +85,7 @@ static int is_elsewhere(const cav_problem *p) {
     }
     if (free) break;
   }
-  return hypot(way[0], way[1]) >= least_travel || fabs(way[2]) >= least_step;
+  *along = hypot(way[0], way[1]), *up = fabs(way[2]);
 }
 
 void cav_flight_apply(double height, double from, double to, cav_guess_pose pose[2], cav_problem *taken) {
@@ -102,9 +102,13 @@ cav_status cav_flight_find(const cav_problem *problem, double *height, double *f
   double g = norm3(problem->model->gravity), middle = problem->duration / 2;
   int stated = problem->guess_height > 0 && problem->guess_to > problem->guess_from, collides = 1;
   *height = *from = *to = 0;
-  if (problem->cycle.on || g == 0 || !can_rise(problem->model) || !is_elsewhere(problem)) return CAV_OK;
+  if (problem->cycle.on || g == 0 || !can_rise(problem->model)) return CAV_OK;
+  double along, up;
+  find_way(problem, &along, &up);
+  if (along < least_travel && up < least_step) return CAV_OK;
   cav_status status = CAV_OK;
-  double first = stated ? problem->guess_height : low, begin = problem->guess_from, end = problem->guess_to, at = first;
+  double first = stated ? problem->guess_height : fmax(low, along / 4), begin = problem->guess_from,
+         end = problem->guess_to, at = first;
   for (; at <= first + most && !status; at += higher) {
     if (!stated) begin = middle - sqrt(2 * at / g), end = middle + sqrt(2 * at / g);
     if (begin <= 0 || end >= problem->duration) return CAV_OK;

@@ -32,9 +32,10 @@ enum { CURES = 3 };
 static const double force_weight = 1, heavier = 10, harder = 4, lighter = 0.04, softer = 6, longer = 2, soft = 0.03,
                     slack = 0.75;
 
-/// What a motion misses first, in the order of a certificate (METHOD.md, 6), and its cures. Forces near a record are what
-/// is looked for: none of them costs anything. A residual beyond its bound is what the model cannot do. What people do on the
-/// edges of their feet is nearer where these may slide, and on softer ground.
+/// What a motion misses first, in the order of a certificate (METHOD.md, 6), most of momentum, slip and hover, and its
+/// cures. Forces near a record are what is looked for: none of them costs anything. A residual beyond its bound is
+/// what the model cannot do. What people do on the edges of their feet is nearer where these may slide, and on softer
+/// ground.
 static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
   static const cure forces[] = {EFFORT, STEP, NONE}, deep[] = {SOFTNESS, STEP, NONE}, between[] = {STEP, NONE},
                     turned[] = {ORDER, STEP, NONE}, slip[] = {SMOOTHING, SLIP, SOFTNESS},
@@ -45,12 +46,15 @@ static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
   if (!cav_verdict_feasible(v)) return cav_problem_has_record(p) ? ground : forces;
   if (v->penetration_max_m > CAV_TOLERANCE_PENETRATION) return deep;
   if (v->penetration_between_m > CAV_TOLERANCE_PENETRATION) return between;
-  if (v->momentum_defect_rms > CAV_TOLERANCE_MOMENTUM) return turned;
+  // of these what is missed by most of its tolerance: what is missed by little is often met once that is mended
+  double momentum = v->momentum_defect_rms / CAV_TOLERANCE_MOMENTUM, slide = v->slip_mean_m_s / CAV_TOLERANCE_SLIP,
+         air = v->hover_fraction / CAV_TOLERANCE_HOVER;
+  if (momentum > 1 && momentum >= fmax(slide, air)) return turned;
   // what is smoothed slides by a part of the smoothing in every step
-  if (v->slip_mean_m_s > CAV_TOLERANCE_SLIP) return slip;
+  if (slide > 1 && slide >= air) return slip;
   // a stated smoothing beyond the usual one is what holds things off the ground
   int blurred = p->schedule.last.smoothing > cav_problem_default(p->model).schedule.last.smoothing;
-  if (v->hover_fraction > CAV_TOLERANCE_HOVER) return blurred ? fades : hover;
+  if (air > 1) return blurred ? fades : hover;
   if (v->replay_step_max_error > CAV_TOLERANCE_STEP) return cav_problem_has_record(p) ? again : fold;
   if (v->residual_fraction_max > v->residual_within) return none;
   return cav_problem_has_record(p) ? near : lost;
@@ -93,7 +97,15 @@ static cav_status weigh_goals(const cav_problem *p, const cav_verdict *v, cav_st
   return status;
 }
 
+/// Whether a repair has added a term of the quantity already: more of it is another cure's work.
+static int is_added(const cav_problem *p, const cav_strategy *s, cav_quantity quantity) {
+  for (int i = p->nterm; i < s->nterm && s->term; i++)
+    if (s->term[i].quantity == quantity) return 1;
+  return 0;
+}
+
 static cav_status weigh_forces(const cav_problem *p, cav_strategy *s) {
+  if (is_added(p, s, CAV_QUANTITY_FORCE)) return CAV_OK;
   cav_term term = {.name = "force", .quantity = CAV_QUANTITY_FORCE, .use = CAV_USE_COST, .component = -1};
   term.to = -1, term.weight = force_weight, term.scale = 1;
   return add_term(p, s, &term);
@@ -101,6 +113,7 @@ static cav_status weigh_forces(const cav_problem *p, cav_strategy *s) {
 
 /// Beside the weight that is there.
 static cav_status weigh_slip(const cav_problem *p, cav_strategy *s) {
+  if (is_added(p, s, CAV_QUANTITY_SLIP)) return CAV_OK;
   for (int i = 0; i < p->nterm; i++) {
     cav_term more = p->term[i];
     if (more.quantity != CAV_QUANTITY_SLIP || !(more.weight > 0)) continue;
@@ -136,7 +149,7 @@ static cav_status change(const cav_problem *p, const cav_verdict *v, cure c, cav
       s->schedule.next_gap = CAV_NEXT_GAP_EXACT;
       break;
     case STEP:
-      s->timestep = (s->timestep > 0 ? s->timestep : p->timestep) / 2;
+      if (s->timestep <= 0) s->timestep = p->timestep / 2;
       break;
     case SOFTNESS:
       s->schedule.last.softness /= harder;

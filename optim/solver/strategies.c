@@ -27,8 +27,9 @@ static const double swing_angle = 0.25, bend_angle = 0.4, pace = 1.2;
 /// Over obstacles limbs swing as much wider and slower.
 static const double wide = 1.6, leisure = 0.6;
 
-/// How much softer and how much slower than stated, and how much longer a diagnosis may last.
-enum { SOFTER = 2, CHEAPER = 10, SLOWER = 2, LONGER = 2, REPAIRS = 4 };
+/// How much softer and how much slower than stated, how much longer a diagnosis may last, how many
+/// repairs there are at the end, and of what is nearly there by the stated guess and by another one.
+enum { SOFTER = 2, CHEAPER = 10, SLOWER = 2, LONGER = 2, REPAIRS = 4, MEND_STATED = 4, MEND = 2 };
 
 /// What the duration of a diagnosis costs, 1/s², so that it is not far from the shortest.
 static const double haste = 100;
@@ -158,11 +159,18 @@ static void add(cav_strategy *strategy, int *n, const cav_strategy *from, const 
 }
 
 // what is nearly there is mended before anything else is tried
-static void add_near(cav_strategy *strategy, int *n, const cav_strategy *stated, const char *one, const char *other) {
+static void add_near(cav_strategy *strategy, int *n, const cav_strategy *stated, int times) {
+  static const char *const name[] = {"near-1",  "near-2",  "near-3",  "near-4",  "near-5",  "near-6",
+                                     "near-7",  "near-8",  "near-9",  "near-10", "near-11", "near-12",
+                                     "near-13", "near-14", "near-15", "near-16"};
   cav_strategy repaired = *stated;
   repaired.use = CAV_STRATEGY_NEAR;
-  add(strategy, n, &repaired, one, "where it is nearly there, with the usual cure of what it misses");
-  add(strategy, n, &repaired, other, "where it is nearly there, with the usual cure of what it misses");
+  size_t before = 0;
+  for (int i = 0; i < *n; i++) before += strategy[i].use == CAV_STRATEGY_NEAR;
+  for (int k = 0; k < times; k++) {
+    assert(before < sizeof name / sizeof *name);
+    add(strategy, n, &repaired, name[before++], "where it is nearly there, with the usual cure of what it misses");
+  }
 }
 
 static void add_repairs(cav_strategy *strategy, int *n, const cav_strategy *stated) {
@@ -206,21 +214,30 @@ static cav_status flight(const cav_problem *problem, cav_strategy *strategy) {
   return status;
 }
 
+/// A strategy, and what mends it where that is nearly there.
+static void add_mended(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *from,
+                       const char *name) {
+  add(strategy, n, from, name, from->text);
+  if (!problem->cycle.on) add_near(strategy, n, from, MEND);
+}
+
 /// Where the guess runs into solids: by a flight where an arc is stated; over them, then as it is, then by a flight of its
 /// own; what they miss is mended before anything else is tried. A file without a guess is begun over them: the straight
 /// way through a solid is nobody's.
 static void add_grown(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *grown,
                       const cav_strategy *walk, const cav_strategy *fly) {
   cav_strategy step = over_solids(walk);
-  if (fly->height > 0 && problem->guess_height > 0) add(strategy, n, fly, "flight", fly->text);
+  if (fly->height > 0 && problem->guess_height > 0) add_mended(problem, strategy, n, fly, "flight");
   if (step.nswing && !is_decorated(problem) && problem->guess == CAV_GUESS_INTERPOLATE) {
     step.name = strategy[0].name;
     strategy[0] = step;
   } else if (step.nswing) {
-    add(strategy, n, &step, "step", step.text);
+    add_mended(problem, strategy, n, &step, "step");
   }
-  add(strategy, n, grown, "solids", "lifted out of the solids that the guess runs into, which grow from soft to hard");
-  if (fly->height > 0 && problem->guess_height <= 0) add(strategy, n, fly, "flight", fly->text);
+  cav_strategy solids = *grown;
+  solids.text = "lifted out of the solids that the guess runs into, which grow from soft to hard";
+  add_mended(problem, strategy, n, &solids, "solids");
+  if (fly->height > 0 && problem->guess_height <= 0) add_mended(problem, strategy, n, fly, "flight");
   add_repairs(strategy, n, grown);
 }
 
@@ -232,12 +249,12 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
     add_repairs(strategy, n, &stated);
     return CAV_OK;
   }
-  if (!problem->cycle.on) add_near(strategy, n, &stated, "near-1", "near-2");
+  if (!problem->cycle.on) add_near(strategy, n, &stated, MEND_STATED);
   if (problem->guess_left && !problem->cycle.on) {
     cav_strategy left = stated;
     left.left = 1;
     add(strategy, n, &left, "left", "postures without the joints that they would have beyond the model's ranges");
-    add_near(strategy, n, &stated, "near-3", "near-4");
+    add_near(strategy, n, &stated, MEND);
   }
 
   if (problem->order == CAV_ORDER_MOMENTUM) {
@@ -260,6 +277,7 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   cav_strategy plain = stated;
   plain.guess = CAV_GUESS_INTERPOLATE, plain.stated = 0;
   cav_strategy walk = plain;
+  walk.text = "from start to goal with the limbs that carry swinging in turn";
   if (status == CAV_OK && !problem->nswing) status = gait(problem, &walk);
   if (status != CAV_OK) return status;
   cav_strategy fly = plain;
@@ -269,20 +287,19 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   if (status != CAV_OK) return status;
   if (collides) add_grown(problem, strategy, n, &stated, &walk, &fly);
 
-  if (!collides && fly.height > 0 && problem->guess_height > 0) add(strategy, n, &fly, "flight", fly.text);
+  if (!collides && fly.height > 0 && problem->guess_height > 0) add_mended(problem, strategy, n, &fly, "flight");
   cav_strategy soft = stated;
   soft.schedule.first.smoothing *= SOFTER;
   soft.schedule.first.penalty /= CHEAPER;
   add(strategy, n, &soft, "soft", "contacts active from twice as far, unactuated force ten times cheaper at first");
 
-  if (walk.nswing && !collides)
-    add(strategy, n, &walk, "swing", "from start to goal with the limbs that carry swinging in turn");
+  if (walk.nswing && !collides) add_mended(problem, strategy, n, &walk, "swing");
 
   cav_strategy leap = plain;
+  leap.text = "straight from start to goal with an arc as high as is asked for";
   status = problem->guess_height != 0 ? CAV_OK : cav_leap_find(problem, &leap.height, &leap.from, &leap.to);
   if (status != CAV_OK) return status;
-  if (leap.height > 0)
-    add(strategy, n, &leap, "leap", "straight from start to goal with an arc as high as is asked for");
+  if (leap.height > 0) add_mended(problem, strategy, n, &leap, "leap");
 
   int decorated = is_decorated(problem);
   if (decorated || problem->guess == CAV_GUESS_HOLD) add(strategy, n, &plain, "line", "straight from start to goal");
@@ -299,6 +316,7 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
     exact.order = CAV_ORDER_MOMENTUM, exact.first_midpoint = 1, exact.use = CAV_STRATEGY_MOMENTUM;
     add(strategy, n, &exact, "momentum", "under the order of momentum, from a motion of the midpoint order");
   }
+  if (!problem->cycle.on) add_near(strategy, n, &stated, MEND);
   if (!problem->cycle.on && !collides) add_repairs(strategy, n, &stated);
   cav_strategy open = stated;
   open.use = CAV_STRATEGY_DIAGNOSIS, open.open = 1;

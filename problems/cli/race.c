@@ -16,6 +16,7 @@
 #include "command.h"
 #include "csv.h"
 #include "file.h"
+#include "rank.h"
 #include "store.h"
 
 // how much more than the cheapest one a motion may cost that is repaired
@@ -24,8 +25,8 @@ static const double dearer = 2;
 // force without an actuator, fraction of the weight, and violation of limits and constraints up to which it nearly keeps them
 static const double nearly = 1e-3;
 
-// times its tolerance up to which what a feasible motion misses of a certificate is little
-static const double few = 4;
+// how often one motion is mended from where it is
+enum { REPAIRS_OF_ONE = 2 };
 
 // part of the duration from which on a knot is near the end
 static const double near_end = 0.75;
@@ -103,19 +104,35 @@ static cav_checkpoint *find_motion(const cav_race *race, int i, const cav_proble
   return NULL;
 }
 
-// where a solve with stages begins: the first one from what was given, one that goes on from the first one's motion, at its own
+// the motion that entry i goes on from; NULL: none is on file, or not of all dofs
+static cav_trajectory *motion_before(const cav_race *race, int i) {
+  const cav_race_entry *of = &race->entry[race->entry[i].from];
+  if (of->solution) return cav_trajectory_copy(of->solution->trajectory);
+  cav_error ignored = {0};
+  char *path = race->folder ? cav_store_checkpoint(race->folder, of->strategy.name) : NULL;
+  cav_checkpoint *c = path ? cav_checkpoint_read(path, race->problem->model, &ignored) : NULL;
+  int whole = c && c->trajectory->nv == race->problem->model->nv && c->place > CAV_PLACE_CONTINUATION;
+  cav_trajectory *motion = whole ? cav_trajectory_copy(c->trajectory) : NULL;
+  cav_checkpoint_free(c);
+  free(path);
+  return motion;
+}
+
+// where a solve with stages begins: the first one from what was given, one that goes on from where it does, at its own
 // step; NULL: from its guess, or no memory
 static cav_trajectory *beginning(const cav_race *race, int i, const cav_problem *taken, cav_status *status) {
-  const cav_trajectory *from = i == 0 ? race->start : NULL;
-  if (race->entry[i].goes_on) from = race->entry[0].solution->trajectory;
   *status = CAV_OK;
-  if (!from) return NULL;
+  int goes_on = race->entry[i].goes_on;
+  if (!goes_on && (i > 0 || !race->start)) return NULL;
+  cav_trajectory *from = goes_on ? motion_before(race, i) : cav_trajectory_copy(race->start);
+  if (!from && !goes_on) *status = CAV_NO_MEMORY;
   // a duration that is free is the motion's own
-  long n = race->entry[i].goes_on ? lround(taken->duration / taken->timestep) : from->nknot - 1;
+  long n = from && goes_on ? lround(taken->duration / taken->timestep) : 0;
+  if (!from || n == 0 || n == from->nknot - 1) return from;
   double step = from->timestep * (from->nknot - 1) / (double)n;
-  cav_trajectory *start =
-      n != from->nknot - 1 ? cav_trajectory_resample(race->problem->model, from, step) : cav_trajectory_copy(from);
+  cav_trajectory *start = cav_trajectory_resample(race->problem->model, from, step);
   if (!start) *status = CAV_NO_MEMORY;
+  cav_trajectory_free(from);
   return start;
 }
 
@@ -275,6 +292,15 @@ static void tell(const cav_race *race, const cav_race_entry *e) {
   if (e->state == CAV_RACE_DONE && e->report.solution)
     fprintf(stderr, ", cost %.4g, %d iterations, %.1f s", e->report.cost, e->report.verdict.iterations,
             e->report.verdict.solve_seconds);
+  // the first clause of what is missed
+  const cav_verdict *v = &e->report.verdict;
+  int misses = e->state == CAV_RACE_DONE && e->report.solution && !cav_race_success(&e->report);
+  const char *colon = strstr(v->reason, ": "), *stop = strstr(v->reason, ". ");
+  size_t first = strlen(v->reason);
+  if (colon) first = (size_t)(colon - v->reason);
+  if (stop && (size_t)(stop - v->reason) < first) first = (size_t)(stop - v->reason);
+  if (misses && first) fprintf(stderr, ": %.*s", (int)first, v->reason);
+  if (misses && !first) fprintf(stderr, ": misses %d of %d targets", v->nmissed, v->ntarget);
   fputc('\n', stderr);
 }
 
@@ -389,35 +415,9 @@ static int misses_momentum(const cav_race_report *report) {
          v->momentum_defect_rms > CAV_TOLERANCE_MOMENTUM;
 }
 
-// whether a is the better motion: the one that is certified and achieves what was asked; of two that are certified
-// alone the cheaper one; otherwise the one that keeps more of the certificate's conditions, in their order; or misses the
-// same one by less
-static int better(const cav_race_report *a, const cav_race_report *b, int cheapest) {
-  const cav_verdict *v = &a->verdict, *w = &b->verdict;
-  const double missed[][3] = {{v->unactuated_force_max, w->unactuated_force_max, CAV_TOLERANCE_UNACTUATED},
-                              {v->limit_violation_max, w->limit_violation_max, CAV_TOLERANCE_LIMIT},
-                              {v->constraint_violation_max, w->constraint_violation_max, CAV_TOLERANCE_CONSTRAINT},
-                              {v->residual_fraction_max, w->residual_fraction_max, v->residual_within},
-                              {v->penetration_max_m, w->penetration_max_m, CAV_TOLERANCE_PENETRATION},
-                              {v->penetration_between_m, w->penetration_between_m, CAV_TOLERANCE_PENETRATION},
-                              {v->momentum_defect_rms, w->momentum_defect_rms, CAV_TOLERANCE_MOMENTUM},
-                              {v->replay_step_max_error, w->replay_step_max_error, CAV_TOLERANCE_STEP}};
-  // what was stopped was not verified
-  int stopped = a->status == CAV_INTERRUPTED, other = b->status == CAV_INTERRUPTED;
-  if (stopped || other) return !stopped;
-  if (cav_race_success(a) && cav_race_success(b)) return cheapest && a->cost < b->cost;
-  if (cav_race_success(a) || cav_race_success(b)) return cav_race_success(a);
-  // what was asked is in the cost
-  if (v->certified && w->certified) return a->cost < b->cost;
-  if (v->certified || w->certified) return v->certified;
-  for (size_t k = 0; k < sizeof missed / sizeof *missed; k++)
-    if (missed[k][0] > missed[k][2] || missed[k][1] > missed[k][2]) return missed[k][0] < missed[k][1];
-  return v->closed_loop_seconds > w->closed_loop_seconds;
-}
-
 // the motion to repair: the best of those that cost little more than the cheapest that nearly keeps forces, limits and
 // constraints, since what was asked is in the cost: one that stands still is not mended by what would certify it. -1: none
-static int find_broken(const cav_race *race) {
+static int find_broken(const cav_race *race, const char *passed) {
   int best = -1;
   double least = INFINITY;
   for (int pass = 0; pass < 2; pass++) {
@@ -427,61 +427,64 @@ static int find_broken(const cav_race *race) {
       const cav_verdict *v = &e->report.verdict;
       if (fmax(v->unactuated_force_max, fmax(v->limit_violation_max, v->constraint_violation_max)) > nearly) continue;
       least = pass == 0 ? fmin(least, e->report.cost) : least;
-      if (pass == 0 || e->report.cost > dearer * least) continue;
-      if (best < 0 || better(&e->report, &race->entry[best].report, 0)) best = k;
+      if (pass == 0 || e->report.cost > dearer * least || passed[k]) continue;
+      if (best < 0 || cav_rank_nearer(&e->report, &race->entry[best].report)) best = k;
     }
   }
-  return best >= 0 ? best : cav_race_best(race, 0);
+  if (best >= 0 || isfinite(least)) return best;
+  best = cav_race_best(race, 0);
+  return best >= 0 && !passed[best] ? best : -1;
 }
 
-// whether a motion that is possible misses little else of a certificate: it is what is looked for, but for how it was planned
-static int is_rough(const cav_verdict *v) {
-  return !v->certified && cav_verdict_feasible(v) && v->penetration_max_m <= CAV_TOLERANCE_PENETRATION &&
-         v->penetration_between_m <= CAV_TOLERANCE_PENETRATION &&
-         v->momentum_defect_rms <= few * CAV_TOLERANCE_MOMENTUM && v->slip_mean_m_s <= few * CAV_TOLERANCE_SLIP &&
-         v->hover_fraction <= few * CAV_TOLERANCE_HOVER && v->replay_step_max_error <= CAV_TOLERANCE_STEP;
+// repairs before entry i that went on from a motion
+static int repairs_of(const cav_race *race, int i, int of) {
+  int n = 0;
+  for (int k = 0; k < i; k++) n += race->entry[k].state == CAV_RACE_DONE && race->entry[k].from == of;
+  return n;
 }
 
-// whether a motion is nearly what was asked
-static int is_near(const cav_race *race, const cav_race_report *report) {
-  const cav_verdict *v = &report->verdict;
-  if (!report->solution || report->status == CAV_INTERRUPTED) return 0;
-  if (v->certified) return !v->achieved && 2 * v->nmissed < v->ntarget;
-  if (is_rough(v)) return 2 * v->nmissed <= v->ntarget;
-  return v->unactuated_force_max <= CAV_TOLERANCE_UNACTUATED &&
-         v->constraint_violation_max <= CAV_TOLERANCE_CONSTRAINT && v->limit_violation_max > CAV_TOLERANCE_LIMIT &&
-         v->limit_violation_max < (1 - race->problem->effort_limit) / 2;
-}
-
-// the best of those before entry i that are. -1: none
-static int find_near(const cav_race *race, int i) {
+// the nearest of those before entry i that are near, and were not mended as often as may be. -1: none
+static int find_near(const cav_race *race, int i, const char *passed) {
   int best = -1;
   for (int k = 0; k < i; k++) {
     const cav_race_entry *e = &race->entry[k];
-    if (e->state != CAV_RACE_DONE || !is_near(race, &e->report)) continue;
-    if (best < 0 || better(&e->report, &race->entry[best].report, 0)) best = k;
+    if (e->state != CAV_RACE_DONE || !cav_rank_near(&e->report, race->problem->effort_limit) || passed[k]) continue;
+    if (e->strategy.use == CAV_STRATEGY_DIAGNOSIS || repairs_of(race, i, k) >= REPAIRS_OF_ONE) continue;
+    if (best < 0 || cav_rank_nearer(&e->report, &race->entry[best].report)) best = k;
   }
   return best;
 }
 
-// the strategy that repairs it by a cure that was not tried; to be cleared where there is one. *of: the entry
-static int find_repair(const cav_race *race, int i, cav_strategy *repaired, int *of) {
-  int best = *of = race->entry[i].strategy.use == CAV_STRATEGY_NEAR ? find_near(race, i) : find_broken(race);
-  int found = best >= 0;
+// whether two strategies are the same: of one guess with the same changes
+static int is_same(const cav_strategy *a, const cav_strategy *b) {
+  return a->left == b->left && a->stated == b->stated && a->guess == b->guess && a->nswing == b->nswing &&
+         a->flies == b->flies && a->height == b->height && !strcmp(a->changed, b->changed);
+}
+
+// the strategy that repairs a motion by a cure that was not tried; to be cleared where there is one
+static int find_cure(const cav_race *race, int i, const cav_race_entry *from, cav_strategy *repaired) {
+  int found = 1;
   for (int k = 0; found; k++) {
-    const cav_race_entry *from = &race->entry[best];
     if (cav_strategy_repair(race->problem, &from->strategy, &from->report.verdict, k, repaired, &found) || !found)
       return 0;
     int known = 0;
-    for (int j = 0; j < i; j++) {
-      const cav_strategy *tried = &race->entry[j].strategy;
-      known |= repaired->left == tried->left && !strcmp(repaired->changed, tried->changed);
-    }
+    for (int j = 0; j < i; j++) known |= is_same(repaired, &race->entry[j].strategy);
     if (!known) break;
     cav_strategy_clear(repaired);
   }
-  if (found) repaired->name = race->entry[i].strategy.name;
-  return found;
+  repaired->name = race->entry[i].strategy.name;
+  return 1;
+}
+
+// the repair that entry i is for: of the best motion that has a cure left. *of: its entry
+static int find_repair(const cav_race *race, int i, cav_strategy *repaired, int *of) {
+  char passed[CAV_STRATEGIES] = {0};
+  while (1) {
+    *of = race->entry[i].strategy.use == CAV_STRATEGY_NEAR ? find_near(race, i, passed) : find_broken(race, passed);
+    if (*of < 0) return 0;
+    if (find_cure(race, i, &race->entry[*of], repaired)) return 1;
+    passed[*of] = 1;
+  }
 }
 
 // whether forces are missing most near the end, where all is to come to rest
@@ -522,10 +525,12 @@ static void settle(cav_race *race, int i) {
   const int mends = e->strategy.use == CAV_STRATEGY_REPAIR || e->strategy.use == CAV_STRATEGY_NEAR;
   const int near = e->strategy.use == CAV_STRATEGY_NEAR;
   if (!mends || *e->strategy.changed || !find_repair(race, i, &repaired, &of)) return;
-  if (near) e->from = of;
+  // what a repair led to is not sought anew by the next one
+  const int goes_on = near || *race->entry[of].strategy.changed;
+  if (goes_on) e->from = of;
   e->strategy = repaired;
   // what is all but certified is not sought anew
-  e->goes_on = near && of == 0 && race->entry[0].solution && is_rough(&race->entry[0].report.verdict);
+  e->goes_on = goes_on && cav_rank_rough(&race->entry[of].report.verdict);
   if (race->tell) fprintf(stderr, "strategy %-8s with %s\n", e->strategy.name, e->strategy.changed);
 }
 
@@ -577,7 +582,7 @@ int cav_race_best(const cav_race *race, int cheapest) {
   for (int i = 0; i < race->n; i++) {
     const cav_race_entry *e = &race->entry[i];
     if (e->state != CAV_RACE_DONE || !e->report.solution || e->strategy.use == CAV_STRATEGY_DIAGNOSIS) continue;
-    if (best < 0 || better(&e->report, &race->entry[best].report, cheapest)) best = i;
+    if (best < 0 || cav_rank_better(&e->report, &race->entry[best].report, cheapest)) best = i;
   }
   return best;
 }

@@ -1,0 +1,68 @@
+/// Which of two motions is the better one, and what is so near a certificate that it is mended from where it is.
+#include "rank.h"
+
+#include <math.h>
+
+// times its tolerance up to which what a feasible motion misses of a certificate is little
+static const double few = 4;
+
+int cav_rank_better(const cav_race_report *a, const cav_race_report *b, int cheapest) {
+  const cav_verdict *v = &a->verdict, *w = &b->verdict;
+  const double missed[][3] = {{v->unactuated_force_max, w->unactuated_force_max, CAV_TOLERANCE_UNACTUATED},
+                              {v->limit_violation_max, w->limit_violation_max, CAV_TOLERANCE_LIMIT},
+                              {v->constraint_violation_max, w->constraint_violation_max, CAV_TOLERANCE_CONSTRAINT},
+                              {v->residual_fraction_max, w->residual_fraction_max, v->residual_within},
+                              {v->penetration_max_m, w->penetration_max_m, CAV_TOLERANCE_PENETRATION},
+                              {v->penetration_between_m, w->penetration_between_m, CAV_TOLERANCE_PENETRATION},
+                              {v->momentum_defect_rms, w->momentum_defect_rms, CAV_TOLERANCE_MOMENTUM},
+                              {v->replay_step_max_error, w->replay_step_max_error, CAV_TOLERANCE_STEP}};
+  // what was stopped was not verified
+  int stopped = a->status == CAV_INTERRUPTED, other = b->status == CAV_INTERRUPTED;
+  if (stopped || other) return !stopped;
+  if (cav_race_success(a) && cav_race_success(b)) return cheapest && a->cost < b->cost;
+  if (cav_race_success(a) || cav_race_success(b)) return cav_race_success(a);
+  // what was asked is in the cost
+  if (v->certified && w->certified) return a->cost < b->cost;
+  if (v->certified || w->certified) return v->certified;
+  for (size_t k = 0; k < sizeof missed / sizeof *missed; k++)
+    if (missed[k][0] > missed[k][2] || missed[k][1] > missed[k][2]) return missed[k][0] < missed[k][1];
+  return v->closed_loop_seconds > w->closed_loop_seconds;
+}
+
+int cav_rank_rough(const cav_verdict *v) {
+  return !v->certified && cav_verdict_feasible(v) && v->penetration_max_m <= CAV_TOLERANCE_PENETRATION &&
+         v->penetration_between_m <= CAV_TOLERANCE_PENETRATION &&
+         v->momentum_defect_rms <= few * CAV_TOLERANCE_MOMENTUM && v->slip_mean_m_s <= few * CAV_TOLERANCE_SLIP &&
+         v->hover_fraction <= few * CAV_TOLERANCE_HOVER;
+}
+
+int cav_rank_near(const cav_race_report *report, double effort) {
+  const cav_verdict *v = &report->verdict;
+  if (!report->solution || report->status == CAV_INTERRUPTED) return 0;
+  if (v->certified) return !v->achieved && 2 * v->nmissed < v->ntarget;
+  if (cav_rank_rough(v)) return 2 * v->nmissed <= v->ntarget;
+  return v->unactuated_force_max <= CAV_TOLERANCE_UNACTUATED &&
+         v->constraint_violation_max <= CAV_TOLERANCE_CONSTRAINT && v->limit_violation_max > CAV_TOLERANCE_LIMIT &&
+         v->limit_violation_max < (1 - effort) / 2;
+}
+
+// what a forward step that has another solution than the planned one counts, however far that is
+static const double folded = 2;
+
+// times of its tolerance that a possible motion has of what it keeps least of a certificate; of a closed loop that is lost,
+// the duration over the time until then
+static double excess_of(const cav_verdict *v) {
+  double most = v->momentum_defect_rms / CAV_TOLERANCE_MOMENTUM;
+  most = fmax(most, v->slip_mean_m_s / CAV_TOLERANCE_SLIP);
+  most = fmax(most, v->hover_fraction / CAV_TOLERANCE_HOVER);
+  if (v->replay_step_max_error > CAV_TOLERANCE_STEP) most = fmax(most, folded);
+  double followed = fmin(v->closed_loop_seconds, v->model_contacts_seconds);
+  return fmax(most, v->duration / fmax(followed, v->duration / 100));
+}
+
+int cav_rank_nearer(const cav_race_report *a, const cav_race_report *b) {
+  const cav_verdict *v = &a->verdict, *w = &b->verdict;
+  if (!cav_rank_rough(v) || !cav_rank_rough(w)) return cav_rank_better(a, b, 0);
+  if (!v->nmissed != !w->nmissed) return !v->nmissed;
+  return excess_of(v) < excess_of(w);
+}

@@ -1,0 +1,23 @@
+/// Which of two motions is the better one, and what is so near a certificate that it is mended from where it is.
+#ifndef CAVORT_RANK_H
+#define CAVORT_RANK_H
+
+#include "race.h"
+
+/// Whether a is the better motion to keep: the one that is certified and achieves what was asked (of two the first, or the
+/// cheaper); of two that are certified alone the cheaper one; otherwise the one that keeps more of the certificate's
+/// conditions, in their order, or misses the same one by less.
+int cav_rank_better(const cav_race_report *a, const cav_race_report *b, int cheapest);
+
+/// Whether a motion that is possible misses little else of a certificate: it is what is looked for, but for how it was
+/// planned.
+int cav_rank_rough(const cav_verdict *verdict);
+
+/// Whether a motion is nearly what was asked; effort is the fraction of the actuators that was planned with.
+int cav_rank_near(const cav_race_report *report, double effort);
+
+/// Whether a is the better motion to mend: of two that are rough the one that misses no target, else the one whose largest
+/// ratio of a figure to its tolerance is smaller; of others the better one to keep.
+int cav_rank_nearer(const cav_race_report *a, const cav_race_report *b);
+
+#endif
