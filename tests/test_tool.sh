@@ -408,6 +408,14 @@ says hop.result/verdict.json '"repaired": "<force weight=\"1\"/>"'
 says hop.result/problem.xml "<force "
 run 0 verify hop.result --quiet
 
+# without strategies: what to change in the file, no limit that the cost hangs on; and not again what was tried
+run 1 solve hop.xml --threads 1 --strategies 1 -o rough
+run 1 explain rough
+says out 'cause: how it is planned, not what is asked: forces, limits and constraints hold. A usual remedy that was not tried: <force weight="1"/>.'
+sed 's/^stated,1,not certified,\(.*\),"",/stated,1,not certified,\1,"<force weight='"'1'"'\/>",/' rough/strategies.csv >tried && mv tried rough/strategies.csv
+run 1 explain rough
+says out 'A usual remedy that was not tried: timestep="0.01".'
+
 # a jump that does not pay, of a leg that cannot fall over: certified, and why it is not achieved
 cat >jumper.xml <<'END'
 <mujoco><worldbody><geom type="plane" size="5 5 .1"/><body name="trunk" pos="0 0 .6"><joint name="z" type="slide" axis="0 0 1"/>

@@ -112,6 +112,46 @@ static char *told_of_repair(const char *folder) {
   return told;
 }
 
+// whether a strategy of the folder's solve made these changes
+static int was_tried(const char *folder, const char *changes) {
+  char *path = cav_result_path(folder, "strategies.csv"), *line = NULL;
+  FILE *in = path ? fopen(path, "r") : NULL;
+  size_t room = 0;
+  int tried = 0;
+  while (in && !tried && getline(&line, &room, in) > 0) {
+    char *changed, *reason;
+    if (!texts_of(line, &changed, &reason)) continue;
+    // quotes within are written as single ones; a solid's growth is of the folder's problem already
+    size_t n = strlen(changes);
+    tried = strlen(changed) >= n && (!changed[n] || !strcmp(changed + n, ", solids='grow'"));
+    for (size_t i = 0; tried && changes[i]; i++) tried = changed[i] == (changes[i] == '"' ? '\'' : changes[i]);
+  }
+  if (in) fclose(in);
+  free(path), free(line);
+  return tried;
+}
+
+// what of the file to change where a motion is possible and a certificate misses something else: no limit is the cause of that
+static void tell_remedy(const cav_result *result, const cav_verdict *verdict, const char *folder, char *text,
+                        size_t size) {
+  cav_strategy strategy[CAV_STRATEGIES], repaired;
+  int n = 0, found = 1;
+  if (cav_strategy_list(result->problem, strategy, &n) || n == 0) return;
+  int said = snprintf(text, size, "how it is planned, not what is asked: forces, limits and constraints hold. ");
+  for (int k = 0; found; k++) {
+    if (cav_strategy_repair(result->problem, &strategy[0], verdict, k, &repaired, &found)) return;
+    if (!found || (*repaired.changed && !was_tried(folder, repaired.changed))) break;
+    cav_strategy_clear(&repaired);
+  }
+  if (found)
+    snprintf(text + said, size - (size_t)said, "A usual remedy that was not tried: %s.", repaired.changed);
+  else
+    snprintf(text + said, size - (size_t)said,
+             "The usual remedies were tried (strategies.csv): more time, or another way by postures (<waypoint> in "
+             "<guess>).");
+  if (found) cav_strategy_clear(&repaired);
+}
+
 int cav_command_explain(const cav_command_line *line) {
   cav_error error = {0};
   cav_result *result = cav_result_read(line->operand, line->model, &error);
@@ -132,6 +172,8 @@ int cav_command_explain(const cav_command_line *line) {
   char missed[CAV_MISSED_TEXT] = "", *repair = told_of_repair(line->operand);
   if (!status && verdict.certified && !verdict.achieved)
     cav_command_missed(result->problem, result->trajectory, &explanation, missed);
+  if (!status && !verdict.certified && verdict.achieved && cav_verdict_feasible(&verdict) && !result->problem->cycle.on)
+    tell_remedy(result, &verdict, line->operand, missed, sizeof missed);
   if (!status && line->json) {
     printf("{\n  \"met\": %s,\n  \"certified\": %s,\n  \"achieved\": %s,\n  \"reason\": ",
            explanation.met ? "true" : "false", verdict.certified ? "true" : "false",
