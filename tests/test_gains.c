@@ -16,10 +16,10 @@ static struct cav_follow drawn[TRIALS][CAV_LOOPS];
 static int trial, run;
 
 cav_status __wrap_cav_closed_loop(const cav_verification *verification, int loop, const double *gain_q,
-                                  const double *gain_v, struct cav_follow *follow);
+                                  const double *gain_v, cav_before *before, struct cav_follow *follow);
 cav_status __wrap_cav_closed_loop(const cav_verification *verification, int loop, const double *gain_q,
-                                  const double *gain_v, struct cav_follow *follow) {
-  (void)verification, (void)gain_v;
+                                  const double *gain_v, cav_before *before, struct cav_follow *follow) {
+  (void)verification, (void)gain_v, (void)before;
   // what is kept tells its trial
   *(double *)gain_q = trial;
   run++;

@@ -1,6 +1,7 @@
 // Verification against motions made by hand (sample.h) whose faults are known: each fault has a sound motion beside it that
 // must pass, and is found with the size it was given. Bounds that stand for something else than rounding say so beside them.
 #include "sample.h"
+#include "verification.h"
 
 static const char *const resting = HEAD
     "<geom name='floor' type='plane' size='5 5 1'/><body name='ball' pos='0 0 0.1'><freejoint name='root'/>"
@@ -166,6 +167,33 @@ static void test_push(void) {
       150, 0.02, CAV_ORDER_EULER);
   CHECK(verify(&s, NULL, NULL) == CAV_OK);
   CHECK_NEAR(s.verdict.push_survived_n_s, 0.024 * 2 * 9.81, 1e-12);
+  sample_free(&s);
+}
+
+// pushed loops go on from where the loop without a push stood, to the same bits, and from wherever they are told to
+static void test_before(void) {
+  int last = 100;
+  double h = 0.02, *gain = calloc((size_t)(2 * last), sizeof *gain), x[3];
+  sample s = sample_new(inverted, last, h, CAV_ORDER_MIDPOINT);
+  for (int t = 0; t <= last; t++) knot(&s, t)[0] = 0.3 * (1 - cos(2 * 3.14159265358979 * t * h));
+  for (int t = 0; t < last; t++) gain[t] = -12, gain[last + t] = -6;
+  cav_trajectory_velocities(s.model, s.motion);
+  cav_verification verification;
+  struct cav_follow own, alone, after;
+  cav_before before = {.x = x};
+  CHECK(cav_closed_loops_begin(&verification, &s.problem, s.motion, &s.law, NULL) == CAV_OK);
+  CHECK(cav_before_numbers(&verification) == 3);
+  CHECK(cav_closed_loop(&verification, CAV_LOOP_OWN, gain, gain + last, &before, &own) == CAV_OK && before.known);
+  for (int loop = CAV_LOOP_PUSHED; loop <= CAV_LOOP_PUSHED_BACK; loop++) {
+    CHECK(cav_closed_loop(&verification, loop, gain, gain + last, NULL, &alone) == CAV_OK);
+    CHECK(cav_closed_loop(&verification, loop, gain, gain + last, &before, &after) == CAV_OK);
+    CHECK(!*alone.lost && alone.error == after.error && alone.seconds == after.seconds);
+  }
+  x[0] += 2;
+  CHECK(cav_closed_loop(&verification, CAV_LOOP_PUSHED, gain, gain + last, &before, &after) == CAV_OK);
+  CHECK(*after.lost);
+  cav_verification_end(&verification);
+  free(gain);
   sample_free(&s);
 }
 
@@ -546,6 +574,7 @@ int main(void) {
   test_loop_steps();
   test_balance();
   test_push();
+  test_before();
   test_passage();
   test_hover();
   test_hover_bar();

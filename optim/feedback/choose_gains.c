@@ -64,6 +64,7 @@ typedef struct search {
   struct cav_follow follow[CAV_LOOPS]; ///< loops of a set, and of the best
   struct cav_follow best_follow[CAV_LOOPS];
   size_t n;
+  cav_before before; ///< where loops of the set in hand are pushed
   set best;
   outcome reached;
   int found; ///< 1: there is a best
@@ -99,10 +100,11 @@ static cav_status try(search *s, const set *one) {
   outcome now = {.follows = CAV_LOOPS};
   cav_status status = regulate(s, one);
   const int first = s->reached.decided;
+  s->before.known = 0;
   for (int k = 0; k < CAV_LOOPS && status == CAV_OK; k++) {
     const int loop = k == 0 ? first : k <= first ? k - 1 : k;
     if (k > 0 && loop >= now.follows) break;
-    status = cav_closed_loop(&s->verification, loop, s->gain, s->gain + s->n, &s->follow[loop]);
+    status = cav_closed_loop(&s->verification, loop, s->gain, s->gain + s->n, &s->before, &s->follow[loop]);
     if (status != CAV_OK) break;
     note(&now, loop, &s->follow[loop]);
     if (s->found && !better(&now, &s->reached)) return CAV_OK;
@@ -156,6 +158,8 @@ cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription 
   solution->gain_v = calloc(s.n, sizeof(double));
   cav_status status = s.gain && solution->gain_q && solution->gain_v ? CAV_OK : CAV_NO_MEMORY;
   if (status == CAV_OK) status = cav_closed_loops_begin(&s.verification, problem, at, &solution->contact, error);
+  if (status == CAV_OK && !(s.before.x = malloc(cav_before_numbers(&s.verification) * sizeof *s.before.x)))
+    status = CAV_NO_MEMORY;
   int trials = sets > 0 && sets < TRIALS ? sets : TRIALS;
   for (int i = 0; i < trials && status == CAV_OK; i++) {
     const set one = sample(&s, i);
@@ -167,7 +171,7 @@ cav_status cav_choose_gains(const cav_problem *problem, const cav_transcription 
     if (!solution->followed && status == CAV_OK) status = CAV_NO_MEMORY;
   }
   cav_verification_end(&s.verification);
-  free(s.gain);
+  free(s.gain), free(s.before.x);
   // zeros are no gains
   if (!s.found) cav_gains_free(solution);
   return status;

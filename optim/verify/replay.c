@@ -149,20 +149,18 @@ cav_status cav_replay_open(const cav_verification *verification, cav_replay *rep
   return status == CAV_NO_MEMORY ? status : CAV_OK;
 }
 
-// generalised force of efforts within the limits at (q, v); moment [nv] is scratch
-static cav_status run_loop(const cav_verification *verification, const double *q, const double *v, const double *effort,
-                           double *moment, double *u) {
+// generalised force of efforts within the limits at (q, v), where bare stands; moment [nv] is scratch
+static void run_loop(const cav_verification *verification, const double *v, const double *effort, double *moment,
+                     double *u) {
   const cav_model *model = verification->model;
-  cav_status status = cav_position(model, verification->bare, q);
   memset(u, 0, sizeof(double) * model->nv);
-  for (int a = 0; a < model->nu && status == CAV_OK; a++) {
+  for (int a = 0; a < model->nu; a++) {
     double length = cav_actuator_length(model, verification->bare, a, moment), velocity = 0, input;
     for (int d = 0; d < model->nv; d++) velocity += moment[d] * v[d];
     cav_actuator_input(model, a, length, velocity, model->actuator[a].unit * effort[a], &input);
     double force = cav_actuator_force(model, a, length, velocity, input);
     for (int d = 0; d < model->nv; d++) u[d] += force * moment[d];
   }
-  return status;
 }
 
 // x [nv], a tangent, moved by a number of periods; scratch [nv]
@@ -173,11 +171,11 @@ static void move(const cav_verification *verification, int periods, double *x, d
   }
 }
 
-// u := forces of the motion and feedback of knot t at (q, v), through the actuators; residual ones as planned. dq and dv
-// may be changed
-static cav_status command(const cav_verification *verification, int t, const double *planned, const double *gain_q,
-                          const double *gain_v, const double *q, const double *v, double *dq, double *dv,
-                          double *effort, double *work, double *u) {
+// u := forces of the motion and feedback of knot t at v, and where bare stands, through the actuators; residual ones as
+// planned. dq and dv may be changed
+static void command(const cav_verification *verification, int t, const double *planned, const double *gain_q,
+                    const double *gain_v, const double *v, double *dq, double *dv, double *effort, double *work,
+                    double *u) {
   int nv = verification->model->nv, periods = t / verification->last;
   size_t at = (size_t)(t % verification->last) * (size_t)nv * (size_t)nv;
   const double *Kq = gain_q ? gain_q + at : NULL, *Kv = gain_v ? gain_v + at : NULL;
@@ -192,11 +190,10 @@ static cav_status command(const cav_verification *verification, int t, const dou
   move(verification, periods, u, work);
   for (int i = 0; i < nv; i++) u[i] += planned[i];
   cav_actuation(verification->model, verification->bare, u, NULL, effort);
-  cav_status status = run_loop(verification, q, v, effort, work, u);
+  run_loop(verification, v, effort, work, u);
   // residual forces act as planned, with their penalty
   for (int i = 0; i < nv; i++)
     if (verification->deviation[i] > 0) u[i] += planned[i];
-  return status;
 }
 
 // angle between two unit quaternions
@@ -225,6 +222,7 @@ typedef struct gap {
   int link, root;
 } gap;
 
+// leaves bare at q1
 static cav_status compare(const cav_verification *verification, const double *q0, const double *q1, double *place,
                           gap *found) {
   const cav_model *model = verification->model;
@@ -355,7 +353,7 @@ static void add_force(const cav_model *model, const cav_state *state, int link, 
     for (int k = 0; k < 3; k++) u[d] += state->axis[6 * d + k] * moment[k] + state->axis[6 * d + 3 + k] * force[k];
 }
 
-// one step from i to i+1 of the finer motion; 0 in *on once the motion is lost
+// one step from i to i+1 of the finer motion, begun and ended with bare at s->q; 0 in *on once the motion is lost
 static cav_status advance(const cav_verification *verification, simulation *s, int i, struct cav_follow *follow,
                           int *on) {
   const cav_model *model = verification->model;
@@ -364,16 +362,15 @@ static cav_status advance(const cav_verification *verification, simulation *s, i
   cav_difference(model, q_ref, s->q, 1, s->dq);
   for (int d = 0; d < model->nv; d++) s->dv[d] = s->v[d] - v_ref[d];
   int knot = (int)((i + 1e-6) * s->motion->timestep / verification->h);
-  cav_status status = command(verification, knot, s->motion->u + i * model->nv, s->gain_q, s->gain_v, s->q, s->v, s->dq,
-                              s->dv, s->control, s->next, s->u);
-  if (status == CAV_OK) note_asked(model, s->control, follow);
-  // command leaves bare at q
-  if (status == CAV_OK && s->push) {
+  command(verification, knot, s->motion->u + i * model->nv, s->gain_q, s->gain_v, s->v, s->dq, s->dv, s->control,
+          s->next, s->u);
+  note_asked(model, s->control, follow);
+  if (s->push) {
     double force[3];
     for (int k = 0; k < 3; k++) force[k] = s->push->impulse[k] / s->motion->timestep;
     add_force(model, verification->bare, s->push->link, force, s->u);
   }
-  if (status == CAV_OK) status = go(verification, s, s->motion->timestep, HALVINGS);
+  cav_status status = go(verification, s, s->motion->timestep, HALVINGS);
   if (status == CAV_NO_MEMORY) return status;
   if (status != CAV_OK) {
     *on = stopped(status, time, follow);
@@ -412,10 +409,10 @@ static int go_on(const cav_disturbance *push, int at, size_t n, double *q) {
 }
 
 // keeps how they stand there
-static void keep(const cav_disturbance *push, size_t n, const double *q) {
-  if (!push->before || push->before->known) return;
-  memcpy(push->before->x, q, n * sizeof *q);
-  push->before->known = 1;
+static void keep(const cav_disturbance *disturbance, size_t n, const double *q) {
+  if (!disturbance->before || disturbance->before->known) return;
+  memcpy(disturbance->before->x, q, n * sizeof *q);
+  disturbance->before->known = 1;
 }
 
 // a simulation to its end; disturbance NULL: none
@@ -438,11 +435,12 @@ static cav_status closed(const cav_verification *verification, const cav_options
     memcpy(s.v, verification->v, sizeof(double) * nv);
     memset(s.a, 0, sizeof(double) * nv);
     if (disturbance && disturbance->start) move_start(model, disturbance->start, s.q, s.v);
-    const int hit = push ? (int)(push->fraction * (motion->nknot - 1)) : 0;
-    int on = 1;
-    for (int i = go_on(push, hit, nq + 2 * nv, s.q); i + 1 < motion->nknot && on && status == CAV_OK; i++) {
+    const int hit = disturbance ? (int)(disturbance->fraction * (motion->nknot - 1)) : 0;
+    int on = 1, i = go_on(push, hit, nq + 2 * nv, s.q);
+    status = cav_position(model, verification->bare, s.q);
+    for (; i + 1 < motion->nknot && on && status == CAV_OK; i++) {
       s.push = push && i == hit ? push : NULL;
-      if (s.push) keep(push, nq + 2 * nv, s.q);
+      if (disturbance && i == hit) keep(disturbance, nq + 2 * nv, s.q);
       status = advance(verification, &s, i, follow, &on);
     }
   }

@@ -220,14 +220,17 @@ typedef struct cav_disturbance {
   int link;                    ///< 0: no impulse
   double fraction, impulse[3]; ///< N s, world
   int start;                   ///< 1 .. CAV_STARTS: one of these; 0: the motion's own
-  struct cav_before *before;   ///< NULL, or what is kept for all impulses of one fraction under the same gains
+  struct cav_before *before;   ///< NULL, or what is kept for all impulses of one fraction under the same gains; by
+                               ///< itself: it is found
 } cav_disturbance;
 
-/// Where a replay stands when an impulse comes: the first finds it, the others go on from there.
+/// Where a replay stands when an impulse comes: the first finds it, with an impulse or without, the others go on from
+/// there.
 typedef struct cav_before {
   int known;
   double *x; ///< [nq+2*nv] q, v, mean acceleration of the step before
 } cav_before;
+size_t cav_before_numbers(const cav_verification *verification);
 enum { CAV_STARTS = 4 };
 
 /// By how much at most a start is off: m or rad, m/s or rad/s. What two simulators make of a touch differs by more.
@@ -251,11 +254,12 @@ enum {
   CAV_LOOPS
 };
 
-/// Makes a motion ready for them; ended as any verification, in any case. Then runs one of them.
+/// Makes a motion ready for them; ended as any verification, in any case. Then runs one of them. before: what all loops of
+/// one set of gains share, or NULL; cav_before_numbers is its room.
 cav_status cav_closed_loops_begin(cav_verification *verification, const cav_problem *problem,
                                   const cav_trajectory *trajectory, const cav_options *contact, cav_error *error);
 cav_status cav_closed_loop(const cav_verification *verification, int loop, const double *gain_q, const double *gain_v,
-                           struct cav_follow *follow);
+                           cav_before *before, struct cav_follow *follow);
 
 /// The worst of those under the contacts of the model's file at each of the steps and from each of the starts that are off;
 /// where it is lost in one, the first of these. known: those of all loops before the pushes, or NULL: they are run.

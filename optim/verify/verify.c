@@ -410,9 +410,9 @@ static cav_status examine(cav_verification *verification, cav_balance *balance, 
   return status;
 }
 
-// s: impulse of the smallest push over the weight, which changes the velocity of a body that stands by 0.03 m/s; the
-// number of pushes tried, each twice the one before
-static const double small_push = 0.003;
+// s: impulse of the smallest push over the weight, which changes the velocity of a body that stands by 0.03 m/s; when it
+// comes, a fraction of the motion; the number of pushes tried, each twice the one before
+static const double small_push = 0.003, pushed_at = 1.0 / 3;
 enum { PUSHES = 5 };
 
 // the root link of the heaviest tree, 0 if there is none
@@ -438,13 +438,16 @@ static void put_worst_first(int order[4], const double error[4]) {
     }
 }
 
+size_t cav_before_numbers(const cav_verification *verification) {
+  return (size_t)verification->model->nq + 2 * (size_t)verification->model->nv;
+}
+
 // the largest push along x and y, either way, with which a certified motion still follows
 static cav_status find_push(const cav_verification *verification, const double *gain_q, const double *gain_v,
                             double *survived) {
   static const double way[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
-  const size_t numbers = (size_t)verification->model->nq + 2 * (size_t)verification->model->nv;
-  cav_before before = {.x = malloc(numbers * sizeof *before.x)};
-  cav_disturbance push = {.link = pushed_link(verification), .fraction = 1.0 / 3, .before = &before};
+  cav_before before = {.x = malloc(cav_before_numbers(verification) * sizeof *before.x)};
+  cav_disturbance push = {.link = pushed_link(verification), .fraction = pushed_at, .before = &before};
   cav_status status = before.x ? CAV_OK : CAV_NO_MEMORY;
   struct cav_follow follow = {0};
   int order[4] = {0, 1, 2, 3};
@@ -595,7 +598,7 @@ static cav_status close_loops(const cav_verification *verification, const cav_fo
   if (known)
     replay->closed = known[CAV_LOOP_CLAIMED];
   else
-    status = cav_closed_loop(verification, CAV_LOOP_CLAIMED, gain_q, gain_v, &replay->closed);
+    status = cav_closed_loop(verification, CAV_LOOP_CLAIMED, gain_q, gain_v, NULL, &replay->closed);
   if (status != CAV_OK) return status;
   return cav_closed_loops_own(verification, known, gain_q, gain_v, &replay->own);
 }
@@ -746,18 +749,20 @@ cav_status cav_closed_loops_begin(cav_verification *verification, const cav_prob
 }
 
 cav_status cav_closed_loop(const cav_verification *verification, int loop, const double *gain_q, const double *gain_v,
-                           struct cav_follow *follow) {
-  if (loop == CAV_LOOP_OWN || loop == CAV_LOOP_FINE)
-    return cav_replay_own(verification, loop == CAV_LOOP_FINE, gain_q, gain_v, NULL, follow);
+                           cav_before *before, struct cav_follow *follow) {
+  cav_disturbance disturbance = {.fraction = pushed_at};
   if (loop == CAV_LOOP_CLAIMED) return cav_replay_closed(verification, &verification->law, gain_q, gain_v, follow);
-  cav_disturbance disturbance = {0};
-  if (loop < CAV_LOOP_PUSHED) {
+  if (loop == CAV_LOOP_FINE) return cav_replay_own(verification, 1, gain_q, gain_v, NULL, follow);
+  if (loop == CAV_LOOP_OWN) {
+    disturbance.before = before;
+  } else if (loop < CAV_LOOP_PUSHED) {
     disturbance.start = loop - CAV_LOOP_START + 1;
   } else {
     // along a diagonal, so that planar motions feel it too
     double along = (loop == CAV_LOOP_PUSHED ? 1 : -1) * small_push * verification->weight * sqrt(0.5);
-    disturbance =
-        (cav_disturbance){.link = pushed_link(verification), .fraction = 1.0 / 3, .impulse = {along, along, 0}};
+    disturbance.link = pushed_link(verification);
+    disturbance.impulse[0] = disturbance.impulse[1] = along;
+    disturbance.before = before;
   }
   return cav_replay_own(verification, 0, gain_q, gain_v, &disturbance, follow);
 }
@@ -772,7 +777,7 @@ cav_status cav_closed_loops_own(const cav_verification *verification, const stru
     if (known)
       now = known[loop];
     else
-      status = cav_closed_loop(verification, loop, gain_q, gain_v, &now);
+      status = cav_closed_loop(verification, loop, gain_q, gain_v, NULL, &now);
     if (status != CAV_OK) return status;
     double asked = fmax(now.asked, follow->asked);
     if (loop == CAV_LOOP_OWN || *now.lost || now.error > follow->error) *follow = now;
