@@ -449,6 +449,28 @@ says err 'not in 1 s, but in 1.195 s, certified and achieved'
 says far.result/strategies.csv "longer,0,certified"
 says far.result/problem.xml 'duration="1"'
 
+# a block that is wanted lower than a sill lets it be leans on it, and that is told; where forces of that fixed body cost it does not
+cat >rail.xml <<'END'
+<mujoco><worldbody><body name="block" pos="0 0 .3"><joint name="x" type="slide" axis="1 0 0"/><joint name="z" type="slide" axis="0 0 1"/>
+<geom type="box" size=".1 .1 .1" mass="2"/></body></worldbody><actuator><motor joint="x" gear="40" ctrllimited="true" ctrlrange="-1 1"/>
+<motor joint="z" gear="60" ctrllimited="true" ctrlrange="-1 1"/></actuator></mujoco>
+END
+cat >over.xml <<'END'
+<problem name="over" model="rail.xml"><scene><body name="sill"><geom name="sill" type="box" pos=".6 0 .18" size=".1 .2 .02" friction=".2"/></body></scene>
+<horizon duration="1.2" timestep="0.03"/><start/><goal><joint name="x" pos="1.2"/></goal><cost><sensor type="framepos" body="block" component="z" target=".27" from=".5" to=".7" weight="300" within="any"/><posture dofs="all" at="end" weight="900"/></cost></problem>
+END
+run 0 solve over.xml --threads 1
+says out "note: on its way it leans on 'sill' (block, up to "
+run 0 verify over.result
+says out "note: on its way it leans on 'sill' (block, up to "
+sed 's|<cost>|<cost><force body="sill" weight="100"/>|' over.xml >free.xml
+run 0 solve free.xml --threads 1 -o free.result
+check "it leans on nothing" sh -c '! grep -q "leans" out'
+says free.result/problem.xml 'body="sill"'
+sed 's|<cost>|<cost><impact body="sill" weight="100"/>|' over.xml >hard.xml
+run 2 solve hard.xml
+says err "expected a body that moves (fixed ones for force alone), got 'sill'"
+
 # a box that spins so fast that the midpoint order loses momentum in its steps
 cat >spin.xml <<'END'
 <mujoco><worldbody><body name="box" pos="0 0 3"><freejoint/><geom type="box" size=".3 .1 .02" mass="5"/></body></worldbody></mujoco>

@@ -199,7 +199,7 @@ static const cav_xml_element track_frame = {
 #define TERM_POSTURE(use) ATTRIBUTES(POSTURE_ATTRIBUTES, WINDOW, use), CHILDREN(&posture_waypoint)
 #define TERM_RATE(use) ATTRIBUTES(RATE_ATTRIBUTES, WINDOW, use), CHILDREN(&value_waypoint)
 #define TERM_ACTUATORS(use) ATTRIBUTES(WINDOW, use), NULL
-#define TERM_CONTACTS(use) ATTRIBUTES(TEXT("body", "(all contacts)", "contacts of this body's link alone; such a term is added to the default one"), WINDOW, use), NULL
+#define TERM_CONTACTS(use) ATTRIBUTES(TEXT("body", "(all contacts)", "contacts of this body's link alone; such a term is added to the default one. Of force also a body that is fixed to the world: what should not be touched"), WINDOW, use), NULL
 
 #define COST                                                                                                           \
   REAL("weight", 1, "", NULL, "the cost is weight/2 times the squared residual, integrated over the window in s, or at one knot as it is; 0 removes a default"), \

@@ -49,12 +49,15 @@ static int frees(const cav_transcription *tr, const cav_term *term, int t, int l
   return (link == link1 || link == link2) && cav_term_weight(tr, term, t) > 0;
 }
 
-/// Whether a term counts the k-th contact of knot t, key [2*contacts]. One of slip over all contacts leaves those that another
+/// Whether a term counts the k-th contact of knot t, key [2*contacts]: of a body that moves those of its link, of one that is
+/// fixed to the world those of its own geoms. One of slip over all contacts leaves those that another
 /// term frees.
 static int counts(const cav_transcription *tr, const int *key, const cav_term *term, int t, int k) {
   const cav_model *m = tr->model;
   const cav_pair *pair = &m->pair[key[2 * k]];
-  int link = m->body[term->body].link, link1 = m->geom[pair->geom1].link, link2 = m->geom[pair->geom2].link;
+  const cav_geom *one = &m->geom[pair->geom1], *two = &m->geom[pair->geom2];
+  int link = m->body[term->body].link, link1 = one->link, link2 = two->link;
+  if (term->body > 0 && link == 0) return one->body == term->body || two->body == term->body;
   if (term->body > 0) return link1 == link || link2 == link;
   if (term->quantity != CAV_QUANTITY_SLIP || m->link[link1].driven || m->link[link2].driven) return 1;
   for (int i = 0; i < tr->problem->nterm; i++)

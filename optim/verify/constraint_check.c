@@ -235,6 +235,9 @@ int cav_verification_looks_at(const cav_verification *verification, const cav_te
   int self = term->quantity == CAV_QUANTITY_SELF_PENETRATION || term->quantity == CAV_QUANTITY_SELF_FORCE;
   if (pair->external == self) return 0;
   int link = model->body[term->body].link;
+  // a body that is fixed shares its link with all of the world
+  if (term->body > 0 && link == 0)
+    return model->geom[pair->geom1].body == term->body || model->geom[pair->geom2].body == term->body;
   if (term->body > 0) return contact->link1 == link || contact->link2 == link;
   return term->quantity != CAV_QUANTITY_SLIP || !is_idle(model, contact) ||
          !(cav_verification_may_slide(verification, t, contact, 1) > 0);

@@ -153,6 +153,10 @@ enum { CAV_MISSED_TEXT = 1000 };
 int cav_command_missed(const cav_problem *problem, const cav_trajectory *motion, const cav_explanation *explanation,
                        char text[CAV_MISSED_TEXT]);
 
+/// Tells which solids of the world a motion leans on that neither its first nor its last knot touches. leaned_on.c.
+void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_trajectory *motion,
+                              const cav_options *contact);
+
 /// Before a solve: tells the one cause why a problem cannot have a solution, if there is one. 0: solve it; otherwise the
 /// exit status.
 int cav_command_refuse(const cav_command_line *line, const cav_problem *problem);

@@ -217,6 +217,8 @@ static int save(void *context, const cav_problem *problem, const cav_solution *s
   if (!status)
     status = cav_command_tell_records(to->folder, told, problem, solution->trajectory, &solution->contact, &error);
   if (!status && told) cav_certificate_print(stdout, problem, verdict, terms);
+  if (!status && told && verdict->certified)
+    cav_command_tell_leaning(stdout, problem, solution->trajectory, &solution->contact);
   free(terms), free(origin);
   if (status) return cav_command_fail(&error);
   // the page is a convenience: without three.js everything else stands

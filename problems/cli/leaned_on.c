@@ -1,0 +1,56 @@
+/// What of the world a motion leans on where neither its first nor its last knot does: a wall that can be stood on is stood
+/// on, and who asked for a way over it is told.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "cavort/result.h"
+#include "command.h"
+
+// part of the weight from which on a solid counts as leaned on, and most solids that are named
+static const double leaning = 0.05;
+enum { NAMED = 3 };
+
+static double size_of(const cav_contact_force *f) {
+  return sqrt(f->force[0] * f->force[0] + f->force[1] * f->force[1] + f->force[2] * f->force[2]);
+}
+
+/// The solid of the world that pushes there: no ground; -1: none.
+static int solid_of(const cav_model *m, const cav_contact_force *f, int *part) {
+  for (int k = 0; k < 2; k++) {
+    int geom = k ? f->geom2 : f->geom1;
+    cav_geom_type type = m->geom[geom].type;
+    if (m->geom[geom].link > 0 || type == CAV_GEOM_PLANE || type == CAV_GEOM_HFIELD) continue;
+    *part = k ? f->geom1 : f->geom2;
+    return geom;
+  }
+  return -1;
+}
+
+void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_trajectory *motion,
+                              const cav_options *contact) {
+  const cav_model *m = problem->model;
+  cav_error ignored = {0};
+  double weight = m->mass * sqrt(pow(m->gravity[0], 2) + pow(m->gravity[1], 2) + pow(m->gravity[2], 2));
+  cav_forces *forces = cav_forces_new(m, motion, contact, problem->close_at_rest, &ignored);
+  const cav_contact_force **most = calloc((size_t)m->ngeom + 1, sizeof *most); // of each solid
+  int *with = calloc(2 * (size_t)m->ngeom + 1, sizeof *with), *ends = with ? with + m->ngeom : NULL;
+  for (int i = 0; forces && most && with && i < forces->nforce; i++) {
+    const cav_contact_force *f = &forces->force[i];
+    int part, solid = solid_of(m, f, &part);
+    if (solid < 0) continue;
+    ends[solid] |= f->knot == 0 || f->knot >= forces->nknot - 2;
+    if (!most[solid] || size_of(f) > size_of(most[solid])) most[solid] = f, with[solid] = part;
+  }
+  int n = 0;
+  for (int g = 0; most && with && g < m->ngeom; g++) {
+    if (!most[g] || ends[g] || size_of(most[g]) < leaning * weight || n++ >= NAMED) continue;
+    const cav_body *body = &m->body[m->geom[with[g]].body];
+    fprintf(out, "%s'%s' (%s, up to %.3g N at %.3g s)", n == 1 ? "  note: on its way it leans on " : ", ",
+            m->geom[g].name ? m->geom[g].name : "a solid of the world", body->name ? body->name : "a body",
+            size_of(most[g]), most[g]->knot * motion->timestep);
+  }
+  if (n > 0) fprintf(out, "; what must not be touched: guide.md, Obstacles\n");
+  cav_forces_free(forces);
+  free(most), free(with);
+}
