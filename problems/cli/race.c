@@ -415,13 +415,25 @@ static int misses_momentum(const cav_race_report *report) {
          v->momentum_defect_rms > CAV_TOLERANCE_MOMENTUM;
 }
 
-// the motion to repair: the best of those that cost little more than the cheapest that nearly keeps forces, limits and
-// constraints, since what was asked is in the cost: one that stands still is not mended by what would certify it. -1: none
-static int find_broken(const cav_race *race, const char *passed) {
+// the best of the first n entries. -1: none
+static int best_of(const cav_race *race, int n, int cheapest) {
+  int best = -1;
+  for (int i = 0; i < n; i++) {
+    const cav_race_entry *e = &race->entry[i];
+    if (e->state != CAV_RACE_DONE || !e->report.solution || e->strategy.use == CAV_STRATEGY_DIAGNOSIS) continue;
+    if (best < 0 || cav_rank_better(&e->report, &race->entry[best].report, cheapest)) best = i;
+  }
+  return best;
+}
+
+// the motion to repair by entry i, of those before it, which have all ended: the best of those that cost little more than
+// the cheapest that nearly keeps forces, limits and constraints, since what was asked is in the cost: one that stands still
+// is not mended by what would certify it. -1: none
+static int find_broken(const cav_race *race, int i, const char *passed) {
   int best = -1;
   double least = INFINITY;
   for (int pass = 0; pass < 2; pass++) {
-    for (int k = 0; k < race->n; k++) {
+    for (int k = 0; k < i; k++) {
       const cav_race_entry *e = &race->entry[k];
       if (e->state != CAV_RACE_DONE || !e->report.solution || e->strategy.use == CAV_STRATEGY_DIAGNOSIS) continue;
       const cav_verdict *v = &e->report.verdict;
@@ -432,7 +444,7 @@ static int find_broken(const cav_race *race, const char *passed) {
     }
   }
   if (best >= 0 || isfinite(least)) return best;
-  best = cav_race_best(race, 0);
+  best = best_of(race, i, 0);
   return best >= 0 && !passed[best] ? best : -1;
 }
 
@@ -480,7 +492,7 @@ static int find_cure(const cav_race *race, int i, const cav_race_entry *from, ca
 static int find_repair(const cav_race *race, int i, cav_strategy *repaired, int *of) {
   char passed[CAV_STRATEGIES] = {0};
   while (1) {
-    *of = race->entry[i].strategy.use == CAV_STRATEGY_NEAR ? find_near(race, i, passed) : find_broken(race, passed);
+    *of = race->entry[i].strategy.use == CAV_STRATEGY_NEAR ? find_near(race, i, passed) : find_broken(race, i, passed);
     if (*of < 0) return 0;
     if (find_cure(race, i, &race->entry[*of], repaired)) return 1;
     passed[*of] = 1;
@@ -577,15 +589,7 @@ cav_status cav_race_finish(cav_race *race, int cheapest, cav_error *error) {
   }
 }
 
-int cav_race_best(const cav_race *race, int cheapest) {
-  int best = -1;
-  for (int i = 0; i < race->n; i++) {
-    const cav_race_entry *e = &race->entry[i];
-    if (e->state != CAV_RACE_DONE || !e->report.solution || e->strategy.use == CAV_STRATEGY_DIAGNOSIS) continue;
-    if (best < 0 || cav_rank_better(&e->report, &race->entry[best].report, cheapest)) best = i;
-  }
-  return best;
-}
+int cav_race_best(const cav_race *race, int cheapest) { return best_of(race, race->n, cheapest); }
 
 int cav_race_save(cav_race *race, int best) {
   cav_race_entry *e = &race->entry[best];
