@@ -520,6 +520,13 @@ says caught/verdict.json '"certified": false'
 lines=$(wc -l <caught/log.csv)
 check "the log ends early: $lines lines" [ "$lines" -lt 200 ]
 run 1 verify caught --quiet
+# what it misses is not the problem's fault
+run 1 verify caught
+says out "was stopped at stage"
+run 1 explain caught
+says out "its command with --resume goes on"
+run 0 explain swing.result
+check "of a whole solve nothing is said" sh -c '! grep -q "was stopped" out'
 
 run 0 solve problem.xml -o swing.result --resume --quiet
 sed 's/duration="1"/duration="2"/' problem.xml >longer.xml

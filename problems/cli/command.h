@@ -153,6 +153,9 @@ enum { CAV_MISSED_TEXT = 1000 };
 int cav_command_missed(const cav_problem *problem, const cav_trajectory *motion, const cav_explanation *explanation,
                        char text[CAV_MISSED_TEXT]);
 
+/// Whether the motion of a folder is where its solve was stopped; tells where, unless out is NULL. stopped.c.
+int cav_command_tell_stopped(FILE *out, const char *folder);
+
 /// Tells which solids of the world a motion leans on that neither its first nor its last knot touches. leaned_on.c.
 void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_trajectory *motion,
                               const cav_options *contact);

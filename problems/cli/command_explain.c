@@ -174,10 +174,12 @@ int cav_command_explain(const cav_command_line *line) {
     cav_command_missed(result->problem, result->trajectory, &explanation, missed);
   if (!status && !verdict.certified && verdict.achieved && cav_verdict_feasible(&verdict) && !result->problem->cycle.on)
     tell_remedy(result, &verdict, line->operand, missed, sizeof missed);
+  int stopped = !status && cav_command_tell_stopped(line->json ? NULL : stdout, line->operand);
   if (!status && line->json) {
-    printf("{\n  \"met\": %s,\n  \"certified\": %s,\n  \"achieved\": %s,\n  \"reason\": ",
-           explanation.met ? "true" : "false", verdict.certified ? "true" : "false",
-           verdict.achieved ? "true" : "false");
+    printf("{\n  \"stopped\": %s,\n", stopped ? "true" : "false");
+    printf(
+        "  \"met\": %s,\n  \"certified\": %s,\n  \"achieved\": %s,\n  \"reason\": ", explanation.met ? "true" : "false",
+        verdict.certified ? "true" : "false", verdict.achieved ? "true" : "false");
     cav_certificate_json_text(stdout, verdict.reason);
     printf(",\n  \"missed\": ");
     cav_certificate_json_text(stdout, verdict.missed);

@@ -39,6 +39,7 @@ int cav_command_verify(const cav_command_line *line) {
   if (!status && !line->json && !line->quiet)
     status = cav_command_tell_records(NULL, 1, result->problem, result->trajectory, &result->problem->contact, &error);
   if (!status && !line->json && !line->quiet) {
+    cav_command_tell_stopped(stdout, line->operand);
     cav_certificate_print(stdout, result->problem, &verdict, terms);
     if (verdict.certified)
       cav_command_tell_leaning(stdout, result->problem, result->trajectory, &result->problem->contact);
