@@ -68,8 +68,8 @@ static const double exceeded = 1.3, fair = 0.5, unfinished = 0.1;
 /// Part of what all knots' forecasts were off by that the knots whose curvature is kept may be off by.
 static const double unmarked = 0.3;
 
-/// What a motion whose rows hold may be dearer than where a run ends without that.
-static const double held_loss = 1e-2;
+/// What a motion whose rows hold may be dearer than where a run ends without that; rows that nearly hold.
+static const double held_loss = 1e-2, nearly = 1e-4;
 
 /// Squares of the step, rad or m, that make a programme convex, of the cost: of all knots, and of single ones.
 /// A wave of these takes what is within this fraction of the largest.
@@ -108,7 +108,8 @@ typedef struct descent {
   double gain;                   ///< decrease of the step that was taken
   double asked;                  ///< what may be left to be saved, of the cost
   cav_trajectory *second, *best; ///< corrected trial; best of those tried
-  cav_trajectory *held;          ///< last motion whose rows held; NULL: none did
+  cav_trajectory *held;          ///< last motion whose rows held, or nearly; NULL: none did
+  int holds;                     ///< 1: as a certificate asks
   double held_cost;
   const cav_trajectory *last; ///< what was evaluated last
 } descent;
@@ -573,23 +574,26 @@ static cav_status look(cav_solve_run *run, descent *d, tail *end) {
   return status;
 }
 
-/// Keeps the motion where its rows hold, or are as near as a certificate asks.
+/// Keeps the motion where its rows hold, or are as near as a certificate asks; until there is one, where they nearly do.
 static cav_status hold(const cav_solve_run *run, descent *d) {
-  if (!cav_run_certifiable(run)) return CAV_OK;
+  int holds = cav_run_certifiable(run);
+  double most = fmax(cav_transcription_unactuated(run->tr, NULL), cav_transcription_violation(run->tr));
+  if (!holds && (d->holds || most > nearly)) return CAV_OK;
+  d->holds = holds;
   cav_trajectory_free(d->held);
   d->held = cav_trajectory_copy(run->at);
   d->held_cost = cav_transcription_cost(run->tr);
   return d->held ? CAV_OK : CAV_NO_MEMORY;
 }
 
-/// Where a run ends beside its rows: back to where they held, if that costs little.
+/// Where a run ends beside its rows: back to where they held, if that costs little, and by the metric of there.
 static cav_status go_back(cav_solve_run *run, descent *d) {
-  double most = (1 + held_loss) * cav_transcription_cost(run->tr);
+  double most = (1 + held_loss) * cav_transcription_cost(run->tr), saving;
   if (cav_run_met(run) || !d->held || d->held_cost > most) return CAV_OK;
   exchange(&run->at, &d->held);
   cav_trajectory_free(d->held);
   d->held = NULL;
-  cav_status status = cav_transcription_values(run->tr, run->at);
+  cav_status status = d->holds ? cav_transcription_values(run->tr, run->at) : foresee(run, d, &saving);
   return status == CAV_OK ? settle_rows(run, d) : status;
 }
 
