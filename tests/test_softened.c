@@ -1,5 +1,6 @@
 /// Where the last phase is stuck it goes on by way of softer laws: a walk's cycle stands still 3e-3 above the optimum that
 /// all iterations find, and comes to it. Where no end is asked for it is not tried, and a motion that is not stuck has none.
+/// Where softer laws gain nothing, as with a box that is shoved, slow steps go on to the optimum.
 #include "motion.h"
 
 /// Cost at the end of the first run of the last phase, stages of softer laws.
@@ -8,9 +9,8 @@ typedef struct course {
   int softened;
 } course;
 
-static course solve(const char *motion, double optimality) {
+static course solve(const char *name, cav_problem *problem, double optimality) {
   course c = {.first = NAN, .last = NAN};
-  cav_problem *problem = motion_load(&(motion_case){motion, NULL});
   if (!problem) return c;
   cav_solve_options options = cav_solve_options_default();
   cav_solution *s = NULL;
@@ -30,18 +30,32 @@ static course solve(const char *motion, double optimality) {
     CHECK(cav_verify_solution(problem, s, &verdict, &error) == CAV_OK);
     CHECK(cav_verdict_feasible(&verdict));
   }
-  printf("%s, to %g: cost %.6f at first, %.6f at the end, %d stages of softer laws\n", motion, optimality, c.first,
+  printf("%s, to %g: cost %.6f at first, %.6f at the end, %d stages of softer laws\n", name, optimality, c.first,
          c.last, c.softened);
   cav_solution_free(s);
   cav_problem_free(problem);
   return c;
 }
 
+static course solve_motion(const char *motion, double optimality) {
+  return solve(motion, motion_load(&(motion_case){motion, NULL}), optimality);
+}
+
+static course solve_shove(double optimality) {
+  cav_error error = {0};
+  cav_problem *problem = cav_problem_load(CAVORT_SOURCE_ROOT "/tests/sliding/shove.xml", NULL, &error);
+  CHECK(problem != NULL);
+  return solve("shove", problem, optimality);
+}
+
 int main(void) {
-  course whole = solve("walk-cycle", 0), stuck = solve("walk-cycle", 1e-4), quick = solve("hop", 1e-4);
+  course whole = solve_motion("walk-cycle", 0), stuck = solve_motion("walk-cycle", 1e-4),
+         quick = solve_motion("hop", 1e-4);
   CHECK(whole.softened == 0 && quick.softened == 0);
   CHECK(stuck.softened > 0);
   CHECK(stuck.first > 1.001 * whole.last);
   CHECK(stuck.last < stuck.first && stuck.last < 1.0005 * whole.last);
+  course all = solve_shove(0), slow = solve_shove(5e-4);
+  CHECK(slow.softened > 0 && slow.first > 1.1 * all.last && slow.last < 1.001 * all.last);
   return check_result();
 }

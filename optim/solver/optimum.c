@@ -56,14 +56,19 @@ static cav_status try_softer(cav_solve_run *run, double law, int *left, int *stu
   return status;
 }
 
-/// The last phase, and where its steps are stuck once more by way of softer laws, unless it is all that there is.
+/// The last phase, and where its steps are stuck once more by way of softer laws, unless it is all that there is. What is
+/// still stuck then goes on as it can, and where softer laws gained nothing their iterations do not count.
 static cav_status descend(cav_solve_run *run) {
-  int left = ITERATIONS, stuck, stages = run->problem->schedule.stages,
+  int left = ITERATIONS, stuck = 0, stages = run->problem->schedule.stages,
       alone = stages < 2 || run->options->first_stage > stages;
-  cav_status status = cav_sqp(run, &left, &stuck);
-  for (int i = 0; i < SOFTENINGS && status == CAV_OK && stuck && left > 0 && !alone; i++)
+  cav_status status = cav_sqp(run, &left, alone ? NULL : &stuck);
+  int rest = left;
+  double cost = cav_transcription_cost(run->tr);
+  for (int i = 0; i < SOFTENINGS && status == CAV_OK && stuck && left > 0; i++)
     status = try_softer(run, softer[i], &left, &stuck);
-  return status;
+  if (status != CAV_OK || !stuck) return status;
+  if (!(cav_transcription_cost(run->tr) < cost)) left = rest;
+  return left > 0 ? cav_sqp(run, &left, NULL) : status;
 }
 
 cav_status cav_to_optimum(cav_solve_run *run) {

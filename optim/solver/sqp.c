@@ -107,6 +107,7 @@ typedef struct descent {
   int needs_known;
   double gain;                   ///< decrease of the step that was taken
   double asked;                  ///< what may be left to be saved, of the cost
+  int patient;                   ///< 1: being stuck is no end, unless little is left
   cav_trajectory *second, *best; ///< corrected trial; best of those tried
   cav_trajectory *held;          ///< last motion whose rows held, or nearly; NULL: none did
   int holds;                     ///< 1: as a certificate asks
@@ -561,6 +562,13 @@ typedef struct tail {
   double gain, saving;        ///< of these iterations, of the cost; what the last look found
 } tail;
 
+/// Whether that ends a run: 2, little is left; 3, it is stuck; 0, neither.
+static int is_end(const descent *d, const tail *end) {
+  int stuck = end->stuck >= LOOKS;
+  if (end->met >= LOOKS || (stuck && end->saving <= left_alone * d->asked)) return 2;
+  return stuck && !d->patient ? 3 : 0;
+}
+
 /// Looks, every few iterations that gain little.
 static cav_status look(cav_solve_run *run, descent *d, tail *end) {
   end->saving = INFINITY;
@@ -603,7 +611,7 @@ static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled
   int calm = 0, taken = 1;
   tail end = {0};
   cav_status status = CAV_OK;
-  for (; *left > 0 && calm < PATIENCE && end.met < LOOKS && end.stuck < LOOKS; --*left) {
+  for (; *left > 0 && calm < PATIENCE && !is_end(d, &end); --*left) {
     status = model(run, d, 0);
     if (status == CAV_OK) status = iterate(run, d, &taken);
     if (status != CAV_OK || !taken) break;
@@ -612,8 +620,8 @@ static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled
     if (status == CAV_OK) status = hold(run, d);
     if (status == CAV_OK) status = look(run, d, &end);
   }
-  int stuck = end.stuck >= LOOKS, little = end.met >= LOOKS || (stuck && end.saving <= left_alone * d->asked);
-  *settled = little ? 2 : stuck ? 3 : !taken || calm >= PATIENCE;
+  int ended = is_end(d, &end);
+  *settled = ended ? ended : !taken || calm >= PATIENCE;
   if (status == CAV_OK) status = settle_rows(run, d);
   return status == CAV_OK ? go_back(run, d) : status;
 }
@@ -681,6 +689,7 @@ static cav_status run_of(cav_solve_run *run, int *left, double asked, double fra
   if (!entry) return CAV_NO_MEMORY;
   cav_status status = descent_new(&d, run) ? cav_transcription_values(run->tr, run->at) : CAV_NO_MEMORY;
   d.asked = asked;
+  d.patient = !stuck;
   if (status == CAV_OK) begin(run, &d);
   run->measured = 0;
   if (status == CAV_OK) status = descend(run, &d, left, &settled);
@@ -691,7 +700,7 @@ static cav_status run_of(cav_solve_run *run, int *left, double asked, double fra
                         : !met           ? CAV_OUTCOME_STALLED
                         : settled        ? CAV_OUTCOME_SETTLED
                                          : CAV_OUTCOME_LIMIT;
-  *stuck = met && settled == 3;
+  if (stuck) *stuck = met && settled == 3;
   if (!cav_run_note(run, fraction, first, outcome)) status = CAV_NO_MEMORY;
   if (status == CAV_OK && !met && !soft) {
     exchange(&run->at, &entry);

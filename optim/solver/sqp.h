@@ -5,8 +5,8 @@
 #include "continuation.h"
 
 /// From run->at, at the transcription's law, to a stationary point at which every row holds. CAV_NOT_CONVERGED with
-/// run->at as it was if the rows do not come in. *left: iterations, of which it takes its own. *stuck: whether steps hardly
-/// gain though much may be left.
+/// run->at as it was if the rows do not come in. *left: iterations, of which it takes its own. *stuck: whether it ended since
+/// steps hardly gain though much may be left; NULL: that is no end.
 cav_status cav_sqp(cav_solve_run *run, int *left, int *stuck);
 
 /// Some iterations of it at a softer law, at a fraction of the way; rows need not come in.
