@@ -31,6 +31,8 @@ static void print_brief(const cav_explanation *e, const cav_verdict *verdict, co
   int apart = !impossible && !*pumping && *e->contradiction;
   if (apart) n += printf("cause: %s. %s\n", e->contradiction, e->nconflict ? e->conflict[0].cure : "") > 0;
   const char *whose = repair ? " (of a repair, --all tells)" : "";
+  // what the motion is of goes before what its cost hangs on
+  if (good && repair) n += puts(repair) >= 0;
   if (!verdict->certified) n += printf("not certified%s: %s\n", whose, verdict->reason) > 0;
   if (!verdict->achieved && n < LINES) n += printf("not achieved: misses %s\n", verdict->missed) > 0;
   if (good)
@@ -45,7 +47,7 @@ static void print_brief(const cav_explanation *e, const cav_verdict *verdict, co
   } else if (n < LINES && e->nviolation) {
     print_cause(&e->violation[0], "cause: "), n++;
   }
-  if (repair && n < LINES) puts(repair);
+  if (repair && !good && n < LINES) puts(repair);
 }
 
 static void print_table(const cav_explanation *e, const cav_verdict *verdict) {

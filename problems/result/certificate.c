@@ -117,9 +117,10 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
     fprintf(out, "%s to %.1g (the word needs %g)\n", cav_verdict_optimal(v) ? "locally optimal" : "NOT optimal, but",
             v->optimality, CAV_TOLERANCE_OPTIMAL);
   if (cav_verdict_feasible(v) && !cav_verdict_optimal(v) && !isnan(v->optimality))
-    fprintf(out,
-            "  a cheaper motion is near: --solver both or more <last iterations> in <schedule> look for it; a "
-            "certificate does not ask for it\n");
+    fprintf(
+        out,
+        "  a cheaper motion may be near: <schedule optimality=\"1e-5\"/> goes on for longer, --solver both goes on by "
+        "Ipopt; a certificate does not ask for it\n");
   fprintf(out, "%s: %s on %s", v->certified ? "certified" : "NOT certified", problem->name, problem->model->name);
   if (!isnan(v->residual_fraction_max))
     fprintf(out, ", with residual forces on its root of up to %.3g %% of the weight", 100 * v->residual_fraction_max);
