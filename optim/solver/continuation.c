@@ -131,12 +131,6 @@ static cav_outcome outcome_of(const cav_solve_run *run, cav_status status) {
   return run->region.stalled ? CAV_OUTCOME_STALLED : run->region.settled ? CAV_OUTCOME_SETTLED : CAV_OUTCOME_LIMIT;
 }
 
-static void exchange(cav_trajectory **a, cav_trajectory **b) {
-  cav_trajectory *kept = *a;
-  *a = *b;
-  *b = kept;
-}
-
 /// Copies a trajectory over another one's place; 0 if memory runs out.
 static int keep(cav_trajectory **kept, const cav_trajectory *at) {
   cav_trajectory_free(*kept);
@@ -206,7 +200,7 @@ cav_status cav_continuation_run(cav_solve_run *run) {
       break;
     }
     if (again) {
-      exchange(&run->at, &before);
+      cav_run_exchange(&run->at, &before);
       retries++;
       fraction = 0.5 * (settled + fraction);
       continue;
@@ -339,7 +333,7 @@ static cav_status restore(cav_solve_run *run, double fraction) {
   if (!cav_run_note(run, 1, begin, outcome)) status = CAV_NO_MEMORY;
   // what cannot be brought in stays as it was: steps that chase the impossible lead far away
   if (status == CAV_OK && !holds(&is, &most)) {
-    exchange(&run->at, &entry);
+    cav_run_exchange(&run->at, &entry);
     status = cav_transcription_values(tr, run->at);
     if (status == CAV_OK) status = CAV_NOT_CONVERGED;
   }
@@ -389,7 +383,7 @@ cav_status cav_minimise_infeasibility(cav_solve_run *run) {
     status = cav_guess_take(run);
     if (status == CAV_OK) status = rest_from_here(run, 0);
     if (status != CAV_OK || !(cav_transcription_merit(run->tr) < merit)) {
-      exchange(&run->at, &first);
+      cav_run_exchange(&run->at, &first);
       if (status == CAV_OK) status = cav_transcription_values(run->tr, run->at);
     }
   }
@@ -415,7 +409,7 @@ cav_status cav_recover_feasible(cav_solve_run *run) {
   run->nested = 0;
   if (status == CAV_NOT_CONVERGED) {
     // a motion that is possible is worth more than a cheaper one that is not
-    exchange(&run->at, &feasible);
+    cav_run_exchange(&run->at, &feasible);
     status = cav_transcription_values(run->tr, run->at);
   }
   cav_trajectory_free(feasible);

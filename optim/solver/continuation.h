@@ -33,6 +33,13 @@ typedef struct cav_solve_run {
   cav_checkpoint checkpoint;    ///< the next one's, but for what is the run's
 } cav_solve_run;
 
+/// Two motions in each other's places.
+static inline void cav_run_exchange(cav_trajectory **a, cav_trajectory **b) {
+  cav_trajectory *kept = *a;
+  *a = *b;
+  *b = kept;
+}
+
 /// Whether a part is still to be done: not of a solve that is resumed after it. Tells the keeper of the place. *status:
 /// CAV_INTERRUPTED if that asks for the end. checkpoint.c.
 int cav_run_reaches(cav_solve_run *run, cav_place place, cav_status *status);

@@ -10,12 +10,6 @@ enum { ITERATIONS = 250 };
 static const double softer[] = {0.6, 0.8};
 enum { SOFTENINGS = sizeof softer / sizeof *softer };
 
-static void exchange(cav_trajectory **a, cav_trajectory **b) {
-  cav_trajectory *kept = *a;
-  *a = *b;
-  *b = kept;
-}
-
 /// Through the law at a fraction of the way, to its optimum nearly, and all stages after it.
 static cav_status soften(cav_solve_run *run, double law, int *left) {
   int stages = run->problem->schedule.stages, first = 0;
@@ -38,19 +32,19 @@ static cav_status soften(cav_solve_run *run, double law, int *left) {
   return status;
 }
 
-/// The last phase again by way of a softer law. Where that ends dearer, back to where it was, still stuck.
+/// The last phase again by way of a softer law. Where that ends dearer or not at all, back to where it was, still stuck; where
+/// it is stopped, too: rows hold there.
 static cav_status try_softer(cav_solve_run *run, double law, int *left, int *stuck) {
   double cost = cav_transcription_cost(run->tr);
   cav_trajectory *before = cav_trajectory_copy(run->at);
   if (!before) return CAV_NO_MEMORY;
   cav_status status = soften(run, law, left);
   if (status == CAV_OK) status = cav_sqp(run, left, stuck);
-  int dearer = status == CAV_OK && cav_transcription_cost(run->tr) >= cost;
-  if (dearer || status == CAV_NOT_CONVERGED) {
-    exchange(&run->at, &before);
+  if (status != CAV_OK || cav_transcription_cost(run->tr) >= cost) {
+    cav_run_exchange(&run->at, &before);
+    run->measured = 0;
     *stuck = 1;
-    status = cav_transcription_values(run->tr, run->at);
-    if (status == CAV_OK) status = cav_sqp_measure(run);
+    if (status == CAV_OK || status == CAV_NOT_CONVERGED) status = cav_transcription_values(run->tr, run->at);
   }
   cav_trajectory_free(before);
   return status;
@@ -68,7 +62,9 @@ static cav_status descend(cav_solve_run *run) {
     status = try_softer(run, softer[i], &left, &stuck);
   if (status != CAV_OK || !stuck) return status;
   if (!(cav_transcription_cost(run->tr) < cost)) left = rest;
-  return left > 0 ? cav_sqp(run, &left, NULL) : status;
+  if (left > 0) status = cav_sqp(run, &left, NULL);
+  // rows held where it began, and it is there again
+  return status == CAV_NOT_CONVERGED ? CAV_OK : status;
 }
 
 cav_status cav_to_optimum(cav_solve_run *run) {

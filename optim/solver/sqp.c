@@ -267,12 +267,6 @@ static cav_status model(cav_solve_run *run, descent *d, int all) {
   return status;
 }
 
-static void exchange(cav_trajectory **a, cav_trajectory **b) {
-  cav_trajectory *kept = *a;
-  *a = *b;
-  *b = kept;
-}
-
 /// Merit of a trajectory, infinite where it cannot be evaluated.
 static cav_status try_at(cav_solve_run *run, descent *d, cav_trajectory *at, double *merit) {
   cav_status status = cav_transcription_values(run->tr, at);
@@ -297,7 +291,7 @@ static cav_status try_better(cav_solve_run *run, descent *d, const cav_trajector
   *better = there < *merit;
   if (!*better) return status;
   *merit = there;
-  exchange(&run->spare, &d->second);
+  cav_run_exchange(&run->spare, &d->second);
   keep_parts(d);
   return status;
 }
@@ -336,7 +330,7 @@ static cav_status shorten(cav_solve_run *run, descent *d, double *merit) {
     double part = shorter[i][0], fraction = part * (2 - part), there;
     if (d->ratio < shorter[i][1]) continue;
     memcpy(d->parts, d->after, (size_t)run->tr->nknot * sizeof(double));
-    exchange(&run->spare, &d->best);
+    cav_run_exchange(&run->spare, &d->best);
     cav_status status = try_step(run, d, part, fraction * d->predicted, &there);
     if (status != CAV_OK) return status;
     if (there < *merit && d->merit - there > 0.1 * fraction * d->predicted) {
@@ -346,7 +340,7 @@ static cav_status shorten(cav_solve_run *run, descent *d, double *merit) {
       d->ratio = (d->merit - there) / d->predicted;
       return CAV_OK;
     }
-    exchange(&run->spare, &d->best);
+    cav_run_exchange(&run->spare, &d->best);
     memcpy(d->after, d->parts, (size_t)run->tr->nknot * sizeof(double));
     d->last = NULL;
   }
@@ -362,7 +356,7 @@ static int is_short(const descent *d) {
 static cav_status extrapolate(cav_solve_run *run, descent *d, double *merit) {
   double multiple = 2, limit = most_radius / cav_quadratic_length(d->qp);
   for (; multiple <= limit; multiple *= 2) {
-    exchange(&run->spare, &d->best);
+    cav_run_exchange(&run->spare, &d->best);
     double longer;
     cav_status status = try_step(run, d, multiple, INFINITY, &longer);
     if (status != CAV_OK) return status;
@@ -370,7 +364,7 @@ static cav_status extrapolate(cav_solve_run *run, descent *d, double *merit) {
       *merit = longer;
       continue;
     }
-    exchange(&run->spare, &d->best);
+    cav_run_exchange(&run->spare, &d->best);
     break;
   }
   return CAV_OK;
@@ -462,7 +456,7 @@ static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
       take_boxes(run, d);
       d->gain = d->merit - trial;
       d->few = d->gain < gauss_newton * scale ? d->few + 1 : 0;
-      exchange(&run->at, &run->spare);
+      cav_run_exchange(&run->at, &run->spare);
       *taken = 1;
       return d->last == run->at ? CAV_OK : cav_transcription_values(run->tr, run->at);
     }
@@ -499,7 +493,7 @@ static cav_status settle_rows(cav_solve_run *run, descent *d) {
     double merit;
     status = try_at(run, d, run->spare, &merit);
     int nearer = isfinite(merit) && fmax(cav_transcription_unactuated(tr, NULL), cav_transcription_violation(tr)) < is;
-    if (nearer) exchange(&run->at, &run->spare);
+    if (nearer) cav_run_exchange(&run->at, &run->spare);
     if (!nearer && status == CAV_OK) status = cav_transcription_values(tr, run->at);
   }
   return status;
@@ -598,7 +592,7 @@ static cav_status hold(const cav_solve_run *run, descent *d) {
 static cav_status go_back(cav_solve_run *run, descent *d) {
   double most = (1 + held_loss) * cav_transcription_cost(run->tr), saving;
   if (cav_run_met(run) || !d->held || d->held_cost > most) return CAV_OK;
-  exchange(&run->at, &d->held);
+  cav_run_exchange(&run->at, &d->held);
   cav_trajectory_free(d->held);
   d->held = NULL;
   cav_status status = d->holds ? cav_transcription_values(run->tr, run->at) : foresee(run, d, &saving);
@@ -611,7 +605,7 @@ static cav_status settle(cav_solve_run *run, descent *d, int *left, int *settled
   int calm = 0, taken = 1;
   tail end = {0};
   cav_status status = CAV_OK;
-  for (; *left > 0 && calm < PATIENCE && !is_end(d, &end); --*left) {
+  for (; status == CAV_OK && *left > 0 && calm < PATIENCE && !is_end(d, &end); --*left) {
     status = model(run, d, 0);
     if (status == CAV_OK) status = iterate(run, d, &taken);
     if (status != CAV_OK || !taken) break;
@@ -644,7 +638,7 @@ static cav_status leap(cav_solve_run *run, descent *d, int *taken) {
     if (!*taken) status = cav_transcription_values(run->tr, run->at);
     if (status != CAV_OK) return status;
   }
-  if (*taken) exchange(&run->at, &run->spare);
+  if (*taken) cav_run_exchange(&run->at, &run->spare);
   return CAV_OK;
 }
 
@@ -662,7 +656,7 @@ static cav_status descend(cav_solve_run *run, descent *d, int *left, int *settle
     double reached = cav_run_met(run) ? cav_transcription_cost(run->tr) : INFINITY;
     if (i == 0 && !cav_run_met(run)) break;
     if (!(reached < (1 - slow) * cost)) {
-      if (reached >= cost) exchange(&run->at, &best);
+      if (reached >= cost) cav_run_exchange(&run->at, &best);
       status = cav_transcription_values(run->tr, run->at);
       if (status == CAV_OK) status = measure(run, d, 1);
       break;
@@ -691,8 +685,11 @@ static cav_status run_of(cav_solve_run *run, int *left, double asked, double fra
   d.asked = asked;
   d.patient = !stuck;
   if (status == CAV_OK) begin(run, &d);
+  if (status == CAV_OK && cav_run_certifiable(run)) status = hold(run, &d);
   run->measured = 0;
   if (status == CAV_OK) status = descend(run, &d, left, &settled);
+  // of a run that is stopped the last motion whose rows held
+  if (status == CAV_INTERRUPTED && d.held && d.holds && !soft) cav_run_exchange(&run->at, &d.held);
   run->tr->penalty = kept;
   if (status == CAV_OK) status = cav_transcription_values(run->tr, run->at);
   int met = status == CAV_OK && cav_run_met(run);
@@ -703,7 +700,7 @@ static cav_status run_of(cav_solve_run *run, int *left, double asked, double fra
   if (stuck) *stuck = met && settled == 3;
   if (!cav_run_note(run, fraction, first, outcome)) status = CAV_NO_MEMORY;
   if (status == CAV_OK && !met && !soft) {
-    exchange(&run->at, &entry);
+    cav_run_exchange(&run->at, &entry);
     status = cav_transcription_values(run->tr, run->at);
     if (status == CAV_OK) status = CAV_NOT_CONVERGED;
   }
