@@ -153,7 +153,20 @@ enum { CAV_MISSED_TEXT = 1000 };
 int cav_command_missed(const cav_problem *problem, const cav_trajectory *motion, const cav_explanation *explanation,
                        char text[CAV_MISSED_TEXT]);
 
-/// Whether the motion of a folder is where its solve was stopped; tells where, unless out is NULL. stopped.c.
+/// A line of a folder's strategies.csv: whether its motion is the one that was kept, how it ended, what it changed of the
+/// problem and what it missed. Opened with no line; next: whether there is one more. tried.c.
+typedef struct cav_tried {
+  FILE *in;
+  char *line;
+  size_t room;
+  int kept;
+  const char *outcome, *changed, *reason;
+} cav_tried;
+cav_tried cav_tried_open(const char *folder);
+int cav_tried_next(cav_tried *tried);
+void cav_tried_close(cav_tried *tried);
+
+/// Whether the motion of a folder is where its solve was stopped; tells where, unless out is NULL. tried.c.
 int cav_command_tell_stopped(FILE *out, const char *folder);
 
 /// Tells which solids of the world a motion leans on that neither its first nor its last knot touches. leaned_on.c.

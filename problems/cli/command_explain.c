@@ -85,51 +85,32 @@ static void print_reasons(const char *name, int n, const cav_reason *reason) {
   printf("]");
 }
 
-// the two quoted texts that end a line of strategies.csv: what was changed, and what was missed
-static int texts_of(char *line, char **changed, char **reason) {
-  char *at[4], *c = line;
-  for (int k = 0; k < 4; k++, c = at[k - 1] + 1)
-    if (!(at[k] = strchr(c, '"'))) return 0;
-  *at[1] = *at[3] = 0;
-  *changed = at[0] + 1, *reason = at[2] + 1;
-  return 1;
-}
-
 // whether the motion of a folder is one that a repair found: with what, and what the problem as it was stated misses; to be freed
 static char *told_of_repair(const char *folder) {
-  char *path = cav_result_path(folder, "strategies.csv"), *line = NULL, *stated = NULL, *told = NULL;
-  FILE *in = path ? fopen(path, "r") : NULL;
-  size_t room = 0;
-  while (in && !told && getline(&line, &room, in) > 0) {
-    char *changed, *reason;
-    int kept = strstr(line, ",1,") == strchr(line, ',') && strchr(line, ',');
-    if (!texts_of(line, &changed, &reason)) continue;
-    if (!stated) stated = strdup(reason);
-    if (!kept || !*changed || !stated || !(told = malloc(strlen(changed) + strlen(stated) + 120))) continue;
-    sprintf(told, "this motion is not of the problem as it was stated, but with %s; as stated it misses: %s", changed,
+  cav_tried t = cav_tried_open(folder);
+  char *stated = NULL, *told = NULL;
+  while (!told && cav_tried_next(&t)) {
+    if (!stated) stated = strdup(t.reason);
+    if (!t.kept || !*t.changed || !stated || !(told = malloc(strlen(t.changed) + strlen(stated) + 120))) continue;
+    sprintf(told, "this motion is not of the problem as it was stated, but with %s; as stated it misses: %s", t.changed,
             *stated ? stated : "a target");
   }
-  if (in) fclose(in);
-  free(path), free(line), free(stated);
+  cav_tried_close(&t);
+  free(stated);
   return told;
 }
 
 // whether a strategy of the folder's solve made these changes
 static int was_tried(const char *folder, const char *changes) {
-  char *path = cav_result_path(folder, "strategies.csv"), *line = NULL;
-  FILE *in = path ? fopen(path, "r") : NULL;
-  size_t room = 0;
+  cav_tried t = cav_tried_open(folder);
   int tried = 0;
-  while (in && !tried && getline(&line, &room, in) > 0) {
-    char *changed, *reason;
-    if (!texts_of(line, &changed, &reason)) continue;
+  while (!tried && cav_tried_next(&t)) {
     // quotes within are written as single ones; a solid's growth is of the folder's problem already
     size_t n = strlen(changes);
-    tried = strlen(changed) >= n && (!changed[n] || !strcmp(changed + n, ", solids='grow'"));
-    for (size_t i = 0; tried && changes[i]; i++) tried = changed[i] == (changes[i] == '"' ? '\'' : changes[i]);
+    tried = strlen(t.changed) >= n && (!t.changed[n] || !strcmp(t.changed + n, ", solids='grow'"));
+    for (size_t i = 0; tried && changes[i]; i++) tried = t.changed[i] == (changes[i] == '"' ? '\'' : changes[i]);
   }
-  if (in) fclose(in);
-  free(path), free(line);
+  cav_tried_close(&t);
   return tried;
 }
 
