@@ -8,175 +8,9 @@
 #include "vectors.h"
 
 #include <assert.h>
-#include <float.h>
-#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-int cav_knot_moves(const cav_transcription *tr, int t) { return tr->periodicity || (t >= tr->first && t < tr->nknot); }
-
-// ---------------------------------------------------------------- counting
-
-/// Readings of a contact that a cost takes: n from the first, of contacts within one tree (self) or of all others.
-typedef struct contact_part {
-  int first, n, self;
-} contact_part;
-
-/// n 0: not a cost of contacts.
-static contact_part contact_part_of(cav_quantity quantity) {
-  static const contact_part part[CAV_QUANTITY_TYPES] = {
-      [CAV_QUANTITY_GAP] = {0, 1, 0},    [CAV_QUANTITY_SLIP] = {1, 2, 0},
-      [CAV_QUANTITY_IMPACT] = {3, 1, 0}, [CAV_QUANTITY_SELF_PENETRATION] = {0, 1, 1},
-      [CAV_QUANTITY_FORCE] = {4, 1, 0},  [CAV_QUANTITY_SELF_FORCE] = {4, 1, 1},
-  };
-  assert(part[quantity].first + part[quantity].n <= CAV_CONTACT_READINGS);
-  return part[quantity];
-}
-
-/// Rows that are begun, and how many of them at most are laid over all columns.
-typedef struct row_count {
-  size_t rows, dense;
-} row_count;
-
-/// Whether a force row is a row of its own, or joins that of its only dof.
-static int stands_alone(const cav_force_row *form) { return form->n != 1; }
-
-/// Whether a term of slip lets a contact of two links slide at knot t that no actuator moves: the floor under a box.
-static int frees(const cav_transcription *tr, const cav_term *term, int t, int link1, int link2) {
-  if (term->quantity != CAV_QUANTITY_SLIP || term->body <= 0 || !(term->within > 0)) return 0;
-  int link = tr->model->body[term->body].link;
-  return (link == link1 || link == link2) && cav_term_weight(tr, term, t) > 0;
-}
-
-/// Whether a term counts the k-th contact of knot t, key [2*contacts]: of a body that moves those of its link, of one that is
-/// fixed to the world those of its own geoms. One of slip over all contacts leaves those that another
-/// term frees.
-static int counts(const cav_transcription *tr, const int *key, const cav_term *term, int t, int k) {
-  const cav_model *m = tr->model;
-  const cav_pair *pair = &m->pair[key[2 * k]];
-  const cav_geom *one = &m->geom[pair->geom1], *two = &m->geom[pair->geom2];
-  int link = m->body[term->body].link, link1 = one->link, link2 = two->link;
-  if (term->body > 0 && link == 0) return one->body == term->body || two->body == term->body;
-  if (term->body > 0) return link1 == link || link2 == link;
-  if (term->quantity != CAV_QUANTITY_SLIP || m->link[link1].driven || m->link[link2].driven) return 1;
-  for (int i = 0; i < tr->problem->nterm; i++)
-    if (frees(tr, &tr->problem->term[i], t, link1, link2)) return 0;
-  return 1;
-}
-
-int cav_knot_contact(const cav_transcription *tr, const int *key, const cav_term *term, int t, int k, int *first) {
-  contact_part part = contact_part_of(term->quantity);
-  *first = part.first;
-  return part.n > 0 && tr->knot[t].moving[k] == part.self && counts(tr, key, term, t, k) ? part.n : 0;
-}
-
-/// Rows of a cost at knot t, whose contacts are listed.
-static row_count cost_rows(const cav_transcription *tr, const int *key, const cav_term *term, int t) {
-  const cav_knot *knot = &tr->knot[t];
-  row_count n = {0};
-  if (cav_term_weight(tr, term, t) == 0) return n;
-  int rate = term->quantity == CAV_QUANTITY_ACCELERATION, first;
-  switch (term->quantity) {
-    case CAV_QUANTITY_SENSOR:
-    case CAV_QUANTITY_TRACK:
-    case CAV_QUANTITY_USER:
-      n.rows = n.dense = (size_t)cav_term_dim(term);
-      break;
-    case CAV_QUANTITY_CONFIGURATION:
-    case CAV_QUANTITY_VELOCITY:
-    case CAV_QUANTITY_ACCELERATION:
-      if (rate ? !knot->has_force : !cav_knot_moves(tr, t)) break;
-      n.rows = (size_t)cav_term_window(tr, term)->dofs;
-      break;
-    case CAV_QUANTITY_EFFORT:
-      if (!knot->has_force) break;
-      n.rows = (size_t)tr->model->nu;
-      for (int k = 0; k < tr->model->nu; k++) n.dense += (size_t)stands_alone(&tr->effort[k]);
-      break;
-    case CAV_QUANTITY_POWER:
-      if (knot->has_force) n.rows = n.dense = (size_t)tr->model->nu;
-      break;
-    case CAV_QUANTITY_GAP:
-    case CAV_QUANTITY_SLIP:
-    case CAV_QUANTITY_IMPACT:
-    case CAV_QUANTITY_SELF_PENETRATION:
-    case CAV_QUANTITY_FORCE:
-    case CAV_QUANTITY_SELF_FORCE:
-      for (int k = 0; k < knot->ncontact; k++) n.rows += (size_t)cav_knot_contact(tr, key, term, t, k, &first);
-      n.dense = n.rows;
-      break;
-    case CAV_QUANTITY_TYPES:
-      break;
-  }
-  return n;
-}
-
-/// Rows of all constraints at knot t.
-static row_count constraint_rows(const cav_transcription *tr, int t) {
-  row_count n = {.rows = (size_t)tr->knot[t].layout.count};
-  if (tr->knot[t].has_force) {
-    for (int k = 0; k < tr->nresidual; k++) n.dense += (size_t)stands_alone(&tr->unactuated[k]);
-    for (int k = 0; k < tr->nlimit; k++) n.dense += tr->servo[k].n > 0 || stands_alone(&tr->effort[k]);
-  }
-  for (int i = 0; i < tr->problem->nterm; i++) {
-    const cav_term *term = &tr->problem->term[i];
-    if (term->use != CAV_USE_COST) n.dense += (size_t)cav_term_readings(tr, term, t);
-  }
-  return n;
-}
-
-/// Whether the penalty on the duration has its row at knot t.
-static int has_duration(const cav_transcription *tr, int t) { return tr->free_step && t == 0; }
-
-/// All rows of knot t.
-static row_count knot_rows(const cav_transcription *tr, const int *key, int t) {
-  row_count n = constraint_rows(tr, t);
-  // those along single dofs
-  n.dense += (size_t)tr->nv;
-  if (tr->constraints_only) return n;
-  n.rows += (size_t)has_duration(tr, t);
-  for (int k = 0; k < tr->knot[t].ncontact && tr->depth_weight > 0; k++)
-    n.rows += !tr->knot[t].moving[k], n.dense += !tr->knot[t].moving[k];
-  for (int k = 0; k < tr->npenalised && tr->knot[t].has_force; k++)
-    n.rows++, n.dense += stands_alone(&tr->penalised[k]);
-  for (int i = 0; i < tr->problem->nterm; i++) {
-    if (tr->problem->term[i].use != CAV_USE_COST) continue;
-    row_count cost = cost_rows(tr, key, &tr->problem->term[i], t);
-    n.rows += cost.rows;
-    n.dense += cost.dense;
-  }
-  return n;
-}
-
-static int grow(double **array, size_t n) {
-  double *p = realloc(*array, n * sizeof(double));
-  if (p) *array = p;
-  return p != NULL;
-}
-
-int cav_knot_reserve(cav_transcription *tr, cav_scratch *s, int t) {
-  cav_knot *knot = &tr->knot[t];
-  row_count n = knot_rows(tr, s->key, t);
-  if (n.rows > INT_MAX / 2 || n.dense > INT_MAX / 2) return 0;
-  knot->nrow = (int)n.rows;
-  knot->dense_most = (int)n.dense;
-  if (knot->dense_most > knot->dense_room) {
-    if (!grow(&knot->dense, n.dense * 3 * (size_t)tr->nv) || !grow(&knot->rest, n.dense)) return 0;
-    knot->dense_room = knot->dense_most;
-  }
-  if (!tr->free_step) return 1;
-  if (knot->nrow > s->trace_room) {
-    if (!grow(&s->trace[0], n.rows) || !grow(&s->trace[1], n.rows)) return 0;
-    s->trace_room = knot->nrow;
-  }
-  size_t slots = (size_t)knot->layout.count;
-  if (knot->layout.count > s->slot_room) {
-    if (!grow(&s->slot[0], slots) || !grow(&s->slot[1], slots)) return 0;
-    s->slot_room = knot->layout.count;
-  }
-  return 1;
-}
 
 // ---------------------------------------------------------------- rows
 
@@ -200,7 +34,7 @@ static void begin_row(cav_sum *a, double weight, double r) {
 
 /// Curvature of the present row's norm by its dual, where it has one; else that of the square that stands for it.
 static double curvature_of(cav_sum *a, const cav_term *term, double x, double square) {
-  if (a->knot->nabsolute == 0 || !a->jacobian || contact_part_of(term->quantity).n > 0) return square;
+  if (a->knot->nabsolute == 0 || !a->jacobian || cav_knot_takes_contacts(term)) return square;
   assert(a->nabsolute < a->knot->nabsolute);
   cav_absolute *row = &a->knot->absolute[a->nabsolute++];
   row->x = x;
@@ -281,7 +115,7 @@ static void put_force(const cav_sum *a, const cav_force_row *form, double *row) 
 /// its own.
 static void add_force(cav_sum *a, double weight, double r, const cav_force_row *form) {
   const cav_transcription *tr = a->tr;
-  if (!stands_alone(form)) {
+  if (!cav_knot_stands_alone(form)) {
     a->knot->merit += 0.5 * weight * r * r;
     a->s->force_weight[form->dof[0]] += (weight + a->bend) * form->coef[0] * form->coef[0];
     a->s->force_derivative[form->dof[0]] += weight * r * form->coef[0];
@@ -515,11 +349,10 @@ static void add_power(cav_sum *a, const cav_term *term, double weight, const dou
 }
 
 static void add_contact(cav_sum *a, const cav_term *term, double weight) {
-  contact_part part = contact_part_of(term->quantity);
   weight /= term->scale * term->scale;
   for (int k = 0; k < a->knot->ncontact; k++) {
-    if (a->knot->moving[k] != part.self || !counts(a->tr, a->s->key, term, a->t, k)) continue;
-    for (int i = part.first; i < part.first + part.n; i++) {
+    int first, n = cav_knot_contact(a->tr, a->s->key, term, a->t, k, &first);
+    for (int i = first; i < first + n; i++) {
       int row = CAV_CONTACT_READINGS * k + i;
       double r = a->knot->y[row], w = weight;
       if (term->quantity == CAV_QUANTITY_GAP && r < 0) r = w = 0; // it is deep: add_depths
@@ -602,7 +435,7 @@ static void add_costs(cav_sum *a, const double *q, const double *v, const double
   }
   add_depths(a);
   // the duration's own penalty
-  if (!has_duration(tr, a->t)) return;
+  if (!cav_knot_has_duration(tr, a->t)) return;
   double duration = (tr->nknot - 1) * tr->options.timestep;
   begin_row(a, tr->problem->duration_weight, duration);
   add_sparse(a, tr->problem->duration_weight, duration, 0, NULL, NULL);

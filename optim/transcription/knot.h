@@ -24,9 +24,18 @@ typedef struct cav_sum {
 /// Whether the configuration of knot t moves with an unknown.
 int cav_knot_moves(const cav_transcription *transcription, int t);
 
+/// Whether a force row is a row of its own, or joins that of its only dof. count.c, as those down to the contacts' readings.
+int cav_knot_stands_alone(const cav_force_row *form);
+
+/// Whether the penalty on the duration has its row at knot t.
+int cav_knot_has_duration(const cav_transcription *transcription, int t);
+
 /// Counts the rows of knot t, whose contacts are listed, and makes room for them; 0 if memory runs out. Rows are laid
 /// as counted.
 int cav_knot_reserve(cav_transcription *transcription, cav_scratch *scratch, int t);
+
+/// Whether a cost is of contacts.
+int cav_knot_takes_contacts(const cav_term *term);
 
 /// Readings that a cost takes of the k-th contact listed at knot t, key [2*contacts]: their number, 0: none, and the
 /// first.

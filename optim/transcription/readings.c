@@ -80,7 +80,7 @@ static void read_knot(const cav_model *model, cav_state *state, void *context, d
   (void)end_of_values;
 }
 
-static int grow(double **array, size_t n) {
+int cav_readings_grow(double **array, size_t n) {
   double *p = realloc(*array, n * sizeof(double));
   if (p) *array = p;
   return p != NULL;
@@ -121,12 +121,14 @@ int cav_readings_list(cav_transcription *tr, cav_scratch *s, int t) {
   knot->nread = CAV_CONTACT_READINGS * ncontact + nsensor;
   size_t total = (size_t)(nv + knot->nread), n = (size_t)nv;
   if ((int)total > s->room) {
-    if (!grow(&s->value, total) || !grow(&s->dq, total * n) || !grow(&s->dv, total * n) || !grow(&s->dn, total * n))
+    if (!cav_readings_grow(&s->value, total) || !cav_readings_grow(&s->dq, total * n) ||
+        !cav_readings_grow(&s->dv, total * n) || !cav_readings_grow(&s->dn, total * n))
       return 0;
     s->room = (int)total;
   }
   if (knot->nread > knot->room) {
-    if (!grow(&knot->y, (size_t)knot->nread) || !grow(&knot->dy, (size_t)knot->nread * 3 * n)) return 0;
+    if (!cav_readings_grow(&knot->y, (size_t)knot->nread) || !cav_readings_grow(&knot->dy, (size_t)knot->nread * 3 * n))
+      return 0;
     knot->room = knot->nread;
   }
   return 1;

@@ -36,6 +36,9 @@ typedef struct cav_scratch {
   size_t join_room;
 } cav_scratch;
 
+/// Makes an array longer, to n numbers; 0 if memory runs out, and it is as it was.
+int cav_readings_grow(double **array, size_t n);
+
 /// Lists the contacts that carry load at the state and makes room for all readings of knot t; 0 if memory runs out.
 int cav_readings_list(cav_transcription *transcription, cav_scratch *scratch, int t);
 
