@@ -12,6 +12,7 @@
 
 #include "file.h"
 #include "ipopt_options.h"
+#include "ipopt_rows.h"
 #include "lagrangian.h"
 #include "library.h"
 #include "rotation.h"
@@ -92,16 +93,14 @@ typedef struct program {
   IpoptProblem nlp;
   cav_solve_run *run;
   cav_trajectory *anchor; ///< x = 0
-  int n, m;
-  int entries;                                  ///< of the Jacobian
-  int *row_knot, *row_slot;                     ///< [m]
-  int *jacobian_row, *jacobian_column, *source; ///< [entries]; source: column among the row's 3nv
-  double *x;                                    ///< [n] point of the last evaluation
-  int known;                                    ///< 1: values at x are known, 2: derivatives too
-  double *full;                                 ///< [3nv+1] a row while it is rotated, and its entry of the step
-  double damping;                               ///< of Gauss-Newton Hessians, per second
-  double noise;                                 ///< of the dual
-  double barrier;                               ///< parameter that the stage starts from
+  int n;
+  cav_ipopt_rows rows;
+  double *x;      ///< [n] point of the last evaluation
+  int known;      ///< 1: values at x are known, 2: derivatives too
+  double *full;   ///< [3nv+1] a row while it is rotated, and its entry of the step
+  double damping; ///< of Gauss-Newton Hessians, per second
+  double noise;   ///< of the dual
+  double barrier; ///< parameter that the stage starts from
   int exact;
   double **hessian;           ///< [nknot][9nv^2] of the Lagrangian
   double *near;               ///< [3n] a point beside x and gradients there, where the step is free
@@ -111,7 +110,7 @@ typedef struct program {
   double *best_x;             ///< [n] the iterate that is nearest to an optimum
   double best_error, best_infeasibility, best_dual;
   int best_iteration;              ///< -1: none yet
-  int passing, begins_near;        ///< as of the stage
+  int begins_near;                 ///< as of the stage
   double recent_cost[WINDOW_MOST]; ///< a ring
   int window_start, settled;       ///< iteration from which costs count; one at which they had settled, 0: not yet
   int finished;                    ///< stopped by us: settled, and where it is the last stage with its rows in
@@ -167,7 +166,7 @@ static Bool constraints(int n, double *x, Bool fresh, int m, double *g, UserData
   program *p = data;
   (void)n, (void)fresh;
   if (!evaluate(p, x, 0)) return 0;
-  for (int i = 0; i < m; i++) g[i] = p->run->tr->knot[p->row_knot[i]].slot[p->row_slot[i]].value;
+  for (int i = 0; i < m; i++) g[i] = p->run->tr->knot[p->rows.row_knot[i]].slot[p->rows.row_slot[i]].value;
   return 1;
 }
 
@@ -176,22 +175,22 @@ static Bool constraint_jacobian(int n, double *x, Bool fresh, int m, int entries
   program *p = data;
   (void)n, (void)fresh, (void)m;
   if (!value) {
-    memcpy(row, p->jacobian_row, (size_t)entries * sizeof *row);
-    memcpy(column, p->jacobian_column, (size_t)entries * sizeof *column);
+    memcpy(row, p->rows.jacobian_row, (size_t)entries * sizeof *row);
+    memcpy(column, p->rows.jacobian_column, (size_t)entries * sizeof *column);
     return 1;
   }
   if (!evaluate(p, x, 1)) return 0;
   const cav_transcription *tr = p->run->tr;
   int nv = tr->nv, last = -1;
   for (int k = 0; k < entries; k++) {
-    int i = p->jacobian_row[k], t = p->row_knot[i];
+    int i = p->rows.jacobian_row[k], t = p->rows.row_knot[i];
     if (i != last) {
-      memcpy(p->full, tr->knot[t].slot_row + (size_t)p->row_slot[i] * 3 * nv, 3 * (size_t)nv * sizeof(double));
+      memcpy(p->full, tr->knot[t].slot_row + (size_t)p->rows.row_slot[i] * 3 * nv, 3 * (size_t)nv * sizeof(double));
       for (int c = 0; c < 3; c++) rotation_row(p, cav_transcription_block(tr, t, c), p->full + c * nv);
-      p->full[3 * nv] = tr->knot[t].slot_step[p->row_slot[i]];
+      p->full[3 * nv] = tr->knot[t].slot_step[p->rows.row_slot[i]];
       last = i;
     }
-    value[k] = p->full[p->source[k]];
+    value[k] = p->full[p->rows.source[k]];
   }
   return 1;
 }
@@ -232,14 +231,14 @@ static int lagrangian_gradient(program *p, const double *x, double factor, const
   if (!evaluate(p, x, 1)) return 0;
   const cav_transcription *tr = p->run->tr;
   for (int i = 0; i < p->n; i++) g[i] = factor * cav_normal_gradient(p->run->normal)[i];
-  for (int i = 0; i < p->m; i++) {
-    int t = p->row_knot[i];
-    const double *row = tr->knot[t].slot_row + (size_t)p->row_slot[i] * 3 * tr->nv;
+  for (int i = 0; i < p->rows.m; i++) {
+    int t = p->rows.row_knot[i];
+    const double *row = tr->knot[t].slot_row + (size_t)p->rows.row_slot[i] * 3 * tr->nv;
     for (int c = 0; c < 3; c++) {
       int block = cav_transcription_block(tr, t, c);
       for (int d = 0; block >= 0 && d < tr->nv; d++) g[block * tr->nv + d] += multiplier[i] * row[c * tr->nv + d];
     }
-    if (tr->free_step) g[p->n - 1] += multiplier[i] * tr->knot[t].slot_step[p->row_slot[i]];
+    if (tr->free_step) g[p->n - 1] += multiplier[i] * tr->knot[t].slot_step[p->rows.row_slot[i]];
   }
   for (int b = 0; b < cav_transcription_blocks(tr); b++) rotation_row(p, b, g + (size_t)b * tr->nv);
   return 1;
@@ -275,8 +274,9 @@ static void exchange_hessians(program *p) {
 /// What each slot pulls with: its row's multiplier, or on the way its penalty.
 static void take_multipliers(program *p, double factor, const double *multiplier) {
   cav_transcription *tr = p->run->tr;
-  for (int i = 0; i < p->m; i++) tr->knot[p->row_knot[i]].slot[p->row_slot[i]].final_multiplier = multiplier[i];
-  if (!p->passing) return;
+  for (int i = 0; i < p->rows.m; i++)
+    tr->knot[p->rows.row_knot[i]].slot[p->rows.row_slot[i]].final_multiplier = multiplier[i];
+  if (!p->rows.passing) return;
   cav_transcription_estimate_multipliers(tr, NULL);
   for (int t = 0; t < tr->nknot; t++)
     for (int i = 0; i < tr->knot[t].layout.count; i++) tr->knot[t].slot[i].final_multiplier *= factor;
@@ -317,7 +317,7 @@ static Bool lagrangian_hessian(int n, double *x, Bool fresh, double factor, int 
 /// Keeps the iterate if none was nearer to an optimum. A line search that meets the noise of the derivatives can wander
 /// off, and the restoration of Ipopt ends anywhere. On the way, where there are no rows, cost is what tells.
 static void keep_best(program *p, int iteration, double cost) {
-  double error = p->passing ? cost : fmax(p->infeasibility / p->run->options->tolerance, p->dual / p->noise);
+  double error = p->rows.passing ? cost : fmax(p->infeasibility / p->run->options->tolerance, p->dual / p->noise);
   if (p->known < 2 || !(p->best_iteration < 0 || error < p->best_error)) return;
   memcpy(p->best_x, p->x, (size_t)p->n * sizeof(double));
   p->best_error = error;
@@ -328,7 +328,7 @@ static void keep_best(program *p, int iteration, double cost) {
 
 /// Notes an iterate's cost; whether the window up to it has settled. Restoration knows no cost: the window begins anew.
 static int has_settled(program *p, int mode, int iteration, double cost) {
-  const settling *rule = p->passing ? &on_the_way : &at_the_end;
+  const settling *rule = p->rows.passing ? &on_the_way : &at_the_end;
   double least = cost, most = cost;
   p->recent_cost[iteration % WINDOW_MOST] = cost;
   if (mode) p->window_start = iteration + 1;
@@ -345,7 +345,8 @@ static int is_finished(program *p, int mode, int iteration, double cost) {
   if (!p->settled && has_settled(p, mode, iteration, cost)) p->settled = iteration;
   if (!p->settled) return 0;
   p->damping = closing_damping;
-  return p->passing || p->infeasibility <= p->run->options->tolerance || iteration >= p->settled + CLOSING_ITERATIONS;
+  return p->rows.passing || p->infeasibility <= p->run->options->tolerance ||
+         iteration >= p->settled + CLOSING_ITERATIONS;
 }
 
 static Bool progress(int mode, int iteration, double cost, double infeasibility, double dual, double mu, double step,
@@ -366,135 +367,6 @@ static Bool progress(int mode, int iteration, double cost, double infeasibility,
   // from near an optimum the restoration of Ipopt only leads away, for as long as it may
   int leaves = p->begins_near && p->settles && mode;
   return !p->interrupted && !p->finished && !leaves;
-}
-
-/// Rows: every slot but the ranges of scalar joints, which bound the unknowns.
-static int is_bound(const cav_transcription *tr, int t, int i, int *dof) {
-  const cav_slot_layout *at = &tr->knot[t].layout;
-  if (i < at->joint || i >= at->tendon) return 0;
-  int joint = 0;
-  for (int left = i - at->joint; left >= 0; joint++) left -= tr->model->joint[joint].limited;
-  *dof = tr->model->joint[joint - 1].dof;
-  return tr->model->joint[joint - 1].type != CAV_JOINT_BALL;
-}
-
-/// Whether the contact law, and so the continuation, has a part in the model: contacts, limits, or friction.
-static int law_acts(const cav_model *m) {
-  int acts = m->npair > 0 || m->nequality > 0;
-  for (int j = 0; j < m->njoint; j++) acts |= m->joint[j].limited;
-  for (int d = 0; d < m->nv; d++) acts |= m->dof[d].frictionloss > 0;
-  for (int k = 0; k < m->ntendon; k++) acts |= m->tendon[k].limited || m->tendon[k].frictionloss > 0;
-  return acts;
-}
-
-/// Whether slot i of knot t is a row of its own. Where the contact law acts, one without bounds is none: Ipopt would give it a
-/// slack, and count the distance to it as violation, so that its filter takes steps that make the cost worse. Elsewhere such
-/// a row lifts the force to an unknown of its own, which bends less.
-static int is_row(const program *p, int t, int i) {
-  const cav_transcription *tr = p->run->tr;
-  const cav_slot *slot = &tr->knot[t].slot[i];
-  int dof;
-  if (p->passing) return 0;
-  return !is_bound(tr, t, i, &dof) && (!law_acts(tr->model) || isfinite(slot->lower) || isfinite(slot->upper));
-}
-
-/// Whether a row depends on the step: forces, and terms that read more than the configuration.
-static int sees_step(const cav_transcription *tr, int t, int i) {
-  const cav_slot_layout *at = &tr->knot[t].layout;
-  return i < at->joint || i >= at->term;
-}
-
-static int list_rows(program *p, char *pattern) {
-  const cav_transcription *tr = p->run->tr;
-  int nv = tr->nv;
-  for (int pass = 0; pass < 2; pass++) {
-    int m = 0, entries = 0;
-    for (int t = 0; t < tr->nknot; t++) {
-      for (int i = 0; i < tr->knot[t].layout.count; i++) {
-        if (!is_row(p, t, i)) continue;
-        if (pass) p->row_knot[m] = t, p->row_slot[m] = i;
-        cav_transcription_pattern(tr, t, i, pattern);
-        for (int c = 0; c < 3 * nv; c++) {
-          if (!pattern[c]) continue;
-          if (pass) {
-            p->jacobian_row[entries] = m;
-            p->jacobian_column[entries] = cav_transcription_block(tr, t, c / nv) * nv + c % nv;
-            p->source[entries] = c;
-          }
-          entries++;
-        }
-        // a free step is seen by what is not of the posture alone
-        if (tr->free_step && sees_step(tr, t, i)) {
-          if (pass) {
-            p->jacobian_row[entries] = m;
-            p->jacobian_column[entries] = p->n - 1;
-            p->source[entries] = 3 * nv;
-          }
-          entries++;
-        }
-        m++;
-      }
-    }
-    if (pass) break;
-    p->m = m;
-    p->entries = entries;
-    p->row_knot = malloc((size_t)(m + 1) * sizeof(int));
-    p->row_slot = malloc((size_t)(m + 1) * sizeof(int));
-    p->jacobian_row = malloc((size_t)(entries + 1) * sizeof(int));
-    p->jacobian_column = malloc((size_t)(entries + 1) * sizeof(int));
-    p->source = malloc((size_t)(entries + 1) * sizeof(int));
-    if (!p->row_knot || !p->row_slot || !p->jacobian_row || !p->jacobian_column || !p->source) return 0;
-  }
-  return 1;
-}
-
-/// Bounds of unknowns and rows, Ipopt's infinity where open.
-static void set_bounds(const program *p, double *x_lower, double *x_upper, double *g_lower, double *g_upper) {
-  const cav_transcription *tr = p->run->tr;
-  const double infinite = 2e19;
-  int dof;
-  for (int i = 0; i < p->n; i++) x_lower[i] = -infinite, x_upper[i] = infinite;
-  if (tr->free_step) {
-    double steps = tr->nknot - 1;
-    x_lower[p->n - 1] = log(tr->problem->duration_least / (steps * p->anchor->timestep));
-    x_upper[p->n - 1] = log(tr->problem->duration_most / (steps * p->anchor->timestep));
-  }
-  for (int t = 0; t < tr->nknot && !p->passing; t++) {
-    for (int i = tr->knot[t].layout.joint; i < tr->knot[t].layout.tendon; i++) {
-      if (!is_bound(tr, t, i, &dof)) continue;
-      const cav_slot *slot = &tr->knot[t].slot[i];
-      x_lower[(t - tr->first) * tr->nv + dof] = slot->lower - slot->value;
-      x_upper[(t - tr->first) * tr->nv + dof] = slot->upper - slot->value;
-    }
-  }
-  for (int i = 0; i < p->m; i++) {
-    const cav_slot *slot = &tr->knot[p->row_knot[i]].slot[p->row_slot[i]];
-    g_lower[i] = fmax(slot->lower, -infinite);
-    g_upper[i] = fmin(slot->upper, infinite);
-  }
-}
-
-/// Multipliers of rows [m], lower and upper bounds [n] each: from the rows' multipliers, or back into their
-/// multipliers.
-static void multipliers_of(const program *p, double *multiplier, int back) {
-  const cav_transcription *tr = p->run->tr;
-  double *lower = multiplier + p->m, *upper = lower + p->n;
-  int dof;
-  for (int i = 0; i < p->m; i++) {
-    cav_slot *slot = &tr->knot[p->row_knot[i]].slot[p->row_slot[i]];
-    if (back) slot->multiplier = multiplier[i];
-    multiplier[i] = slot->final_multiplier;
-  }
-  for (int t = 0; t < tr->nknot && !p->passing; t++) {
-    for (int i = tr->knot[t].layout.joint; i < tr->knot[t].layout.tendon; i++) {
-      if (!is_bound(tr, t, i, &dof)) continue;
-      int k = (t - tr->first) * tr->nv + dof;
-      cav_slot *slot = &tr->knot[t].slot[i];
-      if (back) slot->multiplier = upper[k] - lower[k];
-      lower[k] = fmax(-slot->final_multiplier, 0);
-      upper[k] = fmax(slot->final_multiplier, 0);
-    }
-  }
 }
 
 /// Options that serve all motions; a problem or a caller may set others, and these anew.
@@ -598,11 +470,11 @@ static cav_status conclude(const program *p, enum ApplicationReturnStatus code, 
       {Insufficient_Memory, CAV_NO_MEMORY, "Ipopt ran out of memory"},
   };
   if (p->interrupted) return CAV_INTERRUPTED;
-  if (p->finished && (p->passing || p->infeasibility <= p->run->options->tolerance)) return CAV_OK;
+  if (p->finished && (p->rows.passing || p->infeasibility <= p->run->options->tolerance)) return CAV_OK;
   for (size_t i = 0; i < sizeof meaning / sizeof *meaning; i++) {
     if (meaning[i].code != code) continue;
     // an iterate whose rows hold and whose dual is noise is a solution, however Ipopt went on from there
-    if (meaning[i].status == CAV_NOT_CONVERGED && !p->passing && p->best_error <= 1 && p->best_iteration >= 0)
+    if (meaning[i].status == CAV_NOT_CONVERGED && !p->rows.passing && p->best_error <= 1 && p->best_iteration >= 0)
       return CAV_OK;
     if (error && meaning[i].status != CAV_OK) {
       *error = (cav_error){.status = meaning[i].status};
@@ -628,7 +500,7 @@ static cav_status conclude(const program *p, enum ApplicationReturnStatus code, 
 static void program_free(program *p) {
   for (int t = 0; p->hessian && t < p->run->tr->nknot; t++) free(p->hessian[t]);
   cav_trajectory_free(p->anchor);
-  free(p->row_knot), free(p->row_slot), free(p->jacobian_row), free(p->jacobian_column), free(p->source);
+  cav_ipopt_rows_free(&p->rows);
   free(p->x), free(p->full), free(p->best_x), free(p->hessian), free(p->near), free(p->entry);
 }
 
@@ -637,18 +509,16 @@ static int program_new(program *p) {
   const cav_transcription *tr = p->run->tr;
   size_t n = (size_t)p->n, width = 3 * (size_t)tr->nv;
   int entries = cav_normal_entries(p->run->normal, NULL, NULL, NULL);
-  char *pattern = malloc(4 * (size_t)tr->nv);
   p->x = calloc(n, sizeof(double));
   p->full = malloc((width + 1) * sizeof(double));
   p->best_x = malloc(n * sizeof(double));
   p->hessian = calloc((size_t)tr->nknot, sizeof *p->hessian);
   p->near = malloc(3 * n * sizeof(double));
   p->entry = malloc(2 * (size_t)entries * sizeof(int));
-  int ok = p->anchor && p->x && p->full && p->best_x && pattern && p->hessian && p->near && p->entry;
+  int ok = p->anchor && p->x && p->full && p->best_x && p->hessian && p->near && p->entry;
   for (int t = 0; ok && t < tr->nknot; t++) ok = (p->hessian[t] = malloc(width * width * sizeof(double))) != NULL;
-  ok = ok && list_rows(p, pattern);
+  ok = ok && cav_ipopt_rows_list(&p->rows, tr);
   if (ok) cav_normal_entries(p->run->normal, p->entry, p->entry + entries, NULL);
-  free(pattern);
   return ok;
 }
 
@@ -679,49 +549,50 @@ static cav_status solve_stage(cav_solve_run *run, const stage *what, cav_error *
                .n = cav_transcription_unknowns(tr),
                .anchor = cav_trajectory_copy(run->at),
                .best_iteration = -1,
-               .noise = law_acts(tr->model) ? contact_noise : smooth_noise,
+               .noise = cav_ipopt_law_acts(tr->model) ? contact_noise : smooth_noise,
                .barrier = run->warm    ? warm_barrier
                           : what->near ? near_barrier
                                        : cold_barrier,
                .damping = damping,
                .exact = what->exact,
                .settles = !what->exact && !is_limited(run),
-               .passing = what->passing,
+               .rows = {.passing = what->passing},
                .begins_near = what->near};
   double *bound = NULL, *start = NULL, *multiplier = NULL;
   cav_status status = load(&p.call, error);
   if (status != CAV_OK) goto end;
   // costs are the objective: constraint rows get a weight of their own on the way alone
-  if (!p.passing) tr->penalty = (cav_penalties){0};
+  if (!p.rows.passing) tr->penalty = (cav_penalties){0};
   tr->difference = CAV_DERIVATIVE_CENTRED;
   if ((status = cav_transcription_values(tr, run->at)) != CAV_OK) goto end;
   status = CAV_NO_MEMORY;
   if (!cav_transcription_keep_rows(tr) || !program_new(&p)) goto end;
   if (!is_limited(run) && !cav_absolute_begin(tr)) goto end;
-  bound = malloc((2 * (size_t)p.n + 2 * (size_t)p.m + 1) * sizeof(double));
+  bound = malloc((2 * (size_t)p.n + 2 * (size_t)p.rows.m + 1) * sizeof(double));
   start = calloc((size_t)p.n, sizeof(double));
-  multiplier = calloc(2 * (size_t)p.n + (size_t)p.m + 1, sizeof(double));
+  multiplier = calloc(2 * (size_t)p.n + (size_t)p.rows.m + 1, sizeof(double));
   if (!bound || !start || !multiplier) goto end;
 
-  set_bounds(&p, bound, bound + p.n, bound + 2 * p.n, bound + 2 * p.n + p.m);
-  p.nlp = p.call.CreateIpoptProblem(p.n, bound, bound + p.n, p.m, bound + 2 * p.n, bound + 2 * p.n + p.m, p.entries,
-                                    cav_normal_entries(run->normal, NULL, NULL, NULL), 0, objective, constraints,
-                                    objective_gradient, constraint_jacobian, lagrangian_hessian);
+  cav_ipopt_rows_bounds(&p.rows, tr, p.anchor->timestep, bound, bound + p.n, bound + 2 * p.n,
+                        bound + 2 * p.n + p.rows.m);
+  p.nlp = p.call.CreateIpoptProblem(p.n, bound, bound + p.n, p.rows.m, bound + 2 * p.n, bound + 2 * p.n + p.rows.m,
+                                    p.rows.entries, cav_normal_entries(run->normal, NULL, NULL, NULL), 0, objective,
+                                    constraints, objective_gradient, constraint_jacobian, lagrangian_hessian);
   if (!p.nlp) goto end;
   if (!set_options(&p, what)) {
     status = conclude(&p, Invalid_Option, error);
     goto end;
   }
   p.call.SetIntermediateCallback(p.nlp, progress);
-  multipliers_of(&p, multiplier, 0);
+  cav_ipopt_rows_multipliers(&p.rows, tr, multiplier, 0);
   enum ApplicationReturnStatus code =
-      p.call.IpoptSolve(p.nlp, start, NULL, NULL, multiplier, multiplier + p.m, multiplier + p.m + p.n, &p);
+      p.call.IpoptSolve(p.nlp, start, NULL, NULL, multiplier, multiplier + p.rows.m, multiplier + p.rows.m + p.n, &p);
   status = conclude(&p, code, error);
   // one that failed or was stopped gives its best iterate, with the multipliers that it started from
   int ended = code == Solve_Succeeded || code == Solved_To_Acceptable_Level || p.finished ||
               (what->iterations > 0 && code == Maximum_Iterations_Exceeded);
   int best = !ended && p.best_iteration >= 0;
-  if (!best) multipliers_of(&p, multiplier, 1);
+  if (!best) cav_ipopt_rows_multipliers(&p.rows, tr, multiplier, 1);
   cav_transcription_move(tr, p.anchor, best ? p.best_x : start, run->at);
 end:
   tr->penalty = kept;
@@ -737,7 +608,7 @@ end:
 static int is_exact(const cav_solve_run *run) {
   const char *hessian = option_given(run, hessian_option);
   if (hessian && strcmp(hessian, "auto")) return !strcmp(hessian, "exact");
-  return !law_acts(run->problem->model);
+  return !cav_ipopt_law_acts(run->problem->model);
 }
 
 /// Largest violation of all rows at run->at, with its costs.
@@ -787,7 +658,7 @@ static cav_status sharpen(cav_solve_run *run, const stage *what, cav_status befo
 }
 
 cav_status cav_ipopt(cav_solve_run *run, cav_error *error) {
-  int acts = law_acts(run->problem->model), alone = run->options->solver == CAV_SOLVER_IPOPT && acts;
+  int acts = cav_ipopt_law_acts(run->problem->model), alone = run->options->solver == CAV_SOLVER_IPOPT && acts;
   int stages = alone && !run->options->ipopt_derivative_test ? run->problem->schedule.stages : 0;
   int exact = is_exact(run), iterations = acts && !exact ? EXACT_ITERATIONS / run->problem->model->nv : 0;
   if (iterations < LEAST_EXACT_ITERATIONS || option_given(run, hessian_option) || is_limited(run)) iterations = 0;
