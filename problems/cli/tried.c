@@ -15,12 +15,12 @@ cav_tried cav_tried_open(const char *folder) {
 
 int cav_tried_next(cav_tried *t) {
   while (t->in && getline(&t->line, &t->room, t->in) > 0) {
-    // strategy,kept,outcome, numbers, and the two quoted texts that end a line
-    char *comma[3], *quote[4], *c = t->line;
-    int whole = 1;
-    for (int k = 0; k < 3 && whole; k++, c = comma[k - 1] + 1) whole = (comma[k] = strchr(c, ',')) != NULL;
-    for (int k = 0; k < 4 && whole; k++, c = quote[k - 1] + 1) whole = (quote[k] = strchr(c, '"')) != NULL;
-    if (!whole) continue;
+    // strategy,kept,outcome, numbers, and the two quoted texts that end a line: three commas, then four quotation marks
+    char *mark[7], *c = t->line;
+    int n = 0;
+    while (n < 7 && (c = strchr(c, n < 3 ? ',' : '"'))) mark[n++] = c++;
+    if (n < 7) continue;
+    char **comma = mark, **quote = mark + 3;
     for (int k = 0; k < 3; k++) *comma[k] = 0;
     *quote[1] = *quote[3] = 0;
     t->kept = !strcmp(comma[0] + 1, "1");
