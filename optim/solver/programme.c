@@ -15,6 +15,9 @@ enum { RESTS = 8 };
 /// Fraction of the cost: gap of a programme. Smallest cost that counts as a scale.
 static const double gap_fraction = 1e-11, least_cost = 1e-6;
 
+/// Part of the tolerance below which a row of what nothing drives is met where all ends at rest.
+static const double met = 0.01;
+
 /// Penalties: over the multiplier; of its kind's largest multiplier; of the cost, a unit of the row.
 static const double over = 2, of_kind = 0.1, of_cost = 0.01;
 
@@ -40,17 +43,38 @@ void cav_programme_penalties(const cav_transcription *tr, double *penalty) {
                           of_kind * most[kind_of(&tr->knot[t].layout, i)]);
 }
 
+/// What a linearised row misses after the programme's step.
+static double linear_miss(const cav_slot *slot, double linear) {
+  return fmax(fmax(slot->lower - linear, linear - slot->upper), 0);
+}
+
+/// What a row may miss and is met. A tree that nothing drives and that has to end at rest has a row for every unknown and,
+/// after the last knot, one for every dof more: contacts brake it by a factor a knot, so the multiplier of what is missing
+/// there to the last digit grows by that factor with every knot at rest.
+static double missed_in_vain(const cav_solve_run *run, int row) {
+  const cav_transcription *tr = run->tr;
+  if (row >= tr->nresidual || !tr->problem->close_at_rest || tr->periodicity) return 0;
+  const cav_force_row *force = &tr->unactuated[row];
+  for (int k = 0; k < force->n; k++)
+    if (tr->model->link[tr->model->dof[force->dof[k]].link].driven) return 0;
+  return met * run->options->tolerance;
+}
+
 /// Raises penalties that the multipliers press against; how many. part: of the largest, which none is below then.
-static int raise_penalties(cav_quadratic *qp, double part) {
+static int raise_penalties(const cav_solve_run *run, cav_quadratic *qp, double part) {
+  const cav_transcription *tr = run->tr;
   int raised = 0;
-  const double *y = cav_quadratic_multiplier(qp);
+  const double *y = cav_quadratic_multiplier(qp), *linear = cav_quadratic_prediction(qp);
   double *penalty = cav_quadratic_penalty(qp), most = 0;
-  for (int k = 0; k < cav_quadratic_rows(qp); k++) {
-    if (fabs(y[k]) < 0.9 * penalty[k]) continue;
-    penalty[k] *= 10;
-    most = fmax(most, penalty[k]);
-    raised++;
-  }
+  for (int t = 0, k = 0; t < tr->nknot; t++)
+    for (int i = 0; i < tr->knot[t].layout.count; i++, k++) {
+      if (fabs(y[k]) < 0.9 * penalty[k] ||
+          linear_miss(&tr->knot[t].slot[i], linear[k]) < missed_in_vain(run, i - tr->knot[t].layout.unactuated))
+        continue;
+      penalty[k] *= 10;
+      most = fmax(most, penalty[k]);
+      raised++;
+    }
   for (int k = 0; k < cav_quadratic_rows(qp); k++) penalty[k] = fmax(penalty[k], part * most);
   return raised;
 }
@@ -81,8 +105,7 @@ static double linear_violation(const cav_transcription *tr, cav_quadratic *qp) {
   const double *linear = cav_quadratic_prediction(qp);
   double sum = 0;
   for (int t = 0, k = 0; t < tr->nknot; t++)
-    for (int i = 0; i < tr->knot[t].layout.count; i++, k++)
-      sum += fmax(fmax(tr->knot[t].slot[i].lower - linear[k], linear[k] - tr->knot[t].slot[i].upper), 0);
+    for (int i = 0; i < tr->knot[t].layout.count; i++, k++) sum += linear_miss(&tr->knot[t].slot[i], linear[k]);
   return sum;
 }
 
@@ -106,7 +129,7 @@ cav_status cav_programme_solve(cav_solve_run *run, cav_quadratic *qp, const doub
     memcpy(kept, cav_quadratic_penalty(qp), bytes);
     before = missing;
     int much = missing > missed_little, last = much && (*rest > 0 || i == RAISES - 1);
-    if (last || !raise_penalties(qp, much ? even : 0)) break;
+    if (last || !raise_penalties(run, qp, much ? even : 0)) break;
   }
   run->region.seconds_linear += cav_clock() - begin;
   *solved = status == CAV_OK;
