@@ -1,4 +1,4 @@
-/// A body that nothing drives and that has to stand at the end has more rows than unknowns: a hand pushes a box and the
+/// A body without an actuator that has to stand at the end has more rows than unknowns: a hand pushes a box and the
 /// floor stops it. Rows that are met to the last digits must not hold the last phase (solver/programme.c): where they did
 /// it ended at a cost of 0.0444, of which 4 % were still to be saved.
 #include "cavort/cavort.h"

@@ -237,6 +237,10 @@ run 0 verify swing.result --json
 says out '"certified": true'
 check "as optimal from the files as when it was solved" [ "$(grep '"optimality"' out)" = "$(grep '"optimality"' before.json)" ]
 check "verify writes nothing" cmp -s before.json swing.result/verdict.json
+cp -r swing.result exacting
+sed 's#<schedule#& optimality="1e-20"#' swing.result/problem.xml >exacting/problem.xml
+run 0 verify exacting
+says out "the problem asks for 1e-20 (<schedule optimality>): not reached"
 rm swing.result/view.html
 run 0 view swing.result
 says out "view.html"

@@ -15,7 +15,7 @@ enum { RESTS = 8 };
 /// Fraction of the cost: gap of a programme. Smallest cost that counts as a scale.
 static const double gap_fraction = 1e-11, least_cost = 1e-6;
 
-/// Part of the tolerance below which a row of what nothing drives is met where all ends at rest.
+/// Part of the tolerance below which a row of what has no actuator is met where all ends at rest.
 static const double met = 0.01;
 
 /// Penalties: over the multiplier; of its kind's largest multiplier; of the cost, a unit of the row.
@@ -48,7 +48,7 @@ static double linear_miss(const cav_slot *slot, double linear) {
   return fmax(fmax(slot->lower - linear, linear - slot->upper), 0);
 }
 
-/// What a row may miss and is met. A tree that nothing drives and that has to end at rest has a row for every unknown and,
+/// What a row may miss and is met. A tree without an actuator that has to end at rest has a row for every unknown and,
 /// after the last knot, one for every dof more: contacts brake it by a factor a knot, so the multiplier of what is missing
 /// there to the last digit grows by that factor with every knot at rest.
 static double missed_in_vain(const cav_solve_run *run, int row) {

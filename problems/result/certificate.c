@@ -116,7 +116,10 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
   else
     fprintf(out, "%s to %.1g (the word needs %g)\n", cav_verdict_optimal(v) ? "locally optimal" : "NOT optimal, but",
             v->optimality, CAV_TOLERANCE_OPTIMAL);
-  if (cav_verdict_feasible(v) && !cav_verdict_optimal(v) && !isnan(v->optimality))
+  const double asked = problem->schedule.optimality;
+  if (asked > 0 && v->optimality > asked)
+    fprintf(out, "  the problem asks for %g (<schedule optimality>): not reached; --solver both goes on by Ipopt\n", asked);
+  if (cav_verdict_feasible(v) && !cav_verdict_optimal(v) && !isnan(v->optimality) && !(asked > 0 && asked <= 1e-5))
     fprintf(
         out,
         "  a cheaper motion may be near: <schedule optimality=\"1e-5\"/> goes on for longer, --solver both goes on by "
