@@ -1,4 +1,4 @@
-/// What the commands of the tool share: the command line as read, exit statuses, and how errors are told.
+/// What the commands of the tool share: the command line as read, and how errors are told.
 #ifndef CAVORT_COMMAND_H
 #define CAVORT_COMMAND_H
 
@@ -6,15 +6,7 @@
 
 #include "cavort/mocap.h"
 #include "cavort/solve.h"
-
-/// Exit status of the tool.
-enum {
-  CAV_EXIT_CERTIFIED = 0, ///< or done, where nothing is certified
-  CAV_EXIT_NOT_CERTIFIED = 1,
-  CAV_EXIT_BAD_INPUT = 2,
-  CAV_EXIT_INTERNAL = 3,
-  CAV_EXIT_INTERRUPTED = 130
-};
+#include "exit_status.h"
 
 enum { CAV_COMMAND_IPOPT = 32, CAV_COMMAND_SETTINGS = 32, CAV_COMMAND_PUSHES = 16 };
 

@@ -1,5 +1,5 @@
 /// cavort solve: reads a problem, solves it, certifies the result, writes its folder. What the stated guess does not
-/// lead to is tried by other strategies, in processes (race.c). The first Ctrl-C (SIGINT, SIGTERM, SIGHUP) ends the solve
+/// lead to is tried by other strategies, in processes (race/race.c). The first Ctrl-C (SIGINT, SIGTERM, SIGHUP) ends the solve
 /// with the best iterate saved; another one, a second later, ends the program at once. What is in the folder at any
 /// moment can be read and gone on from (store.c).
 #include <math.h>

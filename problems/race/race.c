@@ -13,8 +13,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "command.h"
 #include "csv.h"
+#include "exit_status.h"
 #include "file.h"
 #include "rank.h"
 #include "store.h"
