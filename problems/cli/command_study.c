@@ -131,6 +131,8 @@ static cav_status plan(study *s, cav_error *error) {
 
 // ---------------------------------------------------------------- records of runs
 
+static const char record_head[] = "strategy,certified,achieved,seconds,iterations,cost,unactuated,end_error\n";
+
 static char *record_path(const study *s, const cav_study_run *run, const char *ending) {
   char name[300];
   snprintf(name, sizeof name, "runs/%.200s.%s.%d.%s", s->motion[run->motion], cav_study_method_names[run->method],
@@ -147,8 +149,8 @@ static cav_status write_record(const study *s, const cav_study_run *run, const c
     status = cav_file_end(&file, error);
   }
   if (!status && !(status = cav_file_begin(&file, path, error))) {
-    fprintf(file.stream, "certified,seconds,iterations,cost,unactuated,end_error\n%d,%.6f,%d", run->certified,
-            run->seconds, run->iterations);
+    fprintf(file.stream, "%s%s,%d,%d,%.6f,%d", record_head, run->strategy, run->certified, run->achieved, run->seconds,
+            run->iterations);
     const double value[3] = {run->cost, run->unactuated, run->end_error};
     for (int k = 0; k < 3; k++) {
       fputc(',', file.stream);
@@ -162,18 +164,19 @@ static cav_status write_record(const study *s, const cav_study_run *run, const c
   return status;
 }
 
+// one of an earlier version has other columns, and the run is done again
 static void read_record(const study *s, cav_study_run *run) {
-  char *path = record_path(s, run, "csv");
-  cav_table *table = path ? cav_table_read(path, NULL) : NULL;
-  if (table && table->nrow == 1 && table->ncol == 6) {
-    const double *x = table->value;
-    run->known = 1;
-    run->certified = x[0] == 1;
-    run->seconds = x[1];
-    run->iterations = (int)fmin(fmax(x[2], 0), 1e9);
-    run->cost = x[3], run->unactuated = x[4], run->end_error = x[5];
+  char *path = record_path(s, run, "csv"), head[sizeof record_head], line[400];
+  FILE *file = path ? fopen(path, "r") : NULL;
+  cav_study_run r = *run;
+  if (file && fgets(head, sizeof head, file) && !strcmp(head, record_head) && fgets(line, sizeof line, file)) {
+    char *value = line + strcspn(line, ",");
+    snprintf(r.strategy, sizeof r.strategy, "%.*s", (int)(value - line), line);
+    r.known = sscanf(value, ",%d,%d,%lf,%d,%lf,%lf,%lf", &r.certified, &r.achieved, &r.seconds, &r.iterations, &r.cost,
+                     &r.unactuated, &r.end_error) == 7;
+    if (r.known) *run = r;
   }
-  cav_table_free(table);
+  if (file) fclose(file);
   free(path);
 }
 
@@ -185,7 +188,10 @@ static int work(void *context, int k) {
   cav_study_run run = s->run[k];
   char reason[480] = "";
   cav_error error = {0};
-  cav_status status = cav_study_solve(s->path[run.motion], s->line->model, &run, reason, &error);
+  char *folder = record_path(s, &run, "checkpoints"), *tried = record_path(s, &run, "tried.csv");
+  const cav_study_task task = {s->path[run.motion], s->line->model, folder, tried, CAV_STUDY_SECONDS};
+  cav_status status = folder && tried ? cav_study_solve(&task, &run, reason, &error) : CAV_NO_MEMORY;
+  free(folder), free(tried);
   // a run that could not even be checked is a run that failed
   if (status) {
     run.end_error = -1;
@@ -199,8 +205,11 @@ static void tell(const study *s, const cav_study_run *run, int done, int all) {
   fprintf(stderr, "%3d of %d  %-20s %-8s start %d  ", done, all, s->motion[run->motion],
           cav_study_method_names[run->method], run->start);
   if (run->known)
-    fprintf(stderr, "%s  %6.1f s  %5d iterations\n", run->certified ? "certified    " : "not certified", run->seconds,
-            run->iterations);
+    fprintf(stderr, "%s  %6.1f s  %5d iterations  %s\n",
+            !run->certified ? "not certified"
+            : run->achieved ? "certified    "
+                            : "not achieved ",
+            run->seconds, run->iterations, run->strategy);
   else
     fprintf(stderr, "no result\n");
 }

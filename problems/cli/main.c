@@ -62,9 +62,8 @@ static const cav_manual_option options[] = {
      "auto: where the stated guess leads to no certificate, others (default); 1: never; N: so many at once, the "
      "cheapest kept"},
     {OPTION_METHODS, "--methods", NULL, "LIST",
-     "what to compare, with commas: own (default), strategies (own, other strategies where needed), ipopt, limited "
-     "(Ipopt with "
-     "limited memory), both"},
+     "what to compare, with commas: own (default), strategies (what solve does: own, then repairs and "
+     "other strategies where needed), ipopt, limited (Ipopt with limited memory), both"},
     {OPTION_MARKERS, "--markers", NULL, "FILE", "marker set: which marker of the clip sits where on which body"},
     {OPTION_SCALE, "--scale", NULL, NULL,
      "fit the sizes of segments too, each within a few percent of the whole body's (scale of the marker set: 0.03), "

@@ -10,7 +10,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "csv.h"
@@ -37,6 +39,8 @@ cav_status cav_race_open(cav_race *race, int most, cav_error *error) {
   cav_status status = cav_strategy_list(race->problem, strategy, &n);
   if (status) return cav_file_fail(error, status, 0, "strategies cannot be listed: %s", cav_status_name(status));
   race->n = 0;
+  race->begin = 0;
+  race->begin = cav_race_seconds(race);
   // a motion that is given has no guess
   if (race->start)
     strategy[0].stated = 1, strategy[0].guess = race->problem->guess, strategy[0].schedule = race->problem->schedule;
@@ -52,10 +56,28 @@ static int counts(cav_status status) {
   return status == CAV_OK || status == CAV_NOT_CONVERGED || status == CAV_INTERRUPTED || status == CAV_NOT_FINITE;
 }
 
-// by a signal, or because the process that this one works for is no more
+double cav_race_seconds(const cav_race *race) {
+  struct timespec own;
+  struct rusage ended;
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &own);
+  getrusage(RUSAGE_CHILDREN, &ended);
+  double seconds = (double)own.tv_sec + 1e-9 * (double)own.tv_nsec +
+                   (double)(ended.ru_utime.tv_sec + ended.ru_stime.tv_sec) +
+                   1e-6 * (double)(ended.ru_utime.tv_usec + ended.ru_stime.tv_usec);
+  // what has reported and waits for an order
+  for (int i = 0; i < race->n; i++)
+    if (race->entry[i].state == CAV_RACE_DONE && race->entry[i].child > 0) seconds += race->entry[i].report.seconds;
+  return seconds - race->begin;
+}
+
+static int is_over(const cav_race *race) {
+  return *race->interrupted || (race->most_seconds > 0 && cav_race_seconds(race) >= race->most_seconds);
+}
+
+// by a signal, because the time is over, or because the process that this one works for is no more
 static int asks_for_the_end(void *context) {
   const cav_race *race = context;
-  return *race->interrupted || (race->parent && getppid() != race->parent);
+  return is_over(race) || (race->parent && getppid() != race->parent);
 }
 
 // where checkpoints of a strategy go
@@ -326,9 +348,11 @@ static int whole(int end, void *data, size_t size, int writes) {
   return 1;
 }
 
-// in the child: never returns
-static void work(cav_race *race, int i) {
+// in the child: never returns. spent: seconds of the race before it
+static void work(cav_race *race, int i, double spent) {
   cav_problem taken;
+  // its clock is a new one
+  race->begin += cav_race_seconds(race) - spent;
   cav_race_report report;
   char order = 0;
   cav_race_entry *e = &race->entry[i];
@@ -342,6 +366,7 @@ static void work(cav_race *race, int i) {
   options.threads = 1;
   options.observer = NULL;
   cav_solution *solution = run(race, i, &options, &taken, &report);
+  report.seconds = cav_race_seconds(race) - spent;
   int done = 0;
   if (whole(e->answer, &report, sizeof report, 1) && whole(e->order, &order, 1, 0) && solution)
     done = race->save(race->context, &taken, solution, &report);
@@ -359,12 +384,13 @@ static int start(cav_race *race, int i) {
     return 0;
   }
   fflush(NULL);
+  double spent = cav_race_seconds(race);
   pid_t parent = getpid(), child = fork();
   if (child == 0) {
     race->parent = parent;
     close(answer[0]), close(order[1]);
     e->answer = answer[1], e->order = order[0];
-    work(race, i);
+    work(race, i, spent);
   }
   close(answer[1]), close(order[0]);
   e->answer = answer[0], e->order = order[1];
@@ -578,7 +604,7 @@ cav_status cav_race_finish(cav_race *race, int cheapest, cav_error *error) {
     int most = cheapest ? race->n : first_success(race), running = 0;
     if (!cheapest) cancel_after(race, most);
     for (int i = 0; i < most; i++) running += race->entry[i].state == CAV_RACE_RUNNING;
-    for (int i = 0; i < most && running < race->processes && !*race->interrupted; i++) {
+    for (int i = 0; i < most && running < race->processes && !is_over(race); i++) {
       if (race->entry[i].state != CAV_RACE_WAITING || !may_start(race, i)) continue;
       settle(race, i);
       if (!start(race, i)) return cav_file_fail(error, CAV_NO_MEMORY, 0, "no process for another strategy");

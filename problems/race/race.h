@@ -13,6 +13,7 @@ typedef struct cav_race_report {
   int solution; ///< 1: there is one, and verdict, cost and iterations are about it
   cav_verdict verdict;
   double cost;
+  double seconds;                     ///< of the processor, of a process of its own
   char text[400];                     ///< what the solver said
   char changed[CAV_STRATEGY_CHANGES]; ///< in the problem, by a repair
 } cav_race_report;
@@ -47,12 +48,14 @@ typedef struct cav_race {
   pid_t parent;                       ///< in a child: whose it is; 0: no child
   volatile sig_atomic_t *interrupted; ///< nonzero: start nothing more
   int processes;                      ///< at most
-  int tell;                           ///< 1: lines on standard error about what starts and ends
+  double most_seconds; ///< that all processes may take together, by their own clocks, one at a time; 0: any
+  int tell;            ///< 1: lines on standard error about what starts and ends
   /// Saves a solution; called in the process that has it. Returns an exit status.
   int (*save)(void *context, const cav_problem *problem, const cav_solution *solution, const cav_race_report *report);
   /// Called in this process at every checkpoint of the first strategy, whose problem it is; first: the first time.
   void (*snapshot)(void *context, const cav_problem *problem, const cav_checkpoint *checkpoint, int first);
   void *context;
+  double begin; ///< on the clock of cav_race_seconds
   int n;
   cav_race_entry entry[CAV_STRATEGIES];
 } cav_race;
@@ -72,6 +75,9 @@ cav_status cav_race_first(cav_race *race, cav_error *error);
 /// Solves by all that wait, in processes. cheapest 0: ends as soon as one is certified and all before it are not; 1:
 /// when all have ended.
 cav_status cav_race_finish(cav_race *race, int cheapest, cav_error *error);
+
+/// Processor seconds since it was opened, of this process and of those that have reported or ended.
+double cav_race_seconds(const cav_race *race);
 
 /// The entry to keep: the first certified one, or the cheapest; without any, the one that keeps most of what a
 /// certificate requires. -1: none has a solution. The same whichever ended first.

@@ -109,16 +109,19 @@ static void clear_finished(const char *folder) {
   }
 }
 
-// removes what processes that were killed left half written
-static void clear_temporary(const char *folder) {
+// removes what a test says yes to
+static void clear(const char *folder, int (*is_meant)(const char *name)) {
   DIR *all = opendir(folder);
   for (const struct dirent *e; all && (e = readdir(all));) {
-    char *path = is_temporary(e->d_name) ? cav_result_path(folder, e->d_name) : NULL;
+    char *path = is_meant(e->d_name) ? cav_result_path(folder, e->d_name) : NULL;
     if (path) unlink(path);
     free(path);
   }
   if (all) closedir(all);
 }
+
+// removes what processes that were killed left half written
+static void clear_temporary(const char *folder) { clear(folder, is_temporary); }
 
 cav_status cav_store_open(cav_store *store, const char *folder, int keep, cav_error *error) {
   char other[128];
@@ -157,4 +160,10 @@ char *cav_store_checkpoint(const char *folder, const char *strategy) {
   else
     snprintf(name, sizeof name, "checkpoint-%.40s.csv", strategy);
   return cav_result_path(folder, name);
+}
+
+void cav_store_remove(const char *folder) {
+  clear_temporary(folder);
+  clear(folder, is_checkpoint);
+  rmdir(folder);
 }

@@ -22,4 +22,7 @@ void cav_store_close(cav_store *store);
 /// out.
 char *cav_store_checkpoint(const char *folder, const char *strategy);
 
+/// Removes checkpoints and what was left half written, and the folder if it holds nothing else; fine where there is none.
+void cav_store_remove(const char *folder);
+
 #endif

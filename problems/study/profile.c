@@ -36,13 +36,13 @@ static int methods_used(int nrun, const cav_study_run *run, int used[CAV_STUDY_M
 }
 
 static void write_runs(FILE *out, const char *const *motion, int nrun, const cav_study_run *run) {
-  fputs("motion,method,start,certified,seconds,iterations,cost,unactuated,end_error\n", out);
+  fputs("motion,method,start,strategy,certified,achieved,seconds,iterations,cost,unactuated,end_error\n", out);
   for (int i = 0; i < nrun; i++) {
     const cav_study_run *r = &run[i];
     if (!r->known) continue;
     cav_table_write_text(out, motion[r->motion]);
-    fprintf(out, ",%s,%d,%d,%.3f,%d", cav_study_method_names[r->method], r->start, r->certified, r->seconds,
-            r->iterations);
+    fprintf(out, ",%s,%d,%s,%d,%d,%.3f,%d", cav_study_method_names[r->method], r->start, r->strategy, r->certified,
+            r->achieved, r->seconds, r->iterations);
     const double value[3] = {r->cost, r->unactuated, r->end_error};
     for (int k = 0; k < 3; k++) fputc(',', out), cav_table_write_number(out, value[k]);
     fputc('\n', out);
@@ -52,7 +52,7 @@ static void write_runs(FILE *out, const char *const *motion, int nrun, const cav
 // one line of the table: a motion, or all of them (motion < 0)
 static void write_line(FILE *out, const char *name, int motion, int method, int nrun, const cav_study_run *run,
                        double *seconds, double *iterations) {
-  int n = 0, certified = 0;
+  int n = 0, certified = 0, achieved = 0, stated = 0;
   double longest = 0;
   for (int i = 0; i < nrun; i++) {
     const cav_study_run *r = &run[i];
@@ -60,17 +60,20 @@ static void write_line(FILE *out, const char *name, int motion, int method, int 
     seconds[n] = r->seconds;
     iterations[n++] = r->iterations;
     certified += r->certified;
+    achieved += r->certified && r->achieved;
+    stated += r->certified && r->achieved && !strcmp(r->strategy, "stated");
     longest = fmax(longest, r->seconds);
   }
   if (n == 0) return;
-  fprintf(out, "%-20s %-8s %3d of %3d  %5.0f %%  %8.1f  %8.1f  %10.0f\n", name, cav_study_method_names[method],
-          certified, n, 100.0 * certified / n, middle(seconds, n), longest, middle(iterations, n));
+  fprintf(out, "%-20s %-10s %3d of %3d  %5.0f %%  %8d  %6d  %8.1f  %8.1f  %10.0f\n", name,
+          cav_study_method_names[method], certified, n, 100.0 * certified / n, achieved, stated, middle(seconds, n),
+          longest, middle(iterations, n));
 }
 
 static void write_table(FILE *out, int nmotion, const char *const *motion, int nrun, const cav_study_run *run,
                         double *work) {
-  fprintf(out, "%-20s %-8s %10s  %7s  %8s  %8s  %10s\n", "motion", "method", "certified", "fraction", "median s",
-          "longest s", "iterations");
+  fprintf(out, "%-20s %-10s %10s  %7s  %8s  %6s  %8s  %8s  %10s\n", "motion", "method", "certified", "fraction",
+          "achieved", "stated", "median s", "longest s", "iterations");
   for (int m = 0; m < nmotion; m++)
     for (int k = 0; k < CAV_STUDY_METHODS; k++) write_line(out, motion[m], m, k, nrun, run, work, work + nrun);
   for (int k = 0; k < CAV_STUDY_METHODS; k++) write_line(out, "all", -1, k, nrun, run, work, work + nrun);

@@ -10,12 +10,14 @@
 #include <time.h>
 
 #include "file.h"
+#include "race.h"
 #include "random.h"
+#include "result_file.h"
+#include "store.h"
 
 const char *const cav_study_method_names[CAV_STUDY_METHODS] = {"own", "strategies", "ipopt", "limited", "both"};
 
 static const double joint_noise = 0.03, mass_noise = 0.05, least_friction = 0.6, most_friction = 1;
-static const double most_seconds = 120;
 
 static double processor_seconds(void) {
   struct timespec t;
@@ -84,61 +86,116 @@ static cav_status perturb(cav_problem *p, int start) {
   return status ? status : perturb_posture(m, p->q_start, &seed);
 }
 
+// when a run that is one solve began and how long it may take
+typedef struct clock_of_run {
+  double begin, most;
+} clock_of_run;
+
 static int observe(void *context, const cav_progress *progress) {
+  const clock_of_run *c = context;
   (void)progress;
-  return processor_seconds() - *(const double *)context > most_seconds;
+  return processor_seconds() - c->begin > c->most;
 }
 
-static cav_solve_options options_of(cav_study_method method, double *begin) {
+static cav_solve_options options_of(cav_study_method method, clock_of_run *clock) {
   static const cav_ipopt_option limited[] = {{"hessian_approximation", "limited-memory"}};
   cav_solve_options o = cav_solve_options_default();
-  int own = method == CAV_STUDY_OWN || method == CAV_STUDY_STRATEGIES;
-  o.solver = own ? CAV_SOLVER_GAUSS_NEWTON : method == CAV_STUDY_BOTH ? CAV_SOLVER_BOTH : CAV_SOLVER_IPOPT;
+  o.solver = method == CAV_STUDY_OWN    ? CAV_SOLVER_GAUSS_NEWTON
+             : method == CAV_STUDY_BOTH ? CAV_SOLVER_BOTH
+                                        : CAV_SOLVER_IPOPT;
   if (method == CAV_STUDY_LIMITED) o.ipopt = limited, o.nipopt = 1;
   o.diagnose = 0;
   o.observer = observe;
-  o.observer_context = begin;
+  o.observer_context = clock;
   return o;
 }
 
-/// Solves and certifies by one strategy. One that was stopped is checked like any other.
-static cav_status solve_by(const cav_problem *problem, const cav_strategy *strategy, cav_study_run *run, double *begin,
-                           cav_verdict *verdict, cav_error *error) {
-  cav_solve_options options = options_of(run->method, begin);
+static void take(cav_study_run *run, const char *strategy, double cost, const cav_verdict *verdict) {
+  run->known = 1;
+  run->certified = verdict->certified;
+  run->achieved = verdict->achieved;
+  run->cost = cost;
+  run->unactuated = verdict->unactuated_force_max;
+  run->end_error = verdict->closed_loop_end_error_m;
+  snprintf(run->strategy, sizeof run->strategy, "%s", strategy);
+}
+
+// why a motion is not certified, or not what was asked
+static void say_why(const cav_verdict *v, const char *after, char reason[480]) {
+  *reason = 0;
+  if (!v->certified)
+    snprintf(reason, 480, "%.430s%s", v->reason, after);
+  else if (!v->achieved)
+    snprintf(reason, 480, "certified, and misses %.400s%s", v->missed, after);
+}
+
+// by the problem's own strategy; one that was stopped is checked like any other
+static cav_status solve_stated(const cav_problem *problem, cav_study_run *run, clock_of_run *clock, char reason[480],
+                               cav_error *error) {
+  cav_strategy strategy[CAV_STRATEGIES];
+  cav_solve_options options = options_of(run->method, clock);
   cav_solution *solution = NULL;
-  cav_status status = cav_strategy_solve(problem, strategy, &options, NULL, &solution, error);
-  if (solution) status = cav_verify_solution(problem, solution, verdict, error);
+  cav_verdict verdict;
+  int n = 0;
+  cav_status status = cav_strategy_list(problem, strategy, &n);
+  if (status) return cav_file_fail(error, status, 0, "strategies cannot be listed: %s", cav_status_name(status));
+  status = cav_strategy_solve(problem, &strategy[0], &options, NULL, &solution, error);
+  if (solution) status = cav_verify_solution(problem, solution, &verdict, error);
   if (solution && !status) {
-    run->known = 1;
-    run->certified = verdict->certified;
-    run->iterations += solution->iterations;
-    run->cost = solution->cost;
-    run->unactuated = verdict->unactuated_force_max;
-    run->end_error = verdict->closed_loop_end_error_m;
+    take(run, strategy[0].name, solution->cost, &verdict);
+    run->iterations = solution->iterations;
+    say_why(&verdict, "", reason);
   }
   cav_solution_free(solution);
   return status;
 }
 
-cav_status cav_study_solve(const char *path, const char *model_path, cav_study_run *run, char reason[480],
-                           cav_error *error) {
-  double begin = processor_seconds();
-  cav_problem *problem = cav_problem_load(path, model_path, error);
-  if (!problem) return error->status;
-  cav_strategy strategy[CAV_STRATEGIES];
-  int n = 0;
-  cav_status status = perturb(problem, run->start);
-  if (!status) status = cav_strategy_list(problem, strategy, &n);
-  if (status) cav_file_fail(error, status, 0, "%s: cannot be perturbed: %s", path, cav_status_name(status));
-  if (run->method != CAV_STUDY_STRATEGIES && n > 1) n = 1;
-  for (int i = 0; i < n && !status && !run->certified && processor_seconds() - begin < most_seconds; i++) {
-    if (strategy[i].use != CAV_STRATEGY_TRY) continue;
-    cav_verdict verdict = {.closed_loop_end_error_m = -1};
-    status = solve_by(problem, &strategy[i], run, &begin, &verdict, error);
-    // of many that fail the stated one says why
-    if (i == 0 || run->certified) snprintf(reason, 480, "%s", verdict.reason);
+// as cavort solve does, one process at a time; the time that is left is the race's
+static cav_status solve_race(const cav_problem *problem, const cav_study_task *task, cav_study_run *run,
+                             const clock_of_run *clock, char reason[480], cav_error *error) {
+  static volatile sig_atomic_t never;
+  cav_race race = {.problem = problem,
+                   .options = cav_solve_options_default(),
+                   .folder = task->folder,
+                   .key = "",
+                   .interrupted = &never,
+                   .processes = 1};
+  double before = processor_seconds() - clock->begin;
+  // nothing is left once the time is over, and no time is no limit
+  race.most_seconds = fmax(clock->most - before, 1e-9);
+  if (task->folder) cav_store_remove(task->folder);
+  cav_status status = task->folder ? cav_result_folder(task->folder, error) : CAV_OK;
+  if (!status) status = cav_race_open(&race, CAV_STRATEGIES, error);
+  if (!status) status = cav_race_first(&race, error);
+  if (!status && !cav_race_success(&race.entry[0].report)) status = cav_race_finish(&race, 0, error);
+  int best = status ? -1 : cav_race_best(&race, 0);
+  for (int i = 0; i < race.n; i++)
+    if (race.entry[i].report.solution) run->iterations += race.entry[i].report.verdict.iterations;
+  if (best >= 0) {
+    const cav_race_report *report = &race.entry[best].report;
+    int over = !cav_race_success(report) && cav_race_seconds(&race) >= race.most_seconds;
+    take(run, race.entry[best].strategy.name, report->cost, &report->verdict);
+    say_why(&report->verdict, over ? "; then its time was over" : "", reason);
+    if (task->tried) status = cav_race_write(&race, best, task->tried, error);
   }
-  run->seconds = processor_seconds() - begin;
+  run->seconds = before + cav_race_seconds(&race);
+  cav_race_close(&race);
+  if (task->folder) cav_store_remove(task->folder);
+  return status;
+}
+
+cav_status cav_study_solve(const cav_study_task *task, cav_study_run *run, char reason[480], cav_error *error) {
+  clock_of_run clock = {processor_seconds(), task->seconds};
+  cav_problem *problem = cav_problem_load(task->problem, task->model, error);
+  if (!problem) return error->status;
+  cav_status status = perturb(problem, run->start);
+  if (status)
+    cav_file_fail(error, status, 0, "%s: cannot be perturbed: %s", task->problem, cav_status_name(status));
+  else if (run->method == CAV_STUDY_STRATEGIES)
+    status = solve_race(problem, task, run, &clock, reason, error);
+  else
+    status = solve_stated(problem, run, &clock, reason, error);
+  if (run->method != CAV_STUDY_STRATEGIES || !run->known) run->seconds = processor_seconds() - clock.begin;
   cav_problem_free(problem);
   return status;
 }
