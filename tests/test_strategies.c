@@ -504,7 +504,26 @@ static void test_left(void) {
   unlink(path), unlink(model), rmdir(folder);
 }
 
+// a cycle is mended and repaired like other motions
+static void test_cycle(void) {
+  cav_error error = {0};
+  cav_problem *p = cav_problem_load(CAVORT_SOURCE_ROOT "/problems/motions/quadruped-trot/problem.xml", NULL, &error);
+  if (!CHECK(p != NULL)) return;
+  CHECK(p->cycle.on);
+  CHECK(offers(p,
+               "stated near-1 near-2 near-3 near-4 soft slow momentum near-5 near-6 repair-1 repair-2 repair-3 "
+               "repair-4"));
+  cav_strategy stated = {.name = "stated", .stated = 1, .order = p->order, .schedule = p->schedule}, repaired;
+  const cav_verdict slides = {.slip_mean_m_s = 0.0105, .closed_loop_seconds = p->duration};
+  int found = 0;
+  CHECK(cav_strategy_repair(p, &stated, &slides, 0, &repaired, &found) == CAV_OK);
+  if (CHECK(found)) CHECK(repaired.schedule.last.smoothing < p->schedule.last.smoothing);
+  if (found) cav_strategy_clear(&repaired);
+  cav_problem_free(p);
+}
+
 int main(void) {
+  test_cycle();
   test_left();
   test_gait(BIPED("1"), 1, 2);
   test_gait(BIPED("1"), 1, -2);

@@ -235,7 +235,7 @@ cav_status cav_strategy_repair(const cav_problem *problem, const cav_strategy *f
   int n = 0;
   *found = 0;
   while (n < CURES && cures[n] != NONE) n++;
-  if (k >= n || problem->cycle.on) return CAV_OK;
+  if (k >= n) return CAV_OK;
   *repaired = *from;
   repaired->use = CAV_STRATEGY_REPAIR;
   repaired->term = NULL;

@@ -215,10 +215,9 @@ static cav_status flight(const cav_problem *problem, cav_strategy *strategy) {
 }
 
 /// A strategy, and what mends it where that is nearly there.
-static void add_mended(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *from,
-                       const char *name) {
+static void add_mended(cav_strategy *strategy, int *n, const cav_strategy *from, const char *name) {
   add(strategy, n, from, name, from->text);
-  if (!problem->cycle.on) add_near(strategy, n, from, MEND);
+  add_near(strategy, n, from, MEND);
 }
 
 /// Where the guess runs into solids: by a flight where an arc is stated; over them, then as it is, then by a flight of its
@@ -227,17 +226,17 @@ static void add_mended(const cav_problem *problem, cav_strategy *strategy, int *
 static void add_grown(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *grown,
                       const cav_strategy *walk, const cav_strategy *fly) {
   cav_strategy step = over_solids(walk);
-  if (fly->height > 0 && problem->guess_height > 0) add_mended(problem, strategy, n, fly, "flight");
+  if (fly->height > 0 && problem->guess_height > 0) add_mended(strategy, n, fly, "flight");
   if (step.nswing && !is_decorated(problem) && problem->guess == CAV_GUESS_INTERPOLATE) {
     step.name = strategy[0].name;
     strategy[0] = step;
   } else if (step.nswing) {
-    add_mended(problem, strategy, n, &step, "step");
+    add_mended(strategy, n, &step, "step");
   }
   cav_strategy solids = *grown;
   solids.text = "lifted out of the solids that the guess runs into, which grow from soft to hard";
-  add_mended(problem, strategy, n, &solids, "solids");
-  if (fly->height > 0 && problem->guess_height <= 0) add_mended(problem, strategy, n, fly, "flight");
+  add_mended(strategy, n, &solids, "solids");
+  if (fly->height > 0 && problem->guess_height <= 0) add_mended(strategy, n, fly, "flight");
   add_repairs(strategy, n, grown);
 }
 
@@ -249,7 +248,7 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
     add_repairs(strategy, n, &stated);
     return CAV_OK;
   }
-  if (!problem->cycle.on) add_near(strategy, n, &stated, MEND_STATED);
+  add_near(strategy, n, &stated, MEND_STATED);
   if (problem->guess_left && !problem->cycle.on) {
     cav_strategy left = stated;
     left.left = 1;
@@ -287,19 +286,19 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   if (status != CAV_OK) return status;
   if (collides) add_grown(problem, strategy, n, &stated, &walk, &fly);
 
-  if (!collides && fly.height > 0 && problem->guess_height > 0) add_mended(problem, strategy, n, &fly, "flight");
+  if (!collides && fly.height > 0 && problem->guess_height > 0) add_mended(strategy, n, &fly, "flight");
   cav_strategy soft = stated;
   soft.schedule.first.smoothing *= SOFTER;
   soft.schedule.first.penalty /= CHEAPER;
   add(strategy, n, &soft, "soft", "contacts active from twice as far, unactuated force ten times cheaper at first");
 
-  if (walk.nswing && !collides) add_mended(problem, strategy, n, &walk, "swing");
+  if (walk.nswing && !collides) add_mended(strategy, n, &walk, "swing");
 
   cav_strategy leap = plain;
   leap.text = "straight from start to goal with an arc as high as is asked for";
   status = problem->guess_height != 0 ? CAV_OK : cav_leap_find(problem, &leap.height, &leap.from, &leap.to);
   if (status != CAV_OK) return status;
-  if (leap.height > 0) add_mended(problem, strategy, n, &leap, "leap");
+  if (leap.height > 0) add_mended(strategy, n, &leap, "leap");
 
   int decorated = is_decorated(problem);
   if (decorated || problem->guess == CAV_GUESS_HOLD) add(strategy, n, &plain, "line", "straight from start to goal");
@@ -316,8 +315,8 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
     exact.order = CAV_ORDER_MOMENTUM, exact.first_midpoint = 1, exact.use = CAV_STRATEGY_MOMENTUM;
     add(strategy, n, &exact, "momentum", "under the order of momentum, from a motion of the midpoint order");
   }
-  if (!problem->cycle.on) add_near(strategy, n, &stated, MEND);
-  if (!problem->cycle.on && !collides) add_repairs(strategy, n, &stated);
+  add_near(strategy, n, &stated, MEND);
+  if (!collides) add_repairs(strategy, n, &stated);
   cav_strategy open = stated;
   open.use = CAV_STRATEGY_DIAGNOSIS, open.open = 1;
   if (!problem->cycle.on && problem->close_at_rest)
