@@ -513,12 +513,12 @@ static void test_cycle(void) {
   CHECK(offers(p,
                "stated near-1 near-2 near-3 near-4 soft slow momentum near-5 near-6 repair-1 repair-2 repair-3 "
                "repair-4"));
-  cav_strategy stated = {.name = "stated", .stated = 1, .order = p->order, .schedule = p->schedule}, repaired;
+  cav_strategy stated = {.name = "stated", .stated = 1, .order = p->order, .schedule = p->schedule}, mended;
   const cav_verdict slides = {.slip_mean_m_s = 0.0105, .closed_loop_seconds = p->duration};
   int found = 0;
-  CHECK(cav_strategy_repair(p, &stated, &slides, 0, &repaired, &found) == CAV_OK);
-  if (CHECK(found)) CHECK(repaired.schedule.last.smoothing < p->schedule.last.smoothing);
-  if (found) cav_strategy_clear(&repaired);
+  CHECK(cav_strategy_repair(p, &stated, &slides, 0, &mended, &found) == CAV_OK);
+  if (CHECK(found)) CHECK(mended.schedule.last.smoothing < p->schedule.last.smoothing);
+  if (found) cav_strategy_clear(&mended);
   cav_problem_free(p);
 }
 
