@@ -192,6 +192,44 @@ static void test_again(bench *b) {
   CHECK(worst < 2 && moved > 20);
 }
 
+// adds each knot's own part once more, as rows add theirs
+static void add_knot(void *context, int t) {
+  bench *b = context;
+  const cav_knot *knot = &b->tr->knot[t];
+  cav_normal_add_block(b->normal, b->tr, t, knot->hessian, knot->step_row, knot->step_square);
+}
+
+// what is gathered and factored in one pass has the bits of one after the other, and fails where that does
+static void test_sum(bench *b) {
+  enum { ROOM = 64 };
+  double x[ROOM], diagonal[ROOM], product[2][ROOM], solution[2][ROOM];
+  double *kept = malloc(cav_normal_room(b->normal) * sizeof *kept);
+  int n = b->normal->size, factored = 0, trials = 200;
+  if (!CHECK(kept && n <= ROOM)) return;
+  for (int i = 0; i < trials; i++) {
+    draw(b, i % 2 ? 3 : 0);
+    for (int j = 0; j < n; j++) x[j] = centred(), diagonal[j] = scene_uniform();
+    cav_normal_clear(b->normal);
+    for (int t = 0; t < KNOTS; t++) add_knot(b, t);
+    cav_normal_save(b->normal, kept);
+    cav_normal_multiply(b->normal, x, product[0]);
+    for (int t = 0; t < KNOTS; t++) add_knot(b, t);
+    cav_normal_add_diagonal(b->normal, diagonal);
+    cav_status status = cav_normal_factor(b->normal, 1e-3);
+    if (status == CAV_OK) cav_normal_solve(b->normal, x, solution[0]);
+    cav_normal_sum sum = {kept, diagonal, x, product[1], add_knot, b};
+    CHECK(cav_normal_factor_sum(b->normal, b->tr, &sum, 1e-3) == status);
+    if (status != CAV_OK) continue;
+    cav_normal_solve(b->normal, x, solution[1]);
+    CHECK(!memcmp(product[0], product[1], (size_t)n * sizeof(double)));
+    CHECK(!memcmp(solution[0], solution[1], (size_t)n * sizeof(double)));
+    factored++;
+  }
+  free(kept);
+  printf("%d of %d sums have a factor, the same in one pass\n", factored, trials);
+  CHECK(factored > trials / 4 && factored < trials);
+}
+
 int main(void) {
   bench b = {0};
   if (make(&b)) {
@@ -199,6 +237,7 @@ int main(void) {
     test_knots(&b);
     test_again(&b);
     test_steep(&b);
+    test_sum(&b);
   }
   cav_quadratic_free(b.qp);
   cav_normal_free(b.normal);

@@ -389,6 +389,57 @@ cav_status cav_normal_factor(cav_normal *normal, double shift) {
   return status == CAV_OK && has_arrow(normal) ? factor_arrow(normal, shift) : status;
 }
 
+/// product += what columns of the band and their mirror images give.
+static void multiply_columns(const cav_normal *normal, int from, int to, const double *x, double *product) {
+  for (int j = from; j < to; j++) {
+    const double *H = normal->H + (size_t)j * normal->band - j;
+    int end = end_of(normal, j);
+    double sum = H[j] * x[j];
+    for (int i = j + 1; i < end; i++) {
+      product[i] += H[i] * x[j];
+      sum += H[i] * x[i];
+    }
+    product[j] += sum;
+  }
+}
+
+int cav_normal_is_band(const cav_normal *normal) { return normal->ntree == 1 && normal->border == 0; }
+int cav_normal_was_band(const cav_normal *normal) { return normal->ngroup == 1 && normal->border == 0; }
+
+cav_status cav_normal_factor_sum(cav_normal *normal, const cav_transcription *tr, const cav_normal_sum *sum,
+                                 double shift) {
+  double *at = normal->factor, *H = normal->H;
+  if (normal->ntree == 1) find_groups(normal);
+  cav_band *band = place_band(normal, 0, &at);
+  size_t width = (size_t)normal->band;
+  int copied = 0, filled = 0;
+  // the factor's own place is what is gathered in: its columns lie as those of H
+  normal->H = band->A;
+  memset(sum->product, 0, (size_t)normal->size * sizeof *sum->product);
+  for (int t = 0; t < tr->nknot && band->done >= 0; t++) {
+    // a knot is the first at its last block; the next two add to all but the blocks before them
+    int ended = t + 1 == tr->nknot, last = ended ? band->core : (t - tr->first) * normal->n;
+    int end = ended ? last : last + 2 * normal->n;
+    if (end > copied) {
+      memcpy(band->A + (size_t)copied * width, sum->kept + (size_t)copied * width,
+             (size_t)(end - copied) * width * sizeof *sum->kept);
+      multiply_columns(normal, copied, end, sum->x, sum->product);
+      copied = end;
+    }
+    sum->add(sum->context, t);
+    if (last <= filled) continue;
+    for (int j = filled; j < last; j++) {
+      double *entry = &band->A[(size_t)j * width];
+      normal->diagonal[j] = *entry + sum->diagonal[j];
+      *entry = lifted(normal, j, shift);
+    }
+    filled = last;
+    cav_band_factor_part(band, last);
+  }
+  normal->H = H;
+  return band->done >= 0 ? CAV_OK : CAV_NOT_CONVERGED;
+}
+
 /// Knots that are taken one after the other.
 typedef struct stream {
   cav_normal *normal;
@@ -448,19 +499,18 @@ void cav_normal_solve(const cav_normal *normal, const double *b, double *x) {
   x[last] = step;
 }
 
+void cav_normal_multiply_kept(const cav_normal *normal, const double *kept, const double *x, double *product) {
+  cav_normal of = *normal;
+  of.H = (double *)kept;
+  of.B = of.H + entries_of(normal);
+  of.C = of.B + (size_t)normal->core * (size_t)normal->border;
+  cav_normal_multiply(&of, x, product);
+}
+
 void cav_normal_multiply(const cav_normal *normal, const double *x, double *product) {
   int core = normal->core, border = normal->border;
   memset(product, 0, (size_t)normal->size * sizeof(double));
-  for (int j = 0; j < core; j++) {
-    const double *H = normal->H + (size_t)j * normal->band - j;
-    int end = end_of(normal, j);
-    double sum = H[j] * x[j];
-    for (int i = j + 1; i < end; i++) {
-      product[i] += H[i] * x[j];
-      sum += H[i] * x[i];
-    }
-    product[j] += sum;
-  }
+  multiply_columns(normal, 0, core, x, product);
   for (int i = 0; i < border; i++) {
     const double *B = normal->B + (size_t)i * core;
     double sum = 0;

@@ -66,12 +66,34 @@ double *cav_normal_place(const cav_normal *normal, const cav_transcription *tran
 /// Factors H + shift diag(H); CAV_NOT_CONVERGED if that is not positive definite.
 cav_status cav_normal_factor(cav_normal *normal, double shift);
 
+/// Whether all unknowns are one band, whatever is gathered; or were at the last gathering. So the next can be factored as it
+/// is gathered.
+int cav_normal_is_band(const cav_normal *normal);
+int cav_normal_was_band(const cav_normal *normal);
+
+/// What is factored in one pass over the knots, while its columns are at hand: what was kept, what add gives at each knot (in
+/// its place, or as a block), a diagonal. And the product of what was kept with x. [unknowns]
+typedef struct cav_normal_sum {
+  const double *kept, *diagonal, *x;
+  double *product;
+  void (*add)(void *context, int t);
+  void *context;
+} cav_normal_sum;
+
+/// Factors a sum where cav_normal_was_band, with the bits that its parts give one after the other; H stays as it was. Results of
+/// cav_normal_factor; product is whole where that is CAV_OK.
+cav_status cav_normal_factor_sum(cav_normal *normal, const cav_transcription *transcription, const cav_normal_sum *sum,
+                                 double shift);
+
 /// Holds the last unknown where it is: its gradient and row become those of one that has no say.
 void cav_normal_hold(cav_normal *normal);
 
 /// x := (H + shift)^-1 b with the last factor; product := H x. [unknowns]
 void cav_normal_solve(const cav_normal *normal, const double *b, double *x);
 void cav_normal_multiply(const cav_normal *normal, const double *x, double *product);
+
+/// product := H x of what was kept. [unknowns]
+void cav_normal_multiply_kept(const cav_normal *normal, const double *kept, const double *x, double *product);
 
 /// Entries of the lower triangle in a fixed order: rows, columns and values where asked for; returns their number.
 int cav_normal_entries(const cav_normal *normal, int *row, int *column, double *value);

@@ -54,6 +54,7 @@ struct cav_quadratic {
   double *local, *image, *block, *dense;  ///< [3nv+1] of one knot, [9nv^2], [most rows * 3nv]
   double *costs;                          ///< normal equations of the costs alone, as they are kept
   double lifted;                          ///< fraction of its diagonal that the last factor needed besides
+  int is_band;                            ///< whether all unknowns are one, which is factored as it is gathered
   int bent;                               ///< iterations whose matrix was far from positive definite
   double predicted;                       ///< decrease of the last solution
   double gap;                             ///< complementarities of the last solution
@@ -229,6 +230,7 @@ static void prepare(cav_quadratic *p) {
     }
   }
   cav_normal_save(p->normal, p->costs);
+  p->is_band = cav_normal_is_band(p->normal);
 }
 
 static double slack(const cav_slot *slot, double value, int upper) {
@@ -382,10 +384,8 @@ static void advance(cav_quadratic *p, double length) {
   }
 }
 
-/// Lagrangian's gradient at x but for the rows' part, into rhs; the normal equations become the costs' alone.
+/// Lagrangian's gradient at x but for the rows' part, into rhs, which holds the costs' Hessian times x.
 static void dual_residual(cav_quadratic *p) {
-  cav_normal_load(p->normal, p->costs);
-  cav_normal_multiply(p->normal, p->x, p->rhs);
   for (int j = 0; j < p->n; j++) p->rhs[j] += p->gradient[j] + p->box[2 * j + 1].y - p->box[2 * j].y;
 }
 
@@ -411,31 +411,41 @@ static void weigh_rows(cav_quadratic *p, int t, double *block, int ld, double *s
   cav_dense_square(CAV_TRIANGLE_LOWER, width, 3, ndense, p->dense, width, block, ld);
 }
 
-/// Adds the weighted rows to the costs' Hessian, which the normal equations are.
-static void gather(cav_quadratic *p) {
+/// Adds the weighted rows of a knot to the costs' Hessian, which the normal equations hold.
+static void gather_knot(void *context, int t) {
+  cav_quadratic *p = context;
   const cav_transcription *tr = p->tr;
   int width = 3 * tr->nv;
-  for (int t = 0; t < tr->nknot; t++) {
-    double square = 0, *place = cav_normal_place(p->normal, tr, t);
-    if (place) {
-      weigh_rows(p, t, place, 3 * tr->nv - 1, NULL, NULL);
-      continue;
-    }
-    memset(p->block, 0, (size_t)width * (size_t)width * sizeof(double));
-    memset(p->local, 0, (size_t)width * sizeof(double));
-    weigh_rows(p, t, p->block, width, p->local, &square);
-    for (int i = 0; i < width; i++)
-      for (int j = 0; j < i; j++) p->block[i * width + j] = p->block[j * width + i];
-    cav_normal_add_block(p->normal, tr, t, p->block, p->local, square);
+  double square = 0, *place = cav_normal_place(p->normal, tr, t);
+  if (place) {
+    weigh_rows(p, t, place, width - 1, NULL, NULL);
+    return;
   }
+  memset(p->block, 0, (size_t)width * (size_t)width * sizeof(double));
+  memset(p->local, 0, (size_t)width * sizeof(double));
+  weigh_rows(p, t, p->block, width, p->local, &square);
+  for (int i = 0; i < width; i++)
+    for (int j = 0; j < i; j++) p->block[i * width + j] = p->block[j * width + i];
+  cav_normal_add_block(p->normal, tr, t, p->block, p->local, square);
+}
+
+/// Factors costs, weighted rows and the diagonal in work with a shift; rhs := the costs' Hessian times x. again: the last call
+/// with another shift.
+static cav_status factor_sum(cav_quadratic *p, double shift, int again) {
+  cav_normal_sum sum = {.kept = p->costs, .diagonal = p->work, .x = p->x, .product = p->rhs, gather_knot, p};
+  if (p->is_band) return cav_normal_factor_sum(p->normal, p->tr, &sum, shift);
+  if (again) return cav_normal_factor(p->normal, shift);
+  cav_normal_load(p->normal, p->costs);
+  cav_normal_multiply(p->normal, p->x, p->rhs);
+  for (int t = 0; t < p->tr->nknot; t++) gather_knot(p, t);
+  cav_normal_add_diagonal(p->normal, p->work);
+  return cav_normal_factor(p->normal, shift);
 }
 
 int cav_quadratic_convex(cav_quadratic *p) {
   memset(p->work, 0, (size_t)p->n * sizeof(double));
   prepare(p);
-  gather(p);
-  cav_normal_add_diagonal(p->normal, p->work);
-  return cav_normal_factor(p->normal, 1e-10) == CAV_OK;
+  return factor_sum(p, 1e-10, 0) == CAV_OK;
 }
 
 int cav_quadratic_knot_convex(cav_quadratic *p, int t, double shift) {
@@ -452,19 +462,19 @@ int cav_quadratic_knot_convex(cav_quadratic *p, int t, double shift) {
   return cav_dense_factor(width, width - 1, p->block, width);
 }
 
-/// Factors the costs' Hessian, which the normal equations are, with all sides. What the last factor needed on its
+/// Factors the costs' Hessian with all sides. What the last factor needed on its
 /// diagonal the next one needs nearly, as weights grow.
 static cav_status factor(cav_quadratic *p) {
   for (int r = 0; r < p->rows; r++) p->weight[r] = p->row[2 * r].w + p->row[2 * r + 1].w;
-  gather(p);
   for (int j = 0; j < p->n; j++) p->work[j] = p->box[2 * j].w + p->box[2 * j + 1].w;
-  cav_normal_add_diagonal(p->normal, p->work);
   double shift = p->lifted > 0 ? fmax(p->lifted / 100, first_lift) : 0;
-  cav_status status = cav_normal_factor(p->normal, shift);
+  cav_status status = factor_sum(p, shift, 0);
   for (p->lifted = shift; status == CAV_NOT_CONVERGED && shift < 10; p->lifted = shift) {
     shift = shift > 0 ? 100 * shift : first_lift;
-    status = cav_normal_factor(p->normal, shift);
+    status = factor_sum(p, shift, 1);
   }
+  // which rows and costs there are, and so what they join, stays as it is until another linearisation
+  p->is_band = cav_normal_was_band(p->normal);
   p->bent += p->lifted > 10 * first_lift;
   return status;
 }
@@ -561,9 +571,9 @@ static cav_status approach(cav_quadratic *p, double tolerance, double *left) {
   for (int i = 0; i < ITERATIONS && held < 3; i++) {
     if ((p->gap <= tolerance && *left <= 1e-8) || p->bent > BENT) break;
     if (cav_transcription_stopped(p->tr)) return CAV_INTERRUPTED;
-    dual_residual(p);
     cav_status status = factor(p);
     if (status != CAV_OK) return status;
+    dual_residual(p);
     // predictor, then the corrector towards what it shows to be within reach
     step(p, 0, 0);
     double length = fmin(boundary * longest(p), 1), ratio = fmin(gap_after(p, length) / p->gap, 1);
@@ -625,6 +635,7 @@ cav_status cav_quadratic_solve_again(cav_quadratic *p, double tolerance) { retur
 
 double cav_quadratic_unfinished(cav_quadratic *p) {
   double decrease = cav_quadratic_decrease(p);
+  cav_normal_multiply_kept(p->normal, p->costs, p->x, p->rhs);
   dual_residual(p);
   add_rows(p, p->multiplier, p->rhs);
   return decrease > 0 ? -dot(p->n, p->rhs, p->x) / decrease : 0;
