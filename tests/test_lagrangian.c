@@ -2,6 +2,7 @@
 /// the Hessian of the Lagrangian: its forms along directions against centred differences of the Lagrangian's gradient,
 /// on a planar leg and on a free body with a ball joint that stand on a floor, with a hard sensor and multipliers at
 /// random.
+#include "dof_groups.h"
 #include "gauss_newton.h"
 #include "lagrangian.h"
 #include "scene.h"
@@ -24,17 +25,39 @@ static const char body_text[] =
     "size='.03' mass='1'/><site name='toe' pos='.1 0 -.28'/></body></body></worldbody><actuator>"
     "<motor joint='hip' gear='40 0 0' ctrlrange='-1 1' ctrllimited='true'/>"
     "<motor joint='hip' gear='0 40 0' ctrlrange='-1 1' ctrllimited='true'/></actuator></mujoco>";
+// two legs that meet, an arm that holds a box with a leg: columns of dofs that do not meet are found at once
+static const char tree_text[] =
+    "<mujoco><worldbody><geom type='plane' size='9 9 1'/><body name='trunk' pos='0 0 .52'><freejoint/>"
+    "<geom type='sphere' size='.1' mass='4'/>"
+    "<body name='left'><joint axis='0 1 0'/><geom type='capsule' fromto='0 .02 0 .05 .04 -.25' size='.03' mass='1'/>"
+    "<body name='left shank' pos='.05 .04 -.25'><joint axis='0 1 0' damping='.1'/>"
+    "<geom type='capsule' fromto='0 0 0 0 0 -.22' size='.03' mass='.6'/><site name='toe' pos='0 0 -.25'/></body></body>"
+    "<body name='right'><joint axis='1 0 0'/><geom type='capsule' fromto='0 -.02 0 .05 -.04 -.25' size='.03' mass='1'/>"
+    "<body name='right shank' pos='.05 -.04 -.25'><joint axis='0 1 0' damping='.1'/>"
+    "<geom type='capsule' fromto='0 0 0 0 .01 -.22' size='.03' mass='.6'/></body></body>"
+    "<body name='arm' pos='0 0 .1'><joint type='ball'/><geom type='capsule' fromto='0 0 0 .3 0 0' size='.03' "
+    "mass='.5'/>"
+    "<body name='hand' pos='.3 0 0'><joint axis='0 1 0'/><geom type='sphere' size='.04' "
+    "mass='.2'/></body></body></body>"
+    "<body name='box' pos='.33 0 .69'><freejoint/><geom type='sphere' size='.03' mass='.3'/></body></worldbody>"
+    "<actuator/></mujoco>";
 static const char problem_text[] =
     "<problem name='hop' model='model.xml'><horizon duration='.2' timestep='.02'/><start/>"
     "<cost><sensor type='framepos' body='trunk' component='z' target='.6' at='.1' weight='10'/></cost>"
     "<constraint><sensor type='framepos' site='toe' component='x' target='.1' at='end'/></constraint></problem>";
 
-static cav_problem *load(const char *model) {
+static const char tree_problem_text[] =
+    "<problem name='hop' model='model.xml'><horizon duration='.2' timestep='.02' order='momentum'/><start/>"
+    "<cost><force weight='1'/><slip weight='10'/>"
+    "<sensor type='framepos' body='hand' reftype='body' refname='box' target='.1 0 0' at='.1' weight='10'/></cost>"
+    "<constraint><sensor type='framepos' site='toe' component='x' target='.1' at='end'/></constraint></problem>";
+
+static cav_problem *load(const char *model, const char *text) {
   char folder[] = "/tmp/cavort-lagrangian-XXXXXX", path[80];
   cav_error error = {0};
   if (!mkdtemp(folder)) return NULL;
   scene_write(folder, "model.xml", model);
-  scene_write(folder, "problem.xml", problem_text);
+  scene_write(folder, "problem.xml", text);
   snprintf(path, sizeof path, "%s/problem.xml", folder);
   cav_problem *problem = cav_problem_load(path, NULL, &error);
   if (!problem) fprintf(stderr, "    %s\n", error.text);
@@ -150,9 +173,35 @@ static int own_jacobian(void *context, const cav_knot_view *view, const cav_view
   return 0;
 }
 
+// groups of dofs: fewer than these where branches do not meet, and all that meet is told by itself
+static void check_groups(cav_transcription *tr, const cav_trajectory *at, int fewer) {
+  cav_dof_groups of;
+  int most = 0, nv = tr->nv;
+  double *pull = calloc((size_t)(nv + 400), sizeof *pull);
+  cav_state *state = cav_state_new(tr->model);
+  if (!CHECK(cav_dof_groups_make(&of, nv) && pull && state)) return;
+  state->options = tr->options;
+  for (int i = nv; i < nv + 400; i++) pull[i] = 1;
+  for (int t = 1; t + 1 < tr->nknot; t++) {
+    CHECK(tr->knot[t].nread < 400);
+    CHECK(cav_inverse(tr->model, state, at->q + (size_t)t * at->nq, cav_velocity_at(tr, at, t),
+                      cav_velocity_after(tr, at, t), tr->knot[t].u) == CAV_OK);
+    cav_dof_groups_find(&of, tr, state, t, pull);
+    most = of.ngroup > most ? of.ngroup : most;
+    for (int r = 0; r < nv; r++)
+      for (int c = 0; c < nv; c++)
+        CHECK(!of.joined[r * nv + c] || cav_dof_groups_alone(&of, r, c) || cav_dof_groups_alone(&of, c, r));
+  }
+  printf("%d groups of %d dofs at most\n", most, nv);
+  CHECK(fewer ? most < nv : most <= nv);
+  free(pull);
+  cav_state_free(state);
+  cav_dof_groups_clear(&of);
+}
+
 // spread: how far knots lie from the start, at random; up: dof that lifts; bound of what the Hessian is off by
-static void check_model(const char *model, double spread, int up, double bound) {
-  cav_problem *problem = load(model);
+static void check_model(const char *model, const char *text, double spread, int up, double bound) {
+  cav_problem *problem = load(model, text);
   if (!CHECK(problem != NULL)) return;
   // and two terms of one's own, one of them hard
   cav_user_quantity own = {"own", "", 2, CAV_READS_ACCELERATION, own_value, own_jacobian, NULL, 0};
@@ -162,7 +211,8 @@ static void check_model(const char *model, double spread, int up, double bound) 
   terms[ngiven] = cav_term_cost(CAV_QUANTITY_USER, 20);
   terms[ngiven + 1] = cav_term_range(CAV_QUANTITY_USER, -1, 1);
   terms[ngiven].user = terms[ngiven + 1].user = &own;
-  problem->term = terms, problem->nterm = ngiven + 2;
+  // which may join any dofs
+  if (text == problem_text) problem->term = terms, problem->nterm = ngiven + 2;
   cav_transcription *tr = cav_transcription_new(problem, 2, NULL);
   cav_normal *normal = cav_normal_new(tr);
   cav_trajectory *at = cav_trajectory_new(problem->model, tr->nknot, problem->timestep);
@@ -191,7 +241,8 @@ static void check_model(const char *model, double spread, int up, double bound) 
       CHECK(without > 100 * with);
     }
   }
-  check_jumps(tr, at, beside, up);
+  if (text == problem_text) check_jumps(tr, at, beside, up);
+  check_groups(tr, at, text == tree_problem_text);
   free(x);
   cav_trajectory_free(at), cav_trajectory_free(held), cav_trajectory_free(beside);
   cav_normal_free(normal);
@@ -200,7 +251,8 @@ static void check_model(const char *model, double spread, int up, double bound) 
 }
 
 int main(void) {
-  check_model(model_text, 0.03, 1, 1e-4);
-  check_model(body_text, 0.03, 2, 1e-4);
+  check_model(model_text, problem_text, 0.03, 1, 1e-4);
+  check_model(body_text, problem_text, 0.03, 2, 1e-4);
+  check_model(tree_text, tree_problem_text, 0.03, 2, 1e-4);
   return check_result();
 }

@@ -1,15 +1,16 @@
 /// Second derivatives of the Lagrangian that Gauss-Newton leaves out, knot by knot. What is nonlinear at a knot are its
 /// readings y(q, v, v'): forces, contacts, sensors. With the pull p = dL/dy held, the curvature is the derivative of
-/// the adjoint product (dy/dz)' p by z = (q, v, v'), taken by differences of analytic derivatives, made symmetric and
-/// chained to the three neighbouring knots. Rates bend where they are rotations', with both ends of their step: by the
-/// pull of all rows on them, costs and constraints of rates included. Left out are rotation vectors to a posture, and
-/// the products of cost terms over power.
+/// the adjoint product (dy/dz)' p by z = (q, v, v'), taken by differences of analytic derivatives along groups of dofs
+/// that do not meet in it (dof_groups.c), made symmetric and chained to the three neighbouring knots. Rates bend where
+/// they are rotations', with both ends of their step: by the pull of all rows on them, costs and constraints of rates
+/// included. Left out are rotation vectors to a posture, and the products of cost terms over power.
 #include "lagrangian.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "dof_groups.h"
 #include "knot.h"
 #include "rotation.h"
 
@@ -26,6 +27,7 @@ typedef struct curve {
   const char *chosen; ///< [nknot] whether a knot's is asked for; NULL: all are
   cav_status *status; ///< [nknot]
   double *room;       ///< [members * room_of]
+  cav_dof_groups *of; ///< [members]
 } curve;
 
 static size_t room_of(const cav_transcription *tr) {
@@ -179,16 +181,17 @@ static void curve_rotations(const cav_transcription *tr, const double *rotation,
   }
 }
 
-/// The adjoint product at z moved by a distance along coordinate j.
-static cav_status adjoint_beside(const curve *c, cav_scratch *s, int t, int j, double distance, const double *pull,
-                                 double *moved, double *g) {
+/// The adjoint product at z moved by a distance along the coordinates of a kind (q_t, v_t, v_{t+1}) that are in a group of dofs.
+static cav_status adjoint_beside(const curve *c, cav_scratch *s, int t, const cav_dof_groups *of, int kind, int group,
+                                 double distance, const double *pull, double *moved, double *g) {
   const cav_transcription *tr = c->tr;
-  int nv = tr->nv, kind = j / nv;
+  int nv = tr->nv;
   double *q = moved + 3 * nv, *step = moved, *v = moved + nv, *v_next = moved + 2 * nv;
   memset(step, 0, (size_t)nv * sizeof *step);
   memcpy(v, cav_velocity_at(tr, c->at, t), (size_t)nv * sizeof *v);
   memcpy(v_next, cav_velocity_after(tr, c->at, t), (size_t)nv * sizeof *v);
-  (kind == 0 ? step : kind == 1 ? v : v_next)[j % nv] += distance;
+  for (int d = 0; d < nv; d++)
+    if (of->group[d] == group) (kind == 0 ? step : kind == 1 ? v : v_next)[d] += distance;
   const double *here = c->at->q + (size_t)t * c->at->nq;
   if (kind == 0) cav_integrate(tr->model, here, step, 1, q);
   cav_stage same = kind == 0 ? CAV_STAGE_NONE : CAV_STAGE_POSITION;
@@ -213,7 +216,52 @@ static void curve_rates(const curve *c, cav_scratch *s, int t, double *pull, dou
                     2, H);
 }
 
-static cav_status curve_knot(const curve *c, cav_scratch *s, int t, double *room) {
+/// Columns of sum [3nv*3nv], of kind * nv + group: differences of the adjoint product, which is base [3nv] here.
+static cav_status find_sums(const curve *c, cav_scratch *s, int t, const cav_dof_groups *of, const double *pull,
+                            const double *base, double *moved, double *sum) {
+  const cav_transcription *tr = c->tr;
+  int nv = tr->nv, width = 3 * nv;
+  cav_status status = CAV_OK;
+  memset(sum, 0, (size_t)width * (size_t)width * sizeof *sum);
+  // velocities first, while the state's positions stand
+  for (int k = 1; k <= 3 && status == CAV_OK; k++) {
+    int kind = k % 3;
+    if (!kind_moves(tr, t, kind)) continue;
+    for (int group = 0; group < of->ngroup && status == CAV_OK; group++) {
+      double distance = kind == 0 ? shift : shift / tr->options.timestep;
+      double *out = sum + (size_t)(kind * nv + group) * (size_t)width;
+      status = adjoint_beside(c, s, t, of, kind, group, distance, pull, moved, out);
+      // contact points of a pair may come and go on one side
+      if (status == CAV_NOT_SUPPORTED) {
+        distance = -distance;
+        status = adjoint_beside(c, s, t, of, kind, group, distance, pull, moved, out);
+      }
+      for (int i = 0; i < width; i++) out[i] = (out[i] - base[i]) / distance;
+    }
+  }
+  return status;
+}
+
+/// The symmetric matrix K [3nv*3nv] of the sums: each entry from where it stands alone, the mean where it does twice.
+static void read_sums(const cav_dof_groups *of, const double *sum, double *K) {
+  int nv = of->nv, width = 3 * nv;
+  memset(K, 0, (size_t)width * (size_t)width * sizeof *K);
+  for (int r = 0; r < nv; r++) {
+    for (int c = 0; c < nv; c++) {
+      int here = cav_dof_groups_alone(of, r, c), there = cav_dof_groups_alone(of, c, r);
+      if (!here && !there) continue;
+      for (int a = 0; a < 3; a++) {
+        for (int b = 0; b < 3; b++) {
+          double one = sum[(b * nv + of->group[c]) * width + a * nv + r];
+          double other = sum[(a * nv + of->group[r]) * width + b * nv + c];
+          K[(a * nv + r) * width + b * nv + c] = here && there ? 0.5 * (one + other) : here ? one : other;
+        }
+      }
+    }
+  }
+}
+
+static cav_status curve_knot(const curve *c, cav_scratch *s, int t, double *room, cav_dof_groups *of) {
   cav_transcription *tr = c->tr;
   cav_knot *knot = &tr->knot[t];
   size_t nv = (size_t)tr->nv, width = 3 * nv;
@@ -229,28 +277,15 @@ static cav_status curve_knot(const curve *c, cav_scratch *s, int t, double *room
   pull_costs(tr, s->key, t, c->factor, pull);
   pull_rows(tr, t, pull);
   knot->refusal = (cav_user_refusal){0};
+  cav_dof_groups_find(of, tr, s->state, t, pull);
   status = cav_readings_adjoint(tr, s, t, pull, base);
-  memset(K, 0, width * width * sizeof *K);
-  // velocities first, while the state's positions stand
-  for (int k = 0; k < 3 * tr->nv && status == CAV_OK; k++) {
-    int j = (k + tr->nv) % (3 * tr->nv);
-    if (!kind_moves(tr, t, j / tr->nv)) continue;
-    double distance = j < tr->nv ? shift : shift / tr->options.timestep;
-    status = adjoint_beside(c, s, t, j, distance, pull, moved, K + (size_t)j * width);
-    // contact points of a pair may come and go on one side
-    if (status == CAV_NOT_SUPPORTED) {
-      distance = -distance;
-      status = adjoint_beside(c, s, t, j, distance, pull, moved, K + (size_t)j * width);
-    }
-    for (size_t i = 0; i < width; i++) K[(size_t)j * width + i] = (K[(size_t)j * width + i] - base[i]) / distance;
-  }
+  if (status == CAV_OK) status = find_sums(c, s, t, of, pull, base, moved, half);
   free(pull);
   if (status == CAV_OK) status = cav_user_refused(&knot->refusal);
   if (status == CAV_NOT_SUPPORTED) return CAV_OK;
   if (status != CAV_OK) return status;
-  // symmetric, then T' K T
-  for (size_t i = 0; i < width; i++)
-    for (size_t j = 0; j < i; j++) K[i * width + j] = K[j * width + i] = 0.5 * (K[i * width + j] + K[j * width + i]);
+  // T' K T
+  read_sums(of, half, K);
   cav_transcription_chain(tr, t, (int)width, K, half);
   for (size_t i = 0; i < width; i++)
     for (size_t j = 0; j < width; j++) K[i * width + j] = half[j * width + i];
@@ -271,17 +306,20 @@ static cav_status curve_knot(const curve *c, cav_scratch *s, int t, double *room
 static void curve_item(void *context, int t, int member) {
   const curve *c = context;
   if (c->chosen && !c->chosen[t]) return;
-  c->status[t] = curve_knot(c, &c->tr->scratch[member], t, c->room + (size_t)member * room_of(c->tr));
+  c->status[t] = curve_knot(c, &c->tr->scratch[member], t, c->room + (size_t)member * room_of(c->tr), &c->of[member]);
 }
 
 cav_status cav_lagrangian_curvature(cav_transcription *tr, const cav_trajectory *at, double factor,
                                     const char *chosen) {
-  int members = cav_parallel_size(tr->pool);
-  curve c = {tr, at, factor, chosen, calloc((size_t)tr->nknot, sizeof(cav_status)), NULL};
+  int members = cav_parallel_size(tr->pool), whole = 1;
+  curve c = {tr, at, factor, chosen, calloc((size_t)tr->nknot, sizeof(cav_status)), NULL, NULL};
   c.room = malloc((size_t)members * room_of(tr) * sizeof(double));
-  cav_status status = c.status && c.room ? CAV_OK : CAV_NO_MEMORY;
+  c.of = calloc((size_t)members, sizeof *c.of);
+  for (int i = 0; c.of && i < members; i++) whole &= cav_dof_groups_make(&c.of[i], tr->nv);
+  cav_status status = c.status && c.room && c.of && whole ? CAV_OK : CAV_NO_MEMORY;
   if (status == CAV_OK) cav_parallel_for(tr->pool, tr->nknot, curve_item, &c);
   if (status == CAV_OK) status = cav_transcription_conclude(tr, c.status);
-  free(c.status), free(c.room);
+  for (int i = 0; c.of && i < members; i++) cav_dof_groups_clear(&c.of[i]);
+  free(c.status), free(c.room), free(c.of);
   return status;
 }
