@@ -223,10 +223,10 @@ static inline __attribute__((always_inline)) void motion_along(const cav_contact
   }
 }
 
-// rows of a contact's derivatives in the dofs of the path
+// rows of a contact's derivatives in the dofs of the path, of its impulse the first ones
 CAV_VECTOR_BODY void path_rows_body(const cav_derivative_task *t, const cav_contact *c,
-                                    const cav_contact_jacobian *derivative, int side, int count, const double d[3],
-                                    double *to) {
+                                    const cav_contact_jacobian *derivative, int side, int impulses, int count,
+                                    const double d[3], double *to) {
   const size_t n = (size_t)t->s->path.stride;
   const double *path = t->s->path.at, sign = side ? 1 : -1, keep = 1 - c->damping[0];
   for (int k = 0; k < count; k += 4, to += 4) {
@@ -236,15 +236,18 @@ CAV_VECTOR_BODY void path_rows_body(const cav_derivative_task *t, const cav_cont
     motion_along(c, path + CAV_OF_AXIS * n, n, k, d, sign, axis, x);
     *(cav_four *)to = DOT6(derivative->dist[side], axis);
     for (int i = 0; i < c->dim; i++) {
-      const double *H = derivative->hessian[i], *v = derivative->velocity[side][i], *f = derivative->impulse[side][i];
+      const double *v = derivative->velocity[side][i];
+      *(cav_four *)(to + (OF_VELOCITY + i) * n) = DOT6(v, axis) + next[i];
+      *(cav_four *)(to + (OF_NEXT + i) * n) = x[i];
+    }
+    for (int i = 0; i < impulses; i++) {
+      const double *H = derivative->hessian[i], *f = derivative->impulse[side][i];
       cav_four by_now = H[0] * now[0], by_next = H[0] * next[0], by_axis = H[0] * x[0];
       for (int j = 1; j < c->dim; j++) {
         by_now += H[j] * now[j];
         by_next += H[j] * next[j];
         by_axis += H[j] * x[j];
       }
-      *(cav_four *)(to + (OF_VELOCITY + i) * n) = DOT6(v, axis) + next[i];
-      *(cav_four *)(to + (OF_NEXT + i) * n) = x[i];
       *(cav_four *)(to + (OF_IMPULSE + i) * n) = DOT6(f, axis) + (keep * by_now - by_next);
       *(cav_four *)(to + (OF_IMPULSE_NOW + i) * n) = keep * by_axis;
       *(cav_four *)(to + (OF_IMPULSE_NEXT + i) * n) = -by_axis;
@@ -253,8 +256,8 @@ CAV_VECTOR_BODY void path_rows_body(const cav_derivative_task *t, const cav_cont
 }
 CAV_BY_VECTORS(path_rows,
                (const cav_derivative_task *t, const cav_contact *c, const cav_contact_jacobian *derivative, int side,
-                int count, const double *d, double *to),
-               (t, c, derivative, side, count, d, to))
+                int impulses, int count, const double *d, double *to),
+               (t, c, derivative, side, impulses, count, d, to))
 
 // adds rows over the dofs of the path to those over all dofs
 static void add_path_rows(const cav_derivative_task *t, int rows, int length, const double *from, double *to) {
@@ -271,13 +274,14 @@ static void add_side(const cav_derivative_task *t, const cav_contact *c, const c
   if (last < 0) return;
   int length = cav_derivative_path(t, last);
   sub3(d, c->pos, t->state->reference + 3 * link);
-  path_rows(t, c, derivative, side, (length + 3) / 4 * 4, d, row);
+  const int impulses = out->normal_only ? 1 : c->dim;
+  path_rows(t, c, derivative, side, impulses, (length + 3) / 4 * 4, d, row);
   add_path_rows(t, 1, length, row, out->dist_dq);
   add_path_rows(t, c->dim, length, row + OF_VELOCITY * n, out->velocity_dq);
   add_path_rows(t, c->dim, length, row + OF_NEXT * n, out->velocity_dv_next);
-  add_path_rows(t, c->dim, length, row + OF_IMPULSE * n, out->impulse_dq);
-  add_path_rows(t, c->dim, length, row + OF_IMPULSE_NOW * n, out->impulse_dv);
-  add_path_rows(t, c->dim, length, row + OF_IMPULSE_NEXT * n, out->impulse_dv_next);
+  add_path_rows(t, impulses, length, row + OF_IMPULSE * n, out->impulse_dq);
+  add_path_rows(t, impulses, length, row + OF_IMPULSE_NOW * n, out->impulse_dv);
+  add_path_rows(t, impulses, length, row + OF_IMPULSE_NEXT * n, out->impulse_dv_next);
 }
 
 cav_status cav_contact_derivatives(const cav_model *model, cav_state *state, int contact, cav_contact_derivative *out) {
@@ -294,7 +298,7 @@ cav_status cav_contact_derivatives(const cav_model *model, cav_state *state, int
   if (out->dist_dq) memset(out->dist_dq, 0, row);
   double *all[] = {out->velocity_dq, out->velocity_dv_next, out->impulse_dq, out->impulse_dv, out->impulse_dv_next};
   for (int k = 0; k < 5; k++) {
-    if (all[k]) memset(all[k], 0, rows);
+    if (all[k]) memset(all[k], 0, k < 2 || !out->normal_only ? rows : row);
   }
   cav_derivative_task t = {.model = model, .state = state, .s = s, .nv = model->nv};
   for (int side = 0; side < 2; side++) add_side(&t, c, &s->contact[contact], side, out);

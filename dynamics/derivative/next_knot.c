@@ -76,7 +76,7 @@ void cav_derivative_next_contacts(const cav_derivative_task *t) {
 static void add_rates(const cav_derivative_task *t, int index, int row, int dof, const double rate[2],
                       cav_contact_derivative *out) {
   const cav_contact *c = &t->state->contact[index];
-  for (int i = 0; i < c->dim; i++) {
+  for (int i = 0; i < (out->normal_only ? 1 : c->dim); i++) {
     double by = t->s->contact[index].hessian[i][row];
     if (out->impulse_dq) out->impulse_dq[i * t->nv + dof] -= by * rate[0];
     if (out->impulse_dv_next) out->impulse_dv_next[i * t->nv + dof] -= by * rate[1];

@@ -213,6 +213,7 @@ typedef struct cav_contact_derivative {
   double *velocity_dq;                               ///< [dim*nv] of velocity_next
   double *velocity_dv_next;                          ///< [dim*nv] of velocity_next
   double *impulse_dq, *impulse_dv, *impulse_dv_next; ///< [dim*nv]
+  int normal_only;                                   ///< 1: of the impulse its first row alone, [nv]
 } cav_contact_derivative;
 
 /// Derivatives of contact number contact of the state, after cav_derivatives and before the next evaluation

@@ -3,6 +3,7 @@
 
 #include <assert.h>
 #include <limits.h>
+#include <string.h>
 
 int cav_knot_moves(const cav_transcription *tr, int t) { return tr->periodicity || (t >= tr->first && t < tr->nknot); }
 
@@ -61,7 +62,7 @@ int cav_knot_contact(const cav_transcription *tr, const int *key, const cav_term
 }
 
 /// Rows of a cost at knot t, whose contacts are listed.
-static row_count cost_rows(const cav_transcription *tr, const int *key, const cav_term *term, int t) {
+static row_count cost_rows(const cav_transcription *tr, cav_scratch *s, const cav_term *term, int t) {
   const cav_knot *knot = &tr->knot[t];
   row_count n = {0};
   if (cav_term_weight(tr, term, t) == 0) return n;
@@ -92,7 +93,11 @@ static row_count cost_rows(const cav_transcription *tr, const int *key, const ca
     case CAV_QUANTITY_SELF_PENETRATION:
     case CAV_QUANTITY_FORCE:
     case CAV_QUANTITY_SELF_FORCE:
-      for (int k = 0; k < knot->ncontact; k++) n.rows += (size_t)cav_knot_contact(tr, key, term, t, k, &first);
+      for (int k = 0; k < knot->ncontact; k++) {
+        const int readings = cav_knot_contact(tr, s->key, term, t, k, &first);
+        n.rows += (size_t)readings;
+        s->used[k] |= (unsigned char)(((1 << readings) - 1) << first);
+      }
       n.dense = n.rows;
       break;
     case CAV_QUANTITY_TYPES:
@@ -118,36 +123,52 @@ static row_count constraint_rows(const cav_transcription *tr, int t) {
 int cav_knot_has_duration(const cav_transcription *tr, int t) { return tr->free_step && t == 0; }
 
 /// All rows of knot t.
-static row_count knot_rows(const cav_transcription *tr, const int *key, int t) {
+static row_count knot_rows(const cav_transcription *tr, cav_scratch *s, int t) {
   row_count n = constraint_rows(tr, t);
   // those along single dofs
   n.dense += (size_t)tr->nv;
   if (tr->constraints_only) return n;
   n.rows += (size_t)cav_knot_has_duration(tr, t);
   for (int k = 0; k < tr->knot[t].ncontact && tr->depth_weight > 0; k++)
-    n.rows += !tr->knot[t].moving[k], n.dense += !tr->knot[t].moving[k];
+    if (!tr->knot[t].moving[k]) n.rows++, n.dense++, s->used[k] |= 1;
   for (int k = 0; k < tr->npenalised && tr->knot[t].has_force; k++)
     n.rows++, n.dense += cav_knot_stands_alone(&tr->penalised[k]);
   for (int i = 0; i < tr->problem->nterm; i++) {
     if (tr->problem->term[i].use != CAV_USE_COST) continue;
-    row_count cost = cost_rows(tr, key, &tr->problem->term[i], t);
+    row_count cost = cost_rows(tr, s, &tr->problem->term[i], t);
     n.rows += cost.rows;
     n.dense += cost.dense;
   }
   return n;
 }
 
-int cav_knot_reserve(cav_transcription *tr, cav_scratch *s, int t) {
-  cav_knot *knot = &tr->knot[t];
-  row_count n = knot_rows(tr, s->key, t);
+/// Room for the dense rows of a sum; 0 if memory runs out.
+static int reserve_dense(cav_sum *a) {
+  cav_scratch *s = a->s;
+  cav_knot *knot = a->knot;
+  int *room = a->passing ? &s->dense_room : &knot->dense_room;
+  double **dense = a->passing ? &s->dense : &knot->dense, **rest = a->passing ? &s->rest : &knot->rest;
+  if (a->jacobian && knot->dense_most > *room) {
+    if (!cav_readings_grow(dense, (size_t)knot->dense_most * 3 * (size_t)a->tr->nv) ||
+        !cav_readings_grow(rest, (size_t)knot->dense_most))
+      return 0;
+    *room = knot->dense_most;
+  }
+  a->dense = *dense, a->rest = *rest;
+  a->du = a->passing ? s->du : knot->du;
+  return 1;
+}
+
+int cav_knot_reserve(cav_sum *a) {
+  cav_transcription *tr = a->tr;
+  cav_scratch *s = a->s;
+  cav_knot *knot = a->knot;
+  if (knot->ncontact > 0) memset(s->used, 0, (size_t)knot->ncontact);
+  row_count n = knot_rows(tr, s, a->t);
   if (n.rows > INT_MAX / 2 || n.dense > INT_MAX / 2) return 0;
   knot->nrow = (int)n.rows;
   knot->dense_most = (int)n.dense;
-  if (knot->dense_most > knot->dense_room) {
-    if (!cav_readings_grow(&knot->dense, n.dense * 3 * (size_t)tr->nv) || !cav_readings_grow(&knot->rest, n.dense))
-      return 0;
-    knot->dense_room = knot->dense_most;
-  }
+  if (!reserve_dense(a)) return 0;
   if (!tr->free_step) return 1;
   if (knot->nrow > s->trace_room) {
     if (!cav_readings_grow(&s->trace[0], n.rows) || !cav_readings_grow(&s->trace[1], n.rows)) return 0;

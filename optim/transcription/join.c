@@ -62,12 +62,12 @@ static void copy_block(const join *g, int n, double *hessian, double *H, int bac
 }
 
 /// One group's part of the product, through room for its rows and block.
-static void join_group(join *g, int first, cav_knot *knot, double *room) {
+static void join_group(join *g, int first, cav_knot *knot, const double *dense, double *room) {
   int width = list_columns(g, first), count = 0;
   double *block = room, *row = room + (size_t)width * (size_t)width;
   for (int i = 0; i < knot->ndense; i++) {
     if (g->group[i] < 0 || representative(g, g->group[i]) != first) continue;
-    const double *from = knot->dense + (size_t)i * 3 * (size_t)g->nv;
+    const double *from = dense + (size_t)i * 3 * (size_t)g->nv;
     double *to = row + (size_t)count++ * (size_t)width;
     for (int k = 0; k < width; k++) to[k] = from[g->column[k]];
   }
@@ -77,13 +77,13 @@ static void join_group(join *g, int first, cav_knot *knot, double *room) {
   copy_block(g, width, knot->hessian, block, 1);
 }
 
-cav_status cav_rows_join(const cav_transcription *tr, cav_scratch *s, cav_knot *knot) {
+cav_status cav_rows_join(const cav_transcription *tr, cav_scratch *s, cav_knot *knot, const double *dense_rows) {
   int width = 3 * tr->nv, n = knot->ndense;
   int trees = 0;
   for (int d = 0; d < tr->nv; d++) trees += tr->model->dof[d].parent < 0;
   if (n == 0) return CAV_OK;
   if (trees == 1) {
-    cav_dense_square(CAV_TRIANGLE_UPPER, width, 3, n, knot->dense, width, knot->hessian, width);
+    cav_dense_square(CAV_TRIANGLE_UPPER, width, 3, n, dense_rows, width, knot->hessian, width);
     return CAV_OK;
   }
   size_t nv = (size_t)tr->nv, ints = 5 * nv + (size_t)n, dense = 9 * nv * nv + 3 * nv * (size_t)n;
@@ -95,12 +95,12 @@ cav_status cav_rows_join(const cav_transcription *tr, cav_scratch *s, cav_knot *
   }
   int *at = (int *)(s->join + dense);
   join g = {.nv = tr->nv, .tree = at, .owner = at + nv, .column = at + 2 * nv, .group = at + 5 * nv};
-  find_groups(&g, tr->model, n, knot->dense);
+  find_groups(&g, tr->model, n, dense_rows);
   if (g.ngroup == 1) {
-    cav_dense_square(CAV_TRIANGLE_UPPER, width, 3, n, knot->dense, width, knot->hessian, width);
+    cav_dense_square(CAV_TRIANGLE_UPPER, width, 3, n, dense_rows, width, knot->hessian, width);
     return CAV_OK;
   }
   for (int d = 0; d < tr->nv; d++)
-    if (g.tree[d] == d && g.owner[d] == d) join_group(&g, d, knot, s->join);
+    if (g.tree[d] == d && g.owner[d] == d) join_group(&g, d, knot, dense_rows, s->join);
   return CAV_OK;
 }

@@ -80,9 +80,9 @@ static void add_sparse(cav_sum *a, double weight, double r, int n, const int *co
 /// Space for one more dense row [3nv] with its residual.
 static double *new_dense(cav_sum *a, double rest) {
   cav_knot *knot = a->knot;
-  assert(knot->ndense < knot->dense_most && knot->dense_most <= knot->dense_room);
-  knot->rest[knot->ndense] = rest;
-  return knot->dense + (size_t)knot->ndense++ * 3 * (size_t)a->tr->nv;
+  assert(knot->ndense < knot->dense_most && knot->dense_most <= (a->passing ? a->s->dense_room : knot->dense_room));
+  a->rest[knot->ndense] = rest;
+  return a->dense + (size_t)knot->ndense++ * 3 * (size_t)a->tr->nv;
 }
 
 // out := a row
@@ -102,11 +102,24 @@ static void add_dense(cav_sum *a, double weight, double r, const double *row) {
   if (a->bend != 0) add_square(a, a->bend, width, NULL, row);
 }
 
+/// Derivative of a reading over the knots, in this thread's room until the next one.
+static const double *reading_row(const cav_sum *a, int reading) {
+  const cav_scratch *s = a->s;
+  const size_t at = (size_t)(a->tr->nv + reading) * (size_t)a->tr->nv;
+  cav_links_chain(a->tr, &a->links, 1, s->dq + at, s->dv + at, s->dn + at, s->reading);
+  return s->reading;
+}
+
+/// Adds weight/2 (r + row dx)^2 for the row of a reading, begun.
+static void add_reading(cav_sum *a, double weight, double r, int reading) {
+  add_dense(a, weight, r, a->jacobian && weight != 0 ? reading_row(a, reading) : NULL);
+}
+
 /// Adds a linear form of u to a row [3nv].
 static void put_force(const cav_sum *a, const cav_force_row *form, double *row) {
   int width = 3 * a->tr->nv;
   for (int k = 0; k < form->n; k++) {
-    const double *du = a->knot->du + (size_t)form->dof[k] * width;
+    const double *du = a->du + (size_t)form->dof[k] * width;
     for (int c = 0; c < width; c++) row[c] += form->coef[k] * du[c];
   }
 }
@@ -181,7 +194,7 @@ static double *keep_force(cav_sum *a, int i, const cav_force_row *form) {
 
 static void keep_reading(cav_sum *a, int i, int reading) {
   double *row = kept_row(a, i);
-  if (row) memcpy(row, a->knot->dy + (size_t)reading * 3 * a->tr->nv, 3 * (size_t)a->tr->nv * sizeof(double));
+  if (row) memcpy(row, reading_row(a, reading), 3 * (size_t)a->tr->nv * sizeof(double));
 }
 
 /// Entries of the derivative of v_t [dof d] over the columns; base is the column block of q_t, q_{t-1} stands before
@@ -357,7 +370,7 @@ static void add_contact(cav_sum *a, const cav_term *term, double weight) {
       double r = a->knot->y[row], w = weight;
       if (term->quantity == CAV_QUANTITY_GAP && r < 0) r = w = 0; // it is deep: add_depths
       begin_cost(a, term, term->scale, &w, &r);
-      add_dense(a, w, r, a->knot->dy + (size_t)row * 3 * a->tr->nv);
+      add_reading(a, w, r, row);
     }
   }
 }
@@ -370,14 +383,13 @@ static void add_depths(cav_sum *a) {
     if (a->knot->moving[k]) continue;
     double r = fmin(a->knot->y[row], 0), w = r < 0 ? weight : 0;
     begin_row(a, w, r);
-    add_dense(a, w, r, a->knot->dy + (size_t)row * 3 * a->tr->nv);
+    add_reading(a, w, r, row);
   }
 }
 
 /// One cost, whose readings, if it has any, are the knot's from reading on.
 static void add_cost(cav_sum *a, const cav_term *term, double weight, int reading, const double *q, const double *v,
                      const double *v_next) {
-  size_t width = 3 * (size_t)a->tr->nv;
   switch (term->quantity) {
     case CAV_QUANTITY_SENSOR:
     case CAV_QUANTITY_TRACK:
@@ -385,7 +397,7 @@ static void add_cost(cav_sum *a, const cav_term *term, double weight, int readin
       for (int k = 0; k < cav_term_dim(term); k++) {
         double r = a->knot->y[reading + k], w = weight;
         begin_cost(a, term, 1, &w, &r);
-        add_dense(a, w, r, a->knot->dy + (size_t)(reading + k) * width);
+        add_reading(a, w, r, reading + k);
       }
       break;
     case CAV_QUANTITY_CONFIGURATION:
@@ -565,7 +577,7 @@ static int add_hard_dofs(cav_sum *a, const cav_term *term, int i, double lower, 
 static void add_hard_terms(cav_sum *a, const double *q, const double *v, const double *v_next) {
   const cav_transcription *tr = a->tr;
   double rho = tr->penalty.term;
-  int i = a->knot->layout.term, reading = CAV_CONTACT_READINGS * a->knot->ncontact, width = 3 * tr->nv, active;
+  int i = a->knot->layout.term, reading = CAV_CONTACT_READINGS * a->knot->ncontact, active;
   for (int k = 0; k < tr->problem->nterm; k++) {
     const cav_term *term = &tr->problem->term[k];
     if (cav_term_weight(tr, term, a->t) == 0) continue;
@@ -579,7 +591,7 @@ static void add_hard_terms(cav_sum *a, const double *q, const double *v, const d
     for (int c = 0; c < dim; c++, reading++) {
       keep_reading(a, i, reading);
       double e = slot_residual(a, i++, a->knot->y[reading], lower, upper, rho, &active);
-      if (active) add_dense(a, rho, e, a->knot->dy + (size_t)reading * width);
+      if (active) add_reading(a, rho, e, reading);
     }
   }
   assert(i == a->knot->layout.count && reading == a->knot->nread);
@@ -608,11 +620,11 @@ static void lay_force_rows(cav_sum *a) {
     double weight = a->s->force_weight[d];
     if (weight == 0) continue;
     double root = sqrt(weight), *out = new_dense(a, a->s->force_derivative[d] / root);
-    const double *du = a->knot->du + (size_t)d * width;
+    const double *du = a->du + (size_t)d * width;
     scale_row(width, root, du, out);
     for (int k = 0; k < width && tr->free_step; k++) a->knot->step_row[k] += a->s->force_step[d] * du[k];
   }
-  add_gradient(width, a->knot->ndense, a->knot->rest, a->knot->dense, a->knot->gradient);
+  add_gradient(width, a->knot->ndense, a->rest, a->dense, a->knot->gradient);
 }
 
 void cav_knot_sum(cav_sum *a, const double *q, const double *v, const double *v_next) {

@@ -93,6 +93,9 @@ int cav_readings_list(cav_transcription *tr, cav_scratch *s, int t) {
     int *key = realloc(s->key, 2 * (size_t)s->state->ncontact * sizeof(int));
     if (!key) return 0;
     s->key = key;
+    unsigned char *used = realloc(s->used, (size_t)s->state->ncontact);
+    if (!used) return 0;
+    s->used = used;
     s->key_room = s->state->ncontact;
   }
   if (!knot->moving || s->state->ncontact > knot->moving_room) {
@@ -127,8 +130,7 @@ int cav_readings_list(cav_transcription *tr, cav_scratch *s, int t) {
     s->room = (int)total;
   }
   if (knot->nread > knot->room) {
-    if (!cav_readings_grow(&knot->y, (size_t)knot->nread) || !cav_readings_grow(&knot->dy, (size_t)knot->nread * 3 * n))
-      return 0;
+    if (!cav_readings_grow(&knot->y, (size_t)knot->nread)) return 0;
     knot->room = knot->nread;
   }
   return 1;
@@ -177,8 +179,12 @@ static void blend(size_t n, double a, const double *x, double b, double c, const
   for (size_t j = 0; j < n && y; j++) out[j] = a * x[j] + b * (c * y[j]);
 }
 
-/// The readings of a contact: sqrt(f_n) times gap, slip and normal velocity; f_n.
-static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s, const cav_contact *c, rows out) {
+/// Every reading of a contact.
+enum { WHOLE = (1 << CAV_CONTACT_READINGS) - 1 };
+
+/// The readings of a contact: sqrt(f_n) times gap, slip and normal velocity; f_n. Those that are used, by bits.
+static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s, const cav_contact *c, unsigned used,
+                               rows out) {
   size_t n = (size_t)tr->nv, nv = n;
   double *at = s->derivative;
   _Static_assert(25 + 6 == CAV_DERIVATIVE_ROWS, "the last of these arrays ends where the scratch does");
@@ -187,7 +193,8 @@ static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s
                               .velocity_dv_next = at + 7 * n,
                               .impulse_dq = at + 13 * n,
                               .impulse_dv = at + 19 * n,
-                              .impulse_dv_next = at + 25 * n};
+                              .impulse_dv_next = at + 25 * n,
+                              .normal_only = 1};
   cav_status status = cav_contact_derivatives(tr->model, s->state, (int)(c - s->state->contact), &d);
   if (status != CAV_OK) return status;
   double derivative, fraction = contact_weight(tr, c, &derivative), open = c->dist > 0;
@@ -199,6 +206,7 @@ static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s
   const double *by_next[4] = {NULL, slip ? d.velocity_dv_next + nv : NULL, slip ? d.velocity_dv_next + 2 * nv : NULL,
                               d.velocity_dv_next};
   for (int k = 0; k < 4; k++, out.dq += n, out.dv += n, out.dn += n) {
+    if (!(used >> k & 1)) continue;
     double by_impulse = derivative * value[k];
     blend(n, by_impulse, d.impulse_dq, fraction, k == 0 ? open : 1, by_q[k], out.dq);
     blend(n, by_impulse, d.impulse_dv, 0, 0, NULL, out.dv);
@@ -209,6 +217,7 @@ static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s
     memset(out.dv - 4 * n, 0, n * sizeof(double));
     memset(out.dn - 4 * n, 0, n * sizeof(double));
   }
+  if (!(used >> 4 & 1)) return CAV_OK;
   double unit = c->impulse[0] > 0 ? 1 / (tr->options.timestep * tr->weight) : 0;
   blend(n, unit, d.impulse_dq, 0, 0, NULL, out.dq);
   blend(n, unit, d.impulse_dv, 0, 0, NULL, out.dv);
@@ -220,7 +229,7 @@ static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s
 static cav_status self_rows(const cav_transcription *tr, const cav_scratch *s, const cav_contact *c, rows out) {
   if (!tr->self_force) return self_penetration_rows(tr, s, c, out);
   size_t n = (size_t)tr->nv;
-  cav_status status = contact_rows(tr, s, c, out);
+  cav_status status = contact_rows(tr, s, c, 1 << 4, out);
   memset(out.dq, 0, 4 * n * sizeof(double));
   memset(out.dv, 0, 4 * n * sizeof(double));
   memset(out.dn, 0, 4 * n * sizeof(double));
@@ -361,7 +370,7 @@ cav_status cav_readings_derivatives(const cav_transcription *tr, cav_scratch *s,
     const cav_contact *c = find_contact(s->state, s->key + 2 * k);
     rows out = rows_at(tr, s, tr->nv + CAV_CONTACT_READINGS * k);
     if (!c) return CAV_INTERNAL;
-    status = tr->knot[t].moving[k] ? self_rows(tr, s, c, out) : contact_rows(tr, s, c, out);
+    if (s->used[k]) status = tr->knot[t].moving[k] ? self_rows(tr, s, c, out) : contact_rows(tr, s, c, s->used[k], out);
   }
   if (status == CAV_NOT_SUPPORTED) return difference(tr, s, t, q, v, v_next);
   return status == CAV_OK ? terms(tr, s, t, q, v, v_next) : status;
@@ -398,7 +407,7 @@ cav_status cav_readings_adjoint(const cav_transcription *tr, cav_scratch *s, int
     const cav_contact *c = weighs(weight + at, CAV_CONTACT_READINGS) ? find_contact(s->state, s->key + 2 * k) : NULL;
     if (!c) continue;
     rows out = rows_at(tr, s, at);
-    status = knot->moving[k] ? self_rows(tr, s, c, out) : contact_rows(tr, s, c, out);
+    status = knot->moving[k] ? self_rows(tr, s, c, out) : contact_rows(tr, s, c, WHOLE, out);
     if (status != CAV_OK) return status;
     fold(tr, s, at, CAV_CONTACT_READINGS, weight, g);
   }

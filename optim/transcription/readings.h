@@ -16,8 +16,12 @@ typedef struct cav_scratch {
   double *value, *dq, *dv, *dn;
   int *key; ///< [2*contacts] pair and feature of the contacts with rows
   int key_room;
+  unsigned char *used;  ///< [contacts] by bits, readings that a row is of
+  double *du;           ///< [nv*3nv] of u, where the knot is not to keep it
+  double *dense, *rest; ///< [dense_room*3nv], [dense_room] rows over all columns, likewise
+  int dense_room;
   double *force_weight, *force_derivative; ///< [nv] of rows along single dofs
-  double *row;                             ///< [3nv]
+  double *row, *reading;                   ///< [3nv]
   int *column;                             ///< [nv]
   double *tangent;                         ///< [nv]
   double *posture;                         ///< [nq]

@@ -7,7 +7,6 @@
 /// and e = z~ - clamp(z~), the row costs rho/2 e^2 and its next multiplier is rho e (Powell, Hestenes, Rockafellar).
 #include "knot.h"
 #include "rotation.h"
-#include "vectors.h"
 
 #include <assert.h>
 #include <float.h>
@@ -222,6 +221,8 @@ static int scratch_new(cav_transcription *tr, cav_scratch *s) {
   s->force_weight = room(&ok, n, sizeof(double));
   s->force_derivative = room(&ok, n, sizeof(double));
   s->row = room(&ok, 3 * n, sizeof(double));
+  s->reading = room(&ok, 3 * n, sizeof(double));
+  s->du = room(&ok, 3 * n * n, sizeof(double));
   s->derivative = room(&ok, CAV_DERIVATIVE_ROWS * n, sizeof(double));
   s->column = room(&ok, n, sizeof(int));
   s->tangent = room(&ok, n, sizeof(double));
@@ -295,7 +296,7 @@ void cav_transcription_free(cav_transcription *tr) {
   for (int t = 0; tr->knot && t < tr->nknot; t++) {
     cav_knot *k = &tr->knot[t];
     free(k->slot), free(k->u), free(k->du), free(k->hessian), free(k->gradient), free(k->rotation), free(k->y),
-        free(k->dy), free(k->slot_row), free(k->slot_step), free(k->step_row);
+        free(k->slot_row), free(k->slot_step), free(k->step_row);
     free(k->dense), free(k->rest), free(k->moving);
     cav_kept_free(k->kept);
   }
@@ -303,7 +304,8 @@ void cav_transcription_free(cav_transcription *tr) {
     cav_scratch *s = &tr->scratch[i];
     cav_state_free(s->state);
     free(s->value), free(s->join), free(s->dq), free(s->dv), free(s->dn), free(s->key), free(s->derivative);
-    free(s->force_weight), free(s->force_derivative), free(s->row), free(s->column), free(s->tangent), free(s->posture);
+    free(s->force_weight), free(s->force_derivative), free(s->row), free(s->reading), free(s->du), free(s->dense),
+        free(s->rest), free(s->used), free(s->column), free(s->tangent), free(s->posture);
     free(s->force_step), free(s->rate), free(s->missing), free(s->user.x), free(s->trace[0]), free(s->trace[1]),
         free(s->slot[0]), free(s->slot[1]);
   }
@@ -341,78 +343,6 @@ const double *cav_velocity_at(const cav_transcription *tr, const cav_trajectory 
 
 const double *cav_velocity_after(const cav_transcription *tr, const cav_trajectory *at, int t) {
   return t + 1 < tr->nknot ? at->v + (size_t)(t + 1) * tr->nv : tr->after;
-}
-
-/// How rows over (q_t, v_t, v_{t+1}) are chained to the knots before, here and next: a factor of each in each, and the
-/// rotation Jacobians that go with it, Jl^-1 at the start of a step and Jr^-1 at its end.
-typedef struct links {
-  double v_before, n_before, q_here, v_here, n_here, n_next;
-  const double *before, *here, *then, *next; ///< of what is before; of v and of v_{t+1} here; of what is next
-} links;
-
-static links links_of(const cav_transcription *tr, int t) {
-  int last = tr->nknot - 1, here = cav_knot_moves(tr, t), before = cav_knot_moves(tr, t - 1);
-  int next = cav_knot_moves(tr, t + 1), held = !next && !tr->problem->close_at_rest; // v_{t+1} is v_t
-  const double *now = tr->knot[t].rotation, *after = t < last ? tr->knot[t + 1].rotation : tr->rotation_after;
-  double inverse = 1 / tr->options.timestep;
-  links l = {.before = now + 9, .here = now, .then = next ? after + 9 : now, .next = next ? after : now};
-  l.q_here = here;
-  l.v_here = here ? inverse : 0;
-  l.v_before = here && before ? -inverse : 0;
-  l.n_next = next ? inverse : 0;
-  l.n_here = held ? inverse : next && here ? -inverse : 0;
-  l.n_before = held && before ? -inverse : 0;
-  return l;
-}
-
-_Static_assert(CAV_ROTATION_SIZE >= 19, "four numbers can be read from any row of either Jacobian");
-
-// three components of a row times a rotation Jacobian; the fourth number says nothing
-CAV_VECTOR_BODY void times_rotation(const double *row, const double *J, cav_four *out) {
-  *out = row[0] * *(const cav_four *)J + row[1] * *(const cav_four *)(J + 3) + row[2] * *(const cav_four *)(J + 6);
-}
-
-/// Chains n rows; dofs of rotations are done again.
-CAV_VECTOR_BODY void chain_rows_body(const cav_transcription *tr, const links *l, int n, const double *dq,
-                                     const double *dv, const double *dn, double *restrict out) {
-  int nv = tr->nv;
-  for (int i = 0; i < n; i++, dq += nv, dv += nv, dn += nv, out += 3 * nv) {
-    for (int d = 0; d < nv; d++) out[d] = l->v_before * dv[d] + l->n_before * dn[d];
-    for (int d = 0; d < nv; d++) out[nv + d] = l->q_here * dq[d] + l->v_here * dv[d] + l->n_here * dn[d];
-    for (int d = 0; d < nv; d++) out[2 * nv + d] = l->n_next * dn[d];
-    for (int k = 0; k < tr->nrotation; k++) {
-      int at = tr->rotation_dof[k], J = CAV_ROTATION_SIZE * k;
-      const cav_four q = {dq[at], dq[at + 1], dq[at + 2], 0};
-      cav_four v_before, n_before, v_here, n_here, n_next;
-      times_rotation(dv + at, l->before + J, &v_before);
-      times_rotation(dn + at, l->before + J, &n_before);
-      times_rotation(dv + at, l->here + J, &v_here);
-      times_rotation(dn + at, l->then + J, &n_here);
-      times_rotation(dn + at, l->next + J, &n_next);
-      v_before = l->v_before * v_before + l->n_before * n_before;
-      v_here = l->q_here * q + l->v_here * v_here + l->n_here * n_here;
-      n_next = l->n_next * n_next;
-      for (int c = 0; c < 3; c++)
-        out[at + c] = v_before[c], out[nv + at + c] = v_here[c], out[2 * nv + at + c] = n_next[c];
-    }
-  }
-}
-
-CAV_BY_VECTORS(chain_rows,
-               (const cav_transcription *tr, const links *l, int n, const double *dq, const double *dv,
-                const double *dn, double *out),
-               (tr, l, n, dq, dv, dn, out))
-
-/// Chains derivatives with respect to (q_t, v_t, v_{t+1}) to the three neighbouring knots.
-static void chain(const cav_transcription *tr, int t, int n, const double *dq, const double *dv, const double *dn,
-                  double *out) {
-  links l = links_of(tr, t);
-  chain_rows(tr, &l, n, dq, dv, dn, out);
-}
-
-void cav_transcription_chain(const cav_transcription *tr, int t, int n, const double *row, double *out) {
-  for (int i = 0; i < n; i++, row += 3 * tr->nv, out += 3 * tr->nv)
-    chain(tr, t, 1, row, row + tr->nv, row + 2 * tr->nv, out);
 }
 
 // ---------------------------------------------------------------- evaluation
@@ -467,11 +397,13 @@ void cav_transcription_wrap(const cav_transcription *tr, cav_scratch *s, int t, 
 }
 
 /// The same of all of a knot's sums.
-static void periodicity_knot(const cav_transcription *tr, cav_scratch *s, int t) {
-  cav_knot *knot = &tr->knot[t];
-  int width = 3 * tr->nv;
+static void periodicity_knot(const cav_sum *a) {
+  const cav_transcription *tr = a->tr;
+  cav_scratch *s = a->s;
+  cav_knot *knot = a->knot;
+  const int t = a->t, width = 3 * tr->nv;
   double *H = knot->hessian;
-  cav_transcription_wrap(tr, s, t, knot->ndense, knot->dense);
+  cav_transcription_wrap(tr, s, t, knot->ndense, a->dense);
   cav_transcription_wrap(tr, s, t, 1, knot->gradient);
   cav_transcription_wrap(tr, s, t, 1, knot->step_row);
   if (tr->keep_rows) cav_transcription_wrap(tr, s, t, knot->layout.count, knot->slot_row);
@@ -502,7 +434,9 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   double start = p->jacobian ? now() : 0;
   cav_status status = cav_inverse(tr->model, s->state, q, v, v_next, knot->u);
   if (status != CAV_OK) return status;
-  if (!cav_readings_list(tr, s, t) || !cav_knot_reserve(tr, s, t)) return CAV_NO_MEMORY;
+  // rows that go into the normal equations at once are needed no longer than that
+  cav_sum a = {.tr = tr, .s = s, .knot = knot, .t = t, .jacobian = p->jacobian, .passing = p->take != NULL};
+  if (!cav_readings_list(tr, s, t) || !cav_knot_reserve(&a)) return CAV_NO_MEMORY;
   if (p->jacobian && tr->free_step) {
     status = shift_step(tr, s, t, 1, q, v, v_next);
     if (status == CAV_OK) status = shift_step(tr, s, t, 2, q, v, v_next);
@@ -517,17 +451,16 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
     status = cav_readings_derivatives(tr, s, t, q, v, v_next);
     if (status == CAV_OK) status = cav_user_refused(&knot->refusal);
     if (status != CAV_OK) return status;
-    chain(tr, t, nv, s->dq, s->dv, s->dn, knot->du);
-    chain(tr, t, knot->nread, s->dq + (size_t)nv * nv, s->dv + (size_t)nv * nv, s->dn + (size_t)nv * nv, knot->dy);
+    a.links = cav_links_of(tr, t);
+    cav_links_chain(tr, &a.links, nv, s->dq, s->dv, s->dn, a.du);
   }
   if (p->jacobian) s->seconds += now() - start;
 
   // rows
-  cav_sum a = {.tr = tr, .s = s, .knot = knot, .t = t, .jacobian = p->jacobian};
   cav_knot_sum(&a, q, v, v_next);
-  if (p->jacobian && tr->periodicity && (t < 2 || t == tr->nknot - 1)) periodicity_knot(tr, s, t);
+  if (p->jacobian && tr->periodicity && (t < 2 || t == tr->nknot - 1)) periodicity_knot(&a);
   if (!isfinite(knot->merit)) return CAV_NOT_FINITE;
-  return p->jacobian && !tr->gradient_only ? cav_rows_join(tr, s, knot) : CAV_OK;
+  return p->jacobian && !tr->gradient_only ? cav_rows_join(tr, s, knot, a.dense) : CAV_OK;
 }
 
 static void evaluate_item(void *context, int t, int member) {

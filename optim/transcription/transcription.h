@@ -51,7 +51,7 @@ enum { CAV_CONTACT_READINGS = 5 };
 
 /// One knot. Columns of its derivatives: tangent increments of q_{t-1}, q_t, q_{t+1}; those of knots that are not
 /// unknowns are zero. In cycles q_{-1}, q_0 and q_{T+1} are the unknowns of q_{T-1}, q_T and q_1 moved: columns of
-/// hessian, gradient, step_row and slot_row are of the unknowns themselves, those of du and dy of the knots beside.
+/// hessian, gradient, step_row and slot_row are of the unknowns themselves, those of du of the knots beside.
 typedef struct cav_knot {
   double time;
   int has_force; ///< u is defined here
@@ -60,17 +60,16 @@ typedef struct cav_knot {
   double *slot_row;    ///< [layout.count*3nv] derivatives of the slots' values, if kept
   double *slot_step;   ///< [layout.count] the same by the logarithm of the step, where that is free
   double *u;           ///< [nv]
-  double *du;          ///< [nv*3nv] row-major
+  double *du;          ///< [nv*3nv] row-major; not of a linearisation whose knots are taken at once
   int nread, ncontact; ///< readings beside u: CAV_CONTACT_READINGS a contact, then sensors
-  int room;            ///< readings for which y, dy have space
+  int room;            ///< readings for which y has space
   int moving_room;
   char *moving;           ///< [ncontact] 1: between two links of one tree, its first reading is the depth
   double *y;              ///< [nread]
-  double *dy;             ///< [nread*3nv]
   int nrow;               ///< rows of costs and constraints
   int ndense, dense_most; ///< rows over all columns, weighted, that make up the Hessian beside the sparse ones; at most
   int dense_room;
-  double *dense, *rest; ///< [dense_room*3nv], [dense_room]
+  double *dense, *rest; ///< [dense_room*3nv], [dense_room]; as du
   double *hessian;      ///< [3nv*3nv] Gauss-Newton, lower triangle
   double *gradient;     ///< [3nv]
   double *
@@ -199,11 +198,11 @@ void cav_values_take(cav_transcription *transcription, cav_trajectory *trajector
 cav_status cav_transcription_return(cav_transcription *transcription, cav_trajectory *trajectory);
 void cav_kept_free(struct cav_kept *kept);
 
-/// Values and derivatives: du, dy, hessian and gradient of the merit of every knot.
+/// Values and derivatives: du, dense rows, hessian and gradient of the merit of every knot.
 cav_status cav_transcription_linearise(cav_transcription *transcription, cav_trajectory *trajectory);
 
 /// The same, and take(context, t) for each knot once its derivatives are there, one call at a time and in ascending order,
-/// while other threads do those of later knots; none from a knot that failed on.
+/// while other threads do those of later knots; none from a knot that failed on. With it du and dense rows are not kept.
 cav_status cav_transcription_linearise_then(cav_transcription *transcription, cav_trajectory *trajectory,
                                             void (*take)(void *context, int t), void *context);
 
@@ -223,8 +222,9 @@ double cav_absolute_curvature(const cav_absolute *row);
 /// Moves the start on: waypoints of targets come so much sooner, windows stay as they are. terms.c.
 void cav_transcription_elapse(cav_transcription *transcription, double seconds);
 
-/// Adds the product of a knot's dense rows to its Hessian, by this thread's room. join.c. CAV_NO_MEMORY.
-cav_status cav_rows_join(const cav_transcription *transcription, struct cav_scratch *scratch, cav_knot *knot);
+/// Adds the product of a knot's dense rows [ndense*3nv] to its Hessian, by this thread's room. join.c. CAV_NO_MEMORY.
+cav_status cav_rows_join(const cav_transcription *transcription, struct cav_scratch *scratch, cav_knot *knot,
+                         const double *dense);
 
 /// Chains rows [n*3nv] over (q_t, v_t, v_{t+1}) to rows over the three neighbouring knots, at the last linearisation.
 void cav_transcription_chain(const cav_transcription *transcription, int t, int n, const double *row, double *out);
