@@ -1,4 +1,6 @@
-/// Dense products and factors: against sums in extended precision, and the same bits by vectors of every length.
+/// Dense products and factors: against sums in extended precision, and the same bits by vectors of every length. The last too of
+/// capsules that are displaced.
+#include "geometry.h"
 #include "lanes.h"
 
 #include <math.h>
@@ -150,6 +152,70 @@ static void check_general(int n, int m) {
   free(A), free(F), free(x), free(b);
 }
 
+/// A block added by columns to what is there, or in its place.
+static void check_transposed(int n, int ld, int ldc, cav_triangle part) {
+  const size_t bytes = (size_t)ldc * (size_t)n * sizeof(double);
+  double *A = numbers((size_t)ld * (size_t)n), *C0 = numbers((size_t)ldc * (size_t)n), *C = malloc(bytes);
+  for (int lanes = 8; lanes >= 2; lanes /= 2)
+    for (int fresh = 0; fresh < 2; fresh++) {
+      int wrong = 0;
+      lanes_most = lanes;
+      memcpy(C, C0, bytes);
+      cav_dense_add_transposed(part, fresh, n, A, ld, C, ldc);
+      for (int j = 0; j < n; j++)
+        for (int i = 0; i < ldc; i++) {
+          const int there = i < n && (part == CAV_TRIANGLE_BOTH || i >= j);
+          wrong += C[i + j * ldc] != (there ? A[i * ld + j] : 0) + (there && fresh ? 0 : C0[i + j * ldc]);
+        }
+      CHECK(wrong == 0);
+    }
+  free(A), free(C0), free(C);
+}
+
+static cav_shape capsule(const double *size, double reach) {
+  cav_shape shape = {.type = CAV_GEOM_CAPSULE, .size = size};
+  double q[4], sum = 0;
+  for (int k = 0; k < 4; k++) q[k] = number(), sum += q[k] * q[k];
+  for (int k = 0; k < 4; k++) q[k] /= sqrt(sum);
+  for (int i = 0; i < 3; i++) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    shape.pos[i] = reach * number();
+    shape.rotation[4 * i] = 1 - 2 * (q[1 + j] * q[1 + j] + q[1 + k] * q[1 + k]);
+    shape.rotation[3 * i + j] = 2 * (q[1 + i] * q[1 + j] - q[0] * q[1 + k]);
+    shape.rotation[3 * i + k] = 2 * (q[1 + i] * q[1 + k] + q[0] * q[1 + j]);
+  }
+  return shape;
+}
+
+/// Rates of the point between two capsules: beside each other, across, end to end, parallel, crossing and about one centre.
+static void check_capsules(void) {
+  static const double size[][3] = {{0.1, 0.3}, {0.05, 0.6}};
+  const double point[3] = {0.02, -0.01, 0.03};
+  int met = 0;
+  for (int i = 0; i < 4000; i++) {
+    static cav_pair_manifolds m; // no byte of it is left to chance
+    cav_touch here[2], rate[2][6];
+    int found[2];
+    cav_shape a = capsule(size[0], 0.8), b = capsule(size[1], 0.8);
+    if (i % 16 == 0) memcpy(b.rotation, a.rotation, sizeof b.rotation);
+    if (i % 16 == 1) memcpy(b.pos, a.pos, sizeof b.pos);
+    memset(here, 0, sizeof here), memset(rate, 0, sizeof rate);
+    for (int way = 0; way < 2; way++) {
+      lanes_most = way ? 8 : 2;
+      memset(&m, 0, sizeof m);
+      cav_manifolds_start(&m, 0, 0.5, 0.2);
+      m.a = a, m.b = b;
+      found[way] = cav_touch_rates(&m, point, 0, &here[way], rate[way]);
+    }
+    CHECK(found[0] == found[1]);
+    met += found[0];
+    for (int k = 0; k < 6 && found[0] && found[1]; k++)
+      CHECK(rate[0][k].dist == rate[1][k].dist && !memcmp(rate[0][k].pos, rate[1][k].pos, sizeof rate[0][k].pos) &&
+            !memcmp(rate[0][k].normal, rate[1][k].normal, sizeof rate[0][k].normal));
+  }
+  CHECK(met > 1000 && met < 3990);
+}
+
 int main(void) {
   static const int size[] = {1, 2, 7, 8, 16, 17, 31, 81, MOST};
   enum { SIZES = sizeof size / sizeof *size };
@@ -168,6 +234,11 @@ int main(void) {
   check_band(500, 80, 27, 0, 9);
   check_band(135, 80, 27, 0, 1);
   check_band(90, 8, 3, 0, 5);
+  for (int a = 1; a < SIZES; a++) {
+    check_transposed(size[a], 3 * size[a], 3 * size[a] - 1, CAV_TRIANGLE_BOTH);
+    check_transposed(size[a], 3 * size[a], 3 * size[a] - 1, CAV_TRIANGLE_LOWER);
+  }
+  check_capsules();
   for (int a = 0; a < SIZES; a++) check_general(size[a], 1 + a);
   return check_result();
 }

@@ -244,7 +244,7 @@ void cav_dense_product_transposed(cav_triangle part, int m, int n, int k, double
 /// Rows of A' [k*n] with the like columns of all parts side by side, which rows have anything but zeros in each strip of columns,
 /// and the upper triangle of their square, by columns.
 typedef struct slice {
-  _Alignas(64) double entry[SLICE * (SQUARE + TILE_MOST)], sum[SQUARE * (SQUARE + TILE_MOST)];
+  _Alignas(64) double entry[SLICE * (SQUARE + TILE_MOST)], sum[(SQUARE + TILE_MOST) * (SQUARE + TILE_MOST)];
   size_t apart; ///< of rows, and of columns of the sum
   row_set tall[SQUARE / 4], wide[SQUARE / 4];
 } slice;
@@ -305,9 +305,73 @@ static void square_slice(const lanes *w, int n, slice *s) {
   }
 }
 
+// four rows of four numbers to columns
+CAV_VECTOR_BODY void transpose_four(cav_four a[4]) {
+  const cav_four p = CAV_SHUFFLED(a[0], a[1], 0, 4, 2, 6), q = CAV_SHUFFLED(a[0], a[1], 1, 5, 3, 7);
+  const cav_four r = CAV_SHUFFLED(a[2], a[3], 0, 4, 2, 6), s = CAV_SHUFFLED(a[2], a[3], 1, 5, 3, 7);
+  a[0] = CAV_SHUFFLED(p, r, 0, 1, 4, 5), a[1] = CAV_SHUFFLED(q, s, 0, 1, 4, 5);
+  a[2] = CAV_SHUFFLED(p, r, 2, 3, 6, 7), a[3] = CAV_SHUFFLED(q, s, 2, 3, 6, 7);
+}
+
+// twelve numbers to every third of them
+CAV_VECTOR_BODY void part_three(const double *from, cav_four out[3]) {
+  const cav_four a = *(const cav_four *)from, b = *(const cav_four *)(from + 4), c = *(const cav_four *)(from + 8);
+  const cav_four x = CAV_SHUFFLED(CAV_SHUFFLED(a, c, 0, 5, 2, 3), b, 0, 1, 6, 3);
+  const cav_four y = CAV_SHUFFLED(CAV_SHUFFLED(a, b, 4, 1, 2, 3), CAV_SHUFFLED(b, c, 0, 1, 6, 3), 0, 1, 6, 7);
+  const cav_four z = CAV_SHUFFLED(CAV_SHUFFLED(c, b, 0, 5, 2, 3), a, 0, 1, 6, 3);
+  out[0] = CAV_SHUFFLED(x, x, 0, 3, 2, 1), out[1] = CAV_SHUFFLED(y, y, 1, 0, 3, 2);
+  out[2] = CAV_SHUFFLED(z, z, 2, 1, 0, 3);
+}
+
+// adds the first numbers of four
+CAV_VECTOR_BODY void add_some(double *to, const cav_four *x, int n) {
+  if (n >= 4)
+    *(cav_four *)to += *x;
+  else
+    for (int i = 0; i < n; i++) to[i] += (*x)[i];
+}
+
+// upper triangle of C += the square of three parts, by four columns of each at once
+CAV_VECTOR_BODY void add_square_of_three_body(int part, slice *s, double *C, size_t ldc) {
+  const size_t apart = s->apart;
+  for (int D = 0; D < part; D += 4) {
+    const int some = least(4, part - D);
+    // what these columns have of each other, in all of them
+    for (int j = 3 * D; j < 3 * D + 12; j++)
+      for (int i = j + 1; i < 3 * D + 12; i++) s->sum[(size_t)j * apart + i] = s->sum[(size_t)i * apart + j];
+    for (int d = D; d < D + some; d++)
+      for (int c = 0; c < 3; c++) {
+        const double *in = s->sum + (size_t)(3 * d + c) * apart;
+        double *out = C + (size_t)(c * part + d) * ldc;
+        for (int e = 0; e <= D; e += 4) {
+          cav_four x[3];
+          part_three(in + 3 * e, x);
+          for (int b = 0; b <= c; b++) add_some(out + b * part + e, &x[b], e < D ? 4 : b == c ? d + 1 - D : some);
+        }
+      }
+    // what columns after them have of them
+    for (int e = D + 4; e < part; e += 4)
+      for (int b = 0; b < 2; b++) {
+        cav_four x[4][3], column[4];
+        for (int i = 0; i < 4; i++) part_three(s->sum + (size_t)(3 * (e + i) + b) * apart + 3 * D, x[i]);
+        for (int c = b + 1; c < 3; c++) {
+          for (int i = 0; i < 4; i++) column[i] = x[i][c];
+          transpose_four(column);
+          for (int i = 0; i < some; i++)
+            add_some(C + (size_t)(c * part + D + i) * ldc + b * part + e, &column[i], part - e);
+        }
+      }
+  }
+}
+CAV_BY_VECTORS(add_square_of_three, (int part, slice *s, double *C, size_t ldc), (part, s, C, ldc))
+
 /// Upper triangle of C += the square, back in the order of the columns: C's rows are `next` apart, its columns ldc.
-static void add_square(int n, int parts, const slice *s, double *C, size_t next, size_t ldc) {
+static void add_square(int n, int parts, slice *s, double *C, size_t next, size_t ldc) {
   const int part = n / parts;
+  if (parts == 3 && next == 1) {
+    add_square_of_three(part, s, C, ldc);
+    return;
+  }
   const size_t down = (size_t)parts, across = (size_t)parts * s->apart;
   for (int at = 0; at < n; at++, C += ldc) {
     const int d = at % part, c = at / part;
@@ -338,6 +402,37 @@ void cav_dense_square(cav_triangle part, int n, int parts, int k, const double *
     square_slice(w, n, &s);
     add_square(n, parts, &s, C, lower ? (size_t)ldc : 1, lower ? 1 : (size_t)ldc);
   }
+}
+
+// a block, four rows of four columns at once; those of fewer one by one
+CAV_VECTOR_BODY void add_transposed_body(int lower, int fresh, int n, const double *A, size_t lda, double *C,
+                                         size_t ldc) {
+  for (int i = 0; i < n; i += 4) {
+    int j = 0;
+    for (; i + 4 <= n && j + 4 <= (lower ? i : n); j += 4) {
+      cav_four a[4];
+      for (int k = 0; k < 4; k++) a[k] = *(const cav_four *)(A + (size_t)(i + k) * lda + j);
+      transpose_four(a);
+      for (int k = 0; k < 4; k++) {
+        cav_four *to = (cav_four *)(C + (size_t)(j + k) * ldc + i);
+        if (fresh)
+          *to = a[k];
+        else
+          *to += a[k];
+      }
+    }
+    for (int row = i; row < least(n, i + 4); row++)
+      for (int k = j, end = lower ? row + 1 : n; k < end; k++) {
+        double *to = C + (size_t)k * ldc + row;
+        *to = fresh ? A[(size_t)row * lda + k] : *to + A[(size_t)row * lda + k];
+      }
+  }
+}
+CAV_BY_VECTORS(add_transposed, (int lower, int fresh, int n, const double *A, size_t lda, double *C, size_t ldc),
+               (lower, fresh, n, A, lda, C, ldc))
+
+void cav_dense_add_transposed(cav_triangle part, int fresh, int n, const double *A, int lda, double *C, int ldc) {
+  add_transposed(part == CAV_TRIANGLE_LOWER, fresh, n, A, (size_t)lda, C, (size_t)ldc);
 }
 
 /// Columns start to end of a band, and where each ends.

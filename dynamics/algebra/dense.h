@@ -20,6 +20,9 @@ void cav_dense_product_transposed(cav_triangle part, int m, int n, int k, double
 /// columns: zeros that stand together then cost nothing, to the same bits for any number of parts.
 void cav_dense_square(cav_triangle part, int n, int parts, int k, const double *A, int lda, double *C, int ldc);
 
+/// C += A, or its lower triangle, C [n*n] by columns, ldc apart, and A by rows; fresh: C := A.
+void cav_dense_add_transposed(cav_triangle part, int fresh, int n, const double *A, int lda, double *C, int ldc);
+
 /// Cholesky factor L of the lower triangle of A [n*n] in its place. Entries further than `below` under the diagonal are zero and
 /// are not touched: a band keeps its columns at a distance of `below` + 1, which is lda = below. Zero if a pivot is not
 /// positive.

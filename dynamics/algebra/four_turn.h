@@ -4,14 +4,6 @@
 
 #include "by_four.h"
 
-// entries of two vectors by their numbers, those of the second from 4 on
-#ifdef __clang__
-#define CAV_SHUFFLED(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
-#else
-typedef long long cav_four_order __attribute__((vector_size(sizeof(cav_four))));
-#define CAV_SHUFFLED(a, b, ...) __builtin_shuffle(a, b, (cav_four_order){__VA_ARGS__})
-#endif
-
 /// Four rows of four turned into columns.
 CAV_INLINE void turn_square(const cav_four from[4], cav_four to[4]) {
   cav_four low = CAV_SHUFFLED(from[0], from[1], 0, 4, 2, 6), high = CAV_SHUFFLED(from[0], from[1], 1, 5, 3, 7);

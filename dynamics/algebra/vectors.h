@@ -9,6 +9,14 @@ int cav_dense_lanes(void);
 /// Four numbers, which a processor takes at once or by two.
 typedef double cav_four __attribute__((vector_size(32), aligned(8), may_alias));
 
+/// Entries of two such by their numbers, those of the second from 4 on.
+#ifdef __clang__
+#define CAV_SHUFFLED(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
+#else
+typedef long long cav_four_order __attribute__((vector_size(sizeof(cav_four))));
+#define CAV_SHUFFLED(a, b, ...) __builtin_shuffle(a, b, (cav_four_order){__VA_ARGS__})
+#endif
+
 #define CAV_VECTOR_BODY static inline __attribute__((always_inline))
 
 /// Defines static void name PARAMETERS, which calls name##_body ARGUMENTS (a CAV_VECTOR_BODY) for this processor.

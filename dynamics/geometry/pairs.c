@@ -4,17 +4,13 @@
 /// Distances are exact (two boxes: see there). Normals and points are smooth in the poses but for what
 /// the geometry itself makes jump:
 ///  - coincident centres: a fixed direction is taken; crossing axes of capsules: the normal changes side;
-///  - capsules closer to parallel than PARALLEL rad have two points where their sides overlap, others one;
+///  - capsules closer to parallel than CAV_PARALLEL rad have two points where their sides overlap, others one;
 ///  - a plane sees the 4 lowest corners of a box, and of a cylinder one line along its side and a regular triangle on
 ///    its lower cap with one corner at the lowest point. The triangle turns quickly near the upright pose, but three
 ///    equal springs on it push and tilt alike however it is turned.
 /// Solids without a routine of their own go to polytope.c.
 #include "pairs.h"
-
-// capsules are parallel below this angle, rad: well above steps of differentiation
-static const double PARALLEL = 1e-5;
-// fraction of their length within which axes count as crossing, so that rounding does not choose the side
-static const double CROSSING = 1e-13;
+#include "capsules_four.h"
 
 // one point of shape b at signed height above a plane: x is its surface point, n the plane's normal
 static void touch_plane(const double x[3], const double n[3], double height, int feature, cav_touch *touch) {
@@ -185,7 +181,7 @@ static int touch_at(const cav_shape *a, const cav_shape *b, const segments *g, d
 static int touch_across(const cav_shape *a, const cav_shape *b, const segments *g, const double cross[3], double s,
                         double margin, cav_touch *touch) {
   double n[3], apart = dot3(g->d, cross), length = norm3(cross);
-  scale3(n, (apart < -CROSSING * length * (g->lu + g->lw) ? -1 : 1) / length, cross);
+  scale3(n, (apart < -CAV_CROSSING * length * (g->lu + g->lw) ? -1 : 1) / length, cross);
   apart = fmax(dot3(g->d, n), 0);
   double dist = apart - a->size[0] - b->size[0];
   if (dist >= margin) return 0;
@@ -209,7 +205,7 @@ static int capsule_capsule(const cav_shape *a, const cav_shape *b, double margin
   g.wd = dot3(g.w, g.d);
   cross3(cross, g.u, g.w);
   double sine2 = dot3(cross, cross);
-  if (sine2 > PARALLEL * PARALLEL) {
+  if (sine2 > CAV_PARALLEL * CAV_PARALLEL) {
     // nearest points of the lines, then clamped: the square distance is convex, two clamped updates reach its minimum
     double turned[3];
     cross3(turned, g.d, g.w);

@@ -1,7 +1,9 @@
 /// Contact points differenced in the six directions of a twist of the second shape against the first, for all points of a
 /// pair at once: one-sided where a point is gone on one side.
+#include "capsules_four.h"
 #include "geometry.h"
 #include "math3.h"
+#include "vectors.h"
 
 // steps: rad, and fraction of the size of the smaller shape
 static const double ROTATION_STEP = 1e-5, SHIFT_STEP = 1e-5;
@@ -39,19 +41,57 @@ void cav_manifolds_start(cav_pair_manifolds *m, int pair, double size, double ma
   m->margin = margin;
 }
 
+// step k of the twelve: the one before a unit twist, then the one after it
+static double step_of(int k, double shift) {
+  const double step = k / 2 < 3 ? ROTATION_STEP : shift;
+  return k % 2 ? step : -step;
+}
+
+// those twelve of two capsules, four at once; 0 where they have to be taken one by one
+static int displace_capsules(cav_pair_manifolds *m, const double point[3], double shift, double margin) {
+  double place[3][3][4], axis[3][3][4], arm[3], along[3];
+  column3(along, m->b.rotation, 2);
+  sub3(arm, m->b.pos, point);
+  for (int k = 0; k < 12; k++) {
+    double x[3], z[3], w[3] = {0, 0, 0}, quat[4], R[9];
+    copy3(x, m->b.pos);
+    copy3(z, along);
+    if (k / 2 < 3) {
+      w[k / 2] = step_of(k, shift);
+      quat_exp(quat, w);
+      quat_matrix(R, quat);
+      rotate(z, R, along);
+      rotate(x, R, arm);
+      add3(x, point, x);
+    } else {
+      x[k / 2 - 3] += step_of(k, shift);
+    }
+    for (int i = 0; i < 3; i++) place[k / 4][i][k % 4] = x[i], axis[k / 4][i][k % 4] = z[i];
+  }
+  for (int g = 0; g < 3; g++) {
+    cav_touch *const touch[4] = {m->touch[4 * g], m->touch[4 * g + 1], m->touch[4 * g + 2], m->touch[4 * g + 3]};
+    if (!cav_capsules_four(&m->a, m->b.size[0], m->b.size[1], (const double(*)[4])place[g], (const double(*)[4])axis[g],
+                           margin, m->count + 4 * g, touch))
+      return 0;
+  }
+  return 1;
+}
+
 // the narrow phase of a pair as it is and after small twists of the second shape about a point, both ways
 static void displace(cav_pair_manifolds *m, const double point[3]) {
   const double shift = SHIFT_STEP * m->size, margin = m->margin + 4 * shift;
   copy3(m->point, point);
   // every routine keeps to CAV_TOUCH_MAX: collide.c asserts it for the same shapes
   m->count[12] = cav_collide_shapes(&m->a, &m->b, margin, m->touch[12]);
+  m->displaced = 1;
+  if (m->a.type == CAV_GEOM_CAPSULE && m->b.type == CAV_GEOM_CAPSULE && cav_dense_lanes() >= 4 &&
+      displace_capsules(m, point, shift, margin))
+    return;
   for (int k = 0; k < 12; k++) {
-    double step = k / 2 < 3 ? ROTATION_STEP : shift;
     cav_shape moved;
-    twist_shape(&m->b, point, k / 2, k % 2 ? step : -step, &moved);
+    twist_shape(&m->b, point, k / 2, step_of(k, shift), &moved);
     m->count[k] = cav_collide_shapes(&m->a, &moved, margin, m->touch[k]);
   }
-  m->displaced = 1;
 }
 
 // differences of two points over a step
