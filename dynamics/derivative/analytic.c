@@ -21,30 +21,56 @@
 /// Not offered: models with parts listed by cav_derivatives_missing; nothing is approximated in their place.
 #include <assert.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "analytic.h"
 #include "half_step.h"
 
 enum { ALIGN = 8 };
 
+/// Lists the paths, one for each dof that moves no other, and those of all dofs: of [nv]; their number, the longest's length.
+static int list_paths(const cav_model *model, int *of, int *longest) {
+  int n = 0;
+  *longest = 0;
+  for (int i = 0; i < model->nv; i++) of[i] = -1;
+  for (int i = model->nv - 1; i >= 0; i--) {
+    int length = 0;
+    if (of[i] < 0) of[i] = n++;
+    for (int k = i; k >= 0; k = model->dof[k].parent, length++) of[k] = of[i];
+    if (length > *longest) *longest = length;
+  }
+  return n;
+}
+
 static cav_derivative_store *derivatives_new(const cav_model *model, int bias) {
   cav_derivative_store *s = calloc(1, sizeof *s);
   if (!s) return NULL;
   size_t nv = (size_t)model->nv, n = (size_t)model->nlink;
-  size_t stride = (nv + 3) / 4 * 4, biases = bias ? 12 * nv : 0;
+  int longest, *of = malloc((nv + 1) * sizeof *of);
+  if (!of) {
+    free(s);
+    return NULL;
+  }
+  const size_t paths = (size_t)list_paths(model, of, &longest), stride = ((size_t)longest + 3) / 4 * 4;
+  const size_t biases = bias ? 12 * nv : 0, ints = n + 3 * nv + paths * stride + 1;
   size_t doubles = 5 * 6 * nv + (12 + 3 * CAV_TWIST_BLOCK) * n + 12 * nv + nv * nv;
-  doubles += (CAV_DOF_COMPONENTS + CAV_PATH_ROWS) * stride + biases;
+  doubles += (CAV_DOF_COMPONENTS * paths + CAV_PATH_ROWS) * stride + biases;
   s->drift = calloc(doubles + ALIGN, sizeof(double));
-  s->touched = calloc(n + 2 * nv + stride + 1, sizeof(int));
+  s->touched = calloc(ints, sizeof(int));
   if (!s->drift || !s->touched) {
+    free(of);
     cav_derivative_store_free(s);
     return NULL;
   }
   s->dof = s->touched + n + 1;
   s->depth = s->dof + nv;
   for (int i = 0; i < model->nv; i++) s->depth[i] = model->dof[i].parent < 0 ? 0 : s->depth[model->dof[i].parent] + 1;
-  s->path.dof = s->depth + nv;
+  s->path.of = s->depth + nv;
+  memcpy(s->path.of, of, nv * sizeof *of);
+  free(of);
+  s->path.dofs = s->path.dof = s->path.of + nv;
   s->path.stride = (int)stride;
+  s->path.n = (int)paths;
   s->drift_now = s->drift + 6 * nv;
   s->drift_next = s->drift_now + 6 * nv;
   s->second = s->drift_next + 6 * nv;
@@ -55,12 +81,12 @@ static cav_derivative_store *derivatives_new(const cav_model *model, int bias) {
   s->by_next = s->by_now + CAV_TWIST_BLOCK * n;
   s->across = s->by_next + CAV_TWIST_BLOCK * n;
   s->spare = s->across + 12 * nv;
-  s->path.at = s->spare + nv * nv;
-  s->entry = s->path.at + CAV_DOF_COMPONENTS * stride;
+  s->path.all = s->path.at = s->spare + nv * nv;
+  s->entry = s->path.all + CAV_DOF_COMPONENTS * paths * stride;
   s->bias_second = bias ? s->entry + CAV_PATH_ROWS * stride : NULL;
   s->bias_rate = bias ? s->bias_second + 6 * nv : NULL;
   assert(s->entry + CAV_PATH_ROWS * stride + biases == s->drift + doubles);
-  s->bytes = sizeof *s + (doubles + ALIGN) * sizeof(double) + (n + 2 * nv + stride + 1) * sizeof(int);
+  s->bytes = sizeof *s + (doubles + ALIGN) * sizeof(double) + ints * sizeof(int);
   return s;
 }
 

@@ -80,7 +80,7 @@ static inline void add_along_tendon(const cav_derivative_task *t, int index, dou
 void cav_derivative_drifts(const cav_derivative_task *t);
 void cav_derivative_gyrations(const cav_derivative_task *t);
 
-/// Makes the path that ends with a dof, of what cav_derivative_drifts has left; what it shares with the one before stays.
+/// Makes the path that ends with a dof, of what cav_derivative_drifts has left; what is there of it stays.
 /// Returns its length. smooth.c.
 int cav_derivative_path(const cav_derivative_task *t, int dof);
 

@@ -31,6 +31,15 @@ static void add_impulse(const cav_contact *c, double wrench[6]) {
   }
 }
 
+// a link whose subtree a contact pushes: its sums begin at zero
+static void touch_link(cav_derivative_store *s, int link) {
+  if (s->touched[link]) return;
+  s->touched[link] = 1;
+  memset(s->by_motion + CAV_TWIST_BLOCK * link, 0, CAV_TWIST_BLOCK * sizeof *s->by_motion);
+  memset(s->by_now + CAV_TWIST_BLOCK * link, 0, CAV_TWIST_BLOCK * sizeof *s->by_now);
+  memset(s->by_next + CAV_TWIST_BLOCK * link, 0, CAV_TWIST_BLOCK * sizeof *s->by_next);
+}
+
 // matrices of one contact at one of its links: own wrench by own motion, less what is carried along with the link
 static void contact_at_link(const cav_derivative_task *t, const cav_contact *c, const cav_contact_jacobian *derivative,
                             int side) {
@@ -46,7 +55,7 @@ static void contact_at_link(const cav_derivative_task *t, const cav_contact *c, 
     cross3(carried + 3, twist, whole + 3);
     for (int r = 0; r < 6; r++) own[6 * r + k] = sign * (derivative->wrench[side][k][r] - carried[r]);
   }
-  t->s->touched[link] = 1;
+  touch_link(t->s, link);
   double motion[36], velocity[36], keep = 1 - c->damping[0], *to = t->s->by_motion + CAV_TWIST_BLOCK * link;
   double *now = t->s->by_now + CAV_TWIST_BLOCK * link, *next = t->s->by_next + CAV_TWIST_BLOCK * link;
   shift(motion, own, d);
@@ -68,7 +77,6 @@ void cav_derivative_contacts(const cav_derivative_task *t) {
   if (t->state->ncontact == 0) return;
   cav_pair_manifolds manifolds;
   manifolds.pair = -1;
-  memset(s->by_motion, 0, 3 * CAV_TWIST_BLOCK * n * sizeof *s->by_motion);
   for (int i = 0; i < t->state->ncontact; i++) {
     const cav_contact *c = &t->state->contact[i];
     cav_contact_differentiate(t->model, t->state, c, 0, &manifolds, &s->contact[i]);
@@ -79,7 +87,7 @@ void cav_derivative_contacts(const cav_derivative_task *t) {
   for (int i = t->model->nlink - 1; i > 0; i--) {
     int parent = t->model->link[i].parent;
     if (parent <= 0 || !s->touched[i]) continue;
-    s->touched[parent] = 1;
+    touch_link(s, parent);
     for (int k = 0; k < CAV_TWIST_BLOCK; k++) {
       s->by_motion[CAV_TWIST_BLOCK * parent + k] += s->by_motion[CAV_TWIST_BLOCK * i + k];
       s->by_now[CAV_TWIST_BLOCK * parent + k] += s->by_now[CAV_TWIST_BLOCK * i + k];

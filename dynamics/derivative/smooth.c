@@ -65,7 +65,7 @@ void cav_derivative_drifts(const cav_derivative_task *t) {
       }
     }
   }
-  memset(t->s->path.dof, -1, (size_t)t->s->path.stride * sizeof *t->s->path.dof);
+  memset(t->s->path.dofs, -1, (size_t)t->s->path.n * (size_t)t->s->path.stride * sizeof *t->s->path.dofs);
 }
 
 // ---------------------------------------------------------------- up the tree
@@ -191,10 +191,14 @@ static void put(const cav_derivative_task *t, int place, int dof) {
 }
 
 int cav_derivative_path(const cav_derivative_task *t, int dof) {
+  cav_dof_path *path = &t->s->path;
+  const size_t which = (size_t)path->of[dof] * (size_t)path->stride;
+  path->dof = path->dofs + which;
+  path->at = path->all + which * CAV_DOF_COMPONENTS;
   int length = t->s->depth[dof] + 1;
-  for (int place = length - 1; dof >= 0; place--, dof = t->state->work->parent[dof]) {
-    if (t->s->path.dof[place] != dof) put(t, place, dof);
-  }
+  // where a dof is there, so are those that move it
+  for (int place = length - 1; dof >= 0 && path->dof[place] != dof; place--, dof = t->state->work->parent[dof])
+    put(t, place, dof);
   return length;
 }
 

@@ -31,10 +31,15 @@ enum {
 };
 
 /// Dofs from a root on, each of which moves the next, with their components: component c of the i-th at at[c * stride + i].
+/// There is one for each dof that moves no other, which all that move it have for theirs.
 typedef struct cav_dof_path {
   int stride; ///< a multiple of four
-  int *dof;   ///< [stride], -1: none yet
+  int *dof;   ///< [stride] of the present one, -1: none yet
   double *at; ///< [CAV_DOF_COMPONENTS*stride]
+  int n;      ///< number of paths
+  int *of;    ///< [nv] that of a dof
+  int *dofs;  ///< [n*stride] of all
+  double *all;
 } cav_dof_path;
 
 typedef struct cav_derivative_store {
