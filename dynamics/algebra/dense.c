@@ -25,11 +25,11 @@ typedef struct row_set {
   unsigned long long bits[SLICE / 64];
 } row_set;
 
-/// One processor's way: C -= s packed A [k][rows] times packed B [k][columns]; the product of rows in a set, all
-/// `apart` one after the other; X := X L'^-1 for rows of a panel packed [PANEL][rows]; factor of n columns of a
+/// One processor's way: C -= s packed A [k][rows] times packed B [k][columns]; the product [some_rows][columns] of rows in a
+/// set, all `apart` one after the other; X := X L'^-1 for rows of a panel packed [PANEL][rows]; factor of n columns of a
 /// triangle in its place, zero if a pivot is not positive; x -= s a; a dot b.
 typedef struct lanes {
-  int rows, columns;
+  int rows, some_rows, columns;
   void (*tile)(int k, const double *A, const double *B, double s, double *C, size_t ldc);
   void (*some)(const row_set *set, size_t apart, const double *A, const double *B, double *C);
   void (*panel)(const triangle *L, double *X);
@@ -43,7 +43,7 @@ static inline double add_eight(const double *s) {
   return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
 }
 
-#define WAY(name, attribute, LANES, VECTORS, COLUMNS)                                                                \
+#define WAY(name, attribute, LANES, VECTORS, SOME, COLUMNS)                                                               \
   typedef double name##_vector __attribute__((vector_size((LANES)*8), aligned(8), may_alias));                       \
   attribute static void name##_tile(int k, const double *A, const double *B, double s, double *C, size_t ldc) {      \
     name##_vector sum[COLUMNS][VECTORS] = {0};                                                                       \
@@ -62,12 +62,12 @@ static inline double add_eight(const double *s) {
       for (unsigned long long left = set->bits[w]; left; left &= left - 1) {                                         \
         const size_t p = (size_t)__builtin_ctzll(left) * apart;                                                      \
         name##_vector a[VECTORS];                                                                                    \
-        for (int i = 0; i < (VECTORS); i++) a[i] = *(const name##_vector *)(A + p + (LANES)*i);                      \
+        for (int i = 0; i < (SOME); i++) a[i] = *(const name##_vector *)(A + p + (LANES)*i);                      \
         for (int j = 0; j < (COLUMNS); j++)                                                                          \
-          for (int i = 0; i < (VECTORS); i++) sum[j][i] += a[i] * B[p + j];                                          \
+          for (int i = 0; i < (SOME); i++) sum[j][i] += a[i] * B[p + j];                                          \
       }                                                                                                              \
     for (int j = 0; j < (COLUMNS); j++, C += apart)                                                                  \
-      for (int i = 0; i < (VECTORS); i++) *(name##_vector *)(C + (LANES)*i) = sum[j][i];                             \
+      for (int i = 0; i < (SOME); i++) *(name##_vector *)(C + (LANES)*i) = sum[j][i];                             \
   }                                                                                                                  \
   attribute static void name##_panel(const triangle *L, double *X) {                                                 \
     for (int c = 0; c < PANEL; c += (COLUMNS)) {                                                                     \
@@ -127,16 +127,16 @@ static inline double add_eight(const double *s) {
   }
 
 #if defined(__x86_64__)
-WAY(eight, __attribute__((target("avx512f"))), 8, 2, 8)
-WAY(four, __attribute__((target("avx2"))), 4, 2, 6)
+WAY(eight, __attribute__((target("avx512f"))), 8, 2, 1, 8)
+WAY(four, __attribute__((target("avx2"))), 4, 2, 2, 6)
 #endif
-WAY(two, , 2, 2, 4)
+WAY(two, , 2, 2, 2, 4)
 
 static const lanes *way(void) {
-  static const lanes two = {4, 4, two_tile, two_some, two_panel, two_triangle, two_subtract, two_dot};
+  static const lanes two = {4, 4, 4, two_tile, two_some, two_panel, two_triangle, two_subtract, two_dot};
 #if defined(__x86_64__)
-  static const lanes eight = {16, 8, eight_tile, eight_some, eight_panel, eight_triangle, eight_subtract, eight_dot};
-  static const lanes four = {8, 6, four_tile, four_some, four_panel, four_triangle, four_subtract, four_dot};
+  static const lanes eight = {16, 8, 8, eight_tile, eight_some, eight_panel, eight_triangle, eight_subtract, eight_dot};
+  static const lanes four = {8, 8, 6, four_tile, four_some, four_panel, four_triangle, four_subtract, four_dot};
   const int most = cav_dense_lanes();
   if (most == 8) return &eight;
   if (most == 4) return &four;
@@ -288,7 +288,7 @@ static void pack_slice(const lanes *w, int n, int parts, int k, const double *A,
     pack_row(n, parts, A, 1ull << p % 64, row, set[p / 64]);
     for (size_t i = (size_t)n; i < s->apart; i++) row[i] = 0;
   }
-  join_strips(n, parts, w->rows, set, s->tall);
+  join_strips(n, parts, w->some_rows, set, s->tall);
   join_strips(n, parts, w->columns, set, s->wide);
 }
 
@@ -296,8 +296,8 @@ static void pack_slice(const lanes *w, int n, int parts, int k, const double *A,
 static void square_slice(const lanes *w, int n, slice *s) {
   for (int j = 0; j < n; j += w->columns) {
     const row_set *b = &s->wide[j / w->columns];
-    for (int i = 0; i < least(n, j + w->columns); i += w->rows) {
-      const row_set *a = &s->tall[i / w->rows];
+    for (int i = 0; i < least(n, j + w->columns); i += w->some_rows) {
+      const row_set *a = &s->tall[i / w->some_rows];
       row_set both;
       for (int l = 0; l < SLICE / 64; l++) both.bits[l] = a->bits[l] & b->bits[l];
       w->some(&both, s->apart, s->entry + i, s->entry + j, s->sum + (size_t)j * s->apart + i);

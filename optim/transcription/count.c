@@ -42,6 +42,7 @@ static int frees(const cav_transcription *tr, const cav_term *term, int t, int l
 /// term frees.
 static int counts(const cav_transcription *tr, const int *key, const cav_term *term, int t, int k) {
   const cav_model *m = tr->model;
+  if (term->body <= 0 && term->quantity != CAV_QUANTITY_SLIP) return 1;
   const cav_pair *pair = &m->pair[key[2 * k]];
   const cav_geom *one = &m->geom[pair->geom1], *two = &m->geom[pair->geom2];
   int link = m->body[term->body].link, link1 = one->link, link2 = two->link;
@@ -155,7 +156,6 @@ static int reserve_dense(cav_sum *a) {
     *room = knot->dense_most;
   }
   a->dense = *dense, a->rest = *rest;
-  a->du = a->passing ? s->du : knot->du;
   return 1;
 }
 

@@ -59,12 +59,14 @@ static void begin_cost(cav_sum *a, const cav_term *term, double unit, double *we
 
 /// Adds weight times the square of a row to the Hessian.
 static void add_square(cav_sum *a, double weight, int n, const int *column, const double *entry) {
-  int width = 3 * a->tr->nv;
+  const int width = 3 * a->tr->nv;
   for (int i = 0; i < n; i++) {
-    int row = column ? column[i] : i;
-    for (int j = 0; j < n; j++)
-      if ((column ? column[j] : j) <= row)
-        a->knot->hessian[row * width + (column ? column[j] : j)] += weight * entry[i] * entry[j];
+    const int at = column ? column[i] : i;
+    const double by = weight * entry[i];
+    double *row = a->knot->hessian + (size_t)at * (size_t)width;
+    for (int j = 0; column && j < n; j++)
+      if (column[j] <= at) row[column[j]] += by * entry[j];
+    for (int j = 0; !column && j <= at; j++) row[j] += by * entry[j];
   }
 }
 
@@ -102,12 +104,18 @@ static void add_dense(cav_sum *a, double weight, double r, const double *row) {
   if (a->bend != 0) add_square(a, a->bend, width, NULL, row);
 }
 
-/// Derivative of a reading over the knots, in this thread's room until the next one.
-static const double *reading_row(const cav_sum *a, int reading) {
+/// Derivative over the knots of u and the readings after it, one of them, in this thread's room until the next one.
+static const double *chained_row(const cav_sum *a, int which) {
   const cav_scratch *s = a->s;
-  const size_t at = (size_t)(a->tr->nv + reading) * (size_t)a->tr->nv;
+  const size_t at = (size_t)which * (size_t)a->tr->nv;
   cav_links_chain(a->tr, &a->links, 1, s->dq + at, s->dv + at, s->dn + at, s->reading);
   return s->reading;
+}
+
+static const double *reading_row(const cav_sum *a, int reading) { return chained_row(a, a->tr->nv + reading); }
+
+static const double *force_row(const cav_sum *a, int dof) {
+  return a->passing ? chained_row(a, dof) : a->knot->du + (size_t)dof * 3 * (size_t)a->tr->nv;
 }
 
 /// Adds weight/2 (r + row dx)^2 for the row of a reading, begun.
@@ -119,7 +127,7 @@ static void add_reading(cav_sum *a, double weight, double r, int reading) {
 static void put_force(const cav_sum *a, const cav_force_row *form, double *row) {
   int width = 3 * a->tr->nv;
   for (int k = 0; k < form->n; k++) {
-    const double *du = a->du + (size_t)form->dof[k] * width;
+    const double *du = force_row(a, form->dof[k]);
     for (int c = 0; c < width; c++) row[c] += form->coef[k] * du[c];
   }
 }
@@ -162,7 +170,9 @@ static double slot_residual(cav_sum *a, int i, double value, double lower, doubl
   } else if (rho > 0) {
     shifted += slot->multiplier / rho;
   }
-  double e = shifted - fmin(fmax(shifted, lower - slack), upper + slack);
+  // written out, as calls take longer than what they do
+  const double least = lower - slack, most = upper + slack, inside = shifted < least ? least : shifted;
+  double e = shifted - (inside > most ? most : inside);
   *active = e != 0 || lower == upper;
   begin_row(a, *active ? rho : 0, e);
   assert(!a->tr->free_step || i < a->s->slot_room);
@@ -223,9 +233,9 @@ static void add_velocity(cav_sum *a, const cav_term *term, double weight, const 
   double entry[6], *goal = a->s->tangent;
   if (!cav_knot_moves(tr, a->t)) return;
   cav_term_target(term, a->knot->time, tr->nv, goal);
-  const int all = cav_term_window(tr, term)->dofs == tr->nv;
+  const char *selected = cav_term_dofs(tr, term);
   for (int d = 0; d < tr->nv; d++) {
-    if (!all && !cav_dof_selected(tr, term, d)) continue;
+    if (!selected[d]) continue;
     int n = 0;
     if (a->jacobian)
       n = velocity_entries(tr, a->t, d, tr->nv, cav_knot_moves(tr, a->t - 1), 1 / term->scale, column, entry);
@@ -251,9 +261,9 @@ static void add_acceleration(cav_sum *a, const cav_term *term, double weight, co
   double entry[12], *goal = a->s->tangent;
   if (!a->knot->has_force) return;
   cav_term_target(term, a->knot->time, tr->nv, goal);
-  const int all = cav_term_window(tr, term)->dofs == tr->nv;
+  const char *selected = cav_term_dofs(tr, term);
   for (int d = 0; d < tr->nv; d++) {
-    if (!all && !cav_dof_selected(tr, term, d)) continue;
+    if (!selected[d]) continue;
     int n = a->jacobian ? acceleration_entries(a, d, 1 / term->scale, column, entry) : 0;
     double r = ((v_next[d] - v[d]) / tr->options.timestep - goal[d]) / term->scale, w = weight;
     begin_cost(a, term, 1, &w, &r);
@@ -300,9 +310,9 @@ static void add_posture(cav_sum *a, const cav_term *term, double weight, const d
   double entry[3];
   if (!cav_knot_moves(tr, a->t)) return;
   posture_difference(a, term, q, a->s->tangent);
-  const int all = cav_term_window(tr, term)->dofs == tr->nv;
+  const char *selected = cav_term_dofs(tr, term);
   for (int d = 0; d < tr->nv; d++) {
-    if (!all && !cav_dof_selected(tr, term, d)) continue;
+    if (!selected[d]) continue;
     int n = a->jacobian ? posture_entries(tr, a->s->tangent, d, 1 / term->scale, column, entry) : 0;
     double r = a->s->tangent[d] / term->scale, w = weight;
     begin_cost(a, term, 1, &w, &r);
@@ -620,7 +630,7 @@ static void lay_force_rows(cav_sum *a) {
     double weight = a->s->force_weight[d];
     if (weight == 0) continue;
     double root = sqrt(weight), *out = new_dense(a, a->s->force_derivative[d] / root);
-    const double *du = a->du + (size_t)d * width;
+    const double *du = force_row(a, d);
     scale_row(width, root, du, out);
     for (int k = 0; k < width && tr->free_step; k++) a->knot->step_row[k] += a->s->force_step[d] * du[k];
   }

@@ -25,9 +25,8 @@ typedef struct cav_sum {
   cav_scratch *s;
   cav_knot *knot;
   int t, jacobian;
-  int passing;          ///< 1: du and dense rows are this thread's, until its next knot; 0: the knot's
+  int passing; ///< 1: dense rows are this thread's, until its next knot, and du is chained row by row; 0: the knot's
   cav_links links;      ///< of the knot, with derivatives
-  double *du;           ///< [nv*3nv] of u
   double *dense, *rest; ///< rows over all columns [dense_most*3nv] and their residuals
   int shifted;          ///< 1, 2: at a shorter or longer step, whose residuals are noted only; 0: at the step itself
   int row;              ///< rows begun

@@ -17,7 +17,6 @@ typedef struct cav_scratch {
   int *key; ///< [2*contacts] pair and feature of the contacts with rows
   int key_room;
   unsigned char *used;  ///< [contacts] by bits, readings that a row is of
-  double *du;           ///< [nv*3nv] of u, where the knot is not to keep it
   double *dense, *rest; ///< [dense_room*3nv], [dense_room] rows over all columns, likewise
   int dense_room;
   double *force_weight, *force_derivative; ///< [nv] of rows along single dofs

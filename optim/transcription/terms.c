@@ -40,12 +40,19 @@ static cav_window window_of(const cav_transcription *tr, const cav_term *term) {
     w.first = 1;
   // a last knot that nothing leaves has no acceleration and no force
   if (reads_force(term) && w.last == tr->nknot - 1 && !cav_knot_has_force(tr, w.last)) w.last--;
-  for (int d = 0; d < tr->nv; d++) w.dofs += cav_dof_selected(tr, term, d);
   return w;
 }
 
 void cav_term_windows(cav_transcription *tr) {
-  for (int i = 0; i < tr->problem->nterm; i++) tr->window[i] = window_of(tr, &tr->problem->term[i]);
+  for (int i = 0; i < tr->problem->nterm; i++) {
+    const cav_term *term = &tr->problem->term[i];
+    char *selected = tr->selected + (size_t)i * (size_t)tr->nv;
+    tr->window[i] = window_of(tr, term);
+    for (int d = 0; d < tr->nv; d++) {
+      selected[d] = (char)(cav_dof_selected(tr, term, d) != 0);
+      tr->window[i].dofs += selected[d];
+    }
+  }
 }
 
 double cav_term_weight(const cav_transcription *tr, const cav_term *term, int t) {

@@ -222,7 +222,6 @@ static int scratch_new(cav_transcription *tr, cav_scratch *s) {
   s->force_derivative = room(&ok, n, sizeof(double));
   s->row = room(&ok, 3 * n, sizeof(double));
   s->reading = room(&ok, 3 * n, sizeof(double));
-  s->du = room(&ok, 3 * n * n, sizeof(double));
   s->derivative = room(&ok, CAV_DERIVATIVE_ROWS * n, sizeof(double));
   s->column = room(&ok, n, sizeof(int));
   s->tangent = room(&ok, n, sizeof(double));
@@ -267,7 +266,8 @@ cav_transcription *cav_transcription_new(const cav_problem *problem, int threads
   tr->start = calloc(2 * (size_t)tr->model->nq + 1, sizeof(double));
   tr->rotation_after = calloc(CAV_ROTATION_SIZE * (size_t)tr->nrotation + 1, sizeof(double));
   tr->window = calloc((size_t)problem->nterm + 1, sizeof *tr->window);
-  if (!tr->before || !tr->start || !tr->rotation_after || !tr->window) goto memory;
+  tr->selected = calloc((size_t)problem->nterm * (size_t)tr->nv + 1, 1);
+  if (!tr->before || !tr->start || !tr->rotation_after || !tr->window || !tr->selected) goto memory;
   cav_term_windows(tr);
   tr->after = tr->before + tr->nv;
   tr->scratch = calloc((size_t)cav_parallel_size(tr->pool), sizeof *tr->scratch);
@@ -304,8 +304,8 @@ void cav_transcription_free(cav_transcription *tr) {
     cav_scratch *s = &tr->scratch[i];
     cav_state_free(s->state);
     free(s->value), free(s->join), free(s->dq), free(s->dv), free(s->dn), free(s->key), free(s->derivative);
-    free(s->force_weight), free(s->force_derivative), free(s->row), free(s->reading), free(s->du), free(s->dense),
-        free(s->rest), free(s->used), free(s->column), free(s->tangent), free(s->posture);
+    free(s->force_weight), free(s->force_derivative), free(s->row), free(s->reading), free(s->dense), free(s->rest),
+        free(s->used), free(s->column), free(s->tangent), free(s->posture);
     free(s->force_step), free(s->rate), free(s->missing), free(s->user.x), free(s->trace[0]), free(s->trace[1]),
         free(s->slot[0]), free(s->slot[1]);
   }
@@ -317,7 +317,7 @@ void cav_transcription_free(cav_transcription *tr) {
   free(tr->unactuated), free(tr->penalised), free(tr->effort), free(tr->effort_range), free(tr->effort_unit),
       free(tr->rotation_dof), free(tr->rotation_of);
   free(tr->knot), free(tr->status), free(tr->ready), free(tr->order), free(tr->scratch), free(tr->before),
-      free(tr->start), free(tr->rotation_after), free(tr->window);
+      free(tr->start), free(tr->rotation_after), free(tr->window), free(tr->selected);
   cav_periodicity_free(tr->periodicity);
   cav_parallel_free(tr->pool);
   free(tr);
@@ -452,7 +452,7 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
     if (status == CAV_OK) status = cav_user_refused(&knot->refusal);
     if (status != CAV_OK) return status;
     a.links = cav_links_of(tr, t);
-    cav_links_chain(tr, &a.links, nv, s->dq, s->dv, s->dn, a.du);
+    if (!a.passing) cav_links_chain(tr, &a.links, nv, s->dq, s->dv, s->dn, knot->du);
   }
   if (p->jacobian) s->seconds += now() - start;
 

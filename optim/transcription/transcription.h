@@ -131,6 +131,7 @@ typedef struct cav_transcription {
   int *rotation_dof;  ///< [nturn] first of three rotational dofs
   int *rotation_of;   ///< [nv] index into turn_dof or -1
   cav_window *window; ///< [nterm]
+  char *selected;     ///< [nterm*nv] 1: the term selects the dof
   cav_penalties penalty;
   int self_force;                   ///< 1: a term asks for forces between links of one tree
   double depth_weight;              ///< 1/(m^2 s), of depth in the world beyond CAV_DEPTH_FREE; 0: none
@@ -272,6 +273,11 @@ static inline const cav_window *cav_term_window(const cav_transcription *transcr
   const ptrdiff_t i = term - transcription->problem->term;
   assert(i >= 0 && i < transcription->problem->nterm);
   return &transcription->window[i];
+}
+
+/// Which dofs a term of the problem selects, [nv].
+static inline const char *cav_term_dofs(const cav_transcription *transcription, const cav_term *term) {
+  return transcription->selected + (term - transcription->problem->term) * transcription->nv;
 }
 
 /// Whether something leaves knot t, so that it has forces.
