@@ -1,5 +1,5 @@
 /// Hessian M + J' H J of one island and its factors, by whichever of two ways takes less work on its structure:
-/// elimination of a dense matrix from the leaves, which keeps the zeros of the trees but fills as the dofs are
+/// elimination from the leaves (elimination.c), which keeps the zeros of the trees but fills as the dofs are
 /// numbered, or CHOLMOD (sparse.c). A sparse pattern is that of the dofs of links that touch, whether their impulses
 /// bend or not, so it holds for all iterations of a step, and for the next step while the same links touch; then nothing
 /// is analysed and only CHOLMOD itself allocates. Contacts that are still apart, of which the discrete law sees many
@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "elimination.h"
 #include "sparse.h"
 
 static const double NEGLIGIBLE = 1e-20; ///< curvature relative to 1/R
@@ -36,8 +37,9 @@ struct cav_hessian {
   int ndof;
   const int *dof, *local;
   int nslot, used, room; // slots, how many of them this step has met
-  slot *slot, *at;       // at: NULL while dense
-  double *value, *x;     // matrix, dense or sparse; right-hand side in local order
+  slot *slot, *at;       // at: NULL while eliminated
+  cav_elimination *elimination;
+  double *value, *x; // sparse matrix; right-hand side in local order
   size_t nvalue, nx;
   int nclique, members; // runs of blocks that see the same dofs; their dofs and pairs of dofs in all
   size_t pairs;
@@ -50,8 +52,12 @@ struct cav_hessian {
 
 cav_hessian *cav_hessian_new(double sparse_from) {
   cav_hessian *h = calloc(1, sizeof *h);
-  if (h) h->sparse_from = sparse_from;
-  return h;
+  if (!h) return NULL;
+  h->sparse_from = sparse_from;
+  h->elimination = cav_elimination_new();
+  if (h->elimination) return h;
+  free(h);
+  return NULL;
 }
 
 void cav_hessian_free(cav_hessian *h) {
@@ -60,14 +66,15 @@ void cav_hessian_free(cav_hessian *h) {
     cav_sparse_free(h->slot[k].sparse);
     free(h->slot[k].data);
   }
+  cav_elimination_free(h->elimination);
   free(h->slot), free(h->value), free(h->x), free(h->clique), free(h->live), free(h->pair);
   free(h);
 }
 
 size_t cav_hessian_bytes(const cav_hessian *h) {
   if (!h) return 0;
-  size_t bytes =
-      sizeof *h + (h->nvalue + h->nx + h->npair) * sizeof(double) + (h->nblock + h->nclique_room) * sizeof(int);
+  size_t bytes = sizeof *h + cav_elimination_bytes(h->elimination) + (h->nvalue + h->nx + h->npair) * sizeof(double) +
+                 (h->nblock + h->nclique_room) * sizeof(int);
   for (int k = 0; k < h->nslot; k++)
     bytes += sizeof(slot) + h->slot[k].room * sizeof(int) + (size_t)(8 * cav_sparse_entries(h->slot[k].sparse));
   return bytes;
@@ -327,9 +334,9 @@ static cav_status next_slot(cav_hessian *h) {
   return CAV_OK;
 }
 
-// operations of the dense way: squares of what stands left of the diagonal in the rows, and four passes over the
-// matrix. low [ndof] is overwritten
-static double dense_work(const cav_hessian *h, double *low) {
+// operations of the elimination: squares of what stands left of the diagonal in the rows as the dofs are numbered, and four
+// passes over the matrix. low [ndof] is overwritten
+static double elimination_work(const cav_hessian *h, double *low) {
   const cav_impulse *p = h->part;
   const int *parent = p->state->work->parent;
   for (int e = 0; e < h->ndof; e++) low[e] = parent[h->dof[e]] < 0 ? e : low[h->local[parent[h->dof[e]]]];
@@ -345,18 +352,28 @@ static double dense_work(const cav_hessian *h, double *low) {
   return work;
 }
 
+// whether elimination is as fast; that of few dofs is whatever they touch
+static int is_eliminated(cav_hessian *h) {
+  const double n = h->ndof;
+  if (n * n * (n + 4.0) < h->sparse_from || elimination_work(h, h->x) < h->sparse_from) return 1;
+  // what has slots has CHOLMOD; it is not loaded before it pays
+  return h->nslot == 0 && !cav_sparse_available();
+}
+
+static cav_status begin_elimination(cav_hessian *h) {
+  h->at = NULL;
+  return cav_elimination_begin(h->elimination, h->part, h->ndof, h->dof, h->local, h->clique);
+}
+
 cav_status cav_hessian_begin(cav_hessian *h, const cav_impulse *part, int ndof, const int *dof, const int *local) {
   h->part = part;
   h->ndof = ndof;
   h->dof = dof;
   h->local = local;
-  h->at = NULL;
   cav_status status = find_cliques(h);
   if (status != CAV_OK) return status;
   if (!make_room(&h->x, &h->nx, (size_t)ndof, sizeof(double))) return CAV_NO_MEMORY;
-  // what has slots has CHOLMOD; it is not loaded before it pays
-  if (dense_work(h, h->x) < h->sparse_from || (h->nslot == 0 && !cav_sparse_available()))
-    return make_room(&h->value, &h->nvalue, (size_t)ndof * (size_t)ndof, sizeof(double)) ? CAV_OK : CAV_NO_MEMORY;
+  if (is_eliminated(h)) return begin_elimination(h);
   if (!make_room(&h->live, &h->nclique_room, (size_t)h->nclique, sizeof(int))) return CAV_NO_MEMORY;
   for (int c = 0; c < h->nclique; c++) h->live[c] = -1;
   h->nlive = 0;
@@ -396,18 +413,10 @@ static void bend_block(const cav_block *block, const double *H, double *sum) {
   }
 }
 
-// adds to the lower triangle what pairs of a clique's dofs sum up to: at place, or with place NULL by local dofs of a
-// dense matrix
-static void add_pairs(cav_hessian *h, int n, const int *dof, const int *place) {
-  const double *sum = h->pair;
-  for (int i = 0; i < n; i++) {
-    for (int j = i; j < n; j++) {
-      const int a = h->local[dof[i]], b = h->local[dof[j]];
-      const size_t at =
-          place ? (size_t)place[i * n + j] : (size_t)(a > b ? a : b) * (size_t)h->ndof + (size_t)(a > b ? b : a);
-      h->value[at] += sum[i * n + j];
-    }
-  }
+// adds to the lower triangle what pairs of a clique's dofs sum up to
+static void add_pairs(cav_hessian *h, int n, const int *place) {
+  for (int i = 0; i < n; i++)
+    for (int j = i; j < n; j++) h->value[place[i * n + j]] += h->pair[i * n + j];
 }
 
 // adds all blocks whose impulses bend, clique by clique
@@ -415,7 +424,7 @@ static void add_blocks(cav_hessian *h, const double *curvature) {
   const cav_impulse *p = h->part;
   for (int b = 0; b < p->nblock;) {
     const cav_block *block = &p->block[b];
-    const int clique = h->clique[b], n = block->ndof, seen = !h->at || h->live[clique] >= 0;
+    const int clique = h->clique[b], n = block->ndof, seen = h->live[clique] >= 0;
     int any = 0;
     for (; b < p->nblock && h->clique[b] == clique; b++) {
       const double *H = curvature + CAV_CURVATURE * b;
@@ -424,7 +433,7 @@ static void add_blocks(cav_hessian *h, const double *curvature) {
       bend_block(&p->block[b], H, h->pair);
       any = 1;
     }
-    if (any) add_pairs(h, n, block->dof, h->at ? h->at->place + h->at->square[h->live[clique]] : NULL);
+    if (any) add_pairs(h, n, h->at->place + h->at->square[h->live[clique]]);
   }
 }
 
@@ -440,51 +449,6 @@ static void fill_sparse(cav_hessian *h, const double *curvature) {
   add_blocks(h, curvature);
 }
 
-static void fill_dense(cav_hessian *h, const double *curvature) {
-  const cav_impulse *p = h->part;
-  const cav_workspace *work = p->state->work;
-  const int n = h->ndof;
-  memset(h->value, 0, (size_t)n * (size_t)n * sizeof(double));
-  for (int e = 0; e < n; e++) {
-    const double *M = p->M + work->row[h->dof[e]];
-    for (int j = h->dof[e], k = 0; j >= 0; j = work->parent[j], k++) h->value[e * n + h->local[j]] = M[k];
-  }
-  add_blocks(h, curvature);
-}
-
-// ---------------------------------------------------------------- factors
-
-// matrix = L' D L from the last dof to the first, touching only what is not zero. No pivot can fall below that of M
-// itself, so rounding in a very stiff constraint cannot make the matrix indefinite
-static void factor_dense(cav_hessian *h) {
-  const int n = h->ndof, *row = h->part->state->work->row;
-  for (int k = n - 1; k >= 0; k--) {
-    double *Ak = h->value + (size_t)k * (size_t)n;
-    const double least = h->part->L[row[h->dof[k]]];
-    if (!(Ak[k] >= least)) Ak[k] = least;
-    for (int i = k - 1; i >= 0; i--) {
-      if (Ak[i] == 0.0) continue;
-      const double ratio = Ak[i] / Ak[k];
-      double *Ai = h->value + (size_t)i * (size_t)n;
-      for (int j = 0; j <= i; j++) Ai[j] -= ratio * Ak[j];
-      Ak[i] = ratio;
-    }
-  }
-}
-
-static void solve_dense(const cav_hessian *h, double *x) {
-  const int n = h->ndof;
-  for (int k = n - 1; k >= 0; k--) {
-    const double *Ak = h->value + (size_t)k * (size_t)n;
-    for (int i = 0; i < k; i++) x[i] -= Ak[i] * x[k];
-  }
-  for (int k = 0; k < n; k++) {
-    const double *Ak = h->value + (size_t)k * (size_t)n;
-    x[k] /= Ak[k];
-    for (int i = 0; i < k; i++) x[k] -= Ak[i] * x[i];
-  }
-}
-
 cav_status cav_hessian_factor(cav_hessian *h, const double *curvature) {
   if (h->at) {
     cav_status status = follow_pattern(h, curvature);
@@ -493,22 +457,21 @@ cav_status cav_hessian_factor(cav_hessian *h, const double *curvature) {
     status = cav_sparse_factor(h->at->sparse, h->value);
     if (status != CAV_NOT_CONVERGED) return status;
     // rounding in very stiff constraints: only the elimination that knows the least pivots can go on
-    h->at = NULL;
-    if (!make_room(&h->value, &h->nvalue, (size_t)h->ndof * (size_t)h->ndof, sizeof(double))) return CAV_NO_MEMORY;
+    status = begin_elimination(h);
+    if (status != CAV_OK) return status;
   }
-  fill_dense(h, curvature);
-  factor_dense(h);
+  cav_elimination_factor(h->elimination, curvature, CAV_CURVATURE);
   return CAV_OK;
 }
 
 cav_status cav_hessian_solve(cav_hessian *h, double *x) {
-  for (int e = 0; e < h->ndof; e++) h->x[e] = x[h->dof[e]];
-  if (h->at) {
-    const cav_status status = cav_sparse_solve(h->at->sparse, h->x, h->x);
-    if (status != CAV_OK) return status;
-  } else {
-    solve_dense(h, h->x);
+  if (!h->at) {
+    cav_elimination_solve(h->elimination, x);
+    return CAV_OK;
   }
+  for (int e = 0; e < h->ndof; e++) h->x[e] = x[h->dof[e]];
+  const cav_status status = cav_sparse_solve(h->at->sparse, h->x, h->x);
+  if (status != CAV_OK) return status;
   for (int e = 0; e < h->ndof; e++) x[h->dof[e]] = h->x[e];
   return CAV_OK;
 }
