@@ -164,14 +164,15 @@ void cav_impulse_push(const cav_impulse *p, double s, const double *f, double *r
 
 void cav_impulse_inertia(const cav_impulse *p, const double *x, double *r) {
   const cav_workspace *work = p->state->work;
-  memset(r, 0, (size_t)p->nv * sizeof *r);
   for (int i = 0; i < p->nv; i++) {
-    const double *M = p->M + work->row[i];
-    r[i] += M[0] * x[i];
+    const double *M = p->M + work->row[i], own = x[i];
+    // nothing has come to r[i] yet: that is from dofs behind it
+    double sum = M[0] * own;
     for (int j = work->parent[i], k = 1; j >= 0; j = work->parent[j], k++) {
-      r[i] += M[k] * x[j];
-      r[j] += M[k] * x[i];
+      sum += M[k] * x[j];
+      r[j] += M[k] * own;
     }
+    r[i] = sum;
   }
 }
 
@@ -254,6 +255,9 @@ void cav_impulse_read(const cav_impulse *p, double *f) {
   }
 }
 
+// a where b is no number
+static double larger(double a, double b) { return b > a ? b : a; }
+
 cav_status cav_impulse_check(const cav_impulse *p, const double *q, const double *v, const double *u, const double *x,
                              double *u_found, double *f, double *error, double *scale) {
   const cav_workspace *work = p->state->work;
@@ -270,18 +274,20 @@ cav_status cav_impulse_check(const cav_impulse *p, const double *q, const double
   // inertial and constraint forces are as much part of the balance as u is
   const double rate = 1.0 / p->state->options.timestep;
   double *change = p->change, *force = p->force;
-  *error = *scale = 0.0;
   for (int i = 0; i < p->nv; i++) change[i] = rate * (x[i] - v[i]);
   if (memcmp(x, v, bytes))
     cav_impulse_inertia(p, change, force);
   else
     memset(force, 0, bytes);
+  double most = 0.0, off = 0.0;
   for (int i = 0; i < p->nv; i++) {
-    *scale = fmax(*scale, fmax(fabs(u[i]), fabs(force[i])));
-    *error = fmax(*error, fabs(u_found[i] - u[i]));
+    most = larger(larger(most, fabs(u[i])), fabs(force[i]));
+    off = larger(off, fabs(u_found[i] - u[i]));
     force[i] = 0.0;
   }
   cav_impulse_push(p, rate, f, force);
-  for (int i = 0; i < p->nv; i++) *scale = fmax(*scale, fabs(force[i]));
+  for (int i = 0; i < p->nv; i++) most = larger(most, fabs(force[i]));
+  *error = off;
+  *scale = most;
   return CAV_OK;
 }

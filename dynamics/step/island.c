@@ -67,23 +67,24 @@ void cav_islands_find(cav_impulse *p, double *room, cav_islands *s) {
 
 void cav_island_inertia(const cav_impulse *p, int ndof, const int *dof, const double *x, double *r) {
   const cav_workspace *work = p->state->work;
-  for (int e = 0; e < ndof; e++) r[dof[e]] = 0.0;
   for (int e = 0; e < ndof; e++) {
     const int i = dof[e];
-    const double *M = p->M + work->row[i];
-    r[i] += M[0] * x[i];
+    const double *M = p->M + work->row[i], own = x[i];
+    // nothing has come to r[i] yet: that is from dofs behind it
+    double sum = M[0] * own;
     for (int j = work->parent[i], k = 1; j >= 0; j = work->parent[j], k++) {
-      r[i] += M[k] * x[j];
-      r[j] += M[k] * x[i];
+      sum += M[k] * x[j];
+      r[j] += M[k] * own;
     }
+    r[i] = sum;
   }
 }
 
 void cav_island_fall(const cav_impulse *p, int ndof, const int *dof, double *x) {
   const int *row = p->state->work->row, *parent = p->state->work->parent;
   for (int e = ndof - 1; e >= 0; e--) {
-    const double *L = p->L + row[dof[e]];
-    for (int i = parent[dof[e]], k = 1; i >= 0; i = parent[i], k++) x[i] -= L[k] * x[dof[e]];
+    const double *L = p->L + row[dof[e]], own = x[dof[e]];
+    for (int i = parent[dof[e]], k = 1; i >= 0; i = parent[i], k++) x[i] -= L[k] * own;
   }
   for (int e = 0; e < ndof; e++) {
     const double *L = p->L + row[dof[e]];

@@ -104,16 +104,18 @@ void cav_newton_add_constraints(cav_newton *s) {
   }
 }
 
-// largest error of the generalised force that rounding causes: of x through inertia and stiff constraints, and of the
-// largest forces
+// largest error of the generalised force that rounding causes where it was measured: of x through inertia and stiff
+// constraints, and of the largest forces
 static double rounding(cav_newton *s) {
   const cav_impulse *p = &s->problem;
+  if (s->rounding >= 0.0) return s->rounding;
   cav_impulse_rows(p, s->x, s->y);
   cav_newton_laws(s, s->y, s->f, s->curvature, 0);
   // two momenta, each at poses that are rounded, or one change of velocity
   const double terms = p->state->options.order == CAV_ORDER_MOMENTUM ? 4.0 : 1.0;
-  return cav_newton_momentum_rounding(s, terms, s->gradient) / p->state->options.timestep +
-         8.0 * DBL_EPSILON * (s->scale + DBL_MIN / p->state->options.timestep);
+  s->rounding = cav_newton_momentum_rounding(s, terms, s->gradient) / p->state->options.timestep +
+                8.0 * DBL_EPSILON * (s->scale + DBL_MIN / p->state->options.timestep);
+  return s->rounding;
 }
 
 void cav_newton_fill_inertia(const cav_impulse *p, double *matrix) {
@@ -207,6 +209,7 @@ static cav_status measure_raised(cav_newton *s) {
 
 cav_status cav_newton_measure(cav_newton *s) {
   const cav_impulse *p = &s->problem;
+  s->rounding = -1.0;
   if (s->raised && !p->excess) return measure_raised(s);
   const cav_status status = cav_impulse_check(p, s->q, s->v, s->u, s->x, s->found, s->f, &s->error, &s->scale);
   if (!p->excess || status != CAV_OK) return status;

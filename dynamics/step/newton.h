@@ -42,6 +42,7 @@ typedef struct cav_newton {
   double *room, *path; ///< of proximal.c; of path.c
   double *ended;       ///< [nv] where it ended, or how far a trace came
   double error, scale; ///< of the last measurement
+  double rounding;     ///< what rounding of x can make of the error there; negative: not known yet
   double most;         ///< scale beyond which x is no step
   int iterations, limit;
 } cav_newton;
@@ -51,6 +52,9 @@ static inline double largest(const double *x, int n) {
   for (int i = 0; i < n; i++) most = most > fabs(x[i]) ? most : fabs(x[i]);
   return most;
 }
+
+// a where b is no number
+static inline double larger(double a, double b) { return b > a ? b : a; }
 
 static inline double dot(const double *a, const double *b, int n) {
   double sum = 0.0;

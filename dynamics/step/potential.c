@@ -40,7 +40,7 @@ void cav_newton_leave_island(cav_newton *s) {
 // sums over the dofs of the island in hand
 static double largest_of(const cav_newton *s, const double *x) {
   double most = 0.0;
-  for (int e = 0; e < s->ndof; e++) most = fmax(most, fabs(x[s->dof[e]]));
+  for (int e = 0; e < s->ndof; e++) most = larger(most, fabs(x[s->dof[e]]));
   return most;
 }
 
@@ -50,12 +50,29 @@ static double dot_of(const cav_newton *s, const double *a, const double *b) {
   return sum;
 }
 
-// gradient of the convex potential at x, the island's
-static void fill_gradient(cav_newton *s) {
+// what the gradient at x is made of: velocities of rows, impulses with their curvature, momentum
+static void evaluate(cav_newton *s) {
+  cav_impulse_rows(&s->part, s->x, s->y);
+  cav_newton_laws(s, s->y, s->f, s->curvature, 0);
   for (int e = 0; e < s->ndof; e++) s->step[s->dof[e]] = s->x[s->dof[e]] - s->anchor[s->dof[e]];
   cav_island_inertia(&s->part, s->ndof, s->dof, s->step, s->momentum);
+}
+
+// gradient of the convex potential at x, the island's, from what it is made of
+static void fill_gradient(cav_newton *s) {
   for (int e = 0; e < s->ndof; e++) s->gradient[s->dof[e]] = s->momentum[s->dof[e]] + s->base[s->dof[e]];
   cav_impulse_push(&s->part, -1.0, s->f, s->gradient);
+}
+
+// x and what the gradient there is made of, by so much of the step, where the line search ended: all of it is known there
+static void go_along(cav_newton *s, double length) {
+  double *const y = s->y, *const f = s->f;
+  for (int e = 0; e < s->ndof; e++) {
+    s->x[s->dof[e]] += length * s->step[s->dof[e]];
+    s->momentum[s->dof[e]] += length * s->found[s->dof[e]];
+  }
+  s->y = s->try_y, s->f = s->try_f;
+  s->try_y = y, s->try_f = f;
 }
 
 // sum over the rows of the island of a_i b_i
@@ -66,7 +83,8 @@ static double dot_rows(const cav_newton *s, const double *a, const double *b) {
   return sum;
 }
 
-// least point of the potential along step, by its derivative: Newton within a shrinking bracket. Returns how far to go
+// least point of the potential along step, by its derivative: Newton within a shrinking bracket. Returns how far to go;
+// try_y, try_f and curvature are those there, found is M step
 static double search(cav_newton *s) {
   const cav_impulse *p = &s->part;
   double linear = dot_of(s, s->step, s->momentum) + dot_of(s, s->step, s->base), low = 0.0, high = INFINITY,
@@ -76,7 +94,7 @@ static double search(cav_newton *s) {
   cav_impulse_rows(p, s->step, s->derivative);
   const double pull = dot_rows(s, s->derivative, s->f), start = linear - pull;
   const double noise = 4.0 * DBL_EPSILON * (fabs(linear) + fabs(pull));
-  for (int k = 0; k < SEARCH_STEPS; k++) {
+  for (int k = 0;; k++) {
     for (int b = 0; b < p->nblock; b++)
       for (int i = p->block[b].first; i < p->block[b].first + p->block[b].dim; i++)
         s->try_y[i] = s->y[i] + length * s->derivative[i];
@@ -84,6 +102,7 @@ static double search(cav_newton *s) {
     const double derivative = linear + length * bend - dot_rows(s, s->derivative, s->try_f);
     // short of the minimum a rough answer will do, beyond it a close one is needed to be sure of descent
     if ((derivative <= 0.0 && derivative >= 0.3 * start) || fabs(derivative) <= fmax(1e-3 * fabs(start), noise)) break;
+    if (k == SEARCH_STEPS) break;
     double curve = bend;
     for (int b = 0; b < p->nblock; b++) {
       const cav_block *block = &p->block[b];
@@ -120,6 +139,7 @@ static void add_row_rounding(const cav_newton *s, int b, double *error) {
   const cav_impulse *p = &s->part;
   const cav_block *block = &p->block[b];
   const double *H = s->curvature + BLOCK * b;
+  double change[CAV_IMPULSE_DIM] = {0.0}; // of each impulse
   for (int i = 0; i < block->dim; i++) {
     const double *J = block->J + i * block->ndof;
     double size = fabs(p->target[block->first + i]) + DBL_MIN;
@@ -128,9 +148,12 @@ static void add_row_rounding(const cav_newton *s, int b, double *error) {
     if (contact && cav_row_looks_ahead(&p->state->options, contact, i))
       size += 8.0 * norm3(contact->pos) / p->state->options.timestep;
     for (int k = 0; k < block->ndof; k++) size += fabs(J[k] * s->x[block->dof[k]]);
-    for (int j = 0; j < block->dim; j++)
-      for (int k = 0; k < block->ndof; k++)
-        error[block->dof[k]] += fabs(block->J[j * block->ndof + k] * H[j * block->dim + i]) * size;
+    for (int j = 0; j < block->dim; j++) change[j] += fabs(H[j * block->dim + i]) * size;
+  }
+  for (int j = 0; j < block->dim; j++) {
+    if (change[j] == 0.0) continue;
+    const double *J = block->J + j * block->ndof;
+    for (int k = 0; k < block->ndof; k++) error[block->dof[k]] += fabs(J[k]) * change[j];
   }
 }
 
@@ -140,11 +163,13 @@ double cav_newton_momentum_rounding(const cav_newton *s, double terms, double *r
     const int i = s->dof[e];
     const double *M = s->part.M + work->row[i];
     // a number near zero is rounded to what the least normal one is
-    room[i] = terms * fabs(M[0]) * (fabs(s->x[i]) + DBL_MIN);
+    const double own = terms * fabs(s->x[i]);
+    double sum = fabs(M[0]) * (own + terms * DBL_MIN);
     for (int j = work->parent[i], k = 1; j >= 0; j = work->parent[j], k++) {
-      room[i] += terms * fabs(M[k] * s->x[j]);
-      room[j] += terms * fabs(M[k] * s->x[i]);
+      sum += terms * fabs(M[k] * s->x[j]);
+      room[j] += fabs(M[k]) * own;
     }
+    room[i] = sum;
   }
   for (int b = 0; b < s->part.nblock; b++) add_row_rounding(s, b, room);
   return DBL_EPSILON * largest_of(s, room);
@@ -176,24 +201,31 @@ static cav_status fall(cav_newton *s) {
 // minimises the potential of the island in hand from x by at most limit iterations; taken counts them, on top of those
 // before
 static cav_status descend(cav_newton *s, const int *local, double tolerance, double scale, int limit, int *taken) {
-  const cav_impulse *p = &s->part;
   double before = INFINITY; // largest gradient at the last iterate
+  // steps since the gradient was evaluated at x itself: sums of steps differ from that by their rounding
+  int summed = 0;
+  const double outset = largest_of(s, s->base);
+  evaluate(s);
   for (int first = 1; *taken < limit; first = 0) {
-    cav_impulse_rows(p, s->x, s->y);
-    cav_newton_laws(s, s->y, s->f, s->curvature, 0);
     fill_gradient(s);
-    const double inertial = fmax(largest_of(s, s->base), largest_of(s, s->momentum)),
-                 error = largest_of(s, s->gradient);
-    if (!first && error <= tolerance * fmax(scale, inertial)) break;
+    const double inertial = larger(outset, largest_of(s, s->momentum)), error = largest_of(s, s->gradient);
     // at rounding the gradient only wanders
-    if (!first && error > 0.5 * before && error <= cav_newton_momentum_rounding(s, 1.0, s->step)) break;
+    const int ends = !first && (error <= tolerance * larger(scale, inertial) ||
+                                (error > 0.5 * before && error <= cav_newton_momentum_rounding(s, 1.0, s->step)));
+    if (ends && !summed) break;
+    if (ends) {
+      evaluate(s);
+      summed = 0;
+      continue;
+    }
     before = error;
     for (int e = 0; e < s->ndof; e++) s->step[s->dof[e]] = -s->gradient[s->dof[e]];
     const cav_status status = solve_hessian(s, local, *taken == 0);
     if (status != CAV_OK) return status;
     ++*taken;
     const double length = search(s);
-    for (int e = 0; e < s->ndof; e++) s->x[s->dof[e]] += length * s->step[s->dof[e]];
+    go_along(s, length);
+    summed++;
     if (length * largest_of(s, s->step) <= 64.0 * DBL_EPSILON * largest_of(s, s->x)) break;
   }
   return CAV_OK;
