@@ -95,6 +95,11 @@ void cav_stabilisation_prepare(cav_state *state);
 
 /// Fills state->row at the state's positions; gives every contact its R, h B, h K and sigma. limits.c.
 cav_status cav_limits_find(const cav_model *model, cav_state *state);
+
+/// Limits of joints that are near in some of four states, of which state is one, into lanes, which have their positions
+/// (broad_four.c). Then cav_limits_find of one of them among those. limits.c.
+void cav_lanes_limits(const cav_model *model, cav_lanes *lanes, const cav_state *state);
+cav_status cav_limits_of_near(const cav_model *model, cav_state *state, const cav_lanes *lanes, int lane);
 void cav_contacts_soften(cav_state *state);
 
 /// Fraction of its stiffness that a contact has, by which its R is divided, and the rate of its logarithm by the

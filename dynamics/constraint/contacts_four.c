@@ -10,10 +10,8 @@
 #include "four_turn.h"
 #include "spatial.h"
 
-typedef long long four_masks __attribute__((vector_size(sizeof(cav_four))));
-
-CAV_INLINE cav_four choose(four_masks which, cav_four yes, cav_four no) {
-  return (cav_four)((which & (four_masks)yes) | (~which & (four_masks)no));
+CAV_INLINE cav_four choose(cav_four_masks which, cav_four yes, cav_four no) {
+  return (cav_four)((which & (cav_four_masks)yes) | (~which & (cav_four_masks)no));
 }
 
 CAV_INLINE cav_four roots(cav_four x) {
@@ -24,7 +22,7 @@ CAV_INLINE cav_four roots(cav_four x) {
 
 CAV_INLINE cav_four sizes(cav_four x) { return choose(x < 0, -x, x); }
 
-CAV_INLINE int any(four_masks m) { return (m[0] | m[1] | m[2] | m[3]) != 0; }
+CAV_INLINE int any(cav_four_masks m) { return held_bits(m) != 0; }
 
 // four numbers of each of four contacts from a member on, by number, and back
 #define OF_EACH(c, member) \
@@ -36,9 +34,9 @@ CAV_BY_FOUR void cav_frames_four(cav_contact *c) {
   turn_in((const double *const[])OF_EACH(c, frame[2]), t);
   // t: the normal's last number, then the tangent
   axpy3(s, t + 1, -dot3(n, t + 1), n);
-  const four_masks none = dot3(s, s) < 1e-12;
+  const cav_four_masks none = dot3(s, s) < 1e-12;
   if (any(none)) {
-    const four_masks y = sizes(n[1]) < 0.5;
+    const cav_four_masks y = sizes(n[1]) < 0.5;
     cav_four other[3] = {CAV_ALL(0), choose(y, CAV_ALL(1), CAV_ALL(0)), choose(y, CAV_ALL(0), CAV_ALL(1))};
     axpy3(other, other, -dot3(n, other), n);
     for (int k = 0; k < 3; k++) s[k] = choose(none, other[k], s[k]);
@@ -72,13 +70,13 @@ CAV_BY_FOUR int cav_law_four(cav_contact *c) {
   }
   // what would overflow or vanish, and what has no friction, is a single one's
   const cav_four rho = R[1] * friction[0] * friction[0], tangent = roots(rho / R[0]);
-  const four_masks ordinary = ((size <= 1e100) & (size >= 1e-100)) | (size == 0);
+  const cav_four_masks ordinary = ((size <= 1e100) & (size >= 1e-100)) | (size == 0);
   if (any(~(ordinary & (friction[0] > 0) & (friction[1] > 0) & (tangent > 0)))) return 0;
 
   const cav_four side[2] = {g[1] / friction[0], g[2] / friction[1]};
   const cav_four root = roots(R[0]), length = roots(rho) * roots(side[0] * side[0] + side[1] * side[1]);
   const cav_four normal = root * g[0], top = normal + length * tangent, cos2 = 1 / (1 + tangent * tangent);
-  const four_masks inside = normal * tangent >= length, off = top <= 0;
+  const cav_four_masks inside = normal * tangent >= length, off = top <= 0;
   const cav_four on_surface = cos2 * top, pushed = choose(off, CAV_ALL(0), on_surface);
   const cav_four ratio = choose(inside, CAV_ALL(1), choose(off, CAV_ALL(0), tangent * on_surface / length));
   f[0] = choose(inside, g[0], pushed / root);

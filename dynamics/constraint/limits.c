@@ -34,10 +34,8 @@ static double sigmoid(double x, double midpoint, double power) {
   return 1 - pow(1 - x, power) / pow(1 - midpoint, power - 1);
 }
 
-// impedance d(x) of solimp at a violation x
-static double impedance(const double solimp[5], double x) {
-  double d0 = clamp_between(solimp[0], IMPEDANCE_MIN, IMPEDANCE_MAX),
-         dw = clamp_between(solimp[1], IMPEDANCE_MIN, IMPEDANCE_MAX);
+// impedance d(x) of solimp at a violation x, between its ends
+static double impedance(const double solimp[5], double d0, double dw, double x) {
   double width = solimp[2];
   if (d0 == dw || width <= R_MIN) { return 0.5 * (d0 + dw); }
   if (x >= width) { return dw; }
@@ -64,28 +62,43 @@ void cav_law_rates(const cav_state *state, const cav_softness *softness, double 
   if (d0 == dw || width <= R_MIN || -gap >= width || gap >= 0) { return; }
   double derivative =
       sigmoid_derivative(-gap / width, clamp_between(solimp[3], IMPEDANCE_MIN, IMPEDANCE_MAX), larger(1, solimp[4]));
-  double d = impedance(solimp, -gap), rate = -derivative / width * (dw - d0);
+  double d = impedance(solimp, d0, dw, -gap), rate = -derivative / width * (dw - d0);
   // R goes with (1 - d)/d above its least value, hK with d
   *regulariser = R > R_MIN ? -rate / (d * (1 - d)) : 0;
   *stiffness = rate / d;
 }
 
-// by solref and solimp; violation x >= 0
-static cav_law solref_law(const cav_state *state, const cav_softness *softness, double x, double weight) {
-  double h = state->options.timestep, d = impedance(softness->solimp, x);
-  double dw = clamp_between(softness->solimp[1], IMPEDANCE_MIN, IMPEDANCE_MAX);
-  double kappa = softness->solref[0], zeta = softness->solref[1];
+/// What of a softness is the same at any violation.
+typedef struct law_terms {
+  double d0, dw, damping,
+      by; ///< ends of the impedance; h B; h K is h times the impedance, or that times factor, over by
+  double factor;
+  int direct; ///< stiffness and damping are given
+} law_terms;
+
+static law_terms terms_of(const cav_state *state, const cav_softness *softness) {
+  double h = state->options.timestep, kappa = softness->solref[0], zeta = softness->solref[1];
+  law_terms t = {.d0 = clamp_between(softness->solimp[0], IMPEDANCE_MIN, IMPEDANCE_MAX),
+                 .dw = clamp_between(softness->solimp[1], IMPEDANCE_MIN, IMPEDANCE_MAX)};
   if ((kappa > 0) != (zeta > 0)) kappa = 0.02, zeta = 1;
-  cav_law l = {larger(R_MIN, (1 - d) / d * weight), 0, 0};
-  if (kappa > 0) {
-    if (state->options.refsafe) { kappa = larger(kappa, 2 * h); }
-    l.damping = h * 2 / larger(R_MIN, dw * kappa);
-    l.stiffness = h * d / larger(R_MIN, dw * dw * kappa * kappa * zeta * zeta);
+  t.direct = !(kappa > 0);
+  if (t.direct) {
+    t.damping = h * -zeta / t.dw;
+    t.factor = h * -kappa;
+    t.by = t.dw * t.dw;
   } else {
-    l.damping = h * -zeta / dw;
-    l.stiffness = h * -kappa * d / (dw * dw);
+    if (state->options.refsafe) { kappa = larger(kappa, 2 * h); }
+    t.damping = h * 2 / larger(R_MIN, t.dw * kappa);
+    t.factor = h;
+    t.by = larger(R_MIN, t.dw * t.dw * kappa * kappa * zeta * zeta);
   }
-  return l;
+  return t;
+}
+
+// by solref and solimp; violation x >= 0
+static cav_law solref_law(const cav_softness *softness, const law_terms *t, double x, double weight) {
+  const double d = impedance(softness->solimp, t->d0, t->dw, x);
+  return (cav_law){larger(R_MIN, (1 - d) / d * weight), t->damping, t->factor * d / t->by};
 }
 
 void cav_stabilisation_prepare(cav_state *state) {
@@ -104,7 +117,8 @@ static cav_law discrete_law(const cav_state *state, double weight) {
 
 cav_law cav_law_at(const cav_state *state, const cav_softness *softness, double x, double weight) {
   if (state->options.stabilisation == CAV_STABILISATION_DISCRETE) return discrete_law(state, weight);
-  return solref_law(state, softness, x, weight);
+  const law_terms terms = terms_of(state, softness);
+  return solref_law(softness, &terms, x, weight);
 }
 
 // of a one-sided row at a distance
@@ -223,25 +237,25 @@ static cav_status limit_ball(cav_state *state, cav_row row, const cav_joint *joi
   return row.dist < activation ? add_row(state, row, &joint->limit, weight) : CAV_OK;
 }
 
-static cav_status add_limits(const cav_model *model, cav_state *state) {
+// limit i of the list of those of joints; beyond: how far from its margin it counts
+static cav_status add_joint_limit(const cav_model *model, cav_state *state, int i, double beyond) {
   const cav_workspace *w = state->work;
-  const double beyond = cav_law_activation(state, self_smoothing(state), LIMIT_SPEED);
+  const int k = w->limit[i];
+  const cav_joint *joint = &model->joint[k];
+  double weight = model->dof[joint->dof].inverse_weight, activation = joint->margin + beyond;
+  // most are far from both ends of a range
+  const double *at = w->q + joint->q, *range = joint->range;
+  if (joint->type != CAV_JOINT_BALL && !(at[0] - range[0] < activation) && !(range[1] - at[0] < activation))
+    return CAV_OK;
+  cav_row row = {.type = CAV_ROW_LIMIT_JOINT, .object = k, .margin = joint->margin};
+  if (joint->type != CAV_JOINT_BALL) return limit_scalar(state, row, at[0], range, &joint->limit, weight, activation);
+  cav_status status = joint->limited ? limit_ball(state, row, joint, weight, activation) : CAV_OK;
+  return status ? status : limit_cylinder(state, row, joint, weight, activation);
+}
+
+static cav_status add_tendon_limits(const cav_model *model, cav_state *state) {
+  const cav_workspace *w = state->work;
   cav_status status = CAV_OK;
-  for (int i = 0; i < w->nlimit && !status; i++) {
-    int k = w->limit[i];
-    const cav_joint *joint = &model->joint[k];
-    double weight = model->dof[joint->dof].inverse_weight, activation = joint->margin + beyond;
-    // most are far from both ends of a range
-    const double *at = w->q + joint->q, *range = joint->range;
-    if (joint->type != CAV_JOINT_BALL && !(at[0] - range[0] < activation) && !(range[1] - at[0] < activation)) continue;
-    cav_row row = {.type = CAV_ROW_LIMIT_JOINT, .object = k, .margin = joint->margin};
-    if (joint->type == CAV_JOINT_BALL) {
-      if (joint->limited) { status = limit_ball(state, row, joint, weight, activation); }
-      if (!status) { status = limit_cylinder(state, row, joint, weight, activation); }
-    } else {
-      status = limit_scalar(state, row, w->q[joint->q], joint->range, &joint->limit, weight, activation);
-    }
-  }
   for (int i = 0; i < w->ntendon_limit && !status; i++) {
     int k = w->tendon_limit[i];
     const cav_tendon *tendon = &model->tendon[k];
@@ -256,7 +270,21 @@ cav_status cav_limits_find(const cav_model *model, cav_state *state) {
   state->nrow = 0;
   if (!state->options.constraint) { return CAV_OK; }
   cav_status status = add_friction(model, state);
-  return status ? status : add_limits(model, state);
+  const double beyond = cav_limit_activation(state, 0);
+  for (int i = 0; i < state->work->nlimit && !status; i++) status = add_joint_limit(model, state, i, beyond);
+  return status ? status : add_tendon_limits(model, state);
+}
+
+cav_status cav_limits_of_near(const cav_model *model, cav_state *state, const cav_lanes *lanes, int lane) {
+  state->nrow = 0;
+  if (!state->options.constraint) { return CAV_OK; }
+  cav_status status = add_friction(model, state);
+  const double beyond = cav_limit_activation(state, 0);
+  for (int k = 0; k < lanes->nbounded && !status; k++) {
+    const int i = lanes->bounded[k];
+    if (i >> lane & 1) status = add_joint_limit(model, state, i / CAV_LANE_BITS, beyond);
+  }
+  return status ? status : add_tendon_limits(model, state);
 }
 
 // 0 below 0, 1 above 1, with no derivative at either, and the rate of its logarithm
@@ -328,26 +356,47 @@ static double contact_weight(const cav_state *state, const cav_pair *pair) {
 }
 
 // R of the friction rows so that R_j mu_j^2 is the same for all (22); all rows share the damping
-static void soften_contact(cav_state *state, cav_contact *c, double inverse_impratio) {
+static void soften_contact(cav_state *state, cav_contact *c, const law_terms *terms, double inverse_impratio) {
   const cav_pair *pair = &state->model->pair[c->pair];
   double rate, weight = contact_weight(state, pair) / cav_contact_stiffness_ratio(state, c, &rate);
-  cav_law l = row_law(state, &pair->softness, c->dist - c->margin, weight);
+  const double x = larger(0, c->margin - c->dist);
+  const cav_law l = terms ? solref_law(&pair->softness, terms, x, weight) : discrete_law(state, weight);
   c->stiffness = l.stiffness;
   c->sigma = smoothing_scale(&l, pair->external ? state->options.smoothing : self_smoothing(state));
   c->regulariser[0] = l.regulariser;
   c->damping[0] = l.damping;
+  const double tangential = larger(R_MIN, l.regulariser * inverse_impratio);
   for (int k = 1; k < c->dim; k++) {
     double *mu = &c->friction[k - 1];
     *mu = larger(*mu, FRICTION_MIN);
     double ratio = *mu == c->friction[0] ? 1 : c->friction[0] / *mu;
-    c->regulariser[k] = larger(R_MIN, l.regulariser * inverse_impratio) * ratio * ratio;
+    c->regulariser[k] = tangential * ratio * ratio;
     c->damping[k] = l.damping;
   }
 }
 
+static int is_same(const cav_softness *a, const cav_softness *b) {
+  int same = 1;
+  for (int k = 0; k < 2; k++) same &= a->solref[k] == b->solref[k];
+  for (int k = 0; k < 5; k++) same &= a->solimp[k] == b->solimp[k];
+  return same;
+}
+
 void cav_contacts_soften(cav_state *state) {
+  const int discrete = state->options.stabilisation == CAV_STABILISATION_DISCRETE;
+  const cav_softness *of = NULL;
   double inverse_impratio = 1 / larger(R_MIN, state->options.impratio);
-  for (int i = 0; i < state->ncontact; i++) soften_contact(state, &state->contact[i], inverse_impratio);
+  law_terms terms;
+  for (int i = 0; i < state->ncontact; i++) {
+    cav_contact *c = &state->contact[i];
+    const cav_softness *softness = &state->model->pair[c->pair].softness;
+    // mostly that of the one before
+    if (!discrete && !(of && is_same(of, softness))) {
+      terms = terms_of(state, softness);
+      of = softness;
+    }
+    soften_contact(state, c, discrete ? NULL : &terms, inverse_impratio);
+  }
 }
 
 double cav_row_velocity(const cav_state *state, const cav_row *row, const double *v) {

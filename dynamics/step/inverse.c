@@ -27,10 +27,10 @@ static cav_status open_position(const cav_model *model, cav_state *state, const 
   return all_finite(q, model->nq) ? CAV_OK : CAV_NOT_FINITE;
 }
 
-/// Contacts among pairs that are known to be near: those of one of four states.
+/// Limits, and contacts where their pairs are listed, among what is known to be near: those of one of four states.
 typedef struct nearby {
   const cav_lanes *lanes;
-  int lane;
+  int lane, listed;
 } nearby;
 
 static cav_status find_contacts(const cav_model *model, cav_state *state, const double *v, const double *v_next) {
@@ -55,10 +55,11 @@ static cav_status find_contacts(const cav_model *model, cav_state *state, const 
 static cav_status find_constraints(const cav_model *model, cav_state *state, const double *v, const double *v_next,
                                    const nearby *near) {
   cav_stabilisation_prepare(state);
-  cav_status status = cav_limits_find(model, state);
+  cav_status status = near ? cav_limits_of_near(model, state, near->lanes, near->lane) : cav_limits_find(model, state);
   if (status) { return status; }
   state->work->narrowed = 0;
-  status = near ? cav_contacts_of_near(model, state, near->lanes, near->lane) : find_contacts(model, state, v, v_next);
+  status = near && near->listed ? cav_contacts_of_near(model, state, near->lanes, near->lane)
+                                : find_contacts(model, state, v, v_next);
   if (status) { return status; }
   if (model->nequality) { cav_equality_evaluate(model, state); }
   cav_contacts_soften(state);
@@ -366,10 +367,11 @@ static void find_positions(const cav_model *model, cav_lanes *lanes, cav_state *
                            cav_extent extent, cav_status *status) {
   cav_lanes_kinematics(model, lanes, state, extent);
   const int listed = cav_contacts_near(model, lanes, state);
+  cav_lanes_limits(model, lanes, state[0]);
   for (int l = 0; l < CAV_LANES; l++) {
     cav_workspace *w = state[l]->work;
-    const nearby near = {lanes, l};
-    status[l] = find_constraints(model, state[l], w->v, w->v_next, listed ? &near : NULL);
+    const nearby near = {lanes, l, listed};
+    status[l] = find_constraints(model, state[l], w->v, w->v_next, &near);
     if (!status[l]) status[l] = make_rooms(model, state[l]);
   }
 }
