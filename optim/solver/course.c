@@ -12,13 +12,14 @@ static const double part = 0.03;
 int cav_course_make(cav_course *c, const cav_transcription *tr, int rows) {
   *c = (cav_course){.n = cav_transcription_unknowns(tr), .rows = rows, .forces = tr->nknot * tr->nv};
   size_t n = (size_t)c->n, all = (size_t)(rows + c->forces);
-  c->here = calloc(3 * all + (size_t)c->forces + 2 * n, sizeof(double));
+  c->here = calloc(3 * all + (size_t)c->forces + 2 * n + (size_t)rows, sizeof(double));
   if (!c->here) return 0;
   c->behind = c->here + all;
   c->miss = c->behind + all;
   c->derivative = c->miss + all;
   c->bend = c->derivative + c->forces;
   c->x = c->bend + n;
+  c->linear = c->x + n;
   return 1;
 }
 
@@ -52,6 +53,7 @@ static cav_status change_by(cav_course *c, cav_transcription *tr, const cav_quad
 cav_status cav_course_find(cav_course *c, cav_transcription *tr, cav_quadratic *qp, const cav_trajectory *at,
                            cav_trajectory *spare) {
   c->known = 0;
+  memcpy(c->linear, cav_quadratic_prediction(qp), (size_t)c->rows * sizeof *c->linear);
   cav_status status = change_by(c, tr, qp, -part, at, spare, c->behind);
   if (status == CAV_OK) status = change_by(c, tr, qp, part, at, spare, c->miss);
   if (status != CAV_OK) return status == CAV_NO_MEMORY || status == CAV_INTERRUPTED ? status : CAV_OK;
@@ -63,10 +65,10 @@ cav_status cav_course_find(cav_course *c, cav_transcription *tr, cav_quadratic *
 }
 
 void cav_course_correct(cav_course *c, const cav_transcription *tr, cav_quadratic *qp, double multiple, double *x) {
-  const double *linear = cav_quadratic_prediction(qp), *here = c->here + c->rows, part_way = fmin(multiple, 1);
+  const double *here = c->here + c->rows, part_way = fmin(multiple, 1);
   double *force = c->miss + c->rows;
   read_all(tr, c->rows, c->miss);
-  for (int k = 0; k < c->rows; k++) c->miss[k] -= c->here[k] + part_way * (linear[k] - c->here[k]);
+  for (int k = 0; k < c->rows; k++) c->miss[k] -= c->here[k] + part_way * (c->linear[k] - c->here[k]);
   for (int i = 0; i < c->forces; i++) force[i] -= here[i] + multiple * c->derivative[i];
   cav_quadratic_correct(qp, c->miss, c->known ? force : NULL, x);
 }

@@ -13,6 +13,7 @@ typedef struct cav_course {
   double *miss;          ///< [rows+forces] what they are off by at a trial
   double *derivative;    ///< [forces] change of the forces by the step, to first order
   double *bend, *x;      ///< [n]
+  double *linear;        ///< [rows] values that the step leads to, to first order
   int known;             ///< derivative and bend
 } cav_course;
 
