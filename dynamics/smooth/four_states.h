@@ -23,7 +23,7 @@ typedef struct cav_lanes {
   cav_four *centre; ///< [3*ngeom] of geoms in pairs, by their slots in the broad phase
   int nnear, *near; ///< [npair] pairs that are near in some state: 16 times the pair, and a bit for each state
   double *
-      limit; ///< [npair] below which they are, by what is added to the margins of those between links and with the world
+      limit; ///< [npair] below which pairs are, by activation: what is added to margins within trees and with the world
   double activation[2];
   int nbounded, *bounded; ///< [njoint] limits that are near in some state, the same way
 } cav_lanes;
