@@ -246,10 +246,10 @@ void cav_normal_add_diagonal(cav_normal *normal, const double *diagonal) {
 }
 
 /// Adds a knot's Hessian and gradient.
-static void gather_knot(cav_normal *normal, const cav_transcription *tr, int t, int fresh) {
+static void gather_knot(cav_normal *normal, const cav_transcription *tr, int t, const double *hessian, int fresh) {
   const cav_knot *knot = &tr->knot[t];
   const int n = normal->n;
-  add_block(normal, tr, t, knot->hessian, knot->step_row, knot->step_square, fresh);
+  add_block(normal, tr, t, hessian, knot->step_row, knot->step_square, fresh);
   for (int c = 0; c < 3; c++) {
     int column = cav_transcription_block(tr, t, c);
     for (int j = 0; column >= 0 && j < n; j++) normal->gradient[column * n + j] += knot->gradient[c * n + j];
@@ -265,7 +265,7 @@ static void find_diagonal(cav_normal *normal) {
 
 void cav_normal_gather(cav_normal *normal, const cav_transcription *tr) {
   cav_normal_clear(normal);
-  for (int t = 0; t < tr->nknot; t++) gather_knot(normal, tr, t, 0);
+  for (int t = 0; t < tr->nknot; t++) gather_knot(normal, tr, t, tr->knot[t].hessian, 0);
   find_diagonal(normal);
 }
 
@@ -449,7 +449,7 @@ static void take_knot(void *context, int t) {
   const stream *s = context;
   cav_normal *normal = s->normal;
   cav_band *band = normal->group;
-  gather_knot(normal, s->tr, t, s->whole);
+  gather_knot(normal, s->tr, t, s->tr->knot[t].present, s->whole);
   // the next two knots add to all blocks but these
   int last = t + 1 < s->tr->nknot ? (t - s->tr->first) * normal->n : band->core;
   if (!s->whole || last <= normal->filled) return;

@@ -72,9 +72,9 @@ static void join_group(join *g, int first, cav_knot *knot, const double *dense, 
     for (int k = 0; k < width; k++) to[k] = from[g->column[k]];
   }
   if (count == 0) return;
-  copy_block(g, width, knot->hessian, block, 0);
+  copy_block(g, width, knot->present, block, 0);
   cav_dense_square(CAV_TRIANGLE_UPPER, width, 3, count, row, width, block, width);
-  copy_block(g, width, knot->hessian, block, 1);
+  copy_block(g, width, knot->present, block, 1);
 }
 
 cav_status cav_rows_join(const cav_transcription *tr, cav_scratch *s, cav_knot *knot, const double *dense_rows) {
@@ -83,7 +83,7 @@ cav_status cav_rows_join(const cav_transcription *tr, cav_scratch *s, cav_knot *
   for (int d = 0; d < tr->nv; d++) trees += tr->model->dof[d].parent < 0;
   if (n == 0) return CAV_OK;
   if (trees == 1) {
-    cav_dense_square(CAV_TRIANGLE_UPPER, width, 3, n, dense_rows, width, knot->hessian, width);
+    cav_dense_square(CAV_TRIANGLE_UPPER, width, 3, n, dense_rows, width, knot->present, width);
     return CAV_OK;
   }
   size_t nv = (size_t)tr->nv, ints = 5 * nv + (size_t)n, dense = 9 * nv * nv + 3 * nv * (size_t)n;
@@ -97,7 +97,7 @@ cav_status cav_rows_join(const cav_transcription *tr, cav_scratch *s, cav_knot *
   join g = {.nv = tr->nv, .tree = at, .owner = at + nv, .column = at + 2 * nv, .group = at + 5 * nv};
   find_groups(&g, tr->model, n, dense_rows);
   if (g.ngroup == 1) {
-    cav_dense_square(CAV_TRIANGLE_UPPER, width, 3, n, dense_rows, width, knot->hessian, width);
+    cav_dense_square(CAV_TRIANGLE_UPPER, width, 3, n, dense_rows, width, knot->present, width);
     return CAV_OK;
   }
   for (int d = 0; d < tr->nv; d++)

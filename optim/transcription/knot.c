@@ -63,7 +63,7 @@ static void add_square(cav_sum *a, double weight, int n, const int *column, cons
   for (int i = 0; i < n; i++) {
     const int at = column ? column[i] : i;
     const double by = weight * entry[i];
-    double *row = a->knot->hessian + (size_t)at * (size_t)width;
+    double *row = a->knot->present + (size_t)at * (size_t)width;
     for (int j = 0; column && j < n; j++)
       if (column[j] <= at) row[column[j]] += by * entry[j];
     for (int j = 0; !column && j <= at; j++) row[j] += by * entry[j];
@@ -650,7 +650,7 @@ void cav_knot_sum(cav_sum *a, const double *q, const double *v, const double *v_
   if (a->jacobian) {
     // its lower triangle alone is read
     for (size_t i = 0, width = 3 * (size_t)nv; i < width; i++)
-      memset(knot->hessian + i * width, 0, (i + 1) * sizeof(double));
+      memset(knot->present + i * width, 0, (i + 1) * sizeof(double));
     memset(knot->gradient, 0, 3 * (size_t)nv * sizeof(double));
     memset(knot->step_row, 0, 3 * (size_t)nv * sizeof(double));
     knot->step_square = knot->step_derivative = 0;

@@ -21,6 +21,7 @@ typedef struct cav_scratch {
   int dense_room;
   double *force_weight, *force_derivative; ///< [nv] of rows along single dofs
   double *row, *reading;                   ///< [3nv]
+  double *hessian;                         ///< [3nv*3nv] of a knot, where it is not to keep it
   int *column;                             ///< [nv]
   double *tangent;                         ///< [nv]
   double *posture;                         ///< [nq]

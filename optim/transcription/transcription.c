@@ -222,6 +222,7 @@ static int scratch_new(cav_transcription *tr, cav_scratch *s) {
   s->force_derivative = room(&ok, n, sizeof(double));
   s->row = room(&ok, 3 * n, sizeof(double));
   s->reading = room(&ok, 3 * n, sizeof(double));
+  s->hessian = room(&ok, 9 * n * n, sizeof(double));
   s->derivative = room(&ok, CAV_DERIVATIVE_ROWS * n, sizeof(double));
   s->column = room(&ok, n, sizeof(int));
   s->tangent = room(&ok, n, sizeof(double));
@@ -304,8 +305,8 @@ void cav_transcription_free(cav_transcription *tr) {
     cav_scratch *s = &tr->scratch[i];
     cav_state_free(s->state);
     free(s->value), free(s->join), free(s->dq), free(s->dv), free(s->dn), free(s->key), free(s->derivative);
-    free(s->force_weight), free(s->force_derivative), free(s->row), free(s->reading), free(s->dense), free(s->rest),
-        free(s->used), free(s->column), free(s->tangent), free(s->posture);
+    free(s->force_weight), free(s->force_derivative), free(s->row), free(s->reading), free(s->hessian), free(s->dense),
+        free(s->rest), free(s->used), free(s->column), free(s->tangent), free(s->posture);
     free(s->force_step), free(s->rate), free(s->missing), free(s->user.x), free(s->trace[0]), free(s->trace[1]),
         free(s->slot[0]), free(s->slot[1]);
   }
@@ -402,7 +403,7 @@ static void periodicity_knot(const cav_sum *a) {
   cav_scratch *s = a->s;
   cav_knot *knot = a->knot;
   const int t = a->t, width = 3 * tr->nv;
-  double *H = knot->hessian;
+  double *H = knot->present;
   cav_transcription_wrap(tr, s, t, knot->ndense, a->dense);
   cav_transcription_wrap(tr, s, t, 1, knot->gradient);
   cav_transcription_wrap(tr, s, t, 1, knot->step_row);
@@ -437,6 +438,8 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   // rows that go into the normal equations at once are needed no longer than that
   cav_sum a = {.tr = tr, .s = s, .knot = knot, .t = t, .jacobian = p->jacobian, .passing = p->take != NULL};
   if (!cav_readings_list(tr, s, t) || !cav_knot_reserve(&a)) return CAV_NO_MEMORY;
+  // a single thread's knot is taken before its next one
+  knot->present = a.passing && cav_parallel_size(tr->pool) == 1 ? s->hessian : knot->hessian;
   if (p->jacobian && tr->free_step) {
     status = shift_step(tr, s, t, 1, q, v, v_next);
     if (status == CAV_OK) status = shift_step(tr, s, t, 2, q, v, v_next);

@@ -70,8 +70,9 @@ typedef struct cav_knot {
   int ndense, dense_most; ///< rows over all columns, weighted, that make up the Hessian beside the sparse ones; at most
   int dense_room;
   double *dense, *rest; ///< [dense_room*3nv], [dense_room]; as du
-  double *hessian;      ///< [3nv*3nv] Gauss-Newton, lower triangle
-  double *gradient;     ///< [3nv]
+  double *hessian;      ///< [3nv*3nv] Gauss-Newton, lower triangle; as du
+  double *present;  ///< that of the evaluation at hand: hessian, or a single thread's, where the knot is taken at once
+  double *gradient; ///< [3nv]
   double *
       step_row; ///< [3nv] of the Hessian, by the logarithm of the step where that is free; then its square and derivative
   double step_square, step_derivative;
@@ -203,7 +204,8 @@ void cav_kept_free(struct cav_kept *kept);
 cav_status cav_transcription_linearise(cav_transcription *transcription, cav_trajectory *trajectory);
 
 /// The same, and take(context, t) for each knot once its derivatives are there, one call at a time and in ascending order,
-/// while other threads do those of later knots; none from a knot that failed on. With it du and dense rows are not kept.
+/// while other threads do those of later knots; none from a knot that failed on. With it du, dense rows and Hessians are not
+/// kept.
 cav_status cav_transcription_linearise_then(cav_transcription *transcription, cav_trajectory *trajectory,
                                             void (*take)(void *context, int t), void *context);
 
