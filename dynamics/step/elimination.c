@@ -262,7 +262,8 @@ cav_status cav_elimination_begin(cav_elimination *e, const cav_impulse *part, in
   const size_t rows = fill_cliques(e, local, to, runs, &wide), entries = (size_t)e->row[n];
   if (!make_room(&e->numbers, &e->nnumbers, (2 * entries + 4 * n + FOUR) * sizeof(double) + entries * sizeof(int)))
     return CAV_NO_MEMORY;
-  if (!make_room(&e->rows, &e->nrows, (rows + wide) * sizeof(double))) return CAV_NO_MEMORY;
+  // room for one where there is no contact, so that there is an array
+  if (!make_room(&e->rows, &e->nrows, (rows + wide + 1) * sizeof(double))) return CAV_NO_MEMORY;
   e->inertia = e->numbers;
   e->value = e->inertia + entries;
   double *at = e->value + entries, **const array[] = {&e->least, &e->pivot, &e->x, &e->along};
