@@ -43,7 +43,7 @@ static inline double add_eight(const double *s) {
   return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
 }
 
-#define WAY(name, attribute, LANES, VECTORS, SOME, COLUMNS)                                                               \
+#define WAY(name, attribute, LANES, VECTORS, SOME, COLUMNS)                                                          \
   typedef double name##_vector __attribute__((vector_size((LANES)*8), aligned(8), may_alias));                       \
   attribute static void name##_tile(int k, const double *A, const double *B, double s, double *C, size_t ldc) {      \
     name##_vector sum[COLUMNS][VECTORS] = {0};                                                                       \
@@ -62,12 +62,12 @@ static inline double add_eight(const double *s) {
       for (unsigned long long left = set->bits[w]; left; left &= left - 1) {                                         \
         const size_t p = (size_t)__builtin_ctzll(left) * apart;                                                      \
         name##_vector a[VECTORS];                                                                                    \
-        for (int i = 0; i < (SOME); i++) a[i] = *(const name##_vector *)(A + p + (LANES)*i);                      \
+        for (int i = 0; i < (SOME); i++) a[i] = *(const name##_vector *)(A + p + (LANES)*i);                         \
         for (int j = 0; j < (COLUMNS); j++)                                                                          \
-          for (int i = 0; i < (SOME); i++) sum[j][i] += a[i] * B[p + j];                                          \
+          for (int i = 0; i < (SOME); i++) sum[j][i] += a[i] * B[p + j];                                             \
       }                                                                                                              \
     for (int j = 0; j < (COLUMNS); j++, C += apart)                                                                  \
-      for (int i = 0; i < (SOME); i++) *(name##_vector *)(C + (LANES)*i) = sum[j][i];                             \
+      for (int i = 0; i < (SOME); i++) *(name##_vector *)(C + (LANES)*i) = sum[j][i];                                \
   }                                                                                                                  \
   attribute static void name##_panel(const triangle *L, double *X) {                                                 \
     for (int c = 0; c < PANEL; c += (COLUMNS)) {                                                                     \

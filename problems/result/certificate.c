@@ -118,7 +118,8 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
             v->optimality, CAV_TOLERANCE_OPTIMAL);
   const double asked = problem->schedule.optimality;
   if (asked > 0 && v->optimality > asked)
-    fprintf(out, "  the problem asks for %g (<schedule optimality>): not reached; --solver both goes on by Ipopt\n", asked);
+    fprintf(out, "  the problem asks for %g (<schedule optimality>): not reached; --solver both goes on by Ipopt\n",
+            asked);
   if (cav_verdict_feasible(v) && !cav_verdict_optimal(v) && !isnan(v->optimality) && !(asked > 0 && asked <= 1e-5))
     fprintf(
         out,
