@@ -37,21 +37,6 @@ static void join_links(cav_dof_groups *g, const cav_model *model, int link1, int
     for (int b = dof_of(model, link2); b >= 0; b = model->dof[b].parent) join(g, a, b);
 }
 
-/// Link that carries an object with a frame; -1: not told here.
-static int link_of(const cav_model *model, cav_object_type type, int object) {
-  switch ((int)type) {
-    case CAV_OBJECT_BODY:
-    case CAV_OBJECT_XBODY:
-      return model->body[object].link;
-    case CAV_OBJECT_GEOM:
-      return model->geom[object].link;
-    case CAV_OBJECT_SITE:
-      return model->site[object].link;
-    default:
-      return -1;
-  }
-}
-
 /// Joins what a reading of a sensor joins beside the tree; 0 if that may be anything: it is of one link, of two, or a sum over
 /// links.
 static int join_sensor(cav_dof_groups *g, const cav_model *model, const cav_sensor *sensor) {
@@ -64,10 +49,8 @@ static int join_sensor(cav_dof_groups *g, const cav_model *model, const cav_sens
     case CAV_SENSOR_FRAMELINVEL:
     case CAV_SENSOR_FRAMEANGVEL: {
       if (!sensor->referred) return 1;
-      int link = link_of(model, sensor->object_type, sensor->object);
-      int other = link_of(model, sensor->reference_type, sensor->reference);
-      if (link < 0 || other < 0) return 0;
-      join_links(g, model, link, other);
+      join_links(g, model, cav_object_link(model, sensor->object_type, sensor->object),
+                 cav_object_link(model, sensor->reference_type, sensor->reference));
       return 1;
     }
 
