@@ -4,18 +4,6 @@
 
 #include "by_four.h"
 
-/// Of a comparison of four numbers.
-typedef long long cav_four_masks __attribute__((vector_size(sizeof(cav_four))));
-
-/// A bit for each of four that holds, from the first on.
-CAV_INLINE int held_bits(cav_four_masks m) {
-#if defined(__x86_64__)
-  return __builtin_ia32_movmskpd256((__attribute__((vector_size(sizeof(cav_four)))) double)m);
-#else
-  return (int)((m[0] & 1) | (m[1] & 2) | (m[2] & 4) | (m[3] & 8));
-#endif
-}
-
 /// Four rows of four turned into columns.
 CAV_INLINE void turn_square(const cav_four from[4], cav_four to[4]) {
   cav_four low = CAV_SHUFFLED(from[0], from[1], 0, 4, 2, 6), high = CAV_SHUFFLED(from[0], from[1], 1, 5, 3, 7);

@@ -10,20 +10,6 @@
 #include "four_turn.h"
 #include "spatial.h"
 
-CAV_INLINE cav_four choose(cav_four_masks which, cav_four yes, cav_four no) {
-  return (cav_four)((which & (cav_four_masks)yes) | (~which & (cav_four_masks)no));
-}
-
-CAV_INLINE cav_four roots(cav_four x) {
-  cav_four r;
-  for (int i = 0; i < 4; i++) r[i] = sqrt(x[i]);
-  return r;
-}
-
-CAV_INLINE cav_four sizes(cav_four x) { return choose(x < 0, -x, x); }
-
-CAV_INLINE int any(cav_four_masks m) { return held_bits(m) != 0; }
-
 // four numbers of each of four contacts from a member on, by number, and back
 #define OF_EACH(c, member) \
   { &(c)[0].member, &(c)[1].member, &(c)[2].member, &(c)[3].member }

@@ -7,25 +7,9 @@
 #include "capsules_four.h"
 #include "spatial.h"
 
-typedef long long four_masks __attribute__((vector_size(sizeof(cav_four))));
-
-CAV_INLINE cav_four choose(four_masks which, cav_four yes, cav_four no) {
-  return (cav_four)((which & (four_masks)yes) | (~which & (four_masks)no));
-}
-
-CAV_INLINE cav_four roots(cav_four x) {
-  cav_four r;
-  for (int i = 0; i < 4; i++) r[i] = sqrt(x[i]);
-  return r;
-}
-
-CAV_INLINE cav_four sizes(cav_four x) { return choose(x < 0, -x, x); }
-
 CAV_INLINE cav_four clamp(cav_four x, double most) {
   return choose(x < -most, CAV_ALL(-most), choose(x > most, CAV_ALL(most), x));
 }
-
-CAV_INLINE int any(four_masks m) { return (m[0] | m[1] | m[2] | m[3]) != 0; }
 
 CAV_BY_FOUR int cav_capsules_four(const cav_shape *a, const double radius, const double half, const double place[3][4],
                                   const double axis[3][4], double margin, int count[4], cav_touch *const touch[4]) {
@@ -42,11 +26,11 @@ CAV_BY_FOUR int cav_capsules_four(const cav_shape *a, const double radius, const
   if (any(~(sine2 > CAV_PARALLEL * CAV_PARALLEL))) return 0;
   cross3(turned, d, w);
   cav_four s = dot3(turned, cross) / sine2, t = s * uw - wd, dist;
-  const four_masks across = (sizes(s) < lu) & (sizes(t) < lw);
-  four_masks there;
+  const cav_four_masks across = (sizes(s) < lu) & (sizes(t) < lw);
+  cav_four_masks there;
   if (!any(~across)) {
     const cav_four length = roots(dot3(cross, cross));
-    const four_masks back = dot3(d, cross) < -CAV_CROSSING * length * (lu + lw);
+    const cav_four_masks back = dot3(d, cross) < -CAV_CROSSING * length * (lu + lw);
     scale3(n, choose(back, CAV_ALL(-1), CAV_ALL(1)) / length, cross);
     const cav_four apart = dot3(d, n);
     dist = choose(apart > 0, apart, CAV_ALL(0)) - a->size[0] - radius;

@@ -255,9 +255,6 @@ void cav_impulse_read(const cav_impulse *p, double *f) {
   }
 }
 
-// a where b is no number
-static double larger(double a, double b) { return b > a ? b : a; }
-
 cav_status cav_impulse_check(const cav_impulse *p, const double *q, const double *v, const double *u, const double *x,
                              double *u_found, double *f, double *error, double *scale) {
   const cav_workspace *work = p->state->work;

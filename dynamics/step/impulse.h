@@ -64,4 +64,7 @@ void cav_impulse_read(const cav_impulse *problem, double *f);
 cav_status cav_impulse_check(const cav_impulse *problem, const double *q, const double *v, const double *u,
                              const double *x, double *u_found, double *f, double *error, double *scale);
 
+/// a where b is no number.
+static inline double larger(double a, double b) { return b > a ? b : a; }
+
 #endif

@@ -53,9 +53,6 @@ static inline double largest(const double *x, int n) {
   return most;
 }
 
-// a where b is no number
-static inline double larger(double a, double b) { return b > a ? b : a; }
-
 static inline double dot(const double *a, const double *b, int n) {
   double sum = 0.0;
   for (int i = 0; i < n; i++) sum += a[i] * b[i];
