@@ -43,6 +43,10 @@ enum { FEW = 3 };
 enum { LOOK = 5, LOOKS = 2 };
 static const double brisk = 0.5, sluggish = 0.03, left_alone = 2;
 
+/// Part of what may be left to be saved at which one look ends a run, however fast it converges; and part that an
+/// iteration may gain there.
+static const double near_end = 0.1, near_gain = 0.1;
+
 /// What may be left to be saved on the way, a fraction of the cost.
 static const double soft_optimality = 2e-3;
 
@@ -553,24 +557,35 @@ static cav_status foresee(cav_solve_run *run, descent *d, double *saving) {
 /// Slow progress where there is little to be saved: how often in a row that was so.
 typedef struct tail {
   int iterations, met, stuck; ///< since the last look; looks in a row that saw the end, or next to no progress
+  int near, hinted;           ///< the last one found next to nothing; was between two that were due
   double gain, saving;        ///< of these iterations, of the cost; what the last look found
 } tail;
 
 /// Whether that ends a run: 2, little is left; 3, it is stuck; 0, neither.
 static int is_end(const descent *d, const tail *end) {
   int stuck = end->stuck >= LOOKS;
-  if (end->met >= LOOKS || (stuck && end->saving <= left_alone * d->asked)) return 2;
+  if (end->near || end->met >= LOOKS || (stuck && end->saving <= left_alone * d->asked)) return 2;
   return stuck && !d->patient ? 3 : 0;
 }
 
-/// Looks, every few iterations that gain little.
+/// Whether the last iteration hints at an end: it gained next to nothing and its programme predicted no more.
+static int hints(const cav_solve_run *run, const descent *d) {
+  double little = d->asked * cav_programme_scale(run->tr);
+  return d->gain < near_gain * little && d->predicted < near_end * little;
+}
+
+/// Looks, every few iterations that gain little; between two such looks once where an iteration hints at an end.
 static cav_status look(cav_solve_run *run, descent *d, tail *end) {
   end->saving = INFINITY;
   end->gain += d->gain / cav_programme_scale(run->tr);
-  if (++end->iterations < LOOK) return CAV_OK;
+  int due = ++end->iterations >= LOOK, early = end->iterations > 1 && !end->hinted && hints(run, d);
+  if (!due && !early) return CAV_OK;
   double gain = end->gain / end->iterations;
-  end->iterations = 0, end->gain = 0;
   cav_status status = gain < d->asked ? foresee(run, d, &end->saving) : CAV_OK;
+  end->near = end->saving <= near_end * d->asked && gain < near_gain * d->asked;
+  end->hinted = !due;
+  if (!due) return status;
+  end->iterations = 0, end->gain = 0;
   end->met = end->saving <= d->asked && gain < brisk * end->saving ? end->met + 1 : 0;
   end->stuck = isfinite(end->saving) && gain < sluggish * end->saving ? end->stuck + 1 : 0;
   return status;

@@ -155,6 +155,7 @@ static outcome solve(const optimum *o, const cav_model *model, int n, const meth
   options.solver = by->solver;
   options.ipopt = &by->option;
   options.nipopt = by->noption;
+  options.optimality = 1e-5; // errors are the discretisation's, to their order
   // an optimum is known, so no proof says that there is none, however near the bounds it lies
   cav_impossibility proof;
   int proofs = -1;
