@@ -11,6 +11,7 @@ struct cav_kept {
   cav_slot *slot;
   int room, moving_room, nread, ncontact, nrow, dense_most, ndense;
   double cost, merit;
+  cav_evaluation *evaluation;
 };
 
 static struct cav_kept *kept_new(const cav_knot *knot, int nv) {
@@ -26,6 +27,7 @@ static struct cav_kept *kept_new(const cav_knot *knot, int nv) {
 void cav_kept_free(struct cav_kept *kept) {
   if (!kept) return;
   free(kept->u), free(kept->y), free(kept->moving), free(kept->slot);
+  cav_evaluation_free(kept->evaluation);
   free(kept);
 }
 
@@ -46,6 +48,13 @@ static int make_room(struct cav_kept *kept, const cav_knot *knot) {
   return 1;
 }
 
+// the last evaluation for the one that is put by, or back
+static void exchange_evaluations(cav_knot *knot, struct cav_kept *kept) {
+  cav_evaluation *last = knot->evaluation;
+  knot->evaluation = kept->evaluation;
+  kept->evaluation = last;
+}
+
 static int keep_knot(cav_knot *knot, int nv) {
   if (!knot->kept) knot->kept = kept_new(knot, nv);
   struct cav_kept *kept = knot->kept;
@@ -57,6 +66,7 @@ static int keep_knot(cav_knot *knot, int nv) {
   kept->nread = knot->nread, kept->ncontact = knot->ncontact, kept->nrow = knot->nrow;
   kept->dense_most = knot->dense_most, kept->ndense = knot->ndense;
   kept->cost = knot->cost, kept->merit = knot->merit;
+  exchange_evaluations(knot, kept);
   return 1;
 }
 
@@ -69,7 +79,7 @@ int cav_values_keep(cav_transcription *tr) {
 void cav_values_take(cav_transcription *tr, cav_trajectory *at) {
   for (int t = 0; t < tr->nknot; t++) {
     cav_knot *knot = &tr->knot[t];
-    const struct cav_kept *kept = knot->kept;
+    struct cav_kept *kept = knot->kept;
     memcpy(knot->u, kept->u, (size_t)tr->nv * sizeof(double));
     memcpy(at->u + (size_t)t * (size_t)tr->nv, kept->u, (size_t)tr->nv * sizeof(double));
     memcpy(knot->slot, kept->slot, (size_t)knot->layout.count * sizeof *knot->slot);
@@ -79,5 +89,6 @@ void cav_values_take(cav_transcription *tr, cav_trajectory *at) {
     knot->dense_most = kept->dense_most, knot->ndense = kept->ndense;
     knot->cost = kept->cost, knot->merit = kept->merit;
     knot->refusal = (cav_user_refusal){0};
+    exchange_evaluations(knot, kept);
   }
 }

@@ -300,6 +300,7 @@ void cav_transcription_free(cav_transcription *tr) {
         free(k->slot_row), free(k->slot_step), free(k->step_row);
     free(k->dense), free(k->rest), free(k->moving);
     cav_kept_free(k->kept);
+    cav_evaluation_free(k->evaluation);
   }
   for (int i = 0; tr->scratch && i < cav_parallel_size(tr->pool); i++) {
     cav_scratch *s = &tr->scratch[i];
@@ -422,6 +423,15 @@ static void periodicity_knot(const cav_sum *a) {
     for (int j = i + 1; j < width; j++) H[i * width + j] = 0;
 }
 
+/// The inverse dynamics of a knot, in the state and in u: those of the step that led here, where they are known.
+static cav_status evaluate_dynamics(const pass *p, cav_scratch *s, cav_knot *knot, const double *q, const double *v,
+                                    const double *v_next) {
+  if (!p->jacobian || !cav_evaluation_take(knot->evaluation, s->state, q, v, v_next))
+    return cav_inverse(p->tr->model, s->state, q, v, v_next, knot->u);
+  memcpy(knot->u, s->state->u, (size_t)p->tr->nv * sizeof(double));
+  return CAV_OK;
+}
+
 static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   cav_transcription *tr = p->tr;
   cav_knot *knot = &tr->knot[t];
@@ -433,7 +443,7 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
 
   // dynamics, first beside the step where that is an unknown
   double start = p->jacobian ? now() : 0;
-  cav_status status = cav_inverse(tr->model, s->state, q, v, v_next, knot->u);
+  cav_status status = evaluate_dynamics(p, s, knot, q, v, v_next);
   if (status != CAV_OK) return status;
   // rows that go into the normal equations at once are needed no longer than that
   cav_sum a = {.tr = tr, .s = s, .knot = knot, .t = t, .jacobian = p->jacobian, .passing = p->take != NULL};
@@ -463,6 +473,7 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   cav_knot_sum(&a, q, v, v_next);
   if (p->jacobian && tr->periodicity && (t < 2 || t == tr->nknot - 1)) periodicity_knot(&a);
   if (!isfinite(knot->merit)) return CAV_NOT_FINITE;
+  if (!p->jacobian) cav_evaluation_keep(&knot->evaluation, s->state, q, v, v_next);
   return p->jacobian && !tr->gradient_only ? cav_rows_join(tr, s, knot, a.dense) : CAV_OK;
 }
 

@@ -6,6 +6,7 @@
 #include <stddef.h>
 
 #include "cavort/solve.h"
+#include "evaluation.h"
 #include "parallel.h"
 #include "periodicity.h"
 #include "plannable.h"
@@ -85,7 +86,8 @@ typedef struct cav_knot {
   cav_absolute
       *absolute; ///< [nabsolute] of the rows with an absolute norm that are not of contacts, in their order; where
                  ///< nabsolute is 0 their Hessian is that of the squares that stand for them
-  struct cav_kept *kept; ///< values put by; NULL: none yet
+  struct cav_kept *kept;      ///< values put by; NULL: none yet
+  cav_evaluation *evaluation; ///< of the last values, unless it has been linearised since; NULL: none yet
 } cav_knot;
 
 /// Weights of the augmented Lagrangian, per kind of row.

@@ -1,0 +1,147 @@
+/// Evaluations of the inverse put by. A trajectory that a solver steps to has been evaluated before it is linearised, and
+/// derivatives read poses, motions, contacts and rows alone, of which a state has a quarter of its memory: a state for each knot
+/// would take what a thread keeps warm (geoms, lists of work, derivatives) from its cache. Numbers are copied; contacts and rows,
+/// most of what there is, change hands.
+#include "evaluation.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "options.h"
+#include "step.h"
+
+/// Numbers of the state's block that are kept: some that follow each other there.
+typedef struct stretch {
+  void *at;
+  size_t bytes;
+} stretch;
+
+enum { STRETCHES = 4 };
+
+struct cav_evaluation {
+  int kept; ///< 0: nothing
+  cav_options options;
+  int ncontact, nrow, nequality, narrowed, contact_room, row_room;
+  double discrete_damping, discrete_stiffness;
+  cav_contact *contact;
+  cav_row *row;
+  double *point; ///< [nq + 2*nv] q, v, v_next as they were given
+  char *numbers; ///< of the stretches
+};
+
+static stretch between(void *from, const void *to) { return (stretch){from, (size_t)((char *)to - (char *)from)}; }
+
+// what follows each other in the layout of a state (state.c); the bytes of all
+static size_t list_stretches(const cav_model *model, const cav_state *state, stretch s[STRETCHES]) {
+  const cav_workspace *w = state->work;
+  size_t bytes = 0;
+  s[0] = between(state->link, w->q + model->nq);
+  s[1] = between(state->velocity, w->narrow_v + 2 * model->nv);
+  s[2] = between(state->tendon_length, state->tendon_arm + model->ntendon_dof);
+  s[3] = between(state->equality,
+                 w->bias ? (void *)(w->bias + 6 * (size_t)model->nlink) : (void *)(state->equality + model->nequality));
+  for (int i = 0; i < STRETCHES; i++) bytes += s[i].bytes;
+  return bytes;
+}
+
+static cav_evaluation *evaluation_new(const cav_model *model, size_t bytes) {
+  cav_evaluation *e = calloc(1, sizeof *e);
+  if (!e) return NULL;
+  e->point = malloc((size_t)(model->nq + 2 * model->nv) * sizeof(double));
+  e->numbers = malloc(bytes);
+  if (e->point && e->numbers) return e;
+  cav_evaluation_free(e);
+  return NULL;
+}
+
+void cav_evaluation_free(cav_evaluation *e) {
+  if (!e) return;
+  free(e->contact), free(e->row), free(e->point), free(e->numbers);
+  free(e);
+}
+
+// an array with room for as many items as another one, what it has may be lost; 0 if memory runs out
+static int make_room(void **items, int *room, int most, size_t size) {
+  if (*room >= most) return 1;
+  free(*items);
+  *items = malloc((size_t)most * size);
+  *room = *items ? most : 0;
+  return *items != NULL;
+}
+
+// room for as many contacts and rows as the state has, so that none is made again and again as they change hands
+static int make_rooms(cav_evaluation *e, const cav_workspace *w) {
+  void *contact = e->contact, *row = e->row;
+  const int made = make_room(&contact, &e->contact_room, w->contact_room, sizeof *e->contact) &&
+                   make_room(&row, &e->row_room, w->row_room, sizeof *e->row);
+  e->contact = contact, e->row = row;
+  return made;
+}
+
+// contacts and rows with their rooms from the one to the other and back
+static void exchange(cav_evaluation *e, cav_state *state) {
+  const cav_evaluation had = *e;
+  cav_workspace *w = state->work;
+  e->contact = state->contact, e->contact_room = w->contact_room;
+  e->row = state->row, e->row_room = w->row_room;
+  state->contact = had.contact, w->contact_room = had.contact_room;
+  state->row = had.row, w->row_room = had.row_room;
+}
+
+// whether what is kept here is all that an evaluation leaves
+static int is_plain(const cav_options *o) {
+  return o->order != CAV_ORDER_MOMENTUM && !o->coupled && o->regulariser != CAV_REGULARISER_EXACT &&
+         !cav_looks_ahead(o);
+}
+
+void cav_evaluation_keep(cav_evaluation **evaluation, cav_state *state, const double *q, const double *v,
+                         const double *v_next) {
+  const cav_model *model = state->model;
+  cav_workspace *w = state->work;
+  stretch s[STRETCHES];
+  if (*evaluation) (*evaluation)->kept = 0;
+  const size_t bytes = list_stretches(model, state, s), nq = (size_t)model->nq, nv = (size_t)model->nv;
+  if (!is_plain(&state->options) || !cav_state_evaluated(state) || memcmp(w->v, v, nv * sizeof(double)) ||
+      memcmp(w->v_next, v_next, nv * sizeof(double)))
+    return;
+  if (!*evaluation) *evaluation = evaluation_new(model, bytes);
+  cav_evaluation *e = *evaluation;
+  if (!e || !make_rooms(e, w)) return;
+  char *to = e->numbers;
+  for (int i = 0; i < STRETCHES; to += s[i++].bytes)
+    if (s[i].bytes) memcpy(to, s[i].at, s[i].bytes);
+  memcpy(e->point, q, nq * sizeof(double));
+  memcpy(e->point + nq, v, nv * sizeof(double));
+  memcpy(e->point + nq + nv, v_next, nv * sizeof(double));
+  exchange(e, state);
+  e->options = w->options;
+  e->ncontact = state->ncontact, e->nrow = state->nrow, e->nequality = state->nequality, e->narrowed = w->narrowed;
+  e->discrete_damping = w->discrete_damping, e->discrete_stiffness = w->discrete_stiffness;
+  e->kept = 1;
+  state->ncontact = state->nrow = state->nequality = 0;
+  w->valid = CAV_STAGE_NONE;
+}
+
+int cav_evaluation_take(cav_evaluation *e, cav_state *state, const double *q, const double *v, const double *v_next) {
+  const cav_model *model = state->model;
+  cav_workspace *w = state->work;
+  const size_t nq = (size_t)model->nq, nv = (size_t)model->nv;
+  stretch s[STRETCHES];
+  if (!e || !e->kept || !cav_options_same(&state->options, &e->options, CAV_STAGE_VELOCITY)) return 0;
+  if (memcmp(e->point, q, nq * sizeof(double)) || memcmp(e->point + nq, v, nv * sizeof(double)) ||
+      memcmp(e->point + nq + nv, v_next, nv * sizeof(double)))
+    return 0;
+  list_stretches(model, state, s);
+  const char *from = e->numbers;
+  for (int i = 0; i < STRETCHES; from += s[i++].bytes)
+    if (s[i].bytes) memcpy(s[i].at, from, s[i].bytes);
+  exchange(e, state);
+  state->ncontact = e->ncontact, state->nrow = e->nrow, state->nequality = e->nequality;
+  w->narrowed = e->narrowed;
+  w->discrete_damping = e->discrete_damping, w->discrete_stiffness = e->discrete_stiffness;
+  w->options = e->options;
+  w->valid = CAV_STAGE_VELOCITY;
+  w->derived = 0;
+  e->kept = 0;
+  return 1;
+}

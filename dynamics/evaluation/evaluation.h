@@ -1,0 +1,24 @@
+/// What an evaluation of the inverse leaves in a state, put by so that a state of the same model can have it back in the place
+/// of another evaluation at the same point. Private to dynamics/ and optim/.
+#ifndef CAVORT_EVALUATION_H
+#define CAVORT_EVALUATION_H
+
+#include "cavort/dynamics.h"
+
+typedef struct cav_evaluation cav_evaluation;
+
+/// Moves what the state's last evaluation, cav_inverse at (q, v, v_next) [nq, nv, nv], has left there to *evaluation, made where
+/// that is NULL; the state holds none then. Nothing is kept, and the state stays as it is, under options whose evaluation leaves
+/// more than this (orders of whole momenta, rows that are coupled or look ahead) or if memory runs out.
+void cav_evaluation_keep(cav_evaluation **evaluation, cav_state *state, const double *q, const double *v,
+                         const double *v_next);
+
+/// Moves it back into a state, if it is of the point (q, v, v_next) and the state's options: then the state is as after
+/// cav_inverse there, bit for bit, and this returns 1. NULL: 0.
+int cav_evaluation_take(cav_evaluation *evaluation, cav_state *state, const double *q, const double *v,
+                        const double *v_next);
+
+/// NULL is fine.
+void cav_evaluation_free(cav_evaluation *evaluation);
+
+#endif
