@@ -9,7 +9,7 @@
 
 #ifndef CAV_REAL
 #define CAV_REAL double
-#define CAV_INLINE static inline
+#define CAV_INLINE static inline __attribute__((always_inline))
 #define CAV_ALL(x) (x) ///< a double as such a number
 #endif
 

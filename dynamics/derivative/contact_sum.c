@@ -5,7 +5,7 @@
 #include "vectors.h"
 
 // X with X b = b about the reference carried to a point d away: shifted = X' M X, M about the point
-static void shift(double shifted[36], const double *M, const double d[3]) {
+CAV_VECTOR_BODY void shift(double shifted[36], const double *M, const double d[3]) {
   double right[6][6];
   // linear at the point = linear + angular x d
   for (int r = 0; r < 6; r++) {
@@ -24,7 +24,7 @@ static void shift(double shifted[36], const double *M, const double d[3]) {
 }
 
 // the wrench of a contact on its second link, about its position
-static void add_impulse(const cav_contact *c, double wrench[6]) {
+CAV_VECTOR_BODY void add_impulse(const cav_contact *c, double wrench[6]) {
   for (int i = 0; i < c->dim; i++) {
     double *part = i < 3 ? wrench + 3 : wrench;
     axpy3(part, part, c->impulse[i], c->frame + 3 * (i % 3));
@@ -41,8 +41,8 @@ static void touch_link(cav_derivative_store *s, int link) {
 }
 
 // matrices of one contact at one of its links: own wrench by own motion, less what is carried along with the link
-static void contact_at_link(const cav_derivative_task *t, const cav_contact *c, const cav_contact_jacobian *derivative,
-                            int side) {
+CAV_VECTOR_BODY void contact_at_link_body(const cav_derivative_task *t, const cav_contact *c,
+                                          const cav_contact_jacobian *derivative, int side) {
   int link = side ? c->link2 : c->link1;
   double d[3], whole[6] = {0}, own[36], sign = side ? 1 : -1;
   sub3(d, c->pos, t->state->reference + 3 * link);
@@ -64,6 +64,9 @@ static void contact_at_link(const cav_derivative_task *t, const cav_contact *c, 
   for (int i = 0; i < 36; i++) now[i] += keep * velocity[i];
   for (int i = 0; i < 36; i++) next[i] += velocity[i];
 }
+CAV_BY_VECTORS(contact_at_link,
+               (const cav_derivative_task *t, const cav_contact *c, const cav_contact_jacobian *derivative, int side),
+               (t, c, derivative, side))
 
 // whether some dof moves both links of a contact: then contact_between does all of it
 static int is_within_tree(const cav_model *model, const cav_contact *c) {

@@ -8,15 +8,15 @@
 // ---------------------------------------------------------------- down the tree
 
 // r = V x S
-static void motion_cross(double r[6], const double V[6], const double S[6]) {
+CAV_VECTOR_BODY void motion_cross(double r[6], const double V[6], const double S[6]) {
   double out[6] = {0};
   motion_cross_add(out, V, S);
   copy6(r, out);
 }
 
 // rates of the axes of one group of dofs, which share the motion before them
-static void group_drifts(const cav_derivative_task *t, int first, int end, const double V[6], const double W[6],
-                         const double A[6]) {
+CAV_VECTOR_BODY void group_drifts(const cav_derivative_task *t, int first, int end, const double V[6],
+                                  const double W[6], const double A[6]) {
   cav_derivative_store *s = t->s;
   for (int k = first; k < end; k++) {
     const double *S = t->state->axis + 6 * k;
@@ -35,7 +35,7 @@ static void group_drifts(const cav_derivative_task *t, int first, int end, const
   }
 }
 
-void cav_derivative_drifts(const cav_derivative_task *t) {
+CAV_VECTOR_BODY void find_drifts_body(const cav_derivative_task *t) {
   const cav_workspace *w = t->state->work;
   const double *axis = t->state->axis;
   for (int i = 1; i < t->model->nlink; i++) {
@@ -65,6 +65,11 @@ void cav_derivative_drifts(const cav_derivative_task *t) {
       }
     }
   }
+}
+CAV_BY_VECTORS(find_drifts, (const cav_derivative_task *t), (t))
+
+void cav_derivative_drifts(const cav_derivative_task *t) {
+  find_drifts(t);
   memset(t->s->path.dofs, -1, (size_t)t->s->path.n * (size_t)t->s->path.stride * sizeof *t->s->path.dofs);
 }
 
@@ -99,7 +104,7 @@ void cav_derivative_gyrations(const cav_derivative_task *t) {
 }
 
 // F += B S
-static void gyration_mul_add(double F[6], const double *gyration, const double S[6]) {
+CAV_VECTOR_BODY void gyration_mul_add(double F[6], const double *gyration, const double S[6]) {
   double moment[3], force[3];
   rotate(moment, gyration, S);
   cross3(force, gyration + 9, S);
@@ -108,7 +113,7 @@ static void gyration_mul_add(double F[6], const double *gyration, const double S
 }
 
 // angular part of B' S; the linear one is zero
-static void gyration_transposed(double r[3], const double *gyration, const double S[6]) {
+CAV_VECTOR_BODY void gyration_transposed(double r[3], const double *gyration, const double S[6]) {
   double linear[3];
   cross3(linear, S + 3, gyration + 9);
   rotate_back(r, gyration, S);
@@ -129,7 +134,7 @@ typedef struct deep {
 } deep;
 
 // a change of contact wrenches by position: scale M x
-static void add_push(deep *d, const double *M, const double x[6], double scale) {
+CAV_VECTOR_BODY void add_push(deep *d, const double *M, const double x[6], double scale) {
   double part[6];
   multiply6(part, M, x);
   axpy6(d->q, d->q, scale, part);
@@ -137,8 +142,8 @@ static void add_push(deep *d, const double *M, const double x[6], double scale) 
 }
 
 // rows of the contacts: the convex law's matrices are symmetric
-static void fill_rows(const cav_derivative_task *t, deep *d, const double *now, const double *next, const double *S,
-                      double scale) {
+CAV_VECTOR_BODY void fill_rows(const cav_derivative_task *t, deep *d, const double *now, const double *next,
+                               const double *S, double scale) {
   copy6(d->row_now, d->now);
   copy6(d->row_next, d->next);
   if (t->state->options.sliding == CAV_SLIDING_CONVEX) return;
@@ -148,7 +153,7 @@ static void fill_rows(const cav_derivative_task *t, deep *d, const double *now, 
   scale6(d->row_next, -scale, d->row_next);
 }
 
-static void deepen(const cav_derivative_task *t, int j, deep *d) {
+CAV_VECTOR_BODY void deepen_body(const cav_derivative_task *t, int j, deep *d) {
   const cav_derivative_store *s = t->s;
   int i = t->model->dof[j].link;
   const double *S = t->state->axis + 6 * j, *I = t->state->work->composite + 10 * i, *G = s->gyration + 12 * i;
@@ -178,6 +183,7 @@ static void deepen(const cav_derivative_task *t, int j, deep *d) {
   add_push(d, now, s->drift_now + 6 * j, scale);
   add_push(d, next, s->drift_next + 6 * j, -scale);
 }
+CAV_BY_VECTORS(deepen, (const cav_derivative_task *t, int j, deep *d), (t, j, d))
 
 // puts a dof on the path
 static void put(const cav_derivative_task *t, int place, int dof) {

@@ -8,6 +8,7 @@
 #include "half_step.h"
 #include "math3.h"
 #include "tree.h"
+#include "vectors.h"
 
 // half angles of all hinges of q, by joint order of the work list
 static void half_turns(cav_workspace *w, const double *q) {
@@ -31,12 +32,17 @@ static void make_unit(const cav_workspace *w, double *q) {
   for (int i = 0; i < w->nquaternion; i++) quat_normalise(q + w->quaternion[i]);
 }
 
+CAV_VECTOR_BODY void place_links_body(const cav_model *model, const cav_workspace *w, const tree_poses *to) {
+  for (int i = 1; i < model->nlink; i++) place_link(model, w, to, i);
+}
+CAV_BY_VECTORS(place_links, (const cav_model *model, const cav_workspace *w, const tree_poses *to), (model, w, to))
+
 void cav_posture_place(const cav_model *model, cav_workspace *w, const cav_posture *at) {
   make_unit(w, at->q);
   half_turns(w, at->q);
   const tree_poses to = {at->q,       w->sine,       w->cosine, at->link,    at->com,
                          at->inertia, at->reference, at->axis,  at->referred};
-  for (int i = 1; i < model->nlink; i++) place_link(model, w, &to, i);
+  place_links(model, w, &to);
 }
 
 void cav_kinematics(const cav_model *model, cav_state *state, const double *q) {

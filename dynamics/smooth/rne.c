@@ -4,6 +4,7 @@
 /// mass. A free joint is two groups of dofs, translation and rotation: the axes of a group turn with what is before it.
 #include "math3.h"
 #include "tree.h"
+#include "vectors.h"
 
 void cav_link_velocities(const cav_model *model, const cav_state *state, const double *v, double *velocity) {
   for (int i = 1; i < model->nlink; i++) {
@@ -35,12 +36,19 @@ void cav_link_biases(const cav_model *model, const cav_state *state, const doubl
   }
 }
 
+CAV_VECTOR_BODY void move_all_body(const cav_model *model, const cav_workspace *w, double gravity,
+                                   const tree_motion *m) {
+  move_tree(model, w, gravity, m);
+}
+CAV_BY_VECTORS(move_all, (const cav_model *model, const cav_workspace *w, double gravity, const tree_motion *m),
+               (model, w, gravity, m))
+
 void cav_newton_euler(const cav_model *model, cav_state *state, const double *v, const double *v_next,
                       const double *a) {
   const cav_workspace *w = state->work;
   const tree_motion m = {state->com, state->inertia,  state->reference,     state->axis,     v,           v_next,
                          a,          state->velocity, state->velocity_next, w->acceleration, state->force};
-  move_tree(model, w, state->options.gravity ? -1 : 0, &m);
+  move_all(model, w, state->options.gravity ? -1 : 0, &m);
 }
 
 void cav_inertial_forces(const cav_model *model, const cav_state *state, double *force) {

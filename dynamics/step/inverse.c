@@ -14,6 +14,7 @@
 #include "options.h"
 #include "step.h"
 #include "tree.h"
+#include "vectors.h"
 
 static void copy(double *to, const double *from, int n) {
   if (n > 0 && to != from) { memcpy(to, from, (size_t)n * sizeof *to); }
@@ -93,8 +94,8 @@ static int is_within_reach(const cav_workspace *w, const double *v, const double
 }
 
 // velocity of the contact's point of a link, added with a sign; the world has none
-static inline void add_point_velocity(int link, const double arm[3], const double *velocity, double sign,
-                                      double linear[3]) {
+CAV_VECTOR_BODY void add_point_velocity(int link, const double arm[3], const double *velocity, double sign,
+                                        double linear[3]) {
   if (link == 0) return;
   const double *V = velocity + 6 * link;
   double at[3];
@@ -104,7 +105,7 @@ static inline void add_point_velocity(int link, const double arm[3], const doubl
 }
 
 // in the frame, from where the contact is on both links
-static inline void velocity_by_arms(const cav_contact *c, double arm[2][3], const double *velocity, double *out) {
+CAV_VECTOR_BODY void velocity_by_arms(const cav_contact *c, double arm[2][3], const double *velocity, double *out) {
   double linear[3] = {0, 0, 0}, angular[3] = {0, 0, 0};
   add_point_velocity(c->link1, arm[0], velocity, -1, linear);
   add_point_velocity(c->link2, arm[1], velocity, 1, linear);
@@ -119,7 +120,7 @@ static inline void velocity_by_arms(const cav_contact *c, double arm[2][3], cons
 }
 
 // from the references of both links
-static inline void contact_arms(const cav_state *state, const cav_contact *c, double arm[2][3]) {
+CAV_VECTOR_BODY void contact_arms(const cav_state *state, const cav_contact *c, double arm[2][3]) {
   if (c->link1) sub3(arm[0], c->pos, state->reference + 3 * c->link1);
   if (c->link2) sub3(arm[1], c->pos, state->reference + 3 * c->link2);
 }
@@ -168,9 +169,8 @@ static void contact_impulse(const cav_state *state, cav_contact *c, const double
   cav_law_contact(state, c, g, c->impulse, NULL);
 }
 
-// all contacts: velocities (those at v only if v has changed), impulses, wrenches
-static void contacts(const cav_model *model, cav_state *state, const double *velocity_now, double scale) {
-  const double *coupled = state->options.coupled ? state->work->target : NULL;
+// velocities of all contacts, those at v only if it has changed
+CAV_VECTOR_BODY void contact_velocities_body(cav_state *state, const double *velocity_now) {
   for (int i = 0; i < state->ncontact; i++) {
     cav_contact *c = &state->contact[i];
     double arm[2][3] = {{0}};
@@ -178,6 +178,13 @@ static void contacts(const cav_model *model, cav_state *state, const double *vel
     if (velocity_now) { velocity_by_arms(c, arm, velocity_now, c->velocity); }
     velocity_by_arms(c, arm, state->velocity_next, c->velocity_next);
   }
+}
+CAV_BY_VECTORS(contact_velocities, (cav_state * state, const double *velocity_now), (state, velocity_now))
+
+// all contacts: velocities, impulses, wrenches
+static void contacts(const cav_model *model, cav_state *state, const double *velocity_now, double scale) {
+  const double *coupled = state->options.coupled ? state->work->target : NULL;
+  contact_velocities(state, velocity_now);
   if (cav_looks_ahead(&state->options)) { cav_next_contacts_find(model, state); }
   const int by_four =
       cav_lanes_pay() && !coupled && !cav_looks_ahead(&state->options) && state->options.sliding == CAV_SLIDING_CONVEX;

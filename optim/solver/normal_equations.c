@@ -6,6 +6,7 @@
 /// band of a humanoid, 0.25 on a cycle of 60 knots, 0.75 on 200 free bodies.
 #include "normal_equations.h"
 #include "dense.h"
+#include "vectors.h"
 
 #include <stddef.h>
 #include <stdlib.h>
@@ -387,7 +388,8 @@ cav_status cav_normal_factor(cav_normal *normal, double shift) {
 }
 
 /// product += what columns of the band and their mirror images give.
-static void multiply_columns(const cav_normal *normal, int from, int to, const double *x, double *product) {
+CAV_VECTOR_BODY void multiply_columns_body(const cav_normal *normal, int from, int to, const double *x,
+                                           double *product) {
   for (int j = from; j < to; j++) {
     const double *H = normal->H + (size_t)j * normal->band - j;
     int end = end_of(normal, j);
@@ -399,6 +401,8 @@ static void multiply_columns(const cav_normal *normal, int from, int to, const d
     product[j] += sum;
   }
 }
+CAV_BY_VECTORS(multiply_columns, (const cav_normal *normal, int from, int to, const double *x, double *product),
+               (normal, from, to, x, product))
 
 int cav_normal_is_band(const cav_normal *normal) { return normal->ntree == 1 && normal->border == 0; }
 int cav_normal_was_band(const cav_normal *normal) { return normal->ngroup == 1 && normal->border == 0; }

@@ -167,6 +167,7 @@ int cav_knot_reserve(cav_sum *a) {
   row_count n = knot_rows(tr, s, a->t);
   if (n.rows > INT_MAX / 2 || n.dense > INT_MAX / 2) return 0;
   knot->nrow = (int)n.rows;
+  a->counted = 1;
   knot->dense_most = (int)n.dense;
   if (!reserve_dense(a)) return 0;
   if (!tr->free_step) return 1;

@@ -14,13 +14,12 @@
 
 // ---------------------------------------------------------------- rows
 
-/// Starts a row of weight/2 r^2. Where the step is free its derivative by the step's logarithm is the difference of two
-/// passes that begin the same rows; weights count with it, as integrals are sums over steps.
-static void begin_row(cav_sum *a, double weight, double r) {
-  int i = a->row++;
-  assert(i < a->knot->nrow);
-  a->bend = 0;
-  if (!a->tr->free_step || !(a->jacobian || a->shifted)) return;
+/// What is done for each of many rows, and hardly longer than a call.
+#define AT_ONCE static inline __attribute__((always_inline))
+
+/// Row i where the step is free: its derivative by the step's logarithm is the difference of two passes that begin the same
+/// rows; weights count with it, as integrals are sums over steps.
+static void trace_row(cav_sum *a, int i, double weight, double r) {
   assert(i < a->s->trace_room);
   a->root = sqrt(weight);
   if (a->shifted) {
@@ -32,6 +31,14 @@ static void begin_row(cav_sum *a, double weight, double r) {
   a->knot->step_derivative += a->derivative * a->root * r;
 }
 
+/// Starts a row of weight/2 r^2.
+AT_ONCE void begin_row(cav_sum *a, double weight, double r) {
+  const int i = a->row++;
+  assert(!a->counted || i < a->knot->nrow);
+  a->bend = 0;
+  if (a->tr->free_step && (a->jacobian || a->shifted)) trace_row(a, i, weight, r);
+}
+
 /// Curvature of the present row's norm by its dual, where it has one; else that of the square that stands for it.
 static double curvature_of(cav_sum *a, const cav_term *term, double x, double square) {
   if (a->knot->nabsolute == 0 || !a->jacobian || cav_knot_takes_contacts(term)) return square;
@@ -41,42 +48,59 @@ static double curvature_of(cav_sum *a, const cav_term *term, double x, double sq
   return cav_absolute_curvature(row);
 }
 
-/// Starts the row of a cost, and turns its norm into a square: with x = r/unit and y^2/2 the norm of x, the residual is
-/// y and its row dy/dx times that of x, which goes into weight and residual.
-static void begin_cost(cav_sum *a, const cav_term *term, double unit, double *weight, double *r) {
-  double bend = 0;
-  if (term->norm == CAV_NORM_ABSOLUTE) {
-    double x = *r / unit, root = sqrt(1 + x * x);
-    // y = x sqrt(2/(1 + root)), which is exact for small x; dy/dx = x/(root y)
-    double part = sqrt(2 / (1 + root)), derivative = 1 / (root * part), square = derivative * derivative;
-    bend = *weight * (curvature_of(a, term, x, square) - square);
-    *weight *= square;
-    *r = unit * x * part / derivative;
-  }
+/// Turns an absolute norm into a square: with x = r/unit and y^2/2 the norm of x, the residual is y and its row dy/dx times that
+/// of x, which goes into weight and residual. Returns what the norm bends by beyond that.
+static double square_norm(cav_sum *a, const cav_term *term, double unit, double *weight, double *r) {
+  double x = *r / unit, root = sqrt(1 + x * x);
+  // y = x sqrt(2/(1 + root)), which is exact for small x; dy/dx = x/(root y)
+  double part = sqrt(2 / (1 + root)), derivative = 1 / (root * part), square = derivative * derivative;
+  double bend = *weight * (curvature_of(a, term, x, square) - square);
+  *weight *= square;
+  *r = unit * x * part / derivative;
+  return bend;
+}
+
+/// Starts the row of a cost, by its norm.
+AT_ONCE void begin_cost(cav_sum *a, const cav_term *term, double unit, double *weight, double *r) {
+  const double bend = term->norm == CAV_NORM_ABSOLUTE ? square_norm(a, term, unit, weight, r) : 0;
   begin_row(a, *weight, *r);
   a->bend = bend;
 }
 
-/// Adds weight times the square of a row to the Hessian.
+/// Adds weight times the square of a row with n entries to the Hessian, of which the lower triangle is read.
 static void add_square(cav_sum *a, double weight, int n, const int *column, const double *entry) {
-  const int width = 3 * a->tr->nv;
+  const size_t width = 3 * (size_t)a->tr->nv;
+  double *H = a->knot->present;
   for (int i = 0; i < n; i++) {
-    const int at = column ? column[i] : i;
+    const int at = column[i];
     const double by = weight * entry[i];
-    double *row = a->knot->present + (size_t)at * (size_t)width;
-    for (int j = 0; column && j < n; j++)
+    double *row = H + (size_t)at * width;
+    for (int j = 0; j < n; j++)
       if (column[j] <= at) row[column[j]] += by * entry[j];
-    for (int j = 0; !column && j <= at; j++) row[j] += by * entry[j];
   }
 }
 
-/// Adds weight/2 (r + row dx)^2 for a row with n entries, begun.
-static void add_sparse(cav_sum *a, double weight, double r, int n, const int *column, const double *entry) {
-  a->knot->merit += 0.5 * weight * r * r;
-  if (!a->jacobian) return;
+/// The same of a full row.
+static void add_full_square(cav_sum *a, double weight, const double *row) {
+  const int width = 3 * a->tr->nv;
+  double *to = a->knot->present;
+  for (int i = 0; i < width; i++, to += width) {
+    const double by = weight * row[i];
+    for (int j = 0; j <= i; j++) to[j] += by * row[j];
+  }
+}
+
+/// Derivatives of a row with n entries.
+static void lay_sparse(cav_sum *a, double weight, double r, int n, const int *column, const double *entry) {
   for (int i = 0; i < n && a->tr->free_step; i++) a->knot->step_row[column[i]] += a->derivative * a->root * entry[i];
   for (int i = 0; i < n; i++) a->knot->gradient[column[i]] += weight * r * entry[i];
   add_square(a, weight + a->bend, n, column, entry);
+}
+
+/// Adds weight/2 (r + row dx)^2 for a row with n entries, begun.
+AT_ONCE void add_sparse(cav_sum *a, double weight, double r, int n, const int *column, const double *entry) {
+  a->knot->merit += 0.5 * weight * r * r;
+  if (a->jacobian) lay_sparse(a, weight, r, n, column, entry);
 }
 
 /// Space for one more dense row [3nv] with its residual.
@@ -93,23 +117,32 @@ CAV_VECTOR_BODY void scale_row_body(int n, double a, const double *row, double *
 }
 CAV_BY_VECTORS(scale_row, (int n, double a, const double *row, double *out), (n, a, row, out))
 
-/// Adds weight/2 (r + row dx)^2 for a full row, begun.
-static void add_dense(cav_sum *a, double weight, double r, const double *row) {
-  a->knot->merit += 0.5 * weight * r * r;
-  if (!a->jacobian || weight == 0) return;
+/// Derivatives of a full row.
+static void lay_dense(cav_sum *a, double weight, double r, const double *row) {
   int width = 3 * a->tr->nv;
   double root = sqrt(weight), *out = new_dense(a, root * r);
   scale_row(width, root, row, out);
   for (int k = 0; k < width && a->tr->free_step; k++) a->knot->step_row[k] += a->derivative * out[k];
-  if (a->bend != 0) add_square(a, a->bend, width, NULL, row);
+  if (a->bend != 0) add_full_square(a, a->bend, row);
+}
+
+/// Adds weight/2 (r + row dx)^2 for a full row, begun.
+AT_ONCE void add_dense(cav_sum *a, double weight, double r, const double *row) {
+  a->knot->merit += 0.5 * weight * r * r;
+  if (a->jacobian && weight != 0) lay_dense(a, weight, r, row);
+}
+
+/// Derivative over the knots of u and the readings after it, one of them, scaled.
+AT_ONCE void chain_row(const cav_sum *a, int which, double scale, double *out) {
+  const cav_scratch *s = a->s;
+  const size_t at = (size_t)which * (size_t)a->tr->nv;
+  cav_links_chain(a->tr, &a->links, 1, scale, s->dq + at, s->dv + at, s->dn + at, out);
 }
 
 /// Derivative over the knots of u and the readings after it, one of them, in this thread's room until the next one.
 static const double *chained_row(const cav_sum *a, int which) {
-  const cav_scratch *s = a->s;
-  const size_t at = (size_t)which * (size_t)a->tr->nv;
-  cav_links_chain(a->tr, &a->links, 1, s->dq + at, s->dv + at, s->dn + at, s->reading);
-  return s->reading;
+  chain_row(a, which, 1, a->s->reading);
+  return a->s->reading;
 }
 
 static const double *reading_row(const cav_sum *a, int reading) { return chained_row(a, a->tr->nv + reading); }
@@ -118,9 +151,22 @@ static const double *force_row(const cav_sum *a, int dof) {
   return a->passing ? chained_row(a, dof) : a->knot->du + (size_t)dof * 3 * (size_t)a->tr->nv;
 }
 
+/// Derivatives of the row of a reading, which is chained where it is to stand, unless it is read beside that.
+static void lay_reading(cav_sum *a, double weight, double r, int reading) {
+  if (a->bend != 0) {
+    lay_dense(a, weight, r, reading_row(a, reading));
+    return;
+  }
+  const int width = 3 * a->tr->nv;
+  double root = sqrt(weight), *out = new_dense(a, root * r);
+  chain_row(a, a->tr->nv + reading, root, out);
+  for (int k = 0; k < width && a->tr->free_step; k++) a->knot->step_row[k] += a->derivative * out[k];
+}
+
 /// Adds weight/2 (r + row dx)^2 for the row of a reading, begun.
-static void add_reading(cav_sum *a, double weight, double r, int reading) {
-  add_dense(a, weight, r, a->jacobian && weight != 0 ? reading_row(a, reading) : NULL);
+AT_ONCE void add_reading(cav_sum *a, double weight, double r, int reading) {
+  a->knot->merit += 0.5 * weight * r * r;
+  if (a->jacobian && weight != 0) lay_reading(a, weight, r, reading);
 }
 
 /// Adds a linear form of u to a row [3nv].
@@ -175,7 +221,7 @@ static double slot_residual(cav_sum *a, int i, double value, double lower, doubl
   double e = shifted - (inside > most ? most : inside);
   *active = e != 0 || lower == upper;
   begin_row(a, *active ? rho : 0, e);
-  assert(!a->tr->free_step || i < a->s->slot_room);
+  assert(!a->tr->free_step || !a->counted || i < a->s->slot_room);
   if (a->shifted) a->s->slot[a->shifted - 1][i] = value;
   if (a->jacobian && a->tr->free_step)
     a->knot->slot_step[i] = (a->s->slot[1][i] - a->s->slot[0][i]) / (2 * CAV_STEP_FRACTION);
@@ -630,6 +676,10 @@ static void lay_force_rows(cav_sum *a) {
     double weight = a->s->force_weight[d];
     if (weight == 0) continue;
     double root = sqrt(weight), *out = new_dense(a, a->s->force_derivative[d] / root);
+    if (a->passing && !tr->free_step) {
+      chain_row(a, d, root, out);
+      continue;
+    }
     const double *du = force_row(a, d);
     scale_row(width, root, du, out);
     for (int k = 0; k < width && tr->free_step; k++) a->knot->step_row[k] += a->s->force_step[d] * du[k];
@@ -661,6 +711,7 @@ void cav_knot_sum(cav_sum *a, const double *q, const double *v, const double *v_
   add_ranges(a, q, tr->options.timestep * tr->penalty.range);
   add_hard_terms(a, q, v, v_next);
   // every pass begins the same rows, or the derivatives by the step would pair residuals of different ones
-  assert(a->row == knot->nrow);
+  assert(!a->counted || a->row == knot->nrow);
+  knot->nrow = a->row;
   if (a->jacobian) lay_force_rows(a);
 }

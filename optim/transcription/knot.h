@@ -14,10 +14,10 @@ typedef struct cav_links {
   const double *before, *here, *then, *next; ///< of what is before; of v and of v_{t+1} here; of what is next
 } cav_links;
 
-/// Those of knot t at the last linearisation, and n rows chained by them, out [n*3nv]. chain.c.
+/// Those of knot t at the last linearisation, and n rows chained by them, scaled, out [n*3nv]. chain.c.
 cav_links cav_links_of(const cav_transcription *transcription, int t);
-void cav_links_chain(const cav_transcription *transcription, const cav_links *links, int n, const double *dq,
-                     const double *dv, const double *dn, double *out);
+void cav_links_chain(const cav_transcription *transcription, const cav_links *links, int n, double scale,
+                     const double *dq, const double *dv, const double *dn, double *out);
 
 /// One knot being summed: dense rows gathered, sparse rows added at once. s->state is evaluated.
 typedef struct cav_sum {
@@ -30,6 +30,7 @@ typedef struct cav_sum {
   double *dense, *rest; ///< rows over all columns [dense_most*3nv] and their residuals
   int shifted;          ///< 1, 2: at a shorter or longer step, whose residuals are noted only; 0: at the step itself
   int row;              ///< rows begun
+  int counted;          ///< 1: rows have been counted, and are as many; values alone do not need to know before
   int nabsolute;        ///< rows with an absolute norm and a dual begun
   double bend;          ///< of the present row: what its norm bends by beyond the square that stands for it
   double root,

@@ -6,6 +6,7 @@
 #include "quantity.h"
 #include "recorded.h"
 #include "rotation.h"
+#include "vectors.h"
 
 #include <assert.h>
 #include <math.h>
@@ -174,10 +175,31 @@ static cav_status self_penetration_rows(const cav_transcription *tr, const cav_s
 }
 
 /// out := a x + b (c y), y NULL: none.
-static void blend(size_t n, double a, const double *x, double b, double c, const double *y, double *restrict out) {
-  for (size_t j = 0; j < n && !y; j++) out[j] = a * x[j];
-  for (size_t j = 0; j < n && y; j++) out[j] = a * x[j] + b * (c * y[j]);
+CAV_VECTOR_BODY void blend_body(int n, double a, const double *x, double b, double c, const double *y,
+                                double *restrict out) {
+  if (!y)
+    for (int j = 0; j < n; j++) out[j] = a * x[j];
+  else
+    for (int j = 0; j < n; j++) out[j] = a * x[j] + b * (c * y[j]);
 }
+
+/// What readings of a contact are made of: derivatives of its impulse, and by reading of what stands beside it, with factors.
+typedef struct mixture {
+  const double *impulse[3], *by_q[4], *by_next[4];
+  double by_impulse[4], fraction, open;
+} mixture;
+
+/// The readings from the first to the fourth that are used, by bits, into rows over q, v and v_next, n between one and the next.
+CAV_VECTOR_BODY void blend_readings_body(int n, const mixture *m, unsigned used, double *dq, double *dv, double *dn) {
+  for (int k = 0; k < 4; k++, dq += n, dv += n, dn += n) {
+    if (!(used >> k & 1)) continue;
+    blend_body(n, m->by_impulse[k], m->impulse[0], m->fraction, k == 0 ? m->open : 1, m->by_q[k], dq);
+    blend_body(n, m->by_impulse[k], m->impulse[1], 0, 0, NULL, dv);
+    blend_body(n, m->by_impulse[k], m->impulse[2], m->fraction, 1, m->by_next[k], dn);
+  }
+}
+CAV_BY_VECTORS(blend_readings, (int n, const mixture *m, unsigned used, double *dq, double *dv, double *dn),
+               (n, m, used, dq, dv, dn))
 
 /// Every reading of a contact.
 enum { WHOLE = (1 << CAV_CONTACT_READINGS) - 1 };
@@ -197,31 +219,29 @@ static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s
                               .normal_only = 1};
   cav_status status = cav_contact_derivatives(tr->model, s->state, (int)(c - s->state->contact), &d);
   if (status != CAV_OK) return status;
-  double derivative, fraction = contact_weight(tr, c, &derivative), open = c->dist > 0;
+  double derivative, fraction = contact_weight(tr, c, &derivative);
   int slip = c->dim > 1;
-  double value[4] = {fmax(c->dist, 0), slip ? c->velocity_next[1] : 0, slip ? c->velocity_next[2] : 0,
-                     c->velocity_next[0]};
-  const double *by_q[4] = {d.dist_dq, slip ? d.velocity_dq + nv : NULL, slip ? d.velocity_dq + 2 * nv : NULL,
-                           d.velocity_dq};
-  const double *by_next[4] = {NULL, slip ? d.velocity_dv_next + nv : NULL, slip ? d.velocity_dv_next + 2 * nv : NULL,
-                              d.velocity_dv_next};
-  for (int k = 0; k < 4; k++, out.dq += n, out.dv += n, out.dn += n) {
-    if (!(used >> k & 1)) continue;
-    double by_impulse = derivative * value[k];
-    blend(n, by_impulse, d.impulse_dq, fraction, k == 0 ? open : 1, by_q[k], out.dq);
-    blend(n, by_impulse, d.impulse_dv, 0, 0, NULL, out.dv);
-    blend(n, by_impulse, d.impulse_dv_next, fraction, 1, by_next[k], out.dn);
-  }
+  const double value[4] = {fmax(c->dist, 0), slip ? c->velocity_next[1] : 0, slip ? c->velocity_next[2] : 0,
+                           c->velocity_next[0]};
+  mixture m = {
+      .impulse = {d.impulse_dq, d.impulse_dv, d.impulse_dv_next},
+      .by_q = {d.dist_dq, slip ? d.velocity_dq + nv : NULL, slip ? d.velocity_dq + 2 * nv : NULL, d.velocity_dq},
+      .by_next = {NULL, slip ? d.velocity_dv_next + nv : NULL, slip ? d.velocity_dv_next + 2 * nv : NULL,
+                  d.velocity_dv_next},
+      .fraction = fraction,
+      .open = c->dist > 0};
+  for (int k = 0; k < 4; k++) m.by_impulse[k] = derivative * value[k];
+  blend_readings((int)n, &m, used, out.dq, out.dv, out.dn);
   if (is_deep(tr, c)) {
-    memcpy(out.dq - 4 * n, d.dist_dq, n * sizeof(double));
-    memset(out.dv - 4 * n, 0, n * sizeof(double));
-    memset(out.dn - 4 * n, 0, n * sizeof(double));
+    memcpy(out.dq, d.dist_dq, n * sizeof(double));
+    memset(out.dv, 0, n * sizeof(double));
+    memset(out.dn, 0, n * sizeof(double));
   }
   if (!(used >> 4 & 1)) return CAV_OK;
   double unit = c->impulse[0] > 0 ? 1 / (tr->options.timestep * tr->weight) : 0;
-  blend(n, unit, d.impulse_dq, 0, 0, NULL, out.dq);
-  blend(n, unit, d.impulse_dv, 0, 0, NULL, out.dv);
-  blend(n, unit, d.impulse_dv_next, 0, 0, NULL, out.dn);
+  blend_body((int)n, unit, d.impulse_dq, 0, 0, NULL, out.dq + 4 * n);
+  blend_body((int)n, unit, d.impulse_dv, 0, 0, NULL, out.dv + 4 * n);
+  blend_body((int)n, unit, d.impulse_dv_next, 0, 0, NULL, out.dn + 4 * n);
   return CAV_OK;
 }
 

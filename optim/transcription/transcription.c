@@ -381,7 +381,7 @@ static cav_status shift_step(const cav_transcription *tr, cav_scratch *s, int t,
   if (status == CAV_OK) status = cav_user_refused(&knot->refusal);
   if (status != CAV_OK) return status;
   if (knot->nread) memcpy(knot->y, s->value + tr->nv, (size_t)knot->nread * sizeof(double));
-  cav_sum a = {.tr = &near, .s = s, .knot = knot, .t = t, .shifted = shifted};
+  cav_sum a = {.tr = &near, .s = s, .knot = knot, .t = t, .shifted = shifted, .counted = 1};
   cav_knot_sum(&a, q, v_here, v_then);
   return CAV_OK;
 }
@@ -447,7 +447,7 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   if (status != CAV_OK) return status;
   // rows that go into the normal equations at once are needed no longer than that
   cav_sum a = {.tr = tr, .s = s, .knot = knot, .t = t, .jacobian = p->jacobian, .passing = p->take != NULL};
-  if (!cav_readings_list(tr, s, t) || !cav_knot_reserve(&a)) return CAV_NO_MEMORY;
+  if (!cav_readings_list(tr, s, t) || (p->jacobian && !cav_knot_reserve(&a))) return CAV_NO_MEMORY;
   // a single thread's knot is taken before its next one
   knot->present = a.passing && cav_parallel_size(tr->pool) == 1 ? s->hessian : knot->hessian;
   if (p->jacobian && tr->free_step) {
@@ -465,7 +465,7 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
     if (status == CAV_OK) status = cav_user_refused(&knot->refusal);
     if (status != CAV_OK) return status;
     a.links = cav_links_of(tr, t);
-    if (!a.passing) cav_links_chain(tr, &a.links, nv, s->dq, s->dv, s->dn, knot->du);
+    if (!a.passing) cav_links_chain(tr, &a.links, nv, 1, s->dq, s->dv, s->dn, knot->du);
   }
   if (p->jacobian) s->seconds += now() - start;
 
