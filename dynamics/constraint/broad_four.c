@@ -1,10 +1,9 @@
-/// The broad phase of four states at once (broad.h), of scenes whose planes are fixed to the world; and the poses of all geoms
-/// that some narrow phase then looks at. Beside it joints near an end of their range.
+/// The broad phase of four states at once (broad.h), of scenes whose planes are fixed to the world; and where each
+/// of these states looks for its contacts alone the poses of all geoms that its narrow phase then looks at. Beside
+/// it joints near an end of their range.
 
 // first of all: what is below takes four numbers where it would take one
-#include "four_turn.h"
-
-#include <stddef.h>
+#include "by_four.h"
 
 #include "broad.h"
 #include "four_states.h"
@@ -43,22 +42,6 @@ CAV_BY_FOUR static void find(const cav_model *model, const struct cav_geom_cache
   l->nnear = n;
 }
 
-// pose of a geom in four states, from its centre there
-CAV_BY_FOUR static void pose_slot(const cav_lanes *l, struct cav_geom_cache *const cache[CAV_LANES], int i) {
-  const cav_geom *geom = cache[0]->slot[i].geom;
-  cav_four pose[12], own[9];
-  _Static_assert(offsetof(cav_shape, rotation) == offsetof(cav_shape, pos) + 3 * sizeof(double), "twelve in a row");
-  take_numbers(own, geom->rotation, 9);
-  copy3(pose, l->centre + 3 * i);
-  matmul3(pose + 3, l->link[geom->link].rotation, own);
-  double *to[CAV_LANES];
-  for (int lane = 0; lane < CAV_LANES; lane++) {
-    to[lane] = cache[lane]->slot[i].shape.pos;
-    cache[lane]->slot[i].turned = 1;
-  }
-  for (int k = 0; k < 12; k += 4) turn_out(pose + k, (double *const[]){to[0] + k, to[1] + k, to[2] + k, to[3] + k});
-}
-
 CAV_BY_FOUR void cav_lanes_limits(const cav_model *model, cav_lanes *l, const cav_state *state) {
   const cav_workspace *w = state->work;
   const double beyond = cav_limit_activation(state, 0);
@@ -74,18 +57,20 @@ CAV_BY_FOUR void cav_lanes_limits(const cav_model *model, cav_lanes *l, const ca
   l->nbounded = n;
 }
 
-void cav_lanes_near(const cav_model *model, cav_lanes *l, cav_state *const state[CAV_LANES],
-                    const double activation[2]) {
-  struct cav_geom_cache *cache[CAV_LANES];
-  for (int lane = 0; lane < CAV_LANES; lane++) cache[lane] = state[lane]->work->geom;
-  find_limits(model, cache[0], l, activation);
-  find(model, cache[0], l);
+void cav_lanes_near(const cav_model *model, cav_lanes *l, const cav_state *state, const double activation[2]) {
+  const struct cav_geom_cache *cache = state->work->geom;
+  find_limits(model, cache, l, activation);
+  find(model, cache, l);
+}
+
+void cav_lanes_place_near(const cav_lanes *l, cav_state *const state[CAV_LANES]) {
+  const struct cav_geom_cache *cache = state[0]->work->geom;
   double *centre[CAV_LANES];
-  for (int lane = 0; lane < CAV_LANES; lane++) centre[lane] = cache[lane]->centre[0];
-  cav_lanes_scatter(centre, l->centre, 3 * cache[0]->nslot);
+  for (int lane = 0; lane < CAV_LANES; lane++) centre[lane] = state[lane]->work->geom->centre[0];
+  cav_lanes_scatter(centre, l->centre, 3 * cache->nslot);
   for (int k = 0; k < l->nnear; k++) {
-    const candidate *c = cache[0]->candidate + l->near[k] / CAV_LANE_BITS;
-    if (!cache[0]->slot[c->first].turned) pose_slot(l, cache, c->first);
-    if (!cache[0]->slot[c->second].turned) pose_slot(l, cache, c->second);
+    const candidate *c = cache->candidate + l->near[k] / CAV_LANE_BITS;
+    if (!cache->slot[c->first].turned) cav_lanes_pose(l, state, c->first);
+    if (!cache->slot[c->second].turned) cav_lanes_pose(l, state, c->second);
   }
 }

@@ -449,17 +449,31 @@ cav_status cav_contacts_find(const cav_model *model, cav_state *state) {
   return status;
 }
 
-int cav_contacts_near(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES]) {
-  const struct cav_geom_cache *cache = state[0]->work->geom;
-  if (!seeks_contacts(model, state[0]) || cache->expensive || cache->fixed || cache->sweep) return 0;
-  double activation[2];
-  find_activations(state[0], activation);
+int cav_contacts_listed(const cav_model *model, const cav_state *state) {
+  const struct cav_geom_cache *cache = state->work->geom;
+  if (!seeks_contacts(model, state)) return 1;
+  if (cache->expensive || cache->fixed || cache->sweep) return 0;
   for (int k = 0; k < cache->nmoving; k++) {
     if (cache->slot[cache->moving[k]].geom->type == CAV_GEOM_PLANE) return 0;
+  }
+  return 1;
+}
+
+void cav_contacts_near(const cav_model *model, cav_lanes *lanes, const cav_state *state) {
+  double activation[2];
+  lanes->nnear = 0;
+  if (!seeks_contacts(model, state)) return;
+  find_activations(state, activation);
+  cav_lanes_near(model, lanes, state, activation);
+}
+
+void cav_contacts_place_near(const cav_lanes *lanes, cav_state *const state[CAV_LANES]) {
+  const struct cav_geom_cache *cache = state[0]->work->geom;
+  if (!lanes->nnear) return;
+  for (int k = 0; k < cache->nmoving; k++) {
     for (int lane = 0; lane < CAV_LANES; lane++) state[lane]->work->geom->slot[cache->moving[k]].turned = 0;
   }
-  cav_lanes_near(model, lanes, state, activation);
-  return 1;
+  cav_lanes_place_near(lanes, state);
 }
 
 cav_status cav_contacts_of_near(const cav_model *model, cav_state *state, const cav_lanes *lanes, int lane) {

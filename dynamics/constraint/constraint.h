@@ -6,6 +6,7 @@
 #include "four_states.h"
 #include "geometry.h"
 #include "smooth.h"
+#include "touch_four.h"
 
 /// World placement of the geoms that are in pairs: what collide.c keeps between its own calls.
 struct cav_geom_cache;
@@ -33,14 +34,24 @@ static inline int cav_pair_has_mesh(const cav_model *model, const cav_pair *pair
 void cav_frames_four(cav_contact *contact);
 int cav_law_four(cav_contact *contact);
 
-/// Pairs of four states whose bounds are near, into lanes, from their poses there; 0 without: the scene has what only a
-/// single state looks for. Then cav_contacts_find of one of them among those. collide.c.
-int cav_contacts_near(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES]);
+/// Whether pairs of four states are listed together: not where the scene has what only a single state looks for. Then
+/// those whose bounds are near in some state, into lanes, from their poses there; and for cav_contacts_find of one of
+/// the states among those the places of their geoms. collide.c.
+int cav_contacts_listed(const cav_model *model, const cav_state *state);
+void cav_contacts_near(const cav_model *model, cav_lanes *lanes, const cav_state *state);
+void cav_contacts_place_near(const cav_lanes *lanes, cav_state *const state[CAV_LANES]);
 cav_status cav_contacts_of_near(const cav_model *model, cav_state *state, const cav_lanes *lanes, int lane);
 
-/// The pairs alone, by the margins that are added to those of pairs between links and with the world. broad_four.c.
-void cav_lanes_near(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES],
-                    const double activation[2]);
+/// The pairs alone, by the margins that are added to those of pairs between links and with the world; then the
+/// places. broad_four.c.
+void cav_lanes_near(const cav_model *model, cav_lanes *lanes, const cav_state *state, const double activation[2]);
+void cav_lanes_place_near(const cav_lanes *lanes, cav_state *const state[CAV_LANES]);
+
+/// Points of pair k of those, in the order and with the bits of cav_contacts_find of each state; touch has room for
+/// CAV_LANES times CAV_TOUCH_MAX. And the place of a geom, by its slot in the broad phase, to the states.
+/// narrow_four.c.
+int cav_lanes_touches(const cav_lanes *lanes, cav_state *const state[CAV_LANES], int k, cav_touch_four *touch);
+void cav_lanes_pose(const cav_lanes *lanes, cav_state *const state[CAV_LANES], int slot);
 
 /// Distance from which a pair's force is not negligible under the state's options.
 double cav_contact_activation(const cav_state *state, const cav_pair *pair);
@@ -101,6 +112,8 @@ cav_status cav_limits_find(const cav_model *model, cav_state *state);
 void cav_lanes_limits(const cav_model *model, cav_lanes *lanes, const cav_state *state);
 cav_status cav_limits_of_near(const cav_model *model, cav_state *state, const cav_lanes *lanes, int lane);
 void cav_contacts_soften(cav_state *state);
+/// Of one contact that need not be in the state.
+void cav_contact_soften(const cav_state *state, cav_contact *contact);
 
 /// Fraction of its stiffness that a contact has, by which its R is divided, and the rate of its logarithm by the
 /// distance: self_stiffness between links of one tree. Where the law is smoothed it fades out towards the end of its

@@ -9,10 +9,10 @@
 /// so there an object counts from speed h before the margin: slower than that, nothing is missed. The smoothed law is
 /// active up to SMOOTH_ACTIVATION delta from there: the two add up.
 #include "constraint.h"
+#include "impedance.h"
 #include "math3.h"
 #include "rotation.h"
 
-static const double R_MIN = 1e-15, IMPEDANCE_MIN = 1e-4, IMPEDANCE_MAX = 0.9999, FRICTION_MIN = 1e-5;
 // fraction of smoothing distances beyond which the smoothed force is dropped: exp(-12) = 6e-6 of its value at contact
 static const double SMOOTH_ACTIVATION = 12;
 // fastest approach to a limit met without a jump, rad/s or m/s
@@ -21,28 +21,6 @@ static const double LIMIT_SPEED = 20;
 // contacts of the smoothed law: fraction of their activation distance over which they fade out at its end, fraction of
 // the radii of round geoms over which they fade out where axes meet, and the least that is left
 static const double FADING = 0.3, CORE = 0.5, STIFFNESS_RATIO_MIN = 1e-12;
-
-static double larger(double a, double b) { return a > b ? a : b; }
-
-static double clamp_between(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
-
-// sigmoid of solimp on [0, 1]: a power on either side of the midpoint, meeting there with equal derivative
-static double sigmoid(double x, double midpoint, double power) {
-  if (power == 1) { return x; }
-  if (power == 2) { return x <= midpoint ? x * x / midpoint : 1 - (1 - x) * (1 - x) / (1 - midpoint); }
-  if (x <= midpoint) { return pow(x, power) / pow(midpoint, power - 1); }
-  return 1 - pow(1 - x, power) / pow(1 - midpoint, power - 1);
-}
-
-// impedance d(x) of solimp at a violation x, between its ends
-static double impedance(const double solimp[5], double d0, double dw, double x) {
-  double width = solimp[2];
-  if (d0 == dw || width <= R_MIN) { return 0.5 * (d0 + dw); }
-  if (x >= width) { return dw; }
-  if (x <= 0) { return d0; }
-  double y = sigmoid(x / width, clamp_between(solimp[3], IMPEDANCE_MIN, IMPEDANCE_MAX), larger(1, solimp[4]));
-  return d0 + y * (dw - d0);
-}
 
 // derivative of the sigmoid
 static double sigmoid_derivative(double x, double midpoint, double power) {
@@ -68,51 +46,12 @@ void cav_law_rates(const cav_state *state, const cav_softness *softness, double 
   *stiffness = rate / d;
 }
 
-/// What of a softness is the same at any violation.
-typedef struct law_terms {
-  double d0, dw, damping,
-      by; ///< ends of the impedance; h B; h K is h times the impedance, or that times factor, over by
-  double factor;
-  int direct; ///< stiffness and damping are given
-} law_terms;
-
-static law_terms terms_of(const cav_state *state, const cav_softness *softness) {
-  double h = state->options.timestep, kappa = softness->solref[0], zeta = softness->solref[1];
-  law_terms t = {.d0 = clamp_between(softness->solimp[0], IMPEDANCE_MIN, IMPEDANCE_MAX),
-                 .dw = clamp_between(softness->solimp[1], IMPEDANCE_MIN, IMPEDANCE_MAX)};
-  if ((kappa > 0) != (zeta > 0)) kappa = 0.02, zeta = 1;
-  t.direct = !(kappa > 0);
-  if (t.direct) {
-    t.damping = h * -zeta / t.dw;
-    t.factor = h * -kappa;
-    t.by = t.dw * t.dw;
-  } else {
-    if (state->options.refsafe) { kappa = larger(kappa, 2 * h); }
-    t.damping = h * 2 / larger(R_MIN, t.dw * kappa);
-    t.factor = h;
-    t.by = larger(R_MIN, t.dw * t.dw * kappa * kappa * zeta * zeta);
-  }
-  return t;
-}
-
-// by solref and solimp; violation x >= 0
-static cav_law solref_law(const cav_softness *softness, const law_terms *t, double x, double weight) {
-  const double d = impedance(softness->solimp, t->d0, t->dw, x);
-  return (cav_law){larger(R_MIN, (1 - d) / d * weight), t->damping, t->factor * d / t->by};
-}
-
 void cav_stabilisation_prepare(cav_state *state) {
   const cav_options *o = &state->options;
   if (o->stabilisation != CAV_STABILISATION_DISCRETE) return;
   double z = o->time_constant > 0 ? exp(-o->timestep / o->time_constant) : 0;
   state->work->discrete_damping = (1 + o->softness) * (1 - z * z);
   state->work->discrete_stiffness = (1 + o->softness) * (1 - z) * (1 - z) / o->timestep;
-}
-
-// by the discrete step: the same for every row but R
-static cav_law discrete_law(const cav_state *state, double weight) {
-  const cav_workspace *w = state->work;
-  return (cav_law){larger(R_MIN, state->options.softness * weight), w->discrete_damping, w->discrete_stiffness};
 }
 
 cav_law cav_law_at(const cav_state *state, const cav_softness *softness, double x, double weight) {
@@ -345,18 +284,8 @@ double cav_contact_stiffness_ratio(const cav_state *state, const cav_contact *c,
   return fraction;
 }
 
-// inverse weight of a contact. Next to a base that is fixed, a link (the turret of an arm) has almost none where its joints
-// cannot move it, and its softness would be as small: a smoothed law, which reaches across gaps, would press with forces
-// beyond any bound. There it has at least a quarter of that of all that moves: less than any body has whose base is free,
-// along a single line (a third, the mean of its three directions), too.
-static double contact_weight(const cav_state *state, const cav_pair *pair) {
-  const cav_model *model = state->model;
-  return state->options.smoothing > 0 && model->mass > 0 ? larger(pair->weight[0], 0.25 / model->mass)
-                                                         : pair->weight[0];
-}
-
 // R of the friction rows so that R_j mu_j^2 is the same for all (22); all rows share the damping
-static void soften_contact(cav_state *state, cav_contact *c, const law_terms *terms, double inverse_impratio) {
+static void soften_contact(const cav_state *state, cav_contact *c, const law_terms *terms, double inverse_impratio) {
   const cav_pair *pair = &state->model->pair[c->pair];
   double rate, weight = contact_weight(state, pair) / cav_contact_stiffness_ratio(state, c, &rate);
   const double x = larger(0, c->margin - c->dist);
@@ -397,6 +326,12 @@ void cav_contacts_soften(cav_state *state) {
     }
     soften_contact(state, c, discrete ? NULL : &terms, inverse_impratio);
   }
+}
+
+void cav_contact_soften(const cav_state *state, cav_contact *c) {
+  const law_terms terms = terms_of(state, &state->model->pair[c->pair].softness);
+  const int discrete = state->options.stabilisation == CAV_STABILISATION_DISCRETE;
+  soften_contact(state, c, discrete ? NULL : &terms, 1 / larger(R_MIN, state->options.impratio));
 }
 
 double cav_row_velocity(const cav_state *state, const cav_row *row, const double *v) {

@@ -42,6 +42,7 @@ static size_t layout(const cav_model *m, char *base, cav_lanes *l) {
   l->centre = carve(base, &used, 3 * m->ngeom);
   l->near = (int *)carve(base, &used, m->npair / (int)(sizeof(cav_four) / sizeof(int)) + 1);
   l->limit = (double *)carve(base, &used, m->npair / CAV_LANES + 1);
+  l->law = (cav_pair_law *)carve(base, &used, m->npair * (int)(sizeof(cav_pair_law) / sizeof(cav_four) + 1));
   l->bounded = (int *)carve(base, &used, m->njoint / (int)(sizeof(cav_four) / sizeof(int)) + 1);
   return used;
 }
@@ -120,15 +121,17 @@ void cav_lanes_kinematics(const cav_model *model, cav_lanes *l, cav_state *const
   cav_lanes_gather(l->q, (const double *const[])OF_EACH(work->q), model->nq);
   if (turn_hinges(w, l)) turn_far(w, l);
   place(model, w, l);
-  cav_lanes_scatter((double *const[])OF_EACH(link[0].pos), (const cav_four *)l->link,
-                    n * (int)(sizeof(cav_pose) / sizeof(double)));
-  cav_lanes_scatter((double *const[])OF_EACH(reference), l->reference, 3 * n);
+  if (extent != CAV_EXTENT_NONE) {
+    cav_lanes_scatter((double *const[])OF_EACH(link[0].pos), (const cav_four *)l->link,
+                      n * (int)(sizeof(cav_pose) / sizeof(double)));
+    cav_lanes_scatter((double *const[])OF_EACH(reference), l->reference, 3 * n);
+  }
   if (extent == CAV_EXTENT_ALL) {
     cav_lanes_scatter((double *const[])OF_EACH(com), l->com, 3 * n);
     cav_lanes_scatter((double *const[])OF_EACH(inertia), l->inertia, 6 * n);
   }
   // velocities that contacts begin with are not those of the bias
-  if (extent == CAV_EXTENT_ALL || cav_takes_mean(state[0]))
+  if (extent == CAV_EXTENT_ALL || (extent == CAV_EXTENT_CONTACTS && cav_takes_mean(state[0])))
     cav_lanes_scatter((double *const[])OF_EACH(axis), l->axis, 6 * model->nv);
   for (int lane = 0; lane < CAV_LANES; lane++) cav_kinematics_close(model, state[lane]);
 }
@@ -148,6 +151,19 @@ void cav_lanes_newton_euler(const cav_model *model, cav_lanes *l, cav_state *con
   cav_lanes_scatter((double *const[])OF_EACH(velocity_next), l->velocity_next, n);
   cav_lanes_scatter((double *const[])OF_EACH(work->acceleration), l->acceleration, n);
   cav_lanes_scatter((double *const[])OF_EACH(force), l->force, n);
+}
+
+CAV_BY_FOUR const cav_four *cav_lanes_velocities(const cav_model *model, cav_lanes *l) {
+  cav_four *velocity = l->acceleration;
+  memset(velocity, 0, 6 * sizeof *velocity);
+  for (int i = 1; i < model->nlink; i++) {
+    const cav_link *link = &model->link[i];
+    cav_four V[6];
+    copy6(V, velocity + 6 * link->parent);
+    for (int k = link->dof; k < link->dof + link->ndof; k++) axpy6(V, V, l->v[k], l->axis + 6 * k);
+    copy6(velocity + 6 * i, V);
+  }
+  return velocity;
 }
 
 CAV_BY_FOUR static void project(const cav_model *model, const cav_state *state, cav_lanes *l) {

@@ -13,6 +13,17 @@ typedef struct cav_lane_pose {
   cav_four pos[3], rotation[9], quat[4];
 } cav_lane_pose;
 
+/// What the contacts of a pair have in common under the options of a batch.
+typedef struct cav_pair_law {
+  const cav_pair *pair; ///< NULL: not known yet
+  int link[2];
+  double weight, regulariser, stiffness,
+      damping; ///< inverse weight; R and h K where they are the same at any violation; h B
+  double ends[2], width, midpoint, power,
+      factor;                   ///< of the impedance where they are not; h K over the impedance
+  double friction[5], ratio[6]; ///< R of a friction row is ratio squared times that of the first
+} cav_pair_law;
+
 /// Arrays as in cav_state and its workspace, each number four times.
 typedef struct cav_lanes {
   cav_four *q, *half, *sine, *cosine; ///< [nq], [nhinge]
@@ -25,11 +36,13 @@ typedef struct cav_lanes {
   double *
       limit; ///< [npair] below which pairs are, by activation: what is added to margins within trees and with the world
   double activation[2];
+  cav_pair_law *law;      ///< [npair]
+  cav_options options;    ///< of those
   int nbounded, *bounded; ///< [njoint] limits that are near in some state, the same way
 } cav_lanes;
 
-/// How much of the poses goes back to the states: what contacts of primitive geoms need, or all.
-typedef enum cav_extent { CAV_EXTENT_CONTACTS, CAV_EXTENT_ALL } cav_extent;
+/// How much of the poses goes back to the states: nothing, what contacts of primitive geoms need, or all.
+typedef enum cav_extent { CAV_EXTENT_NONE, CAV_EXTENT_CONTACTS, CAV_EXTENT_ALL } cav_extent;
 
 /// Whether the processor gains by them: by two numbers at once a state alone is faster. What is below is for those that do.
 static inline int cav_lanes_pay(void) { return cav_dense_lanes() >= CAV_LANES; }
@@ -52,6 +65,9 @@ void cav_kinematics_close(const cav_model *model, cav_state *state);
 
 /// cav_newton_euler of four states after that, at v and v_next of the lanes; the states get the results if pushed.
 void cav_lanes_newton_euler(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES], int pushed);
+
+/// cav_link_velocities of four states at v of the lanes, left in them in the place of the accelerations. Returns them.
+const cav_four *cav_lanes_velocities(const cav_model *model, cav_lanes *lanes);
 
 /// cav_force_project of the forces of the states if pushed, else of those of the lanes, then cav_add_resistance; into u [nv]
 /// of each.

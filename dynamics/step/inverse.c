@@ -158,7 +158,7 @@ static void contact_push(cav_state *state, const cav_contact *c, double scale) {
 
 // f of one contact: its law at g = R^-1 (v* - v_next), v* = (1 - hB) x' - hK x in the normal row or as
 // coupled rows have it
-static void contact_impulse(const cav_state *state, cav_contact *c, const double *coupled) {
+void cav_contact_impulse(const cav_state *state, cav_contact *c, const double *coupled) {
   double g[6];
   for (int k = 0; k < c->dim; k++) {
     double target = (1 - c->damping[k]) * c->velocity[k];
@@ -191,7 +191,7 @@ static void contacts(const cav_model *model, cav_state *state, const double *vel
   for (int i = 0, known = 0; i < state->ncontact; i++) {
     cav_contact *c = &state->contact[i];
     if (i >= known && by_four && i + CAV_LANES <= state->ncontact && cav_law_four(c)) known = i + CAV_LANES;
-    if (i >= known) contact_impulse(state, c, coupled);
+    if (i >= known) cav_contact_impulse(state, c, coupled);
     if (coupled) { coupled += c->dim; }
     contact_push(state, c, scale);
   }
@@ -369,15 +369,22 @@ static int is_plain(const cav_model *model, const cav_state *state) {
          o->regulariser != CAV_REGULARISER_EXACT && !cav_looks_ahead(o) && !cav_contacts_narrow(state);
 }
 
-// positions of four states; status [4]
+// positions of four states; status [4]. Contacts that are left in the lanes are not sought here
 static void find_positions(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES],
-                           cav_extent extent, cav_status *status) {
+                           cav_extent extent, int listed, cav_status *status) {
   cav_lanes_kinematics(model, lanes, state, extent);
-  const int listed = cav_contacts_near(model, lanes, state);
+  if (listed) cav_contacts_near(model, lanes, state[0]);
+  if (listed && extent != CAV_EXTENT_NONE) cav_contacts_place_near(lanes, state);
   cav_lanes_limits(model, lanes, state[0]);
   for (int l = 0; l < CAV_LANES; l++) {
     cav_workspace *w = state[l]->work;
     const nearby near = {lanes, l, listed};
+    if (extent == CAV_EXTENT_NONE) {
+      cav_stabilisation_prepare(state[l]);
+      status[l] = cav_limits_of_near(model, state[l], lanes, l);
+      w->options = state[l]->options;
+      continue;
+    }
     status[l] = find_constraints(model, state[l], w->v, w->v_next, &near);
     if (!status[l]) status[l] = make_rooms(model, state[l]);
   }
@@ -399,15 +406,18 @@ void cav_inverse_four(const cav_model *model, cav_lanes *lanes, cav_state *const
     copy(w->v_next, v_next[l], model->nv);
     w->derived = 0;
   }
-  const cav_extent extent = is_plain(model, state[0]) ? CAV_EXTENT_CONTACTS : CAV_EXTENT_ALL;
-  find_positions(model, lanes, state, extent, status);
+  // links and contacts of plain scenes are left in the lanes
+  const int plain = is_plain(model, state[0]), listed = cav_contacts_listed(model, state[0]);
+  const cav_extent extent = !plain ? CAV_EXTENT_ALL : listed ? CAV_EXTENT_NONE : CAV_EXTENT_CONTACTS;
+  find_positions(model, lanes, state, extent, listed, status);
   cav_lanes_gather(lanes->v, v, model->nv);
   cav_lanes_gather(lanes->v_next, v_next, model->nv);
 
-  // links of states without contacts are left in the lanes
+  // so are links of states without contacts
   int pushed = extent == CAV_EXTENT_ALL;
   for (int l = 0; l < CAV_LANES; l++) pushed |= state[l]->ncontact > 0;
   cav_lanes_newton_euler(model, lanes, state, pushed);
+  if (extent == CAV_EXTENT_NONE) cav_lanes_contacts(model, lanes, state);
   for (int l = 0; l < CAV_LANES && pushed; l++) {
     if (!status[l]) push_links(model, state[l], 1, 1);
   }

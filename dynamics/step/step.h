@@ -15,6 +15,13 @@ void cav_coupled_targets(cav_state *state);
 /// Velocity of a contact in its frame, out [dim], from spatial velocities of links [nlink*6]. inverse.c.
 void cav_contact_velocity(const cav_state *state, const cav_contact *contact, const double *velocity, double *out);
 
+/// Impulse of a contact by its law at its velocities; coupled: v* of its rows, NULL: each has its own. inverse.c.
+void cav_contact_impulse(const cav_state *state, cav_contact *contact, const double *coupled);
+
+/// Wrenches of all contacts of four states into the forces of the lanes, after cav_lanes_newton_euler there; contacts
+/// are sought among the pairs that are near, and no state gets them. Plain scenes (inverse.c). lanes_contacts.c.
+void cav_lanes_contacts(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES]);
+
 /// Whether the state holds a whole evaluation of the inverse under its present options. inverse.c.
 int cav_state_evaluated(const cav_state *state);
 
@@ -23,8 +30,8 @@ int cav_state_evaluated(const cav_state *state);
 void cav_smooth_inverse(const cav_model *model, cav_state *state, const double *v, const double *v_next, double *u);
 
 /// cav_inverse at four points under the same options, with the bits of each alone, in the time of less than four: smooth
-/// parts and the broad phase go for all at once. The states are scratch: none of their evaluations may be reused.
-/// inverse.c.
+/// parts, the broad phase and in plain scenes contacts go for all at once. The states are scratch: none of their
+/// evaluations may be reused. inverse.c.
 void cav_inverse_four(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES],
                       const double *const q[CAV_LANES], const double *const v[CAV_LANES],
                       const double *const v_next[CAV_LANES], double *const u[CAV_LANES], cav_status status[CAV_LANES]);
