@@ -4,8 +4,8 @@
 
 #include "island.h"
 
-enum { CAV_SPARSE_FROM = 2000000 }; ///< where both ways take the same time on heaps (bench_heap)
-enum { CAV_CURVATURE = 36 };        ///< doubles of the curvature -df/dy of one block
+enum { CAV_SPARSE_FROM = 500000 }; ///< where both ways take the same time on heaps of boxes, capsules and robots
+enum { CAV_CURVATURE = 36 };       ///< doubles of the curvature -df/dy of one block
 
 /// Kept by a state from step to step for its memory and its patterns; opaque. hessian.c.
 typedef struct cav_hessian cav_hessian;
