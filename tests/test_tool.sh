@@ -186,11 +186,16 @@ run 2 inspect problem.xml --set horizon/@duration=0.4,0.5
 says err "cavort solve takes several"
 run 2 inspect model.xml --set horizon/@duration=0.4
 says err "is not a problem file"
+run 2 inspect problem.xml --set horizon/@duration=long
+check "an error of a setting names the problem's file" \
+  sh -c 'grep -q "^cavort: problem.xml:[0-9]*: <horizon>: attribute .duration.: .*, as --set has it$" err && ! grep -q cavort-set err'
 run 2 inspect problem.xml --threads 2
 says err "it runs in one thread; solve, mhe, track, study and stress have it"
 sed 's/ name="swing"//' problem.xml >nameless.xml
 run 0 solve nameless.xml --quiet
 has nameless.result/verdict.json
+run 1 mpc nameless.xml --set horizon/@duration=0.5 --duration 0.02 --quiet
+has nameless.mpc/runs.csv
 
 # --- solving ---
 

@@ -95,8 +95,35 @@ void cav_command_tell_asymmetry(const cav_problem *problem, FILE *out) {
 
 void cav_command_version(void) { cav_provenance_print_build(stdout); }
 
+char *cav_command_folder(const cav_command_line *line, const char *name, const char *suffix) {
+  if (line->output) return strdup(line->output);
+  const char *file = line->stated ? line->stated : line->operand, *slash = strrchr(file, '/');
+  const int named = name && *name;
+  if (!named) name = slash ? slash + 1 : file;
+  const char *dot = named ? NULL : strrchr(name, '.');
+  const size_t length = dot && dot > name ? (size_t)(dot - name) : strlen(name);
+  char *folder = malloc(length + strlen(suffix) + 1);
+  if (!folder) return NULL;
+  sprintf(folder, "%.*s%s", (int)length, name, suffix);
+  // a name is no path
+  for (char *c = folder; *c; c++)
+    if (*c == '/') *c = '-';
+  return folder;
+}
+
+static struct { char path[4096], as[4096]; } told;
+
+void cav_command_tell_as(const char *path, const char *as) {
+  snprintf(told.path, sizeof told.path, "%s", path);
+  snprintf(told.as, sizeof told.as, "%s", as);
+}
+
 int cav_command_fail(const cav_error *error) {
-  fprintf(stderr, "cavort: %s\n", error->text[0] ? error->text : cav_status_name(error->status));
+  const size_t n = strlen(told.path);
+  if (n && !strncmp(error->text, told.path, n))
+    fprintf(stderr, "cavort: %s%s, as --set has it\n", told.as, error->text + n);
+  else
+    fprintf(stderr, "cavort: %s\n", error->text[0] ? error->text : cav_status_name(error->status));
   switch (error->status) {
     case CAV_BAD_INPUT:
     case CAV_NOT_FINITE:

@@ -14,6 +14,7 @@ enum { CAV_COMMAND_IPOPT = 32, CAV_COMMAND_SETTINGS = 32, CAV_COMMAND_PUSHES = 1
 typedef struct cav_command_line {
   const char *arguments; ///< the command line as it was given
   const char *operand;   ///< MODEL, PROBLEM, DIR or TOPIC; NULL: none
+  const char *stated;    ///< the file whose settings made the operand; NULL: the operand itself
   int noperand;          ///< of commands that take several
   char **operands;       ///< [noperand]
   const char *model;     ///< --model, NULL: as the problem says
@@ -120,8 +121,15 @@ void cav_command_print_formats(FILE *out);
 /// Prints version, commit, compiler and features.
 void cav_command_version(void);
 
+/// Errors that begin with a path tell of another from now on: of the file that the one of the moment was made from.
+void cav_command_tell_as(const char *path, const char *as);
+
 /// Prints "cavort: text" on standard error; returns the exit status that goes with the error's status.
 int cav_command_fail(const cav_error *error);
+
+/// The folder of a result, to be freed: -o, or NAME followed by a suffix (".mpc"): what the problem is called, or else its file
+/// without its ending. NULL without memory. command.c.
+char *cav_command_folder(const cav_command_line *line, const char *name, const char *suffix);
 
 struct cav_race;
 

@@ -261,18 +261,8 @@ static cav_status write_page(const run *r, cav_error *error) {
   return status;
 }
 
-static char *folder_of(const run *r) {
-  const char *name = r->problem->name;
-  if (r->line->output) return strdup(r->line->output);
-  char *folder = malloc(strlen(name) + 12);
-  if (folder) sprintf(folder, "%s.mhe", *name ? name : "problem");
-  for (char *at = folder; at && *at; at++)
-    if (*at == '/') *at = '-';
-  return folder;
-}
-
 static cav_status write_all(run *r, cav_error *error) {
-  r->folder = folder_of(r);
+  r->folder = cav_command_folder(r->line, r->problem->name, ".mhe");
   cav_status status = r->folder ? cav_result_folder(r->folder, error) : no_memory(error);
   char *path = status ? NULL : cav_result_path(r->folder, "trajectory.csv");
   if (!status && !path) status = no_memory(error);

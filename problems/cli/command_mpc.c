@@ -166,16 +166,6 @@ static cav_status find_first(control *c, cav_error *error) {
   return c->simulation.first ? CAV_OK : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
 }
 
-static char *folder_of(const control *c) {
-  const char *name = c->problem->name;
-  if (c->line->output) return strdup(c->line->output);
-  char *folder = malloc(strlen(name) + 8);
-  if (folder) sprintf(folder, "%s.mpc", *name ? name : "problem");
-  for (char *at = folder; at && *at; at++)
-    if (*at == '/') *at = '-';
-  return folder;
-}
-
 // the run that is told of most: the first that does not stand, or that strayed farthest
 static const cav_run *worst_of(const control *c) {
   const cav_run *worst = c->run;
@@ -263,7 +253,7 @@ static cav_status write_page(const control *c, const cav_run *run, cav_error *er
 
 static cav_status write_all(control *c, cav_error *error) {
   const cav_run *worst = worst_of(c);
-  c->folder = folder_of(c);
+  c->folder = cav_command_folder(c->line, c->problem->name, ".mpc");
   cav_status status =
       c->folder ? cav_result_folder(c->folder, error) : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
   char *motion = status ? NULL : cav_result_path(c->folder, "trajectory.csv");

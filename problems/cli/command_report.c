@@ -53,23 +53,12 @@ static char *name_of(const cav_command_line *line, const cav_command_scene *scen
   return strndup(name, dot && dot > name ? (size_t)(dot - name) : strlen(name));
 }
 
-static char *folder_of(const cav_command_line *line, const char *name) {
-  if (line->output) return strdup(line->output);
-  char *folder = malloc(strlen(name) + 8);
-  if (!folder) return NULL;
-  sprintf(folder, "%s.report", name);
-  // a name is no path
-  for (char *c = folder; *c; c++)
-    if (*c == '/') *c = '-';
-  return folder;
-}
-
 int cav_command_report(const cav_command_line *line) {
   cav_error error = {0};
   cav_command_scene scene;
   if (cav_command_load(line, &scene, &error)) return cav_command_fail(&error);
   ticker tick = {.quiet = line->quiet, .terminal = isatty(2), .begin = seconds()};
-  char *name = name_of(line, &scene), *folder = name ? folder_of(line, name) : NULL;
+  char *name = name_of(line, &scene), *folder = name ? cav_command_folder(line, name, ".report") : NULL;
   cav_provenance provenance;
   cav_provenance_take(&provenance, line->arguments, scene.problem ? line->operand : NULL,
                       scene.problem ? scene.problem->model_path : line->operand);

@@ -37,7 +37,9 @@ int cav_command_set(const cav_command_line *line, int (*run)(const cav_command_l
   close(made);
   cav_status status = cav_command_write_set(line, path, &error);
   set.operand = path;
+  set.stated = line->operand;
   set.nset = 0;
+  cav_command_tell_as(path, line->operand);
   const int done = status ? cav_command_fail(&error) : run(&set);
   unlink(path);
   return done;

@@ -76,23 +76,6 @@ static int observe(void *context, const cav_progress *progress) {
   return interrupted;
 }
 
-// folder of the result: as asked, or NAME.result: after the problem, or, where it has no name, after its file
-static char *folder_of(const cav_command_line *line, const cav_problem *problem) {
-  if (line->output) return strdup(line->output);
-  const char *slash = strrchr(line->operand, '/'), *name = problem->name;
-  if (!*name) name = slash ? slash + 1 : line->operand;
-  size_t length = strlen(name);
-  if (!*problem->name && length > 4 && !strcmp(name + length - 4, ".xml")) length -= 4;
-  char *folder = malloc(length + 8);
-  if (!folder) return NULL;
-  sprintf(folder, "%.*s.result", (int)length, name);
-  // a name is no path
-  for (char *c = folder; *c; c++) {
-    if (*c == '/') *c = '-';
-  }
-  return folder;
-}
-
 // refuses a folder whose problem.xml is the problem file itself, which would be overwritten
 static cav_status check_folder(const char *folder, const cav_command_line *line, cav_error *error) {
   cav_status status = CAV_OK;
@@ -380,7 +363,7 @@ static int solve_one(const cav_command_line *line) {
     fprintf(stderr, "cavort: %s\n", problem->model->warning[i]);
   cav_command_warn_efforts(problem->model, stderr);
   cav_command_tell_asymmetry(problem, stderr);
-  char *folder = folder_of(line, problem);
+  char *folder = cav_command_folder(line, problem->name, ".result");
   int done;
   if (folder) {
     done = solve_into(line, problem, folder);

@@ -96,17 +96,6 @@ static void print_report(const cav_stress_report *report) {
   for (int i = 0; i < CAV_STRESS_SWEEPS; i++) print_range(i, &report->sweep[i]);
 }
 
-// NAME.stress, after the file
-static char *folder_of(const cav_command_line *line) {
-  if (line->output) return strdup(line->output);
-  const char *slash = strrchr(line->operand, '/'), *name = slash ? slash + 1 : line->operand;
-  const char *dot = strrchr(name, '.');
-  const size_t length = dot && dot > name ? (size_t)(dot - name) : strlen(name);
-  char *folder = malloc(length + 8);
-  if (folder) sprintf(folder, "%.*s.stress", (int)length, name);
-  return folder;
-}
-
 static cav_status write_all(const char *folder, const cav_stress_report *report, const cav_provenance *provenance,
                             cav_error *error) {
   char *page = cav_result_path(folder, "stress.html"), *ranges = cav_result_path(folder, "ranges.csv"),
@@ -150,7 +139,7 @@ int cav_command_stress(const cav_command_line *line) {
   if (cav_command_load(line, &loaded, &error)) return cav_command_fail(&error);
   const cav_stress_scene scene = {line->operand, line->model, loaded.problem != NULL, line->floating};
   cav_command_free(&loaded);
-  char *folder = folder_of(line);
+  char *folder = cav_command_folder(line, NULL, ".stress");
   if (!folder) return cav_command_fail(&(cav_error){.status = CAV_NO_MEMORY});
   signal(SIGINT, interrupt);
   signal(SIGTERM, interrupt);
