@@ -231,6 +231,22 @@ static void check_most_missed(repaired *r) {
   }
 }
 
+// a target that is missed though half of the reserve was given weighs ten times as much: one at a time, and one that is held
+// over a window by the usual tolerance
+static void check_targets(repaired *r) {
+  const cav_verdict missed = {.certified = 1, .missed_terms = 1};
+  const double from = r->term[0].from;
+  for (int held = 0; held < 2; held++) {
+    cav_strategy mended;
+    int found;
+    r->term[0].from = held ? 0.5 : from;
+    CHECK(cav_strategy_repair(&r->problem, &r->stated, &missed, 1, &mended, &found) == CAV_OK && found);
+    CHECK(mended.nterm == 2 && mended.term[0].weight == 9000 && !strcmp(mended.changed, "weights of goals 10 times"));
+    cav_strategy_clear(&mended);
+  }
+  r->term[0].from = from;
+}
+
 // closed loops that are lost: contact forces cost something, then half the step
 static void check_loops(repaired *r) {
   const cav_verdict lost = {.achieved = 1};
@@ -359,7 +375,8 @@ static void check_goals(repaired *r) {
 
 // the usual cure of what is missed first, one more at each call; the problem stays as it was
 static void test_repair(void) {
-  void (*const check[])(repaired *) = {check_loops, check_most_missed, check_record, check_slides, check_goals};
+  void (*const check[])(repaired *) = {check_loops,  check_most_missed, check_record,
+                                       check_slides, check_goals,       check_targets};
   for (size_t i = 0; i < sizeof check / sizeof *check; i++) {
     repaired r;
     repaired_make(&r);

@@ -80,11 +80,10 @@ static cav_status add_term(const cav_problem *p, cav_strategy *s, const cav_term
   return status;
 }
 
-/// Costs that have to be met: at one time, or within a tolerance.
-static int is_goal(const cav_term *term) {
+/// Costs that have to be met: at one time, held over a window, or within a tolerance.
+static int is_goal(const cav_problem *p, const cav_term *term) {
   int contacts = cav_quantity_rule_of(term->quantity)->of == CAV_OF_CONTACTS;
-  return !contacts && term->use == CAV_USE_COST && isfinite(term->within) &&
-         (term->from == term->to || term->within > 0);
+  return !contacts && term->use == CAV_USE_COST && isfinite(cav_term_tolerance(p, term, 1));
 }
 
 /// Those that are missed, or all where none is known to be.
@@ -92,7 +91,7 @@ static cav_status weigh_goals(const cav_problem *p, const cav_verdict *v, cav_st
   cav_status status = own_terms(p, s);
   for (int i = 0; i < s->nterm && !status; i++) {
     int missed = v->missed_terms == 0 || (i < 64 && (v->missed_terms >> i & 1));
-    if (missed && is_goal(&s->term[i])) s->term[i].weight *= heavier;
+    if (missed && is_goal(p, &s->term[i])) s->term[i].weight *= heavier;
   }
   return status;
 }
@@ -184,13 +183,13 @@ static void describe(const cav_problem *p, cav_strategy *s) {
   *out = 0;
   int goals = 0, heavy = 0;
   for (int i = 0; i < p->nterm && s->term; i++) {
-    if (!is_goal(&p->term[i]) || !(p->term[i].weight > 0)) continue;
+    if (!is_goal(p, &p->term[i]) || !(p->term[i].weight > 0)) continue;
     goals++, heavy += s->term[i].weight != p->term[i].weight;
   }
   for (int i = 0; i < p->nterm && heavy; i++) {
     size_t n = strlen(out);
     double times = p->term[i].weight > 0 ? s->term[i].weight / p->term[i].weight : 1;
-    if (!is_goal(&p->term[i]) || times == 1) continue;
+    if (!is_goal(p, &p->term[i]) || times == 1) continue;
     if (heavy == goals) {
       snprintf(out, room, ", weights of goals %g times", times);
       break;
