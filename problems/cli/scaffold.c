@@ -14,10 +14,17 @@ static const double degrees = 57.295779513082320877;
 
 // ---------------------------------------------------------------- what there is
 
+// a foot that is less than its body, a ball at the end of a shank, is where that is
 static void pose_of_role(const cav_model *m, const cav_state *state, const cav_roles *roles, cav_role role,
                          cav_pose *pose) {
-  cav_object_pose(m, state, CAV_OBJECT_XBODY, roles->body[role], pose);
+  if (roles->geom[role] >= 0)
+    cav_object_pose(m, state, CAV_OBJECT_GEOM, roles->geom[role], pose);
+  else
+    cav_object_pose(m, state, CAV_OBJECT_XBODY, roles->body[role], pose);
 }
+
+// tolerance of a wish: the usual one, or of a small one a third of it, so that who stays where it is misses it
+static double tolerance_of(double wish, double usual) { return fmin(usual, fabs(wish) / 3); }
 
 // height of the trunk above the lowest foot
 static double height_of(const cav_model *m, const cav_state *state, const cav_roles *roles) {
@@ -212,12 +219,11 @@ static int write_crouch(FILE *out, cav_scaffold *s) {
   write_horizon(out, 2, 0.04);
   write_start(out, s);
   fprintf(out,
-          "\n  <cost>\n    <!-- half way, the %s is lower than at the start, m; found within 0.03 m it counts as "
-          "achieved (within=) -->\n"
+          "\n  <cost>\n    <!-- half way, the %s is lower than at the start, m; off by at most within= it counts as "
+          "achieved -->\n"
           "    <sensor name=\"down\" type=\"framepos\" xbody=\"%s\" component=\"z\" relative=\"start\" target=\"%.3g\" "
-          "at=\"1\" "
-          "weight=\"3000\"/>\n",
-          trunk, trunk, -0.12 * s->height);
+          "at=\"1\" within=\"%.2g\" weight=\"3000\"/>\n",
+          trunk, trunk, -0.12 * s->height, tolerance_of(0.12 * s->height, CAV_WITHIN_LENGTH));
   write_rest(out);
   fputs("  </cost>\n</problem>\n", out);
   return 1;
@@ -231,13 +237,16 @@ static int write_reach(FILE *out, cav_scaffold *s) {
   write_horizon(out, 1, 0.02);
   write_start(out, s);
   // towards its base, where every arm reaches
-  fprintf(out,
-          "\n  <cost>\n    <!-- at the end the hand is so far from where it was, m -->\n"
-          "    <sensor name=\"target\" type=\"framepos\" body=\"hand\" relative=\"start\" target=\"%.3f %.3f %.3f\" "
-          "at=\"end\" "
-          "weight=\"3000\"/>\n    <velocity name=\"final rest\" dofs=\"all\" at=\"end\" weight=\"100\"/>\n  "
-          "</cost>\n</problem>\n",
-          -0.15 * h[0], -0.15 * h[1], -0.15 * h[2]);
+  double way = 0.15 * hypot(hypot(h[0], h[1]), h[2]);
+  fprintf(
+      out,
+      "\n  <cost>\n    <!-- at the end the hand is so far from where it was, m; off by at most within= it counts as "
+      "achieved -->\n"
+      "    <sensor name=\"target\" type=\"framepos\" body=\"hand\" relative=\"start\" target=\"%.3g %.3g %.3g\" "
+      "at=\"end\" within=\"%.2g\" weight=\"3000\"/>\n    <velocity name=\"final rest\" dofs=\"all\" at=\"end\" "
+      "weight=\"100\"/>\n  "
+      "</cost>\n</problem>\n",
+      -0.15 * h[0], -0.15 * h[1], -0.15 * h[2], tolerance_of(way, CAV_WITHIN_LENGTH));
   return 1;
 }
 
@@ -270,9 +279,14 @@ static int write_turn(FILE *out, cav_scaffold *s) {
   cav_file_write_xml(out, joint->name);
   fprintf(out, "\" %s=\"%.4g\"/>\n  </goal>\n\n  <cost>\n", turns ? "degrees" : "pos",
           (turns ? degrees : 1) * (q + by));
-  fputs("    <!-- at the end that joint is at the goal, and at rest -->\n    <posture name=\"goal\" joint=\"", out);
+  fputs(
+      "    <!-- at the end that joint is at the goal (off by at most within= it counts so), and at rest -->\n    "
+      "<posture name=\"goal\" joint=\"",
+      out);
   cav_file_write_xml(out, joint->name);
-  fputs("\" at=\"end\" weight=\"900\"/>\n    <velocity name=\"final rest\" joint=\"", out);
+  fprintf(out, "\" at=\"end\" within=\"%.2g\" weight=\"900\"/>\n    <velocity name",
+          tolerance_of(by, turns ? CAV_WITHIN_ANGLE : CAV_WITHIN_LENGTH));
+  fputs("=\"final rest\" joint=\"", out);
   cav_file_write_xml(out, joint->name);
   fputs("\" at=\"end\" weight=\"100\"/>\n  </cost>\n</problem>\n", out);
   return 1;
