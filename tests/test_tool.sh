@@ -313,7 +313,7 @@ silent out
 check "nothing was written" [ ! -e weak ]
 run 1 solve strict.xml --model weak.xml -o weak --json --quiet
 says out '"impossible": "joint'
-run 0 inspect strict.xml --model weak.xml
+run 1 inspect strict.xml --model weak.xml
 check "inspect says so first" sh -c 'head -n 1 out | grep -q "^impossible: "'
 run 1 solve strict.xml --model weak.xml -o weak --force
 check "the first line still names the cause" sh -c 'head -n 1 err | grep -q "^cavort: impossible: "'

@@ -104,8 +104,17 @@ static void examine_posture(cav_examination *e, const cav_state *state, const ch
   // what stands is named last
   int stands = m->geom[pair->geom2].link == 0 ? pair->geom2 : pair->geom1;
   int moves = stands == pair->geom1 ? pair->geom2 : pair->geom1;
-  cav_impossible(e, CAV_CONDITION_SOLID, NULL,
-                 "Change the posture; height='floor' lifts it onto a floor, cavort inspect shows its depths.",
+  // height='floor' lifts onto planes, and lowers onto whatever is below: out of another solid it lifts nothing
+  const cav_link *root = &m->link[m->link[m->geom[moves].link].root];
+  int floats = root->njoint && m->joint[root->joint].type == CAV_JOINT_FREE, fixed = m->geom[stands].link == 0;
+  const char *cure = "Change the posture, or move the solid; cavort inspect shows its depths.";
+  if (fixed && m->geom[stands].type == CAV_GEOM_PLANE)
+    cure = "Change the posture; height='floor' lifts it onto a floor, cavort inspect shows its depths.";
+  else if (fixed && floats)
+    cure =
+        "Change the posture: to stand on that, <root pos='X Y Z'/> with Z above it; height='floor' then lowers it "
+        "there.";
+  cav_impossible(e, CAV_CONDITION_SOLID, NULL, cure,
                  "%s: geom '%.48s' is %.3g mm inside '%.48s', and a certificate allows %g", which,
                  cav_geom_label(m, moves, one), -1e3 * deepest->dist, cav_geom_label(m, stands, other),
                  1e3 * CAV_TOLERANCE_PENETRATION);

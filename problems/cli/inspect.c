@@ -473,11 +473,13 @@ int cav_command_inspect(const cav_command_line *line) {
   cav_command_scene scene;
   if (cav_command_load(line, &scene, &error)) return cav_command_fail(&error);
   cav_status status = CAV_OK;
+  int proofs = 0;
   if (scene.problem) {
-    if (cav_command_impossible(stdout, "", scene.problem, 3, &error) < 0) status = error.status;
+    if ((proofs = cav_command_impossible(stdout, "", scene.problem, 3, &error)) < 0) status = error.status;
     if (!status) status = print_problem(scene.problem, &error);
   }
   if (!status) print_model(scene.model);
   cav_command_free(&scene);
-  return status ? cav_command_fail(&error) : 0;
+  if (status) return cav_command_fail(&error);
+  return proofs ? CAV_EXIT_NOT_CERTIFIED : CAV_EXIT_CERTIFIED;
 }
