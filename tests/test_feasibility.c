@@ -537,6 +537,33 @@ static void check_damped(void) {
   }
 }
 
+// the same of what slides move: a geom on one of them, and on two that are askew, the centre of mass of both
+static void check_slid(void) {
+  static const char *const model =
+      "<mujoco><worldbody><body name='car'><joint name='x' type='slide' axis='1 0 0'/><geom size='.1' mass='3'/><body "
+      "name='load' pos='0 0 .5'><joint name='y' type='slide' axis='0 1 0'/><geom name='load' size='.1' mass='1' "
+      "contype='0' conaffinity='0'/></body></body></worldbody><actuator><motor joint='x' gear='-40' ctrllimited='true' "
+      "ctrlrange='-1 1'/><motor joint='y' gear='8' ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>";
+  static const struct {
+    const char *name, *what, *axis;
+    double force_over_mass;
+  } wish[] = {{"a geom on two slides, along the first", "type='framepos' geom='load'", "x", 10},
+              {"a geom on two slides, along the second", "type='framepos' geom='load'", "y", 8},
+              {"a centre of mass on a slide", "type='subtreecom' body='car'", "x", 10},
+              {"a centre of mass of which one slides", "type='subtreecom' body='car'", "y", 2}};
+  const double h = 0.01, time = 1 + h;
+  for (size_t k = 0; k < 2 * sizeof wish / sizeof *wish; k++) {
+    const double way = (k & 1 ? -1 : 1) * wish[k / 2].force_over_mass * time * time / 4;
+    for (int beyond = 0; beyond < 2; beyond++) {
+      char terms[400];
+      snprintf(terms, sizeof terms,
+               CONSTRAINT("<sensor name='far' %s component='%s' relative='start' target='%.9f' at='end'/>"),
+               wish[k / 2].what, wish[k / 2].axis, way * (beyond ? 1.001 : 0.97));
+      check_threshold(wish[k / 2].name, model, "duration='1' timestep='.01'", "", terms, beyond);
+    }
+  }
+}
+
 // F T²/2m to an open end, a half of that to rest, by a hard speed or by the way it closes; T a step longer. Against gravity
 // (F/m - g) T²/2
 static void check_slides(void) {
@@ -571,6 +598,7 @@ int main(void) {
   check_travel();
   check_held();
   check_slides();
+  check_slid();
   check_histories();
   static const char *const file[] = {"model.xml", "problem.xml"};
   for (int i = 0; i < 2; i++) {

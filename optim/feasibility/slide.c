@@ -2,11 +2,14 @@
 ///
 /// Its inertia is constant and diagonal, so each slide is a mass under a constant force and one between limits. The farthest
 /// place with at most a speed at the end is that of full force one way and then the other (bang-bang): of a mass m from rest to
-/// rest F T²/4m, F T²/2m where it may still move. A step more than the time is counted, which is what implicit steps gain.
+/// rest F T²/4m, F T²/2m where it may still move. A step more than the time is counted, which is what implicit steps gain. A
+/// point, or a centre of mass, comes as far along an axis of the world as all slides that move it take it together.
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "feasibility.h"
+#include "math3.h"
 #include "problem_file.h"
 
 static const double slack = 1e-5; // of ways and speeds, relative and in their unit
@@ -83,22 +86,76 @@ static void tell(cav_examination *e, const cav_requirement *r, double way, doubl
                  time);
 }
 
-static void examine(cav_examination *e, const cav_requirement *r, const double *mass, const double *force) {
-  const int d = e->model->joint[r->object].dof;
-  const double h = e->problem->timestep * e->longest, time = cav_requirement_time(e, r->knot),
-               *hold = mass + e->model->nv;
-  const double start = e->problem->q_start[e->model->joint[r->object].q], speed = e->problem->v_start[d];
+/// What is known of the model.
+typedef struct slides {
+  double *mass, *hold, *force; ///< [nv] kg; what holds them at rest, largest effort, N
+  double *weight;              ///< [nv] of what is required, by each slide
+} slides;
+
+/// How far a slide comes from its start by a knot at most, to one side (way 1: along its axis).
+static double can_come(const cav_examination *e, const slides *s, int knot, int d, int way) {
+  const double h = e->problem->timestep * e->longest, time = cav_requirement_time(e, knot);
+  const double speed = e->problem->v_start[d];
   // greatest accelerations to either side, and speeds
-  const double gain[2] = {(force[d] + hold[d]) / mass[d], (force[d] - hold[d]) / mass[d]};
+  const double gain[2] = {(s->force[d] + s->hold[d]) / s->mass[d], (s->force[d] - s->hold[d]) / s->mass[d]};
   double most[2];
-  speeds_at(e, r->knot, d, most);
-  for (int way = 0; way < 2; way++) {
-    const double sign = way ? 1 : -1, wanted = way ? r->low[0] - start : start - r->high[0];
-    if (!(wanted > 0)) continue;
-    // sums over steps are off an integral by a half of what speeds at its ends make of one
-    const double ends = fabs(speed) + (isfinite(most[way]) ? fabs(most[way]) : 0);
-    const double can = farthest(gain[way], gain[!way], sign * speed, most[way], time + h) + h * ends;
-    if (wanted > can + slack * (1 + can)) tell(e, r, wanted, can, time);
+  speeds_at(e, knot, d, most);
+  // sums over steps are off an integral by a half of what speeds at its ends make of one
+  const double ends = fabs(speed) + (isfinite(most[way]) ? fabs(most[way]) : 0);
+  return farthest(gain[way], gain[!way], (way ? 1 : -1) * speed, most[way], time + h) + h * ends;
+}
+
+/// Adds by how much the slides above a link move it along a world axis.
+static void add_slides(const cav_examination *e, int link, int axis, double part, double *weight) {
+  const cav_model *m = e->model;
+  for (; link > 0; link = m->link[link].parent)
+    for (int j = m->link[link].joint; j < m->link[link].joint + m->link[link].njoint; j++)
+      weight[m->joint[j].dof] += part * e->start->axis[6 * (size_t)m->joint[j].dof + 3 + (size_t)axis];
+}
+
+/// Where a coordinate of what is required is at the start, and by how much each slide moves it.
+static double weigh_slides(const cav_examination *e, const cav_requirement *r, int axis, double *weight) {
+  const cav_model *m = e->model;
+  memset(weight, 0, (size_t)m->nv * sizeof *weight);
+  if (r->kind == CAV_REQUIRE_COORDINATE) {
+    weight[m->joint[r->object].dof] = 1;
+    return e->problem->q_start[m->joint[r->object].q];
+  }
+  if (r->kind == CAV_REQUIRE_POINT) {
+    double at[3];
+    transform(at, e->start->link[r->object].pos, e->start->link[r->object].rotation, r->point);
+    add_slides(e, r->object, axis, 1, weight);
+    return at[axis];
+  }
+  double sum = 0, mass = 0, centre[3], at[3];
+  for (int i = r->object; i < m->nbody; i++) {
+    const cav_body *b = &m->body[i];
+    if (!(b->mass > 0) || !cav_body_within(m, i, r->object)) continue;
+    cav_body_centre(b, centre);
+    transform(at, e->start->link[b->link].pos, e->start->link[b->link].rotation, centre);
+    add_slides(e, b->link, axis, b->mass, weight);
+    sum += b->mass * at[axis], mass += b->mass;
+  }
+  for (int d = 0; d < m->nv && mass > 0; d++) weight[d] /= mass;
+  return mass > 0 ? sum / mass : 0;
+}
+
+static void examine(cav_examination *e, const cav_requirement *r, const slides *s) {
+  const double time = cav_requirement_time(e, r->knot);
+  for (int axis = 0; axis < (r->kind == CAV_REQUIRE_COORDINATE ? 1 : 3); axis++) {
+    const double start = weigh_slides(e, r, axis, s->weight);
+    for (int way = 0; way < 2; way++) {
+      const double wanted = way ? r->low[axis] - start : start - r->high[axis];
+      double can = 0;
+      if (!(wanted > 0)) continue;
+      for (int d = 0; d < e->model->nv; d++)
+        if (fabs(s->weight[d]) > 1e-12)
+          can += fabs(s->weight[d]) * can_come(e, s, r->knot, d, s->weight[d] > 0 ? way : !way);
+      // what no slide moves is told as such (direction.c)
+      if (can == 0 || !(wanted > can + slack * (1 + fabs(can)))) continue;
+      tell(e, r, wanted, can, time);
+      return;
+    }
   }
 }
 
@@ -106,15 +163,16 @@ cav_status cav_examine_slides(cav_examination *e) {
   const cav_model *m = e->model;
   int known = 0, bounded = 0;
   if (!cav_start_is_given(e->problem) || e->n == 0 || !is_covered(m)) return CAV_OK;
-  double *mass = malloc(3 * (size_t)m->nv * sizeof *mass);
+  double *mass = malloc(4 * (size_t)m->nv * sizeof *mass);
   if (!mass) return CAV_NO_MEMORY;
+  const slides s = {mass, mass + m->nv, mass + 2 * m->nv, mass + 3 * m->nv};
   cav_options options = e->scratch->options;
   cav_status status = find_masses(e, mass, &known);
   e->scratch->options = options;
-  if (!status) status = cav_effort_of_dofs(e, mass + 2 * m->nv, &bounded);
+  if (!status) status = cav_effort_of_dofs(e, s.force, &bounded);
   for (int i = 0; i < e->n && known && bounded && !status && e->nfound == 0; i++) {
     const cav_requirement *r = &e->requirement[i];
-    if (r->kind == CAV_REQUIRE_COORDINATE && r->knot > 0) examine(e, r, mass, mass + 2 * m->nv);
+    if (r->knot > 0 && (r->kind != CAV_REQUIRE_POINT || r->object > 0)) examine(e, r, &s);
   }
   free(mass);
   return status;
