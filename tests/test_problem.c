@@ -298,7 +298,7 @@ static void check_trajectory_ends(void) {
   cav_problem *p = load(HEAD TAIL);
   if (!p) return;
   cav_trajectory *trajectory = cav_trajectory_new(p->model, 3, .1);
-  for (int i = 0; i < 12; i++) trajectory->q[i] = -.01 * i;
+  for (int i = 0; i < 12; i++) trajectory->q[i] = -.01 * i, trajectory->v[i] = .1 * i;
   cav_error error;
   CHECK(cav_trajectory_write(csv_path, p->model, trajectory, &error) == CAV_OK);
   cav_problem *q = load(
@@ -308,7 +308,16 @@ static void check_trajectory_ends(void) {
   if (q) {
     CHECK_NEAR_ALL(q->q_start, trajectory->q, 4, 0);
     CHECK_NEAR_ALL(q->q_goal, trajectory->q + 8, 4, 0);
+    static const double rest[4] = {0};
+    CHECK_NEAR_ALL(q->v_start, rest, 4, 0);
   }
+  cav_problem_free(q);
+  // a motion goes on where another one ended, as fast
+  q = load(
+      "<problem name='p' model='leg.xml'>\n<horizon duration='1' timestep='.05'/>\n<start file='motion.csv' "
+      "velocity='file'/>\n" TAIL);
+  if (q) CHECK_NEAR_ALL(q->q_start, trajectory->q + 8, 4, 0);
+  if (q) CHECK_NEAR_ALL(q->v_start, trajectory->v + 8, 4, 0);
   cav_problem_free(q);
   cav_trajectory_free(trajectory);
   cav_problem_free(p);

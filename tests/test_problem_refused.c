@@ -116,6 +116,7 @@ static void check_broken_starts(void) {
   refuse_start("<start qpos='0 0 0 0' key='bent'/>", "contradicts");
   refuse_start("<start qvel='1'/>", "expected 4 numbers");
   refuse_start("<start knot='last'/>", "file");
+  refuse_start("<start velocity='file'/>", "attribute 'file', which is missing");
   refuse_start("<start file='absent.csv'/>", "absent.csv");
   refuse_start("<start><joint name='ankle' pos='1'/></start>", "no joint of that name");
   refuse_start("<start><joint name='kne' pos='1'/></start>", "did you mean 'knee'");

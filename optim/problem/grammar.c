@@ -32,6 +32,7 @@ const char *const cav_problem_mirrors[] = {
     [CAV_MIRROR_NONE] = "none", [CAV_MIRROR_X] = "x", [CAV_MIRROR_Y] = "y", NULL};
 static const char *const heights[] = {"keep", "floor", NULL};
 static const char *const clippings[] = {"keep", "clip", NULL};
+static const char *const rates[] = {"rest", "file", NULL};
 static const char *const ends[] = {"first", "last", NULL};
 static const char *const frames[] = {"body", "xbody", "geom", "site", NULL};
 static const char *const relations[] = {"none", "start", "goal", NULL};
@@ -93,6 +94,7 @@ static const cav_xml_element start = {
     "start", 1, 1,
     ATTRIBUTES(
         POSE_SOURCE, REALS("qvel", 1, 0, "rad/s or m/s", "(zeros)", "velocity at the start, nv numbers"),
+        WORD("velocity", rates, "rest", "file: the velocity at that knot of the file is the start's, too"),
         FLAG("free", "false", "posture and velocity at the start are found too: what stands here is where the guess starts")),
     CHILDREN(&pose_root, &pose_joint), 0, "posture and velocity that the motion begins with"};
 static const cav_xml_element goal = {

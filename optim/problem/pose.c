@@ -135,8 +135,8 @@ static cav_status read_numbers(const cav_problem_reader *reader, const cav_xml_n
   return CAV_OK;
 }
 
-// first or last knot of a trajectory
-static cav_status read_knot(const cav_problem_reader *reader, const cav_xml_node *node, double *q) {
+// first or last knot of a trajectory: its configuration, or where q is NULL its velocity
+static cav_status read_knot(const cav_problem_reader *reader, const cav_xml_node *node, double *q, double *v) {
   char *path = cav_file_beside(reader->path, cav_xml_text(node, "file", ""));
   if (!path) return cav_problem_no_memory(reader);
   cav_error inner = {0};
@@ -144,7 +144,8 @@ static cav_status read_knot(const cav_problem_reader *reader, const cav_xml_node
   free(path);
   if (!trajectory) return cav_xml_fail_as(reader->error, inner.status, node, "file", "%s", inner.text);
   int knot = cav_xml_word(node, "knot", 1) ? trajectory->nknot - 1 : 0;
-  memcpy(q, trajectory->q + knot * trajectory->nq, (size_t)trajectory->nq * sizeof(double));
+  if (q) memcpy(q, trajectory->q + knot * trajectory->nq, (size_t)trajectory->nq * sizeof(double));
+  if (v) memcpy(v, trajectory->v + knot * trajectory->nv, (size_t)trajectory->nv * sizeof(double));
   cav_trajectory_free(trajectory);
   return CAV_OK;
 }
@@ -164,7 +165,13 @@ static cav_status read_base(const cav_problem_reader *reader, const cav_xml_node
   cav_configuration_reset(reader->model, q);
   if (!first) return CAV_OK;
   if (first == source[0]) return read_key(reader, node, depth, q);
-  return first == source[1] ? read_numbers(reader, node, q) : read_knot(reader, node, q);
+  return first == source[1] ? read_numbers(reader, node, q) : read_knot(reader, node, q, NULL);
+}
+
+cav_status cav_problem_pose_velocity(const cav_problem_reader *reader, const cav_xml_node *node, double *v) {
+  if (!cav_xml_get(node, "file"))
+    return cav_xml_fail(reader->error, node, "velocity", "is that of a knot of attribute 'file', which is missing");
+  return read_knot(reader, node, NULL, v);
 }
 
 // the free joint that a <root> names, or the first; -1 and an error if it is none

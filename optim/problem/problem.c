@@ -321,6 +321,12 @@ static cav_status read_ends(const cav_problem_reader *reader) {
                         qvel->count);
   }
   if (qvel) cav_xml_reals(start, "qvel", p->v_start, m->nv);
+  if (cav_xml_word(start, "velocity", 0)) {
+    if (qvel)
+      return cav_xml_fail(reader->error, start, "velocity", "contradicts attribute 'qvel'; give one of the two");
+    status = cav_problem_pose_velocity(reader, start, p->v_start);
+    if (status) return status;
+  }
   if (!goal) {
     memcpy(p->q_goal, p->q_start, (size_t)m->nq * sizeof(double));
     return CAV_OK;
