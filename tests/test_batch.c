@@ -4,6 +4,7 @@
 /// vectors and without them.
 #include "four_states.h"
 #include "scene.h"
+#include "step.h"
 #include "touch_four.h"
 
 enum { ROWS = 203, THREADS = 5 };
@@ -152,6 +153,15 @@ int __wrap_cav_touches_four(const cav_geom_four *a, const cav_geom_four *b, doub
   return count;
 }
 
+// how often springs, friction losses and limits were
+static int by_rows;
+void __real_cav_lanes_rows(const cav_model *model, cav_lanes *lanes, const cav_state *state);
+void __wrap_cav_lanes_rows(const cav_model *model, cav_lanes *lanes, const cav_state *state);
+void __wrap_cav_lanes_rows(const cav_model *model, cav_lanes *lanes, const cav_state *state) {
+  by_rows++;
+  __real_cav_lanes_rows(model, lanes, state);
+}
+
 enum { MANY = 1000, PATH = 25 };
 
 // states in blocks: of every other block the rows follow one another in small steps; some with angles beyond any
@@ -277,6 +287,53 @@ static const char scene_heap[] =
     "friction='.5 .9 0 0 0'/><pair geom1='f' geom2='g' condim='3'/><pair geom1='h' geom2='i' "
     "condim='3'/></contact></mujoco>";
 
+// springs, friction losses and limits of scalar joints and of tendons along them, some of both ends at once
+static const char scene_rows[] =
+    "<mujoco><compiler angle='radian'/><worldbody><body pos='0 0 1'><freejoint/><geom type='capsule' size='.1 .2'/>"
+    "<body pos='0 0 .3'><joint name='a' type='hinge' axis='0 1 0' range='-.2 .3' limited='true' stiffness='30' "
+    "springref='.2' damping='.2' frictionloss='.5' solimplimit='.6 .95 .2 .3 3.5'/><geom type='capsule' size='.05 .1'/>"
+    "<body pos='0 0 .2'><joint name='b' type='hinge' axis='1 0 0' range='-.1 .1' limited='true' margin='.15' "
+    "frictionloss='.01' solreflimit='-400 -20' solimpfriction='.5 .9 .1 .5 2'/><geom type='sphere' size='.05'/>"
+    "<body pos='0 0 .2'><joint name='c' type='slide' axis='0 1 1' range='-.3 .1' limited='true' stiffness='90' "
+    "solimplimit='.7 .9 .3 .5 1'/><geom type='box' size='.05 .04 .03'/></body></body></body></body></worldbody><tendon>"
+    "<fixed range='-.1 .2' limited='true' frictionloss='.4'><joint joint='a' coef='.5'/><joint joint='b' "
+    "coef='-2'/></fixed>"
+    "<fixed range='-.3 -.1' limited='true' margin='.2' solimplimit='.5 .9 .4 .6 2.5'><joint joint='c' coef='1.5'/>"
+    "<joint joint='b' coef='.3'/></fixed></tendon></mujoco>";
+
+// what was worked out under other options is not taken
+static void test_change(cav_model *model) {
+  if (!CHECK(model != NULL)) return;
+  const int nq = model->nq, nv = model->nv;
+  double *q = scene_vector(MANY * nq), *v = scene_vector(MANY * nv), *next = scene_vector(MANY * nv),
+         *u = scene_vector(5 * nv);
+  cav_lanes *lanes = cav_lanes_new(model);
+  cav_state *state[CAV_LANES + 1];
+  for (int l = 0; l <= CAV_LANES; l++) state[l] = cav_state_new(model);
+  draw_many(model, q, v, next);
+  for (int i = 0; i < 40; i += CAV_LANES) {
+    const double *at[CAV_LANES], *now[CAV_LANES], *then[CAV_LANES];
+    double *found[CAV_LANES];
+    cav_status status[CAV_LANES];
+    for (int l = 0; l <= CAV_LANES; l++) {
+      state[l]->options.impratio = i % 8 ? 5 : 1;
+      state[l]->options.timestep = i % 16 > 4 ? 0.01 : 0.002;
+    }
+    for (int l = 0; l < CAV_LANES; l++) {
+      at[l] = row(q, i + l, nq), now[l] = row(v, i + l, nv), then[l] = row(next, i + l, nv), found[l] = row(u, l, nv);
+    }
+    cav_inverse_four(model, lanes, state, at, now, then, found, status);
+    for (int l = 0; l < CAV_LANES; l++) {
+      CHECK(!status[l] && !cav_inverse(model, state[CAV_LANES], at[l], now[l], then[l], row(u, CAV_LANES, nv)));
+      CHECK(same(found[l], row(u, CAV_LANES, nv), nv));
+    }
+  }
+  for (int l = 0; l <= CAV_LANES; l++) cav_state_free(state[l]);
+  cav_lanes_free(lanes);
+  free(q), free(v), free(next), free(u);
+  cav_model_free(model);
+}
+
 static void test_scenes(void) {
   static const char *const ours[] = {"humanoid", "robot", "quadruped", "arm", "hopper"};
   const char *shared = check_shared_models();
@@ -288,6 +345,11 @@ static void test_scenes(void) {
   }
   test_scene(scene_load(scene_joints), "every joint");
   test_scene(scene_load(scene_rest), "the rest");
+  test_change(scene_load(scene_heap));
+  test_change(scene_load(scene_rows));
+  by_rows = 0;
+  test_scene(scene_load(scene_rows), "rows");
+  CHECK(!cav_lanes_pay() || by_rows > MANY / 4);
   together = rare = 0;
   test_scene(scene_load(scene_heap), "a heap");
   CHECK(!cav_lanes_pay() || (together > 1000 && rare > 100));

@@ -43,6 +43,8 @@ static size_t layout(const cav_model *m, char *base, cav_lanes *l) {
   l->near = (int *)carve(base, &used, m->npair / (int)(sizeof(cav_four) / sizeof(int)) + 1);
   l->limit = (double *)carve(base, &used, m->npair / CAV_LANES + 1);
   l->law = (cav_pair_law *)carve(base, &used, m->npair * (int)(sizeof(cav_pair_law) / sizeof(cav_four) + 1));
+  l->row_law = (cav_row_law *)carve(
+      base, &used, (m->nv + 2 * m->ntendon + m->njoint) * (int)(sizeof(cav_row_law) / sizeof(cav_four) + 1));
   l->bounded = (int *)carve(base, &used, m->njoint / (int)(sizeof(cav_four) / sizeof(int)) + 1);
   return used;
 }
@@ -79,6 +81,14 @@ CAV_BY_FOUR void cav_lanes_scatter(double *const to[CAV_LANES], const cav_four *
   int i = 0;
   for (; i + 4 <= n; i += 4) turn_out(from + i, (double *const[]){a + i, b + i, c + i, d + i});
   for (; i < n; i++) a[i] = from[i][0], b[i] = from[i][1], c[i] = from[i][2], d[i] = from[i][3];
+}
+
+CAV_BY_FOUR int cav_lanes_finite(const cav_four *x, int n) {
+  cav_four a = {0, 0, 0, 0}, b = a;
+  int i = 0;
+  for (; i + 1 < n; i += 2) a += 0 * x[i], b += 0 * x[i + 1];
+  if (i < n) a += 0 * x[i];
+  return held_bits(a + b == 0);
 }
 
 // sines and cosines of half the turns of all hinges; whether an angle is too large for those sums
@@ -133,7 +143,7 @@ void cav_lanes_kinematics(const cav_model *model, cav_lanes *l, cav_state *const
   // velocities that contacts begin with are not those of the bias
   if (extent == CAV_EXTENT_ALL || (extent == CAV_EXTENT_CONTACTS && cav_takes_mean(state[0])))
     cav_lanes_scatter((double *const[])OF_EACH(axis), l->axis, 6 * model->nv);
-  for (int lane = 0; lane < CAV_LANES; lane++) cav_kinematics_close(model, state[lane]);
+  for (int lane = 0; lane < CAV_LANES && extent != CAV_EXTENT_NONE; lane++) cav_kinematics_close(model, state[lane]);
 }
 
 CAV_BY_FOUR static void move(const cav_model *model, const cav_state *state, cav_lanes *l) {
@@ -175,5 +185,5 @@ void cav_lanes_project(const cav_model *model, cav_lanes *l, cav_state *const st
                        double *const u[CAV_LANES]) {
   if (pushed) cav_lanes_gather(l->force, (const double *const[])OF_EACH(force), 6 * model->nlink);
   project(model, state[0], l);
-  cav_lanes_scatter(u, l->u, model->nv);
+  if (u) cav_lanes_scatter(u, l->u, model->nv);
 }

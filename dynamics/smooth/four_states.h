@@ -13,14 +13,19 @@ typedef struct cav_lane_pose {
   cav_four pos[3], rotation[9], quat[4];
 } cav_lane_pose;
 
-/// What the contacts of a pair have in common under the options of a batch.
+/// What the law of a row is made of under the options of a batch (lanes_law.h of step/).
+typedef struct cav_row_law {
+  int known, curved;                              ///< 1: R and h K depend on the violation
+  double weight, regulariser, stiffness, damping; ///< inverse weight; R and h K where they do not; h B
+  double ends[2], width, midpoint, power,
+      factor; ///< of the impedance where they do; h K is factor times that over stiffness
+} cav_row_law;
+
+/// What the contacts of a pair have in common.
 typedef struct cav_pair_law {
   const cav_pair *pair; ///< NULL: not known yet
   int link[2];
-  double weight, regulariser, stiffness,
-      damping; ///< inverse weight; R and h K where they are the same at any violation; h B
-  double ends[2], width, midpoint, power,
-      factor;                   ///< of the impedance where they are not; h K over the impedance
+  cav_row_law row;
   double friction[5], ratio[6]; ///< R of a friction row is ratio squared times that of the first
 } cav_pair_law;
 
@@ -37,7 +42,9 @@ typedef struct cav_lanes {
       limit; ///< [npair] below which pairs are, by activation: what is added to margins within trees and with the world
   double activation[2];
   cav_pair_law *law;      ///< [npair]
-  cav_options options;    ///< of those
+  cav_row_law *row_law;   ///< [nv+2*ntendon+njoint] of friction losses and limits (lanes_rows.c)
+  cav_options options;    ///< of all of those
+  int rows;               ///< 1: springs, friction losses and limits go by four
   int nbounded, *bounded; ///< [njoint] limits that are near in some state, the same way
 } cav_lanes;
 
@@ -55,6 +62,9 @@ void cav_lanes_free(cav_lanes *lanes);
 void cav_lanes_gather(cav_four *to, const double *const from[CAV_LANES], int n);
 void cav_lanes_scatter(double *const to[CAV_LANES], const cav_four *from, int n);
 
+/// A bit for each of the four arrays whose numbers are all finite.
+int cav_lanes_finite(const cav_four *x, int n);
+
 /// cav_kinematics of four states at the q in their workspaces.
 void cav_lanes_kinematics(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES],
                           cav_extent extent);
@@ -70,7 +80,7 @@ void cav_lanes_newton_euler(const cav_model *model, cav_lanes *lanes, cav_state 
 const cav_four *cav_lanes_velocities(const cav_model *model, cav_lanes *lanes);
 
 /// cav_force_project of the forces of the states if pushed, else of those of the lanes, then cav_add_resistance; into u [nv]
-/// of each.
+/// of each, or NULL: left in the lanes.
 void cav_lanes_project(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES], int pushed,
                        double *const u[CAV_LANES]);
 

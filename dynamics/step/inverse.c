@@ -369,25 +369,70 @@ static int is_plain(const cav_model *model, const cav_state *state) {
          o->regulariser != CAV_REGULARISER_EXACT && !cav_looks_ahead(o) && !cav_contacts_narrow(state);
 }
 
-// positions of four states; status [4]. Contacts that are left in the lanes are not sought here
-static void find_positions(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES],
-                           cav_extent extent, int listed, cav_status *status) {
-  cav_lanes_kinematics(model, lanes, state, extent);
-  if (listed) cav_contacts_near(model, lanes, state[0]);
-  if (listed && extent != CAV_EXTENT_NONE) cav_contacts_place_near(lanes, state);
+// positions of four states that contacts and limits are then sought at state by state; status [4]
+static void find_positions(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES], int plain,
+                           cav_status *status) {
+  const int listed = cav_contacts_listed(model, state[0]);
+  cav_lanes_kinematics(model, lanes, state, plain ? CAV_EXTENT_CONTACTS : CAV_EXTENT_ALL);
+  if (listed) {
+    cav_contacts_near(model, lanes, state[0]);
+    cav_contacts_place_near(lanes, state);
+  }
   cav_lanes_limits(model, lanes, state[0]);
   for (int l = 0; l < CAV_LANES; l++) {
     cav_workspace *w = state[l]->work;
     const nearby near = {lanes, l, listed};
-    if (extent == CAV_EXTENT_NONE) {
-      cav_stabilisation_prepare(state[l]);
-      status[l] = cav_limits_of_near(model, state[l], lanes, l);
-      w->options = state[l]->options;
-      continue;
-    }
     status[l] = find_constraints(model, state[l], w->v, w->v_next, &near);
     if (!status[l]) status[l] = make_rooms(model, state[l]);
   }
+}
+
+// what acts on dofs of each of four states, whose u have the rest; u is theirs
+static void close_four(const cav_model *model, cav_state *const state[CAV_LANES], double *const u[CAV_LANES],
+                       cav_status status[CAV_LANES]) {
+  for (int l = 0; l < CAV_LANES; l++) {
+    if (status[l]) continue;
+    const double *bias = state[l]->work->ntendon_spring ? motion_of(model, state[l]).bias : NULL;
+    push_dofs(model, state[l], 1, bias, state[l]->u);
+    status[l] = close_inverse(model, state[l], u[l]);
+    state[l]->work->valid = CAV_STAGE_NONE;
+  }
+}
+
+// scenes whose links, contacts and rows stay in the lanes: their vectors hold u at last, and the states nothing
+static void inverse_in_lanes(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES],
+                             double *const u[CAV_LANES], cav_status status[CAV_LANES]) {
+  cav_lanes_kinematics(model, lanes, state, CAV_EXTENT_NONE);
+  cav_contacts_near(model, lanes, state[0]);
+  cav_lanes_limits(model, lanes, state[0]);
+  cav_stabilisation_prepare(state[0]);
+  for (int l = 1; l < CAV_LANES; l++) {
+    state[l]->work->discrete_damping = state[0]->work->discrete_damping;
+    state[l]->work->discrete_stiffness = state[0]->work->discrete_stiffness;
+  }
+  cav_lanes_prepare(model, lanes, state[0]);
+  cav_lanes_newton_euler(model, lanes, state, 0);
+  cav_lanes_contacts(model, lanes, state);
+  double *found[CAV_LANES];
+  for (int l = 0; l < CAV_LANES; l++) found[l] = state[l]->u;
+  if (lanes->rows) {
+    cav_lanes_project(model, lanes, state, 0, NULL);
+    cav_lanes_rows(model, lanes, state[0]);
+    const int finite = cav_lanes_finite(lanes->u, model->nv);
+    cav_lanes_scatter(finite == CAV_LANE_BITS - 1 ? u : found, lanes->u, model->nv);
+    for (int l = 0; l < CAV_LANES; l++) {
+      status[l] = finite >> l & 1 ? CAV_OK : CAV_NOT_FINITE;
+      if (finite != CAV_LANE_BITS - 1 && !status[l]) copy(u[l], found[l], model->nv);
+    }
+    return;
+  }
+  cav_lanes_project(model, lanes, state, 0, found);
+  for (int l = 0; l < CAV_LANES; l++) {
+    cav_kinematics_close(model, state[l]);
+    status[l] = cav_limits_of_near(model, state[l], lanes, l);
+    state[l]->work->options = state[l]->options;
+  }
+  close_four(model, state, u, status);
 }
 
 void cav_inverse_four(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES],
@@ -399,6 +444,7 @@ void cav_inverse_four(const cav_model *model, cav_lanes *lanes, cav_state *const
     for (int l = 0; l < CAV_LANES; l++) status[l] = cav_inverse(model, state[l], q[l], v[l], v_next[l], u[l]);
     return;
   }
+  const int plain = is_plain(model, state[0]), stays = plain && cav_contacts_listed(model, state[0]);
   for (int l = 0; l < CAV_LANES; l++) {
     cav_workspace *w = state[l]->work;
     copy(w->q, q[l], model->nq);
@@ -406,29 +452,23 @@ void cav_inverse_four(const cav_model *model, cav_lanes *lanes, cav_state *const
     copy(w->v_next, v_next[l], model->nv);
     w->derived = 0;
   }
-  // links and contacts of plain scenes are left in the lanes
-  const int plain = is_plain(model, state[0]), listed = cav_contacts_listed(model, state[0]);
-  const cav_extent extent = !plain ? CAV_EXTENT_ALL : listed ? CAV_EXTENT_NONE : CAV_EXTENT_CONTACTS;
-  find_positions(model, lanes, state, extent, listed, status);
   cav_lanes_gather(lanes->v, v, model->nv);
   cav_lanes_gather(lanes->v_next, v_next, model->nv);
+  if (stays) {
+    inverse_in_lanes(model, lanes, state, u, status);
+    return;
+  }
+  find_positions(model, lanes, state, plain, status);
 
-  // so are links of states without contacts
-  int pushed = extent == CAV_EXTENT_ALL;
+  // links of states without contacts are left in the lanes
+  int pushed = !plain;
   for (int l = 0; l < CAV_LANES; l++) pushed |= state[l]->ncontact > 0;
   cav_lanes_newton_euler(model, lanes, state, pushed);
-  if (extent == CAV_EXTENT_NONE) cav_lanes_contacts(model, lanes, state);
   for (int l = 0; l < CAV_LANES && pushed; l++) {
     if (!status[l]) push_links(model, state[l], 1, 1);
   }
   double *found[CAV_LANES];
   for (int l = 0; l < CAV_LANES; l++) found[l] = state[l]->u;
   cav_lanes_project(model, lanes, state, pushed, found);
-  for (int l = 0; l < CAV_LANES; l++) {
-    if (status[l]) continue;
-    const double *bias = state[l]->work->ntendon_spring ? motion_of(model, state[l]).bias : NULL;
-    push_dofs(model, state[l], 1, bias, state[l]->u);
-    status[l] = close_inverse(model, state[l], u[l]);
-    state[l]->work->valid = CAV_STAGE_NONE;
-  }
+  close_four(model, state, u, status);
 }

@@ -8,8 +8,7 @@
 // first of what is written over its numbers: what is below takes four where it would take one
 #include "by_four.h"
 
-#include "impedance.h"
-#include "options.h"
+#include "lanes_law.h"
 #include "spatial.h"
 #include "step.h"
 
@@ -21,7 +20,7 @@ typedef struct scene {
   cav_state *const *state;
   const cav_four *reference, *now, *next; ///< of links; spatial velocities
   cav_four *force;
-  int discrete, vectors; ///< which law; whether it goes by vectors
+  int vectors; ///< whether the law goes by them
   double scale, inverse_impratio;
 } scene;
 
@@ -32,8 +31,6 @@ typedef struct point {
   cav_four dist, pos[3], frame[9], arm[2][3];
   cav_four now[CAV_IMPULSE_DIM], next[CAV_IMPULSE_DIM], impulse[CAV_IMPULSE_DIM];
 } point;
-
-CAV_INLINE cav_four larger_four(cav_four a, cav_four b) { return choose(a > b, a, b); }
 
 // tangents of a normal: along a direction, or where that is none along the world's y or z
 CAV_INLINE void find_tangents(const cav_four along[3], cav_four frame[9]) {
@@ -84,36 +81,12 @@ CAV_INLINE void open_rows(const scene *s, const cav_touch_four *touch, int dim, 
   find_velocity(c, dim, s->next, c->next);
 }
 
-// sigmoid of solimp
-CAV_INLINE cav_four sigmoid_four(cav_four x, double midpoint, double power) {
-  if (power == 1) return x;
-  if (power == 2) return choose(x <= midpoint, x * x / midpoint, 1 - (1 - x) * (1 - x) / (1 - midpoint));
-  cav_four y;
-  for (int i = 0; i < 4; i++) y[i] = sigmoid(x[i], midpoint, power);
-  return y;
-}
-
-CAV_INLINE cav_four impedance_four(const cav_pair_law *law, cav_four x) {
-  const double d0 = law->ends[0], dw = law->ends[1], width = law->width;
-  if (d0 == dw || width <= R_MIN) return CAV_ALL(0.5 * (d0 + dw));
-  const masks whole = x >= width, none = x <= 0;
-  // where neither end counts
-  const cav_four inside = choose(whole | none, CAV_ALL(0), x);
-  const cav_four d = d0 + sigmoid_four(inside / width, law->midpoint, law->power) * (dw - d0);
-  return choose(whole, CAV_ALL(dw), choose(none, CAV_ALL(d0), d));
-}
-
 // impulses by the exact law; 0: some state's is not of ordinary size
 CAV_INLINE int find_impulses(const scene *s, int dim, point *c) {
   const cav_pair_law *law = c->law;
-  const double damping = law->damping, margin = law->pair->margin, *friction = law->friction;
-  cav_four R[3], stiffness = CAV_ALL(law->stiffness), g[3];
-  R[0] = CAV_ALL(law->regulariser);
-  if (!s->discrete) {
-    const cav_four d = impedance_four(law, larger_four(CAV_ALL(0), margin - c->dist));
-    stiffness = law->factor * d / law->stiffness;
-    R[0] = larger_four(CAV_ALL(R_MIN), (1 - d) / d * law->weight);
-  }
+  const double damping = law->row.damping, margin = law->pair->margin, *friction = law->friction;
+  cav_four R[3], stiffness, g[3];
+  law_at(&law->row, c->dist - margin, &R[0], &stiffness);
   const cav_four tangential = larger_four(CAV_ALL(R_MIN), R[0] * s->inverse_impratio);
   cav_four size = CAV_ALL(0);
   for (int k = 0; k < dim; k++) {
@@ -226,30 +199,12 @@ static void find_law(const scene *s, int p, cav_pair_law *law) {
   law->link[0] = s->model->geom[pair->geom1].link;
   law->link[1] = s->model->geom[pair->geom2].link;
   if (!s->vectors) return;
-  law->weight = contact_weight(state, pair) / (pair->external ? 1 : state->options.self_stiffness);
-  if (s->discrete) {
-    const cav_law discrete = discrete_law(state, law->weight);
-    law->regulariser = discrete.regulariser, law->damping = discrete.damping, law->stiffness = discrete.stiffness;
-  } else {
-    const law_terms terms = terms_of(state, &pair->softness);
-    const double *solimp = pair->softness.solimp;
-    law->ends[0] = terms.d0, law->ends[1] = terms.dw;
-    law->width = solimp[2];
-    law->midpoint = clamp_between(solimp[3], IMPEDANCE_MIN, IMPEDANCE_MAX);
-    law->power = larger(1, solimp[4]);
-    law->damping = terms.damping;
-    law->factor = terms.factor, law->stiffness = terms.by;
-  }
+  law->row = row_law_of(state, &pair->softness,
+                        contact_weight(state, pair) / (pair->external ? 1 : state->options.self_stiffness));
   for (int k = 1; k < pair->dim; k++) {
     law->friction[k - 1] = larger(pair->friction[k - 1], FRICTION_MIN);
     law->ratio[k] = law->friction[k - 1] == law->friction[0] ? 1 : law->friction[0] / law->friction[k - 1];
   }
-}
-
-// those that are known are of other options
-static void forget_laws(cav_lanes *l, int npair, const cav_options *options) {
-  l->options = *options;
-  for (int p = 0; p < npair; p++) l->law[p].pair = NULL;
 }
 
 void cav_lanes_contacts(const cav_model *model, cav_lanes *l, cav_state *const state[CAV_LANES]) {
@@ -257,9 +212,7 @@ void cav_lanes_contacts(const cav_model *model, cav_lanes *l, cav_state *const s
   const cav_options *o = &state[0]->options;
   scene s = {.model = model, .state = state, .reference = l->reference, .next = l->velocity_next, .force = l->force};
   if (!l->nnear) return;
-  if (!cav_options_same(o, &l->options, CAV_STAGE_VELOCITY)) forget_laws(l, model->npair, o);
   s.now = cav_takes_mean(state[0]) ? cav_lanes_velocities(model, l) : l->velocity;
-  s.discrete = o->stabilisation == CAV_STABILISATION_DISCRETE;
   s.vectors = !(o->smoothing > 0) && o->sliding == CAV_SLIDING_CONVEX;
   s.scale = -1 / o->timestep;
   s.inverse_impratio = 1 / larger(R_MIN, o->impratio);

@@ -22,6 +22,11 @@ void cav_contact_impulse(const cav_state *state, cav_contact *contact, const dou
 /// are sought among the pairs that are near, and no state gets them. Plain scenes (inverse.c). lanes_contacts.c.
 void cav_lanes_contacts(const cav_model *model, cav_lanes *lanes, cav_state *const state[CAV_LANES]);
 
+/// Before that: what was worked out under other options is forgotten, and lanes->rows says whether cav_lanes_rows does springs,
+/// friction losses and limits. That adds them to u of the lanes, after cav_lanes_limits and cav_lanes_project. lanes_rows.c.
+void cav_lanes_prepare(const cav_model *model, cav_lanes *lanes, const cav_state *state);
+void cav_lanes_rows(const cav_model *model, cav_lanes *lanes, const cav_state *state);
+
 /// Whether the state holds a whole evaluation of the inverse under its present options. inverse.c.
 int cav_state_evaluated(const cav_state *state);
 
