@@ -356,6 +356,9 @@ static void test_slip(void) {
     CHECK(verify(&s, NULL, NULL) == CAV_OK);
     CHECK_NEAR(s.verdict.slip_mean_m_s, speed[i], 1e-12);
     CHECK_NEAR(s.verdict.penetration_max_m, 1e-3, 1e-12);
+    // what slides most is named, and when
+    if (i) CHECK(strstr(s.verdict.reason, "slip, m/s, 0.3 (at most 0.01) at knot "));
+    if (i) CHECK(strstr(s.verdict.reason, "N between the world and ") && strstr(s.verdict.reason, "slides at 0.3 m/s"));
     sample_free(&s);
   }
 }

@@ -15,7 +15,7 @@ static const double loaded = 0.01;        // fraction of the weight from which o
 
 /// What was found at the knots.
 typedef struct metrics {
-  cav_metric unactuated, limit, term, penetration, between, defect, periodicity, hover;
+  cav_metric unactuated, limit, term, penetration, between, defect, periodicity, hover, slid;
   double slip, load;
   cav_rates rates;
   cav_residual_sum residual;
@@ -320,7 +320,16 @@ static void add_slip(const cav_verification *verification, int t, metrics *found
     if (contact->dim < 3 || !(load > loaded * verification->weight * verification->h)) continue;
     found->load += load;
     double speed = hypot(contact->velocity_next[1], contact->velocity_next[2]);
-    found->slip += load * fmax(speed - cav_verification_may_slide(verification, t, contact, 0), 0);
+    double slides = load * fmax(speed - cav_verification_may_slide(verification, t, contact, 0), 0);
+    found->slip += slides;
+    if (!(slides > found->slid.value)) continue;
+    const cav_model *model = verification->model;
+    const cav_pair *pair = model->pair + contact->pair;
+    char one[32], other[32];
+    cav_metric_note(&found->slid, slides, t,
+                    "mean over loaded contacts, most where %.4g N between %.60s and %.60s slides at %.3g m/s",
+                    load / verification->h, cav_verification_link_name(model, model->geom[pair->geom1].link, one),
+                    cav_verification_link_name(model, model->geom[pair->geom2].link, other), speed);
   }
 }
 
@@ -526,7 +535,8 @@ static void decide(const cav_verification *verification, const metrics *found, c
           "A smaller time step, or a way around, usually helps.");
   require(verdict, &found->defect, CAV_TOLERANCE_MOMENTUM, "momentum defect, fraction of weight rms,",
           "The order momentum keeps it exactly; a smaller time step usually helps too.");
-  const cav_metric slip = {verdict->slip_mean_m_s, -1, "mean over loaded contacts"};
+  cav_metric slip = found->slid;
+  slip.value = verdict->slip_mean_m_s;
   require(verdict, &slip, CAV_TOLERANCE_SLIP, "slip, m/s,",
           "A lower softness or smoothing at the end of the schedule, or a higher weight of slip, usually helps.");
   require(
