@@ -87,23 +87,27 @@ static void test_gait(const char *text, double axis, double travel) {
   // no gait where it stands, nor where the guess swings already; a guess that is held is not held twice
   goal[0] = q[0];
   CHECK(offers(&p,
-               "stated near-1 near-2 near-3 near-4 soft hold slow momentum near-5 near-6 repair-1 repair-2 repair-3 "
+               "stated near-1 near-2 near-3 near-4 soft hold slow momentum near-5 near-6 near-7 near-8 repair-1 "
+               "repair-2 repair-3 "
                "repair-4 open longer"));
   p.guess = CAV_GUESS_HOLD;
   CHECK(offers(&p,
-               "stated near-1 near-2 near-3 near-4 soft line slow momentum near-5 near-6 repair-1 repair-2 repair-3 "
+               "stated near-1 near-2 near-3 near-4 soft line slow momentum near-5 near-6 near-7 near-8 repair-1 "
+               "repair-2 repair-3 "
                "repair-4 open longer"));
   p.guess = CAV_GUESS_INTERPOLATE;
   p.guess_height = 0.3;
-  CHECK(offers(&p,
-               "stated near-1 near-2 near-3 near-4 soft line hold slow momentum near-5 near-6 repair-1 repair-2 "
-               "repair-3 repair-4 open longer"));
+  CHECK(offers(
+      &p,
+      "stated near-1 near-2 near-3 near-4 soft line hold slow momentum near-5 near-6 near-7 near-8 repair-1 repair-2 "
+      "repair-3 repair-4 open longer"));
   goal[0] += travel;
   p.nswing = 1;
   p.swing = &(cav_swing){.joint = 1, .amplitude = 0.1, .frequency = 1};
-  CHECK(offers(&p,
-               "stated near-1 near-2 near-3 near-4 soft line hold slow momentum near-5 near-6 repair-1 repair-2 "
-               "repair-3 repair-4 open longer"));
+  CHECK(offers(
+      &p,
+      "stated near-1 near-2 near-3 near-4 soft line hold slow momentum near-5 near-6 near-7 near-8 repair-1 repair-2 "
+      "repair-3 repair-4 open longer"));
   // taking one leaves the problem as it was
   CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK);
   cav_strategy_apply(&p, &strategy[0], &taken);
@@ -126,7 +130,8 @@ static void check_order(cav_problem *p) {
   int n;
   p->order = CAV_ORDER_MOMENTUM;
   CHECK(offers(p,
-               "stated near-1 near-2 near-3 near-4 midpoint soft hold slow near-5 near-6 repair-1 repair-2 repair-3 "
+               "stated near-1 near-2 near-3 near-4 midpoint soft hold slow near-5 near-6 near-7 near-8 repair-1 "
+               "repair-2 repair-3 "
                "repair-4 open longer"));
   CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
   cav_solution *straight = NULL, *round = NULL;
@@ -447,7 +452,7 @@ static void test_solids(void) {
   p.q_start = q, p.v_start = v, p.q_goal = goal;
   CHECK(offers(&p,
                "stated near-1 near-2 near-3 near-4 solids near-5 near-6 flight near-7 near-8 repair-1 repair-2 "
-               "repair-3 repair-4 soft hold slow momentum near-9 near-10 "
+               "repair-3 repair-4 soft hold slow momentum near-9 near-10 near-11 near-12 "
                "open longer"));
   cav_strategy strategy[CAV_STRATEGIES];
   int n;
@@ -461,7 +466,7 @@ static void test_solids(void) {
   CHECK(offers(&p,
                "stated near-1 near-2 near-3 near-4 step near-5 near-6 solids near-7 near-8 repair-1 repair-2 repair-3 "
                "repair-4 soft line hold slow momentum "
-               "near-9 near-10 open longer"));
+               "near-9 near-10 near-11 near-12 open longer"));
   CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK && strategy[0].schedule.solids == CAV_SOLIDS_HARD);
   cav_strategy_apply(&p, find(strategy, n, "step"), &taken);
   CHECK(taken.nswing == 4 && taken.schedule.solids == CAV_SOLIDS_GROW);
@@ -474,7 +479,8 @@ static void test_solids(void) {
   // where it stops before the wall nothing is in the way
   goal[0] -= 0.8;
   CHECK(offers(&p,
-               "stated near-1 near-2 near-3 near-4 soft hold slow momentum near-5 near-6 repair-1 repair-2 repair-3 "
+               "stated near-1 near-2 near-3 near-4 soft hold slow momentum near-5 near-6 near-7 near-8 repair-1 "
+               "repair-2 repair-3 "
                "repair-4 open longer"));
   cav_model_free(m);
 }
@@ -527,9 +533,10 @@ static void test_cycle(void) {
   cav_problem *p = cav_problem_load(CAVORT_SOURCE_ROOT "/problems/motions/quadruped-trot/problem.xml", NULL, &error);
   if (!CHECK(p != NULL)) return;
   CHECK(p->cycle.on);
-  CHECK(offers(p,
-               "stated near-1 near-2 near-3 near-4 soft slow momentum near-5 near-6 repair-1 repair-2 repair-3 "
-               "repair-4"));
+  CHECK(offers(
+      p,
+      "stated near-1 near-2 near-3 near-4 soft slow momentum near-5 near-6 near-7 near-8 repair-1 repair-2 repair-3 "
+      "repair-4"));
   cav_strategy stated = {.name = "stated", .stated = 1, .order = p->order, .schedule = p->schedule}, mended;
   const cav_verdict slides = {.slip_mean_m_s = 0.0105, .closed_loop_seconds = p->duration};
   int found = 0;

@@ -29,7 +29,7 @@ static const double wide = 1.6, leisure = 0.6;
 
 /// How much softer and how much slower than stated, how much longer a diagnosis may last, how many
 /// repairs there are at the end, and of what is nearly there by the stated guess and by another one.
-enum { SOFTER = 2, CHEAPER = 10, SLOWER = 2, LONGER = 2, REPAIRS = 4, MEND_STATED = 4, MEND = 2 };
+enum { SOFTER = 2, CHEAPER = 10, SLOWER = 2, LONGER = 2, REPAIRS = 4, MEND_STATED = 4, MEND = 2, MEND_LAST = 4 };
 
 /// What the duration of a diagnosis costs, 1/s², so that it is not far from the shortest.
 static const double haste = 100;
@@ -160,9 +160,9 @@ static void add(cav_strategy *strategy, int *n, const cav_strategy *from, const 
 
 // what is nearly there is mended before anything else is tried
 static void add_near(cav_strategy *strategy, int *n, const cav_strategy *stated, int times) {
-  static const char *const name[] = {"near-1",  "near-2",  "near-3",  "near-4",  "near-5",  "near-6",
-                                     "near-7",  "near-8",  "near-9",  "near-10", "near-11", "near-12",
-                                     "near-13", "near-14", "near-15", "near-16"};
+  static const char *const name[] = {"near-1",  "near-2",  "near-3",  "near-4",  "near-5",  "near-6",  "near-7",
+                                     "near-8",  "near-9",  "near-10", "near-11", "near-12", "near-13", "near-14",
+                                     "near-15", "near-16", "near-17", "near-18", "near-19", "near-20"};
   cav_strategy repaired = *stated;
   repaired.use = CAV_STRATEGY_NEAR;
   size_t before = 0;
@@ -315,7 +315,7 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
     exact.order = CAV_ORDER_MOMENTUM, exact.first_midpoint = 1, exact.use = CAV_STRATEGY_MOMENTUM;
     add(strategy, n, &exact, "momentum", "under the order of momentum, from a motion of the midpoint order");
   }
-  add_near(strategy, n, &stated, MEND);
+  add_near(strategy, n, &stated, MEND_LAST);
   if (!collides) add_repairs(strategy, n, &stated);
   cav_strategy open = stated;
   open.use = CAV_STRATEGY_DIAGNOSIS, open.open = 1;

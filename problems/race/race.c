@@ -547,6 +547,7 @@ static int may_start(const cav_race *race, int i) {
     success |= e->state == CAV_RACE_DONE && cav_race_success(&e->report);
   }
   if (race->entry[i].strategy.open && !misses_rest(race)) return 0;
+  if (use == CAV_STRATEGY_NEAR && cav_rank_spent(race, i)) return 0;
   cav_strategy repaired;
   int of;
   const int mends = use == CAV_STRATEGY_REPAIR || use == CAV_STRATEGY_NEAR;

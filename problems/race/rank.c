@@ -15,6 +15,8 @@ int cav_rank_better(const cav_race_report *a, const cav_race_report *b, int chea
                               {v->penetration_max_m, w->penetration_max_m, CAV_TOLERANCE_PENETRATION},
                               {v->penetration_between_m, w->penetration_between_m, CAV_TOLERANCE_PENETRATION},
                               {v->momentum_defect_rms, w->momentum_defect_rms, CAV_TOLERANCE_MOMENTUM},
+                              {v->slip_mean_m_s, w->slip_mean_m_s, CAV_TOLERANCE_SLIP},
+                              {v->hover_fraction, w->hover_fraction, CAV_TOLERANCE_HOVER},
                               {v->replay_step_max_error, w->replay_step_max_error, CAV_TOLERANCE_STEP}};
   // what was stopped was not verified
   int stopped = a->status == CAV_INTERRUPTED, other = b->status == CAV_INTERRUPTED;
@@ -26,7 +28,8 @@ int cav_rank_better(const cav_race_report *a, const cav_race_report *b, int chea
   if (v->certified || w->certified) return v->certified;
   for (size_t k = 0; k < sizeof missed / sizeof *missed; k++)
     if (missed[k][0] > missed[k][2] || missed[k][1] > missed[k][2]) return missed[k][0] < missed[k][1];
-  return v->closed_loop_seconds > w->closed_loop_seconds;
+  if (v->closed_loop_seconds != w->closed_loop_seconds) return v->closed_loop_seconds > w->closed_loop_seconds;
+  return v->model_contacts_seconds > w->model_contacts_seconds;
 }
 
 int cav_rank_rough(const cav_verdict *v) {
@@ -65,4 +68,15 @@ int cav_rank_nearer(const cav_race_report *a, const cav_race_report *b) {
   if (!cav_rank_rough(v) || !cav_rank_rough(w)) return cav_rank_better(a, b, 0);
   if (!v->nmissed != !w->nmissed) return !v->nmissed;
   return excess_of(v) < excess_of(w);
+}
+
+int cav_rank_spent(const cav_race *race, int i) {
+  double mended = 0, sought = 0;
+  for (int k = 0; k < i; k++) {
+    const cav_race_entry *e = &race->entry[k];
+    if (e->state != CAV_RACE_DONE || !e->report.solution) continue;
+    const double step = e->strategy.timestep > 0 ? e->strategy.timestep : race->problem->timestep;
+    *(e->from >= 0 ? &mended : &sought) += e->report.verdict.iterations / step;
+  }
+  return mended > sought;
 }

@@ -1,0 +1,72 @@
+/// Which of two motions is kept where neither is certified, by each condition of a certificate in its order; and when mending
+/// has had its time.
+#include "check.h"
+#include "rank.h"
+
+// one that keeps every condition of a certificate
+static cav_race_report whole(void) {
+  return (cav_race_report){.solution = 1,
+                           .verdict = {.closed_loop_seconds = 2, .model_contacts_seconds = 2, .duration = 2}};
+}
+
+// what is missed later, by however much, is the better one, and of the same the lesser; what is kept is not compared
+static void test_better(void) {
+  enum { CONDITIONS = 9 };
+  cav_race_report little[CONDITIONS], much[CONDITIONS];
+  for (int k = 0; k < CONDITIONS; k++) {
+    for (int far = 0; far < 2; far++) {
+      cav_race_report r = whole();
+      cav_verdict *v = &r.verdict;
+      double *const value[CONDITIONS] = {
+          &v->unactuated_force_max, &v->limit_violation_max,   &v->constraint_violation_max,
+          &v->penetration_max_m,    &v->penetration_between_m, &v->momentum_defect_rms,
+          &v->slip_mean_m_s,        &v->hover_fraction,        &v->replay_step_max_error};
+      static const double most[CONDITIONS] = {
+          CAV_TOLERANCE_UNACTUATED,  CAV_TOLERANCE_LIMIT,       CAV_TOLERANCE_CONSTRAINT,
+          CAV_TOLERANCE_PENETRATION, CAV_TOLERANCE_PENETRATION, CAV_TOLERANCE_MOMENTUM,
+          CAV_TOLERANCE_SLIP,        CAV_TOLERANCE_HOVER,       CAV_TOLERANCE_STEP};
+      // kept conditions are worst where they are kept: none of that counts
+      for (int i = 0; i < CONDITIONS; i++) *value[i] = far ? 0 : 0.9 * most[i];
+      *value[k] = (far ? 5 : 2) * most[k];
+      *(far ? &much[k] : &little[k]) = r;
+    }
+  }
+  for (int k = 0; k < CONDITIONS; k++) {
+    CHECK(cav_rank_better(&little[k], &much[k], 0) && !cav_rank_better(&much[k], &little[k], 0));
+    for (int later = k + 1; later < CONDITIONS; later++)
+      CHECK(cav_rank_better(&much[later], &little[k], 0) && !cav_rank_better(&little[k], &much[later], 0));
+  }
+  // then closed loops: that of the plan, then that under the model's contacts
+  cav_race_report lost = whole(), sooner = whole(), other = whole();
+  lost.verdict.closed_loop_seconds = 1.5, sooner.verdict.closed_loop_seconds = 1;
+  other.verdict.model_contacts_seconds = 1;
+  CHECK(cav_rank_better(&lost, &sooner, 0) && cav_rank_better(&other, &lost, 0) && !cav_rank_better(&lost, &other, 0));
+  sooner = other, sooner.verdict.model_contacts_seconds = 0.5;
+  CHECK(cav_rank_better(&other, &sooner, 0) && !cav_rank_better(&sooner, &other, 0));
+}
+
+// mending is put off once it has taken longer than what it mends, and goes on when more was solved
+static void test_spent(void) {
+  cav_problem problem = {.timestep = 0.02, .duration = 2};
+  cav_race race = {.problem = &problem, .n = 6};
+  for (int i = 0; i < race.n; i++) {
+    race.entry[i].from = i > 0 && i < 4 ? 0 : -1;
+    race.entry[i].state = CAV_RACE_DONE;
+    race.entry[i].report = whole();
+    race.entry[i].report.verdict.iterations = 400;
+  }
+  race.entry[4].report.verdict.iterations = 800;
+  CHECK(!cav_rank_spent(&race, 1) && !cav_rank_spent(&race, 2) && cav_rank_spent(&race, 3));
+  CHECK(cav_rank_spent(&race, 4) && !cav_rank_spent(&race, 5));
+  // at half the step an iteration takes twice as long, and what was not solved none
+  race.entry[1].strategy.timestep = 0.01;
+  CHECK(cav_rank_spent(&race, 2));
+  race.entry[1].state = CAV_RACE_WAITING;
+  CHECK(!cav_rank_spent(&race, 3));
+}
+
+int main(void) {
+  test_better();
+  test_spent();
+  return check_result();
+}
