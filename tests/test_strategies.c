@@ -252,6 +252,22 @@ static void check_targets(repaired *r) {
   r->term[0].from = from;
 }
 
+// what slides on its own links is to lean on them less, before smoothing changes: what slides on the ground is not
+static void check_rubbing(repaired *r) {
+  cav_verdict slides = {.achieved = 1, .slip_mean_m_s = 0.02, .slip_self = 0.9, .closed_loop_seconds = 1};
+  for (int self = 1; self >= 0; self--) {
+    cav_strategy mended;
+    int found;
+    slides.slip_self = self ? 0.9 : 0.1;
+    CHECK(cav_strategy_repair(&r->problem, &r->stated, &slides, 0, &mended, &found) == CAV_OK && found);
+    if (self)
+      CHECK(mended.nterm == 3 && mended.term[2].quantity == CAV_QUANTITY_SELF_FORCE &&
+            !strcmp(mended.changed, "<self_force weight=\"1000\"/>"));
+    if (!self) CHECK(!strcmp(mended.changed, "<last smoothing=\"0.000125\"/>"));
+    cav_strategy_clear(&mended);
+  }
+}
+
 // closed loops that are lost: contact forces cost something, then half the step
 static void check_loops(repaired *r) {
   const cav_verdict lost = {.achieved = 1};
@@ -380,8 +396,8 @@ static void check_goals(repaired *r) {
 
 // the usual cure of what is missed first, one more at each call; the problem stays as it was
 static void test_repair(void) {
-  void (*const check[])(repaired *) = {check_loops,  check_most_missed, check_record,
-                                       check_slides, check_goals,       check_targets};
+  void (*const check[])(repaired *) = {check_loops, check_most_missed, check_record, check_slides,
+                                       check_goals, check_targets,     check_rubbing};
   for (size_t i = 0; i < sizeof check / sizeof *check; i++) {
     repaired r;
     repaired_make(&r);

@@ -358,9 +358,29 @@ static void test_slip(void) {
     CHECK_NEAR(s.verdict.penetration_max_m, 1e-3, 1e-12);
     // what slides most is named, and when
     if (i) CHECK(strstr(s.verdict.reason, "slip, m/s, 0.3 (at most 0.01) at knot "));
+    CHECK(s.verdict.slip_self == 0);
     if (i) CHECK(strstr(s.verdict.reason, "N between the world and ") && strstr(s.verdict.reason, "slides at 0.3 m/s"));
     sample_free(&s);
   }
+}
+
+// a block that slides on the link that carries it, two links up: all slip is within the tree
+static void test_slip_within(void) {
+  static const char *const model = HEAD
+      "<body name='table'><joint name='across' type='slide' axis='0 1 0'/><geom name='top' type='box' size='1 1 .1' "
+      "mass='2'/>"
+      "<body name='arm' pos='0 0 .5'><joint name='up' type='slide' axis='0 0 1'/><geom size='.05' mass='1' contype='0' "
+      "conaffinity='0'/><body name='block' pos='0 0 -.3'><joint name='x' type='slide' axis='1 0 0'/><geom name='foot' "
+      "type='sphere' size='.1' mass='1'/></body></body></body></worldbody><actuator><motor joint='across'/><motor "
+      "joint='up'/><motor joint='x'/></actuator></mujoco>";
+  sample s = sample_new(model, 20, 0.02, CAV_ORDER_MIDPOINT);
+  s.q[1] = -1e-3;
+  s.v[2] = 0.3;
+  for (int t = 0; t <= 20; t++) knot(&s, t)[1] = -1e-3, knot(&s, t)[2] = 0.3 * t * 0.02;
+  CHECK(verify(&s, NULL, NULL) == CAV_OK);
+  CHECK_NEAR(s.verdict.slip_mean_m_s, 0.3, 1e-12);
+  CHECK(s.verdict.slip_self == 1);
+  sample_free(&s);
 }
 
 // numbers of five hard terms
@@ -582,6 +602,7 @@ int main(void) {
   test_hover();
   test_hover_bar();
   test_slip();
+  test_slip_within();
   test_terms();
   test_closed_loop();
   test_thrown();

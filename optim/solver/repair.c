@@ -16,6 +16,7 @@ typedef enum cure {
   FORCE,     ///< contact forces cost something: loads are spread, and nothing stands on an edge
   GOALS,     ///< heavier weights of goals
   SLIP,      ///< a heavier weight of slip
+  SELF,      ///< what leans on its own links pays
   SLIDING,   ///< the convex law of contacts that slide: it has one solution
   ORDER,     ///< the order of momentum
   GAP,       ///< contacts see the gap where a step ends
@@ -29,8 +30,8 @@ typedef enum cure {
 } cure;
 
 enum { CURES = 3 };
-static const double force_weight = 1, heavier = 10, harder = 4, lighter = 0.04, softer = 6, longer = 2, soft = 0.03,
-                    slack = 0.75;
+static const double force_weight = 1, self_weight = 1000, heavier = 10, harder = 4, lighter = 0.04, softer = 6,
+                    longer = 2, soft = 0.03, slack = 0.75;
 
 /// What a motion misses first, in the order of a certificate (METHOD.md, 6), most of momentum, slip and hover, and its
 /// cures. Forces near a record are what is looked for: none of them costs anything. A residual beyond its bound is
@@ -39,9 +40,10 @@ static const double force_weight = 1, heavier = 10, harder = 4, lighter = 0.04, 
 static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
   static const cure forces[] = {EFFORT, STEP, NONE}, deep[] = {SOFTNESS, STEP, NONE}, between[] = {STEP, NONE},
                     turned[] = {ORDER, STEP, NONE}, slip[] = {SMOOTHING, SLIP, SOFTNESS},
-                    hover[] = {GAP, SMOOTHING, STEP}, fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK},
-                    target[] = {EFFORT, GOALS, NONE}, fades[] = {SMOOTHING, GAP, STEP}, near[] = {STEP, SLACK, NONE},
-                    again[] = {STEP, SLIDING, NONE}, ground[] = {STEP, LOOSE, SOFTER}, none[] = {NONE};
+                    rub[] = {SELF, SMOOTHING, SLIP}, hover[] = {GAP, SMOOTHING, STEP}, fold[] = {SLIDING, STEP, NONE},
+                    lost[] = {FORCE, STEP, SLACK}, target[] = {EFFORT, GOALS, NONE}, fades[] = {SMOOTHING, GAP, STEP},
+                    near[] = {STEP, SLACK, NONE}, again[] = {STEP, SLIDING, NONE}, ground[] = {STEP, LOOSE, SOFTER},
+                    none[] = {NONE};
   if (v->certified) return v->achieved ? none : target;
   if (!cav_verdict_feasible(v)) return cav_problem_has_record(p) ? ground : forces;
   if (v->penetration_max_m > CAV_TOLERANCE_PENETRATION) return deep;
@@ -51,7 +53,7 @@ static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
          air = v->hover_fraction / CAV_TOLERANCE_HOVER;
   if (momentum > 1 && momentum >= fmax(slide, air)) return turned;
   // what is smoothed slides by a part of the smoothing in every step
-  if (slide > 1 && slide >= air) return slip;
+  if (slide > 1 && slide >= air) return v->slip_self > 0.5 ? rub : slip;
   // a stated smoothing beyond the usual one is what holds things off the ground
   int blurred = p->schedule.last.smoothing > cav_problem_default(p->model).schedule.last.smoothing;
   if (air > 1) return blurred ? fades : hover;
@@ -103,10 +105,11 @@ static int is_added(const cav_problem *p, const cav_strategy *s, cav_quantity qu
   return 0;
 }
 
-static cav_status weigh_forces(const cav_problem *p, cav_strategy *s) {
-  if (is_added(p, s, CAV_QUANTITY_FORCE)) return CAV_OK;
-  cav_term term = {.name = "force", .quantity = CAV_QUANTITY_FORCE, .use = CAV_USE_COST, .component = -1};
-  term.to = -1, term.weight = force_weight, term.scale = 1;
+/// A cost on forces of contacts with the world and other trees (FORCE), or between links of one tree (SELF_FORCE).
+static cav_status weigh_forces(const cav_problem *p, cav_quantity quantity, double weight, cav_strategy *s) {
+  if (is_added(p, s, quantity)) return CAV_OK;
+  cav_term term = {.name = cav_quantity_rule_of(quantity)->name, .quantity = quantity, .use = CAV_USE_COST};
+  term.component = -1, term.to = -1, term.weight = weight, term.scale = 1;
   return add_term(p, s, &term);
 }
 
@@ -133,7 +136,9 @@ static cav_status change(const cav_problem *p, const cav_verdict *v, cure c, cav
   double effort = s->effort_limit > 0 ? s->effort_limit : p->effort_limit;
   switch (c) {
     case FORCE:
-      return weigh_forces(p, s);
+      return weigh_forces(p, CAV_QUANTITY_FORCE, force_weight, s);
+    case SELF:
+      return weigh_forces(p, CAV_QUANTITY_SELF_FORCE, self_weight, s);
     case GOALS:
       return weigh_goals(p, v, s);
     case SLIP:

@@ -16,7 +16,7 @@ static const double loaded = 0.01;        // fraction of the weight from which o
 /// What was found at the knots.
 typedef struct metrics {
   cav_metric unactuated, limit, term, penetration, between, defect, periodicity, hover, slid;
-  double slip, load;
+  double slip, slip_self, load;
   cav_rates rates;
   cav_residual_sum residual;
 } metrics;
@@ -321,15 +321,17 @@ static void add_slip(const cav_verification *verification, int t, metrics *found
     found->load += load;
     double speed = hypot(contact->velocity_next[1], contact->velocity_next[2]);
     double slides = load * fmax(speed - cav_verification_may_slide(verification, t, contact, 0), 0);
-    found->slip += slides;
-    if (!(slides > found->slid.value)) continue;
     const cav_model *model = verification->model;
     const cav_pair *pair = model->pair + contact->pair;
+    const cav_geom *a = &model->geom[pair->geom1], *b = &model->geom[pair->geom2];
+    found->slip += slides;
+    if (model->link[a->link].root == model->link[b->link].root) found->slip_self += slides;
+    if (!(slides > found->slid.value)) continue;
     char one[32], other[32];
     cav_metric_note(&found->slid, slides, t,
                     "mean over loaded contacts, most where %.4g N between %.60s and %.60s slides at %.3g m/s",
-                    load / verification->h, cav_verification_link_name(model, model->geom[pair->geom1].link, one),
-                    cav_verification_link_name(model, model->geom[pair->geom2].link, other), speed);
+                    load / verification->h, cav_verification_link_name(model, a->link, one),
+                    cav_verification_link_name(model, b->link, other), speed);
   }
 }
 
@@ -583,6 +585,7 @@ static void fill(const cav_verification *verification, const metrics *found, con
   verdict->penetration_max_m = found->penetration.value;
   verdict->penetration_between_m = found->between.value;
   verdict->slip_mean_m_s = found->load > 0 ? found->slip / found->load : 0;
+  verdict->slip_self = found->slip > 0 ? found->slip_self / found->slip : 0;
   verdict->hover_fraction = found->hover.value;
   verdict->power_max_w = found->rates.power;
   verdict->joint_speed_max_rad_s = found->rates.speed;
