@@ -10,9 +10,10 @@
 
 /// A pair as the broad phase wants it: all it reads, in order.
 typedef struct candidate {
-  int first, second;               ///< slots
-  int pair;                        ///< its number
-  short int plane;                 ///< 1 if the first geom is a plane
+  int first, second; ///< slots
+  int pair;          ///< its number
+  signed char plane; ///< 1 if the first geom is a plane
+  signed char four;  ///< 1 if it and the three that follow can be looked at together: of one plane or of none
   signed char external, expensive; ///< as in the pair; 1 if one of the two is a mesh, whose search is worth saving
   double margin;                   ///< of the pair
   double bound;                    ///< sum of bounding radii; of the second geom alone if the first is a plane
@@ -33,10 +34,15 @@ struct cav_geom_cache {
   int nmoving, *moving; ///< slots that are not fixed
   double (*centre)[3];  ///< [nslot] world
   candidate *candidate; ///< [npair], and behind them once more those that fixed never leaves out
-  int ntree, *tree;     ///< [ntree] root links of the trees with slots that move
-  double (*root)[3];    ///< [ntree] where these are
-  cav_fixed *fixed;     ///< NULL: there is little to leave out
-  cav_sweep *sweep;     ///< NULL: all pairs that are left are looked at
+  int ncandidate;
+  double *limit; ///< [ncandidate] below which they are near, by activation: what is added to margins within trees and
+                 ///< with the world
+  double activation[2];
+  int *near;         ///< [ncandidate] scratch
+  int ntree, *tree;  ///< [ntree] root links of the trees with slots that move
+  double (*root)[3]; ///< [ntree] where these are
+  cav_fixed *fixed;  ///< NULL: there is little to leave out
+  cav_sweep *sweep;  ///< NULL: all pairs that are left are looked at
   int sweep_from;
   cav_hint *hint; ///< [npair] where the last searches ended; NULL: no pair is expensive
   double margin;  ///< largest of all pairs
@@ -64,5 +70,12 @@ static inline double limit_between(const candidate *c, double margin) {
   double activation = c->bound + margin;
   return c->plane ? activation : activation > 0 ? activation * activation : 0;
 }
+
+/// Limits by what is added to margins, which few calls change. broad_four.c.
+void cav_limits_prepare(struct cav_geom_cache *cache, const double activation[2]);
+
+/// Those of consecutive candidates whose bounds are near, into found [end - first], in their order; how many. Where
+/// vectors have four numbers (cav_dense_lanes). broad_four.c.
+int cav_near_run(const struct cav_geom_cache *cache, int first, int end, int *found);
 
 #endif

@@ -3,20 +3,41 @@
 /// it joints near an end of their range.
 
 // first of all: what is below takes four numbers where it would take one
-#include "by_four.h"
+#include "four_turn.h"
 
 #include "broad.h"
 #include "four_states.h"
 
-// what the broad phase compares with, which few calls change
-static void find_limits(const cav_model *model, const struct cav_geom_cache *cache, cav_lanes *l,
-                        const double activation[2]) {
-  if (l->activation[0] == activation[0] && l->activation[1] == activation[1]) return;
-  for (int k = 0; k < 2; k++) l->activation[k] = activation[k];
-  for (int p = 0; p < model->npair; p++) {
+void cav_limits_prepare(struct cav_geom_cache *cache, const double activation[2]) {
+  if (cache->activation[0] == activation[0] && cache->activation[1] == activation[1]) return;
+  for (int k = 0; k < 2; k++) cache->activation[k] = activation[k];
+  for (int p = 0; p < cache->ncandidate; p++) {
     const candidate *c = cache->candidate + p;
-    l->limit[p] = limit_between(c, c->margin + activation[c->external]);
+    cache->limit[p] = limit_between(c, c->margin + activation[c->external]);
   }
+}
+
+CAV_BY_FOUR int cav_near_run(const struct cav_geom_cache *cache, int begin, int end, int *found) {
+  int n = 0;
+  for (int p = begin, taken; p < end; p += taken) {
+    const candidate *c = cache->candidate + p;
+    taken = c->four && p + CAV_LANES <= end ? CAV_LANES : 1;
+    // one alone four times; beyond the last centre there is room for one more
+    const int step = taken > 1;
+    cav_four first[4], second[4], normal[3] = {{0}};
+    const double *from[CAV_LANES], *to[CAV_LANES];
+    for (int i = 0; i < CAV_LANES; i++)
+      from[i] = cache->centre[c[i * step].first], to[i] = cache->centre[c[i * step].second];
+    turn_in(from, first);
+    turn_in(to, second);
+    const double *R = cache->slot[c->first].shape.rotation;
+    for (int k = 0; k < 3 && c->plane; k++) normal[k] = CAV_ALL(R[3 * k + 2]);
+    const cav_four limit = taken > 1 ? *(const cav_four *)(cache->limit + p) : CAV_ALL(cache->limit[p]);
+    int bits = held_bits(separation(c, first, second, normal) < limit);
+    if (taken == 1) bits &= 1;
+    for (; bits; bits &= bits - 1) found[n++] = p + __builtin_ctz((unsigned)bits);
+  }
+  return n;
 }
 
 CAV_BY_FOUR static void find(const cav_model *model, const struct cav_geom_cache *cache, cav_lanes *l) {
@@ -34,8 +55,8 @@ CAV_BY_FOUR static void find(const cav_model *model, const struct cav_geom_cache
     cav_four normal[3] = {{0}};
     const double *R = cache->slot[c->first].shape.rotation;
     for (int k = 0; k < 3 && c->plane; k++) normal[k] = CAV_ALL(R[3 * k + 2]);
-    const int near =
-        held_bits(separation(c, l->centre + 3 * c->first, l->centre + 3 * c->second, normal) < CAV_ALL(l->limit[p]));
+    const int near = held_bits(separation(c, l->centre + 3 * c->first, l->centre + 3 * c->second, normal) <
+                               CAV_ALL(cache->limit[p]));
     l->near[n] = CAV_LANE_BITS * p + near;
     n += near != 0;
   }
@@ -58,8 +79,9 @@ CAV_BY_FOUR void cav_lanes_limits(const cav_model *model, cav_lanes *l, const ca
 }
 
 void cav_lanes_near(const cav_model *model, cav_lanes *l, const cav_state *state, const double activation[2]) {
-  const struct cav_geom_cache *cache = state->work->geom;
-  find_limits(model, cache, l, activation);
+  struct cav_geom_cache *cache = state->work->geom;
+  cav_limits_prepare(cache, activation);
+  for (int k = 0; k < 2; k++) l->activation[k] = activation[k];
   find(model, cache, l);
 }
 

@@ -55,6 +55,16 @@ static void open_slots(const cav_model *model, struct cav_geom_cache *cache, int
   }
 }
 
+// which candidates the broad phase may take together with three more
+static void find_fours(struct cav_geom_cache *cache) {
+  for (int p = 0; p < cache->ncandidate; p++) {
+    candidate *c = cache->candidate + p;
+    c->four = p + CAV_LANES <= cache->ncandidate;
+    for (int k = 1; k < CAV_LANES && c->four; k++)
+      c->four = c->plane == c[k].plane && (!c->plane || c->first == c[k].first);
+  }
+}
+
 // trees of the geoms, numbered from 0; -1: of the world
 static void number_trees(const cav_model *model, struct cav_geom_cache *cache, int *tree) {
   int *number = tree + cache->nslot;
@@ -137,6 +147,7 @@ static int open_pruning(const cav_model *model, struct cav_geom_cache *cache, in
     int count;
     const int *always = cav_fixed_always(cache->fixed, &count);
     for (int i = 0; i < count; i++) cache->candidate[model->npair + i] = cache->candidate[always[i]];
+    cache->ncandidate += count;
   }
   free(radius);
   free(reach);
@@ -154,25 +165,31 @@ struct cav_geom_cache *cav_geom_cache_new(const cav_model *model, int sweep_from
     cache->moving = calloc((size_t)model->ngeom + 1, sizeof *cache->moving);
     cache->centre = calloc((size_t)model->ngeom + 1, sizeof *cache->centre);
     cache->candidate = calloc(2 * (size_t)model->npair + 1, sizeof *cache->candidate);
+    cache->limit = calloc(2 * (size_t)model->npair + 1, sizeof *cache->limit);
+    cache->near = calloc(2 * (size_t)model->npair + 1, sizeof *cache->near);
     cache->tree = calloc((size_t)model->nlink, sizeof *cache->tree);
     cache->root = calloc((size_t)model->nlink, sizeof *cache->root);
   }
-  if (!cache || !slot_of || !cache->slot || !cache->moving || !cache->centre || !cache->candidate || !cache->tree ||
-      !cache->root) {
+  if (!cache || !slot_of || !cache->slot || !cache->moving || !cache->centre || !cache->candidate || !cache->limit ||
+      !cache->near || !cache->tree || !cache->root) {
     free(slot_of);
     cav_geom_cache_free(cache);
     return NULL;
   }
   open_slots(model, cache, slot_of);
+  cache->ncandidate = model->npair;
+  cache->activation[0] = cache->activation[1] = NAN;
   free(slot_of);
   if (cache->expensive) cache->hint = calloc((size_t)model->npair, sizeof *cache->hint);
   if ((cache->expensive && !cache->hint) || !open_pruning(model, cache, sweep_from)) {
     cav_geom_cache_free(cache);
     return NULL;
   }
+  find_fours(cache);
   cache->bytes = cav_sweep_bytes(cache->sweep) + cav_fixed_bytes(cache->fixed) + sizeof *cache +
                  ((size_t)model->ngeom + 1) * (sizeof *cache->slot + sizeof *cache->moving + sizeof *cache->centre);
-  cache->bytes += (2 * (size_t)model->npair + 1) * sizeof *cache->candidate;
+  cache->bytes +=
+      (2 * (size_t)model->npair + 1) * (sizeof *cache->candidate + sizeof *cache->limit + sizeof *cache->near);
   if (cache->hint) cache->bytes += (size_t)model->npair * sizeof *cache->hint;
   cache->bytes += (size_t)model->nlink * (sizeof *cache->tree + sizeof *cache->root);
   return cache;
@@ -188,6 +205,8 @@ void cav_geom_cache_free(struct cav_geom_cache *cache) {
   free(cache->moving);
   free(cache->centre);
   free(cache->candidate);
+  free(cache->limit);
+  free(cache->near);
   free(cache->hint);
   free(cache->tree);
   free(cache->root);
@@ -391,19 +410,30 @@ static cav_status collide_swept(const cav_model *model, cav_state *state, const 
   return CAV_OK;
 }
 
+// contacts of a pair whose bounds are near
+static inline cav_status collide_near(const cav_model *model, cav_state *state, const candidate *c,
+                                      const double activation[2]) {
+  double margin = c->margin + activation[c->external];
+  if (c->expensive && state->work->narrowed) margin = reach(model, state, c->pair, margin);
+  return collide_pair(model, state, c, margin);
+}
+
 // contacts of consecutive pairs
 static inline cav_status collide_run(const cav_model *model, cav_state *state, cav_run run,
                                      const double activation[2]) {
   const struct cav_geom_cache *cache = state->work->geom;
-  for (int p = run.first; p < run.end; p++) {
-    const candidate *c = cache->candidate + p;
-    double margin = c->margin + activation[c->external];
-    if (!near(cache, c, margin)) continue;
-    if (c->expensive && state->work->narrowed) margin = reach(model, state, c->pair, margin);
-    cav_status status = collide_pair(model, state, c, margin);
-    if (status) return status;
+  cav_status status = CAV_OK;
+  if (cav_lanes_pay()) {
+    const int n = cav_near_run(cache, run.first, run.end, cache->near);
+    for (int i = 0; i < n && !status; i++)
+      status = collide_near(model, state, cache->candidate + cache->near[i], activation);
+    return status;
   }
-  return CAV_OK;
+  for (int p = run.first; p < run.end && !status; p++) {
+    const candidate *c = cache->candidate + p;
+    if (near(cache, c, c->margin + activation[c->external])) status = collide_near(model, state, c, activation);
+  }
+  return status;
 }
 
 // the pairs that what stands out of reach leaves
@@ -434,6 +464,7 @@ static cav_status collide_all(const cav_model *model, cav_state *state) {
   const cav_run *run = &all;
   int nrun = 1, count = model->npair;
   if (cache->fixed) count = leave_out(state, cache, most, &run, &nrun);
+  cav_limits_prepare(cache, activation);
   if (cache->sweep && count >= cache->sweep_from) return collide_swept(model, state, activation, most);
   for (int r = 0; r < nrun; r++) {
     cav_status status = collide_run(model, state, run[r], activation);

@@ -41,7 +41,6 @@ static size_t layout(const cav_model *m, char *base, cav_lanes *l) {
   l->u = carve(base, &used, m->nv);
   l->centre = carve(base, &used, 3 * m->ngeom);
   l->near = (int *)carve(base, &used, m->npair / (int)(sizeof(cav_four) / sizeof(int)) + 1);
-  l->limit = (double *)carve(base, &used, m->npair / CAV_LANES + 1);
   l->law = (cav_pair_law *)carve(base, &used, m->npair * (int)(sizeof(cav_pair_law) / sizeof(cav_four) + 1));
   l->row_law = (cav_row_law *)carve(
       base, &used, (m->nv + 2 * m->ntendon + m->njoint) * (int)(sizeof(cav_row_law) / sizeof(cav_four) + 1));
@@ -57,7 +56,6 @@ cav_lanes *cav_lanes_new(const cav_model *model) {
   memset(block, 0, bytes);
   cav_lanes *lanes = (cav_lanes *)block;
   layout(model, block, lanes);
-  lanes->activation[0] = lanes->activation[1] = NAN;
   // the world's frame; written as doubles, on whatever processor
   cav_lane_pose *world = lanes->link;
   for (int lane = 0; lane < CAV_LANES; lane++) {

@@ -36,11 +36,9 @@ typedef struct cav_lanes {
   cav_four *com, *inertia, *reference, *axis;
   cav_four *v, *v_next, *bias, *a; ///< [nv] before and after the step, where the bias is taken, acceleration
   cav_four *velocity, *velocity_next, *acceleration, *force, *u;
-  cav_four *centre; ///< [3*ngeom] of geoms in pairs, by their slots in the broad phase
-  int nnear, *near; ///< [npair] pairs that are near in some state: 16 times the pair, and a bit for each state
-  double *
-      limit; ///< [npair] below which pairs are, by activation: what is added to margins within trees and with the world
-  double activation[2];
+  cav_four *centre;       ///< [3*ngeom] of geoms in pairs, by their slots in the broad phase
+  int nnear, *near;       ///< [npair] pairs that are near in some state: 16 times the pair, and a bit for each state
+  double activation[2];   ///< what was added to margins within trees and with the world
   cav_pair_law *law;      ///< [npair]
   cav_row_law *row_law;   ///< [nv+2*ntendon+njoint] of friction losses and limits (lanes_rows.c)
   cav_options options;    ///< of all of those
