@@ -174,7 +174,10 @@ static void pack(const operand *o, int first, int count, int slice, int k, int h
   for (int p = 0; p < k; p++, from += o->by_column, out += height) {
     int some = count;
     if (o->end) some = o->end[slice + p] - first < count ? o->end[slice + p] - first : count;
-    for (int i = 0; i < some; i++) out[i] = from[(size_t)i * o->by_row];
+    if (o->by_row == 1 && some > 0)
+      memcpy(out, from, (size_t)some * sizeof *out);
+    else
+      for (int i = 0; i < some; i++) out[i] = from[(size_t)i * o->by_row];
     for (int i = some > 0 ? some : 0; i < height; i++) out[i] = 0;
   }
 }

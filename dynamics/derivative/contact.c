@@ -390,7 +390,7 @@ static inline __attribute__((always_inline)) void displace(const cav_contact *c,
 }
 
 // rate of the relative velocity along the axes of the frame, out [dim]
-static inline __attribute__((always_inline)) void velocity_rate(const cav_contact *c, const motion *m,
+static inline __attribute__((always_inline)) void velocity_rate(const cav_contact *c, int dim, const motion *m,
                                                                 const placement *p, int side, int shift,
                                                                 cav_four *out) {
   const double *own = m->own[side], *relative = m->relative;
@@ -403,12 +403,12 @@ static inline __attribute__((always_inline)) void velocity_rate(const cav_contac
 
   // and the axes turn
   FOUR_CROSS_ADD3(linear, relative + 3, p->rotation);
-  for (int i = 0; i < c->dim && i < 3; i++) out[i] = FOUR_DOT3(c->frame + 3 * i, linear);
-  if (c->dim <= 3) return;
+  for (int i = 0; i < dim && i < 3; i++) out[i] = FOUR_DOT3(c->frame + 3 * i, linear);
+  if (dim <= 3) return;
   if (!shift) turns(angular, own);
   for (int i = 0; i < 3 && side == 0; i++) angular[i] = -angular[i];
   FOUR_CROSS_ADD3(angular, relative, p->rotation);
-  for (int i = 3; i < c->dim; i++) out[i] = FOUR_DOT3(c->frame + 3 * (i - 3), angular);
+  for (int i = 3; i < dim; i++) out[i] = FOUR_DOT3(c->frame + 3 * (i - 3), angular);
 }
 
 // rate of the way of the point over the step along the tangents, out [2], links held after the step
@@ -470,9 +470,9 @@ static inline __attribute__((always_inline)) void put_three(double *to, const ca
   for (int k = 0; k < 3; k++) to[k] = (*from)[k];
 }
 
-CAV_VECTOR_BODY void fill_side_body(const cav_contact *c, const geometry *g, const motion *now, const motion *next,
-                                    const law_derivative *law, const cav_next_contact *ahead, const double *H, int side,
-                                    cav_contact_jacobian *derivative) {
+CAV_VECTOR_BODY void fill_rows(const cav_contact *c, int dim, const geometry *g, const motion *now, const motion *next,
+                               const law_derivative *law, const cav_next_contact *ahead, const double *H, int side,
+                               cav_contact_jacobian *derivative) {
   double whole[6] = {0}, along = dot3(c->frame, g->align);
   double across = sqrt(fmax(dot3(g->align, g->align) - along * along, 1e-12));
   add_wrench(c, c->impulse, whole);
@@ -480,24 +480,24 @@ CAV_VECTOR_BODY void fill_side_body(const cav_contact *c, const geometry *g, con
     placement p;
     cav_four before[6], after[6], kept[6], wrench[6];
     displace(c, g, side, shift, along, across, &p);
-    velocity_rate(c, now, &p, side, shift, before);
-    velocity_rate(c, next, &p, side, shift, after);
+    velocity_rate(c, dim, now, &p, side, shift, before);
+    velocity_rate(c, dim, next, &p, side, shift, after);
     put_three(derivative->dist[side] + 3 * shift, &p.dist);
     if (ahead) {
       cav_four way[2];
       way_rate(c, ahead, &p, side, shift, way);
       for (int i = 0; i < 2; i++) put_three(derivative->way[side][i] + 3 * shift, &way[i]);
     }
-    for (int j = 0; j < c->dim; j++) kept[j] = (1 - c->damping[j]) * before[j] - after[j];
+    for (int j = 0; j < dim; j++) kept[j] = (1 - c->damping[j]) * before[j] - after[j];
     // the impulse turns with the frame and acts at the displaced position
     for (int i = 0; i < 3; i++) wrench[i] = wrench[3 + i] = (cav_four){0};
     FOUR_CROSS_ADD3(wrench, p.rotation, whole);
     FOUR_CROSS_ADD3(wrench, p.pos, whole + 3);
     FOUR_CROSS_ADD3(wrench + 3, p.rotation, whole + 3);
-    for (int i = 0; i < c->dim; i++) {
+    for (int i = 0; i < dim; i++) {
       const double *e = c->frame + 3 * (i % 3);
       cav_four rate = law->by_dist[i] * p.dist, *part = i < 3 ? wrench + 3 : wrench;
-      for (int j = 0; j < c->dim; j++) rate += H[i * c->dim + j] * kept[j];
+      for (int j = 0; j < dim; j++) rate += H[i * dim + j] * kept[j];
       put_three(derivative->velocity[side][i] + 3 * shift, &after[i]);
       put_three(derivative->impulse[side][i] + 3 * shift, &rate);
       for (int r = 0; r < 3; r++) part[r] = part[r] + rate * e[r];
@@ -505,6 +505,15 @@ CAV_VECTOR_BODY void fill_side_body(const cav_contact *c, const geometry *g, con
     for (int r = 0; r < 6; r++)
       for (int k = 0; k < 3; k++) derivative->wrench[side][3 * shift + k][r] = wrench[r][k];
   }
+}
+// most contacts have three rows: known where it is compiled, that leaves loops out
+CAV_VECTOR_BODY void fill_side_body(const cav_contact *c, const geometry *g, const motion *now, const motion *next,
+                                    const law_derivative *law, const cav_next_contact *ahead, const double *H, int side,
+                                    cav_contact_jacobian *derivative) {
+  if (c->dim == 3 && !ahead)
+    fill_rows(c, 3, g, now, next, law, NULL, H, side, derivative);
+  else
+    fill_rows(c, c->dim, g, now, next, law, ahead, H, side, derivative);
 }
 CAV_BY_VECTORS(fill_side,
                (const cav_contact *c, const geometry *g, const motion *now, const motion *next,
@@ -517,6 +526,41 @@ static int is_flat(const cav_contact *c, const double *H) {
   double fraction = 0;
   for (int i = 0; i < c->dim; i++) fraction += H[i * c->dim + i] * c->regulariser[i];
   return fraction < FLAT;
+}
+
+// the curvature in the frame and in world axes, of rows along the axes of the contact alone
+CAV_VECTOR_BODY void curve_lines_body(const cav_contact *c, const double *H, cav_contact_jacobian *derivative) {
+  cav_four sum[3] = {{0}}, axis[3];
+  for (int j = 0; j < c->dim; j++) axis[j] = (cav_four){c->frame[3 * j], c->frame[3 * j + 1], c->frame[3 * j + 2], 0};
+  for (int i = 0; i < c->dim; i++) {
+    const double *x = c->frame + 3 * i;
+    for (int j = 0; j < c->dim; j++) {
+      const double h = derivative->hessian[i][j] = H[i * c->dim + j];
+      for (int r = 0; r < 3; r++) sum[r] = sum[r] + h * x[r] * axis[j];
+    }
+  }
+  for (int r = 0; r < 3; r++) put_three(&derivative->by_velocity[3 + r][3], &sum[r]);
+}
+CAV_BY_VECTORS(curve_lines, (const cav_contact *c, const double *H, cav_contact_jacobian *derivative),
+               (c, H, derivative))
+
+// the same of all rows
+static void curve(const cav_contact *c, const double *H, cav_contact_jacobian *derivative) {
+  memset(derivative->by_velocity, 0, sizeof derivative->by_velocity);
+  if (c->dim <= 3) {
+    curve_lines(c, H, derivative);
+    return;
+  }
+  for (int i = 0; i < c->dim; i++) {
+    for (int j = 0; j < c->dim; j++) {
+      double h = derivative->hessian[i][j] = H[i * c->dim + j];
+      const double *x = c->frame + 3 * (i % 3), *y = c->frame + 3 * (j % 3);
+      int row = i < 3 ? 3 : 0, column = j < 3 ? 3 : 0;
+      for (int r = 0; r < 3; r++) {
+        for (int s = 0; s < 3; s++) derivative->by_velocity[row + r][column + s] += h * x[r] * y[s];
+      }
+    }
+  }
 }
 
 void cav_contact_differentiate(const cav_model *model, const cav_state *state, const cav_contact *c, int whole,
@@ -537,16 +581,5 @@ void cav_contact_differentiate(const cav_model *model, const cav_state *state, c
     if ((side ? c->link2 : c->link1) > 0) fill_side(c, &g, &now, &next, &law, ahead, H, side, derivative);
   }
 
-  // the curvature in the frame and in world axes
-  memset(derivative->by_velocity, 0, sizeof derivative->by_velocity);
-  for (int i = 0; i < c->dim; i++) {
-    for (int j = 0; j < c->dim; j++) {
-      double h = derivative->hessian[i][j] = H[i * c->dim + j];
-      const double *x = c->frame + 3 * (i % 3), *y = c->frame + 3 * (j % 3);
-      int row = i < 3 ? 3 : 0, column = j < 3 ? 3 : 0;
-      for (int r = 0; r < 3; r++) {
-        for (int s = 0; s < 3; s++) derivative->by_velocity[row + r][column + s] += h * x[r] * y[s];
-      }
-    }
-  }
+  curve(c, H, derivative);
 }

@@ -224,29 +224,29 @@ enum { OF_VELOCITY = 1, OF_NEXT = 7, OF_IMPULSE = 13, OF_IMPULSE_NOW = 19, OF_IM
 _Static_assert(OF_IMPULSE_NEXT + CAV_IMPULSE_DIM == CAV_PATH_ROWS, "the last of these rows is the last that is kept");
 
 // velocities of the point along the axes of the contact
-static inline __attribute__((always_inline)) void motion_along(const cav_contact *c, const double *path, size_t n,
-                                                               int k, const double d[3], double sign,
+static inline __attribute__((always_inline)) void motion_along(const cav_contact *c, int dim, const double *path,
+                                                               size_t n, int k, const double d[3], double sign,
                                                                cav_four motion[6], cav_four *along) {
   motion_of_four(path, n, k, d, motion);
-  for (int i = 0; i < c->dim; i++) {
+  for (int i = 0; i < dim; i++) {
     const double *e = c->frame + 3 * (i % 3);
     along[i] = sign * DOT3(e, motion + (i < 3 ? 3 : 0));
   }
 }
 
 // rows of a contact's derivatives in the dofs of the path, of its impulse the first ones
-CAV_VECTOR_BODY void path_rows_body(const cav_derivative_task *t, const cav_contact *c,
-                                    const cav_contact_jacobian *derivative, int side, int impulses, int count,
-                                    const double d[3], double *to) {
+CAV_VECTOR_BODY void fill_path(const cav_derivative_task *t, const cav_contact *c, int dim,
+                               const cav_contact_jacobian *derivative, int side, int impulses, int count,
+                               const double d[3], double *to) {
   const size_t n = (size_t)t->s->path.stride;
   const double *path = t->s->path.at, sign = side ? 1 : -1, keep = 1 - c->damping[0];
   for (int k = 0; k < count; k += 4, to += 4) {
     cav_four axis[6], drift[6], x[6], now[6], next[6];
-    motion_along(c, path + CAV_OF_NOW * n, n, k, d, sign, drift, now);
-    motion_along(c, path + CAV_OF_NEXT * n, n, k, d, sign, drift, next);
-    motion_along(c, path + CAV_OF_AXIS * n, n, k, d, sign, axis, x);
+    motion_along(c, dim, path + CAV_OF_NOW * n, n, k, d, sign, drift, now);
+    motion_along(c, dim, path + CAV_OF_NEXT * n, n, k, d, sign, drift, next);
+    motion_along(c, dim, path + CAV_OF_AXIS * n, n, k, d, sign, axis, x);
     *(cav_four *)to = DOT6(derivative->dist[side], axis);
-    for (int i = 0; i < c->dim; i++) {
+    for (int i = 0; i < dim; i++) {
       const double *v = derivative->velocity[side][i];
       *(cav_four *)(to + (OF_VELOCITY + i) * n) = DOT6(v, axis) + next[i];
       *(cav_four *)(to + (OF_NEXT + i) * n) = x[i];
@@ -254,7 +254,7 @@ CAV_VECTOR_BODY void path_rows_body(const cav_derivative_task *t, const cav_cont
     for (int i = 0; i < impulses; i++) {
       const double *H = derivative->hessian[i], *f = derivative->impulse[side][i];
       cav_four by_now = H[0] * now[0], by_next = H[0] * next[0], by_axis = H[0] * x[0];
-      for (int j = 1; j < c->dim; j++) {
+      for (int j = 1; j < dim; j++) {
         by_now += H[j] * now[j];
         by_next += H[j] * next[j];
         by_axis += H[j] * x[j];
@@ -264,6 +264,15 @@ CAV_VECTOR_BODY void path_rows_body(const cav_derivative_task *t, const cav_cont
       *(cav_four *)(to + (OF_IMPULSE_NEXT + i) * n) = -by_axis;
     }
   }
+}
+// most contacts have three rows, of whose impulses the first is asked for
+CAV_VECTOR_BODY void path_rows_body(const cav_derivative_task *t, const cav_contact *c,
+                                    const cav_contact_jacobian *derivative, int side, int impulses, int count,
+                                    const double d[3], double *to) {
+  if (c->dim == 3 && impulses == 1)
+    fill_path(t, c, 3, derivative, side, 1, count, d, to);
+  else
+    fill_path(t, c, c->dim, derivative, side, impulses, count, d, to);
 }
 CAV_BY_VECTORS(path_rows,
                (const cav_derivative_task *t, const cav_contact *c, const cav_contact_jacobian *derivative, int side,

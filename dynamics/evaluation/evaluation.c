@@ -1,7 +1,7 @@
-/// Evaluations of the inverse put by. A trajectory that a solver steps to has been evaluated before it is linearised, and
-/// derivatives read poses, motions, contacts and rows alone, of which a state has a quarter of its memory: a state for each knot
-/// would take what a thread keeps warm (geoms, lists of work, derivatives) from its cache. Numbers are copied; contacts and rows,
-/// most of what there is, change hands.
+/// Evaluations of the inverse put by. A trajectory that a solver steps to has been evaluated before it is linearised,
+/// and derivatives read poses, motions, contacts and rows alone, of which a state has a quarter of its memory: a state
+/// for each knot would take what a thread keeps warm (geoms, lists of work, derivatives) from its cache. Numbers are
+/// copied; contacts and rows, most of what there is, change hands.
 #include "evaluation.h"
 
 #include <stdlib.h>
@@ -16,7 +16,7 @@ typedef struct stretch {
   size_t bytes;
 } stretch;
 
-enum { STRETCHES = 4 };
+enum { STRETCHES = 5 };
 
 struct cav_evaluation {
   int kept; ///< 0: nothing
@@ -25,21 +25,23 @@ struct cav_evaluation {
   double discrete_damping, discrete_stiffness;
   cav_contact *contact;
   cav_row *row;
-  double *point; ///< [nq + 2*nv] q, v, v_next as they were given
+  double *q;     ///< [nq] as it was given: the state's has unit quaternions
   char *numbers; ///< of the stretches
 };
 
 static stretch between(void *from, const void *to) { return (stretch){from, (size_t)((char *)to - (char *)from)}; }
 
-// what follows each other in the layout of a state (state.c); the bytes of all
-static size_t list_stretches(const cav_model *model, const cav_state *state, stretch s[STRETCHES]) {
+// what follows each other in the layout of a state (state.c); the bytes of all. What is scratch is left out, as are
+// velocities that contacts were not sought for
+static size_t list_stretches(const cav_model *model, const cav_state *state, int narrowed, stretch s[STRETCHES]) {
   const cav_workspace *w = state->work;
   size_t bytes = 0;
   s[0] = between(state->link, w->q + model->nq);
-  s[1] = between(state->velocity, w->narrow_v + 2 * model->nv);
+  s[1] = between(state->velocity, w->acceleration + 6 * (size_t)model->nlink);
   s[2] = between(state->tendon_length, state->tendon_arm + model->ntendon_dof);
   s[3] = between(state->equality,
                  w->bias ? (void *)(w->bias + 6 * (size_t)model->nlink) : (void *)(state->equality + model->nequality));
+  s[4] = between(w->narrow_v, w->narrow_v + (narrowed ? 2 * model->nv : 0));
   for (int i = 0; i < STRETCHES; i++) bytes += s[i].bytes;
   return bytes;
 }
@@ -47,16 +49,16 @@ static size_t list_stretches(const cav_model *model, const cav_state *state, str
 static cav_evaluation *evaluation_new(const cav_model *model, size_t bytes) {
   cav_evaluation *e = calloc(1, sizeof *e);
   if (!e) return NULL;
-  e->point = malloc((size_t)(model->nq + 2 * model->nv) * sizeof(double));
+  e->q = malloc((size_t)(model->nq + 1) * sizeof(double));
   e->numbers = malloc(bytes);
-  if (e->point && e->numbers) return e;
+  if (e->q && e->numbers) return e;
   cav_evaluation_free(e);
   return NULL;
 }
 
 void cav_evaluation_free(cav_evaluation *e) {
   if (!e) return;
-  free(e->contact), free(e->row), free(e->point), free(e->numbers);
+  free(e->contact), free(e->row), free(e->q), free(e->numbers);
   free(e);
 }
 
@@ -100,19 +102,18 @@ void cav_evaluation_keep(cav_evaluation **evaluation, cav_state *state, const do
   cav_workspace *w = state->work;
   stretch s[STRETCHES];
   if (*evaluation) (*evaluation)->kept = 0;
-  const size_t bytes = list_stretches(model, state, s), nq = (size_t)model->nq, nv = (size_t)model->nv;
+  const size_t nv = (size_t)model->nv;
   if (!is_plain(&state->options) || !cav_state_evaluated(state) || memcmp(w->v, v, nv * sizeof(double)) ||
       memcmp(w->v_next, v_next, nv * sizeof(double)))
     return;
-  if (!*evaluation) *evaluation = evaluation_new(model, bytes);
+  if (!*evaluation) *evaluation = evaluation_new(model, list_stretches(model, state, 1, s));
   cav_evaluation *e = *evaluation;
   if (!e || !make_rooms(e, w)) return;
   char *to = e->numbers;
+  list_stretches(model, state, w->narrowed, s);
   for (int i = 0; i < STRETCHES; to += s[i++].bytes)
     if (s[i].bytes) memcpy(to, s[i].at, s[i].bytes);
-  memcpy(e->point, q, nq * sizeof(double));
-  memcpy(e->point + nq, v, nv * sizeof(double));
-  memcpy(e->point + nq + nv, v_next, nv * sizeof(double));
+  if (model->nq) memcpy(e->q, q, (size_t)model->nq * sizeof *q);
   exchange(e, state);
   e->options = w->options;
   e->ncontact = state->ncontact, e->nrow = state->nrow, e->nequality = state->nequality, e->narrowed = w->narrowed;
@@ -128,10 +129,13 @@ int cav_evaluation_take(cav_evaluation *e, cav_state *state, const double *q, co
   const size_t nq = (size_t)model->nq, nv = (size_t)model->nv;
   stretch s[STRETCHES];
   if (!e || !e->kept || !cav_options_same(&state->options, &e->options, CAV_STAGE_VELOCITY)) return 0;
-  if (memcmp(e->point, q, nq * sizeof(double)) || memcmp(e->point + nq, v, nv * sizeof(double)) ||
-      memcmp(e->point + nq + nv, v_next, nv * sizeof(double)))
+  list_stretches(model, state, e->narrowed, s);
+  // its own velocities lie where the state's do
+  const char *motion = e->numbers + s[0].bytes;
+  const size_t of_v = (size_t)((char *)w->v - (char *)s[1].at), of_next = (size_t)((char *)w->v_next - (char *)s[1].at);
+  if (memcmp(e->q, q, nq * sizeof *q) || memcmp(motion + of_v, v, nv * sizeof *v) ||
+      memcmp(motion + of_next, v_next, nv * sizeof *v_next))
     return 0;
-  list_stretches(model, state, s);
   const char *from = e->numbers;
   for (int i = 0; i < STRETCHES; from += s[i++].bytes)
     if (s[i].bytes) memcpy(s[i].at, from, s[i].bytes);

@@ -1,5 +1,5 @@
-/// What an evaluation of the inverse leaves in a state, put by so that a state of the same model can have it back in the place
-/// of another evaluation at the same point. Private to dynamics/ and optim/.
+/// What an evaluation of the inverse leaves in a state, put by so that a state of the same model can have it back in the
+/// place of another evaluation at the same point. Private to dynamics/ and optim/.
 #ifndef CAVORT_EVALUATION_H
 #define CAVORT_EVALUATION_H
 
@@ -7,9 +7,10 @@
 
 typedef struct cav_evaluation cav_evaluation;
 
-/// Moves what the state's last evaluation, cav_inverse at (q, v, v_next) [nq, nv, nv], has left there to *evaluation, made where
-/// that is NULL; the state holds none then. Nothing is kept, and the state stays as it is, under options whose evaluation leaves
-/// more than this (orders of whole momenta, rows that are coupled or look ahead) or if memory runs out.
+/// Moves what the state's last evaluation, cav_inverse at (q, v, v_next) [nq, nv, nv], has left there to *evaluation,
+/// made where that is NULL; the state holds none then. Nothing is kept, and the state stays as it is, under options
+/// whose evaluation leaves more than this (orders of whole momenta, rows that are coupled or look ahead) or if memory
+/// runs out.
 void cav_evaluation_keep(cav_evaluation **evaluation, cav_state *state, const double *q, const double *v,
                          const double *v_next);
 

@@ -213,7 +213,7 @@ static double slot_residual(cav_sum *a, int i, double value, double lower, doubl
   if (a->tr->constraints_only) {
     if (i >= at->effort && i < at->joint) slack = a->tr->slack_effort;
     if (i >= at->joint && i < at->term) slack = a->tr->slack_range;
-  } else if (rho > 0) {
+  } else if (rho > 0 && slot->multiplier != 0) {
     shifted += slot->multiplier / rho;
   }
   // written out, as calls take longer than what they do
