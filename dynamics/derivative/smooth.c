@@ -219,8 +219,9 @@ typedef struct entries {
   double *row_q, *row_v, *row_n, *column_q, *column_v, *column_n;
 } entries;
 
-// what is smooth
-CAV_VECTOR_BODY void smooth_pairs_body(const cav_derivative_task *t, const deep *deeper, const entries *to, int count) {
+// what is smooth; dofs before place own, where the deeper one's group begins, carry its wrench
+CAV_VECTOR_BODY void smooth_pairs_body(const cav_derivative_task *t, const deep *deeper, const entries *to, int own,
+                                       int count) {
   const double inverse_h = t->inverse_h, part = t->mean ? 0.5 : 1, half = t->mean ? 0.5 : 0, *at = t->s->path.at;
   const size_t n = (size_t)t->s->path.stride;
   const deep d = *deeper;
@@ -231,13 +232,19 @@ CAV_VECTOR_BODY void smooth_pairs_body(const cav_derivative_task *t, const deep 
     *(cav_four *)(out.row_q + k) = DOT6(d.a, CAV_OF_SECOND) + DOT3(d.gyration, CAV_OF_DRIFT);
     *(cav_four *)(out.row_v + k) = part * w - a * inverse_h;
     *(cav_four *)(out.row_n + k) = half * w + a * inverse_h;
-    *(cav_four *)(out.column_q + k) = DOT6(d.q, CAV_OF_AXIS);
+    cav_four column = DOT6(d.q, CAV_OF_AXIS);
+    if (k < own) {
+      const cav_four carried = DOT6(d.carried, CAV_OF_AXIS), all = column + carried;
+      for (int i = 0; i < 4 && k + 4 > own; i++) column[i] = k + i < own ? all[i] : column[i];
+      if (k + 4 <= own) column = all;
+    }
+    *(cav_four *)(out.column_q + k) = column;
     *(cav_four *)(out.column_v + k) = part * by - a * inverse_h;
     *(cav_four *)(out.column_n + k) = half * by + a * inverse_h;
   }
 }
-CAV_BY_VECTORS(smooth_pairs, (const cav_derivative_task *t, const deep *d, const entries *out, int count),
-               (t, d, out, count))
+CAV_BY_VECTORS(smooth_pairs, (const cav_derivative_task *t, const deep *d, const entries *out, int own, int count),
+               (t, d, out, own, count))
 
 // what contacts give
 CAV_VECTOR_BODY void contact_pairs_body(const cav_derivative_task *t, const deep *deeper, const entries *to,
@@ -278,9 +285,7 @@ void cav_derivative_pairs(const cav_derivative_task *t, int j) {
   deep d = {0};
   deepen(t, j, &d);
   while (!group[s->path.dof[own]]) own--;
-  smooth_pairs(t, &d, &out, count);
-  // dofs before its group carry its wrench
-  for (int k = 0; k < own; k++) out.column_q[k] += dot6(d.carried, t->state->axis + 6 * s->path.dof[k]);
+  smooth_pairs(t, &d, &out, own, count);
   if (t->momentum) leave_roots(t, &d, &out, length, cav_moves_root(t->model, j));
   if (d.touched) contact_pairs(t, &d, &out, count);
   for (int k = 0; k < length; k++) {
