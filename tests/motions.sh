@@ -80,7 +80,7 @@ row() {
     row $motion mujoco/humanoid.xml
     row $motion dm_control/humanoid.xml
   done
-  for motion in turn-round side-step walk-back push-up one-leg dance jump-half-turn sit-stand under-bar crawl touch-floor kick-ball throw push-box; do row $motion; done
+  for motion in turn-round side-step walk-back push-up one-leg dance jump-half-turn sit-stand under-bar crawl touch-floor turn-over kick-ball throw push-box; do row $motion; done
   row quadruped-jump
   row robot-squat
   row robot-reach

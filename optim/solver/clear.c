@@ -7,6 +7,7 @@
 #include <stdlib.h>
 
 #include "continuation.h"
+#include "math3.h"
 
 /// Depth that is free, m; least step upwards of the search, and how many of them.
 static const double touching = 1e-3, step = 0.01;
@@ -14,6 +15,9 @@ enum { STEPS = 500 };
 
 /// Depth in a solid from which a guess runs into it, m.
 static const double deep = 0.01;
+
+/// Depth in the ground of a guess that goes through it, over the size of the model.
+static const double buried = 0.5;
 
 /// Time over which the course looks ahead and back, s.
 static const double ahead = 0.25;
@@ -86,22 +90,44 @@ static int has_solid(const cav_model *m) {
   return 0;
 }
 
-cav_status cav_guess_collides(const cav_problem *problem, int *collides) {
-  const cav_model *m = problem->model;
-  *collides = 0;
-  if (problem->cycle.on || !has_solid(m)) return CAV_OK;
+/// Whether any knot of the problem's guess is deeper than this in the world: in all of it, or in solids alone.
+static cav_status is_deeper(const cav_problem *problem, int solids, double than, int *deeper) {
   int n = (int)lround(problem->duration / problem->timestep) + 1;
   cav_problem stated = *problem;
   stated.schedule.solids = CAV_SOLIDS_HARD;
-  cav_trajectory *at = cav_trajectory_new(m, n, problem->timestep);
-  cav_state *state = cav_state_new(m);
+  cav_trajectory *at = cav_trajectory_new(problem->model, n, problem->timestep);
+  cav_state *state = cav_state_new(problem->model);
   cav_status status = at && state ? cav_guess_fill(&stated, problem->q_goal, at) : CAV_NO_MEMORY;
-  for (int t = 0; t < n && !status && !*collides; t++) {
+  *deeper = 0;
+  for (int t = 0; t < n && !status && !*deeper; t++) {
     double depth = 0;
-    status = depth_at(m, state, at->q + (size_t)t * at->nq, 1, &depth);
-    *collides = depth > deep;
+    status = depth_at(problem->model, state, at->q + (size_t)t * at->nq, solids, &depth);
+    *deeper = depth > than;
   }
   cav_state_free(state);
   cav_trajectory_free(at);
   return status;
+}
+
+cav_status cav_guess_collides(const cav_problem *problem, int *collides) {
+  *collides = 0;
+  return problem->cycle.on || !has_solid(problem->model) ? CAV_OK : is_deeper(problem, 1, deep, collides);
+}
+
+cav_status cav_guess_sinks(const cav_problem *problem, int *sinks) {
+  const cav_model *m = problem->model;
+  cav_state *state = cav_state_new(m);
+  double size = 0;
+  *sinks = 0;
+  cav_status status = state ? cav_position(m, state, problem->q_start) : CAV_NO_MEMORY;
+  // how far the links of a tree are apart at the start
+  for (int i = 1; i < m->nlink && !status; i++)
+    for (int k = 1; k < i; k++)
+      if (m->link[i].root == m->link[k].root) {
+        double apart[3];
+        sub3(apart, state->com + 3 * i, state->com + 3 * k);
+        size = fmax(size, norm3(apart));
+      }
+  cav_state_free(state);
+  return status || size == 0 ? status : is_deeper(problem, 0, buried * size, sinks);
 }

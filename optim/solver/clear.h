@@ -13,4 +13,7 @@ cav_status cav_clear(const cav_model *model, cav_trajectory *guess);
 /// Whether the problem's guess runs into a solid of the world, by a centimetre or more.
 cav_status cav_guess_collides(const cav_problem *problem, int *collides);
 
+/// Whether the problem's guess goes through the ground: deeper than half of what its links are apart at the start.
+cav_status cav_guess_sinks(const cav_problem *problem, int *sinks);
+
 #endif

@@ -271,6 +271,13 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
 
   int collides = 0;
   status = problem->schedule.solids == CAV_SOLIDS_GROW ? CAV_OK : cav_guess_collides(problem, &collides);
+  // a straight way through the ground is nobody's
+  const int decorated = is_decorated(problem);
+  int sinks = 0;
+  if (status == CAV_OK && !collides && !decorated && !problem->cycle.on && problem->guess == CAV_GUESS_INTERPOLATE)
+    status = cav_guess_sinks(problem, &sinks);
+  if (status != CAV_OK) return status;
+  if (sinks) strategy[0].guess = CAV_GUESS_HOLD, strategy[0].stated = 0, strategy[0].text = "with the start held";
   // all others would run into them, too
   if (collides) stated.schedule.solids = CAV_SOLIDS_GROW;
   cav_strategy plain = stated;
@@ -300,10 +307,10 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   if (status != CAV_OK) return status;
   if (leap.height > 0) add_mended(strategy, n, &leap, "leap");
 
-  int decorated = is_decorated(problem);
-  if (decorated || problem->guess == CAV_GUESS_HOLD) add(strategy, n, &plain, "line", "straight from start to goal");
+  if (decorated || problem->guess == CAV_GUESS_HOLD || sinks)
+    add(strategy, n, &plain, "line", "straight from start to goal");
   plain.guess = CAV_GUESS_HOLD;
-  if (!problem->cycle.on && (decorated || problem->guess != CAV_GUESS_HOLD))
+  if (!problem->cycle.on && !sinks && (decorated || problem->guess != CAV_GUESS_HOLD))
     add(strategy, n, &plain, "hold", "the start held");
 
   cav_strategy slow = stated;
