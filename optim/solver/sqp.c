@@ -43,9 +43,9 @@ enum { FEW = 3 };
 enum { LOOK = 5, LOOKS = 2 };
 static const double brisk = 0.5, sluggish = 0.03, left_alone = 2;
 
-/// Part of what may be left to be saved at which one look ends a run, however fast it converges; and part that an
-/// iteration may gain there.
-static const double near_end = 0.1, near_gain = 0.1;
+/// Part of what may be left to be saved: one look that finds no more ends a run whose iterations gain less than that each,
+/// however fast it converges.
+static const double near_end = 0.1;
 
 /// What may be left to be saved on the way, a fraction of the cost.
 static const double soft_optimality = 2e-3;
@@ -111,6 +111,7 @@ typedef struct descent {
   int needs_known;
   double gain;                   ///< decrease of the step that was taken
   double asked;                  ///< what may be left to be saved, of the cost
+  double near;                   ///< what is next to nothing; 0 on the way, where a law is left soon in any case
   int patient;                   ///< 1: being stuck is no end, unless little is left
   cav_trajectory *second, *best; ///< corrected trial; best of those tried
   cav_trajectory *held;          ///< last motion whose rows held, or nearly; NULL: none did
@@ -570,8 +571,8 @@ static int is_end(const descent *d, const tail *end) {
 
 /// Whether the last iteration hints at an end: it gained next to nothing and its programme predicted no more.
 static int hints(const cav_solve_run *run, const descent *d) {
-  double little = d->asked * cav_programme_scale(run->tr);
-  return d->gain < near_gain * little && d->predicted < near_end * little;
+  double little = d->near * cav_programme_scale(run->tr);
+  return d->gain < little && d->predicted < little;
 }
 
 /// Looks, every few iterations that gain little; between two such looks once where an iteration hints at an end.
@@ -582,7 +583,7 @@ static cav_status look(cav_solve_run *run, descent *d, tail *end) {
   if (!due && !early) return CAV_OK;
   double gain = end->gain / end->iterations;
   cav_status status = gain < d->asked ? foresee(run, d, &end->saving) : CAV_OK;
-  end->near = end->saving <= near_end * d->asked && gain < near_gain * d->asked;
+  end->near = end->saving <= d->near && gain < d->near;
   end->hinted = !due;
   if (!due) return status;
   end->iterations = 0, end->gain = 0;
@@ -698,6 +699,7 @@ static cav_status run_of(cav_solve_run *run, int *left, double asked, double fra
   if (!entry) return CAV_NO_MEMORY;
   cav_status status = descent_new(&d, run) ? cav_transcription_values(run->tr, run->at) : CAV_NO_MEMORY;
   d.asked = asked;
+  d.near = soft ? 0 : near_end * asked;
   d.patient = !stuck;
   if (status == CAV_OK) begin(run, &d);
   if (status == CAV_OK && cav_run_certifiable(run)) status = hold(run, &d);
