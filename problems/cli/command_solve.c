@@ -296,7 +296,8 @@ static int solve_from(const cav_command_line *line, const cav_problem *problem, 
   int most = b->start ? 1 : line->strategies ? line->strategies : CAV_STRATEGIES;
   cav_status status = cav_race_open(&race, most, &error);
   if (!status && race.tell && !race.entry[0].strategy.stated)
-    fprintf(stderr, "the way from start to goal runs into a solid or the ground and the file has no <guess>: begun %s\n",
+    fprintf(stderr,
+            "the way from start to goal runs into a solid or the ground and the file has no <guess>: begun %s\n",
             race.entry[0].strategy.text);
   if (!status) status = run_race(&race, line, &tick, &error);
   int best = status ? -1 : cav_race_best(&race, line->strategies > 1), done = CAV_EXIT_INTERNAL;
