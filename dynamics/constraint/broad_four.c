@@ -78,7 +78,7 @@ CAV_BY_FOUR void cav_lanes_limits(const cav_model *model, cav_lanes *l, const ca
   l->nbounded = n;
 }
 
-void cav_lanes_near(const cav_model *model, cav_lanes *l, const cav_state *state, const double activation[2]) {
+void cav_lanes_near(const cav_model *model, cav_lanes *l, cav_state *state, const double activation[2]) {
   struct cav_geom_cache *cache = state->work->geom;
   cav_limits_prepare(cache, activation);
   for (int k = 0; k < 2; k++) l->activation[k] = activation[k];

@@ -490,7 +490,7 @@ int cav_contacts_listed(const cav_model *model, const cav_state *state) {
   return 1;
 }
 
-void cav_contacts_near(const cav_model *model, cav_lanes *lanes, const cav_state *state) {
+void cav_contacts_near(const cav_model *model, cav_lanes *lanes, cav_state *state) {
   double activation[2];
   lanes->nnear = 0;
   if (!seeks_contacts(model, state)) return;

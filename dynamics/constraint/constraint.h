@@ -38,13 +38,13 @@ int cav_law_four(cav_contact *contact);
 /// those whose bounds are near in some state, into lanes, from their poses there; and for cav_contacts_find of one of
 /// the states among those the places of their geoms. collide.c.
 int cav_contacts_listed(const cav_model *model, const cav_state *state);
-void cav_contacts_near(const cav_model *model, cav_lanes *lanes, const cav_state *state);
+void cav_contacts_near(const cav_model *model, cav_lanes *lanes, cav_state *state);
 void cav_contacts_place_near(const cav_lanes *lanes, cav_state *const state[CAV_LANES]);
 cav_status cav_contacts_of_near(const cav_model *model, cav_state *state, const cav_lanes *lanes, int lane);
 
 /// The pairs alone, by the margins that are added to those of pairs between links and with the world; then the
 /// places. broad_four.c.
-void cav_lanes_near(const cav_model *model, cav_lanes *lanes, const cav_state *state, const double activation[2]);
+void cav_lanes_near(const cav_model *model, cav_lanes *lanes, cav_state *state, const double activation[2]);
 void cav_lanes_place_near(const cav_lanes *lanes, cav_state *const state[CAV_LANES]);
 
 /// Points of pair k of those, in the order and with the bits of cav_contacts_find of each state; touch has room for

@@ -33,7 +33,7 @@ static stretch between(void *from, const void *to) { return (stretch){from, (siz
 
 // what follows each other in the layout of a state (state.c); the bytes of all. What is scratch is left out, as are
 // velocities that contacts were not sought for
-static size_t list_stretches(const cav_model *model, const cav_state *state, int narrowed, stretch s[STRETCHES]) {
+static size_t list_stretches(const cav_model *model, cav_state *state, int narrowed, stretch s[STRETCHES]) {
   const cav_workspace *w = state->work;
   size_t bytes = 0;
   s[0] = between(state->link, w->q + model->nq);
