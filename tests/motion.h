@@ -84,8 +84,8 @@ static inline void motion_read_log(const char *path, const motion_findings *befo
   found->silent += !spoke;
 }
 
-// leaves out entries whose error grows as the step does, by eight from the run before: next to nothing of it is left at no
-// step. There the derivative changes by 1e8 a unit, as hop's gradient may; it is not wrong
+// leaves out entries whose error grows as the step does, by eight from the run before: none of it is left at no step.
+// There the derivative changes by 1e8 a unit, as hop's gradient may; it is not wrong
 static inline void motion_leave_curved(const motion_findings *before, motion_findings *found) {
   int left = 0;
   if (found->errors > MOTION_NAMES || before->errors > MOTION_NAMES) return;
