@@ -97,8 +97,13 @@ CAV_BY_FOUR static int turn_hinges(const cav_workspace *w, cav_lanes *l) {
     l->half[i] = 0.5 * (l->q[w->hinge[i]] - w->hinge_ref[i]);
     far |= (l->half[i] >= SINES_MOST) | (l->half[i] <= -SINES_MOST);
   }
-  sines((const double *)l->half, (double *)l->sine, (double *)l->cosine, CAV_LANES * w->nhinge);
-  return (far[0] | far[1] | far[2] | far[3]) != 0;
+  const double *half = (const double *)l->half;
+  double *sine = (double *)l->sine, *cosine = (double *)l->cosine;
+  const int n = CAV_LANES * w->nhinge, any = (far[0] | far[1] | far[2] | far[3]) != 0;
+  if (!any) sines(half, sine, cosine, n);
+  for (int i = 0; i < n && any; i++)
+    if (fabs(half[i]) < SINES_MOST) sines(half + i, sine + i, cosine + i, 1);
+  return any;
 }
 
 // a state with such an angle has all its sines from the library, as it has alone
