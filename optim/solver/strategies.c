@@ -240,6 +240,15 @@ static void add_grown(const cav_problem *problem, cav_strategy *strategy, int *n
   add_repairs(strategy, n, grown);
 }
 
+/// A file without a guess whose straight way goes through the ground is begun with the start held: such a way is nobody's.
+static cav_status hold_over_ground(const cav_problem *problem, cav_strategy *begun, int *sinks) {
+  *sinks = 0;
+  if (problem->cycle.on || problem->guess != CAV_GUESS_INTERPOLATE) return CAV_OK;
+  cav_status status = cav_guess_sinks(problem, sinks);
+  if (*sinks) begun->guess = CAV_GUESS_HOLD, begun->stated = 0, begun->text = "with the start held";
+  return status;
+}
+
 cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[CAV_STRATEGIES], int *n) {
   cav_strategy stated = {.guess = problem->guess, .stated = 1, .order = problem->order, .schedule = problem->schedule};
   *n = 0;
@@ -271,13 +280,10 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
 
   int collides = 0;
   status = problem->schedule.solids == CAV_SOLIDS_GROW ? CAV_OK : cav_guess_collides(problem, &collides);
-  // a straight way through the ground is nobody's
   const int decorated = is_decorated(problem);
   int sinks = 0;
-  if (status == CAV_OK && !collides && !decorated && !problem->cycle.on && problem->guess == CAV_GUESS_INTERPOLATE)
-    status = cav_guess_sinks(problem, &sinks);
+  if (status == CAV_OK && !collides && !decorated) status = hold_over_ground(problem, strategy, &sinks);
   if (status != CAV_OK) return status;
-  if (sinks) strategy[0].guess = CAV_GUESS_HOLD, strategy[0].stated = 0, strategy[0].text = "with the start held";
   // all others would run into them, too
   if (collides) stated.schedule.solids = CAV_SOLIDS_GROW;
   cav_strategy plain = stated;

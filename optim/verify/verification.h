@@ -97,16 +97,26 @@ void cav_hover_free(cav_hover *hover);
 cav_status cav_hover_add(cav_hover *hover, const cav_verification *verification, int t);
 void cav_hover_result(cav_hover *hover, const cav_verification *verification, cav_metric *metric);
 
+/// Load that slides, beyond what is asked: sums over the knots that have been added. slip.c.
+typedef struct cav_slip {
+  double load;        ///< N s, of loaded contacts
+  double slides, own; ///< N m: load times speed; of it between links of one tree
+  cav_metric most;    ///< the largest at a knot and contact
+} cav_slip;
+
+/// Adds knot t; verification->state holds the inverse there.
+void cav_slip_add(const cav_verification *verification, int t, cav_slip *slip);
+
 /// Rates that are told: of an actuator W, of joints rad/s and over the limit of the model's file (negative: none has
 /// one). rates.c.
 typedef struct cav_rates {
   double power, speed, over_limit;
 } cav_rates;
 
-/// Adds knot t, whose forces, where it has them, are in verification->control; moment [nv] is scratch.
 /// What still moves at an end that need not be at rest, into end_speed_m_s, end_rate_rad_s and end_body. ending.c.
 cav_status cav_verification_ending(const cav_verification *verification, cav_verdict *verdict);
 
+/// Adds knot t, whose forces, where it has them, are in verification->control; moment [nv] is scratch.
 void cav_rates_add(const cav_verification *verification, int t, double *moment, cav_rates *rates);
 
 /// Forces on roots that are penalised: sums over the knots that have been added, and their part of the cost.

@@ -11,12 +11,11 @@
 #include "verification.h"
 
 static const double usual_gravity = 9.81; // m/s^2, unit of forces where the model has none
-static const double loaded = 0.01;        // fraction of the weight from which on a contact is loaded
 
 /// What was found at the knots.
 typedef struct metrics {
-  cav_metric unactuated, limit, term, penetration, between, defect, periodicity, hover, slid;
-  double slip, slip_self, load;
+  cav_metric unactuated, limit, term, penetration, between, defect, periodicity, hover;
+  cav_slip slip;
   cav_rates rates;
   cav_residual_sum residual;
 } metrics;
@@ -312,29 +311,6 @@ static void note_ranges(const cav_verification *verification, int t, const doubl
   }
 }
 
-// how fast under load, beyond what is asked
-static void add_slip(const cav_verification *verification, int t, metrics *found) {
-  for (int i = 0; i < verification->state->ncontact; i++) {
-    const cav_contact *contact = verification->state->contact + i;
-    double load = contact->impulse[0];
-    if (contact->dim < 3 || !(load > loaded * verification->weight * verification->h)) continue;
-    found->load += load;
-    double speed = hypot(contact->velocity_next[1], contact->velocity_next[2]);
-    double slides = load * fmax(speed - cav_verification_may_slide(verification, t, contact, 0), 0);
-    const cav_model *model = verification->model;
-    const cav_pair *pair = model->pair + contact->pair;
-    const cav_geom *a = &model->geom[pair->geom1], *b = &model->geom[pair->geom2];
-    found->slip += slides;
-    if (model->link[a->link].root == model->link[b->link].root) found->slip_self += slides;
-    if (!(slides > found->slid.value)) continue;
-    char one[32], other[32];
-    cav_metric_note(&found->slid, slides, t,
-                    "mean over loaded contacts, most where %.4g N between %.60s and %.60s slides at %.3g m/s",
-                    load / verification->h, cav_verification_link_name(model, a->link, one),
-                    cav_verification_link_name(model, b->link, other), speed);
-  }
-}
-
 // what is required of knot t of a cycle one period on too, where the model or the ground may not be the same; work
 // [nq+4*nv+nu]
 static cav_status examine_image(const cav_verification *verification, int t, double *work, metrics *found) {
@@ -371,7 +347,7 @@ static cav_status examine_knot(cav_verification *verification, int t, cav_balanc
   if (t >= verification->rows) cav_rates_add(verification, t, work + nv, &found->rates);
   if (t >= verification->rows) return CAV_OK;
   memcpy(verification->u + knot * nv, work, sizeof(double) * nv);
-  add_slip(verification, t, found);
+  cav_slip_add(verification, t, &found->slip);
   note_forces(verification, t, v, work, verification->control + knot * model->nu, work + nv, "", found);
   cav_residual_add(verification, t, work + nv, &found->residual);
   cav_balance_add(balance, verification, t, work + nv);
@@ -537,7 +513,7 @@ static void decide(const cav_verification *verification, const metrics *found, c
           "A smaller time step, or a way around, usually helps.");
   require(verdict, &found->defect, CAV_TOLERANCE_MOMENTUM, "momentum defect, fraction of weight rms,",
           "The order momentum keeps it exactly; a smaller time step usually helps too.");
-  cav_metric slip = found->slid;
+  cav_metric slip = found->slip.most;
   slip.value = verdict->slip_mean_m_s;
   require(verdict, &slip, CAV_TOLERANCE_SLIP, "slip, m/s,",
           "A lower softness or smoothing at the end of the schedule, or a higher weight of slip, usually helps.");
@@ -584,8 +560,8 @@ static void fill(const cav_verification *verification, const metrics *found, con
   verdict->constraint_violation_max = found->term.value;
   verdict->penetration_max_m = found->penetration.value;
   verdict->penetration_between_m = found->between.value;
-  verdict->slip_mean_m_s = found->load > 0 ? found->slip / found->load : 0;
-  verdict->slip_self = found->slip > 0 ? found->slip_self / found->slip : 0;
+  verdict->slip_mean_m_s = found->slip.load > 0 ? found->slip.slides / found->slip.load : 0;
+  verdict->slip_self = found->slip.slides > 0 ? found->slip.own / found->slip.slides : 0;
   verdict->hover_fraction = found->hover.value;
   verdict->power_max_w = found->rates.power;
   verdict->joint_speed_max_rad_s = found->rates.speed;
