@@ -78,9 +78,34 @@ static void test_stopped(cav_problem *problem, patience end, double cost) {
   cav_problem_free(problem);
 }
 
+/// Iterations of the last phase where so much may be left to be saved; the cost there.
+static int end_at(double optimality, double *cost) {
+  cav_problem *problem = motion_load(&(motion_case){"hop", NULL});
+  cav_solve_options options = cav_solve_options_default();
+  cav_solution *s = NULL;
+  int iterations = 0;
+  options.gains = 0, options.optimality = optimality;
+  CHECK(problem && cav_solve(problem, &options, NULL, &s, NULL) == CAV_OK);
+  for (int i = 0; s && i < s->nstage; i++) iterations += strcmp(s->stage[i].phase, "sqp") ? 0 : s->stage[i].iterations;
+  *cost = s ? s->cost : NAN;
+  cav_solution_free(s);
+  cav_problem_free(problem);
+  return iterations;
+}
+
+/// A motion that converges fast ends where one look finds next to nothing, by less than that dearer; asked to the last digit
+/// it goes on.
+static void check_end(void) {
+  double last, near;
+  int all = end_at(0, &last), some = end_at(5e-4, &near);
+  printf("hop: %d iterations to %.8f, where 5e-4 may be left %d to %.8f\n", all, last, some, near);
+  CHECK(some > 0 && 2 * some < all && near >= last && near < (1 + 5e-5) * last);
+}
+
 int main(void) {
   test_stopped(motion_load(&(motion_case){"walk-cycle", NULL}), (patience){"softened", 40}, 0.26);
   test_stopped(shove(), (patience){"sqp", 150}, 0.043);
+  check_end();
   course whole = solve_motion("walk-cycle", 0), stuck = solve_motion("walk-cycle", 1e-4),
          quick = solve_motion("hop", 1e-4);
   CHECK(whole.softened == 0 && quick.softened == 0);
