@@ -1,5 +1,5 @@
-/// Which of two motions is kept where neither is certified, by each condition of a certificate in its order; and when mending
-/// has had its time.
+/// Which of two motions is kept where neither is certified, by each condition of a certificate in its order; what is near one;
+/// and when mending has had its time.
 #include "check.h"
 #include "rank.h"
 
@@ -65,8 +65,38 @@ static void test_spent(void) {
   CHECK(!cav_rank_spent(&race, 3));
 }
 
+// what does something else than was asked is not near it, however little it misses of a certificate
+static void test_near(void) {
+  for (int limits = 0; limits < 2; limits++) {
+    cav_race_report r = whole();
+    r.verdict.ntarget = 3;
+    *(limits ? &r.verdict.limit_violation_max : &r.verdict.slip_mean_m_s) =
+        2 * (limits ? CAV_TOLERANCE_LIMIT : CAV_TOLERANCE_SLIP);
+    for (int missed = 0; missed <= 3; missed++) {
+      r.verdict.nmissed = missed;
+      CHECK(cav_rank_near(&r, 0.8) == (missed < 2));
+    }
+  }
+}
+
+// of certified motions that miss targets the one with fewer is mended, then the one that is less off, whatever they cost
+static void test_nearer(void) {
+  cav_race_report one = whole(), other = whole();
+  one.verdict.certified = other.verdict.certified = 1;
+  one.verdict.nmissed = 1, one.verdict.missed_most = 1.9, one.cost = 2;
+  other.verdict.nmissed = 2, other.verdict.missed_most = 1.1, other.cost = 1;
+  CHECK(cav_rank_nearer(&one, &other) && !cav_rank_nearer(&other, &one));
+  other.verdict.nmissed = 1;
+  CHECK(!cav_rank_nearer(&one, &other) && cav_rank_nearer(&other, &one));
+  // what is not certified comes after them
+  other.verdict.certified = 0, other.verdict.slip_mean_m_s = 2 * CAV_TOLERANCE_SLIP;
+  CHECK(cav_rank_nearer(&one, &other) && !cav_rank_nearer(&other, &one));
+}
+
 int main(void) {
   test_better();
+  test_near();
+  test_nearer();
   test_spent();
   return check_result();
 }

@@ -269,6 +269,22 @@ static void check_targets(repaired *r) {
     cav_strategy_clear(&mended);
   }
   r->term[0].from = from;
+  // one that is missed by little weighs as much more as it needs, first of all; then as before
+  cav_verdict close = missed;
+  static const double by[] = {1.015, 1.9, 2.1};
+  static const char *const changed[] = {"weights of goals 2.1 times", "weights of goals 3.8 times",
+                                        "<limits effort=\"0.9\"/>"};
+  for (int k = 0; k < 3; k++) {
+    cav_strategy mended;
+    int found;
+    close.missed_most = by[k];
+    CHECK(cav_strategy_repair(&r->problem, &r->stated, &close, 0, &mended, &found) == CAV_OK && found);
+    CHECK(!strcmp(mended.changed, changed[k]));
+    cav_strategy_clear(&mended);
+    CHECK(cav_strategy_repair(&r->problem, &r->stated, &close, 1, &mended, &found) == CAV_OK && found);
+    CHECK(!strcmp(mended.changed, k < 2 ? changed[2] : "weights of goals 10 times"));
+    cav_strategy_clear(&mended);
+  }
 }
 
 // what slides on its own links is to lean on them less, before smoothing changes: what slides on the ground is not

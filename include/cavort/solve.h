@@ -465,6 +465,7 @@ typedef struct cav_verdict {
   double cost;                     ///< of the cost terms, summed anew from the knots
   int achieved;                    ///< every target with a tolerance is met
   int ntarget, nmissed;            ///< such targets, and those missed
+  double missed_most;              ///< how far the one missed most is off over its tolerance; 0 if achieved
   unsigned long long missed_terms; ///< bit i: term i is one of those missed; of the first 64 terms
   char missed[240];                ///< the one missed most: name, by how much, wanted and got; "" if achieved
   char reason[480];                ///< why not certified: the first condition missed; "" if certified

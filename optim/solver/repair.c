@@ -15,6 +15,7 @@ typedef enum cure {
   NONE,
   FORCE,     ///< contact forces cost something: loads are spread, and nothing stands on an edge
   GOALS,     ///< heavier weights of goals
+  BIT,       ///< a bit heavier ones, as much as what is missed needs
   SLIP,      ///< a heavier weight of slip
   SELF,      ///< what leans on its own links pays
   SLIDING,   ///< the convex law of contacts that slide: it has one solution
@@ -30,8 +31,8 @@ typedef enum cure {
 } cure;
 
 enum { CURES = 3 };
-static const double force_weight = 1, self_weight = 1000, heavier = 10, harder = 4, lighter = 0.04, softer = 6,
-                    longer = 2, soft = 0.03, slack = 0.75;
+static const double force_weight = 1, self_weight = 1000, heavier = 10, little = 2, harder = 4, lighter = 0.04,
+                    softer = 6, longer = 2, soft = 0.03, slack = 0.75;
 
 /// What a motion misses first, in the order of a certificate (METHOD.md, 6), most of momentum, slip and hover, and its
 /// cures. Forces near a record are what is looked for: none of them costs anything. A residual beyond its bound is
@@ -41,10 +42,10 @@ static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
   static const cure forces[] = {EFFORT, STEP, NONE}, deep[] = {SOFTNESS, STEP, NONE}, between[] = {STEP, NONE},
                     turned[] = {ORDER, STEP, NONE}, slip[] = {SMOOTHING, SLIP, SOFTNESS},
                     rub[] = {SELF, SMOOTHING, SLIP}, hover[] = {GAP, SMOOTHING, STEP}, fold[] = {SLIDING, STEP, NONE},
-                    lost[] = {FORCE, STEP, SLACK}, target[] = {EFFORT, GOALS, NONE}, fades[] = {SMOOTHING, GAP, STEP},
-                    near[] = {STEP, SLACK, NONE}, again[] = {STEP, SLIDING, NONE}, ground[] = {STEP, LOOSE, SOFTER},
-                    none[] = {NONE};
-  if (v->certified) return v->achieved ? none : target;
+                    lost[] = {FORCE, STEP, SLACK}, target[] = {EFFORT, GOALS, NONE}, close[] = {BIT, EFFORT, GOALS},
+                    fades[] = {SMOOTHING, GAP, STEP}, near[] = {STEP, SLACK, NONE}, again[] = {STEP, SLIDING, NONE},
+                    ground[] = {STEP, LOOSE, SOFTER}, none[] = {NONE};
+  if (v->certified) return v->achieved ? none : v->missed_most > 0 && v->missed_most < little ? close : target;
   if (!cav_verdict_feasible(v)) return cav_problem_has_record(p) ? ground : forces;
   if (v->penetration_max_m > CAV_TOLERANCE_PENETRATION) return deep;
   if (v->penetration_between_m > CAV_TOLERANCE_PENETRATION) return between;
@@ -88,12 +89,16 @@ static int is_goal(const cav_problem *p, const cav_term *term) {
   return !contacts && term->use == CAV_USE_COST && isfinite(cav_term_tolerance(p, term, 1));
 }
 
-/// Those that are missed, or all where none is known to be.
-static cav_status weigh_goals(const cav_problem *p, const cav_verdict *v, cav_strategy *s) {
+/// Twice as many times its weight as a target that is missed by little is off over its tolerance: what a cost leaves of it
+/// goes with one over its weight at most.
+static double enough(const cav_verdict *v) { return ceil(10 * little * v->missed_most) / 10; }
+
+/// Weights those that are missed, or all where none is known to be, that many times.
+static cav_status weigh_goals(const cav_problem *p, const cav_verdict *v, double times, cav_strategy *s) {
   cav_status status = own_terms(p, s);
   for (int i = 0; i < s->nterm && !status; i++) {
     int missed = v->missed_terms == 0 || (i < 64 && (v->missed_terms >> i & 1));
-    if (missed && is_goal(p, &s->term[i])) s->term[i].weight *= heavier;
+    if (missed && is_goal(p, &s->term[i])) s->term[i].weight *= times;
   }
   return status;
 }
@@ -140,7 +145,9 @@ static cav_status change(const cav_problem *p, const cav_verdict *v, cure c, cav
     case SELF:
       return weigh_forces(p, CAV_QUANTITY_SELF_FORCE, self_weight, s);
     case GOALS:
-      return weigh_goals(p, v, s);
+      return weigh_goals(p, v, heavier, s);
+    case BIT:
+      return weigh_goals(p, v, enough(v), s);
     case SLIP:
       return weigh_slip(p, s);
     case SLIDING:

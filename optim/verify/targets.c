@@ -352,5 +352,6 @@ void cav_targets_verdict(const cav_verification *verification, cav_term_report *
                r->time, r->wanted, r->got);
     }
   }
+  verdict->missed_most = worst;
   verdict->achieved = verdict->nmissed == 0;
 }

@@ -322,7 +322,10 @@ static void tell(const cav_race *race, const cav_race_entry *e) {
   if (colon) first = (size_t)(colon - v->reason);
   if (stop && (size_t)(stop - v->reason) < first) first = (size_t)(stop - v->reason);
   if (misses && first) fprintf(stderr, ": %.*s", (int)first, v->reason);
-  if (misses && !first) fprintf(stderr, ": misses %d of %d targets", v->nmissed, v->ntarget);
+  const char *when = strstr(v->missed, " at ");
+  if (misses && !first)
+    fprintf(stderr, ": misses %d of %d targets, most %.*s", v->nmissed, v->ntarget,
+            (int)(when ? (size_t)(when - v->missed) : strlen(v->missed)), v->missed);
   fputc('\n', stderr);
 }
 
@@ -666,7 +669,9 @@ cav_status cav_race_write(const cav_race *race, int kept, const char *path, cav_
       if (known) cav_table_write_number(file.stream, value[k]);
     }
     write_quoted(file.stream, e->strategy.changed);
-    write_quoted(file.stream, known ? v->reason : e->report.text);
+    char missed[sizeof v->missed + 16] = "";
+    if (known && *v->missed) snprintf(missed, sizeof missed, "misses %s", v->missed);
+    write_quoted(file.stream, !known ? e->report.text : *v->reason ? v->reason : missed);
     fputc('\n', file.stream);
   }
   return cav_file_end(&file, error);

@@ -43,7 +43,9 @@ int cav_rank_near(const cav_race_report *report, double effort) {
   const cav_verdict *v = &report->verdict;
   if (!report->solution || report->status == CAV_INTERRUPTED) return 0;
   if (v->certified) return !v->achieved && 2 * v->nmissed < v->ntarget;
-  if (cav_rank_rough(v)) return 2 * v->nmissed <= v->ntarget;
+  // a motion that does something else is not what is looked for
+  if (2 * v->nmissed > v->ntarget) return 0;
+  if (cav_rank_rough(v)) return 1;
   return v->unactuated_force_max <= CAV_TOLERANCE_UNACTUATED &&
          v->constraint_violation_max <= CAV_TOLERANCE_CONSTRAINT && v->limit_violation_max > CAV_TOLERANCE_LIMIT &&
          v->limit_violation_max < (1 - effort) / 2;
@@ -65,6 +67,8 @@ static double excess_of(const cav_verdict *v) {
 
 int cav_rank_nearer(const cav_race_report *a, const cav_race_report *b) {
   const cav_verdict *v = &a->verdict, *w = &b->verdict;
+  if (v->certified && w->certified && v->nmissed && w->nmissed)
+    return v->nmissed != w->nmissed ? v->nmissed < w->nmissed : v->missed_most < w->missed_most;
   if (!cav_rank_rough(v) || !cav_rank_rough(w)) return cav_rank_better(a, b, 0);
   if (!v->nmissed != !w->nmissed) return !v->nmissed;
   return excess_of(v) < excess_of(w);

@@ -16,7 +16,8 @@ int cav_rank_rough(const cav_verdict *verdict);
 /// Whether a motion is nearly what was asked; effort is the fraction of the actuators that was planned with.
 int cav_rank_near(const cav_race_report *report, double effort);
 
-/// Whether a is the better motion to mend: of two that are rough the one that misses no target, else the one whose largest
+/// Whether a is the better motion to mend: of two that are certified and miss targets the one that misses fewer, or the same
+/// number by less; of two that are rough the one that misses no target, else the one whose largest
 /// ratio of a figure to its tolerance is smaller; of others the better one to keep.
 int cav_rank_nearer(const cav_race_report *a, const cav_race_report *b);
 
