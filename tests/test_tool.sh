@@ -378,7 +378,7 @@ cat >push_model.xml <<'END'
 END
 cat >push.xml <<'END'
 <problem name="push" model="push_model.xml"><horizon duration="1" timestep="0.05"/><pose name="here"/><start key="here"/><cost>
-<sensor name="there" type="jointpos" joint="x" target=".2125" at="end" weight="90000" within=".005"/>
+<sensor name="there" type="jointpos" joint="x" target=".2125" at="end" weight="90000" within=".004"/>
 <sensor name="half" type="jointpos" joint="x" target=".106" at=".5" weight="1" within=".02"/>
 <velocity dofs="all" at="end" weight="90000" within=".01"/></cost></problem>
 END

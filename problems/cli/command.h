@@ -28,6 +28,7 @@ typedef struct cav_command_line {
   int all;             ///< --all: explain everything
   int force;           ///< --force: solve what is proven impossible
   const char *methods; ///< --methods, NULL: own
+  double seconds;      ///< --seconds: processor time of a run, 0: as usual
   const char *markers; ///< --markers
   int scale;           ///< --scale
   int from_given;      ///< 1: --from is given

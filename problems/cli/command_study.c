@@ -189,7 +189,8 @@ static int work(void *context, int k) {
   char reason[480] = "";
   cav_error error = {0};
   char *folder = record_path(s, &run, "checkpoints"), *tried = record_path(s, &run, "tried.csv");
-  const cav_study_task task = {s->path[run.motion], s->line->model, folder, tried, CAV_STUDY_SECONDS};
+  const double seconds = s->line->seconds > 0 ? s->line->seconds : CAV_STUDY_SECONDS;
+  const cav_study_task task = {s->path[run.motion], s->line->model, folder, tried, seconds};
   cav_status status = folder && tried ? cav_study_solve(&task, &run, reason, &error) : CAV_NO_MEMORY;
   free(folder), free(tried);
   // a run that could not even be checked is a run that failed

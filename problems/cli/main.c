@@ -36,6 +36,7 @@ enum option {
   OPTION_FROM = 2097152,
   OPTION_UNTIL = 4194304,
   OPTION_WINDOW = 8388608,
+  OPTION_SECONDS = 16777216,
   OPTION_CONTROL = 33554432,
   OPTION_ERRORS = 67108864,
   OPTION_SCALE = 134217728,
@@ -64,6 +65,7 @@ static const cav_manual_option options[] = {
     {OPTION_METHODS, "--methods", NULL, "LIST",
      "what to compare, with commas: own (default), strategies (what solve does: own, then repairs and "
      "other strategies where needed), ipopt, limited (Ipopt with limited memory), both"},
+    {OPTION_SECONDS, "--seconds", NULL, "S", "processor time that a run has (default 120)"},
     {OPTION_MARKERS, "--markers", NULL, "FILE", "marker set: which marker of the clip sits where on which body"},
     {OPTION_SCALE, "--scale", NULL, NULL,
      "fit the sizes of segments too, each within a few percent of the whole body's (scale of the marker set: 0.03), "
@@ -188,7 +190,7 @@ static const cav_manual_command commands[] = {
      "solve motions from ten perturbed starts each, in N processes, and count: problem files, or all of "
      "problems/motions;\n"
      "  what a folder holds already is not solved again",
-     cav_command_study, OPTION_MODEL | OPTION_OUTPUT | OPTION_METHODS | OPTION_THREADS | OPTION_QUIET},
+     cav_command_study, OPTION_MODEL | OPTION_OUTPUT | OPTION_METHODS | OPTION_SECONDS | OPTION_THREADS | OPTION_QUIET},
     {"stress", "MODEL|PROBLEM",
      "push a scene to its edges: each parameter swept over its decades, the range in which all holds, the first value\n"
      "  that breaks, and why. Writes a page and two tables",
@@ -370,6 +372,8 @@ static int take_value(cav_command_line *line, enum option option, const char *na
     case OPTION_METHODS:
       line->methods = value;
       return 1;
+    case OPTION_SECONDS:
+      return take_number(name, value, 0, &line->seconds);
     case OPTION_IPOPT:
       return take_ipopt(line, value);
     case OPTION_MARKERS:

@@ -14,7 +14,7 @@
 #include "study.h"
 
 enum { POINTS = 61 };
-static const double least_seconds = 0.1, most_seconds = 120, most_ratio = 100;
+static const double least_seconds = 0.1, most_ratio = 100;
 
 static int ascending(const void *a, const void *b) {
   double x = *(const double *)a, y = *(const double *)b;
@@ -108,6 +108,8 @@ static void write_profile(FILE *out, int nrun, const cav_study_run *run, const i
       if (used[k]) fprintf(out, ",%s_%s", cav_study_method_names[k], relative ? "relative" : "absolute");
   }
   fputc('\n', out);
+  double most_seconds = CAV_STUDY_SECONDS;
+  for (int i = 0; i < nrun; i++) most_seconds = run[i].known ? fmax(most_seconds, run[i].seconds) : most_seconds;
   for (int i = 0; i < POINTS; i++) {
     double s = (double)i / (POINTS - 1), limit[2];
     limit[0] = least_seconds * pow(most_seconds / least_seconds, s);

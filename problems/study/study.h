@@ -6,7 +6,7 @@
 
 enum {
   CAV_STUDY_STARTS = 10,
-  CAV_STUDY_SECONDS = 120, ///< of processor time that a run has
+  CAV_STUDY_SECONDS = 120, ///< of processor time that a run has, unless asked otherwise
   CAV_STUDY_STRATEGY = 24  ///< room for a strategy's name
 };
 
