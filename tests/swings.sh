@@ -19,7 +19,7 @@ END
   "$build/problems/cavort" solve "$work/problem.xml" -o "$work/out" --threads 1 >"$work/said" 2>&1 || status=$?
   line=$(sed -n 's/^cavort: \(impossible: .*\)/\1/p; s/^cavort: \(actuators are .*\)/\1/p; s/^strategy repaired: \(.*\) (the folder.*/\1/p' \
     "$work/said" | head -n 1)
-  [ "$status" != 0 ] || [ -n "$line" ] || line="as stated$(sed -n 's/^kept: strategy /, strategy /p' "$work/said")"
+  [ "$status" != 0 ] || [ -n "$line" ] || line="as stated$(sed -n 's/^kept: strategy \([^,]*\).*/, strategy \1/p' "$work/said")"
   printf '| %s | %s | %d | %s |\n' "$1" "$3" "$status" "$line"
 }
 

@@ -103,23 +103,23 @@ static void test_gait(const char *text, double axis, double travel) {
     CHECK_NEAR(gait->swing[1].phase - gait->swing[0].phase, M_PI, 1e-15);
     CHECK(gait->swing[2].amplitude > 0 && fabs(gait->swing[2].phase - M_PI / 2) < 1e-15);
   }
-  // no gait where it stands, nor where the guess swings already; a guess that is held is not held twice
+  // no gait where it stands, nor where the guess swings already; a guess that is held is not held twice, and where the goal is
+  // the start the way between is the start held
   goal[0] = q[0];
-  CHECK(offers(&p,
-               "stated near-1 near-2 near-3 near-4 soft hold slow momentum near-5 near-6 near-7 near-8 repair-1 "
-               "repair-2 repair-3 "
-               "repair-4 open longer"));
-  p.guess = CAV_GUESS_HOLD;
-  CHECK(offers(&p,
-               "stated near-1 near-2 near-3 near-4 soft line slow momentum near-5 near-6 near-7 near-8 repair-1 "
-               "repair-2 repair-3 "
-               "repair-4 open longer"));
-  p.guess = CAV_GUESS_INTERPOLATE;
-  p.guess_height = 0.3;
-  CHECK(offers(
-      &p,
-      "stated near-1 near-2 near-3 near-4 soft line hold slow momentum near-5 near-6 near-7 near-8 repair-1 repair-2 "
-      "repair-3 repair-4 open longer"));
+  for (int back = 0; back < 2; back++) {
+    goal[m->nq - 1] = q[m->nq - 1] + (back ? 0 : 0.01);
+    static const char *const way[3][2] = {{"hold ", ""}, {"line ", ""}, {"line hold ", "hold "}};
+    for (int k = 0; k < 3; k++) {
+      char list[400];
+      p.guess = k == 1 ? CAV_GUESS_HOLD : CAV_GUESS_INTERPOLATE;
+      p.guess_height = k == 2 ? 0.3 : 0;
+      snprintf(list, sizeof list,
+               "stated near-1 near-2 near-3 near-4 soft %sslow momentum near-5 near-6 near-7 near-8 repair-1 repair-2 "
+               "repair-3 repair-4 open longer",
+               way[k][back]);
+      CHECK(offers(&p, list));
+    }
+  }
   goal[0] += travel;
   p.nswing = 1;
   p.swing = &(cav_swing){.joint = 1, .amplitude = 0.1, .frequency = 1};

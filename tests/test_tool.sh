@@ -534,6 +534,13 @@ run 1 verify caught
 says out "was stopped at stage"
 run 1 explain caught
 says out "its command with --resume goes on"
+# a motion that was kept when others were being tried is whole, but not what all of them would have led to
+sed 's/^\(stated,1,\)stopped/\1not certified/; s/^near-1,0,not tried/near-1,0,stopped/' caught/strategies.csv >kept.csv
+mv kept.csv caught/strategies.csv
+run 1 explain caught
+says_first out "was stopped while other strategies were tried"
+run 1 verify caught
+says out "was stopped while other strategies were tried"
 run 0 explain swing.result
 check "of a whole solve nothing is said" sh -c '! grep -q "was stopped" out'
 

@@ -240,6 +240,13 @@ static void add_grown(const cav_problem *problem, cav_strategy *strategy, int *n
   add_repairs(strategy, n, grown);
 }
 
+/// Whether the goal is the start.
+static int is_back(const cav_problem *problem) {
+  for (int i = 0; i < problem->model->nq; i++)
+    if (problem->q_goal[i] != problem->q_start[i]) return 0;
+  return 1;
+}
+
 /// A file without a guess whose straight way goes through the ground is begun with the start held: such a way is nobody's.
 static cav_status hold_over_ground(const cav_problem *problem, cav_strategy *begun, int *sinks) {
   *sinks = 0;
@@ -313,11 +320,14 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   if (status != CAV_OK) return status;
   if (leap.height > 0) add_mended(strategy, n, &leap, "leap");
 
-  if (decorated || problem->guess == CAV_GUESS_HOLD || sinks)
+  // where the goal is the start, the way straight to it is the start held
+  const int stays = !problem->cycle.on && is_back(problem);
+  if ((decorated || problem->guess == CAV_GUESS_HOLD || sinks) && !stays)
     add(strategy, n, &plain, "line", "straight from start to goal");
   plain.guess = CAV_GUESS_HOLD;
-  if (!problem->cycle.on && !sinks && (decorated || problem->guess != CAV_GUESS_HOLD))
-    add(strategy, n, &plain, "hold", "the start held");
+  const int straight = problem->guess == CAV_GUESS_INTERPOLATE || problem->guess == CAV_GUESS_HOLD;
+  const int held = !decorated && straight && (stays || problem->guess == CAV_GUESS_HOLD);
+  if (!problem->cycle.on && !sinks && !held) add(strategy, n, &plain, "hold", "the start held");
 
   cav_strategy slow = stated;
   slow.schedule.stages *= SLOWER;

@@ -167,7 +167,8 @@ cav_tried cav_tried_open(const char *folder);
 int cav_tried_next(cav_tried *tried);
 void cav_tried_close(cav_tried *tried);
 
-/// Whether the motion of a folder is where its solve was stopped; tells where, unless out is NULL. tried.c.
+/// Whether the solve of a folder was stopped, in its motion or, without success until then, in other strategies; tells where,
+/// unless out is NULL. tried.c.
 int cav_command_tell_stopped(FILE *out, const char *folder);
 
 /// Tells which solids of the world a motion leans on that neither its first nor its last knot touches. leaned_on.c.

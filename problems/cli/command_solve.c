@@ -21,6 +21,12 @@
 
 static volatile sig_atomic_t interrupted, first_second;
 
+static double seconds_now(void) {
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
 // asks for the end; again after a second has passed: ends at once. Some parents deliver one interrupt twice
 static void interrupt(int signal_number) {
   struct timespec now;
@@ -266,6 +272,7 @@ static void tell_cause(const cav_race *race) {
 static int solve_from(const cav_command_line *line, const cav_problem *problem, const char *folder,
                       const cav_provenance *provenance, const char *key, const beginning *b) {
   cav_error error = {0};
+  const double begun = seconds_now();
   ticker tick = {.quiet = line->quiet, .terminal = isatty(STDERR_FILENO)};
   destination to = {line, folder, provenance};
   cav_race race = {.problem = problem,
@@ -310,7 +317,11 @@ static int solve_from(const cav_command_line *line, const cav_problem *problem, 
   } else if (!status) {
     status = cav_file_fail(&error, CAV_NOT_CONVERGED, 0, "no strategy led to a motion");
   }
-  if (race.n > 1 && race.tell && best > 0) fprintf(stderr, "kept: strategy %s\n", race.entry[best].strategy.name);
+  int tried = 0;
+  for (int i = 0; i < race.n; i++) tried += race.entry[i].state == CAV_RACE_DONE;
+  if (race.tell && best >= 0 && tried > 1)
+    fprintf(stderr, "kept: strategy %s, of %d tried in %.1f s\n", race.entry[best].strategy.name, tried,
+            seconds_now() - begun);
   if (status) done = cav_command_fail(&error);
   cav_race_close(&race);
   return done;

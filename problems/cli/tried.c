@@ -39,13 +39,18 @@ void cav_tried_close(cav_tried *t) {
 
 int cav_command_tell_stopped(FILE *out, const char *folder) {
   cav_tried t = cav_tried_open(folder);
-  int stopped = 0;
-  while (!stopped && cav_tried_next(&t)) stopped = t.kept && !strcmp(t.outcome, "stopped");
-  if (stopped && out)
+  int stopped = 0, other = 0, success = 0;
+  while (!stopped && cav_tried_next(&t)) {
+    stopped = t.kept && !strcmp(t.outcome, "stopped");
+    success |= t.kept && !strcmp(t.outcome, "certified");
+    other |= !strcmp(t.outcome, "stopped");
+  }
+  const char *how = stopped ? t.reason : other && !success ? "stopped while other strategies were tried" : NULL;
+  if (how && out)
     fprintf(out,
             "the solve of this folder was %s: what follows is of where it stood then, not of what the problem allows; "
             "its command with --resume goes on\n",
-            t.reason);
+            how);
   cav_tried_close(&t);
-  return stopped;
+  return how != NULL;
 }

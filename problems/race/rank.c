@@ -6,6 +6,9 @@
 // times its tolerance up to which what a feasible motion misses of a certificate is little
 static const double few = 4;
 
+// fraction of the cost by which a motion has to be cheaper to come before one that was found earlier
+static const double cheaper = 1e-4;
+
 int cav_rank_better(const cav_race_report *a, const cav_race_report *b, int cheapest) {
   const cav_verdict *v = &a->verdict, *w = &b->verdict;
   const double missed[][3] = {{v->unactuated_force_max, w->unactuated_force_max, CAV_TOLERANCE_UNACTUATED},
@@ -21,10 +24,10 @@ int cav_rank_better(const cav_race_report *a, const cav_race_report *b, int chea
   // what was stopped was not verified
   int stopped = a->status == CAV_INTERRUPTED, other = b->status == CAV_INTERRUPTED;
   if (stopped || other) return !stopped;
-  if (cav_race_success(a) && cav_race_success(b)) return cheapest && a->cost < b->cost;
+  if (cav_race_success(a) && cav_race_success(b)) return cheapest && a->cost < (1 - cheaper) * b->cost;
   if (cav_race_success(a) || cav_race_success(b)) return cav_race_success(a);
   // what was asked is in the cost
-  if (v->certified && w->certified) return a->cost < b->cost;
+  if (v->certified && w->certified) return a->cost < (1 - cheaper) * b->cost;
   if (v->certified || w->certified) return v->certified;
   for (size_t k = 0; k < sizeof missed / sizeof *missed; k++)
     if (missed[k][0] > missed[k][2] || missed[k][1] > missed[k][2]) return missed[k][0] < missed[k][1];
