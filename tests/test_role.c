@@ -112,8 +112,25 @@ static void check_under(const cav_model *m, cav_state *state, const cav_roles *r
   }
 }
 
+// from the right to the left foot of a biped
+static void between(const cav_model *m, const cav_state *state, const cav_roles *roles, double way[2]) {
+  cav_pose right, left;
+  cav_object_pose(m, state, CAV_OBJECT_BODY, roles->body[CAV_ROLE_RIGHT_FOOT], &right);
+  cav_object_pose(m, state, CAV_OBJECT_BODY, roles->body[CAV_ROLE_LEFT_FOOT], &left);
+  for (int k = 0; k < 2; k++) way[k] = left.pos[k] - right.pos[k];
+}
+
+// whether links of the model are inside each other
+static int is_inside(const cav_model *m, const cav_state *state) {
+  int inside = 0;
+  for (int i = 0; i < state->ncontact; i++)
+    inside |= !m->pair[state->contact[i].pair].external && state->contact[i].dist < -1e-3;
+  return inside;
+}
+
 // the posture stands: the sole's vertical is that of the model's own configuration, feet are level, the centre of mass lies
-// within their box, joints lie in their ranges, links of two legs are not inside each other
+// within their box, joints lie in their ranges, links of two legs are not inside each other; a biped's feet stand no wider than
+// there, side by side
 static void check_stand(const cav_model *m, cav_state *state, const char *name) {
   double *q = scene_vector(m->nq), com[3], least[2] = {INFINITY, INFINITY}, most[2] = {-INFINITY, -INFINITY};
   double lowest = INFINITY, highest = -INFINITY, up[CAV_ROLE_TYPES][9];
@@ -121,6 +138,10 @@ static void check_stand(const cav_model *m, cav_state *state, const char *name) 
   cav_roles roles;
   CHECK(cav_roles_find(m, state, &roles) == CAV_OK);
   cav_pose at;
+  double own[2] = {0}, way[2] = {0};
+  CHECK(cav_position(m, state, m->q0) == CAV_OK);
+  const int inside = is_inside(m, state);
+  if (roles.build == CAV_BUILD_BIPED) between(m, state, &roles, own);
   for (int r = 0; r < CAV_ROLE_TYPES; r++) {
     if (roles.limb[r] < 0) continue;
     cav_object_pose(m, state, CAV_OBJECT_XBODY, roles.body[r], &at);
@@ -128,8 +149,13 @@ static void check_stand(const cav_model *m, cav_state *state, const char *name) 
   }
   if (CHECK(cav_stand_find(m, state, q, &stand) == CAV_OK)) {
     CHECK(cav_position(m, state, q) == CAV_OK);
-    for (int i = 0; i < state->ncontact && !stand.key && roles.build == CAV_BUILD_BIPED; i++)
-      CHECK(m->pair[state->contact[i].pair].external || state->contact[i].dist > -1e-3);
+    if (!stand.key && roles.build == CAV_BUILD_BIPED) {
+      CHECK(!is_inside(m, state));
+      between(m, state, &roles, way);
+      // feet without a shape are points of links that nothing says how to put down
+      const int shaped = m->body[roles.body[CAV_ROLE_RIGHT_FOOT]].ngeom > 0;
+      for (int k = 0; k < 2 && shaped && !inside; k++) CHECK_NEAR(way[k], own[k], 0.02);
+    }
     for (int r = CAV_ROLE_RIGHT_FOOT; r <= CAV_ROLE_BACK_LEFT_FOOT; r++) {
       if (roles.body[r] < 0) continue;
       cav_object_pose(m, state, CAV_OBJECT_XBODY, roles.body[r], &at);

@@ -1,10 +1,10 @@
 /// Standing without names: least squares by Gauss-Newton with a Levenberg-Marquardt damping, on the manifold of
 /// configurations, derivatives by differences. Rows: the tilt of the soles of bipeds (a sole is flat where it was flat in the
 /// model's own configuration), heights of all feet, the centre of mass over their middle, the height of the trunk, and, with
-/// small weights, the way from the model's own configuration. Legs that are straight there, whose length can only fall, are bent:
-/// the trunk comes down by a fixed fraction, and hinges start off towards the middle of their ranges; soles of a quadruped stay
-/// where they are seen from the hips, or it would splay or lean. Joints stay in their ranges. Where links are inside each
-/// other so the feet of a biped go farther apart.
+/// small weights, the way from the model's own configuration. Legs that are straight there, whose length can only fall, are
+/// bent: the trunk comes down by a fixed fraction, and hinges start off towards the middle of their ranges; soles of a
+/// quadruped stay where they are seen from the hips, those of a biped sideways and side by side, or it would splay, lean or
+/// step. Joints stay in their ranges. Where the legs of a biped are inside each other its feet go farther apart.
 #include "stand.h"
 
 #include <assert.h>
@@ -196,12 +196,19 @@ static cav_status rows(stander *s, const double *q, double *row, cav_stand *stan
   row[n++] = length_weight * (at.pos[2] - middle[2] - s->rise);
   s->width = 0;
   for (int i = 0; i < 2; i++) s->width += s->roles->left[i] * (x[1][i] - x[0][i]);
-  // straight legs of quadrupeds are lowered by their knees, not by leaning or splaying
-  for (int k = 0; k < s->nfoot && s->nfoot == 4 && s->stretched; k++) {
-    double reach[2];
-    reach_of(s, k, x[k], reach);
-    for (int i = 0; i < 2; i++) row[n++] = under_weight * (reach[i] - s->under[k][i]);
+  // straight legs are lowered by their knees, not by leaning, splaying or a step: a biped's hips may go back where its knees go
+  // forwards, both as far
+  const double *left = s->roles->left;
+  double step = 0;
+  for (int k = 0; k < s->nfoot && s->stretched; k++) {
+    double way[2];
+    reach_of(s, k, x[k], way);
+    for (int i = 0; i < 2; i++) way[i] -= s->under[k][i];
+    for (int i = 0; i < 2 && s->nfoot == 4; i++) row[n++] = under_weight * way[i];
+    if (s->nfoot == 2 && s->apart <= 0) row[n++] = under_weight * (left[0] * way[0] + left[1] * way[1]);
+    step += (k ? 1 : -1) * (left[1] * way[0] - left[0] * way[1]);
   }
+  if (s->nfoot == 2 && s->stretched) row[n++] = under_weight * step;
   if (s->apart > 0) row[n++] = length_weight * (s->width - s->apart);
   cav_difference(m, s->q0, q, 1, s->step);
   for (int d = 0; d < m->nv; d++) row[n++] = holding(m, d) * s->step[d];
@@ -277,7 +284,16 @@ static cav_status search(stander *s, cav_stand *stand) {
   return status;
 }
 
-// how deep links are inside each other at s->q
+// which leg of a biped a link is of; -1: none
+static int leg_of(const stander *s, int link) {
+  const cav_model *m = s->model;
+  for (int i = m->link[link].body; i > 0; i = m->body[i].parent)
+    for (int k = 0; k < s->nfoot; k++)
+      if (i == s->first[k]) return k;
+  return -1;
+}
+
+// how deep the legs are inside each other at s->q: what else is so stays so, however far apart feet are
 static cav_status find_overlap(const stander *s, double *deepest) {
   cav_state *state = s->state;
   int contact = state->options.contact;
@@ -285,8 +301,11 @@ static cav_status find_overlap(const stander *s, double *deepest) {
   cav_status status = cav_position(s->model, state, s->q);
   state->options.contact = contact;
   *deepest = 0;
-  for (int i = 0; i < state->ncontact && !status; i++)
-    if (!s->model->pair[state->contact[i].pair].external) *deepest = fmax(*deepest, -state->contact[i].dist);
+  for (int i = 0; i < state->ncontact && !status; i++) {
+    const cav_contact *c = &state->contact[i];
+    const int one = leg_of(s, c->link1), other = leg_of(s, c->link2);
+    if (one >= 0 && other >= 0 && one != other) *deepest = fmax(*deepest, -c->dist);
+  }
   return status;
 }
 
