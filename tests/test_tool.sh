@@ -408,6 +408,10 @@ cat >hop.xml <<'END'
 <sensor name="foot" type="framepos" geom="foot" component="z" relative="goal" target=".2" at=".5" weight="900"/>
 <posture dofs="all" at="end" weight="900"/></cost></problem>
 END
+sed 's/<joint name="knee" degrees="60"/<joint name="knee" pos="60"/' hop.xml >units.xml
+run 2 inspect units.xml
+says err "joint 'knee' is at 60, outside its range 0 .. 2.6"
+says err "in degrees it would be in it: <joint name= degrees=>"
 run 0 solve hop.xml --threads 1
 says err 'strategy near-1   with <force weight="1"/>'
 says out 'strategy repaired: not as the problem states it, but with <force weight="1"/>'

@@ -134,10 +134,12 @@ static void shell_moments(int type, double m, const double *s, double moment[3])
 static void weigh_geom(cav_spec *spec, cav_spec_geom *g) {
   static const char *const names[CAV_GEOM_TYPES] = {"plane",    "sphere", "capsule", "ellipsoid",
                                                     "cylinder", "box",    "mesh",    "height field"};
+  static const char *const ordinal[] = {"first", "second", "third"};
   for (int i = 0; i < size_count(g->type); i++) {
     if (!(g->size[i] > 0))
-      cav_spec_fail(spec, g->node, "size", "expected %d number%s > 0 for a %s, got %g; give the missing size",
-                    size_count(g->type), size_count(g->type) == 1 ? "" : "s", names[g->type], g->size[i]);
+      cav_spec_fail(spec, g->node, "size", "expected %d number%s > 0 for a %s, but the %s is %s", size_count(g->type),
+                    size_count(g->type) == 1 ? "" : "s", names[g->type], ordinal[i],
+                    g->size[i] == 0 ? "missing or 0" : "negative");
   }
   if (g->has_mass && g->mass < 0) cav_spec_fail(spec, g->node, "mass", "expected a mass >= 0, got %g", g->mass);
   if (!g->has_mass && g->density < 0)

@@ -294,9 +294,12 @@ static cav_status check_ranges(const cav_problem_reader *reader, const cav_xml_n
       least = 0;
     }
     if (value < least - slack || value > joint->range[1] + slack) {
-      return cav_xml_fail(reader->error, node, NULL,
-                          "joint '%s' is at %g, outside its range %g .. %g (rad or m); ranges='clip' would bring it in",
-                          joint->name, value, least, joint->range[1]);
+      const double turned = value * M_PI / 180;
+      const int degrees = joint->type == CAV_JOINT_HINGE && turned >= least && turned <= joint->range[1];
+      return cav_xml_fail(
+          reader->error, node, NULL,
+          "joint '%s' is at %g, outside its range %g .. %g (rad or m); ranges='clip' would bring it in%s", joint->name,
+          value, least, joint->range[1], degrees ? "; in degrees it would be in it: <joint name= degrees=>" : "");
     }
   }
   return m->ntendon > 0 ? check_tendons(reader, node, q, slack) : CAV_OK;
