@@ -114,6 +114,9 @@ static int was_tried(const char *folder, const char *changes) {
   return tried;
 }
 
+// times what a certificate allows from which on a defect of momentum may be that of a motion that no body can do
+static const double far = 20;
+
 // what of the file to change where a motion is possible and a certificate misses something else: no limit is the cause of that
 static void tell_remedy(const cav_result *result, const cav_verdict *verdict, const char *folder, char *text,
                         size_t size) {
@@ -121,6 +124,14 @@ static void tell_remedy(const cav_result *result, const cav_verdict *verdict, co
   int n = 0, found = 1;
   if (cav_strategy_list(result->problem, strategy, &n) || n == 0) return;
   int said = snprintf(text, size, "how it is planned, not what is asked: forces, limits and constraints hold. ");
+  const double defect = verdict->momentum_defect_rms / CAV_TOLERANCE_MOMENTUM;
+  if (defect > far)
+    said = snprintf(
+        text, size,
+        "forces, limits and constraints hold at the knots, but between them momentum comes from nowhere, %.0f "
+        "times what a certificate allows: fast turns need the order of momentum; where that does not help, more "
+        "is asked than the body can do in that time. ",
+        defect);
   for (int k = 0; found; k++) {
     if (cav_strategy_repair(result->problem, &strategy[0], verdict, k, &repaired, &found)) return;
     if (!found || (*repaired.changed && !was_tried(folder, repaired.changed))) break;
