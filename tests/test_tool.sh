@@ -501,6 +501,13 @@ says err "not certified: momentum defect"
 says err "kept: strategy near-1"
 says fast.result/problem.xml 'order="momentum"'
 
+# milliseconds where seconds are meant
+sed 's/duration=".5" timestep=".05"/duration="500" timestep="50"/' fast.xml >milliseconds.xml
+run 0 inspect milliseconds.xml
+says out "note: a free body falls by 1.23e+04 m in one step of 50 s: durations and steps are in s"
+run 0 inspect fast.xml
+check "of usual steps nothing is said" sh -c '! grep -q "falls by" out'
+
 # --- what Ipopt says is told, where it is there ---
 
 if "$cavort" solve problem.xml -o asked --solver ipopt --quiet >out 2>err || ! grep -q "has no Ipopt" err; then

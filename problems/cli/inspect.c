@@ -414,6 +414,17 @@ static cav_status print_equations(const cav_problem *p, cav_error *error) {
   return CAV_OK;
 }
 
+void cav_command_tell_step(FILE *out, const cav_problem *p) {
+  static const double deep = 10; // m
+  const double *g = p->model->gravity,
+               fall = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) * p->timestep * p->timestep / 2;
+  int floats = 0;
+  for (int j = 0; j < p->model->njoint; j++) floats |= p->model->joint[j].type == CAV_JOINT_FREE;
+  if (floats && fall > deep)
+    fprintf(out, "note: a free body falls by %.3g m in one step of %g s: durations and steps are in s\n", fall,
+            p->timestep);
+}
+
 static cav_status print_problem(const cav_problem *p, cav_error *error) {
   static const char *const order[] = {"euler", "midpoint", "momentum"};
   int knots = (int)lround(p->duration / p->timestep) + 1;
@@ -422,6 +433,7 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
          p->cycle.on        ? "a cycle"
          : p->close_at_rest ? "at rest after the last knot"
                             : "open after the last knot");
+  cav_command_tell_step(stdout, p);
   if (p->duration_most > 0)
     printf("  duration free from %g to %g s, weight %g\n", p->duration_least, p->duration_most, p->duration_weight);
   if (p->cycle.on)
