@@ -256,6 +256,111 @@ static cav_status hold_over_ground(const cav_problem *problem, cav_strategy *beg
   return status;
 }
 
+/// Guesses of a problem from which strategies begin.
+typedef struct guesses {
+  cav_strategy stated, plain, walk, fly; ///< straight from start to goal; with limbs swinging; by a flight
+  int collides, decorated, sinks;        ///< what the stated guess does, and is
+} guesses;
+
+/// The stated guess in other postures, and under another order first.
+static void add_stated(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated) {
+  add_near(strategy, n, stated, MEND_STATED);
+  if (problem->guess_left && !problem->cycle.on) {
+    cav_strategy left = *stated;
+    left.left = 1;
+    add(strategy, n, &left, "left", "postures without the joints that they would have beyond the model's ranges");
+    add_near(strategy, n, stated, MEND);
+  }
+  if (problem->order != CAV_ORDER_MOMENTUM) return;
+  cav_strategy twice = *stated;
+  twice.first_midpoint = 1;
+  add(strategy, n, &twice, "midpoint", "under the midpoint order first, then from there under the order of momentum");
+}
+
+static cav_status add_pumped(const cav_problem *problem, cav_strategy *strategy, int *n, int *swings_up) {
+  cav_strategy pump = {.guess = CAV_GUESS_PUMP, .order = CAV_ORDER_MOMENTUM, .schedule = problem->schedule};
+  *swings_up = 0;
+  cav_status status = problem->guess == CAV_GUESS_PUMP ? CAV_OK : cav_pump_needed(problem, swings_up);
+  if (status == CAV_OK && *swings_up)
+    add(strategy, n, &pump, "pump", "energy pumped in, too little at a time for the way from start to goal");
+  return status;
+}
+
+/// Finds the guesses; a file without one whose straight way sinks is begun, strategy[0], with the start held.
+static cav_status find_guesses(const cav_problem *problem, const cav_strategy *stated, cav_strategy *strategy,
+                               guesses *g) {
+  *g = (guesses){.stated = *stated, .decorated = is_decorated(problem)};
+  cav_status status = problem->schedule.solids == CAV_SOLIDS_GROW ? CAV_OK : cav_guess_collides(problem, &g->collides);
+  if (status == CAV_OK && !g->collides && !g->decorated) status = hold_over_ground(problem, strategy, &g->sinks);
+  // all others would run into them, too
+  if (g->collides) g->stated.schedule.solids = CAV_SOLIDS_GROW;
+  g->plain = g->stated;
+  g->plain.guess = CAV_GUESS_INTERPOLATE, g->plain.stated = 0;
+  g->walk = g->fly = g->plain;
+  g->walk.text = "from start to goal with the limbs that carry swinging in turn";
+  if (status == CAV_OK && !problem->nswing) status = gait(problem, &g->walk);
+  g->fly.text = "all of the way by an arc clear of solids, start and goal held before and after it";
+  g->fly.schedule.solids = problem->schedule.solids;
+  return status == CAV_OK ? flight(problem, &g->fly) : status;
+}
+
+/// From the straight way and from the start held, where the stated guess is neither.
+static void add_plain(const cav_problem *problem, cav_strategy *strategy, int *n, const guesses *g) {
+  // where the goal is the start, the way straight to it is the start held
+  const int stays = !problem->cycle.on && is_back(problem), holds = problem->guess == CAV_GUESS_HOLD;
+  if ((g->decorated || holds || g->sinks) && !stays) add(strategy, n, &g->plain, "line", "straight from start to goal");
+  cav_strategy still = g->plain;
+  still.guess = CAV_GUESS_HOLD;
+  const int held = !g->decorated && (holds || (stays && problem->guess == CAV_GUESS_INTERPOLATE));
+  if (!problem->cycle.on && !g->sinks && !held) add(strategy, n, &still, "hold", "the start held");
+}
+
+/// From other guesses and by other schedules.
+static cav_status add_others(const cav_problem *problem, cav_strategy *strategy, int *n, const guesses *g) {
+  if (g->collides) add_grown(problem, strategy, n, &g->stated, &g->walk, &g->fly);
+  if (!g->collides && g->fly.height > 0 && problem->guess_height > 0) add_mended(strategy, n, &g->fly, "flight");
+  cav_strategy soft = g->stated;
+  soft.schedule.first.smoothing *= SOFTER;
+  soft.schedule.first.penalty /= CHEAPER;
+  add(strategy, n, &soft, "soft", "contacts active from twice as far, unactuated force ten times cheaper at first");
+  if (g->walk.nswing && !g->collides) add_mended(strategy, n, &g->walk, "swing");
+  cav_strategy leap = g->plain;
+  leap.text = "straight from start to goal with an arc as high as is asked for";
+  cav_status status = problem->guess_height != 0 ? CAV_OK : cav_leap_find(problem, &leap.height, &leap.from, &leap.to);
+  if (status != CAV_OK) return status;
+  if (leap.height > 0) add_mended(strategy, n, &leap, "leap");
+  add_plain(problem, strategy, n, g);
+  cav_strategy slow = g->stated;
+  slow.schedule.stages *= SLOWER;
+  add(strategy, n, &slow, "slow", "twice as many stages");
+  return CAV_OK;
+}
+
+/// What waits for how all others ended.
+static void add_last(const cav_problem *problem, cav_strategy *strategy, int *n, const guesses *g) {
+  if (problem->order != CAV_ORDER_MOMENTUM) {
+    cav_strategy exact = g->stated;
+    exact.order = CAV_ORDER_MOMENTUM, exact.first_midpoint = 1, exact.use = CAV_STRATEGY_MOMENTUM;
+    add(strategy, n, &exact, "momentum", "under the order of momentum, from a motion of the midpoint order");
+  }
+  add_near(strategy, n, &g->stated, MEND_LAST);
+  if (!g->collides) add_repairs(strategy, n, &g->stated);
+}
+
+/// What tells a cause where none succeeded.
+static void add_diagnoses(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated,
+                          int swings_up) {
+  cav_strategy open = *stated, longer = *stated;
+  open.use = longer.use = CAV_STRATEGY_DIAGNOSIS, open.open = 1;
+  if (!problem->cycle.on && problem->close_at_rest)
+    add(strategy, n, &open, "open", "with an end that need not be at rest");
+  // what a swing-up takes is told by cav_problem_pumping
+  int timed = problem->window > 0;
+  for (int i = 0; i < problem->nterm; i++) timed |= problem->term[i].quantity == CAV_QUANTITY_TRACK;
+  if (!problem->cycle.on && problem->duration_most == 0 && !swings_up && !timed)
+    add(strategy, n, &longer, "longer", "with a duration free up to twice the stated one");
+}
+
 cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[CAV_STRATEGIES], int *n) {
   cav_strategy stated = {.guess = problem->guess, .stated = 1, .order = problem->order, .schedule = problem->schedule};
   *n = 0;
@@ -264,93 +369,15 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
     add_repairs(strategy, n, &stated);
     return CAV_OK;
   }
-  add_near(strategy, n, &stated, MEND_STATED);
-  if (problem->guess_left && !problem->cycle.on) {
-    cav_strategy left = stated;
-    left.left = 1;
-    add(strategy, n, &left, "left", "postures without the joints that they would have beyond the model's ranges");
-    add_near(strategy, n, &stated, MEND);
-  }
-
-  if (problem->order == CAV_ORDER_MOMENTUM) {
-    cav_strategy twice = stated;
-    twice.first_midpoint = 1;
-    add(strategy, n, &twice, "midpoint", "under the midpoint order first, then from there under the order of momentum");
-  }
-
-  cav_strategy pump = {.guess = CAV_GUESS_PUMP, .order = CAV_ORDER_MOMENTUM, .schedule = problem->schedule};
-  int swings_up = 0;
-  cav_status status = problem->guess == CAV_GUESS_PUMP ? CAV_OK : cav_pump_needed(problem, &swings_up);
+  guesses g;
+  int swings_up;
+  add_stated(problem, strategy, n, &stated);
+  cav_status status = add_pumped(problem, strategy, n, &swings_up);
+  if (status == CAV_OK) status = find_guesses(problem, &stated, strategy, &g);
+  if (status == CAV_OK) status = add_others(problem, strategy, n, &g);
   if (status != CAV_OK) return status;
-  if (swings_up)
-    add(strategy, n, &pump, "pump", "energy pumped in, too little at a time for the way from start to goal");
-
-  int collides = 0;
-  status = problem->schedule.solids == CAV_SOLIDS_GROW ? CAV_OK : cav_guess_collides(problem, &collides);
-  const int decorated = is_decorated(problem);
-  int sinks = 0;
-  if (status == CAV_OK && !collides && !decorated) status = hold_over_ground(problem, strategy, &sinks);
-  if (status != CAV_OK) return status;
-  // all others would run into them, too
-  if (collides) stated.schedule.solids = CAV_SOLIDS_GROW;
-  cav_strategy plain = stated;
-  plain.guess = CAV_GUESS_INTERPOLATE, plain.stated = 0;
-  cav_strategy walk = plain;
-  walk.text = "from start to goal with the limbs that carry swinging in turn";
-  if (status == CAV_OK && !problem->nswing) status = gait(problem, &walk);
-  if (status != CAV_OK) return status;
-  cav_strategy fly = plain;
-  fly.text = "all of the way by an arc clear of solids, start and goal held before and after it";
-  fly.schedule.solids = problem->schedule.solids;
-  status = flight(problem, &fly);
-  if (status != CAV_OK) return status;
-  if (collides) add_grown(problem, strategy, n, &stated, &walk, &fly);
-
-  if (!collides && fly.height > 0 && problem->guess_height > 0) add_mended(strategy, n, &fly, "flight");
-  cav_strategy soft = stated;
-  soft.schedule.first.smoothing *= SOFTER;
-  soft.schedule.first.penalty /= CHEAPER;
-  add(strategy, n, &soft, "soft", "contacts active from twice as far, unactuated force ten times cheaper at first");
-
-  if (walk.nswing && !collides) add_mended(strategy, n, &walk, "swing");
-
-  cav_strategy leap = plain;
-  leap.text = "straight from start to goal with an arc as high as is asked for";
-  status = problem->guess_height != 0 ? CAV_OK : cav_leap_find(problem, &leap.height, &leap.from, &leap.to);
-  if (status != CAV_OK) return status;
-  if (leap.height > 0) add_mended(strategy, n, &leap, "leap");
-
-  // where the goal is the start, the way straight to it is the start held
-  const int stays = !problem->cycle.on && is_back(problem);
-  if ((decorated || problem->guess == CAV_GUESS_HOLD || sinks) && !stays)
-    add(strategy, n, &plain, "line", "straight from start to goal");
-  plain.guess = CAV_GUESS_HOLD;
-  const int straight = problem->guess == CAV_GUESS_INTERPOLATE || problem->guess == CAV_GUESS_HOLD;
-  const int held = !decorated && straight && (stays || problem->guess == CAV_GUESS_HOLD);
-  if (!problem->cycle.on && !sinks && !held) add(strategy, n, &plain, "hold", "the start held");
-
-  cav_strategy slow = stated;
-  slow.schedule.stages *= SLOWER;
-  add(strategy, n, &slow, "slow", "twice as many stages");
-
-  if (problem->order != CAV_ORDER_MOMENTUM) {
-    cav_strategy exact = stated;
-    exact.order = CAV_ORDER_MOMENTUM, exact.first_midpoint = 1, exact.use = CAV_STRATEGY_MOMENTUM;
-    add(strategy, n, &exact, "momentum", "under the order of momentum, from a motion of the midpoint order");
-  }
-  add_near(strategy, n, &stated, MEND_LAST);
-  if (!collides) add_repairs(strategy, n, &stated);
-  cav_strategy open = stated;
-  open.use = CAV_STRATEGY_DIAGNOSIS, open.open = 1;
-  if (!problem->cycle.on && problem->close_at_rest)
-    add(strategy, n, &open, "open", "with an end that need not be at rest");
-  // what a swing-up takes is told by cav_problem_pumping
-  cav_strategy longer = stated;
-  longer.use = CAV_STRATEGY_DIAGNOSIS;
-  int timed = problem->window > 0;
-  for (int i = 0; i < problem->nterm; i++) timed |= problem->term[i].quantity == CAV_QUANTITY_TRACK;
-  if (!problem->cycle.on && problem->duration_most == 0 && !swings_up && !timed)
-    add(strategy, n, &longer, "longer", "with a duration free up to twice the stated one");
+  add_last(problem, strategy, n, &g);
+  add_diagnoses(problem, strategy, n, &g.stated, swings_up);
   return CAV_OK;
 }
 
