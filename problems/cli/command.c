@@ -162,3 +162,9 @@ cav_status cav_command_tell_records(const char *folder, int print, const cav_pro
   cav_records_free(records);
   return status;
 }
+
+double cav_command_clock(clockid_t clock) {
+  struct timespec t;
+  clock_gettime(clock, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}

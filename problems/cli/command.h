@@ -3,6 +3,7 @@
 #define CAVORT_COMMAND_H
 
 #include <stdio.h>
+#include <time.h>
 
 #include "cavort/mocap.h"
 #include "cavort/solve.h"
@@ -166,6 +167,9 @@ typedef struct cav_tried {
 cav_tried cav_tried_open(const char *folder);
 int cav_tried_next(cav_tried *tried);
 void cav_tried_close(cav_tried *tried);
+
+/// Time of a clock, s: CLOCK_MONOTONIC, CLOCK_PROCESS_CPUTIME_ID.
+double cav_command_clock(clockid_t clock);
 
 /// Whether the solve of a folder was stopped, in its motion or, without success until then, in other strategies; tells where,
 /// unless out is NULL. tried.c.

@@ -282,22 +282,16 @@ static void print(const fit *f) {
   putchar('\n');
 }
 
-static double now(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 int cav_command_ik(const cav_command_line *line) {
   cav_error error = {0};
   fit f = {.line = line};
   cav_ik_options options = cav_ik_options_default();
   cav_status status = read_all(&f, &error);
   f.folder = line->output ? strdup(line->output) : default_folder(line->operand);
-  f.seconds = now();
+  f.seconds = cav_command_clock(CLOCK_MONOTONIC);
   if (!status) status = scale(&f, &options, &error);
   if (!status) status = cav_ik(f.model, f.record, f.set, &options, &f.motion, &f.report, &error);
-  f.seconds = now() - f.seconds;
+  f.seconds = cav_command_clock(CLOCK_MONOTONIC) - f.seconds;
   if (!status && f.motion->nknot >= 4) status = cav_quality_measure(f.model, f.motion, NULL, &f.quality, &error);
   if (!status) status = write_all(&f, &error);
   if (!status && !line->quiet) print(&f);

@@ -50,12 +50,6 @@ typedef struct run {
 
 static cav_status no_memory(cav_error *error) { return cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory"); }
 
-static double now(clockid_t clock) {
-  struct timespec t;
-  clock_gettime(clock, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static cav_status open_run(run *r, cav_error *error) {
   const cav_command_line *line = r->line;
   if (!(r->problem = cav_problem_load(line->operand, line->model, error))) return error->status;
@@ -154,9 +148,10 @@ static cav_status sample(run *r, int k, cav_error *error) {
   cav_status status = feed(r, k, error);
   if (status) return status;
   update *u = &r->update[k];
-  const double begin = now(CLOCK_MONOTONIC), work = now(CLOCK_PROCESS_CPUTIME_ID);
+  const double begin = cav_command_clock(CLOCK_MONOTONIC), work = cav_command_clock(CLOCK_PROCESS_CPUTIME_ID);
   status = cav_mhe_update(r->mhe, &u->last);
-  u->clock = now(CLOCK_MONOTONIC) - begin, u->processor = now(CLOCK_PROCESS_CPUTIME_ID) - work;
+  u->clock = cav_command_clock(CLOCK_MONOTONIC) - begin,
+  u->processor = cav_command_clock(CLOCK_PROCESS_CPUTIME_ID) - work;
   u->chi_square = cav_mhe_chi_square(r->mhe, &u->readings);
   if (!status) status = take(r, k);
   if (status == CAV_NOT_CONVERGED)

@@ -26,15 +26,9 @@ typedef struct ticker {
   const char *what;
 } ticker;
 
-static double seconds(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static int tell(void *context, const char *what, double fraction) {
   ticker *tick = context;
-  double now = seconds();
+  double now = cav_command_clock(CLOCK_MONOTONIC);
   int news = !tick->what || strcmp(what, tick->what);
   if (tick->quiet || (!news && now - tick->last < (tick->terminal ? 0.1 : 2))) return interrupted;
   tick->what = what;
@@ -57,7 +51,7 @@ int cav_command_report(const cav_command_line *line) {
   cav_error error = {0};
   cav_command_scene scene;
   if (cav_command_load(line, &scene, &error)) return cav_command_fail(&error);
-  ticker tick = {.quiet = line->quiet, .terminal = isatty(2), .begin = seconds()};
+  ticker tick = {.quiet = line->quiet, .terminal = isatty(2), .begin = cav_command_clock(CLOCK_MONOTONIC)};
   char *name = name_of(line, &scene), *folder = name ? cav_command_folder(line, name, ".report") : NULL;
   cav_provenance provenance;
   cav_provenance_take(&provenance, line->arguments, scene.problem ? line->operand : NULL,

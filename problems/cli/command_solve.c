@@ -21,12 +21,6 @@
 
 static volatile sig_atomic_t interrupted, first_second;
 
-static double seconds_now(void) {
-  struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
 // asks for the end; again after a second has passed: ends at once. Some parents deliver one interrupt twice
 static void interrupt(int signal_number) {
   struct timespec now;
@@ -272,7 +266,7 @@ static void tell_cause(const cav_race *race) {
 static int solve_from(const cav_command_line *line, const cav_problem *problem, const char *folder,
                       const cav_provenance *provenance, const char *key, const beginning *b) {
   cav_error error = {0};
-  const double begun = seconds_now();
+  const double begun = cav_command_clock(CLOCK_MONOTONIC);
   ticker tick = {.quiet = line->quiet, .terminal = isatty(STDERR_FILENO)};
   destination to = {line, folder, provenance};
   cav_race race = {.problem = problem,
@@ -322,7 +316,7 @@ static int solve_from(const cav_command_line *line, const cav_problem *problem, 
   for (int i = 0; i < race.n; i++) tried += race.entry[i].state == CAV_RACE_DONE;
   if (race.tell && best >= 0 && tried > 1)
     fprintf(stderr, "kept: strategy %s, of %d tried in %.1f s\n", race.entry[best].strategy.name, tried,
-            seconds_now() - begun);
+            cav_command_clock(CLOCK_MONOTONIC) - begun);
   if (status) done = cav_command_fail(&error);
   cav_race_close(&race);
   return done;
