@@ -79,6 +79,21 @@ static void test_near(void) {
   }
 }
 
+// a certified motion is near where it misses few targets, or none by much
+static void test_off(void) {
+  cav_race_report r = whole();
+  r.verdict.certified = 1, r.verdict.ntarget = 3;
+  static const double off[] = {1.1, 1.9, 2.1};
+  for (int missed = 1; missed <= 3; missed++) {
+    for (int k = 0; k < 3; k++) {
+      r.verdict.nmissed = missed, r.verdict.missed_most = off[k];
+      CHECK(cav_rank_near(&r, 0.8) == (missed == 1 || k < 2));
+    }
+  }
+  r.verdict.achieved = 1, r.verdict.nmissed = 0, r.verdict.missed_most = 0;
+  CHECK(!cav_rank_near(&r, 0.8));
+}
+
 // of certified motions that miss targets the one with fewer is mended, then the one that is less off, whatever they cost
 static void test_nearer(void) {
   cav_race_report one = whole(), other = whole();
@@ -96,6 +111,7 @@ static void test_nearer(void) {
 int main(void) {
   test_better();
   test_near();
+  test_off();
   test_nearer();
   test_spent();
   return check_result();

@@ -403,6 +403,7 @@ CAV_API cav_status cav_strategy_solve(const cav_problem *problem, const cav_stra
 
 /// What the word optimal requires of a verdict's optimality: a fraction of the cost.
 #define CAV_TOLERANCE_OPTIMAL 1e-4
+#define CAV_MISSED_LITTLE 2 ///< times its tolerance: a target that is off by less is missed by little
 #define CAV_HOVER_GAP 0.003 ///< m: a loaded contact farther apart, that stays so over a step, leans on air
 /// What a term asked and what the motion does.
 typedef struct cav_term_report {

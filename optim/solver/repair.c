@@ -31,8 +31,8 @@ typedef enum cure {
 } cure;
 
 enum { CURES = 3 };
-static const double force_weight = 1, self_weight = 1000, heavier = 10, little = 2, harder = 4, lighter = 0.04,
-                    softer = 6, longer = 2, soft = 0.03, slack = 0.75;
+static const double force_weight = 1, self_weight = 1000, heavier = 10, harder = 4, lighter = 0.04, softer = 6,
+                    longer = 2, soft = 0.03, slack = 0.75;
 
 /// What a motion misses first, in the order of a certificate (METHOD.md, 6), most of momentum, slip and hover, and its
 /// cures. Forces near a record are what is looked for: none of them costs anything. A residual beyond its bound is
@@ -45,7 +45,8 @@ static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
                     lost[] = {FORCE, STEP, SLACK}, target[] = {EFFORT, GOALS, NONE}, close[] = {BIT, EFFORT, GOALS},
                     fades[] = {SMOOTHING, GAP, STEP}, near[] = {STEP, SLACK, NONE}, again[] = {STEP, SLIDING, NONE},
                     ground[] = {STEP, LOOSE, SOFTER}, none[] = {NONE};
-  if (v->certified) return v->achieved ? none : v->missed_most > 0 && v->missed_most < little ? close : target;
+  if (v->certified)
+    return v->achieved ? none : v->missed_most > 0 && v->missed_most < CAV_MISSED_LITTLE ? close : target;
   if (!cav_verdict_feasible(v)) return cav_problem_has_record(p) ? ground : forces;
   if (v->penetration_max_m > CAV_TOLERANCE_PENETRATION) return deep;
   if (v->penetration_between_m > CAV_TOLERANCE_PENETRATION) return between;
@@ -91,7 +92,7 @@ static int is_goal(const cav_problem *p, const cav_term *term) {
 
 /// Twice as many times its weight as a target that is missed by little is off over its tolerance: what a cost leaves of it
 /// goes with one over its weight at most.
-static double enough(const cav_verdict *v) { return ceil(10 * little * v->missed_most) / 10; }
+static double enough(const cav_verdict *v) { return ceil(10 * CAV_MISSED_LITTLE * v->missed_most) / 10; }
 
 /// Weights those that are missed, or all where none is known to be, that many times.
 static cav_status weigh_goals(const cav_problem *p, const cav_verdict *v, double times, cav_strategy *s) {

@@ -45,7 +45,8 @@ int cav_rank_rough(const cav_verdict *v) {
 int cav_rank_near(const cav_race_report *report, double effort) {
   const cav_verdict *v = &report->verdict;
   if (!report->solution || report->status == CAV_INTERRUPTED) return 0;
-  if (v->certified) return !v->achieved && 2 * v->nmissed < v->ntarget;
+  if (v->certified)
+    return !v->achieved && (2 * v->nmissed < v->ntarget || (v->missed_most > 0 && v->missed_most < CAV_MISSED_LITTLE));
   // a motion that does something else is not what is looked for
   if (2 * v->nmissed > v->ntarget) return 0;
   if (cav_rank_rough(v)) return 1;
