@@ -4,7 +4,7 @@
 /// small weights, the way from the model's own configuration. Legs that are straight there, whose length can only fall, are
 /// bent: the trunk comes down by a fixed fraction, and hinges start off towards the middle of their ranges; soles of a
 /// quadruped stay where they are seen from the hips, those of a biped sideways and side by side, or it would splay, lean or
-/// step. Joints stay in their ranges. Where the legs of a biped are inside each other its feet go farther apart.
+/// step. Joints stay in their ranges. Where links are inside each other so the feet of a biped go farther apart.
 #include "stand.h"
 
 #include <assert.h>
@@ -284,16 +284,7 @@ static cav_status search(stander *s, cav_stand *stand) {
   return status;
 }
 
-// which leg of a biped a link is of; -1: none
-static int leg_of(const stander *s, int link) {
-  const cav_model *m = s->model;
-  for (int i = m->link[link].body; i > 0; i = m->body[i].parent)
-    for (int k = 0; k < s->nfoot; k++)
-      if (i == s->first[k]) return k;
-  return -1;
-}
-
-// how deep the legs are inside each other at s->q: what else is so stays so, however far apart feet are
+// how deep links are inside each other at s->q
 static cav_status find_overlap(const stander *s, double *deepest) {
   cav_state *state = s->state;
   int contact = state->options.contact;
@@ -301,11 +292,8 @@ static cav_status find_overlap(const stander *s, double *deepest) {
   cav_status status = cav_position(s->model, state, s->q);
   state->options.contact = contact;
   *deepest = 0;
-  for (int i = 0; i < state->ncontact && !status; i++) {
-    const cav_contact *c = &state->contact[i];
-    const int one = leg_of(s, c->link1), other = leg_of(s, c->link2);
-    if (one >= 0 && other >= 0 && one != other) *deepest = fmax(*deepest, -c->dist);
-  }
+  for (int i = 0; i < state->ncontact && !status; i++)
+    if (!s->model->pair[state->contact[i].pair].external) *deepest = fmax(*deepest, -state->contact[i].dist);
   return status;
 }
 
