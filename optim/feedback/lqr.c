@@ -2,7 +2,8 @@
 /// finer step, du/dq, du/dv, du/dv' of the inverse there give the forward step's linear map, and a Riccati recursion
 /// from the last knot backwards gives du = gain_q dq + gain_v dv. Straying is penalised by its energy, dv' M dv and dq'
 /// M dq, against squared fractions of the actuators' limits, so one penalty serves all limbs. Gains of a knot are the
-/// mean of the finer steps up to the next knot.
+/// mean of the finer steps up to the next knot. Where balance is what is lost, that of the centre of mass counts more; where
+/// a motion takes an actuator near its limit, fractions are of what it leaves.
 ///
 /// When a contact comes and how hard it is is not known to a step or a millimetre. So the recursion takes several
 /// contact laws, one of which holds at each step, by chance and apart from the others: the expectation of what is left
@@ -45,18 +46,21 @@ typedef struct regulator {
   double *inverse;       ///< [nv*nv] of the system
   double *unit, *factor; ///< [nu*nu] inverses of H and of its factor
   double *dq, *dv, *dn;  ///< [nv*nv] of the inverse, row-major
-  double *M;             ///< [nv*nv]
+  double *M;             ///< [nv*nv] what straying is weighed by: inertia, and balance
+  double *row;           ///< [nv]
+  double *room;          ///< [nu*knots] part of its limit that an input is a fraction of
+  const double *now;     ///< [nu] that of the step in hand
   double *u;             ///< [nv]
   double (*rotation)[2][9]; ///< [nrotation] blocks of E and J, row-major
   void *memory;
 } regulator;
 
-static int regulator_make(regulator *r, const cav_transcription *tr) {
+static int regulator_make(regulator *r, const cav_transcription *tr, int knots) {
   int nv = tr->model->nv, nu = tr->model->nu, n = 2 * nv;
   size_t v = (size_t)nv, u = (size_t)nu, s = (size_t)n, all = s + u;
   *r = (regulator){.nv = nv, .nu = nu, .n = n, .all = n + nu};
-  double *m = calloc(s * s + all * all + 2 * v * s + 2 * u * u + 2 * u * s + 3 * v * all + 7 * v * v + v +
-                         18 * (size_t)tr->nrotation + 1,
+  double *m = calloc(s * s + all * all + 2 * v * s + 2 * u * u + 2 * u * s + 3 * v * all + 7 * v * v + 2 * v +
+                         u * (size_t)knots + 18 * (size_t)tr->nrotation + 1,
                      sizeof *m);
   r->memory = m;
   if (!m) return 0;
@@ -81,6 +85,8 @@ static int regulator_make(regulator *r, const cav_transcription *tr) {
   r->dn = m, m += v * v;
   r->M = m, m += v * v;
   r->u = m, m += v;
+  r->row = m, m += v;
+  r->room = m, m += u * (size_t)knots;
   r->rotation = (double(*)[2][9])m;
   return 1;
 }
@@ -102,6 +108,57 @@ static cav_status find_forces(regulator *r, const cav_model *model, cav_state *s
   return status;
 }
 
+/// Least part of its limit that an input is a fraction of.
+static const double least_room = 0.1;
+
+/// What the motion leaves of an actuator's limits, on the side where that is less, over the limit.
+static double room_of(const cav_model *model, int actuator, double effort) {
+  double range[2], scale;
+  cav_verification_actuator_range(model, actuator, range, &scale);
+  return fmin(fmax(fmin(range[1] - effort, effort - range[0]) / scale, least_room), 1);
+}
+
+/// Room of the inputs at all knots: their limits whole, or what is left of them.
+static cav_status find_room(regulator *r, const cav_model *model, cav_state *state, const cav_trajectory *motion,
+                            int left) {
+  const int knots = motion->nknot - 1;
+  for (int i = 0; i < knots * r->nu; i++) r->room[i] = 1;
+  if (!left) return CAV_OK;
+  double *effort = r->K; // as yet of no use
+  for (int t = 0; t < knots; t++) {
+    cav_status status = cav_position(model, state, motion->q + (size_t)t * motion->nq);
+    if (status != CAV_OK) return status;
+    cav_actuation(model, state, motion->u + (size_t)t * motion->nv, r->row, effort);
+    for (int a = 0; a < r->nu; a++) r->room[t * r->nu + a] = room_of(model, a, effort[a]);
+  }
+  return CAV_OK;
+}
+
+/// Whether a dof moves all of a tree that actuators move along: it is straight, and so is all between it and the world.
+static int is_carrier(const cav_model *model, int dof) {
+  if (!model->link[model->link[model->dof[dof].link].root].driven) return 0;
+  for (int d = dof; d >= 0; d = model->dof[d].parent) {
+    const cav_joint *joint = &model->joint[model->dof[d].joint];
+    if (joint->type != CAV_JOINT_SLIDE && (joint->type != CAV_JOINT_FREE || d >= joint->dof + 3)) return 0;
+  }
+  return 1;
+}
+
+/// Adds the energy of centres of mass to that of the links, M, so many times: a carrier's row of M is its tree's momentum
+/// along it, its diagonal the tree's mass.
+static void weigh_balance(regulator *r, const cav_model *model, double times) {
+  const int nv = r->nv;
+  if (times <= 0) return;
+  double *momentum = r->system; // as yet of no use
+  memcpy(momentum, r->M, (size_t)nv * (size_t)nv * sizeof *momentum);
+  for (int d = 0; d < nv; d++) {
+    const double *row = momentum + (size_t)d * nv, part = times / row[d];
+    if (!is_carrier(model, d)) continue;
+    for (int i = 0; i < nv; i++)
+      for (int j = 0; j < nv; j++) r->M[i * nv + j] += part * row[i] * row[j];
+  }
+}
+
 /// Adds the inputs' part of D; each acts on few dofs.
 static void add_inputs(regulator *r) {
   const int nv = r->nv;
@@ -109,9 +166,9 @@ static void add_inputs(regulator *r) {
   double *D = r->D + (size_t)r->n * nv;
   for (int a = 0; a < r->nu; a++, force += nv, D += nv)
     for (int d = 0; d < nv; d++) {
-      const double *column = r->inverse + (size_t)d * nv;
+      const double *column = r->inverse + (size_t)d * nv, by = r->now[a] * force[d];
       if (force[d] == 0) continue;
-      for (int i = 0; i < nv; i++) D[i] += column[i] * force[d];
+      for (int i = 0; i < nv; i++) D[i] += column[i] * by;
     }
 }
 
@@ -242,7 +299,8 @@ static cav_status riccati(regulator *r) {
 /// Adds the gains of the finer step k to those of its knot; at the knot their mean, as generalised forces.
 static void add_gains(regulator *r, int k, double *gain_q, double *gain_v) {
   const int nv = r->nv, nu = r->nu, inputs = nu * r->n;
-  for (int i = 0; i < inputs; i++) r->sum[i] += r->K[i];
+  for (int j = 0; j < r->n; j++)
+    for (int a = 0; a < nu; a++) r->sum[j * nu + a] += r->now[a] * r->K[j * nu + a];
   if (k % r->finer > 0) return;
   for (int j = 0; j < nv; j++)
     for (int a = 0; a < nu; a++) {
@@ -271,15 +329,19 @@ static cav_status add_laws(regulator *r, const cav_transcription *tr, const cav_
   return CAV_OK;
 }
 
-/// Back over a motion; gains of the first knots are kept.
+/// Back over a motion, whose straying is weighed with balance; gains of the first knots are kept. What a cycle looks ahead to
+/// has the room of its first period.
 static cav_status sweep(regulator *r, const cav_transcription *tr, const cav_trajectory *fine, const cav_options *law,
-                        int laws, cav_state *state, cav_state *bare, int knots, double *gain_q, double *gain_v) {
+                        int laws, double balance, cav_state *state, cav_state *bare, int knots, double *gain_q,
+                        double *gain_v) {
   int nq = fine->nq, nv = fine->nv;
   size_t square = (size_t)nv * nv;
   cav_status status = CAV_OK;
   for (int k = fine->nknot - 2; k >= 0 && status == CAV_OK; k--) {
     const double *q = fine->q + (size_t)k * nq, *v = fine->v + (size_t)k * nv;
     status = cav_transcription_stopped(tr) ? CAV_INTERRUPTED : cav_inertia(tr->model, bare, q, r->M);
+    if (status == CAV_OK) weigh_balance(r, tr->model, balance);
+    r->now = r->room + (size_t)(k / r->finer % knots) * r->nu;
     // at the end a second's straying is penalised
     if (status == CAV_OK && k == fine->nknot - 2) add_penalty(r, 1);
     if (status == CAV_OK) status = add_laws(r, tr, law, laws, state, q, v);
@@ -298,7 +360,7 @@ cav_status cav_feedback(const cav_transcription *tr, const cav_trajectory *motio
   memset(gain_q, 0, n * sizeof *gain_q);
   memset(gain_v, 0, n * sizeof *gain_v);
   regulator r;
-  int ready = regulator_make(&r, tr);
+  int ready = regulator_make(&r, tr, motion->nknot - 1);
   // a cycle goes on: two strides are looked ahead
   int ahead = tr->problem->cycle.mirror == CAV_MIRROR_NONE ? 2 : 4;
   cav_trajectory *whole =
@@ -313,8 +375,10 @@ cav_status cav_feedback(const cav_transcription *tr, const cav_trajectory *motio
     r.q = r.v * penalty->rate * penalty->rate;
     bare->options.contact = bare->options.constraint = 0;
     status = find_forces(&r, tr->model, bare, motion->q);
+    if (status == CAV_OK) status = find_room(&r, tr->model, bare, motion, penalty->room);
   }
-  if (status == CAV_OK) status = sweep(&r, tr, fine, law, laws, state, bare, motion->nknot - 1, gain_q, gain_v);
+  if (status == CAV_OK)
+    status = sweep(&r, tr, fine, law, laws, penalty->balance, state, bare, motion->nknot - 1, gain_q, gain_v);
   cav_state_free(state);
   cav_state_free(bare);
   cav_trajectory_free(whole);

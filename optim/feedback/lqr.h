@@ -8,6 +8,9 @@
 typedef struct cav_feedback_penalty {
   double tracking; ///< of the energy of straying, in weight times CAV_MOMENT_ARM, against one actuator at its limit
   double rate;     ///< rad/s: straying by an angle or way counts as a velocity of rate times that
+  double
+      balance; ///< times that the energy of the centre of mass of a tree that moves freely counts beside that of its links
+  int room;    ///< 1: an effort counts over what the motion leaves of its actuator's limit; 0: over the limit
 } cav_feedback_penalty;
 
 /// Gains du = gain_q dq + gain_v dv from knot t to t+1, t = 0 .. nknot-2, each [nv*nv] row-major, at tenths of the step
