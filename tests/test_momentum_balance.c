@@ -129,10 +129,68 @@ static void test_contact_balance(void) {
   sample_free(&s);
 }
 
+// two links, the upper one held in one way or another 0.05 m above its end; then a load joined to the lower one's tip
+#define UPPER(joint)                                                                                           \
+  HEAD "<body name='upper' pos='0 0 2'>" joint                                                                 \
+       "<geom type='capsule' fromto='0 0 -.05 0 0 -.4' size='.03' mass='2'/>"                                  \
+       "<body name='lower' pos='0 0 -.45'><joint name='elbow' axis='0 1 0'/><geom name='shin' type='capsule' " \
+       "fromto='0 0 0 0 0 -.4' size='.03' mass='2'/></body></body>"
+#define LOAD(pos)               \
+  "<body name='load' pos='" pos \
+  "'><freejoint/><geom name='ball' size='.05' mass='1' contype='0' conaffinity='0'/></body>"
+#define SOFT " solref='.06 1'"
+#define TWO(more)                                                                                                \
+  HEAD "<body><joint name='a' type='slide'/><geom size='.1' mass='2'/></body><body pos='0 1 0'><joint name='b' " \
+       "type='slide'/><geom size='.1' mass='1'/></body></worldbody><equality>" more "</equality></mujoco>"
+
+static const struct {
+  const char *text, *tree;
+  int control; // number of q that is put out of line
+} joined[] = {
+    {UPPER("<joint type='ball'/>") "</worldbody></mujoco>", "upper", 4},
+    {UPPER("<freejoint/>") "</worldbody><equality><connect body1='upper' anchor='0 0 0'" SOFT "/></equality></mujoco>",
+     "upper", 2},
+    {UPPER("<freejoint/>") "</worldbody><equality><weld body1='upper'" SOFT "/></equality></mujoco>", "upper", 2},
+    {UPPER("<joint type='ball'/>")
+         LOAD("0 0 1.1") "</worldbody><equality><connect body1='load' body2='lower' anchor='0 0 "
+                         ".05'" SOFT "/></equality></mujoco>",
+     "load", 7},
+    {UPPER("<joint type='ball'/>") LOAD("0 0 1.1") "</worldbody><equality><weld body1='lower' body2='load'" SOFT
+                                                   "/></equality></mujoco>",
+     "load", 7},
+    {UPPER("<joint type='ball'/>")
+         LOAD("0 0 1") "</worldbody><equality><distance geom1='ball' geom2='shin' distance='.1'" SOFT
+                       "/></equality></mujoco>",
+     "load", 7},
+    {TWO("<joint joint1='a' joint2='b' polycoef='0 2 1 0 0'" SOFT "/>"), "body", 0},
+};
+
+// what an equality constraint between trees, or with the world, exerts is in the balance, as that of a joint is; the
+// same motion with a knot out of line is not balanced
+static void test_joined(void) {
+  for (size_t i = 0; i < sizeof joined / sizeof *joined; i++) {
+    for (int order = CAV_ORDER_MIDPOINT; order <= CAV_ORDER_MOMENTUM; order++) {
+      sample s = sample_new(joined[i].text, 60, 0.01, (cav_order)order);
+      s.v[s.model->nv == 2 ? 0 : i == 0 || i > 2 ? 3 : 6] = 2;
+      let_go(&s);
+      CHECK(verify(&s, NULL, NULL) == CAV_OK);
+      printf("joined %zu, order %d: momentum defect %.3g\n", i, order, s.verdict.momentum_defect_rms);
+      CHECK_NEAR(s.verdict.unactuated_force_max, 0, 1e-9);
+      CHECK(s.verdict.momentum_defect_rms < (order == CAV_ORDER_MOMENTUM ? 1e-9 : 1e-3));
+      // control
+      knot(&s, 30)[joined[i].control] += 1e-3;
+      CHECK(verify(&s, NULL, NULL) == CAV_OK);
+      CHECK(s.verdict.momentum_defect_rms > 0.01 && !s.verdict.certified);
+      sample_free(&s);
+    }
+  }
+}
+
 int main(void) {
   test_spin();
   test_tumble();
   test_held_roots();
   test_contact_balance();
+  test_joined();
   return check_result();
 }

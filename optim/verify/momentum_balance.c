@@ -3,14 +3,16 @@
 /// about the point c_t, both taken half way between knots (configuration q_t (+) h v_{t+1}/2, velocity v_{t+1}):
 ///   F = (P_{t+1/2} - P_{t-1/2})/h - m g - sum f
 ///   N = (L_{t+1/2} - L_{t-1/2})/h - sum ((p - c_t) x f + torque)
-/// over contacts with what is not of the tree, and what the model compensates of gravity. What is lost at one knot is lost
+/// over contacts and equality constraints (connect, weld, distance) with what is not of the tree, and what the model
+/// compensates of gravity. What is lost at one knot is lost
 /// for good: the momenta after a knot are those before the next. Of order h^2 for a motion sampled from the continuous
 /// one; zero to rounding for one that obeys the step of order momentum.
 /// A tree that joints hold to the world gets forces from there which no one measures: only what its root link can do
 /// freely is balanced. F and N/0.3 m are projected on the span of the motions of the root link's dofs that no actuator
 /// and no tendon acts on, seen at c; what those joints themselves exert (damping, springs, armature, limits, friction
-/// loss), and a residual force that the problem penalises, is accounted for. A free root gives all six components, a
-/// planar one (two slides and a hinge) three, a cart driven along its rail none: its defect is 0 by definition.
+/// loss, equality constraints of joints), and a residual force that is penalised, is accounted for. A free root
+/// gives all six components, a planar one (two slides and a hinge) three, a cart driven along its rail none: its defect
+/// is 0 by definition.
 /// Written for verification alone: momenta come from link poses and the motion subspaces, not from the inverse.
 #include <math.h>
 #include <stdlib.h>
@@ -239,6 +241,26 @@ static void apply_buoyancy(cav_balance *balance, const cav_verification *verific
   }
 }
 
+// takes out what an equality constraint between links does to the trees that it joins; those between joints act along
+// dofs (joint_force), those between tendons on dofs that are held
+static void apply_equality(cav_balance *balance, const cav_verification *verification, const cav_equality_rows *rows,
+                           const double *com) {
+  const cav_equality *equality = verification->model->equality + rows->equality;
+  const int joins = equality->type == CAV_EQUALITY_CONNECT || equality->type == CAV_EQUALITY_WELD ||
+                    equality->type == CAV_EQUALITY_DISTANCE;
+  if (!joins || balance->tree[equality->link[0]] == balance->tree[equality->link[1]]) return;
+  double force[3], torque[3] = {0};
+  for (int k = 0; k < 3; k++) {
+    force[k] = (rows->dim == 1 ? rows->normal[k] * rows->impulse[0] : rows->impulse[k]) / verification->h;
+    for (int i = 0; i < 3 && rows->dim == 6; i++)
+      torque[k] += rows->rotation[3 * i + k] * rows->impulse[3 + i] / verification->h;
+  }
+  for (int side = 0; side < 2; side++) {
+    const int tree = balance->tree[equality->link[side]];
+    if (tree >= 0) apply(balance, tree, com + 3 * tree, rows->point[side], force, torque, side ? -1 : 1);
+  }
+}
+
 // balance of every tree at knot t: linear, angular about the centre of mass, N and N m
 static void wrenches(cav_balance *balance, const cav_verification *verification, int t) {
   const cav_model *model = verification->model;
@@ -269,9 +291,12 @@ static void wrenches(cav_balance *balance, const cav_verification *verification,
     if (tree2 >= 0) apply(balance, tree2, now + 3 * tree2, contact->pos, force, torque, 1);
     if (tree1 >= 0) apply(balance, tree1, now + 3 * tree1, contact->pos, force, torque, -1);
   }
+  for (int i = 0; i < verification->state->nequality; i++)
+    apply_equality(balance, verification, verification->state->equality + i, now);
 }
 
-// what a root dof's own joint exerts along it at knot t: damping, spring, armature, limit, friction loss
+// what a root dof's own joint exerts along it at knot t: damping, spring, armature, limit, friction loss, and its
+// equality constraint with another joint
 static double joint_force(const cav_verification *verification, int dof, int t) {
   const cav_model *model = verification->model;
   const cav_joint *joint = model->joint + model->dof[dof].joint;
@@ -289,6 +314,14 @@ static double joint_force(const cav_verification *verification, int dof, int t) 
     if (row->type == CAV_ROW_FRICTION_DOF && row->object == dof) force += row->impulse / verification->h;
     if (row->type == CAV_ROW_LIMIT_JOINT && model->joint + row->object == joint) {
       force += row->axis[scalar ? 0 : dof - joint->dof] * row->impulse / verification->h;
+    }
+  }
+  for (int i = 0; i < verification->state->nequality; i++) {
+    const cav_equality_rows *rows = verification->state->equality + i;
+    const cav_equality *equality = model->equality + rows->equality;
+    for (int side = 0; side < 2 && equality->type == CAV_EQUALITY_JOINT; side++) {
+      if (equality->object[side] < 0 || model->joint + equality->object[side] != joint) continue;
+      force += (side ? -rows->derivative : 1) * rows->impulse[0] / verification->h;
     }
   }
   return force;

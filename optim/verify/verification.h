@@ -74,8 +74,8 @@ double cav_verification_effort_row(const cav_verification *verification, int act
 /// How many of these an actuator has, 1 or 2. actuator_check.c.
 int cav_verification_effort_rows(const cav_model *model, int actuator);
 
-/// Balance of momentum of every tree over all knots against gravity and contacts with what is not of the tree:
-/// root mean square and worst knot, fraction of weight. momentum_balance.c.
+/// Balance of momentum of every tree over all knots against gravity, contacts and equality constraints with what is not
+/// of the tree: root mean square and worst knot, fraction of weight. momentum_balance.c.
 typedef struct cav_balance cav_balance;
 cav_balance *cav_balance_new(const cav_verification *verification);
 void cav_balance_free(cav_balance *balance);
