@@ -508,6 +508,42 @@ says out "note: a free body falls by 1.23e+04 m in one step of 50 s: durations a
 run 0 inspect fast.xml
 check "of usual steps nothing is said" sh -c '! grep -q "falls by" out'
 
+# a start that breaks equality constraints of the model, by how much; one that keeps them, one that is free, a constraint as
+# soft as a spring
+cat >hung.xml <<'END'
+<mujoco><worldbody><body name="rod" pos="0 0 2"><freejoint name="root"/><geom type="capsule" fromto="0 0 0 0 0 -.4" size=".03"/>
+<body name="tail" pos="0 0 -.45"><joint name="bend" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -.2" size=".03"/></body></body>
+<body name="wheel" pos="1 0 0"><joint name="axle" axis="0 1 0"/><geom size=".1"/></body></worldbody>
+<equality><weld name="hook" body1="rod"/><joint joint1="bend" joint2="axle"/></equality>
+<actuator><motor joint="bend"/><motor joint="axle"/></actuator></mujoco>
+END
+off() { echo "<problem name='p' model='${2:-hung.xml}'><horizon duration='.2' timestep='.02'/>$1</problem>" >off.xml; }
+off "<start><root pos='1 0 2'/></start><goal/>"
+run 0 inspect off.xml
+says out "note: the start breaks the equality constraint <weld name='hook'> of 'rod' and 'world' by 1 m: the first steps are thrown"
+check "the goal keeps it" sh -c '! grep -q "note: the goal" out'
+run 1 solve off.xml --strategies 1 --threads 1 -o off
+says err "note: the start breaks the equality constraint <weld name='hook'> of 'rod' and 'world' by 1 m"
+run 1 explain off
+says out "note: the start breaks the equality constraint <weld name='hook'> of 'rod' and 'world' by 1 m"
+off "<start><root euler='0 30 0'/><joint name='axle' degrees='20'/></start>"
+run 0 inspect off.xml
+says out "m and 0.524 rad: the first steps are thrown"
+says out "note: the start breaks the equality constraint <joint> of 'bend' and 'axle' by 0.349 rad"
+off "<start/><goal><root pos='0 0 1'/></goal>"
+run 0 inspect off.xml
+says out "note: the goal breaks the equality constraint <weld name='hook'> of 'rod' and 'world' by 1 m: a motion is drawn off it"
+off "<start><root pos='.008 0 2'/><joint name='axle' degrees='2'/></start><goal/>"
+run 0 inspect off.xml
+check "what keeps them is not told of" sh -c '! grep -q "equality constraint <" out'
+off "<start free='true'><root pos='1 0 2'/></start><goal/>"
+run 0 inspect off.xml
+check "a free start is not told of" sh -c '! grep -q "equality constraint <" out'
+sed 's/body1="rod"/body1="rod" solref=".5 1"/' hung.xml >spring.xml
+off "<start><root pos='0 0 1.95'/></start><goal/>" spring.xml
+run 0 inspect off.xml
+check "nor is what a spring gives way by" sh -c '! grep -q "equality constraint <" out'
+
 # --- what Ipopt says is told, where it is there ---
 
 if "$cavort" solve problem.xml -o asked --solver ipopt --quiet >out 2>err || ! grep -q "has no Ipopt" err; then

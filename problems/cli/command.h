@@ -178,6 +178,10 @@ int cav_command_tell_stopped(FILE *out, const char *folder);
 /// Tells of a step in which bodies fall far: milliseconds, perhaps, where seconds are meant. inspect.c.
 void cav_command_tell_step(FILE *out, const cav_problem *problem);
 
+/// Tells which equality constraints of the model a start that is given, or a goal, breaks by more than their softness
+/// explains, a line each; their number. equalities.c.
+int cav_command_tell_equalities(FILE *out, const cav_problem *problem);
+
 /// Tells which solids of the world a motion leans on that neither its first nor its last knot touches. leaned_on.c.
 void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_trajectory *motion,
                               const cav_options *contact);

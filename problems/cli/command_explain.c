@@ -169,6 +169,7 @@ int cav_command_explain(const cav_command_line *line) {
   if (!status && !verdict.certified && verdict.achieved && cav_verdict_feasible(&verdict) && !result->problem->cycle.on)
     tell_remedy(result, &verdict, line->operand, missed, sizeof missed);
   int stopped = !status && cav_command_tell_stopped(line->json ? NULL : stdout, line->operand);
+  if (!status && !line->json && !verdict.certified) cav_command_tell_equalities(stdout, result->problem);
   if (!status && line->json) {
     printf("{\n  \"stopped\": %s,\n", stopped ? "true" : "false");
     printf(
