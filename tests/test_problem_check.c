@@ -60,9 +60,10 @@ static void refused(trial *t, cav_status status, const char *words) {
   } while (0)
 
 static void test_terms(void) {
-  REFUSED(mine->scale = 0, "positive scale and a weight that is not negative: term[10], 'mine'");
+  REFUSED(mine->scale = 0, "positive scale and a weight that is not negative, nor above 1e16: term[10], 'mine'");
   REFUSED(mine->weight = INFINITY, "positive scale");
   REFUSED(mine->weight = NAN, "positive scale");
+  REFUSED(mine->weight = 1e17, "nor above 1e16");
   REFUSED(mine->within = -1, "within");
   REFUSED(mine->within = NAN, "within");
   REFUSED(mine->from = NAN, "window");

@@ -68,13 +68,16 @@ static void check_broken_files(void) {
   refuse("<problem model='leg.xml'>\n<horizon duration='nan'/>\n<start/></problem>", 2, "duration");
   refuse("<problem model='leg.xml'>\n<horizon duration='-1'/>\n<start/></problem>", 2, "above 0");
   refuse("<problem model='leg.xml'>\n<horizon duration='1' timestep='.3'/>\n<start/></problem>", 2, "whole number");
-  refuse("<problem model='leg.xml'>\n<horizon duration='1' timestep='1e-9'/>\n<start/></problem>", 2, "steps");
+  refuse("<problem model='leg.xml'>\n<horizon duration='1' timestep='1e-9'/>\n<start/></problem>", 2,
+         "'timestep': expected 2 to 1e+06 steps");
+  refuse("<problem model='leg.xml'>\n<horizon duration='1' timestep='.7'/>\n<start/></problem>", 2,
+         "'timestep': expected 2 to 1e+06 steps of 0.7 s in a duration of 1 s, got 1.42857; shorten the step");
   refuse("<problem model='leg.xml'>\n<horizon duration='1' order='middle'/>\n<start/></problem>", 2, "midpoint");
   refuse(HEAD "<cast/>\n" TAIL, 4, "did you mean <cost>");
   refuse(HEAD "<guess type='interpolated'/>\n" TAIL, 4, "did you mean 'interpolate'");
   refuse(HEAD "<guess from='.1'/>\n" TAIL, 4, "apex");
   refuse(HEAD "<guess apex='-1'/>\n" TAIL, 4, "apex");
-  refuse(HEAD "<limits effort='1.5'/>\n" TAIL, 4, "effort");
+  refuse(HEAD "<limits effort='1.5'/>\n" TAIL, 4, "'effort': expected a number above 0, at most 1, got '1.5'");
   refuse(HEAD "<schedule stages='0'/>\n" TAIL, 4, "stages");
   refuse(HEAD "<ipopt max_itr='3'/>\n" TAIL, 4, "did you mean 'max_iter'");
   refuse(HEAD "<ipopt max_iter='3.5'/>\n" TAIL, 4, "expected a whole number of at least 0, got '3.5'");
@@ -138,6 +141,7 @@ static void check_broken_terms(void) {
   refuse_cost("<style/>", "name");
   refuse_cost("<effort/>", "weight");
   refuse_cost("<effort weight='-1'/>", "weight");
+  refuse_cost("<effort weight='1e300'/>", "expected a number from 0 to 1e+16, got 1e+300");
   refuse_cost("<effort weight='1' scale='0'/>", "scale");
   refuse_cost("<effort weight='1' lower='0'/>", "lower");
   refuse_cost("<slip weight='1' at='2'/>", "within the horizon");

@@ -412,6 +412,11 @@ sed 's/<joint name="knee" degrees="60"/<joint name="knee" pos="60"/' hop.xml >un
 run 2 inspect units.xml
 says err "joint 'knee' is at 60, outside its range 0 .. 2.6"
 says err "in degrees it would be in it: <joint name= degrees=>"
+# what was given in degrees is not told to be given in degrees
+sed 's/<joint name="knee" degrees="60"/<joint name="knee" degrees="155"/' hop.xml >units.xml
+run 2 inspect units.xml
+says err "joint 'knee' is at 2.70526, outside its range 0 .. 2.6"
+check "err is silent of degrees" sh -c '! grep -q "in degrees" err'
 run 0 solve hop.xml --threads 1
 says err 'strategy near-1   with <force weight="1"/>'
 says out 'strategy repaired: not as the problem states it, but with <force weight="1"/>'

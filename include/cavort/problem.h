@@ -424,6 +424,10 @@ CAV_API cav_status cav_configuration_to_floor(const cav_model *model, cav_state 
 /// outside.
 CAV_API int cav_configuration_clip(const cav_model *model, double *q);
 
+/// Largest weight of a cost and of a free duration: beside a cost of that size, and so with 16 digits, one of weight 1 is lost
+/// in rounding. What has to hold exactly is a constraint.
+#define CAV_WEIGHT_MOST 1e16
+
 /// Weights, schedule and options that serve all motions; the caller sets duration, start, goal and terms. Owns nothing.
 CAV_API cav_problem cav_problem_default(const cav_model *model);
 

@@ -10,6 +10,10 @@ cav_status cav_problem_real(const cav_problem_reader *reader, const cav_xml_node
   if (!cav_xml_get(node, name)) return CAV_OK;
   double given = cav_xml_real(node, name, 0);
   if (given < least || given > most) {
+    if (most < DBL_MAX && least == DBL_MIN) {
+      return cav_xml_fail(reader->error, node, name, "expected a number above 0, at most %g, got '%s'", most,
+                          cav_xml_text(node, name, ""));
+    }
     if (most < DBL_MAX) {
       return cav_xml_fail(reader->error, node, name, "expected a number from %g to %g, got '%s'", least, most,
                           cav_xml_text(node, name, ""));

@@ -204,7 +204,7 @@ static const cav_xml_element track_frame = {
 #define TERM_CONTACTS(use) ATTRIBUTES(TEXT("body", "(all contacts)", "contacts of this body's link alone; such a term is added to the default one. Of force also a body that is fixed to the world: what should not be touched"), WINDOW, use), NULL
 
 #define COST                                                                                                           \
-  REAL("weight", 1, "", NULL, "the cost is weight/2 times the squared residual, integrated over the window in s, or at one knot as it is; 0 removes a default"), \
+  REAL("weight", 1, "", NULL, "the cost is weight/2 times the squared residual, integrated over the window in s, or at one knot as it is; 0 removes a default; at most 1e16"), \
   WORD("norm", cav_problem_norms, "square", "square: x^2/2 of each residual x; absolute: sqrt(1 + x^2) - 1, linear far beyond the scale")
 #define COST_ELEMENT(quantity, element, of, reads, hard, unit, words, text) \
   static const cav_xml_element cost_##element = {#element, 0, 0, TERM_##of(COST), 0, text};

@@ -265,3 +265,19 @@ static cav_status read_pose(const cav_problem_reader *reader, const cav_xml_node
 cav_status cav_problem_pose(const cav_problem_reader *reader, const cav_xml_node *node, double *q) {
   return read_pose(reader, node, 0, q);
 }
+
+static int in_degrees(const cav_problem_reader *reader, const cav_xml_node *node, int joint, int depth) {
+  int stated = 0, degrees = 0;
+  const cav_xml_node *child = cav_problem_child(node, "joint");
+  for (; child; child = cav_xml_next(child)) {
+    if (cav_problem_find(reader, child, "name", CAV_OBJECT_JOINT) != joint) continue;
+    stated = 1;
+    degrees = cav_xml_get(child, "degrees") != NULL;
+  }
+  const cav_xml_node *pose = pose_named(reader, cav_xml_text(node, "key", ""));
+  return stated || !pose || depth >= DEEPEST ? degrees : in_degrees(reader, pose, joint, depth + 1);
+}
+
+int cav_problem_in_degrees(const cav_problem_reader *reader, const cav_xml_node *node, int joint) {
+  return in_degrees(reader, node, joint, 0);
+}

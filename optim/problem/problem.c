@@ -223,8 +223,11 @@ static cav_status read_horizon(const cav_problem_reader *reader) {
   if (status) return status;
   double steps = p->duration / p->timestep;
   if (!(steps >= 2 - whole_step && steps < most_knots)) {
-    return cav_xml_fail(reader->error, node, "duration", "expected 2 to %g steps of %g s, got %g", most_knots,
-                        p->timestep, steps);
+    // of the two numbers the one that the file states; of both the step, which is that of numerics
+    const int step = cav_xml_get(node, "timestep") != NULL;
+    return cav_xml_fail(reader->error, node, step ? "timestep" : "duration",
+                        "expected 2 to %g steps of %g s in a duration of %g s, got %g%s", most_knots, p->timestep,
+                        p->duration, steps, steps < 2 ? "; shorten the step or give more time" : "");
   }
   if (fabs(steps - round(steps)) > whole_step) {
     return cav_xml_fail(reader->error, node, "duration",
@@ -236,7 +239,7 @@ static cav_status read_horizon(const cav_problem_reader *reader) {
   if (cav_knots_plannable(round(steps) + 1, smallest_tree(reader->model), &needs) != CAV_OK)
     return cav_xml_fail(reader->error, node, "duration", "%s", needs.text);
   double range[2];
-  status = cav_problem_real(reader, node, "weight", 0, DBL_MAX, &p->duration_weight);
+  status = cav_problem_real(reader, node, "weight", 0, CAV_WEIGHT_MOST, &p->duration_weight);
   if (status) return status;
   if (cav_xml_reals(node, "range", range, 2)) {
     if (!(range[0] > 0 && range[0] <= p->duration && p->duration <= range[1]))
@@ -295,7 +298,8 @@ static cav_status check_ranges(const cav_problem_reader *reader, const cav_xml_n
     }
     if (value < least - slack || value > joint->range[1] + slack) {
       const double turned = value * M_PI / 180;
-      const int degrees = joint->type == CAV_JOINT_HINGE && turned >= least && turned <= joint->range[1];
+      const int degrees = joint->type == CAV_JOINT_HINGE && turned >= least && turned <= joint->range[1] &&
+                          !cav_problem_in_degrees(reader, node, j);
       return cav_xml_fail(
           reader->error, node, NULL,
           "joint '%s' is at %g, outside its range %g .. %g (rad or m); ranges='clip' would bring it in%s", joint->name,

@@ -31,8 +31,8 @@ static cav_status check_horizon(const cav_problem *p, cav_error *error) {
   if (p->duration_most != 0 && !(p->duration_least > 0 && p->duration_most >= p->duration_least &&
                                  p->duration >= p->duration_least && p->duration <= p->duration_most))
     wrong = "a free duration needs duration between duration_least, above 0, and duration_most";
-  else if (!(p->duration_weight >= 0))
-    wrong = "duration_weight must not be negative";
+  else if (!(p->duration_weight >= 0 && p->duration_weight <= CAV_WEIGHT_MOST))
+    wrong = "duration_weight must not be negative, nor above 1e16";
   else if (!(p->window >= 0) || !(p->overlap >= 0) ||
            (p->window > 0 && !(p->overlap <= p->window - 2 * p->timestep * (1 - near_step))))
     wrong = "windows need an overlap that is shorter than they are by two steps";
@@ -250,8 +250,8 @@ static const char *wrong_track(const cav_problem *p, const cav_term *term) {
 
 static const char *wrong_number(const cav_problem *p, const cav_term *term) {
   double end = term->to < 0 ? p->duration : term->to;
-  if (!(term->scale > 0) || !(term->weight >= 0) || !isfinite(term->scale) || !isfinite(term->weight))
-    return "needs a positive scale and a weight that is not negative";
+  if (!(term->scale > 0) || !(term->weight >= 0) || !isfinite(term->scale) || !(term->weight <= CAV_WEIGHT_MOST))
+    return "needs a positive scale and a weight that is not negative, nor above 1e16";
   if (!(term->from >= 0) || !(end >= term->from) || !(term->from <= p->duration * (1 + near_step)))
     return "has a window that ends before it begins, or begins after the horizon";
   double h = p->timestep;

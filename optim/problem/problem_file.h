@@ -73,6 +73,9 @@ int cav_problem_find_frame(const cav_problem_reader *reader, const cav_xml_node 
 /// Configuration q [nq] of <start>, <goal> or <pose>, from keyframes, numbers, a trajectory and joint values. pose.c.
 cav_status cav_problem_pose(const cav_problem_reader *reader, const cav_xml_node *node, double *q);
 
+/// Whether a posture, or the <pose> that it names, states a joint by degrees=. pose.c.
+int cav_problem_in_degrees(const cav_problem_reader *reader, const cav_xml_node *node, int joint);
+
 /// Velocity v [nv] at the knot that a node takes its posture from. pose.c.
 cav_status cav_problem_pose_velocity(const cav_problem_reader *reader, const cav_xml_node *node, double *v);
 

@@ -537,8 +537,10 @@ static cav_status read_use(const cav_problem_reader *reader, const cav_xml_node 
   term->norm = hard ? CAV_NORM_SQUARE : (cav_norm)cav_xml_word(node, "norm", term->norm);
   if (term->lower > term->upper)
     return cav_xml_fail(reader->error, node, "lower", "%g lies above 'upper', %g", term->lower, term->upper);
-  if (term->weight < 0)
-    return cav_xml_fail(reader->error, node, "weight", "expected a number of 0 or more, got %g", term->weight);
+  if (!(term->weight >= 0 && term->weight <= CAV_WEIGHT_MOST))
+    return cav_xml_fail(reader->error, node, "weight",
+                        "expected a number from 0 to %g, got %g; what has to hold exactly is a term of <constraint>",
+                        CAV_WEIGHT_MOST, term->weight);
   if (!(term->scale > 0))
     return cav_xml_fail(reader->error, node, "scale", "expected a number above 0, got %g", term->scale);
   return read_within(reader, node, term);
