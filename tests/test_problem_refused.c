@@ -123,6 +123,7 @@ static void check_broken_starts(void) {
   refuse_start("<start file='absent.csv'/>", "absent.csv");
   refuse_start("<start><joint name='ankle' pos='1'/></start>", "no joint of that name");
   refuse_start("<start><joint name='kne' pos='1'/></start>", "did you mean 'knee'");
+  refuse_start("<start><joint name='NE' pos='1'/></start>", "has no joint of that name, got 'NE'; it has knee");
   refuse_start("<start><joint name='knee'/></start>", "one of the attributes");
   refuse_start("<start><joint name='knee' pos='0' degrees='0'/></start>", "one of the attributes");
   refuse_start("<start><joint name='x' degrees='10'/></start>", "slides");
@@ -143,7 +144,11 @@ static void check_broken_terms(void) {
   refuse_cost("<effort weight='-1'/>", "weight");
   refuse_cost("<effort weight='1e300'/>", "expected a number from 0 to 1e+16, got 1e+300");
   refuse_cost("<effort weight='1' scale='0'/>", "scale");
-  refuse_cost("<effort weight='1' lower='0'/>", "lower");
+  refuse_cost("<effort weight='1' lower='0'/>", "not known here; remove it");
+  refuse_cost("<velocity weight='1' lower='0'/>",
+              "'lower': not known here; it belongs to <velocity> inside <constraint>");
+  refuse_constraint("<velocity upper='1' weight='1'/>",
+                    "'weight': not known here; it belongs to <velocity> inside <cost>");
   refuse_cost("<slip weight='1' at='2'/>", "within the horizon");
   refuse_cost("<slip weight='1' at='later'/>", "'end'");
   refuse_cost("<slip weight='1' at='.5' from='.1'/>", "contradicts");

@@ -1,9 +1,11 @@
 /// Complaints about XML files: place, element and attribute before the text, and what a misspelt or renamed name may
 /// have meant. What is wrong is found elsewhere; here it is said, and the reader of the file told to stop.
 #include <assert.h>
+#include <ctype.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 #include "xml_parts.h"
 
@@ -103,6 +105,35 @@ static void list_names(char *text, size_t room, const char *const *names) {
   }
 }
 
+static int is_part_of(const char *part, size_t length, const char *name) {
+  for (; *name; name++)
+    if (!strncasecmp(name, part, length)) return 1;
+  return 0;
+}
+
+static int holds_parts(const char *word, const char *name) {
+  int parts = 0;
+  while (*word) {
+    size_t length = 0;
+    while (isalnum((unsigned char)word[length])) length++;
+    if (length && !is_part_of(word, length, name)) return 0;
+    parts += length > 1;
+    word += length ? length : 1;
+  }
+  return parts > 0;
+}
+
+void cav_xml_alike(const char *word, const void *names, int n, size_t stride, char *text, size_t room) {
+  const char *found[9];
+  int count = 0;
+  for (int i = 0; i < n && count < 8; i++) {
+    const char *name = *(const char *const *)((const char *)names + (size_t)i * stride);
+    if (name && *name && holds_parts(word, name)) found[count++] = name;
+  }
+  found[count] = NULL;
+  list_names(text, room, found);
+}
+
 // --- names that no table knows ---
 
 // what a child or an attribute is called now that was called name before; NULL if none was
@@ -111,6 +142,21 @@ static const char *renamed(const cav_xml_source *s, const char *inside, const ch
     if (f->attribute == attribute && !strcmp(f->inside, inside) && !strcmp(f->was, name)) return f->now;
   }
   return NULL;
+}
+
+// the element under which one of the same name knows an attribute that this one does not; NULL: none. Tables hold themselves,
+// such as bodies in bodies: sought so deep alone
+static const cav_xml_element *known_under(const cav_xml_element *parent, const cav_xml_element *rule, const char *name,
+                                          int deep) {
+  const cav_xml_element *const *child = parent->child;
+  for (int i = 0; child && child[i]; i++) {
+    if (child[i] == rule || strcmp(child[i]->name, rule->name)) continue;
+    for (const cav_xml_attribute *a = child[i]->attribute; a && a->name; a++)
+      if (!strcmp(a->name, name)) return parent;
+  }
+  const cav_xml_element *under = NULL;
+  for (int i = 0; child && child[i] && deep && !under; i++) under = known_under(child[i], rule, name, deep - 1);
+  return under;
 }
 
 void cav_xml_unknown_attribute(cav_xml_source *s, int line, const cav_xml_element *rule, const char *name) {
@@ -123,7 +169,12 @@ void cav_xml_unknown_attribute(cav_xml_source *s, int line, const cav_xml_elemen
   int n = 0;
   while (a && a[n].name) n++;
   const char *near = n ? cav_xml_nearest(name, a, n, sizeof *a) : NULL;
-  if (near)
+  const cav_xml_element *under = NULL, *const *root = s->reader->roots;
+  for (int i = 0; root && root[i] && !under; i++) under = known_under(root[i], rule, name, 2);
+  if (under)
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name, "not known here; it belongs to <%s> inside <%s>",
+                        rule->name, under->name);
+  else if (near)
     cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name, "not known here; did you mean '%s'?", near);
   else
     cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name, "not known here; remove it or check its spelling");

@@ -122,7 +122,7 @@ static void refuse_name(const cav_problem_reader *reader, const cav_xml_node *no
   size_t stride = 0;
   const void *names = cav_object_names(m, type, &n, &stride);
   const char *near = n ? cav_xml_nearest(first, names, n, stride) : NULL, *role_name[CAV_ROLE_TYPES];
-  char known[480] = "", parts[240];
+  char known[480] = "", parts[240], alike[200] = "";
   if (roles) {
     for (int r = 0; r < CAV_ROLE_TYPES; r++) role_name[r] = cav_role_name((cav_role)r);
     if (!near && cav_role_named(first) == CAV_ROLE_TYPES)
@@ -130,9 +130,13 @@ static void refuse_name(const cav_problem_reader *reader, const cav_xml_node *no
     cav_roles_list(roles, parts, sizeof parts);
     snprintf(known, sizeof known, "; roles found (%s): %s", cav_build_name(roles->build), *parts ? parts : roles->why);
   }
+  if (!near && n) cav_xml_alike(first, names, n, stride, alike, sizeof alike);
   cav_xml_fail(reader->error, node, attribute, "the model '%s' has no %s of that name, got '%.200s'%s%s%s%s", m->name,
-               kind, cav_xml_text(node, attribute, ""), near ? "; did you mean '" : "", near ? near : "",
-               near ? "'?" : "", known);
+               kind, cav_xml_text(node, attribute, ""),
+               near     ? "; did you mean '"
+               : *alike ? "; it has "
+                        : "",
+               near ? near : alike, near ? "'?" : "", known);
 }
 
 /// A search among the objects of a model by a list of names, separated by |, which it cuts.
@@ -189,9 +193,14 @@ int cav_object_named(const cav_model *model, cav_state *state, const char *names
     size_t stride = 0;
     const void *known = cav_object_names(model, *type, &n, &stride);
     const char *near = n ? cav_xml_nearest(s.first, known, n, stride) : NULL;
-    cav_file_fail(error, CAV_BAD_INPUT, 0, "the model '%.100s' has no %s of that name, got '%.100s'%s%.100s%s",
-                  model->name, cav_object_kind_of(*type)->text, names, near ? "; did you mean '" : "", near ? near : "",
-                  near ? "'?" : "");
+    char alike[200] = "";
+    if (!near && n) cav_xml_alike(s.first, known, n, stride, alike, sizeof alike);
+    cav_file_fail(error, CAV_BAD_INPUT, 0, "the model '%.100s' has no %s of that name, got '%.100s'%s%.200s%s",
+                  model->name, cav_object_kind_of(*type)->text, names,
+                  near     ? "; did you mean '"
+                  : *alike ? "; it has "
+                           : "",
+                  near ? near : alike, near ? "'?" : "");
   }
   *type = s.type;
   free(copy);
