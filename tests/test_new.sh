@@ -75,6 +75,9 @@ if [ "$n" -gt 0 ]; then
   grep -q "impossible: nothing can hold 'trunk' up: there is no floor" "$work/err" || fail "a fall is not told"
 fi
 
+# of a file scene.xml, as those of many models are, the name of the model
+sed 's/<mujoco model="[^"]*"/<mujoco model="tall man scene"/' problems/models/humanoid.xml >"$work/scene.xml"
+"$cavort" new "$work/scene.xml" -o "$work/named.xml" -q && grep -q 'problem name="tall-man-first" model=' "$work/named.xml" || fail "the name of a scene"
 # as another motion
 "$cavort" new problems/models/humanoid.xml --like squat-jump -o "$work/like.xml" >"$work/out" || fail "like squat-jump"
 grep -q 'problem name="humanoid-squat-jump" model=' "$work/like.xml" || fail "like squat-jump: its name"

@@ -222,6 +222,10 @@ static void check_refusals(void) {
   refuse(model, "time,qpos_x\n0,0\n.1,\n", 3, "finite");
   refuse(model, "time,qpos_x\n0,0\n.1,0\n.25,0\n", 3, "equal");
   refuse(model, "time,qpos_x\n0,0\n-.1,0\n", 2, "increasing");
+  // rows 4 to 6 are gone; row 2 alone is late, of steps as the last
+  refuse(model, "time,qpos_x\n0,0\n.1,0\n.2,0\n.6,0\n.7,0\n.8,0\n", 5,
+         "row 4 comes 0.4 s after the one before, other rows 0.1 s");
+  refuse(model, "time,qpos_x\n0,0\n.5,0\n.6,0\n.7,0\n.8,0\n", 3, "row 2 comes 0.5 s after");
   // of an open end no force is told: empty, read as 0
   cav_trajectory *open = cav_trajectory_new(model, 3, 0.1);
   open->u[0] = open->u[1] = 7;

@@ -15,6 +15,7 @@
 #include "file.h"
 #include "xml.h"
 
+static const double uneven_step = 1e-3;      // of a step: by how much one may differ and be as the others
 static const double uneven_most = 1e-6;      // of a step: how far a row's time may be from its knot's
 static const double quaternion_most = 1e-3;  // how far from unit length a quaternion may be before it is an error
 static const double quaternion_unit = 1e-12; // how near to unit length it stays as it was written
@@ -242,6 +243,44 @@ static cav_status match(const cav_table *table, const columns *c, const cav_mode
   return CAV_OK;
 }
 
+static double time_of(const cav_table *table, int column, int row) {
+  return table->value[(size_t)row * (size_t)table->ncol + (size_t)column];
+}
+
+// the first row that does not come after the one before as most rows do, by the first step or else the last; 0: most rows
+// keep to neither. *usual: their step
+static int jump_of(const cav_table *table, int column, double *usual) {
+  int n = table->nrow;
+  for (int last = 0; last < 2; last++) {
+    int from = last ? n - 2 : 0, odd = 0, first = 0;
+    *usual = time_of(table, column, from + 1) - time_of(table, column, from);
+    for (int i = 1; i < n; i++) {
+      double step = time_of(table, column, i) - time_of(table, column, i - 1);
+      if (fabs(step - *usual) <= uneven_step * *usual) continue;
+      if (!odd++) first = i;
+    }
+    if (*usual > 0 && 2 * odd < n - 1) return first;
+  }
+  return 0;
+}
+
+static void tell_uneven(const cav_table *table, int column, int row, double off, cav_error *error) {
+  double usual;
+  int jump = jump_of(table, column, &usual);
+  if (!jump) {
+    cav_file_fail(error, CAV_BAD_INPUT, table->line[row],
+                  "%s:%d: column 'time': expected rows at equal, increasing times; row %d is %g s off", table->path,
+                  table->line[row], row + 1, off);
+    return;
+  }
+  double step = time_of(table, column, jump) - time_of(table, column, jump - 1);
+  cav_file_fail(
+      error, CAV_BAD_INPUT, table->line[jump],
+      "%s:%d: column 'time': expected rows at equal, increasing times; row %d comes %g s after the one before, "
+      "other rows %g s: rows are missing, or too many",
+      table->path, table->line[jump], jump + 1, step, usual);
+}
+
 // the step, and that all rows keep to it; 0 on failure
 static double step_of(const cav_table *table, int column, cav_error *error) {
   if (table->nrow < 2) {
@@ -255,9 +294,7 @@ static double step_of(const cav_table *table, int column, cav_error *error) {
   for (int i = 0; i < table->nrow; i++) {
     double off = time[(size_t)i * (size_t)table->ncol] - first - i * h;
     if (!(h > 0) || !(fabs(off) <= uneven_most * h)) {
-      cav_file_fail(error, CAV_BAD_INPUT, table->line[i],
-                    "%s:%d: column 'time': expected rows at equal, increasing times; row %d is %g s off", table->path,
-                    table->line[i], i + 1, off);
+      tell_uneven(table, column, i, off, error);
       return 0;
     }
   }

@@ -1,10 +1,12 @@
 /// cavort new: a problem file for a model, with the model's own joints, bodies and postures in a comment. Of what suits the
 /// model the first is taken that is read back without a complaint and is not proven impossible; with --like a motion of the
 /// project, or any problem file, with the model in its place.
+#include <ctype.h>
 #include <dirent.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <unistd.h>
 
 #include "command.h"
@@ -22,6 +24,24 @@ enum { NPLACE = sizeof places / sizeof *places, MOTIONS = 256 };
 static void base_of(const char *path, char out[128]) {
   const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path, *dot = strrchr(name, '.');
   snprintf(out, 128, "%.*s", dot && dot > name ? (int)(dot - name) : (int)strlen(name), name);
+}
+
+// the name of a model as that of a file, without "scene" at its end; as it was where none is left. For files that are called
+// scene*.xml, as those of many models are
+static void name_of(const cav_model *model, char base[128]) {
+  static const char usual[] = "scene";
+  char name[128];
+  int n = 0;
+  if (strncmp(base, usual, sizeof usual - 1)) return;
+  for (const char *c = model->name; *c && n < 127; c++) {
+    const int fits = isalnum((unsigned char)*c) || strchr("_-.", *c);
+    if (fits || (n && name[n - 1] != '-')) name[n++] = fits ? *c : '-';
+  }
+  name[n] = 0;
+  const int scene = n - (int)(sizeof usual - 1);
+  if (scene >= 0 && !strcasecmp(name + scene, usual)) n = scene;
+  while (n && strchr("_-.", name[n - 1])) n--;
+  if (n) snprintf(base, 128, "%.*s", n, name);
 }
 
 // whether a problem file can be read (loads) and is not proven impossible
@@ -221,16 +241,18 @@ int cav_command_new(const cav_command_line *line) {
   char base[128], name[200], path[220];
   cav_load_options options = cav_load_options_default();
   options.floating = line->floating;
+  cav_model *model = cav_model_load_with(line->operand, &options, &error);
+  if (!model) return cav_command_fail(&error);
   base_of(line->operand, base);
+  name_of(model, base);
   snprintf(name, sizeof name, "%s-%.60s", base, line->like && !strchr(line->like, '/') ? line->like : "first");
   snprintf(path, sizeof path, "%s.xml", name);
   const char *to = line->output ? line->output : path;
   if (access(to, F_OK) == 0) {
+    cav_model_free(model);
     cav_file_fail(&error, CAV_BAD_INPUT, 0, "%s: is there already; choose another name: -o FILE", to);
     return cav_command_fail(&error);
   }
-  cav_model *model = cav_model_load_with(line->operand, &options, &error);
-  if (!model) return cav_command_fail(&error);
   cav_status status = write_new(line, model, name, to, &error);
   cav_model_free(model);
   return status ? cav_command_fail(&error) : CAV_EXIT_CERTIFIED;
