@@ -421,6 +421,12 @@ run 0 solve hop.xml --threads 1
 says err 'strategy near-1   with <force weight="1"/>'
 says out 'strategy repaired: not as the problem states it, but with <force weight="1"/>'
 says hop.result/strategies.csv "near-1,1,certified"
+says out "strategies were tried, in "
+says hop.result/forces.csv ",geom 1 of world,"
+run 0 table hop.result --csv
+check "the table's seconds are of all that was tried" awk -F , 'NR == FNR { if (FNR > 1) all += $6; next } FNR > 1 { exit !($9 > 0.9 * all && $9 < 1.1 * all) }' hop.result/strategies.csv out
+run 0 verify hop.result
+says out "strategies were tried, in "
 says hop.result/strategies.csv "soft,0,not tried"
 says hop.result/verdict.json '"repaired": "<force weight=\"1\"/>"'
 says hop.result/problem.xml "<force "
@@ -438,6 +444,11 @@ says out 'cause: forces, limits and constraints hold at the knots, but between t
 sed 's/^stated,1,not certified,\(.*\),"",/stated,1,not certified,\1,"<force weight='"'1'"'\/>",/' rough/strategies.csv >tried && mv tried rough/strategies.csv
 run 1 explain rough
 says out 'A usual remedy that was not tried: timestep="0.01".'
+# one that was being tried when the solve was stopped, of what was kept
+{ sed -n '1p' rough/strategies.csv; echo 'stated,0,not certified,,,,,,"",""'; sed 's/^stated/near-1/; 1d' rough/strategies.csv | sed -n 1p
+  echo "near-2,0,stopped,,,,,,\"timestep='0.01', <force weight='1'/>\",\"\""; } >tried && mv tried rough/strategies.csv
+run 1 explain rough
+says out 'A usual remedy that was being tried when the solve was stopped: timestep="0.01".'
 
 # a jump that does not pay, of a leg that cannot fall over: certified, and why it is not achieved
 cat >jumper.xml <<'END'

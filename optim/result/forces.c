@@ -116,12 +116,9 @@ cav_forces *cav_forces_new(const cav_model *model, const cav_trajectory *traject
   return NULL;
 }
 
-// name of a geom, or its number where it has none
 static void write_geom(FILE *out, const cav_model *model, int geom) {
-  if (model->geom[geom].name[0])
-    cav_table_write_text(out, model->geom[geom].name);
-  else
-    fprintf(out, "#%d", geom);
+  char label[CAV_GEOM_LABEL];
+  cav_table_write_text(out, cav_geom_label(model, geom, label));
 }
 
 cav_status cav_forces_write(const char *path, const cav_model *model, const cav_trajectory *trajectory,

@@ -4,7 +4,7 @@
 
 #include "cavort/result.h"
 
-/// Writes forces.csv: knot, time, geoms by name (or #number), position, force on the second geom, gap. Replaces
+/// Writes forces.csv: knot, time, geoms by name (or "geom 2 of BODY"), position, force on the second geom, gap. Replaces
 /// atomically.
 cav_status cav_forces_write(const char *path, const cav_model *model, const cav_trajectory *trajectory,
                             const cav_forces *forces, cav_error *error);

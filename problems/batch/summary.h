@@ -13,11 +13,16 @@ typedef struct cav_summary {
   char motion[128], model[128];
   int known; ///< 1: there is a verdict, and the numbers are its
   int certified, achieved;
-  double cost, optimality, iterations, seconds; ///< NaN: not recorded
-  char cause[CAV_SUMMARY_TEXT];                 ///< the first one why it is not certified and achieved; "": it is
+  double cost, optimality, iterations; ///< of the motion that was kept; NaN: not recorded
+  double seconds;                      ///< of all strategies that were tried; NaN: not recorded
+  char cause[CAV_SUMMARY_TEXT];        ///< the first one why it is not certified and achieved; "": it is
 } cav_summary;
 
-/// What a result folder says; where it has no verdict, known is 0 and cause says so.
+/// Seconds of all strategies of a folder's strategies.csv that led to a motion, one after the other; *n of them, 0: none are
+/// known.
+double cav_summary_tried(const char *folder, int *n);
+
+/// What a result folder says; seconds of all strategies that were tried; where it has no verdict, known is 0 and cause says so.
 void cav_summary_read(const char *folder, cav_summary *summary);
 
 /// The same of a batch's problem NAME in a folder: its result, and what its record says where that has no verdict or is

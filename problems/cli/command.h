@@ -168,6 +168,9 @@ cav_tried cav_tried_open(const char *folder);
 int cav_tried_next(cav_tried *tried);
 void cav_tried_close(cav_tried *tried);
 
+/// Tells how many strategies a folder's solve tried, and in how many seconds, where they are more than one. tried.c.
+void cav_command_tell_tried(FILE *out, const char *folder);
+
 /// Time of a clock, s: CLOCK_MONOTONIC, CLOCK_PROCESS_CPUTIME_ID.
 double cav_command_clock(clockid_t clock);
 

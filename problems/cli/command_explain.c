@@ -100,18 +100,34 @@ static char *told_of_repair(const char *folder) {
   return told;
 }
 
-// whether a strategy of the folder's solve made these changes
-static int was_tried(const char *folder, const char *changes) {
+typedef enum trial { NOT_TRIED, TRIED, STOPPED } trial;
+
+// whether a line's changes, in whose place of " stands ', begin with these; what follows, NULL: they do not
+static const char *after(const char *line, const char *changes) {
+  for (; *changes; changes++, line++)
+    if (*line != (*changes == '"' ? '\'' : *changes)) return NULL;
+  return line;
+}
+
+// whether a strategy of the folder's solve made these changes of the folder's problem, or was stopped while it did
+static trial was_tried(const char *folder, const char *changes) {
+  trial what = NOT_TRIED;
   cav_tried t = cav_tried_open(folder);
-  int tried = 0;
-  while (!tried && cav_tried_next(&t)) {
-    // quotes within are written as single ones; a solid's growth is of the folder's problem already
-    size_t n = strlen(changes);
-    tried = strlen(t.changed) >= n && (!t.changed[n] || !strcmp(t.changed + n, ", solids='grow'"));
-    for (size_t i = 0; tried && changes[i]; i++) tried = t.changed[i] == (changes[i] == '"' ? '\'' : changes[i]);
+  char *kept = NULL;
+  while (!kept && cav_tried_next(&t))
+    if (t.kept) kept = strdup(t.changed);
+  cav_tried_close(&t);
+  t = cav_tried_open(folder);
+  while (what == NOT_TRIED && cav_tried_next(&t)) {
+    const char *rest = after(t.changed, changes);
+    if (!rest) continue;
+    // a solid's growth and what the kept motion changed are of the folder's problem already
+    if (kept && *kept && !strncmp(rest, ", ", 2) && after(rest + 2, kept)) rest = after(rest + 2, kept);
+    if (!*rest || !strcmp(rest, ", solids='grow'")) what = strcmp(t.outcome, "stopped") ? TRIED : STOPPED;
   }
   cav_tried_close(&t);
-  return tried;
+  free(kept);
+  return what;
 }
 
 // times what a certificate allows from which on a defect of momentum may be that of a motion that no body can do
@@ -122,6 +138,7 @@ static void tell_remedy(const cav_result *result, const cav_verdict *verdict, co
                         size_t size) {
   cav_strategy strategy[CAV_STRATEGIES], repaired;
   int n = 0, found = 1;
+  trial tried = NOT_TRIED;
   if (cav_strategy_list(result->problem, strategy, &n) || n == 0) return;
   int said = snprintf(text, size, "how it is planned, not what is asked: forces, limits and constraints hold. ");
   const double defect = verdict->momentum_defect_rms / CAV_TOLERANCE_MOMENTUM;
@@ -134,11 +151,12 @@ static void tell_remedy(const cav_result *result, const cav_verdict *verdict, co
         defect);
   for (int k = 0; found; k++) {
     if (cav_strategy_repair(result->problem, &strategy[0], verdict, k, &repaired, &found)) return;
-    if (!found || (*repaired.changed && !was_tried(folder, repaired.changed))) break;
+    if (!found || (*repaired.changed && (tried = was_tried(folder, repaired.changed)) != TRIED)) break;
     cav_strategy_clear(&repaired);
   }
   if (found)
-    snprintf(text + said, size - (size_t)said, "A usual remedy that was not tried: %s.", repaired.changed);
+    snprintf(text + said, size - (size_t)said, "A usual remedy that %s: %s.",
+             tried == STOPPED ? "was being tried when the solve was stopped" : "was not tried", repaired.changed);
   else
     snprintf(text + said, size - (size_t)said,
              "The usual remedies were tried (strategies.csv): more time, or another way by postures (<waypoint> in "

@@ -315,6 +315,8 @@ static int solve_from(const cav_command_line *line, const cav_problem *problem, 
   }
   int tried = 0;
   for (int i = 0; i < race.n; i++) tried += race.entry[i].state == CAV_RACE_DONE;
+  if (race.tell && best >= 0 && tried > 1 && !status && !line->json && !interrupted)
+    cav_command_tell_tried(stdout, folder);
   if (race.tell && best >= 0 && tried > 1)
     fprintf(stderr, "kept: strategy %s, of %d tried in %.1f s\n", race.entry[best].strategy.name, tried,
             cav_command_clock(CLOCK_MONOTONIC) - begun);

@@ -41,6 +41,7 @@ int cav_command_verify(const cav_command_line *line) {
   if (!status && !line->json && !line->quiet) {
     cav_command_tell_stopped(stdout, line->operand);
     cav_certificate_print(stdout, result->problem, &verdict, terms);
+    cav_command_tell_tried(stdout, line->operand);
     if (verdict.certified)
       cav_command_tell_leaning(stdout, result->problem, result->trajectory, &result->problem->contact);
   }

@@ -5,6 +5,7 @@
 
 #include "command.h"
 #include "result.h"
+#include "summary.h"
 
 cav_tried cav_tried_open(const char *folder) {
   char *path = cav_result_path(folder, "strategies.csv");
@@ -35,6 +36,14 @@ void cav_tried_close(cav_tried *t) {
   if (t->in) fclose(t->in);
   free(t->line);
   *t = (cav_tried){0};
+}
+
+void cav_command_tell_tried(FILE *out, const char *folder) {
+  int n;
+  double seconds = cav_summary_tried(folder, &n);
+  if (n > 1)
+    fprintf(out, "%d strategies were tried, in %.1f s one after the other; this is the one that was kept\n", n,
+            seconds);
 }
 
 int cav_command_tell_stopped(FILE *out, const char *folder) {
