@@ -450,6 +450,21 @@ says out 'A usual remedy that was not tried: timestep="0.01".'
 run 1 explain rough
 says out 'A usual remedy that was being tried when the solve was stopped: timestep="0.01".'
 
+# a ball that is meant in the air: what brings it down is told, and what leaves it there
+cat >toss.xml <<'END'
+<problem name="toss" model="monopod.xml"><scene><body name="ball" pos="2 0 1.2"><freejoint name="ball"/><geom type="sphere" size=".1"
+mass="10"/></body></scene><horizon duration="1" timestep="0.02"/><start height="floor"/><goal height="floor"><root joint="ball"
+pos="3 0 1.5"/></goal><cost/></problem>
+END
+run 0 inspect toss.xml
+says out "height=\"floor\" of <start> lowers 'ball' by 1.1 m, <goal> lowers 'ball' by 1.4 m; <root joint="
+says out "start  centre of mass at 1.005 0.000 0.434 m"
+sed 's|<start height="floor"/>|<start height="floor"><root joint="ball" height="keep"/></start>|; s|pos="3 0 1.5"|& height="keep"|' toss.xml >kept.xml
+run 0 inspect kept.xml
+check "nothing is lowered" sh -c '! grep -q lowers out'
+says out "start  centre of mass at 1.005 0.000 0.986 m"
+says out "goal   centre of mass at 1.508 0.000 1.137 m"
+
 # a jump that does not pay, of a leg that cannot fall over: certified, and why it is not achieved
 cat >jumper.xml <<'END'
 <mujoco><worldbody><geom type="plane" size="5 5 .1"/><body name="trunk" pos="0 0 .6"><joint name="z" type="slide" axis="0 0 1"/>

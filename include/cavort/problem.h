@@ -415,8 +415,8 @@ CAV_API cav_status cav_configuration_stand(const cav_model *model, cav_state *st
 
 /// What height="floor" of a posture in files does to q [nq]: moves each tree that is free or slides along the vertical until
 /// its lowest geom touches a plane of the world, or going down something else that stands there first. rise: planes alone,
-/// and so many metres higher; NULL: no such. The state is left at q. CAV_BAD_INPUT: nothing can be moved so;
-/// CAV_NOT_FINITE, CAV_NO_MEMORY: q is undefined.
+/// and so many metres higher; NULL: no such. The state is left at q. Trees whose <root> says height="keep" stay, in files.
+/// CAV_BAD_INPUT: nothing can be moved so; CAV_NOT_FINITE, CAV_NO_MEMORY: q is undefined.
 CAV_API cav_status cav_configuration_to_floor(const cav_model *model, cav_state *state, const double *rise, double *q,
                                               cav_error *error);
 

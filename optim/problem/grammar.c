@@ -72,7 +72,8 @@ static const cav_xml_element pose_root = {
         TEXT("joint", "(the first free joint)", "free joint that is placed"),
         REALS("pos", 3, 3, "m", "(as it was)", "position in the world"),
         REALS("quat", 4, 4, "", "(as it was)", "orientation as a quaternion w x y z, brought to unit length"),
-        REALS("euler", 3, 3, "degrees", "(as it was)", "orientation by rotations about x, then the new y, then the new z")),
+        REALS("euler", 3, 3, "degrees", "(as it was)", "orientation by rotations about x, then the new y, then the new z"),
+        WORD("height", heights, "floor", "keep: height=\"floor\" of the posture leaves it where it is, as a ball in the air")),
     NULL, 0, "places a free joint: position and orientation of what floats"};
 static const cav_xml_element pose_joint = {
     "joint", 0, 0,

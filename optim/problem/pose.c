@@ -5,6 +5,7 @@
 /// height="floor" down to the floor (floor.c). So one file can set up models that share joint names, or list alternatives.
 /// Balance, contact between limbs and orientation to the floor are the file's business.
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -240,12 +241,46 @@ static cav_status lay_joint(const cav_problem_reader *reader, const cav_xml_node
   return CAV_OK;
 }
 
+// bodies without joints that a posture of that element brought down by more than they are put down: a ball that was meant to fly
+static void note_lowered(const cav_problem_reader *reader, const cav_xml_node *node, const double *before,
+                         const double *q) {
+  static const double put_down = 0.05; // m
+  const cav_model *m = reader->model;
+  char *text = reader->owner->lowered;
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    if (joint->type != CAV_JOINT_FREE) continue;
+    double way = before[joint->q + 2] - q[joint->q + 2];
+    int links = 0;
+    for (int i = 1; i < m->nlink; i++) links += m->link[i].root == joint->link;
+    if (links != 1 || !(way > put_down)) continue;
+    size_t used = strlen(text), room = sizeof reader->owner->lowered;
+    snprintf(text + used, room - used, "%s<%s> lowers '%.60s' by %.3g m", used ? ", " : "", node->rule->name,
+             m->body[m->link[joint->link].body].name, way);
+  }
+}
+
+const char *cav_problem_lowered(const cav_problem *problem) {
+  return ((const cav_problem_owner *)(const void *)problem)->lowered;
+}
+
+// down to the floor, without the trees whose <root> stays as it is stated
 static cav_status drop(const cav_problem_reader *reader, const cav_xml_node *node, double *q) {
+  const cav_model *m = reader->model;
   cav_error inner = {0};
-  double rise = cav_xml_real(node, "rise", 0);
-  cav_status status =
-      cav_configuration_to_floor(reader->model, reader->state, cav_xml_get(node, "rise") ? &rise : NULL, q, &inner);
-  return status ? cav_xml_fail_as(reader->error, status, node, "height", "%s", inner.text) : CAV_OK;
+  double rise = cav_xml_real(node, "rise", 0), *before = calloc((size_t)m->nq + 1, sizeof *before);
+  if (!before) return cav_problem_no_memory(reader);
+  memcpy(before, q, (size_t)m->nq * sizeof *q);
+  cav_status status = cav_configuration_to_floor(m, reader->state, cav_xml_get(node, "rise") ? &rise : NULL, q, &inner);
+  if (status) cav_xml_fail_as(reader->error, status, node, "height", "%s", inner.text);
+  const cav_xml_node *root = cav_problem_child(node, "root");
+  for (; root && !status; root = cav_xml_next(root)) {
+    int j = cav_xml_word(root, "height", 1) ? -1 : root_joint(reader, root);
+    if (j >= 0) memcpy(q + m->joint[j].q, before + m->joint[j].q, 3 * sizeof *q);
+  }
+  if (!status) note_lowered(reader, node, before, q);
+  free(before);
+  return status;
 }
 
 static cav_status read_pose(const cav_problem_reader *reader, const cav_xml_node *node, int depth, double *q) {

@@ -17,6 +17,7 @@ typedef struct cav_problem_owner {
   cav_problem problem;
   cav_model *model;
   cav_problem_block *block;
+  char lowered[400]; ///< what height="floor" brought far down; "": nothing
 } cav_problem_owner;
 
 /// A reading in progress.

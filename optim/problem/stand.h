@@ -2,6 +2,7 @@
 #ifndef CAVORT_STAND_H
 #define CAVORT_STAND_H
 
+#include "cavort/problem.h"
 #include "role.h"
 
 /// What was found, and how well it stands.
@@ -17,5 +18,9 @@ typedef struct cav_stand {
 /// the feet are as flat as there and level, the centre of mass is above their middle, and legs that were straight are bent.
 /// CAV_BAD_INPUT: there is none, why in stand->why. Uses the state.
 cav_status cav_stand_find(const cav_model *model, cav_state *state, double *q, cav_stand *stand);
+
+/// Of a problem that cav_problem_load gave: which single free bodies height="floor" brought down by more than 5 cm, in which
+/// element, in words; "": none. pose.c.
+const char *cav_problem_lowered(const cav_problem *problem);
 
 #endif

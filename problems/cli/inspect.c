@@ -447,6 +447,9 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
   cav_status status = print_posture(p, "start", p->q_start, error);
   if (!status) status = print_posture(p, "goal", p->q_goal, error);
   if (status) return status;
+  if (*cav_problem_lowered(p))
+    printf("  note: height=\"floor\" of %s; <root joint=\"...\" height=\"keep\"/> in it leaves a body in the air\n",
+           cav_problem_lowered(p));
   printf("  %d unknowns%s; the guess %s",
          (knots - 1 + 2 * (p->free_start != 0)) * p->model->nv + (p->duration_most > 0),
          p->free_start ? ", with posture and velocity at the start" : "",
