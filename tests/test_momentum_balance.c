@@ -186,11 +186,37 @@ static void test_joined(void) {
   }
 }
 
+// a plate and a fin on it that a medium slows, turns and blows away
+static const char *const blown =
+    "<mujoco><compiler angle='radian'/><option timestep='0.02' density='1.2' viscosity='0.002' wind='1 -2 "
+    "0'/><worldbody>"
+    "<body name='plate' pos='0 0 1'><freejoint/><geom type='box' size='.1 .2 .01' mass='.1'/><body pos='.2 0 0'>"
+    "<joint axis='0 1 0'/><geom type='ellipsoid' size='.1 .02 .05' mass='.03' fluidshape='ellipsoid'/></body></body>"
+    "</worldbody></mujoco>";
+
+static void test_medium(void) {
+  for (int order = CAV_ORDER_MIDPOINT; order <= CAV_ORDER_MOMENTUM; order++) {
+    sample s = sample_new(blown, 60, 0.01, (cav_order)order);
+    const double v[7] = {4, 0, 2, 1, 3, -2, 1};
+    memcpy(s.v, v, sizeof v);
+    let_go(&s);
+    CHECK(verify(&s, NULL, NULL) == CAV_OK);
+    printf("in a medium, order %d: momentum defect %.3g\n", order, s.verdict.momentum_defect_rms);
+    CHECK_NEAR(s.verdict.unactuated_force_max, 0, 1e-9);
+    CHECK(s.verdict.momentum_defect_rms < (order == CAV_ORDER_MOMENTUM ? 1e-9 : 2e-3));
+    knot(&s, 30)[0] += 1e-3;
+    CHECK(verify(&s, NULL, NULL) == CAV_OK);
+    CHECK(s.verdict.momentum_defect_rms > 0.01 && !s.verdict.certified);
+    sample_free(&s);
+  }
+}
+
 int main(void) {
   test_spin();
   test_tumble();
   test_held_roots();
   test_contact_balance();
   test_joined();
+  test_medium();
   return check_result();
 }

@@ -10,10 +10,11 @@
 /// A tree that joints hold to the world gets forces from there which no one measures: only what its root link can do
 /// freely is balanced. F and N/0.3 m are projected on the span of the motions of the root link's dofs that no actuator
 /// and no tendon acts on, seen at c; what those joints themselves exert (damping, springs, armature, limits, friction
-/// loss, equality constraints of joints), and a residual force that is penalised, is accounted for. A free root
-/// gives all six components, a planar one (two slides and a hinge) three, a cart driven along its rail none: its defect
-/// is 0 by definition.
-/// Written for verification alone: momenta come from link poses and the motion subspaces, not from the inverse.
+/// loss, their equality constraints), what a medium does, and a residual force that is penalised, is accounted for. A
+/// free root gives all six components, a planar one (two slides and a hinge) three, a cart driven along its rail none:
+/// its defect is 0 by definition.
+/// Written for verification alone: momenta come from link poses and the motion subspaces, not from the inverse. That of
+/// a medium is the difference of two inverses, with it and without.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,6 +37,10 @@ struct cav_balance {
   double *mass;   // [ntree]
   double *twist;  // [nlink*6] scratch
   double *wrench; // [ntree*6] scratch: linear, angular about c
+  // in a medium: the model without it, states of both that nothing touches, and what it does along each dof at the knot
+  cav_model still;
+  cav_state *wet, *dry;
+  double *medium; // [3*nv] force, then scratch; NULL: there is no medium
 };
 
 static double vector_dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -155,6 +160,34 @@ static cav_status record(cav_balance *balance, const cav_verification *verificat
   return status;
 }
 
+// the states that the force of a medium is the difference of
+static cav_status survey_medium(cav_balance *balance, const cav_verification *verification) {
+  const cav_model *model = verification->model;
+  if (!verification->law.passive || (model->density == 0 && model->viscosity == 0)) return CAV_OK;
+  balance->still = *model;
+  balance->still.density = balance->still.viscosity = 0;
+  balance->wet = cav_state_new(model);
+  balance->dry = cav_state_new(&balance->still);
+  balance->medium = calloc(3 * (size_t)model->nv + 1, sizeof *balance->medium);
+  if (!balance->wet || !balance->dry || !balance->medium) return CAV_NO_MEMORY;
+  balance->wet->options = verification->law;
+  balance->wet->options.contact = balance->wet->options.constraint = 0;
+  balance->dry->options = balance->wet->options;
+  return CAV_OK;
+}
+
+// what the medium does along each dof at knot t
+static void find_medium(cav_balance *balance, const cav_verification *verification, int t) {
+  const cav_model *model = verification->model;
+  const int nv = model->nv;
+  const double *q = verification->q + t * model->nq, *v = verification->v + t * nv;
+  double *force = balance->medium, *wet = force + nv, *dry = wet + nv;
+  if (!force) return;
+  const int known = cav_inverse(model, balance->wet, q, v, v + nv, wet) == CAV_OK &&
+                    cav_inverse(&balance->still, balance->dry, q, v, v + nv, dry) == CAV_OK;
+  for (int d = 0; d < nv; d++) force[d] = known ? dry[d] - wet[d] : NAN;
+}
+
 cav_balance *cav_balance_new(const cav_verification *verification) {
   const cav_model *model = verification->model;
   size_t nl = (size_t)model->nlink, nv = (size_t)model->nv + 1, knots = (size_t)verification->last + 2;
@@ -180,7 +213,7 @@ cav_balance *cav_balance_new(const cav_verification *verification) {
   int complete = b->root && b->tree && b->com && b->momentum && b->held && b->sum && b->count && b->worst &&
                  b->worst_knot && b->mass && b->twist && b->wrench;
   if (complete) survey(b, verification, unit, unit + nv);
-  if (!complete || record(b, verification, unit + 2 * nv) != CAV_OK) {
+  if (!complete || survey_medium(b, verification) != CAV_OK || record(b, verification, unit + 2 * nv) != CAV_OK) {
     cav_balance_free(b);
     b = NULL;
   }
@@ -202,6 +235,9 @@ void cav_balance_free(cav_balance *balance) {
   free(balance->mass);
   free(balance->twist);
   free(balance->wrench);
+  free(balance->medium);
+  cav_state_free(balance->wet);
+  cav_state_free(balance->dry);
   free(balance);
 }
 
@@ -349,6 +385,7 @@ static int project(const cav_balance *balance, const cav_verification *verificat
     const double *axis = state->axis + 6 * d;
     double *e = basis[n],
            own = joint_force(verification, d, t) + (verification->deviation[d] > 0 ? balance->residual[d] : 0);
+    if (balance->medium) own += balance->medium[d];
     point_velocity(axis, state->reference + 3 * balance->root[i], c, e);
     for (int k = 0; k < 3; k++) e[3 + k] = axis[k] * verification->arm;
     double size = 0;
@@ -373,6 +410,7 @@ void cav_balance_add(cav_balance *balance, const cav_verification *verification,
   double part[6];
   balance->residual = residual;
   wrenches(balance, verification, t);
+  find_medium(balance, verification, t);
   for (int i = 0; i < balance->ntree; i++) {
     int n = project(balance, verification, i, t, part);
     balance->count[i] += n;
