@@ -45,6 +45,25 @@ static void test_better(void) {
   CHECK(cav_rank_better(&other, &sooner, 0) && !cav_rank_better(&sooner, &other, 0));
 }
 
+// one that is certified and does something else comes after one that does what was asked and loses its loop, that after one
+// that is certified and misses some of it; what has a force from nowhere comes last
+static void test_asked(void) {
+  enum { CLASSES = 5 };
+  cav_race_report r[CLASSES];
+  for (int k = 0; k < CLASSES; k++) r[k] = whole(), r[k].verdict.ntarget = 3, r[k].cost = CLASSES - k;
+  r[0].verdict.achieved = 1, r[0].verdict.unactuated_force_max = 1;
+  r[1].verdict.certified = 1, r[1].verdict.nmissed = 2;
+  r[2].verdict.achieved = 1, r[2].verdict.closed_loop_seconds = 1;
+  r[3].verdict.certified = 1, r[3].verdict.nmissed = 1;
+  r[4].verdict.certified = r[4].verdict.achieved = 1;
+  for (int i = 0; i < CLASSES; i++)
+    for (int k = 0; k < i; k++) {
+      CHECK(cav_rank_better(&r[i], &r[k], 0) && !cav_rank_better(&r[k], &r[i], 0));
+      r[i].cost = 10 + i;
+      CHECK(cav_rank_better(&r[i], &r[k], 0) && !cav_rank_better(&r[k], &r[i], 0));
+    }
+}
+
 // mending is put off once it has taken longer than what it mends, and goes on when more was solved
 static void test_spent(void) {
   cav_problem problem = {.timestep = 0.02, .duration = 2};
@@ -110,6 +129,7 @@ static void test_nearer(void) {
 
 int main(void) {
   test_better();
+  test_asked();
   test_near();
   test_off();
   test_nearer();

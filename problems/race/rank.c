@@ -9,6 +9,15 @@ static const double few = 4;
 // fraction of the cost by which a motion has to be cheaper to come before one that was found earlier
 static const double cheaper = 1e-4;
 
+// how much of what is wanted a motion is: certified and as asked; certified and most of what was asked; as asked, forces,
+// limits and constraints hold, and only the rest of a certificate is missed; certified and something else; none of these
+static int class_of(const cav_race_report *report) {
+  const cav_verdict *v = &report->verdict;
+  if (cav_race_success(report)) return 4;
+  if (v->certified) return 2 * v->nmissed <= v->ntarget ? 3 : 1;
+  return v->achieved && cav_verdict_feasible(v) ? 2 : 0;
+}
+
 int cav_rank_better(const cav_race_report *a, const cav_race_report *b, int cheapest) {
   const cav_verdict *v = &a->verdict, *w = &b->verdict;
   const double missed[][3] = {{v->unactuated_force_max, w->unactuated_force_max, CAV_TOLERANCE_UNACTUATED},
@@ -25,10 +34,9 @@ int cav_rank_better(const cav_race_report *a, const cav_race_report *b, int chea
   int stopped = a->status == CAV_INTERRUPTED, other = b->status == CAV_INTERRUPTED;
   if (stopped || other) return !stopped;
   if (cav_race_success(a) && cav_race_success(b)) return cheapest && a->cost < (1 - cheaper) * b->cost;
-  if (cav_race_success(a) || cav_race_success(b)) return cav_race_success(a);
+  if (class_of(a) != class_of(b)) return class_of(a) > class_of(b);
   // what was asked is in the cost
-  if (v->certified && w->certified) return a->cost < (1 - cheaper) * b->cost;
-  if (v->certified || w->certified) return v->certified;
+  if (v->certified) return a->cost < (1 - cheaper) * b->cost;
   for (size_t k = 0; k < sizeof missed / sizeof *missed; k++)
     if (missed[k][0] > missed[k][2] || missed[k][1] > missed[k][2]) return missed[k][0] < missed[k][1];
   if (v->closed_loop_seconds != w->closed_loop_seconds) return v->closed_loop_seconds > w->closed_loop_seconds;
