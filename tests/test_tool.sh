@@ -280,6 +280,14 @@ run 0 solve told.xml
 run 0 explain told.result
 says out "effort of actuator 'p'"
 
+# --- a guess that flies and a motion that does not: told; of one that hops not ---
+
+sed -e '/<sensor/d; /pos="0.2"/d' -e "s#[.][.]/[.][.]/models#$root/problems/models#" "$root/problems/motions/hopper-hop/problem.xml" >stays.xml
+run 0 solve stays.xml
+says out "note: the guess flies (apex), the motion does not: it touches the world at every knot"
+run 0 solve "$root/problems/motions/hopper-hop/problem.xml" -o hops
+check "of a motion that flies no such thing is told" [ "$(grep -c 'guess flies' out)" = 0 ]
+
 # --- what is given where something else is wanted: what it is, and the command that was meant ---
 
 run 2 explain problem.xml

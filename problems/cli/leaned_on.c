@@ -1,5 +1,6 @@
 /// What of the world a motion leans on where neither its first nor its last knot does: a wall that can be stood on is stood
-/// on, and who asked for a way over it is told.
+/// on, and who asked for a way over it is told. And whether a motion whose guess flies does not: who asked for a height alone
+/// may get one that rears up to it.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,6 +28,25 @@ static int solid_of(const cav_model *m, const cav_contact_force *f, int *part) {
   return -1;
 }
 
+// part of the weight below which the world does not bear what flies
+static const double flying = 0.01;
+
+/// Whether at some knot with forces the world bears none of the trees that actuators move.
+static int is_in_the_air(const cav_model *m, const cav_forces *forces, double weight) {
+  int flies = 0, i = 0;
+  for (int t = 0; t < forces->nknot - 1 && !flies; t++) {
+    double borne = 0;
+    for (; i < forces->nforce && forces->force[i].knot <= t; i++) {
+      const cav_contact_force *f = &forces->force[i];
+      const int one = m->geom[f->geom1].link, other = m->geom[f->geom2].link;
+      if ((one > 0 && other > 0) || f->knot < t || !m->link[one > 0 ? one : other].driven) continue;
+      borne += size_of(f);
+    }
+    flies = borne < flying * weight;
+  }
+  return flies;
+}
+
 void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_trajectory *motion,
                               const cav_options *contact) {
   const cav_model *m = problem->model;
@@ -51,6 +71,11 @@ void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_t
             size_of(most[g]), most[g]->knot * motion->timestep);
   }
   if (n > 0) fprintf(out, "; what must not be touched: guide.md, Obstacles\n");
+  if (forces && problem->guess_height > 0 && !is_in_the_air(m, forces, weight))
+    fprintf(
+        out,
+        "  note: the guess flies (apex), the motion does not: it touches the world at every knot; heights of feet at "
+        "a time make it leave the ground\n");
   cav_forces_free(forces);
   free(most), free(with);
 }
