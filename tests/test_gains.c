@@ -4,7 +4,7 @@
 #include "scene.h"
 #include "verification.h"
 
-enum { TRIALS = 60, LOST_TRIALS = 40, FEW = 3 };
+enum { TRIALS = 64, PLAIN = 40, FEW = 3 };
 
 static const char cart[] =
     "<mujoco><option gravity='0 0 0'/><worldbody>"
@@ -68,7 +68,7 @@ static int expected(int *trials) {
     outcome(*trials - 1, &f, &s, &e);
     if (best < 0 || f > follows || (f == follows && (f < CAV_LOOPS ? s > seconds : e < error)))
       best = *trials - 1, follows = f, seconds = s, error = e;
-    if (*trials >= LOST_TRIALS && follows < CAV_LOOP_START) return best;
+    if (*trials >= PLAIN && follows < CAV_LOOP_START) return best;
     if (follows < (*trials <= FEW ? CAV_LOOPS : CAV_LOOP_PUSHED)) continue;
     if (error <= 0.05 + 0.02 * (*trials - 1)) return best;
   }

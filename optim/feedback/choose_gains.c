@@ -14,9 +14,9 @@
 #include "schedule.h"
 #include "verification.h"
 
-/// Contact laws of a regulator; sets that are tried at most, and where none up to there follows from the motion's own start;
-/// sets of which a push is asked.
-enum { LAWS = 2, TRIALS = 60, LOST_TRIALS = 40, FEW = 3 };
+/// Contact laws of a regulator; sets that are tried at most, and how many of them before balance and room are, where those end
+/// by which none follows from the motion's own start; sets of which a push is asked.
+enum { LAWS = 2, TRIALS = 64, PLAIN = 40, FEW = 3 };
 
 /// What a regulator is made of: penalties on straying, and the fractions of the schedule whose contact laws it reckons
 /// with.
@@ -26,22 +26,17 @@ typedef struct set {
   double fraction[LAWS];
 } set;
 
-static const set seed[] = {{{.tracking = 36, .rate = 1.5}, 1, {0.85}},
-                           {{.tracking = 30, .rate = 2}, 1, {1}},
-                           {{.tracking = 30, .rate = 3}, 1, {0.93}},
-                           {{.tracking = 70, .rate = 2.5}, 1, {0.85}},
-                           {{.tracking = 30, .rate = 2.5}, 1, {0.77}},
-                           {{.tracking = 0.1, .rate = 1.5}, 1, {1}},
-                           {{.tracking = 24, .rate = 1.9}, 1, {0.88}},
-                           {{.tracking = 1.5, .rate = 1.5}, 1, {0.85}},
-                           {{.tracking = 12, .rate = 3}, 1, {1}},
-                           {{.tracking = 300, .rate = 10}, 1, {0.85}},
-                           {{.tracking = 4, .rate = 3}, 2, {0.85, 0.6}},
-                           {{.tracking = 0.1, .rate = 1.5, .room = 1}, 1, {1}},
-                           {{.tracking = 1.2, .rate = 1, .balance = 40}, 1, {0.77}},
-                           {{.tracking = 1.5, .rate = 1.5, .balance = 10}, 1, {0.85}},
-                           {{.tracking = 30, .rate = 3, .balance = 3}, 1, {0.93}}};
-enum { SEEDS = sizeof seed / sizeof *seed };
+static const set seed[] = {{{.tracking = 36, .rate = 1.5}, 1, {0.85}},  {{.tracking = 30, .rate = 2}, 1, {1}},
+                           {{.tracking = 30, .rate = 3}, 1, {0.93}},    {{.tracking = 70, .rate = 2.5}, 1, {0.85}},
+                           {{.tracking = 30, .rate = 2.5}, 1, {0.77}},  {{.tracking = 0.1, .rate = 1.5}, 1, {1}},
+                           {{.tracking = 24, .rate = 1.9}, 1, {0.88}},  {{.tracking = 1.5, .rate = 1.5}, 1, {0.85}},
+                           {{.tracking = 12, .rate = 3}, 1, {1}},       {{.tracking = 300, .rate = 10}, 1, {0.85}},
+                           {{.tracking = 4, .rate = 3}, 2, {0.85, 0.6}}};
+static const set balanced[] = {{{.tracking = 0.1, .rate = 1.5, .room = 1}, 1, {1}},
+                               {{.tracking = 1.2, .rate = 1, .balance = 40}, 1, {0.77}},
+                               {{.tracking = 1.5, .rate = 1.5, .balance = 10}, 1, {0.85}},
+                               {{.tracking = 30, .rate = 3, .balance = 3}, 1, {0.93}}};
+enum { SEEDS = sizeof seed / sizeof *seed, BALANCED = sizeof balanced / sizeof *balanced };
 
 /// End error that ends the search, m: at first a tenth of the distance at which a loop is lost, 2 cm more with each
 /// set that was tried.
@@ -138,34 +133,38 @@ static double spread(double x, double from, double to, double middle, int near) 
   return fmin(fmax(start + part * x * (to - from), from), to);
 }
 
-/// Part of the sets whose straying is that of the links alone; the most that balance counts beside it in others.
+/// Part of the later sets whose straying is that of the links alone; the most that balance counts beside it in others.
 static const double plain = 1. / 3, most_balance = 100;
 
-/// The set of a trial: the seeds, then points that fill the range of all (Roberts's additive recurrence), every other
-/// one near the best.
-static set sample(const search *s, int trial) {
-  if (trial < SEEDS) return seed[trial];
-  // powers of the root of x^7 = x + 1
-  static const double step[] = {0.8986537126286993, 0.8075784952213448, 0.7257334129697598,
+/// Powers of the root of x^5 = x + 1, and of x^7 = x + 1.
+static const double of_four[] = {0.8566748838545029, 0.7338918566271259, 0.6287067210378087, 0.5385972572236101},
+                    of_six[] = {0.8986537126286993, 0.8075784952213448, 0.7257334129697598,
                                 0.6521830259439715, 0.5860866975779693, 0.5266889867007357};
+
+/// The set of a trial: the seeds, then points that fill the range of all (Roberts's additive recurrence), every other
+/// one near the best; first without balance and room, then with them.
+static set sample(const search *s, int trial) {
+  const int late = trial >= PLAIN, begun = late ? PLAIN + BALANCED : SEEDS, near = trial % 2;
+  if (trial < begun) return late ? balanced[trial - PLAIN] : seed[trial];
+  const double *step = late ? of_six : of_four;
   const set *best = &s->best;
-  double x[6];
-  int near = trial % 2;
-  for (int k = 0; k < 6; k++) x[k] = fmod(0.5 + (trial - SEEDS + 1) * step[k], 1);
+  double x[6] = {0};
+  for (int k = 0; k < (late ? 6 : 4); k++) x[k] = fmod(0.5 + (trial - begun + 1) * step[k], 1);
   set to = {.laws = near ? best->laws : x[3] < 0.5 ? 1 : 2};
   to.penalty.tracking = exp(spread(x[0], log(1), log(100), log(best->penalty.tracking), near));
   to.penalty.rate = exp(spread(x[1], log(1), log(6), log(best->penalty.rate), near));
+  to.fraction[0] = spread(x[2], 0.6, 1, best->fraction[0], near);
+  to.fraction[1] = spread(x[3], 0.3, 0.9, best->fraction[1], near);
+  if (!late) return to;
   to.penalty.room = near ? best->penalty.room : x[4] < 0.5;
   to.penalty.balance = x[5] < plain ? 0 : exp(log(most_balance) * (x[5] - plain) / (1 - plain));
   if (near) to.penalty.balance = best->penalty.balance;
-  to.fraction[0] = spread(x[2], 0.6, 1, best->fraction[0], near);
-  to.fraction[1] = spread(x[3], 0.3, 0.9, best->fraction[1], near);
   return to;
 }
 
 /// Whether the best is good enough, or the motion is lost.
 static int done(const search *s, int trials) {
-  if (trials >= LOST_TRIALS && s->found && s->reached.follows < CAV_LOOP_START) return 1;
+  if (trials >= PLAIN && s->found && s->reached.follows < CAV_LOOP_START) return 1;
   return s->found && s->reached.follows >= enough(trials) && s->reached.error <= near_enough(trials);
 }
 
