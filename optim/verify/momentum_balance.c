@@ -181,8 +181,8 @@ static void find_medium(cav_balance *balance, const cav_verification *verificati
   const cav_model *model = verification->model;
   const int nv = model->nv;
   const double *q = verification->q + t * model->nq, *v = verification->v + t * nv;
+  if (!balance->medium) return;
   double *force = balance->medium, *wet = force + nv, *dry = wet + nv;
-  if (!force) return;
   const int known = cav_inverse(model, balance->wet, q, v, v + nv, wet) == CAV_OK &&
                     cav_inverse(&balance->still, balance->dry, q, v, v + nv, dry) == CAV_OK;
   for (int d = 0; d < nv; d++) force[d] = known ? dry[d] - wet[d] : NAN;
