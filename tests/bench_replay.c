@@ -98,6 +98,12 @@ static void run(const char *folder, int apart, int anew, double factor) {
 }
 
 int main(int argc, char **argv) {
+  char *end = NULL;
+  if (argc > 1) strtod(argv[1], &end);
+  if (argc < 3 || (*end && strcmp(argv[1], "anew") && strcmp(argv[1], "apart"))) {
+    fprintf(stderr, "usage: bench_replay FACTOR|apart|anew FOLDER...: a factor of the gains, 1 as they are\n");
+    return 2;
+  }
   for (int i = 2; i < argc; i++) {
     const int anew = !strcmp(argv[1], "anew"), apart = anew || !strcmp(argv[1], "apart");
     run(argv[i], apart, anew, apart ? 1 : strtod(argv[1], NULL));

@@ -152,8 +152,9 @@ static void weigh_balance(regulator *r, const cav_model *model, double times) {
   double *momentum = r->system; // as yet of no use
   memcpy(momentum, r->M, (size_t)nv * (size_t)nv * sizeof *momentum);
   for (int d = 0; d < nv; d++) {
-    const double *row = momentum + (size_t)d * nv, part = times / row[d];
+    const double *row = momentum + (size_t)d * nv;
     if (!is_carrier(model, d)) continue;
+    const double part = times / row[d];
     for (int i = 0; i < nv; i++)
       for (int j = 0; j < nv; j++) r->M[i * nv + j] += part * row[i] * row[j];
   }
@@ -330,7 +331,7 @@ static cav_status add_laws(regulator *r, const cav_transcription *tr, const cav_
 }
 
 /// Back over a motion, whose straying is weighed with balance; gains of the first knots are kept. What a cycle looks ahead to
-/// has the room of its first period.
+/// has the room of its first period, mirrored or not.
 static cav_status sweep(regulator *r, const cav_transcription *tr, const cav_trajectory *fine, const cav_options *law,
                         int laws, double balance, cav_state *state, cav_state *bare, int knots, double *gain_q,
                         double *gain_v) {

@@ -104,6 +104,21 @@ static int find_role(const char *name, const cav_roles *roles, cav_object_type *
   return roles->geom[role];
 }
 
+enum { HINT = 240 };
+
+// what may have been meant: near, or else names that hold what was asked for; "": nothing
+static const char *hint_of(const char *near, const char *first, const void *names, int n, size_t stride,
+                           char hint[HINT]) {
+  char alike[200] = "";
+  if (!near && n) cav_xml_alike(first, names, n, stride, alike, sizeof alike);
+  snprintf(hint, HINT, "%s%.200s%s",
+           near     ? "; did you mean '"
+           : *alike ? "; it has "
+                    : "",
+           near ? near : alike, near ? "'?" : "");
+  return hint;
+}
+
 // nothing of that name: what is near, or what else is called so
 static void refuse_name(const cav_problem_reader *reader, const cav_xml_node *node, const char *attribute,
                         cav_object_type type, const char *first, const cav_roles *roles) {
@@ -122,7 +137,7 @@ static void refuse_name(const cav_problem_reader *reader, const cav_xml_node *no
   size_t stride = 0;
   const void *names = cav_object_names(m, type, &n, &stride);
   const char *near = n ? cav_xml_nearest(first, names, n, stride) : NULL, *role_name[CAV_ROLE_TYPES];
-  char known[480] = "", parts[240], alike[200] = "";
+  char known[480] = "", parts[240], hint[HINT];
   if (roles) {
     for (int r = 0; r < CAV_ROLE_TYPES; r++) role_name[r] = cav_role_name((cav_role)r);
     if (!near && cav_role_named(first) == CAV_ROLE_TYPES)
@@ -130,13 +145,8 @@ static void refuse_name(const cav_problem_reader *reader, const cav_xml_node *no
     cav_roles_list(roles, parts, sizeof parts);
     snprintf(known, sizeof known, "; roles found (%s): %s", cav_build_name(roles->build), *parts ? parts : roles->why);
   }
-  if (!near && n) cav_xml_alike(first, names, n, stride, alike, sizeof alike);
-  cav_xml_fail(reader->error, node, attribute, "the model '%s' has no %s of that name, got '%.200s'%s%s%s%s", m->name,
-               kind, cav_xml_text(node, attribute, ""),
-               near     ? "; did you mean '"
-               : *alike ? "; it has "
-                        : "",
-               near ? near : alike, near ? "'?" : "", known);
+  cav_xml_fail(reader->error, node, attribute, "the model '%s' has no %s of that name, got '%.200s'%s%s", m->name, kind,
+               cav_xml_text(node, attribute, ""), hint_of(near, first, names, n, stride, hint), known);
 }
 
 /// A search among the objects of a model by a list of names, separated by |, which it cuts.
@@ -193,14 +203,9 @@ int cav_object_named(const cav_model *model, cav_state *state, const char *names
     size_t stride = 0;
     const void *known = cav_object_names(model, *type, &n, &stride);
     const char *near = n ? cav_xml_nearest(s.first, known, n, stride) : NULL;
-    char alike[200] = "";
-    if (!near && n) cav_xml_alike(s.first, known, n, stride, alike, sizeof alike);
-    cav_file_fail(error, CAV_BAD_INPUT, 0, "the model '%.100s' has no %s of that name, got '%.100s'%s%.200s%s",
-                  model->name, cav_object_kind_of(*type)->text, names,
-                  near     ? "; did you mean '"
-                  : *alike ? "; it has "
-                           : "",
-                  near ? near : alike, near ? "'?" : "");
+    char hint[HINT];
+    cav_file_fail(error, CAV_BAD_INPUT, 0, "the model '%.100s' has no %s of that name, got '%.100s'%s", model->name,
+                  cav_object_kind_of(*type)->text, names, hint_of(near, s.first, known, n, stride, hint));
   }
   *type = s.type;
   free(copy);

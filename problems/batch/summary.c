@@ -61,21 +61,50 @@ static void copy_text(const char *text, const char *name, char *out, size_t room
   out[n] = 0;
 }
 
-double cav_summary_tried(const char *folder, int *n) {
-  char *text = read_text(folder, "strategies.csv");
-  double seconds = 0;
-  *n = 0;
-  for (const char *line = text; line && *line;) {
-    // strategy,kept,outcome,cost,iterations,seconds: empty where it led to nothing, a word in the head
-    const char *at = line;
-    for (int comma = 0; at && comma < 5; comma++) at = (at = strpbrk(at, ",\n")) && *at == ',' ? at + 1 : NULL;
+// ---------------------------------------------------------------- strategies.csv
+
+cav_tried cav_tried_open(const char *folder) {
+  char *path = cav_result_path(folder, "strategies.csv");
+  cav_tried t = {.in = path ? fopen(path, "r") : NULL};
+  free(path);
+  return t;
+}
+
+int cav_tried_next(cav_tried *t) {
+  while (t->in && getline(&t->line, &t->room, t->in) > 0) {
+    // strategy,kept,outcome, numbers, and the two quoted texts that end a line: three commas, then four quotation marks
+    char *mark[7], *c = t->line;
+    int n = 0;
+    while (n < 7 && (c = strchr(c, n < 3 ? ',' : '"'))) mark[n++] = c++;
+    if (n < 7) continue;
+    char **comma = mark, **quote = mark + 3;
+    for (int k = 0; k < 3; k++) *comma[k] = 0;
+    *quote[1] = *quote[3] = 0;
+    t->kept = !strcmp(comma[0] + 1, "1");
+    t->outcome = comma[1] + 1;
+    // of cost, iterations and seconds the last
+    for (c = comma[2] + 1, n = 0; n < 2 && c; n++) c = (c = strchr(c, ',')) ? c + 1 : NULL;
     char *end = NULL;
-    double value = at ? cav_file_number(at, &end) : 0;
-    if (at && end != at && isfinite(value)) seconds += value, (*n)++;
-    line += strcspn(line, "\n");
-    line += *line == '\n';
+    t->seconds = c ? cav_file_number(c, &end) : NAN;
+    if (end == c) t->seconds = NAN;
+    t->changed = quote[0] + 1, t->reason = quote[2] + 1;
+    return 1;
   }
-  free(text);
+  return 0;
+}
+
+void cav_tried_close(cav_tried *t) {
+  if (t->in) fclose(t->in);
+  free(t->line);
+  *t = (cav_tried){0};
+}
+
+double cav_summary_tried(const char *folder, int *n) {
+  cav_tried t = cav_tried_open(folder);
+  double seconds = 0;
+  for (*n = 0; cav_tried_next(&t);)
+    if (isfinite(t.seconds)) seconds += t.seconds, ++*n;
+  cav_tried_close(&t);
   return seconds;
 }
 

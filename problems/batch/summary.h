@@ -18,6 +18,21 @@ typedef struct cav_summary {
   char cause[CAV_SUMMARY_TEXT];        ///< the first one why it is not certified and achieved; "": it is
 } cav_summary;
 
+/// A line of a folder's strategies.csv: whether its motion is the one that was kept, how it ended, the seconds that it took
+/// (NaN: it led to no motion), what it changed of the problem and what it missed. Opened with no line; next: whether there is
+/// one more.
+typedef struct cav_tried {
+  FILE *in;
+  char *line;
+  size_t room;
+  int kept;
+  double seconds;
+  const char *outcome, *changed, *reason;
+} cav_tried;
+cav_tried cav_tried_open(const char *folder);
+int cav_tried_next(cav_tried *tried);
+void cav_tried_close(cav_tried *tried);
+
 /// Seconds of all strategies of a folder's strategies.csv that led to a motion, one after the other; *n of them, 0: none are
 /// known.
 double cav_summary_tried(const char *folder, int *n);

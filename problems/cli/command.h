@@ -155,19 +155,6 @@ enum { CAV_MISSED_TEXT = 1000 };
 int cav_command_missed(const cav_problem *problem, const cav_trajectory *motion, const cav_explanation *explanation,
                        char text[CAV_MISSED_TEXT]);
 
-/// A line of a folder's strategies.csv: whether its motion is the one that was kept, how it ended, what it changed of the
-/// problem and what it missed. Opened with no line; next: whether there is one more. tried.c.
-typedef struct cav_tried {
-  FILE *in;
-  char *line;
-  size_t room;
-  int kept;
-  const char *outcome, *changed, *reason;
-} cav_tried;
-cav_tried cav_tried_open(const char *folder);
-int cav_tried_next(cav_tried *tried);
-void cav_tried_close(cav_tried *tried);
-
 /// Tells how many strategies a folder's solve tried, and in how many seconds, where they are more than one. tried.c.
 void cav_command_tell_tried(FILE *out, const char *folder);
 
@@ -185,7 +172,8 @@ void cav_command_tell_step(FILE *out, const cav_problem *problem);
 /// explains, a line each; their number. equalities.c.
 int cav_command_tell_equalities(FILE *out, const cav_problem *problem);
 
-/// Tells which solids of the world a motion leans on that neither its first nor its last knot touches. leaned_on.c.
+/// Tells which solids of the world a motion leans on that neither its first nor its last knot touches, and that it never
+/// leaves the ground where the problem's guess does. leaned_on.c.
 void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_trajectory *motion,
                               const cav_options *contact);
 

@@ -8,6 +8,7 @@
 #include "certificate.h"
 #include "command.h"
 #include "result.h"
+#include "summary.h"
 
 static void print_when(const cav_reason *r) {
   printf("  knot %d, %.4g s", r->row.knot, r->time);

@@ -1,42 +1,9 @@
-/// What was tried for the motion of a result folder: strategies.csv, line by line.
+/// What the commands tell of what was tried for the motion of a result folder.
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "command.h"
-#include "result.h"
 #include "summary.h"
-
-cav_tried cav_tried_open(const char *folder) {
-  char *path = cav_result_path(folder, "strategies.csv");
-  cav_tried t = {.in = path ? fopen(path, "r") : NULL};
-  free(path);
-  return t;
-}
-
-int cav_tried_next(cav_tried *t) {
-  while (t->in && getline(&t->line, &t->room, t->in) > 0) {
-    // strategy,kept,outcome, numbers, and the two quoted texts that end a line: three commas, then four quotation marks
-    char *mark[7], *c = t->line;
-    int n = 0;
-    while (n < 7 && (c = strchr(c, n < 3 ? ',' : '"'))) mark[n++] = c++;
-    if (n < 7) continue;
-    char **comma = mark, **quote = mark + 3;
-    for (int k = 0; k < 3; k++) *comma[k] = 0;
-    *quote[1] = *quote[3] = 0;
-    t->kept = !strcmp(comma[0] + 1, "1");
-    t->outcome = comma[1] + 1;
-    t->changed = quote[0] + 1, t->reason = quote[2] + 1;
-    return 1;
-  }
-  return 0;
-}
-
-void cav_tried_close(cav_tried *t) {
-  if (t->in) fclose(t->in);
-  free(t->line);
-  *t = (cav_tried){0};
-}
 
 void cav_command_tell_tried(FILE *out, const char *folder) {
   int n;
