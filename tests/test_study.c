@@ -91,6 +91,44 @@ static void check_perturb(void) {
   cav_model_free(model);
 }
 
+/// How far from the floor a tree of a problem's start is, m.
+static double gap_of(const cav_problem *p, int root) {
+  cav_state *state = cav_state_new(p->model);
+  double gap = INFINITY;
+  if (!CHECK(state != NULL)) return NAN;
+  state->options.smoothing = 1;
+  CHECK(cav_position(p->model, state, p->q_start) == CAV_OK);
+  for (int i = 0; i < state->ncontact; i++) {
+    const cav_contact *c = &state->contact[i];
+    if (c->link1 > 0 && c->link2 > 0) continue;
+    if (p->model->link[c->link1 + c->link2].root == root) gap = fmin(gap, c->dist);
+  }
+  cav_state_free(state);
+  return gap;
+}
+
+// what stands beside what moves stays where it is: a box was lifted with the feet, and fell
+static void check_stands(const char *problem) {
+  for (int start = 0; start < 10; start++) {
+    cav_error error = {0};
+    cav_problem *stated = cav_problem_load(problem, NULL, &error), *moved = cav_problem_load(problem, NULL, &error);
+    if (!CHECK(stated && moved)) return;
+    CHECK(cav_study_perturb(moved, start) == CAV_OK);
+    const cav_model *m = stated->model;
+    int roots = 0, differ = 0;
+    for (int i = 1; i < m->nlink; i++) {
+      if (m->link[i].parent != 0) continue;
+      roots++;
+      CHECK_NEAR(gap_of(moved, i), gap_of(stated, i), 1e-9);
+    }
+    for (int i = 0; i < m->nq; i++) differ += moved->q_start[i] != stated->q_start[i];
+    const cav_joint *box = &m->joint[m->njoint - 1];
+    CHECK(roots == 2 && differ > 20 && box->type == CAV_JOINT_FREE);
+    CHECK(!memcmp(moved->q_start + box->q, stated->q_start + box->q, 7 * sizeof(double)));
+    cav_problem_free(stated), cav_problem_free(moved);
+  }
+}
+
 static void check_starts(const char *problem) {
   cav_study_run run[3] = {{.start = 3}, {.start = 3}, {.start = 4}};
   const cav_study_task task = {.problem = problem, .seconds = CAV_STUDY_SECONDS}, nowhere = {.problem = "/nowhere.xml"};
@@ -208,6 +246,7 @@ int main(void) {
   scene_write(top, "swing.xml", swing);
   snprintf(problem, sizeof problem, "%s/swing.xml", top);
   check_starts(problem);
+  check_stands(CAVORT_SOURCE_ROOT "/problems/motions/lift/problem.xml");
   check_mirrored(CAVORT_SOURCE_ROOT "/problems/motions/walker-walk/problem.xml");
   check_race();
   check_limit();

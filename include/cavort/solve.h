@@ -38,8 +38,8 @@ CAV_API const cav_solver_rule *cav_solver_rule_of(cav_solver solver);
 
 /// One line of progress, and of the log.
 typedef struct cav_progress {
-  const char *phase;   ///< "continuation", "sqp", "softened", "multipliers", "restoration", "ipopt", "diagnosis",
-                       ///< "recovery", "feedback"
+  const char *phase;   ///< "kinematics", "continuation", "sqp", "softened", "multipliers", "restoration", "ipopt",
+                       ///< "diagnosis", "recovery", "feedback"
   int stage, stages;   ///< where the phase is, from 1
   double fraction;     ///< of the whole solve that is done, by the stages that are behind it: an estimate
   int iteration;       ///< over the whole solve
@@ -81,6 +81,13 @@ typedef enum cav_place {
       CAV_PLACE_TYPES
 } cav_place;
 
+/// What the first stage of a solve began with (optim/METHOD.md, 5).
+typedef enum cav_begin {
+  CAV_BEGIN_GIVEN,     ///< a start that the caller gave
+  CAV_BEGIN_GUESS,     ///< the problem's guess
+  CAV_BEGIN_KINEMATICS ///< that, brought to its targets by inverse kinematics
+} cav_begin;
+
 /// All that a solve needs to go on between two of its parts and end with the same bits as if it had not stopped.
 typedef struct cav_checkpoint {
   char key[96];                   ///< the caller's mark of problem and model, "" if none; kept in files, not looked at
@@ -89,6 +96,7 @@ typedef struct cav_checkpoint {
   int stage, stages;              ///< of the schedule or of the rounds of multipliers, from 1
   double fraction, settled;       ///< of the schedule: this stage's, and that of the stage before it
   int retries;                    ///< how often this stage was taken back
+  cav_begin begin;                ///< what the first stage began with
   double radius;                  ///< of the trust region
   double law_step, time_constant; ///< s, of the contact law, which follows the step where that is free
   int iterations;                 ///< so far

@@ -417,6 +417,7 @@ static void write_tail(FILE *out, const cav_problem *p) {
   write_text(out, "next_gap", cav_problem_next_gaps[p->schedule.next_gap]);
   write_text(out, "next_slip", cav_problem_next_slips[p->schedule.next_slip]);
   write_text(out, "solids", cav_problem_solids[p->schedule.solids]);
+  if (p->schedule.kinematics) write_text(out, "kinematics", "true");
   if (p->schedule.optimality > 0) write_number(out, "optimality", p->schedule.optimality);
   fputs(">\n", out);
   write_stage(out, "first", &p->schedule.first);

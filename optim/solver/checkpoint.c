@@ -1,7 +1,7 @@
 /// Checkpoints: what a solve was about to do, its trajectory and its multipliers, told between two parts and taken up
 /// again. Between parts nothing else is carried on: models of the cost and of its curvature are found anew in each.
 ///
-/// The file has one record a line, commas between its fields: "cavort_checkpoint,1", one line for each scalar, its
+/// The file has one record a line, commas between its fields: "cavort_checkpoint,2", one line for each scalar, its
 /// name first; q and v of every knot, "q,KNOT,..."; multipliers of every knot; "end". Numbers have 17 digits, which
 /// bring every bit back.
 #include <assert.h>
@@ -57,6 +57,7 @@ static cav_status tell(cav_solve_run *run) {
   c->order = run->problem->order;
   c->stage = run->stage;
   c->stages = run->stages;
+  c->begin = run->begin_with;
   c->radius = run->region.radius;
   c->law_step = run->tr->options.timestep;
   c->time_constant = run->tr->options.time_constant;
@@ -126,6 +127,7 @@ cav_status cav_run_resume(cav_solve_run *run, cav_error *error) {
   run->optimality = c->optimality;
   run->stage = c->stage;
   run->stages = c->stages;
+  run->begin_with = c->begin;
   // parts after continuation are under the last stage's law, and ask whether rows hold
   run->tr->options.timestep = c->law_step;
   cav_stage_set(run->problem, 1, run->tr);
@@ -147,7 +149,7 @@ static void write_row(FILE *out, const char *name, int knot, size_t n, const dou
   X(stage)         \
   X(stages)        \
   X(fraction)      \
-  X(settled) X(retries) X(radius) X(law_step) X(time_constant) X(iterations) X(seconds) X(status) X(optimality)
+  X(settled) X(retries) X(begin) X(radius) X(law_step) X(time_constant) X(iterations) X(seconds) X(status) X(optimality)
 
 cav_status cav_checkpoint_write(const char *path, const cav_checkpoint *c, cav_error *error) {
   cav_file file;
@@ -157,7 +159,7 @@ cav_status cav_checkpoint_write(const char *path, const cav_checkpoint *c, cav_e
   FILE *out = file.stream;
   assert(!strpbrk(c->key, ",\n"));
   assert(c->place < CAV_PLACE_TYPES && (unsigned)c->order < ORDERS);
-  fprintf(out, "cavort_checkpoint,1\nkey,%s\nplace,%s\norder,%s\n", c->key, place_words[c->place],
+  fprintf(out, "cavort_checkpoint,2\nkey,%s\nplace,%s\norder,%s\n", c->key, place_words[c->place],
           order_words[c->order]);
 #define WRITE(field) fprintf(out, #field ",%.17g\n", (double)c->field);
   SCALARS(WRITE)
@@ -243,7 +245,7 @@ static void row(reader *r, const char *expected, int knot, size_t n, double *val
 
 static void scalars(reader *r, cav_checkpoint *c) {
   name(r, "cavort_checkpoint");
-  if (whole(r, 1, 1) != 1) return;
+  if (whole(r, 2, 2) != 2) return;
   name(r, "key");
   snprintf(c->key, sizeof c->key, "%s", field(r, 0));
   name(r, "place");
@@ -255,6 +257,7 @@ static void scalars(reader *r, cav_checkpoint *c) {
   name(r, "fraction"), c->fraction = number(r);
   name(r, "settled"), c->settled = number(r);
   name(r, "retries"), c->retries = whole(r, 0, INT_MAX);
+  name(r, "begin"), c->begin = (cav_begin)whole(r, CAV_BEGIN_GIVEN, CAV_BEGIN_KINEMATICS);
   name(r, "radius"), c->radius = number(r);
   name(r, "law_step"), c->law_step = number(r);
   name(r, "time_constant"), c->time_constant = number(r);

@@ -17,6 +17,9 @@ enum { PENALTY_RISE = 100 };
 /// Weight of depth in the world where solids grow, 1/(m^2 s); and where a record has a start that is free, at the end.
 static const double depth_weight = 1e5, free_depth_weight = 1e7;
 
+/// Penalty of the unactuated force of the first stage, where kinematics come first.
+static const double kinematic = 1e-6;
+
 /// Augmented Lagrangian: rounds, iterations a round, tolerance of a round, and the unactuated force from which
 /// restoration is safe.
 enum { ROUNDS = 6, ROUND_ITERATIONS = 15 };
@@ -153,6 +156,26 @@ cav_status cav_stage_run(cav_solve_run *run, double fraction, cav_outcome *outco
   cav_status status = cav_region_minimise(&run->region, run->normal, run->tr, &run->at, &run->spare);
   *outcome = outcome_of(run, status);
   return status;
+}
+
+int cav_run_from_guess(const cav_solve_run *run) {
+  return run->begin_with == CAV_BEGIN_GUESS && run->options->first_stage <= 1;
+}
+
+cav_status cav_kinematics_run(cav_solve_run *run) {
+  run->begin_with = CAV_BEGIN_KINEMATICS;
+  cav_stage_options stage = cav_schedule_at(&run->problem->schedule, 0);
+  int begin = run->solution->iterations;
+  run->phase = "kinematics";
+  run->stage = 1;
+  run->stages = run->problem->schedule.stages;
+  cav_stage_set(run->problem, 0, run->tr);
+  run->tr->penalty.unactuated *= kinematic;
+  run->region.iterations = stage.iterations;
+  run->region.tolerance = stage.tolerance;
+  cav_status status = cav_region_minimise(&run->region, run->normal, run->tr, &run->at, &run->spare);
+  run->region.radius = 0;
+  return cav_run_note(run, 0, begin, outcome_of(run, status)) ? status : CAV_NO_MEMORY;
 }
 
 /// Where continuation begins: the first stage, the one that the options name, or that of a checkpoint.
@@ -366,6 +389,12 @@ static cav_status rest_from_here(cav_solve_run *run, double radius) {
   return cav_run_note(run, 1, begin, outcome_of(run, status)) ? status : CAV_NO_MEMORY;
 }
 
+/// Whether every row nearly holds.
+static int is_near(const cav_solve_run *run) {
+  violation is = measure(run->tr), most = {near, near, near, near};
+  return holds(&is, &most);
+}
+
 cav_status cav_minimise_infeasibility(cav_solve_run *run) {
   run->phase = "diagnosis";
   run->stages = 2;
@@ -376,8 +405,8 @@ cav_status cav_minimise_infeasibility(cav_solve_run *run) {
   cav_status status = rest_from_here(run, INFINITY);
   cav_trajectory *first = status == CAV_OK ? cav_trajectory_copy(run->at) : NULL;
   if (status == CAV_OK && !first) status = CAV_NO_MEMORY;
-  if (status == CAV_OK) {
-    // what stalled on the way may lie far from where the guess leads
+  if (status == CAV_OK && !is_near(run)) {
+    // what stalled on the way may lie far from where the guess leads; what is nearly there does not
     double merit = cav_transcription_merit(run->tr);
     run->stage = 2;
     status = cav_guess_take(run);

@@ -17,6 +17,7 @@ typedef struct cav_solve_run {
   cav_solution *solution;
   const char *phase;
   int stage, stages;
+  cav_begin begin_with;         ///< what the first stage began with
   int warm;                     ///< the rows' final multipliers are those to start from
   int measured;                 ///< optimality and the rows' multipliers are those of at
   double optimality;            ///< predicted decrease of the cost over the cost
@@ -92,6 +93,13 @@ void cav_stage_set(const cav_problem *problem, double fraction, cav_transcriptio
 
 /// One stage, at a fraction of the way; how it ended.
 cav_status cav_stage_run(cav_solve_run *run, double fraction, cav_outcome *outcome);
+
+/// Whether the first stage began, or begins, with the guess as it is.
+int cav_run_from_guess(const cav_solve_run *run);
+
+/// The guess to where it meets targets and limits at the least cost, with forces of unactuated dofs next to free: inverse
+/// kinematics over all knots at once.
+cav_status cav_kinematics_run(cav_solve_run *run);
 
 /// Stages first to last: softness, activation distance and the penalty on unactuated force go geometrically to their
 /// ends. One that stalls is taken back and reached by a stage half way there.

@@ -92,6 +92,7 @@ cav_status cav_optimiser_solve(cav_optimiser *o, int first_stage, cav_progress *
     for (int i = 0; i < tr->knot[t].layout.count; i++) tr->knot[t].slot[i].multiplier = 0;
   cav_status status = cav_run_solve(run, error);
   if (run->failed != CAV_OK) status = run->failed;
+  run->begin_with = CAV_BEGIN_GIVEN;
   for (int t = 0; t < tr->nknot && run->measured; t++)
     for (int i = 0; i < tr->knot[t].layout.count; i++)
       tr->knot[t].slot[i].multiplier = tr->knot[t].slot[i].final_multiplier;
@@ -107,6 +108,7 @@ cav_status cav_optimiser_iterate(cav_optimiser *o, int iterations, cav_progress 
   if (iterations < 1) return CAV_BAD_INPUT;
   begin(o);
   run->phase = "multipliers";
+  run->begin_with = CAV_BEGIN_GIVEN;
   run->stage = run->stages = 1;
   run->region.iterations = run->region.single = 1;
   run->region.tolerance = 0;
@@ -178,6 +180,7 @@ cav_status cav_optimiser_shift(cav_optimiser *o, double knots, const double *q, 
   memcpy(at->v, o->v, nv * sizeof(double));
   cav_trajectory_velocities(m, at);
   shift_multipliers(o->run.tr, (int)k, part);
+  o->run.begin_with = CAV_BEGIN_GIVEN;
   if (o->options.moving_targets) cav_transcription_elapse(o->run.tr, knots * at->timestep);
   return CAV_OK;
 }

@@ -135,7 +135,10 @@ static cav_status conclude(cav_solve_run *run, int interrupted, cav_error *error
 cav_status cav_run_solve(cav_solve_run *run, cav_error *error) {
   const cav_solve_options *o = run->options;
   cav_place place = run->resume ? run->resume->place : CAV_PLACE_CONTINUATION;
-  cav_status status = place < CAV_PLACE_DIAGNOSIS ? cav_solver_run(run, error) : CAV_NOT_CONVERGED;
+  int kinematics = run->problem->schedule.kinematics && !run->resume && cav_run_from_guess(run);
+  cav_status status = kinematics ? cav_kinematics_run(run) : CAV_OK;
+  if (status != CAV_OK) return status;
+  status = place < CAV_PLACE_DIAGNOSIS ? cav_solver_run(run, error) : CAV_NOT_CONVERGED;
   if (place <= CAV_PLACE_DIAGNOSIS) {
     if (status != CAV_NOT_CONVERGED || !o->diagnose || (place < CAV_PLACE_DIAGNOSIS && cav_run_met(run))) return status;
     if (!cav_run_reaches(run, CAV_PLACE_DIAGNOSIS, &status)) return status;
@@ -223,6 +226,7 @@ cav_status cav_run_open(cav_solve_run *run, const cav_problem *problem, const ca
     memcpy(run->at->v, problem->v_start, (size_t)problem->model->nv * sizeof(double));
   }
   status = start ? take_start(run) : cav_guess_take(run);
+  run->begin_with = start ? CAV_BEGIN_GIVEN : CAV_BEGIN_GUESS;
   if (status == CAV_NO_MEMORY) fail(error, status, "not enough memory for this problem");
   return status == CAV_OK ? cav_run_resume(run, error) : status;
 }

@@ -50,6 +50,12 @@ cav_status cav_solver_run(cav_solve_run *run, cav_error *error) {
 cav_status cav_solver_gn(cav_solve_run *run, cav_error *error) {
   (void)error;
   cav_status status = cav_continuation_run(run);
+  // where it was hopeless from the guess, from where that meets its targets
+  if (status == CAV_NOT_CONVERGED && cav_run_from_guess(run)) {
+    status = cav_guess_take(run);
+    if (status == CAV_OK) status = cav_kinematics_run(run);
+    if (status == CAV_OK) status = cav_continuation_run(run);
+  }
   return status == CAV_OK ? cav_to_optimum(run) : status;
 }
 

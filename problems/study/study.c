@@ -25,22 +25,26 @@ static double processor_seconds(void) {
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/// Lowest gap between what moves and the world, seen from afar through the activation distance of the smoothed law;
-/// infinite if nothing is near.
-static cav_status lowest_gap(const cav_model *m, cav_state *state, const double *q, double *gap) {
+/// Lowest gap [nlink] between the tree of each root link and the world, seen from afar through the activation distance of
+/// the smoothed law; infinite if nothing is near.
+static cav_status lowest_gaps(const cav_model *m, cav_state *state, const double *q, double *gap) {
   state->options.smoothing = state->options.smoothing_self = 1;
   cav_status status = cav_position(m, state, q);
-  *gap = INFINITY;
-  for (int i = 0; i < state->ncontact && !status; i++)
-    if (m->pair[state->contact[i].pair].external) *gap = fmin(*gap, state->contact[i].dist);
+  for (int i = 0; i < m->nlink; i++) gap[i] = INFINITY;
+  for (int i = 0; i < state->ncontact && !status; i++) {
+    const cav_contact *c = &state->contact[i];
+    if (c->link1 > 0 && c->link2 > 0) continue;
+    double *of = &gap[m->link[c->link1 > 0 ? c->link1 : c->link2].root];
+    *of = fmin(*of, c->dist);
+  }
   return status;
 }
 
-/// Moves roots that can along the vertical.
-static void lift(const cav_model *m, double *q, double height) {
+/// Moves a root link that can along the vertical.
+static void lift(const cav_model *m, int root, double *q, double height) {
   for (int j = 0; j < m->njoint; j++) {
     const cav_joint *joint = &m->joint[j];
-    if (m->link[joint->link].parent != 0) continue;
+    if (joint->link != root) continue;
     if (joint->type == CAV_JOINT_FREE) q[joint->q + 2] += height;
     if (joint->type == CAV_JOINT_SLIDE && fabs(joint->axis[2]) > 0.9) q[joint->q] += height / joint->axis[2];
   }
@@ -50,13 +54,12 @@ static int is_root(const cav_model *m, const cav_joint *joint) {
   return m->link[joint->link].parent == 0 && (joint->type == CAV_JOINT_FREE || joint->type == CAV_JOINT_SLIDE);
 }
 
-/// Joints a little elsewhere, within their ranges; the root so that the lowest point is where it was.
+/// Joints a little elsewhere, within their ranges; the root of each tree so that its lowest point is where it was.
 static cav_status perturb_posture(const cav_model *m, double *q, uint64_t *seed) {
   cav_state *state = cav_state_new(m);
-  if (!state) return CAV_NO_MEMORY;
-  double before = 0, after = 0;
-  cav_status status = lowest_gap(m, state, q, &before);
-  for (int j = 0; j < m->njoint; j++) {
+  double *before = malloc(2 * (size_t)m->nlink * sizeof *before), *after = before ? before + m->nlink : NULL;
+  cav_status status = state && before ? lowest_gaps(m, state, q, before) : CAV_NO_MEMORY;
+  for (int j = 0; j < m->njoint && !status; j++) {
     const cav_joint *joint = &m->joint[j];
     int scalar = joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE;
     double shift = cav_random_uniform(seed);
@@ -65,13 +68,15 @@ static cav_status perturb_posture(const cav_model *m, double *q, uint64_t *seed)
     *x += joint_noise * width * shift;
     if (joint->limited) *x = fmin(fmax(*x, joint->range[0]), joint->range[1]);
   }
-  if (!status) status = lowest_gap(m, state, q, &after);
-  if (!status && isfinite(before) && isfinite(after)) lift(m, q, before - after);
+  if (!status) status = lowest_gaps(m, state, q, after);
+  for (int i = 1; i < m->nlink && !status; i++)
+    if (isfinite(before[i]) && isfinite(after[i])) lift(m, i, q, before[i] - after[i]);
   cav_state_free(state);
+  free(before);
   return status;
 }
 
-static cav_status perturb(cav_problem *p, int start) {
+cav_status cav_study_perturb(cav_problem *p, int start) {
   // the model is the problem's own, and no state of it lives
   cav_model *m = (cav_model *)p->model;
   uint64_t seed = 1000003u * (uint64_t)(start + 1);
@@ -188,7 +193,7 @@ cav_status cav_study_solve(const cav_study_task *task, cav_study_run *run, char 
   clock_of_run clock = {processor_seconds(), task->seconds};
   cav_problem *problem = cav_problem_load(task->problem, task->model, error);
   if (!problem) return error->status;
-  cav_status status = perturb(problem, run->start);
+  cav_status status = cav_study_perturb(problem, run->start);
   if (status)
     cav_file_fail(error, status, 0, "%s: cannot be perturbed: %s", task->problem, cav_status_name(status));
   else if (run->method == CAV_STUDY_STRATEGIES)

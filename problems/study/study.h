@@ -42,8 +42,12 @@ typedef struct cav_study_task {
   double seconds;              ///< processor time after which it is stopped; a verification under way is ended
 } cav_study_task;
 
-/// Reads, perturbs, solves and certifies: start k of a motion always the same. Joints move by up to 0.03 rad or 3 % of
-/// their range within it, the root so that what stood still stands; masses of links within 5 %; friction 0.6 to 1.
+/// Start k of a problem, always the same, of a model that is the problem's own: joints move by up to 0.03 rad or 3 % of
+/// their range within it, the root of each tree so that what stood still stands; masses of links within 5 %; friction 0.6
+/// to 1. CAV_NO_MEMORY, or what the dynamics says of the start.
+cav_status cav_study_perturb(cav_problem *problem, int start);
+
+/// Reads, perturbs, solves and certifies.
 /// CAV_STUDY_STRATEGIES is the race of cavort solve with one process at a time: until one is certified and achieved, and
 /// where none is, the motion counts that solve would keep. reason: why it is not certified, or what it misses of what was
 /// asked; "" if neither. Fails where the problem cannot be read or perturbed.
