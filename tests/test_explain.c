@@ -37,6 +37,14 @@ typedef struct outcome {
   cav_explanation explanation;
 } outcome;
 
+/// Whether solves end after their first step.
+static int stop_at_once;
+
+static int at_once(void *context, const cav_progress *line) {
+  (void)context, (void)line;
+  return 1;
+}
+
 static outcome solve(const char *model, const char *terms) {
   char path[160], text[4000];
   cav_error error = {0};
@@ -55,6 +63,7 @@ static outcome solve(const char *model, const char *terms) {
     return out;
   }
   cav_solve_options options = cav_solve_options_default();
+  if (stop_at_once) options.observer = at_once;
   out.status = cav_solve(out.problem, &options, NULL, &out.solution, &error);
   CHECK(out.solution != NULL);
   if (!out.solution) return out;
@@ -412,6 +421,29 @@ static void check_three(void) {
   done(&three), done(&two);
 }
 
+/// A ball beside a lever that its guess takes to a metre above the floor, where it is to be at rest: what is missing is its
+/// weight, 19.6 N, and no brake.
+static void check_unsupported(void) {
+  static const char ball[] =
+      "<mujoco><worldbody><geom name='floor' type='plane' size='1 1 1'/><body name='ball' pos='0 0 .1'>"
+      "<joint name='up' type='slide' axis='0 0 1'/><joint name='along' type='slide' axis='1 0 0'/>"
+      "<geom name='ball' type='sphere' size='.1' mass='2'/></body><body name='lever' pos='0 1 1'>"
+      "<joint name='lever' axis='0 1 0'/><geom type='capsule' fromto='0 0 0 .3 0 0' size='.02' mass='.5'/></body>"
+      "</worldbody><actuator><motor joint='lever' gear='20' ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>";
+  stop_at_once = 1;
+  outcome o = solve(ball,
+                    "<goal><joint name='up' pos='1'/></goal><cost><posture name='up' joint='up' at='end' "
+                    "weight='1e4'/></cost>\n");
+  stop_at_once = 0;
+  if (o.solution) {
+    CHECK(o.status == CAV_INTERRUPTED);
+    expect(&o, 0, 0, "joint 'up' (body 'ball')", 1, 20);
+    CHECK(names(o.explanation.violation[0].cure, "Nothing holds it up there, and it weighs 19.6 N"));
+    CHECK(!strstr(o.explanation.violation[0].cure, "brakes"));
+  }
+  done(&o);
+}
+
 int main(void) {
   if (!mkdtemp(folder)) return EXIT_FAILURE;
   check_out_of_reach();
@@ -420,6 +452,7 @@ int main(void) {
   check_inside_a_box();
   check_contradiction();
   check_three();
+  check_unsupported();
   check_penalty();
   check_speed_limit();
   check_effort_limit();

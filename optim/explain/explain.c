@@ -21,6 +21,7 @@
 #include "cavort/solve.h"
 #include "contradiction.h"
 #include "file.h"
+#include "math3.h"
 #include "problem_file.h"
 #include "transcription.h"
 
@@ -35,6 +36,9 @@ static const double at_bound = 1e-4;
 
 /// Part of the motion from which on a knot belongs to its end.
 static const double end_part = 0.75;
+
+/// Part of a body's weight from which on a missing force is what should hold it up.
+static const double carried = 0.3;
 
 /// Same thing over all its knots.
 typedef struct group {
@@ -493,6 +497,20 @@ static int ends_moving(const inquiry *in, const group *g, const cav_binding *row
   return until && in->problem->close_at_rest && !in->problem->cycle.on && row->knot >= end_part * last;
 }
 
+/// Weight in N of a body that no actuator moves where a good part of it is missed by a force without an actuator; 0:
+/// something else is.
+static double unsupported(const inquiry *in, const cav_binding *row) {
+  const cav_model *m = in->model;
+  if (row->kind != CAV_BINDING_UNACTUATED || !is_line(m, row->object)) return 0;
+  const cav_joint *joint = &m->joint[m->dof[row->object].joint];
+  if (m->link[joint->link].driven || m->link[joint->link].parent != 0) return 0;
+  double gravity = norm3(m->gravity), mass = 0;
+  double up = joint->type == CAV_JOINT_FREE ? -m->gravity[row->object - joint->dof] : -dot3(m->gravity, joint->axis);
+  for (int i = 1; i < m->nlink; i++) mass += m->link[i].root == joint->link ? m->link[i].mass : 0;
+  // the row is over the weight of all
+  return row->value * up * m->mass >= carried * mass * gravity ? mass * gravity : 0;
+}
+
 static void tell_cure(const inquiry *in, const group *g, const cav_binding *row, double saving, char *out,
                       size_t size) {
   static const char *const usual[] = {
@@ -521,6 +539,7 @@ static void tell_cure(const inquiry *in, const group *g, const cav_binding *row,
       snprintf(out, size, "The cost falls by about %.3g for each 0.01%s that it gives way.", 0.01 * saving, unit);
     return;
   }
+  const double weight = unsupported(in, row);
   const cav_binding *inside = row->kind == CAV_BINDING_UNACTUATED ? stuck(in, row->knot) : NULL;
   if (inside) {
     cure_stuck(in, inside, out, size);
@@ -528,6 +547,12 @@ static void tell_cure(const inquiry *in, const group *g, const cav_binding *row,
   }
   if (row->kind == CAV_BINDING_TERM) {
     cure_term(in, row, against, out, size);
+  } else if (weight > 0) {
+    snprintf(
+        out, size,
+        "Nothing holds it up there, and it weighs %.3g N: a lighter body, stronger actuators, or a guess in which what "
+        "is to hold it touches it.",
+        weight);
   } else if (ends_moving(in, g, row)) {
     snprintf(
         out, size,

@@ -61,7 +61,9 @@ static void show_progress(ticker *tick, const cav_progress *p) {
   tick->last = p->seconds;
   tick->shown = 1;
   char left[32] = "";
-  if (p->fraction > 0.05) snprintf(left, sizeof left, ", %.0f s left", p->seconds * (1 / p->fraction - 1));
+  // what goes on until nothing is gained any more has no length that is known
+  int staged = !strcmp(p->phase, "continuation") || !strcmp(p->phase, "feedback") || !strcmp(p->phase, "verification");
+  if (p->fraction > 0.05 && staged) snprintf(left, sizeof left, ", %.0f s left", p->seconds * (1 / p->fraction - 1));
   fprintf(stderr,
           "%s%-12s %2d/%-2d  iteration %4d  cost %9.4g  unactuated %8.2e at knot %3d  violation %8.2e  %6.1f s  %2.0f "
           "%%%s%s",
