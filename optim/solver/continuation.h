@@ -116,7 +116,7 @@ cav_status cav_augmented_lagrangian(cav_solve_run *run);
 cav_status cav_restore(cav_solve_run *run);
 
 /// Where constraints cannot all hold: to the point of least violation, where the violations balance and so say what
-/// contradicts what (explain.c): the lower of two, from the iterate and from the guess.
+/// contradicts what (explain.c): the lower of two, from the iterate and, where that is far off, from the guess.
 cav_status cav_minimise_infeasibility(cav_solve_run *run);
 
 /// Violation that planning leaves room for, by kind of row: what is planned with headroom may use half of it.
