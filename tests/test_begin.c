@@ -127,9 +127,54 @@ static void test_hopeless(void) {
   cav_problem_free(problem);
 }
 
+/// Keeps the last checkpoint of each beginning, as files.
+static int keep(void *count, const cav_checkpoint *c) {
+  char file[160];
+  cav_error error = {0};
+  if (c->place != CAV_PLACE_CONTINUATION) return 0;
+  snprintf(file, sizeof file, "%s/begin-%d.csv", folder, (int)c->begin);
+  CHECK(cav_checkpoint_write(file, c, &error) == CAV_OK);
+  ((int *)count)[c->begin]++;
+  return 0;
+}
+
+// stopped in either pass of the stages, the solve goes on to the same bits
+static void test_resumed(void) {
+  cav_error error = {0};
+  int kept[CAV_BEGIN_KINEMATICS + 1] = {0};
+  cav_problem *problem = cav_problem_load(CAVORT_SOURCE_ROOT "/tests/grip/pick.xml", NULL, &error);
+  if (!CHECK(problem != NULL)) return;
+  cav_solve_options options = cav_solve_options_default();
+  options.observer = before, options.observer_context = "sqp";
+  options.keeper = keep, options.keeper_context = kept;
+  cav_solution *whole = NULL;
+  CHECK(cav_solve(problem, &options, NULL, &whole, &error) == CAV_INTERRUPTED);
+  CHECK(kept[CAV_BEGIN_GIVEN] == 0 && kept[CAV_BEGIN_GUESS] > 0 && kept[CAV_BEGIN_KINEMATICS] > 0);
+  options.keeper = NULL;
+  for (int k = CAV_BEGIN_GUESS; k <= CAV_BEGIN_KINEMATICS && whole; k++) {
+    char file[160];
+    cav_solution *rest = NULL;
+    snprintf(file, sizeof file, "%s/begin-%d.csv", folder, k);
+    cav_checkpoint *from = cav_checkpoint_read(file, problem->model, &error);
+    options.resume = from;
+    CHECK(from && from->begin == (cav_begin)k);
+    CHECK(cav_solve(problem, &options, NULL, &rest, &error) == CAV_INTERRUPTED);
+    if (CHECK(rest != NULL)) {
+      const cav_trajectory *a = whole->trajectory, *b = rest->trajectory;
+      CHECK(rest->iterations == whole->iterations && a->nknot == b->nknot);
+      CHECK(!memcmp(a->q, b->q, (size_t)a->nknot * (size_t)a->nq * sizeof(double)));
+    }
+    cav_solution_free(rest);
+    cav_checkpoint_free(from);
+  }
+  cav_solution_free(whole);
+  cav_problem_free(problem);
+}
+
 int main(void) {
   begin_folder();
   test_spline();
   test_hopeless();
+  test_resumed();
   return check_result();
 }
