@@ -285,7 +285,11 @@ says out "effort of actuator 'p'"
 sed -e '/<sensor/d; /pos="0.2"/d' -e "s#[.][.]/[.][.]/models#$root/problems/models#" "$root/problems/motions/hopper-hop/problem.xml" >stays.xml
 run 0 solve stays.xml
 says out "note: the guess flies (apex), the motion does not: it touches the world at every knot"
+sed 's#<cost>#<cost><sensor name="up" type="framepos" body="foot" component="z" relative="start" target="0.05" at="0.4" weight="3000" within="0.02"/>#' stays.xml >toes.xml
+run 0 solve toes.xml -o toes
+says out "note: 'up' is met on the ground: at 0.4 s it bears"
 run 0 solve "$root/problems/motions/hopper-hop/problem.xml" -o hops
+check "nor is a foot that is up told to stand" [ "$(grep -c 'met on the ground' out)" = 0 ]
 check "of a motion that flies no such thing is told" [ "$(grep -c 'guess flies' out)" = 0 ]
 
 # --- what is given where something else is wanted: what it is, and the command that was meant ---

@@ -355,6 +355,7 @@ static void test_slip(void) {
     }
     CHECK(verify(&s, NULL, NULL) == CAV_OK);
     CHECK_NEAR(s.verdict.slip_mean_m_s, speed[i], 1e-12);
+    CHECK_NEAR(s.verdict.slip_step_mean_m_s, speed[i], 1e-12);
     CHECK_NEAR(s.verdict.penetration_max_m, 1e-3, 1e-12);
     // what slides most is named, and when
     if (i) CHECK(strstr(s.verdict.reason, "slip, m/s, 0.3 (at most 0.01) at knot "));
@@ -362,6 +363,25 @@ static void test_slip(void) {
     if (i) CHECK(strstr(s.verdict.reason, "N between the world and ") && strstr(s.verdict.reason, "slides at 0.3 m/s"));
     sample_free(&s);
   }
+}
+
+// a ball that rolls: its contact has no velocity, and over a step that turns it by a its point goes r (a - sin a)
+static void test_slip_over_step(void) {
+  static const char *const model = HEAD
+      "<geom name='floor' type='plane' size='5 5 1'/><body><joint name='x' type='slide' axis='1 0 0'/><joint name='z' "
+      "type='slide' axis='0 0 1'/><joint name='roll' "
+      "axis='0 1 0'/><geom name='skin' type='sphere' size='.1' mass='1'/></body></worldbody><actuator><motor "
+      "joint='x'/><motor joint='z'/><motor joint='roll'/></actuator></mujoco>";
+  const double h = 0.02, rate = 10, depth = 1e-3, radius = 0.1 - depth / 2, turn = rate * h;
+  sample s = sample_new(model, 20, h, CAV_ORDER_MIDPOINT);
+  s.q[1] = 0.1 - depth;
+  s.v[0] = rate * radius, s.v[2] = rate;
+  for (int t = 0; t <= 20; t++)
+    knot(&s, t)[0] = radius * turn * t, knot(&s, t)[1] = 0.1 - depth, knot(&s, t)[2] = turn * t;
+  CHECK(verify(&s, NULL, NULL) == CAV_OK);
+  CHECK_NEAR(s.verdict.slip_mean_m_s, 0, 1e-12);
+  CHECK_NEAR(s.verdict.slip_step_mean_m_s, radius * (turn - sin(turn)) / h, 1e-12);
+  sample_free(&s);
 }
 
 // a block that slides on the link that carries it, two links up: all slip is within the tree
@@ -602,6 +622,7 @@ int main(void) {
   test_hover();
   test_hover_bar();
   test_slip();
+  test_slip_over_step();
   test_slip_within();
   test_terms();
   test_closed_loop();

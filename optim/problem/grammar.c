@@ -94,7 +94,7 @@ static const cav_xml_element pose_joint = {
 static const cav_xml_element start = {
     "start", 1, 1,
     ATTRIBUTES(
-        POSE_SOURCE, REALS("qvel", 1, 0, "rad/s or m/s", "(zeros)", "velocity at the start, nv numbers"),
+        POSE_SOURCE, REALS("qvel", 1, 0, "rad/s or m/s", "(zeros)", "velocity at the start (of the step that leads to it), nv numbers"),
         WORD("velocity", rates, "rest", "file: the velocity at that knot of the file is the start's, too"),
         FLAG("free", "false", "posture and velocity at the start are found too: what stands here is where the guess starts")),
     CHILDREN(&pose_root, &pose_joint), 0, "posture and velocity that the motion begins with"};

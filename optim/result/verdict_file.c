@@ -96,6 +96,7 @@ void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdi
   write_number(out, "penetration_max_m", v->penetration_max_m);
   write_number(out, "penetration_between_m", v->penetration_between_m);
   write_number(out, "slip_mean_m_s", v->slip_mean_m_s);
+  write_number(out, "slip_step_mean_m_s", v->slip_step_mean_m_s);
   write_number(out, "hover_fraction", v->hover_fraction);
   write_number(out, "power_max_w", v->power_max_w);
   write_number(out, "joint_speed_max_rad_s", v->joint_speed_max_rad_s);

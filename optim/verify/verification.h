@@ -101,11 +101,12 @@ void cav_hover_result(cav_hover *hover, const cav_verification *verification, ca
 typedef struct cav_slip {
   double load;        ///< N s, of loaded contacts
   double slides, own; ///< N m: load times speed; of it between links of one tree
+  double carried;     ///< N m: load times the way of the contact's point over the step, by its length
   cav_metric most;    ///< the largest at a knot and contact
 } cav_slip;
 
-/// Adds knot t; verification->state holds the inverse there.
-void cav_slip_add(const cav_verification *verification, int t, cav_slip *slip);
+/// Adds knot t; verification->state holds the inverse there, q [nq] is scratch. Fails as cav_position.
+cav_status cav_slip_add(const cav_verification *verification, int t, double *q, cav_slip *slip);
 
 /// Rates that are told: of an actuator W, of joints rad/s and over the limit of the model's file (negative: none has
 /// one). rates.c.

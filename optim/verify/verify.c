@@ -347,7 +347,8 @@ static cav_status examine_knot(cav_verification *verification, int t, cav_balanc
   if (t >= verification->rows) cav_rates_add(verification, t, work + nv, &found->rates);
   if (t >= verification->rows) return CAV_OK;
   memcpy(verification->u + knot * nv, work, sizeof(double) * nv);
-  cav_slip_add(verification, t, &found->slip);
+  status = cav_slip_add(verification, t, work + nv, &found->slip);
+  if (status != CAV_OK) return status;
   note_forces(verification, t, v, work, verification->control + knot * model->nu, work + nv, "", found);
   cav_residual_add(verification, t, work + nv, &found->residual);
   cav_balance_add(balance, verification, t, work + nv);
@@ -561,6 +562,7 @@ static void fill(const cav_verification *verification, const metrics *found, con
   verdict->penetration_max_m = found->penetration.value;
   verdict->penetration_between_m = found->between.value;
   verdict->slip_mean_m_s = found->slip.load > 0 ? found->slip.slides / found->slip.load : 0;
+  verdict->slip_step_mean_m_s = found->slip.load > 0 ? found->slip.carried / found->slip.load : 0;
   verdict->slip_self = found->slip.slides > 0 ? found->slip.own / found->slip.slides : 0;
   verdict->hover_fraction = found->hover.value;
   verdict->power_max_w = found->rates.power;

@@ -1,6 +1,6 @@
 /// What of the world a motion leans on where neither its first nor its last knot does: a wall that can be stood on is stood
 /// on, and who asked for a way over it is told. And whether a motion whose guess flies does not: who asked for a height alone
-/// may get one that rears up to it.
+/// may get one that rears up to it. And whether a body that is asked up at a time is up on its toes.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -47,6 +47,61 @@ static int is_in_the_air(const cav_model *m, const cav_forces *forces, double we
   return flies;
 }
 
+/// Height of a term's object at a knot of the motion.
+static double height_at(const cav_model *m, cav_state *state, const cav_term *term, const cav_trajectory *motion,
+                        int t) {
+  cav_pose pose = {.pos = {0, 0, NAN}};
+  if (cav_position(m, state, motion->q + (size_t)t * (size_t)m->nq) == CAV_OK)
+    cav_object_pose(m, state, term->sensor.object_type, term->sensor.object, &pose);
+  return pose.pos[2];
+}
+
+/// Whether a term asks for a height of something at one time.
+static int asks_height(const cav_term *term) {
+  return term->quantity == CAV_QUANTITY_SENSOR && term->sensor.type == CAV_SENSOR_FRAMEPOS && !term->sensor.referred &&
+         (term->component < 0 || term->component == 2) && term->target && term->from == term->to && term->from > 0;
+}
+
+// m from which on something is higher than at the start
+static const double raised = 0.02;
+
+/// What the ground still bears of a link at a knot, N.
+static double borne_of(const cav_model *m, const cav_forces *forces, int knot, int link) {
+  double borne = 0;
+  int part;
+  for (int i = 0; i < forces->nforce; i++) {
+    const cav_contact_force *f = &forces->force[i];
+    const int one = m->geom[f->geom1].link, other = m->geom[f->geom2].link;
+    if (f->knot == knot && (one == link || other == link) && (one == 0 || other == 0) && solid_of(m, f, &part) < 0)
+      borne += size_of(f);
+  }
+  return borne;
+}
+
+/// Bodies that are asked to be higher than at the start at a time and are, on what of them still stands on the ground.
+static void tell_toes(FILE *out, const cav_problem *problem, const cav_trajectory *motion, const cav_forces *forces,
+                      double weight) {
+  const cav_model *m = problem->model;
+  cav_state *state = cav_state_new(m);
+  for (int i = 0, n = 0; state && i < problem->nterm && n < NAMED; i++) {
+    const cav_term *term = &problem->term[i];
+    if (!asks_height(term)) continue;
+    const int t = (int)lround(term->from / motion->timestep),
+              link = cav_object_link(m, term->sensor.object_type, term->sensor.object);
+    if (t >= motion->nknot || link <= 0) continue;
+    const double before = height_at(m, state, term, motion, 0), borne = borne_of(m, forces, t, link);
+    if (!(term->target[2] > before + raised && height_at(m, state, term, motion, t) > before + raised)) continue;
+    if (borne < leaning * weight) continue;
+    n++;
+    fprintf(
+        out,
+        "  note: '%s' is met on the ground: at %.3g s it bears %.3g N of that body; off the ground is higher than it "
+        "reaches on its toes, or a height of the centre of mass that nothing reaches on the ground\n",
+        term->name && *term->name ? term->name : "a height", term->from, borne);
+  }
+  cav_state_free(state);
+}
+
 void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_trajectory *motion,
                               const cav_options *contact) {
   const cav_model *m = problem->model;
@@ -76,6 +131,7 @@ void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_t
         out,
         "  note: the guess flies (apex), the motion does not: it touches the world at every knot; heights of feet at "
         "a time make it leave the ground\n");
+  if (forces) tell_toes(out, problem, motion, forces, weight);
   cav_forces_free(forces);
   free(most), free(with);
 }

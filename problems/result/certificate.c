@@ -46,6 +46,7 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
   add_number(line, &n, "penetration", v->penetration_max_m, CAV_TOLERANCE_PENETRATION, 1e3, " mm");
   add_number(line, &n, "penetration between knots", v->penetration_between_m, CAV_TOLERANCE_PENETRATION, 1e3, " mm");
   add_number(line, &n, "slip of loaded contacts, mean", v->slip_mean_m_s, CAV_TOLERANCE_SLIP, 1e3, " mm/s");
+  add_number(line, &n, "the same over whole steps", v->slip_step_mean_m_s, NAN, 1e3, " mm/s");
   add_number(line, &n, "contact force across open gaps, fraction", v->hover_fraction, CAV_TOLERANCE_HOVER, 100, " %");
   add_number(line, &n, "momentum defect, rms, fraction of weight", v->momentum_defect_rms, CAV_TOLERANCE_MOMENTUM, 100,
              " %");
@@ -135,6 +136,11 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
   if (v->model_contacts_seconds < whole * (1 - 1e-9))
     fprintf(out, "  note: under the contact parameters of the model's file its closed loop is lost at %.3g of %.3g s\n",
             v->model_contacts_seconds, whole);
+  if (v->slip_mean_m_s <= CAV_TOLERANCE_SLIP && v->slip_step_mean_m_s > 2 * CAV_TOLERANCE_SLIP)
+    fprintf(out,
+            "  note: over whole steps loaded contacts move at %.3g mm/s on the mean: links that turn carry them on; "
+            "<schedule next_slip=\"exact\"/> holds them, or a smaller time step\n",
+            1e3 * v->slip_step_mean_m_s);
   if (v->end_body[0])
     fprintf(out,
             "  note: it ends in motion: '%s' at %.2g m/s, turning at %.2g rad/s; whether that comes to rest, or falls, "
