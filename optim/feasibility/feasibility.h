@@ -103,6 +103,14 @@ cav_status cav_centre_of_tree(cav_examination *e, int root, double centre[3], do
 /// Highest that the centre of mass of a tree can be at times, m; infinite where nothing bounds it. takeoff.c.
 cav_status cav_takeoff_heights(cav_examination *e, int root, int n, const double *time, double *highest);
 
+/// Whether a flight is a parabola: gravity is vertical, and no medium, equality constraint, compensation of gravity or spring
+/// of a tendon acts. A root that floats: no actuator acts on its joints, force [nv] of cav_effort_of_dofs, and one of them is
+/// free or slides upwards without end. How high the centre of mass of a tree can be while something of it touches level planes
+/// of the world; infinite where something else may touch it, or nothing bounds that. takeoff.c.
+int cav_flight_is_covered(const cav_model *model);
+int cav_root_floats(const cav_examination *e, int root, const double *force);
+double cav_ground_reach(const cav_examination *e, int root);
+
 /// The conditions, each with its proofs.
 cav_status cav_examine_contradictions(cav_examination *e); // contradiction.c
 cav_status cav_examine_distances(cav_examination *e);      // distance.c
@@ -116,6 +124,7 @@ cav_status cav_examine_hinge(cav_examination *e);          // hinge.c
 cav_status cav_examine_slides(cav_examination *e);         // slide.c
 cav_status cav_examine_energy(cav_examination *e);         // energy.c
 cav_status cav_examine_takeoff(cav_examination *e);        // takeoff.c
+cav_status cav_examine_floats(cav_examination *e);         // float.c
 cav_status cav_examine_holds(cav_examination *e);          // hold.c
 cav_status cav_examine_speeds(cav_examination *e);         // speed.c
 
