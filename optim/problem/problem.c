@@ -290,8 +290,11 @@ static cav_status check_tendons(const cav_problem_reader *reader, const cav_xml_
     const cav_tendon *tendon = &m->tendon[i];
     double length = state->tendon_length[i];
     if (!tendon->limited || (length >= tendon->range[0] - slack && length <= tendon->range[1] + slack)) continue;
-    status = cav_xml_fail(reader->error, node, NULL, "tendon '%s' has length %g, outside its range %g .. %g",
-                          tendon->name, length, tendon->range[0], tendon->range[1]);
+    char number[32];
+    snprintf(number, sizeof number, "%d (no name)", i);
+    status = cav_xml_fail(reader->error, node, NULL, "tendon %s%s%s has length %g, outside its range %g .. %g",
+                          *tendon->name ? "'" : "", *tendon->name ? tendon->name : number, *tendon->name ? "'" : "",
+                          length, tendon->range[0], tendon->range[1]);
   }
   cav_state_free(state);
   return status;

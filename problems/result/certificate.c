@@ -115,8 +115,9 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
   if (isnan(v->optimality))
     fprintf(out, "how optimal is not known\n");
   else
-    fprintf(out, "%s to %.1g (the word needs %g)\n", cav_verdict_optimal(v) ? "locally optimal" : "NOT optimal, but",
-            v->optimality, CAV_TOLERANCE_OPTIMAL);
+    fprintf(out, "%s to %.*g (the word needs %g)\n", cav_verdict_optimal(v) ? "locally optimal" : "NOT optimal, but",
+            v->optimality > CAV_TOLERANCE_OPTIMAL && v->optimality < 2 * CAV_TOLERANCE_OPTIMAL ? 4 : 1, v->optimality,
+            CAV_TOLERANCE_OPTIMAL);
   const double asked = problem->schedule.optimality;
   if (asked > 0 && v->optimality > asked)
     fprintf(out, "  the problem asks for %g (<schedule optimality>): not reached; --solver both goes on by Ipopt\n",
