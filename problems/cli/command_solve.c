@@ -181,7 +181,7 @@ static int save(void *context, const cav_problem *problem, const cav_solution *s
   const cav_verdict *verdict = &report->verdict;
   cav_error error = {0};
   // it may also have been stopped while other strategies were tried, and this one was verified before
-  int stopped = report->status == CAV_INTERRUPTED, ended = stopped || (interrupted && !cav_race_success(report));
+  int stopped = report->status == CAV_INTERRUPTED, ended = stopped || (report->stopped && !cav_race_success(report));
   if (ended)
     fprintf(stderr, "cavort: %s; the best iterate is saved, the same command with --resume goes on\n",
             stopped ? verdict->reason : "stopped while other strategies were tried");
