@@ -221,7 +221,7 @@ static void check_verdict(const cav_problem *problem) {
   for (int lost = 0; lost < 2; lost++) {
     char table[8000];
     verdict.periods = 2, verdict.duration = 1.5, verdict.model_contacts_seconds = lost ? 2.25 : 3;
-    verdict.optimality = lost ? 0.2 : 0.9e-4;
+    verdict.optimality = lost ? 1.04e-4 : 0.9e-4;
     FILE *out = fopen(problem_path, "w+");
     CHECK(out != NULL);
     if (!out) return;
@@ -232,6 +232,9 @@ static void check_verdict(const cav_problem *problem) {
     CHECK((strstr(table, "is lost at 2.25 of 3 s") != NULL) == lost);
     // and one that is not optimal says what to do
     CHECK((strstr(table, "--solver both") != NULL) == lost);
+    // in so many digits that it is seen on which side of its limit it is
+    CHECK((strstr(table, "NOT optimal, but to 0.000104 (the word needs 0.0001)") != NULL) == lost);
+    CHECK((strstr(table, "locally optimal to 9e-05 (the word needs 0.0001)") != NULL) == !lost);
   }
   write_file(problem_path, problem_text);
   verdict.limit_violation_max = 1e-3;

@@ -204,11 +204,15 @@ says out "certified: swing on pendulum"
 says err "continuation"
 for name in trajectory.csv forces.csv controls.csv gains.csv log.csv stages.csv problem.xml strategies.csv verdict.json view.html; do has "swing.result/$name"; done
 sum() { sha256sum "$1" | cut -d' ' -f1; }
+says out "asked   "
 says swing.result/verdict.json "\"problem_sha256\": \"$(sum problem.xml)\", \"model_sha256\": \"$(sum model.xml)\""
 says swing.result/verdict.json 'cavort solve problem.xml"'
 for field in version commit compiler features machine date; do
   check "a result's $field" grep -q "\"$field\": \"[^\"]" swing.result/verdict.json
 done
+sed '/<cost>/d' problem.xml >aimless.xml
+run 0 solve aimless.xml -o aimless
+check "no heading over no targets" sh -c '! grep -q "^asked" out'
 # an earlier result is not replaced, nor moved with what is not its own
 run 0 solve modelless.xml --model model.xml -o twice
 cp twice/verdict.json first.json
@@ -329,6 +333,7 @@ run 2 explain bare
 says err "holds no result"
 run 2 explain nowhere
 says err "there is no such folder"
+says err "none of a problem that is proven impossible: cavort inspect PROBLEM tells the proof"
 
 # --- a motion that cannot be: no certificate, and still a result ---
 
@@ -656,6 +661,27 @@ run 1 verify caught
 says out "was stopped while other strategies were tried"
 run 0 explain swing.result
 check "of a whole solve nothing is said" sh -c '! grep -q "was stopped" out'
+
+# stopped while other strategies are tried, of which one that has ended in a process of its own is the best
+cat >hop.xml <<TEXT
+<problem name="hop" model="$root/problems/models/hopper.xml"><horizon duration="0.8" timestep=".02"/>
+<start height="floor"><joint name="knee" degrees="60"/></start><goal height="floor"><joint name="knee" degrees="60"/></goal>
+<cost><sensor type="subtreecom" body="torso" component="z" relative="start" target="1.5" at="0.4" weight="1000"/></cost></problem>
+TEXT
+"$cavort" solve hop.xml -o hopped --threads 1 >out 2>err &
+child=$!
+tries=0
+while [ "$tries" -lt 600 ] && ! grep -qs '^strategy repair-1 *not' err; do
+  kill -0 "$child" 2>/dev/null || break
+  sleep 0.05
+  tries=$((tries + 1))
+done
+kill -INT "$child"
+wait "$child"
+status=$?
+says err "stopped while other strategies were tried"
+says err "kept: strategy repair-1"
+check "interrupted among strategies: status $status, expected 130" [ "$status" -eq 130 ]
 
 run 0 solve problem.xml -o swing.result --resume --quiet
 sed 's/duration="1"/duration="2"/' problem.xml >longer.xml

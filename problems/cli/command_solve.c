@@ -173,8 +173,6 @@ static const char *why_stopped(int status) {
   return "the solver did not reach its tolerance; the best iterate is saved";
 }
 
-static const char stopped_among[] = "stopped while other strategies were tried";
-
 // writes a result and tells its verdict; the exit status
 static int save(void *context, const cav_problem *problem, const cav_solution *solution,
                 const cav_race_report *report) {
@@ -183,10 +181,10 @@ static int save(void *context, const cav_problem *problem, const cav_solution *s
   const cav_verdict *verdict = &report->verdict;
   cav_error error = {0};
   // it may also have been stopped while other strategies were tried, and this one was verified before
-  int stopped = report->status == CAV_INTERRUPTED, ended = stopped || (interrupted && !cav_race_success(report));
+  int stopped = report->status == CAV_INTERRUPTED, ended = stopped || (report->stopped && !cav_race_success(report));
   if (ended)
     fprintf(stderr, "cavort: %s; the best iterate is saved, the same command with --resume goes on\n",
-            stopped ? verdict->reason : stopped_among);
+            stopped ? verdict->reason : "stopped while other strategies were tried");
   else if (report->status)
     fprintf(stderr, "cavort: %s\n", report->text[0] ? report->text : why_stopped(report->status));
   cav_provenance provenance = *to->provenance;
@@ -312,11 +310,6 @@ static int solve_from(const cav_command_line *line, const cav_problem *problem, 
   if (best >= 0 && race.tell && !interrupted && !cav_race_success(&race.entry[best].report)) tell_cause(&race);
   if (best >= 0) {
     done = cav_race_save(&race, best);
-    // the process of a strategy that was done before does not know
-    if (interrupted && done == CAV_EXIT_NOT_CERTIFIED) {
-      fprintf(stderr, "cavort: %s; the best motion is saved, the same command with --resume goes on\n", stopped_among);
-      done = CAV_EXIT_INTERRUPTED;
-    }
     char *path = cav_result_path(folder, "strategies.csv");
     status = path ? cav_race_write(&race, best, path, &error) : cav_file_fail(&error, CAV_NO_MEMORY, 0, "no memory");
     free(path);

@@ -339,6 +339,9 @@ cav_status cav_race_first(cav_race *race, cav_error *error) {
   return cav_file_fail(error, status, 0, "%s", e->report.text[0] ? e->report.text : cav_status_name(status));
 }
 
+// what a child is told: to save what it has; it knows of no interruption that came after it had ended
+enum { SAVE = 1, SAVE_STOPPED };
+
 // all of a report, or 0
 static int whole(int end, void *data, size_t size, int writes) {
   for (char *at = data; size > 0;) {
@@ -372,7 +375,7 @@ static void work(cav_race *race, int i, double spent) {
   report.seconds = cav_race_seconds(race) - spent;
   int done = 0;
   if (whole(e->answer, &report, sizeof report, 1) && whole(e->order, &order, 1, 0) && solution)
-    done = race->save(race->context, &taken, solution, &report);
+    report.stopped = order == SAVE_STOPPED, done = race->save(race->context, &taken, solution, &report);
   fflush(NULL);
   _exit(done);
 }
@@ -625,9 +628,10 @@ int cav_race_save(cav_race *race, int best) {
   cav_race_entry *e = &race->entry[best];
   cav_problem taken;
   cav_strategy_apply(race->problem, &e->strategy, &taken);
+  e->report.stopped = *race->interrupted != 0;
   if (e->solution) return race->save(race->context, &taken, e->solution, &e->report);
   int how = 0;
-  char order = 1;
+  char order = e->report.stopped ? SAVE_STOPPED : SAVE;
   fflush(NULL);
   if (!whole(e->order, &order, 1, 1)) return CAV_EXIT_INTERNAL;
   while (waitpid(e->child, &how, 0) < 0 && errno == EINTR) continue;

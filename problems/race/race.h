@@ -11,6 +11,7 @@
 typedef struct cav_race_report {
   int status;   ///< of cav_solve
   int solution; ///< 1: there is one, and verdict, cost and iterations are about it
+  int stopped;  ///< 1, where it is saved: the race was interrupted, before or after this one ended
   cav_verdict verdict;
   double cost;
   double seconds;                     ///< of the processor, of a process of its own

@@ -3,6 +3,7 @@
 #include "certificate.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "csv.h"
@@ -17,11 +18,20 @@ static void add(cav_certificate_line *line, int *n, const char *label, const cha
   at->passed = passed;
 }
 
+// a number in as many digits, or in as many more as it takes to tell it from its limit
+static void write_apart(char out[32], int digits, double value, double limit) {
+  char most[32];
+  snprintf(most, sizeof most, "%g", limit);
+  do snprintf(out, 32, "%.*g", digits, value);
+  while (value != limit && strtod(out, NULL) == strtod(most, NULL) && digits++ < 17);
+}
+
 // a number that must not exceed another, both times scale, with a unit
 static void add_number(cav_certificate_line *line, int *n, const char *label, double value, double limit, double scale,
                        const char *unit) {
-  char shown[64], most[64];
-  snprintf(shown, sizeof shown, "%.3g%s", value * scale, unit);
+  char number[32], shown[64], most[64];
+  write_apart(number, 3, value * scale, limit * scale);
+  snprintf(shown, sizeof shown, "%s%s", number, unit);
   snprintf(most, sizeof most, "%g%s", limit * scale, unit);
   add(line, n, label, isnan(value) ? "not known" : shown, isnan(limit) ? "" : most, isnan(limit) ? -1 : value <= limit);
 }
@@ -111,13 +121,14 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
   }
   if (report) print_targets(out, problem, report);
   if (!isnan(v->solve_seconds)) fprintf(out, "  solved in %.1f s, %d iterations\n", v->solve_seconds, v->iterations);
+  char optimality[32];
+  write_apart(optimality, 1, v->optimality, CAV_TOLERANCE_OPTIMAL);
   fprintf(out, "%s, ", cav_verdict_feasible(v) ? "feasible" : "NOT feasible");
   if (isnan(v->optimality))
     fprintf(out, "how optimal is not known\n");
   else
-    fprintf(out, "%s to %.*g (the word needs %g)\n", cav_verdict_optimal(v) ? "locally optimal" : "NOT optimal, but",
-            v->optimality > CAV_TOLERANCE_OPTIMAL && v->optimality < 2 * CAV_TOLERANCE_OPTIMAL ? 4 : 1, v->optimality,
-            CAV_TOLERANCE_OPTIMAL);
+    fprintf(out, "%s to %s (the word needs %g)\n", cav_verdict_optimal(v) ? "locally optimal" : "NOT optimal, but",
+            optimality, CAV_TOLERANCE_OPTIMAL);
   const double asked = problem->schedule.optimality;
   if (asked > 0 && v->optimality > asked)
     fprintf(out, "  the problem asks for %g (<schedule optimality>): not reached; --solver both goes on by Ipopt\n",
