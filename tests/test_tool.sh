@@ -596,6 +596,30 @@ if "$cavort" solve problem.xml -o asked --solver ipopt --quiet >out 2>err || ! g
   says err "kept is its iterate"
 fi
 
+# a goal inside a solid, with what asks for it; a start that nothing holds; what stands says neither
+cat >sunk.xml <<TEXT
+<problem name="sunk" model="$root/problems/models/hopper.xml"><horizon duration="0.6" timestep=".02"/>
+<start height="floor"><joint name="knee" degrees="60"/></start>
+<goal height="floor" rise="-0.4"><joint name="knee" degrees="60"/></goal>
+<cost><posture name="landing" dofs="all" at="end" weight="900"/></cost></problem>
+TEXT
+run 0 inspect sunk.xml
+check "how deep the goal is" grep -qE "^note: the goal has geom 'foot' 400 mm inside 'floor', and a certificate allows 5: 'landing' asks for it" out
+sed -i '/landing/s/<posture.*\/>/<effort weight="1"\/>/; /landing/d' sunk.xml
+run 0 inspect sunk.xml
+says out "no motion ends there, it only leads the guess"
+"$cavort" solve sunk.xml -o sunk --strategies 1 --threads 1 >out 2>err
+says err "note: the goal has geom 'foot' 400 mm inside 'floor'"
+cat >falls.xml <<TEXT
+<problem name="falls" model="$root/problems/models/humanoid.xml"><horizon duration="2" timestep=".04"/>
+<start key="stand"><root pos="0 0 3"/></start><goal key="stand" height="floor"/></problem>
+TEXT
+run 0 inspect falls.xml
+check "a start in the air" grep -qE "^note: at the start 'torso' touches nothing and is at rest, [0-9.]+ m above what is below it: it falls" out
+sed 's/><root[^>]*><.start>/ height="floor"\/>/' falls.xml >stands.xml
+run 0 inspect stands.xml
+check "what stands is not told of" sh -c '! grep -q "^note" out'
+
 # --- interruption, and going on from there ---
 
 # a motion long enough to be caught on its way

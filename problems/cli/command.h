@@ -172,6 +172,10 @@ void cav_command_tell_step(FILE *out, const cav_problem *problem);
 /// explains, a line each; their number. equalities.c.
 int cav_command_tell_equalities(FILE *out, const cav_problem *problem);
 
+/// Tells of a start that is given in the air, at rest and held by nothing, and of a goal deep inside a solid, a line each; their
+/// number. postures.c.
+int cav_command_tell_postures(FILE *out, const cav_problem *problem);
+
 /// Tells which solids of the world a motion leans on that neither its first nor its last knot touches, and that it never
 /// leaves the ground where the problem's guess does. leaned_on.c.
 void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_trajectory *motion,
