@@ -296,14 +296,8 @@ run 0 solve "$root/problems/motions/hopper-hop/problem.xml" -o hops
 check "nor is a foot that is up told to stand" [ "$(grep -c 'met on the ground' out)" = 0 ]
 check "of a motion that flies no such thing is told" [ "$(grep -c 'guess flies' out)" = 0 ]
 
-# --- a goal in the ground is told; new writes a file for a model whose start no problem may have, and says so ---
+# --- new writes a file for a model whose start no problem may have, and says so ---
 
-cat >sunk.xml <<TEXT
-<problem name="sunk" model="$root/problems/models/humanoid.xml"><horizon duration="1" timestep="0.05"/><start key="stand" height="floor"/>
-<goal key="stand" height="floor" rise="-0.3"/><cost><posture dofs="all" at="end" weight="900"/></cost></problem>
-TEXT
-run 0 inspect sunk.xml
-says out "mm deep in 'floor': no motion ends there"
 cat >hung.xml <<'TEXT'
 <mujoco model="hung"><worldbody><site name="hook" pos="0 0 1"/><body name="lamp" pos="0 0 .5"><freejoint/>
 <geom size=".05"/><site name="eye"/></body></worldbody>
@@ -617,6 +611,30 @@ if "$cavort" solve problem.xml -o asked --solver ipopt --quiet >out 2>err || ! g
   says err "iteration limit (max_iter)"
   says err "kept is its iterate"
 fi
+
+# a goal inside a solid, with what asks for it; a start that nothing holds; what stands says neither
+cat >sunk.xml <<TEXT
+<problem name="sunk" model="$root/problems/models/hopper.xml"><horizon duration="0.6" timestep=".02"/>
+<start height="floor"><joint name="knee" degrees="60"/></start>
+<goal height="floor" rise="-0.4"><joint name="knee" degrees="60"/></goal>
+<cost><posture name="landing" dofs="all" at="end" weight="900"/></cost></problem>
+TEXT
+run 0 inspect sunk.xml
+check "how deep the goal is" grep -qE "^note: the goal has geom 'foot' 400 mm inside 'floor', and a certificate allows 5: 'landing' asks for it" out
+sed -i '/landing/s/<posture.*\/>/<effort weight="1"\/>/; /landing/d' sunk.xml
+run 0 inspect sunk.xml
+says out "no motion ends there, it only leads the guess"
+"$cavort" solve sunk.xml -o sunk --strategies 1 --threads 1 >out 2>err
+says err "note: the goal has geom 'foot' 400 mm inside 'floor'"
+cat >falls.xml <<TEXT
+<problem name="falls" model="$root/problems/models/humanoid.xml"><horizon duration="2" timestep=".04"/>
+<start key="stand"><root pos="0 0 3"/></start><goal key="stand" height="floor"/></problem>
+TEXT
+run 0 inspect falls.xml
+check "a start in the air" grep -qE "^note: at the start 'torso' touches nothing and is at rest, [0-9.]+ m above what is below it: it falls" out
+sed 's/><root[^>]*><.start>/ height="floor"\/>/' falls.xml >stands.xml
+run 0 inspect stands.xml
+check "what stands is not told of" sh -c '! grep -q "^note" out'
 
 # --- interruption, and going on from there ---
 

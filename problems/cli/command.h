@@ -168,12 +168,13 @@ int cav_command_tell_stopped(FILE *out, const char *folder);
 /// Tells of a step in which bodies fall far: milliseconds, perhaps, where seconds are meant. inspect.c.
 void cav_command_tell_step(FILE *out, const cav_problem *problem);
 
-/// Tells of a goal that lies deep in the world. inspect.c.
-void cav_command_tell_goal(FILE *out, const cav_problem *problem);
-
 /// Tells which equality constraints of the model a start that is given, or a goal, breaks by more than their softness
 /// explains, a line each; their number. equalities.c.
 int cav_command_tell_equalities(FILE *out, const cav_problem *problem);
+
+/// Tells of a start that is given in the air, at rest and held by nothing, and of a goal deep inside a solid, a line each; their
+/// number. postures.c.
+int cav_command_tell_postures(FILE *out, const cav_problem *problem);
 
 /// Tells which solids of the world a motion leans on that neither its first nor its last knot touches, and that it never
 /// leaves the ground where the problem's guess does. leaned_on.c.

@@ -189,6 +189,8 @@ int cav_command_explain(const cav_command_line *line) {
     tell_remedy(result, &verdict, line->operand, missed, sizeof missed);
   int stopped = !status && cav_command_tell_stopped(line->json ? NULL : stdout, line->operand);
   if (!status && !line->json && !verdict.certified) cav_command_tell_equalities(stdout, result->problem);
+  if (!status && !line->json && !(verdict.certified && verdict.achieved))
+    cav_command_tell_postures(stdout, result->problem);
   if (!status && line->json) {
     printf("{\n  \"stopped\": %s,\n", stopped ? "true" : "false");
     printf(

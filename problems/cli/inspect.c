@@ -425,31 +425,6 @@ void cav_command_tell_step(FILE *out, const cav_problem *p) {
             p->timestep);
 }
 
-void cav_command_tell_goal(FILE *out, const cav_problem *p) {
-  static const double deep = 0.02; // m; a start as deep is refused
-  const cav_model *m = p->model;
-  cav_state *state = cav_state_new(m);
-  const cav_contact *deepest = NULL;
-  if (state && !p->cycle.on && cav_position(m, state, p->q_goal) == CAV_OK)
-    for (int i = 0; i < state->ncontact; i++) {
-      const cav_contact *c = &state->contact[i];
-      if ((c->link1 == 0 || c->link2 == 0) && c->dist < (deepest ? deepest->dist : -deep)) deepest = c;
-    }
-  if (deepest) {
-    const cav_pair *pair = &m->pair[deepest->pair];
-    const int solid = deepest->link1 == 0 ? pair->geom1 : pair->geom2,
-              of = solid == pair->geom1 ? pair->geom2 : pair->geom1;
-    const char *in = m->geom[solid].name, *body = m->body[m->geom[of].body].name;
-    fprintf(
-        out,
-        "note: the goal has '%s' %.3g mm deep in %s%s%s: no motion ends there. <goal height=\"floor\"> without a rise "
-        "below 0 stands on the ground\n",
-        body && *body ? body : "a body", -1e3 * deepest->dist, in && *in ? "'" : "", in && *in ? in : "the world",
-        in && *in ? "'" : "");
-  }
-  cav_state_free(state);
-}
-
 static cav_status print_problem(const cav_problem *p, cav_error *error) {
   static const char *const order[] = {"euler", "midpoint", "momentum"};
   int knots = (int)lround(p->duration / p->timestep) + 1;
@@ -460,7 +435,7 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
                             : "open after the last knot");
   cav_command_tell_step(stdout, p);
   cav_command_tell_equalities(stdout, p);
-  cav_command_tell_goal(stdout, p);
+  cav_command_tell_postures(stdout, p);
   if (p->duration_most > 0)
     printf("  duration free from %g to %g s, weight %g\n", p->duration_least, p->duration_most, p->duration_weight);
   if (p->cycle.on)

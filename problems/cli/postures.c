@@ -1,0 +1,122 @@
+/// What the commands say of a start that nothing holds up, and of a goal that no motion can come to: one inside a solid. A start
+/// inside one is a proof that nothing can be solved (cav_problem_impossible); of a goal it depends on what is asked, since a
+/// goal also is no more than the end of a guess.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cavort/dynamics.h"
+#include "cavort/problem.h"
+#include "cavort/solve.h"
+#include "command.h"
+
+// clear of everything by more than this it falls rather than settles
+static const double clear = 0.02; // m
+
+/// The posture evaluated, with contacts that are so far apart. NULL: it cannot be.
+static cav_state *posture_of(const cav_problem *p, const double *q, double apart) {
+  cav_state *state = cav_state_new(p->model);
+  if (!state) return NULL;
+  state->options.smoothing = state->options.smoothing_self = apart;
+  if (!cav_position(p->model, state, q)) return state;
+  cav_state_free(state);
+  return NULL;
+}
+
+/// The term that asks for the goal's posture at the end, by more than the usual weight of the way there; NULL: none does.
+static const cav_term *asks_for_goal(const cav_problem *p) {
+  for (int i = 0; i < p->nterm; i++) {
+    const cav_term *t = &p->term[i];
+    const double to = t->to < 0 ? p->duration : t->to;
+    if (t->quantity != CAV_QUANTITY_CONFIGURATION || t->target || t->nwaypoint || to < p->duration - p->timestep / 2)
+      continue;
+    if (t->use != CAV_USE_COST || (t->weight > 0 && t->from >= to - 1e-9 && isfinite(t->within))) return t;
+  }
+  return NULL;
+}
+
+static int tell_depth(FILE *out, const cav_problem *p) {
+  const cav_model *m = p->model;
+  cav_state *state = posture_of(p, p->q_goal, 0);
+  const cav_contact *deepest = NULL;
+  for (int i = 0; state && i < state->ncontact; i++)
+    if (!deepest || state->contact[i].dist < deepest->dist) deepest = &state->contact[i];
+  const int deep = deepest && -deepest->dist > CAV_TOLERANCE_PENETRATION;
+  if (deep) {
+    const cav_pair *pair = &m->pair[deepest->pair];
+    const int stands = m->geom[pair->geom2].link == 0 ? pair->geom2 : pair->geom1;
+    const int moves = stands == pair->geom1 ? pair->geom2 : pair->geom1;
+    char one[CAV_GEOM_LABEL], other[CAV_GEOM_LABEL];
+    const cav_term *asked = asks_for_goal(p);
+    fprintf(out, "note: the goal has geom '%.48s' %.3g mm inside '%.48s', and a certificate allows %g: ",
+            cav_geom_label(m, moves, one), -1e3 * deepest->dist, cav_geom_label(m, stands, other),
+            1e3 * CAV_TOLERANCE_PENETRATION);
+    if (asked)
+      fprintf(out, "'%.60s' asks for it at the end and may not be met. ", asked->name ? asked->name : "posture");
+    else
+      fprintf(out, "no motion ends there, it only leads the guess. ");
+    fprintf(out, "%s\n",
+            m->geom[stands].link == 0 && m->geom[stands].type == CAV_GEOM_PLANE
+                ? "Change the posture; height='floor' without rise puts it on a floor"
+                : "Change the posture, or move the solid");
+  }
+  cav_state_free(state);
+  return deep;
+}
+
+/// Whether gravity alone acts on a tree that hangs on nothing: it is free and at rest, no medium, equality constraint or
+/// buoyancy lifts it, and an actuator moves its links, so that a motion of them is meant.
+static int is_loose(const cav_problem *p, int root) {
+  const cav_model *m = p->model;
+  const cav_link *link = &m->link[root];
+  if (link->parent != 0 || !link->driven || !link->njoint || m->joint[link->joint].type != CAV_JOINT_FREE) return 0;
+  for (int b = 1; b < m->nbody; b++)
+    if (m->link[m->body[b].link].root == root && m->body[b].buoyancy != 0) return 0;
+  return 1;
+}
+
+static int touches(const cav_model *m, const cav_state *state, int root) {
+  for (int i = 0; i < state->ncontact; i++) {
+    const int a = m->link[state->contact[i].link1].root, b = m->link[state->contact[i].link2].root;
+    if (a != b && (a == root || b == root) && state->contact[i].dist <= clear) return 1;
+  }
+  return 0;
+}
+
+static int tell_fall(FILE *out, const cav_problem *p) {
+  const cav_model *m = p->model;
+  int n = 0;
+  for (int d = 0; d < m->nv; d++)
+    if (p->v_start[d] != 0) return 0;
+  if (!(m->gravity[2] < 0) || m->nequality || m->density > 0 || m->viscosity > 0) return 0;
+  double *q = calloc((size_t)m->nq + 1, sizeof *q);
+  cav_state *state = q ? posture_of(p, p->q_start, clear) : NULL, *low = state ? cav_state_new(m) : NULL;
+  if (low) memcpy(q, p->q_start, (size_t)m->nq * sizeof *q);
+  const int lowered = low && !cav_configuration_to_floor(m, low, NULL, q, NULL);
+  for (int i = 1; low && i < m->nlink; i++) {
+    if (!is_loose(p, i) || touches(m, state, i)) continue;
+    const int z = m->joint[m->link[i].joint].q + 2;
+    const double height = lowered ? p->q_start[z] - q[z] : 0;
+    const char *name = m->body[m->link[i].body].name;
+    if (lowered && height <= clear) continue;
+    fprintf(out, "note: at the start '%.60s' touches nothing and is at rest", *name ? name : "body");
+    if (lowered) fprintf(out, ", %.3g m above what is below it: it falls", height);
+    fprintf(out,
+            lowered ? ". To stand, <start height='floor'>; of a flight, qvel says how fast it goes\n" : ": it falls\n");
+    n++;
+  }
+  cav_state_free(low);
+  cav_state_free(state);
+  free(q);
+  return n;
+}
+
+int cav_command_tell_postures(FILE *out, const cav_problem *p) {
+  int n = 0;
+  if (p->cycle.on) return 0;
+  if (!p->free_start) n += tell_fall(out, p);
+  // a goal that is the start's was examined as that
+  const int same = !p->free_start && !memcmp(p->q_goal, p->q_start, sizeof *p->q_goal * (size_t)p->model->nq);
+  return same ? n : n + tell_depth(out, p);
+}
