@@ -296,18 +296,6 @@ run 0 solve "$root/problems/motions/hopper-hop/problem.xml" -o hops
 check "nor is a foot that is up told to stand" [ "$(grep -c 'met on the ground' out)" = 0 ]
 check "of a motion that flies no such thing is told" [ "$(grep -c 'guess flies' out)" = 0 ]
 
-# --- new writes a file for a model whose start no problem may have, and says so ---
-
-cat >hung.xml <<'TEXT'
-<mujoco model="hung"><worldbody><site name="hook" pos="0 0 1"/><body name="lamp" pos="0 0 .5"><freejoint/>
-<geom size=".05"/><site name="eye"/></body></worldbody>
-<tendon><spatial limited="true" range="0 .1"><site site="hook"/><site site="eye"/></spatial></tendon></mujoco>
-TEXT
-run 0 new hung.xml -o hung-first.xml
-says err "WARNING: hung-first.xml:"
-says err "tendon 0 (no name) has length 0.5, outside its range 0 .. 0.1; it is written, and has to be changed"
-check "it is written" test -s hung-first.xml
-
 # --- what is given where something else is wanted: what it is, and the command that was meant ---
 
 run 2 explain problem.xml

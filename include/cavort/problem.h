@@ -421,8 +421,8 @@ CAV_API cav_status cav_configuration_stand(const cav_model *model, cav_state *st
 CAV_API cav_status cav_configuration_to_floor(const cav_model *model, cav_state *state, const double *rise, double *q,
                                               cav_error *error);
 
-/// What ranges="clip" does: hinges and slides of q [nq] into their ranges, where they have any. Returns how many were
-/// outside.
+/// What ranges="clip" does to joints: hinges and slides of q [nq] into their ranges, where they have any. Returns how many
+/// were outside. In files it then brings in tendons, too.
 CAV_API int cav_configuration_clip(const cav_model *model, double *q);
 
 /// Largest weight of a cost and of a free duration: beside a cost of that size, and so with 16 digits, one of weight 1 is lost

@@ -90,7 +90,7 @@ static const cav_xml_element pose_joint = {
   WORD("knot", ends, "last", "knot of that file"),                                                                     \
   WORD("height", heights, "keep", "floor: each tree that is free or slides upright is raised or lowered until it stands"), \
   REAL("rise", 0, "m", "(0; what stands in the way down stops it)", "with height=\"floor\": so far above the plane, whatever lies between"), \
-  WORD("ranges", clippings, "keep", "clip: joints are brought into their ranges first")
+  WORD("ranges", clippings, "keep", "clip: joints are brought into their ranges first, and tendons")
 static const cav_xml_element start = {
     "start", 1, 1,
     ATTRIBUTES(

@@ -13,6 +13,7 @@
 #include "math3.h"
 #include "problem_file.h"
 #include "stand.h"
+#include "tendon_range.h"
 
 enum { DEEPEST = 16 }; // poses that name each other
 
@@ -290,7 +291,11 @@ static cav_status read_pose(const cav_problem_reader *reader, const cav_xml_node
   for (; root && !status; root = cav_xml_next(root)) status = lay_root(reader, root, q);
   const cav_xml_node *joint = cav_problem_child(node, "joint");
   for (; joint && !status; joint = cav_xml_next(joint)) status = lay_joint(reader, joint, q);
-  if (!status && cav_xml_word(node, "ranges", 0)) clip(reader, q);
+  if (!status && cav_xml_word(node, "ranges", 0)) {
+    clip(reader, q);
+    // postures of a guess may be outside: what is checked is brought in
+    if (!reader->moved && cav_tendons_clip(reader->model, reader->state, q)) status = cav_problem_no_memory(reader);
+  }
   if (!status && cav_xml_word(node, "height", 0)) status = drop(reader, node, q);
   if (!status && cav_xml_get(node, "rise") && !cav_xml_word(node, "height", 0))
     status = cav_xml_fail(reader->error, node, "rise", "is counted from the floor; add height='floor'");

@@ -20,6 +20,7 @@
 #include "problem_file.h"
 #include "role.h"
 #include "scene.h"
+#include "tendon_range.h"
 
 static const double most_knots = 1e6;
 static const double whole_step = 1e-6; // of a step: how far the duration may be from a whole number of them
@@ -289,12 +290,13 @@ static cav_status check_tendons(const cav_problem_reader *reader, const cav_xml_
   for (int i = 0; i < m->ntendon && status == CAV_OK; i++) {
     const cav_tendon *tendon = &m->tendon[i];
     double length = state->tendon_length[i];
-    if (!tendon->limited || (length >= tendon->range[0] - slack && length <= tendon->range[1] + slack)) continue;
-    char number[32];
-    snprintf(number, sizeof number, "%d (no name)", i);
-    status = cav_xml_fail(reader->error, node, NULL, "tendon %s%s%s has length %g, outside its range %g .. %g",
-                          *tendon->name ? "'" : "", *tendon->name ? tendon->name : number, *tendon->name ? "'" : "",
-                          length, tendon->range[0], tendon->range[1]);
+    if (fabs(cav_tendon_outside(tendon, length)) <= slack) continue;
+    char label[CAV_TENDON_LABEL];
+    cav_tendon_label(m, i, label);
+    status = cav_xml_fail(reader->error, node, NULL, "%s has length %g, outside its range %g .. %g; %s", label, length,
+                          tendon->range[0], tendon->range[1],
+                          cav_xml_word(node, "ranges", 0) ? "no posture near this one has it inside: state another one"
+                                                          : "ranges='clip' brings it in, where a posture nearby does");
   }
   cav_state_free(state);
   return status;

@@ -68,8 +68,8 @@ static cav_status write_choice(cav_scaffold *s, int choice, const char *path, in
   return CAV_OK;
 }
 
-// the first that is good; where none is, the first that can be read at all, told why it is not; where none can, the first,
-// with what has to be changed
+// the first that is good; where none is, the first that can be read at all, told why it is not; else one that cannot be read, and
+// an error that tells why
 static cav_status write_own(cav_scaffold *s, const char *path, cav_error *error) {
   for (int strict = 1; strict >= 0; strict--) {
     for (int choice = 0, wrote = 1; wrote >= 0; choice++) {
@@ -85,17 +85,14 @@ static cav_status write_own(cav_scaffold *s, const char *path, cav_error *error)
       unlink(path);
     }
   }
-  int wrote = 0;
-  for (int choice = 0; wrote == 0; choice++) {
-    cav_status status = write_choice(s, choice, path, &wrote, error);
-    if (status && wrote) return status;
-  }
-  if (wrote > 0) {
-    fprintf(stderr, "cavort: WARNING: %s; it is written, and has to be changed before it can be solved\n", error->text);
-    *error = (cav_error){0};
-    return CAV_OK;
-  }
-  return error->status;
+  const cav_error why = *error;
+  // what asks for least is left to be changed: its lines are those that the error names
+  for (int choice = 0, wrote = 1; wrote >= 0; choice++)
+    if (write_choice(s, choice, path, &wrote, error)) return error->status;
+  return cav_file_fail(error, why.status, 0,
+                       "%.700s\n  (%.100s is there all the same, for this to be changed; cavort inspect tells whether "
+                       "it can be read then)",
+                       why.text, path);
 }
 
 // ---------------------------------------------------------------- like another problem
@@ -197,8 +194,8 @@ static cav_status write_like(const cav_scaffold *s, const char *like, const char
     unlink(path);
     snprintf(why, sizeof why, "%s", error->text);
     join_names(list_motions(model, name), name, list, sizeof list);
-    cav_file_fail(error, status, 0, "%.400s\n  --like %.60s does not suit this model%s%s", why, like,
-                  *list ? "; these can be read with it: " : "", list);
+    cav_file_fail(error, status, 0, "%.400s\n  --like %.60s does not suit this model, nothing was written%s%s", why,
+                  like, *list ? "; these can be read with it: " : "", list);
   }
   if (!status) status = add_comment(s, path, full, source, error);
   free(source);
