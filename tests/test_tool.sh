@@ -677,16 +677,16 @@ TEXT
 "$cavort" solve hop.xml -o hopped --threads 1 >out 2>err &
 child=$!
 tries=0
-while [ "$tries" -lt 600 ] && ! grep -qs '^strategy repair-1 *not' err; do
+while [ "$tries" -lt 1200 ] && ! grep -qs '^strategy repair-1 *not' err; do
   kill -0 "$child" 2>/dev/null || break
-  sleep 0.05
+  sleep 0.1
   tries=$((tries + 1))
 done
 kill -INT "$child"
 wait "$child"
 status=$?
 says err "stopped while other strategies were tried"
-says err "kept: strategy repair-1"
+check "kept is what another process has" grep -q "^kept: strategy [^s]" err
 check "interrupted among strategies: status $status, expected 130" [ "$status" -eq 130 ]
 
 run 0 solve problem.xml -o swing.result --resume --quiet

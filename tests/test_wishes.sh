@@ -77,6 +77,12 @@ ends $? 1 "four metres in half a second"
 says explain.out "8 m a second"
 says explain.out "no limit is at its end: actuators give at most"
 says explain.out "nothing proves that it cannot be had, nor that it can"
+says explain.out ", or a higher weight does"
+# what the solve tried in vain is not advised
+echo "near-1,0,not achieved,9,9,1,0,0.5,\"weight of 'there' 10 times\",\"misses 'there' by 3 m (within 0.03) at 0.5 s: wanted 4, got 1\"" >>far/strategies.csv
+"$cavort" explain far >explain.out
+says explain.out "; 10 times the stated weight was tried (strategies.csv) and did not do: misses 'there' by 3 m (within 0.03) at 0.5 s."
+grep -q "a higher weight does" explain.out && failed=$((failed + 1)) && echo "failed: more weight is advised, which was tried in vain"
 
 # a record of a joint given as a guess: how its column has to be called there
 printf 'time,rail\n0,0\n1,0.5\n' >record.csv

@@ -10,7 +10,10 @@
 
 #include "cavort/problem.h"
 
-static const double inset = 0.05; // of a range: how far inside a length is brought
+static const double inset = 0.05;   // of a range, and m or rad at most: how far inside a length is brought
+static const double within = 1e-7;  // m or rad: what counts as inside
+static const double farthest = 0.2; // m and rad that a step goes: lengths are not straight
+static const double flat = 1e-12, nudge = 0.01;
 enum { SWEEPS = 200 };
 
 double cav_tendon_outside(const cav_tendon *t, double length) {
@@ -23,12 +26,14 @@ static int bring_in(const cav_model *m, const cav_state *state, int i, double *v
   const cav_tendon *t = &m->tendon[i];
   const double off = cav_tendon_outside(t, state->tendon_length[i]);
   double square = 0;
-  if (off == 0) return 0;
-  const double way = -off - copysign(inset * (t->range[1] - t->range[0]), off);
+  if (fabs(off) <= within) return 0;
+  double way = -off - copysign(inset * fmin(t->range[1] - t->range[0], 1), off);
   for (int k = t->dof; k < t->dof + t->ndof; k++) square += state->tendon_arm[k] * state->tendon_arm[k];
-  if (!(square > 0)) return 1;
+  way = copysign(fmin(fabs(way), farthest * sqrt(square)), way);
   memset(v, 0, (size_t)m->nv * sizeof *v);
-  for (int k = t->dof; k < t->dof + t->ndof; k++) v[m->tendon_dof[k]] += way / square * state->tendon_arm[k];
+  // where no dof changes it, as that of a string straight along its least length, all of them a little first
+  for (int k = t->dof; k < t->dof + t->ndof; k++)
+    v[m->tendon_dof[k]] += square > flat ? way / square * state->tendon_arm[k] : nudge;
   cav_integrate(m, q, v, 1, next);
   memcpy(q, next, (size_t)m->nq * sizeof *q);
   cav_configuration_clip(m, q);

@@ -149,11 +149,11 @@ enum { CAV_PUMPING_TEXT = 600 };
 /// impossible.c.
 int cav_command_pumping(const cav_problem *problem, char text[CAV_PUMPING_TEXT]);
 
-/// Why a certified motion misses what was asked: how much of the way it goes, and what would lead elsewhere. Zero: nothing is
-/// missed, or nothing is known. missed.c.
-enum { CAV_MISSED_TEXT = 1000 };
+/// Why a certified motion misses what was asked: how much of the way it goes, what would lead elsewhere, and what of that the
+/// solve of its folder tried in vain. Zero: nothing is missed, or nothing is known. missed.c.
+enum { CAV_MISSED_TEXT = 1400 };
 int cav_command_missed(const cav_problem *problem, const cav_trajectory *motion, const cav_explanation *explanation,
-                       char text[CAV_MISSED_TEXT]);
+                       const char *folder, char text[CAV_MISSED_TEXT]);
 
 /// Tells how many strategies a folder's solve tried, and in how many seconds, where they are more than one. tried.c.
 void cav_command_tell_tried(FILE *out, const char *folder);

@@ -184,7 +184,7 @@ int cav_command_explain(const cav_command_line *line) {
   if (!status) status = cav_problem_impossible(result->problem, &impossible, 1, &proofs, &error);
   char missed[CAV_MISSED_TEXT] = "", *repair = told_of_repair(line->operand);
   if (!status && verdict.certified && !verdict.achieved)
-    cav_command_missed(result->problem, result->trajectory, &explanation, missed);
+    cav_command_missed(result->problem, result->trajectory, &explanation, line->operand, missed);
   if (!status && !verdict.certified && verdict.achieved && cav_verdict_feasible(&verdict) && !result->problem->cycle.on)
     tell_remedy(result, &verdict, line->operand, missed, sizeof missed);
   int stopped = !status && cav_command_tell_stopped(line->json ? NULL : stdout, line->operand);

@@ -8,6 +8,7 @@
 
 #include "cavort/result.h"
 #include "command.h"
+#include "summary.h"
 
 static const double idle = 1e-4; // part of its limit below which an actuator does nothing
 static const double still = 0.2; // part of the way up to which a motion stays where it starts
@@ -69,20 +70,55 @@ static void tell_room(const cav_problem *p, const cav_trajectory *motion, char *
              m->joint[joint].type == CAV_JOINT_HINGE ? "rad" : "m", m->joint[joint].name);
 }
 
+/// By how much the weight of a term was multiplied, as strategies.csv has it.
+static double times_of(const char *changed, const char *name) {
+  static const char goals[] = "weights of goals ";
+  char one[64];
+  snprintf(one, sizeof one, "weight of '%.40s' ", name);
+  const char *at = strstr(changed, one), *all = strstr(changed, goals);
+  return at ? strtod(at + strlen(one), NULL) : all ? strtod(all + sizeof goals - 1, NULL) : 1;
+}
+
+/// What became of the heaviest weight of a term that was tried, where that is by so many times more than that of the motion
+/// that was kept, or is its own: in words, "" where no such was.
+static void tell_heavier(const char *folder, const char *name, double more, char *text, size_t size) {
+  cav_tried t = cav_tried_open(folder);
+  double most = 1, kept = 1;
+  char how[160] = "";
+  *text = 0;
+  while (cav_tried_next(&t)) {
+    const double times = times_of(t.changed, name);
+    if (t.kept) kept = times;
+    if (!(times > most) || strncmp(t.outcome, "not ", 4) || !strcmp(t.outcome, "not tried")) continue;
+    most = times;
+    const char *end = strstr(t.reason, ": wanted"), *stop = strstr(t.reason, ". ");
+    if (!end || (stop && stop < end)) end = stop;
+    snprintf(how, sizeof how, "%.*s", end ? (int)(end - t.reason) : (int)strlen(t.reason), t.reason);
+  }
+  cav_tried_close(&t);
+  if (*how && most > kept && most >= 0.99 * more * kept)
+    snprintf(text, size, "%g times the stated weight was tried (strategies.csv) and did not do: %s", most, how);
+}
+
 static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_term_report *got,
-                 const cav_term_report *held, int i, const cav_explanation *e, char *text, size_t size) {
+                 const cav_term_report *held, int i, const cav_explanation *e, const char *folder, char *text,
+                 size_t size) {
   const cav_term *term = &p->term[i];
   int named = *term->name && strcmp(term->name, cav_quantity_rule_of(term->quantity)->name);
   const char *name = named ? term->name : got[i].what, *unit = got[i].unit, *gap = *unit ? " " : "";
   double way = held[i].off, done = way - got[i].off;
-  char hint[160], room[300];
+  const double more = 2 * got[i].off / got[i].within;
+  char hint[160], room[300], tried[300], weight[300];
+  tell_heavier(folder, term->name, done < still * way && way > got[i].within ? 1 : more, tried, sizeof tried);
+  snprintf(weight, sizeof weight, "a weight %.2g times as large brings it nearer", more);
+  if (*tried) snprintf(weight, sizeof weight, "%s", tried);
   if (way <= got[i].within) {
     snprintf(text, size,
              "the start has '%.60s' to %.3g%s%s, and the motion leaves it by %.3g%s%s at %.3g s%s%.160s. It is traded "
              "against other "
-             "costs: a weight %.2g times as large brings it nearer.",
+             "costs: %s.",
              name, way, gap, unit, got[i].off, gap, unit, got[i].time, e->nconflict ? "; what holds it: " : "",
-             e->nconflict ? e->conflict[0].what : "", 2 * got[i].off / got[i].within);
+             e->nconflict ? e->conflict[0].what : "", weight);
   } else if (done < still * way) {
     suggest(p, hint, sizeof hint);
     if (!e->nconflict) tell_room(p, motion, room, sizeof room);
@@ -93,26 +129,27 @@ static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_t
           "%.3g s, though %s. The search ended at the optimum next to its guess, with %.3g %% of the cost in this "
           "term; "
           "nothing proves that it cannot be had, nor that it can. Next: half of the way, or more time, to see what can "
-          "be; %s, or a higher weight does.",
+          "be; %s%s%s.",
           name, way, gap, unit, way / fmax(got[i].time, p->timestep), gap, unit, fmax(done, 0), gap, unit, got[i].time,
-          room, 100 * got[i].fraction, hint);
+          room, 100 * got[i].fraction, hint, *tried ? "; " : ", or ", *tried ? tried : "a higher weight does");
     else
       snprintf(text, size,
                "'%.60s' is %.3g%s%s from where the start has it, and the motion goes %.2g%s%s of that by %.3g s; what "
                "holds it back: "
-               "%.160s. It stays at the optimum next to its guess: %s, or a higher weight does.",
-               name, way, gap, unit, fmax(done, 0), gap, unit, got[i].time, e->conflict[0].what, hint);
+               "%.160s. It stays at the optimum next to its guess: %s%s%s.",
+               name, way, gap, unit, fmax(done, 0), gap, unit, got[i].time, e->conflict[0].what, hint,
+               *tried ? "; " : ", or ", *tried ? tried : "a higher weight does");
   } else {
     snprintf(text, size,
              "'%.60s' is %.3g%s%s from where the start has it, and the motion goes %.0f %% of that by %.3g s%s%.160s. "
              "The rest "
-             "is traded against other costs: a weight %.2g times as large brings it nearer.",
+             "is traded against other costs: %s.",
              name, way, gap, unit, 100 * done / way, got[i].time, e->nconflict ? "; what holds it back: " : "",
-             e->nconflict ? e->conflict[0].what : "", 2 * got[i].off / got[i].within);
+             e->nconflict ? e->conflict[0].what : "", weight);
   }
 }
 
-int cav_command_missed(const cav_problem *p, const cav_trajectory *motion, const cav_explanation *e,
+int cav_command_missed(const cav_problem *p, const cav_trajectory *motion, const cav_explanation *e, const char *folder,
                        char text[CAV_MISSED_TEXT]) {
   cav_error error = {0};
   cav_term_report *got = calloc(2 * (size_t)p->nterm + 2, sizeof *got), *held = got ? got + p->nterm + 1 : NULL;
@@ -125,7 +162,7 @@ int cav_command_missed(const cav_problem *p, const cav_trajectory *motion, const
   if (got && start && !p->cycle.on && !cav_terms_report(p, motion, &p->contact, got, NULL, &error) &&
       !cav_terms_report(p, start, &p->contact, held, NULL, &error))
     worst = worst_of(p, got);
-  if (worst >= 0) tell(p, motion, got, held, worst, e, text, CAV_MISSED_TEXT);
+  if (worst >= 0) tell(p, motion, got, held, worst, e, folder, text, CAV_MISSED_TEXT);
   cav_trajectory_free(start);
   free(got);
   return *text != 0;
