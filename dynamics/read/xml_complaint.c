@@ -92,16 +92,18 @@ const char *cav_xml_nearest(const char *word, const void *names, int n, size_t s
 
 // names of a list into text, for an error
 static void list_names(char *text, size_t room, const char *const *names) {
+  static const size_t tail = 16; // " and NNN more"
   size_t used = 0;
   text[0] = 0;
-  for (int i = 0; names[i] && used + 4 < room; i++) {
-    int n = snprintf(text + used, room - used, "%s%s", i ? ", " : "", names[i]);
-    if (n < 0) return;
-    if ((size_t)n >= room - used) {
-      memcpy(text + room - 4, "...", 4);
+  for (int i = 0; names[i]; i++) {
+    const size_t n = strlen(names[i]) + (i ? 2 : 0);
+    if (used + n + (names[i + 1] ? tail : 1) > room) {
+      int left = 0;
+      while (names[i + left]) left++;
+      snprintf(text + used, room - used, " and %d more", left);
       return;
     }
-    used += (size_t)n;
+    used += (size_t)snprintf(text + used, room - used, "%s%s", i ? ", " : "", names[i]);
   }
 }
 

@@ -27,8 +27,8 @@ typedef struct set {
 } set;
 
 static const set seed[] = {{{.tracking = 36, .rate = 1.5}, 1, {0.85}},   {{.tracking = 30, .rate = 3}, 1, {0.93}},
-                           {{.tracking = 70, .rate = 2.5}, 1, {0.85}},   {{.tracking = 1.5, .rate = 1.5}, 1, {0.85}},
-                           {{.tracking = 0.1, .rate = 1.5}, 1, {1}},     {{.tracking = 30, .rate = 2.5}, 1, {0.77}},
+                           {{.tracking = 70, .rate = 2.5}, 1, {0.85}},   {{.tracking = 0.1, .rate = 1.5}, 1, {1}},
+                           {{.tracking = 1.5, .rate = 1.5}, 1, {0.85}},  {{.tracking = 30, .rate = 2.5}, 1, {0.77}},
                            {{.tracking = 300, .rate = 10}, 1, {0.85}},   {{.tracking = 24, .rate = 1.9}, 1, {0.88}},
                            {{.tracking = 4, .rate = 3}, 2, {0.85, 0.6}}, {{.tracking = 30, .rate = 2}, 1, {1}},
                            {{.tracking = 12, .rate = 3}, 1, {1}}};
