@@ -39,6 +39,11 @@ asks "$models/humanoid.xml" "duration='3' timestep='.025'" "too high to jump: it
 <start key="stand" height="floor"/><goal key="stand" height="floor"/>
 <cost><sensor name="apex" type="subtreecom" body="torso" component="z" relative="goal" target="16" at="1.5" weight="900"/></cost>
 E2
+# in the air for a second
+asks "$models/humanoid.xml" "duration='2.4' timestep='.03'" "nothing can hold it up there" <<'E2'
+<start key="stand" height="floor"/><cost><posture dofs="all" at="end" weight="900"/>
+<sensor name="up" type="subtreecom" body="torso" component="z" target="1.4" from="0.9" to="1.9" weight="900"/></cost>
+E2
 # the same of a planar leg that is asked of its trunk
 asks "$models/hopper.xml" "duration='2' timestep='.025'" "too high to jump: it takes" <<'E2'
 <start height="floor"><joint name="knee" degrees="60"/></start>

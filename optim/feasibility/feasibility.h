@@ -50,6 +50,9 @@ cav_status cav_requirements_collect(cav_examination *e);
 /// Knots of a term's window. requirement.c.
 void cav_requirement_window(const cav_examination *e, const cav_term *term, int *first, int *last);
 
+/// Of a window every so many knots are collected, its first and its last. requirement.c.
+int cav_requirement_stride(const cav_examination *e);
+
 /// Latest time at which a knot can be, s. requirement.c.
 double cav_requirement_time(const cav_examination *e, int knot);
 
@@ -100,16 +103,17 @@ int cav_tree_is_open(cav_examination *e, int root, int axis);
 /// Centre of mass of a tree and its velocity at the start; leaves the start's velocities in scratch. momentum.c.
 cav_status cav_centre_of_tree(cav_examination *e, int root, double centre[3], double velocity[3]);
 
+/// Whether gravity, straight down, is all that acts on what touches nothing: no medium, equality constraints, buoyancy and
+/// springs of tendons. takeoff.c.
+int cav_weight_is_all(const cav_model *model);
+
+/// What can hold a tree up: level planes alone, 1. support: the highest that its centre of mass can be while anything of
+/// it touches them, m, -infinite where it may touch nothing; friction (may be NULL): largest of these contacts where it
+/// can come forward. 0: something else, or nothing bounds it. takeoff.c.
+int cav_ground_survey(const cav_examination *e, int root, double *support, double *friction);
+
 /// Highest that the centre of mass of a tree can be at times, m; infinite where nothing bounds it. takeoff.c.
 cav_status cav_takeoff_heights(cav_examination *e, int root, int n, const double *time, double *highest);
-
-/// Whether a flight is a parabola: gravity is vertical, and no medium, equality constraint, compensation of gravity or spring
-/// of a tendon acts. A root that floats: no actuator acts on its joints, force [nv] of cav_effort_of_dofs, and one of them is
-/// free or slides upwards without end. How high the centre of mass of a tree can be while something of it touches level planes
-/// of the world; infinite where something else may touch it, or nothing bounds that. takeoff.c.
-int cav_flight_is_covered(const cav_model *model);
-int cav_root_floats(const cav_examination *e, int root, const double *force);
-double cav_ground_reach(const cav_examination *e, int root);
 
 /// The conditions, each with its proofs.
 cav_status cav_examine_contradictions(cav_examination *e); // contradiction.c
@@ -118,13 +122,13 @@ cav_status cav_examine_directions(cav_examination *e);     // direction.c
 cav_status cav_examine_solids(cav_examination *e);         // solid.c
 cav_status cav_examine_enclosures(cav_examination *e);     // enclosure.c
 cav_status cav_examine_falls(cav_examination *e);          // fall.c
+cav_status cav_examine_floats(cav_examination *e);         // float.c
 cav_status cav_examine_momentum(cav_examination *e);       // momentum.c
 cav_status cav_examine_strength(cav_examination *e);       // strength.c
 cav_status cav_examine_hinge(cav_examination *e);          // hinge.c
 cav_status cav_examine_slides(cav_examination *e);         // slide.c
 cav_status cav_examine_energy(cav_examination *e);         // energy.c
 cav_status cav_examine_takeoff(cav_examination *e);        // takeoff.c
-cav_status cav_examine_floats(cav_examination *e);         // float.c
 cav_status cav_examine_holds(cav_examination *e);          // hold.c
 cav_status cav_examine_speeds(cav_examination *e);         // speed.c
 

@@ -26,6 +26,8 @@ void cav_requirement_window(const cav_examination *e, const cav_term *term, int 
   if (to - from < 1e-9 || *first > *last) *first = *last = (int)lround((from + to) / (2 * h));
 }
 
+int cav_requirement_stride(const cav_examination *e) { return e->nknot / MOST_KNOTS + 1; }
+
 double cav_requirement_time(const cav_examination *e, int knot) {
   return knot * e->problem->timestep * fmax(e->longest, 1);
 }
@@ -135,7 +137,7 @@ cav_status cav_requirements_collect(cav_examination *e) {
   const cav_problem *p = e->problem;
   double *q = malloc((size_t)e->model->nq * sizeof *q);
   cav_status status = q ? CAV_OK : CAV_NO_MEMORY;
-  int stride = e->nknot / MOST_KNOTS + 1;
+  int stride = cav_requirement_stride(e);
   for (int i = 0; i < p->nterm; i++) {
     const cav_term *term = &p->term[i];
     int sensor = term->quantity == CAV_QUANTITY_SENSOR, first, last;

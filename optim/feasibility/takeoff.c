@@ -34,7 +34,8 @@ static int is_driven(const cav_model *m, int j, const double *force) {
   return (joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE) && joint->limited && force[joint->dof] > 0;
 }
 
-int cav_root_floats(const cav_examination *e, int root, const double *force) {
+/// A root that floats: no actuator acts on its joints, and one of them is free or slides upwards without end.
+static int is_floating(const cav_examination *e, int root, const double *force) {
   const cav_model *m = e->model;
   const cav_link *link = &m->link[root];
   int up = 0, turned = 0;
@@ -74,43 +75,29 @@ static int can_run(const cav_examination *e, int root) {
   return 0;
 }
 
-/// How high the centre of mass of a tree can be while something of it touches a pair's level plane of the world; infinite:
-/// nothing bounds it, or that is something else.
-static double reach_of(const cav_examination *e, const cav_pair *pair) {
+int cav_ground_survey(const cav_examination *e, int root, double *support, double *friction) {
   const cav_model *m = e->model;
-  const cav_geom *floor = &m->geom[pair->geom1], *g = &m->geom[pair->geom2];
-  cav_pose pose;
-  if (floor->type != CAV_GEOM_PLANE || floor->link != 0) return INFINITY;
-  cav_object_pose(m, e->start, CAV_OBJECT_GEOM, pair->geom1, &pose);
-  if (pose.rotation[8] < 1 - 1e-9) return INFINITY;
-  return pose.pos[2] + g->bound + pair->margin + cav_distance_to_centre(m, 0, g->link, g->pos);
-}
-
-static int joins(const cav_model *m, const cav_pair *pair, int root) {
-  const int a = m->link[m->geom[pair->geom1].link].root, b = m->link[m->geom[pair->geom2].link].root;
-  return a != b && (a == root || b == root);
-}
-
-double cav_ground_reach(const cav_examination *e, int root) {
-  double highest = -INFINITY;
-  for (int p = 0; p < e->model->npair; p++)
-    if (joins(e->model, &e->model->pair[p], root)) highest = fmax(highest, reach_of(e, &e->model->pair[p]));
-  return highest;
-}
-
-/// Supports: level planes alone, and how high the centre of mass can be above them; 0: something else.
-static int survey_ground(const cav_examination *e, jumper *s) {
-  const cav_model *m = e->model;
-  s->friction = 0, s->support = cav_ground_reach(e, s->root);
-  for (int p = 0; p < m->npair && can_run(e, s->root); p++) {
-    const cav_pair *pair = &m->pair[p];
-    if (joins(m, pair, s->root) && pair->dim >= 3)
-      s->friction = fmax(s->friction, fmax(pair->friction[0], pair->friction[1]));
+  double slides = 0, highest = -INFINITY;
+  for (int p = 0; p < m->npair; p++) {
+    int floor = m->pair[p].geom1, other = m->pair[p].geom2;
+    int ra = m->link[m->geom[floor].link].root, rb = m->link[m->geom[other].link].root;
+    if (ra == rb || (ra != root && rb != root)) continue;
+    cav_pose pose;
+    if (m->geom[floor].type != CAV_GEOM_PLANE || m->geom[floor].link != 0) return 0;
+    cav_object_pose(m, e->start, CAV_OBJECT_GEOM, floor, &pose);
+    if (pose.rotation[8] < 1 - 1e-9) return 0;
+    const cav_geom *g = &m->geom[other];
+    double reach = g->bound + m->pair[p].margin + cav_distance_to_centre(m, 0, g->link, g->pos);
+    highest = fmax(highest, pose.pos[2] + reach);
+    if (m->pair[p].dim >= 3 && can_run(e, root))
+      slides = fmax(slides, fmax(m->pair[p].friction[0], m->pair[p].friction[1]));
   }
-  return s->support < INFINITY;
+  *support = highest;
+  if (friction) *friction = slides;
+  return highest < INFINITY;
 }
 
-int cav_flight_is_covered(const cav_model *m) {
+int cav_weight_is_all(const cav_model *m) {
   if (m->gravity[0] != 0 || m->gravity[1] != 0 || !(m->gravity[2] < 0)) return 0;
   if (m->density > 0 || m->viscosity > 0 || m->nequality > 0) return 0;
   for (int i = 0; i < m->nbody; i++)
@@ -176,7 +163,9 @@ static cav_status examine_one(cav_examination *e, const double *force, const cav
   int link = r->kind == CAV_REQUIRE_CENTRE ? m->body[r->object].link : r->object;
   jumper s = {.root = m->link[link].root};
   double below = 0, t = cav_requirement_time(e, r->knot) + e->problem->timestep * fmax(e->longest, 1);
-  if (link == 0 || isinf(r->low[2]) || !cav_root_floats(e, s.root, force) || !survey_ground(e, &s)) return CAV_OK;
+  if (link == 0 || isinf(r->low[2]) || !is_floating(e, s.root, force) ||
+      !cav_ground_survey(e, s.root, &s.support, &s.friction))
+    return CAV_OK;
   // of a whole tree alone the centre is the one that flies
   if (r->kind == CAV_REQUIRE_CENTRE && m->link[s.root].body != r->object) return CAV_OK;
   if (r->kind == CAV_REQUIRE_POINT) below = cav_distance_to_centre(m, 0, r->object, r->point);
@@ -195,7 +184,7 @@ static cav_status examine_one(cav_examination *e, const double *force, const cav
 
 cav_status cav_examine_takeoff(cav_examination *e) {
   const cav_model *m = e->model;
-  if (!cav_start_is_given(e->problem) || !cav_flight_is_covered(m)) return CAV_OK;
+  if (!cav_start_is_given(e->problem) || !cav_weight_is_all(m)) return CAV_OK;
   int bounded = 0, before = e->nfound;
   double *force = malloc((size_t)(m->nv + 1) * sizeof *force);
   cav_status status = force ? cav_effort_of_dofs(e, force, &bounded) : CAV_NO_MEMORY;
@@ -207,11 +196,12 @@ cav_status cav_examine_takeoff(cav_examination *e) {
 
 cav_status cav_takeoff_heights(cav_examination *e, int root, int n, const double *time, double *highest) {
   const cav_model *m = e->model;
-  int bounded = 0, known = cav_flight_is_covered(m);
+  int bounded = 0, known = cav_weight_is_all(m);
   jumper s = {.root = root};
   double *force = malloc((size_t)(m->nv + 1) * sizeof *force);
   cav_status status = force ? cav_effort_of_dofs(e, force, &bounded) : CAV_NO_MEMORY;
-  known = known && bounded && !status && cav_root_floats(e, root, force) && survey_ground(e, &s);
+  known =
+      known && bounded && !status && is_floating(e, root, force) && cav_ground_survey(e, root, &s.support, &s.friction);
   if (known) status = survey(e, force, &s);
   for (int i = 0; i < n; i++) {
     highest[i] = INFINITY;
