@@ -318,7 +318,7 @@ static void test_bounds(void) {
        0, 0.5},
       {"control of a servo with limits of both, not about 0",
        SWUNG("", "",
-             "<position joint='x' kp='3' gear='2' ctrllimited='true' ctrlrange='-1.9 1.6' forcelimited='true' "
+             "<position joint='x' kp='3' gear='2' ctrllimited='true' ctrlrange='-1.725 1.425' forcelimited='true' "
              "forcerange='-50 50'/>"),
        0, 0.9},
   };

@@ -127,15 +127,6 @@ void cav_builder_finite(cav_spec *spec, const cav_xml_node *node, const double *
   if (!isfinite(sum)) cav_spec_fail(spec, node, NULL, "numbers are too large: what follows from them is not finite");
 }
 
-// the list of filter.c, and which pairs are not two parts of one body
-static void fill_pairs(cav_builder *b) {
-  const cav_model *m = b->model;
-  for (int i = 0; i < m->npair; i++) {
-    b->pair[i] = b->pairs[i];
-    int one = b->geom[b->pair[i].geom1].link, other = b->geom[b->pair[i].geom2].link;
-    b->pair[i].external = one == 0 || other == 0 || b->link[one].root != b->link[other].root;
-  }
-}
 // --- the whole ---
 
 static void set_options(cav_builder *b) {
@@ -194,7 +185,7 @@ static void fill(cav_builder *b) {
   cav_builder_bodies(b);
   cav_builder_attachments(b);
   set_options(b);
-  fill_pairs(b);
+  for (int i = 0; i < b->model->npair; i++) b->pair[i] = b->pairs[i];
   for (int i = 0; i < b->model->nwarning; i++) b->warning[i] = cav_builder_text(b, b->spec->warning.at[i]);
 }
 
@@ -312,6 +303,7 @@ static cav_model *build(cav_builder *b) {
   assert(!cav_builder_running(b) || b->text == b->text_end);
   if (cav_builder_running(b)) {
     cav_status status = cav_links_drive(b->model);
+    if (status == CAV_OK) status = cav_pairs_sort(b->model);
     if (status == CAV_OK) status = cav_reference_weights(b->model);
     if (status == CAV_NO_MEMORY)
       cav_spec_no_memory(spec);

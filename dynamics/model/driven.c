@@ -1,5 +1,7 @@
 /// Trees that actuators move, by transmissions, and those that tendons and equality constraints join to them: a shoe that is
 /// welded to a foot goes where the foot does. What is left (a box, a ball, a door) moves as contacts and gravity have it.
+/// Trees that equality constraints close to a loop are one mechanism (a gripper's fingers): its links touch each other as
+/// those of one tree do.
 #include "driven.h"
 
 #include <stdlib.h>
@@ -60,10 +62,84 @@ int cav_roots_join(const cav_model *model, char *mark) {
   return changed;
 }
 
+// a joint by its dof; a site's transmission works on all joints between it and the world
+static void drive_dof(const cav_model *m, int dof) { ((cav_joint *)m->joint)[m->dof[dof].joint].driven = 1; }
+
+static void drive_chain(const cav_model *m, int link) {
+  for (int d = link > 0 ? m->link[link].dof + m->link[link].ndof - 1 : -1; d >= 0; d = m->dof[d].parent)
+    drive_dof(m, d);
+}
+
+static void drive_joints(const cav_model *m, const cav_actuator *actuator) {
+  const cav_tendon *tendon;
+  switch (actuator->transmission) {
+    case CAV_TRANSMISSION_JOINT:
+    case CAV_TRANSMISSION_JOINT_IN_PARENT:
+      drive_dof(m, m->joint[actuator->target].dof);
+      break;
+    case CAV_TRANSMISSION_TENDON:
+      tendon = &m->tendon[actuator->target];
+      for (int k = 0; k < tendon->ndof; k++) drive_dof(m, m->tendon_dof[tendon->dof + k]);
+      break;
+    case CAV_TRANSMISSION_SITE:
+    case CAV_TRANSMISSION_CRANK:
+      drive_chain(m, m->site[actuator->target].link);
+      if (actuator->reference >= 0) drive_chain(m, m->site[actuator->reference].link);
+      break;
+  }
+}
+
+// the links that an equality constraint holds together; of tendons and distances: none
+static void held_together(const cav_model *m, const cav_equality *e, int link[2]) {
+  link[0] = link[1] = 0;
+  for (int k = 0; k < 2; k++) {
+    if (e->type == CAV_EQUALITY_CONNECT || e->type == CAV_EQUALITY_WELD) link[k] = e->link[k];
+    if (e->type == CAV_EQUALITY_JOINT && e->object[k] >= 0) link[k] = m->joint[e->object[k]].link;
+  }
+}
+
+// lowest root of the mechanism of each link; of trees that one constraint after the other joins
+static void find_mechanisms(const cav_model *m, int *mechanism) {
+  for (int l = 0; l < m->nlink; l++) mechanism[l] = m->link[l].root;
+  for (int i = 0; i < m->nequality; i++) {
+    int link[2];
+    held_together(m, &m->equality[i], link);
+    if (link[0] <= 0 || link[1] <= 0) continue;
+    const int one = mechanism[link[0]], other = mechanism[link[1]], low = one < other ? one : other;
+    for (int l = 0; l < m->nlink; l++)
+      if (mechanism[l] == one || mechanism[l] == other) mechanism[l] = low;
+  }
+}
+
+// whether a body of the world carries the tree of a link
+static int carries(const cav_model *m, int body, int link) {
+  int at = m->link[m->link[link].root].body;
+  while (at > 0 && at != body) at = m->body[at].parent;
+  return body > 0 && at == body;
+}
+
+cav_status cav_pairs_sort(cav_model *model) {
+  cav_pair *pair = (cav_pair *)model->pair;
+  int *mechanism = malloc((size_t)model->nlink * sizeof *mechanism);
+  if (!mechanism) return CAV_NO_MEMORY;
+  find_mechanisms(model, mechanism);
+  for (int i = 0; i < model->npair; i++) {
+    const cav_geom *one = &model->geom[pair[i].geom1], *other = &model->geom[pair[i].geom2];
+    if (one->link > 0 && other->link > 0)
+      pair[i].external = mechanism[one->link] != mechanism[other->link];
+    else
+      pair[i].external =
+          one->link == 0 ? !carries(model, one->body, other->link) : !carries(model, other->body, one->link);
+  }
+  free(mechanism);
+  return CAV_OK;
+}
+
 cav_status cav_links_drive(cav_model *model) {
   cav_link *link = (cav_link *)model->link;
   char *mark = calloc((size_t)model->nlink, 1);
   if (!mark) return CAV_NO_MEMORY;
+  for (int i = 0; i < model->nactuator; i++) drive_joints(model, &model->actuator[i]);
   cav_roots_actuated(model, mark);
   while (cav_roots_join(model, mark)) continue;
   for (int l = 1; l < model->nlink; l++) link[l].driven = mark[link[l].root];

@@ -231,6 +231,7 @@ typedef struct cav_joint {
   /// of those actuators are within it.
   int effort_limited;
   double effort_range[2]; ///< N or N m: what actuators on it may give together
+  int driven;             ///< 1: an actuator works on it, itself or by a transmission that it moves
   int lifts;              ///< its actuators give the gravity compensation of what it carries (actuatorgravcomp of MJCF)
   double speed; ///< hinge and slide: limit in the file, rad/s or m/s, told in certificates, obeyed by nothing; 0: none
 } cav_joint;
@@ -307,10 +308,12 @@ typedef struct cav_site {
 
 /// Two geoms that may touch; everything mixed at compile time. Only pairs that can touch are listed.
 typedef struct cav_pair {
-  int geom1, geom2;      ///< geom1's type <= geom2's type
-  int dim;               ///< 1, 3, 4 or 6 rows
-  int listed;            ///< 1: the file lists this pair, whatever masks say
-  int external;          ///< 1 if one of the two stands in the world, or they hang from the world by different roots
+  int geom1, geom2; ///< geom1's type <= geom2's type
+  int dim;          ///< 1, 3, 4 or 6 rows
+  int listed;       ///< 1: the file lists this pair, whatever masks say
+  /// 1 but between links of one tree, of trees that equality constraints of joints, points or frames make one mechanism, and
+  /// between a link and a body of the world from which its tree hangs.
+  int external;
   double friction[5];    ///< two tangential, torsional (m), two rolling (m)
   double margin;         ///< m, distance below which the contact pushes
   cav_softness softness; ///< of its contacts

@@ -436,6 +436,14 @@ CAV_API cav_problem cav_problem_default(const cav_model *model);
 /// Writes the first most of them to term (may be NULL if most is 0) and returns how many there are.
 CAV_API int cav_problem_default_terms(cav_term *term, int most);
 
+/// How far a joint that no actuator works on may lie beyond its range, where its stop holds it as the floor holds a foot:
+/// rad of a hinge or ball, m of a slide. Ranges of other joints are exact.
+#define CAV_TOLERANCE_STOP_ANGLE 0.05
+#define CAV_TOLERANCE_STOP_WAY 0.005
+
+/// The one of the two that goes for a joint; 0: an actuator works on it.
+CAV_API double cav_joint_stop(const cav_joint *joint);
+
 /// By how much a term of a problem may be off its target: what it states (within), of a constraint CAV_TOLERANCE_CONSTRAINT of
 /// its scale, of a goal (a cost at one time, or held over a window of its own at one value) the usual one, if there is one
 /// (> 0); infinite: any, as of running costs, and of what is known of a free start beside a record.

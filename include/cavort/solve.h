@@ -436,9 +436,11 @@ typedef struct cav_verdict {
   /// Of forces on roots that the problem penalises (cav_residual), of the tree that has most at a knot: root mean square and
   /// largest. NaN: there are none.
   double residual_force_rms_n, residual_force_max_n, residual_torque_rms_n_m, residual_torque_max_n_m;
-  double residual_fraction_max;                    ///< largest of all of these, fraction of the weight
-  double residual_within;                          ///< what the problem allows of that
-  double limit_violation_max;                      ///< relative to the limit (effort), rad or m (range)
+  double residual_fraction_max; ///< largest of all of these, fraction of the weight
+  double residual_within;       ///< what the problem allows of that
+  double limit_violation_max;   ///< relative to the limit (effort), rad or m (range)
+  double
+      stop_fraction_max; ///< largest depth in the stop of a joint without an actuator, over cav_joint_stop; NaN: none has a range
   double constraint_violation_max;                 ///< of the problem's hard terms, scaled
   double penetration_max_m, penetration_between_m; ///< at the knots; along the steps between them
   double slip_mean_m_s;                            ///< of loaded contacts, weighted by force

@@ -64,7 +64,8 @@ static void examine_range(cav_examination *e, const cav_requirement *r) {
   char what[160];
   if (r->kind != CAV_REQUIRE_COORDINATE) return;
   const cav_joint *joint = &e->model->joint[r->object];
-  if (!joint->limited || (r->low[0] <= joint->range[1] + slack && r->high[0] >= joint->range[0] - slack)) return;
+  const double room = slack + cav_joint_stop(joint);
+  if (!joint->limited || (r->low[0] <= joint->range[1] + room && r->high[0] >= joint->range[0] - room)) return;
   cav_requirement_words(e, r, what, sizeof what);
   cav_impossible(e, CAV_CONDITION_RANGE, r, "Move the target into the range, or check the range in the model.",
                  "%s, but its range is %.4g to %.4g", what, joint->range[0], joint->range[1]);

@@ -98,8 +98,9 @@ static void pass_hinge(chain *c, const cav_joint *joint) {
   c->hinged = joint->type == CAV_JOINT_HINGE && c->nslide == 0;
   sub3(c->arm, c->tail, joint->pos);
   copy3(c->axis, joint->axis);
-  c->angle[0] = joint->limited ? joint->range[0] - joint->ref : -INFINITY;
-  c->angle[1] = joint->limited ? joint->range[1] - joint->ref : INFINITY;
+  const double stop = cav_joint_stop(joint);
+  c->angle[0] = joint->limited ? joint->range[0] - stop - joint->ref : -INFINITY;
+  c->angle[1] = joint->limited ? joint->range[1] + stop - joint->ref : INFINITY;
   copy3(c->tail, joint->pos);
   c->nslide = 0;
   c->n++;
@@ -112,8 +113,9 @@ static void pass_slide(chain *c, const cav_joint *joint) {
   }
   copy3(c->slide[c->nslide], joint->axis);
   // seen from the node, what lies above it moves the other way
-  c->range[c->nslide][0] = joint->limited ? -(joint->range[1] - joint->ref) : -INFINITY;
-  c->range[c->nslide][1] = joint->limited ? -(joint->range[0] - joint->ref) : INFINITY;
+  const double stop = cav_joint_stop(joint);
+  c->range[c->nslide][0] = joint->limited ? -(joint->range[1] + stop - joint->ref) : -INFINITY;
+  c->range[c->nslide][1] = joint->limited ? -(joint->range[0] - stop - joint->ref) : INFINITY;
   c->nslide++;
 }
 

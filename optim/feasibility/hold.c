@@ -247,8 +247,9 @@ static int read_box(const cav_examination *e, held *h) {
       low = fmin(low, r->low[0]), high = fmax(high, r->high[0]);
     }
     if (known < h->last) {
-      low = joint->limited ? joint->range[0] : -INFINITY;
-      high = joint->limited ? joint->range[1] : INFINITY;
+      const double stop = cav_joint_stop(joint);
+      low = joint->limited ? joint->range[0] - stop : -INFINITY;
+      high = joint->limited ? joint->range[1] + stop : INFINITY;
     }
     if (!isfinite(low) || !isfinite(high)) return 0;
     h->q[joint->q] = (low + high) / 2;

@@ -92,6 +92,11 @@ static void bound_by_term(cav_examination *e, rates *r, int i) {
   }
 }
 
+/// How far a joint can go at most, its stops included.
+static double width_of(const cav_joint *joint) {
+  return joint->range[1] - joint->range[0] + 2 * (give + cav_joint_stop(joint));
+}
+
 static cav_status collect(cav_examination *e, rates *r) {
   const cav_model *m = e->model;
   size_t n = (size_t)e->nknot * (size_t)m->nv;
@@ -102,7 +107,7 @@ static cav_status collect(cav_examination *e, rates *r) {
   for (size_t i = 0; i < n; i++) {
     const cav_joint *joint = &m->joint[m->dof[i % (size_t)m->nv].joint];
     int scalar = joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE;
-    r->high[i] = scalar && joint->limited ? (joint->range[1] - joint->range[0] + 2 * give) / r->shortest : INFINITY;
+    r->high[i] = scalar && joint->limited ? width_of(joint) / r->shortest : INFINITY;
     r->low[i] = -r->high[i];
     r->term[i] = -1;
   }
@@ -130,7 +135,8 @@ static void examine_joint(cav_examination *e, const rates *r, int j) {
         char what[160];
         const char *unit = joint->type == CAV_JOINT_HINGE ? "rad" : "m";
         cav_requirement_words(e, q, what, sizeof what);
-        if (joint->limited) low = fmax(low, joint->range[0]), high = fmin(high, joint->range[1]);
+        const double stop = cav_joint_stop(joint);
+        if (joint->limited) low = fmax(low, joint->range[0] - stop), high = fmin(high, joint->range[1] + stop);
         cav_impossible(
             e, CAV_CONDITION_ENERGY, q, "More time, a nearer target, or a looser limit of speed.",
             "%s, too far for its speed: limits of speed leave %.4g to %.4g %s by then, from %.4g at the start", what,

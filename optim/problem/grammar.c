@@ -276,8 +276,8 @@ static const cav_xml_element guess = {
 static const cav_xml_element limits = {
     "limits", 0, 1,
     ATTRIBUTES(
-        REAL("effort", 0, "", "0.8", "fraction of the actuators' limits to plan with, the rest is for feedback"),
-        REAL("margin", 0, "rad or m", "0.001", "distance kept from the limits of joints and tendons")),
+        REAL("effort", 0, "", "0.8", "fraction of the actuators' limits to plan with, the rest is for feedback; of a servo whose force is limited, of that alone"),
+        REAL("margin", 0, "rad or m", "0.001", "distance kept from the limits of joints and tendons, and from the depth that stops of joints without an actuator may give")),
     NULL, 0, "reserve that a plan keeps from limits"};
 static const cav_xml_element residual = {
     "residual", 0, 1,

@@ -47,6 +47,11 @@ cav_status cav_actuators_plannable(const cav_model *model, cav_error *error) {
   return CAV_OK;
 }
 
+double cav_joint_stop(const cav_joint *joint) {
+  if (joint->driven) return 0;
+  return joint->type == CAV_JOINT_SLIDE ? CAV_TOLERANCE_STOP_WAY : CAV_TOLERANCE_STOP_ANGLE;
+}
+
 // bytes that this process may have, INFINITY: unknown
 static double memory_most(void) {
   double most = INFINITY;

@@ -20,6 +20,7 @@
 #include "problem_file.h"
 #include "role.h"
 #include "scene.h"
+#include "schedule.h"
 #include "tendon_range.h"
 
 static const double most_knots = 1e6;
@@ -32,7 +33,7 @@ static const cav_stage_options first_stage = {CAV_STAGE_OPTIONS(FIRST, FIRST)};
 static const cav_stage_options last_stage = {CAV_STAGE_OPTIONS(LAST, LAST)};
 
 cav_problem cav_problem_default(const cav_model *model) {
-  return (cav_problem){
+  cav_problem problem = {
       .name = "",
       .model = model,
       .duration = 1,
@@ -46,6 +47,10 @@ cav_problem cav_problem_default(const cav_model *model) {
       .residual = {.within = 0.05},
       .schedule = {.stages = 16, .sliding = CAV_SLIDING_COULOMB, .first = first_stage, .last = last_stage},
   };
+  const double part = cav_schedule_part(model);
+  problem.schedule.first.smoothing_self *= part;
+  problem.schedule.last.smoothing_self *= part;
+  return problem;
 }
 
 void *cav_problem_alloc(cav_problem_owner *owner, size_t size) {

@@ -5,6 +5,8 @@
 #include <limits.h>
 #include <math.h>
 
+#include "math3.h"
+
 #define REAL_FIELD(name, first, last, least, most, course, law, unit, text) \
   {#name, CAV_FIELD_REAL, offsetof(cav_stage_options, name), least, most, NULL, unit, text},
 #define WHOLE_FIELD(name, first, last, least, most, text) \
@@ -14,6 +16,27 @@ static const cav_field fields[] = {CAV_STAGE_OPTIONS(REAL_FIELD, WHOLE_FIELD)};
 const cav_field *cav_stage_fields(int *n) {
   *n = sizeof fields / sizeof *fields;
   return fields;
+}
+
+/// Farthest that geoms of a moving link can be from the root of its tree, m, however its joints turn.
+static double reach_of(const cav_model *m, const cav_geom *geom) {
+  double reach = isfinite(geom->bound) ? norm3(geom->pos) + geom->bound : 0;
+  for (int l = geom->link; l > 0 && l != m->link[l].root; l = m->link[l].parent) reach += norm3(m->link[l].pos);
+  return geom->link > 0 ? reach : 0;
+}
+
+/// m: a tree that reaches so far has the usual smoothing.
+static const double usual_reach = 0.5;
+
+double cav_schedule_part(const cav_model *model) {
+  int touches = 0;
+  double most = 0;
+  for (int i = 0; model && i < model->npair; i++) {
+    const int one = model->geom[model->pair[i].geom1].link, other = model->geom[model->pair[i].geom2].link;
+    touches |= !model->pair[i].external && one > 0 && other > 0 && model->link[one].root != model->link[other].root;
+  }
+  for (int i = 0; touches && i < model->ngeom; i++) most = fmax(most, reach_of(model, &model->geom[i]));
+  return most > 0 ? fmin(most / usual_reach, 1) : 1;
 }
 
 int cav_problem_has_record(const cav_problem *problem) {

@@ -10,6 +10,10 @@ void cav_stage_law(const cav_problem *problem, double fraction, double step, cav
 /// The stage at a fraction of the way from first to last.
 cav_stage_options cav_schedule_at(const cav_schedule *schedule, double fraction);
 
+/// Part of the usual smoothing between links of one mechanism that goes for a model, by the reach of its largest tree: links of
+/// a gripper's linkage stand closer to each other than a person's. 1 where no trees are joined to one, and of NULL.
+double cav_schedule_part(const cav_model *model);
+
 /// Whether a term compares the motion with a record.
 int cav_problem_has_record(const cav_problem *problem);
 

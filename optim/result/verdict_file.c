@@ -92,6 +92,7 @@ void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdi
   write_number(out, "residual_fraction_max", v->residual_fraction_max);
   write_number(out, "residual_within", v->residual_within);
   write_number(out, "limit_violation_max", v->limit_violation_max);
+  write_number(out, "stop_fraction_max", v->stop_fraction_max);
   write_number(out, "constraint_violation_max", v->constraint_violation_max);
   write_number(out, "penetration_max_m", v->penetration_max_m);
   write_number(out, "penetration_between_m", v->penetration_between_m);

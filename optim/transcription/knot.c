@@ -522,13 +522,14 @@ static double ball_angle(const cav_joint *joint, const double *q, double axis[3]
 static void add_ranges(cav_sum *a, const double *q, double rho) {
   const cav_transcription *tr = a->tr;
   const cav_model *m = tr->model;
-  double keep = tr->problem->limit_margin;
+  const double margin = tr->problem->limit_margin;
   int i = a->knot->layout.joint, active;
   if (a->t < tr->first) return;
   for (int j = 0; j < m->njoint; j++) {
     const cav_joint *joint = &m->joint[j];
     if (!joint->limited) continue;
     int ball = joint->type == CAV_JOINT_BALL, n = ball ? 3 : 1, column[3];
+    const double keep = margin - cav_joint_stop(joint);
     double axis[3] = {1, 0, 0}, value = ball ? ball_angle(joint, q, axis) : q[joint->q];
     for (int k = 0; k < 3; k++) column[k] = tr->nv + joint->dof + k;
     keep_sparse(a, i, n, column, axis);
@@ -549,7 +550,7 @@ static void add_ranges(cav_sum *a, const double *q, double rho) {
       a->s->row[c] = a->s->state->tendon_arm[tendon->dof + c];
     }
     keep_sparse(a, i, tendon->ndof, a->s->column, a->s->row);
-    double e = slot_residual(a, i++, value, tendon->range[0] + keep, tendon->range[1] - keep, rho, &active);
+    double e = slot_residual(a, i++, value, tendon->range[0] + margin, tendon->range[1] - margin, rho, &active);
     if (active) add_sparse(a, rho, e, tendon->ndof, a->s->column, a->s->row);
   }
   assert(i == a->knot->layout.term);

@@ -62,14 +62,15 @@ static int force_row_set(cav_force_row *row, int nv, const double *dense, double
   return 1;
 }
 
-/// Row k of effort from the dense form of its actuator's [nv], with its range. Margins of control lie at both ends, those
-/// of effort at 0.
+/// Row k of effort from the dense form of its actuator's [nv], with its range. What is left to feedback is left of the
+/// force where that is limited, beside which a servo's control goes to its ends; else of the control, at both ends.
 static int limit_row_set(cav_transcription *tr, int k, const double *effort) {
   const cav_model *m = tr->model;
   int a = tr->limited[k], servo = cav_servo_bounds(m, a) && (k >= m->nu || !m->actuator[a].forcelimited);
   double range[2], per_effort = 1, part = tr->problem->effort_limit;
   cav_actuator_effort_range(m, a, range);
   if (servo && !cav_servo_set(m, a, &tr->servo[k], &per_effort, range)) return 0;
+  if (servo && m->actuator[a].forcelimited) part = 1;
   double lower = range[0], upper = range[1], middle = servo ? (lower + upper) / 2 : 0;
   double limit = fmax(isfinite(lower) ? fabs(lower) : 0, isfinite(upper) ? fabs(upper) : 0);
   double scale = limit > 0 ? 1 / limit : 1;

@@ -60,8 +60,10 @@ cav_status cav_verification_actuators(const cav_model *model, cav_error *error) 
   return CAV_OK;
 }
 
-// the part of a servo's control that is planned with: margins at both ends, of an angle as of any other
-static void plan_input(const cav_verification *verification, double range[2]) {
+// the part of a servo's control that is planned with: margins at both ends, of an angle as of any other; the whole where its
+// force has limits, which keep them
+static void plan_input(const cav_verification *verification, const cav_actuator *a, double range[2]) {
+  if (a->forcelimited) return;
   double middle = (range[0] + range[1]) / 2;
   for (int k = 0; k < 2; k++) range[k] = middle + (range[k] - middle) * verification->problem->effort_limit;
 }
@@ -89,7 +91,7 @@ void cav_verification_effort(const cav_verification *verification, int t, int ac
                   suffix);
   if (a->bias == CAV_BIAS_NONE || !input_range(a, range)) return;
   double input = servo_input(verification, actuator, effort, v, moment), most = fmax(fabs(range[0]), fabs(range[1]));
-  plan_input(verification, range);
+  plan_input(verification, a, range);
   cav_metric_note(metric, fmax(range[0] - input, input - range[1]) / (most > 0 ? most : 1), t,
                   "servo %.60s (%d), control at %.4g of %.4g .. %.4g%s", a->name, actuator, input, range[0], range[1],
                   suffix);
@@ -119,7 +121,7 @@ double cav_verification_effort_row(const cav_verification *verification, int act
     value = servo_input(verification, actuator, effort, v, moment);
     double most = fmax(fabs(range[0]), fabs(range[1]));
     scale = most > 0 ? most : 1;
-    plan_input(verification, range);
+    plan_input(verification, a, range);
     part = 1;
   }
   for (int k = 0; k < 2; k++) range[k] *= part / scale;

@@ -148,8 +148,9 @@ static cav_status list_ranges(const cav_verification *verification, int t, cav_k
     if (!model->joint[j].limited || model->joint[j].type == CAV_JOINT_FREE) continue;
     double range[2];
     joint_range(verification, t, j, rows->work, range);
-    cav_knot_row row = {.kind = CAV_BINDING_JOINT, .object = j, .upper = range[1] - keep};
-    row.lower = model->joint[j].type == CAV_JOINT_BALL ? -INFINITY : range[0] + keep;
+    const double inside = keep - cav_joint_stop(&model->joint[j]);
+    cav_knot_row row = {.kind = CAV_BINDING_JOINT, .object = j, .upper = range[1] - inside};
+    row.lower = model->joint[j].type == CAV_JOINT_BALL ? -INFINITY : range[0] + inside;
     status = add(rows, row);
   }
   for (int i = 0; i < model->ntendon && status == CAV_OK; i++) {

@@ -18,6 +18,7 @@ typedef struct metrics {
   cav_slip slip;
   cav_rates rates;
   cav_residual_sum residual;
+  double stop; ///< largest part of its stop that a joint takes; below 0: none has one
 } metrics;
 
 // writes the reason of a failed call
@@ -272,9 +273,9 @@ static void note_forces(const cav_verification *verification, int t, const doubl
     cav_verification_effort(verification, t, a, control[a], v, work, suffix, &found->limit);
 }
 
-// ranges of joints at q
+// ranges of joints at q; of those that no actuator works on, what their stops take is no violation
 static void note_joints(const cav_verification *verification, int t, const double *q, const char *suffix,
-                        cav_metric *metric) {
+                        metrics *found) {
   const cav_model *model = verification->model;
   char name[32];
   for (int j = 0; j < model->njoint; j++) {
@@ -285,29 +286,33 @@ static void note_joints(const cav_verification *verification, int t, const doubl
     if (joint->type == CAV_JOINT_BALL) {
       beyond = 2 * atan2(sqrt(x[1] * x[1] + x[2] * x[2] + x[3] * x[3]), fabs(x[0])) - joint->range[1];
     }
-    cav_metric_note(metric, beyond, t, "range of %.60s, in rad or m%s", joint_name(model, j, name), suffix);
+    const double stop = cav_joint_stop(joint);
+    if (stop > 0) found->stop = fmax(found->stop, fmax(beyond, 0) / stop);
+    cav_metric_note(&found->limit, beyond - stop, t,
+                    stop > 0 ? "stop of %.60s, in rad or m%s" : "range of %.60s, in rad or m%s",
+                    joint_name(model, j, name), suffix);
   }
 }
 
 // joint and tendon ranges; the state is at q
 static void note_ranges(const cav_verification *verification, int t, const double *q, const char *suffix,
-                        cav_metric *metric) {
+                        metrics *found) {
   const cav_model *model = verification->model;
   char name[32];
-  note_joints(verification, t, q, suffix, metric);
+  note_joints(verification, t, q, suffix, found);
   // twist and swing of ball joints are rows where they are violated
   for (int i = 0; i < verification->state->nrow; i++) {
     const cav_row *row = verification->state->row + i;
     if (row->type != CAV_ROW_LIMIT_JOINT || row->side < 2) continue;
-    cav_metric_note(metric, -row->dist, t, "%s of %.60s, in rad%s", row->side < 4 ? "twist" : "swing",
-                    joint_name(model, row->object, name), suffix);
+    cav_metric_note(&found->limit, -row->dist - cav_joint_stop(&model->joint[row->object]), t, "%s of %.60s, in rad%s",
+                    row->side < 4 ? "twist" : "swing", joint_name(model, row->object, name), suffix);
   }
   for (int i = 0; i < model->ntendon; i++) {
     const cav_tendon *tendon = model->tendon + i;
     if (!tendon->limited) continue;
     double length = verification->state->tendon_length[i];
     double beyond = fmax(tendon->range[0] - length, length - tendon->range[1]);
-    cav_metric_note(metric, beyond, t, "range of tendon %.60s (%d)%s", tendon->name, i, suffix);
+    cav_metric_note(&found->limit, beyond, t, "range of tendon %.60s (%d)%s", tendon->name, i, suffix);
   }
 }
 
@@ -324,7 +329,7 @@ static cav_status examine_image(const cav_verification *verification, int t, dou
   cav_cycle_image_tangent(verification->image, 1, knot_v + nv, next);
   cav_status status = cav_inverse(model, verification->state, q, v, next, u);
   if (status != CAV_OK) return status;
-  note_ranges(verification, t, q, suffix, &found->limit);
+  note_ranges(verification, t, q, suffix, found);
   cav_verification_penetration(verification, t, suffix, &found->penetration);
   if (t < verification->rows) note_forces(verification, t, v, u, control, scratch, suffix, found);
   return CAV_OK;
@@ -342,7 +347,7 @@ static cav_status examine_knot(cav_verification *verification, int t, cav_balanc
   }
   cav_status status = cav_inverse(model, verification->state, q, v, v + nv, work);
   if (status != CAV_OK) return status;
-  note_ranges(verification, t, q, "", &found->limit);
+  note_ranges(verification, t, q, "", found);
   cav_verification_penetration(verification, t, "", &found->penetration);
   if (t >= verification->rows) cav_rates_add(verification, t, work + nv, &found->rates);
   if (t >= verification->rows) return CAV_OK;
@@ -558,6 +563,7 @@ static void fill(const cav_verification *verification, const metrics *found, con
   verdict->momentum_defect_rms = found->defect.value;
   cav_residual_tell(verification, &found->residual, verdict);
   verdict->limit_violation_max = found->limit.value;
+  verdict->stop_fraction_max = found->stop < 0 ? NAN : found->stop;
   verdict->constraint_violation_max = found->term.value;
   verdict->penetration_max_m = found->penetration.value;
   verdict->penetration_between_m = found->between.value;
@@ -601,7 +607,7 @@ static cav_status verify(const cav_problem *problem, const cav_trajectory *traje
   verdict->certified = verdict->achieved = 0;
   snprintf(verdict->reason, sizeof verdict->reason, "not verified");
   cav_verification verification;
-  metrics found = {.rates.over_limit = -1};
+  metrics found = {.rates.over_limit = -1, .stop = -1};
   cav_replay replay = {0};
   cav_balance *balance = NULL;
   cav_status status = cav_verification_begin(&verification, problem, trajectory, contact, gain_q, gain_v, error);
@@ -648,7 +654,7 @@ cav_status cav_verify_solution(const cav_problem *problem, const cav_solution *s
 cav_status cav_terms_report(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
                             cav_term_report *report, double *cost, cav_error *error) {
   cav_verification verification;
-  metrics found = {.rates.over_limit = -1};
+  metrics found = {.rates.over_limit = -1, .stop = -1};
   cav_verdict verdict = {0};
   cav_status status = cav_verification_begin(&verification, problem, trajectory, contact, NULL, NULL, error);
   cav_balance *balance = status == CAV_OK ? cav_balance_new(&verification) : NULL;

@@ -50,6 +50,8 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
     add_number(line, &n, "residual torque, largest", v->residual_torque_max_n_m, NAN, 1, " N m");
   }
   add_number(line, &n, "limits of actuators, joints, tendons", v->limit_violation_max, CAV_TOLERANCE_LIMIT, 1, "");
+  if (!isnan(v->stop_fraction_max))
+    add_number(line, &n, "stops of joints without an actuator, of what they give", v->stop_fraction_max, 1, 100, " %");
   add_number(line, &n, "constraints of the problem", v->constraint_violation_max, CAV_TOLERANCE_CONSTRAINT, 1, "");
   if (v->periods > 1)
     add_number(line, &n, "end of the cycle on its start", v->periodicity_error, CAV_TOLERANCE_PERIODICITY, 1, "");
