@@ -6,6 +6,8 @@
 
 #include "feasibility.h"
 #include "math3.h"
+#include "rotation.h"
+#include "transcription.h"
 
 static const double slack = 1e-6; // m or rad, beyond tolerances: what a certificate leaves room for
 
@@ -71,6 +73,60 @@ static void examine_range(cav_examination *e, const cav_requirement *r) {
                  "%s, but its range is %.4g to %.4g", what, joint->range[0], joint->range[1]);
 }
 
+/// Whether a term asks for a place or an orientation that is read at the start and that no requirement tells: in a frame of
+/// another body, or turned.
+static int is_asked_of_start(const cav_examination *e, int term) {
+  const cav_term *at = &e->problem->term[term];
+  int first, last, turn = at->sensor.type == CAV_SENSOR_FRAMEQUAT;
+  if (at->quantity != CAV_QUANTITY_SENSOR || (!turn && at->sensor.type != CAV_SENSOR_FRAMEPOS)) return 0;
+  // of an orientation all of it: a component's interval is about one axis
+  if (at->sensor.cutoff > 0 || (turn && (at->component >= 0 || at->use == CAV_USE_RANGE))) return 0;
+  for (int i = 0; i < e->n; i++)
+    if (e->requirement[i].term == term) return 0;
+  cav_requirement_window(e, at, &first, &last);
+  return first == 0;
+}
+
+/// How far a reading at the start is from what a term asks for, beyond its tolerance.
+static double missed_at_start(const cav_examination *e, const cav_term *term, double reading[4]) {
+  const int turn = term->sensor.dim == 4;
+  double target[CAV_SENSOR_DIM_MAX], phi[3], most = 0;
+  const double tolerance = cav_term_tolerance(e->problem, term, turn ? CAV_WITHIN_ANGLE : CAV_WITHIN_LENGTH);
+  cav_sensor_read(e->model, e->start, &term->sensor, reading);
+  cav_term_target(term, 0, term->sensor.dim, target);
+  if (turn) {
+    if (!term->target) target[0] = 1;
+    cav_rotation_between(target, reading, phi);
+    return norm3(phi) - tolerance;
+  }
+  for (int k = 0; k < 3; k++) {
+    if (term->component >= 0 && term->component != k) continue;
+    const double off = reading[k] - target[k];
+    most = fmax(most, term->use == CAV_USE_RANGE ? fmax(term->lower - off, off - term->upper) : fabs(off));
+  }
+  return most - tolerance;
+}
+
+static void examine_start_readings(cav_examination *e) {
+  static const char help[] = "Change <start>, or ask for it later.";
+  if (!cav_start_is_given(e->problem)) return;
+  for (int i = 0; i < e->problem->nterm; i++) {
+    const cav_term *term = &e->problem->term[i];
+    const cav_requirement at = {.term = i};
+    double reading[4], off;
+    char what[200];
+    if (!is_asked_of_start(e, i) || !((off = missed_at_start(e, term, reading)) > slack)) continue;
+    cav_requirement_sensor_words(e, term, 0, what, sizeof what);
+    if (term->sensor.dim == 4)
+      cav_impossible(e, CAV_CONDITION_CONTRADICTION, &at, help,
+                     "%s, but the start is turned %.4g rad beyond its tolerance", what, off);
+    else
+      cav_impossible(e, CAV_CONDITION_CONTRADICTION, &at, help,
+                     "%s, but at the start it reads %.4g %.4g %.4g, %.4g m beyond its tolerance", what, reading[0],
+                     reading[1], reading[2], off);
+  }
+}
+
 /// A term speaks at many knots: one proof for each is enough.
 static int is_known(const cav_examination *e, const cav_requirement *r) {
   for (int i = 0; i < e->nfound; i++)
@@ -86,5 +142,6 @@ cav_status cav_examine_contradictions(cav_examination *e) {
     for (int k = i - 1; k >= 0 && e->requirement[k].knot == r->knot && !is_known(e, r); k--)
       examine_pair(e, &e->requirement[k], r);
   }
+  examine_start_readings(e);
   return CAV_OK;
 }
