@@ -296,6 +296,22 @@ run 0 solve "$root/problems/motions/hopper-hop/problem.xml" -o hops
 check "nor is a foot that is up told to stand" [ "$(grep -c 'met on the ground' out)" = 0 ]
 check "of a motion that flies no such thing is told" [ "$(grep -c 'guess flies' out)" = 0 ]
 
+# --- a component in principal axes that are not the body's: told; in those of the file not ---
+
+cat >turned.xml <<'TEXT'
+<mujoco><worldbody><body name="rod"><joint name="rod" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 .3 0 .3" size=".02"/></body>
+<body name="ball" pos="1 0 0"><joint name="ball" type="slide" axis="1 0 0"/><geom size=".1"/></body></worldbody>
+<actuator><motor joint="rod"/></actuator></mujoco>
+TEXT
+cat >aside.xml <<'TEXT'
+<problem name="aside" model="turned.xml"><horizon duration="0.5" timestep="0.05"/><start/>
+<cost><sensor name="beside" type="framepos" body="ball" reftype="body" refname="rod" component="x" target="1" at="end" weight="9"/></cost></problem>
+TEXT
+run 0 inspect aside.xml
+says out "note: 'beside' asks for component x along the principal axes of body 'rod', which are turned by"
+run 0 inspect aside.xml --set cost/beside/@reftype=xbody
+check "axes of the file are not told" [ "$(grep -c 'principal axes' out)" = 0 ]
+
 # --- what is given where something else is wanted: what it is, and the command that was meant ---
 
 run 2 explain problem.xml

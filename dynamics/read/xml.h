@@ -144,7 +144,8 @@ cav_status cav_xml_fail_as(cav_error *error, cav_status status, const cav_xml_no
 const char *cav_xml_nearest(const char *word, const void *names, int n, size_t stride);
 
 /// Names that hold every part of word, whatever the case, into text, with commas: "knee" of "knee_left", "right_knee" of
-/// "knee_right"; parts are what stands between signs that are neither letters nor digits. "": none.
+/// "knee_right"; parts are what stands between signs that are neither letters nor digits. Where none does, the first of all. "": none
+/// has a name.
 void cav_xml_alike(const char *word, const void *names, int n, size_t stride, char *text, size_t room);
 
 #endif

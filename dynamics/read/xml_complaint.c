@@ -125,15 +125,25 @@ static int holds_parts(const char *word, const char *name) {
   return parts > 0;
 }
 
+/// Of a text about names: what " and N more" takes at its end.
+static const size_t more_room = 20;
+
 void cav_xml_alike(const char *word, const void *names, int n, size_t stride, char *text, size_t room) {
   const char *found[9];
-  int count = 0;
-  for (int i = 0; i < n && count < 8; i++) {
-    const char *name = *(const char *const *)((const char *)names + (size_t)i * stride);
-    if (name && *name && holds_parts(word, name)) found[count++] = name;
+  int count = 0, all = 0;
+  for (int any = 0; any < 2 && count == 0; any++) {
+    all = 0;
+    for (int i = 0; i < n; i++) {
+      const char *name = *(const char *const *)((const char *)names + (size_t)i * stride);
+      if (!name || !*name || (!any && !holds_parts(word, name))) continue;
+      if (count < 8) found[count++] = name;
+      all++;
+    }
   }
   found[count] = NULL;
-  list_names(text, room, found);
+  list_names(text, room - more_room, found);
+  const size_t used = strlen(text);
+  if (all > count && !strstr(text, " more")) snprintf(text + used, room - used, " and %d more", all - count);
 }
 
 // --- names that no table knows ---

@@ -157,11 +157,12 @@ cav_status cav_requirements_collect(cav_examination *e) {
 // ---------------------------------------------------------------- words
 
 /// "x 1.5", "z at least 2": what is wanted of one value.
-static int tell_value(char *out, size_t size, const char *axis, double low, double high) {
+static int tell_value(char *out, size_t size, const char *axis, double low, double high, int range) {
   if (isinf(low) && isinf(high)) return 0;
   if (isinf(high)) return snprintf(out, size, " %s%sat least %.4g", axis, *axis ? " " : "", low);
   if (isinf(low)) return snprintf(out, size, " %s%sat most %.4g", axis, *axis ? " " : "", high);
   double middle = (low + high) / 2;
+  if (range && high - low > 1e-3) return snprintf(out, size, " %s%s%.4g to %.4g", axis, *axis ? " " : "", low, high);
   if (high - low < 1e-4) return snprintf(out, size, " %s%s%.4g", axis, *axis ? " " : "", middle);
   return snprintf(out, size, " %s%s%.4g (to %.2g)", axis, *axis ? " " : "", middle, (high - low) / 2);
 }
@@ -201,6 +202,6 @@ void cav_requirement_words(const cav_examination *e, const cav_requirement *r, c
   for (int k = 0; k < 3 && n < (int)size; k++)
     if (r->kind != CAV_REQUIRE_COORDINATE || k == 0)
       n += tell_value(out + n, size - (size_t)n, r->kind == CAV_REQUIRE_COORDINATE ? "" : axis[k], r->low[k],
-                      r->high[k]);
+                      r->high[k], term->use == CAV_USE_RANGE);
   if (n < (int)size) snprintf(out + n, size - (size_t)n, " at %.4g s", r->knot * e->problem->timestep);
 }

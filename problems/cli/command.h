@@ -176,6 +176,10 @@ int cav_command_tell_equalities(FILE *out, const cav_problem *problem);
 /// number. postures.c.
 int cav_command_tell_postures(FILE *out, const cav_problem *problem);
 
+/// Says of terms that ask for one component of a place or rate in a body's principal axes that these are turned from its own; their
+/// number. axes.c.
+int cav_command_tell_axes(FILE *out, const cav_problem *problem);
+
 /// Tells which solids of the world a motion leans on that neither its first nor its last knot touches, and that it never
 /// leaves the ground where the problem's guess does. leaned_on.c.
 void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_trajectory *motion,

@@ -55,11 +55,11 @@ cav_status cav_command_expect(const char *command, const char *wanted, const cha
   int folder = strstr(wanted, "DIR") != NULL, problem = strstr(wanted, "PROBLEM") != NULL;
   kind given = kind_of(path);
   if (given == UNKNOWN && folder && access(path, F_OK) != 0)
-    return cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: there is no such %s", path,
-                         problem
-                             ? "folder or file"
-                             : "folder; cavort solve PROBLEM -o DIR writes one, but none of a problem that is proven "
-                               "impossible: cavort inspect PROBLEM tells the proof");
+    return cav_file_fail(
+        error, CAV_BAD_INPUT, 0, "%s: there is no such %s", path,
+        problem ? "folder or file"
+                : "folder; cavort solve PROBLEM writes NAME.result, NAME the problem's own, or DIR after -o, but "
+                  "none of a problem that is proven impossible: cavort inspect PROBLEM tells the proof");
   if (given == FOLDER && !folder && exists_in(path, "problem.xml"))
     return cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: is a folder; its problem file: cavort %s %s/problem.xml", path,
                          command, path);
