@@ -176,7 +176,7 @@ int cav_command_tell_equalities(FILE *out, const cav_problem *problem);
 /// number. postures.c.
 int cav_command_tell_postures(FILE *out, const cav_problem *problem);
 
-/// Says of terms that ask for one component of a place or rate in a body's principal axes that these are turned from its own; their
+/// Says of terms that ask for one component in a body's principal axes that these are turned from its own; their
 /// number. axes.c.
 int cav_command_tell_axes(FILE *out, const cav_problem *problem);
 

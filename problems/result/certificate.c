@@ -2,6 +2,7 @@
 /// whether a motion is certified is decided by cav_verify alone, the marks here only show which line it fell on.
 #include "certificate.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,6 +12,7 @@
 // adds a line; value and limit are already text
 static void add(cav_certificate_line *line, int *n, const char *label, const char *value, const char *limit,
                 int passed) {
+  assert(*n < CAV_CERTIFICATE_LINES);
   cav_certificate_line *at = &line[(*n)++];
   at->label = label;
   snprintf(at->value, sizeof at->value, "%s", value);

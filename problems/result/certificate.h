@@ -7,7 +7,7 @@
 #include "cavort/solve.h"
 #include "verdict_file.h"
 
-enum { CAV_CERTIFICATE_LINES = 28 };
+enum { CAV_CERTIFICATE_LINES = 32 };
 
 /// One line: what, its value and limit as they are to be read; passed: 1 held, 0 missed, -1 only told.
 typedef struct cav_certificate_line {
