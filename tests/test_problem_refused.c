@@ -121,7 +121,8 @@ static void check_broken_starts(void) {
   refuse_start("<start knot='last'/>", "file");
   refuse_start("<start velocity='file'/>", "attribute 'file', which is missing");
   refuse_start("<start file='absent.csv'/>", "absent.csv");
-  refuse_start("<start><joint name='ankle' pos='1'/></start>", "no joint of that name, got 'ankle'; it has x, z, pitch, knee");
+  refuse_start("<start><joint name='ankle' pos='1'/></start>",
+               "no joint of that name, got 'ankle'; it has x, z, pitch, knee");
   refuse_start("<start><joint name='kne' pos='1'/></start>", "did you mean 'knee'");
   refuse_start("<start><joint name='NE' pos='1'/></start>", "has no joint of that name, got 'NE'; it has knee");
   refuse_start("<start><joint name='knee'/></start>", "one of the attributes");
