@@ -4,7 +4,6 @@
 #define CAVORT_TESTS_IMPOSSIBLE_H
 
 #include <time.h>
-#include <unistd.h>
 
 #include "cavort/cavort.h"
 #include "scene.h"
@@ -12,16 +11,6 @@
 #define CONSTRAINT(...) "<constraint>" __VA_ARGS__ "</constraint>"
 
 static char folder[] = "/tmp/cavort-feasibility-XXXXXX";
-
-static inline void remove_folder(void) {
-  static const char *const file[] = {"model.xml", "problem.xml"};
-  for (int i = 0; i < 2; i++) {
-    char path[160];
-    snprintf(path, sizeof path, "%s/%s", folder, file[i]);
-    unlink(path);
-  }
-  CHECK(rmdir(folder) == 0);
-}
 
 static inline double processor_seconds(void) { return (double)clock() / CLOCKS_PER_SEC; }
 

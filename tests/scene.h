@@ -53,6 +53,17 @@ static inline void scene_write(const char *folder, const char *name, const char 
   fclose(file);
 }
 
+/// Removes a folder of a model and a problem.
+static inline void scene_remove(const char *folder) {
+  static const char *const file[] = {"model.xml", "problem.xml"};
+  for (int i = 0; i < 2; i++) {
+    char path[4096];
+    snprintf(path, sizeof path, "%.4000s/%s", folder, file[i]);
+    unlink(path);
+  }
+  CHECK(rmdir(folder) == 0);
+}
+
 /// The model of an MJCF text, through a temporary file; NULL with a message if it does not load.
 static inline cav_model *scene_load(const char *text) {
   char path[] = "/tmp/cavort-test-XXXXXX";

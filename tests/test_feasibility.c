@@ -579,6 +579,6 @@ int main(void) {
   check_slides();
   check_slid();
   check_histories();
-  remove_folder();
+  scene_remove(folder);
   return check_result();
 }

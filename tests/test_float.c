@@ -201,6 +201,6 @@ int main(void) {
   check_hovers();
   check_flights();
   check_flails();
-  remove_folder();
+  scene_remove(folder);
   return check_result();
 }

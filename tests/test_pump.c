@@ -221,12 +221,6 @@ int main(void) {
   test_solved("acrobot", CHAIN(MOTOR("elbow", "2")), 8, "");
   test_solved("pendubot", CHAIN(MOTOR("swing", "6")), 6, "");
   test_solved("cart", CART("-1 1", "9"), 5, "");
-  static const char *const file[] = {"model.xml", "problem.xml"};
-  for (int i = 0; i < 2; i++) {
-    char path[160];
-    snprintf(path, sizeof path, "%s/%s", folder, file[i]);
-    unlink(path);
-  }
-  CHECK(rmdir(folder) == 0);
+  scene_remove(folder);
   return check_result();
 }

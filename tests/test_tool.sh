@@ -282,7 +282,7 @@ cat >told.xml <<'TEXT'
 TEXT
 run 0 solve told.xml
 run 0 explain told.result
-says out "effort of actuator 'p'"
+says out "control of actuator 'p'"
 
 # --- a guess that flies and a motion that does not: told; of one that hops not ---
 

@@ -297,8 +297,8 @@ static void tell_subject(const inquiry *in, const cav_binding *row, char *out, s
       const cav_actuator *actuator = &m->actuator[row->object];
       const char *body =
           actuator->transmission == CAV_TRANSMISSION_JOINT ? body_name(m, m->joint[actuator->target].body, b) : "";
-      snprintf(out, size, "effort of actuator '%.60s'%s%.60s%s", or_number(actuator->name, "actuator", row->object, a),
-               *body ? " (body '" : "", body, *body ? "')" : "");
+      snprintf(out, size, "%s of actuator '%.60s'%s%.60s%s", row->component > 0 ? "control" : "effort",
+               or_number(actuator->name, "actuator", row->object, a), *body ? " (body '" : "", body, *body ? "')" : "");
       break;
     }
     case CAV_BINDING_JOINT:
@@ -560,6 +560,10 @@ static void tell_cure(const inquiry *in, const group *g, const cav_binding *row,
         "move, or more time.");
   } else if (row->kind == CAV_BINDING_UNACTUATED && in->model->npair == 0) {
     snprintf(out, size, "Nothing can push there: more time, a guess that swings, or more stages.");
+  } else if (row->kind == CAV_BINDING_EFFORT && row->component > 0) {
+    snprintf(
+        out, size,
+        "Its control is at the end of its range there: a target nearer to what the servo can be told, or more time.");
   } else if (row->kind == CAV_BINDING_EFFORT && in->problem->effort_limit < 1 &&
              !(g->missed && fabs(g->missed->value) > 1)) {
     snprintf(out, size,
