@@ -102,7 +102,27 @@ static void test_linkage(void) {
   cav_problem_free(problem);
 }
 
+// a tree on a body of the world: its box is part of the same mechanism, its ground is ground
+static void test_ground(void) {
+  cav_model *m =
+      model_of(HEAD
+               "<body name='site'><geom type='plane' size='5 5 1'/><geom type='box' pos='2 0 1' size='1 1 1'/>"
+               "<body name='mast'><joint type='slide' axis='0 0 1'/><body name='foot'>"
+               "<joint type='slide' axis='1 0 0'/><geom size='.1'/></body><geom size='.1' pos='0 0 1'/></body>"
+               "</body></worldbody></mujoco>");
+  if (!CHECK(m != NULL)) return;
+  int seen[2] = {0};
+  for (int i = 0; i < m->npair; i++) {
+    const int plane = m->geom[m->pair[i].geom1].type == CAV_GEOM_PLANE;
+    CHECK(m->pair[i].external == plane);
+    seen[plane]++;
+  }
+  CHECK(seen[0] > 0 && seen[1] > 0);
+  cav_model_free(m);
+}
+
 int main(void) {
+  test_ground();
   test_lid();
   test_linkage();
   return check_result();

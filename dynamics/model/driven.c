@@ -111,11 +111,12 @@ static void find_mechanisms(const cav_model *m, int *mechanism) {
   }
 }
 
-// whether a body of the world carries the tree of a link
-static int carries(const cav_model *m, int body, int link) {
+// whether a geom of the world is part of what carries the tree of a link: of a body that it hangs on, and no ground
+static int carries(const cav_model *m, const cav_geom *geom, int link) {
   int at = m->link[m->link[link].root].body;
-  while (at > 0 && at != body) at = m->body[at].parent;
-  return body > 0 && at == body;
+  if (geom->type == CAV_GEOM_PLANE || geom->type == CAV_GEOM_HFIELD) return 0;
+  while (at > 0 && at != geom->body) at = m->body[at].parent;
+  return geom->body > 0 && at == geom->body;
 }
 
 cav_status cav_pairs_sort(cav_model *model) {
@@ -128,8 +129,7 @@ cav_status cav_pairs_sort(cav_model *model) {
     if (one->link > 0 && other->link > 0)
       pair[i].external = mechanism[one->link] != mechanism[other->link];
     else
-      pair[i].external =
-          one->link == 0 ? !carries(model, one->body, other->link) : !carries(model, other->body, one->link);
+      pair[i].external = one->link == 0 ? !carries(model, one, other->link) : !carries(model, other, one->link);
   }
   free(mechanism);
   return CAV_OK;

@@ -312,7 +312,7 @@ typedef struct cav_pair {
   int dim;          ///< 1, 3, 4 or 6 rows
   int listed;       ///< 1: the file lists this pair, whatever masks say
   /// 1 but between links of one tree, of trees that equality constraints of joints, points or frames make one mechanism, and
-  /// between a link and a body of the world from which its tree hangs.
+  /// between a link and what a body of the world is made of from which its tree hangs, but planes and height fields.
   int external;
   double friction[5];    ///< two tangential, torsional (m), two rolling (m)
   double margin;         ///< m, distance below which the contact pushes
