@@ -437,9 +437,9 @@ CAV_API cav_problem cav_problem_default(const cav_model *model);
 CAV_API int cav_problem_default_terms(cav_term *term, int most);
 
 /// How far a joint that no actuator works on may lie beyond its range, where its stop holds it as the floor holds a foot:
-/// rad of a hinge or ball, m of a slide. Ranges of other joints are exact.
+/// rad, of a hinge or ball. Ranges of other joints are exact.
 #define CAV_TOLERANCE_STOP_ANGLE 0.05
-#define CAV_TOLERANCE_STOP_WAY 0.005
+#define CAV_TOLERANCE_STOP_WAY 0.005 ///< m, of a slide
 
 /// The one of the two that goes for a joint; 0: an actuator works on it.
 CAV_API double cav_joint_stop(const cav_joint *joint);
