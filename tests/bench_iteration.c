@@ -5,13 +5,15 @@
 /// Instructions are the processor's own count, where the system gives it. Usage: bench_iteration [PROBLEM [count|threads]];
 /// default problems/motions/squat-jump; count: whole iterations alone, once, for a profiler; threads: one iteration of each
 /// stage by one and by two threads in turns, the least of many by the clock on the wall; and what of it is neither
-/// linearisation on the way to the factor nor values of the step tried, hence one thread's.
+/// linearisation on the way to the factor nor values of the step tried, hence one thread's; before them a quadratic programme of
+/// the last phase, the same way.
 #include <linux/perf_event.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
 #include "bench.h"
 #include "continuation.h"
+#include "programme.h"
 #include "transcription.h"
 
 enum { KNOTS = 40, RUNS = 15, ITERATIONS = 10 };
@@ -158,6 +160,46 @@ static void compare_threads(const cav_problem *p, const cav_trajectory *from) {
   }
 }
 
+// the programme of the last stage's rows and costs at a motion, by both numbers of threads by turns
+static void compare_programmes(const cav_problem *p, const cav_trajectory *from) {
+  enum { RUNS_OF_ALL = 4 * RUNS };
+  cav_transcription *tr[2] = {0};
+  cav_normal *normal[2] = {0};
+  cav_quadratic *qp[2] = {0};
+  cav_trajectory *at = cav_trajectory_copy(from);
+  double best[2] = {INFINITY, INFINITY}, *radius = NULL, change[2] = {-INFINITY, INFINITY};
+  int whole = at != NULL;
+  for (int k = 0; k < 2 && whole; k++) {
+    tr[k] = cav_transcription_new(p, k + 1, NULL);
+    normal[k] = tr[k] ? cav_normal_new(tr[k]) : NULL;
+    whole = normal[k] && cav_transcription_keep_rows(tr[k]);
+    if (!whole) break;
+    cav_stage_set(p, 1, tr[k]);
+    tr[k]->penalty = (cav_penalties){.unactuated = p->schedule.last.penalty};
+    qp[k] = cav_quadratic_new(tr[k], normal[k]);
+    whole = qp[k] && cav_transcription_linearise(tr[k], at) == CAV_OK;
+    if (!whole) break;
+    cav_programme_values(tr[k], cav_quadratic_value(qp[k]));
+    for (int i = 0; i < cav_quadratic_rows(qp[k]); i++) cav_quadratic_penalty(qp[k])[i] = cav_programme_scale(tr[k]);
+  }
+  if (whole) radius = malloc(((size_t)cav_transcription_blocks(tr[0]) + 1) * sizeof *radius);
+  for (int b = 0; radius && b <= cav_transcription_blocks(tr[0]); b++) radius[b] = 0.01;
+  for (int r = 0; r < RUNS_OF_ALL && CHECK(radius != NULL); r++)
+    for (int k = 0; k < 2; k++) {
+      const double start = bench_seconds();
+      const cav_status status = cav_quadratic_solve(qp[k], radius, change, 1e-9 * cav_programme_scale(tr[k]));
+      best[k] = fmin(best[k], 1e3 * (bench_seconds() - start));
+      CHECK(status == CAV_OK);
+    }
+  if (radius)
+    CHECK(!memcmp(cav_quadratic_step(qp[0]), cav_quadratic_step(qp[1]),
+                  (size_t)cav_transcription_unknowns(tr[0]) * sizeof(double)));
+  printf("a programme of the last stage: one thread %6.2f ms, two threads %6.2f ms, ratio %.2f\n", best[0], best[1],
+         best[0] / best[1]);
+  for (int k = 0; k < 2; k++) cav_quadratic_free(qp[k]), cav_normal_free(normal[k]), cav_transcription_free(tr[k]);
+  cav_trajectory_free(at), free(radius);
+}
+
 int main(int argc, char **argv) {
   static const char *const names[] = {"one-sided", "centred", "analytic"};
   cav_error error = {0};
@@ -178,7 +220,7 @@ int main(int argc, char **argv) {
   printf("%s: %d dofs, %d knots, step %g s\n", p->name, tr->nv, tr->nknot, p->timestep);
   const int threads = argc > 2 && !strcmp(argv[2], "threads");
   if (threads)
-    compare_threads(p, at);
+    compare_programmes(p, at), compare_threads(p, at);
   else
     whole(p, tr, normal, at, count ? 1 : RUNS);
   for (int s = 0; s < 3 && !count && !threads; s++) {

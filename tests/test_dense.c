@@ -94,6 +94,25 @@ static void check_square(int n, int k) {
       memcpy(C, C0, bytes);
       cav_dense_square(CAV_TRIANGLE_UPPER, n, parts, k, A, ld, C, ldc);
       CHECK(memcmp(plain, C, bytes) == 0);
+      // in two steps, of either triangle: sums of several slices are joined first
+      double *room = numbers(cav_dense_square_room(n)), worst = 0;
+      memcpy(C, C0, bytes);
+      cav_dense_square_find(CAV_TRIANGLE_UPPER, n, parts, k, A, ld, room);
+      cav_dense_square_add(CAV_TRIANGLE_UPPER, n, parts, room, C, ldc);
+      for (int j = 0; j < n; j++)
+        for (int i = 0; i <= j; i++) worst = fmax(worst, fabs(plain[i + j * ldc] - C[i + j * ldc]));
+      CHECK(k > 128 ? worst < 1e-13 : memcmp(plain, C, bytes) == 0);
+      memcpy(C, C0, bytes);
+      cav_dense_square_find(CAV_TRIANGLE_LOWER, n, parts, k, A, ld, room);
+      cav_dense_square_add(CAV_TRIANGLE_LOWER, n, parts, room, C, ldc);
+      worst = 0;
+      for (int j = 0; j < n; j++)
+        for (int i = 0; i < n; i++) {
+          const double added = i < j ? 0 : plain[j + i * ldc] - C0[j + i * ldc];
+          worst = fmax(worst, fabs(C[i + j * ldc] - C0[i + j * ldc] - added));
+        }
+      CHECK(worst < 1e-13);
+      free(room);
     }
   free(A), free(C0), free(C), free(plain);
 }

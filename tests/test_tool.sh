@@ -445,6 +445,15 @@ sed 's/<joint name="knee" degrees="60"/<joint name="knee" pos="60"/' hop.xml >un
 run 2 inspect units.xml
 says err "joint 'knee' is at 60, outside its range 0 .. 2.6"
 says err "in degrees it would be in it: <joint name= degrees=>"
+# a little beyond in radians is no slip of units
+sed 's/<joint name="knee" degrees="60"/<joint name="knee" pos="2.65"/' hop.xml >units.xml
+run 2 inspect units.xml
+says err "joint 'knee' is at 2.65, outside its range 0 .. 2.6"
+check "err is silent of degrees" sh -c '! grep -q "in degrees" err'
+# bounds of a posture are counted from the goal, and where the joint may be is told
+sed 's|<posture dofs="all" at="end" weight="900"/></cost>|</cost><constraint><posture joint="knee" lower="-0.2" upper="0.3"/></constraint>|' hop.xml >bounds.xml
+run 0 inspect bounds.xml
+says out "posture of joint knee at least -0.2 and at most 0.3, counted from the goal (1.047): 0.8472 to 1.347 rad"
 # what was given in degrees is not told to be given in degrees
 sed 's/<joint name="knee" degrees="60"/<joint name="knee" degrees="155"/' hop.xml >units.xml
 run 2 inspect units.xml

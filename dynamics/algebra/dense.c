@@ -3,6 +3,7 @@
 /// contraction). So vectors of two, four and eight numbers give the same bits.
 #include "dense.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -43,94 +44,119 @@ static inline double add_eight(const double *s) {
   return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
 }
 
-#define WAY(name, attribute, LANES, VECTORS, SOME, COLUMNS)                                                          \
-  typedef double name##_vector __attribute__((vector_size((LANES)*8), aligned(8), may_alias));                       \
-  attribute static void name##_tile(int k, const double *A, const double *B, double s, double *C, size_t ldc) {      \
-    name##_vector sum[COLUMNS][VECTORS] = {0};                                                                       \
-    for (int p = 0; p < k; p++, A += (LANES) * (VECTORS), B += (COLUMNS)) {                                          \
-      name##_vector a[VECTORS];                                                                                      \
-      for (int i = 0; i < (VECTORS); i++) a[i] = *(const name##_vector *)(A + (LANES)*i);                            \
-      for (int j = 0; j < (COLUMNS); j++)                                                                            \
-        for (int i = 0; i < (VECTORS); i++) sum[j][i] += a[i] * B[j];                                                \
-    }                                                                                                                \
-    for (int j = 0; j < (COLUMNS); j++, C += ldc)                                                                    \
-      for (int i = 0; i < (VECTORS); i++) *(name##_vector *)(C + (LANES)*i) -= s * sum[j][i];                        \
-  }                                                                                                                  \
-  attribute static void name##_some(const row_set *set, size_t apart, const double *A, const double *B, double *C) { \
-    name##_vector sum[COLUMNS][VECTORS] = {0};                                                                       \
-    for (int w = 0; w < SLICE / 64; w++, A += 64 * apart, B += 64 * apart)                                           \
-      for (unsigned long long left = set->bits[w]; left; left &= left - 1) {                                         \
-        const size_t p = (size_t)__builtin_ctzll(left) * apart;                                                      \
-        name##_vector a[VECTORS];                                                                                    \
-        for (int i = 0; i < (SOME); i++) a[i] = *(const name##_vector *)(A + p + (LANES)*i);                         \
-        for (int j = 0; j < (COLUMNS); j++)                                                                          \
-          for (int i = 0; i < (SOME); i++) sum[j][i] += a[i] * B[p + j];                                             \
-      }                                                                                                              \
-    for (int j = 0; j < (COLUMNS); j++, C += apart)                                                                  \
-      for (int i = 0; i < (SOME); i++) *(name##_vector *)(C + (LANES)*i) = sum[j][i];                                \
-  }                                                                                                                  \
-  attribute static void name##_panel(const triangle *L, double *X) {                                                 \
-    for (int c = 0; c < PANEL; c += (COLUMNS)) {                                                                     \
-      double *at = X + (size_t)(c * (LANES) * (VECTORS));                                                            \
-      name##_vector x[COLUMNS][VECTORS];                                                                             \
-      for (int j = 0; j < (COLUMNS); j++)                                                                            \
-        for (int i = 0; i < (VECTORS); i++) x[j][i] = *(name##_vector *)(at + (LANES) * ((VECTORS)*j + i));          \
-      const double *before = X, *l = L->entry + c;                                                                   \
-      for (int d = 0; d < c; d++, before += (LANES) * (VECTORS), l += PANEL) {                                       \
-        name##_vector a[VECTORS];                                                                                    \
-        for (int i = 0; i < (VECTORS); i++) a[i] = *(const name##_vector *)(before + (LANES)*i);                     \
-        for (int j = 0; j < (COLUMNS); j++)                                                                          \
-          for (int i = 0; i < (VECTORS); i++) x[j][i] -= l[j] * a[i];                                                \
-      }                                                                                                              \
-      for (int j = 0; j < (COLUMNS); j++, l += PANEL) {                                                              \
-        for (int i = 0; i < (VECTORS); i++) x[j][i] *= L->inverse[c + j];                                            \
-        for (int k = 0; k < (COLUMNS); k++)                                                                          \
-          for (int i = 0; i < (VECTORS) && k > j; i++) x[k][i] -= l[k] * x[j][i];                                    \
-      }                                                                                                              \
-      for (int j = 0; j < (COLUMNS); j++)                                                                            \
-        for (int i = 0; i < (VECTORS); i++) *(name##_vector *)(at + (LANES) * ((VECTORS)*j + i)) = x[j][i];          \
-    }                                                                                                                \
-  }                                                                                                                  \
-  attribute static int name##_triangle(int n, triangle *L) {                                                         \
-    for (int c = 0; c < n; c++) {                                                                                    \
-      double *column = L->entry + c * PANEL;                                                                         \
-      name##_vector x[PANEL / (LANES)];                                                                              \
-      for (int i = 0; i < PANEL / (LANES); i++) x[i] = *(name##_vector *)(column + (LANES)*i);                       \
-      for (int d = 0; d < c; d++)                                                                                    \
-        for (int i = 0; i < PANEL / (LANES); i++)                                                                    \
-          x[i] -= L->entry[d * PANEL + c] * *(const name##_vector *)(L->entry + d * PANEL + (LANES)*i);              \
-      for (int i = 0; i < PANEL / (LANES); i++) *(name##_vector *)(column + (LANES)*i) = x[i];                       \
-      double pivot = column[c];                                                                                      \
-      if (!(pivot > 0) || !isfinite(pivot)) return 0;                                                                \
-      double root = sqrt(pivot);                                                                                     \
-      L->inverse[c] = 1 / root;                                                                                      \
-      for (int i = c / (LANES); i < PANEL / (LANES); i++) *(name##_vector *)(column + (LANES)*i) *= L->inverse[c];   \
-      column[c] = root;                                                                                              \
-    }                                                                                                                \
-    return 1;                                                                                                        \
-  }                                                                                                                  \
-  attribute static void name##_subtract(int n, double s, const double *a, double *x) {                               \
-    int i = 0;                                                                                                       \
-    for (; i + (LANES) <= n; i += (LANES)) *(name##_vector *)(x + i) -= s * *(const name##_vector *)(a + i);         \
-    for (; i < n; i++) x[i] -= s * a[i];                                                                             \
-  }                                                                                                                  \
-  attribute static double name##_dot(int n, const double *a, const double *b) {                                      \
-    name##_vector sum[8 / (LANES)] = {0};                                                                            \
-    double eight[8];                                                                                                 \
-    int i = 0;                                                                                                       \
-    for (; i + 8 <= n; i += 8)                                                                                       \
-      for (int l = 0; l < 8 / (LANES); l++)                                                                          \
-        sum[l] += *(const name##_vector *)(a + i + (LANES)*l) * *(const name##_vector *)(b + i + (LANES)*l);         \
-    for (int l = 0; l < 8 / (LANES); l++) *(name##_vector *)(eight + (LANES)*l) = sum[l];                            \
-    for (int l = 0; i < n; i++, l++) eight[l] += a[i] * b[i];                                                        \
-    return add_eight(eight);                                                                                         \
+// What is done for each column of a tile of two vectors of rows, written out: sums in an array would go through memory.
+#define EACH_4(DO, V) DO(V, 0) DO(V, 1) DO(V, 2) DO(V, 3)
+#define EACH_6(DO, V) EACH_4(DO, V) DO(V, 4) DO(V, 5)
+#define EACH_8(DO, V) EACH_6(DO, V) DO(V, 6) DO(V, 7)
+#define SUM_BEGIN(V, j) V low##j = {0}, high##j = {0};
+#define SUM_ADD(V, j) low##j += low * B[j], high##j += high * B[j];
+#define SUM_TAKE(V, j)                         \
+  {                                            \
+    V *at = (V *)C;                            \
+    at[0] -= s * low##j, at[1] -= s * high##j; \
+    C += ldc;                                  \
+  }
+#define SUM_ADD_SOME(V, j)    \
+  low##j += low * B[p + (j)]; \
+  if (more) high##j += high * B[p + (j)];
+#define SUM_PUT(V, j)          \
+  {                            \
+    V *at = (V *)C;            \
+    at[0] = low##j;            \
+    if (more) at[1] = high##j; \
+    C += apart;                \
+  }
+
+// columns of a strip of rows in a panel: as they are; less those before them; over their own diagonals, in turn
+#define ROW_BEGIN(V, j) V low##j = to[2 * (j)], high##j = to[2 * (j) + 1];
+#define ROW_SUBTRACT(V, j) low##j -= l[j] * low, high##j -= l[j] * high;
+#define ROW_PUT(V, j) to[2 * (j)] = low##j, to[2 * (j) + 1] = high##j;
+#define ROW_AFTER(j, k) \
+  if ((k) > (j)) low##k -= l[k] * low##j, high##k -= l[k] * high##j;
+#define ROW_REDUCE(j) low##j *= inverse[j], high##j *= inverse[j];
+#define ROW_REDUCE_4(V, j) ROW_REDUCE(j) ROW_AFTER(j, 0) ROW_AFTER(j, 1) ROW_AFTER(j, 2) ROW_AFTER(j, 3) l += PANEL;
+#define ROW_REDUCE_6(V, j) \
+  ROW_REDUCE(j)            \
+  ROW_AFTER(j, 0) ROW_AFTER(j, 1) ROW_AFTER(j, 2) ROW_AFTER(j, 3) ROW_AFTER(j, 4) ROW_AFTER(j, 5) l += PANEL;
+#define ROW_REDUCE_8(V, j) \
+  ROW_REDUCE(j)            \
+  ROW_AFTER(j, 0)          \
+  ROW_AFTER(j, 1)          \
+  ROW_AFTER(j, 2) ROW_AFTER(j, 3) ROW_AFTER(j, 4) ROW_AFTER(j, 5) ROW_AFTER(j, 6) ROW_AFTER(j, 7) l += PANEL;
+
+#define WAY(name, attribute, LANES, SOME, COLUMNS)                                                                    \
+  typedef double name##_vector __attribute__((vector_size((LANES)*8), aligned(8), may_alias));                        \
+  attribute static void name##_tile(int k, const double *A, const double *B, double s, double *C, size_t ldc) {       \
+    EACH_##COLUMNS(SUM_BEGIN, name##_vector) for (int p = 0; p < k; p++, A += 2 * (LANES), B += (COLUMNS)) {          \
+      const name##_vector low = *(const name##_vector *)A, high = *(const name##_vector *)(A + (LANES));              \
+      EACH_##COLUMNS(SUM_ADD, name##_vector)                                                                          \
+    }                                                                                                                 \
+    EACH_##COLUMNS(SUM_TAKE, name##_vector)                                                                           \
+  }                                                                                                                   \
+  attribute static void name##_some(const row_set *set, size_t apart, const double *A, const double *B, double *C) {  \
+    enum { more = (SOME) > 1 };                                                                                       \
+    EACH_##COLUMNS(SUM_BEGIN, name##_vector) for (int w = 0; w < SLICE / 64;                                          \
+                                                  w++, A += 64 * apart,                                               \
+                                                  B += 64 * apart) for (unsigned long long left = set->bits[w]; left; \
+                                                                        left &= left - 1) {                           \
+      const size_t p = (size_t)__builtin_ctzll(left) * apart;                                                         \
+      const name##_vector low = *(const name##_vector *)(A + p);                                                      \
+      const name##_vector high = more ? *(const name##_vector *)(A + p + (LANES)) : low;                              \
+      EACH_##COLUMNS(SUM_ADD_SOME, name##_vector)                                                                     \
+    }                                                                                                                 \
+    EACH_##COLUMNS(SUM_PUT, name##_vector)                                                                            \
+  }                                                                                                                   \
+  attribute static void name##_panel(const triangle *L, double *X) {                                                  \
+    for (int c = 0; c < PANEL; c += (COLUMNS)) {                                                                      \
+      name##_vector *const to = (name##_vector *)X + 2 * c;                                                           \
+      EACH_##COLUMNS(ROW_BEGIN, name##_vector) const double *l = L->entry + c, *inverse = L->inverse + c;             \
+      for (const name##_vector *before = (name##_vector *)X; before < to; before += 2, l += PANEL) {                  \
+        const name##_vector low = before[0], high = before[1];                                                        \
+        EACH_##COLUMNS(ROW_SUBTRACT, name##_vector)                                                                   \
+      }                                                                                                               \
+      EACH_##COLUMNS(ROW_REDUCE_##COLUMNS, name##_vector) EACH_##COLUMNS(ROW_PUT, name##_vector)                      \
+    }                                                                                                                 \
+  }                                                                                                                   \
+  attribute static int name##_triangle(int n, triangle *L) {                                                          \
+    for (int c = 0; c < n; c++) {                                                                                     \
+      double *column = L->entry + c * PANEL;                                                                          \
+      name##_vector x[PANEL / (LANES)];                                                                               \
+      for (int i = 0; i < PANEL / (LANES); i++) x[i] = *(name##_vector *)(column + (LANES)*i);                        \
+      for (int d = 0; d < c; d++)                                                                                     \
+        for (int i = 0; i < PANEL / (LANES); i++)                                                                     \
+          x[i] -= L->entry[d * PANEL + c] * *(const name##_vector *)(L->entry + d * PANEL + (LANES)*i);               \
+      for (int i = 0; i < PANEL / (LANES); i++) *(name##_vector *)(column + (LANES)*i) = x[i];                        \
+      double pivot = column[c];                                                                                       \
+      if (!(pivot > 0) || !isfinite(pivot)) return 0;                                                                 \
+      double root = sqrt(pivot);                                                                                      \
+      L->inverse[c] = 1 / root;                                                                                       \
+      for (int i = c / (LANES); i < PANEL / (LANES); i++) *(name##_vector *)(column + (LANES)*i) *= L->inverse[c];    \
+      column[c] = root;                                                                                               \
+    }                                                                                                                 \
+    return 1;                                                                                                         \
+  }                                                                                                                   \
+  attribute static void name##_subtract(int n, double s, const double *a, double *x) {                                \
+    int i = 0;                                                                                                        \
+    for (; i + (LANES) <= n; i += (LANES)) *(name##_vector *)(x + i) -= s * *(const name##_vector *)(a + i);          \
+    for (; i < n; i++) x[i] -= s * a[i];                                                                              \
+  }                                                                                                                   \
+  attribute static double name##_dot(int n, const double *a, const double *b) {                                       \
+    name##_vector sum[8 / (LANES)] = {0};                                                                             \
+    double eight[8];                                                                                                  \
+    int i = 0;                                                                                                        \
+    for (; i + 8 <= n; i += 8)                                                                                        \
+      for (int l = 0; l < 8 / (LANES); l++)                                                                           \
+        sum[l] += *(const name##_vector *)(a + i + (LANES)*l) * *(const name##_vector *)(b + i + (LANES)*l);          \
+    for (int l = 0; l < 8 / (LANES); l++) *(name##_vector *)(eight + (LANES)*l) = sum[l];                             \
+    for (int l = 0; i < n; i++, l++) eight[l] += a[i] * b[i];                                                         \
+    return add_eight(eight);                                                                                          \
   }
 
 #if defined(__x86_64__)
-WAY(eight, __attribute__((target("avx512f"))), 8, 2, 1, 8)
-WAY(four, __attribute__((target("avx2"))), 4, 2, 2, 6)
+WAY(eight, __attribute__((target("avx512f"))), 8, 1, 8)
+WAY(four, __attribute__((target("avx2"))), 4, 2, 6)
 #endif
-WAY(two, , 2, 2, 2, 4)
+WAY(two, , 2, 2, 4)
 
 static const lanes *way(void) {
   static const lanes two = {4, 4, 4, two_tile, two_some, two_panel, two_triangle, two_subtract, two_dot};
@@ -153,32 +179,36 @@ typedef struct operand {
   const int *end; ///< column p of a band has no rows from end[p] on, and none has fewer after it; NULL: all are there
 } operand;
 
-/// Packs whole rows [k][height] that lie beside each other; height is known where this is inlined.
-static inline __attribute__((always_inline)) void pack_whole(const double *from, size_t by_column, int k, int height,
-                                                             double *out) {
-  for (int p = 0; p < k; p++, from += by_column, out += height) memcpy(out, from, (size_t)height * sizeof *out);
+/// Packs columns that lie one after the other; height is known where this is inlined.
+static inline __attribute__((always_inline)) void pack_columns(const operand *o, const double *from, int first,
+                                                               int count, int slice, int k, int height, double *out) {
+  for (int p = 0; p < k; p++, from += o->by_column, out += height) {
+    const int some = o->end && o->end[slice + p] - first < count ? o->end[slice + p] - first : count;
+    if (some >= height) {
+      memcpy(out, from, (size_t)height * sizeof *out);
+      continue;
+    }
+    for (int i = 0; i < height; i++) out[i] = i < some ? from[i] : 0;
+  }
 }
 
 /// Packs `count` rows from `first` of slice [k]: [k][height], zeros after the rows that there are.
 static void pack(const operand *o, int first, int count, int slice, int k, int height, double *out) {
   const double *from = o->at + (size_t)first * o->by_row + (size_t)slice * o->by_column;
-  int whole = o->by_row == 1 && count == height && (!o->end || o->end[slice] - first >= count);
-  if (whole && height == 16) {
-    pack_whole(from, o->by_column, k, 16, out);
-    return;
-  }
-  if (whole && height == 8) {
-    pack_whole(from, o->by_column, k, 8, out);
+  if (o->by_row == 1) {
+    if (height == 16)
+      pack_columns(o, from, first, count, slice, k, 16, out);
+    else if (height == 8)
+      pack_columns(o, from, first, count, slice, k, 8, out);
+    else if (height == 6)
+      pack_columns(o, from, first, count, slice, k, 6, out);
+    else
+      pack_columns(o, from, first, count, slice, k, height, out);
     return;
   }
   for (int p = 0; p < k; p++, from += o->by_column, out += height) {
-    int some = count;
-    if (o->end) some = o->end[slice + p] - first < count ? o->end[slice + p] - first : count;
-    if (o->by_row == 1 && some > 0)
-      memcpy(out, from, (size_t)some * sizeof *out);
-    else
-      for (int i = 0; i < some; i++) out[i] = from[(size_t)i * o->by_row];
-    for (int i = some > 0 ? some : 0; i < height; i++) out[i] = 0;
+    const int some = o->end && o->end[slice + p] - first < count ? o->end[slice + p] - first : count;
+    for (int i = 0; i < height; i++) out[i] = i < some ? from[(size_t)i * o->by_row] : 0;
   }
 }
 
@@ -199,7 +229,7 @@ static void add_tile(cav_triangle part, int m, int n, int row, int column, const
     const double *t = T + j * w->rows;
     int first = part == CAV_TRIANGLE_LOWER && column + j > row ? column + j - row : 0;
     int end = part == CAV_TRIANGLE_UPPER && column + j + 1 - row < rows ? column + j + 1 - row : rows;
-    if (end > first) w->subtract(end - first, -sign, t + first, at + first);
+    for (int i = first; i < end; i++) at[i] -= -sign * t[i];
   }
 }
 
@@ -244,13 +274,17 @@ void cav_dense_product_transposed(cav_triangle part, int m, int n, int k, double
   product(part, m, n, k, sign, &a, &b, C, (size_t)ldc);
 }
 
-/// Rows of A' [k*n] with the like columns of all parts side by side, which rows have anything but zeros in each strip of columns,
-/// and the upper triangle of their square, by columns.
+/// Rows of A' [k*n] with the like columns of all parts side by side, and which rows have anything but zeros in each strip of
+/// columns.
 typedef struct slice {
-  _Alignas(64) double entry[SLICE * (SQUARE + TILE_MOST)], sum[(SQUARE + TILE_MOST) * (SQUARE + TILE_MOST)];
-  size_t apart; ///< of rows, and of columns of the sum
+  _Alignas(64) double entry[SLICE * (SQUARE + TILE_MOST)];
+  size_t apart; ///< of rows, and of columns of their square
   row_set tall[SQUARE / 4], wide[SQUARE / 4];
 } slice;
+
+/// Distance of rows and of columns where n columns are packed; room for the square of a slice.
+static size_t apart_of(int n) { return (size_t)(n + TILE_MOST - 1) / 8 * 8; }
+enum { SQUARE_ROOM = (SQUARE + TILE_MOST) * (SQUARE + TILE_MOST) };
 
 /// The number's bits.
 typedef unsigned long long number_bits __attribute__((may_alias));
@@ -295,15 +329,15 @@ static void pack_slice(const lanes *w, int n, int parts, int k, const double *A,
   join_strips(n, parts, w->columns, set, s->wide);
 }
 
-/// The square of a slice's rows.
-static void square_slice(const lanes *w, int n, slice *s) {
+/// The upper triangle of the square of a slice's rows, by columns.
+static void square_slice(const lanes *w, int n, const slice *s, double *sum) {
   for (int j = 0; j < n; j += w->columns) {
     const row_set *b = &s->wide[j / w->columns];
     for (int i = 0; i < least(n, j + w->columns); i += w->some_rows) {
       const row_set *a = &s->tall[i / w->some_rows];
       row_set both;
       for (int l = 0; l < SLICE / 64; l++) both.bits[l] = a->bits[l] & b->bits[l];
-      w->some(&both, s->apart, s->entry + i, s->entry + j, s->sum + (size_t)j * s->apart + i);
+      w->some(&both, s->apart, s->entry + i, s->entry + j, sum + (size_t)j * s->apart + i);
     }
   }
 }
@@ -335,16 +369,15 @@ CAV_VECTOR_BODY void add_some(double *to, const cav_four *x, int n) {
 }
 
 // upper triangle of C += the square of three parts, by four columns of each at once
-CAV_VECTOR_BODY void add_square_of_three_body(int part, slice *s, double *C, size_t ldc) {
-  const size_t apart = s->apart;
+CAV_VECTOR_BODY void add_square_of_three_body(int part, double *sum, size_t apart, double *C, size_t ldc) {
   for (int D = 0; D < part; D += 4) {
     const int some = least(4, part - D);
     // what these columns have of each other, in all of them
     for (int j = 3 * D; j < 3 * D + 12; j++)
-      for (int i = j + 1; i < 3 * D + 12; i++) s->sum[(size_t)j * apart + i] = s->sum[(size_t)i * apart + j];
+      for (int i = j + 1; i < 3 * D + 12; i++) sum[(size_t)j * apart + i] = sum[(size_t)i * apart + j];
     for (int d = D; d < D + some; d++)
       for (int c = 0; c < 3; c++) {
-        const double *in = s->sum + (size_t)(3 * d + c) * apart;
+        const double *in = sum + (size_t)(3 * d + c) * apart;
         double *out = C + (size_t)(c * part + d) * ldc;
         for (int e = 0; e <= D; e += 4) {
           cav_four x[3];
@@ -356,7 +389,7 @@ CAV_VECTOR_BODY void add_square_of_three_body(int part, slice *s, double *C, siz
     for (int e = D + 4; e < part; e += 4)
       for (int b = 0; b < 2; b++) {
         cav_four x[4][3], column[4];
-        for (int i = 0; i < 4; i++) part_three(s->sum + (size_t)(3 * (e + i) + b) * apart + 3 * D, x[i]);
+        for (int i = 0; i < 4; i++) part_three(sum + (size_t)(3 * (e + i) + b) * apart + 3 * D, x[i]);
         for (int c = b + 1; c < 3; c++) {
           for (int i = 0; i < 4; i++) column[i] = x[i][c];
           transpose_four(column);
@@ -366,28 +399,38 @@ CAV_VECTOR_BODY void add_square_of_three_body(int part, slice *s, double *C, siz
       }
   }
 }
-CAV_BY_VECTORS(add_square_of_three, (int part, slice *s, double *C, size_t ldc), (part, s, C, ldc))
+CAV_BY_VECTORS(add_square_of_three, (int part, double *sum, size_t apart, double *C, size_t ldc),
+               (part, sum, apart, C, ldc))
 
 /// Upper triangle of C += the square, back in the order of the columns: C's rows are `next` apart, its columns ldc.
-static void add_square(int n, int parts, slice *s, double *C, size_t next, size_t ldc) {
+static void add_square(int n, int parts, double *sum, double *C, size_t next, size_t ldc) {
   const int part = n / parts;
+  const size_t apart = apart_of(n);
   if (parts == 3 && next == 1) {
-    add_square_of_three(part, s, C, ldc);
+    add_square_of_three(part, sum, apart, C, ldc);
     return;
   }
-  const size_t down = (size_t)parts, across = (size_t)parts * s->apart;
+  const size_t down = (size_t)parts, across = (size_t)parts * apart;
   for (int at = 0; at < n; at++, C += ldc) {
     const int d = at % part, c = at / part;
     const size_t j = (size_t)(d * parts + c);
     for (int b = 0; b <= c; b++) {
       // those before column j of the sum stand in it, the others in theirs
       const int end = b == c ? d + 1 : part, before = least(end, d + (b <= c));
-      const double *in = s->sum + j * s->apart + b, *there = s->sum + (size_t)b * s->apart + j;
+      const double *in = sum + j * apart + b, *there = sum + (size_t)b * apart + j;
       double *out = C + (size_t)(b * part) * next;
       for (int e = 0; e < before; e++) out[(size_t)e * next] += in[(size_t)e * down];
       for (int e = before; e < end; e++) out[(size_t)e * next] += there[(size_t)e * across];
     }
   }
+}
+
+/// The square of at most SLICE rows of at most SQUARE columns.
+static void find_square(const lanes *w, int n, int parts, int k, const double *A, size_t lda, double *sum) {
+  slice s;
+  s.apart = apart_of(n);
+  pack_slice(w, n, parts, k, A, lda, &s);
+  square_slice(w, n, &s, sum);
 }
 
 void cav_dense_square(cav_triangle part, int n, int parts, int k, const double *A, int lda, double *C, int ldc) {
@@ -397,14 +440,43 @@ void cav_dense_square(cav_triangle part, int n, int parts, int k, const double *
     product(part, n, n, k, 1, &a, &a, C, (size_t)ldc);
     return;
   }
-  const int lower = part == CAV_TRIANGLE_LOWER;
-  slice s;
-  s.apart = (size_t)(n + TILE_MOST - 1) / 8 * 8;
+  _Alignas(64) double sum[SQUARE_ROOM];
   for (int first = 0; first < k; first += SLICE, A += SLICE * (size_t)lda) {
-    pack_slice(w, n, parts, least(k - first, SLICE), A, (size_t)lda, &s);
-    square_slice(w, n, &s);
-    add_square(n, parts, &s, C, lower ? (size_t)ldc : 1, lower ? 1 : (size_t)ldc);
+    find_square(w, n, parts, least(k - first, SLICE), A, (size_t)lda, sum);
+    cav_dense_square_add(part, n, parts, sum, C, ldc);
   }
+}
+
+size_t cav_dense_square_room(int n) {
+  const size_t columns = (size_t)n;
+  return n > SQUARE ? columns * columns : (columns + TILE_MOST) * apart_of(n);
+}
+
+void cav_dense_square_find(cav_triangle part, int n, int parts, int k, const double *A, int lda, double *room) {
+  const size_t size = cav_dense_square_room(n);
+  if (n > SQUARE || k == 0 || k > SLICE) memset(room, 0, size * sizeof *room);
+  if (n > SQUARE) {
+    cav_dense_square(part, n, parts, k, A, lda, room, n);
+    return;
+  }
+  if (k > 0) find_square(way(), n, parts, least(k, SLICE), A, (size_t)lda, room);
+  _Alignas(64) double sum[SQUARE_ROOM];
+  for (int first = SLICE; first < k; first += SLICE) {
+    memset(sum, 0, size * sizeof *sum);
+    find_square(way(), n, parts, least(k - first, SLICE), A + (size_t)first * (size_t)lda, (size_t)lda, sum);
+    for (size_t i = 0; i < size; i++) room[i] += sum[i];
+  }
+}
+
+void cav_dense_square_add(cav_triangle part, int n, int parts, double *room, double *C, int ldc) {
+  const size_t apart = (size_t)ldc;
+  if (n <= SQUARE) {
+    add_square(n, parts, room, C, part == CAV_TRIANGLE_LOWER ? apart : 1, part == CAV_TRIANGLE_LOWER ? 1 : apart);
+    return;
+  }
+  for (int j = 0; j < n; j++)
+    for (int i = part == CAV_TRIANGLE_LOWER ? j : 0; i < (part == CAV_TRIANGLE_UPPER ? j + 1 : n); i++)
+      C[(size_t)i + (size_t)j * apart] += room[i + j * n];
 }
 
 // a block, four rows of four columns at once; those of fewer one by one
@@ -444,38 +516,34 @@ typedef struct panel {
 } panel;
 
 static panel panel_at(int start, int n, int below, int step) {
-  panel p = {.start = start, .end = least(n, start + PANEL)};
+  panel p;
+  p.start = start, p.end = least(n, start + PANEL);
   for (int c = start; c < p.end; c++) p.last[c - start] = least(n, c / step * step + below + 1);
   return p;
 }
 
-/// What the columns of a panel take from each other in the rows from `first` on.
-static void reduce_rows(const lanes *w, const panel *p, int first, double *A, size_t ld) {
-  for (int c = p->start; c < p->end; c++) {
-    double *column = A + (size_t)c * ld, inverse = 1 / column[c];
-    for (int d = p->start; d < c; d++) {
-      const double *before = A + (size_t)d * ld;
-      int count = p->last[d - p->start] - first;
-      if (count > 0) w->subtract(count, before[c], before + first, column + first);
-    }
-    for (int i = first; i < p->last[c - p->start]; i++) column[i] *= inverse;
-  }
-}
-
-/// The same in the rows from the panel's end on that all its columns have, by strips; returns the first row after them.
-static int reduce_strips(const lanes *w, const panel *p, const triangle *L, double *A, size_t ld) {
-  int last = p->last[0];
-  if (last - p->end < w->rows / 2) return p->end;
+/// What the columns of a panel take from each other in the rows from the panel's end on, by strips; columns that end before
+/// count as zeros, which stay what they are.
+static void reduce_strips(const lanes *w, const panel *p, const triangle *L, double *A, size_t ld) {
+  const int last = p->last[p->end - p->start - 1];
   _Alignas(64) double X[PANEL * TILE_MOST];
+  int end[PANEL];
+  // rows there are none after a panel of fewer columns, the last
+  assert(p->end - p->start == PANEL || last <= p->end);
   for (int row = p->end; row < last; row += w->rows) {
-    int some = least(last - row, w->rows);
-    operand rows = {.at = A + (size_t)p->start * ld + row, .by_row = 1, .by_column = ld};
+    const int some = least(last - row, w->rows);
+    for (int c = 0; c < PANEL; c++) end[c] = p->last[c] - row;
+    operand rows = {.at = A + (size_t)p->start * ld + row, .by_row = 1, .by_column = ld, .end = end};
     pack(&rows, 0, some, 0, PANEL, w->rows, X);
     w->panel(L, X);
-    for (int c = 0; c < PANEL; c++)
-      memcpy(A + (size_t)(p->start + c) * ld + row, X + c * w->rows, (size_t)some * sizeof *X);
+    for (int c = 0; c < PANEL; c++) {
+      double *to = A + (size_t)(p->start + c) * ld + row;
+      if (end[c] >= w->rows && w->rows == 8)
+        memcpy(to, X + c * 8, 8 * sizeof *X);
+      else if (end[c] > 0)
+        memcpy(to, X + c * w->rows, (size_t)least(end[c], w->rows) * sizeof *X);
+    }
   }
-  return last;
 }
 
 /// The triangle on the panel's diagonal; zero if a pivot is not positive.
@@ -485,8 +553,9 @@ static int factor_triangle(const lanes *w, const panel *p, triangle *L, double *
     const double *column = A + (size_t)(p->start + c) * (ld + 1);
     double *to = L->entry + c * PANEL;
     int count = least(p->end, p->last[c]) - p->start - c;
-    memset(to, 0, PANEL * sizeof *to);
-    memcpy(to + c, column, (size_t)count * sizeof *to);
+    for (int i = 0; i < c; i++) to[i] = 0;
+    for (int i = 0; i < count; i++) to[c + i] = column[i];
+    for (int i = c + count; i < PANEL; i++) to[i] = 0;
   }
   if (!w->triangle(n, L)) return 0;
   for (int c = 0; c < n; c++) {
@@ -505,7 +574,7 @@ int cav_dense_factor_part(int n, int below, int step, int from, int ready, doubl
     int columns = p.end - start, last = p.last[columns - 1], rest = last - p.end;
     if (last > ready) return start;
     if (!factor_triangle(w, &p, &L, A, ld)) return -1;
-    reduce_rows(w, &p, reduce_strips(w, &p, &L, A, ld), A, ld);
+    reduce_strips(w, &p, &L, A, ld);
     // and the panel from all columns after it
     for (int c = 0; c < columns; c++) p.last[c] -= p.end;
     operand rows = {.at = A + (size_t)start * ld + p.end, .by_row = 1, .by_column = ld, .end = p.last};

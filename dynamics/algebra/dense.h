@@ -3,6 +3,8 @@
 #ifndef CAVORT_DENSE_H
 #define CAVORT_DENSE_H
 
+#include <stddef.h>
+
 #include "vectors.h"
 
 /// Which entries of a product are added; the others of C stay.
@@ -19,6 +21,12 @@ void cav_dense_product_transposed(cav_triangle part, int m, int n, int k, double
 /// C += A A', one triangle of it: A [n*k], C [n*n]. Rows of A in equal parts, of which the like are often zero in the same
 /// columns: zeros that stand together then cost nothing, to the same bits for any number of parts.
 void cav_dense_square(cav_triangle part, int n, int parts, int k, const double *A, int lda, double *C, int ldc);
+
+/// The same in two steps, of which the first need not wait for C: A A' into a room of as many numbers, then that added. To the
+/// bits of one step, where A has no more than 128 columns; the sums of more are joined before they are added.
+size_t cav_dense_square_room(int n);
+void cav_dense_square_find(cav_triangle part, int n, int parts, int k, const double *A, int lda, double *room);
+void cav_dense_square_add(cav_triangle part, int n, int parts, double *room, double *C, int ldc);
 
 /// C += A, or its lower triangle, C [n*n] by columns, ldc apart, and A by rows; fresh: C := A.
 void cav_dense_add_transposed(cav_triangle part, int fresh, int n, const double *A, int lda, double *C, int ldc);

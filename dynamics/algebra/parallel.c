@@ -15,12 +15,31 @@ struct cav_parallel {
   } * member;
   pthread_mutex_t mutex;
   pthread_cond_t work, done;
-  int round, busy, stop;
+  atomic_int round, busy; ///< loops begun; members that are still at the present one
+  int stop;
   int n;
   atomic_int next;
   void (*body)(void *, int, int);
   void *context;
 };
+
+/// Looks at what another member is about to change before a member goes to sleep, some 100 microseconds in all: between two loops
+/// there is often less than it takes to be woken.
+enum { LOOKS = 4000 };
+
+static inline void pause(void) {
+#if defined(__x86_64__)
+  __builtin_ia32_pause();
+#endif
+}
+
+static int changes(const atomic_int *value, int from) {
+  for (int i = 0; i < LOOKS; i++) {
+    if (atomic_load_explicit(value, memory_order_acquire) != from) return 1;
+    pause();
+  }
+  return 0;
+}
 
 static void draw(cav_parallel *team, int member) {
   for (int item = atomic_fetch_add(&team->next, 1); item < team->n; item = atomic_fetch_add(&team->next, 1))
@@ -38,8 +57,14 @@ static void *serve(void *argument) {
     seen = team->round;
     pthread_mutex_unlock(&team->mutex);
     draw(team, self->index);
+    if (atomic_fetch_sub(&team->busy, 1) == 1) {
+      // the caller may have gone to sleep
+      pthread_mutex_lock(&team->mutex);
+      pthread_cond_signal(&team->done);
+      pthread_mutex_unlock(&team->mutex);
+    }
+    changes(&team->round, seen);
     pthread_mutex_lock(&team->mutex);
-    if (--team->busy == 0) pthread_cond_signal(&team->done);
   }
   pthread_mutex_unlock(&team->mutex);
   return NULL;
@@ -95,6 +120,8 @@ void cav_parallel_for(cav_parallel *team, int n, void (*body)(void *context, int
 
   draw(team, 0);
 
+  for (int i = 0; i < LOOKS && atomic_load(&team->busy) > 0; i++) pause();
+  if (atomic_load(&team->busy) == 0) return;
   pthread_mutex_lock(&team->mutex);
   while (team->busy > 0) pthread_cond_wait(&team->done, &team->mutex);
   pthread_mutex_unlock(&team->mutex);
@@ -106,34 +133,27 @@ typedef struct order {
   void (*then)(void *, int);
   void *context;
   cav_parallel_flag *ready;
-  int n;
-  atomic_int next; ///< the first that was not followed
-  atomic_flag busy;
+  int n, next; ///< items; the first that was not followed
 } order;
 
-static int is_ready(order *o) {
-  const int next = atomic_load(&o->next);
-  return next < o->n && atomic_load(&o->ready[next]);
+/// Follows what is ready.
+static void catch_up(order *o) {
+  for (; o->next < o->n && atomic_load(&o->ready[o->next]); o->next++) o->then(o->context, o->next);
 }
 
 static void follow(void *context, int item, int member) {
   order *o = context;
   o->body(o->context, item, member);
   atomic_store(&o->ready[item], 1);
-  // an item that gets ready while another member is busy is found by that one, or by this one after it
-  while (is_ready(o) && !atomic_flag_test_and_set(&o->busy)) {
-    while (is_ready(o)) {
-      o->then(o->context, atomic_load(&o->next));
-      atomic_fetch_add(&o->next, 1);
-    }
-    atomic_flag_clear(&o->busy);
-  }
+  // by one member alone, in whose cache stays what one item leaves for the next
+  if (member == 0) catch_up(o);
 }
 
 void cav_parallel_then(cav_parallel *team, int n, void (*body)(void *context, int item, int member),
                        void (*then)(void *context, int item), void *context, cav_parallel_flag *ready) {
-  order o = {.body = body, .then = then, .context = context, .ready = ready, .n = n, .busy = ATOMIC_FLAG_INIT};
-  atomic_init(&o.next, 0);
+  order o = {.body = body, .then = then, .context = context, .ready = ready, .n = n};
   for (int i = 0; i < n; i++) atomic_store(&ready[i], 0);
   cav_parallel_for(team, n, follow, &o);
+  // what others had at hand when no item was left
+  catch_up(&o);
 }

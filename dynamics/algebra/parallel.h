@@ -15,8 +15,8 @@ int cav_parallel_size(const cav_parallel *team);
 /// Calls body(context, item, member) for item = 0 .. n-1, each once, in no fixed order; returns when all are done.
 void cav_parallel_for(cav_parallel *team, int n, void (*body)(void *context, int item, int member), void *context);
 
-/// The same, and then(context, item) for each item after its body, one call at a time and in ascending order, by whichever
-/// member: what has an order of its own goes on while bodies of later items do. ready [n] is the caller's.
+/// The same, and then(context, item) for each item after its body, in ascending order, by the caller's thread: what has an order
+/// of its own goes on while bodies of later items do. ready [n] is the caller's.
 void cav_parallel_then(cav_parallel *team, int n, void (*body)(void *context, int item, int member),
                        void (*then)(void *context, int item), void *context, cav_parallel_flag *ready);
 

@@ -218,8 +218,8 @@ static const cav_xml_element cost = {
     "cost", 0, 1, NULL, (const cav_xml_element *const[]){&cost_style, CAV_QUANTITIES(COST_CHILD) NULL}, 0, "terms that are minimised"};
 
 #define BOUNDS                                                                                                         \
-  REAL("lower", 0, "of the term", "(open)", "least value; without either bound the value equals its target"),          \
-  REAL("upper", 0, "of the term", "(open)", "greatest value")
+  REAL("lower", 0, "of the term", "(open)", "least value, of postures and what has a target from that on; without either bound the value equals its target"), \
+  REAL("upper", 0, "of the term", "(open)", "greatest value, likewise")
 #define HARD_ELEMENT_0(element, of, text)
 #define HARD_ELEMENT_1(element, of, text) \
   static const cav_xml_element hard_##element = {#element, 0, 0, TERM_##of(BOUNDS), 0, text};

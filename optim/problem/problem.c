@@ -321,9 +321,10 @@ static cav_status check_ranges(const cav_problem_reader *reader, const cav_xml_n
       least = 0;
     }
     if (value < least - slack || value > joint->range[1] + slack) {
-      const double turned = value * M_PI / 180;
+      // a little beyond in radians it is no slip of units
+      const double turned = value * M_PI / 180, beyond = fmax(least - value, value - joint->range[1]);
       const int degrees = joint->type == CAV_JOINT_HINGE && turned >= least && turned <= joint->range[1] &&
-                          !cav_problem_in_degrees(reader, node, j);
+                          beyond > 0.1 && !cav_problem_in_degrees(reader, node, j);
       return cav_xml_fail(
           reader->error, node, NULL,
           "joint '%s' is at %g, outside its range %g .. %g (rad or m); ranges='clip' would bring it in%s", joint->name,

@@ -8,6 +8,7 @@
 #include "dense.h"
 #include "vectors.h"
 
+#include <assert.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
@@ -407,38 +408,111 @@ CAV_BY_VECTORS(multiply_columns, (const cav_normal *normal, int from, int to, co
 int cav_normal_is_band(const cav_normal *normal) { return normal->ntree == 1 && normal->border == 0; }
 int cav_normal_was_band(const cav_normal *normal) { return normal->ngroup == 1 && normal->border == 0; }
 
+/// One pass over the knots that factors a sum.
+typedef struct sum_pass {
+  cav_normal *normal;
+  const cav_transcription *tr;
+  const cav_normal_sum *sum;
+  cav_band *band;
+  double shift;
+  int filled;         ///< columns that are added and shifted
+  atomic_int is_over; ///< a pivot was not positive
+} sum_pass;
+
+/// First column that no knot before t adds to.
+static int new_columns(const sum_pass *s, int t) {
+  const int first = t > 0 ? (t - s->tr->first + 1) * s->normal->n : 0;
+  return first < s->band->core ? first : s->band->core;
+}
+
+/// Columns' products with x, each from its diagonal down, of four columns side by side: one after the other their sums would wait
+/// for each other.
+CAV_VECTOR_BODY void multiply_four(const cav_normal *normal, const double *kept, int first, const double *x,
+                                   double *sum) {
+  const double *H[4];
+  const int end = end_of(normal, first);
+  assert(end >= first + 4);
+  for (int c = 0; c < 4; c++) {
+    const int j = first + c;
+    H[c] = kept + (size_t)j * normal->band - j;
+    sum[c] = H[c][j] * x[j];
+    for (int i = j + 1; i < first + 4; i++) sum[c] += H[c][i] * x[i];
+  }
+  double a = sum[0], b = sum[1], c = sum[2], d = sum[3];
+  for (int i = first + 4; i < end; i++)
+    a += H[0][i] * x[i], b += H[1][i] * x[i], c += H[2][i] * x[i], d += H[3][i] * x[i];
+  sum[0] = a, sum[1] = b, sum[2] = c, sum[3] = d;
+  // later columns may end later
+  for (int k = 1; k < 4; k++)
+    for (int i = end, last = end_of(normal, first + k); i < last; i++) sum[k] += H[k][i] * x[i];
+}
+
+/// product := rows from .. to-1 of what was kept times x, each the sum of multiply_columns.
+CAV_VECTOR_BODY void multiply_rows_body(const cav_normal *normal, const double *kept, int from, int to, const double *x,
+                                        double *product) {
+  const int before = (from / normal->n - 2) * normal->n;
+  double sum[4];
+  memset(product + from, 0, (size_t)(to - from) * sizeof *product);
+  for (int j = before > 0 ? before : 0; j < to; j++) {
+    const double *H = kept + (size_t)j * normal->band - j;
+    const int end = end_of(normal, j), last = end < to ? end : to, own = (j - from) % 4;
+    const int by_four = j - own + 4 <= to;
+    if (j >= from && own == 0 && by_four) multiply_four(normal, kept, j, x, sum);
+    for (int i = j < from ? from : j + 1; i < last; i++) product[i] += H[i] * x[j];
+    if (j < from) continue;
+    if (!by_four) {
+      sum[own] = H[j] * x[j];
+      for (int i = j + 1; i < end; i++) sum[own] += H[i] * x[i];
+    }
+    product[j] += sum[own];
+  }
+}
+CAV_BY_VECTORS(multiply_rows,
+               (const cav_normal *normal, const double *kept, int from, int to, const double *x, double *product),
+               (normal, kept, from, to, x, product))
+
+/// What stands by itself of a knot: columns that are new are copied to the factor's place and multiplied.
+static void find_part(void *context, int t, int member) {
+  sum_pass *s = context;
+  const int from = new_columns(s, t), to = t + 1 < s->tr->nknot ? new_columns(s, t + 1) : s->band->core;
+  const size_t width = (size_t)s->normal->band;
+  if (atomic_load(&s->is_over)) return;
+  if (to > from) {
+    memcpy(s->band->A + (size_t)from * width, s->sum->kept + (size_t)from * width,
+           (size_t)(to - from) * width * sizeof(double));
+    multiply_rows(s->normal, s->sum->kept, from, to, s->sum->x, s->sum->product);
+  }
+  if (s->sum->find) s->sum->find(s->sum->context, t, member);
+}
+
+/// Adds the rest of it; columns that no later knot adds to are factored.
+static void factor_part(void *context, int t) {
+  sum_pass *s = context;
+  cav_normal *normal = s->normal;
+  const int last = t + 1 == s->tr->nknot ? s->band->core : (t - s->tr->first) * normal->n;
+  if (atomic_load(&s->is_over)) return;
+  s->sum->add(s->sum->context, t);
+  if (last <= s->filled) return;
+  for (int j = s->filled; j < last; j++) {
+    double *entry = &s->band->A[(size_t)j * (size_t)normal->band];
+    normal->diagonal[j] = *entry + s->sum->diagonal[j];
+    *entry = lifted(normal, j, s->shift);
+  }
+  s->filled = last;
+  if (cav_band_factor_part(s->band, last) != CAV_OK) atomic_store(&s->is_over, 1);
+}
+
 cav_status cav_normal_factor_sum(cav_normal *normal, const cav_transcription *tr, const cav_normal_sum *sum,
                                  double shift) {
   double *at = normal->factor, *H = normal->H;
   if (normal->ntree == 1) find_groups(normal);
-  cav_band *band = place_band(normal, 0, &at);
-  size_t width = (size_t)normal->band;
-  int copied = 0, filled = 0;
+  sum_pass s = {.normal = normal, .tr = tr, .sum = sum, .band = place_band(normal, 0, &at), .shift = shift};
+  atomic_init(&s.is_over, 0);
   // the factor's own place is what is gathered in: its columns lie as those of H
-  normal->H = band->A;
-  memset(sum->product, 0, (size_t)normal->size * sizeof *sum->product);
-  for (int t = 0; t < tr->nknot && band->done >= 0; t++) {
-    // a knot is the first at its last block; the next two add to all but the blocks before them
-    int ended = t + 1 == tr->nknot, last = ended ? band->core : (t - tr->first) * normal->n;
-    int end = ended ? last : last + 2 * normal->n;
-    if (end > copied) {
-      memcpy(band->A + (size_t)copied * width, sum->kept + (size_t)copied * width,
-             (size_t)(end - copied) * width * sizeof *sum->kept);
-      multiply_columns(normal, copied, end, sum->x, sum->product);
-      copied = end;
-    }
-    sum->add(sum->context, t);
-    if (last <= filled) continue;
-    for (int j = filled; j < last; j++) {
-      double *entry = &band->A[(size_t)j * width];
-      normal->diagonal[j] = *entry + sum->diagonal[j];
-      *entry = lifted(normal, j, shift);
-    }
-    filled = last;
-    cav_band_factor_part(band, last);
-  }
+  normal->H = s.band->A;
+  cav_parallel_then(tr->pool, tr->nknot, find_part, factor_part, &s, tr->ready);
   normal->H = H;
-  return band->done >= 0 ? CAV_OK : CAV_NOT_CONVERGED;
+  return s.band->done >= 0 ? CAV_OK : CAV_NOT_CONVERGED;
 }
 
 /// Knots that are taken one after the other.

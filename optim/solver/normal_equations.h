@@ -76,12 +76,15 @@ int cav_normal_was_band(const cav_normal *normal);
 typedef struct cav_normal_sum {
   const double *kept, *diagonal, *x;
   double *product;
-  void (*add)(void *context, int t);
+  void (*find)(void *context, int t,
+               int member);          ///< before add, of many knots at once, by a member of the transcription's team
+  void (*add)(void *context, int t); ///< one after the other
   void *context;
 } cav_normal_sum;
 
-/// Factors a sum where cav_normal_was_band, with the bits that its parts give one after the other; H stays as it was. Results of
-/// cav_normal_factor; product is whole where that is CAV_OK.
+/// Factors a sum where cav_normal_was_band, with the bits that its parts give one after the other; H stays as it was. While knots
+/// are added and factored in their order other threads find what later ones add. Results of cav_normal_factor; product is whole
+/// where that is CAV_OK.
 cav_status cav_normal_factor_sum(cav_normal *normal, const cav_transcription *transcription, const cav_normal_sum *sum,
                                  double shift);
 

@@ -51,14 +51,20 @@ struct cav_quadratic {
   double *change, *weight, *ray;          ///< [rows] J dx; w of both sides; right-hand side
   int *entries;                           ///< [rows*(SPARSE+1)] of a row: how many are not zero and their columns; or 0
   double *x, *dx, *rhs, *gradient, *work; ///< [n]
-  double *local, *image, *block, *dense;  ///< [3nv+1] of one knot, [9nv^2], [most rows * 3nv]
-  double *costs;                          ///< normal equations of the costs alone, as they are kept
-  double lifted;                          ///< fraction of its diagonal that the last factor needed besides
-  int is_band;                            ///< whether all unknowns are one, which is factored as it is gathered
-  int bent;                               ///< iterations whose matrix was far from positive definite
-  double predicted;                       ///< decrease of the last solution
-  double gap;                             ///< complementarities of the last solution
-  double *bound;                          ///< [2*n] of the box
+  double *local, *image, *block;          ///< [3nv+1] of one knot, [9nv^2]
+  int members;                            ///< of the team of threads
+  double *locals, *dense, *square; ///< [nknot*(3nv+1)] of each knot; [members * most rows * 3nv], [members * its room]
+  double *triangle;                ///< [nknot*9nv^2] squares of many members, lower triangles by columns
+  size_t dense_room, square_room;
+  const double *ahead; ///< what the team multiplies the rows by, or with
+  double *product;     ///< where that goes
+  double *costs;       ///< normal equations of the costs alone, as they are kept
+  double lifted;       ///< fraction of its diagonal that the last factor needed besides
+  int is_band;         ///< whether all unknowns are one, which is factored as it is gathered
+  int bent;            ///< iterations whose matrix was far from positive definite
+  double predicted;    ///< decrease of the last solution
+  double gap;          ///< complementarities of the last solution
+  double *bound;       ///< [2*n] of the box
 };
 
 cav_quadratic *cav_quadratic_new(const cav_transcription *tr, cav_normal *normal) {
@@ -74,13 +80,20 @@ cav_quadratic *cav_quadratic_new(const cav_transcription *tr, cav_normal *normal
     p->rows += tr->knot[t].layout.count;
     if ((size_t)tr->knot[t].layout.count > most) most = (size_t)tr->knot[t].layout.count;
   }
-  size_t rows = (size_t)p->rows, n = (size_t)p->n, local = 3 * nv + 1;
+  size_t rows = (size_t)p->rows, n = (size_t)p->n, local = 3 * nv + 1, knots = (size_t)tr->nknot;
+  p->members = cav_parallel_size(tr->pool);
+  p->dense_room = (most + 1) * 3 * nv;
+  p->square_room = cav_dense_square_room((int)(3 * nv));
+  // a single thread adds a square before it finds the next
+  const size_t triangles = p->members > 1 ? knots * 9 * nv * nv : 0;
+  const size_t rooms = (size_t)p->members * (p->dense_room + p->square_room);
+  p->locals = malloc((knots * local + rooms + triangles) * sizeof(double));
   p->row = calloc(2 * rows + 1, sizeof *p->row);
   p->box = calloc(2 * n, sizeof *p->box);
-  p->penalty = calloc(6 * rows + 7 * n + 2 * local + 9 * nv * nv + most * 3 * nv, sizeof(double));
+  p->penalty = calloc(6 * rows + 7 * n + 2 * local + 9 * nv * nv, sizeof(double));
   p->entries = malloc((rows + 1) * (SPARSE + 1) * sizeof(int));
   p->costs = malloc(cav_normal_room(normal) * sizeof(double));
-  if (!p->first || !p->row || !p->box || !p->penalty || !p->entries || !p->costs) {
+  if (!p->first || !p->row || !p->box || !p->penalty || !p->entries || !p->costs || !p->locals) {
     cav_quadratic_free(p);
     return NULL;
   }
@@ -92,14 +105,16 @@ cav_quadratic *cav_quadratic_new(const cav_transcription *tr, cav_normal *normal
   p->bound = next, next += 2 * n;
   p->local = next, next += local;
   p->image = next, next += local;
-  p->block = next, next += 9 * nv * nv;
-  p->dense = next;
+  p->block = next;
+  p->dense = p->locals + knots * local;
+  p->square = p->dense + (size_t)p->members * p->dense_room;
+  p->triangle = p->square + (size_t)p->members * p->square_room;
   return p;
 }
 
 void cav_quadratic_free(cav_quadratic *p) {
   if (!p) return;
-  free(p->first), free(p->row), free(p->box), free(p->penalty), free(p->entries), free(p->costs);
+  free(p->first), free(p->row), free(p->box), free(p->penalty), free(p->entries), free(p->costs), free(p->locals);
   free(p);
 }
 
@@ -152,44 +167,58 @@ static void give(const cav_quadratic *p, int t, const double *local, double *x) 
   if (p->tr->free_step) x[p->n - 1] += local[3 * nv];
 }
 
-/// product := J x. [rows]
-CAV_VECTOR_BODY void rows_times_body(const cav_quadratic *p, const double *x, double *product) {
-  int width = 3 * p->tr->nv;
-  for (int t = 0; t < p->tr->nknot; t++) {
-    const cav_knot *knot = &p->tr->knot[t];
-    take(p, t, x, p->local);
-    for (int i = 0; i < knot->layout.count; i++) {
-      const double *row = knot->slot_row + (size_t)i * (size_t)width;
-      const int *entry = p->entries + (SPARSE + 1) * (p->first[t] + i);
-      double sum = p->tr->free_step ? knot->slot_step[i] * p->local[width] : 0;
-      for (int k = 1; k <= entry[0]; k++) sum += row[entry[k]] * p->local[entry[k]];
-      if (entry[0] == 0) sum += dot(width, row, p->local);
-      product[p->first[t] + i] = sum;
-    }
+/// Room for the unknowns of a knot, and the step's logarithm, of its own.
+static double *local_of(const cav_quadratic *p, int t) { return p->locals + (size_t)t * (size_t)(3 * p->tr->nv + 1); }
+
+/// A knot's part of J x.
+CAV_VECTOR_BODY void knot_rows_times_body(const cav_quadratic *p, int t) {
+  const int width = 3 * p->tr->nv;
+  const cav_knot *knot = &p->tr->knot[t];
+  double *local = local_of(p, t);
+  take(p, t, p->ahead, local);
+  for (int i = 0; i < knot->layout.count; i++) {
+    const double *row = knot->slot_row + (size_t)i * (size_t)width;
+    const int *entry = p->entries + (SPARSE + 1) * (p->first[t] + i);
+    double sum = p->tr->free_step ? knot->slot_step[i] * local[width] : 0;
+    for (int k = 1; k <= entry[0]; k++) sum += row[entry[k]] * local[entry[k]];
+    if (entry[0] == 0) sum += dot(width, row, local);
+    p->product[p->first[t] + i] = sum;
   }
 }
-CAV_BY_VECTORS(rows_times, (const cav_quadratic *p, const double *x, double *product), (p, x, product))
+CAV_BY_VECTORS(knot_rows_times, (const cav_quadratic *p, int t), (p, t))
+static void rows_times_item(void *context, int t, int member) { (void)member, knot_rows_times(context, t); }
+
+/// product := J x. [rows]
+static void rows_times(cav_quadratic *p, const double *x, double *product) {
+  p->ahead = x, p->product = product;
+  cav_parallel_for(p->tr->pool, p->tr->nknot, rows_times_item, p);
+}
+
+/// A knot's part of J' y.
+CAV_VECTOR_BODY void knot_rows_add_body(const cav_quadratic *p, int t) {
+  const int width = 3 * p->tr->nv;
+  const cav_knot *knot = &p->tr->knot[t];
+  double *local = local_of(p, t);
+  memset(local, 0, (size_t)(width + 1) * sizeof(double));
+  for (int i = 0; i < knot->layout.count; i++) {
+    const double *row = knot->slot_row + (size_t)i * (size_t)width;
+    const int *entry = p->entries + (SPARSE + 1) * (p->first[t] + i);
+    const double yi = p->ahead[p->first[t] + i];
+    if (yi == 0) continue;
+    for (int k = 1; k <= entry[0]; k++) local[entry[k]] += yi * row[entry[k]];
+    for (int k = 0; k < width && entry[0] == 0; k++) local[k] += yi * row[k];
+    if (p->tr->free_step) local[width] += yi * knot->slot_step[i];
+  }
+}
+CAV_BY_VECTORS(knot_rows_add, (const cav_quadratic *p, int t), (p, t))
+static void add_rows_item(void *context, int t, int member) { (void)member, knot_rows_add(context, t); }
 
 /// out += J' y. [unknowns]
-CAV_VECTOR_BODY void add_rows_body(const cav_quadratic *p, const double *y, double *out) {
-  int width = 3 * p->tr->nv;
-  for (int t = 0; t < p->tr->nknot; t++) {
-    const cav_knot *knot = &p->tr->knot[t];
-    double *local = p->local;
-    memset(local, 0, (size_t)(width + 1) * sizeof(double));
-    for (int i = 0; i < knot->layout.count; i++) {
-      const double *row = knot->slot_row + (size_t)i * (size_t)width;
-      const int *entry = p->entries + (SPARSE + 1) * (p->first[t] + i);
-      double yi = y[p->first[t] + i];
-      if (yi == 0) continue;
-      for (int k = 1; k <= entry[0]; k++) local[entry[k]] += yi * row[entry[k]];
-      for (int k = 0; k < width && entry[0] == 0; k++) local[k] += yi * row[k];
-      if (p->tr->free_step) local[width] += yi * knot->slot_step[i];
-    }
-    give(p, t, local, out);
-  }
+static void add_rows(cav_quadratic *p, const double *y, double *out) {
+  p->ahead = y;
+  cav_parallel_for(p->tr->pool, p->tr->nknot, add_rows_item, p);
+  for (int t = 0; t < p->tr->nknot; t++) give(p, t, local_of(p, t), out);
 }
-CAV_BY_VECTORS(add_rows, (const cav_quadratic *p, const double *y, double *out), (p, y, out))
 
 /// image := H x of a knot's costs alone; local [3nv+1] holds x.
 CAV_VECTOR_BODY void knot_times_body(const cav_quadratic *p, int t) {
@@ -389,29 +418,63 @@ static void dual_residual(cav_quadratic *p) {
   for (int j = 0; j < p->n; j++) p->rhs[j] += p->gradient[j] + p->box[2 * j + 1].y - p->box[2 * j].y;
 }
 
-/// Adds the weighted rows of a knot to the lower triangle of its block, by columns, and to what the step's logarithm
-/// meets.
+static double *triangle_of(const cav_quadratic *p, int t) {
+  const size_t width = 3 * (size_t)p->tr->nv;
+  return p->triangle + (size_t)t * width * width;
+}
+
+/// The square of a knot's weighted rows with many entries, found by a member of the team.
+static void square_rows(void *context, int t, int member) {
+  const cav_quadratic *p = context;
+  const cav_knot *knot = &p->tr->knot[t];
+  const int width = 3 * p->tr->nv;
+  double *dense = p->dense + (size_t)member * p->dense_room;
+  int ndense = 0;
+  for (int i = 0; i < knot->layout.count; i++) {
+    const double *row = knot->slot_row + (size_t)i * (size_t)width, root = sqrt(p->weight[p->first[t] + i]);
+    if (p->entries[(SPARSE + 1) * (p->first[t] + i)] > 0) continue;
+    double *out = dense + (size_t)ndense++ * (size_t)width;
+    for (int k = 0; k < width; k++) out[k] = root * row[k];
+  }
+  double *square = p->square + (size_t)member * p->square_room;
+  cav_dense_square_find(CAV_TRIANGLE_LOWER, width, 3, ndense, dense, width, square);
+  if (p->members == 1) return;
+  double *to = triangle_of(p, t);
+  memset(to, 0, (size_t)width * (size_t)width * sizeof *to);
+  cav_dense_square_add(CAV_TRIANGLE_LOWER, width, 3, square, to, width);
+}
+
+/// Adds it to the lower triangle of the knot's block, by columns.
+static void add_square(const cav_quadratic *p, int t, double *block, int ld) {
+  const int width = 3 * p->tr->nv;
+  if (p->members == 1) {
+    cav_dense_square_add(CAV_TRIANGLE_LOWER, width, 3, p->square, block, ld);
+    return;
+  }
+  const double *from = triangle_of(p, t);
+  for (int j = 0; j < width; j++, from += width, block += ld)
+    for (int i = j; i < width; i++) block[i] += from[i];
+}
+
+/// Adds the weighted rows of a knot, whose square is found, to the lower triangle of its block, by columns, and to what the
+/// step's logarithm meets.
 static void weigh_rows(cav_quadratic *p, int t, double *block, int ld, double *step_row, double *step_square) {
   const cav_knot *knot = &p->tr->knot[t];
-  int width = 3 * p->tr->nv, ndense = 0;
+  int width = 3 * p->tr->nv;
   for (int i = 0; i < knot->layout.count; i++) {
     const double *row = knot->slot_row + (size_t)i * (size_t)width;
     const int *entry = p->entries + (SPARSE + 1) * (p->first[t] + i), *column = entry + 1;
-    double w = p->weight[p->first[t] + i], root = sqrt(w);
+    double w = p->weight[p->first[t] + i];
     for (int b = 0; b < entry[0]; b++)
       for (int a = b; a < entry[0]; a++) block[column[b] * ld + column[a]] += w * row[column[a]] * row[column[b]];
-    if (entry[0] == 0) {
-      double *out = p->dense + (size_t)ndense++ * (size_t)width;
-      for (int k = 0; k < width; k++) out[k] = root * row[k];
-    }
     if (!p->tr->free_step) continue;
     for (int k = 0; k < width; k++) step_row[k] += w * knot->slot_step[i] * row[k];
     *step_square += w * knot->slot_step[i] * knot->slot_step[i];
   }
-  cav_dense_square(CAV_TRIANGLE_LOWER, width, 3, ndense, p->dense, width, block, ld);
+  add_square(p, t, block, ld);
 }
 
-/// Adds the weighted rows of a knot to the costs' Hessian, which the normal equations hold.
+/// Adds the weighted rows of a knot, whose square is found, to the costs' Hessian, which the normal equations hold.
 static void gather_knot(void *context, int t) {
   cav_quadratic *p = context;
   const cav_transcription *tr = p->tr;
@@ -432,12 +495,13 @@ static void gather_knot(void *context, int t) {
 /// Factors costs, weighted rows and the diagonal in work with a shift; rhs := the costs' Hessian times x. again: the last call
 /// with another shift.
 static cav_status factor_sum(cav_quadratic *p, double shift, int again) {
-  cav_normal_sum sum = {.kept = p->costs, .diagonal = p->work, .x = p->x, .product = p->rhs, gather_knot, p};
+  cav_normal_sum sum = {
+      .kept = p->costs, .diagonal = p->work, .x = p->x, .product = p->rhs, square_rows, gather_knot, p};
   if (p->is_band) return cav_normal_factor_sum(p->normal, p->tr, &sum, shift);
   if (again) return cav_normal_factor(p->normal, shift);
   cav_normal_load(p->normal, p->costs);
   cav_normal_multiply(p->normal, p->x, p->rhs);
-  for (int t = 0; t < p->tr->nknot; t++) gather_knot(p, t);
+  cav_parallel_then(p->tr->pool, p->tr->nknot, square_rows, gather_knot, p, p->tr->ready);
   cav_normal_add_diagonal(p->normal, p->work);
   return cav_normal_factor(p->normal, shift);
 }
@@ -453,6 +517,7 @@ int cav_quadratic_knot_convex(cav_quadratic *p, int t, double shift) {
   double square = 0;
   for (int i = 0; i < width; i++)
     for (int j = 0; j <= i; j++) p->block[j * width + i] = p->tr->knot[t].hessian[i * width + j];
+  square_rows(p, t, 0);
   weigh_rows(p, t, p->block, width, p->local, &square);
   for (int i = 0; i < width; i++) {
     double *d = &p->block[i * width + i];

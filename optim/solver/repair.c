@@ -189,6 +189,13 @@ static cav_status change(const cav_problem *p, const cav_verdict *v, cure c, cav
   return CAV_OK;
 }
 
+/// Whether the problem itself has a term of the quantity.
+static int is_stated(const cav_problem *p, cav_quantity quantity) {
+  for (int i = 0; i < p->nterm; i++)
+    if (p->term[i].quantity == quantity) return 1;
+  return 0;
+}
+
 /// What differs from the problem, as it would stand in its file.
 static void describe(const cav_problem *p, cav_strategy *s) {
   char *out = s->changed;
@@ -216,7 +223,7 @@ static void describe(const cav_problem *p, cav_strategy *s) {
   }
   for (int i = p->nterm; i < s->nterm; i++) {
     size_t n = strlen(out);
-    snprintf(out + n, room - n, ", %s<%s weight=\"%g\"/>", s->term[i].quantity == CAV_QUANTITY_SLIP ? "one more " : "",
+    snprintf(out + n, room - n, ", %s<%s weight=\"%g\"/>", is_stated(p, s->term[i].quantity) ? "one more " : "",
              cav_quantity_rule_of(s->term[i].quantity)->name, s->term[i].weight);
   }
   const struct {

@@ -72,8 +72,9 @@ static const double exceeded = 1.3, fair = 0.5, unfinished = 0.1;
 /// Part of what all knots' forecasts were off by that the knots whose curvature is kept may be off by.
 static const double unmarked = 0.3;
 
-/// What a motion whose rows hold may be dearer than where a run ends without that; rows that nearly hold.
-static const double held_loss = 1e-2, nearly = 1e-4;
+/// What a motion whose rows hold may be dearer than where a run ends without that; rows that nearly hold; part of what they were
+/// off by before a run that nearly brings them in.
+static const double held_loss = 1e-2, nearly = 1e-4, brought_in = 0.1;
 
 /// Squares of the step, rad or m, that make a programme convex, of the cost: of all knots, and of single ones.
 /// A wave of these takes what is within this fraction of the largest.
@@ -479,13 +480,18 @@ static cav_status iterate(cav_solve_run *run, descent *d, int *taken) {
   return d->age < 0 && !is_lost(run, d) ? renew(run, d, 1, taken) : CAV_OK;
 }
 
+/// How far rows are off at the last values.
+static double rows_off(const cav_transcription *tr) {
+  return fmax(cav_transcription_unactuated(tr, NULL), cav_transcription_violation(tr));
+}
+
 /// Brings rows in that are still off by what is not linear in them, along the last programme's metric.
 static cav_status settle_rows(cav_solve_run *run, descent *d) {
   cav_transcription *tr = run->tr;
   cav_status status = CAV_OK;
   double worst = INFINITY;
   for (int i = 0; i < SETTLING && status == CAV_OK; i++) {
-    double is = fmax(cav_transcription_unactuated(tr, NULL), cav_transcription_violation(tr));
+    const double is = rows_off(tr);
     if (!(is < 0.5 * worst) || is < 0.01 * run->options->tolerance) break;
     worst = is;
     for (int t = 0, k = 0; t < tr->nknot; t++)
@@ -497,7 +503,7 @@ static cav_status settle_rows(cav_solve_run *run, descent *d) {
     cav_transcription_move(tr, run->at, d->x, run->spare);
     double merit;
     status = try_at(run, d, run->spare, &merit);
-    int nearer = isfinite(merit) && fmax(cav_transcription_unactuated(tr, NULL), cav_transcription_violation(tr)) < is;
+    int nearer = isfinite(merit) && rows_off(tr) < is;
     if (nearer) cav_run_exchange(&run->at, &run->spare);
     if (!nearer && status == CAV_OK) status = cav_transcription_values(tr, run->at);
   }
@@ -595,7 +601,7 @@ static cav_status look(cav_solve_run *run, descent *d, tail *end) {
 /// Keeps the motion where its rows hold, or are as near as a certificate asks; until there is one, where they nearly do.
 static cav_status hold(const cav_solve_run *run, descent *d) {
   int holds = cav_run_certifiable(run);
-  double most = fmax(cav_transcription_unactuated(run->tr, NULL), cav_transcription_violation(run->tr));
+  const double most = rows_off(run->tr);
   if (!holds && (d->holds || most > nearly)) return CAV_OK;
   d->holds = holds;
   cav_trajectory_free(d->held);
@@ -698,6 +704,7 @@ static cav_status run_of(cav_solve_run *run, int *left, double asked, double fra
   cav_trajectory *entry = cav_trajectory_copy(run->at);
   if (!entry) return CAV_NO_MEMORY;
   cav_status status = descent_new(&d, run) ? cav_transcription_values(run->tr, run->at) : CAV_NO_MEMORY;
+  const double off = rows_off(run->tr);
   d.asked = asked;
   d.near = soft ? 0 : near_end * asked;
   d.patient = !stuck;
@@ -717,8 +724,11 @@ static cav_status run_of(cav_solve_run *run, int *left, double asked, double fra
   if (stuck) *stuck = met && settled == 3;
   if (!cav_run_note(run, fraction, first, outcome)) status = CAV_NO_MEMORY;
   if (status == CAV_OK && !met && !soft) {
-    cav_run_exchange(&run->at, &entry);
-    status = cav_transcription_values(run->tr, run->at);
+    // what nearly brings the rows in is nearer to the end than where it began
+    const double still = rows_off(run->tr);
+    const int better = still <= nearly && still <= brought_in * off;
+    if (!better) cav_run_exchange(&run->at, &entry);
+    if (!better) status = cav_transcription_values(run->tr, run->at);
     if (status == CAV_OK) status = CAV_NOT_CONVERGED;
   }
   cav_trajectory_free(entry);

@@ -299,11 +299,23 @@ static void print_quantity(const cav_problem *p, const cav_term *term) {
   if (term->component >= 0 && term->sensor.dim > 1) printf(", %c", "xyz"[term->component]);
 }
 
+// from what bounds of a posture are counted, and where a single joint may be
+static void print_posture_bounds(const cav_problem *p, const cav_term *term) {
+  const cav_joint *joint = term->dofs == CAV_DOFS_ONE ? &p->model->joint[term->joint] : NULL;
+  const char *whose = term->target ? "its own posture" : "the goal";
+  printf(", counted from %s", whose);
+  if (!joint || joint->type > CAV_JOINT_HINGE || joint->type < CAV_JOINT_SLIDE || term->nwaypoint > 1) return;
+  const double from = (term->target ? term->target : p->q_goal)[joint->q];
+  printf(" (%.4g): %.4g to %.4g %s", from, from + term->lower, from + term->upper,
+         joint->type == CAV_JOINT_SLIDE ? "m" : "rad");
+}
+
 // what a term is held against
 static void print_target(const cav_problem *p, const cav_term *term) {
   if (term->use == CAV_USE_RANGE) {
     if (isfinite(term->lower)) printf(" at least %g", term->lower);
     if (isfinite(term->upper)) printf("%s at most %g", isfinite(term->lower) ? " and" : "", term->upper);
+    if (term->quantity == CAV_QUANTITY_CONFIGURATION) print_posture_bounds(p, term);
     return;
   }
   if (term->nwaypoint) {
@@ -321,7 +333,6 @@ static void print_target(const cav_problem *p, const cav_term *term) {
     for (int i = one ? term->component : 0; i < (one ? term->component + 1 : term->sensor.dim); i++)
       printf(" %.4g", term->target[i]);
   }
-  (void)p;
 }
 
 static void print_terms(const cav_problem *p, int hard) {

@@ -83,7 +83,7 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
   add_number(line, &n, "effort asked for in closed loop, of the limit", v->feedback_effort_max, NAN, 100, " %");
   add_number(line, &n, "open loop at the same step, largest error", v->replay_same_step_max_error, NAN, 1, "");
   add_number(line, &n, "power of an actuator, largest", v->power_max_w, NAN, 1, " W");
-  add_number(line, &n, "speed of a joint, largest", v->joint_speed_max_rad_s, NAN, 1, " rad/s");
+  add_number(line, &n, "speed of a joint that turns, largest", v->joint_speed_max_rad_s, NAN, 1, " rad/s");
   if (!isnan(v->joint_speed_over_limit))
     add_number(line, &n, "speed of a joint over the limit in its file", v->joint_speed_over_limit, NAN, 1, "");
   add_number(line, &n, "cost that a step may still save, fraction", v->optimality, NAN, 1, "");
@@ -91,6 +91,20 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
 }
 
 enum { TARGETS_SHOWN = 12 };
+
+// what was wanted: of a range that is kept, not the value that is had, but its bounds
+static void print_wanted(const cav_term *term, const cav_term_report *r, char *text, size_t size) {
+  const int bounds = term->use == CAV_USE_RANGE && r->off == 0 && !term->target && !term->nwaypoint &&
+                     term->quantity != CAV_QUANTITY_CONFIGURATION;
+  if (bounds && !isfinite(term->upper))
+    snprintf(text, size, ">= %.4g", term->lower);
+  else if (bounds && !isfinite(term->lower))
+    snprintf(text, size, "<= %.4g", term->upper);
+  else if (bounds)
+    snprintf(text, size, "%.3g..%.3g", term->lower, term->upper);
+  else
+    snprintf(text, size, "%.4g", r->wanted);
+}
 
 // targets, those missed first; a line for the rest
 static void print_targets(FILE *out, const cav_problem *problem, const cav_term_report *report) {
@@ -103,11 +117,12 @@ static void print_targets(FILE *out, const cav_problem *problem, const cav_term_
     for (int i = 0; i < problem->nterm && shown < TARGETS_SHOWN; i++) {
       const cav_term_report *r = &report[i];
       if (!r->has_target || r->met != met) continue;
-      char within[24] = "";
+      char within[24] = "", wanted[40];
+      print_wanted(&problem->term[i], r, wanted, sizeof wanted);
       if (isfinite(r->within)) snprintf(within, sizeof within, "%.3g", r->within);
       const char *name = problem->term[i].name && *problem->term[i].name ? problem->term[i].name : "unnamed";
-      fprintf(out, "  %-30.30s %-18.18s %8.4g %10.4g %10.4g %10.3g %10s %s %s\n", name, r->what, r->time, r->wanted,
-              r->got, r->off, within, r->unit, isfinite(r->within) ? mark[r->met] : "");
+      fprintf(out, "  %-30.30s %-18.18s %8.4g %10s %10.4g %10.3g %10s %s %s\n", name, r->what, r->time, wanted, r->got,
+              r->off, within, r->unit, isfinite(r->within) ? mark[r->met] : "");
       shown++;
     }
   }
