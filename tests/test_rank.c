@@ -64,6 +64,21 @@ static void test_asked(void) {
     }
 }
 
+// what is changed of a problem has to be worth it: another class, or a hundredth of the cost; what achieves what was asked is
+static void test_worth(void) {
+  cav_race_report stated = whole(), changed = whole();
+  stated.verdict.certified = changed.verdict.certified = 1;
+  stated.verdict.ntarget = changed.verdict.ntarget = stated.verdict.nmissed = changed.verdict.nmissed = 1;
+  stated.cost = 370.22, changed.cost = 369.98;
+  CHECK(cav_rank_better(&changed, &stated, 0) && !cav_rank_worth(&changed, &stated));
+  changed.cost = 360;
+  CHECK(cav_rank_worth(&changed, &stated));
+  changed.cost = 400, changed.verdict.ntarget = 3;
+  CHECK(cav_rank_worth(&changed, &stated));
+  changed.verdict.achieved = stated.verdict.achieved = 1, changed.verdict.nmissed = stated.verdict.nmissed = 0;
+  CHECK(cav_rank_worth(&changed, &stated));
+}
+
 // mending is put off once it has taken longer than what it mends, and goes on when more was solved
 static void test_spent(void) {
   cav_problem problem = {.timestep = 0.02, .duration = 2};
@@ -130,6 +145,7 @@ static void test_nearer(void) {
 int main(void) {
   test_better();
   test_asked();
+  test_worth();
   test_near();
   test_off();
   test_nearer();

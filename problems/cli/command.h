@@ -6,6 +6,7 @@
 #include <time.h>
 
 #include "cavort/mocap.h"
+#include "cavort/result.h"
 #include "cavort/solve.h"
 #include "exit_status.h"
 
@@ -150,10 +151,11 @@ enum { CAV_PUMPING_TEXT = 600 };
 int cav_command_pumping(const cav_problem *problem, char text[CAV_PUMPING_TEXT]);
 
 /// Why a certified motion misses what was asked: how much of the way it goes, what would lead elsewhere, and what of that the
-/// solve of its folder tried in vain. Zero: nothing is missed, or nothing is known. missed.c.
+/// solve of its folder tried in vain. saving: what a step may still save, a fraction of the cost, or a NaN. Zero: nothing is
+/// missed, or nothing is known. missed.c.
 enum { CAV_MISSED_TEXT = 1400 };
-int cav_command_missed(const cav_problem *problem, const cav_trajectory *motion, const cav_explanation *explanation,
-                       const char *folder, char text[CAV_MISSED_TEXT]);
+int cav_command_missed(const cav_result *result, const cav_explanation *explanation, double saving, const char *folder,
+                       char text[CAV_MISSED_TEXT]);
 
 /// Tells how many strategies a folder's solve tried, and in how many seconds, where they are more than one. tried.c.
 void cav_command_tell_tried(FILE *out, const char *folder);

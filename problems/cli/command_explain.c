@@ -1,6 +1,7 @@
 /// cavort explain: why the motion of a result folder is as it is, in three lines: a proof that the problem cannot be solved, what
 /// the certificate and what was asked miss, and the one cause; --all lists what is missed by rows, and which constraints pull
 /// against each other. Exit status as that of verify: 0 certified and achieved, 1 if not.
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -183,8 +184,13 @@ int cav_command_explain(const cav_command_line *line) {
     *pumping = 0;
   if (!status) status = cav_problem_impossible(result->problem, &impossible, 1, &proofs, &error);
   char missed[CAV_MISSED_TEXT] = "", *repair = told_of_repair(line->operand);
-  if (!status && verdict.certified && !verdict.achieved)
-    cav_command_missed(result->problem, result->trajectory, &explanation, line->operand, missed);
+  if (!status && verdict.certified && !verdict.achieved) {
+    cav_error ignored = {0};
+    if (cav_verify_optimality(result->problem, result->trajectory, &result->problem->contact, result->nrow, result->row,
+                              &verdict, &ignored))
+      verdict.optimality = NAN;
+    cav_command_missed(result, &explanation, verdict.optimality, line->operand, missed);
+  }
   if (!status && !verdict.certified && verdict.achieved && cav_verdict_feasible(&verdict) && !result->problem->cycle.on)
     tell_remedy(result, &verdict, line->operand, missed, sizeof missed);
   int stopped = !status && cav_command_tell_stopped(line->json ? NULL : stdout, line->operand);

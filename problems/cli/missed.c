@@ -100,15 +100,20 @@ static void tell_heavier(const char *folder, const char *name, double more, char
     snprintf(text, size, "%g times the stated weight was tried (strategies.csv) and did not do: %s", most, how);
 }
 
+/// What a step may still save, of the cost, from which on a motion is at no optimum.
+static const double far_off = 0.01;
+
 static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_term_report *got,
-                 const cav_term_report *held, int i, const cav_explanation *e, const char *folder, char *text,
-                 size_t size) {
+                 const cav_term_report *held, int i, const cav_explanation *e, double saving, const char *folder,
+                 char *text, size_t size) {
   const cav_term *term = &p->term[i];
   int named = *term->name && strcmp(term->name, cav_quantity_rule_of(term->quantity)->name);
   const char *name = named ? term->name : got[i].what, *unit = got[i].unit, *gap = *unit ? " " : "";
   double way = held[i].off, done = way - got[i].off;
   const double more = 2 * got[i].off / got[i].within;
-  char hint[160], room[300], tried[300], weight[300];
+  char hint[160], room[300], tried[300], weight[300], ended[100] = "at the optimum next to its guess";
+  if (saving > far_off)
+    snprintf(ended, sizeof ended, "short of an optimum, where a step may still save %.2g %% of the cost", 100 * saving);
   tell_heavier(folder, term->name, done < still * way && way > got[i].within ? 1 : more, tried, sizeof tried);
   snprintf(weight, sizeof weight, "a weight %.2g times as large brings it nearer", more);
   if (*tried) snprintf(weight, sizeof weight, "%s", tried);
@@ -126,18 +131,18 @@ static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_t
       snprintf(
           text, size,
           "'%.60s' is %.3g%s%s from where the start has it, %.3g%s%s a second, and the motion goes %.2g%s%s of that by "
-          "%.3g s, though %s. The search ended at the optimum next to its guess, with %.3g %% of the cost in this "
+          "%.3g s, though %s. The search ended %s, with %.3g %% of the cost in this "
           "term; "
           "nothing proves that it cannot be had, nor that it can. Next: half of the way, or more time, to see what can "
           "be; %s%s%s.",
           name, way, gap, unit, way / fmax(got[i].time, p->timestep), gap, unit, fmax(done, 0), gap, unit, got[i].time,
-          room, 100 * got[i].fraction, hint, *tried ? "; " : ", or ", *tried ? tried : "a higher weight does");
+          room, ended, 100 * got[i].fraction, hint, *tried ? "; " : ", or ", *tried ? tried : "a higher weight does");
     else
       snprintf(text, size,
                "'%.60s' is %.3g%s%s from where the start has it, and the motion goes %.2g%s%s of that by %.3g s; what "
                "holds it back: "
-               "%.160s. It stays at the optimum next to its guess: %s%s%s.",
-               name, way, gap, unit, fmax(done, 0), gap, unit, got[i].time, e->conflict[0].what, hint,
+               "%.160s. It ended %s: %s%s%s.",
+               name, way, gap, unit, fmax(done, 0), gap, unit, got[i].time, e->conflict[0].what, ended, hint,
                *tried ? "; " : ", or ", *tried ? tried : "a higher weight does");
   } else {
     snprintf(text, size,
@@ -149,8 +154,10 @@ static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_t
   }
 }
 
-int cav_command_missed(const cav_problem *p, const cav_trajectory *motion, const cav_explanation *e, const char *folder,
+int cav_command_missed(const cav_result *result, const cav_explanation *e, double saving, const char *folder,
                        char text[CAV_MISSED_TEXT]) {
+  const cav_problem *p = result->problem;
+  const cav_trajectory *motion = result->trajectory;
   cav_error error = {0};
   cav_term_report *got = calloc(2 * (size_t)p->nterm + 2, sizeof *got), *held = got ? got + p->nterm + 1 : NULL;
   cav_trajectory *start = cav_trajectory_copy(motion);
@@ -162,7 +169,7 @@ int cav_command_missed(const cav_problem *p, const cav_trajectory *motion, const
   if (got && start && !p->cycle.on && !cav_terms_report(p, motion, &p->contact, got, NULL, &error) &&
       !cav_terms_report(p, start, &p->contact, held, NULL, &error))
     worst = worst_of(p, got);
-  if (worst >= 0) tell(p, motion, got, held, worst, e, folder, text, CAV_MISSED_TEXT);
+  if (worst >= 0) tell(p, motion, got, held, worst, e, saving, folder, text, CAV_MISSED_TEXT);
   cav_trajectory_free(start);
   free(got);
   return *text != 0;

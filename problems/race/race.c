@@ -447,13 +447,16 @@ static int misses_momentum(const cav_race_report *report) {
          v->momentum_defect_rms > CAV_TOLERANCE_MOMENTUM;
 }
 
-// the best of the first n entries. -1: none
-static int best_of(const cav_race *race, int n, int cheapest) {
+// the best of the first n entries; last: to keep, so that a problem is changed for something. -1: none
+static int best_of(const cav_race *race, int n, int cheapest, int last) {
   int best = -1;
   for (int i = 0; i < n; i++) {
     const cav_race_entry *e = &race->entry[i];
     if (e->state != CAV_RACE_DONE || !e->report.solution || e->strategy.use == CAV_STRATEGY_DIAGNOSIS) continue;
-    if (best < 0 || cav_rank_better(&e->report, &race->entry[best].report, cheapest)) best = i;
+    const cav_race_entry *kept = best < 0 ? NULL : &race->entry[best];
+    if (last && kept && *e->strategy.changed && !*kept->strategy.changed && !cav_rank_worth(&e->report, &kept->report))
+      continue;
+    if (!kept || cav_rank_better(&e->report, &kept->report, cheapest)) best = i;
   }
   return best;
 }
@@ -476,7 +479,7 @@ static int find_broken(const cav_race *race, int i, const char *passed) {
     }
   }
   if (best >= 0 || isfinite(least)) return best;
-  best = best_of(race, i, 0);
+  best = best_of(race, i, 0, 0);
   return best >= 0 && !passed[best] ? best : -1;
 }
 
@@ -622,7 +625,7 @@ cav_status cav_race_finish(cav_race *race, int cheapest, cav_error *error) {
   }
 }
 
-int cav_race_best(const cav_race *race, int cheapest) { return best_of(race, race->n, cheapest); }
+int cav_race_best(const cav_race *race, int cheapest) { return best_of(race, race->n, cheapest, 1); }
 
 int cav_race_save(cav_race *race, int best) {
   cav_race_entry *e = &race->entry[best];

@@ -6,8 +6,9 @@
 // times its tolerance up to which what a feasible motion misses of a certificate is little
 static const double few = 4;
 
-// fraction of the cost by which a motion has to be cheaper to come before one that was found earlier
-static const double cheaper = 1e-4;
+// fraction of the cost by which a motion has to be cheaper to come before one that was found earlier; before that of the problem
+// as it is stated, where it is one of a changed problem
+static const double cheaper = 1e-4, worth = 1e-2;
 
 // how much of what is wanted a motion is: certified and as asked; certified and most of what was asked; as asked, forces,
 // limits and constraints hold, and only the rest of a certificate is missed; certified and something else; none of these
@@ -41,6 +42,11 @@ int cav_rank_better(const cav_race_report *a, const cav_race_report *b, int chea
     if (missed[k][0] > missed[k][2] || missed[k][1] > missed[k][2]) return missed[k][0] < missed[k][1];
   if (v->closed_loop_seconds != w->closed_loop_seconds) return v->closed_loop_seconds > w->closed_loop_seconds;
   return v->model_contacts_seconds > w->model_contacts_seconds;
+}
+
+int cav_rank_worth(const cav_race_report *a, const cav_race_report *b) {
+  if (class_of(a) != class_of(b) || !a->verdict.certified || cav_race_success(a)) return 1;
+  return a->cost < (1 - worth) * b->cost;
 }
 
 int cav_rank_rough(const cav_verdict *v) {

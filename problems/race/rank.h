@@ -9,6 +9,10 @@
 /// conditions, in their order, or misses the same one by less.
 int cav_rank_better(const cav_race_report *a, const cav_race_report *b, int cheapest);
 
+/// Whether a is worth what was changed of the problem for it: of two that are certified and miss as much of what was asked it has
+/// to be cheaper by a hundredth.
+int cav_rank_worth(const cav_race_report *a, const cav_race_report *b);
+
 /// Whether a motion that is possible misses little else of a certificate: it is what is looked for, but for how it was
 /// planned.
 int cav_rank_rough(const cav_verdict *verdict);
