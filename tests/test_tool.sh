@@ -560,7 +560,7 @@ check "it leans on nothing" sh -c '! grep -q "leans" out'
 says free.result/problem.xml 'body="sill"'
 sed 's|<cost>|<cost><impact body="sill" weight="100"/>|' over.xml >hard.xml
 run 2 solve hard.xml
-says err "expected a body that moves (fixed ones for force alone), got 'sill'"
+says err "expected a body that moves (fixed ones for forces alone), got 'sill'"
 
 # a box that spins so fast that the midpoint order loses momentum in its steps
 cat >spin.xml <<'END'

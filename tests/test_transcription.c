@@ -14,8 +14,8 @@
 
 /// A body that floats over and touches a floor, with a ball joint, a tendon, limits near their ends and an unactuated
 /// dof.
-#define WALKER(CORD, MORE)                                                                                         \
-  "<mujoco><worldbody><geom name='floor' type='plane' size='1 1 1'/>"                                              \
+#define WALKER(FLOOR, CORD, MORE)                                                                                  \
+  "<mujoco><worldbody><geom name='floor' type='plane' size='1 1 1'/>" FLOOR                                        \
   "<body name='trunk' pos='0 0 .3'><freejoint name='root'/><geom type='sphere' size='.1' mass='3'/>"               \
   "<site name='eye' pos='.1 0 .05'/>"                                                                              \
   "<body name='leg' pos='.1 0 -.05'><joint name='hip' axis='0 1 0' limited='true' range='-30 30' armature='.01' "  \
@@ -33,10 +33,13 @@
   "</tendon>"                                                                                                      \
   "<actuator><motor joint='hip' gear='20' ctrllimited='true' ctrlrange='-1 1'/>"                                   \
   "<motor tendon='string' gear='5' ctrllimited='true' ctrlrange='-.5 1'/>" MORE "</actuator></mujoco>"
-static const char walker[] = WALKER("", "");
+static const char walker[] = WALKER("", "", "");
+
+/// The same across the edge of a slab.
+static const char slabbed[] = WALKER("<geom name='slab' type='box' size='.2 .3 .01' pos='-.04 0 .01'/>", "", "");
 
 /// The same with servos, whose limits of control move with their lengths and velocities.
-static const char served[] = WALKER("",
+static const char served[] = WALKER("", "",
                                     "<position joint='ankle' kp='3' gear='2' ctrllimited='true' ctrlrange='-.1 .2'"
                                     " forcelimited='true' forcerange='-.3 .2'/>"
                                     "<general tendon='string' gear='-1.5' gainprm='-4' biastype='affine' biasprm='.5 "
@@ -44,10 +47,11 @@ static const char served[] = WALKER("",
                                     "ctrllimited='true' ctrlrange='-.3 .1'/>");
 
 /// The same with a string from the trunk over a foot to a hand, whose arms turn with all of them.
-static const char roped[] = WALKER(
-    "<spatial name='cord' limited='true' range='0 .3' stiffness='20' springlength='.1'><site site='eye'/>"
-    "<site site='toe'/><pulley divisor='2'/><site site='toe'/><site site='hand'/></spatial>",
-    "");
+static const char roped[] =
+    WALKER("",
+           "<spatial name='cord' limited='true' range='0 .3' stiffness='20' springlength='.1'><site site='eye'/>"
+           "<site site='toe'/><pulley divisor='2'/><site site='toe'/><site site='hand'/></spatial>",
+           "");
 
 /// A body with two arms of ball joints and two legs, its own mirror image but for names.
 static const char sided[] =
@@ -119,7 +123,7 @@ static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) 
   cav_term base = term[0];
   base.quantity = CAV_QUANTITY_SENSOR;
   base.weight = 3;
-  for (int kind = 0; kind < 18; kind++) {
+  for (int kind = 0; kind < 19; kind++) {
     cav_term *t = &term[n++];
     *t = base;
     t->scale = 0.5 + 0.1 * kind;
@@ -146,6 +150,7 @@ static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) 
     if (kind == 13) t->quantity = CAV_QUANTITY_SLIP, t->target = NULL, t->body = trunk;
     if (kind == 14) t->quantity = CAV_QUANTITY_ACCELERATION, t->use = CAV_USE_EQUAL, t->target = NULL, t->scale = 50;
     if (kind == 17) t->quantity = CAV_QUANTITY_SELF_FORCE, t->target = NULL;
+    if (kind == 18) t->quantity = CAV_QUANTITY_EDGE_FORCE, t->target = NULL, t->scale = 0.05;
     if (kind == 15 || kind == 16) t->quantity = CAV_QUANTITY_POWER, t->target = NULL, t->scale = 0.3;
     if (kind == 16) t->norm = CAV_NORM_ABSOLUTE, t->scale = 0.05;
     if (kind >= 11) continue;
@@ -411,6 +416,7 @@ static void test_threads(const cav_problem *p, cav_transcription *one, cav_traje
   if (!CHECK(two != NULL)) return;
   two->options = one->options;
   two->penalty = one->penalty;
+  two->depth_weight = one->depth_weight;
   for (int t = 0; t < one->nknot; t++)
     memcpy(two->knot[t].slot, one->knot[t].slot, (size_t)one->knot[t].layout.count * sizeof(cav_slot));
   CHECK(cav_transcription_linearise(one, at) == CAV_OK && cav_transcription_linearise(two, at) == CAV_OK);
@@ -440,6 +446,7 @@ static void test_stream(const cav_problem *p, cav_transcription *one, cav_trajec
     if (!CHECK(way != NULL)) return;
     tr->options = one->options;
     tr->penalty = one->penalty;
+    tr->depth_weight = one->depth_weight;
     for (int t = 0; t < one->nknot; t++)
       memcpy(tr->knot[t].slot, one->knot[t].slot, (size_t)one->knot[t].layout.count * sizeof(cav_slot));
     for (int turn = 0; turn < 4; turn++) {
@@ -758,6 +765,7 @@ int main(void) {
   const closing loose = {.free_start = 1, .free_step = 1, .penalised = 1};
   test_scene(walker, rest, CAV_ORDER_MIDPOINT);
   test_scene(walker, open, CAV_ORDER_MIDPOINT);
+  test_scene(slabbed, rest, CAV_ORDER_MIDPOINT);
   test_scene(walker, rest, CAV_ORDER_EULER);
   test_scene(roped, rest, CAV_ORDER_MIDPOINT);
   test_scene(served, rest, CAV_ORDER_MIDPOINT);
@@ -778,6 +786,7 @@ int main(void) {
   test_scene(served, begun, CAV_ORDER_EULER);
   test_scene(roped, loose, CAV_ORDER_MOMENTUM);
   test_scene(walker, (closing){.at_rest = 1, .depth = 1e5}, CAV_ORDER_MIDPOINT);
+  test_scene(slabbed, (closing){.at_rest = 1, .depth = 1e5}, CAV_ORDER_MOMENTUM);
   test_scene(served, (closing){.at_rest = 1, .free_step = 1, .depth = 1e5}, CAV_ORDER_MOMENTUM);
   return check_result();
 }

@@ -483,6 +483,7 @@ CAV_VECTOR_BODY void fill_rows(const cav_contact *c, int dim, const geometry *g,
     velocity_rate(c, dim, now, &p, side, shift, before);
     velocity_rate(c, dim, next, &p, side, shift, after);
     put_three(derivative->dist[side] + 3 * shift, &p.dist);
+    for (int i = 0; i < 3; i++) put_three(derivative->pos[side][i] + 3 * shift, &p.pos[i]);
     if (ahead) {
       cav_four way[2];
       way_rate(c, ahead, &p, side, shift, way);

@@ -279,6 +279,21 @@ CAV_BY_VECTORS(path_rows,
                 int impulses, int count, const double *d, double *to),
                (t, c, derivative, side, impulses, count, d, to))
 
+// rows of the position in the dofs of the path
+CAV_VECTOR_BODY void place_rows_body(const cav_derivative_task *t, const cav_contact_jacobian *derivative, int side,
+                                     int count, const double d[3], double *to) {
+  const size_t n = (size_t)t->s->path.stride;
+  for (int k = 0; k < count; k += 4, to += 4) {
+    cav_four axis[6];
+    motion_of_four(t->s->path.at + CAV_OF_AXIS * n, n, k, d, axis);
+    for (int i = 0; i < 3; i++) *(cav_four *)(to + i * n) = DOT6(derivative->pos[side][i], axis);
+  }
+}
+CAV_BY_VECTORS(place_rows,
+               (const cav_derivative_task *t, const cav_contact_jacobian *derivative, int side, int count,
+                const double *d, double *to),
+               (t, derivative, side, count, d, to))
+
 // adds rows over the dofs of the path to those over all dofs
 static void add_path_rows(const cav_derivative_task *t, int rows, int length, const double *from, double *to) {
   for (int i = 0; to && i < rows; i++, from += t->s->path.stride, to += t->nv) {
@@ -302,6 +317,9 @@ static void add_side(const cav_derivative_task *t, const cav_contact *c, const c
   add_path_rows(t, impulses, length, row + OF_IMPULSE * n, out->impulse_dq);
   add_path_rows(t, impulses, length, row + OF_IMPULSE_NOW * n, out->impulse_dv);
   add_path_rows(t, impulses, length, row + OF_IMPULSE_NEXT * n, out->impulse_dv_next);
+  if (!out->pos_dq) return;
+  place_rows(t, derivative, side, (length + 3) / 4 * 4, d, row);
+  add_path_rows(t, 3, length, row, out->pos_dq);
 }
 
 cav_status cav_contact_derivatives(const cav_model *model, cav_state *state, int contact, cav_contact_derivative *out) {
@@ -316,6 +334,7 @@ cav_status cav_contact_derivatives(const cav_model *model, cav_state *state, int
   }
   size_t row = (size_t)model->nv * sizeof(double), rows = (size_t)c->dim * row;
   if (out->dist_dq) memset(out->dist_dq, 0, row);
+  if (out->pos_dq) memset(out->pos_dq, 0, 3 * row);
   double *all[] = {out->velocity_dq, out->velocity_dv_next, out->impulse_dq, out->impulse_dv, out->impulse_dv_next};
   for (int k = 0; k < 5; k++) {
     if (all[k]) memset(all[k], 0, k < 2 || !out->normal_only ? rows : row);

@@ -210,6 +210,7 @@ CAV_API cav_status cav_derivatives(const cav_model *model, cav_state *state, dou
 /// Derivatives of one contact, rows by nv, row-major; NULL = not needed.
 typedef struct cav_contact_derivative {
   double *dist_dq;                                   ///< [nv]
+  double *pos_dq;                                    ///< [3*nv] of the position
   double *velocity_dq;                               ///< [dim*nv] of velocity_next
   double *velocity_dv_next;                          ///< [dim*nv] of velocity_next
   double *impulse_dq, *impulse_dv, *impulse_dv_next; ///< [dim*nv]

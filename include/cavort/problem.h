@@ -26,6 +26,7 @@ extern "C" {
   X(IMPACT, impact, CONTACTS, ACCELERATION, 0, "m/s", "impact of loaded contacts", "sqrt(f_n/weight) * normal velocity of every contact") \
   X(SELF_PENETRATION, self_penetration, CONTACTS, ACCELERATION, 0, "m", "self-penetration", "depth of every contact between two links of one tree") \
   X(FORCE, force, CONTACTS, ACCELERATION, 0, "of weight", "force of contacts", "normal force of every contact between trees or with the world") \
+  X(EDGE_FORCE, edge_force, CONTACTS, ACCELERATION, 0, "of weight", "force at edges", "normal force of every contact with a box of the world at an edge of it, fading over the 3 cm beside; edges where the next box or the ground begins are none") \
   X(SELF_FORCE, self_force, CONTACTS, ACCELERATION, 0, "of weight", "force between links", "normal force of every contact between two links of one tree") \
   X(TRACK, track, TRACK, POSITION, 0, "of the noise", "recorded motion", "difference from a record (markers, joints, sensors) over the standard deviation of its noise; what was not recorded is not compared")
 // clang-format on

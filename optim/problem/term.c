@@ -490,9 +490,10 @@ static cav_status read_touch(const cav_problem_reader *reader, const cav_xml_nod
   if (!cav_xml_get(node, "body")) return CAV_OK;
   term->body = cav_problem_find(reader, node, "body", CAV_OBJECT_BODY);
   if (term->body < 0) return CAV_BAD_INPUT;
-  if (reader->model->body[term->body].link == 0 && term->quantity != CAV_QUANTITY_FORCE)
+  if (reader->model->body[term->body].link == 0 && term->quantity != CAV_QUANTITY_FORCE &&
+      term->quantity != CAV_QUANTITY_EDGE_FORCE)
     return cav_xml_fail(reader->error, node, "body",
-                        "expected a body that moves (fixed ones for force alone), got '%.80s'",
+                        "expected a body that moves (fixed ones for forces alone), got '%.80s'",
                         cav_xml_text(node, "body", ""));
   return CAV_OK;
 }

@@ -7,17 +7,19 @@
 
 int cav_knot_moves(const cav_transcription *tr, int t) { return tr->periodicity || (t >= tr->first && t < tr->nknot); }
 
-/// Readings of a contact that a cost takes: n from the first, of contacts within one tree (self) or of all others.
+/// Readings of a contact that a cost takes: n from the first, of those whose bits under the mask are so.
 typedef struct contact_part {
-  int first, n, self;
+  int first, n, mask, bits;
 } contact_part;
 
 /// n 0: not a cost of contacts.
 static contact_part contact_part_of(cav_quantity quantity) {
+  enum { SELF = CAV_WITHIN_TREE, EDGE = CAV_AT_EDGE };
   static const contact_part part[CAV_QUANTITY_TYPES] = {
-      [CAV_QUANTITY_GAP] = {0, 1, 0},    [CAV_QUANTITY_SLIP] = {1, 2, 0},
-      [CAV_QUANTITY_IMPACT] = {3, 1, 0}, [CAV_QUANTITY_SELF_PENETRATION] = {0, 1, 1},
-      [CAV_QUANTITY_FORCE] = {4, 1, 0},  [CAV_QUANTITY_SELF_FORCE] = {4, 1, 1},
+      [CAV_QUANTITY_GAP] = {0, 1, SELF, 0},           [CAV_QUANTITY_SLIP] = {1, 2, SELF, 0},
+      [CAV_QUANTITY_IMPACT] = {3, 1, SELF, 0},        [CAV_QUANTITY_SELF_PENETRATION] = {0, 1, SELF, SELF},
+      [CAV_QUANTITY_FORCE] = {4, 1, SELF, 0},         [CAV_QUANTITY_SELF_FORCE] = {4, 1, SELF, SELF},
+      [CAV_QUANTITY_EDGE_FORCE] = {5, 1, EDGE, EDGE},
   };
   assert(part[quantity].first + part[quantity].n <= CAV_CONTACT_READINGS);
   return part[quantity];
@@ -59,7 +61,7 @@ int cav_knot_takes_contacts(const cav_term *term) { return contact_part_of(term-
 int cav_knot_contact(const cav_transcription *tr, const int *key, const cav_term *term, int t, int k, int *first) {
   contact_part part = contact_part_of(term->quantity);
   *first = part.first;
-  return part.n > 0 && tr->knot[t].moving[k] == part.self && counts(tr, key, term, t, k) ? part.n : 0;
+  return part.n > 0 && (tr->knot[t].moving[k] & part.mask) == part.bits && counts(tr, key, term, t, k) ? part.n : 0;
 }
 
 /// Rows of a cost at knot t, whose contacts are listed.
@@ -93,6 +95,7 @@ static row_count cost_rows(const cav_transcription *tr, cav_scratch *s, const ca
     case CAV_QUANTITY_IMPACT:
     case CAV_QUANTITY_SELF_PENETRATION:
     case CAV_QUANTITY_FORCE:
+    case CAV_QUANTITY_EDGE_FORCE:
     case CAV_QUANTITY_SELF_FORCE:
       for (int k = 0; k < knot->ncontact; k++) {
         const int readings = cav_knot_contact(tr, s->key, term, t, k, &first);
@@ -131,7 +134,7 @@ static row_count knot_rows(const cav_transcription *tr, cav_scratch *s, int t) {
   if (tr->constraints_only) return n;
   n.rows += (size_t)cav_knot_has_duration(tr, t);
   for (int k = 0; k < tr->knot[t].ncontact && tr->depth_weight > 0; k++)
-    if (!tr->knot[t].moving[k]) n.rows++, n.dense++, s->used[k] |= 1;
+    if (!(tr->knot[t].moving[k] & CAV_WITHIN_TREE)) n.rows++, n.dense++, s->used[k] |= 1;
   for (int k = 0; k < tr->npenalised && tr->knot[t].has_force; k++)
     n.rows++, n.dense += cav_knot_stands_alone(&tr->penalised[k]);
   for (int i = 0; i < tr->problem->nterm; i++) {

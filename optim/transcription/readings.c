@@ -51,6 +51,7 @@ static void read_contact(const cav_transcription *tr, const cav_contact *c, doub
   y[2] = c->dim > 1 ? fraction * c->velocity_next[2] : 0;
   y[3] = fraction * c->velocity_next[0];
   y[4] = fmax(c->impulse[0], 0) / (tr->options.timestep * tr->weight);
+  if (tr->edges) y[5] = cav_edge_nearness(tr->model, tr->edges, c, NULL) * y[4];
 }
 
 static void read_knot(const cav_model *model, cav_state *state, void *context, double *value) {
@@ -112,7 +113,8 @@ int cav_readings_list(cav_transcription *tr, cav_scratch *s, int t) {
       int self = !tr->model->pair[c->pair].external;
       int idle = c->impulse[0] < contact_floor * tr->options.timestep * tr->weight && !is_deep(tr, c);
       if (self ? c->dist > 0 && (idle || !tr->self_force) : idle) continue;
-      moving[ncontact] = (char)self;
+      const int edge = !self && tr->edges && cav_edge_nearness(tr->model, tr->edges, c, NULL) > 0;
+      moving[ncontact] = (char)(CAV_WITHIN_TREE * self | CAV_AT_EDGE * edge);
       s->key[2 * ncontact] = c->pair;
       s->key[2 * ncontact++ + 1] = c->feature;
     }
@@ -201,21 +203,32 @@ CAV_VECTOR_BODY void blend_readings_body(int n, const mixture *m, unsigned used,
 CAV_BY_VECTORS(blend_readings, (int n, const mixture *m, unsigned used, double *dq, double *dv, double *dn),
                (n, m, used, dq, dv, dn))
 
-/// Every reading of a contact.
-enum { WHOLE = (1 << CAV_CONTACT_READINGS) - 1 };
+/// The last reading of a contact, its force at an edge: by its force and by its place.
+static void edge_rows(const cav_transcription *tr, const cav_contact *c, const cav_contact_derivative *d, double unit,
+                      rows out) {
+  size_t n = (size_t)tr->nv;
+  double gradient[3], nearness = cav_edge_nearness(tr->model, tr->edges, c, gradient);
+  double force = unit * fmax(c->impulse[0], 0);
+  blend_body((int)n, nearness * unit, d->impulse_dq, 0, 0, NULL, out.dq);
+  blend_body((int)n, nearness * unit, d->impulse_dv, 0, 0, NULL, out.dv);
+  blend_body((int)n, nearness * unit, d->impulse_dv_next, 0, 0, NULL, out.dn);
+  for (int k = 0; k < 3; k++)
+    for (size_t j = 0; j < n; j++) out.dq[j] += force * gradient[k] * d->pos_dq[k * n + j];
+}
 
-/// The readings of a contact: sqrt(f_n) times gap, slip and normal velocity; f_n. Those that are used, by bits.
+/// The readings of a contact: sqrt(f_n) times gap, slip and normal velocity; f_n; f_n at an edge. Those that are used, by bits.
 static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s, const cav_contact *c, unsigned used,
                                rows out) {
   size_t n = (size_t)tr->nv, nv = n;
   double *at = s->derivative;
-  _Static_assert(25 + 6 == CAV_DERIVATIVE_ROWS, "the last of these arrays ends where the scratch does");
+  _Static_assert(31 + 3 == CAV_DERIVATIVE_ROWS, "the last of these arrays ends where the scratch does");
   cav_contact_derivative d = {.dist_dq = at,
                               .velocity_dq = at + n,
                               .velocity_dv_next = at + 7 * n,
                               .impulse_dq = at + 13 * n,
                               .impulse_dv = at + 19 * n,
                               .impulse_dv_next = at + 25 * n,
+                              .pos_dq = used >> 5 & 1 ? at + 31 * n : NULL,
                               .normal_only = 1};
   cav_status status = cav_contact_derivatives(tr->model, s->state, (int)(c - s->state->contact), &d);
   if (status != CAV_OK) return status;
@@ -237,8 +250,10 @@ static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s
     memset(out.dv, 0, n * sizeof(double));
     memset(out.dn, 0, n * sizeof(double));
   }
-  if (!(used >> 4 & 1)) return CAV_OK;
+  if (!(used >> 4)) return CAV_OK;
   double unit = c->impulse[0] > 0 ? 1 / (tr->options.timestep * tr->weight) : 0;
+  if (used >> 5 & 1) edge_rows(tr, c, &d, unit, (rows){out.dq + 5 * n, out.dv + 5 * n, out.dn + 5 * n});
+  if (!(used >> 4 & 1)) return CAV_OK;
   blend_body((int)n, unit, d.impulse_dq, 0, 0, NULL, out.dq + 4 * n);
   blend_body((int)n, unit, d.impulse_dv, 0, 0, NULL, out.dv + 4 * n);
   blend_body((int)n, unit, d.impulse_dv_next, 0, 0, NULL, out.dn + 4 * n);
@@ -390,7 +405,9 @@ cav_status cav_readings_derivatives(const cav_transcription *tr, cav_scratch *s,
     const cav_contact *c = find_contact(s->state, s->key + 2 * k);
     rows out = rows_at(tr, s, tr->nv + CAV_CONTACT_READINGS * k);
     if (!c) return CAV_INTERNAL;
-    if (s->used[k]) status = tr->knot[t].moving[k] ? self_rows(tr, s, c, out) : contact_rows(tr, s, c, s->used[k], out);
+    if (s->used[k])
+      status =
+          tr->knot[t].moving[k] & CAV_WITHIN_TREE ? self_rows(tr, s, c, out) : contact_rows(tr, s, c, s->used[k], out);
   }
   if (status == CAV_NOT_SUPPORTED) return difference(tr, s, t, q, v, v_next);
   return status == CAV_OK ? terms(tr, s, t, q, v, v_next) : status;
@@ -410,10 +427,11 @@ static void fold(const cav_transcription *tr, const cav_scratch *s, int first, i
   }
 }
 
-static int weighs(const double *weight, int n) {
-  for (int i = 0; i < n; i++)
-    if (weight[i] != 0) return 1;
-  return 0;
+/// Which of n numbers are not zero, by bits.
+static unsigned weighs(const double *weight, int n) {
+  unsigned bits = 0;
+  for (int i = 0; i < n; i++) bits |= (unsigned)(weight[i] != 0) << (i < 31 ? i : 31);
+  return bits;
 }
 
 cav_status cav_readings_adjoint(const cav_transcription *tr, cav_scratch *s, int t, const double *weight, double *g) {
@@ -424,10 +442,11 @@ cav_status cav_readings_adjoint(const cav_transcription *tr, cav_scratch *s, int
   if (status != CAV_OK) return status;
   fold(tr, s, 0, nv, weight, g);
   for (int k = 0; k < knot->ncontact; k++, at += CAV_CONTACT_READINGS) {
-    const cav_contact *c = weighs(weight + at, CAV_CONTACT_READINGS) ? find_contact(s->state, s->key + 2 * k) : NULL;
+    const unsigned used = weighs(weight + at, CAV_CONTACT_READINGS);
+    const cav_contact *c = used ? find_contact(s->state, s->key + 2 * k) : NULL;
     if (!c) continue;
     rows out = rows_at(tr, s, at);
-    status = knot->moving[k] ? self_rows(tr, s, c, out) : contact_rows(tr, s, c, WHOLE, out);
+    status = knot->moving[k] & CAV_WITHIN_TREE ? self_rows(tr, s, c, out) : contact_rows(tr, s, c, used, out);
     if (status != CAV_OK) return status;
     fold(tr, s, at, CAV_CONTACT_READINGS, weight, g);
   }

@@ -7,7 +7,7 @@
 #include "transcription.h"
 
 /// Rows of nv that the derivatives of one contact or sensor take at most.
-enum { CAV_DERIVATIVE_ROWS = 31 };
+enum { CAV_DERIVATIVE_ROWS = 34 };
 
 /// What one thread works with.
 typedef struct cav_scratch {

@@ -246,6 +246,12 @@ cav_transcription *cav_transcription_new(const cav_problem *problem, int threads
   for (int i = 0; i < problem->nterm; i++) tr->self_force |= problem->term[i].quantity == CAV_QUANTITY_SELF_FORCE;
   tr->model = problem->model;
   tr->nv = problem->model->nv;
+  for (int i = 0; i < problem->nterm && !tr->edges; i++)
+    if (problem->term[i].quantity == CAV_QUANTITY_EDGE_FORCE && !(tr->edges = cav_edges_new(tr->model))) goto memory;
+  if (tr->edges && !cav_edges_any(tr->edges, tr->model)) {
+    cav_edges_free(tr->edges);
+    tr->edges = NULL;
+  }
   tr->nknot = (int)lround(problem->duration / problem->timestep) + 1;
   tr->first = problem->free_start ? -1 : 1;
   // unknowns and entries of their rows are counted in int
@@ -316,6 +322,7 @@ void cav_transcription_free(cav_transcription *tr) {
   for (int k = 0; k < tr->npenalised; k++) free(tr->penalised[k].dof), free(tr->penalised[k].coef);
   for (int a = 0; tr->effort && a < tr->nlimit; a++) free(tr->effort[a].dof), free(tr->effort[a].coef);
   for (int a = 0; tr->servo && a < tr->nlimit; a++) cav_servo_free(&tr->servo[a]);
+  cav_edges_free(tr->edges);
   free(tr->servo), free(tr->limited);
   free(tr->unactuated), free(tr->penalised), free(tr->effort), free(tr->effort_range), free(tr->effort_unit),
       free(tr->rotation_dof), free(tr->rotation_of);

@@ -234,6 +234,8 @@ int cav_verification_looks_at(const cav_verification *verification, const cav_te
   const cav_pair *pair = model->pair + contact->pair;
   int self = term->quantity == CAV_QUANTITY_SELF_PENETRATION || term->quantity == CAV_QUANTITY_SELF_FORCE;
   if (pair->external == self) return 0;
+  if (term->quantity == CAV_QUANTITY_EDGE_FORCE && !(cav_edge_nearness(model, verification->edges, contact, NULL) > 0))
+    return 0;
   int link = model->body[term->body].link;
   // a body that is fixed shares its link with all of the world
   if (term->body > 0 && link == 0)
@@ -254,6 +256,8 @@ int cav_verification_contact(const cav_verification *verification, const cav_ter
   }
   if (term->quantity == CAV_QUANTITY_IMPACT) value[0] = load * rate[0];
   if (term->quantity == CAV_QUANTITY_SELF_PENETRATION) value[0] = fmax(-contact->dist, 0);
+  if (term->quantity == CAV_QUANTITY_EDGE_FORCE)
+    value[0] = part * cav_edge_nearness(verification->model, verification->edges, contact, NULL);
   if (term->quantity == CAV_QUANTITY_FORCE || term->quantity == CAV_QUANTITY_SELF_FORCE) value[0] = part;
   return 1;
 }
@@ -352,6 +356,7 @@ int cav_verification_measure(const cav_verification *verification, const cav_ter
     case CAV_QUANTITY_IMPACT:
     case CAV_QUANTITY_SELF_PENETRATION:
     case CAV_QUANTITY_FORCE:
+    case CAV_QUANTITY_EDGE_FORCE:
     case CAV_QUANTITY_SELF_FORCE:
       return forced ? contact_values(verification, term, t, x, target) : 0;
     case CAV_QUANTITY_TRACK:

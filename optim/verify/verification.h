@@ -5,6 +5,7 @@
 
 #include "cavort/solve.h"
 #include "cycle_image.h"
+#include "edge.h"
 
 /// A worst value and where it was found.
 typedef struct cav_metric {
@@ -33,6 +34,7 @@ typedef struct cav_verification {
   double *control;    ///< [(T+1)*nu] least-norm fraction of the actuators
   cav_state *state;   ///< claimed law
   cav_state *bare;    ///< positions only: no contacts, no constraints
+  cav_edges *edges;   ///< of boxes of the world
   cav_error *failure; ///< what a quantity of one's own refused first; CAV_OK: nothing
 } cav_verification;
 

@@ -120,6 +120,7 @@ void cav_verification_end(cav_verification *verification) {
   cav_cycle_image_free(verification->image);
   cav_state_free(verification->state);
   cav_state_free(verification->bare);
+  cav_edges_free(verification->edges);
   free(verification->failure);
   free(verification->deviation);
   free(verification->v);
@@ -175,7 +176,8 @@ static cav_status verification_start(cav_verification *verification, const cav_p
   verification->control = calloc(n * ((size_t)model->nu + 1), sizeof(double));
   verification->failure = calloc(1, sizeof *verification->failure);
   verification->deviation = calloc(nv + 1, sizeof(double));
-  if (!verification->failure || !verification->deviation) return CAV_NO_MEMORY;
+  verification->edges = cav_edges_new(model);
+  if (!verification->failure || !verification->deviation || !verification->edges) return CAV_NO_MEMORY;
   if (!verification->state || !verification->bare || !verification->v || !verification->u || !verification->control)
     return CAV_NO_MEMORY;
   verification->state->options = verification->law;
