@@ -449,6 +449,7 @@ typedef struct cav_verdict {
   double hover_fraction;                           ///< of contact force, by impulse, across gaps that stay open
   double power_max_w;            ///< of an actuator: mechanical, at the mean velocity of a step, either way
   double joint_speed_max_rad_s;  ///< of hinges and ball joints
+  double slide_speed_max_m_s;    ///< of slides; NaN: the model has none
   double joint_speed_over_limit; ///< of joints whose file states a limit, the largest ratio; NaN where none does
   double optimality;             ///< fraction of the cost that a step may still save at most; cav_verify_optimality
   /// largest |v' - v_{t+1}| h of single forward steps from each knot, rad or m; INFINITY where one leaves all numbers

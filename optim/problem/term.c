@@ -106,13 +106,24 @@ static int target_count(const cav_model *m, const cav_term *term) {
   return n;
 }
 
-// brings a target that holds orientations to unit length; 0 if one is zero
+// an axis of a frame as a whole, whose length is one
+static int is_direction(const cav_term *term) {
+  const cav_sensor_type type = term->sensor.type;
+  return term->quantity == CAV_QUANTITY_SENSOR && term->component < 0 &&
+         (type == CAV_SENSOR_FRAMEXAXIS || type == CAV_SENSOR_FRAMEYAXIS || type == CAV_SENSOR_FRAMEZAXIS);
+}
+
+// brings a target that holds orientations or a direction to unit length; 0 if one is zero
 static int normalise(const cav_model *m, const cav_term *term, double *target) {
   if (term->quantity == CAV_QUANTITY_CONFIGURATION) {
     cav_configuration_normalise(m, target);
   } else if (term->quantity == CAV_QUANTITY_SENSOR && term->sensor.dim == 4) {
     double *w = target, length = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2] + w[3] * w[3]);
     for (int i = 0; i < 4; i++) w[i] /= length > 0 ? length : 1;
+    return length > 1e-9;
+  } else if (is_direction(term)) {
+    double length = norm3(target);
+    for (int i = 0; i < 3; i++) target[i] /= length > 0 ? length : 1;
     return length > 1e-9;
   }
   return 1;
@@ -134,7 +145,8 @@ static cav_status read_table(const cav_problem_reader *reader, const cav_xml_nod
     if (rate) spread(m, term, in, table.count, out);
     if (!rate) memcpy(out + first, in, sizeof(double) * (size_t)table.count);
     if (!normalise(m, term, out))
-      return cav_xml_fail(reader->error, node, "file", "the quaternion at %g s is zero", table.time[i]);
+      return cav_xml_fail(reader->error, node, "file", "the %s at %g s is zero",
+                          is_direction(term) ? "direction" : "quaternion", table.time[i]);
   }
   term->target = target;
   term->nwaypoint = table.n;
@@ -402,9 +414,10 @@ static cav_status sensor_target(const cav_problem_reader *reader, const cav_xml_
                         given->count);
   }
   cav_xml_reals(node, "target", target + (one ? term->component : 0), wanted);
-  if (!rotation) return CAV_OK;
+  if (!rotation && (!is_direction(term) || cav_xml_word(node, "relative", 0))) return CAV_OK;
   if (normalise(reader->model, term, target)) return CAV_OK;
-  return cav_xml_fail(reader->error, node, "target", "expected a quaternion that is not zero");
+  return cav_xml_fail(reader->error, node, "target", "expected a %s that is not zero",
+                      rotation ? "quaternion" : "direction");
 }
 
 // reading + target, or reading * target for orientations

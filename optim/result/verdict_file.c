@@ -101,6 +101,7 @@ void cav_certificate_json(FILE *out, const cav_problem *problem, const cav_verdi
   write_number(out, "hover_fraction", v->hover_fraction);
   write_number(out, "power_max_w", v->power_max_w);
   write_number(out, "joint_speed_max_rad_s", v->joint_speed_max_rad_s);
+  write_number(out, "slide_speed_max_m_s", v->slide_speed_max_m_s);
   write_number(out, "joint_speed_over_limit", v->joint_speed_over_limit);
   write_number(out, "optimality", v->optimality);
   write_number(out, "replay_step_max_error", v->replay_step_max_error);

@@ -24,7 +24,8 @@ void cav_rates_add(const cav_verification *verification, int t, double *moment, 
     const double *v = verification->v + t * model->nv + joint->dof;
     if (joint->type == CAV_JOINT_FREE) continue;
     double speed = joint->type == CAV_JOINT_BALL ? sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) : fabs(*v);
-    if (joint->type != CAV_JOINT_SLIDE) rates->speed = fmax(rates->speed, speed);
+    double *most = joint->type == CAV_JOINT_SLIDE ? &rates->slide_speed : &rates->speed;
+    *most = fmax(*most, speed);
     if (joint->speed > 0) rates->over_limit = fmax(rates->over_limit, speed / joint->speed);
   }
 }

@@ -113,7 +113,7 @@ cav_status cav_slip_add(const cav_verification *verification, int t, double *q, 
 /// Rates that are told: of an actuator W, of joints rad/s and over the limit of the model's file (negative: none has
 /// one). rates.c.
 typedef struct cav_rates {
-  double power, speed, over_limit;
+  double power, speed, slide_speed, over_limit;
 } cav_rates;
 
 /// What still moves at an end that need not be at rest, into end_speed_m_s, end_rate_rad_s and end_body. ending.c.

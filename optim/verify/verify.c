@@ -575,6 +575,7 @@ static void fill(const cav_verification *verification, const metrics *found, con
   verdict->hover_fraction = found->hover.value;
   verdict->power_max_w = found->rates.power;
   verdict->joint_speed_max_rad_s = found->rates.speed;
+  verdict->slide_speed_max_m_s = found->rates.slide_speed < 0 ? NAN : found->rates.slide_speed;
   verdict->joint_speed_over_limit = found->rates.over_limit < 0 ? NAN : found->rates.over_limit;
   verdict->replay_step_max_error = replay->step_error;
   verdict->replay_same_step_max_error = replay->open_error;
@@ -609,7 +610,7 @@ static cav_status verify(const cav_problem *problem, const cav_trajectory *traje
   verdict->certified = verdict->achieved = 0;
   snprintf(verdict->reason, sizeof verdict->reason, "not verified");
   cav_verification verification;
-  metrics found = {.rates.over_limit = -1, .stop = -1};
+  metrics found = {.rates = {.over_limit = -1, .slide_speed = -1}, .stop = -1};
   cav_replay replay = {0};
   cav_balance *balance = NULL;
   cav_status status = cav_verification_begin(&verification, problem, trajectory, contact, gain_q, gain_v, error);
@@ -656,7 +657,7 @@ cav_status cav_verify_solution(const cav_problem *problem, const cav_solution *s
 cav_status cav_terms_report(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
                             cav_term_report *report, double *cost, cav_error *error) {
   cav_verification verification;
-  metrics found = {.rates.over_limit = -1, .stop = -1};
+  metrics found = {.rates = {.over_limit = -1, .slide_speed = -1}, .stop = -1};
   cav_verdict verdict = {0};
   cav_status status = cav_verification_begin(&verification, problem, trajectory, contact, NULL, NULL, error);
   cav_balance *balance = status == CAV_OK ? cav_balance_new(&verification) : NULL;

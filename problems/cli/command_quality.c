@@ -39,6 +39,8 @@ void cav_command_print_quality(FILE *out, int n, char *const *name, const cav_qu
       double value = *(const double *)((const char *)&quality[i] + rule[k].offset);
       if (csv)
         fputc(',', out), cav_table_write_number(out, value);
+      else if (isnan(value))
+        fprintf(out, " %14s", "-");
       else
         fprintf(out, " %14.4g", value);
     }

@@ -84,6 +84,8 @@ int cav_certificate_lines(const cav_verdict *v, cav_certificate_line line[CAV_CE
   add_number(line, &n, "open loop at the same step, largest error", v->replay_same_step_max_error, NAN, 1, "");
   add_number(line, &n, "power of an actuator, largest", v->power_max_w, NAN, 1, " W");
   add_number(line, &n, "speed of a joint that turns, largest", v->joint_speed_max_rad_s, NAN, 1, " rad/s");
+  if (!isnan(v->slide_speed_max_m_s))
+    add_number(line, &n, "speed of a joint that slides, largest", v->slide_speed_max_m_s, NAN, 1, " m/s");
   if (!isnan(v->joint_speed_over_limit))
     add_number(line, &n, "speed of a joint over the limit in its file", v->joint_speed_over_limit, NAN, 1, "");
   add_number(line, &n, "cost that a step may still save, fraction", v->optimality, NAN, 1, "");
