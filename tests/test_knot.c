@@ -268,7 +268,7 @@ static void test_every_point_is_read(void) {
   const cav_knot *knot = &tr->knot[1];
   double read = 0, borne = 0;
   int several = 0;
-  for (int k = 0; k < knot->ncontact; k++) read += knot->y[CAV_CONTACT_READINGS * k + CAV_CONTACT_READINGS - 1];
+  for (int k = 0; k < knot->ncontact; k++) read += knot->y[CAV_CONTACT_READINGS * k + 4];
   for (int i = 0; i < state->ncontact; i++) {
     const cav_contact *c = &state->contact[i];
     borne += c->impulse[0] / (tr->options.timestep * tr->weight);

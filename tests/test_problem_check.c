@@ -18,7 +18,7 @@ typedef struct trial {
 
 static cav_model *model;
 
-enum { OWN = 10 }; // the term that cases change
+enum { OWN = 11 }; // the term that cases change
 
 static void prepare(trial *t) {
   *t = (trial){.goal = {1}, .time = {0.1, 0.4}, .target = {0.5, 0.6, 0.7, 0, 0.5, 0.6, 0.7, 0}};
@@ -60,7 +60,7 @@ static void refused(trial *t, cav_status status, const char *words) {
   } while (0)
 
 static void test_terms(void) {
-  REFUSED(mine->scale = 0, "positive scale and a weight that is not negative, nor above 1e16: term[10], 'mine'");
+  REFUSED(mine->scale = 0, "positive scale and a weight that is not negative, nor above 1e16: term[11], 'mine'");
   REFUSED(mine->weight = INFINITY, "positive scale");
   REFUSED(mine->weight = NAN, "positive scale");
   REFUSED(mine->weight = 1e17, "nor above 1e16");
