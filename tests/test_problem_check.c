@@ -76,7 +76,7 @@ static void test_terms(void) {
   REFUSED(mine->sensor.object = 7, "looks at nothing in the model");
   REFUSED(mine->sensor.object = -1, "looks at nothing in the model");
   REFUSED((mine->sensor.referred = 1, mine->sensor.reference = 99), "in the frame of nothing");
-  REFUSED(t.target[2] = NAN, "target that is not finite: term[10], 'mine'");
+  REFUSED(t.target[2] = NAN, "target that is not finite: term[11], 'mine'");
   REFUSED((mine->sensor.type = CAV_SENSOR_FRAMEQUAT, mine->sensor.dim = 4, memset(t.target, 0, sizeof t.target)),
           "length zero");
   REFUSED((mine->nwaypoint = 2), "no times");

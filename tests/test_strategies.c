@@ -289,6 +289,15 @@ static void check_targets(repaired *r) {
 
 // what slides on its own links is to lean on them less, before smoothing changes: what slides on the ground is not
 static void check_rubbing(repaired *r) {
+  cav_verdict leans = {.achieved = 1, .hover_fraction = 0.04, .hover_self = 0.9, .closed_loop_seconds = 1};
+  for (int self = 1; self >= 0; self--) {
+    cav_strategy mended;
+    int found;
+    leans.hover_self = self ? 0.9 : 0.1;
+    CHECK(cav_strategy_repair(&r->problem, &r->stated, &leans, 0, &mended, &found) == CAV_OK && found);
+    CHECK(!strcmp(mended.changed, self ? "<last smoothing_self=\"0.0005\"/>" : "next_gap=\"exact\""));
+    cav_strategy_clear(&mended);
+  }
   cav_verdict slides = {.achieved = 1, .slip_mean_m_s = 0.02, .slip_self = 0.9, .closed_loop_seconds = 1};
   for (int self = 1; self >= 0; self--) {
     cav_strategy mended;

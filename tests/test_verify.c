@@ -300,7 +300,7 @@ static void test_hover(void) {
     open += t < 12 ? state->contact[0].impulse[0] : 0;
   }
   CHECK_NEAR(s.verdict.hover_fraction, open / all, 1e-12);
-  CHECK(s.verdict.hover_fraction > 1e-3);
+  CHECK(s.verdict.hover_fraction > 1e-3 && s.verdict.hover_self == 0);
   cav_state_free(state);
   sample_free(&s);
 }

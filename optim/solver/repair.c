@@ -24,6 +24,7 @@ typedef enum cure {
   STEP,      ///< half the step
   SOFTNESS,  ///< harder contacts at the end
   SMOOTHING, ///< contact forces that fade over a shorter way
+  CLOSER,    ///< those between links of one tree
   SOFTER,    ///< softer ones, that bend over a longer way
   LOOSE,     ///< a lighter weight of slip
   EFFORT,    ///< half of the usual reserve of the actuators is given; less than that was asked for, and stays
@@ -32,7 +33,7 @@ typedef enum cure {
 
 enum { CURES = 3 };
 static const double force_weight = 1, self_weight = 1000, heavier = 10, harder = 4, lighter = 0.04, softer = 6,
-                    longer = 2, soft = 0.03, slack = 0.75;
+                    longer = 2, closer = 2, soft = 0.03, slack = 0.75;
 
 /// What a motion misses first, in the order of a certificate (METHOD.md, 6), most of momentum, slip and hover, and its
 /// cures. Forces near a record are what is looked for: none of them costs anything. A residual beyond its bound is
@@ -41,10 +42,10 @@ static const double force_weight = 1, self_weight = 1000, heavier = 10, harder =
 static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
   static const cure forces[] = {EFFORT, STEP, NONE}, deep[] = {SOFTNESS, STEP, NONE}, between[] = {STEP, NONE},
                     turned[] = {ORDER, STEP, NONE}, slip[] = {SMOOTHING, SLIP, SOFTNESS},
-                    rub[] = {SELF, SMOOTHING, SLIP}, hover[] = {GAP, SMOOTHING, STEP}, fold[] = {SLIDING, STEP, NONE},
-                    lost[] = {FORCE, STEP, SLACK}, target[] = {EFFORT, GOALS, NONE}, close[] = {BIT, EFFORT, GOALS},
-                    fades[] = {SMOOTHING, GAP, STEP}, near[] = {STEP, SLACK, NONE}, again[] = {STEP, SLIDING, NONE},
-                    ground[] = {STEP, LOOSE, SOFTER}, none[] = {NONE};
+                    rub[] = {SELF, SMOOTHING, SLIP}, limbs[] = {CLOSER, SELF, STEP}, hover[] = {GAP, SMOOTHING, STEP},
+                    fold[] = {SLIDING, STEP, NONE}, lost[] = {FORCE, STEP, SLACK}, target[] = {EFFORT, GOALS, NONE},
+                    close[] = {BIT, EFFORT, GOALS}, fades[] = {SMOOTHING, GAP, STEP}, near[] = {STEP, SLACK, NONE},
+                    again[] = {STEP, SLIDING, NONE}, ground[] = {STEP, LOOSE, SOFTER}, none[] = {NONE};
   if (v->certified)
     return v->achieved ? none : v->missed_most > 0 && v->missed_most < CAV_MISSED_LITTLE ? close : target;
   if (!cav_verdict_feasible(v)) return cav_problem_has_record(p) ? ground : forces;
@@ -58,6 +59,7 @@ static const cure *cures_of(const cav_problem *p, const cav_verdict *v) {
   if (slide > 1 && slide >= air) return v->slip_self > 0.5 ? rub : slip;
   // a stated smoothing beyond the usual one is what holds things off the ground
   int blurred = p->schedule.last.smoothing > cav_problem_default(p->model).schedule.last.smoothing;
+  if (air > 1 && v->hover_self > 0.5) return limbs;
   if (air > 1) return blurred ? fades : hover;
   if (v->replay_step_max_error > CAV_TOLERANCE_STEP) return cav_problem_has_record(p) ? again : fold;
   if (v->residual_fraction_max > v->residual_within) return none;
@@ -169,6 +171,9 @@ static cav_status change(const cav_problem *p, const cav_verdict *v, cure c, cav
     case SMOOTHING:
       s->schedule.last.smoothing /= harder;
       break;
+    case CLOSER:
+      s->schedule.last.smoothing_self /= closer;
+      break;
     case LOOSE:
       return loosen_slip(p, s);
     case SOFTER:
@@ -235,7 +240,9 @@ static void describe(const cav_problem *p, cav_strategy *s) {
                 {s->schedule.last.softness != p->schedule.last.softness, ", <last softness=\"%.3g\"/>",
                  s->schedule.last.softness},
                 {s->schedule.last.smoothing != p->schedule.last.smoothing, ", <last smoothing=\"%.3g\"/>",
-                 s->schedule.last.smoothing}};
+                 s->schedule.last.smoothing},
+                {s->schedule.last.smoothing_self != p->schedule.last.smoothing_self,
+                 ", <last smoothing_self=\"%.3g\"/>", s->schedule.last.smoothing_self}};
   for (size_t i = 0; i < sizeof number / sizeof *number; i++) {
     size_t n = strlen(out);
     if (number[i].differs) snprintf(out + n, room - n, number[i].format, number[i].value);

@@ -21,7 +21,7 @@ typedef struct lean {
 struct cav_hover {
   lean *open;
   int nopen, room;
-  double load, total, largest; ///< N s
+  double load, own, total, largest; ///< N s; own: of load between links of one tree
   cav_metric worst;
 };
 
@@ -51,6 +51,7 @@ static void settle(cav_hover *hover, const cav_verification *verification, const
     const double gap = gap_now(verification, l);
     if (!(gap > CAV_HOVER_GAP)) continue;
     hover->load += l->load;
+    if (!model->pair[l->pair].external) hover->own += l->load;
     if (l->load <= hover->largest) continue;
     char name1[32], name2[32];
     const cav_pair *pair = model->pair + l->pair;
@@ -85,9 +86,10 @@ cav_status cav_hover_add(cav_hover *hover, const cav_verification *verification,
   return CAV_OK;
 }
 
-void cav_hover_result(cav_hover *hover, const cav_verification *verification, cav_metric *metric) {
+void cav_hover_result(cav_hover *hover, const cav_verification *verification, cav_metric *metric, double *self) {
   settle(hover, NULL, verification->model, verification->rows, verification->h);
   *metric = hover->worst;
   const double whole = least * verification->weight * verification->h * verification->rows;
   metric->value = hover->load / (hover->total > whole ? hover->total : whole);
+  *self = hover->load > 0 ? hover->own / hover->load : 0;
 }

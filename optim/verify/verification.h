@@ -97,7 +97,8 @@ cav_hover *cav_hover_new(void);
 void cav_hover_free(cav_hover *hover);
 /// Adds knot t, in their order up to the last; verification->state holds the inverse there. Fails with CAV_NO_MEMORY.
 cav_status cav_hover_add(cav_hover *hover, const cav_verification *verification, int t);
-void cav_hover_result(cav_hover *hover, const cav_verification *verification, cav_metric *metric);
+/// self: fraction of it between links of one tree.
+void cav_hover_result(cav_hover *hover, const cav_verification *verification, cav_metric *metric, double *self);
 
 /// Load that slides, beyond what is asked: sums over the knots that have been added. slip.c.
 typedef struct cav_slip {

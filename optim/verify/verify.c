@@ -15,6 +15,7 @@ static const double usual_gravity = 9.81; // m/s^2, unit of forces where the mod
 /// What was found at the knots.
 typedef struct metrics {
   cav_metric unactuated, limit, term, penetration, between, defect, periodicity, hover;
+  double hover_self; // fraction of hover between links of one tree
   cav_slip slip;
   cav_rates rates;
   cav_residual_sum residual;
@@ -398,7 +399,7 @@ static cav_status examine(cav_verification *verification, cav_balance *balance, 
     if ((status = verification->failure->status) != CAV_OK && error) *error = *verification->failure;
   }
   cav_balance_result(balance, verification, &found->defect);
-  if (hover) cav_hover_result(hover, verification, &found->hover);
+  if (hover) cav_hover_result(hover, verification, &found->hover, &found->hover_self);
   cav_hover_free(hover);
   free(work);
   free(terms);
@@ -527,8 +528,12 @@ static void decide(const cav_verification *verification, const metrics *found, c
           "A lower softness or smoothing at the end of the schedule, or a higher weight of slip, usually helps.");
   require(
       verdict, &found->hover, CAV_TOLERANCE_HOVER, "contact force across gaps that stay open, fraction of all,",
-      "Coulomb's law and the exact gap (sliding=\"coulomb\" next_gap=\"exact\" in <schedule>), or a lower smoothing at "
-      "its end usually helps.");
+      found->hover_self > 0.5
+          ? "Links of one tree lean on each other: a lower smoothing_self at the end of the schedule, or <self_force "
+            "weight='1000'/>, usually helps."
+          : "Coulomb's law and the exact gap (sliding=\"coulomb\" next_gap=\"exact\" in <schedule>), or a lower "
+            "smoothing "
+            "at its end usually helps.");
   const cav_metric step = {replay->step_error, replay->step_knot, "forward step from the knot against the next knot"};
   require(verdict, &step, CAV_TOLERANCE_STEP, "replay error, rad or m,",
           verification->law.sliding == CAV_SLIDING_COULOMB
@@ -573,6 +578,7 @@ static void fill(const cav_verification *verification, const metrics *found, con
   verdict->slip_step_mean_m_s = found->slip.load > 0 ? found->slip.carried / found->slip.load : 0;
   verdict->slip_self = found->slip.slides > 0 ? found->slip.own / found->slip.slides : 0;
   verdict->hover_fraction = found->hover.value;
+  verdict->hover_self = found->hover_self;
   verdict->power_max_w = found->rates.power;
   verdict->joint_speed_max_rad_s = found->rates.speed;
   verdict->slide_speed_max_m_s = found->rates.slide_speed < 0 ? NAN : found->rates.slide_speed;
