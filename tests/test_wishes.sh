@@ -113,5 +113,20 @@ done
 says dry.force "9.2 N"
 says dry.force "20.0 N"
 
+# a body that nothing reaches: what leads there, in place of more weight
+cat >far.xml.model <<'E2'
+<mujoco><worldbody><body name="cart"><joint name="rail" type="slide" axis="1 0 0"/><geom type="box" size=".2 .1 .1" mass="2"/></body>
+<body name="lid" pos="9 0 0"><joint name="hinge" axis="0 0 1"/><geom type="box" size=".2 .1 .1" pos=".2 0 0" mass="2"/></body>
+</worldbody><actuator><motor name="push" joint="rail" gear="30" ctrllimited="true" ctrlrange="-1 1"/></actuator></mujoco>
+E2
+mv far.xml.model lid.xml
+echo '<problem name="lid" model="lid.xml"><horizon duration="1"/><start/><cost><sensor name="open" type="jointpos" joint="hinge" target="0.5" at="end"
+weight="900"/></cost></problem>' >lid.problem
+"$cavort" solve lid.problem -o lid --threads 1 --strategies 1 >lid.out 2>err
+ends $? 1 "a lid that nothing touches"
+"$cavort" explain lid >explain.out
+says explain.out "nothing that an actuator moves touches 'lid'"
+says explain.out "refname=\"lid\""
+
 echo "$n answers, $failed failed"
-[ "$failed" = 0 ] && [ "$n" -ge 21 ]
+[ "$failed" = 0 ] && [ "$n" -ge 23 ]

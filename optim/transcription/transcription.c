@@ -6,6 +6,7 @@
 /// exact. Constraint rows enter the merit by an augmented Lagrangian of two-sided rows: with z~ = z + multiplier/rho
 /// and e = z~ - clamp(z~), the row costs rho/2 e^2 and its next multiplier is rho e (Powell, Hestenes, Rockafellar).
 #include "knot.h"
+#include "math3.h"
 #include "rotation.h"
 
 #include <assert.h>
@@ -80,6 +81,9 @@ static int limit_row_set(cav_transcription *tr, int k, const double *effort) {
   return force_row_set(&tr->effort[k], m->nv, effort, per_effort * scale);
 }
 
+/// rad/s^2: what turns on a hinge that no actuator moves takes the torque of such an acceleration for one.
+static const double BRISK = 2;
+
 /// Fraction of the scene's mass below which a body is light.
 static const double LIGHT = 1. / 16;
 
@@ -96,6 +100,10 @@ double cav_force_fraction(const cav_model *m, int dof) {
   int link = m->dof[dof].link;
   double mass = 0;
   if (m->link[link].driven) return 1;
+  if (m->joint[m->dof[dof].joint].type == CAV_JOINT_HINGE && m->dof[dof].inverse_weight > 0) {
+    const double pull = norm3(m->gravity), weight = m->mass * (pull > 0 ? pull : 1);
+    return fmin(BRISK / m->dof[dof].inverse_weight / (weight * CAV_MOMENT_ARM), 1);
+  }
   for (int l = 1; l < m->nlink; l++)
     if (m->link[l].root == m->link[link].root) mass += m->link[l].mass;
   return mass > 0 && mass < LIGHT * m->mass ? mass / m->mass : 1;

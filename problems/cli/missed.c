@@ -8,6 +8,7 @@
 
 #include "cavort/result.h"
 #include "command.h"
+#include "role.h"
 #include "summary.h"
 
 static const double idle = 1e-4; // part of its limit below which an actuator does nothing
@@ -100,6 +101,48 @@ static void tell_heavier(const char *folder, const char *name, double more, char
     snprintf(text, size, "%g times the stated weight was tried (strategies.csv) and did not do: %s", most, how);
 }
 
+/// Link whose place or joint a term is of; 0: of the world or of several.
+static int link_of(const cav_problem *p, const cav_term *term) {
+  const cav_model *m = p->model;
+  if (term->quantity == CAV_QUANTITY_CONFIGURATION)
+    return term->dofs == CAV_DOFS_ONE ? m->dof[m->joint[term->joint].dof].link : 0;
+  if (term->quantity != CAV_QUANTITY_SENSOR) return 0;
+  if (term->sensor.object_type == CAV_OBJECT_JOINT) return m->dof[m->joint[term->sensor.object].dof].link;
+  int link = cav_object_link(m, term->sensor.object_type, term->sensor.object);
+  return link > 0 ? link : 0;
+}
+
+/// Of what no actuator moves and nothing that one moves touches: its body, for people; NULL: something does, or may.
+static const char *untouched(const cav_problem *p, const cav_trajectory *motion, const cav_term *term) {
+  const cav_model *m = p->model;
+  const int link = link_of(p, term), root = m->link[link].root;
+  cav_error ignored = {0};
+  if (link <= 0 || m->link[link].driven || m->nu == 0) return NULL;
+  cav_forces *forces = cav_forces_new(m, motion, &p->contact, p->close_at_rest, &ignored);
+  int touched = !forces;
+  for (int i = 0; forces && i < forces->nforce; i++) {
+    const int one = m->geom[forces->force[i].geom1].link, two = m->geom[forces->force[i].geom2].link;
+    touched |= (m->link[one].root == root && m->link[two].driven) || (m->link[two].root == root && m->link[one].driven);
+  }
+  cav_forces_free(forces);
+  for (int b = 1; b < m->nbody && !touched; b++)
+    if (m->body[b].link == link) return m->body[b].name && *m->body[b].name ? m->body[b].name : "the body";
+  return NULL;
+}
+
+/// A body that may take hold of things: a hand, or a foot, or the last link of a chain.
+static const char *hand_of(const cav_model *m) {
+  static const cav_role role[] = {CAV_ROLE_RIGHT_HAND, CAV_ROLE_LEFT_HAND, CAV_ROLE_HAND, CAV_ROLE_RIGHT_FOOT};
+  cav_state *state = cav_state_new(m);
+  cav_roles roles;
+  const char *name = "BODY";
+  if (state && !cav_roles_find(m, state, &roles))
+    for (int i = 3; i >= 0; i--)
+      if (roles.body[role[i]] > 0) name = m->body[roles.body[role[i]]].name;
+  cav_state_free(state);
+  return name;
+}
+
 /// What a step may still save, of the cost, from which on a motion is at no optimum.
 static const double far_off = 0.01;
 
@@ -117,7 +160,18 @@ static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_t
   tell_heavier(folder, term->name, done < still * way && way > got[i].within ? 1 : more, tried, sizeof tried);
   snprintf(weight, sizeof weight, "a weight %.2g times as large brings it nearer", more);
   if (*tried) snprintf(weight, sizeof weight, "%s", tried);
-  if (way <= got[i].within) {
+  const char *body = done < still * way && way > got[i].within ? untouched(p, motion, term) : NULL;
+  if (body) {
+    snprintf(
+        text, size,
+        "'%.60s' is %.3g%s%s from where the start has it, and nothing that an actuator moves touches '%.40s': from "
+        "afar "
+        "no change of the motion brings it nearer, whatever its weight. Next: bring a hand to it, by <sensor "
+        "type=\"framepos\" body=\"%.40s\" reftype=\"body\" refname=\"%.40s\" target=\"0 0 0\" from=\"%.2g\" "
+        "weight=\"300\" within=\"any\"/>, its target at the side to push from, or by postures in <guess> that have it "
+        "there.",
+        name, way, gap, unit, body, hand_of(p->model), body, p->duration / 3);
+  } else if (way <= got[i].within) {
     snprintf(text, size,
              "the start has '%.60s' to %.3g%s%s, and the motion leaves it by %.3g%s%s at %.3g s%s%.160s. It is traded "
              "against other "
