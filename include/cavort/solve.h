@@ -445,9 +445,9 @@ typedef struct cav_verdict {
   double penetration_max_m, penetration_between_m; ///< at the knots; along the steps between them
   double slip_mean_m_s;                            ///< of loaded contacts, weighted by force
   double slip_step_mean_m_s;                       ///< the same by the way of a contact's point over the step
-  double hover_self;                               ///< fraction of hover_fraction between links of one tree
   double slip_self;                                ///< fraction of that between links of one tree
   double hover_fraction;                           ///< of contact force, by impulse, across gaps that stay open
+  double hover_self;                               ///< fraction of that between links of one tree
   double power_max_w;            ///< of an actuator: mechanical, at the mean velocity of a step, either way
   double joint_speed_max_rad_s;  ///< of hinges and ball joints
   double slide_speed_max_m_s;    ///< of slides; NaN: the model has none

@@ -112,6 +112,8 @@ static int link_of(const cav_problem *p, const cav_term *term) {
   return link > 0 ? link : 0;
 }
 
+static const double tail = 1e-3; // N/kg of the scene: less is the tail of a smoothed law
+
 /// Of what no actuator moves and nothing that one moves touches: its body, for people; NULL: something does, or may.
 static const char *untouched(const cav_problem *p, const cav_trajectory *motion, const cav_term *term) {
   const cav_model *m = p->model;
@@ -121,6 +123,8 @@ static const char *untouched(const cav_problem *p, const cav_trajectory *motion,
   cav_forces *forces = cav_forces_new(m, motion, &p->contact, p->close_at_rest, &ignored);
   int touched = !forces;
   for (int i = 0; forces && i < forces->nforce; i++) {
+    const double *force = forces->force[i].force;
+    if (force[0] * force[0] + force[1] * force[1] + force[2] * force[2] < pow(tail * m->mass, 2)) continue;
     const int one = m->geom[forces->force[i].geom1].link, two = m->geom[forces->force[i].geom2].link;
     touched |= (m->link[one].root == root && m->link[two].driven) || (m->link[two].root == root && m->link[one].driven);
   }
