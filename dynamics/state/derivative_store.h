@@ -10,7 +10,7 @@
 typedef struct cav_contact_jacobian {
   int idle; ///< the law is flat here: nothing is filled but this
   double dist[2][6];
-  double pos[2][3][6]; ///< [axis of the world][twist] of the position
+  double pos[2][3][6];      ///< [axis of the world][twist] of the position
   double velocity[2][6][6]; ///< [row][twist] of velocity_next
   double impulse[2][6][6];  ///< [row][twist] of the impulse
   double wrench[2][6][6];   ///< [twist][6] of the wrench on link2 about the position
