@@ -43,7 +43,6 @@ state wall 1.2 0 2.4 "$(box 0.6 0.05 0.3)"
 
 number() { sed -n "s/^ *\"$1\": \([^,]*\),*$/\1/p" "$work/result/verdict.json" | awk "{ printf \"$2\", \$1 }"; }
 
-
 edges() {
   state up-0.15 0.75 0.15 3 "$(box 0.8 0.35 0.15)"
   state up-0.3 0.75 0.3 3 "$(box 0.8 0.35 0.3)"

@@ -1,7 +1,7 @@
 /// Rows of a knot: k equal costs of weight w are one of weight k w, for every cost of contacts and of efforts, k from 1
 /// to 40, with windows, bodies and norms, with a fixed and a free step, over a horizon and around a cycle; problem
 /// files that repeat costs or mix windows are solved as any other. Most of its worth is under a sanitizer: the rows of
-/// repeated costs once left the space that was counted for them. Seen: merits, gradients and Hessians equal to 1.2e-14
+/// repeated costs once left the space that was counted for them. And the units of forces from nowhere. Seen: merits, gradients and Hessians equal to 1.2e-14
 /// of their largest, what the step does to 2e-10 (bounds 1e-13 and 1e-7: a difference of residuals over two millionths
 /// of a step).
 #include "readings.h"
@@ -287,8 +287,29 @@ static void test_every_point_is_read(void) {
   cav_model_free(m);
 }
 
+/// Forces from nowhere on what no actuator moves: what turns on a hinge in the torque of 2 rad/s^2, here of a rod 0.4 m
+/// long about its end beside a body that floats; a light body in its own weight; what is driven in the scene's.
+static void test_units(void) {
+  cav_model *m = scene_load(
+      "<mujoco><worldbody><body pos='0 0 1'><freejoint/><geom type='box' size='.1 .1 .1' mass='50'/>"
+      "<body><joint name='arm'/><geom type='box' size='.1 .1 .1' mass='5'/></body></body>"
+      "<body pos='3 0 1'><joint name='lid' axis='0 0 1' armature='.5'/><geom type='box' size='.2 .001 .01' pos='.2 0 "
+      "0' mass='3'/></body>"
+      "<body pos='5 0 1'><freejoint name='ball'/><geom size='.1' mass='2'/></body></worldbody>"
+      "<actuator><motor joint='arm'/></actuator></mujoco>");
+  if (!CHECK(m != NULL)) return;
+  const int arm = cav_object_find(m, CAV_OBJECT_JOINT, "arm"), lid = cav_object_find(m, CAV_OBJECT_JOINT, "lid"),
+            ball = cav_object_find(m, CAV_OBJECT_JOINT, "ball");
+  CHECK(cav_force_fraction(m, m->joint[arm].dof) == 1);
+  CHECK_NEAR(cav_force_fraction(m, m->joint[lid].dof) * CAV_MOMENT_ARM * 60 * 9.81,
+             2 * (0.5 + 3 * (0.4 * 0.4 + 0.002 * 0.002) / 12 + 3 * 0.04), 1e-9);
+  CHECK_NEAR(cav_force_fraction(m, m->joint[ball].dof), 2. / 60, 1e-15);
+  cav_model_free(m);
+}
+
 int main(void) {
   test_self_force();
+  test_units();
   test_every_point_is_read();
   test_file("<slip from='0' to='end' weight='1'/><slip from='0' to='end' weight='1'/>");
   test_file("<force from='0.1' to='0.5' weight='1'/><slip from='0.1' to='0.7' weight='1'/>");

@@ -583,26 +583,6 @@ static void test_scene(const char *scene, closing close, cav_order order) {
   cav_model_free(m);
 }
 
-/// Forces from nowhere on what no actuator moves: what turns on a hinge in the torque of 2 rad/s^2, here of a rod 0.4 m
-/// long about its end beside a body that floats; a light body in its own weight; what is driven in the scene's.
-static void test_units(void) {
-  cav_model *m = scene_load(
-      "<mujoco><worldbody><body pos='0 0 1'><freejoint/><geom type='box' size='.1 .1 .1' mass='50'/>"
-      "<body><joint name='arm'/><geom type='box' size='.1 .1 .1' mass='5'/></body></body>"
-      "<body pos='3 0 1'><joint name='lid' axis='0 0 1' armature='.5'/><geom type='box' size='.2 .001 .01' pos='.2 0 "
-      "0' mass='3'/></body>"
-      "<body pos='5 0 1'><freejoint name='ball'/><geom size='.1' mass='2'/></body></worldbody>"
-      "<actuator><motor joint='arm'/></actuator></mujoco>");
-  if (!CHECK(m != NULL)) return;
-  const int arm = cav_object_find(m, CAV_OBJECT_JOINT, "arm"), lid = cav_object_find(m, CAV_OBJECT_JOINT, "lid"),
-            ball = cav_object_find(m, CAV_OBJECT_JOINT, "ball");
-  CHECK(cav_force_fraction(m, m->joint[arm].dof) == 1);
-  CHECK_NEAR(cav_force_fraction(m, m->joint[lid].dof) * CAV_MOMENT_ARM * 60 * 9.81,
-             2 * (0.5 + 3 * (0.4 * 0.4 + 0.002 * 0.002) / 12 + 3 * 0.04), 1e-9);
-  CHECK_NEAR(cav_force_fraction(m, m->joint[ball].dof), 2. / 60, 1e-15);
-  cav_model_free(m);
-}
-
 /// Trees that nothing joins: the Hessian is the product of the rows, made here, and its solutions are those of the
 /// dense matrix; a body that reaches another makes one group of the two, and a free step none.
 static void test_apart(int cyclic, int touching, int free_step) {
@@ -783,7 +763,6 @@ int main(void) {
   const closing mirrored = {.free_step = 1, .cycle = {.on = 1, .translation = {0.2, 0, 0}, .mirror = CAV_MIRROR_Y}};
   const closing begun = {.at_rest = 1, .free_start = 1, .penalised = 1};
   const closing loose = {.free_start = 1, .free_step = 1, .penalised = 1};
-  test_units();
   test_scene(walker, rest, CAV_ORDER_MIDPOINT);
   test_scene(walker, open, CAV_ORDER_MIDPOINT);
   test_scene(slabbed, rest, CAV_ORDER_MIDPOINT);
