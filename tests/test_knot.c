@@ -1,9 +1,9 @@
 /// Rows of a knot: k equal costs of weight w are one of weight k w, for every cost of contacts and of efforts, k from 1
 /// to 40, with windows, bodies and norms, with a fixed and a free step, over a horizon and around a cycle; problem
 /// files that repeat costs or mix windows are solved as any other. Most of its worth is under a sanitizer: the rows of
-/// repeated costs once left the space that was counted for them. And the units of forces from nowhere. Seen: merits, gradients and Hessians equal to 1.2e-14
-/// of their largest, what the step does to 2e-10 (bounds 1e-13 and 1e-7: a difference of residuals over two millionths
-/// of a step).
+/// repeated costs once left the space that was counted for them. And the units of forces from nowhere. Seen: merits,
+/// gradients and Hessians equal to 1.2e-14 of their largest, what the step does to 2e-10 (bounds 1e-13 and 1e-7: a
+/// difference of residuals over two millionths of a step).
 #include "readings.h"
 
 #include "scene.h"
