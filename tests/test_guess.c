@@ -54,6 +54,32 @@ static void check_turned(const cav_trajectory *at, int knot, int axis, double an
   for (int i = 0; i < 4; i++) CHECK_NEAR(sign * q[i], w[i], 1e-14);
 }
 
+/// A ball that goes along a ramp of 10 degrees, 15 cm above it but at its ends: put onto it, and left where it is.
+static void check_ground(void) {
+  static const char text[] =
+      "<problem model='m.xml'>\n<scene><geom name='ramp' type='box' pos='.0173648 0 -.0984808' euler='0 -10 0' size='2 "
+      "1 .1'/>"
+      "</scene><horizon duration='1' timestep='.1'/>\n<start><root pos='0 0 .1015427'/></start>\n"
+      "<goal><root pos='1 0 .2778697'/></goal>\n<guess ground='%s'><waypoint time='.1'><root pos='.1 0 "
+      ".2691754'/></waypoint>"
+      "<waypoint time='.9'><root pos='.9 0 .410237'/></waypoint></guess>" TAIL;
+  for (int ground = 0; ground < 2; ground++) {
+    cav_problem *p;
+    char of[1000];
+    snprintf(of, sizeof of, text, ground ? "true" : "false");
+    cav_trajectory *at = guess(of, &p);
+    for (int t = 0; at && t <= 10; t++) {
+      const double *q = at->q + t * at->nq, over = q[2] - (q[0] * tan(M_PI / 18) + .1 / cos(M_PI / 18));
+      const int end = t == 0 || t == 10, near = t <= 2 || t >= 8;
+      CHECK_NEAR(q[0], .1 * t, 1e-12);
+      if (end || !near || !ground) CHECK_NEAR(over, end || ground ? 0 : .15, 1e-6);
+    }
+    if (p) CHECK(p->guess_ground == ground);
+    cav_trajectory_free(at);
+    cav_problem_free(p);
+  }
+}
+
 static void check_ways(void) {
   cav_problem *p;
   cav_trajectory *at = guess(HEAD TAIL, &p);
@@ -240,6 +266,7 @@ int main(void) {
   snprintf(motion_path, sizeof motion_path, "%s/motion.csv", folder);
   scene_write(folder, "m.xml", model);
   check_ways();
+  check_ground();
   check_postures();
   check_broken();
   check_file();

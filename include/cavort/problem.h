@@ -369,6 +369,7 @@ typedef struct cav_problem {
   double guess_from, guess_to; ///< s
   double
       guess_rotation[3]; ///< rotation vector that the first free joint's guess makes over guess_from .. guess_to, rad
+  int guess_ground;      ///< 1: between start and goal the guess stands on what is below it, so high as there
   int nguess_pose;       ///< postures on the way
   const cav_guess_pose
       *guess_pose; ///< [nguess_pose], times increasing within the horizon: postures on the way to the goal

@@ -270,6 +270,7 @@ static const cav_xml_element guess = {
         REAL("apex", 0, "m", "0", "height of a ballistic arc that is added between from and to"),
         REALS("rotation", 3, 3, "degrees", "0 0 0", "rotation of the first free joint between from and to, as a rotation vector"),
         TEXT("from", "0", "begin of the arc and the rotation, s or \"end\""), TEXT("to", "end", "end of them, s or \"end\""),
+        FLAG("ground", "false", "each knot between start and goal is raised or lowered onto what is below it, so high as these: over ramps, steps and terrain"),
         TEXT("file", "(none)", "motion to follow: a trajectory.csv of the same model, such as ik and solve write; its first posture where the start is free, its last where there is no <goal>"),
         REAL("offset", 0, "s", "0", "time of that motion at which the guess begins")),
     CHILDREN(&guess_waypoint, &swing), 0, "motion that the solver starts from; it obeys nothing yet"};
@@ -316,7 +317,7 @@ static const cav_xml_element schedule = {
         WORD("sliding", cav_problem_slidings, "coulomb", "law of contacts that slide, from three quarters of the stages on"),
         WORD("next_gap", cav_problem_next_gaps, "linear", "gap after a step that contacts see, from half of the stages on"),
         WORD("next_slip", cav_problem_next_slips, "linear", "slip over a step that contacts see, from half of the stages on"),
-        REAL("optimality", 0, "", "0", "the solve ends where steps gain slowly and one may save no more than this fraction of the cost; 0: 5e-4"),
+        REAL("optimality", 0, "", "0", "the solve ends where steps gain slowly and one may save no more than this fraction of the cost; 0: 8e-4"),
         WORD("solids", cav_problem_solids, "hard", "how the world begins: grow where the guess runs into solids"),
         FLAG("kinematics", "false", "before the first stage the guess goes to where it meets its targets by inverse kinematics over all knots, whatever forces that takes")),
     CHILDREN(&schedule_first, &schedule_last), 0, "continuation from soft, blurred contacts to hard, sharp ones"};

@@ -513,6 +513,7 @@ static cav_status read_guess(const cav_problem_reader *reader) {
   if (!status) status = read_guess_file(reader, node);
   if (!status) status = read_swings(reader, node);
   if (!status) status = cav_problem_real(reader, node, "apex", 0, DBL_MAX, &p->guess_height);
+  p->guess_ground = cav_xml_bool(node, "ground", 0);
   if (!status) status = cav_problem_window(reader, node, &p->guess_from, &p->guess_to);
   if (status) return status;
   if (p->guess_to < 0) p->guess_to = p->duration;

@@ -298,6 +298,7 @@ static void write_guess(FILE *out, const cav_problem *p) {
   fputs("  <guess", out);
   write_text(out, "type", cav_problem_guesses[p->guess]);
   if (p->guess_height > 0) write_number(out, "apex", p->guess_height);
+  if (p->guess_ground) write_text(out, "ground", "true");
   if (turned) write_numbers(out, "rotation", rotation, 3);
   if (turned || p->guess_height > 0) {
     write_number(out, "from", p->guess_from);

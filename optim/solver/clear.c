@@ -5,6 +5,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "continuation.h"
 #include "math3.h"
@@ -12,6 +13,10 @@
 /// Depth that is free, m; least step upwards of the search, and how many of them.
 static const double touching = 1e-3, step = 0.01;
 enum { STEPS = 500 };
+
+/// How far below it a guess is looked for what it stands on, m, and the vertical part of a normal from which that bears.
+static const double reach = 0.3, level = 0.5;
+enum { GROUNDINGS = 5 };
 
 /// Depth in a solid from which a guess runs into it, m.
 static const double deep = 0.01;
@@ -22,26 +27,41 @@ static const double buried = 0.5;
 /// Time over which the course looks ahead and back, s.
 static const double ahead = 0.25;
 
-void cav_lift(const cav_model *m, double height, double *q) {
+/// Whether a joint lifts the tree that it is the root of.
+static int rises(const cav_model *m, const cav_joint *joint) {
+  const int vertical = joint->type == CAV_JOINT_SLIDE && fabs(joint->axis[2]) > 0.9;
+  return m->link[joint->link].parent == 0 && (vertical || joint->type == CAV_JOINT_FREE);
+}
+
+/// Raises a tree, or all that can rise where it is 0.
+static void lift(const cav_model *m, int tree, double height, double *q) {
   for (int j = 0; j < m->njoint; j++) {
     const cav_joint *joint = &m->joint[j];
-    int root = m->link[joint->link].parent == 0;
-    int vertical = joint->type == CAV_JOINT_SLIDE && fabs(joint->axis[2]) > 0.9;
-    if (root && joint->type == CAV_JOINT_FREE) q[joint->q + 2] += height;
-    if (root && vertical) q[joint->q] += copysign(height, joint->axis[2]);
+    if (!rises(m, joint) || (tree && m->link[joint->link].root != tree)) continue;
+    if (joint->type == CAV_JOINT_FREE)
+      q[joint->q + 2] += height;
+    else
+      q[joint->q] += copysign(height, joint->axis[2]);
   }
 }
 
-/// How deep the model is in the world at a configuration: in all of it, or in solids alone, of which grounds are none.
+void cav_lift(const cav_model *m, double height, double *q) { lift(m, 0, height, q); }
+
+/// Whether a contact is with a solid of the world, of which grounds are none.
+static int is_with_solid(const cav_model *m, const cav_contact *c) {
+  if (c->link1 > 0 && c->link2 > 0) return 0;
+  const cav_pair *pair = &m->pair[c->pair];
+  const cav_geom_type type = m->geom[c->link1 == 0 ? pair->geom1 : pair->geom2].type;
+  return type != CAV_GEOM_PLANE && type != CAV_GEOM_HFIELD;
+}
+
+/// How deep the model is in the world at a configuration: in all of it, or in solids alone.
 static cav_status depth_at(const cav_model *m, cav_state *state, const double *q, int solids, double *depth) {
   cav_status status = cav_position(m, state, q);
   *depth = 0;
   for (int i = 0; i < state->ncontact && !status; i++) {
     const cav_contact *c = &state->contact[i];
-    const cav_pair *pair = &m->pair[c->pair];
-    if (c->link1 > 0 && c->link2 > 0) continue;
-    cav_geom_type type = m->geom[c->link1 == 0 ? pair->geom1 : pair->geom2].type;
-    if (!solids || (type != CAV_GEOM_PLANE && type != CAV_GEOM_HFIELD)) *depth = fmax(*depth, -c->dist);
+    if (solids ? is_with_solid(m, c) : c->link1 == 0 || c->link2 == 0) *depth = fmax(*depth, -c->dist);
   }
   return status;
 }
@@ -77,6 +97,84 @@ cav_status cav_clear(const cav_model *m, cav_trajectory *at) {
   }
   cav_state_free(state);
   free(room);
+  return status;
+}
+
+/// The height of a tree over what is below it in the world; infinite where nothing is within reach, or beside it alone.
+static cav_status height_over(const cav_model *m, cav_state *state, int tree, const double *q, double *height) {
+  cav_status status = cav_position(m, state, q);
+  *height = INFINITY;
+  for (int i = 0; i < state->ncontact && !status; i++) {
+    const cav_contact *c = &state->contact[i];
+    if ((c->link1 > 0 && c->link2 > 0) || m->link[c->link1 > 0 ? c->link1 : c->link2].root != tree) continue;
+    const double up = fabs(c->frame[2]);
+    if (up > level) *height = fmin(*height, c->dist / up);
+  }
+  return status;
+}
+
+/// How far each knot but the first and the last is below the height that it should have, m.
+static cav_status find_sinks(const cav_model *m, cav_state *state, int tree, const cav_trajectory *at, double *q,
+                             double *low) {
+  const int last = at->nknot - 1;
+  double ends[2];
+  cav_status status = height_over(m, state, tree, at->q, &ends[0]);
+  if (!status) status = height_over(m, state, tree, at->q + (size_t)last * at->nq, &ends[1]);
+  // what begins or ends in the air stands on nothing
+  if (!isfinite(ends[0]) || !isfinite(ends[1])) return status;
+  for (int t = 1; t < last && !status; t++) {
+    const double wanted = ends[0] + (ends[1] - ends[0]) * t / last;
+    double height = 0;
+    memcpy(q, at->q + (size_t)t * at->nq, (size_t)at->nq * sizeof *q);
+    for (int k = 0; k < GROUNDINGS && !status; k++) {
+      status = height_over(m, state, tree, q, &height);
+      if (!isfinite(height) || fabs(wanted - height) < touching) break;
+      lift(m, tree, wanted - height, q);
+      low[t] += wanted - height;
+    }
+  }
+  return status;
+}
+
+cav_status cav_ground(const cav_model *m, cav_trajectory *at) {
+  int n = at->nknot, w = (int)ceil(0.5 * ahead / at->timestep), first = 0;
+  while (first < m->njoint && !rises(m, &m->joint[first])) first++;
+  if (first == m->njoint) return CAV_OK;
+  const int tree = m->link[m->joint[first].link].root;
+  cav_state *state = cav_state_new(m);
+  double *low = calloc((size_t)n + (size_t)at->nq, sizeof *low);
+  cav_status status = state && low ? CAV_OK : CAV_NO_MEMORY;
+  if (state) state->options.smoothing = reach;
+  if (!status) status = find_sinks(m, state, tree, at, low + n, low);
+  for (int t = 1; t < n - 1 && !status; t++) {
+    double sum = 0, weights = 0;
+    for (int k = -w; k <= w; k++) {
+      if (t + k < 0 || t + k >= n) continue;
+      const double weight = 1 + cos(M_PI * k / (w + 1));
+      weights += weight, sum += weight * low[t + k];
+    }
+    lift(m, tree, sum / weights, at->q + (size_t)t * at->nq);
+  }
+  cav_state_free(state);
+  free(low);
+  return status;
+}
+
+cav_status cav_stands_on_solid(const cav_problem *problem, int *stands) {
+  const double *const ends[2] = {problem->q_start, problem->q_goal};
+  const cav_model *m = problem->model;
+  cav_state *state = cav_state_new(m);
+  cav_status status = state ? CAV_OK : CAV_NO_MEMORY;
+  *stands = 0;
+  if (state) state->options.smoothing = deep;
+  for (int k = 0; k < 2 && !status; k++) {
+    status = cav_position(m, state, ends[k]);
+    for (int i = 0; i < state->ncontact && !status; i++) {
+      const cav_contact *c = &state->contact[i];
+      *stands |= c->dist < deep && is_with_solid(m, c);
+    }
+  }
+  cav_state_free(state);
   return status;
 }
 

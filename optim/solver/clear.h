@@ -10,6 +10,13 @@ void cav_lift(const cav_model *m, double height, double *q);
 /// Lifts the knots of a guess out of the world, but the first.
 cav_status cav_clear(const cav_model *model, cav_trajectory *guess);
 
+/// Raises and lowers the first tree that can rise onto what is below it, at each knot but the first and the last: so high
+/// above it as these are. Smoothed over a quarter of a second; nothing where these are in the air.
+cav_status cav_ground(const cav_model *model, cav_trajectory *guess);
+
+/// Whether the problem starts or ends within a centimetre of a solid of the world.
+cav_status cav_stands_on_solid(const cav_problem *problem, int *stands);
+
 /// Whether the problem's guess runs into a solid of the world, by a centimetre or more.
 cav_status cav_guess_collides(const cav_problem *problem, int *collides);
 

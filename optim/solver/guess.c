@@ -136,6 +136,7 @@ cav_status cav_guess_fill(const cav_problem *problem, const double *end, cav_tra
     if (x > 0 && x < 1) cav_lift(m, 4 * problem->guess_height * x * (1 - x), q);
   }
   if (!problem->cycle.on && problem->guess != CAV_GUESS_PUMP) status = roll(problem, at);
+  if (!status && problem->guess_ground && !problem->cycle.on) status = cav_ground(m, at);
   if (!status && problem->schedule.solids == CAV_SOLIDS_GROW && !problem->cycle.on) status = cav_clear(m, at);
   memcpy(at->v, problem->v_start, (size_t)m->nv * sizeof(double));
   cav_trajectory_velocities(m, at);

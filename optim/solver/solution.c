@@ -22,7 +22,7 @@ cav_solve_options cav_solve_options_default(void) {
                              .diagnose = 1,
                              .gains = 1,
                              .tolerance = 2e-7,
-                             .optimality = 5e-4};
+                             .optimality = 8e-4};
 }
 
 int cav_solution_log(cav_solution *solution, const cav_progress *line) {

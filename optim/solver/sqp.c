@@ -41,7 +41,7 @@ enum { FEW = 3 };
 /// gains where progress is not slow, and where it is so slow that a run is stuck: that is its end too, where what is left
 /// is no more than so many times what is asked for.
 enum { LOOK = 5, LOOKS = 2 };
-static const double brisk = 0.5, sluggish = 0.03, left_alone = 2;
+static const double brisk = 0.5, sluggish = 0.03, left_alone = 1.25;
 
 /// Part of what may be left to be saved: one look that finds no more ends a run whose iterations gain less than that each,
 /// however fast it converges.

@@ -260,6 +260,7 @@ static cav_status hold_over_ground(const cav_problem *problem, cav_strategy *beg
 typedef struct guesses {
   cav_strategy stated, plain, walk, fly; ///< straight from start to goal; with limbs swinging; by a flight
   int collides, decorated, sinks;        ///< what the stated guess does, and is
+  int over;                              ///< 1: start or goal stands on a solid of the world
 } guesses;
 
 /// The stated guess in other postures, and under another order first.
@@ -286,6 +287,18 @@ static cav_status add_pumped(const cav_problem *problem, cav_strategy *strategy,
   return status;
 }
 
+/// The walk, on what is below it. To or from a solid of the world it goes over solids: feet that swing would be caught in what
+/// they are to stand on.
+static cav_status find_walk(const cav_problem *problem, guesses *g) {
+  g->walk.text = "from start to goal with the limbs that carry swinging in turn";
+  cav_status status = problem->nswing ? CAV_OK : gait(problem, &g->walk);
+  if (status != CAV_OK || g->collides || !g->walk.nswing) return status;
+  g->walk.ground = 1;
+  status = cav_stands_on_solid(problem, &g->over);
+  if (g->over) g->walk.schedule.solids = CAV_SOLIDS_GROW;
+  return status;
+}
+
 /// Finds the guesses; a file without one whose straight way sinks is begun, strategy[0], with the start held.
 static cav_status find_guesses(const cav_problem *problem, const cav_strategy *stated, cav_strategy *strategy,
                                guesses *g) {
@@ -297,8 +310,7 @@ static cav_status find_guesses(const cav_problem *problem, const cav_strategy *s
   g->plain = g->stated;
   g->plain.guess = CAV_GUESS_INTERPOLATE, g->plain.stated = 0;
   g->walk = g->fly = g->plain;
-  g->walk.text = "from start to goal with the limbs that carry swinging in turn";
-  if (status == CAV_OK && !problem->nswing) status = gait(problem, &g->walk);
+  if (status == CAV_OK) status = find_walk(problem, g);
   g->fly.text = "all of the way by an arc clear of solids, start and goal held before and after it";
   g->fly.schedule.solids = problem->schedule.solids;
   return status == CAV_OK ? flight(problem, &g->fly) : status;
@@ -319,11 +331,13 @@ static void add_plain(const cav_problem *problem, cav_strategy *strategy, int *n
 static cav_status add_others(const cav_problem *problem, cav_strategy *strategy, int *n, const guesses *g) {
   if (g->collides) add_grown(problem, strategy, n, &g->stated, &g->walk, &g->fly);
   if (!g->collides && g->fly.height > 0 && problem->guess_height > 0) add_mended(strategy, n, &g->fly, "flight");
+  const int walks = g->walk.nswing && !g->collides;
+  if (walks && g->over) add_mended(strategy, n, &g->walk, "swing");
   cav_strategy soft = g->stated;
   soft.schedule.first.smoothing *= SOFTER;
   soft.schedule.first.penalty /= CHEAPER;
   add(strategy, n, &soft, "soft", "contacts active from twice as far, unactuated force ten times cheaper at first");
-  if (g->walk.nswing && !g->collides) add_mended(strategy, n, &g->walk, "swing");
+  if (walks && !g->over) add_mended(strategy, n, &g->walk, "swing");
   cav_strategy leap = g->plain;
   leap.text = "straight from start to goal with an arc as high as is asked for";
   cav_status status = problem->guess_height != 0 ? CAV_OK : cav_leap_find(problem, &leap.height, &leap.from, &leap.to);
@@ -399,6 +413,7 @@ void cav_strategy_apply(const cav_problem *problem, const cav_strategy *strategy
   if (strategy->left) taken->guess_pose = problem->guess_left;
   if (strategy->stated) return;
   taken->guess_height = strategy->height;
+  taken->guess_ground = strategy->ground;
   if (strategy->height > 0) taken->guess_from = strategy->from, taken->guess_to = strategy->to;
   memset(taken->guess_rotation, 0, sizeof taken->guess_rotation);
   taken->nguess_pose = 0;

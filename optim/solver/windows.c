@@ -100,7 +100,7 @@ static cav_status make_part(windows *w, cav_track *track) {
   // the guess is given as a motion, and a horizon without the goal's arc
   part->nguess_pose = part->nswing = 0;
   part->guess = CAV_GUESS_INTERPOLATE;
-  part->guess_height = 0;
+  part->guess_height = part->guess_ground = 0;
   part->guess_from = 0, part->guess_to = part->duration;
   memset(part->guess_rotation, 0, sizeof part->guess_rotation);
   part->q_start = w->at->q + (size_t)w->first * (size_t)m->nq;

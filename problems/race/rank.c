@@ -3,8 +3,9 @@
 
 #include <math.h>
 
-// times its tolerance up to which what a feasible motion misses of a certificate is little
-static const double few = 4;
+// times its tolerance up to which what a feasible motion misses of a certificate is little; of the balance of momentum, which
+// another order keeps
+static const double few = 4, several = 8;
 
 // fraction of the cost by which a motion has to be cheaper to come before one that was found earlier; before that of the problem
 // as it is stated, where it is one of a changed problem
@@ -52,7 +53,7 @@ int cav_rank_worth(const cav_race_report *a, const cav_race_report *b) {
 int cav_rank_rough(const cav_verdict *v) {
   return !v->certified && cav_verdict_feasible(v) && v->penetration_max_m <= CAV_TOLERANCE_PENETRATION &&
          v->penetration_between_m <= CAV_TOLERANCE_PENETRATION &&
-         v->momentum_defect_rms <= few * CAV_TOLERANCE_MOMENTUM && v->slip_mean_m_s <= few * CAV_TOLERANCE_SLIP &&
+         v->momentum_defect_rms <= several * CAV_TOLERANCE_MOMENTUM && v->slip_mean_m_s <= few * CAV_TOLERANCE_SLIP &&
          v->hover_fraction <= few * CAV_TOLERANCE_HOVER;
 }
 
