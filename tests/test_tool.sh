@@ -648,6 +648,10 @@ check "a start in the air" grep -qE "^note: at the start 'torso' touches nothing
 sed 's/><root[^>]*><.start>/ height="floor"\/>/' falls.xml >stands.xml
 run 0 inspect stands.xml
 check "what stands is not told of" sh -c '! grep -q "^note" out'
+# a trunk bent by 80 degrees over straight legs
+sed 's/<start key="stand" height="floor"\/>/<start key="stand" height="floor"><root pos="0 0 1" euler="0 80 0"\/><joint name="hip_y_right" degrees="-85"\/><joint name="hip_y_left" degrees="-85"\/><\/start>/' stands.xml >leans.xml
+run 0 inspect leans.xml
+check "a start beside its support" grep -qE "^note: at the start the centre of mass of 'torso' is 0.[0-9]+ m beside what it stands on, which is towards \(-1.0 0.0\)" out
 
 # --- interruption, and going on from there ---
 

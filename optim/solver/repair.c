@@ -228,8 +228,8 @@ static void describe(const cav_problem *p, cav_strategy *s) {
   }
   for (int i = p->nterm; i < s->nterm; i++) {
     size_t n = strlen(out);
-    snprintf(out + n, room - n, ", %s<%s weight=\"%g\"/>", is_stated(p, s->term[i].quantity) ? "one more " : "",
-             cav_quantity_rule_of(s->term[i].quantity)->name, s->term[i].weight);
+    snprintf(out + n, room - n, ", <%s weight=\"%g\"/>%s", cav_quantity_rule_of(s->term[i].quantity)->name,
+             s->term[i].weight, is_stated(p, s->term[i].quantity) ? " beside the one that is there" : "");
   }
   const struct {
     int differs;

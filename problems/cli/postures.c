@@ -14,6 +14,10 @@
 // clear of everything by more than this it falls rather than settles
 static const double clear = 0.02; // m
 
+// a centre of mass so far beside its support falls; vertical part of a normal on which one stands, and directions looked at
+static const double unbalanced = 0.05, level = 0.7; // m
+enum { DIRECTIONS = 72 };
+
 /// The posture evaluated, with contacts that are so far apart. NULL: it cannot be.
 static cav_state *posture_of(const cav_problem *p, const double *q, double apart) {
   cav_state *state = cav_state_new(p->model);
@@ -76,12 +80,71 @@ static int is_loose(const cav_problem *p, int root) {
   return 1;
 }
 
+/// Whether a contact is near and with something else than the tree's own links.
+static int bears(const cav_model *m, const cav_contact *c, int root) {
+  const int a = m->link[c->link1].root, b = m->link[c->link2].root;
+  return a != b && (a == root || b == root) && c->dist <= clear;
+}
+
 static int touches(const cav_model *m, const cav_state *state, int root) {
   for (int i = 0; i < state->ncontact; i++) {
-    const int a = m->link[state->contact[i].link1].root, b = m->link[state->contact[i].link2].root;
-    if (a != b && (a == root || b == root) && state->contact[i].dist <= clear) return 1;
+    if (bears(m, &state->contact[i], root)) return 1;
   }
   return 0;
+}
+
+/// How far the centre of mass of a tree is beside what it stands on, seen from above: over all directions the most that it is
+/// farther than every contact. -1 where it does not stand on the world alone, on surfaces that face up.
+static double beside_support(const cav_model *m, const cav_state *state, int root, double support[2]) {
+  double centre[2] = {0}, mass = 0, most = 0;
+  int n = 0;
+  for (int i = 1; i < m->nlink; i++) {
+    if (m->link[i].root != root) continue;
+    mass += m->link[i].mass;
+    for (int k = 0; k < 2; k++) centre[k] += m->link[i].mass * state->com[3 * (size_t)i + (size_t)k];
+  }
+  for (int i = 0; i < state->ncontact; i++) {
+    if (!bears(m, &state->contact[i], root)) continue;
+    const int a = m->link[state->contact[i].link1].root, b = m->link[state->contact[i].link2].root;
+    if (a + b != root || fabs(state->contact[i].frame[2]) < level) return -1;
+    n++;
+  }
+  if (!n || !(mass > 0)) return -1;
+  for (int d = 0; d < DIRECTIONS; d++) {
+    const double way[2] = {cos(2 * M_PI * d / DIRECTIONS), sin(2 * M_PI * d / DIRECTIONS)};
+    double beyond = INFINITY;
+    for (int i = 0; i < state->ncontact; i++) {
+      const cav_contact *c = &state->contact[i];
+      const double past = way[0] * (centre[0] / mass - c->pos[0]) + way[1] * (centre[1] / mass - c->pos[1]);
+      if (bears(m, c, root)) beyond = fmin(beyond, past);
+    }
+    if (beyond > most) most = beyond, support[0] = -way[0], support[1] = -way[1];
+  }
+  return most;
+}
+
+/// Of a start at rest on its feet whose centre of mass is not over them.
+static int tell_lean(FILE *out, const cav_problem *p) {
+  const cav_model *m = p->model;
+  int n = 0;
+  for (int d = 0; d < m->nv; d++)
+    if (p->v_start[d] != 0) return 0;
+  if (!(m->gravity[2] < 0) || m->gravity[0] != 0 || m->gravity[1] != 0 || m->nequality || m->density > 0) return 0;
+  cav_state *state = posture_of(p, p->q_start, clear);
+  for (int i = 1; state && i < m->nlink; i++) {
+    double way[2];
+    const double off = is_loose(p, i) ? beside_support(m, state, i, way) : -1;
+    if (off < unbalanced) continue;
+    const char *name = m->body[m->link[i].body].name;
+    fprintf(out,
+            "note: at the start the centre of mass of '%.60s' is %.2g m beside what it stands on, which is towards "
+            "(%.1f %.1f): it falls over unless it steps at once. Lean the posture over its support, or put more of it "
+            "on the ground\n",
+            *name ? name : "body", off, round(10 * way[0]) / 10 + 0.0, round(10 * way[1]) / 10 + 0.0);
+    n++;
+  }
+  cav_state_free(state);
+  return n;
 }
 
 static int tell_fall(FILE *out, const cav_problem *p) {
@@ -115,7 +178,7 @@ static int tell_fall(FILE *out, const cav_problem *p) {
 int cav_command_tell_postures(FILE *out, const cav_problem *p) {
   int n = 0;
   if (p->cycle.on) return 0;
-  if (!p->free_start) n += tell_fall(out, p);
+  if (!p->free_start) n += tell_fall(out, p) + tell_lean(out, p);
   // a goal that is the start's was examined as that
   const int same = !p->free_start && !memcmp(p->q_goal, p->q_start, sizeof *p->q_goal * (size_t)p->model->nq);
   return same ? n : n + tell_depth(out, p);

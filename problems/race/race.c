@@ -47,7 +47,8 @@ cav_status cav_race_open(cav_race *race, int most, cav_error *error) {
   for (int i = 0; i < n && race->n < most; i++)
     // of those that are solved at once none waits for another
     if (most >= CAV_STRATEGIES || strategy[i].use != CAV_STRATEGY_NEAR)
-      race->entry[race->n++] = (cav_race_entry){.strategy = strategy[i], .from = -1, .answer = -1, .order = -1};
+      race->entry[race->n++] =
+          (cav_race_entry){.strategy = strategy[i], .from = -1, .mends = -1, .cure = -1, .answer = -1, .order = -1};
   return CAV_OK;
 }
 
@@ -508,14 +509,19 @@ static int is_same(const cav_strategy *a, const cav_strategy *b) {
          a->flies == b->flies && a->height == b->height && !strcmp(a->changed, b->changed);
 }
 
-// the strategy that repairs a motion by a cure that was not tried; to be cleared where there is one
-static int find_cure(const cav_race *race, int i, const cav_race_entry *from, cav_strategy *repaired) {
+// the strategy that repairs a motion by a cure that was not tried, nor led to this motion without making it better; to be
+// cleared where there is one
+static int find_cure(const cav_race *race, int i, const cav_race_entry *from, cav_strategy *repaired, int *cure) {
   int found = 1;
+  const cav_verdict *before = from->mends >= 0 ? &race->entry[from->mends].report.verdict : NULL;
+  const int idle = before && !cav_rank_helped(&from->report.verdict, before) ? from->cure : -1;
   for (int k = 0; found; k++) {
+    if (k == idle) continue;
     if (cav_strategy_repair(race->problem, &from->strategy, &from->report.verdict, k, repaired, &found) || !found)
       return 0;
     int known = 0;
     for (int j = 0; j < i; j++) known |= is_same(repaired, &race->entry[j].strategy);
+    *cure = k;
     if (!known) break;
     cav_strategy_clear(repaired);
   }
@@ -523,13 +529,13 @@ static int find_cure(const cav_race *race, int i, const cav_race_entry *from, ca
   return 1;
 }
 
-// the repair that entry i is for: of the best motion that has a cure left. *of: its entry
-static int find_repair(const cav_race *race, int i, cav_strategy *repaired, int *of) {
+// the repair that entry i is for: of the best motion that has a cure left. *of, *cure: its entry, and which one
+static int find_repair(const cav_race *race, int i, cav_strategy *repaired, int *of, int *cure) {
   char passed[CAV_STRATEGIES] = {0};
   while (1) {
     *of = race->entry[i].strategy.use == CAV_STRATEGY_NEAR ? find_near(race, i, passed) : find_broken(race, i, passed);
     if (*of < 0) return 0;
-    if (find_cure(race, i, &race->entry[*of], repaired)) return 1;
+    if (find_cure(race, i, &race->entry[*of], repaired, cure)) return 1;
     passed[*of] = 1;
   }
 }
@@ -558,9 +564,9 @@ static int may_start(const cav_race *race, int i) {
   if (race->entry[i].strategy.open && !misses_rest(race)) return 0;
   if (use == CAV_STRATEGY_NEAR && cav_rank_spent(race, i)) return 0;
   cav_strategy repaired;
-  int of;
+  int of, cure;
   const int mends = use == CAV_STRATEGY_REPAIR || use == CAV_STRATEGY_NEAR;
-  int repairs = mends && !success && find_repair(race, i, &repaired, &of);
+  int repairs = mends && !success && find_repair(race, i, &repaired, &of, &cure);
   if (repairs) cav_strategy_clear(&repaired);
   return use == CAV_STRATEGY_MOMENTUM ? momentum : mends ? repairs : !success;
 }
@@ -569,13 +575,14 @@ static int may_start(const cav_race *race, int i) {
 static void settle(cav_race *race, int i) {
   cav_race_entry *e = &race->entry[i];
   cav_strategy repaired;
-  int of;
+  int of, cure;
   const int mends = e->strategy.use == CAV_STRATEGY_REPAIR || e->strategy.use == CAV_STRATEGY_NEAR;
   const int near = e->strategy.use == CAV_STRATEGY_NEAR;
-  if (!mends || *e->strategy.changed || !find_repair(race, i, &repaired, &of)) return;
+  if (!mends || *e->strategy.changed || !find_repair(race, i, &repaired, &of, &cure)) return;
   // what a repair led to is not sought anew by the next one
   const int goes_on = near || *race->entry[of].strategy.changed;
   if (goes_on) e->from = of;
+  e->mends = of, e->cure = cure;
   e->strategy = repaired;
   // what is all but certified is not sought anew
   e->goes_on = goes_on && cav_rank_rough(&race->entry[of].report.verdict);

@@ -34,6 +34,7 @@ typedef struct cav_race_entry {
   cav_solution *solution; ///< if solved in this process
   int from;               ///< what is nearly there: entry whose motion it begins with; -1: with its guess
   int goes_on;            ///< 1: with the first strategy's motion, by some stages
+  int mends, cure;        ///< of a repair: the entry whose motion it mends, and by which of its cures; -1: none
   pid_t child;
   int answer, order; ///< pipes: from the child, to the child
 } cav_race_entry;

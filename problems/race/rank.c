@@ -7,6 +7,9 @@
 // another order keeps
 static const double few = 4, several = 8;
 
+// part of what was missed that a cure leaves where it helped
+static const double helped = 0.95;
+
 // fraction of the cost by which a motion has to be cheaper to come before one that was found earlier; before that of the problem
 // as it is stated, where it is one of a changed problem
 static const double cheaper = 1e-4, worth = 1e-2;
@@ -82,6 +85,24 @@ static double excess_of(const cav_verdict *v) {
   if (v->replay_step_max_error > CAV_TOLERANCE_STEP) most = fmax(most, folded);
   double followed = fmin(v->closed_loop_seconds, v->model_contacts_seconds);
   return fmax(most, v->duration / fmax(followed, v->duration / 100));
+}
+
+// what a rough motion misses most of: 0 the balance of momentum, 1 slip, 2 hover; -1: none of these
+static int missed_most(const cav_verdict *v, double *excess) {
+  const double over[] = {v->momentum_defect_rms / CAV_TOLERANCE_MOMENTUM, v->slip_mean_m_s / CAV_TOLERANCE_SLIP,
+                         v->hover_fraction / CAV_TOLERANCE_HOVER};
+  int most = -1;
+  *excess = 1;
+  for (int k = 0; k < 3; k++)
+    if (over[k] > *excess) *excess = over[k], most = k;
+  return most;
+}
+
+int cav_rank_helped(const cav_verdict *repaired, const cav_verdict *before) {
+  double now, then;
+  if (!cav_rank_rough(repaired) || !cav_rank_rough(before)) return 1;
+  const int most = missed_most(repaired, &now);
+  return most < 0 || most != missed_most(before, &then) || now < helped * then;
 }
 
 int cav_rank_nearer(const cav_race_report *a, const cav_race_report *b) {

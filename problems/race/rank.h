@@ -25,6 +25,10 @@ int cav_rank_near(const cav_race_report *report, double effort);
 /// ratio of a figure to its tolerance is smaller; of others the better one to keep.
 int cav_rank_nearer(const cav_race_report *a, const cav_race_report *b);
 
+/// Whether a repair made less of what the motion before it missed most, of those that are rough: by a twentieth. Of others, and
+/// where something else is missed most now, nothing is known: 1.
+int cav_rank_helped(const cav_verdict *repaired, const cav_verdict *before);
+
 /// Whether what was mended before entry i took longer than what was solved from guesses, so that the next guess comes first: by
 /// iterations times knots, which are the same on every machine.
 int cav_rank_spent(const cav_race *race, int i);
