@@ -143,6 +143,59 @@ static void test_gait(const char *text, double axis, double travel) {
   cav_model_free(m);
 }
 
+// a sine over a joint of the quadruped
+static const cav_swing *swing_of(const cav_model *m, const cav_strategy *gait, const char *joint) {
+  int j = cav_object_find(m, CAV_OBJECT_JOINT, joint);
+  for (int i = 0; i < gait->nswing; i++)
+    if (gait->swing[i].joint == j) return &gait->swing[i];
+  return NULL;
+}
+
+// four legs trot, those across together; for a turn on the spot they bend and do not swing, wherever they stand
+static void test_four_legs(void) {
+  cav_error error;
+  cav_model *m = cav_model_load(CAVORT_SOURCE_ROOT "/problems/models/quadruped.xml", &error);
+  if (!CHECK(m != NULL)) return;
+  cav_state *state = cav_state_new(m);
+  double q[40], goal[40], v[40] = {0};
+  cav_configuration_reset(m, q);
+  for (int j = 0; j < m->njoint; j++) {
+    if (strstr(m->joint[j].name, "knee")) q[m->joint[j].q] = -1.2;
+    if (strstr(m->joint[j].name, "hip")) q[m->joint[j].q] = 0.6;
+  }
+  q[0] = 3, q[1] = -5;
+  CHECK(state && !cav_configuration_to_floor(m, state, NULL, q, NULL));
+  for (int turns = 0; turns < 2; turns++) {
+    memcpy(goal, q, sizeof goal);
+    if (turns) goal[3] = cos(M_PI / 4), goal[6] = sin(M_PI / 4);
+    goal[0] += turns ? 0 : 1;
+    cav_problem p = cav_problem_default(m);
+    p.q_start = q, p.v_start = v, p.q_goal = goal;
+    cav_strategy strategy[CAV_STRATEGIES];
+    int n;
+    CHECK(cav_strategy_list(&p, strategy, &n) == CAV_OK);
+    // feet that turn where they stand are nobody's: the straight way comes later
+    const cav_strategy *gait = find(strategy, n, turns ? "stated" : "swing");
+    if (!CHECK(gait && gait->nswing == (turns ? 4 : 8) && gait->ground)) continue;
+    CHECK(gait->stated == 0 && !find(strategy, n, "line") == !turns);
+    const char *const joint = turns ? "knee_%s_%s" : "hip_%s_%s", *const end[2] = {"front", "back"},
+                      *const side[2] = {"left", "right"};
+    double phase[2][2] = {{0}};
+    for (int a = 0; a < 4; a++) {
+      char name[40];
+      snprintf(name, sizeof name, joint, end[a / 2], side[a % 2]);
+      const cav_swing *s = swing_of(m, gait, name);
+      if (CHECK(s != NULL)) phase[a / 2][a % 2] = s->phase;
+      CHECK(!turns || (s && s->amplitude < 0));
+    }
+    CHECK_NEAR(cos(phase[0][0] - phase[1][1]), 1, 1e-12);
+    CHECK_NEAR(cos(phase[0][1] - phase[1][0]), 1, 1e-12);
+    CHECK_NEAR(cos(phase[0][0] - phase[0][1]), -1, 1e-12);
+  }
+  cav_state_free(state);
+  cav_model_free(m);
+}
+
 // under the order of momentum one strategy goes by the midpoint order, and ends under the order that was asked for
 static void check_order(cav_problem *p) {
   cav_strategy strategy[CAV_STRATEGIES];
@@ -613,6 +666,7 @@ int main(void) {
   test_gait(BIPED("1"), 1, 2);
   test_gait(BIPED("1"), 1, -2);
   test_gait(BIPED("-1"), -1, 2);
+  test_four_legs();
   test_stalls();
   test_repair();
   test_leap();

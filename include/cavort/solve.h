@@ -324,7 +324,7 @@ CAV_API const double *cav_optimiser_multipliers(cav_optimiser *optimiser, int *n
 
 enum {
   CAV_STRATEGIES = 40,       ///< most strategies of a problem
-  CAV_STRATEGY_SWINGS = 4,   ///< most sines of one
+  CAV_STRATEGY_SWINGS = 16,  ///< most sines of one: two joints of eight limbs
   CAV_STRATEGY_CHANGES = 160 ///< room for what a repair changed, in words
 };
 

@@ -21,6 +21,10 @@
 /// travel.
 static const double touching = 0.02, least_travel = 0.3, across = 0.7;
 
+/// Turn on the spot from which there is a gait, rad, and how much of its rotation is about the vertical, the cosine of half of
+/// the rest; distance of limbs that stand one behind the other, m.
+static const double least_turn = 0.7, upright = 0.9, apart = 0.1;
+
 /// The gait: how far the first and the second hinge go, rad, and its frequency where the hip is a metre up, Hz.
 static const double swing_angle = 0.25, bend_angle = 0.4, pace = 1.2;
 
@@ -42,10 +46,11 @@ enum { RESUMED_STAGES = 10 };
 /// What the gait is made of.
 typedef struct walker {
   const cav_problem *problem;
-  cav_state *state; ///< at the goal
-  cav_image *image; ///< [njoint]
-  char *carries;    ///< [nlink] the link or one that it carries touches the world
-  int side;         ///< axis that the mirror reflects: 0 x, 1 y
+  const double *posture; ///< of the goal; of a turn that of the start
+  cav_state *state;      ///< there
+  cav_image *image;      ///< [njoint]
+  char *carries;         ///< [nlink] the link or one that it carries touches the world
+  int side;              ///< axis that the mirror reflects: 0 x, 1 y
 } walker;
 
 /// How far the first body that can goes from start to goal along the horizontal axes, m.
@@ -66,12 +71,12 @@ static void find_travel(const cav_problem *p, double travel[2]) {
   }
 }
 
-/// Marks the links that carry the body in the goal posture.
+/// Marks the links that carry the body in the posture.
 static cav_status find_support(walker *w) {
   const cav_model *m = w->problem->model;
   w->state->options = m->options;
   w->state->options.smoothing = w->state->options.smoothing_self = touching;
-  cav_status status = cav_position(m, w->state, w->problem->q_goal);
+  cav_status status = cav_position(m, w->state, w->posture);
   for (int i = 0; i < w->state->ncontact && status == CAV_OK; i++) {
     const cav_contact *c = &w->state->contact[i];
     if ((c->link1 > 0 && c->link2 > 0) || c->dist > touching) continue;
@@ -80,7 +85,7 @@ static cav_status find_support(walker *w) {
   return status;
 }
 
-/// Fraction of a hinge's axis across the travel, in the goal posture; 0 for other joints and those that stand for
+/// Fraction of a hinge's axis across the travel, in the posture; 0 for other joints and those that stand for
 /// themselves.
 static double crosses(const walker *w, int j) {
   const cav_joint *joint = &w->problem->model->joint[j];
@@ -94,10 +99,24 @@ static int next_hinge(const walker *w, int after) {
   for (int j = after + 1; j < m->njoint; j++) {
     if (fabs(crosses(w, j)) < across) continue;
     int link = m->joint[j].link;
-    while (link > 0 && after >= 0 && link != m->joint[after].link) link = m->link[link].parent;
-    if (link > 0 || after < 0) return j;
+    while (link > 0 && link != m->joint[after].link) link = m->link[link].parent;
+    if (link > 0) return j;
   }
   return -1;
+}
+
+/// Whether a hinge across the travel is the first one on the way from the root to where a limb touches the world, and that of
+/// the two limbs which are images of each other that comes first.
+static int is_hip(const walker *w, int j) {
+  const cav_model *m = w->problem->model;
+  if (fabs(crosses(w, j)) < across || w->image[j].joint < j) return 0;
+  for (int k = 0; k < j; k++) {
+    if (fabs(crosses(w, k)) < across) continue;
+    int link = m->joint[j].link;
+    while (link > 0 && link != m->joint[k].link) link = m->link[link].parent;
+    if (link > 0) return 0;
+  }
+  return 1;
 }
 
 /// A swing of a joint and the opposite one of its image, half a period later.
@@ -108,21 +127,52 @@ static void lay(const walker *w, int j, double amplitude, double frequency, doub
       (cav_swing){w->image[j].joint, w->image[j].sign * amplitude, frequency, phase + M_PI};
 }
 
-/// The swings of the hinges found; none where the model has none.
+static const double *place_of(const walker *w, int j) { return w->state->link[w->problem->model->joint[j].link].pos; }
+
+/// Where a joint is from its image across the travel, m.
+static double aside(const walker *w, int j) {
+  return place_of(w, j)[w->side] - place_of(w, w->image[j].joint)[w->side];
+}
+
+/// The swings of the hinges found; none where the model has none. Limbs that are images of each other swing in turn, and of a
+/// pair behind another one those that are across: a trot. A travel of 0 is a turn on the spot: limbs bend in turn.
 static void find_gait(const walker *w, double travel, cav_strategy *strategy) {
   const cav_model *m = w->problem->model;
-  int hip = next_hinge(w, -1), knee = hip < 0 ? -1 : next_hinge(w, hip);
-  if (hip < 0) return;
-  double up = w->state->link[m->joint[hip].link].pos[2], frequency = pace / sqrt(fmax(up, 0.05));
-  // a limb hangs down: turning about +y takes it to -x, about +x to +y
-  double forwards = (w->side == 1 ? -1 : 1) * copysign(1, travel) * copysign(1, crosses(w, hip));
-  lay(w, hip, forwards * swing_angle, frequency, 0, strategy);
-  if (knee < 0) return;
-  const cav_joint *joint = &m->joint[knee];
-  double at = w->problem->q_goal[joint->q];
-  int up_first = joint->limited && joint->range[1] - at > at - joint->range[0];
-  double bends = joint->limited ? (up_first ? 1 : -1) : -forwards;
-  lay(w, knee, bends * bend_angle, frequency, M_PI / 2, strategy);
+  int first = -1, pair = 0;
+  for (int hip = 0; hip < m->njoint && strategy->nswing + 4 <= CAV_STRATEGY_SWINGS; hip++) {
+    if (!is_hip(w, hip)) continue;
+    if (first < 0) first = hip;
+    const int along = !w->side, beside = aside(w, hip) * aside(w, first) > 0;
+    // pairs one behind the other alternate
+    if (hip != first && fabs(place_of(w, hip)[along] - place_of(w, first)[along]) > apart) pair++;
+    const double turn = (pair % 2 != 0) == beside && hip != first ? M_PI : 0;
+    const double frequency = pace / sqrt(fmax(place_of(w, hip)[2], 0.05));
+    // a limb hangs down: turning about +y takes it to -x, about +x to +y
+    const double forwards = (w->side == 1 ? -1 : 1) * copysign(1, travel) * copysign(1, crosses(w, hip));
+    if (travel != 0) lay(w, hip, forwards * swing_angle, frequency, turn, strategy);
+    const int knee = next_hinge(w, hip);
+    if (knee < 0) continue;
+    const cav_joint *joint = &m->joint[knee];
+    const double at = w->posture[joint->q];
+    const int up_first = joint->limited && joint->range[1] - at > at - joint->range[0];
+    const double bends = joint->limited ? (up_first ? 1 : -1) : -forwards;
+    lay(w, knee, bends * bend_angle, frequency, turn + M_PI / 2, strategy);
+  }
+}
+
+/// How far the first free body turns about the vertical from start to goal, rad.
+static double find_turn(const cav_problem *p) {
+  const cav_model *m = p->model;
+  for (int j = 0; j < m->njoint && !p->cycle.on; j++) {
+    if (m->joint[j].type != CAV_JOINT_FREE) continue;
+    const double *a = p->q_start + m->joint[j].q + 3, *b = p->q_goal + m->joint[j].q + 3;
+    // of b times the conjugate of a
+    const double w = b[0] * a[0] + b[1] * a[1] + b[2] * a[2] + b[3] * a[3];
+    const double z = -b[0] * a[3] - b[1] * a[2] + b[2] * a[1] + b[3] * a[0];
+    // what mostly rolls or tips does not turn
+    return hypot(w, z) < upright ? 0 : fabs(remainder(2 * atan2(z, w), 2 * M_PI));
+  }
+  return 0;
 }
 
 /// The strategy by a gait: nswing is 0 where none is found. CAV_NO_MEMORY, or what the dynamics says of the goal.
@@ -131,8 +181,13 @@ static cav_status gait(const cav_problem *problem, cav_strategy *strategy) {
   double travel[2];
   find_travel(problem, travel);
   int along = fabs(travel[1]) > fabs(travel[0]);
-  if (fabs(travel[along]) < least_travel) return CAV_OK;
-  walker w = {.problem = problem, .state = cav_state_new(m), .side = !along};
+  const int turns = fabs(travel[along]) < least_travel;
+  if (turns && find_turn(problem) < least_turn) return CAV_OK;
+  if (turns) along = 0, travel[0] = 0;
+  walker w = {.problem = problem,
+              .posture = turns ? problem->q_start : problem->q_goal,
+              .state = cav_state_new(m),
+              .side = !along};
   w.image = calloc((size_t)m->njoint + 1, sizeof *w.image);
   w.carries = calloc((size_t)m->nlink + 1, 1);
   int *link = calloc((size_t)m->nlink + 1, sizeof *link);
@@ -260,7 +315,7 @@ static cav_status hold_over_ground(const cav_problem *problem, cav_strategy *beg
 typedef struct guesses {
   cav_strategy stated, plain, walk, fly; ///< straight from start to goal; with limbs swinging; by a flight
   int collides, decorated, sinks;        ///< what the stated guess does, and is
-  int over;                              ///< 1: start or goal stands on a solid of the world
+  int pivots;                            ///< 1: it turns four feet or more on the spot, where they stand
 } guesses;
 
 /// The stated guess in other postures, and under another order first.
@@ -294,8 +349,13 @@ static cav_status find_walk(const cav_problem *problem, guesses *g) {
   cav_status status = problem->nswing ? CAV_OK : gait(problem, &g->walk);
   if (status != CAV_OK || g->collides || !g->walk.nswing) return status;
   g->walk.ground = 1;
-  status = cav_stands_on_solid(problem, &g->over);
-  if (g->over) g->walk.schedule.solids = CAV_SOLIDS_GROW;
+  int over = 0;
+  status = cav_stands_on_solid(problem, &over);
+  if (over) g->walk.schedule.solids = CAV_SOLIDS_GROW;
+  double travel[2];
+  find_travel(problem, travel);
+  const int stays = fmax(fabs(travel[0]), fabs(travel[1])) < least_travel;
+  g->pivots = stays && g->walk.nswing > 2 && !g->decorated && problem->guess == CAV_GUESS_INTERPOLATE;
   return status;
 }
 
@@ -328,16 +388,19 @@ static void add_plain(const cav_problem *problem, cav_strategy *strategy, int *n
 }
 
 /// From other guesses and by other schedules.
-static cav_status add_others(const cav_problem *problem, cav_strategy *strategy, int *n, const guesses *g) {
+static cav_status add_others(const cav_problem *problem, cav_strategy *strategy, int *n, guesses *g) {
   if (g->collides) add_grown(problem, strategy, n, &g->stated, &g->walk, &g->fly);
   if (!g->collides && g->fly.height > 0 && problem->guess_height > 0) add_mended(strategy, n, &g->fly, "flight");
-  const int walks = g->walk.nswing && !g->collides;
-  if (walks && g->over) add_mended(strategy, n, &g->walk, "swing");
+  if (g->walk.nswing && !g->collides && !g->pivots) add_mended(strategy, n, &g->walk, "swing");
+  if (g->pivots) {
+    g->walk.name = strategy[0].name;
+    strategy[0] = g->walk;
+    add_mended(strategy, n, &g->plain, "line");
+  }
   cav_strategy soft = g->stated;
   soft.schedule.first.smoothing *= SOFTER;
   soft.schedule.first.penalty /= CHEAPER;
   add(strategy, n, &soft, "soft", "contacts active from twice as far, unactuated force ten times cheaper at first");
-  if (walks && !g->over) add_mended(strategy, n, &g->walk, "swing");
   cav_strategy leap = g->plain;
   leap.text = "straight from start to goal with an arc as high as is asked for";
   cav_status status = problem->guess_height != 0 ? CAV_OK : cav_leap_find(problem, &leap.height, &leap.from, &leap.to);
