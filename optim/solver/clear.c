@@ -14,7 +14,8 @@
 static const double touching = 1e-3, step = 0.01;
 enum { STEPS = 500 };
 
-/// How far below it a guess is looked for what it stands on, m, and the vertical part of a normal from which that bears.
+/// Smoothing whose contacts reach what is below a guess, about ten times as far, m; the vertical part of a normal from which
+/// that bears, and steps of the search.
 static const double reach = 0.3, level = 0.5;
 enum { GROUNDINGS = 5 };
 
