@@ -1,0 +1,44 @@
+#!/bin/sh
+# Solves the problems of tests/unseen, each stated in minutes and not tuned, as anyone would, and writes results/unseen.md: whether it is
+# certified and achieved, by which strategy, and what all of them took, one thread each.
+# Each is stopped after $SECONDS_EACH s, by default 300.
+# Usage: sh tests/unseen.sh [BUILD [NAME...]]   (folder of a release build, by default build; with names only these, printed and not written)
+set -eu
+cd "$(dirname "$0")/.."
+build=${1:-build}
+[ $# -eq 0 ] || shift
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+all=
+[ $# -gt 0 ] || { all=1; for f in tests/unseen/*.xml; do set -- "$@" "$(basename "$f" .xml)"; done; }
+
+# field NAME: of the last verdict
+field() { sed -n "s/^ *\"$1\": \([^,]*\),*$/\1/p" "$work/$name/verdict.json"; }
+
+row() {
+  name=$1
+  timeout -s INT "${SECONDS_EACH:-300}" "$build/problems/cavort" solve "tests/unseen/$name.xml" -o "$work/$name" --threads 1 --quiet >"$work/log" 2>&1 || true
+  [ -f "$work/$name/verdict.json" ] || { echo "| $name | no result: $(tail -1 "$work/log") |"; return; }
+  kept=$(awk -F , 'NR > 1 && $2 == 1 { print $1 }' "$work/$name/strategies.csv")
+  spent=$(awk -F , 'NR > 1 && $6 != "" { s += $6; n++ } END { printf "%d | %.0f", n, s }' "$work/$name/strategies.csv")
+  echo "$name $(field certified) $(field achieved) $(field cost) $(field optimality) $(field duration) $kept" | awk -v spent="$spent" '
+    { printf "| %s | %g | %s | %s | %.4g | %.0e | %s | %s |\n", $1, $6, $2 == "true" ? "yes" : "no", $3 == "true" ? "yes" : "no", $4, $5, $7, spent }'
+}
+
+table() {
+  echo "| problem | s | certified | achieved | cost | optimal to | kept | strategies | s, all of them |"
+  echo "|---|---|---|---|---|---|---|---|---|"
+  for one in "$@"; do row "$one"; done
+}
+
+if [ "$all" ]; then
+  {
+    printf '# Problems that were not tuned\n\n`sh tests/unseen.sh`: the files of tests/unseen, each stated in minutes, start and goal and what is asked; solved by all strategies, one thread, stopped after 300 s.\n\n'
+    printf -- '- machine: %s\n- commit: %s\n\n' "$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -1)" "$(git rev-parse --short HEAD)"
+    table "$@"
+  } >"$work/unseen.md"
+  mv "$work/unseen.md" tests/results/unseen.md
+  cat tests/results/unseen.md
+else
+  table "$@"
+fi
