@@ -151,7 +151,7 @@ static const cav_swing *swing_of(const cav_model *m, const cav_strategy *gait, c
   return NULL;
 }
 
-// four legs trot, those across together; for a turn on the spot they bend and do not swing, wherever they stand
+// four legs trot, those across together; for a turn on the spot they bend and do not swing, wherever they stand and face
 static void test_four_legs(void) {
   cav_error error;
   cav_model *m = cav_model_load(CAVORT_SOURCE_ROOT "/problems/models/quadruped.xml", &error);
@@ -165,10 +165,14 @@ static void test_four_legs(void) {
   }
   q[0] = 3, q[1] = -5;
   CHECK(state && !cav_configuration_to_floor(m, state, NULL, q, NULL));
-  for (int turns = 0; turns < 2; turns++) {
+  // facing 0, 100 and 200 degrees
+  for (int k = 0; k < 6; k++) {
+    const int turns = k % 2;
+    const double facing = k / 2 * M_PI / 1.8;
+    q[3] = cos(facing / 2), q[6] = sin(facing / 2);
     memcpy(goal, q, sizeof goal);
-    if (turns) goal[3] = cos(M_PI / 4), goal[6] = sin(M_PI / 4);
-    goal[0] += turns ? 0 : 1;
+    if (turns) goal[3] = cos(facing / 2 + M_PI / 4), goal[6] = sin(facing / 2 + M_PI / 4);
+    goal[0] += turns ? 0 : cos(facing), goal[1] += turns ? 0 : sin(facing);
     cav_problem p = cav_problem_default(m);
     p.q_start = q, p.v_start = v, p.q_goal = goal;
     cav_strategy strategy[CAV_STRATEGIES];
@@ -178,6 +182,7 @@ static void test_four_legs(void) {
     const cav_strategy *gait = find(strategy, n, turns ? "stated" : "swing");
     if (!CHECK(gait && gait->nswing == (turns ? 4 : 8) && gait->ground)) continue;
     CHECK(gait->stated == 0 && !find(strategy, n, "line") == !turns);
+    CHECK(gait < find(strategy, n, "soft") && gait->schedule.solids == CAV_SOLIDS_HARD);
     const char *const joint = turns ? "knee_%s_%s" : "hip_%s_%s", *const end[2] = {"front", "back"},
                       *const side[2] = {"left", "right"};
     double phase[2][2] = {{0}};
@@ -188,6 +193,9 @@ static void test_four_legs(void) {
       if (CHECK(s != NULL)) phase[a / 2][a % 2] = s->phase;
       CHECK(!turns || (s && s->amplitude < 0));
     }
+    // the way it faces, not the way the world's axes point
+    const cav_swing *hip = swing_of(m, gait, "hip_front_left");
+    if (!turns && CHECK(hip != NULL)) CHECK(hip->amplitude < 0);
     CHECK_NEAR(cos(phase[0][0] - phase[1][1]), 1, 1e-12);
     CHECK_NEAR(cos(phase[0][1] - phase[1][0]), 1, 1e-12);
     CHECK_NEAR(cos(phase[0][0] - phase[0][1]), -1, 1e-12);

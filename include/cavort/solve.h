@@ -324,7 +324,7 @@ CAV_API const double *cav_optimiser_multipliers(cav_optimiser *optimiser, int *n
 
 enum {
   CAV_STRATEGIES = 40,       ///< most strategies of a problem
-  CAV_STRATEGY_SWINGS = 16,  ///< most sines of one: two joints of eight limbs
+  CAV_STRATEGY_SWINGS = 16,  ///< most sines of one: two joints of eight limbs, further ones stand
   CAV_STRATEGY_CHANGES = 160 ///< room for what a repair changed, in words
 };
 
@@ -408,6 +408,7 @@ CAV_API cav_status cav_strategy_solve(const cav_problem *problem, const cav_stra
 #define CAV_TOLERANCE_REPLAY \
   0.5 ///< s, or the whole motion: the open loop at the same step reproduces the knots at least so long
 #define CAV_TOLERANCE_STEP 1e-8        ///< rad or m
+#define CAV_LOST_DISTANCE 0.5          ///< m from its plan at which a replay has lost the motion
 #define CAV_TOLERANCE_PERIODICITY 1e-9 ///< m, rad, and these per step
 
 /// What the word optimal requires of a verdict's optimality: a fraction of the cost.

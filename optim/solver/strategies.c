@@ -46,11 +46,11 @@ enum { RESUMED_STAGES = 10 };
 /// What the gait is made of.
 typedef struct walker {
   const cav_problem *problem;
-  const double *posture; ///< of the goal; of a turn that of the start
-  cav_state *state;      ///< there
-  cav_image *image;      ///< [njoint]
-  char *carries;         ///< [nlink] the link or one that it carries touches the world
-  int side;              ///< axis that the mirror reflects: 0 x, 1 y
+  double *posture;  ///< [nq] of the goal, of a turn that of the start, turned to the heading of the model's own
+  cav_state *state; ///< there
+  cav_image *image; ///< [njoint]
+  char *carries;    ///< [nlink] the link or one that it carries touches the world
+  int side;         ///< axis that the mirror reflects: 0 x, 1 y
 } walker;
 
 /// How far the first body that can goes from start to goal along the horizontal axes, m.
@@ -93,15 +93,17 @@ static double crosses(const walker *w, int j) {
   return w->state->axis[6 * joint->dof + w->side];
 }
 
+/// Whether a link hangs on a joint's.
+static int hangs_on(const cav_model *m, int link, int joint) {
+  while (link > 0 && link != m->joint[joint].link) link = m->link[link].parent;
+  return link > 0;
+}
+
 /// The next hinge across the travel on the way from a link outwards; -1: none.
 static int next_hinge(const walker *w, int after) {
   const cav_model *m = w->problem->model;
-  for (int j = after + 1; j < m->njoint; j++) {
-    if (fabs(crosses(w, j)) < across) continue;
-    int link = m->joint[j].link;
-    while (link > 0 && link != m->joint[after].link) link = m->link[link].parent;
-    if (link > 0) return j;
-  }
+  for (int j = after + 1; j < m->njoint; j++)
+    if (fabs(crosses(w, j)) >= across && hangs_on(m, m->joint[j].link, after)) return j;
   return -1;
 }
 
@@ -110,12 +112,8 @@ static int next_hinge(const walker *w, int after) {
 static int is_hip(const walker *w, int j) {
   const cav_model *m = w->problem->model;
   if (fabs(crosses(w, j)) < across || w->image[j].joint < j) return 0;
-  for (int k = 0; k < j; k++) {
-    if (fabs(crosses(w, k)) < across) continue;
-    int link = m->joint[j].link;
-    while (link > 0 && link != m->joint[k].link) link = m->link[link].parent;
-    if (link > 0) return 0;
-  }
+  for (int k = 0; k < j; k++)
+    if (fabs(crosses(w, k)) >= across && hangs_on(m, m->joint[j].link, k)) return 0;
   return 1;
 }
 
@@ -160,38 +158,55 @@ static void find_gait(const walker *w, double travel, cav_strategy *strategy) {
   }
 }
 
-/// How far the first free body turns about the vertical from start to goal, rad.
-static double find_turn(const cav_problem *p) {
-  const cav_model *m = p->model;
-  for (int j = 0; j < m->njoint && !p->cycle.on; j++) {
-    if (m->joint[j].type != CAV_JOINT_FREE) continue;
-    const double *a = p->q_start + m->joint[j].q + 3, *b = p->q_goal + m->joint[j].q + 3;
-    // of b times the conjugate of a
-    const double w = b[0] * a[0] + b[1] * a[1] + b[2] * a[2] + b[3] * a[3];
-    const double z = -b[0] * a[3] - b[1] * a[2] + b[2] * a[1] + b[3] * a[0];
-    // what mostly rolls or tips does not turn
-    return hypot(w, z) < upright ? 0 : fabs(remainder(2 * atan2(z, w), 2 * M_PI));
-  }
-  return 0;
+/// Quaternion of the first free joint in a configuration; NULL: none is free.
+static double *heading_of(const cav_model *m, double *q) {
+  for (int j = 0; j < m->njoint; j++)
+    if (m->joint[j].type == CAV_JOINT_FREE) return q + m->joint[j].q + 3;
+  return NULL;
 }
 
-/// The strategy by a gait: nswing is 0 where none is found. CAV_NO_MEMORY, or what the dynamics says of the goal.
-static cav_status gait(const cav_problem *problem, cav_strategy *strategy) {
+/// How far the first free body is turned about the vertical from one configuration to another, rad; 0 where it mostly rolls or
+/// tips, or none is free.
+static double turned(const cav_model *m, const double *from, const double *to) {
+  const double *a = heading_of(m, (double *)from), *b = heading_of(m, (double *)to);
+  if (!a) return 0;
+  // of b times the conjugate of a
+  const double w = b[0] * a[0] + b[1] * a[1] + b[2] * a[2] + b[3] * a[3];
+  const double z = -b[0] * a[3] - b[1] * a[2] + b[2] * a[1] + b[3] * a[0];
+  return hypot(w, z) < upright ? 0 : remainder(2 * atan2(z, w), 2 * M_PI);
+}
+
+/// The posture, turned so that it faces where the model's own configuration does, and the travel with it: whose axes tell what is
+/// across, and what the mirror is about.
+static void face(const walker *w, const double *posture, double travel[2]) {
+  const cav_model *m = w->problem->model;
+  double *own = w->posture, *heading = heading_of(m, own);
+  cav_configuration_reset(m, own);
+  const double angle = -turned(m, own, posture), c = cos(angle), s = sin(angle), x = travel[0];
+  memcpy(own, posture, (size_t)m->nq * sizeof *own);
+  travel[0] = c * x - s * travel[1], travel[1] = s * x + c * travel[1];
+  if (!heading) return;
+  const double half[2] = {cos(angle / 2), sin(angle / 2)}, q[4] = {heading[0], heading[1], heading[2], heading[3]};
+  heading[0] = half[0] * q[0] - half[1] * q[3], heading[1] = half[0] * q[1] - half[1] * q[2];
+  heading[2] = half[0] * q[2] + half[1] * q[1], heading[3] = half[0] * q[3] + half[1] * q[0];
+}
+
+/// The strategy by a gait: nswing is 0 where none is found; *turns: it is one on the spot. CAV_NO_MEMORY, or what the dynamics
+/// says of the posture.
+static cav_status gait(const cav_problem *problem, cav_strategy *strategy, int *turns) {
   const cav_model *m = problem->model;
   double travel[2];
   find_travel(problem, travel);
-  int along = fabs(travel[1]) > fabs(travel[0]);
-  const int turns = fabs(travel[along]) < least_travel;
-  if (turns && find_turn(problem) < least_turn) return CAV_OK;
-  if (turns) along = 0, travel[0] = 0;
-  walker w = {.problem = problem,
-              .posture = turns ? problem->q_start : problem->q_goal,
-              .state = cav_state_new(m),
-              .side = !along};
+  *turns = fmax(fabs(travel[0]), fabs(travel[1])) < least_travel;
+  if (*turns && (problem->cycle.on || fabs(turned(m, problem->q_start, problem->q_goal)) < least_turn)) return CAV_OK;
+  walker w = {.problem = problem, .state = cav_state_new(m), .posture = malloc((size_t)m->nq * sizeof(double))};
   w.image = calloc((size_t)m->njoint + 1, sizeof *w.image);
   w.carries = calloc((size_t)m->nlink + 1, 1);
   int *link = calloc((size_t)m->nlink + 1, sizeof *link);
-  cav_status status = w.state && w.image && w.carries && link ? CAV_OK : CAV_NO_MEMORY;
+  cav_status status = w.state && w.posture && w.image && w.carries && link ? CAV_OK : CAV_NO_MEMORY;
+  if (status == CAV_OK) face(&w, *turns ? problem->q_start : problem->q_goal, travel);
+  const int along = !*turns && fabs(travel[1]) > fabs(travel[0]);
+  w.side = !along;
   // a model that is not its own mirror image has no gait of this kind
   cav_error unlike;
   double asymmetry;
@@ -199,9 +214,9 @@ static cav_status gait(const cav_problem *problem, cav_strategy *strategy) {
       status == CAV_OK ? cav_mirror_find(problem, w.side, w.image, link, &asymmetry, &unlike) : status;
   if (mirrored == CAV_NO_MEMORY) status = mirrored;
   if (mirrored == CAV_OK) status = find_support(&w);
-  if (mirrored == CAV_OK && status == CAV_OK) find_gait(&w, travel[along], strategy);
+  if (mirrored == CAV_OK && status == CAV_OK) find_gait(&w, *turns ? 0 : travel[along], strategy);
   cav_state_free(w.state);
-  free(w.image), free(w.carries), free(link);
+  free(w.posture), free(w.image), free(w.carries), free(link);
   return status;
 }
 
@@ -275,6 +290,13 @@ static void add_mended(cav_strategy *strategy, int *n, const cav_strategy *from,
   add_near(strategy, n, from, MEND);
 }
 
+/// Puts a strategy in the place of the stated one: a file without a guess is begun so.
+static void begin_with(cav_strategy *strategy, const cav_strategy *first) {
+  const char *name = strategy[0].name;
+  strategy[0] = *first;
+  strategy[0].name = name;
+}
+
 /// Where the guess runs into solids: by a flight where an arc is stated; over them, then as it is, then by a flight of its
 /// own; what they miss is mended before anything else is tried. A file without a guess is begun over them: the straight
 /// way through a solid is nobody's.
@@ -283,8 +305,7 @@ static void add_grown(const cav_problem *problem, cav_strategy *strategy, int *n
   cav_strategy step = over_solids(walk);
   if (fly->height > 0 && problem->guess_height > 0) add_mended(strategy, n, fly, "flight");
   if (step.nswing && !is_decorated(problem) && problem->guess == CAV_GUESS_INTERPOLATE) {
-    step.name = strategy[0].name;
-    strategy[0] = step;
+    begin_with(strategy, &step);
   } else if (step.nswing) {
     add_mended(strategy, n, &step, "step");
   }
@@ -346,16 +367,14 @@ static cav_status add_pumped(const cav_problem *problem, cav_strategy *strategy,
 /// they are to stand on.
 static cav_status find_walk(const cav_problem *problem, guesses *g) {
   g->walk.text = "from start to goal with the limbs that carry swinging in turn";
-  cav_status status = problem->nswing ? CAV_OK : gait(problem, &g->walk);
+  int turns = 0;
+  cav_status status = problem->nswing ? CAV_OK : gait(problem, &g->walk, &turns);
   if (status != CAV_OK || g->collides || !g->walk.nswing) return status;
   g->walk.ground = 1;
   int over = 0;
   status = cav_stands_on_solid(problem, &over);
   if (over) g->walk.schedule.solids = CAV_SOLIDS_GROW;
-  double travel[2];
-  find_travel(problem, travel);
-  const int stays = fmax(fabs(travel[0]), fabs(travel[1])) < least_travel;
-  g->pivots = stays && g->walk.nswing > 2 && !g->decorated && problem->guess == CAV_GUESS_INTERPOLATE;
+  g->pivots = turns && g->walk.nswing > 2 && !g->decorated && !g->sinks && problem->guess == CAV_GUESS_INTERPOLATE;
   return status;
 }
 
@@ -380,7 +399,8 @@ static cav_status find_guesses(const cav_problem *problem, const cav_strategy *s
 static void add_plain(const cav_problem *problem, cav_strategy *strategy, int *n, const guesses *g) {
   // where the goal is the start, the way straight to it is the start held
   const int stays = !problem->cycle.on && is_back(problem), holds = problem->guess == CAV_GUESS_HOLD;
-  if ((g->decorated || holds || g->sinks) && !stays) add(strategy, n, &g->plain, "line", "straight from start to goal");
+  if ((g->decorated || holds || g->sinks || g->pivots) && !stays)
+    add(strategy, n, &g->plain, "line", "straight from start to goal");
   cav_strategy still = g->plain;
   still.guess = CAV_GUESS_HOLD;
   const int held = !g->decorated && (holds || (stays && problem->guess == CAV_GUESS_INTERPOLATE));
@@ -388,15 +408,11 @@ static void add_plain(const cav_problem *problem, cav_strategy *strategy, int *n
 }
 
 /// From other guesses and by other schedules.
-static cav_status add_others(const cav_problem *problem, cav_strategy *strategy, int *n, guesses *g) {
+static cav_status add_others(const cav_problem *problem, cav_strategy *strategy, int *n, const guesses *g) {
   if (g->collides) add_grown(problem, strategy, n, &g->stated, &g->walk, &g->fly);
   if (!g->collides && g->fly.height > 0 && problem->guess_height > 0) add_mended(strategy, n, &g->fly, "flight");
+  if (g->pivots) begin_with(strategy, &g->walk);
   if (g->walk.nswing && !g->collides && !g->pivots) add_mended(strategy, n, &g->walk, "swing");
-  if (g->pivots) {
-    g->walk.name = strategy[0].name;
-    strategy[0] = g->walk;
-    add_mended(strategy, n, &g->plain, "line");
-  }
   cav_strategy soft = g->stated;
   soft.schedule.first.smoothing *= SOFTER;
   soft.schedule.first.penalty /= CHEAPER;

@@ -18,7 +18,7 @@
 enum { SUBSTEPS = 10, ITERATIONS = 1000, HALVINGS = 4 };
 
 static const double same = 1e-6;             // rad or m: a replay that is the knots
-static const double far = 0.5, turned = 1;   // m, rad: a replay that has lost the motion
+static const double turned = 1;              // rad: a replay that has lost the motion, or at CAV_LOST_DISTANCE
 static const double exact_tolerance = 1e-12; // relative residual asked of forward steps
 static const double poor = 1e-6;             // fraction of weight that a forward step may leave unexplained
 // s: steps that simulators take. A motion on the edge follows at one and falls at another
@@ -250,12 +250,12 @@ static cav_status compare(const cav_verification *verification, const double *q0
 static int following(const cav_verification *verification, const gap *now, double time, struct cav_follow *follow) {
   char name[32];
   follow->error = now->distance;
-  int near = now->distance <= far && now->rotation <= turned;
+  int near = now->distance <= CAV_LOST_DISTANCE && now->rotation <= turned;
   if (near) {
     follow->seconds = time;
     return 1;
   }
-  int by_rotation = now->distance <= far;
+  int by_rotation = now->distance <= CAV_LOST_DISTANCE;
   snprintf(follow->lost, sizeof follow->lost, "%.60s is %.2g %s away at %.3f s",
            cav_verification_link_name(verification->model, by_rotation ? now->root : now->link, name),
            by_rotation ? now->rotation : now->distance, by_rotation ? "rad" : "m", time);

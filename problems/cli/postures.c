@@ -87,9 +87,8 @@ static int bears(const cav_model *m, const cav_contact *c, int root) {
 }
 
 static int touches(const cav_model *m, const cav_state *state, int root) {
-  for (int i = 0; i < state->ncontact; i++) {
+  for (int i = 0; i < state->ncontact; i++)
     if (bears(m, &state->contact[i], root)) return 1;
-  }
   return 0;
 }
 
@@ -123,13 +122,19 @@ static double beside_support(const cav_model *m, const cav_state *state, int roo
   return most;
 }
 
+/// Whether the start is at rest under gravity alone, in no medium and held by no equality constraint: what nothing holds falls.
+static int rests(const cav_problem *p) {
+  const cav_model *m = p->model;
+  for (int d = 0; d < m->nv; d++)
+    if (p->v_start[d] != 0) return 0;
+  return m->gravity[2] < 0 && !m->nequality && !(m->density > 0) && !(m->viscosity > 0);
+}
+
 /// Of a start at rest on its feet whose centre of mass is not over them.
 static int tell_lean(FILE *out, const cav_problem *p) {
   const cav_model *m = p->model;
   int n = 0;
-  for (int d = 0; d < m->nv; d++)
-    if (p->v_start[d] != 0) return 0;
-  if (!(m->gravity[2] < 0) || m->gravity[0] != 0 || m->gravity[1] != 0 || m->nequality || m->density > 0) return 0;
+  if (!rests(p) || m->gravity[0] != 0 || m->gravity[1] != 0) return 0;
   cav_state *state = posture_of(p, p->q_start, clear);
   for (int i = 1; state && i < m->nlink; i++) {
     double way[2];
@@ -150,9 +155,7 @@ static int tell_lean(FILE *out, const cav_problem *p) {
 static int tell_fall(FILE *out, const cav_problem *p) {
   const cav_model *m = p->model;
   int n = 0;
-  for (int d = 0; d < m->nv; d++)
-    if (p->v_start[d] != 0) return 0;
-  if (!(m->gravity[2] < 0) || m->nequality || m->density > 0 || m->viscosity > 0) return 0;
+  if (!rests(p)) return 0;
   double *q = calloc((size_t)m->nq + 1, sizeof *q);
   cav_state *state = q ? posture_of(p, p->q_start, clear) : NULL, *low = state ? cav_state_new(m) : NULL;
   if (low) memcpy(q, p->q_start, (size_t)m->nq * sizeof *q);

@@ -76,33 +76,31 @@ int cav_rank_near(const cav_race_report *report, double effort) {
 // what a forward step that has another solution than the planned one counts, however far that is
 static const double folded = 2;
 
+// the largest ratio of a figure to its tolerance; *which: 0 of the balance of momentum, 1 slip, 2 hover
+static double over_tolerance(const cav_verdict *v, int *which) {
+  const double over[] = {v->momentum_defect_rms / CAV_TOLERANCE_MOMENTUM, v->slip_mean_m_s / CAV_TOLERANCE_SLIP,
+                         v->hover_fraction / CAV_TOLERANCE_HOVER};
+  *which = 0;
+  for (int k = 1; k < 3; k++)
+    if (over[k] > over[*which]) *which = k;
+  return over[*which];
+}
+
 // times of its tolerance that a possible motion has of what it keeps least of a certificate; of a closed loop that is lost,
 // the duration over the time until then
 static double excess_of(const cav_verdict *v) {
-  double most = v->momentum_defect_rms / CAV_TOLERANCE_MOMENTUM;
-  most = fmax(most, v->slip_mean_m_s / CAV_TOLERANCE_SLIP);
-  most = fmax(most, v->hover_fraction / CAV_TOLERANCE_HOVER);
+  int which;
+  double most = over_tolerance(v, &which);
   if (v->replay_step_max_error > CAV_TOLERANCE_STEP) most = fmax(most, folded);
   double followed = fmin(v->closed_loop_seconds, v->model_contacts_seconds);
   return fmax(most, v->duration / fmax(followed, v->duration / 100));
 }
 
-// what a rough motion misses most of: 0 the balance of momentum, 1 slip, 2 hover; -1: none of these
-static int missed_most(const cav_verdict *v, double *excess) {
-  const double over[] = {v->momentum_defect_rms / CAV_TOLERANCE_MOMENTUM, v->slip_mean_m_s / CAV_TOLERANCE_SLIP,
-                         v->hover_fraction / CAV_TOLERANCE_HOVER};
-  int most = -1;
-  *excess = 1;
-  for (int k = 0; k < 3; k++)
-    if (over[k] > *excess) *excess = over[k], most = k;
-  return most;
-}
-
 int cav_rank_helped(const cav_verdict *repaired, const cav_verdict *before) {
-  double now, then;
+  int most, other;
   if (!cav_rank_rough(repaired) || !cav_rank_rough(before)) return 1;
-  const int most = missed_most(repaired, &now);
-  return most < 0 || most != missed_most(before, &then) || now < helped * then;
+  const double now = over_tolerance(repaired, &most), then = over_tolerance(before, &other);
+  return now <= 1 || most != other || now < helped * then;
 }
 
 int cav_rank_nearer(const cav_race_report *a, const cav_race_report *b) {

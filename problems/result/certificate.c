@@ -132,7 +132,7 @@ static void print_targets(FILE *out, const cav_problem *problem, const cav_term_
 }
 
 // end errors of a closed loop, m, and effort that it asks for over what there is, from which a certificate is told to be narrow
-static const double at_the_edge = 0.25, overasked = 6;
+static const double at_the_edge = CAV_LOST_DISTANCE / 2, overasked = 6;
 
 void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verdict *v, const cav_term_report *report) {
   static const char *const mark[] = {"NOT", "ok"};
@@ -181,10 +181,10 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
   if (v->certified && (astray > at_the_edge || v->feedback_effort_max > overasked))
     fprintf(
         out,
-        "  note: certified at the edge: its closed loop ends up to %.2g m off (from 0.5 it is lost) and asks for up to "
+        "  note: certified at the edge: its closed loop ends up to %.2g m off (from %g it is lost) and asks for up to "
         "%.3g %% of what an actuator gives; <force weight=\"1\"/>, less <limits effort> or a longer motion make it "
         "surer\n",
-        astray, 100 * v->feedback_effort_max);
+        astray, CAV_LOST_DISTANCE, 100 * v->feedback_effort_max);
   if (v->end_body[0])
     fprintf(out,
             "  note: it ends in motion: '%s' at %.2g m/s, turning at %.2g rad/s; whether that comes to rest, or falls, "

@@ -156,6 +156,15 @@ class Problem:
         self._c.close_at_rest = int(close)
 
     @property
+    def guess_ground(self) -> bool:
+        """Between start and goal the guess stands on what is below it, so high as there."""
+        return bool(self._c.guess_ground)
+
+    @guess_ground.setter
+    def guess_ground(self, ground: bool) -> None:
+        self._c.guess_ground = int(ground)
+
+    @property
     def free_start(self) -> bool:
         """Configuration and velocity at the start are found too; q_start and v_start are where the guess starts."""
         return bool(self._c.free_start)
