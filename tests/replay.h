@@ -198,6 +198,27 @@ static inline int replay_drop_keys(const char *model_path, char *copy) {
   return 1;
 }
 
+// Eulerian angles of a scene, which are degrees, in the radians that the model's file says for all that is read with it. Other
+// angles are not met in scenes.
+static inline void replay_turn(const char *model_path, char *scene, size_t room) {
+  static char text[1 << 16];
+  FILE *stream = fopen(model_path, "r");
+  text[stream ? fread(text, 1, sizeof text - 1, stream) : 0] = 0;
+  if (stream) fclose(stream);
+  CHECK(!strstr(scene, "axisangle="));
+  if (!strstr(text, "angle=\"radian\"")) return;
+  for (char *at = scene; (at = strstr(at, "euler=\"")) != NULL; at++) {
+    char *first = at + strlen("euler=\""), *end = first, turned[100], rest[1 << 12];
+    double angle[3];
+    for (int k = 0; k < 3; k++) angle[k] = strtod(end, &end) * M_PI / 180;
+    snprintf(rest, sizeof rest, "%s", end);
+    CHECK(*end == '"' && strlen(end) < sizeof rest);
+    snprintf(turned, sizeof turned, "%.17g %.17g %.17g", angle[0], angle[1], angle[2]);
+    CHECK((size_t)(first - scene) + strlen(turned) + strlen(rest) < room);
+    snprintf(first, room - (size_t)(first - scene), "%s%s", turned, rest);
+  }
+}
+
 // MuJoCo's model of the problem's file, with what the problem's scene puts into the world; path: the problem's file
 static inline mjModel *replay_load(const char *path, const char *model_path) {
   static char problem[1 << 16], added[1 << 16];
@@ -210,6 +231,7 @@ static inline mjModel *replay_load(const char *path, const char *model_path) {
   if (to) *to = 0;
   for (char *line = from ? strtok(from + strlen("<scene>"), "\n") : NULL; line; line = strtok(NULL, "\n"))
     if (!strstr(line, "<remove")) strcat(added, line);
+  replay_turn(model_path, added, sizeof added);
   const int adds = strchr(added, '<') != NULL, descriptor = adds ? mkstemps(file, 4) : -1;
   char bare[] = "/tmp/cavort-replay-XXXXXX.xml";
   const int keyless = adds ? replay_drop_keys(model_path, bare) : 0;

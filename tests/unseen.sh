@@ -19,7 +19,8 @@ field() { sed -n "s/^ *\"$1\": \([^,]*\),*$/\1/p" "$work/$name/verdict.json"; }
 # how many starts of a certified motion MuJoCo follows
 follows() {
   [ -x "$build/tests/bench_replay" ] && [ "$(field certified)" = true ] || { echo -; return; }
-  "$build/tests/bench_replay" apart "$work/$name" | awk -F '|' 'END { gsub(/^ +| +$/, "", $8); print $8 }'
+  # a file that its version of MuJoCo cannot read has no line
+  "$build/tests/bench_replay" apart "$work/$name" 2>"$work/log" | awk -F '|' '{ gsub(/^ +| +$/, "", $8); n = $8 } END { print n == "" ? "-" : n }'
 }
 
 row() {
