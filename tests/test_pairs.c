@@ -132,6 +132,33 @@ static void test_certificates(void) {
   }
 }
 
+// a pair has a point for every margin above its gap and none below: nothing drops a pair early that is found later
+static void test_margins(void) {
+  for (int ta = 1; ta < CAV_GEOM_MESH; ta++) {
+    for (int tb = ta; tb < CAV_GEOM_MESH; tb++) {
+      int wrong = 0, apart = 0;
+      for (int k = 0; k < POSES; k++) {
+        solid a, b;
+        cav_touch touch[CAV_TOUCH_MAX];
+        random_solid(ta, &a);
+        random_solid(tb, &b);
+        bring_near(&a, &b);
+        for (int i = 0; i < 3; i++) b.shape.pos[i] += uniform(-0.2, 0.2);
+        int count = cav_collide_shapes(&a.shape, &b.shape, 2, touch);
+        if (!CHECK(count > 0)) break;
+        double gap = touch[proof_nearest(touch, count)].dist;
+        if (gap <= 0) continue;
+        apart++;
+        wrong += cav_collide_shapes(&a.shape, &b.shape, gap + 1e-9, touch) == 0;
+        wrong += cav_collide_shapes(&a.shape, &b.shape, gap - 1e-9, touch) != 0;
+      }
+      printf("%-10s %-10s %5d apart, %d found or lost at another margin than their gap\n", names[ta], names[tb], apart,
+             wrong);
+      CHECK(wrong == 0 && apart > POSES / 10);
+    }
+  }
+}
+
 // shapes in the middle of each other: the proof, and no way out that is shorter
 static void test_deep(void) {
   enum { DEEP = 200 };
@@ -591,6 +618,7 @@ static void test_peer(void) {
 
 int main(void) {
   test_certificates();
+  test_margins();
   test_deep();
   test_invariance();
   test_derivatives();

@@ -28,8 +28,9 @@ static void open_slot(const cav_model *model, const cav_geom *geom, slot *s, dou
   s->turned = 1;
 }
 
-// gives each geom in a pair a slot
-static void open_slots(const cav_model *model, struct cav_geom_cache *cache, int *slot_of) {
+// gives each geom in a pair a slot; whether some pair has a mesh
+static int open_slots(const cav_model *model, struct cav_geom_cache *cache, int *slot_of) {
+  int meshes = 0;
   for (int g = 0; g < model->ngeom; g++) { slot_of[g] = -1; }
   for (int p = 0; p < model->npair; p++) {
     const cav_pair *pair = model->pair + p;
@@ -49,10 +50,13 @@ static void open_slots(const cav_model *model, struct cav_geom_cache *cache, int
     c->external = (signed char)pair->external;
     c->margin = pair->margin;
     c->plane = a->type == CAV_GEOM_PLANE;
-    c->expensive = a->type == CAV_GEOM_MESH || b->type == CAV_GEOM_MESH;
-    cache->expensive |= c->expensive;
+    c->sought = (signed char)cav_pair_is_sought(model, pair);
+    c->mesh = (signed char)cav_pair_has_mesh(model, pair);
+    cache->sought |= c->sought;
+    meshes |= c->mesh;
     c->bound = b->bound + (c->plane ? 0 : a->bound);
   }
+  return meshes;
 }
 
 // which candidates the broad phase may take together with three more
@@ -176,12 +180,12 @@ struct cav_geom_cache *cav_geom_cache_new(const cav_model *model, int sweep_from
     cav_geom_cache_free(cache);
     return NULL;
   }
-  open_slots(model, cache, slot_of);
+  const int meshes = open_slots(model, cache, slot_of);
   cache->ncandidate = model->npair;
   cache->activation[0] = cache->activation[1] = NAN;
   free(slot_of);
-  if (cache->expensive) cache->hint = calloc((size_t)model->npair, sizeof *cache->hint);
-  if ((cache->expensive && !cache->hint) || !open_pruning(model, cache, sweep_from)) {
+  if (meshes) cache->hint = calloc((size_t)model->npair, sizeof *cache->hint);
+  if ((meshes && !cache->hint) || !open_pruning(model, cache, sweep_from)) {
     cav_geom_cache_free(cache);
     return NULL;
   }
@@ -326,9 +330,11 @@ static double reach(const cav_model *model, const cav_state *state, int p, doubl
 int cav_contacts_narrow(const cav_state *state) {
   const cav_options *o = &state->options;
   const struct cav_geom_cache *cache = state->work->geom;
-  return cache && cache->expensive && o->contact && o->constraint && o->stabilisation == CAV_STABILISATION_DISCRETE &&
+  return cache && cache->sought && o->contact && o->constraint && o->stabilisation == CAV_STABILISATION_DISCRETE &&
          !o->coupled;
 }
+
+int cav_contacts_have_meshes(const cav_state *state) { return state->work->geom && state->work->geom->hint; }
 
 // the geom as a shape, its rotation formed at the first request
 static const cav_shape *shape_of(const cav_state *state, struct cav_geom_cache *cache, int i) {
@@ -383,11 +389,11 @@ static cav_status push(const cav_model *model, cav_state *state, int p, const ca
 // contacts of one pair whose bounds are near
 static inline cav_status collide_pair(const cav_model *model, cav_state *state, const candidate *c, double margin) {
   struct cav_geom_cache *cache = state->work->geom;
-  if (c->expensive && !near(cache, c, margin)) return CAV_OK;
+  if (c->sought && !near(cache, c, margin)) return CAV_OK;
   cav_touch touch[CAV_TOUCH_MAX];
   const cav_shape *a = shape_of(state, cache, c->first), *b = shape_of(state, cache, c->second);
-  int count = c->expensive ? cav_collide_again(a, b, margin, &cache->hint[c->pair], touch)
-                           : cav_collide_shapes(a, b, margin, touch);
+  int count =
+      c->mesh ? cav_collide_again(a, b, margin, &cache->hint[c->pair], touch) : cav_collide_shapes(a, b, margin, touch);
   assert(count <= CAV_TOUCH_MAX);
   cav_status status = CAV_OK;
   for (int k = 0; k < count && status == CAV_OK; k++) status = push(model, state, c->pair, touch + k);
@@ -403,7 +409,7 @@ static cav_status collide_swept(const cav_model *model, cav_state *state, const 
     const candidate *c = cache->candidate + found[i];
     double margin = c->margin + activation[c->external];
     if (!near(cache, c, margin)) continue;
-    if (c->expensive && state->work->narrowed) margin = reach(model, state, c->pair, margin);
+    if (c->sought && state->work->narrowed) margin = reach(model, state, c->pair, margin);
     cav_status status = collide_pair(model, state, c, margin);
     if (status) return status;
   }
@@ -414,7 +420,7 @@ static cav_status collide_swept(const cav_model *model, cav_state *state, const 
 static inline cav_status collide_near(const cav_model *model, cav_state *state, const candidate *c,
                                       const double activation[2]) {
   double margin = c->margin + activation[c->external];
-  if (c->expensive && state->work->narrowed) margin = reach(model, state, c->pair, margin);
+  if (c->sought && state->work->narrowed) margin = reach(model, state, c->pair, margin);
   return collide_pair(model, state, c, margin);
 }
 
@@ -483,7 +489,7 @@ cav_status cav_contacts_find(const cav_model *model, cav_state *state) {
 int cav_contacts_listed(const cav_model *model, const cav_state *state) {
   const struct cav_geom_cache *cache = state->work->geom;
   if (!seeks_contacts(model, state)) return 1;
-  if (cache->expensive || cache->fixed || cache->sweep) return 0;
+  if (cache->hint || cache->fixed || cache->sweep) return 0;
   for (int k = 0; k < cache->nmoving; k++) {
     if (cache->slot[cache->moving[k]].geom->type == CAV_GEOM_PLANE) return 0;
   }

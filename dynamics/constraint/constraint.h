@@ -19,13 +19,24 @@ size_t cav_geom_cache_bytes(const struct cav_geom_cache *cache);
 /// margin, friction of state->contact and ncontact. collide.c. The activation distance of a pair is its margin, or
 /// where the smoothed law is active (cav_contact_activation), whichever is larger.
 /// Whether contacts that bear nothing at the velocities of links in the state need not be sought (state->work->narrowed
-/// asks for that): there are pairs with meshes, and a law that tells.
+/// asks for that): there are pairs that are sought so, and a law that tells.
 int cav_contacts_narrow(const cav_state *state);
+
+/// Whether a pair of the state's model has a mesh. collide.c.
+int cav_contacts_have_meshes(const cav_state *state);
 cav_status cav_contacts_find(const cav_model *model, cav_state *state);
 
 /// Whether one of the two is a mesh.
 static inline int cav_pair_has_mesh(const cav_model *model, const cav_pair *pair) {
   return model->geom[pair->geom1].type == CAV_GEOM_MESH || model->geom[pair->geom2].type == CAV_GEOM_MESH;
+}
+
+/// Whether contacts of a pair are sought only where they may bear something, as their search is expensive: with a mesh, and within
+/// one tree with an ellipsoid, a cylinder or a box, as housings of robots near a joint have them by the dozen.
+static inline int cav_pair_is_sought(const cav_model *model, const cav_pair *pair) {
+  const cav_geom_type first = model->geom[pair->geom1].type, second = model->geom[pair->geom2].type;
+  return cav_pair_has_mesh(model, pair) ||
+         (!pair->external && first != CAV_GEOM_PLANE && second >= CAV_GEOM_ELLIPSOID && second <= CAV_GEOM_BOX);
 }
 
 /// Of four contacts that follow each other, where vectors have four numbers: axes, from a normal and a tangent in their first two
@@ -135,10 +146,10 @@ double cav_row_velocity(const cav_state *state, const cav_row *row, const double
 void cav_row_push_force(const cav_state *state, const cav_row *row, double force, double *u);
 
 /// Scales of smoothing below contact from which on a smoothed law that ends bears nothing at all. Whether a contact's ends:
-/// with a mesh it does, as those are expensive to find; others trail off.
+/// where it is sought only if it may bear something; others trail off.
 #define CAV_LAW_END 12.0
 static inline int cav_contact_ends(const cav_state *state, const cav_contact *contact) {
-  return cav_pair_has_mesh(state->model, &state->model->pair[contact->pair]);
+  return cav_pair_is_sought(state->model, &state->model->pair[contact->pair]);
 }
 
 /// Impulse of an elliptic contact from g = R^-1 (v* - v_next) [dim]; R [dim], sigma 0: exact law, else smoothed; ends: the

@@ -226,6 +226,48 @@ static int capsule_capsule(const cav_shape *a, const cav_shape *b, double margin
   return count;
 }
 
+/// A capsule that holds a shape: half of its segment, along one of the shape's axes, and the radius about it.
+typedef struct hull {
+  double half, radius, along[3];
+} hull;
+
+// those of a sphere, capsule, ellipsoid, cylinder or box
+static hull hull_of(const cav_shape *s) {
+  const double *size = s->size;
+  hull h = {.radius = size[0]};
+  int axis = 2, solid = s->type == CAV_GEOM_BOX || s->type == CAV_GEOM_ELLIPSOID;
+  for (int i = 0; i < 2 && solid; i++)
+    if (size[i] > size[axis]) axis = i;
+  const double b = size[(axis + 1) % 3], c = size[(axis + 2) % 3];
+  if (s->type == CAV_GEOM_CAPSULE || s->type == CAV_GEOM_CYLINDER) h.half = size[1];
+  if (s->type == CAV_GEOM_BOX) h.half = size[axis], h.radius = sqrt(b * b + c * c);
+  // about the rounder end of an ellipsoid fits a ball of its second axis
+  if (s->type == CAV_GEOM_ELLIPSOID) h.radius = b > c ? b : c, h.half = size[axis] - h.radius;
+  column3(h.along, s->rotation, axis);
+  return h;
+}
+
+// whether the capsules about two shapes are a margin apart or farther: then so are the shapes
+static int hulls_apart(const cav_shape *a, const cav_shape *b, double margin) {
+  const hull ha = hull_of(a), hb = hull_of(b);
+  segments g = {.lu = ha.half, .lw = hb.half};
+  copy3(g.u, ha.along);
+  copy3(g.w, hb.along);
+  sub3(g.d, b->pos, a->pos);
+  g.uw = dot3(g.u, g.w);
+  g.ud = dot3(g.u, g.d);
+  g.wd = dot3(g.w, g.d);
+  const double reach = ha.radius + hb.radius + margin, size = ha.half + ha.radius + hb.half + hb.radius;
+  const double sine2 = 1 - g.uw * g.uw;
+  // three updates, one coordinate at the minimum for the other, end at the nearest points; of nearly parallel ones any near to it
+  double s = sine2 > 1e-12 ? clamp((g.ud - g.uw * g.wd) / sine2, -g.lu, g.lu) : 0, t = nearest_t(&g, s), apart[3];
+  s = nearest_s(&g, t);
+  copy3(apart, g.d);
+  axpy3(apart, apart, -s, g.u);
+  axpy3(apart, apart, t, g.w);
+  return reach > 0 && norm3(apart) > reach + 1e-6 * size;
+}
+
 // few and mostly in order
 static void sort(cav_touch *touch, int count) {
   for (int i = 1; i < count; i++) {
@@ -260,6 +302,8 @@ int cav_collide_again(const cav_shape *a, const cav_shape *b, double margin, cav
       {NULL}};
   routine *collide = table[a->type][b->type];
   int meshes = b->type == CAV_GEOM_MESH && a->type != CAV_GEOM_PLANE;
+  int search = a->type >= CAV_GEOM_CAPSULE && b->type >= CAV_GEOM_ELLIPSOID && b->type <= CAV_GEOM_BOX;
+  if (search && hulls_apart(a, b, margin)) return 0;
   int count = meshes ? cav_collide_mesh(a, b, margin, hint, touch) : collide ? collide(a, b, margin, touch) : 0;
   sort(touch, count);
   return count;

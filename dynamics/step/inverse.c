@@ -361,12 +361,14 @@ cav_status cav_inverse(const cav_model *model, cav_state *state, const double *q
   return cav_inverse_from(model, state, CAV_STAGE_NONE, q, v, v_next, u);
 }
 
-// whether contacts and limits read nothing of a position but poses of links
+// whether contacts and limits read nothing of a position but poses of links. Contacts that are sought state by state where there
+// are meshes are all found for four, to the same forces
 static int is_plain(const cav_model *model, const cav_state *state) {
   const cav_workspace *w = state->work;
   const cav_options *o = &state->options;
   return !model->nequality && !w->nstring && !w->nbuoy && !w->nfloat && o->order != CAV_ORDER_MOMENTUM && !o->coupled &&
-         o->regulariser != CAV_REGULARISER_EXACT && !cav_looks_ahead(o) && !cav_contacts_narrow(state);
+         o->regulariser != CAV_REGULARISER_EXACT && !cav_looks_ahead(o) &&
+         !(cav_contacts_narrow(state) && cav_contacts_have_meshes(state));
 }
 
 // positions of four states that contacts and limits are then sought at state by state; status [4]
