@@ -1,8 +1,8 @@
 #!/bin/sh
 # Every check of the project. Usage: sh tests/all.sh. Ends with one line, "N passed, N failed"; the exit status follows it.
 # Installs what is missing, then: both compilers with warnings as errors, the tests of each, the second build with address and
-# undefined-behaviour sanitizers; headers on their own as C and C++; layout of the text; installation and use through pkg-config,
-# of the static and of the shared library.
+# undefined-behaviour sanitizers and without those that solve whole motions (suite long); headers on their own as C and C++;
+# layout of the text; installation and use through pkg-config, of the static and of the shared library.
 # CAVORT_BUILD names the folder of the builds, by default build-ci.
 set -u
 cd "$(dirname "$0")/.." || exit 1
@@ -148,7 +148,7 @@ if sh problems/install.sh test; then
   check "build, gcc" build gcc gcc --buildtype=release && tests gcc
   check "build, clang with sanitizers" build clang clang --buildtype=debugoptimized -Db_sanitize=address,undefined \
     -Db_lundef=false &&
-    tests clang --timeout-multiplier 6
+    tests clang --timeout-multiplier 6 --no-suite long
   check "headers alone, C17 and C++17" headers
   if command -v clang-format >/dev/null 2>&1; then
     check "layout of the text" layout

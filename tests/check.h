@@ -86,6 +86,19 @@ static inline const char *check_shared_models(void) {
   return folder;
 }
 
+/// How many of n random cases a test goes through: sanitizers take ten times as long and look for other things than rare numbers.
+#if defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define CHECK_CASES(n) (((n) + 4) / 5)
+#endif
+#endif
+#if !defined(CHECK_CASES) && defined(__SANITIZE_ADDRESS__)
+#define CHECK_CASES(n) (((n) + 4) / 5)
+#endif
+#ifndef CHECK_CASES
+#define CHECK_CASES(n) (n)
+#endif
+
 #define CHECK(condition) check_note(!!(condition), __FILE__, __LINE__, #condition)
 #define CHECK_NEAR(a, b, tol) check_near(a, b, tol, __FILE__, __LINE__, #a " near " #b)
 #define CHECK_NEAR_ALL(a, b, n, tol) check_near_all(a, b, n, tol, __FILE__, __LINE__, #a " near " #b)

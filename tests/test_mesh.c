@@ -84,7 +84,7 @@ static void bring_near(const solid *a, solid *b) {
   add3(b->shape.pos, b->shape.pos, d);
 }
 
-enum { POSES = 2000 };
+enum { POSES = CHECK_CASES(2000) };
 static const double MARGIN = 0.05;
 
 static void test_certificates(int type, int kind) {

@@ -97,7 +97,7 @@ static void certify(const cav_shape *a, const cav_shape *b, const cav_touch *tou
   }
 }
 
-enum { POSES = 3000 };
+enum { POSES = CHECK_CASES(3000) };
 static const double MARGIN = 0.05;
 
 static int collide(const solid *a, const solid *b, cav_touch *touch) {
@@ -569,7 +569,7 @@ static void test_peer(void) {
       if (!CHECK(m && d)) continue;
       int same_count = 0, same = 0, geom_a = m->geom_type[0] <= m->geom_type[1] ? 0 : 1;
       double most = 0, above = -INFINITY, mean = 0;
-      enum { PEER_POSES = 1000 };
+      enum { PEER_POSES = CHECK_CASES(1000) };
       for (int k = 0; k < PEER_POSES; k++) {
         solid a, b;
         random_solid(ta, &a);

@@ -154,7 +154,7 @@ static void test_accelerations(const cav_model *m) {
 #ifdef CAVORT_HAVE_MUJOCO
 #include "peer.h"
 
-enum { STATES = 1000 };
+enum { STATES = CHECK_CASES(1000) };
 
 typedef struct peers {
   mjModel *theirs;

@@ -56,6 +56,36 @@ sed 's/timestep=".02"/timestep=".02" close="open"/' coast.xml >open.xml
 "$cavort" solve open.xml -o open --threads 1 -q >open.out 2>&1
 ends $? 0 "a cart that may go on"
 
+# rows and nothing else: any motion that keeps them will do, and one is found; in the least time, with no cost on the way
+cat >block.xml <<'E2'
+<mujoco><option gravity="0 0 0"/><worldbody><body name="cart"><joint name="x" type="slide" axis="1 0 0"/><geom type="box" size=".1 .1 .1"
+mass="2" contype="0" conaffinity="0"/></body></worldbody><actuator><motor joint="x" ctrlrange="-4 4" ctrllimited="true"/></actuator></mujoco>
+E2
+rows='<start/><limits effort="1"/><cost><effort weight="0"/><velocity weight="0"/><acceleration weight="0"/><posture weight="0"/></cost>
+<constraint><sensor type="jointpos" joint="x" target="1" at="end"/><velocity joint="x" at="end"/></constraint></problem>'
+echo "<problem name='rows' model='block.xml'><horizon duration='2' timestep='0.02' close='open'/>$rows" >rows.xml
+echo "<problem name='least' model='block.xml'><horizon duration='2' timestep='0.02' close='open' range='0.5 4' weight='1'/>$rows" >least.xml
+for name in rows least; do
+  "$cavort" solve $name.xml -o $name --threads 1 --strategies 1 -q >$name.out 2>&1
+  ends $? 0 "a block that $name alone hold"
+done
+says least/verdict.json '"duration": 1.41421356'
+
+# milliseconds for seconds: said at once, and nothing of that size is evaluated
+sed 's/timestep=".02"/timestep=".000002"/' coast.xml >ms.xml
+(ulimit -t 5 && "$cavort" inspect ms.xml) >ms.out 2>&1
+ends $? 0 "a problem of half a million knots"
+says ms.out "500001 knots"
+
+# a load that the arm cannot hold, asked for with tolerances: no proof, but said
+sed 's/ mass="0.3"/ mass="500"/' "$models/arm.xml" >heavy.xml
+cat >load.xml <<'E2'
+<problem name="load" model="heavy.xml"><horizon duration="2" timestep="0.025"/><start key="stand"/><cost><posture dofs="all" from="1" to="2"
+weight="900"/></cost></problem>
+E2
+"$cavort" inspect load.xml >load.out 2>&1
+says load.out "note: at rest, posture 'start' cannot be held"
+
 # a tall box on its way over: certified as asked, and told
 cat >tall.xml <<'E2'
 <mujoco><worldbody><geom type="plane" size="5 5 1"/><body name="box" pos="0 0 .5"><freejoint/><geom type="box" size=".1 .1 .5" mass="5"/>

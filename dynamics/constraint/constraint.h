@@ -31,7 +31,7 @@ static inline int cav_pair_has_mesh(const cav_model *model, const cav_pair *pair
   return model->geom[pair->geom1].type == CAV_GEOM_MESH || model->geom[pair->geom2].type == CAV_GEOM_MESH;
 }
 
-/// Whether contacts of a pair are sought only where they may bear something, as their search is expensive: with a mesh, and within
+/// Whether contacts of a pair are sought only where they may bear something, as their search is expensive: with a mesh, and in
 /// one tree with an ellipsoid, a cylinder or a box, as housings of robots near a joint have them by the dozen.
 static inline int cav_pair_is_sought(const cav_model *model, const cav_pair *pair) {
   const cav_geom_type first = model->geom[pair->geom1].type, second = model->geom[pair->geom2].type;

@@ -655,6 +655,19 @@ static void add_hard_terms(cav_sum *a, const double *q, const double *v, const d
   assert(i == a->knot->layout.count && reading == a->knot->nread);
 }
 
+/// Curvature of accelerations for steps, not for the merit: rows alone say nothing of knots that they do not reach, a knot more
+/// with each step.
+static void add_smoothness(cav_sum *a) {
+  const cav_transcription *tr = a->tr;
+  int column[12];
+  double entry[12];
+  if (!a->knot->has_force) return;
+  for (int d = 0; d < tr->nv; d++) {
+    int n = acceleration_entries(a, d, 1, column, entry);
+    add_square(a, tr->options.timestep * tr->smoothness, n, column, entry);
+  }
+}
+
 // gradient += sum of rest times rows, four rows at a time in their order
 CAV_VECTOR_BODY void add_gradient_body(int width, int n, const double *rest, const double *row,
                                        double *restrict gradient) {
@@ -716,4 +729,5 @@ void cav_knot_sum(cav_sum *a, const double *q, const double *v, const double *v_
   assert(!a->counted || a->row == knot->nrow);
   knot->nrow = a->row;
   if (a->jacobian) lay_force_rows(a);
+  if (a->jacobian && tr->smoothness > 0) add_smoothness(a);
 }

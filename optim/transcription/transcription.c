@@ -242,6 +242,21 @@ static int scratch_new(cav_transcription *tr, cav_scratch *s) {
   return ok && s->state;
 }
 
+/// Curvature that steps have along accelerations where the problem gives them none, 1/(m/s^2)^2: a hundredth of the usual cost's.
+static const double smooth_steps = 1e-6;
+
+/// Whether a cost over time tells motions apart that meet the same rows.
+static int has_running_cost(const cav_problem *problem) {
+  for (int i = 0; i < problem->nterm; i++) {
+    const cav_term *term = &problem->term[i];
+    const int running = term->quantity == CAV_QUANTITY_EFFORT || term->quantity == CAV_QUANTITY_ACCELERATION ||
+                        term->quantity == CAV_QUANTITY_VELOCITY || term->quantity == CAV_QUANTITY_CONFIGURATION ||
+                        term->quantity == CAV_QUANTITY_POWER || term->quantity == CAV_QUANTITY_TRACK;
+    if (running && term->use == CAV_USE_COST && term->weight > 0 && term->from != term->to) return 1;
+  }
+  return 0;
+}
+
 cav_transcription *cav_transcription_new(const cav_problem *problem, int threads, cav_error *error) {
   if (cav_actuators_plannable(problem->model, error) != CAV_OK) return NULL;
   const double knots = round(problem->duration / problem->timestep) + 1;
@@ -277,6 +292,7 @@ cav_transcription *cav_transcription_new(const cav_problem *problem, int threads
     return NULL;
   }
   tr->free_step = problem->duration_most > 0;
+  tr->smoothness = has_running_cost(problem) ? 0 : smooth_steps;
   if (!tr->pool || !list_rotations(tr)) goto memory;
   tr->before = calloc(2 * (size_t)tr->nv + 1, sizeof(double));
   tr->start = calloc(2 * (size_t)tr->model->nq + 1, sizeof(double));

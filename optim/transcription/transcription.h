@@ -123,6 +123,7 @@ typedef struct cav_transcription {
   double *start;                ///< [2*nq] room: the knot before a free start, as it is and as it is moved
   double *rotation_after;       ///< [nturn*CAV_ROTATION_SIZE] of the step after the last knot, in cycles
   double weight;                ///< N: model mass times gravity
+  double smoothness; ///< curvature of squared accelerations, s^4/m^2, where no running cost has any; 0: one has
   int nresidual;                ///< rows of unactuated
   cav_force_row *unactuated;    ///< orthonormal complement of the actuators' range, scaled to fractions of weight
   int npenalised;               ///< dofs of roots whose unactuated forces are a cost

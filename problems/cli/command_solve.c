@@ -49,20 +49,25 @@ typedef struct ticker {
   int quiet, terminal;
   int shown, stage;
   const char *phase;
-  double last; // s
+  double last, begun; // s; when the phase began
 } ticker;
 
 static void show_progress(ticker *tick, const cav_progress *p) {
   int news = !tick->phase || strcmp(p->phase, tick->phase) || p->stage != tick->stage;
   if (!news && p->seconds - tick->last < (tick->terminal ? 0.1 : 1.0)) return;
   if (tick->terminal && tick->shown && news && p->seconds - tick->last < 0.05) return;
+  if (!tick->phase || strcmp(p->phase, tick->phase)) tick->begun = p->seconds;
   tick->phase = p->phase;
   tick->stage = p->stage;
   tick->last = p->seconds;
   tick->shown = 1;
   char left[32] = "";
   // what goes on until nothing is gained any more has no length that is known
-  int staged = !strcmp(p->phase, "continuation") || !strcmp(p->phase, "feedback") || !strcmp(p->phase, "verification");
+  int staged = !strcmp(p->phase, "continuation") || !strcmp(p->phase, "verification");
+  // sets of gains are tried until one follows
+  if (!strcmp(p->phase, "feedback") && p->stage > 1)
+    snprintf(left, sizeof left, ", at most %.0f s left",
+             (p->seconds - tick->begun) * (p->stages - p->stage + 1) / (p->stage - 1));
   if (p->fraction > 0.05 && staged) snprintf(left, sizeof left, ", %.0f s left", p->seconds * (1 / p->fraction - 1));
   fprintf(stderr,
           "%s%-12s %2d/%-2d  iteration %4d  cost %9.4g  unactuated %8.2e at knot %3d  violation %8.2e  %6.1f s  %2.0f "

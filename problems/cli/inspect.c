@@ -394,9 +394,23 @@ static void print_stage_ends(const cav_stage_options *first, const cav_stage_opt
   printf("\n\n");
 }
 
+/// What the derivatives and normal equations of all knots take at least, bytes.
+static double bytes_of(const cav_problem *p) {
+  const double block = (double)p->model->nv * p->model->nv * sizeof(double);
+  return p->duration / p->timestep * 18 * block;
+}
+
+// bytes from which on a problem is not evaluated to tell what that takes, and knots of which few motions have more
+static const double vast = 1e9;
+enum { MANY_KNOTS = 4000 };
+
 // how the solver will factor, and what an iteration takes
 static cav_status print_equations(const cav_problem *p, cav_error *error) {
   cav_equations e;
+  if (bytes_of(p) > vast) {
+    printf("  normal equations: %.3g GB at least; not evaluated here\n", bytes_of(p) / 1e9);
+    return CAV_OK;
+  }
   cav_status status = cav_problem_equations(p, &e, error);
   if (status) return status;
   if (!e.left_out)
@@ -434,6 +448,9 @@ void cav_command_tell_step(FILE *out, const cav_problem *p) {
   if (floats && fall > deep)
     fprintf(out, "note: a free body falls by %.3g m in one step of %g s: durations and steps are in s\n", fall,
             p->timestep);
+  if (p->duration / p->timestep > MANY_KNOTS)
+    fprintf(out, "note: %g s in steps of %g s are %.0f knots, %.3g GB at least: durations and steps are in s\n",
+            p->duration, p->timestep, p->duration / p->timestep + 1, bytes_of(p) / 1e9);
 }
 
 static cav_status print_problem(const cav_problem *p, cav_error *error) {

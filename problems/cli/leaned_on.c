@@ -102,6 +102,31 @@ static void tell_toes(FILE *out, const cav_problem *problem, const cav_trajector
   cav_state_free(state);
 }
 
+// part of the weight from which on links of one tree lean on each other
+static const double self_leaning = 0.25;
+
+/// Two links of one tree that lean on each other hardest, where that is no resting posture's: arms folded at the start are
+/// asked for.
+static void tell_self(FILE *out, const cav_model *m, const cav_forces *forces, const cav_trajectory *motion,
+                      double weight) {
+  const cav_contact_force *most = NULL;
+  double size = self_leaning * weight;
+  for (int i = 0; i < forces->nforce; i++) {
+    const cav_contact_force *f = &forces->force[i];
+    const int one = m->geom[f->geom1].link, other = m->geom[f->geom2].link;
+    if (one == 0 || other == 0 || m->link[one].root != m->link[other].root || size_of(f) <= size) continue;
+    if (f->knot == 0 || f->knot >= forces->nknot - 2) return;
+    most = f, size = size_of(f);
+  }
+  if (!most) return;
+  const char *a = m->body[m->geom[most->geom1].body].name, *b = m->body[m->geom[most->geom2].body].name;
+  fprintf(out,
+          "  note: it leans on itself: '%s' on '%s' with up to %.3g N, at %.3g s; <self_force weight=\"1\"/> makes "
+          "that cost "
+          "something\n",
+          a && *a ? a : "a body", b && *b ? b : "a body", size, most->knot * motion->timestep);
+}
+
 void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_trajectory *motion,
                               const cav_options *contact) {
   const cav_model *m = problem->model;
@@ -125,7 +150,8 @@ void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_t
             m->geom[g].name ? m->geom[g].name : "a solid of the world", body->name ? body->name : "a body",
             size_of(most[g]), most[g]->knot * motion->timestep);
   }
-  if (n > 0) fprintf(out, "; what must not be touched: guide.md, Obstacles\n");
+  if (n > 0) fprintf(out, "; where it must not be touched: guide.md, Obstacles\n");
+  if (forces) tell_self(out, m, forces, motion, weight);
   if (forces && problem->guess_height > 0 && !is_in_the_air(m, forces, weight))
     fprintf(
         out,

@@ -178,11 +178,58 @@ static int tell_fall(FILE *out, const cav_problem *p) {
   return n;
 }
 
+/// Whether actuators and contacts bear a posture at rest; tells what does not.
+static int tell_weakness(FILE *out, const cav_problem *p, const char *name, const double *q, double from) {
+  const cav_term held = {.name = name,
+                         .quantity = CAV_QUANTITY_CONFIGURATION,
+                         .use = CAV_USE_EQUAL,
+                         .dofs = CAV_DOFS_ALL,
+                         .from = from,
+                         .to = from + 2 * p->timestep,
+                         .scale = 1,
+                         .target = q};
+  // the balance alone: a problem that asks for nothing else and starts there
+  cav_problem alone = *p;
+  cav_impossibility found[3];
+  cav_error ignored = {0};
+  int n = 0;
+  alone.q_start = (double *)q;
+  alone.term = (cav_term *)&held;
+  alone.nterm = 1;
+  if (cav_problem_impossible(&alone, found, 3, &n, &ignored) != CAV_OK) return 0;
+  for (int i = 0; i < n; i++) {
+    if (found[i].condition != CAV_CONDITION_STRENGTH) continue;
+    fprintf(out, "note: at rest, %s\n", found[i].what);
+    return 1;
+  }
+  return 0;
+}
+
+/// Whether the goal's posture is asked for over a while, or at the end of a motion that is at rest then.
+static int goal_is_held(const cav_problem *p) {
+  if (p->close_at_rest && asks_for_goal(p)) return 1;
+  for (int i = 0; i < p->nterm; i++) {
+    const cav_term *t = &p->term[i];
+    const double to = t->to < 0 ? p->duration : t->to;
+    if (t->quantity == CAV_QUANTITY_CONFIGURATION && !t->target && !t->nwaypoint && t->dofs == CAV_DOFS_ALL &&
+        isfinite(t->within) && t->from > 0 && to > t->from + 2 * p->timestep &&
+        (t->use != CAV_USE_COST || t->weight > 0))
+      return 1;
+  }
+  return 0;
+}
+
 int cav_command_tell_postures(FILE *out, const cav_problem *p) {
   int n = 0;
   if (p->cycle.on) return 0;
   if (!p->free_start) n += tell_fall(out, p) + tell_lean(out, p);
   // a goal that is the start's was examined as that
   const int same = !p->free_start && !memcmp(p->q_goal, p->q_start, sizeof *p->q_goal * (size_t)p->model->nq);
-  return same ? n : n + tell_depth(out, p);
+  if (!same) n += tell_depth(out, p);
+  const int falls = n > 0, weak = !falls && !p->free_start && rests(p) && p->duration > 3 * p->timestep
+                                      ? tell_weakness(out, p, "start", p->q_start, 0)
+                                      : 0;
+  if (!falls && !(same && weak) && goal_is_held(p) && p->duration > 3 * p->timestep)
+    n += tell_weakness(out, p, "goal", p->q_goal, p->duration - 2 * p->timestep);
+  return n + weak;
 }

@@ -134,6 +134,12 @@ static void print_targets(FILE *out, const cav_problem *problem, const cav_term_
 // end errors of a closed loop, m, and effort that it asks for over what there is, from which a certificate is told to be narrow
 static const double at_the_edge = CAV_LOST_DISTANCE / 2, overasked = 6;
 
+static int asks_for(const cav_problem *problem, cav_quantity quantity) {
+  int n = 0;
+  for (int i = 0; i < problem->nterm; i++) n += problem->term[i].quantity == quantity && problem->term[i].weight > 0;
+  return n > 0;
+}
+
 void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verdict *v, const cav_term_report *report) {
   static const char *const mark[] = {"NOT", "ok"};
   cav_certificate_line line[CAV_CERTIFICATE_LINES];
@@ -162,7 +168,8 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
         out,
         "  a cheaper motion may be near: <schedule optimality=\"1e-5\"/> goes on for longer, --solver both goes on by "
         "Ipopt; a certificate does not ask for it\n");
-  fprintf(out, "%s: %s on %s", v->certified ? "certified" : "NOT certified", problem->name, problem->model->name);
+  fprintf(out, "%s: %s", v->certified ? "certified" : "NOT certified", problem->name);
+  if (*problem->model->name) fprintf(out, " on %s", problem->model->name);
   if (!isnan(v->residual_fraction_max))
     fprintf(out, ", with residual forces on its root of up to %.3g %% of the weight", 100 * v->residual_fraction_max);
   fputc('\n', out);
@@ -182,9 +189,9 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
     fprintf(
         out,
         "  note: certified at the edge: its closed loop ends up to %.2g m off (from %g it is lost) and asks for up to "
-        "%.3g %% of what an actuator gives; <force weight=\"1\"/>, less <limits effort> or a longer motion make it "
-        "surer\n",
-        astray, CAV_LOST_DISTANCE, 100 * v->feedback_effort_max);
+        "%.3g %% of what an actuator gives; %sless <limits effort> or a longer motion make it surer\n",
+        astray, CAV_LOST_DISTANCE, 100 * v->feedback_effort_max,
+        asks_for(problem, CAV_QUANTITY_FORCE) ? "" : "<force weight=\"1\"/>, ");
   if (v->end_body[0])
     fprintf(out,
             "  note: it ends in motion: '%s' at %.2g m/s, turning at %.2g rad/s; whether that comes to rest, or falls, "
