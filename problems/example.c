@@ -3,7 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// a model lowered until something touches: the forces that hold it still for one step, and the step that they lead to
+// a model lowered until something barely touches: what holds it still for one step, little of it contacts and the rest u, that of
+// the root too, and the step that they lead to
 int main(int argc, char **argv) {
   cav_error error = {0};
   cav_model *model = cav_model_load(argc > 1 ? argv[1] : "problems/models/humanoid.xml", &error);

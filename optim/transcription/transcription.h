@@ -123,17 +123,17 @@ typedef struct cav_transcription {
   double *start;                ///< [2*nq] room: the knot before a free start, as it is and as it is moved
   double *rotation_after;       ///< [nturn*CAV_ROTATION_SIZE] of the step after the last knot, in cycles
   double weight;                ///< N: model mass times gravity
-  double smoothness; ///< curvature of squared accelerations, s^4/m^2, where no running cost has any; 0: one has
-  int nresidual;                ///< rows of unactuated
-  cav_force_row *unactuated;    ///< orthonormal complement of the actuators' range, scaled to fractions of weight
-  int npenalised;               ///< dofs of roots whose unactuated forces are a cost
-  cav_force_row *penalised;     ///< [npenalised] over their deviations
-  int nlimit;                   ///< rows of effort: one an actuator; then of control, of servos limited in both
-  int *limited;                 ///< [nlimit] the actuator of each
-  cav_force_row *effort;        ///< [nlimit] actuator force over its limit
-  double *effort_unit;          ///< [nlimit] force of its transmission, N or N m, that one unit of the row of effort is
-  double (*effort_range)[2];    ///< [nlimit] limits of effort, scaled; of servos with limits of control alone, those
-  cav_servo *servo;             ///< [nlimit]
+  double smoothness;         ///< curvature of squared accelerations, s^4/m^2, where no running cost has any; 0: one has
+  int nresidual;             ///< rows of unactuated
+  cav_force_row *unactuated; ///< orthonormal complement of the actuators' range, scaled to fractions of weight
+  int npenalised;            ///< dofs of roots whose unactuated forces are a cost
+  cav_force_row *penalised;  ///< [npenalised] over their deviations
+  int nlimit;                ///< rows of effort: one an actuator; then of control, of servos limited in both
+  int *limited;              ///< [nlimit] the actuator of each
+  cav_force_row *effort;     ///< [nlimit] actuator force over its limit
+  double *effort_unit;       ///< [nlimit] force of its transmission, N or N m, that one unit of the row of effort is
+  double (*effort_range)[2]; ///< [nlimit] limits of effort, scaled; of servos with limits of control alone, those
+  cav_servo *servo;          ///< [nlimit]
   int nrotation;
   int *rotation_dof;  ///< [nturn] first of three rotational dofs
   int *rotation_of;   ///< [nv] index into turn_dof or -1

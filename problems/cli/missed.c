@@ -134,6 +134,17 @@ static const char *untouched(const cav_problem *p, const cav_trajectory *motion,
   return NULL;
 }
 
+/// The first term that asks for something as a link sees it; -1: none.
+static int seen_from(const cav_problem *p, int link) {
+  for (int i = 0; i < p->nterm; i++) {
+    const cav_sensor *s = &p->term[i].sensor;
+    if (p->term[i].quantity == CAV_QUANTITY_SENSOR && s->type == CAV_SENSOR_FRAMEPOS && s->referred &&
+        cav_object_link(p->model, s->reference_type, s->reference) == link)
+      return i;
+  }
+  return -1;
+}
+
 /// A body that may take hold of things: a hand, or a foot, or the last link of a chain.
 static const char *hand_of(const cav_model *m) {
   static const cav_role role[] = {CAV_ROLE_RIGHT_HAND, CAV_ROLE_LEFT_HAND, CAV_ROLE_HAND, CAV_ROLE_RIGHT_FOOT};
@@ -165,7 +176,18 @@ static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_t
   snprintf(weight, sizeof weight, "a weight %.2g times as large brings it nearer", more);
   if (*tried) snprintf(weight, sizeof weight, "%s", tried);
   const char *body = done < still * way && way > got[i].within ? untouched(p, motion, term) : NULL;
-  if (body) {
+  const int brought = body ? seen_from(p, link_of(p, term)) : -1;
+  if (body && brought >= 0) {
+    const cav_term *hand = &p->term[brought];
+    snprintf(
+        text, size,
+        "'%.60s' is %.3g%s%s from where the start has it, and nothing that an actuator moves touches '%.40s'. '%.60s' "
+        "asks for something there, at a weight of %.3g, and is off by %.2g m. Next: its target at the face to push on, "
+        "less what the body that pushes is thick, from when on it can be there; postures in <guess> that have it "
+        "there; or "
+        "<schedule kinematics=\"true\"/>, which begins from where targets are met.",
+        name, way, gap, unit, body, *hand->name ? hand->name : got[brought].what, hand->weight, got[brought].off);
+  } else if (body) {
     snprintf(
         text, size,
         "'%.60s' is %.3g%s%s from where the start has it, and nothing that an actuator moves touches '%.40s': from "

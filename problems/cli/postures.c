@@ -219,6 +219,13 @@ static int goal_is_held(const cav_problem *p) {
   return 0;
 }
 
+static int is_impossible(const cav_problem *p) {
+  cav_impossibility found;
+  cav_error ignored = {0};
+  int n = 0;
+  return cav_problem_impossible(p, &found, 1, &n, &ignored) == CAV_OK && n > 0;
+}
+
 int cav_command_tell_postures(FILE *out, const cav_problem *p) {
   int n = 0;
   if (p->cycle.on) return 0;
@@ -226,10 +233,9 @@ int cav_command_tell_postures(FILE *out, const cav_problem *p) {
   // a goal that is the start's was examined as that
   const int same = !p->free_start && !memcmp(p->q_goal, p->q_start, sizeof *p->q_goal * (size_t)p->model->nq);
   if (!same) n += tell_depth(out, p);
-  const int falls = n > 0, weak = !falls && !p->free_start && rests(p) && p->duration > 3 * p->timestep
-                                      ? tell_weakness(out, p, "start", p->q_start, 0)
-                                      : 0;
-  if (!falls && !(same && weak) && goal_is_held(p) && p->duration > 3 * p->timestep)
-    n += tell_weakness(out, p, "goal", p->q_goal, p->duration - 2 * p->timestep);
-  return n + weak;
+  // what falls is told, and so is what is proven impossible
+  if (n > 0 || p->duration < 3 * p->timestep || is_impossible(p)) return n;
+  if (!p->free_start && rests(p)) n += tell_weakness(out, p, "start", p->q_start, 0);
+  if (!(same && n) && goal_is_held(p)) n += tell_weakness(out, p, "goal", p->q_goal, p->duration - 2 * p->timestep);
+  return n;
 }

@@ -323,10 +323,10 @@ static void tell(const cav_race *race, const cav_race_entry *e) {
   if (colon) first = (size_t)(colon - v->reason);
   if (stop && (size_t)(stop - v->reason) < first) first = (size_t)(stop - v->reason);
   if (misses && first) fprintf(stderr, ": %.*s", (int)first, v->reason);
-  const char *when = strstr(v->missed, " at ");
+  const char *when = strstr(v->missed, ") at ");
   if (misses && !first)
     fprintf(stderr, ": misses %d of %d targets, most %.*s", v->nmissed, v->ntarget,
-            (int)(when ? (size_t)(when - v->missed) : strlen(v->missed)), v->missed);
+            (int)(when ? (size_t)(when + 1 - v->missed) : strlen(v->missed)), v->missed);
   fputc('\n', stderr);
 }
 
