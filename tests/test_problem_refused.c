@@ -215,6 +215,8 @@ int main(void) {
   begin_folder();
   refuse_cost("<sensor type='framepos' body='floor' weight='1'/>",
               "no body 'floor', but a geom of that name: give it as attribute 'geom'");
+  refuse_cost("<force body='floor' weight='1'/>",
+              "a geom of that name in the world itself: put it into a <body name=\"floor\">");
   check_broken_files();
   check_former_names();
   check_broken_scenes();

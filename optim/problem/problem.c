@@ -134,9 +134,16 @@ static void refuse_name(const cav_problem_reader *reader, const cav_xml_node *no
   if (other != CAV_OBJECT_TYPES) {
     const char *given = cav_object_kind_of(other)->text;
     int accepted = cav_xml_accepts(node, given);
-    cav_xml_fail(reader->error, node, attribute, "the model '%s' has no %s '%.100s', but a %s of that name%s%s%s",
-                 m->name, kind, first, given, accepted ? ": give it as attribute '" : "", accepted ? given : "",
-                 accepted ? "'" : "");
+    const int geom = !accepted && other == CAV_OBJECT_GEOM ? cav_object_find(m, other, first) : -1,
+              body = geom >= 0 ? m->geom[geom].body : 0;
+    char hint[HINT] = "";
+    if (accepted) snprintf(hint, sizeof hint, ": give it as attribute '%.40s'", given);
+    if (geom >= 0 && body > 0 && m->body[body].name)
+      snprintf(hint, sizeof hint, ", of body '%.100s'", m->body[body].name);
+    if (geom >= 0 && body == 0)
+      snprintf(hint, sizeof hint, " in the world itself: put it into a <body name=\"%.60s\"> of its own", first);
+    cav_xml_fail(reader->error, node, attribute, "the model '%s' has no %s '%.100s', but a %s of that name%s", m->name,
+                 kind, first, given, hint);
     return;
   }
   int n = 0;
