@@ -42,7 +42,7 @@ table() {
 
 if [ "$all" ]; then
   {
-    printf '# Problems that were not tuned\n\n`sh tests/unseen.sh`: the files of tests/unseen, each stated in minutes, start and goal and what is asked; solved by all strategies, one thread, stopped after 300 s.\n\n'
+    printf '# Problems that were not tuned\n\n`sh tests/unseen.sh`: the files of tests/unseen, each stated in minutes, start and goal and what is asked; solved by all strategies, one thread, stopped after 300 s. Debian'\''s MuJoCo cannot read Go1'\''s file.\n\n'
     printf -- '- machine: %s\n- commit: %s\n\n' "$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -1)" "$(git rev-parse --short HEAD)"
     table "$@"
   } >"$work/unseen.md"

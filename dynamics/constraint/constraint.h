@@ -15,15 +15,16 @@ struct cav_geom_cache *cav_geom_cache_new(const cav_model *model, int sweep_from
 void cav_geom_cache_free(struct cav_geom_cache *cache);
 size_t cav_geom_cache_bytes(const struct cav_geom_cache *cache);
 
-/// Broad and narrow phase over model->pair at the state's poses: fills pair, feature, dim, links, pos, frame, dist,
-/// margin, friction of state->contact and ncontact. collide.c. The activation distance of a pair is its margin, or
-/// where the smoothed law is active (cav_contact_activation), whichever is larger.
 /// Whether contacts that bear nothing at the velocities of links in the state need not be sought (state->work->narrowed
 /// asks for that): there are pairs that are sought so, and a law that tells.
 int cav_contacts_narrow(const cav_state *state);
 
 /// Whether a pair of the state's model has a mesh. collide.c.
 int cav_contacts_have_meshes(const cav_state *state);
+
+/// Broad and narrow phase over model->pair at the state's poses: fills pair, feature, dim, links, pos, frame, dist,
+/// margin, friction of state->contact and ncontact. collide.c. The activation distance of a pair is its margin, or
+/// where the smoothed law is active (cav_contact_activation), whichever is larger.
 cav_status cav_contacts_find(const cav_model *model, cav_state *state);
 
 /// Whether one of the two is a mesh.

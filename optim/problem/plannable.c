@@ -65,10 +65,14 @@ static double memory_most(void) {
   return most;
 }
 
-cav_status cav_knots_plannable(double knots, int dofs, cav_error *error) {
+double cav_knots_bytes(double knots, int dofs) {
   // of a knot: the inverse's derivatives, 3, and what is gathered from them, 9 blocks; the band of the normal equations
   // and its factors, 3 each
-  const double block = (double)dofs * dofs * sizeof(double), least = knots * (3 + 9 + 2 * 3) * block;
+  return knots * (3 + 9 + 2 * 3) * (double)dofs * dofs * sizeof(double);
+}
+
+cav_status cav_knots_plannable(double knots, int dofs, cav_error *error) {
+  const double least = cav_knots_bytes(knots, dofs);
   const double most = memory_most();
   if (least <= most) return CAV_OK;
   if (error) {

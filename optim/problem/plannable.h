@@ -13,6 +13,9 @@ cav_status cav_actuators_plannable(const cav_model *model, cav_error *error);
 /// any: fixed gain, affine bias, on a scalar joint or a fixed tendon. plannable.c.
 int cav_servo_bounds(const cav_model *model, int actuator);
 
+/// What derivatives and normal equations of so many knots of so many dofs take at least, bytes. plannable.c.
+double cav_knots_bytes(double knots, int dofs);
+
 /// Whether a plan of so many knots of so many dofs fits into the memory of the machine, and into what the process may
 /// take of it, before any is taken: CAV_BAD_INPUT with what it needs at least and what to do. plannable.c.
 cav_status cav_knots_plannable(double knots, int dofs, cav_error *error);

@@ -9,6 +9,7 @@
 #include "command.h"
 #include "file.h"
 #include "objects.h"
+#include "plannable.h"
 #include "quantity.h"
 #include "stand.h"
 #include "step.h"
@@ -395,10 +396,7 @@ static void print_stage_ends(const cav_stage_options *first, const cav_stage_opt
 }
 
 /// What the derivatives and normal equations of all knots take at least, bytes.
-static double bytes_of(const cav_problem *p) {
-  const double block = (double)p->model->nv * p->model->nv * sizeof(double);
-  return p->duration / p->timestep * 18 * block;
-}
+static double bytes_of(const cav_problem *p) { return cav_knots_bytes(p->duration / p->timestep + 1, p->model->nv); }
 
 // bytes from which on a problem is not evaluated to tell what that takes, and knots of which few motions have more
 static const double vast = 1e9;

@@ -1,6 +1,7 @@
 /// What of the world a motion leans on where neither its first nor its last knot does: a wall that can be stood on is stood
 /// on, and who asked for a way over it is told. And whether a motion whose guess flies does not: who asked for a height alone
-/// may get one that rears up to it. And whether a body that is asked up at a time is up on its toes.
+/// may get one that rears up to it. And whether a body that is asked up at a time is up on its toes, and what links of one body
+/// lean on each other.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

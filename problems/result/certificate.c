@@ -134,10 +134,13 @@ static void print_targets(FILE *out, const cav_problem *problem, const cav_term_
 // end errors of a closed loop, m, and effort that it asks for over what there is, from which a certificate is told to be narrow
 static const double at_the_edge = CAV_LOST_DISTANCE / 2, overasked = 6;
 
-static int asks_for(const cav_problem *problem, cav_quantity quantity) {
-  int n = 0;
-  for (int i = 0; i < problem->nterm; i++) n += problem->term[i].quantity == quantity && problem->term[i].weight > 0;
-  return n > 0;
+/// Whether forces of all contacts cost something.
+static int has_force_cost(const cav_problem *problem) {
+  for (int i = 0; i < problem->nterm; i++) {
+    const cav_term *term = &problem->term[i];
+    if (term->quantity == CAV_QUANTITY_FORCE && term->use == CAV_USE_COST && !term->body && term->weight > 0) return 1;
+  }
+  return 0;
 }
 
 void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verdict *v, const cav_term_report *report) {
@@ -191,7 +194,7 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
         "  note: certified at the edge: its closed loop ends up to %.2g m off (from %g it is lost) and asks for up to "
         "%.3g %% of what an actuator gives; %sless <limits effort> or a longer motion make it surer\n",
         astray, CAV_LOST_DISTANCE, 100 * v->feedback_effort_max,
-        asks_for(problem, CAV_QUANTITY_FORCE) ? "" : "<force weight=\"1\"/>, ");
+        has_force_cost(problem) ? "" : "<force weight=\"1\"/>, ");
   if (v->end_body[0])
     fprintf(out,
             "  note: it ends in motion: '%s' at %.2g m/s, turning at %.2g rad/s; whether that comes to rest, or falls, "
