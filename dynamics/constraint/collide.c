@@ -392,6 +392,7 @@ static inline cav_status collide_pair(const cav_model *model, cav_state *state, 
   if (c->sought && !near(cache, c, margin)) return CAV_OK;
   cav_touch touch[CAV_TOUCH_MAX];
   const cav_shape *a = shape_of(state, cache, c->first), *b = shape_of(state, cache, c->second);
+  if (cav_shapes_apart(a, b, margin)) return CAV_OK;
   int count =
       c->mesh ? cav_collide_again(a, b, margin, &cache->hint[c->pair], touch) : cav_collide_shapes(a, b, margin, touch);
   assert(count <= CAV_TOUCH_MAX);

@@ -39,6 +39,10 @@ static inline cav_shape cav_shape_of(const cav_model *model, const cav_geom *geo
 /// rest.
 int cav_collide_shapes(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch);
 
+/// Whether the capsules about two solids are a margin apart or farther: then cav_collide_shapes has no point. Of a capsule, an
+/// ellipsoid, a cylinder or a box against one of the last three; 0 for others, whose search takes no longer. pairs.c.
+int cav_shapes_apart(const cav_shape *a, const cav_shape *b, double margin);
+
 /// Where the last search of a pair of polyhedra ended: the corners of both that met, up to three of each, none: 0; or a
 /// direction along which they were further apart than was asked for, in the axes of a. It saves the next search and
 /// changes no answer.

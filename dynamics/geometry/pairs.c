@@ -247,8 +247,8 @@ static hull hull_of(const cav_shape *s) {
   return h;
 }
 
-// whether the capsules about two shapes are a margin apart or farther: then so are the shapes
-static int hulls_apart(const cav_shape *a, const cav_shape *b, double margin) {
+int cav_shapes_apart(const cav_shape *a, const cav_shape *b, double margin) {
+  if (a->type < CAV_GEOM_CAPSULE || b->type < CAV_GEOM_ELLIPSOID || b->type > CAV_GEOM_BOX) return 0;
   const hull ha = hull_of(a), hb = hull_of(b);
   segments g = {.lu = ha.half, .lw = hb.half};
   copy3(g.u, ha.along);
@@ -302,8 +302,6 @@ int cav_collide_again(const cav_shape *a, const cav_shape *b, double margin, cav
       {NULL}};
   routine *collide = table[a->type][b->type];
   int meshes = b->type == CAV_GEOM_MESH && a->type != CAV_GEOM_PLANE;
-  int search = a->type >= CAV_GEOM_CAPSULE && b->type >= CAV_GEOM_ELLIPSOID && b->type <= CAV_GEOM_BOX;
-  if (search && hulls_apart(a, b, margin)) return 0;
   int count = meshes ? cav_collide_mesh(a, b, margin, hint, touch) : collide ? collide(a, b, margin, touch) : 0;
   sort(touch, count);
   return count;
