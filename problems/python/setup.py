@@ -60,7 +60,7 @@ def built(folder):
     if not in_checkout():
         raise SystemExit(
             "cavort: no installed shared library of this version (pkg-config cavort), and no sources around this folder "
-            "to build it from. Install the library by 'meson setup build -Ddefault_library=shared && meson install -C build', "
+            "to build it from. Install the library by 'meson setup build -Ddefault_library=shared -Dtests=false && meson install -C build', "
             "or run pip on problems/python of a checkout"
         )
     for program in ("meson", "ninja"):
