@@ -10,7 +10,7 @@ static const char arm[] =
 
 typedef struct trial {
   cav_problem problem;
-  cav_term term[13];
+  cav_term term[14];
   double start[1], rest[1], goal[1], target[8], time[2];
   cav_guess_pose pose[2];
   cav_swing swing;
@@ -18,7 +18,7 @@ typedef struct trial {
 
 static cav_model *model;
 
-enum { OWN = 11 }; // the term that cases change
+enum { OWN = 12 }; // the term that cases change
 
 static void prepare(trial *t) {
   *t = (trial){.goal = {1}, .time = {0.1, 0.4}, .target = {0.5, 0.6, 0.7, 0, 0.5, 0.6, 0.7, 0}};
@@ -60,7 +60,7 @@ static void refused(trial *t, cav_status status, const char *words) {
   } while (0)
 
 static void test_terms(void) {
-  REFUSED(mine->scale = 0, "positive scale and a weight that is not negative, nor above 1e16: term[11], 'mine'");
+  REFUSED(mine->scale = 0, "positive scale and a weight that is not negative, nor above 1e16: term[12], 'mine'");
   REFUSED(mine->weight = INFINITY, "positive scale");
   REFUSED(mine->weight = NAN, "positive scale");
   REFUSED(mine->weight = 1e17, "nor above 1e16");
@@ -76,7 +76,7 @@ static void test_terms(void) {
   REFUSED(mine->sensor.object = 7, "looks at nothing in the model");
   REFUSED(mine->sensor.object = -1, "looks at nothing in the model");
   REFUSED((mine->sensor.referred = 1, mine->sensor.reference = 99), "in the frame of nothing");
-  REFUSED(t.target[2] = NAN, "target that is not finite: term[11], 'mine'");
+  REFUSED(t.target[2] = NAN, "target that is not finite: term[12], 'mine'");
   REFUSED((mine->sensor.type = CAV_SENSOR_FRAMEQUAT, mine->sensor.dim = 4, memset(t.target, 0, sizeof t.target)),
           "length zero");
   REFUSED((mine->nwaypoint = 2), "no times");

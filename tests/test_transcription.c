@@ -123,7 +123,7 @@ static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) 
   cav_term base = term[0];
   base.quantity = CAV_QUANTITY_SENSOR;
   base.weight = 3;
-  for (int kind = 0; kind < 19; kind++) {
+  for (int kind = 0; kind < 20; kind++) {
     cav_term *t = &term[n++];
     *t = base;
     t->scale = 0.5 + 0.1 * kind;
@@ -150,6 +150,7 @@ static int fill_terms(const cav_model *m, const cav_problem *p, cav_term *term) 
     if (kind == 13) t->quantity = CAV_QUANTITY_SLIP, t->target = NULL, t->body = trunk;
     if (kind == 14) t->quantity = CAV_QUANTITY_ACCELERATION, t->use = CAV_USE_EQUAL, t->target = NULL, t->scale = 50;
     if (kind == 17) t->quantity = CAV_QUANTITY_SELF_FORCE, t->target = NULL;
+    if (kind == 19) t->quantity = CAV_QUANTITY_CLEARANCE, t->target = NULL, t->scale = 0.05;
     if (kind == 18) t->quantity = CAV_QUANTITY_EDGE_FORCE, t->target = NULL, t->scale = 0.05;
     if (kind == 15 || kind == 16) t->quantity = CAV_QUANTITY_POWER, t->target = NULL, t->scale = 0.3;
     if (kind == 16) t->norm = CAV_NORM_ABSOLUTE, t->scale = 0.05;

@@ -324,6 +324,8 @@ static double reach(const cav_model *model, const cav_state *state, int p, doubl
   double delta =
       state->options.smoothing > 0 ? c->external ? state->options.smoothing : state->options.smoothing_self : 0;
   double far = c->margin + fmax(most / stiff, (most + kept_gap * margin) / fmax(stiff, 1 / h)) + CAV_LAW_END * delta;
+  // what passes over the world is listed for its clearance, too
+  if (!a->geom->link || !b->geom->link) far = fmax(far, CAV_CLEARANCE);
   return far < margin ? far : margin;
 }
 

@@ -79,6 +79,7 @@ static const cav_term default_term[] = {
     {.name = "slip", .quantity = CAV_QUANTITY_SLIP, .weight = 200},
     {.name = "impact", .quantity = CAV_QUANTITY_IMPACT, .weight = 10},
     {.name = "edge_force", .quantity = CAV_QUANTITY_EDGE_FORCE, .weight = 10},
+    {.name = "clearance", .quantity = CAV_QUANTITY_CLEARANCE, .weight = 10},
     {.name = "self_penetration", .quantity = CAV_QUANTITY_SELF_PENETRATION, .weight = 1e6},
 };
 

@@ -4,7 +4,7 @@
 
 #include "cavort/problem.h"
 
-enum { CAV_DEFAULT_TERMS = 11 }; ///< default costs
+enum { CAV_DEFAULT_TERMS = 12 }; ///< default costs
 
 /// Ready sets of running costs, X(style, word, text): weights in the place of some defaults, and costs beside them.
 #define CAV_STYLES(X)                                                         \

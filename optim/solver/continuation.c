@@ -303,6 +303,11 @@ int cav_run_met(const cav_solve_run *run) {
   return holds(&is, &most);
 }
 
+int cav_run_exact(const cav_solve_run *run) {
+  const violation is = measure(run->tr);
+  return cav_run_met(run) && fmax(is.effort, is.range) <= 0.5 * CAV_TOLERANCE_LIMIT;
+}
+
 cav_status cav_augmented_lagrangian(cav_solve_run *run) {
   violation most = allowed(run);
   most.unactuated = fmax(most.unactuated, near);

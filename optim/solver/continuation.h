@@ -122,8 +122,9 @@ cav_status cav_minimise_infeasibility(cav_solve_run *run);
 /// Violation that planning leaves room for, by kind of row: what is planned with headroom may use half of it.
 void cav_run_allowed(const cav_solve_run *run, double allowed[CAV_BINDING_KINDS]);
 
-/// Whether every row holds to that at the last values.
+/// Whether every row holds to that at the last values; whether limits hold without that headroom, too, as certificates ask.
 int cav_run_met(const cav_solve_run *run);
+int cav_run_exact(const cav_solve_run *run);
 
 /// Appends a line to the log and tells the observer; nonzero if it asks to stop. Region's report.
 int cav_run_report(void *run, double step, double radius);

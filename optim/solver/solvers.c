@@ -96,7 +96,7 @@ static cav_status improve(cav_solve_run *run, cav_error *error) {
   // a restoration leaves the values of its own rows, without costs
   cav_status values = ended ? cav_transcription_values(run->tr, run->at) : CAV_OK;
   if (values != CAV_OK) status = values;
-  if (ended && values == CAV_OK && !(cav_run_met(run) && cav_transcription_cost(run->tr) <= cost)) {
+  if (ended && values == CAV_OK && !(cav_run_exact(run) && cav_transcription_cost(run->tr) <= cost)) {
     cav_trajectory *dearer = run->at;
     run->at = kept, kept = dearer;
     run->measured = 0;

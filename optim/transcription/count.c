@@ -14,12 +14,12 @@ typedef struct contact_part {
 
 /// n 0: not a cost of contacts.
 static contact_part contact_part_of(cav_quantity quantity) {
-  enum { SELF = CAV_WITHIN_TREE, EDGE = CAV_AT_EDGE };
+  enum { SELF = CAV_WITHIN_TREE, EDGE = CAV_AT_EDGE, IDLE = CAV_IDLE };
   static const contact_part part[CAV_QUANTITY_TYPES] = {
-      [CAV_QUANTITY_GAP] = {0, 1, SELF, 0},           [CAV_QUANTITY_SLIP] = {1, 2, SELF, 0},
-      [CAV_QUANTITY_IMPACT] = {3, 1, SELF, 0},        [CAV_QUANTITY_SELF_PENETRATION] = {0, 1, SELF, SELF},
-      [CAV_QUANTITY_FORCE] = {4, 1, SELF, 0},         [CAV_QUANTITY_SELF_FORCE] = {4, 1, SELF, SELF},
-      [CAV_QUANTITY_EDGE_FORCE] = {5, 1, EDGE, EDGE},
+      [CAV_QUANTITY_GAP] = {0, 1, SELF | IDLE, 0},           [CAV_QUANTITY_SLIP] = {1, 2, SELF | IDLE, 0},
+      [CAV_QUANTITY_IMPACT] = {3, 1, SELF | IDLE, 0},        [CAV_QUANTITY_SELF_PENETRATION] = {0, 1, SELF, SELF},
+      [CAV_QUANTITY_FORCE] = {4, 1, SELF | IDLE, 0},         [CAV_QUANTITY_SELF_FORCE] = {4, 1, SELF, SELF},
+      [CAV_QUANTITY_EDGE_FORCE] = {5, 1, EDGE | IDLE, EDGE}, [CAV_QUANTITY_CLEARANCE] = {6, 2, CAV_CLEARS, CAV_CLEARS},
   };
   assert(part[quantity].first + part[quantity].n <= CAV_CONTACT_READINGS);
   return part[quantity];
@@ -32,7 +32,7 @@ typedef struct row_count {
 
 int cav_knot_stands_alone(const cav_force_row *form) { return form->n != 1; }
 
-/// Whether a term of slip lets a contact of two links slide at knot t that no actuator moves: the floor under a box.
+/// Whether a term of slip lets a contact of two links slide at knot t: the floor under a box.
 static int frees(const cav_transcription *tr, const cav_term *term, int t, int link1, int link2) {
   if (term->quantity != CAV_QUANTITY_SLIP || term->body <= 0 || !(term->within > 0)) return 0;
   int link = tr->model->body[term->body].link;
@@ -40,17 +40,18 @@ static int frees(const cav_transcription *tr, const cav_term *term, int t, int l
 }
 
 /// Whether a term counts the k-th contact of knot t, key [2*contacts]: of a body that moves those of its link, of one that is
-/// fixed to the world those of its own geoms. One of slip over all contacts leaves those that another
-/// term frees.
+/// fixed to the world those of its own geoms. One of slip over all contacts leaves those of what no actuator moves that another
+/// term frees, one of clearance all that it frees.
 static int counts(const cav_transcription *tr, const int *key, const cav_term *term, int t, int k) {
   const cav_model *m = tr->model;
-  if (term->body <= 0 && term->quantity != CAV_QUANTITY_SLIP) return 1;
+  const int clearance = term->quantity == CAV_QUANTITY_CLEARANCE;
+  if (term->body <= 0 && term->quantity != CAV_QUANTITY_SLIP && !clearance) return 1;
   const cav_pair *pair = &m->pair[key[2 * k]];
   const cav_geom *one = &m->geom[pair->geom1], *two = &m->geom[pair->geom2];
   int link = m->body[term->body].link, link1 = one->link, link2 = two->link;
   if (term->body > 0 && link == 0) return one->body == term->body || two->body == term->body;
   if (term->body > 0) return link1 == link || link2 == link;
-  if (term->quantity != CAV_QUANTITY_SLIP || m->link[link1].driven || m->link[link2].driven) return 1;
+  if (!clearance && (m->link[link1].driven || m->link[link2].driven)) return 1;
   for (int i = 0; i < tr->problem->nterm; i++)
     if (frees(tr, &tr->problem->term[i], t, link1, link2)) return 0;
   return 1;
@@ -96,6 +97,7 @@ static row_count cost_rows(const cav_transcription *tr, cav_scratch *s, const ca
     case CAV_QUANTITY_SELF_PENETRATION:
     case CAV_QUANTITY_FORCE:
     case CAV_QUANTITY_EDGE_FORCE:
+    case CAV_QUANTITY_CLEARANCE:
     case CAV_QUANTITY_SELF_FORCE:
       for (int k = 0; k < knot->ncontact; k++) {
         const int readings = cav_knot_contact(tr, s->key, term, t, k, &first);
@@ -134,7 +136,7 @@ static row_count knot_rows(const cav_transcription *tr, cav_scratch *s, int t) {
   if (tr->constraints_only) return n;
   n.rows += (size_t)cav_knot_has_duration(tr, t);
   for (int k = 0; k < tr->knot[t].ncontact && tr->depth_weight > 0; k++)
-    if (!(tr->knot[t].moving[k] & CAV_WITHIN_TREE)) n.rows++, n.dense++, s->used[k] |= 1;
+    if (!(tr->knot[t].moving[k] & (CAV_WITHIN_TREE | CAV_IDLE))) n.rows++, n.dense++, s->used[k] |= 1;
   for (int k = 0; k < tr->npenalised && tr->knot[t].has_force; k++)
     n.rows++, n.dense += cav_knot_stands_alone(&tr->penalised[k]);
   for (int i = 0; i < tr->problem->nterm; i++) {

@@ -436,7 +436,7 @@ static void add_depths(cav_sum *a) {
   double weight = a->tr->depth_weight * a->tr->options.timestep;
   for (int k = 0; k < a->knot->ncontact && weight > 0; k++) {
     int row = CAV_CONTACT_READINGS * k;
-    if (a->knot->moving[k] & CAV_WITHIN_TREE) continue;
+    if (a->knot->moving[k] & (CAV_WITHIN_TREE | CAV_IDLE)) continue;
     double r = fmin(a->knot->y[row], 0), w = r < 0 ? weight : 0;
     begin_row(a, w, r);
     add_reading(a, w, r, row);
@@ -477,6 +477,7 @@ static void add_cost(cav_sum *a, const cav_term *term, double weight, int readin
     case CAV_QUANTITY_SELF_PENETRATION:
     case CAV_QUANTITY_FORCE:
     case CAV_QUANTITY_EDGE_FORCE:
+    case CAV_QUANTITY_CLEARANCE:
     case CAV_QUANTITY_SELF_FORCE:
       add_contact(a, term, weight);
       break;

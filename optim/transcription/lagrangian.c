@@ -74,7 +74,7 @@ static void pull_costs(const cav_transcription *tr, const int *key, int t, doubl
   double depth = factor * tr->depth_weight * tr->options.timestep;
   for (int k = 0; k < knot->ncontact && depth > 0; k++) {
     int r = CAV_CONTACT_READINGS * k;
-    if (!(knot->moving[k] & CAV_WITHIN_TREE)) pull[tr->nv + r] += depth * fmin(knot->y[r], 0);
+    if (!(knot->moving[k] & (CAV_WITHIN_TREE | CAV_IDLE))) pull[tr->nv + r] += depth * fmin(knot->y[r], 0);
   }
   for (int k = 0; k < tr->npenalised && knot->has_force; k++)
     pull_force(&tr->penalised[k], factor * tr->options.timestep * force_of(&tr->penalised[k], knot->u), pull);

@@ -3,6 +3,7 @@
 /// of one's own without Jacobian) is
 /// differenced instead, only that, and counted; nothing else is mixed.
 #include "readings.h"
+#include "clearance.h"
 #include "quantity.h"
 #include "recorded.h"
 #include "rotation.h"
@@ -38,6 +39,12 @@ static int is_deep(const cav_transcription *tr, const cav_contact *c) {
   return tr->depth_weight > 0 && c->dist < -CAV_DEPTH_FREE;
 }
 
+/// Whether a driven link passes over the world there, near enough for its speed to cost.
+static int clears(const cav_transcription *tr, const cav_contact *c) {
+  return tr->clearance > 0 && c->dist < tr->clearance && c->dim > 1 &&
+         cav_pair_clears(tr->model, &tr->model->pair[c->pair]);
+}
+
 static void read_contact(const cav_transcription *tr, const cav_contact *c, double *y) {
   memset(y, 0, CAV_CONTACT_READINGS * sizeof *y);
   if (!tr->model->pair[c->pair].external) {
@@ -52,6 +59,10 @@ static void read_contact(const cav_transcription *tr, const cav_contact *c, doub
   y[3] = fraction * c->velocity_next[0];
   y[4] = fmax(c->impulse[0], 0) / (tr->options.timestep * tr->weight);
   if (tr->edges) y[5] = cav_edge_nearness(tr->model, tr->edges, c, NULL) * y[4];
+  if (!clears(tr, c)) return;
+  const double near = cav_clearance_nearness(tr->clearance, c->dist, NULL);
+  y[6] = near * c->velocity_next[1];
+  y[7] = near * c->velocity_next[2];
 }
 
 static void read_knot(const cav_model *model, cav_state *state, void *context, double *value) {
@@ -112,9 +123,11 @@ int cav_readings_list(cav_transcription *tr, cav_scratch *s, int t) {
       const cav_contact *c = &s->state->contact[k];
       int self = !tr->model->pair[c->pair].external;
       int idle = c->impulse[0] < contact_floor * tr->options.timestep * tr->weight && !is_deep(tr, c);
-      if (self ? c->dist > 0 && (idle || !tr->self_force) : idle) continue;
+      const int clear = !self && clears(tr, c);
+      if (self ? c->dist > 0 && (idle || !tr->self_force) : idle && !clear) continue;
       const int edge = !self && tr->edges && cav_edge_nearness(tr->model, tr->edges, c, NULL) > 0;
-      moving[ncontact] = (char)(CAV_WITHIN_TREE * self | CAV_AT_EDGE * edge);
+      moving[ncontact] =
+          (char)(CAV_WITHIN_TREE * self | CAV_AT_EDGE * edge | CAV_CLEARS * clear | CAV_IDLE * (!self && idle));
       s->key[2 * ncontact] = c->pair;
       s->key[2 * ncontact++ + 1] = c->feature;
     }
@@ -216,11 +229,34 @@ static void edge_rows(const cav_transcription *tr, const cav_contact *c, const c
     for (size_t j = 0; j < n; j++) out.dq[j] += force * gradient[k] * d->pos_dq[k * n + j];
 }
 
-/// The readings of a contact: sqrt(f_n) times gap, slip and normal velocity; f_n; f_n at an edge. Those that are used, by bits.
+/// The last readings of a contact, its speed along the world times how near it is.
+static void clearance_rows(const cav_transcription *tr, const cav_contact *c, const cav_contact_derivative *d,
+                           rows out) {
+  int n = tr->nv;
+  double slope, near = cav_clearance_nearness(tr->clearance, c->dist, &slope);
+  for (int k = 1; k < 3; k++) {
+    const size_t at = (size_t)(k - 1) * (size_t)n;
+    blend_body(n, slope * c->velocity_next[k], d->dist_dq, near, 1, d->velocity_dq + k * n, out.dq + at);
+    memset(out.dv + at, 0, (size_t)n * sizeof(double));
+    blend_body(n, near, d->velocity_dv_next + k * n, 0, 0, NULL, out.dn + at);
+  }
+}
+
+/// The readings of a contact: sqrt(f_n) times gap, slip and normal velocity; f_n; f_n at an edge; clearance. Those that are used,
+/// by bits.
 static cav_status contact_rows(const cav_transcription *tr, const cav_scratch *s, const cav_contact *c, unsigned used,
                                rows out) {
   size_t n = (size_t)tr->nv, nv = n;
   double *at = s->derivative;
+  const unsigned clearance = used >> 6;
+  used &= 63;
+  if (clearance) {
+    cav_contact_derivative d = {.dist_dq = at, .velocity_dq = at + n, .velocity_dv_next = at + 7 * n};
+    cav_status status = cav_contact_derivatives(tr->model, s->state, (int)(c - s->state->contact), &d);
+    if (status != CAV_OK) return status;
+    clearance_rows(tr, c, &d, (rows){out.dq + 6 * n, out.dv + 6 * n, out.dn + 6 * n});
+    if (!used) return CAV_OK;
+  }
   _Static_assert(31 + 3 == CAV_DERIVATIVE_ROWS, "the last of these arrays ends where the scratch does");
   cav_contact_derivative d = {.dist_dq = at,
                               .velocity_dq = at + n,

@@ -5,6 +5,7 @@
 /// Derivatives of u, contacts and sensors come from readings.c; those of v, accelerations, postures and ranges are
 /// exact. Constraint rows enter the merit by an augmented Lagrangian of two-sided rows: with z~ = z + multiplier/rho
 /// and e = z~ - clamp(z~), the row costs rho/2 e^2 and its next multiplier is rho e (Powell, Hestenes, Rockafellar).
+#include "clearance.h"
 #include "knot.h"
 #include "math3.h"
 #include "rotation.h"
@@ -257,6 +258,18 @@ static int has_running_cost(const cav_problem *problem) {
   return 0;
 }
 
+/// How far over the world speed along it costs: nowhere without a cost of it, or where slip costs nothing.
+static double clearance_of(const cav_problem *problem) {
+  int clear = 0, hold = 0;
+  for (int i = 0; i < problem->nterm; i++) {
+    const cav_term *term = &problem->term[i];
+    if (term->use != CAV_USE_COST || !(term->weight > 0)) continue;
+    clear |= term->quantity == CAV_QUANTITY_CLEARANCE;
+    hold |= term->quantity == CAV_QUANTITY_SLIP;
+  }
+  return clear && hold ? cav_clearance_height(problem->timestep) : 0;
+}
+
 cav_transcription *cav_transcription_new(const cav_problem *problem, int threads, cav_error *error) {
   if (cav_actuators_plannable(problem->model, error) != CAV_OK) return NULL;
   const double knots = round(problem->duration / problem->timestep) + 1;
@@ -267,6 +280,7 @@ cav_transcription *cav_transcription_new(const cav_problem *problem, int threads
   if (!tr) goto memory;
   tr->problem = problem;
   for (int i = 0; i < problem->nterm; i++) tr->self_force |= problem->term[i].quantity == CAV_QUANTITY_SELF_FORCE;
+  tr->clearance = clearance_of(problem);
   tr->model = problem->model;
   tr->nv = problem->model->nv;
   for (int i = 0; i < problem->nterm && !tr->edges; i++)

@@ -45,10 +45,11 @@ typedef struct cav_absolute {
 
 enum { CAV_ROTATION_SIZE = 21 };
 
-/// Readings of a contact: gap or depth, slip (2), impact, force.
-enum { CAV_CONTACT_READINGS = 6 };
-/// Of a contact that is read: between two links of one tree, its first reading is the depth; near an edge of a box of the world.
-enum { CAV_WITHIN_TREE = 1, CAV_AT_EDGE = 2 };
+/// Readings of a contact: gap or depth, slip (2), impact, force, force at an edge, clearance (2).
+enum { CAV_CONTACT_READINGS = 8 };
+/// Of a contact that is read: between two links of one tree, its first reading is the depth; near an edge of a box of the world;
+/// of a driven link that has to keep clear of the world; one that bears nothing, read for that alone.
+enum { CAV_WITHIN_TREE = 1, CAV_AT_EDGE = 2, CAV_CLEARS = 4, CAV_IDLE = 8 };
 
 /// Depth of a contact with the world that costs nothing where depth costs, m.
 #define CAV_DEPTH_FREE 0.004
@@ -68,7 +69,7 @@ typedef struct cav_knot {
   int nread, ncontact; ///< readings beside u: CAV_CONTACT_READINGS a contact, then sensors
   int room;            ///< readings for which y has space
   int moving_room;
-  char *moving;           ///< [ncontact] bits: CAV_WITHIN_TREE, CAV_AT_EDGE
+  char *moving;           ///< [ncontact] bits: CAV_WITHIN_TREE, CAV_AT_EDGE, CAV_CLEARS, CAV_IDLE
   double *y;              ///< [nread]
   int nrow;               ///< rows of costs and constraints
   int ndense, dense_most; ///< rows over all columns, weighted, that make up the Hessian beside the sparse ones; at most
@@ -141,6 +142,7 @@ typedef struct cav_transcription {
   char *selected;     ///< [nterm*nv] 1: the term selects the dof
   cav_penalties penalty;
   int self_force;                   ///< 1: a term asks for forces between links of one tree
+  double clearance;                 ///< m over the world in which speed along it costs; 0: nowhere
   cav_edges *edges;                 ///< NULL: no term asks for forces at edges
   double depth_weight;              ///< 1/(m^2 s), of depth in the world beyond CAV_DEPTH_FREE; 0: none
   cav_derivative derivative;        ///< of u, contacts and sensors

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "clearance.h"
 #include "verification.h"
 
 // time of a knot for windows and targets: a fraction of the problem's duration, whatever the step has become
@@ -228,12 +229,39 @@ double cav_verification_may_slide(const cav_verification *verification, int t, c
   return speed;
 }
 
+// whether a term of slip that names a body of the pair lets it slide
+static int is_let(const cav_verification *verification, int t, const cav_pair *pair) {
+  const cav_problem *problem = verification->problem;
+  const cav_model *model = verification->model;
+  int single, whole, let = 0;
+  for (int i = 0; i < problem->nterm && !let; i++) {
+    const cav_term *term = problem->term + i;
+    const int link = model->body[term->body].link;
+    if (term->quantity != CAV_QUANTITY_SLIP || term->body <= 0 || !(term->within > 0)) continue;
+    if (link != model->geom[pair->geom1].link && link != model->geom[pair->geom2].link) continue;
+    let = cav_verification_holds(verification, term, t, &single, &whole);
+  }
+  return let;
+}
+
+// whether slip costs anything: what may slide everywhere need not keep clear
+static int holds_still(const cav_problem *problem) {
+  int costs = 0;
+  for (int i = 0; i < problem->nterm; i++) {
+    const cav_term *term = problem->term + i;
+    costs |= term->quantity == CAV_QUANTITY_SLIP && term->use == CAV_USE_COST && term->weight > 0;
+  }
+  return costs;
+}
+
 int cav_verification_looks_at(const cav_verification *verification, const cav_term *term, int t,
                               const cav_contact *contact) {
   const cav_model *model = verification->model;
   const cav_pair *pair = model->pair + contact->pair;
   int self = term->quantity == CAV_QUANTITY_SELF_PENETRATION || term->quantity == CAV_QUANTITY_SELF_FORCE;
   if (pair->external == self) return 0;
+  if (term->quantity == CAV_QUANTITY_CLEARANCE && !(cav_pair_clears(model, pair) && holds_still(verification->problem)))
+    return 0;
   if (term->quantity == CAV_QUANTITY_EDGE_FORCE && !(cav_edge_nearness(model, verification->edges, contact, NULL) > 0))
     return 0;
   int link = model->body[term->body].link;
@@ -241,6 +269,7 @@ int cav_verification_looks_at(const cav_verification *verification, const cav_te
   if (term->body > 0 && link == 0)
     return model->geom[pair->geom1].body == term->body || model->geom[pair->geom2].body == term->body;
   if (term->body > 0) return contact->link1 == link || contact->link2 == link;
+  if (term->quantity == CAV_QUANTITY_CLEARANCE) return !is_let(verification, t, pair);
   return term->quantity != CAV_QUANTITY_SLIP || !is_idle(model, contact) ||
          !(cav_verification_may_slide(verification, t, contact, 1) > 0);
 }
@@ -252,6 +281,11 @@ int cav_verification_contact(const cav_verification *verification, const cav_ter
   value[0] = load * fmax(contact->dist, 0);
   if (term->quantity == CAV_QUANTITY_SLIP) {
     for (int k = 0; k < 2; k++) value[k] = contact->dim > 1 ? load * rate[1 + k] : 0;
+    return 2;
+  }
+  if (term->quantity == CAV_QUANTITY_CLEARANCE) {
+    const double near = cav_clearance_nearness(cav_clearance_height(verification->h), contact->dist, NULL);
+    for (int k = 0; k < 2; k++) value[k] = contact->dim > 1 ? near * rate[1 + k] : 0;
     return 2;
   }
   if (term->quantity == CAV_QUANTITY_IMPACT) value[0] = load * rate[0];
@@ -357,6 +391,7 @@ int cav_verification_measure(const cav_verification *verification, const cav_ter
     case CAV_QUANTITY_SELF_PENETRATION:
     case CAV_QUANTITY_FORCE:
     case CAV_QUANTITY_EDGE_FORCE:
+    case CAV_QUANTITY_CLEARANCE:
     case CAV_QUANTITY_SELF_FORCE:
       return forced ? contact_values(verification, term, t, x, target) : 0;
     case CAV_QUANTITY_TRACK:

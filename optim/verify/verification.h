@@ -154,7 +154,7 @@ int cav_verification_looks_at(const cav_verification *verification, const cav_te
 /// names a body which no actuator moves lets it slide over what none moves either. constraint_check.c.
 double cav_verification_may_slide(const cav_verification *verification, int t, const cav_contact *contact, int named);
 
-/// What a term over contacts measures of one: one value, of slip two. constraint_check.c.
+/// What a term over contacts measures of one: one value, of slip and clearance two. constraint_check.c.
 int cav_verification_contact(const cav_verification *verification, const cav_term *term, const cav_contact *contact,
                              double value[2]);
 
