@@ -1,6 +1,6 @@
-/// What passes over the world: how near it is, against its closed form and differences; what the verifier and the planner make of
-/// a ball that flies over the ground at a known height and speed; whom it is not asked of; and that a ball which goes from place to
-/// place over the ground is carried higher for it.
+/// What passes over the world: how near it is, against its closed form and differences; what the verifier and the planner
+/// make of a ball that flies over the ground at a known height and speed; whom it is not asked of; and that a ball which goes
+/// from place to place over the ground is carried higher for it.
 #include "clearance.h"
 #include "transcription.h"
 

@@ -1,6 +1,6 @@
-/// How near what passes over the world is to it. A foot that swings costs nothing wherever it does not touch, so an optimum carries it
-/// as low as the tail of the contact law lets it, some millimetres at several metres a second, where whatever goes a little
-/// otherwise trips (optim/METHOD.md, 4).
+/// How near what passes over the world is to it. A foot that swings costs nothing wherever it does not touch, so an optimum
+/// carries it as low as the tail of the contact law lets it, some millimetres at several metres a second, where whatever goes
+/// a little otherwise trips (optim/METHOD.md, 4).
 #include "clearance.h"
 
 #include <math.h>

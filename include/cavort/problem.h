@@ -435,7 +435,8 @@ CAV_API int cav_configuration_clip(const cav_model *model, double *q);
 /// Weights, schedule and options that serve all motions; the caller sets duration, start, goal and terms. Owns nothing.
 CAV_API cav_problem cav_problem_default(const cav_model *model);
 
-/// The running costs that serve all motions: effort, velocities, accelerations, posture, gap, slip, impact, overlap.
+/// The running costs that serve all motions: effort, velocities, accelerations, posture, gap, slip, impact, force at edges,
+/// clearance, self-penetration.
 /// Writes the first most of them to term (may be NULL if most is 0) and returns how many there are.
 CAV_API int cav_problem_default_terms(cav_term *term, int most);
 

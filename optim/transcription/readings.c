@@ -233,10 +233,10 @@ static void edge_rows(const cav_transcription *tr, const cav_contact *c, const c
 static void clearance_rows(const cav_transcription *tr, const cav_contact *c, const cav_contact_derivative *d,
                            rows out) {
   int n = tr->nv;
-  double slope, near = cav_clearance_nearness(tr->clearance, c->dist, &slope);
+  double by_gap, near = cav_clearance_nearness(tr->clearance, c->dist, &by_gap);
   for (int k = 1; k < 3; k++) {
     const size_t at = (size_t)(k - 1) * (size_t)n;
-    blend_body(n, slope * c->velocity_next[k], d->dist_dq, near, 1, d->velocity_dq + k * n, out.dq + at);
+    blend_body(n, by_gap * c->velocity_next[k], d->dist_dq, near, 1, d->velocity_dq + k * n, out.dq + at);
     memset(out.dv + at, 0, (size_t)n * sizeof(double));
     blend_body(n, near, d->velocity_dv_next + k * n, 0, 0, NULL, out.dn + at);
   }
