@@ -23,9 +23,14 @@ static int floats(const cav_model *model, int link) {
   return 0;
 }
 
+// planes of the world and height fields
+static int is_ground(const cav_geom *geom) {
+  return geom->link == 0 && (geom->type == CAV_GEOM_PLANE || geom->type == CAV_GEOM_HFIELD);
+}
+
 int cav_pair_clears(const cav_model *model, const cav_pair *pair) {
-  const int one = model->geom[pair->geom1].link, two = model->geom[pair->geom2].link;
-  return (one == 0 && floats(model, two)) || (two == 0 && floats(model, one));
+  const cav_geom *one = model->geom + pair->geom1, *two = model->geom + pair->geom2;
+  return (is_ground(one) && floats(model, two->link)) || (is_ground(two) && floats(model, one->link));
 }
 
 double cav_clearance_nearness(double height, double gap, double *derivative) {

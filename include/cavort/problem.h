@@ -24,7 +24,7 @@ extern "C" {
   X(GAP, gap, CONTACTS, ACCELERATION, 0, "m", "gap of loaded contacts", "sqrt(f_n/weight) * max(gap, 0) of every contact: force only where there is touch") \
   X(SLIP, slip, CONTACTS, ACCELERATION, 0, "m/s", "slip of loaded contacts", "sqrt(f_n/weight) * tangential velocity of every contact") \
   X(IMPACT, impact, CONTACTS, ACCELERATION, 0, "m/s", "impact of loaded contacts", "sqrt(f_n/weight) * normal velocity of every contact") \
-  X(CLEARANCE, clearance, CONTACTS, ACCELERATION, 0, "m/s", "clearance over the world", "tangential velocity of every point that passes over the world within 3 cm, fading over these, of trees that actuators move and whose root floats: swinging feet are lifted; not of what a term of slip lets slide, and nothing where slip costs nothing") \
+  X(CLEARANCE, clearance, CONTACTS, ACCELERATION, 0, "m/s", "clearance over the ground", "tangential velocity of every point that passes over planes and height fields of the world within 3 cm, fading over these, of trees that actuators move and whose root floats: swinging feet are lifted; not of what a term of slip lets slide, and nothing where slip costs nothing") \
   X(SELF_PENETRATION, self_penetration, CONTACTS, ACCELERATION, 0, "m", "self-penetration", "depth of every contact between two links of one tree") \
   X(FORCE, force, CONTACTS, ACCELERATION, 0, "of weight", "force of contacts", "normal force of every contact between trees or with the world") \
   X(EDGE_FORCE, edge_force, CONTACTS, ACCELERATION, 0, "of weight", "force at edges", "normal force of every contact with a box of the world at an edge of it, fading over the 3 cm beside; edges where the next box or the ground begins are none") \
