@@ -234,7 +234,7 @@ def test_refused(arm, swing):
         ({"scale": 0.0}, "positive scale"),
         ({"within": -1.0}, "within"),
         ({"waypoints": [(0.5, [0, 0, 0]), (0.2, [1, 0, 0])]}, "do not increase"),
-        ({"target": [0, np.nan, 0], "name": "mine"}, r"not finite: term\[11\], 'mine'"),
+        ({"target": [0, np.nan, 0], "name": "mine"}, r"not finite: term\[12\], 'mine'"),
     ):
         wrong = built(arm)
         wrong.terms.pop()
