@@ -94,6 +94,22 @@ static double measured(flight *f, double *cost) {
   return most;
 }
 
+/// What the planner makes of it, with no other cost but next to nothing for slip.
+static double planned(flight *f) {
+  cav_problem p = f->problem;
+  cav_term term[2] = {f->term[f->clearance], f->term[f->slip]};
+  cav_error error = {0};
+  term[1].weight = 1e-30;
+  p.term = term, p.nterm = 2;
+  cav_transcription *tr = cav_transcription_new(&p, 1, &error);
+  if (!CHECK(tr != NULL)) return NAN;
+  tr->options.stabilisation = CAV_STABILISATION_DISCRETE, tr->options.softness = 0.01;
+  CHECK(cav_transcription_values(tr, f->motion) == CAV_OK);
+  const double cost = cav_transcription_cost(tr);
+  cav_transcription_free(tr);
+  return cost;
+}
+
 static void test_measure(const cav_model *m) {
   const double gap[] = {0.006, 0.015, 0.04}, near[] = {0.64, 0.25, 0}, speed = 2;
   for (int i = 0; i < 3; i++) {
@@ -103,6 +119,7 @@ static void test_measure(const cav_model *m) {
     // of the three balls the one that hangs on what floats; weight 10, half of the square over the ten steps that have forces
     CHECK_NEAR(measured(&f, &cost), near[i] * speed, 1e-9);
     CHECK_NEAR(cost, 0.5 * 10 * near[i] * speed * near[i] * speed * 0.02 * 10, 1e-9);
+    CHECK_NEAR(planned(&f), cost, 1e-9);
     // what a term of slip lets slide, and nothing where slip costs nothing
     cav_term *let = &f.term[f.problem.nterm];
     *let = cav_term_cost(CAV_QUANTITY_SLIP, 0);

@@ -324,8 +324,9 @@ static double reach(const cav_model *model, const cav_state *state, int p, doubl
   double delta =
       state->options.smoothing > 0 ? c->external ? state->options.smoothing : state->options.smoothing_self : 0;
   double far = c->margin + fmax(most / stiff, (most + kept_gap * margin) / fmax(stiff, 1 / h)) + CAV_LAW_END * delta;
-  // what passes over the world is listed for its clearance, too
-  if (!a->geom->link || !b->geom->link) far = fmax(far, CAV_CLEARANCE);
+  // what passes over the ground is listed for its clearance, too
+  const cav_geom *ground = c->plane ? a->geom : b->geom;
+  if (!ground->link && (c->plane || ground->type == CAV_GEOM_HFIELD)) far = fmax(far, CAV_CLEARANCE);
   return far < margin ? far : margin;
 }
 

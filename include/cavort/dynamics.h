@@ -10,7 +10,8 @@
 extern "C" {
 #endif
 
-/// m: contacts with the world are listed at least as far as this, or 5 m/s times the step, though nothing bears there.
+/// m: contacts with planes and height fields of the world are listed at least as far as this, or 5 m/s times the step, though
+/// nothing bears there.
 #define CAV_CLEARANCE 0.03
 
 /// One contact point at (q, v, v_next). Impulses act on geom2 (and reversed on geom1) along the axes of frame.

@@ -229,21 +229,6 @@ double cav_verification_may_slide(const cav_verification *verification, int t, c
   return speed;
 }
 
-// whether a term of slip that names a body of the pair lets it slide
-static int is_let(const cav_verification *verification, int t, const cav_pair *pair) {
-  const cav_problem *problem = verification->problem;
-  const cav_model *model = verification->model;
-  int single, whole, let = 0;
-  for (int i = 0; i < problem->nterm && !let; i++) {
-    const cav_term *term = problem->term + i;
-    const int link = model->body[term->body].link;
-    if (term->quantity != CAV_QUANTITY_SLIP || term->body <= 0 || !(term->within > 0)) continue;
-    if (link != model->geom[pair->geom1].link && link != model->geom[pair->geom2].link) continue;
-    let = cav_verification_holds(verification, term, t, &single, &whole);
-  }
-  return let;
-}
-
 // whether slip costs anything: what may slide everywhere need not keep clear
 static int holds_still(const cav_problem *problem) {
   int costs = 0;
@@ -269,8 +254,8 @@ int cav_verification_looks_at(const cav_verification *verification, const cav_te
   if (term->body > 0 && link == 0)
     return model->geom[pair->geom1].body == term->body || model->geom[pair->geom2].body == term->body;
   if (term->body > 0) return contact->link1 == link || contact->link2 == link;
-  if (term->quantity == CAV_QUANTITY_CLEARANCE) return !is_let(verification, t, pair);
-  return term->quantity != CAV_QUANTITY_SLIP || !is_idle(model, contact) ||
+  const int slip = term->quantity == CAV_QUANTITY_SLIP && is_idle(model, contact);
+  return !(slip || term->quantity == CAV_QUANTITY_CLEARANCE) ||
          !(cav_verification_may_slide(verification, t, contact, 1) > 0);
 }
 
