@@ -5,9 +5,9 @@
 /// the geometry itself makes jump:
 ///  - coincident centres: a fixed direction is taken; crossing axes of capsules: the normal changes side;
 ///  - capsules closer to parallel than CAV_PARALLEL rad have two points where their sides overlap, others one;
-///  - a plane sees the 4 lowest corners of a box, and of a cylinder one line along its side and a regular triangle on
-///    its lower cap with one corner at the lowest point. The triangle turns quickly near the upright pose, but three
-///    equal springs on it push and tilt alike however it is turned.
+///  - a plane sees the 4 lowest corners of a box.
+/// Of a cylinder a plane sees one line along its side and a regular triangle on its lower cap with one corner at the lowest
+/// point; within 3 degrees of upright, where that triangle turns at no tilt at all, four points that move with the cylinder.
 /// Solids without a routine of their own go to polytope.c.
 #include "pairs.h"
 #include "capsules_four.h"
@@ -69,24 +69,38 @@ static int plane_ellipsoid(const cav_shape *a, const cav_shape *b, double margin
   return 1;
 }
 
+// sine of the tilt below which a cylinder stands on its cap
+static const double STANDS = 0.05;
+
 // points of the cylinder in its own axes: both ends of the lowest line of its side, then two more corners of a regular
-// triangle on the lower cap
+// triangle on the lower cap. Below the tilt STANDS their directions turn at will; there these points slide to the axis, and
+// four that do not turn come out of the cap, which bear alone what stands upright
 static int plane_cylinder(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
   double n[3], down[3], x[3];
   double radius = b->size[0], half = b->size[1];
   column3(n, a->rotation, 2);
   rotate_back(down, b->rotation, n);
   scale3(down, -1, down);
-  double rho = sqrt(down[0] * down[0] + down[1] * down[1]);
-  double c = rho > 0 ? radius * down[0] / rho : radius, s = rho > 0 ? radius * down[1] / rho : 0;
-  int lower = down[2] < 0;
+  double rho = sqrt(down[0] * down[0] + down[1] * down[1]), tilt = rho / STANDS, square = tilt * tilt;
+  int lower = down[2] < 0, stands = tilt < 1;
+  // of the direction: 1 over its length, near the axis a multiple that joins it with two derivatives
+  double by = stands ? radius / STANDS * (15 - square * (10 - 3 * square)) / 8 : radius / rho;
+  double c = by * down[0], s = by * down[1];
   double z = lower ? -half : half, turn = sqrt(0.75);
-  // feature: 0 and 1 the ends of the line, 2 and 3 the triangle of the upper end in its own axes, 4 and 5 of the lower
-  double local[4][3] = {
+  // feature: 0 and 1 the ends of the line, 2 and 3 the triangle of the upper end in its own axes, 4 and 5 of the lower, 6 to
+  // 9 what does not turn of the upper and 10 to 13 of the lower
+  double local[8][3] = {
       {c, s, z}, {c, s, -z}, {-c / 2 - turn * s, -s / 2 + turn * c, z}, {-c / 2 + turn * s, -s / 2 - turn * c, z}};
-  int feature[4] = {lower, !lower, 2 + 2 * lower, 3 + 2 * lower};
+  int feature[8] = {lower, !lower, 2 + 2 * lower, 3 + 2 * lower};
+  if (stands) {
+    double in = radius * square * square / (1 - square), inside = lower ? in : -in;
+    for (int k = 0; k < 4; k++) {
+      set3(local[4 + k], k == 0 ? radius : k == 1 ? -radius : 0, k == 2 ? radius : k == 3 ? -radius : 0, z + inside);
+      feature[4 + k] = 6 + 4 * lower + k;
+    }
+  }
   int count = 0;
-  for (int k = 0; k < 4; k++) {
+  for (int k = 0; k < (stands ? 8 : 4); k++) {
     transform(x, b->pos, b->rotation, local[k]);
     double height = plane_height(a, x, n);
     if (height < margin) touch_plane(x, n, height, feature[k], touch + count++);

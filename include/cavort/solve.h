@@ -353,6 +353,7 @@ typedef struct cav_strategy {
   int nswing;                           ///< sines over joints of the guess
   cav_swing swing[CAV_STRATEGY_SWINGS]; ///< [nswing]
   int ground;                           ///< 1: its guess stands on what is below it
+  int hand;                             ///< 1: a hand is brought first to what has to be pushed
   double height, from, to;              ///< not stated: of a ballistic arc, m, and when, s
   int flies;                            ///< 1: start and goal are held before and after that arc
   cav_guess_pose pose[2];               ///< where it flies
@@ -387,9 +388,9 @@ CAV_API void cav_strategy_clear(cav_strategy *strategy);
 /// The problem by a strategy: borrows all else from the problem, and the swings from the strategy.
 CAV_API void cav_strategy_apply(const cav_problem *problem, const cav_strategy *strategy, cav_problem *taken);
 
-/// Solves by a strategy: cav_solve of what cav_strategy_apply gives, after one under the midpoint order where the
-/// strategy says so, whose iterations and seconds are counted but whose log is not kept. A repair that has a start goes
-/// on from there, with the last stages of its schedule alone.
+/// Solves by a strategy: cav_solve of what cav_strategy_apply gives, after one under the midpoint order, or after some with
+/// a hand at what has to be pushed, where the strategy says so, whose iterations and seconds are counted but whose log is not
+/// kept. A repair that has a start goes on from there, with the last stages of its schedule alone.
 CAV_API cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *strategy,
                                       const cav_solve_options *options, const cav_trajectory *start,
                                       cav_solution **solution, cav_error *error);

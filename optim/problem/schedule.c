@@ -59,6 +59,7 @@ static int slides(const cav_problem *problem) {
 }
 
 static double between(double from, double to, double s) {
+  if (s >= 1) return to; // to the last digit
   return from > 0 && to > 0 ? from * pow(to / from, s) : (1 - s) * from + s * to;
 }
 

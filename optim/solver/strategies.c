@@ -13,6 +13,7 @@
 
 #include "clear.h"
 #include "continuation.h"
+#include "hand.h"
 #include "leap.h"
 #include "periodicity.h"
 #include "pump.h"
@@ -363,6 +364,18 @@ static cav_status add_pumped(const cav_problem *problem, cav_strategy *strategy,
   return status;
 }
 
+/// With a hand brought first to what has to be pushed.
+static cav_status add_pushed(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated) {
+  cav_hand hand;
+  cav_strategy push = *stated;
+  push.hand = 1;
+  push.text =
+      "with a hand brought first to the side that what has to move is pushed from, contacts sharp from there on";
+  cav_status status = problem->cycle.on ? CAV_OK : cav_hand_find(problem, 1, &hand);
+  if (!problem->cycle.on && !status && hand.found) add_mended(strategy, n, &push, "push");
+  return status;
+}
+
 /// The walk, on what is below it. To or from a solid of the world it goes over solids: feet that swing would be caught in what
 /// they are to stand on.
 static cav_status find_walk(const cav_problem *problem, guesses *g) {
@@ -465,7 +478,8 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   guesses g;
   int swings_up;
   add_stated(problem, strategy, n, &stated);
-  cav_status status = add_pumped(problem, strategy, n, &swings_up);
+  cav_status status = add_pushed(problem, strategy, n, &stated);
+  if (status == CAV_OK) status = add_pumped(problem, strategy, n, &swings_up);
   if (status == CAV_OK) status = find_guesses(problem, &stated, strategy, &g);
   if (status == CAV_OK) status = add_others(problem, strategy, n, &g);
   if (status != CAV_OK) return status;
@@ -509,16 +523,87 @@ static cav_schedule resumed(const cav_schedule *schedule) {
   return rest;
 }
 
+/// To where a hand leads a guess; its terms are no part of the problem.
+static cav_status lead(const cav_problem *problem, double away, const cav_solve_options *options,
+                       const cav_solution *before, cav_solution **solution, cav_error *error) {
+  cav_hand hand;
+  cav_problem led = *problem;
+  cav_solve_options first = *options;
+  cav_term *term = calloc((size_t)problem->nterm + CAV_HAND_TERMS, sizeof *term);
+  cav_status status = term ? cav_hand_find(problem, away, &hand) : CAV_NO_MEMORY;
+  *solution = NULL;
+  if (!status) {
+    memcpy(term, problem->term, (size_t)problem->nterm * sizeof *term);
+    memcpy(term + problem->nterm, hand.term, sizeof hand.term);
+    led.term = term, led.nterm = problem->nterm + (hand.found ? CAV_HAND_TERMS : 0);
+    led.schedule = cav_hand_schedule(&problem->schedule);
+    first.diagnose = first.gains = 0;
+    status = cav_solve_after(&led, &first, NULL, before, solution, error);
+  }
+  free(term);
+  return status;
+}
+
+/// By a hand first, that touches or leans on what it pushes, and from there to the end of a solve; where rows do not come in, by
+/// the last stage before it. The first way whose rows do. A checkpoint of it is not gone on from: it begins anew, and ends
+/// with the same bits.
+static cav_status solve_pushed(const cav_problem *taken, const cav_solve_options *options, cav_solution **solution,
+                               cav_error *error) {
+  static const double away[] = {1, 0.7};
+  enum { WAYS = sizeof away / sizeof *away, ENDS = 2 };
+  cav_problem last = *taken;
+  cav_solve_options rest = options ? *options : cav_solve_options_default();
+  cav_solution *before = NULL;
+  cav_status status = CAV_NOT_CONVERGED;
+  last.schedule = cav_hand_schedule(&taken->schedule);
+  last.schedule.kinematics = 0;
+  rest.resume = NULL;
+  rest.diagnose = 0; // what is least violated stands still
+  for (int i = 0; i < WAYS && status == CAV_NOT_CONVERGED; i++) {
+    rest.first_stage = 0;
+    status = lead(taken, away[i], &rest, before, solution, error);
+    cav_trajectory *start = *solution ? cav_trajectory_copy((*solution)->trajectory) : NULL;
+    if (*solution && !start) status = CAV_NO_MEMORY;
+    // one that was stopped, or has no motion, ends here
+    int ends = start && (status == CAV_OK || status == CAV_NOT_CONVERGED);
+    for (int k = 0; k < ENDS && ends; k++) {
+      cav_solution_free(before);
+      before = *solution;
+      rest.first_stage = last.schedule.stages + 1 - k;
+      status = cav_solve_after(&last, &rest, start, before, solution, error);
+      ends = status == CAV_NOT_CONVERGED && *solution;
+    }
+    cav_solution_free(before);
+    before = *solution;
+    cav_trajectory_free(start);
+  }
+  *solution = before;
+  return status;
+}
+
+/// From a motion that pushes, which softer contacts would lose.
+static cav_status mend_pushed(cav_problem *taken, const cav_solve_options *options, const cav_trajectory *start,
+                              cav_solution **solution, cav_error *error) {
+  cav_solve_options rest = options ? *options : cav_solve_options_default();
+  taken->schedule = cav_hand_schedule(&taken->schedule);
+  taken->schedule.kinematics = 0;
+  rest.first_stage = taken->schedule.stages;
+  rest.diagnose = 0;
+  return cav_solve(taken, &rest, start, solution, error);
+}
+
 cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *strategy,
                               const cav_solve_options *options, const cav_trajectory *start, cav_solution **solution,
                               cav_error *error) {
   cav_problem taken;
   cav_strategy_apply(problem, strategy, &taken);
+  if (strategy->hand && !start) return solve_pushed(&taken, options, solution, error);
   const cav_checkpoint *resume = options ? options->resume : NULL;
   int second = resume && resume->order == strategy->order;
   if (!strategy->first_midpoint || start || second) {
     int staged = !options || options->first_stage <= taken.schedule.stages;
     int mended = start && strategy->use == CAV_STRATEGY_REPAIR && staged;
+    if (mended && strategy->hand) return mend_pushed(&taken, options, start, solution, error);
     if (mended || (strategy->first_midpoint && second)) taken.schedule = resumed(&taken.schedule);
     return cav_solve(&taken, options, start, solution, error);
   }

@@ -1,0 +1,27 @@
+/// What pushes a body that no actuator moves, and from where. Private to optim/solver.
+#ifndef CAVORT_HAND_H
+#define CAVORT_HAND_H
+
+#include "cavort/solve.h"
+
+enum { CAV_HAND_TERMS = 2 };
+
+/// Terms that bring a geom of a driven tree to the side of a body that it is to be pushed from, and keep the body from tumbling
+/// towards it.
+typedef struct cav_hand {
+  int found; ///< 0: nothing that no actuator moves is asked for elsewhere along the ground, or nothing
+             ///< reaches it
+  cav_term term[CAV_HAND_TERMS]; ///< they borrow what follows
+  double place[3];               ///< m, of the geom in the frame of the body
+  double upright[3];             ///< z axis of the body at the start
+} cav_hand;
+
+/// away: part of its thickness that the hand keeps from the body, 1: it touches, less: it leans on it. CAV_NO_MEMORY, or what
+/// the dynamics says of start and goal. The hand must stay where it is.
+cav_status cav_hand_find(const cav_problem *problem, double away, cav_hand *hand);
+
+/// The schedule that what is pushed takes: the guess by inverse kinematics, then the last stages at the full weight of the
+/// unactuated force.
+cav_schedule cav_hand_schedule(const cav_schedule *schedule);
+
+#endif

@@ -1,0 +1,87 @@
+/// What no actuator moves and is wanted elsewhere along the ground (solver/hand.c): where a ball has to be brought to push a
+/// block, against its closed form, and five problems stated in a minute each, tests/pushing, whose stated guess ends at a
+/// motion that stands still, certified by the strategy that brings it there first.
+#include <math.h>
+#include <string.h>
+
+#include "cavort/cavort.h"
+#include "check.h"
+#include "hand.h"
+
+static cav_problem *load(const char *name) {
+  char path[300];
+  cav_error error = {0};
+  snprintf(path, sizeof path, CAVORT_SOURCE_ROOT "/tests/pushing/%s.xml", name);
+  cav_problem *p = cav_problem_load(path, NULL, &error);
+  if (!CHECK(p != NULL)) fprintf(stderr, "%s\n", error.text);
+  return p;
+}
+
+/// A block of 0.1 x 0.1 x 0.04 m, a ball of 2 cm: through the middle of the block, against the way, 5 mm over the ground.
+static void test_place(void) {
+  const struct {
+    const char *name;
+    double out, way[2]; ///< m from the middle to the face along the way, and its unit direction
+  } problem[] = {{"ahead", 0.05, {1, 0}},
+                 {"across", 0.05 / 0.8, {0.8, 0.6}},
+                 {"behind", 0.05 * sqrt(5) / 2, {-0.1 / sqrt(0.05), 0.2 / sqrt(0.05)}},
+                 {"slid", 0.05, {0.8, 0.6}}};
+  for (int i = 0; i < 4; i++) {
+    cav_problem *p = load(problem[i].name);
+    if (!p) continue;
+    for (int leans = 0; leans < 2; leans++) {
+      const double away = leans ? 0.7 : 1, far = problem[i].out + away * 0.02;
+      cav_hand hand;
+      CHECK(cav_hand_find(p, away, &hand) == CAV_OK && hand.found);
+      CHECK(hand.term[0].sensor.object_type == CAV_OBJECT_GEOM &&
+            !strcmp(p->model->geom[hand.term[0].sensor.object].name, "tip"));
+      for (int k = 0; k < 2; k++) CHECK_NEAR(hand.place[k], -far * problem[i].way[k], 1e-12);
+      CHECK_NEAR(hand.place[2], 0.005, 1e-12);
+      CHECK_NEAR(hand.term[0].from, 0.3 * p->duration, 1e-12);
+    }
+    cav_problem_free(p);
+  }
+}
+
+static const cav_strategy *find(const cav_strategy *strategy, int n, const char *name) {
+  for (int i = 0; i < n; i++)
+    if (!strcmp(strategy[i].name, name)) return &strategy[i];
+  return NULL;
+}
+
+static void test_pushed(const char *name) {
+  cav_problem *p = load(name);
+  if (!p) return;
+  cav_strategy strategy[CAV_STRATEGIES];
+  cav_solution *s = NULL;
+  cav_verdict v = {0};
+  cav_error error = {0};
+  int n;
+  CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
+  const cav_strategy *push = find(strategy, n, "push");
+  if (CHECK(push != NULL)) CHECK(cav_strategy_solve(p, push, NULL, NULL, &s, &error) == CAV_OK);
+  // its terms are no part of the problem: the cost is that of the file's own
+  if (s) CHECK(!cav_verify_solution(p, s, &v, &error));
+  printf("%s: cost %.4f, %d iterations, %s%s\n", name, v.cost, s ? s->iterations : 0,
+         v.certified ? "certified" : "not certified: ", v.reason);
+  CHECK(v.certified && v.achieved && v.cost < 0.12);
+  cav_solution_free(s);
+  cav_problem_free(p);
+}
+
+/// Nothing to push: a body that the goal has where it starts, a model without actuators' reach.
+static void test_none(void) {
+  cav_error error = {0};
+  cav_hand hand;
+  cav_problem *p = cav_problem_load(CAVORT_SOURCE_ROOT "/problems/motions/hop/problem.xml", NULL, &error);
+  if (CHECK(p != NULL)) CHECK(cav_hand_find(p, 1, &hand) == CAV_OK && !hand.found);
+  cav_problem_free(p);
+}
+
+int main(void) {
+  test_place();
+  test_none();
+  static const char *const name[] = {"ahead", "across", "behind", "turned", "slid"};
+  for (int i = 0; i < 5; i++) test_pushed(name[i]);
+  return check_result();
+}
