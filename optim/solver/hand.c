@@ -185,8 +185,8 @@ static cav_term term_of(cav_sensor_type type, cav_object_type object_type, int o
 static void lay(const cav_model *m, const cav_state *state, const thing *t, int geom, double away, cav_hand *hand) {
   const int body = m->link[t->link].body;
   cav_pose pose;
-  hand->found = 1;
   find_place(m, state, t, geom, away, hand->place);
+  hand->found = isfinite(hand->place[2]); // not where it touches by listed pairs alone
   cav_object_pose(m, state, CAV_OBJECT_XBODY, body, &pose);
   column3(hand->upright, pose.rotation, 2);
   hand->term[0] = term_of(CAV_SENSOR_FRAMEPOS, CAV_OBJECT_GEOM, geom, hand->place);
@@ -194,7 +194,9 @@ static void lay(const cav_model *m, const cav_state *state, const thing *t, int 
   hand->term[0].sensor.reference = body;
   hand->term[0].from = begins * t->time;
   hand->term[1] = term_of(CAV_SENSOR_FRAMEZAXIS, CAV_OBJECT_XBODY, body, hand->upright);
-  for (int i = 0; i < CAV_HAND_TERMS; i++) hand->term[i].to = t->time;
+  copy3(hand->still, pose.pos);
+  hand->term[2] = term_of(CAV_SENSOR_FRAMEPOS, CAV_OBJECT_XBODY, body, hand->still);
+  for (int i = 0; i < CAV_HAND_TERMS; i++) hand->term[i].to = i == 2 ? hand->term[0].from : t->time;
 }
 
 cav_status cav_hand_find(const cav_problem *problem, double away, cav_hand *hand) {

@@ -4,16 +4,17 @@
 
 #include "cavort/solve.h"
 
-enum { CAV_HAND_TERMS = 2 };
+enum { CAV_HAND_TERMS = 3 };
 
-/// Terms that bring a geom of a driven tree to the side of a body that it is to be pushed from, and keep the body from tumbling
-/// towards it.
+/// Terms that bring a geom of a driven tree to the side of a body that it is to be pushed from, keep the body from tumbling
+/// towards it, and where it is until then.
 typedef struct cav_hand {
   int found; ///< 0: nothing that no actuator moves is asked for elsewhere along the ground, or nothing
              ///< reaches it
   cav_term term[CAV_HAND_TERMS]; ///< they borrow what follows
   double place[3];               ///< m, of the geom in the frame of the body
   double upright[3];             ///< z axis of the body at the start
+  double still[3];               ///< m, where it is at the start
 } cav_hand;
 
 /// away: part of its thickness that the hand keeps from the body, 1: it touches, less: it leans on it. CAV_NO_MEMORY, or what

@@ -544,6 +544,9 @@ static cav_status lead(const cav_problem *problem, double away, const cav_solve_
   return status;
 }
 
+/// Unactuated force, fraction of the weight, beyond which a motion that pushes is given up.
+static const double far_off = 5e-3;
+
 /// By a hand first, that touches or leans on what it pushes, and from there to the end of a solve; where rows do not come in, by
 /// the last stage before it. The first way whose rows do. A checkpoint of it is not gone on from: it begins anew, and ends
 /// with the same bits.
@@ -576,6 +579,8 @@ static cav_status solve_pushed(const cav_problem *taken, const cav_solve_options
     cav_solution_free(before);
     before = *solution;
     cav_trajectory_free(start);
+    // what is far off is not pushed by leaning on it
+    if (status == CAV_NOT_CONVERGED && before && before->unactuated > far_off) break;
   }
   *solution = before;
   return status;

@@ -150,7 +150,9 @@ static const char *hand_of(const cav_model *m) {
   static const cav_role role[] = {CAV_ROLE_RIGHT_HAND, CAV_ROLE_LEFT_HAND, CAV_ROLE_HAND, CAV_ROLE_RIGHT_FOOT};
   cav_state *state = cav_state_new(m);
   cav_roles roles;
-  const char *name = "BODY";
+  const char *name = "";
+  for (int l = 1; l < m->nlink; l++)
+    if (m->link[l].driven && *m->body[m->link[l].body].name) name = m->body[m->link[l].body].name;
   if (state && !cav_roles_find(m, state, &roles))
     for (int i = 3; i >= 0; i--)
       if (roles.body[role[i]] > 0) name = m->body[roles.body[role[i]]].name;
@@ -183,10 +185,10 @@ static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_t
         text, size,
         "'%.60s' is %.3g%s%s from where the start has it, and nothing that an actuator moves touches '%.40s'. '%.60s' "
         "asks for something there, at a weight of %.3g, and is off by %.2g m. Next: its target at the face to push on, "
-        "less what the body that pushes is thick, from when on it can be there; postures in <guess> that have it "
-        "there; or "
-        "<schedule kinematics=\"true\"/>, which begins from where targets are met.",
-        name, way, gap, unit, body, *hand->name ? hand->name : got[brought].what, hand->weight, got[brought].off);
+        "less what the body that pushes is thick, from when on it can be there; or postures in <guess> that have it "
+        "there%s.",
+        name, way, gap, unit, body, *hand->name ? hand->name : got[brought].what, hand->weight, got[brought].off,
+        p->schedule.kinematics ? "" : "; or <schedule kinematics=\"true\"/>, which begins from where targets are met");
   } else if (body) {
     snprintf(
         text, size,
