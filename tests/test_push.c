@@ -43,6 +43,28 @@ static void test_place(void) {
   }
 }
 
+/// The same place where its components are asked for one by one.
+static void test_components(void) {
+  cav_problem *p = load("across");
+  if (!p) return;
+  cav_hand whole, hand;
+  cav_term term[40];
+  int n = p->nterm, at = 0;
+  CHECK(n < 39 && cav_hand_find(p, 1, &whole) == CAV_OK && whole.found);
+  memcpy(term, p->term, (size_t)n * sizeof *term);
+  while (at < n - 1 && term[at].quantity != CAV_QUANTITY_SENSOR) at++;
+  term[n] = term[at];
+  term[at].component = 1, term[n].component = 0;
+  cav_problem split = *p;
+  split.term = term, split.nterm = n + 1;
+  CHECK(cav_hand_find(&split, 1, &hand) == CAV_OK && hand.found);
+  for (int k = 0; k < 3; k++) CHECK_NEAR(hand.place[k], whole.place[k], 1e-15);
+  // up alone is no push
+  term[at].component = term[n].component = 2;
+  CHECK(cav_hand_find(&split, 1, &hand) == CAV_OK && !hand.found);
+  cav_problem_free(p);
+}
+
 static const cav_strategy *find(const cav_strategy *strategy, int n, const char *name) {
   for (int i = 0; i < n; i++)
     if (!strcmp(strategy[i].name, name)) return &strategy[i];
@@ -80,6 +102,7 @@ static void test_none(void) {
 
 int main(void) {
   test_place();
+  test_components();
   test_none();
   static const char *const name[] = {"ahead", "across", "behind", "turned", "slid"};
   for (int i = 0; i < 5; i++) test_pushed(name[i]);

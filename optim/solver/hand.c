@@ -14,7 +14,7 @@
 /// m: a way from which a body has to be pushed; gap over the ground of what pushes.
 static const double least_way = 0.02, clear = 0.005;
 
-/// Weight of the term, and the fraction of the time until the target from which on it counts.
+/// Weight of the terms, and the fraction of the time until the target from which on a hand pushes.
 static const double weight = 300, begins = 0.3;
 
 /// Fraction of the schedule's way where contacts are sharp, and stages from there.
@@ -36,20 +36,30 @@ static int is_pushed(const double way[3]) {
   return along >= least_way && along >= fabs(way[2]);
 }
 
-/// What a term asks for of such a link's place; link 0: nothing. The state is at the start.
-static void find_of_term(const cav_problem *p, const cav_term *term, cav_state *state, thing *found) {
+/// Adds what a term asks for of a link's place. The state is at the start.
+static void add_term(const cav_problem *p, const cav_term *term, cav_state *state, thing *found) {
   const cav_sensor *s = &term->sensor;
   double at[CAV_SENSOR_DIM_MAX], target[CAV_SENSOR_DIM_MAX];
   const int place = term->quantity == CAV_QUANTITY_SENSOR && s->type == CAV_SENSOR_FRAMEPOS && !s->referred;
   if (!place || term->use == CAV_USE_RANGE || (term->use == CAV_USE_COST && !(term->weight > 0))) return;
-  const int link = cav_object_link(p->model, s->object_type, s->object);
-  if (!is_left(p->model, link)) return;
   const double time = term->to < 0 ? p->duration : fmin(term->to, p->duration);
+  // the last one is where it goes
+  if (cav_object_link(p->model, s->object_type, s->object) != found->link || time < found->time) return;
   cav_sensor_read(p->model, state, s, at);
   cav_term_target(term, time, s->dim, target);
-  thing one = {.link = link, .time = time};
-  for (int k = 0; k < 3; k++) one.way[k] = term->component < 0 || term->component == k ? target[k] - at[k] : 0;
-  if (is_pushed(one.way)) *found = one;
+  for (int k = 0; k < 3; k++)
+    if (term->component < 0 || term->component == k) found->way[k] = target[k] - at[k];
+  found->time = time;
+}
+
+/// The first link that terms ask for elsewhere; link 0: none.
+static void find_of_terms(const cav_problem *p, cav_state *state, thing *found) {
+  for (int l = 1; l < p->model->nlink && !found->link; l++) {
+    if (!is_left(p->model, l)) continue;
+    thing one = {.link = l};
+    for (int i = 0; i < p->nterm; i++) add_term(p, &p->term[i], state, &one);
+    if (is_pushed(one.way)) *found = one;
+  }
 }
 
 /// What the goal has elsewhere than the start, if no term asks for anything. The state is at the start, and comes to the goal.
@@ -205,7 +215,7 @@ cav_status cav_hand_find(const cav_problem *problem, double away, cav_hand *hand
   *hand = (cav_hand){.found = 0};
   cav_state *state = cav_state_new(m);
   cav_status status = state ? cav_position(m, state, problem->q_start) : CAV_NO_MEMORY;
-  for (int i = 0; i < problem->nterm && !status && !t.link; i++) find_of_term(problem, &problem->term[i], state, &t);
+  if (!status) find_of_terms(problem, state, &t);
   if (!status && !t.link) status = find_of_goal(problem, state, &t);
   int geom = -1;
   if (!status && t.link) status = cav_position(m, state, problem->q_start);

@@ -547,9 +547,9 @@ static cav_status lead(const cav_problem *problem, double away, const cav_solve_
 /// Unactuated force, fraction of the weight, beyond which a motion that pushes is given up.
 static const double far_off = 5e-3;
 
-/// By a hand first, that touches or leans on what it pushes, and from there to the end of a solve; where rows do not come in, by
-/// the last stage before it. The first way whose rows do. A checkpoint of it is not gone on from: it begins anew, and ends
-/// with the same bits.
+/// By a hand first, that touches what it pushes or leans on it, and from there to the end of a solve; where rows do not come
+/// in, by the last stage before it. The first way whose rows do. A checkpoint of it is not gone on from: it begins anew, and
+/// ends with the same bits.
 static cav_status solve_pushed(const cav_problem *taken, const cav_solve_options *options, cav_solution **solution,
                                cav_error *error) {
   static const double away[] = {1, 0.7};

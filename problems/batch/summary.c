@@ -81,7 +81,7 @@ int cav_tried_next(cav_tried *t) {
     for (int k = 0; k < 3; k++) *comma[k] = 0;
     *quote[1] = *quote[3] = 0;
     t->kept = !strcmp(comma[0] + 1, "1");
-    t->outcome = comma[1] + 1;
+    t->name = t->line, t->outcome = comma[1] + 1;
     // of cost, iterations and seconds the last
     for (c = comma[2] + 1, n = 0; n < 2 && c; n++) c = (c = strchr(c, ',')) ? c + 1 : NULL;
     char *end = NULL;

@@ -27,7 +27,7 @@ typedef struct cav_tried {
   size_t room;
   int kept;
   double seconds;
-  const char *outcome, *changed, *reason;
+  const char *name, *outcome, *changed, *reason;
 } cav_tried;
 cav_tried cav_tried_open(const char *folder);
 int cav_tried_next(cav_tried *tried);

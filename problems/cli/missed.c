@@ -101,6 +101,18 @@ static void tell_heavier(const char *folder, const char *name, double more, char
     snprintf(text, size, "%g times the stated weight was tried (strategies.csv) and did not do: %s", most, how);
 }
 
+/// What the strategy missed that brings a hand to what has to be pushed, in words; "" where it was not tried.
+static void tell_pushed(const char *folder, char *text, size_t size) {
+  cav_tried t = cav_tried_open(folder);
+  *text = 0;
+  while (cav_tried_next(&t)) {
+    if (strcmp(t.name, "push") != 0 || strncmp(t.outcome, "not ", 4) != 0 || !strcmp(t.outcome, "not tried")) continue;
+    const char *stop = strstr(t.reason, ". ");
+    snprintf(text, size, "%.*s", stop ? (int)(stop - t.reason) : (int)strlen(t.reason), t.reason);
+  }
+  cav_tried_close(&t);
+}
+
 /// Link whose place or joint a term is of; 0: of the world or of several.
 static int link_of(const cav_problem *p, const cav_term *term) {
   const cav_model *m = p->model;
@@ -171,13 +183,14 @@ static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_t
   const char *name = named ? term->name : got[i].what, *unit = got[i].unit, *gap = *unit ? " " : "";
   double way = held[i].off, done = way - got[i].off;
   const double more = 2 * got[i].off / got[i].within;
-  char hint[160], room[300], tried[300], weight[300], ended[100] = "at the optimum next to its guess";
+  char hint[160], room[300], tried[300], weight[300], pushed[200], ended[100] = "at the optimum next to its guess";
   if (saving > far_off)
     snprintf(ended, sizeof ended, "short of an optimum, where a step may still save %.2g %% of the cost", 100 * saving);
   tell_heavier(folder, term->name, done < still * way && way > got[i].within ? 1 : more, tried, sizeof tried);
   snprintf(weight, sizeof weight, "a weight %.2g times as large brings it nearer", more);
   if (*tried) snprintf(weight, sizeof weight, "%s", tried);
   const char *body = done < still * way && way > got[i].within ? untouched(p, motion, term) : NULL;
+  tell_pushed(folder, pushed, sizeof pushed);
   const int brought = body ? seen_from(p, link_of(p, term)) : -1;
   if (body && brought >= 0) {
     const cav_term *hand = &p->term[brought];
@@ -189,6 +202,14 @@ static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_t
         "there%s.",
         name, way, gap, unit, body, *hand->name ? hand->name : got[brought].what, hand->weight, got[brought].off,
         p->schedule.kinematics ? "" : "; or <schedule kinematics=\"true\"/>, which begins from where targets are met");
+  } else if (body && *pushed) {
+    snprintf(
+        text, size,
+        "'%.60s' is %.3g%s%s from where the start has it, and nothing that an actuator moves touches '%.40s'. The "
+        "strategy push brought a hand to it and missed: %.160s. Next: more time, close=\"open\" in <horizon> where "
+        "it may move at the end, less friction or a lighter body to see whether it is too heavy, or postures in "
+        "<guess> that push it.",
+        name, way, gap, unit, body, pushed);
   } else if (body) {
     snprintf(
         text, size,
