@@ -91,7 +91,7 @@ static void test_pushed(const char *name) {
   cav_problem_free(p);
 }
 
-/// Nothing to push: a body that the goal has where it starts, a model without actuators' reach.
+/// Nothing to push: a hopper alone.
 static void test_none(void) {
   cav_error error = {0};
   cav_hand hand;

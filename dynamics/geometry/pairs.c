@@ -73,8 +73,8 @@ static int plane_ellipsoid(const cav_shape *a, const cav_shape *b, double margin
 static const double STANDS = 0.05;
 
 // points of the cylinder in its own axes: both ends of the lowest line of its side, then two more corners of a regular
-// triangle on the lower cap. Below the tilt STANDS their directions turn at will; there these points slide to the axis, and
-// four that do not turn come out of the cap, which bear alone what stands upright
+// triangle on the lower cap. Below the tilt STANDS their directions turn at will; there these points slide to the axis,
+// where they share what stands with four at the rim that do not turn and come out of the cap
 static int plane_cylinder(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
   double n[3], down[3], x[3];
   double radius = b->size[0], half = b->size[1];

@@ -1,7 +1,7 @@
 /// A hand to what has to be pushed. Where a body that no actuator moves is asked for elsewhere, the helper forces of the first
 /// stages carry it there: they roll it along, since sliding costs more of them, and nothing brings a hand to it when they
-/// fade. So one is brought there first: the geom of a driven tree that is nearest to the side opposite to the way, at the
-/// height of the body's centre, or as low as it can be over the ground.
+/// fade. So one is brought there first: the geom of a driven tree that serves best and of these is nearest to the
+/// body, to the side opposite to the way, at the height of the body's centre or as low as it can be over the ground.
 #include "hand.h"
 
 #include <math.h>
