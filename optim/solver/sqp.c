@@ -47,7 +47,7 @@ static const double brisk = 0.5, sluggish = 0.03, left_alone = 1.25;
 /// however fast it converges.
 static const double near_end = 0.1;
 
-/// Slope at the end of a programme's step, part of its decrease, from which it does not tell what may be saved.
+/// Derivative along a programme's step at its end, part of its decrease, from which that does not tell what may be saved.
 static const double steep = 1;
 
 /// What may be left to be saved on the way, a fraction of the cost.
@@ -547,8 +547,8 @@ static cav_status measure(cav_solve_run *run, descent *d, int curved) {
 }
 
 /// What a step may still save, by Gauss-Newton's model of here in the full box: that of the verifier. A fraction of the
-/// cost, infinite where that is not found: the programme is not solved, or ends on a slope that says more than its decrease,
-/// as where its factors were held. Boxes and penalties stay as they are.
+/// cost, infinite where that is not found: the programme is not solved, or the derivative along its step is larger at the end
+/// than what it decreased by, as where its factors were held. Boxes and penalties stay as they are.
 static cav_status foresee(cav_solve_run *run, descent *d, double *saving) {
   size_t bytes = (size_t)cav_quadratic_rows(d->qp) * sizeof(double);
   int solved = 0;
