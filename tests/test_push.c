@@ -1,5 +1,5 @@
 /// What no actuator moves and is wanted elsewhere along the ground (solver/hand.c): where a ball has to be brought to push a
-/// block, against its closed form, and five problems stated in a minute each, tests/pushing, whose stated guess ends at a
+/// block, against its closed form, and seven problems stated in a minute each, tests/pushing, whose stated guess ends at a
 /// motion that stands still, certified by the strategy that brings it there first.
 #include <math.h>
 #include <string.h>
@@ -71,7 +71,7 @@ static const cav_strategy *find(const cav_strategy *strategy, int n, const char 
   return NULL;
 }
 
-static void test_pushed(const char *name) {
+static void test_pushed(const char *name, double most) {
   cav_problem *p = load(name);
   if (!p) return;
   cav_strategy strategy[CAV_STRATEGIES];
@@ -86,7 +86,7 @@ static void test_pushed(const char *name) {
   if (s) CHECK(!cav_verify_solution(p, s, &v, &error));
   printf("%s: cost %.4f, %d iterations, %s%s\n", name, v.cost, s ? s->iterations : 0,
          v.certified ? "certified" : "not certified: ", v.reason);
-  CHECK(v.certified && v.achieved && v.cost < 0.12);
+  CHECK(v.certified && v.achieved && v.cost < most);
   cav_solution_free(s);
   cav_problem_free(p);
 }
@@ -104,7 +104,11 @@ int main(void) {
   test_place();
   test_components();
   test_none();
-  static const char *const name[] = {"ahead", "across", "behind", "turned", "slid"};
-  for (int i = 0; i < 5; i++) test_pushed(name[i]);
+  static const struct {
+    const char *name;
+    double most; ///< cost
+  } problem[] = {{"ahead", 0.12}, {"across", 0.12},  {"behind", 0.12}, {"turned", 0.12},
+                 {"slid", 0.12},  {"straight", 0.3}, {"aside", 0.3}};
+  for (size_t i = 0; i < sizeof problem / sizeof *problem; i++) test_pushed(problem[i].name, problem[i].most);
   return check_result();
 }

@@ -19,6 +19,7 @@ typedef struct cav_solve_run {
   int stage, stages;
   cav_begin begin_with;         ///< what the first stage began with
   int warm;                     ///< the rows' final multipliers are those to start from
+  int checks_raises;            ///< penalties that grow for nothing are taken back, as near a record
   int measured;                 ///< optimality and the rows' multipliers are those of at
   double optimality;            ///< predicted decrease of the cost over the cost
   cav_status failed;            ///< what went wrong in the report, CAV_OK: nothing

@@ -67,7 +67,8 @@ static cav_status descend(cav_solve_run *run) {
   return status == CAV_NOT_CONVERGED ? CAV_OK : status;
 }
 
-cav_status cav_to_optimum(cav_solve_run *run) {
+/// The last phase, and where rows do not come in by it the augmented Lagrangian, restoration and that phase again.
+static cav_status bring_in(cav_solve_run *run) {
   // of a checkpoint the law is what it was
   if (!run->resume || run->resume->place == CAV_PLACE_CONTINUATION) cav_stage_set(run->problem, 1, run->tr);
   cav_status status = CAV_NOT_CONVERGED;
@@ -81,4 +82,21 @@ cav_status cav_to_optimum(cav_solve_run *run) {
   else
     return status;
   return status == CAV_NOT_CONVERGED ? CAV_OK : status;
+}
+
+/// Whether there is a body that no actuator moves.
+static int moves_things(const cav_model *model) {
+  for (int i = 0; i < model->nv; i++)
+    if (!model->link[model->dof[i].link].driven) return 1;
+  return 0;
+}
+
+cav_status cav_to_optimum(cav_solve_run *run) {
+  cav_status status = bring_in(run);
+  if (status != CAV_NOT_CONVERGED || !moves_things(run->tr->model)) return status;
+  // rows of what is pushed cannot all hold within small boxes: penalties that grow there leave no step
+  run->checks_raises = 1;
+  status = descend(run);
+  run->checks_raises = 0;
+  return status;
 }

@@ -113,13 +113,14 @@ cav_status cav_programme_solve(cav_solve_run *run, cav_quadratic *qp, const doub
                                int *solved) {
   double change[2], begin = cav_clock(), gap = gap_fraction * cav_programme_scale(run->tr), before = INFINITY;
   size_t bytes = (size_t)cav_quadratic_rows(qp) * sizeof *kept;
+  const int checks = run->checks_raises || cav_problem_has_record(run->problem);
   step_bounds(run->tr, run->at, change);
   cav_status status = CAV_OK;
   *rest = *rest > 0 ? *rest - 1 : 0;
   for (int i = 0; i < RAISES; i++) {
     status = i == 0 ? cav_quadratic_solve(qp, radius, change, gap) : cav_quadratic_solve_again(qp, gap);
     if (status != CAV_OK) break;
-    double missing = cav_problem_has_record(run->problem) ? linear_violation(run->tr, qp) : 0;
+    double missing = checks ? linear_violation(run->tr, qp) : 0;
     if (missing > fmax((1 - brought_in) * before, missed_little)) {
       memcpy(cav_quadratic_penalty(qp), kept, bytes);
       status = cav_quadratic_solve_again(qp, gap);

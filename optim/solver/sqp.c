@@ -47,9 +47,6 @@ static const double brisk = 0.5, sluggish = 0.03, left_alone = 1.25;
 /// however fast it converges.
 static const double near_end = 0.1;
 
-/// Derivative along a programme's step at its end, part of its decrease, from which that does not tell what may be saved.
-static const double steep = 1;
-
 /// What may be left to be saved on the way, a fraction of the cost.
 static const double soft_optimality = 2e-3;
 
@@ -547,8 +544,8 @@ static cav_status measure(cav_solve_run *run, descent *d, int curved) {
 }
 
 /// What a step may still save, by Gauss-Newton's model of here in the full box: that of the verifier. A fraction of the
-/// cost, infinite where that is not found: the programme is not solved, or the derivative along its step is larger at the end
-/// than what it decreased by, as where its factors were held. Boxes and penalties stay as they are.
+/// cost, infinite where that is not found: the programme is not solved, or not finished, as where its factors were held. Boxes
+/// and penalties stay as they are.
 static cav_status foresee(cav_solve_run *run, descent *d, double *saving) {
   size_t bytes = (size_t)cav_quadratic_rows(d->qp) * sizeof(double);
   int solved = 0;
@@ -560,7 +557,7 @@ static cav_status foresee(cav_solve_run *run, descent *d, double *saving) {
   status = cav_programme_solve(run, d->qp, d->next, d->kept, &d->rest, &solved);
   memcpy(cav_quadratic_penalty(d->qp), d->offset, bytes);
   *saving = INFINITY;
-  if (solved && fabs(cav_quadratic_unfinished(d->qp)) < steep)
+  if (solved && fabs(cav_quadratic_unfinished(d->qp)) <= unfinished)
     *saving = (fmax(cav_quadratic_decrease(d->qp), 0) + cav_quadratic_gap(d->qp)) / cav_programme_scale(run->tr);
   return status;
 }
