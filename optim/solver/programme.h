@@ -20,7 +20,8 @@ double cav_programme_merit(const cav_transcription *transcription, const double 
 /// Solves the programme, raising penalties until they are exact or there is no more to be had by it. Where rows cannot
 /// all hold in the boxes, as near a record that asks for more than a body has, the multiplier of one is at its penalty
 /// whatever that is; what raises it is taken from others, and penalties that grow for nothing leave no steps in the end.
-/// Such a raise is taken back, and none is tried in the next programmes: *rest counts them. kept [rows]: room. *solved:
+/// Near a record and where run->checks_raises is 1 such a raise is taken back, and none is tried in the next programmes:
+/// *rest counts them. kept [rows]: room. *solved:
 /// whether it could be. CAV_NO_MEMORY, CAV_INTERRUPTED.
 cav_status cav_programme_solve(cav_solve_run *run, cav_quadratic *quadratic, const double *radius, double *kept,
                                int *rest, int *solved);
