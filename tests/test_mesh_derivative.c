@@ -216,6 +216,43 @@ static void test_folding(void) {
   cav_model_free(m);
 }
 
+// A flange of 16 corners that presses on a block, tilted a little, and on a relief of a height field: more points than a pair may
+// give. Which of them are taken does not depend on how far points are sought
+static void test_flange(const char *under) {
+  char corners[TEXT] = "", flange[TEXT];
+  for (int k = 0; k < 32; k++)
+    snprintf(corners + strlen(corners), sizeof corners - strlen(corners), "%.5f %.5f %g ", 0.04 * cos(k / 2 * M_PI / 8),
+             0.04 * sin(k / 2 * M_PI / 8), k % 2 ? 0.01 : -0.01);
+  snprintf(
+      flange, sizeof flange,
+      "<mujoco><option timestep='0.025'/><asset><mesh name='flange' vertex='%s'/><hfield name='relief' nrow='9' "
+      "ncol='9' size='.1 .1 .005 .1' elevation='0 1 0 1 0 1 0 1 0  1 0 1 0 1 0 1 0 1  0 1 0 1 0 1 0 1 0  1 0 1 0 1 0 1 "
+      "0 1  0 1 0 1 0 1 0 1 0  1 0 1 0 1 0 1 0 1  0 1 0 1 0 1 0 1 0  1 0 1 0 1 0 1 0 1  0 1 0 1 0 1 0 1 0'/></asset>"
+      "<worldbody><geom %s/><body pos='0 0 .01'><freejoint/><geom type='mesh' mesh='flange'/></body></worldbody>"
+      "</mujoco>",
+      corners, under);
+  cav_model *m = scene_load(flange);
+  cav_state *state = m ? cav_state_new(m) : NULL;
+  if (!CHECK(state != NULL && m->nv == 6)) return;
+  state->options.stabilisation = CAV_STABILISATION_DISCRETE;
+  double q[7], v[6], next[6], J[6 * 36 + 12], worst = 0;
+  int contacts[2] = {0};
+  for (int k = 0; k < 300; k++) {
+    state->options.smoothing = k % 3 ? 0.004 * (k % 3) : 0;
+    scene_posture(m, q, v, 0);
+    q[2] = 0.01 + 0.004 * scene_uniform();
+    for (int d = 4; d < 7; d++) q[d] = 0.1 * scene_uniform();
+    cav_configuration_normalise(m, q);
+    scene_normals(v, 6, 0.2);
+    scene_normals(next, 6, k % 2 ? 0.02 : 0.2);
+    compare_sought(m, state, q, v, next, J, contacts, &worst);
+  }
+  printf("flange on %s: %d of %d contacts sought, within %.1e\n", under, contacts[0], contacts[1], worst);
+  CHECK(contacts[1] > 1000 && worst == 0);
+  cav_state_free(state);
+  cav_model_free(m);
+}
+
 int main(void) {
   test_folding();
   char meshes[TEXT];
@@ -235,5 +272,10 @@ int main(void) {
     test_history(rock, shapes[i][0], shapes[i][1]);
     test_history(round_rock(), shapes[i][0], shapes[i][1]);
   }
+  test_flange("type='box' size='.1 .1 .05' pos='0 0 -.05'");
+  test_flange("type='cylinder' size='.1 .05' pos='0 0 -.05'");
+  test_flange("type='hfield' hfield='relief'");
+  test_flange("type='plane' size='1 1 1'");
+  test_flange("type='mesh' mesh='flange' pos='.02 .01 -.01'");
   return check_result();
 }

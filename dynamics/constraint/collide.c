@@ -307,6 +307,9 @@ static double reach(const cav_model *model, const cav_state *state, int p, doubl
   const candidate *c = cache->candidate + p;
   const cav_pair *pair = model->pair + p;
   const slot *a = cache->slot + c->first, *b = cache->slot + c->second;
+  const cav_geom *ground = c->plane ? a->geom : b->geom;
+  // of the points over a height field those are taken that are found, so all of them are
+  if (ground->type == CAV_GEOM_HFIELD) return margin;
   // the point lies midway between the surfaces
   double radius = b->geom->bound + 0.5 * fmax(margin, 0), turn[2], mu = 0, roll = 0;
   const double *place = cache->centre[c->second];
@@ -325,8 +328,7 @@ static double reach(const cav_model *model, const cav_state *state, int p, doubl
       state->options.smoothing > 0 ? c->external ? state->options.smoothing : state->options.smoothing_self : 0;
   double far = c->margin + fmax(most / stiff, (most + kept_gap * margin) / fmax(stiff, 1 / h)) + CAV_LAW_END * delta;
   // what passes over the ground is listed for its clearance, too
-  const cav_geom *ground = c->plane ? a->geom : b->geom;
-  if (!ground->link && (c->plane || ground->type == CAV_GEOM_HFIELD)) far = fmax(far, CAV_CLEARANCE);
+  if (c->plane && !ground->link) far = fmax(far, CAV_CLEARANCE);
   return far < margin ? far : margin;
 }
 
@@ -389,13 +391,16 @@ static cav_status push(const cav_model *model, cav_state *state, int p, const ca
   return CAV_OK;
 }
 
-// contacts of one pair whose bounds are near
-static inline cav_status collide_pair(const cav_model *model, cav_state *state, const candidate *c, double margin) {
+// contacts of one pair whose bounds are near, where the pair is nearer than far
+static inline cav_status collide_pair(const cav_model *model, cav_state *state, const candidate *c, double far,
+                                      double margin) {
   struct cav_geom_cache *cache = state->work->geom;
-  if (c->sought && !near(cache, c, margin)) return CAV_OK;
+  if (c->sought && !near(cache, c, far)) return CAV_OK;
   cav_touch touch[CAV_TOUCH_MAX];
   const cav_shape *a = shape_of(state, cache, c->first), *b = shape_of(state, cache, c->second);
-  if (cav_shapes_apart(a, b, margin)) return CAV_OK;
+  if (cav_shapes_apart(a, b, far)) return CAV_OK;
+  // by the gap after the step all points of a near pair may bear, those that come nearer by a turn, too
+  if (state->options.next_gap != CAV_NEXT_GAP_EXACT) margin = far;
   int count =
       c->mesh ? cav_collide_again(a, b, margin, &cache->hint[c->pair], touch) : cav_collide_shapes(a, b, margin, touch);
   assert(count <= CAV_TOUCH_MAX);
@@ -413,8 +418,8 @@ static cav_status collide_swept(const cav_model *model, cav_state *state, const 
     const candidate *c = cache->candidate + found[i];
     double margin = c->margin + activation[c->external];
     if (!near(cache, c, margin)) continue;
-    if (c->sought && state->work->narrowed) margin = reach(model, state, c->pair, margin);
-    cav_status status = collide_pair(model, state, c, margin);
+    const int narrowed = c->sought && state->work->narrowed;
+    cav_status status = collide_pair(model, state, c, narrowed ? reach(model, state, c->pair, margin) : margin, margin);
     if (status) return status;
   }
   return CAV_OK;
@@ -424,8 +429,8 @@ static cav_status collide_swept(const cav_model *model, cav_state *state, const 
 static inline cav_status collide_near(const cav_model *model, cav_state *state, const candidate *c,
                                       const double activation[2]) {
   double margin = c->margin + activation[c->external];
-  if (c->sought && state->work->narrowed) margin = reach(model, state, c->pair, margin);
-  return collide_pair(model, state, c, margin);
+  const int narrowed = c->sought && state->work->narrowed;
+  return collide_pair(model, state, c, narrowed ? reach(model, state, c->pair, margin) : margin, margin);
 }
 
 // contacts of consecutive pairs
@@ -524,7 +529,8 @@ cav_status cav_contacts_of_near(const cav_model *model, cav_state *state, const 
   for (int i = 0; i < lanes->nnear; i++) {
     if (!(lanes->near[i] >> lane & 1)) continue;
     const candidate *c = state->work->geom->candidate + lanes->near[i] / CAV_LANE_BITS;
-    cav_status status = collide_pair(model, state, c, c->margin + activation[c->external]);
+    const double margin = c->margin + activation[c->external];
+    cav_status status = collide_pair(model, state, c, margin, margin);
     if (status) return status;
   }
   make_frames(state);

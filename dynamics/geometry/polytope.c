@@ -375,23 +375,22 @@ static int stand(const contact_pair *g, standing *s) {
   return 1;
 }
 
-// points over a face that the direction stands square on; 0 if none
+// points over a face that the direction stands square on, of all heights: which are taken does not depend on how far points
+// are sought; 0 if none
 static int touch_face(const contact_pair *g, cav_touch *touch) {
   standing s;
   if (!stand(g, &s)) return 0;
   cav_touch found[CAV_OUTLINE_MAX];
-  int count = 0;
   for (int k = 0; k < s.lying.n; k++) {
     double height = dot3(s.m, s.lying.x[k]) - s.top;
-    if (!(height < g->margin)) continue;
-    cav_touch *t = &found[count++];
+    cav_touch *t = &found[k];
     axpy3(t->pos, s.lying.x[k], -height / 2, s.m);
     scale3(t->normal, s.on_b ? -1 : 1, s.m);
     zero3(t->tangent);
     t->dist = height;
     t->feature = 1 + k;
   }
-  count = cav_thin_out(found, count, CAV_TOUCH_MAX);
+  int count = cav_thin_out(found, s.lying.n, CAV_TOUCH_MAX);
   for (int k = 0; k < count; k++) touch[k] = found[k];
   return count;
 }
@@ -498,12 +497,14 @@ static int meet(contact_pair *g, cav_touch *touch) {
   double lowest = INFINITY;
   for (int k = 0; k < count; k++) lowest = fmin(lowest, touch[k].dist);
   // a face whose points all stand higher than what was found is not what meets: a rim, a slanting side
-  if (count && lowest < dist + 1e-6 * g->size) return count;
-  cav_touch last;
-  touch_single(g, dist, &last);
-  if (count == CAV_TOUCH_MAX) count--;
-  touch[count] = last;
-  return count + 1;
+  if (!(lowest < dist + 1e-6 * g->size)) {
+    if (count == CAV_TOUCH_MAX) count--;
+    touch_single(g, dist, &touch[count++]);
+  }
+  int kept = 0;
+  for (int k = 0; k < count; k++)
+    if (touch[k].dist < g->margin) touch[kept++] = touch[k];
+  return kept;
 }
 
 int cav_points_over(const cav_shape *s, double corner[3][3], const double normal[3], double point[][3]) {
