@@ -7,7 +7,9 @@
 /// int a ds = -v, and any lambda may be taken from the weight: with |(t - s)+ - lambda| in its place, twice integrated by
 /// parts, the bound is lambda v + mu (g ((t - lambda)^2 + lambda^2)/2 + g lambda (T - t) + 2 z(t - lambda) - z(0) - z(t)
 /// - v_z (t - lambda)): at t = T half the way of one that need not stop. The least of sixteen lambdas counts. How high z
-/// comes by then is what a push-off can give (takeoff.c); where nothing tells, less than a kilometre.
+/// comes by then is what a push-off can give (takeoff.c), and no more than gravity takes back by t: as nothing pulls down,
+/// z + g s^2/2 is convex, so z(s) is at most g s (t - s)/2 above the line from z(0) to z(t). Where nothing tells, less than a
+/// kilometre.
 #include <math.h>
 
 #include "cavort/solve.h"
@@ -137,9 +139,18 @@ static double way_of(const travel *w, double delay, double highest) {
          (1 + w->friction) * CAV_TOLERANCE_MOMENTUM * w->g * sqrt(all * square);
 }
 
+/// The greatest height at a time of one that starts where it does and is no higher than the last height by the end: gravity has to take it
+/// back, with what the momentum that certificates leave unexplained lends it.
+static double arc_of(const travel *w, double time, double last, double all) {
+  const double left = w->time - time, part = time / w->time;
+  return (1 - part) * w->start[0] + part * last + w->g * time * left / 2 +
+         CAV_TOLERANCE_MOMENTUM * w->g * time * left * sqrt(all / (3 * w->time));
+}
+
 enum { DELAYS = 16 };
 
-/// The farthest that the centre of mass can be from where its first velocity takes it; infinite: off is nearer by far.
+/// The farthest that the centre of mass can be from where its first velocity takes it, no higher than highest then; infinite: off is
+/// nearer by far.
 static cav_status farthest(cav_examination *e, int root, const travel *w, double off, double highest, double *way) {
   double time[DELAYS], height[DELAYS], delay[DELAYS];
   int n = isfinite(w->rest) ? DELAYS : 1, near = 0;
@@ -152,8 +163,9 @@ static cav_status farthest(cav_examination *e, int root, const travel *w, double
   if (!near) return CAV_OK;
   cav_status status = w->friction > 0 ? cav_takeoff_heights(e, root, n, time, height) : CAV_OK;
   for (int i = 0; i < n && !status; i++) {
-    double most = w->friction > 0 ? fmin(height[i], tallest) : w->start[0];
-    *way = fmin(*way, way_of(w, delay[i], i == 0 ? fmin(most, highest) : most));
+    const double arc = arc_of(w, time[i], highest, isfinite(w->rest) ? w->rest : w->time);
+    const double most = w->friction > 0 ? fmin(fmin(height[i], arc), tallest) : w->start[0];
+    *way = fmin(*way, way_of(w, delay[i], most));
   }
   return status;
 }
