@@ -1,6 +1,7 @@
 /// What no actuator moves and is wanted elsewhere along the ground (solver/hand.c): where a ball has to be brought to push a
-/// block, against its closed form, and seven problems stated in a minute each, tests/pushing, whose stated guess ends at a
-/// motion that stands still, certified by the strategy that brings it there first.
+/// block, against its closed form, and problems stated in a minute each, tests/pushing, whose stated guess ends at a
+/// motion that stands still, certified by the strategy that brings it there first: seven of a body that has to be pushed, two
+/// of a touch sensor that is to feel a force, which it has no derivative for until something touches.
 #include <math.h>
 #include <string.h>
 
@@ -71,7 +72,7 @@ static const cav_strategy *find(const cav_strategy *strategy, int n, const char 
   return NULL;
 }
 
-static void test_pushed(const char *name, double most) {
+static void test_pushed(const char *name, const char *by, double most) {
   cav_problem *p = load(name);
   if (!p) return;
   cav_strategy strategy[CAV_STRATEGIES];
@@ -80,7 +81,7 @@ static void test_pushed(const char *name, double most) {
   cav_error error = {0};
   int n;
   CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
-  const cav_strategy *push = find(strategy, n, "push");
+  const cav_strategy *push = find(strategy, n, by);
   if (CHECK(push != NULL)) CHECK(cav_strategy_solve(p, push, NULL, NULL, &s, &error) == CAV_OK);
   // its terms are no part of the problem: the cost is that of the file's own
   if (s) CHECK(!cav_verify_solution(p, s, &v, &error));
@@ -89,6 +90,22 @@ static void test_pushed(const char *name, double most) {
   CHECK(v.certified && v.achieved && v.cost < most);
   cav_solution_free(s);
   cav_problem_free(p);
+}
+
+/// The tip of an arm to the near face of a wall, which a sensor of the wall or of the tip is to feel: a box's face at y = -0.15,
+/// below a ball of 18 mm, in its sensor's window; where a term says where the tip is, there.
+static void test_touched(void) {
+  for (int k = 0; k < 2; k++) {
+    cav_problem *p = load(k ? "feel" : "press");
+    if (!p) continue;
+    cav_hand hand;
+    CHECK(cav_hand_find(p, 1, &hand) == CAV_OK && hand.found == 1 && hand.touches);
+    CHECK(!strcmp(p->model->geom[hand.term[0].sensor.object].name, "tip"));
+    CHECK_NEAR(hand.place[0], -0.45 + 0.3 * cos(70 * M_PI / 180) + 0.25 * cos(-70 * M_PI / 180), 1e-9);
+    CHECK_NEAR(hand.place[1], -0.15 + 0.018, 1e-12);
+    CHECK(hand.term[0].from == 0.8 && hand.term[0].to == 1.2);
+    cav_problem_free(p);
+  }
 }
 
 /// Nothing to push: a hopper alone.
@@ -103,12 +120,14 @@ static void test_none(void) {
 int main(void) {
   test_place();
   test_components();
+  test_touched();
   test_none();
   static const struct {
     const char *name;
     double most; ///< cost
   } problem[] = {{"ahead", 0.12}, {"across", 0.12},  {"behind", 0.12}, {"turned", 0.12},
                  {"slid", 0.12},  {"straight", 0.3}, {"aside", 0.3}};
-  for (size_t i = 0; i < sizeof problem / sizeof *problem; i++) test_pushed(problem[i].name, problem[i].most);
+  for (size_t i = 0; i < sizeof problem / sizeof *problem; i++) test_pushed(problem[i].name, "push", problem[i].most);
+  test_pushed("press", "touch", 0.2), test_pushed("feel", "touch", 0.2);
   return check_result();
 }

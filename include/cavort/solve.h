@@ -353,7 +353,7 @@ typedef struct cav_strategy {
   int nswing;                           ///< sines over joints of the guess
   cav_swing swing[CAV_STRATEGY_SWINGS]; ///< [nswing]
   int ground;                           ///< 1: its guess stands on what is below it
-  int hand;                             ///< 1: a hand is brought first to what has to be pushed
+  int hand;                             ///< 1: a hand is brought first to what has to be pushed or touched
   double height, from, to;              ///< not stated: of a ballistic arc, m, and when, s
   int flies;                            ///< 1: start and goal are held before and after that arc
   cav_guess_pose pose[2];               ///< where it flies

@@ -2,6 +2,8 @@
 /// stages carry it there: they roll it along, since sliding costs more of them, and nothing brings a hand to it when they
 /// fade. So one is brought there first: the geom of a driven tree that serves best and of these is nearest to the
 /// body, to the side opposite to the way, at the height of the body's centre or as low as it can be over the ground.
+/// A touch sensor reads nothing until something touches, and has no derivative there: where a force is asked of one, what
+/// serves best is brought to the surface first, where it is nearest within the sensor's site, or where other terms want it.
 #include "hand.h"
 
 #include <math.h>
@@ -196,7 +198,7 @@ static void lay(const cav_model *m, const cav_state *state, const thing *t, int 
   const int body = m->link[t->link].body;
   cav_pose pose;
   find_place(m, state, t, geom, away, hand->place);
-  hand->found = isfinite(hand->place[2]); // not where it touches by listed pairs alone
+  hand->found = isfinite(hand->place[2]) ? CAV_HAND_TERMS : 0; // not where it touches by listed pairs alone
   cav_object_pose(m, state, CAV_OBJECT_XBODY, body, &pose);
   column3(hand->upright, pose.rotation, 2);
   hand->term[0] = term_of(CAV_SENSOR_FRAMEPOS, CAV_OBJECT_GEOM, geom, hand->place);
@@ -207,6 +209,155 @@ static void lay(const cav_model *m, const cav_state *state, const thing *t, int 
   copy3(hand->still, pose.pos);
   hand->term[2] = term_of(CAV_SENSOR_FRAMEPOS, CAV_OBJECT_XBODY, body, hand->still);
   for (int i = 0; i < CAV_HAND_TERMS; i++) hand->term[i].to = i == 2 ? hand->term[0].from : t->time;
+}
+
+/// What has to be touched: a site whose touch sensor is to feel a force, and when.
+typedef struct touched {
+  const cav_site *site;
+  double from, to;
+} touched;
+
+static int find_touched(const cav_problem *p, touched *found) {
+  for (int i = 0; i < p->nterm; i++) {
+    const cav_term *term = &p->term[i];
+    if (term->quantity != CAV_QUANTITY_SENSOR || term->sensor.type != CAV_SENSOR_TOUCH) continue;
+    double target = term->lower, to = term->to < 0 ? p->duration : fmin(term->to, p->duration);
+    if (term->use != CAV_USE_RANGE) cav_term_target(term, to, 1, &target);
+    if (!(target > 0) || (term->use == CAV_USE_COST && !(term->weight > 0))) continue;
+    *found = (touched){&p->model->site[term->sensor.object], fmax(term->from, 0), to};
+    return 1;
+  }
+  return 0;
+}
+
+/// Where a term on its place wants the link of a geom while it touches, over a place at; 0: none does.
+static int place_asked(const cav_problem *p, const touched *t, int link, double at[3]) {
+  int found = 0;
+  for (int i = 0; i < p->nterm; i++) {
+    const cav_term *term = &p->term[i];
+    const cav_sensor *s = &term->sensor;
+    const double to = term->to < 0 ? p->duration : term->to;
+    double target[CAV_SENSOR_DIM_MAX];
+    if (term->quantity != CAV_QUANTITY_SENSOR || s->type != CAV_SENSOR_FRAMEPOS || s->referred) continue;
+    if (term->use == CAV_USE_RANGE || cav_object_link(p->model, s->object_type, s->object) != link) continue;
+    if (term->from > t->to || to < t->from) continue;
+    cav_term_target(term, fmin(to, t->to), 3, target);
+    for (int k = 0; k < 3; k++)
+      if (term->component < 0 || term->component == k) at[k] = target[k];
+    found = 1;
+  }
+  return found;
+}
+
+/// The nearest place of a box's zone, of a ball's for other shapes.
+static void clamp_to_site(const cav_model *m, const cav_state *state, const cav_site *site, double at[3]) {
+  cav_pose pose;
+  double d[3], local[3];
+  cav_object_pose(m, state, CAV_OBJECT_SITE, (int)(site - m->site), &pose);
+  sub3(d, at, pose.pos);
+  rotate_back(local, pose.rotation, d);
+  if (site->type == CAV_GEOM_BOX) {
+    for (int k = 0; k < 3; k++) local[k] = fmin(fmax(local[k], -site->size[k]), site->size[k]);
+  } else if (norm3(local) > site->size[0])
+    scale3(local, site->size[0] / norm3(local), local);
+  transform(at, pose.pos, pose.rotation, local);
+}
+
+/// The place on the surface of a geom nearest to x, of round ones and meshes towards their middle, and the normal out of it.
+static void surface_near(const cav_geom *geom, const cav_pose *pose, const double x[3], double at[3],
+                         double normal[3]) {
+  double d[3], local[3];
+  column3(normal, pose->rotation, 2);
+  sub3(d, x, pose->pos);
+  if (geom->type == CAV_GEOM_PLANE || geom->type == CAV_GEOM_HFIELD) {
+    axpy3(at, x, -dot3(d, normal), normal);
+    return;
+  }
+  if (geom->type != CAV_GEOM_BOX) {
+    if (norm3(d) > 0) scale3(normal, 1 / norm3(d), d);
+    axpy3(at, pose->pos, exit_of(geom, pose, normal), normal);
+    return;
+  }
+  int face = 0;
+  double most = -INFINITY;
+  rotate_back(local, pose->rotation, d);
+  for (int k = 0; k < 3; k++) {
+    const double out = fabs(local[k]) - geom->size[k];
+    if (out > most) most = out, face = k;
+    local[k] = fmin(fmax(local[k], -geom->size[k]), geom->size[k]);
+  }
+  column3(normal, pose->rotation, face);
+  local[face] = copysign(geom->size[face], dot3(d, normal));
+  if (dot3(d, normal) < 0) scale3(normal, -1, normal);
+  transform(at, pose->pos, pose->rotation, local);
+}
+
+/// How a geom that an actuator moves may come to one that none moves.
+typedef struct meeting {
+  int mover, ground, grade;
+  double far; ///< m, at the start
+  double at[3], normal[3];
+} meeting;
+
+/// Of the pair of a mover and what it may touch; the state is at the start.
+static void weigh_meeting(const cav_problem *p, const cav_state *state, const cav_roles *roles, const touched *t,
+                          int mover, int ground, meeting *best) {
+  const cav_model *m = p->model;
+  const int felt = m->geom[ground].body == t->site->body;
+  cav_pose hand, pose;
+  double x[3], d[3];
+  // what is felt by a sensor that moves is a solid sooner than the ground
+  const int solid = m->geom[ground].type != CAV_GEOM_PLANE && m->geom[ground].type != CAV_GEOM_HFIELD;
+  meeting one = {.mover = mover, .ground = ground, .grade = felt ? grade_of(m, roles, mover) : solid};
+  pose_of(m, state, mover, &hand);
+  pose_of(m, state, ground, &pose);
+  copy3(x, hand.pos);
+  if (place_asked(p, t, m->geom[mover].link, x)) one.grade = 3;
+  if (felt) clamp_to_site(m, state, t->site, x);
+  surface_near(&m->geom[ground], &pose, x, one.at, one.normal);
+  sub3(d, hand.pos, one.at);
+  one.far = norm3(d);
+  if (one.grade > best->grade || (one.grade == best->grade && one.far < best->far)) *best = one;
+}
+
+/// The best of them, mover -1 where there is none.
+static cav_status find_meeting(const cav_problem *p, cav_state *state, const touched *t, meeting *best) {
+  const cav_model *m = p->model;
+  cav_roles roles;
+  *best = (meeting){.mover = -1, .grade = -1};
+  cav_status status = cav_roles_find(m, state, &roles);
+  if (!status) status = cav_position(m, state, p->q_start);
+  for (int i = 0; i < m->npair && !status; i++) {
+    const int pair[] = {m->pair[i].geom1, m->pair[i].geom2};
+    for (int k = 0; k < 2; k++) {
+      const int mover = pair[k], ground = pair[1 - k];
+      if (m->geom[mover].body != t->site->body && m->geom[ground].body != t->site->body) continue;
+      if (!m->link[m->geom[mover].link].driven || m->link[m->geom[ground].link].driven) continue;
+      weigh_meeting(p, state, &roles, t, mover, ground, best);
+    }
+  }
+  return status;
+}
+
+/// One term: the mover at the surface while the sensor is to feel something.
+static void lay_meeting(const cav_model *m, const cav_state *state, const touched *t, const meeting *one, double away,
+                        cav_hand *hand) {
+  const int link = m->geom[one->ground].link, body = m->link[link].body;
+  cav_pose mover, pose;
+  double back[3];
+  scale3(back, -1, one->normal);
+  pose_of(m, state, one->mover, &mover);
+  axpy3(hand->place, one->at, away * cav_geom_reach(&m->geom[one->mover], &mover, back), one->normal);
+  hand->term[0] = term_of(CAV_SENSOR_FRAMEPOS, CAV_OBJECT_GEOM, one->mover, hand->place);
+  hand->term[0].from = t->from, hand->term[0].to = t->to;
+  hand->found = isfinite(dot3(hand->place, hand->place)), hand->touches = 1;
+  if (link == 0) return;
+  double d[3];
+  cav_object_pose(m, state, CAV_OBJECT_XBODY, body, &pose);
+  sub3(d, hand->place, pose.pos);
+  rotate_back(hand->place, pose.rotation, d);
+  hand->term[0].sensor.referred = 1, hand->term[0].sensor.reference_type = CAV_OBJECT_XBODY;
+  hand->term[0].sensor.reference = body;
 }
 
 cav_status cav_hand_find(const cav_problem *problem, double away, cav_hand *hand) {
@@ -221,6 +372,10 @@ cav_status cav_hand_find(const cav_problem *problem, double away, cav_hand *hand
   if (!status && t.link) status = cav_position(m, state, problem->q_start);
   if (!status && t.link) status = find_geom(m, state, problem->q_start, t.link, state->link[t.link].pos, &geom);
   if (!status && geom >= 0) lay(m, state, &t, geom, away, hand);
+  touched touch;
+  meeting one = {.mover = -1};
+  if (!status && !hand->found && find_touched(problem, &touch)) status = find_meeting(problem, state, &touch, &one);
+  if (!status && one.mover >= 0) lay_meeting(m, state, &touch, &one, away, hand);
   cav_state_free(state);
   return status;
 }

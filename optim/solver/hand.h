@@ -1,4 +1,4 @@
-/// What pushes a body that no actuator moves, and from where. Private to optim/solver.
+/// What pushes a body that no actuator moves, or touches what a touch sensor is to feel, and from where. Private to optim/solver.
 #ifndef CAVORT_HAND_H
 #define CAVORT_HAND_H
 
@@ -7,10 +7,11 @@
 enum { CAV_HAND_TERMS = 3 };
 
 /// Terms that bring a geom of a driven tree to the side of a body that it is to be pushed from, keep the body from tumbling
-/// towards it, and where it is until then.
+/// towards it, and where it is until then; or one that brings what is to be touched and what touches it together.
 typedef struct cav_hand {
-  int found; ///< 0: nothing that no actuator moves is asked for elsewhere along the ground, or nothing
-             ///< reaches it
+  int found; ///< number of terms; 0: nothing that no actuator moves is asked for elsewhere along the ground, no force is
+             ///< asked of a touch sensor, or nothing reaches it
+  int touches;                   ///< 1: it is for a touch sensor
   cav_term term[CAV_HAND_TERMS]; ///< they borrow what follows
   double place[3];               ///< m, of the geom in the frame of the body
   double upright[3];             ///< z axis of the body at the start

@@ -364,15 +364,18 @@ static cav_status add_pumped(const cav_problem *problem, cav_strategy *strategy,
   return status;
 }
 
-/// With a hand brought first to what has to be pushed.
+/// With a hand brought first to what has to be pushed or touched.
 static cav_status add_pushed(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated) {
   cav_hand hand;
   cav_strategy push = *stated;
   push.hand = 1;
-  push.text =
-      "with a hand brought first to the side that what has to move is pushed from, contacts sharp from there on";
   cav_status status = problem->cycle.on ? CAV_OK : cav_hand_find(problem, 1, &hand);
-  if (!problem->cycle.on && !status && hand.found) add_mended(strategy, n, &push, "push");
+  if (problem->cycle.on || status || !hand.found) return status;
+  push.text =
+      hand.touches
+          ? "with what is to touch brought there first, contacts sharp from there on"
+          : "with a hand brought first to the side that what has to move is pushed from, contacts sharp from there on";
+  add_mended(strategy, n, &push, hand.touches ? "touch" : "push");
   return status;
 }
 
@@ -535,7 +538,7 @@ static cav_status lead(const cav_problem *problem, double away, const cav_solve_
   if (!status) {
     memcpy(term, problem->term, (size_t)problem->nterm * sizeof *term);
     memcpy(term + problem->nterm, hand.term, sizeof hand.term);
-    led.term = term, led.nterm = problem->nterm + (hand.found ? CAV_HAND_TERMS : 0);
+    led.term = term, led.nterm = problem->nterm + hand.found;
     led.schedule = cav_hand_schedule(&problem->schedule);
     first.diagnose = first.gains = 0;
     status = cav_solve_after(&led, &first, NULL, before, solution, error);
