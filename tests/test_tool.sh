@@ -653,7 +653,23 @@ sed 's/<start key="stand" height="floor"\/>/<start key="stand" height="floor"><r
 run 0 inspect leans.xml
 check "a start beside its support" grep -qE "^note: at the start the centre of mass of 'torso' is 0.[0-9]+ m beside what it stands on, which is towards \(-1.0 0.0\)" out
 
+# a goal whose left foot is on the floor, and a term that wants it up at the end; not one that ends before, or wants what the goal has
+sed 's/<goal key="stand" height="floor"\/>/&<cost><posture name="landing" dofs="all" at="end" weight="900"\/><sensor name="up" type="framepos" body="left foot" component="z" target="0.4" from="0.5" weight="300" within="0.1"\/><\/cost>/; s/<root pos="0 0 3"\/>//' stands.xml >disagrees.xml
+run 0 inspect disagrees.xml
+check "a goal and a term that disagree" grep -qE "^note: the goal disagrees with 'up', which wants z 0.4 \(within 0.1\) at the end: the goal's posture, which 'landing' asks for, has 0.0[0-9]+ there" out
+sed 's/from="0.5"/from="0.5" to="1.5"/' disagrees.xml >agrees.xml
+run 0 inspect agrees.xml
+check "a term that ends before agrees" sh -c '! grep -q "^note" out'
+
 # --- interruption, and going on from there ---
+
+# a time after which it ends by itself, with what it has
+"$cavort" solve "$root/problems/motions/get-up-back/problem.xml" -o timed --threads 1 --seconds 0.4 >out 2>err
+check "a solve that ends when its time is up" [ $? -eq 130 ]
+says err "the best iterate is saved, the same command with --resume goes on"
+check "it has a motion" [ -s timed/trajectory.csv ]
+run 2 solve "$root/problems/motions/hop/problem.xml" --seconds soon
+says err "--seconds: expected a number above 0"
 
 # a motion long enough to be caught on its way
 motion=$root/problems/motions/squat-jump/problem.xml

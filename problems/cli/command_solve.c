@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/time.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -34,8 +35,19 @@ static void interrupt(int signal_number) {
   }
 }
 
-static void catch_interrupts(void) {
-  struct sigaction action = {.sa_handler = interrupt};
+// asks for the end, and never for more than that
+static void time_is_up(int signal_number) {
+  if (!interrupted) interrupt(signal_number);
+}
+
+// seconds: after which it is as if someone had asked for the end, 0: never
+static void catch_interrupts(double seconds) {
+  struct sigaction action = {.sa_handler = interrupt}, alarm = {.sa_handler = time_is_up, .sa_flags = SA_RESTART};
+  const struct itimerval once = {
+      .it_value = {(time_t)seconds, (suseconds_t)fmin(ceil(1e6 * fmod(seconds, 1)), 999999)}};
+  sigemptyset(&alarm.sa_mask);
+  sigaction(SIGALRM, &alarm, NULL);
+  setitimer(ITIMER_REAL, &once, NULL);
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, NULL);
   sigaction(SIGTERM, &action, NULL);
@@ -363,7 +375,7 @@ static int solve_one(const cav_command_line *line) {
     return cav_command_fail(&error);
   }
   // from here on: proofs and the first stage of a long horizon take a while, too
-  catch_interrupts();
+  catch_interrupts(line->seconds);
   cav_problem *problem = cav_problem_load(line->operand, line->model, &error);
   if (!problem) return cav_command_fail(&error);
   int refused = cav_command_refuse(line, problem);

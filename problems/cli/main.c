@@ -65,7 +65,10 @@ static const cav_manual_option options[] = {
     {OPTION_METHODS, "--methods", NULL, "LIST",
      "what to compare, with commas: own (default), strategies (what solve does: own, then repairs and "
      "other strategies where needed), ipopt, limited (Ipopt with limited memory), both"},
-    {OPTION_SECONDS, "--seconds", NULL, "S", "processor time that a run has (default 120)"},
+    {OPTION_SECONDS, "--seconds", NULL, "S",
+     "solve: ends after S s as by Ctrl-C, with the best iterate kept (default: never); study: processor time that a "
+     "run has "
+     "(default 120)"},
     {OPTION_MARKERS, "--markers", NULL, "FILE", "marker set: which marker of the clip sits where on which body"},
     {OPTION_SCALE, "--scale", NULL, NULL,
      "fit the sizes of segments too, each within a few percent of the whole body's (scale of the marker set: 0.03), "
@@ -127,7 +130,8 @@ static const cav_manual_command commands[] = {
      "  one each into DIR (default batch), what is there already not again",
      cav_command_solve,
      OPTION_JOBS | OPTION_SET | OPTION_MODEL | OPTION_OUTPUT | OPTION_SOLVER | OPTION_IPOPT | OPTION_THREADS |
-         OPTION_STRATEGIES | OPTION_RESUME | OPTION_FORCE | OPTION_ERRORS | OPTION_QUIET | OPTION_JSON},
+         OPTION_STRATEGIES | OPTION_SECONDS | OPTION_RESUME | OPTION_FORCE | OPTION_ERRORS | OPTION_QUIET |
+         OPTION_JSON},
     {"table", "DIR...",
      "a line for each result folder, or each problem of a batch: what became of it, and the first cause",
      cav_command_table, OPTION_CSV},

@@ -1,4 +1,5 @@
-/// What the commands say of a start that nothing holds up, and of a goal that no motion can come to: one inside a solid. A start
+/// What the commands say of a start that nothing holds up, and of a goal that no motion can come to: one inside a solid, or one that
+/// disagrees with what else is asked for at the end. A start
 /// inside one is a proof that nothing can be solved (cav_problem_impossible); of a goal it depends on what is asked, since a
 /// goal also is no more than the end of a guess.
 #include <math.h>
@@ -67,6 +68,51 @@ static int tell_depth(FILE *out, const cav_problem *p) {
   }
   cav_state_free(state);
   return deep;
+}
+
+static double tolerance_of(const cav_problem *p, const cav_term *t) {
+  return cav_term_tolerance(p, t, CAV_WITHIN_LENGTH); // places alone
+}
+
+/// By how much the goal's posture misses what a term on a place asks for at the end, and what it has; 0: by no more than the term allows.
+static double goal_misses(const cav_problem *p, cav_state *state, const cav_term *t, int *component, double *has) {
+  const cav_sensor *s = &t->sensor;
+  const int place = s->type == CAV_SENSOR_FRAMEPOS || s->type == CAV_SENSOR_SUBTREECOM;
+  const double to = t->to < 0 ? p->duration : t->to, within = tolerance_of(p, t);
+  double at[CAV_SENSOR_DIM_MAX], most = 0;
+  if (t->quantity != CAV_QUANTITY_SENSOR || !place || !t->target || t->nwaypoint || !isfinite(within)) return 0;
+  if (t->use == CAV_USE_COST && !(t->weight > 0)) return 0;
+  if (to < p->duration - p->timestep / 2 || t->from > p->duration) return 0;
+  cav_sensor_read(p->model, state, s, at);
+  for (int k = 0; k < s->dim; k++) {
+    if (t->component >= 0 && t->component != k) continue;
+    const double off = fabs(at[k] - t->target[k]);
+    if (off > within && off > most) most = off, *component = k, *has = at[k];
+  }
+  return most;
+}
+
+/// A goal asked for at the end, and a term that wants a place of it elsewhere then.
+static int tell_disagreement(FILE *out, const cav_problem *p) {
+  const cav_term *asked = asks_for_goal(p);
+  if (!asked || asked->dofs != CAV_DOFS_ALL) return 0;
+  cav_state *state = posture_of(p, p->q_goal, 0);
+  int n = 0;
+  for (int i = 0; state && i < p->nterm; i++) {
+    const cav_term *t = &p->term[i];
+    int k = 0;
+    double has = 0;
+    if (!(goal_misses(p, state, t, &k, &has) > 0)) continue;
+    fprintf(
+        out,
+        "note: the goal disagrees with '%.60s', which wants %c %.3g (within %.3g) at the end: the goal's posture, "
+        "which '%.60s' asks for, has %.3g there. Change one of them, or end the one before the other begins (to=)\n",
+        *t->name ? t->name : "sensor", "xyz"[k], t -> target[k], tolerance_of(p, t),
+        asked -> name && * asked -> name ? asked -> name : "posture", has);
+    n++;
+  }
+  cav_state_free(state);
+  return n;
 }
 
 /// Whether gravity alone acts on a tree that hangs on nothing: it is free and at rest, no medium, equality constraint or
@@ -233,6 +279,7 @@ int cav_command_tell_postures(FILE *out, const cav_problem *p) {
   // a goal that is the start's was examined as that
   const int same = !p->free_start && !memcmp(p->q_goal, p->q_start, sizeof *p->q_goal * (size_t)p->model->nq);
   if (!same) n += tell_depth(out, p);
+  n += tell_disagreement(out, p);
   // what falls is told, and so is what is proven impossible
   if (n > 0 || p->duration < 3 * p->timestep || is_impossible(p)) return n;
   if (!p->free_start && rests(p)) n += tell_weakness(out, p, "start", p->q_start, 0);
