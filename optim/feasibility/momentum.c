@@ -139,8 +139,8 @@ static double way_of(const travel *w, double delay, double highest) {
          (1 + w->friction) * CAV_TOLERANCE_MOMENTUM * w->g * sqrt(all * square);
 }
 
-/// The greatest height at a time of one that starts where it does and is no higher than the last height by the end: gravity has to take it
-/// back, with what the momentum that certificates leave unexplained lends it.
+/// The greatest height at a time of one that starts where it does and is no higher than the last height by the end:
+/// gravity has to take it back, with what the momentum that certificates leave unexplained lends it.
 static double arc_of(const travel *w, double time, double last, double all) {
   const double left = w->time - time, part = time / w->time;
   return (1 - part) * w->start[0] + part * last + w->g * time * left / 2 +
@@ -149,8 +149,8 @@ static double arc_of(const travel *w, double time, double last, double all) {
 
 enum { DELAYS = 16 };
 
-/// The farthest that the centre of mass can be from where its first velocity takes it, no higher than highest then; infinite: off is
-/// nearer by far.
+/// The farthest that the centre of mass can be from where its first velocity takes it, no higher than highest then;
+/// infinite: off is nearer by far.
 static cav_status farthest(cav_examination *e, int root, const travel *w, double off, double highest, double *way) {
   double time[DELAYS], height[DELAYS], delay[DELAYS];
   int n = isfinite(w->rest) ? DELAYS : 1, near = 0;

@@ -1,6 +1,5 @@
-/// What the commands say of a start that nothing holds up, and of a goal that no motion can come to: one inside a solid, or one that
-/// disagrees with what else is asked for at the end. A start
-/// inside one is a proof that nothing can be solved (cav_problem_impossible); of a goal it depends on what is asked, since a
+/// What the commands say of a start that nothing holds up, and of a goal that no motion can come to: one inside a solid,
+/// or one that disagrees with what else is asked for at the end. A start inside a solid is a proof that nothing can be solved (cav_problem_impossible); of a goal it depends on what is asked, since a
 /// goal also is no more than the end of a guess.
 #include <math.h>
 #include <stdio.h>
@@ -74,7 +73,8 @@ static double tolerance_of(const cav_problem *p, const cav_term *t) {
   return cav_term_tolerance(p, t, CAV_WITHIN_LENGTH); // places alone
 }
 
-/// By how much the goal's posture misses what a term on a place asks for at the end, and what it has; 0: by no more than the term allows.
+/// By how much the goal's posture misses what a term on a place asks for at the end, and what it has; 0: by no more than
+/// the term allows.
 static double goal_misses(const cav_problem *p, cav_state *state, const cav_term *t, int *component, double *has) {
   const cav_sensor *s = &t->sensor;
   const int place = s->type == CAV_SENSOR_FRAMEPOS || s->type == CAV_SENSOR_SUBTREECOM;
