@@ -1,6 +1,7 @@
 /// What the commands say of a start that nothing holds up, and of a goal that no motion can come to: one inside a solid,
-/// or one that disagrees with what else is asked for at the end. A start inside a solid is a proof that nothing can be solved (cav_problem_impossible); of a goal it depends on what is asked, since a
-/// goal also is no more than the end of a guess.
+/// or one that disagrees with what else is asked for at the end. A start inside a solid is a proof that nothing can be
+/// solved (cav_problem_impossible); of a goal it depends on what is asked, since a goal also is no more than the end of a
+/// guess.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
