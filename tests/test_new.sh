@@ -96,6 +96,10 @@ sed 's/<mujoco model="[^"]*"/<mujoco model="tall man scene"/' problems/models/hu
 "$cavort" new problems/models/humanoid.xml --like squat-jump -o "$work/like.xml" >"$work/out" || fail "like squat-jump"
 grep -q 'problem name="humanoid-squat-jump" model=' "$work/like.xml" || fail "like squat-jump: its name"
 "$cavort" inspect "$work/like.xml" >/dev/null 2>&1 || fail "like squat-jump cannot be read"
+# from elsewhere, by a program in a build folder of the source
+source=$(dirname "$(dirname "$(dirname "$cavort")")")
+[ ! -d "$source/problems/motions" ] ||
+  (cd "$work" && "$cavort" new "$root/problems/models/humanoid.xml" --like kick -o elsewhere.xml >/dev/null) || fail "like kick, from elsewhere"
 "$cavort" new problems/models/robot.xml --like squat-jump -o "$work/no.xml" 2>"$work/err" && fail "like what does not fit"
 grep -q "does not suit this model, nothing was written; these can be read with it: .*robot-jump" "$work/err" || fail "that nothing was written is not told"
 grep -q "robot-jump, robot-reach, robot-squat" "$work/err" || fail "what fits is not told"

@@ -16,9 +16,20 @@
 #include "setting.h"
 #include "xml.h"
 
-// where motions are: in the source, or where they are installed
-static const char *const places[] = {"problems/motions", CAVORT_DATA "/motions"};
-enum { NPLACE = sizeof places / sizeof *places, MOTIONS = 256 };
+enum { NPLACE = 3, MOTIONS = 256 };
+
+// where motions are: in the source, seen from it or from a build folder in it that holds this program, or where they are
+// installed
+static const char *place_of(int i) {
+  static const char *const from[] = {"problems/motions", CAVORT_DATA "/motions"};
+  static char beside[600];
+  if (i < 2) return from[i];
+  const ssize_t n = readlink("/proc/self/exe", beside, sizeof beside - 64);
+  beside[n > 0 ? n : 0] = 0;
+  for (int up = 0; up < 3 && strchr(beside, '/'); up++) *strrchr(beside, '/') = 0;
+  strcat(beside, "/problems/motions");
+  return beside;
+}
 
 // NAME of a model's path, without its ending
 static void base_of(const char *path, char out[128]) {
@@ -102,7 +113,7 @@ static char *find_like(const char *like) {
   char path[1200];
   if (access(like, R_OK) == 0 && strchr(like, '.')) return strdup(like);
   for (int i = 0; i < NPLACE; i++) {
-    snprintf(path, sizeof path, "%.600s/%.400s/problem.xml", places[i], like);
+    snprintf(path, sizeof path, "%.600s/%.400s/problem.xml", place_of(i), like);
     if (access(path, R_OK) == 0) return strdup(path);
   }
   return NULL;
@@ -113,11 +124,11 @@ static int list_motions(const char *model, char name[MOTIONS][64]) {
   int n = 0;
   for (int i = 0; i < NPLACE && n == 0; i++) {
     struct dirent **entry;
-    int found = scandir(places[i], &entry, NULL, alphasort);
+    int found = scandir(place_of(i), &entry, NULL, alphasort);
     for (int k = 0; k < found; k++) {
       char path[1200];
       cav_error ignored = {0};
-      snprintf(path, sizeof path, "%.600s/%.400s/problem.xml", places[i], entry[k]->d_name);
+      snprintf(path, sizeof path, "%.600s/%.400s/problem.xml", place_of(i), entry[k]->d_name);
       int is = *entry[k]->d_name != '.' && n < MOTIONS && access(path, R_OK) == 0;
       cav_problem *problem = is && model ? cav_problem_load(path, model, &ignored) : NULL;
       if (is && (!model || problem)) snprintf(name[n++], 64, "%.63s", entry[k]->d_name);
