@@ -1,7 +1,7 @@
 /// What of the world a motion leans on where neither its first nor its last knot does: a wall that can be stood on is stood
 /// on, and who asked for a way over it is told. And whether a motion whose guess flies does not: who asked for a height alone
-/// may get one that rears up to it. And whether a body that is asked up at a time is up on its toes, and what links of one body
-/// lean on each other.
+/// may get one that rears up to it. And whether a body that is asked up at a time is up on its toes, what links of one body
+/// lean on each other, and whether anything holds at the end what is to be at rest then.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -128,6 +128,34 @@ static void tell_self(FILE *out, const cav_model *m, const cav_forces *forces, c
           a && *a ? a : "a body", b && *b ? b : "a body", size, most->knot * motion->timestep);
 }
 
+/// A tree that floats, that actuators move and that nothing holds at the end, where all is to be at rest: at the top of a
+/// hop it is, for a moment.
+static void tell_ending(FILE *out, const cav_problem *problem, const cav_forces *forces) {
+  const cav_model *m = problem->model;
+  if (!problem->close_at_rest || problem->cycle.on || m->nequality || m->density > 0 || !(m->gravity[2] < 0)) return;
+  for (int root = 1; root < m->nlink; root++) {
+    const cav_link *link = &m->link[root];
+    if (link->root != root || !link->driven || !link->njoint || m->joint[link->joint].type != CAV_JOINT_FREE) continue;
+    double borne = 0, mass = 0;
+    for (int l = root; l < m->nlink; l++)
+      if (m->link[l].root == root) mass += m->link[l].mass;
+    for (int i = 0; i < forces->nforce; i++) {
+      const cav_contact_force *f = &forces->force[i];
+      const int one = m->link[m->geom[f->geom1].link].root, other = m->link[m->geom[f->geom2].link].root;
+      if (f->knot != forces->nknot - 1 || one == other) continue;
+      borne += (other == root) * f->force[2] -
+               (one == root) * f->force[2]; // upwards: what is held between hands holds nothing
+    }
+    if (borne > leaning * mass * -m->gravity[2]) continue;
+    const char *name = m->body[link->body].name;
+    fprintf(out,
+            "  note: nothing holds '%.60s' at the end: it is at rest for a moment, as at the top of a hop, and falls. "
+            "A posture "
+            "held over the last tenth of the time (from=), or a smaller within of the final velocity, makes it stand\n",
+            name && *name ? name : "a body");
+  }
+}
+
 void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_trajectory *motion,
                               const cav_options *contact) {
   const cav_model *m = problem->model;
@@ -152,7 +180,7 @@ void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_t
             size_of(most[g]), most[g]->knot * motion->timestep);
   }
   if (n > 0) fprintf(out, "; where it must not be touched: guide.md, Obstacles\n");
-  if (forces) tell_self(out, m, forces, motion, weight);
+  if (forces) tell_ending(out, problem, forces), tell_self(out, m, forces, motion, weight);
   if (forces && problem->guess_height > 0 && !is_in_the_air(m, forces, weight))
     fprintf(
         out,
