@@ -138,13 +138,13 @@ E2
 asks trolley.xml "duration='2' timestep='.02' close='open'" "9.97 m from the start, but at full effort it comes 3.06 m far in 2 s" <<'E2'
 <start/><cost><posture name="far" joint="rail" qpos="10" at="end" weight="900"/></cost>
 E2
-# eight metres in half a second, and forty in three, of a body that only its feet push
 # from rest to rest at its height: mu g T^2/2 at most, what a hop of that time takes, 2.51 m in 0.8 s (here a step longer, 2.67 m), as
 # gravity has to take back what it rises
 asks "$models/humanoid.xml" "duration='0.8' timestep='.025'" "it takes a centre of mass at most 2.7" <<'E2'
 <start key="stand" height="floor"/><goal key="stand" height="floor"><root pos="3 0 1.34"/></goal>
 <cost><sensor name="there" type="subtreecom" body="torso" relative="goal" target="0 0 0" at="end" weight="900"/></cost>
 E2
+# eight metres in half a second, and forty in three, of a body that only its feet push
 asks "$models/humanoid.xml" "duration='0.5' timestep='.025'" "friction (0.8) cannot push it there in time" <<'E2'
 <start key="stand" height="floor"/><cost><sensor name="there" type="subtreecom" body="torso" component="x" relative="start" target="8" at="end" weight="900"/></cost>
 E2

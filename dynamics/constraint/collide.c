@@ -409,6 +409,11 @@ static inline cav_status collide_pair(const cav_model *model, cav_state *state, 
   return status;
 }
 
+// how far a pair is sought, of its margin
+static inline double far_of(const cav_model *model, const cav_state *state, const candidate *c, double margin) {
+  return c->sought && state->work->narrowed ? reach(model, state, c->pair, margin) : margin;
+}
+
 // contacts of the pairs that a sweep leaves
 static cav_status collide_swept(const cav_model *model, cav_state *state, const double activation[2], double most) {
   struct cav_geom_cache *cache = state->work->geom;
@@ -418,8 +423,7 @@ static cav_status collide_swept(const cav_model *model, cav_state *state, const 
     const candidate *c = cache->candidate + found[i];
     double margin = c->margin + activation[c->external];
     if (!near(cache, c, margin)) continue;
-    const int narrowed = c->sought && state->work->narrowed;
-    cav_status status = collide_pair(model, state, c, narrowed ? reach(model, state, c->pair, margin) : margin, margin);
+    cav_status status = collide_pair(model, state, c, far_of(model, state, c, margin), margin);
     if (status) return status;
   }
   return CAV_OK;
@@ -429,8 +433,7 @@ static cav_status collide_swept(const cav_model *model, cav_state *state, const 
 static inline cav_status collide_near(const cav_model *model, cav_state *state, const candidate *c,
                                       const double activation[2]) {
   double margin = c->margin + activation[c->external];
-  const int narrowed = c->sought && state->work->narrowed;
-  return collide_pair(model, state, c, narrowed ? reach(model, state, c->pair, margin) : margin, margin);
+  return collide_pair(model, state, c, far_of(model, state, c, margin), margin);
 }
 
 // contacts of consecutive pairs
