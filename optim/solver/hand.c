@@ -303,17 +303,17 @@ typedef struct meeting {
 static void weigh_meeting(const cav_problem *p, const cav_state *state, const cav_roles *roles, const touched *t,
                           int mover, int ground, meeting *best) {
   const cav_model *m = p->model;
-  const int fixed = m->geom[ground].body == t->site->body;
+  const int on_ground = m->geom[ground].body == t->site->body;
   cav_pose hand, pose;
   double x[3], d[3];
   // a sensor that moves is to press on a solid sooner than on the ground
   const int solid = m->geom[ground].type != CAV_GEOM_PLANE && m->geom[ground].type != CAV_GEOM_HFIELD;
-  meeting one = {.mover = mover, .ground = ground, .grade = fixed ? grade_of(m, roles, mover) : solid};
+  meeting one = {.mover = mover, .ground = ground, .grade = on_ground ? grade_of(m, roles, mover) : solid};
   pose_of(m, state, mover, &hand);
   pose_of(m, state, ground, &pose);
   copy3(x, hand.pos);
   if (place_asked(p, t, m->geom[mover].link, x)) one.grade = 3;
-  if (fixed) clamp_to_site(m, state, t->site, x);
+  if (on_ground) clamp_to_site(m, state, t->site, x);
   surface_near(&m->geom[ground], &pose, x, one.at, one.normal);
   sub3(d, hand.pos, one.at);
   one.far = norm3(d);

@@ -178,6 +178,10 @@ int cav_command_tell_equalities(FILE *out, const cav_problem *problem);
 /// number. postures.c.
 int cav_command_tell_postures(FILE *out, const cav_problem *problem);
 
+/// Whether gravity and contacts alone act on a tree of links that floats, none of it lifted by buoyancy, and an actuator moves
+/// its root, so that a motion of it is meant. postures.c.
+int cav_command_is_loose(const cav_model *model, int root);
+
 /// Says of terms that ask for one component in a body's principal axes that these are turned from its own; their
 /// number. axes.c.
 int cav_command_tell_axes(FILE *out, const cav_problem *problem);

@@ -132,10 +132,12 @@ static void tell_self(FILE *out, const cav_model *m, const cav_forces *forces, c
 /// hop it is, for a moment.
 static void tell_ending(FILE *out, const cav_problem *problem, const cav_forces *forces) {
   const cav_model *m = problem->model;
-  if (!problem->close_at_rest || problem->cycle.on || m->nequality || m->density > 0 || !(m->gravity[2] < 0)) return;
+  if (!problem->close_at_rest || problem->cycle.on || m->nequality || m->density > 0 || m->viscosity > 0 ||
+      !(m->gravity[2] < 0))
+    return;
   for (int root = 1; root < m->nlink; root++) {
     const cav_link *link = &m->link[root];
-    if (link->root != root || !link->driven || !link->njoint || m->joint[link->joint].type != CAV_JOINT_FREE) continue;
+    if (!cav_command_is_loose(m, root)) continue;
     double borne = 0, mass = 0;
     for (int l = root; l < m->nlink; l++)
       if (m->link[l].root == root) mass += m->link[l].mass;

@@ -116,10 +116,7 @@ static int tell_disagreement(FILE *out, const cav_problem *p) {
   return n;
 }
 
-/// Whether gravity alone acts on a tree that hangs on nothing: it is free and at rest, no medium, equality constraint or
-/// buoyancy lifts it, and an actuator moves its links, so that a motion of them is meant.
-static int is_loose(const cav_problem *p, int root) {
-  const cav_model *m = p->model;
+int cav_command_is_loose(const cav_model *m, int root) {
   const cav_link *link = &m->link[root];
   if (link->parent != 0 || !link->driven || !link->njoint || m->joint[link->joint].type != CAV_JOINT_FREE) return 0;
   for (int b = 1; b < m->nbody; b++)
@@ -185,7 +182,7 @@ static int tell_lean(FILE *out, const cav_problem *p) {
   cav_state *state = posture_of(p, p->q_start, clear);
   for (int i = 1; state && i < m->nlink; i++) {
     double way[2];
-    const double off = is_loose(p, i) ? beside_support(m, state, i, way) : -1;
+    const double off = cav_command_is_loose(m, i) ? beside_support(m, state, i, way) : -1;
     if (off < unbalanced) continue;
     const char *name = m->body[m->link[i].body].name;
     fprintf(out,
@@ -208,7 +205,7 @@ static int tell_fall(FILE *out, const cav_problem *p) {
   if (low) memcpy(q, p->q_start, (size_t)m->nq * sizeof *q);
   const int lowered = low && !cav_configuration_to_floor(m, low, NULL, q, NULL);
   for (int i = 1; low && i < m->nlink; i++) {
-    if (!is_loose(p, i) || touches(m, state, i)) continue;
+    if (!cav_command_is_loose(m, i) || touches(m, state, i)) continue;
     const int z = m->joint[m->link[i].joint].q + 2;
     const double height = lowered ? p->q_start[z] - q[z] : 0;
     const char *name = m->body[m->link[i].body].name;
