@@ -661,6 +661,22 @@ sed 's/from="0.5"/from="0.5" to="1.5"/' disagrees.xml >agrees.xml
 run 0 inspect agrees.xml
 check "a term that ends before agrees" sh -c '! grep -q "^note" out'
 
+# thrown up and at rest at the top, for a moment: nothing holds it there; what stands at the end is held
+cat >toy.xml <<TEXT
+<mujoco><worldbody><geom name="floor" type="plane" size="2 2 .1"/><body name="trunk" pos="0 0 1"><freejoint/><geom type="box" size=".1 .1 .1" mass="2"/>
+<body pos="0 0 .1"><joint name="arm" axis="0 1 0" damping=".1"/><geom type="capsule" fromto="0 0 0 0 0 .2" size=".03" mass=".2"/></body></body></worldbody>
+<actuator><motor joint="arm" ctrllimited="true" ctrlrange="-5 5"/></actuator></mujoco>
+TEXT
+cat >apex.xml <<TEXT
+<problem name="apex" model="toy.xml"><horizon duration="0.25" timestep="0.01"/><start qvel="0 0 2.5506 0 0 0 0"/>
+<cost><velocity name="rest" dofs="all" at="end" weight="100"/></cost></problem>
+TEXT
+"$cavort" solve apex.xml -o apex --strategies 1 --threads 1 >out 2>err
+says out "note: nothing holds 'trunk' at the end"
+sed 's/<start[^>]*>/<start height="floor"\/>/' apex.xml >stood.xml
+"$cavort" solve stood.xml -o stood --strategies 1 --threads 1 >out 2>err
+check "what stands at the end is held" sh -c 'grep -q "penetration" out && ! grep -q "nothing holds" out'
+
 # --- interruption, and going on from there ---
 
 # a time after which it ends by itself, with what it has
