@@ -219,6 +219,30 @@ static inline void replay_turn(const char *model_path, char *scene, size_t room)
   }
 }
 
+// Masses as the model's file and the scene say: a model that says its total mass (settotalmass) says it of itself alone, while
+// MuJoCo scales what an including file adds, too.
+static inline int replay_weigh(mjModel *theirs, const char *model_path) {
+  mjModel *alone = mj_loadXML(model_path, NULL, NULL, 0);
+  int heaviest = 0;
+  for (int b = 0; alone && b < alone->nbody; b++)
+    if (alone->body_mass[b] > alone->body_mass[heaviest]) heaviest = b;
+  const char *name = alone ? mj_id2name(alone, mjOBJ_BODY, heaviest) : NULL;
+  const int same = name ? mj_name2id(theirs, mjOBJ_BODY, name) : -1;
+  const int known = alone && (same >= 0 || theirs->nbody == alone->nbody);
+  const double scale = known ? alone->body_mass[heaviest] / theirs->body_mass[same >= 0 ? same : heaviest] : 1;
+  if (alone) mj_deleteModel(alone);
+  if (!CHECK(known)) return 0;
+  if (fabs(scale - 1) < 1e-9) return 1;
+  for (int b = 0; b < theirs->nbody; b++) {
+    theirs->body_mass[b] *= scale;
+    for (int k = 0; k < 3; k++) theirs->body_inertia[3 * b + k] *= scale;
+  }
+  mjData *data = mj_makeData(theirs);
+  mj_setConst(theirs, data);
+  mj_deleteData(data);
+  return 1;
+}
+
 // MuJoCo's model of the problem's file, with what the problem's scene puts into the world; path: the problem's file
 static inline mjModel *replay_load(const char *path, const char *model_path) {
   static char problem[1 << 16], added[1 << 16];
@@ -243,6 +267,7 @@ static inline mjModel *replay_load(const char *path, const char *model_path) {
   }
   mjModel *model = mj_loadXML(adds ? file : model_path, NULL, text, sizeof text);
   if (!model) fprintf(stderr, "    %s\n", text);
+  if (model && adds) replay_weigh(model, model_path);
   if (adds) unlink(file);
   if (keyless) unlink(bare);
   return model;
@@ -270,7 +295,11 @@ static inline int replay_open(replay *s, const char *path) {
   s->all = replay_unroll(s);
   if (!CHECK(s->theirs && replay_match(s))) return 0;
   s->data = mj_makeData(s->theirs);
-  return 1;
+  double ours = 0, mass = 0;
+  for (int l = 1; l < model->nlink; l++) ours += model->link[l].mass;
+  for (int b = 1; b < s->theirs->nbody; b++) mass += s->theirs->body_weldid[b] ? s->theirs->body_mass[b] : 0;
+  const int whole = s->theirs->nv == model->nv;
+  return CHECK(!whole || fabs(mass - ours) < 1e-6 * ours);
 }
 
 static inline void replay_close(replay *s) {
