@@ -173,6 +173,8 @@ run 0 inspect problem.xml
 says out "pendulum"
 says out "left out: no tree"
 says out "us, factors "
+says out "x, y, z in the world at the start, at the goal"
+check "the verdict comes last" [ "$(tail -n 1 out)" = "nothing proves it impossible: cavort solve problem.xml" ]
 run 0 inspect model.xml
 run 0 view problem.xml
 says out "start: inside nothing"

@@ -42,6 +42,44 @@ static void print_joint(const cav_joint *joint) {
   }
 }
 
+// "x y z" of an object in a posture that the state is at: what a framepos of it reads
+static void print_place(const cav_model *m, cav_state *state, cav_object_type type, int object) {
+  const cav_sensor place = {.name = "", .type = CAV_SENSOR_FRAMEPOS, .object_type = type, .object = object, .dim = 3};
+  double at[3];
+  cav_sensor_read(m, state, &place, at);
+  for (int k = 0; k < 3; k++) printf(" %8.3f", fabs(at[k]) < 5e-4 ? 0 : at[k]);
+}
+
+// Where bodies and sites are at the posture of the file, or at the start and the goal of a problem: the numbers that targets of
+// framepos are written beside
+static cav_status print_places(const cav_model *m, const cav_problem *p, cav_error *error) {
+  const double *posture[] = {p ? p->q_start : m->q0, p ? p->q_goal : NULL};
+  const int n = p ? 2 : 1;
+  cav_state *state[2] = {0};
+  cav_status status = CAV_OK;
+  for (int i = 0; i < n && !status; i++) {
+    state[i] = cav_state_new(m);
+    status = state[i] ? cav_position(m, state[i], posture[i]) : CAV_NO_MEMORY;
+  }
+  if (status) cav_file_fail(error, status, 0, "places of bodies cannot be evaluated");
+  if (!status)
+    printf("%-20s %s; of bodies the centre of mass\n", "places, m",
+           p ? "x, y, z in the world at the start, at the goal" : "x, y, z in the world at the posture of the file");
+  for (int k = 1; k < m->nbody + m->nsite && !status; k++) {
+    const int site = k - m->nbody;
+    const char *name = site >= 0 ? m->site[site].name : m->body[k].name;
+    printf("  %-18s", *name ? name : "(no name)");
+    for (int i = 0; i < n; i++) {
+      print_place(m, state[i], site >= 0 ? CAV_OBJECT_SITE : CAV_OBJECT_BODY, site >= 0 ? site : k);
+      if (i + 1 < n) printf("   ");
+    }
+    printf(site >= 0 ? "   site\n" : "\n");
+  }
+  printf("\n");
+  for (int i = 0; i < n; i++) cav_state_free(state[i]);
+  return status;
+}
+
 static void print_bodies(const cav_model *m) {
   printf("%-20s %-20s %8s  %s\n", "body", "on", "kg", "joints");
   for (int i = 1; i < m->nbody; i++) {
@@ -502,14 +540,17 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
   return CAV_OK;
 }
 
-static void print_model(const cav_model *m) {
+static cav_status print_model(const cav_model *m, const cav_problem *p, cav_error *error) {
   print_sizes(m);
   print_bodies(m);
+  cav_status status = print_places(m, p, error);
+  if (status) return status;
   print_roles(m);
   print_stages(m);
   print_costs(m);
   print_actuators(m);
   print_warnings(m);
+  return CAV_OK;
 }
 
 int cav_command_inspect(const cav_command_line *line) {
@@ -522,7 +563,11 @@ int cav_command_inspect(const cav_command_line *line) {
     if ((proofs = cav_command_impossible(stdout, "", scene.problem, 3, &error)) < 0) status = error.status;
     if (!status) status = print_problem(scene.problem, &error);
   }
-  if (!status) print_model(scene.model);
+  if (!status) status = print_model(scene.model, scene.problem, &error);
+  // the verdict once more, where nothing buries it
+  if (!status && scene.problem)
+    printf(proofs ? "\nimpossible, as the first lines say: %s\n" : "\nnothing proves it impossible: cavort solve %s\n",
+           line->stated ? line->stated : line->operand);
   cav_command_free(&scene);
   if (status) return cav_command_fail(&error);
   return proofs ? CAV_EXIT_NOT_CERTIFIED : CAV_EXIT_CERTIFIED;

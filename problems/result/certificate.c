@@ -156,12 +156,14 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
   if (!isnan(v->solve_seconds)) fprintf(out, "  solved in %.1f s, %d iterations\n", v->solve_seconds, v->iterations);
   char optimality[32];
   write_apart(optimality, 1, v->optimality, CAV_TOLERANCE_OPTIMAL);
-  fprintf(out, "%s, ", cav_verdict_feasible(v) ? "feasible" : "NOT feasible");
+  fputs(cav_verdict_feasible(v) ? "feasible" : "NOT feasible", out);
   if (isnan(v->optimality))
-    fprintf(out, "how optimal is not known\n");
+    fprintf(out, ", how optimal is not known\n");
+  else if (cav_verdict_optimal(v))
+    fprintf(out, ", locally optimal: a step saves no more than %s of the cost\n", optimality);
   else
-    fprintf(out, "%s to %s (the word needs %g)\n", cav_verdict_optimal(v) ? "locally optimal" : "NOT optimal, but",
-            optimality, CAV_TOLERANCE_OPTIMAL);
+    fprintf(out, "; a step may still save %s of the cost (locally optimal: no more than %g)\n", optimality,
+            CAV_TOLERANCE_OPTIMAL);
   const double asked = problem->schedule.optimality;
   if (asked > 0 && v->optimality > asked)
     fprintf(out, "  the problem asks for %g (<schedule optimality>): not reached; --solver both goes on by Ipopt\n",
