@@ -253,6 +253,46 @@ static void test_flange(const char *under) {
   cav_model_free(m);
 }
 
+// on a level part of a height field the inverse and its derivatives are those on a plane
+static void test_level(const char *type, const char *attributes, double most) {
+  static const char *const under[] = {"type='plane' size='1 1 1'", "type='hfield' hfield='level'"};
+  char body[TEXT];
+  cav_model *m[2];
+  cav_state *state[2];
+  for (int i = 0; i < 2; i++) {
+    snprintf(
+        body, sizeof body,
+        "<mujoco><compiler angle='degree'/><option timestep='0.025'/><asset><hfield name='level' nrow='40' ncol='50' "
+        "size='4 3 1 .2'/><mesh name='rock' vertex='%s'/></asset><worldbody><geom %s pos='.1 .2 -.1' euler='7 -12 20'/>"
+        "<body pos='0 0 .1'><freejoint/><geom type='%s' %s/></body></worldbody></mujoco>",
+        rock, under[i], type, attributes);
+    m[i] = scene_load(body);
+    state[i] = m[i] ? cav_state_new(m[i]) : NULL;
+    if (!CHECK(state[i] != NULL && m[i]->nv == 6)) return;
+    state[i]->options.stabilisation = CAV_STABILISATION_DISCRETE;
+    state[i]->options.smoothing = 0.02;
+  }
+  double q[7], v[6], next[6], u[2][6], J[2][108], worst = 0;
+  int contacts[2] = {0};
+  for (int k = 0; k < POSES; k++) {
+    scene_posture(m[0], q, v, 0);
+    for (int d = 0; d < 2; d++) q[d] = 0.5 * scene_uniform();
+    q[2] = 0.05 * scene_uniform();
+    scene_normals(v, 6, 0.5);
+    scene_normals(next, 6, 0.5);
+    for (int i = 0; i < 2; i++) {
+      CHECK(cav_inverse(m[i], state[i], q, v, next, u[i]) == CAV_OK);
+      CHECK(cav_inverse_jacobian_by(m[i], state[i], CAV_DERIVATIVE_ANALYTIC, q, v, next, J[i], J[i] + 36, J[i] + 72) ==
+            CAV_OK);
+      contacts[i] += state[i]->ncontact;
+    }
+    worst = fmax(worst, fmax(scene_error(u[0], u[1], 6), scene_error(J[0], J[1], 108)));
+  }
+  printf("%-8s on a level field: %d contacts, %d on a plane, within %.1e\n", type, contacts[1], contacts[0], worst);
+  CHECK(contacts[0] > 100 && contacts[0] == contacts[1] && worst < most);
+  for (int i = 0; i < 2; i++) cav_state_free(state[i]), cav_model_free(m[i]);
+}
+
 int main(void) {
   test_folding();
   char meshes[TEXT];
@@ -277,5 +317,8 @@ int main(void) {
   test_flange("type='hfield' hfield='relief'");
   test_flange("type='plane' size='1 1 1'");
   test_flange("type='mesh' mesh='flange' pos='.02 .01 -.01'");
+  // those of curved shapes are by differences
+  for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++)
+    test_level(shapes[i][0], shapes[i][1], i == 3 || i == 4 ? 1e-5 : 1e-11);
   return check_result();
 }

@@ -308,8 +308,6 @@ static double reach(const cav_model *model, const cav_state *state, int p, doubl
   const cav_pair *pair = model->pair + p;
   const slot *a = cache->slot + c->first, *b = cache->slot + c->second;
   const cav_geom *ground = c->plane ? a->geom : b->geom;
-  // of the points over a height field those are taken that are found, so all of them are
-  if (ground->type == CAV_GEOM_HFIELD) return margin;
   // the point lies midway between the surfaces
   double radius = b->geom->bound + 0.5 * fmax(margin, 0), turn[2], mu = 0, roll = 0;
   const double *place = cache->centre[c->second];
@@ -399,8 +397,11 @@ static inline cav_status collide_pair(const cav_model *model, cav_state *state, 
   cav_touch touch[CAV_TOUCH_MAX];
   const cav_shape *a = shape_of(state, cache, c->first), *b = shape_of(state, cache, c->second);
   if (cav_shapes_apart(a, b, far)) return CAV_OK;
+  // of the points over a height field those are taken that are found: all of them, of a pair that is near
+  const int chosen = a->type == CAV_GEOM_HFIELD || b->type == CAV_GEOM_HFIELD;
+  if (chosen && far < margin && !cav_collide_shapes(a, b, far, touch)) return CAV_OK;
   // by the gap after the step all points of a near pair may bear, those that come nearer by a turn, too
-  if (state->options.next_gap != CAV_NEXT_GAP_EXACT) margin = far;
+  if (state->options.next_gap != CAV_NEXT_GAP_EXACT && !chosen) margin = far;
   int count =
       c->mesh ? cav_collide_again(a, b, margin, &cache->hint[c->pair], touch) : cav_collide_shapes(a, b, margin, touch);
   assert(count <= CAV_TOUCH_MAX);

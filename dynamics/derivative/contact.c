@@ -92,6 +92,23 @@ static void ball_on_plane(const cav_contact *c, double radius, const double axis
   }
 }
 
+// the same on a plane of the second geom, which carries what is found from it
+static void ball_on_second(const cav_contact *c, double radius, const double axis[3], geometry *g) {
+  double up[3], arm[3];
+  scale3(up, -1, c->frame);
+  scale3(arm, radius + 0.5 * c->dist, up);
+  copy3(g->align, axis);
+  memset(g->tangent, 0, sizeof g->tangent);
+  for (int k = 0; k < 6; k++) {
+    double move[3], twist[6];
+    unit(twist, k);
+    unit_velocity(move, k, arm);
+    g->dist[k] = -dot3(up, move);
+    for (int i = 0; i < 3; i++) g->pos[k][i] = twist[3 + i] - move[i] - 0.5 * g->dist[k] * up[i];
+    cross3(g->normal[k], twist, c->frame);
+  }
+}
+
 // by differences of the narrow phase, those of the pair's points shared; 0 where the point comes and goes
 static int difference(const cav_contact *c, cav_pair_manifolds *m, geometry *g) {
   cav_touch here, rate[6];
@@ -290,6 +307,12 @@ static void contact_geometry(const cav_model *model, const cav_state *state, con
   if (first->type == CAV_GEOM_PLANE && has_fixed_points(&m->b)) {
     double radius = end_radius(&m->b, axis);
     ball_on_plane(c, radius, axis, g);
+    find_alignment(c, g);
+    return;
+  }
+  if (second->type == CAV_GEOM_HFIELD && c->feature < CAV_LEVEL_FEATURES && has_fixed_points(&m->a)) {
+    double radius = end_radius(&m->a, axis);
+    ball_on_second(c, radius, axis, g);
     find_alignment(c, g);
     return;
   }

@@ -14,7 +14,10 @@ typedef struct cav_touch {
   int feature;
 } cav_touch;
 
-enum { CAV_TOUCH_MAX = 8 }; ///< most points one pair can give
+enum {
+  CAV_TOUCH_MAX = 8,      ///< most points one pair can give
+  CAV_LEVEL_FEATURES = 64 ///< of a height field: features below this are of the plane that it is there
+};
 
 /// A geom in the world.
 typedef struct cav_shape {

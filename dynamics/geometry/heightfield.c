@@ -1,6 +1,7 @@
 /// Contacts of a height field with sphere, capsule, ellipsoid, cylinder, box and mesh.
 ///
-/// The field is a solid made of prisms, two a cell, from its surface down to its base. Prisms under the bounding box of
+/// Where the surface is one plane as far as the shape may touch it, the contacts are those of that plane. Elsewhere the field is a
+/// solid made of prisms, two a cell, from its surface down to its base. Prisms under the bounding box of
 /// the other shape are tested one by one. Apart: polytope.c's contact with the prism, kept only where its normal
 /// supports the surface about the point: walls between prisms, and edges that lie in a plane or a valley, push nothing
 /// sideways. Overlapping: the points of the shape over the triangle, each with its height over the triangle's plane;
@@ -18,6 +19,9 @@ enum { FOUND_MAX = 128 };
 // fractions of the size: points that are one; how far a neighbour may stick out of a supporting plane; cosine of one
 // normal
 static const double ALIKE = 1e-7, STICKS_OUT = 1e-9, SAME_NORMAL = 1 - 1e-9;
+// fraction of the size within which a surface is one plane; of the margin, from which beside a cell nothing of that plane's normal
+// comes from it
+static const double LEVEL = 1e-12, BESIDE = 1e-4;
 
 /// A prism as a mesh: its three upper corners counterclockwise, the same at the base below them.
 typedef struct prism {
@@ -116,6 +120,40 @@ static int is_supporting(const field *g, const double p[3], const double up[3]) 
   return 1;
 }
 
+// 1 if the surface is one plane over some cells and those about them, none of which is outside the field
+static int is_level(const field *g, int r0, int r1, int c0, int c1) {
+  const cav_hfield *h = g->h;
+  if (r0 < 1 || c0 < 1 || r1 + 2 >= h->nrow || c1 + 2 >= h->ncol) return 0;
+  const double *row = h->height + (r0 - 1) * h->ncol + c0 - 1, first = row[0], along = row[1] - first,
+               up = row[h->ncol] - first;
+  for (int i = 0; i <= r1 - r0 + 3; i++, row += h->ncol)
+    for (int k = 0; k <= c1 - c0 + 3; k++)
+      if (fabs(row[k] - first - i * up - k * along) > LEVEL * g->size) return 0;
+  return 1;
+}
+
+// contacts with the plane that the surface is about a cell
+static int collide_level(const field *g, int r, int c, const cav_shape *a, double margin, cav_touch *touch) {
+  static const double size[3] = {0, 0, 0};
+  cav_shape level = {.type = CAV_GEOM_PLANE, .size = size};
+  double x[3][3], plane[4], axes[3][3];
+  triangle_of(g, r, c, 0, x);
+  plane_through(x[0], x[1], x[2], plane);
+  transform(level.pos, g->shape->pos, g->shape->rotation, x[0]);
+  sub3(axes[0], x[1], x[0]);
+  normalise3(axes[0]);
+  cross3(axes[1], plane, axes[0]);
+  copy3(axes[2], plane);
+  for (int k = 0; k < 3; k++) {
+    double world[3];
+    rotate(world, g->shape->rotation, axes[k]);
+    for (int i = 0; i < 3; i++) level.rotation[3 * i + k] = world[i];
+  }
+  const int count = cav_collide_shapes(&level, a, margin, touch);
+  for (int k = 0; k < count; k++) scale3(touch[k].normal, -1, touch[k].normal);
+  return count;
+}
+
 /// Contacts found so far.
 typedef struct collection {
   cav_touch at[FOUND_MAX];
@@ -204,12 +242,19 @@ int cav_collide_hfield(const cav_shape *a, const cav_shape *b, double margin, ca
   if (low[2] > h->top || high[2] < -h->base) return 0;
   if (!cells_between(low[0], high[0], h->size[0], g.dx, h->ncol - 1, &c0, &c1)) return 0;
   if (!cells_between(low[1], high[1], h->size[1], g.dy, h->nrow - 1, &r0, &r1)) return 0;
+  if (is_level(&g, r0, r1, c0, c1)) return collide_level(&g, r0, c0, a, margin, touch);
   collection all;
   g.depth = fmax(h->base, -low[2]);
   all.n = 0;
   all.alike = ALIKE * (g.dx + g.dy);
+  const double beside = (1 - BESIDE) * margin;
   for (int r = r0; r <= r1; r++) {
     for (int c = c0; c <= c1; c++) {
+      // what a prism beside the shape would give there is no point of the surface as a whole
+      const double x = -h->size[0] + c * g.dx, y = -h->size[1] + r * g.dy;
+      const int under =
+          x + g.dx >= low[0] + beside && x <= high[0] - beside && y + g.dy >= low[1] + beside && y <= high[1] - beside;
+      if (!under && is_level(&g, r, r, c, c)) continue;
       for (int half = 0; half < 2; half++) {
         prism p;
         double top[3][3];
@@ -219,7 +264,7 @@ int cav_collide_hfield(const cav_shape *a, const cav_shape *b, double margin, ca
         cav_shape solid = {.type = CAV_GEOM_MESH, .size = b->size, .mesh = &p.mesh};
         copy3(solid.pos, b->pos);
         memcpy(solid.rotation, b->rotation, sizeof solid.rotation);
-        int feature = 64 * (2 * (r * (h->ncol - 1) + c) + half);
+        int feature = CAV_LEVEL_FEATURES + 64 * (2 * (r * (h->ncol - 1) + c) + half);
         if (collect_apart(&g, a, &solid, p.plane, margin, feature, &all))
           collect_over(&g, a, top, p.plane, margin, feature, &all);
       }
