@@ -33,9 +33,7 @@ static const char *round_rock(void) {
   return points;
 }
 
-static void test_shape(cav_next_gap next_gap, const char *points, const char *type, const char *attributes) {
-  char model_text[TEXT];
-  snprintf(model_text, sizeof model_text, text, points, type, attributes);
+static void test_model(cav_next_gap next_gap, const char *model_text, const char *type, double height) {
   cav_model *m = scene_load(model_text);
   cav_state *state = m ? cav_state_new(m) : NULL;
   if (!CHECK(state != NULL)) return;
@@ -49,6 +47,7 @@ static void test_shape(cav_next_gap next_gap, const char *points, const char *ty
   double worst = 0;
   for (int k = 0; k < POSES; k++) {
     scene_posture(m, q, v, 0.4);
+    if (height > 0) q[0] = 0.2 * scene_uniform(), q[1] = 0.2 * scene_uniform(), q[2] = height + 0.03 * scene_uniform();
     scene_normals(v, nv, 0.5);
     scene_normals(next, nv, 0.5);
     for (int i = 0; i < 2; i++) {
@@ -71,12 +70,34 @@ static void test_shape(cav_next_gap next_gap, const char *points, const char *ty
     }
   }
   printf("%-8s %5d contacts, %5d columns, %3d at kinks, the rest within %.1e\n", type, contacts, columns, kinks, worst);
-  CHECK(contacts > 3 * POSES);
-  // seen: none; columns where a nearest part changes within the step of a difference
-  CHECK(kinks < columns / 1000);
+  CHECK(contacts > (height > 0 ? 1 : 3) * POSES);
+  // columns where a nearest part changes within the step of a difference: seen none, and over hills 57 and 21 of a box and an
+  // ellipsoid that are deep in one, where points come and go
+  CHECK(kinks < columns / (height > 0 ? 40 : 1000));
   free(q), free(v), free(next), free(J);
   cav_state_free(state);
   cav_model_free(m);
+}
+
+static void test_shape(cav_next_gap next_gap, const char *points, const char *type, const char *attributes) {
+  char model_text[TEXT];
+  snprintf(model_text, sizeof model_text, text, points, type, attributes);
+  test_model(next_gap, model_text, type, 0);
+}
+
+// over hills of a height field
+static void test_relief(const char *type, const char *attributes) {
+  enum { SIDE = 12 };
+  char heights[TEXT] = "", model_text[3 * TEXT];
+  for (int i = 0; i < SIDE * SIDE; i++)
+    snprintf(heights + strlen(heights), sizeof heights - strlen(heights), "%.3f ", 0.5 + 0.5 * scene_uniform());
+  snprintf(model_text, sizeof model_text,
+           "<mujoco><option timestep='0.025'/><asset><hfield name='hills' nrow='12' ncol='12' size='.6 .6 .03 .1' "
+           "elevation='%s'/><mesh name='rock' vertex='%s'/></asset><worldbody><geom type='hfield' hfield='hills'/>"
+           "<body pos='0 0 .1'><freejoint/><geom type='%s' %s/></body></worldbody></mujoco>",
+           heights, rock, type, attributes);
+  printf("hills:   ");
+  test_model(CAV_NEXT_GAP_LINEAR, model_text, type, 0.1);
 }
 
 // contacts do not depend, to the bit, on what was evaluated before: along a walk whose searches begin where the last ones
@@ -320,5 +341,6 @@ int main(void) {
   // those of curved shapes are by differences
   for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++)
     test_level(shapes[i][0], shapes[i][1], i == 3 || i == 4 ? 1e-5 : 1e-11);
+  for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) test_relief(shapes[i][0], shapes[i][1]);
   return check_result();
 }

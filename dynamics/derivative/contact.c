@@ -254,10 +254,10 @@ static int nearest_points(const cav_contact *c, const cav_shape *a, const cav_sh
 }
 
 // points over a face of one of two polyhedra: those of the other move against it, the direction with it
-static int face_point(const cav_contact *c, const cav_pair_manifolds *m, geometry *g) {
+static int face_point(const cav_contact *c, int feature, const cav_pair_manifolds *m, geometry *g) {
   const cav_face_point *p = NULL;
   for (int i = 0; i < m->faces && !p; i++)
-    if (m->face[i].feature == c->feature) p = &m->face[i];
+    if (m->face[i].feature == feature) p = &m->face[i];
   if (!p) return 0;
   double arm[3], back = p->on_b ? -1 : 1;
   sub3(arm, p->place, c->pos);
@@ -281,6 +281,16 @@ static int face_point(const cav_contact *c, const cav_pair_manifolds *m, geometr
 // whether a contact is the one between the nearest points that gjk.c or convex.c finds
 static int is_nearest(const cav_contact *c, const cav_shape *a, const cav_shape *b) {
   return b->type == CAV_GEOM_MESH && a->type != CAV_GEOM_PLANE && c->feature == 0;
+}
+
+// a contact with a prism of a height field as one with that mesh; 0: it is with none
+static int on_prism(const cav_contact *c, cav_pair_manifolds *m, geometry *g) {
+  cav_prism prism;
+  const int feature = cav_hfield_prism(&m->b, c->feature, &prism);
+  if (feature == 0) return nearest_points(c, &m->a, &prism.shape, m->size, g);
+  if (feature < 0) return 0;
+  m->faces = cav_face_points(&m->a, &prism.shape, m->margin, m->face);
+  return m->faces > 0 && face_point(c, feature, m, g);
 }
 
 // what the second contact axis is aligned with, by the rule of collide.c
@@ -318,8 +328,9 @@ static void contact_geometry(const cav_model *model, const cav_state *state, con
   }
   if (second->type == CAV_GEOM_MESH && c->feature > 0 && m->faces < 0)
     m->faces = cav_face_points(&m->a, &m->b, m->margin, m->face);
-  int known = c->feature > 0 ? m->faces > 0 && face_point(c, m, g)
-                             : is_nearest(c, &m->a, &m->b) && nearest_points(c, &m->a, &m->b, m->size, g);
+  int known = second->type == CAV_GEOM_HFIELD ? on_prism(c, m, g)
+              : c->feature > 0                ? m->faces > 0 && face_point(c, c->feature, m, g)
+                               : is_nearest(c, &m->a, &m->b) && nearest_points(c, &m->a, &m->b, m->size, g);
   if (!known) {
     // where the points of a pair come and go there is no derivative: one that moves with the second geom over a plane of
     // the first has the right rate of the gap

@@ -15,8 +15,9 @@ typedef struct cav_touch {
 } cav_touch;
 
 enum {
-  CAV_TOUCH_MAX = 8,      ///< most points one pair can give
-  CAV_LEVEL_FEATURES = 64 ///< of a height field: features below this are of the plane that it is there
+  CAV_TOUCH_MAX = 8,       ///< most points one pair can give
+  CAV_LEVEL_FEATURES = 64, ///< of a height field: features below this are of the plane that it is there
+  CAV_PRISM_FEATURES = 64  ///< after them, so many of each of its prisms
 };
 
 /// A geom in the world.
@@ -78,6 +79,17 @@ void cav_face_point_move(const cav_face_point *p, const double twist[6], const d
 /// Points over a face as cav_collide_convex makes them, before they are thinned out. 0: there is no face, or a cylinder
 /// stands upright on it. polytope.c.
 int cav_face_points(const cav_shape *a, const cav_shape *b, double margin, cav_face_point point[CAV_FACE_POINTS]);
+
+/// A prism of a height field as a mesh: its three upper corners counterclockwise, the same below them at its base.
+typedef struct cav_prism {
+  double vertex[18], plane[20];
+  cav_mesh mesh;
+  cav_shape shape;
+} cav_prism;
+
+/// The prism that a contact of a height field is with, which must stay where it is, and the contact's feature as one of that
+/// mesh; -1: it is with no prism, or with one that it overlaps. heightfield.c.
+int cav_hfield_prism(const cav_shape *field, int feature, cav_prism *prism);
 
 /// Contact points of one pair as it is and displaced, for differences. pair is -1 at the start.
 typedef struct cav_pair_manifolds {

@@ -1,33 +1,27 @@
 /// Contacts of a height field with sphere, capsule, ellipsoid, cylinder, box and mesh.
 ///
-/// Where the surface is one plane as far as the shape may touch it, the contacts are those of that plane. Elsewhere the field is a
-/// solid made of prisms, two a cell, from its surface down to its base. Prisms under the bounding box of
-/// the other shape are tested one by one. Apart: polytope.c's contact with the prism, kept only where its normal
-/// supports the surface about the point: walls between prisms, and edges that lie in a plane or a valley, push nothing
-/// sideways. Overlapping: the points of the shape over the triangle, each with its height over the triangle's plane;
-/// the way out is up. Points found by several prisms are one; of more than 8 the deepest is kept, then those furthest
-/// apart. A shape that sinks through the base is pushed up by its whole depth until it is below it altogether. Not
-/// done: what goes through the surface from below, or sideways through an outer wall deeper than its core, is pushed
-/// up.
+/// Where the surface is one plane as far as the shape may touch it, the contacts are those of that plane. Elsewhere the field
+/// is a solid made of prisms, two a cell, from its surface down to its base. Prisms under the bounding box of the other
+/// shape, and as far beside it as it is large or a cell is, are tested one by one. Apart: polytope.c's contact with the
+/// prism, kept only where its normal supports the surface about the point: walls between prisms, and edges that lie in a
+/// plane or a valley, push nothing sideways. Overlapping: the points of the shape over the triangle, each with its height
+/// over the triangle's plane; the way out is up. Points found by several prisms are one; of more than 8 the deepest is
+/// kept, then those furthest apart. A shape that sinks through the base is pushed up by its whole depth until it is below
+/// it altogether. Not done: what goes through the surface from below, or sideways through an outer wall deeper than its
+/// core, is pushed up.
 #include <assert.h>
 
 #include "gjk.h"
 #include "math3.h"
 #include "pairs.h"
 
-enum { FOUND_MAX = 128 };
+enum { FOUND_MAX = 128, OVER = 16 }; // OVER: features of a prism from this on are of points over it, where it overlaps
 // fractions of the size: points that are one; how far a neighbour may stick out of a supporting plane; cosine of one
 // normal
 static const double ALIKE = 1e-7, STICKS_OUT = 1e-9, SAME_NORMAL = 1 - 1e-9;
-// fraction of the size within which a surface is one plane; of the margin, from which beside a cell nothing of that plane's normal
-// comes from it
+// fraction of the size within which a surface is one plane; of the margin, from which beside a cell nothing of that
+// plane's normal comes from it
 static const double LEVEL = 1e-12, BESIDE = 1e-4;
-
-/// A prism as a mesh: its three upper corners counterclockwise, the same at the base below them.
-typedef struct prism {
-  double vertex[18], plane[20];
-  cav_mesh mesh;
-} prism;
 
 typedef struct field {
   const cav_shape *shape;
@@ -61,7 +55,7 @@ static void plane_through(const double a[3], const double b[3], const double c[3
   plane[3] = dot3(plane, a);
 }
 
-static void make_prism(const field *g, double top[3][3], prism *p) {
+static void make_prism(const field *g, double top[3][3], cav_prism *p) {
   static const int face[6] = {0, 3, 6, 10, 14, 18};
   static const int corner[18] = {0, 1, 2, 5, 4, 3, 0, 3, 4, 1, 1, 4, 5, 2, 2, 5, 3, 0};
   static const int start[7] = {0, 3, 6, 9, 12, 15, 18};
@@ -87,6 +81,27 @@ static void make_prism(const field *g, double top[3][3], prism *p) {
                        .corner = corner,
                        .neighbour_start = start,
                        .neighbour = neighbour};
+  p->shape = (cav_shape){.type = CAV_GEOM_MESH, .size = g->shape->size, .mesh = &p->mesh};
+  copy3(p->shape.pos, g->shape->pos);
+  memcpy(p->shape.rotation, g->shape->rotation, sizeof p->shape.rotation);
+}
+
+static field field_of(const cav_shape *shape) {
+  const cav_hfield *h = shape->hfield;
+  field g = {shape, h, 2 * h->size[0] / (h->ncol - 1), 2 * h->size[1] / (h->nrow - 1), 0, h->base};
+  g.size = g.dx + g.dy + h->base + h->top;
+  return g;
+}
+
+int cav_hfield_prism(const cav_shape *shape, int feature, cav_prism *p) {
+  const int index = (feature - CAV_LEVEL_FEATURES) / CAV_PRISM_FEATURES, columns = shape->hfield->ncol - 1;
+  const int own = (feature - CAV_LEVEL_FEATURES) % CAV_PRISM_FEATURES;
+  if (feature < CAV_LEVEL_FEATURES || own >= OVER) return -1;
+  field g = field_of(shape);
+  double top[3][3];
+  triangle_of(&g, index / 2 / columns, index / 2 % columns, index % 2, top);
+  make_prism(&g, top, p);
+  return own;
 }
 
 // 1 if p is over a triangle, by a fraction of the cell
@@ -209,7 +224,7 @@ static void collect_over(const field *g, const cav_shape *a, double x[3][3], con
     sub3(d, point[k], corner[0]);
     double height = dot3(d, normal);
     if (!(height < margin)) continue;
-    cav_touch t = {.dist = height, .feature = feature + 16 + k};
+    cav_touch t = {.dist = height, .feature = feature + OVER + k};
     axpy3(t.pos, point[k], -height / 2, normal);
     scale3(t.normal, -1, normal);
     collect(all, &t);
@@ -226,9 +241,8 @@ static int cells_between(double low, double high, double half, double step, int 
 
 int cav_collide_hfield(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
   const cav_hfield *h = b->hfield;
-  field g = {b, h, 2 * h->size[0] / (h->ncol - 1), 2 * h->size[1] / (h->nrow - 1), 0, 0};
+  field g = field_of(b);
   double low[3], high[3];
-  g.size = g.dx + g.dy + h->base + h->top;
   for (int k = 0; k < 6; k++) {
     double d[3], x[3], local[3];
     column3(d, b->rotation, k / 2);
@@ -236,36 +250,36 @@ int cav_collide_hfield(const cav_shape *a, const cav_shape *b, double margin, ca
     cav_shape_support(a, d, x);
     sub3(x, x, b->pos);
     rotate_back(local, b->rotation, x);
-    (k & 1 ? low : high)[k / 2] = local[k / 2] + (k & 1 ? -margin : margin);
+    (k & 1 ? low : high)[k / 2] = local[k / 2];
   }
+  // sideways no further than the shape is large, or a cell: far soft contacts are of what is below
+  const double large = fmax(fmax(high[0] - low[0], high[1] - low[1]), fmax(g.dx, g.dy)), aside = fmin(margin, large);
+  low[2] -= margin, high[2] += margin;
   int r0, r1, c0, c1;
   if (low[2] > h->top || high[2] < -h->base) return 0;
-  if (!cells_between(low[0], high[0], h->size[0], g.dx, h->ncol - 1, &c0, &c1)) return 0;
-  if (!cells_between(low[1], high[1], h->size[1], g.dy, h->nrow - 1, &r0, &r1)) return 0;
+  if (!cells_between(low[0] - aside, high[0] + aside, h->size[0], g.dx, h->ncol - 1, &c0, &c1)) return 0;
+  if (!cells_between(low[1] - aside, high[1] + aside, h->size[1], g.dy, h->nrow - 1, &r0, &r1)) return 0;
   if (is_level(&g, r0, r1, c0, c1)) return collide_level(&g, r0, c0, a, margin, touch);
   collection all;
   g.depth = fmax(h->base, -low[2]);
   all.n = 0;
   all.alike = ALIKE * (g.dx + g.dy);
-  const double beside = (1 - BESIDE) * margin;
+  const double beside = BESIDE * margin;
   for (int r = r0; r <= r1; r++) {
     for (int c = c0; c <= c1; c++) {
       // what a prism beside the shape would give there is no point of the surface as a whole
       const double x = -h->size[0] + c * g.dx, y = -h->size[1] + r * g.dy;
       const int under =
-          x + g.dx >= low[0] + beside && x <= high[0] - beside && y + g.dy >= low[1] + beside && y <= high[1] - beside;
+          x + g.dx >= low[0] - beside && x <= high[0] + beside && y + g.dy >= low[1] - beside && y <= high[1] + beside;
       if (!under && is_level(&g, r, r, c, c)) continue;
       for (int half = 0; half < 2; half++) {
-        prism p;
+        cav_prism p;
         double top[3][3];
         triangle_of(&g, r, c, half, top);
         if (fmax(top[0][2], fmax(top[1][2], top[2][2])) < low[2]) continue;
         make_prism(&g, top, &p);
-        cav_shape solid = {.type = CAV_GEOM_MESH, .size = b->size, .mesh = &p.mesh};
-        copy3(solid.pos, b->pos);
-        memcpy(solid.rotation, b->rotation, sizeof solid.rotation);
-        int feature = CAV_LEVEL_FEATURES + 64 * (2 * (r * (h->ncol - 1) + c) + half);
-        if (collect_apart(&g, a, &solid, p.plane, margin, feature, &all))
+        int feature = CAV_LEVEL_FEATURES + CAV_PRISM_FEATURES * (2 * (r * (h->ncol - 1) + c) + half);
+        if (collect_apart(&g, a, &p.shape, p.plane, margin, feature, &all))
           collect_over(&g, a, top, p.plane, margin, feature, &all);
       }
     }
