@@ -19,8 +19,7 @@ enum { FOUND_MAX = 128, OVER = 16 }; // OVER: features of a prism from this on a
 // fractions of the size: points that are one; how far a neighbour may stick out of a supporting plane; cosine of one
 // normal
 static const double ALIKE = 1e-7, STICKS_OUT = 1e-9, SAME_NORMAL = 1 - 1e-9;
-// fraction of the size within which a surface is one plane; of the margin, from which beside a cell nothing of that
-// plane's normal comes from it
+// fraction of the size within which a surface is one plane; of the margin, within which a cell is not beside a shape
 static const double LEVEL = 1e-12, BESIDE = 1e-4;
 
 typedef struct field {
@@ -239,6 +238,33 @@ static int cells_between(double low, double high, double half, double step, int 
   return 1;
 }
 
+// the steepest of the triangles of a cell and of those about it, m a m; infinite at the border of the field
+static double steepest(const field *g, int r, int c) {
+  const cav_hfield *h = g->h;
+  if (r < 1 || c < 1 || r + 2 >= h->nrow || c + 2 >= h->ncol) return INFINITY;
+  double most = 0;
+  for (int i = r - 1; i <= r + 1; i++)
+    for (int k = c - 1; k <= c + 1; k++) {
+      const double *x = h->height + i * h->ncol + k, *y = x + h->ncol;
+      const double lower[] = {(x[1] - x[0]) / g->dx, (y[1] - x[1]) / g->dy};
+      const double upper[] = {(y[1] - y[0]) / g->dx, (y[0] - x[0]) / g->dy};
+      most = fmax(most, fmax(lower[0] * lower[0] + lower[1] * lower[1], upper[0] * upper[0] + upper[1] * upper[1]));
+    }
+  return sqrt(most);
+}
+
+// Whether a cell is so far beside a shape that no normal from it to the shape supports the surface there: all of them lean more
+// than the surface does. low, high: box about the shape in the field's axes
+static int is_beside(const field *g, int r, int c, const double low[3], const double high[3], double margin) {
+  const double *x = g->h->height + r * g->h->ncol + c, *y = x + g->h->ncol;
+  const double left = -g->h->size[0] + c * g->dx, near = -g->h->size[1] + r * g->dy;
+  const double apart =
+      hypot(fmax(0, fmax(low[0] - left - g->dx, left - high[0])), fmax(0, fmax(low[1] - near - g->dy, near - high[1])));
+  if (!(apart > BESIDE * margin)) return 0;
+  const double rise = fmax(0, high[2] - fmin(fmin(x[0], x[1]), fmin(y[0], y[1])));
+  return apart - BESIDE * margin > rise * steepest(g, r, c);
+}
+
 int cav_collide_hfield(const cav_shape *a, const cav_shape *b, double margin, cav_touch *touch) {
   const cav_hfield *h = b->hfield;
   field g = field_of(b);
@@ -254,29 +280,23 @@ int cav_collide_hfield(const cav_shape *a, const cav_shape *b, double margin, ca
   }
   // sideways no further than the shape is large, or a cell: far soft contacts are of what is below
   const double large = fmax(fmax(high[0] - low[0], high[1] - low[1]), fmax(g.dx, g.dy)), aside = fmin(margin, large);
-  low[2] -= margin, high[2] += margin;
   int r0, r1, c0, c1;
-  if (low[2] > h->top || high[2] < -h->base) return 0;
+  if (low[2] - margin > h->top || high[2] + margin < -h->base) return 0;
   if (!cells_between(low[0] - aside, high[0] + aside, h->size[0], g.dx, h->ncol - 1, &c0, &c1)) return 0;
   if (!cells_between(low[1] - aside, high[1] + aside, h->size[1], g.dy, h->nrow - 1, &r0, &r1)) return 0;
   if (is_level(&g, r0, r1, c0, c1)) return collide_level(&g, r0, c0, a, margin, touch);
   collection all;
-  g.depth = fmax(h->base, -low[2]);
+  g.depth = fmax(h->base, margin - low[2]);
   all.n = 0;
   all.alike = ALIKE * (g.dx + g.dy);
-  const double beside = BESIDE * margin;
   for (int r = r0; r <= r1; r++) {
     for (int c = c0; c <= c1; c++) {
-      // what a prism beside the shape would give there is no point of the surface as a whole
-      const double x = -h->size[0] + c * g.dx, y = -h->size[1] + r * g.dy;
-      const int under =
-          x + g.dx >= low[0] - beside && x <= high[0] + beside && y + g.dy >= low[1] - beside && y <= high[1] + beside;
-      if (!under && is_level(&g, r, r, c, c)) continue;
+      if (is_beside(&g, r, c, low, high, margin)) continue;
       for (int half = 0; half < 2; half++) {
         cav_prism p;
         double top[3][3];
         triangle_of(&g, r, c, half, top);
-        if (fmax(top[0][2], fmax(top[1][2], top[2][2])) < low[2]) continue;
+        if (fmax(top[0][2], fmax(top[1][2], top[2][2])) < low[2] - margin) continue;
         make_prism(&g, top, &p);
         int feature = CAV_LEVEL_FEATURES + CAV_PRISM_FEATURES * (2 * (r * (h->ncol - 1) + c) + half);
         if (collect_apart(&g, a, &p.shape, p.plane, margin, feature, &all))
