@@ -110,6 +110,38 @@ static void refuse(const char *scene, int line, const char *says) {
   "<mujoco><worldbody><body name='base'><geom type='box' size='.1 .1 .1'/><body pos='0 0 " HEIGHT \
   "'><joint axis='0 0 1'/><geom type='cylinder' size='.05 .05'/></body></body></worldbody></mujoco>"
 
+// pairs of a plane and of what keeps its distance from it: a door, what slides along it; not of one that leans, sinks or touches
+static void test_apart(void) {
+  static const struct {
+    const char *body;
+    int pairs;
+  } scene[] = {
+      {"<body pos='0 0 1.02'><joint axis='0 0 1'/><geom type='box' size='.45 .02 1'/></body>", 0},
+      {"<body pos='0 0 1.02'><joint axis='0 .01 1'/><geom type='box' size='.45 .02 1'/></body>", 1},
+      {"<body pos='0 0 .999'><joint axis='0 0 1'/><geom type='box' size='.45 .02 1'/></body>", 1},
+      {"<body pos='0 0 1.02'><joint axis='0 0 1'/><geom type='box' size='.45 .02 1' margin='.03'/></body>", 1},
+      {"<body pos='0 0 .2'><joint type='slide' axis='1 0 0'/><joint type='slide' axis='0 1 0'/><joint axis='0 0 1'/>"
+       "<geom size='.1'/><body pos='.1 0 0'><joint axis='0 0 -1'/><geom size='.05'/></body></body>",
+       0},
+      {"<body pos='0 0 .2'><joint type='slide' axis='0 0 1'/><geom size='.1'/></body>", 1},
+      {"<body pos='0 0 .2'><joint axis='0 0 1'/><geom size='.1'/><body pos='.3 0 0'><joint axis='0 1 0'/><geom "
+       "size='.05'/></body></body>",
+       1},
+      {"<body pos='0 0 .2'><freejoint/><geom size='.1'/></body>", 1},
+  };
+  for (size_t i = 0; i < sizeof scene / sizeof *scene; i++) {
+    char path[] = "/tmp/cavort-apart-XXXXXX";
+    const int file = mkstemp(path);
+    if (!CHECK(file >= 0)) return;
+    dprintf(file, "<mujoco><worldbody><geom type='plane' size='1 1 1'/>%s</worldbody></mujoco>", scene[i].body);
+    close(file);
+    cav_model *m = cav_model_load(path, NULL);
+    if (!CHECK(m && m->npair == scene[i].pairs)) fprintf(stderr, "    %s\n", scene[i].body);
+    cav_model_free(m);
+    unlink(path);
+  }
+}
+
 static void test_overlaps(void) {
   static const struct {
     const char *text, *says;
@@ -150,6 +182,7 @@ static void test_overlaps(void) {
 
 int main(void) {
   test_overlaps();
+  test_apart();
   check_left();
   // a geom alone takes no body, joint or actuator with it
   cav_error error = {0};

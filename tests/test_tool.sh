@@ -679,6 +679,22 @@ sed 's/<start[^>]*>/<start height="floor"\/>/' apex.xml >stood.xml
 "$cavort" solve stood.xml -o stood --strategies 1 --threads 1 >out 2>err
 check "what stands at the end is held" sh -c 'grep -q "penetration" out && ! grep -q "nothing holds" out'
 
+# a club that is asked down and hovers; one that is swung onto the ground, which no term asks for
+cat >bench.xml <<TEXT
+<mujoco><worldbody><geom name="floor" type="plane" size="2 2 .1"/><body name="trunk" pos="0 0 .05"><freejoint/><geom type="box" size=".1 .1 .05" mass="4"/>
+<body name="arm"><joint name="arm" axis="0 1 0" damping=".1"/><geom name="club" type="capsule" fromto="0 0 .15 0 0 .25" size=".03" mass=".2"/><site name="tip" pos="0 0 .25"/></body></body></worldbody>
+<actuator><motor joint="arm" ctrllimited="true" ctrlrange="-5 5"/></actuator></mujoco>
+TEXT
+cat >taps.xml <<TEXT
+<problem name="taps" model="bench.xml"><horizon duration="1" timestep="0.02"/><start height="floor"/><goal height="floor"/>
+<cost><sensor name="tip down" type="framepos" site="tip" component="z" target="0.04" from="0.4" to="0.6" weight="3000"/><posture name="back" dofs="all" at="end" weight="100"/></cost></problem>
+TEXT
+sed 's#<sensor name="tip down".*weight="3000"/>#<sensor name="down" type="jointpos" joint="arm" target="1.7" from="0.6" to="1" weight="300"/>#; s/duration="1"/duration="1.6"/' taps.xml >beats.xml
+"$cavort" solve taps.xml -o taps --strategies 1 --threads 1 >out 2>err
+check "what hovers is told of" grep -qE "^  note: 'tip down' stays [0-9.]+ mm above the ground at 0.5 s, which bears nothing of it" out
+"$cavort" solve beats.xml -o beats --strategies 1 --threads 1 >out 2>err
+check "what bears on the ground is told of" grep -qE "^  note: on its way the ground bears 'arm', geom club \(up to [0-9.]+ N at [0-9.]+ s\); the weight is 41.2 N" out
+
 # --- interruption, and going on from there ---
 
 # a time after which it ends by itself, with what it has

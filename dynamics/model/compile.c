@@ -315,6 +315,7 @@ static cav_model *build(cav_builder *b) {
     if (cav_builder_running(b)) find_strokes(b);
     if (cav_builder_running(b) && !cav_settle_gains(spec, b->model)) cav_spec_no_memory(spec);
     if (cav_builder_running(b)) leave_overlaps(b);
+    if (cav_builder_running(b) && cav_pairs_leave(b->model)) cav_spec_no_memory(spec);
   }
   if (cav_builder_running(b)) return b->model;
   free(b->model);

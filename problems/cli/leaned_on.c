@@ -1,10 +1,12 @@
 /// What of the world a motion leans on where neither its first nor its last knot does: a wall that can be stood on is stood
 /// on, and who asked for a way over it is told. And whether a motion whose guess flies does not: who asked for a height alone
 /// may get one that rears up to it. And whether a body that is asked up at a time is up on its toes, what links of one body
-/// lean on each other, and whether anything holds at the end what is to be at rest then.
+/// lean on each other, whether anything holds at the end what is to be at rest then, which parts besides those that it begins
+/// and ends on bear on the ground, and whether what is asked down to the ground stays above it.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "cavort/result.h"
 #include "command.h"
@@ -128,6 +130,105 @@ static void tell_self(FILE *out, const cav_model *m, const cav_forces *forces, c
           a && *a ? a : "a body", b && *b ? b : "a body", size, most->knot * motion->timestep);
 }
 
+// part of the weight from which on the ground is hit by what is asked to come there, and below which nothing bears on it
+static const double hit = 0.5, borne_by_nothing = 0.01;
+
+/// Whether a term asks for a place of a link.
+static int is_asked(const cav_problem *problem, int link) {
+  for (int i = 0; i < problem->nterm; i++) {
+    const cav_term *term = &problem->term[i];
+    if (term->quantity == CAV_QUANTITY_SENSOR && term->sensor.type == CAV_SENSOR_FRAMEPOS &&
+        cav_object_link(problem->model, term->sensor.object_type, term->sensor.object) == link)
+      return 1;
+  }
+  return 0;
+}
+
+/// The geom of a driven tree that the ground pushes there; -1: none.
+static int on_ground(const cav_model *m, const cav_contact_force *f) {
+  const int one = m->geom[f->geom1].link, other = m->geom[f->geom2].link, part = one > 0 ? f->geom1 : f->geom2;
+  int unused;
+  return (one > 0) != (other > 0) && m->link[one + other].driven && solid_of(m, f, &unused) < 0 ? part : -1;
+}
+
+/// Parts that bear on the ground on the way and neither at the start nor at the end: shins, a hand that hits the floor.
+static void tell_ground(FILE *out, const cav_problem *problem, const cav_trajectory *motion, const cav_forces *forces,
+                        double weight) {
+  const cav_model *m = problem->model;
+  const cav_contact_force **most = calloc((size_t)m->ngeom + 1, sizeof *most);
+  char *stands = calloc((size_t)m->ngeom + 1, 1);
+  for (int i = 0; most && stands && i < forces->nforce; i++) {
+    const cav_contact_force *f = &forces->force[i];
+    const int geom = on_ground(m, f);
+    if (geom < 0) continue;
+    const int ends = f->knot == 0 || f->knot >= forces->nknot - 2;
+    if (ends && size_of(f) > borne_by_nothing * weight) stands[geom] = 1;
+    if (!most[geom] || size_of(f) > size_of(most[geom])) most[geom] = f;
+  }
+  int n = 0;
+  for (int g = 0; most && stands && g < m->ngeom; g++) {
+    if (!most[g] || stands[g]) continue;
+    int whole = 0; // both sides of a sole are alike, a shin and the ball that it ends in are not
+    for (int k = 0; k < m->ngeom; k++)
+      whole |= stands[k] && m->geom[k].body == m->geom[g].body && m->geom[k].type == m->geom[g].type;
+    const double least = is_asked(problem, m->geom[g].link) ? hit : leaning;
+    if (whole || size_of(most[g]) < least * weight || n++ >= NAMED) continue;
+    const char *body = m->body[m->geom[g].body].name, *name = m->geom[g].name;
+    const int named = name && *name && strcmp(name, body);
+    fprintf(out, "%s'%.60s'%s%.60s (up to %.3g N at %.3g s)", n == 1 ? "  note: on its way the ground bears " : ", ",
+            *body ? body : "a body", named ? ", geom " : "", named ? name : "", size_of(most[g]),
+            most[g]->knot * motion->timestep);
+  }
+  if (n > 0) fprintf(out, "; the weight is %.3g N\n", weight);
+  free(most);
+  free(stands);
+}
+
+// m: from which on what is asked down to the ground is above it, and up to which it was meant to be there
+static const double off_ground = 1e-3, meant = 0.03;
+
+/// How far above the ground a link is at a knot, infinite where that is far.
+static double gap_of(const cav_model *m, cav_state *state, int link, const double *q) {
+  double gap = INFINITY;
+  state->options.smoothing = meant;
+  if (cav_position(m, state, q)) return gap;
+  for (int i = 0; i < state->ncontact; i++) {
+    const cav_contact *c = &state->contact[i];
+    const cav_pair *pair = &m->pair[c->pair];
+    const cav_geom_type type = m->geom[m->geom[pair->geom1].link == 0 ? pair->geom1 : pair->geom2].type;
+    const int ground = type == CAV_GEOM_PLANE || type == CAV_GEOM_HFIELD;
+    if (ground && c->link1 + c->link2 == link && (c->link1 == 0 || c->link2 == 0)) gap = fmin(gap, c->dist);
+  }
+  return gap;
+}
+
+/// Bodies that are asked down to the ground at a time, come near it and do not touch it.
+static void tell_hovering(FILE *out, const cav_problem *problem, const cav_trajectory *motion, const cav_forces *forces,
+                          double weight) {
+  const cav_model *m = problem->model;
+  cav_state *state = cav_state_new(m);
+  for (int i = 0, n = 0; state && i < problem->nterm && n < NAMED; i++) {
+    const cav_term *term = &problem->term[i];
+    const double to = term->to < 0 ? problem->duration : term->to, time = (fmax(term->from, 0) + to) / 2;
+    const int t = (int)lround(time / motion->timestep),
+              link = cav_object_link(m, term->sensor.object_type, term->sensor.object);
+    if (term->quantity != CAV_QUANTITY_SENSOR || term->sensor.type != CAV_SENSOR_FRAMEPOS || term->sensor.referred ||
+        (term->component >= 0 && term->component != 2) || !term->target || t >= motion->nknot - 1 || link <= 0)
+      continue;
+    const double gap = gap_of(m, state, link, motion->q + (size_t)t * (size_t)m->nq);
+    const double before = gap_of(m, state, link, motion->q);
+    if (!(gap > off_ground && gap < meant && before > 2 * meant)) continue;
+    if (borne_of(m, forces, t, link) > borne_by_nothing * weight) continue;
+    n++;
+    fprintf(
+        out,
+        "  note: '%s' stays %.2g mm above the ground at %.3g s, which bears nothing of it; where it is to rest there a "
+        "target lower by more than that, and a smaller within, press it down\n",
+        term->name && *term->name ? term->name : "a place", 1e3 * gap, t * motion->timestep);
+  }
+  cav_state_free(state);
+}
+
 /// A tree that floats, that actuators move and that nothing holds at the end, where all is to be at rest: at the top of a
 /// hop it is, for a moment.
 static void tell_ending(FILE *out, const cav_problem *problem, const cav_forces *forces) {
@@ -188,7 +289,8 @@ void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_t
         out,
         "  note: the guess flies (apex), the motion does not: it touches the world at every knot; heights of feet at "
         "a time make it leave the ground\n");
-  if (forces) tell_toes(out, problem, motion, forces, weight);
+  if (forces) tell_toes(out, problem, motion, forces, weight), tell_ground(out, problem, motion, forces, weight);
+  if (forces) tell_hovering(out, problem, motion, forces, weight);
   cav_forces_free(forces);
   free(most), free(with);
 }

@@ -39,6 +39,30 @@ static void tell(const cav_model *m, const penetration *p, double timestep, int 
            cav_geom_label(m, stands, b));
 }
 
+void cav_command_tell_guess(FILE *out, const cav_problem *p) {
+  static const double deep = 0.02; // m
+  cav_error ignored = {0};
+  penetration ends = {0}, on_the_way = {0};
+  char text[200];
+  if (!p->nguess_pose) return;
+  cav_state *state = cav_state_new(p->model);
+  cav_trajectory *guess = cav_problem_guess(p, &ignored);
+  cav_status status = state && guess ? CAV_OK : CAV_NO_MEMORY;
+  if (!status) status = note_depth(p->model, state, p->q_start, 0, &ends);
+  if (!status) status = note_depth(p->model, state, p->q_goal, 0, &ends);
+  for (int k = 0; !status && k < p->nguess_pose; k++) {
+    const int t = (int)lround(p->guess_pose[k].time / p->timestep);
+    if (t < guess->nknot)
+      status = note_depth(p->model, state, guess->q + (size_t)t * (size_t)guess->nq, t, &on_the_way);
+  }
+  if (!status && on_the_way.depth > fmax(deep, ends.depth)) {
+    tell(p->model, &on_the_way, p->timestep, 1, text, sizeof text);
+    fprintf(out, "note: a waypoint of the guess is inside something, %s; cavort view PROBLEM shows it\n", text);
+  }
+  cav_trajectory_free(guess);
+  cav_state_free(state);
+}
+
 // FILE.view.html, in the folder of the command
 static char *page_path(const char *operand) {
   const char *slash = strrchr(operand, '/'), *name = slash ? slash + 1 : operand;

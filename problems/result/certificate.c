@@ -178,7 +178,10 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
   if (!isnan(v->residual_fraction_max))
     fprintf(out, ", with residual forces on its root of up to %.3g %% of the weight", 100 * v->residual_fraction_max);
   fputc('\n', out);
+  int missed = 0;
+  for (int i = 0; i < n; i++) missed += line[i].passed == 0;
   if (!v->certified) fprintf(out, "  %s\n", v->reason);
+  if (!v->certified && missed > 1) fprintf(out, "  that is the first of %d conditions that are NOT met\n", missed);
   // told, not required: the motion is planned under its own law of contacts
   double whole = v->periods * v->duration;
   if (v->model_contacts_seconds < whole * (1 - 1e-9))
