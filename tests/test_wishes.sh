@@ -157,6 +157,13 @@ ends $? 1 "a lid that nothing touches"
 "$cavort" explain lid >explain.out
 says explain.out "nothing that an actuator moves touches 'lid'"
 says explain.out "refname=\"lid\""
+# the same, asked for by a posture of all joints
+echo '<problem name="lid" model="lid.xml"><horizon duration="1"/><start/><goal><joint name="hinge" pos="0.5"/></goal>
+<cost><posture name="final" dofs="all" at="end" weight="900"/></cost></problem>' >whole.problem
+"$cavort" solve whole.problem -o whole --threads 1 --strategies 1 >lid.out 2>err
+ends $? 1 "a lid that nothing touches, in a posture"
+"$cavort" explain whole >explain.out
+says explain.out "'final' is 0.5 rad from where the start has it, and nothing that an actuator moves touches 'lid'"
 
 echo "$n answers, $failed failed"
 [ "$failed" = 0 ] && [ "$n" -ge 23 ]

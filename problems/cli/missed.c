@@ -113,11 +113,14 @@ static void tell_pushed(const char *folder, char *text, size_t size) {
   cav_tried_close(&t);
 }
 
-/// Link whose place or joint a term is of; 0: of the world or of several.
-static int link_of(const cav_problem *p, const cav_term *term) {
+/// Link whose place or joint a term is of, of several the one that is off the most, a joint's name; 0: of the world or of none
+/// of them.
+static int link_of(const cav_problem *p, const cav_term *term, const char *what) {
   const cav_model *m = p->model;
-  if (term->quantity == CAV_QUANTITY_CONFIGURATION)
-    return term->dofs == CAV_DOFS_ONE ? m->dof[m->joint[term->joint].dof].link : 0;
+  if (term->quantity == CAV_QUANTITY_CONFIGURATION) {
+    const int joint = term->dofs == CAV_DOFS_ONE ? term->joint : cav_object_find(m, CAV_OBJECT_JOINT, what);
+    return joint >= 0 ? m->dof[m->joint[joint].dof].link : 0;
+  }
   if (term->quantity != CAV_QUANTITY_SENSOR) return 0;
   if (term->sensor.object_type == CAV_OBJECT_JOINT) return m->dof[m->joint[term->sensor.object].dof].link;
   int link = cav_object_link(m, term->sensor.object_type, term->sensor.object);
@@ -127,9 +130,10 @@ static int link_of(const cav_problem *p, const cav_term *term) {
 static const double tail = 1e-3; // N/kg of the scene: less is the tail of a smoothed law
 
 /// Of what no actuator moves and nothing that one moves touches: its body, for people; NULL: something does, or may.
-static const char *untouched(const cav_problem *p, const cav_trajectory *motion, const cav_term *term) {
+static const char *untouched(const cav_problem *p, const cav_trajectory *motion, const cav_term *term,
+                             const char *what) {
   const cav_model *m = p->model;
-  const int link = link_of(p, term), root = m->link[link].root;
+  const int link = link_of(p, term, what), root = m->link[link].root;
   cav_error ignored = {0};
   if (link <= 0 || m->link[link].driven || m->nu == 0) return NULL;
   cav_forces *forces = cav_forces_new(m, motion, &p->contact, p->close_at_rest, &ignored);
@@ -189,9 +193,9 @@ static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_t
   tell_heavier(folder, term->name, done < still * way && way > got[i].within ? 1 : more, tried, sizeof tried);
   snprintf(weight, sizeof weight, "a weight %.2g times as large brings it nearer", more);
   if (*tried) snprintf(weight, sizeof weight, "%s", tried);
-  const char *body = done < still * way && way > got[i].within ? untouched(p, motion, term) : NULL;
+  const char *body = done < still * way && way > got[i].within ? untouched(p, motion, term, got[i].what) : NULL;
   tell_pushed(folder, pushed, sizeof pushed);
-  const int brought = body ? seen_from(p, link_of(p, term)) : -1;
+  const int brought = body ? seen_from(p, link_of(p, term, got[i].what)) : -1;
   if (body && brought >= 0) {
     const cav_term *hand = &p->term[brought];
     snprintf(
