@@ -744,6 +744,11 @@ run 1 explain caught
 says_first out "was stopped while other strategies were tried"
 run 1 verify caught
 says out "was stopped while other strategies were tried"
+# one that has not come to an end has a checkpoint, and no list of strategies
+mv caught/strategies.csv strategies.aside
+run 1 explain caught
+says_first out "the solve of this folder has not come to an end: it runs, or was killed"
+mv strategies.aside caught/strategies.csv
 run 0 explain swing.result
 check "of a whole solve nothing is said" sh -c '! grep -q "was stopped" out'
 

@@ -1,8 +1,11 @@
 /// What the commands tell of what was tried for the motion of a result folder.
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "command.h"
+#include "result_file.h"
 #include "summary.h"
 
 void cav_command_tell_tried(FILE *out, const char *folder) {
@@ -13,7 +16,23 @@ void cav_command_tell_tried(FILE *out, const char *folder) {
             seconds);
 }
 
+/// Whether a folder has a file.
+static int has(const char *folder, const char *name) {
+  char *path = cav_result_path(folder, name);
+  struct stat about;
+  const int is = path && !stat(path, &about);
+  free(path);
+  return is;
+}
+
 int cav_command_tell_stopped(FILE *out, const char *folder) {
+  if (has(folder, "checkpoint.csv") && !has(folder, "strategies.csv")) {
+    if (out)
+      fprintf(out,
+              "the solve of this folder has not come to an end: it runs, or was killed (the same command with --resume "
+              "goes on). What follows is of the last iterate that it wrote, not of what the problem allows\n");
+    return 1;
+  }
   cav_tried t = cav_tried_open(folder);
   int stopped = 0, other = 0, success = 0;
   while (!stopped && cav_tried_next(&t)) {
