@@ -455,11 +455,12 @@ static void test_end_of_the_cone(void) {
 static void test_turret(void) {
   static const char pattern[] =
       "<mujoco><worldbody><geom type='plane' size='1 1 1'/><body pos='0 0 .2'>%s"
-      "<geom type='cylinder' size='.06 .03' mass='2.5'/></body></worldbody></mujoco>";
+      "<geom type='cylinder' size='.06 .03' mass='2.5'/></body></worldbody>%s</mujoco>";
   double force[2] = {0};
   for (int k = 0; k < 2; k++) {
     char text[400];
-    snprintf(text, sizeof text, pattern, k ? "<freejoint/>" : "<joint axis='0 0 1' armature='.1'/>");
+    snprintf(text, sizeof text, pattern, k ? "<freejoint/>" : "<joint name='j' axis='0 0 1' armature='.1'/>",
+             k ? "" : "<actuator><motor joint='j'/></actuator>");
     cav_model *m = scene_load(text);
     cav_state *state = m ? cav_state_new(m) : NULL;
     if (!CHECK(state != NULL)) return;

@@ -4,8 +4,8 @@
 /// millimetre in the model's own configuration and in every keyframe. So are the two sides of the bearing of a base that
 /// stands in the world, where they are within a millimetre of each other: MJCF's filter of parents keeps such pairs of the
 /// world alone, and a plan's smoothed law would press them together and brake the joint. Pairs that the file lists are
-/// kept. Left out always: a link and a plane from which it stands off and which it keeps its distance from in every
-/// posture, a door that is hinged over the floor, say. A smoothed law, which acts at a distance, would have it rub there.
+/// kept. Left out always: a link that no actuator moves and a plane that it keeps its distance from in every posture, as a
+/// door that is hinged over the floor. A smoothed law, which acts at a distance, would have it rub there.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -94,31 +94,38 @@ int cav_overlaps_leave(cav_model *model, char *text, size_t room) {
   return taken;
 }
 
-// whether all joints between a link and the world turn about n or slide square to it, n in the world
+// whether all joints between a link and the world turn about n or slide square to it, n in the world; without a state, whether
+// they may
 static int keeps_height(const cav_model *m, const cav_state *state, int link, const double n[3]) {
   for (int l = link; l > 0; l = m->link[l].parent)
     for (int j = m->link[l].joint; j < m->link[l].joint + m->link[l].njoint; j++) {
       const cav_joint *joint = m->joint + j;
+      if (joint->type != CAV_JOINT_HINGE && joint->type != CAV_JOINT_SLIDE) return 0;
+      if (!state) continue;
       double axis[3];
       rotate(axis, state->link[l].rotation, joint->axis);
       const double along = fabs(dot3(axis, n));
-      if (joint->type != CAV_JOINT_HINGE && joint->type != CAV_JOINT_SLIDE) return 0;
       if (joint->type == CAV_JOINT_HINGE ? along < 1 - 1e-12 : along > 1e-9) return 0;
     }
   return 1;
 }
 
-// whether a pair is of a plane of the world and of what it keeps its distance from
+// whether a pair is of a plane of the world and of what keeps its distance from it, moved by no actuator; without a state,
+// whether it may be
 static int keeps_off(const cav_model *m, const cav_state *state, const cav_pair *pair) {
   const cav_geom *plane = m->geom + pair->geom1;
+  const int link = m->geom[pair->geom2].link;
   double n[3];
   column3(n, plane->rotation, 2);
-  return plane->type == CAV_GEOM_PLANE && !plane->link && !pair->listed &&
-         keeps_height(m, state, m->geom[pair->geom2].link, n);
+  return plane->type == CAV_GEOM_PLANE && !plane->link && !pair->listed && !m->link[link].driven &&
+         keeps_height(m, state, link, n);
 }
 
 cav_status cav_pairs_leave(cav_model *model) {
   cav_pair *pair = (cav_pair *)model->pair;
+  int n = 0;
+  for (int i = 0; i < model->npair; i++) n += keeps_off(model, NULL, &pair[i]);
+  if (!n) return CAV_OK;
   cav_state *state = cav_state_new(model);
   char *near = calloc((size_t)model->npair + 1, 1);
   cav_status status = state && near ? CAV_OK : CAV_NO_MEMORY;
@@ -129,7 +136,7 @@ cav_status cav_pairs_leave(cav_model *model) {
     const cav_contact *c = &state->contact[i];
     near[c->pair] |= c->dist <= fmax(c->margin, 0) + 1e-9;
   }
-  int n = 0;
+  n = 0;
   for (int i = 0; i < model->npair && !status; i++)
     if (near[i] || !keeps_off(model, state, &pair[i])) pair[n++] = pair[i];
   // where there are no poses nothing is left out
