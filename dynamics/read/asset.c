@@ -112,7 +112,7 @@ void cav_read_hfield(cav_spec *spec, const cav_xml_node *node) {
   if (!file && (h->nrow < 2 || h->ncol < 2))
     cav_spec_fail(spec, node, NULL, "expected nrow and ncol of at least 2, or a file; got %d and %d", h->nrow, h->ncol);
   // features of contacts number the prisms under the grid, 128 a cell
-  _Static_assert(128 * (long long)(CAV_SPEC_GRID - 1) * (CAV_SPEC_GRID - 1) <= INT_MAX, "features are int");
+  _Static_assert(64 + 128 * (long long)(CAV_SPEC_GRID - 1) * (CAV_SPEC_GRID - 1) <= INT_MAX, "features are int");
   if (h->nrow > CAV_SPEC_GRID || h->ncol > CAV_SPEC_GRID)
     cav_spec_fail(spec, node, NULL, "%d by %d points; at most %d along each side are read", h->nrow, h->ncol,
                   CAV_SPEC_GRID);
