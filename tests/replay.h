@@ -219,24 +219,29 @@ static inline void replay_turn(const char *model_path, char *scene, size_t room)
   }
 }
 
+// mass and inertia of a body times a factor
+static inline void replay_scale(mjModel *theirs, int body, double factor) {
+  theirs->body_mass[body] *= factor;
+  for (int k = 0; k < 3; k++) theirs->body_inertia[3 * body + k] *= factor;
+}
+
 // Masses as the model's file and the scene say: a model that says its total mass (settotalmass) says it of itself alone, while
-// MuJoCo scales what an including file adds, too.
-static inline int replay_weigh(mjModel *theirs, const char *model_path) {
-  mjModel *alone = mj_loadXML(model_path, NULL, NULL, 0);
-  int heaviest = 0;
-  for (int b = 0; alone && b < alone->nbody; b++)
-    if (alone->body_mass[b] > alone->body_mass[heaviest]) heaviest = b;
-  const char *name = alone ? mj_id2name(alone, mjOBJ_BODY, heaviest) : NULL;
-  const int same = name ? mj_name2id(theirs, mjOBJ_BODY, name) : -1;
-  const int known = alone && (same >= 0 || theirs->nbody == alone->nbody);
-  const double scale = known ? alone->body_mass[heaviest] / theirs->body_mass[same >= 0 ? same : heaviest] : 1;
-  if (alone) mj_deleteModel(alone);
-  if (!CHECK(known)) return 0;
-  if (fabs(scale - 1) < 1e-9) return 1;
-  for (int b = 0; b < theirs->nbody; b++) {
-    theirs->body_mass[b] *= scale;
-    for (int k = 0; k < 3; k++) theirs->body_inertia[3 * b + k] *= scale;
+// MuJoCo scales what an including file adds, too. Bodies of the model get those that MuJoCo gives it alone, bodies of the scene
+// those that the problem has.
+static inline int replay_weigh(mjModel *theirs, const cav_problem *problem) {
+  const cav_model *ours = problem->model;
+  mjModel *alone = mj_loadXML(problem->model_path, NULL, NULL, 0);
+  if (!CHECK(alone)) return 0;
+  for (int b = 1; b < theirs->nbody; b++) {
+    const char *name = mj_id2name(theirs, mjOBJ_BODY, b);
+    // without a name: of the model, which comes first
+    const int same = name ? mj_name2id(alone, mjOBJ_BODY, name) : b < alone->nbody ? b : -1;
+    const int there = same < 0 && name ? cav_object_find(ours, CAV_OBJECT_BODY, name) : -1;
+    const double mass = same >= 0 ? alone->body_mass[same] : there >= 0 ? ours->body[there].mass : NAN;
+    if (!CHECK(isfinite(mass))) return 0;
+    if (theirs->body_mass[b] > 0) replay_scale(theirs, b, mass / theirs->body_mass[b]);
   }
+  mj_deleteModel(alone);
   mjData *data = mj_makeData(theirs);
   mj_setConst(theirs, data);
   mj_deleteData(data);
@@ -244,7 +249,8 @@ static inline int replay_weigh(mjModel *theirs, const char *model_path) {
 }
 
 // MuJoCo's model of the problem's file, with what the problem's scene puts into the world; path: the problem's file
-static inline mjModel *replay_load(const char *path, const char *model_path) {
+static inline mjModel *replay_load(const char *path, const cav_problem *of) {
+  const char *model_path = of->model_path;
   static char problem[1 << 16], added[1 << 16];
   char file[] = "/tmp/cavort-replay-XXXXXX.xml", text[1000] = "";
   FILE *stream = fopen(path, "r");
@@ -267,7 +273,7 @@ static inline mjModel *replay_load(const char *path, const char *model_path) {
   }
   mjModel *model = mj_loadXML(adds ? file : model_path, NULL, text, sizeof text);
   if (!model) fprintf(stderr, "    %s\n", text);
-  if (model && adds) replay_weigh(model, model_path);
+  if (model && adds) replay_weigh(model, of);
   if (adds) unlink(file);
   if (keyless) unlink(bare);
   return model;
@@ -284,7 +290,7 @@ static inline int replay_open(replay *s, const char *path) {
     s->image = cav_cycle_image_new(s->problem, &error);
     s->periods = s->problem->cycle.mirror == CAV_MIRROR_NONE ? 2 : 4;
   }
-  s->theirs = replay_load(path, s->problem->model_path);
+  s->theirs = replay_load(path, s->problem);
   s->state = cav_state_new(model);
   s->work = malloc(sizeof(double) * (size_t)(6 * model->nv + 2 * model->nq + model->nu + 7 * model->nlink));
   s->v = s->work + 5 * model->nv + model->nq + model->nu + 7 * model->nlink;
