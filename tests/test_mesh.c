@@ -322,6 +322,77 @@ static void test_level(double rough) {
   }
 }
 
+// whether a point of a field's surface, in its axes, and a normal out of it are those of the surface as a whole: no triangle
+// about the point sticks out of the plane through it
+static int supports(const cav_hfield *h, const double p[3], const double up[3]) {
+  const double dx = 2 * h->size[0] / (h->ncol - 1), dy = 2 * h->size[1] / (h->nrow - 1);
+  for (int r = 0; r < h->nrow - 1; r++)
+    for (int c = 0; c < h->ncol - 1; c++)
+      for (int half = 0; half < 2; half++) {
+        const int at[3][2] = {{r, c}, {half ? r + 1 : r, c + 1}, {r + 1, c + !half}};
+        double x[3][3], least = INFINITY, most = -INFINITY;
+        for (int k = 0; k < 3; k++)
+          set3(x[k], -h->size[0] + at[k][1] * dx, -h->size[1] + at[k][0] * dy,
+               h->height[at[k][0] * h->ncol + at[k][1]]);
+        for (int k = 0; k < 3; k++) {
+          const double *a = x[k], *b = x[(k + 1) % 3];
+          double d[3];
+          least = fmin(least, (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]));
+          sub3(d, a, p);
+          most = fmax(most, dot3(d, up));
+        }
+        if (least > -1e-7 * dx * dy && most > 1e-7) return 0;
+      }
+  return 1;
+}
+
+// points on hills are those with all prisms of the field that the surface as a whole has: none that is far beside a shape is missed
+static void test_all_prisms(int type, double tall, double margin) {
+  enum { SIDE = 10 };
+  static double height[SIDE * SIDE];
+  for (int i = 0; i < SIDE * SIDE; i++) height[i] = tall * (scene_uniform() + 1);
+  cav_hfield h = {
+      .name = "", .nrow = SIDE, .ncol = SIDE, .size = {1, 1}, .top = 2 * tall, .base = 0.1, .height = height};
+  cav_shape ground = level_field(&h);
+  int compared = 0, points = 0, missed = 0;
+  for (int k = 0; k < 120; k++) {
+    solid a;
+    cav_touch touch[CAV_TOUCH_MAX];
+    random_solid(type, 0, &a);
+    for (int i = 0; i < 3 && type < CAV_GEOM_MESH; i++)
+      a.size[i] *= tall < 0.05 ? 0.1 : 0.4; // what is small meets tips beside it
+    set3(a.shape.pos, uniform(-0.6, 0.6), uniform(-0.6, 0.6), uniform(1.5 * tall, 1.5 * tall + 0.2));
+    const int n = cav_collide_shapes(&a.shape, &ground, margin, touch);
+    int apart = n < CAV_TOUCH_MAX, seen = 0, absent = 0; // what overlaps a prism has points by their height over it
+    for (int i = 0; i < n; i++) apart &= touch[i].dist > 0;
+    for (int f = 0; f < 2 * (SIDE - 1) * (SIDE - 1) && apart; f++) {
+      cav_prism prism;
+      cav_touch with[CAV_TOUCH_MAX];
+      CHECK(cav_hfield_prism(&ground, CAV_LEVEL_FEATURES + CAV_PRISM_FEATURES * f, &prism) == 0);
+      const int m = cav_collide_shapes(&a.shape, &prism.shape, margin, with);
+      for (int i = 0; i < m; i++) {
+        double y[3], up[3], nearest = INFINITY;
+        axpy3(y, with[i].pos, with[i].dist / 2, with[i].normal);
+        scale3(up, -1, with[i].normal);
+        apart &= with[i].dist > 0;
+        if (!supports(&h, y, up)) continue;
+        for (int j = 0; j < n; j++) {
+          double d[3];
+          sub3(d, touch[j].pos, with[i].pos);
+          nearest = fmin(nearest, norm3(d));
+        }
+        seen++;
+        absent += nearest > 1e-6;
+      }
+    }
+    if (apart) compared += n > 0, points += seen, missed += absent;
+    let_go(&a);
+  }
+  printf("%-10s over hills of %.2f m: %d poses, %d points with all prisms, %d missed\n", names[type], 2 * tall,
+         compared, points, missed);
+  CHECK(compared > 20 && points > 20 && missed == 0);
+}
+
 // over hills a sphere's nearest point is found by brute force over all triangles
 static void test_hills(void) {
   enum { SIDE = 15 };
@@ -702,6 +773,8 @@ int main(void) {
   test_level(0);
   test_level(1e-11);
   test_hills();
+  for (int type = 1; type <= CAV_GEOM_MESH; type++)
+    test_all_prisms(type, 0.1, MARGIN), test_all_prisms(type, 0.01, 0.15);
 #ifdef CAVORT_HAVE_ASSIMP
   test_collada();
 #endif

@@ -695,6 +695,13 @@ check "what hovers is told of" grep -qE "^  note: 'tip down' stays [0-9.]+ mm ab
 "$cavort" solve beats.xml -o beats --strategies 1 --threads 1 >out 2>err
 check "what bears on the ground is told of" grep -qE "^  note: on its way the ground bears 'arm', geom club \(up to [0-9.]+ N at [0-9.]+ s\); the weight is 41.2 N" out
 
+# not what hovers after it has borne; not the feet of a gait, whose period has no ends of its own
+sed 's#<posture name="back"#<sensor name="after" type="framepos" site="tip" component="z" target="0.045" at="1.1" weight="3000"/>&#' beats.xml >after.xml
+"$cavort" solve after.xml -o after --strategies 1 --threads 1 >out 2>err
+check "what hovers after it has borne is not told of" sh -c 'grep -q "ground bears .arm." out && ! grep -q "stays .* above the ground" out'
+"$cavort" solve "$root/problems/motions/cheetah-gallop/problem.xml" -o gallop --strategies 1 --threads 1 >out 2>err
+check "feet that gallop are not told of" sh -c 'grep -q "^certified" out && ! grep -q "ground bears" out'
+
 # --- interruption, and going on from there ---
 
 # a time after which it ends by itself, with what it has

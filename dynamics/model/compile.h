@@ -37,8 +37,8 @@ cav_pair *cav_filter_pairs(cav_spec *spec, const int *weld, const int *link_of, 
 /// if memory runs out. overlap.c.
 int cav_overlaps_leave(cav_model *model, char *text, size_t room);
 
-/// Takes pairs out that no posture brings together: planes of the world and what keeps its distance from them. CAV_NO_MEMORY.
-/// overlap.c.
+/// Takes pairs out that no posture brings together: planes of the world and what keeps its distance from
+/// them, moved by no actuator. CAV_NO_MEMORY. overlap.c.
 cav_status cav_pairs_leave(cav_model *model);
 
 /// Model of a complete spec; NULL on failure, noted in spec. compile.c.

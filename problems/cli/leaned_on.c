@@ -10,6 +10,7 @@
 
 #include "cavort/result.h"
 #include "command.h"
+#include "role.h"
 
 // part of the weight from which on a solid counts as leaned on, and most solids that are named
 static const double leaning = 0.05;
@@ -59,10 +60,10 @@ static double height_at(const cav_model *m, cav_state *state, const cav_term *te
   return pose.pos[2];
 }
 
-/// Whether a term asks for a height of something at one time.
+/// Whether a term asks for a height of something in the world.
 static int asks_height(const cav_term *term) {
   return term->quantity == CAV_QUANTITY_SENSOR && term->sensor.type == CAV_SENSOR_FRAMEPOS && !term->sensor.referred &&
-         (term->component < 0 || term->component == 2) && term->target && term->from == term->to && term->from > 0;
+         (term->component < 0 || term->component == 2) && term->target;
 }
 
 // m from which on something is higher than at the start
@@ -88,7 +89,7 @@ static void tell_toes(FILE *out, const cav_problem *problem, const cav_trajector
   cav_state *state = cav_state_new(m);
   for (int i = 0, n = 0; state && i < problem->nterm && n < NAMED; i++) {
     const cav_term *term = &problem->term[i];
-    if (!asks_height(term)) continue;
+    if (!asks_height(term) || term->from != term->to || !(term->from > 0)) continue;
     const int t = (int)lround(term->from / motion->timestep),
               link = cav_object_link(m, term->sensor.object_type, term->sensor.object);
     if (t >= motion->nknot || link <= 0) continue;
@@ -151,13 +152,26 @@ static int on_ground(const cav_model *m, const cav_contact_force *f) {
   return (one > 0) != (other > 0) && m->link[one + other].driven && solid_of(m, f, &unused) < 0 ? part : -1;
 }
 
-/// Parts that bear on the ground on the way and neither at the start nor at the end: shins, a hand that hits the floor.
+/// Marks the geoms of feet: they are meant to stand, whether they do at the start or not.
+static void mark_feet(const cav_model *m, char *stands) {
+  cav_state *state = cav_state_new(m);
+  cav_roles roles;
+  if (state && !cav_roles_find(m, state, &roles))
+    for (int r = CAV_ROLE_RIGHT_FOOT; r <= CAV_ROLE_BACK_LEFT_FOOT; r++)
+      for (int g = 0; g < m->ngeom && roles.body[r] > 0; g++)
+        stands[g] |= roles.geom[r] < 0 ? m->geom[g].body == roles.body[r] : g == roles.geom[r];
+  cav_state_free(state);
+}
+
+/// Parts that bear on the ground on the way and neither at the start nor at the end: shins, a hand that hits the floor. Of a
+/// period, which has no ends of its own, nothing is told.
 static void tell_ground(FILE *out, const cav_problem *problem, const cav_trajectory *motion, const cav_forces *forces,
                         double weight) {
   const cav_model *m = problem->model;
   const cav_contact_force **most = calloc((size_t)m->ngeom + 1, sizeof *most);
   char *stands = calloc((size_t)m->ngeom + 1, 1);
-  for (int i = 0; most && stands && i < forces->nforce; i++) {
+  if (stands) mark_feet(m, stands);
+  for (int i = 0; most && stands && !problem->cycle.on && i < forces->nforce; i++) {
     const cav_contact_force *f = &forces->force[i];
     const int geom = on_ground(m, f);
     if (geom < 0) continue;
@@ -209,16 +223,19 @@ static void tell_hovering(FILE *out, const cav_problem *problem, const cav_traje
   cav_state *state = cav_state_new(m);
   for (int i = 0, n = 0; state && i < problem->nterm && n < NAMED; i++) {
     const cav_term *term = &problem->term[i];
+    if (!asks_height(term)) continue;
     const double to = term->to < 0 ? problem->duration : term->to, time = (fmax(term->from, 0) + to) / 2;
     const int t = (int)lround(time / motion->timestep),
               link = cav_object_link(m, term->sensor.object_type, term->sensor.object);
-    if (term->quantity != CAV_QUANTITY_SENSOR || term->sensor.type != CAV_SENSOR_FRAMEPOS || term->sensor.referred ||
-        (term->component >= 0 && term->component != 2) || !term->target || t >= motion->nknot - 1 || link <= 0)
-      continue;
+    if (t >= motion->nknot - 1 || link <= 0) continue;
+    int bears = 0; // before or after, too, as a hand that pushes off
+    for (int k = 0; k < forces->nforce && !bears; k++) {
+      const int part = on_ground(m, &forces->force[k]);
+      bears = part >= 0 && m->geom[part].link == link && size_of(&forces->force[k]) > borne_by_nothing * weight;
+    }
     const double gap = gap_of(m, state, link, motion->q + (size_t)t * (size_t)m->nq);
     const double before = gap_of(m, state, link, motion->q);
-    if (!(gap > off_ground && gap < meant && before > 2 * meant)) continue;
-    if (borne_of(m, forces, t, link) > borne_by_nothing * weight) continue;
+    if (bears || !(gap > off_ground && gap < meant && before > 2 * meant)) continue;
     n++;
     fprintf(
         out,
