@@ -346,7 +346,7 @@ static int supports(const cav_hfield *h, const double p[3], const double up[3]) 
   return 1;
 }
 
-// points on hills are those with all prisms of the field that the surface as a whole has: none that is far beside a shape is missed
+// points on hills are those with all prisms that the surface as a whole has: none far beside a shape is missed
 static void test_all_prisms(int type, double tall, double margin) {
   enum { SIDE = 10 };
   static double height[SIDE * SIDE];
