@@ -30,7 +30,7 @@ static const char lifted[] =
     "<body gravcomp='.5' pos='.3 0 .5'><joint type='ball'/><geom/><body gravcomp='2' pos='0 .3 0'><joint type='slide' "
     "axis='1 0 1' actuatorgravcomp='false'/><geom/></body></body></body></body></worldbody></mujoco>";
 
-enum { STATES = 16, POINTS = 6, SENSORS = 48, LAWS = 5 };
+enum { STATES = 16, POINTS = 6, SENSORS = 56, LISTED = 24, TOUCHES = 4, LAWS = 5 };
 
 /// What is compared, of one state: u, then 13 numbers a contact (gap, velocities, impulses), then sensors.
 typedef struct readings {
@@ -51,7 +51,7 @@ static double worst[3];
 // the model's sensors, and every type that has a derivative on some object
 static void list_sensors(readings *r) {
   r->nsensor = 0;
-  for (int i = 0; i < model->nsensor && r->nsensor < SENSORS / 2; i++) r->sensor[r->nsensor++] = model->sensor[i];
+  for (int i = 0; i < model->nsensor && r->nsensor < LISTED; i++) r->sensor[r->nsensor++] = model->sensor[i];
   for (int type = 0; type <= CAV_SENSOR_SUBTREEANGMOM; type++) {
     cav_sensor s = {
         .type = (cav_sensor_type)type, .dim = 3, .object_type = CAV_OBJECT_BODY, .object = model->nbody - 1};
@@ -79,6 +79,13 @@ static void list_sensors(readings *r) {
     r->sensor[r->nsensor++] =
         (cav_sensor){.type = type, .dim = 3, .object_type = CAV_OBJECT_SITE, .object = model->nsite - 1};
   }
+  // what presses on bodies, and on a geom
+  for (int i = 0; i < TOUCHES && (i == 0 || i < model->nbody) && model->ngeom > 0; i++) {
+    r->sensor[r->nsensor++] = (cav_sensor){.type = CAV_SENSOR_TOUCH,
+                                           .dim = 1,
+                                           .object_type = i ? CAV_OBJECT_BODY : CAV_OBJECT_GEOM,
+                                           .object = i == 1 ? model->nbody - 1 : i};
+  }
   for (int i = 0; i < model->ntendon && r->nsensor < SENSORS; i++) {
     r->sensor[r->nsensor++] =
         (cav_sensor){.type = CAV_SENSOR_TENDONPOS, .dim = 1, .object_type = CAV_OBJECT_TENDON, .object = i};
@@ -87,6 +94,7 @@ static void list_sensors(readings *r) {
 
 // whether sensors of a type have a derivative
 static int has_derivative(const cav_sensor *s) {
+  if (s->type == CAV_SENSOR_TOUCH) return s->cutoff == 0;
   int type = (int)s->type, string = s->type == CAV_SENSOR_TENDONVEL && model->tendon[s->object].npath == 0;
   if (s->cutoff > 0 || (s->referred && (type < CAV_SENSOR_FRAMEPOS || type > CAV_SENSOR_FRAMEZAXIS))) return 0;
   return type <= CAV_SENSOR_SUBTREEANGMOM || type == CAV_SENSOR_VELOCIMETER || type == CAV_SENSOR_GYRO || string ||
@@ -133,7 +141,10 @@ static int differentiate(const readings *r, double *dq, double *dv, double *dn) 
     CHECK(cav_contact_derivatives(model, state, i, &d) == CAV_OK);
   }
   for (int i = 0; i < r->nsensor; i++) {
-    cav_status status = cav_sensor_derivatives(model, state, &r->sensor[i], dq + at, dn + at);
+    const int touch = r->sensor[i].type == CAV_SENSOR_TOUCH;
+    if (touch) CHECK(cav_sensor_derivatives(model, state, &r->sensor[i], dq + at, dn + at) == CAV_NOT_SUPPORTED);
+    cav_status status = touch ? cav_touch_derivatives(model, state, &r->sensor[i], dq + at, dv + at, dn + at)
+                              : cav_sensor_derivatives(model, state, &r->sensor[i], dq + at, dn + at);
     CHECK(status == (has_derivative(&r->sensor[i]) ? CAV_OK : CAV_NOT_SUPPORTED));
     at += r->sensor[i].dim * nv;
   }
@@ -186,14 +197,22 @@ static void compare_columns(const readings *r, const double *ours, int which) {
     reference(r, which, j, step / 2, fine, value);
     for (int i = 0; i < n; i++) column[i] = ours[i * nv + j];
     compare(column, fine, coarse, nv, 1 / state->options.timestep * scale, which);
-    int at = nv;
+    int at = nv, gone = 0;
+    // a sum of forces is as good as the largest that it is made of, and as rounding of the whole
+    double summed = scale;
     for (int i = 0; i < r->ncontact; i++, at += 13) {
+      gone |= !isfinite(fine[at] - coarse[at]);
+      summed = fmax(summed, 1e-6 * state->contact[i].impulse[0]);
+      for (int k = 7; k < 13; k++) summed = fmax(summed, fabs(fine[at + k]));
       compare(column + at, fine + at, coarse + at, 7, 1, which);
       compare(column + at + 7, fine + at + 7, coarse + at + 7, 6, scale, which);
     }
     for (int i = 0; i < r->nsensor; at += r->sensor[i++].dim) {
-      if (!has_derivative(&r->sensor[i])) continue;
-      compare(column + at, fine + at, coarse + at, r->sensor[i].dim, 1, which);
+      const int touch = r->sensor[i].type == CAV_SENSOR_TOUCH;
+      // a sum has no number for a point that is gone
+      if (!has_derivative(&r->sensor[i]) || (touch && gone)) continue;
+      const double unit = touch ? summed / state->options.timestep : 1;
+      compare(column + at, fine + at, coarse + at, r->sensor[i].dim, unit, which);
     }
   }
   free(fine), free(coarse), free(column), free(value);

@@ -128,6 +128,6 @@ int main(void) {
   } problem[] = {{"ahead", 0.12}, {"across", 0.12},  {"behind", 0.12}, {"turned", 0.12},
                  {"slid", 0.12},  {"straight", 0.3}, {"aside", 0.3}};
   for (size_t i = 0; i < sizeof problem / sizeof *problem; i++) test_pushed(problem[i].name, "push", problem[i].most);
-  test_pushed("press", "touch", 0.2), test_pushed("feel", "touch", 0.2);
+  test_pushed("press", "touch", 0.2), test_pushed("feel", "touch", 0.2), test_pushed("bear", "touch", 0.2);
   return check_result();
 }

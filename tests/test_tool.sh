@@ -692,6 +692,11 @@ TEXT
 sed 's#<sensor name="tip down".*weight="3000"/>#<sensor name="down" type="jointpos" joint="arm" target="1.7" from="0.6" to="1" weight="300"/>#; s/duration="1"/duration="1.6"/' taps.xml >beats.xml
 "$cavort" solve taps.xml -o taps --strategies 1 --threads 1 >out 2>err
 check "what hovers is told of" grep -qE "^  note: 'tip down' stays [0-9.]+ mm above the ground at 0.5 s, which bears nothing of it" out
+# what the note says of it has it bear
+sed -n "s|.*bears nothing of it; \(<sensor .*/>\) beside it has it bear 4 N|\1|p" out >bears
+sed "s|<posture name=\"back\"|$(cat bears)&|" taps.xml >rests.xml
+"$cavort" solve rests.xml -o rests --strategies 1 --threads 1 >out 2>err
+check "a touch sensor of a body has it bear" grep -qE "^  sensor +touch +0.[456][0-9]* +4 .* 1 N ok" out
 "$cavort" solve beats.xml -o beats --strategies 1 --threads 1 >out 2>err
 check "what bears on the ground is told of" grep -qE "^  note: on its way the ground bears 'arm', geom club \(up to [0-9.]+ N at [0-9.]+ s\); the weight is 41.2 N" out
 

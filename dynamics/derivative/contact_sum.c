@@ -2,6 +2,7 @@
 /// subtrees; those between two moving links; derivatives of one contact by the dofs. Those of a contact by its
 /// links' twists are contact.c's; the products of the sums with axes of dofs are smooth.c's.
 #include "analytic.h"
+#include "sensor.h"
 #include "vectors.h"
 
 // X with X b = b about the reference carried to a point d away: shifted = X' M X, M about the point
@@ -322,16 +323,24 @@ static void add_side(const cav_derivative_task *t, const cav_contact *c, const c
   add_path_rows(t, 3, length, row, out->pos_dq);
 }
 
-cav_status cav_contact_derivatives(const cav_model *model, cav_state *state, int contact, cav_contact_derivative *out) {
-  cav_derivative_store *s = state->work->derivatives;
-  if (!cav_state_evaluated(state) || !state->work->derived || contact < 0 || contact >= state->ncontact)
-    return CAV_BAD_INPUT;
-  const cav_contact *c = &state->contact[contact];
-  if (s->contact[contact].idle) {
+// adds the derivatives of a contact to what out points at
+static void add_contact(const cav_derivative_task *t, int contact, cav_contact_derivative *out) {
+  const cav_contact *c = &t->state->contact[contact];
+  if (t->s->contact[contact].idle) {
     cav_pair_manifolds manifolds;
     manifolds.pair = -1;
-    cav_contact_differentiate(model, state, c, 1, &manifolds, &s->contact[contact]);
+    cav_contact_differentiate(t->model, t->state, c, 1, &manifolds, &t->s->contact[contact]);
   }
+  for (int side = 0; side < 2; side++) add_side(t, c, &t->s->contact[contact], side, out);
+  if (cav_looks_ahead(&t->state->options)) cav_contact_next_derivatives(t, contact, out);
+}
+
+// whether the state holds what derivatives are made of
+static int is_derived(const cav_state *state) { return cav_state_evaluated(state) && state->work->derived; }
+
+cav_status cav_contact_derivatives(const cav_model *model, cav_state *state, int contact, cav_contact_derivative *out) {
+  if (!is_derived(state) || contact < 0 || contact >= state->ncontact) return CAV_BAD_INPUT;
+  const cav_contact *c = &state->contact[contact];
   size_t row = (size_t)model->nv * sizeof(double), rows = (size_t)c->dim * row;
   if (out->dist_dq) memset(out->dist_dq, 0, row);
   if (out->pos_dq) memset(out->pos_dq, 0, 3 * row);
@@ -339,8 +348,28 @@ cav_status cav_contact_derivatives(const cav_model *model, cav_state *state, int
   for (int k = 0; k < 5; k++) {
     if (all[k]) memset(all[k], 0, k < 2 || !out->normal_only ? rows : row);
   }
-  cav_derivative_task t = {.model = model, .state = state, .s = s, .nv = model->nv};
-  for (int side = 0; side < 2; side++) add_side(&t, c, &s->contact[contact], side, out);
-  if (cav_looks_ahead(&state->options)) cav_contact_next_derivatives(&t, contact, out);
+  cav_derivative_task t = {.model = model, .state = state, .s = state->work->derivatives, .nv = model->nv};
+  add_contact(&t, contact, out);
+  return CAV_OK;
+}
+
+cav_status cav_touch_derivatives(const cav_model *model, cav_state *state, const cav_sensor *sensor, double *d_dq,
+                                 double *d_dv, double *d_dv_next) {
+  if (sensor->type != CAV_SENSOR_TOUCH || sensor->cutoff > 0) return CAV_NOT_SUPPORTED;
+  if (!is_derived(state)) return CAV_BAD_INPUT;
+  double *all[] = {d_dq, d_dv, d_dv_next};
+  const double inverse_h = 1 / state->options.timestep;
+  cav_contact_derivative out = {.impulse_dq = d_dq, .impulse_dv = d_dv, .impulse_dv_next = d_dv_next, .normal_only = 1};
+  cav_derivative_task t = {.model = model, .state = state, .s = state->work->derivatives, .nv = model->nv};
+  for (int k = 0; k < 3; k++) {
+    if (all[k]) memset(all[k], 0, (size_t)model->nv * sizeof(double));
+  }
+  for (int i = cav_touch_next(model, state, sensor, 0); i < state->ncontact;
+       i = cav_touch_next(model, state, sensor, i + 1)) {
+    add_contact(&t, i, &out);
+  }
+  for (int k = 0; k < 3; k++) {
+    for (int j = 0; all[k] && j < model->nv; j++) all[k][j] *= inverse_h;
+  }
   return CAV_OK;
 }

@@ -143,6 +143,7 @@ static cav_object_type looks_at(const cav_sensor *sensor) {
     case CAV_TARGET_NONE:
       return CAV_OBJECT_TYPES;
     case CAV_TARGET_FRAME:
+    case CAV_TARGET_SURFACE:
       return sensor->object_type;
     case CAV_TARGET_BODY:
       return CAV_OBJECT_BODY;

@@ -451,6 +451,7 @@ UNREAD_SENSORS(UNREAD_SENSOR)
 #define OF_NONE(reads) of_nothing
 #define OF_BODY(reads) of_body
 #define OF_SITE(reads) of_site
+#define OF_SURFACE(reads) of_site
 #define OF_SCALAR_JOINT(reads) of_joint
 #define OF_BALL_JOINT(reads) of_joint
 #define OF_LIMITED_JOINT(reads) of_joint

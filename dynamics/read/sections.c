@@ -169,6 +169,7 @@ static void read_sensor(cav_mjcf_reader *r, const cav_xml_node *node, cav_sensor
     cav_object_type kind;
   } objects[] = {[CAV_TARGET_BODY] = {"body", CAV_OBJECT_BODY},
                  [CAV_TARGET_SITE] = {"site", CAV_OBJECT_SITE},
+                 [CAV_TARGET_SURFACE] = {"site", CAV_OBJECT_SITE},
                  [CAV_TARGET_SCALAR_JOINT] = {"joint", CAV_OBJECT_JOINT},
                  [CAV_TARGET_BALL_JOINT] = {"joint", CAV_OBJECT_JOINT},
                  [CAV_TARGET_LIMITED_JOINT] = {"joint", CAV_OBJECT_JOINT},

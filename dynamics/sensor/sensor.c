@@ -150,9 +150,6 @@ static void sense_site(const cav_model *model, const cav_state *state, const cav
   double world[3] = {0, 0, 0}, wrench[6], angular[3];
   cav_frame_pose(state, site->link, site->pos, site->quat, &pose);
   switch (sensor->type) {
-    case CAV_SENSOR_TOUCH:
-      out[0] = cav_touch_force(model, state, sensor->object);
-      return;
     case CAV_SENSOR_RANGEFINDER:
       out[0] = measure_range(model, state, site->body, &pose);
       return;
@@ -259,6 +256,8 @@ static void sense(const cav_model *model, cav_state *state, const cav_sensor *se
       sense_subtree(model, state, sensor, out);
       break;
     case CAV_SENSOR_TOUCH:
+      out[0] = cav_touch_force(model, state, sensor);
+      break;
     case CAV_SENSOR_ACCELEROMETER:
     case CAV_SENSOR_VELOCIMETER:
     case CAV_SENSOR_GYRO:

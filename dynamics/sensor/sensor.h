@@ -14,7 +14,11 @@ void cav_point_acceleration(const cav_state *state, int link, const double point
 /// Wrench (moment about point, force) by which its parent holds a body with all that stands on it. wrench.c.
 void cav_body_wrench(const cav_model *model, const cav_state *state, int body, const double point[3], double F[6]);
 
-/// Sum of the normal forces on the body of a site that lie in its zone or point out through it, N. wrench.c.
-double cav_touch_force(const cav_model *model, const cav_state *state, int site);
+/// Sum of the normal forces on what a touch sensor looks at, N: on the body of a site, where they lie in its zone or point out
+/// through it; on a body with what is fixed to it; on a geom. wrench.c.
+double cav_touch_force(const cav_model *model, const cav_state *state, const cav_sensor *sensor);
+
+/// The contacts whose forces these are, by number: the next one from first on, or ncontact. wrench.c.
+int cav_touch_next(const cav_model *model, const cav_state *state, const cav_sensor *sensor, int first);
 
 #endif

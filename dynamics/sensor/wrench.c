@@ -94,23 +94,46 @@ void cav_body_wrench(const cav_model *model, const cav_state *state, int body, c
   for (int i = 0; i < state->nequality; i++) add_equality(model, &state->equality[i], body, point, -inverse_h, F);
 }
 
-double cav_touch_force(const cav_model *model, const cav_state *state, int site) {
+int cav_touch_sees(const cav_model *model, const cav_sensor *sensor, int geom) {
+  const cav_geom *g = &model->geom[geom];
+  if (sensor->object_type == CAV_OBJECT_GEOM) { return geom == sensor->object; }
+  if (sensor->object_type == CAV_OBJECT_SITE) { return g->body == model->site[sensor->object].body; }
+  return g->link == model->body[sensor->object].link && cav_descends(model, g->body, sensor->object);
+}
+
+// the zone of a site
+static cav_shape zone_of(const cav_model *model, const cav_state *state, int site) {
   const cav_site *zone = &model->site[site];
   cav_pose pose;
   cav_object_pose(model, state, CAV_OBJECT_SITE, site, &pose);
   cav_shape shape = {.type = zone->type, .size = zone->size};
   copy3(shape.pos, pose.pos);
   memcpy(shape.rotation, pose.rotation, sizeof shape.rotation);
-  double impulse = 0;
-  for (int i = 0; i < state->ncontact; i++) {
-    const cav_contact *c = &state->contact[i];
+  return shape;
+}
+
+int cav_touch_next(const cav_model *model, const cav_state *state, const cav_sensor *sensor, int first) {
+  const int zoned = sensor->object_type == CAV_OBJECT_SITE;
+  cav_shape zone = {0};
+  if (zoned) { zone = zone_of(model, state, sensor->object); }
+  for (; first < state->ncontact; first++) {
+    const cav_contact *c = &state->contact[first];
     const cav_pair *pair = &model->pair[c->pair];
-    int first = model->geom[pair->geom1].body == zone->body, second = model->geom[pair->geom2].body == zone->body;
-    if ((!first && !second) || !(c->impulse[0] > 0)) { continue; }
+    const int felt1 = cav_touch_sees(model, sensor, pair->geom1), felt2 = cav_touch_sees(model, sensor, pair->geom2);
+    if ((!felt1 && !felt2) || !(c->impulse[0] > 0)) { continue; }
     // within the zone, or the normal away from the body runs into it
     double out[3];
-    scale3(out, second ? -1 : 1, c->frame);
-    if (cav_ray(&shape, c->pos, out) >= 0) { impulse += c->impulse[0]; }
+    scale3(out, felt2 ? -1 : 1, c->frame);
+    if (!zoned || cav_ray(&zone, c->pos, out) >= 0) { break; }
+  }
+  return first;
+}
+
+double cav_touch_force(const cav_model *model, const cav_state *state, const cav_sensor *sensor) {
+  double impulse = 0;
+  for (int i = cav_touch_next(model, state, sensor, 0); i < state->ncontact;
+       i = cav_touch_next(model, state, sensor, i + 1)) {
+    impulse += state->contact[i].impulse[0];
   }
   return impulse / state->options.timestep;
 }

@@ -227,9 +227,17 @@ CAV_API cav_status cav_contact_derivatives(const cav_model *model, cav_state *st
                                            cav_contact_derivative *out);
 
 /// Derivatives of cav_sensor_read at the same point, [sensor->dim*nv] each; NULL = not needed. Readings do not depend
-/// on v. CAV_BAD_INPUT as above, CAV_NOT_SUPPORTED for a type of sensor without derivative.
+/// on v. CAV_BAD_INPUT as above, CAV_NOT_SUPPORTED for a type of sensor without derivative (touch: cav_touch_derivatives).
 CAV_API cav_status cav_sensor_derivatives(const cav_model *model, cav_state *state, const cav_sensor *sensor,
                                           double *d_dq, double *d_dv_next);
+
+/// Whether a geom is what a touch sensor looks at: its geom, one of its body or fixed to that, or of the body of its site.
+CAV_API int cav_touch_sees(const cav_model *model, const cav_sensor *sensor, int geom);
+
+/// Derivatives of the reading of a touch sensor at the same point, [nv] each; NULL = not needed: of the contacts that it feels,
+/// which are none while nothing pushes. CAV_BAD_INPUT as above, CAV_NOT_SUPPORTED for other sensors and readings that are cut.
+CAV_API cav_status cav_touch_derivatives(const cav_model *model, cav_state *state, const cav_sensor *sensor,
+                                         double *d_dq, double *d_dv, double *d_dv_next);
 
 /// A function of (q, v, v_next) read off a state after cav_inverse has filled it: writes n values.
 /// It may call what uses scratch of the state, such as cav_sensor_read, and changes nothing else.

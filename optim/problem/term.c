@@ -286,6 +286,7 @@ static const struct {
                  [CAV_TARGET_FRAME] = {"body, xbody, geom or site", CAV_OBJECT_TYPES},
                  [CAV_TARGET_BODY] = {"body", CAV_OBJECT_BODY},
                  [CAV_TARGET_SITE] = {"site", CAV_OBJECT_SITE},
+                 [CAV_TARGET_SURFACE] = {"body, geom or site", CAV_OBJECT_TYPES},
                  [CAV_TARGET_SCALAR_JOINT] = {"joint", CAV_OBJECT_JOINT},
                  [CAV_TARGET_BALL_JOINT] = {"joint", CAV_OBJECT_JOINT},
                  [CAV_TARGET_LIMITED_JOINT] = {"joint", CAV_OBJECT_JOINT},
@@ -300,6 +301,7 @@ static int has_frame(cav_object_type type) {
 // whether a sensor looks at objects of that kind
 static int looks_at(const cav_sensor *sensor) {
   cav_sensor_target target = cav_sensor_rule_of(sensor->type)->target;
+  if (target == CAV_TARGET_SURFACE) return has_frame(sensor->object_type) && sensor->object_type != CAV_OBJECT_XBODY;
   return target == CAV_TARGET_FRAME ? has_frame(sensor->object_type) : sensor->object_type == wanted_of[target].type;
 }
 
@@ -374,13 +376,13 @@ static cav_status read_object(const cav_problem_reader *reader, const cav_xml_no
     sensor->object_type = type;
   }
   const cav_sensor_rule *rule = cav_sensor_rule_of(sensor->type);
-  int framed = rule->target == CAV_TARGET_FRAME;
+  int bodies = rule->target == CAV_TARGET_FRAME || rule->target == CAV_TARGET_SURFACE;
   const char *wanted = wanted_of[rule->target].name;
   if (rule->target == CAV_TARGET_NONE)
     return cav_xml_fail(reader->error, node, "type", "a %s reads nothing of the motion; windows tell the time",
                         rule->name);
   if (!given)
-    return cav_xml_fail(reader->error, node, framed ? "body" : wanted, "is missing; a %s needs one of: %s", rule->name,
+    return cav_xml_fail(reader->error, node, bodies ? "body" : wanted, "is missing; a %s needs one of: %s", rule->name,
                         wanted);
   if (!looks_at(sensor)) return cav_xml_fail(reader->error, node, given, "a %s looks at a %s", rule->name, wanted);
   sensor->object = cav_problem_find_frame(reader, node, given, &sensor->object_type);

@@ -211,9 +211,9 @@ static void lay(const cav_model *m, const cav_state *state, const thing *t, int 
   for (int i = 0; i < CAV_HAND_TERMS; i++) hand->term[i].to = i == 2 ? hand->term[0].from : t->time;
 }
 
-/// What has to be touched: a site whose touch sensor is to feel a force, and when.
+/// What has to be touched: what a touch sensor looks at that is to feel a force, and when.
 typedef struct touched {
-  const cav_site *site;
+  const cav_sensor *sensor;
   double from, to;
 } touched;
 
@@ -224,7 +224,7 @@ static int find_touched(const cav_problem *p, touched *found) {
     double target = term->lower, to = term->to < 0 ? p->duration : fmin(term->to, p->duration);
     if (term->use != CAV_USE_RANGE) cav_term_target(term, to, 1, &target);
     if (!(target > 0) || (term->use == CAV_USE_COST && !(term->weight > 0))) continue;
-    *found = (touched){&p->model->site[term->sensor.object], fmax(term->from, 0), to};
+    *found = (touched){&term->sensor, fmax(term->from, 0), to};
     return 1;
   }
   return 0;
@@ -250,10 +250,11 @@ static int place_asked(const cav_problem *p, const touched *t, int link, double 
 }
 
 /// The nearest place of a box's zone, of a ball's for other shapes.
-static void clamp_to_site(const cav_model *m, const cav_state *state, const cav_site *site, double at[3]) {
+static void clamp_to_site(const cav_model *m, const cav_state *state, int index, double at[3]) {
+  const cav_site *site = &m->site[index];
   cav_pose pose;
   double d[3], local[3];
-  cav_object_pose(m, state, CAV_OBJECT_SITE, (int)(site - m->site), &pose);
+  cav_object_pose(m, state, CAV_OBJECT_SITE, index, &pose);
   sub3(d, at, pose.pos);
   rotate_back(local, pose.rotation, d);
   if (site->type == CAV_GEOM_BOX) {
@@ -303,7 +304,7 @@ typedef struct meeting {
 static void weigh_meeting(const cav_problem *p, const cav_state *state, const cav_roles *roles, const touched *t,
                           int mover, int ground, meeting *best) {
   const cav_model *m = p->model;
-  const int on_ground = m->geom[ground].body == t->site->body;
+  const int on_ground = cav_touch_sees(m, t->sensor, ground);
   cav_pose hand, pose;
   double x[3], d[3];
   // a sensor that moves is to press on a solid sooner than on the ground
@@ -313,7 +314,7 @@ static void weigh_meeting(const cav_problem *p, const cav_state *state, const ca
   pose_of(m, state, ground, &pose);
   copy3(x, hand.pos);
   if (place_asked(p, t, m->geom[mover].link, x)) one.grade = 3;
-  if (on_ground) clamp_to_site(m, state, t->site, x);
+  if (on_ground && t->sensor->object_type == CAV_OBJECT_SITE) clamp_to_site(m, state, t->sensor->object, x);
   surface_near(&m->geom[ground], &pose, x, one.at, one.normal);
   sub3(d, hand.pos, one.at);
   one.far = norm3(d);
@@ -331,7 +332,7 @@ static cav_status find_meeting(const cav_problem *p, cav_state *state, const tou
     const int pair[] = {m->pair[i].geom1, m->pair[i].geom2};
     for (int k = 0; k < 2; k++) {
       const int mover = pair[k], ground = pair[1 - k];
-      if (m->geom[mover].body != t->site->body && m->geom[ground].body != t->site->body) continue;
+      if (!cav_touch_sees(m, t->sensor, mover) && !cav_touch_sees(m, t->sensor, ground)) continue;
       if (!m->link[m->geom[mover].link].driven || m->link[m->geom[ground].link].driven) continue;
       weigh_meeting(p, state, &roles, t, mover, ground, best);
     }
@@ -339,7 +340,24 @@ static cav_status find_meeting(const cav_problem *p, cav_state *state, const tou
   return status;
 }
 
-/// One term: the mover at the surface while the sensor is to feel something.
+/// How far a geom's middle is from the surface it lies on with its broadest side, m: a shin that kneels lies flat,
+/// whichever way it points before; of a mesh as far as it reaches as it is.
+static double lying(const cav_geom *geom, const cav_pose *pose, const double back[3]) {
+  switch (geom->type) {
+    case CAV_GEOM_CAPSULE:
+      return geom->size[0];
+    case CAV_GEOM_CYLINDER:
+      return fmin(geom->size[0], geom->size[1]);
+    case CAV_GEOM_BOX:
+    case CAV_GEOM_ELLIPSOID:
+      return fmin(geom->size[0], fmin(geom->size[1], geom->size[2]));
+    default:
+      return cav_geom_reach(geom, pose, back);
+  }
+}
+
+/// One term: the mover at the surface while the sensor is to feel something; with any side, if that is all one to the
+/// sensor.
 static void lay_meeting(const cav_model *m, const cav_state *state, const touched *t, const meeting *one, double away,
                         cav_hand *hand) {
   const int link = m->geom[one->ground].link, body = m->link[link].body;
@@ -347,7 +365,10 @@ static void lay_meeting(const cav_model *m, const cav_state *state, const touche
   double back[3];
   scale3(back, -1, one->normal);
   pose_of(m, state, one->mover, &mover);
-  axpy3(hand->place, one->at, away * cav_geom_reach(&m->geom[one->mover], &mover, back), one->normal);
+  const int lies = t->sensor->object_type != CAV_OBJECT_SITE && cav_touch_sees(m, t->sensor, one->mover);
+  const double reach =
+      lies ? lying(&m->geom[one->mover], &mover, back) : cav_geom_reach(&m->geom[one->mover], &mover, back);
+  axpy3(hand->place, one->at, away * reach, one->normal);
   hand->term[0] = term_of(CAV_SENSOR_FRAMEPOS, CAV_OBJECT_GEOM, one->mover, hand->place);
   hand->term[0].from = t->from, hand->term[0].to = t->to;
   hand->found = isfinite(dot3(hand->place, hand->place)), hand->touches = 1;

@@ -58,6 +58,11 @@ static void keep_sensed(const marks *a, const cav_sensor *sensor) {
       if (m->body[sensor->object].link == 0) keep_all(a);
       keep_object(a, CAV_OBJECT_BODY, sensor->object);
       break;
+    case CAV_TARGET_SURFACE:
+      // anything may press on what is of the world
+      if (cav_object_link(m, sensor->object_type, sensor->object) == 0) keep_all(a);
+      keep_object(a, sensor->object_type, sensor->object);
+      break;
     case CAV_TARGET_SITE:
       // a rangefinder sees whatever is there
       if (sensor->type == CAV_SENSOR_RANGEFINDER) keep_all(a);

@@ -75,9 +75,6 @@ static void site_pattern(const cav_model *m, const cav_sensor *sensor, char *see
       // any geom may be the nearest
       memset(seen, 1, (size_t)m->nv);
       return;
-    case CAV_SENSOR_TOUCH:
-      touch_pattern(m, link, seen);
-      break;
     case CAV_SENSOR_FORCE:
     case CAV_SENSOR_TORQUE:
       // all that stands on the body, and what touches that
@@ -129,6 +126,10 @@ static cav_sensor_stage sensor_pattern(const cav_transcription *tr, const cav_se
       break;
     case CAV_TARGET_SITE:
       site_pattern(m, sensor, seen);
+      break;
+    case CAV_TARGET_SURFACE:
+      touch_pattern(m, cav_object_link(m, sensor->object_type, sensor->object), seen);
+      frame_pattern(m, sensor->object_type, sensor->object, seen);
       break;
     case CAV_TARGET_BODY:
       subtree_pattern(m, m->body[sensor->object].link, seen);

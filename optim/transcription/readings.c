@@ -351,6 +351,14 @@ static cav_status sensor_rows(const cav_transcription *tr, const cav_scratch *s,
   return CAV_OK;
 }
 
+/// Of a touch sensor.
+static cav_status touch_rows(const cav_transcription *tr, const cav_scratch *s, const cav_term *term, rows out) {
+  cav_status status = cav_touch_derivatives(tr->model, s->state, &term->sensor, out.dq, out.dv, out.dn);
+  for (int j = 0; j < tr->nv && status == CAV_OK; j++)
+    out.dq[j] /= term->scale, out.dv[j] /= term->scale, out.dn[j] /= term->scale;
+  return status;
+}
+
 /// Of a quantity of one's own, from its Jacobian and the derivatives of u, which stand first.
 static cav_status user_rows(const cav_transcription *tr, cav_scratch *s, const cav_term *term, int t, rows out) {
   double *by[3], *to[3] = {out.dq, out.dv, out.dn};
@@ -372,7 +380,8 @@ static cav_status term_rows(const cav_transcription *tr, cav_scratch *s, const c
     memset(out.dv, 0, (size_t)(cav_term_dim(term) * tr->nv) * sizeof(double));
     return cav_recorded_derivatives(tr, s, term, t, out.dq, out.dn);
   }
-  return term->quantity == CAV_QUANTITY_USER ? user_rows(tr, s, term, t, out) : sensor_rows(tr, s, term, t, out);
+  if (term->quantity == CAV_QUANTITY_USER) return user_rows(tr, s, term, t, out);
+  return term->sensor.type == CAV_SENSOR_TOUCH ? touch_rows(tr, s, term, out) : sensor_rows(tr, s, term, t, out);
 }
 
 /// Readings of one term alone, for differences.

@@ -20,6 +20,25 @@ static double size_of(const cav_contact_force *f) {
   return sqrt(f->force[0] * f->force[0] + f->force[1] * f->force[1] + f->force[2] * f->force[2]);
 }
 
+static const char *or_else(const char *name, const char *otherwise) { return name && *name ? name : otherwise; }
+
+/// Name of a geom, of its body where it has none.
+static const char *name_of(const cav_model *m, int geom, const char *otherwise) {
+  return or_else(m->geom[geom].name,
+                 or_else(m->geom[geom].body > 0 ? m->body[m->geom[geom].body].name : NULL, otherwise));
+}
+
+/// Whether a term asks for a force on a geom.
+static int is_to_bear(const cav_problem *problem, int geom) {
+  for (int i = 0; i < problem->nterm; i++) {
+    const cav_term *term = &problem->term[i];
+    if (term->quantity == CAV_QUANTITY_SENSOR && term->sensor.type == CAV_SENSOR_TOUCH &&
+        cav_touch_sees(problem->model, &term->sensor, geom))
+      return 1;
+  }
+  return 0;
+}
+
 /// The solid of the world that pushes there: no ground; -1: none.
 static int solid_of(const cav_model *m, const cav_contact_force *f, int *part) {
   for (int k = 0; k < 2; k++) {
@@ -101,7 +120,7 @@ static void tell_toes(FILE *out, const cav_problem *problem, const cav_trajector
         out,
         "  note: '%s' is met on the ground: at %.3g s it bears %.3g N of that body; off the ground is higher than it "
         "reaches on its toes, or a height of the centre of mass that nothing reaches on the ground\n",
-        term->name && *term->name ? term->name : "a height", term->from, borne);
+        or_else(term->name, "a height"), term->from, borne);
   }
   cav_state_free(state);
 }
@@ -123,12 +142,13 @@ static void tell_self(FILE *out, const cav_model *m, const cav_forces *forces, c
     most = f, size = size_of(f);
   }
   if (!most) return;
-  const char *a = m->body[m->geom[most->geom1].body].name, *b = m->body[m->geom[most->geom2].body].name;
+  const char *a = or_else(m->body[m->geom[most->geom1].body].name, "a body"),
+             *b = or_else(m->body[m->geom[most->geom2].body].name, "a body");
   fprintf(out,
           "  note: it leans on itself: '%s' on '%s' with up to %.3g N, at %.3g s; <self_force weight=\"1\"/> makes "
           "that cost "
           "something\n",
-          a && *a ? a : "a body", b && *b ? b : "a body", size, most->knot * motion->timestep);
+          a, b, size, most->knot * motion->timestep);
 }
 
 // part of the weight from which on the ground is hit by what is asked to come there, and below which nothing bears on it
@@ -216,6 +236,26 @@ static double gap_of(const cav_model *m, cav_state *state, int link, const doubl
   return gap;
 }
 
+/// What has a link bear a tenth of the weight: a touch sensor of its body over the time of a term, if that has a name.
+static void tell_bearing(FILE *out, const cav_model *m, const cav_term *term, int link, double weight) {
+  const char *body = or_else(m->body[m->link[link].body].name, "");
+  const double force = fmax(1, round(0.1 * weight)), from = fmax(term->from, 0);
+  char window[80];
+  if (term->to < 0)
+    snprintf(window, sizeof window, "from=\"%.4g\"", from);
+  else if (term->to <= from)
+    snprintf(window, sizeof window, "at=\"%.4g\"", from);
+  else
+    snprintf(window, sizeof window, "from=\"%.4g\" to=\"%.4g\"", from, term->to);
+  if (!*body)
+    fputs("where it is to rest there a target lower by more than that, and a smaller within, press it down\n", out);
+  else
+    fprintf(out,
+            "<sensor type=\"touch\" body=\"%s\" target=\"%g\" within=\"%g\" scale=\"%g\" %s weight=\"30\"/> beside it "
+            "has it bear %g N\n",
+            body, force, ceil(0.25 * force), force, window, force);
+}
+
 /// Bodies that are asked down to the ground at a time, come near it and do not touch it.
 static void tell_hovering(FILE *out, const cav_problem *problem, const cav_trajectory *motion, const cav_forces *forces,
                           double weight) {
@@ -237,11 +277,9 @@ static void tell_hovering(FILE *out, const cav_problem *problem, const cav_traje
     const double before = gap_of(m, state, link, motion->q);
     if (bears || !(gap > off_ground && gap < meant && before > 2 * meant)) continue;
     n++;
-    fprintf(
-        out,
-        "  note: '%s' stays %.2g mm above the ground at %.3g s, which bears nothing of it; where it is to rest there a "
-        "target lower by more than that, and a smaller within, press it down\n",
-        term->name && *term->name ? term->name : "a place", 1e3 * gap, t * motion->timestep);
+    fprintf(out, "  note: '%s' stays %.2g mm above the ground at %.3g s, which bears nothing of it; ",
+            or_else(term->name, "a place"), 1e3 * gap, t * motion->timestep);
+    tell_bearing(out, m, term, link, weight);
   }
   cav_state_free(state);
 }
@@ -272,7 +310,7 @@ static void tell_ending(FILE *out, const cav_problem *problem, const cav_forces 
             "  note: nothing holds '%.60s' at the end: it is at rest for a moment, as at the top of a hop, and falls. "
             "A posture "
             "held over the last tenth of the time (from=), or a smaller within of the final velocity, makes it stand\n",
-            name && *name ? name : "a body");
+            or_else(name, "a body"));
   }
 }
 
@@ -293,10 +331,10 @@ void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_t
   }
   int n = 0;
   for (int g = 0; most && with && g < m->ngeom; g++) {
-    if (!most[g] || ends[g] || size_of(most[g]) < leaning * weight || n++ >= NAMED) continue;
-    const cav_body *body = &m->body[m->geom[with[g]].body];
+    if (!most[g] || ends[g] || size_of(most[g]) < leaning * weight) continue;
+    if (is_to_bear(problem, g) || is_to_bear(problem, with[g]) || n++ >= NAMED) continue;
     fprintf(out, "%s'%s' (%s, up to %.3g N at %.3g s)", n == 1 ? "  note: on its way it leans on " : ", ",
-            m->geom[g].name ? m->geom[g].name : "a solid of the world", body->name ? body->name : "a body",
+            name_of(m, g, "a solid of the world"), or_else(m->body[m->geom[with[g]].body].name, "a body"),
             size_of(most[g]), most[g]->knot * motion->timestep);
   }
   if (n > 0) fprintf(out, "; where it must not be touched: guide.md, Obstacles\n");

@@ -64,6 +64,8 @@ const char *cav_manual_target(cav_sensor_target target) {
       return "body";
     case CAV_TARGET_SITE:
       return "site";
+    case CAV_TARGET_SURFACE:
+      return "body, geom, site";
     case CAV_TARGET_SCALAR_JOINT:
       return "joint (hinge, slide)";
     case CAV_TARGET_BALL_JOINT:
