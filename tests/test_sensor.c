@@ -280,6 +280,48 @@ static void compare_models(void) {
 }
 #endif
 
+/// What presses on a body, on what is fixed to it and on a geom: the floor on a trunk, and a crate on an arm, but not the other
+/// arm, which is of its tree.
+static void test_touch(void) {
+  cav_model *m = scene_load(
+      "<mujoco><worldbody><geom type='plane' size='2 2 .1'/><body name='trunk' pos='0 0 .0995'><freejoint/>"
+      "<geom name='ball' type='sphere' size='.1'/><body name='arm' pos='0 .3 .2'><joint axis='1 0 0'/>"
+      "<geom name='upper' type='sphere' size='.05' mass='1'/><body name='hand' pos='.2 0 0'>"
+      "<geom name='palm' type='sphere' size='.05' mass='1'/></body></body>"
+      "<body name='other' pos='0 .3 .2985'><joint axis='1 0 0'/><geom type='sphere' size='.05' mass='1'/></body></body>"
+      "<body name='crate' pos='.2 .3 .3985'><freejoint/><geom type='sphere' size='.05' "
+      "mass='1'/></body></worldbody></mujoco>");
+  cav_state *state = m ? cav_state_new(m) : NULL;
+  if (!CHECK(state != NULL)) return;
+  double *zero = scene_vector(m->nv), *u = scene_vector(m->nv);
+  CHECK(cav_inverse(m, state, m->q0, zero, zero, u) == CAV_OK);
+  double floor = 0, crate = 0, arms = 0;
+  for (int i = 0; i < state->ncontact; i++) {
+    const cav_contact *c = &state->contact[i];
+    const int one = m->link[c->link1].root, two = m->link[c->link2].root;
+    *(c->link1 == 0 || c->link2 == 0 ? &floor : one == two ? &arms : &crate) += c->impulse[0] / m->timestep;
+  }
+  CHECK(floor > 0 && arms > 0 && crate > 0);
+  const struct {
+    const char *name;
+    cav_object_type type;
+    double force;
+  } felt[] = {{"trunk", CAV_OBJECT_BODY, floor}, {"arm", CAV_OBJECT_BODY, crate}, {"hand", CAV_OBJECT_BODY, crate},
+              {"palm", CAV_OBJECT_GEOM, crate},  {"upper", CAV_OBJECT_GEOM, 0},   {"other", CAV_OBJECT_BODY, 0},
+              {"crate", CAV_OBJECT_BODY, crate}, {"ball", CAV_OBJECT_GEOM, floor}};
+  for (size_t i = 0; i < sizeof felt / sizeof *felt; i++) {
+    double reading;
+    const int object = cav_object_find(m, felt[i].type, felt[i].name);
+    const cav_sensor s = {.type = CAV_SENSOR_TOUCH, .dim = 1, .object_type = felt[i].type, .object = object};
+    if (!CHECK(object >= 0)) continue;
+    cav_sensor_read(m, state, &s, &reading);
+    CHECK_NEAR(reading, felt[i].force, 1e-12 * (1 + felt[i].force));
+  }
+  free(zero), free(u);
+  cav_state_free(state);
+  cav_model_free(m);
+}
+
 int main(void) {
   cav_error error = {0};
   cav_model *m = cav_model_load(CAVORT_SOURCE_ROOT "/tests/sensors.xml", &error);
@@ -287,6 +329,7 @@ int main(void) {
     fprintf(stderr, "    %s\n", error.text);
     return check_result();
   }
+  test_touch();
   test_scale();
   test_balance();
   test_actuators(m);

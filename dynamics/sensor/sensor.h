@@ -15,7 +15,7 @@ void cav_point_acceleration(const cav_state *state, int link, const double point
 void cav_body_wrench(const cav_model *model, const cav_state *state, int body, const double point[3], double F[6]);
 
 /// Sum of the normal forces on what a touch sensor looks at, N: on the body of a site, where they lie in its zone or point out
-/// through it; on a body with what is fixed to it; on a geom. wrench.c.
+/// through it; on a body with what is fixed to it, or on a geom, by what is not of its tree. wrench.c.
 double cav_touch_force(const cav_model *model, const cav_state *state, const cav_sensor *sensor);
 
 /// The contacts whose forces these are, by number: the next one from first on, or ncontact. wrench.c.

@@ -121,6 +121,9 @@ int cav_touch_next(const cav_model *model, const cav_state *state, const cav_sen
     const cav_pair *pair = &model->pair[c->pair];
     const int felt1 = cav_touch_sees(model, sensor, pair->geom1), felt2 = cav_touch_sees(model, sensor, pair->geom2);
     if ((!felt1 && !felt2) || !(c->impulse[0] > 0)) { continue; }
+    // a knee that presses on the other leg bears nothing; what a site feels is MuJoCo's
+    const int within = c->link1 > 0 && c->link2 > 0 && model->link[c->link1].root == model->link[c->link2].root;
+    if (!zoned && within) { continue; }
     // within the zone, or the normal away from the body runs into it
     double out[3];
     scale3(out, felt2 ? -1 : 1, c->frame);

@@ -80,7 +80,7 @@ typedef enum cav_bias {
   X(SUBTREECOM, "subtreecom", 3, BODY, POSITION, "m, world")                                                               \
   X(SUBTREELINVEL, "subtreelinvel", 3, BODY, VELOCITY, "m/s, world")                                                       \
   X(SUBTREEANGMOM, "subtreeangmom", 3, BODY, VELOCITY, "kg m^2/s about the subtree's centre of mass, world")                \
-  X(TOUCH, "touch", 1, SURFACE, ACCELERATION, "N, sum of normal forces on a body with what is fixed to it, or on a geom; of a site, in models too, on its body within the site or pointing out through it") \
+  X(TOUCH, "touch", 1, SURFACE, ACCELERATION, "N, sum of normal forces on a body with what is fixed to it, or on a geom, by what is not of its tree; of a site, in models too, of all on its body within the site or pointing out through it") \
   X(ACCELEROMETER, "accelerometer", 3, SITE, ACCELERATION, "m/s^2, of the site, site axes, gravity included: 9.81 upwards at rest") \
   X(VELOCIMETER, "velocimeter", 3, SITE, VELOCITY, "m/s, site axes")                                                       \
   X(GYRO, "gyro", 3, SITE, VELOCITY, "rad/s, site axes")                                                                   \

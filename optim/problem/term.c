@@ -416,6 +416,8 @@ static cav_status sensor_target(const cav_problem_reader *reader, const cav_xml_
                         given->count);
   }
   cav_xml_reals(node, "target", target + (one ? term->component : 0), wanted);
+  if (term->sensor.type == CAV_SENSOR_TOUCH && *target < 0)
+    return cav_xml_fail(reader->error, node, "target", "a touch is never negative, got %g", *target);
   if (!rotation && (!is_direction(term) || cav_xml_word(node, "relative", 0))) return CAV_OK;
   if (normalise(reader->model, term, target)) return CAV_OK;
   return cav_xml_fail(reader->error, node, "target", "expected a %s that is not zero",

@@ -130,8 +130,9 @@ static const double self_leaning = 0.25;
 
 /// Two links of one tree that lean on each other hardest, where that is no resting posture's: arms folded at the start are
 /// asked for.
-static void tell_self(FILE *out, const cav_model *m, const cav_forces *forces, const cav_trajectory *motion,
+static void tell_self(FILE *out, const cav_problem *problem, const cav_forces *forces, const cav_trajectory *motion,
                       double weight) {
+  const cav_model *m = problem->model;
   const cav_contact_force *most = NULL;
   double size = self_leaning * weight;
   for (int i = 0; i < forces->nforce; i++) {
@@ -144,11 +145,14 @@ static void tell_self(FILE *out, const cav_model *m, const cav_forces *forces, c
   if (!most) return;
   const char *a = or_else(m->body[m->geom[most->geom1].body].name, "a body"),
              *b = or_else(m->body[m->geom[most->geom2].body].name, "a body");
-  fprintf(out,
-          "  note: it leans on itself: '%s' on '%s' with up to %.3g N, at %.3g s; <self_force weight=\"1\"/> makes "
-          "that cost "
-          "something\n",
-          a, b, size, most->knot * motion->timestep);
+  double costs = 0;
+  for (int i = 0; i < problem->nterm; i++)
+    if (problem->term[i].quantity == CAV_QUANTITY_SELF_FORCE) costs = fmax(costs, problem->term[i].weight);
+  fprintf(
+      out,
+      "  note: it leans on itself: '%s' on '%s' with up to %.3g N, at %.3g s; <self_force weight=\"%g\"/> makes that "
+      "cost %s\n",
+      a, b, size, most->knot * motion->timestep, costs > 0 ? 10 * costs : 1, costs > 0 ? "more" : "something");
 }
 
 // part of the weight from which on the ground is hit by what is asked to come there, and below which nothing bears on it
@@ -206,12 +210,15 @@ static void tell_ground(FILE *out, const cav_problem *problem, const cav_traject
     for (int k = 0; k < m->ngeom; k++)
       whole |= stands[k] && m->geom[k].body == m->geom[g].body && m->geom[k].type == m->geom[g].type;
     const double least = is_asked(problem, m->geom[g].link) ? hit : leaning;
+    // of a body's geoms without names the one that bears most stands for all
+    for (int k = 0; k < m->ngeom && !*or_else(m->geom[g].name, ""); k++)
+      whole |= k != g && most[k] && m->geom[k].body == m->geom[g].body && !*or_else(m->geom[k].name, "") &&
+               (size_of(most[k]) > size_of(most[g]) || (size_of(most[k]) == size_of(most[g]) && k < g));
     if (whole || size_of(most[g]) < least * weight || n++ >= NAMED) continue;
-    const char *body = m->body[m->geom[g].body].name, *name = m->geom[g].name;
+    const char *body = or_else(m->body[m->geom[g].body].name, "a body"), *name = m->geom[g].name;
     const int named = name && *name && strcmp(name, body);
     fprintf(out, "%s'%.60s'%s%.60s (up to %.3g N at %.3g s)", n == 1 ? "  note: on its way the ground bears " : ", ",
-            *body ? body : "a body", named ? ", geom " : "", named ? name : "", size_of(most[g]),
-            most[g]->knot * motion->timestep);
+            body, named ? ", geom " : "", named ? name : "", size_of(most[g]), most[g]->knot * motion->timestep);
   }
   if (n > 0) fprintf(out, "; the weight is %.3g N\n", weight);
   free(most);
@@ -338,7 +345,7 @@ void cav_command_tell_leaning(FILE *out, const cav_problem *problem, const cav_t
             size_of(most[g]), most[g]->knot * motion->timestep);
   }
   if (n > 0) fprintf(out, "; where it must not be touched: guide.md, Obstacles\n");
-  if (forces) tell_ending(out, problem, forces), tell_self(out, m, forces, motion, weight);
+  if (forces) tell_ending(out, problem, forces), tell_self(out, problem, forces, motion, weight);
   if (forces && problem->guess_height > 0 && !is_in_the_air(m, forces, weight))
     fprintf(
         out,
