@@ -198,12 +198,13 @@ static void compare_columns(const readings *r, const double *ours, int which) {
     for (int i = 0; i < n; i++) column[i] = ours[i * nv + j];
     compare(column, fine, coarse, nv, 1 / state->options.timestep * scale, which);
     int at = nv, gone = 0;
-    // a sum of forces is as good as the largest that it is made of, and as rounding of the whole
+    // each force in a sum may be off by what one is let, and the sum by rounding of the whole
     double summed = scale;
     for (int i = 0; i < r->ncontact; i++, at += 13) {
+      double largest = 1e-6 * state->contact[i].impulse[0];
       gone |= !isfinite(fine[at] - coarse[at]);
-      summed = fmax(summed, 1e-6 * state->contact[i].impulse[0]);
-      for (int k = 7; k < 13; k++) summed = fmax(summed, fabs(fine[at + k]));
+      for (int k = 7; k < 13; k++) largest = fmax(largest, fabs(fine[at + k]));
+      summed += largest;
       compare(column + at, fine + at, coarse + at, 7, 1, which);
       compare(column + at + 7, fine + at + 7, coarse + at + 7, 6, scale, which);
     }
