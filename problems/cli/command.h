@@ -181,8 +181,10 @@ int cav_command_tell_equalities(FILE *out, const cav_problem *problem);
 /// number. postures.c.
 int cav_command_tell_postures(FILE *out, const cav_problem *problem);
 
-/// Whether gravity and contacts alone act on a tree of links that floats, none of it lifted by buoyancy, and an actuator moves
-/// its root, so that a motion of it is meant. postures.c.
+/// Whether gravity and contacts alone act on a tree of links that floats, none of it lifted by buoyancy. postures.c.
+int cav_command_floats(const cav_model *model, int root);
+
+/// The same, where an actuator moves its root, too, so that a motion of it is meant. postures.c.
 int cav_command_is_loose(const cav_model *model, int root);
 
 /// Says of terms that ask for one component in a body's principal axes that these are turned from its own; their

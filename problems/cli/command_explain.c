@@ -102,13 +102,18 @@ static char *told_of_repair(const char *folder) {
   return told;
 }
 
-typedef enum trial { NOT_TRIED, TRIED, STOPPED } trial;
+typedef enum trial { NOT_TRIED, TRIED, STOPPED, WITH_OTHERS } trial;
 
 // whether a line's changes, in whose place of " stands ', begin with these; what follows, NULL: they do not
 static const char *after(const char *line, const char *changes) {
   for (; *changes; changes++, line++)
     if (*line != (*changes == '"' ? '\'' : *changes)) return NULL;
   return line;
+}
+
+static int is_among(const char *line, const char *changes) {
+  while (*line && !after(line, changes)) line++;
+  return *line != 0;
 }
 
 // whether a strategy of the folder's solve made these changes of the folder's problem, or was stopped while it did
@@ -127,6 +132,11 @@ static trial was_tried(const char *folder, const char *changes) {
     if (kept && *kept && !strncmp(rest, ", ", 2) && after(rest + 2, kept)) rest = after(rest + 2, kept);
     if (!*rest || !strcmp(rest, ", solids='grow'")) what = strcmp(t.outcome, "stopped") ? TRIED : STOPPED;
   }
+  cav_tried_close(&t);
+  t = cav_tried_open(folder);
+  while (what == NOT_TRIED && cav_tried_next(&t))
+    if (is_among(t.changed, changes) && !strncmp(t.outcome, "not ", 4) && strcmp(t.outcome, "not tried"))
+      what = WITH_OTHERS;
   cav_tried_close(&t);
   free(kept);
   return what;
@@ -158,7 +168,10 @@ static void tell_remedy(const cav_result *result, const cav_verdict *verdict, co
   }
   if (found)
     snprintf(text + said, size - (size_t)said, "A usual remedy that %s: %s.",
-             tried == STOPPED ? "was being tried when the solve was stopped" : "was not tried", repaired.changed);
+             tried == STOPPED       ? "was being tried when the solve was stopped"
+             : tried == WITH_OTHERS ? "was tried with others alone (strategies.csv)"
+                                    : "was not tried",
+             repaired.changed);
   else
     snprintf(text + said, size - (size_t)said,
              "The usual remedies were tried (strategies.csv): more time, or another way by postures (<waypoint> in "

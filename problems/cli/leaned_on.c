@@ -291,33 +291,43 @@ static void tell_hovering(FILE *out, const cav_problem *problem, const cav_traje
   cav_state_free(state);
 }
 
-/// A tree that floats, that actuators move and that nothing holds at the end, where all is to be at rest: at the top of a
-/// hop it is, for a moment.
+// part of the weight that may be left to brake at an end at rest and is not told of
+static const double braking = 0.1;
+
+/// A tree that floats and that nothing holds at the end, where all is to be at rest: at the top of a hop it is, for a moment;
+/// or that forces brake there, which a tolerance of the velocity lets them do.
 static void tell_ending(FILE *out, const cav_problem *problem, const cav_forces *forces) {
   const cav_model *m = problem->model;
   if (!problem->close_at_rest || problem->cycle.on || m->nequality || m->density > 0 || m->viscosity > 0 ||
       !(m->gravity[2] < 0))
     return;
   for (int root = 1; root < m->nlink; root++) {
-    const cav_link *link = &m->link[root];
-    if (!cav_command_is_loose(m, root)) continue;
-    double borne = 0, mass = 0;
+    if (!cav_command_floats(m, root)) continue;
+    double borne[3] = {0}, mass = 0;
     for (int l = root; l < m->nlink; l++)
       if (m->link[l].root == root) mass += m->link[l].mass;
     for (int i = 0; i < forces->nforce; i++) {
       const cav_contact_force *f = &forces->force[i];
       const int one = m->link[m->geom[f->geom1].link].root, other = m->link[m->geom[f->geom2].link].root;
       if (f->knot != forces->nknot - 1 || one == other) continue;
-      borne += (other == root) * f->force[2] -
-               (one == root) * f->force[2]; // upwards: what is held between hands holds nothing
+      // what is held between hands holds nothing
+      for (int k = 0; k < 3; k++) borne[k] += ((other == root) - (one == root)) * f->force[k];
     }
-    if (borne > leaning * mass * -m->gravity[2]) continue;
-    const char *name = m->body[link->body].name;
-    fprintf(out,
-            "  note: nothing holds '%.60s' at the end: it is at rest for a moment, as at the top of a hop, and falls. "
-            "A posture "
-            "held over the last tenth of the time (from=), or a smaller within of the final velocity, makes it stand\n",
-            or_else(name, "a body"));
+    const double weight = mass * -m->gravity[2], left = hypot(hypot(borne[0], borne[1]), borne[2] - weight);
+    const char *name = or_else(m->body[m->link[root].body].name, "a body");
+    if (borne[2] <= leaning * weight)
+      fprintf(
+          out,
+          "  note: nothing holds '%.60s' at the end: it is at rest for a moment, as at the top of a hop, and falls. "
+          "A posture held over the last tenth of the time (from=), or a smaller within of the final velocity, makes "
+          "it stand\n",
+          name);
+    else if (left > braking * weight)
+      fprintf(
+          out,
+          "  note: '%.60s' is no more than braked at the end, by %.3g N of its %.3g N: a posture held over the last "
+          "tenth of the time (from=), or a smaller within of the final velocity, has it stand\n",
+          name, left, weight);
   }
 }
 

@@ -179,6 +179,11 @@ static const char *hand_of(const cav_model *m) {
 /// What a step may still save, of the cost, from which on a motion is at no optimum.
 static const double far_off = 0.01;
 
+/// Whether a number is on the other side of what is wanted than the start has it.
+static int goes_beyond(const cav_term_report *got, const cav_term_report *start) {
+  return !strcmp(got->what, start->what) && (got->got - got->wanted) * (start->got - start->wanted) < 0;
+}
+
 static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_term_report *got,
                  const cav_term_report *held, int i, const cav_explanation *e, double saving, const char *folder,
                  char *text, size_t size) {
@@ -230,6 +235,12 @@ static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_t
              "against other "
              "costs: %s.",
              name, way, gap, unit, got[i].off, gap, unit, got[i].time, e->nconflict ? "; what holds it: " : "",
+             e->nconflict ? e->conflict[0].what : "", weight);
+  } else if (goes_beyond(&got[i], &held[i])) {
+    snprintf(text, size,
+             "'%.60s' is %.3g%s%s from where the start has it, and the motion goes %.3g%s%s too far by %.3g s%s%.160s. "
+             "It is traded against other costs: %s.",
+             name, way, gap, unit, got[i].off, gap, unit, got[i].time, e->nconflict ? "; what holds it there: " : "",
              e->nconflict ? e->conflict[0].what : "", weight);
   } else if (done < still * way) {
     suggest(p, hint, sizeof hint);

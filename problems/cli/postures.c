@@ -116,13 +116,15 @@ static int tell_disagreement(FILE *out, const cav_problem *p) {
   return n;
 }
 
-int cav_command_is_loose(const cav_model *m, int root) {
+int cav_command_floats(const cav_model *m, int root) {
   const cav_link *link = &m->link[root];
-  if (link->parent != 0 || !link->driven || !link->njoint || m->joint[link->joint].type != CAV_JOINT_FREE) return 0;
+  if (link->parent != 0 || !link->njoint || m->joint[link->joint].type != CAV_JOINT_FREE) return 0;
   for (int b = 1; b < m->nbody; b++)
     if (m->link[m->body[b].link].root == root && m->body[b].buoyancy != 0) return 0;
   return 1;
 }
+
+int cav_command_is_loose(const cav_model *m, int root) { return m->link[root].driven && cav_command_floats(m, root); }
 
 /// Whether a contact is near and with something else than the tree's own links.
 static int bears(const cav_model *m, const cav_contact *c, int root) {
