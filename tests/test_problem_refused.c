@@ -175,7 +175,8 @@ static void check_broken_terms(void) {
   refuse_cost("<sensor weight='1' type='gyro' body='trunk'/>", "looks at a site");
   refuse_cost("<sensor weight='1' type='touch' joint='knee'/>", "a touch looks at a body, geom or site");
   refuse_cost("<sensor weight='1' type='touch' body='trunk' target='-5'/>", "a touch is never negative");
-  refuse_cost("<sensor weight='1' type='touch'/>", "attribute 'body': is missing; a touch needs one of: body, geom or site");
+  refuse_cost("<sensor weight='1' type='touch'/>",
+              "attribute 'body': is missing; a touch needs one of: body, geom or site");
   refuse_cost("<sensor weight='1' type='clock'/>", "nothing of the motion");
   refuse_cost("<sensor weight='1' name='time'/>", "nothing of the motion");
   refuse_cost("<sensor weight='1' type='ballquat' joint='knee'/>", "needs a ball joint");
