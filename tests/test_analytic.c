@@ -234,6 +234,7 @@ static int one_state(readings *r, int k, double lift) {
   o->spring = (cav_spring)(k / 3 % 2);
   o->gravity = k % 5 > 0;
   o->passive = k % 7 > 0;
+  o->stops = k % 5 == 2;
   other->options = *o;
   scene_posture(model, q, scratch, k & 8 ? 0.3 : 0.1);
   if (model->njoint && model->joint[0].type == CAV_JOINT_FREE) q[2] += lift;

@@ -480,8 +480,8 @@ run 0 verify hop.result --quiet
 run 1 solve hop.xml --threads 1 --strategies 1 -o rough
 run 1 explain rough
 says out 'cause: how it is planned, not what is asked: forces, limits and constraints hold. A usual remedy that was not tried: <force weight="1"/>.'
-# a centre of mass 2.5 m higher after half a second: what holds at the knots alone is not told to be possible
-sed '/name="foot"/d; s/target=".3" at/target="2.5" within="2" at/; s/<posture dofs/<clearance weight="0"\/><posture within="2" dofs/' hop.xml >high.xml
+# a centre of mass 2.2 m higher after half a second: what holds at the knots alone is not told to be possible
+sed '/name="foot"/d; s/target=".3" at/target="2.2" within="2" at/; s/<posture dofs/<clearance weight="0"\/><posture within="2" dofs/' hop.xml >high.xml
 run 1 solve high.xml --strategies 1 --threads 1 --quiet -o high
 run 1 explain high
 says out 'cause: forces, limits and constraints hold at the knots, but between them momentum comes from nowhere, '
@@ -787,7 +787,7 @@ kill -INT "$child"
 wait "$child"
 status=$?
 says err "stopped while other strategies were tried"
-check "kept is what another process has" grep -q "^kept: strategy [^s]" err
+check "kept is what another process has" sh -c 'grep "^kept: strategy " err | grep -qv "strategy stated"'
 check "interrupted among strategies: status $status, expected 130" [ "$status" -eq 130 ]
 
 run 0 solve problem.xml -o swing.result --resume --quiet

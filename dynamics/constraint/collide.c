@@ -320,8 +320,8 @@ static double reach(const cav_model *model, const cav_state *state, int p, doubl
   // under Coulomb's law the normal row is alone, and where it bears nothing neither does friction
   for (int k = 0; k + 1 < pair->dim && state->options.sliding == CAV_SLIDING_CONVEX; k++)
     *(k < 2 ? &mu : &roll) = fmax(k < 2 ? mu : roll, pair->friction[k]);
-  double kept = fabs(1 - w->discrete_damping), most = (1 + mu) * (kept * now + next + SLACK);
-  most += roll * (kept * turn[0] + turn[1]);
+  double kept = fabs(1 - w->discrete_damping), rubs = fabs(1 - w->discrete_damping - cav_friction_stops(state));
+  double most = kept * now + next + SLACK + mu * (rubs * now + next + SLACK) + roll * (rubs * turn[0] + turn[1]);
   double delta =
       state->options.smoothing > 0 ? c->external ? state->options.smoothing : state->options.smoothing_self : 0;
   double far = c->margin + fmax(most / stiff, (most + kept_gap * margin) / fmax(stiff, 1 / h)) + CAV_LAW_END * delta;

@@ -74,6 +74,10 @@ typedef struct cav_law {
 } cav_law;
 cav_law cav_law_at(const cav_state *state, const cav_softness *softness, double x, double weight);
 
+/// What rows of friction add to h B: 1 in the step after which nothing moves, where they feel the velocity before it as they
+/// do that after any other step: what friction holds creeps, and would be let go by a step that ends that.
+static inline double cav_friction_stops(const cav_state *state) { return state->options.stops ? 1 : 0; }
+
 /// Fills state->equality constraint at the state's positions: errors, what their rates depend on, laws. equality.c.
 void cav_equality_evaluate(const cav_model *model, cav_state *state);
 

@@ -91,7 +91,7 @@ static cav_status add_row(cav_state *state, cav_row row, const cav_softness *sof
   int friction = row.type == CAV_ROW_FRICTION_DOF || row.type == CAV_ROW_FRICTION_TENDON;
   cav_law l = row_law(state, softness, friction ? 0 : row.dist - row.margin, weight);
   row.regulariser = l.regulariser;
-  row.damping = l.damping;
+  row.damping = l.damping + (friction ? cav_friction_stops(state) : 0);
   row.stiffness = friction ? 0 : l.stiffness;
   row.sigma = smoothing_scale(&l, self_smoothing(state));
   cav_row *slot = cav_row_push(state);
@@ -284,7 +284,7 @@ double cav_contact_stiffness_ratio(const cav_state *state, const cav_contact *c,
   return fraction;
 }
 
-// R of the friction rows so that R_j mu_j^2 is the same for all (22); all rows share the damping
+// R of the friction rows so that R_j mu_j^2 is the same for all (22); these share the damping
 static void soften_contact(const cav_state *state, cav_contact *c, const law_terms *terms, double inverse_impratio) {
   const cav_pair *pair = &state->model->pair[c->pair];
   double rate, weight = contact_weight(state, pair) / cav_contact_stiffness_ratio(state, c, &rate);
@@ -295,12 +295,13 @@ static void soften_contact(const cav_state *state, cav_contact *c, const law_ter
   c->regulariser[0] = l.regulariser;
   c->damping[0] = l.damping;
   const double tangential = larger(R_MIN, l.regulariser * inverse_impratio);
+  const double damping = l.damping + cav_friction_stops(state);
   for (int k = 1; k < c->dim; k++) {
     double *mu = &c->friction[k - 1];
     *mu = larger(*mu, FRICTION_MIN);
     double ratio = *mu == c->friction[0] ? 1 : c->friction[0] / *mu;
     c->regulariser[k] = tangential * ratio * ratio;
-    c->damping[k] = l.damping;
+    c->damping[k] = damping;
   }
 }
 

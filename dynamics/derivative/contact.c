@@ -598,6 +598,20 @@ static void curve(const cav_contact *c, const double *H, cav_contact_jacobian *d
   }
 }
 
+// the same by the velocity before the step, whatever part of it each row takes
+static void curve_before(const cav_contact *c, const double *H, cav_contact_jacobian *derivative) {
+  memset(derivative->by_before, 0, sizeof derivative->by_before);
+  for (int i = 0; i < c->dim; i++) {
+    for (int j = 0; j < c->dim; j++) {
+      const double h = (1 - c->damping[j]) * H[i * c->dim + j], *x = c->frame + 3 * (i % 3),
+                   *y = c->frame + 3 * (j % 3);
+      const int row = i < 3 ? 3 : 0, column = j < 3 ? 3 : 0;
+      for (int r = 0; r < 3; r++)
+        for (int s = 0; s < 3; s++) derivative->by_before[row + r][column + s] += h * x[r] * y[s];
+    }
+  }
+}
+
 void cav_contact_differentiate(const cav_model *model, const cav_state *state, const cav_contact *c, int whole,
                                cav_pair_manifolds *manifolds, cav_contact_jacobian *derivative) {
   law_derivative law;
@@ -617,4 +631,5 @@ void cav_contact_differentiate(const cav_model *model, const cav_state *state, c
   }
 
   curve(c, H, derivative);
+  if (state->options.stops) curve_before(c, H, derivative);
 }

@@ -57,12 +57,17 @@ CAV_VECTOR_BODY void contact_at_link_body(const cav_derivative_task *t, const ca
     for (int r = 0; r < 6; r++) own[6 * r + k] = sign * (derivative->wrench[side][k][r] - carried[r]);
   }
   touch_link(t->s, link);
-  double motion[36], velocity[36], keep = 1 - c->damping[0], *to = t->s->by_motion + CAV_TWIST_BLOCK * link;
+  double motion[36], velocity[36], before[36], keep = 1 - c->damping[0], *to = t->s->by_motion + CAV_TWIST_BLOCK * link;
   double *now = t->s->by_now + CAV_TWIST_BLOCK * link, *next = t->s->by_next + CAV_TWIST_BLOCK * link;
   shift(motion, own, d);
   shift(velocity, &derivative->by_velocity[0][0], d);
   for (int i = 0; i < 36; i++) to[i] += motion[i];
-  for (int i = 0; i < 36; i++) now[i] += keep * velocity[i];
+  if (t->state->options.stops) {
+    shift(before, &derivative->by_before[0][0], d);
+    for (int i = 0; i < 36; i++) now[i] += before[i];
+  } else {
+    for (int i = 0; i < 36; i++) now[i] += keep * velocity[i];
+  }
   for (int i = 0; i < 36; i++) next[i] += velocity[i];
 }
 CAV_BY_VECTORS(contact_at_link,
@@ -133,11 +138,12 @@ static inline __attribute__((always_inline)) void motion_of_four(const double *p
 
 // adds four columns of a row of the results, of the dofs of a path from the k-th on, as far as there are any
 static inline __attribute__((always_inline)) void add_columns(const cav_derivative_task *t, int row, int k, int end,
-                                                              const cav_four *q, const cav_four *push, double keep) {
+                                                              const cav_four *q, const cav_four *push,
+                                                              const cav_four *before) {
   for (int i = 0; i < 4 && k + i < end; i++) {
     int at = row * t->nv + t->s->path.dof[k + i];
     t->dq[at] += (*q)[i];
-    t->dv[at] += keep * (*push)[i];
+    t->dv[at] += (*before)[i];
     t->dn[at] -= (*push)[i];
   }
 }
@@ -147,24 +153,30 @@ CAV_VECTOR_BODY void between_columns_body(const cav_derivative_task *t, const ca
                                           const cav_contact_jacobian *derivative, const between *b, int side, int first,
                                           int end, const double d[3]) {
   const double *K = &derivative->by_velocity[0][0], *M = &derivative->wrench[side][0][0], *path = t->s->path.at;
-  const double keep = 1 - c->damping[0], sign = side ? 1 : -1, on = sign * t->inverse_h, *w = b->whole, *S;
+  const double *L = &derivative->by_before[0][0];
+  const int stops = t->state->options.stops;
+  const double keep = stops ? 0 : 1 - c->damping[0], sign = side ? 1 : -1, on = sign * t->inverse_h, *w = b->whole, *S;
   const size_t n = (size_t)t->s->path.stride;
   for (int k = first; k < end; k += 4) {
-    cav_four axis[6], now[6], next[6], dq[6], carried[6], own[6];
+    cav_four axis[6], now[6], next[6], last[6], held[6], dq[6], carried[6], own[6];
     motion_of_four(path + CAV_OF_AXIS * n, n, k, d, axis);
     motion_of_four(path + CAV_OF_NOW * n, n, k, d, now);
     motion_of_four(path + CAV_OF_NEXT * n, n, k, d, next);
-    for (int i = 0; i < 6; i++) now[i] = sign * (keep * now[i] - next[i]);
+    for (int i = 0; i < 6; i++) last[i] = now[i], now[i] = sign * (keep * now[i] - next[i]);
     for (int i = 0; i < 6; i++) {
       dq[i] = axis[0] * M[i];
       for (int j = 1; j < 6; j++) dq[i] = dq[i] + axis[j] * M[6 * j + i];
       dq[i] = dq[i] + DOT6(K + 6 * i, now);
       next[i] = sign * DOT6(K + 6 * i, axis);
     }
+    for (int i = 0; i < 6 && stops; i++) {
+      dq[i] = dq[i] + sign * DOT6(L + 6 * i, last);
+      held[i] = sign * DOT6(L + 6 * i, axis);
+    }
     S = b->axes[!side];
     for (int row = last_dof(t->model, b->link[!side]); row != b->common; row = t->model->dof[row].parent, S += 6) {
-      cav_four q = on * DOT6(S, dq), push = DOT6(S, next) * on;
-      add_columns(t, row, k, end, &q, &push, keep);
+      cav_four q = on * DOT6(S, dq), push = DOT6(S, next) * on, before = stops ? DOT6(S, held) * on : keep * push;
+      add_columns(t, row, k, end, &q, &push, &before);
     }
     if (b->common < 0) continue;
     // rows of the same link: there smooth.c carries the wrench along with it; the dofs that move both links feel nothing
@@ -177,7 +189,8 @@ CAV_VECTOR_BODY void between_columns_body(const cav_derivative_task *t, const ca
     S = b->axes[side];
     for (int row = last_dof(t->model, b->link[side]); row != b->common; row = t->model->dof[row].parent, S += 6) {
       cav_four q = -(on * DOT6(S, own)), push = -(DOT6(S, next) * on);
-      add_columns(t, row, k, end, &q, &push, keep);
+      cav_four before = stops ? -(DOT6(S, held) * on) : keep * push;
+      add_columns(t, row, k, end, &q, &push, &before);
     }
     S = b->shared;
     for (int row = b->common; row >= 0; row = t->model->dof[row].parent, S += 6) {
@@ -240,7 +253,10 @@ CAV_VECTOR_BODY void fill_path(const cav_derivative_task *t, const cav_contact *
                                const cav_contact_jacobian *derivative, int side, int impulses, int count,
                                const double d[3], double *to) {
   const size_t n = (size_t)t->s->path.stride;
-  const double *path = t->s->path.at, sign = side ? 1 : -1, keep = 1 - c->damping[0];
+  const double *path = t->s->path.at, sign = side ? 1 : -1;
+  // of the velocity before the step all rows take one part, but in a step after which nothing moves
+  const int stops = t->state->options.stops;
+  const double keep = stops ? 1 : 1 - c->damping[0];
   for (int k = 0; k < count; k += 4, to += 4) {
     cav_four axis[6], drift[6], x[6], now[6], next[6];
     motion_along(c, dim, path + CAV_OF_NOW * n, n, k, d, sign, drift, now);
@@ -254,14 +270,20 @@ CAV_VECTOR_BODY void fill_path(const cav_derivative_task *t, const cav_contact *
     }
     for (int i = 0; i < impulses; i++) {
       const double *H = derivative->hessian[i], *f = derivative->impulse[side][i];
-      cav_four by_now = H[0] * now[0], by_next = H[0] * next[0], by_axis = H[0] * x[0];
+      cav_four by_now = H[0] * now[0], by_next = H[0] * next[0], by_axis = H[0] * x[0], before;
       for (int j = 1; j < dim; j++) {
         by_now += H[j] * now[j];
         by_next += H[j] * next[j];
         by_axis += H[j] * x[j];
       }
+      before = by_axis;
+      if (stops) by_now = before = (cav_four){0};
+      for (int j = 0; j < dim && stops; j++) {
+        by_now += (1 - c->damping[j]) * H[j] * now[j];
+        before += (1 - c->damping[j]) * H[j] * x[j];
+      }
       *(cav_four *)(to + (OF_IMPULSE + i) * n) = DOT6(f, axis) + (keep * by_now - by_next);
-      *(cav_four *)(to + (OF_IMPULSE_NOW + i) * n) = keep * by_axis;
+      *(cav_four *)(to + (OF_IMPULSE_NOW + i) * n) = keep * before;
       *(cav_four *)(to + (OF_IMPULSE_NEXT + i) * n) = -by_axis;
     }
   }

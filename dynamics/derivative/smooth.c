@@ -141,12 +141,12 @@ CAV_VECTOR_BODY void add_push(deep *d, const double *M, const double x[6], doubl
   axpy6(d->push, d->push, scale, part);
 }
 
-// rows of the contacts: the convex law's matrices are symmetric
+// rows of the contacts: the convex law's matrices are symmetric, unless rows take the velocity before the step unlike each other
 CAV_VECTOR_BODY void fill_rows(const cav_derivative_task *t, deep *d, const double *now, const double *next,
                                const double *S, double scale) {
   copy6(d->row_now, d->now);
   copy6(d->row_next, d->next);
-  if (t->state->options.sliding == CAV_SLIDING_CONVEX) return;
+  if (t->state->options.sliding == CAV_SLIDING_CONVEX && !t->state->options.stops) return;
   multiply6_transposed(d->row_now, now, S);
   multiply6_transposed(d->row_next, next, S);
   scale6(d->row_now, scale, d->row_now);

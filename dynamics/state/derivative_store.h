@@ -17,6 +17,7 @@ typedef struct cav_contact_jacobian {
   double hessian[6][6];     ///< -df/dv_next
   double way[2][2][6];      ///< [row][twist] of h times what tangential rows see, links held after the step (next_slip)
   double by_velocity[6][6]; ///< frame' hessian frame, 6 x 6 in world axes about the position
+  double by_before[6][6]; ///< the same of the velocity before the step, where rows take that unlike each other (stops)
 } cav_contact_jacobian;
 
 /// Components of a dof on a path: those of its axis, then of the vectors of the store in their order.

@@ -206,19 +206,22 @@ void cav_coupled_targets(cav_state *state) {
   const int n = cav_jacobian_rows(state);
   if (n == 0) return;
   double *rate = w->target + n, *out = w->target;
+  const double stops = cav_friction_stops(state);
   int i = 0;
   // h B x' + h K x by the diagonal law, x' into out
   for (int c = 0; c < state->ncontact; c++) {
     const cav_contact *contact = &state->contact[c];
     for (int k = 0; k < contact->dim; k++, i++) {
-      out[i] = contact->velocity[k];
-      rate[i] = contact->damping[k] * out[i] + (k ? 0 : contact->stiffness * (contact->dist - contact->margin));
+      const double v = contact->velocity[k], more = k ? stops : 0;
+      out[i] = (1 - more) * v;
+      rate[i] = (contact->damping[k] - more) * v + (k ? 0 : contact->stiffness * (contact->dist - contact->margin));
     }
   }
   for (int k = 0; k < state->nrow; k++, i++) {
     const cav_row *row = &state->row[k];
-    out[i] = row->velocity;
-    rate[i] = row->damping * out[i] + row->stiffness * (row->dist - row->margin);
+    const double more = row->bound > 0 ? stops : 0;
+    out[i] = (1 - more) * row->velocity;
+    rate[i] = (row->damping - more) * row->velocity + row->stiffness * (row->dist - row->margin);
   }
   for (int t = 0; t < state->nequality; t++) {
     const cav_equality_rows *eq = &state->equality[t];

@@ -367,7 +367,7 @@ static int is_plain(const cav_model *model, const cav_state *state) {
   const cav_workspace *w = state->work;
   const cav_options *o = &state->options;
   return !model->nequality && !w->nstring && !w->nbuoy && !w->nfloat && o->order != CAV_ORDER_MOMENTUM && !o->coupled &&
-         o->regulariser != CAV_REGULARISER_EXACT && !cav_looks_ahead(o) &&
+         o->regulariser != CAV_REGULARISER_EXACT && !cav_looks_ahead(o) && !o->stops &&
          !(cav_contacts_narrow(state) && cav_contacts_have_meshes(state));
 }
 

@@ -516,6 +516,7 @@ typedef struct cav_field {
   REAL(POSITION, self_stiffness, DBL_MIN, 1, 0, "", "fraction of their stiffness that contacts between two links of one tree get; 1: the law") \
   REAL(POSITION, saturation, 0, DBL_MAX, 0, "m", "depth beyond which the smoothed law's contacts with the world grow no stiffer, and fade out where round geoms are in solids; 0: never") \
   REAL(POSITION, impratio, DBL_MIN, DBL_MAX, 1, "", "R_normal / R_friction")                                       \
+  FLAG(POSITION, stops, "1: the step after which nothing moves: friction acts by the velocity before it too, since what friction holds creeps by that (dynamics/METHOD.md, 4)") \
   FLAG(POSITION, coupled, "1: B and K dense, so that all rows together are critically damped; costs a factorisation") \
   FLAG(POSITION, refsafe, "1: keep solref time constants >= 2 h")                                                  \
   FLAG(POSITION, contact, "0: no contacts")                                                                        \

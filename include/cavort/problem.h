@@ -352,7 +352,7 @@ typedef struct cav_problem {
       scene; ///< what the problem file added to the world of the model's file, as MJCF; the model has it. NULL: nothing
   double duration, timestep; ///< s; knots are round(duration/timestep) + 1
   cav_order order;           ///< of the step
-  int close_at_rest;         ///< 1: v after the last knot is zero, with rows there; 0: no rows at the last knot
+  int close_at_rest; ///< 1: v after the last knot is zero, with rows there (options.stops); 0: no rows at the last knot
   /// Free duration: the step is an unknown, the same for all knots, between these; both 0: duration is what it is.
   /// Times of windows and waypoints stay fractions of duration.
   double duration_least, duration_most;

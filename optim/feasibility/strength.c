@@ -211,7 +211,7 @@ static int weakest(const bearing *b, const double *left, int nu) {
   return worst;
 }
 
-static void tell(cav_examination *e, const bearing *b, const double *need, const double *left, int t, int term) {
+static void tell(cav_examination *e, const bearing *b, const double *left, int t, int term) {
   const cav_model *m = e->model;
   const cav_term *held = &e->problem->term[term];
   const cav_requirement at = {.term = term, .knot = t};
@@ -226,18 +226,18 @@ static void tell(cav_examination *e, const bearing *b, const double *need, const
           ? "N"
           : "N m";
   if (weak >= 0)
-    cav_impossible(
-        e, CAV_CONDITION_STRENGTH, &at, "A stronger actuator, a lighter load, or a posture that needs less.",
-        "posture '%.48s' cannot be held at %.4g s: joint '%.48s' needs %.4g %s against gravity, and actuator "
-        "'%.48s' at its limit of %.3g and all contacts leave %.3g %s of it",
-        held->name, time, cav_name_or(m->joint[j].name, "joint", j, joint), need[worst], unit,
-        cav_name_or(m->actuator[weak].name, "actuator", weak, name), b->factor[weak], fabs(left[worst]), unit);
+    cav_impossible(e, CAV_CONDITION_STRENGTH, &at, "A stronger actuator, a lighter load, or a posture that needs less.",
+                   "posture '%.48s' cannot be held at %.4g s: with actuator '%.48s' at its limit of %.3g and all that "
+                   "contacts can "
+                   "give, %.3g %s against gravity are missing at joint '%.48s'",
+                   held->name, time, cav_name_or(m->actuator[weak].name, "actuator", weak, name), b->factor[weak],
+                   fabs(left[worst]), unit, cav_name_or(m->joint[j].name, "joint", j, joint));
   else
-    cav_impossible(
-        e, CAV_CONDITION_STRENGTH, &at, "A posture that stands, or one that is not held.",
-        "posture '%.48s' cannot be held at %.4g s: joint '%.48s' needs %.4g %s against gravity, and no actuator "
-        "or contact can give %.3g %s of it",
-        held->name, time, cav_name_or(m->joint[j].name, "joint", j, joint), need[worst], unit, fabs(left[worst]), unit);
+    cav_impossible(e, CAV_CONDITION_STRENGTH, &at, "A posture that stands, or one that is not held.",
+                   "posture '%.48s' cannot be held at %.4g s: %.3g %s against gravity are missing at joint '%.48s', "
+                   "and no actuator "
+                   "or contact can give them",
+                   held->name, time, fabs(left[worst]), unit, cav_name_or(m->joint[j].name, "joint", j, joint));
 }
 
 /// The balance of a posture at rest.
@@ -263,8 +263,7 @@ static cav_status examine_posture(cav_examination *e, int t, int term, const dou
     double size = 0;
     for (int d = 0; d < m->nv; d++) size += left[d] * left[d];
     // more than a certificate's tolerance of force, by a wide margin
-    if (sqrt(size) > 1e-4 * load / most_load && separation(&b, need, left) > 0.5 * size)
-      tell(e, &b, need, left, t, term);
+    if (sqrt(size) > 1e-4 * load / most_load && separation(&b, need, left) > 0.5 * size) tell(e, &b, left, t, term);
   }
   state->options.smoothing = state->options.smoothing_self = 0;
   free(b.column);

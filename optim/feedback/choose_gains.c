@@ -82,7 +82,7 @@ typedef struct search {
 static cav_status regulate(const search *s, const set *one) {
   cav_options law[LAWS];
   for (int i = 0; i < one->laws; i++) {
-    law[i] = s->tr->options;
+    law[i] = cav_knot_law(s->tr, 0);
     cav_stage_law(s->problem, one->fraction[i], s->tr->options.timestep, &law[i]);
   }
   cav_status status = cav_feedback(s->tr, s->at, law, one->laws, &one->penalty, s->gain, s->gain + s->n);

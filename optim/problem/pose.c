@@ -53,6 +53,25 @@ static const char *nearest_key(const cav_problem_reader *reader, const char *wor
   return near ? near : cav_xml_nearest(word, &found, 1, sizeof found);
 }
 
+enum { NAMES = 240 };
+
+// names of the file's poses and the model's keyframes, as many as there is room for
+static void list_keys(const cav_problem_reader *reader, const char *own, char text[NAMES]) {
+  const cav_model *m = reader->model;
+  size_t used = 0;
+  *text = 0;
+  const cav_xml_node *pose = cav_problem_child(reader->root, "pose");
+  for (int k = 0; used + 70 < NAMES && (pose || k < m->nkey);) {
+    const char *name = pose ? cav_xml_text(pose, "name", "") : m->key[k].name;
+    if (pose)
+      pose = cav_xml_next(pose);
+    else
+      k++;
+    if (name && *name && strcmp(name, own))
+      used += (size_t)snprintf(text + used, NAMES - used, "%s'%.60s'", used ? ", " : "; there is ", name);
+  }
+}
+
 static int names_stand(const char *list) {
   const char *last = strrchr(list, '|');
   last = last ? last + 1 : list;
@@ -98,9 +117,12 @@ static cav_status read_key(const cav_problem_reader *reader, const cav_xml_node 
   }
   copy[strcspn(copy, " ")] = 0;
   const char *near = nearest_key(reader, copy);
+  char known[NAMES] = "";
+  if (!near) list_keys(reader, cav_xml_text(node, "name", ""), known);
+  if (!near && !*known) snprintf(known, sizeof known, "; 'stand' is found of any model that has feet");
   cav_xml_fail(reader->error, node, "key",
-               "neither the model '%s' nor this file has a keyframe or pose of that name, got '%.200s'%s%s%s", m->name,
-               list, near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
+               "neither the model '%s' nor this file has a keyframe or pose of that name, got '%.200s'%s%s%s%s",
+               m->name, list, near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "", known);
   free(copy);
   return CAV_BAD_INPUT;
 }

@@ -142,8 +142,15 @@ static void refuse_name(const cav_problem_reader *reader, const cav_xml_node *no
       snprintf(hint, sizeof hint, ", of body '%.100s'", m->body[body].name);
     if (geom >= 0 && body == 0)
       snprintf(hint, sizeof hint, " in the world itself: put it into a <body name=\"%.60s\"> of its own", first);
-    cav_xml_fail(reader->error, node, attribute, "the model '%s' has no %s '%.100s', but a %s of that name%s", m->name,
-                 kind, first, given, hint);
+    if (!accepted && geom < 0) {
+      int n = 0;
+      size_t stride = 0;
+      const void *names = cav_object_names(m, type, &n, &stride);
+      const char *near = n ? cav_xml_nearest(first, names, n, stride) : NULL;
+      hint_of(near, first, names, n, stride, hint);
+    }
+    cav_xml_fail(reader->error, node, attribute, "the model '%s' has no %s '%.100s', but %s %s of that name%s", m->name,
+                 kind, first, strchr("aeiou", *given) ? "an" : "a", given, hint);
     return;
   }
   int n = 0;

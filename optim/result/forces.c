@@ -95,6 +95,7 @@ cav_forces *cav_forces_new(const cav_model *model, const cav_trajectory *traject
   int t = 0;
   for (; t < n && !status; t++) {
     const double *next = t + 1 < n ? trajectory->v + (t + 1) * nv : rest;
+    if (!status) state->options.stops = contact->stops && t + 1 == n && at_rest;
     if (t + 1 < n || at_rest) {
       status = note_knot(f, model, state, trajectory, t, next, rest + nv, least);
     } else {

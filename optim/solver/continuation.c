@@ -48,8 +48,13 @@ static double between(double from, double to, double s) {
   return from > 0 && to > 0 ? from * pow(to / from, s) : (1 - s) * from + s * to;
 }
 
+// fraction of the way from which on friction knows at the last knot that nothing moves after it: what it holds there is
+// found by then, and what is still on its way is not held against what it has to leave anyway
+static const double STOPS_FROM = 0.5;
+
 void cav_stage_set(const cav_problem *problem, double x, cav_transcription *tr) {
   cav_stage_law(problem, x, tr->options.timestep, &tr->options);
+  tr->options.stops = x >= STOPS_FROM && problem->close_at_rest && !problem->cycle.on;
   tr->penalty = penalised;
   tr->penalty.effort = between(penalised.effort, PENALTY_RISE * penalised.effort, x);
   tr->penalty.range = between(penalised.range, PENALTY_RISE * penalised.range, x);

@@ -316,7 +316,7 @@ static cav_status move_alone(const cav_idle *idle, const cav_options *law, cav_t
   double *u = calloc((size_t)m->nv + 1, sizeof *u);
   cav_state *state = cav_state_new(m);
   cav_status status = u && state ? CAV_OK : CAV_NO_MEMORY;
-  if (status == CAV_OK) state->options = *law;
+  if (status == CAV_OK) state->options = *law, state->options.stops = 0;
   at->timestep = law->timestep;
   cav_part_gather(idle->whole->model->nq, idle->idle.q, idle->whole->q_start, at->q);
   cav_part_gather(idle->whole->model->nv, idle->idle.dof, idle->whole->v_start, at->v);
@@ -462,6 +462,7 @@ static cav_status check_alone(const cav_idle *idle, const cav_options *law, doub
   for (size_t t = 0; status == CAV_OK && t < (size_t)at->nknot; t++) {
     int last = t + 1 == (size_t)at->nknot;
     const double *v = at->v + t * nv, *next = !last ? v + nv : p->close_at_rest ? rest : v;
+    state->options.stops = law->stops && last && p->close_at_rest;
     status = cav_inverse(m, state, at->q + t * nq, v, next, u);
     if (status != CAV_OK) break;
     *alone &= !meets(idle, state);

@@ -267,7 +267,7 @@ static cav_status curve_knot(const curve *c, cav_scratch *s, int t, double *room
   size_t nv = (size_t)tr->nv, width = 3 * nv;
   double *K = room, *half = K + width * width, *base = half + width * width, *moved = base + width;
   const double *q = c->at->q + (size_t)t * c->at->nq;
-  s->state->options = tr->options;
+  s->state->options = cav_knot_law(tr, t);
   cav_status status =
       cav_inverse(tr->model, s->state, q, cav_velocity_at(tr, c->at, t), cav_velocity_after(tr, c->at, t), knot->u);
   if (status != CAV_OK) return status;

@@ -206,6 +206,12 @@ int cav_knot_has_force(const cav_transcription *tr, int t) {
   return t < tr->nknot - 1 || (tr->problem->close_at_rest && !tr->periodicity);
 }
 
+cav_options cav_knot_law(const cav_transcription *tr, int t) {
+  cav_options law = tr->options;
+  law.stops = tr->options.stops && t == tr->nknot - 1 && cav_knot_has_force(tr, t);
+  return law;
+}
+
 static int knot_new(cav_transcription *tr, int t) {
   cav_knot *knot = &tr->knot[t];
   int ok = 1;
@@ -299,6 +305,7 @@ cav_transcription *cav_transcription_new(const cav_problem *problem, int threads
   tr->options = problem->model->options;
   tr->options.timestep = problem->timestep;
   tr->options.order = problem->order;
+  tr->options.stops = problem->close_at_rest && !problem->cycle.on;
   tr->derivative = CAV_DERIVATIVE_ANALYTIC;
   tr->pool = cav_parallel_new(threads);
   if (problem->cycle.on && !(tr->periodicity = cav_periodicity_new(problem, error))) {
@@ -420,10 +427,10 @@ static cav_status shift_step(const cav_transcription *tr, cav_scratch *s, int t,
   }
   near.options.timestep *= fraction;
   near.options.time_constant *= fraction;
-  s->state->options = near.options;
+  s->state->options = cav_knot_law(&near, t);
   cav_status status = cav_inverse(tr->model, s->state, q, v_here, v_then, knot->u);
   if (status == CAV_OK) cav_readings_values(&near, s, t);
-  s->state->options = tr->options;
+  s->state->options = cav_knot_law(tr, t);
   if (status == CAV_OK) status = cav_user_refused(&knot->refusal);
   if (status != CAV_OK) return status;
   if (knot->nread) memcpy(knot->y, s->value + tr->nv, (size_t)knot->nread * sizeof(double));
@@ -484,7 +491,7 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   int nv = tr->nv;
   const double *q = p->at->q + (size_t)t * p->at->nq, *v = cav_velocity_at(tr, p->at, t);
   const double *v_next = cav_velocity_after(tr, p->at, t);
-  s->state->options = tr->options;
+  s->state->options = cav_knot_law(tr, t);
   knot->refusal = (cav_user_refusal){0};
 
   // dynamics, first beside the step where that is an unknown

@@ -154,8 +154,9 @@ typedef struct cav_transcription {
   int keep_rows;                    ///< slot_row of the knots is filled by linearisations
   int (*stop)(void *context);       ///< asked before every evaluation; nonzero: CAV_INTERRUPTED. NULL: none asks
   void *stop_context;
-  cav_options options;         ///< contact law of this stage; its timestep is the step of the last trajectory
-  cav_knot *knot;              ///< [nknot]
+  cav_options options; ///< contact law of this stage, stops of the last knot alone; its timestep is the step of the
+                       ///< last trajectory
+  cav_knot *knot;      ///< [nknot]
   struct cav_scratch *scratch; ///< one a thread
   cav_parallel *pool;
   cav_status *status;       ///< [nknot] of an evaluation
@@ -293,6 +294,9 @@ static inline const char *cav_term_dofs(const cav_transcription *transcription, 
 
 /// Whether something leaves knot t, so that it has forces.
 int cav_knot_has_force(const cav_transcription *transcription, int t);
+
+/// The contact law of a knot: that of the transcription, whose stops is of the last one of a motion that closes at rest.
+cav_options cav_knot_law(const cav_transcription *transcription, int t);
 
 /// Weight with which a term of the problem speaks at knot t: the step for an integral, 1 at a single knot, 0 outside its
 /// window. terms.c.

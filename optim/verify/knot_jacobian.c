@@ -109,6 +109,7 @@ static cav_status read(cav_knot_jacobian *s, int t, double *value) {
   if (s->evaluated == t && s->step == s->at.h && !memcmp(s->point, q, nq * sizeof *q))
     unchanged = memcmp(s->point + nq, v, nv * sizeof *v) ? CAV_STAGE_POSITION : CAV_STAGE_VELOCITY;
   s->evaluated = -1;
+  s->at.state->options = cav_verification_law(&s->at, t);
   cav_status status = cav_inverse_from(model, s->at.state, unchanged, q, v, v + nv, s->at.u + k * nv);
   if (status != CAV_OK) return status;
   s->evaluated = t;

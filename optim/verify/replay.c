@@ -64,6 +64,7 @@ cav_status cav_replay_steps(const cav_verification *verification, cav_replay *re
   replay->step_knot = 0;
   for (int t = 0; t < verification->rows && status == CAV_OK; t++) {
     const double *v = verification->v + t * nv;
+    verification->state->options = cav_verification_law(verification, t);
     status = step(verification, verification->state, exact_tolerance, verification->q + t * model->nq, v,
                   verification->u + t * nv, NULL, next);
     // a step that stopped far from its solution shows as a large error, one that has none in numbers as one without end
@@ -127,6 +128,7 @@ cav_status cav_replay_open(const cav_verification *verification, cav_replay *rep
   memcpy(q, verification->q, sizeof(double) * nq);
   memcpy(v, verification->v, sizeof(double) * nv);
   replay->open_error = replay->open_seconds = 0;
+  verification->state->options = cav_verification_law(verification, 0);
   cav_status status = CAV_OK;
   for (int t = 0; t + 1 < motion->nknot; t++) {
     // only what actuators give, and what is penalised of the rest
@@ -287,6 +289,7 @@ static cav_options claimed_options(const cav_verification *verification, const c
   claimed.smoothing *= h / verification->h;
   claimed.smoothing_self *= h / verification->h;
   claimed.order = CAV_ORDER_EULER;
+  claimed.stops = 0;
   return claimed;
 }
 

@@ -44,6 +44,9 @@ cav_status cav_verification_begin(cav_verification *verification, const cav_prob
                                   const double *gain_v, cav_error *error);
 void cav_verification_end(cav_verification *verification);
 
+/// The claimed law at a knot: its stops is of the last one of a motion that closes at rest.
+cav_options cav_verification_law(const cav_verification *verification, int t);
+
 /// Keeps the larger of the two; a value that is not a number counts as larger. Writes where by printf's rules.
 void cav_metric_note(cav_metric *metric, double value, int knot, const char *format, ...)
     __attribute__((format(printf, 4, 5)));

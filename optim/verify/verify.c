@@ -147,6 +147,12 @@ static void knot_velocities(cav_verification *verification) {
   }
 }
 
+cav_options cav_verification_law(const cav_verification *verification, int t) {
+  cav_options law = verification->law;
+  law.stops = law.stops && t == verification->last && verification->rows > verification->last;
+  return law;
+}
+
 static cav_status verification_start(cav_verification *verification, const cav_problem *problem,
                                      const cav_trajectory *trajectory, const cav_options *contact, cav_error *error) {
   const cav_model *model = problem->model;
@@ -181,7 +187,7 @@ static cav_status verification_start(cav_verification *verification, const cav_p
   if (!verification->failure || !verification->deviation || !verification->edges) return CAV_NO_MEMORY;
   if (!verification->state || !verification->bare || !verification->v || !verification->u || !verification->control)
     return CAV_NO_MEMORY;
-  verification->state->options = verification->law;
+  verification->state->options = cav_verification_law(verification, 0);
   verification->bare->options.contact = verification->bare->options.constraint = 0;
   cav_residual_find(verification, verification->v, verification->u);
   memcpy(verification->v, problem->free_start ? trajectory->v : problem->v_start, sizeof(double) * nv);
@@ -348,6 +354,7 @@ static cav_status examine_knot(cav_verification *verification, int t, cav_balanc
     cav_status status = examine_image(verification, t, work, found);
     if (status != CAV_OK) return status;
   }
+  verification->state->options = cav_verification_law(verification, t);
   cav_status status = cav_inverse(model, verification->state, q, v, v + nv, work);
   if (status != CAV_OK) return status;
   note_ranges(verification, t, q, "", found);
@@ -683,6 +690,7 @@ static cav_status stand_at(cav_verification *verification, int t, double **work,
   size_t nv = (size_t)model->nv, knot = (size_t)t;
   const double *v = verification->v + knot * nv;
   double *u = verification->u + knot * nv;
+  verification->state->options = cav_verification_law(verification, t);
   cav_status status = cav_inverse(model, verification->state, verification->q + knot * (size_t)model->nq, v, v + nv, u);
   if (status != CAV_OK) return status;
   cav_actuation(model, verification->state, u, NULL, verification->control + knot * (size_t)model->nu);
@@ -748,6 +756,7 @@ cav_status cav_closed_loops_begin(cav_verification *verification, const cav_prob
   int nv = status == CAV_OK ? verification->model->nv : 0;
   for (int t = 0; t < verification->rows && status == CAV_OK; t++) {
     const double *v = verification->v + t * nv;
+    verification->state->options = cav_verification_law(verification, t);
     status = cav_inverse(verification->model, verification->state, verification->q + t * verification->model->nq, v,
                          v + nv, verification->u + t * nv);
   }

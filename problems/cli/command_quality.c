@@ -75,7 +75,8 @@ static cav_status measure_file(const cav_model *model, const char *file, cav_qua
 // a folder's motion with its problem's model and law, a fit's with its repair.xml's model; a file's with --model
 static cav_status measure(const cav_command_line *line, const char *path, cav_quality *quality, cav_error *error) {
   struct stat info;
-  int folder = !stat(path, &info) && S_ISDIR(info.st_mode);
+  if (stat(path, &info)) return cav_file_fail(error, CAV_BAD_INPUT, 0, "%s: no such folder or file", path);
+  int folder = S_ISDIR(info.st_mode);
   char *problem = cav_result_path(path, "problem.xml"), *file = cav_result_path(path, "trajectory.csv"),
        *repair = cav_result_path(path, "repair.xml");
   cav_status status = problem && file && repair ? CAV_OK : cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory");
