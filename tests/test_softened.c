@@ -1,6 +1,6 @@
-/// Where the last phase is stuck it goes on by way of softer laws: getting up from the front stands still a tenth above
-/// where it ends so. Where no end is asked for it is not tried, and a motion that is not stuck has none.
-/// Where softer laws gain nothing, as with a box that is shoved, slow steps go on to the optimum.
+/// Where the last phase is stuck it goes on by way of softer laws: a box that is shoved stands still a tenth above where it
+/// ends so, by slow steps where softer laws gain nothing. Where no end is asked for it is not tried, and a motion that is
+/// not stuck has none.
 #include "motion.h"
 
 /// Cost at the end of the first run of the last phase, stages of softer laws.
@@ -46,8 +46,6 @@ static course solve(const char *name, cav_problem *problem, double optimality) {
 }
 
 static course solve_motion(const char *motion, double optimality) { return solve(motion, load(motion), optimality); }
-
-static cav_problem *get_up(void) { return motion_load(&(motion_case){"get-up-front", NULL}); }
 
 static cav_problem *shove(void) {
   cav_error error = {0};
@@ -112,12 +110,11 @@ static void check_end(void) {
 }
 
 int main(void) {
-  test_stopped(get_up(), (patience){"softened", 40, 8e-4}, 5.2);
+  test_stopped(shove(), (patience){"softened", 40, 5e-4}, 0.043);
   test_stopped(shove(), (patience){"sqp", 150, 1e-4}, 0.043);
   check_end();
-  course stuck = solve("get-up-front", get_up(), 8e-4), quick = solve_motion("hop", 1e-4);
+  course quick = solve_motion("hop", 1e-4);
   CHECK(quick.softened == 0);
-  CHECK(stuck.softened > 0 && stuck.first > 1.05 * stuck.last);
   course all = solve("shove", shove(), 0), slow = solve("shove", shove(), 5e-4);
   CHECK(all.softened == 0);
   CHECK(slow.softened > 0 && slow.first > 1.1 * all.last && slow.last < 1.001 * all.last);

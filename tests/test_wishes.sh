@@ -98,7 +98,7 @@ says tip.out "note: it ends in motion: 'box' at "
 
 # farther than the search comes, and not so far that it is proven: what was used of actuators and ranges, and no verdict on the wish
 cat >far.xml <<E2
-<problem name="far" model="$models/humanoid.xml"><horizon duration="0.5" timestep=".025"/><start key="stand" height="floor"/><cost><clearance weight="0"/>
+<problem name="far" model="$models/humanoid.xml"><horizon duration="0.5" timestep=".025" order="momentum"/><start key="stand" height="floor"/><cost><clearance weight="0"/>
 <sensor name="there" type="subtreecom" body="torso" component="x" relative="start" target="4" at="end" weight="900"/></cost></problem>
 E2
 "$cavort" solve far.xml -o far --threads 1 --strategies 1 >far.out 2>far.err

@@ -229,6 +229,12 @@ static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_t
         "weight=\"300\" within=\"any\"/>, its target at the side to push from, or by postures in <guess> that have it "
         "there.",
         name, way, gap, unit, body, hand_of(p->model), body, p->duration / 3);
+  } else if (p->model->nu == 0 && !p->free_start && p->residual.force == 0 && p->residual.torque == 0) {
+    snprintf(
+        text, size,
+        "'%.60s' is off by %.3g%s%s at %.3g s, and no actuator moves this model: the motion follows from its start, "
+        "and no weight changes it. Next: another start (where, or how fast), duration, mass or friction.",
+        name, got[i].off, gap, unit, got[i].time);
   } else if (way <= got[i].within) {
     snprintf(text, size,
              "the start has '%.60s' to %.3g%s%s, and the motion leaves it by %.3g%s%s at %.3g s%s%.160s. It is traded "
