@@ -211,7 +211,7 @@ static int weakest(const bearing *b, const double *left, int nu) {
   return worst;
 }
 
-static void tell(cav_examination *e, const bearing *b, const double *left, int t, int term) {
+static void tell(cav_examination *e, const bearing *b, const double *need, const double *left, int t, int term) {
   const cav_model *m = e->model;
   const cav_term *held = &e->problem->term[term];
   const cav_requirement at = {.term = term, .knot = t};
@@ -225,19 +225,24 @@ static void tell(cav_examination *e, const bearing *b, const double *left, int t
       m->joint[j].type == CAV_JOINT_SLIDE || (m->joint[j].type == CAV_JOINT_FREE && worst < m->joint[j].dof + 3)
           ? "N"
           : "N m";
+  // what is missing may be more than what gravity asks of the joint: a torque that others leave there
+  char lacks[160], needs[64] = "";
+  const char *what = cav_name_or(m->joint[j].name, "joint", j, joint);
+  const int part = fabs(left[worst]) <= fabs(need[worst]);
+  if (part) snprintf(needs, sizeof needs, "needs %.4g %s against gravity and ", need[worst], unit);
+  snprintf(lacks, sizeof lacks, "joint '%.48s' %slacks %.3g %s%s", what, needs, fabs(left[worst]), unit,
+           part ? " of it" : " against gravity");
   if (weak >= 0)
     cav_impossible(e, CAV_CONDITION_STRENGTH, &at, "A stronger actuator, a lighter load, or a posture that needs less.",
                    "posture '%.48s' cannot be held at %.4g s: with actuator '%.48s' at its limit of %.3g and all that "
                    "contacts can "
-                   "give, %.3g %s against gravity are missing at joint '%.48s'",
+                   "give, %s",
                    held->name, time, cav_name_or(m->actuator[weak].name, "actuator", weak, name), b->factor[weak],
-                   fabs(left[worst]), unit, cav_name_or(m->joint[j].name, "joint", j, joint));
+                   lacks);
   else
     cav_impossible(e, CAV_CONDITION_STRENGTH, &at, "A posture that stands, or one that is not held.",
-                   "posture '%.48s' cannot be held at %.4g s: %.3g %s against gravity are missing at joint '%.48s', "
-                   "and no actuator "
-                   "or contact can give them",
-                   held->name, time, fabs(left[worst]), unit, cav_name_or(m->joint[j].name, "joint", j, joint));
+                   "posture '%.48s' cannot be held at %.4g s: %s, which no actuator or contact can give", held->name,
+                   time, lacks);
 }
 
 /// The balance of a posture at rest.
@@ -263,7 +268,8 @@ static cav_status examine_posture(cav_examination *e, int t, int term, const dou
     double size = 0;
     for (int d = 0; d < m->nv; d++) size += left[d] * left[d];
     // more than a certificate's tolerance of force, by a wide margin
-    if (sqrt(size) > 1e-4 * load / most_load && separation(&b, need, left) > 0.5 * size) tell(e, &b, left, t, term);
+    if (sqrt(size) > 1e-4 * load / most_load && separation(&b, need, left) > 0.5 * size)
+      tell(e, &b, need, left, t, term);
   }
   state->options.smoothing = state->options.smoothing_self = 0;
   free(b.column);
