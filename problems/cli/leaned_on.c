@@ -315,13 +315,18 @@ static void tell_ending(FILE *out, const cav_problem *problem, const cav_forces 
     }
     const double weight = mass * -m->gravity[2], left = hypot(hypot(borne[0], borne[1]), borne[2] - weight);
     const char *name = or_else(m->body[m->link[root].body].name, "a body");
+    char held[160] = "";
+    for (int j = 0; j < m->njoint && !m->link[root].driven && !*held; j++)
+      if (m->joint[j].link == root && m->joint[j].name && *m->joint[j].name)
+        snprintf(held, sizeof held, " (<velocity joint=\"%.60s\" at=\"end\" weight=\"1000\" within=\"0.1\"/>)",
+                 m->joint[j].name);
     if (borne[2] <= leaning * weight)
       fprintf(
           out,
           "  note: nothing holds '%.60s' at the end: it is at rest for a moment, as at the top of a hop, and falls. "
-          "A posture held over the last tenth of the time (from=), or a smaller within of the final velocity, makes "
+          "A posture held over the last tenth of the time (from=), or a smaller within of the final velocity%s, makes "
           "it stand\n",
-          name);
+          name, held);
     else if (left > braking * weight)
       fprintf(
           out,
