@@ -579,37 +579,37 @@ CAV_VECTOR_BODY void curve_lines_body(const cav_contact *c, const double *H, cav
 CAV_BY_VECTORS(curve_lines, (const cav_contact *c, const double *H, cav_contact_jacobian *derivative),
                (c, H, derivative))
 
-// the same of all rows
-static void curve(const cav_contact *c, const double *H, cav_contact_jacobian *derivative) {
-  memset(derivative->by_velocity, 0, sizeof derivative->by_velocity);
-  if (c->dim <= 3) {
-    curve_lines(c, H, derivative);
-    return;
-  }
+// a matrix of a contact's rows in world axes
+static void turn_rows(const cav_contact *c, const double *H, double out[6][6]) {
+  memset(out, 0, 36 * sizeof out[0][0]);
   for (int i = 0; i < c->dim; i++) {
     for (int j = 0; j < c->dim; j++) {
-      double h = derivative->hessian[i][j] = H[i * c->dim + j];
-      const double *x = c->frame + 3 * (i % 3), *y = c->frame + 3 * (j % 3);
-      int row = i < 3 ? 3 : 0, column = j < 3 ? 3 : 0;
+      const double h = H[i * c->dim + j], *x = c->frame + 3 * (i % 3), *y = c->frame + 3 * (j % 3);
+      const int row = i < 3 ? 3 : 0, column = j < 3 ? 3 : 0;
       for (int r = 0; r < 3; r++) {
-        for (int s = 0; s < 3; s++) derivative->by_velocity[row + r][column + s] += h * x[r] * y[s];
+        for (int s = 0; s < 3; s++) out[row + r][column + s] += h * x[r] * y[s];
       }
     }
   }
 }
 
+// the curvature of all rows
+static void curve(const cav_contact *c, const double *H, cav_contact_jacobian *derivative) {
+  if (c->dim <= 3) {
+    memset(derivative->by_velocity, 0, sizeof derivative->by_velocity);
+    curve_lines(c, H, derivative);
+    return;
+  }
+  for (int i = 0; i < c->dim; i++)
+    for (int j = 0; j < c->dim; j++) derivative->hessian[i][j] = H[i * c->dim + j];
+  turn_rows(c, H, derivative->by_velocity);
+}
+
 // the same by the velocity before the step, whatever part of it each row takes
 static void curve_before(const cav_contact *c, const double *H, cav_contact_jacobian *derivative) {
-  memset(derivative->by_before, 0, sizeof derivative->by_before);
-  for (int i = 0; i < c->dim; i++) {
-    for (int j = 0; j < c->dim; j++) {
-      const double h = (1 - c->damping[j]) * H[i * c->dim + j], *x = c->frame + 3 * (i % 3),
-                   *y = c->frame + 3 * (j % 3);
-      const int row = i < 3 ? 3 : 0, column = j < 3 ? 3 : 0;
-      for (int r = 0; r < 3; r++)
-        for (int s = 0; s < 3; s++) derivative->by_before[row + r][column + s] += h * x[r] * y[s];
-    }
-  }
+  double kept[36];
+  for (int i = 0; i < c->dim * c->dim; i++) kept[i] = (1 - c->damping[i % c->dim]) * H[i];
+  turn_rows(c, kept, derivative->by_before);
 }
 
 void cav_contact_differentiate(const cav_model *model, const cav_state *state, const cav_contact *c, int whole,

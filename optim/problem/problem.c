@@ -131,6 +131,10 @@ static void refuse_name(const cav_problem_reader *reader, const cav_xml_node *no
   const cav_model *m = reader->model;
   const char *kind = cav_object_kind_of(type)->text;
   cav_object_type other = other_kind(m, type, first);
+  int n = 0;
+  size_t stride = 0;
+  const void *names = cav_object_names(m, type, &n, &stride);
+  const char *near = n ? cav_xml_nearest(first, names, n, stride) : NULL;
   if (other != CAV_OBJECT_TYPES) {
     const char *given = cav_object_kind_of(other)->text;
     int accepted = cav_xml_accepts(node, given);
@@ -142,21 +146,12 @@ static void refuse_name(const cav_problem_reader *reader, const cav_xml_node *no
       snprintf(hint, sizeof hint, ", of body '%.100s'", m->body[body].name);
     if (geom >= 0 && body == 0)
       snprintf(hint, sizeof hint, " in the world itself: put it into a <body name=\"%.60s\"> of its own", first);
-    if (!accepted && geom < 0) {
-      int n = 0;
-      size_t stride = 0;
-      const void *names = cav_object_names(m, type, &n, &stride);
-      const char *near = n ? cav_xml_nearest(first, names, n, stride) : NULL;
-      hint_of(near, first, names, n, stride, hint);
-    }
+    if (!accepted && geom < 0) hint_of(near, first, names, n, stride, hint);
     cav_xml_fail(reader->error, node, attribute, "the model '%s' has no %s '%.100s', but %s %s of that name%s", m->name,
                  kind, first, strchr("aeiou", *given) ? "an" : "a", given, hint);
     return;
   }
-  int n = 0;
-  size_t stride = 0;
-  const void *names = cav_object_names(m, type, &n, &stride);
-  const char *near = n ? cav_xml_nearest(first, names, n, stride) : NULL, *role_name[CAV_ROLE_TYPES];
+  const char *role_name[CAV_ROLE_TYPES];
   char known[480] = "", parts[240], hint[HINT];
   if (roles) {
     for (int r = 0; r < CAV_ROLE_TYPES; r++) role_name[r] = cav_role_name((cav_role)r);

@@ -39,6 +39,11 @@ double cav_schedule_part(const cav_model *model) {
   return most > 0 ? fmin(most / usual_reach, 1) : 1;
 }
 
+int cav_problem_is_given(const cav_problem *problem) {
+  return problem->model->nu == 0 && !problem->free_start && problem->residual.force == 0 &&
+         problem->residual.torque == 0;
+}
+
 int cav_problem_has_record(const cav_problem *problem) {
   int found = 0;
   for (int i = 0; i < problem->nterm; i++) found |= problem->term[i].quantity == CAV_QUANTITY_TRACK;

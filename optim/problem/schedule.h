@@ -17,4 +17,7 @@ double cav_schedule_part(const cav_model *model);
 /// Whether a term compares the motion with a record.
 int cav_problem_has_record(const cav_problem *problem);
 
+/// Whether its motion follows from its start alone: no actuator moves the model, and no residual force or free start is there.
+int cav_problem_is_given(const cav_problem *problem);
+
 #endif

@@ -140,18 +140,14 @@ static cav_status loosen_slip(const cav_problem *p, cav_strategy *s) {
   return status;
 }
 
-/// Whether the motion follows from the start alone: nothing acts but the law of contacts, whose cures are left.
-static int is_given(const cav_problem *p) {
-  return p->model->nu == 0 && !p->free_start && p->residual.force == 0 && p->residual.torque == 0;
-}
-
 /// Whether a cure changes what the motion does, not what contacts obey.
 static int is_of_motion(cure c) {
   return c == FORCE || c == SELF || c == GOALS || c == BIT || c == SLIP || c == LOOSE || c == EFFORT || c == SLACK;
 }
 
 static cav_status change(const cav_problem *p, const cav_verdict *v, cure c, cav_strategy *s) {
-  if (is_given(p) && is_of_motion(c)) return CAV_OK;
+  // what follows from its start has the cures of the contact law left
+  if (cav_problem_is_given(p) && is_of_motion(c)) return CAV_OK;
   double effort = s->effort_limit > 0 ? s->effort_limit : p->effort_limit;
   switch (c) {
     case FORCE:

@@ -9,6 +9,7 @@
 #include "cavort/result.h"
 #include "command.h"
 #include "role.h"
+#include "schedule.h"
 #include "summary.h"
 
 static const double idle = 1e-4; // part of its limit below which an actuator does nothing
@@ -229,7 +230,7 @@ static void tell(const cav_problem *p, const cav_trajectory *motion, const cav_t
         "weight=\"300\" within=\"any\"/>, its target at the side to push from, or by postures in <guess> that have it "
         "there.",
         name, way, gap, unit, body, hand_of(p->model), body, p->duration / 3);
-  } else if (p->model->nu == 0 && !p->free_start && p->residual.force == 0 && p->residual.torque == 0) {
+  } else if (cav_problem_is_given(p)) {
     snprintf(
         text, size,
         "'%.60s' is off by %.3g%s%s at %.3g s, and no actuator moves this model: the motion follows from its start, "
