@@ -96,6 +96,16 @@ qvel="0.5 0 0 0 1 0"/><cost/></problem>' >tip.xml
 "$cavort" solve tip.xml -o tip --threads 1 >tip.out 2>tip.err
 says tip.out "note: it ends in motion: 'box' at "
 
+# what no actuator moves follows from its start: no weight is advised
+sed 's|<cost/>|<cost><sensor name="gone" type="subtreecom" body="box" component="x" target="0.3" at="end" weight="9"/></cost>|' tip.xml >gone.xml
+"$cavort" solve gone.xml -o gone --threads 1 >gone.out 2>gone.err
+ends $? 1 "a box that is to be elsewhere"
+"$cavort" explain gone >explain.out
+says explain.out "no actuator moves this model: the motion follows from its start"
+"$cavort" quality nothere 2>err
+ends $? 2 "quality of no folder"
+says err "nothere: no such folder or file"
+
 # farther than the search comes, and not so far that it is proven: what was used of actuators and ranges, and no verdict on the wish
 cat >far.xml <<E2
 <problem name="far" model="$models/humanoid.xml"><horizon duration="0.5" timestep=".025" order="momentum"/><start key="stand" height="floor"/><cost><clearance weight="0"/>
