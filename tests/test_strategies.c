@@ -634,10 +634,11 @@ static void test_left(void) {
     if (!p) continue;
     cav_strategy strategy[CAV_STRATEGIES];
     int n;
-    CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && (find(strategy, n, "left") == NULL) == roomy);
-    CHECK((p->guess_left == NULL) == roomy && (roomy || !strcmp(strategy[5].name, "left")));
+    CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && (find(strategy, n, "clipped") == NULL) == roomy);
+    CHECK((p->guess_left == NULL) == roomy && strategy->left == !roomy);
+    CHECK(roomy || (!strcmp(strategy[5].name, "clipped") && !strategy[5].left));
     if (!roomy) {
-      cav_strategy_apply(p, find(strategy, n, "left"), &taken);
+      cav_strategy_apply(p, strategy, &taken);
       CHECK(taken.nguess_pose == 2 && taken.guess_pose[0].time == 0.3 && taken.guess_pose[1].time == 0.6);
       for (int i = 0; i < 2; i++) CHECK_NEAR(taken.guess_pose[i].q[0], 10 * M_PI / 180, 1e-15);
       CHECK_NEAR(taken.guess_pose[0].q[1], 60 * M_PI / 180, 1e-15);

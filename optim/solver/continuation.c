@@ -303,6 +303,11 @@ int cav_run_certifiable(const cav_solve_run *run) {
   return holds(&is, &most);
 }
 
+int cav_run_within_limits(const cav_solve_run *run) {
+  const violation is = measure(run->tr);
+  return fmax(is.effort, is.range) <= CAV_TOLERANCE_LIMIT;
+}
+
 int cav_run_met(const cav_solve_run *run) {
   violation most = allowed(run), is = measure(run->tr);
   return holds(&is, &most);

@@ -80,6 +80,9 @@ cav_status cav_solve_after(const cav_problem *problem, const cav_solve_options *
 /// Whether rows are so near to holding that feedback may make a certified motion of it.
 int cav_run_certifiable(const cav_solve_run *run);
 
+/// Whether efforts and ranges are within what is planned with, as a certificate asks.
+int cav_run_within_limits(const cav_solve_run *run);
+
 /// The problem's guess: start held, or the geodesic to end [nq], with a ballistic arc if asked; cycles always go to
 /// their end, at constant speed; or what cav_pump_fill simulates. q and v of at are filled. CAV_NO_MEMORY, or what the
 /// dynamics says of start and goal.

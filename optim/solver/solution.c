@@ -106,7 +106,7 @@ static cav_status find_rows(cav_solve_run *run) {
 
 /// Gains, of what may be certified with them.
 static cav_status find_gains(cav_solve_run *run, cav_error *error) {
-  if (!run->options->gains || !cav_run_certifiable(run)) return CAV_OK;
+  if (!run->options->gains || !cav_run_certifiable(run) || !cav_run_within_limits(run)) return CAV_OK;
   run->phase = "feedback";
   run->stage = run->stages = 1;
   // a motion whose rows do not quite hold is not worth more than one set

@@ -340,13 +340,14 @@ typedef struct guesses {
   int pivots;                            ///< 1: it turns four feet or more on the spot, where they stand
 } guesses;
 
-/// The stated guess in other postures, and under another order first.
+/// The stated guess, which is begun without the joints that its postures would have beyond the model's ranges, then with them
+/// at these ranges' ends; and under another order first.
 static void add_stated(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated) {
+  const int left = problem->guess_left && !problem->cycle.on;
+  if (left) strategy[0].left = 1, strategy[0].text = "the problem's guess without the joints that it has beyond ranges";
   add_near(strategy, n, stated, MEND_STATED);
-  if (problem->guess_left && !problem->cycle.on) {
-    cav_strategy left = *stated;
-    left.left = 1;
-    add(strategy, n, &left, "left", "postures without the joints that they would have beyond the model's ranges");
+  if (left) {
+    add(strategy, n, stated, "clipped", "the problem's guess, joints that it has beyond ranges at the ends of these");
     add_near(strategy, n, stated, MEND);
   }
   if (problem->order != CAV_ORDER_MOMENTUM) return;

@@ -53,9 +53,13 @@ int cav_rank_worth(const cav_race_report *a, const cav_race_report *b) {
   return a->cost < (1 - worth) * b->cost;
 }
 
+// whether nothing is deeper in anything than is certified
+static int shallow(const cav_verdict *v) {
+  return fmax(v->penetration_max_m, v->penetration_between_m) <= CAV_TOLERANCE_PENETRATION;
+}
+
 int cav_rank_rough(const cav_verdict *v) {
-  return !v->certified && cav_verdict_feasible(v) && v->penetration_max_m <= CAV_TOLERANCE_PENETRATION &&
-         v->penetration_between_m <= CAV_TOLERANCE_PENETRATION &&
+  return !v->certified && cav_verdict_feasible(v) && shallow(v) &&
          v->momentum_defect_rms <= several * CAV_TOLERANCE_MOMENTUM && v->slip_mean_m_s <= few * CAV_TOLERANCE_SLIP &&
          v->hover_fraction <= few * CAV_TOLERANCE_HOVER;
 }
@@ -68,7 +72,7 @@ int cav_rank_near(const cav_race_report *report, double effort) {
   // a motion that does something else is not what is looked for
   if (2 * v->nmissed > v->ntarget) return 0;
   if (cav_rank_rough(v)) return 1;
-  return v->unactuated_force_max <= CAV_TOLERANCE_UNACTUATED &&
+  return v->unactuated_force_max <= CAV_TOLERANCE_UNACTUATED && shallow(v) &&
          v->constraint_violation_max <= CAV_TOLERANCE_CONSTRAINT && v->limit_violation_max > CAV_TOLERANCE_LIMIT &&
          v->limit_violation_max < (1 - effort) / 2;
 }
