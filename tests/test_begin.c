@@ -79,14 +79,12 @@ static void test_spline(void) {
   // velocities are differences over a step
   double coarse = by_kinematics(".02"), fine = by_kinematics(".01");
   CHECK(fine < 0.02 * aside && coarse > 1.8 * fine && coarse < 2.2 * fine);
-  // as stated there is no such phase, and nothing takes the ball aside
+  // as stated it is simulated, since no actuator moves it: there is no such phase, and nothing takes the ball aside
   snprintf(text, sizeof text, pass, ".01", "");
   write_in("problem.xml", text);
   cav_solution *s = solve_up_to(path, "sqp", &problem);
-  if (CHECK(s != NULL && s->nstage > 0)) {
-    CHECK(!strcmp(s->stage[0].phase, "continuation"));
+  if (CHECK(s != NULL && (s->nstage == 0 || !strcmp(s->stage[0].phase, "sqp"))))
     CHECK(off_spline(s->trajectory) > 0.1 * aside);
-  }
   cav_solution_free(s);
   cav_problem_free(problem);
 }

@@ -625,7 +625,8 @@ static void test_left(void) {
              "<joint name='a' axis='0 1 0' limited='true' range='%s'/>"
              "<geom type='capsule' size='.05' fromto='0 0 0 0 0 -.4'/><body pos='0 0 -.4'>"
              "<joint name='b' axis='0 1 0' limited='true' range='0 120'/>"
-             "<geom type='capsule' size='.05' fromto='0 0 0 0 0 -.4'/></body></body></worldbody></mujoco>",
+             "<geom type='capsule' size='.05' fromto='0 0 0 0 0 -.4'/></body></body></worldbody>"
+             "<actuator><motor joint='a'/></actuator></mujoco>",
              range[roomy]);
     scene_write(folder, "m.xml", text);
     cav_error error = {0};

@@ -573,7 +573,7 @@ cat >fast.xml <<'END'
 END
 run 0 solve fast.xml --threads 1
 says err "not certified: momentum defect"
-says err "kept: strategy near-1"
+says err "kept: strategy repair-1"
 says fast.result/problem.xml 'order="momentum"'
 
 # milliseconds where seconds are meant

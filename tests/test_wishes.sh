@@ -102,6 +102,18 @@ sed 's|<cost/>|<cost><sensor name="gone" type="subtreecom" body="box" component=
 ends $? 1 "a box that is to be elsewhere"
 "$cavort" explain gone >explain.out
 says explain.out "no actuator moves this model: the motion follows from its start"
+
+# a block that slides to a stop within v^2/(2 mu g) = 0.408 m: simulated, no iteration is needed; steps of 10 ms are within 10 mm
+cat >block.xml <<'E2'
+<mujoco><worldbody><geom type="plane" size="5 5 1" friction=".5"/><body name="block" pos="0 0 .05"><freejoint/><geom type="box" size=".1 .1 .05"
+mass="2" friction=".5"/></body></worldbody></mujoco>
+E2
+echo '<problem name="slide" model="block.xml"><horizon duration="0.8" timestep=".01"/><start height="floor" qvel="2 0 0 0 0 0"/><cost>
+<slip body="block" weight="0" within="any"/><sensor name="stop" type="framepos" body="block" component="x" target="0.4077" at="end" weight="1"
+within="0.0105"/></cost></problem>' >slide.xml
+"$cavort" solve slide.xml -o slide --threads 1 >slide.out 2>slide.err
+ends $? 0 "a block that slides to a stop"
+says slide/verdict.json '"iterations": 0'
 "$cavort" quality nothere 2>err
 ends $? 2 "quality of no folder"
 says err "nothere: no such folder or file"

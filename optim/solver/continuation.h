@@ -88,6 +88,17 @@ int cav_run_within_limits(const cav_solve_run *run);
 /// dynamics says of start and goal.
 cav_status cav_guess_fill(const cav_problem *problem, const double *end, cav_trajectory *at);
 
+/// Law of the last stage at the problem's step.
+cav_options cav_last_law(const cav_problem *problem);
+
+/// What a model does without forces by the law, from q and v of the first knot. CAV_NO_MEMORY, CAV_NOT_CONVERGED,
+/// CAV_NOT_FINITE: what the forward step says.
+cav_status cav_simulate_passive(const cav_model *model, const cav_options *law, cav_trajectory *at);
+
+/// The motion of a problem that no actuator moves, which follows from its start, under the last law. *at NULL: something
+/// moves it, the schedule asks for kinematics first, or the forward step does not find it. CAV_NO_MEMORY.
+cav_status cav_guess_given(const cav_problem *problem, cav_trajectory **at);
+
 /// The guess into run->at, moved a little off its symmetries: a straight or symmetric one can be a saddle of all costs
 /// and constraints at once, which exact derivatives never leave.
 cav_status cav_guess_take(cav_solve_run *run);

@@ -143,6 +143,49 @@ cav_status cav_guess_fill(const cav_problem *problem, const double *end, cav_tra
   return status;
 }
 
+cav_options cav_last_law(const cav_problem *problem) {
+  cav_options law = problem->model->options;
+  law.timestep = problem->timestep;
+  law.order = problem->order;
+  cav_stage_law(problem, 1, problem->timestep, &law);
+  return law;
+}
+
+cav_status cav_simulate_passive(const cav_model *model, const cav_options *law, cav_trajectory *at) {
+  double *u = calloc((size_t)model->nv + 1, sizeof *u);
+  cav_state *state = cav_state_new(model);
+  cav_status status = u && state ? CAV_OK : CAV_NO_MEMORY;
+  if (status == CAV_OK) state->options = *law, state->options.stops = 0;
+  at->timestep = law->timestep;
+  for (int t = 0; status == CAV_OK && t + 1 < at->nknot; t++) {
+    double *q = at->q + (size_t)t * (size_t)at->nq, *v = at->v + (size_t)t * (size_t)at->nv;
+    status = cav_forward(model, state, q, v, u, v + at->nv);
+    if (status == CAV_OK) cav_integrate(model, q, v + at->nv, law->timestep, q + at->nq);
+  }
+  if (status == CAV_OK) cav_trajectory_velocities(model, at);
+  cav_state_free(state);
+  free(u);
+  return status;
+}
+
+cav_status cav_guess_given(const cav_problem *problem, cav_trajectory **at) {
+  *at = NULL;
+  if (!cav_problem_is_given(problem) || problem->cycle.on || problem->schedule.kinematics) return CAV_OK;
+  const cav_options law = cav_last_law(problem);
+  const int nknot = (int)lround(problem->duration / problem->timestep) + 1;
+  cav_trajectory *way = cav_trajectory_new(problem->model, nknot, problem->timestep);
+  if (!way) return CAV_NO_MEMORY;
+  memcpy(way->q, problem->q_start, (size_t)way->nq * sizeof *way->q);
+  memcpy(way->v, problem->v_start, (size_t)way->nv * sizeof *way->v);
+  cav_status status = cav_simulate_passive(problem->model, &law, way);
+  if (status == CAV_OK)
+    *at = way;
+  else
+    cav_trajectory_free(way);
+  // what the forward step does not find is left to the solver
+  return status == CAV_NO_MEMORY ? status : CAV_OK;
+}
+
 cav_trajectory *cav_problem_guess(const cav_problem *problem, cav_error *error) {
   if (cav_problem_check(problem, 0, error)) return NULL;
   int nknot = (int)lround(problem->duration / problem->timestep) + 1, cycle = problem->cycle.on;

@@ -312,23 +312,9 @@ static cav_status split(const marks *a, char *here, cav_idle *idle) {
 
 /// The idle trees from their start by the law. CAV_NOT_CONVERGED, CAV_NOT_FINITE: what the forward step says.
 static cav_status move_alone(const cav_idle *idle, const cav_options *law, cav_trajectory *at) {
-  const cav_model *m = idle->idle.model;
-  double *u = calloc((size_t)m->nv + 1, sizeof *u);
-  cav_state *state = cav_state_new(m);
-  cav_status status = u && state ? CAV_OK : CAV_NO_MEMORY;
-  if (status == CAV_OK) state->options = *law, state->options.stops = 0;
-  at->timestep = law->timestep;
   cav_part_gather(idle->whole->model->nq, idle->idle.q, idle->whole->q_start, at->q);
   cav_part_gather(idle->whole->model->nv, idle->idle.dof, idle->whole->v_start, at->v);
-  for (int t = 0; status == CAV_OK && t + 1 < at->nknot; t++) {
-    double *q = at->q + (size_t)t * (size_t)at->nq, *v = at->v + (size_t)t * (size_t)at->nv;
-    status = cav_forward(m, state, q, v, u, v + at->nv);
-    if (status == CAV_OK) cav_integrate(m, q, v + at->nv, law->timestep, q + at->nq);
-  }
-  if (status == CAV_OK) cav_trajectory_velocities(m, at);
-  cav_state_free(state);
-  free(u);
-  return status;
+  return cav_simulate_passive(idle->idle.model, law, at);
 }
 
 /// Whether the idle trees end at rest, where the motion closes so: within the speed that a ten millionth of their
@@ -341,21 +327,12 @@ static int ends_well(const cav_idle *idle, const cav_options *law) {
   return !idle->whole->close_at_rest || fastest <= 1e-6 * law->timestep;
 }
 
-/// Law of the last stage at the problem's step.
-static cav_options last_law(const cav_problem *p) {
-  cav_options law = p->model->options;
-  law.timestep = p->timestep;
-  law.order = p->order;
-  cav_stage_law(p, 1, p->timestep, &law);
-  return law;
-}
-
 /// Whether the problem can be split; with both parts, and the idle one by itself. What comes near is kept until nothing
 /// does.
 static cav_status split_apart(marks *a, char *here, box *room, extent *space, cav_idle *idle) {
   const cav_model *m = a->problem->model;
   int nknot = (int)lround(a->problem->duration / a->problem->timestep) + 1;
-  cav_options law = last_law(a->problem);
+  cav_options law = cav_last_law(a->problem);
   for (;;) {
     while (cav_roots_join(a->problem->model, a->kept)) continue;
     cav_trajectory_free(idle->alone);

@@ -239,7 +239,7 @@ void cav_run_close(cav_solve_run *run) {
   cav_transcription_free(run->tr);
 }
 
-/// All of a problem.
+/// All of a problem, from a start or its guess.
 static cav_status solve_whole(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
                               const cav_solution *before, cav_solution **solution, cav_error *error) {
   cav_solve_run run;
@@ -264,6 +264,18 @@ static cav_status solve_whole(const cav_problem *problem, const cav_solve_option
     fail(error, status, "a number that is not finite came up; the last finite iterate is kept");
   status = cav_run_refused(&run, status, error);
   cav_run_close(&run);
+  return status;
+}
+
+/// All of a problem; what no actuator moves begins with its simulation, and goes straight to the last phase.
+static cav_status solve_all(const cav_problem *problem, const cav_solve_options *options, const cav_trajectory *start,
+                            const cav_solution *before, cav_solution **solution, cav_error *error) {
+  cav_trajectory *given = NULL;
+  cav_solve_options straight = *options;
+  cav_status status = start || options->resume ? CAV_OK : cav_guess_given(problem, &given);
+  if (given) straight.first_stage = problem->schedule.stages + 1;
+  if (status == CAV_OK) status = solve_whole(problem, &straight, given ? given : start, before, solution, error);
+  cav_trajectory_free(given);
   return status;
 }
 
@@ -308,7 +320,7 @@ cav_status cav_solve_after(const cav_problem *problem, const cav_solve_options *
   if (status == CAV_NO_MEMORY && !*solution) fail(error, status, "not enough memory for this problem");
   if (status != CAV_NO_MEMORY && !alone && !*solution && error) *error = (cav_error){0};
   if (status != CAV_NO_MEMORY && !alone && !*solution)
-    status = solve_whole(problem, &options, start, before, solution, error);
+    status = solve_all(problem, &options, start, before, solution, error);
   cav_idle_clear(&idle);
   return status;
 }

@@ -457,17 +457,16 @@ static void add_last(const cav_problem *problem, cav_strategy *strategy, int *n,
   if (!g->collides) add_repairs(strategy, n, &g->stated);
 }
 
-/// What tells a cause where none succeeded.
+/// What tells a cause where none succeeded. fixed: a longer duration tells nothing.
 static void add_diagnoses(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated,
-                          int swings_up) {
+                          int fixed) {
   cav_strategy open = *stated, longer = *stated;
   open.use = longer.use = CAV_STRATEGY_DIAGNOSIS, open.open = 1;
   if (!problem->cycle.on && problem->close_at_rest)
     add(strategy, n, &open, "open", "with an end that need not be at rest");
-  // what a swing-up takes is told by cav_problem_pumping
   int timed = problem->window > 0;
   for (int i = 0; i < problem->nterm; i++) timed |= problem->term[i].quantity == CAV_QUANTITY_TRACK;
-  if (!problem->cycle.on && problem->duration_most == 0 && !swings_up && !timed)
+  if (!problem->cycle.on && problem->duration_most == 0 && !fixed && !timed)
     add(strategy, n, &longer, "longer", "with a duration free up to twice the stated one");
 }
 
@@ -475,8 +474,11 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   cav_strategy stated = {.guess = problem->guess, .stated = 1, .order = problem->order, .schedule = problem->schedule};
   *n = 0;
   add(strategy, n, &stated, "stated", "the problem's guess and schedule");
-  if (is_recorded(problem)) {
+  const int given = cav_problem_is_given(problem) && !problem->cycle.on;
+  if (is_recorded(problem) || given) {
     add_repairs(strategy, n, &stated);
+    // what is simulated is where it is at its time however long that goes on
+    if (given) add_diagnoses(problem, strategy, n, &stated, 1);
     return CAV_OK;
   }
   guesses g;
@@ -488,6 +490,7 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   if (status == CAV_OK) status = add_others(problem, strategy, n, &g);
   if (status != CAV_OK) return status;
   add_last(problem, strategy, n, &g);
+  // what a swing-up takes is told by cav_problem_pumping
   add_diagnoses(problem, strategy, n, &g.stated, swings_up);
   return CAV_OK;
 }
