@@ -272,8 +272,11 @@ static cav_status solve_all(const cav_problem *problem, const cav_solve_options 
                             const cav_solution *before, cav_solution **solution, cav_error *error) {
   cav_trajectory *given = NULL;
   cav_solve_options straight = *options;
-  cav_status status = start || options->resume ? CAV_OK : cav_guess_given(problem, &given);
-  if (given) straight.first_stage = problem->schedule.stages + 1;
+  const cav_checkpoint *resume = options->resume;
+  cav_status status = start || resume ? CAV_OK : cav_guess_given(problem, &given);
+  // one that is gone on from ends with the same bits
+  const int again = resume && resume->begin == CAV_BEGIN_GIVEN && resume->place > CAV_PLACE_CONTINUATION && !start;
+  if (given || (again && cav_problem_is_given(problem))) straight.first_stage = problem->schedule.stages + 1;
   if (status == CAV_OK) status = solve_whole(problem, &straight, given ? given : start, before, solution, error);
   cav_trajectory_free(given);
   return status;
