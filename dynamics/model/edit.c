@@ -207,6 +207,13 @@ static int takes_more(const cav_model *model, const cav_joint *joint) {
   return joint->type != CAV_JOINT_FREE && joint_weight(model, joint) > 0;
 }
 
+void cav_model_scale_friction(cav_model *model, double factor) {
+  cav_geom *geom = WRITE(cav_geom, geom);
+  cav_pair *pair = WRITE(cav_pair, pair);
+  for (int i = 0; i < model->ngeom; i++) geom[i].friction[0] *= factor;
+  for (int i = 0; i < model->npair; i++) pair[i].friction[0] *= factor, pair[i].friction[1] *= factor;
+}
+
 int cav_model_set_stiffest(cav_model *model, double rate) {
   cav_joint *joint = WRITE(cav_joint, joint);
   cav_tendon *tendon = WRITE(cav_tendon, tendon);

@@ -43,6 +43,9 @@ double cav_model_most_damped(const cav_model *model, const char **name);
 int cav_model_set_stiffest(cav_model *model, double rate);
 int cav_model_set_most_damped(cav_model *model, double rate);
 
+/// Sliding friction of all geoms and pairs times factor, which is not negative.
+void cav_model_scale_friction(cav_model *model, double factor);
+
 /// solref of all constraints := (time constant, 1), s.
 void cav_model_set_solref(cav_model *model, double time_constant);
 

@@ -9,6 +9,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "edit.h"
 #include "file.h"
 #include "race.h"
 #include "random.h"
@@ -17,7 +18,7 @@
 
 const char *const cav_study_method_names[CAV_STUDY_METHODS] = {"own", "strategies", "ipopt", "limited", "both"};
 
-static const double joint_noise = 0.03, mass_noise = 0.05, least_friction = 0.6, most_friction = 1;
+static const double joint_noise = 0.03, mass_noise = 0.05, friction_noise = 0.25;
 
 static double processor_seconds(void) {
   struct timespec t;
@@ -85,8 +86,9 @@ cav_status cav_study_perturb(cav_problem *p, int start) {
   for (int i = 0; i < m->nlink; i++) scale[i] = 1 + mass_noise * cav_random_uniform(&seed);
   // a cycle that mirrors needs a model that is its own image: all masses by one factor
   for (int i = 1; i < m->nlink && p->cycle.mirror != CAV_MIRROR_NONE; i++) scale[i] = scale[0];
-  double fraction = 0.5 * (1 + cav_random_uniform(&seed));
-  cav_status status = cav_model_perturb(m, scale, least_friction + fraction * (most_friction - least_friction));
+  // of what each geom has: at one friction for all a box that the file lets slide tips where it is pushed
+  cav_model_scale_friction(m, 1 + friction_noise * cav_random_uniform(&seed));
+  cav_status status = cav_model_perturb(m, scale, 0);
   free(scale);
   return status ? status : perturb_posture(m, p->q_start, &seed);
 }
