@@ -76,6 +76,36 @@ static void test_through_ground(void) {
   cav_problem_free(p);
 }
 
+// a box that is to be carried is kept as it stands by a strategy of its own, unless a term tells its turn on the way, or the
+// goal has it turned; a ball, which has no side to stand on, is not
+static void test_upright(void) {
+  static const char *const motion[] = {"push-box", "throw"};
+  for (int k = 0; k < 2; k++) {
+    char path[300];
+    cav_error error;
+    cav_strategy strategy[CAV_STRATEGIES];
+    int n;
+    snprintf(path, sizeof path, CAVORT_SOURCE_ROOT "/problems/motions/%s/problem.xml", motion[k]);
+    cav_problem *p = cav_problem_load(path, NULL, &error);
+    if (!CHECK(p != NULL)) return;
+    CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && !find(strategy, n, "upright"));
+    for (int i = 0; i < p->nterm; i++)
+      if (!strcmp(p->term[i].name, "upright")) ((cav_term *)p->term)[i].weight = 0;
+    CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
+    const cav_strategy *upright = find(strategy, n, "upright");
+    CHECK((upright != NULL) == (k == 0));
+    if (upright) {
+      CHECK(upright == &strategy[1] && upright->stated);
+      CHECK_TEXT(upright->changed, "<sensor type=\"framequat\" xbody=\"box\" weight=\"100\"/>");
+      // turned over about x by the goal
+      double *q = p->q_goal + p->model->joint[p->model->njoint - 1].q;
+      q[3] = q[4] = sqrt(0.5);
+      CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && !find(strategy, n, "upright"));
+    }
+    cav_problem_free(p);
+  }
+}
+
 // both legs swing in turn, the right way round whichever way the axes point
 static void test_gait(const char *text, double axis, double travel) {
   cav_model *m = scene_load(text);
@@ -671,6 +701,7 @@ static void test_cycle(void) {
 
 int main(void) {
   test_through_ground();
+  test_upright();
   test_cycle();
   test_left();
   test_gait(BIPED("1"), 1, 2);

@@ -354,6 +354,7 @@ typedef struct cav_strategy {
   cav_swing swing[CAV_STRATEGY_SWINGS]; ///< [nswing]
   int ground;                           ///< 1: its guess stands on what is below it
   int hand;                             ///< 1: a hand is brought first to what has to be pushed or touched
+  int upright;                          ///< 1: what no actuator moves is kept upright by a cost on its turn
   double height, from, to;              ///< not stated: of a ballistic arc, m, and when, s
   int flies;                            ///< 1: start and goal are held before and after that arc
   cav_guess_pose pose[2];               ///< where it flies

@@ -9,6 +9,7 @@
 
 #include "cavort/solve.h"
 #include "schedule.h"
+#include "upright.h"
 
 /// What can be changed.
 typedef enum cure {
@@ -255,6 +256,8 @@ static void describe(const cav_problem *p, cav_strategy *s) {
     if (number[i].differs) snprintf(out + n, room - n, number[i].format, number[i].value);
   }
   size_t n = strlen(out);
+  if (s->upright) cav_upright_describe(p, out + n, room - n);
+  n = strlen(out);
   snprintf(out + n, room - n, "%s%s%s%s", s->order != p->order ? ", order=\"momentum\"" : "",
            s->schedule.sliding != p->schedule.sliding ? ", sliding=\"convex\"" : "",
            s->schedule.next_gap != p->schedule.next_gap ? ", next_gap=\"exact\"" : "",

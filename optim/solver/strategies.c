@@ -17,6 +17,7 @@
 #include "leap.h"
 #include "periodicity.h"
 #include "pump.h"
+#include "upright.h"
 
 /// Gap below which a limb carries, m; travel from which there is a gait, m; cosine from which a hinge lies across the
 /// travel.
@@ -340,11 +341,22 @@ typedef struct guesses {
   int pivots;                            ///< 1: it turns four feet or more on the spot, where they stand
 } guesses;
 
+/// With what no actuator moves kept upright. What tips is not mended by what else is missed, so it comes first.
+static void add_upright(const cav_problem *problem, cav_strategy *strategy, int *n) {
+  if (!cav_upright_terms(problem, NULL)) return;
+  cav_strategy kept = strategy[0];
+  kept.upright = 1;
+  cav_upright_describe(problem, kept.changed, sizeof kept.changed);
+  memmove(kept.changed, kept.changed + 2, strlen(kept.changed + 2) + 1);
+  add(strategy, n, &kept, "upright", "with a cost on how far what no actuator moves is turned from how it stands");
+}
+
 /// The stated guess, which is begun without the joints that its postures would have beyond the model's ranges, then with them
 /// at these ranges' ends; and under another order first.
 static void add_stated(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated) {
   const int left = problem->guess_left && !problem->cycle.on;
   if (left) strategy[0].left = 1, strategy[0].text = "the problem's guess without the joints that it has beyond ranges";
+  add_upright(problem, strategy, n);
   add_near(strategy, n, stated, MEND_STATED);
   if (left) {
     add(strategy, n, stated, "clipped", "the problem's guess, joints that it has beyond ranges at the ends of these");
@@ -604,11 +616,19 @@ static cav_status mend_pushed(cav_problem *taken, const cav_solve_options *optio
   return cav_solve(taken, &rest, start, solution, error);
 }
 
-cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *strategy,
-                              const cav_solve_options *options, const cav_trajectory *start, cav_solution **solution,
-                              cav_error *error) {
-  cav_problem taken;
-  cav_strategy_apply(problem, strategy, &taken);
+/// The terms of a problem and those that keep things upright, which are no part of it; to be freed. NULL: no memory.
+static cav_term *keep_upright(const cav_problem *problem, cav_problem *taken) {
+  const int more = cav_upright_terms(problem, NULL);
+  cav_term *term = calloc((size_t)(taken->nterm + more) + 1, sizeof *term);
+  if (!term) return NULL;
+  memcpy(term, taken->term, (size_t)taken->nterm * sizeof *term);
+  cav_upright_terms(problem, term + taken->nterm);
+  taken->term = term, taken->nterm += more;
+  return term;
+}
+
+static cav_status solve_taken(cav_problem taken, const cav_strategy *strategy, const cav_solve_options *options,
+                              const cav_trajectory *start, cav_solution **solution, cav_error *error) {
   if (strategy->hand && !start) return solve_pushed(&taken, options, solution, error);
   const cav_checkpoint *resume = options ? options->resume : NULL;
   int second = resume && resume->order == strategy->order;
@@ -634,5 +654,17 @@ cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *st
   taken.schedule = resumed(&taken.schedule);
   status = cav_solve_after(&taken, &rest, before->trajectory, before, solution, error);
   cav_solution_free(before);
+  return status;
+}
+
+cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *strategy,
+                              const cav_solve_options *options, const cav_trajectory *start, cav_solution **solution,
+                              cav_error *error) {
+  cav_problem taken;
+  cav_term *term = NULL;
+  cav_strategy_apply(problem, strategy, &taken);
+  if (strategy->upright && !(term = keep_upright(problem, &taken))) return CAV_NO_MEMORY;
+  cav_status status = solve_taken(taken, strategy, options, start, solution, error);
+  free(term);
   return status;
 }

@@ -1,0 +1,16 @@
+/// Terms that keep upright what no actuator moves and what is to stand at the goal as it did at the start. Private to
+/// optim/solver.
+#ifndef CAVORT_UPRIGHT_H
+#define CAVORT_UPRIGHT_H
+
+#include "cavort/problem.h"
+
+/// Writes these terms, which borrow the problem's start; term: room for one of each joint, NULL: they are counted alone.
+/// Returns their number: of each free body that no actuator moves, which terms or the goal want elsewhere, turned at the
+/// goal as at the start, that has a side to stand on, and whose turn no term tells on the way.
+int cav_upright_terms(const cav_problem *problem, cav_term *term);
+
+/// The terms as they would stand in the problem's file, each after a comma.
+void cav_upright_describe(const cav_problem *problem, char *text, size_t size);
+
+#endif
