@@ -341,14 +341,26 @@ typedef struct guesses {
   int pivots;                            ///< 1: it turns four feet or more on the spot, where they stand
 } guesses;
 
-/// With what no actuator moves kept upright. What tips is not mended by what else is missed, so it comes first.
-static void add_upright(const cav_problem *problem, cav_strategy *strategy, int *n) {
+/// With what no actuator moves kept upright. What tips is not mended by what else is missed, so this comes first where terms
+/// bring hands to it; elsewhere it stands still until something is brought to it.
+static void add_upright(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated) {
   if (!cav_upright_terms(problem, NULL)) return;
-  cav_strategy kept = strategy[0];
+  cav_strategy kept = *stated;
   kept.upright = 1;
   cav_upright_describe(problem, kept.changed, sizeof kept.changed);
   memmove(kept.changed, kept.changed + 2, strlen(kept.changed + 2) + 1);
   add(strategy, n, &kept, "upright", "with a cost on how far what no actuator moves is turned from how it stands");
+}
+
+/// From the guess that the first one begins with after all.
+static void begin_upright(cav_strategy *strategy, int n) {
+  for (int i = 1; i < n; i++) {
+    if (!strategy[i].upright) continue;
+    const cav_strategy kept = strategy[i];
+    strategy[i] = strategy[0];
+    strategy[i].name = kept.name, strategy[i].text = kept.text, strategy[i].upright = 1;
+    memcpy(strategy[i].changed, kept.changed, sizeof kept.changed);
+  }
 }
 
 /// The stated guess, which is begun without the joints that its postures would have beyond the model's ranges, then with them
@@ -356,7 +368,7 @@ static void add_upright(const cav_problem *problem, cav_strategy *strategy, int 
 static void add_stated(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated) {
   const int left = problem->guess_left && !problem->cycle.on;
   if (left) strategy[0].left = 1, strategy[0].text = "the problem's guess without the joints that it has beyond ranges";
-  add_upright(problem, strategy, n);
+  if (cav_upright_held(problem)) add_upright(problem, strategy, n, stated);
   add_near(strategy, n, stated, MEND_STATED);
   if (left) {
     add(strategy, n, stated, "clipped", "the problem's guess, joints that it has beyond ranges at the ends of these");
@@ -497,10 +509,12 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   int swings_up;
   add_stated(problem, strategy, n, &stated);
   cav_status status = add_pushed(problem, strategy, n, &stated);
+  if (status == CAV_OK && !cav_upright_held(problem)) add_upright(problem, strategy, n, &stated);
   if (status == CAV_OK) status = add_pumped(problem, strategy, n, &swings_up);
   if (status == CAV_OK) status = find_guesses(problem, &stated, strategy, &g);
   if (status == CAV_OK) status = add_others(problem, strategy, n, &g);
   if (status != CAV_OK) return status;
+  begin_upright(strategy, *n);
   add_last(problem, strategy, n, &g);
   // what a swing-up takes is told by cav_problem_pumping
   add_diagnoses(problem, strategy, n, &g.stated, swings_up);

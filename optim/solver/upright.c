@@ -77,6 +77,18 @@ int cav_upright_terms(const cav_problem *p, cav_term *term) {
   return n;
 }
 
+int cav_upright_held(const cav_problem *p) {
+  const cav_model *m = p->model;
+  int held = 0;
+  for (int j = 0; j < m->njoint && !held; j++)
+    for (int i = 0; i < p->nterm && !held && is_kept(p, &m->joint[j]); i++) {
+      const cav_sensor *s = &p->term[i].sensor;
+      held = p->term[i].quantity == CAV_QUANTITY_SENSOR && is_counted(&p->term[i]) && s->referred &&
+             cav_object_link(m, s->reference_type, s->reference) == m->joint[j].link;
+    }
+  return held;
+}
+
 void cav_upright_describe(const cav_problem *p, char *text, size_t size) {
   const cav_model *m = p->model;
   size_t n = 0;

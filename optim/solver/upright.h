@@ -10,6 +10,9 @@
 /// goal as at the start, that has a side to stand on, and whose turn no term tells on the way.
 int cav_upright_terms(const cav_problem *problem, cav_term *term);
 
+/// Whether terms bring something to one of these bodies already, by places in its frame: what pushes it has not to be found.
+int cav_upright_held(const cav_problem *problem);
+
 /// The terms as they would stand in the problem's file, each after a comma.
 void cav_upright_describe(const cav_problem *problem, char *text, size_t size);
 
