@@ -97,6 +97,14 @@ static void test_upright(void) {
     if (upright) {
       CHECK(upright == &strategy[1] && upright->stated);
       CHECK_TEXT(upright->changed, "<sensor type=\"framequat\" xbody=\"box\" weight=\"100\"/>");
+      // its terms are laid over the problem's: from the same guess the first steps are others
+      cav_solve_options few = cav_solve_options_default();
+      cav_solution *one = NULL, *two = NULL;
+      few.max_iterations = 3, few.gains = few.diagnose = 0;
+      cav_strategy_solve(p, &strategy[0], &few, NULL, &one, &error);
+      cav_strategy_solve(p, upright, &few, NULL, &two, &error);
+      if (CHECK(one && two)) CHECK(isfinite(two->cost) && one->cost != two->cost);
+      cav_solution_free(one), cav_solution_free(two);
       // turned over about x by the goal
       double *q = p->q_goal + p->model->joint[p->model->njoint - 1].q;
       q[3] = q[4] = sqrt(0.5);
