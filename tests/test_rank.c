@@ -123,6 +123,21 @@ static void test_momentum(void) {
   }
 }
 
+// harder contacts mend what is in something by a little; what is deep in itself is another motion
+static void test_deep(void) {
+  for (int between = 0; between < 2; between++)
+    for (int times = 1; times <= 3; times++) {
+      cav_race_report r = whole(), slides = whole();
+      *(between ? &r.verdict.penetration_between_m : &r.verdict.penetration_max_m) =
+          0.95 * times * CAV_TOLERANCE_PENETRATION;
+      slides.verdict.slip_mean_m_s = 1.5 * CAV_TOLERANCE_SLIP;
+      CHECK(cav_rank_near(&r, 0.8) == (times < 3));
+      if (times == 2) CHECK(!cav_rank_nearer(&r, &slides) && cav_rank_nearer(&slides, &r));
+      r.verdict.limit_violation_max = 0.05;
+      CHECK(cav_rank_near(&r, 0.8) == (times < 2));
+    }
+}
+
 // a cure that left nearly all of what was missed most did not help; nothing is known where something else is missed now, where
 // nothing is, or where forces are missing
 static void test_helped(void) {
@@ -181,6 +196,7 @@ int main(void) {
   test_nearer();
   test_spent();
   test_momentum();
+  test_deep();
   test_helped();
   return check_result();
 }

@@ -28,7 +28,8 @@ static const char swing[] =
 
 // a leg that hops over a floor; of the problem %s: how high its centre of mass comes, and how near
 static const char monopod[] =
-    "<mujoco><worldbody><geom type='plane' size='5 5 .1'/><body name='trunk' pos='0 0 .85'>"
+    "<mujoco><default><geom friction='.8'/></default><worldbody><geom type='plane' size='5 5 .1'/>"
+    "<body name='trunk' pos='0 0 .85'>"
     "<joint name='x' type='slide' axis='1 0 0'/><joint name='z' type='slide' axis='0 0 1'/>"
     "<joint name='pitch' axis='0 1 0'/><geom type='box' size='.15 .1 .1' mass='8'/><body name='thigh' pos='0 0 -.1'>"
     "<joint name='hip' axis='0 1 0' limited='true' range='-100 100'/>"

@@ -7,6 +7,9 @@
 // another order keeps
 static const double few = 4, several = 8;
 
+// the same of depths, which harder contacts make less
+static const double twice = 2;
+
 // part of what was missed that a cure leaves where it helped
 static const double helped = 0.95;
 
@@ -53,13 +56,13 @@ int cav_rank_worth(const cav_race_report *a, const cav_race_report *b) {
   return a->cost < (1 - worth) * b->cost;
 }
 
-// whether nothing is deeper in anything than is certified
-static int shallow(const cav_verdict *v) {
-  return fmax(v->penetration_max_m, v->penetration_between_m) <= CAV_TOLERANCE_PENETRATION;
+// the largest depth in anything, in its tolerance
+static double depth_of(const cav_verdict *v) {
+  return fmax(v->penetration_max_m, v->penetration_between_m) / CAV_TOLERANCE_PENETRATION;
 }
 
 int cav_rank_rough(const cav_verdict *v) {
-  return !v->certified && cav_verdict_feasible(v) && shallow(v) &&
+  return !v->certified && cav_verdict_feasible(v) && depth_of(v) <= twice &&
          v->momentum_defect_rms <= several * CAV_TOLERANCE_MOMENTUM && v->slip_mean_m_s <= few * CAV_TOLERANCE_SLIP &&
          v->hover_fraction <= few * CAV_TOLERANCE_HOVER;
 }
@@ -72,7 +75,7 @@ int cav_rank_near(const cav_race_report *report, double effort) {
   // a motion that does something else is not what is looked for
   if (2 * v->nmissed > v->ntarget) return 0;
   if (cav_rank_rough(v)) return 1;
-  return v->unactuated_force_max <= CAV_TOLERANCE_UNACTUATED && shallow(v) &&
+  return v->unactuated_force_max <= CAV_TOLERANCE_UNACTUATED && depth_of(v) <= 1 &&
          v->constraint_violation_max <= CAV_TOLERANCE_CONSTRAINT && v->limit_violation_max > CAV_TOLERANCE_LIMIT &&
          v->limit_violation_max < (1 - effort) / 2;
 }
@@ -94,7 +97,7 @@ static double over_tolerance(const cav_verdict *v, int *which) {
 // the duration over the time until then
 static double excess_of(const cav_verdict *v) {
   int which;
-  double most = over_tolerance(v, &which);
+  double most = fmax(over_tolerance(v, &which), depth_of(v));
   if (v->replay_step_max_error > CAV_TOLERANCE_STEP) most = fmax(most, folded);
   double followed = fmin(v->closed_loop_seconds, v->model_contacts_seconds);
   return fmax(most, v->duration / fmax(followed, v->duration / 100));
