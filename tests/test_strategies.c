@@ -89,6 +89,7 @@ static void test_upright(void) {
     cav_problem *p = cav_problem_load(path, NULL, &error);
     if (!CHECK(p != NULL)) return;
     CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && !find(strategy, n, "upright"));
+    cav_strategies_clear(strategy, n);
     for (int i = 0; i < p->nterm; i++)
       if (!strcmp(p->term[i].name, "upright")) ((cav_term *)p->term)[i].weight = 0;
     CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
@@ -105,11 +106,17 @@ static void test_upright(void) {
       cav_strategy_solve(p, upright, &few, NULL, &two, &error);
       if (CHECK(one && two)) CHECK(isfinite(two->cost) && one->cost != two->cost);
       cav_solution_free(one), cav_solution_free(two);
+      // and is what the motion is certified by, and its folder holds
+      cav_problem taken;
+      cav_strategy_apply(p, upright, &taken);
+      CHECK(taken.nterm == p->nterm + 1 && !strcmp(taken.term[p->nterm].name, "upright"));
       // turned over about x by the goal
+      cav_strategies_clear(strategy, n);
       double *q = p->q_goal + p->model->joint[p->model->njoint - 1].q;
       q[3] = q[4] = sqrt(0.5);
       CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && !find(strategy, n, "upright"));
     }
+    cav_strategies_clear(strategy, n);
     cav_problem_free(p);
   }
 }

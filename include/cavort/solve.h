@@ -354,7 +354,6 @@ typedef struct cav_strategy {
   cav_swing swing[CAV_STRATEGY_SWINGS]; ///< [nswing]
   int ground;                           ///< 1: its guess stands on what is below it
   int hand;                             ///< 1: a hand is brought first to what has to be pushed or touched
-  int upright;                          ///< 1: what no actuator moves is kept upright by a cost on its turn
   double height, from, to;              ///< not stated: of a ballistic arc, m, and when, s
   int flies;                            ///< 1: start and goal are held before and after that arc
   cav_guess_pose pose[2];               ///< where it flies
@@ -380,11 +379,12 @@ typedef struct cav_pumping {
 CAV_API cav_status cav_problem_pumping(const cav_problem *problem, cav_pumping *pumping);
 
 /// Strategies for a problem, in the order in which they are worth trying; the first is the problem's own.
-/// CAV_NO_MEMORY, or what the dynamics says of the goal posture.
+/// CAV_NO_MEMORY, or what the dynamics says of the goal posture. Cleared by cav_strategies_clear, after a failure, too.
 CAV_API cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[CAV_STRATEGIES], int *n);
 
-/// Frees what a repaired strategy owns.
+/// Frees what one strategy owns, or n of them: their terms.
 CAV_API void cav_strategy_clear(cav_strategy *strategy);
+CAV_API void cav_strategies_clear(cav_strategy *strategy, int n);
 
 /// The problem by a strategy: borrows all else from the problem, and the swings from the strategy.
 CAV_API void cav_strategy_apply(const cav_problem *problem, const cav_strategy *strategy, cav_problem *taken);

@@ -236,8 +236,11 @@ static void describe(const cav_problem *p, cav_strategy *s) {
   }
   for (int i = p->nterm; i < s->nterm; i++) {
     size_t n = strlen(out);
-    snprintf(out + n, room - n, ", <%s weight=\"%g\"/>%s", cav_quantity_rule_of(s->term[i].quantity)->name,
-             s->term[i].weight, is_stated(p, s->term[i].quantity) ? " beside the one that is there" : "");
+    if (s->term[i].quantity == CAV_QUANTITY_SENSOR)
+      cav_upright_describe(p, &s->term[i], out + n, room - n);
+    else
+      snprintf(out + n, room - n, ", <%s weight=\"%g\"/>%s", cav_quantity_rule_of(s->term[i].quantity)->name,
+               s->term[i].weight, is_stated(p, s->term[i].quantity) ? " beside the one that is there" : "");
   }
   const struct {
     int differs;
@@ -256,8 +259,6 @@ static void describe(const cav_problem *p, cav_strategy *s) {
     if (number[i].differs) snprintf(out + n, room - n, number[i].format, number[i].value);
   }
   size_t n = strlen(out);
-  if (s->upright) cav_upright_describe(p, out + n, room - n);
-  n = strlen(out);
   snprintf(out + n, room - n, "%s%s%s%s", s->order != p->order ? ", order=\"momentum\"" : "",
            s->schedule.sliding != p->schedule.sliding ? ", sliding=\"convex\"" : "",
            s->schedule.next_gap != p->schedule.next_gap ? ", next_gap=\"exact\"" : "",
@@ -296,4 +297,8 @@ void cav_strategy_clear(cav_strategy *strategy) {
   free(strategy->term);
   strategy->term = NULL;
   strategy->nterm = 0;
+}
+
+void cav_strategies_clear(cav_strategy *strategy, int n) {
+  for (int i = 0; i < n; i++) cav_strategy_clear(&strategy[i]);
 }

@@ -343,41 +343,52 @@ typedef struct guesses {
 
 /// With what no actuator moves kept upright. What tips is not mended by what else is missed, so this comes first where terms
 /// bring hands to it; elsewhere it stands still until something is brought to it.
-static void add_upright(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated) {
-  if (!cav_upright_terms(problem, NULL)) return;
+static cav_status add_upright(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated) {
+  const int more = cav_upright_terms(problem, NULL);
+  if (more == 0) return CAV_OK;
   cav_strategy kept = *stated;
-  kept.upright = 1;
-  cav_upright_describe(problem, kept.changed, sizeof kept.changed);
+  kept.nterm = problem->nterm + more;
+  kept.term = calloc((size_t)kept.nterm, sizeof *kept.term);
+  if (!kept.term) return CAV_NO_MEMORY;
+  memcpy(kept.term, problem->term, (size_t)problem->nterm * sizeof *kept.term);
+  cav_upright_terms(problem, kept.term + problem->nterm);
+  for (int i = problem->nterm; i < kept.nterm; i++) {
+    const size_t used = strlen(kept.changed);
+    cav_upright_describe(problem, &kept.term[i], kept.changed + used, sizeof kept.changed - used);
+  }
   memmove(kept.changed, kept.changed + 2, strlen(kept.changed + 2) + 1);
   add(strategy, n, &kept, "upright", "with a cost on how far what no actuator moves is turned from how it stands");
+  return CAV_OK;
 }
 
-/// From the guess that the first one begins with after all.
+/// What has terms of its own begins with the guess that the first one begins with after all.
 static void begin_upright(cav_strategy *strategy, int n) {
   for (int i = 1; i < n; i++) {
-    if (!strategy[i].upright) continue;
+    if (!strategy[i].term) continue;
     const cav_strategy kept = strategy[i];
     strategy[i] = strategy[0];
-    strategy[i].name = kept.name, strategy[i].text = kept.text, strategy[i].upright = 1;
+    strategy[i].name = kept.name, strategy[i].text = kept.text, strategy[i].term = kept.term,
+    strategy[i].nterm = kept.nterm;
     memcpy(strategy[i].changed, kept.changed, sizeof kept.changed);
   }
 }
 
 /// The stated guess, which is begun without the joints that its postures would have beyond the model's ranges, then with them
 /// at these ranges' ends; and under another order first.
-static void add_stated(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated) {
+static cav_status add_stated(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated) {
   const int left = problem->guess_left && !problem->cycle.on;
   if (left) strategy[0].left = 1, strategy[0].text = "the problem's guess without the joints that it has beyond ranges";
-  if (cav_upright_held(problem)) add_upright(problem, strategy, n, stated);
+  const cav_status status = cav_upright_held(problem) ? add_upright(problem, strategy, n, stated) : CAV_OK;
   add_near(strategy, n, stated, MEND_STATED);
   if (left) {
     add(strategy, n, stated, "clipped", "the problem's guess, joints that it has beyond ranges at the ends of these");
     add_near(strategy, n, stated, MEND);
   }
-  if (problem->order != CAV_ORDER_MOMENTUM) return;
+  if (problem->order != CAV_ORDER_MOMENTUM) return status;
   cav_strategy twice = *stated;
   twice.first_midpoint = 1;
   add(strategy, n, &twice, "midpoint", "under the midpoint order first, then from there under the order of momentum");
+  return status;
 }
 
 static cav_status add_pumped(const cav_problem *problem, cav_strategy *strategy, int *n, int *swings_up) {
@@ -507,9 +518,9 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   }
   guesses g;
   int swings_up;
-  add_stated(problem, strategy, n, &stated);
-  cav_status status = add_pushed(problem, strategy, n, &stated);
-  if (status == CAV_OK && !cav_upright_held(problem)) add_upright(problem, strategy, n, &stated);
+  cav_status status = add_stated(problem, strategy, n, &stated);
+  if (status == CAV_OK) status = add_pushed(problem, strategy, n, &stated);
+  if (status == CAV_OK && !cav_upright_held(problem)) status = add_upright(problem, strategy, n, &stated);
   if (status == CAV_OK) status = add_pumped(problem, strategy, n, &swings_up);
   if (status == CAV_OK) status = find_guesses(problem, &stated, strategy, &g);
   if (status == CAV_OK) status = add_others(problem, strategy, n, &g);
@@ -630,19 +641,11 @@ static cav_status mend_pushed(cav_problem *taken, const cav_solve_options *optio
   return cav_solve(taken, &rest, start, solution, error);
 }
 
-/// The terms of a problem and those that keep things upright, which are no part of it; to be freed. NULL: no memory.
-static cav_term *keep_upright(const cav_problem *problem, cav_problem *taken) {
-  const int more = cav_upright_terms(problem, NULL);
-  cav_term *term = calloc((size_t)(taken->nterm + more) + 1, sizeof *term);
-  if (!term) return NULL;
-  memcpy(term, taken->term, (size_t)taken->nterm * sizeof *term);
-  cav_upright_terms(problem, term + taken->nterm);
-  taken->term = term, taken->nterm += more;
-  return term;
-}
-
-static cav_status solve_taken(cav_problem taken, const cav_strategy *strategy, const cav_solve_options *options,
-                              const cav_trajectory *start, cav_solution **solution, cav_error *error) {
+cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *strategy,
+                              const cav_solve_options *options, const cav_trajectory *start, cav_solution **solution,
+                              cav_error *error) {
+  cav_problem taken;
+  cav_strategy_apply(problem, strategy, &taken);
   if (strategy->hand && !start) return solve_pushed(&taken, options, solution, error);
   const cav_checkpoint *resume = options ? options->resume : NULL;
   int second = resume && resume->order == strategy->order;
@@ -668,17 +671,5 @@ static cav_status solve_taken(cav_problem taken, const cav_strategy *strategy, c
   taken.schedule = resumed(&taken.schedule);
   status = cav_solve_after(&taken, &rest, before->trajectory, before, solution, error);
   cav_solution_free(before);
-  return status;
-}
-
-cav_status cav_strategy_solve(const cav_problem *problem, const cav_strategy *strategy,
-                              const cav_solve_options *options, const cav_trajectory *start, cav_solution **solution,
-                              cav_error *error) {
-  cav_problem taken;
-  cav_term *term = NULL;
-  cav_strategy_apply(problem, strategy, &taken);
-  if (strategy->upright && !(term = keep_upright(problem, &taken))) return CAV_NO_MEMORY;
-  cav_status status = solve_taken(taken, strategy, options, start, solution, error);
-  free(term);
   return status;
 }

@@ -5,7 +5,6 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 /// Weight of the terms; rad between start and goal up to which it is turned the same; m from which a goal has it elsewhere.
 static const double weight = 100, same = 0.02, least_way = 0.02;
@@ -47,7 +46,7 @@ static int is_level(const cav_problem *p, const cav_joint *joint) {
   return fabs(w) > cos(same / 2);
 }
 
-/// Whether it has a geom that touches others and does not roll whichever way it lies.
+/// Whether it has a geom that does not roll whichever way it lies.
 static int has_side(const cav_model *m, int link) {
   for (int g = 0; g < m->ngeom; g++)
     if (m->geom[g].link == link && m->geom[g].type != CAV_GEOM_SPHERE) return 1;
@@ -89,17 +88,12 @@ int cav_upright_held(const cav_problem *p) {
   return held;
 }
 
-void cav_upright_describe(const cav_problem *p, char *text, size_t size) {
-  const cav_model *m = p->model;
-  size_t n = 0;
-  *text = 0;
-  for (int j = 0; j < m->njoint && n < size; j++) {
-    const double *q = p->q_start + m->joint[j].q + 3;
-    if (!is_kept(p, &m->joint[j])) continue;
-    char target[80] = "";
-    if (fabs(q[0]) < cos(same / 2))
-      snprintf(target, sizeof target, " target=\"%.3g %.3g %.3g %.3g\"", q[0], q[1], q[2], q[3]);
-    n += (size_t)snprintf(text + n, size - n, ", <sensor type=\"framequat\" xbody=\"%.40s\"%s weight=\"%g\"/>",
-                          m->body[m->link[m->joint[j].link].body].name, target, weight);
-  }
+void cav_upright_describe(const cav_problem *p, const cav_term *term, char *text, size_t size) {
+  const double *q = term->target;
+  const char *name = p->model->body[term->sensor.object].name;
+  char target[80] = "";
+  if (fabs(q[0]) < cos(same / 2))
+    snprintf(target, sizeof target, " target=\"%.3g %.3g %.3g %.3g\"", q[0], q[1], q[2], q[3]);
+  snprintf(text, size, ", <sensor type=\"framequat\" xbody=\"%.40s\"%s weight=\"%g\"/>", name ? name : "", target,
+           term->weight);
 }

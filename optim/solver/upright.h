@@ -13,7 +13,7 @@ int cav_upright_terms(const cav_problem *problem, cav_term *term);
 /// Whether terms bring something to one of these bodies already, by places in its frame: what pushes it has not to be found.
 int cav_upright_held(const cav_problem *problem);
 
-/// The terms as they would stand in the problem's file, each after a comma.
-void cav_upright_describe(const cav_problem *problem, char *text, size_t size);
+/// One of these terms as it would stand in the problem's file, after a comma.
+void cav_upright_describe(const cav_problem *problem, const cav_term *term, char *text, size_t size);
 
 #endif

@@ -151,7 +151,9 @@ static void tell_remedy(const cav_result *result, const cav_verdict *verdict, co
   cav_strategy strategy[CAV_STRATEGIES], repaired;
   int n = 0, found = 1;
   trial tried = NOT_TRIED;
-  if (cav_strategy_list(result->problem, strategy, &n) || n == 0) return;
+  const cav_status status = cav_strategy_list(result->problem, strategy, &n);
+  cav_strategies_clear(strategy + 1, n > 0 ? n - 1 : 0); // the first one has the problem's terms
+  if (status || n == 0) return;
   int said = snprintf(text, size, "how it is planned, not what is asked: forces, limits and constraints hold. ");
   const double defect = verdict->momentum_defect_rms / CAV_TOLERANCE_MOMENTUM;
   if (defect > far)

@@ -30,12 +30,13 @@ static int worst_of(const cav_problem *p, const cav_term_report *report) {
 static void suggest(const cav_problem *p, char *text, size_t size) {
   cav_strategy strategy[CAV_STRATEGIES];
   int n = 0;
-  if (cav_strategy_list(p, strategy, &n)) n = 0;
+  const cav_status status = cav_strategy_list(p, strategy, &n);
   snprintf(text, size, "postures on the way to it (<waypoint> in <guess>) lead elsewhere");
-  for (int i = 0; i < n; i++)
+  for (int i = 0; i < n && !status; i++)
     if (strategy[i].height > 0)
       snprintf(text, size, "<guess apex=\"%.3g\" from=\"%.3g\" to=\"%.3g\"/> leads elsewhere", strategy[i].height,
                strategy[i].from, strategy[i].to);
+  cav_strategies_clear(strategy, n);
 }
 
 /// How far a motion is from the ends of what actuators and joints can do, where no multiplier speaks of a limit.

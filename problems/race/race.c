@@ -37,16 +37,19 @@ cav_status cav_race_open(cav_race *race, int most, cav_error *error) {
   cav_strategy strategy[CAV_STRATEGIES];
   int n = 0;
   cav_status status = cav_strategy_list(race->problem, strategy, &n);
-  if (status) return cav_file_fail(error, status, 0, "strategies cannot be listed: %s", cav_status_name(status));
   race->n = 0;
+  if (status) cav_strategies_clear(strategy, n);
+  if (status) return cav_file_fail(error, status, 0, "strategies cannot be listed: %s", cav_status_name(status));
   race->begin = 0;
   race->begin = cav_race_seconds(race);
   // a motion that is given has no guess
   if (race->start)
     strategy[0].stated = 1, strategy[0].guess = race->problem->guess, strategy[0].schedule = race->problem->schedule;
-  for (int i = 0; i < n && race->n < most; i++)
+  for (int i = 0; i < n; i++)
     // of those that are solved at once none waits for another
-    if (most >= CAV_STRATEGIES || strategy[i].use != CAV_STRATEGY_NEAR)
+    if (race->n >= most || (most < CAV_STRATEGIES && strategy[i].use == CAV_STRATEGY_NEAR))
+      cav_strategy_clear(&strategy[i]);
+    else
       race->entry[race->n++] =
           (cav_race_entry){.strategy = strategy[i], .from = -1, .mends = -1, .cure = -1, .answer = -1, .order = -1};
   return CAV_OK;

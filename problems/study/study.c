@@ -145,6 +145,7 @@ static cav_status solve_stated(const cav_problem *problem, cav_study_run *run, c
   cav_verdict verdict;
   int n = 0;
   cav_status status = cav_strategy_list(problem, strategy, &n);
+  cav_strategies_clear(strategy + 1, n > 0 ? n - 1 : 0); // the first one has the problem's terms
   if (status) return cav_file_fail(error, status, 0, "strategies cannot be listed: %s", cav_status_name(status));
   status = cav_strategy_solve(problem, &strategy[0], &options, NULL, &solution, error);
   if (solution) status = cav_verify_solution(problem, solution, &verdict, error);

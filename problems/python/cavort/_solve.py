@@ -9,6 +9,7 @@ from . import _library
 from ._library import Record, failure, ffi, lib, new_error
 from ._problem import Frozen, Problem
 from ._solution import Solution
+from ._term import Term
 
 
 class _Watch:
@@ -62,6 +63,7 @@ def _start_warm(frozen: Frozen, options: Any, warm: Solution) -> Any:
 def _strategies(frozen: Frozen, most: int) -> list[Any]:
     # the problem's own guess first; what is worth trying after it
     array, count = ffi.new("cav_strategy[]", lib.CAV_STRATEGIES), ffi.new("int *")
+    array = ffi.gc(array, lambda strategies: lib.cav_strategies_clear(strategies, count[0]))
     frozen.check(lib.cav_strategy_list(frozen.c, array, count), "the strategies")
     frozen.keep = (frozen.keep, array)
     listed = [array[i] for i in range(count[0])]
@@ -78,7 +80,9 @@ def _run(problem: Problem, frozen: Frozen, strategy: Any, options: Any, start: A
         status = lib.cav_strategy_solve(frozen.c, ffi.addressof(strategy), options, start, out, error)
         struct, name = ffi.new("cav_problem *"), _library.text(strategy.name)
         lib.cav_strategy_apply(frozen.c, ffi.addressof(strategy), struct)
-        taken = Frozen(struct, frozen.model, frozen.terms, frozen)
+        # a strategy may have terms of its own behind the problem's
+        added = [Term(frozen.model, struct.term[i], keep=frozen) for i in range(len(frozen.terms), struct.nterm)]
+        taken = Frozen(struct, frozen.model, [*frozen.terms, *added], frozen)
     found = None
     if out[0]:
         found = Solution(problem, taken, ffi.gc(out[0], lib.cav_solution_free), status, name)
