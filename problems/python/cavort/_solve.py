@@ -63,9 +63,9 @@ def _start_warm(frozen: Frozen, options: Any, warm: Solution) -> Any:
 def _strategies(frozen: Frozen, most: int) -> list[Any]:
     # the problem's own guess first; what is worth trying after it
     array, count = ffi.new("cav_strategy[]", lib.CAV_STRATEGIES), ffi.new("int *")
-    array = ffi.gc(array, lambda strategies: lib.cav_strategies_clear(strategies, count[0]))
+    owner = ffi.gc(ffi.cast("cav_strategy *", array), lambda _: lib.cav_strategies_clear(array, count[0]))
     frozen.check(lib.cav_strategy_list(frozen.c, array, count), "the strategies")
-    frozen.keep = (frozen.keep, array)
+    frozen.keep = (frozen.keep, array, owner)
     listed = [array[i] for i in range(count[0])]
     return [strategy for strategy in listed if strategy.use == lib.CAV_STRATEGY_TRY][:most]
 
