@@ -98,7 +98,7 @@ static void check_quantities(void) {
   CHECK(!cav_problem_load(path, NULL, &own) && own.status == CAV_BAD_INPUT && strstr(own.text, "<user>"));
   for (cav_quantity k = 0; k < CAV_QUANTITY_USER; k++) {
     const cav_quantity_rule *rule = cav_quantity_rule_of(k);
-    const char *what = k == CAV_QUANTITY_SENSOR  ? " type='framepos' site='eye'"
+    const char *what = k == CAV_QUANTITY_SENSOR  ? " type='framepos' site='eye' reftype='body' refname='trunk'"
                        : k == CAV_QUANTITY_TRACK ? " file='record.csv' joints='knee'"
                                                  : "";
     write_in("record.csv", "time,knee\n0,0\n.5,.1\n1,\n");

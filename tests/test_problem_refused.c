@@ -187,6 +187,10 @@ static void check_broken_terms(void) {
   refuse_cost("<sensor weight='1' type='accelerometer' site='eye' relative='start'/>", "at rest");
   refuse_cost("<sensor weight='1' type='framepos' body='trunc'/>", "did you mean 'trunk'");
   refuse_cost("<sensor weight='1' type='framepos' body='trunk' target='1 2'/>", "expected 3 numbers");
+  refuse_cost("<sensor weight='1' type='framepos' body='trunk' component='x'/>",
+              "give a place in the world, or relative=");
+  refuse_cost("<sensor weight='1' type='subtreecom' body='trunk'/>", "give a place in the world, or relative=");
+  refuse_cost("<sensor weight='1' type='framexaxis' body='trunk' reftype='body' refname='shin'/>", "give a direction");
   refuse_cost("<sensor weight='1' type='framepos' body='trunk' component='z' target='1 2 3'/>", "expected 1 number");
   refuse_cost("<sensor weight='1' type='framepos' body='trunk' component='w'/>", "x, y or z");
   refuse_cost("<sensor weight='1' type='jointpos' joint='knee' component='x'/>", "one value");

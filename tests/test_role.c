@@ -316,7 +316,7 @@ static void check_oddities(void) {
 static cav_problem *load(const char *model, const char *body, cav_error *error) {
   static const char pattern[] =
       "<problem name='p' model='%s/problems/models/%s.xml'><horizon duration='.2' timestep='.05'/>"
-      "<start key='stand' height='floor'/><cost><sensor type='framepos' %s weight='1'/></cost>"
+      "<start key='stand' height='floor'/><cost><sensor type='framepos' %s target='0 0 1' weight='1'/></cost>"
       "</problem>";
   char text[5000], path[100];
   snprintf(text, sizeof text, pattern, CAVORT_SOURCE_ROOT, model, body);

@@ -138,7 +138,9 @@ static const cav_xml_element pose = {
   TEXT("component", "(all)", "x, y or z: the one value that counts")
 #define SENSOR_ATTRIBUTES                                                                                              \
   SENSOR_SOURCE, TABLE,                                                                                                \
-  REALS("target", 1, 0, "of the sensor", "(0; the unit quaternion)", "wanted reading: all values, or that of the component"), \
+  REALS("target", 1, 0, "of the sensor",                                                                               \
+        "(0; the unit quaternion; none for places in the world and directions unless relative)",                       \
+        "wanted reading: all values, or that of the component"),                                                       \
   WORD("relative", relations, "none", "the target is counted from the reading at the start or the goal posture")
 static const cav_xml_element posture_waypoint = {
     "waypoint", 0, 0,

@@ -120,6 +120,9 @@ int cav_term_counts(const cav_term *term);
 /// Sensor of an element, declared there or by the model's name for it, into term->sensor and component. term.c.
 cav_status cav_problem_sensor(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term);
 
+/// Whether zeros are no wish: a sensor reads a place in the world, or a direction. term.c.
+int cav_problem_needs_target(const cav_term *term);
+
 /// Terms of a <track>, copies of base with a record each: *n of them, CAV_TRACK_TERMS at most. track.c.
 enum { CAV_TRACK_TERMS = 3 };
 cav_status cav_problem_track(const cav_problem_reader *reader, const cav_xml_node *node, const cav_term *base,

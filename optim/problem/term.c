@@ -492,9 +492,21 @@ cav_status cav_problem_sensor(const cav_problem_reader *reader, const cav_xml_no
   return status ? status : read_component(reader, node, term);
 }
 
+int cav_problem_needs_target(const cav_term *term) {
+  const cav_sensor *sensor = &term->sensor;
+  return is_direction(term) || sensor->type == CAV_SENSOR_SUBTREECOM ||
+         (sensor->type == CAV_SENSOR_FRAMEPOS && !sensor->referred);
+}
+
 static cav_status read_sensor(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
   cav_status status = cav_problem_sensor(reader, node, term);
   if (!status) status = read_targets(reader, node, term, term->sensor.dim, sensor_target);
+  if (!status && !term->target && term->use != CAV_USE_RANGE && !cav_xml_word(node, "relative", 0) &&
+      cav_problem_needs_target(term)) {
+    status = cav_xml_fail(reader->error, node, "target",
+                          "is missing; give %s, or relative=\"start\" or \"goal\" to count from the reading there",
+                          is_direction(term) ? "a direction" : "a place in the world");
+  }
   if (!status && term->use == CAV_USE_RANGE && term->target && term->sensor.dim != 4) {
     status = cav_xml_fail(reader->error, node, "target", "contradicts 'lower' and 'upper'; give one or the others");
   }

@@ -190,6 +190,10 @@ static int write_term(FILE *out, const cav_problem *p, const cav_term *term) {
   }
   if (cav_term_has_dofs(term) && !write_dofs(out, p, term)) return 0;
   if (term->target && !term->nwaypoint) write_target(out, p, term, term->target);
+  // zeros, which a file has to say
+  if (!term->target && term->quantity == CAV_QUANTITY_SENSOR && term->use != CAV_USE_RANGE &&
+      cav_problem_needs_target(term))
+    write_target(out, p, term, (const double[3]){0});
   write_window(out, p, term);
   if (term->body > 0 && !*p->model->body[term->body].name) return 0;
   if (term->body > 0) write_text(out, "body", p->model->body[term->body].name);
