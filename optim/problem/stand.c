@@ -1,5 +1,4 @@
-/// Standing without names: least squares by Gauss-Newton with a Levenberg-Marquardt damping, on the manifold of
-/// configurations, derivatives by differences. Rows: the tilt of the soles of bipeds (a sole is flat where it was flat in the
+/// Standing without names, by least squares over configurations (posture_search.c). Rows: the tilt of the soles of bipeds (a sole is flat where it was flat in the
 /// model's own configuration), heights of all feet, the centre of mass over their middle, the height of the trunk, and, with
 /// small weights, the way from the model's own configuration. Legs that are straight there, whose length can only fall, are
 /// bent: the trunk comes down by a fixed fraction, and hinges start off towards the middle of their ranges; soles of a
@@ -13,13 +12,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "dense.h"
+#include "posture_search.h"
 
 static const double straight = 0.93;   // leg's length over that of its parts
 static const double biped_bent = 0.96; // of the height of straight legs
 static const double quadruped_bent = 0.75;
 static const double start_bend = 0.3;    // rad
-static const double inside = 0.02;       // rad from a limit
 static const double length_weight = 100; // 1/m
 static const double joint_weight = 0.03, root_weight = 0.3, under_weight = 10;
 static const double tilt_weight = 30;
@@ -38,8 +36,8 @@ typedef struct stander {
   int stretched;                      // legs are straight in the model's own configuration
   double under[FEET][2];              // from where a leg begins to its sole there, m
   double apart, width;                // feet of a biped, sideways: as wanted, 0 for wherever; as they are
-  int nrow;
-  double *q0, *q, *trial, *step;
+  double *q0, *q, *step;
+  cav_stand *stand; // what the posture looked at last is off by
 } stander;
 
 // world point of a point of a body
@@ -122,32 +120,6 @@ static void bend(stander *s, int k) {
   }
 }
 
-// the range that a joint is kept in
-static void kept_range(const cav_joint *joint, double range[2]) {
-  int scalar = joint->limited && (joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE);
-  double room = scalar ? fmin(inside, (joint->range[1] - joint->range[0]) / 4) : 0;
-  range[0] = scalar ? joint->range[0] + room : -INFINITY;
-  range[1] = scalar ? joint->range[1] - room : INFINITY;
-}
-
-static void clip(const cav_model *m, double *q) {
-  double range[2];
-  for (int j = 0; j < m->njoint; j++) {
-    const cav_joint *joint = &m->joint[j];
-    kept_range(joint, range);
-    if (joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE)
-      q[joint->q] = fmin(fmax(q[joint->q], range[0]), range[1]);
-  }
-}
-
-// whether a dof is at an end of its range and would go beyond it
-static int is_pinned(const stander *s, int d, double way) {
-  const cav_joint *joint = &s->model->joint[s->model->dof[d].joint];
-  double range[2];
-  kept_range(joint, range);
-  return (way > 0 && s->q[joint->q] >= range[1]) || (way < 0 && s->q[joint->q] <= range[0]);
-}
-
 // weight of the way of dof d from the model's own configuration
 static double holding(const cav_model *m, int d) {
   const cav_joint *joint = &m->joint[m->dof[d].joint];
@@ -163,8 +135,10 @@ static void reach_of(const stander *s, int k, const double sole[3], double reach
   for (int i = 0; i < 2; i++) reach[i] = sole[i] - at.pos[i];
 }
 
-// rows at q; what the posture is off by in stand
-static cav_status rows(stander *s, const double *q, double *row, cav_stand *stand) {
+// rows at q, zeros where there are fewer; what the posture is off by in s->stand
+static cav_status rows(void *user, const double *q, double *row) {
+  stander *s = user;
+  cav_stand *stand = s->stand;
   const cav_model *m = s->model;
   cav_status status = cav_position(m, s->state, q);
   if (status) return status;
@@ -213,75 +187,8 @@ static cav_status rows(stander *s, const double *q, double *row, cav_stand *stan
   cav_difference(m, s->q0, q, 1, s->step);
   for (int d = 0; d < m->nv; d++) row[n++] = holding(m, d) * s->step[d];
   assert(n <= OTHER_ROWS + m->nv);
-  s->nrow = n;
+  memset(row + n, 0, (size_t)(OTHER_ROWS + m->nv - n) * sizeof *row);
   return CAV_OK;
-}
-
-static double square(const double *row, int n) {
-  double sum = 0;
-  for (int i = 0; i < n; i++) sum += row[i] * row[i];
-  return sum;
-}
-
-// one step from s->q with that damping; work [nrow (nv+2) + nv^2 + 2 nv]. *better: whether it was taken
-static cav_status iterate(stander *s, double damping, double *work, int *better, cav_stand *stand) {
-  static const double difference = 1e-6;
-  const cav_model *m = s->model;
-  int nv = m->nv, most = OTHER_ROWS + nv;
-  double *row = work, *moved = row + most, *jacobian = moved + most, *a = jacobian + (size_t)most * (size_t)nv,
-         *b = a + (size_t)nv * (size_t)nv, *unit = b + nv;
-  cav_status status = rows(s, s->q, row, stand);
-  int n = s->nrow;
-  for (int d = 0; d < nv && !status; d++) {
-    cav_stand ignored;
-    memset(unit, 0, (size_t)nv * sizeof *unit);
-    unit[d] = difference;
-    cav_integrate(m, s->q, unit, 1, s->trial);
-    status = rows(s, s->trial, moved, &ignored);
-    for (int i = 0; i < n; i++) jacobian[i * nv + d] = (moved[i] - row[i]) / difference;
-  }
-  if (status) return status;
-  for (int d = 0; d < nv; d++) {
-    for (int e = 0; e <= d; e++) {
-      a[e * nv + d] = d == e ? damping : 0;
-      for (int i = 0; i < n; i++) a[e * nv + d] += jacobian[i * nv + d] * jacobian[i * nv + e];
-    }
-    b[d] = 0;
-    for (int i = 0; i < n; i++) b[d] -= jacobian[i * nv + d] * row[i];
-  }
-  for (int d = 0; d < nv; d++) {
-    if (!is_pinned(s, d, b[d])) continue;
-    for (int e = 0; e < nv; e++) a[d > e ? e * nv + d : d * nv + e] = d == e;
-    b[d] = 0;
-  }
-  *better = cav_dense_factor(nv, nv - 1, a, nv);
-  if (!*better) return CAV_OK;
-  cav_dense_solve_lower(nv, nv - 1, a, nv, 1, b, nv);
-  cav_dense_solve_upper(nv, nv - 1, a, nv, 1, b, nv);
-  cav_integrate(m, s->q, b, 1, s->trial);
-  clip(m, s->trial);
-  cav_stand after;
-  status = rows(s, s->trial, moved, &after);
-  *better = !status && square(moved, n) < square(row, n);
-  if (!*better) return status;
-  memcpy(s->q, s->trial, (size_t)m->nq * sizeof *s->q);
-  *stand = after;
-  return CAV_OK;
-}
-
-static cav_status search(stander *s, cav_stand *stand) {
-  enum { ITERATIONS = 100 };
-  int nv = s->model->nv, most = OTHER_ROWS + nv;
-  double *work = calloc((size_t)most * (size_t)(nv + 2) + (size_t)nv * (size_t)nv + 2 * (size_t)nv, sizeof *work);
-  cav_status status = work ? CAV_OK : CAV_NO_MEMORY;
-  double damping = 1e-3;
-  for (int i = 0; i < ITERATIONS && damping < 1e6 && !status; i++) {
-    int better = 0;
-    status = iterate(s, damping, work, &better, stand);
-    damping = better ? fmax(damping / 5, 1e-9) : damping * 5;
-  }
-  free(work);
-  return status;
 }
 
 // how deep links are inside each other at s->q
@@ -298,15 +205,17 @@ static cav_status find_overlap(const stander *s, double *deepest) {
 }
 
 // a posture; farther and farther apart while links are inside each other. Feet that cannot go farther stay
-static cav_status search_clear(stander *s, cav_stand *stand) {
+static cav_status search_clear(stander *s) {
   enum { TRIES = 6 };
-  cav_status status = search(s, stand);
+  cav_posture_search search = {
+      .model = s->model, .nrow = OTHER_ROWS + s->model->nv, .q = s->q, .rows = rows, .user = s};
+  cav_status status = cav_posture_find(&search);
   for (int i = 0; i < TRIES && !status && s->nfoot == 2; i++) {
     double overlap;
     status = find_overlap(s, &overlap);
     if (status || overlap <= touching) break;
     s->apart = s->width + overlap + clearance;
-    status = search(s, stand);
+    status = cav_posture_find(&search);
   }
   return status;
 }
@@ -348,22 +257,22 @@ static cav_status prepare(stander *s) {
     for (int k = 0; k < s->nfoot; k++) bend(s, k);
   }
   s->stretched = stretched;
-  clip(m, s->q);
+  cav_posture_clip(m, s->q);
   return CAV_OK;
 }
 
 static cav_status stand_on_feet(const cav_model *m, cav_state *state, const cav_roles *roles, double *q,
                                 cav_stand *stand) {
-  stander s = {.model = m, .state = state, .roles = roles};
-  s.q0 = calloc((size_t)(3 * m->nq + m->nv), sizeof *s.q0);
+  stander s = {.model = m, .state = state, .roles = roles, .stand = stand};
+  s.q0 = calloc((size_t)(2 * m->nq + m->nv), sizeof *s.q0);
   if (!s.q0) return CAV_NO_MEMORY;
-  s.q = s.q0 + m->nq, s.trial = s.q + m->nq, s.step = s.trial + m->nq;
+  s.q = s.q0 + m->nq, s.step = s.q + m->nq;
   memcpy(s.q0, m->q0, (size_t)m->nq * sizeof *s.q0);
   // links alone: contacts take most of the time, and say nothing here
   int contact = state->options.contact;
   state->options.contact = 0;
   cav_status status = prepare(&s);
-  if (!status) status = search_clear(&s, stand);
+  if (!status) status = search_clear(&s);
   state->options.contact = contact;
   if (!status && (stand->tilt > level || stand->uneven > level || stand->aside > level)) {
     snprintf(
