@@ -417,6 +417,12 @@ CAV_API cav_status cav_sensor_of(const cav_model *model, cav_sensor_type type, c
 /// one found. CAV_BAD_INPUT: there is none, and why; CAV_NOT_FINITE, CAV_NO_MEMORY. Uses the state.
 CAV_API cav_status cav_configuration_stand(const cav_model *model, cav_state *state, double *q, cav_error *error);
 
+/// What key="kneel" and the like are in files: q [nq] of a posture that is found, by name: squat, kneel, half-kneel, sit,
+/// sit-floor, all-fours, lie-back, lie-front or lie-side of a biped, lie of a quadruped, stand of both. CAV_BAD_INPUT: no such
+/// posture, or the model has none, and why; CAV_NOT_FINITE, CAV_NO_MEMORY. Uses the state.
+CAV_API cav_status cav_configuration_posture(const cav_model *model, cav_state *state, const char *name, double *q,
+                                             cav_error *error);
+
 /// What height="floor" of a posture in files does to q [nq]: moves each tree that is free or slides along the vertical until
 /// its lowest geom touches a plane of the world, or going down something else that stands there first. rise: planes alone,
 /// and so many metres higher; NULL: no such. The state is left at q. Trees whose <root> says height="keep" stay, in files.

@@ -4,7 +4,9 @@
 /// ranges of its joints. Postures of files go the same way (pose.c).
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
+#include "posture.h"
 #include "problem_file.h"
 #include "stand.h"
 
@@ -168,6 +170,21 @@ cav_status cav_configuration_stand(const cav_model *m, cav_state *state, double 
   if (!status) return CAV_OK;
   const char *why = status == CAV_BAD_INPUT ? stand.why : cav_status_name(status);
   return refuse(error, status, "a posture that stands cannot be found: %s", why);
+}
+
+cav_status cav_configuration_posture(const cav_model *m, cav_state *state, const char *name, double *q,
+                                     cav_error *error) {
+  if (!strcmp(name, "stand")) return cav_configuration_stand(m, state, q, error);
+  int i = 0;
+  while (cav_posture_names[i] && strcmp(cav_posture_names[i], name)) i++;
+  if (!cav_posture_names[i])
+    return refuse(error, CAV_BAD_INPUT, "there is no posture of that name, got '%.40s'; cavort help roles lists them",
+                  name);
+  char why[200];
+  cav_status status = cav_posture_named(m, state, name, q, why);
+  if (!status) return CAV_OK;
+  return refuse(error, status, "the posture cannot be found: %s",
+                status == CAV_BAD_INPUT ? why : cav_status_name(status));
 }
 
 int cav_configuration_clip(const cav_model *m, double *q) {

@@ -11,6 +11,7 @@
 
 #include "file.h"
 #include "math3.h"
+#include "posture.h"
 #include "problem_file.h"
 #include "stand.h"
 #include "tendon_range.h"
@@ -49,6 +50,8 @@ static const char *nearest_key(const cav_problem_reader *reader, const char *wor
     const char *name = cav_xml_text(pose, "name", "");
     near = cav_xml_nearest(word, &name, 1, sizeof name);
   }
+  for (int i = 0; cav_posture_names[i] && !near; i++)
+    near = cav_xml_nearest(word, &cav_posture_names[i], 1, sizeof *cav_posture_names);
   const char *const found = "stand"; // of any model that has feet
   return near ? near : cav_xml_nearest(word, &found, 1, sizeof found);
 }
@@ -72,23 +75,37 @@ static void list_keys(const cav_problem_reader *reader, const char *own, char te
   }
 }
 
-static int names_stand(const char *list) {
+// which posture that is found the last name of a list, separated by |, means; NULL: none
+static const char *names_found(const char *list) {
   const char *last = strrchr(list, '|');
   last = last ? last + 1 : list;
   last += strspn(last, " ");
-  return !strncmp(last, "stand", 5) && !last[5 + strspn(last + 5, " ")];
+  size_t n = strcspn(last, " ");
+  if (n == 5 && !strncmp(last, "stand", n)) return "stand";
+  for (int i = 0; cav_posture_names[i]; i++)
+    if (strlen(cav_posture_names[i]) == n && !strncmp(last, cav_posture_names[i], n)) return cav_posture_names[i];
+  return NULL;
 }
 
-static cav_status find_stand(const cav_problem_reader *reader, const cav_xml_node *node, double *q) {
+// a posture of any model that has what it takes
+static cav_status find_posture(const cav_problem_reader *reader, const cav_xml_node *node, const char *name,
+                               double *q) {
   cav_stand stand;
-  cav_status status = cav_stand_find(reader->model, reader->state, q, &stand);
+  char why[200], *reason = why;
+  cav_status status;
+  if (strcmp(name, "stand")) {
+    status = cav_posture_named(reader->model, reader->state, name, q, why);
+  } else {
+    status = cav_stand_find(reader->model, reader->state, q, &stand);
+    reason = stand.why;
+  }
   if (status == CAV_BAD_INPUT)
     return cav_xml_fail(reader->error, node, "key",
-                        "neither the model '%s' nor this file has a keyframe or pose 'stand', and %s; without 'key' a "
+                        "neither the model '%s' nor this file has a keyframe or pose '%s', and %s; without 'key' a "
                         "posture is that of the model's file, with <joint name= degrees=> inside for single joints",
-                        reader->model->name, stand.why);
+                        reader->model->name, name, reason);
   if (status)
-    cav_xml_fail_as(reader->error, status, node, "key", "a posture that stands cannot be evaluated: %s",
+    cav_xml_fail_as(reader->error, status, node, "key", "the posture '%s' cannot be evaluated: %s", name,
                     cav_status_name(status));
   return status;
 }
@@ -111,9 +128,10 @@ static cav_status read_key(const cav_problem_reader *reader, const cav_xml_node 
     return CAV_OK;
   }
   // of any model that has feet, by whatever names
-  if (names_stand(list)) {
+  const char *found = names_found(list);
+  if (found) {
     free(copy);
-    return find_stand(reader, node, q);
+    return find_posture(reader, node, found, q);
   }
   copy[strcspn(copy, " ")] = 0;
   const char *near = nearest_key(reader, copy);

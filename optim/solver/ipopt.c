@@ -376,7 +376,7 @@ static const cav_ipopt_option usual[] = {
     {"acceptable_iter", "10"},
     {"acceptable_constr_viol_tol", "1e-4"},
     {"mumps_mem_percent", "200"},
-    {"mumps_pivot_order", "0"}, // AMD, 6 % faster here than METIS, which MUMPS would choose
+    {"mumps_pivot_order", "2"}, // AMF: where pivots are delayed, a fifth of what AMD takes
     {"warm_start_bound_push", "1e-6"},
     {"warm_start_slack_bound_push", "1e-6"},
     {"warm_start_mult_bound_push", "1e-6"},

@@ -161,6 +161,14 @@ class Model:
         check(lib.cav_configuration_stand(self._c, self._scratch(), pointer_to(q), error), "a posture that stands", error)
         return q
 
+    def posture(self, name: str) -> Array:
+        """A posture by name [nq]: stand, squat, kneel, half-kneel, sit, sit-floor, all-fours, lie-back, lie-front or
+        lie-side of a biped, stand or lie of a quadruped."""
+        q, error = np.empty(self.nq), new_error()
+        status = lib.cav_configuration_posture(self._c, self._scratch(), name.encode(), pointer_to(q), error)
+        check(status, f"the posture {name!r}", error)
+        return q
+
     def to_floor(self, q: ArrayLike, rise: float | None = None) -> Array:
         """q [nq] with every tree that can be raised or lowered on what it stands on; rise: so many m above planes."""
         moved, error = _library.as_array(q, (self.nq,), "q").copy(), new_error()
