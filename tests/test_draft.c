@@ -295,7 +295,7 @@ static void test_terms(void) {
   int foot = cav_object_named(m, state, "nothing | right foot", &kind, &error);
   CHECK(foot >= 0);
   cav_sensor sensor;
-  CHECK(cav_sensor_of(m, CAV_SENSOR_FRAMEPOS, kind, foot, &sensor, &error) == CAV_OK);
+  CHECK(cav_sensor_of(m, CAV_SENSOR_FRAMELINVEL, kind, foot, &sensor, &error) == CAV_OK);
   for (cav_quantity k = 0; k < CAV_QUANTITY_USER; k++)
     for (int use = 0; use < 3; use++) {
       const cav_quantity_rule *rule = cav_quantity_rule_of(k);
@@ -304,7 +304,7 @@ static void test_terms(void) {
       char inside[400];
       // a record is read from its frames
       if (k == CAV_QUANTITY_TRACK) continue;
-      const char *what = sensed ? " type='framepos' body='right foot'" : "", *section = use ? "constraint" : "cost";
+      const char *what = sensed ? " type='framelinvel' body='right foot'" : "", *section = use ? "constraint" : "cost";
       const char *how[] = {" weight='3'", "", " lower='-1' upper='2'"};
       snprintf(inside, sizeof inside, "<start/><%s><%s%s%s/></%s>", section, rule->name, what, how[use], section);
       cav_problem *p = problem_of(humanoid, inside);

@@ -84,7 +84,7 @@ static const cav_xml_element pose_joint = {
         REALS("quat", 4, 4, "", "(one of the three is given)", "orientation of a ball joint, w x y z")),
     NULL, 0, "sets one joint"};
 #define POSE_SOURCE                                                                                                    \
-  TEXT("key", "(the model's own configuration)", "keyframe of the model or else <pose> of this file to begin with; \"stand\" serves any model with feet"), \
+  TEXT("key", "(the model's own configuration)", "keyframe of the model or else <pose> of this file to begin with; \"stand\", \"kneel\", \"sit\", \"lie-back\" and more are found of any humanoid (help postures)"), \
   REALS("qpos", 1, 0, "rad or m", "(the model's own configuration)", "all nq coordinates to begin with, in MuJoCo's layout"), \
   TEXT("file", "(the model's own configuration)", "trajectory.csv to take a knot of, relative to this file"),          \
   WORD("knot", ends, "last", "knot of that file"),                                                                     \

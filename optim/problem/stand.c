@@ -1,9 +1,10 @@
-/// Standing without names, by least squares over configurations (posture_search.c). Rows: the tilt of the soles of bipeds (a sole is flat where it was flat in the
-/// model's own configuration), heights of all feet, the centre of mass over their middle, the height of the trunk, and, with
-/// small weights, the way from the model's own configuration. Legs that are straight there, whose length can only fall, are
-/// bent: the trunk comes down by a fixed fraction, and hinges start off towards the middle of their ranges; soles of a
-/// quadruped stay where they are seen from the hips, those of a biped sideways and side by side, or it would splay, lean or
-/// step. Joints stay in their ranges. Where links are inside each other so the feet of a biped go farther apart.
+/// Standing without names, by least squares over configurations (posture_search.c). Rows: the tilt of the soles of bipeds (a
+/// sole is flat where it was flat in the model's own configuration), heights of all feet, the centre of mass over their
+/// middle, the height of the trunk, and, with small weights, the way from the model's own configuration. Legs that are
+/// straight there, whose length can only fall, are bent: the trunk comes down by a fixed fraction, and hinges start off
+/// towards the middle of their ranges; soles of a quadruped stay where they are seen from the hips, those of a biped sideways
+/// and side by side, or it would splay, lean or step. Joints stay in their ranges. Where links are inside each other so the
+/// feet of a biped go farther apart.
 #include "stand.h"
 
 #include <assert.h>

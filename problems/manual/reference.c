@@ -7,6 +7,7 @@
 #include "exchange.h"
 #include "ipopt_options.h"
 #include "manual.h"
+#include "posture.h"
 #include "problem_file.h"
 #include "quantity.h"
 #include "role.h"
@@ -239,6 +240,15 @@ static void print_roles(FILE *out) {
   fprintf(out, ".\n");
 }
 
+static void print_postures(FILE *out) {
+  fprintf(out,
+          "\n## Postures\n\nNames for `key` that are found for any humanoid with a free root, `stand` and `lie` of "
+          "quadrupeds too, where neither\nthe file nor the model has a posture of that name.\n\n| name | posture "
+          "|\n|---|---|\n| `stand` | nearly straight on both or all four feet |\n");
+  for (int i = 0; cav_posture_names[i]; i++)
+    fprintf(out, "| `%s` | %s |\n", cav_posture_names[i], cav_posture_meaning(cav_posture_names[i]));
+}
+
 void cav_manual_reference(FILE *out, const cav_manual *manual) {
   fprintf(out,
           "# Reference\n\nCommands and their options, and all that a problem file may say. Printed by `cavort help "
@@ -251,4 +261,5 @@ void cav_manual_reference(FILE *out, const cav_manual *manual) {
   print_sensors(out);
   print_words(out);
   print_roles(out);
+  print_postures(out);
 }

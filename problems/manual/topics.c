@@ -4,6 +4,7 @@
 
 #include "ipopt_options.h"
 #include "manual.h"
+#include "posture.h"
 #include "problem_file.h"
 #include "quantity.h"
 #include "role.h"
@@ -181,6 +182,18 @@ static void print_roles(FILE *out, const cav_manual *manual) {
   for (cav_role r = 0; r < CAV_ROLE_TYPES; r++) fprintf(out, "  %s\n", cav_role_name(r));
 }
 
+static void print_postures(FILE *out, const cav_manual *manual) {
+  (void)manual;
+  fprintf(out,
+          "postures: key= of <start>, <goal>, <pose> and waypoints, after the file's poses and the model's keyframes; "
+          "found\n"
+          "for any humanoid with a free root, where nothing else is said\n"
+          "  %-11s nearly straight on both or all four feet\n",
+          "stand");
+  for (int i = 0; cav_posture_names[i]; i++)
+    fprintf(out, "  %-11s %s\n", cav_posture_names[i], cav_posture_meaning(cav_posture_names[i]));
+}
+
 static void print_schema(FILE *out, const cav_manual *manual) {
   (void)manual;
   cav_manual_schema(out);
@@ -194,6 +207,7 @@ static const cav_manual_topic topics[] = {
     {"contact", "options of an evaluation of the dynamics", print_contact},
     {"ipopt", "options of Ipopt", print_ipopt},
     {"roles", "names of bodies that serve any model", print_roles},
+    {"postures", "names of postures that serve any humanoid", print_postures},
     {"reference", "all of it, in Markdown", cav_manual_reference},
     {"xsd", "schema of problem files for editors (XSD)", print_schema},
     {"man", "the man page, in roff", cav_manual_man_page},

@@ -3,9 +3,8 @@
 
 #include <math.h>
 
-// times its tolerance up to which what a feasible motion misses of a certificate is little; of the balance of momentum, which
-// another order keeps
-static const double few = 4, several = 8;
+// times its tolerance up to which what a feasible motion misses of a certificate is little
+static const double several = 8;
 
 // the same of depths, which harder contacts make less
 static const double twice = 2;
@@ -63,8 +62,8 @@ static double depth_of(const cav_verdict *v) {
 
 int cav_rank_rough(const cav_verdict *v) {
   return !v->certified && cav_verdict_feasible(v) && depth_of(v) <= twice &&
-         v->momentum_defect_rms <= several * CAV_TOLERANCE_MOMENTUM && v->slip_mean_m_s <= few * CAV_TOLERANCE_SLIP &&
-         v->hover_fraction <= few * CAV_TOLERANCE_HOVER;
+         v->momentum_defect_rms <= several * CAV_TOLERANCE_MOMENTUM &&
+         v->slip_mean_m_s <= several * CAV_TOLERANCE_SLIP && v->hover_fraction <= several * CAV_TOLERANCE_HOVER;
 }
 
 int cav_rank_near(const cav_race_report *report, double effort) {
@@ -105,6 +104,9 @@ static double excess_of(const cav_verdict *v) {
 
 int cav_rank_helped(const cav_verdict *repaired, const cav_verdict *before) {
   int most, other;
+  // of targets alone
+  if (repaired->certified && before->certified && repaired->nmissed && before->nmissed)
+    return repaired->nmissed < before->nmissed || repaired->missed_most < helped * before->missed_most;
   if (!cav_rank_rough(repaired) || !cav_rank_rough(before)) return 1;
   const double now = over_tolerance(repaired, &most), then = over_tolerance(before, &other);
   return now <= 1 || most != other || now < helped * then;

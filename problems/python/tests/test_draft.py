@@ -69,6 +69,13 @@ def test_postures(humanoid):
         lowest = state.pose("body", "foot_right").pos[2]
         state.position(model.to_floor(stand))
         assert lowest - state.pose("body", "foot_right").pos[2] == pytest.approx(height, abs=1e-9)
+    kneel = model.to_floor(model.posture("kneel"))
+    state.position(kneel)
+    knees = state.pose("body", "head").pos[2]
+    state.position(model.to_floor(stand))
+    assert 0.2 < state.pose("body", "head").pos[2] - knees < 0.6
+    with pytest.raises(cavort.Error, match="no posture of that name, got 'kneal'"):
+        model.posture("kneal")
     bent = stand.copy()
     bent[model.q_slice("knee_right")] = 9
     clipped = model.clip(bent)

@@ -1,0 +1,212 @@
+/// Postures by name: humanoids and quadrupeds, most by others, kneel, sit and lie as the words say, by arithmetic of its own:
+/// what is upright, what is low, what is on the ground and over what the centre of mass is. Names in problem files.
+#include <unistd.h>
+
+#include "cavort/cavort.h"
+#include "check.h"
+#include "posture.h"
+#include "role.h"
+#include "scene.h"
+
+/// What a posture shows.
+typedef struct sight {
+  double up, front, left; // height of the torso's long axis, of its front and its left, of unit vectors
+  double torso, knee, hands, foot[2], deep; // lowest points, m; deep: links inside each other
+  double least, com[2], from[2], to[2];     // the box of all that is within 1 cm of the ground
+} sight;
+
+static double lowest(const cav_model *m, const cav_state *state, int body) {
+  double least = INFINITY;
+  cav_pose at;
+  for (int g = m->body[body].geom; g < m->body[body].geom + m->body[body].ngeom; g++) {
+    if (!m->geom[g].contype && !m->geom[g].conaffinity) continue;
+    cav_object_pose(m, state, CAV_OBJECT_GEOM, g, &at);
+    least = fmin(least, at.pos[2] - cav_geom_reach(&m->geom[g], &at, (double[]){0, 0, 1}));
+  }
+  return least;
+}
+
+// the lowest point of a limb, with its end or without
+static double limb_low(const cav_model *m, const cav_state *state, const cav_roles *roles, cav_role role, int whole) {
+  double least = INFINITY;
+  for (int i = roles->body[role]; i > 0; i = m->body[i].parent) {
+    if (whole || i != roles->body[role]) least = fmin(least, lowest(m, state, i));
+    if (i == roles->limb[role]) break;
+  }
+  return least;
+}
+
+// height of a vector that is v in the world at the model's own configuration and turns with the torso
+static double turned(const cav_pose *own, const cav_pose *now, const double v[3]) {
+  double z = 0;
+  for (int k = 0; k < 3; k++) {
+    double inside = own->rotation[k] * v[0] + own->rotation[3 + k] * v[1] + own->rotation[6 + k] * v[2];
+    z += now->rotation[6 + k] * inside;
+  }
+  return z;
+}
+
+static void look(const cav_model *m, cav_state *state, const cav_roles *roles, const double *q, sight *s) {
+  int torso = roles->body[CAV_ROLE_TORSO], root = torso;
+  const double *l = roles->left, front[3] = {l[1], -l[0], 0}, left[3] = {l[0], l[1], 0};
+  cav_pose own, now, at;
+  CHECK(cav_position(m, state, m->q0) == CAV_OK);
+  cav_object_pose(m, state, CAV_OBJECT_XBODY, torso, &own);
+  CHECK(cav_position(m, state, q) == CAV_OK);
+  cav_object_pose(m, state, CAV_OBJECT_XBODY, torso, &now);
+  *s = (sight){.up = turned(&own, &now, (double[]){0, 0, 1}),
+               .front = turned(&own, &now, front),
+               .left = turned(&own, &now, left),
+               .torso = lowest(m, state, torso),
+               .least = INFINITY,
+               .from = {INFINITY, INFINITY},
+               .to = {-INFINITY, -INFINITY}};
+  for (int i = 0; i < state->ncontact; i++)
+    if (!m->pair[state->contact[i].pair].external) s->deep = fmax(s->deep, -state->contact[i].dist);
+  while (m->body[root].parent > 0) root = m->body[root].parent;
+  for (int g = 0; g < m->ngeom; g++) {
+    int top = m->geom[g].body;
+    while (m->body[top].parent > 0) top = m->body[top].parent;
+    if (top != root || (!m->geom[g].contype && !m->geom[g].conaffinity)) continue;
+    cav_object_pose(m, state, CAV_OBJECT_GEOM, g, &at);
+    double low = at.pos[2] - cav_geom_reach(&m->geom[g], &at, (double[]){0, 0, 1});
+    s->least = fmin(s->least, low);
+    for (int k = 0; k < 2 && low < 0.01; k++) {
+      double reach = cav_geom_reach(&m->geom[g], &at, (double[]){k == 0, k == 1, 0});
+      s->from[k] = fmin(s->from[k], at.pos[k] - reach), s->to[k] = fmax(s->to[k], at.pos[k] + reach);
+    }
+  }
+  const cav_sensor sensor = {
+      .name = "", .type = CAV_SENSOR_SUBTREECOM, .object_type = CAV_OBJECT_BODY, .object = root, .dim = 3};
+  double com[3];
+  cav_sensor_read(m, state, &sensor, com);
+  memcpy(s->com, com, sizeof s->com);
+}
+
+// what the word says
+static void check_meaning(const cav_model *m, cav_state *state, const cav_roles *roles, const char *name,
+                          const double *q) {
+  sight s;
+  look(m, state, roles, q, &s);
+  const int feet[2] = {CAV_ROLE_RIGHT_FOOT, CAV_ROLE_LEFT_FOOT}, hands[2] = {CAV_ROLE_RIGHT_HAND, CAV_ROLE_LEFT_HAND};
+  double foot[2], knee[2], hand[2];
+  for (int k = 0; k < 2 && roles->build == CAV_BUILD_BIPED; k++) {
+    foot[k] = lowest(m, state, roles->body[feet[k]]);
+    knee[k] = limb_low(m, state, roles, feet[k], 0);
+    hand[k] = limb_low(m, state, roles, hands[k], 1);
+  }
+  CHECK(fabs(s.least) < 5e-3 && s.deep < 6e-3);
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    if (!joint->limited || (joint->type != CAV_JOINT_HINGE && joint->type != CAV_JOINT_SLIDE)) continue;
+    CHECK(q[joint->q] >= joint->range[0] && q[joint->q] <= joint->range[1]);
+  }
+  int lying = !strncmp(name, "lie-", 4), over = 1;
+  if (!strcmp(name, "lie")) {
+    CHECK(s.up > 0.99 && s.torso < 5e-3);
+  } else if (lying || !strcmp(name, "all-fours")) {
+    CHECK(fabs(s.up) < 0.4);
+    if (!strcmp(name, "lie-back")) CHECK(s.front > 0.9);
+    if (!strcmp(name, "lie-front")) CHECK(s.front < -0.9);
+    if (!strcmp(name, "lie-side")) CHECK(s.left > 0.9);
+    if (!lying) CHECK(s.front < -0.9 && knee[0] < 5e-3 && knee[1] < 5e-3 && hand[0] < 5e-3 && hand[1] < 5e-3);
+  } else {
+    CHECK(s.up > (strcmp(name, "squat") ? 0.85 : 0.5) && s.torso > 0.1);
+    const int kneels = strstr(name, "kneel") != NULL, both = !strcmp(name, "kneel"), floor = !strcmp(name, "sit-floor");
+    if (kneels) CHECK(knee[0] < 5e-3 && (both ? knee[1] : foot[1]) < 5e-3 && (both || knee[1] > 0.01));
+    if (!kneels && !floor) CHECK(foot[0] < 5e-3 && foot[1] < 5e-3);
+    over = strcmp(name, "sit") != 0;
+  }
+  for (int k = 0; k < 2 && over; k++) CHECK(s.com[k] > s.from[k] - 1e-3 && s.com[k] < s.to[k] + 1e-3);
+}
+
+static void check_model(const char *path, int floating, const char *refused) {
+  cav_error error = {0};
+  cav_load_options options = cav_load_options_default();
+  options.floating = floating;
+  cav_model *m = cav_model_load_with(path, &options, &error);
+#ifndef CAVORT_HAVE_QHULL
+  if (!m && strstr(error.text, "needs Qhull")) return; // robots with meshes, in a build without them
+#endif
+  if (!CHECK(m != NULL)) {
+    fprintf(stderr, "    %s\n", error.text);
+    return;
+  }
+  cav_state *state = cav_state_new(m);
+  cav_roles roles;
+  CHECK(cav_roles_find(m, state, &roles) == CAV_OK);
+  double *q = scene_vector(m->nq), *again = scene_vector(m->nq);
+  for (int i = 0; cav_posture_names[i]; i++) {
+    const char *name = cav_posture_names[i];
+    int own = roles.build == (strcmp(name, "lie") ? CAV_BUILD_BIPED : CAV_BUILD_QUADRUPED);
+    error = (cav_error){0};
+    cav_status status = cav_configuration_posture(m, state, name, q, &error);
+    if (!CHECK((status == CAV_OK) == (own && strcmp(refused, name) != 0)))
+      fprintf(stderr, "    %s, %s: %s\n", path, name, error.text);
+    if (status) CHECK(status == CAV_BAD_INPUT && strlen(error.text) > 40);
+    if (status) continue;
+    check_meaning(m, state, &roles, name, q);
+    CHECK(cav_configuration_posture(m, state, name, again, NULL) == CAV_OK &&
+          !memcmp(q, again, (size_t)m->nq * sizeof *q));
+  }
+  CHECK(cav_configuration_posture(m, state, "kneal", q, &error) == CAV_BAD_INPUT && strstr(error.text, "'kneal'"));
+  if (roles.build) CHECK(cav_configuration_posture(m, state, "stand", q, &error) == CAV_OK);
+  free(q), free(again);
+  cav_state_free(state);
+  cav_model_free(m);
+}
+
+static cav_problem *load(const char *folder, const char *start, cav_error *error) {
+  char text[1000], path[200];
+  snprintf(
+      text, sizeof text,
+      "<problem name='p' model='%s/problems/models/humanoid.xml'><horizon duration='.2' timestep='.05'/>%s</problem>",
+      CAVORT_SOURCE_ROOT, start);
+  scene_write(folder, "p.xml", text);
+  snprintf(path, sizeof path, "%s/p.xml", folder);
+  return cav_problem_load(path, NULL, error);
+}
+
+// after the model's keyframes and the file's poses, by the last name of a list
+static void check_files(const char *folder) {
+  cav_error error = {0};
+  cav_problem *found = load(folder, "<start key='kneel' height='floor'/>", &error),
+              *last = load(folder, "<start key='mine | kneel ' height='floor'/>", &error),
+              *own = load(folder, "<pose name='kneel'/><start key='kneel' height='floor'/>", &error);
+  if (CHECK(found && last && own)) {
+    size_t bytes = (size_t)found->model->nq * sizeof(double);
+    CHECK(!memcmp(found->q_start, last->q_start, bytes) && memcmp(found->q_start, own->q_start, bytes) != 0);
+  }
+  CHECK(!load(folder, "<start key='kneal'/>", &error) && strstr(error.text, "did you mean 'kneel'?"));
+  CHECK(!load(folder, "<start key='lie'/>", &error) && strstr(error.text, "for quadrupeds"));
+  cav_problem_free(found), cav_problem_free(last), cav_problem_free(own);
+}
+
+int main(void) {
+  static const struct {
+    const char *name;
+    int shared, floating;
+    const char *refused;
+  } model[] = {{"humanoid.xml", 0, 0, ""},
+               {"robot.xml", 0, 0, "half-kneel"}, // its hips do not part so far
+               {"quadruped.xml", 0, 0, ""},
+               {"cheetah.xml", 0, 0, ""},
+               {"mujoco/humanoid.xml", 1, 0, ""},
+               {"dm_control/humanoid.xml", 1, 0, ""},
+               {"dm_control/quadruped.xml", 1, 0, ""},
+               {"unitree/g1/g1_29dof.xml", 1, 0, ""},
+               {"menagerie/unitree_go1/scene.xml", 1, 0, ""}};
+  char folder[] = "/tmp/cavort_posture_XXXXXX", path[5000];
+  const char *shared = check_shared_models();
+  for (size_t i = 0; i < sizeof model / sizeof *model; i++) {
+    snprintf(path, sizeof path, "%s%s/%s", model[i].shared ? shared ? shared : "" : CAVORT_SOURCE_ROOT,
+             model[i].shared ? "" : "/problems/models", model[i].name);
+    if (!model[i].shared || (shared && access(path, R_OK) == 0)) check_model(path, model[i].floating, model[i].refused);
+  }
+  if (!CHECK(mkdtemp(folder) != NULL)) return check_result();
+  check_files(folder);
+  snprintf(path, sizeof path, "%s/p.xml", folder);
+  unlink(path);
+  rmdir(folder);
+  return check_result();
+}
