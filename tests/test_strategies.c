@@ -1,8 +1,10 @@
 /// Strategies: which are offered to which problem, that a gait is found with the right signs, that taking one changes
 /// guess and schedule alone; and stages of the continuation that stall: taken back, reached half way, noted. Stalls are
 /// made by the linker, which puts a region that claims one in the place of the true one.
+#include <unistd.h>
 #include "clear.h"
 #include "continuation.h"
+
 #include "scene.h"
 
 cav_status __real_cav_region_minimise(cav_region *region, cav_normal *normal, cav_transcription *tr,
@@ -714,6 +716,73 @@ static void test_cycle(void) {
   cav_problem_free(p);
 }
 
+// the problem of an arm from one side of something to the other
+static cav_problem *arm_past(const char *scene, const char *guess) {
+  static const char pattern[] =
+      "<problem name='past' model='" CAVORT_SOURCE_ROOT
+      "/problems/models/arm.xml'><scene>%s</scene><horizon duration='2.5' "
+      "timestep='0.02'/><start><joint name='joint1' degrees='-70'/><joint name='joint2' degrees='60'/><joint "
+      "name='joint4' degrees='40'/></start>"
+      "<goal><joint name='joint1' degrees='70'/><joint name='joint2' degrees='60'/><joint name='joint4' "
+      "degrees='40'/></goal>%s<cost><posture "
+      "dofs='all' at='end' weight='900'/><velocity dofs='all' at='end' weight='100'/></cost></problem>";
+  char folder[] = "/tmp/cavort_past_XXXXXX", path[100], text[1500];
+  if (!CHECK(mkdtemp(folder) != NULL)) return NULL;
+  cav_error error = {0};
+  snprintf(text, sizeof text, pattern, scene, guess);
+  scene_write(folder, "p.xml", text);
+  snprintf(path, sizeof path, "%s/p.xml", folder);
+  cav_problem *p = cav_problem_load(path, NULL, &error);
+  if (!CHECK(p != NULL)) fprintf(stderr, "    %s\n", error.text);
+  unlink(path), rmdir(folder);
+  return p;
+}
+
+// an arm whose straight way runs into a wall or between posts is begun round them, clear of all, where its file has no guess; what
+// it does then is certified
+static void test_detour(void) {
+  static const char *const scene[] = {"<geom name='wall' type='box' pos='.45 0 .25' size='.2 .02 .25'/>",
+                                      "<geom name='one' type='cylinder' pos='.4 .15 .35' size='.03 .35'/><geom "
+                                      "name='two' type='cylinder' pos='.4 -.15 .35' "
+                                      "size='.03 .35'/>",
+                                      ""};
+  for (int k = 0; k < 3; k++) {
+    cav_problem *p = arm_past(scene[k], ""),
+                *stated = arm_past(scene[k],
+                                   "<guess><waypoint time='1'><joint name='joint2' degrees='20'/></waypoint></guess>");
+    if (!p || !stated) return;
+    cav_strategy strategy[CAV_STRATEGIES];
+    cav_error error = {0};
+    int n;
+    CHECK(cav_strategy_list(stated, strategy, &n) == CAV_OK && strategy[0].stated && !strategy[0].nswing);
+    CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && (strategy[0].nswing == 7) == (k < 2));
+    if (k < 2) {
+      cav_problem taken;
+      cav_strategy_apply(p, &strategy[0], &taken);
+      cav_trajectory *guess = cav_trajectory_new(p->model, 126, p->timestep);
+      cav_state *state = cav_state_new(p->model);
+      CHECK(cav_guess_fill(&taken, p->q_goal, guess) == CAV_OK);
+      for (int t = 0; t < guess->nknot; t++) {
+        CHECK(cav_position(p->model, state, guess->q + t * guess->nq) == CAV_OK);
+        for (int i = 0; i < state->ncontact; i++) {
+          const cav_pair *pair = &p->model->pair[state->contact[i].pair];
+          // arm and scene
+          if (p->model->geom[pair->geom1].link != p->model->geom[pair->geom2].link) CHECK(state->contact[i].dist > 0);
+        }
+      }
+      cav_state_free(state);
+      cav_trajectory_free(guess);
+      cav_solution *solution = NULL;
+      CHECK(cav_strategy_solve(p, &strategy[0], NULL, NULL, &solution, &error) == CAV_OK);
+      cav_verdict v;
+      if (CHECK(solution && solution->gain_q))
+        CHECK(cav_verify_solution(&taken, solution, &v, &error) == CAV_OK && v.certified && v.achieved);
+      cav_solution_free(solution);
+    }
+    cav_problem_free(p), cav_problem_free(stated);
+  }
+}
+
 int main(void) {
   test_through_ground();
   test_upright();
@@ -727,5 +796,6 @@ int main(void) {
   test_repair();
   test_leap();
   test_solids();
+  test_detour();
   return check_result();
 }

@@ -13,6 +13,7 @@
 
 #include "clear.h"
 #include "continuation.h"
+#include "detour.h"
 #include "hand.h"
 #include "leap.h"
 #include "periodicity.h"
@@ -337,6 +338,7 @@ static cav_status hold_over_ground(const cav_problem *problem, cav_strategy *beg
 /// Guesses of a problem from which strategies begin.
 typedef struct guesses {
   cav_strategy stated, plain, walk, fly; ///< straight from start to goal; with limbs swinging; by a flight
+  cav_strategy detour;                   ///< round what the straight way runs into; none without swings
   int collides, decorated, sinks;        ///< what the stated guess does, and is
   int pivots;                            ///< 1: it turns four feet or more on the spot, where they stand
 } guesses;
@@ -442,6 +444,11 @@ static cav_status find_guesses(const cav_problem *problem, const cav_strategy *s
   g->plain.guess = CAV_GUESS_INTERPOLATE, g->plain.stated = 0;
   g->walk = g->fly = g->plain;
   if (status == CAV_OK) status = find_walk(problem, g);
+  g->detour = g->plain;
+  g->detour.text = "bowed round the solids that the straight way runs into";
+  g->detour.schedule.solids = problem->schedule.solids;
+  if (status == CAV_OK && g->collides && !g->decorated && problem->guess == CAV_GUESS_INTERPOLATE)
+    status = cav_detour_find(problem, &g->detour);
   g->fly.text = "all of the way by an arc clear of solids, start and goal held before and after it";
   g->fly.schedule.solids = problem->schedule.solids;
   return status == CAV_OK ? flight(problem, &g->fly) : status;
@@ -461,6 +468,8 @@ static void add_plain(const cav_problem *problem, cav_strategy *strategy, int *n
 
 /// From other guesses and by other schedules.
 static cav_status add_others(const cav_problem *problem, cav_strategy *strategy, int *n, const guesses *g) {
+  // a file without a guess is begun so
+  if (g->detour.nswing) begin_with(strategy, &g->detour);
   if (g->collides) add_grown(problem, strategy, n, &g->stated, &g->walk, &g->fly);
   if (!g->collides && g->fly.height > 0 && problem->guess_height > 0) add_mended(strategy, n, &g->fly, "flight");
   if (g->pivots) begin_with(strategy, &g->walk);

@@ -1,0 +1,135 @@
+/// An arm that would sweep through a post is not lifted out of it as a body is, and where its guess goes through, forces fade
+/// into a motion that scrapes along. So the straight way is bowed: each driven hinge and slide has a half sine over the
+/// duration, of amplitudes out of an even sequence in a cube that grows from a fourth of a radian to 1.5. Of the smallest cube
+/// with a way whose knots are clear of the world and of each other the one with the least amplitudes is taken, 2 cm clear if
+/// there is one.
+#include "detour.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "continuation.h"
+
+enum { KNOTS = 41, TRIES = 1500, CUBES = 6 };
+static const double largest = 1.5; // rad; of slides a third of it in m
+static const double clear = 0.02;  // m
+static const double inside = 1e-3; // m: deeper than where it begins and ends by so much is no way
+
+/// A way that is looked at.
+typedef struct search {
+  cav_problem bowed; // with the swings
+  cav_state *state;
+  cav_trajectory *at;
+  double *apart; // [npair] m: how far they have to be from each other
+} search;
+
+// whether all that is near at a configuration is as far apart as is wanted
+static cav_status is_apart(const search *s, const double *q, int *good) {
+  cav_status status = cav_position(s->bowed.model, s->state, q);
+  for (int i = 0; i < s->state->ncontact && !status && *good; i++)
+    *good = s->state->contact[i].dist >= s->apart[s->state->contact[i].pair];
+  return status;
+}
+
+// the same at all knots
+static cav_status is_clear(search *s, int *good) {
+  // an odd stride meets all knots of a prime number, those in the middle early
+  enum { STRIDE = 7, FIRST = 20 };
+  cav_status status = cav_guess_fill(&s->bowed, s->bowed.q_goal, s->at);
+  *good = 1;
+  for (int k = 0; k < KNOTS && !status && *good; k++)
+    status = is_apart(s, s->at->q + (size_t)((FIRST + k * STRIDE) % KNOTS) * (size_t)s->at->nq, good);
+  return status;
+}
+
+// pairs are to be so far apart, those that start or goal have nearer as far as there
+static cav_status want_apart(const search *s, double distance) {
+  const double *const ends[2] = {s->bowed.q_start, s->bowed.q_goal};
+  cav_status status = CAV_OK;
+  for (int i = 0; i < s->bowed.model->npair; i++) s->apart[i] = distance;
+  for (int k = 0; k < 2 && !status; k++) {
+    status = cav_position(s->bowed.model, s->state, ends[k]);
+    for (int i = 0; i < s->state->ncontact && !status; i++) {
+      const cav_contact *c = &s->state->contact[i];
+      s->apart[c->pair] = fmin(s->apart[c->pair], c->dist - inside);
+    }
+  }
+  return status;
+}
+
+// whether a joint may bow the way: an actuator of its own moves it, and nothing couples it
+static int may_bow(const cav_model *m, int j) {
+  const cav_joint *joint = &m->joint[j];
+  const int root = m->link[joint->link].root;
+  if (joint->type != CAV_JOINT_HINGE && joint->type != CAV_JOINT_SLIDE) return 0;
+  if (m->joint[m->link[root].joint].type == CAV_JOINT_FREE) return 0;
+  for (int i = 0; i < m->nequality; i++)
+    if (m->equality[i].type == CAV_EQUALITY_JOINT && (m->equality[i].object[0] == j || m->equality[i].object[1] == j))
+      return 0;
+  for (int i = 0; i < m->nactuator; i++)
+    if (m->actuator[i].transmission == CAV_TRANSMISSION_JOINT && m->actuator[i].target == j) return 1;
+  return 0;
+}
+
+// the best of the ways of a cube into the strategy
+static cav_status search_cube(search *s, double size, cav_strategy *strategy) {
+  // square roots of primes: even in as many dimensions as there are
+  static const int prime[CAV_STRATEGY_SWINGS] = {2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53};
+  cav_status status = CAV_OK;
+  double best = INFINITY;
+  cav_swing swing[CAV_STRATEGY_SWINGS];
+  const int n = s->bowed.nswing;
+  for (int k = 1; k <= TRIES && !status; k++) {
+    double square = 0;
+    for (int i = 0; i < n; i++) {
+      const double whole = k * sqrt(prime[i]), even = 2 * (whole - floor(whole)) - 1;
+      const double unit = s->bowed.model->joint[s->bowed.swing[i].joint].type == CAV_JOINT_SLIDE ? 1.0 / 3 : 1;
+      s->bowed.swing[i].amplitude = size * unit * even;
+      square += even * even;
+    }
+    if (square >= best) continue;
+    int good;
+    status = is_clear(s, &good);
+    if (!good || status) continue;
+    best = square;
+    for (int i = 0; i < n; i++) swing[i] = s->bowed.swing[i];
+  }
+  if (best == INFINITY) return status;
+  strategy->nswing = n;
+  for (int i = 0; i < n; i++) strategy->swing[i] = swing[i];
+  return status;
+}
+
+static cav_status search_all(search *s, cav_strategy *strategy) {
+  cav_status status = CAV_OK;
+  // what is two centimetres away is listed
+  s->state->options.smoothing = clear;
+  for (int tight = 0; tight < 2 && !strategy->nswing && !status; tight++) {
+    status = want_apart(s, tight ? 0 : clear);
+    for (int k = 1; k <= CUBES && !strategy->nswing && !status; k++)
+      status = search_cube(s, largest * k / CUBES, strategy);
+  }
+  return status;
+}
+
+cav_status cav_detour_find(const cav_problem *problem, cav_strategy *strategy) {
+  const cav_model *m = problem->model;
+  cav_swing swing[CAV_STRATEGY_SWINGS];
+  search s = {.bowed = *problem};
+  s.bowed.guess = CAV_GUESS_INTERPOLATE;
+  s.bowed.schedule.solids = CAV_SOLIDS_HARD;
+  s.bowed.timestep = problem->duration / (KNOTS - 1);
+  s.bowed.swing = swing, s.bowed.nswing = 0;
+  strategy->nswing = 0;
+  for (int j = 0; j < m->njoint && s.bowed.nswing < CAV_STRATEGY_SWINGS; j++)
+    if (may_bow(m, j)) swing[s.bowed.nswing++] = (cav_swing){.joint = j, .frequency = 0.5 / problem->duration};
+  if (!s.bowed.nswing) return CAV_OK;
+  s.state = cav_state_new(m);
+  s.at = cav_trajectory_new(m, KNOTS, s.bowed.timestep);
+  s.apart = calloc((size_t)m->npair + 1, sizeof *s.apart);
+  cav_status status = s.state && s.at && s.apart ? search_all(&s, strategy) : CAV_NO_MEMORY;
+  free(s.apart);
+  cav_state_free(s.state);
+  cav_trajectory_free(s.at);
+  return status;
+}
