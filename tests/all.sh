@@ -158,7 +158,7 @@ if sh problems/install.sh test; then
   fi
   check "install, pkg-config, the example" installed gcc
   check "shared library: build, gcc" build shared gcc --buildtype=release -Ddefault_library=shared -Dtests=false &&
-    tests shared symbols tool python &&
+    tests shared symbols python &&
     check "shared library: install, pkg-config, the example" installed shared &&
     check "Python: install, wheel, a line that uses it" python_package shared
   check "the example as README.md has it" example

@@ -177,7 +177,7 @@ static void test_margins(void) {
 
 // shapes in the middle of each other: the proof, and no way out that is shorter
 static void test_deep(void) {
-  enum { DEEP = CHECK_CASES(200) };
+  enum { DEEP = CHECK_CASES(80) };
   for (int ta = 1; ta < CAV_GEOM_MESH; ta++) {
     for (int tb = ta; tb < CAV_GEOM_MESH; tb++) {
       worst w = {0};

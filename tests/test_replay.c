@@ -47,7 +47,7 @@ int main(void) {
   static const motion_case cases[] = {{"squat-jump", NULL},
                                       {"walk", NULL},
                                       {"kick", NULL},
-                                      {"get-up-back", "mujoco/humanoid.xml"},
+                                      {"get-up-back", "dm_control/humanoid.xml"},
                                       {"cheetah-jump", NULL}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
     check_motion(&cases[i], strcmp(cases[i].motion, "walk") && !cases[i].model);
