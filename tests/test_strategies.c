@@ -738,8 +738,8 @@ static cav_problem *arm_past(const char *scene, const char *guess) {
   return p;
 }
 
-// an arm whose straight way runs into a wall or between posts is begun round them, clear of all, where its file has no guess; what
-// it does then is certified
+// an arm whose straight way runs into a wall or between posts is begun round them, clear of all, where its file has no guess;
+// what it does then is certified
 static void test_detour(void) {
   static const char *const scene[] = {"<geom name='wall' type='box' pos='.45 0 .25' size='.2 .02 .25'/>",
                                       "<geom name='one' type='cylinder' pos='.4 .15 .35' size='.03 .35'/><geom "
@@ -756,6 +756,14 @@ static void test_detour(void) {
     int n;
     CHECK(cav_strategy_list(stated, strategy, &n) == CAV_OK && strategy[0].stated && !strategy[0].nswing);
     CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && (strategy[0].nswing == 7) == (k < 2));
+    // nearer to the goal's posture, by the same guess
+    const cav_strategy *posture = find(strategy, n, "posture");
+    if (CHECK(posture && posture->nterm == p->nterm && posture->nswing == strategy[0].nswing)) {
+      int heavier = 0;
+      for (int i = 0; i < p->nterm; i++) heavier += posture->term[i].weight == 10 * p->term[i].weight;
+      CHECK(heavier == 1);
+      CHECK_TEXT(posture->changed, "<posture weight=\"1\"/>");
+    }
     if (k < 2) {
       cav_problem taken;
       cav_strategy_apply(p, &strategy[0], &taken);
@@ -779,6 +787,7 @@ static void test_detour(void) {
         CHECK(cav_verify_solution(&taken, solution, &v, &error) == CAV_OK && v.certified && v.achieved);
       cav_solution_free(solution);
     }
+    cav_strategies_clear(strategy, n);
     cav_problem_free(p), cav_problem_free(stated);
   }
 }

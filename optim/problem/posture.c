@@ -23,7 +23,7 @@ static const double touching = 1e-3;   // m: links this deep in each other sprea
 static const double spread = 0.1;      // so much farther outwards each time
 static const double level = 5e-3;      // m: what is on the ground may be off it, and the centre of mass off its place
 static const double behind_knee = 0.2; // of the shank: where a knee bears
-enum { LIMBS = 4, CHAIN = 80, TRIES = 6 }; // CHAIN: bodies of a limb
+enum { LIMBS = 4, TRIES = 6 };
 
 /// What is on the ground: legs without feet, ends of limbs, the trunk. Of quadrupeds the first limbs are the front legs.
 enum {

@@ -231,8 +231,9 @@ static void describe(const cav_problem *p, cav_strategy *s) {
   }
   for (int i = 0; i < p->nterm && s->term; i++) {
     size_t n = strlen(out);
-    if (p->term[i].quantity == CAV_QUANTITY_SLIP && s->term[i].weight != p->term[i].weight)
-      snprintf(out + n, room - n, ", <slip weight=\"%g\"/>", s->term[i].weight);
+    if (!is_goal(p, &p->term[i]) && s->term[i].weight != p->term[i].weight)
+      snprintf(out + n, room - n, ", <%s weight=\"%g\"/>", cav_quantity_rule_of(p->term[i].quantity)->name,
+               s->term[i].weight);
   }
   for (int i = p->nterm; i < s->nterm; i++) {
     size_t n = strlen(out);

@@ -8,6 +8,7 @@
 /// sine, and the second bends while the limb comes forwards.
 #include <assert.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -363,6 +364,42 @@ static cav_status add_upright(const cav_problem *problem, cav_strategy *strategy
   return CAV_OK;
 }
 
+/// Whether all that is driven hangs on the world by joints that are driven, too: arms, not what could walk.
+static int hangs(const cav_model *m) {
+  int driven = 0;
+  for (int j = 0; j < m->njoint; j++) {
+    const cav_joint *joint = &m->joint[j];
+    if (!joint->driven) continue;
+    const cav_link *root = &m->link[m->link[joint->link].root];
+    for (int i = root->joint; i < root->joint + root->njoint; i++)
+      if (!m->joint[i].driven) return 0;
+    driven = 1;
+  }
+  return driven;
+}
+
+/// An arm nearer to the posture of its goal: folded up it takes less effort, and rests and scrapes on its own base.
+static cav_status add_posture(const cav_problem *problem, cav_strategy *strategy, int *n, const cav_strategy *stated) {
+  static const double nearer = 10;
+  int found = -1;
+  for (int i = 0; i < problem->nterm && found < 0; i++) {
+    const cav_term *term = &problem->term[i];
+    const int whole = term->from == 0 && (term->to < 0 || term->to >= problem->duration);
+    if (term->quantity == CAV_QUANTITY_CONFIGURATION && term->use == CAV_USE_COST && whole && term->weight > 0)
+      found = i;
+  }
+  if (found < 0 || problem->model->npair == 0 || !hangs(problem->model) || problem->cycle.on) return CAV_OK;
+  cav_strategy kept = *stated;
+  kept.nterm = problem->nterm;
+  kept.term = calloc((size_t)kept.nterm, sizeof *kept.term);
+  if (!kept.term) return CAV_NO_MEMORY;
+  memcpy(kept.term, problem->term, (size_t)problem->nterm * sizeof *kept.term);
+  kept.term[found].weight *= nearer;
+  snprintf(kept.changed, sizeof kept.changed, "<posture weight=\"%g\"/>", kept.term[found].weight);
+  add(strategy, n, &kept, "posture", "with ten times the cost on the way from the posture of the goal");
+  return CAV_OK;
+}
+
 /// What has terms of its own begins with the guess that the first one begins with after all.
 static void begin_upright(cav_strategy *strategy, int n) {
   for (int i = 1; i < n; i++) {
@@ -530,6 +567,7 @@ cav_status cav_strategy_list(const cav_problem *problem, cav_strategy strategy[C
   cav_status status = add_stated(problem, strategy, n, &stated);
   if (status == CAV_OK) status = add_pushed(problem, strategy, n, &stated);
   if (status == CAV_OK && !cav_upright_held(problem)) status = add_upright(problem, strategy, n, &stated);
+  if (status == CAV_OK) status = add_posture(problem, strategy, n, &stated);
   if (status == CAV_OK) status = add_pumped(problem, strategy, n, &swings_up);
   if (status == CAV_OK) status = find_guesses(problem, &stated, strategy, &g);
   if (status == CAV_OK) status = add_others(problem, strategy, n, &g);
