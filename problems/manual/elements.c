@@ -178,14 +178,19 @@ int cav_manual_explain(FILE *out, const char *name) {
   return told;
 }
 
-const char *cav_manual_nearest(const char *word) {
+const char *cav_manual_nearest(const cav_manual *manual, const char *word) {
+  enum { NAMES = 1500 };
   cav_manual_place place[CAV_MANUAL_ELEMENTS];
-  int n = cav_manual_places(place);
-  const char *near = NULL;
-  for (int i = 0; i < n && !near; i++) {
-    near = cav_xml_nearest(word, &place[i].element->name, 1, sizeof *place);
-    for (const cav_xml_attribute *a = place[i].element->attribute; a && a->name && !near; a++)
-      near = cav_xml_nearest(word, &a->name, 1, sizeof *a);
+  const char *name[NAMES];
+  const int n = cav_manual_places(place);
+  int names = 0;
+  for (int i = 0; i < manual->ncommand; i++) name[names++] = manual->command[i].name;
+  for (int i = 0; i < manual->ntopic; i++) name[names++] = manual->topic[i].name;
+  for (int i = 0; i < n; i++) {
+    assert(names < NAMES);
+    name[names++] = place[i].element->name;
+    for (const cav_xml_attribute *a = place[i].element->attribute; a && a->name && names < NAMES; a++)
+      name[names++] = a->name;
   }
-  return near;
+  return cav_xml_nearest(word, name, names, sizeof *name);
 }
