@@ -117,7 +117,7 @@ static const cav_xml_element pose = {
   TEXT("at", "(the window)", "one time in the place of a window, s or \"end\": the nearest knot"),                     \
   REAL("scale", 0, "of the term", "1", "residuals are divided by it: the size of an error that counts as one"),        \
   TEXT("within", "(0.03 m, 0.1 rad, 0.3 m/s or rad/s, 0.1 of an axis for goals; none for running costs)",              \
-       "tolerance of the target, in the unit of the term: the motion has achieved it if off by at most this; \"any\": reported only. Of slip, m/s: so fast contacts may slide")
+       "tolerance of the target, in the unit of the term, over the whole horizon too: the motion has achieved it if off by at most this, of a vector by its length, of a posture or a rate at each dof; \"any\": reported only. Of slip, m/s: so fast contacts may slide")
 #define DOFS                                                                                                           \
   WORD("dofs", cav_problem_dof_sets, "joints", "dofs that count: joints are all but free joints"),                     \
   TEXT("joint", "(dofs)", "one joint in the place of a set of dofs")

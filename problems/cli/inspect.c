@@ -336,6 +336,8 @@ static void print_quantity(const cav_problem *p, const cav_term *term) {
   const char *object = cav_object_name(m, term->sensor.object_type, term->sensor.object);
   printf("%s of %s", cav_sensor_rule_of(term->sensor.type)->name, object);
   if (term->component >= 0 && term->sensor.dim > 1) printf(", %c", "xyz"[term->component]);
+  if (term->sensor.referred)
+    printf(", in the frame of %s", cav_object_name(m, term->sensor.reference_type, term->sensor.reference));
 }
 
 // from what bounds of a posture are counted, and where a single joint may be
@@ -371,7 +373,32 @@ static void print_target(const cav_problem *p, const cav_term *term) {
     printf(" to");
     for (int i = one ? term->component : 0; i < (one ? term->component + 1 : term->sensor.dim); i++)
       printf(" %.4g", term->target[i]);
+  } else if (term->quantity == CAV_QUANTITY_SENSOR) {
+    printf(term->sensor.dim == 4 ? " to no rotation" : " to 0");
   }
+}
+
+// whether achieved needs a term, and to what tolerance
+static void print_standing(const cav_problem *p, const cav_term *term) {
+  cav_tolerance tolerance[4];
+  int reported, n = cav_term_tolerances(p, term, 4, tolerance, &reported);
+  for (int i = 0; i < n && i < 4; i++)
+    printf("%s %g%s%s", i ? "," : "; to be met within", tolerance[i].within, *tolerance[i].unit ? " " : "",
+           tolerance[i].unit);
+  if (n && term->use == CAV_USE_COST && !(term->within > 0)) printf(" (usual)");
+  if (!n && reported) printf("; reported only, %s", term->within > 0 ? "within=\"any\"" : "no within=");
+  if (term->quantity == CAV_QUANTITY_SLIP && term->within > 0) {
+    if (isinf(term->within))
+      printf("; these may slide");
+    else
+      printf("; these may slide by %g m/s", term->within);
+  }
+}
+
+// by what name logs and tables tell of a term, where it has another than its element's
+static void print_name(const cav_term *term) {
+  if (term->name && *term->name && strcmp(term->name, cav_quantity_rule_of(term->quantity)->name))
+    printf("'%s': ", term->name);
 }
 
 static void print_terms(const cav_problem *p, int hard) {
@@ -379,14 +406,18 @@ static void print_terms(const cav_problem *p, int hard) {
   for (int i = 0; i < p->nterm; i++) {
     const cav_term *term = &p->term[i];
     if ((term->use != CAV_USE_COST) != hard) continue;
-    if (!n++) printf("%s\n", hard ? "constraints" : "costs");
+    if (!n++)
+      printf("%s; achieved needs those that are to be met, the rest is not asked for\n",
+             hard ? "constraints" : "costs");
     if (hard)
       printf("  must be           ");
     else
       printf("  weight %-10.4g ", term->weight);
+    print_name(term);
     print_quantity(p, term);
     print_target(p, term);
     print_window(p, term);
+    print_standing(p, term);
     printf("\n");
   }
 }

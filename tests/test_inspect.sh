@@ -1,0 +1,62 @@
+#!/bin/sh
+# What inspect says of a problem before it is solved: which terms count, where start and goal touch and are too deep, which way joints move.
+# Usage: test_inspect.sh CAVORT SOURCE_ROOT
+set -u
+cavort=$(cd "$(dirname "$1")" && pwd)/$(basename "$1")
+root=$(cd "$2" && pwd)
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+checks=0
+failed=0
+check() {
+  text=$1
+  shift
+  checks=$((checks + 1))
+  "$@" && return 0
+  failed=$((failed + 1))
+  echo "failed: $text"
+}
+# inspected STATUS ARGUMENT...: what it prints is in out and err
+inspected() {
+  wanted=$1
+  shift
+  "$cavort" inspect "$@" >out 2>err
+  status=$?
+  check "inspect $*: status $status, expected $wanted" [ "$status" -eq "$wanted" ]
+}
+says() { check "says: $1" grep -qF -- "$1" out; }
+not_said() { check "does not say: $1" sh -c '! grep -qF -- "$1" out' sh "$1"; }
+
+# --- terms: names, tolerances, what achieved needs ---
+
+cat >model.xml <<'TEXT'
+<mujoco model="two"><option timestep="0.02"/><worldbody><geom name="ground" type="plane" size="9 9 1"/>
+<body name="rod" pos="0 0 2"><joint name="pivot" axis="0 1 0" damping=".1"/>
+<geom name="bob" pos="0 0 -.5" size=".05" mass="1"/></body>
+<body name="box" pos="2 0 .1"><freejoint name="box"/><geom name="box" type="box" size=".1 .1 .1"/></body></worldbody>
+<actuator><motor joint="pivot" gear="10" ctrlrange="-1 1"/></actuator></mujoco>
+TEXT
+cat >terms.xml <<'TEXT'
+<problem name="terms" model="model.xml"><horizon duration="1" timestep=".02"/><start/>
+<cost><posture name="final" dofs="all" at="end" weight="900"/>
+<sensor name="near" type="framepos" body="box" reftype="xbody" refname="rod" component="z" target="-1.9" weight="3"/>
+<sensor name="soft" type="touch" body="rod" within="5" weight="1"/>
+<sensor name="free" type="touch" body="rod" weight="1"/>
+<sensor name="hint" type="framepos" body="rod" target="0 0 1.5" at=".5" within="any" weight="1"/>
+<slip body="box" weight="0" within="0.2"/></cost>
+<constraint><sensor name="level" type="framequat" body="box" at="end"/></constraint></problem>
+TEXT
+inspected 0 terms.xml
+says "costs; achieved needs those that are to be met, the rest is not asked for"
+says "  weight 900        'final': posture of all dofs to the goal at 1 s; to be met within 0.1 rad, 0.03 m (usual)"
+says "  weight 3          'near': framepos of box, z, in the frame of rod to -1.9; reported only, no within="
+says "  weight 1          'soft': touch of rod to 0; to be met within 5 N"
+check "over the whole horizon without within: a running cost" grep -qx "  weight 1          'free': touch of rod to 0" out
+says "'hint': framepos of rod to 0 0 1.5 at 0.5 s; reported only, within=\"any\""
+says "slip of loaded contacts of body box; these may slide by 0.2 m/s"
+says "  must be           'level': framequat of box to no rotation at 1 s; to be met within 1e-06 rad"
+check "a name that is the element's is not repeated" grep -q "^  weight 1000       gap of" out
+
+[ "$failed" -eq 0 ] && echo "$checks checks"
+exit "$failed"
