@@ -58,5 +58,65 @@ says "slip of loaded contacts of body box; these may slide by 0.2 m/s"
 says "  must be           'level': framequat of box to no rotation at 1 s; to be met within 1e-06 rad"
 check "a name that is the element's is not repeated" grep -q "^  weight 1000       gap of" out
 
+# --- joints: what a positive change moves where ---
+
+line() { sed -n "s/^$1  *[a-z]* .*  + \(.*\)/\1/p" out; }
+joint() { check "$1: + $2, not + $(line "$1")" [ "$(line "$1")" = "$2" ]; }
+inspected 0 "$root/problems/models/humanoid.xml"
+joint knee_right "foot_right forwards"
+joint abdomen_z "turns pelvis to the left"
+joint ankle_y_left "foot_left down"
+joint elbow_left "hand_left forwards"
+inspected 0 "$root/problems/models/robot.xml"
+joint knee_right "foot_right backwards"
+joint ankle_roll_left "rolls foot_left to the right"
+joint waist_yaw "turns chest to the left"
+inspected 0 "$root/problems/models/walker.xml"
+joint z "torso up"
+joint pitch "tips torso forwards"
+
+# against where bodies are when the joint has been moved
+places() { sed -n '/^places/,/^$/p' "$1"; }
+moved() {
+  cat >moved.xml <<TEXT
+<problem name="moved" model="$1"><horizon duration="1"/><start/><goal ranges="clip"><joint name="$2" degrees="$3"/></goal></problem>
+TEXT
+  "$cavort" inspect moved.xml >moved.out 2>&1
+  # start and goal of that body: which way it went most
+  places moved.out | awk -v body="$4" '$1 == body { for (k = 0; k < 3; k++) d[k] = $(5 + k) - $(2 + k); most = 0
+    for (k = 1; k < 3; k++) if (d[k] * d[k] > d[most] * d[most]) most = k
+    split(d[most] > 0 ? "forwards left up" : "backwards right down", way, " "); print way[most + 1] }'
+}
+for model in humanoid robot; do
+  path=$root/problems/models/$model.xml
+  "$cavort" inspect "$path" >rows 2>&1
+  sed -n 's/^\([a-z_0-9]*\)  *hinge  *\([-0-9.]*\)[.][.]\([-0-9.]*\) deg .*+ \([a-z_]*\) \([a-z]*\).*/\1 \2 \3 \4 \5/p' rows |
+    grep -vE 'ankle|wrist|turns|rolls|tips' >rows.txt
+  check "$model: joints are looked at" [ "$(wc -l <rows.txt)" -ge 12 ]
+  while read -r name low high body way; do
+    # to the side where there is room
+    to=$(echo "$low $high" | awk '{ print ($2 > 8) ? 8 : -8 }')
+    found=$(moved "$path" "$name" "$to" "$body")
+    case $to:$found in
+      -*:forwards) found=backwards ;; -*:backwards) found=forwards ;; -*:left) found=right ;;
+      -*:right) found=left ;; -*:up) found=down ;; -*:down) found=up ;;
+    esac
+    check "$model: $name moves $body $found, not $way" [ "$way" = "$found" ]
+  done <rows.txt
+done
+
+# a root that lies: seen from itself; and one that the file has turned, by its feet
+cat >lying.xml <<TEXT
+<problem name="lying" model="$root/problems/models/humanoid.xml"><horizon duration="1"/>
+<start><root pos="0 0 1" euler="0 90 0"/></start></problem>
+TEXT
+inspected 0 lying.xml
+joint knee_right "foot_right forwards"
+sed 's/<body name="torso"[^>]*/& euler="0 0 1.5708"/' "$root/problems/models/humanoid.xml" >turned.xml
+inspected 0 turned.xml
+joint knee_right "foot_right forwards"
+check "the comment of new has it" sh -c '"$1" new "$2" -o written.xml -q && grep -q "knee_right .* degrees; + foot_right forwards" written.xml' \
+  sh "$cavort" "$root/problems/models/humanoid.xml"
+
 [ "$failed" -eq 0 ] && echo "$checks checks"
 exit "$failed"

@@ -11,6 +11,7 @@
 #include "objects.h"
 #include "plannable.h"
 #include "quantity.h"
+#include "sense.h"
 #include "stand.h"
 #include "step.h"
 
@@ -29,17 +30,18 @@ static void print_sizes(const cav_model *m) {
          (double)m->bytes / 1024);
 }
 
-// "name type lower..upper" of one joint
-static void print_joint(const cav_joint *joint) {
-  double scale = joint->type == CAV_JOINT_SLIDE ? 1 : 180 / M_PI;
-  printf("%s %s", joint->name[0] ? joint->name : "(no name)", joint_name[joint->type]);
-  if (joint->limited && joint->type == CAV_JOINT_BALL) printf(" up to %.3g deg", scale * joint->range[1]);
-  if (joint->twist_limited) printf(" twist %.3g..%.3g deg", scale * joint->twist[0], scale * joint->twist[1]);
-  if (joint->swing_limited) printf(" swing up to %.3g deg", scale * joint->swing);
-  if (joint->limited && joint->type != CAV_JOINT_BALL) {
-    printf(" %.3g..%.3g %s", scale * joint->range[0], scale * joint->range[1],
-           joint->type == CAV_JOINT_SLIDE ? "m" : "deg");
-  }
+// the range of a joint
+static void write_range(const cav_joint *joint, char text[120]) {
+  const double scale = joint->type == CAV_JOINT_SLIDE ? 1 : 180 / M_PI;
+  int n = 0;
+  *text = 0;
+  if (joint->limited && joint->type == CAV_JOINT_BALL) n += sprintf(text, "up to %.3g deg", scale * joint->range[1]);
+  if (joint->twist_limited)
+    n += sprintf(text + n, "%stwist %.3g..%.3g deg", n ? " " : "", scale * joint->twist[0], scale * joint->twist[1]);
+  if (joint->swing_limited) n += sprintf(text + n, "%sswing up to %.3g deg", n ? " " : "", scale * joint->swing);
+  if (joint->limited && joint->type != CAV_JOINT_BALL)
+    sprintf(text + n, "%.3g..%.3g %s", scale * joint->range[0], scale * joint->range[1],
+            joint->type == CAV_JOINT_SLIDE ? "m" : "deg");
 }
 
 // "x y z" of an object in a posture that the state is at: what a framepos of it reads
@@ -89,13 +91,44 @@ static void print_bodies(const cav_model *m) {
            body->parent > 0 ? m->body[body->parent].name : "world", body->mass);
     if (body->link == 0) printf("fixed to the world");
     if (body->link > 0 && link->body != i) printf("fixed to %s", m->body[link->body].name);
-    for (int j = link->joint; body->link > 0 && link->body == i && j < link->joint + link->njoint; j++) {
-      if (j > link->joint) printf(", ");
-      print_joint(&m->joint[j]);
-    }
+    for (int j = link->joint; body->link > 0 && link->body == i && j < link->joint + link->njoint; j++)
+      printf("%s%s", j > link->joint ? ", " : "", m->joint[j].name[0] ? m->joint[j].name : "(no name)");
     printf("\n");
   }
   printf("\n");
+}
+
+// Type and range of every joint, where it is at the posture of the file or the start of a problem, and what a positive change
+// of it moves there
+static cav_status print_joints(const cav_model *m, const cav_problem *p, cav_error *error) {
+  cav_state *state = cav_state_new(m);
+  const double *q = p ? p->q_start : m->q0;
+  cav_roles roles;
+  cav_status status = state ? cav_roles_find(m, state, &roles) : CAV_NO_MEMORY;
+  if (!status) status = cav_position(m, state, q);
+  if (status) cav_file_fail(error, status, 0, "the joints cannot be evaluated");
+  int width = 20;
+  for (int j = 0; j < m->njoint; j++) width = (int)fmax(width, fmin((double)strlen(m->joint[j].name), 40));
+  if (!status && m->njoint)
+    printf("%-*s %-6s %-18s %-10s + moves, seen from the root of its tree\n", width, "joint", "type", "range",
+           p ? "start" : "in file");
+  for (int j = 0; j < m->njoint && !status; j++) {
+    const cav_joint *joint = &m->joint[j];
+    const int slides = joint->type == CAV_JOINT_SLIDE, scalar = slides || joint->type == CAV_JOINT_HINGE;
+    char range[120], at[40] = "", sense[CAV_SENSE];
+    write_range(joint, range);
+    cav_sense_of(m, state, &roles, j, sense);
+    if (scalar) snprintf(at, sizeof at, "%.4g %s", (slides ? 1 : 180 / M_PI) * q[joint->q] + 0.0, slides ? "m" : "deg");
+    printf("%-*s %s", width, joint->name[0] ? joint->name : "(no name)", joint_name[joint->type]);
+    if (scalar)
+      printf("  %-18s %-10s + %s", range, at, sense);
+    else if (*range)
+      printf(" %s", range);
+    printf("\n");
+  }
+  if (m->njoint) printf("\n");
+  cav_state_free(state);
+  return status;
 }
 
 // what key="stand" is
@@ -574,7 +607,8 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
 static cav_status print_model(const cav_model *m, const cav_problem *p, cav_error *error) {
   print_sizes(m);
   print_bodies(m);
-  cav_status status = print_places(m, p, error);
+  cav_status status = print_joints(m, p, error);
+  if (!status) status = print_places(m, p, error);
   if (status) return status;
   print_roles(m);
   print_stages(m);

@@ -5,6 +5,7 @@
 #include <stdio.h>
 
 #include "role.h"
+#include "sense.h"
 
 /// Where a problem starts, in the order in which it is tried.
 typedef enum cav_scaffold_start {
@@ -23,6 +24,7 @@ typedef struct cav_scaffold {
   cav_roles roles;
   int stands; ///< 1: there is a posture that stands, q [nq]
   double *q;
+  char (*sense)[CAV_SENSE]; ///< [njoint] what a positive change of each joint moves there
   double hand[3];           ///< of an arm: from its first joint to its hand, m
   double height;            ///< of the trunk above the lowest foot, m
   cav_scaffold_start start; ///< of what is written
