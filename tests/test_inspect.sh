@@ -118,5 +118,46 @@ joint knee_right "foot_right forwards"
 check "the comment of new has it" sh -c '"$1" new "$2" -o written.xml -q && grep -q "knee_right .* degrees; + foot_right forwards" written.xml' \
   sh "$cavort" "$root/problems/models/humanoid.xml"
 
+# --- postures: what touches, what is in what ---
+
+humanoid=$root/problems/models/humanoid.xml
+# posture HORIZON START: a problem of the humanoid with that start and a goal
+posture() {
+  { echo "<problem name='p' model='$humanoid'><horizon duration='1'/>"; cat; echo "</problem>"; } >p.xml
+}
+posture <<'TEXT'
+<start key="stand" height="floor"/><goal><root pos="0 0 1.25"/></goal>
+TEXT
+inspected 0 p.xml
+says ", touches the world with foot_right, foot_left in x "
+check "the goal's pair" grep -qE "^  goal .*, deepest penetration [0-9.]+ mm: 'foot[0-9]_(right|left)' in 'floor'$" out
+says "note: the goal has geom 'foot"
+posture <<'TEXT'
+<start><root pos="0 0 2"/></start>
+TEXT
+inspected 0 p.xml
+check "in the air" grep -qE "^  start  .* m, touches nothing of the world$" out
+posture <<'TEXT'
+<start key="supine" height="floor"/>
+TEXT
+inspected 0 p.xml
+check "many are counted" grep -qE "touches the world with (\w+, ){7}\w+ and [0-9]+ more in x" out
+# a hand in the other hand, where a start is found: a note, and no word of a solid to be moved
+posture <<'TEXT'
+<start free="true" key="stand" height="floor"/><goal key="stand" height="floor"><joint name="shoulder1_right" degrees="25"/>
+<joint name="shoulder1_left" degrees="25"/></goal>
+TEXT
+inspected 0 p.xml
+check "link in link" grep -qE "^note: the goal has geom '.*' [0-9.]+ mm inside '.*', and a certificate allows 5: .*Change the posture$" out
+posture <<'TEXT'
+<start free="true"><root pos="0 0 1.2"/></start><goal key="stand" height="floor"/>
+TEXT
+inspected 0 p.xml
+says "note: the start has geom 'foot"
+says "the guess begins there, no motion does"
+sed -i 's/<start free="true">/<cycle translation="1 0 0"\/><start>/' p.xml
+inspected 0 p.xml
+says "the guess begins there, no motion does"
+
 [ "$failed" -eq 0 ] && echo "$checks checks"
 exit "$failed"

@@ -455,33 +455,6 @@ static void print_terms(const cav_problem *p, int hard) {
   }
 }
 
-// where a posture has its centre of mass and where it touches: whether it could stand
-static cav_status print_posture(const cav_problem *p, const char *name, const double *q, cav_error *error) {
-  static const double touching = 0.005; // m
-  cav_state *state = cav_state_new(p->model);
-  if (!state) return cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for a state");
-  state->options.smoothing = state->options.smoothing_self = touching; // so that contacts are seen before they touch
-  cav_status status = cav_position(p->model, state, q);
-  if (status) cav_file_fail(error, status, 0, "the posture of the %s cannot be evaluated", name);
-  double com[3], low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, depth = 0;
-  int n = 0;
-  if (!status) cav_momentum(p->model, state, p->v_start, com, NULL, NULL);
-  for (int i = 0; i < state->ncontact && !status; i++) {
-    const cav_contact *c = &state->contact[i];
-    depth = fmax(depth, -c->dist);
-    if (c->dist > touching || (c->link1 != 0 && c->link2 != 0)) continue;
-    for (int k = 0; k < 3; k++) low[k] = fmin(low[k], c->pos[k]), high[k] = fmax(high[k], c->pos[k]);
-    n++;
-  }
-  if (!status) {
-    printf("  %-6s centre of mass at %.3f %.3f %.3f m", name, com[0], com[1], com[2]);
-    if (n) printf(", touches the world in x %.3f..%.3f, y %.3f..%.3f", low[0], high[0], low[1], high[1]);
-    printf(depth > 0 ? ", deepest penetration %.1f mm\n" : "\n", 1e3 * depth);
-  }
-  cav_state_free(state);
-  return status;
-}
-
 // what goes from where to where
 static void print_stage_ends(const cav_stage_options *first, const cav_stage_options *last) {
   int n;
@@ -574,8 +547,8 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
            : p->cycle.mirror == CAV_MIRROR_Y ? ", mirrored along y"
                                              : "");
   cav_command_tell_asymmetry(p, stdout);
-  cav_status status = print_posture(p, "start", p->q_start, error);
-  if (!status) status = print_posture(p, "goal", p->q_goal, error);
+  cav_status status = cav_command_print_stance(p, "start", p->q_start, error);
+  if (!status) status = cav_command_print_stance(p, "goal", p->q_goal, error);
   if (status) return status;
   if (*cav_problem_lowered(p))
     printf("  note: height=\"floor\" of %s; <root joint=\"...\" height=\"keep\"/> in it leaves a body in the air\n",
