@@ -112,6 +112,29 @@ static void check_broken_scenes(void) {
   refuse(SCENE_HEAD "<goal rise='.2'/>\n" TAIL, 8, "add height='floor'");
 }
 
+// words of other files: what stands for them here, where the element has it
+static void check_synonyms(void) {
+  refuse_cost("<sensor weight='1' type='framepos' body='trunk' tolerance='.1'/>",
+              "'tolerance': not known here; did you mean 'within'?");
+  refuse_cost("<sensor weight='1' type='framepos' body='trunk' position='0 0 1'/>", "did you mean 'target'?");
+  refuse_cost("<sensor weight='1' type='framepos' body='trunk' target='0 0 1' time='.5'/>", "did you mean 'at'?");
+  refuse_cost("<posture cost='1'/>", "did you mean 'weight'?");
+  refuse_cost("<sensor weight='1' type='framepos' link='trunk' target='0 0 1'/>", "did you mean 'body'?");
+  refuse_cost("<framepos weight='1'/>", "not known inside cost");
+  refuse_start("<start><joint name='knee' position='1'/></start>", "did you mean 'pos'?");
+  refuse_start("<start><joint name='knee' angle='1'/></start>", "did you mean 'degrees'?");
+  refuse_start("<start pose='bent'/>", "did you mean 'key'?");
+  refuse("<problem model='leg.xml'>\n<horizon duration='1' dt='.1'/>\n<start/></problem>", 2,
+         "did you mean 'timestep'?");
+  refuse("<problem model='leg.xml'>\n<horizon time='1'/>\n<start/></problem>", 2, "did you mean 'duration'?");
+  refuse("<problem robot='leg.xml'>\n<horizon duration='1'/>\n<start/></problem>", 1, "did you mean 'model'?");
+  refuse(HEAD "<objective/>\n" TAIL, 4, "did you mean <cost>?");
+  refuse(HEAD "<world/>\n" TAIL, 4, "did you mean <scene>?");
+  refuse_scene("<geom type='box' size='.1 .1 .1' position='1 0 0'/>", "did you mean 'pos'?");
+  // where the element has no such attribute spelling counts
+  refuse(HEAD "<limits tolerance='1'/>\n" TAIL, 4, "'tolerance': not known here; remove it");
+}
+
 static void check_broken_starts(void) {
   refuse_start("<start key='bend'/>", "did you mean 'bent'");
   refuse_start("<start key='satnd'/>", "did you mean 'stand'");
@@ -228,6 +251,7 @@ int main(void) {
   check_broken_files();
   check_former_names();
   check_broken_scenes();
+  check_synonyms();
   check_broken_starts();
   check_broken_terms();
   check_other_model();

@@ -445,7 +445,7 @@ cat >hop.xml <<'END'
 END
 sed 's/<joint name="knee" degrees="60"/<joint name="knee" pos="60"/' hop.xml >units.xml
 run 2 inspect units.xml
-says err "joint 'knee' is at 60, outside its range 0 .. 2.6 rad;"
+says err "joint 'knee' is at 60, outside its range 0 .. 2.618 rad;"
 says err "in degrees it would be in it: <joint name= degrees=>"
 # a little beyond in radians is no slip of units
 sed 's/<joint name="knee" degrees="60"/<joint name="knee" pos="2.65"/' hop.xml >units.xml
@@ -459,16 +459,16 @@ says out "posture of joint knee at least -0.2 and at most 0.3, counted from the 
 # what was given in degrees is not told to be given in degrees
 sed 's/<joint name="knee" degrees="60"/<joint name="knee" degrees="155"/' hop.xml >units.xml
 run 2 inspect units.xml
-says err "joint 'knee' is at 155, outside its range 0 .. 148.97 degrees;"
+says err "joint 'knee' is at 155, outside its range 0 .. 150 degrees;"
 check "err is silent of degrees" sh -c '! grep -q "in degrees" err'
 check "nor of a sign" sh -c '! grep -q "other sign" err'
 # the sign, which models choose as they like
 sed 's/<joint name="knee" degrees="60"/<joint name="knee" degrees="-30"/' hop.xml >units.xml
 run 2 inspect units.xml
-says err "joint 'knee' is at -30, outside its range 0 .. 148.97 degrees; ranges='clip' would bring it in; with the other sign it would be in it: cavort inspect MODEL"
+says err "joint 'knee' is at -30, outside its range 0 .. 150 degrees; ranges='clip' would bring it in; with the other sign it would be in it: cavort inspect MODEL"
 sed 's/<joint name="knee" degrees="60"/<joint name="knee" pos="-30"/' hop.xml >units.xml
 run 2 inspect units.xml
-says err "joint 'knee' is at -30, outside its range 0 .. 2.6 rad; ranges='clip' would bring it in; in degrees and with the other sign"
+says err "joint 'knee' is at -30, outside its range 0 .. 2.618 rad; ranges='clip' would bring it in; in degrees and with the other sign"
 sed 's/<joint name="knee" degrees="60"/<joint name="knee" degrees="-3"/' hop.xml >units.xml
 run 2 inspect units.xml
 check "a little beyond is no slip of sign" sh -c '! grep -q "other sign" err'
