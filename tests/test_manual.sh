@@ -73,6 +73,24 @@ while read -r word; do
   check "help $word in 130 columns" not grep -qE "^($word: |  [a-z<]).{130}" "$folder/answer"
 done <"$folder/words"
 
+# --- attributes by their names: all that have them, and what is chosen among several ---
+
+for word in lower upper; do
+  check "who has $word" says "$word" "attribute $word of <sensor> <posture> <velocity> <acceleration> in <constraint>"
+done
+check "a name is told once" says xbody "attribute xbody of <sensor>"
+check "and no more" not says xbody "<sensor> <sensor>"
+for word in body xbody geom site; do
+  check "one of several objects: $word" says "$word" "give exactly one of body, xbody, geom, site, joint, tendon, actuator"
+done
+check "no default is another object" not says xbody "default: "
+check "one of three" says degrees "give exactly one of pos, degrees, quat"
+for word in force gap impact clearance edge_force self_force self_penetration; do
+  check "$word has no tolerance" sh -c "! '$tool' help $word | grep -q '^  within '"
+done
+check "slip has one" says slip "  within "
+check "who has a tolerance" says within "attribute within of <sensor> <posture> <velocity> <acceleration> <effort> <power>"
+
 # --- the schema ---
 
 if command -v xmllint >/dev/null 2>&1; then

@@ -112,6 +112,19 @@ static void check_broken_scenes(void) {
   refuse(SCENE_HEAD "<goal rise='.2'/>\n" TAIL, 8, "add height='floor'");
 }
 
+// a tolerance of what has no target: what to ask in its place
+static void check_untouched(void) {
+  static const char *const force[] = {"force", "edge_force"}, *const others[] = {"gap", "impact", "clearance",
+                                                                                 "self_penetration", "self_force"};
+  char text[200];
+  for (int i = 0; i < 7; i++) {
+    snprintf(text, sizeof text, "<%s weight='1' within='.1'/>", i < 2 ? force[i] : others[i - 2]);
+    refuse_cost(text, i < 2 ? "<constraint><sensor type=\"touch\" body=\"NAME\" upper=\"0\"/></constraint>"
+                            : "no tolerance; a higher weight");
+  }
+  refuse_cost("<slip weight='1' within='fast'/>", "or 'any', got 'fast'");
+}
+
 // words of other files: what stands for them here, where the element has it
 static void check_synonyms(void) {
   refuse_cost("<sensor weight='1' type='framepos' body='trunk' tolerance='.1'/>",
@@ -251,6 +264,7 @@ int main(void) {
   check_broken_files();
   check_former_names();
   check_broken_scenes();
+  check_untouched();
   check_synonyms();
   check_broken_starts();
   check_broken_terms();

@@ -298,6 +298,27 @@ run 0 solve "$root/problems/motions/hopper-hop/problem.xml" -o hops
 check "nor is a foot that is up told to stand" [ "$(grep -c 'met on the ground' out)" = 0 ]
 check "of a motion that flies no such thing is told" [ "$(grep -c 'guess flies' out)" = 0 ]
 
+# --- what must not touch: the line that a refused tolerance of <force> names ---
+
+cat >railcar.xml <<'TEXT'
+<mujoco model="railcar"><option timestep="0.02"/><worldbody><body name="wall" pos="1 0 .3"><geom type="box" size=".1 1 .3"/></body>
+<body name="car" pos="0 0 .3"><joint name="x" type="slide" axis="1 0 0" damping="1"/><geom type="box" size=".1 .1 .1" mass="1"/></body>
+</worldbody><actuator><motor joint="x" ctrlrange="-20 20"/></actuator></mujoco>
+TEXT
+cat >presses.xml <<'TEXT'
+<problem name="presses" model="railcar.xml"><horizon duration="1" timestep=".02"/><start/><cost><force body="wall" weight="1" within="5"/>
+<sensor name="there" type="framepos" body="car" component="x" target=".85" at="end" weight="900" within=".1"/></cost></problem>
+TEXT
+run 2 solve presses.xml
+line='<constraint><sensor type="touch" body="wall" upper="0"/></constraint>'
+says err "$(echo "$line" | sed 's/wall/NAME/')"
+sed 's#<force [^>]*>##' presses.xml >touches.xml
+run 0 solve touches.xml -o touches --strategies 1 --threads 1
+check "without it the car presses on the wall" [ "$(wc -l <touches/forces.csv)" -gt 1 ]
+sed "s#</problem>#$line&#" touches.xml >untouched.xml
+run 0 solve untouched.xml -o untouched --strategies 1 --threads 1
+check "with it the wall is not touched" [ "$(wc -l <untouched/forces.csv)" -eq 1 ]
+
 # --- a component in principal axes that are not the body's: told; in those of the file not ---
 
 cat >turned.xml <<'TEXT'

@@ -148,10 +148,10 @@ void cav_xml_alike(const char *word, const void *names, int n, size_t stride, ch
 
 // --- names that no table knows ---
 
-// what a child or an attribute is called now that was called name before; NULL if none was
-static const char *renamed(const cav_xml_source *s, const char *inside, const char *name, int attribute) {
+// what is known of a child or an attribute of that name that is none; NULL: nothing
+static const cav_xml_former *former_of(const cav_xml_source *s, const char *inside, const char *name, int attribute) {
   for (const cav_xml_former *f = s->reader->former; f && f->inside; f++) {
-    if (f->attribute == attribute && !strcmp(f->inside, inside) && !strcmp(f->was, name)) return f->now;
+    if (f->attribute == attribute && !strcmp(f->inside, inside) && !strcmp(f->was, name)) return f;
   }
   return NULL;
 }
@@ -256,11 +256,12 @@ static const char *synonym_of(const synonym *list, size_t length, const char *wo
 #define SYNONYM_OF(list, ...) synonym_of(list, sizeof(list) / sizeof *(list), __VA_ARGS__)
 
 void cav_xml_unknown_attribute(cav_xml_source *s, int line, const cav_xml_element *rule, const char *name) {
-  const char *now = renamed(s, rule->name, name, 1);
-  if (now) {
-    cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name, "is called '%s' now; rename it", now);
-    return;
-  }
+  const cav_xml_former *former = former_of(s, rule->name, name, 1);
+  if (former && former->now)
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name, "is called '%s' now; rename it", former->now);
+  else if (former)
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name, "%s", former->instead);
+  if (former) return;
   const cav_xml_attribute *a = rule->attribute;
   int n = 0;
   while (a && a[n].name) n++;
@@ -279,11 +280,12 @@ void cav_xml_unknown_attribute(cav_xml_source *s, int line, const cav_xml_elemen
 
 void cav_xml_unknown_element(cav_xml_source *s, int line, const cav_xml_element *parent,
                              const cav_xml_element *const *allowed, const char *name) {
-  const char *now = parent ? renamed(s, parent->name, name, 0) : NULL;
-  if (now) {
-    cav_xml_source_fail(s, CAV_BAD_INPUT, line, name, NULL, "is called <%s> now; rename it", now);
-    return;
-  }
+  const cav_xml_former *former = parent ? former_of(s, parent->name, name, 0) : NULL;
+  if (former && former->now)
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, name, NULL, "is called <%s> now; rename it", former->now);
+  else if (former)
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, name, NULL, "%s", former->instead);
+  if (former) return;
   const char *names[120];
   int n = 0;
   for (; allowed && allowed[n] && n < 119; n++) names[n] = allowed[n]->name;
