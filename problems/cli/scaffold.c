@@ -172,7 +172,7 @@ static void begin(FILE *out, cav_scaffold *s, const char *task) {
   fprintf(out, "\"%s>\n", s->floating ? " floating=\"true\"" : "");
 }
 
-static int has_floor(const cav_model *m) {
+int cav_scaffold_has_floor(const cav_model *m) {
   for (int i = 0; i < m->ngeom; i++)
     if (m->geom[i].type == CAV_GEOM_PLANE && m->geom[i].link == 0) return 1;
   return 0;
@@ -180,14 +180,15 @@ static int has_floor(const cav_model *m) {
 
 // the posture that it starts from: one that stands, the first keyframe, or the model's own; on the floor, or as it is
 static void write_start(FILE *out, const cav_scaffold *s) {
-  int stands = s->start == CAV_SCAFFOLD_FLOOR && s->roles.base != CAV_BASE_FIXED, floor = has_floor(s->model);
+  int stands = s->start == CAV_SCAFFOLD_FLOOR && s->roles.base != CAV_BASE_FIXED,
+      floor = cav_scaffold_has_floor(s->model);
   int lowered = stands && (floor || s->stands);
   int key = s->start != CAV_SCAFFOLD_PLAIN && s->model->nkey && *s->model->key[0].name;
   if (lowered && !floor)
     fputs(
         "\n  <!-- what the model's file does not have: a floor. Boxes, bars and things to carry may stand here, too "
         "-->\n"
-        "  <scene>\n    <geom name=\"floor\" type=\"plane\" size=\"0 0 1\"/>\n  </scene>\n",
+        "  <scene>\n    " CAV_SCAFFOLD_PLANE "\n  </scene>\n",
         out);
   fputs(
       "\n  <!-- where it starts; a goal of its own would be <goal>, else it ends as it began. Single joints are set "

@@ -35,6 +35,10 @@ typedef struct cav_scaffold {
 cav_status cav_scaffold_open(cav_scaffold *scaffold, const cav_model *model, cav_error *error);
 void cav_scaffold_close(cav_scaffold *scaffold);
 
+/// Whether a plane of the world belongs to a model, and what a <scene> adds where none does.
+int cav_scaffold_has_floor(const cav_model *model);
+#define CAV_SCAFFOLD_PLANE "<geom name=\"floor\" type=\"plane\" size=\"0 0 1\"/>"
+
 /// What a problem for the model may name, as a comment.
 void cav_scaffold_list(FILE *out, const cav_scaffold *scaffold);
 
