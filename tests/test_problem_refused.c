@@ -101,7 +101,10 @@ static void refuse_scene(const char *element, const char *words) {
 static void check_broken_scenes(void) {
   refuse_scene("<gem/>", "did you mean <geom>");
   refuse_scene("<geom type='box' size='.1'/>", "size");
-  refuse_scene("<geom name='shin' size='.1'/>", "is taken already");
+  refuse_scene("<geom name='shin' size='.1'/>", "; choose another");
+  refuse_scene("<geom name='floor' type='plane' size='1 1 1'/>",
+               "; the model has this floor, so remove the plane of the <scene>");
+  refuse_scene("<geom name='floor' type='box' size='1 1 1'/>", "; choose another");
   refuse_scene("<geom class='hard' size='.1'/>", "no default class 'hard'");
   refuse_scene("<geom material='wood' size='.1'/>", "no material 'wood'");
   refuse_scene("<geom type='mesh' mesh='rock'/>", "rock");
