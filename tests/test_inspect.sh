@@ -159,5 +159,22 @@ sed -i 's/<start free="true">/<cycle translation="1 0 0"\/><start>/' p.xml
 inspected 0 p.xml
 says "the guess begins there, no motion does"
 
+# --- a box that begins inside a table, and is not stopped by it; on it by what is told; a ball in the air ---
+
+posture <<'TEXT'
+<scene><body name="table" pos="1 0 .35"><geom name="tabletop" type="box" size=".4 .4 .05" pos="0 0 .3"/></body>
+<body name="box" pos="2 0 .1"><freejoint name="box"/><geom name="box" type="box" size=".1 .1 .1"/></body>
+<body name="ball" pos="3 0 .1"><freejoint name="ball"/><geom name="ball" size=".1"/></body></scene>
+<start key="stand" height="floor"/>
+<goal key="stand" height="floor"><root joint="box" pos="1 0 .72"/><root joint="ball" pos="3 0 1"/></goal>
+TEXT
+inspected 0 p.xml
+says "note: height=\"floor\" of <goal> lowers 'box' by 0.62 m, not stopped by 'tabletop', inside which it begins: 0.080 m higher it is on that"
+says "note: height=\"floor\" of <goal> lowers 'ball' by 0.9 m; <root joint="
+sed -i 's/pos="1 0 .72"/pos="1 0 .80"/' p.xml
+inspected 0 p.xml
+not_said "tabletop', inside"
+check "it lies on the table" grep -qE "^  box .* 1.000 +0.000 +0.800$" out
+
 [ "$failed" -eq 0 ] && echo "$checks checks"
 exit "$failed"

@@ -553,6 +553,8 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
   if (*cav_problem_lowered(p))
     printf("  note: height=\"floor\" of %s; <root joint=\"...\" height=\"keep\"/> in it leaves a body in the air\n",
            cav_problem_lowered(p));
+  if (*cav_problem_buried(p))
+    printf("  note: height=\"floor\" of %s. Change Z of its <root pos=\"X Y Z\">\n", cav_problem_buried(p));
   printf("  %d unknowns%s; the guess %s",
          (knots - 1 + 2 * (p->free_start != 0)) * p->model->nv + (p->duration_most > 0),
          p->free_start ? ", with posture and velocity at the start" : "",
