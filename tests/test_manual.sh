@@ -55,6 +55,8 @@ for word in torso 'right hand' hand foot pelvis; do
   check "$word is a role" says "$word" "$word: a role"
   check "$word leads to the roles" says "$word" "  back left foot"
 done
+check "a posture by its name" says kneel "kneel: a posture of any humanoid"
+check "with the others" says kneel "  all-fours"
 check "a role by its own name" says hand 'body="hand"'
 for word in achieved certified optimal stand keyframe axis floor knee dt tolerance units left; do
   check "help of $word" says "$word" "$word: "

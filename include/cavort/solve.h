@@ -431,8 +431,8 @@ typedef struct cav_term_report {
 
 /// By how much values of a term in one unit may be off for the motion to have achieved what was asked.
 typedef struct cav_tolerance {
-  double within;
-  char unit[16];
+  double within; ///< above 0, in unit
+  char unit[16]; ///< "m", "rad", "of limit"
 } cav_tolerance;
 
 /// What verification found; from the knots alone, with code apart from the optimiser's. optim/METHOD.md, 6.

@@ -212,8 +212,8 @@ cav_status cav_configuration_posture(const cav_model *m, cav_state *state, const
   int i = 0;
   while (cav_posture_names[i] && strcmp(cav_posture_names[i], name)) i++;
   if (!cav_posture_names[i])
-    return refuse(error, CAV_BAD_INPUT, "there is no posture of that name, got '%.40s'; cavort help postures lists them",
-                  name);
+    return refuse(error, CAV_BAD_INPUT,
+                  "there is no posture of that name, got '%.40s'; cavort help postures lists them", name);
   char why[200];
   cav_status status = cav_posture_named(m, state, name, q, why);
   if (!status) return CAV_OK;

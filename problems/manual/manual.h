@@ -94,8 +94,8 @@ typedef struct cav_manual_use {
 /// The command that does what a word says which is none itself, NULL: none is known. words.c.
 const cav_manual_use *cav_manual_use_of(const char *word);
 
-/// Prints all that help has of a word: a topic, names of problem files, roles, what stands for a word known from elsewhere;
-/// how many there were. words.c.
+/// Prints all that help has of a word: a topic, names of problem files, roles, postures, what stands for a word known from
+/// elsewhere; how many there were. words.c.
 int cav_manual_answer(FILE *out, const cav_manual *manual, const char *word);
 
 /// The reference of commands and problem files, in Markdown. reference.c.

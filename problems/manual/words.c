@@ -4,6 +4,7 @@
 #include <strings.h>
 
 #include "manual.h"
+#include "posture.h"
 #include "role.h"
 
 // words separated by |, the command line that does it, what that does
@@ -49,10 +50,10 @@ static const struct {
      NULL},
     {"impossible|infeasible|feasible|proof",
      "a problem that is proven impossible is not solved; cavort inspect PROBLEM tells the proof", "inspect"},
-    {"stand|standing|home",
+    {"stand|standing|lying|crouch|sitting|kneeling|squatting",
      "key=\"stand\" of <start>, <goal>, <pose> and <waypoint> is a posture on the feet, found for any model that has "
-     "feet;\n  height=\"floor\" beside it puts it on the floor",
-     "key"},
+     "feet;\n  others are found for any humanoid. height=\"floor\" beside it puts it on the floor",
+     "postures"},
     {"keyframe|keyframes|qpos0", "a posture that the model's file names: key=\"NAME\" of <start>, <goal> and others",
      "key"},
     {"feet|hands|paw|paws|knee|elbow|hip|shoulder|ankle|wrist|leg|legs|arm|arms|thigh|shin|toe|finger|neck|waist|back|"
@@ -107,7 +108,7 @@ static const struct {
      "a force on a body: <sensor type=\"touch\" body=\"right hand\" target=\"20\" within=\"5\" from=\"0.8\" to=\"1.2\" "
      "weight=\"100\"/>;\n  none on it: <constraint><sensor type=\"touch\" body=\"table\" upper=\"0\"/></constraint>",
      "touch"},
-    {"jump|walk|kick|squat|climb|backflip|cartwheel|dance|motions|examples",
+    {"jump|walk|kick|climb|backflip|cartwheel|dance|motions|examples",
      "motions of the project stand in problems/motions; cavort new MODEL --like jump writes one for a model", "new"},
     {"output|folder|csv|trajectory|json|files",
      "cavort solve writes a folder, NAME.result; its files: problems/README.md, Result folders", "solve"},
@@ -162,6 +163,16 @@ static int print_role(FILE *out, const cav_manual *manual, const char *name) {
   return print_topic(out, manual, "roles");
 }
 
+// a posture that is found by its name
+static int print_posture(FILE *out, const cav_manual *manual, const char *name) {
+  for (int i = 0; cav_posture_names[i]; i++) {
+    if (strcmp(cav_posture_names[i], name)) continue;
+    fprintf(out, "%s: a posture of any humanoid, as in <start key=\"%s\" height=\"floor\"/>\n", name, name);
+    return print_topic(out, manual, "postures");
+  }
+  return 0;
+}
+
 static int print_word(FILE *out, const char *name) {
   int told = 0;
   for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
@@ -178,6 +189,7 @@ int cav_manual_answer(FILE *out, const cav_manual *manual, const char *name) {
   told += print_topic(out, manual, name);
   told += cav_manual_explain(out, name);
   told += print_role(out, manual, name);
+  told += print_posture(out, manual, name);
   const cav_manual_use *use = told ? NULL : cav_manual_use_of(name);
   if (use) fprintf(out, "%s: cavort %s %s\n", name, use->line, use->text);
   return told + (use != NULL);
