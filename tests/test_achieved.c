@@ -258,12 +258,104 @@ static void test_goals(void) {
   }
 }
 
+// what a verdict will ask of a term is known before there is a motion, and is what it asks then: a tolerance for each unit of its
+// values, of whatever it is given for, over the whole horizon too
+static void test_tolerances(void) {
+  static const struct {
+    const char *cost;
+    int n, reported;
+    double within;
+    const char *unit;
+  } c[] = {{"<posture name='it' weight='1' at='end'/>", 1, 1, 0.1, "rad"},
+           {"<velocity name='it' weight='1' at='end'/>", 1, 1, 0.3, "rad/s"},
+           {"<velocity name='it' weight='1' from='.5'/>", 0, 0, 0, ""},
+           {"<posture name='it' weight='1'/>", 0, 0, 0, ""},
+           {"<posture name='it' weight='1' at='end' within='any'/>", 0, 1, 0, ""},
+           {"<sensor name='it' type='touch' body='rod' within='any' weight='1'/>", 0, 1, 0, ""},
+           {"<sensor name='it' type='framepos' body='rod' target='0 0 2' weight='1'/>", 0, 1, 0, ""},
+           {"<sensor name='it' type='framepos' body='rod' target='0 0 2' within='.02' weight='1'/>", 1, 1, 0.02, "m"},
+           {"<sensor name='it' type='touch' body='rod' within='5' weight='1'/>", 1, 1, 5, "N"},
+           {"<sensor name='it' type='touch' body='rod' weight='1'/>", 0, 0, 0, ""},
+           {"<sensor name='it' type='touch' body='rod' at='.5' weight='1'/>", 0, 1, 0, ""},
+           {"<effort name='it' weight='1' at='.5' within='.2'/>", 1, 1, 0.2, "of limit"},
+           {"<power name='it' weight='1' at='.5'/>", 0, 1, 0, ""},
+           {"<power name='it' weight='1' at='.5' within='.2'/>", 1, 1, 0.2, "m/s"},
+           {"<slip name='it' weight='1' within='.2'/>", 0, 0, 0, ""},
+           {"<force name='it' weight='1' at='.5'/>", 0, 0, 0, ""}};
+  for (size_t i = 0; i < sizeof c / sizeof *c; i++) {
+    cav_error error = {0};
+    cav_problem *p = problem_with(c[i].cost, &error);
+    if (!CHECK(p != NULL)) continue;
+    cav_term_report *report = calloc((size_t)p->nterm, sizeof *report);
+    cav_trajectory *still = hanging(p);
+    CHECK(report && cav_terms_report(p, still, &p->model->options, report, NULL, &error) == CAV_OK);
+    for (int k = 0; k < p->nterm; k++) {
+      cav_tolerance found[2] = {{0}};
+      int reported = -1, n = cav_term_tolerances(p, &p->term[k], 2, found, &reported);
+      CHECK(reported == report[k].has_target && n == (reported && isfinite(report[k].within)));
+      CHECK(n == 0 || (found->within == report[k].within && !strcmp(found->unit, report[k].unit)));
+      if (strcmp(p->term[k].name, "it")) continue;
+      if (!CHECK(n == c[i].n && reported == c[i].reported && found->within == c[i].within &&
+                 !strcmp(found->unit, c[i].unit)))
+        fprintf(stderr, "    %s: %d, %d, %g %s\n", c[i].cost, n, reported, found->within, found->unit);
+    }
+    CHECK(cav_term_tolerances(p, p->term, 0, NULL, NULL) == 0);
+    free(report);
+    cav_trajectory_free(still);
+    cav_problem_free(p);
+  }
+}
+
+// a tolerance is of a vector's length, of the one component that counts, and of each dof of a posture for itself
+static void test_lengths(void) {
+  static const char *const two =
+      "<mujoco><option timestep='0.02'/><worldbody><body name='rod'><joint name='pivot' axis='0 1 0'/><geom pos='0 0 "
+      "-.5' size='.05'/></body>"
+      "<body name='car' pos='3 0 0'><joint name='a' axis='0 1 0'/><joint name='b' type='slide' axis='1 0 0'/>"
+      "<geom size='.05'/></body></worldbody></mujoco>";
+  static const struct {
+    const char *cost;
+    int achieved;
+  } c[] = {{"<sensor type='framepos' body='rod' target='.03 .04 -.5' at='end' weight='1' within='.045'/>", 0},
+           {"<sensor type='framepos' body='rod' target='.03 .04 -.5' at='end' weight='1' within='.051'/>", 1},
+           {"<sensor type='framepos' body='rod' component='y' target='.04' at='end' weight='1' within='.045'/>", 1},
+           {"<posture qpos='0 .3 .4' at='end' weight='1' within='.45'/>", 1},
+           {"<posture qpos='0 .3 .4' at='end' weight='1' within='.39'/>", 0}};
+  write_file("model.xml", two);
+  for (size_t i = 0; i < sizeof c / sizeof *c; i++) {
+    char text[1000];
+    cav_error error = {0};
+    cav_verdict verdict = {0};
+    snprintf(text, sizeof text,
+             "<problem model='model.xml'><horizon duration='1' timestep='0.02'/><start/><cost>%s</cost></problem>",
+             c[i].cost);
+    write_file("problem.xml", text);
+    cav_problem *p = cav_problem_load(path_of("problem.xml"), NULL, &error);
+    if (!CHECK(p != NULL)) continue;
+    cav_trajectory *still = hanging(p);
+    if (!CHECK(cav_verify(p, still, &p->model->options, NULL, NULL, &verdict, &error) == CAV_OK))
+      fprintf(stderr, "    %s\n", error.text);
+    if (!CHECK(verdict.ntarget == 1 && verdict.achieved == c[i].achieved))
+      fprintf(stderr, "    %s: %s\n", c[i].cost, verdict.missed);
+    // rad of the hinges and m of the slide, of one number
+    cav_tolerance found[2];
+    if (strstr(c[i].cost, "posture"))
+      CHECK(cav_term_tolerances(p, &p->term[p->nterm - 1], 2, found, NULL) == 2 && !strcmp(found[0].unit, "rad") &&
+            !strcmp(found[1].unit, "m") && found[0].within == found[1].within);
+    cav_trajectory_free(still);
+    cav_problem_free(p);
+  }
+  write_file("model.xml", model);
+}
+
 int main(void) {
   if (!CHECK(mkdtemp(folder) != NULL)) return check_result();
   write_file("model.xml", model);
   test_hanging();
   test_within();
   test_goals();
+  test_tolerances();
+  test_lengths();
   test_cost();
   test_slides();
   test_shoved();

@@ -184,8 +184,16 @@ static void test_names(void) {
   CHECK(cav_manual_explain(out, "framepos") == 1);
   CHECK(cav_manual_explain(out, "nothing") == 0);
   if (out) fclose(out);
-  const char *near = cav_manual_nearest("horzon");
-  CHECK(near && !strcmp(near, "horizon"));
+  const cav_manual_command command = {.name = "solve"};
+  cav_manual manual = {.command = &command, .ncommand = 1};
+  manual.topic = cav_manual_topics(&manual.ntopic);
+  static const char *const meant[][2] = {{"horzon", "horizon"}, {"solv", "solve"}, {"sensrs", "sensors"}};
+  for (int i = 0; i < 3; i++) {
+    const char *near = cav_manual_nearest(&manual, meant[i][0]);
+    CHECK(near && !strcmp(near, meant[i][1]));
+  }
+  CHECK(!cav_manual_use_of("") && !cav_manual_use_of("chec") && !cav_manual_use_of("check|validate"));
+  CHECK(cav_manual_use_of("check") == cav_manual_use_of("Validate"));
 }
 
 static void write_files(void) {

@@ -29,6 +29,70 @@ for command in $("$tool" help | sed -n 's/^cavort \([a-z]*\) .*/\1/p'); do
   [ "$command" = cavort ] || check "$command has a section" grep -q "^### cavort $command " "$folder/reference.md"
 done
 
+# --- words that name nothing here ---
+
+says() { "$tool" help "$1" | grep -qF -- "$2"; }
+tells() { "$tool" "$1" 2>&1 | grep -qF -- "$2"; }
+while IFS='|' read -r word line; do
+  check "no command '$word': cavort $line" tells "$word" "there is no command '$word'; cavort $line "
+  check "nor help of it" says "$word" "cavort $line"
+done <<'TEXT'
+check|inspect PROBLEM
+validate|inspect PROBLEM
+info|inspect PROBLEM
+plan|solve PROBLEM
+optimise|solve PROBLEM
+optimize|solve PROBLEM
+play|view DIR
+plot|view DIR
+open|view DIR
+create|new MODEL
+TEXT
+check "simulate" tells simulate "cavort mpc PROBLEM"
+check "a word that no one knows is left alone" not tells fly "; cavort "
+check "spelling still counts" tells expain "did you mean 'explain'?"
+for word in torso 'right hand' hand foot pelvis; do
+  check "$word is a role" says "$word" "$word: a role"
+  check "$word leads to the roles" says "$word" "  back left foot"
+done
+check "a posture by its name" says kneel "kneel: a posture of any humanoid"
+check "with the others" says kneel "  all-fours"
+check "a role by its own name" says hand 'body="hand"'
+for word in achieved certified optimal stand keyframe axis floor knee dt tolerance units left; do
+  check "help of $word" says "$word" "$word: "
+done
+check "what is meant comes first" sh -c "'$tool' help floor | head -n 1 | grep -q '^floor: .*<scene>'"
+# all that the list of words leads to is there
+sed -n 's/^ *{"\([^"]*|[^"]*\)".*/\1/p' "$source/problems/manual/words.c" | tr '|' '\n' >"$folder/words"
+check "there are words" [ "$(wc -l <"$folder/words")" -gt 150 ]
+while read -r word; do
+  [ -n "$word" ] || continue
+  "$tool" help "$word" >"$folder/answer" 2>&1 || { check "help $word" false; continue; }
+  see=$(sed -n 's/^  more: cavort help //p' "$folder/answer")
+  [ -z "$see" ] || check "$word leads to $see" "$tool" help "$see"
+  use=$(sed -n "s/^$word: cavort \([a-z]*\) .*/\1/p" "$folder/answer")
+  [ -z "$use" ] || check "$word is the command $use" "$tool" help "$use"
+  check "help $word in 130 columns" not grep -qE "^($word: |  [a-z<]).{130}" "$folder/answer"
+done <"$folder/words"
+
+# --- attributes by their names: all that have them, and what is chosen among several ---
+
+for word in lower upper; do
+  check "who has $word" says "$word" "attribute $word of <sensor> <posture> <velocity> <acceleration> in <constraint>"
+done
+check "a name is told once" says xbody "attribute xbody of <sensor>"
+check "and no more" not says xbody "<sensor> <sensor>"
+for word in body xbody geom site; do
+  check "one of several objects: $word" says "$word" "give exactly one of body, xbody, geom, site, joint, tendon, actuator"
+done
+check "no default is another object" not says xbody "default: "
+check "one of three" says degrees "give exactly one of pos, degrees, quat"
+for word in force gap impact clearance edge_force self_force self_penetration; do
+  check "$word has no tolerance" sh -c "! '$tool' help $word | grep -q '^  within '"
+done
+check "slip has one" says slip "  within "
+check "who has a tolerance" says within "attribute within of <sensor> <posture> <velocity> <acceleration> <effort> <power>"
+
 # --- the schema ---
 
 if command -v xmllint >/dev/null 2>&1; then

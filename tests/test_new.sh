@@ -96,6 +96,17 @@ sed 's/<mujoco model="[^"]*"/<mujoco model="tall man scene"/' problems/models/hu
 "$cavort" new problems/models/humanoid.xml --like squat-jump -o "$work/like.xml" >"$work/out" || fail "like squat-jump"
 grep -q 'problem name="humanoid-squat-jump" model=' "$work/like.xml" || fail "like squat-jump: its name"
 "$cavort" inspect "$work/like.xml" >/dev/null 2>&1 || fail "like squat-jump cannot be read"
+# a model without a floor gets one, where postures are put on it: beside what the scene has, and in a scene of its own
+sed '/type="plane"/d' problems/models/humanoid.xml >"$work/floorless.xml"
+grep -q 'type="plane"' problems/models/humanoid.xml || fail "the humanoid's file has a floor"
+for motion in sit-stand squat-jump; do
+  "$cavort" new "$work/floorless.xml" --like $motion -o "$work/$motion.xml" >/dev/null || fail "like $motion, without a floor"
+  "$cavort" inspect "$work/$motion.xml" >"$work/out" 2>&1 || { fail "$motion without a floor"; cat "$work/out"; }
+  grep -q "^  start .* touches the world with foot_right, foot_left" "$work/out" || fail "$motion does not stand on its floor"
+  [ "$(grep -c 'name="floor" type="plane"' "$work/$motion.xml")" = 1 ] || fail "$motion has one floor"
+done
+"$cavort" new problems/models/humanoid.xml --like sit-stand -o "$work/floored.xml" >/dev/null || fail "like sit-stand"
+grep -q 'type="plane"' "$work/floored.xml" && fail "a model with a floor gets another"
 # from elsewhere, by a program in a build folder of the source
 source=$(dirname "$(dirname "$(dirname "$cavort")")")
 [ ! -d "$source/problems/motions" ] ||

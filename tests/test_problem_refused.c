@@ -101,7 +101,10 @@ static void refuse_scene(const char *element, const char *words) {
 static void check_broken_scenes(void) {
   refuse_scene("<gem/>", "did you mean <geom>");
   refuse_scene("<geom type='box' size='.1'/>", "size");
-  refuse_scene("<geom name='shin' size='.1'/>", "is taken already");
+  refuse_scene("<geom name='shin' size='.1'/>", "; choose another");
+  refuse_scene("<geom name='floor' type='plane' size='1 1 1'/>",
+               "; the model has this floor, so remove the plane of the <scene>");
+  refuse_scene("<geom name='floor' type='box' size='1 1 1'/>", "; choose another");
   refuse_scene("<geom class='hard' size='.1'/>", "no default class 'hard'");
   refuse_scene("<geom material='wood' size='.1'/>", "no material 'wood'");
   refuse_scene("<geom type='mesh' mesh='rock'/>", "rock");
@@ -110,6 +113,42 @@ static void check_broken_scenes(void) {
   refuse(SCENE_HEAD "<goal><root joint='crte'/></goal>\n" TAIL, 8, "did you mean 'crate'");
   refuse(SCENE_HEAD "<goal><root joint='door'/></goal>\n" TAIL, 8, "is not free; use <joint>");
   refuse(SCENE_HEAD "<goal rise='.2'/>\n" TAIL, 8, "add height='floor'");
+}
+
+// a tolerance of what has no target: what to ask in its place
+static void check_untouched(void) {
+  static const char *const force[] = {"force", "edge_force"}, *const others[] = {"gap", "impact", "clearance",
+                                                                                 "self_penetration", "self_force"};
+  char text[200];
+  for (int i = 0; i < 7; i++) {
+    snprintf(text, sizeof text, "<%s weight='1' within='.1'/>", i < 2 ? force[i] : others[i - 2]);
+    refuse_cost(text, i < 2 ? "<constraint><sensor type=\"touch\" body=\"NAME\" upper=\"0\"/></constraint>"
+                            : "no tolerance; a higher weight");
+  }
+  refuse_cost("<slip weight='1' within='fast'/>", "or 'any', got 'fast'");
+}
+
+// words of other files: what stands for them here, where the element has it
+static void check_synonyms(void) {
+  refuse_cost("<sensor weight='1' type='framepos' body='trunk' tolerance='.1'/>",
+              "'tolerance': not known here; did you mean 'within'?");
+  refuse_cost("<sensor weight='1' type='framepos' body='trunk' position='0 0 1'/>", "did you mean 'target'?");
+  refuse_cost("<sensor weight='1' type='framepos' body='trunk' target='0 0 1' time='.5'/>", "did you mean 'at'?");
+  refuse_cost("<posture cost='1'/>", "did you mean 'weight'?");
+  refuse_cost("<sensor weight='1' type='framepos' link='trunk' target='0 0 1'/>", "did you mean 'body'?");
+  refuse_cost("<framepos weight='1'/>", "not known inside cost");
+  refuse_start("<start><joint name='knee' position='1'/></start>", "did you mean 'pos'?");
+  refuse_start("<start><joint name='knee' angle='1'/></start>", "did you mean 'degrees'?");
+  refuse_start("<start pose='bent'/>", "did you mean 'key'?");
+  refuse("<problem model='leg.xml'>\n<horizon duration='1' dt='.1'/>\n<start/></problem>", 2,
+         "did you mean 'timestep'?");
+  refuse("<problem model='leg.xml'>\n<horizon time='1'/>\n<start/></problem>", 2, "did you mean 'duration'?");
+  refuse("<problem robot='leg.xml'>\n<horizon duration='1'/>\n<start/></problem>", 1, "did you mean 'model'?");
+  refuse(HEAD "<objective/>\n" TAIL, 4, "did you mean <cost>?");
+  refuse(HEAD "<world/>\n" TAIL, 4, "did you mean <scene>?");
+  refuse_scene("<geom type='box' size='.1 .1 .1' position='1 0 0'/>", "did you mean 'pos'?");
+  // where the element has no such attribute spelling counts
+  refuse(HEAD "<limits tolerance='1'/>\n" TAIL, 4, "'tolerance': not known here; remove it");
 }
 
 static void check_broken_starts(void) {
@@ -228,6 +267,8 @@ int main(void) {
   check_broken_files();
   check_former_names();
   check_broken_scenes();
+  check_untouched();
+  check_synonyms();
   check_broken_starts();
   check_broken_terms();
   check_other_model();

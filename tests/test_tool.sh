@@ -298,6 +298,27 @@ run 0 solve "$root/problems/motions/hopper-hop/problem.xml" -o hops
 check "nor is a foot that is up told to stand" [ "$(grep -c 'met on the ground' out)" = 0 ]
 check "of a motion that flies no such thing is told" [ "$(grep -c 'guess flies' out)" = 0 ]
 
+# --- what must not touch: the line that a refused tolerance of <force> names ---
+
+cat >railcar.xml <<'TEXT'
+<mujoco model="railcar"><option timestep="0.02"/><worldbody><body name="wall" pos="1 0 .3"><geom type="box" size=".1 1 .3"/></body>
+<body name="car" pos="0 0 .3"><joint name="x" type="slide" axis="1 0 0" damping="1"/><geom type="box" size=".1 .1 .1" mass="1"/></body>
+</worldbody><actuator><motor joint="x" ctrlrange="-20 20"/></actuator></mujoco>
+TEXT
+cat >presses.xml <<'TEXT'
+<problem name="presses" model="railcar.xml"><horizon duration="1" timestep=".02"/><start/><cost><force body="wall" weight="1" within="5"/>
+<sensor name="there" type="framepos" body="car" component="x" target=".85" at="end" weight="900" within=".1"/></cost></problem>
+TEXT
+run 2 solve presses.xml
+line='<constraint><sensor type="touch" body="wall" upper="0"/></constraint>'
+says err "$(echo "$line" | sed 's/wall/NAME/')"
+sed 's#<force [^>]*>##' presses.xml >touches.xml
+run 0 solve touches.xml -o touches --strategies 1 --threads 1
+check "without it the car presses on the wall" [ "$(wc -l <touches/forces.csv)" -gt 1 ]
+sed "s#</problem>#$line&#" touches.xml >untouched.xml
+run 0 solve untouched.xml -o untouched --strategies 1 --threads 1
+check "with it the wall is not touched" [ "$(wc -l <untouched/forces.csv)" -eq 1 ]
+
 # --- a component in principal axes that are not the body's: told; in those of the file not ---
 
 cat >turned.xml <<'TEXT'
@@ -445,7 +466,7 @@ cat >hop.xml <<'END'
 END
 sed 's/<joint name="knee" degrees="60"/<joint name="knee" pos="60"/' hop.xml >units.xml
 run 2 inspect units.xml
-says err "joint 'knee' is at 60, outside its range 0 .. 2.6"
+says err "joint 'knee' is at 60, outside its range 0 .. 2.618 rad;"
 says err "in degrees it would be in it: <joint name= degrees=>"
 # a little beyond in radians is no slip of units
 sed 's/<joint name="knee" degrees="60"/<joint name="knee" pos="2.65"/' hop.xml >units.xml
@@ -459,8 +480,19 @@ says out "posture of joint knee at least -0.2 and at most 0.3, counted from the 
 # what was given in degrees is not told to be given in degrees
 sed 's/<joint name="knee" degrees="60"/<joint name="knee" degrees="155"/' hop.xml >units.xml
 run 2 inspect units.xml
-says err "joint 'knee' is at 2.70526, outside its range 0 .. 2.6"
+says err "joint 'knee' is at 155, outside its range 0 .. 150 degrees;"
 check "err is silent of degrees" sh -c '! grep -q "in degrees" err'
+check "nor of a sign" sh -c '! grep -q "other sign" err'
+# the sign, which models choose as they like
+sed 's/<joint name="knee" degrees="60"/<joint name="knee" degrees="-30"/' hop.xml >units.xml
+run 2 inspect units.xml
+says err "joint 'knee' is at -30, outside its range 0 .. 150 degrees; ranges='clip' would bring it in; with the other sign it would be in it: cavort inspect MODEL"
+sed 's/<joint name="knee" degrees="60"/<joint name="knee" pos="-30"/' hop.xml >units.xml
+run 2 inspect units.xml
+says err "joint 'knee' is at -30, outside its range 0 .. 2.618 rad; ranges='clip' would bring it in; in degrees and with the other sign"
+sed 's/<joint name="knee" degrees="60"/<joint name="knee" degrees="-3"/' hop.xml >units.xml
+run 2 inspect units.xml
+check "a little beyond is no slip of sign" sh -c '! grep -q "other sign" err'
 run 0 solve hop.xml --threads 1
 says err 'strategy near-1   with <force weight="1"/>'
 says out 'strategy repaired: not as the problem states it, but with <force weight="1"/>'
@@ -653,7 +685,7 @@ check "what stands is not told of" sh -c '! grep -q "^note" out'
 # a trunk bent by 80 degrees over straight legs
 sed 's/<start key="stand" height="floor"\/>/<start key="stand" height="floor"><root pos="0 0 1" euler="0 80 0"\/><joint name="hip_y_right" degrees="-85"\/><joint name="hip_y_left" degrees="-85"\/><\/start>/' stands.xml >leans.xml
 run 0 inspect leans.xml
-check "a start beside its support" grep -qE "^note: at the start the centre of mass of 'torso' is 0.[0-9]+ m beside what it stands on, which is towards \(-1.0 0.0\)" out
+check "a start beside its support" grep -qE "^note: at the start the centre of mass of 'torso' and all that hangs on it is 0.[0-9]+ m beside what it stands on, which is towards \(-1.0 0.0\)" out
 
 # a goal whose left foot is on the floor, and a term that wants it up at the end; not one that ends before, or wants what the goal has
 sed 's/<goal key="stand" height="floor"\/>/&<cost><posture name="landing" dofs="all" at="end" weight="900"\/><sensor name="up" type="framepos" body="left foot" component="z" target="0.4" from="0.5" weight="300" within="0.1"\/><\/cost>/; s/<root pos="0 0 3"\/>//' stands.xml >disagrees.xml

@@ -40,6 +40,26 @@ static int compare_named(const void *a, const void *b) {
   return (x->node->line > y->node->line) - (x->node->line < y->node->line);
 }
 
+static int in_scene(const cav_spec *spec, const cav_xml_node *node) {
+  return spec->scene && !strcmp(node->file, spec->scene->file);
+}
+
+static int is_plane(const cav_spec *spec, const cav_xml_node *node) {
+  int plane = 0;
+  for (int i = 0; i < spec->geom.n; i++)
+    plane |= spec->geom.at[i].node == node && spec->geom.at[i].type == CAV_GEOM_PLANE;
+  return plane;
+}
+
+// two objects of one name: the one that the problem adds is at fault, whose file can be changed; else the later one
+static void refuse_twice(cav_spec *spec, const named *first, const named *second) {
+  const int swap = in_scene(spec, first->node) && !in_scene(spec, second->node);
+  const cav_xml_node *one = (swap ? second : first)->node, *fault = (swap ? first : second)->node;
+  const int floors = in_scene(spec, fault) && !in_scene(spec, one) && is_plane(spec, one) && is_plane(spec, fault);
+  cav_spec_fail(spec, fault, "name", "'%.60s' is taken already at %.200s:%d; %s", first->name, one->file, one->line,
+                floors ? "the model has this floor, so remove the plane of the <scene>" : "choose another");
+}
+
 static void check_unique(cav_spec *spec, const void *first, int n, size_t stride) {
   named *sorted = malloc((size_t)(n + 1) * sizeof *sorted);
   if (!sorted) {
@@ -50,8 +70,7 @@ static void check_unique(cav_spec *spec, const void *first, int n, size_t stride
   qsort(sorted, (size_t)n, sizeof *sorted, compare_named);
   for (int i = 1; i < n; i++) {
     if (!*sorted[i].name || strcmp(sorted[i].name, sorted[i - 1].name)) continue;
-    cav_spec_fail(spec, sorted[i].node, "name", "'%.60s' is taken already at %.200s:%d; choose another", sorted[i].name,
-                  sorted[i - 1].node->file, sorted[i - 1].node->line);
+    refuse_twice(spec, &sorted[i - 1], &sorted[i]);
   }
   free(sorted);
 }

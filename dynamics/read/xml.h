@@ -58,11 +58,13 @@ typedef struct cav_xml_element {
   const char *text; ///< what it means; NULL: of another format
 } cav_xml_element;
 
-/// A name that files of earlier versions have: an error that meets it says what it is called now.
+/// A name that files of earlier versions have, or that is expected where it has no meaning: an error that meets it says what it
+/// is called now, or what to do instead.
 typedef struct cav_xml_former {
   const char *inside;    ///< element that holds the child or the attribute; NULL ends a table
-  const char *was, *now; ///< names, then and now
+  const char *was, *now; ///< names, then and now; now NULL: it has none
   int attribute;         ///< 1: of an attribute, 0: of a child
+  const char *instead;   ///< where now is NULL: why it is refused, and what to do
 } cav_xml_former;
 
 /// One attribute as found, converted.

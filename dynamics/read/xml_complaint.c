@@ -148,10 +148,10 @@ void cav_xml_alike(const char *word, const void *names, int n, size_t stride, ch
 
 // --- names that no table knows ---
 
-// what a child or an attribute is called now that was called name before; NULL if none was
-static const char *renamed(const cav_xml_source *s, const char *inside, const char *name, int attribute) {
+// what is known of a child or an attribute of that name that is none; NULL: nothing
+static const cav_xml_former *former_of(const cav_xml_source *s, const char *inside, const char *name, int attribute) {
   for (const cav_xml_former *f = s->reader->former; f && f->inside; f++) {
-    if (f->attribute == attribute && !strcmp(f->inside, inside) && !strcmp(f->was, name)) return f->now;
+    if (f->attribute == attribute && !strcmp(f->inside, inside) && !strcmp(f->was, name)) return f;
   }
   return NULL;
 }
@@ -171,16 +171,102 @@ static const cav_xml_element *known_under(const cav_xml_element *parent, const c
   return under;
 }
 
-void cav_xml_unknown_attribute(cav_xml_source *s, int line, const cav_xml_element *rule, const char *name) {
-  const char *now = renamed(s, rule->name, name, 1);
-  if (now) {
-    cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name, "is called '%s' now; rename it", now);
-    return;
+/// A word that other files use, and what it may be here, the likelier first.
+typedef struct synonym {
+  const char *word, *here[3];
+} synonym;
+
+static const synonym attribute_synonyms[] = {
+    {"tolerance", {"within"}},
+    {"tol", {"within"}},
+    {"error", {"within"}},
+    {"accuracy", {"within"}},
+    {"position", {"target", "pos"}},
+    {"value", {"target", "pos"}},
+    {"goal", {"target", "key"}},
+    {"desired", {"target"}},
+    {"reference", {"target"}},
+    {"time", {"at", "duration"}},
+    {"when", {"at", "time"}},
+    {"t", {"at", "time"}},
+    {"start", {"from"}},
+    {"begin", {"from"}},
+    {"until", {"to"}},
+    {"stop", {"to"}},
+    {"end", {"to"}},
+    {"dt", {"timestep"}},
+    {"step", {"timestep"}},
+    {"h", {"timestep"}},
+    {"length", {"duration"}},
+    {"seconds", {"duration"}},
+    {"integrator", {"order"}},
+    {"min", {"lower"}},
+    {"minimum", {"lower"}},
+    {"max", {"upper"}},
+    {"maximum", {"upper"}},
+    {"cost", {"weight"}},
+    {"gain", {"weight"}},
+    {"w", {"weight"}},
+    {"angle", {"degrees"}},
+    {"deg", {"degrees"}},
+    {"rad", {"pos"}},
+    {"rpy", {"euler"}},
+    {"rotation", {"euler"}},
+    {"orientation", {"quat"}},
+    {"quaternion", {"quat"}},
+    {"q", {"qpos"}},
+    {"v", {"qvel"}},
+    {"pose", {"key"}},
+    {"posture", {"key"}},
+    {"keyframe", {"key"}},
+    {"link", {"body"}},
+    {"object", {"body"}},
+    {"axis", {"component"}},
+    {"dim", {"component"}},
+    {"direction", {"component"}},
+    {"robot", {"model"}},
+    {"mjcf", {"model"}},
+    {"urdf", {"model"}},
+    {"id", {"name"}},
+    {"label", {"name"}},
+    {"kind", {"type"}},
+    {"mu", {"friction"}},
+};
+
+static const synonym element_synonyms[] = {
+    {"objective", {"cost"}},    {"objectives", {"cost"}}, {"initial", {"start"}},    {"init", {"start"}},
+    {"final", {"goal"}},        {"end", {"goal"}},        {"worldbody", {"scene"}},  {"world", {"scene"}},
+    {"environment", {"scene"}}, {"time", {"horizon"}},    {"position", {"sensor"}},  {"place", {"sensor"}},
+    {"target", {"sensor"}},     {"keyframe", {"pose"}},   {"bound", {"constraint"}}, {"pos", {"sensor"}},
+};
+
+// what names [n] of a table have in the place of a word that other files use, NULL: nothing
+static const char *synonym_of(const synonym *list, size_t length, const char *word, const void *names, int n,
+                              size_t stride) {
+  for (size_t i = 0; i < length; i++) {
+    if (strcasecmp(list[i].word, word)) continue;
+    for (int k = 0; k < 3 && list[i].here[k]; k++)
+      for (int j = 0; j < n; j++) {
+        const char *name = *(const char *const *)((const char *)names + (size_t)j * stride);
+        if (name && !strcmp(name, list[i].here[k])) return name;
+      }
   }
+  return NULL;
+}
+#define SYNONYM_OF(list, ...) synonym_of(list, sizeof(list) / sizeof *(list), __VA_ARGS__)
+
+void cav_xml_unknown_attribute(cav_xml_source *s, int line, const cav_xml_element *rule, const char *name) {
+  const cav_xml_former *former = former_of(s, rule->name, name, 1);
+  if (former && former->now)
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name, "is called '%s' now; rename it", former->now);
+  else if (former)
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, rule->name, name, "%s", former->instead);
+  if (former) return;
   const cav_xml_attribute *a = rule->attribute;
   int n = 0;
   while (a && a[n].name) n++;
-  const char *near = n ? cav_xml_nearest(name, a, n, sizeof *a) : NULL;
+  const char *near = n ? SYNONYM_OF(attribute_synonyms, name, a, n, sizeof *a) : NULL;
+  if (n && !near) near = cav_xml_nearest(name, a, n, sizeof *a);
   const cav_xml_element *under = NULL, *const *root = s->reader->roots;
   for (int i = 0; root && root[i] && !under; i++) under = known_under(root[i], rule, name, 2);
   if (under)
@@ -194,18 +280,20 @@ void cav_xml_unknown_attribute(cav_xml_source *s, int line, const cav_xml_elemen
 
 void cav_xml_unknown_element(cav_xml_source *s, int line, const cav_xml_element *parent,
                              const cav_xml_element *const *allowed, const char *name) {
-  const char *now = parent ? renamed(s, parent->name, name, 0) : NULL;
-  if (now) {
-    cav_xml_source_fail(s, CAV_BAD_INPUT, line, name, NULL, "is called <%s> now; rename it", now);
-    return;
-  }
+  const cav_xml_former *former = parent ? former_of(s, parent->name, name, 0) : NULL;
+  if (former && former->now)
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, name, NULL, "is called <%s> now; rename it", former->now);
+  else if (former)
+    cav_xml_source_fail(s, CAV_BAD_INPUT, line, name, NULL, "%s", former->instead);
+  if (former) return;
   const char *names[120];
   int n = 0;
   for (; allowed && allowed[n] && n < 119; n++) names[n] = allowed[n]->name;
   names[n] = NULL;
   char list[300];
   list_names(list, sizeof list, names);
-  const char *near = n ? cav_xml_nearest(name, names, n, sizeof *names) : NULL;
+  const char *near = n ? SYNONYM_OF(element_synonyms, name, names, n, sizeof *names) : NULL;
+  if (n && !near) near = cav_xml_nearest(name, names, n, sizeof *names);
   const char *inside = parent ? parent->name : "the file";
   if (near)
     cav_xml_source_fail(s, CAV_BAD_INPUT, line, name, NULL, "not known inside %s; did you mean <%s>?", inside, near);

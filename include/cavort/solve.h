@@ -429,6 +429,12 @@ typedef struct cav_term_report {
   char unit[16], what[64]; ///< unit of its numbers; name of what is measured
 } cav_term_report;
 
+/// By how much values of a term in one unit may be off for the motion to have achieved what was asked.
+typedef struct cav_tolerance {
+  double within; ///< above 0, in unit
+  char unit[16]; ///< "m", "rad", "of limit"
+} cav_tolerance;
+
 /// What verification found; from the knots alone, with code apart from the optimiser's. optim/METHOD.md, 6.
 /// optimality is filled by cav_verify_optimality; solve_seconds and iterations are the solver's. cav_verify leaves these
 /// as they are.
@@ -526,6 +532,12 @@ CAV_API cav_status cav_verify_optimality(const cav_problem *problem, const cav_t
 CAV_API cav_status cav_terms_report(const cav_problem *problem, const cav_trajectory *trajectory,
                                     const cav_options *contact, cav_term_report *report, double *cost,
                                     cav_error *error);
+
+/// What a verdict will ask of a term, before there is a motion: how many tolerances its values have, one for each unit (a posture
+/// may have rad and m), the first most of them in list (may be NULL if most is 0). 0: achieved does not need it. *reported
+/// (may be NULL) is 1 where it has a target at all, so that a report tells what a motion has there.
+CAV_API int cav_term_tolerances(const cav_problem *problem, const cav_term *term, int most, cav_tolerance *list,
+                                int *reported);
 
 /// One value of a term at one knot of a motion.
 typedef struct cav_term_value {

@@ -69,47 +69,81 @@ static double way_to_plane(const cav_model *m, const cav_state *state, int root)
   return up;
 }
 
-// whether a tree is deeper than that inside something that stands in the world and is no plane
-static cav_status is_inside(const cav_model *m, cav_state *state, int root, const double *q, double depth,
-                            int *inside) {
+// the geom that stands in the world, is no plane and has a tree deepest and deeper than that inside it; -1: there is none
+static cav_status solid_around(const cav_model *m, cav_state *state, int root, const double *q, double depth,
+                               int *solid) {
   cav_status status = cav_position(m, state, q);
-  *inside = 0;
+  double most = depth;
+  *solid = -1;
   for (int i = 0; i < state->ncontact && !status; i++) {
-    const cav_geom *a = &m->geom[m->pair[state->contact[i].pair].geom1],
-                   *b = &m->geom[m->pair[state->contact[i].pair].geom2];
-    const cav_geom *stands = a->link == 0 ? a : b, *moves = a->link == 0 ? b : a;
-    if (stands->link != 0 || stands->type == CAV_GEOM_PLANE || m->link[moves->link].root != root) continue;
-    *inside |= state->contact[i].dist < -depth;
+    const cav_pair *pair = &m->pair[state->contact[i].pair];
+    const int stands = m->geom[pair->geom1].link == 0 ? pair->geom1 : pair->geom2,
+              moves = stands == pair->geom1 ? pair->geom2 : pair->geom1;
+    if (m->geom[stands].link != 0 || m->geom[stands].type == CAV_GEOM_PLANE) continue;
+    if (m->link[m->geom[moves].link].root != root || !(-state->contact[i].dist > most)) continue;
+    most = -state->contact[i].dist;
+    *solid = stands;
   }
   return status;
 }
 
+// half way between where a tree is in nothing and where it is in something, 40 times; ways from where the coordinate is from
+static cav_status bisect(const cav_model *m, cav_state *state, int root, int height, double from, double gain,
+                         double *q, double *free, double *blocked) {
+  cav_status status = CAV_OK;
+  for (int i = 0; i < 40 && !status; i++) {
+    const double middle = (*free + *blocked) / 2;
+    int solid;
+    q[height] = from + middle / gain;
+    status = solid_around(m, state, root, q, 0, &solid);
+    *(solid >= 0 ? blocked : free) = middle;
+  }
+  return status;
+}
+
+static const double search_step = 0.005; // m: thinner things are passed
+static const double rounding = 1e-6;     // m: what lies on something may be so deep in it
+
 // how far a tree can go down, at most that far, before it touches something: step by step, then by bisection
 static cav_status way_down(const cav_model *m, cav_state *state, int root, int height, double gain, double most,
                            double *q, double *way) {
-  static const double step = 0.005;    // m: thinner things are passed
-  static const double rounding = 1e-6; // m: what lies on something may be so deep in it
   double from = q[height], free = 0, blocked = 0;
-  int inside;
-  cav_status status = is_inside(m, state, root, q, rounding, &inside);
+  int solid;
+  cav_status status = solid_around(m, state, root, q, rounding, &solid);
   *way = most;
   // what starts inside of something is not stopped by it
-  if (status || inside) return status;
-  while (!status && !inside && blocked < most) {
+  if (status || solid >= 0) return status;
+  while (!status && solid < 0 && blocked > -most) {
     free = blocked;
-    blocked = fmin(blocked + fmax(step, most / 4000), most);
-    q[height] = from - blocked / gain;
-    status = is_inside(m, state, root, q, 0, &inside);
+    blocked = fmax(blocked - fmax(search_step, most / 4000), -most);
+    q[height] = from + blocked / gain;
+    status = solid_around(m, state, root, q, 0, &solid);
   }
-  for (int i = 0; i < 40 && inside && !status; i++) {
-    double middle = (free + blocked) / 2;
-    int deep;
-    q[height] = from - middle / gain;
-    status = is_inside(m, state, root, q, 0, &deep);
-    *(deep ? &blocked : &free) = middle;
-  }
+  const int stopped = !status && solid >= 0;
+  if (stopped) status = bisect(m, state, root, height, from, gain, q, &free, &blocked);
   q[height] = from;
-  if (inside) *way = free;
+  if (stopped) *way = -free;
+  return status;
+}
+
+cav_status cav_tree_buried(const cav_model *m, cav_state *state, int root, double *q, int *solid, double *up) {
+  static const double highest = 20; // m
+  double gain = 1, free = 0, blocked = 0;
+  cav_status status = solid_around(m, state, root, q, rounding, solid);
+  *up = 0;
+  const int height = status ? -1 : lifting(m, state, root, &gain);
+  if (status || *solid < 0 || height < 0) return status;
+  const double from = q[height];
+  int in = *solid;
+  while (!status && in >= 0 && free < highest) {
+    blocked = free;
+    free += search_step;
+    q[height] = from + free / gain;
+    status = solid_around(m, state, root, q, 0, &in);
+  }
+  if (!status && in < 0) status = bisect(m, state, root, height, from, gain, q, &free, &blocked);
+  q[height] = from;
+  *up = in < 0 ? free : 0;
   return status;
 }
 
@@ -178,8 +212,8 @@ cav_status cav_configuration_posture(const cav_model *m, cav_state *state, const
   int i = 0;
   while (cav_posture_names[i] && strcmp(cav_posture_names[i], name)) i++;
   if (!cav_posture_names[i])
-    return refuse(error, CAV_BAD_INPUT, "there is no posture of that name, got '%.40s'; cavort help postures lists them",
-                  name);
+    return refuse(error, CAV_BAD_INPUT,
+                  "there is no posture of that name, got '%.40s'; cavort help postures lists them", name);
   char why[200];
   cav_status status = cav_posture_named(m, state, name, q, why);
   if (!status) return CAV_OK;

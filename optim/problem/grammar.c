@@ -79,9 +79,9 @@ static const cav_xml_element pose_joint = {
     "joint", 0, 0,
     ATTRIBUTES(
         NEEDED("name", "joint that is set"),
-        REALS("pos", 1, 1, "rad or m", "(one of the three is given)", "angle of a hinge, distance of a slide"),
-        REALS("degrees", 1, 1, "degrees", "(one of the three is given)", "angle of a hinge"),
-        REALS("quat", 4, 4, "", "(one of the three is given)", "orientation of a ball joint, w x y z")),
+        REALS("pos", 1, 1, "rad or m", "(give exactly one of pos, degrees, quat)", "angle of a hinge, distance of a slide"),
+        REALS("degrees", 1, 1, "degrees", "(give exactly one of pos, degrees, quat)", "angle of a hinge"),
+        REALS("quat", 4, 4, "", "(give exactly one of pos, degrees, quat)", "orientation of a ball joint, w x y z")),
     NULL, 0, "sets one joint"};
 #define POSE_SOURCE                                                                                                    \
   TEXT("key", "(the model's own configuration)", "keyframe of the model or else <pose> of this file to begin with; \"stand\", \"kneel\", \"sit\", \"lie-back\" and more are found of any humanoid (help postures)"), \
@@ -115,9 +115,19 @@ static const cav_xml_element pose = {
   TEXT("from", "(0)", "begin of the window, s or \"end\""),                                                            \
   TEXT("to", "(end)", "end of the window, s or \"end\""),                                                              \
   TEXT("at", "(the window)", "one time in the place of a window, s or \"end\": the nearest knot"),                     \
-  REAL("scale", 0, "of the term", "1", "residuals are divided by it: the size of an error that counts as one"),        \
+  REAL("scale", 0, "of the term", "1", "residuals are divided by it: the size of an error that counts as one")
+#define WITHIN                                                                                                         \
   TEXT("within", "(0.03 m, 0.1 rad, 0.3 m/s or rad/s, 0.1 of an axis for goals; none for running costs)",              \
-       "tolerance of the target, in the unit of the term: the motion has achieved it if off by at most this; \"any\": reported only. Of slip, m/s: so fast contacts may slide")
+       "tolerance of the target, in the unit of the term, over the whole horizon too: the motion has achieved it if off by at most this, of a vector by its length, of a posture or a rate at each dof; \"any\": reported only")
+// what has no target has no tolerance; slip lets slide
+#define WITHIN_gap
+#define WITHIN_slip TEXT("within", "(0: they are not to slide)", "m/s: so fast these contacts may slide; \"any\": as fast as they like"),
+#define WITHIN_impact
+#define WITHIN_clearance
+#define WITHIN_self_penetration
+#define WITHIN_force
+#define WITHIN_edge_force
+#define WITHIN_self_force
 #define DOFS                                                                                                           \
   WORD("dofs", cav_problem_dof_sets, "joints", "dofs that count: joints are all but free joints"),                     \
   TEXT("joint", "(dofs)", "one joint in the place of a set of dofs")
@@ -126,13 +136,14 @@ static const cav_xml_element pose = {
 #define POSTURE_ATTRIBUTES                                                                                             \
   DOFS, TABLE, TEXT("key", "(the goal)", "wanted posture: keyframe of the model or <pose> of this file"),              \
   REALS("qpos", 1, 0, "rad or m", "(the goal)", "wanted posture: all nq coordinates, or of one hinge or slide its number")
+#define ONE_OBJECT "(give exactly one of body, xbody, geom, site, joint, tendon, actuator)"
 #define SENSOR_SOURCE                                                                                              \
   WORD("type", sensors, "(the sensor of the model by that name)", "what is read, by MJCF's names"),                    \
-  TEXT("body", "(another object)", "object: frame at the centre of mass of a body, with its principal axes; roles such as \"right foot\" stand for bodies"), \
-  TEXT("xbody", "(another object)", "object: frame of a body as the model's file writes it"),                          \
-  TEXT("geom", "(another object)", "object: a geom"), TEXT("site", "(another object)", "object: a site"),              \
-  TEXT("joint", "(another object)", "object: a joint"), TEXT("tendon", "(another object)", "object: a tendon"),        \
-  TEXT("actuator", "(another object)", "object: an actuator"),                                                         \
+  TEXT("body", ONE_OBJECT, "object: frame at the centre of mass of a body, with its principal axes; roles such as \"right foot\" stand for bodies"), \
+  TEXT("xbody", ONE_OBJECT, "object: frame of a body as the model's file writes it"),                          \
+  TEXT("geom", ONE_OBJECT, "object: a geom"), TEXT("site", ONE_OBJECT, "object: a site"),              \
+  TEXT("joint", ONE_OBJECT, "object: a joint"), TEXT("tendon", ONE_OBJECT, "object: a tendon"),        \
+  TEXT("actuator", ONE_OBJECT, "object: an actuator"),                                                         \
   WORD("reftype", frames, "(the world)", "kind of the frame that a position, velocity or orientation is read in"),     \
   TEXT("refname", "(the world)", "name of that frame"),                                                                \
   TEXT("component", "(all)", "x, y or z: the one value that counts")
@@ -198,19 +209,19 @@ static const cav_xml_element track_frame = {
   WORD("norm", cav_problem_norms, "square", "square: x^2/2 of each residual x; absolute: sqrt(1 + x^2) - 1, linear far beyond the noise")
 
 // attributes and children of a term by what it has values of
-#define TERM_TRACK(use)                                                                                                \
+#define TERM_TRACK(use, element)                                                                                       \
   ATTRIBUTES(TRACK_ATTRIBUTES, WINDOW, TRACK_COST), CHILDREN(&track_marker, &track_joint, &track_sensor, &track_frame)
-#define TERM_SENSOR(use) ATTRIBUTES(SENSOR_ATTRIBUTES, WINDOW, use), CHILDREN(&value_waypoint)
-#define TERM_POSTURE(use) ATTRIBUTES(POSTURE_ATTRIBUTES, WINDOW, use), CHILDREN(&posture_waypoint)
-#define TERM_RATE(use) ATTRIBUTES(RATE_ATTRIBUTES, WINDOW, use), CHILDREN(&value_waypoint)
-#define TERM_ACTUATORS(use) ATTRIBUTES(WINDOW, use), NULL
-#define TERM_CONTACTS(use) ATTRIBUTES(TEXT("body", "(all contacts)", "contacts of this body's link alone; such a term is added to the default one. Of force also a body that is fixed to the world: what should not be touched"), WINDOW, use), NULL
+#define TERM_SENSOR(use, element) ATTRIBUTES(SENSOR_ATTRIBUTES, WINDOW, WITHIN, use), CHILDREN(&value_waypoint)
+#define TERM_POSTURE(use, element) ATTRIBUTES(POSTURE_ATTRIBUTES, WINDOW, WITHIN, use), CHILDREN(&posture_waypoint)
+#define TERM_RATE(use, element) ATTRIBUTES(RATE_ATTRIBUTES, WINDOW, WITHIN, use), CHILDREN(&value_waypoint)
+#define TERM_ACTUATORS(use, element) ATTRIBUTES(WINDOW, WITHIN, use), NULL
+#define TERM_CONTACTS(use, element) ATTRIBUTES(TEXT("body", "(all contacts)", "contacts of this body's link alone; such a term is added to the default one. Of force also a body that is fixed to the world: what should not be touched"), WINDOW, WITHIN_##element use), NULL
 
 #define COST                                                                                                           \
   REAL("weight", 1, "", NULL, "the cost is weight/2 times the squared residual, integrated over the window in s, or at one knot as it is; 0 removes a default; at most 1e16"), \
   WORD("norm", cav_problem_norms, "square", "square: x^2/2 of each residual x; absolute: sqrt(1 + x^2) - 1, linear far beyond the scale")
 #define COST_ELEMENT(quantity, element, of, reads, hard, unit, words, text) \
-  static const cav_xml_element cost_##element = {#element, 0, 0, TERM_##of(COST), 0, text};
+  static const cav_xml_element cost_##element = {#element, 0, 0, TERM_##of(COST, element), 0, text};
 #define COST_CHILD(quantity, element, ...) &cost_##element,
 CAV_QUANTITIES(COST_ELEMENT)
 static const cav_xml_element cost_style = {
@@ -224,7 +235,7 @@ static const cav_xml_element cost = {
   REAL("upper", 0, "of the term", "(open)", "greatest value, likewise")
 #define HARD_ELEMENT_0(element, of, text)
 #define HARD_ELEMENT_1(element, of, text) \
-  static const cav_xml_element hard_##element = {#element, 0, 0, TERM_##of(BOUNDS), 0, text};
+  static const cav_xml_element hard_##element = {#element, 0, 0, TERM_##of(BOUNDS, element), 0, text};
 #define HARD_CHILD_0(element)
 #define HARD_CHILD_1(element) &hard_##element,
 #define HARD_ELEMENT(quantity, element, of, reads, hard, unit, words, text) HARD_ELEMENT_##hard(element, of, text)
@@ -294,10 +305,10 @@ static const cav_xml_element parameter = {
     ATTRIBUTES(
         {"type", CAV_XML_WORD, 0, 0, parameters, 1, NOTE("", NULL, "what is not known: of a body its mass, a coordinate of its centre of mass (com), its inertia; friction of a geom; stiffness, damping, armature of a joint; a coordinate of the place of a site")},
         TEXT("name", "(\"mass of BODY\" and the like)", "name in tables"),
-        TEXT("body", "(another object)", "body of a mass, com or inertia; roles such as \"right foot\" stand for bodies"),
-        TEXT("geom", "(another object)", "geom of a friction, of all its contacts"),
-        TEXT("joint", "(another object)", "joint of a stiffness, damping or armature"),
-        TEXT("site", "(another object)", "site of a place: a marker, recorded as <sensor type=\"framepos\" site=>, an IMU"),
+        TEXT("body", "(give the one that the type is of)", "body of a mass, com or inertia; roles such as \"right foot\" stand for bodies"),
+        TEXT("geom", "(give the one that the type is of)", "geom of a friction, of all its contacts"),
+        TEXT("joint", "(give the one that the type is of)", "joint of a stiffness, damping or armature"),
+        TEXT("site", "(give the one that the type is of)", "site of a place: a marker, recorded as <sensor type=\"framepos\" site=>, an IMU"),
         TEXT("component", "(of com and place alone)", "x, y or z: which coordinate, in the frame of the body"),
         REAL("value", 0, "of the parameter", "(the model's)", "where the search begins; in result folders what was found, which the model then has"),
         REAL("sd", 0, "of the parameter", "(nothing is known)", "standard deviation of what is known beforehand: a cost of half the squared difference from 'prior' over it"),
@@ -346,9 +357,14 @@ const cav_xml_element cav_problem_element = {
              &parameter, &schedule, &ipopt, &contact),
     0, "root of a problem file: one motion that is wanted of a model"};
 
-// names of earlier versions
-#define FORMER_CHILD(inside, was, now) { inside, was, now, 0 }
-#define FORMER_ATTRIBUTE(inside, was, now) { inside, was, now, 1 }
+// names of earlier versions, and tolerances of what has no target
+#define FORMER_CHILD(inside, was, now) { inside, was, now, 0, NULL }
+#define FORMER_ATTRIBUTE(inside, was, now) { inside, was, now, 1, NULL }
+#define NO_WITHIN(inside, instead) { inside, "within", NULL, 1, instead }
+#define UNTOUCHED                                                                                                      \
+  "this cost has no target, so no tolerance; what must not touch is a constraint, <constraint><sensor type=\"touch\" "  \
+  "body=\"NAME\" upper=\"0\"/></constraint>, or a cost in N, <sensor type=\"touch\" body=\"NAME\" within=\"5\" weight=\"1\"/>"
+#define WEIGH "this cost has no target, so no tolerance; a higher weight makes it smaller. Of contacts, slip has a tolerance"
 const cav_xml_former cav_problem_former[] = {
     FORMER_CHILD("scene", "leave", "remove"),
     FORMER_CHILD("cost", "overlap", "self_penetration"),
@@ -358,5 +374,13 @@ const cav_xml_former cav_problem_former[] = {
     FORMER_ATTRIBUTE("last", "self_share", "self_stiffness"),
     FORMER_ATTRIBUTE("contact", "self_share", "self_stiffness"),
     FORMER_ATTRIBUTE("contact", "guard", "refsafe"),
-    {NULL, NULL, NULL, 0}};
+    NO_WITHIN("force", UNTOUCHED),
+    NO_WITHIN("edge_force", UNTOUCHED),
+    NO_WITHIN("gap", WEIGH),
+    NO_WITHIN("impact", WEIGH),
+    NO_WITHIN("clearance", WEIGH),
+    NO_WITHIN("self_penetration", WEIGH),
+    NO_WITHIN("self_force", WEIGH),
+    NO_WITHIN("track", "a record has noise (sd), no tolerance; remove it"),
+    {NULL, NULL, NULL, 0, NULL}};
 // clang-format on

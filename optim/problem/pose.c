@@ -5,6 +5,7 @@
 /// height="floor" down to the floor (floor.c). So one file can set up models that share joint names, or list alternatives.
 /// Balance, contact between limbs and orientation to the floor are the file's business.
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -282,27 +283,54 @@ static cav_status lay_joint(const cav_problem_reader *reader, const cav_xml_node
   return CAV_OK;
 }
 
-// bodies without joints that a posture of that element brought down by more than they are put down: a ball that was meant to fly
-static void note_lowered(const cav_problem_reader *reader, const cav_xml_node *node, const double *before,
-                         const double *q) {
+// adds to a list of texts
+static void add_text(char *text, size_t room, const char *format, ...) {
+  size_t used = strlen(text);
+  va_list args;
+  if (used && used + 3 < room) used += (size_t)sprintf(text + used, ", ");
+  va_start(args, format);
+  vsnprintf(text + used, room - used, format, args);
+  va_end(args);
+}
+
+// bodies without joints that a posture of that element brought down by more than they are put down: a ball that was meant to fly,
+// or a box that begins inside a table, which is not stopped by it. before is as it was in the end
+static cav_status note_lowered(const cav_problem_reader *reader, const cav_xml_node *node, double *before,
+                               const double *q) {
   static const double put_down = 0.05; // m
   const cav_model *m = reader->model;
-  char *text = reader->owner->lowered;
-  for (int j = 0; j < m->njoint; j++) {
+  cav_problem_owner *owner = reader->owner;
+  cav_status status = CAV_OK;
+  for (int j = 0; j < m->njoint && !status; j++) {
     const cav_joint *joint = &m->joint[j];
     if (joint->type != CAV_JOINT_FREE) continue;
-    double way = before[joint->q + 2] - q[joint->q + 2];
-    int links = 0;
+    double way = before[joint->q + 2] - q[joint->q + 2], up;
+    int links = 0, solid;
     for (int i = 1; i < m->nlink; i++) links += m->link[i].root == joint->link;
     if (links != 1 || !(way > put_down)) continue;
-    size_t used = strlen(text), room = sizeof reader->owner->lowered;
-    snprintf(text + used, room - used, "%s<%s> lowers '%.60s' by %.3g m", used ? ", " : "", node->rule->name,
-             m->body[m->link[joint->link].body].name, way);
+    const char *name = m->body[m->link[joint->link].body].name;
+    status = cav_tree_buried(m, reader->state, joint->link, before, &solid, &up);
+    if (status) break;
+    if (solid < 0) {
+      add_text(owner->lowered, sizeof owner->lowered, "<%s> lowers '%.60s' by %.3g m", node->rule->name, name, way);
+      continue;
+    }
+    char label[CAV_GEOM_LABEL], raise[60] = "";
+    // to the next millimetre; what lies a rounding deep in it is stopped by it
+    if (up > 0) snprintf(raise, sizeof raise, ": %.3f m higher it is on that", ceil(1e3 * up - 1e-3) / 1e3);
+    add_text(owner->buried, sizeof owner->buried,
+             "<%s> lowers '%.60s' by %.3g m, not stopped by '%.60s', inside which it begins%s", node->rule->name, name,
+             way, cav_geom_label(m, solid, label), raise);
   }
+  return status;
 }
 
 const char *cav_problem_lowered(const cav_problem *problem) {
   return ((const cav_problem_owner *)(const void *)problem)->lowered;
+}
+
+const char *cav_problem_buried(const cav_problem *problem) {
+  return ((const cav_problem_owner *)(const void *)problem)->buried;
 }
 
 // down to the floor, without the trees whose <root> stays as it is stated
@@ -319,7 +347,9 @@ static cav_status drop(const cav_problem_reader *reader, const cav_xml_node *nod
     int j = cav_xml_word(root, "height", 1) ? -1 : root_joint(reader, root);
     if (j >= 0) memcpy(q + m->joint[j].q, before + m->joint[j].q, 3 * sizeof *q);
   }
-  if (!status) note_lowered(reader, node, before, q);
+  if (!status && (status = note_lowered(reader, node, before, q)))
+    cav_xml_fail_as(reader->error, status, node, "height", "the posture cannot be evaluated: %s",
+                    cav_status_name(status));
   free(before);
   return status;
 }

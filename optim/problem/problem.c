@@ -316,6 +316,37 @@ static cav_status check_tendons(const cav_problem_reader *reader, const cav_xml_
   return status;
 }
 
+static int within_range(const cav_joint *joint, double value) {
+  return value >= joint->range[0] && value <= joint->range[1];
+}
+
+// what a value outside a joint's range may have been meant as: of a little beyond nothing
+static const char *meant(const cav_joint *joint, double value, int degrees) {
+  const int hinge = joint->type == CAV_JOINT_HINGE;
+  const double beyond = fmax(joint->range[0] - value, value - joint->range[1]), turned = value * M_PI / 180;
+  if (joint->type == CAV_JOINT_BALL || beyond <= (hinge ? 0.1 : 0.01)) return "";
+  if (hinge && !degrees && within_range(joint, turned)) return "; in degrees it would be in it: <joint name= degrees=>";
+  if (within_range(joint, -value))
+    return "; with the other sign it would be in it: cavort inspect MODEL says which way a joint is positive";
+  if (hinge && !degrees && within_range(joint, -turned))
+    return "; in degrees and with the other sign it would be in it: <joint name= degrees=>";
+  return "";
+}
+
+static cav_status refuse_range(const cav_problem_reader *reader, const cav_xml_node *node, int j, double value,
+                               double least) {
+  const cav_joint *joint = &reader->model->joint[j];
+  const int slide = joint->type == CAV_JOINT_SLIDE, degrees = !slide && cav_problem_in_degrees(reader, node, j);
+  const double unit = degrees ? 180 / M_PI : 1;
+  return cav_xml_fail(reader->error, node, NULL,
+                      "joint '%s' is at %g, outside its range %.5g .. %.5g %s; ranges='clip' would bring it in%s",
+                      joint->name, unit * value, unit * least, unit * joint->range[1],
+                      slide     ? "m"
+                      : degrees ? "degrees"
+                                : "rad",
+                      meant(joint, value, degrees));
+}
+
 // within ranges of joints and tendons, or the solver meets a knot that it may not move
 static cav_status check_ranges(const cav_problem_reader *reader, const cav_xml_node *node, const double *q) {
   static const double slack = 1e-6;
@@ -329,16 +360,7 @@ static cav_status check_ranges(const cav_problem_reader *reader, const cav_xml_n
       value = 2 * atan2(sqrt(w[1] * w[1] + w[2] * w[2] + w[3] * w[3]), fabs(w[0]));
       least = 0;
     }
-    if (value < least - slack || value > joint->range[1] + slack) {
-      // a little beyond in radians it is no slip of units
-      const double turned = value * M_PI / 180, beyond = fmax(least - value, value - joint->range[1]);
-      const int degrees = joint->type == CAV_JOINT_HINGE && turned >= least && turned <= joint->range[1] &&
-                          beyond > 0.1 && !cav_problem_in_degrees(reader, node, j);
-      return cav_xml_fail(
-          reader->error, node, NULL,
-          "joint '%s' is at %g, outside its range %g .. %g (rad or m); ranges='clip' would bring it in%s", joint->name,
-          value, least, joint->range[1], degrees ? "; in degrees it would be in it: <joint name= degrees=>" : "");
-    }
+    if (value < least - slack || value > joint->range[1] + slack) return refuse_range(reader, node, j, value, least);
   }
   return m->ntendon > 0 ? check_tendons(reader, node, q, slack) : CAV_OK;
 }

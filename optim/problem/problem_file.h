@@ -18,6 +18,7 @@ typedef struct cav_problem_owner {
   cav_model *model;
   cav_problem_block *block;
   char lowered[400]; ///< what height="floor" brought far down; "": nothing
+  char buried[400];  ///< what it brought out of a solid; "": nothing
 } cav_problem_owner;
 
 /// A reading in progress.

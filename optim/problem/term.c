@@ -514,8 +514,6 @@ static cav_status read_sensor(const cav_problem_reader *reader, const cav_xml_no
 }
 
 static cav_status read_touch(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
-  if (term->within > 0 && term->quantity != CAV_QUANTITY_SLIP)
-    return cav_xml_fail(reader->error, node, "within", "this term has no target; of contacts, slip has a tolerance");
   if (!cav_xml_get(node, "body")) return CAV_OK;
   term->body = cav_problem_find(reader, node, "body", CAV_OBJECT_BODY);
   if (term->body < 0) return CAV_BAD_INPUT;
@@ -548,7 +546,8 @@ static cav_status read_values(const cav_problem_reader *reader, const cav_xml_no
 
 // tolerance of a term's target: a number above 0, or "any": told only
 static cav_status read_within(const cav_problem_reader *reader, const cav_xml_node *node, cav_term *term) {
-  const char *text = cav_xml_text(node, "within", NULL);
+  // what has no target accepts none
+  const char *text = cav_xml_accepts(node, "within") ? cav_xml_text(node, "within", NULL) : NULL;
   if (!text) return CAV_OK;
   char *end = NULL;
   term->within = strcmp(text, "any") ? cav_file_number(text, &end) : INFINITY;

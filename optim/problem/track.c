@@ -570,8 +570,6 @@ cav_status cav_problem_track(const cav_problem_reader *reader, const cav_xml_nod
   cav_marker_set *set = NULL;
   cav_status status = CAV_OK;
   *n = 0;
-  if (base->within > 0)
-    return cav_xml_fail(reader->error, node, "within", "a record has noise (sd), no tolerance; remove it");
   if (reader->problem->duration_most > 0)
     return cav_xml_fail(reader->error, node, NULL, "a record has its own time; remove 'range' of <horizon>");
   if (cav_xml_get(node, "markers")) {

@@ -99,11 +99,11 @@ static const char *sensor_unit(const cav_model *model, const cav_sensor *sensor,
   return "";
 }
 
-// whether a term names a value to be reached: at one time, by a target of its own, or as a constraint
+// whether a term names a value to be reached: at one time, by a target or a tolerance of its own, or as a constraint
 static int states_target(const cav_problem *problem, const cav_term *term) {
   if (cav_quantity_rule_of(term->quantity)->of == CAV_OF_CONTACTS) return 0;
   if (term->quantity == CAV_QUANTITY_TRACK) return 0;
-  return term->target != NULL || !isinf(cav_term_tolerance(problem, term, 1));
+  return term->target != NULL || term->within > 0 || !isinf(cav_term_tolerance(problem, term, 1));
 }
 
 // number of the dof that the k-th selected value of a term belongs to
@@ -130,9 +130,10 @@ static void describe(const cav_model *model, const cav_term *term, int k, cav_te
     *usual = term->user->within;
     int n = snprintf(r->what, sizeof r->what, "%.50s", term->user->name);
     if (term->user->dim > 1) snprintf(r->what + n, sizeof r->what - (size_t)n, " %d", one);
-  } else if (term->quantity == CAV_QUANTITY_EFFORT) {
-    unit = "of limit";
-    snprintf(r->what, sizeof r->what, "effort of %.40s", k < model->nu ? model->actuator[k].name : "");
+  } else if (cav_quantity_rule_of(term->quantity)->of == CAV_OF_ACTUATORS) {
+    unit = term->quantity == CAV_QUANTITY_POWER ? "m/s" : "of limit";
+    snprintf(r->what, sizeof r->what, "%s of %.40s", cav_quantity_rule_of(term->quantity)->name,
+             k < model->nu ? model->actuator[k].name : "");
   } else {
     int d = selected_dof(model, term, k);
     const cav_joint *joint = d >= 0 ? &model->joint[model->dof[d].joint] : NULL;
@@ -198,6 +199,49 @@ static void note_target(const cav_verification *verification, const cav_term *te
   r->time = t * verification->h;
   describe(verification->model, term, worst, r, &usual);
   r->within = cav_term_tolerance(verification->problem, term, usual);
+}
+
+// values that a term has at a knot, as they are compared; those of contacts and records have no target
+static int values_of(const cav_model *model, const cav_term *term) {
+  int n = 0;
+  switch (cav_quantity_rule_of(term->quantity)->of) {
+    case CAV_OF_SENSOR:
+      return term->component >= 0 ? 1 : term->sensor.dim < 4 ? term->sensor.dim : 3;
+    case CAV_OF_POSTURE:
+    case CAV_OF_RATE:
+      while (selected_dof(model, term, n) >= 0) n++;
+      return n;
+    case CAV_OF_ACTUATORS:
+      return model->nu;
+    case CAV_OF_USER:
+      return term->component >= 0 ? 1 : term->user->dim;
+    case CAV_OF_CONTACTS:
+    case CAV_OF_TRACK:
+      break;
+  }
+  return 0;
+}
+
+int cav_term_tolerances(const cav_problem *problem, const cav_term *term, int most, cav_tolerance *list,
+                        int *reported) {
+  enum { UNITS = 4 };
+  cav_tolerance found[UNITS];
+  const int values = states_target(problem, term) ? values_of(problem->model, term) : 0;
+  int n = 0;
+  if (reported) *reported = values > 0;
+  for (int k = 0; k < values && n < UNITS; k++) {
+    cav_term_report r;
+    double usual;
+    int known = 0;
+    describe(problem->model, term, k, &r, &usual);
+    const double within = cav_term_tolerance(problem, term, usual);
+    while (known < n && (found[known].within != within || strcmp(found[known].unit, r.unit))) known++;
+    if (isinf(within) || known < n) continue;
+    found[n].within = within;
+    memcpy(found[n++].unit, r.unit, sizeof r.unit);
+  }
+  for (int k = 0; k < n && k < most; k++) list[k] = found[k];
+  return n;
 }
 
 void cav_target_words(const cav_verification *verification, const cav_term *term, int t, int k, double x, double target,

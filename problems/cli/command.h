@@ -177,8 +177,19 @@ void cav_command_tell_step(FILE *out, const cav_problem *problem);
 /// explains, a line each; their number. equalities.c.
 int cav_command_tell_equalities(FILE *out, const cav_problem *problem);
 
-/// Tells of a start that is given in the air, at rest and held by nothing, and of a goal deep inside a solid, a line each; their
-/// number. postures.c.
+/// Prints where a posture of a problem has its centre of mass, which bodies touch the world and what is deepest in what: a line
+/// that begins with a name. stance.c.
+cav_status cav_command_print_stance(const cav_problem *problem, const char *name, const double *q, cav_error *error);
+
+/// The names of the geoms of a pair, of the one that moves and of the one that it is in: where one is of the world, that. Returns
+/// the latter. stance.c.
+int cav_command_pair(const cav_model *model, int pair, char moves[CAV_GEOM_LABEL], char stands[CAV_GEOM_LABEL]);
+
+/// The contact with the least distance, NULL: there is none. stance.c.
+const cav_contact *cav_command_deepest(const cav_state *state);
+
+/// Tells of a start that is given in the air, at rest and held by nothing, and of a goal, or a start that is found, deep inside
+/// something, a line each; their number. postures.c.
 int cav_command_tell_postures(FILE *out, const cav_problem *problem);
 
 /// Whether gravity and contacts alone act on a tree of links that floats, none of it lifted by buoyancy. postures.c.

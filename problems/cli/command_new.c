@@ -160,15 +160,70 @@ static cav_status refuse_like(const char *like, cav_error *error) {
                        n ? "there are " : "motions are sought in problems/motions and " CAVORT_DATA "/motions", list);
 }
 
-// the text of a file with the comment before its root, and the model's path as it is seen from there
-static cav_status add_comment(const cav_scaffold *s, const char *path, const char *model, const char *like,
-                              cav_error *error) {
+// the text of a file, in fresh memory; NULL: it cannot be read
+static char *read_text(const char *path) {
   char *text = NULL;
   size_t length = 0;
   FILE *in = fopen(path, "r"), *copy = in ? open_memstream(&text, &length) : NULL;
   for (int c; copy && (c = fgetc(in)) != EOF;) fputc(c, copy);
   if (in) fclose(in);
-  if (!copy || fclose(copy) != 0) return cav_file_fail(error, CAV_NO_MEMORY, 0, "%s: cannot be read again", path);
+  if (copy && fclose(copy) == 0) return text;
+  free(text);
+  return NULL;
+}
+
+// behind the start tag of the first element of that name, comments aside; NULL: there is none that holds something
+static char *behind_tag(char *text, const char *name) {
+  const size_t n = strlen(name);
+  for (char *at = text; (at = strchr(at, '<')); at++) {
+    if (!strncmp(at, "<!--", 4)) {
+      at = strstr(at, "-->");
+      if (!at) return NULL;
+    }
+    if (strncmp(at + 1, name, n) || !strchr(" \t\r\n/>", at[1 + n])) continue;
+    char quote = 0;
+    for (at++; *at && (quote || *at != '>'); at++)
+      if (*at == quote || (!quote && (*at == '"' || *at == '\''))) quote = quote ? 0 : *at;
+    return *at && at[-1] != '/' ? at + 1 : NULL;
+  }
+  return NULL;
+}
+
+static int has_either(const char *text, const char *attribute, const char *value) {
+  char quoted[64];
+  for (int i = 0; i < 2; i++) {
+    snprintf(quoted, sizeof quoted, "%s=%c%s%c", attribute, "\"'"[i], value, "\"'"[i]);
+    if (strstr(text, quoted)) return 1;
+  }
+  return 0;
+}
+
+// a floor in the <scene> of a file that puts postures on one which neither the model nor the file has
+static cav_status add_floor(const cav_model *model, const char *path, cav_error *error) {
+  char *text = read_text(path);
+  if (!text) return cav_file_fail(error, CAV_NO_MEMORY, 0, "%s: cannot be read again", path);
+  char *scene = behind_tag(text, "scene"), *at = scene ? scene : behind_tag(text, "problem");
+  cav_status status = CAV_OK;
+  if (at && !cav_scaffold_has_floor(model) && has_either(text, "height", "floor") &&
+      !has_either(text, "type", "plane")) {
+    cav_file file;
+    status = cav_file_begin(&file, path, error);
+    if (!status) {
+      fwrite(text, 1, (size_t)(at - text), file.stream);
+      fputs(scene ? "\n    " CAV_SCAFFOLD_PLANE : "\n  <scene>\n    " CAV_SCAFFOLD_PLANE "\n  </scene>", file.stream);
+      fputs(at, file.stream);
+      status = cav_file_end(&file, error);
+    }
+  }
+  free(text);
+  return status;
+}
+
+// the text of a file with the comment before its root, and the model's path as it is seen from there
+static cav_status add_comment(const cav_scaffold *s, const char *path, const char *model, const char *like,
+                              cav_error *error) {
+  char *text = read_text(path);
+  if (!text) return cav_file_fail(error, CAV_NO_MEMORY, 0, "%s: cannot be read again", path);
   char *root = strstr(text, "<problem"), *at = root ? strstr(root, model) : NULL;
   cav_file file;
   cav_status status = cav_file_begin(&file, path, error);
@@ -201,6 +256,7 @@ static cav_status write_like(const cav_scaffold *s, const char *like, const char
   const cav_setting setting[] = {{"@model", full}, {"@name", s->name}, {"@floating", "true"}};
   cav_status status = cav_setting_write(source, s->floating ? 3 : 2, setting, path, error);
   int loads;
+  if (!status) status = add_floor(s->model, path, error);
   if (!status && (status = try_file(path, &loads, error))) {
     unlink(path);
     snprintf(why, sizeof why, "%s", error->text);

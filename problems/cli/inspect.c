@@ -11,6 +11,7 @@
 #include "objects.h"
 #include "plannable.h"
 #include "quantity.h"
+#include "sense.h"
 #include "stand.h"
 #include "step.h"
 
@@ -29,17 +30,18 @@ static void print_sizes(const cav_model *m) {
          (double)m->bytes / 1024);
 }
 
-// "name type lower..upper" of one joint
-static void print_joint(const cav_joint *joint) {
-  double scale = joint->type == CAV_JOINT_SLIDE ? 1 : 180 / M_PI;
-  printf("%s %s", joint->name[0] ? joint->name : "(no name)", joint_name[joint->type]);
-  if (joint->limited && joint->type == CAV_JOINT_BALL) printf(" up to %.3g deg", scale * joint->range[1]);
-  if (joint->twist_limited) printf(" twist %.3g..%.3g deg", scale * joint->twist[0], scale * joint->twist[1]);
-  if (joint->swing_limited) printf(" swing up to %.3g deg", scale * joint->swing);
-  if (joint->limited && joint->type != CAV_JOINT_BALL) {
-    printf(" %.3g..%.3g %s", scale * joint->range[0], scale * joint->range[1],
-           joint->type == CAV_JOINT_SLIDE ? "m" : "deg");
-  }
+// the range of a joint
+static void write_range(const cav_joint *joint, char text[120]) {
+  const double scale = joint->type == CAV_JOINT_SLIDE ? 1 : 180 / M_PI;
+  int n = 0;
+  *text = 0;
+  if (joint->limited && joint->type == CAV_JOINT_BALL) n += sprintf(text, "up to %.3g deg", scale * joint->range[1]);
+  if (joint->twist_limited)
+    n += sprintf(text + n, "%stwist %.3g..%.3g deg", n ? " " : "", scale * joint->twist[0], scale * joint->twist[1]);
+  if (joint->swing_limited) n += sprintf(text + n, "%sswing up to %.3g deg", n ? " " : "", scale * joint->swing);
+  if (joint->limited && joint->type != CAV_JOINT_BALL)
+    sprintf(text + n, "%.3g..%.3g %s", scale * joint->range[0], scale * joint->range[1],
+            joint->type == CAV_JOINT_SLIDE ? "m" : "deg");
 }
 
 // "x y z" of an object in a posture that the state is at: what a framepos of it reads
@@ -89,13 +91,44 @@ static void print_bodies(const cav_model *m) {
            body->parent > 0 ? m->body[body->parent].name : "world", body->mass);
     if (body->link == 0) printf("fixed to the world");
     if (body->link > 0 && link->body != i) printf("fixed to %s", m->body[link->body].name);
-    for (int j = link->joint; body->link > 0 && link->body == i && j < link->joint + link->njoint; j++) {
-      if (j > link->joint) printf(", ");
-      print_joint(&m->joint[j]);
-    }
+    for (int j = link->joint; body->link > 0 && link->body == i && j < link->joint + link->njoint; j++)
+      printf("%s%s", j > link->joint ? ", " : "", m->joint[j].name[0] ? m->joint[j].name : "(no name)");
     printf("\n");
   }
   printf("\n");
+}
+
+// Type and range of every joint, where it is at the posture of the file or the start of a problem, and what a positive change
+// of it moves there
+static cav_status print_joints(const cav_model *m, const cav_problem *p, cav_error *error) {
+  cav_state *state = cav_state_new(m);
+  const double *q = p ? p->q_start : m->q0;
+  cav_roles roles;
+  cav_status status = state ? cav_roles_find(m, state, &roles) : CAV_NO_MEMORY;
+  if (!status) status = cav_position(m, state, q);
+  if (status) cav_file_fail(error, status, 0, "the joints cannot be evaluated");
+  int width = 20;
+  for (int j = 0; j < m->njoint; j++) width = (int)fmax(width, fmin((double)strlen(m->joint[j].name), 40));
+  if (!status && m->njoint)
+    printf("%-*s %-6s %-18s %-10s + moves, seen from the root of its tree\n", width, "joint", "type", "range",
+           p ? "start" : "in file");
+  for (int j = 0; j < m->njoint && !status; j++) {
+    const cav_joint *joint = &m->joint[j];
+    const int slides = joint->type == CAV_JOINT_SLIDE, scalar = slides || joint->type == CAV_JOINT_HINGE;
+    char range[120], at[40] = "", sense[CAV_SENSE];
+    write_range(joint, range);
+    cav_sense_of(m, state, &roles, j, sense);
+    if (scalar) snprintf(at, sizeof at, "%.4g %s", (slides ? 1 : 180 / M_PI) * q[joint->q] + 0.0, slides ? "m" : "deg");
+    printf("%-*s %s", width, joint->name[0] ? joint->name : "(no name)", joint_name[joint->type]);
+    if (scalar)
+      printf("  %-18s %-10s + %s", range, at, sense);
+    else if (*range)
+      printf(" %s", range);
+    printf("\n");
+  }
+  if (m->njoint) printf("\n");
+  cav_state_free(state);
+  return status;
 }
 
 // what key="stand" is
@@ -336,6 +369,8 @@ static void print_quantity(const cav_problem *p, const cav_term *term) {
   const char *object = cav_object_name(m, term->sensor.object_type, term->sensor.object);
   printf("%s of %s", cav_sensor_rule_of(term->sensor.type)->name, object);
   if (term->component >= 0 && term->sensor.dim > 1) printf(", %c", "xyz"[term->component]);
+  if (term->sensor.referred)
+    printf(", in the frame of %s", cav_object_name(m, term->sensor.reference_type, term->sensor.reference));
 }
 
 // from what bounds of a posture are counted, and where a single joint may be
@@ -371,7 +406,32 @@ static void print_target(const cav_problem *p, const cav_term *term) {
     printf(" to");
     for (int i = one ? term->component : 0; i < (one ? term->component + 1 : term->sensor.dim); i++)
       printf(" %.4g", term->target[i]);
+  } else if (term->quantity == CAV_QUANTITY_SENSOR) {
+    printf(term->sensor.dim == 4 ? " to no rotation" : " to 0");
   }
+}
+
+// whether achieved needs a term, and to what tolerance
+static void print_standing(const cav_problem *p, const cav_term *term) {
+  cav_tolerance tolerance[4];
+  int reported, n = cav_term_tolerances(p, term, 4, tolerance, &reported);
+  for (int i = 0; i < n && i < 4; i++)
+    printf("%s %g%s%s", i ? "," : "; to be met within", tolerance[i].within, *tolerance[i].unit ? " " : "",
+           tolerance[i].unit);
+  if (n && term->use == CAV_USE_COST && !(term->within > 0)) printf(" (usual)");
+  if (!n && reported) printf("; reported only, %s", term->within > 0 ? "within=\"any\"" : "no within=");
+  if (term->quantity == CAV_QUANTITY_SLIP && term->within > 0) {
+    if (isinf(term->within))
+      printf("; these may slide");
+    else
+      printf("; these may slide by %g m/s", term->within);
+  }
+}
+
+// by what name logs and tables tell of a term, where it has another than its element's
+static void print_name(const cav_term *term) {
+  if (term->name && *term->name && strcmp(term->name, cav_quantity_rule_of(term->quantity)->name))
+    printf("'%s': ", term->name);
 }
 
 static void print_terms(const cav_problem *p, int hard) {
@@ -379,43 +439,20 @@ static void print_terms(const cav_problem *p, int hard) {
   for (int i = 0; i < p->nterm; i++) {
     const cav_term *term = &p->term[i];
     if ((term->use != CAV_USE_COST) != hard) continue;
-    if (!n++) printf("%s\n", hard ? "constraints" : "costs");
+    if (!n++)
+      printf("%s; achieved needs those that are to be met, the rest is not asked for\n",
+             hard ? "constraints" : "costs");
     if (hard)
       printf("  must be           ");
     else
       printf("  weight %-10.4g ", term->weight);
+    print_name(term);
     print_quantity(p, term);
     print_target(p, term);
     print_window(p, term);
+    print_standing(p, term);
     printf("\n");
   }
-}
-
-// where a posture has its centre of mass and where it touches: whether it could stand
-static cav_status print_posture(const cav_problem *p, const char *name, const double *q, cav_error *error) {
-  static const double touching = 0.005; // m
-  cav_state *state = cav_state_new(p->model);
-  if (!state) return cav_file_fail(error, CAV_NO_MEMORY, 0, "no memory for a state");
-  state->options.smoothing = state->options.smoothing_self = touching; // so that contacts are seen before they touch
-  cav_status status = cav_position(p->model, state, q);
-  if (status) cav_file_fail(error, status, 0, "the posture of the %s cannot be evaluated", name);
-  double com[3], low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, depth = 0;
-  int n = 0;
-  if (!status) cav_momentum(p->model, state, p->v_start, com, NULL, NULL);
-  for (int i = 0; i < state->ncontact && !status; i++) {
-    const cav_contact *c = &state->contact[i];
-    depth = fmax(depth, -c->dist);
-    if (c->dist > touching || (c->link1 != 0 && c->link2 != 0)) continue;
-    for (int k = 0; k < 3; k++) low[k] = fmin(low[k], c->pos[k]), high[k] = fmax(high[k], c->pos[k]);
-    n++;
-  }
-  if (!status) {
-    printf("  %-6s centre of mass at %.3f %.3f %.3f m", name, com[0], com[1], com[2]);
-    if (n) printf(", touches the world in x %.3f..%.3f, y %.3f..%.3f", low[0], high[0], low[1], high[1]);
-    printf(depth > 0 ? ", deepest penetration %.1f mm\n" : "\n", 1e3 * depth);
-  }
-  cav_state_free(state);
-  return status;
 }
 
 // what goes from where to where
@@ -510,12 +547,14 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
            : p->cycle.mirror == CAV_MIRROR_Y ? ", mirrored along y"
                                              : "");
   cav_command_tell_asymmetry(p, stdout);
-  cav_status status = print_posture(p, "start", p->q_start, error);
-  if (!status) status = print_posture(p, "goal", p->q_goal, error);
+  cav_status status = cav_command_print_stance(p, "start", p->q_start, error);
+  if (!status) status = cav_command_print_stance(p, "goal", p->q_goal, error);
   if (status) return status;
   if (*cav_problem_lowered(p))
     printf("  note: height=\"floor\" of %s; <root joint=\"...\" height=\"keep\"/> in it leaves a body in the air\n",
            cav_problem_lowered(p));
+  if (*cav_problem_buried(p))
+    printf("  note: height=\"floor\" of %s. Change Z of its <root pos=\"X Y Z\">\n", cav_problem_buried(p));
   printf("  %d unknowns%s; the guess %s",
          (knots - 1 + 2 * (p->free_start != 0)) * p->model->nv + (p->duration_most > 0),
          p->free_start ? ", with posture and velocity at the start" : "",
@@ -543,7 +582,8 @@ static cav_status print_problem(const cav_problem *p, cav_error *error) {
 static cav_status print_model(const cav_model *m, const cav_problem *p, cav_error *error) {
   print_sizes(m);
   print_bodies(m);
-  cav_status status = print_places(m, p, error);
+  cav_status status = print_joints(m, p, error);
+  if (!status) status = print_places(m, p, error);
   if (status) return status;
   print_roles(m);
   print_stages(m);

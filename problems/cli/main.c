@@ -117,7 +117,10 @@ enum { NOPTION = sizeof options / sizeof *options };
 static int help(const cav_command_line *line);
 
 static const cav_manual_command commands[] = {
-    {"inspect", "MODEL|PROBLEM", "say what a model or a problem holds, what it runs and what it leaves out",
+    {"inspect", "MODEL|PROBLEM",
+     "say what a model or a problem holds, what it runs and what it leaves out; of a problem first whether something "
+     "proves it\n"
+     "  impossible, and all that looks wrong with it: the way to check a file before it is solved",
      cav_command_inspect, OPTION_MODEL | OPTION_FLOATING | OPTION_SET},
     {"new", "MODEL",
      "write a problem file to begin with, for a model (-o, default MODEL-first.xml): a wish that suits it, and its "
@@ -241,17 +244,6 @@ static void suggest(const char *near) {
   if (near) fprintf(stderr, "; did you mean '%s'?", near);
 }
 
-// a topic, or else elements, attributes and sensors of that name; 0: there is none. A topic may have such a name, too
-static int print_named(const cav_manual *manual, const char *name) {
-  int told = 0;
-  for (int i = 0; i < manual->ntopic; i++) {
-    if (strcmp(manual->topic[i].name, name)) continue;
-    manual->topic[i].print(stdout, manual);
-    told++;
-  }
-  return told + cav_manual_explain(stdout, name);
-}
-
 static void print_topics(const cav_manual *manual) {
   printf("topics of cavort help\n");
   for (int i = 0; i < manual->ntopic; i++) printf("  %-18s %s\n", manual->topic[i].name, manual->topic[i].text);
@@ -259,11 +251,19 @@ static void print_topics(const cav_manual *manual) {
 }
 
 static int no_help(const cav_manual *manual, const char *name) {
-  const char *near = cav_xml_nearest(name, &commands->name, NCOMMAND, sizeof *commands);
-  if (!near) near = cav_xml_nearest(name, &manual->topic->name, manual->ntopic, sizeof *manual->topic);
-  if (!near) near = cav_manual_nearest(name);
   fprintf(stderr, "cavort: there is no command or topic '%s'", name);
-  suggest(near);
+  suggest(cav_manual_nearest(manual, name));
+  fprintf(stderr, "; see cavort help\n");
+  return CAV_EXIT_BAD_INPUT;
+}
+
+static int no_command(const char *name) {
+  const cav_manual_use *use = cav_manual_use_of(name);
+  fprintf(stderr, "cavort: there is no command '%s'", name);
+  if (use)
+    fprintf(stderr, "; cavort %s %s", use->line, use->text);
+  else
+    suggest(cav_xml_nearest(name, &commands->name, NCOMMAND, sizeof *commands));
   fprintf(stderr, "; see cavort help\n");
   return CAV_EXIT_BAD_INPUT;
 }
@@ -272,7 +272,8 @@ static int help(const cav_command_line *line) {
   cav_manual manual = {.command = commands, .option = options, .ncommand = NCOMMAND, .noption = NOPTION};
   manual.topic = cav_manual_topics(&manual.ntopic);
   const cav_manual_command *c = line->operand ? find_command(line->operand) : NULL;
-  if (line->operand && !c) return print_named(&manual, line->operand) ? 0 : no_help(&manual, line->operand);
+  if (line->operand && !c)
+    return cav_manual_answer(stdout, &manual, line->operand) ? 0 : no_help(&manual, line->operand);
   if (c) {
     print_command(c);
     return 0;
@@ -556,12 +557,7 @@ static int run(int argc, char **argv, const char *arguments) {
     return 0;
   }
   const cav_manual_command *c = find_command(name);
-  if (!c) {
-    fprintf(stderr, "cavort: there is no command '%s'", name);
-    suggest(cav_xml_nearest(name, &commands->name, NCOMMAND, sizeof *commands));
-    fprintf(stderr, "; see cavort help\n");
-    return CAV_EXIT_BAD_INPUT;
-  }
+  if (!c) return no_command(name);
   for (int i = 2; i < argc; i++) {
     if (strcmp(argv[i], "--help") && strcmp(argv[i], "-h")) continue;
     print_command(c);

@@ -41,28 +41,27 @@ static const cav_term *asks_for_goal(const cav_problem *p) {
   return NULL;
 }
 
-static int tell_depth(FILE *out, const cav_problem *p) {
+/// Of a posture that is deeper in something than a certificate allows: the goal, or a start that is only where the guess begins
+/// (of one that is given it is a proof).
+static int tell_depth(FILE *out, const cav_problem *p, int start) {
   const cav_model *m = p->model;
-  cav_state *state = posture_of(p, p->q_goal, 0);
-  const cav_contact *deepest = NULL;
-  for (int i = 0; state && i < state->ncontact; i++)
-    if (!deepest || state->contact[i].dist < deepest->dist) deepest = &state->contact[i];
+  cav_state *state = posture_of(p, start ? p->q_start : p->q_goal, 0);
+  const cav_contact *deepest = state ? cav_command_deepest(state) : NULL;
   const int deep = deepest && -deepest->dist > CAV_TOLERANCE_PENETRATION;
   if (deep) {
-    const cav_pair *pair = &m->pair[deepest->pair];
-    const int stands = m->geom[pair->geom2].link == 0 ? pair->geom2 : pair->geom1;
-    const int moves = stands == pair->geom1 ? pair->geom2 : pair->geom1;
-    char one[CAV_GEOM_LABEL], other[CAV_GEOM_LABEL];
-    const cav_term *asked = asks_for_goal(p);
-    fprintf(out, "note: the goal has geom '%.48s' %.3g mm inside '%.48s', and a certificate allows %g: ",
-            cav_geom_label(m, moves, one), -1e3 * deepest->dist, cav_geom_label(m, stands, other),
-            1e3 * CAV_TOLERANCE_PENETRATION);
+    char moves[CAV_GEOM_LABEL], stands[CAV_GEOM_LABEL];
+    const int still = cav_command_pair(m, deepest->pair, moves, stands);
+    const cav_term *asked = start ? NULL : asks_for_goal(p);
+    fprintf(out, "note: the %s has geom '%.48s' %.3g mm inside '%.48s', and a certificate allows %g: ",
+            start ? "start" : "goal", moves, -1e3 * deepest->dist, stands, 1e3 * CAV_TOLERANCE_PENETRATION);
     if (asked)
       fprintf(out, "'%.60s' asks for it at the end and may not be met. ", asked->name ? asked->name : "posture");
     else
-      fprintf(out, "no motion ends there, it only leads the guess. ");
+      fprintf(out,
+              start ? "the guess begins there, no motion does. " : "no motion ends there, it only leads the guess. ");
     fprintf(out, "%s\n",
-            m->geom[stands].link == 0 && m->geom[stands].type == CAV_GEOM_PLANE
+            m->geom[still].link != 0 ? "Change the posture"
+            : m->geom[still].type == CAV_GEOM_PLANE
                 ? "Change the posture; height='floor' without rise puts it on a floor"
                 : "Change the posture, or move the solid");
   }
@@ -187,11 +186,13 @@ static int tell_lean(FILE *out, const cav_problem *p) {
     const double off = cav_command_is_loose(m, i) ? beside_support(m, state, i, way) : -1;
     if (off < unbalanced) continue;
     const char *name = m->body[m->link[i].body].name;
-    fprintf(out,
-            "note: at the start the centre of mass of '%.60s' is %.2g m beside what it stands on, which is towards "
-            "(%.1f %.1f): it falls over unless it steps at once. Lean the posture over its support, or put more of it "
-            "on the ground\n",
-            *name ? name : "body", off, round(10 * way[0]) / 10 + 0.0, round(10 * way[1]) / 10 + 0.0);
+    fprintf(
+        out,
+        "note: at the start the centre of mass of '%.60s' and all that hangs on it is %.2g m beside what it stands on, "
+        "which is towards "
+        "(%.1f %.1f): it falls over unless it steps at once. Lean the posture over its support, or put more of it "
+        "on the ground\n",
+        *name ? name : "body", off, round(10 * way[0]) / 10 + 0.0, round(10 * way[1]) / 10 + 0.0);
     n++;
   }
   cav_state_free(state);
@@ -274,15 +275,17 @@ static int is_impossible(const cav_problem *p) {
 
 int cav_command_tell_postures(FILE *out, const cav_problem *p) {
   int n = 0;
-  if (p->cycle.on) return 0;
+  if (p->cycle.on) return tell_depth(out, p, 1);
   if (!p->free_start) n += tell_fall(out, p) + tell_lean(out, p);
-  // a goal that is the start's was examined as that
-  const int same = !p->free_start && !memcmp(p->q_goal, p->q_start, sizeof *p->q_goal * (size_t)p->model->nq);
-  if (!same) n += tell_depth(out, p);
+  // a goal that is the start's was examined as that where the start is given
+  const int same = !memcmp(p->q_goal, p->q_start, sizeof *p->q_goal * (size_t)p->model->nq);
+  if (p->free_start || !same) n += tell_depth(out, p, 0);
+  if (p->free_start && !same) n += tell_depth(out, p, 1);
   n += tell_disagreement(out, p);
   // what falls is told, and so is what is proven impossible
   if (n > 0 || p->duration < 3 * p->timestep || is_impossible(p)) return n;
   if (!p->free_start && rests(p)) n += tell_weakness(out, p, "start", p->q_start, 0);
-  if (!(same && n) && goal_is_held(p)) n += tell_weakness(out, p, "goal", p->q_goal, p->duration - 2 * p->timestep);
+  if (!(!p->free_start && same && n) && goal_is_held(p))
+    n += tell_weakness(out, p, "goal", p->q_goal, p->duration - 2 * p->timestep);
   return n;
 }

@@ -31,12 +31,8 @@ static void tell(const cav_model *m, const penetration *p, double timestep, int 
     return;
   }
   if (when) snprintf(time, sizeof time, " at %.4g s", p->knot * timestep);
-  // what stands is named last
-  const cav_pair *pair = &m->pair[p->pair];
-  int stands = m->geom[pair->geom2].link == 0 ? pair->geom2 : pair->geom1;
-  int moves = stands == pair->geom1 ? pair->geom2 : pair->geom1;
-  snprintf(out, size, "deepest %.3g mm%s: '%.60s' in '%.60s'", 1e3 * p->depth, time, cav_geom_label(m, moves, a),
-           cav_geom_label(m, stands, b));
+  cav_command_pair(m, p->pair, a, b);
+  snprintf(out, size, "deepest %.3g mm%s: '%.60s' in '%.60s'", 1e3 * p->depth, time, a, b);
 }
 
 void cav_command_tell_guess(FILE *out, const cav_problem *p) {

@@ -44,8 +44,10 @@ static double height_of(const cav_model *m, const cav_state *state, const cav_ro
 cav_status cav_scaffold_open(cav_scaffold *s, const cav_model *model, cav_error *error) {
   cav_state *state = cav_state_new(model);
   cav_stand stand;
-  *s = (cav_scaffold){.model = model, .q = malloc(((size_t)model->nq + 1) * sizeof *s->q)};
-  cav_status status = state && s->q ? cav_roles_find(model, state, &s->roles) : CAV_NO_MEMORY;
+  *s = (cav_scaffold){.model = model,
+                      .q = malloc(((size_t)model->nq + 1) * sizeof *s->q),
+                      .sense = calloc((size_t)model->njoint + 1, sizeof *s->sense)};
+  cav_status status = state && s->q && s->sense ? cav_roles_find(model, state, &s->roles) : CAV_NO_MEMORY;
   if (!status) {
     s->stands = cav_stand_find(model, state, s->q, &stand) == CAV_OK;
     if (!s->stands) cav_configuration_reset(model, s->q);
@@ -53,6 +55,7 @@ cav_status cav_scaffold_open(cav_scaffold *s, const cav_model *model, cav_error 
   }
   int hand = status ? -1 : s->roles.body[CAV_ROLE_HAND];
   if (!status) s->height = height_of(model, state, &s->roles);
+  for (int j = 0; j < model->njoint && !status; j++) cav_sense_of(model, state, &s->roles, j, s->sense[j]);
   if (hand > 0) {
     cav_pose pose, base;
     int link = model->link[model->body[hand].link].root;
@@ -65,7 +68,10 @@ cav_status cav_scaffold_open(cav_scaffold *s, const cav_model *model, cav_error 
   return status;
 }
 
-void cav_scaffold_close(cav_scaffold *s) { free(s->q); }
+void cav_scaffold_close(cav_scaffold *s) {
+  free(s->q);
+  free(s->sense);
+}
 
 // ---------------------------------------------------------------- the comment
 
@@ -98,7 +104,10 @@ static void end(lines *l) {
 
 static void list_joints(FILE *out, const cav_scaffold *s) {
   static const char *const types[] = {"free", "ball", "slide", "hinge"};
-  fputs("     Joints: type, range, where it is at the start\n", out);
+  fputs(
+      "     Joints: type, range, where it is at the start, and what a positive change moves there, seen from the "
+      "root\n",
+      out);
   for (int j = 0; j < s->model->njoint; j++) {
     const cav_joint *joint = &s->model->joint[j];
     int turns = joint->type == CAV_JOINT_HINGE;
@@ -108,7 +117,8 @@ static void list_joints(FILE *out, const cav_scaffold *s) {
     if (joint->type == CAV_JOINT_HINGE || joint->type == CAV_JOINT_SLIDE) {
       double unit = turns ? degrees : 1;
       if (joint->limited) fprintf(out, " %.4g to %.4g,", unit * joint->range[0], unit * joint->range[1]);
-      fprintf(out, " at %.4g %s", unit * s->q[joint->q], turns ? "degrees" : "m");
+      fprintf(out, " at %.4g %s; + ", unit * s->q[joint->q], turns ? "degrees" : "m");
+      put_name(out, s->sense[j]);
     }
     fputc('\n', out);
   }
@@ -162,7 +172,7 @@ static void begin(FILE *out, cav_scaffold *s, const char *task) {
   fprintf(out, "\"%s>\n", s->floating ? " floating=\"true\"" : "");
 }
 
-static int has_floor(const cav_model *m) {
+int cav_scaffold_has_floor(const cav_model *m) {
   for (int i = 0; i < m->ngeom; i++)
     if (m->geom[i].type == CAV_GEOM_PLANE && m->geom[i].link == 0) return 1;
   return 0;
@@ -170,14 +180,15 @@ static int has_floor(const cav_model *m) {
 
 // the posture that it starts from: one that stands, the first keyframe, or the model's own; on the floor, or as it is
 static void write_start(FILE *out, const cav_scaffold *s) {
-  int stands = s->start == CAV_SCAFFOLD_FLOOR && s->roles.base != CAV_BASE_FIXED, floor = has_floor(s->model);
+  int stands = s->start == CAV_SCAFFOLD_FLOOR && s->roles.base != CAV_BASE_FIXED,
+      floor = cav_scaffold_has_floor(s->model);
   int lowered = stands && (floor || s->stands);
   int key = s->start != CAV_SCAFFOLD_PLAIN && s->model->nkey && *s->model->key[0].name;
   if (lowered && !floor)
     fputs(
         "\n  <!-- what the model's file does not have: a floor. Boxes, bars and things to carry may stand here, too "
         "-->\n"
-        "  <scene>\n    <geom name=\"floor\" type=\"plane\" size=\"0 0 1\"/>\n  </scene>\n",
+        "  <scene>\n    " CAV_SCAFFOLD_PLANE "\n  </scene>\n",
         out);
   fputs(
       "\n  <!-- where it starts; a goal of its own would be <goal>, else it ends as it began. Single joints are set "

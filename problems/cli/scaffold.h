@@ -5,6 +5,7 @@
 #include <stdio.h>
 
 #include "role.h"
+#include "sense.h"
 
 /// Where a problem starts, in the order in which it is tried.
 typedef enum cav_scaffold_start {
@@ -23,6 +24,7 @@ typedef struct cav_scaffold {
   cav_roles roles;
   int stands; ///< 1: there is a posture that stands, q [nq]
   double *q;
+  char (*sense)[CAV_SENSE]; ///< [njoint] what a positive change of each joint moves there
   double hand[3];           ///< of an arm: from its first joint to its hand, m
   double height;            ///< of the trunk above the lowest foot, m
   cav_scaffold_start start; ///< of what is written
@@ -32,6 +34,10 @@ typedef struct cav_scaffold {
 /// Looks at a model. CAV_NO_MEMORY, or what the dynamics says of it.
 cav_status cav_scaffold_open(cav_scaffold *scaffold, const cav_model *model, cav_error *error);
 void cav_scaffold_close(cav_scaffold *scaffold);
+
+/// Whether a plane of the world belongs to a model, and what a <scene> adds where none does.
+int cav_scaffold_has_floor(const cav_model *model);
+#define CAV_SCAFFOLD_PLANE "<geom name=\"floor\" type=\"plane\" size=\"0 0 1\"/>"
 
 /// What a problem for the model may name, as a comment.
 void cav_scaffold_list(FILE *out, const cav_scaffold *scaffold);

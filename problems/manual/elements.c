@@ -113,8 +113,10 @@ static void print_attribute(FILE *out, const cav_xml_attribute *a) {
   snprintf(name, sizeof name, "%s%s", a->name, a->required ? " *" : "");
   cav_manual_value(a, value);
   fprintf(out, "  %-16s %s", name, value);
+  // what is chosen among several has no default
   if (fallback && *fallback == '(')
-    fprintf(out, "; default: %.*s", (int)strlen(fallback) - 2, fallback + 1);
+    fprintf(out, "; %s%.*s", strncmp(fallback, "(give ", 6) ? "default: " : "", (int)strlen(fallback) - 2,
+            fallback + 1);
   else if (fallback)
     fprintf(out, "; default %s", fallback);
   fprintf(out, "\n%19s%s\n", "", a->note->text);
@@ -142,17 +144,30 @@ static int told_before(const cav_manual_place *place, int i, const cav_xml_attri
   return 0;
 }
 
-// an attribute once for each meaning, with the elements that have it
+// whether an element of that name was told before as one that has an attribute of that meaning
+static int named_before(const cav_manual_place *place, int from, int k, const cav_xml_attribute *a) {
+  for (int i = from; i < k; i++) {
+    const cav_xml_attribute *other = cav_manual_attribute(place[i].element, a->name);
+    if (other && same_note(a, other) && !strcmp(place[i].element->name, place[k].element->name)) return 1;
+  }
+  return 0;
+}
+
+// an attribute once for each meaning, with the elements that have it; where of two terms the constraint alone does, in what
 static int explain_attribute(FILE *out, const cav_manual_place *place, int n, const char *name) {
   int told = 0;
   for (int i = 0; i < n; i++) {
     const cav_xml_attribute *a = cav_manual_attribute(place[i].element, name);
     if (!a || told_before(place, i, a)) continue;
+    const cav_manual_place *under = NULL;
     fprintf(out, "attribute %s of", name);
     for (int k = i; k < n; k++) {
       const cav_xml_attribute *other = cav_manual_attribute(place[k].element, name);
-      if (other && same_note(a, other) && !cav_manual_twin(place, k)) fprintf(out, " <%s>", place[k].element->name);
+      if (!other || !same_note(a, other) || named_before(place, i, k, a)) continue;
+      fprintf(out, " <%s>", place[k].element->name);
+      if (cav_manual_twin(place, k)) under = &place[k];
     }
+    if (under) cav_manual_parents(out, under, "<", ">");
     fprintf(out, "\n");
     print_attribute(out, a);
     told++;
@@ -178,14 +193,19 @@ int cav_manual_explain(FILE *out, const char *name) {
   return told;
 }
 
-const char *cav_manual_nearest(const char *word) {
+const char *cav_manual_nearest(const cav_manual *manual, const char *word) {
+  enum { NAMES = 1500 };
   cav_manual_place place[CAV_MANUAL_ELEMENTS];
-  int n = cav_manual_places(place);
-  const char *near = NULL;
-  for (int i = 0; i < n && !near; i++) {
-    near = cav_xml_nearest(word, &place[i].element->name, 1, sizeof *place);
-    for (const cav_xml_attribute *a = place[i].element->attribute; a && a->name && !near; a++)
-      near = cav_xml_nearest(word, &a->name, 1, sizeof *a);
+  const char *name[NAMES];
+  const int n = cav_manual_places(place);
+  int names = 0;
+  for (int i = 0; i < manual->ncommand; i++) name[names++] = manual->command[i].name;
+  for (int i = 0; i < manual->ntopic; i++) name[names++] = manual->topic[i].name;
+  for (int i = 0; i < n; i++) {
+    assert(names < NAMES);
+    name[names++] = place[i].element->name;
+    for (const cav_xml_attribute *a = place[i].element->attribute; a && a->name && names < NAMES; a++)
+      name[names++] = a->name;
   }
-  return near;
+  return cav_xml_nearest(word, name, names, sizeof *name);
 }

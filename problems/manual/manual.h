@@ -81,8 +81,22 @@ const char *cav_manual_target(cav_sensor_target target);
 /// Elements, attributes and types of sensors by a name: printed as help, how many there were. elements.c.
 int cav_manual_explain(FILE *out, const char *name);
 
-/// The name of an element or attribute nearest to a word, NULL: none is near. elements.c.
-const char *cav_manual_nearest(const char *word);
+/// The name of a command, a topic, an element or an attribute nearest to a word, NULL: none is near. elements.c.
+const char *cav_manual_nearest(const cav_manual *manual, const char *word);
+
+/// A word for what a command does.
+typedef struct cav_manual_use {
+  const char *words; ///< separated by |
+  const char *line;  ///< what follows cavort: "inspect PROBLEM"
+  const char *text;  ///< what that does, after the line
+} cav_manual_use;
+
+/// The command that does what a word says which is none itself, NULL: none is known. words.c.
+const cav_manual_use *cav_manual_use_of(const char *word);
+
+/// Prints all that help has of a word: a topic, names of problem files, roles, postures, what stands for a word known from
+/// elsewhere; how many there were. words.c.
+int cav_manual_answer(FILE *out, const cav_manual *manual, const char *word);
 
 /// The reference of commands and problem files, in Markdown. reference.c.
 void cav_manual_reference(FILE *out, const cav_manual *manual);

@@ -1,0 +1,86 @@
+/// How a posture touches and is in things, in one line of inspect: its centre of mass, which bodies touch the world and where,
+/// and which geom is deepest in what. And the two geoms of a contact by their names, what stands behind what moves.
+#include <math.h>
+#include <stdio.h>
+
+#include "cavort/dynamics.h"
+#include "command.h"
+
+// farther apart it does not touch; less deep is rounding; bodies that are named, the others are counted
+static const double touching = 0.005, deep = 5e-5; // m
+enum { NAMED = 8 };
+
+int cav_command_pair(const cav_model *m, int pair, char moves[CAV_GEOM_LABEL], char stands[CAV_GEOM_LABEL]) {
+  const cav_pair *of = &m->pair[pair];
+  const int still = m->geom[of->geom2].link == 0 ? of->geom2 : of->geom1;
+  char label[CAV_GEOM_LABEL];
+  snprintf(moves, CAV_GEOM_LABEL, "%s", cav_geom_label(m, still == of->geom1 ? of->geom2 : of->geom1, label));
+  snprintf(stands, CAV_GEOM_LABEL, "%s", cav_geom_label(m, still, label));
+  return still;
+}
+
+const cav_contact *cav_command_deepest(const cav_state *state) {
+  const cav_contact *deepest = NULL;
+  for (int i = 0; i < state->ncontact; i++)
+    if (!deepest || state->contact[i].dist < deepest->dist) deepest = &state->contact[i];
+  return deepest;
+}
+
+// the body that touches the world by a contact, 0: none
+static int body_of(const cav_model *m, const cav_contact *c) {
+  const cav_pair *pair = &m->pair[c->pair];
+  if (c->dist > touching || (c->link1 != 0) == (c->link2 != 0)) return 0;
+  return m->geom[m->geom[pair->geom1].link == 0 ? pair->geom2 : pair->geom1].body;
+}
+
+// ", touches the world with a, b in x 0..1, y 0..1"
+static void print_touch(const cav_model *m, const cav_state *state) {
+  double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+  int bodies = 0;
+  for (int i = 0; i < state->ncontact; i++) {
+    const int body = body_of(m, &state->contact[i]);
+    int before = 0;
+    if (!body) continue;
+    for (int k = 0; k < 2; k++) {
+      low[k] = fmin(low[k], state->contact[i].pos[k]);
+      high[k] = fmax(high[k], state->contact[i].pos[k]);
+    }
+    for (int k = 0; k < i; k++) before |= body_of(m, &state->contact[k]) == body;
+    if (before || ++bodies > NAMED) continue;
+    printf("%s%.60s", bodies == 1 ? ", touches the world with " : ", ",
+           *m->body[body].name ? m->body[body].name : "(no name)");
+  }
+  if (bodies > NAMED) printf(" and %d more", bodies - NAMED);
+  if (bodies)
+    printf(" in x %.3f..%.3f, y %.3f..%.3f", low[0], high[0], low[1], high[1]);
+  else
+    printf(", touches nothing of the world");
+}
+
+cav_status cav_command_print_stance(const cav_problem *p, const char *name, const double *q, cav_error *error) {
+  cav_state *state = cav_state_new(p->model);
+  double com[3];
+  cav_status status = state ? CAV_OK : CAV_NO_MEMORY;
+  // so that contacts are seen before they touch
+  if (state) state->options.smoothing = state->options.smoothing_self = touching;
+  if (!status) status = cav_position(p->model, state, q);
+  if (status) {
+    cav_state_free(state);
+    *error = (cav_error){.status = status};
+    snprintf(error->text, sizeof error->text, "the posture of the %s cannot be evaluated: %s", name,
+             cav_status_name(status));
+    return status;
+  }
+  cav_momentum(p->model, state, p->v_start, com, NULL, NULL);
+  printf("  %-6s centre of mass at %.3f %.3f %.3f m", name, com[0], com[1], com[2]);
+  print_touch(p->model, state);
+  const cav_contact *deepest = cav_command_deepest(state);
+  if (deepest && -deepest->dist > deep) {
+    char moves[CAV_GEOM_LABEL], stands[CAV_GEOM_LABEL];
+    cav_command_pair(p->model, deepest->pair, moves, stands);
+    printf(", deepest penetration %.1f mm: '%.60s' in '%.60s'", -1e3 * deepest->dist, moves, stands);
+  }
+  printf("\n");
+  cav_state_free(state);
+  return CAV_OK;
+}

@@ -1,0 +1,196 @@
+/// Words that people know from elsewhere and that name nothing here: the command that does what one says, and what stands for
+/// another in problem files. What is spelt wrong is not looked for here (cav_xml_nearest).
+#include <string.h>
+#include <strings.h>
+
+#include "manual.h"
+#include "posture.h"
+#include "role.h"
+
+// words separated by |, the command line that does it, what that does
+static const cav_manual_use uses[] = {
+    {"check|validate|lint|info|describe|list|test|parse|dump|print", "inspect PROBLEM",
+     "checks a problem file and says what it asks for, without solving it"},
+    {"run|plan|optimise|optimize|optimisation|optimization|go|compute|generate|synthesise|synthesize|motion",
+     "solve PROBLEM", "finds the motion that a problem file asks for"},
+    {"play|show|plot|open|animate|render|display|watch|draw|gui|visualise|visualize|viewer|page", "view DIR",
+     "writes the page that plays the motion of a result folder, and says where it is"},
+    {"init|create|scaffold|template|begin|start|make|add|example", "new MODEL",
+     "writes a problem file to begin with, for a model"},
+    {"simulate|sim|step|control|controller|push", "mpc PROBLEM",
+     "simulates a body that plans control; every certified motion of cavort solve was simulated, too"},
+    {"replay|certify", "verify DIR", "certifies and simulates the motion of a result folder again"},
+    {"why|debug|diagnose|analyse|analyze", "explain DIR", "says why the motion of a result folder is as it is"},
+    {"convert|save|write", "export DIR", "writes the motion of a result folder in a format of other tools"},
+    {"compare|diff", "view DIR DIR", "writes one page of two motions"},
+    {"results|status|ls|summary", "table DIR...", "prints a line for each result folder"},
+    {"bench|benchmark|measure|accuracy|profile", "report MODEL", "measures error against run time"},
+    {"fit|retarget|mocap|clip", "ik CLIP", "fits a model to a recorded clip"},
+    {"estimate|observe|filter|smooth", "mhe PROBLEM", "estimates a motion from its records"},
+    {"sweep|scan|grid|batch", "solve PROBLEM --set PATH=VALUE,VALUE", "solves a problem for several values"},
+    {"resume|continue", "solve PROBLEM --resume", "goes on where a solve was stopped"},
+    {"version", "--version", "prints the version"},
+};
+
+// words separated by |, what stands for them, and of what cavort help tells more; NULL: of nothing
+static const struct {
+  const char *words, *text, *see;
+} words[] = {
+    {"achieved|achieve|success|missed|tolerance|tolerances|met",
+     "a motion is achieved if every target is met to within its tolerance; exit status 0 needs that, and cavort "
+     "inspect\n  PROBLEM marks the terms that count",
+     "within"},
+    {"certified|certificate|certification|verdict|valid",
+     "a motion is certified if it obeys physics and limits, by a verifier apart from the solver; what that requires:\n"
+     "  problems/README.md, Result folders. Whether it does what was asked is another matter (achieved)",
+     "verify"},
+    {"optimal|optimality|optimum",
+     "a motion is optimal if no small step along its constraints saves more than 1e-4 of the cost: a local optimum,\n"
+     "  another guess may lead to a better one. Neither certified nor achieved needs it",
+     NULL},
+    {"impossible|infeasible|feasible|proof",
+     "a problem that is proven impossible is not solved; cavort inspect PROBLEM tells the proof", "inspect"},
+    {"stand|standing|lying|crouch|sitting|kneeling|squatting",
+     "key=\"stand\" of <start>, <goal>, <pose> and <waypoint> is a posture on the feet, found for any model that has "
+     "feet;\n  others are found for any humanoid. height=\"floor\" beside it puts it on the floor",
+     "postures"},
+    {"keyframe|keyframes|qpos0", "a posture that the model's file names: key=\"NAME\" of <start>, <goal> and others",
+     "key"},
+    {"feet|hands|paw|paws|knee|elbow|hip|shoulder|ankle|wrist|leg|legs|arm|arms|thigh|shin|toe|finger|neck|waist|back|"
+     "chest|limb|link|"
+     "links|"
+     "bodies|joints|sites|geoms",
+     "bodies, joints, sites and geoms go by the names of the model's file; cavort inspect MODEL lists them, with what "
+     "a\n"
+     "  positive change of each joint moves where. Names of some parts serve any model (roles)",
+     "roles"},
+    {"axis|axes|direction|upright|vertical|orientation|tilt|facing|heading",
+     "sensors framexaxis, frameyaxis and framezaxis read where an axis of a body points, framequat a whole "
+     "orientation:\n"
+     "  <sensor type=\"framezaxis\" xbody=\"torso\" target=\"0 0 1\" at=\"end\" weight=\"900\"/> is upright",
+     "sensors"},
+    {"x|y|z|world|coordinates|left|right|forwards|forward|up|down",
+     "z is up; x and y are those of the model's file, of most robots x forwards and y left. One of them counts by\n"
+     "  component=\"z\"",
+     "component"},
+    {"unit|units|metre|metres|meter|meters|radian|radians",
+     "m, s, kg, N and rad; degrees in the attributes degrees, euler and rotation alone", NULL},
+    {"floor|ground|plane|table|box|wall|obstacle|obstacles|object|objects|stairs|ball|terrain|environment",
+     "what the model's file does not have stands in <scene>, as MJCF writes it:\n"
+     "  <scene><geom name=\"floor\" type=\"plane\" size=\"0 0 1\"/></scene>; height=\"floor\" of a posture puts it "
+     "down "
+     "there",
+     "height"},
+    {"mjcf|urdf|mujoco|robot|humanoid",
+     "models are MJCF or URDF files: <problem model=\"FILE\">, from the problem file's folder, or --model FILE",
+     "model"},
+    {"objective|reward|loss|goals|wish", "what is wanted is a term of <cost>, what has to hold one of <constraint>",
+     "terms"},
+    {"bound|bounds|inequality|equality|hard",
+     "a term of <constraint> has to hold: equal to its target, or between lower and upper", "constraint"},
+    {"position|place|location|reach",
+     "where a body is: <sensor type=\"framepos\" body=\"right hand\" target=\"0.4 -0.2 1\" at=\"end\" "
+     "weight=\"900\"/>; a "
+     "joint's\n  angle is type=\"jointpos\", all joints at once are <posture>",
+     "framepos"},
+    {"angle|angles|bend",
+     "of a posture <joint name=\"NAME\" degrees=\"30\"/>; as a wish type=\"jointpos\" (rad) or "
+     "<posture joint=\"NAME\"/>",
+     "joint"},
+    {"torques|motor|motors|muscle|muscles|strength",
+     "forces of actuators are planned within their limits: <effort> is their cost, <limits effort> how much of them is "
+     "used",
+     "effort"},
+    {"friction|footstep|footsteps|gait|contacts",
+     "contacts are found, no file says when; friction is that of geoms, in the model's file or the <scene>", "contact"},
+    {"dt|knot|step|steps|fps|length", "knots are timestep apart, duration is a whole number of steps", "horizon"},
+    {"touching|press|pressure|lean|support|bear",
+     "a force on a body: <sensor type=\"touch\" body=\"right hand\" target=\"20\" within=\"5\" from=\"0.8\" to=\"1.2\" "
+     "weight=\"100\"/>;\n  none on it: <constraint><sensor type=\"touch\" body=\"table\" upper=\"0\"/></constraint>",
+     "touch"},
+    {"jump|walk|kick|climb|backflip|cartwheel|dance|motions|examples",
+     "motions of the project stand in problems/motions; cavort new MODEL --like jump writes one for a model", "new"},
+    {"output|folder|csv|trajectory|json|files",
+     "cavort solve writes a folder, NAME.result; its files: problems/README.md, Result folders", "solve"},
+    {"seed|random", "nothing is random: one build and one input give the same motion, at any number of threads", NULL},
+    {"python|c|api|library", "README.md, From C and From Python", NULL},
+};
+
+// whether a list of words, separated by |, has that one
+static int has_word(const char *list, const char *word) {
+  const size_t n = strcspn(word, "|");
+  if (word[n]) return 0;
+  while (strncasecmp(list, word, n) || (list[n] != '|' && list[n])) {
+    list = strchr(list, '|');
+    if (!list) return 0;
+    list++;
+  }
+  return n > 0;
+}
+
+const cav_manual_use *cav_manual_use_of(const char *word) {
+  for (size_t i = 0; i < sizeof uses / sizeof *uses; i++)
+    if (has_word(uses[i].words, word)) return &uses[i];
+  return NULL;
+}
+
+static int print_topic(FILE *out, const cav_manual *manual, const char *name) {
+  int told = 0;
+  for (int i = 0; i < manual->ntopic; i++) {
+    if (strcmp(manual->topic[i].name, name)) continue;
+    manual->topic[i].print(out, manual);
+    told++;
+  }
+  return told;
+}
+
+// the role of that name, or else one whose last word it is: foot of "right foot"; CAV_ROLE_TYPES: none
+static cav_role role_of(const char *name) {
+  const size_t n = strlen(name);
+  cav_role role = cav_role_named(name);
+  for (cav_role r = 0; r < CAV_ROLE_TYPES && role == CAV_ROLE_TYPES; r++) {
+    const char *text = cav_role_name(r), *last = strrchr(text, ' ');
+    if (last && strlen(last + 1) == n && !strcasecmp(last + 1, name)) role = r;
+  }
+  return role;
+}
+
+static int print_role(FILE *out, const cav_manual *manual, const char *name) {
+  const cav_role role = role_of(name);
+  if (role == CAV_ROLE_TYPES) return 0;
+  fprintf(out, "%s: a role, which stands for a body of any model, as in <sensor type=\"framepos\" body=\"%s\">\n", name,
+          cav_role_name(role));
+  return print_topic(out, manual, "roles");
+}
+
+// a posture that is found by its name
+static int print_posture(FILE *out, const cav_manual *manual, const char *name) {
+  for (int i = 0; cav_posture_names[i]; i++) {
+    if (strcmp(cav_posture_names[i], name)) continue;
+    fprintf(out, "%s: a posture of any humanoid, as in <start key=\"%s\" height=\"floor\"/>\n", name, name);
+    return print_topic(out, manual, "postures");
+  }
+  return 0;
+}
+
+static int print_word(FILE *out, const char *name) {
+  int told = 0;
+  for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
+    if (!has_word(words[i].words, name)) continue;
+    fprintf(out, "%s: %s\n", name, words[i].text);
+    if (words[i].see && strcmp(words[i].see, name)) fprintf(out, "  more: cavort help %s\n", words[i].see);
+    told++;
+  }
+  return told;
+}
+
+int cav_manual_answer(FILE *out, const cav_manual *manual, const char *name) {
+  int told = print_word(out, name);
+  told += print_topic(out, manual, name);
+  told += cav_manual_explain(out, name);
+  told += print_role(out, manual, name);
+  told += print_posture(out, manual, name);
+  const cav_manual_use *use = told ? NULL : cav_manual_use_of(name);
+  if (use) fprintf(out, "%s: cavort %s %s\n", name, use->line, use->text);
+  return told + (use != NULL);
+}

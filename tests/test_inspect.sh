@@ -1,0 +1,180 @@
+#!/bin/sh
+# What inspect says of a problem before it is solved: which terms count, where start and goal touch and are too deep, which way joints move.
+# Usage: test_inspect.sh CAVORT SOURCE_ROOT
+set -u
+cavort=$(cd "$(dirname "$1")" && pwd)/$(basename "$1")
+root=$(cd "$2" && pwd)
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+checks=0
+failed=0
+check() {
+  text=$1
+  shift
+  checks=$((checks + 1))
+  "$@" && return 0
+  failed=$((failed + 1))
+  echo "failed: $text"
+}
+# inspected STATUS ARGUMENT...: what it prints is in out and err
+inspected() {
+  wanted=$1
+  shift
+  "$cavort" inspect "$@" >out 2>err
+  status=$?
+  check "inspect $*: status $status, expected $wanted" [ "$status" -eq "$wanted" ]
+}
+says() { check "says: $1" grep -qF -- "$1" out; }
+not_said() { check "does not say: $1" sh -c '! grep -qF -- "$1" out' sh "$1"; }
+
+# --- terms: names, tolerances, what achieved needs ---
+
+cat >model.xml <<'TEXT'
+<mujoco model="two"><option timestep="0.02"/><worldbody><geom name="ground" type="plane" size="9 9 1"/>
+<body name="rod" pos="0 0 2"><joint name="pivot" axis="0 1 0" damping=".1"/>
+<geom name="bob" pos="0 0 -.5" size=".05" mass="1"/></body>
+<body name="box" pos="2 0 .1"><freejoint name="box"/><geom name="box" type="box" size=".1 .1 .1"/></body></worldbody>
+<actuator><motor joint="pivot" gear="10" ctrlrange="-1 1"/></actuator></mujoco>
+TEXT
+cat >terms.xml <<'TEXT'
+<problem name="terms" model="model.xml"><horizon duration="1" timestep=".02"/><start/>
+<cost><posture name="final" dofs="all" at="end" weight="900"/>
+<sensor name="near" type="framepos" body="box" reftype="xbody" refname="rod" component="z" target="-1.9" weight="3"/>
+<sensor name="soft" type="touch" body="rod" within="5" weight="1"/>
+<sensor name="free" type="touch" body="rod" weight="1"/>
+<sensor name="hint" type="framepos" body="rod" target="0 0 1.5" at=".5" within="any" weight="1"/>
+<slip body="box" weight="0" within="0.2"/></cost>
+<constraint><sensor name="level" type="framequat" body="box" at="end"/></constraint></problem>
+TEXT
+inspected 0 terms.xml
+says "costs; achieved needs those that are to be met, the rest is not asked for"
+says "  weight 900        'final': posture of all dofs to the goal at 1 s; to be met within 0.1 rad, 0.03 m (usual)"
+says "  weight 3          'near': framepos of box, z, in the frame of rod to -1.9; reported only, no within="
+says "  weight 1          'soft': touch of rod to 0; to be met within 5 N"
+check "over the whole horizon without within: a running cost" grep -qx "  weight 1          'free': touch of rod to 0" out
+says "'hint': framepos of rod to 0 0 1.5 at 0.5 s; reported only, within=\"any\""
+says "slip of loaded contacts of body box; these may slide by 0.2 m/s"
+says "  must be           'level': framequat of box to no rotation at 1 s; to be met within 1e-06 rad"
+check "a name that is the element's is not repeated" grep -q "^  weight 1000       gap of" out
+
+# --- joints: what a positive change moves where ---
+
+line() { sed -n "s/^$1  *[a-z]* .*  + \(.*\)/\1/p" out; }
+joint() { check "$1: + $2, not + $(line "$1")" [ "$(line "$1")" = "$2" ]; }
+inspected 0 "$root/problems/models/humanoid.xml"
+joint knee_right "foot_right forwards"
+joint abdomen_z "turns pelvis to the left"
+joint ankle_y_left "foot_left down"
+joint elbow_left "hand_left forwards"
+inspected 0 "$root/problems/models/robot.xml"
+joint knee_right "foot_right backwards"
+joint ankle_roll_left "rolls foot_left to the right"
+joint waist_yaw "turns chest to the left"
+inspected 0 "$root/problems/models/walker.xml"
+joint z "torso up"
+joint pitch "tips torso forwards"
+
+# against where bodies are when the joint has been moved
+places() { sed -n '/^places/,/^$/p' "$1"; }
+moved() {
+  cat >moved.xml <<TEXT
+<problem name="moved" model="$1"><horizon duration="1"/><start/><goal ranges="clip"><joint name="$2" degrees="$3"/></goal></problem>
+TEXT
+  "$cavort" inspect moved.xml >moved.out 2>&1
+  # start and goal of that body: which way it went most
+  places moved.out | awk -v body="$4" '$1 == body { for (k = 0; k < 3; k++) d[k] = $(5 + k) - $(2 + k); most = 0
+    for (k = 1; k < 3; k++) if (d[k] * d[k] > d[most] * d[most]) most = k
+    split(d[most] > 0 ? "forwards left up" : "backwards right down", way, " "); print way[most + 1] }'
+}
+for model in humanoid robot; do
+  path=$root/problems/models/$model.xml
+  "$cavort" inspect "$path" >rows 2>&1
+  sed -n 's/^\([a-z_0-9]*\)  *hinge  *\([-0-9.]*\)[.][.]\([-0-9.]*\) deg .*+ \([a-z_]*\) \([a-z]*\).*/\1 \2 \3 \4 \5/p' rows |
+    grep -vE 'ankle|wrist|turns|rolls|tips' >rows.txt
+  check "$model: joints are looked at" [ "$(wc -l <rows.txt)" -ge 12 ]
+  while read -r name low high body way; do
+    # to the side where there is room
+    to=$(echo "$low $high" | awk '{ print ($2 > 8) ? 8 : -8 }')
+    found=$(moved "$path" "$name" "$to" "$body")
+    case $to:$found in
+      -*:forwards) found=backwards ;; -*:backwards) found=forwards ;; -*:left) found=right ;;
+      -*:right) found=left ;; -*:up) found=down ;; -*:down) found=up ;;
+    esac
+    check "$model: $name moves $body $found, not $way" [ "$way" = "$found" ]
+  done <rows.txt
+done
+
+# a root that lies: seen from itself; and one that the file has turned, by its feet
+cat >lying.xml <<TEXT
+<problem name="lying" model="$root/problems/models/humanoid.xml"><horizon duration="1"/>
+<start><root pos="0 0 1" euler="0 90 0"/></start></problem>
+TEXT
+inspected 0 lying.xml
+joint knee_right "foot_right forwards"
+sed 's/<body name="torso"[^>]*/& euler="0 0 1.5708"/' "$root/problems/models/humanoid.xml" >turned.xml
+inspected 0 turned.xml
+joint knee_right "foot_right forwards"
+check "the comment of new has it" sh -c '"$1" new "$2" -o written.xml -q && grep -q "knee_right .* degrees; + foot_right forwards" written.xml' \
+  sh "$cavort" "$root/problems/models/humanoid.xml"
+
+# --- postures: what touches, what is in what ---
+
+humanoid=$root/problems/models/humanoid.xml
+# posture HORIZON START: a problem of the humanoid with that start and a goal
+posture() {
+  { echo "<problem name='p' model='$humanoid'><horizon duration='1'/>"; cat; echo "</problem>"; } >p.xml
+}
+posture <<'TEXT'
+<start key="stand" height="floor"/><goal><root pos="0 0 1.25"/></goal>
+TEXT
+inspected 0 p.xml
+says ", touches the world with foot_right, foot_left in x "
+check "the goal's pair" grep -qE "^  goal .*, deepest penetration [0-9.]+ mm: 'foot[0-9]_(right|left)' in 'floor'$" out
+says "note: the goal has geom 'foot"
+posture <<'TEXT'
+<start><root pos="0 0 2"/></start>
+TEXT
+inspected 0 p.xml
+check "in the air" grep -qE "^  start  .* m, touches nothing of the world$" out
+posture <<'TEXT'
+<start key="supine" height="floor"/>
+TEXT
+inspected 0 p.xml
+check "many are counted" grep -qE "touches the world with (\w+, ){7}\w+ and [0-9]+ more in x" out
+# a hand in the other hand, where a start is found: a note, and no word of a solid to be moved
+posture <<'TEXT'
+<start free="true" key="stand" height="floor"/><goal key="stand" height="floor"><joint name="shoulder1_right" degrees="25"/>
+<joint name="shoulder1_left" degrees="25"/></goal>
+TEXT
+inspected 0 p.xml
+check "link in link" grep -qE "^note: the goal has geom '.*' [0-9.]+ mm inside '.*', and a certificate allows 5: .*Change the posture$" out
+posture <<'TEXT'
+<start free="true"><root pos="0 0 1.2"/></start><goal key="stand" height="floor"/>
+TEXT
+inspected 0 p.xml
+says "note: the start has geom 'foot"
+says "the guess begins there, no motion does"
+sed -i 's/<start free="true">/<cycle translation="1 0 0"\/><start>/' p.xml
+inspected 0 p.xml
+says "the guess begins there, no motion does"
+
+# --- a box that begins inside a table, and is not stopped by it; on it by what is told; a ball in the air ---
+
+posture <<'TEXT'
+<scene><body name="table" pos="1 0 .35"><geom name="tabletop" type="box" size=".4 .4 .05" pos="0 0 .3"/></body>
+<body name="box" pos="2 0 .1"><freejoint name="box"/><geom name="box" type="box" size=".1 .1 .1"/></body>
+<body name="ball" pos="3 0 .1"><freejoint name="ball"/><geom name="ball" size=".1"/></body></scene>
+<start key="stand" height="floor"/>
+<goal key="stand" height="floor"><root joint="box" pos="1 0 .72"/><root joint="ball" pos="3 0 1"/></goal>
+TEXT
+inspected 0 p.xml
+says "note: height=\"floor\" of <goal> lowers 'box' by 0.62 m, not stopped by 'tabletop', inside which it begins: 0.080 m higher it is on that"
+says "note: height=\"floor\" of <goal> lowers 'ball' by 0.9 m; <root joint="
+sed -i 's/pos="1 0 .72"/pos="1 0 .80"/' p.xml
+inspected 0 p.xml
+not_said "tabletop', inside"
+check "it lies on the table" grep -qE "^  box .* 1.000 +0.000 +0.800$" out
+
+[ "$failed" -eq 0 ] && echo "$checks checks"
+exit "$failed"
