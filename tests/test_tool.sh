@@ -472,6 +472,11 @@ sed 's/<joint name="knee" degrees="60"/<joint name="knee" pos="60"/' hop.xml >un
 run 2 inspect units.xml
 says err "joint 'knee' is at 60, outside its range 0 .. 2.618 rad;"
 says err "in degrees it would be in it: <joint name= degrees=>"
+# without a key a posture begins with the model's own configuration, which may be outside ranges
+sed 's/range="0 150"/range="10 150"/' monopod.xml >bent.xml
+sed 's/model="monopod.xml"/model="bent.xml"/; s/<start key="stand" height="floor"/<start height="floor"/' hop.xml >units.xml
+run 2 inspect units.xml
+says err "in the model's own configuration, with which a posture without 'key' begins; key=\"stand\""
 # a little beyond in radians is no slip of units
 sed 's/<joint name="knee" degrees="60"/<joint name="knee" pos="2.65"/' hop.xml >units.xml
 run 2 inspect units.xml

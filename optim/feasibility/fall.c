@@ -4,6 +4,7 @@
 /// its joints do: after T the speed of its centre of mass is v - g T, but for the momentum that certificates leave
 /// unexplained, at most CAV_TOLERANCE_MOMENTUM g T. Where all has to be at rest by then, it cannot.
 #include <math.h>
+#include <string.h>
 
 #include "cavort/solve.h"
 #include "feasibility.h"
@@ -31,6 +32,13 @@ static int has_shape(const cav_model *m, int root) {
   return 0;
 }
 
+// whether shapes are missing because their files are
+static int lost_meshes(const cav_model *m) {
+  for (int i = 0; i < m->nwarning; i++)
+    if (strstr(m->warning[i], "the file is not found")) return 1;
+  return 0;
+}
+
 static void tell(cav_examination *e, int root, double speed, double time) {
   const cav_model *m = e->model;
   char buffer[48];
@@ -48,9 +56,9 @@ static void tell(cav_examination *e, int root, double speed, double time) {
         e, CAV_CONDITION_MOMENTUM, NULL,
         "Give it geoms that may touch; cavort inspect lists what was left out of the model's file, meshes that "
         "are not found among it.",
-        "nothing can hold '%s' up: none of its bodies has a shape that may touch anything, so at the end, after "
+        "nothing can hold '%s' up: none of its bodies has a shape that may touch anything%s, so at the end, after "
         "%.3g s, it falls at %.3g m/s, and it has to be at rest",
-        name, time, speed);
+        name, lost_meshes(m) ? " (the files of its meshes are not found)" : "", time, speed);
 }
 
 cav_status cav_examine_falls(cav_examination *e) {

@@ -330,7 +330,7 @@ static const cav_xml_element schedule = {
         WORD("sliding", cav_problem_slidings, "coulomb", "law of contacts that slide, from three quarters of the stages on"),
         WORD("next_gap", cav_problem_next_gaps, "linear", "gap after a step that contacts see, from half of the stages on"),
         WORD("next_slip", cav_problem_next_slips, "linear", "slip over a step that contacts see, from half of the stages on"),
-        REAL("optimality", 0, "", "0", "the solve ends where steps gain slowly and one may save no more than this fraction of the cost; 0: 8e-4"),
+        REAL("optimality", 0, "", "(8e-4)", "the solve ends where steps gain slowly and one may save no more than this fraction of the cost; 0: the default"),
         WORD("solids", cav_problem_solids, "hard", "how the world begins: grow where the guess runs into solids"),
         FLAG("kinematics", "false", "before the first stage the guess goes to where it meets its targets by inverse kinematics over all knots, whatever forces that takes")),
     CHILDREN(&schedule_first, &schedule_last), 0, "continuation from soft, blurred contacts to hard, sharp ones"};
@@ -368,6 +368,7 @@ const cav_xml_element cav_problem_element = {
 const cav_xml_former cav_problem_former[] = {
     FORMER_CHILD("scene", "leave", "remove"),
     FORMER_CHILD("cost", "overlap", "self_penetration"),
+    {"constraint", "force", NULL, 0, "is a cost; what must not touch is <sensor type=\"touch\" body=\"NAME\" upper=\"0\"/>"},
     FORMER_ATTRIBUTE("cycle", "turn", "rotation"),
     FORMER_ATTRIBUTE("guess", "turn", "rotation"),
     FORMER_ATTRIBUTE("first", "self_share", "self_stiffness"),

@@ -338,6 +338,16 @@ static cav_status refuse_range(const cav_problem_reader *reader, const cav_xml_n
   const cav_joint *joint = &reader->model->joint[j];
   const int slide = joint->type == CAV_JOINT_SLIDE, degrees = !slide && cav_problem_in_degrees(reader, node, j);
   const double unit = degrees ? 180 / M_PI : 1;
+  const int based = cav_xml_get(node, "key") || cav_xml_get(node, "qpos") || cav_xml_get(node, "file");
+  if (!based && value == reader->model->q0[joint->q])
+    return cav_xml_fail(
+        reader->error, node, NULL,
+        "joint '%s' is at %g, outside its range %.5g .. %.5g %s, in the model's own configuration, with "
+        "which a posture without 'key' begins; key=\"stand\", or a keyframe of the model, begins with another",
+        joint->name, unit * value, unit * least, unit * joint->range[1],
+        slide     ? "m"
+        : degrees ? "degrees"
+                  : "rad");
   return cav_xml_fail(reader->error, node, NULL,
                       "joint '%s' is at %g, outside its range %.5g .. %.5g %s; ranges='clip' would bring it in%s",
                       joint->name, unit * value, unit * least, unit * joint->range[1],
