@@ -208,6 +208,7 @@ static void check_broken_terms(void) {
   refuse_cost("<sensor weight='1' name='eyes'/>", "did you mean 'eye'");
   refuse_cost("<sensor weight='1' type='framepos'/>", "needs one of");
   refuse_cost("<sensor weight='1' type='framepoz' body='trunk'/>", "did you mean 'framepos'");
+  refuse_cost("<sensor weight='1' type='framepos' body='turnk' target='0 0 1'/>", "did you mean 'trunk'");
   refuse_cost("<sensor weight='1' type='framepos' body='trunk' site='eye'/>", "contradicts");
   refuse_cost("<sensor weight='1' type='framepos' joint='knee'/>", "looks at");
   refuse_cost("<sensor weight='1' type='subtreecom' site='eye'/>", "looks at");

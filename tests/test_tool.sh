@@ -101,6 +101,8 @@ run 2 verify nowhere
 run 2 view nowhere
 run 2 solv
 says err "did you mean 'solve'"
+run 2 veiw
+says err "did you mean 'view'"
 run 0 help sensor
 says out "<sensor> in <cost>"
 run 0 help within

@@ -59,23 +59,23 @@ void cav_xml_source_fail(cav_xml_source *s, cav_status status, int line, const c
 
 // --- guessing names ---
 
-// edits that turn a into b, both cut at WORD_LIMIT characters
+// edits that turn a into b, both cut at WORD_LIMIT characters; two letters that change places are one
 static int distance(const char *a, const char *b) {
-  int row[WORD_LIMIT + 1];
-  int n = (int)strnlen(b, WORD_LIMIT);
-  for (int j = 0; j <= n; j++) row[j] = j;
-  for (int i = 0; i < WORD_LIMIT && a[i]; i++) {
-    int diagonal = row[0];
-    row[0] = i + 1;
-    for (int j = 0; j < n; j++) {
-      int best = diagonal + (a[i] != b[j]);
-      if (row[j + 1] + 1 < best) best = row[j + 1] + 1;
-      if (row[j] + 1 < best) best = row[j] + 1;
-      diagonal = row[j + 1];
-      row[j + 1] = best;
+  int edits[WORD_LIMIT + 1][WORD_LIMIT + 1];
+  int n = (int)strnlen(a, WORD_LIMIT), m = (int)strnlen(b, WORD_LIMIT);
+  for (int i = 0; i <= n; i++) {
+    for (int j = 0; j <= m; j++) {
+      int *best = &edits[i][j];
+      *best = i + j;
+      if (!i || !j) continue;
+      *best = edits[i - 1][j - 1] + (a[i - 1] != b[j - 1]);
+      if (edits[i - 1][j] + 1 < *best) *best = edits[i - 1][j] + 1;
+      if (edits[i][j - 1] + 1 < *best) *best = edits[i][j - 1] + 1;
+      if (i < 2 || j < 2 || a[i - 1] != b[j - 2] || a[i - 2] != b[j - 1]) continue;
+      if (edits[i - 2][j - 2] + 1 < *best) *best = edits[i - 2][j - 2] + 1;
     }
   }
-  return row[n];
+  return edits[n][m];
 }
 
 const char *cav_xml_nearest(const char *word, const void *names, int n, size_t stride) {
