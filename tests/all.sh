@@ -28,6 +28,8 @@ check() {
   else
     failed=$((failed + 1))
     echo "FAILED   $name ($(($(date +%s) - start)) s)"
+    # of a build the errors, which are among much else
+    grep -E 'error:|FAILED' "$out/check.log" | head -n 20 | sed 's/^/    /'
     tail -n 60 "$out/check.log" | sed 's/^/    /'
     return 1
   fi

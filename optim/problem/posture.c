@@ -238,6 +238,8 @@ static int find_middle(const poser *p, double middle[2]) {
   return n;
 }
 
+static int is_unsaid(const double way[3]) { return way[0] == 0 && way[1] == 0 && way[2] == 0; }
+
 // way of a part of a limb less the one that is wanted; row [3]
 static void way_rows(const poser *p, int limb, int lower, double *row) {
   const double *stated = p->shape->limb[limb][lower];
@@ -245,8 +247,8 @@ static void way_rows(const poser *p, int limb, int lower, double *row) {
   origin(p, lower ? p->middle[limb] : p->first[limb], a);
   origin(p, lower ? p->end[limb] : p->middle[limb], b);
   const double *left_as_right = limb % 2 ? p->shape->limb[limb - 1][lower] : stated;
-  if (!stated[0] && !stated[1] && !stated[2]) stated = left_as_right;
-  if (!stated[0] && !stated[1] && !stated[2]) stated = hanging[lower];
+  if (is_unsaid(stated)) stated = left_as_right;
+  if (is_unsaid(stated)) stated = hanging[lower];
   const double seen[3] = {stated[0], side * (stated[1] + p->spread), stated[2]};
   for (int i = 0; i < 3; i++) {
     way[i] = seen[0] * p->axis[0][i] + seen[1] * p->axis[1][i] + seen[2] * p->axis[2][i];
