@@ -54,6 +54,7 @@ static int offers(const cav_problem *p, const char *names) {
   int n;
   CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK);
   for (int i = 0; i < n; i++) strcat(strcat(text, i ? " " : ""), strategy[i].name);
+  cav_strategies_clear(strategy, n);
   if (!strcmp(text, names)) return 1;
   fprintf(stderr, "    '%s', expected '%s'\n", text, names);
   return 0;
@@ -276,6 +277,7 @@ static void check_order(cav_problem *p) {
     printf("costs differ by %.1g\n", fabs(round->cost / straight->cost - 1));
     CHECK_NEAR(round->cost, straight->cost, 1e-6 * straight->cost);
   }
+  cav_strategies_clear(strategy, n);
   cav_solution_free(straight);
   cav_solution_free(round);
   p->order = CAV_ORDER_MIDPOINT;
@@ -756,6 +758,7 @@ static void test_detour(void) {
     cav_error error = {0};
     int n;
     CHECK(cav_strategy_list(stated, strategy, &n) == CAV_OK && strategy[0].stated && !strategy[0].nswing);
+    cav_strategies_clear(strategy, n);
     CHECK(cav_strategy_list(p, strategy, &n) == CAV_OK && (strategy[0].nswing == 7) == (k < 2));
     // nearer to the goal's posture, by the same guess
     const cav_strategy *posture = find(strategy, n, "posture");

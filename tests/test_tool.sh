@@ -479,6 +479,21 @@ sed 's/range="0 150"/range="10 150"/' monopod.xml >bent.xml
 sed 's/model="monopod.xml"/model="bent.xml"/; s/<start key="stand" height="floor"/<start height="floor"/' hop.xml >units.xml
 run 2 inspect units.xml
 says err "in the model's own configuration, with which a posture without 'key' begins; key=\"stand\""
+# where nothing has to be met, and where nothing is driven, that is told
+echo '<problem name="idle" model="monopod.xml"><horizon duration="1" timestep="0.02"/><start><joint name="knee" degrees="1"/></start></problem>' >idle.xml
+run 0 inspect idle.xml
+says out "note: no term has to be met"
+run 0 inspect hop.xml
+check "a goal that is asked for is one" sh -c '! grep -q "no term has to be met" out'
+echo '<mujoco><worldbody><body><freejoint/><geom size=".1" mass="1"/></body></worldbody></mujoco>' >loose.xml
+run 0 inspect loose.xml
+says out "nothing is driven: the model has no actuator"
+sed 's/key="stand" height="floor"/key="sitting"/' hop.xml >units.xml
+run 2 inspect units.xml
+says err "there is 'stand'"
+sed 's/component="z" relative="goal" target=".3"/component="z" relative="goal" target="0 0 .3"/' hop.xml >units.xml
+run 2 inspect units.xml
+says err "expected 1 number, of the component, got 3"
 # a little beyond in radians is no slip of units
 sed 's/<joint name="knee" degrees="60"/<joint name="knee" pos="2.65"/' hop.xml >units.xml
 run 2 inspect units.xml
@@ -506,6 +521,7 @@ run 2 inspect units.xml
 check "a little beyond is no slip of sign" sh -c '! grep -q "other sign" err'
 run 0 solve hop.xml --threads 1
 says err 'strategy near-1   with <force weight="1"/>'
+check "the cost is told" grep -q '^  solved in [0-9.]* s, [0-9]* iterations, cost [0-9.]*$' out
 says out 'strategy repaired: not as the problem states it, but with <force weight="1"/>'
 says hop.result/strategies.csv "near-1,1,certified"
 says out "strategies were tried, in "
@@ -692,7 +708,7 @@ run 0 inspect falls.xml
 check "a start in the air" grep -qE "^note: at the start 'torso' touches nothing and is at rest, [0-9.]+ m above what is below it: it falls" out
 sed 's/><root[^>]*><.start>/ height="floor"\/>/' falls.xml >stands.xml
 run 0 inspect stands.xml
-check "what stands is not told of" sh -c '! grep -q "^note" out'
+check "what stands is not told of" sh -c '! grep -q "^note: at" out'
 # a trunk bent by 80 degrees over straight legs
 sed 's/<start key="stand" height="floor"\/>/<start key="stand" height="floor"><root pos="0 0 1" euler="0 80 0"\/><joint name="hip_y_right" degrees="-85"\/><joint name="hip_y_left" degrees="-85"\/><\/start>/' stands.xml >leans.xml
 run 0 inspect leans.xml

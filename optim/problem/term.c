@@ -412,7 +412,10 @@ static cav_status sensor_target(const cav_problem_reader *reader, const cav_xml_
   const cav_xml_value *given = cav_xml_get(node, "target");
   int rotation = term->sensor.dim == 4, one = term->component >= 0 && !rotation, wanted = one ? 1 : term->sensor.dim;
   if (given->count != wanted) {
-    return cav_xml_fail(reader->error, node, "target", "expected %d number%s, got %d", wanted, wanted > 1 ? "s" : "",
+    return cav_xml_fail(reader->error, node, "target", "expected %d number%s%s, got %d", wanted, wanted > 1 ? "s" : "",
+                        one        ? ", of the component"
+                        : rotation ? ", a quaternion w x y z"
+                                   : "",
                         given->count);
   }
   cav_xml_reals(node, "target", target + (one ? term->component : 0), wanted);

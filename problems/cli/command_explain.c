@@ -95,7 +95,9 @@ static char *told_of_repair(const char *folder) {
     if (!stated) stated = strdup(t.reason);
     if (!t.kept || !*t.changed || !stated || !(told = malloc(strlen(t.changed) + strlen(stated) + 120))) continue;
     sprintf(told, "this motion is not of the problem as it was stated, but with %s; as stated it misses: %s", t.changed,
-            *stated ? stated : "a target");
+            !*stated                        ? "a target"
+            : strncmp(stated, "misses ", 7) ? stated
+                                            : stated + 7);
   }
   cav_tried_close(&t);
   free(stated);

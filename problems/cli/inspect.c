@@ -324,6 +324,8 @@ static void print_costs(const cav_model *m) {
 static void print_actuators(const cav_model *m) {
   int planned = 0;
   for (int i = 0; i < m->nu; i++) planned += cav_actuator_unplannable(m, i) == NULL;
+  if (!m->nu && m->nv)
+    printf("\nnothing is driven: the model has no actuator, gravity, springs and contacts alone move it\n");
   if (!m->nu) return;
   printf("\nmotions can be planned with %d of %d actuators\n", planned, m->nu);
   for (int i = 0; i < m->nu; i++) {
@@ -593,6 +595,13 @@ static cav_status print_model(const cav_model *m, const cav_problem *p, cav_erro
   return CAV_OK;
 }
 
+// whether achieved needs nothing, and no constraint says what has to hold
+static int asks_nothing(const cav_problem *p) {
+  for (int i = 0; i < p->nterm; i++)
+    if (p->term[i].use != CAV_USE_COST || cav_term_tolerances(p, &p->term[i], 0, NULL, NULL)) return 0;
+  return !p->cycle.on;
+}
+
 int cav_command_inspect(const cav_command_line *line) {
   cav_error error = {0};
   cav_command_scene scene;
@@ -604,6 +613,11 @@ int cav_command_inspect(const cav_command_line *line) {
     if (!status) status = print_problem(scene.problem, &error);
   }
   if (!status) status = print_model(scene.model, scene.problem, &error);
+  if (!status && scene.problem && asks_nothing(scene.problem))
+    printf(
+        "\nnote: no term has to be met: <goal> is where the guess ends; <posture dofs=\"all\" at=\"end\" "
+        "weight=\"900\"/> in <cost> "
+        "asks for it\n");
   // the verdict once more, where nothing buries it
   if (!status && scene.problem)
     printf(proofs ? "\nimpossible, as the first lines say: %s\n" : "\nnothing proves it impossible: cavort solve %s\n",

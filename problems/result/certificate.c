@@ -153,7 +153,9 @@ void cav_certificate_print(FILE *out, const cav_problem *problem, const cav_verd
             line[i].passed < 0 ? "" : mark[line[i].passed]);
   }
   if (report) print_targets(out, problem, report);
-  if (!isnan(v->solve_seconds)) fprintf(out, "  solved in %.1f s, %d iterations\n", v->solve_seconds, v->iterations);
+  if (!isnan(v->solve_seconds)) fprintf(out, "  solved in %.1f s, %d iterations", v->solve_seconds, v->iterations);
+  fprintf(out, "%scost %.6g", isnan(v->solve_seconds) ? "  " : ", ", v->cost);
+  fprintf(out, problem->duration_most > 0 ? ", duration %.8g s\n" : "\n", v->duration);
   char optimality[32];
   write_apart(optimality, 1, v->optimality, CAV_TOLERANCE_OPTIMAL);
   fputs(cav_verdict_feasible(v) ? "feasible" : "NOT feasible", out);
