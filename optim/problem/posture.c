@@ -137,7 +137,7 @@ typedef struct poser {
   int grounded;    // whether the ground counts
   double *q0, *q, *step;
   double off, aside,
-      overlap; // of the posture looked at last: of what is on the ground, of the centre of mass, of links, m
+      depth; // of the posture looked at last: of what is on the ground, of the centre of mass, of links, m
 } poser;
 
 static const shape *find_shape(const char *name) {
@@ -280,17 +280,8 @@ static void ground_rows(poser *p, double *row) {
   }
 }
 
-// how deep links are inside each other at the posture looked at last, all pairs, root of squares
-static double find_overlap(const poser *p) {
-  const cav_model *m = p->model;
-  const cav_state *state = p->state;
-  double sum = 0;
-  for (int i = 0; i < state->ncontact; i++) {
-    const cav_contact *c = &state->contact[i];
-    if (!m->pair[c->pair].external && c->dist < 0) sum += c->dist * c->dist;
-  }
-  return sqrt(sum);
-}
+// how deep links are inside each other at the posture looked at last, all pairs
+static double find_depth(const poser *p) { return cav_posture_depth(p->model, p->state, CAV_DEPTH_ALL); }
 
 enum { OTHER_ROWS = 12 + 6 * LIMBS + 4 + PARTS + 3 }; // beside one for each dof
 
@@ -323,8 +314,8 @@ static cav_status rows(void *user, const double *q, double *row) {
   }
   if (p->grounded) ground_rows(p, row + n);
   n += PARTS + 2;
-  p->overlap = p->state->options.contact ? find_overlap(p) : 0;
-  row[n++] = length_weight * p->overlap;
+  p->depth = p->state->options.contact ? find_depth(p) : 0;
+  row[n++] = length_weight * p->depth;
   assert(n == OTHER_ROWS);
   cav_difference(m, p->q0, q, 1, p->step);
   for (int d = 0; d < m->nv; d++) {
@@ -395,7 +386,7 @@ static cav_status search(poser *p) {
     status = cav_posture_find(&search);
     p->state->options.contact = 1;
     if (!status) status = cav_position(p->model, p->state, p->q);
-    if (status || find_overlap(p) <= touching) return status;
+    if (status || find_depth(p) <= touching) return status;
   }
   return status ? status : cav_posture_find(&search);
 }
@@ -416,12 +407,12 @@ static cav_status pose(poser *p, char *why) {
   int contact = p->state->options.contact;
   status = search(p);
   p->state->options.contact = contact;
-  if (status || fmax(fmax(p->off, p->aside), p->overlap) <= level) return status;
+  if (status || fmax(fmax(p->off, p->aside), p->depth) <= level) return status;
   snprintf(
       why, 200,
       "none was found (%s): what is on the ground is %.2g m off it, the centre of mass %.2g m from its place, links "
       "are %.2g m inside each other",
-      p->shape->meaning, p->off, p->aside, p->overlap);
+      p->shape->meaning, p->off, p->aside, p->depth);
   return CAV_BAD_INPUT;
 }
 

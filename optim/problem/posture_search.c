@@ -33,6 +33,17 @@ void cav_posture_clip(const cav_model *m, double *q) {
   }
 }
 
+double cav_posture_depth(const cav_model *m, const cav_state *state, cav_depth of) {
+  double deepest = 0, squares = 0;
+  for (int i = 0; i < state->ncontact; i++) {
+    const cav_contact *c = &state->contact[i];
+    if (m->pair[c->pair].external) continue;
+    double depth = fmax(-c->dist, 0);
+    deepest = fmax(deepest, depth), squares += depth * depth;
+  }
+  return of == CAV_DEPTH_DEEPEST ? deepest : sqrt(squares);
+}
+
 // whether a dof is at an end of its range and would go beyond it
 static int is_pinned(const cav_posture_search *s, int d, double way) {
   const cav_joint *joint = &s->model->joint[s->model->dof[d].joint];

@@ -19,6 +19,12 @@ typedef struct cav_posture_search {
 /// CAV_NO_MEMORY.
 cav_status cav_posture_find(cav_posture_search *search);
 
+/// How deep links are inside each other: of the deepest pair, or root of the sum of squares over all of them.
+typedef enum cav_depth { CAV_DEPTH_DEEPEST, CAV_DEPTH_ALL } cav_depth;
+
+/// It, m, by the contacts that the state has.
+double cav_posture_depth(const cav_model *model, const cav_state *state, cav_depth of);
+
 /// Brings hinges and slides of q [nq] into these ranges.
 void cav_posture_clip(const cav_model *model, double *q);
 

@@ -192,16 +192,12 @@ static cav_status rows(void *user, const double *q, double *row) {
   return CAV_OK;
 }
 
-// how deep links are inside each other at s->q
-static cav_status find_overlap(const stander *s, double *deepest) {
-  cav_state *state = s->state;
-  int contact = state->options.contact;
-  state->options.contact = 1;
-  cav_status status = cav_position(s->model, state, s->q);
-  state->options.contact = contact;
-  *deepest = 0;
-  for (int i = 0; i < state->ncontact && !status; i++)
-    if (!s->model->pair[state->contact[i].pair].external) *deepest = fmax(*deepest, -state->contact[i].dist);
+// the contacts at s->q
+static cav_status find_contacts(const stander *s) {
+  int contact = s->state->options.contact;
+  s->state->options.contact = 1;
+  cav_status status = cav_position(s->model, s->state, s->q);
+  s->state->options.contact = contact;
   return status;
 }
 
@@ -212,10 +208,10 @@ static cav_status search_clear(stander *s) {
       .model = s->model, .nrow = OTHER_ROWS + s->model->nv, .q = s->q, .rows = rows, .user = s};
   cav_status status = cav_posture_find(&search);
   for (int i = 0; i < TRIES && !status && s->nfoot == 2; i++) {
-    double overlap;
-    status = find_overlap(s, &overlap);
-    if (status || overlap <= touching) break;
-    s->apart = s->width + overlap + clearance;
+    if ((status = find_contacts(s))) break;
+    double depth = cav_posture_depth(s->model, s->state, CAV_DEPTH_DEEPEST);
+    if (depth <= touching) break;
+    s->apart = s->width + depth + clearance;
     status = cav_posture_find(&search);
   }
   return status;
