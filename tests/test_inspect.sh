@@ -1,31 +1,14 @@
 #!/bin/sh
 # What inspect says of a problem before it is solved: which terms count, where start and goal touch and are too deep, which way joints move.
 # Usage: test_inspect.sh CAVORT SOURCE_ROOT
-set -u
-cavort=$(cd "$(dirname "$1")" && pwd)/$(basename "$1")
-root=$(cd "$2" && pwd)
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-checks=0
-failed=0
-check() {
-  text=$1
-  shift
-  checks=$((checks + 1))
-  "$@" && return 0
-  failed=$((failed + 1))
-  echo "failed: $text"
-}
+. "$(dirname "$0")/command.sh"
+
 # inspected STATUS ARGUMENT...: what it prints is in out and err
 inspected() {
   wanted=$1
   shift
-  "$cavort" inspect "$@" >out 2>err
-  status=$?
-  check "inspect $*: status $status, expected $wanted" [ "$status" -eq "$wanted" ]
+  run "$wanted" inspect "$@"
 }
-says() { check "says: $1" grep -qF -- "$1" out; }
 not_said() { check "does not say: $1" sh -c '! grep -qF -- "$1" out' sh "$1"; }
 
 # --- terms: names, tolerances, what achieved needs ---
@@ -48,14 +31,14 @@ cat >terms.xml <<'TEXT'
 <constraint><sensor name="level" type="framequat" body="box" at="end"/></constraint></problem>
 TEXT
 inspected 0 terms.xml
-says "costs; achieved needs those that are to be met, the rest is not asked for"
-says "  weight 900        'final': posture of all dofs to the goal at 1 s; to be met within 0.1 rad, 0.03 m (usual)"
-says "  weight 3          'near': framepos of box, z, in the frame of rod to -1.9; reported only, no within="
-says "  weight 1          'soft': touch of rod to 0; to be met within 5 N"
+says out "costs; achieved needs those that are to be met, the rest is not asked for"
+says out "  weight 900        'final': posture of all dofs to the goal at 1 s; to be met within 0.1 rad, 0.03 m (usual)"
+says out "  weight 3          'near': framepos of box, z, in the frame of rod to -1.9; reported only, no within="
+says out "  weight 1          'soft': touch of rod to 0; to be met within 5 N"
 check "over the whole horizon without within: a running cost" grep -qx "  weight 1          'free': touch of rod to 0" out
-says "'hint': framepos of rod to 0 0 1.5 at 0.5 s; reported only, within=\"any\""
-says "slip of loaded contacts of body box; these may slide by 0.2 m/s"
-says "  must be           'level': framequat of box to no rotation at 1 s; to be met within 1e-06 rad"
+says out "'hint': framepos of rod to 0 0 1.5 at 0.5 s; reported only, within=\"any\""
+says out "slip of loaded contacts of body box; these may slide by 0.2 m/s"
+says out "  must be           'level': framequat of box to no rotation at 1 s; to be met within 1e-06 rad"
 check "a name that is the element's is not repeated" grep -q "^  weight 1000       gap of" out
 
 # --- joints: what a positive change moves where ---
@@ -129,9 +112,9 @@ posture <<'TEXT'
 <start key="stand" height="floor"/><goal><root pos="0 0 1.25"/></goal>
 TEXT
 inspected 0 p.xml
-says ", touches the world with foot_right, foot_left in x "
+says out ", touches the world with foot_right, foot_left in x "
 check "the goal's pair" grep -qE "^  goal .*, deepest penetration [0-9.]+ mm: 'foot[0-9]_(right|left)' in 'floor'$" out
-says "note: the goal has geom 'foot"
+says out "note: the goal has geom 'foot"
 posture <<'TEXT'
 <start><root pos="0 0 2"/></start>
 TEXT
@@ -153,11 +136,11 @@ posture <<'TEXT'
 <start free="true"><root pos="0 0 1.2"/></start><goal key="stand" height="floor"/>
 TEXT
 inspected 0 p.xml
-says "note: the start has geom 'foot"
-says "the guess begins there, no motion does"
+says out "note: the start has geom 'foot"
+says out "the guess begins there, no motion does"
 sed -i 's/<start free="true">/<cycle translation="1 0 0"\/><start>/' p.xml
 inspected 0 p.xml
-says "the guess begins there, no motion does"
+says out "the guess begins there, no motion does"
 
 # --- a box that begins inside a table, and is not stopped by it; on it by what is told; a ball in the air ---
 
@@ -169,8 +152,8 @@ posture <<'TEXT'
 <goal key="stand" height="floor"><root joint="box" pos="1 0 .72"/><root joint="ball" pos="3 0 1"/></goal>
 TEXT
 inspected 0 p.xml
-says "note: height=\"floor\" of <goal> lowers 'box' by 0.62 m, not stopped by 'tabletop', inside which it begins: 0.080 m higher it is on that"
-says "note: height=\"floor\" of <goal> lowers 'ball' by 0.9 m; <root joint="
+says out "note: height=\"floor\" of <goal> lowers 'box' by 0.62 m, not stopped by 'tabletop', inside which it begins: 0.080 m higher it is on that"
+says out "note: height=\"floor\" of <goal> lowers 'ball' by 0.9 m; <root joint="
 sed -i 's/pos="1 0 .72"/pos="1 0 .80"/' p.xml
 inspected 0 p.xml
 not_said "tabletop', inside"

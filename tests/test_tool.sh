@@ -1,40 +1,9 @@
 #!/bin/sh
 # The command itself: exit statuses, what goes to standard output and what to standard error, folders, interruption, resuming.
 # Usage: test_tool.sh CAVORT SOURCE_ROOT [LIBRARY=SONAME...], the libraries that are loaded where they are used. Prints what is wrong and fails if anything is.
-set -u
-cavort=$(cd "$(dirname "$1")" && pwd)/$(basename "$1")
-root=$2
+. "$(dirname "$0")/command.sh"
 shift 2
 libraries=$*
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-checks=0
-failed=0
-
-# check TEXT COMMAND...: one check
-check() {
-  text=$1
-  shift
-  checks=$((checks + 1))
-  "$@" && return 0
-  failed=$((failed + 1))
-  echo "failed: $text"
-  sed 's/^/    /' out err 2>/dev/null | head -n 20
-}
-
-# run STATUS ARGUMENT...: the command ends with that status; out and err keep what it wrote
-run() {
-  wanted=$1
-  shift
-  "$cavort" "$@" >out 2>err
-  status=$?
-  check "cavort $*: status $status, expected $wanted" [ "$status" -eq "$wanted" ]
-}
-
-says() { check "$1 says: $2" grep -qF -- "$2" "$1"; }
-silent() { check "$1 is empty" [ ! -s "$1" ]; }
-has() { check "$1 exists" [ -s "$1" ]; }
 
 # --- the command line ---
 
