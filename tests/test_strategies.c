@@ -2,9 +2,10 @@
 /// guess and schedule alone; and stages of the continuation that stall: taken back, reached half way, noted. Stalls are
 /// made by the linker, which puts a region that claims one in the place of the true one.
 #include <unistd.h>
+
+#include "biped.h"
 #include "clear.h"
 #include "continuation.h"
-
 #include "scene.h"
 
 cav_status __real_cav_region_minimise(cav_region *region, cav_normal *normal, cav_transcription *tr,
@@ -25,21 +26,6 @@ cav_status __wrap_cav_region_minimise(cav_region *region, cav_normal *normal, ca
   }
   return status;
 }
-
-#define LEG(SIDE, Y, AXIS)                                                                 \
-  "<body name='thigh_" SIDE "' pos='0 " Y " -.1'><joint name='hip_" SIDE "' axis='0 " AXIS \
-  " 0' range='-100 60'/>"                                                                  \
-  "<geom type='capsule' size='.05' fromto='0 0 0 0 0 -.4' mass='5'/><body pos='0 0 -.4'>"  \
-  "<joint name='knee_" SIDE "' axis='0 " AXIS                                              \
-  " 0' range='-2 140'/>"                                                                   \
-  "<geom type='capsule' size='.04' fromto='0 0 0 0 0 -.4' mass='3'/>"                      \
-  "<geom type='sphere' size='.05' pos='0 0 -.4' mass='.5'/></body></body>"
-#define BIPED(AXIS) \
-  "<mujoco><compiler angle='degree'/><default><joint limited='true'/><motor ctrllimited='true' ctrlrange='-1 1'/>"     \
-  "</default><worldbody><geom type='plane' size='9 9 1'/><body name='trunk' pos='0 0 .95'><freejoint/>"                \
-  "<geom type='capsule' size='.1' fromto='0 0 0 0 0 .4' mass='20'/>" LEG("left", ".1", AXIS) LEG("right", "-.1", AXIS) \
-  "</body></worldbody><actuator><motor joint='hip_left' gear='100'/><motor joint='hip_right' gear='100'/>"             \
-  "<motor joint='knee_left' gear='100'/><motor joint='knee_right' gear='100'/></actuator></mujoco>"
 
 static const cav_strategy *find(const cav_strategy *strategy, int n, const char *name) {
   for (int i = 0; i < n; i++)
@@ -325,242 +311,6 @@ static void test_stalls(void) {
   cav_model_free(m);
 }
 
-// a biped with a goal and slip, and its stated strategy
-typedef struct repaired {
-  cav_model *model;
-  double q[20], v[20];
-  cav_term term[2];
-  cav_problem problem;
-  cav_strategy stated;
-} repaired;
-
-static void repaired_make(repaired *r) {
-  *r = (repaired){
-      .model = scene_load(BIPED("1")),
-      .term = {{.name = "goal", .quantity = CAV_QUANTITY_CONFIGURATION, .weight = 900, .from = 1, .to = 1, .scale = 1},
-               {.name = "slip", .quantity = CAV_QUANTITY_SLIP, .weight = 200, .to = -1, .scale = 1}}};
-  if (!CHECK(r->model != NULL)) return;
-  cav_configuration_reset(r->model, r->q);
-  r->problem = cav_problem_default(r->model);
-  r->problem.q_start = r->problem.q_goal = r->q, r->problem.v_start = r->v;
-  r->problem.term = r->term, r->problem.nterm = 2;
-  cav_strategy strategy[CAV_STRATEGIES];
-  int n;
-  CHECK(cav_strategy_list(&r->problem, strategy, &n) == CAV_OK);
-  r->stated = strategy[0];
-}
-
-// of momentum, slip and hover what is missed by most of its tolerance is mended, whichever a certificate names first
-static void check_most_missed(repaired *r) {
-  const cav_verdict base = {.achieved = 1, .closed_loop_seconds = 1};
-  static const double value[3][3] = {{0.011, 0.0101, 0.0301}, {0.0051, 0.03, 0.06}, {0.0051, 0.0101, 0.12}};
-  static const char *const changed[3] = {"order=\"momentum\"", "<last smoothing=\"0.000125\"/>", "next_gap=\"exact\""};
-  for (int k = 0; k < 3; k++) {
-    cav_verdict v = base;
-    v.momentum_defect_rms = value[k][0], v.slip_mean_m_s = value[k][1], v.hover_fraction = value[k][2];
-    cav_strategy mended;
-    int found;
-    CHECK(cav_strategy_repair(&r->problem, &r->stated, &v, 0, &mended, &found) == CAV_OK && found);
-    CHECK(!strcmp(mended.changed, changed[k]));
-    cav_strategy_clear(&mended);
-  }
-}
-
-// a target that is missed though half of the reserve was given weighs ten times as much: one at a time, and one that is held
-// over a window by the usual tolerance
-static void check_targets(repaired *r) {
-  const cav_verdict missed = {.certified = 1, .missed_terms = 1};
-  const double from = r->term[0].from;
-  for (int held = 0; held < 2; held++) {
-    cav_strategy mended;
-    int found;
-    r->term[0].from = held ? 0.5 : from;
-    CHECK(cav_strategy_repair(&r->problem, &r->stated, &missed, 1, &mended, &found) == CAV_OK && found);
-    CHECK(mended.nterm == 2 && mended.term[0].weight == 9000 && !strcmp(mended.changed, "weights of goals 10 times"));
-    cav_strategy_clear(&mended);
-  }
-  r->term[0].from = from;
-  // one that is missed by little weighs as much more as it needs, first of all; then as before
-  cav_verdict close = missed;
-  static const double by[] = {1.015, 1.9, 2.1};
-  static const char *const changed[] = {"weights of goals 2.1 times", "weights of goals 3.8 times",
-                                        "<limits effort=\"0.9\"/>"};
-  for (int k = 0; k < 3; k++) {
-    cav_strategy mended;
-    int found;
-    close.missed_most = by[k];
-    CHECK(cav_strategy_repair(&r->problem, &r->stated, &close, 0, &mended, &found) == CAV_OK && found);
-    CHECK(!strcmp(mended.changed, changed[k]));
-    cav_strategy_clear(&mended);
-    CHECK(cav_strategy_repair(&r->problem, &r->stated, &close, 1, &mended, &found) == CAV_OK && found);
-    CHECK(!strcmp(mended.changed, k < 2 ? changed[2] : "weights of goals 10 times"));
-    cav_strategy_clear(&mended);
-  }
-}
-
-// what slides on its own links is to lean on them less, before smoothing changes: what slides on the ground is not
-static void check_rubbing(repaired *r) {
-  cav_verdict leans = {.achieved = 1, .hover_fraction = 0.04, .hover_self = 0.9, .closed_loop_seconds = 1};
-  for (int self = 1; self >= 0; self--) {
-    cav_strategy mended;
-    int found;
-    leans.hover_self = self ? 0.9 : 0.1;
-    CHECK(cav_strategy_repair(&r->problem, &r->stated, &leans, 0, &mended, &found) == CAV_OK && found);
-    CHECK(!strcmp(mended.changed, self ? "<last smoothing_self=\"0.0005\"/>" : "next_gap=\"exact\""));
-    cav_strategy_clear(&mended);
-  }
-  cav_verdict slides = {.achieved = 1, .slip_mean_m_s = 0.02, .slip_self = 0.9, .closed_loop_seconds = 1};
-  for (int self = 1; self >= 0; self--) {
-    cav_strategy mended;
-    int found;
-    slides.slip_self = self ? 0.9 : 0.1;
-    CHECK(cav_strategy_repair(&r->problem, &r->stated, &slides, 0, &mended, &found) == CAV_OK && found);
-    if (self)
-      CHECK(mended.nterm == 3 && mended.term[2].quantity == CAV_QUANTITY_SELF_FORCE &&
-            !strcmp(mended.changed, "<self_force weight=\"1000\"/>"));
-    if (!self) CHECK(!strcmp(mended.changed, "<last smoothing=\"0.000125\"/>"));
-    cav_strategy_clear(&mended);
-  }
-}
-
-// closed loops that are lost: contact forces cost something, then half the step
-static void check_loops(repaired *r) {
-  const cav_verdict lost = {.achieved = 1};
-  cav_problem taken;
-  cav_strategy once, twice;
-  int found;
-  CHECK(cav_strategy_repair(&r->problem, &r->stated, &lost, 0, &once, &found) == CAV_OK && found);
-  cav_strategy_apply(&r->problem, &once, &taken);
-  CHECK(taken.nterm == 3 && taken.term[2].quantity == CAV_QUANTITY_FORCE && taken.term[2].weight == 1);
-  CHECK(taken.timestep == r->problem.timestep && !strcmp(once.changed, "<force weight=\"1\"/>"));
-  CHECK(cav_strategy_repair(&r->problem, &once, &lost, 1, &twice, &found) == CAV_OK && found);
-  cav_strategy_apply(&r->problem, &twice, &taken);
-  CHECK(taken.nterm == 3 && taken.timestep == r->problem.timestep / 2 && strstr(twice.changed, "<force") &&
-        strstr(twice.changed, "timestep"));
-  cav_strategy again;
-  // neither twice
-  for (int k = 0; k < 2; k++) {
-    CHECK(cav_strategy_repair(&r->problem, &twice, &lost, k, &again, &found) == CAV_OK && found);
-    CHECK(!strcmp(again.changed, twice.changed));
-    cav_strategy_clear(&again);
-  }
-  cav_strategy_clear(&once), cav_strategy_clear(&twice);
-}
-
-// near a record contact forces are what is looked for, and cost nothing; a residual beyond its bound has no cure
-static void check_record(repaired *r) {
-  cav_verdict lost = {.achieved = 1};
-  cav_strategy once;
-  int found;
-  r->term[1].quantity = CAV_QUANTITY_TRACK;
-  CHECK(cav_strategy_repair(&r->problem, &r->stated, &lost, 0, &once, &found) == CAV_OK && found);
-  CHECK(once.nterm == 0 && once.timestep == r->problem.timestep / 2);
-  cav_strategy_clear(&once);
-  // where forces are missing near one the step is halved, feet may slide, and contacts end softer unless they are soft
-  cav_term near[] = {r->term[0], r->term[1], r->term[1]};
-  near[2].quantity = CAV_QUANTITY_SLIP;
-  r->problem.term = near, r->problem.nterm = 3;
-  cav_verdict airy = lost;
-  airy.unactuated_force_max = 0.01;
-  CHECK(cav_strategy_repair(&r->problem, &r->stated, &airy, 0, &once, &found) == CAV_OK && found);
-  CHECK(once.nterm == 0 && once.timestep == r->problem.timestep / 2);
-  cav_strategy_clear(&once);
-  if (!CHECK(cav_strategy_repair(&r->problem, &r->stated, &airy, 1, &once, &found) == CAV_OK && found &&
-             once.nterm == 3))
-    return;
-  CHECK(once.term[2].weight == 8 && near[2].weight == 200 && !strcmp(once.changed, "<slip weight=\"8\"/>"));
-  cav_strategy_clear(&once);
-  CHECK(cav_strategy_repair(&r->problem, &r->stated, &airy, 2, &once, &found) == CAV_OK && found);
-  CHECK(once.schedule.last.softness == 6 * r->problem.schedule.last.softness &&
-        once.schedule.last.smoothing == 2 * r->problem.schedule.last.smoothing &&
-        strstr(once.changed, "softness=\"0.03\"") && strstr(once.changed, "smoothing=\"0.001\""));
-  cav_strategy_clear(&once);
-  r->stated.schedule.last.softness = 0.03;
-  CHECK(cav_strategy_repair(&r->problem, &r->stated, &airy, 2, &once, &found) == CAV_OK &&
-        once.schedule.last.softness == 0.03);
-  r->stated.schedule.last.softness = r->problem.schedule.last.softness;
-  r->problem.term = r->term, r->problem.nterm = 2;
-  cav_strategy_clear(&once);
-  r->term[1].quantity = CAV_QUANTITY_SLIP;
-  lost.residual_fraction_max = 0.11, lost.residual_within = 0.1;
-  CHECK(cav_strategy_repair(&r->problem, &r->stated, &lost, 0, &once, &found) == CAV_OK && !found);
-}
-
-// what hangs in the air: the exact gap, then forces that fade sooner, then half the step; what slips gets them first, then ten
-// times the weight
-static void check_slides(repaired *r) {
-  cav_verdict hovers = {.achieved = 1}, slips = hovers;
-  slips.slip_mean_m_s = 0.02;
-  cav_strategy once;
-  int found;
-  hovers.hover_fraction = 0.1;
-  CHECK(cav_strategy_repair(&r->problem, &r->stated, &hovers, 1, &once, &found) == CAV_OK && found);
-  CHECK(once.schedule.last.smoothing == r->problem.schedule.last.smoothing / 4 &&
-        once.schedule.last.softness == r->problem.schedule.last.softness && once.timestep == r->stated.timestep);
-  CHECK(!strcmp(once.changed, "<last smoothing=\"0.000125\"/>"));
-  cav_strategy_clear(&once);
-  CHECK(cav_strategy_repair(&r->problem, &r->stated, &slips, 0, &once, &found) == CAV_OK && found);
-  CHECK(once.schedule.last.smoothing == r->problem.schedule.last.smoothing / 4);
-  cav_strategy_clear(&once);
-  CHECK(cav_strategy_repair(&r->problem, &r->stated, &slips, 1, &once, &found) == CAV_OK && found);
-  CHECK(once.nterm == 3 && once.term[1].weight + once.term[2].weight == 2000);
-  cav_strategy_clear(&once);
-}
-
-// a goal that is missed gets effort, then weight; what is good needs nothing
-static void check_goals(repaired *r) {
-  cav_verdict hangs = {.certified = 1}, strained = {.achieved = 1};
-  cav_strategy once, twice;
-  int found;
-  CHECK(cav_strategy_repair(&r->problem, &r->stated, &hangs, 0, &once, &found) == CAV_OK && found &&
-        once.effort_limit == 0.9);
-  CHECK(cav_strategy_repair(&r->problem, &once, &hangs, 1, &twice, &found) == CAV_OK && found &&
-        twice.term[0].weight == 9000);
-  CHECK(twice.term[1].weight == 200 && !strcmp(twice.changed, "weights of goals 10 times, <limits effort=\"0.9\"/>"));
-  cav_strategy_clear(&once), cav_strategy_clear(&twice);
-  // effort is given once, unless limits are what is missed; of goals those grow that are missed, by name
-  once = r->stated;
-  once.effort_limit = 0.9;
-  CHECK(cav_strategy_repair(&r->problem, &once, &hangs, 0, &twice, &found) == CAV_OK && found &&
-        twice.effort_limit == 0.9);
-  cav_strategy_clear(&twice);
-  strained.limit_violation_max = 0.03;
-  CHECK(cav_strategy_repair(&r->problem, &once, &strained, 0, &twice, &found) == CAV_OK && found);
-  CHECK_NEAR(twice.effort_limit, 0.95, 1e-15);
-  cav_strategy_clear(&twice);
-  cav_term two[] = {r->term[0], r->term[0], r->term[1]};
-  two[1].name = "other";
-  r->problem.term = two, r->problem.nterm = 3;
-  hangs.missed_terms = 2;
-  CHECK(cav_strategy_repair(&r->problem, &r->stated, &hangs, 1, &once, &found) == CAV_OK && found && once.nterm == 3);
-  CHECK(once.term[0].weight == 900 && once.term[1].weight == 9000 && once.term[2].weight == 200);
-  CHECK(!strcmp(once.changed, "weight of 'other' 10 times"));
-  cav_strategy_clear(&once);
-  r->problem.term = r->term, r->problem.nterm = 2, hangs.missed_terms = 0;
-  // less effort than usual was asked for
-  r->problem.effort_limit = 0.3;
-  CHECK(cav_strategy_repair(&r->problem, &r->stated, &hangs, 0, &once, &found) == CAV_OK &&
-        !strstr(once.changed, "effort"));
-  cav_strategy_clear(&once);
-  r->problem.effort_limit = 0.8;
-  hangs.achieved = 1;
-  CHECK(cav_strategy_repair(&r->problem, &r->stated, &hangs, 0, &once, &found) == CAV_OK && !found);
-  CHECK(r->problem.nterm == 2 && r->term[0].weight == 900 && r->term[1].weight == 200 &&
-        r->problem.effort_limit == 0.8);
-}
-
-// the usual cure of what is missed first, one more at each call; the problem stays as it was
-static void test_repair(void) {
-  void (*const check[])(repaired *) = {check_loops, check_most_missed, check_record, check_slides,
-                                       check_goals, check_targets,     check_rubbing};
-  for (size_t i = 0; i < sizeof check / sizeof *check; i++) {
-    repaired r;
-    repaired_make(&r);
-    if (r.model) check[i](&r);
-    cav_model_free(r.model);
-  }
-}
-
 // a height that is asked for above the way from start to goal: an arc about that time, ballistic
 static void test_leap(void) {
   cav_model *m = scene_load(BIPED("1"));
@@ -806,7 +556,6 @@ int main(void) {
   test_gait(BIPED("-1"), -1, 2);
   test_four_legs();
   test_stalls();
-  test_repair();
   test_leap();
   test_solids();
   test_detour();
