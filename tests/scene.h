@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "cavort/dynamics.h"
+#include "cavort/problem.h"
 #include "check.h"
 
 /// Free, ball, slide and hinge joints, several on one body, welded children, two trees, springs, damping, armature,
@@ -51,6 +52,14 @@ static inline void scene_write(const char *folder, const char *name, const char 
   if (!file) return;
   fputs(text, file);
   fclose(file);
+}
+
+/// The problem of a text, as folder/problem.xml; NULL with what is wrong with it.
+static inline cav_problem *scene_problem(const char *folder, const char *text, cav_error *error) {
+  char path[400];
+  scene_write(folder, "problem.xml", text);
+  snprintf(path, sizeof path, "%.250s/problem.xml", folder);
+  return cav_problem_load(path, NULL, error);
 }
 
 /// Removes a folder of a model and a problem.

@@ -1,12 +1,11 @@
 /// Postures by name: humanoids and quadrupeds, most by others, kneel, sit and lie as the words say, by arithmetic of its own:
 /// what is upright, what is low, what is on the ground and over what the centre of mass is. Names in problem files.
-#include <unistd.h>
-
 #include "cavort/cavort.h"
 #include "check.h"
 #include "posture.h"
 #include "role.h"
 #include "scene.h"
+#include "shipped.h"
 
 /// What a posture shows.
 typedef struct sight {
@@ -121,17 +120,9 @@ static void check_meaning(const cav_model *m, cav_state *state, const cav_roles 
 }
 
 static void check_model(const char *path, int floating, const char *refused) {
+  cav_model *m = shipped_load(path, floating);
+  if (!m) return;
   cav_error error = {0};
-  cav_load_options options = cav_load_options_default();
-  options.floating = floating;
-  cav_model *m = cav_model_load_with(path, &options, &error);
-#ifndef CAVORT_HAVE_QHULL
-  if (!m && strstr(error.text, "needs Qhull")) return; // robots with meshes, in a build without them
-#endif
-  if (!CHECK(m != NULL)) {
-    fprintf(stderr, "    %s\n", error.text);
-    return;
-  }
   cav_state *state = cav_state_new(m);
   cav_roles roles;
   CHECK(cav_roles_find(m, state, &roles) == CAV_OK);
@@ -157,14 +148,12 @@ static void check_model(const char *path, int floating, const char *refused) {
 }
 
 static cav_problem *load(const char *folder, const char *start, cav_error *error) {
-  char text[1000], path[200];
+  char text[1000];
   snprintf(
       text, sizeof text,
       "<problem name='p' model='%s/problems/models/humanoid.xml'><horizon duration='.2' timestep='.05'/>%s</problem>",
       CAVORT_SOURCE_ROOT, start);
-  scene_write(folder, "p.xml", text);
-  snprintf(path, sizeof path, "%s/p.xml", folder);
-  return cav_problem_load(path, NULL, error);
+  return scene_problem(folder, text, error);
 }
 
 // after the model's keyframes and the file's poses, by the last name of a list
@@ -196,17 +185,14 @@ int main(void) {
                {"dm_control/quadruped.xml", 1, 0, ""},
                {"unitree/g1/g1_29dof.xml", 1, 0, ""},
                {"menagerie/unitree_go1/scene.xml", 1, 0, ""}};
-  char folder[] = "/tmp/cavort_posture_XXXXXX", path[5000];
-  const char *shared = check_shared_models();
-  for (size_t i = 0; i < sizeof model / sizeof *model; i++) {
-    snprintf(path, sizeof path, "%s%s/%s", model[i].shared ? shared ? shared : "" : CAVORT_SOURCE_ROOT,
-             model[i].shared ? "" : "/problems/models", model[i].name);
-    if (!model[i].shared || (shared && access(path, R_OK) == 0)) check_model(path, model[i].floating, model[i].refused);
-  }
+  char folder[] = "/tmp/cavort_posture_XXXXXX", path[SHIPPED_PATH];
+  for (size_t i = 0; i < sizeof model / sizeof *model; i++)
+    if (shipped_path(model[i].name, model[i].shared, path))
+      check_model(path, model[i].floating, model[i].refused);
+    else
+      CHECK(model[i].shared);
   if (!CHECK(mkdtemp(folder) != NULL)) return check_result();
   check_files(folder);
-  snprintf(path, sizeof path, "%s/p.xml", folder);
-  unlink(path);
-  rmdir(folder);
+  scene_remove(folder);
   return check_result();
 }

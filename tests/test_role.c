@@ -7,6 +7,7 @@
 #include "check.h"
 #include "role.h"
 #include "scene.h"
+#include "shipped.h"
 #include "stand.h"
 
 static char folder[] = "/tmp/cavort_role_XXXXXX";
@@ -29,17 +30,17 @@ typedef struct expectation {
     [CAV_ROLE_FRONT_LEFT_FOOT] = fl, [CAV_ROLE_BACK_RIGHT_FOOT] = br, [CAV_ROLE_BACK_LEFT_FOOT] = bl \
   }
 
-static const expectation shipped[] = {
-    {"humanoid", 0, CAV_BUILD_BIPED,
+static const expectation own_models[] = {
+    {"humanoid.xml", 0, CAV_BUILD_BIPED,
      BIPED("pelvis", "torso", "head", "foot_right", "foot_left", "hand_right", "hand_left")},
-    {"robot", 0, CAV_BUILD_BIPED,
+    {"robot.xml", 0, CAV_BUILD_BIPED,
      BIPED("pelvis", "chest", "skull", "foot_right", "foot_left", "hand_right", "hand_left")},
-    {"walker", 0, CAV_BUILD_BIPED, BIPED("torso", "torso", NULL, "foot_right", "foot_left", NULL, NULL)},
-    {"quadruped", 0, CAV_BUILD_QUADRUPED,
+    {"walker.xml", 0, CAV_BUILD_BIPED, BIPED("torso", "torso", NULL, "foot_right", "foot_left", NULL, NULL)},
+    {"quadruped.xml", 0, CAV_BUILD_QUADRUPED,
      QUADRUPED("trunk", "shank_front_right", "shank_front_left", "shank_back_right", "shank_back_left")},
-    {"arm", 0, CAV_BUILD_ARMS, {[CAV_ROLE_HAND] = "flange"}},
-    {"cheetah", 0, CAV_BUILD_NONE, {NULL}},
-    {"hopper", 0, CAV_BUILD_NONE, {NULL}},
+    {"arm.xml", 0, CAV_BUILD_ARMS, {[CAV_ROLE_HAND] = "flange"}},
+    {"cheetah.xml", 0, CAV_BUILD_NONE, {NULL}},
+    {"hopper.xml", 0, CAV_BUILD_NONE, {NULL}},
 };
 
 static const expectation shared_models[] = {
@@ -197,17 +198,8 @@ static void check_stand(const cav_model *m, cav_state *state, const char *name) 
 }
 
 static void check_model(const char *path, const expectation *e) {
-  cav_error error = {0};
-  cav_load_options options = cav_load_options_default();
-  options.floating = e->floating;
-  cav_model *m = cav_model_load_with(path, &options, &error);
-#ifndef CAVORT_HAVE_QHULL
-  if (!m && strstr(error.text, "needs Qhull")) return; // robots with meshes, in a build without them
-#endif
-  if (!CHECK(m != NULL)) {
-    fprintf(stderr, "    %s\n", error.text);
-    return;
-  }
+  cav_model *m = shipped_load(path, e->floating);
+  if (!m) return;
   cav_state *state = cav_state_new(m);
   check_roles(m, state, e);
   if (e->build == CAV_BUILD_BIPED || e->build == CAV_BUILD_QUADRUPED) check_stand(m, state, e->model);
@@ -318,11 +310,9 @@ static cav_problem *load(const char *model, const char *body, cav_error *error) 
       "<problem name='p' model='%s/problems/models/%s.xml'><horizon duration='.2' timestep='.05'/>"
       "<start key='stand' height='floor'/><cost><sensor type='framepos' %s target='0 0 1' weight='1'/></cost>"
       "</problem>";
-  char text[5000], path[100];
+  char text[5000];
   snprintf(text, sizeof text, pattern, CAVORT_SOURCE_ROOT, model, body);
-  scene_write(folder, "p.xml", text);
-  snprintf(path, sizeof path, "%s/p.xml", folder);
-  return cav_problem_load(path, NULL, error);
+  return scene_problem(folder, text, error);
 }
 
 static void refuse(const char *model, const char *body, const char *first, const char *second) {
@@ -362,25 +352,17 @@ static void check_files(void) {
     cav_state_free(state);
   }
   cav_problem_free(p);
-  char path[100];
-  snprintf(path, sizeof path, "%s/p.xml", folder);
-  unlink(path);
-  rmdir(folder);
+  scene_remove(folder);
 }
 
 int main(void) {
   if (!CHECK(mkdtemp(folder) != NULL)) return check_result();
-  char path[5000];
-  for (size_t i = 0; i < sizeof shipped / sizeof *shipped; i++) {
-    snprintf(path, sizeof path, "%s/problems/models/%s.xml", CAVORT_SOURCE_ROOT, shipped[i].model);
-    check_model(path, &shipped[i]);
-  }
-  const char *shared = check_shared_models();
-  for (size_t i = 0; shared && i < sizeof shared_models / sizeof *shared_models; i++) {
-    snprintf(path, sizeof path, "%s/%s", shared, shared_models[i].model);
-    if (access(path, R_OK) == 0) check_model(path, &shared_models[i]);
-  }
-  if (!shared) printf("the shared models are absent: roles are not tried on them\n");
+  char path[SHIPPED_PATH];
+  for (size_t i = 0; i < sizeof own_models / sizeof *own_models; i++)
+    if (CHECK(shipped_path(own_models[i].model, 0, path))) check_model(path, &own_models[i]);
+  for (size_t i = 0; i < sizeof shared_models / sizeof *shared_models; i++)
+    if (shipped_path(shared_models[i].model, 1, path)) check_model(path, &shared_models[i]);
+  if (!check_shared_models()) printf("the shared models are absent: roles are not tried on them\n");
   check_oddities();
   check_files();
   return check_result();
