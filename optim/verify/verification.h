@@ -47,6 +47,10 @@ void cav_verification_end(cav_verification *verification);
 /// The claimed law at a knot: its stops is of the last one of a motion that closes at rest.
 cav_options cav_verification_law(const cav_verification *verification, int t);
 
+/// Writes why a call failed, by printf's rules, unless error is NULL; gives the status.
+cav_status cav_verification_fail(cav_error *error, cav_status status, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
 /// Keeps the larger of the two; a value that is not a number counts as larger. Writes where by printf's rules.
 void cav_metric_note(cav_metric *metric, double value, int knot, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
@@ -260,7 +264,7 @@ cav_status cav_replay_own(const cav_verification *verification, int finer, const
                           const cav_disturbance *disturbance, struct cav_follow *follow);
 
 /// The closed loops of a motion with its gains, for their choice: those of a verification, the last of which start off,
-/// and then two small pushes.
+/// and then two small pushes. closed_loop.c.
 enum {
   CAV_LOOP_OWN,
   CAV_LOOP_FINE,
@@ -282,6 +286,14 @@ cav_status cav_closed_loop(const cav_verification *verification, int loop, const
 /// where it is lost in one, the first of these. known: those of all loops before the pushes, or NULL: they are run.
 cav_status cav_closed_loops_own(const cav_verification *verification, const struct cav_follow *known,
                                 const double *gain_q, const double *gain_v, struct cav_follow *follow);
+
+/// The loops that a certificate asks for, into closed and own of a replay; followed, or NULL: what is known of them.
+cav_status cav_closed_loops_certify(const cav_verification *verification, const cav_followed *followed,
+                                    const double *gain_q, const double *gain_v, cav_replay *replay);
+
+/// N s of the largest push along x and y, either way, with which a certified motion still follows; NaN: nothing can be pushed.
+cav_status cav_closed_loops_push(const cav_verification *verification, const double *gain_q, const double *gain_v,
+                                 double *survived);
 
 /// What loops before the pushes have done with a motion that is no cycle, its law and gains, copied; NULL: no memory. Then
 /// theirs where all that a loop reads is the same to the bit, else NULL. followed.c.

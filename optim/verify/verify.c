@@ -1,16 +1,14 @@
 /// Certifies a motion from its knots alone, with code apart from the optimiser's: velocities, forces and contacts are
 /// recomputed from q; what a certificate requires is measured, and the first tolerance that is broken is named with its
-/// knot, body and size. METHOD.md, 6. Momentum: momentum_balance.c; hard terms: constraint_check.c; depths, between knots
-/// too: penetration.c; forward simulation: replay.c. It does not decide on the cost.
+/// knot, body and size. METHOD.md, 6. What is admitted: verification.c; momentum: momentum_balance.c; hard terms:
+/// constraint_check.c; depths, between knots too: penetration.c; forward simulation: replay.c, closed_loop.c. It does not
+/// decide on the cost.
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "verification.h"
-
-static const double usual_gravity = 9.81; // m/s^2, unit of forces where the model has none
 
 /// What was found at the knots.
 typedef struct metrics {
@@ -22,190 +20,10 @@ typedef struct metrics {
   double stop; ///< largest part of its stop that a joint takes; below 0: none has one
 } metrics;
 
-// writes the reason of a failed call
-static cav_status verification_fail(cav_error *error, cav_status status, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
-static cav_status verification_fail(cav_error *error, cav_status status, const char *format, ...) {
-  if (!error) return status;
-  va_list list;
-  va_start(list, format);
-  error->status = status;
-  error->line = 0;
-  vsnprintf(error->text, sizeof error->text, format, list);
-  va_end(list);
-  return status;
-}
-
-void cav_metric_note(cav_metric *metric, double value, int knot, const char *format, ...) {
-  if (value <= metric->value || isnan(metric->value)) return;
-  va_list list;
-  va_start(list, format);
-  metric->value = value;
-  metric->knot = knot;
-  vsnprintf(metric->where, sizeof metric->where, format, list);
-  va_end(list);
-}
-
-const char *cav_verification_link_name(const cav_model *model, int link, char buffer[32]) {
-  int body = model->link[link].body;
-  if (link == 0) return "the world";
-  if (*model->body[body].name) return model->body[body].name;
-  snprintf(buffer, 32, "body %d", body);
-  return buffer;
-}
-
 static const char *joint_name(const cav_model *model, int joint, char buffer[32]) {
   if (*model->joint[joint].name) return model->joint[joint].name;
   snprintf(buffer, 32, "joint %d", joint);
   return buffer;
-}
-
-// 1 if all n values are finite
-static int all_finite(const double *x, size_t n) {
-  for (size_t i = 0; i < n; i++) {
-    if (!isfinite(x[i])) return 0;
-  }
-  return 1;
-}
-
-// the motion fits the problem, and all of it is numbers
-static cav_status admit(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
-                        const double *gain_q, const double *gain_v, cav_error *error) {
-  if (!problem || !problem->model || !trajectory || !contact) {
-    return verification_fail(error, CAV_BAD_INPUT,
-                             "verification needs a problem with a model, a trajectory and a contact law");
-  }
-  const cav_model *model = problem->model;
-  if (trajectory->nq != model->nq || trajectory->nv != model->nv) {
-    return verification_fail(error, CAV_BAD_INPUT,
-                             "the trajectory has %d positions and %d velocities, the model %d and %d: "
-                             "verify it with the model it was solved for",
-                             trajectory->nq, trajectory->nv, model->nq, model->nv);
-  }
-  for (int i = 0; i < problem->nterm; i++) {
-    const cav_term *term = &problem->term[i];
-    const cav_user_quantity *user = term->user;
-    if (term->quantity != CAV_QUANTITY_USER) continue;
-    if (!user || !user->name || !user->value || user->dim < 1 || user->dim > CAV_USER_DIM_MAX ||
-        term->component >= user->dim)
-      return verification_fail(error, CAV_BAD_INPUT, "term %d is of a quantity of one's own that is not filled", i);
-  }
-  if (!problem->q_start || !problem->v_start) {
-    return verification_fail(error, CAV_BAD_INPUT, "the problem has no start: set q_start and v_start");
-  }
-  if (problem->duration_most == 0 && !(fabs(trajectory->timestep - problem->timestep) <= 1e-9 * problem->timestep)) {
-    return verification_fail(error, CAV_BAD_INPUT, "the trajectory's step is %.9g s, the problem's %.9g s",
-                             trajectory->timestep, problem->timestep);
-  }
-  if (!(problem->timestep > 0) || !(trajectory->timestep > 0))
-    return verification_fail(error, CAV_BAD_INPUT, "the steps of the problem and of the trajectory must be positive");
-  if (!(fabs(contact->timestep - trajectory->timestep) <= 1e-9 * trajectory->timestep))
-    return verification_fail(error, CAV_BAD_INPUT, "the claimed law is at a step of %.9g s, the trajectory's is %.9g s",
-                             contact->timestep, trajectory->timestep);
-  long knots = lround(problem->duration / problem->timestep) + 1;
-  if (trajectory->nknot < 2 || trajectory->nknot != knots) {
-    return verification_fail(error, CAV_BAD_INPUT, "the trajectory has %d knots, the problem asks for %ld",
-                             trajectory->nknot, knots);
-  }
-  size_t n = (size_t)trajectory->nknot, gains = (n - 1) * (size_t)model->nv * (size_t)model->nv;
-  int finite = all_finite(trajectory->q, n * (size_t)model->nq) &&
-               (!problem->free_start || all_finite(trajectory->v, (size_t)model->nv)) &&
-               all_finite(problem->q_start, (size_t)model->nq) && all_finite(problem->v_start, (size_t)model->nv) &&
-               (!gain_q || all_finite(gain_q, gains)) && (!gain_v || all_finite(gain_v, gains));
-  return finite ? CAV_OK
-                : verification_fail(error, CAV_NOT_FINITE,
-                                    "the trajectory, the start or the gains hold numbers that are not finite");
-}
-
-void cav_verification_end(cav_verification *verification) {
-  cav_cycle_image_free(verification->image);
-  cav_state_free(verification->state);
-  cav_state_free(verification->bare);
-  cav_edges_free(verification->edges);
-  free(verification->failure);
-  free(verification->deviation);
-  free(verification->v);
-  free(verification->u);
-  free(verification->control);
-}
-
-// velocities from the knots and that of the start; one more closes the motion
-static void knot_velocities(cav_verification *verification) {
-  const cav_model *model = verification->model;
-  int nq = model->nq, nv = model->nv;
-  for (int t = 1; t <= verification->last; t++) {
-    cav_difference(model, verification->q + (t - 1) * nq, verification->q + t * nq, verification->h,
-                   verification->v + t * nv);
-  }
-  double *close = verification->v + (verification->last + 1) * nv;
-  memset(close, 0, sizeof(double) * nv);
-  if (verification->image) {
-    cav_cycle_image_tangent(verification->image, -1, close - nv, verification->v);
-    cav_cycle_image_tangent(verification->image, 1, verification->v + nv, close);
-  } else if (!verification->problem->close_at_rest) {
-    memcpy(close, close - nv, sizeof(double) * nv);
-  }
-}
-
-cav_options cav_verification_law(const cav_verification *verification, int t) {
-  cav_options law = verification->law;
-  law.stops = law.stops && t == verification->last && verification->rows > verification->last;
-  return law;
-}
-
-static cav_status verification_start(cav_verification *verification, const cav_problem *problem,
-                                     const cav_trajectory *trajectory, const cav_options *contact, cav_error *error) {
-  const cav_model *model = problem->model;
-  size_t n = (size_t)trajectory->nknot, nv = (size_t)model->nv;
-  *verification = (cav_verification){.problem = problem,
-                                     .model = model,
-                                     .law = *contact,
-                                     .last = trajectory->nknot - 1,
-                                     .h = trajectory->timestep,
-                                     .arm = CAV_MOMENT_ARM,
-                                     .q = trajectory->q};
-  verification->periods = 1;
-  if (problem->cycle.on) {
-    verification->image = cav_cycle_image_new(problem, error);
-    if (!verification->image) return error->status;
-    verification->periods = problem->cycle.mirror == CAV_MIRROR_NONE ? 2 : 4;
-  }
-  verification->rows = verification->last + (problem->close_at_rest && !problem->cycle.on ? 1 : 0);
-  verification->law.timestep = verification->h;
-  // weight, or a like force where there is no gravity
-  const double *g = model->gravity;
-  double pull = contact->gravity ? sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) : 0;
-  verification->weight = (pull > 0 ? pull : usual_gravity) * (model->mass > 0 ? model->mass : 1);
-  verification->state = cav_state_new(model);
-  verification->bare = cav_state_new(model);
-  verification->v = malloc(sizeof(double) * (n + 1) * (nv + 1));
-  verification->u = calloc(n * (nv + 1), sizeof(double));
-  verification->control = calloc(n * ((size_t)model->nu + 1), sizeof(double));
-  verification->failure = calloc(1, sizeof *verification->failure);
-  verification->deviation = calloc(nv + 1, sizeof(double));
-  verification->edges = cav_edges_new(model);
-  if (!verification->failure || !verification->deviation || !verification->edges) return CAV_NO_MEMORY;
-  if (!verification->state || !verification->bare || !verification->v || !verification->u || !verification->control)
-    return CAV_NO_MEMORY;
-  verification->state->options = cav_verification_law(verification, 0);
-  verification->bare->options.contact = verification->bare->options.constraint = 0;
-  cav_residual_find(verification, verification->v, verification->u);
-  memcpy(verification->v, problem->free_start ? trajectory->v : problem->v_start, sizeof(double) * nv);
-  knot_velocities(verification);
-  return CAV_OK;
-}
-
-cav_status cav_verification_begin(cav_verification *verification, const cav_problem *problem,
-                                  const cav_trajectory *trajectory, const cav_options *contact, const double *gain_q,
-                                  const double *gain_v, cav_error *error) {
-  *verification = (cav_verification){0};
-  cav_status status = admit(problem, trajectory, contact, gain_q, gain_v, error);
-  if (status != CAV_OK) return status;
-  if (error) *error = (cav_error){0};
-  cav_error refusal = {0};
-  status = verification_start(verification, problem, trajectory, contact, &refusal);
-  if (refusal.status != CAV_OK && error) *error = refusal;
-  return status;
 }
 
 // the motion begins where the problem says
@@ -388,7 +206,7 @@ static cav_status examine(cav_verification *verification, cav_balance *balance, 
   for (int t = 0; t <= verification->last && status == CAV_OK; t++) {
     status = examine_knot(verification, t, balance, work, found);
     if (status != CAV_OK) {
-      verification_fail(error, status, "inverse dynamics at knot %d: %s", t, cav_status_name(status));
+      cav_verification_fail(error, status, "inverse dynamics at knot %d: %s", t, cav_status_name(status));
       break;
     }
     status = cav_hover_add(hover, verification, t);
@@ -410,64 +228,6 @@ static cav_status examine(cav_verification *verification, cav_balance *balance, 
   cav_hover_free(hover);
   free(work);
   free(terms);
-  return status;
-}
-
-// s: impulse of the smallest push over the weight, which changes the velocity of a body that stands by 0.03 m/s; when it
-// comes, a fraction of the motion; the number of pushes tried, each twice the one before
-static const double small_push = 0.003, pushed_at = 1.0 / 3;
-enum { PUSHES = 5 };
-
-// the root link of the heaviest tree, 0 if there is none
-static int pushed_link(const cav_verification *verification) {
-  const cav_model *model = verification->model;
-  int found = 0;
-  double most = 0;
-  for (int root = 1; root < model->nlink; root++) {
-    if (model->link[root].root != root) continue;
-    double mass = 0;
-    for (int l = root; l < model->nlink; l++) mass += model->link[l].root == root ? model->link[l].mass : 0;
-    if (mass > most) most = mass, found = root;
-  }
-  return found;
-}
-
-// the way that ends farthest off comes first: of the next push, twice as large, it is most likely to be lost
-static void put_worst_first(int order[4], const double error[4]) {
-  for (int i = 1; i < 4; i++)
-    for (int k = i; k > 0 && error[order[k]] > error[order[k - 1]]; k--) {
-      const int held = order[k];
-      order[k] = order[k - 1], order[k - 1] = held;
-    }
-}
-
-size_t cav_before_numbers(const cav_verification *verification) {
-  return (size_t)verification->model->nq + 2 * (size_t)verification->model->nv;
-}
-
-// the largest push along x and y, either way, with which a certified motion still follows
-static cav_status find_push(const cav_verification *verification, const double *gain_q, const double *gain_v,
-                            double *survived) {
-  static const double way[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
-  cav_before before = {.x = malloc(cav_before_numbers(verification) * sizeof *before.x)};
-  cav_disturbance push = {.link = pushed_link(verification), .fraction = pushed_at, .before = &before};
-  cav_status status = before.x ? CAV_OK : CAV_NO_MEMORY;
-  struct cav_follow follow = {0};
-  int order[4] = {0, 1, 2, 3};
-  double error[4];
-  *survived = push.link > 0 ? 0 : NAN;
-  for (int rung = 0; rung < PUSHES && push.link > 0 && status == CAV_OK && !*follow.lost; rung++) {
-    double size = ldexp(small_push * verification->weight, rung);
-    for (int i = 0; i < 4 && status == CAV_OK && !*follow.lost; i++) {
-      const int k = order[i];
-      push.impulse[0] = size * way[k][0], push.impulse[1] = size * way[k][1];
-      status = cav_replay_own(verification, 0, gain_q, gain_v, &push, &follow);
-      error[k] = follow.error;
-    }
-    if (status == CAV_OK && !*follow.lost) put_worst_first(order, error);
-    if (status == CAV_OK && !*follow.lost) *survived = size;
-  }
-  free(before.x);
   return status;
 }
 
@@ -603,23 +363,10 @@ static void fill(const cav_verification *verification, const metrics *found, con
   verdict->duration = verification->last * verification->h;
 }
 
-// the closed loops that a certificate asks for; followed, or NULL: what is known of them
-static cav_status close_loops(const cav_verification *verification, const cav_followed *followed, const double *gain_q,
-                              const double *gain_v, cav_replay *replay) {
-  const struct cav_follow *known = cav_followed_find(followed, verification, gain_q, gain_v);
-  cav_status status = CAV_OK;
-  if (known)
-    replay->closed = known[CAV_LOOP_CLAIMED];
-  else
-    status = cav_closed_loop(verification, CAV_LOOP_CLAIMED, gain_q, gain_v, NULL, &replay->closed);
-  if (status != CAV_OK) return status;
-  return cav_closed_loops_own(verification, known, gain_q, gain_v, &replay->own);
-}
-
 static cav_status verify(const cav_problem *problem, const cav_trajectory *trajectory, const cav_options *contact,
                          const double *gain_q, const double *gain_v, const cav_followed *followed, cav_verdict *verdict,
                          cav_error *error) {
-  if (!verdict) return verification_fail(error, CAV_BAD_INPUT, "verification needs a place for its verdict");
+  if (!verdict) return cav_verification_fail(error, CAV_BAD_INPUT, "verification needs a place for its verdict");
   verdict->certified = verdict->achieved = 0;
   snprintf(verdict->reason, sizeof verdict->reason, "not verified");
   cav_verification verification;
@@ -636,7 +383,7 @@ static cav_status verify(const cav_problem *problem, const cav_trajectory *traje
   if (status == CAV_OK) status = cav_verification_between(&verification, &found.between);
   if (status == CAV_OK) status = cav_replay_steps(&verification, &replay);
   if (status == CAV_OK) status = cav_replay_open(&verification, &replay);
-  if (status == CAV_OK) status = close_loops(&verification, followed, gain_q, gain_v, &replay);
+  if (status == CAV_OK) status = cav_closed_loops_certify(&verification, followed, gain_q, gain_v, &replay);
   if (status == CAV_OK) {
     *verdict->reason = 0;
     fill(&verification, &found, &replay, verdict);
@@ -646,12 +393,12 @@ static cav_status verify(const cav_problem *problem, const cav_trajectory *traje
   }
   verdict->push_survived_n_s = NAN;
   if (status == CAV_OK && verdict->certified)
-    status = find_push(&verification, gain_q, gain_v, &verdict->push_survived_n_s);
+    status = cav_closed_loops_push(&verification, gain_q, gain_v, &verdict->push_survived_n_s);
   free(report);
   cav_balance_free(balance);
   cav_verification_end(&verification);
   if (status != CAV_OK && error && !*error->text)
-    verification_fail(error, status, "verification: %s", cav_status_name(status));
+    cav_verification_fail(error, status, "verification: %s", cav_status_name(status));
   return status;
 }
 
@@ -662,7 +409,7 @@ cav_status cav_verify(const cav_problem *problem, const cav_trajectory *trajecto
 
 cav_status cav_verify_solution(const cav_problem *problem, const cav_solution *solution, cav_verdict *verdict,
                                cav_error *error) {
-  if (!solution) return verification_fail(error, CAV_BAD_INPUT, "there is no solution to verify");
+  if (!solution) return cav_verification_fail(error, CAV_BAD_INPUT, "there is no solution to verify");
   return verify(problem, solution->trajectory, &solution->contact, solution->gain_q, solution->gain_v,
                 solution->followed, verdict, error);
 }
@@ -709,11 +456,11 @@ cav_status cav_term_values(const cav_problem *problem, const cav_trajectory *tra
   *n = 0;
   cav_status status = cav_verification_begin(&verification, problem, trajectory, contact, NULL, NULL, error);
   if (status == CAV_OK && (term < 0 || term >= problem->nterm))
-    status =
-        verification_fail(error, CAV_BAD_INPUT, "the problem has %d terms, none of number %d", problem->nterm, term);
+    status = cav_verification_fail(error, CAV_BAD_INPUT, "the problem has %d terms, none of number %d", problem->nterm,
+                                   term);
   for (int t = 0; status == CAV_OK && t <= verification.last; t++) {
     status = stand_at(&verification, t, &work, &room);
-    if (status != CAV_OK) verification_fail(error, status, "knot %d: %s", t, cav_status_name(status));
+    if (status != CAV_OK) cav_verification_fail(error, status, "knot %d: %s", t, cav_status_name(status));
     if (status == CAV_OK) cav_targets_list(&verification, &problem->term[term], t, work, most, value, n);
     if (status == CAV_OK && (status = verification.failure->status) != CAV_OK && error) *error = *verification.failure;
   }
@@ -729,8 +476,8 @@ cav_status cav_track_residuals(const cav_problem *problem, const cav_trajectory 
   int room = 0;
   cav_status status = cav_verification_begin(&verification, problem, trajectory, contact, NULL, NULL, error);
   if (status == CAV_OK && (term < 0 || term >= problem->nterm || !problem->term[term].track))
-    status = verification_fail(error, CAV_BAD_INPUT, "the problem has %d terms, no record of number %d", problem->nterm,
-                               term);
+    status = cav_verification_fail(error, CAV_BAD_INPUT, "the problem has %d terms, no record of number %d",
+                                   problem->nterm, term);
   const cav_track *track = status == CAV_OK ? problem->term[term].track : NULL;
   if (track) cav_records_begin(problem->model, track, residual);
   for (int t = 0; status == CAV_OK && t <= verification.last; t++) {
@@ -738,7 +485,7 @@ cav_status cav_track_residuals(const cav_problem *problem, const cav_trajectory 
     if (status == CAV_OK)
       cav_records_note(&verification, &problem->term[term], t, residual);
     else
-      verification_fail(error, status, "knot %d: %s", t, cav_status_name(status));
+      cav_verification_fail(error, status, "knot %d: %s", t, cav_status_name(status));
   }
   for (int i = 0; track && i < track->nchannel; i++) {
     cav_channel_residual *r = &residual[i];
@@ -748,59 +495,4 @@ cav_status cav_track_residuals(const cav_problem *problem, const cav_trajectory 
   free(work);
   cav_verification_end(&verification);
   return status;
-}
-
-cav_status cav_closed_loops_begin(cav_verification *verification, const cav_problem *problem,
-                                  const cav_trajectory *trajectory, const cav_options *contact, cav_error *error) {
-  cav_status status = cav_verification_begin(verification, problem, trajectory, contact, NULL, NULL, error);
-  int nv = status == CAV_OK ? verification->model->nv : 0;
-  for (int t = 0; t < verification->rows && status == CAV_OK; t++) {
-    const double *v = verification->v + t * nv;
-    verification->state->options = cav_verification_law(verification, t);
-    status = cav_inverse(verification->model, verification->state, verification->q + t * verification->model->nq, v,
-                         v + nv, verification->u + t * nv);
-  }
-  return status;
-}
-
-cav_status cav_closed_loop(const cav_verification *verification, int loop, const double *gain_q, const double *gain_v,
-                           cav_before *before, struct cav_follow *follow) {
-  cav_disturbance disturbance = {.fraction = pushed_at};
-  if (loop == CAV_LOOP_CLAIMED) return cav_replay_closed(verification, &verification->law, gain_q, gain_v, follow);
-  if (loop == CAV_LOOP_FINE) return cav_replay_own(verification, 1, gain_q, gain_v, NULL, follow);
-  if (loop == CAV_LOOP_OWN) {
-    disturbance.before = before;
-  } else if (loop < CAV_LOOP_PUSHED) {
-    disturbance.start = loop - CAV_LOOP_START + 1;
-  } else {
-    // along a diagonal, so that planar motions feel it too
-    double along = (loop == CAV_LOOP_PUSHED ? 1 : -1) * small_push * verification->weight * sqrt(0.5);
-    disturbance.link = pushed_link(verification);
-    disturbance.impulse[0] = disturbance.impulse[1] = along;
-    disturbance.before = before;
-  }
-  return cav_replay_own(verification, 0, gain_q, gain_v, &disturbance, follow);
-}
-
-cav_status cav_closed_loops_own(const cav_verification *verification, const struct cav_follow *known,
-                                const double *gain_q, const double *gain_v, struct cav_follow *follow) {
-  *follow = (struct cav_follow){0};
-  for (int loop = CAV_LOOP_OWN; loop < CAV_LOOP_PUSHED && !*follow->lost; loop++) {
-    if (loop == CAV_LOOP_CLAIMED) continue;
-    struct cav_follow now;
-    cav_status status = CAV_OK;
-    if (known)
-      now = known[loop];
-    else
-      status = cav_closed_loop(verification, loop, gain_q, gain_v, NULL, &now);
-    if (status != CAV_OK) return status;
-    double asked = fmax(now.asked, follow->asked);
-    if (loop == CAV_LOOP_OWN || *now.lost || now.error > follow->error) *follow = now;
-    follow->asked = asked;
-    const size_t said = strlen(follow->lost);
-    if (*now.lost && loop >= CAV_LOOP_START)
-      snprintf(follow->lost + said, sizeof follow->lost - said, ", from a start that is %g rad and rad/s off",
-               CAV_START_VELOCITY);
-  }
-  return CAV_OK;
 }
