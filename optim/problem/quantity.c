@@ -132,3 +132,11 @@ double cav_term_tolerance(const cav_problem *problem, const cav_term *term, doub
   if (term->use != CAV_USE_COST) return CAV_TOLERANCE_CONSTRAINT * term->scale;
   return usual > 0 && is_goal(problem, term) ? usual : INFINITY;
 }
+
+int cav_term_asks(const cav_term *term) { return term->use != CAV_USE_COST || term->weight > 0; }
+
+int cav_term_places(const cav_model *model, const cav_term *term, int link) {
+  const cav_sensor *s = &term->sensor;
+  return term->quantity == CAV_QUANTITY_SENSOR && s->type == CAV_SENSOR_FRAMEPOS && !s->referred &&
+         cav_object_link(model, s->object_type, s->object) == link;
+}

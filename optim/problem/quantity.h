@@ -40,4 +40,10 @@ int cav_channel_dim(const cav_channel *channel);
 /// Whether a term selects dofs.
 int cav_term_has_dofs(const cav_term *term);
 
+/// Whether a term asks for anything: it is no cost without a weight.
+int cav_term_asks(const cav_term *term);
+
+/// Whether a term is of the place of a link in the world.
+int cav_term_places(const cav_model *model, const cav_term *term, int link);
+
 #endif

@@ -9,6 +9,7 @@
 #include <math.h>
 
 #include "math3.h"
+#include "quantity.h"
 #include "role.h"
 #include "schedule.h"
 #include "transcription.h"
@@ -42,11 +43,10 @@ static int is_pushed(const double way[3]) {
 static void add_term(const cav_problem *p, const cav_term *term, cav_state *state, thing *found) {
   const cav_sensor *s = &term->sensor;
   double at[CAV_SENSOR_DIM_MAX], target[CAV_SENSOR_DIM_MAX];
-  const int place = term->quantity == CAV_QUANTITY_SENSOR && s->type == CAV_SENSOR_FRAMEPOS && !s->referred;
-  if (!place || term->use == CAV_USE_RANGE || (term->use == CAV_USE_COST && !(term->weight > 0))) return;
+  if (!cav_term_places(p->model, term, found->link) || term->use == CAV_USE_RANGE || !cav_term_asks(term)) return;
   const double time = term->to < 0 ? p->duration : fmin(term->to, p->duration);
   // the last one is where it goes
-  if (cav_object_link(p->model, s->object_type, s->object) != found->link || time < found->time) return;
+  if (time < found->time) return;
   cav_sensor_read(p->model, state, s, at);
   cav_term_target(term, time, s->dim, target);
   for (int k = 0; k < 3; k++)
@@ -223,7 +223,7 @@ static int find_touched(const cav_problem *p, touched *found) {
     if (term->quantity != CAV_QUANTITY_SENSOR || term->sensor.type != CAV_SENSOR_TOUCH) continue;
     double target = term->lower, to = term->to < 0 ? p->duration : fmin(term->to, p->duration);
     if (term->use != CAV_USE_RANGE) cav_term_target(term, to, 1, &target);
-    if (!(target > 0) || (term->use == CAV_USE_COST && !(term->weight > 0))) continue;
+    if (!(target > 0) || !cav_term_asks(term)) continue;
     *found = (touched){&term->sensor, fmax(term->from, 0), to};
     return 1;
   }
@@ -235,11 +235,9 @@ static int place_asked(const cav_problem *p, const touched *t, int link, double 
   int found = 0;
   for (int i = 0; i < p->nterm; i++) {
     const cav_term *term = &p->term[i];
-    const cav_sensor *s = &term->sensor;
     const double to = term->to < 0 ? p->duration : term->to;
     double target[CAV_SENSOR_DIM_MAX];
-    if (term->quantity != CAV_QUANTITY_SENSOR || s->type != CAV_SENSOR_FRAMEPOS || s->referred) continue;
-    if (term->use == CAV_USE_RANGE || cav_object_link(p->model, s->object_type, s->object) != link) continue;
+    if (term->use == CAV_USE_RANGE || !cav_term_places(p->model, term, link)) continue;
     if (term->from > t->to || to < t->from) continue;
     cav_term_target(term, fmin(to, t->to), 3, target);
     for (int k = 0; k < 3; k++)

@@ -6,6 +6,8 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "quantity.h"
+
 /// Weight of the terms; rad between start and goal up to which it is turned the same; m from which a goal has it elsewhere.
 static const double weight = 100, same = 0.02, least_way = 0.02;
 
@@ -14,16 +16,13 @@ static int link_of(const cav_problem *p, const cav_term *term) {
   return term->quantity == CAV_QUANTITY_SENSOR ? cav_object_link(p->model, s->object_type, s->object) : -1;
 }
 
-static int is_counted(const cav_term *term) { return term->use != CAV_USE_COST || term->weight > 0; }
-
 /// Whether terms or the goal want a free body elsewhere.
 static int is_wanted(const cav_problem *p, const cav_joint *joint) {
   double way = 0;
   for (int k = 0; k < 3; k++) way += pow(p->q_goal[joint->q + k] - p->q_start[joint->q + k], 2);
   int wanted = sqrt(way) > least_way;
   for (int i = 0; i < p->nterm && !wanted; i++)
-    wanted = is_counted(&p->term[i]) && p->term[i].sensor.type == CAV_SENSOR_FRAMEPOS && !p->term[i].sensor.referred &&
-             link_of(p, &p->term[i]) == joint->link;
+    wanted = cav_term_asks(&p->term[i]) && cav_term_places(p->model, &p->term[i], joint->link);
   return wanted;
 }
 
@@ -34,7 +33,7 @@ static int is_told(const cav_problem *p, int link) {
     const cav_sensor_type type = term->sensor.type;
     const int turn = type == CAV_SENSOR_FRAMEQUAT || type == CAV_SENSOR_FRAMEXAXIS || type == CAV_SENSOR_FRAMEYAXIS ||
                      type == CAV_SENSOR_FRAMEZAXIS;
-    if (is_counted(term) && turn && term->from != term->to && link_of(p, term) == link) return 1;
+    if (cav_term_asks(term) && turn && term->from != term->to && link_of(p, term) == link) return 1;
   }
   return 0;
 }
@@ -82,7 +81,7 @@ int cav_upright_held(const cav_problem *p) {
   for (int j = 0; j < m->njoint && !held; j++)
     for (int i = 0; i < p->nterm && !held && is_kept(p, &m->joint[j]); i++) {
       const cav_sensor *s = &p->term[i].sensor;
-      held = p->term[i].quantity == CAV_QUANTITY_SENSOR && is_counted(&p->term[i]) && s->referred &&
+      held = p->term[i].quantity == CAV_QUANTITY_SENSOR && cav_term_asks(&p->term[i]) && s->referred &&
              cav_object_link(m, s->reference_type, s->reference) == m->joint[j].link;
     }
   return held;
