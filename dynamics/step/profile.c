@@ -1,8 +1,7 @@
 /// What the stages of one evaluation of the inverse take, by running each alone: for `cavort inspect` and for whoever
 /// wants to know where the time goes. A stage is repeated until it can be measured and the shortest of several such
 /// runs counts, so the caches are warm. What the velocity stages take is told apart by leaving the constraints out.
-#include <time.h>
-
+#include "clock.h"
 #include "math3.h"
 #include "step.h"
 
@@ -14,12 +13,6 @@ typedef struct probe {
   cav_state *state;
   const double *q, *v, *v_next;
 } probe;
-
-static double clock_seconds(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 static void run_poses(probe *p) { cav_kinematics(p->model, p->state, p->q); }
 static void run_rows(probe *p) { cav_limits_find(p->model, p->state); }
@@ -44,9 +37,9 @@ static double stage_seconds(probe *p, void (*run)(probe *)) {
   double best = INFINITY;
   for (int k = 0; k < RUNS; k++) {
     run_whole(p);
-    double start = clock_seconds();
+    double start = cav_clock();
     for (int i = 0; i < CALLS; i++) run(p);
-    best = fmin(best, (clock_seconds() - start) / CALLS);
+    best = fmin(best, (cav_clock() - start) / CALLS);
   }
   return best;
 }

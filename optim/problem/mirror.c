@@ -14,6 +14,7 @@
 
 #include "cavort/dynamics.h"
 #include "file.h"
+#include "math3.h"
 #include "periodicity.h"
 
 // how far a robot may be from its image: lengths by its extent, axes (1 degree), masses, moments of inertia
@@ -112,15 +113,9 @@ static void reflect(int axis, const double *p, double *out) {
   for (int k = 0; k < 3; k++) out[k] = k == axis ? -p[k] : p[k];
 }
 
-static void rotate(const double *R, const double *x, double *out) {
-  for (int i = 0; i < 3; i++) out[i] = R[3 * i] * x[0] + R[3 * i + 1] * x[1] + R[3 * i + 2] * x[2];
-}
-
-static double dot_product(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
 static double apart(const double *a, const double *b) {
   double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-  return sqrt(dot_product(d, d));
+  return sqrt(dot3(d, d));
 }
 
 // a length between a thing and its image counts as asymmetry
@@ -170,18 +165,18 @@ static cav_status fit_joint(comparison *c, int j, cav_image *image) {
 
   // anchors, and what is left of axes
   double at[3], at_b[3], mirrored[3], along[3], along_b[3];
-  rotate(A->rotation, a->pos, at), rotate(B->rotation, b->pos, at_b);
+  rotate(at, A->rotation, a->pos), rotate(at_b, B->rotation, b->pos);
   for (int k = 0; k < 3; k++) at[k] += A->pos[k], at_b[k] += B->pos[k];
   reflect(axis, at, mirrored);
   if (scalar) {
     double image_axis[3];
-    rotate(A->rotation, a->axis, along), rotate(B->rotation, b->axis, along_b);
+    rotate(along, A->rotation, a->axis), rotate(along_b, B->rotation, b->axis);
     reflect(axis, along, image_axis);
-    double s = dot_product(image_axis, along_b) * (a->type == CAV_JOINT_HINGE ? -1 : 1);
+    double s = dot3(image_axis, along_b) * (a->type == CAV_JOINT_HINGE ? -1 : 1);
     if (fabs(fabs(s) - 1) > axis_least) return unlike(m, j, other, "the axes", error);
     image->sign = s > 0 ? 1 : -1;
     // a hinge may sit anywhere on its axis, a slide anywhere
-    double off = dot_product(mirrored, along_b) - dot_product(at_b, along_b);
+    double off = dot3(mirrored, along_b) - dot3(at_b, along_b);
     for (int k = 0; k < 3; k++) mirrored[k] -= off * along_b[k];
   } else {
     // -N = -R_a' M R_b

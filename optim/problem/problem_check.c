@@ -107,25 +107,6 @@ static cav_status check_guess(const cav_problem *p, cav_error *error) {
   return CAV_OK;
 }
 
-// numbers of a target, components that a term may pick
-static int target_length(const cav_problem *p, const cav_term *term) {
-  switch (cav_quantity_rule_of(term->quantity)->of) {
-    case CAV_OF_SENSOR:
-      return term->sensor.dim;
-    case CAV_OF_POSTURE:
-      return p->model->nq;
-    case CAV_OF_RATE:
-      return p->model->nv;
-    case CAV_OF_USER:
-      return term->user && term->user->dim > 0 && term->user->dim <= CAV_USER_DIM_MAX ? term->user->dim : 0;
-    case CAV_OF_ACTUATORS:
-    case CAV_OF_CONTACTS:
-    case CAV_OF_TRACK:
-      break;
-  }
-  return 0;
-}
-
 static int has_object(const cav_model *m, cav_object_type type, int object) {
   int n = 0;
   size_t stride;
@@ -166,7 +147,7 @@ static const char *wrong_object(const cav_model *m, const cav_term *term) {
 }
 
 static const char *wrong_target(const cav_problem *p, int moving, const cav_term *term) {
-  int n = target_length(p, term), rows = term->nwaypoint ? term->nwaypoint : 1;
+  int n = cav_term_target_length(p->model, term), rows = term->nwaypoint ? term->nwaypoint : 1;
   if (term->nwaypoint < 0 || (term->nwaypoint && (!term->target || !term->waypoint_time)))
     return "counts waypoints that have no targets or no times";
   const double last = moving ? DBL_MAX / 2 : p->duration;

@@ -133,6 +133,24 @@ double cav_term_tolerance(const cav_problem *problem, const cav_term *term, doub
   return usual > 0 && is_goal(problem, term) ? usual : INFINITY;
 }
 
+int cav_term_target_length(const cav_model *model, const cav_term *term) {
+  switch (cav_quantity_rule_of(term->quantity)->of) {
+    case CAV_OF_SENSOR:
+      return term->sensor.dim;
+    case CAV_OF_POSTURE:
+      return model->nq;
+    case CAV_OF_RATE:
+      return model->nv;
+    case CAV_OF_USER:
+      return term->user && term->user->dim > 0 && term->user->dim <= CAV_USER_DIM_MAX ? term->user->dim : 0;
+    case CAV_OF_ACTUATORS:
+    case CAV_OF_CONTACTS:
+    case CAV_OF_TRACK:
+      break;
+  }
+  return 0;
+}
+
 int cav_term_asks(const cav_term *term) { return term->use != CAV_USE_COST || term->weight > 0; }
 
 int cav_term_places(const cav_model *model, const cav_term *term, int link) {

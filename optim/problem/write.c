@@ -88,11 +88,6 @@ static void write_target(FILE *out, const cav_problem *p, const cav_term *term, 
   }
 }
 
-static int target_length(const cav_problem *p, const cav_term *term) {
-  if (term->quantity == CAV_QUANTITY_CONFIGURATION) return p->model->nq;
-  return term->quantity == CAV_QUANTITY_SENSOR ? term->sensor.dim : p->model->nv;
-}
-
 // window attributes; none for the whole horizon
 static void write_window(FILE *out, const cav_problem *p, const cav_term *term) {
   double to = term->to < 0 ? p->duration : term->to, from = term->from < 0 ? p->duration : term->from;
@@ -214,7 +209,7 @@ static int write_term(FILE *out, const cav_problem *p, const cav_term *term) {
   for (int i = 0; i < term->nwaypoint; i++) {
     fputs("      <waypoint", out);
     write_number(out, "time", term->waypoint_time[i]);
-    write_target(out, p, term, term->target + i * target_length(p, term));
+    write_target(out, p, term, term->target + i * cav_term_target_length(p->model, term));
     fputs("/>\n", out);
   }
   fprintf(out, "    </%s>\n", element);

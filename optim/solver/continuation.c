@@ -5,7 +5,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 /// Weights of rows while they are only penalised, at the first stage; they end a hundred times higher. Rows are scaled,
 /// so these serve all models. Ranges are expensive from the start: a motion that leans on a limit, whose force is free,
@@ -37,12 +36,6 @@ enum { RESTORATIONS = 30 };
 /// Diagnosis: iterations towards the least violation, and the relative decrease that ends them.
 enum { REST_ITERATIONS = 300 };
 static const double rest_tolerance = 1e-8;
-
-double cav_clock(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 static double between(double from, double to, double s) {
   return from > 0 && to > 0 ? from * pow(to / from, s) : (1 - s) * from + s * to;
@@ -253,16 +246,12 @@ typedef struct violation {
   double unactuated, effort, range, term;
 } violation;
 
-static double excess(const cav_slot *slot) {
-  return fmax(fmax(slot->lower - slot->value, slot->value - slot->upper), 0);
-}
-
 static violation measure(const cav_transcription *tr) {
   violation m = {0};
   for (int t = 0; t < tr->nknot; t++) {
     const cav_knot *knot = &tr->knot[t];
     for (int i = 0; i < knot->layout.count; i++) {
-      double e = excess(&knot->slot[i]);
+      double e = cav_slot_excess(&knot->slot[i]);
       double *worst = i < knot->layout.effort  ? &m.unactuated
                       : i < knot->layout.joint ? &m.effort
                       : i < knot->layout.term  ? &m.range

@@ -3,6 +3,7 @@
 #define CAVORT_CONTINUATION_H
 
 #include "cavort/solve.h"
+#include "clock.h"
 #include "gauss_newton.h"
 #include "schedule.h"
 
@@ -155,8 +156,5 @@ int cav_solution_log(cav_solution *solution, const cav_progress *line);
 
 /// Keeps a stage that ended; 0 if memory runs out. solution.c.
 int cav_solution_note(cav_solution *solution, const cav_stage_record *stage);
-
-/// Wall clock, s.
-double cav_clock(void);
 
 #endif

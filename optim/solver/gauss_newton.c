@@ -6,7 +6,8 @@
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
-#include <time.h>
+
+#include "clock.h"
 
 /// Added to the diagonal, relative: condition numbers reach 1e15 under stiff penalties.
 static const double jitter = 1e-10;
@@ -25,12 +26,6 @@ static const double gain = 1.01;
 
 /// Fraction of the Newton step below which a radius that still shrinks is one that a jump of the merit holds.
 static const double collapse = 1e-6;
-
-static double now(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 /// Steps in a row that gain less than the tolerance, each shorter than the one before, that end a run: they come nearer and
 /// nearer to a jump of the merit (features of meshes that change), half the way each time, and the next stage may do without it.
@@ -220,9 +215,9 @@ cav_status cav_region_minimise(cav_region *region, cav_normal *normal, cav_trans
   for (int i = 0; i < region->iterations && calm < 2; i++) {
     cav_status factored = CAV_OK;
     if ((status = cav_normal_linearise(normal, tr, *at, jitter, &factored)) != CAV_OK) break;
-    double merit = cav_transcription_merit(tr), start = now();
+    double merit = cav_transcription_merit(tr), start = cav_clock();
     if ((status = prepare_at(&d, normal, tr, *at, factored)) != CAV_OK) break;
-    region->seconds_linear += now() - start;
+    region->seconds_linear += cav_clock() - start;
     if (!(region->radius > 0)) {
       find_cauchy(&d);
       region->radius = d.cauchy_norm;

@@ -221,9 +221,7 @@ cav_status cav_guess_take(cav_solve_run *run) {
   cav_status status = cav_guess_fill(run->problem, end, run->at);
   for (int i = 0; i < n; i++) x[i] = nudge * (2 * fmod((i + 1) * golden, 1) - 1);
   cav_transcription_move(run->tr, run->at, x, run->spare);
-  cav_trajectory *moved = run->spare;
-  run->spare = run->at;
-  run->at = moved;
+  cav_run_exchange(&run->at, &run->spare);
   free(x);
   return status;
 }

@@ -191,9 +191,7 @@ static cav_status take_start(cav_solve_run *run) {
   double *x = calloc((size_t)cav_transcription_unknowns(run->tr), sizeof *x);
   if (!x) return CAV_NO_MEMORY;
   cav_transcription_move(run->tr, run->at, x, run->spare);
-  cav_trajectory *moved = run->spare;
-  run->spare = run->at;
-  run->at = moved;
+  cav_run_exchange(&run->at, &run->spare);
   free(x);
   return CAV_OK;
 }

@@ -47,14 +47,9 @@ static cav_status refuse(const windows *w, cav_error *error) {
   return reason ? cav_file_fail(error, CAV_BAD_INPUT, 0, "solved by windows: %s", reason) : CAV_OK;
 }
 
-static int target_length(const cav_problem *p, const cav_term *term) {
-  if (term->quantity == CAV_QUANTITY_CONFIGURATION) return p->model->nq;
-  return term->quantity == CAV_QUANTITY_SENSOR ? term->sensor.dim : p->model->nv;
-}
-
 /// Waypoints of a term within a window, and what it wants at its ends; room moves on.
 static void cut_waypoints(const windows *w, cav_term *term, double from, double duration, double **room) {
-  int dim = target_length(w->whole, term), n = 0;
+  int dim = cav_term_target_length(w->whole->model, term), n = 0;
   const cav_term *whole = &w->whole->term[term - w->part.term];
   double *time = *room, *target = time + whole->nwaypoint + 2, slack = near_knot * w->whole->timestep;
   for (int i = -1; i <= whole->nwaypoint; i++) {
@@ -256,7 +251,8 @@ static int ends(cav_status status) { return status != CAV_OK && status != CAV_NO
 static size_t room_of(const cav_problem *p) {
   size_t n = 1;
   for (int i = 0; i < p->nterm; i++)
-    if (p->term[i].nwaypoint) n += ((size_t)p->term[i].nwaypoint + 2) * (1 + (size_t)target_length(p, &p->term[i]));
+    if (p->term[i].nwaypoint)
+      n += ((size_t)p->term[i].nwaypoint + 2) * (1 + (size_t)cav_term_target_length(p->model, &p->term[i]));
   return n;
 }
 

@@ -195,12 +195,6 @@ static void add_force(cav_sum *a, double weight, double r, const cav_force_row *
   add_dense(a, weight, r, a->s->row);
 }
 
-static double form_value(const cav_force_row *form, const double *u) {
-  double value = 0;
-  for (int k = 0; k < form->n; k++) value += form->coef[k] * u[form->dof[k]];
-  return value;
-}
-
 /// Sets and begins a constraint row; the residual of its augmented Lagrangian, 0 with *active 0 where it does not push.
 static double slot_residual(cav_sum *a, int i, double value, double lower, double upper, double rho, int *active) {
   cav_slot *slot = &a->knot->slot[i];
@@ -371,7 +365,7 @@ static void add_effort(cav_sum *a, const cav_term *term, double weight) {
   if (!a->knot->has_force) return;
   weight /= term->scale * term->scale;
   for (int k = 0; k < tr->model->nu; k++) {
-    double r = form_value(&tr->effort[k], a->knot->u), w = weight;
+    double r = cav_force_value(&tr->effort[k], a->knot->u), w = weight;
     begin_cost(a, term, term->scale, &w, &r);
     add_force(a, w, r, &tr->effort[k]);
   }
@@ -392,7 +386,7 @@ static int mean_velocity_entries(const cav_sum *a, int d, double scale, int *col
 static double power_row(cav_sum *a, int k, const double *v, const double *v_next, double *row) {
   const cav_transcription *tr = a->tr;
   double *moment = a->s->tangent, unit = tr->effort_unit[k] / tr->weight, velocity = 0, entry[12];
-  double force = unit * form_value(&tr->effort[k], a->knot->u);
+  double force = unit * cav_force_value(&tr->effort[k], a->knot->u);
   int column[12];
   cav_actuator_length(tr->model, a->s->state, k, moment);
   for (int d = 0; d < tr->nv; d++) velocity += moment[d] * 0.5 * (v[d] + v_next[d]);
@@ -499,7 +493,7 @@ static void add_costs(cav_sum *a, const double *q, const double *v, const double
   }
   assert(reading == a->knot->nread);
   for (int k = 0; k < tr->npenalised && a->knot->has_force; k++) {
-    double weight = tr->options.timestep, r = form_value(&tr->penalised[k], a->knot->u);
+    double weight = tr->options.timestep, r = cav_force_value(&tr->penalised[k], a->knot->u);
     begin_row(a, weight, r);
     add_force(a, weight, r, &tr->penalised[k]);
   }
@@ -587,7 +581,7 @@ static void add_force_slots(cav_sum *a, const double *q, const double *v) {
   double rho = tr->options.timestep * tr->penalty.unactuated;
   for (int k = 0; k < tr->nresidual; k++) {
     keep_force(a, i, &tr->unactuated[k]);
-    double e = slot_residual(a, i++, form_value(&tr->unactuated[k], a->knot->u), 0, 0, rho, &active);
+    double e = slot_residual(a, i++, cav_force_value(&tr->unactuated[k], a->knot->u), 0, 0, rho, &active);
     add_force(a, rho, e, &tr->unactuated[k]);
   }
   assert(i == a->knot->layout.effort);
@@ -595,7 +589,7 @@ static void add_force_slots(cav_sum *a, const double *q, const double *v) {
   for (int k = 0; k < tr->nlimit; k++) {
     const double *range = tr->effort_range[k];
     const cav_servo *servo = &tr->servo[k];
-    double value = form_value(&tr->effort[k], a->knot->u);
+    double value = cav_force_value(&tr->effort[k], a->knot->u);
     double *row = keep_force(a, i, &tr->effort[k]);
     if (servo->n > 0) value -= cav_servo_value(tr->model, servo, q, v);
     if (servo->n > 0 && row) put_servo(a, servo, row);

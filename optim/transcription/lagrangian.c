@@ -45,12 +45,6 @@ static void pull_force(const cav_force_row *form, double derivative, double *pul
   for (int k = 0; k < form->n; k++) pull[form->dof[k]] += derivative * form->coef[k];
 }
 
-static double force_of(const cav_force_row *form, const double *u) {
-  double value = 0;
-  for (int k = 0; k < form->n; k++) value += form->coef[k] * u[form->dof[k]];
-  return value;
-}
-
 /// What costs of a knot pull its readings by.
 static void pull_costs(const cav_transcription *tr, const int *key, int t, double factor, double *pull) {
   const cav_knot *knot = &tr->knot[t];
@@ -63,7 +57,8 @@ static void pull_costs(const cav_transcription *tr, const int *key, int t, doubl
     for (int k = 0; k < dim && term->use == CAV_USE_COST; k++)
       pull[tr->nv + sensor + k] += derivative_of(term, weight, knot->y[sensor + k], 1);
     for (int k = 0; k < tr->model->nu && term->quantity == CAV_QUANTITY_EFFORT && knot->has_force; k++)
-      pull_force(&tr->effort[k], derivative_of(term, weight, force_of(&tr->effort[k], knot->u), term->scale), pull);
+      pull_force(&tr->effort[k], derivative_of(term, weight, cav_force_value(&tr->effort[k], knot->u), term->scale),
+                 pull);
     for (int k = 0; k < knot->ncontact && term->use == CAV_USE_COST; k++) {
       int first, n = cav_knot_contact(tr, key, term, t, k, &first), at = CAV_CONTACT_READINGS * k + first;
       if (term->quantity == CAV_QUANTITY_GAP && knot->y[at] < 0) continue;
@@ -77,7 +72,7 @@ static void pull_costs(const cav_transcription *tr, const int *key, int t, doubl
     if (!(knot->moving[k] & (CAV_WITHIN_TREE | CAV_IDLE))) pull[tr->nv + r] += depth * fmin(knot->y[r], 0);
   }
   for (int k = 0; k < tr->npenalised && knot->has_force; k++)
-    pull_force(&tr->penalised[k], factor * tr->options.timestep * force_of(&tr->penalised[k], knot->u), pull);
+    pull_force(&tr->penalised[k], factor * tr->options.timestep * cav_force_value(&tr->penalised[k], knot->u), pull);
 }
 
 /// What multipliers of a knot's rows pull its readings by.

@@ -6,6 +6,7 @@
 /// exact. Constraint rows enter the merit by an augmented Lagrangian of two-sided rows: with z~ = z + multiplier/rho
 /// and e = z~ - clamp(z~), the row costs rho/2 e^2 and its next multiplier is rho e (Powell, Hestenes, Rockafellar).
 #include "clearance.h"
+#include "clock.h"
 #include "knot.h"
 #include "math3.h"
 #include "rotation.h"
@@ -16,13 +17,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
-
-static double now(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 // ---------------------------------------------------------------- construction
 
@@ -495,7 +489,7 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
   knot->refusal = (cav_user_refusal){0};
 
   // dynamics, first beside the step where that is an unknown
-  double start = p->jacobian ? now() : 0;
+  double start = p->jacobian ? cav_clock() : 0;
   cav_status status = evaluate_dynamics(p, s, knot, q, v, v_next);
   if (status != CAV_OK) return status;
   // rows that go into the normal equations at once are needed no longer than that
@@ -520,7 +514,7 @@ static cav_status evaluate_knot(const pass *p, cav_scratch *s, int t) {
     a.links = cav_links_of(tr, t);
     if (!a.passing) cav_links_chain(tr, &a.links, nv, 1, s->dq, s->dv, s->dn, knot->du);
   }
-  if (p->jacobian) s->seconds += now() - start;
+  if (p->jacobian) s->seconds += cav_clock() - start;
 
   // rows
   cav_knot_sum(&a, q, v, v_next);
@@ -596,7 +590,7 @@ cav_status cav_transcription_conclude(cav_transcription *tr, const cav_status *s
 /// A pass over all knots.
 static cav_status evaluate(pass *p) {
   cav_transcription *tr = p->tr;
-  double start = now(), dynamics = 0;
+  double start = cav_clock(), dynamics = 0;
   int members = cav_parallel_size(tr->pool);
   p->status = tr->status;
   memset(p->status, 0, (size_t)tr->nknot * sizeof *p->status);
@@ -610,9 +604,9 @@ static cav_status evaluate(pass *p) {
     cav_parallel_for(tr->pool, tr->nknot, p->bound < INFINITY ? evaluate_within : evaluate_item, p);
   for (int i = 0; i < members; i++) dynamics += tr->scratch[i].seconds / members;
   // values alone are dynamics: a clock at every knot would take a twentieth of their time
-  if (!p->jacobian) dynamics = now() - start;
+  if (!p->jacobian) dynamics = cav_clock() - start;
   tr->seconds_dynamics += dynamics;
-  tr->seconds_assembly += now() - start - dynamics;
+  tr->seconds_assembly += cav_clock() - start - dynamics;
   return cav_transcription_conclude(tr, p->status);
 }
 
@@ -696,10 +690,6 @@ double cav_transcription_merit(const cav_transcription *tr) {
   return sum_merit;
 }
 
-static double excess(const cav_slot *slot) {
-  return fmax(fmax(slot->lower - slot->value, slot->value - slot->upper), 0);
-}
-
 double cav_transcription_unactuated(const cav_transcription *tr, int *where) {
   double worst = 0;
   if (where) *where = 0;
@@ -717,7 +707,7 @@ double cav_transcription_violation(const cav_transcription *tr) {
   double worst = 0;
   for (int t = 0; t < tr->nknot; t++)
     for (int i = tr->knot[t].layout.effort; i < tr->knot[t].layout.count; i++)
-      worst = fmax(worst, excess(&tr->knot[t].slot[i]));
+      worst = fmax(worst, cav_slot_excess(&tr->knot[t].slot[i]));
   return worst;
 }
 

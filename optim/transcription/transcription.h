@@ -3,6 +3,7 @@
 #define CAVORT_TRANSCRIPTION_H
 
 #include <assert.h>
+#include <math.h>
 #include <stddef.h>
 
 #include "cavort/solve.h"
@@ -20,6 +21,11 @@ typedef struct cav_slot {
   double final_multiplier; ///< multiplier at the end of a solve, for explanations and warm starts
 } cav_slot;
 
+/// By how much a row is beyond its bounds, 0: it is not.
+static inline double cav_slot_excess(const cav_slot *slot) {
+  return fmax(fmax(slot->lower - slot->value, slot->value - slot->upper), 0);
+}
+
 /// Where a knot's constraint rows come from, in the order in which they stand in cav_knot.slot.
 typedef struct cav_slot_layout {
   int unactuated; ///< first row of the forces that no actuator can give
@@ -36,6 +42,13 @@ typedef struct cav_force_row {
   int *dof;
   double *coef;
 } cav_force_row;
+
+/// Its value at u [nv].
+static inline double cav_force_value(const cav_force_row *row, const double *u) {
+  double value = 0;
+  for (int k = 0; k < row->n; k++) value += row->coef[k] * u[row->dof[k]];
+  return value;
+}
 
 /// A cost row with an absolute norm sqrt(1 + x^2) - 1: its argument at the last linearisation and at the iterate before,
 /// and the dual w of x/sqrt(1 + x^2), -1 .. 1, that its Hessian is taken with.

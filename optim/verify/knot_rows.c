@@ -289,8 +289,7 @@ static double read_limit(const cav_verification *verification, int t, const cav_
   if (row->kind == CAV_BINDING_JOINT) return joint_value(verification, t, row->object);
   if (row->kind == CAV_BINDING_TENDON) return verification->state->tendon_length[row->object];
   if (row->term) return residual[row->object] / verification->deviation[row->object];
-  const cav_joint *joint = model->joint + model->dof[row->object].joint;
-  int line = joint->type == CAV_JOINT_SLIDE || (joint->type == CAV_JOINT_FREE && row->object - joint->dof < 3);
+  int line = cav_verification_is_line(model, row->object);
   return residual[row->object] / (verification->weight * (line ? 1 : verification->arm));
 }
 

@@ -6,16 +6,11 @@
 
 #include "verification.h"
 
-static int is_line(const cav_model *model, int d) {
-  const cav_joint *joint = model->joint + model->dof[d].joint;
-  return joint->type == CAV_JOINT_SLIDE || (joint->type == CAV_JOINT_FREE && d - joint->dof < 3);
-}
-
 void cav_residual_find(cav_verification *verification, double *unit, double *residual) {
   const cav_model *model = verification->model;
   const cav_residual *allowed = &verification->problem->residual;
   for (int d = 0; d < model->nv; d++) {
-    double deviation = is_line(model, d) ? allowed->force : allowed->torque;
+    double deviation = cav_verification_is_line(model, d) ? allowed->force : allowed->torque;
     verification->deviation[d] = 0;
     if (model->link[model->dof[d].link].parent != 0 || !(deviation > 0)) continue;
     memset(unit, 0, sizeof(double) * (size_t)model->nv);
@@ -36,7 +31,7 @@ void cav_residual_add(const cav_verification *verification, int t, const double 
     for (int d = link->dof; d < link->dof + link->ndof; d++) {
       double deviation = verification->deviation[d], x = residual[d];
       if (deviation == 0) continue;
-      square[!is_line(model, d)] += x * x;
+      square[!cav_verification_is_line(model, d)] += x * x;
       sum->cost += 0.5 * verification->h * x * x / (deviation * deviation);
     }
     double f = sqrt(square[0]), m = sqrt(square[1]);

@@ -137,7 +137,7 @@ static void describe(const cav_model *model, const cav_term *term, int k, cav_te
   } else {
     int d = selected_dof(model, term, k);
     const cav_joint *joint = d >= 0 ? &model->joint[model->dof[d].joint] : NULL;
-    int line = joint && (joint->type == CAV_JOINT_SLIDE || (joint->type == CAV_JOINT_FREE && d - joint->dof < 3));
+    int line = joint && cav_verification_is_line(model, d);
     static const char *const units[][2] = {{"rad", "m"}, {"rad/s", "m/s"}, {"rad/s2", "m/s2"}};
     int rate = term->quantity == CAV_QUANTITY_VELOCITY ? 1 : term->quantity == CAV_QUANTITY_ACCELERATION ? 2 : 0;
     unit = units[rate][line];

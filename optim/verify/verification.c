@@ -39,6 +39,11 @@ const char *cav_verification_link_name(const cav_model *model, int link, char bu
   return buffer;
 }
 
+int cav_verification_is_line(const cav_model *model, int dof) {
+  const cav_joint *joint = model->joint + model->dof[dof].joint;
+  return joint->type == CAV_JOINT_SLIDE || (joint->type == CAV_JOINT_FREE && dof - joint->dof < 3);
+}
+
 // 1 if all n values are finite
 static int all_finite(const double *x, size_t n) {
   for (size_t i = 0; i < n; i++) {

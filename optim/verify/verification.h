@@ -58,6 +58,9 @@ void cav_metric_note(cav_metric *metric, double value, int knot, const char *for
 /// Name of a link's body for people: its name, or "body N".
 const char *cav_verification_link_name(const cav_model *model, int link, char buffer[32]);
 
+/// Whether the force of a dof is one, N: of a slide, or of a free joint along an axis; else it is a moment.
+int cav_verification_is_line(const cav_model *model, int dof);
+
 /// Range of an actuator's effort by its constant limits, infinite where open. scale: the larger finite
 /// magnitude of the two, 1 where there is none. actuator_check.c.
 void cav_verification_actuator_range(const cav_model *model, int actuator, double range[2], double *scale);

@@ -90,7 +90,7 @@ static void note_forces(const cav_verification *verification, int t, const doubl
   for (int d = 0; d < model->nv; d++) {
     const cav_joint *joint = model->joint + model->dof[d].joint;
     if (verification->deviation[d] > 0) continue;
-    int line = joint->type == CAV_JOINT_SLIDE || (joint->type == CAV_JOINT_FREE && d - joint->dof < 3);
+    int line = cav_verification_is_line(model, d);
     double fraction = fabs(work[d]) / (verification->weight * (line ? 1 : verification->arm));
     cav_metric_note(&found->unactuated, fraction, t, "%.60s of %.60s, dof %d: %.4g %s%s",
                     joint_name(model, model->dof[d].joint, name), cav_verification_link_name(model, joint->link, link),
